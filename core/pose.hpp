@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace locus {
+
+/// Tangent of SE(3): translation (m) first, then rotation (rad). Order of every 6-vector and 6x6 matrix of the project.
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+/// Rigid transform. A variable T_a_b takes a point of frame b to frame a: p_a = T_a_b * p_b.
+struct Pose {
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero(); ///< metres
+
+  [[nodiscard]] Pose inverse() const {
+    const Eigen::Quaterniond r = rotation.conjugate();
+    return {r, -(r * translation)};
+  }
+  [[nodiscard]] Eigen::Matrix3d R() const { return rotation.toRotationMatrix(); }
+  [[nodiscard]] bool finite() const { return rotation.coeffs().allFinite() && translation.allFinite(); }
+
+  friend Pose operator*(const Pose& T_a_b, const Pose& T_b_c) {
+    return {(T_a_b.rotation * T_b_c.rotation).normalized(), T_a_b.rotation * T_b_c.translation + T_a_b.translation};
+  }
+  friend Eigen::Vector3d operator*(const Pose& T_a_b, const Eigen::Vector3d& p_b) {
+    return T_a_b.rotation * p_b + T_a_b.translation;
+  }
+};
+
+/// v -> matrix with skew(v) * w == v x w.
+Eigen::Matrix3d skew(const Eigen::Vector3d& v);
+
+/// Rotation vector (rad) to rotation and back; log gives the shorter way round.
+Eigen::Quaterniond so3_exp(const Eigen::Vector3d& rotation_vector_rad);
+Eigen::Vector3d so3_log(const Eigen::Quaterniond& rotation);
+
+/// SE(3) exponential of a twist held for unit time, and its inverse.
+Pose se3_exp(const Vector6& tangent);
+Vector6 se3_log(const Pose& pose);
+
+/// Ad(T): takes a twist seen in b to the same twist seen in a, for T_a_b.
+Matrix6 adjoint(const Pose& T_a_b);
+
+/// Linear in translation, slerp in rotation; fraction 0 gives `from`, 1 gives `to`, others extrapolate.
+Pose interpolate(const Pose& T_a_from, const Pose& T_a_to, double fraction);
+
+/// Angle of the rotation, 0..pi.
+double angle_rad(const Eigen::Quaterniond& rotation);
+
+/// Rotation of intrinsic yaw, pitch, roll: Rz(yaw) Ry(pitch) Rx(roll).
+Eigen::Quaterniond from_rpy_rad(const Eigen::Vector3d& rpy_rad);
+
+} // namespace locus
