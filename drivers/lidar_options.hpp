@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "core/pose.hpp"
+
+namespace locus {
+
+namespace velodyne {
+enum class Model : std::uint8_t; // opaque: an option names a model and knows nothing of its geometry
+}
+
+/// Whose clock stamps the measurements of a lidar. `sensor`: its time of hour is taken as true; `receive`: the stamps
+/// of reception fix the offset and the sensor's clock is the ruler; `automatic` (key: auto): `sensor` while it says
+/// that it is locked to PPS, else `receive`.
+enum class LidarTime : std::uint8_t { automatic, sensor, receive };
+
+/// One lidar: how its packets are told from others, how they are read, and where it sits on the robot.
+struct LidarOptions {
+  std::string name = "front";
+  std::optional<velodyne::Model> model; ///< nothing (key: auto): told from the packets
+  std::uint16_t port = 2368;            ///< UDP port that its data packets are sent to
+  std::optional<std::uint32_t>
+      source_ip; ///< of the sender, host byte order; nothing (key: any): whoever sends to the port
+  LidarTime time = LidarTime::automatic;
+  std::string calibration; ///< file of per-laser corrections; empty: the model's built-in table
+  Pose T_base_lidar;
+
+  bool operator==(const LidarOptions&) const = default;
+};
+
+} // namespace locus
