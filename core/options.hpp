@@ -15,27 +15,35 @@
 namespace locus {
 
 /// What can be set about the algorithm, module by module. A field is named as its key in the YAML file, the unit in its
-/// name. problem() says what is wrong as "key: reason, range", and nothing when all is well.
+/// name. problem() says what is wrong, one line "key: reason" for each key that is, and nothing when all is well.
 
 struct BodyBoxOptions { ///< returns inside the box belong to the robot itself and are dropped
   bool enabled = false;
   Eigen::Vector3d min_m = Eigen::Vector3d::Zero(); ///< base frame
   Eigen::Vector3d max_m = Eigen::Vector3d::Zero();
+
+  bool operator==(const BodyBoxOptions&) const = default;
 };
 
 struct SegmentFilterOptions { ///< centroids of short arcs of each ring, in firing order; its leaf follows the scene
   bool enabled = true;
   std::size_t points = 2000; ///< aimed at per sweep
+
+  bool operator==(const SegmentFilterOptions&) const = default;
 };
 
 struct VoxelFilterOptions { ///< one centroid per voxel (paper II-A)
   bool enabled = false;
   double leaf_m = 0.1;
+
+  bool operator==(const VoxelFilterOptions&) const = default;
 };
 
 struct RandomFilterOptions { ///< keeps a seeded random share of the points (paper II-A)
   bool enabled = false;
   double keep = 0.1; ///< share kept, 0..1
+
+  bool operator==(const RandomFilterOptions&) const = default;
 };
 
 /// How returns become the points of a sweep (paper II-A).
@@ -50,6 +58,7 @@ struct SweepOptions {
   std::uint64_t seed = 1;
 
   [[nodiscard]] std::optional<std::string> problem() const;
+  bool operator==(const SweepOptions&) const = default;
 };
 
 enum class ScanToScanMode { always, automatic, off }; ///< automatic (key: auto): only without a healthy six-axis prior
@@ -57,12 +66,16 @@ enum class ScanToScanMode { always, automatic, off }; ///< automatic (key: auto)
 struct RegistrationOptions {
   int max_iterations = 20;           ///< Gauss-Newton steps at most
   double max_correspondence_m = 1.0; ///< points farther than this from their counterpart do not count
+
+  bool operator==(const RegistrationOptions&) const = default;
 };
 
 struct MapOptions {
   double keyframe_m = 1.0;    ///< the map takes a sweep after every so many metres ...
   double keyframe_deg = 30.0; ///< ... or so many degrees (paper II-B.3)
   std::size_t max_bytes = 100'000'000;
+
+  bool operator==(const MapOptions&) const = default;
 };
 
 enum class SourceKind { imu, odometry }; ///< imu gives rotation only, odometry all six axes
@@ -71,6 +84,8 @@ struct MotionSourceOptions {
   std::string name;
   SourceKind kind = SourceKind::odometry;
   Pose T_base_source; ///< imu: where the sensor sits and how it is turned
+
+  bool operator==(const MotionSourceOptions&) const = default;
 };
 
 enum class Fusion { combined, queue }; ///< combined: gyro rotation with odometry translation; queue: paper II-B.1
@@ -90,6 +105,7 @@ struct OdometryOptions {
   int threads = 2;
 
   [[nodiscard]] std::optional<std::string> problem() const;
+  bool operator==(const OdometryOptions&) const = default;
 };
 
 } // namespace locus

@@ -82,4 +82,14 @@ Eigen::Quaterniond from_rpy_rad(const Eigen::Vector3d& rpy_rad) {
                             Eigen::AngleAxisd(rpy_rad.x(), Eigen::Vector3d::UnitX())};
 }
 
+Eigen::Vector3d to_rpy_rad(const Eigen::Quaterniond& rotation) {
+  constexpr double kGimbalLock = 1e-9; // cosine of the pitch below which the yaw is lost in rounding
+  const Eigen::Matrix3d R = rotation.toRotationMatrix();
+  const double yaw = std::hypot(R(0, 0), R(1, 0)) < kGimbalLock ? 0.0 : std::atan2(R(1, 0), R(0, 0));
+  // What is left when the yaw is taken back is Ry(pitch) Rx(roll): exact for any yaw, so also next to the lock.
+  const Eigen::Matrix3d R_pitch_roll = Eigen::AngleAxisd(-yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix() * R;
+  return {std::atan2(-R_pitch_roll(1, 2), R_pitch_roll(1, 1)), std::atan2(-R_pitch_roll(2, 0), R_pitch_roll(0, 0)),
+          yaw};
+}
+
 } // namespace locus

@@ -20,6 +20,7 @@ struct Pose {
     return {r, -(r * translation)};
   }
   [[nodiscard]] Eigen::Matrix3d R() const { return rotation.toRotationMatrix(); }
+  bool operator==(const Pose&) const = default;
   [[nodiscard]] bool finite() const { return rotation.coeffs().allFinite() && translation.allFinite(); }
 
   friend Pose operator*(const Pose& T_a_b, const Pose& T_b_c) {
@@ -52,5 +53,8 @@ double angle_rad(const Eigen::Quaterniond& rotation);
 
 /// Rotation of intrinsic yaw, pitch, roll: Rz(yaw) Ry(pitch) Rx(roll).
 Eigen::Quaterniond from_rpy_rad(const Eigen::Vector3d& rpy_rad);
+
+/// Its inverse: pitch in -pi/2..pi/2. Looking straight up or down, where yaw and roll turn about one axis, yaw is 0.
+Eigen::Vector3d to_rpy_rad(const Eigen::Quaterniond& rotation);
 
 } // namespace locus
