@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "support/scene.hpp"
+#include "support/trajectory.hpp"
+
+namespace locus::sim {
+
+/// Ready-made worlds. The floor is z = 0, except where said; a seed gives the same scene every time.
+
+/// 10 x 8 x 4 m around the origin, with some furniture. The middle 4 x 4 m are free.
+Scene room();
+
+enum class Walls { bare, pillars }; ///< bare: nothing tells where along the corridor one is
+
+/// Along x from 0 to `length_m`, 3 m wide around y = 0, 3 m high, closed at both ends. Pillars and door frames stand at
+/// uneven distances; the middle 1.6 m are free.
+Scene corridor(double length_m, Walls walls = Walls::pillars);
+
+/// Along x from 0 to `length_m`, about 5 m wide around y = 0 and 4 m high, of rough rock that looks alike everywhere.
+/// The middle 3 m are free.
+Scene tunnel(double length_m, std::uint64_t seed = 1);
+
+/// A street along x from -50 m to `length_m` + 50 m: houses with gaps, parked cars, poles, trees. The middle 6 m are
+/// free.
+Scene street(double length_m, std::uint64_t seed = 1);
+
+/// The ground floor of a small power plant: two halls of 24 x 20 m, full of machines and pillars, and two corridors
+/// between them.
+Scene plant();
+
+/// Round the plant as long as `at_least` lasts: through both halls, both corridors and between the machines.
+Course plant_course(Duration at_least, double speed_mps);
+
+/// Where plant_course() begins.
+Start plant_start();
+
+} // namespace locus::sim
