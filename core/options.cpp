@@ -1,42 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/options.hpp"
 
-#include <array>
-#include <charconv>
-#include <string_view>
+#include "core/problems.hpp"
 
 namespace locus {
 namespace {
-
-/// Gathers what is wrong with a set of options.
-class Problems {
- public:
-  void require(bool holds, std::string_view key, std::string_view reason) {
-    if (holds)
-      return;
-    if (!text_.empty())
-      text_ += '\n';
-    text_.append(key).append(": ").append(reason);
-  }
-
-  /// Not-a-number is out of every range.
-  template <class T> void require_range(std::string_view key, T value, T lowest, T highest) {
-    require(value >= lowest && value <= highest, key,
-            shortest(value) + " is outside " + shortest(lowest) + " .. " + shortest(highest));
-  }
-
-  [[nodiscard]] std::optional<std::string> result() const {
-    return text_.empty() ? std::nullopt : std::optional{text_};
-  }
-
- private:
-  template <class T> static std::string shortest(T value) {
-    std::array<char, 32> buffer{};
-    return {buffer.data(), std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr};
-  }
-
-  std::string text_;
-};
 
 void check(Problems& problems, const std::string& section, const RegistrationOptions& options) {
   problems.require_range(section + ".max_iterations", options.max_iterations, 1, 100);

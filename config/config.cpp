@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "config/config.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <set>
+#include <string_view>
+
+#include "core/problems.hpp"
+#include "core/sweep.hpp"
+
+namespace locus {
+namespace {
+
+constexpr std::size_t kMaxLidars = 16;
+
+bool is_word(std::string_view text, std::string_view punctuation) {
+  return !text.empty() && std::isalpha(static_cast<unsigned char>(text.front())) != 0 &&
+         std::all_of(text.begin(), text.end(), [&](unsigned char c) {
+           return std::isalnum(c) != 0 || punctuation.find(static_cast<char>(c)) != std::string_view::npos;
+         });
+}
+
+/// ROS 2's rule for absolute names: /word/word.
+bool is_topic(std::string_view text) {
+  while (text.starts_with('/')) {
+    text.remove_prefix(1);
+    const std::string_view word = text.substr(0, text.find('/'));
+    if (!is_word(word, "_"))
+      return false;
+    text.remove_prefix(word.size());
+    if (text.empty())
+      return true;
+  }
+  return false;
+}
+
+void require_topic_or_empty(Problems& problems, const std::string& key, const std::string& topic) {
+  problems.require(topic.empty() || is_topic(topic), key,
+                   "'" + topic + "' is no topic; write it as /words/of_letters_and_digits");
+}
+
+std::string item(const char* list, std::size_t index, const char* key) {
+  return std::string{list} + '.' + std::to_string(index) + '.' + key;
+}
+
+/// Names are keys of the figures and words of the command line: one meaning each, over lidars and sources together.
+void check_names(Problems& problems, const Config& config) {
+  std::set<std::string_view> taken{"total", "all-lidars"};
+  const auto check = [&](const std::string& key, std::string_view name) {
+    problems.require(is_word(name, "_-"), key,
+                     "'" + std::string{name} + "' is no name; write a letter, then letters, digits, _ or -");
+    problems.require(taken.insert(name).second, key, "'" + std::string{name} + "' is taken, each name may stand once");
+  };
+  for (std::size_t i = 0; i < config.lidars.size(); ++i)
+    check(item("lidars", i, "name"), config.lidars[i].name);
+  for (std::size_t i = 0; i < config.odometry.motion_sources.size(); ++i)
+    check(item("motion_sources", i, "name"), config.odometry.motion_sources[i].name);
+}
+
+void check_lidars(Problems& problems, const std::vector<LidarOptions>& lidars) {
+  problems.require(!lidars.empty() && lidars.size() <= kMaxLidars, "lidars", "there must be 1 to 16 of them");
+  for (std::size_t i = 0; i < lidars.size(); ++i) {
+    problems.require(lidars[i].port != 0, item("lidars", i, "port"), "0 is outside 1 .. 65535");
+    const bool heard_twice = std::any_of(lidars.begin(), lidars.begin() + static_cast<std::ptrdiff_t>(i),
+                                         [&lidar = lidars[i]](const LidarOptions& other) {
+                                           return other.port == lidar.port && (!other.source_ip || !lidar.source_ip ||
+                                                                               *other.source_ip == *lidar.source_ip);
+                                         });
+    problems.require(!heard_twice, item("lidars", i, "port"),
+                     "is another lidar's too; give each its own port, or each its own source_ip");
+  }
+}
+
+void check_sources(Problems& problems, const Config& config) {
+  problems.require(config.odometry.motion_sources.size() <= Sweep::kMaxSources, "motion_sources",
+                   "there may be " + std::to_string(Sweep::kMaxSources) + " at most");
+  for (std::size_t i = 0; i < config.source_topics.size(); ++i) {
+    require_topic_or_empty(problems, item("motion_sources", i, "topic"), config.source_topics[i].topic);
+    require_topic_or_empty(problems, item("motion_sources", i, "health_topic"), config.source_topics[i].health_topic);
+  }
+}
+
+void check_realtime(Problems& problems, const RealtimeOptions& realtime) {
+  problems.require_range("realtime.priority", realtime.priority, 0, 99);
+  for (const int cpu : realtime.cpus)
+    problems.require_range("realtime.cpus", cpu, 0, 1023);
+}
+
+void check_dds(Problems& problems, const DdsOptions& dds) {
+  problems.require_range("dds.domain", dds.domain, 0, 232);
+  problems.require(!dds.interface.empty(), "dds.interface", "must name a network interface, e.g. lo or eth0");
+  problems.require(!dds.frame_odom.empty(), "dds.frame_odom", "must not be empty");
+  problems.require(!dds.frame_base.empty() && dds.frame_base != dds.frame_odom, "dds.frame_base",
+                   "must not be empty and must differ from frame_odom");
+  require_topic_or_empty(problems, "dds.prefix", dds.prefix);
+  require_topic_or_empty(problems, "dds.flat_ground_topic", dds.flat_ground_topic);
+}
+
+} // namespace
+
+OdometryOptions Config::default_odometry() {
+  OdometryOptions odometry;
+  odometry.motion_sources = {{"wio", SourceKind::odometry, {}}, {"imu", SourceKind::imu, {}}};
+  return odometry;
+}
+
+std::optional<std::string> Config::problem() const {
+  Problems problems;
+  check_names(problems, *this);
+  check_lidars(problems, lidars);
+  check_sources(problems, *this);
+  problems.add(sweep.problem());
+  problems.add(odometry.problem());
+  check_realtime(problems, realtime);
+  check_dds(problems, dds);
+  return problems.result();
+}
+
+} // namespace locus

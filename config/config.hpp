@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/options.hpp"
+#include "drivers/lidar_options.hpp"
+
+namespace locus {
+
+/// Where the samples of one motion source come from.
+struct SourceTopics {
+  std::string topic;        ///< sensor_msgs/Imu or nav_msgs/Odometry by the source's kind; empty: not from DDS
+  std::string health_topic; ///< std_msgs/Bool, false is unhealthy; empty: none
+
+  bool operator==(const SourceTopics&) const = default;
+};
+
+/// What the threads of the daemon ask of the operating system.
+struct RealtimeOptions {
+  int priority = 0;         ///< of SCHED_FIFO; 0: ordinary scheduling
+  std::vector<int> cpus;    ///< that the threads may run on; empty: all
+  bool lock_memory = false; ///< mlockall, so that no page is ever waited for
+
+  bool operator==(const RealtimeOptions&) const = default;
+};
+
+/// How the results leave by DDS.
+struct DdsOptions {
+  int domain = 0;
+  std::string interface = "lo";  ///< network interface by name
+  std::string prefix = "/locus"; ///< of every topic but tf and diagnostics
+  std::string frame_odom = "odom";
+  std::string frame_base = "base_link";
+  bool publish_tf = false;
+  bool publish_cloud = false;
+  bool publish_map = false;
+  std::string flat_ground_topic; ///< std_msgs/Bool that overrides flat_ground; empty: none
+  bool type_hashes = true;       ///< announce the types' hashes, which ROS 2 from Iron on looks for
+
+  bool operator==(const DdsOptions&) const = default;
+};
+
+/// All that can be set: the options of every module, as one file describes them. Any thread may read it.
+struct Config {
+  std::vector<LidarOptions> lidars{LidarOptions{}}; ///< the first one gives the sweep its period
+  SweepOptions sweep;
+  OdometryOptions odometry = default_odometry();
+  std::vector<SourceTopics> source_topics{{"/wheel_odometry", ""},
+                                          {"/imu/data", ""}}; ///< of odometry.motion_sources[i]
+  RealtimeOptions realtime;
+  DdsOptions dds;
+
+  /// As problem() of every module, and what only shows when all are seen together: names and ports used twice.
+  [[nodiscard]] std::optional<std::string> problem() const;
+  bool operator==(const Config&) const = default;
+
+ private:
+  static OdometryOptions default_odometry();
+};
+
+} // namespace locus

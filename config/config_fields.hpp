@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string_view>
+#include <utility>
+
+#include "config/config.hpp"
+#include "drivers/velodyne_model.hpp"
+
+/// The one place where a key is spelled. fields() shows a section each key of a struct with its field; a reader fills
+/// the fields from YAML, a writer makes YAML of them. Both therefore know the same keys. Where the file says a thing
+/// otherwise than the struct does, fields() converts before the key and back after it.
+namespace locus {
+
+template <class E> using EnumName = std::pair<std::string_view, E>;
+
+/// The words of an enumeration. YAML 1.1 tools rewrite a plain off or on as false or true: both are understood where
+/// they may occur, the first word is the one that is written.
+inline auto names_of(velodyne::Model) {
+  std::array<EnumName<velodyne::Model>, velodyne::kModels.size()> names;
+  std::transform(velodyne::kModels.begin(), velodyne::kModels.end(), names.begin(), [](velodyne::Model model) {
+    return EnumName<velodyne::Model>{to_string(model), model};
+  });
+  return names;
+}
+constexpr auto names_of(LidarTime) {
+  using enum LidarTime;
+  return std::to_array<EnumName<LidarTime>>({{"auto", automatic}, {"sensor", sensor}, {"receive", receive}});
+}
+constexpr auto names_of(SourceKind) {
+  using enum SourceKind;
+  return std::to_array<EnumName<SourceKind>>({{"imu", imu}, {"odometry", odometry}});
+}
+constexpr auto names_of(Fusion) {
+  using enum Fusion;
+  return std::to_array<EnumName<Fusion>>({{"combined", combined}, {"queue", queue}});
+}
+constexpr auto names_of(NoSourcePrior) {
+  using enum NoSourcePrior;
+  return std::to_array<EnumName<NoSourcePrior>>({{"constant_velocity", constant_velocity}, {"identity", identity}});
+}
+constexpr auto names_of(ScanToScanMode) {
+  using enum ScanToScanMode;
+  return std::to_array<EnumName<ScanToScanMode>>(
+      {{"always", always}, {"auto", automatic}, {"off", off}, {"false", off}});
+}
+constexpr auto names_of(FlatGround) {
+  using enum FlatGround;
+  return std::to_array<EnumName<FlatGround>>(
+      {{"off", off}, {"on", on}, {"auto", automatic}, {"false", off}, {"true", on}});
+}
+
+/// An address as dotted text.
+struct Ipv4 {
+  std::uint32_t host_order = 0;
+};
+
+/// A motion source as the file has it, in one item.
+struct MotionSource {
+  MotionSourceOptions options;
+  SourceTopics topics;
+};
+
+template <class Section> void fields(Section& section, Pose& T) {
+  constexpr double kDeg = std::numbers::pi / 180;
+  // A nanodegree is less than rounding makes of an angle on its way through a rotation: 30 stays 30.
+  Eigen::Vector3d rpy_deg = (to_rpy_rad(T.rotation) / kDeg).unaryExpr([](double angle_deg) {
+    return std::round(angle_deg * 1e9) / 1e9 + 0.0; // no negative zero
+  });
+  section.key("xyz_m", T.translation);
+  section.key("rpy_deg", rpy_deg);
+  T.rotation = from_rpy_rad(rpy_deg * kDeg);
+}
+
+template <class Section> void fields(Section& section, LidarOptions& options) {
+  std::optional<Ipv4> source_ip;
+  if (options.source_ip)
+    source_ip = Ipv4{*options.source_ip};
+  section.key("name", options.name);
+  section.key_or("model", options.model, "auto");
+  section.key("port", options.port);
+  section.key_or("source_ip", source_ip, "any");
+  section.key("time", options.time);
+  section.key("calibration", options.calibration);
+  section.key("T_base_lidar", options.T_base_lidar);
+  options.source_ip = source_ip ? std::optional{source_ip->host_order} : std::nullopt;
+}
+
+template <class Section> void fields(Section& section, MotionSource& source) {
+  section.key("name", source.options.name);
+  section.key("kind", source.options.kind);
+  section.key("topic", source.topics.topic);
+  section.key("health_topic", source.topics.health_topic);
+  section.key("T_base_source", source.options.T_base_source);
+}
+
+template <class Section> void fields(Section& section, BodyBoxOptions& options) {
+  section.key("enabled", options.enabled);
+  section.key("min_m", options.min_m);
+  section.key("max_m", options.max_m);
+}
+
+template <class Section> void fields(Section& section, SegmentFilterOptions& options) {
+  section.key("enabled", options.enabled);
+  section.key("points", options.points);
+}
+
+template <class Section> void fields(Section& section, VoxelFilterOptions& options) {
+  section.key("enabled", options.enabled);
+  section.key("leaf_m", options.leaf_m);
+}
+
+template <class Section> void fields(Section& section, RandomFilterOptions& options) {
+  section.key("enabled", options.enabled);
+  section.key("keep", options.keep);
+}
+
+template <class Section> void fields(Section& section, SweepOptions& options) {
+  constexpr double kLongestMs = 1e9; // what is beyond does not fit a Duration, and is out of range by far
+  std::optional<double> period_ms;
+  if (options.sweep_period)
+    period_ms = to_seconds(*options.sweep_period) * 1e3;
+  std::array<double, 2> range_m{options.min_range_m, options.max_range_m};
+  section.key_or("sweep_period_ms", period_ms, "auto");
+  section.key("motion_correction", options.motion_correction);
+  section.key("range_m", range_m);
+  section.key("body_box", options.body_box);
+  section.key("segment_filter", options.segment_filter);
+  section.key("voxel_filter", options.voxel_filter);
+  section.key("random_filter", options.random_filter);
+  section.key("seed", options.seed);
+  options.sweep_period.reset();
+  if (period_ms)
+    options.sweep_period = from_seconds(std::clamp(*period_ms, -kLongestMs, kLongestMs) * 1e-3);
+  options.min_range_m = range_m[0];
+  options.max_range_m = range_m[1];
+}
+
+template <class Section> void fields(Section& section, RegistrationOptions& options) {
+  section.key("max_iterations", options.max_iterations);
+  section.key("max_correspondence_m", options.max_correspondence_m);
+}
+
+template <class Section> void fields(Section& section, MapOptions& options) {
+  section.key("keyframe_m", options.keyframe_m);
+  section.key("keyframe_deg", options.keyframe_deg);
+  section.key("max_bytes", options.max_bytes);
+}
+
+/// Scan-to-scan is a registration that can be switched.
+struct ScanToScan {
+  ScanToScanMode mode;
+  RegistrationOptions registration;
+};
+
+template <class Section> void fields(Section& section, ScanToScan& options) {
+  section.key("mode", options.mode);
+  fields(section, options.registration);
+}
+
+template <class Section> void fields(Section& section, OdometryOptions& options) {
+  ScanToScan scan_to_scan{options.scan_to_scan_mode, options.scan_to_scan};
+  section.key("fusion", options.fusion);
+  section.key("no_source_prior", options.no_source_prior);
+  section.key("scan_to_scan", scan_to_scan);
+  section.key("scan_to_submap", options.scan_to_submap);
+  section.key("map", options.map);
+  section.key("flat_ground", options.flat_ground);
+  section.key("threads", options.threads);
+  options.scan_to_scan_mode = scan_to_scan.mode;
+  options.scan_to_scan = scan_to_scan.registration;
+}
+
+template <class Section> void fields(Section& section, RealtimeOptions& options) {
+  section.key("priority", options.priority);
+  section.key("cpus", options.cpus);
+  section.key("lock_memory", options.lock_memory);
+}
+
+template <class Section> void fields(Section& section, DdsOptions& options) {
+  section.key("domain", options.domain);
+  section.key("interface", options.interface);
+  section.key("prefix", options.prefix);
+  section.key("frame_odom", options.frame_odom);
+  section.key("frame_base", options.frame_base);
+  section.key("publish_tf", options.publish_tf);
+  section.key("publish_cloud", options.publish_cloud);
+  section.key("publish_map", options.publish_map);
+  section.key("flat_ground_topic", options.flat_ground_topic);
+  section.key("type_hashes", options.type_hashes);
+}
+
+template <class Section> void fields(Section& section, Config& config) {
+  std::vector<MotionSource> sources;
+  for (std::size_t i = 0; i < config.odometry.motion_sources.size(); ++i)
+    sources.push_back({config.odometry.motion_sources[i],
+                       i < config.source_topics.size() ? config.source_topics[i] : SourceTopics{}});
+  section.key("lidars", config.lidars);
+  section.key("motion_sources", sources);
+  fields(section, config.sweep);
+  fields(section, config.odometry);
+  section.key("realtime", config.realtime);
+  section.key("dds", config.dds);
+  config.odometry.motion_sources.clear();
+  config.source_topics.clear();
+  for (MotionSource& source : sources) {
+    config.odometry.motion_sources.push_back(std::move(source.options));
+    config.source_topics.push_back(std::move(source.topics));
+  }
+}
+
+} // namespace locus

@@ -1,0 +1,363 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "config/config_yaml.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nettle/sha2.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <numeric>
+
+#include "config/config_fields.hpp"
+#include "config/yaml_values.hpp"
+
+namespace locus {
+namespace {
+
+struct Mistake {
+  std::string path; ///< "lidars.0.port"; empty: the file as a whole
+  int line = 0;     ///< counted from 1
+  std::string what;
+};
+
+std::string join(const std::string& path, std::string_view key) {
+  return path.empty() ? std::string{key} : path + '.' + std::string{key};
+}
+
+std::vector<std::string> split(std::string_view text, char separator) {
+  std::vector<std::string> parts{""};
+  for (const char c : text)
+    c == separator ? void(parts.emplace_back()) : parts.back().push_back(c);
+  return parts;
+}
+
+/// Edits (a letter more, less or other) that make b of a.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1); // row[j]: from the part of a seen so far to the first j letters of b
+  std::iota(row.begin(), row.end(), 0);
+  for (const char c : a) {
+    std::size_t diagonal = row[0]++;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (c == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+std::string unknown_key(std::string_view key, const std::vector<std::string_view>& known) {
+  const auto nearest = std::min_element(known.begin(), known.end(), [&](std::string_view a, std::string_view b) {
+    return edit_distance(key, a) < edit_distance(key, b);
+  });
+  return fmt::format("unknown key '{}'; the nearest known one is '{}'", key, *nearest);
+}
+
+struct AnySection;
+template <class T>
+concept HasFields = requires(T& value, AnySection& section) {
+  fields(section, value);
+};
+
+/// What a tree of YAML says, read into structs, with the line of every key it holds.
+class Reading {
+ public:
+  /// Reads a section with fields() into `value`; what the tree does not name stays as it is.
+  template <class T> void read_section(const YAML::Node& node, const std::string& path, int line, T& value);
+
+  template <class T> void read(const YAML::Node& node, const std::string& path, int line, T& value) {
+    lines_[path] = line;
+    if constexpr (HasFields<T>)
+      read_section(node, path, line, value);
+    else if (const auto reason = parse(node, value))
+      blame(path, line, *reason);
+  }
+  template <class T> void read(const YAML::Node& node, const std::string& path, int line, std::vector<T>& items) {
+    lines_[path] = line;
+    if (!node.IsSequence())
+      return blame(path, line, "must be a list");
+    items.assign(node.size(), T{});
+    for (std::size_t i = 0; i < items.size(); ++i)
+      read(node[i], join(path, std::to_string(i)), node[i].Mark().line + 1, items[i]);
+  }
+
+  void blame(const std::string& path, int line, std::string what) {
+    mistakes_.push_back({path, line, std::move(what)});
+  }
+
+  /// Takes the lines of a problem() and finds where their keys stand in the file, or the nearest section around them. A
+  /// key that could not even be read is not blamed twice.
+  void blame_problems(const std::optional<std::string>& problems);
+
+  [[nodiscard]] std::vector<Mistake> take_mistakes() {
+    std::stable_sort(mistakes_.begin(), mistakes_.end(), [](const auto& a, const auto& b) { return a.line < b.line; });
+    return std::move(mistakes_);
+  }
+
+ private:
+  std::map<std::string, int> lines_;
+  std::vector<Mistake> mistakes_;
+};
+
+/// The section that a reader shows to fields().
+class SectionReader {
+ public:
+  SectionReader(Reading& reading, const YAML::Node& node, std::string path, int line)
+      : reading_(reading), path_(std::move(path)) {
+    if (!node.IsMap() && !node.IsNull()) // nothing after the colon: a section without keys
+      reading_.blame(path_, line, "must be a section of keys");
+    else
+      for (const auto& entry : node)
+        add(entry.first, entry.second);
+  }
+
+  template <class T> void key(std::string_view name, T& value) {
+    known_.push_back(name);
+    if (const auto entry = entries_.find(name); entry != entries_.end())
+      reading_.read(entry->second.value, join(path_, name), entry->second.line, value);
+  }
+  template <class T> void key_or(std::string_view name, std::optional<T>& value, std::string_view word_for_none) {
+    OptionalWord<T> word{value, word_for_none};
+    key(name, word);
+  }
+
+  void blame_unknown_keys() {
+    for (const auto& [name, entry] : entries_) {
+      if (std::find(known_.begin(), known_.end(), name) == known_.end())
+        reading_.blame(path_, entry.line, unknown_key(name, known_));
+    }
+  }
+
+ private:
+  struct Entry {
+    YAML::Node value;
+    int line;
+  };
+
+  void add(const YAML::Node& key, const YAML::Node& value) {
+    const int line = key.Mark().line + 1;
+    if (!key.IsScalar())
+      reading_.blame(path_, line, "a key must be a word");
+    else if (const auto [entry, is_new] = entries_.try_emplace(key.Scalar(), Entry{value, line}); !is_new)
+      reading_.blame(join(path_, key.Scalar()), line,
+                     "stands a second time, first in line " + std::to_string(entry->second.line));
+  }
+
+  Reading& reading_;
+  std::string path_;
+  std::map<std::string, Entry, std::less<>> entries_;
+  std::vector<std::string_view> known_;
+};
+
+template <class T> void Reading::read_section(const YAML::Node& node, const std::string& path, int line, T& value) {
+  SectionReader section{*this, node, path, line};
+  fields(section, value);
+  section.blame_unknown_keys();
+}
+
+void Reading::blame_problems(const std::optional<std::string>& problems) {
+  if (!problems)
+    return;
+  const std::vector<Mistake> unreadable = mistakes_;
+  for (const std::string& problem : split(*problems, '\n')) {
+    const std::string path = problem.substr(0, problem.find(": "));
+    std::string known = path;
+    while (!known.empty() && !lines_.contains(known))
+      known.resize(known.find('.') == std::string::npos ? 0 : known.rfind('.'));
+    const int line = known.empty() ? 1 : lines_.at(known);
+    if (std::none_of(unreadable.begin(), unreadable.end(), [&](const Mistake& m) { return m.path == path; }))
+      blame(path, line, problem.substr(path.size() + 2));
+  }
+}
+
+/// The section that a writer shows to fields().
+class SectionWriter {
+ public:
+  template <class T> void key(std::string_view name, T& value) { node_.force_insert(std::string{name}, write(value)); }
+  template <class T> void key_or(std::string_view name, std::optional<T>& value, std::string_view word_for_none) {
+    OptionalWord<T> word{value, word_for_none};
+    key(name, word);
+  }
+  [[nodiscard]] YAML::Node node() const { return node_; }
+
+  template <class T> static YAML::Node write(T& value) {
+    if constexpr (!HasFields<T>) {
+      return to_node(value);
+    } else {
+      SectionWriter section;
+      fields(section, value);
+      section.node_.SetStyle(YAML::EmitterStyle::Flow);
+      return section.node_;
+    }
+  }
+  template <class T> static YAML::Node write(std::vector<T>& items) {
+    YAML::Node node{YAML::NodeType::Sequence};
+    for (T& item : items)
+      node.push_back(write(item));
+    if (!HasFields<T> || items.empty())
+      node.SetStyle(YAML::EmitterStyle::Flow);
+    return node;
+  }
+
+ private:
+  YAML::Node node_{YAML::NodeType::Map};
+};
+
+YAML::Node to_tree(Config config) {
+  SectionWriter section;
+  fields(section, config);
+  return section.node();
+}
+
+/// Reads a tree over `config`.
+std::vector<Mistake> read_tree(const YAML::Node& tree, Config& config) {
+  Reading reading;
+  reading.read_section(tree, "", 1, config);
+  reading.blame_problems(config.problem());
+  return reading.take_mistakes();
+}
+
+std::string text_of(const Mistake& mistake) {
+  return mistake.path.empty() ? mistake.what : mistake.path + ": " + mistake.what;
+}
+
+/// One --set option, and the place in the tree it came to stand at.
+struct Override {
+  std::string assignment;
+  std::string path; ///< list items by index
+};
+
+/// Position of a list's item given by its index or its name.
+std::optional<std::size_t> find_item(const YAML::Node& list, const std::string& name_or_index) {
+  for (std::size_t i = 0; i < list.size(); ++i)
+    if (name_or_index == std::to_string(i) || (list[i].IsMap() && list[i]["name"].as<std::string>("") == name_or_index))
+      return i;
+  return std::nullopt;
+}
+
+/// Steps down from `node` along one part of a dotted path. Returns what is wrong, if anything.
+std::optional<std::string> descend(YAML::Node& node, std::string& path, const std::string& part) {
+  if (node.IsMap()) {
+    std::vector<std::string_view> keys;
+    for (const auto& entry : node)
+      keys.push_back(entry.first.Scalar());
+    if (std::find(keys.begin(), keys.end(), part) == keys.end())
+      return unknown_key(part, keys);
+    path = join(path, part);
+    node.reset(node[part]);
+    return std::nullopt;
+  }
+  if (node.IsSequence()) {
+    const auto index = find_item(node, part);
+    if (!index)
+      return path + " has no item '" + part + "'; give a name or an index below " + std::to_string(node.size());
+    path = join(path, std::to_string(*index));
+    node.reset(node[*index]);
+    return std::nullopt;
+  }
+  return path + " has no keys below it";
+}
+
+/// Puts the value of one --set option into the tree. Returns what is wrong, if anything.
+std::optional<std::string> assign(YAML::Node tree, Override& override) {
+  const std::size_t equals = override.assignment.find('=');
+  if (equals == std::string::npos || equals == 0)
+    return "must be KEY=VALUE, e.g. lidars.front.port=2369";
+  YAML::Node node = tree;
+  for (const std::string& part : split(override.assignment.substr(0, equals), '.'))
+    if (const auto problem = descend(node, override.path, part))
+      return problem;
+  try {
+    node = YAML::Load(override.assignment.substr(equals + 1));
+  } catch (const std::exception&) {
+    return "the value is not YAML";
+  }
+  return std::nullopt;
+}
+
+/// The option that a mistake comes from: the last one that set its place, something below it or something around it.
+const Override& culprit(const std::vector<Override>& overrides, const Mistake& mistake) {
+  const auto related = std::find_if(overrides.rbegin(), overrides.rend(), [&](const Override& override) {
+    return (mistake.path + '.').starts_with(override.path + '.') ||
+           (override.path + '.').starts_with(mistake.path + '.');
+  });
+  return related == overrides.rend() ? overrides.back() : *related;
+}
+
+} // namespace
+
+Expected<Config, ConfigErrors> parse_config(const std::string& yaml, const std::string& origin) {
+  std::vector<YAML::Node> documents;
+  try {
+    documents = YAML::LoadAll(yaml);
+  } catch (const YAML::Exception& error) {
+    return ConfigErrors{origin + ':' + std::to_string(error.mark.line + 1) + ": not YAML: " + error.msg};
+  } catch (const std::exception& error) {
+    return ConfigErrors{origin + ":1: not YAML: " + error.what()};
+  }
+  if (documents.size() > 1)
+    return ConfigErrors{origin + ':' + std::to_string(documents[1].Mark().line + 1) +
+                        ": a second YAML document begins; keep one"};
+  Config config;
+  if (documents.empty())
+    return config;
+  ConfigErrors errors;
+  for (const Mistake& mistake : read_tree(documents.front(), config))
+    errors.push_back(origin + ':' + std::to_string(mistake.line) + ": " + text_of(mistake));
+  if (!errors.empty())
+    return errors;
+  return config;
+}
+
+Expected<Config, ConfigErrors> load_config(const std::filesystem::path& file) {
+  constexpr std::streamsize kMaxBytes = 1 << 20;
+  std::string text(kMaxBytes + 1, '\0');
+  std::ifstream stream{file, std::ios::binary};
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (stream.bad() || (stream.gcount() == 0 && !stream.eof()))
+    return ConfigErrors{file.string() + ": cannot be read; give a YAML file that exists and may be read"};
+  if (stream.gcount() > kMaxBytes)
+    return ConfigErrors{file.string() + ": is longer than 1 MiB; this is no configuration"};
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  return parse_config(text, file.string());
+}
+
+Expected<Config, ConfigErrors> override_config(const Config& config, std::span<const std::string> assignments) {
+  const YAML::Node tree = to_tree(config);
+  std::vector<Override> overrides;
+  ConfigErrors errors;
+  for (const std::string& assignment : assignments) {
+    Override& override = overrides.emplace_back(Override{assignment, ""});
+    if (const auto problem = assign(tree, override))
+      errors.push_back("--set " + assignment + ": " + *problem);
+  }
+  if (!errors.empty() || overrides.empty())
+    return errors.empty() ? Expected<Config, ConfigErrors>{config} : errors;
+  Config changed = config;
+  for (const Mistake& mistake : read_tree(tree, changed))
+    errors.push_back("--set " + culprit(overrides, mistake).assignment + ": " + text_of(mistake));
+  if (!errors.empty())
+    return errors;
+  return changed;
+}
+
+std::string print_config(const Config& config) {
+  YAML::Emitter emitter;
+  emitter << to_tree(config);
+  return std::string{emitter.c_str(), emitter.size()} + '\n';
+}
+
+std::string config_sha256(const Config& config) {
+  const std::string text = print_config(config);
+  sha256_ctx context;
+  sha256_init(&context);
+  sha256_update(&context, text.size(), reinterpret_cast<const std::uint8_t*>(text.data()));
+  std::array<std::uint8_t, SHA256_DIGEST_SIZE> digest{};
+  sha256_digest(&context, digest.size(), digest.data());
+  return fmt::format("{:02x}", fmt::join(digest, ""));
+}
+
+} // namespace locus
