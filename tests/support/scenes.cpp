@@ -208,6 +208,29 @@ Course plant_course(Duration at_least, double speed_mps) {
   return Course::along(waypoints, {.speed_mps = speed_mps, .turn_rate_radps = 0.8 * std::max(1.0, speed_mps)});
 }
 
+Course room_course(Duration at_least, double speed_mps) {
+  const double lap_m = 8; // a little less than it is, corners cut
+  const auto laps = 1 + static_cast<int>(to_seconds(at_least) * speed_mps / lap_m);
+  std::vector<Eigen::Vector2d> waypoints{{-1.2, -1.2}};
+  for (int i = 0; i < laps; ++i)
+    waypoints.insert(waypoints.end(), {{1.2, -1.2}, {1.2, 1.2}, {-1.2, 1.2}, {-1.2, -1.2}});
+  return Course::along(waypoints, {.speed_mps = speed_mps, .turn_rate_radps = 2.0});
+}
+
+Start room_start() { return {.position_m = {-1.2, -1.2}, .heading_rad = 0}; }
+
+Course weaving_course(Duration at_least, double speed_mps, double aside_m, double wave_m) {
+  const double length_m = to_seconds(at_least) * speed_mps;
+  std::vector<Eigen::Vector2d> waypoints{{0, 0}};
+  for (double side = 1; waypoints.back().x() < length_m || waypoints.size() < 3; side = -side)
+    waypoints.emplace_back(waypoints.back().x() + wave_m / 2, side * aside_m);
+  return Course::along(waypoints, {.speed_mps = speed_mps});
+}
+
+Start weaving_start(double x_m, double aside_m, double wave_m) {
+  return {.position_m = {x_m, 0}, .heading_rad = std::atan2(aside_m, wave_m / 2)};
+}
+
 Start plant_start() { return {.position_m = {15, 14.8}, .heading_rad = std::atan2(15.5 - 14.8, 22.0 - 15.0)}; }
 
 } // namespace locus::sim

@@ -37,4 +37,12 @@ Course plant_course(Duration at_least, double speed_mps);
 /// Where plant_course() begins.
 Start plant_start();
 
+/// Laps of 2.4 x 2.4 m in the middle of room(), at 2 rad/s in the corners; begins at room_start().
+Course room_course(Duration at_least, double speed_mps);
+Start room_start();
+
+/// Along x from its Start, weaving by `aside_m` to either side over `wave_m`, for at least as long as asked.
+Course weaving_course(Duration at_least, double speed_mps, double aside_m, double wave_m);
+Start weaving_start(double x_m, double aside_m, double wave_m);
+
 } // namespace locus::sim

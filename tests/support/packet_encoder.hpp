@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "core/pose.hpp"
+#include "drivers/datagram.hpp"
+#include "drivers/velodyne_model.hpp"
+#include "support/scene.hpp"
+#include "support/trajectory.hpp"
+
+namespace locus::sim {
+
+inline constexpr std::size_t kPositionPacketBytes = 512;
+
+/// A lidar, how it is mounted and what is wrong with it; as it stands, a perfect one that stands level in the base.
+struct SyntheticLidarOptions {
+  velodyne::Model model = velodyne::Model::vlp16;
+  velodyne::ReturnMode return_mode = velodyne::ReturnMode::strongest;
+  double rpm = 600;
+  double first_azimuth_deg = 0; ///< when the trajectory starts
+  Pose T_base_lidar;
+  std::uint16_t port = 2368;                   ///< that data packets are sent to
+  std::uint32_t source_ip = 0xC0A8'01C9;       ///< 192.168.1.201
+  double min_range_m = 0.4, max_range_m = 100; ///< no return beyond
+  double range_noise_m = 0;                    ///< standard deviation
+  double dropout = 0;                          ///< share of the returns that is lost, 0..1
+  Duration clock_offset{};                     ///< what its clock is ahead of true time
+  bool sends_position_packets = false;         ///< one after every fifth data packet
+  bool pps_locked = true;                      ///< and a valid fix, in its position packets
+  std::uint64_t seed = 1;
+};
+
+/// A Velodyne on a moving robot: makes the datagrams that the sensor would send, firing by firing. Every ray leaves
+/// from where the laser is at its own time, under the azimuth that the rotor has at that time. One owner.
+class SyntheticLidar {
+ public:
+  /// Scene and trajectory must outlive it. The same arguments give the same bytes.
+  SyntheticLidar(const Scene& scene, const Trajectory& trajectory, const SyntheticLidarOptions& options);
+
+  /// The next data or position packet, sent when its last firing is over. There is always one: when the course ends the
+  /// robot stands.
+  Datagram next();
+
+ private:
+  struct Aim { ///< of a laser, in the frame of the lidar, but for the azimuth
+    double cos_elevation, sin_elevation;
+    double azimuth_offset_rad;
+    double origin_z_m;
+  };
+  struct Echo {
+    std::uint16_t ticks = 0; ///< of the model's distance resolution; 0: none
+    std::uint8_t intensity = 0;
+  };
+  struct Echoes {
+    Echo last, strongest;
+  };
+  struct Mount; ///< where the lidar is and how it moves while one column is fired
+
+  void fill_data_packet();
+  void fill_column(std::size_t column);
+  void put_block_headers(std::size_t column, Stamp fired);
+  void put_echo(std::size_t block, std::size_t channel, const Echo& echo);
+  Echoes fire(const Mount& mount, const velodyne::Firing& firing, double column_azimuth_rad);
+  [[nodiscard]] std::optional<Hit> look(const Mount& mount, const velodyne::Firing& firing, double azimuth_rad) const;
+  Echo measure(const std::optional<Hit>& hit);
+  [[nodiscard]] double rotor_azimuth_rad(Stamp stamp) const;
+  [[nodiscard]] std::uint32_t microseconds_past_hour(Stamp stamp) const;
+  void fill_position_packet();
+  [[nodiscard]] Datagram datagram(std::span<const std::byte> payload, std::uint16_t port) const;
+
+  const Scene& scene_;
+  const Trajectory& trajectory_;
+  SyntheticLidarOptions options_;
+  const velodyne::ModelSpec& spec_;
+  velodyne::PacketLayout layout_;
+  std::vector<Aim> aims_; ///< by laser
+  double rotor_rate_radps_;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+  std::uniform_real_distribution<double> uniform_;
+
+  Stamp packet_begin_; ///< first firing of the data packet to come
+  int data_packets_until_position_;
+  std::array<std::byte, velodyne::kDataPacketBytes> data_{};
+  std::array<std::byte, kPositionPacketBytes> position_{};
+};
+
+} // namespace locus::sim
