@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/motion_track.hpp"
+
+#include <algorithm>
+
+namespace locus {
+
+MotionTrack::MotionTrack(const MotionSourceOptions& options)
+    : kind_(options.kind), T_base_source_(options.T_base_source), nodes_(kCapacity) {}
+
+void MotionTrack::add(const ImuSample& sample) {
+  if (!accepts(sample.stamp, sample.angular_velocity_radps.allFinite() && sample.specific_force_mps2.allFinite()))
+    return;
+  const Eigen::Vector3d angular_velocity_base = T_base_source_.rotation * sample.angular_velocity_radps;
+  Node node{sample.stamp, Pose{}, T_base_source_.rotation * sample.specific_force_mps2};
+  if (size_ > 0) {
+    const Node& last = from_newest(0);
+    const Eigen::Vector3d mean = 0.5 * (last_angular_velocity_base_radps_ + angular_velocity_base);
+    const Eigen::Vector3d turn_rad = to_seconds(sample.stamp - last.stamp) * mean;
+    node.T_source_base.rotation = (last.T_source_base.rotation * so3_exp(turn_rad)).normalized();
+  }
+  last_angular_velocity_base_radps_ = angular_velocity_base;
+  push(node);
+}
+
+void MotionTrack::add(const OdometrySample& sample) {
+  const Eigen::Quaterniond& q = sample.T_source_base.rotation;
+  if (!accepts(sample.stamp, sample.T_source_base.finite() && q.norm() > 0.5))
+    return;
+  push({sample.stamp, Pose{q.normalized(), sample.T_source_base.translation}});
+}
+
+bool MotionTrack::accepts(Stamp stamp, bool finite) {
+  ++counters_.received;
+  if (!finite) {
+    ++counters_.rejected.nan;
+    return false;
+  }
+  if (size_ > 0 && stamp <= from_newest(0).stamp) {
+    ++counters_.rejected.out_of_order;
+    return false;
+  }
+  return true;
+}
+
+void MotionTrack::push(const Node& node) {
+  newest_ = (newest_ + 1) % kCapacity;
+  nodes_[newest_] = node;
+  size_ = std::min(size_ + 1, kCapacity);
+}
+
+const MotionTrack::Node& MotionTrack::from_newest(std::size_t age) const {
+  return nodes_[(newest_ + kCapacity - age) % kCapacity];
+}
+
+std::size_t MotionTrack::age_at(Stamp stamp) const {
+  std::size_t younger = 0;
+  std::size_t older = size_;
+  while (younger < older) {
+    const std::size_t middle = (younger + older) / 2;
+    if (from_newest(middle).stamp <= stamp)
+      older = middle;
+    else
+      younger = middle + 1;
+  }
+  return younger;
+}
+
+std::optional<Pose> MotionTrack::at(Stamp stamp) const {
+  const std::size_t age = age_at(stamp);
+  if (age == size_)
+    return std::nullopt;
+  stamp = std::min(stamp, from_newest(0).stamp + kMaxExtrapolation);
+  if (age == 0 && size_ == 1)
+    return from_newest(0).T_source_base;
+  const Node& before = from_newest(age == 0 ? 1 : age);
+  const Node& after = from_newest(age == 0 ? 0 : age - 1);
+  const double fraction = to_seconds(stamp - before.stamp) / to_seconds(after.stamp - before.stamp);
+  return interpolate(before.T_source_base, after.T_source_base, fraction);
+}
+
+bool MotionTrack::has_sample_in(Stamp from, Stamp to) const {
+  const std::size_t age = age_at(to);
+  return age < size_ && from_newest(age).stamp > from;
+}
+
+std::optional<Eigen::Vector3d> MotionTrack::mean_specific_force_mps2(Stamp from, Stamp to) const {
+  if (kind_ != SourceKind::imu || !has_sample_in(from, to))
+    return std::nullopt;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double count = 0.0;
+  for (std::size_t age = age_at(to); age < size_ && from_newest(age).stamp > from; ++age) {
+    sum += from_newest(age).specific_force_base_mps2;
+    count += 1.0;
+  }
+  return sum / count;
+}
+
+} // namespace locus

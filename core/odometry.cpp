@@ -1,0 +1,304 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/odometry.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/motion_sources.hpp"
+
+namespace locus {
+
+namespace {
+
+constexpr std::size_t kMinPoints = 30; ///< fewer say nothing reliable about six axes
+
+/// Least share of the points that must find a counterpart for a registration to be believed.
+constexpr double kMinInlierShare = 0.2;
+
+/// A registration that contradicts the prior by more than this many standard deviations, and by more than the least, is
+/// refused.
+constexpr double kMaxDeviation_sigma = 8.0;
+constexpr double kAlwaysAllowed_m = 0.5;
+constexpr double kAlwaysAllowed_rad = 0.1;
+
+/// After so many refusals in a row the submap is behind us, and the map goes on from the prediction.
+constexpr int kRefusalsToRestart = 10;
+
+/// Neighbouring points share errors of calibration and of correction: so many of them count as one.
+constexpr double kPointsPerIndependentPoint = 4.0;
+
+/// Least share of normals along a direction for it to count as seen, with hysteresis.
+constexpr double kDegenerateBelow = 0.02;
+constexpr double kObservableAbove = 0.04;
+
+constexpr double kGravity_mps2 = 9.80665;
+constexpr double kGravityTolerance_mps2 = 0.5;
+
+constexpr std::size_t kLastScanBytes = 8'000'000;
+
+Vector6 sigma(double translation_m, double rotation_deg) {
+  const double rotation_rad = rotation_deg * std::numbers::pi / 180.0;
+  Vector6 s;
+  s << Eigen::Vector3d::Constant(translation_m), Eigen::Vector3d::Constant(rotation_rad);
+  return s;
+}
+
+const Vector6 kUnknownMotion = sigma(3.0, 10.0); ///< per sweep, of a robot of which nothing is known
+
+/// Roll and pitch that a resting robot must have for gravity to read as it does; no yaw.
+Eigen::Quaterniond level(const Eigen::Vector3d& specific_force_base_mps2) {
+  const Eigen::Vector3d& f = specific_force_base_mps2;
+  return from_rpy_rad({std::atan2(f.y(), f.z()), std::atan2(-f.x(), std::hypot(f.y(), f.z())), 0.0});
+}
+
+/// Block-diagonal matrix that turns both halves of a 6-vector.
+Matrix6 turn_both(const Eigen::Quaterniond& rotation) {
+  Matrix6 R = Matrix6::Zero();
+  R.topLeftCorner<3, 3>() = R.bottomRightCorner<3, 3>() = rotation.toRotationMatrix();
+  return R;
+}
+
+/// Difference T - reference as translation and turn, both along the axes of the common left frame.
+Vector6 difference(const Pose& T, const Pose& reference) {
+  Vector6 d;
+  d << T.translation - reference.translation, so3_log(T.rotation * reference.rotation.conjugate());
+  return d;
+}
+
+/// The point as seen from the end of the sweep, for a base that moved with a constant twist while the sweep came in.
+SurfacePoint corrected(const SweepPoint& point, const Vector6& twist_base) {
+  const Pose T_end_firing = se3_exp(-static_cast<double>(point.age_s) * twist_base);
+  return {(T_end_firing * point.position_base_m.cast<double>()).cast<float>(),
+          (T_end_firing.rotation * point.normal_base.cast<double>()).cast<float>()};
+}
+
+void correct_all(std::span<const SweepPoint> points, const Vector6& twist_base, std::vector<SurfacePoint>& scan) {
+  scan.clear();
+  for (const SweepPoint& point : points)
+    scan.push_back(corrected(point, twist_base));
+}
+
+} // namespace
+
+Odometry::Odometry(const OdometryOptions& options, StageClock* clock)
+    : options_(options), clock_(clock), gicp_(options.threads), map_(options.map.max_bytes),
+      last_scan_map_(kLastScanBytes), constant_velocity_statistics_(sigma(0.3, 3.0), sigma(0.005, 0.05)) {
+  for (const MotionSourceOptions& source : options.motion_sources) {
+    const bool imu = source.kind == SourceKind::imu;
+    statistics_.emplace_back(imu ? sigma(0.3, 0.3) : sigma(0.05, 0.5), sigma(0.002, 0.02));
+  }
+}
+
+OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested& stop) {
+  if (processed_ == 0)
+    return begin(sweep);
+  const Prior prior = integrate_sensors(sweep);
+  Pose T_last_now = prior.T_last_now;
+  correct_motion(sweep, T_last_now);
+
+  OdometryEstimate estimate;
+  estimate.scan_to_scan = match_scan(sweep, prior, stop);
+  if (trusts(estimate.scan_to_scan, estimate.scan_to_scan.T_target_source, prior)) {
+    T_last_now = estimate.scan_to_scan.T_target_source;
+    if (prior.from_start_of_motion)
+      restart_from(sweep, T_last_now);
+    correct_motion(sweep, T_last_now);
+  }
+  estimate.scan_to_submap = match_submap(prior, T_last_now, stop);
+  estimate.failed =
+      !trusts(estimate.scan_to_submap, T_odom_last_.inverse() * estimate.scan_to_submap.T_target_source, prior);
+  estimate.T_odom_base = estimate.failed ? T_odom_last_ * T_last_now : estimate.scan_to_submap.T_target_source;
+  finish(sweep, prior, estimate);
+  return estimate;
+}
+
+/// The world begins at the first sweep: at its origin, without yaw, level if gravity is known.
+OdometryEstimate Odometry::begin(const Sweep& sweep) {
+  const auto& force = sweep.specific_force_base_mps2;
+  if (force && std::abs(force->norm() - kGravity_mps2) < kGravityTolerance_mps2)
+    T_odom_last_.rotation = level(*force);
+  correct_all(sweep.points, Vector6::Zero(), scan_);
+  if (sweep.uncorrected != Uncorrected::nothing) {
+    first_points_ = sweep.points;
+    first_duration_ = sweep.end - sweep.start;
+  }
+  OdometryEstimate estimate;
+  estimate.T_odom_base = T_odom_last_;
+  estimate.failed = scan_.size() < kMinPoints;
+  finish(sweep, Prior{}, estimate);
+  if (estimate.failed)
+    processed_ = 0; // nothing was seen yet: the next sweep is the first
+  return estimate;
+}
+
+Odometry::Prior Odometry::integrate_sensors(const Sweep& sweep) const {
+  Prior prior;
+  const double elapsed_s = to_seconds(sweep.end - last_stamp_);
+  const double periods = last_period_ > Duration::zero() ? std::max(1.0, elapsed_s / to_seconds(last_period_)) : 1.0;
+  const bool keeps_velocity = options_.no_source_prior == NoSourcePrior::constant_velocity && elapsed_s > 0.0;
+  if (keeps_velocity)
+    prior.T_last_now = se3_exp(elapsed_s * twist_base_);
+  prior.source.rotation = prior.source.translation =
+      keeps_velocity ? PriorSource::kConstantVelocity : PriorSource::kIdentity;
+  prior.from_start_of_motion = processed_ == 1;
+  prior.variance =
+      prior.from_start_of_motion ? kUnknownMotion.cwiseAbs2().eval() : constant_velocity_statistics_.variance(periods);
+
+  const auto kind_of = [this](std::size_t i) { return options_.motion_sources[i].kind; };
+  const auto usable = [&](std::size_t i) { return sweep.sources[i].usable && last_sources_[i].usable; };
+  const SourceChoice choice = choose_sources(kind_of, options_.motion_sources.size(), options_.fusion, usable);
+  const auto step = [&](std::size_t i) {
+    return last_sources_[i].T_source_base.inverse() * sweep.sources[i].T_source_base;
+  };
+  if (choice.rotation) {
+    prior.T_last_now.rotation = step(*choice.rotation).rotation;
+    prior.variance.tail<3>() = statistics_[*choice.rotation].variance(periods).tail<3>();
+    prior.source.rotation = static_cast<int>(*choice.rotation);
+  }
+  if (choice.translation) {
+    prior.T_last_now.translation = step(*choice.translation).translation;
+    prior.variance.head<3>() = statistics_[*choice.translation].variance(periods).head<3>();
+    prior.source.translation = static_cast<int>(*choice.translation);
+    prior.from_start_of_motion = false;
+  }
+  return prior;
+}
+
+/// Takes out of the points what no motion source could, with the twist that T_last_now means.
+void Odometry::correct_motion(const Sweep& sweep, const Pose& T_last_now) {
+  Vector6 twist = Vector6::Zero();
+  const double elapsed_s = to_seconds(sweep.end - last_stamp_);
+  if (sweep.uncorrected != Uncorrected::nothing && elapsed_s > 0.0) {
+    twist = se3_log(T_last_now) / elapsed_s;
+    if (sweep.uncorrected == Uncorrected::translation)
+      twist.tail<3>().setZero();
+  }
+  correct_all(sweep.points, twist, scan_);
+}
+
+Registration Odometry::match_scan(const Sweep& sweep, const Prior& prior, const Gicp::StopRequested& stop) {
+  Registration none;
+  none.T_target_source = prior.T_last_now;
+  const bool needed = options_.scan_to_scan_mode == ScanToScanMode::always || prior.source.translation < 0;
+  if (options_.scan_to_scan_mode == ScanToScanMode::off || !needed || sweep.points.size() < kMinPoints)
+    return none;
+  const StageScope scope(clock_, Stage::scan_to_scan);
+  last_scan_map_.clear();
+  last_scan_map_.insert(last_scan_, Pose{});
+  const PosePrior pose_prior{prior.T_last_now, prior.variance.cwiseInverse().asDiagonal()};
+  return gicp_.align(scan_, last_scan_map_, prior.T_last_now, pose_prior, options_.scan_to_scan,
+                     prior.from_start_of_motion, stop);
+}
+
+/// The first two sweeps came without any idea of the motion. Now that there is one, the first is corrected with it, and
+/// the map begins anew.
+void Odometry::restart_from(const Sweep& sweep, const Pose& T_last_now) {
+  const double elapsed_s = to_seconds(sweep.end - last_stamp_);
+  if (first_points_.empty() || elapsed_s <= 0.0)
+    return;
+  correct_all(first_points_, se3_log(T_last_now) / elapsed_s, last_scan_);
+  map_.clear();
+  map_.insert(last_scan_, T_odom_last_);
+  first_points_ = {};
+}
+
+Registration Odometry::match_submap(const Prior& prior, const Pose& T_last_now, const Gicp::StopRequested& stop) {
+  const StageScope scope(clock_, Stage::scan_to_submap);
+  const Pose T_start = T_odom_last_ * T_last_now;
+  Registration none;
+  none.T_target_source = T_start;
+  if (scan_.size() < kMinPoints)
+    return none;
+  const Matrix6 R = turn_both(T_odom_last_.rotation);
+  const PosePrior pose_prior{T_odom_last_ * prior.T_last_now,
+                             R * prior.variance.cwiseInverse().asDiagonal() * R.transpose()};
+  return gicp_.align(scan_, map_, T_start, pose_prior, options_.scan_to_submap, false, stop);
+}
+
+bool Odometry::trusts(const Registration& registration, const Pose& T_last_now, const Prior& prior) const {
+  if (registration.iterations == 0 || !T_last_now.finite() ||
+      static_cast<double>(registration.inliers) < kMinInlierShare * static_cast<double>(scan_.size()))
+    return false;
+  Vector6 allowed;
+  allowed << Eigen::Vector3d::Constant(kAlwaysAllowed_m), Eigen::Vector3d::Constant(kAlwaysAllowed_rad);
+  allowed = allowed.cwiseMax(kMaxDeviation_sigma * prior.variance.cwiseSqrt());
+  return (difference(T_last_now, prior.T_last_now).cwiseAbs().array() <= allowed.array()).all();
+}
+
+void Odometry::learn(const Prior& prior, const Pose& T_last_now, const Registration& registration) {
+  const Matrix6 R = turn_both(T_odom_last_.rotation.conjugate());
+  const Matrix6 information = R * registration.information * R.transpose() / kPointsPerIndependentPoint;
+  const auto learn_from = [&](int source, const Pose& predicted) {
+    PriorStatistics& statistics =
+        source >= 0 ? statistics_[static_cast<std::size_t>(source)] : constant_velocity_statistics_;
+    statistics.learn(difference(T_last_now, predicted), information);
+  };
+  learn_from(prior.source.translation, prior.T_last_now);
+  if (prior.source.rotation != prior.source.translation)
+    learn_from(prior.source.rotation, prior.T_last_now);
+}
+
+void Odometry::update_map(OdometryEstimate& estimate) {
+  const Pose T_keyframe_base = T_odom_keyframe_.inverse() * estimate.T_odom_base;
+  const double turned_deg = angle_rad(T_keyframe_base.rotation) * 180.0 / std::numbers::pi;
+  const bool moved =
+      T_keyframe_base.translation.norm() > options_.map.keyframe_m || turned_deg > options_.map.keyframe_deg;
+  const bool first = processed_ == 0;
+  const bool restarts = refused_in_a_row_ >= kRefusalsToRestart && scan_.size() >= kMinPoints;
+  if ((estimate.failed && !restarts) || !(moved || first || restarts))
+    return;
+  const StageScope scope(clock_, Stage::map);
+  map_.insert(scan_, estimate.T_odom_base);
+  T_odom_keyframe_ = estimate.T_odom_base;
+  refused_in_a_row_ = 0;
+  estimate.keyframe = true;
+}
+
+/// Fills in what the estimate says beside its pose, takes the sweep into the map and remembers it as the last.
+void Odometry::finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate) {
+  estimate.stamp = sweep.end;
+  estimate.points = scan_.size();
+  estimate.prior = prior.source;
+  refused_in_a_row_ = estimate.failed ? refused_in_a_row_ + 1 : 0;
+  const Pose T_last_now = T_odom_last_.inverse() * estimate.T_odom_base;
+  const double elapsed_s = to_seconds(sweep.end - last_stamp_);
+
+  if (processed_ > 0) {
+    const Matrix6 R = turn_both(T_odom_last_.rotation);
+    Matrix6 information = R * prior.variance.cwiseInverse().asDiagonal() * R.transpose();
+    if (!estimate.failed) {
+      information += estimate.scan_to_submap.information / kPointsPerIndependentPoint;
+      learn(prior, T_last_now, estimate.scan_to_submap);
+      const double weakest = estimate.scan_to_submap.observability[0];
+      degenerate_ = weakest < (degenerate_ ? kObservableAbove : kDegenerateBelow);
+    }
+    const Matrix6 step_covariance = information.inverse();
+    Matrix6 transport = Matrix6::Identity();
+    transport.topRightCorner<3, 3>() = -skew(estimate.T_odom_base.translation - T_odom_last_.translation);
+    covariance_ = transport * covariance_ * transport.transpose();
+    estimate.pose_covariance = covariance_ + step_covariance;
+    if (elapsed_s > 0.0) {
+      twist_base_ = se3_log(T_last_now) / elapsed_s;
+      const Matrix6 R_base = turn_both(estimate.T_odom_base.rotation.conjugate());
+      estimate.twist_covariance = 2.0 / (elapsed_s * elapsed_s) * R_base * step_covariance * R_base.transpose();
+    }
+    estimate.twist_base = twist_base_;
+  }
+  if (scan_.size() < kMinPoints || estimate.failed)
+    estimate.state = TrackingState::dead_reckoning;
+  else
+    estimate.state = degenerate_ ? TrackingState::degenerate : TrackingState::tracking;
+
+  update_map(estimate);
+  if (estimate.keyframe || estimate.failed)
+    covariance_ = estimate.pose_covariance;
+  ++processed_;
+  T_odom_last_ = estimate.T_odom_base;
+  last_stamp_ = sweep.end;
+  last_period_ = sweep.end - sweep.start;
+  last_sources_ = sweep.sources;
+  std::swap(last_scan_, scan_);
+}
+
+} // namespace locus

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/odometry_estimate.hpp"
+#include "core/options.hpp"
+#include "core/prior_statistics.hpp"
+#include "core/registration.hpp"
+#include "core/stage_clock.hpp"
+#include "core/surface_map.hpp"
+#include "core/sweep.hpp"
+
+namespace locus {
+
+/// The scan matching unit of LOCUS (paper II-B): sweeps in, odometry out.
+///
+/// Each sweep is registered with the one before (equation 1) and with the submap (equation 2), starting from what the
+/// motion sources say. The prior is not only the start: it takes part in the registration with the weight it has proved
+/// to deserve, so an axis that the points do not see falls back to it by itself. The result depends on the sweeps that
+/// were processed and on nothing else. One owner.
+class Odometry {
+ public:
+  explicit Odometry(const OdometryOptions& options, StageClock* clock = nullptr);
+
+  /// The estimate for the end of the sweep. Never fails: a sweep that cannot be registered yields the prediction,
+  /// flagged. `stop` ends a registration early.
+  OdometryEstimate process(
+      const Sweep& sweep, const Gicp::StopRequested& stop = [] { return false; });
+
+  [[nodiscard]] const SurfaceMap& map() const { return map_; }
+
+ private:
+  /// E of the paper's II-B.1: the motion since the last processed sweep, before a look at the points.
+  struct Prior {
+    Pose T_last_now;
+    Vector6 variance = Vector6::Zero(); ///< in the axes of the base at the last sweep
+    PriorSource source;
+    bool from_start_of_motion = false; ///< nothing at all is known yet: not even a velocity
+  };
+
+  OdometryEstimate begin(const Sweep& sweep);
+  [[nodiscard]] Prior integrate_sensors(const Sweep& sweep) const;
+  void correct_motion(const Sweep& sweep, const Pose& T_last_now);
+  Registration match_scan(const Sweep& sweep, const Prior& prior, const Gicp::StopRequested& stop);
+  Registration match_submap(const Prior& prior, const Pose& T_last_now, const Gicp::StopRequested& stop);
+  void restart_from(const Sweep& sweep, const Pose& T_last_now);
+  [[nodiscard]] bool trusts(const Registration& registration, const Pose& T_last_now, const Prior& prior) const;
+  void learn(const Prior& prior, const Pose& T_last_now, const Registration& registration);
+  void update_map(OdometryEstimate& estimate);
+  void finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate);
+
+  OdometryOptions options_;
+  StageClock* clock_;
+  Gicp gicp_;
+  SurfaceMap map_;
+  SurfaceMap last_scan_map_;       ///< the last processed sweep alone, the target of scan-to-scan
+  std::vector<SurfacePoint> scan_; ///< the sweep at hand, fully corrected
+  std::vector<SurfacePoint> last_scan_;
+  std::vector<PriorStatistics> statistics_; ///< by motion source
+  PriorStatistics constant_velocity_statistics_;
+
+  std::uint64_t processed_ = 0;
+  std::vector<SweepPoint>
+      first_points_; ///< of the first sweep, as they came: no velocity was known to correct them with
+  Duration first_duration_{};
+  Stamp last_stamp_;
+  Duration last_period_{};
+  std::array<SourcePose, Sweep::kMaxSources> last_sources_;
+  Pose T_odom_last_;
+  Vector6 twist_base_ = Vector6::Zero();
+  Pose T_odom_keyframe_;
+  Matrix6 covariance_ = Matrix6::Zero(); ///< of T_odom_last_, what the map has gathered
+  int refused_in_a_row_ = 0;
+  bool degenerate_ = false;
+};
+
+} // namespace locus

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/prior_statistics.hpp"
+
+#include <algorithm>
+
+namespace locus {
+
+namespace {
+
+constexpr double kMemory_sweeps = 30.0;
+
+/// An axis counts as seen by the lidar where its points outweigh the prior by this much.
+constexpr double kLidarDominates = 4.0;
+
+} // namespace
+
+PriorStatistics::PriorStatistics(const Vector6& initial_sigma, const Vector6& least_sigma)
+    : variance_(initial_sigma.cwiseAbs2()), least_variance_(least_sigma.cwiseAbs2()) {}
+
+void PriorStatistics::learn(const Vector6& difference, const Matrix6& lidar_information) {
+  learned_ = std::min(learned_ + 1.0, kMemory_sweeps);
+  for (int axis = 0; axis < 6; ++axis) {
+    if (lidar_information(axis, axis) * variance_[axis] < kLidarDominates)
+      continue;
+    variance_[axis] += (difference[axis] * difference[axis] - variance_[axis]) / (learned_ + 1.0);
+    variance_[axis] = std::max(variance_[axis], least_variance_[axis]);
+  }
+}
+
+Vector6 PriorStatistics::variance(double periods) const { return variance_ * (periods * periods); }
+
+} // namespace locus

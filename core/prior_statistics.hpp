@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "core/pose.hpp"
+
+namespace locus {
+
+/// How far one kind of prior lies from what the lidar finds, axis by axis, learned from sweep to sweep.
+///
+/// Its inverse is the weight of the prior in the registration, so a prior is trusted as far as it has proved itself and
+/// no constant is tuned to a robot. An axis is learned from only where the points constrain it: where they do not, the
+/// registration repeats the prior, which proves nothing. One owner.
+class PriorStatistics {
+ public:
+  /// `initial_sigma` and `least_sigma`: standard deviation per sweep before anything is learned, and the least ever
+  /// believed.
+  PriorStatistics(const Vector6& initial_sigma, const Vector6& least_sigma);
+
+  /// `difference` of the registration from the prior in base axes; `lidar_information` of the registration in the same
+  /// axes.
+  void learn(const Vector6& difference, const Matrix6& lidar_information);
+
+  /// Variances of the prior over `periods` sweep periods.
+  [[nodiscard]] Vector6 variance(double periods) const;
+
+ private:
+  Vector6 variance_;
+  Vector6 least_variance_;
+  double learned_ = 0.0;
+};
+
+} // namespace locus

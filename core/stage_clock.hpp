@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace locus {
+
+/// The stages whose cost is reported.
+enum class Stage : std::uint8_t { decode, correct, filter, covariance, scan_to_scan, scan_to_submap, map };
+inline constexpr std::size_t kStages = 7;
+
+/// Told when a stage begins and ends. The core has no clock of its own; who wants timing brings one.
+class StageClock {
+ public:
+  virtual ~StageClock() = default;
+  virtual void enter(Stage stage) = 0;
+  virtual void leave() = 0; ///< the innermost stage entered
+};
+
+/// Marks a stage for the life of the object; does nothing without a clock.
+class StageScope {
+ public:
+  StageScope(StageClock* clock, Stage stage) : clock_(clock) {
+    if (clock_ != nullptr)
+      clock_->enter(stage);
+  }
+  ~StageScope() {
+    if (clock_ != nullptr)
+      clock_->leave();
+  }
+  StageScope(const StageScope&) = delete;
+  StageScope& operator=(const StageScope&) = delete;
+
+ private:
+  StageClock* clock_;
+};
+
+} // namespace locus

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/surface_grid.hpp"
+
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace locus {
+
+namespace {
+
+/// Variance of one point across its surface: ranging noise of the lidars this is for (2 to 3 cm, averaged over a few
+/// returns).
+constexpr double kPointVariance_m2 = 0.02 * 0.02;
+
+/// A point with a normal stands for a disc; its radius as a share of the voxel.
+constexpr double kDiscRadiusInLeaves = 0.25;
+
+/// A voxel holds a plane when its points spread in two directions, by an absolute and by a relative measure (one scan
+/// line spreads in one only), and little across them.
+constexpr double kMinSpreadInLeaves = 0.1;
+constexpr double kMinMiddleToLargest = 0.05;
+constexpr double kMaxSmallestToMiddle = 0.15;
+
+/// Older points fade once a voxel has seen this many, so a long stay does not freeze it.
+constexpr float kMaxCount = 400.0F;
+
+constexpr std::size_t kEvictionAttempts = 64;
+
+using Upper = Eigen::Matrix<float, 6, 1>;
+
+Upper upper_of_outer(const Eigen::Vector3f& v) {
+  return {v.x() * v.x(), v.x() * v.y(), v.x() * v.z(), v.y() * v.y(), v.y() * v.z(), v.z() * v.z()};
+}
+
+Eigen::Matrix3d symmetric(const Upper& u) {
+  Eigen::Matrix3d m;
+  m << u[0], u[1], u[2], u[1], u[3], u[4], u[2], u[4], u[5];
+  return m;
+}
+
+std::uint64_t hash_of(VoxelIndex index) {
+  const auto bits = [](std::int32_t i) {
+    return static_cast<std::uint64_t>(static_cast<std::uint32_t>(i)) & 0x1FFFFFU;
+  };
+  std::uint64_t h = bits(index.x) | bits(index.y) << 21U | bits(index.z) << 42U;
+  h = (h ^ h >> 32U) * 0xD6E8FEB86659FD93ULL;
+  h = (h ^ h >> 32U) * 0xD6E8FEB86659FD93ULL;
+  return h ^ h >> 32U;
+}
+
+} // namespace
+
+SurfaceGrid::SurfaceGrid(double leaf_m, std::size_t max_bytes) : leaf_m_(leaf_m) {
+  constexpr std::size_t kBytesPerVoxel =
+      sizeof(VoxelIndex) + sizeof(Surface) + sizeof(Moments) + sizeof(std::uint32_t) + 4 * sizeof(Entry);
+  const std::size_t capacity = std::max<std::size_t>(max_bytes / kBytesPerVoxel, 64);
+  entries_.resize(std::bit_ceil(2 * capacity));
+  voxels_.resize(capacity);
+  surfaces_.resize(capacity);
+  moments_.resize(capacity);
+  touched_.reserve(capacity);
+}
+
+VoxelIndex SurfaceGrid::index_of(const Eigen::Vector3d& point_m) const {
+  const auto cell = [this](double v) { return static_cast<std::int32_t>(std::floor(v / leaf_m_)); };
+  return {cell(point_m.x()), cell(point_m.y()), cell(point_m.z())};
+}
+
+Eigen::Vector3d SurfaceGrid::centre_of(VoxelIndex index) const {
+  return leaf_m_ * Eigen::Vector3d{index.x + 0.5, index.y + 0.5, index.z + 0.5};
+}
+
+std::size_t SurfaceGrid::home_of(VoxelIndex index) const { return hash_of(index) & (entries_.size() - 1); }
+
+std::uint32_t SurfaceGrid::slot_of(VoxelIndex index) const {
+  const std::uint64_t hash = hash_of(index);
+  const auto tag = static_cast<std::uint32_t>(hash >> 32U);
+  const std::size_t mask = entries_.size() - 1;
+  for (std::size_t i = hash & mask;; i = (i + 1) & mask) {
+    const Entry& entry = entries_[i];
+    if (entry.slot == kEmpty || (entry.tag == tag && voxels_[entry.slot] == index))
+      return entry.slot;
+  }
+}
+
+const Surface* SurfaceGrid::find(VoxelIndex index) const {
+  const std::uint32_t slot = slot_of(index);
+  return slot == kEmpty ? nullptr : &surfaces_[slot];
+}
+
+std::uint32_t SurfaceGrid::find_or_create(VoxelIndex index) {
+  const std::uint32_t found = slot_of(index);
+  if (found != kEmpty)
+    return found;
+  const std::uint32_t slot = take_slot();
+  voxels_[slot] = index;
+  surfaces_[slot].variance_m2 = -1.0F;
+  moments_[slot] = Moments{};
+  const std::size_t mask = entries_.size() - 1;
+  std::size_t i = home_of(index);
+  while (entries_[i].slot != kEmpty)
+    i = (i + 1) & mask;
+  entries_[i] = {static_cast<std::uint32_t>(hash_of(index) >> 32U), slot};
+  return slot;
+}
+
+std::uint32_t SurfaceGrid::take_slot() {
+  if (used_ < capacity())
+    return static_cast<std::uint32_t>(used_++);
+  if (2 * touched_.size() > capacity())
+    refresh(); // touched voxels cannot be evicted, and there must be some that can
+  const double radius2 = protected_radius_m_ * protected_radius_m_;
+  const auto is_near = [&] { return (centre(hand_) - protected_centre_m_).squaredNorm() < radius2; };
+  for (std::size_t attempt = 0; attempt < kEvictionAttempts && is_near(); ++attempt)
+    hand_ = (hand_ + 1) % capacity();
+  while (moments_[hand_].touched)
+    hand_ = (hand_ + 1) % capacity();
+  const std::size_t slot = hand_;
+  hand_ = (hand_ + 1) % capacity();
+  erase_entry(voxels_[slot]);
+  ++evicted_;
+  return static_cast<std::uint32_t>(slot);
+}
+
+/// Linear probing without tombstones: entries behind the gap move up as long as that brings them nearer to their home.
+void SurfaceGrid::erase_entry(VoxelIndex index) {
+  const std::size_t mask = entries_.size() - 1;
+  std::size_t gap = home_of(index);
+  while (voxels_[entries_[gap].slot] != index)
+    gap = (gap + 1) & mask;
+  for (std::size_t i = (gap + 1) & mask; entries_[i].slot != kEmpty; i = (i + 1) & mask) {
+    const std::size_t home = home_of(voxels_[entries_[i].slot]);
+    if (((i - home) & mask) >= ((i - gap) & mask)) {
+      entries_[gap] = entries_[i];
+      gap = i;
+    }
+  }
+  entries_[gap] = Entry{};
+}
+
+void SurfaceGrid::insert(const Eigen::Vector3d& point_m, const Eigen::Vector3d& normal) {
+  const VoxelIndex index = index_of(point_m);
+  const std::uint32_t slot = find_or_create(index);
+  Moments& moments = moments_[slot];
+  if (!moments.touched) {
+    moments.touched = true;
+    touched_.push_back(slot);
+  }
+  if (moments.count >= kMaxCount) {
+    moments.count *= 0.5F;
+    moments.sum *= 0.5F;
+    moments.outer *= 0.5F;
+    moments.covariance *= 0.5F;
+  }
+  const double disc_m = kDiscRadiusInLeaves * leaf_m_;
+  const double across = normal.isZero() ? kPointVariance_m2 : disc_m * disc_m;
+  const Eigen::Vector3f offset = (point_m - centre_of(index)).cast<float>();
+  moments.count += 1.0F;
+  moments.sum += offset;
+  moments.outer += upper_of_outer(offset);
+  moments.covariance += static_cast<float>(kPointVariance_m2 - across) * upper_of_outer(normal.cast<float>());
+  moments.covariance[0] += static_cast<float>(across);
+  moments.covariance[3] += static_cast<float>(across);
+  moments.covariance[5] += static_cast<float>(across);
+}
+
+Surface SurfaceGrid::fit(const Moments& moments) const {
+  const Eigen::Vector3f mean = moments.sum / moments.count;
+  const Upper covariance = (moments.outer + moments.covariance) / moments.count - upper_of_outer(mean);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>{}.computeDirect(symmetric(covariance));
+  const Eigen::Vector3d spread = eigen.eigenvalues();
+  const double min_spread_m = kMinSpreadInLeaves * leaf_m_;
+  const bool planar = spread[1] > min_spread_m * min_spread_m && spread[1] > kMinMiddleToLargest * spread[2] &&
+                      spread[0] < kMaxSmallestToMiddle * spread[1];
+  const double variance = std::max(spread[0], kPointVariance_m2);
+  return {mean, eigen.eigenvectors().col(0).cast<float>(), planar ? static_cast<float>(variance) : -1.0F};
+}
+
+void SurfaceGrid::refresh() {
+  for (const std::uint32_t slot : touched_) {
+    surfaces_[slot] = fit(moments_[slot]);
+    moments_[slot].touched = false;
+  }
+  touched_.clear();
+}
+
+/// Every entry lies behind its voxel's home with no gap between, so emptying from each home to the next gap empties
+/// all.
+void SurfaceGrid::clear() {
+  const std::size_t mask = entries_.size() - 1;
+  for (std::size_t slot = 0; slot < used_; ++slot) {
+    for (std::size_t i = home_of(voxels_[slot]); entries_[i].slot != kEmpty; i = (i + 1) & mask)
+      entries_[i] = Entry{};
+  }
+  touched_.clear();
+  used_ = 0;
+  hand_ = 0;
+}
+
+void SurfaceGrid::protect(const Eigen::Vector3d& centre_m, double radius_m) {
+  protected_centre_m_ = centre_m;
+  protected_radius_m_ = radius_m;
+}
+
+} // namespace locus

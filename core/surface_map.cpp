@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/surface_map.hpp"
+
+namespace locus {
+
+namespace {
+
+/// The coarse grid needs about a ninth of the voxels of the fine one where both see surfaces.
+constexpr std::size_t kCoarseShare = 8;
+
+/// Registration looks no farther than the lidars see.
+constexpr double kSubmapRadius_m = 100.0;
+
+} // namespace
+
+SurfaceMap::SurfaceMap(std::size_t max_bytes)
+    : fine_(kFineLeaf_m, max_bytes - max_bytes / kCoarseShare), coarse_(kCoarseLeaf_m, max_bytes / kCoarseShare) {}
+
+void SurfaceMap::insert(std::span<const SurfacePoint> points_base, const Pose& T_map_base) {
+  const Eigen::Matrix3d R = T_map_base.R();
+  fine_.protect(T_map_base.translation, kSubmapRadius_m);
+  coarse_.protect(T_map_base.translation, kSubmapRadius_m);
+  for (const SurfacePoint& point : points_base) {
+    const Eigen::Vector3d position = R * point.position_m.cast<double>() + T_map_base.translation;
+    const Eigen::Vector3d normal = R * point.normal.cast<double>();
+    fine_.insert(position, normal);
+    coarse_.insert(position, normal);
+  }
+  fine_.refresh();
+  coarse_.refresh();
+}
+
+void SurfaceMap::clear() {
+  fine_.clear();
+  coarse_.clear();
+}
+
+} // namespace locus

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/pose.hpp"
+#include "core/surface_grid.hpp"
+
+namespace locus {
+
+/// A point with what is known of the surface under it.
+struct SurfacePoint {
+  Eigen::Vector3f position_m;
+  Eigen::Vector3f normal; ///< unit, or zero where there is none to be trusted
+};
+
+/// The map as surfaces in voxels of two sizes: the fine one for accuracy, the coarse one for reach and for sparse
+/// places. Serves as the global map whose neighbourhood of the robot is the submap (paper II-B.3) and, holding one
+/// sweep, as the target of scan-to-scan. Memory is bounded and fixed at construction. One writer or many readers.
+class SurfaceMap {
+ public:
+  static constexpr double kFineLeaf_m = 0.5;
+  static constexpr double kCoarseLeaf_m = 1.5;
+
+  explicit SurfaceMap(std::size_t max_bytes);
+
+  /// Adds a sweep seen from T_map_base.
+  void insert(std::span<const SurfacePoint> points_base, const Pose& T_map_base);
+  void clear();
+
+  [[nodiscard]] const SurfaceGrid& fine() const { return fine_; }
+  [[nodiscard]] const SurfaceGrid& coarse() const { return coarse_; }
+
+ private:
+  SurfaceGrid fine_;
+  SurfaceGrid coarse_;
+};
+
+} // namespace locus

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/pose.hpp"
+#include "core/stamp.hpp"
+
+namespace locus {
+
+/// One point of a sweep: the centroid of neighbouring returns, or a single one.
+struct SweepPoint {
+  Eigen::Vector3f position_base_m; ///< base frame at the end of the sweep
+  Eigen::Vector3f normal_base;     ///< unit normal of its surface towards the lidar; zero where it could not be trusted
+  float age_s;                     ///< from its firing to the end of the sweep
+  float intensity;
+  std::uint16_t scan_line; ///< lidar index * 256 + ring
+};
+
+/// The part of the robot's motion during a sweep that no motion source could take out of its points.
+enum class Uncorrected : std::uint8_t { nothing, translation, all };
+
+/// Where one motion source saw the base at the end of a sweep.
+struct SourcePose {
+  bool usable = false; ///< healthy, and with a sample inside the sweep
+  Pose T_source_base;  ///< an inertial source gives rotation only
+};
+
+/// All returns of all lidars in one window of time, seen from where the base was at its end (paper L_k).
+///
+/// Carries the pose of every motion source at its end, so that whoever processes it can form the motion since any
+/// earlier sweep, however many were dropped in between.
+struct Sweep {
+  static constexpr std::size_t kMaxSources = 8;
+
+  std::uint64_t sequence = 0; ///< counts windows from 0
+  Stamp start;
+  Stamp end;                                  ///< the stamp of the sweep
+  Uncorrected uncorrected = Uncorrected::all; ///< left to Odometry
+  std::size_t raw_returns = 0;                ///< returns that came in
+  std::array<SourcePose, kMaxSources> sources;
+  std::optional<Eigen::Vector3d>
+      specific_force_base_mps2;   ///< mean over the sweep, from the first usable inertial source
+  std::vector<SweepPoint> points; ///< by scan line, within it in the order of firing
+};
+
+} // namespace locus

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "core/lidar_packet.hpp"
+#include "core/motion_sources.hpp"
+#include "core/point_filters.hpp"
+#include "core/ring_segments.hpp"
+#include "core/scan_normals.hpp"
+#include "core/stage_clock.hpp"
+#include "core/sweep.hpp"
+
+namespace locus {
+
+/// Measures the time of one revolution from stamps and azimuths of the packets, at any speed of rotation. One owner.
+class RevolutionTimer {
+ public:
+  void observe(const LidarPacket& packet);
+  [[nodiscard]] Duration period() const;
+
+ private:
+  std::optional<std::uint8_t> lidar_; ///< the first one heard of lowest index
+  Stamp last_stamp_;
+  std::uint16_t last_azimuth_cdeg_ = 0;
+  double azimuth_sum_cdeg_ = 0.0;
+  double time_sum_s_ = 0.0;
+};
+
+/// Turns packets into sweeps: motion correction, merger and filters (paper II-A), done while the sweep is still coming
+/// in.
+///
+/// A sweep is a window of time over all lidars, so they need no phase lock and a dead one is simply not there. Each
+/// packet is moved to where the base was at the start of the window, with one linear map per packet; at the cut the
+/// whole is moved to its end. What no motion source could correct keeps its time of firing, for Odometry to correct.
+/// Memory is fixed after the first sweeps. One owner.
+class SweepBuilder {
+ public:
+  /// Takes a finished sweep; may swap its points for another vector of the same use.
+  using Sink = std::function<void(Sweep&)>;
+
+  struct Counters {
+    std::uint64_t late_packets = 0;      ///< older than the window by more than kMaxLateness: left out
+    std::uint64_t restarts = 0;          ///< time had jumped; the windows began anew
+    std::uint64_t overflowed_points = 0; ///< more than fit into memory: left out
+  };
+
+  static constexpr Duration kGrace = std::chrono::milliseconds{2}; ///< after the nominal end, when no packet comes
+  static constexpr Duration kMaxLateness = std::chrono::milliseconds{50};
+
+  /// `T_base_lidar` by lidar index; `max_returns` in one sweep of all lidars.
+  SweepBuilder(const SweepOptions& options, std::vector<Pose> T_base_lidar, MotionSources sources,
+               std::size_t max_returns, Sink sink, StageClock* clock = nullptr);
+
+  [[nodiscard]] MotionSources& sources() { return sources_; }
+  [[nodiscard]] const MotionSources& sources() const { return sources_; }
+
+  /// `arrival` is when the packet reached this computer.
+  void add(const LidarPacket& packet, Stamp arrival);
+
+  /// Tells the time, in stamps of arrival: closes windows that have ended without a packet to close them.
+  void advance(Stamp now);
+
+  /// The input has ended: the last partial window counts if it is longer than half a period.
+  void finish();
+
+  [[nodiscard]] const Counters& counters() const { return counters_; }
+
+ private:
+  struct Window {
+    Stamp start, end;
+    SourceChoice choice;
+    Stamp last_firing;
+    Pose T_start_base; ///< at the last packet: stands in where a track does not reach
+  };
+  struct RawPoint {
+    SweepPoint point;
+    std::uint32_t segment;
+  };
+
+  void open(Stamp start);
+  void close();
+  void append(const LidarPacket& packet, Stamp from, Stamp to);
+  void reduce(float duration_s);
+  void move_to_end();
+  [[nodiscard]] Pose T_start_base(Stamp stamp);
+  [[nodiscard]] Duration period() const;
+  [[nodiscard]] bool inside_body(const Eigen::Vector3f& p_base) const;
+
+  SweepOptions options_;
+  std::vector<Pose> T_base_lidar_;
+  MotionSources sources_;
+  Sink sink_;
+  StageClock* clock_;
+  std::size_t max_returns_;
+  RevolutionTimer revolution_;
+  RingSegments segments_;
+  ScanNormals normals_;
+  VoxelFilter voxel_filter_;
+  RandomFilter random_filter_;
+  std::optional<Window> window_;
+  std::vector<RawPoint> raw_; ///< only where segments are not the points themselves
+  Sweep sweep_;
+  Duration lag_{}; ///< of arrival behind firing, as last seen
+  std::uint64_t consecutive_late_ = 0;
+  Counters counters_;
+};
+
+} // namespace locus
