@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/motion_files.hpp"
+
+#include <chrono>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "drivers/capture_folder.hpp"
+#include "support/temporary_file.hpp"
+
+namespace locus {
+namespace {
+
+using test::bytes_of;
+using test::TemporaryFile;
+
+Expected<std::vector<ImuSample>, std::string> imu_from(const std::string& text) {
+  const TemporaryFile file{"imu.csv", bytes_of(text)};
+  return read_imu(file.path());
+}
+
+Expected<std::vector<OdometrySample>, std::string> odometry_from(const std::string& text) {
+  const TemporaryFile file{"wio.tum", bytes_of(text)};
+  return read_odometry(file.path());
+}
+
+/// The odometry of `text` with the meta file `meta` beside it.
+Expected<std::vector<OdometrySample>, std::string> odometry_from(const std::string& text, const std::string& meta) {
+  const TemporaryFile file{"wio.tum", bytes_of(text)};
+  const TemporaryFile meta_file{"wio.meta.csv", bytes_of(meta)};
+  return read_odometry(file.path());
+}
+
+template <class T> std::string error_of(const Expected<T, std::string>& result) { return result ? "" : result.error(); }
+
+bool contains(std::string_view text, std::string_view part) { return text.find(part) != std::string_view::npos; }
+
+TEST(MotionFiles, ImuRowsHoldRatesForcesAndWhereGivenAttitude) {
+  const auto samples = imu_from("t_ns,wx,wy,wz,ax,ay,az,qw,qx,qy,qz\n"
+                                "1403636579763555527,0.1,-0.2,+0.3,1,2,9.81\n"
+                                "1403636579763555528, 0.1, 0.2, 0.3, 1, 2, 9.81, 0, 1, 0, 0\n"
+                                "1403636579763555529,0.1,0.2,0.3,1,2,9.81,0,0,0,0\n");
+  ASSERT_TRUE(samples) << samples.error();
+  ASSERT_EQ(samples->size(), 3u);
+  const ImuSample& first = (*samples)[0];
+  EXPECT_EQ(to_ns(first.stamp), 1403636579763555527);
+  EXPECT_EQ(first.arrival, first.stamp);
+  EXPECT_EQ(first.angular_velocity_radps, Eigen::Vector3d(0.1, -0.2, 0.3));
+  EXPECT_EQ(first.specific_force_mps2, Eigen::Vector3d(1, 2, 9.81));
+  EXPECT_FALSE(first.attitude);
+  ASSERT_TRUE((*samples)[1].attitude);
+  EXPECT_EQ((*samples)[1].attitude->x(), 1.0);
+  EXPECT_FALSE((*samples)[2].attitude);
+}
+
+TEST(MotionFiles, OdometryRowsHoldPosesWithTheRotationsRealPartLast) {
+  const auto samples = odometry_from("10.5 1 2 3 0 0 0.6 0.8\n");
+  ASSERT_TRUE(samples) << samples.error();
+  ASSERT_EQ(samples->size(), 1u);
+  EXPECT_EQ((*samples)[0].T_source_base.translation, Eigen::Vector3d(1, 2, 3));
+  EXPECT_DOUBLE_EQ((*samples)[0].T_source_base.rotation.w(), 0.8);
+  EXPECT_DOUBLE_EQ((*samples)[0].T_source_base.rotation.z(), 0.6);
+  EXPECT_EQ((*samples)[0].covariance_scale, 1.0);
+}
+
+TEST(MotionFiles, TumTimesKeepTheirNanoseconds) {
+  const std::pair<const char*, std::int64_t> cases[] = {
+      {"1403636579.763555527", 1403636579763555527},
+      {"1.403636579763555527e+09", 1403636579763555527}, // as NumPy and evo write it
+      {"1403636579763555527E-9", 1403636579763555527},
+      {"1403636579.7635555274", 1403636579763555527},
+      {"1403636579.7635555275", 1403636579763555528},
+      {"0.9999999996", 1'000'000'000},
+      {"1403636579", 1403636579000000000},
+      {"1403636579.", 1403636579000000000},
+      {".5", 500'000'000},
+      {"-1.25", -1'250'000'000},
+      {"0.000000001", 1},
+      {"0.0000000001", 0},
+      {"0e-18", 0},
+      {"00000000000000000000012.5", 12'500'000'000},
+  };
+  for (const auto& [text, ns] : cases) {
+    const auto samples = odometry_from(std::string{text} + " 0 0 0 0 0 0 1");
+    ASSERT_TRUE(samples) << samples.error();
+    EXPECT_EQ(to_ns(samples->front().stamp), ns) << text;
+  }
+}
+
+TEST(MotionFiles, TimesThatAreNoneAreErrors) {
+  for (const char* text :
+       {"nan", "inf", "-", ".", "1.2.3", "1e", "1e99", "e5", "0x10", "9999999999999", "1,5", "12:30:00"}) {
+    EXPECT_TRUE(contains(error_of(odometry_from("1 0 0 0 0 0 0 1\n" + std::string{text} + " 0 0 0 0 0 0 1\n")),
+                         "wio.tum:2: time \"" + std::string{text} + "\" is not"))
+        << text;
+  }
+  for (const char* text : {"1.5", "1e9", "nan", "-", "9223372036854775807", "99999999999999999999"}) {
+    EXPECT_TRUE(contains(error_of(imu_from("1,0,0,0,0,0,0\n" + std::string{text} + ",0,0,0,0,0,0\n")),
+                         "imu.csv:2: time \"" + std::string{text} + "\" is not"))
+        << text;
+  }
+}
+
+TEST(MotionFiles, CommentsBlankLinesCrlfAndAMissingLastNewlineAreAccepted) {
+  const auto imu = imu_from("#timestamp [ns],w_x\r\n\r\n1,0,0,0,0,0,9.81\r\n# interlude\r\n  \t\r\n2,0,0,0,0,0,9.81");
+  ASSERT_TRUE(imu) << imu.error();
+  EXPECT_EQ(imu->size(), 2u);
+  const auto odometry = odometry_from("# t x y z qx qy qz qw\r\n  1\t0  0 0 0 0 0 1 \r\n\r\n2 0 0 0 0 0 0 1");
+  ASSERT_TRUE(odometry) << odometry.error();
+  EXPECT_EQ(odometry->size(), 2u);
+}
+
+TEST(MotionFiles, EmptyFilesHoldNoSamples) {
+  EXPECT_TRUE(imu_from("")->empty());
+  EXPECT_TRUE(imu_from("t_ns,wx,wy,wz,ax,ay,az\n")->empty());
+  EXPECT_TRUE(odometry_from("# nothing\n")->empty());
+}
+
+TEST(MotionFiles, NanIsPassedOnForHealthToJudge) {
+  const auto imu = imu_from("1,nan,0,0,0,0,NaN\n");
+  ASSERT_TRUE(imu) << imu.error();
+  EXPECT_TRUE(std::isnan(imu->front().angular_velocity_radps.x()));
+  const auto odometry = odometry_from("1 nan nan nan nan nan nan nan\n");
+  ASSERT_TRUE(odometry) << odometry.error();
+  EXPECT_FALSE(odometry->front().T_source_base.finite());
+}
+
+TEST(MotionFiles, MalformedTextIsAnErrorWithFileLineAndRemedy) {
+  EXPECT_TRUE(contains(error_of(imu_from("1,0,0,0,0,0,0\n2,0,0\n")), "imu.csv:2: 3 columns; expected t_ns,"));
+  EXPECT_TRUE(contains(error_of(imu_from("1,0,0,0,0,0,0,0,0,0,0,0,0,0\n")), "imu.csv:1: too many columns; expected"));
+  EXPECT_TRUE(contains(error_of(imu_from("1,0,0,0,0,0,0\n2,0,0,o,0,0,0\n")), "imu.csv:2: a value is not a number"));
+  EXPECT_TRUE(contains(error_of(imu_from("1,0,0,0,0,0,\n")), "imu.csv:1: a value is not a number"));
+  EXPECT_TRUE(contains(error_of(imu_from("1,0,0,0,0,0,0,9,9,9,9\n")), "imu.csv:1: the attitude is not a unit"));
+  EXPECT_TRUE(contains(error_of(imu_from("one,header\nand,another\n")), "imu.csv:2: 2 columns"));
+  EXPECT_TRUE(contains(error_of(odometry_from("1 0 0 0 0 0 0\n")), "wio.tum:1: 7 columns; expected t x y z"));
+  EXPECT_TRUE(contains(error_of(odometry_from("1 0 0 0 0 0 0 1 \n2 0 0 0 0 0 0 1x\n")), "wio.tum:2: a value is not"));
+  EXPECT_TRUE(contains(error_of(odometry_from("1 0 0 0 0 0 0 0\n")), "wio.tum:1: the rotation is not a unit"));
+  EXPECT_TRUE(contains(error_of(read_imu("/no/such/imu.csv")), "/no/such/imu.csv: cannot be read; check"));
+  EXPECT_TRUE(contains(error_of(read_imu(testing::TempDir())), "cannot be read"));
+}
+
+TEST(MotionFiles, MetaFileGivesArrivalAndCovarianceAndItsArrivalTheOrder) {
+  const auto samples = odometry_from("1.0 1 0 0 0 0 0 1\n1.1 2 0 0 0 0 0 1\n1.2 3 0 0 0 0 0 1\n",
+                                     "t_ns,arrival_ns,covariance_scale\n"
+                                     "1000000000,1250000000,1\n1100000400,1100000500,7.5\n");
+  ASSERT_TRUE(samples) << samples.error();
+  ASSERT_EQ(samples->size(), 3u);
+  EXPECT_EQ((*samples)[0].T_source_base.translation.x(), 2.0);
+  EXPECT_EQ((*samples)[0].covariance_scale, 7.5);
+  EXPECT_EQ(to_ns((*samples)[0].arrival), 1100000500);
+  EXPECT_EQ(to_ns((*samples)[0].stamp), 1100000000);
+  EXPECT_EQ((*samples)[1].T_source_base.translation.x(), 3.0); // not mentioned: arrival = stamp
+  EXPECT_EQ((*samples)[2].T_source_base.translation.x(), 1.0);
+  EXPECT_EQ(to_ns((*samples)[2].arrival), 1250000000);
+}
+
+TEST(MotionFiles, RepeatedStampsTakeTheirMetaRowsInOrder) {
+  const auto samples =
+      odometry_from("1.0 1 0 0 0 0 0 1\n1.0 2 0 0 0 0 0 1\n", "1000000000,1100000000,1\n1000000000,1200000000,2\n");
+  ASSERT_TRUE(samples) << samples.error();
+  EXPECT_EQ(to_ns((*samples)[0].arrival), 1100000000);
+  EXPECT_EQ(to_ns((*samples)[1].arrival), 1200000000);
+  EXPECT_EQ((*samples)[1].T_source_base.translation.x(), 2.0);
+}
+
+TEST(MotionFiles, MetaRowsWithoutSampleOrMalformedAreErrors) {
+  const std::string sample = "1.0 1 0 0 0 0 0 1\n";
+  EXPECT_TRUE(contains(error_of(odometry_from(sample, "2000000000,2000000000,1\n")),
+                       "wio.meta.csv: no sample at t_ns 2000000000"));
+  EXPECT_TRUE(
+      contains(error_of(odometry_from(sample, "1000000000,1000000000,1\n1000000000,1000000000,1\n")), "no sample"));
+  EXPECT_TRUE(contains(error_of(odometry_from(sample, "1000000000,1000000000\n")), "wio.meta.csv:1: expected t_ns,"));
+  EXPECT_TRUE(contains(error_of(odometry_from(sample, "1000000000,later,1\n")), "wio.meta.csv:1: expected t_ns,"));
+}
+
+TEST(MotionFiles, AnHourOfImuIsReadInSeconds) {
+  std::string text;
+  for (int i = 0; i < 720'000; ++i) {
+    text += std::to_string(1'700'000'000'000'000'000 + i * 5'000'000LL) +
+            ",0.012345678,-0.0234567891,0.1234567891,0.0987654321,-0.1987654321,9.8123456789\n";
+  }
+  const TemporaryFile file{"imu.csv", bytes_of(text)};
+  const auto begin = std::chrono::steady_clock::now();
+  const auto samples = read_imu(file.path());
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
+  ASSERT_TRUE(samples) << samples.error();
+  EXPECT_EQ(samples->size(), 720'000u);
+  RecordProperty("seconds", std::to_string(elapsed.count()));
+  EXPECT_LT(elapsed.count(), 20.0); // 0.3 s when optimised and alone; sanitizers and neighbours slow it down
+}
+
+class CaptureFolders : public testing::Test {
+ protected:
+  CaptureFolders() { std::filesystem::create_directory(folder_); }
+  ~CaptureFolders() override { std::filesystem::remove_all(folder_); }
+  void add(const std::string& name) const { std::ofstream{folder_ / name} << "x"; }
+
+  const std::filesystem::path folder_ =
+      std::filesystem::path(testing::TempDir()) / ("capture_folder_" + std::to_string(::getpid()));
+};
+
+TEST_F(CaptureFolders, FilesOfTheContractAreFoundByName) {
+  for (const char* name : {"lidar.pcap", "imu.csv", "imu.meta.csv", "wio.tum", "vio.tum", "vio.meta.csv", "kio.tum",
+                           "gt.tum", "gt_map.ply", "config.yaml", "notes.txt"}) {
+    add(name);
+  }
+  const auto found = CaptureFolder::find(folder_);
+  ASSERT_TRUE(found) << found.error();
+  EXPECT_EQ(found->lidar, folder_ / "lidar.pcap");
+  EXPECT_EQ(found->imu, folder_ / "imu.csv");
+  EXPECT_EQ(found->ground_truth, folder_ / "gt.tum");
+  EXPECT_EQ(found->map_truth, folder_ / "gt_map.ply");
+  EXPECT_EQ(found->config, folder_ / "config.yaml");
+  ASSERT_EQ(found->odometry.size(), 3u);
+  EXPECT_EQ(found->odometry[0].name, "kio");
+  EXPECT_EQ(found->odometry[1].name, "vio");
+  EXPECT_EQ(found->odometry[2].name, "wio");
+  EXPECT_EQ(found->odometry[2].file, folder_ / "wio.tum");
+}
+
+TEST_F(CaptureFolders, OnlyTheCaptureMustBeThere) {
+  EXPECT_TRUE(contains(error_of(CaptureFolder::find(folder_)), "holds no lidar.pcap or lidar.pcapng"));
+  add("lidar.pcapng");
+  const auto found = CaptureFolder::find(folder_);
+  ASSERT_TRUE(found) << found.error();
+  EXPECT_EQ(found->lidar, folder_ / "lidar.pcapng");
+  EXPECT_TRUE(found->imu.empty());
+  EXPECT_TRUE(found->config.empty());
+  EXPECT_TRUE(found->odometry.empty());
+  add("lidar.pcap");
+  EXPECT_TRUE(contains(error_of(CaptureFolder::find(folder_)), "holds both lidar.pcap and lidar.pcapng"));
+}
+
+TEST_F(CaptureFolders, FileStandsForItself) {
+  add("drive.pcap");
+  const auto found = CaptureFolder::find(folder_ / "drive.pcap");
+  ASSERT_TRUE(found) << found.error();
+  EXPECT_EQ(found->lidar, folder_ / "drive.pcap");
+}
+
+TEST_F(CaptureFolders, WhatWouldBeIgnoredInSilenceIsAnError) {
+  EXPECT_TRUE(contains(error_of(CaptureFolder::find(folder_ / "nothing")), "no such file or folder"));
+  add("lidar.pcap");
+  add("wio.meta.csv");
+  EXPECT_TRUE(contains(error_of(CaptureFolder::find(folder_)), "wio.meta.csv: belongs to no source"));
+}
+
+} // namespace
+} // namespace locus
