@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/lidar_input.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "drivers/velodyne_calibration.hpp"
+
+namespace locus {
+
+namespace {
+
+constexpr Duration kSenderTimeout = std::chrono::seconds{1};
+constexpr Duration kLongestGapToldByAzimuth = std::chrono::seconds{1};
+constexpr double kAzimuthToleranceCdeg = 100.0;
+constexpr double kSpeedTolerance = 0.02; ///< by which the motor's speed may change over a gap
+
+} // namespace
+
+Expected<LidarInput, std::string> LidarInput::open(LidarOptions options, std::uint8_t index) {
+  if (options.calibration.empty())
+    return LidarInput{std::move(options), index, std::nullopt};
+  auto calibration = velodyne::read_calibration(options.calibration);
+  if (!calibration)
+    return calibration.error();
+  if (options.model && calibration->laser_count != velodyne::spec(*options.model).calibration.laser_count)
+    return options.calibration + ": " + std::to_string(calibration->laser_count) + " lasers, but lidar " +
+           options.name + " is a " + std::string{to_string(*options.model)};
+  return LidarInput{std::move(options), index, *calibration};
+}
+
+LidarInput::LidarInput(LidarOptions options, std::uint8_t index, std::optional<velodyne::Calibration> calibration)
+    : options_(std::move(options)), decoder_({options_.model, std::nullopt, calibration}), clock_(options_.time) {
+  packet_.lidar = index;
+}
+
+const LidarPacket* LidarInput::receive(const Datagram& datagram) {
+  packet_is_ready_ = false;
+  ++counters_.received;
+  if (const auto error = take(datagram))
+    ++counters_[*error];
+  return packet_is_ready_ ? &packet_ : nullptr;
+}
+
+bool LidarInput::listens_to(std::uint16_t port) const {
+  constexpr int kPositionPortDistance = kDefaultPositionPort - kDefaultDataPort;
+  return port == options_.port || port == kDefaultPositionPort || port == options_.port + kPositionPortDistance;
+}
+
+std::optional<std::uint32_t> LidarInput::source_ip() const {
+  return options_.source_ip ? options_.source_ip : learnt_ip_;
+}
+
+std::optional<PacketError> LidarInput::take(const Datagram& datagram) {
+  if (datagram.truncated)
+    return PacketError::truncated;
+  if (!is_sender(datagram))
+    return PacketError::sender;
+  if (datagram.payload.size() == velodyne::kDataPacketBytes)
+    return take_data(datagram);
+  if (datagram.payload.size() != velodyne::kPositionPacketBytes)
+    return PacketError::length;
+  position_ = velodyne::parse_position_packet(datagram.payload.first<velodyne::kPositionPacketBytes>());
+  clock_.set_synchronised(position_->is_synchronised());
+  ++counters_.position;
+  return std::nullopt;
+}
+
+std::optional<PacketError> LidarInput::take_data(const Datagram& datagram) {
+  if (is_duplicate(datagram.payload))
+    return PacketError::duplicate;
+  if (const auto error = decoder_.decode(datagram.payload, packet_))
+    return error;
+  const Duration time_of_hour = velodyne::time_of_hour(datagram.payload);
+  const auto reading = clock_.read(time_of_hour, packet_.duration, datagram.receive_stamp);
+  counters_.clock_steps = clock_.steps();
+  if (!reading)
+    return PacketError::time;
+  packet_.stamp = reading->stamp - velodyne::spec(*decoder_.model()).stamp_delay;
+  packet_is_ready_ = true;
+  count(*reading);
+  remember(datagram);
+  return std::nullopt;
+}
+
+bool LidarInput::is_sender(const Datagram& datagram) const {
+  if (options_.source_ip || !learnt_ip_)
+    return !options_.source_ip || *options_.source_ip == datagram.source_ip;
+  return *learnt_ip_ == datagram.source_ip || datagram.receive_stamp - last_heard_ > kSenderTimeout;
+}
+
+bool LidarInput::is_duplicate(std::span<const std::byte> payload) const {
+  const auto end = recent_.begin() + static_cast<std::ptrdiff_t>(std::min(remembered_, kRemembered));
+  return std::any_of(recent_.begin(), end, [&](const Payload& seen) {
+    return velodyne::time_of_hour(seen) == velodyne::time_of_hour(payload) &&
+           std::memcmp(seen.data(), payload.data(), seen.size()) == 0;
+  });
+}
+
+/// Packets that should lie between the latest one and this one, and do not.
+std::uint64_t LidarInput::missing_before(const SensorClock::Reading& reading) const {
+  const double packets = to_seconds(reading.advance) / to_seconds(packet_.duration);
+  const auto missing = std::llround(packets) - 1;
+  if (missing <= 0)
+    return 0;
+  if (reading.advance <= kLongestGapToldByAzimuth) {
+    const double expected_cdeg =
+        decoder_.rotation_rate_rpm() / 60.0 * velodyne::kCdegPerTurn * to_seconds(reading.advance);
+    const double turned_cdeg = packet_.first_azimuth_cdeg - last_azimuth_cdeg_;
+    const double error_cdeg = std::remainder(turned_cdeg - expected_cdeg, velodyne::kCdegPerTurn);
+    if (std::abs(error_cdeg) > kAzimuthToleranceCdeg + kSpeedTolerance * expected_cdeg)
+      return 0;
+  }
+  return static_cast<std::uint64_t>(missing);
+}
+
+void LidarInput::count(const SensorClock::Reading& reading) {
+  ++counters_.data;
+  if (reading.continuous && reading.advance <= Duration{}) {
+    ++counters_.reordered;
+    counters_.lost -= std::min<std::uint64_t>(counters_.lost, 1);
+    return;
+  }
+  if (reading.continuous)
+    counters_.lost += missing_before(reading);
+  last_azimuth_cdeg_ = packet_.first_azimuth_cdeg;
+}
+
+void LidarInput::remember(const Datagram& datagram) {
+  learnt_ip_ = datagram.source_ip;
+  last_heard_ = datagram.receive_stamp;
+  std::copy(datagram.payload.begin(), datagram.payload.end(), recent_[remembered_ % kRemembered].begin());
+  ++remembered_;
+}
+
+Expected<LidarRouter, std::string> LidarRouter::open(const std::vector<LidarOptions>& options) {
+  std::vector<LidarInput> lidars;
+  lidars.reserve(options.size());
+  for (const LidarOptions& one : options) {
+    auto lidar = LidarInput::open(one, static_cast<std::uint8_t>(lidars.size()));
+    if (!lidar)
+      return lidar.error();
+    lidars.push_back(std::move(*lidar));
+  }
+  return LidarRouter{std::move(lidars)};
+}
+
+const LidarPacket* LidarRouter::receive(const Datagram& datagram) {
+  if (LidarInput* lidar = find(datagram))
+    return lidar->receive(datagram);
+  ++foreign_.received;
+  ++foreign_[PacketError::sender];
+  return nullptr;
+}
+
+/// The lidar of this address, else one on this port that has no address yet, else one on this port (which will refuse).
+LidarInput* LidarRouter::find(const Datagram& datagram) {
+  LidarInput* found = nullptr;
+  for (LidarInput& lidar : lidars_) {
+    if (!lidar.listens_to(datagram.destination_port))
+      continue;
+    if (lidar.source_ip() == datagram.source_ip)
+      return &lidar;
+    if (found == nullptr || (found->source_ip() && !lidar.source_ip()))
+      found = &lidar;
+  }
+  return found;
+}
+
+PacketCounters LidarRouter::total() const {
+  PacketCounters sum = foreign_;
+  for (const LidarInput& lidar : lidars_)
+    sum += lidar.counters();
+  return sum;
+}
+
+} // namespace locus

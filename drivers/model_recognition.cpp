@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/model_recognition.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "drivers/wire.hpp"
+
+namespace locus::velodyne {
+
+namespace {
+
+constexpr Duration kSpacingTolerance = std::chrono::microseconds{2}; // both stamps are whole microseconds
+constexpr int kMaxLostInARow = 3;
+
+bool is_close(Duration a, Duration b) { return std::chrono::abs(a - b) <= kSpacingTolerance; }
+
+/// The model that sends packets at this spacing; nothing when it fits none.
+std::optional<Model> model_of_spacing(Model claimed, ReturnMode mode, Duration spacing) {
+  const Duration expected = packet_duration(claimed, mode);
+  for (int packets = 1; packets <= 1 + kMaxLostInARow; ++packets)
+    if (is_close(spacing, packets * expected))
+      return claimed;
+  const auto* found = std::find_if(kModels.begin(), kModels.end(),
+                                   [&](Model m) { return is_close(spacing, packet_duration(m, mode)); });
+  return found == kModels.end() ? std::nullopt : std::optional{*found};
+}
+
+/// Whether the two halves of the blocks measure the same distances, as they do when 16 lasers fire twice. In recorded
+/// packets 60 % of the pairs within 2 % is above every HDL-32E and below nine tenths of the VLP-16.
+bool fires_sixteen_lasers_twice(std::span<const std::byte, kDataPacketBytes> packet) {
+  constexpr std::size_t kLasers = 16;
+  std::size_t pairs = 0;
+  std::size_t alike = 0;
+  for (std::size_t block = 0; block < kBlocks; ++block) {
+    const std::byte* channels = packet.data() + block * kBlockBytes + kBlockHeaderBytes;
+    for (std::size_t laser = 0; laser < kLasers; ++laser) {
+      const int first = read_u16(channels + laser * kChannelBytes);
+      const int second = read_u16(channels + (laser + kLasers) * kChannelBytes);
+      if (first == 0 || second == 0)
+        continue;
+      ++pairs;
+      if (50 * std::abs(first - second) <= std::max(first, second))
+        ++alike;
+    }
+  }
+  return 10 * alike > 6 * pairs;
+}
+
+} // namespace
+
+Model ModelRecognition::recognise(Model claimed, ReturnMode mode, Duration time_of_hour,
+                                  std::span<const std::byte, kDataPacketBytes> packet) {
+  if (claimed != claimed_)
+    verdict_.reset();
+  claimed_ = claimed;
+  if (last_time_of_hour_)
+    if (const auto told = model_of_spacing(claimed, mode, time_of_hour - *last_time_of_hour_))
+      verdict_ = told;
+  last_time_of_hour_ = time_of_hour;
+  if (!verdict_)
+    verdict_ = claimed == Model::hdl32e && fires_sixteen_lasers_twice(packet) ? Model::vlp16 : claimed;
+  return *verdict_;
+}
+
+} // namespace locus::velodyne

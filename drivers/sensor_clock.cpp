@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/sensor_clock.hpp"
+
+#include <algorithm>
+
+namespace locus {
+
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr Duration kHour = std::chrono::hours{1};
+constexpr Duration kReorderWindow = milliseconds{100}; ///< a packet later than this has not just been overtaken
+constexpr Duration kMaxEarly = milliseconds{20};       ///< ahead of the envelope
+constexpr Duration kMaxLate = std::chrono::seconds{1}; ///< behind it: no network holds packets for longer
+constexpr int kMaxReplaySpeed = 10; ///< sensor time per time of reception, where only `sensor` counts
+constexpr int kProofOfStep = 5;
+
+constexpr Duration kEnvelopeSpan = milliseconds{500};
+constexpr Duration kSettling = std::chrono::seconds{1};
+constexpr double kSettlingSlew = 0.05;
+constexpr double kMaxDrift = 500e-6;
+constexpr Duration kMaxOffsetError = milliseconds{5};
+constexpr Duration kMaxUtcError = milliseconds{20};
+
+/// Of all times that differ from `time` by whole hours, the one closest to `target`.
+Duration nearest_hour(Duration time, Duration target) {
+  const Duration half = kHour / 2;
+  Duration beyond = (target - time + half) % kHour;
+  if (beyond < Duration{})
+    beyond += kHour;
+  return target + half - beyond;
+}
+
+} // namespace
+
+std::optional<SensorClock::Reading> SensorClock::read(Duration time_of_hour, Duration packet_duration, Stamp receive) {
+  const Duration sensor_time = anchored_ ? unwrap(time_of_hour, receive) : time_of_hour;
+  if (!anchored_ || !follows(sensor_time, packet_duration, receive)) {
+    if (anchored_ && !proves_step(time_of_hour))
+      return std::nullopt;
+    steps_ += anchored_ ? 1 : 0;
+    anchor(time_of_hour, packet_duration, receive);
+    return Reading{stamp(time_of_hour, receive), Duration{}, false};
+  }
+  suspects_ = 0;
+  const Duration advance = sensor_time - latest_;
+  if (advance > Duration{}) {
+    if (mode_ != LidarTime::sensor)
+      track(sensor_time, packet_duration, receive);
+    latest_ = sensor_time;
+    latest_receive_ = receive;
+  }
+  return Reading{stamp(sensor_time, receive), advance, true};
+}
+
+void SensorClock::anchor(Duration time_of_hour, Duration packet_duration, Stamp receive) {
+  anchored_ = true;
+  suspects_ = 0;
+  latest_ = time_of_hour;
+  latest_receive_ = receive;
+  offset_ = receive.time_since_epoch() - packet_duration - time_of_hour;
+  settled_at_ = receive + kSettling;
+  envelope_ = {receive, offset_, offset_};
+}
+
+Duration SensorClock::unwrap(Duration time_of_hour, Stamp receive) const {
+  return nearest_hour(time_of_hour, latest_ + (receive - latest_receive_));
+}
+
+bool SensorClock::follows(Duration sensor_time, Duration packet_duration, Stamp receive) const {
+  if (sensor_time <= latest_)
+    return latest_ - sensor_time <= kReorderWindow;
+  if (mode_ == LidarTime::sensor)
+    return (sensor_time - latest_ - kReorderWindow) / kMaxReplaySpeed <= receive - latest_receive_;
+  const Duration lateness = receive.time_since_epoch() - packet_duration - offset_ - sensor_time;
+  return lateness >= -kMaxEarly && lateness <= kMaxLate;
+}
+
+/// Whether the refused times, this one included, tell the same story often enough to be believed.
+bool SensorClock::proves_step(Duration time_of_hour) {
+  const Duration advance = nearest_hour(time_of_hour - suspect_time_of_hour_, Duration{});
+  const bool goes_on = suspects_ > 0 && advance > Duration{} && advance <= kReorderWindow;
+  suspects_ = goes_on ? suspects_ + 1 : 1;
+  suspect_time_of_hour_ = time_of_hour;
+  return suspects_ == kProofOfStep;
+}
+
+/// Moves the offset towards the envelope. Precondition: sensor_time > latest_.
+void SensorClock::track(Duration sensor_time, Duration packet_duration, Stamp receive) {
+  const Duration delay = receive.time_since_epoch() - packet_duration - sensor_time;
+  envelope_.minimum = std::min(envelope_.minimum, delay);
+  const bool settled = receive >= settled_at_;
+  if (receive - envelope_.span_start >= kEnvelopeSpan) {
+    const Duration error = envelope_.lowest() - offset_;
+    if (settled && std::chrono::abs(error) > kMaxOffsetError) {
+      ++steps_;
+      offset_ += error;
+    }
+    envelope_ = {receive, delay, envelope_.minimum};
+  }
+  const Duration most = from_seconds((settled ? kMaxDrift : kSettlingSlew) * to_seconds(sensor_time - latest_));
+  offset_ += std::clamp(envelope_.lowest() - offset_, -most, most);
+}
+
+Stamp SensorClock::stamp(Duration sensor_time, Stamp receive) const {
+  const Stamp by_reception{sensor_time + offset_};
+  if (mode_ == LidarTime::receive || (mode_ == LidarTime::automatic && !synchronised_))
+    return by_reception;
+  const Stamp reference = mode_ == LidarTime::sensor ? receive : by_reception;
+  const Stamp by_sensor{nearest_hour(sensor_time, reference.time_since_epoch())};
+  if (mode_ == LidarTime::automatic && std::chrono::abs(by_sensor - by_reception) > kMaxUtcError)
+    return by_reception;
+  return by_sensor;
+}
+
+} // namespace locus

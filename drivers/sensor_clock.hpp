@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "core/stamp.hpp"
+#include "drivers/lidar_options.hpp"
+
+namespace locus {
+
+/// Turns a lidar's time of hour into stamps of the host's clock. The lidar's clock always is the ruler; LidarTime says
+/// what fixes its zero:
+/// - receive: the stamps of reception. A packet cannot arrive before its last firing and is sometimes late, so the
+/// lower
+///   envelope of (reception - end of packet) over the last second is the offset. It is followed at 500 ppm at most (5 %
+///   in the first second), so jitter of the network does not reach the stamps.
+/// - sensor: the time of hour itself; of all hours the one that puts the packet closest to its reception. Right as long
+/// as
+///   the host's clock is right to half an hour; the host's clock should be on UTC too, or the lidar's stamps are not
+///   those of the other sensors.
+/// - automatic: sensor while the lidar is synchronised *and* its time is within 20 ms of what reception says (else the
+///   host's clock is not on UTC, and stamps are promised to be the host's), otherwise receive.
+///
+/// A time that does not follow from the ones before is refused. When five in a row follow from each other instead, the
+/// clock was set: a step, counted, and time goes on from there. A drift that the envelope cannot be followed at (error
+/// beyond 5 ms) is a step too. Time of hour wraps every hour, unnoticed. Reads no clock, allocates nothing. One owner.
+class SensorClock {
+ public:
+  /// One packet's place in time.
+  struct Reading {
+    Stamp stamp;      ///< of the instant that the time of hour names
+    Duration advance; ///< of the sensor's clock since the latest packet before; < 0 for a packet that comes late
+    bool continuous;  ///< false for the first packet and the one after a step: `advance` means nothing
+  };
+
+  explicit SensorClock(LidarTime mode) : mode_(mode) {}
+
+  /// Takes the stamps of one data packet; nothing if its time is refused. Precondition: 0 <= time_of_hour < 1 h.
+  std::optional<Reading> read(Duration time_of_hour, Duration packet_duration, Stamp receive);
+
+  /// Whether the lidar's clock is on UTC, as its position packets say.
+  void set_synchronised(bool synchronised) { synchronised_ = synchronised; }
+
+  [[nodiscard]] std::uint64_t steps() const { return steps_; }
+
+ private:
+  /// Lower envelope of the delay of reception, over one to two of its spans.
+  struct Envelope {
+    Stamp span_start;
+    Duration minimum, previous_minimum;
+    [[nodiscard]] Duration lowest() const { return minimum < previous_minimum ? minimum : previous_minimum; }
+  };
+
+  void anchor(Duration time_of_hour, Duration packet_duration, Stamp receive);
+  [[nodiscard]] Duration unwrap(Duration time_of_hour, Stamp receive) const;
+  [[nodiscard]] bool follows(Duration sensor_time, Duration packet_duration, Stamp receive) const;
+  bool proves_step(Duration time_of_hour);
+  void track(Duration sensor_time, Duration packet_duration, Stamp receive);
+  [[nodiscard]] Stamp stamp(Duration sensor_time, Stamp receive) const;
+
+  LidarTime mode_;
+  bool synchronised_ = false;
+  std::uint64_t steps_ = 0;
+
+  bool anchored_ = false;
+  Duration latest_{};    ///< latest sensor time: time of hour at the anchor, counted on from there
+  Stamp latest_receive_; ///< of that packet
+  Duration offset_{};    ///< host's clock = sensor time + offset
+  Stamp settled_at_;
+  Envelope envelope_{};
+
+  Duration suspect_time_of_hour_{};
+  int suspects_ = 0;
+};
+
+} // namespace locus

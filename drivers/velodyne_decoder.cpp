@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/velodyne_decoder.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include "drivers/wire.hpp"
+
+namespace locus::velodyne {
+
+namespace {
+
+constexpr double kRadPerCdeg = std::numbers::pi / 18000.0;
+
+/// Twice the fastest setting of any model, 1200 rpm.
+constexpr double kMaxTurnCdegPerNs = 2.0 * 20.0 * kCdegPerTurn * 1e-9;
+
+/// Longest time over which the turn of the VLS-128 is told from two packets: at 2400 rpm two fifths of a turn.
+constexpr Duration kMaxTurnGap = std::chrono::milliseconds{10};
+
+const std::byte* block_at(std::span<const std::byte, kDataPacketBytes> packet, std::size_t block) {
+  return packet.data() + block * kBlockBytes;
+}
+
+std::uint16_t flag_of(const std::byte* block) { return read_u16(block); }
+std::uint16_t azimuth_of(const std::byte* block) { return read_u16(block + 2); }
+const std::byte* channel_at(const std::byte* block, std::size_t channel) {
+  return block + kBlockHeaderBytes + channel * kChannelBytes;
+}
+
+int clockwise_turn(std::uint16_t from_cdeg, std::uint16_t to_cdeg) {
+  const int turn = int{to_cdeg} - int{from_cdeg};
+  return turn < 0 ? turn + kCdegPerTurn : turn;
+}
+
+} // namespace
+
+Duration time_of_hour(std::span<const std::byte> payload) {
+  return std::chrono::microseconds{read_u32(payload.data() + kTimeOffset)};
+}
+
+std::optional<PacketError> Decoder::decode(std::span<const std::byte> payload, LidarPacket& packet) {
+  if (payload.size() != kDataPacketBytes)
+    return PacketError::length;
+  const auto bytes = payload.first<kDataPacketBytes>();
+  const Duration stamp = time_of_hour(payload);
+  if (const auto error = recognise(bytes, stamp))
+    return error;
+  if (const auto error = check_blocks(bytes))
+    return error;
+  if (stamp >= std::chrono::hours{1})
+    return PacketError::time;
+  if (!measure_turns(bytes, stamp))
+    return PacketError::azimuth;
+
+  packet.count = 0;
+  for (std::size_t column = 0; column < layout_.columns; ++column) {
+    for (std::size_t bank = 0; bank < layout_.banks; ++bank) {
+      take_aim(column, bank);
+      emit_returns(bytes, column, bank, packet);
+    }
+  }
+  packet.duration = packet_duration(*model_, *mode_);
+  packet.first_azimuth_cdeg = azimuth_cdeg_.front();
+  packet.last_azimuth_cdeg = aim_.azimuth_cdeg.back();
+  return std::nullopt;
+}
+
+double Decoder::rotation_rate_rpm() const {
+  return column_duration_ == Duration{} ? 0.0
+                                        : 60.0 * double{mean_turn_cdeg_} / kCdegPerTurn / to_seconds(column_duration_);
+}
+
+std::optional<PacketError> Decoder::recognise(Packet packet, Duration time_of_hour) {
+  const auto mode = options_.return_mode
+                        ? options_.return_mode
+                        : return_mode_from_byte(std::to_integer<std::uint8_t>(packet[kReturnModeOffset]));
+  if (!mode)
+    return PacketError::model;
+  auto model = options_.model;
+  if (!model) {
+    const auto claimed = model_from_product_id(std::to_integer<std::uint8_t>(packet[kProductIdOffset]));
+    if (!claimed)
+      return PacketError::model;
+    model = recognition_.recognise(*claimed, *mode, time_of_hour, packet);
+  }
+  if (model == model_ && mode == mode_)
+    return std::nullopt;
+  const Calibration& own = spec(*model).calibration;
+  if (options_.calibration && options_.calibration->laser_count != own.laser_count)
+    return PacketError::model;
+  prepare(*model, *mode, options_.calibration ? *options_.calibration : own);
+  return std::nullopt;
+}
+
+void Decoder::prepare(Model model, ReturnMode mode, const Calibration& calibration) {
+  model_ = model;
+  mode_ = mode;
+  layout_ = packet_layout(model, mode);
+  column_duration_ = spec(model).column_duration;
+  distance_resolution_m_ = static_cast<float>(calibration.distance_resolution_m);
+  last_time_of_hour_.reset();
+
+  const std::span<const Firing> firings = spec(model).firings();
+  for (std::size_t i = 0; i < firings.size(); ++i) {
+    const Laser& laser = calibration.storage[firings[i].laser];
+    firings_.share_of_column[i] =
+        static_cast<float>(firings[i].offset_ns) / static_cast<float>(column_duration_.count());
+    firings_.cos_azimuth_offset[i] = static_cast<float>(std::cos(laser.azimuth_offset_rad));
+    firings_.sin_azimuth_offset[i] = static_cast<float>(std::sin(laser.azimuth_offset_rad));
+    firings_.cos_elevation[i] = static_cast<float>(std::cos(laser.elevation_rad));
+    firings_.sin_elevation[i] = static_cast<float>(std::sin(laser.elevation_rad));
+    firings_.range_offset_m[i] = static_cast<float>(laser.range_offset_m);
+    firings_.radial_offset_m[i] = static_cast<float>(laser.radial_offset_m);
+    firings_.lateral_offset_m[i] = static_cast<float>(laser.lateral_offset_m);
+    firings_.vertical_offset_m[i] = static_cast<float>(laser.vertical_offset_m);
+    firings_.offset_ns[i] = firings[i].offset_ns;
+    firings_.ring[i] = laser.ring;
+  }
+}
+
+std::optional<PacketError> Decoder::check_blocks(Packet packet) const {
+  for (std::size_t i = 0; i < layout_.used_blocks(); ++i) {
+    const std::byte* block = block_at(packet, i);
+    if (flag_of(block) != kBankFlags[i % layout_.blocks_per_column() / layout_.returns])
+      return PacketError::flag;
+    if (azimuth_of(block) >= kCdegPerTurn)
+      return PacketError::azimuth;
+  }
+  return std::nullopt;
+}
+
+/// Sets azimuth and turn of every column. Fails when most turns are impossible.
+bool Decoder::measure_turns(Packet packet, Duration time_of_hour) {
+  const std::size_t columns = layout_.columns;
+  for (std::size_t column = 0; column < columns; ++column)
+    azimuth_cdeg_[column] = azimuth_of(block_at(packet, column * layout_.blocks_per_column()));
+
+  const double max_turn_cdeg = kMaxTurnCdegPerNs * static_cast<double>(column_duration_.count());
+  int sum_cdeg = 0;
+  int possible = 0;
+  std::array<bool, kBlocks> is_possible{};
+  for (std::size_t column = 0; column + 1 < columns; ++column) {
+    const int turn_cdeg = clockwise_turn(azimuth_cdeg_[column], azimuth_cdeg_[column + 1]);
+    turn_cdeg_[column] = static_cast<float>(turn_cdeg);
+    is_possible[column] = turn_cdeg <= max_turn_cdeg;
+    sum_cdeg += is_possible[column] ? turn_cdeg : 0;
+    possible += is_possible[column] ? 1 : 0;
+  }
+  if (2 * static_cast<std::size_t>(possible) + 1 < columns)
+    return false;
+
+  if (columns > 1) {
+    mean_turn_cdeg_ = static_cast<float>(sum_cdeg) / static_cast<float>(possible);
+  } else if (last_time_of_hour_ && time_of_hour > *last_time_of_hour_ &&
+             time_of_hour - *last_time_of_hour_ < kMaxTurnGap) {
+    const double turn_cdeg = clockwise_turn(last_azimuth_cdeg_, azimuth_cdeg_.front()) *
+                             (to_seconds(column_duration_) / to_seconds(time_of_hour - *last_time_of_hour_));
+    if (turn_cdeg <= max_turn_cdeg)
+      mean_turn_cdeg_ = static_cast<float>(turn_cdeg);
+  }
+  last_time_of_hour_ = time_of_hour;
+  last_azimuth_cdeg_ = azimuth_cdeg_.front();
+
+  for (std::size_t column = 0; column < columns; ++column)
+    if (!is_possible[column])
+      turn_cdeg_[column] = mean_turn_cdeg_;
+  return true;
+}
+
+/// Turns the column's azimuth by each firing's share of the turn (first, a small angle) and by its laser's offset.
+void Decoder::take_aim(std::size_t column, std::size_t bank) {
+  const double azimuth_rad = kRadPerCdeg * azimuth_cdeg_[column];
+  const auto cos_column = static_cast<float>(std::cos(azimuth_rad));
+  const auto sin_column = static_cast<float>(std::sin(azimuth_rad));
+  const float turn_cdeg = turn_cdeg_[column];
+  const float turn_rad = static_cast<float>(kRadPerCdeg) * turn_cdeg;
+  for (std::size_t channel = 0; channel < kChannels; ++channel) {
+    const std::size_t i = bank * kChannels + channel;
+    const float angle = firings_.share_of_column[i] * turn_rad;
+    const float cos_angle = 1.0F - 0.5F * angle * angle; // at most 1.6 deg: the next terms are below 3e-8
+    const float sin_angle = angle - angle * angle * angle / 6.0F;
+    const float cos_firing = cos_column * cos_angle - sin_column * sin_angle;
+    const float sin_firing = sin_column * cos_angle + cos_column * sin_angle;
+    aim_.cos_azimuth[channel] =
+        cos_firing * firings_.cos_azimuth_offset[i] - sin_firing * firings_.sin_azimuth_offset[i];
+    aim_.sin_azimuth[channel] =
+        sin_firing * firings_.cos_azimuth_offset[i] + cos_firing * firings_.sin_azimuth_offset[i];
+    const int firing_cdeg = azimuth_cdeg_[column] + static_cast<int>(firings_.share_of_column[i] * turn_cdeg + 0.5F);
+    aim_.azimuth_cdeg[channel] =
+        static_cast<std::uint16_t>(firing_cdeg < kCdegPerTurn ? firing_cdeg : firing_cdeg - kCdegPerTurn);
+  }
+}
+
+/// Appends the returns of one bank of a column. Every channel is written where the next return belongs and kept by
+/// counting it: no branch to be mispredicted on the mix of hits and misses that a scene is.
+void Decoder::emit_returns(Packet packet, std::size_t column, std::size_t bank, LidarPacket& out) const {
+  const std::byte* block = block_at(packet, column * layout_.blocks_per_column() + bank * layout_.returns);
+  const auto column_offset_ns =
+      static_cast<std::int32_t>(static_cast<Duration::rep>(column) * column_duration_.count());
+  std::size_t count = out.count;
+  for (std::size_t channel = 0; channel < kChannels; ++channel) {
+    const std::size_t i = bank * kChannels + channel;
+    std::uint16_t previous_distance = 0; // 0 is no return, so nothing is lost when the first echo equals it
+    for (std::size_t echo = 0; echo < layout_.returns; ++echo) {
+      const std::byte* at = channel_at(block + echo * kBlockBytes, channel);
+      const std::uint16_t distance = read_u16(at);
+      const float range_m = static_cast<float>(distance) * distance_resolution_m_ + firings_.range_offset_m[i];
+      const float radial_m = range_m * firings_.cos_elevation[i] + firings_.radial_offset_m[i];
+      out.storage[count] = {
+          .x_m = radial_m * aim_.cos_azimuth[channel] + firings_.lateral_offset_m[i] * aim_.sin_azimuth[channel],
+          .y_m = firings_.lateral_offset_m[i] * aim_.cos_azimuth[channel] - radial_m * aim_.sin_azimuth[channel],
+          .z_m = range_m * firings_.sin_elevation[i] + firings_.vertical_offset_m[i],
+          .range_m = range_m,
+          .offset_ns = column_offset_ns + firings_.offset_ns[i],
+          .azimuth_cdeg = aim_.azimuth_cdeg[channel],
+          .ring = firings_.ring[i],
+          .intensity = std::to_integer<std::uint8_t>(at[2])};
+      const bool is_return = (distance != 0) & (distance != previous_distance) & (range_m > 0.0F);
+      count += is_return ? 1 : 0;
+      previous_distance = distance;
+    }
+  }
+  out.count = count;
+}
+
+} // namespace locus::velodyne

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "core/lidar_packet.hpp"
+#include "core/stamp.hpp"
+#include "drivers/model_recognition.hpp"
+#include "drivers/packet_counters.hpp"
+#include "drivers/velodyne_model.hpp"
+
+namespace locus::velodyne {
+
+/// What the configuration knows better than the packets.
+struct DecoderOptions {
+  std::optional<Model> model;             ///< nothing: told by ModelRecognition
+  std::optional<ReturnMode> return_mode;  ///< nothing: the packet's own factory byte
+  std::optional<Calibration> calibration; ///< nothing: the model's own table
+};
+
+/// Turns data packets into returns, each with the direction and the time of its own firing.
+///
+/// The azimuth of a firing is that of its column plus the share of the turn to the next column that had passed when it
+/// fired. After the last column, and where two columns lie farther apart than any motor turns (a field of view was
+/// set), the mean turn of the packet's columns counts; a dual packet of the VLS-128, one column long, counts the turn
+/// since the packet before, the first one none. In dual mode two equal distances are one return.
+///
+/// One owner. Allocates nothing, throws nothing. A packet that is refused leaves the decoder as it was, but for what
+/// the model is recognised by.
+class Decoder {
+ public:
+  explicit Decoder(DecoderOptions options = {}) : options_(std::move(options)) {}
+
+  /// Fills everything of `packet` but lidar and stamp, or says why not (length, model, flag, azimuth, time) and leaves
+  /// `packet` undefined.
+  std::optional<PacketError> decode(std::span<const std::byte> payload, LidarPacket& packet);
+
+  /// Of the packets so far; nothing before the first good one.
+  [[nodiscard]] std::optional<Model> model() const { return model_; }
+  [[nodiscard]] std::optional<ReturnMode> return_mode() const { return mode_; }
+
+  /// Of the last good packet, from the turn of its columns.
+  [[nodiscard]] double rotation_rate_rpm() const;
+
+ private:
+  using Packet = std::span<const std::byte, kDataPacketBytes>;
+  template <class T> using PerFiring = std::array<T, kMaxLasers>;
+
+  /// Everything about a firing that does not change from packet to packet, one array per figure so that loops over the
+  /// firings become vector instructions.
+  struct Firings {
+    PerFiring<float> share_of_column; ///< of the column's duration that has passed before it
+    PerFiring<float> cos_azimuth_offset, sin_azimuth_offset;
+    PerFiring<float> cos_elevation, sin_elevation;
+    PerFiring<float> range_offset_m, radial_offset_m, lateral_offset_m, vertical_offset_m;
+    PerFiring<std::int32_t> offset_ns;
+    PerFiring<std::uint8_t> ring;
+  };
+
+  /// Where the 32 lasers of a block point when they fire.
+  struct Aim {
+    std::array<float, kChannels> cos_azimuth, sin_azimuth;
+    std::array<std::uint16_t, kChannels> azimuth_cdeg;
+  };
+
+  std::optional<PacketError> recognise(Packet packet, Duration time_of_hour);
+  void prepare(Model model, ReturnMode mode, const Calibration& calibration);
+  [[nodiscard]] std::optional<PacketError> check_blocks(Packet packet) const;
+  bool measure_turns(Packet packet, Duration time_of_hour);
+  void take_aim(std::size_t column, std::size_t bank);
+  void emit_returns(Packet packet, std::size_t column, std::size_t bank, LidarPacket& out) const;
+
+  DecoderOptions options_;
+  ModelRecognition recognition_;
+  std::optional<Model> model_;
+  std::optional<ReturnMode> mode_;
+  PacketLayout layout_{};
+  Duration column_duration_{};
+  float distance_resolution_m_ = 0.0F;
+  Firings firings_{};
+  Aim aim_{};
+
+  std::array<std::uint16_t, kBlocks> azimuth_cdeg_{}; ///< per column
+  std::array<float, kBlocks> turn_cdeg_{};            ///< from each column to the next
+  float mean_turn_cdeg_ = 0.0F;
+  std::optional<Duration> last_time_of_hour_;
+  std::uint16_t last_azimuth_cdeg_ = 0;
+};
+
+/// Time past the hour that a data packet names, not checked. Precondition: the payload has kDataPacketBytes.
+Duration time_of_hour(std::span<const std::byte> payload);
+
+} // namespace locus::velodyne
