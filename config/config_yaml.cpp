@@ -2,11 +2,11 @@
 #include "config/config_yaml.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <nettle/sha2.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <cctype>
 #include <fstream>
 #include <map>
 #include <numeric>
@@ -50,9 +50,11 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 }
 
 std::string unknown_key(std::string_view key, const std::vector<std::string_view>& known) {
-  const auto nearest = std::min_element(known.begin(), known.end(), [&](std::string_view a, std::string_view b) {
-    return edit_distance(key, a) < edit_distance(key, b);
-  });
+  const auto distance = [&](std::string_view candidate) { // a key cut short is near: voxel means voxel_filter
+    return std::pair{edit_distance(key, candidate.substr(0, key.size())), edit_distance(key, candidate)};
+  };
+  const auto nearest = std::min_element(
+      known.begin(), known.end(), [&](std::string_view a, std::string_view b) { return distance(a) < distance(b); });
   return fmt::format("unknown key '{}'; the nearest known one is '{}'", key, *nearest);
 }
 
@@ -61,6 +63,8 @@ template <class T>
 concept HasFields = requires(T& value, AnySection& section) {
   fields(section, value);
 };
+
+bool contains(const std::string& outer, const std::string& path) { return (path + '.').starts_with(outer + '.'); }
 
 /// What a tree of YAML says, read into structs, with the line of every key it holds.
 class Reading {
@@ -168,7 +172,7 @@ void Reading::blame_problems(const std::optional<std::string>& problems) {
     while (!known.empty() && !lines_.contains(known))
       known.resize(known.find('.') == std::string::npos ? 0 : known.rfind('.'));
     const int line = known.empty() ? 1 : lines_.at(known);
-    if (std::none_of(unreadable.begin(), unreadable.end(), [&](const Mistake& m) { return m.path == path; }))
+    if (std::none_of(unreadable.begin(), unreadable.end(), [&](const Mistake& m) { return contains(m.path, path); }))
       blame(path, line, problem.substr(path.size() + 2));
   }
 }
@@ -281,11 +285,20 @@ std::optional<std::string> assign(YAML::Node tree, Override& override) {
 /// The option that a mistake comes from: the last one that set its place, something below it or something around it.
 const Override& culprit(const std::vector<Override>& overrides, const Mistake& mistake) {
   const auto related = std::find_if(overrides.rbegin(), overrides.rend(), [&](const Override& override) {
-    return (mistake.path + '.').starts_with(override.path + '.') ||
-           (override.path + '.').starts_with(mistake.path + '.');
+    return contains(override.path, mistake.path) || contains(mistake.path, override.path);
   });
   return related == overrides.rend() ? overrides.back() : *related;
 }
+
+/// One line for the terminal, whatever bytes of the file are quoted in it.
+std::string error_line(const std::string& where, const std::string& what) {
+  std::string line = where + ": " + what;
+  std::replace_if(
+      line.begin(), line.end(), [](unsigned char c) { return std::iscntrl(c) != 0; }, '?');
+  return line;
+}
+
+std::string at_line(const std::string& file, int line) { return file + ':' + std::to_string(line); }
 
 } // namespace
 
@@ -294,19 +307,19 @@ Expected<Config, ConfigErrors> parse_config(const std::string& yaml, const std::
   try {
     documents = YAML::LoadAll(yaml);
   } catch (const YAML::Exception& error) {
-    return ConfigErrors{origin + ':' + std::to_string(error.mark.line + 1) + ": not YAML: " + error.msg};
+    return ConfigErrors{error_line(at_line(origin, error.mark.line + 1), "not YAML: " + error.msg)};
   } catch (const std::exception& error) {
-    return ConfigErrors{origin + ":1: not YAML: " + error.what()};
+    return ConfigErrors{error_line(at_line(origin, 1), std::string{"not YAML: "} + error.what())};
   }
   if (documents.size() > 1)
-    return ConfigErrors{origin + ':' + std::to_string(documents[1].Mark().line + 1) +
-                        ": a second YAML document begins; keep one"};
+    return ConfigErrors{
+        error_line(at_line(origin, documents[1].Mark().line + 1), "a second YAML document begins; keep one")};
   Config config;
   if (documents.empty())
     return config;
   ConfigErrors errors;
   for (const Mistake& mistake : read_tree(documents.front(), config))
-    errors.push_back(origin + ':' + std::to_string(mistake.line) + ": " + text_of(mistake));
+    errors.push_back(error_line(at_line(origin, mistake.line), text_of(mistake)));
   if (!errors.empty())
     return errors;
   return config;
@@ -318,9 +331,9 @@ Expected<Config, ConfigErrors> load_config(const std::filesystem::path& file) {
   std::ifstream stream{file, std::ios::binary};
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (stream.bad() || (stream.gcount() == 0 && !stream.eof()))
-    return ConfigErrors{file.string() + ": cannot be read; give a YAML file that exists and may be read"};
+    return ConfigErrors{error_line(file.string(), "cannot be read; give a YAML file that exists and may be read")};
   if (stream.gcount() > kMaxBytes)
-    return ConfigErrors{file.string() + ": is longer than 1 MiB; this is no configuration"};
+    return ConfigErrors{error_line(file.string(), "is longer than 1 MiB; this is no configuration")};
   text.resize(static_cast<std::size_t>(stream.gcount()));
   return parse_config(text, file.string());
 }
@@ -332,13 +345,13 @@ Expected<Config, ConfigErrors> override_config(const Config& config, std::span<c
   for (const std::string& assignment : assignments) {
     Override& override = overrides.emplace_back(Override{assignment, ""});
     if (const auto problem = assign(tree, override))
-      errors.push_back("--set " + assignment + ": " + *problem);
+      errors.push_back(error_line("--set " + assignment, *problem));
   }
   if (!errors.empty() || overrides.empty())
     return errors.empty() ? Expected<Config, ConfigErrors>{config} : errors;
   Config changed = config;
   for (const Mistake& mistake : read_tree(tree, changed))
-    errors.push_back("--set " + culprit(overrides, mistake).assignment + ": " + text_of(mistake));
+    errors.push_back(error_line("--set " + culprit(overrides, mistake).assignment, text_of(mistake)));
   if (!errors.empty())
     return errors;
   return changed;

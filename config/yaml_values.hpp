@@ -53,8 +53,10 @@ requires std::is_arithmetic_v<T> Reason parse(const YAML::Node& node, T& value) 
   if constexpr (std::is_floating_point_v<T>) {
     if (!read_to_the_end || !std::isfinite(number))
       return "must be a finite number";
+  } else if (error == std::errc::result_out_of_range) {
+    return fmt::format("is outside {} .. {}", std::numeric_limits<T>::min(), std::numeric_limits<T>::max());
   } else if (!read_to_the_end) {
-    return fmt::format("must be a whole number {} .. {}", std::numeric_limits<T>::min(), std::numeric_limits<T>::max());
+    return std::is_signed_v<T> ? "must be a whole number" : "must be a whole number, 0 or more";
   }
   value = number;
   return std::nullopt;

@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "config/config_yaml.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <random>
+
+#include "support/temporary_file.hpp"
+#include "yaml_tree.hpp"
+
+namespace locus {
+namespace {
+
+/// Every key with another value than it has in kBase.
+const std::string kAllChanged = R"(
+lidars:
+  - {name: top, model: HDL-32E, port: 2400, source_ip: 192.168.1.201, time: sensor, calibration: "a, b}: #\n", T_base_lidar: {xyz_m: [0.1, -2e-07, 3], rpy_deg: [1, 30, -179.5]}}
+motion_sources:
+  - {name: vio, kind: odometry, topic: /vio, health_topic: /vio/health, T_base_source: {xyz_m: [0, 0, 0], rpy_deg: [0, 0, 0]}}
+  - {name: gyro, kind: imu, topic: /gyro, health_topic: /gyro_2, T_base_source: {xyz_m: [0.3333333333333333, 1, 2], rpy_deg: [90, 0, 45]}}
+sweep_period_ms: 66.666667
+motion_correction: false
+range_m: [0.1, 77.7]
+body_box: {enabled: true, min_m: [-2, -2, -2], max_m: [2, 2, 2]}
+segment_filter: {enabled: false, points: 1234}
+voxel_filter: {enabled: true, leaf_m: 0.3}
+random_filter: {enabled: true, keep: 0.7}
+seed: 18446744073709551615
+fusion: queue
+no_source_prior: identity
+scan_to_scan: {mode: off, max_iterations: 7, max_correspondence_m: 1.5}
+scan_to_submap: {max_iterations: 8, max_correspondence_m: 0.6}
+map: {keyframe_m: 2, keyframe_deg: 31, max_bytes: 123456789}
+flat_ground: on
+threads: 3
+realtime: {priority: 50, cpus: [2, 3], lock_memory: true}
+dds: {domain: 7, interface: eth1, prefix: /robot/locus, frame_odom: odom_2, frame_base: base, publish_tf: true, publish_cloud: true, publish_map: true, flat_ground_topic: /flat, type_hashes: false}
+)";
+
+/// The defaults, but such that each value of kAllChanged fits among them alone.
+const std::string kBase = R"(
+motion_sources:
+  - {name: a, kind: imu}
+  - {name: b, kind: odometry}
+body_box: {min_m: [-1, -1, -1], max_m: [1, 1, 1]}
+)";
+
+Config valid(const Expected<Config, ConfigErrors>& config) {
+  if (config)
+    return *config;
+  for (const std::string& error : config.error())
+    ADD_FAILURE() << error;
+  return {};
+}
+
+ConfigErrors errors_of(const Expected<Config, ConfigErrors>& config) {
+  return config ? ConfigErrors{} : config.error();
+}
+
+ConfigErrors errors_in(const std::string& yaml) { return errors_of(parse_config(yaml, "robot.yaml")); }
+
+Config with(const Config& config, const std::vector<std::string>& assignments) {
+  return valid(override_config(config, assignments));
+}
+
+ConfigErrors errors_with(const std::vector<std::string>& assignments) {
+  return errors_of(override_config(Config{}, assignments));
+}
+
+TEST(Config, DefaultsHaveNoProblem) { EXPECT_EQ(Config{}.problem(), std::nullopt); }
+
+TEST(ConfigYaml, EmptyTextAndEmptySectionsAreTheDefaults) {
+  for (const char* text : {"", "# nothing\n", "---\n", "{}", "dds:\nvoxel_filter:\n"})
+    EXPECT_EQ(valid(parse_config(text, "robot.yaml")), Config{}) << text;
+}
+
+TEST(ConfigYaml, PrintedDefaultsReadBackEqual) {
+  EXPECT_EQ(valid(parse_config(print_config(Config{}), "printed")), Config{});
+}
+
+TEST(ConfigYaml, EveryKeyChangedReadsBackEqual) {
+  const Config changed = valid(parse_config(kAllChanged, "changed"));
+  const std::string printed = print_config(changed);
+  EXPECT_EQ(test::leaves_of(printed), test::leaves_of(kAllChanged));
+  EXPECT_EQ(valid(parse_config(printed, "printed")), changed);
+}
+
+TEST(ConfigYaml, EveryKeyAloneChangesItselfAndNothingElse) {
+  const Config base = valid(parse_config(kBase, "base"));
+  const auto base_leaves = test::leaves_of(print_config(base));
+  const auto changed_leaves = test::leaves_of(kAllChanged);
+  const std::string no_correction =
+      "motion_sources.0.T_base_source"; // the one place that kAllChanged has to leave alone
+  for (const auto& [path, value] : base_leaves) {
+    if (path.starts_with(no_correction))
+      continue;
+    const bool of_second_source = path.starts_with("motion_sources.1.T_base_source");
+    const Config start = of_second_source ? with(base, {"motion_sources.1.kind=imu"}) : base;
+    const Config one_changed = with(start, {path + '=' + changed_leaves.at(path)});
+    auto expected = test::leaves_of(print_config(start));
+    EXPECT_NE(expected.at(path), changed_leaves.at(path)) << path;
+    expected[path] = changed_leaves.at(path);
+    EXPECT_EQ(test::leaves_of(print_config(one_changed)), expected) << path;
+    EXPECT_NE(one_changed, start) << path;
+    EXPECT_NE(config_sha256(one_changed), config_sha256(start)) << path;
+  }
+}
+
+TEST(ConfigYaml, AnglesReadBackToANanodegreeAlsoWhereYawAndRollAreOne) {
+  std::mt19937 random{1};
+  std::uniform_real_distribution<double> angle_rad{-3.1, 3.1};
+  for (int i = 0; i < 200; ++i) {
+    Config config;
+    const double pitch_rad = i % 4 == 0 ? std::copysign(std::acos(0.0), angle_rad(random)) : angle_rad(random);
+    config.lidars[0].T_base_lidar.rotation = from_rpy_rad({angle_rad(random), pitch_rad, angle_rad(random)});
+    const Config again = valid(parse_config(print_config(config), "printed"));
+    EXPECT_LT(again.lidars[0].T_base_lidar.rotation.angularDistance(config.lidars[0].T_base_lidar.rotation), 1e-9);
+    EXPECT_EQ(print_config(again), print_config(config));
+  }
+}
+
+TEST(ConfigYaml, UnknownKeyNamesFileLineAndNearestKey) {
+  EXPECT_EQ(errors_in("threads: 2\nvoxel_filter: {enabeld: true}\n"),
+            ConfigErrors{"robot.yaml:2: voxel_filter: unknown key 'enabeld'; the nearest known one is 'enabled'"});
+  EXPECT_EQ(errors_in("\n\nfussion: queue\n"),
+            ConfigErrors{"robot.yaml:3: unknown key 'fussion'; the nearest known one is 'fusion'"});
+}
+
+TEST(ConfigYaml, AllMistakesAreReportedInTheOrderOfTheirLines) {
+  EXPECT_EQ(errors_in("threads: 0\n"
+                      "lidars:\n"
+                      "  - {name: a, port: abc}\n"
+                      "  - name: b\n"
+                      "    T_base_lidar: {xyz_m: [1, 2]}\n"
+                      "    port: 2369\n"
+                      "fusion: best\n"
+                      "map:\n"
+                      "  keyframe_m: 1\n"
+                      "  keyframe_m: 2\n"
+                      "range_m: [5, 1]\n"),
+            (ConfigErrors{
+                "robot.yaml:1: threads: 0 is outside 1 .. 256",
+                "robot.yaml:3: lidars.0.port: must be a whole number, 0 or more",
+                "robot.yaml:5: lidars.1.T_base_lidar.xyz_m: must be a list of 3 finite numbers",
+                "robot.yaml:7: fusion: must be combined | queue",
+                "robot.yaml:10: map.keyframe_m: stands a second time, first in line 9",
+                "robot.yaml:11: range_m: must be [nearest, farthest] with 0 <= nearest < farthest <= 1000",
+            }));
+}
+
+struct BadValue {
+  std::string assignment;
+  std::string reason;
+};
+
+TEST(ConfigYaml, EveryKindOfBadValueIsRefusedWithItsKeyAndReason) {
+  const std::vector<BadValue> bad_values{
+      {"threads=2.5", "must be a whole number"},
+      {"threads=many", "must be a whole number"},
+      {"threads=99999999999", "is outside"},
+      {"threads=[1]", "must be a whole number"},
+      {"threads=", "must be a whole number"},
+      {"lidars.front.port=-1", "0 or more"},
+      {"lidars.front.port=0", "is outside 1 .. 65535"},
+      {"lidars.front.port=65536", "is outside 0 .. 65535"},
+      {"lidars.front.name=2nd", "is no name"},
+      {"lidars.front.name=total", "is taken"},
+      {"lidars.front.model=VLP-17", "must be VLP-16 | Puck-Hi-Res | VLP-32C | HDL-32E | VLS-128, or auto"},
+      {"lidars.front.source_ip=192.168.1.256", "must be an address"},
+      {"lidars.front.time=gps", "must be auto | sensor | receive"},
+      {"lidars.front.calibration=[a]", "must be text"},
+      {"lidars.front.T_base_lidar.rpy_deg=[0, .inf, 0]", "must be a list of 3 finite numbers"},
+      {"lidars=[]", "1 to 16"},
+      {"lidars={name: a}", "must be a list"},
+      {"motion_sources=[5]", "must be a section of keys"},
+      {"motion_sources=[{kind: imu}]", "is no name"},
+      {"motion_sources.wio.topic=wheel odometry", "is no topic"},
+      {"motion_sources.imu.health_topic=/imu/", "is no topic"},
+      {"motion_sources.wio.T_base_source.xyz_m=[1, 0, 0]", "belongs to kind imu alone"},
+      {"motion_correction=perhaps", "must be true or false"},
+      {"sweep_period_ms=5", "is outside 10 .. 1000"},
+      {"sweep_period_ms=-1e300", "is outside 10 .. 1000"},
+      {"sweep_period_ms=fast", "must be a finite number, or auto"},
+      {"range_m=[-1, 5]", "must be [nearest, farthest]"},
+      {"range_m=[0.5, 100, 200]", "must be a list of 2 finite numbers"},
+      {"body_box={enabled: true}", "must be greater"},
+      {"segment_filter.points=99", "is outside 100 .. 1000000"},
+      {"voxel_filter.leaf_m=.nan", "must be a finite number"},
+      {"voxel_filter.leaf_m=1e999", "must be a finite number"},
+      {"voxel_filter.leaf_m=0", "is outside 0.01 .. 10"},
+      {"random_filter.keep=1.1", "is outside 0.001 .. 1"},
+      {"seed=-1", "0 or more"},
+      {"seed=18446744073709551616", "is outside 0 .. 18446744073709551615"},
+      {"scan_to_scan.mode=sometimes", "must be always | auto | off"},
+      {"scan_to_scan.max_iterations=0", "is outside 1 .. 100"},
+      {"scan_to_submap.max_iterations=101", "is outside 1 .. 100"},
+      {"scan_to_submap.max_correspondence_m=-0.5", "is outside 0.01 .. 100"},
+      {"map.keyframe_m=0", "is outside"},
+      {"map.keyframe_deg=181", "is outside 1 .. 180"},
+      {"map.max_bytes=999", "is outside"},
+      {"flat_ground=maybe", "must be off | on | auto"},
+      {"realtime.priority=100", "is outside 0 .. 99"},
+      {"realtime.cpus=[-1]", "is outside 0 .. 1023"},
+      {"realtime.cpus=0", "must be a list"},
+      {"dds.domain=233", "is outside 0 .. 232"},
+      {"dds.interface=\"\"", "must name a network interface"},
+      {"dds.prefix=/locus//", "is no topic"},
+      {"dds.frame_base=odom", "must differ from frame_odom"},
+      {"dds.flat_ground_topic=flat", "is no topic"},
+  };
+  for (const BadValue& bad : bad_values) {
+    const ConfigErrors errors = errors_with({bad.assignment});
+    ASSERT_EQ(errors.size(), 1U) << bad.assignment;
+    EXPECT_TRUE(errors[0].starts_with("--set " + bad.assignment + ": ")) << errors[0];
+    EXPECT_NE(errors[0].find(bad.reason), std::string::npos) << errors[0] << "\nlacks: " << bad.reason;
+  }
+}
+
+TEST(ConfigYaml, TwoLidarsMayShareAPortOnlyWithAddressesOfTheirOwn) {
+  const auto lidars = [](const std::string& first, const std::string& second) {
+    return "lidars:\n  - {name: a, source_ip: " + first + "}\n  - {name: b, source_ip: " + second + "}\n";
+  };
+  EXPECT_TRUE(errors_in(lidars("10.0.0.1", "10.0.0.2")).empty());
+  for (const auto& [first, second] :
+       {std::pair{"any", "any"}, std::pair{"any", "10.0.0.2"}, std::pair{"10.0.0.2", "10.0.0.2"}}) {
+    const ConfigErrors errors = errors_in(lidars(first, second));
+    ASSERT_EQ(errors.size(), 1U);
+    EXPECT_TRUE(errors[0].starts_with("robot.yaml:3: lidars.1.port: ")) << errors[0];
+  }
+}
+
+TEST(ConfigYaml, ALidarAndASourceMayNotShareAName) {
+  EXPECT_EQ(errors_in("lidars:\n  - name: wio\nmotion_sources:\n  - name: wio\n"),
+            ConfigErrors{"robot.yaml:4: motion_sources.0.name: 'wio' is taken, each name may stand once"});
+}
+
+TEST(ConfigYaml, OffAndOnAreWordsWhateverYamlMakesOfThem) {
+  EXPECT_EQ(valid(parse_config("flat_ground: on\nscan_to_scan: {mode: off}", "")).odometry.flat_ground, FlatGround::on);
+  EXPECT_EQ(valid(parse_config("flat_ground: 'on'", "")).odometry.flat_ground, FlatGround::on);
+  EXPECT_EQ(valid(parse_config("flat_ground: true", "")).odometry.flat_ground, FlatGround::on);
+  EXPECT_EQ(valid(parse_config("scan_to_scan: {mode: false}", "")).odometry.scan_to_scan_mode, ScanToScanMode::off);
+}
+
+TEST(ConfigYaml, WhatIsNotYamlIsRefusedWithItsLine) {
+  EXPECT_EQ(errors_in("threads: 1\nlidars: [a\n").size(), 1U);
+  EXPECT_TRUE(errors_in("threads: 1\nlidars: ]\n")[0].starts_with("robot.yaml:2: not YAML: "));
+  EXPECT_TRUE(errors_in(std::string(100'000, '['))[0].starts_with("robot.yaml:1: not YAML: "));
+  EXPECT_EQ(errors_in("just words"), ConfigErrors{"robot.yaml:1: must be a section of keys"});
+  EXPECT_EQ(errors_in("? [a, b]\n: c\n"), ConfigErrors{"robot.yaml:1: a key must be a word"});
+  EXPECT_EQ(errors_in("---\nthreads: 1\n---\nthreads: 2\n"),
+            ConfigErrors{"robot.yaml:4: a second YAML document begins; keep one"});
+}
+
+TEST(ConfigYaml, DamagedFilesGiveOnePrintableLinePerMistakeAndNeverCrash) {
+  std::mt19937 random{7};
+  const std::string intact = print_config(Config{});
+  int refused = 0;
+  for (int i = 0; i < 2000; ++i) {
+    std::string text = intact;
+    for (unsigned damage = 0; damage <= random() % 8; ++damage)
+      text[random() % text.size()] = static_cast<char>(random());
+    text.resize(i % 2 == 0 ? text.size() : random() % text.size());
+    for (const std::string& error : errors_in(text)) {
+      ++refused;
+      EXPECT_TRUE(error.starts_with("robot.yaml:"));
+      EXPECT_TRUE(std::none_of(error.begin(), error.end(), [](unsigned char c) { return std::iscntrl(c) != 0; }));
+    }
+  }
+  EXPECT_GT(refused, 1000);
+}
+
+TEST(ConfigYaml, FileThatCannotBeReadIsNamed) {
+  const auto error_of = [](const std::string& file) { return errors_of(load_config(file)).at(0); };
+  EXPECT_TRUE(error_of("/nowhere/robot.yaml").starts_with("/nowhere/robot.yaml: cannot be read"));
+  EXPECT_TRUE(error_of(testing::TempDir()).starts_with(testing::TempDir() + ": cannot be read"));
+  EXPECT_TRUE(error_of("/dev/zero").starts_with("/dev/zero: is longer than 1 MiB"));
+}
+
+TEST(ConfigYaml, FileGivesWhatItsTextGives) {
+  const test::TemporaryFile file{"robot.yaml", test::bytes_of(kAllChanged)};
+  EXPECT_EQ(valid(load_config(file.path())), valid(parse_config(kAllChanged, "")));
+}
+
+TEST(ConfigOverride, ListItemsAreFoundByNameAndByIndex) {
+  const Config config = with(Config{}, {"lidars.front.port=2369", "lidars.0.T_base_lidar.xyz_m=[0, 0, 1]"});
+  EXPECT_EQ(config.lidars[0].port, 2369);
+  EXPECT_EQ(config.lidars[0].T_base_lidar.translation.z(), 1.0);
+}
+
+TEST(ConfigOverride, PartOfASectionLeavesTheRestOfIt) {
+  const Config config = with(Config{}, {"map={keyframe_m: 3}"});
+  EXPECT_EQ(config.odometry.map, (MapOptions{3.0, MapOptions{}.keyframe_deg, MapOptions{}.max_bytes}));
+}
+
+TEST(ConfigOverride, OptionsTakeEffectTogetherAndTheLastOneWins) {
+  const Config config = with(Config{}, {"range_m=[0.5, 2]", "threads=3", "range_m=[3, 9]", "threads=1"});
+  EXPECT_EQ(config.sweep.min_range_m, 3.0);
+  EXPECT_EQ(config.odometry.threads, 1);
+}
+
+TEST(ConfigOverride, MistakesNameTheOptionAtFault) {
+  EXPECT_EQ(errors_with({"threads=4", "lidars.frnt.port=1", "voxel.leaf_m=1", "threads.max=2", "threads", "map=[1"}),
+            (ConfigErrors{
+                "--set lidars.frnt.port=1: lidars has no item 'frnt'; give a name or an index below 1",
+                "--set voxel.leaf_m=1: unknown key 'voxel'; the nearest known one is 'voxel_filter'",
+                "--set threads.max=2: threads has no keys below it",
+                "--set threads: must be KEY=VALUE, e.g. lidars.front.port=2369",
+                "--set map=[1: the value is not YAML",
+            }));
+  EXPECT_EQ(errors_with({"threads=0", "map={keyframes: 1}", "seed=2"}),
+            (ConfigErrors{
+                "--set threads=0: threads: 0 is outside 1 .. 256",
+                "--set map={keyframes: 1}: map: unknown key 'keyframes'; the nearest known one is 'keyframe_m'",
+            }));
+}
+
+TEST(ConfigSha256, IsTheDigestOfThePrintedText) {
+  // A second opinion on the digest: the tool of the same name.
+  const test::TemporaryFile file{"printed.yaml", test::bytes_of(print_config(Config{}))};
+  FILE* pipe = popen(("sha256sum " + file.path().string()).c_str(), "r");
+  ASSERT_NE(pipe, nullptr);
+  std::string digest(64, '\0');
+  const std::size_t read = fread(digest.data(), 1, digest.size(), pipe);
+  pclose(pipe);
+  ASSERT_EQ(read, digest.size());
+  EXPECT_EQ(config_sha256(Config{}), digest);
+}
+
+} // namespace
+} // namespace locus
