@@ -14,8 +14,7 @@ namespace locus::sim {
 namespace {
 
 constexpr double kTurn_rad = 2 * std::numbers::pi;
-constexpr double kHalfBeam_rad = 0.0015; // in dual return mode the edge of the beam may meet something else
-constexpr double kTellingApart_m = 1.0;  // echoes nearer to each other than this are one
+constexpr double kTellingApart_m = 1.0; // echoes nearer to each other than this are one
 constexpr int kDataPacketsPerPosition = 5;
 
 // Position packet, VLP-16 user manual 63-9243, section 9.4.

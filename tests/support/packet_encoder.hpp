@@ -19,13 +19,17 @@ namespace locus::sim {
 
 inline constexpr std::size_t kPositionPacketBytes = 512;
 
+/// In dual return mode the right edge of the beam may meet something else than its centre; it points this far beside
+/// it.
+inline constexpr double kHalfBeam_rad = 0.0015;
+
 /// A lidar, how it is mounted and what is wrong with it; as it stands, a perfect one that stands level in the base.
 struct SyntheticLidarOptions {
   velodyne::Model model = velodyne::Model::vlp16;
   velodyne::ReturnMode return_mode = velodyne::ReturnMode::strongest;
   double rpm = 600;
   double first_azimuth_deg = 0; ///< when the trajectory starts
-  Pose T_base_lidar;
+  Pose T_base_lidar{};
   std::uint16_t port = 2368;                   ///< that data packets are sent to
   std::uint32_t source_ip = 0xC0A8'01C9;       ///< 192.168.1.201
   double min_range_m = 0.4, max_range_m = 100; ///< no return beyond
