@@ -1,0 +1,31 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Installs what building and testing locusd needs: the Build-Depends of packaging/debian/control. At once done when all
+# of it is there. Runs as root or with sudo, on Debian 12 or newer.
+set -euo pipefail
+packaging=$(dirname "$(realpath "$0")")
+
+fail() {
+  echo "install-build-deps.sh: $1" >&2
+  echo "  Install the Build-Depends of $packaging/debian/control by other means, then run again." >&2
+  exit 1
+}
+
+if command -v dpkg-checkbuilddeps >/dev/null && dpkg-checkbuilddeps "$packaging/debian/control" 2>/dev/null; then
+  exit 0
+fi
+
+command -v apt-get >/dev/null || fail "there is no apt-get; this is not Debian."
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+  command -v sudo >/dev/null || fail "packages are missing, and without sudo only root can install them."
+  as_root=(sudo)
+fi
+
+install() {
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+    apt-get build-dep --yes --no-install-recommends --option DPkg::Lock::Timeout=600 "$packaging"
+}
+
+# The lists of a fresh or stale machine do not know the packages: then, and only then, fetch them.
+install || { "${as_root[@]}" apt-get update && install; } || fail "apt-get could not install all packages, see above."
