@@ -12,7 +12,6 @@ namespace locus::velodyne {
 
 namespace {
 
-constexpr std::size_t kTimeOfHourAt = 0xC6;
 constexpr std::size_t kPpsAt = 0xCA;
 constexpr std::size_t kNmeaAt = 0xCE;
 constexpr std::size_t kNmeaBytes = 128;
@@ -105,7 +104,7 @@ PositionPacket parse_position_packet(std::span<const std::byte, kPositionPacketB
   std::transform(payload.begin() + kNmeaAt, payload.begin() + kNmeaAt + kNmeaBytes, nmea.begin(),
                  [](std::byte b) { return std::to_integer<char>(b); });
   const auto pps = std::to_integer<std::uint8_t>(payload[kPpsAt]);
-  return {.time_of_hour = std::chrono::microseconds{read_u32(payload.data() + kTimeOfHourAt)},
+  return {.time_of_hour = std::chrono::microseconds{read_u32(payload.data() + kTimeOfHourOffset)},
           .pps = pps <= static_cast<std::uint8_t>(PpsState::error) ? static_cast<PpsState>(pps) : PpsState::error,
           .rmc = parse_rmc({nmea.data(), nmea.size()})};
 }

@@ -13,6 +13,7 @@
 namespace locus::velodyne {
 
 inline constexpr std::size_t kPositionPacketBytes = 512;
+inline constexpr std::size_t kTimeOfHourOffset = 0xC6; ///< microseconds past the hour, 32 bits
 
 /// What a GPS receiver says of itself in an NMEA RMC sentence.
 struct RmcSentence {
