@@ -92,8 +92,8 @@ class Reading {
     mistakes_.push_back({path, line, std::move(what)});
   }
 
-  /// Takes the lines of a problem() and finds where their keys stand in the file, or the nearest section around them. A
-  /// key that could not even be read is not blamed twice.
+  /// Takes the lines of a problem() and finds where their keys stand in the file, or the nearest section around them.
+  /// What could not even be read is not blamed twice.
   void blame_problems(const std::optional<std::string>& problems);
 
   [[nodiscard]] std::vector<Mistake> take_mistakes() {
@@ -266,13 +266,13 @@ std::optional<std::string> descend(YAML::Node& node, std::string& path, const st
 }
 
 /// Puts the value of one --set option into the tree. Returns what is wrong, if anything.
-std::optional<std::string> assign(YAML::Node tree, Override& override) {
+std::optional<std::string> assign(const YAML::Node& tree, Override& override) {
   const std::size_t equals = override.assignment.find('=');
   if (equals == std::string::npos || equals == 0)
     return "must be KEY=VALUE, e.g. lidars.front.port=2369";
   YAML::Node node = tree;
   for (const std::string& part : split(override.assignment.substr(0, equals), '.'))
-    if (const auto problem = descend(node, override.path, part))
+    if (auto problem = descend(node, override.path, part))
       return problem;
   try {
     node = YAML::Load(override.assignment.substr(equals + 1));

@@ -88,7 +88,7 @@ template <std::size_t kCount> Reason parse(const YAML::Node& node, std::array<do
 
 inline Reason parse(const YAML::Node& node, Eigen::Vector3d& value) {
   std::array<double, 3> numbers{};
-  if (const Reason reason = parse(node, numbers))
+  if (Reason reason = parse(node, numbers))
     return reason;
   value = Eigen::Vector3d{numbers.data()};
   return std::nullopt;

@@ -1,0 +1,26 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# demo.sh [CAPTURE]: builds locus-replay and runs it on a capture, a pcap file or a capture folder; without one, on a
+# robot that it first lets drive through a synthetic plant for a minute. Prints the figures and where the result lies.
+set -euo pipefail
+capture=${1:+$(realpath "$1")}
+cd "$(dirname "$0")"
+
+packaging/install-build-deps.sh
+cmake --preset release --log-level=WARNING
+cmake --build --preset release --target locus-replay synthetic-capture
+bin=build/release/bin
+result=build/demo
+
+if [ -z "$capture" ]; then
+  capture=$result/plant
+  [ -e "$capture/lidar.pcap" ] || "$bin/synthetic-capture" plant 60 "$capture"
+fi
+"$bin/locus-replay" -o "$result/odometry" "$capture"
+
+echo
+echo "$PWD/$result/odometry holds:"
+echo "  odometry.tum   where the robot was at the end of each sweep"
+echo "  odometry.csv   how sure of it, and why"
+echo "  map.pcd        what it saw"
+echo "  summary.json   losses, counts, times"
