@@ -73,11 +73,12 @@ std::optional<PacketError> LidarInput::take_data(const Datagram& datagram) {
   if (const auto error = decoder_.decode(datagram.payload, packet_))
     return error;
   const Duration time_of_hour = velodyne::time_of_hour(datagram.payload);
-  const auto reading = clock_.read(time_of_hour, packet_.duration, datagram.receive_stamp);
+  const Duration stamp_delay = velodyne::spec(*decoder_.model()).stamp_delay;
+  const auto reading = clock_.read(time_of_hour, packet_.duration - stamp_delay, datagram.receive_stamp);
   counters_.clock_steps = clock_.steps();
   if (!reading)
     return PacketError::time;
-  packet_.stamp = reading->stamp - velodyne::spec(*decoder_.model()).stamp_delay;
+  packet_.stamp = reading->stamp - stamp_delay;
   packet_is_ready_ = true;
   count(*reading);
   remember(datagram);
@@ -100,8 +101,8 @@ bool LidarInput::is_duplicate(std::span<const std::byte> payload) const {
 
 /// Packets that should lie between the latest one and this one, and do not.
 std::uint64_t LidarInput::missing_before(const SensorClock::Reading& reading) const {
-  const double packets = to_seconds(reading.advance) / to_seconds(packet_.duration);
-  const auto missing = std::llround(packets) - 1;
+  const Duration nominal = velodyne::packet_duration(*decoder_.model(), *decoder_.return_mode());
+  const auto missing = std::llround(to_seconds(reading.advance - last_duration_) / to_seconds(nominal));
   if (missing <= 0)
     return 0;
   if (reading.advance <= kLongestGapToldByAzimuth) {
@@ -125,6 +126,7 @@ void LidarInput::count(const SensorClock::Reading& reading) {
   if (reading.continuous)
     counters_.lost += missing_before(reading);
   last_azimuth_cdeg_ = packet_.first_azimuth_cdeg;
+  last_duration_ = packet_.duration;
 }
 
 void LidarInput::remember(const Datagram& datagram) {

@@ -78,6 +78,7 @@ class LidarInput {
   std::optional<std::uint32_t> learnt_ip_;
   Stamp last_heard_;
   std::uint16_t last_azimuth_cdeg_ = 0; ///< of the first firing of the latest packet
+  Duration last_duration_{};            ///< of that packet
 
   static constexpr std::size_t kRemembered = 8;
   std::array<Payload, kRemembered> recent_{}; ///< for telling duplicates

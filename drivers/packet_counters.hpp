@@ -14,7 +14,7 @@ enum class PacketError : std::uint8_t {
   flag,      ///< a block that does not open as the model's blocks do
   model,     ///< unknown product id or return mode, or a calibration file for another number of lasers
   sender,    ///< not from a lidar that was asked for
-  azimuth,   ///< beyond 359.99 degrees, or a turn that no motor makes
+  azimuth,   ///< beyond 360 degrees, or a turn that no motor makes
   time,      ///< an impossible time of hour, or one far from where the sensor's clock should be
   duplicate, ///< a packet that was already there
   truncated, ///< part of the payload is missing

@@ -34,32 +34,32 @@ Duration nearest_hour(Duration time, Duration target) {
 
 } // namespace
 
-std::optional<SensorClock::Reading> SensorClock::read(Duration time_of_hour, Duration packet_duration, Stamp receive) {
+std::optional<SensorClock::Reading> SensorClock::read(Duration time_of_hour, Duration until_sent, Stamp receive) {
   const Duration sensor_time = anchored_ ? unwrap(time_of_hour, receive) : time_of_hour;
-  if (!anchored_ || !follows(sensor_time, packet_duration, receive)) {
+  if (!anchored_ || !follows(sensor_time, until_sent, receive)) {
     if (anchored_ && !proves_step(time_of_hour))
       return std::nullopt;
     steps_ += anchored_ ? 1 : 0;
-    anchor(time_of_hour, packet_duration, receive);
+    anchor(time_of_hour, until_sent, receive);
     return Reading{stamp(time_of_hour, receive), Duration{}, false};
   }
   suspects_ = 0;
   const Duration advance = sensor_time - latest_;
   if (advance > Duration{}) {
     if (mode_ != LidarTime::sensor)
-      track(sensor_time, packet_duration, receive);
+      track(sensor_time, until_sent, receive);
     latest_ = sensor_time;
     latest_receive_ = receive;
   }
   return Reading{stamp(sensor_time, receive), advance, true};
 }
 
-void SensorClock::anchor(Duration time_of_hour, Duration packet_duration, Stamp receive) {
+void SensorClock::anchor(Duration time_of_hour, Duration until_sent, Stamp receive) {
   anchored_ = true;
   suspects_ = 0;
   latest_ = time_of_hour;
   latest_receive_ = receive;
-  offset_ = receive.time_since_epoch() - packet_duration - time_of_hour;
+  offset_ = receive.time_since_epoch() - until_sent - time_of_hour;
   settled_at_ = receive + kSettling;
   envelope_ = {receive, offset_, offset_};
 }
@@ -68,12 +68,12 @@ Duration SensorClock::unwrap(Duration time_of_hour, Stamp receive) const {
   return nearest_hour(time_of_hour, latest_ + (receive - latest_receive_));
 }
 
-bool SensorClock::follows(Duration sensor_time, Duration packet_duration, Stamp receive) const {
+bool SensorClock::follows(Duration sensor_time, Duration until_sent, Stamp receive) const {
   if (sensor_time <= latest_)
     return latest_ - sensor_time <= kReorderWindow;
   if (mode_ == LidarTime::sensor)
     return (sensor_time - latest_ - kReorderWindow) / kMaxReplaySpeed <= receive - latest_receive_;
-  const Duration lateness = receive.time_since_epoch() - packet_duration - offset_ - sensor_time;
+  const Duration lateness = receive.time_since_epoch() - until_sent - offset_ - sensor_time;
   return lateness >= -kMaxEarly && lateness <= kMaxLate;
 }
 
@@ -87,8 +87,8 @@ bool SensorClock::proves_step(Duration time_of_hour) {
 }
 
 /// Moves the offset towards the envelope. Precondition: sensor_time > latest_.
-void SensorClock::track(Duration sensor_time, Duration packet_duration, Stamp receive) {
-  const Duration delay = receive.time_since_epoch() - packet_duration - sensor_time;
+void SensorClock::track(Duration sensor_time, Duration until_sent, Stamp receive) {
+  const Duration delay = receive.time_since_epoch() - until_sent - sensor_time;
   envelope_.minimum = std::min(envelope_.minimum, delay);
   const bool settled = receive >= settled_at_;
   if (receive - envelope_.span_start >= kEnvelopeSpan) {

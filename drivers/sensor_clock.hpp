@@ -36,8 +36,9 @@ class SensorClock {
 
   explicit SensorClock(LidarTime mode) : mode_(mode) {}
 
-  /// Takes the stamps of one data packet; nothing if its time is refused. Precondition: 0 <= time_of_hour < 1 h.
-  std::optional<Reading> read(Duration time_of_hour, Duration packet_duration, Stamp receive);
+  /// Takes the stamps of one data packet, which is sent `until_sent` after the instant that its time of hour names;
+  /// nothing if its time is refused. Precondition: 0 <= time_of_hour < 1 h.
+  std::optional<Reading> read(Duration time_of_hour, Duration until_sent, Stamp receive);
 
   /// Whether the lidar's clock is on UTC, as its position packets say.
   void set_synchronised(bool synchronised) { synchronised_ = synchronised; }
@@ -52,11 +53,11 @@ class SensorClock {
     [[nodiscard]] Duration lowest() const { return minimum < previous_minimum ? minimum : previous_minimum; }
   };
 
-  void anchor(Duration time_of_hour, Duration packet_duration, Stamp receive);
+  void anchor(Duration time_of_hour, Duration until_sent, Stamp receive);
   [[nodiscard]] Duration unwrap(Duration time_of_hour, Stamp receive) const;
-  [[nodiscard]] bool follows(Duration sensor_time, Duration packet_duration, Stamp receive) const;
+  [[nodiscard]] bool follows(Duration sensor_time, Duration until_sent, Stamp receive) const;
   bool proves_step(Duration time_of_hour);
-  void track(Duration sensor_time, Duration packet_duration, Stamp receive);
+  void track(Duration sensor_time, Duration until_sent, Stamp receive);
   [[nodiscard]] Stamp stamp(Duration sensor_time, Stamp receive) const;
 
   LidarTime mode_;

@@ -12,10 +12,11 @@ namespace {
 
 constexpr double kRadPerCdeg = std::numbers::pi / 18000.0;
 
-/// Twice the fastest setting of any model, 1200 rpm.
-constexpr double kMaxTurnCdegPerNs = 2.0 * 20.0 * kCdegPerTurn * 1e-9;
+/// Three times the fastest setting of any model, 1200 rpm: a first packet of a VLP-16 taken for one of an HDL-32E,
+/// whose columns are shorter, seems to turn 2.4 times as fast and must not be refused for it.
+constexpr double kMaxTurnCdegPerNs = 3.0 * 20.0 * kCdegPerTurn * 1e-9;
 
-/// Longest time over which the turn of the VLS-128 is told from two packets: at 2400 rpm two fifths of a turn.
+/// Longest time over which the turn of the VLS-128 is told from two packets: at 3600 rpm three fifths of a turn.
 constexpr Duration kMaxTurnGap = std::chrono::milliseconds{10};
 
 const std::byte* block_at(std::span<const std::byte, kDataPacketBytes> packet, std::size_t block) {
@@ -60,7 +61,7 @@ std::optional<PacketError> Decoder::decode(std::span<const std::byte> payload, L
       emit_returns(bytes, column, bank, packet);
     }
   }
-  packet.duration = packet_duration(*model_, *mode_);
+  packet.duration = duration_;
   packet.first_azimuth_cdeg = azimuth_cdeg_.front();
   packet.last_azimuth_cdeg = aim_.azimuth_cdeg.back();
   return std::nullopt;
@@ -100,6 +101,7 @@ void Decoder::prepare(Model model, ReturnMode mode, const Calibration& calibrati
   column_duration_ = spec(model).column_duration;
   distance_resolution_m_ = static_cast<float>(calibration.distance_resolution_m);
   last_time_of_hour_.reset();
+  mean_turn_cdeg_ = 0.0F;
 
   const std::span<const Firing> firings = spec(model).firings();
   for (std::size_t i = 0; i < firings.size(); ++i) {
@@ -124,36 +126,51 @@ std::optional<PacketError> Decoder::check_blocks(Packet packet) const {
     const std::byte* block = block_at(packet, i);
     if (flag_of(block) != kBankFlags[i % layout_.blocks_per_column() / layout_.returns])
       return PacketError::flag;
-    if (azimuth_of(block) >= kCdegPerTurn)
+    if (azimuth_of(block) > kCdegPerTurn) // 360.00 itself is reported now and then
       return PacketError::azimuth;
   }
   return std::nullopt;
 }
 
-/// Sets azimuth and turn of every column. Fails when most turns are impossible.
+/// Sets azimuth, turn and time of every column. Fails when most turns are impossible.
 bool Decoder::measure_turns(Packet packet, Duration time_of_hour) {
-  const std::size_t columns = layout_.columns;
-  for (std::size_t column = 0; column < columns; ++column)
-    azimuth_cdeg_[column] = azimuth_of(block_at(packet, column * layout_.blocks_per_column()));
-
   const double max_turn_cdeg = kMaxTurnCdegPerNs * static_cast<double>(column_duration_.count());
-  int sum_cdeg = 0;
-  int possible = 0;
+  const std::size_t columns = layout_.columns;
   std::array<bool, kBlocks> is_possible{};
-  for (std::size_t column = 0; column + 1 < columns; ++column) {
-    const int turn_cdeg = clockwise_turn(azimuth_cdeg_[column], azimuth_cdeg_[column + 1]);
-    turn_cdeg_[column] = static_cast<float>(turn_cdeg);
-    is_possible[column] = turn_cdeg <= max_turn_cdeg;
-    sum_cdeg += is_possible[column] ? turn_cdeg : 0;
-    possible += is_possible[column] ? 1 : 0;
+  int possible = 0;
+  int sum_cdeg = 0;
+  for (std::size_t column = 0; column < columns; ++column) {
+    azimuth_cdeg_[column] = azimuth_of(block_at(packet, column * layout_.blocks_per_column())) % kCdegPerTurn;
+    if (column == 0)
+      continue;
+    const int turn_cdeg = clockwise_turn(azimuth_cdeg_[column - 1], azimuth_cdeg_[column]);
+    turn_cdeg_[column - 1] = static_cast<float>(turn_cdeg);
+    is_possible[column - 1] = turn_cdeg <= max_turn_cdeg;
+    possible += is_possible[column - 1] ? 1 : 0;
+    sum_cdeg += is_possible[column - 1] ? turn_cdeg : 0;
   }
-  if (2 * static_cast<std::size_t>(possible) + 1 < columns)
+  const int impossible = static_cast<int>(columns) - 1 - possible;
+  if (impossible > possible)
     return false;
-
-  if (columns > 1) {
+  if (columns > 1)
     mean_turn_cdeg_ = static_cast<float>(sum_cdeg) / static_cast<float>(possible);
-  } else if (last_time_of_hour_ && time_of_hour > *last_time_of_hour_ &&
-             time_of_hour - *last_time_of_hour_ < kMaxTurnGap) {
+  else
+    measure_turn_since_last_packet(time_of_hour, max_turn_cdeg);
+
+  std::int64_t columns_passed = 0;
+  for (std::size_t column = 0; column < columns; ++column) {
+    column_offset_ns_[column] = static_cast<std::int32_t>(columns_passed * column_duration_.count());
+    const bool skips_blind_sector = !is_possible[column] && column + 1 < columns && impossible == 1 && sum_cdeg > 0;
+    columns_passed += skips_blind_sector ? std::lround(turn_cdeg_[column] / mean_turn_cdeg_) : 1;
+    if (!is_possible[column])
+      turn_cdeg_[column] = mean_turn_cdeg_;
+  }
+  duration_ = columns_passed * column_duration_;
+  return true;
+}
+
+void Decoder::measure_turn_since_last_packet(Duration time_of_hour, double max_turn_cdeg) {
+  if (last_time_of_hour_ && time_of_hour > *last_time_of_hour_ && time_of_hour - *last_time_of_hour_ < kMaxTurnGap) {
     const double turn_cdeg = clockwise_turn(last_azimuth_cdeg_, azimuth_cdeg_.front()) *
                              (to_seconds(column_duration_) / to_seconds(time_of_hour - *last_time_of_hour_));
     if (turn_cdeg <= max_turn_cdeg)
@@ -161,11 +178,6 @@ bool Decoder::measure_turns(Packet packet, Duration time_of_hour) {
   }
   last_time_of_hour_ = time_of_hour;
   last_azimuth_cdeg_ = azimuth_cdeg_.front();
-
-  for (std::size_t column = 0; column < columns; ++column)
-    if (!is_possible[column])
-      turn_cdeg_[column] = mean_turn_cdeg_;
-  return true;
 }
 
 /// Turns the column's azimuth by each firing's share of the turn (first, a small angle) and by its laser's offset.
@@ -196,8 +208,6 @@ void Decoder::take_aim(std::size_t column, std::size_t bank) {
 /// counting it: no branch to be mispredicted on the mix of hits and misses that a scene is.
 void Decoder::emit_returns(Packet packet, std::size_t column, std::size_t bank, LidarPacket& out) const {
   const std::byte* block = block_at(packet, column * layout_.blocks_per_column() + bank * layout_.returns);
-  const auto column_offset_ns =
-      static_cast<std::int32_t>(static_cast<Duration::rep>(column) * column_duration_.count());
   std::size_t count = out.count;
   for (std::size_t channel = 0; channel < kChannels; ++channel) {
     const std::size_t i = bank * kChannels + channel;
@@ -212,7 +222,7 @@ void Decoder::emit_returns(Packet packet, std::size_t column, std::size_t bank, 
           .y_m = firings_.lateral_offset_m[i] * aim_.cos_azimuth[channel] - radial_m * aim_.sin_azimuth[channel],
           .z_m = range_m * firings_.sin_elevation[i] + firings_.vertical_offset_m[i],
           .range_m = range_m,
-          .offset_ns = column_offset_ns + firings_.offset_ns[i],
+          .offset_ns = column_offset_ns_[column] + firings_.offset_ns[i],
           .azimuth_cdeg = aim_.azimuth_cdeg[channel],
           .ring = firings_.ring[i],
           .intensity = std::to_integer<std::uint8_t>(at[2])};

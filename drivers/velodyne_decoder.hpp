@@ -71,6 +71,7 @@ class Decoder {
   void prepare(Model model, ReturnMode mode, const Calibration& calibration);
   [[nodiscard]] std::optional<PacketError> check_blocks(Packet packet) const;
   bool measure_turns(Packet packet, Duration time_of_hour);
+  void measure_turn_since_last_packet(Duration time_of_hour, double max_turn_cdeg);
   void take_aim(std::size_t column, std::size_t bank);
   void emit_returns(Packet packet, std::size_t column, std::size_t bank, LidarPacket& out) const;
 
@@ -86,6 +87,8 @@ class Decoder {
 
   std::array<std::uint16_t, kBlocks> azimuth_cdeg_{}; ///< per column
   std::array<float, kBlocks> turn_cdeg_{};            ///< from each column to the next
+  std::array<std::int32_t, kBlocks> column_offset_ns_{};
+  Duration duration_{};
   float mean_turn_cdeg_ = 0.0F;
   std::optional<Duration> last_time_of_hour_;
   std::uint16_t last_azimuth_cdeg_ = 0;
