@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <functional>
+
+#include "config/config.hpp"
+#include "core/sweep_builder.hpp"
+#include "daemon/input.hpp"
+#include "daemon/machine_time.hpp"
+#include "daemon/stage_stopwatch.hpp"
+#include "drivers/lidar_input.hpp"
+
+namespace locus::daemon {
+
+/// The way from the sensors to a sweep: bytes to returns, motion samples to tracks, both to sweeps.
+///
+/// The daemon's ingest thread and the replay in one thread make the same calls here. Before an input is taken its
+/// arrival tells the time, so a window that nobody closes ends before it whether or not Silence was heard in between:
+/// sweeps depend on the inputs alone. Allocates nothing once a few sweeps have been built, never throws after
+/// construction. One owner.
+class Ingest {
+ public:
+  /// Takes a finished sweep (see SweepBuilder::Sink) and when the work on its cut began.
+  using Sink = std::function<void(Sweep& sweep, const MachineTime& cut)>;
+
+  /// `lidars` opened from config.lidars.
+  Ingest(const Config& config, LidarRouter lidars, Sink sink);
+  Ingest(const Ingest&) = delete;
+  Ingest& operator=(const Ingest&) = delete;
+
+  void take(const Input& input) {
+    std::visit([this](const auto& what) { take(what); }, input);
+  }
+  void take(const Datagram& datagram);
+  void take(const ImuInput& imu) { take_motion(imu); }
+  void take(const OdometryInput& odometry) { take_motion(odometry); }
+  void take(const Silence& silence) { sweeps_.advance(silence.now); }
+  void take(const EndOfInput&) { sweeps_.finish(); }
+
+  /// The counters behind these belong to the thread that calls take().
+  [[nodiscard]] const LidarRouter& lidars() const { return lidars_; }
+  [[nodiscard]] const MotionSources& sources() const { return sweeps_.sources(); }
+  [[nodiscard]] const SweepBuilder& sweeps() const { return sweeps_; }
+  [[nodiscard]] const StageStopwatch& stages() const { return stages_; }
+
+  /// The most points that a sweep can have.
+  static std::size_t max_points(const Config& config);
+
+ private:
+  /// Passes stages on to the stopwatch and notes when a sweep is cut, which opens Stage::filter.
+  class CutWatch : public StageClock {
+   public:
+    explicit CutWatch(StageStopwatch& stages) : stages_(stages) {}
+    void enter(Stage stage) override;
+    void leave() override { stages_.leave(); }
+    [[nodiscard]] const MachineTime& cut() const { return cut_; }
+
+   private:
+    StageStopwatch& stages_;
+    MachineTime cut_;
+  };
+
+  template <class MotionInput> void take_motion(const MotionInput& input);
+
+  Sink sink_;
+  StageStopwatch stages_;
+  CutWatch cut_watch_{stages_};
+  LidarRouter lidars_;
+  SweepBuilder sweeps_;
+};
+
+} // namespace locus::daemon

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/live_pipeline.hpp"
+
+#include <ctime>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <pthread.h>
+
+namespace locus::daemon {
+
+namespace {
+
+/// How late, at most, a window is closed that no packet closes.
+constexpr Duration kMaxSilence = std::chrono::milliseconds{2};
+
+/// How long a thread sleeps, at most, before it looks whether it is still wanted.
+constexpr Duration kMaxSleep = std::chrono::milliseconds{100};
+
+} // namespace
+
+LivePipeline::LivePipeline(const Config& config, LidarRouter lidars, InputSource& input, double speed)
+    : input_(input), speed_(speed), max_points_(Ingest::max_points(config)),
+      ingest_(config, std::move(lidars), [this](Sweep& sweep, const MachineTime& cut) { hand_over(sweep, cut); }),
+      processor_(config.odometry), ingest_thread_([this] { run_ingest(); }),
+      odometry_thread_([this] { run_odometry(); }) {
+  pthread_setname_np(ingest_thread_.native_handle(), "ingest");
+  pthread_setname_np(odometry_thread_.native_handle(), "odometry");
+}
+
+void LivePipeline::stop() {
+  stopping_.store(true, std::memory_order_relaxed);
+  if (ingest_thread_.joinable())
+    ingest_thread_.join();
+  if (odometry_thread_.joinable())
+    odometry_thread_.join();
+}
+
+void LivePipeline::run_ingest() {
+  bool more = true;
+  while (more && !stopping_.load(std::memory_order_relaxed)) {
+    const Input input = input_.next(kMaxSilence);
+    ingest_.take(input);
+    more = !std::holds_alternative<EndOfInput>(input);
+  }
+  ingest_ended_.store(true, std::memory_order_release);
+  sweep_is_there_.notify();
+}
+
+/// Leaves memory behind in exchange for that of the sweep.
+void LivePipeline::hand_over(Sweep& sweep, const MachineTime& cut) {
+  CutSweep& back = newest_sweep_.back();
+  std::vector<SweepPoint> spare = std::exchange(back.sweep.points, {});
+  spare.reserve(max_points_); // does something for the first few sweeps alone
+  back = {std::move(sweep), cut};
+  sweep.points = std::move(spare);
+  seen_.fetch_add(1, std::memory_order_relaxed);
+  if (newest_sweep_.publish())
+    dropped_.fetch_add(1, std::memory_order_relaxed);
+  else
+    sweep_is_there_.notify();
+}
+
+void LivePipeline::run_odometry() {
+  for (bool last_look = false; !last_look;) {
+    last_look = ingest_ended_.load(std::memory_order_acquire);
+    if (const CutSweep* taken = newest_sweep_.take())
+      process(*taken);
+    else if (!last_look)
+      sweep_is_there_.wait_for(kMaxSleep);
+  }
+  odometry_ended_.store(true, std::memory_order_release);
+  estimate_is_there_.notify();
+}
+
+void LivePipeline::process(const CutSweep& taken) {
+  const Duration period = from_seconds(to_seconds(taken.sweep.end - taken.sweep.start) / speed_);
+  const Duration deadline = taken.cut.wall + period;
+  const ProcessedSweep done = processor_.process(taken.sweep, taken.cut, [this, deadline] {
+    return stopping_.load(std::memory_order_relaxed) || read_clock(CLOCK_MONOTONIC) > deadline;
+  });
+  (done.estimate.failed ? failed_ : processed_).fetch_add(1, std::memory_order_relaxed);
+  if (!estimates_.push(done))
+    unfetched_.fetch_add(1, std::memory_order_relaxed);
+  estimate_is_there_.notify();
+}
+
+std::optional<ProcessedSweep> LivePipeline::next(Duration timeout) {
+  std::optional<ProcessedSweep> done = estimates_.pop();
+  if (done)
+    return done;
+  estimate_is_there_.wait_for(timeout);
+  return estimates_.pop();
+}
+
+bool LivePipeline::finished() const { return odometry_ended_.load(std::memory_order_acquire) && estimates_.empty(); }
+
+SweepCounters LivePipeline::counters() const {
+  const auto read = [](const Counter& counter) { return counter.load(std::memory_order_relaxed); };
+  return {read(seen_), read(processed_), read(dropped_), read(failed_)};
+}
+
+} // namespace locus::daemon

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <thread>
+
+#include "config/config.hpp"
+#include "core/sweep.hpp"
+#include "daemon/ingest.hpp"
+#include "daemon/input.hpp"
+#include "daemon/latest_slot.hpp"
+#include "daemon/spsc_ring.hpp"
+#include "daemon/sweep_processor.hpp"
+#include "daemon/wakeup.hpp"
+
+namespace locus::daemon {
+
+/// The live threads: ingest turns inputs into sweeps, odometry turns the newest sweep into an estimate.
+///
+/// Between the two is a LatestSlot: a sweep that was not taken when the next one is ready is dropped and counted, so
+/// under overload the estimates get fewer, never older. The registration of a sweep is ended one period after its cut.
+/// Estimates leave through a ring; who does not fetch them loses them and delays nobody. On the way from input to
+/// estimate no lock is taken and, once the first sweeps have bought the memory, the ingest allocates nothing. Every
+/// wait has a timeout.
+///
+/// One owner, who may be the consumer too.
+class LivePipeline {
+ public:
+  static constexpr std::size_t kMaxUnfetched = 64;
+
+  /// Starts both threads. `lidars` opened from config.lidars; `input` must outlive this, and is used by the ingest
+  /// thread alone. `speed`: by how much its stamps run faster than the clock on the wall; 1 but for a PacedInput.
+  LivePipeline(const Config& config, LidarRouter lidars, InputSource& input, double speed = 1.0);
+  ~LivePipeline() { stop(); }
+  LivePipeline(const LivePipeline&) = delete;
+  LivePipeline& operator=(const LivePipeline&) = delete;
+
+  /// Consumer: the next estimate, or nothing if there is none within `timeout`.
+  std::optional<ProcessedSweep> next(Duration timeout);
+
+  /// Consumer: whether all has been fetched and nothing more can come, for the input has ended or stop() was called.
+  [[nodiscard]] bool finished() const;
+
+  /// Owner: ends both threads, within an iteration of the registration and one wait for input. What has been seen is
+  /// accounted for afterwards. May be called again.
+  void stop();
+
+  /// Any thread.
+  [[nodiscard]] SweepCounters counters() const;
+  [[nodiscard]] std::uint64_t unfetched() const { return unfetched_.load(std::memory_order_relaxed); }
+
+  /// Owner, after stop().
+  [[nodiscard]] const Ingest& ingest() const { return ingest_; }
+  [[nodiscard]] const SweepProcessor& processor() const { return processor_; }
+
+ private:
+  struct CutSweep {
+    Sweep sweep;
+    MachineTime cut;
+  };
+  using Counter = std::atomic<std::uint64_t>; ///< one thread counts, any reads
+
+  void run_ingest();
+  void run_odometry();
+  void hand_over(Sweep& sweep, const MachineTime& cut);
+  void process(const CutSweep& taken);
+
+  InputSource& input_;
+  double speed_;
+  std::size_t max_points_;
+  Ingest ingest_;
+  SweepProcessor processor_;
+
+  LatestSlot<CutSweep> newest_sweep_;
+  Wakeup sweep_is_there_;
+  SpscRing<ProcessedSweep, kMaxUnfetched> estimates_;
+  Wakeup estimate_is_there_;
+
+  Counter seen_{0}, dropped_{0};                    ///< by ingest
+  Counter processed_{0}, failed_{0}, unfetched_{0}; ///< by odometry
+  std::atomic<bool> stopping_{false};
+  std::atomic<bool> ingest_ended_{false};
+  std::atomic<bool> odometry_ended_{false};
+  std::thread ingest_thread_;
+  std::thread odometry_thread_;
+};
+
+} // namespace locus::daemon
