@@ -120,7 +120,7 @@ Expected<Capture, std::string> Capture::open(const std::filesystem::path& file) 
   if (handle == nullptr) {
     return fmt::format("{}: {}", file.string(), foreign_file(stream.get(), reason.data()));
   }
-  stream.release(); // now closed by pcap_close()
+  static_cast<void>(stream.release()); // pcap_close() closes it
   const std::uintmax_t bytes_total =
       std::filesystem::is_regular_file(file, ignored) ? std::filesystem::file_size(file, ignored) : 0;
   Capture capture{file, handle, bytes_total};

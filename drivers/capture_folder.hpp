@@ -24,7 +24,7 @@ struct CaptureFolder {
   std::vector<Source> odometry;       ///< every other *.tum, by name
 
   /// Looks at names alone and opens nothing. A file is taken for the capture itself. Fails with one line for the user.
-  static Expected<CaptureFolder, std::string> find(const std::filesystem::path& path);
+  static Expected<CaptureFolder, std::string> find(const std::filesystem::path& where);
 };
 
 } // namespace locus

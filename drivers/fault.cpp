@@ -133,9 +133,9 @@ Expected<Fault, std::string> Fault::parse(std::string_view text) {
   }
   const std::string_view what = text.substr(colon + 1, at - colon - 1);
   const std::size_t equals = std::min(what.find('='), what.size());
-  const auto traits = std::ranges::find(kKinds, what.substr(0, equals), &KindTraits::name);
+  const auto* const traits = std::ranges::find(kKinds, what.substr(0, equals), &KindTraits::name);
   if (traits == kKinds.end()) {
-    return fmt::format("fault \"{}\": unknown kind \"{}\"; known are {}", text, what.substr(0, equals),
+    return fmt::format(R"(fault "{}": unknown kind "{}"; known are {})", text, what.substr(0, equals),
                        kinds_that([](const KindTraits&) { return true; }));
   }
   Fault fault;
@@ -144,7 +144,7 @@ Expected<Fault, std::string> Fault::parse(std::string_view text) {
   fault.value = traits->default_value;
   if (equals < what.size()) {
     if (traits->unit.empty()) {
-      return fmt::format("fault \"{}\": {} takes no value; leave \"{}\" out", text, traits->name, what.substr(equals));
+      return fmt::format(R"(fault "{}": {} takes no value; leave "{}" out)", text, traits->name, what.substr(equals));
     }
     const std::optional<double> value = parse_value(*traits, what.substr(equals + 1));
     if (!value) {

@@ -146,7 +146,7 @@ TEST(Capture, TwoLidarsInOneFileAreToldApartByPortAndAddress) {
   const TemporaryFile file{"two.pcap"};
   {
     PcapWriter writer{file.path()};
-    for (int i = 0; i < 10; ++i) {
+    for (std::int64_t i = 0; i < 10; ++i) {
       writer.write(stamp_from_ns(2 * i), 0xC0A801C9, 2368, 0xFFFFFFFF, 2368, payload_of(1206));
       writer.write(stamp_from_ns(2 * i + 1), 0xC0A801CA, 2368, 0xFFFFFFFF, 2369, payload_of(1206));
     }

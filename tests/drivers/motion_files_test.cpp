@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/motion_files.hpp"
 
+#include <array>
 #include <chrono>
 #include <cmath>
 
@@ -65,7 +66,7 @@ TEST(MotionFiles, OdometryRowsHoldPosesWithTheRotationsRealPartLast) {
 }
 
 TEST(MotionFiles, TumTimesKeepTheirNanoseconds) {
-  const std::pair<const char*, std::int64_t> cases[] = {
+  constexpr auto kCases = std::to_array<std::pair<const char*, std::int64_t>>({
       {"1403636579.763555527", 1403636579763555527},
       {"1.403636579763555527e+09", 1403636579763555527}, // as NumPy and evo write it
       {"1403636579763555527E-9", 1403636579763555527},
@@ -80,8 +81,8 @@ TEST(MotionFiles, TumTimesKeepTheirNanoseconds) {
       {"0.0000000001", 0},
       {"0e-18", 0},
       {"00000000000000000000012.5", 12'500'000'000},
-  };
-  for (const auto& [text, ns] : cases) {
+  });
+  for (const auto& [text, ns] : kCases) {
     const auto samples = odometry_from(std::string{text} + " 0 0 0 0 0 0 1");
     ASSERT_TRUE(samples) << samples.error();
     EXPECT_EQ(to_ns(samples->front().stamp), ns) << text;
@@ -191,7 +192,7 @@ TEST(MotionFiles, AnHourOfImuIsReadInSeconds) {
 }
 
 class CaptureFolders : public testing::Test {
- protected:
+ public:
   CaptureFolders() { std::filesystem::create_directory(folder_); }
   ~CaptureFolders() override { std::filesystem::remove_all(folder_); }
   void add(const std::string& name) const { std::ofstream{folder_ / name} << "x"; }
