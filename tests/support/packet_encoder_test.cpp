@@ -96,10 +96,11 @@ TEST_P(EverySensor, EveryReturnLiesOnASurfaceFromWhereItWasFired) {
     ASSERT_FALSE(decoder.decode(datagram.payload, *packet));
     const Stamp fired = datagram.receive_stamp - velodyne::packet_duration(model, mode);
     for (const LidarReturn& echo : packet->returns()) {
+      const auto range_m = static_cast<double>(echo.range_m);
       const Pose T_world_lidar = trajectory.T_world_base(fired + Duration{echo.offset_ns}) * kTilted;
-      const Eigen::Vector3d point = T_world_lidar * Eigen::Vector3d{echo.x_m, echo.y_m, echo.z_m};
-      ASSERT_LT(scene.distance_to_surface(point), half_step_m + aside_rad * double{echo.range_m} + 1e-5)
-          << "packet " << packets << " ring " << int{echo.ring} << " range " << echo.range_m;
+      const Eigen::Vector3d point = T_world_lidar * Eigen::Vector3f{echo.x_m, echo.y_m, echo.z_m}.cast<double>();
+      ASSERT_LT(scene.distance_to_surface(point), half_step_m + aside_rad * range_m + 1e-5)
+          << "packet " << packets << " ring " << int{echo.ring} << " range " << range_m;
     }
     ++packets;
     returns += packet->count;

@@ -162,10 +162,10 @@ void Scene::build(std::uint32_t begin, std::uint32_t end) {
   const auto first = surfaces_.begin() + begin, last = surfaces_.begin() + end;
   Bounds bounds = bounds_of(*first);
   std::for_each(first, last, [&](const Surface& surface) { bounds = united(bounds, bounds_of(surface)); });
-  const std::size_t node = nodes_.size();
-  nodes_.push_back({bounds, begin, static_cast<std::uint16_t>(end - begin), 0});
-  if (end - begin <= kLeafSize)
+  if (end - begin <= kLeafSize) {
+    nodes_.push_back({bounds, begin, static_cast<std::uint16_t>(end - begin), 0});
     return;
+  }
 
   Eigen::Index axis = 0;
   (bounds.max_m - bounds.min_m).maxCoeff(&axis);
@@ -175,10 +175,10 @@ void Scene::build(std::uint32_t begin, std::uint32_t end) {
     return of_a.min_m[axis] + of_a.max_m[axis] < of_b.min_m[axis] + of_b.max_m[axis];
   });
   const auto split = static_cast<std::uint32_t>(middle - surfaces_.begin());
+  const std::size_t node = nodes_.size();
+  nodes_.push_back({bounds, 0, 0, static_cast<std::uint16_t>(axis)});
   build(begin, split);
   nodes_[node].first = static_cast<std::uint32_t>(nodes_.size());
-  nodes_[node].count = 0;
-  nodes_[node].axis = static_cast<std::uint16_t>(axis);
   build(split, end);
 }
 

@@ -88,8 +88,6 @@ class Scene {
   /// From the point to the nearest surface, seen or hidden.
   [[nodiscard]] double distance_to_surface(const Eigen::Vector3d& point) const;
 
-  [[nodiscard]] std::size_t size() const { return surfaces_.size(); }
-
  private:
   struct Node {
     Bounds bounds;
