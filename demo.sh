@@ -14,7 +14,7 @@ result=build/demo
 
 if [ -z "$capture" ]; then
   capture=$result/plant
-  [ -e "$capture/lidar.pcap" ] || "$bin/synthetic-capture" plant 60 "$capture"
+  "$bin/synthetic-capture" plant 60 "$capture"
 fi
 "$bin/locus-replay" -o "$result/odometry" "$capture"
 
