@@ -71,8 +71,9 @@ Duration SensorClock::unwrap(Duration time_of_hour, Stamp receive) const {
 bool SensorClock::follows(Duration sensor_time, Duration until_sent, Stamp receive) const {
   if (sensor_time <= latest_)
     return latest_ - sensor_time <= kReorderWindow;
+  const Duration advance = sensor_time - latest_;
   if (mode_ == LidarTime::sensor)
-    return (sensor_time - latest_ - kReorderWindow) / kMaxReplaySpeed <= receive - latest_receive_;
+    return advance <= kReorderWindow || advance / kMaxReplaySpeed <= receive - latest_receive_;
   const Duration lateness = receive.time_since_epoch() - until_sent - offset_ - sensor_time;
   return lateness >= -kMaxEarly && lateness <= kMaxLate;
 }

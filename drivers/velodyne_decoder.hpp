@@ -17,17 +17,18 @@ namespace locus::velodyne {
 
 /// What the configuration knows better than the packets.
 struct DecoderOptions {
-  std::optional<Model> model;             ///< nothing: told by ModelRecognition
-  std::optional<ReturnMode> return_mode;  ///< nothing: the packet's own factory byte
-  std::optional<Calibration> calibration; ///< nothing: the model's own table
+  std::optional<Model> model = std::nullopt;             ///< nothing: told by ModelRecognition
+  std::optional<ReturnMode> return_mode = std::nullopt;  ///< nothing: the packet's own factory byte
+  std::optional<Calibration> calibration = std::nullopt; ///< nothing: the model's own table
 };
 
 /// Turns data packets into returns, each with the direction and the time of its own firing.
 ///
 /// The azimuth of a firing is that of its column plus the share of the turn to the next column that had passed when it
-/// fired. After the last column, and where two columns lie farther apart than any motor turns (a field of view was
-/// set), the mean turn of the packet's columns counts; a dual packet of the VLS-128, one column long, counts the turn
-/// since the packet before, the first one none. In dual mode two equal distances are one return.
+/// fired. After the last column the mean turn of the packet's columns counts; a dual packet of the VLS-128, one column
+/// long, counts the turn since the packet before, the first one none. Where a field of view was set, a packet may hold
+/// the columns before and behind the blind sector: those behind it are later by the columns that it would have taken.
+/// In dual mode two equal distances are one return.
 ///
 /// One owner. Allocates nothing, throws nothing. A packet that is refused leaves the decoder as it was, but for what
 /// the model is recognised by.

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <array>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "drivers/lidar_input.hpp"
+#include "velodyne_test_packet.hpp"
+
+namespace locus {
+namespace {
+
+using test::VelodyneTestPacket;
+using velodyne::Model;
+using velodyne::ReturnMode;
+
+constexpr std::uint32_t kLidarIp = 0xC0A801C9;
+constexpr std::uint32_t kOtherIp = 0xC0A801CA;
+constexpr double kPacketUs = 1327.104;
+
+/// The datagrams of a VLP-16 at 600 rpm, by their number; kept until the stream is gone.
+class Stream {
+ public:
+  explicit Stream(std::uint32_t source_ip = kLidarIp, std::uint16_t port = 2368) : ip_(source_ip), port_(port) {}
+
+  Datagram operator()(int number, double sensor_ahead_us = 0.0) {
+    const double us = kPacketUs * number;
+    const auto azimuth_cdeg = static_cast<std::uint16_t>(static_cast<long>(0.36 * us) % velodyne::kCdegPerTurn);
+    const auto time_of_hour_us = static_cast<std::uint32_t>(1e9 + us + sensor_ahead_us);
+    packet_.emplace(Model::vlp16, ReturnMode::strongest, time_of_hour_us, azimuth_cdeg);
+    packet_->set_all_returns(1000);
+    return {packet_->payload(), ip_, 2368, port_,
+            stamp_from_ns(1'700'000'000'000'000'000) + from_seconds(1e-6 * (us + kPacketUs + 80.0))};
+  }
+
+ private:
+  std::uint32_t ip_;
+  std::uint16_t port_;
+  std::optional<VelodyneTestPacket> packet_;
+};
+
+LidarInput open(const LidarOptions& options = {}) {
+  auto lidar = LidarInput::open(options, 0);
+  EXPECT_TRUE(lidar);
+  return std::move(*lidar);
+}
+
+LidarOptions options(const char* name, std::uint16_t port, std::optional<std::uint32_t> ip = std::nullopt) {
+  LidarOptions result;
+  result.name = name;
+  result.port = port;
+  result.source_ip = ip;
+  return result;
+}
+
+std::uint64_t rejected(const PacketCounters& counters) {
+  std::uint64_t sum = 0;
+  for (const std::uint64_t one : counters.rejected)
+    sum += one;
+  return sum;
+}
+
+TEST(LidarInput, GoodPacketsComeOutStampedAtTheirFirstFiring) {
+  LidarInput lidar = open();
+  Stream stream;
+  for (int i = 0; i < 100; ++i) {
+    const Datagram datagram = stream(i);
+    const LidarPacket* packet = lidar.receive(datagram);
+    ASSERT_NE(packet, nullptr);
+    EXPECT_EQ(packet->count, 384U);
+    EXPECT_LT(std::chrono::abs(datagram.receive_stamp - packet->stamp - packet->duration),
+              std::chrono::microseconds{3});
+  }
+  EXPECT_EQ(lidar.counters().received, 100U);
+  EXPECT_EQ(lidar.counters().data, 100U);
+  EXPECT_EQ(lidar.counters().lost, 0U);
+}
+
+TEST(LidarInput, Vls128StampsAreThoseOfItsFirstFiringToo) {
+  LidarInput lidar = open();
+  const VelodyneTestPacket bytes{Model::vls128, ReturnMode::strongest};
+  const Stamp receive = stamp_from_ns(1'700'000'000'000'000'000);
+  const LidarPacket* packet = lidar.receive({bytes.payload(), kLidarIp, 2368, 2368, receive});
+  ASSERT_NE(packet, nullptr);
+  EXPECT_EQ(packet->stamp + packet->duration, receive);
+}
+
+TEST(LidarInput, GapOfStampAndAzimuthIsLoss) {
+  LidarInput lidar = open();
+  Stream stream;
+  for (const int number : {0, 1, 2, 5, 6, 106})
+    lidar.receive(stream(number));
+  EXPECT_EQ(lidar.counters().lost, 2U + 99U);
+}
+
+TEST(LidarInput, GapOfStampWithoutOneOfAzimuthIsNoLoss) {
+  LidarInput lidar = open();
+  Stream stream;
+  for (int i = 0; i < 10; ++i)
+    lidar.receive(stream(i));
+  for (int i = 10; i < 20; ++i)
+    lidar.receive(stream(i, 15'000.0)); // the sensor's clock has gone on by 15 ms, the motor has not
+  EXPECT_EQ(lidar.counters().data, 20U);
+  EXPECT_EQ(lidar.counters().lost, 0U);
+}
+
+TEST(LidarInput, OvertakenPacketIsReorderedAndNotLost) {
+  LidarInput lidar = open();
+  Stream stream;
+  for (const int number : {0, 1, 3, 2, 4})
+    EXPECT_NE(lidar.receive(stream(number)), nullptr);
+  EXPECT_EQ(lidar.counters().data, 5U);
+  EXPECT_EQ(lidar.counters().reordered, 1U);
+  EXPECT_EQ(lidar.counters().lost, 0U);
+}
+
+TEST(LidarInput, PacketThatWasThereBeforeIsADuplicate) {
+  LidarInput lidar = open();
+  Stream stream;
+  for (const int number : {0, 1, 1, 2, 0, 3})
+    lidar.receive(stream(number));
+  EXPECT_EQ(lidar.counters().data, 4U);
+  EXPECT_EQ(lidar.counters()[PacketError::duplicate], 2U);
+  EXPECT_EQ(lidar.counters().reordered, 0U);
+}
+
+TEST(LidarInput, TimeFarOffIsRefusedAndASetClockCounted) {
+  LidarInput lidar = open();
+  Stream stream;
+  for (int i = 0; i < 10; ++i)
+    lidar.receive(stream(i));
+  for (int i = 10; i < 20; ++i)
+    lidar.receive(stream(i, 20e6));
+  EXPECT_EQ(lidar.counters()[PacketError::time], 4U);
+  EXPECT_EQ(lidar.counters().clock_steps, 1U);
+  EXPECT_EQ(lidar.counters().data, 16U);
+  EXPECT_EQ(lidar.counters().lost, 0U);
+}
+
+TEST(LidarInput, FirstSenderIsTheLidarUntilItFallsSilent) {
+  LidarInput lidar = open();
+  Stream stream;
+  Stream other{kOtherIp};
+  EXPECT_NE(lidar.receive(stream(0)), nullptr);
+  EXPECT_EQ(lidar.receive(other(1)), nullptr);
+  EXPECT_NE(lidar.receive(stream(1)), nullptr);
+  EXPECT_EQ(lidar.counters()[PacketError::sender], 1U);
+  EXPECT_NE(lidar.receive(other(1000)), nullptr) << "1.3 s later: the lidar was replaced";
+  EXPECT_EQ(lidar.source_ip(), kOtherIp);
+}
+
+TEST(LidarInput, TruncatedDatagramIsTruncatedWhateverItsLength) {
+  LidarInput lidar = open();
+  Stream stream;
+  Datagram datagram = stream(0);
+  datagram.truncated = true;
+  EXPECT_EQ(lidar.receive(datagram), nullptr);
+  datagram.payload = datagram.payload.first(100);
+  EXPECT_EQ(lidar.receive(datagram), nullptr);
+  EXPECT_EQ(lidar.counters()[PacketError::truncated], 2U);
+}
+
+TEST(LidarInput, EveryDatagramIsCountedOnceWhateverItHolds) {
+  LidarInput lidar = open();
+  Stream stream;
+  std::mt19937 random{11};
+  std::uniform_int_distribution<int> byte{0, 255};
+  std::vector<std::byte> garbage(1500);
+  int number = 0;
+  for (std::size_t length = 0; length <= 1500; ++length) {
+    for (std::byte& b : garbage)
+      b = static_cast<std::byte>(byte(random));
+    Datagram datagram = stream(number++);
+    lidar.receive(datagram);
+    datagram.payload = std::span{garbage}.first(length);
+    lidar.receive(datagram);
+  }
+  const PacketCounters& counters = lidar.counters();
+  EXPECT_EQ(counters.received, 2U * 1501U);
+  EXPECT_EQ(counters.data, 1501U);
+  EXPECT_EQ(counters.position, 1U);
+  EXPECT_EQ(counters[PacketError::length], 1499U);
+  EXPECT_EQ(counters.received, counters.data + counters.position + rejected(counters));
+}
+
+TEST(LidarRouter, LidarsAreToldApartByPort) {
+  auto router = LidarRouter::open({options("front", 2368), options("rear", 2369)});
+  ASSERT_TRUE(router);
+  Stream front;
+  Stream rear{kLidarIp, 2369};
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_EQ(router->receive(front(i))->lidar, 0);
+    EXPECT_EQ(router->receive(rear(i))->lidar, 1);
+  }
+  EXPECT_EQ(router->lidars()[1].counters().data, 10U);
+}
+
+TEST(LidarRouter, LidarsAreToldApartByAddress) {
+  auto router = LidarRouter::open({options("front", 2368), options("rear", 2368, kOtherIp)});
+  ASSERT_TRUE(router);
+  Stream front;
+  Stream rear{kOtherIp};
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_EQ(router->receive(rear(i))->lidar, 1);
+    EXPECT_EQ(router->receive(front(i))->lidar, 0);
+  }
+}
+
+TEST(LidarRouter, PositionPacketsGoToTheLidarThatSendsThem) {
+  auto router = LidarRouter::open({options("front", 2368), options("rear", 2368, kOtherIp)});
+  ASSERT_TRUE(router);
+  Stream front;
+  router->receive(front(0));
+  const std::array<std::byte, velodyne::kPositionPacketBytes> position{};
+  EXPECT_EQ(router->receive({position, kOtherIp, 8308, 8308, Stamp{}}), nullptr);
+  EXPECT_EQ(router->lidars()[0].counters().position, 0U);
+  EXPECT_EQ(router->lidars()[1].counters().position, 1U);
+}
+
+TEST(LidarRouter, ForeignSendersAreCounted) {
+  auto router = LidarRouter::open({options("front", 2368, kLidarIp)});
+  ASSERT_TRUE(router);
+  Stream stranger{kOtherIp};
+  Stream elsewhere{kLidarIp, 5353};
+  EXPECT_EQ(router->receive(stranger(0)), nullptr);
+  EXPECT_EQ(router->receive(elsewhere(0)), nullptr);
+  EXPECT_EQ(router->lidars()[0].counters()[PacketError::sender], 1U);
+  EXPECT_EQ(router->total()[PacketError::sender], 2U);
+  EXPECT_EQ(router->total().received, 2U);
+}
+
+} // namespace
+} // namespace locus

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "drivers/sensor_clock.hpp"
+
+namespace locus {
+namespace {
+
+using std::chrono::hours;
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+using std::chrono::nanoseconds;
+using std::chrono::seconds;
+
+constexpr Duration kPacket = nanoseconds{1'327'104};
+constexpr std::int64_t kEpoch = 1'700'000'000'000'000'000;
+
+/// A sensor whose clock runs off the host's, and the network between them.
+struct Link {
+  Duration sensor_ahead{};           ///< of the host's clock at the start
+  double drift = 0.0;                ///< of the sensor's clock
+  Stamp now = stamp_from_ns(kEpoch); ///< true time of the next packet's first firing
+  Stamp started = now;
+
+  [[nodiscard]] Duration time_of_hour() const {
+    const Duration sensor = now.time_since_epoch() + sensor_ahead + from_seconds(drift * to_seconds(now - started));
+    return std::chrono::floor<microseconds>(sensor % hours{1});
+  }
+
+  /// Sends a packet; returns how far the stamp is from the truth.
+  std::optional<Duration> send(SensorClock& clock, Duration delay = microseconds{100}) {
+    const auto reading = clock.read(time_of_hour(), kPacket, now + kPacket + delay);
+    const Stamp fired = now;
+    now += kPacket;
+    return reading ? std::optional{reading->stamp - fired} : std::nullopt;
+  }
+};
+
+TEST(SensorClock, JitterOfTheNetworkDoesNotReachTheStamps) {
+  SensorClock clock{LidarTime::receive};
+  Link link{.sensor_ahead = seconds{-700}, .drift = 50e-6};
+  std::mt19937 random{1};
+  std::exponential_distribution<double> jitter_s{1.0 / 2e-3};
+  Stamp settled = link.now + seconds{3};
+  Duration worst{};
+  while (link.now < stamp_from_ns(kEpoch) + seconds{60}) {
+    const bool counts = link.now > settled;
+    const auto error = link.send(clock, microseconds{100} + from_seconds(jitter_s(random)));
+    ASSERT_TRUE(error);
+    if (counts)
+      worst = std::max(worst, std::chrono::abs(*error - microseconds{100}));
+  }
+  EXPECT_LT(worst, microseconds{200}) << "under 2 ms of mean jitter and 50 ppm of drift";
+  EXPECT_EQ(clock.steps(), 0U);
+}
+
+TEST(SensorClock, DurationsComeFromTheSensorsClock) {
+  SensorClock clock{LidarTime::receive};
+  Link link;
+  std::optional<Stamp> last;
+  for (int i = 0; i < 5'000; ++i) {
+    const auto reading = clock.read(link.time_of_hour(), kPacket, link.now + kPacket + microseconds{i % 7 * 300});
+    ASSERT_TRUE(reading);
+    if (last) {
+      EXPECT_LE(std::chrono::abs(reading->stamp - *last - kPacket), microseconds{3});
+    }
+    last = reading->stamp;
+    link.now += kPacket;
+  }
+}
+
+TEST(SensorClock, LateFirstPacketIsForgottenWithinASecond) {
+  SensorClock clock{LidarTime::receive};
+  Link link;
+  link.send(clock, milliseconds{15});
+  std::optional<Duration> error;
+  Duration last_error = milliseconds{15};
+  for (int i = 0; i < 700; ++i) {
+    error = link.send(clock);
+    ASSERT_TRUE(error);
+    ASSERT_GT(*error + kPacket, last_error) << "stamps never run backwards";
+    last_error = *error;
+  }
+  EXPECT_LT(*error, microseconds{150});
+  EXPECT_EQ(clock.steps(), 0U);
+}
+
+TEST(SensorClock, HourRollsOverUnnoticed) {
+  for (const LidarTime mode : {LidarTime::receive, LidarTime::sensor, LidarTime::automatic}) {
+    SensorClock clock{mode};
+    Link link;
+    const Stamp top_of_hour{std::chrono::ceil<hours>(link.now.time_since_epoch())};
+    link.now = top_of_hour - seconds{1};
+    while (link.now < top_of_hour + seconds{1}) {
+      const auto error = link.send(clock);
+      ASSERT_TRUE(error);
+      ASSERT_LT(std::chrono::abs(*error), microseconds{150});
+    }
+    EXPECT_EQ(clock.steps(), 0U);
+  }
+}
+
+TEST(SensorClock, FewHoursOfSilenceAreNoStep) {
+  SensorClock clock{LidarTime::receive};
+  Link link{.sensor_ahead = seconds{1234}};
+  link.send(clock);
+  link.now += hours{5} + seconds{7};
+  const auto error = link.send(clock);
+  ASSERT_TRUE(error);
+  EXPECT_LT(std::chrono::abs(*error), microseconds{150});
+  EXPECT_EQ(clock.steps(), 0U);
+}
+
+TEST(SensorClock, SensorTimeIsTakenAsTrueWithTheHourOfReception) {
+  SensorClock clock{LidarTime::sensor};
+  Link link{.sensor_ahead = milliseconds{368}};
+  for (int i = 0; i < 100; ++i) {
+    const auto error = link.send(clock, milliseconds{std::abs(i % 100 - 50)});
+    ASSERT_TRUE(error);
+    EXPECT_LE(std::chrono::abs(*error - milliseconds{368}), microseconds{1});
+  }
+}
+
+TEST(SensorClock, AutomaticTakesSensorTimeOnlyWhileSynchronisedAndInAgreementWithTheHost) {
+  const auto error_after = [](Duration ahead, bool synchronised) {
+    SensorClock clock{LidarTime::automatic};
+    clock.set_synchronised(synchronised);
+    Link link{.sensor_ahead = ahead};
+    link.send(clock);
+    return link.send(clock).value();
+  };
+  EXPECT_LE(std::chrono::abs(error_after(milliseconds{2}, true) - milliseconds{2}), microseconds{1});
+  EXPECT_NEAR(to_seconds(error_after(milliseconds{2}, false)), 100e-6, 2e-6);
+  EXPECT_NEAR(to_seconds(error_after(milliseconds{368}, true)), 100e-6, 2e-6) << "the host's clock is not on UTC";
+}
+
+TEST(SensorClock, SetClockIsAStepThatIsSurvived) {
+  for (const LidarTime mode : {LidarTime::receive, LidarTime::sensor}) {
+    for (const Duration step : {Duration{seconds{10}}, Duration{seconds{-10}}, Duration{-milliseconds{500}}}) {
+      SensorClock clock{mode};
+      Link link;
+      for (int i = 0; i < 1000; ++i)
+        link.send(clock);
+      link.sensor_ahead += step;
+      int refused = 0;
+      for (int i = 0; i < 1000; ++i)
+        refused += link.send(clock) ? 0 : 1;
+      EXPECT_EQ(refused, 4) << "the fifth proves it";
+      EXPECT_EQ(clock.steps(), 1U);
+      const Duration error = link.send(clock).value();
+      const Duration wanted = mode == LidarTime::sensor ? step : Duration{};
+      EXPECT_LT(std::chrono::abs(error - wanted), microseconds{150});
+    }
+  }
+}
+
+TEST(SensorClock, LoneWrongTimesAreRefusedAndChangeNothing) {
+  SensorClock clock{LidarTime::receive};
+  Link link;
+  for (int i = 0; i < 2000; ++i) {
+    if (i % 100 == 50) {
+      EXPECT_EQ(clock.read(seconds{i}, kPacket, link.now), std::nullopt);
+    }
+    const auto error = link.send(clock);
+    ASSERT_TRUE(error);
+    EXPECT_LT(std::chrono::abs(*error), microseconds{150});
+  }
+  EXPECT_EQ(clock.steps(), 0U);
+}
+
+TEST(SensorClock, TimeThatRunsBackwardsIsNeverBelieved) {
+  SensorClock clock{LidarTime::receive};
+  Duration time_of_hour = seconds{1800};
+  ASSERT_TRUE(clock.read(time_of_hour, kPacket, stamp_from_ns(kEpoch)));
+  int refused = 0;
+  for (int i = 1; i <= 1000; ++i) {
+    time_of_hour -= kPacket;
+    refused += clock.read(time_of_hour, kPacket, stamp_from_ns(kEpoch) + i * kPacket) ? 0 : 1;
+  }
+  EXPECT_GE(refused, 900) << "all but those that may have been overtaken";
+  EXPECT_EQ(clock.steps(), 0U);
+}
+
+TEST(SensorClock, DriftBeyondFiveHundredPpmIsCountedAsStepsAndFollowed) {
+  SensorClock clock{LidarTime::receive};
+  Link link{.drift = 2000e-6};
+  Duration worst{};
+  while (link.now < stamp_from_ns(kEpoch) + seconds{60})
+    if (const auto error = link.send(clock))
+      worst = std::max(worst, std::chrono::abs(*error));
+  EXPECT_GE(clock.steps(), 5U);
+  EXPECT_LE(clock.steps(), 40U);
+  EXPECT_LT(worst, milliseconds{8});
+}
+
+TEST(SensorClock, DriftBelowFiveHundredPpmIsFollowedWithoutAStep) {
+  for (const double drift : {-400e-6, 400e-6}) {
+    SensorClock clock{LidarTime::receive};
+    Link link{.drift = drift};
+    Duration worst{};
+    while (link.now < stamp_from_ns(kEpoch) + seconds{30}) {
+      const auto error = link.send(clock);
+      ASSERT_TRUE(error);
+      worst = std::max(worst, std::chrono::abs(*error));
+    }
+    EXPECT_LT(worst, milliseconds{1});
+    EXPECT_EQ(clock.steps(), 0U);
+  }
+}
+
+TEST(SensorClock, ReplayAtTenTimesTheSpeedWorksInSensorTime) {
+  SensorClock clock{LidarTime::sensor};
+  Link link;
+  for (int i = 0; i < 10'000; ++i) {
+    ASSERT_TRUE(clock.read(link.time_of_hour(), kPacket, stamp_from_ns(kEpoch) + i * kPacket / 10));
+    link.now += kPacket;
+  }
+  EXPECT_EQ(clock.steps(), 0U);
+}
+
+TEST(SensorClock, NoStampsBreakIt) {
+  std::mt19937_64 random{5};
+  std::uniform_int_distribution<std::int64_t> hour{0, hours{1} / nanoseconds{1} - 1};
+  std::uniform_int_distribution<std::int64_t> stamp{0, 9'000'000'000'000'000'000};
+  for (const LidarTime mode : {LidarTime::receive, LidarTime::sensor, LidarTime::automatic}) {
+    SensorClock clock{mode};
+    clock.set_synchronised(true);
+    int taken = 0;
+    for (int i = 0; i < 20'000; ++i)
+      taken += clock.read(Duration{hour(random)}, kPacket, stamp_from_ns(stamp(random))) ? 1 : 0;
+    EXPECT_GT(taken, 0);
+  }
+}
+
+} // namespace
+} // namespace locus

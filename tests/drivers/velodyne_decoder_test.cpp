@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "drivers/velodyne_decoder.hpp"
+#include "velodyne_test_packet.hpp"
+
+namespace locus::velodyne {
+namespace {
+
+using test::VelodyneTestPacket;
+
+constexpr std::array kModes{ReturnMode::strongest, ReturnMode::last, ReturnMode::dual};
+constexpr double kRadPerCdeg = std::numbers::pi / 18000.0;
+
+LidarPacket decoded(const VelodyneTestPacket& bytes, DecoderOptions options = {}) {
+  Decoder decoder{std::move(options)};
+  LidarPacket packet;
+  EXPECT_EQ(decoder.decode(bytes.payload(), packet), std::nullopt);
+  return packet;
+}
+
+double clockwise_azimuth_rad(const LidarReturn& r) { return std::atan2(-double{r.y_m}, double{r.x_m}); }
+
+double angle_between(double a_rad, double b_rad) {
+  return std::abs(std::remainder(a_rad - b_rad, 2.0 * std::numbers::pi));
+}
+
+TEST(VelodyneDecoder, EveryFiringOfEveryModelHasItsTimeItsDirectionAndItsRing) {
+  constexpr std::uint16_t kDistance = 5000;
+  for (const Model model : kModels) {
+    for (const ReturnMode mode : kModes) {
+      VelodyneTestPacket bytes{model, mode, 1'000'000, 12'345};
+      bytes.set_all_returns(kDistance);
+      const LidarPacket packet = decoded(bytes, {.model = model});
+
+      const ModelSpec& figures = spec(model);
+      const PacketLayout layout = packet_layout(model, mode);
+      const auto firings = figures.firings();
+      ASSERT_EQ(packet.count, layout.columns * firings.size()) << to_string(model) << ' ' << to_string(mode);
+      EXPECT_EQ(packet.duration, packet_duration(model, mode));
+      const double turn_cdeg = layout.columns > 1 ? 10.0 * kCdegPerTurn * to_seconds(figures.column_duration) : 0.0;
+      for (std::size_t n = 0; n < packet.count; ++n) {
+        const std::size_t column = n / firings.size();
+        const Firing& firing = firings[n % firings.size()];
+        const Laser& laser = figures.calibration.storage[firing.laser];
+        const LidarReturn& r = packet.storage[n];
+        const auto expected_ns = static_cast<std::int64_t>(column) * figures.column_duration.count() + firing.offset_ns;
+        ASSERT_EQ(r.offset_ns, expected_ns) << to_string(model) << ' ' << to_string(mode) << " return " << n;
+        ASSERT_EQ(r.ring, laser.ring);
+        const double range_m = kDistance * figures.calibration.distance_resolution_m;
+        ASSERT_NEAR(double{r.range_m}, range_m, 1e-5);
+        ASSERT_NEAR(double{r.z_m}, range_m * std::sin(laser.elevation_rad) + laser.vertical_offset_m, 1e-5);
+        ASSERT_NEAR(std::hypot(double{r.x_m}, double{r.y_m}), range_m * std::cos(laser.elevation_rad), 1e-5);
+        const double share = static_cast<double>(expected_ns) / static_cast<double>(figures.column_duration.count());
+        const double azimuth_cdeg = 12'345.0 + turn_cdeg * share;
+        // Azimuths are reported in hundredths of a degree, so is the interpolated one: half of one off, twice.
+        ASSERT_NEAR(r.azimuth_cdeg, azimuth_cdeg, 1.1);
+        ASSERT_LT(angle_between(clockwise_azimuth_rad(r), azimuth_cdeg * kRadPerCdeg + laser.azimuth_offset_rad),
+                  0.6 * kRadPerCdeg);
+      }
+    }
+  }
+}
+
+TEST(VelodyneDecoder, AxesAreForwardLeftUp) {
+  VelodyneTestPacket bytes{Model::vlp16, ReturnMode::strongest, 0, 9'000, 0.0}; // standing rotor, looking to the right
+  bytes.set_return(0, 15, 5000);                                                // the laser at +15 degrees
+  const LidarPacket packet = decoded(bytes);
+  ASSERT_EQ(packet.count, 1U);
+  EXPECT_NEAR(packet.storage[0].x_m, 0.0, 1e-5);
+  EXPECT_NEAR(packet.storage[0].y_m, -10.0 * std::cos(15.0 * std::numbers::pi / 180.0), 1e-5);
+  EXPECT_NEAR(packet.storage[0].z_m, 10.0 * std::sin(15.0 * std::numbers::pi / 180.0) - 0.0112, 1e-5);
+}
+
+TEST(VelodyneDecoder, AzimuthIsInterpolatedAtAnySpeedAndThroughTheWrap) {
+  for (double rpm = 300.0; rpm <= 1200.0; rpm += 60.0) {
+    for (std::uint16_t start_cdeg = 0; start_cdeg < kCdegPerTurn;
+         start_cdeg = static_cast<std::uint16_t>(start_cdeg + 617)) {
+      VelodyneTestPacket bytes{Model::hdl32e, ReturnMode::strongest, 0, start_cdeg, rpm};
+      bytes.set_all_returns(1000);
+      const LidarPacket packet = decoded(bytes, {.model = Model::hdl32e});
+      ASSERT_EQ(packet.count, 384U);
+      for (const LidarReturn& r : packet.returns()) {
+        ASSERT_LT(r.azimuth_cdeg, kCdegPerTurn);
+        const double expected_cdeg = start_cdeg + rpm / 60.0 * kCdegPerTurn * 1e-9 * r.offset_ns;
+        ASSERT_LT(angle_between(clockwise_azimuth_rad(r), expected_cdeg * kRadPerCdeg), 0.6 * kRadPerCdeg)
+            << rpm << " rpm from " << start_cdeg;
+      }
+    }
+  }
+}
+
+TEST(VelodyneDecoder, SpeedIsThatOfThePacketsColumns) {
+  Decoder decoder;
+  LidarPacket packet;
+  EXPECT_EQ(decoder.rotation_rate_rpm(), 0.0);
+  ASSERT_EQ(decoder.decode(VelodyneTestPacket(Model::vlp16, ReturnMode::dual, 0, 0, 1200.0).payload(), packet),
+            std::nullopt);
+  EXPECT_NEAR(decoder.rotation_rate_rpm(), 1200.0, 4.0);
+}
+
+TEST(VelodyneDecoder, Vls128InDualModeTakesItsSpeedFromThePacketBefore) {
+  Decoder decoder;
+  LidarPacket packet;
+  VelodyneTestPacket first{Model::vls128, ReturnMode::dual, 1'000'000, 100};
+  VelodyneTestPacket second{Model::vls128, ReturnMode::dual, 1'001'066, 484}; // 20 packets later, at 600 rpm
+  second.set_all_returns(1000);
+  ASSERT_EQ(decoder.decode(first.payload(), packet), std::nullopt);
+  ASSERT_EQ(decoder.decode(second.payload(), packet), std::nullopt);
+  EXPECT_NEAR(decoder.rotation_rate_rpm(), 600.0, 1.0);
+  EXPECT_EQ(packet.last_azimuth_cdeg, 484 + 15); // 16 of 20 slots of a turn of 19.2
+}
+
+TEST(VelodyneDecoder, EqualSecondReturnIsEmittedOnce) {
+  VelodyneTestPacket bytes{Model::vlp16, ReturnMode::dual};
+  bytes.set_return(2, 3, 1000, 7); // both echoes the same
+  bytes.set_return(3, 3, 1000, 7);
+  bytes.set_return(4, 5, 2000, 8); // last and strongest differ
+  bytes.set_return(5, 5, 1500, 9);
+  bytes.set_return(6, 6, 3000, 1); // only one of them
+  bytes.set_return(9, 7, 3500, 2);
+  const LidarPacket packet = decoded(bytes);
+  ASSERT_EQ(packet.count, 5U);
+  std::vector<int> intensities;
+  for (const LidarReturn& r : packet.returns())
+    intensities.push_back(r.intensity);
+  EXPECT_EQ(intensities, (std::vector{7, 8, 9, 1, 2}))
+      << "in the order of firing, the last return before the strongest";
+  EXPECT_EQ(packet.storage[1].offset_ns, packet.storage[2].offset_ns);
+}
+
+TEST(VelodyneDecoder, DistanceZeroIsNoReturn) { EXPECT_EQ(decoded({Model::vls128, ReturnMode::strongest}).count, 0U); }
+
+TEST(VelodyneDecoder, ColumnsBehindABlindSectorAreLaterByTheColumnsItTook) {
+  // As a VLP-32C does that was set to see from 270 to 90 degrees: a packet goes on where the last one was left.
+  VelodyneTestPacket bytes{Model::vlp32c, ReturnMode::strongest, 0, 9'000, 600.0};
+  for (std::size_t block = 8; block < kBlocks; ++block)
+    bytes.set_azimuth(block, static_cast<std::uint16_t>(27'000 + 20 * (block - 8)));
+  bytes.set_all_returns(1000);
+  const LidarPacket packet = decoded(bytes);
+  ASSERT_EQ(packet.count, 384U);
+  const double seconds_per_cdeg = 0.1 / kCdegPerTurn;
+  EXPECT_NEAR(1e-9 * packet.storage[8 * kChannels].offset_ns, (27'000 - 9'000) * seconds_per_cdeg, 1e-4);
+  EXPECT_EQ(packet.storage[8 * kChannels - 1].azimuth_cdeg / 100, 91) << "interpolated as if the sector were not there";
+  EXPECT_NEAR(to_seconds(packet.duration), (27'080 - 9'000) * seconds_per_cdeg, 1e-4);
+}
+
+TEST(VelodyneDecoder, AnyOtherLengthIsRefused) {
+  Decoder decoder;
+  LidarPacket packet;
+  const std::vector<std::byte> bytes(1500, std::byte{0xFF});
+  for (std::size_t length = 0; length <= bytes.size(); ++length) {
+    const auto error = decoder.decode(std::span{bytes}.first(length), packet);
+    EXPECT_EQ(error, length == kDataPacketBytes ? PacketError::model : PacketError::length) << length;
+  }
+}
+
+TEST(VelodyneDecoder, WrongFlagIsRefused) {
+  LidarPacket packet;
+  for (std::size_t block = 0; block < kBlocks; ++block) {
+    VelodyneTestPacket bytes{Model::vls128, ReturnMode::strongest};
+    bytes.set_flag(block, 0xEEFE);
+    EXPECT_EQ(Decoder{}.decode(bytes.payload(), packet), PacketError::flag);
+  }
+}
+
+TEST(VelodyneDecoder, UnusedBlocksOfTheVls128MayHoldAnything) {
+  VelodyneTestPacket bytes{Model::vls128, ReturnMode::dual};
+  for (std::size_t block = 8; block < kBlocks; ++block)
+    bytes.set_azimuth(block, 65'535);
+  decoded(bytes);
+}
+
+TEST(VelodyneDecoder, AbsurdAzimuthsAreRefused) {
+  LidarPacket packet;
+  VelodyneTestPacket beyond{Model::vlp16, ReturnMode::strongest};
+  beyond.set_azimuth(7, 36'001);
+  EXPECT_EQ(Decoder{}.decode(beyond.payload(), packet), PacketError::azimuth);
+
+  VelodyneTestPacket backwards{Model::vlp16, ReturnMode::strongest};
+  for (std::size_t block = 0; block < kBlocks; ++block)
+    backwards.set_azimuth(block, static_cast<std::uint16_t>(20'000 - 40 * block));
+  EXPECT_EQ(Decoder{}.decode(backwards.payload(), packet), PacketError::azimuth);
+}
+
+TEST(VelodyneDecoder, FullTurnIsZero) {
+  // HDL-32E and VLP-16 report 360.00 degrees now and then.
+  VelodyneTestPacket bytes{Model::hdl32e, ReturnMode::strongest, 0, 35'924, 704.0};
+  bytes.set_azimuth(4, 36'000);
+  bytes.set_all_returns(1000);
+  const LidarPacket packet = decoded(bytes, {.model = Model::hdl32e});
+  EXPECT_EQ(packet.storage[4 * kChannels].azimuth_cdeg, 0);
+}
+
+TEST(VelodyneDecoder, ImpossibleTimeOfHourIsRefused) {
+  LidarPacket packet;
+  EXPECT_EQ(Decoder{}.decode(VelodyneTestPacket(Model::vlp16, ReturnMode::strongest, 3'600'000'000).payload(), packet),
+            PacketError::time);
+}
+
+TEST(VelodyneDecoder, UnknownFactoryBytesAreRefusedUnlessTheConfigurationKnowsBetter) {
+  LidarPacket packet;
+  VelodyneTestPacket bytes{Model::vlp16, ReturnMode::strongest};
+  bytes.set_product_id(0x77);
+  EXPECT_EQ(Decoder{}.decode(bytes.payload(), packet), PacketError::model);
+  EXPECT_EQ(Decoder{{.model = Model::vlp16}}.decode(bytes.payload(), packet), std::nullopt);
+  bytes.set_return_mode(0x00);
+  EXPECT_EQ(Decoder{{.model = Model::vlp16}}.decode(bytes.payload(), packet), PacketError::model);
+  Decoder told{{.model = Model::vlp16, .return_mode = ReturnMode::last}};
+  EXPECT_EQ(told.decode(bytes.payload(), packet), std::nullopt);
+  EXPECT_EQ(told.return_mode(), ReturnMode::last);
+}
+
+TEST(VelodyneDecoder, CalibrationForAnotherNumberOfLasersIsRefused) {
+  LidarPacket packet;
+  Decoder decoder{{.calibration = spec(Model::vlp16).calibration}};
+  EXPECT_EQ(decoder.decode(VelodyneTestPacket(Model::hdl32e, ReturnMode::strongest).payload(), packet),
+            PacketError::model);
+  EXPECT_EQ(decoder.decode(VelodyneTestPacket(Model::vlp16, ReturnMode::strongest).payload(), packet), std::nullopt);
+}
+
+TEST(VelodyneDecoder, CalibratedOffsetsMoveTheReturn) {
+  Calibration calibration = spec(Model::vlp16).calibration;
+  calibration.storage[15] = {.elevation_rad = 0.0,
+                             .azimuth_offset_rad = 0.1,
+                             .vertical_offset_m = 0.3,
+                             .radial_offset_m = 0.2,
+                             .lateral_offset_m = 0.05,
+                             .range_offset_m = 1.0};
+  VelodyneTestPacket bytes{Model::vlp16, ReturnMode::strongest, 0, 0, 0.0};
+  bytes.set_return(0, 15, 5000);
+  const LidarPacket packet = decoded(bytes, {.calibration = calibration});
+  ASSERT_EQ(packet.count, 1U);
+  EXPECT_NEAR(packet.storage[0].range_m, 11.0, 1e-5);
+  EXPECT_NEAR(packet.storage[0].x_m, 11.2 * std::cos(0.1) + 0.05 * std::sin(0.1), 1e-5);
+  EXPECT_NEAR(packet.storage[0].y_m, -11.2 * std::sin(0.1) + 0.05 * std::cos(0.1), 1e-5);
+  EXPECT_NEAR(packet.storage[0].z_m, 0.3, 1e-5);
+}
+
+TEST(VelodyneDecoder, SpacingOfPacketsOverrulesTheProductIdInEitherModeAndThroughLoss) {
+  LidarPacket packet;
+  for (const ReturnMode mode : kModes) {
+    for (const Model truth : {Model::vlp16, Model::vlp32c, Model::hdl32e, Model::vls128}) {
+      for (const Model claim : {Model::vlp16, Model::vlp32c, Model::hdl32e, Model::vls128}) {
+        if ((claim == Model::vls128) != (truth == Model::vls128))
+          continue; // its flags are its own: a wrong id cannot be decoded before the spacing is known
+        if (claim == Model::vlp32c && truth == Model::vlp16)
+          continue; // exactly twice the spacing: no different from one that loses every second packet
+        Decoder decoder;
+        const double spacing_us = 1e6 * to_seconds(packet_duration(truth, mode));
+        for (const int number : {0, 1, 2, 5, 6}) { // two are lost
+          VelodyneTestPacket bytes{truth, mode, static_cast<std::uint32_t>(1e6 + spacing_us * number)};
+          bytes.set_product_id(spec(claim).product_id);
+          ASSERT_EQ(decoder.decode(bytes.payload(), packet), std::nullopt);
+          if (number > 0) {
+            ASSERT_EQ(decoder.model(), truth)
+                << to_string(claim) << " is a " << to_string(truth) << ' ' << to_string(mode);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(VelodyneDecoder, PuckHiResIsNotTakenForAVlp16ThatHasTheSameTiming) {
+  Decoder decoder;
+  LidarPacket packet;
+  for (const std::uint32_t number : {0U, 1U, 2U}) {
+    ASSERT_EQ(
+        decoder.decode(VelodyneTestPacket(Model::puck_hi_res, ReturnMode::strongest, 1'327 * number).payload(), packet),
+        std::nullopt);
+    EXPECT_EQ(decoder.model(), Model::puck_hi_res);
+  }
+}
+
+TEST(VelodyneDecoder, NoBytesBreakIt) {
+  std::mt19937 random{7};
+  std::uniform_int_distribution<int> byte{0, 255};
+  std::uniform_int_distribution<std::size_t> at{0, kDataPacketBytes - 1};
+  Decoder decoder;
+  LidarPacket packet;
+  int decoded_packets = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    VelodyneTestPacket good{kModels[static_cast<std::size_t>(i) % kModels.size()],
+                            kModes[static_cast<std::size_t>(i) % 3]};
+    good.set_all_returns(static_cast<std::uint16_t>(i));
+    std::vector<std::byte> bytes{good.payload().begin(), good.payload().end()};
+    for (int flips = i % 8; flips > 0; --flips)
+      bytes[at(random)] = static_cast<std::byte>(byte(random));
+    if (i % 10 == 0)
+      std::generate(bytes.begin(), bytes.end(), [&] { return static_cast<std::byte>(byte(random)); });
+    if (decoder.decode(bytes, packet))
+      continue;
+    ++decoded_packets;
+    ASSERT_LE(packet.count, LidarPacket::kMaxReturns);
+    for (const LidarReturn& r : packet.returns()) {
+      ASSERT_TRUE(std::isfinite(r.x_m) && std::isfinite(r.y_m) && std::isfinite(r.z_m));
+      ASSERT_GT(r.range_m, 0.0F);
+      ASSERT_LT(r.azimuth_cdeg, kCdegPerTurn);
+      ASSERT_LT(r.ring, kMaxLasers);
+    }
+  }
+  EXPECT_GT(decoded_packets, 1000) << "or this test tries nothing";
+}
+
+} // namespace
+} // namespace locus::velodyne
