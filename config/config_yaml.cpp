@@ -55,7 +55,7 @@ std::string unknown_key(std::string_view key, const std::vector<std::string_view
   };
   const auto nearest = std::min_element(
       known.begin(), known.end(), [&](std::string_view a, std::string_view b) { return distance(a) < distance(b); });
-  return fmt::format("unknown key '{}'; the nearest known one is '{}'", key, *nearest);
+  return fmt::format("unknown key; the nearest known one is '{}'", *nearest);
 }
 
 struct AnySection;
@@ -64,7 +64,16 @@ concept HasFields = requires(T& value, AnySection& section) {
   fields(section, value);
 };
 
+/// Whether `path` is `outer` or lies below it.
 bool contains(const std::string& outer, const std::string& path) { return (path + '.').starts_with(outer + '.'); }
+
+/// Whether `path` or what it lies in could not be read.
+bool is_blamed(const std::vector<Mistake>& unreadable, const std::string& path) {
+  return std::any_of(unreadable.begin(), unreadable.end(), [&](const Mistake& m) { return contains(m.path, path); });
+}
+
+/// The key that a line of problem() is about.
+std::string path_of(const std::string& problem) { return problem.substr(0, problem.find(": ")); }
 
 /// What a tree of YAML says, read into structs, with the line of every key it holds.
 class Reading {
@@ -131,7 +140,7 @@ class SectionReader {
   void blame_unknown_keys() {
     for (const auto& [name, entry] : entries_) {
       if (std::find(known_.begin(), known_.end(), name) == known_.end())
-        reading_.blame(path_, entry.line, unknown_key(name, known_));
+        reading_.blame(join(path_, name), entry.line, unknown_key(name, known_));
     }
   }
 
@@ -167,12 +176,12 @@ void Reading::blame_problems(const std::optional<std::string>& problems) {
     return;
   const std::vector<Mistake> unreadable = mistakes_;
   for (const std::string& problem : split(*problems, '\n')) {
-    const std::string path = problem.substr(0, problem.find(": "));
+    const std::string path = path_of(problem);
     std::string known = path;
     while (!known.empty() && !lines_.contains(known))
       known.resize(known.find('.') == std::string::npos ? 0 : known.rfind('.'));
     const int line = known.empty() ? 1 : lines_.at(known);
-    if (std::none_of(unreadable.begin(), unreadable.end(), [&](const Mistake& m) { return contains(m.path, path); }))
+    if (!is_blamed(unreadable, path))
       blame(path, line, problem.substr(path.size() + 2));
   }
 }
@@ -216,14 +225,6 @@ YAML::Node to_tree(Config config) {
   return section.node();
 }
 
-/// Reads a tree over `config`.
-std::vector<Mistake> read_tree(const YAML::Node& tree, Config& config) {
-  Reading reading;
-  reading.read_section(tree, "", 1, config);
-  reading.blame_problems(config.problem());
-  return reading.take_mistakes();
-}
-
 std::string text_of(const Mistake& mistake) {
   return mistake.path.empty() ? mistake.what : mistake.path + ": " + mistake.what;
 }
@@ -249,7 +250,7 @@ std::optional<std::string> descend(YAML::Node& node, std::string& path, const st
     for (const auto& entry : node)
       keys.push_back(entry.first.Scalar());
     if (std::find(keys.begin(), keys.end(), part) == keys.end())
-      return unknown_key(part, keys);
+      return join(path, part) + ": " + unknown_key(part, keys);
     path = join(path, part);
     node.reset(node[part]);
     return std::nullopt;
@@ -282,10 +283,10 @@ std::optional<std::string> assign(const YAML::Node& tree, Override& override) {
   return std::nullopt;
 }
 
-/// The option that a mistake comes from: the last one that set its place, something below it or something around it.
-const Override& culprit(const std::vector<Override>& overrides, const Mistake& mistake) {
+/// The option that broke the rule of a key: the last one that set it, something below it or something around it.
+const Override& culprit(const std::vector<Override>& overrides, const std::string& path) {
   const auto related = std::find_if(overrides.rbegin(), overrides.rend(), [&](const Override& override) {
-    return contains(override.path, mistake.path) || contains(mistake.path, override.path);
+    return contains(override.path, path) || contains(path, override.path);
   });
   return related == overrides.rend() ? overrides.back() : *related;
 }
@@ -317,8 +318,11 @@ Expected<Config, ConfigErrors> parse_config(const std::string& yaml, const std::
   Config config;
   if (documents.empty())
     return config;
+  Reading reading;
+  reading.read_section(documents.front(), "", 1, config);
+  reading.blame_problems(config.problem());
   ConfigErrors errors;
-  for (const Mistake& mistake : read_tree(documents.front(), config))
+  for (const Mistake& mistake : reading.take_mistakes())
     errors.push_back(error_line(at_line(origin, mistake.line), text_of(mistake)));
   if (!errors.empty())
     return errors;
@@ -339,19 +343,31 @@ Expected<Config, ConfigErrors> load_config(const std::filesystem::path& file) {
 }
 
 Expected<Config, ConfigErrors> override_config(const Config& config, std::span<const std::string> assignments) {
-  const YAML::Node tree = to_tree(config);
+  Config changed = config;
   std::vector<Override> overrides;
+  std::vector<Mistake> unreadable;
   ConfigErrors errors;
+  const auto blame = [&](const Override& override, const std::string& what) {
+    errors.push_back(error_line("--set " + override.assignment, what));
+  };
   for (const std::string& assignment : assignments) {
     Override& override = overrides.emplace_back(Override{assignment, ""});
+    const YAML::Node tree = to_tree(changed);
+    Reading reading;
     if (const auto problem = assign(tree, override))
-      errors.push_back(error_line("--set " + assignment, *problem));
+      blame(override, *problem);
+    else
+      reading.read_section(tree, "", 1, changed);
+    for (Mistake& mistake : reading.take_mistakes()) {
+      blame(override, text_of(mistake));
+      unreadable.push_back(std::move(mistake));
+    }
   }
-  if (!errors.empty() || overrides.empty())
-    return errors.empty() ? Expected<Config, ConfigErrors>{config} : errors;
-  Config changed = config;
-  for (const Mistake& mistake : read_tree(tree, changed))
-    errors.push_back(error_line("--set " + culprit(overrides, mistake).assignment, text_of(mistake)));
+  const auto problems = changed.problem();
+  if (problems && !overrides.empty())
+    for (const std::string& problem : split(*problems, '\n'))
+      if (!is_blamed(unreadable, path_of(problem)))
+        blame(culprit(overrides, path_of(problem)), problem);
   if (!errors.empty())
     return errors;
   return changed;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <optional>
@@ -13,8 +14,11 @@ namespace locus {
 class Problems {
  public:
   void require(bool holds, std::string_view key, std::string_view reason) {
-    if (!holds)
-      add(std::string{key}.append(": ").append(reason));
+    if (holds)
+      return;
+    std::string line = std::string{key}.append(": ").append(reason);
+    std::replace(line.begin(), line.end(), '\n', ' '); // a reason may quote anything
+    add(line);
   }
 
   /// Not-a-number is outside every range.

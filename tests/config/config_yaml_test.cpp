@@ -124,9 +124,9 @@ TEST(ConfigYaml, AnglesReadBackToANanodegreeAlsoWhereYawAndRollAreOne) {
 
 TEST(ConfigYaml, UnknownKeyNamesFileLineAndNearestKey) {
   EXPECT_EQ(errors_in("threads: 2\nvoxel_filter: {enabeld: true}\n"),
-            ConfigErrors{"robot.yaml:2: voxel_filter: unknown key 'enabeld'; the nearest known one is 'enabled'"});
+            ConfigErrors{"robot.yaml:2: voxel_filter.enabeld: unknown key; the nearest known one is 'enabled'"});
   EXPECT_EQ(errors_in("\n\nfussion: queue\n"),
-            ConfigErrors{"robot.yaml:3: unknown key 'fussion'; the nearest known one is 'fusion'"});
+            ConfigErrors{"robot.yaml:3: fussion: unknown key; the nearest known one is 'fusion'"});
 }
 
 TEST(ConfigYaml, AllMistakesAreReportedInTheOrderOfTheirLines) {
@@ -140,6 +140,8 @@ TEST(ConfigYaml, AllMistakesAreReportedInTheOrderOfTheirLines) {
                       "map:\n"
                       "  keyframe_m: 1\n"
                       "  keyframe_m: 2\n"
+                      "  keyframe: 3\n"
+                      "  keyframe_deg: 0\n"
                       "range_m: [5, 1]\n"),
             (ConfigErrors{
                 "robot.yaml:1: threads: 0 is outside 1 .. 256",
@@ -147,7 +149,9 @@ TEST(ConfigYaml, AllMistakesAreReportedInTheOrderOfTheirLines) {
                 "robot.yaml:5: lidars.1.T_base_lidar.xyz_m: must be a list of 3 finite numbers",
                 "robot.yaml:7: fusion: must be combined | queue",
                 "robot.yaml:10: map.keyframe_m: stands a second time, first in line 9",
-                "robot.yaml:11: range_m: must be [nearest, farthest] with 0 <= nearest < farthest <= 1000",
+                "robot.yaml:11: map.keyframe: unknown key; the nearest known one is 'keyframe_m'",
+                "robot.yaml:12: map.keyframe_deg: 0 is outside 1 .. 180",
+                "robot.yaml:13: range_m: must be [nearest, farthest] with 0 <= nearest < farthest <= 1000",
             }));
 }
 
@@ -237,6 +241,12 @@ TEST(ConfigYaml, ALidarAndASourceMayNotShareAName) {
             ConfigErrors{"robot.yaml:4: motion_sources.0.name: 'wio' is taken, each name may stand once"});
 }
 
+TEST(ConfigYaml, MistakesThatQuoteLineBreaksStayOneLine) {
+  EXPECT_EQ(
+      errors_in("lidars:\n  - name: \"a\\nb: c\"\n"),
+      ConfigErrors{"robot.yaml:2: lidars.0.name: 'a b: c' is no name; write a letter, then letters, digits, _ or -"});
+}
+
 TEST(ConfigYaml, OffAndOnAreWordsWhateverYamlMakesOfThem) {
   EXPECT_EQ(valid(parse_config("flat_ground: on\nscan_to_scan: {mode: off}", "")).odometry.flat_ground, FlatGround::on);
   EXPECT_EQ(valid(parse_config("flat_ground: 'on'", "")).odometry.flat_ground, FlatGround::on);
@@ -295,6 +305,11 @@ TEST(ConfigOverride, PartOfASectionLeavesTheRestOfIt) {
   EXPECT_EQ(config.odometry.map, (MapOptions{3.0, MapOptions{}.keyframe_deg, MapOptions{}.max_bytes}));
 }
 
+TEST(ConfigOverride, PartsOfASectionMayFollowTheSection) {
+  const Config config = with(Config{}, {"map={}", "map={keyframe_m: 3}", "map.keyframe_deg=4"});
+  EXPECT_EQ(config.odometry.map, (MapOptions{3.0, 4.0, MapOptions{}.max_bytes}));
+}
+
 TEST(ConfigOverride, OptionsTakeEffectTogetherAndTheLastOneWins) {
   const Config config = with(Config{}, {"range_m=[0.5, 2]", "threads=3", "range_m=[3, 9]", "threads=1"});
   EXPECT_EQ(config.sweep.min_range_m, 3.0);
@@ -305,15 +320,15 @@ TEST(ConfigOverride, MistakesNameTheOptionAtFault) {
   EXPECT_EQ(errors_with({"threads=4", "lidars.frnt.port=1", "voxel.leaf_m=1", "threads.max=2", "threads", "map=[1"}),
             (ConfigErrors{
                 "--set lidars.frnt.port=1: lidars has no item 'frnt'; give a name or an index below 1",
-                "--set voxel.leaf_m=1: unknown key 'voxel'; the nearest known one is 'voxel_filter'",
+                "--set voxel.leaf_m=1: voxel: unknown key; the nearest known one is 'voxel_filter'",
                 "--set threads.max=2: threads has no keys below it",
                 "--set threads: must be KEY=VALUE, e.g. lidars.front.port=2369",
                 "--set map=[1: the value is not YAML",
             }));
   EXPECT_EQ(errors_with({"threads=0", "map={keyframes: 1}", "seed=2"}),
             (ConfigErrors{
+                "--set map={keyframes: 1}: map.keyframes: unknown key; the nearest known one is 'keyframe_m'",
                 "--set threads=0: threads: 0 is outside 1 .. 256",
-                "--set map={keyframes: 1}: map: unknown key 'keyframes'; the nearest known one is 'keyframe_m'",
             }));
 }
 
