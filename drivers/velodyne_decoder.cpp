@@ -198,7 +198,8 @@ void Decoder::take_aim(std::size_t column, std::size_t bank) {
         cos_firing * firings_.cos_azimuth_offset[i] - sin_firing * firings_.sin_azimuth_offset[i];
     aim_.sin_azimuth[channel] =
         sin_firing * firings_.cos_azimuth_offset[i] + cos_firing * firings_.sin_azimuth_offset[i];
-    const int firing_cdeg = azimuth_cdeg_[column] + static_cast<int>(firings_.share_of_column[i] * turn_cdeg + 0.5F);
+    const float rounded_turn_cdeg = firings_.share_of_column[i] * turn_cdeg + 0.5F; // >= 0: no need of a call to lround
+    const int firing_cdeg = azimuth_cdeg_[column] + static_cast<int>(rounded_turn_cdeg);
     aim_.azimuth_cdeg[channel] =
         static_cast<std::uint16_t>(firing_cdeg < kCdegPerTurn ? firing_cdeg : firing_cdeg - kCdegPerTurn);
   }

@@ -34,7 +34,7 @@ struct DecoderOptions {
 /// the model is recognised by.
 class Decoder {
  public:
-  explicit Decoder(DecoderOptions options = {}) : options_(std::move(options)) {}
+  explicit Decoder(const DecoderOptions& options = {}) : options_(options) {}
 
   /// Fills everything of `packet` but lidar and stamp, or says why not (length, model, flag, azimuth, time) and leaves
   /// `packet` undefined.

@@ -18,8 +18,8 @@ using test::VelodyneTestPacket;
 constexpr std::array kModes{ReturnMode::strongest, ReturnMode::last, ReturnMode::dual};
 constexpr double kRadPerCdeg = std::numbers::pi / 18000.0;
 
-LidarPacket decoded(const VelodyneTestPacket& bytes, DecoderOptions options = {}) {
-  Decoder decoder{std::move(options)};
+LidarPacket decoded(const VelodyneTestPacket& bytes, const DecoderOptions& options = {}) {
+  Decoder decoder{options};
   LidarPacket packet;
   EXPECT_EQ(decoder.decode(bytes.payload(), packet), std::nullopt);
   return packet;
@@ -59,7 +59,7 @@ TEST(VelodyneDecoder, EveryFiringOfEveryModelHasItsTimeItsDirectionAndItsRing) {
         ASSERT_NEAR(std::hypot(double{r.x_m}, double{r.y_m}), range_m * std::cos(laser.elevation_rad), 1e-5);
         const double share = static_cast<double>(expected_ns) / static_cast<double>(figures.column_duration.count());
         const double azimuth_cdeg = 12'345.0 + turn_cdeg * share;
-        // Azimuths are reported in hundredths of a degree, so is the interpolated one: half of one off, twice.
+        // Reported and given out in hundredths of a degree: rounded twice.
         ASSERT_NEAR(r.azimuth_cdeg, azimuth_cdeg, 1.1);
         ASSERT_LT(angle_between(clockwise_azimuth_rad(r), azimuth_cdeg * kRadPerCdeg + laser.azimuth_offset_rad),
                   0.6 * kRadPerCdeg);
