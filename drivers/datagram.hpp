@@ -9,8 +9,8 @@
 
 namespace locus {
 
-/// One UDP datagram as it came from a socket or a capture. Addresses and ports are in host byte order. Owns nothing: the
-/// payload lives until its source is asked for the next one.
+/// One UDP datagram as it came from a socket or a capture. Addresses and ports are in host byte order. Owns nothing:
+/// the payload lives until its source is asked for the next one.
 struct Datagram {
   std::span<const std::byte> payload;
   std::uint32_t source_ip = 0;
