@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <deque>
+#include <vector>
+
+#include "config/config.hpp"
+#include "daemon/input.hpp"
+#include "daemon/sweep_processor.hpp"
+#include "drivers/lidar_input.hpp"
+#include "drivers/velodyne_model.hpp"
+
+namespace locus::daemon {
+
+/// What reaches the computer of a robot that drives round the room for eight seconds, in the order of arrival: a
+/// VLP-16 at 10 Hz, wheel odometry and an IMU.
+class Drive {
+ public:
+  static constexpr std::size_t kSweeps = 80;
+
+  /// That of the robot.
+  static Config config();
+
+  /// Made once, for all tests.
+  static const Drive& instance();
+
+  [[nodiscard]] const std::vector<Input>& inputs() const { return inputs_; }
+
+ private:
+  Drive();
+
+  std::deque<std::array<std::byte, velodyne::kDataPacketBytes>> payloads_;
+  std::vector<Input> inputs_;
+};
+
+Stamp arrival_of(const Input& input);
+
+/// Gives the inputs of the drive out as fast as they are asked for.
+class DriveInput : public InputSource {
+ public:
+  Input next(Duration timeout) override;
+
+ private:
+  std::size_t given_ = 0;
+};
+
+/// The drive through ingest and odometry in one thread: what the live threads are compared with. What was taken is the
+/// registration alone.
+std::vector<ProcessedSweep> process_in_one_thread(const Config& config);
+
+LidarRouter open_lidars(const Config& config);
+
+} // namespace locus::daemon

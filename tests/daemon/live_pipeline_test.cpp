@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/live_pipeline.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <ctime>
+#include <thread>
+#include <vector>
+
+#include "daemon/allocation_counter.hpp"
+#include "daemon/drive.hpp"
+#include "daemon/paced_input.hpp"
+
+namespace locus::daemon {
+namespace {
+
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+/// So slow a world that no registration is ended by its deadline.
+constexpr double kNoHurry = 1e-3;
+
+/// Gives the drive out no faster than the odometry processes it, so that nothing is dropped.
+class PatientInput : public InputSource {
+ public:
+  void wait_for(const LivePipeline& pipeline) { pipeline_.store(&pipeline); }
+
+  Input next(Duration timeout) override {
+    const LivePipeline* pipeline = pipeline_.load();
+    if (pipeline == nullptr || is_behind(pipeline->counters())) {
+      std::this_thread::sleep_for(std::min<Duration>(timeout, microseconds{100}));
+      return Silence{last_arrival_};
+    }
+    const Input input = drive_.next(timeout);
+    if (!std::holds_alternative<EndOfInput>(input))
+      last_arrival_ = arrival_of(input);
+    return input;
+  }
+
+ private:
+  static bool is_behind(const SweepCounters& counters) { return counters.seen > counters.processed + counters.failed; }
+
+  DriveInput drive_;
+  std::atomic<const LivePipeline*> pipeline_{nullptr};
+  Stamp last_arrival_;
+};
+
+/// A robot that is switched off.
+class SilentInput : public InputSource {
+ public:
+  Input next(Duration timeout) override {
+    std::this_thread::sleep_for(timeout);
+    return Silence{};
+  }
+};
+
+std::vector<ProcessedSweep> fetch_all(LivePipeline& pipeline) {
+  std::vector<ProcessedSweep> fetched;
+  while (!pipeline.finished())
+    if (const auto done = pipeline.next(milliseconds{100}))
+      fetched.push_back(*done);
+  return fetched;
+}
+
+void expect_adds_up(const SweepCounters& counters) {
+  EXPECT_EQ(counters.seen, counters.processed + counters.dropped + counters.failed);
+}
+
+Duration median_wall(std::vector<ProcessedSweep>::const_iterator begin,
+                     std::vector<ProcessedSweep>::const_iterator end) {
+  std::vector<Duration> walls;
+  std::transform(begin, end, std::back_inserter(walls), [](const ProcessedSweep& done) { return done.took.wall; });
+  std::nth_element(walls.begin(), walls.begin() + static_cast<std::ptrdiff_t>(walls.size() / 2), walls.end());
+  return walls[walls.size() / 2];
+}
+
+Duration time_to_stop(LivePipeline& pipeline) {
+  const Duration begin = read_clock(CLOCK_MONOTONIC);
+  pipeline.stop();
+  return read_clock(CLOCK_MONOTONIC) - begin;
+}
+
+TEST(LivePipeline, GivesTheBitsOfOneThreadWhenNothingIsDropped) {
+  const Config config = Drive::config();
+  const std::vector<ProcessedSweep> expected = process_in_one_thread(config);
+  PatientInput input;
+  LivePipeline pipeline(config, open_lidars(config), input, kNoHurry);
+  input.wait_for(pipeline);
+  const std::vector<ProcessedSweep> fetched = fetch_all(pipeline);
+  pipeline.stop();
+
+  ASSERT_EQ(fetched.size(), expected.size());
+  for (std::size_t i = 0; i < fetched.size(); ++i) {
+    const OdometryEstimate& estimate = fetched[i].estimate;
+    EXPECT_EQ(fetched[i].sequence, expected[i].sequence);
+    EXPECT_EQ(estimate.stamp, expected[i].estimate.stamp);
+    EXPECT_EQ(estimate.T_odom_base, expected[i].estimate.T_odom_base) << "sweep " << i;
+    EXPECT_EQ(estimate.pose_covariance, expected[i].estimate.pose_covariance) << "sweep " << i;
+  }
+  expect_adds_up(pipeline.counters());
+  EXPECT_EQ(pipeline.counters().dropped, 0U);
+  EXPECT_EQ(pipeline.counters().seen, expected.size());
+}
+
+/// Sweeps come three times as fast as they can be registered: both steps of the registration, of many points, and no
+/// deadline that would come to their help. A queue would make every estimate older than the one before; here the newest
+/// sweep wins, and the rest is counted.
+TEST(LivePipeline, OverloadDropsSweepsAndNeverMakesEstimatesOlder) {
+  Config config = Drive::config();
+  config.sweep.segment_filter.points = 20'000;
+  config.odometry.scan_to_scan_mode = ScanToScanMode::always;
+  config.odometry.threads = 1;
+  const std::vector<ProcessedSweep> alone = process_in_one_thread(config);
+  const Duration registration = median_wall(alone.begin(), alone.end());
+  DriveInput drive;
+  PacedInput input(drive, 3.0 * to_seconds(milliseconds{100}) / to_seconds(registration));
+  LivePipeline pipeline(config, open_lidars(config), input, kNoHurry);
+  const std::vector<ProcessedSweep> fetched = fetch_all(pipeline);
+  pipeline.stop();
+
+  const SweepCounters counters = pipeline.counters();
+  expect_adds_up(counters);
+  EXPECT_EQ(counters.seen, alone.size());
+  EXPECT_GT(counters.dropped, counters.seen / 8);
+  EXPECT_EQ(fetched.size(), counters.processed + counters.failed);
+  ASSERT_GE(fetched.size(), 9U);
+  EXPECT_TRUE(std::is_sorted(fetched.begin(), fetched.end(),
+                             [](const ProcessedSweep& a, const ProcessedSweep& b) { return a.sequence < b.sequence; }));
+  EXPECT_EQ(fetched.back().sequence, alone.back().sequence) << "the newest sweep always is processed";
+  const auto third = static_cast<std::ptrdiff_t>(fetched.size() / 3);
+  const Duration at_first = median_wall(fetched.begin(), fetched.begin() + third);
+  const Duration at_last = median_wall(fetched.end() - third, fetched.end());
+  RecordProperty("dropped_of_80", static_cast<int>(counters.dropped));
+  RecordProperty("registration_us", static_cast<int>(registration / microseconds{1}));
+  RecordProperty("age_us_first_third", static_cast<int>(at_first / microseconds{1}));
+  RecordProperty("age_us_last_third", static_cast<int>(at_last / microseconds{1}));
+  EXPECT_LT(to_seconds(at_last), 3.0 * to_seconds(at_first));
+}
+
+/// What the deadline is for: a registration that is too slow for its sweeps is cut short, and few are dropped.
+TEST(LivePipeline, RegistrationEndsAnIterationAfterItsDeadline) {
+  constexpr double kImpossible = 1e9; // every deadline has passed before the registration begins
+  PatientInput input;
+  const Config config = Drive::config();
+  LivePipeline pipeline(config, open_lidars(config), input, kImpossible);
+  input.wait_for(pipeline);
+  const std::vector<ProcessedSweep> fetched = fetch_all(pipeline);
+  ASSERT_FALSE(fetched.empty());
+  for (const ProcessedSweep& done : fetched)
+    EXPECT_LE(done.estimate.scan_to_submap.iterations, 1) << "sweep " << done.sequence;
+}
+
+TEST(LivePipeline, ConsumerThatFetchesNothingLosesEstimatesAndDelaysNobody) {
+  const Config config = Drive::config();
+  PatientInput input;
+  LivePipeline pipeline(config, open_lidars(config), input, kNoHurry);
+  input.wait_for(pipeline);
+  const Duration give_up = read_clock(CLOCK_MONOTONIC) + seconds{60};
+  while (pipeline.counters().seen < Drive::kSweeps - 1 && read_clock(CLOCK_MONOTONIC) < give_up)
+    std::this_thread::sleep_for(milliseconds{1});
+  pipeline.stop();
+
+  const SweepCounters counters = pipeline.counters();
+  expect_adds_up(counters);
+  EXPECT_EQ(pipeline.unfetched(), counters.processed + counters.failed - LivePipeline::kMaxUnfetched);
+  EXPECT_FALSE(pipeline.finished());
+  EXPECT_EQ(fetch_all(pipeline).size(), LivePipeline::kMaxUnfetched);
+}
+
+TEST(LivePipeline, StopsWithinASecondInSilence) {
+  SilentInput input;
+  const Config config = Drive::config();
+  LivePipeline pipeline(config, open_lidars(config), input);
+  std::this_thread::sleep_for(milliseconds{20});
+  EXPECT_LT(time_to_stop(pipeline), seconds{1});
+  EXPECT_TRUE(pipeline.finished());
+  EXPECT_EQ(pipeline.counters(), SweepCounters{});
+}
+
+TEST(LivePipeline, StopsWithinASecondInMidDriveAndAccountsForWhatItHasSeen) {
+  DriveInput drive;
+  PacedInput input(drive, 4.0);
+  const Config config = Drive::config();
+  LivePipeline pipeline(config, open_lidars(config), input, 4.0);
+  while (!pipeline.next(milliseconds{100})) {
+  }
+  EXPECT_LT(time_to_stop(pipeline), seconds{1});
+  expect_adds_up(pipeline.counters());
+  EXPECT_LT(pipeline.counters().seen, Drive::kSweeps);
+}
+
+/// Both threads and the consumer together.
+TEST(LivePipeline, AllocatesNothingOnceWarm) {
+  constexpr std::uint64_t kWarm = 40;
+  const Config config = Drive::config();
+  PatientInput input;
+  Drive::instance();
+  LivePipeline pipeline(config, open_lidars(config), input, kNoHurry);
+  input.wait_for(pipeline);
+  std::uint64_t before = 0;
+  std::uint64_t after = 0;
+  while (!pipeline.finished())
+    if (const auto done = pipeline.next(milliseconds{100}))
+      (done->sequence <= kWarm ? before : after) = allocations();
+  ASSERT_GT(after, 0U);
+  EXPECT_EQ(after - before, 0U);
+}
+
+} // namespace
+} // namespace locus::daemon

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/stage_stopwatch.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <ctime>
+
+#include "daemon/machine_time.hpp"
+
+namespace locus::daemon {
+namespace {
+
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+
+/// Uses that much CPU time of this thread; how long it takes by the clock on the wall does not matter.
+void work_for(Duration cpu) {
+  const Duration end = read_clock(CLOCK_THREAD_CPUTIME_ID) + cpu;
+  while (read_clock(CLOCK_THREAD_CPUTIME_ID) < end) {
+  }
+}
+
+void expect_about(Duration measured, Duration expected) {
+  EXPECT_NEAR(to_seconds(measured), to_seconds(expected), 0.1 * to_seconds(expected));
+}
+
+TEST(StageStopwatch, InnerStageIsNotChargedToTheOuter) {
+  StageStopwatch stopwatch;
+  {
+    const StageScope filter(&stopwatch, Stage::filter);
+    work_for(milliseconds{10});
+    {
+      const StageScope covariance(&stopwatch, Stage::covariance);
+      work_for(milliseconds{30});
+    }
+    work_for(milliseconds{10});
+  }
+  work_for(milliseconds{20}); // in no stage
+  expect_about(stopwatch.total(Stage::filter), milliseconds{20});
+  expect_about(stopwatch.total(Stage::covariance), milliseconds{30});
+  EXPECT_EQ(stopwatch.total(Stage::map), Duration::zero());
+}
+
+TEST(StageStopwatch, WhatIsDoneInAPauseBelongsToNoStage) {
+  StageStopwatch stopwatch;
+  {
+    const StageScope filter(&stopwatch, Stage::filter);
+    work_for(milliseconds{10});
+    const StageStopwatch::Pause pause(stopwatch);
+    work_for(milliseconds{30});
+  }
+  expect_about(stopwatch.total(Stage::filter), milliseconds{10});
+}
+
+TEST(StageStopwatch, VisitsThatAreNotTimedCountLikeThoseThatAre) {
+  StageStopwatch stopwatch;
+  for (int packet = 0; packet < 200; ++packet) {
+    {
+      const StageScope decode(&stopwatch, Stage::decode);
+      work_for(microseconds{100});
+    }
+    const StageScope correct(&stopwatch, Stage::correct);
+    work_for(microseconds{200});
+    if (packet % 50 == 0) {
+      const StageScope filter(&stopwatch, Stage::filter);
+      work_for(milliseconds{5});
+    }
+  }
+  expect_about(stopwatch.total(Stage::decode), milliseconds{20});
+  expect_about(stopwatch.total(Stage::correct), milliseconds{40});
+  expect_about(stopwatch.total(Stage::filter), milliseconds{20});
+}
+
+} // namespace
+} // namespace locus::daemon
