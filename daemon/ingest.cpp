@@ -16,6 +16,7 @@ constexpr Duration kUsualPeriod = std::chrono::milliseconds{100}; ///< 600 rpm, 
 
 std::vector<Pose> mounts(const std::vector<LidarOptions>& lidars) {
   std::vector<Pose> T_base_lidar;
+  T_base_lidar.reserve(lidars.size());
   for (const LidarOptions& lidar : lidars)
     T_base_lidar.push_back(lidar.T_base_lidar);
   return T_base_lidar;

@@ -54,7 +54,7 @@ void LivePipeline::hand_over(Sweep& sweep, const MachineTime& cut) {
   std::vector<SweepPoint> spare = std::exchange(back.sweep.points, {});
   spare.reserve(max_points_); // does something for the first few sweeps alone
   back = {std::move(sweep), cut};
-  sweep.points = std::move(spare);
+  sweep.points = std::move(spare); // NOLINT(bugprone-use-after-move): the one member that was moved away
   seen_.fetch_add(1, std::memory_order_relaxed);
   if (newest_sweep_.publish())
     dropped_.fetch_add(1, std::memory_order_relaxed);

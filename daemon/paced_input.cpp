@@ -45,7 +45,7 @@ Input PacedInput::next(Duration timeout) {
     const Duration since_anchor = read_clock(CLOCK_MONOTONIC) - anchor_clock_;
     return Silence{std::min(held_->arrival, anchor_arrival_ + from_seconds(speed_ * to_seconds(since_anchor)))};
   }
-  const Input input = held_->input;
+  Input input = held_->input;
   held_.reset();
   return input;
 }

@@ -6,6 +6,24 @@
 #include <cstdlib>
 #include <new>
 
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define LOCUS_SANITIZED
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define LOCUS_SANITIZED
+#endif
+#endif
+
+#ifdef LOCUS_SANITIZED
+
+namespace locus::daemon {
+
+std::optional<std::uint64_t> allocations() { return std::nullopt; }
+
+} // namespace locus::daemon
+
+#else
+
 namespace {
 
 std::atomic<std::uint64_t> g_allocations{0};
@@ -32,6 +50,8 @@ void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std
 
 namespace locus::daemon {
 
-std::uint64_t allocations() { return g_allocations.load(std::memory_order_relaxed); }
+std::optional<std::uint64_t> allocations() { return g_allocations.load(std::memory_order_relaxed); }
 
 } // namespace locus::daemon
+
+#endif

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -89,12 +90,14 @@ struct Filters {
 class IngestWithFilters : public testing::TestWithParam<Filters> {};
 
 TEST_P(IngestWithFilters, AllocatesNothingOnceWarm) {
+  if (!allocations())
+    GTEST_SKIP() << "a sanitizer is in the way of counting";
   constexpr std::uint64_t kWarm = 10;
   const Config& config = GetParam().config;
   std::vector<SweepPoint> spare;
   spare.reserve(Ingest::max_points(config));
-  std::uint64_t before = 0;
-  std::uint64_t after = 0;
+  std::optional<std::uint64_t> before;
+  std::optional<std::uint64_t> after;
   Ingest ingest(config, open_lidars(config), [&](Sweep& sweep, const MachineTime&) {
     std::swap(sweep.points, spare);
     spare.reserve(Ingest::max_points(config));
@@ -102,8 +105,8 @@ TEST_P(IngestWithFilters, AllocatesNothingOnceWarm) {
   });
   for (const Input& input : Drive::instance().inputs())
     ingest.take(input);
-  ASSERT_GT(after, 0U);
-  EXPECT_EQ(after - before, 0U);
+  ASSERT_TRUE(before && after);
+  EXPECT_EQ(*after - *before, 0U);
 }
 
 Filters segments() { return {"Segments", Drive::config()}; }

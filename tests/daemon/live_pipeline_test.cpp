@@ -7,6 +7,8 @@
 #include <atomic>
 #include <chrono>
 #include <ctime>
+#include <iterator>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -195,19 +197,21 @@ TEST(LivePipeline, StopsWithinASecondInMidDriveAndAccountsForWhatItHasSeen) {
 
 /// Both threads and the consumer together.
 TEST(LivePipeline, AllocatesNothingOnceWarm) {
+  if (!allocations())
+    GTEST_SKIP() << "a sanitizer is in the way of counting";
   constexpr std::uint64_t kWarm = 40;
   const Config config = Drive::config();
   PatientInput input;
   Drive::instance();
   LivePipeline pipeline(config, open_lidars(config), input, kNoHurry);
   input.wait_for(pipeline);
-  std::uint64_t before = 0;
-  std::uint64_t after = 0;
+  std::optional<std::uint64_t> before;
+  std::optional<std::uint64_t> after;
   while (!pipeline.finished())
     if (const auto done = pipeline.next(milliseconds{100}))
       (done->sequence <= kWarm ? before : after) = allocations();
-  ASSERT_GT(after, 0U);
-  EXPECT_EQ(after - before, 0U);
+  ASSERT_TRUE(before && after);
+  EXPECT_EQ(*after - *before, 0U);
 }
 
 } // namespace
