@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_replay/arguments.hpp"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "locus_replay/failure.hpp"
+
+namespace locus::tools {
+namespace {
+
+constexpr double kLongest_s = 1e8; ///< three years
+
+/// CLI11's own ranges let NaN pass.
+CLI::Validator number_between(double low, double high) {
+  return {[=](const std::string& text) {
+            double number = 0;
+            const bool within = CLI::detail::lexical_cast(text, number) && number >= low && number <= high;
+            return within ? std::string{} : fmt::format("{} is no number from {} to {}", text, low, high);
+          },
+          ""};
+}
+
+Arguments::OdometryFile parse_odometry(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == 0 || equals == std::string::npos || equals + 1 == text.size())
+    throw Failure(ExitStatus::wrong_usage,
+                  fmt::format("--odometry {}: must be NAME=FILE, for example wio=wheels.tum", text));
+  return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+} // namespace
+
+std::optional<Arguments> parse_arguments(int argc, char** argv) {
+  Arguments arguments;
+  std::vector<std::string> odometry, faults;
+  int threads = 0;
+  double start_s = 0, duration_s = 0, speed = 0;
+
+  CLI::App app{"Recorded lidar packets in; odometry, map and figures out.", "locus-replay"};
+  app.add_option("CAPTURE", arguments.capture,
+                 "A pcap or pcapng file, or a folder with lidar.pcap and any of imu.csv, NAME.tum, config.yaml")
+      ->required();
+  app.add_option("-o,--output", arguments.output,
+                 "Folder for odometry.tum, odometry.csv, map.pcd and summary.json; made if need be")
+      ->required()
+      ->type_name("DIR");
+  app.add_option("-c,--config", arguments.config, "Configuration; default: the folder's config.yaml, else defaults")
+      ->type_name("FILE");
+  app.add_option("--set", arguments.overrides, "Overrides one key of it, e.g. lidars.0.port=2369; may be repeated")
+      ->type_name("KEY=VALUE")
+      ->expected(1)
+      ->take_all();
+  app.add_option("--imu", arguments.imu, "Samples of the motion source of kind imu, CSV as EuRoC's")->type_name("FILE");
+  app.add_option("--odometry", odometry, "Poses of the motion source NAME, as TUM; may be repeated")
+      ->type_name("NAME=FILE")
+      ->expected(1)
+      ->take_all();
+  app.add_option("--start", start_s, "Leaves out what arrived earlier, seconds from the start of the capture")
+      ->type_name("S")
+      ->check(number_between(0, kLongest_s));
+  auto* duration = app.add_option("--duration", duration_s, "Leaves out what arrived this much later, seconds")
+                       ->type_name("S")
+                       ->check(number_between(1e-3, kLongest_s));
+  auto* threads_option = app.add_option("--threads", threads, "That registration uses; does not change the result")
+                             ->type_name("N")
+                             ->check(CLI::Range(1, 256));
+  app.add_option("--fail", faults,
+                 "Injects a fault, NAME:KIND[=VALUE]@T[-T1], e.g. all-lidars:lost@10-20; may be repeated. NAME: a "
+                 "lidar, a motion source or all-lidars. KIND: lost, frozen, jump, nan, late, covariance, clock-step, "
+                 "packet-loss, reorder, duplicate. T: seconds from the start of the capture")
+      ->type_name("SPEC")
+      ->expected(1)
+      ->take_all();
+  auto* realtime = app.add_flag("--realtime{1}", speed,
+                                "At the pace of the recording, or SPEED times it (--realtime=SPEED), through the "
+                                "threads of the service: sweeps that come too fast are dropped")
+                       ->check(number_between(0.01, 1000));
+  app.add_flag("--quiet", arguments.quiet, "Prints warnings and errors alone");
+  app.set_version_flag("--version", "locus-replay " LOCUS_VERSION);
+  app.footer("Examples:\n"
+             "  locus-replay -o out drive.pcap\n"
+             "  locus-replay -c husky.yaml --imu imu.csv --odometry wio=wheels.tum -o out drive.pcap\n"
+             "  locus-replay --set lidars.front.port=2369 --fail front:lost@10-20 -o out robot_folder/");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& asked_for_text) {
+    app.exit(asked_for_text);
+    return std::nullopt;
+  } catch (const CLI::ParseError& error) {
+    throw Failure(ExitStatus::wrong_usage, fmt::format("{}; see locus-replay --help", error.what()));
+  }
+
+  for (const std::string& text : odometry)
+    arguments.odometry.push_back(parse_odometry(text));
+  for (const std::string& text : faults)
+    arguments.faults.push_back(value_or_fail(Fault::parse(text), ExitStatus::wrong_usage));
+  if (threads_option->count() > 0)
+    arguments.overrides.push_back(fmt::format("threads={}", threads));
+  arguments.start = from_seconds(start_s);
+  if (duration->count() > 0)
+    arguments.duration = from_seconds(duration_s);
+  if (realtime->count() > 0)
+    arguments.realtime_speed = speed;
+  return arguments;
+}
+
+} // namespace locus::tools

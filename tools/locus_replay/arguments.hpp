@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/stamp.hpp"
+#include "drivers/fault.hpp"
+
+namespace locus::tools {
+
+/// What the user asked for.
+struct Arguments {
+  struct OdometryFile {
+    std::string name; ///< of the motion source
+    std::filesystem::path file;
+  };
+
+  std::filesystem::path capture;
+  std::filesystem::path output;
+  std::filesystem::path config; ///< empty: that of the capture folder, or the defaults
+  std::vector<std::string> overrides;
+  std::filesystem::path imu; ///< empty: that of the capture folder
+  std::vector<OdometryFile> odometry;
+  Duration start{};
+  std::optional<Duration> duration;
+  std::vector<Fault> faults;
+  std::optional<double> realtime_speed;
+  bool quiet = false;
+};
+
+/// Nothing where help or version were asked for and have been printed. Throws Failure.
+std::optional<Arguments> parse_arguments(int argc, char** argv);
+
+} // namespace locus::tools

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "core/expected.hpp"
+
+namespace locus::tools {
+
+enum class ExitStatus { done = 0, failed = 1, wrong_usage = 2 };
+
+/// Ends the program. Each line of what() is for the user: what is wrong, where, what to do.
+class Failure : public std::runtime_error {
+ public:
+  Failure(ExitStatus status, const std::string& what) : std::runtime_error(what), status_(status) {}
+  [[nodiscard]] ExitStatus status() const { return status_; }
+
+ private:
+  ExitStatus status_;
+};
+
+template <class T> T value_or_fail(Expected<T, std::string> expected, ExitStatus status) {
+  if (!expected)
+    throw Failure(status, expected.error());
+  return std::move(*expected);
+}
+
+} // namespace locus::tools

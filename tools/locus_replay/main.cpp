@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+// locus-replay: a recorded capture in; odometry, map and figures out.
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "config/config_yaml.hpp"
+#include "daemon/ingest.hpp"
+#include "daemon/live_pipeline.hpp"
+#include "daemon/paced_input.hpp"
+#include "daemon/sweep_processor.hpp"
+#include "locus_replay/arguments.hpp"
+#include "locus_replay/failure.hpp"
+#include "locus_replay/motion_recordings.hpp"
+#include "locus_replay/recording.hpp"
+#include "locus_replay/results.hpp"
+
+namespace locus::tools {
+namespace {
+
+using daemon::MachineTime;
+
+/// Each line on its own, for people and for logs.
+void say(const std::string& lines) {
+  for (std::size_t begin = 0; begin < lines.size();) {
+    const std::size_t end = std::min(lines.find('\n', begin), lines.size());
+    fmt::print(stderr, "locus-replay: {}\n", lines.substr(begin, end - begin));
+    begin = end + 1;
+  }
+}
+
+Config config_or_fail(Expected<Config, ConfigErrors> config) {
+  if (!config)
+    throw Failure(ExitStatus::wrong_usage, fmt::format("{}", fmt::join(config.error(), "\n")));
+  return *config;
+}
+
+Config configuration(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
+  Config config;
+  if (!file.empty())
+    config = config_or_fail(load_config(file));
+  return config_or_fail(override_config(config, overrides));
+}
+
+void check_faults(const std::vector<Fault>& faults, const Config& config) {
+  std::vector<FaultTarget> targets;
+  for (const LidarOptions& lidar : config.lidars)
+    targets.push_back({lidar.name, FaultTarget::Kind::lidar});
+  for (const MotionSourceOptions& source : config.odometry.motion_sources)
+    targets.push_back(
+        {source.name, source.kind == SourceKind::imu ? FaultTarget::Kind::imu : FaultTarget::Kind::odometry});
+  for (const Fault& fault : faults) {
+    if (const auto problem = fault_problem(fault, targets))
+      throw Failure(ExitStatus::wrong_usage, *problem);
+  }
+}
+
+/// As fast as the machine can; the same bits on every run.
+void replay(const Config& config, LidarRouter lidars, Recording& recording, Results& results) {
+  daemon::SweepCounters counters;
+  daemon::SweepProcessor processor(config.odometry);
+  daemon::Ingest ingest(config, std::move(lidars), [&](Sweep& sweep, const MachineTime& cut) {
+    const daemon::ProcessedSweep done = processor.process(sweep, cut);
+    ++counters.seen;
+    ++(done.estimate.failed ? counters.failed : counters.processed);
+    results.take(done);
+  });
+  for (bool more = true; more;) {
+    const daemon::Input input = recording.next(Duration::zero());
+    ingest.take(input);
+    more = !std::holds_alternative<daemon::EndOfInput>(input);
+  }
+  results.finish(ingest, processor, counters);
+}
+
+/// At the pace of the recording or a multiple of it, through the threads of the daemon.
+void replay_live(const Config& config, LidarRouter lidars, Recording& recording, double speed, Results& results) {
+  constexpr Duration kPatience = std::chrono::milliseconds{100};
+  daemon::PacedInput paced(recording, speed);
+  daemon::LivePipeline pipeline(config, std::move(lidars), paced, speed);
+  while (!pipeline.finished()) {
+    if (const auto done = pipeline.next(kPatience))
+      results.take(*done);
+  }
+  pipeline.stop();
+  results.finish(pipeline.ingest(), pipeline.processor(), pipeline.counters());
+}
+
+void run(const Arguments& arguments) {
+  const MachineTime begin = MachineTime::now();
+  const CaptureFolder folder = value_or_fail(CaptureFolder::find(arguments.capture), ExitStatus::failed);
+  const std::filesystem::path& config_file = arguments.config.empty() ? folder.config : arguments.config;
+  const Config config = configuration(config_file, arguments.overrides);
+  check_faults(arguments.faults, config);
+  LidarRouter lidars = value_or_fail(LidarRouter::open(config.lidars), ExitStatus::wrong_usage);
+
+  Capture capture = value_or_fail(Capture::open(folder.lidar), ExitStatus::failed);
+  std::vector<std::string> warnings;
+  std::vector<MotionRecording> motion = read_motion(arguments, folder, config, !config_file.empty(), warnings);
+  for (const std::string& warning : warnings)
+    say("warning: " + warning);
+
+  const PlayOptions options{arguments.start, arguments.duration, arguments.faults, config.sweep.seed};
+  Recording recording(std::move(capture), std::move(motion), config, lidars, options);
+  Results results(arguments, config, recording, begin);
+  if (arguments.realtime_speed)
+    replay_live(config, std::move(lidars), recording, *arguments.realtime_speed, results);
+  else
+    replay(config, std::move(lidars), recording, results);
+  for (const std::string& warning : recording.capture().warnings())
+    say("warning: " + warning);
+}
+
+} // namespace
+} // namespace locus::tools
+
+int main(int argc, char** argv) {
+  using namespace locus::tools;
+  try {
+    if (const std::optional<Arguments> arguments = parse_arguments(argc, argv))
+      run(*arguments);
+    return static_cast<int>(ExitStatus::done);
+  } catch (const Failure& failure) {
+    say(failure.what());
+    return static_cast<int>(failure.status());
+  } catch (const std::exception& error) { // out of memory or threads
+    say(error.what());
+    return static_cast<int>(ExitStatus::failed);
+  }
+}

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_replay/motion_recordings.hpp"
+
+#include <algorithm>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "drivers/motion_files.hpp"
+#include "locus_replay/failure.hpp"
+
+namespace locus::tools {
+namespace {
+
+struct MotionFile {
+  std::string name; ///< of the source; of an IMU none
+  SourceKind kind;
+  std::filesystem::path file;
+  bool named_by_user;
+};
+
+std::vector<MotionFile> motion_files(const Arguments& arguments, const CaptureFolder& folder) {
+  std::vector<MotionFile> files;
+  if (!arguments.imu.empty())
+    files.push_back({"", SourceKind::imu, arguments.imu, true});
+  else if (!folder.imu.empty())
+    files.push_back({"", SourceKind::imu, folder.imu, false});
+  for (const Arguments::OdometryFile& named : arguments.odometry)
+    files.push_back({named.name, SourceKind::odometry, named.file, true});
+  for (const CaptureFolder::Source& found : folder.odometry) {
+    if (std::ranges::none_of(arguments.odometry, [&](const auto& named) { return named.name == found.name; }))
+      files.push_back({found.name, SourceKind::odometry, found.file, false});
+  }
+  return files;
+}
+
+/// The source that a file speaks for: the first one of kind imu, or the odometry of this name.
+std::optional<std::size_t> source_of(const MotionFile& file, const std::vector<MotionSourceOptions>& sources) {
+  const auto found = std::ranges::find_if(sources, [&](const MotionSourceOptions& source) {
+    return source.kind == file.kind && (file.kind == SourceKind::imu || source.name == file.name);
+  });
+  return found == sources.end() ? std::nullopt : std::optional<std::size_t>(found - sources.begin());
+}
+
+std::string without_source(const MotionFile& file) {
+  const std::string name = file.kind == SourceKind::imu ? "imu" : file.name;
+  return fmt::format("{}: no motion source {} is configured; add {{name: {}, kind: {}}} to motion_sources",
+                     file.file.string(), file.kind == SourceKind::imu ? "of kind imu" : "named " + name, name,
+                     file.kind == SourceKind::imu ? "imu" : "odometry");
+}
+
+std::string without_file(const MotionSourceOptions& source) {
+  return source.kind == SourceKind::imu
+             ? fmt::format("motion source {}: never heard from, there is no imu.csv; name a file with --imu FILE",
+                           source.name)
+             : fmt::format("motion source {0}: never heard from, there is no {0}.tum; name a file with --odometry "
+                           "{0}=FILE",
+                           source.name);
+}
+
+MotionRecording read(const MotionFile& file, std::size_t source) {
+  if (file.kind == SourceKind::imu)
+    return {source, value_or_fail(read_imu(file.file), ExitStatus::failed)};
+  return {source, value_or_fail(read_odometry(file.file), ExitStatus::failed)};
+}
+
+} // namespace
+
+std::vector<MotionRecording> read_motion(const Arguments& arguments, const CaptureFolder& folder, const Config& config,
+                                         bool config_is_users_own, std::vector<std::string>& warnings) {
+  const std::vector<MotionSourceOptions>& sources = config.odometry.motion_sources;
+  std::vector<MotionRecording> recordings;
+  const auto is_read = [&](std::size_t source) {
+    return std::ranges::any_of(recordings, [&](const MotionRecording& r) { return r.source == source; });
+  };
+  for (const MotionFile& file : motion_files(arguments, folder)) {
+    const std::optional<std::size_t> source = source_of(file, sources);
+    if (source && is_read(*source))
+      throw Failure(ExitStatus::wrong_usage,
+                    fmt::format("{}: a second file for motion source {}; keep one", file.file.string(), file.name));
+    if (source)
+      recordings.push_back(read(file, *source));
+    else if (file.named_by_user)
+      throw Failure(ExitStatus::wrong_usage, without_source(file));
+    else
+      warnings.push_back(without_source(file) + "; left out");
+  }
+  for (std::size_t source = 0; config_is_users_own && source < sources.size(); ++source) {
+    if (!is_read(source))
+      warnings.push_back(without_file(sources[source]));
+  }
+  return recordings;
+}
+
+} // namespace locus::tools

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "config/config.hpp"
+#include "core/motion_sample.hpp"
+#include "drivers/capture_folder.hpp"
+#include "locus_replay/arguments.hpp"
+
+namespace locus::tools {
+
+/// What one motion source said, in the order of arrival.
+struct MotionRecording {
+  std::size_t source; ///< index in the configuration
+  std::variant<std::vector<ImuSample>, std::vector<OdometrySample>> samples;
+};
+
+/// Reads the motion files that the user named, and those of the folder, for the motion sources of the configuration.
+/// A file of the folder that belongs to no source is left out with a warning, and so is a source without a file, if the
+/// configuration was the user's own. Throws Failure for a file that was named and fits nothing, or cannot be read.
+std::vector<MotionRecording> read_motion(const Arguments& arguments, const CaptureFolder& folder, const Config& config,
+                                         bool config_is_users_own, std::vector<std::string>& warnings);
+
+} // namespace locus::tools

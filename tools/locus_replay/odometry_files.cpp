@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_replay/odometry_files.hpp"
+
+#include <cstdint>
+#include <string_view>
+
+#include <fmt/format.h>
+
+namespace locus::tools {
+namespace {
+
+std::string_view name_of(TrackingState state) {
+  switch (state) {
+  case TrackingState::tracking:
+    return "tracking";
+  case TrackingState::degenerate:
+    return "degenerate";
+  case TrackingState::dead_reckoning:
+    return "dead_reckoning";
+  case TrackingState::standstill:
+    return "standstill";
+  }
+  return "";
+}
+
+std::string csv_header() {
+  constexpr std::string_view kAxes[] = {"x", "y", "z", "roll", "pitch", "yaw"};
+  std::string header = "t_ns,state,source,iterations,inliers";
+  for (const std::string_view row : kAxes) {
+    for (const std::string_view column : kAxes)
+      header += fmt::format(",cov_{}_{}", row, column);
+  }
+  return header;
+}
+
+} // namespace
+
+OdometryFiles::OdometryFiles(const std::filesystem::path& folder, const std::vector<MotionSourceOptions>& sources)
+    : tum_(folder / "odometry.tum"), csv_(folder / "odometry.csv") {
+  for (const MotionSourceOptions& source : sources)
+    source_names_.push_back(source.name);
+  csv_.print("{}\n", csv_header());
+}
+
+/// What the rotation came from and what the translation, once if it is the same.
+std::string OdometryFiles::name_of(const PriorSource& prior) const {
+  const auto name = [this](int source) -> std::string {
+    if (source >= 0)
+      return source_names_[static_cast<std::size_t>(source)];
+    return source == PriorSource::kConstantVelocity ? "constant_velocity" : "identity";
+  };
+  return prior.rotation == prior.translation ? name(prior.rotation)
+                                             : name(prior.rotation) + '+' + name(prior.translation);
+}
+
+void OdometryFiles::write(const OdometryEstimate& estimate) {
+  const std::int64_t ns = to_ns(estimate.stamp);
+  const Eigen::Vector3d& p = estimate.T_odom_base.translation;
+  const Eigen::Quaterniond& q = estimate.T_odom_base.rotation;
+  tum_.print("{}.{:09} {} {} {} {} {} {} {}\n", ns / 1'000'000'000, ns % 1'000'000'000, p.x(), p.y(), p.z(), q.x(),
+             q.y(), q.z(), q.w());
+  csv_.print("{},{},{},{},{}", ns, tools::name_of(estimate.state), name_of(estimate.prior),
+             estimate.scan_to_submap.iterations, estimate.scan_to_submap.inliers);
+  for (int row = 0; row < 6; ++row) {
+    for (int column = 0; column < 6; ++column)
+      csv_.print(",{}", estimate.pose_covariance(row, column));
+  }
+  csv_.print("\n");
+}
+
+void OdometryFiles::close() {
+  tum_.close();
+  csv_.close();
+}
+
+} // namespace locus::tools

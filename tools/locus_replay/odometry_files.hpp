@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/odometry_estimate.hpp"
+#include "core/options.hpp"
+#include "locus_replay/output_file.hpp"
+
+namespace locus::tools {
+
+/// Writes odometry.tum and odometry.csv, a row each for every estimate. Numbers have as many digits as it takes to give
+/// back the same bits. Throws Failure.
+class OdometryFiles {
+ public:
+  OdometryFiles(const std::filesystem::path& folder, const std::vector<MotionSourceOptions>& sources);
+
+  void write(const OdometryEstimate& estimate);
+  void close();
+
+ private:
+  [[nodiscard]] std::string name_of(const PriorSource& prior) const;
+
+  std::vector<std::string> source_names_;
+  OutputFile tum_;
+  OutputFile csv_;
+};
+
+} // namespace locus::tools

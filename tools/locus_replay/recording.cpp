@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_replay/recording.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/motion_sources.hpp"
+#include "drivers/velodyne_model.hpp"
+
+namespace locus::tools {
+
+using daemon::EndOfInput;
+using daemon::Input;
+using daemon::Silence;
+
+Recording::Recording(Capture capture, std::vector<MotionRecording> motion, const Config& config,
+                     const LidarRouter& lidars, const PlayOptions& options)
+    : capture_(std::move(capture)), lidars_(lidars), play_for_(options.duration), head_(capture_.next()) {
+  const Stamp capture_start = head_ != nullptr ? head_->receive_stamp : Stamp{};
+  begin_ = capture_start + options.start;
+  end_ = play_for_ ? begin_ + *play_for_ : Stamp::max();
+  if (!options.faults.empty())
+    faults_.emplace(options.faults, capture_start, options.seed);
+  for (MotionRecording& recording : motion) {
+    const std::string& name = config.odometry.motion_sources[recording.source].name;
+    std::visit([&](auto& samples) { inject_faults(options.faults, name, capture_start, options.seed, samples); },
+               recording.samples);
+    MotionCursor& cursor = motion_.emplace_back(MotionCursor{std::move(recording)});
+    while (cursor.arrival() < begin_ - MotionSources::kTimeout)
+      ++cursor.next;
+  }
+}
+
+Stamp Recording::MotionCursor::arrival() const {
+  return std::visit([&](const auto& samples) { return next < samples.size() ? samples[next].arrival : Stamp::max(); },
+                    recording.samples);
+}
+
+Input Recording::MotionCursor::take() {
+  const std::size_t index = next++;
+  if (const auto* imu = std::get_if<std::vector<ImuSample>>(&recording.samples))
+    return daemon::ImuInput{recording.source, (*imu)[index]};
+  return daemon::OdometryInput{recording.source, std::get<std::vector<OdometrySample>>(recording.samples)[index]};
+}
+
+Input Recording::next(Duration) {
+  if (!pending_)
+    pending_ = fetch();
+  const auto earliest = std::ranges::min_element(motion_, {}, &MotionCursor::arrival);
+  if (earliest != motion_.end() && earliest->arrival() <= pending_->arrival)
+    return earliest->take();
+  const Input input = pending_->input;
+  pending_.reset();
+  return input;
+}
+
+/// The next datagram of the part that is played, or nullptr for ever.
+const Datagram* Recording::read() {
+  while (!capture_is_over_) {
+    const Datagram* datagram = head_ != nullptr ? std::exchange(head_, nullptr) : capture_.next();
+    capture_is_over_ = datagram == nullptr || datagram->receive_stamp >= end_;
+    if (!capture_is_over_ && datagram->receive_stamp >= begin_)
+      return datagram;
+  }
+  return nullptr;
+}
+
+Recording::Pending Recording::fetch() {
+  const auto keep = [this](const Datagram& datagram) {
+    faulty_.push_back({datagram, {datagram.payload.begin(), datagram.payload.end()}});
+  };
+  if (faulty_.empty()) {
+    const Datagram* datagram = read();
+    if (datagram != nullptr) {
+      note(*datagram);
+      if (!faults_)
+        return {*datagram, datagram->receive_stamp};
+      faults_->pass(lidar_of(*datagram), *datagram, keep);
+      if (faulty_.empty())
+        return {Silence{datagram->receive_stamp}, datagram->receive_stamp};
+    } else if (faults_) {
+      faults_->finish(keep);
+    }
+  }
+  if (faulty_.empty())
+    return {EndOfInput{}, last_};
+  given_out_ = std::move(faulty_.front());
+  faulty_.pop_front();
+  given_out_.datagram.payload = given_out_.payload;
+  return {given_out_.datagram, given_out_.datagram.receive_stamp};
+}
+
+void Recording::note(const Datagram& datagram) {
+  const Stamp now = datagram.receive_stamp;
+  first_ = started_ ? std::min(first_, now) : now;
+  last_ = started_ ? std::max(last_, now) : now;
+  started_ = true;
+  PortTraffic& traffic = traffic_[datagram.destination_port];
+  ++traffic.datagrams;
+  traffic.data_packet_sized += datagram.payload.size() == velodyne::kDataPacketBytes ? 1U : 0U;
+  traffic.source_ip = datagram.source_ip;
+  if (play_for_)
+    progress_.store(to_seconds(now - begin_) / to_seconds(*play_for_), std::memory_order_relaxed);
+  else if (capture_.bytes_total() > 0)
+    progress_.store(static_cast<double>(capture_.bytes_read()) / static_cast<double>(capture_.bytes_total()),
+                    std::memory_order_relaxed);
+}
+
+/// By the configuration alone: a fault may strike before the lidar has made itself known.
+std::string_view Recording::lidar_of(const Datagram& datagram) const {
+  const auto found = std::ranges::find_if(lidars_.lidars(), [&](const LidarInput& lidar) {
+    return lidar.listens_to(datagram.destination_port) &&
+           lidar.options().source_ip.value_or(datagram.source_ip) == datagram.source_ip;
+  });
+  return found == lidars_.lidars().end() ? std::string_view{} : found->options().name;
+}
+
+} // namespace locus::tools

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "daemon/input.hpp"
+#include "drivers/capture.hpp"
+#include "drivers/fault_injection.hpp"
+#include "drivers/lidar_input.hpp"
+#include "locus_replay/motion_recordings.hpp"
+
+namespace locus::tools {
+
+/// Which part of a recording is played, and what is made to go wrong in it.
+struct PlayOptions {
+  Duration start{};                 ///< after the first datagram of the capture
+  std::optional<Duration> duration; ///< nothing: to the last datagram
+  std::vector<Fault> faults;        ///< fault_problem() finds nothing
+  std::uint64_t seed = 1;           ///< of the faults
+};
+
+/// The datagrams that went to one UDP port.
+struct PortTraffic {
+  std::uint64_t datagrams = 0;
+  std::uint64_t data_packet_sized = 0;
+  std::uint32_t source_ip = 0; ///< of the latest
+};
+
+/// A recording as it once came in: datagrams and motion samples in the order of their arrival, faults injected.
+///
+/// The capture is streamed and the motion samples are held. Motion is played from one second ahead of the first
+/// datagram, so that the sources are known by then, and to the last one. A datagram that a fault swallows leaves
+/// Silence behind. One owner.
+class Recording : public daemon::InputSource {
+ public:
+  /// `lidars`: to tell by port and address whose datagram a fault strikes.
+  Recording(Capture capture, std::vector<MotionRecording> motion, const Config& config, const LidarRouter& lidars,
+            const PlayOptions& options);
+
+  daemon::Input next(Duration timeout) override;
+
+  /// Share of the recording that is over, 0..1. Any thread.
+  [[nodiscard]] double progress() const { return progress_.load(std::memory_order_relaxed); }
+
+  [[nodiscard]] const Capture& capture() const { return capture_; }
+  /// From the first to the last datagram played.
+  [[nodiscard]] Duration duration() const { return last_ - first_; }
+  [[nodiscard]] const std::map<std::uint16_t, PortTraffic>& traffic() const { return traffic_; }
+
+ private:
+  struct Pending { ///< the next input that is no motion sample
+    daemon::Input input;
+    Stamp arrival;
+  };
+  struct OwnedDatagram {
+    Datagram datagram; ///< without payload
+    std::vector<std::byte> payload;
+  };
+  struct MotionCursor {
+    MotionRecording recording;
+    std::size_t next = 0;
+
+    [[nodiscard]] Stamp arrival() const; ///< of the next sample; Stamp::max() after the last
+    daemon::Input take();
+  };
+
+  const Datagram* read();
+  void note(const Datagram& datagram);
+  void inject_faults_into(const Datagram& datagram);
+  [[nodiscard]] std::string_view lidar_of(const Datagram& datagram) const;
+  Pending fetch();
+
+  Capture capture_;
+  std::vector<MotionCursor> motion_;
+  LidarRouter lidars_; ///< never receives anything
+  std::optional<Duration> play_for_;
+  const Datagram* head_; ///< read ahead to learn when the capture begins
+  Stamp begin_, end_;
+  bool capture_is_over_ = false;
+  std::optional<DatagramFaults> faults_;
+  std::deque<OwnedDatagram> faulty_; ///< came out of the faults, not given out yet
+  OwnedDatagram given_out_;
+  std::optional<Pending> pending_;
+
+  bool started_ = false;
+  Stamp first_, last_;
+  std::map<std::uint16_t, PortTraffic> traffic_; ///< by destination port
+  std::atomic<double> progress_{0.0};
+};
+
+} // namespace locus::tools

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_replay/results.hpp"
+
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "locus_replay/failure.hpp"
+#include "locus_replay/map_file.hpp"
+#include "locus_replay/no_data.hpp"
+#include "locus_replay/output_file.hpp"
+
+namespace locus::tools {
+namespace {
+
+const std::filesystem::path& made(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error)
+    throw Failure(ExitStatus::failed, fmt::format("{}: the folder cannot be made ({}); choose another with -o",
+                                                  folder.string(), error.message()));
+  return folder;
+}
+
+} // namespace
+
+Results::Results(const Arguments& arguments, const Config& config, const Recording& recording,
+                 const daemon::MachineTime& begin)
+    : arguments_(arguments), config_(config), recording_(recording), begin_(begin),
+      odometry_(made(arguments.output), config.odometry.motion_sources),
+      figures_(config.odometry.motion_sources.size()), progress_(!arguments.quiet) {}
+
+void Results::take(const daemon::ProcessedSweep& sweep) {
+  odometry_.write(sweep.estimate);
+  figures_.take(sweep);
+  progress_.show(recording_.progress());
+}
+
+void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor& processor,
+                     const daemon::SweepCounters& sweeps) {
+  progress_.wipe();
+  odometry_.close();
+  write_map(arguments_.output / "map.pcd", processor.odometry().map());
+  const FinishedRun run{
+      arguments_.capture.string(),        config_, ingest, processor, sweeps, figures_, recording_.duration(),
+      daemon::MachineTime::now() - begin_};
+  OutputFile file(arguments_.output / "summary.json");
+  file.print("{}\n", summary(run).dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  file.close();
+  if (ingest.lidars().total().data == 0)
+    throw Failure(ExitStatus::failed, fmt::format("{}: no valid data packet: {}", arguments_.capture.string(),
+                                                  why_no_data(recording_, ingest.lidars())));
+  if (!arguments_.quiet)
+    fmt::print("{}results    {}\n", readable(run), arguments_.output.string());
+}
+
+} // namespace locus::tools

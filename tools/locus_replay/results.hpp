@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "daemon/ingest.hpp"
+#include "daemon/sweep_processor.hpp"
+#include "locus_replay/arguments.hpp"
+#include "locus_replay/odometry_files.hpp"
+#include "locus_replay/progress_bar.hpp"
+#include "locus_replay/recording.hpp"
+#include "locus_replay/run_figures.hpp"
+
+namespace locus::tools {
+
+/// All that comes out of a run: the files in the output folder and the figures on the terminal. One owner.
+class Results {
+ public:
+  /// Makes the folder. The arguments must outlive this. Throws Failure, as do the others.
+  Results(const Arguments& arguments, const Config& config, const Recording& recording,
+          const daemon::MachineTime& begin);
+
+  void take(const daemon::ProcessedSweep& sweep);
+
+  /// After the last sweep. Fails for a recording without a valid data packet, once the counters that tell why are
+  /// written.
+  void finish(const daemon::Ingest& ingest, const daemon::SweepProcessor& processor,
+              const daemon::SweepCounters& sweeps);
+
+ private:
+  const Arguments& arguments_;
+  const Config& config_;
+  const Recording& recording_;
+  daemon::MachineTime begin_;
+  OdometryFiles odometry_;
+  RunFigures figures_;
+  ProgressBar progress_;
+};
+
+} // namespace locus::tools

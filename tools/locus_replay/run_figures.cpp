@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_replay/run_figures.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <numeric>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "config/config_yaml.hpp"
+
+namespace locus::tools {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr std::array<std::string_view, kStages> kStageNames{"decode",       "correct",        "filter", "covariance",
+                                                            "scan_to_scan", "scan_to_submap", "map"};
+
+/// Three digits behind the point: no figure here is known better.
+double rounded(double value) { return std::round(value * 1e3) / 1e3; }
+
+ordered_json to_json(const PacketCounters& counters) {
+  ordered_json rejected;
+  for (std::size_t i = 0; i < kPacketErrorCount; ++i)
+    rejected[std::string{kPacketErrorNames[i]}] = counters.rejected[i];
+  return {{"received", counters.received}, {"data", counters.data},           {"position", counters.position},
+          {"lost", counters.lost},         {"reordered", counters.reordered}, {"clock_steps", counters.clock_steps},
+          {"rejected", rejected}};
+}
+
+ordered_json to_json(const RunFigures::Percentiles& p) {
+  return {{"p50", rounded(p.p50)}, {"p90", rounded(p.p90)}, {"p99", rounded(p.p99)}, {"max", rounded(p.max)}};
+}
+
+ordered_json packets(const LidarRouter& lidars) {
+  ordered_json packets{{"total", to_json(lidars.total())}};
+  for (const LidarInput& lidar : lidars.lidars())
+    packets[lidar.options().name] = to_json(lidar.counters());
+  return packets;
+}
+
+ordered_json stages(const FinishedRun& run) {
+  const double sweeps = std::max<double>(1.0, static_cast<double>(run.figures.sweeps()));
+  ordered_json stages;
+  for (std::size_t i = 0; i < kStages; ++i) {
+    const auto stage = static_cast<Stage>(i);
+    const Duration total = run.ingest.stages().total(stage) + run.processor.stages().total(stage);
+    stages[std::string{kStageNames[i]}] = rounded(1e3 * to_seconds(total) / sweeps);
+  }
+  return stages;
+}
+
+ordered_json sources(const FinishedRun& run) {
+  ordered_json sources = ordered_json::object();
+  for (std::size_t i = 0; i < run.config.odometry.motion_sources.size(); ++i) {
+    const SourceCounters& counters = run.ingest.sources().track(i).counters();
+    const SourceCounters::Rejected& rejected = counters.rejected;
+    sources[run.config.odometry.motion_sources[i].name] = {{"received", counters.received},
+                                                           {"used_sweeps", run.figures.used_sweeps(i)},
+                                                           {"rejected",
+                                                            {{"stale", rejected.stale},
+                                                             {"jump", rejected.jump},
+                                                             {"nan", rejected.nan},
+                                                             {"frozen", rejected.frozen},
+                                                             {"out_of_order", rejected.out_of_order},
+                                                             {"covariance", rejected.covariance},
+                                                             {"disagreement", rejected.disagreement}}},
+                                                           {"health_changes", 0}};
+  }
+  return sources;
+}
+
+/// Not from getrusage(): its figure survives exec, so it may be that of the program that started this one.
+double peak_rss_mb() {
+  std::ifstream status{"/proc/self/status"};
+  for (std::string word; status >> word;) {
+    if (double kib = 0; word == "VmHWM:" && status >> kib)
+      return kib * 1024.0 / 1e6;
+  }
+  return 0.0;
+}
+
+} // namespace
+
+void RunFigures::take(const daemon::ProcessedSweep& sweep) {
+  const OdometryEstimate& estimate = sweep.estimate;
+  if (sweeps() > 0)
+    path_m_ += (estimate.T_odom_base.translation - last_T_odom_base_.translation).norm();
+  last_T_odom_base_ = estimate.T_odom_base;
+  wall_ms_.push_back(static_cast<float>(1e3 * to_seconds(sweep.took.wall)));
+  cpu_ms_.push_back(static_cast<float>(1e3 * to_seconds(sweep.took.cpu)));
+  sums_.raw_points += static_cast<double>(sweep.raw_returns);
+  sums_.filtered_points += static_cast<double>(estimate.points);
+  sums_.scan_to_scan_iterations += estimate.scan_to_scan.iterations;
+  sums_.scan_to_submap_iterations += estimate.scan_to_submap.iterations;
+  const PriorSource& prior = estimate.prior;
+  if (prior.rotation >= 0)
+    ++used_sweeps_[static_cast<std::size_t>(prior.rotation)];
+  if (prior.translation >= 0 && prior.translation != prior.rotation)
+    ++used_sweeps_[static_cast<std::size_t>(prior.translation)];
+}
+
+RunFigures::Means RunFigures::means() const {
+  const double count = std::max<double>(1.0, static_cast<double>(sweeps()));
+  return {sums_.raw_points / count, sums_.filtered_points / count, sums_.scan_to_scan_iterations / count,
+          sums_.scan_to_submap_iterations / count};
+}
+
+/// By the nearest rank.
+RunFigures::Percentiles RunFigures::percentiles(std::vector<float> values) {
+  if (values.empty())
+    return {};
+  std::ranges::sort(values);
+  const auto at = [&](double share) {
+    const double rank = std::ceil(share * static_cast<double>(values.size()));
+    return static_cast<double>(values[static_cast<std::size_t>(std::max(1.0, rank)) - 1]);
+  };
+  return {at(0.5), at(0.9), at(0.99), at(1.0)};
+}
+
+ordered_json summary(const FinishedRun& run) {
+  const RunFigures::Means means = run.figures.means();
+  return {{"version", LOCUS_VERSION},
+          {"capture", run.capture},
+          {"config_sha256", config_sha256(run.config)},
+          {"threads", run.config.odometry.threads},
+          {"isa", "baseline"},
+          {"duration_s", rounded(to_seconds(run.duration))},
+          {"wall_s", rounded(to_seconds(run.spent.wall))},
+          {"cpu_s", rounded(to_seconds(run.spent.cpu))},
+          {"peak_rss_mb", rounded(peak_rss_mb())},
+          {"packets", packets(run.ingest.lidars())},
+          {"sweeps",
+           {{"seen", run.sweeps.seen},
+            {"processed", run.sweeps.processed},
+            {"dropped", run.sweeps.dropped},
+            {"failed", run.sweeps.failed}}},
+          {"process_ms", to_json(run.figures.process_ms())},
+          {"process_cpu_ms", to_json(run.figures.process_cpu_ms())},
+          {"stage_ms", stages(run)},
+          {"points", {{"raw_mean", rounded(means.raw_points)}, {"filtered_mean", rounded(means.filtered_points)}}},
+          {"iterations_mean",
+           {{"scan_to_scan", rounded(means.scan_to_scan_iterations)},
+            {"scan_to_submap", rounded(means.scan_to_submap_iterations)}}},
+          {"sources", sources(run)}};
+}
+
+std::string readable(const FinishedRun& run) {
+  const PacketCounters packets = run.ingest.lidars().total();
+  const auto rejected = std::accumulate(packets.rejected.begin(), packets.rejected.end(), std::uint64_t{0});
+  const RunFigures::Percentiles wall_ms = run.figures.process_ms();
+  const Eigen::Vector3d& end_m = run.figures.last_T_odom_base().translation;
+  std::string text = fmt::format("recording  {:.1f} s; packets: {} data, {} position, {} lost, {} rejected\n",
+                                 to_seconds(run.duration), packets.data, packets.position, packets.lost, rejected);
+  text += fmt::format("sweeps     {} seen: {} processed, {} dropped, {} failed\n", run.sweeps.seen,
+                      run.sweeps.processed, run.sweeps.dropped, run.sweeps.failed);
+  for (std::size_t i = 0; i < run.config.odometry.motion_sources.size(); ++i) {
+    text += fmt::format("{:10} {} samples, used for {} sweeps\n", run.config.odometry.motion_sources[i].name,
+                        run.ingest.sources().track(i).counters().received, run.figures.used_sweeps(i));
+  }
+  text += fmt::format("path       {:.2f} m, ends at {:.3f} {:.3f} {:.3f} m\n", run.figures.path_m(), end_m.x(),
+                      end_m.y(), end_m.z());
+  text += fmt::format("time       {:.2f} ms a sweep from its cut, 99 % within {:.2f} ms; {:.1f} s in all, {:.0f} MB\n",
+                      wall_ms.p50, wall_ms.p99, to_seconds(run.spent.wall), peak_rss_mb());
+  return text;
+}
+
+} // namespace locus::tools

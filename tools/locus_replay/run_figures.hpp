@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "config/config.hpp"
+#include "daemon/ingest.hpp"
+#include "daemon/sweep_processor.hpp"
+
+namespace locus::tools {
+
+/// Gathers what is told of every sweep of a run: a few bytes for each.
+class RunFigures {
+ public:
+  struct Means {
+    double raw_points = 0, filtered_points = 0, scan_to_scan_iterations = 0, scan_to_submap_iterations = 0;
+  };
+  struct Percentiles {
+    double p50 = 0, p90 = 0, p99 = 0, max = 0;
+  };
+
+  explicit RunFigures(std::size_t sources) : used_sweeps_(sources) {}
+
+  void take(const daemon::ProcessedSweep& sweep);
+
+  [[nodiscard]] std::size_t sweeps() const { return wall_ms_.size(); }
+  [[nodiscard]] Percentiles process_ms() const { return percentiles(wall_ms_); }
+  [[nodiscard]] Percentiles process_cpu_ms() const { return percentiles(cpu_ms_); }
+  [[nodiscard]] Means means() const;
+  /// Sweeps whose prior came from this source, all of it or in part.
+  [[nodiscard]] std::uint64_t used_sweeps(std::size_t source) const { return used_sweeps_[source]; }
+  [[nodiscard]] double path_m() const { return path_m_; }
+  [[nodiscard]] const Pose& last_T_odom_base() const { return last_T_odom_base_; }
+
+ private:
+  static Percentiles percentiles(std::vector<float> values);
+
+  std::vector<float> wall_ms_, cpu_ms_;
+  std::vector<std::uint64_t> used_sweeps_;
+  Means sums_;
+  double path_m_ = 0;
+  Pose last_T_odom_base_;
+};
+
+/// All that a finished run is described by.
+struct FinishedRun {
+  std::string capture; ///< as the user named it
+  const Config& config;
+  const daemon::Ingest& ingest;
+  const daemon::SweepProcessor& processor;
+  daemon::SweepCounters sweeps;
+  const RunFigures& figures;
+  Duration duration; ///< of the recording
+  daemon::MachineTime spent;
+};
+
+/// The contents of summary.json.
+nlohmann::ordered_json summary(const FinishedRun& run);
+
+/// The same for human eyes, in a few lines.
+std::string readable(const FinishedRun& run);
+
+} // namespace locus::tools
