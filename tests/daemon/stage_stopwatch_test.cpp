@@ -21,8 +21,10 @@ void work_for(Duration cpu) {
   }
 }
 
+/// A virtual machine is charged for time that its host took away: more may be measured than was used, but not less.
 void expect_about(Duration measured, Duration expected) {
-  EXPECT_NEAR(to_seconds(measured), to_seconds(expected), 0.1 * to_seconds(expected));
+  EXPECT_GT(to_seconds(measured), 0.95 * to_seconds(expected));
+  EXPECT_LT(to_seconds(measured), 1.5 * to_seconds(expected));
 }
 
 TEST(StageStopwatch, InnerStageIsNotChargedToTheOuter) {
@@ -58,17 +60,17 @@ TEST(StageStopwatch, VisitsThatAreNotTimedCountLikeThoseThatAre) {
   for (int packet = 0; packet < 200; ++packet) {
     {
       const StageScope decode(&stopwatch, Stage::decode);
-      work_for(microseconds{100});
+      work_for(microseconds{400});
     }
     const StageScope correct(&stopwatch, Stage::correct);
-    work_for(microseconds{200});
+    work_for(microseconds{800});
     if (packet % 50 == 0) {
       const StageScope filter(&stopwatch, Stage::filter);
       work_for(milliseconds{5});
     }
   }
-  expect_about(stopwatch.total(Stage::decode), milliseconds{20});
-  expect_about(stopwatch.total(Stage::correct), milliseconds{40});
+  expect_about(stopwatch.total(Stage::decode), milliseconds{80});
+  expect_about(stopwatch.total(Stage::correct), milliseconds{160});
   expect_about(stopwatch.total(Stage::filter), milliseconds{20});
 }
 
