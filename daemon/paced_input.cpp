@@ -18,6 +18,8 @@ Stamp arrival_of(const Input& input, Stamp otherwise) {
     return imu->sample.arrival;
   if (const auto* odometry = std::get_if<OdometryInput>(&input))
     return odometry->sample.arrival;
+  if (const auto* silence = std::get_if<Silence>(&input))
+    return silence->now;
   return otherwise;
 }
 

@@ -13,7 +13,7 @@ class PacedInput : public InputSource {
   /// A step in the stamps of arrival that is longer than this is no pause but another clock, and is not waited for.
   static constexpr Duration kMaxPause = std::chrono::seconds{10};
 
-  /// `recording` must outlive this, and never be silent. Precondition: speed > 0.
+  /// `recording` must outlive this; where it is silent, that is for a time it knows. Precondition: speed > 0.
   PacedInput(InputSource& recording, double speed) : recording_(recording), speed_(speed) {}
 
   Input next(Duration timeout) override;

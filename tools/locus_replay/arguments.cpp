@@ -49,13 +49,11 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
       ->type_name("FILE");
   app.add_option("--set", arguments.overrides, "Overrides one key of it, e.g. lidars.0.port=2369; may be repeated")
       ->type_name("KEY=VALUE")
-      ->expected(1)
-      ->take_all();
+      ->allow_extra_args(false);
   app.add_option("--imu", arguments.imu, "Samples of the motion source of kind imu, CSV as EuRoC's")->type_name("FILE");
   app.add_option("--odometry", odometry, "Poses of the motion source NAME, as TUM; may be repeated")
       ->type_name("NAME=FILE")
-      ->expected(1)
-      ->take_all();
+      ->allow_extra_args(false);
   app.add_option("--start", start_s, "Leaves out what arrived earlier, seconds from the start of the capture")
       ->type_name("S")
       ->check(number_between(0, kLongest_s));
@@ -70,8 +68,7 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
                  "lidar, a motion source or all-lidars. KIND: lost, frozen, jump, nan, late, covariance, clock-step, "
                  "packet-loss, reorder, duplicate. T: seconds from the start of the capture")
       ->type_name("SPEC")
-      ->expected(1)
-      ->take_all();
+      ->allow_extra_args(false);
   auto* realtime = app.add_flag("--realtime{1}", speed,
                                 "At the pace of the recording, or SPEED times it (--realtime=SPEED), through the "
                                 "threads of the service: sweeps that come too fast are dropped")

@@ -158,8 +158,9 @@ std::string readable(const FinishedRun& run) {
   text += fmt::format("sweeps     {} seen: {} processed, {} dropped, {} failed\n", run.sweeps.seen,
                       run.sweeps.processed, run.sweeps.dropped, run.sweeps.failed);
   for (std::size_t i = 0; i < run.config.odometry.motion_sources.size(); ++i) {
-    text += fmt::format("{:10} {} samples, used for {} sweeps\n", run.config.odometry.motion_sources[i].name,
-                        run.ingest.sources().track(i).counters().received, run.figures.used_sweeps(i));
+    if (const auto received = run.ingest.sources().track(i).counters().received; received > 0)
+      text += fmt::format("{:10} {} samples, used for {} sweeps\n", run.config.odometry.motion_sources[i].name,
+                          received, run.figures.used_sweeps(i));
   }
   text += fmt::format("path       {:.2f} m, ends at {:.3f} {:.3f} {:.3f} m\n", run.figures.path_m(), end_m.x(),
                       end_m.y(), end_m.z());

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fstream>
+#include <random>
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "support/pcap_writer.hpp"
+#include "synthetic_robot.hpp"
+
+namespace locus::test {
+namespace {
+
+/// One line on stderr that says so, and the exit status.
+void expect_error(const ProgramRun& run, int status, const std::vector<std::string>& said) {
+  EXPECT_EQ(run.status, status) << run.err;
+  const std::vector<std::string> lines = lines_of(run.err);
+  ASSERT_EQ(lines.size(), 1U) << run.err;
+  for (const std::string& part : said)
+    EXPECT_NE(lines[0].find(part), std::string::npos) << "no '" << part << "' in: " << lines[0];
+}
+
+/// A folder with one file of these bytes, and a run on it.
+class BadCapture : public testing::Test {
+ protected:
+  ProgramRun replay(const std::string& content) {
+    std::ofstream{folder_ / "bad.pcap", std::ios::binary} << content;
+    return replay();
+  }
+  ProgramRun replay() { return run_program(LOCUS_REPLAY, {"-o", folder_ / "out", folder_ / "bad.pcap"}); }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(BadCapture, ZeroBytes) { expect_error(replay(""), 1, {"bad.pcap", "empty"}); }
+
+TEST_F(BadCapture, PngNamedPcap) { expect_error(replay("\x89PNG\r\n\x1a\n rest of it"), 1, {"bad.pcap", "PNG"}); }
+
+TEST_F(BadCapture, RandomBytes) {
+  std::mt19937 random{7};
+  std::string bytes(100'000, '\0');
+  for (char& byte : bytes)
+    byte = static_cast<char>(random());
+  expect_error(replay(bytes), 1, {"bad.pcap", "not a pcap"});
+}
+
+TEST_F(BadCapture, ForeignLinkType) {
+  { const PcapWriter pcap(folder_ / "bad.pcap", DLT_USB_LINUX); }
+  expect_error(replay(), 1, {"bad.pcap", "link type"});
+}
+
+TEST_F(BadCapture, MissingFile) { expect_error(replay(), 1, {"bad.pcap", "no such file"}); }
+
+TEST_F(BadCapture, NoDatagramsAtAll) {
+  { PcapWriter(folder_ / "bad.pcap").write_frame(stamp_from_ns(1), Bytes(60)); }
+  expect_error(replay(), 1, {"bad.pcap", "no valid data packet", "no UDP datagram"});
+}
+
+TEST_F(BadCapture, DatagramsOfAllLengthsAreCountedAndNoneIsData) {
+  {
+    PcapWriter pcap(folder_ / "bad.pcap");
+    for (std::size_t length = 0; length < 1500; ++length)
+      pcap.write(stamp_from_ns(static_cast<std::int64_t>(1'700'000'000'000'000'000 + 1'000'000 * length)), 0xC0A801C9,
+                 2368, 0xFFFFFFFF, 2368, Bytes(length));
+  }
+  expect_error(replay(), 1, {"bad.pcap", "no valid data packet", "model 1"});
+  const auto summary = nlohmann::json::parse(read_text(folder_ / "out/summary.json"));
+  EXPECT_EQ(summary["packets"]["total"]["received"], 1500);
+  EXPECT_EQ(summary["packets"]["total"]["rejected"]["length"], 1498);
+  EXPECT_EQ(summary["packets"]["total"]["rejected"]["model"], 1);
+  EXPECT_EQ(summary["packets"]["total"]["position"], 1);
+}
+
+TEST_F(BadCapture, TruncatedInMidPacketIsAWarningAndNoFailure) {
+  std::string bytes = read_text(room_drive() / "lidar.pcap");
+  bytes.resize(bytes.size() / 2 + 17);
+  const ProgramRun run = replay(bytes);
+  EXPECT_EQ(run.status, 0);
+  ASSERT_EQ(lines_of(run.err).size(), 1U) << run.err;
+  EXPECT_NE(run.err.find("ends in mid-packet"), std::string::npos) << run.err;
+  EXPECT_NEAR(static_cast<double>(read_tum(folder_ / "out/odometry.tum").size()), 40, 2);
+}
+
+TEST(WrongUsage, OtherPortIsNamedWithTheOverrideThatHelps) {
+  const Replay replay({"--set", "lidars.front.port=3000", room_drive().string()});
+  expect_error(replay.run(), 1, {"packets to port 2368, configured 3000", "--set lidars.0.port=2368"});
+}
+
+TEST(WrongUsage, OtherAddressIsNamedWithTheOverrideThatHelps) {
+  const Replay replay({"--set", "lidars.front.source_ip=10.0.0.1", room_drive().string()});
+  expect_error(replay.run(), 1, {"come from 192.168.1.201", "--set lidars.0.source_ip=192.168.1.201"});
+}
+
+TEST(WrongUsage, PartBeyondTheCapture) {
+  expect_error(Replay({"--start", "100", room_drive().string()}).run(), 1, {"--start"});
+}
+
+TEST(WrongUsage, UnknownOption) { expect_error(Replay({"--frobnicate", "x.pcap"}).run(), 2, {"--frobnicate"}); }
+
+TEST(WrongUsage, NoCapture) { expect_error(Replay(std::vector<std::string>{}).run(), 2, {"CAPTURE"}); }
+
+TEST(WrongUsage, NoOutput) { expect_error(run_program(LOCUS_REPLAY, {"x.pcap"}), 2, {"--output"}); }
+
+TEST(WrongUsage, UnknownKeyIsNamedWithFileAndLine) {
+  const TemporaryFolder folder;
+  std::ofstream{folder / "robot.yaml"} << "# mine\nvoxel_filtre: {enabled: true}\n";
+  expect_error(Replay({"-c", folder / "robot.yaml", room_drive().string()}).run(), 2,
+               {"robot.yaml:2", "voxel_filtre", "voxel_filter"});
+}
+
+TEST(WrongUsage, MissingConfiguration) {
+  expect_error(Replay({"-c", "/nowhere.yaml", room_drive().string()}).run(), 2, {"/nowhere.yaml"});
+}
+
+TEST(WrongUsage, BadOverrides) {
+  const std::string capture = room_drive().string();
+  expect_error(Replay({"--set", "voxel_filter.leaf=1", capture}).run(), 2, {"--set voxel_filter.leaf=1", "leaf_m"});
+  expect_error(Replay({"--set", "voxel_filter.leaf_m=-1", capture}).run(), 2, {"voxel_filter.leaf_m"});
+  expect_error(Replay({"--set", "nonsense", capture}).run(), 2, {"--set nonsense"});
+  expect_error(Replay({"--threads", "0", capture}).run(), 2, {"--threads"});
+  expect_error(Replay({"--start", "nan", capture}).run(), 2, {"--start"});
+  expect_error(Replay({"--realtime=0", capture}).run(), 2, {"--realtime"});
+}
+
+TEST(WrongUsage, BadFaults) {
+  const std::string capture = room_drive().string();
+  expect_error(Replay({"--fail", "front", capture}).run(), 2, {"fault", "front:lost@10-20"});
+  expect_error(Replay({"--fail", "front:melted@1", capture}).run(), 2, {"melted", "packet-loss"});
+  expect_error(Replay({"--fail", "rear:lost@1", capture}).run(), 2, {"rear", "front"});
+  expect_error(Replay({"--fail", "front:covariance@1", capture}).run(), 2, {"covariance"});
+}
+
+TEST(WrongUsage, OdometryFilesMustBeNamedAsASource) {
+  const std::string capture = room_drive().string();
+  expect_error(Replay({"--odometry", "wheels.tum", capture}).run(), 2, {"NAME=FILE"});
+  expect_error(Replay({"--odometry", "legs=wheels.tum", capture}).run(), 2, {"legs", "motion_sources"});
+  expect_error(Replay({"--odometry", "wio=/nowhere.tum", capture}).run(), 1, {"/nowhere.tum"});
+}
+
+TEST(WrongUsage, FilesAndSourcesWithoutEachOtherAreWarnedAbout) {
+  const TemporaryFolder folder;
+  std::filesystem::copy(room_drive(), folder.path());
+  std::filesystem::rename(folder / "wio.tum", folder / "legs.tum");
+  const Replay replay({folder.path().string()});
+  EXPECT_EQ(replay.run().status, 0);
+  const std::vector<std::string> lines = lines_of(replay.run().err);
+  ASSERT_EQ(lines.size(), 2U) << replay.run().err;
+  EXPECT_NE(lines[0].find("{name: legs, kind: odometry}"), std::string::npos) << lines[0];
+  EXPECT_NE(lines[1].find("--odometry wio=FILE"), std::string::npos) << lines[1];
+}
+
+TEST(WrongUsage, OutputThatCannotBeWritten) {
+  const TemporaryFolder folder;
+  std::ofstream{folder / "file"} << "not a folder";
+  const std::string capture = room_drive().string();
+  expect_error(run_program(LOCUS_REPLAY, {"-o", folder / "file", capture}), 1, {folder / "file"});
+  expect_error(run_program(LOCUS_REPLAY, {"-o", (folder / "file/below").string(), capture}), 1, {"file/below"});
+}
+
+TEST(WrongUsage, FullDiskIsToldAndNotIgnored) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(::symlink("/dev/full", (folder / "odometry.csv").c_str()), 0);
+  expect_error(run_program(LOCUS_REPLAY, {"-o", folder.path().string(), room_drive().string()}), 1,
+               {"odometry.csv", "space"});
+}
+
+} // namespace
+} // namespace locus::test

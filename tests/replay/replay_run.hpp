@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "core/pose.hpp"
+#include "core/stamp.hpp"
+
+namespace locus::test {
+
+/// A folder that is gone after the test.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+std::string read_text(const std::filesystem::path& file);
+std::vector<std::string> lines_of(const std::string& text);
+
+struct StampedPose {
+  Stamp stamp;
+  Pose pose;
+};
+std::vector<StampedPose> read_tum(const std::filesystem::path& file);
+
+/// What a run of a program left on its terminal.
+struct ProgramRun {
+  int status = -1; ///< of exit; -1: it crashed or never ran
+  std::string out, err;
+};
+ProgramRun run_program(const std::string& program, const std::vector<std::string>& arguments);
+
+/// One run of the real locus-replay, with an output folder of its own.
+class Replay {
+ public:
+  /// Everything but -o DIR.
+  explicit Replay(std::vector<std::string> arguments);
+
+  [[nodiscard]] const ProgramRun& run() const { return run_; }
+  [[nodiscard]] std::filesystem::path file(const std::string& name) const { return folder_ / name; }
+  [[nodiscard]] std::vector<StampedPose> trajectory() const { return read_tum(file("odometry.tum")); }
+  [[nodiscard]] std::vector<std::vector<std::string>> table() const; ///< odometry.csv by row and column
+  [[nodiscard]] nlohmann::json summary() const { return nlohmann::json::parse(read_text(file("summary.json"))); }
+
+ private:
+  TemporaryFolder folder_;
+  ProgramRun run_;
+};
+
+/// RMS and largest distance between a trajectory and the truth, interpolated at its stamps, after the best rigid
+/// alignment.
+struct TrajectoryError {
+  double rmse_m, max_m;
+};
+TrajectoryError trajectory_error(const std::vector<StampedPose>& trajectory, const std::vector<StampedPose>& truth);
+
+} // namespace locus::test
