@@ -35,6 +35,8 @@ constexpr double kObservableAbove = 0.04;
 constexpr double kGravity_mps2 = 9.80665;
 constexpr double kGravityTolerance_mps2 = 0.5;
 
+constexpr int kStartRounds = 3; ///< until motion and correction of the first two sweeps agree
+
 constexpr std::size_t kLastScanBytes = 8'000'000;
 
 Vector6 sigma(double translation_m, double rotation_deg) {
@@ -98,17 +100,17 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
   correct_motion(sweep, T_last_now);
 
   OdometryEstimate estimate;
-  estimate.scan_to_scan = match_scan(sweep, prior, stop);
+  estimate.scan_to_scan = match_scan(prior, T_last_now, prior.blind, stop);
   if (trusts(estimate.scan_to_scan, estimate.scan_to_scan.T_target_source, prior)) {
+    if (prior.blind)
+      begin_again(sweep, prior, estimate.scan_to_scan, stop);
     T_last_now = estimate.scan_to_scan.T_target_source;
-    if (prior.from_start_of_motion)
-      restart_from(sweep, T_last_now);
     correct_motion(sweep, T_last_now);
   }
   estimate.scan_to_submap = match_submap(prior, T_last_now, stop);
-  estimate.failed =
-      !trusts(estimate.scan_to_submap, T_odom_last_.inverse() * estimate.scan_to_submap.T_target_source, prior);
-  estimate.T_odom_base = estimate.failed ? T_odom_last_ * T_last_now : estimate.scan_to_submap.T_target_source;
+  const Pose T_last_submap = T_odom_last_.inverse() * estimate.scan_to_submap.T_target_source;
+  estimate.failed = !trusts(estimate.scan_to_submap, T_last_submap, prior);
+  estimate.T_odom_base = T_odom_last_ * (estimate.failed ? T_last_now : T_last_submap);
   finish(sweep, prior, estimate);
   return estimate;
 }
@@ -119,10 +121,8 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
   if (force && std::abs(force->norm() - kGravity_mps2) < kGravityTolerance_mps2)
     T_odom_last_.rotation = level(*force);
   correct_all(sweep.points, Vector6::Zero(), scan_);
-  if (sweep.uncorrected != Uncorrected::nothing) {
+  if (sweep.uncorrected != Uncorrected::nothing)
     first_points_ = sweep.points;
-    first_duration_ = sweep.end - sweep.start;
-  }
   OdometryEstimate estimate;
   estimate.T_odom_base = T_odom_last_;
   estimate.failed = scan_.size() < kMinPoints;
@@ -141,9 +141,8 @@ Odometry::Prior Odometry::integrate_sensors(const Sweep& sweep) const {
     prior.T_last_now = se3_exp(elapsed_s * twist_base_);
   prior.source.rotation = prior.source.translation =
       keeps_velocity ? PriorSource::kConstantVelocity : PriorSource::kIdentity;
-  prior.from_start_of_motion = processed_ == 1;
-  prior.variance =
-      prior.from_start_of_motion ? kUnknownMotion.cwiseAbs2().eval() : constant_velocity_statistics_.variance(periods);
+  prior.blind = processed_ == 1;
+  prior.variance = prior.blind ? kUnknownMotion.cwiseAbs2().eval() : constant_velocity_statistics_.variance(periods);
 
   const auto kind_of = [this](std::size_t i) { return options_.motion_sources[i].kind; };
   const auto usable = [&](std::size_t i) { return sweep.sources[i].usable && last_sources_[i].usable; };
@@ -160,47 +159,55 @@ Odometry::Prior Odometry::integrate_sensors(const Sweep& sweep) const {
     prior.T_last_now.translation = step(*choice.translation).translation;
     prior.variance.head<3>() = statistics_[*choice.translation].variance(periods).head<3>();
     prior.source.translation = static_cast<int>(*choice.translation);
-    prior.from_start_of_motion = false;
+    prior.blind = false;
   }
   return prior;
 }
 
 /// Takes out of the points what no motion source could, with the twist that T_last_now means.
 void Odometry::correct_motion(const Sweep& sweep, const Pose& T_last_now) {
-  Vector6 twist = Vector6::Zero();
-  const double elapsed_s = to_seconds(sweep.end - last_stamp_);
-  if (sweep.uncorrected != Uncorrected::nothing && elapsed_s > 0.0) {
-    twist = se3_log(T_last_now) / elapsed_s;
-    if (sweep.uncorrected == Uncorrected::translation)
-      twist.tail<3>().setZero();
-  }
-  correct_all(sweep.points, twist, scan_);
+  correct_all(sweep.points, uncorrected_twist(sweep, T_last_now), scan_);
 }
 
-Registration Odometry::match_scan(const Sweep& sweep, const Prior& prior, const Gicp::StopRequested& stop) {
+/// The part of the motion that is still in the points of the sweep.
+Vector6 Odometry::uncorrected_twist(const Sweep& sweep, const Pose& T_last_now) const {
+  const double elapsed_s = to_seconds(sweep.end - last_stamp_);
+  if (sweep.uncorrected == Uncorrected::nothing || elapsed_s <= 0.0)
+    return Vector6::Zero();
+  Vector6 twist = se3_log(T_last_now) / elapsed_s;
+  if (sweep.uncorrected == Uncorrected::translation)
+    twist.tail<3>().setZero();
+  return twist;
+}
+
+Registration Odometry::match_scan(const Prior& prior, const Pose& T_start, bool wide, const Gicp::StopRequested& stop) {
   Registration none;
-  none.T_target_source = prior.T_last_now;
+  none.T_target_source = T_start;
   const bool needed = options_.scan_to_scan_mode == ScanToScanMode::always || prior.source.translation < 0;
-  if (options_.scan_to_scan_mode == ScanToScanMode::off || !needed || sweep.points.size() < kMinPoints)
+  if (options_.scan_to_scan_mode == ScanToScanMode::off || !needed || scan_.size() < kMinPoints)
     return none;
   const StageScope scope(clock_, Stage::scan_to_scan);
   last_scan_map_.clear();
   last_scan_map_.insert(last_scan_, Pose{});
   const PosePrior pose_prior{prior.T_last_now, prior.variance.cwiseInverse().asDiagonal()};
-  return gicp_.align(scan_, last_scan_map_, prior.T_last_now, pose_prior, options_.scan_to_scan,
-                     prior.from_start_of_motion, stop);
+  return gicp_.align(scan_, last_scan_map_, T_start, pose_prior, options_.scan_to_scan, wide, stop);
 }
 
-/// The first two sweeps came without any idea of the motion. Now that there is one, the first is corrected with it, and
-/// the map begins anew.
-void Odometry::restart_from(const Sweep& sweep, const Pose& T_last_now) {
-  const double elapsed_s = to_seconds(sweep.end - last_stamp_);
-  if (first_points_.empty() || elapsed_s <= 0.0)
+/// The first two sweeps came without any idea of the motion. What was found between them corrects both, so it can be
+/// found better; then the map begins anew with the first one corrected.
+void Odometry::begin_again(const Sweep& sweep, const Prior& prior, Registration& found,
+                           const Gicp::StopRequested& stop) {
+  if (first_points_.empty())
     return;
-  correct_all(first_points_, se3_log(T_last_now) / elapsed_s, last_scan_);
+  for (int round = 0; round < kStartRounds; ++round) {
+    const Pose T_last_now = found.T_target_source;
+    correct_all(first_points_, uncorrected_twist(sweep, T_last_now), last_scan_);
+    correct_motion(sweep, T_last_now);
+    found = match_scan(prior, T_last_now, false, stop);
+  }
+  first_points_ = {};
   map_.clear();
   map_.insert(last_scan_, T_odom_last_);
-  first_points_ = {};
 }
 
 Registration Odometry::match_submap(const Prior& prior, const Pose& T_last_now, const Gicp::StopRequested& stop) {

@@ -39,15 +39,16 @@ class Odometry {
     Pose T_last_now;
     Vector6 variance = Vector6::Zero(); ///< in the axes of the base at the last sweep
     PriorSource source;
-    bool from_start_of_motion = false; ///< nothing at all is known yet: not even a velocity
+    bool blind = false; ///< nothing at all is known yet, not even a velocity
   };
 
   OdometryEstimate begin(const Sweep& sweep);
   [[nodiscard]] Prior integrate_sensors(const Sweep& sweep) const;
   void correct_motion(const Sweep& sweep, const Pose& T_last_now);
-  Registration match_scan(const Sweep& sweep, const Prior& prior, const Gicp::StopRequested& stop);
+  [[nodiscard]] Vector6 uncorrected_twist(const Sweep& sweep, const Pose& T_last_now) const;
+  Registration match_scan(const Prior& prior, const Pose& T_start, bool wide, const Gicp::StopRequested& stop);
   Registration match_submap(const Prior& prior, const Pose& T_last_now, const Gicp::StopRequested& stop);
-  void restart_from(const Sweep& sweep, const Pose& T_last_now);
+  void begin_again(const Sweep& sweep, const Prior& prior, Registration& found, const Gicp::StopRequested& stop);
   [[nodiscard]] bool trusts(const Registration& registration, const Pose& T_last_now, const Prior& prior) const;
   void learn(const Prior& prior, const Pose& T_last_now, const Registration& registration);
   void update_map(OdometryEstimate& estimate);
@@ -66,7 +67,6 @@ class Odometry {
   std::uint64_t processed_ = 0;
   std::vector<SweepPoint>
       first_points_; ///< of the first sweep, as they came: no velocity was known to correct them with
-  Duration first_duration_{};
   Stamp last_stamp_;
   Duration last_period_{};
   std::array<SourcePose, Sweep::kMaxSources> last_sources_;

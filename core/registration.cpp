@@ -30,11 +30,11 @@ constexpr double kConvergedTranslation_m = 5e-4;
 constexpr double kConvergedRotation_rad = 5e-5;
 constexpr int kStepsPerLookup = 2; ///< Gauss-Newton steps on the same counterparts
 
-/// Counterpart of one source point.
+/// Counterpart of one source point: a plane of the target.
 struct Match {
-  Eigen::Vector3d mean_m; ///< target frame
-  Eigen::Vector3f normal;
-  float variance_m2 = -1.0F; ///< negative: none
+  Eigen::Vector3d mean_m;
+  Eigen::Vector3d normal;
+  double variance_m2 = -1.0; ///< negative: none
 };
 
 /// Sums over the points of one block.
@@ -56,12 +56,9 @@ struct NormalEquations {
   }
 };
 
-Eigen::Matrix3d surface_covariance(const Eigen::Vector3d& normal, double across_m2, double along_m2) {
-  return along_m2 * Eigen::Matrix3d::Identity() + (across_m2 - along_m2) * normal * normal.transpose();
-}
-
 Match match_of(const SurfaceGrid& grid, VoxelIndex index, const Surface& surface) {
-  return {grid.centre_of(index) + surface.mean_m.cast<double>(), surface.normal, surface.variance_m2};
+  return {grid.centre_of(index) + surface.mean_m.cast<double>(), surface.normal.cast<double>(),
+          static_cast<double>(surface.variance_m2)};
 }
 
 /// The plane of the voxel around the point, in the fine grid if it has one, else in the coarse one.
@@ -72,60 +69,78 @@ Match find_here(const SurfaceMap& map, const Eigen::Vector3d& point, double max_
     if (surface == nullptr || !surface->planar())
       continue;
     const Match match = match_of(*grid, index, *surface);
-    if (std::abs(match.normal.cast<double>().dot(point - match.mean_m)) < max_distance_m)
+    if (std::abs(match.normal.dot(point - match.mean_m)) < max_distance_m)
       return match;
   }
   return {};
 }
 
-/// The nearest coarse plane of the 27 voxels around.
+/// The plane of the 27 coarse voxels around whose mean is nearest, at most a voxel away.
 Match find_around(const SurfaceMap& map, const Eigen::Vector3d& point) {
   const SurfaceGrid& grid = map.coarse();
   const VoxelIndex centre = grid.index_of(point);
   Match nearest;
   double nearest_m2 = grid.leaf_m() * grid.leaf_m();
-  for (int dx = -1; dx <= 1; ++dx) {
-    for (int dy = -1; dy <= 1; ++dy) {
-      for (int dz = -1; dz <= 1; ++dz) {
-        const VoxelIndex index{centre.x + dx, centre.y + dy, centre.z + dz};
-        const Surface* surface = grid.find(index);
-        if (surface == nullptr || !surface->planar())
-          continue;
-        const Match match = match_of(grid, index, *surface);
-        const double distance_m2 = (point - match.mean_m).squaredNorm();
-        if (distance_m2 < nearest_m2) {
-          nearest_m2 = distance_m2;
-          nearest = match;
-        }
-      }
+  for (int i = 0; i < 27; ++i) {
+    const VoxelIndex index{centre.x + i % 3 - 1, centre.y + i / 3 % 3 - 1, centre.z + i / 9 - 1};
+    const Surface* surface = grid.find(index);
+    if (surface == nullptr || !surface->planar())
+      continue;
+    const Match match = match_of(grid, index, *surface);
+    const double distance_m2 = (point - match.mean_m).squaredNorm();
+    if (distance_m2 < nearest_m2) {
+      nearest_m2 = distance_m2;
+      nearest = match;
     }
   }
   return nearest;
 }
 
+/// (C_target + C_source)^-1 of two surfaces with covariance I + (variance - 1) n n' along their normals n and m, in
+/// closed form: the sum is 2 (I - u n n' - v m m'), inverted after Woodbury. A source without a normal is an isotropic
+/// point.
+Eigen::Matrix3d information(const Match& match, const Eigen::Vector3d& source_normal) {
+  const Eigen::Vector3d& n = match.normal;
+  const Eigen::Vector3d& m = source_normal;
+  if (m.isZero()) {
+    const double along = 1.0 / (kAlongVariance_m2 + kPointVariance_m2);
+    const double across = 1.0 / (match.variance_m2 + kPointVariance_m2);
+    return along * Eigen::Matrix3d::Identity() + (across - along) * n * n.transpose();
+  }
+  constexpr double kScale = 2.0 * kAlongVariance_m2;
+  const double k_n = kScale / (kAlongVariance_m2 - match.variance_m2) - 1.0;
+  const double k_m = kScale / (kAlongVariance_m2 - kPointVariance_m2) - 1.0;
+  const double c = n.dot(m);
+  const Eigen::Vector3d a = k_m * n + c * m;
+  const Eigen::Vector3d b = c * n + k_n * m;
+  const double share = 1.0 / (k_n * k_m - c * c);
+  return (Eigen::Matrix3d::Identity() + share * (a * n.transpose() + b * m.transpose())) / kScale;
+}
+
 /// Adds one point's share: residual d = R p + t - mean, J = [I, -(R p)x] for a turn about the target's axes.
 void linearise(const Eigen::Vector3d& rotated, const Eigen::Vector3d& rotated_normal,
                const Eigen::Vector3d& translation, const Match& match, double width2, NormalEquations& sum) {
-  const Eigen::Vector3d normal = match.normal.cast<double>();
-  const bool has_normal = !rotated_normal.isZero();
-  const Eigen::Matrix3d covariance =
-      surface_covariance(normal, match.variance_m2, kAlongVariance_m2) +
-      surface_covariance(rotated_normal, kPointVariance_m2, has_normal ? kAlongVariance_m2 : kPointVariance_m2);
-  const Eigen::Matrix3d M = covariance.inverse();
   const Eigen::Vector3d d = rotated + translation - match.mean_m;
+  const Eigen::Matrix3d M = information(match, rotated_normal);
   const Eigen::Vector3d Md = M * d;
   const double r2 = d.dot(Md);
   const double root = width2 / (width2 + r2);
-  const double w = root * root;
+  const double w = root * root; // Geman-McClure
 
-  const Eigen::Matrix3d Q = skew(rotated);
-  const Eigen::Matrix3d MQ = M * Q;
+  const double x = w * rotated.x();
+  const double y = w * rotated.y();
+  const double z = w * rotated.z();
+  Eigen::Matrix3d wMQ; // w M (R p)x
+  wMQ.col(0) = z * M.col(1) - y * M.col(2);
+  wMQ.col(1) = x * M.col(2) - z * M.col(0);
+  wMQ.col(2) = y * M.col(0) - x * M.col(1);
   sum.H.topLeftCorner<3, 3>() += w * M;
-  sum.H.topRightCorner<3, 3>() -= w * MQ;
-  sum.H.bottomRightCorner<3, 3>() += w * Q.transpose() * MQ;
+  sum.H.topRightCorner<3, 3>() -= wMQ;
+  for (int column = 0; column < 3; ++column)
+    sum.H.block<3, 1>(3, 3 + column) -= rotated.cross(wMQ.col(column));
   sum.b.head<3>() += w * Md;
   sum.b.tail<3>() += w * rotated.cross(Md);
-  sum.normals += w * normal * normal.transpose();
+  sum.normals += w * match.normal * match.normal.transpose();
   sum.error += w * r2;
   sum.weight += w;
   sum.inliers += r2 < width2 ? 1 : 0;
@@ -165,7 +180,7 @@ Registration Gicp::align(std::span<const SurfacePoint> source, const SurfaceMap&
   workers_->partial.resize(std::max(workers_->partial.size(), blocks));
   double width = wide ? kWidthStartWide : kWidthStart;
 
-  while (result.iterations < options.max_iterations && !stop()) {
+  while (result.iterations < options.max_iterations && (result.iterations == 0 || !stop())) {
     const bool look_up = result.iterations % kStepsPerLookup == 0;
     if (look_up && result.iterations > 0)
       width = std::max(0.5 * width, kWidthEnd);
@@ -181,7 +196,7 @@ Registration Gicp::align(std::span<const SurfacePoint> source, const SurfaceMap&
           const Eigen::Vector3d point = rotated + T.translation;
           match = around ? find_around(target, point) : find_here(target, point, options.max_correspondence_m);
         }
-        if (match.variance_m2 > 0.0F)
+        if (match.variance_m2 > 0.0)
           linearise(rotated, R * source[i].normal.cast<double>(), T.translation, match, width * width, sum);
       }
       workers_->partial[block] = sum;

@@ -40,7 +40,8 @@ struct Registration {
 /// order: same input, same bits, for any number of threads. One owner.
 class Gicp {
  public:
-  using StopRequested = std::function<bool()>; ///< asked between iterations; true ends the work with what is there
+  using StopRequested = std::function<bool()>; ///< asked between iterations; true ends the work with what is there, one
+                                               ///< iteration at the least
 
   explicit Gicp(int threads);
   ~Gicp();

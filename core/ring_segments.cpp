@@ -7,10 +7,14 @@ namespace locus {
 
 namespace {
 
+/// A segment whose centroid lies farther than this from the middle of its ends goes round a corner; it lies on no
+/// surface.
+constexpr float kMaxBend_m = 0.04F;
+
 constexpr std::size_t kLinesPerLidar = 256;
 constexpr float kFirstLeaf_m = 0.4F;
 constexpr float kMinLeaf_m = 0.1F;
-constexpr float kMaxLeaf_m = 3.0F;
+constexpr float kMaxLeaf_m = 0.4F;
 
 /// A step in range larger than this between neighbouring returns is another surface.
 constexpr float kRangeJump_m = 0.1F;
@@ -30,17 +34,17 @@ std::uint32_t RingSegments::add(std::uint16_t scan_line, const Eigen::Vector3f& 
   Line& line = lines_[scan_line];
   const bool same_surface = line.open != kNone &&
                             std::abs(range_m - line.last_range_m) < kRangeJump_m + kRangeJumpPerRange * range_m &&
-                            (position_m - line.first_m).squaredNorm() < leaf_m_ * leaf_m_;
+                            (position_m - segments_[line.open].first_m).squaredNorm() < leaf_m_ * leaf_m_;
   line.last_range_m = range_m;
   if (!same_surface) {
     if (segments_.size() == kMaxSegments)
       return kNone;
     line.open = static_cast<std::uint32_t>(segments_.size());
-    line.first_m = position_m;
-    segments_.push_back({position_m, time_s, intensity, 1.0F, scan_line});
+    segments_.push_back({position_m, position_m, position_m, time_s, intensity, 1.0F, scan_line});
     return line.open;
   }
   Segment& segment = segments_[line.open];
+  segment.last_m = position_m;
   segment.sum_m += position_m;
   segment.time_sum_s += time_s;
   segment.intensity_sum += intensity;
@@ -48,17 +52,30 @@ std::uint32_t RingSegments::add(std::uint16_t scan_line, const Eigen::Vector3f& 
   return line.open;
 }
 
+bool RingSegments::bends(const Segment& segment) {
+  const Eigen::Vector3f middle = 0.5F * (segment.first_m + segment.last_m);
+  return (segment.sum_m / segment.count - middle).squaredNorm() > kMaxBend_m * kMaxBend_m;
+}
+
 void RingSegments::finish(float duration_s, std::vector<SweepPoint>& points) {
   std::fill(line_begin_.begin(), line_begin_.end(), 0U);
-  for (const Segment& segment : segments_)
+  std::size_t straight = 0;
+  for (const Segment& segment : segments_) {
+    if (bends(segment))
+      continue;
     ++line_begin_[segment.scan_line + 1U];
+    ++straight;
+  }
   for (std::size_t i = 1; i < line_begin_.size(); ++i)
     line_begin_[i] += line_begin_[i - 1];
 
-  points.resize(segments_.size());
+  points.resize(straight);
   place_.resize(segments_.size());
   for (std::size_t i = 0; i < segments_.size(); ++i) {
     const Segment& segment = segments_[i];
+    place_[i] = kNone;
+    if (bends(segment))
+      continue;
     const float share = 1.0F / segment.count;
     place_[i] = line_begin_[segment.scan_line]++;
     points[place_[i]] = {share * segment.sum_m, Eigen::Vector3f::Zero(), duration_s - share * segment.time_sum_s,

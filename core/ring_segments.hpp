@@ -34,6 +34,7 @@ class RingSegments {
 
  private:
   struct Segment {
+    Eigen::Vector3f first_m, last_m;
     Eigen::Vector3f sum_m;
     float time_sum_s;
     float intensity_sum;
@@ -43,8 +44,9 @@ class RingSegments {
   struct Line {
     std::uint32_t open = kNone;
     float last_range_m = 0.0F;
-    Eigen::Vector3f first_m = Eigen::Vector3f::Zero();
   };
+
+  static bool bends(const Segment& segment);
 
   std::size_t points_wanted_;
   float leaf_m_;

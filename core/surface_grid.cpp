@@ -15,14 +15,17 @@ namespace {
 /// returns).
 constexpr double kPointVariance_m2 = 0.02 * 0.02;
 
-/// A point with a normal stands for a disc; its radius as a share of the voxel.
+/// A point stands for a disc, or for a ball where its normal is not known; the radius as a share of the voxel.
 constexpr double kDiscRadiusInLeaves = 0.25;
 
-/// A voxel holds a plane when its points spread in two directions, by an absolute and by a relative measure (one scan
-/// line spreads in one only), and little across them.
+/// How points must spread to count as a plane: in two directions by an absolute and by a relative measure (one scan
+/// line spreads in one only), and little across them. A corner of two walls has a ratio of 0.25 across.
 constexpr double kMinSpreadInLeaves = 0.1;
 constexpr double kMinMiddleToLargest = 0.05;
 constexpr double kMaxSmallestToMiddle = 0.15;
+constexpr double kMaxRoughness_m = 0.15;
+
+constexpr float kEnoughPoints = 8.0F; ///< to be judged by where they lie alone
 
 /// Older points fade once a voxel has seen this many, so a long stay does not freeze it.
 constexpr float kMaxCount = 400.0F;
@@ -30,12 +33,14 @@ constexpr float kMaxCount = 400.0F;
 constexpr std::size_t kEvictionAttempts = 64;
 
 using Upper = Eigen::Matrix<float, 6, 1>;
+using EigenSolver = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>;
 
 Upper upper_of_outer(const Eigen::Vector3f& v) {
   return {v.x() * v.x(), v.x() * v.y(), v.x() * v.z(), v.y() * v.y(), v.y() * v.z(), v.z() * v.z()};
 }
 
-Eigen::Matrix3d symmetric(const Upper& u) {
+Eigen::Matrix3d symmetric(const Upper& upper) {
+  const Eigen::Matrix<double, 6, 1> u = upper.cast<double>();
   Eigen::Matrix3d m;
   m << u[0], u[1], u[2], u[1], u[3], u[4], u[2], u[4], u[5];
   return m;
@@ -54,23 +59,22 @@ std::uint64_t hash_of(VoxelIndex index) {
 } // namespace
 
 SurfaceGrid::SurfaceGrid(double leaf_m, std::size_t max_bytes) : leaf_m_(leaf_m) {
-  constexpr std::size_t kBytesPerVoxel =
-      sizeof(VoxelIndex) + sizeof(Surface) + sizeof(Moments) + sizeof(std::uint32_t) + 4 * sizeof(Entry);
+  constexpr std::size_t kBytesPerVoxel = sizeof(Voxel) + sizeof(Moments) + sizeof(std::uint32_t) + 4 * sizeof(Entry);
   const std::size_t capacity = std::max<std::size_t>(max_bytes / kBytesPerVoxel, 64);
   entries_.resize(std::bit_ceil(2 * capacity));
   voxels_.resize(capacity);
-  surfaces_.resize(capacity);
   moments_.resize(capacity);
   touched_.reserve(capacity);
 }
 
 VoxelIndex SurfaceGrid::index_of(const Eigen::Vector3d& point_m) const {
-  const auto cell = [this](double v) { return static_cast<std::int32_t>(std::floor(v / leaf_m_)); };
+  const auto cell = [this](double v) { return static_cast<std::int32_t>(std::floor(v / leaf_m_ + 0.5)); };
   return {cell(point_m.x()), cell(point_m.y()), cell(point_m.z())};
 }
 
 Eigen::Vector3d SurfaceGrid::centre_of(VoxelIndex index) const {
-  return leaf_m_ * Eigen::Vector3d{index.x + 0.5, index.y + 0.5, index.z + 0.5};
+  return leaf_m_ *
+         Eigen::Vector3d{static_cast<double>(index.x), static_cast<double>(index.y), static_cast<double>(index.z)};
 }
 
 std::size_t SurfaceGrid::home_of(VoxelIndex index) const { return hash_of(index) & (entries_.size() - 1); }
@@ -81,14 +85,14 @@ std::uint32_t SurfaceGrid::slot_of(VoxelIndex index) const {
   const std::size_t mask = entries_.size() - 1;
   for (std::size_t i = hash & mask;; i = (i + 1) & mask) {
     const Entry& entry = entries_[i];
-    if (entry.slot == kEmpty || (entry.tag == tag && voxels_[entry.slot] == index))
+    if (entry.slot == kEmpty || (entry.tag == tag && voxels_[entry.slot].index == index))
       return entry.slot;
   }
 }
 
 const Surface* SurfaceGrid::find(VoxelIndex index) const {
   const std::uint32_t slot = slot_of(index);
-  return slot == kEmpty ? nullptr : &surfaces_[slot];
+  return slot == kEmpty ? nullptr : &voxels_[slot].surface;
 }
 
 std::uint32_t SurfaceGrid::find_or_create(VoxelIndex index) {
@@ -96,8 +100,7 @@ std::uint32_t SurfaceGrid::find_or_create(VoxelIndex index) {
   if (found != kEmpty)
     return found;
   const std::uint32_t slot = take_slot();
-  voxels_[slot] = index;
-  surfaces_[slot].variance_m2 = -1.0F;
+  voxels_[slot] = {index, Surface{}};
   moments_[slot] = Moments{};
   const std::size_t mask = entries_.size() - 1;
   std::size_t i = home_of(index);
@@ -120,7 +123,7 @@ std::uint32_t SurfaceGrid::take_slot() {
     hand_ = (hand_ + 1) % capacity();
   const std::size_t slot = hand_;
   hand_ = (hand_ + 1) % capacity();
-  erase_entry(voxels_[slot]);
+  erase_entry(voxels_[slot].index);
   ++evicted_;
   return static_cast<std::uint32_t>(slot);
 }
@@ -129,10 +132,10 @@ std::uint32_t SurfaceGrid::take_slot() {
 void SurfaceGrid::erase_entry(VoxelIndex index) {
   const std::size_t mask = entries_.size() - 1;
   std::size_t gap = home_of(index);
-  while (voxels_[entries_[gap].slot] != index)
+  while (voxels_[entries_[gap].slot].index != index)
     gap = (gap + 1) & mask;
   for (std::size_t i = (gap + 1) & mask; entries_[i].slot != kEmpty; i = (i + 1) & mask) {
-    const std::size_t home = home_of(voxels_[entries_[i].slot]);
+    const std::size_t home = home_of(voxels_[entries_[i].slot].index);
     if (((i - home) & mask) >= ((i - gap) & mask)) {
       entries_[gap] = entries_[i];
       gap = i;
@@ -155,34 +158,41 @@ void SurfaceGrid::insert(const Eigen::Vector3d& point_m, const Eigen::Vector3d& 
     moments.outer *= 0.5F;
     moments.covariance *= 0.5F;
   }
-  const double disc_m = kDiscRadiusInLeaves * leaf_m_;
-  const double across = normal.isZero() ? kPointVariance_m2 : disc_m * disc_m;
+  const double along_m2 = kDiscRadiusInLeaves * kDiscRadiusInLeaves * leaf_m_ * leaf_m_;
   const Eigen::Vector3f offset = (point_m - centre_of(index)).cast<float>();
   moments.count += 1.0F;
   moments.sum += offset;
   moments.outer += upper_of_outer(offset);
-  moments.covariance += static_cast<float>(kPointVariance_m2 - across) * upper_of_outer(normal.cast<float>());
-  moments.covariance[0] += static_cast<float>(across);
-  moments.covariance[3] += static_cast<float>(across);
-  moments.covariance[5] += static_cast<float>(across);
+  moments.covariance += static_cast<float>(kPointVariance_m2 - along_m2) * upper_of_outer(normal.cast<float>());
+  for (const int diagonal : {0, 3, 5})
+    moments.covariance[diagonal] += static_cast<float>(along_m2);
 }
 
 Surface SurfaceGrid::fit(const Moments& moments) const {
-  const Eigen::Vector3f mean = moments.sum / moments.count;
-  const Upper covariance = (moments.outer + moments.covariance) / moments.count - upper_of_outer(mean);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>{}.computeDirect(symmetric(covariance));
-  const Eigen::Vector3d spread = eigen.eigenvalues();
-  const double min_spread_m = kMinSpreadInLeaves * leaf_m_;
-  const bool planar = spread[1] > min_spread_m * min_spread_m && spread[1] > kMinMiddleToLargest * spread[2] &&
-                      spread[0] < kMaxSmallestToMiddle * spread[1];
-  const double variance = std::max(spread[0], kPointVariance_m2);
-  return {mean, eigen.eigenvectors().col(0).cast<float>(), planar ? static_cast<float>(variance) : -1.0F};
+  const auto is_plane = [this](const Eigen::Vector3d& spread_m2) {
+    const double min_spread_m = kMinSpreadInLeaves * leaf_m_;
+    return spread_m2[1] > min_spread_m * min_spread_m && spread_m2[1] > kMinMiddleToLargest * spread_m2[2] &&
+           spread_m2[0] < kMaxSmallestToMiddle * spread_m2[1] && spread_m2[0] < kMaxRoughness_m * kMaxRoughness_m;
+  };
+  Surface surface;
+  surface.mean_m = moments.sum / moments.count;
+  const Upper scatter = moments.outer / moments.count - upper_of_outer(surface.mean_m);
+  EigenSolver eigen;
+  eigen.computeDirect(symmetric(scatter));
+  bool planar = moments.count >= kEnoughPoints && is_plane(eigen.eigenvalues());
+  if (!planar) {
+    eigen.computeDirect(symmetric(scatter + moments.covariance / moments.count));
+    planar = is_plane(eigen.eigenvalues());
+  }
+  surface.normal = eigen.eigenvectors().col(0).cast<float>();
+  if (planar)
+    surface.variance_m2 = static_cast<float>(std::max(eigen.eigenvalues()[0], kPointVariance_m2));
+  return surface;
 }
 
 void SurfaceGrid::refresh() {
   for (const std::uint32_t slot : touched_) {
-    surfaces_[slot] = fit(moments_[slot]);
+    voxels_[slot].surface = fit(moments_[slot]);
     moments_[slot].touched = false;
   }
   touched_.clear();
@@ -193,7 +203,7 @@ void SurfaceGrid::refresh() {
 void SurfaceGrid::clear() {
   const std::size_t mask = entries_.size() - 1;
   for (std::size_t slot = 0; slot < used_; ++slot) {
-    for (std::size_t i = home_of(voxels_[slot]); entries_[i].slot != kEmpty; i = (i + 1) & mask)
+    for (std::size_t i = home_of(voxels_[slot].index); entries_[i].slot != kEmpty; i = (i + 1) & mask)
       entries_[i] = Entry{};
   }
   touched_.clear();

@@ -3,8 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
-#include <span>
 #include <vector>
 
 #include "core/pose.hpp"
@@ -17,20 +15,21 @@ struct VoxelIndex {
   friend bool operator==(const VoxelIndex&, const VoxelIndex&) = default;
 };
 
-/// What registration reads of a voxel: the plane through its points.
+/// The plane through the points of a voxel: what registration reads of it.
 struct Surface {
-  Eigen::Vector3f mean_m; ///< from the centre of its voxel
-  Eigen::Vector3f normal; ///< unit
-  float variance_m2;      ///< along the normal; negative: the points lie on no plane
+  Eigen::Vector3f mean_m = Eigen::Vector3f::Zero(); ///< from the centre of the voxel
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero(); ///< unit
+  float variance_m2 = -1.0F;                        ///< along the normal; negative: the points lie on no plane
   [[nodiscard]] bool planar() const { return variance_m2 > 0.0F; }
 };
 
 /// Running Gaussians of points in cubic voxels, found by hashing.
 ///
-/// Each point brings its own covariance, a disc where its normal is known; a voxel's covariance is the moment match of
-/// them all, so a plane shows with a single point that knows its normal as well as with many that do not. Voxels live
-/// in a pool of fixed size; when it is full the oldest one far from the robot gives way. Nothing walks the whole map.
-/// One writer or many readers.
+/// Only planes are read from it. Along a plane the points of a sweep lie where the scan lines happen to fall, a pattern
+/// that moves with the lidar: whatever else were read from a voxel would follow the robot. A voxel with enough points
+/// is judged by how they lie. One with fewer takes into account what each point knows of its surface: the moment match
+/// of discs, so a single point that knows its normal makes a plane. Voxels live in a pool of fixed size; when it is
+/// full the oldest one far from the robot gives way. Nothing walks the whole map. One writer or many readers.
 class SurfaceGrid {
  public:
   SurfaceGrid(double leaf_m, std::size_t max_bytes);
@@ -40,9 +39,11 @@ class SurfaceGrid {
   /// Brings the surfaces of the voxels up to date that were written to since the last call.
   void refresh();
   void clear();
-  /// Voxels nearer than `radius_m` to `centre_m` are spared from eviction.
+  /// Voxels nearer than `radius_m` to `centre_m` are spared from eviction while there are others.
   void protect(const Eigen::Vector3d& centre_m, double radius_m);
 
+  /// The voxel whose centre, a multiple of the leaf, is nearest: the floor at height zero does not lie between two of
+  /// them.
   [[nodiscard]] VoxelIndex index_of(const Eigen::Vector3d& point_m) const;
   [[nodiscard]] Eigen::Vector3d centre_of(VoxelIndex index) const;
   /// Nothing where no point has fallen.
@@ -50,25 +51,30 @@ class SurfaceGrid {
 
   [[nodiscard]] double leaf_m() const { return leaf_m_; }
   [[nodiscard]] std::size_t size() const { return used_; }
-  [[nodiscard]] std::size_t capacity() const { return surfaces_.size(); }
+  [[nodiscard]] std::size_t capacity() const { return voxels_.size(); }
   [[nodiscard]] std::uint64_t evicted() const { return evicted_; }
   /// Slots 0..size()-1, in no order that means anything.
-  [[nodiscard]] const Surface& surface(std::size_t slot) const { return surfaces_[slot]; }
-  [[nodiscard]] Eigen::Vector3d centre(std::size_t slot) const { return centre_of(voxels_[slot]); }
+  [[nodiscard]] const Surface& surface(std::size_t slot) const { return voxels_[slot].surface; }
+  [[nodiscard]] Eigen::Vector3d centre(std::size_t slot) const { return centre_of(voxels_[slot].index); }
 
  private:
   static constexpr std::uint32_t kEmpty = 0xFFFFFFFFU;
+  using Upper = Eigen::Matrix<float, 6, 1>; ///< xx xy xz yy yz zz of a symmetric matrix
 
   struct Entry {
     std::uint32_t tag = 0; ///< upper half of the hash: most foreign voxels are told apart without a look at the pool
     std::uint32_t slot = kEmpty;
   };
-
-  struct Moments { ///< sums over points, relative to the centre of the voxel
+  struct Voxel {
+    VoxelIndex index;
+    Surface surface;
+  };
+  struct Moments { ///< sums over points, relative to the centre of the voxel; apart from Voxel, which is read far more
+                   ///< often
     float count = 0.0F;
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-    Eigen::Matrix<float, 6, 1> outer = Eigen::Matrix<float, 6, 1>::Zero();      ///< xx xy xz yy yz zz of position
-    Eigen::Matrix<float, 6, 1> covariance = Eigen::Matrix<float, 6, 1>::Zero(); ///< the points' own
+    Upper outer = Upper::Zero();
+    Upper covariance = Upper::Zero(); ///< the points' own
     bool touched = false;
   };
 
@@ -81,8 +87,7 @@ class SurfaceGrid {
 
   double leaf_m_;
   std::vector<Entry> entries_; ///< open addressing, linear probing, power of two, at most half full
-  std::vector<VoxelIndex> voxels_;
-  std::vector<Surface> surfaces_;
+  std::vector<Voxel> voxels_;
   std::vector<Moments> moments_;
   std::vector<std::uint32_t> touched_;
   std::size_t used_ = 0;

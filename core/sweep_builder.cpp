@@ -177,7 +177,8 @@ void SweepBuilder::reduce(float duration_s) {
   segments_.finish(duration_s, sweep_.points);
   {
     const StageScope scope(clock_, Stage::covariance);
-    normals_.estimate(sweep_.points);
+    normals_.estimate(sweep_.points,
+                      options_.segment_filter.enabled ? options_.segment_filter.points : sweep_.points.size());
   }
   if (!options_.segment_filter.enabled) {
     for (RawPoint& raw : raw_) {
