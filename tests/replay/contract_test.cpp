@@ -123,8 +123,11 @@ TEST(LocusReplay, SameBytesForEveryNumberOfThreadsAndOnEveryRun) {
   const std::string capture = room_drive().string();
   const std::string expected = read_text(Replay({"--threads", "1", capture}).file("odometry.tum"));
   ASSERT_FALSE(expected.empty());
-  for (const char* threads : {"1", "2", "2", "4", "4"})
-    EXPECT_EQ(read_text(Replay({"--threads", threads, capture}).file("odometry.tum")), expected) << threads;
+  for (const char* threads : {"1", "2", "2", "4", "4"}) {
+    const Replay replay({"--threads", threads, capture});
+    EXPECT_EQ(read_text(replay.file("odometry.tum")), expected) << threads << " threads";
+    EXPECT_EQ(replay.run().err, "") << threads << " threads, however few processors";
+  }
 }
 
 TEST(LocusReplay, StaysWithinThreeCentimetresOfTruthInARoom) {

@@ -77,10 +77,12 @@ std::vector<StampedPose> read_tum(const std::filesystem::path& file) {
 
 ProgramRun run_program(const std::string& program, const std::vector<std::string>& arguments) {
   const TemporaryFolder folder;
+  std::vector<std::string> command{program};
+  command.insert(command.end(), arguments.begin(), arguments.end());
   const std::string out = folder / "out", err = folder / "err";
-  std::vector<char*> argv{const_cast<char*>(program.c_str())};
-  for (const std::string& argument : arguments)
-    argv.push_back(const_cast<char*>(argument.c_str()));
+  std::vector<char*> argv;
+  for (std::string& word : command)
+    argv.push_back(word.data());
   argv.push_back(nullptr);
 
   posix_spawn_file_actions_t actions;

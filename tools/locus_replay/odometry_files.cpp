@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "locus_replay/odometry_files.hpp"
 
+#include <array>
 #include <cstdint>
 #include <string_view>
 
@@ -24,7 +25,7 @@ std::string_view name_of(TrackingState state) {
 }
 
 std::string csv_header() {
-  constexpr std::string_view kAxes[] = {"x", "y", "z", "roll", "pitch", "yaw"};
+  constexpr std::array<std::string_view, 6> kAxes{"x", "y", "z", "roll", "pitch", "yaw"};
   std::string header = "t_ns,state,source,iterations,inliers";
   for (const std::string_view row : kAxes) {
     for (const std::string_view column : kAxes)

@@ -13,9 +13,9 @@ using daemon::EndOfInput;
 using daemon::Input;
 using daemon::Silence;
 
-Recording::Recording(Capture capture, std::vector<MotionRecording> motion, const Config& config,
-                     const LidarRouter& lidars, const PlayOptions& options)
-    : capture_(std::move(capture)), lidars_(lidars), play_for_(options.duration), head_(capture_.next()) {
+Recording::Recording(Capture capture, std::vector<MotionRecording> motion, const Config& config, LidarRouter lidars,
+                     const PlayOptions& options)
+    : capture_(std::move(capture)), lidars_(std::move(lidars)), play_for_(options.duration), head_(capture_.next()) {
   const Stamp capture_start = head_ != nullptr ? head_->receive_stamp : Stamp{};
   begin_ = capture_start + options.start;
   end_ = play_for_ ? begin_ + *play_for_ : Stamp::max();
@@ -49,7 +49,7 @@ Input Recording::next(Duration) {
   const auto earliest = std::ranges::min_element(motion_, {}, &MotionCursor::arrival);
   if (earliest != motion_.end() && earliest->arrival() <= pending_->arrival)
     return earliest->take();
-  const Input input = pending_->input;
+  Input input = pending_->input;
   pending_.reset();
   return input;
 }

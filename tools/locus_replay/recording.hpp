@@ -41,7 +41,7 @@ struct PortTraffic {
 class Recording : public daemon::InputSource {
  public:
   /// `lidars`: to tell by port and address whose datagram a fault strikes.
-  Recording(Capture capture, std::vector<MotionRecording> motion, const Config& config, const LidarRouter& lidars,
+  Recording(Capture capture, std::vector<MotionRecording> motion, const Config& config, LidarRouter lidars,
             const PlayOptions& options);
 
   daemon::Input next(Duration timeout) override;
