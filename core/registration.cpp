@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -149,7 +150,8 @@ void linearise(const Eigen::Vector3d& rotated, const Eigen::Vector3d& rotated_no
 } // namespace
 
 struct Gicp::Workers {
-  explicit Workers(int threads) : arena(threads), parallel(threads > 1) {}
+  /// No more than there are processors: TBB would not start them, and says so on stderr.
+  explicit Workers(int threads) : arena(std::min(threads, tbb::info::default_concurrency())), parallel(threads > 1) {}
 
   template <class Body> void for_each_block(std::size_t blocks, const Body& body) {
     if (!parallel) {
