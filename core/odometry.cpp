@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t kMinPoints = 30; ///< fewer say nothing reliable about six axes
 
 /// Least share of the points that must find a counterpart for a registration to be believed.
-constexpr double kMinInlierShare = 0.2;
+constexpr double kMinInlierShare = 0.1;
 
 /// A registration that contradicts the prior by more than this many standard deviations, and by more than the least, is
 /// refused.
@@ -46,6 +46,9 @@ Vector6 sigma(double translation_m, double rotation_deg) {
   return s;
 }
 
+/// Per sweep, against a constant velocity: what 4 m/s^2 and 2 rad/s^2 do in 0.1 s. Standing must not teach that it
+/// lasts.
+const Vector6 kRobotsAccelerate = sigma(0.02, 0.5);
 const Vector6 kUnknownMotion = sigma(3.0, 10.0); ///< per sweep, of a robot of which nothing is known
 
 /// Roll and pitch that a resting robot must have for gravity to read as it does; no yaw.
@@ -85,7 +88,7 @@ void correct_all(std::span<const SweepPoint> points, const Vector6& twist_base, 
 
 Odometry::Odometry(const OdometryOptions& options, StageClock* clock)
     : options_(options), clock_(clock), gicp_(options.threads), map_(options.map.max_bytes),
-      last_scan_map_(kLastScanBytes), constant_velocity_statistics_(sigma(0.3, 3.0), sigma(0.005, 0.05)) {
+      last_scan_map_(kLastScanBytes), constant_velocity_statistics_(sigma(0.3, 3.0), kRobotsAccelerate) {
   for (const MotionSourceOptions& source : options.motion_sources) {
     const bool imu = source.kind == SourceKind::imu;
     statistics_.emplace_back(imu ? sigma(0.3, 0.3) : sigma(0.05, 0.5), sigma(0.002, 0.02));
@@ -121,6 +124,7 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
   if (force && std::abs(force->norm() - kGravity_mps2) < kGravityTolerance_mps2)
     T_odom_last_.rotation = level(*force);
   correct_all(sweep.points, Vector6::Zero(), scan_);
+  registered_ = sweep.registered;
   if (sweep.uncorrected != Uncorrected::nothing)
     first_points_ = sweep.points;
   OdometryEstimate estimate;
@@ -167,6 +171,7 @@ Odometry::Prior Odometry::integrate_sensors(const Sweep& sweep) const {
 /// Takes out of the points what no motion source could, with the twist that T_last_now means.
 void Odometry::correct_motion(const Sweep& sweep, const Pose& T_last_now) {
   correct_all(sweep.points, uncorrected_twist(sweep, T_last_now), scan_);
+  registered_ = sweep.registered;
 }
 
 /// The part of the motion that is still in the points of the sweep.
@@ -190,7 +195,7 @@ Registration Odometry::match_scan(const Prior& prior, const Pose& T_start, bool 
   last_scan_map_.clear();
   last_scan_map_.insert(last_scan_, Pose{});
   const PosePrior pose_prior{prior.T_last_now, prior.variance.cwiseInverse().asDiagonal()};
-  return gicp_.align(scan_, last_scan_map_, T_start, pose_prior, options_.scan_to_scan, wide, stop);
+  return gicp_.align(registered(), last_scan_map_, T_start, pose_prior, options_.scan_to_scan, wide, stop);
 }
 
 /// The first two sweeps came without any idea of the motion. What was found between them corrects both, so it can be
@@ -220,12 +225,12 @@ Registration Odometry::match_submap(const Prior& prior, const Pose& T_last_now, 
   const Matrix6 R = turn_both(T_odom_last_.rotation);
   const PosePrior pose_prior{T_odom_last_ * prior.T_last_now,
                              R * prior.variance.cwiseInverse().asDiagonal() * R.transpose()};
-  return gicp_.align(scan_, map_, T_start, pose_prior, options_.scan_to_submap, false, stop);
+  return gicp_.align(registered(), map_, T_start, pose_prior, options_.scan_to_submap, false, stop);
 }
 
 bool Odometry::trusts(const Registration& registration, const Pose& T_last_now, const Prior& prior) const {
   if (registration.iterations == 0 || !T_last_now.finite() ||
-      static_cast<double>(registration.inliers) < kMinInlierShare * static_cast<double>(scan_.size()))
+      static_cast<double>(registration.inliers) < kMinInlierShare * static_cast<double>(registered_))
     return false;
   Vector6 allowed;
   allowed << Eigen::Vector3d::Constant(kAlwaysAllowed_m), Eigen::Vector3d::Constant(kAlwaysAllowed_rad);
@@ -265,7 +270,7 @@ void Odometry::update_map(OdometryEstimate& estimate) {
 /// Fills in what the estimate says beside its pose, takes the sweep into the map and remembers it as the last.
 void Odometry::finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate) {
   estimate.stamp = sweep.end;
-  estimate.points = scan_.size();
+  estimate.points = registered_;
   estimate.prior = prior.source;
   refused_in_a_row_ = estimate.failed ? refused_in_a_row_ + 1 : 0;
   const Pose T_last_now = T_odom_last_.inverse() * estimate.T_odom_base;

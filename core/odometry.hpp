@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/odometry_estimate.hpp"
@@ -51,6 +52,7 @@ class Odometry {
   void begin_again(const Sweep& sweep, const Prior& prior, Registration& found, const Gicp::StopRequested& stop);
   [[nodiscard]] bool trusts(const Registration& registration, const Pose& T_last_now, const Prior& prior) const;
   void learn(const Prior& prior, const Pose& T_last_now, const Registration& registration);
+  [[nodiscard]] std::span<const SurfacePoint> registered() const { return std::span(scan_).first(registered_); }
   void update_map(OdometryEstimate& estimate);
   void finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate);
 
@@ -60,6 +62,7 @@ class Odometry {
   SurfaceMap map_;
   SurfaceMap last_scan_map_;       ///< the last processed sweep alone, the target of scan-to-scan
   std::vector<SurfacePoint> scan_; ///< the sweep at hand, fully corrected
+  std::size_t registered_ = 0;     ///< the first so many points of scan_ are registered
   std::vector<SurfacePoint> last_scan_;
   std::vector<PriorStatistics> statistics_; ///< by motion source
   PriorStatistics constant_velocity_statistics_;

@@ -118,7 +118,7 @@ Eigen::Matrix3d information(const Match& match, const Eigen::Vector3d& source_no
   return (Eigen::Matrix3d::Identity() + share * (a * n.transpose() + b * m.transpose())) / kScale;
 }
 
-/// Adds one point's share: residual d = R p + t - mean, J = [I, -(R p)x] for a turn about the target's axes.
+/// Takes in one point's share: residual d = R p + t - mean, J = [I, -(R p)x] for a turn about the target's axes.
 void linearise(const Eigen::Vector3d& rotated, const Eigen::Vector3d& rotated_normal,
                const Eigen::Vector3d& translation, const Match& match, double width2, NormalEquations& sum) {
   const Eigen::Vector3d d = rotated + translation - match.mean_m;

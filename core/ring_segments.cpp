@@ -12,7 +12,6 @@ namespace {
 constexpr float kMaxBend_m = 0.04F;
 
 constexpr std::size_t kLinesPerLidar = 256;
-constexpr float kFirstLeaf_m = 0.4F;
 constexpr float kMinLeaf_m = 0.1F;
 constexpr float kMaxLeaf_m = 0.4F;
 
@@ -23,7 +22,7 @@ constexpr float kRangeJumpPerRange = 0.02F;
 } // namespace
 
 RingSegments::RingSegments(std::size_t lidars, std::size_t points_wanted)
-    : points_wanted_(points_wanted), leaf_m_(kFirstLeaf_m), lines_(lidars * kLinesPerLidar),
+    : points_wanted_(points_wanted), leaf_m_(kMinLeaf_m), lines_(lidars * kLinesPerLidar),
       line_begin_(lines_.size() + 1) {
   segments_.reserve(kMaxSegments);
   place_.reserve(kMaxSegments);

@@ -22,15 +22,16 @@ class RingSegments {
 
   RingSegments(std::size_t lidars, std::size_t points_wanted);
 
-  /// Adds a return and gives back the segment it went into, kNone when all are in use. `time_s` counts from the start
-  /// of the sweep.
+  /// Takes in a return and gives back the segment it went into, kNone when all are in use. `time_s` counts from the
+  /// start of the sweep.
   std::uint32_t add(std::uint16_t scan_line, const Eigen::Vector3f& position_m, float range_m, float time_s,
                     float intensity);
 
   /// Writes the centroids sorted by scan line, in it by time, with age_s = duration_s - time; steers the leaf and
-  /// starts over. After it place_of() tells where a segment went.
+  /// starts over.  /// After it place_of() tells where a segment went: kNone for one that went round a corner and was
+  /// left out.
   void finish(float duration_s, std::vector<SweepPoint>& points);
-  [[nodiscard]] std::size_t place_of(std::uint32_t segment) const { return place_[segment]; }
+  [[nodiscard]] std::uint32_t place_of(std::uint32_t segment) const { return place_[segment]; }
 
  private:
   struct Segment {

@@ -20,11 +20,6 @@ constexpr double kMinMiddleToLargest = 0.02; ///< below this they lie on one lin
 constexpr double kMaxSmallestToMiddle = 0.1;
 constexpr std::size_t kMinNeighbours = 5;
 
-/// Whether the i-th of n points is among the `wanted` that are chosen evenly.
-bool is_chosen(std::size_t i, std::size_t n, std::size_t wanted) {
-  return wanted >= n || (i + 1) * wanted / n != i * wanted / n;
-}
-
 /// Centred moments of a point and its neighbours; at most three on each of three lines.
 class Neighbourhood {
  public:
@@ -68,7 +63,7 @@ class Neighbourhood {
 
 } // namespace
 
-void ScanNormals::estimate(std::vector<SweepPoint>& points, std::size_t wanted) {
+void ScanNormals::estimate(std::vector<SweepPoint>& points) {
   lines_.clear();
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (lines_.empty() || lines_.back().id != points[i].scan_line)
@@ -86,8 +81,6 @@ void ScanNormals::estimate(std::vector<SweepPoint>& points, std::size_t wanted) 
                                        beside[1] != nullptr ? beside[1]->begin : 0};
 
     for (std::size_t i = line.begin; i < line.end; ++i) {
-      if (!is_chosen(i, points.size(), wanted))
-        continue;
       SweepPoint& point = points[i];
       Neighbourhood neighbourhood(point.position_base_m);
       for (std::size_t j = std::max(i, line.begin + 1) - 1; j < std::min(i + 2, line.end); ++j)
@@ -105,12 +98,6 @@ void ScanNormals::estimate(std::vector<SweepPoint>& points, std::size_t wanted) 
       point.normal_base = neighbourhood.normal();
     }
   }
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (is_chosen(i, points.size(), wanted))
-      points[kept++] = points[i];
-  }
-  points.resize(kept);
 }
 
 } // namespace locus

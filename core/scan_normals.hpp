@@ -17,9 +17,8 @@ class ScanNormals {
  public:
   explicit ScanNormals(std::size_t max_points) { lines_.reserve(max_points); }
 
-  /// `points` sorted by scan line, within it by time (that is, by falling age). Keeps about `wanted` of them, evenly
-  /// along the lines, and writes their normals; all of them serve as neighbours.
-  void estimate(std::vector<SweepPoint>& points, std::size_t wanted);
+  /// `points` sorted by scan line, within it by time (that is, by falling age). Writes normal_base, nothing else.
+  void estimate(std::vector<SweepPoint>& points);
 
  private:
   struct Line {

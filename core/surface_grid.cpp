@@ -16,16 +16,22 @@ namespace {
 constexpr double kPointVariance_m2 = 0.02 * 0.02;
 
 /// A point stands for a disc, or for a ball where its normal is not known; the radius as a share of the voxel.
-constexpr double kDiscRadiusInLeaves = 0.25;
+constexpr double kDiscRadiusInLeaves = 0.5;
 
-/// How points must spread to count as a plane: in two directions by an absolute and by a relative measure (one scan
-/// line spreads in one only), and little across them. A corner of two walls has a ratio of 0.25 across.
-constexpr double kMinSpreadInLeaves = 0.1;
+/// Points on a plane spread in two directions, by an absolute and by a relative measure (one scan line spreads in one
+/// only), and little across them. With discs around them they always spread, so there the test across may be milder.
+constexpr double kMinSpreadInLeaves = 0.15;
 constexpr double kMinMiddleToLargest = 0.05;
-constexpr double kMaxSmallestToMiddle = 0.15;
+constexpr double kMaxAcrossToMiddle = 0.05;
+constexpr double kMaxAcrossToMiddleOfDiscs = 0.15;
 constexpr double kMaxRoughness_m = 0.15;
 
-constexpr float kEnoughPoints = 8.0F; ///< to be judged by where they lie alone
+/// Enough to be judged by where they lie alone.
+constexpr float kEnoughPoints = 12.0F;
+
+/// Least share of the points' own normals that must agree with the plane: where wall and floor meet, a few points of
+/// the one tilt the plane through the many of the other, and the tilt drags the map along with the scan lines.
+constexpr double kMinAgreement = 0.8;
 
 /// Older points fade once a voxel has seen this many, so a long stay does not freeze it.
 constexpr float kMaxCount = 400.0F;
@@ -156,33 +162,39 @@ void SurfaceGrid::insert(const Eigen::Vector3d& point_m, const Eigen::Vector3d& 
     moments.count *= 0.5F;
     moments.sum *= 0.5F;
     moments.outer *= 0.5F;
-    moments.covariance *= 0.5F;
+    moments.normals *= 0.5F;
+    moments.normal_count *= 0.5F;
   }
-  const double along_m2 = kDiscRadiusInLeaves * kDiscRadiusInLeaves * leaf_m_ * leaf_m_;
   const Eigen::Vector3f offset = (point_m - centre_of(index)).cast<float>();
   moments.count += 1.0F;
   moments.sum += offset;
   moments.outer += upper_of_outer(offset);
-  moments.covariance += static_cast<float>(kPointVariance_m2 - along_m2) * upper_of_outer(normal.cast<float>());
-  for (const int diagonal : {0, 3, 5})
-    moments.covariance[diagonal] += static_cast<float>(along_m2);
+  moments.normals += upper_of_outer(normal.cast<float>());
+  moments.normal_count += normal.isZero() ? 0.0F : 1.0F;
 }
 
 Surface SurfaceGrid::fit(const Moments& moments) const {
-  const auto is_plane = [this](const Eigen::Vector3d& spread_m2) {
+  const Eigen::Matrix3d normals = symmetric(moments.normals);
+  const auto is_plane = [&](const EigenSolver& eigen, double max_across_to_middle) {
+    const Eigen::Vector3d spread_m2 = eigen.eigenvalues();
+    const Eigen::Vector3d normal = eigen.eigenvectors().col(0);
     const double min_spread_m = kMinSpreadInLeaves * leaf_m_;
     return spread_m2[1] > min_spread_m * min_spread_m && spread_m2[1] > kMinMiddleToLargest * spread_m2[2] &&
-           spread_m2[0] < kMaxSmallestToMiddle * spread_m2[1] && spread_m2[0] < kMaxRoughness_m * kMaxRoughness_m;
+           spread_m2[0] < max_across_to_middle * spread_m2[1] && spread_m2[0] < kMaxRoughness_m * kMaxRoughness_m &&
+           normal.dot(normals * normal) >= kMinAgreement * static_cast<double>(moments.normal_count);
   };
   Surface surface;
   surface.mean_m = moments.sum / moments.count;
-  const Upper scatter = moments.outer / moments.count - upper_of_outer(surface.mean_m);
+  const Eigen::Matrix3d scatter = symmetric(moments.outer / moments.count - upper_of_outer(surface.mean_m));
   EigenSolver eigen;
-  eigen.computeDirect(symmetric(scatter));
-  bool planar = moments.count >= kEnoughPoints && is_plane(eigen.eigenvalues());
+  eigen.computeDirect(scatter);
+  bool planar = moments.count >= kEnoughPoints && is_plane(eigen, kMaxAcrossToMiddle);
   if (!planar) {
-    eigen.computeDirect(symmetric(scatter + moments.covariance / moments.count));
-    planar = is_plane(eigen.eigenvalues());
+    const double along_m2 = kDiscRadiusInLeaves * kDiscRadiusInLeaves * leaf_m_ * leaf_m_;
+    const double share = 1.0 / static_cast<double>(moments.count);
+    eigen.computeDirect(scatter + along_m2 * Eigen::Matrix3d::Identity() +
+                        share * (kPointVariance_m2 - along_m2) * normals);
+    planar = is_plane(eigen, kMaxAcrossToMiddleOfDiscs);
   }
   surface.normal = eigen.eigenvectors().col(0).cast<float>();
   if (planar)

@@ -34,7 +34,7 @@ class SurfaceGrid {
  public:
   SurfaceGrid(double leaf_m, std::size_t max_bytes);
 
-  /// Adds a point; `normal` is unit or zero. Call refresh() before the surfaces are read again.
+  /// Takes in a point; `normal` is unit or zero. Call refresh() before the surfaces are read again.
   void insert(const Eigen::Vector3d& point_m, const Eigen::Vector3d& normal);
   /// Brings the surfaces of the voxels up to date that were written to since the last call.
   void refresh();
@@ -74,7 +74,8 @@ class SurfaceGrid {
     float count = 0.0F;
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
     Upper outer = Upper::Zero();
-    Upper covariance = Upper::Zero(); ///< the points' own
+    Upper normals = Upper::Zero(); ///< outer products of the normals, of those points that have one
+    float normal_count = 0.0F;
     bool touched = false;
   };
 

@@ -28,7 +28,7 @@ class SurfaceMap {
 
   explicit SurfaceMap(std::size_t max_bytes);
 
-  /// Adds a sweep seen from T_map_base.
+  /// Takes in a sweep seen from T_map_base.
   void insert(std::span<const SurfacePoint> points_base, const Pose& T_map_base);
   void clear();
 

@@ -44,8 +44,9 @@ struct Sweep {
   std::size_t raw_returns = 0;                ///< returns that came in
   std::array<SourcePose, kMaxSources> sources;
   std::optional<Eigen::Vector3d>
-      specific_force_base_mps2;   ///< mean over the sweep, from the first usable inertial source
-  std::vector<SweepPoint> points; ///< by scan line, within it in the order of firing
+      specific_force_base_mps2; ///< mean over the sweep, from the first usable inertial source
+  std::vector<SweepPoint> points;
+  std::size_t registered = 0; ///< the first so many points, spread evenly, are registered; the rest only serves the map
 };
 
 } // namespace locus

@@ -8,7 +8,7 @@ namespace locus {
 
 namespace {
 
-constexpr double kFullTurn_cdeg = 36000.0;
+constexpr int kFullTurn_cdeg = 36000;
 constexpr Duration kMinPeriod = std::chrono::milliseconds{40}; ///< 1500 rpm
 constexpr Duration kMaxPeriod = std::chrono::milliseconds{250};
 constexpr Duration kDefaultPeriod = std::chrono::milliseconds{100};
@@ -26,15 +26,13 @@ void RevolutionTimer::observe(const LidarPacket& packet) {
   constexpr double kForget = 0.995; ///< a memory of a few sweeps
   if (lidar_ && packet.lidar > *lidar_)
     return;
-  const bool first = lidar_ != packet.lidar;
-  const auto turned = [&](std::uint16_t from, std::uint16_t to) { return (to + 36000 - from) % 36000; };
-  const double step_s = first ? to_seconds(packet.duration) : to_seconds(packet.stamp - last_stamp_);
-  const int step_cdeg = first ? turned(packet.first_azimuth_cdeg, packet.last_azimuth_cdeg)
-                              : turned(last_azimuth_cdeg_, packet.first_azimuth_cdeg);
+  const bool follows = lidar_ == packet.lidar;
+  const double step_s = to_seconds(packet.stamp - last_stamp_);
+  const int step_cdeg = (packet.first_azimuth_cdeg + kFullTurn_cdeg - last_azimuth_cdeg_) % kFullTurn_cdeg;
   lidar_ = packet.lidar;
   last_stamp_ = packet.stamp;
   last_azimuth_cdeg_ = packet.first_azimuth_cdeg;
-  if (step_s <= 0.0 || step_s > kMaxStep_s || step_cdeg == 0)
+  if (!follows || step_s <= 0.0 || step_s > kMaxStep_s || step_cdeg == 0)
     return;
   azimuth_sum_cdeg_ = kForget * azimuth_sum_cdeg_ + step_cdeg;
   time_sum_s_ = kForget * time_sum_s_ + step_s;
@@ -128,7 +126,8 @@ bool SweepBuilder::inside_body(const Eigen::Vector3f& p_base) const {
          (p_base.array() < box.max_m.cast<float>().array()).all();
 }
 
-/// Adds the returns fired in [from, to). Within the packet the motion is taken as linear: one 3x4 matrix and its rate.
+/// Takes in the returns fired in [from, to). Within the packet the motion is taken as linear: one 3x4 matrix and its
+/// rate.
 void SweepBuilder::append(const LidarPacket& packet, Stamp from, Stamp to) {
   const auto affine = [](const Pose& T) {
     Eigen::Matrix<double, 3, 4> A;
@@ -177,12 +176,12 @@ void SweepBuilder::reduce(float duration_s) {
   segments_.finish(duration_s, sweep_.points);
   {
     const StageScope scope(clock_, Stage::covariance);
-    normals_.estimate(sweep_.points,
-                      options_.segment_filter.enabled ? options_.segment_filter.points : sweep_.points.size());
+    normals_.estimate(sweep_.points);
   }
   if (!options_.segment_filter.enabled) {
     for (RawPoint& raw : raw_) {
-      raw.point.normal_base = sweep_.points[segments_.place_of(raw.segment)].normal_base;
+      if (const std::uint32_t place = segments_.place_of(raw.segment); place != RingSegments::kNone)
+        raw.point.normal_base = sweep_.points[place].normal_base;
       raw.point.age_s = duration_s - raw.point.age_s;
     }
     sweep_.points.clear();
@@ -194,6 +193,24 @@ void SweepBuilder::reduce(float duration_s) {
     voxel_filter_.apply(sweep_.points);
   if (options_.random_filter.enabled)
     random_filter_.apply(sweep_.points);
+  sweep_.registered = sweep_.points.size();
+  if (options_.segment_filter.enabled && sweep_.points.size() > options_.segment_filter.points)
+    choose_registered();
+}
+
+/// Moves as many points to the front as are wanted, evenly chosen along the scan lines.
+void SweepBuilder::choose_registered() {
+  const std::size_t wanted = options_.segment_filter.points;
+  const std::size_t total = sweep_.points.size();
+  unregistered_.clear();
+  sweep_.registered = 0;
+  for (std::size_t i = 0; i < total; ++i) {
+    if ((i + 1) * wanted / total != i * wanted / total)
+      sweep_.points[sweep_.registered++] = sweep_.points[i];
+    else
+      unregistered_.push_back(sweep_.points[i]);
+  }
+  std::copy(unregistered_.begin(), unregistered_.end(), sweep_.points.begin() + static_cast<std::ptrdiff_t>(wanted));
 }
 
 void SweepBuilder::move_to_end() {

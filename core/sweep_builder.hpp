@@ -86,6 +86,7 @@ class SweepBuilder {
   void close();
   void append(const LidarPacket& packet, Stamp from, Stamp to);
   void reduce(float duration_s);
+  void choose_registered();
   void move_to_end();
   [[nodiscard]] Pose T_start_base(Stamp stamp);
   [[nodiscard]] Duration period() const;
@@ -105,6 +106,7 @@ class SweepBuilder {
   std::optional<Window> window_;
   std::vector<RawPoint> raw_; ///< only where segments are not the points themselves
   Sweep sweep_;
+  std::vector<SweepPoint> unregistered_;
   Duration lag_{}; ///< of arrival behind firing, as last seen
   std::uint64_t consecutive_late_ = 0;
   Counters counters_;
