@@ -87,7 +87,7 @@ void correct_all(std::span<const SweepPoint> points, const Vector6& twist_base, 
 } // namespace
 
 Odometry::Odometry(const OdometryOptions& options, StageClock* clock)
-    : options_(options), clock_(clock), gicp_(options.threads), map_(options.map.max_bytes),
+    : options_(options), clock_(clock), gicp_(options.threads, options.isa), map_(options.map.max_bytes),
       last_scan_map_(kLastScanBytes), constant_velocity_statistics_(sigma(0.3, 3.0), kRobotsAccelerate) {
   for (const MotionSourceOptions& source : options.motion_sources) {
     const bool imu = source.kind == SourceKind::imu;

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "core/isa.hpp"
 #include "core/pose.hpp"
 #include "core/stamp.hpp"
 
@@ -103,6 +104,7 @@ struct OdometryOptions {
   MapOptions map;
   FlatGround flat_ground = FlatGround::off;
   int threads = 2;
+  Isa isa = best_isa(); ///< no key: a result of the machine, or of the environment variable LOCUS_ISA
 
   [[nodiscard]] std::optional<std::string> problem() const;
   bool operator==(const OdometryOptions&) const = default;

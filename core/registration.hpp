@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 
+#include "core/isa.hpp"
 #include "core/options.hpp"
 #include "core/pose.hpp"
 #include "core/surface_map.hpp"
@@ -43,7 +44,7 @@ class Gicp {
   using StopRequested = std::function<bool()>; ///< asked between iterations; true ends the work with what is there, one
                                                ///< iteration at the least
 
-  explicit Gicp(int threads);
+  explicit Gicp(int threads, Isa isa = best_isa());
   ~Gicp();
   Gicp(const Gicp&) = delete;
   Gicp& operator=(const Gicp&) = delete;

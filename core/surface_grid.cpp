@@ -151,6 +151,8 @@ void SurfaceGrid::erase_entry(VoxelIndex index) {
 }
 
 void SurfaceGrid::insert(const Eigen::Vector3d& point_m, const Eigen::Vector3d& normal) {
+  if (!reaches(point_m))
+    return;
   const VoxelIndex index = index_of(point_m);
   const std::uint32_t slot = find_or_create(index);
   Moments& moments = moments_[slot];

@@ -34,7 +34,8 @@ class SurfaceGrid {
  public:
   SurfaceGrid(double leaf_m, std::size_t max_bytes);
 
-  /// Takes in a point; `normal` is unit or zero. Call refresh() before the surfaces are read again.
+  /// Takes in a point; `normal` is unit or zero. Call refresh() before the surfaces are read again. A point out of
+  /// reach is left out.
   void insert(const Eigen::Vector3d& point_m, const Eigen::Vector3d& normal);
   /// Brings the surfaces of the voxels up to date that were written to since the last call.
   void refresh();
@@ -42,8 +43,14 @@ class SurfaceGrid {
   /// Voxels nearer than `radius_m` to `centre_m` are spared from eviction while there are others.
   void protect(const Eigen::Vector3d& centre_m, double radius_m);
 
-  /// The voxel whose centre, a multiple of the leaf, is nearest: the floor at height zero does not lie between two of
-  /// them.
+  /// Whether a point is finite and within 2^20 voxels of the origin: 500 km at half a metre.
+  [[nodiscard]] bool reaches(const Eigen::Vector3d& point_m) const {
+    constexpr double kMaxIndex = 1 << 20;
+    return (point_m.array().abs() < kMaxIndex * leaf_m_).all();
+  }
+
+  /// Precondition: reaches(point). The voxel whose centre, a multiple of the leaf, is nearest: the floor at height zero
+  /// does not lie between two of them.
   [[nodiscard]] VoxelIndex index_of(const Eigen::Vector3d& point_m) const;
   [[nodiscard]] Eigen::Vector3d centre_of(VoxelIndex index) const;
   /// Nothing where no point has fallen.

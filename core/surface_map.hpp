@@ -32,6 +32,9 @@ class SurfaceMap {
   void insert(std::span<const SurfacePoint> points_base, const Pose& T_map_base);
   void clear();
 
+  /// Whether a point can be looked up: finite, and no farther than voxels can be counted.
+  [[nodiscard]] bool reaches(const Eigen::Vector3d& point_m) const { return fine_.reaches(point_m); }
+
   [[nodiscard]] const SurfaceGrid& fine() const { return fine_; }
   [[nodiscard]] const SurfaceGrid& coarse() const { return coarse_; }
 
