@@ -96,7 +96,7 @@ Eigen::Matrix3d information(const Match& match, const Eigen::Vector3d& source_no
     sum.H.block<3, 1>(3, 3 + column) -= rotated.cross(wMQ.col(column));
   sum.b.head<3>() += w * Md;
   sum.b.tail<3>() += w * rotated.cross(Md);
-  sum.normals += w * match.normal * match.normal.transpose();
+  sum.normals.noalias() += (w * match.normal) * match.normal.transpose();
   sum.error += w * r2;
   sum.weight += w;
   sum.inliers += r2 < width2 ? 1 : 0;

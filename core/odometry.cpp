@@ -80,8 +80,10 @@ SurfacePoint corrected(const SweepPoint& point, const Vector6& twist_base) {
 
 void correct_all(std::span<const SweepPoint> points, const Vector6& twist_base, std::vector<SurfacePoint>& scan) {
   scan.clear();
+  const bool correct_already = twist_base.isZero();
   for (const SweepPoint& point : points)
-    scan.push_back(corrected(point, twist_base));
+    scan.push_back(correct_already ? SurfacePoint{point.position_base_m, point.normal_base}
+                                   : corrected(point, twist_base));
 }
 
 } // namespace

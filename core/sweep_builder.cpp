@@ -19,6 +19,14 @@ constexpr std::uint64_t kLatePacketsToRestart = 500;
 
 constexpr std::size_t kReturnsPerSegmentPoint = 4; ///< room for what the leaf has not learned yet
 
+struct Affine {
+  Eigen::Matrix3f R;
+  Eigen::Vector3f t;
+  Eigen::Vector3f operator*(const Eigen::Vector3f& p) const { return R * p + t; }
+};
+
+Affine affine(const Pose& T) { return {T.R().cast<float>(), T.translation.cast<float>()}; }
+
 } // namespace
 
 void RevolutionTimer::observe(const LidarPacket& packet) {
@@ -120,29 +128,24 @@ Pose SweepBuilder::T_start_base(Stamp stamp) {
   return window_->T_start_base;
 }
 
+bool SweepBuilder::in_range(float range_m) const {
+  return static_cast<double>(range_m) >= options_.min_range_m && static_cast<double>(range_m) <= options_.max_range_m;
+}
+
 bool SweepBuilder::inside_body(const Eigen::Vector3f& p_base) const {
   const BodyBoxOptions& box = options_.body_box;
   return (p_base.array() > box.min_m.cast<float>().array()).all() &&
          (p_base.array() < box.max_m.cast<float>().array()).all();
 }
 
-/// Takes in the returns fired in [from, to). Within the packet the motion is taken as linear: one 3x4 matrix and its
-/// rate.
+/// Takes in the returns fired in [from, to). Within the packet the motion is taken as linear: a transform and its rate.
 void SweepBuilder::append(const LidarPacket& packet, Stamp from, Stamp to) {
-  const auto affine = [](const Pose& T) {
-    Eigen::Matrix<double, 3, 4> A;
-    A << T.R(), T.translation;
-    return A;
-  };
   const Pose& T_base_lidar = T_base_lidar_[packet.lidar];
-  const Eigen::Matrix<double, 3, 4> begin = affine(T_start_base(packet.stamp) * T_base_lidar);
-  const Eigen::Matrix<double, 3, 4> end = affine(T_start_base(packet.stamp + packet.duration) * T_base_lidar);
-  const Eigen::Matrix<float, 3, 4> A = begin.cast<float>();
-  const Eigen::Matrix<float, 3, 4> A_per_ns =
-      ((end - begin) / std::max(1.0, static_cast<double>(packet.duration.count()))).cast<float>();
-  const Eigen::Matrix<float, 3, 4> A_base = affine(T_base_lidar).cast<float>();
-  const auto min_range_m = static_cast<float>(options_.min_range_m);
-  const auto max_range_m = static_cast<float>(options_.max_range_m);
+  const Affine begin = affine(T_start_base(packet.stamp) * T_base_lidar);
+  const Affine end = affine(T_start_base(packet.stamp + packet.duration) * T_base_lidar);
+  const float per_ns = 1.0F / std::max(1.0F, static_cast<float>(packet.duration.count()));
+  const Affine rate{per_ns * (end.R - begin.R), per_ns * (end.t - begin.t)};
+  const Affine mount = affine(T_base_lidar);
   const auto first_ns = static_cast<std::int32_t>((from - packet.stamp).count());
   const auto last_ns = static_cast<std::int32_t>((to - packet.stamp).count());
   const auto packet_s = static_cast<float>(to_seconds(packet.stamp - window_->start));
@@ -152,23 +155,27 @@ void SweepBuilder::append(const LidarPacket& packet, Stamp from, Stamp to) {
     if (r.offset_ns >= last_ns || (r.offset_ns < first_ns && !is_first_part))
       continue;
     ++sweep_.raw_returns;
-    if (!(r.range_m >= min_range_m && r.range_m <= max_range_m))
-      continue;
-    const Eigen::Vector4f p_lidar{r.x_m, r.y_m, r.z_m, 1.0F};
-    if (options_.body_box.enabled && inside_body(A_base * p_lidar))
+    const Eigen::Vector3f p_lidar{r.x_m, r.y_m, r.z_m};
+    if (!in_range(r.range_m) || (options_.body_box.enabled && inside_body(mount * p_lidar)))
       continue;
     const auto offset_ns = static_cast<float>(r.offset_ns);
-    const Eigen::Vector3f p_start = (A + offset_ns * A_per_ns) * p_lidar;
-    const float time_s = packet_s + 1e-9F * offset_ns;
-    const auto scan_line = static_cast<std::uint16_t>(packet.lidar * 256U + r.ring);
-    const std::uint32_t segment = segments_.add(scan_line, p_start, r.range_m, time_s, r.intensity);
-    const bool kept_singly = !options_.segment_filter.enabled;
-    if (segment == RingSegments::kNone || (kept_singly && raw_.size() == max_returns_))
-      ++counters_.overflowed_points;
-    else if (kept_singly)
-      raw_.push_back({{p_start, Eigen::Vector3f::Zero(), time_s, static_cast<float>(r.intensity), scan_line}, segment});
+    const Eigen::Vector3f p_start = begin * p_lidar + offset_ns * (rate * p_lidar);
+    keep({p_start, Eigen::Vector3f::Zero(), packet_s + 1e-9F * offset_ns, static_cast<float>(r.intensity),
+          static_cast<std::uint16_t>(packet.lidar * 256U + r.ring)},
+         r.range_m);
   }
   window_->last_firing = std::max(window_->last_firing, to);
+}
+
+/// `point.age_s` still counts from the start of the window.
+void SweepBuilder::keep(const SweepPoint& point, float range_m) {
+  const std::uint32_t segment =
+      segments_.add(point.scan_line, point.position_base_m, range_m, point.age_s, point.intensity);
+  const bool singly = !options_.segment_filter.enabled;
+  if (segment == RingSegments::kNone || (singly && raw_.size() == max_returns_))
+    ++counters_.overflowed_points;
+  else if (singly)
+    raw_.push_back({point, segment});
 }
 
 /// The filters over the sweep, and the normals, which are found on the segments whatever becomes of these.

@@ -90,6 +90,8 @@ class SweepBuilder {
   void move_to_end();
   [[nodiscard]] Pose T_start_base(Stamp stamp);
   [[nodiscard]] Duration period() const;
+  void keep(const SweepPoint& point, float range_m);
+  [[nodiscard]] bool in_range(float range_m) const;
   [[nodiscard]] bool inside_body(const Eigen::Vector3f& p_base) const;
 
   SweepOptions options_;
