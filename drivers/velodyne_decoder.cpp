@@ -68,8 +68,9 @@ std::optional<PacketError> Decoder::decode(std::span<const std::byte> payload, L
 }
 
 double Decoder::rotation_rate_rpm() const {
-  return column_duration_ == Duration{} ? 0.0
-                                        : 60.0 * double{mean_turn_cdeg_} / kCdegPerTurn / to_seconds(column_duration_);
+  if (column_duration_ == Duration{})
+    return 0.0;
+  return 60.0 * static_cast<double>(mean_turn_cdeg_) / kCdegPerTurn / to_seconds(column_duration_);
 }
 
 std::optional<PacketError> Decoder::recognise(Packet packet, Duration time_of_hour) {

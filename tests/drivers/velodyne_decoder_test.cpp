@@ -25,7 +25,9 @@ LidarPacket decoded(const VelodyneTestPacket& bytes, const DecoderOptions& optio
   return packet;
 }
 
-double clockwise_azimuth_rad(const LidarReturn& r) { return std::atan2(-double{r.y_m}, double{r.x_m}); }
+double clockwise_azimuth_rad(const LidarReturn& r) {
+  return std::atan2(-static_cast<double>(r.y_m), static_cast<double>(r.x_m));
+}
 
 double angle_between(double a_rad, double b_rad) {
   return std::abs(std::remainder(a_rad - b_rad, 2.0 * std::numbers::pi));
@@ -54,9 +56,11 @@ TEST(VelodyneDecoder, EveryFiringOfEveryModelHasItsTimeItsDirectionAndItsRing) {
         ASSERT_EQ(r.offset_ns, expected_ns) << to_string(model) << ' ' << to_string(mode) << " return " << n;
         ASSERT_EQ(r.ring, laser.ring);
         const double range_m = kDistance * figures.calibration.distance_resolution_m;
-        ASSERT_NEAR(double{r.range_m}, range_m, 1e-5);
-        ASSERT_NEAR(double{r.z_m}, range_m * std::sin(laser.elevation_rad) + laser.vertical_offset_m, 1e-5);
-        ASSERT_NEAR(std::hypot(double{r.x_m}, double{r.y_m}), range_m * std::cos(laser.elevation_rad), 1e-5);
+        ASSERT_NEAR(static_cast<double>(r.range_m), range_m, 1e-5);
+        ASSERT_NEAR(static_cast<double>(r.z_m), range_m * std::sin(laser.elevation_rad) + laser.vertical_offset_m,
+                    1e-5);
+        ASSERT_NEAR(std::hypot(static_cast<double>(r.x_m), static_cast<double>(r.y_m)),
+                    range_m * std::cos(laser.elevation_rad), 1e-5);
         const double share = static_cast<double>(expected_ns) / static_cast<double>(figures.column_duration.count());
         const double azimuth_cdeg = 12'345.0 + turn_cdeg * share;
         // Reported and given out in hundredths of a degree: rounded twice.

@@ -135,9 +135,9 @@ using Revolution = std::multimap<Key, Point>;
 Point turned_clockwise(const LidarReturn& at, double angle_rad, double lift_m) {
   const double c = std::cos(angle_rad);
   const double s = std::sin(angle_rad);
-  const double x = double{at.x_m};
-  const double y = double{at.y_m};
-  return {c * x + s * y, c * y - s * x, double{at.z_m} + lift_m};
+  const double x = static_cast<double>(at.x_m);
+  const double y = static_cast<double>(at.y_m);
+  return {c * x + s * y, c * y - s * x, static_cast<double>(at.z_m) + lift_m};
 }
 
 /// Where another decoder with conventions of its own puts the return of laser `laser` that was fired in column `column`
@@ -188,7 +188,8 @@ std::vector<Revolution> decode_to_convention(const std::vector<std::byte>& packe
       const double own_turn = turn < kBlindSectorRad ? turn : mean_turn; // the other turns through the blind sector
       const double moved_rad = turn * convention.share(laser, own_share, column == last_column) - own_turn * own_share;
       const double lift_m = convention.has_vertical_offsets ? 0.0 : -lasers[laser].vertical_offset_m;
-      const int ticks = static_cast<int>(std::lround(double{r.range_m} / spec.calibration.distance_resolution_m));
+      const int ticks =
+          static_cast<int>(std::lround(static_cast<double>(r.range_m) / spec.calibration.distance_resolution_m));
       revolutions.back().emplace(Key{r.ring, ticks, keeps_intensity ? r.intensity : 0},
                                  turned_clockwise(r, moved_rad, lift_m));
     }
@@ -246,8 +247,8 @@ struct PlainPoint {
 std::vector<std::pair<Key, Point>> expected_dual_points() {
   std::vector<std::pair<Key, Point>> points;
   for (const DualPoint& p : test::read_binary_pcd<DualPoint>(velodyne_data("vlp16_dual.expected.pcd")))
-    points.push_back({{p.channel, static_cast<int>(std::lround(double{p.distance} / 0.002)), p.intensity},
-                      {double{p.x}, double{p.y}, double{p.z}}});
+    points.push_back({{p.channel, static_cast<int>(std::lround(static_cast<double>(p.distance) / 0.002)), p.intensity},
+                      {static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)}});
   return points;
 }
 
@@ -273,7 +274,7 @@ TEST(VelodyneReference, Vlp32cReturnsAreThoseOfAnotherDecoderInItsConventions) {
   const auto lasers = velodyne::spec(Model::vlp32c).calibration.lasers();
   std::vector<std::pair<Key, Point>> expected;
   for (const PlainPoint& p : test::read_binary_pcd<PlainPoint>(velodyne_data("vlp32c_strongest.expected.pcd"))) {
-    const Point point{double{p.x}, double{p.y}, double{p.z}};
+    const Point point{static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)};
     const double range_m = distance(point, {0.0, 0.0, 0.0});
     const double elevation_rad = std::asin(point.z_m / range_m);
     const auto laser = std::min_element(lasers.begin(), lasers.end(), [&](const auto& a, const auto& b) {
