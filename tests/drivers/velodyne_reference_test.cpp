@@ -135,8 +135,8 @@ using Revolution = std::multimap<Key, Point>;
 Point turned_clockwise(const LidarReturn& at, double angle_rad, double lift_m) {
   const double c = std::cos(angle_rad);
   const double s = std::sin(angle_rad);
-  const double x = static_cast<double>(at.x_m);
-  const double y = static_cast<double>(at.y_m);
+  const auto x = static_cast<double>(at.x_m);
+  const auto y = static_cast<double>(at.y_m);
   return {c * x + s * y, c * y - s * x, static_cast<double>(at.z_m) + lift_m};
 }
 
