@@ -51,12 +51,6 @@ Vector6 sigma(double translation_m, double rotation_deg) {
 const Vector6 kRobotsAccelerate = sigma(0.02, 0.5);
 const Vector6 kUnknownMotion = sigma(3.0, 10.0); ///< per sweep, of a robot of which nothing is known
 
-/// Roll and pitch that a resting robot must have for gravity to read as it does; no yaw.
-Eigen::Quaterniond level(const Eigen::Vector3d& specific_force_base_mps2) {
-  const Eigen::Vector3d& f = specific_force_base_mps2;
-  return from_rpy_rad({std::atan2(f.y(), f.z()), std::atan2(-f.x(), std::hypot(f.y(), f.z())), 0.0});
-}
-
 /// Block-diagonal matrix that turns both halves of a 6-vector.
 Matrix6 turn_both(const Eigen::Quaterniond& rotation) {
   Matrix6 R = Matrix6::Zero();
@@ -89,8 +83,9 @@ void correct_all(std::span<const SweepPoint> points, const Vector6& twist_base, 
 } // namespace
 
 Odometry::Odometry(const OdometryOptions& options, StageClock* clock)
-    : options_(options), clock_(clock), gicp_(options.threads, options.isa), map_(options.map.max_bytes),
-      last_scan_map_(kLastScanBytes), constant_velocity_statistics_(sigma(0.3, 3.0), kRobotsAccelerate) {
+    : options_(options), clock_(clock), gicp_(options.threads, options.isa), flat_ground_(options.flat_ground),
+      map_(options.map.max_bytes), last_scan_map_(kLastScanBytes),
+      constant_velocity_statistics_(sigma(0.3, 3.0), kRobotsAccelerate) {
   for (const MotionSourceOptions& source : options.motion_sources) {
     const bool imu = source.kind == SourceKind::imu;
     statistics_.emplace_back(imu ? sigma(0.3, 0.3) : sigma(0.05, 0.5), sigma(0.002, 0.02));
@@ -101,6 +96,7 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
   if (processed_ == 0)
     return begin(sweep);
   const Prior prior = integrate_sensors(sweep);
+  flat_ground_.observe(sweep.end, sweep.specific_force_base_mps2);
   Pose T_last_now = prior.T_last_now;
   correct_motion(sweep, T_last_now);
 
@@ -109,13 +105,13 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
   if (trusts(estimate.scan_to_scan, estimate.scan_to_scan.T_target_source, prior)) {
     if (prior.blind)
       begin_again(sweep, prior, estimate.scan_to_scan, stop);
-    T_last_now = estimate.scan_to_scan.T_target_source;
+    T_last_now = flatten(estimate.scan_to_scan.T_target_source);
     correct_motion(sweep, T_last_now);
   }
   estimate.scan_to_submap = match_submap(prior, T_last_now, stop);
   const Pose T_last_submap = T_odom_last_.inverse() * estimate.scan_to_submap.T_target_source;
   estimate.failed = !trusts(estimate.scan_to_submap, T_last_submap, prior);
-  estimate.T_odom_base = T_odom_last_ * (estimate.failed ? T_last_now : T_last_submap);
+  estimate.T_odom_base = T_odom_last_ * (estimate.failed ? T_last_now : flatten(T_last_submap));
   finish(sweep, prior, estimate);
   return estimate;
 }
@@ -124,7 +120,7 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
 OdometryEstimate Odometry::begin(const Sweep& sweep) {
   const auto& force = sweep.specific_force_base_mps2;
   if (force && std::abs(force->norm() - kGravity_mps2) < kGravityTolerance_mps2)
-    T_odom_last_.rotation = level(*force);
+    T_odom_last_.rotation = from_rpy_rad(level_rpy_rad(*force));
   correct_all(sweep.points, Vector6::Zero(), scan_);
   registered_ = sweep.registered;
   if (sweep.uncorrected != Uncorrected::nothing)
@@ -228,6 +224,12 @@ Registration Odometry::match_submap(const Prior& prior, const Pose& T_last_now, 
   const PosePrior pose_prior{T_odom_last_ * prior.T_last_now,
                              R * prior.variance.cwiseInverse().asDiagonal() * R.transpose()};
   return gicp_.align(registered(), map_, T_start, pose_prior, options_.scan_to_submap, false, stop);
+}
+
+Pose Odometry::flatten(const Pose& T_last_now) const {
+  if (!flat_ground_.holds())
+    return T_last_now;
+  return T_odom_last_.inverse() * FlatGroundAssumption::flatten(T_odom_last_, T_odom_last_ * T_last_now);
 }
 
 bool Odometry::trusts(const Registration& registration, const Pose& T_last_now, const Prior& prior) const {

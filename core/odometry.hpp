@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "core/flat_ground.hpp"
 #include "core/odometry_estimate.hpp"
 #include "core/options.hpp"
 #include "core/prior_statistics.hpp"
@@ -50,6 +51,7 @@ class Odometry {
   Registration match_scan(const Prior& prior, const Pose& T_start, bool wide, const Gicp::StopRequested& stop);
   Registration match_submap(const Prior& prior, const Pose& T_last_now, const Gicp::StopRequested& stop);
   void begin_again(const Sweep& sweep, const Prior& prior, Registration& found, const Gicp::StopRequested& stop);
+  [[nodiscard]] Pose flatten(const Pose& T_last_now) const;
   [[nodiscard]] bool trusts(const Registration& registration, const Pose& T_last_now, const Prior& prior) const;
   void learn(const Prior& prior, const Pose& T_last_now, const Registration& registration);
   [[nodiscard]] std::span<const SurfacePoint> registered() const { return std::span(scan_).first(registered_); }
@@ -59,6 +61,7 @@ class Odometry {
   OdometryOptions options_;
   StageClock* clock_;
   Gicp gicp_;
+  FlatGroundAssumption flat_ground_;
   SurfaceMap map_;
   SurfaceMap last_scan_map_;       ///< the last processed sweep alone, the target of scan-to-scan
   std::vector<SurfacePoint> scan_; ///< the sweep at hand, fully corrected

@@ -2,6 +2,7 @@
 // locus-replay: a recorded capture in; odometry, map and figures out.
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <optional>
 #include <string>
@@ -42,11 +43,24 @@ Config config_or_fail(Expected<Config, ConfigErrors> config) {
   return *config;
 }
 
+Isa isa_or_fail(const std::string& name) {
+  const std::optional<Isa> isa = isa_from_string(name);
+  if (!isa || !is_supported(*isa))
+    throw Failure(ExitStatus::wrong_usage,
+                  fmt::format("LOCUS_ISA={}: {}; unset it, or choose one of {} that this processor has", name,
+                              isa ? "this processor cannot run it" : "no such instruction set",
+                              fmt::join(kIsaNames, ", ")));
+  return *isa;
+}
+
 Config configuration(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
   Config config;
   if (!file.empty())
     config = config_or_fail(load_config(file));
-  return config_or_fail(override_config(config, overrides));
+  config = config_or_fail(override_config(config, overrides));
+  if (const char* const isa = std::getenv("LOCUS_ISA"))
+    config.odometry.isa = isa_or_fail(isa);
+  return config;
 }
 
 void check_faults(const std::vector<Fault>& faults, const Config& config) {

@@ -127,7 +127,7 @@ ordered_json summary(const FinishedRun& run) {
           {"capture", run.capture},
           {"config_sha256", config_sha256(run.config)},
           {"threads", run.config.odometry.threads},
-          {"isa", "baseline"},
+          {"isa", std::string(to_string(run.config.odometry.isa))},
           {"duration_s", rounded(to_seconds(run.duration))},
           {"wall_s", rounded(to_seconds(run.spent.wall))},
           {"cpu_s", rounded(to_seconds(run.spent.cpu))},

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+
+#include "core/options.hpp"
+#include "core/pose.hpp"
+#include "core/stamp.hpp"
+
+namespace locus {
+
+/// Roll and pitch (rad) that a resting base must have for gravity to read as it does; the yaw is zero.
+Eigen::Vector3d level_rpy_rad(const Eigen::Vector3d& specific_force_base_mps2);
+
+/// The flat ground assumption (paper II-C): no motion up or down, no roll, no pitch, in the gravity-aligned odometry
+/// frame.
+///
+/// Known from context (on), or found (automatic): the inertial sensor has seen the base level for long enough. It ends
+/// at once when the base is level no more. One owner.
+class FlatGroundAssumption {
+ public:
+  explicit FlatGroundAssumption(FlatGround mode) : mode_(mode) {}
+
+  /// Looks at the mean specific force of a sweep, where there is one.
+  void observe(Stamp stamp, const std::optional<Eigen::Vector3d>& specific_force_base_mps2);
+
+  [[nodiscard]] bool holds() const { return mode_ == FlatGround::on || (mode_ == FlatGround::automatic && found_); }
+
+  /// T_odom_base as it is on the plane of T_odom_last.
+  [[nodiscard]] static Pose flatten(const Pose& T_odom_last, const Pose& T_odom_base);
+
+ private:
+  FlatGround mode_;
+  bool found_ = false;
+  std::optional<Stamp> level_since_;
+};
+
+} // namespace locus
