@@ -30,12 +30,11 @@ Match find_here(const SurfaceMap& map, const Eigen::Vector3d& point, double max_
   return {};
 }
 
-/// The plane of the 27 coarse voxels around whose mean is nearest, at most a voxel away.
-Match find_around(const SurfaceMap& map, const Eigen::Vector3d& point) {
-  const SurfaceGrid& grid = map.coarse();
+/// The plane of the 27 voxels around whose mean is nearest, at most `reach_m` away.
+Match nearest_around(const SurfaceGrid& grid, const Eigen::Vector3d& point, double reach_m) {
   const VoxelIndex centre = grid.index_of(point);
   Match nearest;
-  double nearest_m2 = grid.leaf_m() * grid.leaf_m();
+  double nearest_m2 = reach_m * reach_m;
   for (int i = 0; i < 27; ++i) {
     const VoxelIndex index{centre.x + i % 3 - 1, centre.y + i / 3 % 3 - 1, centre.z + i / 9 - 1};
     const Surface* surface = grid.find(index);
@@ -49,6 +48,12 @@ Match find_around(const SurfaceMap& map, const Eigen::Vector3d& point) {
     }
   }
   return nearest;
+}
+
+/// A plane near the point: of the fine grid if there is one within reach, else of the coarse one.
+Match find_around(const SurfaceMap& map, const Eigen::Vector3d& point) {
+  const Match fine = nearest_around(map.fine(), point, map.fine().leaf_m());
+  return fine.variance_m2 > 0.0 ? fine : nearest_around(map.coarse(), point, map.coarse().leaf_m());
 }
 
 /// (C_target + C_source)^-1 of two surfaces with covariance I + (variance - 1) n n' along their normals n and m, in

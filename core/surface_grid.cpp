@@ -189,8 +189,11 @@ Surface SurfaceGrid::fit(const Moments& moments) const {
   surface.mean_m = moments.sum / moments.count;
   const Eigen::Matrix3d scatter = symmetric(moments.outer / moments.count - upper_of_outer(surface.mean_m));
   EigenSolver eigen;
-  eigen.computeDirect(scatter);
-  bool planar = moments.count >= kEnoughPoints && is_plane(eigen, kMaxAcrossToMiddle);
+  bool planar = false;
+  if (moments.count >= kEnoughPoints) {
+    eigen.computeDirect(scatter);
+    planar = is_plane(eigen, kMaxAcrossToMiddle);
+  }
   if (!planar) {
     const double along_m2 = kDiscRadiusInLeaves * kDiscRadiusInLeaves * leaf_m_ * leaf_m_;
     const double share = 1.0 / static_cast<double>(moments.count);
