@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/motion_sources.hpp"
+
+#include <gtest/gtest.h>
+
+namespace locus {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr Stamp at_ms(int ms) { return stamp_from_ns(1'000'000'000) + milliseconds{ms}; }
+
+const std::vector<MotionSourceOptions> kWheelsImuVisual{
+    {"wheels", SourceKind::odometry, {}}, {"imu", SourceKind::imu, {}}, {"visual", SourceKind::odometry, {}}};
+
+/// Wheels that say 1 m/s and no turn, a gyro that says 1 rad/s, a visual odometry that says 2 m/s and 2 rad/s.
+class MotionSourcesTest : public testing::Test {
+ protected:
+  static void feed(MotionSources& sources, std::size_t source, int from_ms, int to_ms) {
+    for (int ms = from_ms; ms <= to_ms; ms += 20) {
+      const Stamp stamp = at_ms(ms);
+      const double t_s = 1e-3 * ms;
+      if (source == 0)
+        sources.add(0, OdometrySample{stamp, stamp, {Eigen::Quaterniond::Identity(), {t_s, 0, 0}}, 1.0});
+      else if (source == 1)
+        sources.add(1, ImuSample{stamp, stamp, {0, 0, 1.0}, {0, 0, 9.81}, {}});
+      else
+        sources.add(2, OdometrySample{stamp, stamp, {so3_exp({0, 0, 2 * t_s}), {2 * t_s, 0, 0}}, 1.0});
+    }
+  }
+};
+
+TEST_F(MotionSourcesTest, CombinedTakesRotationFromTheGyroAndTranslationFromTheOdometry) {
+  MotionSources sources(kWheelsImuVisual, Fusion::combined);
+  for (const std::size_t source : {0U, 1U, 2U})
+    feed(sources, source, 0, 1000);
+  const SourceChoice choice = sources.choose(at_ms(1000));
+  EXPECT_EQ(choice.rotation, 1U);
+  EXPECT_EQ(choice.translation, 0U);
+  EXPECT_EQ(choice.uncorrected(), Uncorrected::nothing);
+  const auto T = sources.motion(choice, at_ms(400), at_ms(500));
+  ASSERT_TRUE(T);
+  EXPECT_NEAR(T->translation.x(), 0.1, 1e-9);
+  EXPECT_NEAR(so3_log(T->rotation).z(), 0.1, 1e-9);
+}
+
+TEST_F(MotionSourcesTest, QueueTakesAllFromTheFirstHealthyOne) {
+  MotionSources sources(kWheelsImuVisual, Fusion::queue);
+  for (const std::size_t source : {0U, 1U, 2U})
+    feed(sources, source, 0, 1000);
+  const SourceChoice choice = sources.choose(at_ms(1000));
+  EXPECT_EQ(choice.rotation, 0U);
+  EXPECT_EQ(choice.translation, 0U);
+  EXPECT_NEAR(so3_log(sources.motion(choice, at_ms(400), at_ms(500))->rotation).z(), 0.0, 1e-12);
+}
+
+TEST_F(MotionSourcesTest, AnInertialSourceFirstInTheQueueLeavesTheTranslationOpen) {
+  MotionSources sources({kWheelsImuVisual[1], kWheelsImuVisual[0]}, Fusion::queue);
+  sources.add(0, ImuSample{at_ms(0), at_ms(0), {0, 0, 1.0}, {0, 0, 9.81}, {}});
+  sources.add(1, OdometrySample{at_ms(0), at_ms(0), {}, 1.0});
+  const SourceChoice choice = sources.choose(at_ms(10));
+  EXPECT_EQ(choice.rotation, 0U);
+  EXPECT_FALSE(choice.translation);
+  EXPECT_EQ(choice.uncorrected(), Uncorrected::translation);
+}
+
+TEST_F(MotionSourcesTest, ASilentSourceIsNotChosen) {
+  MotionSources sources(kWheelsImuVisual, Fusion::queue);
+  feed(sources, 0, 0, 1000);
+  feed(sources, 2, 0, 2500);
+  EXPECT_EQ(sources.choose(at_ms(1990)).translation, 0U);
+  EXPECT_EQ(sources.choose(at_ms(2001)).translation, 2U) << "a second of silence is too long";
+}
+
+TEST_F(MotionSourcesTest, WithoutAnySourceNothingIsCorrected) {
+  const MotionSources sources({}, Fusion::combined);
+  const SourceChoice choice = sources.choose(at_ms(0));
+  EXPECT_FALSE(choice.rotation);
+  EXPECT_FALSE(choice.translation);
+  EXPECT_EQ(choice.uncorrected(), Uncorrected::all);
+  EXPECT_EQ(*sources.motion(choice, at_ms(0), at_ms(100)), Pose{});
+}
+
+TEST_F(MotionSourcesTest, NoMotionWhereATrackDoesNotReach) {
+  MotionSources sources(kWheelsImuVisual, Fusion::combined);
+  feed(sources, 0, 0, 1000);
+  feed(sources, 1, 500, 1000);
+  const SourceChoice choice = sources.choose(at_ms(1000));
+  EXPECT_TRUE(sources.motion(choice, at_ms(500), at_ms(600)));
+  EXPECT_FALSE(sources.motion(choice, at_ms(400), at_ms(600)));
+}
+
+TEST_F(MotionSourcesTest, DescribeWritesThePoseOfEverySourceThatSpokeDuringTheSweep) {
+  MotionSources sources(kWheelsImuVisual, Fusion::queue);
+  feed(sources, 0, 0, 1000);
+  feed(sources, 1, 0, 1000);
+  feed(sources, 2, 0, 800);
+  Sweep sweep;
+  sweep.start = at_ms(900);
+  sweep.end = at_ms(1000);
+  sources.describe(sweep);
+  EXPECT_TRUE(sweep.sources[0].usable);
+  EXPECT_TRUE(sweep.sources[1].usable);
+  EXPECT_FALSE(sweep.sources[2].usable);
+  EXPECT_FALSE(sweep.sources[3].usable) << "there is no such source";
+  EXPECT_NEAR(sweep.sources[0].T_source_base.translation.x(), 1.0, 1e-12);
+  EXPECT_NEAR(so3_log(sweep.sources[1].T_source_base.rotation).z(), 1.0, 1e-6);
+  ASSERT_TRUE(sweep.specific_force_base_mps2);
+  EXPECT_NEAR(sweep.specific_force_base_mps2->z(), 9.81, 1e-12);
+
+  sweep.start = at_ms(2000);
+  sweep.end = at_ms(2100);
+  sources.describe(sweep);
+  EXPECT_FALSE(sweep.sources[0].usable);
+  EXPECT_FALSE(sweep.specific_force_base_mps2) << "nothing is left of the sweep before";
+}
+
+} // namespace
+} // namespace locus

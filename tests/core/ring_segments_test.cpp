@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/ring_segments.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <numbers>
+#include <vector>
+
+namespace locus {
+namespace {
+
+constexpr float kSweep_s = 0.1F;
+constexpr int kReturns = 1800; ///< of a scan line
+
+/// One scan line all around; what its laser meets is given by its range over the azimuth. Gives back the segment of
+/// each return.
+std::vector<std::uint32_t> scan(RingSegments& segments, std::uint16_t scan_line,
+                                const std::function<double(double)>& range_m) {
+  std::vector<std::uint32_t> result;
+  for (int i = 0; i < kReturns; ++i) {
+    const double azimuth = 2 * std::numbers::pi * i / kReturns;
+    const double r = range_m(azimuth);
+    const Eigen::Vector3d p{r * std::cos(azimuth), r * std::sin(azimuth), 0.1 * scan_line};
+    result.push_back(segments.add(scan_line, p.cast<float>(), static_cast<float>(r),
+                                  kSweep_s * static_cast<float>(i) / kReturns, 50.0F));
+  }
+  return result;
+}
+
+double tank(double) { return 5.0; }
+
+/// From the middle of a square room of 8 m.
+double square_room(double azimuth) { return 4.0 / std::max(std::abs(std::cos(azimuth)), std::abs(std::sin(azimuth))); }
+
+TEST(RingSegments, CentroidsComeByScanLineAndWithinItByTime) {
+  RingSegments segments(2, 100);
+  for (const int line : {7, 0, 256 + 3, 2})
+    scan(segments, static_cast<std::uint16_t>(line), tank);
+  std::vector<SweepPoint> points;
+  segments.finish(kSweep_s, points);
+  ASSERT_GT(points.size(), 40U);
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    ASSERT_GE(points[i].scan_line, points[i - 1].scan_line);
+    if (points[i].scan_line == points[i - 1].scan_line) {
+      ASSERT_LT(points[i].age_s, points[i - 1].age_s);
+    }
+  }
+}
+
+TEST(RingSegments, ACentroidHasTheMeanPlaceTimeAndIntensityOfItsReturns) {
+  RingSegments segments(1, 100);
+  std::vector<std::uint32_t> used;
+  for (int i = 0; i < 4; ++i)
+    used.push_back(segments.add(0, {5.0F, 0.01F * static_cast<float>(i), 0.0F}, 5.0F, 0.01F * static_cast<float>(i),
+                                10.0F * static_cast<float>(i)));
+  ASSERT_EQ(used[0], used[3]);
+  std::vector<SweepPoint> points;
+  segments.finish(kSweep_s, points);
+  ASSERT_EQ(points.size(), 1U);
+  EXPECT_EQ(segments.place_of(used[0]), 0U);
+  EXPECT_LT((points[0].position_base_m - Eigen::Vector3f{5.0F, 0.015F, 0.0F}).norm(), 1e-5F);
+  EXPECT_NEAR(points[0].age_s, 0.1F - 0.015F, 1e-6F);
+  EXPECT_NEAR(points[0].intensity, 15.0F, 1e-5F);
+  EXPECT_TRUE(points[0].normal_base.isZero());
+}
+
+TEST(RingSegments, AStepInRangeIsAnotherSurface) {
+  RingSegments segments(1, 100);
+  const std::uint32_t wall = segments.add(0, {5.0F, 0.0F, 0.0F}, 5.0F, 0.0F, 0.0F);
+  const std::uint32_t pillar = segments.add(0, {4.5F, 0.01F, 0.0F}, 4.5F, 0.001F, 0.0F);
+  EXPECT_NE(wall, pillar);
+}
+
+TEST(RingSegments, NoSegmentIsLongerThanTheLargestLeaf) {
+  RingSegments segments(1, 10); // few: the leaf grows as far as it may
+  std::vector<SweepPoint> points;
+  for (int sweep = 0; sweep < 10; ++sweep) {
+    const auto used = scan(segments, 0, tank);
+    segments.finish(kSweep_s, points);
+    for (int i = 0; i < kReturns; ++i) {
+      const double azimuth = 2 * std::numbers::pi * i / kReturns;
+      const Eigen::Vector3d p{5 * std::cos(azimuth), 5 * std::sin(azimuth), 0};
+      const std::size_t place = segments.place_of(used[static_cast<std::size_t>(i)]);
+      ASSERT_LT((points[place].position_base_m.cast<double>() - p).norm(), 0.25);
+    }
+  }
+}
+
+TEST(RingSegments, TheLeafFollowsTheSceneToTheNumberWanted) {
+  RingSegments segments(1, 1000); // 8 lines of 31 m: a leaf of 0.25 m
+  std::vector<SweepPoint> points;
+  for (int sweep = 0; sweep < 10; ++sweep) {
+    for (std::uint16_t line = 0; line < 8; ++line)
+      scan(segments, line, tank);
+    segments.finish(kSweep_s, points);
+  }
+  EXPECT_GT(points.size(), 800U);
+  EXPECT_LT(points.size(), 1300U);
+}
+
+TEST(RingSegments, NoCentroidCutsACorner) {
+  RingSegments segments(1, 10);
+  std::vector<SweepPoint> points;
+  bool corner_left_out = false;
+  for (int sweep = 0; sweep < 20; ++sweep) {
+    for (const std::uint32_t segment : scan(segments, 0, [&](double a) { return square_room(a + 0.013 * sweep); })) {
+      ASSERT_NE(segment, RingSegments::kNone);
+    }
+    const auto used = scan(segments, 1, square_room);
+    segments.finish(kSweep_s, points);
+    for (const std::uint32_t segment : used)
+      corner_left_out |= segments.place_of(segment) == RingSegments::kNone;
+    for (const SweepPoint& p : points) {
+      if (p.scan_line != 1)
+        continue;
+      const double off_m = 4.0 - static_cast<double>(p.position_base_m.head<2>().cwiseAbs().maxCoeff());
+      ASSERT_LT(off_m, 0.03);
+    }
+  }
+  EXPECT_TRUE(corner_left_out);
+}
+
+TEST(RingSegments, MoreThanFitAreRefused) {
+  RingSegments segments(1, 1000);
+  std::size_t refused = 0;
+  for (std::size_t i = 0; i < RingSegments::kMaxSegments + 100; ++i) {
+    const float range_m = i % 2 == 0 ? 5.0F : 50.0F;
+    if (segments.add(0, {range_m, 0, 0}, range_m, 0.0F, 0.0F) == RingSegments::kNone)
+      ++refused;
+  }
+  EXPECT_EQ(refused, 100U);
+  std::vector<SweepPoint> points;
+  segments.finish(kSweep_s, points);
+  EXPECT_EQ(points.size(), RingSegments::kMaxSegments);
+  EXPECT_NE(segments.add(0, {5, 0, 0}, 5.0F, 0.0F, 0.0F), RingSegments::kNone) << "the next sweep starts afresh";
+}
+
+TEST(RingSegments, AnEmptySweepIsEmpty) {
+  RingSegments segments(1, 1000);
+  std::vector<SweepPoint> points(3);
+  segments.finish(kSweep_s, points);
+  EXPECT_TRUE(points.empty());
+}
+
+} // namespace
+} // namespace locus

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "core/odometry.hpp"
+#include "core/options.hpp"
+#include "core/sweep_builder.hpp"
+#include "drivers/velodyne_decoder.hpp"
+#include "support/packet_encoder.hpp"
+#include "support/scene.hpp"
+#include "support/synthetic_sources.hpp"
+#include "support/trajectory.hpp"
+
+namespace locus::test {
+
+inline constexpr std::size_t kMaxReturns = 100'000; ///< of one sweep; a VLP-16 makes 30 000
+
+/// What a robot of the tests carries: a level VLP-16 on a mast, unless said otherwise, and no motion source.
+struct RobotSetup {
+  std::vector<sim::SyntheticLidarOptions> lidars{on_mast()};
+  std::optional<sim::OdometryFaults> wheels; ///< 50 Hz, first in the queue
+  std::optional<sim::ImuFaults> imu;         ///< 200 Hz
+  double wheels_rate_hz = 50.0;
+  SweepOptions sweep;
+  Fusion fusion = Fusion::combined;
+  std::function<bool(std::size_t lidar, Stamp)> is_lost = [](std::size_t, Stamp) { return false; }; ///< packets
+  std::function<bool(std::size_t source, Stamp)> is_silent = [](std::size_t, Stamp) { return false; };
+
+  static sim::SyntheticLidarOptions on_mast();
+  [[nodiscard]] std::vector<MotionSourceOptions> motion_sources() const;
+  [[nodiscard]] OdometryOptions odometry() const;
+};
+
+/// A stream of decoded packets of one synthetic lidar, stamped with the true time. One owner.
+class PacketStream {
+ public:
+  /// Scene and trajectory must outlive it.
+  PacketStream(const sim::Scene& scene, const sim::Trajectory& trajectory, const sim::SyntheticLidarOptions& options,
+               std::uint8_t index);
+
+  [[nodiscard]] const LidarPacket& packet() const { return packet_; }
+  [[nodiscard]] Stamp arrival() const { return packet_.stamp + packet_.duration; }
+  void advance();
+
+ private:
+  sim::SyntheticLidar lidar_;
+  velodyne::Decoder decoder_;
+  LidarPacket packet_;
+};
+
+/// Drives the robot for `duration`; `sink` gets each sweep. Gives back what the builder counted.
+SweepBuilder::Counters drive(const sim::Scene& scene, const sim::Trajectory& trajectory, const RobotSetup& setup,
+                             Duration duration, const SweepBuilder::Sink& sink);
+
+/// All sweeps of a drive.
+std::vector<Sweep> sweeps_of(const sim::Scene& scene, const sim::Trajectory& trajectory, const RobotSetup& setup,
+                             Duration duration);
+
+/// Where the base truly is, seen from where it was at the first stamp.
+Pose true_motion(const sim::Trajectory& trajectory, Stamp from, Stamp to);
+
+} // namespace locus::test
