@@ -29,8 +29,10 @@ struct SourceChoice {
 /// Fusion::queue the first healthy one in the queue gives all it has. One owner.
 class MotionSources {
  public:
-  /// Silence after which a source is no longer healthy: the paper's rate check, > 1 Hz.
-  static constexpr Duration kTimeout = std::chrono::seconds{1};
+  /// Silence after which a source does not correct motion any more: one sample of the slowest (10 Hz) and the time for
+  /// which tracks are extrapolated. Sooner than the paper's rate check (> 1 Hz), which would correct ten sweeps with a
+  /// standstill.
+  static constexpr Duration kTimeout = std::chrono::milliseconds{150};
 
   MotionSources(const std::vector<MotionSourceOptions>& options, Fusion fusion);
 

@@ -20,6 +20,8 @@ std::vector<PcdPoint> points_of(const SurfaceGrid& grid) {
   std::vector<PcdPoint> points;
   for (std::size_t slot = 0; slot < grid.size(); ++slot) {
     const Surface& surface = grid.surface(slot);
+    if (!surface.planar())
+      continue;
     const Eigen::Vector3f p = (grid.centre(slot) + surface.mean_m.cast<double>()).cast<float>();
     const Eigen::Vector3f& n = surface.normal;
     points.push_back({p.x(), p.y(), p.z(), n.x(), n.y(), n.z()});
