@@ -68,8 +68,9 @@ TEST_F(MotionSourcesTest, ASilentSourceIsNotChosen) {
   MotionSources sources(kWheelsImuVisual, Fusion::queue);
   feed(sources, 0, 0, 1000);
   feed(sources, 2, 0, 2500);
-  EXPECT_EQ(sources.choose(at_ms(1990)).translation, 0U);
-  EXPECT_EQ(sources.choose(at_ms(2001)).translation, 2U) << "a second of silence is too long";
+  const Stamp silent_since = at_ms(1000);
+  EXPECT_EQ(sources.choose(silent_since + MotionSources::kTimeout - milliseconds{1}).translation, 0U);
+  EXPECT_EQ(sources.choose(silent_since + MotionSources::kTimeout).translation, 2U);
 }
 
 TEST_F(MotionSourcesTest, WithoutAnySourceNothingIsCorrected) {
