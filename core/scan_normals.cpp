@@ -42,10 +42,10 @@ class Neighbourhood {
   [[nodiscard]] Eigen::Vector3f normal() const {
     if (count_ < kMinNeighbours)
       return Eigen::Vector3f::Zero();
-    const double n = static_cast<double>(count_);
+    const auto n = static_cast<double>(count_);
     const Eigen::Matrix3d covariance = (outer_ - sum_ * sum_.transpose() / n) / n;
     const auto eigen = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>{}.computeDirect(covariance);
-    const Eigen::Vector3d spread = eigen.eigenvalues();
+    const Eigen::Vector3d& spread = eigen.eigenvalues();
     if (spread[0] > kMaxRoughness_m * kMaxRoughness_m || spread[1] < kMinMiddleToLargest * spread[2] ||
         spread[0] > kMaxSmallestToMiddle * spread[1])
       return Eigen::Vector3f::Zero();
