@@ -12,33 +12,39 @@ constexpr double kAlongVariance_m2 = 1.0;
 constexpr double kPointVariance_m2 = 0.02 * 0.02;
 
 Match match_of(const SurfaceGrid& grid, VoxelIndex index, const Surface& surface) {
-  return {grid.centre_of(index) + surface.mean_m.cast<double>(), surface.normal.cast<double>(),
-          static_cast<double>(surface.variance_m2)};
+  const Eigen::Vector3d mean = grid.centre_of(index) + surface.mean_m.cast<double>();
+  if (surface.planar())
+    return {mean, surface.normal.cast<double>(), static_cast<double>(surface.variance_m2)};
+  return {mean, Eigen::Vector3d::Zero(), static_cast<double>(surface.strewn_m2)};
+}
+
+bool serves(const Surface* surface, bool takes_shapeless) {
+  return surface != nullptr && (surface->planar() || (takes_shapeless && surface->shapeless()));
 }
 
 /// The plane of the voxel around the point, in the fine grid if it has one, else in the coarse one.
-Match find_here(const SurfaceMap& map, const Eigen::Vector3d& point, double max_distance_m) {
-  for (const SurfaceGrid* grid : {&map.fine(), &map.coarse()}) {
+Match find_here(const GicpPass& pass, const Eigen::Vector3d& point) {
+  for (const SurfaceGrid* grid : {&pass.target.fine(), &pass.target.coarse()}) {
     const VoxelIndex index = grid->index_of(point);
     const Surface* surface = grid->find(index);
-    if (surface == nullptr || !surface->planar())
+    if (!serves(surface, pass.takes_shapeless))
       continue;
     const Match match = match_of(*grid, index, *surface);
-    if (std::abs(match.normal.dot(point - match.mean_m)) < max_distance_m)
+    if (std::abs(match.normal.dot(point - match.mean_m)) < pass.max_correspondence_m)
       return match;
   }
   return {};
 }
 
-/// The plane of the 27 voxels around whose mean is nearest, at most `reach_m` away.
-Match nearest_around(const SurfaceGrid& grid, const Eigen::Vector3d& point, double reach_m) {
+/// The one of the 27 voxels around whose mean is nearest, at most a voxel away.
+Match nearest_around(const SurfaceGrid& grid, bool takes_shapeless, const Eigen::Vector3d& point) {
   const VoxelIndex centre = grid.index_of(point);
   Match nearest;
-  double nearest_m2 = reach_m * reach_m;
+  double nearest_m2 = grid.leaf_m() * grid.leaf_m();
   for (int i = 0; i < 27; ++i) {
     const VoxelIndex index{centre.x + i % 3 - 1, centre.y + i / 3 % 3 - 1, centre.z + i / 9 - 1};
     const Surface* surface = grid.find(index);
-    if (surface == nullptr || !surface->planar())
+    if (!serves(surface, takes_shapeless))
       continue;
     const Match match = match_of(grid, index, *surface);
     const double distance_m2 = (point - match.mean_m).squaredNorm();
@@ -50,23 +56,27 @@ Match nearest_around(const SurfaceGrid& grid, const Eigen::Vector3d& point, doub
   return nearest;
 }
 
-/// A plane near the point: of the fine grid if there is one within reach, else of the coarse one.
-Match find_around(const SurfaceMap& map, const Eigen::Vector3d& point) {
-  const Match fine = nearest_around(map.fine(), point, map.fine().leaf_m());
-  return fine.variance_m2 > 0.0 ? fine : nearest_around(map.coarse(), point, map.coarse().leaf_m());
+/// Near the point: in the fine grid if there is one within reach, else in the coarse one.
+Match find_around(const GicpPass& pass, const Eigen::Vector3d& point) {
+  const Match fine = nearest_around(pass.target.fine(), pass.takes_shapeless, point);
+  return fine.variance_m2 > 0.0 ? fine : nearest_around(pass.target.coarse(), pass.takes_shapeless, point);
 }
 
-/// (C_target + C_source)^-1 of two surfaces with covariance I + (variance - 1) n n' along their normals n and m, in
-/// closed form: the sum is 2 (I - u n n' - v m m'), inverted after Woodbury. A source without a normal is an isotropic
-/// point.
+/// Inverse of across n n' + along (I - n n'), for a unit normal n.
+Eigen::Matrix3d inverse_of_disc(const Eigen::Vector3d& n, double across_m2, double along_m2) {
+  return Eigen::Matrix3d::Identity() / along_m2 + (1.0 / across_m2 - 1.0 / along_m2) * n * n.transpose();
+}
+
+/// (C_target + C_source)^-1. A source without a normal is an isotropic point. Two planes with covariance
+/// I + (variance - 1) n n' along their normals n and m add up to 2 (I - u n n' - v m m'), inverted after Woodbury.
 Eigen::Matrix3d information(const Match& match, const Eigen::Vector3d& source_normal) {
   const Eigen::Vector3d& n = match.normal;
   const Eigen::Vector3d& m = source_normal;
-  if (m.isZero()) {
-    const double along = 1.0 / (kAlongVariance_m2 + kPointVariance_m2);
-    const double across = 1.0 / (match.variance_m2 + kPointVariance_m2);
-    return along * Eigen::Matrix3d::Identity() + (across - along) * n * n.transpose();
-  }
+  if (n.isZero())
+    return inverse_of_disc(m, match.variance_m2 + kPointVariance_m2,
+                           match.variance_m2 + (m.isZero() ? kPointVariance_m2 : kAlongVariance_m2));
+  if (m.isZero())
+    return inverse_of_disc(n, match.variance_m2 + kPointVariance_m2, kAlongVariance_m2 + kPointVariance_m2);
   constexpr double kScale = 2.0 * kAlongVariance_m2;
   const double k_n = kScale / (kAlongVariance_m2 - match.variance_m2) - 1.0;
   const double k_m = kScale / (kAlongVariance_m2 - kPointVariance_m2) - 1.0;
@@ -105,13 +115,13 @@ Eigen::Matrix3d information(const Match& match, const Eigen::Vector3d& source_no
   sum.error += w * r2;
   sum.weight += w;
   sum.inliers += r2 < width2 ? 1 : 0;
+  sum.planes += match.normal.isZero() ? 0U : 1U;
 }
 
 Match find(const GicpPass& pass, const Eigen::Vector3d& point) {
   if (!pass.target.reaches(point))
     return {};
-  return pass.look_up == LookUp::around ? find_around(pass.target, point)
-                                        : find_here(pass.target, point, pass.max_correspondence_m);
+  return pass.look_up == LookUp::around ? find_around(pass, point) : find_here(pass, point);
 }
 
 [[gnu::always_inline]] inline NormalEquations sum_points(const GicpPass& pass, std::span<const SurfacePoint> points,

@@ -10,11 +10,11 @@
 
 namespace locus {
 
-/// Counterpart of one source point: a plane of the target.
+/// Counterpart of one source point: a plane of the target, or the Gaussian of a shapeless voxel.
 struct Match {
   Eigen::Vector3d mean_m;
-  Eigen::Vector3d normal;
-  double variance_m2 = -1.0; ///< negative: none
+  Eigen::Vector3d normal;    ///< zero for a shapeless one
+  double variance_m2 = -1.0; ///< along the normal, or in every direction; negative: no counterpart
 };
 
 /// Sums over the points of one block.
@@ -24,6 +24,7 @@ struct NormalEquations {
   Eigen::Matrix3d normals = Eigen::Matrix3d::Zero();
   double error = 0.0;
   double weight = 0.0;
+  std::size_t planes = 0; ///< points whose counterpart is a plane
   std::size_t inliers = 0;
 
   void operator+=(const NormalEquations& other) {
@@ -32,6 +33,7 @@ struct NormalEquations {
     normals += other.normals;
     error += other.error;
     weight += other.weight;
+    planes += other.planes;
     inliers += other.inliers;
   }
 };
@@ -40,7 +42,7 @@ struct NormalEquations {
 enum class LookUp {
   keep,   ///< those of the pass before
   here,   ///< the plane of the voxel around the point, fine or else coarse
-  around, ///< the nearest plane of the 27 coarse voxels around it
+  around, ///< the nearest plane of the 27 voxels around it, fine or else coarse
 };
 
 /// One pass over some of the points: finds their counterparts and sums the normal equations at T = (R, t).
@@ -49,6 +51,7 @@ struct GicpPass {
   Eigen::Matrix3d R;
   Eigen::Vector3d t;
   LookUp look_up;
+  bool takes_shapeless;        ///< voxels without a plane serve, too
   double max_correspondence_m; ///< across the plane
   double width2;               ///< of Geman-McClure, squared standard deviations
 };

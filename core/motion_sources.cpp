@@ -8,7 +8,7 @@ MotionSources::MotionSources(const std::vector<MotionSourceOptions>& options, Fu
 
 SourceChoice MotionSources::choose(Stamp now) const {
   return choose_sources([this](std::size_t i) { return tracks_[i].kind(); }, tracks_.size(), fusion_,
-                        [&](std::size_t i) { return tracks_[i].has_sample_in(now - kTimeout, now); });
+                        [&](std::size_t i) { return tracks_[i].is_live(now); });
 }
 
 std::optional<Pose> MotionSources::motion(const SourceChoice& choice, Stamp from, Stamp to) const {

@@ -29,17 +29,14 @@ struct SourceChoice {
 /// Fusion::queue the first healthy one in the queue gives all it has. One owner.
 class MotionSources {
  public:
-  /// Silence after which a source does not correct motion any more: one sample of the slowest (10 Hz) and the time for
-  /// which tracks are extrapolated. Sooner than the paper's rate check (> 1 Hz), which would correct ten sweeps with a
-  /// standstill.
-  static constexpr Duration kTimeout = std::chrono::milliseconds{150};
-
   MotionSources(const std::vector<MotionSourceOptions>& options, Fusion fusion);
 
   /// `source` is the index in the configuration; its kind must fit the sample.
   void add(std::size_t source, const ImuSample& sample) { tracks_[source].add(sample); }
   void add(std::size_t source, const OdometrySample& sample) { tracks_[source].add(sample); }
 
+  /// Those whose tracks reach `now` and go on doing so: with two samples in the time for which tracks are extrapolated.
+  /// A slower or silent source would correct a sweep with a standstill; that is left to Odometry.
   [[nodiscard]] SourceChoice choose(Stamp now) const;
 
   /// T_from_to of the base after the chosen sources; nothing where a track does not reach one of the instants.

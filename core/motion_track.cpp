@@ -84,6 +84,11 @@ bool MotionTrack::has_sample_in(Stamp from, Stamp to) const {
   return age < size_ && from_newest(age).stamp > from;
 }
 
+bool MotionTrack::is_live(Stamp now) const {
+  return size_ > 1 && now <= from_newest(0).stamp + kMaxExtrapolation &&
+         from_newest(0).stamp <= from_newest(1).stamp + kMaxExtrapolation;
+}
+
 std::optional<Eigen::Vector3d> MotionTrack::mean_specific_force_mps2(Stamp from, Stamp to) const {
   if (kind_ != SourceKind::imu || !has_sample_in(from, to))
     return std::nullopt;

@@ -46,6 +46,9 @@ class MotionTrack {
   /// Whether a sample lies in (from, to]. A source without one is not used for that sweep.
   [[nodiscard]] bool has_sample_in(Stamp from, Stamp to) const;
 
+  /// Whether the newest sample is at most kMaxExtrapolation old, and came as soon after the one before.
+  [[nodiscard]] bool is_live(Stamp now) const;
+
   /// Mean specific force in the base frame over the samples in (from, to]; nothing for odometry or without samples.
   [[nodiscard]] std::optional<Eigen::Vector3d> mean_specific_force_mps2(Stamp from, Stamp to) const;
 

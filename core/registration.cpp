@@ -18,6 +18,10 @@ namespace {
 
 constexpr std::size_t kBlock = 256; ///< points per partial sum, whatever the number of threads
 
+/// Where fewer of the points than this find a plane, as in a thicket, shapeless voxels serve as well. Elsewhere they
+/// would only tie the robot to where the scan lines fell.
+constexpr double kFewPlanes = 0.4;
+
 constexpr double kDamping = 1e-6; ///< keeps directions solvable that neither points nor prior know
 
 /// Geman-McClure width in standard deviations: begins wide to reach far, halves with each look-up to shut out what does
@@ -105,17 +109,19 @@ Registration Gicp::align(std::span<const SurfacePoint> source, const SurfaceMap&
   Registration result;
   result.T_target_source = T_start;
   double width = wide ? kWidthStartWide : kWidthStart;
+  bool few_planes = false;
   while (result.iterations < options.max_iterations && (result.iterations == 0 || !stop())) {
     const Pose& T = result.T_target_source;
     const bool looks_up = result.iterations % kStepsPerLookUp == 0;
     if (looks_up && result.iterations > 0)
       width = std::max(0.5 * width, kWidthEnd);
     const LookUp anew = wide && width > kWidthStart ? LookUp::around : LookUp::here;
-    const NormalEquations points = workers_->run(
-        {target, T.R(), T.translation, looks_up ? anew : LookUp::keep, options.max_correspondence_m, width * width},
-        source);
+    const NormalEquations points = workers_->run({target, T.R(), T.translation, looks_up ? anew : LookUp::keep,
+                                                  few_planes, options.max_correspondence_m, width * width},
+                                                 source);
     if (!(points.weight > 0.0))
       break;
+    few_planes = few_planes || static_cast<double>(points.planes) < kFewPlanes * static_cast<double>(source.size());
     const Vector6 step = solve(points, T, prior);
     if (!step.allFinite())
       break;

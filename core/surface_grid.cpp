@@ -29,6 +29,8 @@ constexpr double kMaxRoughness_m = 0.15;
 /// Enough to be judged by where they lie alone.
 constexpr float kEnoughPoints = 12.0F;
 
+constexpr float kEnoughToBeStrewn = 4.0F;
+
 /// Least share of the points' own normals that must agree with the plane: where wall and floor meet, a few points of
 /// the one tilt the plane through the many of the other, and the tilt drags the map along with the scan lines.
 constexpr double kMinAgreement = 0.8;
@@ -202,6 +204,8 @@ Surface SurfaceGrid::fit(const Moments& moments) const {
     planar = is_plane(eigen, kMaxAcrossToMiddleOfDiscs);
   }
   surface.normal = eigen.eigenvectors().col(0).cast<float>();
+  if (moments.count >= kEnoughToBeStrewn)
+    surface.strewn_m2 = static_cast<float>(scatter.trace() / 3.0 + kPointVariance_m2);
   if (planar)
     surface.variance_m2 = static_cast<float>(std::max(eigen.eigenvalues()[0], kPointVariance_m2));
   return surface;

@@ -15,12 +15,14 @@ struct VoxelIndex {
   friend bool operator==(const VoxelIndex&, const VoxelIndex&) = default;
 };
 
-/// The plane through the points of a voxel: what registration reads of it.
+/// What registration reads of a voxel: the plane through its points, or how widely they are strewn.
 struct Surface {
   Eigen::Vector3f mean_m = Eigen::Vector3f::Zero(); ///< from the centre of the voxel
   Eigen::Vector3f normal = Eigen::Vector3f::Zero(); ///< unit
   float variance_m2 = -1.0F;                        ///< along the normal; negative: the points lie on no plane
+  float strewn_m2 = -1.0F; ///< mean variance of the points about their mean; negative: too few to tell
   [[nodiscard]] bool planar() const { return variance_m2 > 0.0F; }
+  [[nodiscard]] bool shapeless() const { return !planar() && strewn_m2 > 0.0F; }
 };
 
 /// Running Gaussians of points in cubic voxels, found by hashing.

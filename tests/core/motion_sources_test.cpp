@@ -56,9 +56,11 @@ TEST_F(MotionSourcesTest, QueueTakesAllFromTheFirstHealthyOne) {
 
 TEST_F(MotionSourcesTest, AnInertialSourceFirstInTheQueueLeavesTheTranslationOpen) {
   MotionSources sources({kWheelsImuVisual[1], kWheelsImuVisual[0]}, Fusion::queue);
-  sources.add(0, ImuSample{at_ms(0), at_ms(0), {0, 0, 1.0}, {0, 0, 9.81}, {}});
-  sources.add(1, OdometrySample{at_ms(0), at_ms(0), {}, 1.0});
-  const SourceChoice choice = sources.choose(at_ms(10));
+  for (const int ms : {0, 10}) {
+    sources.add(0, ImuSample{at_ms(ms), at_ms(ms), {0, 0, 1.0}, {0, 0, 9.81}, {}});
+    sources.add(1, OdometrySample{at_ms(ms), at_ms(ms), {}, 1.0});
+  }
+  const SourceChoice choice = sources.choose(at_ms(20));
   EXPECT_EQ(choice.rotation, 0U);
   EXPECT_FALSE(choice.translation);
   EXPECT_EQ(choice.uncorrected(), Uncorrected::translation);
@@ -69,8 +71,17 @@ TEST_F(MotionSourcesTest, ASilentSourceIsNotChosen) {
   feed(sources, 0, 0, 1000);
   feed(sources, 2, 0, 2500);
   const Stamp silent_since = at_ms(1000);
-  EXPECT_EQ(sources.choose(silent_since + MotionSources::kTimeout - milliseconds{1}).translation, 0U);
-  EXPECT_EQ(sources.choose(silent_since + MotionSources::kTimeout).translation, 2U);
+  EXPECT_EQ(sources.choose(silent_since + MotionTrack::kMaxExtrapolation).translation, 0U);
+  EXPECT_EQ(sources.choose(silent_since + MotionTrack::kMaxExtrapolation + milliseconds{1}).translation, 2U);
+}
+
+// Its track stands between one sample's extrapolation and the next sample: half of a sweep would count as standing
+// still.
+TEST_F(MotionSourcesTest, ASourceSlowerThanTracksAreExtrapolatedIsNotChosen) {
+  MotionSources sources(kWheelsImuVisual, Fusion::queue);
+  for (int ms = 0; ms <= 1000; ms += 100)
+    sources.add(0, OdometrySample{at_ms(ms), at_ms(ms), {Eigen::Quaterniond::Identity(), {1e-3 * ms, 0, 0}}, 1.0});
+  EXPECT_FALSE(sources.choose(at_ms(1000)).translation);
 }
 
 TEST_F(MotionSourcesTest, WithoutAnySourceNothingIsCorrected) {
