@@ -9,6 +9,13 @@
 
 namespace locus::tools {
 
+namespace {
+
+/// Motion is played from so long before the first datagram on, so that sources are live when it comes.
+constexpr Duration kMotionAhead = std::chrono::seconds{1};
+
+} // namespace
+
 using daemon::EndOfInput;
 using daemon::Input;
 using daemon::Silence;
@@ -26,7 +33,7 @@ Recording::Recording(Capture capture, std::vector<MotionRecording> motion, const
     std::visit([&](auto& samples) { inject_faults(options.faults, name, capture_start, options.seed, samples); },
                recording.samples);
     MotionCursor& cursor = motion_.emplace_back(MotionCursor{std::move(recording)});
-    while (cursor.arrival() < begin_ - MotionSources::kTimeout)
+    while (cursor.arrival() < begin_ - kMotionAhead)
       ++cursor.next;
   }
 }
