@@ -196,7 +196,7 @@ INSTANTIATE_TEST_SUITE_P(Captures, GicpVersusPclOnRealPair,
                          testing::Values(RealPair{"hdl32e_static_monterey", 3, 1.0},
                                          RealPair{"vlp16_static_1200rpm_product21", 20, 3.5}, // measured 3.1
                                          RealPair{"vlp16_static_gps_pps", 2, 2.0}),           // measured 1.6
-                         [](const auto& info) { return std::string{info.param.recording}; });
+                         [](const auto& test) { return std::string{test.param.recording}; });
 
 } // namespace
 } // namespace locus::test
