@@ -29,7 +29,7 @@ Match find_here(const GicpPass& pass, const Eigen::Vector3d& point) {
     const Surface* surface = grid->find(index);
     if (!serves(surface, pass.takes_shapeless))
       continue;
-    const Match match = match_of(*grid, index, *surface);
+    Match match = match_of(*grid, index, *surface);
     if (std::abs(match.normal.dot(point - match.mean_m)) < pass.max_correspondence_m)
       return match;
   }
@@ -58,7 +58,7 @@ Match nearest_around(const SurfaceGrid& grid, bool takes_shapeless, const Eigen:
 
 /// Near the point: in the fine grid if there is one within reach, else in the coarse one.
 Match find_around(const GicpPass& pass, const Eigen::Vector3d& point) {
-  const Match fine = nearest_around(pass.target.fine(), pass.takes_shapeless, point);
+  Match fine = nearest_around(pass.target.fine(), pass.takes_shapeless, point);
   return fine.variance_m2 > 0.0 ? fine : nearest_around(pass.target.coarse(), pass.takes_shapeless, point);
 }
 

@@ -180,7 +180,7 @@ void SurfaceGrid::insert(const Eigen::Vector3d& point_m, const Eigen::Vector3d& 
 Surface SurfaceGrid::fit(const Moments& moments) const {
   const Eigen::Matrix3d normals = symmetric(moments.normals);
   const auto is_plane = [&](const EigenSolver& eigen, double max_across_to_middle) {
-    const Eigen::Vector3d spread_m2 = eigen.eigenvalues();
+    const Eigen::Vector3d& spread_m2 = eigen.eigenvalues();
     const Eigen::Vector3d normal = eigen.eigenvectors().col(0);
     const double min_spread_m = kMinSpreadInLeaves * leaf_m_;
     return spread_m2[1] > min_spread_m * min_spread_m && spread_m2[1] > kMinMiddleToLargest * spread_m2[2] &&
