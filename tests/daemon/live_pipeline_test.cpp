@@ -37,7 +37,7 @@ class PatientInput : public InputSource {
       std::this_thread::sleep_for(std::min<Duration>(timeout, microseconds{100}));
       return Silence{last_arrival_};
     }
-    const Input input = drive_.next(timeout);
+    Input input = drive_.next(timeout);
     if (!std::holds_alternative<EndOfInput>(input))
       last_arrival_ = arrival_of(input);
     return input;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -22,7 +23,7 @@ class VelodyneTestPacket {
     for (std::size_t block = 0; block < layout.used_blocks(); ++block) {
       const std::size_t column = block / layout.blocks_per_column();
       set_flag(block, kBankFlags[block % layout.blocks_per_column() / layout.returns]);
-      const auto turned_cdeg = static_cast<unsigned>(turn_cdeg * static_cast<double>(column) + 0.5);
+      const auto turned_cdeg = static_cast<unsigned>(std::lround(turn_cdeg * static_cast<double>(column)));
       set_azimuth(block, static_cast<std::uint16_t>((azimuth_cdeg + turned_cdeg) % kCdegPerTurn));
     }
     set_time_of_hour(time_of_hour_us);
