@@ -53,7 +53,6 @@ class RealSensor : public testing::Test {
   }
 };
 
-// NOLINTNEXTLINE(cppcoreguidelines-macro-usage): skipping must return from the test itself
 #define LOAD_OR_SKIP(recording, name)                                                                                  \
   const std::optional<Recording> recording = load(name);                                                               \
   if (!(recording))                                                                                                    \
