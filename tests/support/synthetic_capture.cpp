@@ -137,6 +137,8 @@ void run(const Arguments& arguments) {
 } // namespace
 } // namespace locus::sim
 
+// Only the printing of an error could throw here, and there is nobody left to tell.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
   CLI::App app{"Writes what the sensors of a synthetic robot see, with the exact truth, as a capture folder."};
   locus::sim::Arguments arguments;
