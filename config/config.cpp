@@ -6,6 +6,8 @@
 #include <set>
 #include <string_view>
 
+#include <fmt/format.h>
+
 #include "core/problems.hpp"
 #include "core/sweep.hpp"
 
@@ -49,8 +51,8 @@ void check_names(Problems& problems, const Config& config) {
   std::set<std::string_view> taken{"total", "all-lidars"};
   const auto check = [&](const std::string& key, std::string_view name) {
     problems.require(is_word(name, "_-"), key,
-                     "'" + std::string{name} + "' is no name; write a letter, then letters, digits, _ or -");
-    problems.require(taken.insert(name).second, key, "'" + std::string{name} + "' is taken, each name may stand once");
+                     fmt::format("'{}' is no name; write a letter, then letters, digits, _ or -", name));
+    problems.require(taken.insert(name).second, key, fmt::format("'{}' is taken, each name may stand once", name));
   };
   for (std::size_t i = 0; i < config.lidars.size(); ++i)
     check(item("lidars", i, "name"), config.lidars[i].name);
