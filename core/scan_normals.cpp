@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/scan_normals.hpp"
 
-#include <Eigen/Eigenvalues>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "core/principal_axes.hpp"
 
 namespace locus {
 
@@ -44,12 +44,11 @@ class Neighbourhood {
       return Eigen::Vector3f::Zero();
     const auto n = static_cast<double>(count_);
     const Eigen::Matrix3d covariance = (outer_ - sum_ * sum_.transpose() / n) / n;
-    const auto eigen = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>{}.computeDirect(covariance);
-    const Eigen::Vector3d& spread = eigen.eigenvalues();
-    if (spread[0] > kMaxRoughness_m * kMaxRoughness_m || spread[1] < kMinMiddleToLargest * spread[2] ||
-        spread[0] > kMaxSmallestToMiddle * spread[1])
+    const auto [variance, axis] = principal_axes(covariance);
+    if (variance[0] > kMaxRoughness_m * kMaxRoughness_m || variance[1] < kMinMiddleToLargest * variance[2] ||
+        variance[0] > kMaxSmallestToMiddle * variance[1])
       return Eigen::Vector3f::Zero();
-    const Eigen::Vector3f normal = eigen.eigenvectors().col(0).cast<float>();
+    const Eigen::Vector3f normal = axis.cast<float>();
     return normal.dot(centre_) > 0.0F ? -normal : normal;
   }
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/surface_grid.hpp"
 
-#include <Eigen/Eigenvalues>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
+
+#include "core/principal_axes.hpp"
 
 namespace locus {
 
@@ -41,7 +41,6 @@ constexpr float kMaxCount = 400.0F;
 constexpr std::size_t kEvictionAttempts = 64;
 
 using Upper = Eigen::Matrix<float, 6, 1>;
-using EigenSolver = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>;
 
 Upper upper_of_outer(const Eigen::Vector3f& v) {
   return {v.x() * v.x(), v.x() * v.y(), v.x() * v.z(), v.y() * v.y(), v.y() * v.z(), v.z() * v.z()};
@@ -179,9 +178,8 @@ void SurfaceGrid::insert(const Eigen::Vector3d& point_m, const Eigen::Vector3d& 
 
 Surface SurfaceGrid::fit(const Moments& moments) const {
   const Eigen::Matrix3d normals = symmetric(moments.normals);
-  const auto is_plane = [&](const EigenSolver& eigen, double max_across_to_middle) {
-    const Eigen::Vector3d& spread_m2 = eigen.eigenvalues();
-    const Eigen::Vector3d normal = eigen.eigenvectors().col(0);
+  const auto is_plane = [&](const PrincipalAxes& axes, double max_across_to_middle) {
+    const auto& [spread_m2, normal] = axes;
     const double min_spread_m = kMinSpreadInLeaves * leaf_m_;
     return spread_m2[1] > min_spread_m * min_spread_m && spread_m2[1] > kMinMiddleToLargest * spread_m2[2] &&
            spread_m2[0] < max_across_to_middle * spread_m2[1] && spread_m2[0] < kMaxRoughness_m * kMaxRoughness_m &&
@@ -190,24 +188,24 @@ Surface SurfaceGrid::fit(const Moments& moments) const {
   Surface surface;
   surface.mean_m = moments.sum / moments.count;
   const Eigen::Matrix3d scatter = symmetric(moments.outer / moments.count - upper_of_outer(surface.mean_m));
-  EigenSolver eigen;
+  PrincipalAxes axes;
   bool planar = false;
   if (moments.count >= kEnoughPoints) {
-    eigen.computeDirect(scatter);
-    planar = is_plane(eigen, kMaxAcrossToMiddle);
+    axes = principal_axes(scatter);
+    planar = is_plane(axes, kMaxAcrossToMiddle);
   }
   if (!planar) {
     const double along_m2 = kDiscRadiusInLeaves * kDiscRadiusInLeaves * leaf_m_ * leaf_m_;
     const double share = 1.0 / static_cast<double>(moments.count);
-    eigen.computeDirect(scatter + along_m2 * Eigen::Matrix3d::Identity() +
-                        share * (kPointVariance_m2 - along_m2) * normals);
-    planar = is_plane(eigen, kMaxAcrossToMiddleOfDiscs);
+    axes = principal_axes(scatter + along_m2 * Eigen::Matrix3d::Identity() +
+                          share * (kPointVariance_m2 - along_m2) * normals);
+    planar = is_plane(axes, kMaxAcrossToMiddleOfDiscs);
   }
-  surface.normal = eigen.eigenvectors().col(0).cast<float>();
+  surface.normal = axes.normal.cast<float>();
   if (moments.count >= kEnoughToBeStrewn)
     surface.strewn_m2 = static_cast<float>(scatter.trace() / 3.0 + kPointVariance_m2);
   if (planar)
-    surface.variance_m2 = static_cast<float>(std::max(eigen.eigenvalues()[0], kPointVariance_m2));
+    surface.variance_m2 = static_cast<float>(std::max(axes.variance[0], kPointVariance_m2));
   return surface;
 }
 
