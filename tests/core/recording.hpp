@@ -14,7 +14,7 @@
 #include "core/sweep_builder.hpp"
 #include "drivers/datagram.hpp"
 #include "drivers/lidar_input.hpp"
-#include "support/packet_encoder.hpp"
+#include "locus_sim/synthetic_lidar.hpp"
 
 namespace locus::test {
 

@@ -11,10 +11,10 @@
 #include "core/options.hpp"
 #include "core/sweep_builder.hpp"
 #include "drivers/velodyne_decoder.hpp"
-#include "support/packet_encoder.hpp"
-#include "support/scene.hpp"
-#include "support/synthetic_sources.hpp"
-#include "support/trajectory.hpp"
+#include "locus_sim/scene.hpp"
+#include "locus_sim/synthetic_lidar.hpp"
+#include "locus_sim/synthetic_sources.hpp"
+#include "locus_sim/trajectory.hpp"
 
 namespace locus::test {
 

@@ -5,10 +5,10 @@
 #include <stdexcept>
 
 #include "daemon/ingest.hpp"
-#include "support/packet_encoder.hpp"
+#include "locus_sim/synthetic_lidar.hpp"
+#include "locus_sim/synthetic_sources.hpp"
+#include "locus_sim/trajectory.hpp"
 #include "support/scenes.hpp"
-#include "support/synthetic_sources.hpp"
-#include "support/trajectory.hpp"
 
 namespace locus::daemon {
 
@@ -69,8 +69,8 @@ Input DriveInput::next(Duration) {
 std::vector<ProcessedSweep> process_in_one_thread(const Config& config) {
   std::vector<ProcessedSweep> processed;
   SweepProcessor processor(config.odometry);
-  Ingest ingest(config, open_lidars(config), [&](Sweep& sweep, const MachineTime&) {
-    processed.push_back(processor.process(sweep, MachineTime::now()));
+  Ingest ingest(config, open_lidars(config), [&](Sweep& sweep, const SweepCut& cut) {
+    processed.push_back(processor.process(sweep, cut));
   });
   for (const Input& input : Drive::instance().inputs())
     ingest.take(input);

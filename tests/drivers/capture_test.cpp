@@ -8,18 +8,18 @@
 #include <gtest/gtest.h>
 
 #include "drivers/udp_frame.hpp"
-#include "support/pcap_writer.hpp"
+#include "locus_sim/pcap_writer.hpp"
 #include "support/temporary_file.hpp"
 #include "support/test_data.hpp"
 
 namespace locus {
 namespace {
 
-using test::append_big_endian;
-using test::Bytes;
-using test::ethernet;
-using test::ipv4_udp;
-using test::PcapWriter;
+using sim::append_big_endian;
+using sim::Bytes;
+using sim::ethernet;
+using sim::ipv4_udp;
+using sim::PcapWriter;
 using test::TemporaryFile;
 
 Bytes payload_of(std::size_t size) {
@@ -84,7 +84,7 @@ void append_block(Bytes& file, std::uint32_t type, Bytes body) {
   body.resize((body.size() + 3) / 4 * 4);
   append_little_endian(file, type, 4);
   append_little_endian(file, body.size() + 12, 4);
-  test::append(file, body);
+  sim::append(file, body);
   append_little_endian(file, body.size() + 12, 4);
 }
 
@@ -115,7 +115,7 @@ void append_pcapng_frame(Bytes& file, std::uint64_t time_ns, const Bytes& frame)
   append_little_endian(body, time_ns & 0xFFFFFFFF, 4);
   append_little_endian(body, frame.size(), 4);
   append_little_endian(body, frame.size(), 4);
-  test::append(body, frame);
+  sim::append(body, frame);
   append_block(file, 6, body);
 }
 
@@ -169,7 +169,7 @@ TEST(Capture, EveryLinkTypeOfTheContractGivesTheSamePayload) {
     for (const auto& [value, count] : fields) {
       append_big_endian(frame, value, count);
     }
-    test::append(frame, packet);
+    sim::append(frame, packet);
     return frame;
   };
   Bytes vlan;

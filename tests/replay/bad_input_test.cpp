@@ -5,11 +5,14 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "support/pcap_writer.hpp"
+#include "locus_sim/pcap_writer.hpp"
 #include "synthetic_robot.hpp"
 
 namespace locus::test {
 namespace {
+
+using sim::Bytes;
+using sim::PcapWriter;
 
 /// One line on stderr that says so, and the exit status.
 void expect_error(const ProgramRun& run, int status, const std::vector<std::string>& said) {

@@ -3,8 +3,8 @@
 
 #include <chrono>
 
+#include "locus_sim/capture_folder_writer.hpp"
 #include "replay_run.hpp"
-#include "support/capture_folder_writer.hpp"
 #include "support/scenes.hpp"
 
 namespace locus::test {

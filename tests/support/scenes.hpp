@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-#include "support/scene.hpp"
-#include "support/trajectory.hpp"
+#include "locus_sim/scene.hpp"
+#include "locus_sim/trajectory.hpp"
 
 namespace locus::sim {
 

@@ -8,7 +8,7 @@
 #include <map>
 #include <string>
 
-#include "support/capture_folder_writer.hpp"
+#include "locus_sim/capture_folder_writer.hpp"
 #include "support/scenes.hpp"
 
 namespace locus::sim {

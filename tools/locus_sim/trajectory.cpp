@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "support/trajectory.hpp"
+#include "locus_sim/trajectory.hpp"
 
 #include <algorithm>
 #include <array>

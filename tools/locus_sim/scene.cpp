@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "support/scene.hpp"
+#include "locus_sim/scene.hpp"
 
 #include <Eigen/Geometry>
 

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "support/packet_encoder.hpp"
-#include "support/scene.hpp"
-#include "support/synthetic_sources.hpp"
-#include "support/trajectory.hpp"
+#include "locus_sim/scene.hpp"
+#include "locus_sim/synthetic_lidar.hpp"
+#include "locus_sim/synthetic_sources.hpp"
+#include "locus_sim/trajectory.hpp"
 
 namespace locus::sim {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "support/synthetic_sources.hpp"
+#include "locus_sim/synthetic_sources.hpp"
 
 #include <cmath>
 

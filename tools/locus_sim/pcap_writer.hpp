@@ -14,7 +14,7 @@
 
 #include "core/stamp.hpp"
 
-namespace locus::test {
+namespace locus::sim {
 
 using Bytes = std::vector<std::byte>;
 
@@ -118,4 +118,4 @@ class PcapWriter {
   pcap_dumper_t* dumper_;
 };
 
-} // namespace locus::test
+} // namespace locus::sim

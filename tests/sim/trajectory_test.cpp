@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "support/trajectory.hpp"
+#include "locus_sim/trajectory.hpp"
 
 #include <gtest/gtest.h>
 
 #include <numbers>
 #include <stdexcept>
 
-#include "support/synthetic_sources.hpp"
+#include "locus_sim/synthetic_sources.hpp"
 
 namespace locus::sim {
 namespace {

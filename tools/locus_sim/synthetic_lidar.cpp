@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "support/packet_encoder.hpp"
+#include "locus_sim/synthetic_lidar.hpp"
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>

@@ -12,8 +12,8 @@
 #include "core/pose.hpp"
 #include "drivers/datagram.hpp"
 #include "drivers/velodyne_model.hpp"
-#include "support/scene.hpp"
-#include "support/trajectory.hpp"
+#include "locus_sim/scene.hpp"
+#include "locus_sim/trajectory.hpp"
 
 namespace locus::sim {
 

@@ -4,7 +4,7 @@
 #include <random>
 
 #include "core/motion_sample.hpp"
-#include "support/trajectory.hpp"
+#include "locus_sim/trajectory.hpp"
 
 namespace locus::sim {
 

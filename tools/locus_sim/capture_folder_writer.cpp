@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "support/capture_folder_writer.hpp"
+#include "locus_sim/capture_folder_writer.hpp"
 
 #include <fmt/ostream.h>
 
@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "support/pcap_writer.hpp"
+#include "locus_sim/pcap_writer.hpp"
 
 namespace locus::sim {
 namespace {
@@ -56,7 +56,7 @@ void write_lidars(const std::filesystem::path& path, const Scene& scene, const T
     sources.emplace_back(scene, trajectory, lidar.options);
   std::transform(sources.begin(), sources.end(), std::back_inserter(next), [](auto& source) { return source.next(); });
 
-  test::PcapWriter pcap(path);
+  PcapWriter pcap(path);
   while (true) {
     const auto earliest = std::min_element(next.begin(), next.end(), [](const Datagram& a, const Datagram& b) {
       return a.receive_stamp < b.receive_stamp;
