@@ -8,47 +8,52 @@ namespace locus {
 namespace {
 
 /// Surfaces say nothing along themselves: a variance there that is large against every residual (Segal's 1 to epsilon).
-constexpr double kAlongVariance_m2 = 1.0;
-constexpr double kPointVariance_m2 = 0.02 * 0.02;
+constexpr float kAlongVariance_m2 = 1.0F;
+constexpr float kPointVariance_m2 = 0.02F * 0.02F;
 
-Match match_of(const SurfaceGrid& grid, VoxelIndex index, const Surface& surface) {
-  const Eigen::Vector3d mean = grid.centre_of(index) + surface.mean_m.cast<double>();
-  if (surface.planar())
-    return {mean, surface.normal.cast<double>(), static_cast<double>(surface.variance_m2)};
-  return {mean, Eigen::Vector3d::Zero(), static_cast<double>(surface.strewn_m2)};
+/// Points farther than this from the origin have no counterpart: no lidar sees so far, and single precision counts
+/// there in tenths of a millimetre.
+constexpr float kMaxDistance_m = 1000.0F;
+
+/// Stands in for a point that is not a number: it would spoil the sums even with no weight.
+const SurfacePoint kOutOfReach{Eigen::Vector3f::Constant(1e6F * kMaxDistance_m), Eigen::Vector3f::Zero()};
+
+/// Transform in single precision, about GicpPass::origin_m on the side of the target.
+struct Affine {
+  Eigen::Matrix3f R;
+  Eigen::Vector3f t;
+};
+
+Affine about_origin(const GicpPass& pass) {
+  return {pass.T_target_source.R().cast<float>(), (pass.T_target_source.translation - pass.origin_m).cast<float>()};
 }
+
+/// A surface of the target, where it lies and how it serves a point.
+struct Counterpart {
+  const Surface* surface = nullptr;
+  Eigen::Vector3f mean_m = Eigen::Vector3f::Zero(); ///< from the origin
+};
 
 bool serves(const Surface* surface, bool takes_shapeless) {
   return surface != nullptr && (surface->planar() || (takes_shapeless && surface->shapeless()));
 }
 
-/// The plane of the voxel around the point, in the fine grid if it has one, else in the coarse one.
-Match find_here(const GicpPass& pass, const Eigen::Vector3d& point) {
-  for (const SurfaceGrid* grid : {&pass.target.fine(), &pass.target.coarse()}) {
-    const VoxelIndex index = grid->index_of(point);
-    const Surface* surface = grid->find(index);
-    if (!serves(surface, pass.takes_shapeless))
-      continue;
-    Match match = match_of(*grid, index, *surface);
-    if (std::abs(match.normal.dot(point - match.mean_m)) < pass.max_correspondence_m)
-      return match;
-  }
-  return {};
+Counterpart at(const GicpPass& pass, const SurfaceGrid& grid, VoxelIndex index, const Surface* surface) {
+  if (!serves(surface, pass.takes_shapeless))
+    return {};
+  return {surface, (grid.centre_of(index) - pass.origin_m).cast<float>() + surface->mean_m};
 }
 
 /// The one of the 27 voxels around whose mean is nearest, at most a voxel away.
-Match nearest_around(const SurfaceGrid& grid, bool takes_shapeless, const Eigen::Vector3d& point) {
-  const VoxelIndex centre = grid.index_of(point);
-  Match nearest;
-  double nearest_m2 = grid.leaf_m() * grid.leaf_m();
+Counterpart nearest_around(const GicpPass& pass, const SurfaceGrid& grid, const Eigen::Vector3f& point) {
+  const VoxelIndex centre = grid.index_of(pass.origin_m + point.cast<double>());
+  Counterpart nearest;
+  auto nearest_m2 = static_cast<float>(grid.leaf_m() * grid.leaf_m());
   for (int i = 0; i < 27; ++i) {
     const VoxelIndex index{centre.x + i % 3 - 1, centre.y + i / 3 % 3 - 1, centre.z + i / 9 - 1};
-    const Surface* surface = grid.find(index);
-    if (!serves(surface, takes_shapeless))
-      continue;
-    const Match match = match_of(grid, index, *surface);
-    const double distance_m2 = (point - match.mean_m).squaredNorm();
-    if (distance_m2 < nearest_m2) {
+    const Counterpart match = at(pass, grid, index, grid.find(index));
+    const float distance_m2 = (point - match.mean_m).squaredNorm();
+    if (match.surface != nullptr && distance_m2 < nearest_m2) {
       nearest_m2 = distance_m2;
       nearest = match;
     }
@@ -56,117 +61,311 @@ Match nearest_around(const SurfaceGrid& grid, bool takes_shapeless, const Eigen:
   return nearest;
 }
 
-/// Near the point: in the fine grid if there is one within reach, else in the coarse one.
-Match find_around(const GicpPass& pass, const Eigen::Vector3d& point) {
-  Match fine = nearest_around(pass.target.fine(), pass.takes_shapeless, point);
-  return fine.variance_m2 > 0.0 ? fine : nearest_around(pass.target.coarse(), pass.takes_shapeless, point);
+void put(const Counterpart& match, std::size_t i, MatchBlock& matches) {
+  const bool found = match.surface != nullptr;
+  const bool planar = found && match.surface->planar();
+  const Eigen::Vector3f normal = planar ? match.surface->normal : Eigen::Vector3f::Zero();
+  matches.x_m[i] = match.mean_m.x();
+  matches.y_m[i] = match.mean_m.y();
+  matches.z_m[i] = match.mean_m.z();
+  matches.normal_x[i] = normal.x();
+  matches.normal_y[i] = normal.y();
+  matches.normal_z[i] = normal.z();
+  matches.across_m2[i] = planar ? match.surface->variance_m2 : found ? match.surface->strewn_m2 : 1.0F;
+  matches.along_m2[i] = planar ? kAlongVariance_m2 : matches.across_m2[i];
+  matches.found[i] = found ? 1.0F : 0.0F;
 }
 
-/// Inverse of across n n' + along (I - n n'), for a unit normal n.
-Eigen::Matrix3d inverse_of_disc(const Eigen::Vector3d& n, double across_m2, double along_m2) {
-  return Eigen::Matrix3d::Identity() / along_m2 + (1.0 / across_m2 - 1.0 / along_m2) * n * n.transpose();
-}
+/// Where the points of a block lie in the target, from the origin.
+struct Placed {
+  PerPoint x_m, y_m, z_m;
+  [[nodiscard]] Eigen::Vector3f operator[](std::size_t i) const { return {x_m[i], y_m[i], z_m[i]}; }
+};
 
-/// (C_target + C_source)^-1. A source without a normal is an isotropic point. Two planes with covariance
-/// I + (variance - 1) n n' along their normals n and m add up to 2 (I - u n n' - v m m'), inverted after Woodbury.
-Eigen::Matrix3d information(const Match& match, const Eigen::Vector3d& source_normal) {
-  const Eigen::Vector3d& n = match.normal;
-  const Eigen::Vector3d& m = source_normal;
-  if (n.isZero())
-    return inverse_of_disc(m, match.variance_m2 + kPointVariance_m2,
-                           match.variance_m2 + (m.isZero() ? kPointVariance_m2 : kAlongVariance_m2));
-  if (m.isZero())
-    return inverse_of_disc(n, match.variance_m2 + kPointVariance_m2, kAlongVariance_m2 + kPointVariance_m2);
-  constexpr double kScale = 2.0 * kAlongVariance_m2;
-  const double k_n = kScale / (kAlongVariance_m2 - match.variance_m2) - 1.0;
-  const double k_m = kScale / (kAlongVariance_m2 - kPointVariance_m2) - 1.0;
-  const double c = n.dot(m);
-  const Eigen::Vector3d a = k_m * n + c * m;
-  const Eigen::Vector3d b = c * n + k_n * m;
-  const double share = 1.0 / (k_n * k_m - c * c);
-  return (Eigen::Matrix3d::Identity() + share * (a * n.transpose() + b * m.transpose())) / kScale;
-}
+using Places = std::array<std::uint32_t, kGicpBlock>;
 
-/// Takes in one point's share: residual d = R p + t - mean, J = [I, -(R p)x] for a turn about the target's axes.
-[[gnu::always_inline]] inline void add_point(const Eigen::Vector3d& rotated, const Eigen::Vector3d& rotated_normal,
-                                             const Eigen::Vector3d& translation, const Match& match, double width2,
-                                             NormalEquations& sum) {
-  const Eigen::Vector3d d = rotated + translation - match.mean_m;
-  const Eigen::Matrix3d M = information(match, rotated_normal);
-  const Eigen::Vector3d Md = M * d;
-  const double r2 = d.dot(Md);
-  const double root = width2 / (width2 + r2);
-  const double w = root * root; // Geman-McClure
-
-  const double x = w * rotated.x();
-  const double y = w * rotated.y();
-  const double z = w * rotated.z();
-  Eigen::Matrix3d wMQ; // w M (R p)x
-  wMQ.col(0) = z * M.col(1) - y * M.col(2);
-  wMQ.col(1) = x * M.col(2) - z * M.col(0);
-  wMQ.col(2) = y * M.col(0) - x * M.col(1);
-  sum.H.topLeftCorner<3, 3>() += w * M;
-  sum.H.topRightCorner<3, 3>() -= wMQ;
-  for (int column = 0; column < 3; ++column)
-    sum.H.block<3, 1>(3, 3 + column) -= rotated.cross(wMQ.col(column));
-  sum.b.head<3>() += w * Md;
-  sum.b.tail<3>() += w * rotated.cross(Md);
-  sum.normals.noalias() += (w * match.normal) * match.normal.transpose();
-  sum.error += w * r2;
-  sum.weight += w;
-  sum.inliers += r2 < width2 ? 1 : 0;
-  sum.planes += match.normal.isZero() ? 0U : 1U;
-}
-
-Match find(const GicpPass& pass, const Eigen::Vector3d& point) {
-  if (!pass.target.reaches(point))
-    return {};
-  return pass.look_up == LookUp::around ? find_around(pass, point) : find_here(pass, point);
-}
-
-[[gnu::always_inline]] inline NormalEquations sum_points(const GicpPass& pass, std::span<const SurfacePoint> points,
-                                                         std::span<Match> matches) {
-  NormalEquations sum;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3d rotated = pass.R * points[i].position_m.cast<double>();
-    if (pass.look_up != LookUp::keep)
-      matches[i] = find(pass, rotated + pass.t);
-    if (matches[i].variance_m2 > 0.0)
-      add_point(rotated, pass.R * points[i].normal.cast<double>(), pass.t, matches[i], pass.width2, sum);
+/// Lists the points near enough to be looked up and gives back how many they are.
+std::size_t take_near_ones(const Placed& points, std::size_t count, Places& places) {
+  std::size_t near = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    places[near] = static_cast<std::uint32_t>(i);
+    near += (points[i].array().abs() < kMaxDistance_m).all() ? 1U : 0U;
   }
-  return sum;
+  return near;
+}
+
+/// The plane of the voxel around each point, in the fine grid if it has one, else in the coarse one.
+void find_here(const GicpPass& pass, const Placed& points, std::size_t count, MatchBlock& matches) {
+  std::array<VoxelIndex, kGicpBlock> index;
+  std::array<const Surface*, kGicpBlock> surface;
+  Places open; // of points still without a counterpart
+  const auto reach_m = static_cast<float>(pass.max_correspondence_m);
+  count = take_near_ones(points, count, open);
+  for (const SurfaceGrid* grid : {&pass.target.fine(), &pass.target.coarse()}) {
+    for (std::size_t k = 0; k < count; ++k)
+      index[k] = grid->index_of(pass.origin_m + points[open[k]].cast<double>());
+    grid->find(std::span(index).first(count), std::span(surface).first(count));
+    std::size_t left = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::uint32_t i = open[k];
+      const Counterpart match = at(pass, *grid, index[k], surface[k]);
+      const bool near =
+          match.surface != nullptr &&
+          (!match.surface->planar() || std::abs(match.surface->normal.dot(points[i] - match.mean_m)) < reach_m);
+      put(near ? match : Counterpart{}, i, matches);
+      open[left] = i;
+      left += near ? 0U : 1U;
+    }
+    count = left;
+  }
+}
+
+/// Near each point: in the fine grid if there is one within reach, else in the coarse one.
+void find_around(const GicpPass& pass, const Placed& points, std::size_t count, MatchBlock& matches) {
+  Places near;
+  count = take_near_ones(points, count, near);
+  for (const std::uint32_t i : std::span(near).first(count)) {
+    Counterpart match = nearest_around(pass, pass.target.fine(), points[i]);
+    if (match.surface == nullptr)
+      match = nearest_around(pass, pass.target.coarse(), points[i]);
+    put(match, i, matches);
+  }
+}
+
+void find(const GicpPass& pass, const SourceBlock& source, MatchBlock& matches) {
+  const auto [R, t] = about_origin(pass);
+  Placed points;
+  for (std::size_t i = 0; i < kGicpBlock; ++i) {
+    points.x_m[i] = R(0, 0) * source.x_m[i] + R(0, 1) * source.y_m[i] + R(0, 2) * source.z_m[i] + t.x();
+    points.y_m[i] = R(1, 0) * source.x_m[i] + R(1, 1) * source.y_m[i] + R(1, 2) * source.z_m[i] + t.y();
+    points.z_m[i] = R(2, 0) * source.x_m[i] + R(2, 1) * source.y_m[i] + R(2, 2) * source.z_m[i] + t.z();
+  }
+  for (std::size_t i = 0; i < kGicpBlock; ++i)
+    put({}, i, matches);
+  if (pass.look_up == LookUp::around)
+    find_around(pass, points, source.count, matches);
+  else
+    find_here(pass, points, source.count, matches);
+}
+
+/// What a point adds to the normal equations, in the order in which they are summed up.
+enum Term : std::size_t {
+  kHtt = 0,        ///< translation with translation: xx xy xz yy yz zz
+  kHtr = kHtt + 6, ///< translation with rotation, row by row
+  kHrr = kHtr + 9, ///< rotation with rotation: xx xy xz yy yz zz
+  kBt = kHrr + 6,
+  kBr = kBt + 3,
+  kNormals = kBr + 3, ///< of n n': xx xy xz yy yz zz
+  kError = kNormals + 6,
+  kWeight,
+  kInliers,
+  kPlanes,
+  kTerms
+};
+
+/// So many points at a time: their terms stay in the fastest cache.
+constexpr std::size_t kChunk = 64;
+constexpr std::size_t kLanes = 16;
+using Terms = std::array<std::array<float, kChunk>, kTerms>;
+using Sums = std::array<std::array<float, kLanes>, kTerms>;
+
+/// The terms of all points from `begin`: residual d = R p + t - mean, J = [I, -(R p)x] for a turn about the target's
+/// axes.
+///
+/// The information M = (C_target + C_source)^-1 of two surfaces with normals n and m: the sum of the covariances is
+/// alpha I - u n n' - v m m', inverted after Woodbury to (I + n e' + m f') / alpha. A side without a normal is a ball,
+/// its u or v zero.
+[[gnu::always_inline]] inline void take_terms(const Affine& T, const SourceBlock& source, const MatchBlock& match,
+                                              float width2, std::size_t begin, Terms& terms) {
+  const auto [R, t] = T;
+  const float r00 = R(0, 0), r01 = R(0, 1), r02 = R(0, 2), r10 = R(1, 0), r11 = R(1, 1), r12 = R(1, 2), r20 = R(2, 0),
+              r21 = R(2, 1), r22 = R(2, 2), tx = t.x(), ty = t.y(), tz = t.z();
+  for (std::size_t k = 0; k < kChunk; ++k) {
+    const std::size_t i = begin + k;
+    const float px = source.x_m[i], py = source.y_m[i], pz = source.z_m[i];
+    const float x = r00 * px + r01 * py + r02 * pz;
+    const float y = r10 * px + r11 * py + r12 * pz;
+    const float z = r20 * px + r21 * py + r22 * pz;
+    const float sx = source.normal_x[i], sy = source.normal_y[i], sz = source.normal_z[i];
+    const float mx = r00 * sx + r01 * sy + r02 * sz;
+    const float my = r10 * sx + r11 * sy + r12 * sz;
+    const float mz = r20 * sx + r21 * sy + r22 * sz;
+    const float nx = match.normal_x[i], ny = match.normal_y[i], nz = match.normal_z[i];
+    const float dx = x + tx - match.x_m[i];
+    const float dy = y + ty - match.y_m[i];
+    const float dz = z + tz - match.z_m[i];
+
+    const float u = match.along_m2[i] - match.across_m2[i];
+    const float v = source.along_m2[i] - kPointVariance_m2;
+    const float share = 1.0F / (match.along_m2[i] + source.along_m2[i]); // 1 / alpha
+    const float cx = ny * mz - nz * my, cy = nz * mx - nx * mz, cz = nx * my - ny * mx;
+    const float uv = u * v * share;
+    const float s = 1.0F / (match.across_m2[i] + kPointVariance_m2 + uv * (cx * cx + cy * cy + cz * cz));
+    const float nn = s * (u - uv);
+    const float mm = s * (v - uv);
+    const float nm = s * uv * (nx * mx + ny * my + nz * mz);
+    const float ex = nn * nx + nm * mx, ey = nn * ny + nm * my, ez = nn * nz + nm * mz;
+    const float fx = nm * nx + mm * mx, fy = nm * ny + mm * my, fz = nm * nz + mm * mz;
+
+    const float ed = ex * dx + ey * dy + ez * dz;
+    const float fd = fx * dx + fy * dy + fz * dz;
+    const float gx = share * (dx + nx * ed + mx * fd); // M d
+    const float gy = share * (dy + ny * ed + my * fd);
+    const float gz = share * (dz + nz * ed + mz * fd);
+    const float r2 = dx * gx + dy * gy + dz * gz;
+    const float root = width2 / (width2 + r2);
+    const float w = match.found[i] * root * root; // Geman-McClure
+    const float ws = w * share;
+    const float xx = ws * (1.0F + nx * ex + mx * fx), xy = ws * (nx * ey + mx * fy), xz = ws * (nx * ez + mx * fz);
+    const float yy = ws * (1.0F + ny * ey + my * fy), yz = ws * (ny * ez + my * fz);
+    const float zz = ws * (1.0F + nz * ez + mz * fz);
+
+    // w M [R p]x, negated
+    const float ax = y * xz - z * xy, ay = z * xx - x * xz, az = x * xy - y * xx;
+    const float bx = y * yz - z * yy, by = z * xy - x * yz, bz = x * yy - y * xy;
+    const float hx = y * zz - z * yz, hy = z * xz - x * zz, hz = x * yz - y * xz;
+
+    terms[kHtt + 0][k] = xx;
+    terms[kHtt + 1][k] = xy;
+    terms[kHtt + 2][k] = xz;
+    terms[kHtt + 3][k] = yy;
+    terms[kHtt + 4][k] = yz;
+    terms[kHtt + 5][k] = zz;
+    terms[kHtr + 0][k] = ax;
+    terms[kHtr + 1][k] = ay;
+    terms[kHtr + 2][k] = az;
+    terms[kHtr + 3][k] = bx;
+    terms[kHtr + 4][k] = by;
+    terms[kHtr + 5][k] = bz;
+    terms[kHtr + 6][k] = hx;
+    terms[kHtr + 7][k] = hy;
+    terms[kHtr + 8][k] = hz;
+    terms[kHrr + 0][k] = y * hx - z * bx;
+    terms[kHrr + 1][k] = y * hy - z * by;
+    terms[kHrr + 2][k] = y * hz - z * bz;
+    terms[kHrr + 3][k] = z * ay - x * hy;
+    terms[kHrr + 4][k] = z * az - x * hz;
+    terms[kHrr + 5][k] = x * bz - y * az;
+    terms[kBt + 0][k] = w * gx;
+    terms[kBt + 1][k] = w * gy;
+    terms[kBt + 2][k] = w * gz;
+    terms[kBr + 0][k] = w * (y * gz - z * gy);
+    terms[kBr + 1][k] = w * (z * gx - x * gz);
+    terms[kBr + 2][k] = w * (x * gy - y * gx);
+    terms[kNormals + 0][k] = w * nx * nx;
+    terms[kNormals + 1][k] = w * nx * ny;
+    terms[kNormals + 2][k] = w * nx * nz;
+    terms[kNormals + 3][k] = w * ny * ny;
+    terms[kNormals + 4][k] = w * ny * nz;
+    terms[kNormals + 5][k] = w * nz * nz;
+    terms[kError][k] = w * r2;
+    terms[kWeight][k] = w;
+    terms[kInliers][k] = r2 < width2 ? match.found[i] : 0.0F;
+    terms[kPlanes][k] = nx * nx + ny * ny + nz * nz > 0.5F ? match.found[i] : 0.0F;
+  }
+}
+
+[[gnu::always_inline]] inline void add_up(const Terms& terms, Sums& sums) {
+  for (std::size_t term = 0; term < kTerms; ++term)
+    for (std::size_t k = 0; k < kChunk; k += kLanes)
+      for (std::size_t lane = 0; lane < kLanes; ++lane)
+        sums[term][lane] += terms[term][k + lane];
+}
+
+[[gnu::always_inline]] inline void sum_block(const Affine& T, const SourceBlock& source, const MatchBlock& matches,
+                                             float width2, Sums& sums) {
+  Terms terms;
+  for (std::size_t begin = 0; begin < kGicpBlock; begin += kChunk) {
+    take_terms(T, source, matches, width2, begin, terms);
+    add_up(terms, sums);
+  }
 }
 
 /// The same source for three instruction sets. Only these functions are compiled for more than the baseline, so no type
 /// changes its layout.
-NormalEquations sum_baseline(const GicpPass& pass, std::span<const SurfacePoint> points, std::span<Match> matches) {
-  return sum_points(pass, points, matches);
+void sum_baseline(const Affine& T, const SourceBlock& source, const MatchBlock& matches, float width2, Sums& sums) {
+  sum_block(T, source, matches, width2, sums);
 }
 
 #if defined(__x86_64__)
-[[gnu::flatten, gnu::target("avx2,fma")]] NormalEquations
-sum_avx2(const GicpPass& pass, std::span<const SurfacePoint> points, std::span<Match> matches) {
-  return sum_points(pass, points, matches);
+[[gnu::flatten, gnu::target("avx2,fma")]] void sum_avx2(const Affine& T, const SourceBlock& source,
+                                                        const MatchBlock& matches, float width2, Sums& sums) {
+  sum_block(T, source, matches, width2, sums);
 }
 
-[[gnu::flatten, gnu::target("avx512f,avx512vl,avx512dq,fma")]] NormalEquations
-sum_avx512(const GicpPass& pass, std::span<const SurfacePoint> points, std::span<Match> matches) {
-  return sum_points(pass, points, matches);
+[[gnu::flatten, gnu::target("avx512f,avx512vl,avx512dq,fma")]] void
+sum_avx512(const Affine& T, const SourceBlock& source, const MatchBlock& matches, float width2, Sums& sums) {
+  sum_block(T, source, matches, width2, sums);
 }
 #endif
+
+void sum_with(Isa isa, const Affine& T, const SourceBlock& source, const MatchBlock& matches, float width2,
+              Sums& sums) {
+#if defined(__x86_64__)
+  if (isa == Isa::avx512)
+    return sum_avx512(T, source, matches, width2, sums);
+  if (isa == Isa::avx2)
+    return sum_avx2(T, source, matches, width2, sums);
+#endif
+  static_cast<void>(isa);
+  sum_baseline(T, source, matches, width2, sums);
+}
+
+NormalEquations equations_of(const Sums& sums) {
+  const auto total = [&sums](std::size_t term) {
+    double sum = 0.0;
+    for (const float lane : sums[term])
+      sum += static_cast<double>(lane);
+    return sum;
+  };
+  const auto symmetric = [&total](std::size_t first) {
+    Eigen::Matrix3d m;
+    m << total(first), total(first + 1), total(first + 2), total(first + 1), total(first + 3), total(first + 4),
+        total(first + 2), total(first + 4), total(first + 5);
+    return m;
+  };
+  NormalEquations result;
+  result.H.topLeftCorner<3, 3>() = symmetric(kHtt);
+  result.H.bottomRightCorner<3, 3>() = symmetric(kHrr);
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column)
+      result.H(row, 3 + column) = result.H(3 + column, row) =
+          total(kHtr + 3U * static_cast<std::size_t>(row) + static_cast<std::size_t>(column));
+    result.b[row] = total(kBt + static_cast<std::size_t>(row));
+    result.b[3 + row] = total(kBr + static_cast<std::size_t>(row));
+  }
+  result.normals = symmetric(kNormals);
+  result.error = total(kError);
+  result.weight = total(kWeight);
+  result.inliers = static_cast<std::size_t>(total(kInliers));
+  result.planes = static_cast<std::size_t>(total(kPlanes));
+  return result;
+}
 
 } // namespace
 
-NormalEquations linearise(const GicpPass& pass, std::span<const SurfacePoint> points, std::span<Match> matches,
-                          Isa isa) {
-#if defined(__x86_64__)
-  if (isa == Isa::avx512)
-    return sum_avx512(pass, points, matches);
-  if (isa == Isa::avx2)
-    return sum_avx2(pass, points, matches);
-#endif
-  static_cast<void>(isa);
-  return sum_baseline(pass, points, matches);
+SourceBlock::SourceBlock(std::span<const SurfacePoint> points)
+    : x_m{}, y_m{}, z_m{}, normal_x{}, normal_y{}, normal_z{}, count(points.size()) {
+  along_m2.fill(kPointVariance_m2);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const bool finite = points[i].position_m.allFinite() && points[i].normal.allFinite();
+    const auto& [position_m, normal] = finite ? points[i] : kOutOfReach;
+    x_m[i] = position_m.x();
+    y_m[i] = position_m.y();
+    z_m[i] = position_m.z();
+    normal_x[i] = normal.x();
+    normal_y[i] = normal.y();
+    normal_z[i] = normal.z();
+    along_m2[i] = normal.isZero() ? kPointVariance_m2 : kAlongVariance_m2;
+  }
+}
+
+NormalEquations linearise(const GicpPass& pass, const SourceBlock& source, MatchBlock& matches, Isa isa) {
+  if (pass.look_up != LookUp::keep)
+    find(pass, source, matches);
+  Sums sums{};
+  sum_with(isa, about_origin(pass), source, matches, static_cast<float>(pass.width2), sums);
+  return equations_of(sums);
 }
 
 } // namespace locus

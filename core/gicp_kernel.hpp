@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 
@@ -10,11 +11,27 @@
 
 namespace locus {
 
-/// Counterpart of one source point: a plane of the target, or the Gaussian of a shapeless voxel.
-struct Match {
-  Eigen::Vector3d mean_m;
-  Eigen::Vector3d normal;    ///< zero for a shapeless one
-  double variance_m2 = -1.0; ///< along the normal, or in every direction; negative: no counterpart
+inline constexpr std::size_t kGicpBlock = 256; ///< points that are summed up together, whatever the number of threads
+
+/// One figure of each point of a block: one array per figure makes loops over points vector instructions.
+using PerPoint = std::array<float, kGicpBlock>;
+
+/// Points of a sweep, from the origin of their own frame. Places beyond the last point of the sweep hold zeros.
+struct SourceBlock {
+  PerPoint x_m, y_m, z_m;
+  PerPoint normal_x, normal_y, normal_z; ///< zero where there is none to be trusted
+  PerPoint along_m2;                     ///< variance along the surface; that of the point itself without a normal
+  std::size_t count = 0;
+
+  explicit SourceBlock(std::span<const SurfacePoint> points);
+};
+
+/// Their counterparts: planes of the target, or Gaussians of shapeless voxels.
+struct MatchBlock {
+  PerPoint x_m, y_m, z_m;                ///< mean, from GicpPass::origin_m
+  PerPoint normal_x, normal_y, normal_z; ///< zero for a shapeless one
+  PerPoint across_m2, along_m2;          ///< variances; equal for a shapeless one
+  PerPoint found;                        ///< 1, or 0 where there is no counterpart
 };
 
 /// Sums over the points of one block.
@@ -45,20 +62,19 @@ enum class LookUp {
   around, ///< the nearest plane of the 27 voxels around it, fine or else coarse
 };
 
-/// One pass over some of the points: finds their counterparts and sums the normal equations at T = (R, t).
+/// One pass over some of the points: finds their counterparts and sums the normal equations at T_target_source.
 struct GicpPass {
   const SurfaceMap& target;
-  Eigen::Matrix3d R;
-  Eigen::Vector3d t;
+  Pose T_target_source;
+  Eigen::Vector3d origin_m; ///< in the target, near the source: single precision counts from here
   LookUp look_up;
   bool takes_shapeless;        ///< voxels without a plane serve, too
   double max_correspondence_m; ///< across the plane
   double width2;               ///< of Geman-McClure, squared standard deviations
 };
 
-/// `matches` has the size of `points`; read or written as the pass says. Pure but for that; any thread. The result
-/// depends on the instruction set in its last digits.
-NormalEquations linearise(const GicpPass& pass, std::span<const SurfacePoint> points, std::span<Match> matches,
-                          Isa isa);
+/// `matches` is read or written as the pass says. Pure but for that; any thread. The result depends on the instruction
+/// set in its last digits.
+NormalEquations linearise(const GicpPass& pass, const SourceBlock& source, MatchBlock& matches, Isa isa);
 
 } // namespace locus

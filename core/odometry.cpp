@@ -2,6 +2,7 @@
 #include "core/odometry.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -65,19 +66,51 @@ Vector6 difference(const Pose& T, const Pose& reference) {
   return d;
 }
 
-/// The point as seen from the end of the sweep, for a base that moved with a constant twist while the sweep came in.
-SurfacePoint corrected(const SweepPoint& point, const Vector6& twist_base) {
-  const Pose T_end_firing = se3_exp(-static_cast<double>(point.age_s) * twist_base);
-  return {(T_end_firing * point.position_base_m.cast<double>()).cast<float>(),
-          (T_end_firing.rotation * point.normal_base.cast<double>()).cast<float>()};
-}
+/// Takes points to the end of their sweep, for a base that moved with a constant twist while the sweep came in: exactly
+/// at instants a few milliseconds apart, between them to first order.
+class TwistCorrection {
+ public:
+  TwistCorrection(const Vector6& twist_base, double duration_s)
+      : velocity_mps_(twist_base.head<3>().cast<float>()), turn_radps_(twist_base.tail<3>().cast<float>()),
+        step_s_(static_cast<float>(duration_s / kInstants)) {
+    for (std::size_t i = 0; i < kInstants; ++i) {
+      const Pose T_end_then = se3_exp(-(static_cast<double>(i) + 0.5) * duration_s / kInstants * twist_base);
+      instants_[i] = {T_end_then.R().cast<float>(), T_end_then.translation.cast<float>()};
+    }
+  }
 
-void correct_all(std::span<const SweepPoint> points, const Vector6& twist_base, std::vector<SurfacePoint>& scan) {
+  [[nodiscard]] SurfacePoint operator()(const SweepPoint& point) const {
+    constexpr float kLast = kInstants - 1;
+    const float i = std::clamp(std::floor(point.age_s / step_s_), 0.0F, kLast);
+    const auto& [R, t] = instants_[static_cast<std::size_t>(i)];
+    const float earlier_s = point.age_s - (i + 0.5F) * step_s_;
+    const Eigen::Vector3f p = R * point.position_base_m + t;
+    const Eigen::Vector3f n = R * point.normal_base;
+    return {p - earlier_s * (turn_radps_.cross(p) + velocity_mps_), n - earlier_s * turn_radps_.cross(n)};
+  }
+
+ private:
+  static constexpr std::size_t kInstants = 32;
+  struct Affine {
+    Eigen::Matrix3f R;
+    Eigen::Vector3f t;
+  };
+  Eigen::Vector3f velocity_mps_, turn_radps_;
+  float step_s_;
+  std::array<Affine, kInstants> instants_;
+};
+
+void correct_all(std::span<const SweepPoint> points, const Vector6& twist_base, Duration duration,
+                 std::vector<SurfacePoint>& scan) {
   scan.clear();
-  const bool correct_already = twist_base.isZero();
+  if (twist_base.isZero() || duration <= Duration::zero()) {
+    for (const SweepPoint& point : points)
+      scan.push_back({point.position_base_m, point.normal_base});
+    return;
+  }
+  const TwistCorrection corrected(twist_base, to_seconds(duration));
   for (const SweepPoint& point : points)
-    scan.push_back(correct_already ? SurfacePoint{point.position_base_m, point.normal_base}
-                                   : corrected(point, twist_base));
+    scan.push_back(corrected(point));
 }
 
 } // namespace
@@ -121,7 +154,7 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
   const auto& force = sweep.specific_force_base_mps2;
   if (force && std::abs(force->norm() - kGravity_mps2) < kGravityTolerance_mps2)
     T_odom_last_.rotation = from_rpy_rad(level_rpy_rad(*force));
-  correct_all(sweep.points, Vector6::Zero(), scan_);
+  correct_all(sweep.points, Vector6::Zero(), Duration::zero(), scan_);
   registered_ = sweep.registered;
   if (sweep.uncorrected != Uncorrected::nothing)
     first_points_ = sweep.points;
@@ -168,7 +201,7 @@ Odometry::Prior Odometry::integrate_sensors(const Sweep& sweep) const {
 
 /// Takes out of the points what no motion source could, with the twist that T_last_now means.
 void Odometry::correct_motion(const Sweep& sweep, const Pose& T_last_now) {
-  correct_all(sweep.points, uncorrected_twist(sweep, T_last_now), scan_);
+  correct_all(sweep.points, uncorrected_twist(sweep, T_last_now), sweep.end - sweep.start, scan_);
   registered_ = sweep.registered;
 }
 
@@ -204,7 +237,7 @@ void Odometry::begin_again(const Sweep& sweep, const Prior& prior, Registration&
     return;
   for (int round = 0; round < kStartRounds; ++round) {
     const Pose T_last_now = found.T_target_source;
-    correct_all(first_points_, uncorrected_twist(sweep, T_last_now), last_scan_);
+    correct_all(first_points_, uncorrected_twist(sweep, T_last_now), sweep.end - sweep.start, last_scan_);
     correct_motion(sweep, T_last_now);
     found = match_scan(prior, T_last_now, false, stop);
   }

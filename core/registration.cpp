@@ -16,8 +16,6 @@ namespace locus {
 
 namespace {
 
-constexpr std::size_t kBlock = 256; ///< points per partial sum, whatever the number of threads
-
 /// Where fewer of the points than this find a plane, as in a thicket, shapeless voxels serve as well. Elsewhere they
 /// would only tie the robot to where the scan lines fell.
 constexpr double kFewPlanes = 0.4;
@@ -41,29 +39,29 @@ struct Gicp::Workers {
   Workers(int threads, Isa with_isa)
       : arena(std::min(threads, tbb::info::default_concurrency())), parallel(threads > 1), isa(with_isa) {}
 
-  template <class Body> void for_each_block(std::size_t blocks, const Body& body) {
+  template <class Body> void for_each_block(const Body& body) {
     if (!parallel) {
-      for (std::size_t block = 0; block < blocks; ++block)
+      for (std::size_t block = 0; block < blocks.size(); ++block)
         body(block);
       return;
     }
-    arena.execute([&] { tbb::parallel_for(std::size_t{0}, blocks, body, tbb::simple_partitioner{}); });
+    arena.execute([&] { tbb::parallel_for(std::size_t{0}, blocks.size(), body, tbb::simple_partitioner{}); });
+  }
+
+  void take(std::span<const SurfacePoint> source) {
+    blocks.clear();
+    for (std::size_t begin = 0; begin < source.size(); begin += kGicpBlock)
+      blocks.emplace_back(source.subspan(begin, std::min(kGicpBlock, source.size() - begin)));
+    matches.resize(std::max(matches.size(), blocks.size()));
+    partial.resize(std::max(partial.size(), blocks.size()));
   }
 
   /// One pass over all points, block by block in a fixed order of summation.
-  NormalEquations run(const GicpPass& pass, std::span<const SurfacePoint> source) {
-    const std::size_t blocks = (source.size() + kBlock - 1) / kBlock;
-    matches.resize(std::max(matches.size(), source.size()));
-    partial.resize(std::max(partial.size(), blocks));
-    for_each_block(blocks, [&](std::size_t block) {
-      const std::size_t begin = block * kBlock;
-      const std::size_t count = std::min(kBlock, source.size() - begin);
-      partial[block] = linearise(pass, source.subspan(begin, count), std::span(matches).subspan(begin, count), isa);
-    });
+  NormalEquations run(const GicpPass& pass) {
+    for_each_block([&](std::size_t block) { partial[block] = linearise(pass, blocks[block], matches[block], isa); });
     NormalEquations total;
-    for (std::size_t block = 0; block < blocks; ++block)
+    for (std::size_t block = 0; block < blocks.size(); ++block)
       total += partial[block];
-    total.H.bottomLeftCorner<3, 3>() = total.H.topRightCorner<3, 3>().transpose();
     return total;
   }
 
@@ -71,7 +69,8 @@ struct Gicp::Workers {
   tbb::task_arena arena;
   bool parallel;
   Isa isa;
-  std::vector<Match> matches;
+  std::vector<SourceBlock> blocks;
+  std::vector<MatchBlock> matches;
   std::vector<NormalEquations> partial;
 };
 
@@ -108,6 +107,9 @@ Registration Gicp::align(std::span<const SurfacePoint> source, const SurfaceMap&
                          const StopRequested& stop) {
   Registration result;
   result.T_target_source = T_start;
+  if (!T_start.finite() || !target.reaches(T_start.translation))
+    return result;
+  workers_->take(source);
   double width = wide ? kWidthStartWide : kWidthStart;
   bool few_planes = false;
   while (result.iterations < options.max_iterations && (result.iterations == 0 || !stop())) {
@@ -116,9 +118,8 @@ Registration Gicp::align(std::span<const SurfacePoint> source, const SurfaceMap&
     if (looks_up && result.iterations > 0)
       width = std::max(0.5 * width, kWidthEnd);
     const LookUp anew = wide && width > kWidthStart ? LookUp::around : LookUp::here;
-    const NormalEquations points = workers_->run({target, T.R(), T.translation, looks_up ? anew : LookUp::keep,
-                                                  few_planes, options.max_correspondence_m, width * width},
-                                                 source);
+    const NormalEquations points = workers_->run({target, T, T_start.translation, looks_up ? anew : LookUp::keep,
+                                                  few_planes, options.max_correspondence_m, width * width});
     if (!(points.weight > 0.0))
       break;
     few_planes = few_planes || static_cast<double>(points.planes) < kFewPlanes * static_cast<double>(source.size());

@@ -2,6 +2,7 @@
 #include "core/surface_grid.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 
@@ -53,6 +54,12 @@ Eigen::Matrix3d symmetric(const Upper& upper) {
   return m;
 }
 
+/// std::floor is a call where the baseline has no instruction for it.
+std::int32_t floor_of(double v) {
+  const auto truncated = static_cast<std::int32_t>(v);
+  return truncated - (v < truncated ? 1 : 0);
+}
+
 std::uint64_t hash_of(VoxelIndex index) {
   const auto bits = [](std::int32_t i) {
     return static_cast<std::uint64_t>(static_cast<std::uint32_t>(i)) & 0x1FFFFFU;
@@ -75,7 +82,7 @@ SurfaceGrid::SurfaceGrid(double leaf_m, std::size_t max_bytes) : leaf_m_(leaf_m)
 }
 
 VoxelIndex SurfaceGrid::index_of(const Eigen::Vector3d& point_m) const {
-  const auto cell = [this](double v) { return static_cast<std::int32_t>(std::floor(v / leaf_m_ + 0.5)); };
+  const auto cell = [this](double v) { return floor_of(v / leaf_m_ + 0.5); };
   return {cell(point_m.x()), cell(point_m.y()), cell(point_m.z())};
 }
 
@@ -86,8 +93,7 @@ Eigen::Vector3d SurfaceGrid::centre_of(VoxelIndex index) const {
 
 std::size_t SurfaceGrid::home_of(VoxelIndex index) const { return hash_of(index) & (entries_.size() - 1); }
 
-std::uint32_t SurfaceGrid::slot_of(VoxelIndex index) const {
-  const std::uint64_t hash = hash_of(index);
+std::uint32_t SurfaceGrid::slot_of(VoxelIndex index, std::uint64_t hash) const {
   const auto tag = static_cast<std::uint32_t>(hash >> 32U);
   const std::size_t mask = entries_.size() - 1;
   for (std::size_t i = hash & mask;; i = (i + 1) & mask) {
@@ -98,22 +104,45 @@ std::uint32_t SurfaceGrid::slot_of(VoxelIndex index) const {
 }
 
 const Surface* SurfaceGrid::find(VoxelIndex index) const {
-  const std::uint32_t slot = slot_of(index);
+  const std::uint32_t slot = slot_of(index, hash_of(index));
   return slot == kEmpty ? nullptr : &voxels_[slot].surface;
 }
 
+void SurfaceGrid::find(std::span<const VoxelIndex> indices, std::span<const Surface*> surfaces) const {
+  constexpr std::size_t kAtOnce = 64;
+  std::array<std::uint64_t, kAtOnce> hashes;
+  const std::size_t mask = entries_.size() - 1;
+  for (std::size_t begin = 0; begin < indices.size(); begin += kAtOnce) {
+    const std::size_t count = std::min(kAtOnce, indices.size() - begin);
+    for (std::size_t i = 0; i < count; ++i) {
+      hashes[i] = hash_of(indices[begin + i]);
+      __builtin_prefetch(&entries_[hashes[i] & mask]);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      const Entry& home = entries_[hashes[i] & mask];
+      if (home.slot != kEmpty)
+        __builtin_prefetch(&voxels_[home.slot]);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint32_t slot = slot_of(indices[begin + i], hashes[i]);
+      surfaces[begin + i] = slot == kEmpty ? nullptr : &voxels_[slot].surface;
+    }
+  }
+}
+
 std::uint32_t SurfaceGrid::find_or_create(VoxelIndex index) {
-  const std::uint32_t found = slot_of(index);
+  const std::uint64_t hash = hash_of(index);
+  const std::uint32_t found = slot_of(index, hash);
   if (found != kEmpty)
     return found;
   const std::uint32_t slot = take_slot();
   voxels_[slot] = {index, Surface{}};
   moments_[slot] = Moments{};
   const std::size_t mask = entries_.size() - 1;
-  std::size_t i = home_of(index);
+  std::size_t i = hash & mask;
   while (entries_[i].slot != kEmpty)
     i = (i + 1) & mask;
-  entries_[i] = {static_cast<std::uint32_t>(hash_of(index) >> 32U), slot};
+  entries_[i] = {static_cast<std::uint32_t>(hash >> 32U), slot};
   return slot;
 }
 

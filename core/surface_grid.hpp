@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/pose.hpp"
@@ -57,6 +58,8 @@ class SurfaceGrid {
   [[nodiscard]] Eigen::Vector3d centre_of(VoxelIndex index) const;
   /// Nothing where no point has fallen.
   [[nodiscard]] const Surface* find(VoxelIndex index) const;
+  /// The same for many at once, of equal number: their waits for memory overlap.
+  void find(std::span<const VoxelIndex> indices, std::span<const Surface*> surfaces) const;
 
   [[nodiscard]] double leaf_m() const { return leaf_m_; }
   [[nodiscard]] std::size_t size() const { return used_; }
@@ -89,7 +92,7 @@ class SurfaceGrid {
   };
 
   [[nodiscard]] std::size_t home_of(VoxelIndex index) const;
-  [[nodiscard]] std::uint32_t slot_of(VoxelIndex index) const;
+  [[nodiscard]] std::uint32_t slot_of(VoxelIndex index, std::uint64_t hash) const;
   std::uint32_t find_or_create(VoxelIndex index);
   std::uint32_t take_slot();
   void erase_entry(VoxelIndex index);
