@@ -220,9 +220,9 @@ void apply(const Meta& meta, OdometrySample& sample) {
   sample.covariance_scale = meta.covariance_scale;
 }
 
-template <class Row>
+template <class Row, class ParseRow>
 Expected<std::vector<Row>, std::string> read_rows(const std::filesystem::path& file, char separator,
-                                                  Problem (*parse_row)(Fields, Row&)) {
+                                                  ParseRow&& parse_row) {
   std::vector<Row> rows;
   bool first = true;
   Problem problem = for_each_line(file, separator, [&](Fields fields) -> Problem {
@@ -259,10 +259,10 @@ Problem apply_meta(const std::filesystem::path& file, std::vector<Sample>& sampl
 template <class Sample>
 Expected<std::vector<Sample>, std::string> read_samples(const std::filesystem::path& file, char separator,
                                                         Problem (*parse_row)(Fields, Sample&)) {
-  Expected<std::vector<Sample>, std::string> samples = read_rows(file, separator, parse_row);
+  Expected<std::vector<Sample>, std::string> samples = read_rows<Sample>(file, separator, parse_row);
   const std::filesystem::path meta_file = std::filesystem::path{file}.replace_extension(".meta.csv");
   if (samples && std::filesystem::exists(meta_file)) {
-    const Expected<std::vector<Meta>, std::string> rows = read_rows(meta_file, ',', &parse_meta);
+    const Expected<std::vector<Meta>, std::string> rows = read_rows<Meta>(meta_file, ',', &parse_meta);
     if (!rows) {
       return rows.error();
     }
@@ -284,6 +284,30 @@ Expected<std::vector<ImuSample>, std::string> read_imu(const std::filesystem::pa
 
 Expected<std::vector<OdometrySample>, std::string> read_odometry(const std::filesystem::path& file) {
   return read_samples<OdometrySample>(file, ' ', &parse_odometry);
+}
+
+Expected<std::vector<StampedPose>, std::string> read_trajectory(const std::filesystem::path& file) {
+  std::optional<Stamp> last;
+  Expected<std::vector<StampedPose>, std::string> poses =
+      read_rows<StampedPose>(file, ' ', [&](Fields fields, StampedPose& pose) -> Problem {
+        OdometrySample sample;
+        if (Problem problem = parse_odometry(fields, sample)) {
+          return problem;
+        }
+        if (!sample.T_source_base.finite()) {
+          return "the pose is not finite; remove the line";
+        }
+        if (last && sample.stamp <= *last) {
+          return "its time is not after that of the pose before; sort the lines by time and keep one of each";
+        }
+        last = sample.stamp;
+        pose = {sample.stamp, sample.T_source_base};
+        return std::nullopt;
+      });
+  if (poses && poses->empty()) {
+    return fmt::format("{}: holds no pose; expected lines of t x y z qx qy qz qw", file.string());
+  }
+  return poses;
 }
 
 } // namespace locus

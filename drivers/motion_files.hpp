@@ -22,4 +22,13 @@ Expected<std::vector<ImuSample>, std::string> read_imu(const std::filesystem::pa
 /// TUM's trajectory table, seconds and metres: `t x y z qx qy qz qw`. The nanoseconds of the time are kept.
 Expected<std::vector<OdometrySample>, std::string> read_odometry(const std::filesystem::path& file);
 
+/// Where the base was at one instant.
+struct StampedPose {
+  Stamp stamp;
+  Pose T_source_base; ///< in the frame of whoever says so
+};
+
+/// The same table as something to measure by, so more is asked of it: finite, in the order of time, at least one pose.
+Expected<std::vector<StampedPose>, std::string> read_trajectory(const std::filesystem::path& file);
+
 } // namespace locus

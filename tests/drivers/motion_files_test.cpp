@@ -247,5 +247,31 @@ TEST_F(CaptureFolders, WhatWouldBeIgnoredInSilenceIsAnError) {
   EXPECT_TRUE(contains(error_of(CaptureFolder::find(folder_)), "wio.meta.csv: belongs to no source"));
 }
 
+Expected<std::vector<StampedPose>, std::string> trajectory_from(const std::string& text) {
+  const TemporaryFile file{"gt.tum", bytes_of(text)};
+  return read_trajectory(file.path());
+}
+
+TEST(MotionFiles, TrajectoryIsReadAsOdometryIs) {
+  const auto poses = trajectory_from("# t x y z qx qy qz qw\n10.5 1 2 3 0 0 0.6 0.8\n11 4 5 6 0 0 0 1\n");
+  ASSERT_TRUE(poses) << poses.error();
+  ASSERT_EQ(poses->size(), 2u);
+  EXPECT_EQ(to_ns((*poses)[0].stamp), 10'500'000'000);
+  EXPECT_EQ((*poses)[0].T_source_base.translation, Eigen::Vector3d(1, 2, 3));
+  EXPECT_DOUBLE_EQ((*poses)[0].T_source_base.rotation.z(), 0.6);
+}
+
+TEST(MotionFiles, TrajectoryThatCannotBeMeasuredByIsRefusedWithItsLine) {
+  const std::string good = "10 0 0 0 0 0 0 1\n";
+  EXPECT_TRUE(contains(error_of(trajectory_from(good + "11 nan 0 0 0 0 0 1\n")), "gt.tum:2: the pose is not finite"));
+  EXPECT_TRUE(contains(error_of(trajectory_from(good + "11 0 0 0 nan 0 0 1\n")), "gt.tum:2: the pose is not finite"));
+  EXPECT_TRUE(contains(error_of(trajectory_from(good + "11 0 inf 0 0 0 0 1\n")), "gt.tum:2: the pose is not finite"));
+  EXPECT_TRUE(contains(error_of(trajectory_from(good + "\n9 0 0 0 0 0 0 1\n")), "gt.tum:3: its time is not after"));
+  EXPECT_TRUE(contains(error_of(trajectory_from(good + good)), "gt.tum:2: its time is not after"));
+  EXPECT_TRUE(contains(error_of(trajectory_from(good + "11 0 0 0\n")), "gt.tum:2: 4 columns"));
+  EXPECT_TRUE(contains(error_of(trajectory_from("")), "gt.tum: holds no pose"));
+  EXPECT_TRUE(contains(error_of(trajectory_from("t x y z qx qy qz qw\n")), "gt.tum: holds no pose"));
+}
+
 } // namespace
 } // namespace locus

@@ -39,7 +39,8 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
 
   CLI::App app{"Recorded lidar packets in; odometry, map and figures out.", "locus-replay"};
   app.add_option("CAPTURE", arguments.capture,
-                 "A pcap or pcapng file, or a folder with lidar.pcap and any of imu.csv, NAME.tum, config.yaml")
+                 "A pcap or pcapng file, or a folder with lidar.pcap and any of imu.csv, NAME.tum, config.yaml, "
+                 "gt.tum, gt_map.ply")
       ->required();
   app.add_option("-o,--output", arguments.output,
                  "Folder for odometry.tum, odometry.csv, map.pcd and summary.json; made if need be")
@@ -54,6 +55,12 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   app.add_option("--odometry", odometry, "Poses of the motion source NAME, as TUM; may be repeated")
       ->type_name("NAME=FILE")
       ->allow_extra_args(false);
+  app.add_option("--ground-truth", arguments.ground_truth,
+                 "True poses of the robot to measure the odometry by, as TUM; default: the folder's gt.tum")
+      ->type_name("FILE");
+  app.add_option("--map-truth", arguments.map_truth,
+                 "True map to measure the map by, PLY or PCD; default: the folder's gt_map.ply")
+      ->type_name("FILE");
   app.add_option("--start", start_s, "Leaves out what arrived earlier, seconds from the start of the capture")
       ->type_name("S")
       ->check(number_between(0, kLongest_s));

@@ -24,6 +24,8 @@ struct Arguments {
   std::vector<std::string> overrides;
   std::filesystem::path imu; ///< empty: that of the capture folder
   std::vector<OdometryFile> odometry;
+  std::filesystem::path ground_truth; ///< empty: that of the capture folder
+  std::filesystem::path map_truth;    ///< the same
   Duration start{};
   std::optional<Duration> duration;
   std::vector<Fault> faults;

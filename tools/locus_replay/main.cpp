@@ -22,6 +22,7 @@
 #include "locus_replay/motion_recordings.hpp"
 #include "locus_replay/recording.hpp"
 #include "locus_replay/results.hpp"
+#include "locus_replay/truth.hpp"
 
 namespace locus::tools {
 namespace {
@@ -121,9 +122,10 @@ void run(const Arguments& arguments) {
   for (const std::string& warning : warnings)
     say("warning: " + warning);
 
+  Truth truth(arguments, folder);
   const PlayOptions options{arguments.start, arguments.duration, arguments.faults, config.sweep.seed};
   Recording recording(std::move(capture), std::move(motion), config, lidars, options);
-  Results results(arguments, config, recording, begin);
+  Results results(arguments, config, recording, std::move(truth), begin);
   if (arguments.realtime_speed)
     replay_live(config, std::move(lidars), recording, *arguments.realtime_speed, results);
   else

@@ -2,14 +2,18 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
+#include <vector>
 
 #include "core/surface_map.hpp"
 
 namespace locus::tools {
 
-/// Writes the surfaces of the map as a binary PCD, one point for each fine voxel: the mean of what fell into it, and
-/// the normal where that is a plane, else zeros. By hand, for this is all of PCD that is needed and libpcl-io brings
-/// VTK. Throws Failure.
-void write_map(const std::filesystem::path& path, const SurfaceMap& map);
+/// The surfaces of the map: for each fine voxel that is a plane, the mean of what fell into it and the normal.
+std::vector<SurfacePoint> points_of(const SurfaceMap& map);
+
+/// Writes them as a binary PCD. By hand, for this is all of PCD that is needed and libpcl-io brings VTK. Throws
+/// Failure.
+void write_map(const std::filesystem::path& path, std::span<const SurfacePoint> points);
 
 } // namespace locus::tools

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "locus_replay/results.hpp"
 
+#include <optional>
 #include <system_error>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -24,34 +27,40 @@ const std::filesystem::path& made(const std::filesystem::path& folder) {
 
 } // namespace
 
-Results::Results(const Arguments& arguments, const Config& config, const Recording& recording,
+Results::Results(const Arguments& arguments, const Config& config, const Recording& recording, Truth truth,
                  const daemon::MachineTime& begin)
     : arguments_(arguments), config_(config), recording_(recording), begin_(begin),
       odometry_(made(arguments.output), config.odometry.motion_sources),
-      figures_(config.odometry.motion_sources.size()), progress_(!arguments.quiet) {}
+      figures_(config.odometry.motion_sources.size()), truth_(std::move(truth)), progress_(!arguments.quiet) {}
 
 void Results::take(const daemon::ProcessedSweep& sweep) {
   odometry_.write(sweep.estimate);
   figures_.take(sweep);
+  truth_.take(sweep.estimate);
   progress_.show(recording_.progress());
 }
 
 void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor& processor,
                      const daemon::SweepCounters& sweeps) {
+  const daemon::MachineTime spent = daemon::MachineTime::now() - begin_;
+  const bool has_data = ingest.lidars().total().data > 0;
   progress_.wipe();
   odometry_.close();
-  write_map(arguments_.output / "map.pcd", processor.odometry().map());
-  const FinishedRun run{
-      arguments_.capture.string(),        config_, ingest, processor, sweeps, figures_, recording_.duration(),
-      daemon::MachineTime::now() - begin_};
+  const std::vector<SurfacePoint> map = points_of(processor.odometry().map());
+  write_map(arguments_.output / "map.pcd", map);
+  const Accuracy accuracy = has_data ? truth_.compare(map, !arguments_.quiet) : Accuracy{};
+  const FinishedRun run{arguments_.capture.string(), config_, ingest,  processor, sweeps, figures_,
+                        recording_.duration(),       spent,   accuracy};
   OutputFile file(arguments_.output / "summary.json");
   file.print("{}\n", summary(run).dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   file.close();
-  if (ingest.lidars().total().data == 0)
+  if (!has_data)
     throw Failure(ExitStatus::failed, fmt::format("{}: no valid data packet: {}", arguments_.capture.string(),
                                                   why_no_data(recording_, ingest.lidars())));
   if (!arguments_.quiet)
     fmt::print("{}results    {}\n", readable(run), arguments_.output.string());
+  if (!accuracy.problems.empty())
+    throw Failure(ExitStatus::failed, fmt::format("{}", fmt::join(accuracy.problems, "\n")));
 }
 
 } // namespace locus::tools

@@ -8,6 +8,7 @@
 #include "locus_replay/progress_bar.hpp"
 #include "locus_replay/recording.hpp"
 #include "locus_replay/run_figures.hpp"
+#include "locus_replay/truth.hpp"
 
 namespace locus::tools {
 
@@ -15,7 +16,7 @@ namespace locus::tools {
 class Results {
  public:
   /// Makes the folder. The arguments must outlive this. Throws Failure, as do the others.
-  Results(const Arguments& arguments, const Config& config, const Recording& recording,
+  Results(const Arguments& arguments, const Config& config, const Recording& recording, Truth truth,
           const daemon::MachineTime& begin);
 
   void take(const daemon::ProcessedSweep& sweep);
@@ -32,6 +33,7 @@ class Results {
   daemon::MachineTime begin_;
   OdometryFiles odometry_;
   RunFigures figures_;
+  Truth truth_;
   ProgressBar progress_;
 };
 

@@ -19,8 +19,8 @@ using nlohmann::ordered_json;
 constexpr std::array<std::string_view, kStages> kStageNames{"decode",       "correct",        "filter", "covariance",
                                                             "scan_to_scan", "scan_to_submap", "map"};
 
-/// Three digits behind the point: no figure here is known better.
-double rounded(double value) { return std::round(value * 1e3) / 1e3; }
+/// Four digits behind the point: no figure here is known better.
+double rounded(double value) { return std::round(value * 1e4) / 1e4; }
 
 ordered_json to_json(const PacketCounters& counters) {
   ordered_json rejected;
@@ -73,6 +73,41 @@ ordered_json sources(const FinishedRun& run) {
   return sources;
 }
 
+template <class T> ordered_json rounded_or_null(const std::optional<T>& value) {
+  return value ? ordered_json(rounded(*value)) : ordered_json(nullptr);
+}
+
+void add_accuracy(const Accuracy& accuracy, ordered_json& json) {
+  if (const auto& trajectory = accuracy.trajectory) {
+    const ErrorStatistics& ape = trajectory->ape_m;
+    json["ape_m"] = {
+        {"max", rounded(ape.max)}, {"mean", rounded(ape.mean)}, {"std", rounded(ape.std)}, {"rmse", rounded(ape.rmse)}};
+    json["rpe_10m_percent"] = rounded_or_null(trajectory->rpe_10m_percent);
+    json["end_drift_m"] = rounded(trajectory->end_drift_m);
+  }
+  if (const auto& map = accuracy.map)
+    json["map_error_m"] = {{"rmse", rounded_or_null(map->rmse_m)}, {"outliers", map->outliers}};
+}
+
+std::string readable(const Accuracy& accuracy, std::size_t estimates) {
+  std::string text;
+  if (const auto& trajectory = accuracy.trajectory) {
+    text += fmt::format("truth      off by {:.3f} m in the mean, {:.3f} m at most, {:.3f} m at the end",
+                        trajectory->ape_m.mean, trajectory->ape_m.max, trajectory->end_drift_m);
+    if (trajectory->rpe_10m_percent)
+      text +=
+          fmt::format("; {:.2f} % and {:.2f} deg over 10 m", *trajectory->rpe_10m_percent, *trajectory->rpe_10m_deg);
+    if (trajectory->stamps.size() < estimates)
+      text += fmt::format("; it speaks of {} of {} sweeps", trajectory->stamps.size(), estimates);
+    text += '\n';
+  }
+  if (const auto& map = accuracy.map) {
+    text += fmt::format("map truth  {} of {} points within 1 m", map->compared, map->compared + map->outliers);
+    text += map->rmse_m ? fmt::format(", off by {:.3f} m rms\n", *map->rmse_m) : "\n";
+  }
+  return text;
+}
+
 /// Not from getrusage(): its figure survives exec, so it may be that of the program that started this one.
 double peak_rss_mb() {
   std::ifstream status{"/proc/self/status"};
@@ -123,29 +158,32 @@ RunFigures::Percentiles RunFigures::percentiles(std::vector<float> values) {
 
 ordered_json summary(const FinishedRun& run) {
   const RunFigures::Means means = run.figures.means();
-  return {{"version", LOCUS_VERSION},
-          {"capture", run.capture},
-          {"config_sha256", config_sha256(run.config)},
-          {"threads", run.config.odometry.threads},
-          {"isa", std::string(to_string(run.config.odometry.isa))},
-          {"duration_s", rounded(to_seconds(run.duration))},
-          {"wall_s", rounded(to_seconds(run.spent.wall))},
-          {"cpu_s", rounded(to_seconds(run.spent.cpu))},
-          {"peak_rss_mb", rounded(peak_rss_mb())},
-          {"packets", packets(run.ingest.lidars())},
-          {"sweeps",
-           {{"seen", run.sweeps.seen},
-            {"processed", run.sweeps.processed},
-            {"dropped", run.sweeps.dropped},
-            {"failed", run.sweeps.failed}}},
-          {"process_ms", to_json(run.figures.process_ms())},
-          {"process_cpu_ms", to_json(run.figures.process_cpu_ms())},
-          {"stage_ms", stages(run)},
-          {"points", {{"raw_mean", rounded(means.raw_points)}, {"filtered_mean", rounded(means.filtered_points)}}},
-          {"iterations_mean",
-           {{"scan_to_scan", rounded(means.scan_to_scan_iterations)},
-            {"scan_to_submap", rounded(means.scan_to_submap_iterations)}}},
-          {"sources", sources(run)}};
+  ordered_json json{
+      {"version", LOCUS_VERSION},
+      {"capture", run.capture},
+      {"config_sha256", config_sha256(run.config)},
+      {"threads", run.config.odometry.threads},
+      {"isa", std::string(to_string(run.config.odometry.isa))},
+      {"duration_s", rounded(to_seconds(run.duration))},
+      {"wall_s", rounded(to_seconds(run.spent.wall))},
+      {"cpu_s", rounded(to_seconds(run.spent.cpu))},
+      {"peak_rss_mb", rounded(peak_rss_mb())},
+      {"packets", packets(run.ingest.lidars())},
+      {"sweeps",
+       {{"seen", run.sweeps.seen},
+        {"processed", run.sweeps.processed},
+        {"dropped", run.sweeps.dropped},
+        {"failed", run.sweeps.failed}}},
+      {"process_ms", to_json(run.figures.process_ms())},
+      {"process_cpu_ms", to_json(run.figures.process_cpu_ms())},
+      {"stage_ms", stages(run)},
+      {"points", {{"raw_mean", rounded(means.raw_points)}, {"filtered_mean", rounded(means.filtered_points)}}},
+      {"iterations_mean",
+       {{"scan_to_scan", rounded(means.scan_to_scan_iterations)},
+        {"scan_to_submap", rounded(means.scan_to_submap_iterations)}}},
+      {"sources", sources(run)}};
+  add_accuracy(run.accuracy, json);
+  return json;
 }
 
 std::string readable(const FinishedRun& run) {
@@ -166,7 +204,7 @@ std::string readable(const FinishedRun& run) {
                       end_m.y(), end_m.z());
   text += fmt::format("time       {:.2f} ms a sweep from its cut, 99 % within {:.2f} ms; {:.1f} s in all, {:.0f} MB\n",
                       wall_ms.p50, wall_ms.p99, to_seconds(run.spent.wall), peak_rss_mb());
-  return text;
+  return text + readable(run.accuracy, run.figures.sweeps());
 }
 
 } // namespace locus::tools

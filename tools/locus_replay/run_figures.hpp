@@ -3,11 +3,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
+#include "accuracy/map_accuracy.hpp"
+#include "accuracy/trajectory_accuracy.hpp"
 #include "config/config.hpp"
 #include "daemon/ingest.hpp"
 #include "daemon/sweep_processor.hpp"
@@ -47,6 +50,13 @@ class RunFigures {
   Pose last_T_odom_base_;
 };
 
+/// How far a run is from the truth, as far as that was given.
+struct Accuracy {
+  std::optional<TrajectoryAccuracy> trajectory;
+  std::optional<MapAccuracy> map;
+  std::vector<std::string> problems; ///< why one that was given could not be compared with, each a line for the user
+};
+
 /// All that a finished run is described by.
 struct FinishedRun {
   std::string capture; ///< as the user named it
@@ -55,8 +65,9 @@ struct FinishedRun {
   const daemon::SweepProcessor& processor;
   daemon::SweepCounters sweeps;
   const RunFigures& figures;
-  Duration duration; ///< of the recording
-  daemon::MachineTime spent;
+  Duration duration;         ///< of the recording
+  daemon::MachineTime spent; ///< without what it took to compare with the truth
+  const Accuracy& accuracy;
 };
 
 /// The contents of summary.json.

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "accuracy/point_cloud_file.hpp"
+#include "core/odometry_estimate.hpp"
+#include "core/surface_map.hpp"
+#include "drivers/capture_folder.hpp"
+#include "locus_replay/arguments.hpp"
+#include "locus_replay/progress_bar.hpp"
+#include "locus_replay/run_figures.hpp"
+
+namespace locus::tools {
+
+/// The truth that the user or the folder gave, and what of a run is compared with it. One owner.
+class Truth {
+ public:
+  /// Reads the poses and looks at the map, so that what is wrong with them is known before the run. Throws Failure.
+  Truth(const Arguments& arguments, const CaptureFolder& folder);
+
+  void take(const OdometryEstimate& estimate);
+
+  /// Takes its time if there is a map.
+  [[nodiscard]] Accuracy compare(std::span<const SurfacePoint> map, bool show_progress) const;
+
+ private:
+  [[nodiscard]] std::string why_nothing_in_common() const;
+
+  std::filesystem::path trajectory_file_;
+  std::vector<StampedPose> trajectory_;
+  std::optional<PointCloudFile> map_;
+  std::vector<StampedPose> estimates_; ///< with a true trajectory alone
+};
+
+} // namespace locus::tools
