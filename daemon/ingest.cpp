@@ -44,7 +44,7 @@ Ingest::Ingest(const Config& config, LidarRouter lidars, Sink sink)
           max_returns(config),
           [this](Sweep& sweep) {
             const StageStopwatch::Pause pause(stages_);
-            sink_(sweep, cut_watch_.cut());
+            sink_(sweep, {cut_watch_.cut_began(), stages_.lap()});
           },
           &cut_watch_) {}
 
@@ -68,7 +68,7 @@ template void Ingest::take_motion(const OdometryInput&);
 
 void Ingest::CutWatch::enter(Stage stage) {
   if (stage == Stage::filter)
-    cut_ = MachineTime::now();
+    cut_began_ = MachineTime::now();
   stages_.enter(stage);
 }
 

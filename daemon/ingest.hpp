@@ -9,6 +9,7 @@
 #include "daemon/input.hpp"
 #include "daemon/machine_time.hpp"
 #include "daemon/stage_stopwatch.hpp"
+#include "daemon/sweep_cut.hpp"
 #include "drivers/lidar_input.hpp"
 
 namespace locus::daemon {
@@ -21,8 +22,8 @@ namespace locus::daemon {
 /// construction. One owner.
 class Ingest {
  public:
-  /// Takes a finished sweep (see SweepBuilder::Sink) and when the work on its cut began.
-  using Sink = std::function<void(Sweep& sweep, const MachineTime& cut)>;
+  /// Takes a finished sweep, see SweepBuilder::Sink.
+  using Sink = std::function<void(Sweep& sweep, const SweepCut& cut)>;
 
   /// `lidars` opened from config.lidars.
   Ingest(const Config& config, LidarRouter lidars, Sink sink);
@@ -54,11 +55,11 @@ class Ingest {
     explicit CutWatch(StageStopwatch& stages) : stages_(stages) {}
     void enter(Stage stage) override;
     void leave() override { stages_.leave(); }
-    [[nodiscard]] const MachineTime& cut() const { return cut_; }
+    [[nodiscard]] const MachineTime& cut_began() const { return cut_began_; }
 
    private:
     StageStopwatch& stages_;
-    MachineTime cut_;
+    MachineTime cut_began_;
   };
 
   template <class MotionInput> void take_motion(const MotionInput& input);

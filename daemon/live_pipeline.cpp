@@ -22,7 +22,7 @@ constexpr Duration kMaxSleep = std::chrono::milliseconds{100};
 
 LivePipeline::LivePipeline(const Config& config, LidarRouter lidars, InputSource& input, double speed)
     : input_(input), speed_(speed), max_points_(Ingest::max_points(config)),
-      ingest_(config, std::move(lidars), [this](Sweep& sweep, const MachineTime& cut) { hand_over(sweep, cut); }),
+      ingest_(config, std::move(lidars), [this](Sweep& sweep, const SweepCut& cut) { hand_over(sweep, cut); }),
       processor_(config.odometry), ingest_thread_([this] { run_ingest(); }),
       odometry_thread_([this] { run_odometry(); }) {
   pthread_setname_np(ingest_thread_.native_handle(), "ingest");
@@ -49,7 +49,7 @@ void LivePipeline::run_ingest() {
 }
 
 /// Leaves memory behind in exchange for that of the sweep.
-void LivePipeline::hand_over(Sweep& sweep, const MachineTime& cut) {
+void LivePipeline::hand_over(Sweep& sweep, const SweepCut& cut) {
   CutSweep& back = newest_sweep_.back();
   std::vector<SweepPoint> spare = std::exchange(back.sweep.points, {});
   spare.reserve(max_points_); // does something for the first few sweeps alone
@@ -76,7 +76,7 @@ void LivePipeline::run_odometry() {
 
 void LivePipeline::process(const CutSweep& taken) {
   const Duration period = from_seconds(to_seconds(taken.sweep.end - taken.sweep.start) / speed_);
-  const Duration deadline = taken.cut.wall + period;
+  const Duration deadline = taken.cut.began.wall + period;
   const ProcessedSweep done = processor_.process(taken.sweep, taken.cut, [this, deadline] {
     return stopping_.load(std::memory_order_relaxed) || read_clock(CLOCK_MONOTONIC) > deadline;
   });

@@ -13,6 +13,7 @@
 #include "daemon/input.hpp"
 #include "daemon/latest_slot.hpp"
 #include "daemon/spsc_ring.hpp"
+#include "daemon/sweep_cut.hpp"
 #include "daemon/sweep_processor.hpp"
 #include "daemon/wakeup.hpp"
 
@@ -59,13 +60,13 @@ class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it kee
  private:
   struct CutSweep {
     Sweep sweep;
-    MachineTime cut;
+    SweepCut cut;
   };
   using Counter = std::atomic<std::uint64_t>; ///< one thread counts, any reads
 
   void run_ingest();
   void run_odometry();
-  void hand_over(Sweep& sweep, const MachineTime& cut);
+  void hand_over(Sweep& sweep, const SweepCut& cut);
   void process(const CutSweep& taken);
 
   InputSource& input_;

@@ -62,4 +62,15 @@ Duration StageStopwatch::total(Stage stage) const {
   return from_seconds(to_seconds(timed) * static_cast<double>(visits_[index]) / static_cast<double>(timed_visits));
 }
 
+/// An extrapolated total may shrink a little: nothing was spent then.
+StageTimes StageStopwatch::lap() {
+  StageTimes spent;
+  for (std::size_t stage = 0; stage < kStages; ++stage) {
+    const Duration now = total(static_cast<Stage>(stage));
+    spent[stage] = std::max(Duration::zero(), now - totals_at_lap_[stage]);
+    totals_at_lap_[stage] = now;
+  }
+  return spent;
+}
+
 } // namespace locus::daemon

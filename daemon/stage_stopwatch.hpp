@@ -10,6 +10,9 @@
 
 namespace locus::daemon {
 
+/// CPU time by stage.
+using StageTimes = std::array<Duration, kStages>;
+
 /// Adds up the CPU time that its thread spends in each stage; the time of an inner stage is not charged to the outer.
 ///
 /// Reading the clock of a thread is a system call, as long as the decoding of a packet. So of the stages that every
@@ -26,6 +29,8 @@ class StageStopwatch : public StageClock {
 
   /// CPU time spent in `stage` so far.
   [[nodiscard]] Duration total(Stage stage) const;
+  /// CPU time spent in each stage since the last call.
+  StageTimes lap();
 
   /// What is done in the life of this object belongs to none of the stages that are open.
   class Pause {
@@ -54,6 +59,7 @@ class StageStopwatch : public StageClock {
   Duration mark_{}; ///< up to here everything is charged
   std::array<Duration, kStages + 1> totals_{};
   std::array<std::uint64_t, kStages + 1> visits_{};
+  StageTimes totals_at_lap_{};
   std::array<Frame, kMaxDepth> open_{};
   std::size_t depth_ = 0;
 };

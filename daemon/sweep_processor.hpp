@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <bitset>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 
 #include "core/odometry.hpp"
 #include "daemon/machine_time.hpp"
 #include "daemon/stage_stopwatch.hpp"
+#include "daemon/sweep_cut.hpp"
 
 namespace locus::daemon {
 
@@ -25,7 +29,9 @@ struct ProcessedSweep {
   OdometryEstimate estimate;
   std::uint64_t sequence = 0; ///< Sweep::sequence
   std::size_t raw_returns = 0;
-  MachineTime took; ///< from the cut of the sweep to the estimate
+  std::bitset<Sweep::kMaxSources> usable_sources; ///< SourcePose::usable, by the index of the source
+  MachineTime took;                               ///< from the cut of the sweep to the estimate
+  StageTimes stages_took;                         ///< those of the ingest included
 };
 
 /// Odometry with its costs measured; what the daemon's odometry thread and the replay in one thread share. One owner.
@@ -35,11 +41,15 @@ class SweepProcessor {
   SweepProcessor(const SweepProcessor&) = delete;
   SweepProcessor& operator=(const SweepProcessor&) = delete;
 
-  /// `cut` as Ingest::Sink has it, `stop` as Odometry has it.
+  /// `stop` as Odometry has it.
   ProcessedSweep process(
-      const Sweep& sweep, const MachineTime& cut, const Gicp::StopRequested& stop = [] { return false; }) {
-    ProcessedSweep done{odometry_.process(sweep, stop), sweep.sequence, sweep.raw_returns, {}};
-    done.took = MachineTime::now() - cut;
+      const Sweep& sweep, const SweepCut& cut, const Gicp::StopRequested& stop = [] { return false; }) {
+    ProcessedSweep done{odometry_.process(sweep, stop), sweep.sequence, sweep.raw_returns, {}, {}, cut.ingest_took};
+    done.took = MachineTime::now() - cut.began;
+    const StageTimes odometry_took = stages_.lap();
+    std::ranges::transform(done.stages_took, odometry_took, done.stages_took.begin(), std::plus{});
+    for (std::size_t source = 0; source < Sweep::kMaxSources; ++source)
+      done.usable_sources[source] = sweep.sources[source].usable;
     return done;
   }
 

@@ -69,8 +69,8 @@ Input DriveInput::next(Duration) {
 std::vector<ProcessedSweep> process_in_one_thread(const Config& config) {
   std::vector<ProcessedSweep> processed;
   SweepProcessor processor(config.odometry);
-  Ingest ingest(config, open_lidars(config), [&](Sweep& sweep, const SweepCut& cut) {
-    processed.push_back(processor.process(sweep, cut));
+  Ingest ingest(config, open_lidars(config), [&](Sweep& sweep, const SweepCut&) {
+    processed.push_back(processor.process(sweep, {MachineTime::now(), {}}));
   });
   for (const Input& input : Drive::instance().inputs())
     ingest.take(input);

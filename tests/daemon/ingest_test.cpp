@@ -26,7 +26,7 @@ struct Summary {
 
 template <class Feed> std::vector<Summary> sweeps_of(const Config& config, const Feed& feed) {
   std::vector<Summary> sweeps;
-  Ingest ingest(config, open_lidars(config), [&](Sweep& sweep, const MachineTime&) {
+  Ingest ingest(config, open_lidars(config), [&](Sweep& sweep, const SweepCut&) {
     const Eigen::Vector3f first =
         sweep.points.empty() ? Eigen::Vector3f::Zero().eval() : sweep.points.front().position_base_m;
     sweeps.push_back({sweep.sequence, sweep.start, sweep.end, sweep.raw_returns, sweep.points.size(), first});
@@ -42,10 +42,10 @@ bool is_datagram(const Input& input) { return std::holds_alternative<Datagram>(i
 TEST(Ingest, MakesOneSweepPerRevolutionAndCountsEveryPacket) {
   const Config config = Drive::config();
   std::size_t sweeps = 0;
-  Ingest ingest(config, open_lidars(config), [&](Sweep& sweep, const MachineTime& cut) {
+  Ingest ingest(config, open_lidars(config), [&](Sweep& sweep, const SweepCut& cut) {
     ++sweeps;
     EXPECT_GT(sweep.points.size(), 1000U);
-    EXPECT_GT(cut.wall, Duration::zero());
+    EXPECT_GT(cut.began.wall, Duration::zero());
     EXPECT_EQ(sweep.uncorrected, sweeps == 1 ? sweep.uncorrected : Uncorrected::nothing);
   });
   std::uint64_t datagrams = 0;
@@ -98,7 +98,7 @@ TEST_P(IngestWithFilters, AllocatesNothingOnceWarm) {
   spare.reserve(Ingest::max_points(config));
   std::optional<std::uint64_t> before;
   std::optional<std::uint64_t> after;
-  Ingest ingest(config, open_lidars(config), [&](Sweep& sweep, const MachineTime&) {
+  Ingest ingest(config, open_lidars(config), [&](Sweep& sweep, const SweepCut&) {
     std::swap(sweep.points, spare);
     spare.reserve(Ingest::max_points(config));
     (sweep.sequence <= kWarm ? before : after) = allocations();

@@ -55,6 +55,20 @@ TEST(StageStopwatch, WhatIsDoneInAPauseBelongsToNoStage) {
   expect_about(stopwatch.total(Stage::filter), milliseconds{10});
 }
 
+TEST(StageStopwatch, LapHoldsWhatWasSpentSinceTheLastOne) {
+  StageStopwatch stopwatch;
+  const auto work_in_filter_for = [&](Duration cpu) {
+    const StageScope filter(&stopwatch, Stage::filter);
+    work_for(cpu);
+  };
+  work_in_filter_for(milliseconds{30});
+  expect_about(stopwatch.lap()[static_cast<std::size_t>(Stage::filter)], milliseconds{30});
+  work_in_filter_for(milliseconds{10});
+  const StageTimes lap = stopwatch.lap();
+  expect_about(lap[static_cast<std::size_t>(Stage::filter)], milliseconds{10});
+  EXPECT_EQ(lap[static_cast<std::size_t>(Stage::map)], Duration::zero());
+}
+
 TEST(StageStopwatch, VisitsThatAreNotTimedCountLikeThoseThatAre) {
   StageStopwatch stopwatch;
   for (int packet = 0; packet < 200; ++packet) {

@@ -81,7 +81,7 @@ void check_faults(const std::vector<Fault>& faults, const Config& config) {
 void replay(const Config& config, LidarRouter lidars, Recording& recording, Results& results) {
   daemon::SweepCounters counters;
   daemon::SweepProcessor processor(config.odometry);
-  daemon::Ingest ingest(config, std::move(lidars), [&](Sweep& sweep, const MachineTime& cut) {
+  daemon::Ingest ingest(config, std::move(lidars), [&](Sweep& sweep, const daemon::SweepCut& cut) {
     const daemon::ProcessedSweep done = processor.process(sweep, cut);
     ++counters.seen;
     ++(done.estimate.failed ? counters.failed : counters.processed);
