@@ -1,237 +1,250 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "locus_sim/scene.hpp"
 
-#include <Eigen/Geometry>
-
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <numbers>
+#include <span>
+#include <utility>
 
 namespace locus::sim {
 namespace {
 
 constexpr double kNowhere = std::numeric_limits<double>::infinity();
-constexpr double kTouching_m = 1e-9; // a ray that starts on a surface leaves it
-constexpr std::uint32_t kLeafSize = 2;
-constexpr std::size_t kMaxDepth = 64;
+constexpr double kFar_m = 1e30; // where no ray comes
+constexpr std::uint32_t kLeafSize = 4;
+constexpr std::uint32_t kBranch = 0xFFFF'FFFF; // in place of the count of a leaf
+constexpr std::size_t kStackSize = 256;        // three more per level
+constexpr float kSlack_m = 1e-3F;              // boxes are larger by this: more than single precision can be wrong by
 
-/// Smaller root of t^2 + 2 b t + c = 0 in front of the origin that `accepts`, infinity when there is none.
-template <class Accepts> double first_root(double b, double c, Accepts accepts) {
-  const double discriminant = b * b - c;
-  if (discriminant < 0)
-    return kNowhere;
-  const double root = std::sqrt(discriminant);
-  for (const double t : {-b - root, -b + root})
-    if (t > kTouching_m && accepts(t))
-      return t;
-  return kNowhere;
-}
-
-/// Where a ray enters and leaves an axis-aligned box; it misses when enter > leave.
-struct Passage {
-  double enter, leave;
+struct Waiting { // to be looked into, unless something nearer has been found
+  std::uint32_t first, count;
+  float enter_m;
 };
 
-Passage passage(const Bounds& box, const Eigen::Vector3d& origin, const Eigen::Vector3d& inverse_direction) {
-  Passage through{-kNowhere, kNowhere};
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    const double a = (box.min_m[axis] - origin[axis]) * inverse_direction[axis];
-    const double b = (box.max_m[axis] - origin[axis]) * inverse_direction[axis];
-    through.enter = std::max(through.enter, std::min(a, b));
-    through.leave = std::min(through.leave, std::max(a, b));
-  }
-  return through;
+Bounds bounds_of(const Surface& surface) {
+  return std::visit([](const auto& shape) { return shape.bounds(); }, surface.shape);
 }
 
-/// Finite even where the ray runs along an axis, so that no 0 * infinity arises on the face of a box.
-Eigen::Vector3d inverse(const Eigen::Vector3d& direction) {
-  return direction.unaryExpr([](double d) { return 1.0 / (d == 0.0 ? 1e-300 : d); });
+Bounds bounds_of(std::span<const Surface> surfaces) {
+  if (surfaces.empty())
+    return {Eigen::Vector3d::Constant(kFar_m), Eigen::Vector3d::Constant(kFar_m)};
+  Bounds all = bounds_of(surfaces.front());
+  for (const Surface& surface : surfaces)
+    all = united(all, bounds_of(surface));
+  return all;
+}
+
+double area_m2(const Bounds& bounds) {
+  const Eigen::Vector3d size = bounds.max_m - bounds.min_m;
+  return size.x() * size.y() + size.y() * size.z() + size.z() * size.x();
 }
 
 double squared_distance(const Bounds& box, const Eigen::Vector3d& point) {
   return (point - point.cwiseMax(box.min_m).cwiseMin(box.max_m)).squaredNorm();
 }
 
-Bounds united(const Bounds& a, const Bounds& b) { return {a.min_m.cwiseMin(b.min_m), a.max_m.cwiseMax(b.max_m)}; }
-
-Bounds bounds_of(const Surface& surface) {
-  return std::visit([](const auto& shape) { return shape.bounds(); }, surface.shape);
+double range_m(const Surface& surface, const Ray& ray) {
+  return std::visit([&](const auto& shape) { return shape.range_m(ray); }, surface.shape);
 }
 
-Eigen::Vector3d into_box(const Box& box, const Eigen::Vector3d& v) {
-  return {box.cos_yaw * v.x() + box.sin_yaw * v.y(), box.cos_yaw * v.y() - box.sin_yaw * v.x(), v.z()};
+double distance_m(const Surface& surface, const Eigen::Vector3d& point) {
+  return std::visit([&](const auto& shape) { return shape.distance_m(point); }, surface.shape);
+}
+
+bool passes_through(const Ray& ray, const Bounds& box, double max_range_m) {
+  double enter = 0, leave = max_range_m;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const double a = (box.min_m[axis] - ray.origin_m[axis]) / ray.direction[axis];
+    const double b = (box.max_m[axis] - ray.origin_m[axis]) / ray.direction[axis];
+    enter = std::max(enter, std::min(a, b));
+    leave = std::min(leave, std::max(a, b));
+  }
+  return enter <= leave;
 }
 
 } // namespace
 
-double Rectangle::range_m(const Ray& ray) const {
-  const Eigen::Vector3d normal = edge_u_m.cross(edge_v_m);
-  const double approach = normal.dot(ray.direction);
-  if (approach == 0)
-    return kNowhere;
-  const double t = normal.dot(corner_m - ray.origin_m) / approach;
-  if (!(t > kTouching_m))
-    return kNowhere;
-  const Eigen::Vector3d from_corner = ray.origin_m + t * ray.direction - corner_m;
-  const double u = from_corner.dot(edge_u_m), v = from_corner.dot(edge_v_m);
-  const bool inside = u >= 0 && u <= edge_u_m.squaredNorm() && v >= 0 && v <= edge_v_m.squaredNorm();
-  return inside ? t : kNowhere;
+Eigen::Vector3d Mover::position_m(Stamp stamp) const {
+  const double turns = std::fmod(to_seconds(stamp.time_since_epoch()), period_s) / period_s + phase;
+  return from_m + 0.5 * (1 - std::cos(2 * std::numbers::pi * turns)) * (to_m - from_m);
 }
 
-double Rectangle::distance_m(const Eigen::Vector3d& point) const {
-  const Eigen::Vector3d from_corner = point - corner_m;
-  const double u = std::clamp(from_corner.dot(edge_u_m) / edge_u_m.squaredNorm(), 0.0, 1.0);
-  const double v = std::clamp(from_corner.dot(edge_v_m) / edge_v_m.squaredNorm(), 0.0, 1.0);
-  return (from_corner - u * edge_u_m - v * edge_v_m).norm();
+Bounds Mover::bounds() const {
+  const Bounds own = bounds_of(parts);
+  return united({own.min_m + from_m, own.max_m + from_m}, {own.min_m + to_m, own.max_m + to_m});
 }
 
-Bounds Rectangle::bounds() const {
-  const Eigen::Vector3d u = corner_m + edge_u_m, v = corner_m + edge_v_m;
-  return united({corner_m.cwiseMin(u), corner_m.cwiseMax(u)}, {v.cwiseMin(v + edge_u_m), v.cwiseMax(v + edge_u_m)});
-}
-
-double Box::range_m(const Ray& ray) const {
-  const Passage through = passage({-half_size_m, half_size_m}, into_box(*this, ray.origin_m - center_m),
-                                  inverse(into_box(*this, ray.direction)));
-  if (through.enter > through.leave)
-    return kNowhere;
-  if (through.enter > kTouching_m)
-    return through.enter;
-  return through.leave > kTouching_m ? through.leave : kNowhere;
-}
-
-double Box::distance_m(const Eigen::Vector3d& point) const {
-  const Eigen::Vector3d beyond = into_box(*this, point - center_m).cwiseAbs() - half_size_m;
-  const double inside = beyond.maxCoeff();
-  return inside < 0 ? -inside : beyond.cwiseMax(0.0).norm();
-}
-
-Bounds Box::bounds() const {
-  const double c = std::abs(cos_yaw), s = std::abs(sin_yaw);
-  const Eigen::Vector3d reach{c * half_size_m.x() + s * half_size_m.y(), s * half_size_m.x() + c * half_size_m.y(),
-                              half_size_m.z()};
-  return {center_m - reach, center_m + reach};
-}
-
-double Cylinder::range_m(const Ray& ray) const {
-  const Eigen::Vector3d from_base = ray.origin_m - base_m;
-  const double a = ray.direction.head<2>().squaredNorm();
-  if (a == 0)
-    return kNowhere;
-  const double b = from_base.head<2>().dot(ray.direction.head<2>()) / a;
-  const double c = (from_base.head<2>().squaredNorm() - radius_m * radius_m) / a;
-  return first_root(b, c, [&](double t) {
-    const double z = from_base.z() + t * ray.direction.z();
-    return z >= 0 && z <= height_m;
-  });
-}
-
-double Cylinder::distance_m(const Eigen::Vector3d& point) const {
-  const Eigen::Vector3d from_base = point - base_m;
-  const double radially = from_base.head<2>().norm() - radius_m;
-  const double along = from_base.z() - std::clamp(from_base.z(), 0.0, height_m);
-  return std::hypot(radially, along);
-}
-
-Bounds Cylinder::bounds() const {
-  const Eigen::Vector3d reach{radius_m, radius_m, 0};
-  return {base_m - reach, base_m + reach + Eigen::Vector3d{0, 0, height_m}};
-}
-
-double Sphere::range_m(const Ray& ray) const {
-  const Eigen::Vector3d from_center = ray.origin_m - center_m;
-  return first_root(from_center.dot(ray.direction), from_center.squaredNorm() - radius_m * radius_m,
-                    [](double) { return true; });
-}
-
-double Sphere::distance_m(const Eigen::Vector3d& point) const { return std::abs((point - center_m).norm() - radius_m); }
-
-Bounds Sphere::bounds() const {
-  const Eigen::Vector3d reach = Eigen::Vector3d::Constant(radius_m);
-  return {center_m - reach, center_m + reach};
-}
-
-Scene::Scene(std::vector<Surface> surfaces) : surfaces_(std::move(surfaces)) {
-  nodes_.reserve(2 * surfaces_.size());
+Scene::Scene(std::vector<Surface> surfaces, std::vector<Mover> movers)
+    : surfaces_(std::move(surfaces)), movers_(std::move(movers)), bounds_(bounds_of(surfaces_)) {
   if (!surfaces_.empty())
     build(0, static_cast<std::uint32_t>(surfaces_.size()));
+  std::transform(movers_.begin(), movers_.end(), std::back_inserter(mover_bounds_),
+                 [](const Mover& mover) { return mover.bounds(); });
 }
 
-void Scene::build(std::uint32_t begin, std::uint32_t end) {
-  const auto first = surfaces_.begin() + begin, last = surfaces_.begin() + end;
-  Bounds bounds = bounds_of(*first);
-  std::for_each(first, last, [&](const Surface& surface) { bounds = united(bounds, bounds_of(surface)); });
-  if (end - begin <= kLeafSize) {
-    nodes_.push_back({bounds, begin, static_cast<std::uint16_t>(end - begin), 0});
-    return;
+/// Makes the node over a range of surfaces, which it puts in order; its index.
+std::uint32_t Scene::build(std::uint32_t begin, std::uint32_t end) {
+  const std::uint32_t middle = split(begin, end);
+  const std::array<std::uint32_t, 5> limits{begin, split(begin, middle), middle, split(middle, end), end};
+  Node node;
+  for (std::size_t lane = 0; lane < 4; ++lane) {
+    const std::uint32_t first = limits[lane], count = limits[lane + 1] - first;
+    const Bounds box = bounds_of(std::span<const Surface>(surfaces_).subspan(first, count));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto i = static_cast<Eigen::Index>(axis), j = static_cast<Eigen::Index>(lane);
+      node.min_m[axis][j] = static_cast<float>(box.min_m[i]) - kSlack_m;
+      node.max_m[axis][j] = static_cast<float>(box.max_m[i]) + kSlack_m;
+    }
+    node.first[lane] = count <= kLeafSize ? first : build(first, first + count);
+    node.count[lane] = count <= kLeafSize ? count : kBranch;
   }
+  nodes_.push_back(node);
+  return static_cast<std::uint32_t>(nodes_.size() - 1);
+}
 
+/// Puts a range in order along its longest side and finds where to part it: where fewest surfaces are met, the chance
+/// to meet a box being as its area.
+std::uint32_t Scene::split(std::uint32_t begin, std::uint32_t end) {
+  const std::size_t count = end - begin;
+  if (count < 2)
+    return end;
+  const std::span<Surface> range = std::span(surfaces_).subspan(begin, count);
+  struct Placed {
+    Bounds bounds;
+    Surface surface;
+  };
+  std::vector<Placed> placed;
+  Bounds centers{Eigen::Vector3d::Constant(kFar_m), Eigen::Vector3d::Constant(-kFar_m)};
+  for (const Surface& surface : range) {
+    const Bounds bounds = bounds_of(surface);
+    const Eigen::Vector3d center = bounds.min_m + bounds.max_m;
+    placed.push_back({bounds, surface});
+    centers = united(centers, {center, center});
+  }
   Eigen::Index axis = 0;
-  (bounds.max_m - bounds.min_m).maxCoeff(&axis);
-  const auto middle = first + (end - begin) / 2;
-  std::nth_element(first, middle, last, [axis](const Surface& a, const Surface& b) {
-    const Bounds of_a = bounds_of(a), of_b = bounds_of(b);
-    return of_a.min_m[axis] + of_a.max_m[axis] < of_b.min_m[axis] + of_b.max_m[axis];
+  (centers.max_m - centers.min_m).maxCoeff(&axis);
+  std::stable_sort(placed.begin(), placed.end(), [axis](const Placed& a, const Placed& b) {
+    return a.bounds.min_m[axis] + a.bounds.max_m[axis] < b.bounds.min_m[axis] + b.bounds.max_m[axis];
   });
-  const auto split = static_cast<std::uint32_t>(middle - surfaces_.begin());
-  const std::size_t node = nodes_.size();
-  nodes_.push_back({bounds, 0, 0, static_cast<std::uint16_t>(axis)});
-  build(begin, split);
-  nodes_[node].first = static_cast<std::uint32_t>(nodes_.size());
-  build(split, end);
-}
+  std::transform(placed.begin(), placed.end(), range.begin(), [](const Placed& each) { return each.surface; });
 
-std::optional<Hit> Scene::cast(const Ray& ray, double max_range_m) const {
-  const Eigen::Vector3d inverse_direction = inverse(ray.direction);
-  double nearest = max_range_m;
-  const Surface* met = nullptr;
-  std::array<std::uint32_t, kMaxDepth> waiting;
-  std::size_t depth = 0;
-  if (!nodes_.empty())
-    waiting[depth++] = 0;
-  while (depth > 0) {
-    const std::uint32_t index = waiting[--depth];
-    const Node& node = nodes_[index];
-    const Passage through = passage(node.bounds, ray.origin_m, inverse_direction);
-    if (through.enter > through.leave || through.leave < 0 || through.enter > nearest)
-      continue;
-    if (node.count == 0) { // the nearer child is looked at first: what it holds often hides the other
-      const bool forward = ray.direction[node.axis] > 0;
-      waiting[depth++] = forward ? node.first : index + 1;
-      waiting[depth++] = forward ? index + 1 : node.first;
-      continue;
-    }
-    for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
-      const double range_m = std::visit([&](const auto& shape) { return shape.range_m(ray); }, surfaces_[i].shape);
-      if (range_m < nearest) {
-        nearest = range_m;
-        met = &surfaces_[i];
-      }
+  std::vector<double> area_behind_m2(count);
+  Bounds box = placed.back().bounds;
+  for (std::size_t i = count; i-- > 0;)
+    area_behind_m2[i] = area_m2(box = united(box, placed[i].bounds));
+  box = placed.front().bounds;
+  double least = kNowhere;
+  std::size_t best = count / 2;
+  for (std::size_t i = 1; i < count; ++i) {
+    box = united(box, placed[i - 1].bounds);
+    const double cost = area_m2(box) * static_cast<double>(i) + area_behind_m2[i] * static_cast<double>(count - i);
+    if (cost < least) {
+      least = cost;
+      best = i;
     }
   }
-  return met ? std::optional<Hit>{{nearest, met->reflectivity}} : std::nullopt;
+  return begin + static_cast<std::uint32_t>(best);
 }
 
-double Scene::distance_to_surface(const Eigen::Vector3d& point) const {
-  double nearest = kNowhere;
-  std::array<std::uint32_t, kMaxDepth> waiting;
+void Scene::cast_at_surfaces(const Ray& ray, Met& nearest) const {
+  const Eigen::Array3f origin = ray.origin_m.cast<float>();
+  const Eigen::Array3f inverse =
+      ray.direction.cast<float>().array().unaryExpr([](float d) { return 1.0F / (d == 0.0F ? 1e-30F : d); });
+  std::array<Waiting, kStackSize> waiting;
   std::size_t depth = 0;
   if (!nodes_.empty())
-    waiting[depth++] = 0;
+    waiting[depth++] = {static_cast<std::uint32_t>(nodes_.size() - 1), kBranch, 0};
   while (depth > 0) {
-    const std::uint32_t index = waiting[--depth];
-    const Node& node = nodes_[index];
-    if (squared_distance(node.bounds, point) > nearest * nearest)
+    const Waiting next = waiting[--depth];
+    if (next.enter_m > static_cast<float>(nearest.range_m))
       continue;
-    if (node.count == 0) {
-      waiting[depth++] = node.first;
-      waiting[depth++] = index + 1;
+    if (next.count != kBranch) {
+      for (std::uint32_t i = next.first; i < next.first + next.count; ++i) {
+        const double range = range_m(surfaces_[i], ray);
+        if (range < nearest.range_m)
+          nearest = {range, &surfaces_[i], nullptr};
+      }
       continue;
     }
-    for (std::uint32_t i = node.first; i < node.first + node.count; ++i)
-      nearest =
-          std::min(nearest, std::visit([&](const auto& shape) { return shape.distance_m(point); }, surfaces_[i].shape));
+    const Node& node = nodes_[next.first];
+    Node::Lanes enter = Node::Lanes::Zero(), leave = Node::Lanes::Constant(static_cast<float>(nearest.range_m));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto i = static_cast<Eigen::Index>(axis);
+      const Node::Lanes a = (node.min_m[axis] - origin[i]) * inverse[i];
+      const Node::Lanes b = (node.max_m[axis] - origin[i]) * inverse[i];
+      enter = enter.max(a.min(b));
+      leave = leave.min(a.max(b));
+    }
+    const std::size_t first_child = depth;
+    for (std::size_t lane = 0; lane < 4; ++lane) {
+      const auto j = static_cast<Eigen::Index>(lane);
+      if (enter[j] > leave[j])
+        continue;
+      std::size_t place = depth++; // the nearest on top: what it holds often hides the others
+      for (; place > first_child && waiting[place - 1].enter_m < enter[j]; --place)
+        waiting[place] = waiting[place - 1];
+      waiting[place] = {node.first[lane], node.count[lane], enter[j]};
+    }
+  }
+}
+
+void Scene::cast_at_movers(const Ray& ray, Stamp stamp, Met& nearest) const {
+  for (std::size_t i = 0; i < movers_.size(); ++i) {
+    if (!passes_through(ray, mover_bounds_[i], nearest.range_m))
+      continue;
+    const Ray own{ray.origin_m - movers_[i].position_m(stamp), ray.direction};
+    for (const Surface& part : movers_[i].parts) {
+      const double range = range_m(part, own);
+      if (range < nearest.range_m)
+        nearest = {range, &part, &movers_[i]};
+    }
+  }
+}
+
+std::optional<Hit> Scene::cast(const Ray& ray, double max_range_m, Stamp stamp) const {
+  Met nearest{.range_m = max_range_m};
+  cast_at_surfaces(ray, nearest);
+  cast_at_movers(ray, stamp, nearest);
+  if (nearest.surface == nullptr)
+    return std::nullopt;
+  Eigen::Vector3d point = ray.origin_m + nearest.range_m * ray.direction;
+  if (nearest.mover != nullptr)
+    point -= nearest.mover->position_m(stamp);
+  const Eigen::Vector3d normal =
+      std::visit([&](const auto& shape) { return shape.normal(point); }, nearest.surface->shape);
+  return Hit{nearest.range_m, std::abs(normal.dot(ray.direction)), nearest.surface->reflectivity};
+}
+
+double Scene::distance_to_surface(const Eigen::Vector3d& point, Stamp stamp) const {
+  double nearest = kNowhere;
+  for (const Mover& mover : movers_) {
+    for (const Surface& part : mover.parts)
+      nearest = std::min(nearest, distance_m(part, point - mover.position_m(stamp)));
+  }
+  std::vector<std::uint32_t> waiting;
+  if (!nodes_.empty())
+    waiting.push_back(static_cast<std::uint32_t>(nodes_.size() - 1));
+  while (!waiting.empty()) {
+    const Node& node = nodes_[waiting.back()];
+    waiting.pop_back();
+    for (std::size_t lane = 0; lane < 4; ++lane) {
+      Bounds box;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto i = static_cast<Eigen::Index>(axis), j = static_cast<Eigen::Index>(lane);
+        box.min_m[i] = static_cast<double>(node.min_m[axis][j]);
+        box.max_m[i] = static_cast<double>(node.max_m[axis][j]);
+      }
+      if (squared_distance(box, point) > nearest * nearest)
+        continue;
+      if (node.count[lane] == kBranch)
+        waiting.push_back(node.first[lane]);
+      else
+        for (std::uint32_t i = node.first[lane]; i < node.first[lane] + node.count[lane]; ++i)
+          nearest = std::min(nearest, distance_m(surfaces_[i], point));
+    }
   }
   return nearest;
 }

@@ -1,105 +1,73 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Core>
-
+#include <array>
 #include <cstdint>
 #include <optional>
-#include <variant>
 #include <vector>
+
+#include "core/stamp.hpp"
+#include "locus_sim/shapes.hpp"
 
 namespace locus::sim {
 
-/// A ray from a point in a direction of unit length, world frame.
-struct Ray {
-  Eigen::Vector3d origin_m;
-  Eigen::Vector3d direction;
-};
-
-/// Axis-aligned bounds, world frame.
-struct Bounds {
-  Eigen::Vector3d min_m, max_m;
-};
-
-/// The shapes a scene is made of. Each is a surface without thickness, seen from both sides, and answers three
-/// questions: where a ray first meets it (metres along the ray, infinity when nowhere), how far a point is from it, and
-/// its bounds.
-
-struct Rectangle {
-  Eigen::Vector3d corner_m;
-  Eigen::Vector3d edge_u_m, edge_v_m; ///< perpendicular to each other
-
-  [[nodiscard]] double range_m(const Ray& ray) const;
-  [[nodiscard]] double distance_m(const Eigen::Vector3d& point) const;
-  [[nodiscard]] Bounds bounds() const;
-};
-
-/// Upright box, turned about z. From inside it is a room.
-struct Box {
-  Eigen::Vector3d center_m;
-  Eigen::Vector3d half_size_m;
-  double cos_yaw = 1.0, sin_yaw = 0.0;
-
-  [[nodiscard]] double range_m(const Ray& ray) const;
-  [[nodiscard]] double distance_m(const Eigen::Vector3d& point) const;
-  [[nodiscard]] Bounds bounds() const;
-};
-
-/// Upright tube, open at both ends.
-struct Cylinder {
-  Eigen::Vector3d base_m; ///< centre of its lower end
-  double radius_m;
-  double height_m;
-
-  [[nodiscard]] double range_m(const Ray& ray) const;
-  [[nodiscard]] double distance_m(const Eigen::Vector3d& point) const;
-  [[nodiscard]] Bounds bounds() const;
-};
-
-struct Sphere {
-  Eigen::Vector3d center_m;
-  double radius_m;
-
-  [[nodiscard]] double range_m(const Ray& ray) const;
-  [[nodiscard]] double distance_m(const Eigen::Vector3d& point) const;
-  [[nodiscard]] Bounds bounds() const;
-};
-
-/// A shape with the brightness that a lidar sees.
-struct Surface {
-  std::variant<Rectangle, Box, Cylinder, Sphere> shape;
-  std::uint8_t reflectivity = 50;
-};
-
+/// What a ray meets.
 struct Hit {
   double range_m;
+  double cos_incidence; ///< of the angle between ray and normal, 0..1
   std::uint8_t reflectivity;
 };
 
-/// A world that stands still and can be asked, exactly, what a ray meets. Immutable, any thread. A tree of bounding
-/// boxes makes a ray cost the logarithm of the number of surfaces, so a street of 15 km needs no trick.
+/// Something upright that goes to and fro between two places: a person, a forklift.
+struct Mover {
+  std::vector<Surface> parts;   ///< around the origin
+  Eigen::Vector3d from_m, to_m; ///< of the origin
+  double period_s;              ///< there and back
+  double phase = 0;             ///< of a period, 0..1
+
+  [[nodiscard]] Eigen::Vector3d position_m(Stamp stamp) const;
+  [[nodiscard]] Bounds bounds() const; ///< of all it ever reaches
+};
+
+/// A world that can be asked, exactly, what a ray meets. Immutable, any thread. A tree of bounding boxes makes a ray
+/// cost the logarithm of the number of surfaces, so a street of 15 km needs no trick.
 class Scene {
  public:
-  explicit Scene(std::vector<Surface> surfaces);
+  explicit Scene(std::vector<Surface> surfaces, std::vector<Mover> movers = {});
 
-  /// The first surface within `max_range_m`, or nothing.
-  [[nodiscard]] std::optional<Hit> cast(const Ray& ray, double max_range_m) const;
+  /// The first surface within `max_range_m`, or nothing. Where nothing moves, any stamp will do.
+  [[nodiscard]] std::optional<Hit> cast(const Ray& ray, double max_range_m, Stamp stamp = {}) const;
 
   /// From the point to the nearest surface, seen or hidden.
-  [[nodiscard]] double distance_to_surface(const Eigen::Vector3d& point) const;
+  [[nodiscard]] double distance_to_surface(const Eigen::Vector3d& point, Stamp stamp = {}) const;
+
+  [[nodiscard]] const std::vector<Surface>& surfaces() const { return surfaces_; } ///< all that stands still
+  [[nodiscard]] const Bounds& bounds() const { return bounds_; }                   ///< of them
 
  private:
+  /// Four children, one per lane. Single precision finds who may be met; where, is reckoned in double precision.
   struct Node {
-    Bounds bounds;
-    std::uint32_t first; ///< leaf: its first surface; branch: its second child, the first one follows the node itself
-    std::uint16_t count; ///< surfaces of a leaf; 0 for a branch
-    std::uint16_t axis;  ///< along which a branch was split
+    using Lanes = Eigen::Array4f;
+    std::array<Lanes, 3> min_m, max_m;  ///< of x, y and z
+    std::array<std::uint32_t, 4> first; ///< leaf: its first surface; branch: its node
+    std::array<std::uint32_t, 4> count; ///< surfaces of a leaf; kBranch for a branch
+  };
+  struct Met {
+    double range_m;
+    const Surface* surface = nullptr;
+    const Mover* mover = nullptr;
   };
 
-  void build(std::uint32_t begin, std::uint32_t end);
+  std::uint32_t build(std::uint32_t begin, std::uint32_t end);
+  std::uint32_t split(std::uint32_t begin, std::uint32_t end);
+  void cast_at_surfaces(const Ray& ray, Met& nearest) const;
+  void cast_at_movers(const Ray& ray, Stamp stamp, Met& nearest) const;
 
   std::vector<Surface> surfaces_; ///< in the order of the leaves
-  std::vector<Node> nodes_;       ///< depth first
+  std::vector<Node> nodes_;       ///< the last one is the root
+  std::vector<Mover> movers_;
+  std::vector<Bounds> mover_bounds_;
+  Bounds bounds_;
 };
 
 } // namespace locus::sim

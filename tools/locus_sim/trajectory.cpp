@@ -5,115 +5,62 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
-#include <string>
+#include <utility>
 
 namespace locus::sim {
 namespace {
 
-constexpr double kTurnRamp_s = 0.25;    // from straight to the full rate of a turn
 constexpr double kLongestStep_s = 0.05; // three Gauss points over it are exact to 1e-12 m at 2 rad/s and 15 m/s
+constexpr double kHalfWheelbase_m = 0.3, kHalfTrack_m = 0.25;
+constexpr double kSlipRamp_s = 0.3; // from rolling wheels to spinning ones
 
-/// Quintic from 0 at u = 0 to 1 at u = 1, flat to the second order at both ends, with its slope and its integral from
-/// 0.
-double ease(double u) { return u * u * u * (10 + u * (-15 + 6 * u)); }
-double ease_slope(double u) { return 30 * u * u * (1 - u) * (1 - u); }
-double ease_integral(double u) { return u * u * u * u * (2.5 + u * (-3 + u)); }
-
-/// Height, roll or pitch at a distance driven, with two derivatives by distance.
-struct Ripple {
-  double value, slope, curvature;
-};
+// The body swings in full where it moves faster than these.
+constexpr double kLively_mps = 0.2, kLively_radps = 0.5;
 
 /// Two waves whose lengths have no common multiple, so that no two places feel the same.
-Ripple ripple(double amplitude, double wavelength_m, double phase, double driven_m) {
-  Ripple sum{};
-  for (const double shortening : {1.0, std::numbers::phi}) {
-    const double k = 2 * std::numbers::pi * shortening / wavelength_m;
-    const double share = 0.5 * amplitude, angle = k * driven_m + phase * shortening;
-    sum.value += share * std::sin(angle);
-    sum.slope += share * k * std::cos(angle);
-    sum.curvature -= share * k * k * std::sin(angle);
-  }
+Jet ripple(double amplitude, double wavelength_m, double phase, const Jet& driven_m) {
+  Jet sum;
+  for (const double shortening : {1.0, std::numbers::phi})
+    sum = sum +
+          0.5 * amplitude * sin(2 * std::numbers::pi * shortening / wavelength_m * driven_m + Jet(phase * shortening));
   return sum;
 }
 
 Eigen::Vector2d unit(double heading_rad) { return {std::cos(heading_rad), std::sin(heading_rad)}; }
 
-Course turning(double speed_mps, double angle_rad, double rate_radps) {
-  return Course{}.change_speed(speed_mps, Duration::zero()).turn(angle_rad, rate_radps);
+Jet squared(const Jet& x) { return x * x; }
+
+double ramp_s(const Slip& slip) { return std::min(kSlipRamp_s, to_seconds(slip.to - slip.from) / 2); }
+
+/// What of a slip has gone by: the time lost to it, and how fast it is being lost.
+Jet time_lost(const Slip& slip, double since_start_s) {
+  const double ramp = ramp_s(slip), from = to_seconds(slip.from), to = to_seconds(slip.to);
+  const auto risen = [&](double since_s) -> Jet { // integral of a ramp from 0 to 1
+    const double u = std::clamp(since_s / ramp, 0.0, 1.0);
+    return {ramp * ease_integral(u) + std::max(0.0, since_s - ramp), ease(u), ease_slope(u) / ramp};
+  };
+  return risen(since_start_s - from) - risen(since_start_s - (to - ramp));
 }
 
-/// From the corner of a polyline to where the turn around it begins and ends.
-double tangent_m(double speed_mps, double angle_rad, double rate_radps) {
-  if (std::abs(angle_rad) < 1e-9)
-    return 0;
-  const Trajectory turn{turning(speed_mps, angle_rad, rate_radps)};
-  return turn.T_world_base(turn.end()).translation.y() / std::sin(angle_rad);
-}
-
-double angle_between(const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
-  return std::atan2(from.x() * to.y() - from.y() * to.x(), from.dot(to));
+/// Position, attitude and their derivatives from those of coordinates and angles.
+BaseMotion motion_of(const std::array<Jet, 3>& xyz_m, const Jet& roll, const Jet& pitch, const Jet& yaw) {
+  const double cr = std::cos(roll.value), sr = std::sin(roll.value);
+  const double cp = std::cos(pitch.value), sp = std::sin(pitch.value);
+  const auto& [x, y, z] = xyz_m;
+  BaseMotion motion;
+  motion.T_world_base = {from_rpy_rad({roll.value, pitch.value, yaw.value}), {x.value, y.value, z.value}};
+  motion.velocity_world_mps = {x.rate, y.rate, z.rate};
+  motion.acceleration_world_mps2 = {x.acceleration, y.acceleration, z.acceleration};
+  // Rates of roll, pitch and yaw as seen in the base: the Euler-rate matrix of Rz(yaw) Ry(pitch) Rx(roll).
+  motion.angular_velocity_base_radps = {roll.rate - yaw.rate * sp, pitch.rate * cr + yaw.rate * cp * sr,
+                                        yaw.rate * cp * cr - pitch.rate * sr};
+  return motion;
 }
 
 } // namespace
 
-Course& Course::stand(Duration duration) {
-  if (speed_mps_ != 0)
-    throw std::invalid_argument("Course::stand: brake to a speed of zero first");
-  stretches_.push_back({to_seconds(duration), 0, 0, 0, 0});
-  return *this;
-}
-
-Course& Course::change_speed(double to_mps, Duration over) {
-  stretches_.push_back({to_seconds(over), speed_mps_, to_mps, 0, 0});
-  speed_mps_ = to_mps;
-  return *this;
-}
-
-Course& Course::straight(double distance_m) {
-  if (!(distance_m >= 0 && speed_mps_ > 0))
-    throw std::invalid_argument("Course::straight: needs a speed above zero and a distance of at least zero");
-  stretches_.push_back({distance_m / speed_mps_, speed_mps_, speed_mps_, 0, 0});
-  return *this;
-}
-
-Course& Course::turn(double angle_rad, double peak_rate_radps) {
-  const double largest_rate = std::abs(angle_rad) / kTurnRamp_s; // a small turn is over before the peak is reached
-  const double rate = std::copysign(std::min(peak_rate_radps, largest_rate), angle_rad);
-  const double v = speed_mps_;
-  stretches_.push_back({kTurnRamp_s, v, v, 0, rate});
-  stretches_.push_back({rate == 0 ? 0 : angle_rad / rate - kTurnRamp_s, v, v, rate, rate});
-  stretches_.push_back({kTurnRamp_s, v, v, rate, 0});
-  return *this;
-}
-
-Course Course::along(const std::vector<Eigen::Vector2d>& waypoints_m, const Pace& pace) {
-  if (waypoints_m.size() < 2)
-    throw std::invalid_argument("Course::along: needs two waypoints or more");
-  const double ramp_m = pace.speed_mps * to_seconds(pace.accelerating) / 2;
-  Course course;
-  course.stand(pace.standing).change_speed(pace.speed_mps, pace.accelerating);
-  double used_m = ramp_m;
-  for (std::size_t i = 1; i < waypoints_m.size(); ++i) {
-    const Eigen::Vector2d leg = waypoints_m[i] - waypoints_m[i - 1];
-    const bool last = i + 1 == waypoints_m.size();
-    const double angle = last ? 0 : angle_between(leg, waypoints_m[i + 1] - waypoints_m[i]);
-    const double kept_m = last ? ramp_m : tangent_m(pace.speed_mps, angle, pace.turn_rate_radps);
-    const double straight_m = leg.norm() - used_m - kept_m;
-    if (!(straight_m >= 0))
-      throw std::invalid_argument("Course::along: the leg to waypoint " + std::to_string(i) +
-                                  " is too short for the turns at its ends");
-    course.straight(straight_m);
-    if (!last)
-      course.turn(angle, pace.turn_rate_radps);
-    used_m = kept_m;
-  }
-  return course.change_speed(0, pace.accelerating).stand(pace.standing);
-}
-
-Trajectory::Trajectory(const Course& course, const Start& start, const Terrain& terrain)
-    : start_(start.stamp), terrain_(terrain) {
+Trajectory::Trajectory(const Course& course, const Start& start, const Terrain& terrain, Ride ride)
+    : start_(start.stamp), terrain_(terrain), ride_(std::move(ride)) {
   double begin_s = 0, driven_m = 0, heading_rad = start.heading_rad;
   Eigen::Vector2d position_m = start.position_m;
   for (const Course::Stretch& stretch : course.stretches()) {
@@ -133,16 +80,27 @@ Trajectory::Trajectory(const Course& course, const Start& start, const Terrain& 
   stretches_.push_back({{1, 0, 0, 0, 0}, begin_s, driven_m, heading_rad, 1, {position_m}});
 }
 
+Stamp Trajectory::end() const {
+  Stamp end = start_ + from_seconds(stretches_.back().begin_s);
+  for (const Slip& slip : ride_.slips)
+    end += slip.to - slip.from - from_seconds(ramp_s(slip));
+  return end;
+}
+
 Trajectory::Planar Trajectory::planar(const Placed& placed, double since_s) {
   const auto& [duration_s, from_mps, to_mps, from_radps, to_radps] = placed.stretch;
   const double u = duration_s > 0 ? std::clamp(since_s / duration_s, 0.0, 1.0) : 0;
   const double gain_mps = to_mps - from_mps, gain_radps = to_radps - from_radps;
+  const double slope = duration_s > 0 ? ease_slope(u) / duration_s : 0;
+  const double curvature = duration_s > 0 ? ease_curvature(u) / (duration_s * duration_s) : 0;
   return {.driven_m = placed.driven_m + from_mps * since_s + gain_mps * duration_s * ease_integral(u),
           .speed_mps = from_mps + gain_mps * ease(u),
-          .acceleration_mps2 = duration_s > 0 ? gain_mps * ease_slope(u) / duration_s : 0,
+          .acceleration_mps2 = gain_mps * slope,
+          .jerk_mps3 = gain_mps * curvature,
           .heading_rad = placed.heading_rad + from_radps * since_s + gain_radps * duration_s * ease_integral(u),
           .yaw_rate_radps = from_radps + gain_radps * ease(u),
-          .yaw_acceleration_radps2 = duration_s > 0 ? gain_radps * ease_slope(u) / duration_s : 0};
+          .yaw_acceleration_radps2 = gain_radps * slope,
+          .yaw_jerk_radps3 = gain_radps * curvature};
 }
 
 /// Gauss-Legendre quadrature of the velocity with three points.
@@ -160,36 +118,77 @@ Eigen::Vector2d Trajectory::displacement(const Placed& placed, double from_s, do
   return (to_s - from_s) * sum;
 }
 
+Jet Trajectory::time_on_course(double since_start_s) const {
+  Jet time{since_start_s, 1, 0};
+  for (const Slip& slip : ride_.slips)
+    time = time - time_lost(slip, since_start_s);
+  return time;
+}
+
+double Trajectory::slip_ratio(Stamp stamp) const { return 1 - time_on_course(to_seconds(stamp - start_)).rate; }
+
+Trajectory::Attitude Trajectory::on_ground(const Jet& x, const Jet& y, const Jet& heading, const Jet& driven) const {
+  Attitude attitude{.z_m = ripple(terrain_.height_m, terrain_.wavelength_m, 0.0, driven),
+                    .roll_rad = ripple(terrain_.tilt_rad, terrain_.wavelength_m, 1.0, driven),
+                    .pitch_rad = ripple(terrain_.tilt_rad, terrain_.wavelength_m, 2.0, driven)};
+  if (!ride_.ground_m)
+    return attitude;
+  const Jet c = cos(heading), s = sin(heading);
+  const auto height_at = [&](double ahead_m, double left_m) {
+    return ride_.ground_m(x + ahead_m * c - left_m * s, y + ahead_m * s + left_m * c);
+  };
+  const Jet front = height_at(kHalfWheelbase_m, 0), back = height_at(-kHalfWheelbase_m, 0);
+  const Jet left = height_at(0, kHalfTrack_m), right = height_at(0, -kHalfTrack_m);
+  attitude.z_m = attitude.z_m + 0.25 * (front + back + left + right);
+  attitude.pitch_rad = attitude.pitch_rad - atan((front - back) * (0.5 / kHalfWheelbase_m));
+  attitude.roll_rad = attitude.roll_rad + atan((left - right) * (0.5 / kHalfTrack_m));
+  return attitude;
+}
+
 BaseMotion Trajectory::at(Stamp stamp) const {
-  const double t = to_seconds(stamp - start_);
-  const auto after = std::upper_bound(stretches_.begin() + 1, stretches_.end(), t,
+  const double since_start_s = to_seconds(stamp - start_);
+  const Jet time = time_on_course(since_start_s);
+  const auto after = std::upper_bound(stretches_.begin() + 1, stretches_.end(), time.value,
                                       [](double time_s, const Placed& placed) { return time_s < placed.begin_s; });
   const Placed& placed = *(after - 1);
-  const double since_s = std::clamp(t - placed.begin_s, 0.0, placed.stretch.duration_s);
+  const double since_s = std::clamp(time.value - placed.begin_s, 0.0, placed.stretch.duration_s);
   const std::size_t steps = std::max<std::size_t>(placed.positions_m.size(), 2) - 1;
   const std::size_t step = std::min(static_cast<std::size_t>(since_s / placed.step_s), steps - 1);
   const double step_begin_s = static_cast<double>(step) * placed.step_s;
   const Eigen::Vector2d xy = placed.positions_m[step] + displacement(placed, step_begin_s, since_s);
 
   const Planar s = planar(placed, since_s);
-  const double v = s.speed_mps, a = s.acceleration_mps2, yaw_rate = s.yaw_rate_radps;
-  const Ripple z = ripple(terrain_.height_m, terrain_.wavelength_m, 0.0, s.driven_m);
-  const Ripple roll = ripple(terrain_.tilt_rad, terrain_.wavelength_m, 1.0, s.driven_m);
-  const Ripple pitch = ripple(terrain_.tilt_rad, terrain_.wavelength_m, 2.0, s.driven_m);
-  const double roll_rate = roll.slope * v, pitch_rate = pitch.slope * v;
-  const Eigen::Vector2d ahead = unit(s.heading_rad), left{-ahead.y(), ahead.x()};
-  const Eigen::Vector2d velocity = v * ahead, acceleration = a * ahead + v * yaw_rate * left;
-  const double cr = std::cos(roll.value), sr = std::sin(roll.value);
-  const double cp = std::cos(pitch.value), sp = std::sin(pitch.value);
+  const Eigen::Vector2d ahead = unit(s.heading_rad), leftwards{-ahead.y(), ahead.x()};
+  const Eigen::Vector2d velocity = s.speed_mps * ahead;
+  const Eigen::Vector2d acceleration = s.acceleration_mps2 * ahead + s.speed_mps * s.yaw_rate_radps * leftwards;
+  Jet x = chain(xy.x(), velocity.x(), acceleration.x(), time);
+  Jet y = chain(xy.y(), velocity.y(), acceleration.y(), time);
+  Jet yaw = chain(s.heading_rad, s.yaw_rate_radps, s.yaw_acceleration_radps2, time);
+  const Jet driven = chain(s.driven_m, s.speed_mps, s.acceleration_mps2, time);
+  auto [z, roll, pitch] = on_ground(x, y, yaw, driven);
 
-  BaseMotion motion;
-  motion.T_world_base = {from_rpy_rad({roll.value, pitch.value, s.heading_rad}), {xy.x(), xy.y(), z.value}};
-  motion.velocity_world_mps << velocity, z.slope * v;
-  motion.acceleration_world_mps2 << acceleration, z.curvature * v * v + z.slope * a;
-  // Rates of roll, pitch and yaw as seen in the base: the Euler-rate matrix of Rz(yaw) Ry(pitch) Rx(roll).
-  motion.angular_velocity_base_radps = {roll_rate - yaw_rate * sp, pitch_rate * cr + yaw_rate * cp * sr,
-                                        yaw_rate * cp * cr - pitch_rate * sr};
-  return motion;
+  if (!ride_.oscillations.empty()) {
+    const Jet speed = chain(s.speed_mps, s.acceleration_mps2, s.jerk_mps3, time);
+    const Jet yaw_rate = chain(s.yaw_rate_radps, s.yaw_acceleration_radps2, s.yaw_jerk_radps3, time);
+    const Jet liveliness = saturated(squared(speed * (1 / kLively_mps)) + squared(yaw_rate * (1 / kLively_radps)));
+    const Jet c = cos(yaw), n = sin(yaw);
+    for (const Oscillation& oscillation : ride_.oscillations) {
+      const double omega = 2 * std::numbers::pi * oscillation.frequency_hz;
+      std::array<Jet, 3> swing;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double lag_rad = oscillation.phase_rad - 2 * std::numbers::pi / 3 * static_cast<double>(axis);
+        swing[axis] = liveliness * sin(Jet(omega * since_start_s + lag_rad, omega));
+      }
+      const Jet forward = oscillation.amplitude_m.x() * swing[0], left = oscillation.amplitude_m.y() * swing[1];
+      x = x + forward * c - left * n;
+      y = y + forward * n + left * c;
+      z = z + oscillation.amplitude_m.z() * swing[2];
+      roll = roll + oscillation.amplitude_rpy_rad.x() * swing[0];
+      pitch = pitch + oscillation.amplitude_rpy_rad.y() * swing[1];
+      yaw = yaw + oscillation.amplitude_rpy_rad.z() * swing[2];
+    }
+  }
+  return motion_of({x, y, z}, roll, pitch, yaw);
 }
 
 } // namespace locus::sim

@@ -3,44 +3,15 @@
 
 #include <Eigen/Core>
 
+#include <functional>
 #include <vector>
 
 #include "core/pose.hpp"
 #include "core/stamp.hpp"
+#include "locus_sim/course.hpp"
+#include "locus_sim/jet.hpp"
 
 namespace locus::sim {
-
-/// What the driver does, step after step: speed and turning rate go from one value to the next along a quintic that
-/// starts and ends flat, so the trajectory has a continuous acceleration and jerk everywhere.
-class Course {
- public:
-  Course& stand(Duration duration);
-  Course& change_speed(double to_mps, Duration over);
-  Course& straight(double distance_m);                    ///< at the present speed, which must not be zero
-  Course& turn(double angle_rad, double peak_rate_radps); ///< at the present speed; at speed zero, on the spot
-
-  struct Pace {
-    double speed_mps = 1.0;
-    double turn_rate_radps = 1.0;
-    Duration standing{2'000'000'000};     ///< before the start and after the end
-    Duration accelerating{2'000'000'000}; ///< and braking
-  };
-  /// Along a polyline, its corners rounded by turns at the pace's speed. Starts at the first point, heading for the
-  /// second. Throws std::invalid_argument when a leg is too short for the turns at its ends.
-  static Course along(const std::vector<Eigen::Vector2d>& waypoints_m, const Pace& pace);
-
-  /// One stretch of time over which speed and yaw rate pass from one value to another.
-  struct Stretch {
-    double duration_s;
-    double from_mps, to_mps;
-    double from_radps, to_radps;
-  };
-  [[nodiscard]] const std::vector<Stretch>& stretches() const { return stretches_; }
-
- private:
-  std::vector<Stretch> stretches_;
-  double speed_mps_ = 0;
-};
 
 /// Where a course begins.
 struct Start {
@@ -56,6 +27,29 @@ struct Terrain {
   double wavelength_m = 4; ///< of the longest ripple
 };
 
+/// Height of the ground at a place, metres.
+using Ground = std::function<Jet(const Jet& x_m, const Jet& y_m)>;
+
+/// One way in which the body swings while the robot moves: a step of a gait, or a vibration.
+struct Oscillation {
+  double frequency_hz;
+  Eigen::Vector3d amplitude_m;       ///< forward, left, up
+  Eigen::Vector3d amplitude_rpy_rad; ///< roll, pitch, yaw
+  double phase_rad = 0;              ///< each axis is a third of a turn behind the one before
+};
+
+/// The wheels, or feet, run on as before but the robot does not move; from and to after the start.
+struct Slip {
+  Duration from, to;
+};
+
+/// How the body rides on its wheels or legs.
+struct Ride {
+  Ground ground_m = {}; ///< what the wheels stand on, beneath the ripples of the terrain; none: level at 0
+  std::vector<Oscillation> oscillations = {};
+  std::vector<Slip> slips = {}; ///< in order, apart from each other
+};
+
 /// The state of the base at one instant.
 struct BaseMotion {
   Pose T_world_base;
@@ -65,16 +59,18 @@ struct BaseMotion {
 };
 
 /// The exact motion of a robot that drives a course: a continuous function of time with its derivatives. The base rolls
-/// where it points (no sideways slip in the plane). Before the start and after the end it stands. Immutable, any
-/// thread.
+/// where it points (no sideways slip in the plane, but for oscillations). Before the start and after the end it stands.
+/// Immutable, any thread.
 class Trajectory {
  public:
-  explicit Trajectory(const Course& course, const Start& start = {}, const Terrain& terrain = {});
+  explicit Trajectory(const Course& course, const Start& start = {}, const Terrain& terrain = {}, Ride ride = {});
 
   [[nodiscard]] BaseMotion at(Stamp stamp) const;
   [[nodiscard]] Pose T_world_base(Stamp stamp) const { return at(stamp).T_world_base; }
+  /// How much of what the wheels turn is lost: 0 they roll, 1 they spin on the spot.
+  [[nodiscard]] double slip_ratio(Stamp stamp) const;
   [[nodiscard]] Stamp start() const { return start_; }
-  [[nodiscard]] Stamp end() const { return start_ + from_seconds(stretches_.back().begin_s); }
+  [[nodiscard]] Stamp end() const;
   [[nodiscard]] double length_m() const { return stretches_.back().driven_m; }
 
  private:
@@ -88,15 +84,22 @@ class Trajectory {
     double step_s;
     std::vector<Eigen::Vector2d> positions_m;
   };
+  /// On the plane, as functions of the time on the course, which stands still while the wheels slip.
   struct Planar {
-    double driven_m, speed_mps, acceleration_mps2;
-    double heading_rad, yaw_rate_radps, yaw_acceleration_radps2;
+    double driven_m, speed_mps, acceleration_mps2, jerk_mps3;
+    double heading_rad, yaw_rate_radps, yaw_acceleration_radps2, yaw_jerk_radps3;
+  };
+  struct Attitude {
+    Jet z_m, roll_rad, pitch_rad;
   };
   static Planar planar(const Placed& placed, double since_s);
   static Eigen::Vector2d displacement(const Placed& placed, double from_s, double to_s);
+  [[nodiscard]] Jet time_on_course(double since_start_s) const;
+  [[nodiscard]] Attitude on_ground(const Jet& x, const Jet& y, const Jet& heading, const Jet& driven) const;
 
   Stamp start_;
   Terrain terrain_;
+  Ride ride_;
   std::vector<Placed> stretches_; ///< the last one is the standstill after the end
 };
 
