@@ -37,8 +37,8 @@ class RealCapture : public testing::Test {
     for (const StampedPose& row : trajectory) {
       if (row.stamp - trajectory.front().stamp > duration)
         break;
-      moved_m = std::max(moved_m, row.pose.translation.norm());
-      turned_deg = std::max(turned_deg, angle_rad(row.pose.rotation) * 180 / std::numbers::pi);
+      moved_m = std::max(moved_m, row.T_source_base.translation.norm());
+      turned_deg = std::max(turned_deg, angle_rad(row.T_source_base.rotation) * 180 / std::numbers::pi);
     }
     EXPECT_LT(moved_m, 0.02);
     EXPECT_LT(turned_deg, 0.1);
@@ -100,10 +100,11 @@ TEST_F(RealCapture, CarAtFifteenMetresPerSecond) {
   ASSERT_GE(trajectory.size(), 5U);
   double path_m = 0;
   for (std::size_t i = 2; i < trajectory.size(); ++i)
-    path_m += (trajectory[i].pose.translation - trajectory[i - 1].pose.translation).norm();
+    path_m += (trajectory[i].T_source_base.translation - trajectory[i - 1].T_source_base.translation).norm();
   const Duration elapsed = trajectory.back().stamp - trajectory[1].stamp;
   EXPECT_NEAR(path_m / to_seconds(elapsed), 15.45, 0.35);
-  const Eigen::Quaterniond turn = trajectory[1].pose.rotation.conjugate() * trajectory.back().pose.rotation;
+  const Eigen::Quaterniond turn =
+      trajectory[1].T_source_base.rotation.conjugate() * trajectory.back().T_source_base.rotation;
   const double yaw_dps = to_rpy_rad(turn).z() * 180 / std::numbers::pi / to_seconds(elapsed);
   EXPECT_LT(yaw_dps, 0.0) << "clockwise";
   EXPECT_GT(yaw_dps, -3.0);
@@ -132,7 +133,7 @@ TEST_F(RealCapture, Vlp16ThatReportsAnotherModelStandsThenMoves) {
   const MedianOverTime wall_m = distance_to_end_wall_m(capture_file("vlp16_static_1200rpm_product21"));
   MedianOverTime x_m;
   for (const StampedPose& row : trajectory)
-    x_m.add(row.stamp, row.pose.translation.x());
+    x_m.add(row.stamp, row.T_source_base.translation.x());
   constexpr Duration kWindow = milliseconds{200};
   const double nearer_m = wall_m.over_first(kWindow) - wall_m.over_last(kWindow);
   EXPECT_GT(nearer_m, 0.08);

@@ -10,6 +10,7 @@
 
 #include "core/pose.hpp"
 #include "core/stamp.hpp"
+#include "drivers/motion_files.hpp"
 
 namespace locus::test {
 
@@ -31,10 +32,7 @@ class TemporaryFolder {
 std::string read_text(const std::filesystem::path& file);
 std::vector<std::string> lines_of(const std::string& text);
 
-struct StampedPose {
-  Stamp stamp;
-  Pose pose;
-};
+/// What is no trajectory fails the test and is empty.
 std::vector<StampedPose> read_tum(const std::filesystem::path& file);
 
 /// What a run of a program left on its terminal.
@@ -60,12 +58,5 @@ class Replay {
   TemporaryFolder folder_;
   ProgramRun run_;
 };
-
-/// RMS and largest distance between a trajectory and the truth, interpolated at its stamps, after the best rigid
-/// alignment.
-struct TrajectoryError {
-  double rmse_m, max_m;
-};
-TrajectoryError trajectory_error(const std::vector<StampedPose>& trajectory, const std::vector<StampedPose>& truth);
 
 } // namespace locus::test

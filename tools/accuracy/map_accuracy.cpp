@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "accuracy/map_accuracy.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -58,13 +57,36 @@ Points moved(std::span<const Eigen::Vector3f> points, const Pose& T) {
   return result;
 }
 
-MapAccuracy summarised(std::span<const float> distances_m) {
+/// From each point of the map to the nearest true one; infinite beyond a metre. Most points have one close by, where
+/// few others are to be looked at; only for the rest is it worth a wider search.
+Expected<std::vector<float>, std::string> distances_to(TruthWalker& truth, const Points& map) {
+  std::vector<float> distances_m(map.size(), std::numeric_limits<float>::infinity());
+  for (const float reach_m : {0.25F, kOutlier_m}) {
+    Points lost;
+    for (std::size_t i = 0; i < map.size(); ++i) {
+      if (std::isinf(distances_m[i]))
+        lost.push_back(map[i]);
+    }
+    NearestDistances nearest(lost, reach_m);
+    if (std::optional<std::string> problem = truth.walk([&](const Eigen::Vector3f& point) { nearest.offer(point); }))
+      return *std::move(problem);
+    const std::vector<float> found_m = nearest.distances_m();
+    auto found = found_m.begin();
+    for (float& distance_m : distances_m) {
+      if (std::isinf(distance_m))
+        distance_m = *found++;
+    }
+  }
+  return distances_m;
+}
+
+MapAccuracy summary_of(std::span<const float> distances_m) {
   MapAccuracy accuracy;
   double squares_m2 = 0;
   for (const float distance_m : distances_m) {
-    const bool outlier = !(distance_m <= kOutlier_m);
-    ++(outlier ? accuracy.outliers : accuracy.compared);
-    squares_m2 += outlier ? 0.0 : static_cast<double>(distance_m) * static_cast<double>(distance_m);
+    ++(std::isinf(distance_m) ? accuracy.outliers : accuracy.compared);
+    if (!std::isinf(distance_m))
+      squares_m2 += static_cast<double>(distance_m) * static_cast<double>(distance_m);
   }
   if (accuracy.compared > 0)
     accuracy.rmse_m = std::sqrt(squares_m2 / static_cast<double>(accuracy.compared));
@@ -78,31 +100,14 @@ Expected<MapAccuracy, std::string> map_accuracy(std::span<const Eigen::Vector3f>
   constexpr std::size_t kMaxIcpPoints = 30'000, kMaxTrueVoxels = 500'000;
   constexpr float kFinest_m = 0.05F;
   TruthWalker walker(truth, T_truth_odom.inverse(), progress);
-
   ThinnedCloud thinned(kFinest_m, kMaxTrueVoxels);
   if (std::optional<std::string> problem = walker.walk([&](const Eigen::Vector3f& point) { thinned.insert(point); }))
     return *std::move(problem);
-  const Points map = moved(map_odom, icp(some_of(map_odom, kMaxIcpPoints), thinned.centroids(), kOutlier_m));
-
-  // Most points have the truth close by, where few others are looked at; the rest are worth a second walk.
-  std::vector<float> distances_m(map.size(), std::numeric_limits<float>::infinity());
-  for (const float reach_m : {0.25F, kOutlier_m}) {
-    Points lost;
-    for (std::size_t i = 0; i < map.size(); ++i) {
-      if (distances_m[i] > kOutlier_m)
-        lost.push_back(map[i]);
-    }
-    NearestDistances nearest(lost, reach_m);
-    if (std::optional<std::string> problem = walker.walk([&](const Eigen::Vector3f& point) { nearest.offer(point); }))
-      return *std::move(problem);
-    const std::vector<float> found_m = nearest.distances_m();
-    std::size_t next = 0;
-    for (float& distance_m : distances_m) {
-      if (distance_m > kOutlier_m)
-        distance_m = found_m[next++];
-    }
-  }
-  return summarised(distances_m);
+  const Pose T_fitted_map = icp(some_of(map_odom, kMaxIcpPoints), thinned.centroids(), kOutlier_m);
+  const Expected<std::vector<float>, std::string> distances_m = distances_to(walker, moved(map_odom, T_fitted_map));
+  if (!distances_m)
+    return distances_m.error();
+  return summary_of(*distances_m);
 }
 
 } // namespace locus
