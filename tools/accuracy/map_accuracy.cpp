@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "accuracy/icp.hpp"
@@ -19,8 +20,8 @@ constexpr float kOutlier_m = 1.0F; ///< the contract's
 /// The truth in the frame of the map, where coordinates are small enough for floats, pass after pass.
 class TruthWalker {
  public:
-  TruthWalker(const PointCloudFile& truth, const Pose& T_odom_truth, const std::function<void(double)>& progress)
-      : truth_(truth), T_odom_truth_(T_odom_truth), progress_(progress) {}
+  TruthWalker(const PointCloudFile& truth, Pose T_odom_truth, const std::function<void(double)>& progress)
+      : truth_(truth), T_odom_truth_(std::move(T_odom_truth)), progress_(progress) {}
 
   template <class Visit> std::optional<std::string> walk(Visit&& visit) {
     const Eigen::Matrix3d R = T_odom_truth_.R();
