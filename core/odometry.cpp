@@ -224,7 +224,7 @@ Registration Odometry::match_scan(const Prior& prior, const Pose& T_start, bool 
     return none;
   const StageScope scope(clock_, Stage::scan_to_scan);
   last_scan_map_.clear();
-  last_scan_map_.insert(last_scan_, Pose{});
+  last_scan_map_.insert(std::span(last_scan_).first(last_registered_), Pose{});
   const PosePrior pose_prior{prior.T_last_now, prior.variance.cwiseInverse().asDiagonal()};
   return gicp_.align(registered(), last_scan_map_, T_start, pose_prior, options_.scan_to_scan, wide, stop);
 }
@@ -348,6 +348,7 @@ void Odometry::finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& 
   last_period_ = sweep.end - sweep.start;
   last_sources_ = sweep.sources;
   std::swap(last_scan_, scan_);
+  last_registered_ = registered_;
 }
 
 } // namespace locus

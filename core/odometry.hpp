@@ -67,6 +67,7 @@ class Odometry {
   std::vector<SurfacePoint> scan_; ///< the sweep at hand, fully corrected
   std::size_t registered_ = 0;     ///< the first so many points of scan_ are registered
   std::vector<SurfacePoint> last_scan_;
+  std::size_t last_registered_ = 0;
   std::vector<PriorStatistics> statistics_; ///< by motion source
   PriorStatistics constant_velocity_statistics_;
 

@@ -1,55 +1,66 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
-
-#include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace locus {
 
+/// Symmetric 3x3 matrix, its upper half.
+template <class Real> struct Symmetric3 { Real xx, xy, xz, yy, yz, zz; };
+
 /// How points scatter about their mean: variances along the principal axes, and the axis of the least one.
-struct PrincipalAxes {
-  Eigen::Vector3d variance; ///< ascending
-  Eigen::Vector3d normal;   ///< unit, of the least variance; its sign means nothing
+template <class Real> struct PrincipalAxes {
+  Real least, middle, greatest;
+  Real x, y,
+      z; ///< unit axis of the least variance, or zero for points that all lie in one place; its sign means nothing
 };
 
-/// Eigenvalues of a symmetric, positive semi-definite matrix and the eigenvector of the least.
+/// Eigenvalues of a positive semi-definite matrix and the eigenvector of the least.
 ///
-/// Newton's method on the characteristic polynomial climbs from zero to the least root and never beyond; for points on
-/// a plane, whose least variance is far below the others, two or three steps suffice. No trigonometric function is
-/// needed, which makes it several times as fast as the general closed form. Any thread.
-inline PrincipalAxes principal_axes(const Eigen::Matrix3d& m) {
-  constexpr int kMaxSteps = 16;
-  constexpr double kPrecision = 1e-12; ///< of the greatest variance
-  const double trace = m.trace();
-  const Eigen::Vector3d cofactors{m(1, 1) * m(2, 2) - m(1, 2) * m(1, 2), m(0, 0) * m(2, 2) - m(0, 2) * m(0, 2),
-                                  m(0, 0) * m(1, 1) - m(0, 1) * m(0, 1)};
-  const double minors = cofactors.sum();
-  const double determinant = m(0, 0) * cofactors[0] - m(0, 1) * (m(0, 1) * m(2, 2) - m(0, 2) * m(1, 2)) +
-                             m(0, 2) * (m(0, 1) * m(1, 2) - m(0, 2) * m(1, 1));
-  double least = 0.0;
-  for (int step = 0; step < kMaxSteps; ++step) {
-    const double value = ((trace - least) * least - minors) * least + determinant;
-    const double slope = (3.0 * least - 2.0 * trace) * least + minors;
-    if (!(value > kPrecision * trace * slope))
-      break;
-    least += value / slope;
+/// Newton's method on the characteristic polynomial climbs from zero towards the least root and never beyond. Where
+/// the least variance is a tenth of the middle one, as for points on a plane, four steps leave an error of a millionth;
+/// where both are alike they leave a tenth, still far from a plane. Without branches and trigonometric functions: a
+/// loop over many matrices becomes vector instructions. Any thread.
+template <class Real> [[gnu::always_inline]] inline PrincipalAxes<Real> principal_axes(const Symmetric3<Real>& m) {
+  constexpr int kSteps = 4;
+  constexpr Real kTiny = Real(1e-30); // instead of a division by zero
+  const Real trace = m.xx + m.yy + m.zz;
+  const Real minors = m.yy * m.zz - m.yz * m.yz + m.xx * m.zz - m.xz * m.xz + m.xx * m.yy - m.xy * m.xy;
+  const Real determinant =
+      m.xx * (m.yy * m.zz - m.yz * m.yz) - m.xy * (m.xy * m.zz - m.xz * m.yz) + m.xz * (m.xy * m.yz - m.xz * m.yy);
+  Real least = 0;
+  for (int step = 0; step < kSteps; ++step) {
+    const Real value = ((trace - least) * least - minors) * least + determinant;
+    const Real slope = (3 * least - 2 * trace) * least + minors;
+    least += (value > 0 ? value : Real(0)) / (slope > kTiny ? slope : kTiny);
   }
-  const double sum = trace - least;
-  const double product = minors - least * sum;
-  const double middle = 0.5 * (sum - std::sqrt(std::max(0.0, sum * sum - 4.0 * product)));
+  const Real sum = trace - least;
+  const Real discriminant = sum * sum - 4 * (minors - least * sum);
+  const Real middle = Real(0.5) * (sum - std::sqrt(discriminant > 0 ? discriminant : Real(0)));
 
-  // What the matrix takes to zero is orthogonal to its rows: the longest of their cross products is the most precise.
-  const Eigen::Matrix3d shifted = m - least * Eigen::Matrix3d::Identity();
-  const std::array<Eigen::Vector3d, 3> crosses{
-      shifted.col(0).cross(shifted.col(1)), shifted.col(1).cross(shifted.col(2)), shifted.col(2).cross(shifted.col(0))};
-  const auto longest = std::max_element(crosses.begin(), crosses.end(),
-                                        [](const auto& a, const auto& b) { return a.squaredNorm() < b.squaredNorm(); });
-  const double length = longest->norm();
-  return {{least, middle, sum - middle}, length > 0.0 ? Eigen::Vector3d{*longest / length} : Eigen::Vector3d::UnitZ()};
+  // The axis is orthogonal to all columns of what is left: the longest of their cross products is the most precise.
+  const Real a = m.xx - least, b = m.yy - least, c = m.zz - least;
+  const Real x1 = m.xy * m.yz - m.xz * b, y1 = m.xz * m.xy - a * m.yz, z1 = a * b - m.xy * m.xy;
+  const Real x2 = b * c - m.yz * m.yz, y2 = m.yz * m.xz - m.xy * c, z2 = m.xy * m.yz - b * m.xz;
+  const Real x3 = y2, y3 = c * a - m.xz * m.xz, z3 = m.xz * m.xy - m.yz * a;
+  const Real n1 = x1 * x1 + y1 * y1 + z1 * z1, n2 = x2 * x2 + y2 * y2 + z2 * z2, n3 = x3 * x3 + y3 * y3 + z3 * z3;
+  const bool second = n2 > n1;
+  const Real n12 = second ? n2 : n1;
+  const bool third = n3 > n12;
+  const Real length2 = third ? n3 : n12;
+  const Real scale = 1 / std::sqrt(length2 > kTiny ? length2 : kTiny);
+  return {least,
+          middle,
+          sum - middle,
+          scale * (third    ? x3
+                   : second ? x2
+                            : x1),
+          scale * (third    ? y3
+                   : second ? y2
+                            : y1),
+          scale * (third    ? z3
+                   : second ? z2
+                            : z1)};
 }
 
 } // namespace locus

@@ -15,88 +15,140 @@ namespace {
 constexpr float kMaxDistancePerRange = 0.15F;
 constexpr float kMinReach_m = 0.6F;
 
-constexpr double kMaxRoughness_m = 0.04;     ///< across the plane, one standard deviation
-constexpr double kMinMiddleToLargest = 0.02; ///< below this they lie on one line
-constexpr double kMaxSmallestToMiddle = 0.1;
-constexpr std::size_t kMinNeighbours = 5;
+constexpr float kMaxRoughness_m = 0.04F;      ///< across the plane, one standard deviation
+constexpr float kMinMiddleToGreatest = 0.02F; ///< below this they lie on one line
+constexpr float kMaxLeastToMiddle = 0.1F;
+constexpr float kMinPoints = 5.0F; ///< itself counted
 
-/// Centred moments of a point and its neighbours; at most three on each of three lines.
-class Neighbourhood {
- public:
-  explicit Neighbourhood(const Eigen::Vector3f& centre)
-      : centre_(centre), reach2_(std::max(kMinReach_m, kMaxDistancePerRange * centre.norm())) {
-    reach2_ *= reach2_;
-  }
+constexpr std::size_t kChunk = 64; ///< points at a time: their moments stay in the fastest cache
+using PerPoint = std::array<float, kChunk>;
 
-  void add(const Eigen::Vector3f& point) {
-    const Eigen::Vector3f offset = point - centre_;
-    if (offset.squaredNorm() > reach2_)
-      return;
-    const Eigen::Vector3d d = offset.cast<double>();
-    sum_ += d;
-    outer_ += d * d.transpose();
-    ++count_;
-  }
-
-  /// Unit normal towards the lidar's side, or zero.
-  [[nodiscard]] Eigen::Vector3f normal() const {
-    if (count_ < kMinNeighbours)
-      return Eigen::Vector3f::Zero();
-    const auto n = static_cast<double>(count_);
-    const Eigen::Matrix3d covariance = (outer_ - sum_ * sum_.transpose() / n) / n;
-    const auto [variance, axis] = principal_axes(covariance);
-    if (variance[0] > kMaxRoughness_m * kMaxRoughness_m || variance[1] < kMinMiddleToLargest * variance[2] ||
-        variance[0] > kMaxSmallestToMiddle * variance[1])
-      return Eigen::Vector3f::Zero();
-    const Eigen::Vector3f normal = axis.cast<float>();
-    return normal.dot(centre_) > 0.0F ? -normal : normal;
-  }
-
- private:
-  Eigen::Vector3f centre_;
-  float reach2_;
-  Eigen::Vector3d sum_ = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d outer_ = Eigen::Matrix3d::Zero();
-  std::size_t count_ = 0;
+/// Sums over a point's neighbours, from the point.
+struct Moments {
+  PerPoint count, x, y, z, xx, xy, xz, yy, yz, zz;
 };
+
+/// Unit normals towards the lidar's side of planes through the points of the moments, or zero.
+void normals_of(const Moments& moments, const PerPoint& px, const PerPoint& py, const PerPoint& pz, PerPoint& nx,
+                PerPoint& ny, PerPoint& nz) {
+  for (std::size_t i = 0; i < kChunk; ++i) {
+    const float share = 1.0F / moments.count[i];
+    const float x = share * moments.x[i], y = share * moments.y[i], z = share * moments.z[i];
+    const PrincipalAxes<float> axes = principal_axes<float>(
+        {share * moments.xx[i] - x * x, share * moments.xy[i] - x * y, share * moments.xz[i] - x * z,
+         share * moments.yy[i] - y * y, share * moments.yz[i] - y * z, share * moments.zz[i] - z * z});
+    const bool trusted = (moments.count[i] >= kMinPoints) & (axes.least <= kMaxRoughness_m * kMaxRoughness_m) &
+                         (axes.middle >= kMinMiddleToGreatest * axes.greatest) &
+                         (axes.least <= kMaxLeastToMiddle * axes.middle);
+    const bool looks_away = axes.x * px[i] + axes.y * py[i] + axes.z * pz[i] > 0.0F;
+    const float sign = trusted ? (looks_away ? -1.0F : 1.0F) : 0.0F;
+    nx[i] = sign * axes.x;
+    ny[i] = sign * axes.y;
+    nz[i] = sign * axes.z;
+  }
+}
 
 } // namespace
 
-void ScanNormals::estimate(std::vector<SweepPoint>& points) {
+ScanNormals::ScanNormals(std::size_t max_points) {
+  lines_.reserve(max_points);
+  neighbours_.reserve(max_points + kChunk);
+  for (std::vector<float>* figures : {&x_, &y_, &z_})
+    figures->reserve(max_points + kChunk);
+}
+
+void ScanNormals::find_lines(const std::vector<SweepPoint>& points) {
   lines_.clear();
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (lines_.empty() || lines_.back().id != points[i].scan_line)
       lines_.push_back({points[i].scan_line, i, i});
     lines_.back().end = i + 1;
   }
-  for (std::size_t l = 0; l < lines_.size(); ++l) {
-    const Line& line = lines_[l];
-    std::array<const Line*, 2> beside{};
-    if (l > 0 && lines_[l - 1].id + 1 == line.id)
-      beside[0] = &lines_[l - 1];
-    if (l + 1 < lines_.size() && line.id + 1 == lines_[l + 1].id)
-      beside[1] = &lines_[l + 1];
-    std::array<std::size_t, 2> nearest{beside[0] != nullptr ? beside[0]->begin : 0,
-                                       beside[1] != nullptr ? beside[1]->begin : 0};
+}
 
-    for (std::size_t i = line.begin; i < line.end; ++i) {
-      SweepPoint& point = points[i];
-      Neighbourhood neighbourhood(point.position_base_m);
-      for (std::size_t j = std::max(i, line.begin + 1) - 1; j < std::min(i + 2, line.end); ++j)
-        neighbourhood.add(points[j].position_base_m);
-      for (std::size_t side = 0; side < 2; ++side) {
-        if (beside[side] == nullptr)
-          continue;
-        std::size_t& k = nearest[side];
-        const auto time_apart = [&](std::size_t j) { return std::abs(points[j].age_s - point.age_s); };
-        while (k + 1 < beside[side]->end && time_apart(k + 1) <= time_apart(k))
-          ++k;
-        for (std::size_t j = std::max(k, beside[side]->begin + 1) - 1; j < std::min(k + 2, beside[side]->end); ++j)
-          neighbourhood.add(points[j].position_base_m);
-      }
-      point.normal_base = neighbourhood.normal();
+void ScanNormals::find_neighbours(const std::vector<SweepPoint>& points, std::size_t line) {
+  const auto [id, begin, end] = lines_[line];
+  struct Beside {
+    std::size_t begin, end;
+    std::size_t nearest; ///< in time, which follows the point at hand
+  };
+  std::array<Beside, 2> beside{};
+  if (line > 0 && lines_[line - 1].id + 1 == id)
+    beside[0] = {lines_[line - 1].begin, lines_[line - 1].end, lines_[line - 1].begin};
+  if (line + 1 < lines_.size() && id + 1 == lines_[line + 1].id)
+    beside[1] = {lines_[line + 1].begin, lines_[line + 1].end, lines_[line + 1].begin};
+
+  for (std::size_t i = begin; i < end; ++i) {
+    std::uint32_t* place = neighbours_[i].place;
+    std::fill_n(place, Neighbours::kMost, static_cast<std::uint32_t>(i));
+    const auto add = [&place](std::size_t j) { *place++ = static_cast<std::uint32_t>(j); };
+    if (i > begin)
+      add(i - 1);
+    if (i + 1 < end)
+      add(i + 1);
+    for (auto& [first, last, nearest] : beside) {
+      if (first == last)
+        continue;
+      const auto time_apart = [&](std::size_t j) { return std::abs(points[j].age_s - points[i].age_s); };
+      while (nearest + 1 < last && time_apart(nearest + 1) <= time_apart(nearest))
+        ++nearest;
+      for (std::size_t j = std::max(nearest, first + 1) - 1; j < std::min(nearest + 2, last); ++j)
+        add(j);
     }
   }
+}
+
+/// For the points from `begin` on, as many as a chunk holds; those beyond the last one are padding.
+void ScanNormals::fit_planes(std::vector<SweepPoint>& points, std::size_t begin) const {
+  Moments moments{};
+  moments.count.fill(1.0F);
+  PerPoint px, py, pz, reach2, nx, ny, nz;
+  for (std::size_t i = 0; i < kChunk; ++i) {
+    px[i] = x_[begin + i];
+    py[i] = y_[begin + i];
+    pz[i] = z_[begin + i];
+    const float reach_m =
+        std::max(kMinReach_m, kMaxDistancePerRange * std::sqrt(px[i] * px[i] + py[i] * py[i] + pz[i] * pz[i]));
+    reach2[i] = reach_m * reach_m;
+  }
+  for (std::size_t n = 0; n < Neighbours::kMost; ++n) {
+    for (std::size_t i = 0; i < kChunk; ++i) {
+      const std::uint32_t j = neighbours_[begin + i].place[n];
+      const float x = x_[j] - px[i], y = y_[j] - py[i], z = z_[j] - pz[i];
+      const float counts = (j != begin + i) & (x * x + y * y + z * z <= reach2[i]) ? 1.0F : 0.0F;
+      const float cx = counts * x, cy = counts * y, cz = counts * z;
+      moments.count[i] += counts;
+      moments.x[i] += cx;
+      moments.y[i] += cy;
+      moments.z[i] += cz;
+      moments.xx[i] += cx * x;
+      moments.xy[i] += cx * y;
+      moments.xz[i] += cx * z;
+      moments.yy[i] += cy * y;
+      moments.yz[i] += cy * z;
+      moments.zz[i] += cz * z;
+    }
+  }
+  normals_of(moments, px, py, pz, nx, ny, nz);
+  for (std::size_t i = 0; i < std::min(kChunk, points.size() - begin); ++i)
+    points[begin + i].normal_base = {nx[i], ny[i], nz[i]};
+}
+
+void ScanNormals::estimate(std::vector<SweepPoint>& points) {
+  const std::size_t padded = points.size() + kChunk;
+  for (std::vector<float>* figures : {&x_, &y_, &z_})
+    figures->assign(padded, 0.0F);
+  neighbours_.assign(padded, {});
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    x_[i] = points[i].position_base_m.x();
+    y_[i] = points[i].position_base_m.y();
+    z_[i] = points[i].position_base_m.z();
+  }
+  find_lines(points);
+  for (std::size_t line = 0; line < lines_.size(); ++line)
+    find_neighbours(points, line);
+  for (std::size_t begin = 0; begin < points.size(); begin += kChunk)
+    fit_planes(points, begin);
 }
 
 } // namespace locus

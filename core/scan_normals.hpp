@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "core/sweep.hpp"
@@ -15,7 +16,7 @@ namespace locus {
 /// through them is trusted when they spread in two directions and little across; else the normal stays zero. One owner.
 class ScanNormals {
  public:
-  explicit ScanNormals(std::size_t max_points) { lines_.reserve(max_points); }
+  explicit ScanNormals(std::size_t max_points);
 
   /// `points` sorted by scan line, within it by time (that is, by falling age). Writes normal_base, nothing else.
   void estimate(std::vector<SweepPoint>& points);
@@ -25,7 +26,18 @@ class ScanNormals {
     std::uint16_t id;
     std::size_t begin, end;
   };
+  /// Of one point; its own place stands where it has fewer.
+  struct Neighbours {
+    static constexpr std::size_t kMost = 8;
+    std::uint32_t place[kMost];
+  };
+  void find_lines(const std::vector<SweepPoint>& points);
+  void find_neighbours(const std::vector<SweepPoint>& points, std::size_t line);
+  void fit_planes(std::vector<SweepPoint>& points, std::size_t begin) const;
+
   std::vector<Line> lines_;
+  std::vector<Neighbours> neighbours_;
+  std::vector<float> x_, y_, z_; ///< of the points
 };
 
 } // namespace locus

@@ -14,18 +14,18 @@ namespace {
 
 /// Variance of one point across its surface: ranging noise of the lidars this is for (2 to 3 cm, averaged over a few
 /// returns).
-constexpr double kPointVariance_m2 = 0.02 * 0.02;
+constexpr float kPointVariance_m2 = 0.02F * 0.02F;
 
 /// A point stands for a disc, or for a ball where its normal is not known; the radius as a share of the voxel.
-constexpr double kDiscRadiusInLeaves = 0.5;
+constexpr float kDiscRadiusInLeaves = 0.5F;
 
 /// Points on a plane spread in two directions, by an absolute and by a relative measure (one scan line spreads in one
 /// only), and little across them. With discs around them they always spread, so there the test across may be milder.
-constexpr double kMinSpreadInLeaves = 0.15;
-constexpr double kMinMiddleToLargest = 0.05;
-constexpr double kMaxAcrossToMiddle = 0.05;
-constexpr double kMaxAcrossToMiddleOfDiscs = 0.15;
-constexpr double kMaxRoughness_m = 0.15;
+constexpr float kMinSpreadInLeaves = 0.15F;
+constexpr float kMinMiddleToGreatest = 0.05F;
+constexpr float kMaxAcrossToMiddle = 0.05F;
+constexpr float kMaxAcrossToMiddleOfDiscs = 0.15F;
+constexpr float kMaxRoughness_m = 0.15F;
 
 /// Enough to be judged by where they lie alone.
 constexpr float kEnoughPoints = 12.0F;
@@ -34,7 +34,7 @@ constexpr float kEnoughToBeStrewn = 4.0F;
 
 /// Least share of the points' own normals that must agree with the plane: where wall and floor meet, a few points of
 /// the one tilt the plane through the many of the other, and the tilt drags the map along with the scan lines.
-constexpr double kMinAgreement = 0.8;
+constexpr float kMinAgreement = 0.8F;
 
 /// Older points fade once a voxel has seen this many, so a long stay does not freeze it.
 constexpr float kMaxCount = 400.0F;
@@ -42,16 +42,18 @@ constexpr float kMaxCount = 400.0F;
 constexpr std::size_t kEvictionAttempts = 64;
 
 using Upper = Eigen::Matrix<float, 6, 1>;
+const Upper kIdentity{1.0F, 0.0F, 0.0F, 1.0F, 0.0F, 1.0F};
 
 Upper upper_of_outer(const Eigen::Vector3f& v) {
   return {v.x() * v.x(), v.x() * v.y(), v.x() * v.z(), v.y() * v.y(), v.y() * v.z(), v.z() * v.z()};
 }
 
-Eigen::Matrix3d symmetric(const Upper& upper) {
-  const Eigen::Matrix<double, 6, 1> u = upper.cast<double>();
-  Eigen::Matrix3d m;
-  m << u[0], u[1], u[2], u[1], u[3], u[4], u[2], u[4], u[5];
-  return m;
+PrincipalAxes<float> axes_of(const Upper& m) { return principal_axes<float>({m[0], m[1], m[2], m[3], m[4], m[5]}); }
+
+/// v' m v
+float quadratic(const Upper& m, const Eigen::Vector3f& v) {
+  return m[0] * v.x() * v.x() + m[3] * v.y() * v.y() + m[5] * v.z() * v.z() +
+         2.0F * (m[1] * v.x() * v.y() + m[2] * v.x() * v.z() + m[4] * v.y() * v.z());
 }
 
 /// std::floor is a call where the baseline has no instruction for it.
@@ -206,35 +208,32 @@ void SurfaceGrid::insert(const Eigen::Vector3d& point_m, const Eigen::Vector3d& 
 }
 
 Surface SurfaceGrid::fit(const Moments& moments) const {
-  const Eigen::Matrix3d normals = symmetric(moments.normals);
-  const auto is_plane = [&](const PrincipalAxes& axes, double max_across_to_middle) {
-    const auto& [spread_m2, normal] = axes;
-    const double min_spread_m = kMinSpreadInLeaves * leaf_m_;
-    return spread_m2[1] > min_spread_m * min_spread_m && spread_m2[1] > kMinMiddleToLargest * spread_m2[2] &&
-           spread_m2[0] < max_across_to_middle * spread_m2[1] && spread_m2[0] < kMaxRoughness_m * kMaxRoughness_m &&
-           normal.dot(normals * normal) >= kMinAgreement * static_cast<double>(moments.normal_count);
+  const auto leaf_m = static_cast<float>(leaf_m_);
+  const auto is_plane = [&](const PrincipalAxes<float>& axes, float max_across_to_middle) {
+    const float min_spread_m = kMinSpreadInLeaves * leaf_m;
+    return axes.middle > min_spread_m * min_spread_m && axes.middle > kMinMiddleToGreatest * axes.greatest &&
+           axes.least < max_across_to_middle * axes.middle && axes.least < kMaxRoughness_m * kMaxRoughness_m &&
+           quadratic(moments.normals, {axes.x, axes.y, axes.z}) >= kMinAgreement * moments.normal_count;
   };
   Surface surface;
   surface.mean_m = moments.sum / moments.count;
-  const Eigen::Matrix3d scatter = symmetric(moments.outer / moments.count - upper_of_outer(surface.mean_m));
-  PrincipalAxes axes;
+  const Upper scatter = moments.outer / moments.count - upper_of_outer(surface.mean_m);
+  PrincipalAxes<float> axes{};
   bool planar = false;
   if (moments.count >= kEnoughPoints) {
-    axes = principal_axes(scatter);
+    axes = axes_of(scatter);
     planar = is_plane(axes, kMaxAcrossToMiddle);
   }
   if (!planar) {
-    const double along_m2 = kDiscRadiusInLeaves * kDiscRadiusInLeaves * leaf_m_ * leaf_m_;
-    const double share = 1.0 / static_cast<double>(moments.count);
-    axes = principal_axes(scatter + along_m2 * Eigen::Matrix3d::Identity() +
-                          share * (kPointVariance_m2 - along_m2) * normals);
+    const float along_m2 = kDiscRadiusInLeaves * kDiscRadiusInLeaves * leaf_m * leaf_m;
+    axes = axes_of(scatter + along_m2 * kIdentity + (kPointVariance_m2 - along_m2) / moments.count * moments.normals);
     planar = is_plane(axes, kMaxAcrossToMiddleOfDiscs);
   }
-  surface.normal = axes.normal.cast<float>();
+  surface.normal = {axes.x, axes.y, axes.z};
   if (moments.count >= kEnoughToBeStrewn)
-    surface.strewn_m2 = static_cast<float>(scatter.trace() / 3.0 + kPointVariance_m2);
+    surface.strewn_m2 = (scatter[0] + scatter[3] + scatter[5]) / 3.0F + kPointVariance_m2;
   if (planar)
-    surface.variance_m2 = static_cast<float>(std::max(axes.variance[0], kPointVariance_m2));
+    surface.variance_m2 = std::max(axes.least, kPointVariance_m2);
   return surface;
 }
 

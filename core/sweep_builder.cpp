@@ -2,6 +2,7 @@
 #include "core/sweep_builder.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 namespace locus {
@@ -19,13 +20,21 @@ constexpr std::uint64_t kLatePacketsToRestart = 500;
 
 constexpr std::size_t kReturnsPerSegmentPoint = 4; ///< room for what the leaf has not learned yet
 
-struct Affine {
-  Eigen::Matrix3f R;
-  Eigen::Vector3f t;
-  Eigen::Vector3f operator*(const Eigen::Vector3f& p) const { return R * p + t; }
-};
-
-Affine affine(const Pose& T) { return {T.R().cast<float>(), T.translation.cast<float>()}; }
+/// Of one salvo: -1 for a return fired in [first_ns, last_ns) and within range, 0 for all others. Counts those fired.
+RingSegments::Mask select(const Salvo& salvo, std::int32_t first_ns, std::int32_t last_ns, float min_range_m,
+                          float max_range_m, std::size_t& fired) {
+  RingSegments::Mask counts;
+  std::int32_t number = 0;
+  for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
+    const bool is_return =
+        (salvo.range_m[k] > 0.0F) & (salvo.offset_ns[k] >= first_ns) & (salvo.offset_ns[k] < last_ns);
+    const bool in_range = (salvo.range_m[k] >= min_range_m) & (salvo.range_m[k] <= max_range_m);
+    number += is_return ? 1 : 0;
+    counts[k] = is_return & in_range ? -1 : 0;
+  }
+  fired += static_cast<std::size_t>(number);
+  return counts;
+}
 
 } // namespace
 
@@ -128,54 +137,70 @@ Pose SweepBuilder::T_start_base(Stamp stamp) {
   return window_->T_start_base;
 }
 
-bool SweepBuilder::in_range(float range_m) const {
-  return static_cast<double>(range_m) >= options_.min_range_m && static_cast<double>(range_m) <= options_.max_range_m;
-}
-
-bool SweepBuilder::inside_body(const Eigen::Vector3f& p_base) const {
+/// Leaves out the returns that hit the robot itself.
+void SweepBuilder::leave_out_body(const Pose& T_base_lidar, const Salvo& salvo, RingSegments::Mask& counts) const {
   const BodyBoxOptions& box = options_.body_box;
-  return (p_base.array() > box.min_m.cast<float>().array()).all() &&
-         (p_base.array() < box.max_m.cast<float>().array()).all();
+  const Eigen::Matrix3f R = T_base_lidar.R().cast<float>();
+  const Eigen::Vector3f t = T_base_lidar.translation.cast<float>();
+  const Eigen::Array3f min_m = box.min_m.cast<float>(), max_m = box.max_m.cast<float>();
+  for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
+    const Eigen::Array3f p_base = R * Eigen::Vector3f{salvo.x_m[k], salvo.y_m[k], salvo.z_m[k]} + t;
+    if ((p_base > min_m).all() && (p_base < max_m).all())
+      counts[k] = 0;
+  }
 }
 
-/// Takes in the returns fired in [from, to). Within the packet the motion is taken as linear: a transform and its rate.
-void SweepBuilder::append(const LidarPacket& packet, Stamp from, Stamp to) {
+/// Within the packet the motion is taken as linear: a transform and its rate.
+PacketMotion SweepBuilder::motion_of(const LidarPacket& packet) {
   const Pose& T_base_lidar = T_base_lidar_[packet.lidar];
-  const Affine begin = affine(T_start_base(packet.stamp) * T_base_lidar);
-  const Affine end = affine(T_start_base(packet.stamp + packet.duration) * T_base_lidar);
-  const float per_ns = 1.0F / std::max(1.0F, static_cast<float>(packet.duration.count()));
-  const Affine rate{per_ns * (end.R - begin.R), per_ns * (end.t - begin.t)};
-  const Affine mount = affine(T_base_lidar);
-  const auto first_ns = static_cast<std::int32_t>((from - packet.stamp).count());
-  const auto last_ns = static_cast<std::int32_t>((to - packet.stamp).count());
-  const auto packet_s = static_cast<float>(to_seconds(packet.stamp - window_->start));
-  const bool is_first_part = from == packet.stamp; // takes what fires ahead of the stamp, too
+  const Pose begin = T_start_base(packet.stamp) * T_base_lidar;
+  const Pose end = T_start_base(packet.stamp + packet.duration) * T_base_lidar;
+  const double per_s = 1.0 / std::max(1e-9, to_seconds(packet.duration));
+  const Eigen::Matrix3d R = begin.R();
+  return {R.cast<float>(), begin.translation.cast<float>(), (per_s * (end.R() - R)).cast<float>(),
+          (per_s * (end.translation - begin.translation)).cast<float>(),
+          static_cast<float>(to_seconds(packet.stamp - window_->start))};
+}
 
-  for (const LidarReturn& r : packet.returns()) {
-    if (r.offset_ns >= last_ns || (r.offset_ns < first_ns && !is_first_part))
-      continue;
-    ++sweep_.raw_returns;
-    const Eigen::Vector3f p_lidar{r.x_m, r.y_m, r.z_m};
-    if (!in_range(r.range_m) || (options_.body_box.enabled && inside_body(mount * p_lidar)))
-      continue;
-    const auto offset_ns = static_cast<float>(r.offset_ns);
-    const Eigen::Vector3f p_start = begin * p_lidar + offset_ns * (rate * p_lidar);
-    keep({p_start, Eigen::Vector3f::Zero(), packet_s + 1e-9F * offset_ns, static_cast<float>(r.intensity),
-          static_cast<std::uint16_t>(packet.lidar * 256U + r.ring)},
-         r.range_m);
+/// Takes in the returns fired in [from, to).
+void SweepBuilder::append(const LidarPacket& packet, Stamp from, Stamp to) {
+  const PacketMotion motion = motion_of(packet);
+  segments_.begin_packet(packet.lidar, motion);
+  constexpr std::int32_t kAhead = std::numeric_limits<std::int32_t>::min();
+  // The first part takes what was fired ahead of the stamp, too.
+  const std::int32_t first_ns =
+      from == packet.stamp ? kAhead : static_cast<std::int32_t>((from - packet.stamp).count());
+  const auto last_ns = static_cast<std::int32_t>((to - packet.stamp).count());
+  const auto min_range_m = static_cast<float>(options_.min_range_m);
+  const auto max_range_m = static_cast<float>(options_.max_range_m);
+  for (const Salvo& salvo : packet.salvos()) {
+    RingSegments::Mask counts = select(salvo, first_ns, last_ns, min_range_m, max_range_m, sweep_.raw_returns);
+    if (options_.body_box.enabled)
+      leave_out_body(T_base_lidar_[packet.lidar], salvo, counts);
+    counters_.overflowed_points += segments_.add(packet.lidar, salvo, counts);
+    if (!options_.segment_filter.enabled)
+      keep_singly(packet.lidar, salvo, counts, motion);
   }
   window_->last_firing = std::max(window_->last_firing, to);
 }
 
-/// `point.age_s` still counts from the start of the window.
-void SweepBuilder::keep(const SweepPoint& point, float range_m) {
-  const std::uint32_t segment =
-      segments_.add(point.scan_line, point.position_base_m, range_m, point.age_s, point.intensity);
-  const bool singly = !options_.segment_filter.enabled;
-  if (segment == RingSegments::kNone || (singly && raw_.size() == max_returns_))
-    ++counters_.overflowed_points;
-  else if (singly)
-    raw_.push_back({point, segment});
+/// Keeps the returns themselves; their segments only give them normals.
+void SweepBuilder::keep_singly(std::size_t lidar, const Salvo& salvo, const RingSegments::Mask& counts,
+                               const PacketMotion& motion) {
+  for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
+    const std::uint32_t segment = segments_.latest(lidar, salvo.first_laser + k);
+    if (counts[k] == 0 || segment == RingSegments::kNone)
+      continue;
+    if (raw_.size() == max_returns_) {
+      ++counters_.overflowed_points;
+      continue;
+    }
+    const LidarReturn r = salvo[k];
+    const float time_s = motion.stamp_s + 1e-9F * static_cast<float>(r.offset_ns);
+    raw_.push_back({{motion.place({r.x_m, r.y_m, r.z_m}, time_s), Eigen::Vector3f::Zero(), time_s,
+                     static_cast<float>(r.intensity), static_cast<std::uint16_t>(lidar * 256U + r.ring)},
+                    segment});
+  }
 }
 
 /// The filters over the sweep, and the normals, which are found on the segments whatever becomes of these.

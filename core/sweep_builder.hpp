@@ -90,9 +90,9 @@ class SweepBuilder {
   void move_to_end();
   [[nodiscard]] Pose T_start_base(Stamp stamp);
   [[nodiscard]] Duration period() const;
-  void keep(const SweepPoint& point, float range_m);
-  [[nodiscard]] bool in_range(float range_m) const;
-  [[nodiscard]] bool inside_body(const Eigen::Vector3f& p_base) const;
+  [[nodiscard]] PacketMotion motion_of(const LidarPacket& packet);
+  void leave_out_body(const Pose& T_base_lidar, const Salvo& salvo, RingSegments::Mask& counts) const;
+  void keep_singly(std::size_t lidar, const Salvo& salvo, const RingSegments::Mask& counts, const PacketMotion& motion);
 
   SweepOptions options_;
   std::vector<Pose> T_base_lidar_;

@@ -56,14 +56,11 @@ std::optional<PacketError> Decoder::decode(std::span<const std::byte> payload, L
 
   packet.count = 0;
   for (std::size_t column = 0; column < layout_.columns; ++column) {
-    for (std::size_t bank = 0; bank < layout_.banks; ++bank) {
-      take_aim(column, bank);
-      emit_returns(bytes, column, bank, packet);
-    }
+    for (std::size_t firing = 0; firing < layout_.banks * kChannels; firing += Salvo::kLasers)
+      read_salvos(bytes, column, firing, packet);
   }
   packet.duration = duration_;
   packet.first_azimuth_cdeg = azimuth_cdeg_.front();
-  packet.last_azimuth_cdeg = aim_.azimuth_cdeg.back();
   return std::nullopt;
 }
 
@@ -119,6 +116,7 @@ void Decoder::prepare(Model model, ReturnMode mode, const Calibration& calibrati
     firings_.vertical_offset_m[i] = static_cast<float>(laser.vertical_offset_m);
     firings_.offset_ns[i] = firings[i].offset_ns;
     firings_.ring[i] = laser.ring;
+    firings_.laser[i] = firings[i].laser;
   }
 }
 
@@ -182,58 +180,62 @@ void Decoder::measure_turn_since_last_packet(Duration time_of_hour, double max_t
 }
 
 /// Turns the column's azimuth by each firing's share of the turn (first, a small angle) and by its laser's offset.
-void Decoder::take_aim(std::size_t column, std::size_t bank) {
+Decoder::Aim Decoder::take_aim(std::size_t column, std::size_t first_firing) const {
+  Aim aim;
   const double azimuth_rad = kRadPerCdeg * azimuth_cdeg_[column];
   const auto cos_column = static_cast<float>(std::cos(azimuth_rad));
   const auto sin_column = static_cast<float>(std::sin(azimuth_rad));
-  const float turn_cdeg = turn_cdeg_[column];
-  const float turn_rad = static_cast<float>(kRadPerCdeg) * turn_cdeg;
-  for (std::size_t channel = 0; channel < kChannels; ++channel) {
-    const std::size_t i = bank * kChannels + channel;
+  const float turn_rad = static_cast<float>(kRadPerCdeg) * turn_cdeg_[column];
+  for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
+    const std::size_t i = first_firing + k;
     const float angle = firings_.share_of_column[i] * turn_rad;
     const float cos_angle = 1.0F - 0.5F * angle * angle; // at most 1.6 deg: the next terms are below 3e-8
     const float sin_angle = angle - angle * angle * angle / 6.0F;
     const float cos_firing = cos_column * cos_angle - sin_column * sin_angle;
     const float sin_firing = sin_column * cos_angle + cos_column * sin_angle;
-    aim_.cos_azimuth[channel] =
-        cos_firing * firings_.cos_azimuth_offset[i] - sin_firing * firings_.sin_azimuth_offset[i];
-    aim_.sin_azimuth[channel] =
-        sin_firing * firings_.cos_azimuth_offset[i] + cos_firing * firings_.sin_azimuth_offset[i];
-    const float rounded_turn_cdeg = firings_.share_of_column[i] * turn_cdeg + 0.5F; // >= 0: no need of a call to lround
-    const int firing_cdeg = azimuth_cdeg_[column] + static_cast<int>(rounded_turn_cdeg);
-    aim_.azimuth_cdeg[channel] =
-        static_cast<std::uint16_t>(firing_cdeg < kCdegPerTurn ? firing_cdeg : firing_cdeg - kCdegPerTurn);
+    aim.cos_azimuth[k] = cos_firing * firings_.cos_azimuth_offset[i] - sin_firing * firings_.sin_azimuth_offset[i];
+    aim.sin_azimuth[k] = sin_firing * firings_.cos_azimuth_offset[i] + cos_firing * firings_.sin_azimuth_offset[i];
+  }
+  return aim;
+}
+
+/// Appends what sixteen firings of a column brought, in dual return mode one salvo for each echo. A second echo at the
+/// distance of the first is none.
+void Decoder::read_salvos(Packet packet, std::size_t column, std::size_t first_firing, LidarPacket& out) const {
+  const std::size_t bank = first_firing / kChannels;
+  const std::byte* block = block_at(packet, column * layout_.blocks_per_column() + bank * layout_.returns);
+  const Aim aim = take_aim(column, first_firing);
+  Distances previous{}; // 0 is no return: nothing is lost when the first echo equals it
+  for (std::size_t echo = 0; echo < layout_.returns; ++echo) {
+    Salvo& salvo = out.storage[out.count++];
+    Distances distances;
+    for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
+      const std::byte* at = channel_at(block + echo * kBlockBytes, first_firing % kChannels + k);
+      const std::uint16_t distance = read_u16(at);
+      salvo.intensity[k] = std::to_integer<std::uint8_t>(at[2]);
+      distances[k] = distance == previous[k] ? std::uint16_t{0} : distance;
+      previous[k] = distance;
+    }
+    place(distances, aim, first_firing, salvo);
+    for (std::size_t k = 0; k < Salvo::kLasers; ++k)
+      salvo.offset_ns[k] = column_offset_ns_[column] + firings_.offset_ns[first_firing + k];
   }
 }
 
-/// Appends the returns of one bank of a column. Every channel is written where the next return belongs and kept by
-/// counting it: no branch to be mispredicted on the mix of hits and misses that a scene is.
-void Decoder::emit_returns(Packet packet, std::size_t column, std::size_t bank, LidarPacket& out) const {
-  const std::byte* block = block_at(packet, column * layout_.blocks_per_column() + bank * layout_.returns);
-  std::size_t count = out.count;
-  for (std::size_t channel = 0; channel < kChannels; ++channel) {
-    const std::size_t i = bank * kChannels + channel;
-    std::uint16_t previous_distance = 0; // 0 is no return, so nothing is lost when the first echo equals it
-    for (std::size_t echo = 0; echo < layout_.returns; ++echo) {
-      const std::byte* at = channel_at(block + echo * kBlockBytes, channel);
-      const std::uint16_t distance = read_u16(at);
-      const float range_m = static_cast<float>(distance) * distance_resolution_m_ + firings_.range_offset_m[i];
-      const float radial_m = range_m * firings_.cos_elevation[i] + firings_.radial_offset_m[i];
-      out.storage[count] = {
-          .x_m = radial_m * aim_.cos_azimuth[channel] + firings_.lateral_offset_m[i] * aim_.sin_azimuth[channel],
-          .y_m = firings_.lateral_offset_m[i] * aim_.cos_azimuth[channel] - radial_m * aim_.sin_azimuth[channel],
-          .z_m = range_m * firings_.sin_elevation[i] + firings_.vertical_offset_m[i],
-          .range_m = range_m,
-          .offset_ns = column_offset_ns_[column] + firings_.offset_ns[i],
-          .azimuth_cdeg = aim_.azimuth_cdeg[channel],
-          .ring = firings_.ring[i],
-          .intensity = std::to_integer<std::uint8_t>(at[2])};
-      const bool is_return = (distance != 0) & (distance != previous_distance) & (range_m > 0.0F);
-      count += is_return ? 1 : 0;
-      previous_distance = distance;
-    }
+/// Everything about a salvo that follows from its distances.
+void Decoder::place(const Distances& distances, const Aim& aim, std::size_t first_firing, Salvo& salvo) const {
+  salvo.first_laser = firings_.laser[first_firing];
+  for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
+    const std::size_t i = first_firing + k;
+    const float range_m = static_cast<float>(distances[k]) * distance_resolution_m_ + firings_.range_offset_m[i];
+    const float radial_m = range_m * firings_.cos_elevation[i] + firings_.radial_offset_m[i];
+    const float lateral_m = firings_.lateral_offset_m[i];
+    salvo.x_m[k] = radial_m * aim.cos_azimuth[k] + lateral_m * aim.sin_azimuth[k];
+    salvo.y_m[k] = lateral_m * aim.cos_azimuth[k] - radial_m * aim.sin_azimuth[k];
+    salvo.z_m[k] = range_m * firings_.sin_elevation[i] + firings_.vertical_offset_m[i];
+    salvo.range_m[k] = distances[k] != 0 && range_m > 0.0F ? range_m : 0.0F;
+    salvo.ring[k] = firings_.ring[i];
   }
-  out.count = count;
 }
 
 } // namespace locus::velodyne

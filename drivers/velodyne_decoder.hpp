@@ -59,22 +59,23 @@ class Decoder {
     PerFiring<float> cos_elevation, sin_elevation;
     PerFiring<float> range_offset_m, radial_offset_m, lateral_offset_m, vertical_offset_m;
     PerFiring<std::int32_t> offset_ns;
-    PerFiring<std::uint8_t> ring;
+    PerFiring<std::uint8_t> ring, laser;
   };
 
-  /// Where the 32 lasers of a block point when they fire.
+  /// Where the lasers of a salvo point when they fire.
   struct Aim {
-    std::array<float, kChannels> cos_azimuth, sin_azimuth;
-    std::array<std::uint16_t, kChannels> azimuth_cdeg;
+    Salvo::PerLaser<float> cos_azimuth, sin_azimuth;
   };
+  using Distances = Salvo::PerLaser<std::uint16_t>;
 
   std::optional<PacketError> recognise(Packet packet, Duration time_of_hour);
   void prepare(Model model, ReturnMode mode, const Calibration& calibration);
   [[nodiscard]] std::optional<PacketError> check_blocks(Packet packet) const;
   bool measure_turns(Packet packet, Duration time_of_hour);
   void measure_turn_since_last_packet(Duration time_of_hour, double max_turn_cdeg);
-  void take_aim(std::size_t column, std::size_t bank);
-  void emit_returns(Packet packet, std::size_t column, std::size_t bank, LidarPacket& out) const;
+  [[nodiscard]] Aim take_aim(std::size_t column, std::size_t first_firing) const;
+  void read_salvos(Packet packet, std::size_t column, std::size_t first_firing, LidarPacket& out) const;
+  void place(const Distances& distances, const Aim& aim, std::size_t first_firing, Salvo& salvo) const;
 
   DecoderOptions options_;
   ModelRecognition recognition_;
@@ -84,7 +85,6 @@ class Decoder {
   Duration column_duration_{};
   float distance_resolution_m_ = 0.0F;
   Firings firings_{};
-  Aim aim_{};
 
   std::array<std::uint16_t, kBlocks> azimuth_cdeg_{}; ///< per column
   std::array<float, kBlocks> turn_cdeg_{};            ///< from each column to the next
