@@ -224,7 +224,9 @@ Registration Odometry::match_scan(const Prior& prior, const Pose& T_start, bool 
     return none;
   const StageScope scope(clock_, Stage::scan_to_scan);
   last_scan_map_.clear();
-  last_scan_map_.insert(std::span(last_scan_).first(last_registered_), Pose{});
+  // Once the motion is roughly known, the points that are registered make map enough.
+  const std::size_t points = prior.blind ? last_scan_.size() : last_registered_;
+  last_scan_map_.insert(std::span(last_scan_).first(points), Pose{});
   const PosePrior pose_prior{prior.T_last_now, prior.variance.cwiseInverse().asDiagonal()};
   return gicp_.align(registered(), last_scan_map_, T_start, pose_prior, options_.scan_to_scan, wide, stop);
 }

@@ -15,6 +15,27 @@ namespace {
 constexpr float kSweep_s = 0.1F;
 constexpr int kReturns = 1800; ///< of a scan line
 
+/// Takes in a single return of one scan line. Gives back its segment.
+std::uint32_t add(RingSegments& segments, std::uint16_t scan_line, const Eigen::Vector3f& p, float range_m,
+                  float time_s, float intensity) {
+  const std::size_t lidar = scan_line / 256, laser = scan_line % 256, lane = laser % Salvo::kLasers;
+  Salvo salvo{};
+  salvo.first_laser = static_cast<std::uint8_t>(laser - lane);
+  salvo.x_m[lane] = p.x();
+  salvo.y_m[lane] = p.y();
+  salvo.z_m[lane] = p.z();
+  salvo.range_m[lane] = range_m;
+  salvo.offset_ns[lane] = static_cast<std::int32_t>(1e9F * time_s);
+  salvo.ring[lane] = static_cast<std::uint8_t>(laser);
+  salvo.intensity[lane] = static_cast<std::uint8_t>(intensity);
+  RingSegments::Mask counts{};
+  counts[lane] = -1;
+  const std::size_t refused = segments.add(lidar, salvo, counts);
+  const std::uint32_t segment = segments.latest(lidar, laser);
+  EXPECT_EQ(refused, segment == RingSegments::kNone ? 1U : 0U);
+  return segment;
+}
+
 /// One scan line all around; what its laser meets is given by its range over the azimuth. Gives back the segment of
 /// each return.
 std::vector<std::uint32_t> scan(RingSegments& segments, std::uint16_t scan_line,
@@ -24,8 +45,8 @@ std::vector<std::uint32_t> scan(RingSegments& segments, std::uint16_t scan_line,
     const double azimuth = 2 * std::numbers::pi * i / kReturns;
     const double r = range_m(azimuth);
     const Eigen::Vector3d p{r * std::cos(azimuth), r * std::sin(azimuth), 0.1 * scan_line};
-    result.push_back(segments.add(scan_line, p.cast<float>(), static_cast<float>(r),
-                                  kSweep_s * static_cast<float>(i) / kReturns, 50.0F));
+    result.push_back(add(segments, scan_line, p.cast<float>(), static_cast<float>(r),
+                         kSweep_s * static_cast<float>(i) / kReturns, 50.0F));
   }
   return result;
 }
@@ -54,8 +75,8 @@ TEST(RingSegments, ACentroidHasTheMeanPlaceTimeAndIntensityOfItsReturns) {
   RingSegments segments(1, 100);
   std::vector<std::uint32_t> used;
   for (int i = 0; i < 4; ++i)
-    used.push_back(segments.add(0, {5.0F, 0.01F * static_cast<float>(i), 0.0F}, 5.0F, 0.01F * static_cast<float>(i),
-                                10.0F * static_cast<float>(i)));
+    used.push_back(add(segments, 0, {5.0F, 0.01F * static_cast<float>(i), 0.0F}, 5.0F, 0.01F * static_cast<float>(i),
+                       10.0F * static_cast<float>(i)));
   ASSERT_EQ(used[0], used[3]);
   std::vector<SweepPoint> points;
   segments.finish(kSweep_s, points);
@@ -69,8 +90,8 @@ TEST(RingSegments, ACentroidHasTheMeanPlaceTimeAndIntensityOfItsReturns) {
 
 TEST(RingSegments, AStepInRangeIsAnotherSurface) {
   RingSegments segments(1, 100);
-  const std::uint32_t wall = segments.add(0, {5.0F, 0.0F, 0.0F}, 5.0F, 0.0F, 0.0F);
-  const std::uint32_t pillar = segments.add(0, {4.5F, 0.01F, 0.0F}, 4.5F, 0.001F, 0.0F);
+  const std::uint32_t wall = add(segments, 0, {5.0F, 0.0F, 0.0F}, 5.0F, 0.0F, 0.0F);
+  const std::uint32_t pillar = add(segments, 0, {4.5F, 0.01F, 0.0F}, 4.5F, 0.001F, 0.0F);
   EXPECT_NE(wall, pillar);
 }
 
@@ -128,14 +149,42 @@ TEST(RingSegments, MoreThanFitAreRefused) {
   std::size_t refused = 0;
   for (std::size_t i = 0; i < RingSegments::kMaxSegments + 100; ++i) {
     const float range_m = i % 2 == 0 ? 5.0F : 50.0F;
-    if (segments.add(0, {range_m, 0, 0}, range_m, 0.0F, 0.0F) == RingSegments::kNone)
+    if (add(segments, 0, {range_m, 0, 0}, range_m, 0.0F, 0.0F) == RingSegments::kNone)
       ++refused;
   }
   EXPECT_EQ(refused, 100U);
   std::vector<SweepPoint> points;
   segments.finish(kSweep_s, points);
   EXPECT_EQ(points.size(), RingSegments::kMaxSegments);
-  EXPECT_NE(segments.add(0, {5, 0, 0}, 5.0F, 0.0F, 0.0F), RingSegments::kNone) << "the next sweep starts afresh";
+  EXPECT_NE(add(segments, 0, {5, 0, 0}, 5.0F, 0.0F, 0.0F), RingSegments::kNone) << "the next sweep starts afresh";
+}
+
+TEST(RingSegments, ACentroidIsMovedWithTheInstantThatIsItsMean) {
+  RingSegments segments(1, 100);
+  PacketMotion motion;
+  motion.stamp_s = 0.02F;
+  motion.t_m = {0.0F, 0.0F, 2.0F};
+  motion.t_mps = {0.0F, 0.0F, 10.0F};
+  segments.begin_packet(0, motion);
+  for (const float time_s : {0.0F, 0.001F})
+    add(segments, 0, {5.0F, 0.0F, 0.0F}, 5.0F, time_s, 0.0F); // after the stamp
+  std::vector<SweepPoint> points;
+  segments.finish(kSweep_s, points);
+  ASSERT_EQ(points.size(), 1U);
+  EXPECT_LT((points[0].position_base_m - Eigen::Vector3f{5.0F, 0.0F, 2.005F}).norm(), 1e-5F);
+  EXPECT_NEAR(points[0].age_s, 0.1F - 0.0205F, 1e-6F);
+}
+
+TEST(RingSegments, ALaserThatSeesNothingForAWholePacketBeginsAnew) {
+  RingSegments segments(1, 100);
+  const auto hit = [&] { return add(segments, 0, {5.0F, 0.0F, 0.0F}, 5.0F, 0.0F, 0.0F); };
+  segments.begin_packet(0, {});
+  const std::uint32_t first = hit();
+  segments.begin_packet(0, {});
+  EXPECT_EQ(hit(), first) << "the next packet goes on";
+  segments.begin_packet(0, {});
+  segments.begin_packet(0, {});
+  EXPECT_NE(hit(), first);
 }
 
 TEST(RingSegments, AnEmptySweepIsEmpty) {

@@ -36,18 +36,16 @@ class NumberedLidar {
     packet.stamp = next_;
     packet.duration = kPacket;
     packet.first_azimuth_cdeg = azimuth_cdeg(Duration{0});
-    packet.last_azimuth_cdeg = azimuth_cdeg((kColumns - 1) * kColumn);
     for (int column = 0; column < kColumns; ++column) {
-      for (int laser = 0; laser < kLasers; ++laser) {
-        const Duration offset = column * kColumn + laser * kLaser;
-        packet.storage[packet.count++] = {.x_m = static_cast<float>(fired_.size()),
-                                          .y_m = 0.0F,
-                                          .z_m = 0.0F,
-                                          .range_m = range_m_,
-                                          .offset_ns = static_cast<std::int32_t>(offset.count()),
-                                          .azimuth_cdeg = azimuth_cdeg(offset),
-                                          .ring = static_cast<std::uint8_t>(laser),
-                                          .intensity = 10};
+      Salvo& salvo = packet.storage[packet.count++];
+      salvo.y_m = salvo.z_m = {};
+      salvo.range_m.fill(range_m_);
+      salvo.intensity.fill(10);
+      for (std::size_t laser = 0; laser < Salvo::kLasers; ++laser) {
+        const Duration offset = column * kColumn + static_cast<int>(laser) * kLaser;
+        salvo.x_m[laser] = static_cast<float>(fired_.size());
+        salvo.offset_ns[laser] = static_cast<std::int32_t>(offset.count());
+        salvo.ring[laser] = static_cast<std::uint8_t>(laser);
         fired_.push_back(next_ + offset);
       }
     }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "drivers/lidar_input.hpp"
+#include "support/returns.hpp"
 #include "velodyne_test_packet.hpp"
 
 namespace locus {
@@ -69,7 +70,7 @@ TEST(LidarInput, GoodPacketsComeOutStampedAtTheirFirstFiring) {
     const Datagram datagram = stream(i);
     const LidarPacket* packet = lidar.receive(datagram);
     ASSERT_NE(packet, nullptr);
-    EXPECT_EQ(packet->count, 384U);
+    EXPECT_EQ(test::returns_of(*packet).size(), 384U);
     EXPECT_LT(std::chrono::abs(datagram.receive_stamp - packet->stamp - packet->duration),
               std::chrono::microseconds{3});
   }

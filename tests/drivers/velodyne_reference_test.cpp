@@ -16,6 +16,7 @@
 #include "drivers/velodyne_decoder.hpp"
 #include "drivers/wire.hpp"
 #include "reference_data.hpp"
+#include "support/returns.hpp"
 #include "support/test_data.hpp"
 
 namespace locus {
@@ -47,15 +48,16 @@ std::vector<int> returns_per_frame(const std::filesystem::path& file, Decoder& d
       continue;
     EXPECT_EQ(decoder.decode(datagram->payload, packet), std::nullopt);
     const auto column_ns = velodyne::spec(*decoder.model()).column_duration.count();
+    const std::vector<LidarReturn> returns = test::returns_of(packet);
     std::size_t next = 0;
     for (std::size_t block = 0; block < velodyne::kBlocks; ++block) {
       if (azimuth_of_block(datagram->payload, block) < last_azimuth_cdeg)
         frames.push_back(0);
       last_azimuth_cdeg = azimuth_of_block(datagram->payload, block);
-      for (; next < packet.count && packet.storage[next].offset_ns / column_ns == static_cast<long>(block); ++next)
+      for (; next < returns.size() && returns[next].offset_ns / column_ns == static_cast<long>(block); ++next)
         ++frames.back();
     }
-    EXPECT_EQ(next, packet.count);
+    EXPECT_EQ(next, returns.size());
   }
   return frames;
 }
@@ -175,7 +177,7 @@ std::vector<Revolution> decode_to_convention(const std::vector<std::byte>& packe
 
     const std::size_t last_column = layout.columns - 1;
     const auto skipped_columns = static_cast<std::size_t>(packet.duration / spec.column_duration) - layout.columns;
-    for (const LidarReturn& r : packet.returns()) {
+    for (const LidarReturn& r : test::returns_of(packet)) {
       auto column = static_cast<std::size_t>(r.offset_ns / spec.column_duration.count());
       column -= column > last_column ? skipped_columns : 0; // behind a blind sector
       const auto lasers = spec.calibration.lasers();

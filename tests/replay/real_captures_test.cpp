@@ -11,6 +11,7 @@
 #include "drivers/capture.hpp"
 #include "drivers/lidar_input.hpp"
 #include "replay_run.hpp"
+#include "support/returns.hpp"
 #include "support/test_data.hpp"
 
 namespace locus::test {
@@ -81,7 +82,7 @@ MedianOverTime distance_to_end_wall_m(const std::filesystem::path& file) {
   MedianOverTime distance_m;
   while (const Datagram* datagram = capture->next())
     if (const LidarPacket* packet = lidar->receive(*datagram))
-      for (const LidarReturn& r : packet->returns())
+      for (const LidarReturn& r : test::returns_of(*packet))
         if (r.x_m > 6.8F && r.x_m < 7.6F && std::abs(r.y_m + 1.0F) < 0.8F)
           distance_m.add(packet->stamp, static_cast<double>(r.x_m));
   return distance_m;

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "drivers/velodyne_decoder.hpp"
+#include "support/returns.hpp"
 #include "support/scenes.hpp"
 
 namespace locus::sim {
@@ -95,7 +96,8 @@ TEST_P(EverySensor, EveryReturnLiesOnASurfaceFromWhereItWasFired) {
   for (Datagram datagram = lidar.next(); datagram.receive_stamp < trajectory.end(); datagram = lidar.next()) {
     ASSERT_FALSE(decoder.decode(datagram.payload, *packet));
     const Stamp fired = datagram.receive_stamp - velodyne::packet_duration(model, mode);
-    for (const LidarReturn& echo : packet->returns()) {
+    const std::vector<LidarReturn> echoes = test::returns_of(*packet);
+    for (const LidarReturn& echo : echoes) {
       const auto range_m = static_cast<double>(echo.range_m);
       const Pose T_world_lidar = trajectory.T_world_base(fired + Duration{echo.offset_ns}) * kTilted;
       const Eigen::Vector3d point = T_world_lidar * Eigen::Vector3f{echo.x_m, echo.y_m, echo.z_m}.cast<double>();
@@ -103,7 +105,7 @@ TEST_P(EverySensor, EveryReturnLiesOnASurfaceFromWhereItWasFired) {
           << "packet " << packets << " ring " << int{echo.ring} << " range " << range_m;
     }
     ++packets;
-    returns += packet->count;
+    returns += echoes.size();
   }
   const velodyne::PacketLayout layout = velodyne::packet_layout(model, mode);
   const std::size_t firings = packets * layout.columns * layout.banks * velodyne::kChannels;
