@@ -22,9 +22,9 @@ inline void write_room_drive(const std::filesystem::path& folder, Duration durat
     lidar.options.sends_position_packets = true;
     robot.lidars.push_back(lidar);
   }
-  robot.imu = sim::ImuFaults{
+  robot.imu->faults = {
       .gyro_bias_radps = {0.001, -0.0015, 0.002}, .gyro_noise_radps = 0.003, .accelerometer_noise_mps2 = 0.05};
-  robot.odometry = sim::OdometryFaults{.scale_error = 0.01, .noise_m_per_sqrt_m = 0.005};
+  robot.odometry.front().faults = {.scale_error = 0.01, .noise_m_per_sqrt_m = 0.005};
   const sim::Trajectory trajectory(sim::room_course(duration, 1.0), sim::room_start());
   sim::write_capture_folder(folder, sim::room(), trajectory, duration, robot);
 }

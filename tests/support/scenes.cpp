@@ -3,59 +3,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
-#include <random>
 #include <utility>
+
+#include "locus_sim/dice.hpp"
+#include "locus_sim/scene_builder.hpp"
 
 namespace locus::sim {
 namespace {
 
-/// Collects surfaces, given as an architect would: by corners and centres on the floor.
-class Builder {
- public:
-  void rectangle(const Eigen::Vector3d& corner, const Eigen::Vector3d& u, const Eigen::Vector3d& v,
-                 std::uint8_t bright) {
-    surfaces_.push_back({Rectangle{corner, u, v}, bright});
-  }
-  void box(const Eigen::Vector3d& min, const Eigen::Vector3d& max, std::uint8_t bright) {
-    surfaces_.push_back({Box{(min + max) / 2, (max - min) / 2}, bright});
-  }
-  void turned_box(const Eigen::Vector3d& floor_center, const Eigen::Vector3d& size, double yaw_rad,
-                  std::uint8_t bright) {
-    const Eigen::Vector3d center = floor_center + Eigen::Vector3d{0, 0, size.z() / 2};
-    surfaces_.push_back({Box{center, size / 2, std::cos(yaw_rad), std::sin(yaw_rad)}, bright});
-  }
-  void cylinder(const Eigen::Vector3d& base, double radius, double height, std::uint8_t bright) {
-    surfaces_.push_back({Cylinder{base, radius, height}, bright});
-  }
-  void sphere(const Eigen::Vector3d& center, double radius, std::uint8_t bright) {
-    surfaces_.push_back({Sphere{center, radius}, bright});
-  }
-  Scene scene() { return Scene(std::move(surfaces_)); }
-
- private:
-  std::vector<Surface> surfaces_;
-};
-
-/// Uniform numbers that are the same with every standard library.
-class Dice {
- public:
-  explicit Dice(std::uint64_t seed) : engine_(seed) {}
-  double between(double low, double high) {
-    return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1p-53;
-  }
-  std::uint8_t brightness(int low, int high) { return static_cast<std::uint8_t>(between(low, high)); }
-
- private:
-  std::mt19937_64 engine_;
-};
-
-void tank(Builder& build, double x, double y, double radius, double height) {
+void tank(SceneBuilder& build, double x, double y, double radius, double height) {
   build.cylinder({x, y, 0}, radius, height, 90);
   build.cylinder({x, y, height}, radius / 3, 0.6, 110); // manhole
 }
 
-void parked_car(Builder& build, double x, double y, double yaw_rad, bool van, std::uint8_t bright) {
+void parked_car(SceneBuilder& build, double x, double y, double yaw_rad, bool van, std::uint8_t bright) {
   if (van) {
     build.turned_box({x, y, 0.25}, {5.2, 2.0, 2.1}, yaw_rad, bright);
     return;
@@ -65,7 +26,7 @@ void parked_car(Builder& build, double x, double y, double yaw_rad, bool van, st
 }
 
 /// Houses of one side; `facade_y` is where they stand, `outward` the sign of y away from the street.
-void houses(Builder& build, Dice& dice, double from_x, double to_x, double facade_y, double outward) {
+void houses(SceneBuilder& build, Dice& dice, double from_x, double to_x, double facade_y, double outward) {
   for (double x = from_x; x < to_x;) {
     const double width = dice.between(8, 18), depth = dice.between(8, 14), setback = dice.between(0, 2.5);
     const double front = facade_y + outward * setback, back = front + outward * depth;
@@ -81,7 +42,7 @@ void houses(Builder& build, Dice& dice, double from_x, double to_x, double facad
 }
 
 /// What stands on one pavement.
-void kerbside(Builder& build, Dice& dice, double from_x, double to_x, double side) {
+void kerbside(SceneBuilder& build, Dice& dice, double from_x, double to_x, double side) {
   for (double x = from_x; x < to_x; x += dice.between(5.5, 14))
     parked_car(build, x, side * dice.between(4.2, 4.6), dice.between(-0.06, 0.06), dice.between(0, 1) < 0.2,
                dice.brightness(40, 200));
@@ -97,7 +58,7 @@ void kerbside(Builder& build, Dice& dice, double from_x, double to_x, double sid
 } // namespace
 
 Scene room() {
-  Builder build;
+  SceneBuilder build;
   build.box({-5, -4, 0}, {5, 4, 4}, 60);
   build.box({3.5, -4, 0}, {5, -2.5, 2}, 80);
   build.box({-5, 2.6, 0}, {-3, 4, 1}, 40);
@@ -110,7 +71,7 @@ Scene room() {
 }
 
 Scene corridor(double length_m, Walls walls) {
-  Builder build;
+  SceneBuilder build;
   build.box({0, -1.5, 0}, {length_m, 1.5, 3}, 60);
   if (walls == Walls::bare)
     return build.scene();
@@ -132,7 +93,7 @@ Scene corridor(double length_m, Walls walls) {
 
 Scene tunnel(double length_m, std::uint64_t seed) {
   constexpr double kWall_m = 2.5, kRoof_m = 4.0;
-  Builder build;
+  SceneBuilder build;
   Dice dice(seed);
   build.box({0, -kWall_m, 0}, {length_m, kWall_m, kRoof_m}, 40);
   const auto rocks_per_face = static_cast<int>(length_m * 5);
@@ -150,7 +111,7 @@ Scene tunnel(double length_m, std::uint64_t seed) {
 
 Scene street(double length_m, std::uint64_t seed) {
   constexpr double kTile_m = 50, kHalfWidth_m = 60;
-  Builder build;
+  SceneBuilder build;
   Dice dice(seed);
   const double from_x = -50, to_x = length_m + 50;
   for (double x = from_x; x < to_x;
@@ -164,7 +125,7 @@ Scene street(double length_m, std::uint64_t seed) {
 }
 
 Scene plant() {
-  Builder build;
+  SceneBuilder build;
   Dice dice(7);
   build.box({0, 0, 0}, {64, 20, 7}, 60);
   for (const auto& [from_y, to_y] : {std::pair{0.0, 3.0}, {6.0, 14.0}, {17.0, 20.0}}) // solid, between the corridors

@@ -91,18 +91,18 @@ RobotOptions robot(const Arguments& arguments) {
   for (int index = 0; index < arguments.lidars; ++index)
     options.lidars.push_back(mounted_lidar(index, arguments));
   if (!arguments.no_noise) {
-    options.imu = ImuFaults{.gyro_bias_radps = {0.001, -0.0015, 0.002},
+    options.imu->faults = {.gyro_bias_radps = {0.001, -0.0015, 0.002},
                             .gyro_noise_radps = 0.003,
                             .accelerometer_bias_mps2 = {0.02, -0.01, 0.03},
                             .accelerometer_noise_mps2 = 0.05,
                             .attitude_noise_rad = 0.003};
-    options.odometry = OdometryFaults{
+    options.odometry.front().faults = {
         .scale_error = 0.01, .yaw_drift_rad_per_m = 0.001, .noise_m_per_sqrt_m = 0.005, .noise_rad_per_sqrt_m = 0.003};
   }
   if (arguments.no_imu)
     options.imu.reset();
   if (arguments.no_odometry)
-    options.odometry.reset();
+    options.odometry.clear();
   return options;
 }
 

@@ -16,7 +16,7 @@
 namespace locus::sim {
 namespace {
 
-constexpr double kImuRate_hz = 200, kOdometryRate_hz = 50, kTruthRate_hz = 100;
+constexpr double kImuRate_hz = 200, kTruthRate_hz = 100;
 constexpr std::uint32_t kBroadcast = 0xFFFF'FFFF;
 
 /// A text file that was written in full when close() returns.
@@ -49,11 +49,11 @@ void print_tum(TextFile& file, Stamp stamp, const Pose& pose) {
 
 /// All lidars into one file, in the order in which their packets arrive.
 void write_lidars(const std::filesystem::path& path, const Scene& scene, const Trajectory& trajectory, Stamp end,
-                  const std::vector<NamedLidar>& lidars) {
+                  const std::vector<NamedLidar>& lidars, SeenSpace* seen, const std::function<void(double)>& progress) {
   std::vector<SyntheticLidar> sources;
   std::vector<Datagram> next;
   for (const NamedLidar& lidar : lidars)
-    sources.emplace_back(scene, trajectory, lidar.options);
+    sources.emplace_back(scene, trajectory, lidar.options, seen);
   std::transform(sources.begin(), sources.end(), std::back_inserter(next), [](auto& source) { return source.next(); });
 
   PcapWriter pcap(path);
@@ -63,6 +63,7 @@ void write_lidars(const std::filesystem::path& path, const Scene& scene, const T
     });
     if (earliest == next.end() || earliest->receive_stamp > end)
       return;
+    progress(to_seconds(earliest->receive_stamp - trajectory.start()) / to_seconds(end - trajectory.start()));
     pcap.write(earliest->receive_stamp, earliest->source_ip, earliest->source_port, kBroadcast,
                earliest->destination_port, earliest->payload);
     *earliest = sources[static_cast<std::size_t>(earliest - next.begin())].next();
@@ -99,42 +100,44 @@ std::string dotted(std::uint32_t ip) {
   return fmt::format("{}.{}.{}.{}", ip >> 24, ip >> 16 & 0xFFu, ip >> 8 & 0xFFu, ip & 0xFFu);
 }
 
+std::string yaml(const Pose& pose) {
+  const Eigen::Vector3d& xyz_m = pose.translation;
+  const Eigen::Vector3d rpy_deg = to_rpy_rad(pose.rotation) * (180 / std::numbers::pi);
+  return fmt::format("{{xyz_m: [{:.6f}, {:.6f}, {:.6f}], rpy_deg: [{:.6f}, {:.6f}, {:.6f}]}}", xyz_m.x(), xyz_m.y(),
+                     xyz_m.z(), rpy_deg.x(), rpy_deg.y(), rpy_deg.z());
+}
+
 void write_config(const std::filesystem::path& path, const RobotOptions& robot) {
   TextFile file(path);
   file.print("lidars:\n");
-  for (const auto& [name, options] : robot.lidars) {
-    const Eigen::Vector3d& xyz_m = options.T_base_lidar.translation;
-    const Eigen::Vector3d rpy_deg = to_rpy_rad(options.T_base_lidar.rotation) * (180 / std::numbers::pi);
-    file.print("  - {{name: {}, model: {}, port: {}, source_ip: {},\n", name, to_string(options.model), options.port,
-               dotted(options.source_ip));
-    file.print("     T_base_lidar: {{xyz_m: [{:.6f}, {:.6f}, {:.6f}], rpy_deg: [{:.6f}, {:.6f}, {:.6f}]}}}}\n",
-               xyz_m.x(), xyz_m.y(), xyz_m.z(), rpy_deg.x(), rpy_deg.y(), rpy_deg.z());
-  }
-  if (!robot.odometry && !robot.imu)
-    file.print("motion_sources: []\n");
-  else
-    file.print("motion_sources:\n");
-  if (robot.odometry)
-    file.print("  - {{name: wio, kind: odometry, topic: /wheel_odometry}}\n");
+  for (const auto& [name, options] : robot.lidars)
+    file.print("  - {{name: {}, model: {}, port: {}, source_ip: {}, T_base_lidar: {}}}\n", name,
+               to_string(options.model), options.port, dotted(options.source_ip), yaml(options.T_base_lidar));
+  file.print("motion_sources:{}\n", robot.odometry.empty() && !robot.imu ? " []" : "");
+  for (const NamedOdometry& odometry : robot.odometry)
+    file.print("  - {{name: {}, kind: odometry, topic: {}}}\n", odometry.name, odometry.topic);
   if (robot.imu)
-    file.print("  - {{name: imu, kind: imu, topic: /imu/data}}\n");
+    file.print("  - {{name: imu, kind: imu, topic: /imu/data, T_base_source: {}}}\n", yaml(robot.imu->T_base_imu));
   file.close();
 }
 
 } // namespace
 
 void write_capture_folder(const std::filesystem::path& folder, const Scene& scene, const Trajectory& trajectory,
-                          Duration duration, const RobotOptions& robot) {
+                          Duration duration, const RobotOptions& robot, SeenSpace* seen,
+                          const std::function<void(double)>& progress) {
   std::filesystem::create_directories(folder);
   const Stamp end = trajectory.start() + duration;
-  write_lidars(folder / "lidar.pcap", scene, trajectory, end, robot.lidars);
-  if (robot.imu)
-    write_imu(folder / "imu.csv", SyntheticImu(trajectory, kImuRate_hz, *robot.imu, robot.seed), end);
-  if (robot.odometry)
-    write_odometry(folder / "wio.tum", SyntheticOdometry(trajectory, kOdometryRate_hz, *robot.odometry, robot.seed + 1),
-                   end);
-  write_truth(folder / "gt.tum", trajectory, end);
   write_config(folder / "config.yaml", robot);
+  write_truth(folder / "gt.tum", trajectory, end);
+  std::uint64_t seed = robot.seed;
+  if (robot.imu)
+    write_imu(folder / "imu.csv", SyntheticImu(trajectory, kImuRate_hz, robot.imu->faults, seed, robot.imu->T_base_imu),
+              end);
+  for (const NamedOdometry& odometry : robot.odometry)
+    write_odometry(folder / (odometry.name + ".tum"),
+                   SyntheticOdometry(trajectory, odometry.rate_hz, odometry.faults, ++seed), end);
+  write_lidars(folder / "lidar.pcap", scene, trajectory, end, robot.lidars, seen, progress);
 }
 
 } // namespace locus::sim

@@ -2,10 +2,13 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "locus_sim/scene.hpp"
+#include "locus_sim/seen_space.hpp"
 #include "locus_sim/synthetic_lidar.hpp"
 #include "locus_sim/synthetic_sources.hpp"
 #include "locus_sim/trajectory.hpp"
@@ -17,18 +20,33 @@ struct NamedLidar {
   SyntheticLidarOptions options;
 };
 
+struct MountedImu {
+  ImuFaults faults;
+  Pose T_base_imu;
+};
+
+struct NamedOdometry {
+  std::string name = "wio";
+  std::string topic = "/wheel_odometry";
+  double rate_hz = 50;
+  OdometryFaults faults;
+};
+
 /// What a robot carries, for a capture folder.
 struct RobotOptions {
   std::vector<NamedLidar> lidars{{}};
-  std::optional<ImuFaults> imu = ImuFaults{};                ///< 200 Hz, nothing: no IMU
-  std::optional<OdometryFaults> odometry = OdometryFaults{}; ///< wheels, 50 Hz, nothing: none
-  std::uint64_t seed = 1;                                    ///< of IMU and odometry; lidars have their own
+  std::optional<MountedImu> imu = MountedImu{}; ///< 200 Hz, nothing: no IMU
+  std::vector<NamedOdometry> odometry{{}};      ///< the best first
+  std::uint64_t seed = 1;                       ///< of IMU and odometry; lidars have their own
 };
 
 /// Drives a robot through a scene for `duration` and writes what its sensors saw as a capture folder: lidar.pcap,
-/// imu.csv, wio.tum, the true poses as gt.tum (100 Hz) and a config.yaml that names the sensors and overrides nothing
-/// else. Makes the folder. Throws std::runtime_error when it cannot write.
-void write_capture_folder(const std::filesystem::path& folder, const Scene& scene, const Trajectory& trajectory,
-                          Duration duration, const RobotOptions& robot);
+/// imu.csv, NAME.tum of each odometry source, the true poses as gt.tum (100 Hz) and a config.yaml that names the
+/// sensors and overrides nothing else. Makes the folder. `seen` takes note of every surface point that a lidar meets;
+/// `progress` is told what share of the duration is done. Throws std::runtime_error when it cannot write.
+void write_capture_folder(
+    const std::filesystem::path& folder, const Scene& scene, const Trajectory& trajectory, Duration duration,
+    const RobotOptions& robot, SeenSpace* seen = nullptr,
+    const std::function<void(double done)>& progress = [](double) {});
 
 } // namespace locus::sim

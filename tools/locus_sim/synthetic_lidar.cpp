@@ -17,6 +17,9 @@ constexpr double kTurn_rad = 2 * std::numbers::pi;
 constexpr double kTellingApart_m = 1.0; // echoes nearer to each other than this are one
 constexpr int kDataPacketsPerPosition = 5;
 
+// Velodyne's data sheets: a surface that throws back a tenth of the light is seen at about half the reach.
+constexpr double kDark = 10, kReachOfDark = 0.5;
+
 // Position packet, VLP-16 user manual 63-9243, section 9.4.
 constexpr std::uint16_t kPositionPort = 8308;
 constexpr std::size_t kPositionTimeOffset = 198, kPpsOffset = 202, kNmeaOffset = 206;
@@ -40,28 +43,37 @@ std::string gprmc(Stamp stamp, bool valid_fix) {
 } // namespace
 
 struct SyntheticLidar::Mount {
+  Stamp fired;
   Eigen::Matrix3d R_world_lidar;
+  Eigen::Matrix3d R_world_rotor;
   Eigen::Vector3d position_m;
   Eigen::Vector3d velocity_mps;
   Eigen::Vector3d angular_velocity_radps; ///< all in world frame, at the first firing of the column
 
-  Mount(const BaseMotion& base, const Pose& T_base_lidar) {
+  Mount(Stamp stamp, const BaseMotion& base, const Pose& T_base_lidar, double azimuth_rad) : fired(stamp) {
     const Pose T_world_lidar = base.T_world_base * T_base_lidar;
     R_world_lidar = T_world_lidar.R();
+    R_world_rotor = R_world_lidar * Eigen::AngleAxisd(-azimuth_rad, Eigen::Vector3d::UnitZ());
     position_m = T_world_lidar.translation;
     angular_velocity_radps = base.T_world_base.rotation * base.angular_velocity_base_radps;
     velocity_mps = base.velocity_world_mps + angular_velocity_radps.cross(position_m - base.T_world_base.translation);
   }
 };
 
-SyntheticLidar::SyntheticLidar(const Scene& scene, const Trajectory& trajectory, const SyntheticLidarOptions& options)
+SyntheticLidar::SyntheticLidar(const Scene& scene, const Trajectory& trajectory, const SyntheticLidarOptions& options,
+                               SeenSpace* seen)
     : scene_(scene), trajectory_(trajectory), options_(options), spec_(velodyne::spec(options.model)),
-      layout_(velodyne::packet_layout(options.model, options.return_mode)),
-      rotor_rate_radps_(options.rpm / 60 * kTurn_rad), random_(options.seed), packet_begin_(trajectory.start()),
-      data_packets_until_position_(kDataPacketsPerPosition) {
-  for (const velodyne::Laser& laser : spec_.calibration.lasers())
-    aims_.push_back({std::cos(laser.elevation_rad), std::sin(laser.elevation_rad), laser.azimuth_offset_rad,
-                     laser.vertical_offset_m});
+      layout_(velodyne::packet_layout(options.model, options.return_mode)), random_(options.seed), seen_(seen),
+      packet_begin_(trajectory.start()), data_packets_until_position_(kDataPacketsPerPosition) {
+  const double rotor_rate_radps = options.rpm / 60 * kTurn_rad;
+  for (const velodyne::Firing& firing : spec_.firings()) {
+    const velodyne::Laser& laser = spec_.calibration.lasers()[firing.laser];
+    const double azimuth_rad = rotor_rate_radps * 1e-9 * firing.offset_ns + laser.azimuth_offset_rad;
+    const double level = std::cos(laser.elevation_rad);
+    aims_.push_back({{level * std::cos(azimuth_rad), -level * std::sin(azimuth_rad), std::sin(laser.elevation_rad)},
+                     laser.vertical_offset_m,
+                     Duration{firing.offset_ns}});
+  }
 }
 
 Datagram SyntheticLidar::next() {
@@ -76,12 +88,21 @@ Datagram SyntheticLidar::next() {
   return datagram(data_, options_.port);
 }
 
-Datagram SyntheticLidar::datagram(std::span<const std::byte> payload, std::uint16_t port) const {
+Datagram SyntheticLidar::datagram(std::span<const std::byte> payload, std::uint16_t port) {
   return {.payload = payload,
           .source_ip = options_.source_ip,
           .source_port = port,
           .destination_port = port,
-          .receive_stamp = packet_begin_};
+          .receive_stamp = arrival()};
+}
+
+/// Packets wait for each other: none overtakes.
+Stamp SyntheticLidar::arrival() {
+  const Duration delay = options_.latency > Duration::zero()
+                             ? from_seconds(-to_seconds(options_.latency) * std::log1p(-uniform_(random_)))
+                             : Duration::zero();
+  last_arrival_ = std::max(last_arrival_, packet_begin_ + delay);
+  return last_arrival_;
 }
 
 void SyntheticLidar::fill_data_packet() {
@@ -95,13 +116,11 @@ void SyntheticLidar::fill_data_packet() {
 void SyntheticLidar::fill_column(std::size_t column) {
   const Stamp fired = packet_begin_ + static_cast<Duration::rep>(column) * spec_.column_duration;
   put_block_headers(column, fired);
-  const Mount mount(trajectory_.at(fired), options_.T_base_lidar);
-  const double azimuth_rad = rotor_azimuth_rad(fired);
+  const Mount mount(fired, trajectory_.at(fired), options_.T_base_lidar, rotor_azimuth_rad(fired));
   const std::size_t first_block = column * layout_.blocks_per_column();
-  const auto firings = spec_.firings();
-  for (std::size_t i = 0; i < firings.size(); ++i) {
+  for (std::size_t i = 0; i < aims_.size(); ++i) {
     const std::size_t block = first_block + i / velodyne::kChannels * layout_.returns;
-    const Echoes echoes = fire(mount, firings[i], azimuth_rad);
+    const Echoes echoes = fire(mount, aims_[i]);
     if (layout_.returns == 2) {
       put_echo(block, i % velodyne::kChannels, echoes.last);
       put_echo(block + 1, i % velodyne::kChannels, echoes.strongest);
@@ -129,45 +148,71 @@ void SyntheticLidar::put_echo(std::size_t block, std::size_t channel, const Echo
   put(data_, offset + 2, echo.intensity, 1);
 }
 
-SyntheticLidar::Echoes SyntheticLidar::fire(const Mount& mount, const velodyne::Firing& firing,
-                                            double column_azimuth_rad) {
-  const double turned_rad = rotor_rate_radps_ * 1e-9 * firing.offset_ns;
-  const double azimuth_rad = column_azimuth_rad + turned_rad + aims_[firing.laser].azimuth_offset_rad;
-  const auto center = look(mount, firing, azimuth_rad);
+SyntheticLidar::Echoes SyntheticLidar::fire(const Mount& mount, const Aim& aim) {
+  const auto center = look(mount, aim, 0);
   const Echo center_echo = measure(center);
+  if (options_.dust > 0 && uniform_(random_) < options_.dust) {
+    const Echo grain = measure_dust();
+    if (center_echo.ticks == 0 || grain.ticks < center_echo.ticks)
+      return {center_echo.ticks == 0 ? grain : center_echo, grain};
+  }
   if (options_.return_mode != velodyne::ReturnMode::dual)
     return {center_echo, center_echo};
 
-  const auto edge = look(mount, firing, azimuth_rad + kHalfBeam_rad);
+  const auto edge = look(mount, aim, kHalfBeam_rad);
   if (!center || !edge || std::abs(edge->range_m - center->range_m) < kTellingApart_m)
     return {center_echo, center_echo};
   const Echo edge_echo = measure(edge);
+  if (edge_echo.ticks == 0 || center_echo.ticks == 0) // one of them was lost
+    return edge_echo.ticks == 0 ? Echoes{center_echo, center_echo} : Echoes{edge_echo, edge_echo};
   // When the strongest return is also the last, the sensor reports the second strongest in its place.
   return edge->range_m > center->range_m ? Echoes{edge_echo, center_echo} : Echoes{center_echo, edge_echo};
 }
 
 /// The motion within a column is followed to first order: over its 0.1 ms the rest is below 1e-7 m and 1e-7 rad.
-std::optional<Hit> SyntheticLidar::look(const Mount& mount, const velodyne::Firing& firing, double azimuth_rad) const {
-  const Aim& aim = aims_[firing.laser];
-  const double since_s = 1e-9 * firing.offset_ns;
-  const Eigen::Vector3d aimed =
-      mount.R_world_lidar * Eigen::Vector3d{aim.cos_elevation * std::cos(azimuth_rad),
-                                            -aim.cos_elevation * std::sin(azimuth_rad), aim.sin_elevation};
+std::optional<Hit> SyntheticLidar::look(const Mount& mount, const Aim& aim, double aside_rad) const {
+  const double since_s = to_seconds(aim.after);
+  Eigen::Vector3d aimed = mount.R_world_rotor * aim.direction;
+  if (aside_rad != 0)
+    aimed = Eigen::AngleAxisd(-aside_rad, mount.R_world_lidar.col(2)) * aimed;
   const Ray ray{mount.position_m + since_s * mount.velocity_mps + aim.origin_z_m * mount.R_world_lidar.col(2),
                 aimed + since_s * mount.angular_velocity_radps.cross(aimed)};
-  return scene_.cast(ray, options_.max_range_m);
+  const auto hit = scene_.cast(ray, options_.max_range_m, mount.fired + aim.after);
+  if (hit && seen_ != nullptr)
+    seen_->mark(ray.origin_m + hit->range_m * ray.direction);
+  return hit;
 }
 
 SyntheticLidar::Echo SyntheticLidar::measure(const std::optional<Hit>& hit) {
   if (!hit || (options_.dropout > 0 && uniform_(random_) < options_.dropout))
     return {};
-  double range_m = hit->range_m;
-  if (options_.range_noise_m > 0)
-    range_m += options_.range_noise_m * normal_(random_);
+  double noise_m = options_.range_noise_m, brightness = hit->reflectivity;
+  if (options_.fades) {
+    const double nearness = kReachOfDark * options_.max_range_m / hit->range_m;
+    const double strength = brightness / kDark * hit->cos_incidence * nearness * nearness;
+    if (is_lost(strength))
+      return {};
+    noise_m *= 1 + 1 / strength;
+    brightness *= 0.5 * (1 + hit->cos_incidence) * (1 + 0.05 * normal_(random_)); // not quite calibrated away
+  }
+  const double range_m = noise_m > 0 ? hit->range_m + noise_m * normal_(random_) : hit->range_m;
   const double ticks = std::round(range_m / spec_.calibration.distance_resolution_m);
   if (range_m < options_.min_range_m || ticks > 65'535)
     return {};
-  return {static_cast<std::uint16_t>(ticks), hit->reflectivity};
+  return {static_cast<std::uint16_t>(ticks), static_cast<std::uint8_t>(std::clamp(brightness, 1.0, 255.0))};
+}
+
+/// Echoes do not end at once: some a little above the threshold are lost, some a little below are not.
+bool SyntheticLidar::is_lost(double strength) {
+  constexpr double kNever = 1.4, kAlways = 0.8;
+  return strength < kNever && uniform_(random_) * (kNever - kAlways) > strength - kAlways;
+}
+
+SyntheticLidar::Echo SyntheticLidar::measure_dust() {
+  constexpr double kMeanWay_m = 2.5;
+  const double range_m = options_.min_range_m - kMeanWay_m * std::log1p(-uniform_(random_));
+  const double ticks = std::min(65'535.0, std::round(range_m / spec_.calibration.distance_resolution_m));
+  return {static_cast<std::uint16_t>(ticks), static_cast<std::uint8_t>(1 + 8 * uniform_(random_))};
 }
 
 /// 0 .. 2 pi, clockwise seen from above.

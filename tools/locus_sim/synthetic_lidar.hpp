@@ -13,6 +13,7 @@
 #include "drivers/datagram.hpp"
 #include "drivers/velodyne_model.hpp"
 #include "locus_sim/scene.hpp"
+#include "locus_sim/seen_space.hpp"
 #include "locus_sim/trajectory.hpp"
 
 namespace locus::sim {
@@ -33,11 +34,14 @@ struct SyntheticLidarOptions {
   std::uint16_t port = 2368;                   ///< that data packets are sent to
   std::uint32_t source_ip = 0xC0A8'01C9;       ///< 192.168.1.201
   double min_range_m = 0.4, max_range_m = 100; ///< no return beyond
-  double range_noise_m = 0;                    ///< standard deviation
+  double range_noise_m = 0;                    ///< standard deviation, of strong echoes where they fade
   double dropout = 0;                          ///< share of the returns that is lost, 0..1
-  Duration clock_offset{};                     ///< what its clock is ahead of true time
-  bool sends_position_packets = false;         ///< one after every fifth data packet
-  bool pps_locked = true;                      ///< and a valid fix, in its position packets
+  bool fades = false;      ///< echoes of far, dark or slanting surfaces are weak: noisier, and lost when too weak
+  double dust = 0;         ///< share of the pulses that meet a grain of dust within a few metres, 0..1
+  Duration latency{};      ///< mean of what the network takes; 0: packets arrive when their last firing is over
+  Duration clock_offset{}; ///< what its clock is ahead of true time
+  bool sends_position_packets = false; ///< one after every fifth data packet
+  bool pps_locked = true;              ///< and a valid fix, in its position packets
   std::uint64_t seed = 1;
 };
 
@@ -46,17 +50,19 @@ struct SyntheticLidarOptions {
 class SyntheticLidar {
  public:
   /// Scene and trajectory must outlive it. The same arguments give the same bytes.
-  SyntheticLidar(const Scene& scene, const Trajectory& trajectory, const SyntheticLidarOptions& options);
+  /// `seen` takes note of every surface point that a ray meets.
+  SyntheticLidar(const Scene& scene, const Trajectory& trajectory, const SyntheticLidarOptions& options,
+                 SeenSpace* seen = nullptr);
 
   /// The next data or position packet, sent when its last firing is over. There is always one: when the course ends the
   /// robot stands.
   Datagram next();
 
  private:
-  struct Aim { ///< of a laser, in the frame of the lidar, but for the azimuth
-    double cos_elevation, sin_elevation;
-    double azimuth_offset_rad;
+  struct Aim { ///< of a firing, in the frame of the lidar, as if its column had azimuth 0
+    Eigen::Vector3d direction;
     double origin_z_m;
+    Duration after; ///< the column's first firing
   };
   struct Echo {
     std::uint16_t ticks = 0; ///< of the model's distance resolution; 0: none
@@ -65,32 +71,36 @@ class SyntheticLidar {
   struct Echoes {
     Echo last, strongest;
   };
-  struct Mount; ///< where the lidar is and how it moves while one column is fired
+  struct Mount; ///< where the lidar is, how it moves and how far its rotor has turned while one column is fired
 
   void fill_data_packet();
   void fill_column(std::size_t column);
   void put_block_headers(std::size_t column, Stamp fired);
   void put_echo(std::size_t block, std::size_t channel, const Echo& echo);
-  Echoes fire(const Mount& mount, const velodyne::Firing& firing, double column_azimuth_rad);
-  [[nodiscard]] std::optional<Hit> look(const Mount& mount, const velodyne::Firing& firing, double azimuth_rad) const;
+  Echoes fire(const Mount& mount, const Aim& aim);
+  [[nodiscard]] std::optional<Hit> look(const Mount& mount, const Aim& aim, double aside_rad) const;
   Echo measure(const std::optional<Hit>& hit);
+  Echo measure_dust();
+  bool is_lost(double strength);
   [[nodiscard]] double rotor_azimuth_rad(Stamp stamp) const;
   [[nodiscard]] std::uint32_t microseconds_past_hour(Stamp stamp) const;
   void fill_position_packet();
-  [[nodiscard]] Datagram datagram(std::span<const std::byte> payload, std::uint16_t port) const;
+  [[nodiscard]] Datagram datagram(std::span<const std::byte> payload, std::uint16_t port);
+  Stamp arrival();
 
   const Scene& scene_;
   const Trajectory& trajectory_;
   SyntheticLidarOptions options_;
   const velodyne::ModelSpec& spec_;
   velodyne::PacketLayout layout_;
-  std::vector<Aim> aims_; ///< by laser
-  double rotor_rate_radps_;
+  std::vector<Aim> aims_; ///< of the firings of a column
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
   std::uniform_real_distribution<double> uniform_;
 
+  SeenSpace* seen_;
   Stamp packet_begin_; ///< first firing of the data packet to come
+  Stamp last_arrival_;
   int data_packets_until_position_;
   std::array<std::byte, velodyne::kDataPacketBytes> data_{};
   std::array<std::byte, kPositionPacketBytes> position_{};

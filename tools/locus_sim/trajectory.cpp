@@ -128,7 +128,7 @@ Jet Trajectory::time_on_course(double since_start_s) const {
 double Trajectory::slip_ratio(Stamp stamp) const { return 1 - time_on_course(to_seconds(stamp - start_)).rate; }
 
 Trajectory::Attitude Trajectory::on_ground(const Jet& x, const Jet& y, const Jet& heading, const Jet& driven) const {
-  Attitude attitude{.z_m = ripple(terrain_.height_m, terrain_.wavelength_m, 0.0, driven),
+  Attitude attitude{.z_m = ride_.base_height_m + ripple(terrain_.height_m, terrain_.wavelength_m, 0.0, driven),
                     .roll_rad = ripple(terrain_.tilt_rad, terrain_.wavelength_m, 1.0, driven),
                     .pitch_rad = ripple(terrain_.tilt_rad, terrain_.wavelength_m, 2.0, driven)};
   if (!ride_.ground_m)

@@ -45,7 +45,8 @@ struct Slip {
 
 /// How the body rides on its wheels or legs.
 struct Ride {
-  Ground ground_m = {}; ///< what the wheels stand on, beneath the ripples of the terrain; none: level at 0
+  double base_height_m = 0; ///< of the base above the ground
+  Ground ground_m = {};     ///< what the wheels stand on, beneath the ripples of the terrain; none: level at 0
   std::vector<Oscillation> oscillations = {};
   std::vector<Slip> slips = {}; ///< in order, apart from each other
 };

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_sim/arguments.hpp"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+
+#include "locus_replay/failure.hpp"
+
+namespace locus::tools {
+namespace {
+
+constexpr double kShortest_s = 1, kLongest_s = 24 * 3600;
+
+template <class Named> std::vector<std::string> names_of(const Named& all) {
+  std::vector<std::string> names;
+  for (const auto& each : all)
+    names.emplace_back(each.name);
+  return names;
+}
+
+template <class Named> auto by_name(const Named& all, const std::string& name) {
+  return *std::find_if(all.begin(), all.end(), [&](const auto& each) { return each.name == name; });
+}
+
+/// FROM-TO in seconds.
+sim::Slip parse_slip(const std::string& text, double duration_s) {
+  const std::size_t dash = text.find('-');
+  double from_s = 0, to_s = 0;
+  const bool numbers = dash != std::string::npos && CLI::detail::lexical_cast(text.substr(0, dash), from_s) &&
+                       CLI::detail::lexical_cast(text.substr(dash + 1), to_s);
+  if (!numbers || !(from_s >= 0 && from_s < to_s && to_s <= duration_s))
+    throw Failure(ExitStatus::wrong_usage,
+                  fmt::format("--slip {}: must be FROM-TO in seconds within the duration, for example 20-25", text));
+  return {from_seconds(from_s), from_seconds(to_s)};
+}
+
+std::vector<sim::Slip> parse_slips(const std::vector<std::string>& texts, double duration_s) {
+  std::vector<sim::Slip> slips;
+  for (const std::string& text : texts)
+    slips.push_back(parse_slip(text, duration_s));
+  std::sort(slips.begin(), slips.end(), [](const sim::Slip& a, const sim::Slip& b) { return a.from < b.from; });
+  for (std::size_t i = 1; i < slips.size(); ++i) {
+    if (slips[i].from < slips[i - 1].to)
+      throw Failure(ExitStatus::wrong_usage,
+                    fmt::format("--slip: the slip at {} s begins before the one at {} s ends; give each its own time",
+                                to_seconds(slips[i].from), to_seconds(slips[i - 1].from)));
+  }
+  return slips;
+}
+
+} // namespace
+
+std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
+  SimArguments arguments;
+  std::string world, robot, model = "VLP-16", return_mode = "strongest";
+  double duration_s = 0;
+  bool no_noise = false;
+  std::vector<std::string> slips;
+
+  CLI::App app{"A synthetic robot drives through a synthetic place: a capture folder with exact truth.", "locus-sim"};
+  app.add_option("--world", world, "Where it drives")->required()->check(CLI::IsMember(names_of(sim::kWorlds)));
+  app.add_option("--robot", robot, "What drives")->required()->check(CLI::IsMember(names_of(sim::kRobots)));
+  app.add_option("--duration", duration_s, "How long, seconds")
+      ->required()
+      ->type_name("S")
+      ->check(CLI::Range(kShortest_s, kLongest_s));
+  app.add_option("--seed", arguments.seed, "Of course, clutter, moving things and noise; default 1")->type_name("N");
+  app.add_option("--lidars", arguments.sensors.lidars, "1: level, 2: and one pitched forward, 3: and one backward")
+      ->type_name("N")
+      ->check(CLI::Range(1, 3));
+  app.add_option("--model", model, "Of all lidars; default VLP-16")
+      ->check(CLI::IsMember({"VLP-16", "VLP-32C", "HDL-32E"}));
+  app.add_option("--return", return_mode, "Echoes that they report; default strongest")
+      ->check(CLI::IsMember({"strongest", "dual"}));
+  app.add_flag("--no-noise", no_noise, "Perfect sensors");
+  app.add_option("--slip", slips,
+                 "Wheels or feet spin and the robot stays where it is, seconds from the start; may be repeated")
+      ->type_name("T-T1")
+      ->allow_extra_args(false);
+  app.add_option("--dust", arguments.sensors.dust, "Share of the laser pulses that meet dust, 0..1")
+      ->type_name("P")
+      ->check(CLI::Range(0.0, 1.0));
+  app.add_option("-o,--output", arguments.output, "Capture folder; made if need be")->required()->type_name("DIR");
+  app.set_version_flag("--version", "locus-sim " LOCUS_VERSION);
+  app.footer(
+      "Writes lidar.pcap, imu.csv, one NAME.tum per odometry source, gt.tum, gt_map.ply and config.yaml. The same\n"
+      "options give the same bytes.\n\n"
+      "Examples:\n"
+      "  locus-sim --world urban --robot husky --duration 60 --seed 1 -o plant\n"
+      "  locus-sim --world tunnel --robot spot --duration 300 --seed 7 --slip 20-25 --dust 0.02 -o mine\n"
+      "  locus-replay -o out plant");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& asked_for_text) {
+    app.exit(asked_for_text);
+    return std::nullopt;
+  } catch (const CLI::ParseError& error) {
+    throw Failure(ExitStatus::wrong_usage, fmt::format("{}; see locus-sim --help", error.what()));
+  }
+
+  arguments.world = by_name(sim::kWorlds, world);
+  arguments.robot = by_name(sim::kRobots, robot);
+  arguments.duration = from_seconds(duration_s);
+  arguments.slips = parse_slips(slips, duration_s);
+  arguments.sensors.model = *velodyne::model_from_string(model);
+  arguments.sensors.return_mode = return_mode == "dual" ? velodyne::ReturnMode::dual : velodyne::ReturnMode::strongest;
+  arguments.sensors.noise = !no_noise;
+  return arguments;
+}
+
+} // namespace locus::tools

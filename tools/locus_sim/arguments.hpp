@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "core/stamp.hpp"
+#include "locus_sim/robot.hpp"
+#include "locus_sim/world.hpp"
+
+namespace locus::tools {
+
+/// What the user asked for.
+struct SimArguments {
+  sim::NamedWorld world;
+  sim::NamedRobot robot;
+  Duration duration;
+  std::uint64_t seed = 1;
+  sim::SensorChoice sensors;
+  std::vector<sim::Slip> slips;
+  std::filesystem::path output;
+};
+
+/// Nothing where help or version were asked for and have been printed. Throws Failure.
+std::optional<SimArguments> parse_sim_arguments(int argc, char** argv);
+
+} // namespace locus::tools

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// locus-sim: a synthetic robot with exact truth to a capture folder.
+#include <cstdio>
+#include <exception>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "daemon/machine_time.hpp"
+#include "locus_replay/failure.hpp"
+#include "locus_replay/progress_bar.hpp"
+#include "locus_sim/arguments.hpp"
+#include "locus_sim/capture_folder_writer.hpp"
+#include "locus_sim/driver.hpp"
+#include "locus_sim/seen_space.hpp"
+#include "locus_sim/truth_map.hpp"
+
+namespace locus::tools {
+namespace {
+
+sim::Trajectory drive(const sim::World& world, const sim::Robot& robot, const SimArguments& arguments) {
+  Duration driving = arguments.duration;
+  for (const sim::Slip& slip : arguments.slips)
+    driving -= slip.to - slip.from; // the course goes on where it stood still
+  sim::Dice dice(arguments.seed + 1);
+  const sim::PlannedCourse planned = plan_course(world.roads, robot.agility, driving, dice);
+  sim::Ride ride = robot.ride;
+  ride.ground_m = world.ground_m;
+  ride.slips = arguments.slips;
+  return sim::Trajectory(planned.course, planned.start, world.terrain, ride);
+}
+
+void run(const SimArguments& arguments) {
+  const daemon::MachineTime begin = daemon::MachineTime::now();
+  const sim::World world = arguments.world.make(arguments.seed);
+  const sim::Robot robot = arguments.robot.make(arguments.sensors, arguments.seed);
+  const sim::Trajectory trajectory = drive(world, robot, arguments);
+  sim::SeenSpace seen(world.scene.bounds());
+  ProgressBar bar(true);
+  write_capture_folder(arguments.output, world.scene, trajectory, arguments.duration, robot.sensors, &seen,
+                       [&](double done) { bar.show(done); });
+  write_truth_map(arguments.output / "gt_map.ply", world.scene, seen);
+  bar.wipe();
+  const double wall_s = to_seconds(daemon::MachineTime::now().wall - begin.wall);
+  fmt::print("{:.0f} m in {:.0f} s, made in {:.1f} s, {:.0f} times as fast as it was driven: {}\n",
+             trajectory.length_m(), to_seconds(arguments.duration), wall_s, to_seconds(arguments.duration) / wall_s,
+             arguments.output.string());
+}
+
+} // namespace
+} // namespace locus::tools
+
+int main(int argc, char** argv) {
+  using namespace locus::tools;
+  try {
+    if (const std::optional<SimArguments> arguments = parse_sim_arguments(argc, argv))
+      run(*arguments);
+    return static_cast<int>(ExitStatus::done);
+  } catch (const Failure& failure) {
+    fmt::print(stderr, "locus-sim: {}\n", failure.what());
+    return static_cast<int>(failure.status());
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "locus-sim: {}\n", error.what());
+    return static_cast<int>(ExitStatus::failed);
+  }
+}

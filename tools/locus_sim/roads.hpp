@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+#include <cstddef>
+#include <initializer_list>
+#include <vector>
+
+namespace locus::sim {
+
+/// Where robots drive in a world: straight lanes between places, seen from above. One owner.
+class Roads {
+ public:
+  struct Lane {
+    std::size_t from, to; ///< places; robots use it in both directions
+  };
+
+  /// Lanes from each place to the next; places already known (to a millimetre) are the same place.
+  void add(std::initializer_list<Eigen::Vector2d> polyline_m);
+
+  [[nodiscard]] const std::vector<Eigen::Vector2d>& places_m() const { return places_m_; }
+  [[nodiscard]] const std::vector<Lane>& lanes() const { return lanes_; }
+
+  /// The places that one lane leads to.
+  [[nodiscard]] std::vector<std::size_t> neighbours(std::size_t place) const;
+
+  /// From a point to the middle of the nearest lane.
+  [[nodiscard]] double distance_m(const Eigen::Vector2d& point) const;
+
+ private:
+  std::size_t place(const Eigen::Vector2d& at_m);
+
+  std::vector<Eigen::Vector2d> places_m_;
+  std::vector<Lane> lanes_;
+};
+
+} // namespace locus::sim

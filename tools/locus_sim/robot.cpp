@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_sim/robot.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <span>
+
+#include "locus_sim/dice.hpp"
+
+namespace locus::sim {
+namespace {
+
+constexpr double kRadPerDeg = std::numbers::pi / 180;
+
+struct Mounting {
+  std::string_view name;
+  Eigen::Vector3d xyz_m, rpy_deg;
+};
+
+Pose pose_of(const Mounting& mounting) { return {from_rpy_rad(kRadPerDeg * mounting.rpy_deg), mounting.xyz_m}; }
+
+/// Lidars of one model, each turning a little faster or slower than it should and with a phase of its own.
+std::vector<NamedLidar> lidars(std::span<const Mounting> mountings, const SensorChoice& choice, Dice& dice) {
+  std::vector<NamedLidar> all;
+  for (const Mounting& mounting : mountings.first(static_cast<std::size_t>(choice.lidars))) {
+    const auto index = static_cast<std::uint16_t>(all.size());
+    SyntheticLidarOptions options;
+    options.model = choice.model;
+    options.return_mode = choice.return_mode;
+    options.rpm = 600 + dice.between(-0.6, 0.6);
+    options.first_azimuth_deg = dice.between(0, 360);
+    options.T_base_lidar = pose_of(mounting);
+    options.port = static_cast<std::uint16_t>(options.port + index);
+    options.source_ip += index;
+    options.max_range_m = choice.model == velodyne::Model::vlp32c ? 200 : 100;
+    options.sends_position_packets = true;
+    options.dust = choice.dust;
+    if (choice.noise) {
+      options.range_noise_m = 0.01;
+      options.dropout = 0.003;
+      options.fades = true;
+      options.latency = std::chrono::microseconds{60};
+    }
+    options.seed = static_cast<std::uint64_t>(dice.between(1, 1e15));
+    all.push_back({std::string(mounting.name), options});
+  }
+  return all;
+}
+
+Eigen::Vector3d anywhere(Dice& dice, double reach) {
+  const double x = dice.between(-reach, reach), y = dice.between(-reach, reach), z = dice.between(-reach, reach);
+  return {x, y, z};
+}
+
+/// Either sign, between half and the whole of it: a real sensor is never perfect.
+double about(Dice& dice, double size) { return (dice.chance(0.5) ? 1 : -1) * dice.between(0.5, 1) * size; }
+
+/// An industrial MEMS unit, its gyro calibrated at rest before the start. What its data sheet says, not what its best
+/// specimen does.
+ImuFaults imu_faults(Dice& dice, double vibration_mps2) {
+  return {.gyro_bias_radps = anywhere(dice, 0.0015),
+          .gyro_noise_radps = 0.003,
+          .gyro_bias_walk_radps_per_sqrt_s = 3e-5,
+          .gyro_scale_error = about(dice, 0.002),
+          .accelerometer_bias_mps2 = anywhere(dice, 0.05),
+          .accelerometer_noise_mps2 = 0.03,
+          .vibration_mps2 = vibration_mps2,
+          .attitude_noise_rad = 0.1 * kRadPerDeg,
+          .attitude_wander_rad = 0.4 * kRadPerDeg,
+          .heading_rad = dice.between(-std::numbers::pi, std::numbers::pi)};
+}
+
+} // namespace
+
+Robot make_husky(const SensorChoice& choice, std::uint64_t seed) {
+  static const std::array<Mounting, 3> kLidars{
+      {{"top", {0, 0, 0.8}, {0, 0, 0}}, {"front", {0.4, 0, 0.6}, {0, 30, 0}}, {"rear", {-0.4, 0, 0.6}, {0, 30, 180}}}};
+  Dice dice(seed);
+  Robot robot;
+  robot.agility = {
+      .cruise_mps = 1.0, .turn_rate_radps = 0.9, .acceleration_mps2 = 0.7, .sudden_mps2 = 2.2, .sudden_share = 0.15};
+  robot.ride.base_height_m = 0.13;
+  robot.ride.oscillations = {
+      {2.3, {0, 0, 0}, kRadPerDeg * Eigen::Vector3d{0.2, 0.15, 0}, 0.4},                       // rocking on its tyres
+      {9.7, {0, 0, 0.0004}, kRadPerDeg * Eigen::Vector3d{0.05, 0.1, 0}, 1.1},                  // tyre lugs
+      {17.3, {0.0001, 0.0001, 0.00015}, kRadPerDeg * Eigen::Vector3d{0.04, 0.05, 0.01}, 2.0}}; // drive train
+  robot.sensors.lidars = lidars(kLidars, choice, dice);
+  robot.sensors.imu = MountedImu{.faults = {}, .T_base_imu = {Eigen::Quaterniond::Identity(), {0, 0, 0.3}}};
+  OdometryFaults wheels{.spinning_mps = robot.agility.cruise_mps}; // spinning wheels are no fault of a sensor
+  if (choice.noise) {
+    robot.sensors.imu->faults = imu_faults(dice, 0.4);
+    wheels.scale_error = about(dice, 0.015);
+    wheels.noise_m_per_sqrt_m = 0.006;
+    wheels.noise_rad_per_sqrt_m = 0.002;
+    wheels.yaw_drift_rad_per_s = about(dice, 0.0005);
+    wheels.turn_error = about(dice, 0.015);
+    wheels.turn_slip_m_per_rad = dice.between(0.01, 0.03);
+    wheels.climb_m_per_sqrt_m = 0.002;
+  }
+  robot.sensors.odometry = {{.faults = wheels}};
+  robot.sensors.seed = seed;
+  return robot;
+}
+
+Robot make_spot(const SensorChoice& choice, std::uint64_t seed) {
+  static const std::array<Mounting, 3> kLidars{{{"top", {0, 0, 0.4}, {0, 0, 0}},
+                                                {"front", {0.35, 0, 0.3}, {0, 30, 0}},
+                                                {"rear", {-0.35, 0, 0.3}, {0, 30, 180}}}};
+  Dice dice(seed);
+  Robot robot;
+  robot.agility = {
+      .cruise_mps = 1.2, .turn_rate_radps = 1.1, .acceleration_mps2 = 0.9, .sudden_mps2 = 2.5, .sudden_share = 0.1};
+  robot.ride.base_height_m = 0.5;
+  robot.ride.oscillations = {
+      {2.0, {0.004, 0.012, 0.010}, kRadPerDeg * Eigen::Vector3d{1.5, 0.6, 0.5}, 0.3}, // the stride
+      {4.0, {0.004, 0, 0.006}, kRadPerDeg * Eigen::Vector3d{0.2, 0.8, 0}, 1.7},       // its two steps
+      {13.0, {0, 0, 0.0002}, kRadPerDeg * Eigen::Vector3d{0.04, 0.06, 0}, 0.9}};      // feet touching down
+  robot.sensors.lidars = lidars(kLidars, choice, dice);
+  robot.sensors.imu = MountedImu{};
+  OdometryFaults vision{}, legs{.spinning_mps = robot.agility.cruise_mps};
+  if (choice.noise) {
+    robot.sensors.imu->faults = imu_faults(dice, 0.6);
+    vision.scale_error = about(dice, 0.01);
+    vision.noise_m_per_sqrt_m = 0.008;
+    vision.noise_rad_per_sqrt_m = 0.002;
+    vision.yaw_drift_rad_per_m = about(dice, 0.0008);
+    vision.climb_m_per_sqrt_m = 0.006;
+    legs.scale_error = about(dice, 0.025);
+    legs.noise_m_per_sqrt_m = 0.012;
+    legs.noise_rad_per_sqrt_m = 0.004;
+    legs.yaw_drift_rad_per_s = about(dice, 0.0008);
+    legs.turn_error = about(dice, 0.02);
+    legs.turn_slip_m_per_rad = dice.between(0.005, 0.02);
+    legs.climb_m_per_sqrt_m = 0.012;
+  }
+  robot.sensors.odometry = {{.name = "vio", .topic = "/visual_odometry", .rate_hz = 30, .faults = vision},
+                            {.name = "kio", .topic = "/kinematic_odometry", .rate_hz = 50, .faults = legs}};
+  robot.sensors.seed = seed;
+  return robot;
+}
+
+} // namespace locus::sim

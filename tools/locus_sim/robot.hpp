@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <string_view>
+
+#include "locus_sim/capture_folder_writer.hpp"
+#include "locus_sim/driver.hpp"
+
+namespace locus::sim {
+
+/// What the user may choose about the sensors.
+struct SensorChoice {
+  int lidars = 1; ///< 1..3
+  velodyne::Model model = velodyne::Model::vlp16;
+  velodyne::ReturnMode return_mode = velodyne::ReturnMode::strongest;
+  bool noise = true; ///< false: every sensor is perfect
+  double dust = 0;   ///< share of the pulses that meet dust
+};
+
+/// A robot, how it moves and what it carries.
+struct Robot {
+  Agility agility;
+  Ride ride; ///< without ground and slips
+  RobotOptions sensors;
+};
+
+/// Skid-steered, as the Husky of the LOCUS paper: vibration, sudden acceleration; wheel-inertial odometry, IMU.
+Robot make_husky(const SensorChoice& choice, std::uint64_t seed);
+
+/// Legged, as its Spot: a gait of 2 Hz; visual-inertial and kinematic-inertial odometry, IMU.
+Robot make_spot(const SensorChoice& choice, std::uint64_t seed);
+
+/// A robot by its name on the command line. The seed decides how large each fault of its sensors is.
+struct NamedRobot {
+  std::string_view name;
+  Robot (*make)(const SensorChoice& choice, std::uint64_t seed);
+};
+inline constexpr std::array kRobots{NamedRobot{"husky", make_husky}, NamedRobot{"spot", make_spot}};
+
+} // namespace locus::sim

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_sim/truth_map.hpp"
+
+#include <Eigen/Geometry>
+#include <fmt/ostream.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cerrno>
+#include <cmath>
+#include <fstream>
+#include <numbers>
+#include <stdexcept>
+#include <system_error>
+
+namespace locus::sim {
+namespace {
+
+constexpr double kStep_m = 0.03;
+static_assert(std::endian::native == std::endian::little, "points are written as they lie in memory");
+
+int steps(double length_m) { return std::max(1, static_cast<int>(std::ceil(length_m / kStep_m))); }
+
+/// Points of a shape, at most a step apart in both directions, for a sink.
+template <class Sink> class Sampler {
+ public:
+  explicit Sampler(Sink& sink) : sink_(sink) {}
+
+  void operator()(const Rectangle& shape) const { patch(shape.corner_m, shape.edge_u_m, shape.edge_v_m, 2); }
+  void operator()(const Triangle& shape) const { patch(shape.corner_m, shape.edge_u_m, shape.edge_v_m, 1); }
+  void operator()(const Box& box) const {
+    Eigen::Matrix3d axes;
+    axes << box.cos_yaw, -box.sin_yaw, 0, box.sin_yaw, box.cos_yaw, 0, 0, 0, 1;
+    axes *= box.half_size_m.asDiagonal();
+    for (const Eigen::Index axis : {0, 1, 2}) {
+      const Eigen::Vector3d out = axes.col(axis), u = axes.col((axis + 1) % 3), v = axes.col((axis + 2) % 3);
+      for (const double side : {-1.0, 1.0})
+        patch(box.center_m + side * out - u - v, 2 * u, 2 * v, 2);
+    }
+  }
+  void operator()(const Cylinder& shape) const {
+    ring(shape.base_m, shape.axis, shape.radius_m, shape.height_m * shape.axis);
+  }
+  void operator()(const Sphere& shape) const {
+    const int rings = steps(std::numbers::pi * shape.radius_m);
+    for (int i = 0; i <= rings; ++i) {
+      const double angle = std::numbers::pi * i / rings;
+      const Eigen::Vector3d up{0, 0, shape.radius_m * std::cos(angle)};
+      ring(shape.center_m + up, Eigen::Vector3d::UnitZ(), shape.radius_m * std::sin(angle), Eigen::Vector3d::Zero());
+    }
+  }
+
+ private:
+  /// Of a parallelogram as far as the shares of both edges add up to no more than `sum`.
+  void patch(const Eigen::Vector3d& corner, const Eigen::Vector3d& u, const Eigen::Vector3d& v, double sum) const {
+    const int along = steps(u.norm()), across = steps(v.norm());
+    for (int i = 0; i <= along; ++i) {
+      const double share = static_cast<double>(i) / along;
+      const Eigen::Vector3d begin = corner + share * u;
+      for (int j = 0; j <= across && share + static_cast<double>(j) / across <= sum + 1e-9; ++j)
+        sink_(begin + static_cast<double>(j) / across * v);
+    }
+  }
+  /// A circle about an axis, drawn out along `way`.
+  void ring(const Eigen::Vector3d& center, const Eigen::Vector3d& axis, double radius,
+            const Eigen::Vector3d& way) const {
+    const Eigen::Vector3d u = axis.unitOrthogonal(), v = axis.cross(u);
+    const int around = steps(2 * std::numbers::pi * radius), along = steps(way.norm());
+    for (int i = 0; i < around; ++i) {
+      const double angle = 2 * std::numbers::pi * i / around;
+      const Eigen::Vector3d begin = center + radius * (std::cos(angle) * u + std::sin(angle) * v);
+      for (int j = 0; j <= along; ++j)
+        sink_(begin + static_cast<double>(j) / along * way);
+    }
+  }
+
+  Sink& sink_;
+};
+
+template <class Sink> void for_each_point(const Scene& scene, const SeenSpace& seen, Sink sink) {
+  auto if_seen = [&](const Eigen::Vector3d& point) {
+    if (seen.holds(point))
+      sink(point);
+  };
+  const Sampler sampler(if_seen);
+  for (const Surface& surface : scene.surfaces())
+    std::visit(sampler, surface.shape);
+}
+
+} // namespace
+
+void write_truth_map(const std::filesystem::path& path, const Scene& scene, const SeenSpace& seen) {
+  const SeenSpace wanted = seen.grown();
+  std::size_t count = 0;
+  for_each_point(scene, wanted, [&](const Eigen::Vector3d&) { ++count; });
+  std::ofstream file(path, std::ios::binary);
+  fmt::print(file,
+             "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\n"
+             "property float z\nend_header\n",
+             count);
+  for_each_point(scene, wanted, [&](const Eigen::Vector3d& point) {
+    const Eigen::Vector3f single = point.cast<float>();
+    file.write(reinterpret_cast<const char*>(single.data()), 3 * sizeof(float));
+  });
+  file.close();
+  if (!file)
+    throw std::runtime_error(path.string() + ": " + std::generic_category().message(errno));
+}
+
+} // namespace locus::sim
