@@ -12,6 +12,8 @@
 #include "locus_replay/map_file.hpp"
 #include "locus_replay/no_data.hpp"
 #include "locus_replay/output_file.hpp"
+#include "locus_replay/report.hpp"
+#include "locus_replay/report_map.hpp"
 
 namespace locus::tools {
 namespace {
@@ -36,6 +38,7 @@ Results::Results(const Arguments& arguments, const Config& config, const Recordi
 void Results::take(const daemon::ProcessedSweep& sweep) {
   odometry_.write(sweep.estimate);
   figures_.take(sweep);
+  sweeps_.push_back(record_of(sweep));
   truth_.take(sweep.estimate);
   progress_.show(recording_.progress());
 }
@@ -52,8 +55,12 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
   const FinishedRun run{arguments_.capture.string(), config_, ingest,  processor, sweeps, figures_,
                         recording_.duration(),       spent,   accuracy};
   OutputFile file(arguments_.output / "summary.json");
-  file.print("{}\n", summary(run).dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  const nlohmann::ordered_json figures = summary(run);
+  file.print("{}\n", figures.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   file.close();
+  write_report(arguments_.output / "report.html",
+               {figures, config_, figures_.path_m(), sweeps_, visible_surfaces(processor.odometry().map()),
+                truth_.trajectory(), accuracy.trajectory});
   if (!has_data)
     throw Failure(ExitStatus::failed, fmt::format("{}: no valid data packet: {}", arguments_.capture.string(),
                                                   why_no_data(recording_, ingest.lidars())));

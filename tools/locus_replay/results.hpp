@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <vector>
+
 #include "daemon/ingest.hpp"
 #include "daemon/sweep_processor.hpp"
 #include "locus_replay/arguments.hpp"
@@ -8,6 +10,7 @@
 #include "locus_replay/progress_bar.hpp"
 #include "locus_replay/recording.hpp"
 #include "locus_replay/run_figures.hpp"
+#include "locus_replay/sweep_record.hpp"
 #include "locus_replay/truth.hpp"
 
 namespace locus::tools {
@@ -33,6 +36,7 @@ class Results {
   daemon::MachineTime begin_;
   OdometryFiles odometry_;
   RunFigures figures_;
+  std::vector<SweepRecord> sweeps_;
   Truth truth_;
   ProgressBar progress_;
 };

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "config/config_yaml.hpp"
+#include "locus_replay/quantiles.hpp"
 
 namespace locus::tools {
 namespace {
@@ -144,16 +145,9 @@ RunFigures::Means RunFigures::means() const {
           sums_.scan_to_submap_iterations / count};
 }
 
-/// By the nearest rank.
-RunFigures::Percentiles RunFigures::percentiles(std::vector<float> values) {
-  if (values.empty())
-    return {};
-  std::ranges::sort(values);
-  const auto at = [&](double share) {
-    const double rank = std::ceil(share * static_cast<double>(values.size()));
-    return static_cast<double>(values[static_cast<std::size_t>(std::max(1.0, rank)) - 1]);
-  };
-  return {at(0.5), at(0.9), at(0.99), at(1.0)};
+RunFigures::Percentiles RunFigures::percentiles(std::span<const float> values) {
+  const Quantiles quantiles({values.begin(), values.end()});
+  return {quantiles.at(0.5), quantiles.at(0.9), quantiles.at(0.99), quantiles.at(1.0)};
 }
 
 ordered_json summary(const FinishedRun& run) {

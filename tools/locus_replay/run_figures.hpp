@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -41,7 +42,7 @@ class RunFigures {
   [[nodiscard]] const Pose& last_T_odom_base() const { return last_T_odom_base_; }
 
  private:
-  static Percentiles percentiles(std::vector<float> values);
+  static Percentiles percentiles(std::span<const float> values);
 
   std::vector<float> wall_ms_, cpu_ms_;
   std::vector<std::uint64_t> used_sweeps_;

@@ -25,6 +25,9 @@ class Truth {
 
   void take(const OdometryEstimate& estimate);
 
+  /// Empty if there is none.
+  [[nodiscard]] std::span<const StampedPose> trajectory() const { return trajectory_; }
+
   /// Takes its time if there is a map.
   [[nodiscard]] Accuracy compare(std::span<const SurfacePoint> map, bool show_progress) const;
 

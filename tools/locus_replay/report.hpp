@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <span>
+
+#include <nlohmann/json.hpp>
+
+#include "accuracy/trajectory_accuracy.hpp"
+#include "config/config.hpp"
+#include "core/surface_map.hpp"
+#include "drivers/motion_files.hpp"
+#include "locus_replay/sweep_record.hpp"
+
+namespace locus::tools {
+
+/// What report.html is made of. What of it is empty is left out of the page.
+struct Report {
+  const nlohmann::ordered_json& summary; ///< as in summary.json
+  const Config& config;
+  double path_m; ///< length of the path
+  std::span<const SweepRecord> sweeps;
+  std::span<const SurfacePoint> map;                 ///< odom frame; see visible_surfaces()
+  std::span<const StampedPose> truth;                ///< in its own frame
+  const std::optional<TrajectoryAccuracy>& accuracy; ///< against that truth
+};
+
+/// Writes the run as one page that needs no network and no other file: figures, map and counters, with the libraries
+/// that draw them. An hour's run takes a few megabytes. Throws Failure.
+void write_report(const std::filesystem::path& path, const Report& report);
+
+} // namespace locus::tools

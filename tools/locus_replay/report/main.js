@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page of locus-replay's report. Figures are drawn to the width of the page and anew when that or its colours
+// change; each that is drawn says so by data-drawn, and one that fails says why and stops no other.
+import {select} from "d3-selection";
+
+import {boxes} from "./boxes.js";
+import {note} from "./drawing.js";
+import {heading} from "./heading.js";
+import {mapView} from "./map_view.js";
+import {plan, side} from "./projection.js";
+import {run} from "./run.js";
+import {configuration, packets, sources, stages} from "./tables.js";
+import {timeline} from "./timeline.js";
+
+const kTables = {stages, packets, sources, configuration};
+const kFigures = {plan, map: mapView, side, boxes, timeline};
+
+function draw(parts) {
+  for (const [id, drawPart] of Object.entries(parts)) {
+    const part = select(`#${id}`);
+    try {
+      drawPart(part, part.select(".drawing").node().clientWidth);
+      part.attr("data-drawn", "yes");
+    } catch (error) {
+      note(part, `This part could not be drawn: ${error.message}`);
+      console.error(error);
+    }
+  }
+}
+
+function drawFigures() {
+  if (run.path) draw(kFigures);
+  else for (const id of Object.keys(kFigures)) note(select(`#${id}`), "No sweep was seen, so there is nothing to draw.");
+}
+
+heading();
+draw(kTables);
+drawFigures();
+
+let drawn_width = window.innerWidth;
+window.addEventListener("resize", () => {
+  if (window.innerWidth === drawn_width) return; // a phone's address bar comes and goes
+  drawn_width = window.innerWidth;
+  drawFigures();
+});
+window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawFigures);

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// The run that this page shows, as locus-replay wrote it into the page (report.cpp).
+
+export const run = JSON.parse(document.getElementById("run").textContent);
+export const summary = run.summary;
+
+/** Time of the last sweep, in seconds after the first. */
+export const duration_s = run.path?.t.at(-1) ?? 0;
+
+/** The tiles of the map: centres, unit normals, and the side of a tile. */
+export const map = run.map ? decode(run.map) : {count: 0};
+
+function decode({tile_m, count, origin_m, step_m, data}) {
+  const bytes = Uint8Array.from(atob(data), (character) => character.charCodeAt(0));
+  const view = new DataView(bytes.buffer);
+  const centres = new Float32Array(3 * count), normals = new Float32Array(3 * count);
+  for (let i = 0; i < count; ++i) {
+    for (let axis = 0; axis < 3; ++axis)
+      centres[3 * i + axis] = origin_m[axis] + step_m * view.getInt16(8 * i + 2 * axis, true);
+    normals.set(unfolded(view.getInt8(8 * i + 6) / 127, view.getInt8(8 * i + 7) / 127), 3 * i);
+  }
+  return {tile_m, count, centres, normals};
+}
+
+/** A normal from its octahedral coordinates. */
+function unfolded(u, v) {
+  const z = 1 - Math.abs(u) - Math.abs(v);
+  const x = z >= 0 ? u : (1 - Math.abs(v)) * (u < 0 ? -1 : 1);
+  const y = z >= 0 ? v : (1 - Math.abs(u)) * (v < 0 ? -1 : 1);
+  const length = Math.hypot(x, y, z);
+  return [x / length, y / length, z / length];
+}

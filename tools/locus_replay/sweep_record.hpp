@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "core/odometry_estimate.hpp"
+#include "core/sweep.hpp"
+#include "daemon/sweep_processor.hpp"
+
+namespace locus::tools {
+
+/// What a lidar or a motion source was to a sweep.
+enum class SourceHealth : std::uint8_t {
+  lost,    ///< nothing, or nothing to be trusted, came from it
+  healthy, ///< could have been used
+  used
+};
+
+/// What the report draws of one sweep: a couple of hundred bytes.
+struct SweepRecord {
+  Stamp stamp;
+  Pose T_odom_base;
+  double std_m = 0; ///< of the position, as the estimate itself states it
+  double speed_mps = 0;
+  double wall_ms = 0;
+  daemon::StageTimes stages_took{};
+  TrackingState state = TrackingState::tracking;
+  SourceHealth lidars = SourceHealth::used; ///< healthy: the registration was refused
+  std::array<SourceHealth, Sweep::kMaxSources> sources{};
+};
+
+SweepRecord record_of(const daemon::ProcessedSweep& sweep);
+
+} // namespace locus::tools
