@@ -56,7 +56,20 @@ inline double ease_slope(double u) { return 30 * u * u * (1 - u) * (1 - u); }
 inline double ease_curvature(double u) { return 60 * u * (1 - u) * (1 - 2 * u); }
 inline double ease_integral(double u) { return u * u * u * u * (2.5 + u * (-3 + u)); }
 
-/// The same, 0 before and 1 after.
+/// 0 up to -rounding / 2, then rising with x, the kink at 0 rounded off.
+inline Jet rising(const Jet& x, double rounding) {
+  const double u = x.value / rounding + 0.5;
+  if (u <= 0)
+    return {};
+  return u < 1 ? chain(rounding * ease_integral(u), ease(u), ease_slope(u) / rounding, x) : x;
+}
+
+/// From 0 at x = 0 to 1 at x = length along a straight line, its kinks rounded off.
+inline Jet ramp(const Jet& x, double length, double rounding) {
+  return (1 / length) * (rising(x, rounding) - rising(x - length, rounding));
+}
+
+/// The quintic, 0 before and 1 after.
 inline Jet ease(const Jet& u) {
   if (u.value <= 0 || u.value >= 1)
     return {u.value <= 0 ? 0.0 : 1.0};

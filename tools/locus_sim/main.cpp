@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // locus-sim: a synthetic robot with exact truth to a capture folder.
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <optional>
@@ -23,7 +24,9 @@ sim::Trajectory drive(const sim::World& world, const sim::Robot& robot, const Si
   for (const sim::Slip& slip : arguments.slips)
     driving -= slip.to - slip.from; // the course goes on where it stood still
   sim::Dice dice(arguments.seed + 1);
-  const sim::PlannedCourse planned = plan_course(world.roads, robot.agility, driving, dice);
+  sim::Agility agility = robot.agility;
+  agility.cruise_mps = std::min(agility.cruise_mps, world.max_speed_mps);
+  const sim::PlannedCourse planned = plan_course(world.roads, agility, driving, dice);
   sim::Ride ride = robot.ride;
   ride.ground_m = world.ground_m;
   ride.slips = arguments.slips;

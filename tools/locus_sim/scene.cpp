@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kNowhere = std::numeric_limits<double>::infinity();
 constexpr double kFar_m = 1e30; // where no ray comes
-constexpr std::uint32_t kLeafSize = 4;
+constexpr std::size_t kLeafSize = 4;
 constexpr std::uint32_t kBranch = 0xFFFF'FFFF; // in place of the count of a leaf
 constexpr std::size_t kStackSize = 256;        // three more per level
 constexpr float kSlack_m = 1e-3F;              // boxes are larger by this: more than single precision can be wrong by
@@ -77,76 +77,109 @@ Bounds Mover::bounds() const {
   return united({own.min_m + from_m, own.max_m + from_m}, {own.min_m + to_m, own.max_m + to_m});
 }
 
+/// Sorts surfaces into a tree.
+class Scene::TreeMaker {
+ public:
+  TreeMaker(std::vector<Surface>& surfaces, std::vector<Node>& nodes) : surfaces_(surfaces), nodes_(nodes) {
+    for (const Surface& surface : surfaces) {
+      order_.push_back(static_cast<std::uint32_t>(order_.size()));
+      bounds_.push_back(bounds_of(surface));
+    }
+    area_behind_m2_.resize(surfaces.size());
+  }
+
+  void make() {
+    if (!surfaces_.empty())
+      node_over(0, order_.size());
+    std::vector<Surface> sorted;
+    std::transform(order_.begin(), order_.end(), std::back_inserter(sorted),
+                   [&](std::uint32_t i) { return surfaces_[i]; });
+    surfaces_ = std::move(sorted);
+  }
+
+ private:
+  std::uint32_t node_over(std::size_t begin, std::size_t end) {
+    const std::size_t middle = split(begin, end);
+    const std::array<std::size_t, 5> limits{begin, split(begin, middle), middle, split(middle, end), end};
+    Node node;
+    for (std::size_t lane = 0; lane < 4; ++lane) {
+      const std::size_t from = limits[lane], to = limits[lane + 1];
+      const Bounds box = bounds_over(from, to);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto i = static_cast<Eigen::Index>(axis), j = static_cast<Eigen::Index>(lane);
+        node.min_m[axis][j] = static_cast<float>(box.min_m[i]) - kSlack_m;
+        node.max_m[axis][j] = static_cast<float>(box.max_m[i]) + kSlack_m;
+      }
+      const bool is_leaf = to - from <= kLeafSize;
+      node.first[lane] = is_leaf ? static_cast<std::uint32_t>(from) : node_over(from, to);
+      node.count[lane] = is_leaf ? static_cast<std::uint32_t>(to - from) : kBranch;
+    }
+    nodes_.push_back(node);
+    return static_cast<std::uint32_t>(nodes_.size() - 1);
+  }
+
+  [[nodiscard]] const Bounds& bounds(std::size_t place) const { return bounds_[order_[place]]; }
+
+  [[nodiscard]] Bounds bounds_over(std::size_t begin, std::size_t end) const {
+    if (begin == end)
+      return {Eigen::Vector3d::Constant(kFar_m), Eigen::Vector3d::Constant(kFar_m)};
+    Bounds all = bounds(begin);
+    for (std::size_t i = begin + 1; i < end; ++i)
+      all = united(all, bounds(i));
+    return all;
+  }
+
+  /// Puts a range in order along its longest side and finds where to part it: where fewest surfaces are met, the chance
+  /// to meet a box being as its area.
+  std::size_t split(std::size_t begin, std::size_t end) {
+    if (end - begin < 2)
+      return end;
+    const auto middle_of = [](const Bounds& box) -> Eigen::Vector3d { return box.min_m + box.max_m; };
+    Bounds middles{middle_of(bounds(begin)), middle_of(bounds(begin))};
+    for (std::size_t i = begin; i < end; ++i)
+      middles = united(middles, {middle_of(bounds(i)), middle_of(bounds(i))});
+    Eigen::Index axis = 0;
+    (middles.max_m - middles.min_m).maxCoeff(&axis);
+    const auto at = [&](std::size_t place) { return order_.begin() + static_cast<std::ptrdiff_t>(place); };
+    std::stable_sort(at(begin), at(end), [&](std::uint32_t a, std::uint32_t b) {
+      return middle_of(bounds_[a])[axis] < middle_of(bounds_[b])[axis];
+    });
+    return cheapest_cut(begin, end);
+  }
+
+  std::size_t cheapest_cut(std::size_t begin, std::size_t end) {
+    Bounds box = bounds(end - 1);
+    for (std::size_t i = end; i-- > begin;) {
+      box = united(box, bounds(i));
+      area_behind_m2_[i] = area_m2(box);
+    }
+    box = bounds(begin);
+    double least = kNowhere;
+    std::size_t best = begin + 1;
+    for (std::size_t i = begin + 1; i < end; ++i) {
+      box = united(box, bounds(i - 1));
+      const double cost =
+          area_m2(box) * static_cast<double>(i - begin) + area_behind_m2_[i] * static_cast<double>(end - i);
+      if (cost < least) {
+        least = cost;
+        best = i;
+      }
+    }
+    return best;
+  }
+
+  std::vector<Surface>& surfaces_;
+  std::vector<Node>& nodes_;
+  std::vector<std::uint32_t> order_;
+  std::vector<Bounds> bounds_; ///< of the surfaces as they came
+  std::vector<double> area_behind_m2_;
+};
+
 Scene::Scene(std::vector<Surface> surfaces, std::vector<Mover> movers)
     : surfaces_(std::move(surfaces)), movers_(std::move(movers)), bounds_(bounds_of(surfaces_)) {
-  if (!surfaces_.empty())
-    build(0, static_cast<std::uint32_t>(surfaces_.size()));
+  TreeMaker(surfaces_, nodes_).make();
   std::transform(movers_.begin(), movers_.end(), std::back_inserter(mover_bounds_),
                  [](const Mover& mover) { return mover.bounds(); });
-}
-
-/// Makes the node over a range of surfaces, which it puts in order; its index.
-std::uint32_t Scene::build(std::uint32_t begin, std::uint32_t end) {
-  const std::uint32_t middle = split(begin, end);
-  const std::array<std::uint32_t, 5> limits{begin, split(begin, middle), middle, split(middle, end), end};
-  Node node;
-  for (std::size_t lane = 0; lane < 4; ++lane) {
-    const std::uint32_t first = limits[lane], count = limits[lane + 1] - first;
-    const Bounds box = bounds_of(std::span<const Surface>(surfaces_).subspan(first, count));
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto i = static_cast<Eigen::Index>(axis), j = static_cast<Eigen::Index>(lane);
-      node.min_m[axis][j] = static_cast<float>(box.min_m[i]) - kSlack_m;
-      node.max_m[axis][j] = static_cast<float>(box.max_m[i]) + kSlack_m;
-    }
-    node.first[lane] = count <= kLeafSize ? first : build(first, first + count);
-    node.count[lane] = count <= kLeafSize ? count : kBranch;
-  }
-  nodes_.push_back(node);
-  return static_cast<std::uint32_t>(nodes_.size() - 1);
-}
-
-/// Puts a range in order along its longest side and finds where to part it: where fewest surfaces are met, the chance
-/// to meet a box being as its area.
-std::uint32_t Scene::split(std::uint32_t begin, std::uint32_t end) {
-  const std::size_t count = end - begin;
-  if (count < 2)
-    return end;
-  const std::span<Surface> range = std::span(surfaces_).subspan(begin, count);
-  struct Placed {
-    Bounds bounds;
-    Surface surface;
-  };
-  std::vector<Placed> placed;
-  Bounds centers{Eigen::Vector3d::Constant(kFar_m), Eigen::Vector3d::Constant(-kFar_m)};
-  for (const Surface& surface : range) {
-    const Bounds bounds = bounds_of(surface);
-    const Eigen::Vector3d center = bounds.min_m + bounds.max_m;
-    placed.push_back({bounds, surface});
-    centers = united(centers, {center, center});
-  }
-  Eigen::Index axis = 0;
-  (centers.max_m - centers.min_m).maxCoeff(&axis);
-  std::stable_sort(placed.begin(), placed.end(), [axis](const Placed& a, const Placed& b) {
-    return a.bounds.min_m[axis] + a.bounds.max_m[axis] < b.bounds.min_m[axis] + b.bounds.max_m[axis];
-  });
-  std::transform(placed.begin(), placed.end(), range.begin(), [](const Placed& each) { return each.surface; });
-
-  std::vector<double> area_behind_m2(count);
-  Bounds box = placed.back().bounds;
-  for (std::size_t i = count; i-- > 0;)
-    area_behind_m2[i] = area_m2(box = united(box, placed[i].bounds));
-  box = placed.front().bounds;
-  double least = kNowhere;
-  std::size_t best = count / 2;
-  for (std::size_t i = 1; i < count; ++i) {
-    box = united(box, placed[i - 1].bounds);
-    const double cost = area_m2(box) * static_cast<double>(i) + area_behind_m2[i] * static_cast<double>(count - i);
-    if (cost < least) {
-      least = cost;
-      best = i;
-    }
-  }
-  return begin + static_cast<std::uint32_t>(best);
 }
 
 void Scene::cast_at_surfaces(const Ray& ray, Met& nearest) const {

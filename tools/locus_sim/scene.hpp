@@ -52,14 +52,13 @@ class Scene {
     std::array<std::uint32_t, 4> first; ///< leaf: its first surface; branch: its node
     std::array<std::uint32_t, 4> count; ///< surfaces of a leaf; kBranch for a branch
   };
+  class TreeMaker;
   struct Met {
     double range_m;
     const Surface* surface = nullptr;
     const Mover* mover = nullptr;
   };
 
-  std::uint32_t build(std::uint32_t begin, std::uint32_t end);
-  std::uint32_t split(std::uint32_t begin, std::uint32_t end);
   void cast_at_surfaces(const Ray& ray, Met& nearest) const;
   void cast_at_movers(const Ray& ray, Stamp stamp, Met& nearest) const;
 

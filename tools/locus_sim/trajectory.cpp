@@ -34,12 +34,9 @@ double ramp_s(const Slip& slip) { return std::min(kSlipRamp_s, to_seconds(slip.t
 
 /// What of a slip has gone by: the time lost to it, and how fast it is being lost.
 Jet time_lost(const Slip& slip, double since_start_s) {
-  const double ramp = ramp_s(slip), from = to_seconds(slip.from), to = to_seconds(slip.to);
-  const auto risen = [&](double since_s) -> Jet { // integral of a ramp from 0 to 1
-    const double u = std::clamp(since_s / ramp, 0.0, 1.0);
-    return {ramp * ease_integral(u) + std::max(0.0, since_s - ramp), ease(u), ease_slope(u) / ramp};
-  };
-  return risen(since_start_s - from) - risen(since_start_s - (to - ramp));
+  const double ramp = ramp_s(slip), middle = ramp / 2;
+  return rising(Jet(since_start_s - to_seconds(slip.from) - middle, 1), ramp) -
+         rising(Jet(since_start_s - to_seconds(slip.to) + middle, 1), ramp);
 }
 
 /// Position, attitude and their derivatives from those of coordinates and angles.

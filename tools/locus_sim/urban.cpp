@@ -39,13 +39,14 @@ Roads roads() {
   return roads;
 }
 
-/// Ramps start and end smoothly.
+/// Ramps, their kinks rounded; and where in the hall they lie.
 Jet ground_m(const Jet& x, const Jet& y) {
-  const auto rise = [](const Jet& at, double from, double length) { return ease((at - from) * (1 / length)); };
-  const Jet hump = (rise(x, 38, 11) - rise(x, 53, 11)) * rise(y, 91, 1);
-  const Jet on_west_ramp = 1.0 - rise(x, 8, 1.5), on_south_ramp = rise(y, 26.5, 1.5) - rise(y, 35.5, 1);
-  const Jet platform = rise(y, 6, 18) * (1.0 - rise(x, 13, 17)) * (1.0 - (1.0 - on_west_ramp) * (1.0 - on_south_ramp)) *
-                       (1.0 - rise(y, 36, 0.9));
+  constexpr double kRounding_m = 1.5;
+  const auto beyond = [](const Jet& at, double from) { return ease(at - from); }; // from there, over a metre
+  const Jet hump = (ramp(x - 38, 11, kRounding_m) - ramp(x - 53, 11, kRounding_m)) * beyond(y, 91);
+  const Jet on_west_ramp = 1.0 - beyond(x, 8), on_south_ramp = beyond(y, 26.5) - beyond(y, 35.5);
+  const Jet platform = ramp(y - 6, 18, kRounding_m) * (1.0 - ramp(x - 13, 17, kRounding_m)) *
+                       (1.0 - (1.0 - on_west_ramp) * (1.0 - on_south_ramp)) * (1.0 - beyond(y, 36));
   return kHump_m * hump + kPlatform_m * platform;
 }
 
@@ -204,7 +205,11 @@ World make_urban(std::uint64_t seed) {
   turbine_hall(build, furnish, site_roads, dice);
   boiler_hall(build, furnish, dice);
   stores(build, furnish, dice);
-  return {build.scene(), std::move(site_roads), ground_m, {.height_m = 0.004, .tilt_rad = 0.004, .wavelength_m = 3.1}};
+  return {.scene = build.scene(),
+          .roads = std::move(site_roads),
+          .ground_m = ground_m,
+          .terrain = {.height_m = 0.004, .tilt_rad = 0.004, .wavelength_m = 3.1},
+          .max_speed_mps = 1.5};
 }
 
 } // namespace locus::sim
