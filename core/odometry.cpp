@@ -38,7 +38,8 @@ constexpr double kGravityTolerance_mps2 = 0.5;
 
 constexpr int kStartRounds = 3; ///< until motion and correction of the first two sweeps agree
 
-constexpr std::size_t kLastScanBytes = 8'000'000;
+/// Room for the 16 000 voxels of a large sweep, and small enough for the second cache.
+constexpr std::size_t kLastScanBytes = 2'500'000;
 
 Vector6 sigma(double translation_m, double rotation_deg) {
   const double rotation_rad = rotation_deg * std::numbers::pi / 180.0;

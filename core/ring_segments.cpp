@@ -42,7 +42,7 @@ void RingSegments::begin_packet(std::size_t lidar, const PacketMotion& motion) {
   Lidar& at = lidars_[lidar];
   at.motion = motion;
   ++at.packet;
-  for (Bank& bank : at.banks) {
+  for (Bank& bank : at.banks()) {
     Mask abandoned;
     for (std::size_t k = 0; k < Salvo::kLasers; ++k)
       abandoned[k] = bank.count[k] > 0.0F && bank.last_packet[k] + 1 < at.packet ? -1 : 0;
@@ -66,7 +66,9 @@ RingSegments::Mask RingSegments::beginnings(const Bank& bank, const Salvo& salvo
 }
 
 std::size_t RingSegments::add(std::size_t lidar, const Salvo& salvo, const Mask& counts) {
-  Bank& bank = lidars_[lidar].banks[salvo.first_laser / Salvo::kLasers];
+  const std::size_t place = salvo.first_laser / Salvo::kLasers;
+  lidars_[lidar].banks_used = std::max(lidars_[lidar].banks_used, place + 1);
+  Bank& bank = lidars_[lidar].storage[place];
   const PacketMotion& motion = lidars_[lidar].motion;
   const std::int32_t packet = lidars_[lidar].packet;
   Mask takes = counts;
@@ -109,7 +111,7 @@ std::size_t RingSegments::add(std::size_t lidar, const Salvo& salvo, const Mask&
 }
 
 std::uint32_t RingSegments::latest(std::size_t lidar, std::size_t laser) const {
-  return lidars_[lidar].banks[laser / Salvo::kLasers].id[laser % Salvo::kLasers];
+  return lidars_[lidar].storage[laser / Salvo::kLasers].id[laser % Salvo::kLasers];
 }
 
 std::uint32_t RingSegments::open() { return opened_ < kMaxSegments ? opened_++ : kNone; }
@@ -133,7 +135,7 @@ void RingSegments::close(std::size_t lidar, Bank& bank, std::size_t laser) {
 
 void RingSegments::finish(float duration_s, std::vector<SweepPoint>& points) {
   for (std::size_t lidar = 0; lidar < lidars_.size(); ++lidar) {
-    for (Bank& bank : lidars_[lidar].banks) {
+    for (Bank& bank : lidars_[lidar].banks()) {
       for (std::size_t k = 0; k < Salvo::kLasers; ++k)
         if (bank.count[k] > 0.0F)
           close(lidar, bank, k);

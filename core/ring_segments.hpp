@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/lidar_packet.hpp"
@@ -70,8 +71,10 @@ class RingSegments {
   };
   struct Lidar {
     PacketMotion motion;
-    std::int32_t packet = 0; ///< counted from 1 in each sweep
-    std::array<Bank, LidarPacket::kMaxLasers / Salvo::kLasers> banks;
+    std::int32_t packet = 0;    ///< counted from 1 in each sweep
+    std::size_t banks_used = 0; ///< as many as the lidar has shown
+    std::array<Bank, LidarPacket::kMaxLasers / Salvo::kLasers> storage;
+    std::span<Bank> banks() { return std::span(storage).first(banks_used); }
   };
   struct Segment {
     SweepPoint point; ///< age_s still counts from the start of the sweep

@@ -41,6 +41,9 @@ constexpr float kMaxCount = 400.0F;
 
 constexpr std::size_t kEvictionAttempts = 64;
 
+/// Voxels that are looked for at a time: their waits for memory overlap.
+constexpr std::size_t kAtOnce = 64;
+
 using Upper = Eigen::Matrix<float, 6, 1>;
 const Upper kIdentity{1.0F, 0.0F, 0.0F, 1.0F, 0.0F, 1.0F};
 
@@ -111,7 +114,6 @@ const Surface* SurfaceGrid::find(VoxelIndex index) const {
 }
 
 void SurfaceGrid::find(std::span<const VoxelIndex> indices, std::span<const Surface*> surfaces) const {
-  constexpr std::size_t kAtOnce = 64;
   std::array<std::uint64_t, kAtOnce> hashes;
   const std::size_t mask = entries_.size() - 1;
   for (std::size_t begin = 0; begin < indices.size(); begin += kAtOnce) {
@@ -132,8 +134,7 @@ void SurfaceGrid::find(std::span<const VoxelIndex> indices, std::span<const Surf
   }
 }
 
-std::uint32_t SurfaceGrid::find_or_create(VoxelIndex index) {
-  const std::uint64_t hash = hash_of(index);
+std::uint32_t SurfaceGrid::find_or_create(VoxelIndex index, std::uint64_t hash) {
   const std::uint32_t found = slot_of(index, hash);
   if (found != kEmpty)
     return found;
@@ -182,11 +183,32 @@ void SurfaceGrid::erase_entry(VoxelIndex index) {
   entries_[gap] = Entry{};
 }
 
-void SurfaceGrid::insert(const Eigen::Vector3d& point_m, const Eigen::Vector3d& normal) {
-  if (!reaches(point_m))
-    return;
-  const VoxelIndex index = index_of(point_m);
-  const std::uint32_t slot = find_or_create(index);
+void SurfaceGrid::insert(std::span<const Point> points) {
+  struct Place {
+    const Point* point;
+    VoxelIndex index;
+    std::uint64_t hash;
+  };
+  std::array<Place, kAtOnce> places;
+  while (!points.empty()) {
+    std::size_t count = 0;
+    for (const Point& point : points.first(std::min(kAtOnce, points.size()))) {
+      if (!reaches(point.position_m))
+        continue;
+      const VoxelIndex index = index_of(point.position_m);
+      places[count++] = {&point, index, hash_of(index)};
+      __builtin_prefetch(&entries_[places[count - 1].hash & (entries_.size() - 1)]);
+    }
+    for (const Place& place : std::span(places).first(count))
+      if (const Entry& home = entries_[place.hash & (entries_.size() - 1)]; home.slot != kEmpty)
+        __builtin_prefetch(&moments_[home.slot], 1);
+    for (const Place& place : std::span(places).first(count))
+      add(*place.point, place.index, find_or_create(place.index, place.hash));
+    points = points.subspan(std::min(kAtOnce, points.size()));
+  }
+}
+
+void SurfaceGrid::add(const Point& point, VoxelIndex index, std::uint32_t slot) {
   Moments& moments = moments_[slot];
   if (!moments.touched) {
     moments.touched = true;
@@ -199,12 +221,12 @@ void SurfaceGrid::insert(const Eigen::Vector3d& point_m, const Eigen::Vector3d& 
     moments.normals *= 0.5F;
     moments.normal_count *= 0.5F;
   }
-  const Eigen::Vector3f offset = (point_m - centre_of(index)).cast<float>();
+  const Eigen::Vector3f offset = (point.position_m - centre_of(index)).cast<float>();
   moments.count += 1.0F;
   moments.sum += offset;
   moments.outer += upper_of_outer(offset);
-  moments.normals += upper_of_outer(normal.cast<float>());
-  moments.normal_count += normal.isZero() ? 0.0F : 1.0F;
+  moments.normals += upper_of_outer(point.normal);
+  moments.normal_count += point.normal.isZero() ? 0.0F : 1.0F;
 }
 
 Surface SurfaceGrid::fit(const Moments& moments) const {

@@ -37,9 +37,14 @@ class SurfaceGrid {
  public:
   SurfaceGrid(double leaf_m, std::size_t max_bytes);
 
-  /// Takes in a point; `normal` is unit or zero. Call refresh() before the surfaces are read again. A point out of
-  /// reach is left out.
-  void insert(const Eigen::Vector3d& point_m, const Eigen::Vector3d& normal);
+  /// A point and the unit normal of its surface, or zero.
+  struct Point {
+    Eigen::Vector3d position_m;
+    Eigen::Vector3f normal;
+  };
+
+  /// Takes in points. Call refresh() before the surfaces are read again. Points out of reach are left out.
+  void insert(std::span<const Point> points);
   /// Brings the surfaces of the voxels up to date that were written to since the last call.
   void refresh();
   void clear();
@@ -93,7 +98,8 @@ class SurfaceGrid {
 
   [[nodiscard]] std::size_t home_of(VoxelIndex index) const;
   [[nodiscard]] std::uint32_t slot_of(VoxelIndex index, std::uint64_t hash) const;
-  std::uint32_t find_or_create(VoxelIndex index);
+  std::uint32_t find_or_create(VoxelIndex index, std::uint64_t hash);
+  void add(const Point& point, VoxelIndex index, std::uint32_t slot);
   std::uint32_t take_slot();
   void erase_entry(VoxelIndex index);
   [[nodiscard]] Surface fit(const Moments& moments) const;

@@ -20,12 +20,11 @@ void SurfaceMap::insert(std::span<const SurfacePoint> points_base, const Pose& T
   const Eigen::Matrix3d R = T_map_base.R();
   fine_.protect(T_map_base.translation, kSubmapRadius_m);
   coarse_.protect(T_map_base.translation, kSubmapRadius_m);
-  for (const SurfacePoint& point : points_base) {
-    const Eigen::Vector3d position = R * point.position_m.cast<double>() + T_map_base.translation;
-    const Eigen::Vector3d normal = R * point.normal.cast<double>();
-    fine_.insert(position, normal);
-    coarse_.insert(position, normal);
-  }
+  points_map_.clear();
+  for (const auto& [position_m, normal] : points_base)
+    points_map_.push_back({R * position_m.cast<double>() + T_map_base.translation, R.cast<float>() * normal});
+  fine_.insert(points_map_);
+  coarse_.insert(points_map_);
   fine_.refresh();
   coarse_.refresh();
 }

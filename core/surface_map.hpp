@@ -41,6 +41,7 @@ class SurfaceMap {
  private:
   SurfaceGrid fine_;
   SurfaceGrid coarse_;
+  std::vector<SurfaceGrid::Point> points_map_; ///< of the sweep being inserted
 };
 
 } // namespace locus

@@ -56,6 +56,9 @@ std::optional<PacketError> Decoder::decode(std::span<const std::byte> payload, L
 
   packet.count = 0;
   for (std::size_t column = 0; column < layout_.columns; ++column) {
+    const double azimuth_rad = kRadPerCdeg * azimuth_cdeg_[column];
+    cos_column_ = static_cast<float>(std::cos(azimuth_rad));
+    sin_column_ = static_cast<float>(std::sin(azimuth_rad));
     for (std::size_t firing = 0; firing < layout_.banks * kChannels; firing += Salvo::kLasers)
       read_salvos(bytes, column, firing, packet);
   }
@@ -182,17 +185,14 @@ void Decoder::measure_turn_since_last_packet(Duration time_of_hour, double max_t
 /// Turns the column's azimuth by each firing's share of the turn (first, a small angle) and by its laser's offset.
 Decoder::Aim Decoder::take_aim(std::size_t column, std::size_t first_firing) const {
   Aim aim;
-  const double azimuth_rad = kRadPerCdeg * azimuth_cdeg_[column];
-  const auto cos_column = static_cast<float>(std::cos(azimuth_rad));
-  const auto sin_column = static_cast<float>(std::sin(azimuth_rad));
   const float turn_rad = static_cast<float>(kRadPerCdeg) * turn_cdeg_[column];
   for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
     const std::size_t i = first_firing + k;
     const float angle = firings_.share_of_column[i] * turn_rad;
     const float cos_angle = 1.0F - 0.5F * angle * angle; // at most 1.6 deg: the next terms are below 3e-8
     const float sin_angle = angle - angle * angle * angle / 6.0F;
-    const float cos_firing = cos_column * cos_angle - sin_column * sin_angle;
-    const float sin_firing = sin_column * cos_angle + cos_column * sin_angle;
+    const float cos_firing = cos_column_ * cos_angle - sin_column_ * sin_angle;
+    const float sin_firing = sin_column_ * cos_angle + cos_column_ * sin_angle;
     aim.cos_azimuth[k] = cos_firing * firings_.cos_azimuth_offset[i] - sin_firing * firings_.sin_azimuth_offset[i];
     aim.sin_azimuth[k] = sin_firing * firings_.cos_azimuth_offset[i] + cos_firing * firings_.sin_azimuth_offset[i];
   }

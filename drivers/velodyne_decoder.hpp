@@ -89,6 +89,7 @@ class Decoder {
   std::array<std::uint16_t, kBlocks> azimuth_cdeg_{}; ///< per column
   std::array<float, kBlocks> turn_cdeg_{};            ///< from each column to the next
   std::array<std::int32_t, kBlocks> column_offset_ns_{};
+  float cos_column_ = 1.0F, sin_column_ = 0.0F; ///< of the azimuth of the column at hand
   Duration duration_{};
   float mean_turn_cdeg_ = 0.0F;
   std::optional<Duration> last_time_of_hour_;

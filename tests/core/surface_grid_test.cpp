@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -11,12 +12,16 @@ namespace {
 
 constexpr double kLeaf_m = 0.5;
 constexpr std::size_t kEnoughBytes = 10'000'000;
-const Eigen::Vector3d kNoNormal = Eigen::Vector3d::Zero();
+const Eigen::Vector3f kNoNormal = Eigen::Vector3f::Zero();
+
+void insert(SurfaceGrid& grid, const Eigen::Vector3d& point_m, const Eigen::Vector3f& normal) {
+  grid.insert(std::array{SurfaceGrid::Point{point_m, normal}});
+}
 
 /// One point in the middle of each voxel of a line along x.
 void insert_voxels_along_x(SurfaceGrid& grid, int from, int to) {
   for (int i = from; i < to; ++i)
-    grid.insert({kLeaf_m * i, 0, 0}, kNoNormal);
+    insert(grid, {kLeaf_m * i, 0, 0}, kNoNormal);
   grid.refresh();
 }
 
@@ -26,7 +31,7 @@ TEST(SurfaceGrid, FindsWhatWasInserted) {
   SurfaceGrid grid(kLeaf_m, kEnoughBytes);
   const Eigen::Vector3d p{3.1, -2.2, 0.7};
   EXPECT_EQ(grid.find(grid.index_of(p)), nullptr);
-  grid.insert(p, Eigen::Vector3d::UnitX());
+  insert(grid, p, Eigen::Vector3f::UnitX());
   grid.refresh();
   const Surface* surface = grid.find(grid.index_of(p));
   ASSERT_NE(surface, nullptr);
@@ -44,17 +49,17 @@ TEST(SurfaceGrid, TheIndexIsOfTheNearestCentre) {
 
 TEST(SurfaceGrid, APointThatKnowsItsNormalIsAPlane) {
   SurfaceGrid grid(kLeaf_m, kEnoughBytes);
-  const Eigen::Vector3d normal = Eigen::Vector3d{1, 2, 2}.normalized();
-  grid.insert({0.1, 0.1, 0.1}, normal);
+  const Eigen::Vector3f normal = Eigen::Vector3f{1, 2, 2}.normalized();
+  insert(grid, {0.1, 0.1, 0.1}, normal);
   grid.refresh();
   const Surface* surface = grid.find({0, 0, 0});
   ASSERT_TRUE(surface->planar());
-  EXPECT_NEAR(std::abs(surface->normal.cast<double>().dot(normal)), 1.0, 1e-5);
+  EXPECT_NEAR(std::abs(surface->normal.dot(normal)), 1.0F, 1e-5F);
 }
 
 TEST(SurfaceGrid, APointThatDoesNotIsNone) {
   SurfaceGrid grid(kLeaf_m, kEnoughBytes);
-  grid.insert({0.1, 0.1, 0.1}, kNoNormal);
+  insert(grid, {0.1, 0.1, 0.1}, kNoNormal);
   grid.refresh();
   EXPECT_FALSE(grid.find({0, 0, 0})->planar());
 }
@@ -64,7 +69,7 @@ TEST(SurfaceGrid, OneScanLineIsNoPlane) {
   std::mt19937 random{1};
   std::normal_distribution<double> noise{0.0, 0.01};
   for (int i = -20; i <= 20; ++i)
-    grid.insert({0.01 * i, noise(random), noise(random)}, kNoNormal);
+    insert(grid, {0.01 * i, noise(random), noise(random)}, kNoNormal);
   grid.refresh();
   ASSERT_EQ(grid.size(), 1U);
   EXPECT_FALSE(grid.find({0, 0, 0})->planar());
@@ -75,8 +80,8 @@ TEST(SurfaceGrid, ThePointsOfACornerAreNoPlane) {
   std::mt19937 random{1};
   std::uniform_real_distribution<double> along{-0.24, 0.24};
   for (int i = 0; i < 100; ++i) {
-    grid.insert({-0.1, along(random), along(random)}, Eigen::Vector3d::UnitX());
-    grid.insert({along(random), -0.1, along(random)}, Eigen::Vector3d::UnitY());
+    insert(grid, {-0.1, along(random), along(random)}, Eigen::Vector3f::UnitX());
+    insert(grid, {along(random), -0.1, along(random)}, Eigen::Vector3f::UnitY());
   }
   grid.refresh();
   EXPECT_FALSE(grid.find({0, 0, 0})->planar());
@@ -88,7 +93,7 @@ TEST(SurfaceGrid, ANoisyFloorAtHeightZeroIsOneLayerOfPlanes) {
   std::uniform_real_distribution<double> along{-1.74, 1.74};
   std::normal_distribution<double> noise{0.0, 0.02};
   for (int i = 0; i < 5000; ++i)
-    grid.insert({along(random), along(random), noise(random)}, Eigen::Vector3d::UnitZ());
+    insert(grid, {along(random), along(random), noise(random)}, Eigen::Vector3f::UnitZ());
   grid.refresh();
   EXPECT_EQ(grid.size(), 49U) << "7 x 7 voxels, one above the other none";
   for (std::size_t slot = 0; slot < grid.size(); ++slot) {
@@ -102,9 +107,9 @@ TEST(SurfaceGrid, ANoisyFloorAtHeightZeroIsOneLayerOfPlanes) {
 TEST(SurfaceGrid, ALongStayDoesNotFreezeAVoxel) {
   SurfaceGrid grid(kLeaf_m, kEnoughBytes);
   for (int i = 0; i < 20'000; ++i)
-    grid.insert({0, 0, 0}, Eigen::Vector3d::UnitZ());
+    insert(grid, {0, 0, 0}, Eigen::Vector3f::UnitZ());
   for (int i = 0; i < 2000; ++i)
-    grid.insert({0, 0, 0.1}, Eigen::Vector3d::UnitZ());
+    insert(grid, {0, 0, 0.1}, Eigen::Vector3f::UnitZ());
   grid.refresh();
   EXPECT_NEAR(grid.find({0, 0, 0})->mean_m.z(), 0.1, 0.01);
 }
@@ -129,7 +134,7 @@ TEST(SurfaceGrid, WhatIsHeldCanBeFoundAfterAnyNumberOfEvictions) {
   std::mt19937 random{1};
   std::uniform_int_distribution<int> cell{-20, 20};
   for (int i = 0; i < 50'000; ++i) {
-    grid.insert(kLeaf_m * Eigen::Vector3d(cell(random), cell(random), cell(random)), kNoNormal);
+    insert(grid, kLeaf_m * Eigen::Vector3d(cell(random), cell(random), cell(random)), kNoNormal);
     if (i % 1000 == 0)
       grid.refresh();
   }
@@ -162,7 +167,7 @@ TEST(SurfaceGrid, AMapsWorthOfInsertionsInOneGoFitsTheSmallestBudget) {
   SurfaceGrid grid(kLeaf_m, 1);
   EXPECT_GT(grid.capacity(), 0U);
   for (int i = 0; i < 10'000; ++i) // without a refresh in between
-    grid.insert({kLeaf_m * i, 0, 0}, kNoNormal);
+    insert(grid, {kLeaf_m * i, 0, 0}, kNoNormal);
   grid.refresh();
   EXPECT_EQ(grid.size(), grid.capacity());
 }

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/principal_axes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+
+#include <cmath>
+#include <random>
+
+namespace locus {
+namespace {
+
+using Solver = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>;
+
+/// Variances along axes that are turned at random.
+Eigen::Matrix3d scatter(const Eigen::Vector3d& variance, unsigned seed) {
+  std::mt19937 random{seed};
+  std::normal_distribution<double> any;
+  const Eigen::Matrix3d R =
+      Eigen::Quaterniond{any(random), any(random), any(random), any(random)}.normalized().toRotationMatrix();
+  return R * variance.asDiagonal() * R.transpose();
+}
+
+template <class Real> PrincipalAxes<Real> axes_of(const Eigen::Matrix3d& m) {
+  const Eigen::Matrix<Real, 3, 3> r = m.cast<Real>();
+  return principal_axes<Real>({r(0, 0), r(0, 1), r(0, 2), r(1, 1), r(1, 2), r(2, 2)});
+}
+
+TEST(PrincipalAxes, OfPointsOnAPlaneAreThoseOfAGeneralSolver) {
+  for (unsigned seed = 0; seed < 1000; ++seed) {
+    const double middle = std::pow(10.0, -2.0 + 0.002 * seed), least = 1e-4 + 1e-4 * (seed % 100) * middle;
+    const Eigen::Matrix3d m = scatter({least, middle, 1.5 * middle}, seed);
+    const Solver truth(m);
+    const PrincipalAxes<float> axes = axes_of<float>(m);
+    ASSERT_NEAR(axes.least, truth.eigenvalues()[0], 1e-5 * middle + 1e-3 * least) << "seed " << seed;
+    ASSERT_NEAR(axes.middle, truth.eigenvalues()[1], 2e-3 * middle);
+    ASSERT_NEAR(axes.greatest, truth.eigenvalues()[2], 2e-3 * middle);
+    const Eigen::Vector3d axis{axes.x, axes.y, axes.z};
+    ASSERT_NEAR(axis.norm(), 1.0, 1e-5);
+    ASSERT_NEAR(std::abs(axis.dot(truth.eigenvectors().col(0))), 1.0, 1e-5);
+  }
+}
+
+TEST(PrincipalAxes, OfABallOrALineLookLikeNoPlane) {
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    const PrincipalAxes<double> ball = axes_of<double>(scatter({1.0, 1.0, 1.0}, seed));
+    EXPECT_GT(ball.least, 0.5 * ball.middle);
+    EXPECT_NEAR(ball.greatest, 1.0, 0.3);
+    const PrincipalAxes<double> line = axes_of<double>(scatter({1e-4, 1e-4, 1.0}, seed));
+    EXPECT_LT(line.middle, 1e-3);
+    EXPECT_NEAR(line.greatest, 1.0, 1e-3);
+  }
+}
+
+TEST(PrincipalAxes, OfOnePlaceAreFinite) {
+  const PrincipalAxes<float> axes = axes_of<float>(Eigen::Matrix3d::Zero());
+  for (const float figure : {axes.least, axes.middle, axes.greatest, axes.x, axes.y, axes.z})
+    EXPECT_EQ(figure, 0.0F);
+}
+
+} // namespace
+} // namespace locus
