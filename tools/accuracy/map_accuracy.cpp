@@ -16,6 +16,9 @@ namespace {
 using Points = std::vector<Eigen::Vector3f>;
 
 constexpr float kOutlier_m = 1.0F; ///< the contract's
+constexpr float kFinestVoxel_m = 0.05F;
+constexpr std::size_t kMaxIcpPoints = 30'000;   ///< of the map
+constexpr std::size_t kMaxTrueVoxels = 200'000; ///< of the truth: 20 MB in all
 
 /// The truth in the frame of the map, where coordinates are small enough for floats, pass after pass.
 class TruthWalker {
@@ -41,6 +44,13 @@ class TruthWalker {
   const std::function<void(double)>& progress_;
   double walked_ = 0;
 };
+
+Expected<Points, std::string> thinned_truth(TruthWalker& truth) {
+  ThinnedCloud thinned(kFinestVoxel_m, kMaxTrueVoxels);
+  if (std::optional<std::string> problem = truth.walk([&](const Eigen::Vector3f& point) { thinned.insert(point); }))
+    return *std::move(problem);
+  return thinned.centroids();
+}
 
 /// At most so many, evenly taken.
 Points some_of(std::span<const Eigen::Vector3f> points, std::size_t most) {
@@ -98,13 +108,11 @@ MapAccuracy summary_of(std::span<const float> distances_m) {
 
 Expected<MapAccuracy, std::string> map_accuracy(std::span<const Eigen::Vector3f> map_odom, const PointCloudFile& truth,
                                                 const Pose& T_truth_odom, const std::function<void(double)>& progress) {
-  constexpr std::size_t kMaxIcpPoints = 30'000, kMaxTrueVoxels = 500'000;
-  constexpr float kFinest_m = 0.05F;
   TruthWalker walker(truth, T_truth_odom.inverse(), progress);
-  ThinnedCloud thinned(kFinest_m, kMaxTrueVoxels);
-  if (std::optional<std::string> problem = walker.walk([&](const Eigen::Vector3f& point) { thinned.insert(point); }))
-    return *std::move(problem);
-  const Pose T_fitted_map = icp(some_of(map_odom, kMaxIcpPoints), thinned.centroids(), kOutlier_m);
+  const Expected<Points, std::string> thinned = thinned_truth(walker);
+  if (!thinned)
+    return thinned.error();
+  const Pose T_fitted_map = icp(some_of(map_odom, kMaxIcpPoints), *thinned, kOutlier_m);
   const Expected<std::vector<float>, std::string> distances_m = distances_to(walker, moved(map_odom, T_fitted_map));
   if (!distances_m)
     return distances_m.error();

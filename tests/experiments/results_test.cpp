@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_experiments/results.hpp"
+
+#include <fstream>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "locus_replay/failure.hpp"
+#include "replay/replay_run.hpp"
+
+namespace locus::experiments {
+namespace {
+
+Results run(const std::string& course, const std::string& configuration, double max_ape_m, double silent_s = 0) {
+  return {{"course", course},
+          {"configuration", configuration},
+          {"summary", {{"ape_m", {{"max", max_ape_m}}}}},
+          {"position_error", Results::object()},
+          {"silent_at_end_s", silent_s}};
+}
+
+Results results(const std::vector<Results>& runs) {
+  return {{"version", "1"}, {"simulated", true}, {"duration_s", 300}, {"runs", runs}};
+}
+
+std::filesystem::path saved(const std::filesystem::path& folder, const Results& results) {
+  std::filesystem::create_directories(folder);
+  std::ofstream{folder / "results.json"} << results;
+  return folder;
+}
+
+std::string error_of_merging(const std::vector<std::filesystem::path>& folders) {
+  try {
+    merged(folders);
+  } catch (const tools::Failure& failure) {
+    return failure.what();
+  }
+  return "";
+}
+
+TEST(Robustness, IsJudgedBesideTheRunWithoutFailure) {
+  Results all = results({run("beta", "locusd", 0.1), run("beta", "wio_imu_fail", 0.29), run("beta", "wio_fail", 0.31),
+                         run("beta", "lidar_drop", 0.1, 200)});
+  judge_robustness(all);
+  ASSERT_EQ(all["robustness"].size(), 1U);
+  EXPECT_EQ(all["robustness"][0]["wio_imu_fail"], "OK");
+  EXPECT_EQ(all["robustness"][0]["wio_fail"], "Errors");
+  EXPECT_EQ(all["robustness"][0]["lidar_drop"], "Stops");
+}
+
+TEST(Robustness, WithoutTheRunToCompareWithThereIsNoVerdict) {
+  Results all =
+      results({run("beta", "wio_fail", 0.3), {{"course", "alpha"}, {"configuration", "locusd"}, {"failed", "x"}}});
+  judge_robustness(all);
+  EXPECT_TRUE(all["robustness"].empty());
+}
+
+TEST(Merge, PutsTheRunsOfShardsTogether) {
+  const test::TemporaryFolder folder;
+  const auto one = saved(folder / "1", results({run("beta", "locusd", 0.1)}));
+  const auto two = saved(folder / "2", results({run("beta", "wio_fail", 0.1)}));
+  const Results all = merged({one, two});
+  EXPECT_EQ(all["runs"].size(), 2U);
+  EXPECT_EQ(all["robustness"][0]["wio_fail"], "OK") << "judged across shards";
+}
+
+TEST(Merge, RefusesWhatDoesNotBelongTogether) {
+  const test::TemporaryFolder folder;
+  const auto one = saved(folder / "1", results({run("beta", "locusd", 0.1)}));
+  Results longer = results({run("beta", "wio_fail", 0.1)});
+  longer["duration_s"] = 600;
+  EXPECT_NE(error_of_merging({one, saved(folder / "2", longer)}).find("duration_s differs"), std::string::npos);
+  EXPECT_NE(error_of_merging({one, one}).find("beta/locusd is in another folder too"), std::string::npos);
+  EXPECT_NE(error_of_merging({folder / "none"}).find("no results of locus-experiments"), std::string::npos);
+  EXPECT_NE(error_of_merging({saved(folder / "3", Results::array())}).find("no results"), std::string::npos);
+}
+
+} // namespace
+} // namespace locus::experiments

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_experiments/arguments.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <thread>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "locus_replay/failure.hpp"
+
+namespace locus::experiments {
+
+using tools::ExitStatus;
+using tools::Failure;
+
+std::optional<Shard> Shard::parse(const std::string& text) {
+  Shard shard{0, 0};
+  const char* const end = text.data() + text.size();
+  const auto [slash, error] = std::from_chars(text.data(), end, shard.index);
+  if (error != std::errc{} || slash == end || *slash != '/')
+    return std::nullopt;
+  const auto [stop, second_error] = std::from_chars(slash + 1, end, shard.count);
+  if (second_error != std::errc{} || stop != end || shard.index < 1 || shard.index > shard.count)
+    return std::nullopt;
+  --shard.index;
+  return shard;
+}
+
+std::optional<Arguments> parse_arguments(int argc, char** argv) {
+  Arguments arguments;
+  arguments.jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  std::string shard = "1/1";
+
+  CLI::App app{
+      "The evaluation of the LOCUS paper, on simulated courses or on recordings of yours: one page of figures.",
+      "locus-experiments"};
+  app.add_option("RECORDING", arguments.recordings,
+                 "Capture folders to run on; without any, the courses of the paper are simulated");
+  app.add_option("-o,--output", arguments.output,
+                 "Folder for experiments.html, results.json and the runs; made if need be")
+      ->required()
+      ->type_name("DIR");
+  app.add_option("--duration", arguments.duration_s, "Of each simulated course, seconds; the paper's last 3600")
+      ->type_name("S")
+      ->capture_default_str()
+      ->check(CLI::Range(30, 36'000));
+  app.add_option("--pace", arguments.pace_s, "Of each run at the pace of the recording, seconds")
+      ->type_name("S")
+      ->capture_default_str()
+      ->check(CLI::Range(10, 36'000));
+  app.add_option("--jobs", arguments.jobs, "Runs at the same time; those that measure speed run alone")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1024));
+  auto* shard_option = app.add_option("--shard", shard, "Does only the I-th of N parts, for --merge")->type_name("I/N");
+  app.add_option("--merge", arguments.merge, "Makes one page of the output folders of all parts, and runs nothing")
+      ->type_name("DIR...")
+      ->excludes(shard_option);
+  app.add_flag("--keep-captures", arguments.keep_captures, "Leaves the simulated courses in DIR/courses");
+  app.add_flag("--quiet", arguments.quiet, "Prints errors alone");
+  app.set_version_flag("--version", "locus-experiments " LOCUS_VERSION);
+  app.footer("Examples:\n"
+             "  locus-experiments -o experiments\n"
+             "  locus-experiments --shard 1/2 -o part1 & locus-experiments --shard 2/2 -o part2; wait\n"
+             "  locus-experiments --merge part1 part2 -o experiments\n"
+             "  locus-experiments -o fleet robot1/ robot2/ robot3/");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& asked_for_text) {
+    app.exit(asked_for_text);
+    return std::nullopt;
+  } catch (const CLI::ParseError& error) {
+    throw Failure(ExitStatus::wrong_usage, fmt::format("{}; see locus-experiments --help", error.what()));
+  }
+  const std::optional<Shard> parsed = Shard::parse(shard);
+  if (!parsed)
+    throw Failure(ExitStatus::wrong_usage, fmt::format("--shard {}: must be I/N with I from 1 to N, as in 2/8", shard));
+  arguments.shard = *parsed;
+  return arguments;
+}
+
+} // namespace locus::experiments

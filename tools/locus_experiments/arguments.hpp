@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace locus::experiments {
+
+/// One part of the runs, for one of several machines.
+struct Shard {
+  std::size_t index = 0; ///< 0..count-1
+  std::size_t count = 1;
+
+  /// "2/8" is the second of eight. Nothing if it is no such thing.
+  static std::optional<Shard> parse(const std::string& text);
+  [[nodiscard]] bool has(std::size_t run) const { return run % count == index; }
+};
+
+/// What the user asked for.
+struct Arguments {
+  std::filesystem::path output;
+  std::vector<std::filesystem::path> recordings; ///< capture folders; empty: the paper's courses, simulated
+  std::vector<std::filesystem::path> merge;      ///< folders of finished shards; empty: run
+  int duration_s = 300;                          ///< of a simulated course
+  int pace_s = 60;                               ///< of a run at the pace of the recording
+  int jobs = 1;
+  Shard shard;
+  bool keep_captures = false;
+  bool quiet = false;
+};
+
+/// Nothing where help or version were asked for and have been printed. Throws tools::Failure.
+std::optional<Arguments> parse_arguments(int argc, char** argv);
+
+} // namespace locus::experiments

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+// locus-experiments: the evaluation of the LOCUS paper in one page.
+#include <algorithm>
+#include <exception>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "locus_experiments/arguments.hpp"
+#include "locus_experiments/child_process.hpp"
+#include "locus_experiments/conductor.hpp"
+#include "locus_experiments/loam_features.hpp"
+#include "locus_experiments/measurement.hpp"
+#include "locus_experiments/plan.hpp"
+#include "locus_experiments/results.hpp"
+#include "locus_replay/failure.hpp"
+#include "locus_replay/replay_program.hpp"
+#include "locus_replay/say.hpp"
+
+namespace locus::experiments {
+namespace {
+
+using tools::ExitStatus;
+using tools::Failure;
+
+/// How much faster than the recording things go, roughly: for the progress bar.
+constexpr double kSimulationSpeed = 5, kReplaySpeed = 30;
+
+/// First argument of the children that run locus-replay with LOAM's points in place of the filters.
+constexpr std::string_view kLoamReplay = "replay-with-loam-features";
+
+/// A program of the same build or package as this one.
+std::string sibling(const char* name) {
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / name;
+  if (!std::filesystem::exists(program))
+    throw Failure(ExitStatus::failed, fmt::format("{}: is not there; install locus-tools whole", program.string()));
+  return program.string();
+}
+
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error)
+    throw Failure(ExitStatus::failed, fmt::format("{}: the folder cannot be made ({}); choose another with -o",
+                                                  folder.string(), error.message()));
+}
+
+/// The plan carried out, and what came of it.
+class Experiments {
+ public:
+  Experiments(const Arguments& arguments, Plan plan)
+      : arguments_(arguments), plan_(std::move(plan)), replay_(sibling("locus-replay")) {}
+
+  Results carry_out() {
+    simulate();
+    replay();
+    return results();
+  }
+
+ private:
+  void simulate();
+  void replay();
+  void carry_out(const Run& run);
+  [[nodiscard]] std::optional<std::string> why_impossible(const Run& run) const;
+  [[nodiscard]] const Course& course_of(const Run& run) const {
+    return *std::ranges::find(plan_.courses, run.course, &Course::name);
+  }
+  [[nodiscard]] Results results() const;
+
+  const Arguments& arguments_;
+  Plan plan_;
+  std::string replay_;
+  std::mutex mutex_;
+  std::map<std::string, std::string> broken_courses_; ///< by name, why
+  std::map<std::string, Results> done_;               ///< by Run::id()
+};
+
+void Experiments::simulate() {
+  std::vector<Task> tasks;
+  for (const Course& course : plan_.courses) {
+    if (course.simulation.empty())
+      continue;
+    make_folder(course.folder);
+    std::vector<std::string> command{sibling("locus-sim")};
+    command.insert(command.end(), course.simulation.begin(), course.simulation.end());
+    command.insert(command.end(), {"-o", course.folder.string()});
+    const std::filesystem::path log = course.folder.string() + ".log";
+    tasks.push_back({"simulated " + course.name, arguments_.duration_s / kSimulationSpeed, false, [=, this, &course] {
+                       if (const auto problem = run_program(command, log)) {
+                         const std::lock_guard lock(mutex_);
+                         broken_courses_[course.name] = *problem;
+                       }
+                     }});
+  }
+  conduct(tasks, arguments_.jobs, arguments_.quiet);
+}
+
+void Experiments::replay() {
+  std::vector<Task> tasks;
+  for (const Run& run : plan_.runs) {
+    const bool paced = run.paced_cpus > 0;
+    tasks.push_back({"ran " + run.id(), paced ? arguments_.pace_s : arguments_.duration_s / kReplaySpeed, paced,
+                     [&run, this] { carry_out(run); }});
+  }
+  conduct(tasks, arguments_.jobs, arguments_.quiet);
+}
+
+std::optional<std::string> Experiments::why_impossible(const Run& run) const {
+  if (const auto broken = broken_courses_.find(run.course); broken != broken_courses_.end())
+    return broken->second;
+  if (const auto cpus = usable_cpus().size(); static_cast<std::size_t>(run.paced_cpus) > cpus)
+    return fmt::format("needs {} processors, there is {}", run.paced_cpus, cpus);
+  return std::nullopt;
+}
+
+void Experiments::carry_out(const Run& run) {
+  const Course& course = course_of(run);
+  const std::filesystem::path folder = arguments_.output / "runs" / run.course / run.configuration;
+  Results result;
+  try {
+    make_folder(folder);
+    std::vector<std::string> command{replay_};
+    if (run.loam_features)
+      command = {sibling("locus-experiments"), std::string{kLoamReplay}};
+    command.insert(command.end(), {"--quiet", "-o", folder.string()});
+    if (run.paced_cpus == 0)
+      command.insert(command.end(), {"--threads", "1"}); // the result is the same, and other runs have the other cores
+    command.insert(command.end(), run.options.begin(), run.options.end());
+    command.push_back(course.folder.string());
+    std::vector<int> cpus;
+    if (run.paced_cpus > 0) {
+      cpus = usable_cpus();
+      cpus.resize(std::min(cpus.size(), static_cast<std::size_t>(run.paced_cpus)));
+    }
+    std::optional<std::string> problem = why_impossible(run);
+    if (!problem)
+      problem = run_program(command, folder / "log", cpus);
+    result = problem ? Results{{"course", run.course}, {"configuration", run.configuration}, {"failed", *problem}}
+                     : measurement(run, folder, course);
+  } catch (const std::exception& error) {
+    result = {{"course", run.course}, {"configuration", run.configuration}, {"failed", error.what()}};
+  }
+  const std::lock_guard lock(mutex_);
+  done_[run.id()] = std::move(result);
+}
+
+Results Experiments::results() const {
+  Results results{{"version", LOCUS_VERSION},
+                  {"simulated", arguments_.recordings.empty()},
+                  {"duration_s", arguments_.recordings.empty() ? Results(arguments_.duration_s) : Results(nullptr)},
+                  {"runs", Results::array()}};
+  for (const Run& run : plan_.runs)
+    results["runs"].push_back(done_.at(run.id()));
+  judge_robustness(results);
+  return results;
+}
+
+/// Each failed run in a line of its own; nothing if all is well.
+std::string failures_in(const Results& results) {
+  std::string lines;
+  for (const Results& run : results.at("runs")) {
+    if (run.contains("failed"))
+      lines += fmt::format("{}{}/{}: {}", lines.empty() ? "" : "\n", run.at("course").get<std::string>(),
+                           run.at("configuration").get<std::string>(), run.at("failed").get<std::string>());
+  }
+  return lines;
+}
+
+void run(const Arguments& arguments) {
+  make_folder(arguments.output);
+  const Results results =
+      arguments.merge.empty() ? Experiments(arguments, make_plan(arguments)).carry_out() : merged(arguments.merge);
+  write_results(arguments.output, results);
+  if (!arguments.keep_captures)
+    std::filesystem::remove_all(arguments.output / "courses");
+  if (!arguments.quiet)
+    fmt::print("results in {}\n", (arguments.output / "experiments.html").string());
+  if (const std::string failures = failures_in(results); !failures.empty())
+    throw Failure(ExitStatus::failed, failures);
+}
+
+} // namespace
+} // namespace locus::experiments
+
+int main(int argc, char** argv) {
+  using namespace locus::experiments;
+  const auto say = [](const char* what) { locus::tools::say("locus-experiments", what); };
+  if (argc > 1 && argv[1] == kLoamReplay)
+    return locus::tools::replay_program(argc - 1, argv + 1, keep_loam_features);
+  try {
+    if (const std::optional<Arguments> arguments = parse_arguments(argc, argv))
+      run(*arguments);
+    return static_cast<int>(ExitStatus::done);
+  } catch (const Failure& failure) {
+    say(failure.what());
+    return static_cast<int>(failure.status());
+  } catch (const std::exception& error) {
+    say(error.what());
+    return static_cast<int>(ExitStatus::failed);
+  }
+}

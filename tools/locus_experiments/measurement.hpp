@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include <nlohmann/json.hpp>
+
+#include "locus_experiments/plan.hpp"
+
+namespace locus::experiments {
+
+/// What a run says of itself and how far it was from the truth, as it stands in results.json: its summary.json, the
+/// position error over time (at most a few hundred points) and its quantiles, and when it fell silent. Throws
+/// tools::Failure where the run has not left its files.
+nlohmann::ordered_json measurement(const Run& run, const std::filesystem::path& folder, const Course& course);
+
+/// The processor, for figures from several machines.
+std::string machine_name();
+
+} // namespace locus::experiments

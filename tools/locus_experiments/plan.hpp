@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "locus_experiments/arguments.hpp"
+
+namespace locus::experiments {
+
+/// Where a robot drives.
+struct Course {
+  std::string name;
+  std::filesystem::path folder;        ///< the capture
+  std::vector<std::string> simulation; ///< options of locus-sim that make it; empty for a recording
+};
+
+/// One run of locus-replay.
+struct Run {
+  std::string course;
+  std::string configuration;        ///< what it is called in the results
+  std::vector<std::string> options; ///< of locus-replay
+  int paced_cpus = 0;               ///< at the pace of the recording on so many processors; 0: as fast as can be
+  bool loam_features = false;       ///< LOAM's points in place of the filters
+
+  [[nodiscard]] std::string id() const { return course + '/' + configuration; }
+};
+
+struct Plan {
+  std::vector<Course> courses;
+  std::vector<Run> runs;
+};
+
+/// Settings of the paper's Section II and Table IV as --set options: what paper-husky.yaml says beyond husky.yaml.
+const std::vector<std::string>& paper_settings();
+
+/// The paper's experiments, or as much of them as a recording allows; of these the part of one shard, with the courses
+/// that it needs.
+Plan make_plan(const Arguments& arguments);
+
+} // namespace locus::experiments

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_experiments/results.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <set>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "locus_experiments/page.hpp"
+#include "locus_replay/failure.hpp"
+#include "locus_replay/output_file.hpp"
+
+namespace locus::experiments {
+namespace {
+
+using tools::ExitStatus;
+using tools::Failure;
+
+constexpr const char* kFileName = "results.json";
+
+std::string id_of(const Results& run) {
+  return run.at("course").get<std::string>() + '/' + run.at("configuration").get<std::string>();
+}
+
+Results read_results(const std::filesystem::path& folder) {
+  std::ifstream stream{folder / kFileName};
+  Results results = Results::parse(stream, nullptr, false);
+  if (!results.is_object() || !results.contains("runs") || !results.at("runs").is_array())
+    throw Failure(ExitStatus::failed, fmt::format("{}: no results of locus-experiments; name the folder that it was "
+                                                  "given with -o",
+                                                  (folder / kFileName).string()));
+  return results;
+}
+
+const Results* find(const Results& runs, const std::string& course, std::string_view configuration) {
+  const auto found = std::ranges::find_if(runs, [&](const Results& run) {
+    return run.at("course") == course && run.at("configuration") == configuration && !run.contains("failed");
+  });
+  return found == runs.end() ? nullptr : &*found;
+}
+
+std::string verdict(const Results& failed, const Results& reference) {
+  constexpr double kSilent_s = 1.0, kNegligible_m = 0.2;
+  if (failed.at("silent_at_end_s").get<double>() > reference.at("silent_at_end_s").get<double>() + kSilent_s)
+    return "Stops";
+  const auto max_m = [](const Results& run) { return run.at("summary").at("ape_m").at("max").get<double>(); };
+  return max_m(failed) > max_m(reference) + kNegligible_m ? "Errors" : "OK";
+}
+
+} // namespace
+
+Results merged(const std::vector<std::filesystem::path>& folders) {
+  Results all;
+  std::set<std::string> seen;
+  for (const std::filesystem::path& folder : folders) {
+    Results part = read_results(folder);
+    if (all.is_null()) {
+      all = part;
+      all["runs"] = Results::array();
+    }
+    for (const char* key : {"version", "simulated", "duration_s"}) {
+      if (all.value(key, Results{}) != part.value(key, Results{}))
+        throw Failure(ExitStatus::failed,
+                      fmt::format("{}: its {} differs from that of {}; merge the shards of one experiment",
+                                  (folder / kFileName).string(), key, (folders.front() / kFileName).string()));
+    }
+    for (const Results& run : part.at("runs")) {
+      if (!seen.insert(id_of(run)).second)
+        throw Failure(ExitStatus::failed, fmt::format("{}: {} is in another folder too; name each shard once",
+                                                      (folder / kFileName).string(), id_of(run)));
+      all["runs"].push_back(run);
+    }
+  }
+  judge_robustness(all);
+  return all;
+}
+
+void judge_robustness(Results& results) {
+  Results rows = Results::array();
+  const Results& runs = results.at("runs");
+  for (const Results& reference : runs) {
+    if (reference.at("configuration") != "locusd" || !reference.contains("position_error"))
+      continue;
+    const auto course = reference.at("course").get<std::string>();
+    Results row{{"course", course}};
+    for (const char* failure : {"wio_imu_fail", "wio_fail", "lidar_drop"}) {
+      if (const Results* run = find(runs, course, failure))
+        row[failure] = verdict(*run, reference);
+    }
+    if (row.size() > 1)
+      rows.push_back(std::move(row));
+  }
+  results["robustness"] = std::move(rows);
+}
+
+void write_results(const std::filesystem::path& folder, const Results& results) {
+  const std::string text = results.dump(1, ' ', false, Results::error_handler_t::replace);
+  tools::OutputFile json(folder / kFileName);
+  json.print("{}\n", text);
+  json.close();
+  write_page(folder / "experiments.html", results);
+}
+
+} // namespace locus::experiments

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+namespace locus::experiments {
+
+/// What results.json holds: {"version", "simulated", "duration_s", "runs": [...], "robustness": [...]}. A run is a
+/// measurement(), or its course and configuration with "failed", the reason why there is none.
+using Results = nlohmann::ordered_json;
+
+/// Puts the runs of several shards together. Throws tools::Failure where a folder holds no results, where two hold the
+/// same run, or where they do not belong together.
+Results merged(const std::vector<std::filesystem::path>& folders);
+
+/// Table III from the runs: what each failure did, beside the run of the same course without it.
+///
+/// The paper's words are taken as: Stops, no odometry in the last second; Errors, the largest position error has grown
+/// by more than 20 cm; OK, the rest.
+void judge_robustness(Results& results);
+
+/// Writes results.json and experiments.html. Throws tools::Failure.
+void write_results(const std::filesystem::path& folder, const Results& results);
+
+} // namespace locus::experiments

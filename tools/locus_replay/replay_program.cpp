@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_replay/replay_program.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "config/config_yaml.hpp"
+#include "daemon/ingest.hpp"
+#include "daemon/live_pipeline.hpp"
+#include "daemon/paced_input.hpp"
+#include "daemon/sweep_processor.hpp"
+#include "locus_replay/arguments.hpp"
+#include "locus_replay/failure.hpp"
+#include "locus_replay/motion_recordings.hpp"
+#include "locus_replay/recording.hpp"
+#include "locus_replay/results.hpp"
+#include "locus_replay/say.hpp"
+#include "locus_replay/truth.hpp"
+
+namespace locus::tools {
+namespace {
+
+using daemon::MachineTime;
+
+void say(const std::string& lines) { tools::say("locus-replay", lines); }
+
+Config config_or_fail(Expected<Config, ConfigErrors> config) {
+  if (!config)
+    throw Failure(ExitStatus::wrong_usage, fmt::format("{}", fmt::join(config.error(), "\n")));
+  return *config;
+}
+
+Isa isa_or_fail(const std::string& name) {
+  const std::optional<Isa> isa = isa_from_string(name);
+  if (!isa || !is_supported(*isa))
+    throw Failure(ExitStatus::wrong_usage,
+                  fmt::format("LOCUS_ISA={}: {}; unset it, or choose one of {} that this processor has", name,
+                              isa ? "this processor cannot run it" : "no such instruction set",
+                              fmt::join(kIsaNames, ", ")));
+  return *isa;
+}
+
+Config configuration(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
+  Config config;
+  if (!file.empty())
+    config = config_or_fail(load_config(file));
+  config = config_or_fail(override_config(config, overrides));
+  if (const char* const isa = std::getenv("LOCUS_ISA"))
+    config.odometry.isa = isa_or_fail(isa);
+  return config;
+}
+
+void check_faults(const std::vector<Fault>& faults, const Config& config) {
+  std::vector<FaultTarget> targets;
+  for (const LidarOptions& lidar : config.lidars)
+    targets.push_back({lidar.name, FaultTarget::Kind::lidar});
+  for (const MotionSourceOptions& source : config.odometry.motion_sources)
+    targets.push_back(
+        {source.name, source.kind == SourceKind::imu ? FaultTarget::Kind::imu : FaultTarget::Kind::odometry});
+  for (const Fault& fault : faults) {
+    if (const auto problem = fault_problem(fault, targets))
+      throw Failure(ExitStatus::wrong_usage, *problem);
+  }
+}
+
+/// As fast as the machine can; the same bits on every run.
+void replay(const Config& config, LidarRouter lidars, Recording& recording, Results& results, const SweepStage& stage) {
+  daemon::SweepCounters counters;
+  daemon::SweepProcessor processor(config.odometry);
+  daemon::Ingest ingest(config, std::move(lidars), [&](Sweep& sweep, const daemon::SweepCut& cut) {
+    if (stage)
+      stage(sweep);
+    const daemon::ProcessedSweep done = processor.process(sweep, cut);
+    ++counters.seen;
+    ++(done.estimate.failed ? counters.failed : counters.processed);
+    results.take(done);
+  });
+  for (bool more = true; more;) {
+    const daemon::Input input = recording.next(Duration::zero());
+    ingest.take(input);
+    more = !std::holds_alternative<daemon::EndOfInput>(input);
+  }
+  results.finish(ingest, processor, counters);
+}
+
+/// At the pace of the recording or a multiple of it, through the threads of the daemon.
+void replay_live(const Config& config, LidarRouter lidars, Recording& recording, double speed, Results& results) {
+  constexpr Duration kPatience = std::chrono::milliseconds{100};
+  daemon::PacedInput paced(recording, speed);
+  daemon::LivePipeline pipeline(config, std::move(lidars), paced, speed);
+  while (!pipeline.finished()) {
+    if (const auto done = pipeline.next(kPatience))
+      results.take(*done);
+  }
+  pipeline.stop();
+  results.finish(pipeline.ingest(), pipeline.processor(), pipeline.counters());
+}
+
+void run(const Arguments& arguments, const SweepStage& stage) {
+  const MachineTime begin = MachineTime::now();
+  const CaptureFolder folder = value_or_fail(CaptureFolder::find(arguments.capture), ExitStatus::failed);
+  const std::filesystem::path& config_file = arguments.config.empty() ? folder.config : arguments.config;
+  const Config config = configuration(config_file, arguments.overrides);
+  check_faults(arguments.faults, config);
+  LidarRouter lidars = value_or_fail(LidarRouter::open(config.lidars), ExitStatus::wrong_usage);
+
+  Capture capture = value_or_fail(Capture::open(folder.lidar), ExitStatus::failed);
+  std::vector<std::string> warnings;
+  std::vector<MotionRecording> motion = read_motion(arguments, folder, config, !config_file.empty(), warnings);
+  for (const std::string& warning : warnings)
+    say("warning: " + warning);
+
+  Truth truth(arguments, folder);
+  const PlayOptions options{arguments.start, arguments.duration, arguments.faults, config.sweep.seed};
+  Recording recording(std::move(capture), std::move(motion), config, lidars, options);
+  Results results(arguments, config, recording, std::move(truth), begin);
+  if (arguments.realtime_speed)
+    replay_live(config, std::move(lidars), recording, *arguments.realtime_speed, results);
+  else
+    replay(config, std::move(lidars), recording, results, stage);
+  for (const std::string& warning : recording.capture().warnings())
+    say("warning: " + warning);
+}
+
+} // namespace
+
+int replay_program(int argc, char** argv, const SweepStage& stage) {
+  try {
+    if (const std::optional<Arguments> arguments = parse_arguments(argc, argv))
+      run(*arguments, stage);
+    return static_cast<int>(ExitStatus::done);
+  } catch (const Failure& failure) {
+    say(failure.what());
+    return static_cast<int>(failure.status());
+  } catch (const std::exception& error) { // out of memory or threads
+    say(error.what());
+    return static_cast<int>(ExitStatus::failed);
+  }
+}
+
+} // namespace locus::tools
