@@ -30,10 +30,9 @@ export function leftAxis(svg, scale, {x, width, count}) {
 
 /** Samples of what the figure draws, each beside its name: `draw` gets an SVG of 22 by 12. */
 export function legend(figure, entries) {
-  const items = figure.select(".legend").selectAll("span").data(entries).join("span");
+  const items = figure.select(".legend").html("").selectAll("span").data(entries).join("span");
   items.each(function ({name, draw}) {
     const item = select(this);
-    item.text("");
     if (draw) item.append("svg").attr("width", 22).attr("height", 12).attr("aria-hidden", "true").call(draw);
     item.append("span").text(name);
   });

@@ -29,16 +29,13 @@ function makeView(figure) {
     note(figure, "The map is empty: no sweep showed a surface.");
     return false;
   }
-  let renderer;
-  try {
-    // With the buffer kept, "save image" works, and a test can look at it.
-    renderer = new THREE.WebGLRenderer({antialias: true, alpha: true, preserveDrawingBuffer: true});
-  } catch (error) {
-    note(figure, "This browser offers no WebGL, which the map in space needs. The walls are seen in the figures of the path; " +
+  if (!document.createElement("canvas").getContext("webgl")) {
+    note(figure, "This browser offers no WebGL, which the map in space needs. Its walls are drawn in the path from above; " +
                  "map.pcd beside this report opens in any viewer of point clouds.");
     return false;
   }
-  return new View(figure, renderer);
+  // With the buffer kept, "save image" works, and a test can look at it.
+  return new View(figure, new THREE.WebGLRenderer({antialias: true, alpha: true, preserveDrawingBuffer: true}));
 }
 
 class View {
@@ -56,7 +53,7 @@ class View {
     this.here.renderOrder = 3;
     this.bounds = bounds();
     const size_m = this.bounds.getSize(new THREE.Vector3());
-    this.oblique = size_m.x >= size_m.y ? [-0.35, -0.8, 0.75] : [0.8, -0.35, 0.75]; // the long side across the page
+    this.oblique = obliqueView(size_m);
 
     this.box.append(renderer.domElement);
     select(renderer.domElement).attr("role", "img").attr("tabindex", 0)
@@ -150,12 +147,26 @@ function bounds() {
   return box;
 }
 
+/** From above a long side, the one from where more of the tiles show their faces. */
+function obliqueView({x, y}) {
+  const along = x >= y ? [0.35, 0.8] : [0.8, 0.35];
+  const directions = [[1, 1], [1, -1], [-1, 1], [-1, -1]].map(([a, b]) => [a * along[0], b * along[1], 0.75]);
+  const faces = directions.map((direction) => {
+    let facing = 0;
+    for (let i = 0; i < 3 * map.count; i += 3)
+      facing += map.normals[i] * direction[0] + map.normals[i + 1] * direction[1] + map.normals[i + 2] * direction[2] > 0;
+    return facing;
+  });
+  return directions[faces.indexOf(Math.max(...faces))];
+}
+
 const corners = ({min, max}) => [min.x, max.x].flatMap((x) => [min.y, max.y].flatMap((y) => [min.z, max.z].map((z) => new THREE.Vector3(x, y, z))));
 
 const kTileShader = {
   vertex: `
     precision highp float;
     uniform mat4 modelViewMatrix, projectionMatrix;
+    uniform vec3 cameraPosition;
     uniform float side, low, high;
     uniform vec3 floor_tint;
     uniform sampler2D ramp;
@@ -165,7 +176,7 @@ const kTileShader = {
       vec3 level = normalize(cross(abs(facing.z) < 0.9 ? vec3(0, 0, 1) : vec3(1, 0, 0), facing));
       vec3 upright = cross(facing, level);
       vec3 corner = centre + side * (position.x * level + position.y * upright);
-      float light = 0.72 + 0.28 * dot(facing, normalize(vec3(-0.45, -0.25, 0.85)));
+      float light = 0.6 + 0.4 * abs(dot(facing, normalize(cameraPosition - centre)));
       vec3 by_height = texture2D(ramp, vec2(clamp((centre.z - low) / (high - low), 0.005, 0.995), 0.5)).rgb;
       tint = mix(light * by_height, floor_tint, 0.5 * smoothstep(0.6, 0.9, facing.z)); // floors stand back behind walls
       gl_Position = projectionMatrix * modelViewMatrix * vec4(corner, 1.0);
@@ -173,10 +184,13 @@ const kTileShader = {
   fragment: `
     precision mediump float;
     varying vec3 tint;
-    void main() { gl_FragColor = vec4(tint, 1.0); }`,
+    void main() {
+      if (!gl_FrontFacing && mod(gl_FragCoord.x, 4.0) + mod(gl_FragCoord.y, 4.0) > 1.5) discard;
+      gl_FragColor = vec4(tint, 1.0);
+    }`,
 };
 
-/** One square for all, and where each of its copies lies. Their backs are not drawn: one looks into rooms from outside. */
+/** One square for all, and where each of its copies lies. Their backs are a veil: one looks into rooms from outside. */
 function makeTiles({low, high}) {
   const geometry = new THREE.InstancedBufferGeometry();
   const corners = [-0.5, -0.5, 0, 0.5, -0.5, 0, 0.5, 0.5, 0, -0.5, 0.5, 0];
@@ -187,6 +201,7 @@ function makeTiles({low, high}) {
   const material = new THREE.RawShaderMaterial({
     vertexShader: kTileShader.vertex,
     fragmentShader: kTileShader.fragment,
+    side: THREE.DoubleSide,
     uniforms: {side: {value: kOverlap * map.tile_m}, floor_tint: {value: new THREE.Color()}, low: {value: low}, high: {value: high}, ramp: {value: rampTexture()}},
   });
   const tiles = new THREE.Mesh(geometry, material);

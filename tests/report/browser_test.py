@@ -1,0 +1,269 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""browser_test.py SAMPLE_REPORTS: what headless Chromium makes of the reports that this program writes.
+
+Set LOCUS_SCREENSHOTS to a folder to see what it saw.
+"""
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+try:
+    from selenium import webdriver
+    from selenium.webdriver import ActionChains
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.support.wait import WebDriverWait
+except ImportError as error:
+    print(f"SKIPPED: {error}; install python3-selenium", file=sys.stderr)
+    sys.exit(77)
+
+CHROMIUM, DRIVER = "/usr/bin/chromium", "/usr/bin/chromedriver"
+for program, package in (CHROMIUM, "chromium"), (DRIVER, "chromium-driver"):
+    if not os.access(program, os.X_OK):
+        print(f"SKIPPED: {program} is not there; install {package}", file=sys.stderr)
+        sys.exit(77)
+
+FIGURES = {"plan", "map", "side", "boxes", "timeline"}
+TABLES = {"stages", "packets", "sources", "configuration"}
+
+# How many colours the picture on a canvas has, and which share of it is painted.
+LOOK_AT_CANVAS = """
+  const [source] = arguments, copy = document.createElement("canvas");
+  copy.width = source.width; copy.height = source.height;
+  const context = copy.getContext("2d");
+  context.drawImage(source, 0, 0);
+  const pixels = new Uint32Array(context.getImageData(0, 0, copy.width, copy.height).data.buffer);
+  let sum = 0;
+  for (const pixel of pixels) sum = (31 * sum + pixel) | 0;
+  return {colours: new Set(pixels).size, painted: pixels.filter((pixel) => pixel !== 0).length / pixels.length, sum};
+"""
+
+# Contrast of two colours after WCAG 2.
+CONTRAST = """
+  const [names] = arguments, style = getComputedStyle(document.documentElement);
+  const luminance = (name) => {
+    const [r, g, b] = style.getPropertyValue("--" + name).trim().match(/[0-9a-f]{2}/g)
+        .map((part) => parseInt(part, 16) / 255).map((c) => (c <= 0.03928 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  const [low, high] = names.map(luminance).sort((a, b) => a - b);
+  return (high + 0.05) / (low + 0.05);
+"""
+
+
+class Browser:
+    """One page in a window of its own, closed at the end of a with statement."""
+
+    def __init__(self, page, width=1280, dark=False, webgl=True):
+        self.profile = tempfile.mkdtemp(prefix="locus-report-profile-")
+        options = webdriver.ChromeOptions()
+        options.binary_location = CHROMIUM
+        graphics = (["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] if webgl
+                    else ["--disable-gpu", "--disable-3d-apis"])
+        for argument in ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-quic", "--no-first-run",
+                         "--disable-background-networking", "--disable-component-update", "--disable-sync",
+                         f"--user-data-dir={self.profile}", *graphics]:
+            options.add_argument(argument)
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+        self.driver = webdriver.Chrome(service=webdriver.chrome.service.Service(DRIVER), options=options)
+        self.set_width(width)
+        self.set_dark(dark)
+        self.driver.get(f"file://{page}")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.driver.quit()
+        shutil.rmtree(self.profile, ignore_errors=True)
+
+    def set_width(self, width):
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
+                                    {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600})
+
+    def set_dark(self, dark):
+        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [scheme]})
+
+    def run(self, script, *arguments):
+        return self.driver.execute_script(script, *arguments)
+
+    def one(self, selector):
+        return self.driver.find_element(By.CSS_SELECTOR, selector)
+
+    def all(self, selector):
+        return self.driver.find_elements(By.CSS_SELECTOR, selector)
+
+    def drawn(self):
+        return {part.get_attribute("id") for part in self.all("[data-drawn]")}
+
+    def canvas(self, selector):
+        return self.run(LOOK_AT_CANVAS, self.one(selector))
+
+    def complaints(self):
+        return [entry["message"] for entry in self.driver.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")]
+
+    def wait_until(self, condition):
+        WebDriverWait(self.driver, 60).until(lambda _: condition())
+
+    def keep_picture(self, name):
+        if folder := os.environ.get("LOCUS_SCREENSHOTS"):
+            height = self.run("return document.documentElement.scrollHeight")
+            width = self.run("return innerWidth")
+            self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
+                                        {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600})
+            self.driver.save_screenshot(os.path.join(folder, f"{name}.png"))
+
+
+class Report(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.mkdtemp(prefix="locus-report-")
+        subprocess.run([sample_reports, cls.folder], check=True)
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.folder)
+
+    def browser(self, name, **how):
+        return Browser(os.path.join(self.folder, f"{name}.html"), **how)
+
+    def expect_all_drawn(self, browser):
+        self.assertEqual(browser.drawn(), FIGURES | TABLES)
+        for selector in "#plan .estimate", "#side .estimate", "#plan .truth", "#side .truth":
+            self.assertGreater(len(browser.one(f"{selector}[d]").get_attribute("d")), 1000, selector)
+        self.assertGreater(browser.canvas("#plan canvas")["painted"], 0.005, "walls in the plan")
+        self.assertGreater(browser.canvas("#map canvas")["colours"], 100, "tiles coloured by height")
+        self.assertGreater(browser.canvas("#map canvas")["painted"], 0.05, "share of the map's picture")
+        series = browser.all("#timeline .series")
+        self.assertEqual(len(series), 4)
+        for line in series:
+            self.assertGreater(len(line.get_attribute("d")), 500)
+        self.assertEqual(len(browser.all("#timeline .band")), 4, "state, lidar and two sources")
+        self.assertEqual(len(browser.all("#boxes .box-plot")), 6)
+        self.assertEqual(len(browser.all("#stages tbody tr")), 9)
+        self.assertEqual(len(browser.all("#stages svg.quantiles circle")), 9)
+        self.assertEqual(browser.complaints(), [])
+
+    def test_hour_is_drawn_in_full_and_asks_nobody_for_anything(self):
+        with self.browser("hour") as browser:
+            self.expect_all_drawn(browser)
+            self.assertEqual(browser.run("return performance.getEntriesByType('resource').length"), 0)
+            self.assertEqual(browser.one("#capture").text, "hour")
+            self.assertIn("1:00h", browser.one("#key-figures").text.replace("\u202f", "").replace(" ", ""))
+            browser.keep_picture("hour")
+
+    def test_fits_a_phone(self):
+        with self.browser("hostile", width=360) as browser:
+            self.expect_all_drawn(browser)
+            self.assertLessEqual(browser.run("return document.documentElement.scrollWidth"), 360)
+            for drawing in browser.all(".drawing > svg, .drawing > canvas"):
+                self.assertLessEqual(drawing.rect["x"] + drawing.rect["width"], 360)
+            outside = browser.run("""
+              return [...document.querySelectorAll(".drawing > svg text")].filter((text) => {
+                const box = text.getBoundingClientRect();
+                return box.width > 0 && (box.left < 0 || box.right > 360);
+              }).map((text) => text.textContent)""")
+            self.assertEqual(outside, [])
+            browser.keep_picture("phone")
+
+    def test_is_readable_in_light_and_dark(self):
+        with self.browser("hostile") as browser:
+            for dark in False, True:
+                browser.set_dark(dark)
+                paper = browser.run("return getComputedStyle(document.body).backgroundColor")
+                shade = sum(int(part) for part in paper[4:-1].split(",")) / 3
+                self.assertTrue(shade < 40 if dark else shade > 230, paper)
+                for text in "ink", "muted", "warning":
+                    self.assertGreater(browser.run(CONTRAST, [text, "paper"]), 4.5, f"{text}, dark: {dark}")
+                self.assertGreater(browser.run(CONTRAST, ["estimate", "paper"]), 3.0)
+                self.assertGreater(browser.run(CONTRAST, ["estimate", "truth"]), 2.0)
+            browser.keep_picture("dark")
+
+    def test_canvases_follow_when_the_colours_of_the_page_change(self):
+        with self.browser("hostile") as browser:
+            before = {canvas: browser.canvas(canvas)["sum"] for canvas in ("#plan canvas", "#map canvas")}
+            browser.set_dark(True)
+            for canvas, light in before.items():
+                browser.wait_until(lambda: browser.canvas(canvas)["sum"] != light)
+            self.expect_all_drawn(browser)
+
+    def test_figures_follow_the_width_of_the_page(self):
+        with self.browser("hostile") as browser:
+            browser.set_width(360)
+            browser.wait_until(lambda: browser.run(
+                "return document.querySelector('#timeline .drawing > svg').viewBox.baseVal.width") < 360)
+            self.assertLessEqual(browser.run("return document.documentElement.scrollWidth"), 360)
+            self.expect_all_drawn(browser)
+
+    def test_health_is_told_by_shape_not_by_colour_alone(self):
+        with self.browser("hostile") as browser:
+            looks = browser.run("""
+              return Object.fromEntries([...document.querySelectorAll("#timeline .band rect")].map((rect) =>
+                  [rect.dataset.what, [rect.getAttribute("fill").startsWith("url("), rect.getAttribute("height")].join()]))""")
+            self.assertEqual(set(looks), {"tracking", "degenerate", "dead reckoning", "used", "healthy, not used", "lost"})
+            self.assertEqual(len({looks["used"], looks["healthy, not used"], looks["lost"]}), 3, looks)
+            self.assertNotEqual(looks["tracking"], looks["degenerate"])
+
+    def test_map_turns_under_the_mouse_and_comes_nearer_with_the_wheel(self):
+        with self.browser("hostile") as browser:
+            canvas = browser.one("#map canvas")
+            seen = [browser.canvas("#map canvas")["sum"]]
+            ActionChains(browser.driver).drag_and_drop_by_offset(canvas, 120, 30).perform()
+            seen.append(browser.canvas("#map canvas")["sum"])
+            browser.run("arguments[0].dispatchEvent(new WheelEvent('wheel', {deltaY: -240, cancelable: true}))", canvas)
+            seen.append(browser.canvas("#map canvas")["sum"])
+            for button in reversed(browser.all("#map button")):
+                button.click()
+                seen.append(browser.canvas("#map canvas")["sum"])
+            self.assertEqual(seen.pop(), seen[0], "oblique again, as at first")
+            self.assertEqual(len(set(seen)), 5, "each time another picture")
+
+    def test_instant_pointed_at_is_shown_in_every_figure(self):
+        with self.browser("hostile") as browser:
+            map_before = browser.canvas("#map canvas")["sum"]
+            timeline = browser.one("#timeline .drawing > svg")
+            ActionChains(browser.driver).move_to_element(timeline).perform()
+            readings = [reading.text for reading in browser.all("#timeline .reading")]
+            self.assertEqual(sum(reading != "" for reading in readings), len(readings))
+            self.assertTrue(any(reading.endswith("mm") for reading in readings), readings)
+            for dot in "#plan .here", "#side .here":
+                self.assertTrue(browser.one(dot).is_displayed())
+            self.assertNotEqual(browser.canvas("#map canvas")["sum"], map_before)
+
+    def test_no_name_breaks_out_of_the_page(self):
+        with self.browser("hostile") as browser:
+            self.assertIsNone(browser.run("return window.broken_out ?? null"))
+            self.assertIn("<script>window.broken_out", browser.one("#about").text)
+            self.assertIn("</script>", browser.one("#sources").text)
+            self.expect_all_drawn(browser)
+
+    def test_without_webgl_a_sentence_stands_in_for_the_map(self):
+        with self.browser("hostile", webgl=False) as browser:
+            self.assertIn("WebGL", browser.one("#map .note").text)
+            self.assertEqual(browser.drawn(), FIGURES | TABLES)
+            self.assertEqual(browser.complaints(), [])
+
+    def test_without_truth_map_or_sources_says_so_calmly(self):
+        with self.browser("bare", width=360) as browser:
+            self.assertEqual(browser.drawn(), FIGURES | TABLES)
+            self.assertIn("No true trajectory", browser.one("#boxes .note").text)
+            self.assertIn("map is empty", browser.one("#map .note").text)
+            self.assertEqual(len(browser.all(".truth")), 0)
+            self.assertEqual(browser.complaints(), [])
+            browser.keep_picture("bare")
+
+    def test_recording_without_a_sweep_still_has_its_counters(self):
+        with self.browser("nothing") as browser:
+            self.assertEqual(browser.drawn(), TABLES)
+            self.assertIn("No sweep was seen", browser.one("#plan .note").text)
+            self.assertIn("rejected: length", browser.one("#packets").text)
+            self.assertEqual(browser.complaints(), [])
+
+
+if __name__ == "__main__":
+    sample_reports = sys.argv.pop(1)
+    unittest.main(verbosity=2)

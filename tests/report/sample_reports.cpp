@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// sample-reports FOLDER: reports of runs that nobody drove, for the browser to show.
+#include <cstdlib>
+#include <filesystem>
+
+#include "sample_run.hpp"
+
+namespace {
+
+/// What would break out of the page, did nobody see to it.
+constexpr const char* kHostile = "</script><script>window.broken_out = true</script><!--<b> \xff.pcap";
+
+} // namespace
+
+int main(int argc, char** argv) {
+  using locus::test::SampleRun;
+  if (argc != 2)
+    return EXIT_FAILURE;
+  const std::filesystem::path folder = argv[1];
+  std::filesystem::create_directories(folder);
+
+  SampleRun hour = SampleRun::of(std::chrono::hours{1}, "hour");
+  locus::tools::write_report(folder / "hour.html", hour.report());
+
+  SampleRun hostile = SampleRun::of(std::chrono::minutes{1}, kHostile);
+  hostile.config.odometry.motion_sources.front().name = kHostile;
+  hostile.summary["sources"][kHostile] = hostile.summary["sources"]["wio"];
+  locus::tools::write_report(folder / "hostile.html", hostile.report());
+
+  locus::tools::write_report(folder / "bare.html", SampleRun::bare().report());
+
+  SampleRun nothing = SampleRun::bare();
+  nothing.sweeps.clear();
+  locus::tools::write_report(folder / "nothing.html", nothing.report());
+  return EXIT_SUCCESS;
+}
