@@ -22,5 +22,6 @@ echo
 echo "$PWD/$result/odometry holds:"
 echo "  odometry.tum   where the robot was at the end of each sweep"
 echo "  odometry.csv   how sure of it, and why"
+echo "  report.html    all of it to look at, in any browser"
 echo "  map.pcd        what it saw"
 echo "  summary.json   losses, counts, times"

@@ -122,6 +122,20 @@ TEST(LocusReplay, MapIsABinaryPcdOfTheSizeItStates) {
   EXPECT_EQ(map.size(), data + 12 + count * 6 * sizeof(float));
 }
 
+TEST(LocusReplay, ReportShowsTheRunAgainstTheTruthOfTheFolder) {
+  const Replay replay({room_drive().string()});
+  const std::string page = read_text(replay.file("report.html"));
+  const std::string begin = R"(<script type="application/json" id="run">)";
+  const std::size_t first = page.find(begin) + begin.size();
+  const json run = json::parse(page.substr(first, page.find("</script>", first) - first));
+  EXPECT_EQ(run["summary"], replay.summary());
+  EXPECT_EQ(run["path"]["t"].size(), run["path"]["x"].size());
+  EXPECT_GT(run["path"]["t"].size(), 50U);
+  EXPECT_GT(run["truth"]["t"].size(), 50U);
+  EXPECT_GT(run["map"]["count"], 100);
+  EXPECT_EQ(run["health"].back()["name"], "imu");
+}
+
 TEST(LocusReplay, SameBytesForEveryNumberOfThreadsAndOnEveryRun) {
   const std::string capture = room_drive().string();
   const std::string expected = read_text(Replay({"--threads", "1", capture}).file("odometry.tum"));

@@ -9,7 +9,7 @@ export function heading() {
   const name = summary.capture.replace(/\/+$/, "").split("/").pop() || summary.capture;
   document.title = `${name} – locus-replay`;
   select("#capture").text(name);
-  select("#about").text([summary.capture, recordedAt()].filter(Boolean).join(" · "));
+  select("#about").text([summary.capture !== name ? summary.capture : "", recordedAt()].filter(Boolean).join(" · "));
   select("#machine").text(machine());
   const item = select("#key-figures").selectAll("div").data(keyFigures()).join("div");
   item.append("dt").text(({name}) => name);
