@@ -344,8 +344,7 @@ NormalEquations equations_of(const Sums& sums) {
 
 } // namespace
 
-SourceBlock::SourceBlock(std::span<const SurfacePoint> points)
-    : x_m{}, y_m{}, z_m{}, normal_x{}, normal_y{}, normal_z{}, count(points.size()) {
+SourceBlock::SourceBlock(std::span<const SurfacePoint> points) : count(points.size()) {
   along_m2.fill(kPointVariance_m2);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const bool finite = points[i].position_m.allFinite() && points[i].normal.allFinite();

@@ -18,9 +18,9 @@ using PerPoint = std::array<float, kGicpBlock>;
 
 /// Points of a sweep, from the origin of their own frame. Places beyond the last point of the sweep hold zeros.
 struct SourceBlock {
-  PerPoint x_m, y_m, z_m;
-  PerPoint normal_x, normal_y, normal_z; ///< zero where there is none to be trusted
-  PerPoint along_m2;                     ///< variance along the surface; that of the point itself without a normal
+  PerPoint x_m{}, y_m{}, z_m{};
+  PerPoint normal_x{}, normal_y{}, normal_z{}; ///< zero where there is none to be trusted
+  PerPoint along_m2{}; ///< variance along the surface; that of the point itself without a normal
   std::size_t count = 0;
 
   explicit SourceBlock(std::span<const SurfacePoint> points);

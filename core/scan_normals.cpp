@@ -79,9 +79,10 @@ void ScanNormals::find_neighbours(const std::vector<SweepPoint>& points, std::si
     beside[1] = {lines_[line + 1].begin, lines_[line + 1].end, lines_[line + 1].begin};
 
   for (std::size_t i = begin; i < end; ++i) {
-    std::uint32_t* place = neighbours_[i].place;
-    std::fill_n(place, Neighbours::kMost, static_cast<std::uint32_t>(i));
-    const auto add = [&place](std::size_t j) { *place++ = static_cast<std::uint32_t>(j); };
+    auto& places = neighbours_[i].place;
+    places.fill(static_cast<std::uint32_t>(i));
+    std::size_t found = 0;
+    const auto add = [&](std::size_t j) { places[found++] = static_cast<std::uint32_t>(j); };
     if (i > begin)
       add(i - 1);
     if (i + 1 < end)

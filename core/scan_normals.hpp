@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -29,7 +30,7 @@ class ScanNormals {
   /// Of one point; its own place stands where it has fewer.
   struct Neighbours {
     static constexpr std::size_t kMost = 8;
-    std::uint32_t place[kMost];
+    std::array<std::uint32_t, kMost> place;
   };
   void find_lines(const std::vector<SweepPoint>& points);
   void find_neighbours(const std::vector<SweepPoint>& points, std::size_t line);
