@@ -5,21 +5,12 @@
 #include <fmt/format.h>
 
 #include "locus_replay/failure.hpp"
+#include "locus_replay/number_between.hpp"
 
 namespace locus::tools {
 namespace {
 
 constexpr double kLongest_s = 1e8; ///< three years
-
-/// CLI11's own ranges let NaN pass.
-CLI::Validator number_between(double low, double high) {
-  return {[=](const std::string& text) {
-            double number = 0;
-            const bool within = CLI::detail::lexical_cast(text, number) && number >= low && number <= high;
-            return within ? std::string{} : fmt::format("{} is no number from {} to {}", text, low, high);
-          },
-          ""};
-}
 
 Arguments::OdometryFile parse_odometry(const std::string& text) {
   const std::size_t equals = text.find('=');

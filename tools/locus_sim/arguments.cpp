@@ -8,6 +8,7 @@
 #include <string>
 
 #include "locus_replay/failure.hpp"
+#include "locus_replay/number_between.hpp"
 
 namespace locus::tools {
 namespace {
@@ -66,7 +67,7 @@ std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
   app.add_option("--duration", duration_s, "How long, seconds")
       ->required()
       ->type_name("S")
-      ->check(CLI::Range(kShortest_s, kLongest_s));
+      ->check(number_between(kShortest_s, kLongest_s));
   app.add_option("--seed", arguments.seed, "Of course, clutter, moving things and noise; default 1")->type_name("N");
   app.add_option("--lidars", arguments.sensors.lidars, "1: level, 2: and one pitched forward, 3: and one backward")
       ->type_name("N")
@@ -82,7 +83,7 @@ std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
       ->allow_extra_args(false);
   app.add_option("--dust", arguments.sensors.dust, "Share of the laser pulses that meet dust, 0..1")
       ->type_name("P")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(number_between(0, 1));
   app.add_option("-o,--output", arguments.output, "Capture folder; made if need be")->required()->type_name("DIR");
   app.set_version_flag("--version", "locus-sim " LOCUS_VERSION);
   app.footer(

@@ -120,8 +120,9 @@ double corner_speed_mps(double angle_rad, const Agility& agility) {
 /// The longest leg that ends at rest in time, if any is worth it.
 void drive_last_leg(Course& course, double longest_m, double from_mps, const Agility& agility, double left_s,
                     Dice& dice) {
+  constexpr double kWorthIt_m = 0.5;
   const double braking_s = from_mps / agility.acceleration_mps2, braking_m = braking_s * from_mps / 2;
-  for (double length_m = longest_m; length_m > braking_m; length_m *= 0.9) {
+  for (double length_m = longest_m; length_m > braking_m + kWorthIt_m; length_m *= 0.9) {
     Dice same = dice;
     const Leg leg(length_m, from_mps, 0, agility, same);
     if (leg.duration_s() < left_s) {

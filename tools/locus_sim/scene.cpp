@@ -54,15 +54,10 @@ double distance_m(const Surface& surface, const Eigen::Vector3d& point) {
   return std::visit([&](const auto& shape) { return shape.distance_m(point); }, surface.shape);
 }
 
-bool passes_through(const Ray& ray, const Bounds& box, double max_range_m) {
-  double enter = 0, leave = max_range_m;
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    const double a = (box.min_m[axis] - ray.origin_m[axis]) / ray.direction[axis];
-    const double b = (box.max_m[axis] - ray.origin_m[axis]) / ray.direction[axis];
-    enter = std::max(enter, std::min(a, b));
-    leave = std::min(leave, std::max(a, b));
-  }
-  return enter <= leave;
+bool passes_through(const Eigen::Array3d& origin, const Eigen::Array3d& inverse, const Bounds& box,
+                    double max_range_m) {
+  const Eigen::Array3d a = (box.min_m.array() - origin) * inverse, b = (box.max_m.array() - origin) * inverse;
+  return std::max(0.0, a.min(b).maxCoeff()) <= std::min(max_range_m, a.max(b).minCoeff());
 }
 
 } // namespace
@@ -225,8 +220,9 @@ void Scene::cast_at_surfaces(const Ray& ray, Met& nearest) const {
 }
 
 void Scene::cast_at_movers(const Ray& ray, Stamp stamp, Met& nearest) const {
+  const Eigen::Array3d inverse = ray.direction.array().inverse();
   for (std::size_t i = 0; i < movers_.size(); ++i) {
-    if (!passes_through(ray, mover_bounds_[i], nearest.range_m))
+    if (!passes_through(ray.origin_m, inverse, mover_bounds_[i], nearest.range_m))
       continue;
     const Ray own{ray.origin_m - movers_[i].position_m(stamp), ray.direction};
     for (const Surface& part : movers_[i].parts) {
@@ -243,12 +239,11 @@ std::optional<Hit> Scene::cast(const Ray& ray, double max_range_m, Stamp stamp) 
   cast_at_movers(ray, stamp, nearest);
   if (nearest.surface == nullptr)
     return std::nullopt;
-  Eigen::Vector3d point = ray.origin_m + nearest.range_m * ray.direction;
-  if (nearest.mover != nullptr)
-    point -= nearest.mover->position_m(stamp);
+  const Eigen::Vector3d point_m = ray.origin_m + nearest.range_m * ray.direction;
+  const Eigen::Vector3d own_m = nearest.mover != nullptr ? point_m - nearest.mover->position_m(stamp) : point_m;
   const Eigen::Vector3d normal =
-      std::visit([&](const auto& shape) { return shape.normal(point); }, nearest.surface->shape);
-  return Hit{nearest.range_m, std::abs(normal.dot(ray.direction)), nearest.surface->reflectivity};
+      std::visit([&](const auto& shape) { return shape.normal(own_m); }, nearest.surface->shape);
+  return Hit{point_m, nearest.range_m, std::abs(normal.dot(ray.direction)), nearest.surface->reflectivity};
 }
 
 double Scene::distance_to_surface(const Eigen::Vector3d& point, Stamp stamp) const {
@@ -257,12 +252,24 @@ double Scene::distance_to_surface(const Eigen::Vector3d& point, Stamp stamp) con
     for (const Surface& part : mover.parts)
       nearest = std::min(nearest, distance_m(part, point - mover.position_m(stamp)));
   }
-  std::vector<std::uint32_t> waiting;
+  struct Near { // a node or a leaf, and the squared distance to its box
+    double squared_m2;
+    std::uint32_t first, count;
+  };
+  std::vector<Near> waiting;
   if (!nodes_.empty())
-    waiting.push_back(static_cast<std::uint32_t>(nodes_.size() - 1));
+    waiting.push_back({0, static_cast<std::uint32_t>(nodes_.size() - 1), kBranch});
   while (!waiting.empty()) {
-    const Node& node = nodes_[waiting.back()];
+    const Near next = waiting.back();
     waiting.pop_back();
+    if (next.squared_m2 > nearest * nearest)
+      continue;
+    if (next.count != kBranch) {
+      for (std::uint32_t i = next.first; i < next.first + next.count; ++i)
+        nearest = std::min(nearest, distance_m(surfaces_[i], point));
+      continue;
+    }
+    const Node& node = nodes_[next.first];
     for (std::size_t lane = 0; lane < 4; ++lane) {
       Bounds box;
       for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -270,14 +277,10 @@ double Scene::distance_to_surface(const Eigen::Vector3d& point, Stamp stamp) con
         box.min_m[i] = static_cast<double>(node.min_m[axis][j]);
         box.max_m[i] = static_cast<double>(node.max_m[axis][j]);
       }
-      if (squared_distance(box, point) > nearest * nearest)
-        continue;
-      if (node.count[lane] == kBranch)
-        waiting.push_back(node.first[lane]);
-      else
-        for (std::uint32_t i = node.first[lane]; i < node.first[lane] + node.count[lane]; ++i)
-          nearest = std::min(nearest, distance_m(surfaces_[i], point));
+      waiting.push_back({squared_distance(box, point), node.first[lane], node.count[lane]});
     }
+    std::sort(waiting.end() - 4, waiting.end(), // the nearest is looked at first and rules the others out
+              [](const Near& a, const Near& b) { return a.squared_m2 > b.squared_m2; });
   }
   return nearest;
 }

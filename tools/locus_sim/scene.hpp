@@ -13,6 +13,7 @@ namespace locus::sim {
 
 /// What a ray meets.
 struct Hit {
+  Eigen::Vector3d point_m;
   double range_m;
   double cos_incidence; ///< of the angle between ray and normal, 0..1
   std::uint8_t reflectivity;

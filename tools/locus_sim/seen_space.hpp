@@ -8,8 +8,8 @@
 
 namespace locus::sim {
 
-/// Remembers where rays have met surfaces, in cubes of half a metre: the true map holds what could be seen, and no
-/// hidden sides. One owner.
+/// Remembers where echoes came from, in cubes of half a metre: the true map holds what was seen, and no hidden sides.
+/// One owner.
 class SeenSpace {
  public:
   /// What lies beyond the bounds is not remembered.
@@ -29,28 +29,10 @@ class SeenSpace {
     return contains(cube) && seen_[index(cube)];
   }
 
-  /// The cubes that were seen and all beside them.
-  [[nodiscard]] SeenSpace grown() const {
-    SeenSpace result = *this;
-    for (std::ptrdiff_t z = 0; z < size_.z(); ++z)
-      for (std::ptrdiff_t y = 0; y < size_.y(); ++y)
-        for (std::ptrdiff_t x = 0; x < size_.x(); ++x)
-          if (const Cube cube{x, y, z}; seen_[index(cube)])
-            result.mark_beside(cube);
-    return result;
-  }
-
  private:
   static constexpr double kCube_m = 0.5;
   using Cube = Eigen::Array<std::ptrdiff_t, 3, 1>;
 
-  void mark_beside(const Cube& cube) {
-    for (std::ptrdiff_t i = 0; i < 27; ++i) {
-      const Cube beside = cube + Cube{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
-      if (contains(beside))
-        seen_[index(beside)] = true;
-    }
-  }
   [[nodiscard]] Cube cube_of(const Eigen::Vector3d& point) const {
     return ((point - origin_m_) / kCube_m).array().floor().cast<std::ptrdiff_t>();
   }

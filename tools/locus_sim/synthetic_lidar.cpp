@@ -177,10 +177,7 @@ std::optional<Hit> SyntheticLidar::look(const Mount& mount, const Aim& aim, doub
     aimed = Eigen::AngleAxisd(-aside_rad, mount.R_world_lidar.col(2)) * aimed;
   const Ray ray{mount.position_m + since_s * mount.velocity_mps + aim.origin_z_m * mount.R_world_lidar.col(2),
                 aimed + since_s * mount.angular_velocity_radps.cross(aimed)};
-  const auto hit = scene_.cast(ray, options_.max_range_m, mount.fired + aim.after);
-  if (hit && seen_ != nullptr)
-    seen_->mark(ray.origin_m + hit->range_m * ray.direction);
-  return hit;
+  return scene_.cast(ray, options_.max_range_m, mount.fired + aim.after);
 }
 
 SyntheticLidar::Echo SyntheticLidar::measure(const std::optional<Hit>& hit) {
@@ -199,6 +196,8 @@ SyntheticLidar::Echo SyntheticLidar::measure(const std::optional<Hit>& hit) {
   const double ticks = std::round(range_m / spec_.calibration.distance_resolution_m);
   if (range_m < options_.min_range_m || ticks > 65'535)
     return {};
+  if (seen_ != nullptr)
+    seen_->mark(hit->point_m);
   return {static_cast<std::uint16_t>(ticks), static_cast<std::uint8_t>(std::clamp(brightness, 1.0, 255.0))};
 }
 

@@ -50,7 +50,7 @@ struct SyntheticLidarOptions {
 class SyntheticLidar {
  public:
   /// Scene and trajectory must outlive it. The same arguments give the same bytes.
-  /// `seen` takes note of every surface point that a ray meets.
+  /// `seen` takes note of every surface point that an echo comes from.
   SyntheticLidar(const Scene& scene, const Trajectory& trajectory, const SyntheticLidarOptions& options,
                  SeenSpace* seen = nullptr);
 

@@ -91,18 +91,22 @@ template <class Sink> void for_each_point(const Scene& scene, const SeenSpace& s
 } // namespace
 
 void write_truth_map(const std::filesystem::path& path, const Scene& scene, const SeenSpace& seen) {
-  const SeenSpace wanted = seen.grown();
-  std::size_t count = 0;
-  for_each_point(scene, wanted, [&](const Eigen::Vector3d&) { ++count; });
   std::ofstream file(path, std::ios::binary);
-  fmt::print(file,
-             "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\n"
-             "property float z\nend_header\n",
-             count);
-  for_each_point(scene, wanted, [&](const Eigen::Vector3d& point) {
+  const auto write_header = [&](std::size_t points) {
+    fmt::print(file,
+               "ply\nformat binary_little_endian 1.0\nelement vertex {:12}\nproperty float x\nproperty float y\n"
+               "property float z\nend_header\n",
+               points);
+  };
+  std::size_t points = 0;
+  write_header(points); // as long as the one that replaces it when the number is known
+  for_each_point(scene, seen, [&](const Eigen::Vector3d& point) {
     const Eigen::Vector3f single = point.cast<float>();
     file.write(reinterpret_cast<const char*>(single.data()), 3 * sizeof(float));
+    ++points;
   });
+  file.seekp(0);
+  write_header(points);
   file.close();
   if (!file)
     throw std::runtime_error(path.string() + ": " + std::generic_category().message(errno));

@@ -8,9 +8,9 @@
 
 namespace locus::sim {
 
-/// Writes the surfaces of a scene as points in world frame, one per 3 cm or denser, as far as they were seen or lie
-/// within half a metre of what was: gt_map.ply, binary. What moves is not part of it. Throws std::runtime_error when it
-/// cannot write.
+/// Writes the surfaces of a scene as points in world frame, one per 3 cm or denser, as far as they lie in
+/// cubes of which something was seen: gt_map.ply, binary. What moves is not part of it. Throws std::runtime_error when
+/// it cannot write.
 void write_truth_map(const std::filesystem::path& path, const Scene& scene, const SeenSpace& seen);
 
 } // namespace locus::sim

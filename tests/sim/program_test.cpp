@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+// The real locus-sim, driven from outside, and the real locus-replay on what it made.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "drivers/capture.hpp"
+#include "drivers/position_packet.hpp"
+#include "replay/replay_run.hpp"
+
+namespace locus::test {
+namespace {
+
+std::vector<std::string> husky_in(const std::string& world, const std::string& folder,
+                                  std::vector<std::string> more = {}) {
+  std::vector<std::string> all{"--world", world, "--robot", "husky", "--duration", "12", "-o", folder};
+  all.insert(all.end(), more.begin(), more.end());
+  return all;
+}
+
+const std::vector<std::string> kFiles{"lidar.pcap", "imu.csv", "wio.tum", "gt.tum", "gt_map.ply", "config.yaml"};
+
+TEST(LocusSim, SameOptionsGiveTheSameBytesAndAnotherSeedOthers) {
+  const TemporaryFolder folder;
+  const auto simulate = [&](const std::string& name, const std::string& seed) {
+    const ProgramRun run = run_program(LOCUS_SIM, husky_in("urban", folder / name, {"--seed", seed, "--dust", "0.05"}));
+    ASSERT_EQ(run.status, 0) << run.err;
+  };
+  simulate("a", "7");
+  simulate("b", "7");
+  simulate("c", "8");
+  for (const std::string& file : kFiles) {
+    const std::string bytes = read_text(folder / ("a/" + file));
+    EXPECT_FALSE(bytes.empty()) << file;
+    EXPECT_TRUE(bytes == read_text(folder / ("b/" + file))) << file;
+    EXPECT_EQ(bytes == read_text(folder / ("c/" + file)), file == "config.yaml") << file;
+  }
+}
+
+TEST(LocusSim, FolderReplays) {
+  const TemporaryFolder folder;
+  const std::string capture = folder / "capture";
+  ASSERT_EQ(run_program(LOCUS_SIM, husky_in("stairs", capture, {"--lidars", "3"})).status, 0);
+  const Replay replay({capture});
+  ASSERT_EQ(replay.run().status, 0) << replay.run().err;
+  EXPECT_EQ(replay.run().err, "");
+  const nlohmann::json summary = replay.summary();
+  EXPECT_EQ(summary["packets"]["total"]["lost"], 0);
+  EXPECT_EQ(summary["packets"]["total"]["clock_steps"], 0);
+  EXPECT_EQ(summary["packets"].size(), 4U); // total, top, front, rear
+  EXPECT_EQ(summary["sweeps"]["processed"], summary["sweeps"]["seen"]);
+  EXPECT_LT(summary["ape_m"]["max"], 0.2);
+}
+
+TEST(LocusSim, PositionPacketsTellTheTimeOfTheirArrival) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(run_program(LOCUS_SIM, husky_in("corridor", folder / "c")).status, 0);
+  auto capture = Capture::open(folder / "c/lidar.pcap");
+  ASSERT_TRUE(capture) << capture.error();
+  int seen = 0;
+  while (const Datagram* datagram = capture->next()) {
+    if (datagram->payload.size() != velodyne::kPositionPacketBytes)
+      continue;
+    const auto packet = velodyne::parse_position_packet(datagram->payload.first<velodyne::kPositionPacketBytes>());
+    ASSERT_TRUE(packet.is_synchronised());
+    const Duration since_epoch = datagram->receive_stamp.time_since_epoch();
+    const Duration behind = since_epoch % std::chrono::hours{1} - packet.time_of_hour;
+    ASSERT_GE(behind, Duration::zero());
+    ASSERT_LT(behind, std::chrono::milliseconds{5});
+    ASSERT_EQ(packet.rmc->time_of_day,
+              std::chrono::floor<std::chrono::seconds>((since_epoch - behind) % std::chrono::hours{24}));
+    ++seen;
+  }
+  EXPECT_NEAR(seen, 12 * 753.5 / 5, 2);
+}
+
+TEST(LocusSim, WrongOptionsAreAnErrorOfOneLineThatNamesThem) {
+  const TemporaryFolder folder;
+  const std::string x = folder / "x";
+  const auto expect_refused = [](const std::vector<std::string>& arguments, const std::string& named) {
+    const ProgramRun run = run_program(LOCUS_SIM, arguments);
+    EXPECT_EQ(run.status, 2) << run.err;
+    EXPECT_EQ(lines_of(run.err).size(), 1U) << run.err;
+    EXPECT_NE(run.err.find(named), std::string::npos) << run.err;
+  };
+  expect_refused({}, "--");
+  expect_refused(husky_in("moon", x), "moon");
+  expect_refused(husky_in("urban", x, {"--lidars", "4"}), "4");
+  expect_refused(husky_in("urban", x, {"--model", "VLS-128"}), "VLS-128");
+  expect_refused(husky_in("urban", x, {"--dust", "nan"}), "dust");
+  expect_refused(husky_in("urban", x, {"--dust", "1.5"}), "dust");
+  expect_refused(husky_in("urban", x, {"--slip", "5"}), "--slip 5");
+  expect_refused(husky_in("urban", x, {"--slip", "5-50"}), "--slip 5-50");
+  expect_refused(husky_in("urban", x, {"--slip", "2-6", "--slip", "5-8"}), "slip");
+  expect_refused({"--world", "urban", "--robot", "husky", "--duration", "nan", "-o", x}, "duration");
+}
+
+TEST(LocusSim, FolderThatCannotBeMadeIsAFailure) {
+  const ProgramRun run = run_program(LOCUS_SIM, husky_in("corridor", "/dev/null/folder"));
+  EXPECT_EQ(run.status, 1);
+  EXPECT_EQ(lines_of(run.err).size(), 1U) << run.err;
+}
+
+TEST(LocusSim, HelpShowsAnExample) {
+  const ProgramRun run = run_program(LOCUS_SIM, {"--help"});
+  EXPECT_EQ(run.status, 0);
+  EXPECT_NE(run.out.find("locus-sim --world urban"), std::string::npos);
+  EXPECT_EQ(run_program(LOCUS_SIM, {"--version"}).status, 0);
+}
+
+} // namespace
+} // namespace locus::test

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+namespace locus::tools {
+
+/// Takes numbers from `low` to `high`, both included. CLI11's own ranges let NaN pass.
+inline CLI::Validator number_between(double low, double high) {
+  return {[=](const std::string& text) {
+            double number = 0;
+            const bool within = CLI::detail::lexical_cast(text, number) && number >= low && number <= high;
+            return within ? std::string{} : fmt::format("{} is no number from {} to {}", text, low, high);
+          },
+          ""};
+}
+
+} // namespace locus::tools
