@@ -63,13 +63,14 @@ class Browser:
         options.binary_location = CHROMIUM
         graphics = (["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] if webgl
                     else ["--disable-gpu", "--disable-3d-apis"])
-        for argument in ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-quic", "--no-first-run",
+        for argument in ["--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-quic",
+                         "--no-first-run",
                          "--disable-background-networking", "--disable-component-update", "--disable-sync",
                          f"--user-data-dir={self.profile}", *graphics]:
             options.add_argument(argument)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
         self.driver = webdriver.Chrome(service=webdriver.chrome.service.Service(DRIVER), options=options)
-        self.set_width(width)
+        self.set_size(width)
         self.set_dark(dark)
         self.driver.get(f"file://{page}")
 
@@ -80,9 +81,9 @@ class Browser:
         self.driver.quit()
         shutil.rmtree(self.profile, ignore_errors=True)
 
-    def set_width(self, width):
+    def set_size(self, width, height=900):
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
-                                    {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600})
+                                    {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600})
 
     def set_dark(self, dark):
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
@@ -111,10 +112,7 @@ class Browser:
 
     def keep_picture(self, name):
         if folder := os.environ.get("LOCUS_SCREENSHOTS"):
-            height = self.run("return document.documentElement.scrollHeight")
-            width = self.run("return innerWidth")
-            self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
-                                        {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600})
+            self.set_size(*self.run("return [innerWidth, document.documentElement.scrollHeight]"))
             self.driver.save_screenshot(os.path.join(folder, f"{name}.png"))
 
 
@@ -193,7 +191,7 @@ class Report(unittest.TestCase):
 
     def test_figures_follow_the_width_of_the_page(self):
         with self.browser("hostile") as browser:
-            browser.set_width(360)
+            browser.set_size(360)
             browser.wait_until(lambda: browser.run(
                 "return document.querySelector('#timeline .drawing > svg').viewBox.baseVal.width") < 360)
             self.assertLessEqual(browser.run("return document.documentElement.scrollWidth"), 360)
@@ -202,9 +200,11 @@ class Report(unittest.TestCase):
     def test_health_is_told_by_shape_not_by_colour_alone(self):
         with self.browser("hostile") as browser:
             looks = browser.run("""
-              return Object.fromEntries([...document.querySelectorAll("#timeline .band rect")].map((rect) =>
-                  [rect.dataset.what, [rect.getAttribute("fill").startsWith("url("), rect.getAttribute("height")].join()]))""")
-            self.assertEqual(set(looks), {"tracking", "degenerate", "dead reckoning", "used", "healthy, not used", "lost"})
+              const look = (rect) => [rect.getAttribute("fill").startsWith("url("), rect.getAttribute("height")].join();
+              return Object.fromEntries([...document.querySelectorAll("#timeline .band rect")].map(
+                  (rect) => [rect.dataset.what, look(rect)]))""")
+            self.assertEqual(set(looks),
+                             {"tracking", "degenerate", "dead reckoning", "used", "healthy, not used", "lost"})
             self.assertEqual(len({looks["used"], looks["healthy, not used"], looks["lost"]}), 3, looks)
             self.assertNotEqual(looks["tracking"], looks["degenerate"])
 

@@ -7,8 +7,11 @@ import {select} from "d3-selection";
 export function canvasOf(figure, width, height, description) {
   const drawing = figure.select(".drawing");
   drawing.selectAll("svg").remove();
-  return drawing.append("svg").attr("viewBox", `0 0 ${width} ${height}`).attr("height", height)
-      .attr("role", "img").attr("aria-label", description);
+  return drawing.append("svg")
+      .attr("viewBox", `0 0 ${width} ${height}`)
+      .attr("height", height)
+      .attr("role", "img")
+      .attr("aria-label", description);
 }
 
 const withMinus = (format) => (value) => format(value).replace("-", "−");
@@ -23,15 +26,15 @@ export function bottomAxis(svg, scale, {y, height, ticks, format}) {
 
 /** An axis along the left of a field, with a grid as wide as the field. */
 export function leftAxis(svg, scale, {x, width, count}) {
-  const axis = axisLeft(scale).tickSizeInner(-width).tickSizeOuter(0).tickPadding(6).ticks(count)
-      .tickFormat(withMinus(scale.tickFormat(count)));
+  const axis = axisLeft(scale).tickSizeInner(-width).tickSizeOuter(0).tickPadding(6).ticks(count).tickFormat(
+      withMinus(scale.tickFormat(count)));
   svg.append("g").attr("class", "axis grid").attr("transform", `translate(${x} 0)`).call(axis);
 }
 
 /** Samples of what the figure draws, each beside its name: `draw` gets an SVG of 22 by 12. */
 export function legend(figure, entries) {
   const items = figure.select(".legend").html("").selectAll("span").data(entries).join("span");
-  items.each(function ({name, draw}) {
+  items.each(function({name, draw}) {
     const item = select(this);
     if (draw) item.append("svg").attr("width", 22).attr("height", 12).attr("aria-hidden", "true").call(draw);
     item.append("span").text(name);

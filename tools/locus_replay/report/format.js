@@ -36,7 +36,8 @@ export function clock(seconds, tenths = false) {
 /** "90.0" "s", "12:05" "min", "1:00" "h". */
 export function duration(seconds) {
   if (seconds < 100) return {value: figure(seconds), unit: "s"};
-  return seconds < 3600 ? {value: clock(Math.round(seconds)), unit: "min"} : {value: clock(Math.round(seconds / 60)), unit: "h"};
+  return seconds < 3600 ? {value: clock(Math.round(seconds)), unit: "min"} :
+                          {value: clock(Math.round(seconds / 60)), unit: "h"};
 }
 
 /** Round instants in a span of time, about `wanted` of them. */

@@ -14,8 +14,13 @@ export function heading() {
   const item = select("#key-figures").selectAll("div").data(keyFigures()).join("div");
   item.append("dt").text(({name}) => name);
   const value = item.append("dd");
-  value.append("span").attr("class", "value").classed("warning", ({warning}) => warning).text(({value}) => value)
-      .append("span").attr("class", "unit").text(({unit}) => (unit ? `\u202f${unit}` : ""));
+  value.append("span")
+      .attr("class", "value")
+      .classed("warning", ({warning}) => warning)
+      .text(({value}) => value)
+      .append("span")
+      .attr("class", "unit")
+      .text(({unit}) => (unit ? `\u202f${unit}` : ""));
   value.append("span").attr("class", "detail").text(({detail}) => detail);
 }
 
@@ -26,7 +31,8 @@ function recordedAt() {
 
 function machine() {
   const {version, isa, threads, wall_s, cpu_s, peak_rss_mb, config_sha256} = summary;
-  return `locus-replay ${version}, ${threads} ${threads === 1 ? "thread" : "threads"}, ${isa}; ${written(wall_s)} s by the clock, ` +
+  return `locus-replay ${version}, ${threads} ${threads === 1 ? "thread" : "threads"}, ${isa}; ${
+             written(wall_s)} s by the clock, ` +
       `${written(cpu_s)} s of CPU, ${written(peak_rss_mb)} MB at most; configuration ${config_sha256.slice(0, 12)}`;
 }
 
@@ -36,9 +42,19 @@ function keyFigures() {
   return [
     ...wayFigures(),
     {name: "Recording", ...duration(duration_s), detail: `${written(duration_s / wall_s)} × real time`},
-    {name: "Per sweep", value: written(process_ms.p50), unit: "ms", detail: `99 % within ${written(process_ms.p99)} ms`},
+    {
+      name: "Per sweep",
+      value: written(process_ms.p50),
+      unit: "ms",
+      detail: `99 % within ${written(process_ms.p99)} ms`
+    },
     {name: "Dropped", value: count(sweeps.dropped), detail: lost_of, warning: sweeps.dropped > 0},
-    {name: "Not registered", value: count(sweeps.failed), detail: "sweeps; the prediction stands", warning: sweeps.failed > 0},
+    {
+      name: "Not registered",
+      value: count(sweeps.failed),
+      detail: "sweeps; the prediction stands",
+      warning: sweeps.failed > 0
+    },
   ];
 }
 
@@ -51,12 +67,25 @@ function wayFigures() {
   if (run.ape_m) {
     const {ape_m} = run;
     const unit = lengthUnit(ape_m.max), in_unit = (metres) => written(metres * unit.perMetre);
-    figures.push({name: "Position error, mean", value: in_unit(ape_m.mean), unit: unit.name,
-                  detail: `rms ${in_unit(ape_m.rmse)}, largest ${in_unit(ape_m.max)} ${unit.name}`});
+    figures.push({
+      name: "Position error, mean",
+      value: in_unit(ape_m.mean),
+      unit: unit.name,
+      detail: `rms ${in_unit(ape_m.rmse)}, largest ${in_unit(ape_m.max)} ${unit.name}`
+    });
     if (Number.isFinite(rpe_10m_percent))
-      figures.push({name: "Error over 10 m", value: written(rpe_10m_percent), unit: "%", detail: `${written(end_drift_m)} m at the end`});
+      figures.push({
+        name: "Error over 10 m",
+        value: written(rpe_10m_percent),
+        unit: "%",
+        detail: `${written(end_drift_m)} m at the end`
+      });
   } else {
-    figures.push({name: "Stated deviation", ...length(run.series.std_m.v.at(-1)), detail: "of the last position; no truth given"});
+    figures.push({
+      name: "Stated deviation",
+      ...length(run.series.std_m.v.at(-1)),
+      detail: "of the last position; no truth given"
+    });
   }
   return figures;
 }

@@ -12,8 +12,19 @@ import {run} from "./run.js";
 import {configuration, packets, sources, stages} from "./tables.js";
 import {timeline} from "./timeline.js";
 
-const kTables = {stages, packets, sources, configuration};
-const kFigures = {plan, map: mapView, side, boxes, timeline};
+const kTables = {
+  stages,
+  packets,
+  sources,
+  configuration
+};
+const kFigures = {
+  plan,
+  map: mapView,
+  side,
+  boxes,
+  timeline
+};
 
 function draw(parts) {
   for (const [id, drawPart] of Object.entries(parts)) {
@@ -29,8 +40,10 @@ function draw(parts) {
 }
 
 function drawFigures() {
-  if (run.path) draw(kFigures);
-  else for (const id of Object.keys(kFigures)) note(select(`#${id}`), "No sweep was seen, so there is nothing to draw.");
+  if (run.path)
+    draw(kFigures);
+  else
+    for (const id of Object.keys(kFigures)) note(select(`#${id}`), "No sweep was seen, so there is nothing to draw.");
 }
 
 heading();
@@ -39,7 +52,7 @@ drawFigures();
 
 let drawn_width = window.innerWidth;
 window.addEventListener("resize", () => {
-  if (window.innerWidth === drawn_width) return; // a phone's address bar comes and goes
+  if (window.innerWidth === drawn_width) return;  // a phone's address bar comes and goes
   drawn_width = window.innerWidth;
   drawFigures();
 });

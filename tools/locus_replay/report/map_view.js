@@ -15,7 +15,7 @@ import {fixed} from "./format.js";
 import {map, run} from "./run.js";
 
 const kFieldOfView_deg = 40;
-const kOverlap = 1.12; // tiles lie at the mean of what was seen in a voxel, so some leave gaps
+const kOverlap = 1.12;  // tiles lie at the mean of what was seen in a voxel, so some leave gaps
 let view = null;
 
 /** Once; later only to the width and the colours of the page. */
@@ -30,8 +30,10 @@ function makeView(figure) {
     return false;
   }
   if (!document.createElement("canvas").getContext("webgl")) {
-    note(figure, "This browser offers no WebGL, which the map in space needs. Its walls are drawn in the path from above; " +
-                 "map.pcd beside this report opens in any viewer of point clouds.");
+    note(
+        figure,
+        "This browser offers no WebGL, which the map in space needs. Its walls are drawn in the path from above; " +
+            "map.pcd beside this report opens in any viewer of point clouds.");
     return false;
   }
   // With the buffer kept, "save image" works, and a test can look at it.
@@ -48,7 +50,8 @@ class View {
     this.estimate = makePath(run.path, {width: 3, order: 2});
     this.scene.add(this.tiles, this.estimate);
     if (run.truth) this.scene.add(this.truth = makePath(run.truth, {width: 9, order: 1}));
-    this.here = new THREE.Mesh(new THREE.SphereBufferGeometry(1, 20, 12), new THREE.MeshBasicMaterial({depthTest: false}));
+    this.here =
+        new THREE.Mesh(new THREE.SphereBufferGeometry(1, 20, 12), new THREE.MeshBasicMaterial({depthTest: false}));
     this.scene.add(this.here);
     this.here.renderOrder = 3;
     this.bounds = bounds();
@@ -56,8 +59,11 @@ class View {
     this.oblique = obliqueView(size_m);
 
     this.box.append(renderer.domElement);
-    select(renderer.domElement).attr("role", "img").attr("tabindex", 0)
-        .attr("aria-label", `Map of ${map.count} surfaces and the path through it; drag to turn, scroll to come nearer`);
+    select(renderer.domElement)
+        .attr("role", "img")
+        .attr("tabindex", 0)
+        .attr(
+            "aria-label", `Map of ${map.count} surfaces and the path through it; drag to turn, scroll to come nearer`);
     this.camera = new THREE.PerspectiveCamera(kFieldOfView_deg, 1, size_m.length() / 1000, size_m.length() * 20);
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, renderer.domElement);
@@ -72,8 +78,15 @@ class View {
 
   addButtons(figure) {
     const views = [["Oblique", this.oblique], ["Above", [0, -1e-3, 1]], ["Side", [0, -1, 0.08]]];
-    figure.select(".drawing").append("div").attr("class", "views").selectAll("button").data(views).join("button")
-        .attr("type", "button").text(([name]) => name).on("click", ([, direction]) => {
+    figure.select(".drawing")
+        .append("div")
+        .attr("class", "views")
+        .selectAll("button")
+        .data(views)
+        .join("button")
+        .attr("type", "button")
+        .text(([name]) => name)
+        .on("click", ([, direction]) => {
           this.look(direction);
           this.render();
         });
@@ -85,7 +98,8 @@ class View {
     this.controls.target.copy(centre);
     this.camera.position.copy(centre).add(back);
     this.camera.lookAt(centre);
-    const half_height = Math.tan(THREE.Math.degToRad(kFieldOfView_deg / 2)), half_width = half_height * this.camera.aspect;
+    const half_height = Math.tan(THREE.Math.degToRad(kFieldOfView_deg / 2)),
+          half_width = half_height * this.camera.aspect;
     const away = corners(this.bounds).map((corner) => {
       const seen = corner.sub(centre).applyQuaternion(this.camera.quaternion.clone().inverse());
       return Math.max(Math.abs(seen.x) / half_width, Math.abs(seen.y) / half_height) + seen.z;
@@ -143,7 +157,8 @@ function bounds() {
     box.min.setComponent(axis, quantile(along, 0.03));
     box.max.setComponent(axis, quantile(along, 0.97));
   }
-  for (let i = 0; i < run.path.t.length; ++i) box.expandByPoint(new THREE.Vector3(run.path.x[i], run.path.y[i], run.path.z[i]));
+  for (let i = 0; i < run.path.t.length; ++i)
+    box.expandByPoint(new THREE.Vector3(run.path.x[i], run.path.y[i], run.path.z[i]));
   return box;
 }
 
@@ -154,13 +169,15 @@ function obliqueView({x, y}) {
   const faces = directions.map((direction) => {
     let facing = 0;
     for (let i = 0; i < 3 * map.count; i += 3)
-      facing += map.normals[i] * direction[0] + map.normals[i + 1] * direction[1] + map.normals[i + 2] * direction[2] > 0;
+      facing +=
+          map.normals[i] * direction[0] + map.normals[i + 1] * direction[1] + map.normals[i + 2] * direction[2] > 0;
     return facing;
   });
   return directions[faces.indexOf(Math.max(...faces))];
 }
 
-const corners = ({min, max}) => [min.x, max.x].flatMap((x) => [min.y, max.y].flatMap((y) => [min.z, max.z].map((z) => new THREE.Vector3(x, y, z))));
+const corners = ({min, max}) => [min.x, max.x].flatMap(
+    (x) => [min.y, max.y].flatMap((y) => [min.z, max.z].map((z) => new THREE.Vector3(x, y, z))));
 
 const kTileShader = {
   vertex: `
@@ -202,10 +219,16 @@ function makeTiles({low, high}) {
     vertexShader: kTileShader.vertex,
     fragmentShader: kTileShader.fragment,
     side: THREE.DoubleSide,
-    uniforms: {side: {value: kOverlap * map.tile_m}, floor_tint: {value: new THREE.Color()}, low: {value: low}, high: {value: high}, ramp: {value: rampTexture()}},
+    uniforms: {
+      side: {value: kOverlap * map.tile_m},
+      floor_tint: {value: new THREE.Color()},
+      low: {value: low},
+      high: {value: high},
+      ramp: {value: rampTexture()}
+    },
   });
   const tiles = new THREE.Mesh(geometry, material);
-  tiles.frustumCulled = false; // their bounds are not those of the one square
+  tiles.frustumCulled = false;  // their bounds are not those of the one square
   return tiles;
 }
 
@@ -214,7 +237,8 @@ const rampAt = (share) => interpolateCividis(0.2 + 0.8 * share);
 function rampTexture() {
   const kSteps = 128;
   const bytes = new Uint8Array(3 * kSteps);
-  for (let i = 0; i < kSteps; ++i) new THREE.Color(rampAt(i / (kSteps - 1))).toArray().forEach((part, k) => bytes[3 * i + k] = 255 * part);
+  for (let i = 0; i < kSteps; ++i)
+    new THREE.Color(rampAt(i / (kSteps - 1))).toArray().forEach((part, k) => bytes[3 * i + k] = 255 * part);
   const texture = new THREE.DataTexture(bytes, kSteps, 1, THREE.RGBFormat);
   texture.needsUpdate = true;
   texture.magFilter = texture.minFilter = THREE.LinearFilter;

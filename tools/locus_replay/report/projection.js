@@ -8,14 +8,19 @@ import {nearest, onCursor} from "./cursor.js";
 import {bottomAxis, canvasOf, colour, leftAxis, legend, lineSample} from "./drawing.js";
 import {map, run} from "./run.js";
 
-const kMargin = {top: 8, right: 8, bottom: 36, left: 48};
+const kMargin = {
+  top: 8,
+  right: 8,
+  bottom: 36,
+  left: 48
+};
 const kAxes = ["x", "y", "z"];
 
 /** How the ground is seen: one axis of the odom frame across the page, one up. */
 export function plan(figure, width) {
   const across = extentOfPaths("x"), up = extentOfPaths("y");
   const view = {across: withWalls("x", across, up), up: withWalls("y", up, across)};
-  const height = document.querySelector("#map .drawing").clientHeight; // beside which it lies
+  const height = document.querySelector("#map .drawing").clientHeight;  // beside which it lies
   const field_height = height - kMargin.top - kMargin.bottom;
   draw(figure, {width, field_height, axes: ["x", "y"], view, exaggeration: 1, name: "Path from above"});
 }
@@ -24,7 +29,10 @@ export function side(figure, width) {
   const length = ([low, high]) => high - low;
   const [x, y] = [extentOfPaths("x"), extentOfPaths("y")];
   const axis = length(y) > length(x) ? "y" : "x";
-  const view = {across: axis === "x" ? withWalls("x", x, y) : withWalls("y", y, x), up: widened(extentOfPaths("z"), 0.25)};
+  const view = {
+    across: axis === "x" ? withWalls("x", x, y) : withWalls("y", y, x),
+    up: widened(extentOfPaths("z"), 0.25)
+  };
   const field_width = width - kMargin.left - kMargin.right, field_height = 0.36 * field_width;
   const fitting = field_height / length(view.up) / (field_width / length(view.across));
   const exaggeration = [200, 100, 50, 20, 10, 5, 2].find((factor) => factor <= fitting) ?? 1;
@@ -41,24 +49,30 @@ function widened([low, high], by) {
 /** Makes room for the walls around, yet no more than the path itself takes, the other way too. */
 function withWalls(axis, along, across) {
   const room = Math.max(along[1] - along[0], across[1] - across[0], 6);
-  const coordinates = Array.from({length: map.count}, (_, i) => map.centres[3 * i + kAxes.indexOf(axis)]).sort((a, b) => a - b);
+  const coordinates =
+      Array.from({length: map.count}, (_, i) => map.centres[3 * i + kAxes.indexOf(axis)]).sort((a, b) => a - b);
   const walls = map.count > 0 ? [quantile(coordinates, 0.01), quantile(coordinates, 0.99)] : along;
-  return widened([Math.min(along[0], Math.max(walls[0], along[0] - room)),
-                  Math.max(along[1], Math.min(walls[1], along[1] + room))], 0.03 * room);
+  return widened(
+      [
+        Math.min(along[0], Math.max(walls[0], along[0] - room)), Math.max(along[1], Math.min(walls[1], along[1] + room))
+      ],
+      0.03 * room);
 }
 
 /** Both scales, so that a metre is as long both ways but for the exaggeration, and the view in the middle. */
 function scales({width, field_height, view, exaggeration}) {
   const field_width = width - kMargin.left - kMargin.right;
   const middle = ([low, high]) => (low + high) / 2;
-  const pixels_per_m = Math.min(field_width / (view.across[1] - view.across[0]),
-                                field_height / (view.up[1] - view.up[0]) / exaggeration);
+  const pixels_per_m = Math.min(
+      field_width / (view.across[1] - view.across[0]), field_height / (view.up[1] - view.up[0]) / exaggeration);
   const half_across_m = field_width / pixels_per_m / 2, half_up_m = field_height / pixels_per_m / exaggeration / 2;
   return {
-    across: scaleLinear([kMargin.left, kMargin.left + field_width])
-        .domain([middle(view.across) - half_across_m, middle(view.across) + half_across_m]),
-    up: scaleLinear([kMargin.top + field_height, kMargin.top])
-        .domain([middle(view.up) - half_up_m, middle(view.up) + half_up_m]),
+    across: scaleLinear([kMargin.left, kMargin.left + field_width]).domain([
+      middle(view.across) - half_across_m, middle(view.across) + half_across_m
+    ]),
+    up: scaleLinear([kMargin.top + field_height, kMargin.top]).domain([
+      middle(view.up) - half_up_m, middle(view.up) + half_up_m
+    ]),
   };
 }
 
@@ -71,9 +85,16 @@ function draw(figure, options) {
   const svg = canvasOf(figure, width, height, name);
   bottomAxis(svg, across, {y: kMargin.top + field_height, height: field_height, ticks: across.ticks(width / 90)});
   leftAxis(svg, up, {x: kMargin.left, width: width - kMargin.left - kMargin.right, count: field_height / 50});
-  svg.append("text").attr("class", "unit").attr("x", width - kMargin.right).attr("y", height - 4).attr("text-anchor", "end")
+  svg.append("text")
+      .attr("class", "unit")
+      .attr("x", width - kMargin.right)
+      .attr("y", height - 4)
+      .attr("text-anchor", "end")
       .text(`${axes[0]} in m`);
-  svg.append("text").attr("class", "unit").attr("x", 0).attr("y", height - 4)
+  svg.append("text")
+      .attr("class", "unit")
+      .attr("x", 0)
+      .attr("y", height - 4)
       .text(exaggeration > 1 ? `${axes[1]} in m, drawn ${exaggeration} times as tall` : `${axes[1]} in m`);
 
   const at = (path, i) => [across(path[axes[0]][i]), up(path[axes[1]][i])];
@@ -88,11 +109,24 @@ function draw(figure, options) {
 function drawEnds(svg, begin, end) {
   const below = end[1] > begin[1] ? {begin: -9, end: 18} : {begin: 18, end: -9};
   svg.append("circle").attr("class", "end").attr("r", 4.5).attr("cx", begin[0]).attr("cy", begin[1]);
-  svg.append("rect").attr("class", "end").attr("width", 8).attr("height", 8).attr("x", end[0] - 4).attr("y", end[1] - 4);
-  svg.append("text").attr("class", "end-label").attr("x", begin[0]).attr("y", begin[1] + below.begin)
-      .attr("text-anchor", "middle").text("start");
-  svg.append("text").attr("class", "end-label").attr("x", end[0]).attr("y", end[1] + below.end)
-      .attr("text-anchor", "middle").text("end");
+  svg.append("rect")
+      .attr("class", "end")
+      .attr("width", 8)
+      .attr("height", 8)
+      .attr("x", end[0] - 4)
+      .attr("y", end[1] - 4);
+  svg.append("text")
+      .attr("class", "end-label")
+      .attr("x", begin[0])
+      .attr("y", begin[1] + below.begin)
+      .attr("text-anchor", "middle")
+      .text("start");
+  svg.append("text")
+      .attr("class", "end-label")
+      .attr("x", end[0])
+      .attr("y", end[1] + below.end)
+      .attr("text-anchor", "middle")
+      .text("end");
 }
 
 function drawCursor(svg, name, at) {
@@ -108,8 +142,12 @@ function drawWalls(figure, {width, height, axes, across, up, exaggeration}) {
   const drawing = figure.select(".drawing");
   drawing.selectAll("canvas").remove();
   const pixels = window.devicePixelRatio || 1;
-  const canvas = drawing.insert("canvas", ":first-child").attr("width", width * pixels).attr("height", height * pixels)
-      .style("width", `${width}px`).style("height", `${height}px`).attr("aria-hidden", "true");
+  const canvas = drawing.insert("canvas", ":first-child")
+                     .attr("width", width * pixels)
+                     .attr("height", height * pixels)
+                     .style("width", `${width}px`)
+                     .style("height", `${height}px`)
+                     .attr("aria-hidden", "true");
   if (exaggeration > 2) return;
   const context = canvas.node().getContext("2d");
   context.scale(pixels, pixels);

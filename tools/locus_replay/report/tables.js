@@ -15,10 +15,15 @@ function table(parent, head, rows) {
   const element = parent.append("div").attr("class", "scroll").append("table");
   element.append("thead").append("tr").selectAll("th").data(head).join("th").attr("scope", "col").text((cell) => cell);
   const row = element.append("tbody").selectAll("tr").data(rows).join("tr");
-  row.each(function (cells) {
-    select(this).selectAll(null).data(cells).enter()
-        .append((_, i) => document.createElement(i === 0 ? "th" : "td")).attr("scope", (_, i) => (i === 0 ? "row" : null))
-        .attr("class", (cell) => (cell?.warning ? "warning" : null)).text((cell) => cell?.text ?? cell);
+  row.each(function(cells) {
+    select(this)
+        .selectAll(null)
+        .data(cells)
+        .enter()
+        .append((_, i) => document.createElement(i === 0 ? "th" : "td"))
+        .attr("scope", (_, i) => (i === 0 ? "row" : null))
+        .attr("class", (cell) => (cell?.warning ? "warning" : null))
+        .text((cell) => cell?.text ?? cell);
   });
   return {head: element.select("thead tr"), rows: row};
 }
@@ -30,24 +35,48 @@ export function stages(figure) {
   const drawing = figure.select(".drawing").html("");
   const kQuantiles = ["p50", "p90", "p99", "max"];
   const rows = Object.entries(run.stages ?? {}).map(([name, took]) => ({name: words(name), took}));
-  rows.push({name: "cut to estimate, CPU", took: summary.process_cpu_ms, total: true},
-            {name: "cut to estimate, by the clock", took: summary.process_ms});
-  const {head, rows: row} = table(drawing, ["CPU time, ms", "mean", ...kQuantiles], rows.map(({name, took}) =>
-      [name, took.mean === undefined ? "" : written(took.mean), ...kQuantiles.map((key) => written(took[key]))]));
+  rows.push(
+      {name: "cut to estimate, CPU", took: summary.process_cpu_ms, total: true},
+      {name: "cut to estimate, by the clock", took: summary.process_ms});
+  const {head, rows: row} = table(
+      drawing, ["CPU time, ms", "mean", ...kQuantiles],
+      rows.map(
+          ({name, took}) =>
+              [name, took.mean === undefined ? "" : written(took.mean),
+               ...kQuantiles.map((key) => written(took[key]))]));
   head.append("th").attr("class", "graph");
   row.classed("total", (_, i) => rows[i].total);
   const scale = scaleLinear([0, 100]).domain([0, max(rows, ({took}) => took.p99) || 1]);
-  row.append("td").attr("class", "graph").append("svg").attr("class", "quantiles").attr("aria-hidden", "true")
-      .each(function (_, i) { drawQuantiles(select(this), rows[i].took, scale); });
-  legend(figure, [{name: "median", draw: (svg) => svg.append("circle").attr("r", 3.5).attr("cx", 11).attr("cy", 6).attr("class", "mean")},
-                  {name: "90 % and 99 % of the sweeps", draw: (svg) => svg.append("path").attr("class", "whisker").attr("d", "M2,6H20M12,2V10M20,2V10")}]);
+  row.append("td")
+      .attr("class", "graph")
+      .append("svg")
+      .attr("class", "quantiles")
+      .attr("aria-hidden", "true")
+      .each(function(_, i) {
+        drawQuantiles(select(this), rows[i].took, scale);
+      });
+  legend(figure, [
+    {
+      name: "median",
+      draw: (svg) => svg.append("circle").attr("r", 3.5).attr("cx", 11).attr("cy", 6).attr("class", "mean")
+    },
+    {
+      name: "90 % and 99 % of the sweeps",
+      draw: (svg) => svg.append("path").attr("class", "whisker").attr("d", "M2,6H20M12,2V10M20,2V10")
+    }
+  ]);
 }
 
 function drawQuantiles(svg, {p50, p90, p99}, scale) {
   const percent = (value) => `${scale(value)}%`;
   svg.append("line").attr("x1", percent(p50)).attr("x2", percent(p99)).attr("y1", "50%").attr("y2", "50%");
   for (const value of [p90, p99])
-    svg.append("line").attr("class", "mark").attr("x1", percent(value)).attr("x2", percent(value)).attr("y1", "22%").attr("y2", "78%");
+    svg.append("line")
+        .attr("class", "mark")
+        .attr("x1", percent(value))
+        .attr("x2", percent(value))
+        .attr("y1", "22%")
+        .attr("y2", "78%");
   svg.append("circle").attr("r", 3.5).attr("cx", percent(p50)).attr("cy", "50%");
 }
 
@@ -69,8 +98,9 @@ export function packets(section) {
 export function sources(section) {
   const drawing = section.select(".drawing").html("");
   const {sweeps, points, iterations_mean: iterations} = summary;
-  table(drawing, ["sweeps", "seen", "processed", "dropped", "failed"],
-        [["", count(sweeps.seen), count(sweeps.processed), mishap(sweeps.dropped), mishap(sweeps.failed)]]);
+  table(
+      drawing, ["sweeps", "seen", "processed", "dropped", "failed"],
+      [["", count(sweeps.seen), count(sweeps.processed), mishap(sweeps.dropped), mishap(sweeps.failed)]]);
   table(drawing, ["mean per sweep", ""], [
     ["returns", count(Math.round(points.raw_mean))],
     ["points registered", count(Math.round(points.filtered_mean))],
@@ -78,12 +108,15 @@ export function sources(section) {
     ["iterations, scan to submap", written(iterations.scan_to_submap)],
   ]);
   const rejections = (rejected) => Object.entries(rejected).filter(([, times]) => times > 0);
-  table(drawing, ["source", "samples", "used in sweeps", "changes of health", "rejected"],
-        Object.entries(summary.sources).map(([name, source]) => {
-          const reasons = rejections(source.rejected).map(([reason, times]) => `${words(reason)} ${count(times)}`);
-          return [name, count(source.received), count(source.used_sweeps), mishap(source.health_changes),
-                  reasons.length > 0 ? {text: `▲ ${reasons.join(", ")}`, warning: true} : "none"];
-        }));
+  table(
+      drawing, ["source", "samples", "used in sweeps", "changes of health", "rejected"],
+      Object.entries(summary.sources).map(([name, source]) => {
+        const reasons = rejections(source.rejected).map(([reason, times]) => `${words(reason)} ${count(times)}`);
+        return [
+          name, count(source.received), count(source.used_sweeps), mishap(source.health_changes),
+          reasons.length > 0 ? {text: `▲ ${reasons.join(", ")}`, warning: true} : "none"
+        ];
+      }));
 }
 
 export function configuration(section) {
