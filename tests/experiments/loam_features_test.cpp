@@ -59,8 +59,8 @@ TEST(LoamFeatures, BorderOfAShadowIsNoEdge) {
   Sweep sweep = turn(range_at);
   keep_loam_features(sweep);
   for (const SweepPoint& point : sweep.points) {
-    const double azimuth = std::atan2(point.position_base_m.y(), point.position_base_m.x());
-    const bool at_shadow = std::abs(azimuth - 2.0) < 0.015 || std::abs(azimuth - 2.2) < 0.015;
+    const float azimuth = std::atan2(point.position_base_m.y(), point.position_base_m.x());
+    const bool at_shadow = std::abs(azimuth - 2.0F) < 0.015F || std::abs(azimuth - 2.2F) < 0.015F;
     EXPECT_FALSE(at_shadow && point.position_base_m.norm() > 7) << azimuth;
   }
 }

@@ -49,7 +49,7 @@ TEST(LocusExperiments, TwoShardsOfAFleetsRecordingsMakeOnePage) {
   }
   const std::string page = read_text(std::filesystem::path(all) / "experiments.html");
   EXPECT_NE(page.find("\"configuration\":\"pace_2cpu\""), std::string::npos);
-  EXPECT_EQ(page.find("@RESULTS@"), std::string::npos);
+  EXPECT_EQ(page.find("@DATA@"), std::string::npos);
 }
 
 TEST(LocusExperiments, LoamFeaturesReplaceTheFilters) {

@@ -44,6 +44,7 @@ class PinnedThread {
 
 int spawn(const std::vector<std::string>& command, const std::filesystem::path& log, pid_t& child) {
   std::vector<char*> argv;
+  argv.reserve(command.size() + 1);
   for (const std::string& word : command)
     argv.push_back(const_cast<char*>(word.c_str())); // NOLINT(cppcoreguidelines-pro-type-const-cast): not written to
   argv.push_back(nullptr);

@@ -102,6 +102,7 @@ void conduct(const std::vector<Task>& tasks, int jobs, bool quiet) {
   std::thread conductor([&] {
     {
       std::vector<std::jthread> workers;
+      workers.reserve(static_cast<std::size_t>(jobs));
       for (int i = 0; i < jobs; ++i)
         workers.emplace_back([&] { work(board, false); });
     }

@@ -8,9 +8,13 @@
 
 #include <fmt/format.h>
 
-#include "locus_experiments/page.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/output_file.hpp"
+#include "pages/data_page.hpp"
+
+// Laid into the program by locus_page() in CMake.
+extern "C" const char locus_experiments_page_begin[]; // NOLINT(modernize-avoid-c-arrays): the linker knows its length
+extern "C" const char locus_experiments_page_end[];   // NOLINT(modernize-avoid-c-arrays)
 
 namespace locus::experiments {
 namespace {
@@ -100,7 +104,8 @@ void write_results(const std::filesystem::path& folder, const Results& results) 
   tools::OutputFile json(folder / kFileName);
   json.print("{}\n", text);
   json.close();
-  write_page(folder / "experiments.html", results);
+  tools::write_data_page(folder / "experiments.html", {locus_experiments_page_begin, locus_experiments_page_end},
+                         results);
 }
 
 } // namespace locus::experiments

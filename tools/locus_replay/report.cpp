@@ -4,16 +4,18 @@
 #include <algorithm>
 #include <cstddef>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "config/config_yaml.hpp"
-#include "locus_replay/output_file.hpp"
 #include "locus_replay/quantiles.hpp"
 #include "locus_replay/report_map.hpp"
-#include "locus_replay/report_page.hpp"
 #include "locus_replay/report_series.hpp"
+#include "pages/data_page.hpp"
+
+// Laid into the program by locus_page() in CMake.
+extern "C" const char locus_report_page_begin[]; // NOLINT(modernize-avoid-c-arrays): its length is the linker's affair
+extern "C" const char locus_report_page_end[];   // NOLINT(modernize-avoid-c-arrays)
 
 namespace locus::tools {
 namespace {
@@ -194,31 +196,13 @@ ordered_json figures(const Report& report) {
   return run;
 }
 
-/// JSON that nothing in it can end the script element of: in a string "<" may be written as its number, and nowhere
-/// else does it occur.
-std::string for_html(const ordered_json& json) {
-  const std::string text = json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
-  std::string safe;
-  safe.reserve(text.size());
-  for (const char character : text) {
-    if (character == '<')
-      safe += "\\u003c";
-    else
-      safe += character;
-  }
-  return safe;
-}
-
 } // namespace
 
 void write_report(const std::filesystem::path& path, const Report& report) {
   ordered_json run{{"summary", report.summary}, {"config", print_config(report.config)}};
   if (!report.sweeps.empty())
     run.update(figures(report));
-  const ReportPage page = report_page();
-  OutputFile file(path);
-  file.print("{}{}{}", page.before_run, for_html(run), page.after_run);
-  file.close();
+  write_data_page(path, {locus_report_page_begin, locus_report_page_end}, run);
 }
 
 } // namespace locus::tools

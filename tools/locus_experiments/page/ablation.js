@@ -4,7 +4,7 @@ import {max, min} from "d3-array";
 import {scaleLinear} from "d3-scale";
 import {line} from "d3-shape";
 
-import {bottomAxis, canvasOf, leftAxis, legend} from "../../locus_replay/report/drawing.js";
+import {bottomAxis, canvasOf, leftAxis, legend, lineSample} from "../../locus_replay/report/drawing.js";
 import {clock, figure as written, timeTicks} from "../../locus_replay/report/format.js";
 import {metreScale} from "./metres.js";
 import {find} from "./results.js";
@@ -32,7 +32,8 @@ export function ablation(figure, width) {
   const span_s = max(drawn, ({result}) => result.position_error.t_s.at(-1));
   const x = scaleLinear([kMargin.left, width - kMargin.right]).domain([0, span_s]);
   const y = metreScale(min(errors_m), max(errors_m), [height - kMargin.bottom, kMargin.top]);
-  bottomAxis(svg, x, {y: height - kMargin.bottom, height: height - kMargin.bottom - kMargin.top, ticks: timeTicks(span_s, width / 90), format: (s) => clock(s)});
+  bottomAxis(svg, x, {y: height - kMargin.bottom, height: height - kMargin.bottom - kMargin.top,
+                      ticks: timeTicks(span_s, width / 90), format: (s) => clock(s)});
   leftAxis(svg, y, {x: kMargin.left, width: width - kMargin.left - kMargin.right, count: 4});
   for (const {result, className} of drawn) {
     const {t_s, error_m} = result.position_error;
@@ -40,15 +41,15 @@ export function ablation(figure, width) {
         .attr("d", line().x((_, i) => x(t_s[i])).y(y)(error_m));
   }
   nameLines(svg, drawn.map(({name, result}) => ({name, at: y(result.position_error.error_m.at(-1))})), width);
-  legend(figure, drawn.map(({name, className}) => ({name, draw: (sample) =>
-      sample.append("line").attr("class", `variant ${className}`).attr("x1", 1).attr("x2", 21).attr("y1", 6).attr("y2", 6)})));
+  legend(figure, drawn.map(({name, className}) => ({name, draw: lineSample(`variant ${className}`)})));
 }
 
 /** Beside the ends of the lines, moved apart where they would cover each other. */
 function nameLines(svg, names, width) {
   names.sort((a, b) => a.at - b.at);
   names.forEach((name, i) => { if (i > 0) name.at = Math.max(name.at, names[i - 1].at + 13); });
-  svg.append("g").selectAll("text").data(names).join("text").attr("x", width - kMargin.right + 6).attr("y", ({at}) => at + 4).text(({name}) => name);
+  svg.append("g").selectAll("text").data(names).join("text").attr("x", width - kMargin.right + 6)
+      .attr("y", ({at}) => at + 4).text(({name}) => name);
 }
 
 export function ablationTable(section) {
@@ -58,7 +59,9 @@ export function ablationTable(section) {
     if (!result?.summary.ape_m) return {cells: [name, what, missing, "", "", "", ""]};
     const {ape_m: ape, process_cpu_ms: cpu, points} = result.summary;
     const share = baseline_ms > 0 ? `${written(cpu.p50 / baseline_ms)} ×` : "–";
-    return {cells: [name, what, metres(ape.mean), metres(ape.max), written(points.filtered_mean), written(cpu.p50), share]};
+    return {cells: [name, what, metres(ape.mean), metres(ape.max), written(points.filtered_mean), written(cpu.p50),
+                    share]};
   });
-  table(section.select(".drawing").html(""), ["", "", "mean APE, m", "max", "points", "CPU ms a sweep", "of baseline"], [{rows}]);
+  table(section.select(".drawing").html(""),
+        ["", "", "mean APE, m", "max", "points", "CPU ms a sweep", "of baseline"], [{rows}]);
 }

@@ -10,7 +10,8 @@ import {accuracy as paper} from "./paper.js";
 import {configurations, courseName, courses, find} from "./results.js";
 import {metres, missing, table} from "./table.js";
 
-const compared = courses.filter((course) => Object.keys(configurations).some((key) => find(course, key)?.summary.ape_m));
+const compared = courses.filter((course) =>
+    Object.keys(configurations).some((key) => find(course, key)?.summary.ape_m));
 
 function ourRow(run, name) {
   const {ape_m: ape, map_error_m: map, rpe_10m_percent: rpe} = run.summary;
@@ -24,35 +25,41 @@ export function accuracyTable(section) {
     const ours = Object.entries(configurations).filter(([key]) => find(course, key)?.summary.ape_m);
     return {
       name: courseName(course),
-      rows: [...theirs.map(({name, ape, map}) => ({cells: [`paper: ${name}`, ...ape.map(written), written(map), "–"]})),
+      rows: [...theirs.map(({name, ape, map}) =>
+                 ({cells: [`paper: ${name}`, ...ape.map(written), written(map), "–"]})),
              ...ours.map(([key, name]) => ourRow(find(course, key), name))],
     };
   });
-  table(section.select(".drawing").html(""), ["", "max APE, m", "mean", "std", "map RMSE, m", "drift over 10 m, %"], groups);
+  table(section.select(".drawing").html(""),
+        ["", "max APE, m", "mean", "std", "map RMSE, m", "drift over 10 m, %"], groups);
 }
 
 const kMargin = {top: 4, right: 24, bottom: 30, left: 24}, kRow = 22, kLabel = 17;
 
 /** One box a run, on a common logarithmic scale. */
 export function boxes(figure, width) {
-  const rows = compared.flatMap((course) => Object.keys(configurations).filter((key) => find(course, key)?.position_error)
+  const rows = compared.flatMap((course) => Object.keys(configurations)
+      .filter((key) => find(course, key)?.position_error)
       .map((key) => ({course, key, box: find(course, key).position_error_quantiles_m})));
   const height = rows.length * (kRow + kLabel) + kMargin.top + kMargin.bottom;
   const svg = canvasOf(figure, width, height, "Position errors of each run");
-  const x = metreScale(min(rows, ({box}) => box.p1), max(rows, ({box}) => box.max), [kMargin.left, width - kMargin.right]);
+  const x = metreScale(min(rows, ({box}) => box.p1), max(rows, ({box}) => box.max),
+                       [kMargin.left, width - kMargin.right]);
   const y = scaleBand([kMargin.top, height - kMargin.bottom]).domain(rows.map((_, i) => i));
   bottomAxis(svg, x, {y: height - kMargin.bottom, height: height - kMargin.bottom - kMargin.top});
   rows.forEach((row, i) => drawBox(svg, row, y(i), x));
-  legend(figure, [{name: "box: half of the sweeps; whiskers: 98 %; dot: the largest"}]);
+  legend(figure, ["box: half of the sweeps", "line: 98 %", "dot: the largest"].map((name) => ({name})));
 }
 
 function drawBox(svg, {course, key, box}, top, x) {
   const middle = top + kLabel + kRow / 2;
   svg.append("text").attr("x", 0).attr("y", top + kLabel - 4).text(`${courseName(course)}: ${configurations[key]}`);
   const group = svg.append("g").attr("class", "box-plot");
-  group.append("line").attr("class", "whisker").attr("x1", x(box.p1)).attr("x2", x(box.p99)).attr("y1", middle).attr("y2", middle);
+  group.append("line").attr("class", "whisker").attr("x1", x(box.p1)).attr("x2", x(box.p99))
+      .attr("y1", middle).attr("y2", middle);
   group.append("rect").attr("class", "box").attr("x", x(box.q1)).attr("width", Math.max(1, x(box.q3) - x(box.q1)))
       .attr("y", middle - 6).attr("height", 12);
-  group.append("line").attr("class", "median").attr("x1", x(box.median)).attr("x2", x(box.median)).attr("y1", middle - 6).attr("y2", middle + 6);
+  group.append("line").attr("class", "median").attr("x1", x(box.median)).attr("x2", x(box.median))
+      .attr("y1", middle - 6).attr("y2", middle + 6);
   group.append("circle").attr("class", "largest").attr("r", 2.75).attr("cx", x(box.max)).attr("cy", middle);
 }

@@ -20,7 +20,8 @@ export function pace(section) {
     const rows = kPaced.map((cpus) => pacedRow(course, cpus));
     const paper = results.simulated && paced[course];
     if (paper)
-      rows.unshift({cells: ["paper: LOCUS", "–", "–", "–", "–", written(paper.dropped), paper.cores ? written(paper.cores) : "–"]});
+      rows.unshift({cells: ["paper: LOCUS", "–", "–", "–", "–", written(paper.dropped),
+                            paper.cores ? written(paper.cores) : "–"]});
     return {name: courseName(course), rows};
   });
   table(section.select(".drawing").html(""),
@@ -39,5 +40,6 @@ export function robustness(section) {
       `max APE ${metres(find(row.course, "locusd").summary.ape_m.max)} m`,
       ...Object.keys(kFailures).map((key) => cell(row, key))]}));
   const theirs = {cells: ["paper: LOCUS", "–", ...Object.keys(kFailures).map((key) => paperRobustness[key])]};
-  table(section.select(".drawing").html(""), ["", "no failure", ...Object.values(kFailures)], [{rows: [theirs, ...ours]}]);
+  table(section.select(".drawing").html(""), ["", "no failure", ...Object.values(kFailures)],
+        [{rows: [theirs, ...ours]}]);
 }

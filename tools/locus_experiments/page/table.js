@@ -11,7 +11,8 @@ export function table(parent, head, groups) {
   for (const {name, rows} of groups) {
     const body = element.append("tbody");
     if (name)
-      body.append("tr").append("th").attr("class", "group").attr("scope", "rowgroup").attr("colspan", head.length).text(name);
+      body.append("tr").append("th").attr("class", "group").attr("scope", "rowgroup").attr("colspan", head.length)
+          .text(name);
     body.selectAll(null).data(rows).enter().append("tr").attr("class", (row) => row.className ?? null)
         .each(function (row) { cells(select(this), row); });
   }
