@@ -58,8 +58,10 @@ RingSegments::Mask RingSegments::beginnings(const Bank& bank, const Salvo& salvo
     const float dy = salvo.y_m[k] - bank.first_y[k];
     const float dz = salvo.z_m[k] - bank.first_z[k];
     const float step_m = std::abs(salvo.range_m[k] - bank.last_range_m[k]);
-    const bool same_surface = (bank.count[k] > 0.0F) & (step_m < kRangeJump_m + kRangeJumpPerRange * salvo.range_m[k]) &
-                              (dx * dx + dy * dy + dz * dz < leaf_m_ * leaf_m_);
+    const float max_step_m = kRangeJump_m + kRangeJumpPerRange * salvo.range_m[k];
+    const bool is_open = bank.count[k] > 0.0F;
+    const bool same_surface =
+        is_open & (step_m < max_step_m) & (dx * dx + dy * dy + dz * dz < leaf_m_ * leaf_m_); // no branch in the loop
     begins[k] = same_surface ? 0 : counts[k];
   }
   return begins;

@@ -32,12 +32,13 @@ struct Moments {
 void normals_of(const Moments& moments, const PerPoint& px, const PerPoint& py, const PerPoint& pz, PerPoint& nx,
                 PerPoint& ny, PerPoint& nz) {
   for (std::size_t i = 0; i < kChunk; ++i) {
-    const float share = 1.0F / moments.count[i];
+    const float count = moments.count[i];
+    const float share = 1.0F / count;
     const float x = share * moments.x[i], y = share * moments.y[i], z = share * moments.z[i];
     const PrincipalAxes<float> axes = principal_axes<float>(
         {share * moments.xx[i] - x * x, share * moments.xy[i] - x * y, share * moments.xz[i] - x * z,
          share * moments.yy[i] - y * y, share * moments.yz[i] - y * z, share * moments.zz[i] - z * z});
-    const bool trusted = (moments.count[i] >= kMinPoints) & (axes.least <= kMaxRoughness_m * kMaxRoughness_m) &
+    const bool trusted = (count >= kMinPoints) & (axes.least <= kMaxRoughness_m * kMaxRoughness_m) &
                          (axes.middle >= kMinMiddleToGreatest * axes.greatest) &
                          (axes.least <= kMaxLeastToMiddle * axes.middle);
     const bool looks_away = axes.x * px[i] + axes.y * py[i] + axes.z * pz[i] > 0.0F;
@@ -116,7 +117,8 @@ void ScanNormals::fit_planes(std::vector<SweepPoint>& points, std::size_t begin)
     for (std::size_t i = 0; i < kChunk; ++i) {
       const std::uint32_t j = neighbours_[begin + i].place[n];
       const float x = x_[j] - px[i], y = y_[j] - py[i], z = z_[j] - pz[i];
-      const float counts = (j != begin + i) & (x * x + y * y + z * z <= reach2[i]) ? 1.0F : 0.0F;
+      const bool is_near = (j != begin + i) & (x * x + y * y + z * z <= reach2[i]);
+      const float counts = is_near ? 1.0F : 0.0F;
       const float cx = counts * x, cy = counts * y, cz = counts * z;
       moments.count[i] += counts;
       moments.x[i] += cx;

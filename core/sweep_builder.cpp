@@ -26,11 +26,12 @@ RingSegments::Mask select(const Salvo& salvo, std::int32_t first_ns, std::int32_
   RingSegments::Mask counts;
   std::int32_t number = 0;
   for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
-    const bool is_return =
-        (salvo.range_m[k] > 0.0F) & (salvo.offset_ns[k] >= first_ns) & (salvo.offset_ns[k] < last_ns);
-    const bool in_range = (salvo.range_m[k] >= min_range_m) & (salvo.range_m[k] <= max_range_m);
+    const float range_m = salvo.range_m[k];
+    const std::int32_t offset_ns = salvo.offset_ns[k];
+    const bool is_return = (range_m > 0.0F) & (offset_ns >= first_ns) & (offset_ns < last_ns); // no branch in the loop
+    const bool in_range = (range_m >= min_range_m) & (range_m <= max_range_m);
     number += is_return ? 1 : 0;
-    counts[k] = is_return & in_range ? -1 : 0;
+    counts[k] = (is_return & in_range) ? -1 : 0;
   }
   fired += static_cast<std::size_t>(number);
   return counts;
