@@ -60,7 +60,7 @@ TEST_F(CaptureFolder, HoldsTwoLidarsInOrderOfArrivalAndAllMotion) {
   EXPECT_EQ(lines("imu.csv"), 402U); // a header, then 200 Hz with both ends
   EXPECT_EQ(lines("wio.tum"), 101U);
   EXPECT_EQ(lines("gt.tum"), 201U);
-  EXPECT_EQ(lines("config.yaml"), 8U);
+  EXPECT_EQ(lines("config.yaml"), 6U);
 }
 
 TEST_F(CaptureFolder, LeavesOutWhatTheRobotDoesNotCarry) {

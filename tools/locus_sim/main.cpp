@@ -44,10 +44,10 @@ void run(const SimArguments& arguments) {
                        [&](double done) { bar.show(done); });
   write_truth_map(arguments.output / "gt_map.ply", world.scene, seen);
   bar.wipe();
-  const double wall_s = to_seconds(daemon::MachineTime::now().wall - begin.wall);
-  fmt::print("{:.0f} m in {:.0f} s, made in {:.1f} s, {:.0f} times as fast as it was driven: {}\n",
-             trajectory.length_m(), to_seconds(arguments.duration), wall_s, to_seconds(arguments.duration) / wall_s,
-             arguments.output.string());
+  const daemon::MachineTime spent = daemon::MachineTime::now() - begin;
+  fmt::print("{}: {:.0f} m in {:.0f} s, {:.0f} times faster than that on one core ({:.1f} s)\n",
+             arguments.output.string(), trajectory.length_m(), to_seconds(arguments.duration),
+             to_seconds(arguments.duration) / to_seconds(spent.cpu), to_seconds(spent.cpu));
 }
 
 } // namespace

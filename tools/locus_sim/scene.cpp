@@ -233,8 +233,12 @@ void Scene::cast_at_movers(const Ray& ray, Stamp stamp, Met& nearest) const {
   }
 }
 
-std::optional<Hit> Scene::cast(const Ray& ray, double max_range_m, Stamp stamp) const {
+std::optional<Hit> Scene::cast(const Ray& ray, double max_range_m, Stamp stamp, const Surface* guess) const {
   Met nearest{.range_m = max_range_m};
+  if (guess != nullptr) {
+    if (const double range = range_m(*guess, ray); range < max_range_m)
+      nearest = {range, guess, nullptr};
+  }
   cast_at_surfaces(ray, nearest);
   cast_at_movers(ray, stamp, nearest);
   if (nearest.surface == nullptr)
@@ -243,7 +247,8 @@ std::optional<Hit> Scene::cast(const Ray& ray, double max_range_m, Stamp stamp) 
   const Eigen::Vector3d own_m = nearest.mover != nullptr ? point_m - nearest.mover->position_m(stamp) : point_m;
   const Eigen::Vector3d normal =
       std::visit([&](const auto& shape) { return shape.normal(own_m); }, nearest.surface->shape);
-  return Hit{point_m, nearest.range_m, std::abs(normal.dot(ray.direction)), nearest.surface->reflectivity};
+  return Hit{point_m, nearest.range_m, std::abs(normal.dot(ray.direction)), nearest.surface->reflectivity,
+             nearest.mover == nullptr ? nearest.surface : nullptr};
 }
 
 double Scene::distance_to_surface(const Eigen::Vector3d& point, Stamp stamp) const {

@@ -17,6 +17,7 @@ struct Hit {
   double range_m;
   double cos_incidence; ///< of the angle between ray and normal, 0..1
   std::uint8_t reflectivity;
+  const Surface* surface; ///< nothing: it moves
 };
 
 /// Something upright that goes to and fro between two places: a person, a forklift.
@@ -36,8 +37,10 @@ class Scene {
  public:
   explicit Scene(std::vector<Surface> surfaces, std::vector<Mover> movers = {});
 
-  /// The first surface within `max_range_m`, or nothing. Where nothing moves, any stamp will do.
-  [[nodiscard]] std::optional<Hit> cast(const Ray& ray, double max_range_m, Stamp stamp = {}) const;
+  /// The first surface within `max_range_m`, or nothing. Where nothing moves, any stamp will do. `guess`, the surface
+  /// that a ray like this one has met, makes it faster.
+  [[nodiscard]] std::optional<Hit> cast(const Ray& ray, double max_range_m, Stamp stamp = {},
+                                        const Surface* guess = nullptr) const;
 
   /// From the point to the nearest surface, seen or hidden.
   [[nodiscard]] double distance_to_surface(const Eigen::Vector3d& point, Stamp stamp = {}) const;

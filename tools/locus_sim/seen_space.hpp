@@ -29,6 +29,17 @@ class SeenSpace {
     return contains(cube) && seen_[index(cube)];
   }
 
+  /// Whether there is any such cube within bounds, or at their edge.
+  [[nodiscard]] bool reaches_into(const Bounds& bounds) const {
+    const Cube first = cube_of(bounds.min_m).max(0), last = cube_of(bounds.max_m).min(size_ - 1);
+    for (std::ptrdiff_t z = first.z(); z <= last.z(); ++z)
+      for (std::ptrdiff_t y = first.y(); y <= last.y(); ++y)
+        for (std::ptrdiff_t x = first.x(); x <= last.x(); ++x)
+          if (seen_[index({x, y, z})])
+            return true;
+    return false;
+  }
+
  private:
   static constexpr double kCube_m = 0.5;
   using Cube = Eigen::Array<std::ptrdiff_t, 3, 1>;

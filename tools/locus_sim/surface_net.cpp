@@ -17,9 +17,9 @@ class Lattice {
       : origin_m_(bounds.min_m), cell_m_(cell_m),
         size_(((bounds.max_m - bounds.min_m) / cell_m).array().ceil().cast<std::ptrdiff_t>() + 1),
         air_(static_cast<std::size_t>(size_.prod())) {
-    for (std::ptrdiff_t z = 0; z < size_.z(); ++z)
+    for (std::ptrdiff_t x = 0; x < size_.x(); ++x)
       for (std::ptrdiff_t y = 0; y < size_.y(); ++y)
-        for (std::ptrdiff_t x = 0; x < size_.x(); ++x)
+        for (std::ptrdiff_t z = 0; z < size_.z(); ++z)
           air_[flat({x, y, z})] = static_cast<float>(air(place_m({x, y, z})));
   }
 
@@ -53,7 +53,7 @@ class Lattice {
 
  private:
   [[nodiscard]] std::size_t flat(const Index& index) const {
-    return static_cast<std::size_t>((index.z() * size_.y() + index.y()) * size_.x() + index.x());
+    return static_cast<std::size_t>((index.x() * size_.y() + index.y()) * size_.z() + index.z());
   }
 
   Eigen::Vector3d origin_m_;
@@ -80,9 +80,9 @@ void add_surface(SceneBuilder& build, const Bounds& bounds, double cell_m,
     build.triangle(around[0], around[2], around[3], bright);
   };
   const Lattice::Index last = lattice.size() - 1;
-  for (std::ptrdiff_t z = 1; z < last.z(); ++z)
+  for (std::ptrdiff_t x = 1; x < last.x(); ++x)
     for (std::ptrdiff_t y = 1; y < last.y(); ++y)
-      for (std::ptrdiff_t x = 1; x < last.x(); ++x)
+      for (std::ptrdiff_t z = 1; z < last.z(); ++z)
         for (std::ptrdiff_t axis = 0; axis < 3; ++axis)
           add_about_edge({x, y, z}, axis);
 }

@@ -8,7 +8,8 @@
 namespace locus::sim {
 
 /// Adds the surface on which a function of space is zero, as triangles about `cell_m` large. Inside the bounds alone.
-/// The function should change by about one per metre near its zero, and tell air (above zero) from rock elsewhere.
+/// The function, asked for in columns from below to above, should change by about one per metre near its zero, and tell
+/// air (above zero) from rock elsewhere.
 ///
 /// Naive surface nets: one vertex in every cell that the surface crosses, at the mean of the crossings of its edges;
 /// one pair of triangles about every edge of the lattice that it crosses.

@@ -148,8 +148,9 @@ void SyntheticLidar::put_echo(std::size_t block, std::size_t channel, const Echo
   put(data_, offset + 2, echo.intensity, 1);
 }
 
-SyntheticLidar::Echoes SyntheticLidar::fire(const Mount& mount, const Aim& aim) {
+SyntheticLidar::Echoes SyntheticLidar::fire(const Mount& mount, Aim& aim) {
   const auto center = look(mount, aim, 0);
+  aim.met = center ? center->surface : nullptr;
   const Echo center_echo = measure(center);
   if (options_.dust > 0 && uniform_(random_) < options_.dust) {
     const Echo grain = measure_dust();
@@ -177,7 +178,7 @@ std::optional<Hit> SyntheticLidar::look(const Mount& mount, const Aim& aim, doub
     aimed = Eigen::AngleAxisd(-aside_rad, mount.R_world_lidar.col(2)) * aimed;
   const Ray ray{mount.position_m + since_s * mount.velocity_mps + aim.origin_z_m * mount.R_world_lidar.col(2),
                 aimed + since_s * mount.angular_velocity_radps.cross(aimed)};
-  return scene_.cast(ray, options_.max_range_m, mount.fired + aim.after);
+  return scene_.cast(ray, options_.max_range_m, mount.fired + aim.after, aim.met);
 }
 
 SyntheticLidar::Echo SyntheticLidar::measure(const std::optional<Hit>& hit) {
@@ -190,7 +191,7 @@ SyntheticLidar::Echo SyntheticLidar::measure(const std::optional<Hit>& hit) {
     if (is_lost(strength))
       return {};
     noise_m *= 1 + 1 / strength;
-    brightness *= 0.5 * (1 + hit->cos_incidence) * (1 + 0.05 * normal_(random_)); // not quite calibrated away
+    brightness *= 0.5 * (1 + hit->cos_incidence) * (0.9 + 0.2 * uniform_(random_)); // not quite calibrated away
   }
   const double range_m = noise_m > 0 ? hit->range_m + noise_m * normal_(random_) : hit->range_m;
   const double ticks = std::round(range_m / spec_.calibration.distance_resolution_m);

@@ -62,7 +62,8 @@ class SyntheticLidar {
   struct Aim { ///< of a firing, in the frame of the lidar, as if its column had azimuth 0
     Eigen::Vector3d direction;
     double origin_z_m;
-    Duration after; ///< the column's first firing
+    Duration after;               ///< the column's first firing
+    const Surface* met = nullptr; ///< by the ray of the column before
   };
   struct Echo {
     std::uint16_t ticks = 0; ///< of the model's distance resolution; 0: none
@@ -77,7 +78,7 @@ class SyntheticLidar {
   void fill_column(std::size_t column);
   void put_block_headers(std::size_t column, Stamp fired);
   void put_echo(std::size_t block, std::size_t channel, const Echo& echo);
-  Echoes fire(const Mount& mount, const Aim& aim);
+  Echoes fire(const Mount& mount, Aim& aim);
   [[nodiscard]] std::optional<Hit> look(const Mount& mount, const Aim& aim, double aside_rad) const;
   Echo measure(const std::optional<Hit>& hit);
   Echo measure_dust();

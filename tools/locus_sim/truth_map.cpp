@@ -84,8 +84,10 @@ template <class Sink> void for_each_point(const Scene& scene, const SeenSpace& s
       sink(point);
   };
   const Sampler sampler(if_seen);
-  for (const Surface& surface : scene.surfaces())
-    std::visit(sampler, surface.shape);
+  for (const Surface& surface : scene.surfaces()) {
+    if (seen.reaches_into(std::visit([](const auto& shape) { return shape.bounds(); }, surface.shape)))
+      std::visit(sampler, surface.shape);
+  }
 }
 
 } // namespace

@@ -53,25 +53,27 @@ Jet ground_m(const Jet& x, const Jet& y) {
 /// Above zero in the air of the drifts: beneath an arch that was blasted, not built, over a trodden floor.
 class Drifts {
  public:
-  Drifts(const Roads& roads, std::uint64_t seed) : roads_(roads), rock_(seed) {}
+  Drifts(const Roads& roads, std::uint64_t seed) : roads_(roads), rock_(seed), aside_m_(roads.distance_m(place_m_)) {}
 
-  double operator()(const Eigen::Vector3d& point) const {
-    const double aside_m = distance_to_road_m(point.head<2>());
-    if (aside_m > kHalfWidth_m + 1.5)
+  double operator()(const Eigen::Vector3d& point) {
+    if (point.head<2>() != place_m_) { // asked for from below to above, again and again at one place
+      place_m_ = point.head<2>();
+      aside_m_ = roads_.distance_m(place_m_);
+    }
+    if (aside_m_ > kHalfWidth_m + 1.5)
       return -1;
     const double up_m = point.z() - ground_m(point.x(), point.y()).value;
     const double rough_m = 0.28 * rock_(point / 2.7) + 0.14 * rock_(point / 1.1);
     const double arch =
-        std::pow(std::pow(aside_m / kHalfWidth_m, 4) + std::pow(std::max(0.0, up_m) / kRoof_m, 4), 0.25);
+        std::pow(std::pow(aside_m_ / kHalfWidth_m, 4) + std::pow(std::max(0.0, up_m) / kRoof_m, 4), 0.25);
     return std::min(up_m - 0.12 * rough_m, kHalfWidth_m * (1 - arch) + rough_m);
   }
 
  private:
-  /// Columns are asked for from below to above again and again, always about the same places.
-  [[nodiscard]] double distance_to_road_m(const Eigen::Vector2d& place) const { return roads_.distance_m(place); }
-
   const Roads& roads_;
   Noise rock_;
+  Eigen::Vector2d place_m_{-1, -1};
+  double aside_m_; ///< of that place
 };
 
 } // namespace
