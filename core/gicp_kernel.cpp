@@ -7,9 +7,15 @@ namespace locus {
 
 namespace {
 
-/// Surfaces say nothing along themselves: a variance there that is large against every residual (Segal's 1 to epsilon).
-constexpr float kAlongVariance_m2 = 1.0F;
-constexpr float kPointVariance_m2 = 0.02F * 0.02F;
+/// A surface of the target says nothing along itself: a variance there that is large against every residual (Segal's 1
+/// to epsilon).
+constexpr float kAlongVariance_m2 = 100.0F;
+
+/// A point of the source reaches no farther along its surface than the arc it stands for. Were it as wide as the
+/// target, a normal wrong by one degree would cost the point its weight, and the few luckiest normals would decide.
+constexpr float kAlongSourceVariance_m2 = 0.1F * 0.1F;
+
+constexpr float kPointVariance_m2 = 0.01F * 0.01F; ///< as in the grid
 
 /// Points farther than this from the origin have no counterpart: no lidar sees so far, and single precision counts
 /// there in tenths of a millimetre.
@@ -120,14 +126,15 @@ void find_here(const GicpPass& pass, const Placed& points, std::size_t count, Ma
   }
 }
 
-/// Near each point: in the fine grid if there is one within reach, else in the coarse one.
+/// Near each point: in the coarse grid if there is one within reach, else in the fine one. From afar the nearest of the
+/// small voxels is rarely the right one.
 void find_around(const GicpPass& pass, const Placed& points, std::size_t count, MatchBlock& matches) {
   Places near;
   count = take_near_ones(points, count, near);
   for (const std::uint32_t i : std::span(near).first(count)) {
-    Counterpart match = nearest_around(pass, pass.target.fine(), points[i]);
+    Counterpart match = nearest_around(pass, pass.target.coarse(), points[i]);
     if (match.surface == nullptr)
-      match = nearest_around(pass, pass.target.coarse(), points[i]);
+      match = nearest_around(pass, pass.target.fine(), points[i]);
     put(match, i, matches);
   }
 }
@@ -355,7 +362,7 @@ SourceBlock::SourceBlock(std::span<const SurfacePoint> points) : count(points.si
     normal_x[i] = normal.x();
     normal_y[i] = normal.y();
     normal_z[i] = normal.z();
-    along_m2[i] = normal.isZero() ? kPointVariance_m2 : kAlongVariance_m2;
+    along_m2[i] = normal.isZero() ? kPointVariance_m2 : kAlongSourceVariance_m2;
   }
 }
 

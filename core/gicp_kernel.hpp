@@ -59,7 +59,7 @@ struct NormalEquations {
 enum class LookUp {
   keep,   ///< those of the pass before
   here,   ///< the plane of the voxel around the point, fine or else coarse
-  around, ///< the nearest plane of the 27 voxels around it, fine or else coarse
+  around, ///< the nearest plane of the 27 voxels around it, coarse or else fine
 };
 
 /// One pass over some of the points: finds their counterparts and sums the normal equations at T_target_source.

@@ -24,8 +24,8 @@ constexpr double kDamping = 1e-6; ///< keeps directions solvable that neither po
 
 /// Geman-McClure width in standard deviations: begins wide to reach far, halves with each look-up to shut out what does
 /// not fit.
-constexpr double kWidthStartWide = 40.0;
-constexpr double kWidthStart = 6.0;
+constexpr double kWidthStartWide = 80.0;
+constexpr double kWidthStart = 12.0;
 constexpr double kWidthEnd = 3.0;
 
 constexpr double kConvergedTranslation_m = 5e-4;

@@ -14,7 +14,8 @@ namespace {
 constexpr float kMaxBend_m = 0.04F;
 
 constexpr std::size_t kLinesPerLidar = 256;
-constexpr float kMinLeaf_m = 0.1F;
+constexpr float kFirstLeaf_m = 0.1F;
+constexpr float kMinLeaf_m = 0.05F;
 constexpr float kMaxLeaf_m = 0.4F;
 
 /// A step in range larger than this between neighbouring returns is another surface.
@@ -33,7 +34,7 @@ template <class Visit> void for_each_set(const RingSegments::Mask& mask, const V
 } // namespace
 
 RingSegments::RingSegments(std::size_t lidars, std::size_t points_wanted)
-    : points_wanted_(points_wanted), leaf_m_(kMinLeaf_m), lidars_(lidars), line_begin_(lidars * kLinesPerLidar + 1) {
+    : points_wanted_(points_wanted), leaf_m_(kFirstLeaf_m), lidars_(lidars), line_begin_(lidars * kLinesPerLidar + 1) {
   segments_.reserve(kMaxSegments);
   place_.reserve(kMaxSegments);
 }
