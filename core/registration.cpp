@@ -26,7 +26,7 @@ constexpr double kDamping = 1e-6; ///< keeps directions solvable that neither po
 /// not fit.
 constexpr double kWidthStartWide = 80.0;
 constexpr double kWidthStart = 12.0;
-constexpr double kWidthEnd = 3.0;
+constexpr double kWidthEnd = 3.5;
 
 constexpr double kConvergedTranslation_m = 5e-4;
 constexpr double kConvergedRotation_rad = 5e-5;

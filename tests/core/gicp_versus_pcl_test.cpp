@@ -134,9 +134,9 @@ Outcome align_with_pcl(const View& target, const View& source, const Pose& truth
 }
 
 /// Ours must converge at least as often and err by no more metres. `rotation_share` is how many times PCL's error of
-/// rotation ours may have: the aim is 1 and is not reached everywhere. A lidar that stands hits the same points again
-/// in every sweep, and point-to-point matching locks onto that pattern, which planes ignore by design: on a robot that
-/// moves it is a bias.
+/// rotation ours may have: the aim is 1 and is reached but for one pair, where PCL's error is less than the noise allows
+/// to know: aligning the same returns of both sweeps with each other leaves 0.03 deg, and over ten pairs of that capture
+/// PCL errs by 0.069 deg (root mean square), ours by 0.029.
 void expect_ours_is_as_good(const View& target, const View& source, const Pose& truth, double rotation_share) {
   const Outcome ours = align_ours(target, source, truth);
   const Outcome pcl = align_with_pcl(target, source, truth);
@@ -172,7 +172,7 @@ TEST(GicpVersusPcl, InARoom) {
 
 TEST(GicpVersusPcl, InAPlant) {
   expect_ours_is_as_good_between(sim::plant(), {.position_m = {15.0, 14.8}, .heading_rad = 0.1},
-                                 {.position_m = {15.9, 14.9}, .heading_rad = -0.1}, 1.5); // measured 1.3
+                                 {.position_m = {15.9, 14.9}, .heading_rad = -0.1}, 1.0);
 }
 
 struct RealPair {
@@ -194,8 +194,8 @@ TEST_P(GicpVersusPclOnRealPair, OfAStandingLidar) {
 
 INSTANTIATE_TEST_SUITE_P(Captures, GicpVersusPclOnRealPair,
                          testing::Values(RealPair{"hdl32e_static_monterey", 3, 1.0},
-                                         RealPair{"vlp16_static_1200rpm_product21", 20, 3.5}, // measured 3.1
-                                         RealPair{"vlp16_static_gps_pps", 2, 2.0}),           // measured 1.6
+                                         RealPair{"vlp16_static_1200rpm_product21", 20, 3.5}, // measured 3.2
+                                         RealPair{"vlp16_static_gps_pps", 2, 1.0}),
                          [](const auto& test) { return std::string{test.param.recording}; });
 
 } // namespace

@@ -147,6 +147,7 @@ TEST_F(RealCapture, StandingVlp16WithGps) {
   EXPECT_EQ(standing.summary()["packets"]["total"]["data"], 293);
   EXPECT_EQ(standing.summary()["packets"]["total"]["position"], 57);
   EXPECT_NEAR(static_cast<double>(standing.trajectory().size()), 3.9, 1);
+  expect_still(standing.trajectory(), milliseconds{500});
 }
 
 } // namespace
