@@ -22,11 +22,12 @@ constexpr double kFewPlanes = 0.4;
 
 constexpr double kDamping = 1e-6; ///< keeps directions solvable that neither points nor prior know
 
-/// Geman-McClure width in standard deviations: begins wide to reach far, halves with each look-up to shut out what does
+/// Geman-McClure width in standard deviations: begins wide to reach far, narrows with each look-up to shut out what does
 /// not fit.
 constexpr double kWidthStartWide = 80.0;
 constexpr double kWidthStart = 12.0;
 constexpr double kWidthEnd = 3.5;
+constexpr double kNarrowing = 0.3;
 
 constexpr double kConvergedTranslation_m = 5e-4;
 constexpr double kConvergedRotation_rad = 5e-5;
@@ -116,7 +117,7 @@ Registration Gicp::align(std::span<const SurfacePoint> source, const SurfaceMap&
     const Pose& T = result.T_target_source;
     const bool looks_up = result.iterations % kStepsPerLookUp == 0;
     if (looks_up && result.iterations > 0)
-      width = std::max(0.5 * width, kWidthEnd);
+      width = std::max(kNarrowing * width, kWidthEnd);
     const LookUp anew = wide && width > kWidthStart ? LookUp::around : LookUp::here;
     const NormalEquations points = workers_->run({target, T, T_start.translation, looks_up ? anew : LookUp::keep,
                                                   few_planes, options.max_correspondence_m, width * width});
