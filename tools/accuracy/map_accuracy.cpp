@@ -112,7 +112,7 @@ Expected<MapAccuracy, std::string> map_accuracy(std::span<const Eigen::Vector3f>
   const Expected<Points, std::string> thinned = thinned_truth(walker);
   if (!thinned)
     return thinned.error();
-  const Pose T_fitted_map = icp(some_of(map_odom, kMaxIcpPoints), *thinned, kOutlier_m);
+  const Pose T_fitted_map = icp(some_of(map_odom, kMaxIcpPoints), *thinned, static_cast<double>(kOutlier_m));
   const Expected<std::vector<float>, std::string> distances_m = distances_to(walker, moved(map_odom, T_fitted_map));
   if (!distances_m)
     return distances_m.error();
