@@ -4,7 +4,7 @@
 # robot that it first lets drive through a simulated power plant for a minute. Prints the figures and where the report
 # lies.
 set -euo pipefail
-capture=${1:+$(realpath "$1")}
+capture=${1:+$(realpath -e "$1")} # says so at once if there is none
 cd "$(dirname "$0")"
 
 packaging/install-build-deps.sh

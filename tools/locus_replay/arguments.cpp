@@ -34,7 +34,7 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
                  "gt.tum, gt_map.ply")
       ->required();
   app.add_option("-o,--output", arguments.output,
-                 "Folder for odometry.tum, odometry.csv, map.pcd and summary.json; made if need be")
+                 "Folder for odometry.tum, odometry.csv, map.pcd, report.html and summary.json; made if need be")
       ->required()
       ->type_name("DIR");
   app.add_option("-c,--config", arguments.config, "Configuration; default: the folder's config.yaml, else defaults")
