@@ -3,7 +3,7 @@
 
 #include <chrono>
 
-#include "locus_sim/capture_folder_writer.hpp"
+#include "locus_sim/capture_writer.hpp"
 #include "replay_run.hpp"
 #include "support/scenes.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "locus_sim/capture_folder_writer.hpp"
+#include "locus_sim/capture_writer.hpp"
 
 #include <gtest/gtest.h>
 

@@ -84,7 +84,10 @@ std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
   app.add_option("--dust", arguments.sensors.dust, "Share of the laser pulses that meet dust, 0..1")
       ->type_name("P")
       ->check(number_between(0, 1));
-  app.add_option("-o,--output", arguments.output, "Capture folder; made if need be")->required()->type_name("DIR");
+  app.add_option("-o,--output", arguments.output,
+                 "Capture folder; made if need be. -: a stream on standard output, for locus-play")
+      ->required()
+      ->type_name("DIR");
   app.set_version_flag("--version", "locus-sim " LOCUS_VERSION);
   app.footer(
       "Writes lidar.pcap, imu.csv, one NAME.tum per odometry source, gt.tum, gt_map.ply and config.yaml. The same\n"

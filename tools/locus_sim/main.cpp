@@ -11,9 +11,11 @@
 #include "locus_replay/failure.hpp"
 #include "locus_replay/progress_bar.hpp"
 #include "locus_sim/arguments.hpp"
-#include "locus_sim/capture_folder_writer.hpp"
+#include "locus_sim/capture_writer.hpp"
 #include "locus_sim/driver.hpp"
+#include "locus_sim/folder_sink.hpp"
 #include "locus_sim/seen_space.hpp"
+#include "locus_sim/stream_sink.hpp"
 #include "locus_sim/truth_map.hpp"
 
 namespace locus::tools {
@@ -38,10 +40,16 @@ void run(const SimArguments& arguments) {
   const sim::World world = arguments.world.make(arguments.seed);
   const sim::Robot robot = arguments.robot.make(arguments.sensors, arguments.seed);
   const sim::Trajectory trajectory = drive(world, robot, arguments);
+  if (arguments.output == "-") {
+    sim::StreamSink sink;
+    write_capture(sink, world.scene, trajectory, arguments.duration, robot.sensors);
+    return;
+  }
+  sim::FolderSink sink(arguments.output);
   sim::SeenSpace seen(world.scene.bounds());
   ProgressBar bar(true);
-  write_capture_folder(arguments.output, world.scene, trajectory, arguments.duration, robot.sensors, &seen,
-                       [&](double done) { bar.show(done); });
+  write_capture(sink, world.scene, trajectory, arguments.duration, robot.sensors, &seen,
+                [&](double done) { bar.show(done); });
   write_truth_map(arguments.output / "gt_map.ply", world.scene, seen);
   bar.wipe();
   const daemon::MachineTime spent = daemon::MachineTime::now() - begin;

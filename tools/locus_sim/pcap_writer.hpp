@@ -2,17 +2,21 @@
 #pragma once
 
 #include <algorithm>
+#include <cerrno>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include <pcap/pcap.h>
 
 #include "core/stamp.hpp"
+#include "drivers/datagram.hpp"
 
 namespace locus::sim {
 
@@ -76,13 +80,13 @@ inline Bytes ethernet(std::span<const std::byte> packet, std::uint16_t ether_typ
   return frame;
 }
 
-/// Writes capture files for tests: nanosecond pcap, Ethernet unless another link type is asked for. The file is
-/// complete once the writer is gone. Throws std::runtime_error when it cannot write.
+/// Writes capture files: nanosecond pcap, Ethernet unless another link type is asked for; "-" is standard output. The
+/// file is complete once the writer is gone. Throws std::runtime_error when it cannot write.
 class PcapWriter {
  public:
   explicit PcapWriter(const std::filesystem::path& path, int link_type = DLT_EN10MB)
       : pcap_(pcap_open_dead_with_tstamp_precision(link_type, 65535, PCAP_TSTAMP_PRECISION_NANO)),
-        dumper_(pcap_dump_open(pcap_, path.c_str())) {
+        dumper_(pcap_dump_open(pcap_, path.c_str())), path_(path.string()) {
     if (dumper_ == nullptr) {
       const std::string reason = pcap_geterr(pcap_);
       pcap_close(pcap_);
@@ -102,6 +106,19 @@ class PcapWriter {
     write_frame(stamp, ethernet(ipv4_udp({source_ip, source_port, destination_ip, destination_port}, payload)));
   }
 
+  /// As it was sent: to everyone.
+  void write(const Datagram& datagram) {
+    write(datagram.receive_stamp, datagram.source_ip, datagram.source_port, UdpAddresses{}.destination_ip,
+          datagram.destination_port, datagram.payload);
+  }
+
+  /// Throws unless everything has reached the file.
+  void flush() {
+    if (pcap_dump_flush(dumper_) != 0 || std::ferror(pcap_dump_file(dumper_)) != 0)
+      throw std::runtime_error(path_ + ": cannot be written (" + std::generic_category().message(errno) +
+                               "); check permissions and free space");
+  }
+
   /// Any bytes as one captured frame, of which only the first `snap_length` are kept.
   void write_frame(Stamp stamp, std::span<const std::byte> frame, std::size_t snap_length = 65535) {
     pcap_pkthdr header{};
@@ -116,6 +133,7 @@ class PcapWriter {
  private:
   pcap_t* pcap_;
   pcap_dumper_t* dumper_;
+  std::string path_;
 };
 
 } // namespace locus::sim

@@ -4,7 +4,7 @@
 #include <array>
 #include <string_view>
 
-#include "locus_sim/capture_folder_writer.hpp"
+#include "locus_sim/capture_writer.hpp"
 #include "locus_sim/driver.hpp"
 
 namespace locus::sim {

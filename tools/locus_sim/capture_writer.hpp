@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "locus_sim/capture_sink.hpp"
 #include "locus_sim/scene.hpp"
 #include "locus_sim/seen_space.hpp"
 #include "locus_sim/synthetic_lidar.hpp"
@@ -40,13 +41,16 @@ struct RobotOptions {
   std::uint64_t seed = 1;                       ///< of IMU and odometry; lidars have their own
 };
 
-/// Drives a robot through a scene for `duration` and writes what its sensors saw as a capture folder: lidar.pcap,
-/// imu.csv, NAME.tum of each odometry source, the true poses as gt.tum (100 Hz) and a config.yaml that names the
-/// sensors and overrides nothing else. Makes the folder. `seen` takes note of every surface point that a lidar meets;
-/// `progress` is told what share of the duration is done. Throws std::runtime_error when it cannot write.
-void write_capture_folder(
-    const std::filesystem::path& folder, const Scene& scene, const Trajectory& trajectory, Duration duration,
-    const RobotOptions& robot, SeenSpace* seen = nullptr,
-    const std::function<void(double done)>& progress = [](double) {});
+/// Drives a robot through a scene for `duration` and hands over, in the order of arrival, what its sensors saw: the
+/// datagrams of its lidars, imu.csv, NAME.tum of each odometry source, the true poses as gt.tum (100 Hz); first of all
+/// a config.yaml that names the sensors and overrides nothing else. `seen` takes note of every surface point that an
+/// echo comes from; `progress` is told what share of the duration is done. What the sink throws passes through.
+void write_capture(
+    CaptureSink& sink, const Scene& scene, const Trajectory& trajectory, Duration duration, const RobotOptions& robot,
+    SeenSpace* seen = nullptr, const std::function<void(double done)>& progress = [](double) {});
+
+/// The same, as a capture folder, which it makes.
+void write_capture_folder(const std::filesystem::path& folder, const Scene& scene, const Trajectory& trajectory,
+                          Duration duration, const RobotOptions& robot);
 
 } // namespace locus::sim

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_sim/capture_writer.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numbers>
+#include <utility>
+
+#include "locus_sim/folder_sink.hpp"
+
+namespace locus::sim {
+namespace {
+
+constexpr double kImuRate_hz = 200, kTruthRate_hz = 100;
+
+/// One line of a TUM file; integer arithmetic keeps the stamp to the nanosecond.
+std::string tum_line(Stamp stamp, const Pose& pose) {
+  const std::int64_t ns = to_ns(stamp);
+  const Eigen::Vector3d& p = pose.translation;
+  const Eigen::Quaterniond& q = pose.rotation;
+  return fmt::format("{}.{:09} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", ns / 1'000'000'000,
+                     ns % 1'000'000'000, p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w());
+}
+
+std::string imu_line(const ImuSample& sample) {
+  const Eigen::Vector3d &w = sample.angular_velocity_radps, &a = sample.specific_force_mps2;
+  const Eigen::Quaterniond& q = *sample.attitude;
+  return fmt::format("{},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}\n", to_ns(sample.stamp),
+                     w.x(), w.y(), w.z(), a.x(), a.y(), a.z(), q.w(), q.x(), q.y(), q.z());
+}
+
+struct Line {
+  Stamp arrival;
+  std::string text;
+};
+
+/// A file that grows line by line, one line ahead of what has been written.
+class LineSource {
+ public:
+  LineSource(std::string file, std::function<Line()> make)
+      : file_(std::move(file)), make_(std::move(make)), next_(make_()) {}
+
+  void write_until(Stamp stamp, CaptureSink& sink) {
+    for (; next_.arrival <= stamp; next_ = make_())
+      sink.text(file_, next_.arrival, next_.text);
+  }
+
+ private:
+  std::string file_;
+  std::function<Line()> make_;
+  Line next_;
+};
+
+std::vector<LineSource> line_sources(const Trajectory& trajectory, const RobotOptions& robot) {
+  std::vector<LineSource> sources;
+  std::uint64_t seed = robot.seed;
+  if (robot.imu)
+    sources.emplace_back("imu.csv", [imu = SyntheticImu(trajectory, kImuRate_hz, robot.imu->faults, seed,
+                                                        robot.imu->T_base_imu)]() mutable {
+      const ImuSample sample = imu.next();
+      return Line{sample.arrival, imu_line(sample)};
+    });
+  for (const NamedOdometry& odometry : robot.odometry)
+    sources.emplace_back(odometry.name + ".tum",
+                         [source = SyntheticOdometry(trajectory, odometry.rate_hz, odometry.faults, ++seed)]() mutable {
+                           const OdometrySample sample = source.next();
+                           return Line{sample.arrival, tum_line(sample.stamp, sample.T_source_base)};
+                         });
+  sources.emplace_back("gt.tum", [&trajectory, next = trajectory.start()]() mutable {
+    const Stamp stamp = std::exchange(next, next + from_seconds(1 / kTruthRate_hz));
+    return Line{stamp, tum_line(stamp, trajectory.T_world_base(stamp))};
+  });
+  return sources;
+}
+
+/// All lidars as one stream of datagrams, in the order in which they arrive. One owner.
+class Lidars {
+ public:
+  Lidars(const Scene& scene, const Trajectory& trajectory, const std::vector<NamedLidar>& lidars, SeenSpace* seen) {
+    for (const NamedLidar& lidar : lidars)
+      lidars_.emplace_back(scene, trajectory, lidar.options, seen);
+    for (SyntheticLidar& lidar : lidars_)
+      waiting_.push_back(lidar.next());
+  }
+
+  /// Of the next to come; there is always one.
+  [[nodiscard]] const Datagram& front() const { return waiting_[earliest()]; }
+  void pop() {
+    const std::size_t index = earliest();
+    waiting_[index] = lidars_[index].next();
+  }
+
+ private:
+  [[nodiscard]] std::size_t earliest() const {
+    const auto found = std::min_element(waiting_.begin(), waiting_.end(), [](const Datagram& a, const Datagram& b) {
+      return a.receive_stamp < b.receive_stamp;
+    });
+    return static_cast<std::size_t>(found - waiting_.begin());
+  }
+
+  std::vector<SyntheticLidar> lidars_;
+  std::vector<Datagram> waiting_;
+};
+
+std::string dotted(std::uint32_t ip) {
+  return fmt::format("{}.{}.{}.{}", ip >> 24, ip >> 16 & 0xFFu, ip >> 8 & 0xFFu, ip & 0xFFu);
+}
+
+std::string yaml(const Pose& pose) {
+  const Eigen::Vector3d& xyz_m = pose.translation;
+  const Eigen::Vector3d rpy_deg = to_rpy_rad(pose.rotation) * (180 / std::numbers::pi) + Eigen::Vector3d::Zero();
+  return fmt::format("{{xyz_m: [{:.6f}, {:.6f}, {:.6f}], rpy_deg: [{:.6f}, {:.6f}, {:.6f}]}}", xyz_m.x(), xyz_m.y(),
+                     xyz_m.z(), rpy_deg.x(), rpy_deg.y(), rpy_deg.z());
+}
+
+std::string configuration(const RobotOptions& robot) {
+  std::string text = "lidars:\n";
+  for (const auto& [name, options] : robot.lidars)
+    text += fmt::format("  - {{name: {}, model: {}, port: {}, source_ip: {}, T_base_lidar: {}}}\n", name,
+                        to_string(options.model), options.port, dotted(options.source_ip), yaml(options.T_base_lidar));
+  text += fmt::format("motion_sources:{}\n", robot.odometry.empty() && !robot.imu ? " []" : "");
+  for (const NamedOdometry& odometry : robot.odometry)
+    text += fmt::format("  - {{name: {}, kind: odometry, topic: {}}}\n", odometry.name, odometry.topic);
+  if (robot.imu)
+    text +=
+        fmt::format("  - {{name: imu, kind: imu, topic: /imu/data, T_base_source: {}}}\n", yaml(robot.imu->T_base_imu));
+  return text;
+}
+
+} // namespace
+
+void write_capture(CaptureSink& sink, const Scene& scene, const Trajectory& trajectory, Duration duration,
+                   const RobotOptions& robot, SeenSpace* seen, const std::function<void(double)>& progress) {
+  const Stamp start = trajectory.start(), end = start + duration;
+  sink.text("config.yaml", start, configuration(robot));
+  if (robot.imu)
+    sink.text("imu.csv", start, "#t_ns,wx,wy,wz,ax,ay,az,qw,qx,qy,qz\n");
+  std::vector<LineSource> texts = line_sources(trajectory, robot);
+  const auto write_texts_until = [&](Stamp stamp) {
+    for (LineSource& text : texts)
+      text.write_until(stamp, sink);
+  };
+  for (Lidars lidars(scene, trajectory, robot.lidars, seen); lidars.front().receive_stamp <= end; lidars.pop()) {
+    write_texts_until(lidars.front().receive_stamp);
+    sink.datagram(lidars.front());
+    progress(to_seconds(lidars.front().receive_stamp - start) / to_seconds(duration));
+  }
+  write_texts_until(end);
+  sink.close();
+}
+
+void write_capture_folder(const std::filesystem::path& folder, const Scene& scene, const Trajectory& trajectory,
+                          Duration duration, const RobotOptions& robot) {
+  FolderSink sink(folder);
+  write_capture(sink, scene, trajectory, duration, robot);
+}
+
+} // namespace locus::sim

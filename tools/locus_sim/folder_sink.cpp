@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_sim/folder_sink.hpp"
+
+#include <system_error>
+
+#include <fmt/format.h>
+
+namespace locus::sim {
+namespace {
+
+std::filesystem::path made(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error)
+    throw tools::Failure(tools::ExitStatus::failed, fmt::format("{}: no folder can be made there ({}); choose another",
+                                                                folder.string(), error.message()));
+  return folder;
+}
+
+} // namespace
+
+FolderSink::FolderSink(const std::filesystem::path& folder) : folder_(made(folder)), pcap_(folder / "lidar.pcap") {}
+
+void FolderSink::datagram(const Datagram& datagram) { pcap_.write(datagram); }
+
+void FolderSink::text(std::string_view file, Stamp, const std::string& lines) {
+  auto open = files_.find(file);
+  if (open == files_.end())
+    open = files_.emplace(file, folder_ / file).first;
+  open->second.print("{}", lines);
+}
+
+void FolderSink::close() {
+  pcap_.flush();
+  for (auto& [name, file] : files_)
+    file.close();
+}
+
+} // namespace locus::sim

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "locus_sim/capture_sink.hpp"
+#include "locus_sim/pcap_writer.hpp"
+
+namespace locus::sim {
+
+/// The port that texts in a stream are addressed to: discard, so that nobody takes them for a lidar's.
+inline constexpr std::uint16_t kTextPort = 9;
+
+/// A capture on standard output, for a program that plays it on as it comes (`locus-sim -o - | locus-play -`).
+///
+/// The stream is a pcap file (nanoseconds, Ethernet, IPv4, UDP), its packets in the order of arrival. The datagrams of
+/// the lidars stand in it as in lidar.pcap. The other files of a capture folder come in pieces: a datagram from
+/// 127.0.0.1 to 127.0.0.1, port 9, whose payload is the name of the file, a line feed, and whole lines to be appended
+/// to it. config.yaml comes first and in one piece, its packet stamped with the start. There is no gt_map.ply: what was
+/// seen is known only at the end. Any reader of pcap files can look at it, and all but the texts can be replayed.
+class StreamSink : public CaptureSink {
+ public:
+  void datagram(const Datagram& datagram) override { pcap_.write(datagram); }
+  void text(std::string_view file, Stamp arrival, const std::string& lines) override;
+  void close() override { pcap_.flush(); }
+
+ private:
+  PcapWriter pcap_{"-"};
+};
+
+} // namespace locus::sim
