@@ -22,8 +22,8 @@ constexpr double kFewPlanes = 0.4;
 
 constexpr double kDamping = 1e-6; ///< keeps directions solvable that neither points nor prior know
 
-/// Geman-McClure width in standard deviations: begins wide to reach far, narrows with each look-up to shut out what does
-/// not fit.
+/// Geman-McClure width in standard deviations: begins wide to reach far, narrows with each look-up to shut out what
+/// does not fit.
 constexpr double kWidthStartWide = 80.0;
 constexpr double kWidthStart = 12.0;
 constexpr double kWidthEnd = 3.5;

@@ -134,9 +134,9 @@ Outcome align_with_pcl(const View& target, const View& source, const Pose& truth
 }
 
 /// Ours must converge at least as often and err by no more metres. `rotation_share` is how many times PCL's error of
-/// rotation ours may have: the aim is 1 and is reached but for one pair, where PCL's error is less than the noise allows
-/// to know: aligning the same returns of both sweeps with each other leaves 0.03 deg, and over ten pairs of that capture
-/// PCL errs by 0.069 deg (root mean square), ours by 0.029.
+/// rotation ours may have: the aim is 1 and is reached but for one pair, where PCL's error is less than the noise
+/// allows to know: aligning the same returns of both sweeps with each other leaves 0.03 deg, and over ten pairs of that
+/// capture PCL errs by 0.069 deg (root mean square), ours by 0.029.
 void expect_ours_is_as_good(const View& target, const View& source, const Pose& truth, double rotation_share) {
   const Outcome ours = align_ours(target, source, truth);
   const Outcome pcl = align_with_pcl(target, source, truth);

@@ -109,8 +109,8 @@ TEST(LivePipeline, GivesTheBitsOfOneThreadWhenNothingIsDropped) {
 }
 
 /// Sweeps come three times as fast as they can be registered: both steps of the registration, of every single return,
-/// and no deadline that would come to their help. A queue would make every estimate older than the one before; here the newest
-/// sweep wins, and the rest is counted.
+/// and no deadline that would come to their help. A queue would make every estimate older than the one before; here the
+/// newest sweep wins, and the rest is counted.
 TEST(LivePipeline, OverloadDropsSweepsAndNeverMakesEstimatesOlder) {
   Config config = Drive::config();
   config.sweep.segment_filter.enabled = false;
