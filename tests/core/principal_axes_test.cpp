@@ -37,7 +37,7 @@ TEST(PrincipalAxes, OfPointsOnAPlaneAreThoseOfAGeneralSolver) {
     ASSERT_NEAR(axes.least, truth.eigenvalues()[0], 1e-5 * middle + 1e-3 * least) << "seed " << seed;
     ASSERT_NEAR(axes.middle, truth.eigenvalues()[1], 2e-3 * middle);
     ASSERT_NEAR(axes.greatest, truth.eigenvalues()[2], 2e-3 * middle);
-    const Eigen::Vector3d axis{axes.x, axes.y, axes.z};
+    const Eigen::Vector3d axis = Eigen::Vector3f(axes.x, axes.y, axes.z).cast<double>();
     ASSERT_NEAR(axis.norm(), 1.0, 1e-5);
     ASSERT_NEAR(std::abs(axis.dot(truth.eigenvectors().col(0))), 1.0, 1e-5);
   }

@@ -186,6 +186,42 @@ TEST(SyntheticLidar, NoiseAndDropoutsAreAsLargeAsAskedFor) {
   EXPECT_NEAR(lost / (lost + kept), 0.1, 0.005);
 }
 
+TEST(SyntheticLidar, DustThrowsBackTheShareOfPulsesAskedForAndDualModeSeesThroughIt) {
+  const Scene wall({{Rectangle{{20, -200, -200}, {0, 400, 0}, {0, 0, 400}}}});
+  const Trajectory trajectory(Course{}.stand(seconds{1}));
+  SyntheticLidar lidar(wall, trajectory, {.return_mode = ReturnMode::dual, .dust = 0.2});
+  double dusty = 0, all = 0;
+  for (int packet = 0; packet < 15; ++packet) { // a tenth of a turn, past the wall
+    const Datagram datagram = lidar.next();
+    for (std::size_t block = 0; block < velodyne::kBlocks; block += 2)
+      for (std::size_t channel = 0; channel < velodyne::kChannels; ++channel) {
+        const std::uint32_t last = ticks(datagram.payload, block, channel);
+        const std::uint32_t strongest = ticks(datagram.payload, block + 1, channel);
+        ASSERT_GE(last, 10'000U); // 20 m
+        dusty += strongest < last;
+        ++all;
+      }
+  }
+  EXPECT_NEAR(dusty / all, 0.2, 0.03);
+}
+
+TEST(SyntheticLidar, EchoesFadeWithDistanceSlantAndDarkness) {
+  const Trajectory trajectory(Course{}.stand(seconds{1}));
+  const auto seen_of = [&](double x_m, std::uint8_t reflectivity) { // a wall ahead
+    const Scene wall({{Rectangle{{x_m, -200, -200}, {0, 400, 0}, {0, 0, 400}}, reflectivity}});
+    SyntheticLidar lidar(wall, trajectory, {.fades = true});
+    const Datagram datagram = lidar.next();
+    int seen = 0;
+    for (std::size_t channel = 0; channel < velodyne::kChannels; ++channel)
+      seen += ticks(datagram.payload, 0, channel) > 0;
+    return seen;
+  };
+  EXPECT_EQ(seen_of(30, 50), 32);
+  EXPECT_EQ(seen_of(30, 10), 32);
+  EXPECT_EQ(seen_of(80, 50), 32);
+  EXPECT_EQ(seen_of(80, 10), 0);
+}
+
 TEST(SyntheticLidar, NothingIsSeenBeyondItsReach) {
   const Scene scene = room();
   const Trajectory trajectory(Course{}.stand(seconds{1}));

@@ -30,8 +30,8 @@ Course winding() {
       .stand(seconds{1});
 }
 
-TEST(Trajectory, DerivativesAreThoseOfThePose) {
-  const Trajectory trajectory(winding(), {}, kRough);
+/// Compares them with differences of the pose.
+void expect_exact_derivatives(const Trajectory& trajectory) {
   constexpr Duration kHalf = microseconds{100};
   const double interval_s = to_seconds(2 * kHalf);
   for (Stamp t = trajectory.start() + milliseconds{7}; t < trajectory.end(); t += milliseconds{23}) {
@@ -44,6 +44,16 @@ TEST(Trajectory, DerivativesAreThoseOfThePose) {
     ASSERT_LT((acceleration - now.acceleration_world_mps2).norm(), 1e-4);
     ASSERT_LT((angular_velocity - now.angular_velocity_base_radps).norm(), 1e-5);
   }
+}
+
+TEST(Trajectory, DerivativesAreThoseOfThePose) { expect_exact_derivatives(Trajectory(winding(), {}, kRough)); }
+
+TEST(Trajectory, DerivativesAreThoseOfThePoseWithHillsGaitAndSlip) {
+  Ride legged;
+  legged.ground_m = [](const Jet& x, const Jet& y) { return 0.4 * sin(0.5 * x) + 0.3 * cos(0.7 * y); };
+  legged.oscillations = {{2.0, {0.01, 0.02, 0.03}, {0.03, 0.02, 0.01}, 0.5}, {5.0, {0, 0, 0.001}, {0, 0.005, 0}, 1}};
+  legged.slips = {{milliseconds{2200}, milliseconds{2900}}, {seconds{4}, milliseconds{4200}}};
+  expect_exact_derivatives(Trajectory(winding(), {}, kRough, legged));
 }
 
 TEST(Trajectory, AccelerationHasNoJumps) {

@@ -27,15 +27,6 @@ std::size_t Roads::place(const Eigen::Vector2d& at_m) {
   return index;
 }
 
-std::vector<std::size_t> Roads::neighbours(std::size_t place) const {
-  std::vector<std::size_t> found;
-  for (const Lane& lane : lanes_) {
-    if (lane.from == place || lane.to == place)
-      found.push_back(lane.from == place ? lane.to : lane.from);
-  }
-  return found;
-}
-
 double Roads::distance_m(const Eigen::Vector2d& point) const {
   double nearest = std::numeric_limits<double>::infinity();
   for (const Lane& lane : lanes_) {

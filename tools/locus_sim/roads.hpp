@@ -22,9 +22,6 @@ class Roads {
   [[nodiscard]] const std::vector<Eigen::Vector2d>& places_m() const { return places_m_; }
   [[nodiscard]] const std::vector<Lane>& lanes() const { return lanes_; }
 
-  /// The places that one lane leads to.
-  [[nodiscard]] std::vector<std::size_t> neighbours(std::size_t place) const;
-
   /// From a point to the middle of the nearest lane.
   [[nodiscard]] double distance_m(const Eigen::Vector2d& point) const;
 

@@ -39,7 +39,6 @@ class SceneBuilder {
   }
   void mover(Mover mover) { movers_.push_back(std::move(mover)); }
 
-  [[nodiscard]] std::vector<Surface>& surfaces() { return surfaces_; }
   Scene scene() { return Scene(std::move(surfaces_), std::move(movers_)); }
 
  private:

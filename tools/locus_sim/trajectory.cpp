@@ -142,6 +142,22 @@ Trajectory::Attitude Trajectory::on_ground(const Jet& x, const Jet& y, const Jet
   return attitude;
 }
 
+Trajectory::Swing Trajectory::swing(double since_start_s, const Jet& speed, const Jet& yaw_rate) const {
+  const Jet liveliness = saturated(squared(speed * (1 / kLively_mps)) + squared(yaw_rate * (1 / kLively_radps)));
+  Swing sum;
+  for (const Oscillation& oscillation : ride_.oscillations) {
+    const double omega = 2 * std::numbers::pi * oscillation.frequency_hz;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double lag_rad = oscillation.phase_rad - 2 * std::numbers::pi / 3 * static_cast<double>(axis);
+      const Jet wave = liveliness * sin(Jet(omega * since_start_s + lag_rad, omega));
+      const auto i = static_cast<Eigen::Index>(axis);
+      sum.shift_m[axis] = sum.shift_m[axis] + oscillation.amplitude_m[i] * wave;
+      sum.turn_rad[axis] = sum.turn_rad[axis] + oscillation.amplitude_rpy_rad[i] * wave;
+    }
+  }
+  return sum;
+}
+
 BaseMotion Trajectory::at(Stamp stamp) const {
   const double since_start_s = to_seconds(stamp - start_);
   const Jet time = time_on_course(since_start_s);
@@ -160,32 +176,17 @@ BaseMotion Trajectory::at(Stamp stamp) const {
   const Eigen::Vector2d acceleration = s.acceleration_mps2 * ahead + s.speed_mps * s.yaw_rate_radps * leftwards;
   Jet x = chain(xy.x(), velocity.x(), acceleration.x(), time);
   Jet y = chain(xy.y(), velocity.y(), acceleration.y(), time);
-  Jet yaw = chain(s.heading_rad, s.yaw_rate_radps, s.yaw_acceleration_radps2, time);
+  const Jet yaw = chain(s.heading_rad, s.yaw_rate_radps, s.yaw_acceleration_radps2, time);
   const Jet driven = chain(s.driven_m, s.speed_mps, s.acceleration_mps2, time);
-  auto [z, roll, pitch] = on_ground(x, y, yaw, driven);
+  const auto [z, roll, pitch] = on_ground(x, y, yaw, driven);
 
-  if (!ride_.oscillations.empty()) {
-    const Jet speed = chain(s.speed_mps, s.acceleration_mps2, s.jerk_mps3, time);
-    const Jet yaw_rate = chain(s.yaw_rate_radps, s.yaw_acceleration_radps2, s.yaw_jerk_radps3, time);
-    const Jet liveliness = saturated(squared(speed * (1 / kLively_mps)) + squared(yaw_rate * (1 / kLively_radps)));
-    const Jet c = cos(yaw), n = sin(yaw);
-    for (const Oscillation& oscillation : ride_.oscillations) {
-      const double omega = 2 * std::numbers::pi * oscillation.frequency_hz;
-      std::array<Jet, 3> swing;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const double lag_rad = oscillation.phase_rad - 2 * std::numbers::pi / 3 * static_cast<double>(axis);
-        swing[axis] = liveliness * sin(Jet(omega * since_start_s + lag_rad, omega));
-      }
-      const Jet forward = oscillation.amplitude_m.x() * swing[0], left = oscillation.amplitude_m.y() * swing[1];
-      x = x + forward * c - left * n;
-      y = y + forward * n + left * c;
-      z = z + oscillation.amplitude_m.z() * swing[2];
-      roll = roll + oscillation.amplitude_rpy_rad.x() * swing[0];
-      pitch = pitch + oscillation.amplitude_rpy_rad.y() * swing[1];
-      yaw = yaw + oscillation.amplitude_rpy_rad.z() * swing[2];
-    }
-  }
-  return motion_of({x, y, z}, roll, pitch, yaw);
+  const Jet speed = chain(s.speed_mps, s.acceleration_mps2, s.jerk_mps3, time);
+  const Jet yaw_rate = chain(s.yaw_rate_radps, s.yaw_acceleration_radps2, s.yaw_jerk_radps3, time);
+  const auto [shift_m, turn_rad] = swing(since_start_s, speed, yaw_rate);
+  const Jet c = cos(yaw), n = sin(yaw);
+  x = x + shift_m[0] * c - shift_m[1] * n;
+  y = y + shift_m[0] * n + shift_m[1] * c;
+  return motion_of({x, y, z + shift_m[2]}, roll + turn_rad[0], pitch + turn_rad[1], yaw + turn_rad[2]);
 }
 
 } // namespace locus::sim

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 
+#include <array>
 #include <functional>
 #include <vector>
 
@@ -93,10 +94,15 @@ class Trajectory {
   struct Attitude {
     Jet z_m, roll_rad, pitch_rad;
   };
+  struct Swing {
+    std::array<Jet, 3> shift_m;  ///< forward, left, up
+    std::array<Jet, 3> turn_rad; ///< roll, pitch, yaw
+  };
   static Planar planar(const Placed& placed, double since_s);
   static Eigen::Vector2d displacement(const Placed& placed, double from_s, double to_s);
   [[nodiscard]] Jet time_on_course(double since_start_s) const;
   [[nodiscard]] Attitude on_ground(const Jet& x, const Jet& y, const Jet& heading, const Jet& driven) const;
+  [[nodiscard]] Swing swing(double since_start_s, const Jet& speed, const Jet& yaw_rate) const;
 
   Stamp start_;
   Terrain terrain_;
