@@ -1,20 +1,68 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/motion_sources.hpp"
 
+#include <algorithm>
+#include <utility>
+
 namespace locus {
 
-MotionSources::MotionSources(const std::vector<MotionSourceOptions>& options, Fusion fusion)
-    : fusion_(fusion), tracks_(options.begin(), options.end()) {}
+MotionSources::MotionSources(const std::vector<MotionSourceOptions>& options, Fusion fusion, HealthSink health_sink)
+    : fusion_(fusion), health_sink_(std::move(health_sink)), sources_(options.begin(), options.end()) {}
+
+template <class Sample> void MotionSources::take(std::size_t source, Sample sample) {
+  Source& from = sources_[source];
+  now_ = std::max(now_, sample.arrival);
+  const std::optional<Stamp> stamp = from.health.judge(sample);
+  follow_health(source);
+  if (!stamp)
+    return;
+  sample.stamp = *stamp;
+  from.track.add(sample);
+}
+template void MotionSources::take(std::size_t, ImuSample);
+template void MotionSources::take(std::size_t, OdometrySample);
+
+void MotionSources::advance(Stamp now) {
+  now_ = std::max(now_, now);
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    sources_[i].health.advance(now_);
+    follow_health(i);
+  }
+}
+
+void MotionSources::hear(const RegistrationFeedback& feedback) {
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    sources_[i].health.hear(feedback.opinions[i], feedback, now_);
+    follow_health(i);
+  }
+}
+
+void MotionSources::set_outside_verdict(std::size_t source, bool healthy) {
+  sources_[source].health.set_outside_verdict(healthy, now_);
+  follow_health(source);
+}
+
+void MotionSources::follow_health(std::size_t source) {
+  Source& of = sources_[source];
+  if (of.health.spell() != of.spell) {
+    of.spell = of.health.spell();
+    of.track.clear();
+  }
+  if (std::optional<HealthEvent> event = of.health.take_event(); event && health_sink_) {
+    event->source = source;
+    health_sink_(*event);
+  }
+}
 
 SourceChoice MotionSources::choose(Stamp now) const {
-  return choose_sources([this](std::size_t i) { return tracks_[i].kind(); }, tracks_.size(), fusion_,
-                        [&](std::size_t i) { return tracks_[i].is_live(now); });
+  return choose_sources([this](std::size_t i) { return sources_[i].track.kind(); }, sources_.size(), fusion_,
+                        [&](std::size_t i) { return healthy(i) && sources_[i].track.is_live(now); });
 }
 
 std::optional<Pose> MotionSources::motion(const SourceChoice& choice, Stamp from, Stamp to) const {
   const auto step = [&](std::size_t source) -> std::optional<Pose> {
-    const std::optional<Pose> T_source_from = tracks_[source].at(from);
-    const std::optional<Pose> T_source_to = tracks_[source].at(to);
+    const std::optional<Pose> T_source_from = sources_[source].track.at(from);
+    const std::optional<Pose> T_source_to = sources_[source].track.at(to);
     if (!T_source_from || !T_source_to)
       return std::nullopt;
     return T_source_from->inverse() * *T_source_to;
@@ -35,14 +83,15 @@ void MotionSources::describe(Sweep& sweep) const {
   sweep.specific_force_base_mps2.reset();
   for (std::size_t i = 0; i < sweep.sources.size(); ++i) {
     sweep.sources[i] = SourcePose{};
-    if (i >= tracks_.size() || !tracks_[i].has_sample_in(sweep.start, sweep.end))
+    if (i >= sources_.size() || !sources_[i].track.has_sample_in(sweep.start, sweep.end))
       continue;
-    const std::optional<Pose> T_source_base = tracks_[i].at(sweep.end);
+    const MotionTrack& track = sources_[i].track;
+    const std::optional<Pose> T_source_base = track.at(sweep.end);
     if (!T_source_base)
       continue;
-    sweep.sources[i] = {true, *T_source_base};
-    if (!sweep.specific_force_base_mps2)
-      sweep.specific_force_base_mps2 = tracks_[i].mean_specific_force_mps2(sweep.start, sweep.end);
+    sweep.sources[i] = {true, healthy(i), sources_[i].spell, *T_source_base};
+    if (healthy(i) && !sweep.specific_force_base_mps2)
+      sweep.specific_force_base_mps2 = track.mean_specific_force_mps2(sweep.start, sweep.end);
   }
 }
 

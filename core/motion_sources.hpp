@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <vector>
 
+#include "core/health_monitor.hpp"
 #include "core/motion_track.hpp"
 #include "core/options.hpp"
 #include "core/sweep.hpp"
@@ -23,20 +25,33 @@ struct SourceChoice {
   }
 };
 
-/// All motion sources of the robot in a static priority queue (paper II-B.1, health monitoring and priority queue).
+/// All motion sources of the robot in a static priority queue, each with its health (paper II-B.1, health monitoring
+/// and priority queue).
 ///
 /// With Fusion::combined the best inertial source gives the rotation and the best odometry the translation; with
 /// Fusion::queue the first healthy one in the queue gives all it has. One owner.
 class MotionSources {
  public:
-  MotionSources(const std::vector<MotionSourceOptions>& options, Fusion fusion);
+  /// Told of each change of health once, in the thread that calls.
+  using HealthSink = std::function<void(const HealthEvent&)>;
+
+  MotionSources(const std::vector<MotionSourceOptions>& options, Fusion fusion, HealthSink health_sink = {});
 
   /// `source` is the index in the configuration; its kind must fit the sample.
-  void add(std::size_t source, const ImuSample& sample) { tracks_[source].add(sample); }
-  void add(std::size_t source, const OdometrySample& sample) { tracks_[source].add(sample); }
+  void add(std::size_t source, const ImuSample& sample) { take(source, sample); }
+  void add(std::size_t source, const OdometrySample& sample) { take(source, sample); }
 
-  /// Those whose tracks reach `now` and go on doing so: with two samples in the time for which tracks are extrapolated.
-  /// A slower or silent source would correct a sweep with a standstill; that is left to Odometry.
+  /// Tells the time, in stamps of arrival: a silence is noticed.
+  void advance(Stamp now);
+
+  /// What lidar says of the sources.
+  void hear(const RegistrationFeedback& feedback);
+
+  /// What somebody else says of a source, until the next word (health_topic).
+  void set_outside_verdict(std::size_t source, bool healthy);
+
+  /// The healthy ones whose tracks reach `now` and go on doing so: with two samples in the time for which tracks are
+  /// extrapolated. A slower or silent source would correct a sweep with a standstill; that is left to Odometry.
   [[nodiscard]] SourceChoice choose(Stamp now) const;
 
   /// T_from_to of the base after the chosen sources; nothing where a track does not reach one of the instants.
@@ -45,12 +60,26 @@ class MotionSources {
   /// Writes the poses of all sources at the end of the sweep, and its specific force.
   void describe(Sweep& sweep) const;
 
-  [[nodiscard]] const MotionTrack& track(std::size_t source) const { return tracks_[source]; }
-  [[nodiscard]] std::size_t size() const { return tracks_.size(); }
+  [[nodiscard]] bool healthy(std::size_t source) const { return sources_[source].health.healthy(); }
+  [[nodiscard]] const SourceCounters& counters(std::size_t source) const { return sources_[source].health.counters(); }
+  [[nodiscard]] std::size_t size() const { return sources_.size(); }
 
  private:
+  struct Source {
+    explicit Source(const MotionSourceOptions& options) : health(options.kind), track(options) {}
+
+    HealthMonitor health;
+    MotionTrack track;
+    std::uint32_t spell = 0; ///< that the track belongs to
+  };
+
+  template <class Sample> void take(std::size_t source, Sample sample);
+  void follow_health(std::size_t source);
+
   Fusion fusion_;
-  std::vector<MotionTrack> tracks_;
+  HealthSink health_sink_;
+  std::vector<Source> sources_;
+  Stamp now_; ///< of the latest arrival heard of
 };
 
 /// Picks from sources in priority order those that `usable(index)` allows.

@@ -9,8 +9,6 @@ MotionTrack::MotionTrack(const MotionSourceOptions& options)
     : kind_(options.kind), T_base_source_(options.T_base_source), nodes_(kCapacity) {}
 
 void MotionTrack::add(const ImuSample& sample) {
-  if (!accepts(sample.stamp, sample.angular_velocity_radps.allFinite() && sample.specific_force_mps2.allFinite()))
-    return;
   const Eigen::Vector3d angular_velocity_base = T_base_source_.rotation * sample.angular_velocity_radps;
   Node node{sample.stamp, Pose{}, T_base_source_.rotation * sample.specific_force_mps2};
   if (size_ > 0) {
@@ -24,23 +22,7 @@ void MotionTrack::add(const ImuSample& sample) {
 }
 
 void MotionTrack::add(const OdometrySample& sample) {
-  const Eigen::Quaterniond& q = sample.T_source_base.rotation;
-  if (!accepts(sample.stamp, sample.T_source_base.finite() && q.norm() > 0.5))
-    return;
-  push({sample.stamp, Pose{q.normalized(), sample.T_source_base.translation}});
-}
-
-bool MotionTrack::accepts(Stamp stamp, bool finite) {
-  ++counters_.received;
-  if (!finite) {
-    ++counters_.rejected.nan;
-    return false;
-  }
-  if (size_ > 0 && stamp <= from_newest(0).stamp) {
-    ++counters_.rejected.out_of_order;
-    return false;
-  }
-  return true;
+  push({sample.stamp, Pose{sample.T_source_base.rotation.normalized(), sample.T_source_base.translation}});
 }
 
 void MotionTrack::push(const Node& node) {
@@ -68,9 +50,8 @@ std::size_t MotionTrack::age_at(Stamp stamp) const {
 
 std::optional<Pose> MotionTrack::at(Stamp stamp) const {
   const std::size_t age = age_at(stamp);
-  if (age == size_)
+  if (age == size_ || stamp > from_newest(0).stamp + kMaxExtrapolation)
     return std::nullopt;
-  stamp = std::min(stamp, from_newest(0).stamp + kMaxExtrapolation);
   if (age == 0 && size_ == 1)
     return from_newest(0).T_source_base;
   const Node& before = from_newest(age == 0 ? 1 : age);

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -13,21 +12,11 @@
 
 namespace locus {
 
-/// What became of the samples of one motion source; every sample is counted once.
-struct SourceCounters {
-  struct Rejected {
-    std::uint64_t stale = 0, jump = 0, nan = 0, frozen = 0, out_of_order = 0, covariance = 0, disagreement = 0;
-  };
-  std::uint64_t received = 0;
-  Rejected rejected;
-};
-
 /// The recent motion of the base as one source saw it, asked for at any instant.
 ///
 /// Poses are in the source's own odometry frame, so only their differences mean anything. An inertial source integrates
 /// its gyro: its poses turn but do not move. Between samples poses are interpolated; beyond the newest they are
-/// extrapolated with the last velocity, for
-/// kMaxExtrapolation at most. Memory is fixed at construction. One owner.
+/// extrapolated with the last velocity, for kMaxExtrapolation at most. Memory is fixed at construction. One owner.
 class MotionTrack {
  public:
   static constexpr std::size_t kCapacity = 2048;                               ///< two seconds at 1 kHz
@@ -35,12 +24,14 @@ class MotionTrack {
 
   explicit MotionTrack(const MotionSourceOptions& options);
 
-  /// Takes the next sample; one that is not finite or not newer than the last is counted and left out.
+  /// Takes the next sample: finite and newer than the last, as HealthMonitor lets them pass.
   void add(const ImuSample& sample);
   void add(const OdometrySample& sample);
 
-  /// T_source_base at `stamp`; nothing before the oldest sample. Later than kMaxExtrapolation after the newest the pose
-  /// stands.
+  /// Forgets all samples: what comes next does not follow from them.
+  void clear() { size_ = 0; }
+
+  /// T_source_base at `stamp`; nothing before the oldest sample and later than kMaxExtrapolation after the newest.
   [[nodiscard]] std::optional<Pose> at(Stamp stamp) const;
 
   /// Whether a sample lies in (from, to]. A source without one is not used for that sweep.
@@ -53,7 +44,6 @@ class MotionTrack {
   [[nodiscard]] std::optional<Eigen::Vector3d> mean_specific_force_mps2(Stamp from, Stamp to) const;
 
   [[nodiscard]] SourceKind kind() const { return kind_; }
-  [[nodiscard]] const SourceCounters& counters() const { return counters_; }
 
  private:
   struct Node {
@@ -62,7 +52,6 @@ class MotionTrack {
     Eigen::Vector3d specific_force_base_mps2 = Eigen::Vector3d::Zero();
   };
 
-  bool accepts(Stamp stamp, bool finite);
   void push(const Node& node);
   [[nodiscard]] const Node& from_newest(std::size_t age) const;
   /// Age of the newest node that is not later than `stamp`; size_ when all are.
@@ -70,7 +59,6 @@ class MotionTrack {
 
   SourceKind kind_;
   Pose T_base_source_;
-  SourceCounters counters_;
   Eigen::Vector3d last_angular_velocity_base_radps_ = Eigen::Vector3d::Zero();
   std::vector<Node> nodes_; ///< ring
   std::size_t newest_ = 0;

@@ -36,6 +36,9 @@ constexpr double kObservableAbove = 0.04;
 constexpr double kGravity_mps2 = 9.80665;
 constexpr double kGravityTolerance_mps2 = 0.5;
 
+/// A prior that is less sure than this looks for counterparts all around each point.
+constexpr double kWide_m = 0.3;
+
 constexpr int kStartRounds = 3; ///< until motion and correction of the first two sweeps agree
 
 /// Room for the 16 000 voxels of a large sweep, and small enough for the second cache.
@@ -65,6 +68,27 @@ Vector6 difference(const Pose& T, const Pose& reference) {
   Vector6 d;
   d << T.translation - reference.translation, so3_log(T.rotation * reference.rotation.conjugate());
   return d;
+}
+
+/// What a source may be off by in a sweep before lidar objects, one standard deviation. Above what a healthy one is off
+/// by on bad ground, well below spinning wheels: a prior that is merely poor has its weight for that.
+const Vector6 kHonestError = sigma(0.01, 0.2);
+
+/// Chi-square test of the axes that lidar sees, which are those it knows better than an honest source does.
+LidarOpinion opinion_on(const Vector6& error, const Matrix6& lidar_information) {
+  constexpr double kMaxChiSquare = 38.0; ///< exceeded once in a million by six honest axes
+  double chi_square = 0.0;
+  bool sees = false;
+  for (int axis = 0; axis < 6; ++axis) {
+    const double variance = kHonestError[axis] * kHonestError[axis];
+    if (lidar_information(axis, axis) * variance < 1.0)
+      continue;
+    sees = true;
+    chi_square += error[axis] * error[axis] / (variance + 1.0 / lidar_information(axis, axis));
+  }
+  if (!sees)
+    return LidarOpinion::none;
+  return chi_square > kMaxChiSquare ? LidarOpinion::disagrees : LidarOpinion::agrees;
 }
 
 /// Takes points to the end of their sweep, for a base that moved with a constant twist while the sweep came in: exactly
@@ -136,7 +160,7 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
 
   OdometryEstimate estimate;
   estimate.scan_to_scan = match_scan(prior, T_last_now, prior.blind, stop);
-  if (trusts(estimate.scan_to_scan, estimate.scan_to_scan.T_target_source, prior)) {
+  if (trusts(estimate.scan_to_scan, estimate.scan_to_scan.T_target_source, prior.T_last_now, prior.variance)) {
     if (prior.blind)
       begin_again(sweep, prior, estimate.scan_to_scan, stop);
     T_last_now = flatten(estimate.scan_to_scan.T_target_source);
@@ -144,7 +168,7 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
   }
   estimate.scan_to_submap = match_submap(prior, T_last_now, stop);
   const Pose T_last_submap = T_odom_last_.inverse() * estimate.scan_to_submap.T_target_source;
-  estimate.failed = !trusts(estimate.scan_to_submap, T_last_submap, prior);
+  estimate.failed = !trusts(estimate.scan_to_submap, T_last_submap, prior.T_last_now, variance_in_submap(prior));
   estimate.T_odom_base = T_odom_last_ * (estimate.failed ? T_last_now : flatten(T_last_submap));
   finish(sweep, prior, estimate);
   return estimate;
@@ -181,23 +205,31 @@ Odometry::Prior Odometry::integrate_sensors(const Sweep& sweep) const {
   prior.variance = prior.blind ? kUnknownMotion.cwiseAbs2().eval() : constant_velocity_statistics_.variance(periods);
 
   const auto kind_of = [this](std::size_t i) { return options_.motion_sources[i].kind; };
-  const auto usable = [&](std::size_t i) { return sweep.sources[i].usable && last_sources_[i].usable; };
-  const SourceChoice choice = choose_sources(kind_of, options_.motion_sources.size(), options_.fusion, usable);
-  const auto step = [&](std::size_t i) {
-    return last_sources_[i].T_source_base.inverse() * sweep.sources[i].T_source_base;
+  const auto usable = [&](std::size_t i) {
+    return sweep.sources[i].usable && last_sources_[i].usable && step(sweep, i).has_value();
   };
+  const SourceChoice choice = choose_sources(kind_of, options_.motion_sources.size(), options_.fusion, usable);
   if (choice.rotation) {
-    prior.T_last_now.rotation = step(*choice.rotation).rotation;
+    prior.T_last_now.rotation = step(sweep, *choice.rotation)->rotation;
     prior.variance.tail<3>() = statistics_[*choice.rotation].variance(periods).tail<3>();
     prior.source.rotation = static_cast<int>(*choice.rotation);
   }
   if (choice.translation) {
-    prior.T_last_now.translation = step(*choice.translation).translation;
+    prior.T_last_now.translation = step(sweep, *choice.translation)->translation;
     prior.variance.head<3>() = statistics_[*choice.translation].variance(periods).head<3>();
     prior.source.translation = static_cast<int>(*choice.translation);
     prior.blind = false;
   }
   return prior;
+}
+
+/// T_last_now as one source saw it; nothing where it does not know.
+std::optional<Pose> Odometry::step(const Sweep& sweep, std::size_t source) const {
+  const SourcePose& last = last_sources_[source];
+  const SourcePose& now = sweep.sources[source];
+  if (!last.known || !now.known || last.spell != now.spell)
+    return std::nullopt;
+  return last.T_source_base.inverse() * now.T_source_base;
 }
 
 /// Takes out of the points what no motion source could, with the twist that T_last_now means.
@@ -257,9 +289,16 @@ Registration Odometry::match_submap(const Prior& prior, const Pose& T_last_now, 
   if (scan_.size() < kMinPoints)
     return none;
   const Matrix6 R = turn_both(T_odom_last_.rotation);
-  const PosePrior pose_prior{T_odom_last_ * prior.T_last_now,
-                             R * prior.variance.cwiseInverse().asDiagonal() * R.transpose()};
-  return gicp_.align(registered(), map_, T_start, pose_prior, options_.scan_to_submap, false, stop);
+  const Vector6 variance = variance_in_submap(prior);
+  const PosePrior pose_prior{T_odom_last_ * prior.T_last_now, R * variance.cwiseInverse().asDiagonal() * R.transpose()};
+  const bool wide = variance.head<3>().maxCoeff() > kWide_m * kWide_m;
+  return gicp_.align(registered(), map_, T_start, pose_prior, options_.scan_to_submap, wide, stop);
+}
+
+/// Of the prior as seen from the submap, in base axes: after dead reckoning its start is in doubt as well.
+Vector6 Odometry::variance_in_submap(const Prior& prior) const {
+  const Matrix6 R = turn_both(T_odom_last_.rotation.conjugate());
+  return prior.variance + (R.cwiseAbs() * adrift_sigma_).cwiseAbs2();
 }
 
 Pose Odometry::flatten(const Pose& T_last_now) const {
@@ -268,27 +307,37 @@ Pose Odometry::flatten(const Pose& T_last_now) const {
   return T_odom_last_.inverse() * FlatGroundAssumption::flatten(T_odom_last_, T_odom_last_ * T_last_now);
 }
 
-bool Odometry::trusts(const Registration& registration, const Pose& T_last_now, const Prior& prior) const {
+bool Odometry::trusts(const Registration& registration, const Pose& T_last_now, const Pose& T_last_predicted,
+                      const Vector6& variance) const {
   if (registration.iterations == 0 || !T_last_now.finite() ||
       static_cast<double>(registration.inliers) < kMinInlierShare * static_cast<double>(registered_))
     return false;
   Vector6 allowed;
   allowed << Eigen::Vector3d::Constant(kAlwaysAllowed_m), Eigen::Vector3d::Constant(kAlwaysAllowed_rad);
-  allowed = allowed.cwiseMax(kMaxDeviation_sigma * prior.variance.cwiseSqrt());
-  return (difference(T_last_now, prior.T_last_now).cwiseAbs().array() <= allowed.array()).all();
+  allowed = allowed.cwiseMax(kMaxDeviation_sigma * variance.cwiseSqrt());
+  return (difference(T_last_now, T_last_predicted).cwiseAbs().array() <= allowed.array()).all();
 }
 
-void Odometry::learn(const Prior& prior, const Pose& T_last_now, const Registration& registration) {
+/// Compares what each source predicted, and a constant velocity if that was the prior, with what lidar found. A source
+/// that is in agreement teaches its statistics; one in disagreement would only teach them to expect the worst.
+void Odometry::judge_sources(const Sweep& sweep, const Prior& prior, const Pose& T_last_now,
+                             const Registration& registration) {
   const Matrix6 R = turn_both(T_odom_last_.rotation.conjugate());
   const Matrix6 information = R * registration.information * R.transpose() / kPointsPerIndependentPoint;
-  const auto learn_from = [&](int source, const Pose& predicted) {
-    PriorStatistics& statistics =
-        source >= 0 ? statistics_[static_cast<std::size_t>(source)] : constant_velocity_statistics_;
-    statistics.learn(difference(T_last_now, predicted), information);
-  };
-  learn_from(prior.source.translation, prior.T_last_now);
-  if (prior.source.rotation != prior.source.translation)
-    learn_from(prior.source.rotation, prior.T_last_now);
+  for (std::size_t i = 0; i < options_.motion_sources.size(); ++i) {
+    const std::optional<Pose> T_last_predicted = step(sweep, i);
+    if (!T_last_predicted)
+      continue;
+    Matrix6 seen = information;
+    if (options_.motion_sources[i].kind == SourceKind::imu)
+      seen.topRows<3>().setZero(); // knows nothing of translation
+    const Vector6 difference_in_step = difference(T_last_now, *T_last_predicted);
+    feedback_.opinions[i] = opinion_on(difference_in_step, seen);
+    if (feedback_.opinions[i] != LidarOpinion::disagrees)
+      statistics_[i].learn(difference_in_step, seen);
+  }
+  if (prior.source.translation < 0)
+    constant_velocity_statistics_.learn(difference(T_last_now, prior.T_last_now), information);
 }
 
 void Odometry::update_map(OdometryEstimate& estimate) {
@@ -307,44 +356,83 @@ void Odometry::update_map(OdometryEstimate& estimate) {
   estimate.keyframe = true;
 }
 
+/// What a prediction says of itself. The errors of a motion source keep their sign, as those of scale and of bias do,
+/// so they add up until lidar finds the submap again.
+void Odometry::drift(const Prior& prior, OdometryEstimate& estimate) {
+  const Eigen::Vector3d moved_m = estimate.T_odom_base.translation - T_odom_last_.translation;
+  adrift_sigma_.head<3>().array() += adrift_sigma_.tail<3>().norm() * moved_m.norm();
+  adrift_sigma_ += turn_both(T_odom_last_.rotation).cwiseAbs() * prior.variance.cwiseSqrt();
+  carry_covariance(moved_m);
+  estimate.pose_covariance = covariance_;
+  estimate.pose_covariance.diagonal() += adrift_sigma_.cwiseAbs2();
+  const Matrix6 R = turn_both(T_odom_last_.rotation);
+  move_on(T_odom_last_.inverse() * estimate.T_odom_base, R * prior.variance.asDiagonal() * R.transpose(), estimate);
+}
+
+/// What a registered sweep says of itself, of its prior and of the motion sources.
+void Odometry::settle(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate) {
+  const Pose T_last_now = T_odom_last_.inverse() * estimate.T_odom_base;
+  const double weakest = estimate.scan_to_submap.observability[0];
+  degenerate_ = weakest < (degenerate_ ? kObservableAbove : kDegenerateBelow);
+  const Matrix6 R = turn_both(T_odom_last_.rotation);
+  const Matrix6 prior_information = R * variance_in_submap(prior).cwiseInverse().asDiagonal() * R.transpose();
+  const Matrix6 covariance =
+      (prior_information + estimate.scan_to_submap.information / kPointsPerIndependentPoint).inverse();
+  carry_covariance(estimate.T_odom_base.translation - T_odom_last_.translation);
+  estimate.pose_covariance = covariance_ + covariance;
+  if (!adrift_sigma_.isZero()) { // the way back to the submap is no motion of the robot
+    adrift_sigma_.setZero();
+    move_on(prior.T_last_now, covariance, estimate);
+    return;
+  }
+  judge_sources(sweep, prior, T_last_now, estimate.scan_to_submap);
+  move_on(T_last_now, covariance, estimate);
+  if (!degenerate_)
+    feedback_.twist_base = twist_base_;
+}
+
+/// The covariance of the pose before, as one of the pose now: turns about there move what is here.
+void Odometry::carry_covariance(const Eigen::Vector3d& moved_m) {
+  Matrix6 transport = Matrix6::Identity();
+  transport.topRightCorner<3, 3>() = -skew(moved_m);
+  covariance_ = transport * covariance_ * transport.transpose();
+}
+
+/// The twist that T_last_now means, with its covariance.
+void Odometry::move_on(const Pose& T_last_now, const Matrix6& covariance_odom, OdometryEstimate& estimate) {
+  const double elapsed_s = to_seconds(estimate.stamp - last_stamp_);
+  if (elapsed_s > 0.0) {
+    twist_base_ = se3_log(T_last_now) / elapsed_s;
+    const Matrix6 R = turn_both(estimate.T_odom_base.rotation.conjugate());
+    estimate.twist_covariance = 2.0 / (elapsed_s * elapsed_s) * R * covariance_odom * R.transpose();
+  }
+  estimate.twist_base = twist_base_;
+}
+
 /// Fills in what the estimate says beside its pose, takes the sweep into the map and remembers it as the last.
 void Odometry::finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate) {
   estimate.stamp = sweep.end;
   estimate.points = registered_;
   estimate.prior = prior.source;
-  refused_in_a_row_ = estimate.failed ? refused_in_a_row_ + 1 : 0;
-  const Pose T_last_now = T_odom_last_.inverse() * estimate.T_odom_base;
-  const double elapsed_s = to_seconds(sweep.end - last_stamp_);
-
-  if (processed_ > 0) {
-    const Matrix6 R = turn_both(T_odom_last_.rotation);
-    Matrix6 information = R * prior.variance.cwiseInverse().asDiagonal() * R.transpose();
-    if (!estimate.failed) {
-      information += estimate.scan_to_submap.information / kPointsPerIndependentPoint;
-      learn(prior, T_last_now, estimate.scan_to_submap);
-      const double weakest = estimate.scan_to_submap.observability[0];
-      degenerate_ = weakest < (degenerate_ ? kObservableAbove : kDegenerateBelow);
-    }
-    const Matrix6 step_covariance = information.inverse();
-    Matrix6 transport = Matrix6::Identity();
-    transport.topRightCorner<3, 3>() = -skew(estimate.T_odom_base.translation - T_odom_last_.translation);
-    covariance_ = transport * covariance_ * transport.transpose();
-    estimate.pose_covariance = covariance_ + step_covariance;
-    if (elapsed_s > 0.0) {
-      twist_base_ = se3_log(T_last_now) / elapsed_s;
-      const Matrix6 R_base = turn_both(estimate.T_odom_base.rotation.conjugate());
-      estimate.twist_covariance = 2.0 / (elapsed_s * elapsed_s) * R_base * step_covariance * R_base.transpose();
-    }
-    estimate.twist_base = twist_base_;
-  }
+  if (!estimate.failed)
+    refused_in_a_row_ = 0;
+  else if (scan_.size() >= kMinPoints)
+    ++refused_in_a_row_;
+  feedback_ = {};
+  if (processed_ > 0 && estimate.failed)
+    drift(prior, estimate);
+  else if (processed_ > 0)
+    settle(sweep, prior, estimate);
   if (scan_.size() < kMinPoints || estimate.failed)
     estimate.state = TrackingState::dead_reckoning;
   else
     estimate.state = degenerate_ ? TrackingState::degenerate : TrackingState::tracking;
 
   update_map(estimate);
-  if (estimate.keyframe || estimate.failed)
+  if (estimate.keyframe) {
     covariance_ = estimate.pose_covariance;
+    adrift_sigma_.setZero();
+  }
   ++processed_;
   T_odom_last_ = estimate.T_odom_base;
   last_stamp_ = sweep.end;

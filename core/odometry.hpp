@@ -12,6 +12,7 @@
 #include "core/options.hpp"
 #include "core/prior_statistics.hpp"
 #include "core/registration.hpp"
+#include "core/registration_feedback.hpp"
 #include "core/stage_clock.hpp"
 #include "core/surface_map.hpp"
 #include "core/sweep.hpp"
@@ -33,6 +34,9 @@ class Odometry {
   OdometryEstimate process(
       const Sweep& sweep, const Gicp::StopRequested& stop = [] { return false; });
 
+  /// What the sweep processed last says of the motion sources, for their health.
+  [[nodiscard]] const RegistrationFeedback& feedback() const { return feedback_; }
+
   [[nodiscard]] const SurfaceMap& map() const { return map_; }
 
  private:
@@ -46,16 +50,23 @@ class Odometry {
 
   OdometryEstimate begin(const Sweep& sweep);
   [[nodiscard]] Prior integrate_sensors(const Sweep& sweep) const;
+  [[nodiscard]] std::optional<Pose> step(const Sweep& sweep, std::size_t source) const;
   void correct_motion(const Sweep& sweep, const Pose& T_last_now);
   [[nodiscard]] Vector6 uncorrected_twist(const Sweep& sweep, const Pose& T_last_now) const;
   Registration match_scan(const Prior& prior, const Pose& T_start, bool wide, const Gicp::StopRequested& stop);
   Registration match_submap(const Prior& prior, const Pose& T_last_now, const Gicp::StopRequested& stop);
   void begin_again(const Sweep& sweep, const Prior& prior, Registration& found, const Gicp::StopRequested& stop);
   [[nodiscard]] Pose flatten(const Pose& T_last_now) const;
-  [[nodiscard]] bool trusts(const Registration& registration, const Pose& T_last_now, const Prior& prior) const;
-  void learn(const Prior& prior, const Pose& T_last_now, const Registration& registration);
+  [[nodiscard]] Vector6 variance_in_submap(const Prior& prior) const;
+  [[nodiscard]] bool trusts(const Registration& registration, const Pose& T_last_now, const Pose& T_last_predicted,
+                            const Vector6& variance) const;
+  void judge_sources(const Sweep& sweep, const Prior& prior, const Pose& T_last_now, const Registration& registration);
   [[nodiscard]] std::span<const SurfacePoint> registered() const { return std::span(scan_).first(registered_); }
   void update_map(OdometryEstimate& estimate);
+  void drift(const Prior& prior, OdometryEstimate& estimate);
+  void settle(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate);
+  void carry_covariance(const Eigen::Vector3d& moved_m);
+  void move_on(const Pose& T_last_now, const Matrix6& covariance_odom, OdometryEstimate& estimate);
   void finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate);
 
   OdometryOptions options_;
@@ -80,9 +91,11 @@ class Odometry {
   Pose T_odom_last_;
   Vector6 twist_base_ = Vector6::Zero();
   Pose T_odom_keyframe_;
-  Matrix6 covariance_ = Matrix6::Zero(); ///< of T_odom_last_, what the map has gathered
-  int refused_in_a_row_ = 0;
+  Matrix6 covariance_ = Matrix6::Zero();   ///< of T_odom_last_, what the map has gathered
+  Vector6 adrift_sigma_ = Vector6::Zero(); ///< gathered since lidar was lost, odom axes
+  int refused_in_a_row_ = 0;               ///< sweeps with points
   bool degenerate_ = false;
+  RegistrationFeedback feedback_;
 };
 
 } // namespace locus

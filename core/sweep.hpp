@@ -26,8 +26,10 @@ enum class Uncorrected : std::uint8_t { nothing, translation, all };
 
 /// Where one motion source saw the base at the end of a sweep.
 struct SourcePose {
-  bool usable = false; ///< healthy, and with a sample inside the sweep
-  Pose T_source_base;  ///< an inertial source gives rotation only
+  bool known = false;      ///< with a sample inside the sweep
+  bool usable = false;     ///< known, and healthy
+  std::uint32_t spell = 0; ///< HealthMonitor::spell; poses of different spells have nothing to do with each other
+  Pose T_source_base;      ///< an inertial source gives rotation only
 };
 
 /// All returns of all lidars in one window of time, seen from where the base was at its end (paper L_k).

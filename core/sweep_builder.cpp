@@ -111,6 +111,7 @@ void SweepBuilder::add(const LidarPacket& packet, Stamp arrival) {
 }
 
 void SweepBuilder::advance(Stamp now) {
+  sources_.advance(now);
   if (!window_ || now - lag_ > window_->end + kMaxGap)
     return;
   while (now - lag_ > window_->end + kGrace)
@@ -126,16 +127,50 @@ void SweepBuilder::finish() {
 }
 
 void SweepBuilder::open(Stamp start) {
-  window_ = Window{start, start + period(), {}, start, Pose{}};
+  window_.emplace(start, start + period());
   if (options_.motion_correction)
     window_->choice = sources_.choose(start);
+  window_->uncorrected = options_.motion_correction ? window_->choice.uncorrected() : Uncorrected::nothing;
   sweep_.raw_returns = 0;
 }
 
 Pose SweepBuilder::T_start_base(Stamp stamp) {
-  if (const std::optional<Pose> T = sources_.motion(window_->choice, window_->start, stamp))
-    window_->T_start_base = *T;
-  return window_->T_start_base;
+  std::optional<Pose> T_start_base = follow_sources(stamp);
+  if (!T_start_base) {
+    hand_over(stamp);
+    T_start_base = follow_sources(stamp);
+  }
+  if (!T_start_base) // a packet from before a track begins
+    return window_->T_start_placed;
+  if (stamp > window_->placed) {
+    window_->placed = stamp;
+    window_->T_start_placed = *T_start_base;
+  }
+  return *T_start_base;
+}
+
+/// Where the base was after the sources of the window; nothing where one of them has fallen silent. Whatever none of
+/// them tells, but one did when the window began, goes on as it went.
+std::optional<Pose> SweepBuilder::follow_sources(Stamp stamp) const {
+  const SourceChoice& choice = window_->choice;
+  std::optional<Pose> T_anchor_base = sources_.motion(choice, window_->anchor, stamp);
+  if (!T_anchor_base)
+    return std::nullopt;
+  if (choice.uncorrected() != window_->uncorrected) {
+    const Pose T_coasting = se3_exp(to_seconds(stamp - window_->anchor) * last_twist_base_);
+    if (!choice.translation)
+      T_anchor_base->translation = T_coasting.translation;
+    if (!choice.rotation)
+      T_anchor_base->rotation = T_coasting.rotation;
+  }
+  return window_->T_start_anchor * *T_anchor_base;
+}
+
+/// A source has fallen silent in mid-sweep: the next best one takes over where it was last heard.
+void SweepBuilder::hand_over(Stamp now) {
+  window_->anchor = window_->placed;
+  window_->T_start_anchor = window_->T_start_placed;
+  window_->choice = sources_.choose(now);
 }
 
 /// Leaves out the returns that hit the robot itself.
@@ -247,7 +282,11 @@ void SweepBuilder::choose_registered() {
 }
 
 void SweepBuilder::move_to_end() {
-  const Pose T_end_start = T_start_base(window_->end).inverse();
+  const Pose T_start_end = T_start_base(window_->end);
+  last_twist_base_ = se3_log(T_start_end) / to_seconds(window_->end - window_->start);
+  if (T_start_end == Pose{})
+    return;
+  const Pose T_end_start = T_start_end.inverse();
   const Eigen::Matrix3f R = T_end_start.R().cast<float>();
   const Eigen::Vector3f t = T_end_start.translation.cast<float>();
   for (SweepPoint& point : sweep_.points) {
@@ -260,10 +299,9 @@ void SweepBuilder::close() {
   const StageScope scope(clock_, Stage::filter);
   sweep_.start = window_->start;
   sweep_.end = window_->end;
-  sweep_.uncorrected = options_.motion_correction ? window_->choice.uncorrected() : Uncorrected::nothing;
+  sweep_.uncorrected = window_->uncorrected;
   reduce(static_cast<float>(to_seconds(sweep_.end - sweep_.start)));
-  if (window_->choice.rotation)
-    move_to_end();
+  move_to_end();
   sources_.describe(sweep_);
   sink_(sweep_);
   ++sweep_.sequence;

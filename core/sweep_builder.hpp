@@ -72,10 +72,15 @@ class SweepBuilder {
 
  private:
   struct Window {
+    Window(Stamp start_, Stamp end_) : start(start_), end(end_), last_firing(start_), anchor(start_), placed(start_) {}
     Stamp start, end;
-    SourceChoice choice;
+    Uncorrected uncorrected = Uncorrected::all; ///< decided at the start
+    SourceChoice choice;                        ///< of those that go on being healthy
     Stamp last_firing;
-    Pose T_start_base; ///< at the last packet: stands in where a track does not reach
+    Stamp anchor; ///< since when the sources of the choice have been followed
+    Pose T_start_anchor;
+    Stamp placed; ///< the latest instant whose pose is known
+    Pose T_start_placed;
   };
   struct RawPoint {
     SweepPoint point;
@@ -89,6 +94,8 @@ class SweepBuilder {
   void choose_registered();
   void move_to_end();
   [[nodiscard]] Pose T_start_base(Stamp stamp);
+  [[nodiscard]] std::optional<Pose> follow_sources(Stamp stamp) const;
+  void hand_over(Stamp now);
   [[nodiscard]] Duration period() const;
   [[nodiscard]] PacketMotion motion_of(const LidarPacket& packet);
   void leave_out_body(const Pose& T_base_lidar, const Salvo& salvo, RingSegments::Mask& counts) const;
@@ -106,7 +113,8 @@ class SweepBuilder {
   VoxelFilter voxel_filter_;
   RandomFilter random_filter_;
   std::optional<Window> window_;
-  std::vector<RawPoint> raw_; ///< only where segments are not the points themselves
+  Vector6 last_twist_base_ = Vector6::Zero(); ///< over the last window, after its sources
+  std::vector<RawPoint> raw_;                 ///< only where segments are not the points themselves
   Sweep sweep_;
   std::vector<SweepPoint> unregistered_;
   Duration lag_{}; ///< of arrival behind firing, as last seen

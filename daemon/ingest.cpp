@@ -37,10 +37,11 @@ std::size_t max_returns(const Config& config) {
 
 } // namespace
 
-Ingest::Ingest(const Config& config, LidarRouter lidars, Sink sink)
+Ingest::Ingest(const Config& config, LidarRouter lidars, Sink sink, MotionSources::HealthSink health_sink)
     : sink_(std::move(sink)), lidars_(std::move(lidars)),
       sweeps_(
-          config.sweep, mounts(config.lidars), MotionSources(config.odometry.motion_sources, config.odometry.fusion),
+          config.sweep, mounts(config.lidars),
+          MotionSources(config.odometry.motion_sources, config.odometry.fusion, std::move(health_sink)),
           max_returns(config),
           [this](Sweep& sweep) {
             const StageStopwatch::Pause pause(stages_);

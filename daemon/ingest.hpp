@@ -25,8 +25,8 @@ class Ingest {
   /// Takes a finished sweep, see SweepBuilder::Sink.
   using Sink = std::function<void(Sweep& sweep, const SweepCut& cut)>;
 
-  /// `lidars` opened from config.lidars.
-  Ingest(const Config& config, LidarRouter lidars, Sink sink);
+  /// `lidars` opened from config.lidars; `health_sink` is told of each change of health of a motion source.
+  Ingest(const Config& config, LidarRouter lidars, Sink sink, MotionSources::HealthSink health_sink = {});
   Ingest(const Ingest&) = delete;
   Ingest& operator=(const Ingest&) = delete;
 
@@ -38,6 +38,9 @@ class Ingest {
   void take(const OdometryInput& odometry) { take_motion(odometry); }
   void take(const Silence& silence) { sweeps_.advance(silence.now); }
   void take(const EndOfInput&) { sweeps_.finish(); }
+
+  /// What the sweep registered last says of the motion sources; counts from the next window on.
+  void take(const RegistrationFeedback& feedback) { sweeps_.sources().hear(feedback); }
 
   /// The counters behind these belong to the thread that calls take().
   [[nodiscard]] const LidarRouter& lidars() const { return lidars_; }

@@ -22,7 +22,12 @@ constexpr Duration kMaxSleep = std::chrono::milliseconds{100};
 
 LivePipeline::LivePipeline(const Config& config, LidarRouter lidars, InputSource& input, double speed)
     : input_(input), speed_(speed), max_points_(Ingest::max_points(config)),
-      ingest_(config, std::move(lidars), [this](Sweep& sweep, const SweepCut& cut) { hand_over(sweep, cut); }),
+      ingest_(
+          config, std::move(lidars), [this](Sweep& sweep, const SweepCut& cut) { hand_over(sweep, cut); },
+          [this](const HealthEvent& event) {
+            if (!health_events_.push(event))
+              unfetched_.fetch_add(1, std::memory_order_relaxed);
+          }),
       processor_(config.odometry), ingest_thread_([this] { run_ingest(); }),
       odometry_thread_([this] { run_odometry(); }) {
   pthread_setname_np(ingest_thread_.native_handle(), "ingest");
@@ -56,6 +61,8 @@ void LivePipeline::hand_over(Sweep& sweep, const SweepCut& cut) {
   back = {std::move(sweep), cut};
   sweep.points = std::move(spare); // NOLINT(bugprone-use-after-move): the one member that was moved away
   seen_.fetch_add(1, std::memory_order_relaxed);
+  while (const std::optional<RegistrationFeedback> feedback = feedback_.pop())
+    ingest_.take(*feedback);
   if (newest_sweep_.publish())
     dropped_.fetch_add(1, std::memory_order_relaxed);
   else
@@ -81,6 +88,8 @@ void LivePipeline::process(const CutSweep& taken) {
     return stopping_.load(std::memory_order_relaxed) || read_clock(CLOCK_MONOTONIC) > deadline;
   });
   (done.estimate.failed ? failed_ : processed_).fetch_add(1, std::memory_order_relaxed);
+  // Never full: one goes in for each sweep handed over, and the ingest empties the ring when it hands over the next.
+  static_cast<void>(feedback_.push(processor_.odometry().feedback()));
   if (!estimates_.push(done))
     unfetched_.fetch_add(1, std::memory_order_relaxed);
   estimate_is_there_.notify();

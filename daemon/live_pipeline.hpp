@@ -42,6 +42,9 @@ class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it kee
   /// Consumer: the next estimate, or nothing if there is none within `timeout`.
   std::optional<ProcessedSweep> next(Duration timeout);
 
+  /// Consumer: the next change of health of a motion source.
+  std::optional<HealthEvent> next_health_event() { return health_events_.pop(); }
+
   /// Consumer: whether all has been fetched and nothing more can come, for the input has ended or stop() was called.
   [[nodiscard]] bool finished() const;
 
@@ -51,6 +54,7 @@ class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it kee
 
   /// Any thread.
   [[nodiscard]] SweepCounters counters() const;
+  /// Estimates and changes of health that nobody fetched in time.
   [[nodiscard]] std::uint64_t unfetched() const { return unfetched_.load(std::memory_order_relaxed); }
 
   /// Owner, after stop().
@@ -62,7 +66,7 @@ class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it kee
     Sweep sweep;
     SweepCut cut;
   };
-  using Counter = std::atomic<std::uint64_t>; ///< one thread counts, any reads
+  using Counter = std::atomic<std::uint64_t>; ///< any thread may read
 
   void run_ingest();
   void run_odometry();
@@ -78,10 +82,13 @@ class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it kee
   LatestSlot<CutSweep> newest_sweep_;
   Wakeup sweep_is_there_;
   SpscRing<ProcessedSweep, kMaxUnfetched> estimates_;
+  SpscRing<HealthEvent, kMaxUnfetched> health_events_; ///< ingest -> consumer
+  SpscRing<RegistrationFeedback, 4> feedback_;         ///< odometry -> ingest
   Wakeup estimate_is_there_;
 
-  Counter seen_{0}, dropped_{0};                    ///< by ingest
-  Counter processed_{0}, failed_{0}, unfetched_{0}; ///< by odometry
+  Counter seen_{0}, dropped_{0};     ///< by ingest
+  Counter processed_{0}, failed_{0}; ///< by odometry
+  Counter unfetched_{0};             ///< by both
   std::atomic<bool> stopping_{false};
   std::atomic<bool> ingest_ended_{false};
   std::atomic<bool> odometry_ended_{false};

@@ -23,7 +23,7 @@ class MotionSourcesTest : public testing::Test {
       if (source == 0)
         sources.add(0, OdometrySample{stamp, stamp, {Eigen::Quaterniond::Identity(), {t_s, 0, 0}}, 1.0});
       else if (source == 1)
-        sources.add(1, ImuSample{stamp, stamp, {0, 0, 1.0}, {0, 0, 9.81}, {}});
+        sources.add(1, ImuSample{stamp, stamp, {0, 0, 1.0}, {1e-6 * ms, 0, 9.81}, {}}); // never twice the same
       else
         sources.add(2, OdometrySample{stamp, stamp, {so3_exp({0, 0, 2 * t_s}), {2 * t_s, 0, 0}}, 1.0});
     }
@@ -57,7 +57,7 @@ TEST_F(MotionSourcesTest, QueueTakesAllFromTheFirstHealthyOne) {
 TEST_F(MotionSourcesTest, AnInertialSourceFirstInTheQueueLeavesTheTranslationOpen) {
   MotionSources sources({kWheelsImuVisual[1], kWheelsImuVisual[0]}, Fusion::queue);
   for (const int ms : {0, 10}) {
-    sources.add(0, ImuSample{at_ms(ms), at_ms(ms), {0, 0, 1.0}, {0, 0, 9.81}, {}});
+    sources.add(0, ImuSample{at_ms(ms), at_ms(ms), {0, 0, 1.0}, {1e-6 * ms, 0, 9.81}, {}});
     sources.add(1, OdometrySample{at_ms(ms), at_ms(ms), {}, 1.0});
   }
   const SourceChoice choice = sources.choose(at_ms(20));
@@ -125,6 +125,42 @@ TEST_F(MotionSourcesTest, DescribeWritesThePoseOfEverySourceThatSpokeDuringTheSw
   sources.describe(sweep);
   EXPECT_FALSE(sweep.sources[0].usable);
   EXPECT_FALSE(sweep.specific_force_base_mps2) << "nothing is left of the sweep before";
+}
+
+TEST_F(MotionSourcesTest, WhoeverLosesHealthIsKnownToTheSweepButNotUsable) {
+  MotionSources sources(kWheelsImuVisual, Fusion::combined);
+  feed(sources, 0, 0, 1000);
+  sources.set_outside_verdict(0, false);
+  sources.set_outside_verdict(0, true);
+  feed(sources, 0, 1020, 1100); // on probation
+  Sweep sweep;
+  sweep.start = at_ms(1000);
+  sweep.end = at_ms(1100);
+  sources.describe(sweep);
+  EXPECT_TRUE(sweep.sources[0].known);
+  EXPECT_FALSE(sweep.sources[0].usable);
+  EXPECT_EQ(sweep.sources[0].spell, 1U);
+  EXPECT_FALSE(sources.choose(at_ms(1100)).translation);
+}
+
+TEST_F(MotionSourcesTest, EachChangeOfHealthIsToldOnceWithItsSource) {
+  std::vector<HealthEvent> events;
+  MotionSources sources(kWheelsImuVisual, Fusion::combined, [&](const HealthEvent& event) { events.push_back(event); });
+  feed(sources, 0, 0, 1000);
+  feed(sources, 2, 0, 1000);
+  for (int ms = 1000; ms <= 1500; ms += 10) {
+    sources.advance(at_ms(ms));
+    if (ms % 20 == 0)
+      feed(sources, 0, ms, ms);
+  }
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_EQ(events[0].source, 2U);
+  EXPECT_EQ(events[0].stamp, at_ms(1070));
+  EXPECT_FALSE(events[0].healthy);
+  feed(sources, 2, 1520, 2540);
+  ASSERT_EQ(events.size(), 2U);
+  EXPECT_EQ(events[1].source, 2U);
+  EXPECT_TRUE(events[1].healthy);
 }
 
 } // namespace

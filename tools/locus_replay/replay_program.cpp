@@ -76,14 +76,18 @@ void check_faults(const std::vector<Fault>& faults, const Config& config) {
 void replay(const Config& config, LidarRouter lidars, Recording& recording, Results& results, const SweepStage& stage) {
   daemon::SweepCounters counters;
   daemon::SweepProcessor processor(config.odometry);
-  daemon::Ingest ingest(config, std::move(lidars), [&](Sweep& sweep, const daemon::SweepCut& cut) {
+  const auto process = [&](daemon::Ingest& ingest, Sweep& sweep, const daemon::SweepCut& cut) {
     if (stage)
       stage(sweep);
     const daemon::ProcessedSweep done = processor.process(sweep, cut);
+    ingest.take(processor.odometry().feedback());
     ++counters.seen;
     ++(done.estimate.failed ? counters.failed : counters.processed);
     results.take(done);
-  });
+  };
+  daemon::Ingest ingest(
+      config, std::move(lidars), [&](Sweep& sweep, const daemon::SweepCut& cut) { process(ingest, sweep, cut); },
+      [&](const HealthEvent& event) { results.take(event); });
   for (bool more = true; more;) {
     const daemon::Input input = recording.next(Duration::zero());
     ingest.take(input);
@@ -97,11 +101,17 @@ void replay_live(const Config& config, LidarRouter lidars, Recording& recording,
   constexpr Duration kPatience = std::chrono::milliseconds{100};
   daemon::PacedInput paced(recording, speed);
   daemon::LivePipeline pipeline(config, std::move(lidars), paced, speed);
+  const auto take_events = [&] {
+    while (const auto event = pipeline.next_health_event())
+      results.take(*event);
+  };
   while (!pipeline.finished()) {
     if (const auto done = pipeline.next(kPatience))
       results.take(*done);
+    take_events();
   }
   pipeline.stop();
+  take_events();
   results.finish(pipeline.ingest(), pipeline.processor(), pipeline.counters());
 }
 

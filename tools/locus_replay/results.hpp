@@ -23,6 +23,7 @@ class Results {
           const daemon::MachineTime& begin);
 
   void take(const daemon::ProcessedSweep& sweep);
+  void take(const HealthEvent& event) { figures_.take(event); }
 
   /// After the last sweep. Fails for a recording without a valid data packet, once the counters that tell why are
   /// written.

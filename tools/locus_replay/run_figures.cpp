@@ -57,21 +57,31 @@ ordered_json stages(const FinishedRun& run) {
 ordered_json sources(const FinishedRun& run) {
   ordered_json sources = ordered_json::object();
   for (std::size_t i = 0; i < run.config.odometry.motion_sources.size(); ++i) {
-    const SourceCounters& counters = run.ingest.sources().track(i).counters();
-    const SourceCounters::Rejected& rejected = counters.rejected;
+    const SourceCounters& counters = run.ingest.sources().counters(i);
+    ordered_json rejected;
+    for (std::size_t reason = 0; reason < kHealthReasonCount; ++reason)
+      rejected[std::string{kHealthReasonNames[reason]}] = counters.rejected[reason];
     sources[run.config.odometry.motion_sources[i].name] = {{"received", counters.received},
                                                            {"used_sweeps", run.figures.used_sweeps(i)},
-                                                           {"rejected",
-                                                            {{"stale", rejected.stale},
-                                                             {"jump", rejected.jump},
-                                                             {"nan", rejected.nan},
-                                                             {"frozen", rejected.frozen},
-                                                             {"out_of_order", rejected.out_of_order},
-                                                             {"covariance", rejected.covariance},
-                                                             {"disagreement", rejected.disagreement}}},
-                                                           {"health_changes", 0}};
+                                                           {"rejected", rejected},
+                                                           {"health_changes", counters.health_changes}};
   }
   return sources;
+}
+
+/// When a source was lost and why, and when it came back.
+std::string readable_health(const FinishedRun& run, std::size_t source) {
+  constexpr std::size_t kTold = 4; ///< a source that flaps is not worth a page
+  std::string text;
+  std::size_t told = 0;
+  for (const HealthEvent& event : run.figures.health_events()) {
+    if (event.source != source || told++ >= kTold)
+      continue;
+    const double after_s = to_seconds(event.stamp - run.figures.first_stamp());
+    text += event.healthy ? fmt::format(", back at {:.2f} s", after_s)
+                          : fmt::format(", lost at {:.2f} s ({})", after_s, to_string(event.reason));
+  }
+  return told > kTold ? text + fmt::format(" and {} more changes", told - kTold) : text;
 }
 
 template <class T> ordered_json rounded_or_null(const std::optional<T>& value) {
@@ -123,7 +133,9 @@ double peak_rss_mb() {
 
 void RunFigures::take(const daemon::ProcessedSweep& sweep) {
   const OdometryEstimate& estimate = sweep.estimate;
-  if (sweeps() > 0)
+  if (sweeps() == 0)
+    first_stamp_ = estimate.stamp;
+  else
     path_m_ += (estimate.T_odom_base.translation - last_T_odom_base_.translation).norm();
   last_T_odom_base_ = estimate.T_odom_base;
   wall_ms_.push_back(static_cast<float>(1e3 * to_seconds(sweep.took.wall)));
@@ -190,9 +202,9 @@ std::string readable(const FinishedRun& run) {
   text += fmt::format("sweeps     {} seen: {} processed, {} dropped, {} failed\n", run.sweeps.seen,
                       run.sweeps.processed, run.sweeps.dropped, run.sweeps.failed);
   for (std::size_t i = 0; i < run.config.odometry.motion_sources.size(); ++i) {
-    if (const auto received = run.ingest.sources().track(i).counters().received; received > 0)
-      text += fmt::format("{:10} {} samples, used for {} sweeps\n", run.config.odometry.motion_sources[i].name,
-                          received, run.figures.used_sweeps(i));
+    if (const auto received = run.ingest.sources().counters(i).received; received > 0)
+      text += fmt::format("{:10} {} samples, used for {} sweeps{}\n", run.config.odometry.motion_sources[i].name,
+                          received, run.figures.used_sweeps(i), readable_health(run, i));
   }
   text += fmt::format("path       {:.2f} m, ends at {:.3f} {:.3f} {:.3f} m\n", run.figures.path_m(), end_m.x(),
                       end_m.y(), end_m.z());

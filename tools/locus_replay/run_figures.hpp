@@ -31,6 +31,7 @@ class RunFigures {
   explicit RunFigures(std::size_t sources) : used_sweeps_(sources) {}
 
   void take(const daemon::ProcessedSweep& sweep);
+  void take(const HealthEvent& event) { health_events_.push_back(event); }
 
   [[nodiscard]] std::size_t sweeps() const { return wall_ms_.size(); }
   [[nodiscard]] Percentiles process_ms() const { return percentiles(wall_ms_); }
@@ -38,6 +39,9 @@ class RunFigures {
   [[nodiscard]] Means means() const;
   /// Sweeps whose prior came from this source, all of it or in part.
   [[nodiscard]] std::uint64_t used_sweeps(std::size_t source) const { return used_sweeps_[source]; }
+  /// In the order in which they happened.
+  [[nodiscard]] const std::vector<HealthEvent>& health_events() const { return health_events_; }
+  [[nodiscard]] Stamp first_stamp() const { return first_stamp_; }
   [[nodiscard]] double path_m() const { return path_m_; }
   [[nodiscard]] const Pose& last_T_odom_base() const { return last_T_odom_base_; }
 
@@ -46,6 +50,8 @@ class RunFigures {
 
   std::vector<float> wall_ms_, cpu_ms_;
   std::vector<std::uint64_t> used_sweeps_;
+  std::vector<HealthEvent> health_events_;
+  Stamp first_stamp_; ///< end of the first sweep
   Means sums_;
   double path_m_ = 0;
   Pose last_T_odom_base_;

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "core/motion_sample.hpp"
+#include "core/options.hpp"
+#include "core/registration_feedback.hpp"
+#include "core/source_health.hpp"
+
+namespace locus {
+
+/// A sample of a motion source as health metrics see it: stamped by the host's clock, of one kind or the other.
+struct SourceReading {
+  Stamp stamp;
+  Stamp arrival;
+  const ImuSample* imu = nullptr;
+  const OdometrySample* odometry = nullptr;
+};
+
+/// One way to tell that a motion source is not to be trusted (paper II-B.1). To add another, derive it and name it in
+/// health_metrics(). A metric knows the samples and what lidar says, and no clock. One owner.
+class HealthMetric {
+ public:
+  virtual ~HealthMetric() = default;
+
+  /// Why this sample must be left out; nothing if there is no reason.
+  virtual std::optional<HealthReason> judge(const SourceReading&) { return std::nullopt; }
+
+  /// No metric has objected to the sample: later ones follow from it.
+  virtual void accept(const SourceReading&) {}
+
+  /// Why the source must not be used any longer, after `opinion` of lidar on it; nothing if there is no reason.
+  virtual std::optional<HealthReason> hear(LidarOpinion /*opinion*/, const RegistrationFeedback&) {
+    return std::nullopt;
+  }
+
+  /// The source has lost its health: what comes next need not follow from what came before.
+  virtual void forget() {}
+};
+
+/// All metrics for a source of this kind, in the order in which they are asked.
+std::vector<std::unique_ptr<HealthMetric>> health_metrics(SourceKind kind);
+
+} // namespace locus

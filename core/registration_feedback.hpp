@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "core/pose.hpp"
+#include "core/stamp.hpp"
+#include "core/sweep.hpp"
+
+namespace locus {
+
+/// What lidar says about the motion that a source reported from one sweep to the next.
+enum class LidarOpinion : std::uint8_t { none, agrees, disagrees };
+
+/// What a registered sweep tells the health monitors. Nothing else of the result goes back to the sensors' side, so
+/// that a sweep never depends on when the one before it was registered, but for which sources are trusted.
+struct RegistrationFeedback {
+  std::array<LidarOpinion, Sweep::kMaxSources> opinions{};
+  std::optional<Vector6> twist_base; ///< m/s and rad/s as lidar saw it; nothing where it saw too little
+};
+
+} // namespace locus
