@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "core/imu_self_check.hpp"
+
 namespace locus {
 
 namespace {
@@ -119,11 +121,11 @@ class FrozenOdometry : public HealthMetric {
   bool lidar_sees_motion_ = false;
 };
 
-/// A turn rate beyond the range of any unit on a robot.
+/// A turn rate that no robot has.
 class ImpossibleTurnRate : public HealthMetric {
  public:
   std::optional<HealthReason> judge(const SourceReading& reading) override {
-    constexpr double kMax_radps = 35.0; ///< 2000 degrees per second
+    constexpr double kMax_radps = 12.0; ///< two turns a second; what a gyro in deg/s soon goes beyond
     return reason_if(reading.imu->angular_velocity_radps.norm() > kMax_radps, HealthReason::jump);
   }
 };
@@ -178,12 +180,14 @@ class LidarDisagrees : public HealthMetric {
 
 } // namespace
 
-std::vector<std::unique_ptr<HealthMetric>> health_metrics(SourceKind kind) {
+std::vector<std::unique_ptr<HealthMetric>> health_metrics(const MotionSourceOptions& source) {
   std::vector<std::unique_ptr<HealthMetric>> metrics;
   metrics.push_back(std::make_unique<NotANumber>()); // first, so that the others need not think of it
+  if (source.kind == SourceKind::imu)
+    metrics.push_back(std::make_unique<ImuSelfCheck>(source.T_base_source)); // looks at all the others leave out
   metrics.push_back(std::make_unique<Late>());
   metrics.push_back(std::make_unique<OutOfOrder>());
-  if (kind == SourceKind::imu) {
+  if (source.kind == SourceKind::imu) {
     metrics.push_back(std::make_unique<FrozenImu>());
     metrics.push_back(std::make_unique<ImpossibleTurnRate>());
   } else {

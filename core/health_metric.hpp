@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "core/motion_sample.hpp"
@@ -37,11 +38,17 @@ class HealthMetric {
     return std::nullopt;
   }
 
+  /// What the metric has found out about the source as a whole, in words for the user; empty if nothing is wrong.
+  [[nodiscard]] virtual std::string_view verdict() const { return {}; }
+
+  /// Whether the specific force of an inertial source may be used.
+  [[nodiscard]] virtual bool trusts_accelerometer() const { return true; }
+
   /// The source has lost its health: what comes next need not follow from what came before.
   virtual void forget() {}
 };
 
-/// All metrics for a source of this kind, in the order in which they are asked.
-std::vector<std::unique_ptr<HealthMetric>> health_metrics(SourceKind kind);
+/// All metrics for a source, in the order in which they are asked.
+std::vector<std::unique_ptr<HealthMetric>> health_metrics(const MotionSourceOptions& source);
 
 } // namespace locus

@@ -108,6 +108,18 @@ void HealthMonitor::change(bool healthy, HealthReason reason, Stamp now) {
 
 std::optional<HealthEvent> HealthMonitor::take_event() { return std::exchange(event_, std::nullopt); }
 
+std::string_view HealthMonitor::verdict() const {
+  for (const auto& metric : metrics_) {
+    if (const std::string_view verdict = metric->verdict(); !verdict.empty())
+      return verdict;
+  }
+  return {};
+}
+
+bool HealthMonitor::trusts_accelerometer() const {
+  return std::ranges::all_of(metrics_, [](const auto& metric) { return metric->trusts_accelerometer(); });
+}
+
 Duration HealthMonitor::timeout() const {
   if (period_s_ == 0.0)
     return kLongestTimeout;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "core/health_metric.hpp"
@@ -28,7 +29,7 @@ class HealthMonitor {
   static constexpr Duration kShortestTimeout = std::chrono::milliseconds{50};
   static constexpr Duration kLongestTimeout = std::chrono::seconds{1}; ///< the paper's rate of 1 Hz
 
-  explicit HealthMonitor(SourceKind kind) : metrics_(health_metrics(kind)) {}
+  explicit HealthMonitor(const MotionSourceOptions& source) : metrics_(health_metrics(source)) {}
 
   /// The instant of the measurement if the sample may be used; nothing if it is left out.
   std::optional<Stamp> judge(const ImuSample& sample);
@@ -48,6 +49,9 @@ class HealthMonitor {
   [[nodiscard]] std::uint32_t spell() const { return spell_; }
   /// Silence that costs the source its health: three of its own periods.
   [[nodiscard]] Duration timeout() const;
+  /// What is wrong with the source as a whole, in words for the user; empty if nothing is.
+  [[nodiscard]] std::string_view verdict() const;
+  [[nodiscard]] bool trusts_accelerometer() const;
   /// The latest change since the last call; HealthEvent::source is left to the caller.
   std::optional<HealthEvent> take_event();
   [[nodiscard]] const SourceCounters& counters() const { return counters_; }

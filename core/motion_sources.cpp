@@ -90,7 +90,7 @@ void MotionSources::describe(Sweep& sweep) const {
     if (!T_source_base)
       continue;
     sweep.sources[i] = {true, healthy(i), sources_[i].spell, *T_source_base};
-    if (healthy(i) && !sweep.specific_force_base_mps2)
+    if (healthy(i) && sources_[i].health.trusts_accelerometer() && !sweep.specific_force_base_mps2)
       sweep.specific_force_base_mps2 = track.mean_specific_force_mps2(sweep.start, sweep.end);
   }
 }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "core/health_monitor.hpp"
@@ -61,12 +62,14 @@ class MotionSources {
   void describe(Sweep& sweep) const;
 
   [[nodiscard]] bool healthy(std::size_t source) const { return sources_[source].health.healthy(); }
+  /// What is wrong with a source as a whole, in words for the user; empty if nothing is.
+  [[nodiscard]] std::string_view verdict(std::size_t source) const { return sources_[source].health.verdict(); }
   [[nodiscard]] const SourceCounters& counters(std::size_t source) const { return sources_[source].health.counters(); }
   [[nodiscard]] std::size_t size() const { return sources_.size(); }
 
  private:
   struct Source {
-    explicit Source(const MotionSourceOptions& options) : health(options.kind), track(options) {}
+    explicit Source(const MotionSourceOptions& options) : health(options), track(options) {}
 
     HealthMonitor health;
     MotionTrack track;

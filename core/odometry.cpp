@@ -203,6 +203,7 @@ Odometry::Prior Odometry::integrate_sensors(const Sweep& sweep) const {
       keeps_velocity ? PriorSource::kConstantVelocity : PriorSource::kIdentity;
   prior.blind = processed_ == 1;
   prior.variance = prior.blind ? kUnknownMotion.cwiseAbs2().eval() : constant_velocity_statistics_.variance(periods);
+  prior.bias = prior.variance.cwiseSqrt(); // who goes on as before errs more the longer it does
 
   const auto kind_of = [this](std::size_t i) { return options_.motion_sources[i].kind; };
   const auto usable = [&](std::size_t i) {
@@ -212,11 +213,13 @@ Odometry::Prior Odometry::integrate_sensors(const Sweep& sweep) const {
   if (choice.rotation) {
     prior.T_last_now.rotation = step(sweep, *choice.rotation)->rotation;
     prior.variance.tail<3>() = statistics_[*choice.rotation].variance(periods).tail<3>();
+    prior.bias.tail<3>() = statistics_[*choice.rotation].bias(periods).tail<3>();
     prior.source.rotation = static_cast<int>(*choice.rotation);
   }
   if (choice.translation) {
     prior.T_last_now.translation = step(sweep, *choice.translation)->translation;
     prior.variance.head<3>() = statistics_[*choice.translation].variance(periods).head<3>();
+    prior.bias.head<3>() = statistics_[*choice.translation].bias(periods).head<3>();
     prior.source.translation = static_cast<int>(*choice.translation);
     prior.blind = false;
   }
@@ -298,7 +301,7 @@ Registration Odometry::match_submap(const Prior& prior, const Pose& T_last_now, 
 /// Of the prior as seen from the submap, in base axes: after dead reckoning its start is in doubt as well.
 Vector6 Odometry::variance_in_submap(const Prior& prior) const {
   const Matrix6 R = turn_both(T_odom_last_.rotation.conjugate());
-  return prior.variance + (R.cwiseAbs() * adrift_sigma_).cwiseAbs2();
+  return prior.variance + (R.cwiseAbs() * adrift_.bias).cwiseAbs2() + R.cwiseAbs() * adrift_.variance;
 }
 
 Pose Odometry::flatten(const Pose& T_last_now) const {
@@ -356,16 +359,16 @@ void Odometry::update_map(OdometryEstimate& estimate) {
   estimate.keyframe = true;
 }
 
-/// What a prediction says of itself. The errors of a motion source keep their sign, as those of scale and of bias do,
-/// so they add up until lidar finds the submap again.
+/// What a prediction says of itself. Until lidar finds the submap again noise gathers, and bias adds up.
 void Odometry::drift(const Prior& prior, OdometryEstimate& estimate) {
   const Eigen::Vector3d moved_m = estimate.T_odom_base.translation - T_odom_last_.translation;
-  adrift_sigma_.head<3>().array() += adrift_sigma_.tail<3>().norm() * moved_m.norm();
-  adrift_sigma_ += turn_both(T_odom_last_.rotation).cwiseAbs() * prior.variance.cwiseSqrt();
+  const Matrix6 R = turn_both(T_odom_last_.rotation);
+  adrift_.bias.head<3>().array() += adrift_.bias.tail<3>().norm() * moved_m.norm();
+  adrift_.bias += R.cwiseAbs() * prior.bias;
+  adrift_.variance += R.cwiseAbs() * prior.variance;
   carry_covariance(moved_m);
   estimate.pose_covariance = covariance_;
-  estimate.pose_covariance.diagonal() += adrift_sigma_.cwiseAbs2();
-  const Matrix6 R = turn_both(T_odom_last_.rotation);
+  estimate.pose_covariance.diagonal() += adrift_.bias.cwiseAbs2() + adrift_.variance;
   move_on(T_odom_last_.inverse() * estimate.T_odom_base, R * prior.variance.asDiagonal() * R.transpose(), estimate);
 }
 
@@ -380,8 +383,8 @@ void Odometry::settle(const Sweep& sweep, const Prior& prior, OdometryEstimate& 
       (prior_information + estimate.scan_to_submap.information / kPointsPerIndependentPoint).inverse();
   carry_covariance(estimate.T_odom_base.translation - T_odom_last_.translation);
   estimate.pose_covariance = covariance_ + covariance;
-  if (!adrift_sigma_.isZero()) { // the way back to the submap is no motion of the robot
-    adrift_sigma_.setZero();
+  if (!adrift_.variance.isZero()) { // the way back to the submap is no motion of the robot
+    adrift_ = {};
     move_on(prior.T_last_now, covariance, estimate);
     return;
   }
@@ -431,7 +434,7 @@ void Odometry::finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& 
   update_map(estimate);
   if (estimate.keyframe) {
     covariance_ = estimate.pose_covariance;
-    adrift_sigma_.setZero();
+    adrift_ = {};
   }
   ++processed_;
   T_odom_last_ = estimate.T_odom_base;

@@ -44,6 +44,7 @@ class Odometry {
   struct Prior {
     Pose T_last_now;
     Vector6 variance = Vector6::Zero(); ///< in the axes of the base at the last sweep
+    Vector6 bias = Vector6::Zero();     ///< the part of the deviation that comes again with the next sweep
     PriorSource source;
     bool blind = false; ///< nothing at all is known yet, not even a velocity
   };
@@ -91,9 +92,11 @@ class Odometry {
   Pose T_odom_last_;
   Vector6 twist_base_ = Vector6::Zero();
   Pose T_odom_keyframe_;
-  Matrix6 covariance_ = Matrix6::Zero();   ///< of T_odom_last_, what the map has gathered
-  Vector6 adrift_sigma_ = Vector6::Zero(); ///< gathered since lidar was lost, odom axes
-  int refused_in_a_row_ = 0;               ///< sweeps with points
+  Matrix6 covariance_ = Matrix6::Zero(); ///< of T_odom_last_, what the map has gathered
+  struct {
+    Vector6 bias = Vector6::Zero(), variance = Vector6::Zero(); ///< odom axes
+  } adrift_;                 ///< how far predictions may be off since the last registered sweep
+  int refused_in_a_row_ = 0; ///< sweeps with points
   bool degenerate_ = false;
   RegistrationFeedback feedback_;
 };

@@ -8,6 +8,7 @@ namespace locus {
 namespace {
 
 constexpr double kMemory_sweeps = 30.0;
+constexpr double kMemoryOfBias_sweeps = 100.0; ///< long enough for the noise to go out
 
 /// An axis counts as seen by the lidar where its points outweigh the prior by this much.
 constexpr double kLidarDominates = 4.0;
@@ -15,14 +16,16 @@ constexpr double kLidarDominates = 4.0;
 } // namespace
 
 PriorStatistics::PriorStatistics(const Vector6& initial_sigma, const Vector6& least_sigma)
-    : variance_(initial_sigma.cwiseAbs2()), least_variance_(least_sigma.cwiseAbs2()) {}
+    : variance_(initial_sigma.cwiseAbs2()), least_variance_(least_sigma.cwiseAbs2()), bias_(initial_sigma) {}
 
 void PriorStatistics::learn(const Vector6& difference, const Matrix6& lidar_information) {
-  learned_ = std::min(learned_ + 1.0, kMemory_sweeps);
+  learned_ = std::min(learned_ + 1.0, kMemoryOfBias_sweeps);
+  const double memory_sweeps = std::min(learned_, kMemory_sweeps);
   for (int axis = 0; axis < 6; ++axis) {
     if (lidar_information(axis, axis) * variance_[axis] < kLidarDominates)
       continue;
-    variance_[axis] += (difference[axis] * difference[axis] - variance_[axis]) / (learned_ + 1.0);
+    variance_[axis] += (difference[axis] * difference[axis] - variance_[axis]) / (memory_sweeps + 1.0);
+    bias_[axis] += (difference[axis] - bias_[axis]) / (learned_ + 1.0);
     variance_[axis] = std::max(variance_[axis], least_variance_[axis]);
   }
 }

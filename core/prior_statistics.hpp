@@ -23,9 +23,14 @@ class PriorStatistics {
   /// Variances of the prior over `periods` sweep periods.
   [[nodiscard]] Vector6 variance(double periods) const;
 
+  /// The part of the error that is the same from sweep to sweep, as those of scale and of gyro bias are, over
+  /// `periods`: what adds up while nothing corrects it.
+  [[nodiscard]] Vector6 bias(double periods) const { return periods * bias_.cwiseAbs(); }
+
  private:
   Vector6 variance_;
   Vector6 least_variance_;
+  Vector6 bias_;
   double learned_ = 0.0;
 };
 

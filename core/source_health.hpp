@@ -19,11 +19,12 @@ enum class HealthReason : std::uint8_t {
   out_of_order, ///< a stamp that does not follow from the ones before
   covariance,   ///< much less certain than usual, as the source itself says
   disagreement, ///< lidar saw another motion
-  outside       ///< somebody else says so
+  outside,      ///< somebody else says so
+  self_check    ///< ImuSelfCheck has refused it
 };
-inline constexpr std::size_t kHealthReasonCount = 8;
+inline constexpr std::size_t kHealthReasonCount = 9;
 inline constexpr std::array<std::string_view, kHealthReasonCount> kHealthReasonNames{
-    "stale", "jump", "nan", "frozen", "out_of_order", "covariance", "disagreement", "outside"};
+    "stale", "jump", "nan", "frozen", "out_of_order", "covariance", "disagreement", "outside", "self_check"};
 
 constexpr std::string_view to_string(HealthReason reason) {
   return kHealthReasonNames[static_cast<std::size_t>(reason)];

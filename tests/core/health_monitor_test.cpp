@@ -12,6 +12,9 @@ using std::chrono::hours;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
+const MotionSourceOptions kWheels{.name = "wheels", .kind = SourceKind::odometry, .T_base_source = {}};
+const MotionSourceOptions kImu{.name = "imu", .kind = SourceKind::imu, .T_base_source = {}};
+
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// Wheels at 50 Hz that go 1 m/s, and what can become of their samples on the way to the monitor.
@@ -89,7 +92,7 @@ class WheelsTest : public testing::Test {
 
   void begin_fault() { fault_began_ = now_; }
 
-  HealthMonitor monitor_{SourceKind::odometry};
+  HealthMonitor monitor_{kWheels};
   Stamp now_ = stamp_from_ns(1'700'000'000'000'000'000);
   double x_m_ = 0.0;
   double stopping_at_m_ = 2.0, speed_mps_ = 1.0; ///< of brake_and_stand
@@ -110,7 +113,7 @@ TEST_F(WheelsTest, AreHealthyFromTheFirstSampleOn) {
   EXPECT_TRUE(events_.empty());
   EXPECT_EQ(monitor_.counters().received, 100U);
   EXPECT_EQ(monitor_.counters().health_changes, 0U);
-  HealthMonitor unheard(SourceKind::odometry);
+  HealthMonitor unheard(kWheels);
   EXPECT_FALSE(unheard.healthy());
   unheard.advance(now_);
   EXPECT_FALSE(unheard.take_event()) << "who never spoke cannot fall silent";
@@ -130,7 +133,7 @@ TEST_F(WheelsTest, SilenceOfThreeLearnedPeriodsCostsTheirHealth) {
 TEST_F(WheelsTest, TheTimeoutIsNeverShorterThanFiftyMillisecondsNorLongerThanASecond) {
   for (const auto& [period, timeout] :
        {std::pair{milliseconds{5}, milliseconds{50}}, {milliseconds{900}, seconds{1}}}) {
-    HealthMonitor monitor(SourceKind::odometry);
+    HealthMonitor monitor(kWheels);
     EXPECT_EQ(monitor.timeout(), HealthMonitor::kLongestTimeout) << "before anything is learned";
     for (int i = 0; i < 20; ++i) {
       const Stamp stamp = stamp_from_ns(0) + i * period;
@@ -349,7 +352,7 @@ class ImuTest : public testing::Test {
                                .attitude = {}});
     }
   }
-  HealthMonitor monitor_{SourceKind::imu};
+  HealthMonitor monitor_{kImu};
   Stamp now_ = stamp_from_ns(1'700'000'000'000'000'000);
 };
 

@@ -63,6 +63,21 @@ TEST(PriorStatistics, AnAxisThatThePointsDoNotSeeTeachesNothing) {
   EXPECT_DOUBLE_EQ(statistics.variance(1.0)[1], 0.002 * 0.002);
 }
 
+TEST(PriorStatistics, TheBiasIsWhatIsLeftOfErrorsWhenTheirNoiseHasGoneOut) {
+  PriorStatistics statistics(kInitial, kLeast);
+  EXPECT_TRUE(statistics.bias(1.0).isApprox(kInitial)) << "who is not known yet may err the same way all the time";
+  std::mt19937 random{1};
+  std::normal_distribution<double> normal;
+  for (int i = 0; i < 3000; ++i) {
+    Vector6 difference = Vector6::Constant(-0.01);
+    for (int axis = 0; axis < 6; ++axis)
+      difference[axis] += 0.005 * normal(random);
+    statistics.learn(difference, kSeesAll);
+  }
+  EXPECT_NEAR(statistics.bias(1.0).mean(), 0.01, 0.001);
+  EXPECT_NEAR(statistics.bias(100.0).mean(), 1.0, 0.1);
+}
+
 TEST(PriorStatistics, TheDeviationGrowsWithTheTimeBetween) {
   const PriorStatistics statistics(kInitial, kLeast);
   EXPECT_TRUE(statistics.variance(10.0).isApprox(100.0 * kInitial.cwiseAbs2()));

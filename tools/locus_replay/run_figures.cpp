@@ -55,12 +55,15 @@ ordered_json stages(const FinishedRun& run) {
 }
 
 ordered_json sources(const FinishedRun& run) {
+  constexpr std::size_t kAlwaysTold = 7; ///< reasons; the others are rare, and told where they occur
   ordered_json sources = ordered_json::object();
   for (std::size_t i = 0; i < run.config.odometry.motion_sources.size(); ++i) {
     const SourceCounters& counters = run.ingest.sources().counters(i);
     ordered_json rejected;
-    for (std::size_t reason = 0; reason < kHealthReasonCount; ++reason)
-      rejected[std::string{kHealthReasonNames[reason]}] = counters.rejected[reason];
+    for (std::size_t reason = 0; reason < kHealthReasonCount; ++reason) {
+      if (reason < kAlwaysTold || counters.rejected[reason] > 0)
+        rejected[std::string{kHealthReasonNames[reason]}] = counters.rejected[reason];
+    }
     sources[run.config.odometry.motion_sources[i].name] = {{"received", counters.received},
                                                            {"used_sweeps", run.figures.used_sweeps(i)},
                                                            {"rejected", rejected},
@@ -69,7 +72,7 @@ ordered_json sources(const FinishedRun& run) {
   return sources;
 }
 
-/// When a source was lost and why, and when it came back.
+/// When a source was lost and why, when it came back, and what is wrong with it altogether.
 std::string readable_health(const FinishedRun& run, std::size_t source) {
   constexpr std::size_t kTold = 4; ///< a source that flaps is not worth a page
   std::string text;
@@ -81,7 +84,11 @@ std::string readable_health(const FinishedRun& run, std::size_t source) {
     text += event.healthy ? fmt::format(", back at {:.2f} s", after_s)
                           : fmt::format(", lost at {:.2f} s ({})", after_s, to_string(event.reason));
   }
-  return told > kTold ? text + fmt::format(" and {} more changes", told - kTold) : text;
+  if (told > kTold)
+    text += fmt::format(" and {} more changes", told - kTold);
+  if (const std::string_view verdict = run.ingest.sources().verdict(source); !verdict.empty())
+    text += fmt::format("\n           {}", verdict);
+  return text;
 }
 
 template <class T> ordered_json rounded_or_null(const std::optional<T>& value) {
