@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/imu_self_check.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace locus {
@@ -14,9 +15,12 @@ constexpr double kMaxTilt_deg = 60.0;      ///< no robot begins on a steeper slo
 
 /// Turn rates of lidar below this are noise beside the gyro's.
 constexpr double kTurns_radps = 0.15;
-/// Sum of squared turn rates (per sweep) after which the comparison is sure: a second of an ordinary turn.
-constexpr double kEnoughTurning = 2.0;
+/// After so many turning sweeps the comparison is sure.
+constexpr int kSweepsToCompare = 10;
 constexpr double kDegPerRad = 57.3;
+
+constexpr Duration kMaxGap = std::chrono::milliseconds{100};   ///< across which a gyro can be followed
+constexpr Duration kResolution = std::chrono::milliseconds{5}; ///< of what is remembered of its turns
 
 bool is_about(double value, double expected, double tolerance) {
   return std::abs(value - expected) < tolerance * expected;
@@ -27,17 +31,42 @@ bool is_about(double value, double expected, double tolerance) {
 std::optional<HealthReason> ImuSelfCheck::judge(const SourceReading& reading) {
   if (refused_)
     return HealthReason::self_check;
-  turn_sum_radps_ += R_base_imu_ * reading.imu->angular_velocity_radps;
-  turns_ += 1.0;
-  if (weighed_)
-    return std::nullopt;
-  if (!first_)
-    first_ = reading.stamp;
-  force_sum_mps2_ += R_base_imu_ * reading.imu->specific_force_mps2;
-  forces_ += 1.0;
-  if (reading.stamp - *first_ >= kWeighFor)
-    weigh_gravity();
+  follow_turns(R_base_imu_ * reading.imu->angular_velocity_radps, reading.stamp);
+  weigh(R_base_imu_ * reading.imu->specific_force_mps2, reading.stamp);
   return refused_ ? std::optional{HealthReason::self_check} : std::nullopt;
+}
+
+void ImuSelfCheck::weigh(const Eigen::Vector3d& specific_force_base_mps2, Stamp stamp) {
+  if (weighed_)
+    return;
+  if (!first_)
+    first_ = stamp;
+  force_sum_mps2_ += specific_force_base_mps2;
+  forces_ += 1.0;
+  if (stamp - *first_ >= kWeighFor)
+    weigh_gravity();
+}
+
+void ImuSelfCheck::follow_turns(const Eigen::Vector3d& turn_rate_base_radps, Stamp stamp) {
+  if (last_ && stamp > *last_ && stamp - *last_ < kMaxGap)
+    angle_rad_ += to_seconds(stamp - *last_) * turn_rate_base_radps;
+  else if (last_)
+    known_ = 0;
+  last_ = stamp;
+  if (known_ > 0 && stamp - turned_[newest_].stamp < kResolution)
+    return;
+  newest_ = (newest_ + 1) % turned_.size();
+  turned_[newest_] = {stamp, angle_rad_};
+  known_ = std::min(known_ + 1, turned_.size());
+}
+
+const ImuSelfCheck::Turned* ImuSelfCheck::turned_at(Stamp stamp) const {
+  for (std::size_t age = 0; age < known_; ++age) {
+    const Turned& turned = turned_[(newest_ + turned_.size() - age) % turned_.size()];
+    if (turned.stamp <= stamp)
+      return &turned;
+  }
+  return nullptr;
 }
 
 void ImuSelfCheck::weigh_gravity() {
@@ -56,24 +85,25 @@ void ImuSelfCheck::weigh_gravity() {
 }
 
 std::optional<HealthReason> ImuSelfCheck::hear(LidarOpinion /*opinion*/, const RegistrationFeedback& feedback) {
-  if (turns_ == 0.0 || compared_ || !feedback.twist_base)
+  if (refused_ || turning_sweeps_ == kSweepsToCompare || !weighed_ || !feedback.twist_base)
     return std::nullopt;
-  const Eigen::Vector3d gyro = turn_sum_radps_ / turns_;
+  const Turned* const from = turned_at(feedback.from);
+  const Turned* const to = turned_at(feedback.to);
+  if (from == nullptr || from->stamp >= to->stamp)
+    return std::nullopt;
+  const Eigen::Vector3d gyro = (to->angle_rad - from->angle_rad) / to_seconds(to->stamp - from->stamp);
   const Eigen::Vector3d lidar = feedback.twist_base->tail<3>();
-  turn_sum_radps_.setZero();
-  turns_ = 0.0;
   if (lidar.norm() < kTurns_radps)
     return std::nullopt;
   lidar_lidar_ += lidar.squaredNorm();
   gyro_lidar_ += gyro.dot(lidar);
   gyro_gyro_ += gyro.squaredNorm();
-  if (lidar_lidar_ > kEnoughTurning)
+  if (++turning_sweeps_ == kSweepsToCompare)
     compare_turns();
   return refused_ ? std::optional{HealthReason::self_check} : std::nullopt;
 }
 
 void ImuSelfCheck::compare_turns() {
-  compared_ = true;
   const double likeness = gyro_lidar_ / std::sqrt(gyro_gyro_ * lidar_lidar_);
   const double scale = gyro_lidar_ / lidar_lidar_;
   constexpr double kAlike = 0.7;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <optional>
 #include <string_view>
 
 #include "core/health_metric.hpp"
@@ -23,7 +26,16 @@ class ImuSelfCheck : public HealthMetric {
   [[nodiscard]] bool trusts_accelerometer() const override { return trusts_accelerometer_; }
 
  private:
+  /// How far the gyro had turned when; lidar speaks of what was a few sweeps ago.
+  struct Turned {
+    Stamp stamp;
+    Eigen::Vector3d angle_rad; ///< base axes
+  };
+
+  void weigh(const Eigen::Vector3d& specific_force_base_mps2, Stamp stamp);
   void weigh_gravity();
+  void follow_turns(const Eigen::Vector3d& turn_rate_base_radps, Stamp stamp);
+  [[nodiscard]] const Turned* turned_at(Stamp stamp) const;
   void compare_turns();
   void refuse(std::string_view verdict);
 
@@ -37,10 +49,12 @@ class ImuSelfCheck : public HealthMetric {
   Eigen::Vector3d force_sum_mps2_ = Eigen::Vector3d::Zero(); ///< base axes
   double forces_ = 0.0;
 
-  Eigen::Vector3d turn_sum_radps_ = Eigen::Vector3d::Zero(); ///< since lidar was last heard, base axes
-  double turns_ = 0.0;
+  std::array<Turned, 128> turned_; ///< ring
+  std::size_t newest_ = 0, known_ = 0;
+  Eigen::Vector3d angle_rad_ = Eigen::Vector3d::Zero();
+  std::optional<Stamp> last_;
   double lidar_lidar_ = 0.0, gyro_lidar_ = 0.0, gyro_gyro_ = 0.0; ///< sums of products of turn rates
-  bool compared_ = false;
+  int turning_sweeps_ = 0;
 };
 
 } // namespace locus

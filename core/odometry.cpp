@@ -359,13 +359,14 @@ void Odometry::update_map(OdometryEstimate& estimate) {
   estimate.keyframe = true;
 }
 
-/// What a prediction says of itself. Until lidar finds the submap again noise gathers, and bias adds up.
+/// What a prediction says of itself. Until lidar finds the submap again its bias adds up. The noise of a step does not:
+/// most of it is the lidar's own, by which it was learned, and the next step takes it back.
 void Odometry::drift(const Prior& prior, OdometryEstimate& estimate) {
   const Eigen::Vector3d moved_m = estimate.T_odom_base.translation - T_odom_last_.translation;
   const Matrix6 R = turn_both(T_odom_last_.rotation);
-  adrift_.bias.head<3>().array() += adrift_.bias.tail<3>().norm() * moved_m.norm();
+  adrift_.bias.head<3>() += skew(moved_m).cwiseAbs() * adrift_.bias.tail<3>();
   adrift_.bias += R.cwiseAbs() * prior.bias;
-  adrift_.variance += R.cwiseAbs() * prior.variance;
+  adrift_.variance = R.cwiseAbs() * prior.variance;
   carry_covariance(moved_m);
   estimate.pose_covariance = covariance_;
   estimate.pose_covariance.diagonal() += adrift_.bias.cwiseAbs2() + adrift_.variance;
@@ -421,7 +422,7 @@ void Odometry::finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& 
     refused_in_a_row_ = 0;
   else if (scan_.size() >= kMinPoints)
     ++refused_in_a_row_;
-  feedback_ = {};
+  feedback_ = {.from = last_stamp_, .to = sweep.end, .opinions = {}, .twist_base = {}};
   if (processed_ > 0 && estimate.failed)
     drift(prior, estimate);
   else if (processed_ > 0)

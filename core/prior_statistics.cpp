@@ -30,6 +30,14 @@ void PriorStatistics::learn(const Vector6& difference, const Matrix6& lidar_info
   }
 }
 
+/// A mean that the noise of the samples may have made says nothing.
+Vector6 PriorStatistics::bias(double periods) const {
+  if (learned_ == 0.0)
+    return periods * bias_;
+  const Vector6 noise = (variance_ / learned_).cwiseSqrt();
+  return periods * (bias_.cwiseAbs() - noise).cwiseMax(0.0);
+}
+
 Vector6 PriorStatistics::variance(double periods) const { return variance_ * (periods * periods); }
 
 } // namespace locus

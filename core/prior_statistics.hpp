@@ -25,7 +25,7 @@ class PriorStatistics {
 
   /// The part of the error that is the same from sweep to sweep, as those of scale and of gyro bias are, over
   /// `periods`: what adds up while nothing corrects it.
-  [[nodiscard]] Vector6 bias(double periods) const { return periods * bias_.cwiseAbs(); }
+  [[nodiscard]] Vector6 bias(double periods) const;
 
  private:
   Vector6 variance_;

@@ -17,6 +17,7 @@ enum class LidarOpinion : std::uint8_t { none, agrees, disagrees };
 /// What a registered sweep tells the health monitors. Nothing else of the result goes back to the sensors' side, so
 /// that a sweep never depends on when the one before it was registered, but for which sources are trusted.
 struct RegistrationFeedback {
+  Stamp from, to; ///< ends of the two sweeps between which it saw the motion
   std::array<LidarOpinion, Sweep::kMaxSources> opinions{};
   std::optional<Vector6> twist_base; ///< m/s and rad/s as lidar saw it; nothing where it saw too little
 };

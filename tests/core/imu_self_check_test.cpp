@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numbers>
 
 namespace locus {
@@ -11,22 +12,27 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// A unit at 200 Hz on a robot that turns by 0.5 rad/s, seen by lidar every 100 ms; `wrong` tells what it reports.
+/// A unit at 200 Hz on a robot that sways left and right, seen by lidar every 100 ms; `wrong` tells what it reports.
 class ImuSelfCheckTest : public testing::Test {
  protected:
   template <class Wrong> void drive(ImuSelfCheck& check, Duration duration, const Wrong& wrong) {
     for (int i = 0; i < duration / milliseconds{5}; ++i) {
       now_ += milliseconds{5};
-      ImuSample sample{now_, now_, {0.01, 0.02, 0.5}, {0.3, 0.1, 9.8}, {}};
+      ImuSample sample{now_, now_, {0.01, 0.02, turn_rate_radps(now_)}, {0.3, 0.1, 9.8}, {}};
       wrong(sample);
       refused_ = check.judge(SourceReading{.stamp = now_, .arrival = now_, .imu = &sample}).has_value();
       if (i % 20 != 19)
         continue;
-      RegistrationFeedback seen;
+      RegistrationFeedback seen; // of the sweep before the last: a live pipeline is that late
+      seen.to = now_ - milliseconds{100};
+      seen.from = seen.to - milliseconds{100};
       seen.twist_base = Vector6::Zero();
-      seen.twist_base->tail<3>() = Eigen::Vector3d{0, 0, 0.5};
+      seen.twist_base->tail<3>() = Eigen::Vector3d{0, 0, turn_rate_radps(seen.from + milliseconds{50})};
       check.hear(LidarOpinion::none, seen);
     }
+  }
+  static double turn_rate_radps(Stamp stamp) {
+    return 0.7 * std::sin(2.0 * std::numbers::pi * to_seconds(stamp.time_since_epoch() % seconds{1}));
   }
   Stamp now_ = stamp_from_ns(1'700'000'000'000'000'000);
   bool refused_ = false;

