@@ -106,26 +106,6 @@ std::optional<Stamp> parse_seconds(std::string_view text) {
   return stamp_from_ns(negative ? -ns : ns);
 }
 
-/// Calls `on_line(fields)` for each line that holds data and puts the place before the problem that it returns.
-template <class OnLine> Problem for_each_line(const std::filesystem::path& file, char separator, OnLine&& on_line) {
-  std::ifstream stream{file};
-  if (!stream || std::filesystem::is_directory(file)) {
-    return fmt::format("{}: cannot be read; check the path and its permissions", file.string());
-  }
-  FieldSplitter split{separator};
-  std::string buffer;
-  for (std::size_t number = 1; std::getline(stream, buffer); ++number) {
-    const std::string_view line = trimmed(buffer);
-    if (line.empty() || line.starts_with('#')) {
-      continue;
-    }
-    if (Problem problem = on_line(split(line))) {
-      return fmt::format("{}:{}: {}", file.string(), number, *problem);
-    }
-  }
-  return std::nullopt;
-}
-
 /// A first line in which nothing is a number.
 bool is_header(Fields fields) {
   return std::ranges::none_of(fields, [](std::string_view field) {
@@ -220,19 +200,62 @@ void apply(const Meta& meta, OdometrySample& sample) {
   sample.covariance_scale = meta.covariance_scale;
 }
 
-template <class Row, class ParseRow>
-Expected<std::vector<Row>, std::string> read_rows(const std::filesystem::path& file, char separator,
-                                                  ParseRow&& parse_row) {
-  std::vector<Row> rows;
-  bool first = true;
-  Problem problem = for_each_line(file, separator, [&](Fields fields) -> Problem {
-    if (std::exchange(first, false) && is_header(fields)) {
-      return std::nullopt;
+/// The rows of a table, one after the other. Blank lines, comments and a header line are none.
+template <class Row> class RowReader {
+ public:
+  RowReader(std::filesystem::path file, char separator, Problem (*parse_row)(Fields, Row&))
+      : file_(std::move(file)), stream_(file_), split_(separator), parse_row_(parse_row) {
+    if (!stream_ || std::filesystem::is_directory(file_)) {
+      problem_ = fmt::format("{}: cannot be read; check the path and its permissions", file_.string());
     }
-    return parse_row(fields, rows.emplace_back());
-  });
-  if (problem) {
-    return *std::move(problem);
+  }
+
+  /// False at the end, and where there is a problem.
+  bool next(Row& row) {
+    while (!problem_ && std::getline(stream_, buffer_)) {
+      ++line_;
+      const std::string_view line = trimmed(buffer_);
+      if (line.empty() || line.starts_with('#')) {
+        continue;
+      }
+      const Fields fields = split_(line);
+      if (std::exchange(first_, false) && is_header(fields)) {
+        continue;
+      }
+      row = {};
+      if (const Problem problem = parse_row_(fields, row)) {
+        report(*problem);
+      }
+      return !problem_;
+    }
+    return false;
+  }
+
+  /// Puts the place of the latest row before what is wrong with it.
+  void report(const std::string& problem) { problem_ = fmt::format("{}:{}: {}", file_.string(), line_, problem); }
+  [[nodiscard]] const Problem& problem() const { return problem_; }
+
+ private:
+  std::filesystem::path file_;
+  std::ifstream stream_;
+  FieldSplitter split_;
+  Problem (*parse_row_)(Fields, Row&);
+  std::string buffer_;
+  std::size_t line_ = 0;
+  bool first_ = true;
+  Problem problem_;
+};
+
+template <class Row>
+Expected<std::vector<Row>, std::string> read_rows(const std::filesystem::path& file, char separator,
+                                                  Problem (*parse_row)(Fields, Row&)) {
+  RowReader<Row> reader(file, separator, parse_row);
+  std::vector<Row> rows;
+  for (Row row; reader.next(row);) {
+    rows.push_back(row);
+  }
+  if (reader.problem()) {
+    return *reader.problem();
   }
   return rows;
 }
@@ -256,58 +279,125 @@ Problem apply_meta(const std::filesystem::path& file, std::vector<Sample>& sampl
   return std::nullopt;
 }
 
-template <class Sample>
-Expected<std::vector<Sample>, std::string> read_samples(const std::filesystem::path& file, char separator,
-                                                        Problem (*parse_row)(Fields, Sample&)) {
-  Expected<std::vector<Sample>, std::string> samples = read_rows<Sample>(file, separator, parse_row);
-  const std::filesystem::path meta_file = std::filesystem::path{file}.replace_extension(".meta.csv");
-  if (samples && std::filesystem::exists(meta_file)) {
-    const Expected<std::vector<Meta>, std::string> rows = read_rows<Meta>(meta_file, ',', &parse_meta);
+/// How the table of a kind of sample is written.
+template <class Sample> struct Table;
+template <> struct Table<ImuSample> {
+  static RowReader<ImuSample> open(const std::filesystem::path& file) { return {file, ',', &parse_imu}; }
+};
+template <> struct Table<OdometrySample> {
+  static RowReader<OdometrySample> open(const std::filesystem::path& file) { return {file, ' ', &parse_odometry}; }
+};
+
+std::filesystem::path meta_file_of(std::filesystem::path file) { return file.replace_extension(".meta.csv"); }
+
+template <class Sample> Expected<std::vector<Sample>, std::string> read_samples(const std::filesystem::path& file) {
+  RowReader<Sample> reader = Table<Sample>::open(file);
+  std::vector<Sample> samples;
+  for (Sample sample; reader.next(sample);) {
+    samples.push_back(sample);
+  }
+  if (reader.problem()) {
+    return *reader.problem();
+  }
+  if (const std::filesystem::path meta_file = meta_file_of(file); std::filesystem::exists(meta_file)) {
+    const Expected<std::vector<Meta>, std::string> rows = read_rows(meta_file, ',', &parse_meta);
     if (!rows) {
       return rows.error();
     }
-    if (Problem problem = apply_meta(meta_file, *samples, *rows)) {
+    if (Problem problem = apply_meta(meta_file, samples, *rows)) {
       return *std::move(problem);
     }
   }
-  if (samples) {
-    std::ranges::stable_sort(*samples, {}, &Sample::arrival);
-  }
+  std::ranges::stable_sort(samples, {}, &Sample::arrival);
   return samples;
 }
 
 } // namespace
 
-Expected<std::vector<ImuSample>, std::string> read_imu(const std::filesystem::path& file) {
-  return read_samples<ImuSample>(file, ',', &parse_imu);
-}
-
-Expected<std::vector<OdometrySample>, std::string> read_odometry(const std::filesystem::path& file) {
-  return read_samples<OdometrySample>(file, ' ', &parse_odometry);
-}
-
 Expected<std::vector<StampedPose>, std::string> read_trajectory(const std::filesystem::path& file) {
-  std::optional<Stamp> last;
-  Expected<std::vector<StampedPose>, std::string> poses =
-      read_rows<StampedPose>(file, ' ', [&](Fields fields, StampedPose& pose) -> Problem {
-        OdometrySample sample;
-        if (Problem problem = parse_odometry(fields, sample)) {
-          return problem;
-        }
-        if (!sample.T_source_base.finite()) {
-          return "the pose is not finite; remove the line";
-        }
-        if (last && sample.stamp <= *last) {
-          return "its time is not after that of the pose before; sort the lines by time and keep one of each";
-        }
-        last = sample.stamp;
-        pose = {sample.stamp, sample.T_source_base};
-        return std::nullopt;
-      });
-  if (poses && poses->empty()) {
+  RowReader<OdometrySample> reader = Table<OdometrySample>::open(file);
+  std::vector<StampedPose> poses;
+  for (OdometrySample sample; reader.next(sample);) {
+    if (!sample.T_source_base.finite()) {
+      reader.report("the pose is not finite; remove the line");
+    } else if (!poses.empty() && sample.stamp <= poses.back().stamp) {
+      reader.report("its time is not after that of the pose before; sort the lines by time and keep one of each");
+    }
+    poses.push_back({sample.stamp, sample.T_source_base});
+  }
+  if (reader.problem()) {
+    return *reader.problem();
+  }
+  if (poses.empty()) {
     return fmt::format("{}: holds no pose; expected lines of t x y z qx qy qz qw", file.string());
   }
   return poses;
 }
+
+template <class Sample> class MotionSamples<Sample>::Rows {
+ public:
+  explicit Rows(const std::filesystem::path& file) : reader_(Table<Sample>::open(file)) {}
+
+  bool next(Sample& sample) { return reader_.next(sample); }
+  [[nodiscard]] const Problem& problem() const { return reader_.problem(); }
+
+ private:
+  RowReader<Sample> reader_;
+};
+
+template <class Sample>
+Expected<MotionSamples<Sample>, std::string> MotionSamples<Sample>::open(const std::filesystem::path& file) {
+  bool in_order = !std::filesystem::exists(meta_file_of(file));
+  Rows rows(file);
+  Stamp last = Stamp::min();
+  for (Sample sample; in_order && rows.next(sample);) {
+    in_order = sample.arrival >= last;
+    last = sample.arrival;
+  }
+  if (rows.problem()) {
+    return *rows.problem();
+  }
+  if (in_order) {
+    return MotionSamples(std::make_unique<Rows>(file));
+  }
+  Expected<std::vector<Sample>, std::string> samples = read_samples<Sample>(file);
+  if (!samples) {
+    return samples.error();
+  }
+  return MotionSamples(std::move(*samples));
+}
+
+template <class Sample> MotionSamples<Sample>::MotionSamples(std::unique_ptr<Rows> rows) : rows_(std::move(rows)) {
+  pop();
+}
+
+template <class Sample> MotionSamples<Sample>::MotionSamples(std::vector<Sample> samples) : held_(std::move(samples)) {
+  pop();
+}
+
+template <class Sample> MotionSamples<Sample>::MotionSamples(MotionSamples&&) noexcept = default;
+template <class Sample> MotionSamples<Sample>& MotionSamples<Sample>::operator=(MotionSamples&&) noexcept = default;
+template <class Sample> MotionSamples<Sample>::~MotionSamples() = default;
+
+template <class Sample> void MotionSamples<Sample>::pop() {
+  if (rows_) {
+    ended_ = !rows_->next(front_);
+  } else if (next_ < held_.size()) {
+    front_ = held_[next_++];
+  } else {
+    ended_ = true;
+  }
+}
+
+template <class Sample> std::vector<Sample> MotionSamples<Sample>::drain() {
+  std::vector<Sample> samples;
+  for (; front() != nullptr; pop()) {
+    samples.push_back(front_);
+  }
+  return samples;
+}
+
+template class MotionSamples<ImuSample>;
+template class MotionSamples<OdometrySample>;
 
 } // namespace locus

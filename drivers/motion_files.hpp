@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -10,17 +12,45 @@
 
 namespace locus {
 
-/// Readers of recorded motion. All skip blank lines and lines that start with #, accept CRLF, and give the samples in
-/// the order of their arrival: that of STEM.meta.csv (`t_ns,arrival_ns,covariance_scale`) beside the file where there
-/// is one, else arrival = stamp. NaN passes, as it does from a live sensor. Text that is no number is an error, one
-/// line for the user: `file:line: what; what to do`. Any thread.
+/// Readers of recorded motion. All skip blank lines and lines that start with # and accept CRLF. Text that is no number
+/// is an error, one line for the user: `file:line: what; what to do`.
 
-/// EuRoC's IMU table with an optional attitude and an optional header line, rad/s and m/s^2:
-/// `t_ns,wx,wy,wz,ax,ay,az[,qw,qx,qy,qz]`.
-Expected<std::vector<ImuSample>, std::string> read_imu(const std::filesystem::path& file);
+/// What a motion source said, sample by sample in the order of arrival: that of STEM.meta.csv
+/// (`t_ns,arrival_ns,covariance_scale`) beside the file where there is one, else arrival = stamp. NaN passes, as it
+/// does from a live sensor. The file is, of ImuSample, EuRoC's table with an optional attitude and header line, rad/s
+/// and m/s^2: `t_ns,wx,wy,wz,ax,ay,az[,qw,qx,qy,qz]`; of OdometrySample TUM's, seconds and metres: `t x y z qx qy qz
+/// qw`, of whose time the nanoseconds are kept.
+///
+/// One hour of an IMU would fill 100 MB: a file in which the samples stand in the order of arrival is read as they are
+/// asked for, and only another one is held. One owner.
+template <class Sample> class MotionSamples {
+ public:
+  /// Reads the file through, so that what is wrong with it is known before the first sample is used.
+  static Expected<MotionSamples, std::string> open(const std::filesystem::path& file);
 
-/// TUM's trajectory table, seconds and metres: `t x y z qx qy qz qw`. The nanoseconds of the time are kept.
-Expected<std::vector<OdometrySample>, std::string> read_odometry(const std::filesystem::path& file);
+  /// In the order of their arrival.
+  explicit MotionSamples(std::vector<Sample> samples);
+  MotionSamples(MotionSamples&&) noexcept;
+  MotionSamples& operator=(MotionSamples&&) noexcept;
+  ~MotionSamples();
+
+  /// The next one, valid until pop(); nullptr after the last.
+  [[nodiscard]] const Sample* front() const { return ended_ ? nullptr : &front_; }
+  void pop();
+
+  /// All that are left.
+  std::vector<Sample> drain();
+
+ private:
+  class Rows;
+  explicit MotionSamples(std::unique_ptr<Rows> rows);
+
+  std::unique_ptr<Rows> rows_; ///< nullptr: the samples are held
+  std::vector<Sample> held_;
+  std::size_t next_ = 0; ///< of those held
+  Sample front_;
+  bool ended_ = false;
+};
 
 /// Where the base was at one instant.
 struct StampedPose {
@@ -28,7 +58,8 @@ struct StampedPose {
   Pose T_source_base; ///< in the frame of whoever says so
 };
 
-/// The same table as something to measure by, so more is asked of it: finite, in the order of time, at least one pose.
+/// TUM's table as something to measure by, so more is asked of it: finite, in the order of time, at least one pose. Any
+/// thread.
 Expected<std::vector<StampedPose>, std::string> read_trajectory(const std::filesystem::path& file);
 
 } // namespace locus

@@ -16,21 +16,28 @@ namespace {
 using test::bytes_of;
 using test::TemporaryFile;
 
+template <class Sample> Expected<std::vector<Sample>, std::string> read(const std::filesystem::path& file) {
+  auto samples = MotionSamples<Sample>::open(file);
+  if (!samples)
+    return samples.error();
+  return samples->drain();
+}
+
 Expected<std::vector<ImuSample>, std::string> imu_from(const std::string& text) {
   const TemporaryFile file{"imu.csv", bytes_of(text)};
-  return read_imu(file.path());
+  return read<ImuSample>(file.path());
 }
 
 Expected<std::vector<OdometrySample>, std::string> odometry_from(const std::string& text) {
   const TemporaryFile file{"wio.tum", bytes_of(text)};
-  return read_odometry(file.path());
+  return read<OdometrySample>(file.path());
 }
 
 /// The odometry of `text` with the meta file `meta` beside it.
 Expected<std::vector<OdometrySample>, std::string> odometry_from(const std::string& text, const std::string& meta) {
   const TemporaryFile file{"wio.tum", bytes_of(text)};
   const TemporaryFile meta_file{"wio.meta.csv", bytes_of(meta)};
-  return read_odometry(file.path());
+  return read<OdometrySample>(file.path());
 }
 
 template <class T> std::string error_of(const Expected<T, std::string>& result) { return result ? "" : result.error(); }
@@ -137,8 +144,8 @@ TEST(MotionFiles, MalformedTextIsAnErrorWithFileLineAndRemedy) {
   EXPECT_TRUE(contains(error_of(odometry_from("1 0 0 0 0 0 0\n")), "wio.tum:1: 7 columns; expected t x y z"));
   EXPECT_TRUE(contains(error_of(odometry_from("1 0 0 0 0 0 0 1 \n2 0 0 0 0 0 0 1x\n")), "wio.tum:2: a value is not"));
   EXPECT_TRUE(contains(error_of(odometry_from("1 0 0 0 0 0 0 0\n")), "wio.tum:1: the rotation is not a unit"));
-  EXPECT_TRUE(contains(error_of(read_imu("/no/such/imu.csv")), "/no/such/imu.csv: cannot be read; check"));
-  EXPECT_TRUE(contains(error_of(read_imu(testing::TempDir())), "cannot be read"));
+  EXPECT_TRUE(contains(error_of(read<ImuSample>("/no/such/imu.csv")), "/no/such/imu.csv: cannot be read; check"));
+  EXPECT_TRUE(contains(error_of(read<ImuSample>(testing::TempDir())), "cannot be read"));
 }
 
 TEST(MotionFiles, MetaFileGivesArrivalAndCovarianceAndItsArrivalTheOrder) {
@@ -183,7 +190,7 @@ TEST(MotionFiles, AnHourOfImuIsReadInSeconds) {
   }
   const TemporaryFile file{"imu.csv", bytes_of(text)};
   const auto begin = std::chrono::steady_clock::now();
-  const auto samples = read_imu(file.path());
+  const auto samples = read<ImuSample>(file.path());
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
   ASSERT_TRUE(samples) << samples.error();
   EXPECT_EQ(samples->size(), 720'000u);
@@ -271,6 +278,52 @@ TEST(MotionFiles, TrajectoryThatCannotBeMeasuredByIsRefusedWithItsLine) {
   EXPECT_TRUE(contains(error_of(trajectory_from(good + "11 0 0 0\n")), "gt.tum:2: 4 columns"));
   EXPECT_TRUE(contains(error_of(trajectory_from("")), "gt.tum: holds no pose"));
   EXPECT_TRUE(contains(error_of(trajectory_from("t x y z qx qy qz qw\n")), "gt.tum: holds no pose"));
+}
+
+/// The stamps in nanoseconds, in the order in which they come.
+std::vector<std::int64_t> stamps_of(MotionSamples<OdometrySample> samples) {
+  std::vector<std::int64_t> stamps;
+  for (; samples.front() != nullptr; samples.pop())
+    stamps.push_back(to_ns(samples.front()->stamp));
+  return stamps;
+}
+
+std::string row_at(const char* time) { return std::string{time} + " 0 0 0 0 0 0 1\n"; }
+
+TEST(MotionSamples, ComeOneAfterTheOther) {
+  const TemporaryFile file{"wio.tum", bytes_of("# t x y z qx qy qz qw\n" + row_at("1e-9") + "\n" + row_at("2e-9") +
+                                               row_at("2e-9") + row_at("3e-9"))};
+  auto samples = MotionSamples<OdometrySample>::open(file.path());
+  ASSERT_TRUE(samples) << samples.error();
+  EXPECT_EQ(stamps_of(std::move(*samples)), (std::vector<std::int64_t>{1, 2, 2, 3}));
+}
+
+TEST(MotionSamples, ComeInTheOrderOfTheirArrival) {
+  const TemporaryFile file{"wio.tum", bytes_of(row_at("3e-9") + row_at("1e-9"))};
+  auto samples = MotionSamples<OdometrySample>::open(file.path());
+  ASSERT_TRUE(samples) << samples.error();
+  EXPECT_EQ(stamps_of(std::move(*samples)), (std::vector<std::int64_t>{1, 3})) << "arrival is the stamp";
+
+  const TemporaryFile meta{"wio.meta.csv", bytes_of("1,20,1\n3,10,1\n")};
+  auto late = MotionSamples<OdometrySample>::open(file.path());
+  ASSERT_TRUE(late) << late.error();
+  EXPECT_EQ(stamps_of(std::move(*late)), (std::vector<std::int64_t>{3, 1})) << "the first came late";
+}
+
+TEST(MotionSamples, AreKnownToBeGoodBeforeTheFirstIsUsed) {
+  const TemporaryFile file{"wio.tum", bytes_of(row_at("1") + row_at("2") + "3 0 0\n")};
+  EXPECT_TRUE(contains(error_of(MotionSamples<OdometrySample>::open(file.path())), "wio.tum:3: 3 columns"));
+  EXPECT_TRUE(contains(error_of(MotionSamples<OdometrySample>::open("/nowhere/wio.tum")), "cannot be read"));
+}
+
+TEST(MotionSamples, DrainGivesWhatIsLeft) {
+  MotionSamples<ImuSample> samples(std::vector<ImuSample>(3));
+  samples.pop();
+  EXPECT_EQ(samples.drain().size(), 2u);
+  EXPECT_EQ(samples.front(), nullptr);
+  EXPECT_TRUE(samples.drain().empty());
+  const TemporaryFile empty{"imu.csv", bytes_of("t_ns,wx,wy,wz,ax,ay,az\n")};
+  EXPECT_EQ((*MotionSamples<ImuSample>::open(empty.path())).front(), nullptr);
 }
 
 } // namespace

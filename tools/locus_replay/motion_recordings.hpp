@@ -10,6 +10,7 @@
 #include "config/config.hpp"
 #include "core/motion_sample.hpp"
 #include "drivers/capture_folder.hpp"
+#include "drivers/motion_files.hpp"
 #include "locus_replay/arguments.hpp"
 
 namespace locus::tools {
@@ -17,7 +18,7 @@ namespace locus::tools {
 /// What one motion source said, in the order of arrival.
 struct MotionRecording {
   std::size_t source; ///< index in the configuration
-  std::variant<std::vector<ImuSample>, std::vector<OdometrySample>> samples;
+  std::variant<MotionSamples<ImuSample>, MotionSamples<OdometrySample>> samples;
 };
 
 /// Reads the motion files that the user named, and those of the folder, for the motion sources of the configuration.

@@ -2,6 +2,7 @@
 #include "locus_replay/recording.hpp"
 
 #include <algorithm>
+#include <type_traits>
 #include <utility>
 
 #include "core/motion_sources.hpp"
@@ -13,6 +14,13 @@ namespace {
 
 /// Motion is played from so long before the first datagram on, so that sources are live when it comes.
 constexpr Duration kMotionAhead = std::chrono::seconds{1};
+
+template <class Sample>
+MotionSamples<Sample> with_faults(std::vector<Sample> samples, const PlayOptions& options, const std::string& source,
+                                  Stamp capture_start) {
+  inject_faults(options.faults, source, capture_start, options.seed, samples);
+  return MotionSamples<Sample>(std::move(samples));
+}
 
 } // namespace
 
@@ -30,24 +38,35 @@ Recording::Recording(Capture capture, std::vector<MotionRecording> motion, const
     faults_.emplace(options.faults, capture_start, options.seed);
   for (MotionRecording& recording : motion) {
     const std::string& name = config.odometry.motion_sources[recording.source].name;
-    std::visit([&](auto& samples) { inject_faults(options.faults, name, capture_start, options.seed, samples); },
-               recording.samples);
-    MotionCursor& cursor = motion_.emplace_back(MotionCursor{std::move(recording)});
+    if (std::ranges::find(options.faults, name, &Fault::name) != options.faults.end())
+      std::visit([&](auto& samples) { samples = with_faults(samples.drain(), options, name, capture_start); },
+                 recording.samples);
+    MotionCursor& cursor = motion_.emplace_back(std::move(recording));
     while (cursor.arrival() < begin_ - kMotionAhead)
-      ++cursor.next;
+      cursor.take();
   }
 }
 
 Stamp Recording::MotionCursor::arrival() const {
-  return std::visit([&](const auto& samples) { return next < samples.size() ? samples[next].arrival : Stamp::max(); },
-                    recording.samples);
+  return std::visit(
+      [](const auto& samples) { return samples.front() != nullptr ? samples.front()->arrival : Stamp::max(); },
+      recording.samples);
 }
 
 Input Recording::MotionCursor::take() {
-  const std::size_t index = next++;
-  if (const auto* imu = std::get_if<std::vector<ImuSample>>(&recording.samples))
-    return daemon::ImuInput{recording.source, (*imu)[index]};
-  return daemon::OdometryInput{recording.source, std::get<std::vector<OdometrySample>>(recording.samples)[index]};
+  const auto input_of = [&](const auto& sample) -> Input {
+    if constexpr (std::is_same_v<std::decay_t<decltype(sample)>, ImuSample>)
+      return daemon::ImuInput{recording.source, sample};
+    else
+      return daemon::OdometryInput{recording.source, sample};
+  };
+  return std::visit(
+      [&](auto& samples) {
+        Input input = input_of(*samples.front());
+        samples.pop();
+        return input;
+      },
+      recording.samples);
 }
 
 Input Recording::next(Duration) {

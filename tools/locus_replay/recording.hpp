@@ -35,9 +35,9 @@ struct PortTraffic {
 
 /// A recording as it once came in: datagrams and motion samples in the order of their arrival, faults injected.
 ///
-/// The capture is streamed and the motion samples are held. Motion is played from one second ahead of the first
-/// datagram, so that the sources are known by then, and to the last one. A datagram that a fault swallows leaves
-/// Silence behind. One owner.
+/// The capture is streamed, and so are motion samples that no fault befalls. Motion is played from one second ahead of
+/// the first datagram, so that the sources are known by then, and to the last one. A datagram that a fault swallows
+/// leaves Silence behind. One owner.
 class Recording : public daemon::InputSource {
  public:
   /// `lidars`: to tell by port and address whose datagram a fault strikes.
@@ -65,7 +65,6 @@ class Recording : public daemon::InputSource {
   };
   struct MotionCursor {
     MotionRecording recording;
-    std::size_t next = 0;
 
     [[nodiscard]] Stamp arrival() const; ///< of the next sample; Stamp::max() after the last
     daemon::Input take();
