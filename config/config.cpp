@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include <fmt/format.h>
+#include <net/if.h>
 
 #include "core/problems.hpp"
 #include "core/sweep.hpp"
@@ -91,7 +92,8 @@ void check_realtime(Problems& problems, const RealtimeOptions& realtime) {
 
 void check_dds(Problems& problems, const DdsOptions& dds) {
   problems.require_range("dds.domain", dds.domain, 0, 232);
-  problems.require(!dds.interface.empty(), "dds.interface", "must name a network interface, e.g. lo or eth0");
+  problems.require(is_word(dds.interface, "_-.:@") && dds.interface.size() < IFNAMSIZ, "dds.interface",
+                   "must name a network interface, e.g. lo or eth0");
   problems.require(!dds.frame_odom.empty(), "dds.frame_odom", "must not be empty");
   problems.require(!dds.frame_base.empty() && dds.frame_base != dds.frame_odom, "dds.frame_base",
                    "must not be empty and must differ from frame_odom");

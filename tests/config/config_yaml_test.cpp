@@ -211,6 +211,7 @@ TEST(ConfigYaml, EveryKindOfBadValueIsRefusedWithItsKeyAndReason) {
       {"realtime.cpus=0", "must be a list"},
       {"dds.domain=233", "is outside 0 .. 232"},
       {"dds.interface=\"\"", "must name a network interface"},
+      {"dds.interface=eth0\"/>", "must name a network interface"},
       {"dds.prefix=/locus//", "is no topic"},
       {"dds.frame_base=odom", "must differ from frame_odom"},
       {"dds.flat_ground_topic=flat", "is no topic"},

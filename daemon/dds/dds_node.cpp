@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/dds/dds_node.hpp"
+
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace locus::daemon {
+namespace {
+
+struct QosDeleter {
+  void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
+};
+using Qos = std::unique_ptr<dds_qos_t, QosDeleter>;
+
+/// On the loopback interface nobody but local processes listens; multicast serves to find those who come later, for lo
+/// does not claim to have it. A writer that goes waits no
+/// longer than that for readers far behind, for the service stops within a second. Shared memory stays off: without its
+/// broker a participant waits for it for ever.
+std::string cyclone_configuration(const std::string& interface) {
+  const bool loopback = interface == "lo";
+  return fmt::format("<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"{}\"{}/></Interfaces>{}"
+                     "</General><Internal><WriterLingerDuration>50 ms</WriterLingerDuration></Internal></Domain>"
+                     "</CycloneDDS>",
+                     interface, loopback ? " multicast=\"true\"" : "",
+                     loopback ? "<AllowMulticast>spdp</AllowMulticast>" : "");
+}
+
+Qos make_qos(TopicQos wanted) {
+  constexpr dds_data_representation_id_t kXcdr1 = DDS_DATA_REPRESENTATION_XCDR1;
+  Qos qos{dds_create_qos()};
+  dds_qset_reliability(qos.get(), wanted.reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT,
+                       DDS_MSECS(100));
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, wanted.depth);
+  dds_qset_durability(qos.get(), DDS_DURABILITY_VOLATILE);
+  dds_qset_data_representation(qos.get(), 1, &kXcdr1);
+  dds_qset_writer_data_lifecycle(qos.get(), false);
+  return qos;
+}
+
+void set_user_data(dds_qos_t* qos, std::string_view text) { dds_qset_userdata(qos, text.data(), text.size()); }
+
+std::function<void(bool, std::string_view)>& log_sink() {
+  static std::function<void(bool, std::string_view)> sink;
+  return sink;
+}
+
+/// The library hands out its lines in pieces; the one with the line feed is the last.
+void take_log(void*, const dds_log_data_t* data) {
+  static std::mutex mutex;
+  static std::string line;
+  const std::scoped_lock lock(mutex);
+  line.append(data->message, data->size);
+  if (line.empty() || line.back() != '\n')
+    return;
+  line.pop_back();
+  if (log_sink())
+    log_sink()((data->priority & (DDS_LC_FATAL | DDS_LC_ERROR)) != 0, line);
+  line.clear();
+}
+
+} // namespace
+
+void set_dds_log(std::function<void(bool, std::string_view)> sink) {
+  log_sink() = std::move(sink);
+  dds_set_log_sink(&take_log, nullptr);
+}
+
+Expected<DdsNode, std::string> DdsNode::open(const DdsOptions& options) {
+  const auto failed = [&](const char* what, dds_entity_t code) {
+    return fmt::format("no {} in DDS domain {} on interface {} ({}); bring the interface up, or set dds.interface to "
+                       "one that is",
+                       what, options.domain, options.interface, dds_strretcode(code));
+  };
+  const auto id = static_cast<dds_domainid_t>(options.domain);
+  DdsEntity domain{dds_create_domain(id, cyclone_configuration(options.interface).c_str())};
+  if (domain.handle() < 0)
+    return failed("domain", domain.handle());
+  const Qos qos{dds_create_qos()};
+  set_user_data(qos.get(), "enclave=/;"); // as every node of ROS 2 says
+  DdsEntity participant{dds_create_participant(id, qos.get(), nullptr)};
+  if (participant.handle() < 0)
+    return failed("participant", participant.handle());
+  return DdsNode{std::move(domain), std::move(participant), options.type_hashes};
+}
+
+DdsEntity DdsNode::create_endpoint(const ros::Type& type, const std::string& topic, TopicQos wanted,
+                                   CreateEndpoint create) const {
+  const Qos qos = make_qos(wanted);
+  const dds_entity_t handle =
+      dds_create_topic(participant(), type.descriptor, ("rt" + topic).c_str(), qos.get(), nullptr);
+  if (type_hashes_)
+    set_user_data(qos.get(), fmt::format("typehash=RIHS01_{};", type.hash));
+  DdsEntity endpoint{create(participant(), handle, qos.get(), nullptr)};
+  if (handle > 0)
+    dds_delete(handle); // lives on as long as the endpoint does
+  return endpoint;
+}
+
+} // namespace locus::daemon

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include <dds/dds.h>
+
+#include "config/config.hpp"
+#include "core/expected.hpp"
+#include "daemon/dds/ros_types.hpp"
+
+namespace locus::daemon {
+
+/// A DDS entity, deleted at the end of its life with all that was made from it. One owner.
+class DdsEntity {
+ public:
+  explicit DdsEntity(dds_entity_t handle = 0) : handle_(handle) {}
+  ~DdsEntity() {
+    if (handle_ > 0)
+      dds_delete(handle_);
+  }
+  DdsEntity(DdsEntity&& other) noexcept : handle_(std::exchange(other.handle_, 0)) {}
+  DdsEntity& operator=(DdsEntity&& other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  [[nodiscard]] dds_entity_t handle() const { return handle_; }
+
+ private:
+  dds_entity_t handle_;
+};
+
+/// How a topic is delivered, after ROS 2's own profiles.
+struct TopicQos {
+  bool reliable = true;
+  int depth = 10;
+
+  static constexpr TopicQos standard() { return {true, 10}; }   ///< odometry, diagnostics, commands
+  static constexpr TopicQos transform() { return {true, 100}; } ///< tf
+  static constexpr TopicQos sensor_out() { return {false, 5}; } ///< clouds
+  static constexpr TopicQos sensor_in() {
+    return {false, 100};
+  } ///< best effort readers accept every writer; the depth
+    ///< outlasts a stall of this process
+};
+
+/// What the DDS library itself has to say, line by line, from any of its threads. One sink in a process.
+void set_dds_log(std::function<void(bool is_error, std::string_view line)> sink);
+
+/// This process among the participants of a ROS 2 network: the domain and the interface that the configuration names,
+/// and no other. Any thread may use it.
+class DdsNode {
+ public:
+  /// Fails with one line for the user, at once, e.g. while the interface does not exist. To be tried again then.
+  static Expected<DdsNode, std::string> open(const DdsOptions& options);
+
+  /// Of a topic as ROS 2 spells it, "/locus/odometry". Handles below zero are errors of DDS.
+  template <class Message> [[nodiscard]] DdsEntity create_writer(const std::string& topic, TopicQos qos) const {
+    return create_endpoint(ros::type_of<Message>(), topic, qos, &dds_create_writer);
+  }
+  template <class Message> [[nodiscard]] DdsEntity create_reader(const std::string& topic, TopicQos qos) const {
+    return create_endpoint(ros::type_of<Message>(), topic, qos, &dds_create_reader);
+  }
+
+  [[nodiscard]] dds_entity_t participant() const { return participant_.handle(); }
+
+ private:
+  using CreateEndpoint = dds_entity_t (*)(dds_entity_t, dds_entity_t, const dds_qos_t*, const dds_listener_t*);
+
+  DdsNode(DdsEntity domain, DdsEntity participant, bool type_hashes)
+      : domain_(std::move(domain)), participant_(std::move(participant)), type_hashes_(type_hashes) {}
+  [[nodiscard]] DdsEntity create_endpoint(const ros::Type& type, const std::string& topic, TopicQos qos,
+                                          CreateEndpoint create) const;
+
+  DdsEntity domain_; ///< outlives the participant
+  DdsEntity participant_;
+  bool type_hashes_;
+};
+
+/// Sends messages of one topic. One owner; one that is not open yet loses what it is given.
+template <class Message> class DdsWriter {
+ public:
+  DdsWriter() = default;
+  DdsWriter(const DdsNode& node, const std::string& topic, TopicQos qos)
+      : writer_(node.create_writer<Message>(topic, qos)) {}
+
+  /// Whether DDS took it; it may not while a reliable reader is far behind.
+  bool write(const Message& message) const { return dds_write(writer_.handle(), &message) == DDS_RETCODE_OK; }
+  [[nodiscard]] bool has_readers() const {
+    dds_publication_matched_status_t status{};
+    return dds_get_publication_matched_status(writer_.handle(), &status) == DDS_RETCODE_OK && status.current_count > 0;
+  }
+
+ private:
+  DdsEntity writer_;
+};
+
+/// Receives messages of one topic. One owner.
+template <class Message> class DdsReader {
+ public:
+  DdsReader(const DdsNode& node, const std::string& topic, TopicQos qos)
+      : reader_(node.create_reader<Message>(topic, qos)) {}
+
+  /// Hands out what has come, the oldest first; valid during the call only.
+  template <class Use> void take(const Use& use) {
+    constexpr std::uint32_t kBatch = 32;
+    for (dds_return_t count = kBatch; count == kBatch;) {
+      std::array<void*, kBatch> samples{};
+      std::array<dds_sample_info_t, kBatch> infos{};
+      count = dds_take(reader_.handle(), samples.data(), infos.data(), kBatch, kBatch);
+      for (std::size_t i = 0; count > 0 && i < static_cast<std::size_t>(count); ++i)
+        if (infos[i].valid_data)
+          use(*static_cast<const Message*>(samples[i]));
+      if (count > 0)
+        dds_return_loan(reader_.handle(), samples.data(), count);
+    }
+  }
+
+  [[nodiscard]] std::uint32_t writers() const {
+    dds_subscription_matched_status_t status{};
+    return dds_get_subscription_matched_status(reader_.handle(), &status) == DDS_RETCODE_OK ? status.current_count : 0;
+  }
+  [[nodiscard]] dds_entity_t handle() const { return reader_.handle(); }
+
+ private:
+  DdsEntity reader_;
+};
+
+} // namespace locus::daemon

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/dds/ros_link.hpp"
+
+#include <algorithm>
+#include <ctime>
+#include <optional>
+#include <utility>
+
+#include <pthread.h>
+
+#include "daemon/dds/dds_node.hpp"
+#include "daemon/machine_time.hpp"
+
+namespace locus::daemon {
+namespace {
+
+constexpr Duration kMaxSleep = std::chrono::milliseconds{100}; ///< before a look whether the link is still wanted
+constexpr Duration kFirstPause = std::chrono::seconds{1};      ///< between two attempts to connect; doubled each time
+constexpr Duration kLongestPause = std::chrono::seconds{15};
+
+} // namespace
+
+/// What exists while there is a network.
+struct RosLink::Session {
+  struct ImuSource {
+    std::size_t source;
+    DdsReader<ros::Imu> reader;
+    std::uint64_t received = 0;
+  };
+  struct OdometrySource {
+    std::size_t source;
+    DdsReader<ros::Odometry> reader;
+    UsualCovariance usual;
+    std::uint64_t received = 0;
+  };
+  struct HealthTopic {
+    std::size_t source;
+    DdsReader<ros::Bool> reader;
+  };
+
+  Session(DdsNode node_, const Config& config) : node(std::move(node_)) {
+    const DdsOptions& dds = config.dds;
+    odometry = {node, dds.prefix + "/odometry", TopicQos::standard()};
+    odometry_fast = {node, dds.prefix + "/odometry_fast", TopicQos::standard()};
+    state = {node, dds.prefix + "/state", TopicQos::standard()};
+    diagnostics = {node, "/diagnostics", TopicQos::standard()};
+    if (dds.publish_tf)
+      tf.emplace(node, "/tf", TopicQos::transform());
+    if (dds.publish_cloud)
+      cloud.emplace(node, dds.prefix + "/cloud", TopicQos::sensor_out());
+    if (dds.publish_map)
+      map.emplace(node, dds.prefix + "/map", TopicQos::sensor_out());
+    listen(config);
+  }
+
+  void listen(const Config& config) {
+    waitset = DdsEntity{dds_create_waitset(node.participant())};
+    const auto wake_by = [this](dds_entity_t reader) {
+      dds_set_status_mask(reader, DDS_DATA_AVAILABLE_STATUS);
+      dds_waitset_attach(waitset.handle(), reader, 0);
+    };
+    for (std::size_t i = 0; i < config.source_topics.size(); ++i) {
+      const auto& [topic, health_topic] = config.source_topics[i];
+      if (!topic.empty() && config.odometry.motion_sources[i].kind == SourceKind::imu)
+        wake_by(imus.emplace_back(ImuSource{i, {node, topic, TopicQos::sensor_in()}}).reader.handle());
+      else if (!topic.empty())
+        wake_by(odometries.emplace_back(OdometrySource{i, {node, topic, TopicQos::sensor_in()}, {}}).reader.handle());
+      if (!health_topic.empty())
+        wake_by(health_topics.emplace_back(HealthTopic{i, {node, health_topic, TopicQos::standard()}}).reader.handle());
+    }
+    if (!config.dds.flat_ground_topic.empty())
+      wake_by(flat_ground.emplace(node, config.dds.flat_ground_topic, TopicQos::standard()).handle());
+  }
+
+  DdsNode node; ///< outlives all that is made from it
+  DdsWriter<ros::Odometry> odometry, odometry_fast;
+  DdsWriter<ros::UInt8> state;
+  DdsWriter<ros::DiagnosticArray> diagnostics;
+  std::optional<DdsWriter<ros::TFMessage>> tf;
+  std::optional<DdsWriter<ros::PointCloud2>> cloud, map;
+  DdsEntity waitset;
+  std::vector<ImuSource> imus;
+  std::vector<OdometrySource> odometries;
+  std::vector<HealthTopic> health_topics;
+  std::optional<DdsReader<ros::Bool>> flat_ground;
+};
+
+RosLink::RosLink(const Config& config, Sink sink)
+    : config_(config), frames_{config.dds.frame_odom, config.dds.frame_base}, sink_(std::move(sink)) {
+  status_.sources.resize(config.source_topics.size());
+  thread_ = std::thread([this] { run(); });
+  pthread_setname_np(thread_.native_handle(), "dds");
+}
+
+RosLink::~RosLink() {
+  stopping_.store(true, std::memory_order_relaxed);
+  thread_.join();
+}
+
+void RosLink::run() {
+  session_ = connect();
+  if (!session_)
+    return;
+  connected_.store(session_.get(), std::memory_order_release);
+  std::array<dds_attach_t, 1> triggered{};
+  Duration told{};
+  while (!stopping_.load(std::memory_order_relaxed)) {
+    progress_.fetch_add(1, std::memory_order_relaxed);
+    dds_waitset_wait(session_->waitset.handle(), triggered.data(), triggered.size(), kMaxSleep.count());
+    receive(*session_);
+    if (const Duration now = read_clock(CLOCK_MONOTONIC); now - told >= kMaxSleep) {
+      tell_sources(*session_);
+      told = now;
+    }
+  }
+}
+
+/// Nothing when the link is no longer wanted.
+std::unique_ptr<RosLink::Session> RosLink::connect() {
+  Duration pause = kFirstPause;
+  Duration next_attempt{};
+  while (!stopping_.load(std::memory_order_relaxed)) {
+    progress_.fetch_add(1, std::memory_order_relaxed);
+    if (read_clock(CLOCK_MONOTONIC) < next_attempt) {
+      std::this_thread::sleep_for(kMaxSleep);
+      continue;
+    }
+    auto node = DdsNode::open(config_.dds);
+    const std::scoped_lock lock(status_mutex_);
+    ++status_.attempts;
+    status_.connected = node.has_value();
+    if (node)
+      return std::make_unique<Session>(std::move(*node), config_);
+    status_.problem = node.error();
+    next_attempt = read_clock(CLOCK_MONOTONIC) + pause;
+    pause = std::min(2 * pause, kLongestPause);
+  }
+  return nullptr;
+}
+
+void RosLink::receive(Session& session) {
+  const Stamp arrival{read_clock(CLOCK_REALTIME)};
+  for (auto& from : session.imus)
+    from.reader.take([&](const ros::Imu& message) {
+      ++from.received;
+      sink_(ImuInput{from.source, to_sample(message, arrival)});
+    });
+  for (auto& from : session.odometries)
+    from.reader.take([&](const ros::Odometry& message) {
+      ++from.received;
+      sink_(OdometryInput{from.source, to_sample(message, arrival, from.usual)});
+    });
+  for (auto& from : session.health_topics)
+    from.reader.take([&](const ros::Bool& message) { sink_(OutsideVerdict{from.source, message.data_}); });
+  if (session.flat_ground)
+    session.flat_ground->take([&](const ros::Bool& message) { sink_(FlatGroundWord{message.data_}); });
+}
+
+void RosLink::tell_sources(const Session& session) {
+  const std::scoped_lock lock(status_mutex_);
+  const auto tell = [this](const auto& sources) {
+    for (const auto& from : sources)
+      status_.sources[from.source] = {from.reader.writers(), from.received};
+  };
+  tell(session.imus);
+  tell(session.odometries);
+}
+
+bool RosLink::publish(const OdometryReport& report, TrackingState state) {
+  Session* const to = session();
+  if (to == nullptr)
+    return false;
+  const bool odometry_left = to->odometry.write(to_ros(report, frames_));
+  const bool state_left = to->state.write(to_ros(state));
+  if (!to->tf)
+    return odometry_left && state_left;
+  ros::TransformStamped transform = to_ros_transform(report.stamp, report.T_odom_base, frames_);
+  return to->tf->write({{1, 1, &transform, false}}) && odometry_left && state_left;
+}
+
+bool RosLink::publish_fast(const OdometryReport& report) {
+  Session* const to = session();
+  return to != nullptr && to->odometry_fast.write(to_ros(report, frames_));
+}
+
+bool RosLink::publish_cloud(std::span<const CloudMessage::Point> points, Stamp stamp) {
+  Session* const to = session();
+  return to != nullptr && to->cloud && to->cloud->write(cloud_.make(points, stamp, frames_.base));
+}
+
+bool RosLink::publish_map(std::span<const CloudMessage::Point> points, Stamp stamp) {
+  Session* const to = session();
+  return to != nullptr && to->map && to->map->write(map_.make(points, stamp, frames_.odom));
+}
+
+bool RosLink::publish(const DiagnosticsMessage& diagnostics) {
+  Session* const to = session();
+  return to != nullptr && to->diagnostics.write(diagnostics.message());
+}
+
+RosLink::Status RosLink::status() const {
+  const std::scoped_lock lock(status_mutex_);
+  return status_;
+}
+
+} // namespace locus::daemon

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <variant>
+#include <vector>
+
+#include "config/config.hpp"
+#include "daemon/dds/ros_messages.hpp"
+#include "daemon/input.hpp"
+
+namespace locus::daemon {
+
+/// Somebody outside says whether a motion source is healthy (its health_topic).
+struct OutsideVerdict {
+  std::size_t source;
+  bool healthy;
+};
+
+/// Somebody outside says whether the ground is flat (flat_ground_topic).
+struct FlatGroundWord {
+  bool flat;
+};
+
+/// All that comes in by DDS.
+using RosInput = std::variant<ImuInput, OdometryInput, OutsideVerdict, FlatGroundWord>;
+
+/// The robot's network in ROS 2's words: the configured topics in, odometry and what goes with it out.
+///
+/// Comes up by itself: while there is no network it is tried again, less and less often, and what is published
+/// meanwhile is lost. Inputs are handed over in the thread of the link, stamped with their arrival.
+class RosLink {
+ public:
+  using Sink = std::function<void(const RosInput&)>;
+
+  /// What is to be told of the link.
+  struct Status {
+    bool connected = false;
+    std::uint64_t attempts = 0; ///< so far, the one that succeeded included
+    std::string problem;        ///< why the last one failed
+    struct Source {
+      std::uint32_t writers = 0;  ///< that send its topic now
+      std::uint64_t received = 0; ///< samples
+    };
+    std::vector<Source> sources; ///< by the index of the configuration
+  };
+
+  /// Begins at once and does not wait.
+  RosLink(const Config& config, Sink sink);
+  ~RosLink();
+  RosLink(const RosLink&) = delete;
+  RosLink& operator=(const RosLink&) = delete;
+
+  /// Each by one thread at a time; false while there is no network, or a reader holds it up.
+  bool publish(const OdometryReport& report, TrackingState state); ///< odometry, state and, if asked for, tf
+  bool publish_fast(const OdometryReport& report);
+  bool publish_cloud(std::span<const CloudMessage::Point> points, Stamp stamp); ///< base frame
+  bool publish_map(std::span<const CloudMessage::Point> points, Stamp stamp);   ///< odom frame
+  bool publish(const DiagnosticsMessage& diagnostics);
+
+  /// Any thread.
+  [[nodiscard]] Status status() const;
+  /// Grows as long as the thread of the link lives, at least ten times a second.
+  [[nodiscard]] std::uint64_t progress() const { return progress_.load(std::memory_order_relaxed); }
+
+ private:
+  struct Session;
+
+  void run();
+  [[nodiscard]] std::unique_ptr<Session> connect();
+  void receive(Session& session);
+  void tell_sources(const Session& session);
+  [[nodiscard]] Session* session() const { return connected_.load(std::memory_order_acquire); }
+
+  Config config_;
+  FrameNames frames_;
+  Sink sink_;
+  CloudMessage cloud_, map_;
+  std::unique_ptr<Session> session_;         ///< made by the thread of the link
+  std::atomic<Session*> connected_{nullptr}; ///< the same once it is complete
+  mutable std::mutex status_mutex_;          ///< no thread of the packet path takes it
+  Status status_;
+  std::atomic<std::uint64_t> progress_{0};
+  std::atomic<bool> stopping_{false};
+  std::thread thread_;
+};
+
+} // namespace locus::daemon

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string_view>
+
+#include "ros_types.h"
+
+/// The messages of ROS 2 by shorter names. They are C structs: strings and sequences are pointers that the struct does
+/// not own.
+namespace locus::daemon::ros {
+
+using Time = builtin_interfaces_msg_dds__Time_;
+using Header = std_msgs_msg_dds__Header_;
+using Bool = std_msgs_msg_dds__Bool_;
+using UInt8 = std_msgs_msg_dds__UInt8_;
+using Point = geometry_msgs_msg_dds__Point_;
+using Vector3 = geometry_msgs_msg_dds__Vector3_;
+using Quaternion = geometry_msgs_msg_dds__Quaternion_;
+using TransformStamped = geometry_msgs_msg_dds__TransformStamped_;
+using Odometry = nav_msgs_msg_dds__Odometry_;
+using TFMessage = tf2_msgs_msg_dds__TFMessage_;
+using Imu = sensor_msgs_msg_dds__Imu_;
+using PointField = sensor_msgs_msg_dds__PointField_;
+using PointCloud2 = sensor_msgs_msg_dds__PointCloud2_;
+using KeyValue = diagnostic_msgs_msg_dds__KeyValue_;
+using DiagnosticStatus = diagnostic_msgs_msg_dds__DiagnosticStatus_;
+using DiagnosticArray = diagnostic_msgs_msg_dds__DiagnosticArray_;
+
+/// What DDS and ROS 2 know a type of message by. The hash is ROS 2's own over the description of the type (REP 2011);
+/// from Iron on it is expected in the user data of every endpoint.
+struct Type {
+  const dds_topic_descriptor_t* descriptor;
+  std::string_view hash;
+};
+
+template <class Message> Type type_of();
+template <> inline Type type_of<Bool>() {
+  return {&std_msgs_msg_dds__Bool__desc, "feb91e995ff9ebd09c0cb3d2aed18b11077585839fb5db80193b62d74528f6c9"};
+}
+template <> inline Type type_of<UInt8>() {
+  return {&std_msgs_msg_dds__UInt8__desc, "6138bd83d8c3569cb80a667db03cfc1629f529fee79d944c39c34e352e72f010"};
+}
+template <> inline Type type_of<Odometry>() {
+  return {&nav_msgs_msg_dds__Odometry__desc, "3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0"};
+}
+template <> inline Type type_of<TFMessage>() {
+  return {&tf2_msgs_msg_dds__TFMessage__desc, "e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087"};
+}
+template <> inline Type type_of<Imu>() {
+  return {&sensor_msgs_msg_dds__Imu__desc, "7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b"};
+}
+template <> inline Type type_of<PointCloud2>() {
+  return {&sensor_msgs_msg_dds__PointCloud2__desc, "9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5"};
+}
+template <> inline Type type_of<DiagnosticArray>() {
+  return {&diagnostic_msgs_msg_dds__DiagnosticArray__desc,
+          "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"};
+}
+
+} // namespace locus::daemon::ros

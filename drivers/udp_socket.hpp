@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/expected.hpp"
+#include "drivers/datagram.hpp"
+
+namespace locus {
+
+/// A UDP port that lidars send to, whether to this host, by broadcast or by multicast.
+///
+/// The kernel stamps each datagram when it comes, and counts those that it had no room for. One owner. Allocates
+/// nothing, throws nothing after it was opened.
+class UdpSocket {
+ public:
+  /// Asked of the kernel: half a second of a VLS-128 in dual return mode.
+  static constexpr int kWantedBufferBytes = 8 << 20;
+  static constexpr std::size_t kBatch = 32;
+
+  /// Listens to `port` on every interface. Fails with one line for the user.
+  static Expected<UdpSocket, std::string> open(std::uint16_t port);
+
+  /// Takes over a socket that somebody else has bound, e.g. systemd. Fails with one line for the user.
+  static Expected<UdpSocket, std::string> adopt(int descriptor);
+
+  ~UdpSocket();
+  UdpSocket(UdpSocket&& other) noexcept;
+  UdpSocket& operator=(UdpSocket&&) = delete;
+
+  /// Joins a multicast group on every interface that has multicast, now or again after one has come up. Whether any
+  /// does.
+  bool join(std::uint32_t group_host_order);
+
+  /// What has come, at most kBatch, in order; valid until the next call. Does not wait.
+  std::span<const Datagram> receive();
+
+  [[nodiscard]] int descriptor() const { return descriptor_; }
+  [[nodiscard]] std::uint16_t port() const { return port_; }
+  /// What the kernel gave, as it counts: about half of it holds payloads.
+  [[nodiscard]] int buffer_bytes() const { return buffer_bytes_; }
+  /// Datagrams that the kernel threw away, because the buffer was full. Known from the next one that it delivers.
+  [[nodiscard]] std::uint64_t kernel_drops() const { return kernel_drops_; }
+
+ private:
+  struct Batch;
+
+  explicit UdpSocket(int descriptor);
+  std::optional<std::string> prepare();
+
+  int descriptor_;
+  std::uint16_t port_ = 0;
+  int buffer_bytes_ = 0;
+  std::uint64_t kernel_drops_ = 0;
+  std::uint32_t last_drops_ = 0; ///< as the kernel counts, in 32 bits
+  std::unique_ptr<Batch> batch_;
+};
+
+} // namespace locus

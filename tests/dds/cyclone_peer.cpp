@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// A participant made with Cyclone DDS: cyclone_peer DOMAIN listen|talk PREFIX. See peer_words.hpp.
+#include <cstdlib>
+#include <stdexcept>
+
+#include "daemon/dds/dds_node.hpp"
+#include "daemon/dds/ros_messages.hpp"
+#include "dds/peer_words.hpp"
+
+namespace locus::test {
+namespace {
+
+using daemon::DdsNode;
+using daemon::DdsReader;
+using daemon::DdsWriter;
+using daemon::TopicQos;
+namespace ros = daemon::ros;
+
+void say(const ros::Odometry& m, const char* topic) {
+  const auto& [p, q] = m.pose_.pose_;
+  tell("{} {}.{:09} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {} {} {:.9g} {:.9g} {}", topic,
+       m.header_.stamp_.sec_, m.header_.stamp_.nanosec_, p.x_, p.y_, p.z_, q.x_, q.y_, q.z_, q.w_, m.header_.frame_id_,
+       m.child_frame_id_, m.pose_.covariance_[35], m.twist_.twist_.angular_.z_, realtime_ns());
+}
+
+void listen(const DdsNode& node, const std::string& prefix) {
+  DdsReader<ros::Odometry> odometry{node, prefix + "/odometry", TopicQos::standard()};
+  DdsReader<ros::Odometry> fast{node, prefix + "/odometry_fast", TopicQos::standard()};
+  DdsReader<ros::UInt8> state{node, prefix + "/state", TopicQos::standard()};
+  DdsReader<ros::TFMessage> tf{node, "/tf", TopicQos::transform()};
+  DdsReader<ros::PointCloud2> cloud{node, prefix + "/cloud", TopicQos::sensor_in()};
+  DdsReader<ros::PointCloud2> map{node, prefix + "/map", TopicQos::sensor_in()};
+  DdsReader<ros::DiagnosticArray> diagnostics{node, "/diagnostics", TopicQos::standard()};
+  const auto say_cloud = [](const ros::PointCloud2& m, const char* topic) {
+    tell("{} {} {} {} {} {}", topic, m.width_, m.point_step_, m.data_._length, m.fields_._length, m.header_.frame_id_);
+  };
+  while (stdin_is_open()) {
+    odometry.take([](const ros::Odometry& m) { say(m, "odometry"); });
+    fast.take([](const ros::Odometry& m) { say(m, "odometry_fast"); });
+    state.take([](const ros::UInt8& m) { tell("state {}", m.data_); });
+    tf.take([](const ros::TFMessage& m) {
+      for (std::uint32_t i = 0; i < m.transforms_._length; ++i) {
+        const ros::TransformStamped& t = m.transforms_._buffer[i];
+        tell("tf {} {} {:.9f}", t.header_.frame_id_, t.child_frame_id_, t.transform_.translation_.x_);
+      }
+    });
+    cloud.take([&](const ros::PointCloud2& m) { say_cloud(m, "cloud"); });
+    map.take([&](const ros::PointCloud2& m) { say_cloud(m, "map"); });
+    diagnostics.take([](const ros::DiagnosticArray& m) {
+      for (std::uint32_t i = 0; i < m.status_._length; ++i) {
+        const ros::DiagnosticStatus& status = m.status_._buffer[i];
+        tell("diagnostics {} {} {}", status.level_, status.values_._length, status.name_);
+      }
+    });
+    std::this_thread::sleep_for(std::chrono::microseconds{200});
+  }
+}
+
+void talk(const DdsNode& node) {
+  const DdsWriter<ros::Imu> imus{node, "/imu/data", {false, 5}};
+  const DdsWriter<ros::Odometry> odometries{node, "/wheel_odometry", TopicQos::standard()};
+  const DdsWriter<ros::Bool> healths{node, "/wheel_health", TopicQos::standard()};
+  std::string empty;
+  talk_on([&](int i) {
+    const Said said(i);
+    ros::Imu imu{};
+    imu.header_ = {{said.sec, said.nanosec}, empty.data()};
+    imu.orientation_.w_ = 1;
+    imu.angular_velocity_.z_ = said.figure;
+    imu.linear_acceleration_.z_ = 9.81;
+    ros::Odometry odometry{};
+    odometry.header_ = {{said.sec, said.nanosec}, empty.data()};
+    odometry.child_frame_id_ = empty.data();
+    odometry.pose_.pose_.position_.x_ = said.figure;
+    odometry.pose_.pose_.orientation_.w_ = 1;
+    odometry.twist_.covariance_[0] = 0.01;
+    imus.write(imu);
+    odometries.write(odometry);
+    healths.write({i % 2 == 0});
+  });
+}
+
+void run(int argc, char** argv) {
+  if (argc != 4)
+    throw std::runtime_error("usage: cyclone_peer DOMAIN listen|talk PREFIX");
+  DdsOptions options;
+  options.domain = std::atoi(argv[1]); // NOLINT
+  const auto node = DdsNode::open(options);
+  if (!node)
+    throw std::runtime_error(node.error());
+  if (std::string(argv[2]) == "talk")
+    talk(*node);
+  else
+    listen(*node, argv[3]);
+}
+
+} // namespace
+} // namespace locus::test
+
+int main(int argc, char** argv) {
+  try {
+    locus::test::run(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "cyclone_peer: {}\n", error.what());
+    return 1;
+  }
+  return 0;
+}

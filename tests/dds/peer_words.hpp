@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <ctime>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
+
+/// What the peers of the tests have in common: programs of another DDS process that say on stdout, line by line, what
+/// they heard, and that live until their stdin is closed.
+namespace locus::test {
+
+/// CLOCK_REALTIME, the clock that stamps are on.
+inline std::int64_t realtime_ns() {
+  timespec now{};
+  clock_gettime(CLOCK_REALTIME, &now);
+  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
+
+template <class... Values> void tell(fmt::format_string<Values...> format, Values&&... values) {
+  fmt::print("{}\n", fmt::format(format, std::forward<Values>(values)...));
+  std::fflush(stdout);
+}
+
+inline bool stdin_is_open() {
+  pollfd input{STDIN_FILENO, POLLIN, 0};
+  if (poll(&input, 1, 0) <= 0)
+    return true;
+  char byte = 0;
+  return read(STDIN_FILENO, &byte, 1) > 0;
+}
+
+/// What a peer that talks sends: message `i` has these stamps and figures, so that the other side can tell them.
+struct Said {
+  static constexpr std::int32_t kSec = 1'700'000'000;
+  std::int32_t sec;
+  std::uint32_t nanosec;
+  double figure; ///< i / 8: exact in binary
+
+  explicit Said(int i)
+      : sec(kSec + i / 100), nanosec(static_cast<std::uint32_t>(i % 100) * 10'000'000U), figure(i / 8.0) {}
+};
+
+/// Calls `say(i)` a hundred times a second until stdin is closed.
+template <class Say> void talk_on(const Say& say) {
+  for (int i = 0; stdin_is_open(); ++i) {
+    say(i);
+    std::this_thread::sleep_for(std::chrono::milliseconds{10});
+  }
+}
+
+} // namespace locus::test

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/dds/ros_link.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <functional>
+#include <mutex>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "dds/peer_words.hpp"
+#include "support/child.hpp"
+#include "support/dds_domain.hpp"
+
+namespace locus::daemon {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr Duration kPatience = seconds{20}; ///< for discovery on a busy machine
+
+bool eventually(const std::function<bool()>& holds) {
+  const auto give_up = std::chrono::steady_clock::now() + kPatience;
+  while (!holds()) {
+    if (std::chrono::steady_clock::now() > give_up)
+      return false;
+    std::this_thread::sleep_for(milliseconds{5});
+  }
+  return true;
+}
+
+/// Collects what comes in.
+class Inbox {
+ public:
+  RosLink::Sink sink() {
+    return [this](const RosInput& input) {
+      const std::scoped_lock lock(mutex_);
+      inputs_.push_back(input);
+    };
+  }
+  template <class Kind> std::vector<Kind> all() const {
+    const std::scoped_lock lock(mutex_);
+    std::vector<Kind> found;
+    for (const RosInput& input : inputs_)
+      if (const Kind* one = std::get_if<Kind>(&input))
+        found.push_back(*one);
+    return found;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<RosInput> inputs_;
+};
+
+Config config_in(const test::DdsDomain& domain) {
+  Config config;
+  config.dds.domain = domain.number();
+  config.dds.prefix = "/robot_7/locus";
+  config.dds.publish_tf = config.dds.publish_cloud = config.dds.publish_map = true;
+  config.source_topics[0].health_topic = "/wheel_health";
+  return config;
+}
+
+OdometryReport report(int i) {
+  OdometryReport report;
+  report.stamp = stamp_from_ns(1'700'000'000'000'000'000 + i * 100'000'000LL);
+  report.T_odom_base.translation = {i / 8.0, 2, 3};
+  report.T_odom_base.rotation = from_rpy_rad({0, 0, 0.5});
+  report.pose_covariance(5, 5) = 0.25;
+  report.twist_base[5] = 0.75;
+  return report;
+}
+
+class Peers : public testing::TestWithParam<const char*> {
+ protected:
+  [[nodiscard]] std::vector<std::string> peer(const char* role) const {
+    return {GetParam(), std::to_string(domain_.number()), role, "/robot_7/locus"};
+  }
+
+  test::DdsDomain domain_;
+  Config config_ = config_in(domain_);
+  Inbox inbox_;
+};
+
+TEST_P(Peers, HearOdometryStateTransformCloudAndDiagnostics) {
+  test::Child listener(peer("listen"));
+  RosLink link(config_, inbox_.sink());
+  const std::vector<CloudMessage::Point> points(2'000, {1, 2, 3, 4, 0, 5, 0}); // more needs larger socket buffers
+  const auto hears_all = [&] {
+    for (const char* word : {"odometry", "state", "tf", "cloud", "diagnostics"})
+      if (listener.lines_of(word).size() < 3)
+        return false;
+    return true;
+  };
+  int sent = 0;
+  ASSERT_TRUE(eventually([&] {
+    link.publish(report(++sent), TrackingState::degenerate);
+    link.publish_cloud(points, stamp_from_ns(1));
+    link.publish(DiagnosticsMessage({{Diagnostic::Level::error, "locusd", "", {{"a", "b"}}}}, stamp_from_ns(1)));
+    std::this_thread::sleep_for(milliseconds{20});
+    return hears_all();
+  })) << testing::PrintToString(listener.lines());
+  listener.close_stdin();
+  EXPECT_EQ(listener.wait_for_exit(seconds{5}), 0);
+
+  std::istringstream row(listener.lines_of("odometry").back());
+  double t = 0, x = 0, y = 0, z = 0, qx = 0, qy = 0, qz = 0, qw = 0, yaw_variance = 0, yaw_rate = 0;
+  std::string frame, child;
+  row >> t >> x >> y >> z >> qx >> qy >> qz >> qw >> frame >> child >> yaw_variance >> yaw_rate;
+  EXPECT_NEAR((t - 1.7e9) * 10, x * 8, 1e-4) << "stamp and pose are those of one report";
+  EXPECT_EQ(z, 3.0);
+  EXPECT_NEAR(qz, std::sin(0.25), 1e-9);
+  EXPECT_EQ(frame + ' ' + child, "odom base_link");
+  EXPECT_EQ(yaw_variance, 0.25);
+  EXPECT_EQ(yaw_rate, 0.75);
+  EXPECT_EQ(listener.lines_of("state").back(), "1");
+  EXPECT_EQ(listener.lines_of("tf").back().substr(0, 14), "odom base_link");
+  EXPECT_EQ(listener.lines_of("cloud").back(), "2000 24 48000 7 base_link");
+  EXPECT_EQ(listener.lines_of("diagnostics").back(), "2 1 locusd");
+}
+
+TEST_P(Peers, AreHeardInOrderWithEveryFigure) {
+  RosLink link(config_, inbox_.sink());
+  test::Child talker(peer("talk"));
+  EXPECT_TRUE(eventually([&] {
+    return inbox_.all<ImuInput>().size() > 50 && inbox_.all<OdometryInput>().size() > 50 &&
+           inbox_.all<OutsideVerdict>().size() > 50;
+  }));
+  talker.close_stdin();
+  const std::vector<ImuInput> imus = inbox_.all<ImuInput>();
+  ASSERT_FALSE(imus.empty());
+  const auto number_of = [](double figure) { return static_cast<int>(figure * 8); };
+  int last = -1;
+  for (const ImuInput& imu : imus) {
+    const int i = number_of(imu.sample.angular_velocity_radps.z());
+    const test::Said said(i);
+    EXPECT_EQ(imu.source, 1U);
+    EXPECT_EQ(imu.sample.stamp, to_stamp({said.sec, said.nanosec}));
+    EXPECT_EQ(imu.sample.specific_force_mps2.z(), 9.81);
+    EXPECT_GT(i, last);
+    last = i;
+  }
+  for (const OdometryInput& odometry : inbox_.all<OdometryInput>()) {
+    const test::Said said(number_of(odometry.sample.T_source_base.translation.x()));
+    EXPECT_EQ(odometry.source, 0U);
+    EXPECT_EQ(odometry.sample.stamp, to_stamp({said.sec, said.nanosec}));
+    EXPECT_NEAR(odometry.sample.covariance_scale, 1.0, 1e-9);
+  }
+  EXPECT_EQ(inbox_.all<OutsideVerdict>().front().source, 0U);
+  const RosLink::Status status = link.status();
+  EXPECT_TRUE(status.connected);
+  EXPECT_EQ(status.sources[1].writers, 1U);
+  EXPECT_GE(inbox_.all<ImuInput>().size(), status.sources[1].received);
+}
+
+INSTANTIATE_TEST_SUITE_P(Dds, Peers, testing::Values(CYCLONE_PEER, FAST_DDS_PEER), [](const auto& peer) {
+  return std::string(peer.param).find("fast") == std::string::npos ? "Cyclone" : "FastDds";
+});
+
+TEST(RosLink, WithoutItsInterfaceGoesOnTryingAndSaysWhichOne) {
+  const test::DdsDomain domain;
+  Config config = config_in(domain);
+  config.dds.interface = "nowhere7";
+  RosLink link(config, [](const RosInput&) {});
+  EXPECT_TRUE(eventually([&] { return link.status().attempts >= 2; }));
+  EXPECT_FALSE(link.status().connected);
+  EXPECT_NE(link.status().problem.find("interface nowhere7"), std::string::npos) << link.status().problem;
+  EXPECT_FALSE(link.publish(report(1), TrackingState::tracking));
+  const std::uint64_t before = link.progress();
+  EXPECT_TRUE(eventually([&] { return link.progress() > before; })) << "waiting is no standstill";
+}
+
+TEST(RosLink, IsGoneWithinASecond) {
+  const test::DdsDomain domain;
+  auto link = std::make_unique<RosLink>(config_in(domain), [](const RosInput&) {});
+  EXPECT_TRUE(eventually([&] { return link->status().connected; }));
+  const auto begin = std::chrono::steady_clock::now();
+  link.reset();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, seconds{1});
+}
+
+} // namespace
+} // namespace locus::daemon

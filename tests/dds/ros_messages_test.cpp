@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/dds/ros_messages.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <string>
+
+namespace locus::daemon {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr Stamp kArrival = stamp_from_ns(1'700'000'000'500'000'000);
+
+ros::Imu resting_imu() {
+  static std::string frame = "imu_link";
+  ros::Imu imu{};
+  imu.header_ = {{1'700'000'000, 250'000'000}, frame.data()};
+  imu.orientation_.w_ = 1.0;
+  imu.linear_acceleration_.z_ = 9.81;
+  return imu;
+}
+
+ros::Odometry odometry_at(double x_m) {
+  static std::string frame;
+  ros::Odometry odometry{};
+  odometry.header_ = {{1'700'000'000, 250'000'000}, frame.data()};
+  odometry.child_frame_id_ = frame.data();
+  odometry.pose_.pose_.position_.x_ = x_m;
+  odometry.pose_.pose_.orientation_.w_ = 1.0;
+  return odometry;
+}
+
+std::array<double, 36> covariance(double variance) {
+  std::array<double, 36> matrix{};
+  for (std::size_t i = 0; i < 6; ++i)
+    matrix[7 * i] = variance;
+  return matrix;
+}
+
+TEST(RosMessages, ImuBecomesASampleInTheSensorsFrame) {
+  ros::Imu imu = resting_imu();
+  imu.angular_velocity_ = {0.1, 0.2, 0.3};
+  const ImuSample sample = to_sample(imu, kArrival);
+  EXPECT_EQ(to_ns(sample.stamp), 1'700'000'000'250'000'000);
+  EXPECT_EQ(sample.arrival, kArrival);
+  EXPECT_EQ(sample.angular_velocity_radps, Eigen::Vector3d(0.1, 0.2, 0.3));
+  EXPECT_EQ(sample.specific_force_mps2, Eigen::Vector3d(0, 0, 9.81));
+  ASSERT_TRUE(sample.attitude);
+  EXPECT_EQ(sample.attitude->w(), 1.0);
+}
+
+TEST(RosMessages, ImuWithoutAttitudeSaysSoInOneOfThreeWays) {
+  ros::Imu declared = resting_imu();
+  declared.orientation_covariance_[0] = -1.0;
+  ros::Imu zero = resting_imu();
+  zero.orientation_.w_ = 0.0;
+  ros::Imu nan = resting_imu();
+  nan.orientation_.x_ = kNan;
+  for (const ros::Imu& imu : {declared, zero, nan})
+    EXPECT_FALSE(to_sample(imu, kArrival).attitude);
+}
+
+TEST(RosMessages, NotANumberIsPassedOnToWhoeverCountsIt) {
+  ros::Imu imu = resting_imu();
+  imu.angular_velocity_.y_ = kNan;
+  EXPECT_TRUE(std::isnan(to_sample(imu, kArrival).angular_velocity_radps.y()));
+  UsualCovariance usual;
+  ros::Odometry odometry = odometry_at(kNan);
+  EXPECT_FALSE(to_sample(odometry, kArrival, usual).T_source_base.finite());
+  odometry = odometry_at(1.0);
+  odometry.pose_.pose_.orientation_ = {};
+  EXPECT_LT(to_sample(odometry, kArrival, usual).T_source_base.rotation.norm(), 0.5) << "no rotation at all";
+}
+
+TEST(RosMessages, AnyBitsOfAStampAreAnInstant) {
+  EXPECT_EQ(to_ns(to_stamp({-1, 0})), -1'000'000'000);
+  EXPECT_EQ(to_ns(to_stamp({2'147'483'647, 4'294'967'295U})), 2'147'483'647'000'000'000 + 4'294'967'295);
+  EXPECT_EQ(to_ns(to_stamp({-2'147'483'648, 0})), -2'147'483'648'000'000'000);
+}
+
+TEST(RosMessages, StampsGoThereAndBack) {
+  for (const std::int64_t ns : {0LL, 1LL, -1LL, 1'700'000'000'999'999'999LL, -1'500'000'000LL}) {
+    const ros::Time time = to_ros(stamp_from_ns(ns));
+    EXPECT_LT(time.nanosec_, 1'000'000'000U);
+    EXPECT_EQ(to_ns(to_stamp(time)), ns);
+  }
+}
+
+TEST(UsualCovariance, TellsHowMuchWorseThanUsual) {
+  UsualCovariance usual;
+  for (int i = 0; i < 100; ++i)
+    EXPECT_NEAR(usual.scale(covariance(1e-4)), 1.0, 1e-9);
+  EXPECT_NEAR(usual.scale(covariance(1e-3)), 10.0, 0.5);
+  EXPECT_NEAR(usual.scale(covariance(1e-4)), 1.0, 0.1);
+}
+
+TEST(UsualCovariance, ThatIsNotReportedIsAsUsual) {
+  UsualCovariance usual;
+  EXPECT_EQ(usual.scale(covariance(0.0)), 1.0);
+}
+
+TEST(UsualCovariance, ThatCannotBeIsInfinite) {
+  UsualCovariance usual;
+  for (const double impossible : {kNan, -1.0, std::numeric_limits<double>::infinity(), 1e308})
+    EXPECT_EQ(usual.scale(covariance(impossible)), std::numeric_limits<double>::infinity()) << impossible;
+  EXPECT_NEAR(usual.scale(covariance(1e-4)), 1.0, 1e-9) << "and teaches nothing";
+}
+
+TEST(RosMessages, EstimateBecomesOdometryWithFramesAndBothCovariances) {
+  OdometryReport report;
+  report.stamp = stamp_from_ns(1'700'000'000'123'456'789);
+  report.T_odom_base = {from_rpy_rad({0.1, 0.2, 0.3}), {1, 2, 3}};
+  report.twist_base << 1, 2, 3, 4, 5, 6;
+  report.pose_covariance = Vector6(report.twist_base).asDiagonal();
+  report.pose_covariance(0, 5) = 0.25;
+  report.twist_covariance(5, 0) = 0.125;
+  const FrameNames frames{"odom", "base_link"};
+  const ros::Odometry message = to_ros(report, frames);
+  EXPECT_EQ(message.header_.stamp_.nanosec_, 123'456'789U);
+  EXPECT_STREQ(message.header_.frame_id_, "odom");
+  EXPECT_STREQ(message.child_frame_id_, "base_link");
+  EXPECT_EQ(message.pose_.pose_.position_.z_, 3.0);
+  EXPECT_EQ(message.pose_.pose_.orientation_.w_, report.T_odom_base.rotation.w());
+  EXPECT_EQ(message.pose_.covariance_[35], 6.0);
+  EXPECT_EQ(message.pose_.covariance_[5], 0.25) << "row-major";
+  EXPECT_EQ(message.twist_.covariance_[30], 0.125);
+  EXPECT_EQ(message.twist_.twist_.angular_.z_, 6.0);
+}
+
+TEST(CloudMessage, HoldsPointsAsItsFieldsSay) {
+  CloudMessage cloud;
+  const std::vector<CloudMessage::Point> points{{1, 2, 3, 40, -0.05F, 7, 1}, {4, 5, 6, 50, 0, 15, 0}};
+  const std::string frame = "base_link";
+  const ros::PointCloud2& message = cloud.make(points, kArrival, frame);
+  EXPECT_EQ(message.width_, 2U);
+  EXPECT_EQ(message.data_._length, message.width_ * message.point_step_);
+  EXPECT_EQ(message.row_step_, message.data_._length);
+  ASSERT_EQ(message.fields_._length, 7U);
+  const auto read = [&](std::size_t field, std::size_t point, auto value) {
+    const std::size_t offset = point * message.point_step_ + message.fields_._buffer[field].offset_;
+    std::memcpy(&value, message.data_._buffer + offset, sizeof(value));
+    return value;
+  };
+  EXPECT_STREQ(message.fields_._buffer[4].name_, "time");
+  EXPECT_EQ(read(4, 0, float{}), -0.05F);
+  EXPECT_EQ(read(0, 1, float{}), 4.0F);
+  EXPECT_STREQ(message.fields_._buffer[5].name_, "ring");
+  EXPECT_EQ(read(5, 1, std::uint16_t{}), 15);
+  EXPECT_EQ(cloud.make({}, kArrival, frame).data_._length, 0U);
+}
+
+TEST(DiagnosticsMessage, ShowsEveryFigure) {
+  const DiagnosticsMessage message(
+      {{Diagnostic::Level::warning, "locusd: front", "silent for 2 s", {{"packets.lost", "3"}, {"rpm", "600"}}},
+       {Diagnostic::Level::ok, "locusd: sweeps", "", {}}},
+      kArrival);
+  const ros::DiagnosticArray& array = message.message();
+  ASSERT_EQ(array.status_._length, 2U);
+  EXPECT_EQ(array.status_._buffer[0].level_, 1);
+  EXPECT_STREQ(array.status_._buffer[0].message_, "silent for 2 s");
+  ASSERT_EQ(array.status_._buffer[0].values_._length, 2U);
+  EXPECT_STREQ(array.status_._buffer[0].values_._buffer[1].key_, "rpm");
+  EXPECT_STREQ(array.status_._buffer[0].values_._buffer[1].value_, "600");
+  EXPECT_EQ(array.status_._buffer[1].values_._length, 0U);
+}
+
+} // namespace
+} // namespace locus::daemon
