@@ -20,7 +20,7 @@ using std::chrono::seconds;
 constexpr Stamp kStart = stamp_from_ns(1'700'000'000'000'000'000);
 constexpr Duration kColumn = nanoseconds{55'296};
 constexpr Duration kLaser = nanoseconds{2'304};
-constexpr int kColumns = 24, kLasers = 16;
+constexpr int kColumns = 24;
 constexpr Duration kPacket = kColumns * kColumn;
 constexpr std::size_t kMaxReturns = 60'000; ///< two lidars at 300 rpm make no more
 

@@ -89,7 +89,8 @@ ordered_json sweep_band(const Report& report, const TimeAxis& time, const std::s
 }
 
 ordered_json health_bands(const Report& report, const TimeAxis& time) {
-  ordered_json bands{sweep_band(report, time, "lidar", [](const SweepRecord& sweep) { return sweep.lidars; })};
+  ordered_json bands =
+      ordered_json::array({sweep_band(report, time, "lidar", [](const SweepRecord& sweep) { return sweep.lidars; })});
   const std::vector<MotionSourceOptions>& sources = report.config.odometry.motion_sources;
   for (std::size_t i = 0; i < sources.size(); ++i)
     bands.push_back(
@@ -130,7 +131,7 @@ ordered_json box_of(const std::string& name, std::span<const double> errors_m) {
 ordered_json error_boxes(const TrajectoryAccuracy& accuracy) {
   constexpr std::size_t kParts = 5;
   const std::span<const double> errors_m{accuracy.position_error_m};
-  ordered_json boxes{box_of("whole run", errors_m)};
+  ordered_json boxes = ordered_json::array({box_of("whole run", errors_m)});
   for (std::size_t part = 0; errors_m.size() >= kParts && part < kParts; ++part) {
     const std::size_t begin = part * errors_m.size() / kParts, end = (part + 1) * errors_m.size() / kParts;
     boxes.push_back(
