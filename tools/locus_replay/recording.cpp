@@ -41,7 +41,8 @@ Recording::Recording(Capture capture, std::vector<MotionRecording> motion, const
     if (std::ranges::find(options.faults, name, &Fault::name) != options.faults.end())
       std::visit([&](auto& samples) { samples = with_faults(samples.drain(), options, name, capture_start); },
                  recording.samples);
-    MotionCursor& cursor = motion_.emplace_back(std::move(recording));
+    motion_.push_back({std::move(recording)});
+    MotionCursor& cursor = motion_.back();
     while (cursor.arrival() < begin_ - kMotionAhead)
       cursor.take();
   }
