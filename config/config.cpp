@@ -15,7 +15,7 @@
 namespace locus {
 namespace {
 
-constexpr std::size_t kMaxLidars = 16;
+constexpr std::uint32_t kFirstMulticastIp = 0xE000'0000;
 
 bool is_word(std::string_view text, std::string_view punctuation) {
   return !text.empty() && std::isalpha(static_cast<unsigned char>(text.front())) != 0 &&
@@ -62,9 +62,11 @@ void check_names(Problems& problems, const Config& config) {
 }
 
 void check_lidars(Problems& problems, const std::vector<LidarOptions>& lidars) {
-  problems.require(!lidars.empty() && lidars.size() <= kMaxLidars, "lidars", "there must be 1 to 16 of them");
+  problems.require(!lidars.empty() && lidars.size() <= Config::kMaxLidars, "lidars", "there must be 1 to 16 of them");
   for (std::size_t i = 0; i < lidars.size(); ++i) {
     problems.require(lidars[i].port != 0, item("lidars", i, "port"), "0 is outside 1 .. 65535");
+    problems.require(lidars[i].multicast_ip.value_or(kFirstMulticastIp) >> 28 == kFirstMulticastIp >> 28,
+                     item("lidars", i, "multicast_ip"), "must be within 224.0.0.0 .. 239.255.255.255, or none");
     const bool heard_twice = std::any_of(lidars.begin(), lidars.begin() + static_cast<std::ptrdiff_t>(i),
                                          [&lidar = lidars[i]](const LidarOptions& other) {
                                            return other.port == lidar.port && (!other.source_ip || !lidar.source_ip ||

@@ -45,6 +45,8 @@ struct DdsOptions {
 
 /// All that can be set: the options of every module, as one file describes them. Any thread may read it.
 struct Config {
+  static constexpr std::size_t kMaxLidars = 16;
+
   std::vector<LidarOptions> lidars{LidarOptions{}}; ///< the first one gives the sweep its period
   SweepOptions sweep;
   OdometryOptions odometry = default_odometry();

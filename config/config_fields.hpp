@@ -77,17 +77,20 @@ template <class Section> void fields(Section& section, Pose& T) {
 }
 
 template <class Section> void fields(Section& section, LidarOptions& options) {
-  std::optional<Ipv4> source_ip;
-  if (options.source_ip)
-    source_ip = Ipv4{*options.source_ip};
+  const auto from_number = [](std::optional<std::uint32_t> ip) { return ip ? std::optional{Ipv4{*ip}} : std::nullopt; };
+  std::optional<Ipv4> source_ip = from_number(options.source_ip);
+  std::optional<Ipv4> multicast_ip = from_number(options.multicast_ip);
   section.key("name", options.name);
   section.key_or("model", options.model, "auto");
   section.key("port", options.port);
   section.key_or("source_ip", source_ip, "any");
+  section.key_or("multicast_ip", multicast_ip, "none");
   section.key("time", options.time);
   section.key("calibration", options.calibration);
   section.key("T_base_lidar", options.T_base_lidar);
-  options.source_ip = source_ip ? std::optional{source_ip->host_order} : std::nullopt;
+  const auto to_number = [](std::optional<Ipv4> ip) { return ip ? std::optional{ip->host_order} : std::nullopt; };
+  options.source_ip = to_number(source_ip);
+  options.multicast_ip = to_number(multicast_ip);
 }
 
 template <class Section> void fields(Section& section, MotionSource& source) {

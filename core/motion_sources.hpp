@@ -58,6 +58,9 @@ class MotionSources {
   /// T_from_to of the base after the chosen sources; nothing where a track does not reach one of the instants.
   [[nodiscard]] std::optional<Pose> motion(const SourceChoice& choice, Stamp from, Stamp to) const;
 
+  /// Up to when the motion of a source is known without extrapolation; nothing while it is not.
+  [[nodiscard]] std::optional<Stamp> newest(std::size_t source) const { return sources_[source].track.newest(); }
+
   /// Writes the poses of all sources at the end of the sweep, and its specific force.
   void describe(Sweep& sweep) const;
 

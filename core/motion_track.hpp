@@ -37,6 +37,11 @@ class MotionTrack {
   /// Whether a sample lies in (from, to]. A source without one is not used for that sweep.
   [[nodiscard]] bool has_sample_in(Stamp from, Stamp to) const;
 
+  /// Of the newest sample; nothing while there is none.
+  [[nodiscard]] std::optional<Stamp> newest() const {
+    return size_ > 0 ? std::optional{from_newest(0).stamp} : std::nullopt;
+  }
+
   /// Whether the newest sample is at most kMaxExtrapolation old, and came as soon after the one before.
   [[nodiscard]] bool is_live(Stamp now) const;
 

@@ -39,6 +39,12 @@ class Odometry {
 
   [[nodiscard]] const SurfaceMap& map() const { return map_; }
 
+  /// The points of the sweep processed last, fully corrected: base frame at its end, in the order of Sweep::points.
+  [[nodiscard]] std::span<const SurfacePoint> scan() const { return last_scan_; }
+
+  /// From the next sweep on.
+  void set_flat_ground(FlatGround mode) { flat_ground_ = FlatGroundAssumption(mode); }
+
  private:
   /// E of the paper's II-B.1: the motion since the last processed sweep, before a look at the points.
   struct Prior {

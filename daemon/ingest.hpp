@@ -36,6 +36,7 @@ class Ingest {
   void take(const Datagram& datagram);
   void take(const ImuInput& imu) { take_motion(imu); }
   void take(const OdometryInput& odometry) { take_motion(odometry); }
+  void take(const OutsideVerdict& verdict) { sweeps_.sources().set_outside_verdict(verdict.source, verdict.healthy); }
   void take(const Silence& silence) { sweeps_.advance(silence.now); }
   void take(const EndOfInput&) { sweeps_.finish(); }
 

@@ -19,6 +19,12 @@ struct OdometryInput {
   OdometrySample sample;
 };
 
+/// Somebody outside says whether this motion source is healthy (its health_topic).
+struct OutsideVerdict {
+  std::size_t source;
+  bool healthy;
+};
+
 /// Nothing has come in until `now`, in stamps of arrival.
 struct Silence {
   Stamp now;
@@ -28,7 +34,7 @@ struct Silence {
 struct EndOfInput {};
 
 /// All that can reach the ingest.
-using Input = std::variant<Silence, Datagram, ImuInput, OdometryInput, EndOfInput>;
+using Input = std::variant<Silence, Datagram, ImuInput, OdometryInput, OutsideVerdict, EndOfInput>;
 
 /// Where input comes from: sockets and DDS readers in the daemon, a recording in a replay. One owner.
 class InputSource {

@@ -20,15 +20,15 @@ constexpr Duration kMaxSleep = std::chrono::milliseconds{100};
 
 } // namespace
 
-LivePipeline::LivePipeline(const Config& config, LidarRouter lidars, InputSource& input, double speed)
-    : input_(input), speed_(speed), max_points_(Ingest::max_points(config)),
+LivePipeline::LivePipeline(const Config& config, LidarRouter lidars, InputSource& input, LiveOptions options)
+    : input_(input), options_(std::move(options)), max_points_(Ingest::max_points(config)),
       ingest_(
           config, std::move(lidars), [this](Sweep& sweep, const SweepCut& cut) { hand_over(sweep, cut); },
           [this](const HealthEvent& event) {
             if (!health_events_.push(event))
               unfetched_.fetch_add(1, std::memory_order_relaxed);
           }),
-      processor_(config.odometry), ingest_thread_([this] { run_ingest(); }),
+      processor_(config.odometry), flat_ground_(config.odometry.flat_ground), ingest_thread_([this] { run_ingest(); }),
       odometry_thread_([this] { run_odometry(); }) {
   pthread_setname_np(ingest_thread_.native_handle(), "ingest");
   pthread_setname_np(odometry_thread_.native_handle(), "odometry");
@@ -43,14 +43,41 @@ void LivePipeline::stop() {
 }
 
 void LivePipeline::run_ingest() {
+  options_.on_thread_start();
   bool more = true;
   while (more && !stopping_.load(std::memory_order_relaxed)) {
+    ingest_progress_.fetch_add(1, std::memory_order_relaxed);
     const Input input = input_.next(kMaxSilence);
     ingest_.take(input);
+    carry_forward(input);
+    report();
     more = !std::holds_alternative<EndOfInput>(input);
   }
   ingest_ended_.store(true, std::memory_order_release);
   sweep_is_there_.notify();
+}
+
+void LivePipeline::carry_forward(const Input& input) {
+  while (const std::optional<FastSample> anchor = anchors_.pop())
+    fast_odometry_.take(*anchor);
+  std::optional<FastSample> sample;
+  if (const auto* imu = std::get_if<ImuInput>(&input))
+    sample = fast_odometry_.carry(ingest_.sources(), imu->source, imu->sample.arrival);
+  else if (const auto* odometry = std::get_if<OdometryInput>(&input))
+    sample = fast_odometry_.carry(ingest_.sources(), odometry->source, odometry->sample.arrival);
+  if (!sample)
+    return;
+  static_cast<void>(fast_samples_.push(*sample)); // who does not fetch them has no use for them
+  estimate_is_there_.notify();
+}
+
+void LivePipeline::report() {
+  const Duration now = read_clock(CLOCK_MONOTONIC_COARSE);
+  if (now - reported_ < kMaxSleep)
+    return;
+  reported_ = now;
+  reports_.back().read(ingest_);
+  static_cast<void>(reports_.publish());
 }
 
 /// Leaves memory behind in exchange for that of the sweep.
@@ -70,7 +97,12 @@ void LivePipeline::hand_over(Sweep& sweep, const SweepCut& cut) {
 }
 
 void LivePipeline::run_odometry() {
+  options_.on_thread_start();
+  FlatGround flat_ground = flat_ground_.load(std::memory_order_relaxed);
   for (bool last_look = false; !last_look;) {
+    odometry_progress_.fetch_add(1, std::memory_order_relaxed);
+    if (const FlatGround wanted = flat_ground_.load(std::memory_order_relaxed); wanted != flat_ground)
+      processor_.set_flat_ground(flat_ground = wanted);
     last_look = ingest_ended_.load(std::memory_order_acquire);
     if (const CutSweep* taken = newest_sweep_.take())
       process(*taken);
@@ -82,7 +114,7 @@ void LivePipeline::run_odometry() {
 }
 
 void LivePipeline::process(const CutSweep& taken) {
-  const Duration period = from_seconds(to_seconds(taken.sweep.end - taken.sweep.start) / speed_);
+  const Duration period = from_seconds(to_seconds(taken.sweep.end - taken.sweep.start) / options_.speed);
   const Duration deadline = taken.cut.began.wall + period;
   const ProcessedSweep done = processor_.process(taken.sweep, taken.cut, [this, deadline] {
     return stopping_.load(std::memory_order_relaxed) || read_clock(CLOCK_MONOTONIC) > deadline;
@@ -90,9 +122,14 @@ void LivePipeline::process(const CutSweep& taken) {
   (done.estimate.failed ? failed_ : processed_).fetch_add(1, std::memory_order_relaxed);
   // Never full: one goes in for each sweep handed over, and the ingest empties the ring when it hands over the next.
   static_cast<void>(feedback_.push(processor_.odometry().feedback()));
+  const OdometryEstimate& estimate = done.estimate;
+  static_cast<void>(anchors_.push({estimate.stamp, estimate.T_odom_base, estimate.pose_covariance, estimate.twist_base,
+                                   estimate.twist_covariance})); // never full: emptied with every input
   if (!estimates_.push(done))
     unfetched_.fetch_add(1, std::memory_order_relaxed);
   estimate_is_there_.notify();
+  if (options_.after_estimate)
+    options_.after_estimate(taken.sweep, processor_.odometry(), estimate);
 }
 
 std::optional<ProcessedSweep> LivePipeline::next(Duration timeout) {

@@ -4,12 +4,15 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <thread>
 
 #include "config/config.hpp"
 #include "core/sweep.hpp"
+#include "daemon/fast_odometry.hpp"
 #include "daemon/ingest.hpp"
+#include "daemon/ingest_report.hpp"
 #include "daemon/input.hpp"
 #include "daemon/latest_slot.hpp"
 #include "daemon/spsc_ring.hpp"
@@ -18,6 +21,14 @@
 #include "daemon/wakeup.hpp"
 
 namespace locus::daemon {
+
+/// How the live threads are set up, beside their configuration.
+struct LiveOptions {
+  double speed = 1.0; ///< by how much the stamps of the input run faster than the clock on the wall; 1 if it is live
+  std::function<void()> on_thread_start = [] {}; ///< in each of the threads, e.g. to set its priority
+  /// In the odometry thread, after the estimate has left: for clouds, maps and what is to be saved.
+  std::function<void(const Sweep&, const Odometry&, const OdometryEstimate&)> after_estimate{};
+};
 
 /// The live threads: ingest turns inputs into sweeps, odometry turns the newest sweep into an estimate.
 ///
@@ -33,14 +44,20 @@ class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it kee
   static constexpr std::size_t kMaxUnfetched = 64;
 
   /// Starts both threads. `lidars` opened from config.lidars; `input` must outlive this, and is used by the ingest
-  /// thread alone. `speed`: by how much its stamps run faster than the clock on the wall; 1 but for a PacedInput.
-  LivePipeline(const Config& config, LidarRouter lidars, InputSource& input, double speed = 1.0);
+  /// thread alone.
+  LivePipeline(const Config& config, LidarRouter lidars, InputSource& input, LiveOptions options = {});
   ~LivePipeline() { stop(); }
   LivePipeline(const LivePipeline&) = delete;
   LivePipeline& operator=(const LivePipeline&) = delete;
 
-  /// Consumer: the next estimate, or nothing if there is none within `timeout`.
+  /// Consumer: the next estimate; nothing if there is none within `timeout`, or a fast sample sooner.
   std::optional<ProcessedSweep> next(Duration timeout);
+
+  /// Consumer: the next estimate carried forward; call it as long as there is one.
+  std::optional<FastSample> next_fast() { return fast_samples_.pop(); }
+
+  /// Consumer: what the ingest has counted, ten times a second; nullptr when nothing new is there.
+  const IngestReport* next_report() { return reports_.take(); }
 
   /// Consumer: the next change of health of a motion source.
   std::optional<HealthEvent> next_health_event() { return health_events_.pop(); }
@@ -51,6 +68,18 @@ class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it kee
   /// Owner: ends both threads, within an iteration of the registration and one wait for input. What has been seen is
   /// accounted for afterwards. May be called again.
   void stop();
+
+  /// Any thread: from the next sweep on.
+  void set_flat_ground(FlatGround mode) { flat_ground_.store(mode, std::memory_order_relaxed); }
+
+  /// Any thread. Each number grows as long as its thread lives, whether or not sensors do.
+  struct Progress {
+    std::uint64_t ingest, odometry;
+    bool operator==(const Progress&) const = default;
+  };
+  [[nodiscard]] Progress progress() const {
+    return {ingest_progress_.load(std::memory_order_relaxed), odometry_progress_.load(std::memory_order_relaxed)};
+  }
 
   /// Any thread.
   [[nodiscard]] SweepCounters counters() const;
@@ -70,11 +99,13 @@ class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it kee
 
   void run_ingest();
   void run_odometry();
+  void carry_forward(const Input& input);
+  void report();
   void hand_over(Sweep& sweep, const SweepCut& cut);
   void process(const CutSweep& taken);
 
   InputSource& input_;
-  double speed_;
+  LiveOptions options_;
   std::size_t max_points_;
   Ingest ingest_;
   SweepProcessor processor_;
@@ -84,11 +115,18 @@ class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it kee
   SpscRing<ProcessedSweep, kMaxUnfetched> estimates_;
   SpscRing<HealthEvent, kMaxUnfetched> health_events_; ///< ingest -> consumer
   SpscRing<RegistrationFeedback, 4> feedback_;         ///< odometry -> ingest
+  SpscRing<FastSample, 4> anchors_;                    ///< odometry -> ingest: what is carried forward
+  FastOdometry fast_odometry_;                         ///< of ingest
+  SpscRing<FastSample, kMaxUnfetched> fast_samples_;   ///< ingest -> consumer
+  LatestSlot<IngestReport> reports_;                   ///< ingest -> consumer
+  Duration reported_{};                                ///< of ingest
   Wakeup estimate_is_there_;
 
   Counter seen_{0}, dropped_{0};     ///< by ingest
   Counter processed_{0}, failed_{0}; ///< by odometry
   Counter unfetched_{0};             ///< by both
+  Counter ingest_progress_{0}, odometry_progress_{0};
+  std::atomic<FlatGround> flat_ground_;
   std::atomic<bool> stopping_{false};
   std::atomic<bool> ingest_ended_{false};
   std::atomic<bool> odometry_ended_{false};

@@ -53,6 +53,8 @@ class SweepProcessor {
     return done;
   }
 
+  void set_flat_ground(FlatGround mode) { odometry_.set_flat_ground(mode); }
+
   [[nodiscard]] const Odometry& odometry() const { return odometry_; }
   [[nodiscard]] const StageStopwatch& stages() const { return stages_; }
 

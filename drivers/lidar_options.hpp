@@ -25,6 +25,8 @@ struct LidarOptions {
   std::uint16_t port = 2368;            ///< UDP port that its data packets are sent to
   std::optional<std::uint32_t>
       source_ip; ///< of the sender, host byte order; nothing (key: any): whoever sends to the port
+  std::optional<std::uint32_t>
+      multicast_ip; ///< group that it sends to, host byte order; nothing (key: none): it sends to this host or to all
   LidarTime time = LidarTime::automatic;
   std::string calibration; ///< file of per-laser corrections; empty: the model's built-in table
   Pose T_base_lidar;

@@ -24,7 +24,8 @@ std::string because(const char* what, std::uint16_t port) {
   const char* const advice = error == EADDRINUSE ? "; another program listens there, end it or change the port"
                              : error == EACCES   ? "; ports below 1024 are for root, change the port"
                                                  : "";
-  return fmt::format("UDP port {}: {}: {}{}", port, what, std::strerror(error), advice); // NOLINT(concurrency-mt-unsafe)
+  return fmt::format("UDP port {}: {}: {}{}", port, what, std::strerror(error),
+                     advice); // NOLINT(concurrency-mt-unsafe)
 }
 
 bool set(int descriptor, int level, int option, int value) {
@@ -101,15 +102,12 @@ std::optional<std::string> UdpSocket::prepare() {
     set(descriptor_, SOL_SOCKET, SO_RCVBUF, kWantedBufferBytes);
   size = sizeof(buffer_bytes_);
   getsockopt(descriptor_, SOL_SOCKET, SO_RCVBUF, &buffer_bytes_, &size);
-  set(descriptor_, IPPROTO_IP, IP_MULTICAST_ALL, 0); // of groups, those alone that were joined here
   if (!set(descriptor_, SOL_SOCKET, SO_TIMESTAMPNS, 1) || !set(descriptor_, SOL_SOCKET, SO_RXQ_OVFL, 1))
     return because("no stamps of arrival", port_);
   return std::nullopt;
 }
 
-bool UdpSocket::join(std::uint32_t group_host_order) {
-  if (!IN_MULTICAST(group_host_order))
-    return true;
+bool UdpSocket::join(std::uint32_t group_host_order) const {
   ifaddrs* interfaces = nullptr;
   if (getifaddrs(&interfaces) != 0)
     return false;

@@ -35,9 +35,9 @@ class UdpSocket {
   UdpSocket(UdpSocket&& other) noexcept;
   UdpSocket& operator=(UdpSocket&&) = delete;
 
-  /// Joins a multicast group on every interface that has multicast, now or again after one has come up. Whether any
-  /// does.
-  bool join(std::uint32_t group_host_order);
+  /// Joins a multicast group on every interface that has multicast, to be repeated as interfaces come up. Whether any
+  /// has. Any thread.
+  bool join(std::uint32_t group_host_order) const; // NOLINT(modernize-use-nodiscard)
 
   /// What has come, at most kBatch, in order; valid until the next call. Does not wait.
   std::span<const Datagram> receive();

@@ -18,12 +18,6 @@
 
 namespace locus::daemon {
 
-/// Somebody outside says whether a motion source is healthy (its health_topic).
-struct OutsideVerdict {
-  std::size_t source;
-  bool healthy;
-};
-
 /// Somebody outside says whether the ground is flat (flat_ground_topic).
 struct FlatGroundWord {
   bool flat;

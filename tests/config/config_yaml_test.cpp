@@ -17,7 +17,7 @@ namespace {
 /// Every key with another value than it has in kBase.
 const std::string kAllChanged = R"(
 lidars:
-  - {name: top, model: HDL-32E, port: 2400, source_ip: 192.168.1.201, time: sensor, calibration: "a, b}: #\n", T_base_lidar: {xyz_m: [0.1, -2e-07, 3], rpy_deg: [1, 30, -179.5]}}
+  - {name: top, model: HDL-32E, port: 2400, source_ip: 192.168.1.201, multicast_ip: 239.1.2.3, time: sensor, calibration: "a, b}: #\n", T_base_lidar: {xyz_m: [0.1, -2e-07, 3], rpy_deg: [1, 30, -179.5]}}
 motion_sources:
   - {name: vio, kind: odometry, topic: /vio, health_topic: /vio/health, T_base_source: {xyz_m: [0, 0, 0], rpy_deg: [0, 0, 0]}}
   - {name: gyro, kind: imu, topic: /gyro, health_topic: /gyro_2, T_base_source: {xyz_m: [0.3333333333333333, 1, 2], rpy_deg: [90, 0, 45]}}
@@ -174,6 +174,7 @@ TEST(ConfigYaml, EveryKindOfBadValueIsRefusedWithItsKeyAndReason) {
       {"lidars.front.name=total", "is taken"},
       {"lidars.front.model=VLP-17", "must be VLP-16 | Puck-Hi-Res | VLP-32C | HDL-32E | VLS-128, or auto"},
       {"lidars.front.source_ip=192.168.1.256", "must be an address"},
+      {"lidars.front.multicast_ip=192.168.1.201", "must be within 224.0.0.0"},
       {"lidars.front.time=gps", "must be auto | sensor | receive"},
       {"lidars.front.calibration=[a]", "must be text"},
       {"lidars.front.T_base_lidar.rpy_deg=[0, .inf, 0]", "must be a list of 3 finite numbers"},

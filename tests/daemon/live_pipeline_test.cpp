@@ -90,7 +90,7 @@ TEST(LivePipeline, GivesTheBitsOfOneThreadWhenNothingIsDropped) {
   const Config config = Drive::config();
   const std::vector<ProcessedSweep> expected = process_in_one_thread(config);
   PatientInput input;
-  LivePipeline pipeline(config, open_lidars(config), input, kNoHurry);
+  LivePipeline pipeline(config, open_lidars(config), input, {.speed = kNoHurry});
   input.wait_for(pipeline);
   const std::vector<ProcessedSweep> fetched = fetch_all(pipeline);
   pipeline.stop();
@@ -120,7 +120,7 @@ TEST(LivePipeline, OverloadDropsSweepsAndNeverMakesEstimatesOlder) {
   const Duration registration = median_wall(alone.begin(), alone.end());
   DriveInput drive;
   PacedInput input(drive, 3.0 * to_seconds(milliseconds{100}) / to_seconds(registration));
-  LivePipeline pipeline(config, open_lidars(config), input, kNoHurry);
+  LivePipeline pipeline(config, open_lidars(config), input, {.speed = kNoHurry});
   const std::vector<ProcessedSweep> fetched = fetch_all(pipeline);
   pipeline.stop();
 
@@ -148,7 +148,7 @@ TEST(LivePipeline, RegistrationEndsAnIterationAfterItsDeadline) {
   constexpr double kImpossible = 1e9; // every deadline has passed before the registration begins
   PatientInput input;
   const Config config = Drive::config();
-  LivePipeline pipeline(config, open_lidars(config), input, kImpossible);
+  LivePipeline pipeline(config, open_lidars(config), input, {.speed = kImpossible});
   input.wait_for(pipeline);
   const std::vector<ProcessedSweep> fetched = fetch_all(pipeline);
   ASSERT_FALSE(fetched.empty());
@@ -159,7 +159,7 @@ TEST(LivePipeline, RegistrationEndsAnIterationAfterItsDeadline) {
 TEST(LivePipeline, ConsumerThatFetchesNothingLosesEstimatesAndDelaysNobody) {
   const Config config = Drive::config();
   PatientInput input;
-  LivePipeline pipeline(config, open_lidars(config), input, kNoHurry);
+  LivePipeline pipeline(config, open_lidars(config), input, {.speed = kNoHurry});
   input.wait_for(pipeline);
   const Duration give_up = read_clock(CLOCK_MONOTONIC) + seconds{60};
   while (pipeline.counters().seen < Drive::kSweeps - 1 && read_clock(CLOCK_MONOTONIC) < give_up)
@@ -187,7 +187,7 @@ TEST(LivePipeline, StopsWithinASecondInMidDriveAndAccountsForWhatItHasSeen) {
   DriveInput drive;
   PacedInput input(drive, 4.0);
   const Config config = Drive::config();
-  LivePipeline pipeline(config, open_lidars(config), input, 4.0);
+  LivePipeline pipeline(config, open_lidars(config), input, {.speed = 4.0});
   while (!pipeline.next(milliseconds{100})) {
   }
   EXPECT_LT(time_to_stop(pipeline), seconds{1});
@@ -203,7 +203,7 @@ TEST(LivePipeline, AllocatesNothingOnceWarm) {
   const Config config = Drive::config();
   PatientInput input;
   Drive::instance();
-  LivePipeline pipeline(config, open_lidars(config), input, kNoHurry);
+  LivePipeline pipeline(config, open_lidars(config), input, {.speed = kNoHurry});
   input.wait_for(pipeline);
   std::optional<std::uint64_t> before;
   std::optional<std::uint64_t> after;

@@ -7,6 +7,7 @@
 
 #include "core/motion_sources.hpp"
 #include "drivers/velodyne_model.hpp"
+#include "locus_replay/failure.hpp"
 
 namespace locus::tools {
 
@@ -27,6 +28,19 @@ MotionSamples<Sample> with_faults(std::vector<Sample> samples, const PlayOptions
 using daemon::EndOfInput;
 using daemon::Input;
 using daemon::Silence;
+
+void check_faults(const std::vector<Fault>& faults, const Config& config) {
+  std::vector<FaultTarget> targets;
+  for (const LidarOptions& lidar : config.lidars)
+    targets.push_back({lidar.name, FaultTarget::Kind::lidar});
+  for (const MotionSourceOptions& source : config.odometry.motion_sources)
+    targets.push_back(
+        {source.name, source.kind == SourceKind::imu ? FaultTarget::Kind::imu : FaultTarget::Kind::odometry});
+  for (const Fault& fault : faults) {
+    if (const auto problem = fault_problem(fault, targets))
+      throw Failure(ExitStatus::wrong_usage, *problem);
+  }
+}
 
 Recording::Recording(Capture capture, std::vector<MotionRecording> motion, const Config& config, LidarRouter lidars,
                      const PlayOptions& options)

@@ -26,6 +26,9 @@ struct PlayOptions {
   std::uint64_t seed = 1;           ///< of the faults
 };
 
+/// Throws Failure for a fault that none of the sensors can have.
+void check_faults(const std::vector<Fault>& faults, const Config& config);
+
 /// The datagrams that went to one UDP port.
 struct PortTraffic {
   std::uint64_t datagrams = 0;

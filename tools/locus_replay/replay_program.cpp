@@ -59,19 +59,6 @@ Config configuration(const std::filesystem::path& file, const std::vector<std::s
   return config;
 }
 
-void check_faults(const std::vector<Fault>& faults, const Config& config) {
-  std::vector<FaultTarget> targets;
-  for (const LidarOptions& lidar : config.lidars)
-    targets.push_back({lidar.name, FaultTarget::Kind::lidar});
-  for (const MotionSourceOptions& source : config.odometry.motion_sources)
-    targets.push_back(
-        {source.name, source.kind == SourceKind::imu ? FaultTarget::Kind::imu : FaultTarget::Kind::odometry});
-  for (const Fault& fault : faults) {
-    if (const auto problem = fault_problem(fault, targets))
-      throw Failure(ExitStatus::wrong_usage, *problem);
-  }
-}
-
 /// As fast as the machine can; the same bits on every run.
 void replay(const Config& config, LidarRouter lidars, Recording& recording, Results& results, const SweepStage& stage) {
   daemon::SweepCounters counters;
@@ -100,7 +87,7 @@ void replay(const Config& config, LidarRouter lidars, Recording& recording, Resu
 void replay_live(const Config& config, LidarRouter lidars, Recording& recording, double speed, Results& results) {
   constexpr Duration kPatience = std::chrono::milliseconds{100};
   daemon::PacedInput paced(recording, speed);
-  daemon::LivePipeline pipeline(config, std::move(lidars), paced, speed);
+  daemon::LivePipeline pipeline(config, std::move(lidars), paced, {.speed = speed});
   const auto take_events = [&] {
     while (const auto event = pipeline.next_health_event())
       results.take(*event);

@@ -2,8 +2,6 @@
 #include "locus_replay/run_figures.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <fstream>
 #include <numeric>
 #include <string_view>
 
@@ -17,24 +15,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr std::array<std::string_view, kStages> kStageNames{"decode",       "correct",        "filter", "covariance",
-                                                            "scan_to_scan", "scan_to_submap", "map"};
-
-/// Four digits behind the point: no figure here is known better.
-double rounded(double value) { return std::round(value * 1e4) / 1e4; }
-
-ordered_json to_json(const PacketCounters& counters) {
-  ordered_json rejected;
-  for (std::size_t i = 0; i < kPacketErrorCount; ++i)
-    rejected[std::string{kPacketErrorNames[i]}] = counters.rejected[i];
-  return {{"received", counters.received}, {"data", counters.data},           {"position", counters.position},
-          {"lost", counters.lost},         {"reordered", counters.reordered}, {"clock_steps", counters.clock_steps},
-          {"rejected", rejected}};
-}
-
-ordered_json to_json(const RunFigures::Percentiles& p) {
-  return {{"p50", rounded(p.p50)}, {"p90", rounded(p.p90)}, {"p99", rounded(p.p99)}, {"max", rounded(p.max)}};
-}
+using daemon::rounded;
+using daemon::to_json;
 
 ordered_json packets(const LidarRouter& lidars) {
   ordered_json packets{{"total", to_json(lidars.total())}};
@@ -44,31 +26,17 @@ ordered_json packets(const LidarRouter& lidars) {
 }
 
 ordered_json stages(const FinishedRun& run) {
-  const double sweeps = std::max<double>(1.0, static_cast<double>(run.figures.sweeps()));
-  ordered_json stages;
-  for (std::size_t i = 0; i < kStages; ++i) {
-    const auto stage = static_cast<Stage>(i);
-    const Duration total = run.ingest.stages().total(stage) + run.processor.stages().total(stage);
-    stages[std::string{kStageNames[i]}] = rounded(1e3 * to_seconds(total) / sweeps);
-  }
-  return stages;
+  daemon::StageTimes totals;
+  for (std::size_t i = 0; i < kStages; ++i)
+    totals[i] = run.ingest.stages().total(static_cast<Stage>(i)) + run.processor.stages().total(static_cast<Stage>(i));
+  return daemon::stages_json(totals, run.figures.sweeps());
 }
 
 ordered_json sources(const FinishedRun& run) {
-  constexpr std::size_t kAlwaysTold = 7; ///< reasons; the others are rare, and told where they occur
   ordered_json sources = ordered_json::object();
-  for (std::size_t i = 0; i < run.config.odometry.motion_sources.size(); ++i) {
-    const SourceCounters& counters = run.ingest.sources().counters(i);
-    ordered_json rejected;
-    for (std::size_t reason = 0; reason < kHealthReasonCount; ++reason) {
-      if (reason < kAlwaysTold || counters.rejected[reason] > 0)
-        rejected[std::string{kHealthReasonNames[reason]}] = counters.rejected[reason];
-    }
-    sources[run.config.odometry.motion_sources[i].name] = {{"received", counters.received},
-                                                           {"used_sweeps", run.figures.used_sweeps(i)},
-                                                           {"rejected", rejected},
-                                                           {"health_changes", counters.health_changes}};
-  }
+  for (std::size_t i = 0; i < run.config.odometry.motion_sources.size(); ++i)
+    sources[run.config.odometry.motion_sources[i].name] =
+        to_json(run.ingest.sources().counters(i), run.figures.used_sweeps(i));
   return sources;
 }
 
@@ -126,16 +94,6 @@ std::string readable(const Accuracy& accuracy, std::size_t estimates) {
   return text;
 }
 
-/// Not from getrusage(): its figure survives exec, so it may be that of the program that started this one.
-double peak_rss_mb() {
-  std::ifstream status{"/proc/self/status"};
-  for (std::string word; status >> word;) {
-    if (double kib = 0; word == "VmHWM:" && status >> kib)
-      return kib * 1024.0 / 1e6;
-  }
-  return 0.0;
-}
-
 } // namespace
 
 void RunFigures::take(const daemon::ProcessedSweep& sweep) {
@@ -164,7 +122,7 @@ RunFigures::Means RunFigures::means() const {
           sums_.scan_to_submap_iterations / count};
 }
 
-RunFigures::Percentiles RunFigures::percentiles(std::span<const float> values) {
+daemon::Percentiles RunFigures::percentiles(std::span<const float> values) {
   const Quantiles quantiles({values.begin(), values.end()});
   return {quantiles.at(0.5), quantiles.at(0.9), quantiles.at(0.99), quantiles.at(1.0)};
 }
@@ -180,13 +138,9 @@ ordered_json summary(const FinishedRun& run) {
       {"duration_s", rounded(to_seconds(run.duration))},
       {"wall_s", rounded(to_seconds(run.spent.wall))},
       {"cpu_s", rounded(to_seconds(run.spent.cpu))},
-      {"peak_rss_mb", rounded(peak_rss_mb())},
+      {"peak_rss_mb", rounded(daemon::peak_rss_mb())},
       {"packets", packets(run.ingest.lidars())},
-      {"sweeps",
-       {{"seen", run.sweeps.seen},
-        {"processed", run.sweeps.processed},
-        {"dropped", run.sweeps.dropped},
-        {"failed", run.sweeps.failed}}},
+      {"sweeps", to_json(run.sweeps)},
       {"process_ms", to_json(run.figures.process_ms())},
       {"process_cpu_ms", to_json(run.figures.process_cpu_ms())},
       {"stage_ms", stages(run)},
@@ -202,7 +156,7 @@ ordered_json summary(const FinishedRun& run) {
 std::string readable(const FinishedRun& run) {
   const PacketCounters packets = run.ingest.lidars().total();
   const auto rejected = std::accumulate(packets.rejected.begin(), packets.rejected.end(), std::uint64_t{0});
-  const RunFigures::Percentiles wall_ms = run.figures.process_ms();
+  const daemon::Percentiles wall_ms = run.figures.process_ms();
   const Eigen::Vector3d& end_m = run.figures.last_T_odom_base().translation;
   std::string text = fmt::format("recording  {:.1f} s; packets: {} data, {} position, {} lost, {} rejected\n",
                                  to_seconds(run.duration), packets.data, packets.position, packets.lost, rejected);
@@ -216,7 +170,7 @@ std::string readable(const FinishedRun& run) {
   text += fmt::format("path       {:.2f} m, ends at {:.3f} {:.3f} {:.3f} m\n", run.figures.path_m(), end_m.x(),
                       end_m.y(), end_m.z());
   text += fmt::format("time       {:.2f} ms a sweep from its cut, 99 % within {:.2f} ms; {:.1f} s in all, {:.0f} MB\n",
-                      wall_ms.p50, wall_ms.p99, to_seconds(run.spent.wall), peak_rss_mb());
+                      wall_ms.p50, wall_ms.p99, to_seconds(run.spent.wall), daemon::peak_rss_mb());
   return text + readable(run.accuracy, run.figures.sweeps());
 }
 

@@ -13,6 +13,7 @@
 #include "accuracy/map_accuracy.hpp"
 #include "accuracy/trajectory_accuracy.hpp"
 #include "config/config.hpp"
+#include "daemon/figures_json.hpp"
 #include "daemon/ingest.hpp"
 #include "daemon/sweep_processor.hpp"
 
@@ -24,9 +25,6 @@ class RunFigures {
   struct Means {
     double raw_points = 0, filtered_points = 0, scan_to_scan_iterations = 0, scan_to_submap_iterations = 0;
   };
-  struct Percentiles {
-    double p50 = 0, p90 = 0, p99 = 0, max = 0;
-  };
 
   explicit RunFigures(std::size_t sources) : used_sweeps_(sources) {}
 
@@ -34,8 +32,8 @@ class RunFigures {
   void take(const HealthEvent& event) { health_events_.push_back(event); }
 
   [[nodiscard]] std::size_t sweeps() const { return wall_ms_.size(); }
-  [[nodiscard]] Percentiles process_ms() const { return percentiles(wall_ms_); }
-  [[nodiscard]] Percentiles process_cpu_ms() const { return percentiles(cpu_ms_); }
+  [[nodiscard]] daemon::Percentiles process_ms() const { return percentiles(wall_ms_); }
+  [[nodiscard]] daemon::Percentiles process_cpu_ms() const { return percentiles(cpu_ms_); }
   [[nodiscard]] Means means() const;
   /// Sweeps whose prior came from this source, all of it or in part.
   [[nodiscard]] std::uint64_t used_sweeps(std::size_t source) const { return used_sweeps_[source]; }
@@ -46,7 +44,7 @@ class RunFigures {
   [[nodiscard]] const Pose& last_T_odom_base() const { return last_T_odom_base_; }
 
  private:
-  static Percentiles percentiles(std::span<const float> values);
+  static daemon::Percentiles percentiles(std::span<const float> values);
 
   std::vector<float> wall_ms_, cpu_ms_;
   std::vector<std::uint64_t> used_sweeps_;

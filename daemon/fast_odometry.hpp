@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <optional>
+
+#include "core/motion_sources.hpp"
+#include "core/odometry_estimate.hpp"
+
+namespace locus::daemon {
+
+/// Where the base is between two estimates, or after the last one.
+struct FastSample {
+  Stamp stamp;
+  Pose T_odom_base;
+  Matrix6 pose_covariance = Matrix6::Zero(); ///< frames as in OdometryEstimate
+  Vector6 twist_base = Vector6::Zero();
+  Matrix6 twist_covariance = Matrix6::Zero();
+};
+
+/// Carries the last estimate forward with each sample of the source that gives the rotation, the quickest of those
+/// chosen. Goes on without lidar: dead reckoning gives estimates, too. One owner, the ingest thread.
+class FastOdometry {
+ public:
+  void take(const FastSample& estimate) { estimate_ = estimate; }
+
+  /// After a sample of `source`; nothing for other sources, and while none is healthy or nothing has been estimated.
+  [[nodiscard]] std::optional<FastSample> carry(const MotionSources& sources, std::size_t source, Stamp arrival) const;
+
+ private:
+  std::optional<FastSample> estimate_;
+};
+
+} // namespace locus::daemon

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "config/config.hpp"
+#include "core/source_health.hpp"
+#include "daemon/stage_stopwatch.hpp"
+#include "daemon/sweep_processor.hpp"
+#include "drivers/packet_counters.hpp"
+
+/// Figures by the names that summary.json of locus-replay and the status of locusd have in common.
+namespace locus::daemon {
+
+/// Of a distribution.
+struct Percentiles {
+  double p50 = 0, p90 = 0, p99 = 0, max = 0;
+};
+
+/// Four digits behind the point: no figure here is known better.
+double rounded(double value);
+
+nlohmann::ordered_json to_json(const PacketCounters& counters);
+nlohmann::ordered_json to_json(const SweepCounters& counters);
+nlohmann::ordered_json to_json(const Percentiles& percentiles);
+/// `used_sweeps`: those whose prior came from the source, all of it or in part.
+nlohmann::ordered_json to_json(const SourceCounters& counters, std::uint64_t used_sweeps);
+/// Milliseconds, in the mean over `sweeps`.
+nlohmann::ordered_json stages_json(const StageTimes& totals, std::uint64_t sweeps);
+
+/// Of this process since it began, in megabytes.
+double peak_rss_mb();
+
+} // namespace locus::daemon

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/ingest_report.hpp"
+
+namespace locus::daemon {
+
+void IngestReport::read(const Ingest& ingest) {
+  total = ingest.lidars().total();
+  for (std::size_t i = 0; i < ingest.lidars().lidars().size(); ++i) {
+    const LidarInput& lidar = ingest.lidars().lidars()[i];
+    const velodyne::Decoder& decoder = lidar.decoder();
+    lidars[i] = {lidar.counters(),      decoder.model(),
+                 decoder.return_mode(), decoder.model() ? decoder.rotation_rate_rpm() : 0.0,
+                 lidar.source_ip(),     lidar.position() ? lidar.position()->pps : velodyne::PpsState::absent};
+  }
+  for (std::size_t i = 0; i < ingest.sources().size(); ++i)
+    sources[i] = {ingest.sources().counters(i), ingest.sources().healthy(i), ingest.sources().verdict(i)};
+  sweeps = ingest.sweeps().counters();
+}
+
+} // namespace locus::daemon

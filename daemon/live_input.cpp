@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/live_input.hpp"
+
+#include <algorithm>
+#include <ctime>
+#include <utility>
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include "daemon/machine_time.hpp"
+
+namespace locus::daemon {
+
+namespace {
+
+/// A verdict has no time of its own: it counts at once.
+Stamp arrival_of(const LiveInput::Motion& motion) {
+  if (const auto* imu = std::get_if<ImuInput>(&motion))
+    return imu->sample.arrival;
+  if (const auto* odometry = std::get_if<OdometryInput>(&motion))
+    return odometry->sample.arrival;
+  return Stamp::min();
+}
+
+} // namespace
+
+LiveInput::LiveInput(std::vector<UdpSocket> sockets)
+    : sockets_(std::move(sockets)), waiting_(sockets_.size()),
+      motion_is_there_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+  for (const UdpSocket& socket : sockets_)
+    poll_.push_back({socket.descriptor(), POLLIN, 0});
+  poll_.push_back({motion_is_there_, POLLIN, 0});
+}
+
+LiveInput::~LiveInput() { close(motion_is_there_); }
+
+void LiveInput::push(const Motion& motion) noexcept {
+  if (!motion_.push(motion))
+    motion_drops_.fetch_add(1, std::memory_order_relaxed);
+  eventfd_write(motion_is_there_, 1);
+}
+
+Input LiveInput::next(Duration timeout) {
+  if (auto input = take_earliest())
+    return *input;
+  const Stamp asked{read_clock(CLOCK_REALTIME)}; // before the look: what comes after it is not older
+  const timespec wait = to_timespec(timeout);
+  ppoll(poll_.data(), poll_.size(), &wait, nullptr);
+  receive();
+  if (auto input = take_earliest())
+    return *input;
+  return Silence{asked};
+}
+
+void LiveInput::receive() {
+  std::uint64_t drops = 0;
+  for (std::size_t i = 0; i < sockets_.size(); ++i) {
+    if (poll_[i].revents != 0)
+      waiting_[i] = sockets_[i].receive();
+    drops += sockets_[i].kernel_drops();
+  }
+  kernel_drops_.store(drops, std::memory_order_relaxed);
+  if (poll_.back().revents != 0) {
+    eventfd_t notifications = 0;
+    eventfd_read(motion_is_there_, &notifications);
+  }
+}
+
+std::optional<Input> LiveInput::take_earliest() {
+  if (!next_motion_)
+    next_motion_ = motion_.pop();
+  Stamp earliest = next_motion_ ? arrival_of(*next_motion_) : Stamp::max();
+  std::span<const Datagram>* from = nullptr;
+  for (auto& waiting : waiting_) {
+    if (waiting.empty() || waiting.front().receive_stamp >= earliest)
+      continue;
+    earliest = waiting.front().receive_stamp;
+    from = &waiting;
+  }
+  if (from != nullptr) {
+    const Datagram& datagram = from->front();
+    *from = from->subspan(1);
+    return datagram;
+  }
+  if (!next_motion_)
+    return std::nullopt;
+  Input input = std::visit([](const auto& motion) { return Input{motion}; }, *next_motion_);
+  next_motion_.reset();
+  return input;
+}
+
+} // namespace locus::daemon

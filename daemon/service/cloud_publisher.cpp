@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/service/cloud_publisher.hpp"
+
+#include <algorithm>
+
+#include <pthread.h>
+
+namespace locus::daemon {
+
+namespace {
+
+constexpr Duration kMapPeriod = std::chrono::seconds{5};
+
+void sweep_points(const Sweep& sweep, const Odometry& odometry, std::vector<CloudMessage::Point>& out) {
+  out.clear();
+  const std::size_t count = std::min(sweep.points.size(), odometry.scan().size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector3f& p = odometry.scan()[i].position_m;
+    const SweepPoint& point = sweep.points[i];
+    out.push_back({p.x(), p.y(), p.z(), point.intensity, -point.age_s,
+                   static_cast<std::uint16_t>(point.scan_line % 256),
+                   static_cast<std::uint16_t>(point.scan_line / 256)});
+  }
+}
+
+/// The coarse surfaces: some ten thousand of a map that fills its memory.
+void map_points(const SurfaceGrid& grid, std::vector<CloudMessage::Point>& out) {
+  out.clear();
+  for (std::size_t slot = 0; slot < grid.size(); ++slot) {
+    if (!grid.surface(slot).planar())
+      continue;
+    const Eigen::Vector3f p = grid.centre(slot).cast<float>() + grid.surface(slot).mean_m;
+    out.push_back({p.x(), p.y(), p.z(), 0, 0, 0, 0});
+  }
+}
+
+} // namespace
+
+CloudPublisher::CloudPublisher(const DdsOptions& options, RosLink& link) : options_(options), link_(link) {
+  if (!options_.publish_cloud && !options_.publish_map)
+    return;
+  thread_ = std::thread([this] { run(); });
+  pthread_setname_np(thread_.native_handle(), "clouds");
+}
+
+CloudPublisher::~CloudPublisher() {
+  stopping_.store(true, std::memory_order_relaxed);
+  wakeup_.notify();
+  if (thread_.joinable())
+    thread_.join();
+}
+
+void CloudPublisher::take(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
+  if (options_.publish_cloud) {
+    sweep_points(sweep, odometry, sweep_.back().points);
+    sweep_.back().stamp = estimate.stamp;
+    static_cast<void>(sweep_.publish());
+  }
+  if (options_.publish_map && estimate.stamp - map_published_ > kMapPeriod) {
+    map_points(odometry.map().coarse(), map_.back().points);
+    map_.back().stamp = map_published_ = estimate.stamp;
+    static_cast<void>(map_.publish());
+  }
+  if (thread_.joinable())
+    wakeup_.notify();
+}
+
+void CloudPublisher::run() {
+  while (!stopping_.load(std::memory_order_relaxed)) {
+    if (const Cloud* sweep = sweep_.take())
+      link_.publish_cloud(sweep->points, sweep->stamp);
+    if (const Cloud* map = map_.take())
+      link_.publish_map(map->points, map->stamp);
+    wakeup_.wait_for(std::chrono::milliseconds{100});
+  }
+}
+
+} // namespace locus::daemon

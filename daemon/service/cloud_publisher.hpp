@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "config/config.hpp"
+#include "core/odometry.hpp"
+#include "daemon/dds/ros_link.hpp"
+#include "daemon/latest_slot.hpp"
+#include "daemon/wakeup.hpp"
+
+namespace locus::daemon {
+
+/// Publishes the sweeps and the map from a thread of its own, so that they never delay the odometry: while one is on
+/// its way the next waits, and the one after replaces it.
+class CloudPublisher {
+ public:
+  /// `link` must outlive this. Idle where the configuration asks for neither.
+  CloudPublisher(const DdsOptions& options, RosLink& link);
+  ~CloudPublisher();
+  CloudPublisher(const CloudPublisher&) = delete;
+  CloudPublisher& operator=(const CloudPublisher&) = delete;
+
+  /// Producer, one thread: what is worth publishing of a sweep that was processed.
+  void take(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate);
+
+ private:
+  struct Cloud {
+    std::vector<CloudMessage::Point> points;
+    Stamp stamp;
+  };
+
+  void run();
+
+  DdsOptions options_;
+  RosLink& link_;
+  LatestSlot<Cloud> sweep_, map_;
+  Stamp map_published_; ///< of the producer
+  Wakeup wakeup_;
+  std::atomic<bool> stopping_{false};
+  std::thread thread_;
+};
+
+} // namespace locus::daemon

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/service/live_figures.hpp"
+
+#include <algorithm>
+#include <vector>
+
+namespace locus::daemon {
+
+void LiveFigures::take(const ProcessedSweep& sweep, bool published) {
+  const std::scoped_lock lock(mutex_);
+  const OdometryEstimate& estimate = sweep.estimate;
+  const Duration now = read_clock(CLOCK_MONOTONIC);
+  window_[sums_.estimates % kWindow] = {now, static_cast<float>(1e3 * to_seconds(sweep.took.wall)),
+                                        static_cast<float>(1e3 * to_seconds(sweep.took.cpu))};
+  ++sums_.estimates;
+  sums_.last = estimate;
+  sums_.last_at = now;
+  for (std::size_t i = 0; i < kStages; ++i)
+    sums_.stages[i] += sweep.stages_took[i];
+  sums_.raw_points += static_cast<double>(sweep.raw_returns);
+  sums_.filtered_points += static_cast<double>(estimate.points);
+  sums_.scan_to_scan_iterations += estimate.scan_to_scan.iterations;
+  sums_.scan_to_submap_iterations += estimate.scan_to_submap.iterations;
+  const PriorSource& prior = estimate.prior;
+  if (prior.rotation >= 0)
+    ++sums_.used_sweeps[static_cast<std::size_t>(prior.rotation)];
+  if (prior.translation >= 0 && prior.translation != prior.rotation)
+    ++sums_.used_sweeps[static_cast<std::size_t>(prior.translation)];
+  sums_.unpublished += published ? 0 : 1;
+}
+
+void LiveFigures::take(const IngestReport& report) {
+  const std::scoped_lock lock(mutex_);
+  sums_.ingest = report;
+}
+
+LiveFigures::Snapshot LiveFigures::snapshot() const {
+  const std::scoped_lock lock(mutex_);
+  Snapshot snapshot = sums_;
+  snapshot.process_ms = percentiles(&Timing::wall_ms);
+  snapshot.process_cpu_ms = percentiles(&Timing::cpu_ms);
+  snapshot.rate_hz = rate_hz();
+  return snapshot;
+}
+
+Percentiles LiveFigures::percentiles(float Timing::*figure) const {
+  std::vector<float> values;
+  for (std::size_t i = 0; i < std::min<std::size_t>(sums_.estimates, kWindow); ++i)
+    values.push_back(window_[i].*figure);
+  if (values.empty())
+    return {};
+  std::ranges::sort(values);
+  const auto at = [&](double share) {
+    return static_cast<double>(values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5)]);
+  };
+  return {at(0.5), at(0.9), at(0.99), at(1.0)};
+}
+
+/// Of the estimates younger than a few seconds: one that has stopped has a rate of zero.
+double LiveFigures::rate_hz() const {
+  constexpr Duration kSpan = std::chrono::seconds{5};
+  const Duration now = read_clock(CLOCK_MONOTONIC);
+  const std::size_t known = std::min<std::size_t>(sums_.estimates, kWindow);
+  std::size_t young = 0;
+  Duration oldest = now;
+  for (; young < known; ++young) {
+    const Timing& timing = window_[(sums_.estimates - 1 - young) % kWindow];
+    if (now - timing.at > kSpan)
+      break;
+    oldest = timing.at;
+  }
+  const double elapsed_s = to_seconds(now - oldest);
+  return young > 1 && elapsed_s > 0 ? static_cast<double>(young - 1) / elapsed_s : 0.0;
+}
+
+} // namespace locus::daemon

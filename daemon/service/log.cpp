@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/service/log.hpp"
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <vector>
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <sys/uio.h>
+#include <unistd.h>
+
+#define SD_JOURNAL_SUPPRESS_LOCATION // the caller's is meant
+#include <systemd/sd-journal.h>
+
+#include "daemon/machine_time.hpp"
+
+namespace locus::daemon {
+
+namespace {
+
+/// systemd names the stream that it has connected; whoever redirects stderr wants text.
+bool stderr_is_journal() {
+  const char* const stream = std::getenv("JOURNAL_STREAM"); // NOLINT(concurrency-mt-unsafe): at start-up
+  struct stat status {};
+  return stream != nullptr && fstat(STDERR_FILENO, &status) == 0 &&
+         fmt::format("{}:{}", status.st_dev, status.st_ino) == stream;
+}
+
+} // namespace
+
+Log::Log() : to_journal_(stderr_is_journal()) {}
+
+void Log::say(Severity severity, const std::string& message, Fields fields, const std::source_location& where) {
+  std::uint64_t silenced = 0;
+  if (!may_speak(where, silenced))
+    return;
+  if (silenced > 0)
+    write(severity, fmt::format("{} ({} more like it were left out)", message, silenced), fields, where);
+  else
+    write(severity, message, fields, where);
+}
+
+bool Log::may_speak(const std::source_location& where, std::uint64_t& silenced_before) {
+  const std::scoped_lock lock(mutex_);
+  const Duration now = read_clock(CLOCK_MONOTONIC);
+  Site& site = sites_[{where.file_name(), where.line()}];
+  if (site.said == 0 || now - site.since > kInterval) {
+    silenced_before = site.silenced;
+    site = {now, 0, 0};
+  }
+  if (site.said == kBurst) {
+    ++site.silenced;
+    return false;
+  }
+  ++site.said;
+  return true;
+}
+
+void Log::write(Severity severity, const std::string& message, Fields fields, const std::source_location& where) const {
+  if (!to_journal_) {
+    static constexpr std::array<std::string_view, 7> kWords{"", "", "", "error: ", "warning: ", "", ""};
+    fmt::print(stderr, "locusd: {}{}\n", kWords[static_cast<std::size_t>(severity)], message);
+    return;
+  }
+  std::vector<std::string> lines{
+      fmt::format("MESSAGE={}", message), fmt::format("PRIORITY={}", static_cast<int>(severity)),
+      fmt::format("CODE_FILE={}", where.file_name()), fmt::format("CODE_LINE={}", where.line()),
+      fmt::format("CODE_FUNC={}", where.function_name())};
+  for (const auto& [name, value] : fields)
+    lines.push_back(fmt::format("{}={}", name, value));
+  std::vector<iovec> vectors;
+  for (std::string& line : lines)
+    vectors.push_back({line.data(), line.size()});
+  sd_journal_sendv(vectors.data(), static_cast<int>(vectors.size()));
+}
+
+} // namespace locus::daemon

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// locusd: lidar packets and motion samples in, odometry out, until it is told to stop.
+#include <cstdio>
+#include <exception>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "config/config_yaml.hpp"
+#include "daemon/service/log.hpp"
+#include "daemon/service/service.hpp"
+
+namespace {
+
+constexpr int kDone = 0, kFailed = 1, kWrongUsage = 2;
+
+struct Arguments {
+  std::string config;
+  bool check_config = false;
+  bool print_config = false;
+};
+
+void describe(CLI::App& app, Arguments& arguments) {
+  app.add_option("-c,--config", arguments.config, "Configuration file; without one every key has its default")
+      ->type_name("FILE");
+  app.add_flag("--check-config", arguments.check_config, "Only says what is wrong with the configuration");
+  app.add_flag("--print-config", arguments.print_config, "Only prints the configuration in force, every key");
+  app.set_version_flag("--version", "locusd " LOCUS_VERSION);
+  app.footer("Signals: SIGHUP reloads the configuration, SIGTERM stops.\n"
+             "Exit status: 0 stopped as told, 1 failed while running, 2 wrong usage or configuration.\n"
+             "Example:\n"
+             "  locusd --config /etc/locusd/locusd.yaml");
+}
+
+int run(const Arguments& arguments) {
+  const auto config = locus::daemon::read_config(arguments.config);
+  if (!config) {
+    for (const std::string& error : config.error())
+      fmt::print(stderr, "locusd: {}\n", error);
+    return kWrongUsage;
+  }
+  if (arguments.print_config)
+    fmt::print("{}", locus::print_config(*config));
+  if (arguments.print_config || arguments.check_config)
+    return kDone;
+  locus::daemon::Log log;
+  locus::daemon::Service service(arguments.config, log);
+  return service.run(*config);
+}
+
+} // namespace
+
+int main(int argc, char** argv) {
+  Arguments arguments;
+  CLI::App app{"Real-time lidar odometry as a service.", "locusd"};
+  describe(app, arguments);
+  try {
+    app.parse(argc, argv);
+    return run(arguments);
+  } catch (const CLI::Success& asked_for_text) {
+    return app.exit(asked_for_text);
+  } catch (const CLI::ParseError& error) {
+    fmt::print(stderr, "locusd: {}; see locusd --help\n", error.what());
+    return kWrongUsage;
+  } catch (const std::exception& error) { // out of memory or threads
+    fmt::print(stderr, "locusd: {}\n", error.what());
+    return kFailed;
+  }
+}

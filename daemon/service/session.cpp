@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/service/session.hpp"
+
+#include <array>
+#include <string_view>
+#include <utility>
+#include <variant>
+
+#include <fmt/format.h>
+#include <pthread.h>
+
+#include "daemon/machine_time.hpp"
+#include "daemon/service/lidar_sockets.hpp"
+#include "daemon/service/realtime.hpp"
+
+namespace locus::daemon {
+
+namespace {
+
+constexpr std::array<std::string_view, 4> kStateNames{"tracking", "degenerate", "dead_reckoning", "standstill"};
+
+OdometryReport report_of(const OdometryEstimate& e) {
+  return {e.stamp, e.T_odom_base, e.pose_covariance, e.twist_base, e.twist_covariance};
+}
+
+OdometryReport report_of(const FastSample& s) {
+  return {s.stamp, s.T_odom_base, s.pose_covariance, s.twist_base, s.twist_covariance};
+}
+
+} // namespace
+
+std::string_view to_string(TrackingState state) { return kStateNames[static_cast<std::size_t>(state)]; }
+
+Expected<std::unique_ptr<Session>, std::string> Session::start(const Config& config, std::span<const int> inherited,
+                                                               Log& log) {
+  auto lidars = LidarRouter::open(config.lidars);
+  if (!lidars)
+    return lidars.error();
+  auto sockets = open_lidar_sockets(config, inherited, log);
+  if (!sockets)
+    return sockets.error();
+  return std::unique_ptr<Session>(new Session(config, std::move(*lidars), std::move(*sockets), log));
+}
+
+Session::Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket> sockets, Log& log)
+    : config_(config), log_(log), started_(read_clock(CLOCK_MONOTONIC)), input_(std::move(sockets)),
+      flat_ground_(config.odometry.flat_ground), link_(config, [this](const RosInput& input) { receive(input); }),
+      clouds_(config.dds, link_) {
+  LiveOptions options;
+  options.on_thread_start = [this] {
+    if (const auto problem = raise_priority(config_.realtime.priority))
+      log_.warn(*problem);
+  };
+  options.after_estimate = [this](const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
+    clouds_.take(sweep, odometry, estimate);
+  };
+  pipeline_ = std::make_unique<LivePipeline>(config_, std::move(lidars), input_, std::move(options));
+  running_.store(pipeline_.get(), std::memory_order_release);
+  publisher_ = std::thread([this] { publish(); });
+  pthread_setname_np(publisher_.native_handle(), "publisher");
+}
+
+Session::~Session() {
+  running_.store(nullptr, std::memory_order_release);
+  stopping_.store(true, std::memory_order_relaxed);
+  publisher_.join();
+  pipeline_->stop();
+}
+
+void Session::receive(const RosInput& input) {
+  if (const auto* word = std::get_if<FlatGroundWord>(&input))
+    take(*word);
+  else if (const auto* imu = std::get_if<ImuInput>(&input))
+    input_.push(*imu);
+  else if (const auto* odometry = std::get_if<OdometryInput>(&input))
+    input_.push(*odometry);
+  else
+    input_.push(std::get<OutsideVerdict>(input));
+}
+
+/// At most one change a second: a topic that flutters does not flutter the odometry.
+void Session::take(FlatGroundWord word) {
+  constexpr Duration kLeastPause = std::chrono::seconds{1};
+  const FlatGround wanted = word.flat ? FlatGround::on : FlatGround::off;
+  const Duration now = read_clock(CLOCK_MONOTONIC);
+  if (wanted == flat_ground() || now - flat_ground_changed_ < kLeastPause)
+    return;
+  flat_ground_changed_ = now;
+  set_flat_ground(wanted);
+  log_.info(fmt::format("flat ground is {}, as {} says", word.flat ? "on" : "off", config_.dds.flat_ground_topic));
+}
+
+void Session::set_flat_ground(FlatGround mode) {
+  flat_ground_.store(mode, std::memory_order_relaxed);
+  if (LivePipeline* const running = running_.load(std::memory_order_acquire))
+    running->set_flat_ground(mode);
+}
+
+void Session::publish() {
+  while (!stopping_.load(std::memory_order_relaxed)) {
+    publisher_progress_.fetch_add(1, std::memory_order_relaxed);
+    if (const auto done = pipeline_->next(std::chrono::milliseconds{50})) {
+      const bool published = link_.publish(report_of(done->estimate), done->estimate.state);
+      figures_.take(*done, published);
+      tell(*done);
+    }
+    while (const auto sample = pipeline_->next_fast())
+      link_.publish_fast(report_of(*sample));
+    while (const auto event = pipeline_->next_health_event())
+      tell(*event);
+    if (const IngestReport* report = pipeline_->next_report())
+      figures_.take(*report);
+  }
+}
+
+void Session::tell(const ProcessedSweep& done) {
+  const TrackingState state = done.estimate.state;
+  if (told_state_ == state)
+    return;
+  told_state_ = state;
+  const std::string name{to_string(state)};
+  if (state == TrackingState::dead_reckoning)
+    log_.warn("dead reckoning: no sweep can be registered; look whether the lidars send (locusctl status)",
+              {{"LOCUS_STATE", name}});
+  else if (state == TrackingState::degenerate)
+    log_.warn("degenerate: the lidars do not see along every axis here, motion sources carry the others",
+              {{"LOCUS_STATE", name}});
+  else
+    log_.info(name, {{"LOCUS_STATE", name}});
+}
+
+void Session::tell(const HealthEvent& event) {
+  const std::string& name = config_.odometry.motion_sources[event.source].name;
+  if (event.healthy)
+    log_.info(fmt::format("motion source {} is back", name), {{"LOCUS_SOURCE", name}});
+  else
+    log_.warn(fmt::format("motion source {} is lost ({}); the next best one is used", name, to_string(event.reason)),
+              {{"LOCUS_SOURCE", name}, {"LOCUS_REASON", std::string{to_string(event.reason)}}});
+}
+
+Duration Session::age() const { return read_clock(CLOCK_MONOTONIC) - started_; }
+
+Session::Progress Session::progress() const {
+  return {pipeline_->progress(), publisher_progress_.load(std::memory_order_relaxed), link_.progress()};
+}
+
+} // namespace locus::daemon

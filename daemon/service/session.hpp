@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <thread>
+
+#include "config/config.hpp"
+#include "core/expected.hpp"
+#include "daemon/dds/ros_link.hpp"
+#include "daemon/live_input.hpp"
+#include "daemon/live_pipeline.hpp"
+#include "daemon/service/cloud_publisher.hpp"
+#include "daemon/service/live_figures.hpp"
+#include "daemon/service/log.hpp"
+
+namespace locus::daemon {
+
+/// As summaries and logs spell it.
+std::string_view to_string(TrackingState state);
+
+/// The service as one configuration makes it: sockets, DDS, the live threads, the publisher. A reload ends one and
+/// begins another.
+class Session {
+ public:
+  /// Opens what there is and starts all threads. Fails with one line for the user.
+  static Expected<std::unique_ptr<Session>, std::string> start(const Config& config, std::span<const int> inherited,
+                                                               Log& log);
+  ~Session();
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  [[nodiscard]] const Config& config() const { return config_; }
+  [[nodiscard]] const LiveFigures& figures() const { return figures_; }
+  [[nodiscard]] const LiveInput& input() const { return input_; }
+  [[nodiscard]] RosLink& link() { return link_; }
+  [[nodiscard]] LivePipeline& pipeline() { return *pipeline_; }
+  [[nodiscard]] Duration age() const;
+
+  /// A thread has done nothing since the last call if its number is the same.
+  struct Progress {
+    LivePipeline::Progress live;
+    std::uint64_t publisher, dds;
+  };
+  [[nodiscard]] Progress progress() const;
+
+  void set_flat_ground(FlatGround mode);
+  [[nodiscard]] FlatGround flat_ground() const { return flat_ground_.load(std::memory_order_relaxed); }
+
+ private:
+  Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket> sockets, Log& log);
+  void receive(const RosInput& input);
+  void take(FlatGroundWord word);
+  void publish();
+  void tell(const ProcessedSweep& done);
+  void tell(const HealthEvent& event);
+
+  Config config_;
+  Log& log_;
+  Duration started_;
+  LiveFigures figures_;
+  LiveInput input_;
+  std::atomic<FlatGround> flat_ground_;
+  Duration flat_ground_changed_{}; ///< of the thread of the link
+  std::unique_ptr<LivePipeline> pipeline_;
+  std::atomic<LivePipeline*> running_{nullptr}; ///< the same once it exists, for the thread of the link
+  RosLink link_;
+  CloudPublisher clouds_;
+  std::optional<TrackingState> told_state_;
+  std::atomic<std::uint64_t> publisher_progress_{0};
+  std::atomic<bool> stopping_{false};
+  std::thread publisher_;
+};
+
+} // namespace locus::daemon

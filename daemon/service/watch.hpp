@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "daemon/service/log.hpp"
+#include "daemon/service/session.hpp"
+
+namespace locus::daemon {
+
+/// Looks after a session a few times a second and tells what its owner should know: sensors that are not heard, a
+/// network that is not there, packets that the kernel threw away. Tells each once per turn for the worse or the better.
+/// One owner.
+class Watch {
+ public:
+  /// Silence of a sensor that should have spoken by then.
+  static constexpr Duration kPatience = std::chrono::seconds{5};
+
+  Watch(Session& session, Log& log) : session_(session), log_(log) {}
+
+  void look();
+
+ private:
+  void look_at_link(const RosLink::Status& link);
+  void look_at_sources(const RosLink::Status& link);
+  void look_at_lidars();
+  void look_at_drops();
+
+  Session& session_;
+  Log& log_;
+  bool was_connected_ = false;
+  std::uint64_t told_attempts_ = 0;
+  std::set<std::string> unheard_; ///< lidars and sources that were told of
+  std::uint64_t kernel_drops_ = 0;
+  Duration joined_{};
+};
+
+/// Tells a hung thread from a quiet one: fed to systemd's watchdog only while all threads go on. One owner.
+class Watchdog {
+ public:
+  /// Nothing to do unless systemd asks for it (WatchdogSec=).
+  Watchdog();
+  void look(const Session& session);
+
+ private:
+  Duration period_{}; ///< zero: nobody asks
+  Duration fed_{};
+  std::optional<Session::Progress> last_;
+};
+
+} // namespace locus::daemon

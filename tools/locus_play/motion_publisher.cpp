@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_play/motion_publisher.hpp"
+
+#include "daemon/dds/ros_messages.hpp"
+#include "locus_replay/failure.hpp"
+
+namespace locus::tools {
+
+using daemon::DdsWriter;
+using daemon::TopicQos;
+namespace ros = daemon::ros;
+
+MotionPublisher::MotionPublisher(const Config& config)
+    : node_(value_or_fail(daemon::DdsNode::open(config.dds), ExitStatus::failed)), frame_odom_(config.dds.frame_odom),
+      frame_base_(config.dds.frame_base) {
+  for (std::size_t i = 0; i < config.source_topics.size(); ++i) {
+    const std::string& topic = topics_.emplace_back(config.source_topics[i].topic);
+    if (topic.empty())
+      continue;
+    if (config.odometry.motion_sources[i].kind == SourceKind::imu)
+      imus_.emplace(i, DdsWriter<ros::Imu>(node_, topic, TopicQos::sensor_out()));
+    else
+      odometries_.emplace(i, DdsWriter<ros::Odometry>(node_, topic, TopicQos::standard()));
+  }
+}
+
+void MotionPublisher::publish(const daemon::ImuInput& input, Duration shift) {
+  const auto writer = imus_.find(input.source);
+  if (writer == imus_.end())
+    return;
+  const Eigen::Vector3d& w = input.sample.angular_velocity_radps;
+  const Eigen::Vector3d& f = input.sample.specific_force_mps2;
+  ros::Imu message{};
+  message.header_ = {daemon::to_ros(input.sample.stamp + shift), frame_base_.data()};
+  if (const auto& q = input.sample.attitude)
+    message.orientation_ = {q->x(), q->y(), q->z(), q->w()};
+  else
+    message.orientation_covariance_[0] = -1; // REP 145: it has none
+  message.angular_velocity_ = {w.x(), w.y(), w.z()};
+  message.linear_acceleration_ = {f.x(), f.y(), f.z()};
+  writer->second.write(message);
+}
+
+void MotionPublisher::publish(const daemon::OdometryInput& input, Duration shift) {
+  constexpr double kUsualVariance = 1e-4;
+  const auto writer = odometries_.find(input.source);
+  if (writer == odometries_.end())
+    return;
+  daemon::OdometryReport report{.stamp = input.sample.stamp + shift, .T_odom_base = input.sample.T_source_base};
+  report.twist_covariance.diagonal().setConstant(kUsualVariance * input.sample.covariance_scale);
+  const daemon::FrameNames frames{frame_odom_, frame_base_};
+  writer->second.write(daemon::to_ros(report, frames));
+}
+
+std::vector<std::string> MotionPublisher::unheard() const {
+  std::vector<std::string> topics;
+  for (const auto& [source, writer] : imus_)
+    if (!writer.has_readers())
+      topics.push_back(topics_[source]);
+  for (const auto& [source, writer] : odometries_)
+    if (!writer.has_readers())
+      topics.push_back(topics_[source]);
+  return topics;
+}
+
+} // namespace locus::tools
