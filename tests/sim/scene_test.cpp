@@ -62,6 +62,18 @@ TEST(Scene, CylinderEndsAtItsHeight) {
   EXPECT_DOUBLE_EQ(scene.distance_to_surface({5, 0, 1}), 1);
 }
 
+TEST(Scene, SurfacesAboutOnePointAreAllKept) {
+  std::vector<Surface> shells;
+  for (int i = 1; i <= 40; ++i)
+    shells.push_back({Sphere{{0, 0, 0}, 1.0 * i}, static_cast<std::uint8_t>(i)});
+  const Scene scene(shells);
+  for (int i = 1; i <= 40; ++i) {
+    const auto hit = scene.cast({{0, 0, i - 0.5}, {0, 0, 1}}, 100);
+    ASSERT_TRUE(hit);
+    EXPECT_EQ(hit->reflectivity, i);
+  }
+}
+
 /// Two ways to the same answer: the tree of boxes with the formulae of intersection, and marching by distances.
 class ReadyMadeScene : public testing::TestWithParam<std::pair<const char*, Scene>> {};
 

@@ -13,25 +13,27 @@ namespace locus::sim {
 namespace {
 
 constexpr double kNowhere = std::numeric_limits<double>::infinity();
-constexpr double kFar_m = 1e30; // where no ray comes
-constexpr std::size_t kLeafSize = 4;
-constexpr std::uint32_t kBranch = 0xFFFF'FFFF; // in place of the count of a leaf
-constexpr std::size_t kStackSize = 256;        // three more per level
-constexpr float kSlack_m = 1e-3F;              // boxes are larger by this: more than single precision can be wrong by
+constexpr double kFar_m = 1e30;                 // where no ray comes
+constexpr std::uint32_t kSurface = 0x8000'0000; // with the index of a surface, in place of that of a node
+constexpr std::size_t kStackSize = 256;         // three more per level
+constexpr float kSlack_m = 1e-3F;               // boxes are larger by this: more than single precision can be wrong by
 
-struct Waiting { // to be looked into, unless something nearer has been found
-  std::uint32_t first, count;
-  float enter_m;
+/// Children to be looked into, unless something nearer has been found. Two arrays: what is written as two halves and
+/// read as a whole a moment later makes the processor wait.
+struct Waiting {
+  std::array<std::uint32_t, kStackSize> child;
+  std::array<float, kStackSize> enter_m;
 };
 
 Bounds bounds_of(const Surface& surface) {
   return std::visit([](const auto& shape) { return shape.bounds(); }, surface.shape);
 }
 
+const Bounds kOutOfReach{Eigen::Vector3d::Constant(kFar_m), Eigen::Vector3d::Constant(kFar_m)};
+const Bounds kNoBounds{Eigen::Vector3d::Constant(kNowhere), Eigen::Vector3d::Constant(-kNowhere)}; // of nothing yet
+
 Bounds bounds_of(std::span<const Surface> surfaces) {
-  if (surfaces.empty())
-    return {Eigen::Vector3d::Constant(kFar_m), Eigen::Vector3d::Constant(kFar_m)};
-  Bounds all = bounds_of(surfaces.front());
+  Bounds all = surfaces.empty() ? kOutOfReach : kNoBounds;
   for (const Surface& surface : surfaces)
     all = united(all, bounds_of(surface));
   return all;
@@ -79,8 +81,8 @@ class Scene::TreeMaker {
     for (const Surface& surface : surfaces) {
       order_.push_back(static_cast<std::uint32_t>(order_.size()));
       bounds_.push_back(bounds_of(surface));
+      middles_m_.push_back((bounds_.back().min_m + bounds_.back().max_m) / 2);
     }
-    area_behind_m2_.resize(surfaces.size());
   }
 
   void make() {
@@ -93,10 +95,26 @@ class Scene::TreeMaker {
   }
 
  private:
+  struct Bin { // surfaces whose middles lie in one slice of a range
+    Bounds box = kNoBounds;
+    std::size_t count = 0;
+
+    void add(const Bin& other) {
+      box = united(box, other.box);
+      count += other.count;
+    }
+    [[nodiscard]] double cost() const { return count == 0 ? 0 : static_cast<double>(count) * area_m2(box); }
+  };
+  struct Cut { // surfaces with a middle below it go to one side
+    Eigen::Index axis = 0;
+    double at_m = 0, cost = kNowhere;
+  };
+
   std::uint32_t node_over(std::size_t begin, std::size_t end) {
     const std::size_t middle = split(begin, end);
     const std::array<std::size_t, 5> limits{begin, split(begin, middle), middle, split(middle, end), end};
     Node node;
+    node.child.fill(kSurface); // also of an empty lane, whose box is out of reach
     for (std::size_t lane = 0; lane < 4; ++lane) {
       const std::size_t from = limits[lane], to = limits[lane + 1];
       const Bounds box = bounds_over(from, to);
@@ -105,69 +123,72 @@ class Scene::TreeMaker {
         node.min_m[axis][j] = static_cast<float>(box.min_m[i]) - kSlack_m;
         node.max_m[axis][j] = static_cast<float>(box.max_m[i]) + kSlack_m;
       }
-      const bool is_leaf = to - from <= kLeafSize;
-      node.first[lane] = is_leaf ? static_cast<std::uint32_t>(from) : node_over(from, to);
-      node.count[lane] = is_leaf ? static_cast<std::uint32_t>(to - from) : kBranch;
+      if (from != to)
+        node.child[lane] = to - from == 1 ? kSurface | static_cast<std::uint32_t>(from) : node_over(from, to);
     }
     nodes_.push_back(node);
     return static_cast<std::uint32_t>(nodes_.size() - 1);
   }
 
-  [[nodiscard]] const Bounds& bounds(std::size_t place) const { return bounds_[order_[place]]; }
-
   [[nodiscard]] Bounds bounds_over(std::size_t begin, std::size_t end) const {
-    if (begin == end)
-      return {Eigen::Vector3d::Constant(kFar_m), Eigen::Vector3d::Constant(kFar_m)};
-    Bounds all = bounds(begin);
-    for (std::size_t i = begin + 1; i < end; ++i)
-      all = united(all, bounds(i));
+    Bounds all = begin == end ? kOutOfReach : kNoBounds;
+    for (std::size_t i = begin; i < end; ++i)
+      all = united(all, bounds_[order_[i]]);
     return all;
   }
 
-  /// Puts a range in order along its longest side and finds where to part it: where fewest surfaces are met, the chance
-  /// to meet a box being as its area.
+  /// Parts a range in two where fewest surfaces are met, the chance to meet a box being as its area.
   std::size_t split(std::size_t begin, std::size_t end) {
     if (end - begin < 2)
       return end;
-    const auto middle_of = [](const Bounds& box) -> Eigen::Vector3d { return box.min_m + box.max_m; };
-    Bounds middles{middle_of(bounds(begin)), middle_of(bounds(begin))};
+    Bounds middles = kNoBounds;
     for (std::size_t i = begin; i < end; ++i)
-      middles = united(middles, {middle_of(bounds(i)), middle_of(bounds(i))});
-    Eigen::Index axis = 0;
-    (middles.max_m - middles.min_m).maxCoeff(&axis);
+      middles = united(middles, {middles_m_[order_[i]], middles_m_[order_[i]]});
+    Cut best;
+    for (const Eigen::Index axis : {0, 1, 2}) {
+      const Cut cut = cheapest_cut(begin, end, axis, middles);
+      if (cut.cost < best.cost)
+        best = cut;
+    }
+    if (best.cost == kNowhere) // all about one point
+      return begin + (end - begin) / 2;
     const auto at = [&](std::size_t place) { return order_.begin() + static_cast<std::ptrdiff_t>(place); };
-    std::stable_sort(at(begin), at(end), [&](std::uint32_t a, std::uint32_t b) {
-      return middle_of(bounds_[a])[axis] < middle_of(bounds_[b])[axis];
-    });
-    return cheapest_cut(begin, end);
+    const auto middle = std::stable_partition(at(begin), at(end),
+                                              [&](std::uint32_t i) { return middles_m_[i][best.axis] < best.at_m; });
+    return static_cast<std::size_t>(middle - order_.begin());
   }
 
-  std::size_t cheapest_cut(std::size_t begin, std::size_t end) {
-    Bounds box = bounds(end - 1);
-    for (std::size_t i = end; i-- > begin;) {
-      box = united(box, bounds(i));
-      area_behind_m2_[i] = area_m2(box);
+  [[nodiscard]] Cut cheapest_cut(std::size_t begin, std::size_t end, Eigen::Index axis, const Bounds& middles) const {
+    const double low_m = middles.min_m[axis], slice_m = (middles.max_m[axis] - low_m) / static_cast<double>(kBins);
+    Cut best{.axis = axis};
+    if (!(slice_m > 1e-6))
+      return best;
+    std::array<Bin, kBins> bins;
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto bin = static_cast<std::size_t>((middles_m_[order_[i]][axis] - low_m) / slice_m);
+      bins[std::min(bin, kBins - 1)].add({bounds_[order_[i]], 1});
     }
-    box = bounds(begin);
-    double least = kNowhere;
-    std::size_t best = begin + 1;
-    for (std::size_t i = begin + 1; i < end; ++i) {
-      box = united(box, bounds(i - 1));
-      const double cost =
-          area_m2(box) * static_cast<double>(i - begin) + area_behind_m2_[i] * static_cast<double>(end - i);
-      if (cost < least) {
-        least = cost;
-        best = i;
-      }
+    std::array<double, kBins> cost_behind;
+    Bin behind, before;
+    for (std::size_t i = kBins; i-- > 0;) {
+      behind.add(bins[i]);
+      cost_behind[i] = behind.cost();
+    }
+    for (std::size_t i = 1; i < kBins; ++i) {
+      before.add(bins[i - 1]);
+      if (const double cost = before.cost() + cost_behind[i]; cost < best.cost)
+        best = {axis, low_m + static_cast<double>(i) * slice_m, cost};
     }
     return best;
   }
 
+  static constexpr std::size_t kBins = 16;
+
   std::vector<Surface>& surfaces_;
   std::vector<Node>& nodes_;
   std::vector<std::uint32_t> order_;
-  std::vector<Bounds> bounds_; ///< of the surfaces as they came
-  std::vector<double> area_behind_m2_;
+  std::vector<Bounds> bounds_; ///< of the surfaces as they came, as the next
+  std::vector<Eigen::Vector3d> middles_m_;
 };
 
 Scene::Scene(std::vector<Surface> surfaces, std::vector<Mover> movers)
@@ -181,23 +202,26 @@ void Scene::cast_at_surfaces(const Ray& ray, Met& nearest) const {
   const Eigen::Array3f origin = ray.origin_m.cast<float>();
   const Eigen::Array3f inverse =
       ray.direction.cast<float>().array().unaryExpr([](float d) { return 1.0F / (d == 0.0F ? 1e-30F : d); });
-  std::array<Waiting, kStackSize> waiting;
+  Waiting waiting;
   std::size_t depth = 0;
+  const auto put = [&](std::size_t place, std::uint32_t child, float enter_m) {
+    waiting.child[place] = child;
+    waiting.enter_m[place] = enter_m;
+  };
   if (!nodes_.empty())
-    waiting[depth++] = {static_cast<std::uint32_t>(nodes_.size() - 1), kBranch, 0};
+    put(depth++, static_cast<std::uint32_t>(nodes_.size() - 1), 0);
   while (depth > 0) {
-    const Waiting next = waiting[--depth];
-    if (next.enter_m > static_cast<float>(nearest.range_m))
+    --depth;
+    if (waiting.enter_m[depth] > static_cast<float>(nearest.range_m))
       continue;
-    if (next.count != kBranch) {
-      for (std::uint32_t i = next.first; i < next.first + next.count; ++i) {
-        const double range = range_m(surfaces_[i], ray);
-        if (range < nearest.range_m)
-          nearest = {range, &surfaces_[i], nullptr};
-      }
+    const std::uint32_t next = waiting.child[depth];
+    if ((next & kSurface) != 0) {
+      const Surface& surface = surfaces_[next - kSurface];
+      if (const double range = range_m(surface, ray); range < nearest.range_m)
+        nearest = {range, &surface, nullptr};
       continue;
     }
-    const Node& node = nodes_[next.first];
+    const Node& node = nodes_[next];
     Node::Lanes enter = Node::Lanes::Zero(), leave = Node::Lanes::Constant(static_cast<float>(nearest.range_m));
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto i = static_cast<Eigen::Index>(axis);
@@ -212,9 +236,9 @@ void Scene::cast_at_surfaces(const Ray& ray, Met& nearest) const {
       if (enter[j] > leave[j])
         continue;
       std::size_t place = depth++; // the nearest on top: what it holds often hides the others
-      for (; place > first_child && waiting[place - 1].enter_m < enter[j]; --place)
-        waiting[place] = waiting[place - 1];
-      waiting[place] = {node.first[lane], node.count[lane], enter[j]};
+      for (; place > first_child && waiting.enter_m[place - 1] < enter[j]; --place)
+        put(place, waiting.child[place - 1], waiting.enter_m[place - 1]);
+      put(place, node.child[lane], enter[j]);
     }
   }
 }
@@ -257,24 +281,23 @@ double Scene::distance_to_surface(const Eigen::Vector3d& point, Stamp stamp) con
     for (const Surface& part : mover.parts)
       nearest = std::min(nearest, distance_m(part, point - mover.position_m(stamp)));
   }
-  struct Near { // a node or a leaf, and the squared distance to its box
+  struct Near { // the squared distance to the box of a child
     double squared_m2;
-    std::uint32_t first, count;
+    std::uint32_t child;
   };
   std::vector<Near> waiting;
   if (!nodes_.empty())
-    waiting.push_back({0, static_cast<std::uint32_t>(nodes_.size() - 1), kBranch});
+    waiting.push_back({0, static_cast<std::uint32_t>(nodes_.size() - 1)});
   while (!waiting.empty()) {
     const Near next = waiting.back();
     waiting.pop_back();
     if (next.squared_m2 > nearest * nearest)
       continue;
-    if (next.count != kBranch) {
-      for (std::uint32_t i = next.first; i < next.first + next.count; ++i)
-        nearest = std::min(nearest, distance_m(surfaces_[i], point));
+    if ((next.child & kSurface) != 0) {
+      nearest = std::min(nearest, distance_m(surfaces_[next.child - kSurface], point));
       continue;
     }
-    const Node& node = nodes_[next.first];
+    const Node& node = nodes_[next.child];
     for (std::size_t lane = 0; lane < 4; ++lane) {
       Bounds box;
       for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -282,7 +305,7 @@ double Scene::distance_to_surface(const Eigen::Vector3d& point, Stamp stamp) con
         box.min_m[i] = static_cast<double>(node.min_m[axis][j]);
         box.max_m[i] = static_cast<double>(node.max_m[axis][j]);
       }
-      waiting.push_back({squared_distance(box, point), node.first[lane], node.count[lane]});
+      waiting.push_back({squared_distance(box, point), node.child[lane]});
     }
     std::sort(waiting.end() - 4, waiting.end(), // the nearest is looked at first and rules the others out
               [](const Near& a, const Near& b) { return a.squared_m2 > b.squared_m2; });

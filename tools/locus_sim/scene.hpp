@@ -53,8 +53,7 @@ class Scene {
   struct Node {
     using Lanes = Eigen::Array4f;
     std::array<Lanes, 3> min_m, max_m;  ///< of x, y and z
-    std::array<std::uint32_t, 4> first; ///< leaf: its first surface; branch: its node
-    std::array<std::uint32_t, 4> count; ///< surfaces of a leaf; kBranch for a branch
+    std::array<std::uint32_t, 4> child; ///< a node, or a surface, which is marked
   };
   class TreeMaker;
   struct Met {
@@ -66,7 +65,7 @@ class Scene {
   void cast_at_surfaces(const Ray& ray, Met& nearest) const;
   void cast_at_movers(const Ray& ray, Stamp stamp, Met& nearest) const;
 
-  std::vector<Surface> surfaces_; ///< in the order of the leaves
+  std::vector<Surface> surfaces_; ///< in the order of the tree
   std::vector<Node> nodes_;       ///< the last one is the root
   std::vector<Mover> movers_;
   std::vector<Bounds> mover_bounds_;

@@ -63,7 +63,7 @@ struct SyntheticLidar::Mount {
 SyntheticLidar::SyntheticLidar(const Scene& scene, const Trajectory& trajectory, const SyntheticLidarOptions& options,
                                SeenSpace* seen)
     : scene_(scene), trajectory_(trajectory), options_(options), spec_(velodyne::spec(options.model)),
-      layout_(velodyne::packet_layout(options.model, options.return_mode)), random_(options.seed), seen_(seen),
+      layout_(velodyne::packet_layout(options.model, options.return_mode)), dice_(options.seed), seen_(seen),
       packet_begin_(trajectory.start()), data_packets_until_position_(kDataPacketsPerPosition) {
   const double rotor_rate_radps = options.rpm / 60 * kTurn_rad;
   for (const velodyne::Firing& firing : spec_.firings()) {
@@ -99,7 +99,7 @@ Datagram SyntheticLidar::datagram(std::span<const std::byte> payload, std::uint1
 /// Packets wait for each other: none overtakes.
 Stamp SyntheticLidar::arrival() {
   const Duration delay = options_.latency > Duration::zero()
-                             ? from_seconds(-to_seconds(options_.latency) * std::log1p(-uniform_(random_)))
+                             ? from_seconds(-to_seconds(options_.latency) * std::log1p(-dice_.uniform()))
                              : Duration::zero();
   last_arrival_ = std::max(last_arrival_, packet_begin_ + delay);
   return last_arrival_;
@@ -152,7 +152,7 @@ SyntheticLidar::Echoes SyntheticLidar::fire(const Mount& mount, Aim& aim) {
   const auto center = look(mount, aim, 0);
   aim.met = center ? center->surface : nullptr;
   const Echo center_echo = measure(center);
-  if (options_.dust > 0 && uniform_(random_) < options_.dust) {
+  if (options_.dust > 0 && dice_.uniform() < options_.dust) {
     const Echo grain = measure_dust();
     if (center_echo.ticks == 0 || grain.ticks < center_echo.ticks)
       return {center_echo.ticks == 0 ? grain : center_echo, grain};
@@ -182,7 +182,7 @@ std::optional<Hit> SyntheticLidar::look(const Mount& mount, const Aim& aim, doub
 }
 
 SyntheticLidar::Echo SyntheticLidar::measure(const std::optional<Hit>& hit) {
-  if (!hit || (options_.dropout > 0 && uniform_(random_) < options_.dropout))
+  if (!hit || (options_.dropout > 0 && dice_.uniform() < options_.dropout))
     return {};
   double noise_m = options_.range_noise_m, brightness = hit->reflectivity;
   if (options_.fades) {
@@ -191,9 +191,9 @@ SyntheticLidar::Echo SyntheticLidar::measure(const std::optional<Hit>& hit) {
     if (is_lost(strength))
       return {};
     noise_m *= 1 + 1 / strength;
-    brightness *= 0.5 * (1 + hit->cos_incidence) * (0.9 + 0.2 * uniform_(random_)); // not quite calibrated away
+    brightness *= 0.5 * (1 + hit->cos_incidence) * (0.9 + 0.2 * dice_.uniform()); // not quite calibrated away
   }
-  const double range_m = noise_m > 0 ? hit->range_m + noise_m * normal_(random_) : hit->range_m;
+  const double range_m = noise_m > 0 ? hit->range_m + noise_m * dice_.normal() : hit->range_m;
   const double ticks = std::round(range_m / spec_.calibration.distance_resolution_m);
   if (range_m < options_.min_range_m || ticks > 65'535)
     return {};
@@ -205,14 +205,14 @@ SyntheticLidar::Echo SyntheticLidar::measure(const std::optional<Hit>& hit) {
 /// Echoes do not end at once: some a little above the threshold are lost, some a little below are not.
 bool SyntheticLidar::is_lost(double strength) {
   constexpr double kNever = 1.4, kAlways = 0.8;
-  return strength < kNever && uniform_(random_) * (kNever - kAlways) > strength - kAlways;
+  return strength < kNever && dice_.uniform() * (kNever - kAlways) > strength - kAlways;
 }
 
 SyntheticLidar::Echo SyntheticLidar::measure_dust() {
   constexpr double kMeanWay_m = 2.5;
-  const double range_m = options_.min_range_m - kMeanWay_m * std::log1p(-uniform_(random_));
+  const double range_m = options_.min_range_m - kMeanWay_m * std::log1p(-dice_.uniform());
   const double ticks = std::min(65'535.0, std::round(range_m / spec_.calibration.distance_resolution_m));
-  return {static_cast<std::uint16_t>(ticks), static_cast<std::uint8_t>(1 + 8 * uniform_(random_))};
+  return {static_cast<std::uint16_t>(ticks), static_cast<std::uint8_t>(1 + 8 * dice_.uniform())};
 }
 
 /// 0 .. 2 pi, clockwise seen from above.

@@ -5,13 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "core/pose.hpp"
 #include "drivers/datagram.hpp"
 #include "drivers/velodyne_model.hpp"
+#include "locus_sim/quick_dice.hpp"
 #include "locus_sim/scene.hpp"
 #include "locus_sim/seen_space.hpp"
 #include "locus_sim/trajectory.hpp"
@@ -95,9 +95,7 @@ class SyntheticLidar {
   const velodyne::ModelSpec& spec_;
   velodyne::PacketLayout layout_;
   std::vector<Aim> aims_; ///< of the firings of a column
-  std::mt19937_64 random_;
-  std::normal_distribution<double> normal_;
-  std::uniform_real_distribution<double> uniform_;
+  QuickDice dice_;
 
   SeenSpace* seen_;
   Stamp packet_begin_; ///< first firing of the data packet to come

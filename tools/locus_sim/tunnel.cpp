@@ -50,6 +50,8 @@ Jet ground_m(const Jet& x, const Jet& y) {
          0.1 * sin(kTurn / 17 * x + kTurn / 23 * y);
 }
 
+double square(double x) { return x * x; }
+
 /// Above zero in the air of the drifts: beneath an arch that was blasted, not built, over a trodden floor.
 class Drifts {
  public:
@@ -64,8 +66,8 @@ class Drifts {
       return -1;
     const double up_m = point.z() - ground_m(point.x(), point.y()).value;
     const double rough_m = 0.28 * rock_(point / 2.7) + 0.14 * rock_(point / 1.1);
-    const double arch =
-        std::pow(std::pow(aside_m_ / kHalfWidth_m, 4) + std::pow(std::max(0.0, up_m) / kRoof_m, 4), 0.25);
+    const double aside = square(aside_m_ / kHalfWidth_m), up = square(std::max(0.0, up_m) / kRoof_m);
+    const double arch = std::sqrt(std::sqrt(square(aside) + square(up))); // squarer than a circle
     return std::min(up_m - 0.12 * rough_m, kHalfWidth_m * (1 - arch) + rough_m);
   }
 
