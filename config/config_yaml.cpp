@@ -9,9 +9,9 @@
 #include <cctype>
 #include <fstream>
 #include <map>
-#include <numeric>
 
 #include "config/config_fields.hpp"
+#include "config/nearest_word.hpp"
 #include "config/yaml_values.hpp"
 
 namespace locus {
@@ -34,28 +34,8 @@ std::vector<std::string> split(std::string_view text, char separator) {
   return parts;
 }
 
-/// Edits (a letter more, less or other) that make b of a.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1); // row[j]: from the part of a seen so far to the first j letters of b
-  std::iota(row.begin(), row.end(), 0);
-  for (const char c : a) {
-    std::size_t diagonal = row[0]++;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (c == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, row[j] + 1, row[j + 1] + 1});
-    }
-  }
-  return row.back();
-}
-
 std::string unknown_key(std::string_view key, const std::vector<std::string_view>& known) {
-  const auto distance = [&](std::string_view candidate) { // a key cut short is near: voxel means voxel_filter
-    return std::pair{edit_distance(key, candidate.substr(0, key.size())), edit_distance(key, candidate)};
-  };
-  const auto nearest = std::min_element(
-      known.begin(), known.end(), [&](std::string_view a, std::string_view b) { return distance(a) < distance(b); });
-  return fmt::format("unknown key; the nearest known one is '{}'", *nearest);
+  return fmt::format("unknown key; the nearest known one is '{}'", nearest_word(key, known));
 }
 
 struct AnySection;
@@ -301,6 +281,29 @@ std::string error_line(const std::string& where, const std::string& what) {
 
 std::string at_line(const std::string& file, int line) { return file + ':' + std::to_string(line); }
 
+/// What the library says of text that is not YAML, for people who never read the grammar.
+std::string in_plain_words(const std::string& complaint, const std::string& yaml, int line) {
+  static constexpr std::string_view kIndentation = "this line is not indented like the lines it belongs to; give all "
+                                                   "keys of a section, and all items of a list, the same "
+                                                   "number of spaces";
+  static const std::map<std::string_view, std::string_view> kWords{
+      {"end of map not found", kIndentation},
+      {"end of sequence not found", kIndentation},
+      {"illegal map value",
+       "a key cannot stand here; look in this line and the one before for a missing colon or space "
+       "behind it, and for an indentation unlike that of the other keys"},
+      {"end of map flow not found", "a { before this line is not closed; add the missing }"},
+      {"end of sequence flow not found", "a [ before this line is not closed; add the missing ]"},
+      {"unknown token", "no value begins like this; put it in quotes"}};
+  const std::vector<std::string> lines = split(yaml, '\n');
+  const auto index = static_cast<std::size_t>(line - 1);
+  if (index < lines.size() &&
+      lines[index].substr(0, lines[index].find_first_not_of(" \t")).find('\t') != std::string::npos)
+    return "this line is indented by a tab; use spaces";
+  const auto known = kWords.find(complaint);
+  return known == kWords.end() ? "not YAML: " + complaint : std::string{known->second};
+}
+
 } // namespace
 
 Expected<Config, ConfigErrors> parse_config(const std::string& yaml, const std::string& origin) {
@@ -308,13 +311,15 @@ Expected<Config, ConfigErrors> parse_config(const std::string& yaml, const std::
   try {
     documents = YAML::LoadAll(yaml);
   } catch (const YAML::Exception& error) {
-    return ConfigErrors{error_line(at_line(origin, error.mark.line + 1), "not YAML: " + error.msg)};
+    const int line = error.mark.line + 1;
+    return ConfigErrors{error_line(at_line(origin, line), in_plain_words(error.msg, yaml, line))};
   } catch (const std::exception& error) {
     return ConfigErrors{error_line(at_line(origin, 1), std::string{"not YAML: "} + error.what())};
   }
   if (documents.size() > 1)
     return ConfigErrors{
-        error_line(at_line(origin, documents[1].Mark().line + 1), "a second YAML document begins; keep one")};
+        error_line(at_line(origin, documents[1].Mark().line + 1),
+                   "a second YAML document begins; keep one, and begin every top-level key in the first column")};
   Config config;
   if (documents.empty())
     return config;

@@ -263,7 +263,27 @@ TEST(ConfigYaml, WhatIsNotYamlIsRefusedWithItsLine) {
   EXPECT_EQ(errors_in("just words"), ConfigErrors{"robot.yaml:1: must be a section of keys"});
   EXPECT_EQ(errors_in("? [a, b]\n: c\n"), ConfigErrors{"robot.yaml:1: a key must be a word"});
   EXPECT_EQ(errors_in("---\nthreads: 1\n---\nthreads: 2\n"),
-            ConfigErrors{"robot.yaml:4: a second YAML document begins; keep one"});
+            ConfigErrors{"robot.yaml:4: a second YAML document begins; keep one, and begin every top-level key in "
+                         "the first column"});
+}
+
+/// Words of the YAML grammar tell a robot's owner nothing.
+TEST(ConfigYaml, MistakesOfIndentationAreToldInPlainWords) {
+  const auto said = [](const std::string& yaml, const std::string& where, const std::string& what) {
+    const ConfigErrors errors = errors_in(yaml);
+    ASSERT_EQ(errors.size(), 1U);
+    EXPECT_TRUE(errors[0].starts_with(where)) << errors[0];
+    EXPECT_NE(errors[0].find(what), std::string::npos) << errors[0];
+  };
+  said("lidars:\n  - name: front\n   port: 3\n", "robot.yaml:3: ", "is not indented like the lines it belongs to");
+  said("map:\n    keyframe_m: 1\n  keyframe_deg: 3\n",
+       "robot.yaml:3: ", "is not indented like the lines it belongs to");
+  said("map:\n  keyframe_m: 1\n   keyframe_deg: 2\n", "robot.yaml:3: ", "a key cannot stand here");
+  said("map:\n  keyframe_m:1\n  keyframe_deg: 2\n", "robot.yaml:3: ", "a missing colon or space behind it");
+  said("map:\n\tkeyframe_m: 1\n", "robot.yaml:2: ", "is indented by a tab; use spaces");
+  said("lidars:\n- {name: front, port: 3\nthreads: 2\n", "robot.yaml:3: ", "a { before this line is not closed");
+  said("range_m: [1, 2\nthreads: 2\n", "robot.yaml:2: ", "a [ before this line is not closed");
+  said("threads: @2\n", "robot.yaml:1: ", "put it in quotes");
 }
 
 TEST(ConfigYaml, DamagedFilesGiveOnePrintableLinePerMistakeAndNeverCrash) {

@@ -121,6 +121,7 @@ TEST(LocusSim, WrongOptionsAreAnErrorOfOneLineThatNamesThem) {
   };
   expect_refused({}, "--");
   expect_refused(husky_in("moon", x), "moon");
+  expect_refused({"--wrld", "urban", "-o", x}, "no option --wrld; the nearest is --world");
   expect_refused(husky_in("urban", x, {"--lidars", "4"}), "4");
   expect_refused(husky_in("urban", x, {"--model", "VLS-128"}), "VLS-128");
   expect_refused(husky_in("urban", x, {"--dust", "nan"}), "dust");
@@ -135,6 +136,19 @@ TEST(LocusSim, FolderThatCannotBeMadeIsAFailure) {
   const ProgramRun run = run_program(LOCUS_SIM, husky_in("corridor", "/dev/null/folder"));
   EXPECT_EQ(run.status, 1);
   EXPECT_EQ(run.err, "locus-sim: /dev/null/folder: no folder can be made there (Not a directory); choose another\n");
+}
+
+/// Not after an hour of driving.
+TEST(LocusSim, FileThatCannotBeWrittenIsNamedBeforeTheDrive) {
+  for (const std::string name : {"lidar.pcap", "gt_map.ply"}) {
+    const TemporaryFolder folder;
+    std::filesystem::create_directories(folder / ("c/" + name));
+    const ProgramRun run = run_program(LOCUS_SIM, husky_in("corridor", folder / "c"));
+    EXPECT_EQ(run.status, 1);
+    EXPECT_EQ(run.err, "locus-sim: " + (folder / ("c/" + name)).string() +
+                           ": cannot be written (Is a directory); check permissions and free space\n");
+    EXPECT_FALSE(std::filesystem::exists(folder / "c/imu.csv"));
+  }
 }
 
 TEST(LocusSim, HelpShowsAnExample) {

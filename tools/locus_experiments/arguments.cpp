@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "command_line.hpp"
 #include "locus_replay/failure.hpp"
 
 namespace locus::experiments {
@@ -66,14 +67,8 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
              "  locus-experiments --shard 1/2 -o part1 & locus-experiments --shard 2/2 -o part2; wait\n"
              "  locus-experiments --merge part1 part2 -o experiments\n"
              "  locus-experiments -o fleet robot1/ robot2/ robot3/");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& asked_for_text) {
-    app.exit(asked_for_text);
+  if (!tools::parse_command_line(app, argc, argv))
     return std::nullopt;
-  } catch (const CLI::ParseError& error) {
-    throw Failure(ExitStatus::wrong_usage, fmt::format("{}; see locus-experiments --help", error.what()));
-  }
   const std::optional<Shard> parsed = Shard::parse(shard);
   if (!parsed)
     throw Failure(ExitStatus::wrong_usage, fmt::format("--shard {}: must be I/N with I from 1 to N, as in 2/8", shard));

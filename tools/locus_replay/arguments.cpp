@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "command_line.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/number_between.hpp"
 
@@ -77,14 +78,8 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
              "  locus-replay -o out drive.pcap\n"
              "  locus-replay -c husky.yaml --imu imu.csv --odometry wio=wheels.tum -o out drive.pcap\n"
              "  locus-replay --set lidars.front.port=2369 --fail front:lost@10-20 -o out robot_folder/");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& asked_for_text) {
-    app.exit(asked_for_text);
+  if (!parse_command_line(app, argc, argv))
     return std::nullopt;
-  } catch (const CLI::ParseError& error) {
-    throw Failure(ExitStatus::wrong_usage, fmt::format("{}; see locus-replay --help", error.what()));
-  }
 
   for (const std::string& text : odometry)
     arguments.odometry.push_back(parse_odometry(text));

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <string>
 
+#include "command_line.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/number_between.hpp"
 
@@ -96,14 +97,8 @@ std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
       "  locus-sim --world urban --robot husky --duration 60 --seed 1 -o plant\n"
       "  locus-sim --world tunnel --robot spot --duration 300 --seed 7 --slip 20-25 --dust 0.02 -o mine\n"
       "  locus-replay -o out plant");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& asked_for_text) {
-    app.exit(asked_for_text);
+  if (!parse_command_line(app, argc, argv))
     return std::nullopt;
-  } catch (const CLI::ParseError& error) {
-    throw Failure(ExitStatus::wrong_usage, fmt::format("{}; see locus-sim --help", error.what()));
-  }
 
   arguments.world = by_name(sim::kWorlds, world);
   arguments.robot = by_name(sim::kRobots, robot);

@@ -9,6 +9,7 @@
 
 #include "daemon/machine_time.hpp"
 #include "locus_replay/failure.hpp"
+#include "locus_replay/output_file.hpp"
 #include "locus_replay/progress_bar.hpp"
 #include "locus_sim/arguments.hpp"
 #include "locus_sim/capture_writer.hpp"
@@ -37,20 +38,25 @@ sim::Trajectory drive(const sim::World& world, const sim::Robot& robot, const Si
 
 void run(const SimArguments& arguments) {
   const daemon::MachineTime begin = daemon::MachineTime::now();
+  std::optional<sim::FolderSink> folder; // tried before the hour that the drive may take
+  std::optional<OutputFile> map;
+  if (arguments.output != "-") {
+    folder.emplace(arguments.output);
+    map.emplace(arguments.output / "gt_map.ply");
+  }
   const sim::World world = arguments.world.make(arguments.seed);
   const sim::Robot robot = arguments.robot.make(arguments.sensors, arguments.seed);
   const sim::Trajectory trajectory = drive(world, robot, arguments);
-  if (arguments.output == "-") {
+  if (!folder) {
     sim::StreamSink sink;
     write_capture(sink, world.scene, trajectory, arguments.duration, robot.sensors);
     return;
   }
-  sim::FolderSink sink(arguments.output);
   sim::SeenSpace seen(world.scene.bounds());
   ProgressBar bar(true);
-  write_capture(sink, world.scene, trajectory, arguments.duration, robot.sensors, &seen,
+  write_capture(*folder, world.scene, trajectory, arguments.duration, robot.sensors, &seen,
                 [&](double done) { bar.show(done); });
-  write_truth_map(arguments.output / "gt_map.ply", world.scene, seen);
+  write_truth_map(*map, world.scene, seen);
   bar.wipe();
   const daemon::MachineTime spent = daemon::MachineTime::now() - begin;
   fmt::print("{}: {:.0f} m in {:.0f} s, {:.0f} times faster than that on one core ({:.1f} s)\n",

@@ -88,9 +88,9 @@ class PcapWriter {
       : pcap_(pcap_open_dead_with_tstamp_precision(link_type, 65535, PCAP_TSTAMP_PRECISION_NANO)),
         dumper_(pcap_dump_open(pcap_, path.c_str())), path_(path.string()) {
     if (dumper_ == nullptr) {
-      const std::string reason = pcap_geterr(pcap_);
+      const std::runtime_error error = cannot_be_written();
       pcap_close(pcap_);
-      throw std::runtime_error(reason);
+      throw error;
     }
   }
   PcapWriter(const PcapWriter&) = delete;
@@ -115,8 +115,7 @@ class PcapWriter {
   /// Throws unless everything has reached the file.
   void flush() {
     if (pcap_dump_flush(dumper_) != 0 || std::ferror(pcap_dump_file(dumper_)) != 0)
-      throw std::runtime_error(path_ + ": cannot be written (" + std::generic_category().message(errno) +
-                               "); check permissions and free space");
+      throw cannot_be_written();
   }
 
   /// Any bytes as one captured frame, of which only the first `snap_length` are kept.
@@ -131,6 +130,11 @@ class PcapWriter {
   }
 
  private:
+  [[nodiscard]] std::runtime_error cannot_be_written() const {
+    return std::runtime_error(path_ + ": cannot be written (" + std::generic_category().message(errno) +
+                              "); check permissions and free space");
+  }
+
   pcap_t* pcap_;
   pcap_dumper_t* dumper_;
   std::string path_;

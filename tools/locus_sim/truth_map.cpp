@@ -2,17 +2,13 @@
 #include "locus_sim/truth_map.hpp"
 
 #include <Eigen/Geometry>
-#include <fmt/ostream.h>
 
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cerrno>
 #include <cmath>
-#include <fstream>
 #include <numbers>
-#include <stdexcept>
-#include <system_error>
+#include <span>
 
 namespace locus::sim {
 namespace {
@@ -92,11 +88,9 @@ template <class Sink> void for_each_point(const Scene& scene, const SeenSpace& s
 
 } // namespace
 
-void write_truth_map(const std::filesystem::path& path, const Scene& scene, const SeenSpace& seen) {
-  std::ofstream file(path, std::ios::binary);
+void write_truth_map(tools::OutputFile& file, const Scene& scene, const SeenSpace& seen) {
   const auto write_header = [&](std::size_t points) {
-    fmt::print(file,
-               "ply\nformat binary_little_endian 1.0\nelement vertex {:12}\nproperty float x\nproperty float y\n"
+    file.print("ply\nformat binary_little_endian 1.0\nelement vertex {:12}\nproperty float x\nproperty float y\n"
                "property float z\nend_header\n",
                points);
   };
@@ -104,14 +98,12 @@ void write_truth_map(const std::filesystem::path& path, const Scene& scene, cons
   write_header(points); // as long as the one that replaces it when the number is known
   for_each_point(scene, seen, [&](const Eigen::Vector3d& point) {
     const Eigen::Vector3f single = point.cast<float>();
-    file.write(reinterpret_cast<const char*>(single.data()), 3 * sizeof(float));
+    file.write(std::as_bytes(std::span(single.data(), 3)));
     ++points;
   });
-  file.seekp(0);
+  file.rewind();
   write_header(points);
   file.close();
-  if (!file)
-    throw std::runtime_error(path.string() + ": " + std::generic_category().message(errno));
 }
 
 } // namespace locus::sim
