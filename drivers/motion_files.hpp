@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,11 @@ namespace locus {
 
 /// Readers of recorded motion. All skip blank lines and lines that start with # and accept CRLF. Text that is no number
 /// is an error, one line for the user: `file:line: what; what to do`.
+
+/// From an instant to another one, which belongs to it.
+struct TimeSpan {
+  Stamp first, last;
+};
 
 /// What a motion source said, sample by sample in the order of arrival: that of STEM.meta.csv
 /// (`t_ns,arrival_ns,covariance_scale`) beside the file where there is one, else arrival = stamp. NaN passes, as it
@@ -34,6 +40,9 @@ template <class Sample> class MotionSamples {
   MotionSamples& operator=(MotionSamples&&) noexcept;
   ~MotionSamples();
 
+  /// When the first and the last one arrive; nothing if there is none.
+  [[nodiscard]] const std::optional<TimeSpan>& arrivals() const { return arrivals_; }
+
   /// The next one, valid until pop(); nullptr after the last.
   [[nodiscard]] const Sample* front() const { return ended_ ? nullptr : &front_; }
   void pop();
@@ -43,8 +52,9 @@ template <class Sample> class MotionSamples {
 
  private:
   class Rows;
-  explicit MotionSamples(std::unique_ptr<Rows> rows);
+  MotionSamples(std::unique_ptr<Rows> rows, std::optional<TimeSpan> arrivals);
 
+  std::optional<TimeSpan> arrivals_;
   std::unique_ptr<Rows> rows_; ///< nullptr: the samples are held
   std::vector<Sample> held_;
   std::size_t next_ = 0; ///< of those held

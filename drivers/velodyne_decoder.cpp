@@ -79,13 +79,12 @@ std::optional<PacketError> Decoder::recognise(Packet packet, Duration time_of_ho
                         : return_mode_from_byte(std::to_integer<std::uint8_t>(packet[kReturnModeOffset]));
   if (!mode)
     return PacketError::model;
-  auto model = options_.model;
-  if (!model) {
-    const auto claimed = model_from_product_id(std::to_integer<std::uint8_t>(packet[kProductIdOffset]));
-    if (!claimed)
-      return PacketError::model;
-    model = recognition_.recognise(*claimed, *mode, time_of_hour, packet);
-  }
+  recognised_ = model_from_product_id(std::to_integer<std::uint8_t>(packet[kProductIdOffset]));
+  if (recognised_)
+    recognised_ = recognition_.recognise(*recognised_, *mode, time_of_hour, packet);
+  const auto model = options_.model ? options_.model : recognised_;
+  if (!model)
+    return PacketError::model;
   if (model == model_ && mode == mode_)
     return std::nullopt;
   const Calibration& own = spec(*model).calibration;

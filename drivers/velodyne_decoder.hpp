@@ -44,6 +44,10 @@ class Decoder {
   [[nodiscard]] std::optional<Model> model() const { return model_; }
   [[nodiscard]] std::optional<ReturnMode> return_mode() const { return mode_; }
 
+  /// What the packets say they come from, by ModelRecognition; another than model() where the options say otherwise.
+  /// Nothing while their product id is unknown.
+  [[nodiscard]] std::optional<Model> recognised_model() const { return recognised_; }
+
   /// Of the last good packet, from the turn of its columns.
   [[nodiscard]] double rotation_rate_rpm() const;
 
@@ -79,6 +83,7 @@ class Decoder {
 
   DecoderOptions options_;
   ModelRecognition recognition_;
+  std::optional<Model> recognised_;
   std::optional<Model> model_;
   std::optional<ReturnMode> mode_;
   PacketLayout layout_{};

@@ -316,6 +316,18 @@ TEST(MotionSamples, AreKnownToBeGoodBeforeTheFirstIsUsed) {
   EXPECT_TRUE(contains(error_of(MotionSamples<OdometrySample>::open("/nowhere/wio.tum")), "cannot be read"));
 }
 
+TEST(MotionSamples, TellWhenTheFirstAndTheLastArrive) {
+  for (const std::string& rows : {row_at("1e-9") + row_at("3e-9"), row_at("3e-9") + row_at("1e-9")}) {
+    const TemporaryFile file{"wio.tum", bytes_of(rows)};
+    const auto samples = MotionSamples<OdometrySample>::open(file.path());
+    ASSERT_TRUE(samples && samples->arrivals());
+    EXPECT_EQ(to_ns(samples->arrivals()->first), 1);
+    EXPECT_EQ(to_ns(samples->arrivals()->last), 3);
+  }
+  const TemporaryFile empty{"wio.tum", bytes_of("# t x y z qx qy qz qw\n")};
+  EXPECT_FALSE(MotionSamples<OdometrySample>::open(empty.path())->arrivals());
+}
+
 TEST(MotionSamples, DrainGivesWhatIsLeft) {
   MotionSamples<ImuSample> samples(std::vector<ImuSample>(3));
   samples.pop();

@@ -286,6 +286,21 @@ TEST(VelodyneDecoder, SpacingOfPacketsOverrulesTheProductIdInEitherModeAndThroug
   }
 }
 
+TEST(VelodyneDecoder, ConfiguredModelIsObeyedAndTheOneThatThePacketsSpeakOfIsTold) {
+  Decoder decoder{{.model = Model::vlp16}};
+  LidarPacket packet;
+  EXPECT_EQ(decoder.recognised_model(), std::nullopt);
+  for (const std::uint32_t number : {0U, 1U, 2U}) {
+    VelodyneTestPacket bytes(Model::hdl32e, ReturnMode::strongest, 553 * number);
+    ASSERT_EQ(decoder.decode(bytes.payload(), packet), std::nullopt);
+    EXPECT_EQ(decoder.model(), Model::vlp16);
+  }
+  EXPECT_EQ(decoder.recognised_model(), Model::hdl32e);
+  EXPECT_EQ(decoder.decode(VelodyneTestPacket(Model::vls128, ReturnMode::strongest, 2'000).payload(), packet),
+            PacketError::flag);
+  EXPECT_EQ(decoder.recognised_model(), Model::vls128) << "of a packet that is refused, too";
+}
+
 TEST(VelodyneDecoder, PuckHiResIsNotTakenForAVlp16ThatHasTheSameTiming) {
   Decoder decoder;
   LidarPacket packet;

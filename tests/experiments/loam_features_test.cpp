@@ -65,6 +65,18 @@ TEST(LoamFeatures, BorderOfAShadowIsNoEdge) {
   }
 }
 
+TEST(LoamFeatures, SurfaceAlongTheBeamGivesNone) {
+  // Between two long walls: from 8 degrees on, neighbours on a wall are more than a fortieth of their range apart.
+  const auto range_at = [](double azimuth) { return std::min(60.0, 1 / std::max(1e-9, std::abs(std::sin(azimuth)))); };
+  Sweep sweep = turn(range_at);
+  keep_loam_features(sweep);
+  EXPECT_GT(sweep.points.size(), 50U);
+  for (const SweepPoint& point : sweep.points) {
+    const float range_m = point.position_base_m.norm();
+    EXPECT_FALSE(range_m > 7.2F && range_m < 50) << range_m;
+  }
+}
+
 TEST(LoamFeatures, EachScanLineGivesItsOwn) {
   Sweep sweep = turn(square_room, 3);
   const Sweep other = turn(square_room, 260);

@@ -45,6 +45,22 @@ TEST(Plan, HasEveryRunOfThePapersTables) {
     EXPECT_TRUE(all.contains(run)) << run;
 }
 
+TEST(Plan, LoamFeaturesAreTakenInOneRunFromTheUncutSweep) {
+  const Plan plan = make_plan(arguments());
+  const auto loam = std::ranges::find(plan.runs, true, &Run::loam_features);
+  ASSERT_NE(loam, plan.runs.end());
+  EXPECT_EQ(std::ranges::count(plan.runs, true, &Run::loam_features), 1);
+  EXPECT_EQ(loam->id(), "alpha/loam_feat");
+  std::vector<std::string> settings;
+  std::ranges::copy_if(loam->options, std::back_inserter(settings),
+                       [](const auto& option) { return option != "--set"; });
+  const auto config = override_config(Config{}, settings);
+  ASSERT_TRUE(config);
+  EXPECT_FALSE(config->sweep.segment_filter.enabled);
+  EXPECT_FALSE(config->sweep.voxel_filter.enabled);
+  EXPECT_FALSE(config->sweep.random_filter.enabled);
+}
+
 TEST(Plan, ShardsShareOutEveryRunOnce) {
   const std::set<std::string> all = ids(make_plan(arguments()));
   std::set<std::string> shared;

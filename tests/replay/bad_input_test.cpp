@@ -84,9 +84,25 @@ TEST_F(BadCapture, TruncatedInMidPacketIsAWarningAndNoFailure) {
   EXPECT_NEAR(static_cast<double>(read_tum(folder_ / "out/odometry.tum").size()), 40, 2);
 }
 
-TEST(WrongUsage, OtherPortIsNamedWithTheOverrideThatHelps) {
-  const Replay replay({"--set", "lidars.front.port=3000", room_drive().string()});
-  expect_error(replay.run(), 1, {"packets to port 2368, configured 3000", "--set lidars.0.port=2368"});
+/// What there is then would be taken for a result.
+TEST(WrongUsage, OtherPortIsNamedWithTheOverrideThatHelpsAndNothingButTheSummaryIsLeft) {
+  const TemporaryFolder folder;
+  const std::string capture = room_drive().string(), out = folder / "out";
+  EXPECT_EQ(run_program(LOCUS_REPLAY, {"--duration", "1", "-o", out, capture}).status, 0);
+  EXPECT_TRUE(std::filesystem::exists(folder / "out/report.html"));
+  expect_error(run_program(LOCUS_REPLAY, {"--set", "lidars.front.port=3000", "-o", out, capture}), 1,
+               {"packets to port 2368, configured 3000", "--set lidars.0.port=2368"});
+  std::vector<std::string> left;
+  for (const auto& entry : std::filesystem::directory_iterator(out))
+    left.push_back(entry.path().filename());
+  EXPECT_EQ(left, std::vector<std::string>{"summary.json"});
+}
+
+TEST(WrongUsage, FolderOfARecordingIsNoPlaceForResults) {
+  const std::string capture = room_drive().string();
+  expect_error(run_program(LOCUS_REPLAY, {"-o", capture, capture}), 2, {"-o " + capture, "holds a recording"});
+  expect_error(run_program(LOCUS_REPLAY, {"-o", capture + "/.", capture + "/lidar.pcap"}), 2, {"holds a recording"});
+  EXPECT_FALSE(std::filesystem::exists(room_drive() / "odometry.tum"));
 }
 
 TEST(WrongUsage, OtherAddressIsNamedWithTheOverrideThatHelps) {
@@ -98,7 +114,12 @@ TEST(WrongUsage, PartBeyondTheCapture) {
   expect_error(Replay({"--start", "100", room_drive().string()}).run(), 1, {"--start"});
 }
 
-TEST(WrongUsage, UnknownOption) { expect_error(Replay({"--frobnicate", "x.pcap"}).run(), 2, {"--frobnicate"}); }
+TEST(WrongUsage, UnknownOptionIsNamedWithTheNearestOne) {
+  expect_error(Replay({"--frobnicate", "x.pcap"}).run(), 2, {"no option --frobnicate"});
+  expect_error(Replay({"--thread", "2", "x.pcap"}).run(), 2, {"no option --thread; the nearest is --threads"});
+  expect_error(Replay({"--ground-truht=gt.tum", "x.pcap"}).run(), 2, {"--ground-truht; the nearest is --ground-truth"});
+  expect_error(run_program(LOCUS_REPLAY, {"--outptu", "x", "x.pcap"}), 2, {"--outptu; the nearest is --output"});
+}
 
 TEST(WrongUsage, NoCapture) { expect_error(Replay(std::vector<std::string>{}).run(), 2, {"CAPTURE"}); }
 

@@ -64,6 +64,18 @@ TEST(Truth, OfAnotherTimeFailsAfterTheResultsAreWritten) {
   EXPECT_GT(replay.trajectory().size(), 70U);
 }
 
+TEST(Truth, MapOfAnotherPlaceIsAWarning) {
+  const TemporaryFolder folder;
+  const Replay replay(with("--map-truth", written(folder / "far.ply", "ply\nformat ascii 1.0\nelement vertex 2\n"
+                                                                      "property float x\nproperty float y\n"
+                                                                      "property float z\nend_header\n"
+                                                                      "5000 0 0\n5001 0 0\n")));
+  EXPECT_EQ(replay.run().status, 0);
+  ASSERT_EQ(lines_of(replay.run().err).size(), 1U) << replay.run().err;
+  EXPECT_NE(replay.run().err.find("warning: "), std::string::npos);
+  EXPECT_NE(replay.run().err.find("far.ply: none of the "), std::string::npos) << replay.run().err;
+}
+
 TEST(Truth, ThatCannotBeReadIsRefusedBeforeTheRun) {
   const TemporaryFolder folder;
   expect_refused("--ground-truth", folder / "none.tum", "none.tum: cannot be read");

@@ -59,8 +59,8 @@ std::string without_file(const MotionSourceOptions& source) {
 
 MotionRecording read(const MotionFile& file, std::size_t source) {
   if (file.kind == SourceKind::imu)
-    return {source, value_or_fail(MotionSamples<ImuSample>::open(file.file), ExitStatus::failed)};
-  return {source, value_or_fail(MotionSamples<OdometrySample>::open(file.file), ExitStatus::failed)};
+    return {source, file.file, value_or_fail(MotionSamples<ImuSample>::open(file.file), ExitStatus::failed)};
+  return {source, file.file, value_or_fail(MotionSamples<OdometrySample>::open(file.file), ExitStatus::failed)};
 }
 
 } // namespace

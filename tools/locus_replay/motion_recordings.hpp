@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <span>
 #include <string>
 #include <variant>
@@ -18,6 +19,7 @@ namespace locus::tools {
 /// What one motion source said, in the order of arrival.
 struct MotionRecording {
   std::size_t source; ///< index in the configuration
+  std::filesystem::path file;
   std::variant<MotionSamples<ImuSample>, MotionSamples<OdometrySample>> samples;
 };
 

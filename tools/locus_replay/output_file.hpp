@@ -26,6 +26,8 @@ class OutputFile {
   void write(std::span<const std::byte> bytes) {
     stream_.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   }
+  /// What is written next replaces what was written first.
+  void rewind() { stream_.seekp(0); }
   void close() {
     stream_.close();
     check();

@@ -5,9 +5,12 @@
 #include <type_traits>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "core/motion_sources.hpp"
 #include "drivers/velodyne_model.hpp"
 #include "locus_replay/failure.hpp"
+#include "locus_replay/time_span_text.hpp"
 
 namespace locus::tools {
 
@@ -66,6 +69,10 @@ Stamp Recording::MotionCursor::arrival() const {
   return std::visit(
       [](const auto& samples) { return samples.front() != nullptr ? samples.front()->arrival : Stamp::max(); },
       recording.samples);
+}
+
+std::optional<TimeSpan> Recording::MotionCursor::arrivals() const {
+  return std::visit([](const auto& samples) { return samples.arrivals(); }, recording.samples);
 }
 
 Input Recording::MotionCursor::take() {
@@ -145,6 +152,18 @@ void Recording::note(const Datagram& datagram) {
   else if (capture_.bytes_total() > 0)
     progress_.store(static_cast<double>(capture_.bytes_read()) / static_cast<double>(capture_.bytes_total()),
                     std::memory_order_relaxed);
+}
+
+std::vector<std::string> Recording::warnings() const {
+  std::vector<std::string> warnings = capture_.warnings();
+  for (const MotionCursor& motion : motion_) {
+    const std::optional<TimeSpan> span = motion.arrivals();
+    if (started_ && (!span || span->last < first_ || span->first > last_))
+      warnings.push_back(fmt::format("{}: its samples ({}) and the packets ({}) have no time in common, so nothing of "
+                                     "it was used; give what was recorded with them, by the same clock",
+                                     motion.recording.file.string(), text_of(span), text_of(TimeSpan{first_, last_})));
+  }
+  return warnings;
 }
 
 /// By the configuration alone: a fault may strike before the lidar has made itself known.

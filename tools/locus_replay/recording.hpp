@@ -7,6 +7,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -56,6 +57,8 @@ class Recording : public daemon::InputSource {
   /// From the first to the last datagram played.
   [[nodiscard]] Duration duration() const { return last_ - first_; }
   [[nodiscard]] const std::map<std::uint16_t, PortTraffic>& traffic() const { return traffic_; }
+  /// What is wrong with the capture and with the motion played along with it, a line for the user each.
+  [[nodiscard]] std::vector<std::string> warnings() const;
 
  private:
   struct Pending { ///< the next input that is no motion sample
@@ -70,6 +73,7 @@ class Recording : public daemon::InputSource {
     MotionRecording recording;
 
     [[nodiscard]] Stamp arrival() const; ///< of the next sample; Stamp::max() after the last
+    [[nodiscard]] std::optional<TimeSpan> arrivals() const;
     daemon::Input take();
   };
 

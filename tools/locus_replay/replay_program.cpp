@@ -59,6 +59,13 @@ Config configuration(const std::filesystem::path& file, const std::vector<std::s
   return config;
 }
 
+/// Results in the folder of a recording would be taken for its files by the next run.
+void check_output(const std::filesystem::path& folder) {
+  if (std::filesystem::is_directory(folder) && CaptureFolder::find(folder))
+    throw Failure(ExitStatus::wrong_usage,
+                  fmt::format("-o {}: holds a recording; choose another folder for the results", folder.string()));
+}
+
 /// As fast as the machine can; the same bits on every run.
 void replay(const Config& config, LidarRouter lidars, Recording& recording, Results& results, const SweepStage& stage) {
   daemon::SweepCounters counters;
@@ -105,6 +112,7 @@ void replay_live(const Config& config, LidarRouter lidars, Recording& recording,
 void run(const Arguments& arguments, const SweepStage& stage) {
   const MachineTime begin = MachineTime::now();
   const CaptureFolder folder = value_or_fail(CaptureFolder::find(arguments.capture), ExitStatus::failed);
+  check_output(arguments.output);
   const std::filesystem::path& config_file = arguments.config.empty() ? folder.config : arguments.config;
   const Config config = configuration(config_file, arguments.overrides);
   check_faults(arguments.faults, config);
@@ -124,8 +132,6 @@ void run(const Arguments& arguments, const SweepStage& stage) {
     replay_live(config, std::move(lidars), recording, *arguments.realtime_speed, results);
   else
     replay(config, std::move(lidars), recording, results, stage);
-  for (const std::string& warning : recording.capture().warnings())
-    say("warning: " + warning);
 }
 
 } // namespace

@@ -64,7 +64,7 @@ ordered_json estimated_path(const Report& report, const TimeAxis& time) {
   std::vector<PathPoint> points;
   for (const SweepRecord& sweep : report.sweeps)
     points.push_back({time(sweep.stamp), sweep.T_odom_base.translation});
-  return path(points);
+  return path(std::move(points));
 }
 
 /// As far as the run goes, laid upon the estimate as the comparison lays it.
@@ -75,7 +75,7 @@ ordered_json true_path(const Report& report, const TimeAxis& time) {
     if (pose.stamp >= report.sweeps.front().stamp && pose.stamp <= report.sweeps.back().stamp)
       points.push_back({time(pose.stamp), T_odom_truth * pose.T_source_base.translation});
   }
-  return path(points);
+  return path(std::move(points));
 }
 
 template <class State>

@@ -56,9 +56,8 @@ ordered_json series(std::span<const Sample> samples, double resolution) {
   return {{"t", std::move(t)}, {"v", std::move(v)}};
 }
 
-ordered_json path(std::span<const PathPoint> points) {
-  std::vector<PathPoint> finite;
-  std::ranges::copy_if(points, std::back_inserter(finite), [](const PathPoint& p) { return p.position_m.allFinite(); });
+ordered_json path(std::vector<PathPoint> points) {
+  std::erase_if(points, [](const PathPoint& point) { return !point.position_m.allFinite(); });
   ordered_json t = ordered_json::array(), x = ordered_json::array(), y = ordered_json::array(),
                z = ordered_json::array();
   const auto push = [&](const PathPoint& point) {
@@ -67,12 +66,12 @@ ordered_json path(std::span<const PathPoint> points) {
     y.push_back(rounded(point.position_m.y(), kPathResolution_m));
     z.push_back(rounded(point.position_m.z(), kPathResolution_m));
   };
-  if (!finite.empty()) {
-    const double step_m = smooth_step_m(finite);
-    const PathPoint* kept = finite.data();
+  if (!points.empty()) {
+    const double step_m = smooth_step_m(points);
+    const PathPoint* kept = points.data();
     push(*kept);
-    for (const PathPoint& point : finite) {
-      const bool is_last = &point == &finite.back();
+    for (const PathPoint& point : points) {
+      const bool is_last = &point == &points.back();
       if (is_last || (point.position_m - kept->position_m).norm() > step_m) {
         push(point);
         kept = &point;

@@ -32,7 +32,7 @@ struct PathPoint {
 
 /// `{t, x, y, z}` to the millimetre, in steps that still look smooth: at most `kPathPoints` and both ends.
 inline constexpr std::size_t kPathPoints = 20'000;
-nlohmann::ordered_json path(std::span<const PathPoint> points);
+nlohmann::ordered_json path(std::vector<PathPoint> points);
 
 /// What something was at one time: the smaller, the worse.
 struct BandSample {

@@ -9,11 +9,12 @@
 #include <fmt/format.h>
 
 #include "locus_replay/failure.hpp"
+#include "locus_replay/lidar_doubts.hpp"
 #include "locus_replay/map_file.hpp"
-#include "locus_replay/no_data.hpp"
 #include "locus_replay/output_file.hpp"
 #include "locus_replay/report.hpp"
 #include "locus_replay/report_map.hpp"
+#include "locus_replay/say.hpp"
 
 namespace locus::tools {
 namespace {
@@ -25,6 +26,11 @@ const std::filesystem::path& made(const std::filesystem::path& folder) {
     throw Failure(ExitStatus::failed, fmt::format("{}: the folder cannot be made ({}); choose another with -o",
                                                   folder.string(), error.message()));
   return folder;
+}
+
+void warn(const std::vector<std::string>& lines) {
+  for (const std::string& line : lines)
+    say("locus-replay", "warning: " + line);
 }
 
 } // namespace
@@ -46,28 +52,45 @@ void Results::take(const daemon::ProcessedSweep& sweep) {
 void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor& processor,
                      const daemon::SweepCounters& sweeps) {
   const daemon::MachineTime spent = daemon::MachineTime::now() - begin_;
-  const bool has_data = ingest.lidars().total().data > 0;
   progress_.wipe();
   odometry_.close();
+  const bool has_data = ingest.lidars().total().data > 0;
   const std::vector<SurfacePoint> map = points_of(processor.odometry().map());
-  write_map(arguments_.output / "map.pcd", map);
   const Accuracy accuracy = has_data ? truth_.compare(map, !arguments_.quiet) : Accuracy{};
   const FinishedRun run{arguments_.capture.string(), config_, ingest,  processor, sweeps, figures_,
                         recording_.duration(),       spent,   accuracy};
-  OutputFile file(arguments_.output / "summary.json");
-  const nlohmann::ordered_json figures = summary(run);
-  file.print("{}\n", figures.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
-  file.close();
+  const nlohmann::ordered_json figures = write_summary(run);
+  warn(recording_.warnings());
+  if (!has_data) {
+    remove_all_but_the_summary();
+    throw Failure(ExitStatus::failed, fmt::format("{}: no valid data packet: {}", arguments_.capture.string(),
+                                                  why_no_data(recording_, ingest.lidars())));
+  }
+  write_map(arguments_.output / "map.pcd", map);
   write_report(arguments_.output / "report.html",
                {figures, config_, figures_.path_m(), sweeps_, visible_surfaces(processor.odometry().map()),
                 truth_.trajectory(), accuracy.trajectory});
-  if (!has_data)
-    throw Failure(ExitStatus::failed, fmt::format("{}: no valid data packet: {}", arguments_.capture.string(),
-                                                  why_no_data(recording_, ingest.lidars())));
+  warn(lidar_warnings(recording_, ingest.lidars()));
+  warn(accuracy.warnings);
   if (!arguments_.quiet)
     fmt::print("{}results    {}\n", readable(run), arguments_.output.string());
   if (!accuracy.problems.empty())
     throw Failure(ExitStatus::failed, fmt::format("{}", fmt::join(accuracy.problems, "\n")));
+}
+
+nlohmann::ordered_json Results::write_summary(const FinishedRun& run) const {
+  OutputFile file(arguments_.output / "summary.json");
+  nlohmann::ordered_json figures = summary(run);
+  file.print("{}\n", figures.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  file.close();
+  return figures;
+}
+
+/// So that nothing, of an earlier run either, is taken for the result of one that failed.
+void Results::remove_all_but_the_summary() const {
+  std::error_code ignored;
+  for (const char* const name : {"odometry.tum", "odometry.csv", "map.pcd", "report.html"})
+    std::filesystem::remove(arguments_.output / name, ignored);
 }
 
 } // namespace locus::tools

@@ -3,6 +3,8 @@
 
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "daemon/ingest.hpp"
 #include "daemon/sweep_processor.hpp"
 #include "locus_replay/arguments.hpp"
@@ -25,12 +27,15 @@ class Results {
   void take(const daemon::ProcessedSweep& sweep);
   void take(const HealthEvent& event) { figures_.take(event); }
 
-  /// After the last sweep. Fails for a recording without a valid data packet, once the counters that tell why are
-  /// written.
+  /// After the last sweep. Warns of what in the input is unlikely to be what the user meant. Fails for a recording
+  /// without a valid data packet: summary.json, whose counters tell why, is all that it then leaves.
   void finish(const daemon::Ingest& ingest, const daemon::SweepProcessor& processor,
               const daemon::SweepCounters& sweeps);
 
  private:
+  nlohmann::ordered_json write_summary(const FinishedRun& run) const;
+  void remove_all_but_the_summary() const;
+
   const Arguments& arguments_;
   const Config& config_;
   const Recording& recording_;

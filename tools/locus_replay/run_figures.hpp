@@ -60,6 +60,7 @@ struct Accuracy {
   std::optional<TrajectoryAccuracy> trajectory;
   std::optional<MapAccuracy> map;
   std::vector<std::string> problems; ///< why one that was given could not be compared with, each a line for the user
+  std::vector<std::string> warnings; ///< likewise: what makes the comparison worthless
 };
 
 /// All that a finished run is described by.

@@ -4,16 +4,17 @@
 #include <fmt/format.h>
 
 #include "locus_replay/failure.hpp"
+#include "locus_replay/time_span_text.hpp"
 
 namespace locus::tools {
 
 Truth::Truth(const Arguments& arguments, const CaptureFolder& folder)
-    : trajectory_file_(arguments.ground_truth.empty() ? folder.ground_truth : arguments.ground_truth) {
+    : trajectory_file_(arguments.ground_truth.empty() ? folder.ground_truth : arguments.ground_truth),
+      map_file_(arguments.map_truth.empty() ? folder.map_truth : arguments.map_truth) {
   if (!trajectory_file_.empty())
     trajectory_ = value_or_fail(read_trajectory(trajectory_file_), ExitStatus::failed);
-  const std::filesystem::path& map_file = arguments.map_truth.empty() ? folder.map_truth : arguments.map_truth;
-  if (!map_file.empty())
-    map_ = value_or_fail(PointCloudFile::open(map_file), ExitStatus::failed);
+  if (!map_file_.empty())
+    map_ = value_or_fail(PointCloudFile::open(map_file_), ExitStatus::failed);
 }
 
 void Truth::take(const OdometryEstimate& estimate) {
@@ -35,19 +36,21 @@ Accuracy Truth::compare(std::span<const SurfacePoint> map, bool show_progress) c
       positions_m.push_back(point.position_m);
     const Pose T_truth_odom = accuracy.trajectory ? accuracy.trajectory->T_truth_odom : Pose{};
     const auto found = map_accuracy(positions_m, *map_, T_truth_odom, [&](double done) { progress.show(done); });
-    if (found)
-      accuracy.map = *found;
-    else
+    if (!found)
       accuracy.problems.push_back(found.error());
+    else
+      accuracy.map = *found;
+    if (found && found->compared == 0)
+      accuracy.warnings.push_back(fmt::format("{}: none of the {} points of the map lies within 1 m of a true one; "
+                                              "give the map of this place, in the frame of the true poses",
+                                              map_file_.string(), found->outliers));
   }
   return accuracy;
 }
 
 std::string Truth::why_nothing_in_common() const {
   const auto span = [](const std::vector<StampedPose>& poses) {
-    return poses.empty() ? std::string{"none"}
-                         : fmt::format("{:.3f} to {:.3f} s", to_seconds(poses.front().stamp.time_since_epoch()),
-                                       to_seconds(poses.back().stamp.time_since_epoch()));
+    return text_of(poses.empty() ? std::nullopt : std::optional(TimeSpan{poses.front().stamp, poses.back().stamp}));
   };
   return fmt::format("{}: its poses ({}) and the sweeps ({}) have no time in common; give the truth of this recording, "
                      "by the same clock",

@@ -34,7 +34,7 @@ class Truth {
  private:
   [[nodiscard]] std::string why_nothing_in_common() const;
 
-  std::filesystem::path trajectory_file_;
+  std::filesystem::path trajectory_file_, map_file_; ///< empty: none
   std::vector<StampedPose> trajectory_;
   std::optional<PointCloudFile> map_;
   std::vector<StampedPose> estimates_; ///< with a true trajectory alone

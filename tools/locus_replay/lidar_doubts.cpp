@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "locus_replay/no_data.hpp"
+#include "locus_replay/lidar_doubts.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <vector>
 
 #include <fmt/format.h>
@@ -22,6 +23,31 @@ std::string rejections(const PacketCounters& counters) {
   return fmt::format("{}", fmt::join(reasons, ", "));
 }
 
+bool is_configured(const LidarRouter& lidars, std::uint16_t port) {
+  return std::ranges::any_of(lidars.lidars(), [&](const LidarInput& lidar) { return lidar.listens_to(port); });
+}
+
+/// The model that the packets of a lidar speak of, where it is another than the configured one.
+std::optional<velodyne::Model> other_model(const LidarInput& lidar) {
+  const auto recognised = lidar.decoder().recognised_model();
+  return lidar.options().model && recognised != lidar.options().model ? recognised : std::nullopt;
+}
+
+std::string not_heard(const LidarInput& lidar, const Recording& recording, const LidarRouter& lidars) {
+  const LidarOptions& options = lidar.options();
+  std::string line = fmt::format("lidar {}: no valid data packet to port {}", options.name, options.port);
+  if (options.source_ip)
+    line += " from " + dotted(*options.source_ip);
+  if (const std::string rejected = rejections(lidar.counters()); !rejected.empty())
+    return fmt::format("{}, rejected: {}; check its address and model", line, rejected);
+  for (const auto& [port, traffic] : recording.traffic()) {
+    if (traffic.data_packet_sized > 0 && !is_configured(lidars, port))
+      return fmt::format("{}; {} packets went to port {}: if they are its own, use --set lidars.{}.port={}", line,
+                         traffic.data_packet_sized, port, options.name, port);
+  }
+  return line + "; check its port and address, or take it out of the configuration";
+}
+
 std::string without_datagrams(const Capture::Stats& seen) {
   if (seen.datagrams > 0)
     return fmt::format("none of its {} UDP datagrams lies within --start and --duration; choose another part",
@@ -39,13 +65,11 @@ std::string why_no_data(const Recording& recording, const LidarRouter& lidars) {
   const auto& [port, busiest] = *std::ranges::max_element(
       traffic, {}, [](const auto& entry) { return std::pair(entry.second.data_packet_sized, entry.second.datagrams); });
   const LidarOptions& first = lidars.lidars().front().options();
-  const bool configured = std::ranges::any_of(
-      lidars.lidars(), [&, port = port](const LidarInput& lidar) { return lidar.listens_to(port); });
   if (busiest.data_packet_sized == 0)
     return fmt::format("none of its UDP datagrams has the size of a data packet, 1206 bytes; most ({}) go to port {}; "
                        "record the lidar's data port",
                        busiest.datagrams, port);
-  if (!configured)
+  if (!is_configured(lidars, port))
     return fmt::format("{} packets to port {}, configured {}; use --set lidars.0.port={}", busiest.data_packet_sized,
                        port, first.port, port);
   const PacketCounters total = lidars.total();
@@ -53,8 +77,24 @@ std::string why_no_data(const Recording& recording, const LidarRouter& lidars) {
     return fmt::format("{} packets to port {} come from {}, configured {}; use --set lidars.0.source_ip={}",
                        busiest.data_packet_sized, port, dotted(busiest.source_ip), dotted(*first.source_ip),
                        dotted(busiest.source_ip));
+  if (const auto model = other_model(lidars.lidars().front()))
+    return fmt::format("{} packets to port {}, those of a {}, configured {}; use --set lidars.0.model=auto",
+                       busiest.data_packet_sized, port, to_string(*model), to_string(*first.model));
   return fmt::format("{} packets to port {}, rejected: {}; is it a Velodyne, and lidars.0.model the right one?",
                      busiest.data_packet_sized, port, rejections(total));
+}
+
+std::vector<std::string> lidar_warnings(const Recording& recording, const LidarRouter& lidars) {
+  std::vector<std::string> warnings;
+  for (const LidarInput& lidar : lidars.lidars()) {
+    if (lidar.counters().data == 0)
+      warnings.push_back(not_heard(lidar, recording, lidars));
+    if (const auto model = other_model(lidar))
+      warnings.push_back(fmt::format("lidar {0}: configured as {1}, but its packets are those of a {2}, and read as a "
+                                     "{1}'s they make a wrong world; use --set lidars.{0}.model=auto",
+                                     lidar.options().name, to_string(*lidar.options().model), to_string(*model)));
+  }
+  return warnings;
 }
 
 } // namespace locus::tools

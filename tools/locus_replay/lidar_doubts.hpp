@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "drivers/lidar_input.hpp"
 #include "locus_replay/recording.hpp"
@@ -10,5 +11,9 @@ namespace locus::tools {
 
 /// Why a recording held no valid data packet: what was seen in its place and what to do, one line for the user.
 std::string why_no_data(const Recording& recording, const LidarRouter& lidars);
+
+/// What about the lidars of a recording that was played is unlikely to be what the user meant, a line each: one that
+/// was not heard though others were, one whose packets are another model's.
+std::vector<std::string> lidar_warnings(const Recording& recording, const LidarRouter& lidars);
 
 } // namespace locus::tools

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "drivers/motion_files.hpp"
+
+namespace locus::tools {
+
+/// For an error or a warning, in seconds as a TUM file has them.
+inline std::string text_of(const std::optional<TimeSpan>& span) {
+  if (!span)
+    return "none";
+  return fmt::format("{:.3f} to {:.3f} s", to_seconds(span->first.time_since_epoch()),
+                     to_seconds(span->last.time_since_epoch()));
+}
+
+} // namespace locus::tools
