@@ -2,6 +2,7 @@
 #include "core/gicp_kernel.hpp"
 
 #include <cmath>
+#include <span>
 
 namespace locus {
 
@@ -139,22 +140,6 @@ void find_around(const GicpPass& pass, const Placed& points, std::size_t count, 
   }
 }
 
-void find(const GicpPass& pass, const SourceBlock& source, MatchBlock& matches) {
-  const auto [R, t] = about_origin(pass);
-  Placed points;
-  for (std::size_t i = 0; i < kGicpBlock; ++i) {
-    points.x_m[i] = R(0, 0) * source.x_m[i] + R(0, 1) * source.y_m[i] + R(0, 2) * source.z_m[i] + t.x();
-    points.y_m[i] = R(1, 0) * source.x_m[i] + R(1, 1) * source.y_m[i] + R(1, 2) * source.z_m[i] + t.y();
-    points.z_m[i] = R(2, 0) * source.x_m[i] + R(2, 1) * source.y_m[i] + R(2, 2) * source.z_m[i] + t.z();
-  }
-  for (std::size_t i = 0; i < kGicpBlock; ++i)
-    put({}, i, matches);
-  if (pass.look_up == LookUp::around)
-    find_around(pass, points, source.count, matches);
-  else
-    find_here(pass, points, source.count, matches);
-}
-
 /// What a point adds to the normal equations, in the order in which they are summed up.
 enum Term : std::size_t {
   kHtt = 0,        ///< translation with translation: xx xy xz yy yz zz
@@ -162,8 +147,7 @@ enum Term : std::size_t {
   kHrr = kHtr + 9, ///< rotation with rotation: xx xy xz yy yz zz
   kBt = kHrr + 6,
   kBr = kBt + 3,
-  kNormals = kBr + 3, ///< of n n': xx xy xz yy yz zz
-  kError = kNormals + 6,
+  kError = kBr + 3,
   kWeight,
   kInliers,
   kPlanes,
@@ -259,12 +243,6 @@ using Sums = std::array<std::array<float, kLanes>, kTerms>;
     terms[kBr + 0][k] = w * (y * gz - z * gy);
     terms[kBr + 1][k] = w * (z * gx - x * gz);
     terms[kBr + 2][k] = w * (x * gy - y * gx);
-    terms[kNormals + 0][k] = w * nx * nx;
-    terms[kNormals + 1][k] = w * nx * ny;
-    terms[kNormals + 2][k] = w * nx * nz;
-    terms[kNormals + 3][k] = w * ny * ny;
-    terms[kNormals + 4][k] = w * ny * nz;
-    terms[kNormals + 5][k] = w * nz * nz;
     terms[kError][k] = w * r2;
     terms[kWeight][k] = w;
     terms[kInliers][k] = r2 < width2 ? match.found[i] : 0.0F;
@@ -341,7 +319,6 @@ NormalEquations equations_of(const Sums& sums) {
     result.b[row] = total(kBt + static_cast<std::size_t>(row));
     result.b[3 + row] = total(kBr + static_cast<std::size_t>(row));
   }
-  result.normals = symmetric(kNormals);
   result.error = total(kError);
   result.weight = total(kWeight);
   result.inliers = static_cast<std::size_t>(total(kInliers));
@@ -366,12 +343,66 @@ SourceBlock::SourceBlock(std::span<const SurfacePoint> points) : count(points.si
   }
 }
 
-NormalEquations linearise(const GicpPass& pass, const SourceBlock& source, MatchBlock& matches, Isa isa) {
-  if (pass.look_up != LookUp::keep)
-    find(pass, source, matches);
+void find(const GicpPass& pass, const SourceBlock& source, MatchBlock& matches) {
+  const auto [R, t] = about_origin(pass);
+  Placed points;
+  for (std::size_t i = 0; i < kGicpBlock; ++i) {
+    points.x_m[i] = R(0, 0) * source.x_m[i] + R(0, 1) * source.y_m[i] + R(0, 2) * source.z_m[i] + t.x();
+    points.y_m[i] = R(1, 0) * source.x_m[i] + R(1, 1) * source.y_m[i] + R(1, 2) * source.z_m[i] + t.y();
+    points.z_m[i] = R(2, 0) * source.x_m[i] + R(2, 1) * source.y_m[i] + R(2, 2) * source.z_m[i] + t.z();
+  }
+  for (std::size_t i = 0; i < kGicpBlock; ++i)
+    put({}, i, matches);
+  if (pass.look_up == LookUp::around)
+    find_around(pass, points, source.count, matches);
+  else
+    find_here(pass, points, source.count, matches);
+}
+
+void straighten(const WeakDirections& weak, MatchBlock& matches) {
+  constexpr float kNormalError = 0.1F; ///< three standard deviations of a normal from a handful of returns
+  for (const Eigen::Vector3f& along : std::span(weak.unit).first(weak.count)) {
+    for (std::size_t i = 0; i < kGicpBlock; ++i) {
+      const float leans =
+          matches.normal_x[i] * along.x() + matches.normal_y[i] * along.y() + matches.normal_z[i] * along.z();
+      const float taken = std::abs(leans) < kNormalError ? leans : 0.0F;
+      matches.normal_x[i] -= taken * along.x();
+      matches.normal_y[i] -= taken * along.y();
+      matches.normal_z[i] -= taken * along.z();
+    }
+  }
+}
+
+NormalEquations linearise(const GicpPass& pass, const SourceBlock& source, const MatchBlock& matches, Isa isa) {
   Sums sums{};
   sum_with(isa, about_origin(pass), source, matches, static_cast<float>(pass.width2), sums);
   return equations_of(sums);
+}
+
+Geometry geometry(const Eigen::Matrix3d& R_target_source, const SourceBlock& source, const MatchBlock& matches) {
+  Geometry sum;
+  const auto add = [&sum](const Eigen::Vector3d& p, const Eigen::Vector3d& n, double weight) {
+    Vector6 gradient;
+    gradient << n, p.cross(n);
+    sum.gradients.selfadjointView<Eigen::Lower>().rankUpdate(gradient, weight);
+  };
+  for (std::size_t i = 0; i < source.count; ++i) {
+    if (matches.found[i] == 0.0F)
+      continue;
+    const Eigen::Vector3d p =
+        R_target_source * Eigen::Vector3f(source.x_m[i], source.y_m[i], source.z_m[i]).cast<double>();
+    const Eigen::Vector3d n =
+        Eigen::Vector3f(matches.normal_x[i], matches.normal_y[i], matches.normal_z[i]).cast<double>();
+    sum.points += 1.0;
+    if (!n.isZero(0.0)) {
+      add(p, n, 1.0);
+      continue;
+    }
+    for (int axis = 0; axis < 3; ++axis)
+      add(p, Eigen::Vector3d::Unit(axis), 1.0 / 3.0);
+  }
+  sum.gradients = sum.gradients.selfadjointView<Eigen::Lower>();
+  return sum;
 }
 
 } // namespace locus

@@ -38,7 +38,6 @@ struct MatchBlock {
 struct NormalEquations {
   Matrix6 H = Matrix6::Zero();
   Vector6 b = Vector6::Zero();
-  Eigen::Matrix3d normals = Eigen::Matrix3d::Zero();
   double error = 0.0;
   double weight = 0.0;
   std::size_t planes = 0; ///< points whose counterpart is a plane
@@ -47,7 +46,6 @@ struct NormalEquations {
   void operator+=(const NormalEquations& other) {
     H += other.H;
     b += other.b;
-    normals += other.normals;
     error += other.error;
     weight += other.weight;
     planes += other.planes;
@@ -62,6 +60,12 @@ enum class LookUp {
   around, ///< the nearest plane of the 27 voxels around it, coarse or else fine
 };
 
+/// Directions along which hardly any surface stands in the way, as along a corridor.
+struct WeakDirections {
+  std::array<Eigen::Vector3f, 2> unit{};
+  std::size_t count = 0;
+};
+
 /// One pass over some of the points: finds their counterparts and sums the normal equations at T_target_source.
 struct GicpPass {
   const SurfaceMap& target;
@@ -73,8 +77,30 @@ struct GicpPass {
   double width2;               ///< of Geman-McClure, squared standard deviations
 };
 
-/// `matches` is read or written as the pass says. Pure but for that; any thread. The result depends on the instruction
-/// set in its last digits.
-NormalEquations linearise(const GicpPass& pass, const SourceBlock& source, MatchBlock& matches, Isa isa);
+/// Finds the counterparts of the points as the pass says, which is not to keep them. Pure but for `matches`; any
+/// thread.
+void find(const GicpPass& pass, const SourceBlock& source, MatchBlock& matches);
+
+/// Takes counterparts that lean along a weak direction by no more than the error of a normal as not leaning there. They
+/// would tie the robot to where the scan lines fell.
+void straighten(const WeakDirections& weak, MatchBlock& matches);
+
+/// Sums up the normal equations. Pure; any thread. The result depends on the instruction set in its last digits.
+NormalEquations linearise(const GicpPass& pass, const SourceBlock& source, const MatchBlock& matches, Isa isa);
+
+/// Sums over the points of one block, of how the distance to the counterpart changes with the pose: with unit normals,
+/// so that it tells where the surfaces stand and not how well they are known.
+struct Geometry {
+  Matrix6 gradients = Matrix6::Zero(); ///< of (n, R p x n) with itself
+  double points = 0.0;
+
+  void operator+=(const Geometry& other) {
+    gradients += other.gradients;
+    points += other.points;
+  }
+};
+
+/// Of the points with a counterpart; a shapeless one counts as a third of a plane along each axis. Pure; any thread.
+Geometry geometry(const Eigen::Matrix3d& R_target_source, const SourceBlock& source, const MatchBlock& matches);
 
 } // namespace locus

@@ -26,12 +26,16 @@ constexpr double kAlwaysAllowed_rad = 0.1;
 /// After so many refusals in a row the submap is behind us, and the map goes on from the prediction.
 constexpr int kRefusalsToRestart = 10;
 
-/// Neighbouring points share errors of calibration and of correction: so many of them count as one.
-constexpr double kPointsPerIndependentPoint = 4.0;
+/// OdometryEstimate::observability of an axis that counts as seen, with hysteresis.
+constexpr double kDegenerateBelow = 0.01;
+constexpr double kObservableAbove = 0.02;
 
-/// Least share of normals along a direction for it to count as seen, with hysteresis.
-constexpr double kDegenerateBelow = 0.02;
-constexpr double kObservableAbove = 0.04;
+/// Of a change of twist during a sweep, how much of it shows in where the sweep comes to lie.
+constexpr double kAskew = 0.25;
+
+/// Motion sources that see no more than this see a robot at rest.
+constexpr double kRest_mps = 0.03;
+constexpr double kRest_radps = 0.02;
 
 constexpr double kGravity_mps2 = 9.80665;
 constexpr double kGravityTolerance_mps2 = 0.5;
@@ -51,9 +55,13 @@ Vector6 sigma(double translation_m, double rotation_deg) {
   return s;
 }
 
-/// Per sweep, against a constant velocity: what 4 m/s^2 and 2 rad/s^2 do in 0.1 s. Standing must not teach that it
-/// lasts.
-const Vector6 kRobotsAccelerate = sigma(0.02, 0.5);
+/// A robot accelerates by 4 m/s^2 and 2 rad/s^2 in a sweep; standing must not teach that it lasts.
+const PriorExpectation kConstantVelocity{
+    .sigma = sigma(0.3, 3.0), .bias = sigma(0.3, 3.0), .least_sigma = sigma(0.02, 0.5)};
+const PriorExpectation kOdometrySource{
+    .sigma = sigma(0.02, 0.5), .bias = sigma(0.005, 0.1), .least_sigma = sigma(0.002, 0.02)};
+const PriorExpectation kInertialUnit{
+    .sigma = sigma(0.3, 0.1), .bias = sigma(0.3, 0.05), .least_sigma = sigma(0.002, 0.02)};
 const Vector6 kUnknownMotion = sigma(3.0, 10.0); ///< per sweep, of a robot of which nothing is known
 
 /// Block-diagonal matrix that turns both halves of a 6-vector.
@@ -142,12 +150,10 @@ void correct_all(std::span<const SweepPoint> points, const Vector6& twist_base, 
 
 Odometry::Odometry(const OdometryOptions& options, StageClock* clock)
     : options_(options), clock_(clock), gicp_(options.threads, options.isa), flat_ground_(options.flat_ground),
-      map_(options.map.max_bytes), last_scan_map_(kLastScanBytes),
-      constant_velocity_statistics_(sigma(0.3, 3.0), kRobotsAccelerate) {
-  for (const MotionSourceOptions& source : options.motion_sources) {
-    const bool imu = source.kind == SourceKind::imu;
-    statistics_.emplace_back(imu ? sigma(0.3, 0.3) : sigma(0.05, 0.5), sigma(0.002, 0.02));
-  }
+      map_(options.map.max_bytes), last_scan_map_(kLastScanBytes), constant_velocity_statistics_(kConstantVelocity) {
+  for (const MotionSourceOptions& source : options.motion_sources)
+    statistics_.emplace_back(source.kind == SourceKind::imu ? kInertialUnit : kOdometrySource);
+  gyro_biases_.resize(options.motion_sources.size());
 }
 
 OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested& stop) {
@@ -166,10 +172,15 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
     T_last_now = flatten(estimate.scan_to_scan.T_target_source);
     correct_motion(sweep, T_last_now);
   }
+  const PoseUncertainty before = uncertainty_;
+  predict(prior);
   estimate.scan_to_submap = match_submap(prior, T_last_now, stop);
   const Pose T_last_submap = T_odom_last_.inverse() * estimate.scan_to_submap.T_target_source;
-  estimate.failed = !trusts(estimate.scan_to_submap, T_last_submap, prior.T_last_now, variance_in_submap(prior));
+  estimate.failed = !trusts(estimate.scan_to_submap, T_last_submap, prior.T_last_now, variance_against_submap());
   estimate.T_odom_base = T_odom_last_ * (estimate.failed ? T_last_now : flatten(T_last_submap));
+  hold_still(sweep, estimate);
+  if (estimate.state == TrackingState::standstill)
+    uncertainty_ = before; // standing adds nothing
   finish(sweep, prior, estimate);
   return estimate;
 }
@@ -226,13 +237,16 @@ Odometry::Prior Odometry::integrate_sensors(const Sweep& sweep) const {
   return prior;
 }
 
-/// T_last_now as one source saw it; nothing where it does not know.
+/// T_last_now as one source saw it, less what is known of its error; nothing where it does not know.
 std::optional<Pose> Odometry::step(const Sweep& sweep, std::size_t source) const {
   const SourcePose& last = last_sources_[source];
   const SourcePose& now = sweep.sources[source];
   if (!last.known || !now.known || last.spell != now.spell)
     return std::nullopt;
-  return last.T_source_base.inverse() * now.T_source_base;
+  Pose T_last_now = last.T_source_base.inverse() * now.T_source_base;
+  if (options_.motion_sources[source].kind == SourceKind::imu)
+    T_last_now.rotation = T_last_now.rotation * so3_exp(-gyro_biases_[source].turn_rad(sweep.end - last_stamp_));
+  return T_last_now;
 }
 
 /// Takes out of the points what no motion source could, with the twist that T_last_now means.
@@ -291,17 +305,27 @@ Registration Odometry::match_submap(const Prior& prior, const Pose& T_last_now, 
   none.T_target_source = T_start;
   if (scan_.size() < kMinPoints)
     return none;
-  const Matrix6 R = turn_both(T_odom_last_.rotation);
-  const Vector6 variance = variance_in_submap(prior);
-  const PosePrior pose_prior{T_odom_last_ * prior.T_last_now, R * variance.cwiseInverse().asDiagonal() * R.transpose()};
-  const bool wide = variance.head<3>().maxCoeff() > kWide_m * kWide_m;
+  const PosePrior pose_prior{T_odom_last_ * prior.T_last_now, uncertainty_.against_submap().inverse()};
+  const bool wide = variance_against_submap().head<3>().maxCoeff() > kWide_m * kWide_m;
   return gicp_.align(registered(), map_, T_start, pose_prior, options_.scan_to_submap, wide, stop);
 }
 
-/// Of the prior as seen from the submap, in base axes: after dead reckoning its start is in doubt as well.
-Vector6 Odometry::variance_in_submap(const Prior& prior) const {
-  const Matrix6 R = turn_both(T_odom_last_.rotation.conjugate());
-  return prior.variance + (R.cwiseAbs() * adrift_.bias).cwiseAbs2() + R.cwiseAbs() * adrift_.variance;
+/// What is known before the sweep is compared with the submap.
+void Odometry::predict(const Prior& prior) {
+  uncertainty_.predict(T_odom_last_.rotation * prior.T_last_now.translation, covariance_of(prior),
+                       turn_both(T_odom_last_.rotation).cwiseAbs() * prior.bias);
+}
+
+/// Of a prior, odom axes.
+Matrix6 Odometry::covariance_of(const Prior& prior) const {
+  const Matrix6 R = turn_both(T_odom_last_.rotation);
+  return R * prior.variance.asDiagonal() * R.transpose();
+}
+
+/// Of the prediction, along the axes of the base at the last sweep.
+Vector6 Odometry::variance_against_submap() const {
+  const Matrix6 R = turn_both(T_odom_last_.rotation);
+  return (R.transpose() * uncertainty_.against_submap() * R).diagonal();
 }
 
 Pose Odometry::flatten(const Pose& T_last_now) const {
@@ -322,24 +346,31 @@ bool Odometry::trusts(const Registration& registration, const Pose& T_last_now, 
 }
 
 /// Compares what each source predicted, and a constant velocity if that was the prior, with what lidar found. A source
-/// that is in agreement teaches its statistics; one in disagreement would only teach them to expect the worst.
+/// that is in agreement teaches its statistics; one in disagreement would only teach them to expect the worst. Standing
+/// must not teach that it lasts.
 void Odometry::judge_sources(const Sweep& sweep, const Prior& prior, const Pose& T_last_now,
-                             const Registration& registration) {
+                             const OdometryEstimate& estimate) {
   const Matrix6 R = turn_both(T_odom_last_.rotation.conjugate());
-  const Matrix6 information = R * registration.information * R.transpose() / kPointsPerIndependentPoint;
+  const Matrix6 information = R * estimate.scan_to_submap.information * R.transpose();
+  const bool stands = estimate.state == TrackingState::standstill;
   for (std::size_t i = 0; i < options_.motion_sources.size(); ++i) {
     const std::optional<Pose> T_last_predicted = step(sweep, i);
     if (!T_last_predicted)
       continue;
+    const bool imu = options_.motion_sources[i].kind == SourceKind::imu;
     Matrix6 seen = information;
-    if (options_.motion_sources[i].kind == SourceKind::imu)
+    if (imu)
       seen.topRows<3>().setZero(); // knows nothing of translation
-    const Vector6 difference_in_step = difference(T_last_now, *T_last_predicted);
-    feedback_.opinions[i] = opinion_on(difference_in_step, seen);
-    if (feedback_.opinions[i] != LidarOpinion::disagrees)
-      statistics_[i].learn(difference_in_step, seen);
+    const Vector6 error = difference(T_last_now, *T_last_predicted);
+    feedback_.opinions[i] = opinion_on(error, seen);
+    if (feedback_.opinions[i] == LidarOpinion::disagrees)
+      continue;
+    if (!stands)
+      statistics_[i].learn(error, seen);
+    if (imu)
+      gyro_biases_[i].learn(-error.tail<3>(), so3_log(T_last_now.rotation), sweep.end - last_stamp_);
   }
-  if (prior.source.translation < 0)
+  if (prior.source.translation < 0 && !stands)
     constant_velocity_statistics_.learn(difference(T_last_now, prior.T_last_now), information);
 }
 
@@ -359,47 +390,70 @@ void Odometry::update_map(OdometryEstimate& estimate) {
   estimate.keyframe = true;
 }
 
-/// What a prediction says of itself. Until lidar finds the submap again its bias adds up. The noise of a step does not:
-/// most of it is the lidar's own, by which it was learned, and the next step takes it back.
-void Odometry::drift(const Prior& prior, OdometryEstimate& estimate) {
-  const Eigen::Vector3d moved_m = estimate.T_odom_base.translation - T_odom_last_.translation;
-  const Matrix6 R = turn_both(T_odom_last_.rotation);
-  adrift_.bias.head<3>() += skew(moved_m).cwiseAbs() * adrift_.bias.tail<3>();
-  adrift_.bias += R.cwiseAbs() * prior.bias;
-  adrift_.variance = R.cwiseAbs() * prior.variance;
-  carry_covariance(moved_m);
-  estimate.pose_covariance = covariance_;
-  estimate.pose_covariance.diagonal() += adrift_.bias.cwiseAbs2() + adrift_.variance;
-  move_on(T_odom_last_.inverse() * estimate.T_odom_base, R * prior.variance.asDiagonal() * R.transpose(), estimate);
+/// Where the robot stands the estimate stays where it was.
+void Odometry::hold_still(const Sweep& sweep, OdometryEstimate& estimate) {
+  if (estimate.failed)
+    return standstill_.lose_sight();
+  const std::optional<Pose> T_odom_held =
+      standstill_.observe(sweep.end, estimate.T_odom_base, sources_saw_motion(sweep));
+  if (!T_odom_held)
+    return;
+  estimate.T_odom_base = *T_odom_held;
+  estimate.state = TrackingState::standstill;
+}
+
+bool Odometry::sources_saw_motion(const Sweep& sweep) const {
+  const double elapsed_s = to_seconds(sweep.end - last_stamp_);
+  for (std::size_t i = 0; i < options_.motion_sources.size(); ++i) {
+    const std::optional<Pose> T_last_now = sweep.sources[i].usable ? step(sweep, i) : std::nullopt;
+    if (T_last_now && (T_last_now->translation.norm() > kRest_mps * elapsed_s ||
+                       angle_rad(T_last_now->rotation) > kRest_radps * elapsed_s))
+      return true;
+  }
+  return false;
 }
 
 /// What a registered sweep says of itself, of its prior and of the motion sources.
 void Odometry::settle(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate) {
   const Pose T_last_now = T_odom_last_.inverse() * estimate.T_odom_base;
-  const double weakest = estimate.scan_to_submap.observability[0];
-  degenerate_ = weakest < (degenerate_ ? kObservableAbove : kDegenerateBelow);
-  const Matrix6 R = turn_both(T_odom_last_.rotation);
-  const Matrix6 prior_information = R * variance_in_submap(prior).cwiseInverse().asDiagonal() * R.transpose();
-  const Matrix6 covariance =
-      (prior_information + estimate.scan_to_submap.information / kPointsPerIndependentPoint).inverse();
-  carry_covariance(estimate.T_odom_base.translation - T_odom_last_.translation);
-  estimate.pose_covariance = covariance_ + covariance;
-  if (!adrift_.variance.isZero()) { // the way back to the submap is no motion of the robot
-    adrift_ = {};
-    move_on(prior.T_last_now, covariance, estimate);
-    return;
-  }
-  judge_sources(sweep, prior, T_last_now, estimate.scan_to_submap);
-  move_on(T_last_now, covariance, estimate);
-  if (!degenerate_)
+  uncertainty_.see(estimate.scan_to_submap.information);
+  observe(estimate);
+  if (adrift_) // the way back to the submap is no motion of the robot
+    return move_on(prior.T_last_now, uncertainty_.against_submap(), estimate);
+  judge_sources(sweep, prior, T_last_now, estimate);
+  const Vector6 last_twist = twist_base_;
+  move_on(T_last_now, uncertainty_.against_submap(), estimate);
+  bend(sweep, twist_base_ - last_twist, estimate);
+  if (estimate.state != TrackingState::degenerate)
     feedback_.twist_base = twist_base_;
 }
 
-/// The covariance of the pose before, as one of the pose now: turns about there move what is here.
-void Odometry::carry_covariance(const Eigen::Vector3d& moved_m) {
-  Matrix6 transport = Matrix6::Identity();
-  transport.topRightCorner<3, 3>() = -skew(moved_m);
-  covariance_ = transport * covariance_ * transport.transpose();
+/// A sweep that no source corrected was corrected with one twist throughout. Where the robot accelerated it is bent,
+/// and lies the more askew.
+void Odometry::bend(const Sweep& sweep, const Vector6& twist_change, const OdometryEstimate& estimate) {
+  if (sweep.uncorrected == Uncorrected::nothing)
+    return;
+  Vector6 askew = kAskew * to_seconds(sweep.end - sweep.start) * twist_change;
+  if (sweep.uncorrected == Uncorrected::translation)
+    askew.tail<3>().setZero();
+  const Matrix6 R = turn_both(estimate.T_odom_base.rotation);
+  uncertainty_.predict(Eigen::Vector3d::Zero(), R * askew.cwiseAbs2().asDiagonal() * R.transpose(), Vector6::Zero());
+}
+
+/// Which axes of the base the lidar sees, and whether they are enough.
+void Odometry::observe(OdometryEstimate& estimate) {
+  constexpr double kLeast = 1e-6; ///< keeps an axis of which nothing is seen solvable
+  const Matrix6 R = turn_both(estimate.T_odom_base.rotation);
+  const Matrix6 seen = R.transpose() * estimate.scan_to_submap.observability * R + kLeast * Matrix6::Identity();
+  estimate.observability = seen.inverse().diagonal().cwiseInverse().cwiseMin(1.0);
+  bool degenerate = false;
+  for (std::size_t axis = 0; axis < weak_.size(); ++axis) {
+    const double observability = estimate.observability[static_cast<Eigen::Index>(axis)];
+    weak_[axis] = observability < (weak_[axis] ? kObservableAbove : kDegenerateBelow);
+    degenerate = degenerate || weak_[axis];
+  }
+  if (degenerate && estimate.state == TrackingState::tracking)
+    estimate.state = TrackingState::degenerate;
 }
 
 /// The twist that T_last_now means, with its covariance.
@@ -423,20 +477,18 @@ void Odometry::finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& 
   else if (scan_.size() >= kMinPoints)
     ++refused_in_a_row_;
   feedback_ = {.from = last_stamp_, .to = sweep.end, .opinions = {}, .twist_base = {}};
+  if (estimate.failed)
+    estimate.state = TrackingState::dead_reckoning;
   if (processed_ > 0 && estimate.failed)
-    drift(prior, estimate);
+    move_on(T_odom_last_.inverse() * estimate.T_odom_base, covariance_of(prior), estimate);
   else if (processed_ > 0)
     settle(sweep, prior, estimate);
-  if (scan_.size() < kMinPoints || estimate.failed)
-    estimate.state = TrackingState::dead_reckoning;
-  else
-    estimate.state = degenerate_ ? TrackingState::degenerate : TrackingState::tracking;
+  estimate.pose_covariance = uncertainty_.since_start();
+  adrift_ = estimate.failed;
 
   update_map(estimate);
-  if (estimate.keyframe) {
-    covariance_ = estimate.pose_covariance;
-    adrift_ = {};
-  }
+  if (estimate.keyframe)
+    uncertainty_.keep();
   ++processed_;
   T_odom_last_ = estimate.T_odom_base;
   last_stamp_ = sweep.end;

@@ -8,12 +8,15 @@
 #include <vector>
 
 #include "core/flat_ground.hpp"
+#include "core/gyro_bias.hpp"
 #include "core/odometry_estimate.hpp"
 #include "core/options.hpp"
+#include "core/pose_uncertainty.hpp"
 #include "core/prior_statistics.hpp"
 #include "core/registration.hpp"
 #include "core/registration_feedback.hpp"
 #include "core/stage_clock.hpp"
+#include "core/standstill.hpp"
 #include "core/surface_map.hpp"
 #include "core/sweep.hpp"
 
@@ -64,15 +67,19 @@ class Odometry {
   Registration match_submap(const Prior& prior, const Pose& T_last_now, const Gicp::StopRequested& stop);
   void begin_again(const Sweep& sweep, const Prior& prior, Registration& found, const Gicp::StopRequested& stop);
   [[nodiscard]] Pose flatten(const Pose& T_last_now) const;
-  [[nodiscard]] Vector6 variance_in_submap(const Prior& prior) const;
+  void predict(const Prior& prior);
+  [[nodiscard]] Matrix6 covariance_of(const Prior& prior) const;
+  [[nodiscard]] Vector6 variance_against_submap() const;
   [[nodiscard]] bool trusts(const Registration& registration, const Pose& T_last_now, const Pose& T_last_predicted,
                             const Vector6& variance) const;
-  void judge_sources(const Sweep& sweep, const Prior& prior, const Pose& T_last_now, const Registration& registration);
+  void judge_sources(const Sweep& sweep, const Prior& prior, const Pose& T_last_now, const OdometryEstimate& estimate);
   [[nodiscard]] std::span<const SurfacePoint> registered() const { return std::span(scan_).first(registered_); }
   void update_map(OdometryEstimate& estimate);
-  void drift(const Prior& prior, OdometryEstimate& estimate);
+  void hold_still(const Sweep& sweep, OdometryEstimate& estimate);
+  [[nodiscard]] bool sources_saw_motion(const Sweep& sweep) const;
   void settle(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate);
-  void carry_covariance(const Eigen::Vector3d& moved_m);
+  void bend(const Sweep& sweep, const Vector6& twist_change, const OdometryEstimate& estimate);
+  void observe(OdometryEstimate& estimate);
   void move_on(const Pose& T_last_now, const Matrix6& covariance_odom, OdometryEstimate& estimate);
   void finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate);
 
@@ -98,12 +105,12 @@ class Odometry {
   Pose T_odom_last_;
   Vector6 twist_base_ = Vector6::Zero();
   Pose T_odom_keyframe_;
-  Matrix6 covariance_ = Matrix6::Zero(); ///< of T_odom_last_, what the map has gathered
-  struct {
-    Vector6 bias = Vector6::Zero(), variance = Vector6::Zero(); ///< odom axes
-  } adrift_;                 ///< how far predictions may be off since the last registered sweep
-  int refused_in_a_row_ = 0; ///< sweeps with points
-  bool degenerate_ = false;
+  PoseUncertainty uncertainty_;
+  std::vector<GyroBias> gyro_biases_;
+  Standstill standstill_;
+  int refused_in_a_row_ = 0;   ///< sweeps with points
+  bool adrift_ = false;        ///< the last sweep was a prediction
+  std::array<bool, 6> weak_{}; ///< axes that lidar hardly sees
   RegistrationFeedback feedback_;
 };
 

@@ -27,6 +27,10 @@ struct OdometryEstimate {
   Matrix6 pose_covariance = Matrix6::Zero();  ///< of x, y, z and turns about the odom axes; since the start
   Vector6 twist_base = Vector6::Zero();       ///< m/s and rad/s, base frame
   Matrix6 twist_covariance = Matrix6::Zero(); ///< base frame
+  /// How well lidar sees x, y, z, roll, pitch and yaw of the base, from 0 (not at all) to 1: the share of the normals
+  /// around that lies along an axis, for turns the square of their mean lever in metres; after what a motion along the
+  /// other axes could be mistaken for is taken out.
+  Vector6 observability = Vector6::Zero();
   TrackingState state = TrackingState::tracking;
   PriorSource prior;
   Registration scan_to_scan;   ///< paper equation 1; zero iterations where it did not run

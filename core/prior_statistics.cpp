@@ -15,26 +15,25 @@ constexpr double kLidarDominates = 4.0;
 
 } // namespace
 
-PriorStatistics::PriorStatistics(const Vector6& initial_sigma, const Vector6& least_sigma)
-    : variance_(initial_sigma.cwiseAbs2()), least_variance_(least_sigma.cwiseAbs2()), bias_(initial_sigma) {}
+PriorStatistics::PriorStatistics(const PriorExpectation& expectation)
+    : variance_(expectation.sigma.cwiseAbs2()), least_variance_(expectation.least_sigma.cwiseAbs2()),
+      bias_(expectation.bias) {}
 
 void PriorStatistics::learn(const Vector6& difference, const Matrix6& lidar_information) {
-  learned_ = std::min(learned_ + 1.0, kMemoryOfBias_sweeps);
-  const double memory_sweeps = std::min(learned_, kMemory_sweeps);
   for (int axis = 0; axis < 6; ++axis) {
     if (lidar_information(axis, axis) * variance_[axis] < kLidarDominates)
       continue;
+    learned_[axis] = std::min(learned_[axis] + 1.0, kMemoryOfBias_sweeps);
+    const double memory_sweeps = std::min(learned_[axis], kMemory_sweeps);
     variance_[axis] += (difference[axis] * difference[axis] - variance_[axis]) / (memory_sweeps + 1.0);
-    bias_[axis] += (difference[axis] - bias_[axis]) / (learned_ + 1.0);
+    bias_[axis] += (difference[axis] - bias_[axis]) / (learned_[axis] + 1.0);
     variance_[axis] = std::max(variance_[axis], least_variance_[axis]);
   }
 }
 
 /// A mean that the noise of the samples may have made says nothing.
 Vector6 PriorStatistics::bias(double periods) const {
-  if (learned_ == 0.0)
-    return periods * bias_;
-  const Vector6 noise = (variance_ / learned_).cwiseSqrt();
+  const Vector6 noise = (learned_.array() > 0.0).select(variance_.array() / learned_.array().max(1.0), 0.0).sqrt();
   return periods * (bias_.cwiseAbs() - noise).cwiseMax(0.0);
 }
 

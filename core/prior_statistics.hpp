@@ -5,6 +5,13 @@
 
 namespace locus {
 
+/// What is expected of a kind of prior before anything is learned, per sweep.
+struct PriorExpectation {
+  Vector6 sigma;       ///< standard deviation
+  Vector6 bias;        ///< the part of an error that the next sweep repeats
+  Vector6 least_sigma; ///< the least ever believed
+};
+
 /// How far one kind of prior lies from what the lidar finds, axis by axis, learned from sweep to sweep.
 ///
 /// Its inverse is the weight of the prior in the registration, so a prior is trusted as far as it has proved itself and
@@ -12,9 +19,7 @@ namespace locus {
 /// registration repeats the prior, which proves nothing. One owner.
 class PriorStatistics {
  public:
-  /// `initial_sigma` and `least_sigma`: standard deviation per sweep before anything is learned, and the least ever
-  /// believed.
-  PriorStatistics(const Vector6& initial_sigma, const Vector6& least_sigma);
+  explicit PriorStatistics(const PriorExpectation& expectation);
 
   /// `difference` of the registration from the prior in base axes; `lidar_information` of the registration in the same
   /// axes.
@@ -31,7 +36,7 @@ class PriorStatistics {
   Vector6 variance_;
   Vector6 least_variance_;
   Vector6 bias_;
-  double learned_ = 0.0;
+  Vector6 learned_ = Vector6::Zero(); ///< sweeps in which lidar saw the axis
 };
 
 } // namespace locus

@@ -33,6 +33,17 @@ constexpr double kConvergedTranslation_m = 5e-4;
 constexpr double kConvergedRotation_rad = 5e-5;
 constexpr int kStepsPerLookUp = 2; ///< Gauss-Newton steps on the same counterparts
 
+/// Where fewer than this share of the normals points, there is next to nothing to hold on to.
+constexpr double kFewNormals = 0.01;
+
+WeakDirections weak_directions(const Matrix6& observability) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(observability.topLeftCorner<3, 3>());
+  WeakDirections weak;
+  for (int axis = 0; axis < 2 && axes.eigenvalues()[axis] < kFewNormals; ++axis)
+    weak.unit[weak.count++] = axes.eigenvectors().col(axis).cast<float>();
+  return weak;
+}
+
 } // namespace
 
 struct Gicp::Workers {
@@ -59,11 +70,27 @@ struct Gicp::Workers {
 
   /// One pass over all points, block by block in a fixed order of summation.
   NormalEquations run(const GicpPass& pass) {
+    if (pass.look_up != LookUp::keep)
+      look_up(pass);
     for_each_block([&](std::size_t block) { partial[block] = linearise(pass, blocks[block], matches[block], isa); });
     NormalEquations total;
     for (std::size_t block = 0; block < blocks.size(); ++block)
       total += partial[block];
     return total;
+  }
+
+  void look_up(const GicpPass& pass) {
+    for_each_block([&](std::size_t block) { find(pass, blocks[block], matches[block]); });
+    const WeakDirections weak = weak_directions(observability(pass.T_target_source.R()));
+    for (MatchBlock& block : matches)
+      straighten(weak, block);
+  }
+
+  [[nodiscard]] Matrix6 observability(const Eigen::Matrix3d& R_target_source) const {
+    Geometry total;
+    for (std::size_t block = 0; block < blocks.size(); ++block)
+      total += geometry(R_target_source, blocks[block], matches[block]);
+    return total.gradients / std::max(total.points, 1.0);
   }
 
   /// Our own: other users of TBB in the process neither slow us nor are bound by our number of threads.
@@ -90,11 +117,9 @@ Vector6 solve(const NormalEquations& points, const Pose& T, const PosePrior& pri
 }
 
 void describe(const NormalEquations& points, Registration& result) {
-  using Solver = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>;
   result.inliers = points.inliers;
   result.mean_error = points.error / points.weight;
   result.information = points.H;
-  result.observability = Solver(points.normals / points.weight, Eigen::EigenvaluesOnly).eigenvalues();
 }
 
 bool is_small(const Vector6& step) {
@@ -134,6 +159,8 @@ Registration Gicp::align(std::span<const SurfacePoint> source, const SurfaceMap&
     if (result.converged)
       break;
   }
+  if (result.iterations > 0)
+    result.observability = workers_->observability(result.T_target_source.R());
   return result;
 }
 

@@ -29,8 +29,9 @@ struct Registration {
   std::size_t inliers = 0;               ///< points with a counterpart within reach
   double mean_error = 0.0;               ///< mean squared Mahalanobis distance of the inliers
   Matrix6 information = Matrix6::Zero(); ///< of the points alone, without the prior; order and frame as in PosePrior
-  Eigen::Vector3d observability =
-      Eigen::Vector3d::Zero(); ///< eigenvalues of the mean of n n', ascending: 0 = unseen direction
+  /// Mean over the points of (n, p x n) with itself, n the unit normal of the counterpart, p the point in m about the
+  /// source's origin: what the surfaces around allow to be seen. Target axes.
+  Matrix6 observability = Matrix6::Zero();
 };
 
 /// Generalised ICP (Segal 2009; paper equations 1 and 2): aligns points that have surface covariances with a map of

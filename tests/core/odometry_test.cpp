@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <numbers>
 #include <random>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -189,6 +190,24 @@ TEST(Odometry, TenSecondsWithoutLidarAreBridgedByWheelOdometry) {
   expect_sound(result.estimates);
 }
 
+TEST(Odometry, AlongABareCorridorTheWheelsCarryOnAndTheDoubtGrows) {
+  const sim::Trajectory trajectory = sixty_metres({.position_m = {50, 0}});
+  const Outcome result =
+      drive_through(sim::corridor(200, sim::Walls::bare), trajectory, robot_with_wheels_and_imu(), seconds{15});
+  const Pose truth = true_motion(trajectory, result.estimates.front().stamp, result.estimates.back().stamp);
+  const double driven_m = truth.translation.norm();
+  ASSERT_GT(driven_m, 20.0);
+  EXPECT_LT(result.worst_error_m, 0.007 * driven_m) << "half a percent of slip";
+  const auto sigma_m = [](const OdometryEstimate& e, int axis) { return std::sqrt(e.pose_covariance(axis, axis)); };
+  const OdometryEstimate &early = result.estimates[5], &late = result.estimates.back();
+  EXPECT_EQ(late.state, TrackingState::degenerate);
+  EXPECT_LT(late.observability[0], 0.01);
+  EXPECT_GT(late.observability[1], 0.1);
+  EXPECT_GT(sigma_m(late, 0), 10 * sigma_m(early, 0));
+  EXPECT_LT(sigma_m(late, 1), 0.1);
+  EXPECT_LT(result.worst_error_m, 3 * sigma_m(late, 0));
+}
+
 TEST(Odometry, TheErrorOfABlindStretchIsTakenBackWhereTheMapIsKnown) {
   const sim::Trajectory trajectory(sim::room_course(seconds{40}, 1.0), sim::room_start());
   const Stamp dark = trajectory.start() + seconds{15}, light = dark + seconds{10};
@@ -326,17 +345,26 @@ TEST(Odometry, TheMapTakesASweepAfterAMetreOrThirtyDegrees) {
   EXPECT_GT(keyframes, 15U);
 }
 
-TEST(Odometry, ARobotThatStandsAddsNothingToTheMap) {
+TEST(Odometry, ARobotThatStandsIsHeldAndAddsNothingToTheMap) {
   const sim::Trajectory trajectory(sim::Course{}.stand(seconds{10}));
   const RobotSetup setup = robot_with_lidar_alone();
   Odometry odometry(setup.odometry());
   std::vector<std::size_t> sizes;
+  std::vector<OdometryEstimate> estimates;
   drive(sim::room(), trajectory, setup, seconds{10}, [&](const Sweep& sweep) {
-    odometry.process(sweep);
+    estimates.push_back(odometry.process(sweep));
     sizes.push_back(odometry.map().fine().size());
   });
   ASSERT_GT(sizes.size(), 90U);
   EXPECT_EQ(sizes.back(), sizes[2]);
+  for (const OdometryEstimate& e : std::span(estimates).subspan(20)) {
+    ASSERT_EQ(e.state, TrackingState::standstill);
+    ASSERT_EQ(e.T_odom_base, estimates.back().T_odom_base);
+    ASSERT_TRUE(e.twist_base.isZero());
+  }
+  const Pose error = estimates.front().T_odom_base.inverse() * estimates.back().T_odom_base;
+  EXPECT_LT(error.translation.norm(), 0.005);
+  EXPECT_LT(angle_rad(error.rotation), 0.05 * kPerDegree_rad);
 }
 
 TEST(Odometry, BeginsLevelByGravityAndWithoutYaw) {

@@ -10,16 +10,16 @@ namespace locus {
 namespace {
 
 const Vector6 kInitial = Vector6::Constant(0.1);
-const Vector6 kLeast = Vector6::Constant(0.002);
+const PriorExpectation kExpectation{.sigma = kInitial, .bias = 0.5 * kInitial, .least_sigma = Vector6::Constant(0.002)};
 const Matrix6 kSeesAll = 1e6 * Matrix6::Identity();
 
 TEST(PriorStatistics, BeginsWithWhatItWasTold) {
-  const PriorStatistics statistics(kInitial, kLeast);
+  const PriorStatistics statistics(kExpectation);
   EXPECT_TRUE(statistics.variance(1.0).isApprox(kInitial.cwiseAbs2()));
 }
 
 TEST(PriorStatistics, LearnsTheSpreadOfEachAxis) {
-  PriorStatistics statistics(kInitial, kLeast);
+  PriorStatistics statistics(kExpectation);
   std::mt19937 random{1};
   std::normal_distribution<double> normal;
   Vector6 sigma;
@@ -38,14 +38,14 @@ TEST(PriorStatistics, LearnsTheSpreadOfEachAxis) {
 }
 
 TEST(PriorStatistics, NeverBelievesMoreThanTheLeast) {
-  PriorStatistics statistics(kInitial, kLeast);
+  PriorStatistics statistics(kExpectation);
   for (int i = 0; i < 1000; ++i)
     statistics.learn(Vector6::Zero(), kSeesAll);
-  EXPECT_TRUE(statistics.variance(1.0).isApprox(kLeast.cwiseAbs2()));
+  EXPECT_TRUE(statistics.variance(1.0).isApprox(kExpectation.least_sigma.cwiseAbs2()));
 }
 
 TEST(PriorStatistics, ForgetsWhatALongTimeAgoWasSo) {
-  PriorStatistics statistics(kInitial, kLeast);
+  PriorStatistics statistics(kExpectation);
   for (int i = 0; i < 1000; ++i)
     statistics.learn(Vector6::Zero(), kSeesAll);
   for (int i = 0; i < 100; ++i)
@@ -54,7 +54,7 @@ TEST(PriorStatistics, ForgetsWhatALongTimeAgoWasSo) {
 }
 
 TEST(PriorStatistics, AnAxisThatThePointsDoNotSeeTeachesNothing) {
-  PriorStatistics statistics(kInitial, kLeast);
+  PriorStatistics statistics(kExpectation);
   Matrix6 blind_along_x = kSeesAll;
   blind_along_x(0, 0) = 1.0; // a standard deviation of a metre
   for (int i = 0; i < 1000; ++i)
@@ -64,8 +64,9 @@ TEST(PriorStatistics, AnAxisThatThePointsDoNotSeeTeachesNothing) {
 }
 
 TEST(PriorStatistics, TheBiasIsWhatIsLeftOfErrorsWhenTheirNoiseHasGoneOut) {
-  PriorStatistics statistics(kInitial, kLeast);
-  EXPECT_TRUE(statistics.bias(1.0).isApprox(kInitial)) << "who is not known yet may err the same way all the time";
+  PriorStatistics statistics(kExpectation);
+  EXPECT_TRUE(statistics.bias(1.0).isApprox(0.5 * kInitial))
+      << "who is not known yet may err the same way all the time";
   std::mt19937 random{1};
   std::normal_distribution<double> normal;
   for (int i = 0; i < 3000; ++i) {
@@ -79,7 +80,7 @@ TEST(PriorStatistics, TheBiasIsWhatIsLeftOfErrorsWhenTheirNoiseHasGoneOut) {
 }
 
 TEST(PriorStatistics, TheDeviationGrowsWithTheTimeBetween) {
-  const PriorStatistics statistics(kInitial, kLeast);
+  const PriorStatistics statistics(kExpectation);
   EXPECT_TRUE(statistics.variance(10.0).isApprox(100.0 * kInitial.cwiseAbs2()));
 }
 
