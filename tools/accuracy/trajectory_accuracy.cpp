@@ -9,49 +9,10 @@
 #include <numbers>
 #include <numeric>
 
+#include "accuracy/pose_pairs.hpp"
+
 namespace locus {
 namespace {
-
-struct PosePair {
-  Stamp stamp;
-  Pose T_odom_base;
-  Pose T_truth_base;
-};
-
-/// Beyond this, an interval of the truth is a hole: twice the usual one, but a second is always bridged.
-Duration longest_interval(std::span<const StampedPose> truth) {
-  std::vector<Duration> intervals;
-  for (std::size_t i = 1; i < truth.size(); ++i)
-    intervals.push_back(truth[i].stamp - truth[i - 1].stamp);
-  if (intervals.empty())
-    return {};
-  const auto median = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
-  std::ranges::nth_element(intervals, median);
-  return std::max<Duration>(std::chrono::seconds{1}, 2 * *median);
-}
-
-std::optional<Pose> pose_at(std::span<const StampedPose> truth, Stamp stamp, Duration longest) {
-  const auto after = std::ranges::lower_bound(truth, stamp, {}, &StampedPose::stamp);
-  if (after == truth.end() || (after == truth.begin() && after->stamp > stamp))
-    return std::nullopt;
-  if (after->stamp == stamp)
-    return after->T_source_base;
-  const auto before = std::prev(after);
-  if (after->stamp - before->stamp > longest)
-    return std::nullopt;
-  return interpolate(before->T_source_base, after->T_source_base,
-                     to_seconds(stamp - before->stamp) / to_seconds(after->stamp - before->stamp));
-}
-
-std::vector<PosePair> paired(std::span<const StampedPose> estimates, std::span<const StampedPose> truth) {
-  const Duration longest = longest_interval(truth);
-  std::vector<PosePair> pairs;
-  for (const StampedPose& estimate : estimates) {
-    if (const std::optional<Pose> T_truth_base = pose_at(truth, estimate.stamp, longest))
-      pairs.push_back({estimate.stamp, estimate.T_source_base, *T_truth_base});
-  }
-  return pairs;
-}
 
 /// Points that move with the attitude of the base, and are centred on it.
 const std::array<Eigen::Vector3d, 4> kAroundBase{{{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}}};
@@ -74,25 +35,21 @@ struct StretchError {
   double percent, deg;
 };
 
-/// The mean over every stretch that begins at a pose and ends at the first one `length_m` of path farther on.
+/// The mean over all stretches.
 std::optional<StretchError> relative_error(std::span<const PosePair> pairs, double length_m) {
-  std::vector<double> path_m{0.0};
-  for (std::size_t i = 1; i < pairs.size(); ++i)
-    path_m.push_back(path_m.back() +
-                     (pairs[i].T_truth_base.translation - pairs[i - 1].T_truth_base.translation).norm());
-  StretchError sum{0, 0};
-  std::size_t begin = 0;
-  for (std::size_t end = 1; end < pairs.size(); ++end) {
-    for (; path_m[end] - path_m[begin] >= length_m; ++begin) {
-      const Pose T_truth = pairs[begin].T_truth_base.inverse() * pairs[end].T_truth_base;
-      const Pose error = T_truth.inverse() * (pairs[begin].T_odom_base.inverse() * pairs[end].T_odom_base);
-      sum.percent += 100.0 * error.translation.norm() / (path_m[end] - path_m[begin]);
-      sum.deg += angle_rad(error.rotation) * 180.0 / std::numbers::pi;
-    }
-  }
-  if (begin == 0)
+  const std::vector<Stretch> stretches = stretches_of(pairs, length_m);
+  if (stretches.empty())
     return std::nullopt;
-  return StretchError{sum.percent / static_cast<double>(begin), sum.deg / static_cast<double>(begin)};
+  StretchError sum{0, 0};
+  for (const Stretch& stretch : stretches) {
+    const PosePair &begin = pairs[stretch.begin], &end = pairs[stretch.end];
+    const Pose T_truth = begin.T_truth_base.inverse() * end.T_truth_base;
+    const Pose error = T_truth.inverse() * (begin.T_odom_base.inverse() * end.T_odom_base);
+    sum.percent += 100.0 * error.translation.norm() / stretch.length_m;
+    sum.deg += angle_rad(error.rotation) * 180.0 / std::numbers::pi;
+  }
+  const auto count = static_cast<double>(stretches.size());
+  return StretchError{sum.percent / count, sum.deg / count};
 }
 
 double end_drift_m(const PosePair& first, const PosePair& last) {

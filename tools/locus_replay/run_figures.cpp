@@ -71,6 +71,9 @@ void add_accuracy(const Accuracy& accuracy, ordered_json& json) {
     json["rpe_10m_percent"] = rounded_or_null(trajectory->rpe_10m_percent);
     json["end_drift_m"] = rounded(trajectory->end_drift_m);
   }
+  if (const auto& consistency = accuracy.consistency)
+    json["covariance"] = {{"nees_10m", rounded_or_null(consistency->nees_10m)},
+                          {"worst_sigma", rounded(consistency->worst_sigma)}};
   if (const auto& map = accuracy.map)
     json["map_error_m"] = {{"rmse", rounded_or_null(map->rmse_m)}, {"outliers", map->outliers}};
 }
@@ -87,6 +90,11 @@ std::string readable(const Accuracy& accuracy, std::size_t estimates) {
       text += fmt::format("; it speaks of {} of {} sweeps", trajectory->stamps.size(), estimates);
     text += '\n';
   }
+  if (const auto& consistency = accuracy.consistency; consistency && consistency->nees_10m)
+    text += fmt::format(
+        "honesty    normalised squared error over 10 m {:.1f} (6 is the truth about six axes), worst position "
+        "{:.1f} sigma off\n",
+        *consistency->nees_10m, consistency->worst_sigma);
   if (const auto& map = accuracy.map) {
     text += fmt::format("map truth  {} of {} points within 1 m", map->compared, map->compared + map->outliers);
     text += map->rmse_m ? fmt::format(", off by {:.3f} m rms\n", *map->rmse_m) : "\n";

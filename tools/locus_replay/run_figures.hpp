@@ -10,6 +10,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "accuracy/consistency.hpp"
 #include "accuracy/map_accuracy.hpp"
 #include "accuracy/trajectory_accuracy.hpp"
 #include "config/config.hpp"
@@ -58,6 +59,7 @@ class RunFigures {
 /// How far a run is from the truth, as far as that was given.
 struct Accuracy {
   std::optional<TrajectoryAccuracy> trajectory;
+  std::optional<Consistency> consistency; ///< of the covariances with that
   std::optional<MapAccuracy> map;
   std::vector<std::string> problems; ///< why one that was given could not be compared with, each a line for the user
   std::vector<std::string> warnings; ///< likewise: what makes the comparison worthless

@@ -18,14 +18,17 @@ Truth::Truth(const Arguments& arguments, const CaptureFolder& folder)
 }
 
 void Truth::take(const OdometryEstimate& estimate) {
-  if (!trajectory_.empty())
-    estimates_.push_back({estimate.stamp, estimate.T_odom_base});
+  if (trajectory_.empty())
+    return;
+  estimates_.push_back({estimate.stamp, estimate.T_odom_base});
+  covariances_.push_back(estimate.pose_covariance);
 }
 
 Accuracy Truth::compare(std::span<const SurfacePoint> map, bool show_progress) const {
   Accuracy accuracy;
   if (!trajectory_.empty()) {
     accuracy.trajectory = trajectory_accuracy(estimates_, trajectory_);
+    accuracy.consistency = consistency(estimates_, covariances_, trajectory_);
     if (!accuracy.trajectory)
       accuracy.problems.push_back(why_nothing_in_common());
   }

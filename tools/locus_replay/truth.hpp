@@ -38,6 +38,7 @@ class Truth {
   std::vector<StampedPose> trajectory_;
   std::optional<PointCloudFile> map_;
   std::vector<StampedPose> estimates_; ///< with a true trajectory alone
+  std::vector<Matrix6> covariances_;   ///< of these
 };
 
 } // namespace locus::tools

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "accuracy/consistency.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <random>
+#include <vector>
+
+#include "core/pose_uncertainty.hpp"
+
+namespace locus {
+namespace {
+
+using std::chrono::seconds;
+
+/// A drive of a metre a second along x, as estimated with an error and as stated.
+struct Drive {
+  std::vector<StampedPose> truth, estimates;
+  std::vector<Matrix6> covariances;
+
+  [[nodiscard]] std::optional<Consistency> judged() const { return consistency(estimates, covariances, truth); }
+};
+
+template <class ErrorAt> Drive drive(int poses, double variance_per_metre, ErrorAt&& error_at) {
+  Drive result;
+  for (int i = 0; i < poses; ++i) {
+    const Pose T_truth{Eigen::Quaterniond::Identity(), {1.0 * i, 0, 0}};
+    const Stamp stamp = stamp_from_ns(1'000'000'000'000) + i * seconds{1};
+    result.truth.push_back({stamp, T_truth});
+    result.estimates.push_back({stamp, error_at(i) * T_truth});
+    result.covariances.push_back(Matrix6::Identity() * (i * variance_per_metre));
+    result.covariances.back().diagonal().tail<3>() /= 1e4; // so that no turn moves what is 10 m ahead
+  }
+  return result;
+}
+
+Pose shifted(double x_m) { return {Eigen::Quaterniond::Identity(), {x_m, 0, 0}}; }
+
+TEST(Consistency, AnErrorOfOneSigmaAlongOneAxisCountsAsOne) {
+  // 1 cm a metre makes 0.1 m in 10 m, where the stated variance is 0.01 m^2.
+  const auto judged = drive(100, 0.001, [](int i) { return shifted(0.01 * i); }).judged();
+  ASSERT_TRUE(judged && judged->nees_10m);
+  EXPECT_NEAR(*judged->nees_10m, 1.0, 0.01);
+}
+
+TEST(Consistency, DeadReckoningThatIsStatedAsSuchHasSixForSixAxes) {
+  constexpr double kSigma_m = 0.01, kSigma_rad = 0.001;
+  std::mt19937 random{1};
+  std::normal_distribution<double> error_m(0.0, kSigma_m), error_rad(0.0, kSigma_rad);
+  Vector6 variance;
+  variance << Eigen::Vector3d::Constant(kSigma_m * kSigma_m), Eigen::Vector3d::Constant(kSigma_rad * kSigma_rad);
+  Drive walk = drive(20'000, 0.0, [](int) { return Pose{}; });
+  PoseUncertainty uncertainty;
+  Pose T_odom_base;
+  for (std::size_t i = 1; i < walk.estimates.size(); ++i) {
+    const Eigen::Vector3d step_m{1.0 + error_m(random), error_m(random), error_m(random)};
+    const Eigen::Vector3d moved_m = T_odom_base.rotation * step_m;
+    uncertainty.predict(moved_m, variance.asDiagonal(), Vector6::Zero());
+    T_odom_base.translation += moved_m;
+    T_odom_base.rotation =
+        (so3_exp({error_rad(random), error_rad(random), error_rad(random)}) * T_odom_base.rotation).normalized();
+    walk.estimates[i].T_source_base = T_odom_base;
+    walk.covariances[i] = uncertainty.since_start();
+  }
+  const auto judged = walk.judged();
+  ASSERT_TRUE(judged && judged->nees_10m);
+  EXPECT_NEAR(*judged->nees_10m, 6.0, 0.3);
+}
+
+TEST(Consistency, NothingIsSaidOfAStretchThatWasNotDriven) {
+  const auto judged = drive(5, 0.001, [](int) { return Pose{}; }).judged();
+  ASSERT_TRUE(judged);
+  EXPECT_FALSE(judged->nees_10m);
+  EXPECT_EQ(judged->worst_sigma, 0.0);
+}
+
+TEST(Consistency, TheWorstPositionIsFoundWhereverItIs) {
+  // After 50 m the stated deviation is 0.1 m.
+  const auto judged = drive(100, 0.0002, [](int i) { return shifted(i == 50 ? 0.4 : 0.0); }).judged();
+  ASSERT_TRUE(judged);
+  EXPECT_NEAR(judged->worst_sigma, 4.0, 1e-6);
+}
+
+TEST(Consistency, AnErrorBelowACentimetreIsNone) {
+  EXPECT_EQ(drive(20, 1e-12, [](int) { return Pose{}; }).judged()->worst_sigma, 0.0);
+  EXPECT_EQ(drive(20, 1e-12, [](int i) { return shifted(i == 3 ? 0.009 : 0.0); }).judged()->worst_sigma, 0.0);
+}
+
+TEST(Consistency, TruthOfAnotherTimeSaysNothing) {
+  Drive other = drive(20, 0.001, [](int) { return Pose{}; });
+  for (StampedPose& pose : other.truth)
+    pose.stamp += std::chrono::hours{1};
+  EXPECT_FALSE(other.judged());
+}
+
+} // namespace
+} // namespace locus
