@@ -81,7 +81,7 @@ class Page(unittest.TestCase):
             self.assertIn("paper: LOCUS 1.69 0.620 0.570 0.290 –", accuracy)
             self.assertIn("locusd as it ships 0.0400 0.0100 0.0100 0.0200 0.100", accuracy)
             self.assertIn("on one core 1.50 2.50 3.50 4.50 0.500 0.200", self.rows(browser, "pace"))
-            self.assertIn("locusd, Beta max APE 0.0400 m" + 3 * " OK, max APE 0.0400 m",
+            self.assertIn("locusd, Beta 0.0400 m" + 3 * " OK, 0.0400 m",
                           self.rows(browser, "robustness"))
             browser.keep_picture("experiments")
 

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "command_line.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/number_between.hpp"
 
@@ -43,14 +44,8 @@ std::optional<PlayArguments> parse_play_arguments(int argc, char** argv) {
              "  locus-play robot_folder/\n"
              "  locus-play --to 192.168.1.255 --interface eth0 --domain 7 robot_folder/\n"
              "  locus-play --fail wio:jump=5@30 robot_folder/");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& asked_for_text) {
-    app.exit(asked_for_text);
+  if (!parse_command_line(app, argc, argv))
     return std::nullopt;
-  } catch (const CLI::ParseError& error) {
-    throw Failure(ExitStatus::wrong_usage, fmt::format("{}; see locus-play --help", error.what()));
-  }
   for (const std::string& text : faults)
     arguments.faults.push_back(value_or_fail(Fault::parse(text), ExitStatus::wrong_usage));
   return arguments;

@@ -56,12 +56,12 @@ export function ablationTable(section) {
   const baseline_ms = kVariants[0].result?.summary.process_cpu_ms.p50;
   const rows = kVariants.map(({name, means, result}) => {
     const what = {text: means, className: "words"};
-    if (!result?.summary.ape_m) return {cells: [name, what, missing, "", "", "", ""]};
+    if (!result?.summary.ape_m) return {cells: [name, missing, "", "", "", "", what]};
     const {ape_m: ape, process_cpu_ms: cpu, points} = result.summary;
     const share = baseline_ms > 0 ? `${written(cpu.p50 / baseline_ms)} ×` : "–";
-    return {cells: [name, what, metres(ape.mean), metres(ape.max), written(points.filtered_mean), written(cpu.p50),
-                    share]};
+    return {cells: [name, metres(ape.mean), metres(ape.max), written(points.filtered_mean), written(cpu.p50), share,
+                    what]};
   });
   table(section.select(".drawing").html(""),
-        ["", "", "mean APE, m", "max", "points", "CPU ms a sweep", "of baseline"], [{rows}]);
+        ["", "mean APE, m", "max", "points", "CPU ms a sweep", "of baseline", ""], [{rows}]);
 }

@@ -33,11 +33,11 @@ const kFailures = {wio_imu_fail: "WIO and IMU fail", wio_fail: "WIO fails", lida
 export function robustness(section) {
   const cell = (row, key) => {
     if (!row[key]) return missing;
-    const text = `${row[key]}, max APE ${metres(find(row.course, key).summary.ape_m.max)} m`;
+    const text = `${row[key]}, ${metres(find(row.course, key).summary.ape_m.max)} m`;
     return {text, className: row[key] === "OK" ? null : "warning"};
   };
   const ours = results.robustness.map((row) => ({className: "ours", cells: [`locusd, ${courseName(row.course)}`,
-      `max APE ${metres(find(row.course, "locusd").summary.ape_m.max)} m`,
+      `${metres(find(row.course, "locusd").summary.ape_m.max)} m`,
       ...Object.keys(kFailures).map((key) => cell(row, key))]}));
   const theirs = {cells: ["paper: LOCUS", "–", ...Object.keys(kFailures).map((key) => paperRobustness[key])]};
   table(section.select(".drawing").html(""), ["", "no failure", ...Object.values(kFailures)],
