@@ -2,6 +2,7 @@
 #include "core/gicp_kernel.hpp"
 
 #include <cmath>
+#include <numeric>
 #include <span>
 
 namespace locus {
@@ -379,29 +380,53 @@ NormalEquations linearise(const GicpPass& pass, const SourceBlock& source, const
   return equations_of(sums);
 }
 
-Geometry geometry(const Eigen::Matrix3d& R_target_source, const SourceBlock& source, const MatchBlock& matches) {
-  Geometry sum;
-  const auto add = [&sum](const Eigen::Vector3d& p, const Eigen::Vector3d& n, double weight) {
-    Vector6 gradient;
-    gradient << n, p.cross(n);
-    sum.gradients.selfadjointView<Eigen::Lower>().rankUpdate(gradient, weight);
-  };
-  for (std::size_t i = 0; i < source.count; ++i) {
-    if (matches.found[i] == 0.0F)
-      continue;
-    const Eigen::Vector3d p =
-        R_target_source * Eigen::Vector3f(source.x_m[i], source.y_m[i], source.z_m[i]).cast<double>();
-    const Eigen::Vector3d n =
-        Eigen::Vector3f(matches.normal_x[i], matches.normal_y[i], matches.normal_z[i]).cast<double>();
-    sum.points += 1.0;
-    if (!n.isZero(0.0)) {
-      add(p, n, 1.0);
-      continue;
+Normals normals_of(const MatchBlock& matches) {
+  enum : std::size_t { kXx, kXy, kXz, kYy, kYz, kZz, kFound, kSums };
+  std::array<std::array<float, kLanes>, kSums> sums{};
+  for (std::size_t i = 0; i < kGicpBlock; i += kLanes) {
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const float x = matches.normal_x[i + lane], y = matches.normal_y[i + lane], z = matches.normal_z[i + lane];
+      sums[kXx][lane] += x * x;
+      sums[kXy][lane] += x * y;
+      sums[kXz][lane] += x * z;
+      sums[kYy][lane] += y * y;
+      sums[kYz][lane] += y * z;
+      sums[kZz][lane] += z * z;
+      sums[kFound][lane] += matches.found[i + lane];
     }
-    for (int axis = 0; axis < 3; ++axis)
-      add(p, Eigen::Vector3d::Unit(axis), 1.0 / 3.0);
   }
-  sum.gradients = sum.gradients.selfadjointView<Eigen::Lower>();
+  const auto total = [&sums](std::size_t sum) {
+    return static_cast<double>(std::accumulate(sums[sum].begin(), sums[sum].end(), 0.0F));
+  };
+  Normals normals;
+  normals.points = total(kFound);
+  normals.squares << total(kXx), total(kXy), total(kXz), total(kXy), total(kYy), total(kYz), total(kXz), total(kYz),
+      total(kZz);
+  const double shapeless = normals.points - normals.squares.trace();
+  normals.squares.diagonal().array() += shapeless / 3.0;
+  return normals;
+}
+
+Matrix6 gradients_of(const Eigen::Matrix3d& R_target_source, const SourceBlock& source, const MatchBlock& matches) {
+  using Row = Eigen::Array<float, 1, kGicpBlock>;
+  const auto row = [](const PerPoint& figures) { return Eigen::Map<const Row>(figures.data()); };
+  const Eigen::Matrix3f R = R_target_source.cast<float>();
+  Eigen::Matrix<float, 3, kGicpBlock> p;
+  for (int axis = 0; axis < 3; ++axis)
+    p.row(axis) = R(axis, 0) * row(source.x_m) + R(axis, 1) * row(source.y_m) + R(axis, 2) * row(source.z_m);
+  const auto x = p.row(0).array(), y = p.row(1).array(), z = p.row(2).array();
+  const auto nx = row(matches.normal_x), ny = row(matches.normal_y), nz = row(matches.normal_z);
+  Eigen::Matrix<float, 6, kGicpBlock> gradients;
+  gradients << nx, ny, nz, y * nz - z * ny, z * nx - x * nz, x * ny - y * nx;
+  Matrix6 sum = (gradients * gradients.transpose()).cast<double>();
+  for (std::size_t i = 0; i < source.count; ++i) {
+    const auto column = static_cast<Eigen::Index>(i);
+    if (matches.found[i] == 0.0F || !gradients.col(column).head<3>().isZero(0.0F))
+      continue;
+    Eigen::Matrix<double, 6, 3> shapeless;
+    shapeless << Eigen::Matrix3d::Identity(), skew(p.col(column).cast<double>());
+    sum += shapeless * shapeless.transpose() / 3.0;
+  }
   return sum;
 }
 

@@ -88,19 +88,21 @@ void straighten(const WeakDirections& weak, MatchBlock& matches);
 /// Sums up the normal equations. Pure; any thread. The result depends on the instruction set in its last digits.
 NormalEquations linearise(const GicpPass& pass, const SourceBlock& source, const MatchBlock& matches, Isa isa);
 
-/// Sums over the points of one block, of how the distance to the counterpart changes with the pose: with unit normals,
-/// so that it tells where the surfaces stand and not how well they are known.
-struct Geometry {
-  Matrix6 gradients = Matrix6::Zero(); ///< of (n, R p x n) with itself
+/// How many of the points of a block have a counterpart, and which way it faces; a shapeless one counts as a third of a
+/// plane along each axis.
+struct Normals {
+  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero(); ///< sum of n n'
   double points = 0.0;
 
-  void operator+=(const Geometry& other) {
-    gradients += other.gradients;
+  void operator+=(const Normals& other) {
+    squares += other.squares;
     points += other.points;
   }
 };
+Normals normals_of(const MatchBlock& matches);
 
-/// Of the points with a counterpart; a shapeless one counts as a third of a plane along each axis. Pure; any thread.
-Geometry geometry(const Eigen::Matrix3d& R_target_source, const SourceBlock& source, const MatchBlock& matches);
+/// Sum over the points of a block of (n, R p x n) with itself: how distances to the counterparts change with the pose.
+/// Of unit normals, so it tells where surfaces stand and not how well they are known. Counts as normals_of().
+Matrix6 gradients_of(const Eigen::Matrix3d& R_target_source, const SourceBlock& source, const MatchBlock& matches);
 
 } // namespace locus

@@ -36,8 +36,9 @@ constexpr int kStepsPerLookUp = 2; ///< Gauss-Newton steps on the same counterpa
 /// Where fewer than this share of the normals points, there is next to nothing to hold on to.
 constexpr double kFewNormals = 0.01;
 
-WeakDirections weak_directions(const Matrix6& observability) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(observability.topLeftCorner<3, 3>());
+WeakDirections weak_directions(const Normals& normals) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
+  axes.computeDirect(normals.squares / std::max(normals.points, 1.0));
   WeakDirections weak;
   for (int axis = 0; axis < 2 && axes.eigenvalues()[axis] < kFewNormals; ++axis)
     weak.unit[weak.count++] = axes.eigenvectors().col(axis).cast<float>();
@@ -81,16 +82,23 @@ struct Gicp::Workers {
 
   void look_up(const GicpPass& pass) {
     for_each_block([&](std::size_t block) { find(pass, blocks[block], matches[block]); });
-    const WeakDirections weak = weak_directions(observability(pass.T_target_source.R()));
-    for (MatchBlock& block : matches)
-      straighten(weak, block);
+    const WeakDirections weak = weak_directions(normals());
+    for (std::size_t block = 0; block < blocks.size() && weak.count > 0; ++block)
+      straighten(weak, matches[block]);
+  }
+
+  [[nodiscard]] Normals normals() const {
+    Normals total;
+    for (std::size_t block = 0; block < blocks.size(); ++block)
+      total += normals_of(matches[block]);
+    return total;
   }
 
   [[nodiscard]] Matrix6 observability(const Eigen::Matrix3d& R_target_source) const {
-    Geometry total;
+    Matrix6 gradients = Matrix6::Zero();
     for (std::size_t block = 0; block < blocks.size(); ++block)
-      total += geometry(R_target_source, blocks[block], matches[block]);
-    return total.gradients / std::max(total.points, 1.0);
+      gradients += gradients_of(R_target_source, blocks[block], matches[block]);
+    return gradients / std::max(normals().points, 1.0);
   }
 
   /// Our own: other users of TBB in the process neither slow us nor are bound by our number of threads.
