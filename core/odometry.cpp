@@ -158,7 +158,7 @@ Odometry::Odometry(const OdometryOptions& options, StageClock* clock)
 
 OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested& stop) {
   if (processed_ == 0)
-    return begin(sweep);
+    return begin(sweep, stop);
   const Prior prior = integrate_sensors(sweep);
   flat_ground_.observe(sweep.end, sweep.specific_force_base_mps2);
   Pose T_last_now = prior.T_last_now;
@@ -185,13 +185,30 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
   return estimate;
 }
 
-/// The world begins at the first sweep: at its origin, without yaw, level if gravity is known.
-OdometryEstimate Odometry::begin(const Sweep& sweep) {
-  const auto& force = sweep.specific_force_base_mps2;
-  if (force && std::abs(force->norm() - kGravity_mps2) < kGravityTolerance_mps2)
-    T_odom_last_.rotation = from_rpy_rad(level_rpy_rad(*force));
+void Odometry::begin_at(const Pose& T_odom_base, std::span<const SurfacePoint> map_odom) {
+  T_odom_start_ = T_odom_base;
+  knows_start_ = !map_odom.empty();
+  map_.insert(map_odom, Pose{});
+}
+
+/// The world begins at the first sweep: where it is told to, or at its origin, without yaw, level if gravity is known.
+OdometryEstimate Odometry::begin(const Sweep& sweep, const Gicp::StopRequested& stop) {
   correct_all(sweep.points, Vector6::Zero(), Duration::zero(), scan_);
   registered_ = sweep.registered;
+  const auto& force = sweep.specific_force_base_mps2;
+  if (T_odom_start_)
+    T_odom_last_ = *T_odom_start_;
+  if (knows_start_ && scan_.size() >= kMinPoints) {
+    const std::optional<Registration> found = find_again(stop);
+    resumed_ = found.has_value();
+    knows_start_ = false;
+    if (found)
+      T_odom_last_ = found->T_target_source;
+    else
+      T_odom_start_.reset();
+  }
+  if (!T_odom_start_ && force && std::abs(force->norm() - kGravity_mps2) < kGravityTolerance_mps2)
+    T_odom_last_.rotation = from_rpy_rad(level_rpy_rad(*force));
   if (sweep.uncorrected != Uncorrected::nothing)
     first_points_ = sweep.points;
   OdometryEstimate estimate;
@@ -201,6 +218,21 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
   if (estimate.failed)
     processed_ = 0; // nothing was seen yet: the next sweep is the first
   return estimate;
+}
+
+/// The first sweep in the map that it is to begin with; without it the map is cleared.
+std::optional<Registration> Odometry::find_again(const Gicp::StopRequested& stop) {
+  constexpr double kLeastInlierShare = 0.6, kFarthest_m = 0.5;
+  const StageScope scope(clock_, Stage::scan_to_submap);
+  const PosePrior prior{T_odom_last_, sigma(kFarthest_m, 5.0).cwiseAbs2().cwiseInverse().asDiagonal()};
+  const Registration found = gicp_.align(registered(), map_, T_odom_last_, prior, options_.scan_to_submap, true, stop);
+  const Eigen::Vector3d moved_m = found.T_target_source.translation - T_odom_last_.translation;
+  if (found.iterations > 0 && found.T_target_source.finite() && moved_m.norm() < kFarthest_m &&
+      static_cast<double>(found.inliers) >= kLeastInlierShare * static_cast<double>(registered_))
+    return found;
+  map_.clear();
+  T_odom_last_ = {};
+  return std::nullopt;
 }
 
 Odometry::Prior Odometry::integrate_sensors(const Sweep& sweep) const {

@@ -32,6 +32,13 @@ class Odometry {
  public:
   explicit Odometry(const OdometryOptions& options, StageClock* clock = nullptr);
 
+  /// Before the first sweep: where it is to be, instead of level at the origin. With surfaces that were seen there
+  /// before (odom frame) it is registered with them; where it does not fit it begins level at the origin all the same.
+  void begin_at(const Pose& T_odom_base, std::span<const SurfacePoint> map_odom = {});
+
+  /// Whether the first sweep was found in the surfaces that it was to begin with.
+  [[nodiscard]] bool resumed() const { return resumed_; }
+
   /// The estimate for the end of the sweep. Never fails: a sweep that cannot be registered yields the prediction,
   /// flagged. `stop` ends a registration early.
   OdometryEstimate process(
@@ -58,7 +65,8 @@ class Odometry {
     bool blind = false; ///< nothing at all is known yet, not even a velocity
   };
 
-  OdometryEstimate begin(const Sweep& sweep);
+  OdometryEstimate begin(const Sweep& sweep, const Gicp::StopRequested& stop);
+  [[nodiscard]] std::optional<Registration> find_again(const Gicp::StopRequested& stop);
   [[nodiscard]] Prior integrate_sensors(const Sweep& sweep) const;
   [[nodiscard]] std::optional<Pose> step(const Sweep& sweep, std::size_t source) const;
   void correct_motion(const Sweep& sweep, const Pose& T_last_now);
@@ -97,6 +105,9 @@ class Odometry {
   PriorStatistics constant_velocity_statistics_;
 
   std::uint64_t processed_ = 0;
+  std::optional<Pose> T_odom_start_; ///< where to begin
+  bool knows_start_ = false;         ///< the map holds what was seen there
+  bool resumed_ = false;
   std::vector<SweepPoint>
       first_points_; ///< of the first sweep, as they came: no velocity was known to correct them with
   Stamp last_stamp_;

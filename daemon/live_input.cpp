@@ -41,19 +41,22 @@ void LiveInput::push(const Motion& motion) noexcept {
   eventfd_write(motion_is_there_, 1);
 }
 
+/// Motion that is there already still waits for a look at the sockets: an older datagram may lie there.
 Input LiveInput::next(Duration timeout) {
-  if (auto input = take_earliest())
-    return *input;
+  if (!next_motion_)
+    next_motion_ = motion_.pop();
   const Stamp asked{read_clock(CLOCK_REALTIME)}; // before the look: what comes after it is not older
-  const timespec wait = to_timespec(timeout);
-  ppoll(poll_.data(), poll_.size(), &wait, nullptr);
-  receive();
+  if (std::ranges::all_of(waiting_, [](const auto& datagrams) { return datagrams.empty(); }))
+    receive(next_motion_ ? Duration::zero() : timeout);
   if (auto input = take_earliest())
     return *input;
   return Silence{asked};
 }
 
-void LiveInput::receive() {
+/// Waits until something is there, at most for `timeout`.
+void LiveInput::receive(Duration timeout) {
+  const timespec wait = to_timespec(timeout);
+  ppoll(poll_.data(), poll_.size(), &wait, nullptr);
   std::uint64_t drops = 0;
   for (std::size_t i = 0; i < sockets_.size(); ++i) {
     if (poll_[i].revents != 0)

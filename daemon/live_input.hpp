@@ -43,7 +43,7 @@ class LiveInput : public InputSource {
 
  private:
   [[nodiscard]] std::optional<Input> take_earliest();
-  void receive();
+  void receive(Duration timeout);
 
   std::vector<UdpSocket> sockets_;
   std::vector<std::span<const Datagram>> waiting_; ///< by socket: received and not given out yet

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
+#include <vector>
 
 #include "core/odometry.hpp"
 #include "daemon/machine_time.hpp"
@@ -24,6 +26,12 @@ struct SweepCounters {
   bool operator==(const SweepCounters&) const = default;
 };
 
+/// Where to begin, see Odometry::begin_at().
+struct StartPoint {
+  Pose T_odom_base;
+  std::vector<SurfacePoint> map_odom;
+};
+
 /// The estimate for one sweep, with what it took.
 struct ProcessedSweep {
   OdometryEstimate estimate;
@@ -37,7 +45,11 @@ struct ProcessedSweep {
 /// Odometry with its costs measured; what the daemon's odometry thread and the replay in one thread share. One owner.
 class SweepProcessor {
  public:
-  explicit SweepProcessor(const OdometryOptions& options) : odometry_(options, &stages_) {}
+  explicit SweepProcessor(const OdometryOptions& options, const std::optional<StartPoint>& start = {})
+      : odometry_(options, &stages_) {
+    if (start)
+      odometry_.begin_at(start->T_odom_base, start->map_odom);
+  }
   SweepProcessor(const SweepProcessor&) = delete;
   SweepProcessor& operator=(const SweepProcessor&) = delete;
 

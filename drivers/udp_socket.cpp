@@ -28,6 +28,23 @@ std::string because(const char* what, std::uint16_t port) {
                      advice); // NOLINT(concurrency-mt-unsafe)
 }
 
+/// Lidars speak IPv4; a socket of both families, as systemd makes them, sees their addresses mapped.
+std::uint32_t ip_of(const sockaddr_storage& address) {
+  std::uint32_t ip = 0;
+  if (address.ss_family == AF_INET)
+    std::memcpy(&ip, &reinterpret_cast<const sockaddr_in&>(address).sin_addr, sizeof(ip));
+  else if (address.ss_family == AF_INET6)
+    std::memcpy(&ip, &reinterpret_cast<const sockaddr_in6&>(address).sin6_addr.s6_addr[12], sizeof(ip));
+  return ntohl(ip);
+}
+
+std::uint16_t port_of(const sockaddr_storage& address) {
+  if (address.ss_family == AF_INET)
+    return ntohs(reinterpret_cast<const sockaddr_in&>(address).sin_port);
+  return address.ss_family == AF_INET6 ? ntohs(reinterpret_cast<const sockaddr_in6&>(address).sin6_port)
+                                       : std::uint16_t{0};
+}
+
 bool set(int descriptor, int level, int option, int value) {
   return setsockopt(descriptor, level, option, &value, sizeof(value)) == 0;
 }
@@ -40,7 +57,7 @@ struct UdpSocket::Batch {
 
   std::array<std::array<std::byte, kMaxPayloadBytes>, kBatch> payloads;
   alignas(cmsghdr) std::array<Control, kBatch> controls;
-  std::array<sockaddr_in, kBatch> senders{};
+  std::array<sockaddr_storage, kBatch> senders{};
   std::array<iovec, kBatch> vectors{};
   std::array<mmsghdr, kBatch> messages{};
   std::array<Datagram, kBatch> datagrams;
@@ -49,7 +66,7 @@ struct UdpSocket::Batch {
     for (std::size_t i = 0; i < kBatch; ++i) {
       vectors[i] = {payloads[i].data(), payloads[i].size()};
       msghdr& header = messages[i].msg_hdr;
-      header = {&senders[i], sizeof(sockaddr_in), &vectors[i], 1, controls[i].data(), controls[i].size(), 0};
+      header = {&senders[i], sizeof(sockaddr_storage), &vectors[i], 1, controls[i].data(), controls[i].size(), 0};
     }
   }
 };
@@ -93,11 +110,11 @@ Expected<UdpSocket, std::string> UdpSocket::adopt(int descriptor) {
 
 /// SO_RCVBUFFORCE needs a privilege; without it the kernel gives as much as net.core.rmem_max allows.
 std::optional<std::string> UdpSocket::prepare() {
-  sockaddr_in address{};
+  sockaddr_storage address{};
   socklen_t size = sizeof(address);
-  if (getsockname(descriptor_, reinterpret_cast<sockaddr*>(&address), &size) != 0 || address.sin_family != AF_INET)
-    return fmt::format("descriptor {} is no IPv4 socket; lidars speak nothing else", descriptor_);
-  port_ = ntohs(address.sin_port);
+  if (getsockname(descriptor_, reinterpret_cast<sockaddr*>(&address), &size) != 0 || port_of(address) == 0)
+    return fmt::format("descriptor {} is bound to no UDP port", descriptor_);
+  port_ = port_of(address);
   if (!set(descriptor_, SOL_SOCKET, SO_RCVBUFFORCE, kWantedBufferBytes))
     set(descriptor_, SOL_SOCKET, SO_RCVBUF, kWantedBufferBytes);
   size = sizeof(buffer_bytes_);
@@ -137,7 +154,7 @@ std::span<const Datagram> UdpSocket::receive() {
   const auto to_stamp = [](const timespec& t) { return Stamp{std::chrono::seconds{t.tv_sec} + Duration{t.tv_nsec}}; };
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     msghdr& header = batch_->messages[i].msg_hdr;
-    const sockaddr_in& sender = batch_->senders[i];
+    const sockaddr_storage& sender = batch_->senders[i];
     Stamp stamp = to_stamp(clock);
     for (cmsghdr* control = CMSG_FIRSTHDR(&header); control != nullptr; control = CMSG_NXTHDR(&header, control)) {
       if (control->cmsg_level != SOL_SOCKET)
@@ -154,8 +171,8 @@ std::span<const Datagram> UdpSocket::receive() {
       }
     }
     batch_->datagrams[i] = {{batch_->payloads[i].data(), batch_->messages[i].msg_len},
-                            ntohl(sender.sin_addr.s_addr),
-                            ntohs(sender.sin_port),
+                            ip_of(sender),
+                            port_of(sender),
                             port_,
                             stamp,
                             (header.msg_flags & MSG_TRUNC) != 0};

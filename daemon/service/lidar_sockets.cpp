@@ -33,7 +33,7 @@ std::vector<int> inherited_sockets() {
   std::vector<int> descriptors;
   const int count = sd_listen_fds(1);
   for (int i = 0; i < count; ++i)
-    if (const int descriptor = SD_LISTEN_FDS_START + i; sd_is_socket(descriptor, AF_INET, SOCK_DGRAM, -1) > 0)
+    if (const int descriptor = SD_LISTEN_FDS_START + i; sd_is_socket(descriptor, AF_UNSPEC, SOCK_DGRAM, -1) > 0)
       descriptors.push_back(descriptor);
   return descriptors;
 }

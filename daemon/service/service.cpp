@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/service/service.hpp"
 
+#include <array>
 #include <csignal>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
@@ -56,27 +58,66 @@ int Service::run(const Config& config) {
     log_.warn(*problem);
   if (const auto problem = config.realtime.lock_memory ? lock_memory() : std::nullopt)
     log_.warn(*problem);
-  if (!begin(config))
+  if (!begin(config, recent_state()))
     return 1;
+  auto control = ControlServer::open(control_path(), [this](const nlohmann::json& request) { return answer(request); });
+  if (control)
+    control_ = std::move(*control);
+  else
+    log_.warn(control.error());
   sd_notify(0, "READY=1");
   for (bool wanted = true; wanted;) {
-    pollfd wait{signals_, POLLIN, 0};
+    std::vector<pollfd> wait{{signals_, POLLIN, 0}};
+    if (control_)
+      control_->add_to(wait);
     const timespec tick = to_timespec(kTick);
-    ppoll(&wait, 1, &tick, nullptr);
+    ppoll(wait.data(), wait.size(), &tick, nullptr);
     wanted = take_signal();
+    if (wanted && control_)
+      control_->serve();
     look_after();
   }
   sd_notify(0, "STOPPING=1\nSTATUS=Stopping");
   watch_.reset();
+  if (session_)
+    keep_state(session_->stop());
   session_.reset();
   log_.info("stopped");
   return 0;
 }
 
-bool Service::begin(const Config& config) {
+/// What another service left behind, if it can still be true.
+std::optional<SavedState> Service::recent_state() {
+  constexpr Duration kOldest = std::chrono::seconds{60};
+  const auto file = state_path();
+  if (!file || !std::filesystem::exists(*file))
+    return std::nullopt;
+  auto state = load_state(*file);
+  if (!state) {
+    log_.warn(fmt::format("a fresh start: {}", state.error()));
+    return std::nullopt;
+  }
+  const Duration age = Stamp{read_clock(CLOCK_REALTIME)} - state->stamp;
+  if (age < Duration::zero() || age > kOldest) {
+    log_.info(fmt::format("a fresh start: the saved state is {:.0f} s old, more than {:.0f} s", to_seconds(age),
+                          to_seconds(kOldest)));
+    return std::nullopt;
+  }
+  return std::move(*state);
+}
+
+void Service::keep_state(std::optional<SavedState> state) {
+  const auto file = state_path();
+  if (!file || !state)
+    return;
+  if (const auto problem = write_state(*file, *state))
+    log_.error(*problem);
+}
+
+bool Service::begin(const Config& config, std::optional<SavedState> state) {
   watch_.reset();
   session_.reset();
-  auto session = Session::start(config, inherited_, log_);
+  auto session = Session::start(config, inherited_, std::move(state), log_);
   if (!session) {
     log_.error(session.error());
     return false;
@@ -91,10 +132,16 @@ std::optional<std::string> Service::reload() {
   std::optional<std::string> problem;
   const auto config = read_config(config_file_);
   const Config old = session_->config();
-  if (!config)
+  if (!config) {
     problem = fmt::format("{}", fmt::join(config.error(), "; "));
-  else if (!begin(*config))
-    problem = begin(old) ? "the sockets of the new configuration cannot be opened" : "neither can be opened";
+  } else {
+    std::optional<SavedState> state = session_->stop();
+    if (state)
+      state->flat_ground = config->odometry.flat_ground;
+    if (!begin(*config, state))
+      problem =
+          begin(old, state) ? "its sockets cannot be opened" : "its sockets cannot be opened, nor can the old ones";
+  }
   if (problem)
     log_.error(fmt::format("reload refused, the old configuration stays in force: {}", *problem));
   else
@@ -113,6 +160,50 @@ bool Service::take_signal() {
       return false;
   }
   return true;
+}
+
+std::optional<ControlServer::Answer> Service::answer(const nlohmann::json& request) {
+  using Answer = ControlServer::Answer;
+  const auto done = [] { return Answer{{{"done", true}}, {}}; };
+  const auto refused = [](const std::string& why) { return Answer{{{"error", why}}, {}}; };
+  const std::string command = request["command"];
+  if (command == "status")
+    return Answer{status_json(*session_), {}};
+  if (command == "save-map")
+    return answer_map();
+  if (command == "flat-ground") {
+    const std::string mode = request["mode"];
+    if (mode != "on" && mode != "off" && mode != "auto")
+      return refused("flat-ground must be on, off or auto");
+    session_->set_flat_ground(mode == "on" ? FlatGround::on : mode == "off" ? FlatGround::off : FlatGround::automatic);
+    return done();
+  }
+  if (command == "reset") {
+    std::optional<Pose> T_odom_base;
+    if (request.contains("pose")) {
+      const auto v = request["pose"].get<std::array<double, 6>>();
+      T_odom_base = Pose{from_rpy_rad(Eigen::Vector3d{v[3], v[4], v[5]} * (EIGEN_PI / 180)), {v[0], v[1], v[2]}};
+    }
+    session_->reset(T_odom_base);
+    return done();
+  }
+  if (command == "reload") {
+    const auto problem = reload();
+    return problem ? refused(*problem) : done();
+  }
+  return refused(fmt::format("unknown command {}; use locusctl of the same version", command));
+}
+
+/// The points of the map as they lie in memory. Nothing until the odometry thread has brought them.
+std::optional<ControlServer::Answer> Service::answer_map() {
+  if (!std::exchange(map_asked_, true))
+    session_->request_map();
+  const std::vector<SurfacePoint>* const points = session_->take_map();
+  if (points == nullptr)
+    return std::nullopt;
+  map_asked_ = false;
+  const auto bytes = std::as_bytes(std::span(*points));
+  return ControlServer::Answer{{{"points", points->size()}}, {bytes.begin(), bytes.end()}};
 }
 
 void Service::look_after() {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "config/config_yaml.hpp"
+#include "daemon/service/control_server.hpp"
 #include "daemon/service/log.hpp"
 #include "daemon/service/session.hpp"
 #include "daemon/service/watch.hpp"
@@ -29,7 +30,11 @@ class Service {
   int run(const Config& config);
 
  private:
-  bool begin(const Config& config);
+  bool begin(const Config& config, std::optional<SavedState> state);
+  [[nodiscard]] std::optional<SavedState> recent_state();
+  void keep_state(std::optional<SavedState> state);
+  std::optional<ControlServer::Answer> answer(const nlohmann::json& request);
+  std::optional<ControlServer::Answer> answer_map();
   /// Takes the configuration file again; a bad one leaves the old configuration in force, and that is said.
   std::optional<std::string> reload();
   void look_after();
@@ -41,6 +46,8 @@ class Service {
   std::vector<int> inherited_;
   int signals_; ///< signalfd
   std::unique_ptr<Session> session_;
+  std::optional<ControlServer> control_;
+  bool map_asked_ = false;
   std::optional<Watch> watch_;
   Watchdog watchdog_;
   Duration told_{};

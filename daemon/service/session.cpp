@@ -32,39 +32,89 @@ OdometryReport report_of(const FastSample& s) {
 std::string_view to_string(TrackingState state) { return kStateNames[static_cast<std::size_t>(state)]; }
 
 Expected<std::unique_ptr<Session>, std::string> Session::start(const Config& config, std::span<const int> inherited,
-                                                               Log& log) {
+                                                               std::optional<SavedState> state, Log& log) {
   auto lidars = LidarRouter::open(config.lidars);
   if (!lidars)
     return lidars.error();
   auto sockets = open_lidar_sockets(config, inherited, log);
   if (!sockets)
     return sockets.error();
-  return std::unique_ptr<Session>(new Session(config, std::move(*lidars), std::move(*sockets), log));
+  return std::unique_ptr<Session>(new Session(config, std::move(*lidars), std::move(*sockets), std::move(state), log));
 }
 
-Session::Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket> sockets, Log& log)
+Session::Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket> sockets,
+                 std::optional<SavedState> state, Log& log)
     : config_(config), log_(log), started_(read_clock(CLOCK_MONOTONIC)), input_(std::move(sockets)),
-      flat_ground_(config.odometry.flat_ground), link_(config, [this](const RosInput& input) { receive(input); }),
-      clouds_(config.dds, link_) {
+      flat_ground_(state ? state->flat_ground : config.odometry.flat_ground),
+      link_(config, [this](const RosInput& input) { receive(input); }), clouds_(config.dds, link_),
+      state_(state_path(), [this](const std::string& problem) { log_.error(problem); }) {
+  tells_resumed_ = state.has_value();
+  begin(std::move(lidars), state ? std::optional{std::move(state->start)} : std::nullopt);
+}
+
+Session::~Session() { end(); }
+
+void Session::begin(LidarRouter lidars, std::optional<StartPoint> start) {
   LiveOptions options;
+  options.start = std::move(start);
   options.on_thread_start = [this] {
     if (const auto problem = raise_priority(config_.realtime.priority))
       log_.warn(*problem);
   };
   options.after_estimate = [this](const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
-    clouds_.take(sweep, odometry, estimate);
+    after(sweep, odometry, estimate);
   };
+  const std::scoped_lock lock(pipeline_mutex_);
   pipeline_ = std::make_unique<LivePipeline>(config_, std::move(lidars), input_, std::move(options));
-  running_.store(pipeline_.get(), std::memory_order_release);
+  pipeline_->set_flat_ground(flat_ground());
+  stopping_.store(false, std::memory_order_relaxed);
   publisher_ = std::thread([this] { publish(); });
   pthread_setname_np(publisher_.native_handle(), "publisher");
 }
 
-Session::~Session() {
-  running_.store(nullptr, std::memory_order_release);
+void Session::end() {
   stopping_.store(true, std::memory_order_relaxed);
-  publisher_.join();
+  if (publisher_.joinable())
+    publisher_.join();
   pipeline_->stop();
+}
+
+/// In the odometry thread, when the estimate has left.
+void Session::after(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
+  resumed_.store(odometry.resumed() ? Resumed::yes : Resumed::no, std::memory_order_relaxed);
+  clouds_.take(sweep, odometry, estimate);
+  state_.take(odometry, estimate, flat_ground());
+  if (!map_wanted_.exchange(false, std::memory_order_relaxed))
+    return;
+  std::vector<SurfacePoint>& points = map_.back();
+  points.clear();
+  const SurfaceGrid& grid = odometry.map().fine();
+  for (std::size_t slot = 0; slot < grid.size(); ++slot)
+    if (const Surface& surface = grid.surface(slot); surface.planar())
+      points.push_back({grid.centre(slot).cast<float>() + surface.mean_m, surface.normal});
+  static_cast<void>(map_.publish());
+}
+
+void Session::reset(std::optional<Pose> T_odom_base) {
+  auto lidars = LidarRouter::open(config_.lidars);
+  if (!lidars) {
+    log_.error(fmt::format("reset refused: {}", lidars.error()));
+    return;
+  }
+  end();
+  begin(std::move(*lidars), T_odom_base ? std::optional{StartPoint{*T_odom_base, {}}} : std::nullopt);
+  log_.info("odometry begins anew, as it was told to");
+}
+
+std::optional<SavedState> Session::stop() {
+  end();
+  const std::optional<OdometryEstimate> last = figures_.snapshot().last;
+  if (!last)
+    return std::nullopt;
+  SavedState state;
+  read_state(pipeline_->processor().odometry(), *last, state);
+  state.flat_ground = flat_ground();
+  return state;
 }
 
 void Session::receive(const RosInput& input) {
@@ -92,8 +142,9 @@ void Session::take(FlatGroundWord word) {
 
 void Session::set_flat_ground(FlatGround mode) {
   flat_ground_.store(mode, std::memory_order_relaxed);
-  if (LivePipeline* const running = running_.load(std::memory_order_acquire))
-    running->set_flat_ground(mode);
+  const std::scoped_lock lock(pipeline_mutex_);
+  if (pipeline_)
+    pipeline_->set_flat_ground(mode);
 }
 
 void Session::publish() {
@@ -114,6 +165,13 @@ void Session::publish() {
 }
 
 void Session::tell(const ProcessedSweep& done) {
+  if (const Resumed resumed = resumed_.load(std::memory_order_relaxed); tells_resumed_ && resumed != Resumed::unknown) {
+    tells_resumed_ = false;
+    if (resumed == Resumed::yes)
+      log_.info("resumed where the service ended");
+    else
+      log_.warn("a fresh start: the first sweep does not fit the saved state");
+  }
   const TrackingState state = done.estimate.state;
   if (told_state_ == state)
     return;

@@ -4,6 +4,8 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -17,6 +19,7 @@
 #include "daemon/service/cloud_publisher.hpp"
 #include "daemon/service/live_figures.hpp"
 #include "daemon/service/log.hpp"
+#include "daemon/service/saved_state.hpp"
 
 namespace locus::daemon {
 
@@ -29,7 +32,7 @@ class Session {
  public:
   /// Opens what there is and starts all threads. Fails with one line for the user.
   static Expected<std::unique_ptr<Session>, std::string> start(const Config& config, std::span<const int> inherited,
-                                                               Log& log);
+                                                               std::optional<SavedState> state, Log& log);
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -48,11 +51,25 @@ class Session {
   };
   [[nodiscard]] Progress progress() const;
 
+  /// Begins anew, at a pose or level at the origin, with an empty map.
+  void reset(std::optional<Pose> T_odom_base);
+
+  /// Ends the live threads for good, and tells what another session needs to go on; nothing without an estimate.
+  std::optional<SavedState> stop();
+
+  /// Asks for the surfaces of the map, which come with the next sweep.
+  void request_map() { map_wanted_.store(true, std::memory_order_relaxed); }
+  [[nodiscard]] const std::vector<SurfacePoint>* take_map() { return map_.take(); }
+
   void set_flat_ground(FlatGround mode);
   [[nodiscard]] FlatGround flat_ground() const { return flat_ground_.load(std::memory_order_relaxed); }
 
  private:
-  Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket> sockets, Log& log);
+  Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket> sockets, std::optional<SavedState> state,
+          Log& log);
+  void begin(LidarRouter lidars, std::optional<StartPoint> start);
+  void end();
+  void after(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate);
   void receive(const RosInput& input);
   void take(FlatGroundWord word);
   void publish();
@@ -67,9 +84,15 @@ class Session {
   std::atomic<FlatGround> flat_ground_;
   Duration flat_ground_changed_{}; ///< of the thread of the link
   std::unique_ptr<LivePipeline> pipeline_;
-  std::atomic<LivePipeline*> running_{nullptr}; ///< the same once it exists, for the thread of the link
+  std::mutex pipeline_mutex_; ///< of those who change pipeline_ and the thread of the link
+  enum class Resumed : std::uint8_t { unknown, yes, no };
+  std::atomic<Resumed> resumed_{Resumed::unknown};
+  bool tells_resumed_ = false; ///< of the publisher
+  std::atomic<bool> map_wanted_{false};
+  LatestSlot<std::vector<SurfacePoint>> map_;
   RosLink link_;
   CloudPublisher clouds_;
+  StateKeeper state_;
   std::optional<TrackingState> told_state_;
   std::atomic<std::uint64_t> publisher_progress_{0};
   std::atomic<bool> stopping_{false};

@@ -101,7 +101,7 @@ void add_estimate(const LiveFigures::Snapshot& figures, ordered_json& json) {
   for (int i = 0; i < 36; ++i)
     covariance.push_back(last.pose_covariance(i / 6, i % 6));
   json["covariance"] = covariance;
-  json["observability"] = last.scan_to_submap.observability;
+  json["observability"] = std::vector<double>(last.observability.begin(), last.observability.end());
 }
 
 } // namespace

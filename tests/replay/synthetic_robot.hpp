@@ -10,7 +10,8 @@
 namespace locus::test {
 
 /// What a robot with ordinary sensors (noise, bias, slip) brings back from a drive around a room.
-inline void write_room_drive(const std::filesystem::path& folder, Duration duration, int lidars = 1) {
+inline void write_room_drive(const std::filesystem::path& folder, Duration duration, int lidars = 1,
+                             double speed_mps = 1.0) {
   sim::RobotOptions robot{.lidars = {}};
   for (int i = 0; i < lidars; ++i) {
     sim::NamedLidar lidar{i == 0 ? "front" : "rear", {}};
@@ -25,7 +26,7 @@ inline void write_room_drive(const std::filesystem::path& folder, Duration durat
   robot.imu->faults = {
       .gyro_bias_radps = {0.001, -0.0015, 0.002}, .gyro_noise_radps = 0.003, .accelerometer_noise_mps2 = 0.05};
   robot.odometry.front().faults = {.scale_error = 0.01, .noise_m_per_sqrt_m = 0.005};
-  const sim::Trajectory trajectory(sim::room_course(duration, 1.0), sim::room_start());
+  const sim::Trajectory trajectory(sim::room_course(duration, speed_mps), sim::room_start());
   sim::write_capture_folder(folder, sim::room(), trajectory, duration, robot);
 }
 

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/service/control_server.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+
+#include <fmt/format.h>
+#include <grp.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "daemon/machine_time.hpp"
+
+namespace locus::daemon {
+
+namespace {
+
+constexpr std::size_t kMaxRequestBytes = 4096;
+constexpr Duration kLongestAnswer = std::chrono::seconds{3};
+
+std::vector<gid_t> groups_of(int client) {
+  std::vector<gid_t> groups(256);
+  socklen_t size = static_cast<socklen_t>(groups.size() * sizeof(gid_t));
+  if (getsockopt(client, SOL_SOCKET, SO_PEERGROUPS, groups.data(), &size) != 0)
+    size = 0;
+  groups.resize(size / sizeof(gid_t));
+  return groups;
+}
+
+bool may_command(int client) {
+  ucred peer{};
+  socklen_t size = sizeof(peer);
+  if (getsockopt(client, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0)
+    return false;
+  if (peer.uid == 0 || peer.uid == geteuid())
+    return true;
+  const group* const allowed = getgrnam("locusd"); // NOLINT(concurrency-mt-unsafe): the main thread alone asks
+  if (allowed == nullptr)
+    return false;
+  const std::vector<gid_t> groups = groups_of(client);
+  return peer.gid == allowed->gr_gid || std::ranges::find(groups, allowed->gr_gid) != groups.end();
+}
+
+Descriptor memory_file(std::span<const std::byte> bytes) {
+  Descriptor file{memfd_create("answer", MFD_CLOEXEC)};
+  while (!bytes.empty()) {
+    const ssize_t written = write(file.number(), bytes.data(), bytes.size());
+    if (written <= 0)
+      return Descriptor{};
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+  }
+  return file;
+}
+
+/// Whether it left; an answer that does not fit a client's buffer is its own fault.
+bool send(int client, const ControlServer::Answer& answer) {
+  std::string text = answer.json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  const Descriptor file = answer.bytes.empty() ? Descriptor{} : memory_file(answer.bytes);
+  iovec vector{text.data(), text.size()};
+  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control{};
+  msghdr message{};
+  message.msg_iov = &vector;
+  message.msg_iovlen = 1;
+  if (file.number() >= 0) {
+    message.msg_control = control.data();
+    message.msg_controllen = control.size();
+    cmsghdr* const header = CMSG_FIRSTHDR(&message);
+    header->cmsg_level = SOL_SOCKET;
+    header->cmsg_type = SCM_RIGHTS;
+    header->cmsg_len = CMSG_LEN(sizeof(int));
+    const int number = file.number();
+    std::memcpy(CMSG_DATA(header), &number, sizeof(number));
+  }
+  return sendmsg(client, &message, MSG_DONTWAIT | MSG_NOSIGNAL) >= 0;
+}
+
+ControlServer::Answer refusal(const std::string& why) { return {{{"error", why}}, {}}; }
+
+} // namespace
+
+Descriptor::~Descriptor() {
+  if (number_ >= 0)
+    close(number_);
+}
+
+std::filesystem::path control_path() {
+  const char* const folder = std::getenv("RUNTIME_DIRECTORY"); // NOLINT(concurrency-mt-unsafe): nobody sets it
+  return std::filesystem::path(folder != nullptr ? folder : "/run/locusd") / "control";
+}
+
+Expected<ControlServer, std::string> ControlServer::open(const std::filesystem::path& path, Handler handler) {
+  const auto failed = [&](const char* what) {
+    return fmt::format("{}: {}: {}; locusctl will not reach this service", path.string(), what,
+                       std::strerror(errno)); // NOLINT(concurrency-mt-unsafe)
+  };
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.native().size() >= sizeof(address.sun_path)) {
+    errno = ENAMETOOLONG;
+    return failed("no socket");
+  }
+  path.native().copy(address.sun_path, sizeof(address.sun_path) - 1);
+  std::error_code ignored;
+  std::filesystem::create_directories(path.parent_path(), ignored);
+  unlink(path.c_str()); // left behind by one that crashed
+  Descriptor listener{::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)};
+  if (bind(listener.number(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
+    return failed("cannot be made");
+  constexpr mode_t kEverybody = 0666; // who may do what is told by who asks
+  if (chmod(path.c_str(), kEverybody) != 0 || listen(listener.number(), kMaxClients) != 0)
+    return failed("cannot be listened to");
+  return ControlServer{std::move(listener), std::move(handler)};
+}
+
+void ControlServer::add_to(std::vector<pollfd>& poll) const {
+  poll.push_back({listener_.number(), POLLIN, 0});
+  for (const Client& client : clients_)
+    poll.push_back({client.socket.number(), POLLIN, 0});
+}
+
+void ControlServer::serve() {
+  accept_all();
+  std::erase_if(clients_, [this](Client& client) { return !serve(client); });
+}
+
+void ControlServer::accept_all() {
+  while (true) {
+    Descriptor client{accept4(listener_.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC)};
+    if (client.number() < 0)
+      return;
+    if (clients_.size() < kMaxClients)
+      clients_.push_back({std::move(client), std::nullopt, {}});
+    else
+      send(client.number(), refusal("too many clients; end a locusctl that still runs"));
+  }
+}
+
+bool ControlServer::serve(Client& client) {
+  if (!client.pending) {
+    std::array<char, kMaxRequestBytes> text{};
+    const ssize_t size = recv(client.socket.number(), text.data(), text.size(), MSG_DONTWAIT);
+    if (size < 0)
+      return errno == EAGAIN || errno == EINTR;
+    if (size == 0)
+      return false;
+    client.pending = nlohmann::json::parse(text.data(), text.data() + size, nullptr, false);
+    client.asked = read_clock(CLOCK_MONOTONIC);
+  }
+  const std::optional<Answer> answer = handle(client);
+  if (!answer)
+    return true;
+  client.pending.reset();
+  return send(client.socket.number(), *answer);
+}
+
+std::optional<ControlServer::Answer> ControlServer::handle(Client& client) {
+  const nlohmann::json& request = *client.pending;
+  if (!request.is_object() || !request.contains("command") || !request["command"].is_string())
+    return refusal("no request; use locusctl of the same version");
+  if (request["command"] != "status" && !may_command(client.socket.number()))
+    return refusal("not permitted; be root or a member of group locusd");
+  if (read_clock(CLOCK_MONOTONIC) - client.asked > kLongestAnswer)
+    return refusal("no answer in time; is there lidar data (locusctl status)?");
+  try {
+    return handler_(request);
+  } catch (const nlohmann::json::exception&) {
+    return refusal("the request lacks something; use locusctl of the same version");
+  }
+}
+
+} // namespace locus::daemon

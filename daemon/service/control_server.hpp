@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+#include <poll.h>
+
+#include "core/expected.hpp"
+#include "daemon/service/log.hpp"
+
+namespace locus::daemon {
+
+/// A file descriptor, closed at the end of its life.
+class Descriptor {
+ public:
+  explicit Descriptor(int number = -1) : number_(number) {}
+  ~Descriptor();
+  Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
+  Descriptor& operator=(Descriptor&& other) noexcept {
+    std::swap(number_, other.number_);
+    return *this;
+  }
+  [[nodiscard]] int number() const { return number_; }
+
+ private:
+  int number_;
+};
+
+/// Where locusctl reaches the service: a Unix socket on which each message is one request or one answer, in JSON.
+///
+/// A request is {"command": NAME, ...}. An answer holds "error" if it was refused, and may bring bytes along in a
+/// memory file, so that nobody waits for a slow reader. Everybody on the machine may ask for the status; the other
+/// commands are for root, the service's own user and members of group locusd. One owner, the main thread.
+class ControlServer {
+ public:
+  struct Answer {
+    nlohmann::ordered_json json;
+    std::vector<std::byte> bytes;
+  };
+  /// Nothing: the answer is not there yet; the same request is made again at the next serve(), for a few seconds.
+  using Handler = std::function<std::optional<Answer>(const nlohmann::json& request)>;
+
+  static constexpr std::size_t kMaxClients = 16;
+
+  /// Fails with one line for the user.
+  static Expected<ControlServer, std::string> open(const std::filesystem::path& path, Handler handler);
+
+  void add_to(std::vector<pollfd>& poll) const;
+  /// Takes what has come, without waiting.
+  void serve();
+
+ private:
+  struct Client {
+    Descriptor socket;
+    std::optional<nlohmann::json> pending;
+    Duration asked{};
+  };
+
+  ControlServer(Descriptor listener, Handler handler) : listener_(std::move(listener)), handler_(std::move(handler)) {}
+  void accept_all();
+  /// Whether the client stays.
+  bool serve(Client& client);
+  [[nodiscard]] std::optional<Answer> handle(Client& client);
+
+  Descriptor listener_;
+  Handler handler_;
+  std::vector<Client> clients_;
+};
+
+/// $RUNTIME_DIRECTORY/control as systemd sets it, else /run/locusd/control.
+std::filesystem::path control_path();
+
+} // namespace locus::daemon

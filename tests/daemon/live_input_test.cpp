@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/live_input.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <ctime>
+#include <thread>
+#include <vector>
+
+#include "daemon/allocation_counter.hpp"
+#include "daemon/machine_time.hpp"
+#include "support/temporary_file.hpp"
+#include "support/udp_sender.hpp"
+
+namespace locus::daemon {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+std::vector<UdpSocket> two_sockets() {
+  std::vector<UdpSocket> sockets;
+  for (int i = 0; i < 2; ++i)
+    sockets.push_back(std::move(*UdpSocket::open(0)));
+  return sockets;
+}
+
+Stamp now() { return Stamp{read_clock(CLOCK_REALTIME)}; }
+
+ImuInput imu_at(Stamp arrival) {
+  ImuInput input{1, {}};
+  input.sample.arrival = arrival;
+  return input;
+}
+
+TEST(LiveInput, GivesSocketsAndMotionInTheOrderOfArrival) {
+  LiveInput input(two_sockets());
+  const test::UdpSender sender;
+  const std::uint16_t first = input.sockets()[0].port(), second = input.sockets()[1].port();
+  sender.send(second, test::bytes_of("a"));
+  const Stamp between = now();
+  std::this_thread::sleep_for(milliseconds{1});
+  sender.send(first, test::bytes_of("b"));
+  sender.send(second, test::bytes_of("c"));
+  input.push(imu_at(between));
+
+  std::vector<std::uint16_t> ports;
+  for (int i = 0; i < 4; ++i) {
+    const Input next = input.next(milliseconds{100});
+    if (const auto* datagram = std::get_if<Datagram>(&next))
+      ports.push_back(datagram->destination_port);
+    else if (std::holds_alternative<ImuInput>(next))
+      ports.push_back(0);
+  }
+  EXPECT_EQ(ports, (std::vector<std::uint16_t>{second, 0, first, second}));
+  EXPECT_TRUE(std::holds_alternative<Silence>(input.next(milliseconds{1})));
+}
+
+TEST(LiveInput, SilenceIsNeverLaterThanWhatComesNext) {
+  LiveInput input(two_sockets());
+  const std::uint16_t port = input.sockets()[0].port();
+  std::thread robot([port] {
+    const test::UdpSender sender;
+    for (int i = 0; i < 100; ++i) {
+      sender.send(port, test::bytes_of("x"));
+      std::this_thread::sleep_for(milliseconds{3});
+    }
+  });
+  Stamp silent_until;
+  int datagrams = 0;
+  const Stamp give_up = now() + seconds{20};
+  while (datagrams < 100 && now() < give_up) {
+    const Input next = input.next(milliseconds{2});
+    if (const auto* silence = std::get_if<Silence>(&next)) {
+      silent_until = silence->now;
+    } else {
+      ++datagrams;
+      EXPECT_GE(std::get<Datagram>(next).receive_stamp, silent_until);
+    }
+  }
+  robot.join();
+  EXPECT_EQ(datagrams, 100);
+}
+
+TEST(LiveInput, MotionWakesTheWaitingThread) {
+  LiveInput input(two_sockets());
+  std::thread reader([&] {
+    std::this_thread::sleep_for(milliseconds{50});
+    input.push(imu_at(now()));
+  });
+  const Duration begin = read_clock(CLOCK_MONOTONIC);
+  EXPECT_TRUE(std::holds_alternative<ImuInput>(input.next(seconds{10})));
+  EXPECT_LT(read_clock(CLOCK_MONOTONIC) - begin, seconds{5});
+  reader.join();
+}
+
+TEST(LiveInput, MotionThatNobodyFetchesIsCounted) {
+  LiveInput input(two_sockets());
+  for (std::size_t i = 0; i < LiveInput::kMaxUnread + 7; ++i)
+    input.push(imu_at(now()));
+  EXPECT_EQ(input.motion_drops(), 7U);
+}
+
+TEST(LiveInput, AllocatesNothing) {
+  if (!allocations())
+    GTEST_SKIP() << "a sanitizer is in the way of counting";
+  LiveInput input(two_sockets());
+  const test::UdpSender sender;
+  const std::vector<std::byte> packet(1206);
+  int taken = 0;
+  const auto before = allocations();
+  for (int i = 0; i < 1000; ++i) {
+    sender.send(input.sockets()[static_cast<std::size_t>(i % 2)].port(), packet);
+    input.push(imu_at(Stamp{}));
+    for (int k = 0; k < 2; ++k)
+      taken += std::holds_alternative<Silence>(input.next(milliseconds{1})) ? 0 : 1;
+  }
+  EXPECT_EQ(allocations(), before);
+  EXPECT_EQ(taken, 2000);
+}
+
+} // namespace
+} // namespace locus::daemon

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/udp_socket.hpp"
+
+#include <gtest/gtest.h>
+
+#include <ctime>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include <fcntl.h>
+
+#include "support/temporary_file.hpp"
+#include "support/udp_sender.hpp"
+
+namespace locus {
+namespace {
+
+using test::UdpSender;
+
+constexpr std::uint16_t kAnyPort = 0; ///< the kernel chooses one that is free
+
+UdpSocket open_any() {
+  auto socket = UdpSocket::open(kAnyPort);
+  if (!socket)
+    throw std::runtime_error(socket.error());
+  return std::move(*socket);
+}
+
+Stamp now() {
+  timespec t{};
+  clock_gettime(CLOCK_REALTIME, &t);
+  return Stamp{std::chrono::seconds{t.tv_sec} + Duration{t.tv_nsec}};
+}
+
+TEST(UdpSocket, GivesPayloadSenderPortAndTheKernelsStamp) {
+  UdpSocket socket = open_any();
+  const UdpSender sender;
+  const Stamp before = now();
+  sender.send(socket.port(), test::bytes_of("first"));
+  sender.send(socket.port(), test::bytes_of("second"));
+  const Stamp after = now();
+  const auto datagrams = socket.receive();
+  ASSERT_EQ(datagrams.size(), 2U);
+  EXPECT_EQ(std::vector(datagrams[1].payload.begin(), datagrams[1].payload.end()), test::bytes_of("second"));
+  EXPECT_EQ(datagrams[0].source_ip, INADDR_LOOPBACK);
+  EXPECT_NE(datagrams[0].source_port, 0);
+  EXPECT_EQ(datagrams[0].destination_port, socket.port());
+  EXPECT_FALSE(datagrams[0].truncated);
+  EXPECT_GE(datagrams[0].receive_stamp, before);
+  EXPECT_LE(datagrams[0].receive_stamp, datagrams[1].receive_stamp);
+  EXPECT_LE(datagrams[1].receive_stamp, after) << "the kernel's, not that of the look";
+  EXPECT_TRUE(socket.receive().empty());
+}
+
+TEST(UdpSocket, LongDatagramIsCutAndSaysSo) {
+  UdpSocket socket = open_any();
+  UdpSender().send(socket.port(), std::vector<std::byte>(5000));
+  const auto datagrams = socket.receive();
+  ASSERT_EQ(datagrams.size(), 1U);
+  EXPECT_TRUE(datagrams[0].truncated);
+}
+
+TEST(UdpSocket, CountsWhatTheKernelHadNoRoomFor) {
+  UdpSocket socket = open_any();
+  const UdpSender sender;
+  const std::vector<std::byte> packet(1206);
+  const std::size_t flood = static_cast<std::size_t>(socket.buffer_bytes()) / packet.size() + 1000;
+  for (std::size_t i = 0; i < flood; ++i)
+    sender.send(socket.port(), packet);
+  std::size_t received = 0;
+  for (std::size_t batch = 1; batch > 0; received += batch)
+    batch = socket.receive().size();
+  sender.send(socket.port(), packet); // brings the count along
+  received += socket.receive().size();
+  EXPECT_GT(socket.kernel_drops(), 0U);
+  EXPECT_EQ(received + socket.kernel_drops(), flood + 1);
+}
+
+TEST(UdpSocket, HearsTheGroupsThatItHasJoined) {
+  constexpr std::uint32_t kGroup = 0xEF01'0203; // 239.1.2.3
+  UdpSocket socket = open_any();
+  ASSERT_TRUE(socket.join(kGroup));
+  EXPECT_TRUE(socket.join(kGroup)) << "and may be told again";
+  UdpSender().send(socket.port(), test::bytes_of("to all of us"), kGroup);
+  EXPECT_EQ(socket.receive().size(), 1U);
+}
+
+TEST(UdpSocket, PortThatIsTakenIsSaid) {
+  const UdpSocket first = open_any();
+  const auto second = UdpSocket::open(first.port());
+  ASSERT_FALSE(second);
+  EXPECT_NE(second.error().find("another program listens there"), std::string::npos) << second.error();
+}
+
+TEST(UdpSocket, TakesOverWhatIsBoundToBothFamilies) {
+  const int both = ::socket(AF_INET6, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_in6 any{};
+  any.sin6_family = AF_INET6;
+  ASSERT_EQ(bind(both, reinterpret_cast<const sockaddr*>(&any), sizeof(any)), 0);
+  auto socket = UdpSocket::adopt(both);
+  ASSERT_TRUE(socket) << socket.error();
+  UdpSender().send(socket->port(), test::bytes_of("mapped"));
+  const auto datagrams = socket->receive();
+  ASSERT_EQ(datagrams.size(), 1U);
+  EXPECT_EQ(datagrams[0].source_ip, INADDR_LOOPBACK);
+}
+
+TEST(UdpSocket, TakesOverNothingElse) {
+  EXPECT_FALSE(UdpSocket::adopt(open("/dev/null", O_RDONLY | O_CLOEXEC)));
+  EXPECT_FALSE(UdpSocket::adopt(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)));
+}
+
+} // namespace
+} // namespace locus

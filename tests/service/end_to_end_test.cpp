@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <csignal>
+#include <numbers>
+#include <sstream>
+
+#include "service/robot_network.hpp"
+
+namespace locus::test {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+class EndToEnd : public RobotNetwork {};
+
+/// By what locus-play moved all stamps.
+Duration shift_of(const Child& play) {
+  for (const std::string& line : play.lines())
+    if (const std::size_t at = line.find("shifted by "); at != std::string::npos)
+      return Duration{std::stoll(line.substr(at + 11))};
+  ADD_FAILURE() << testing::PrintToString(play.lines());
+  return {};
+}
+
+/// Every pose of the replay was heard, and is the same to 1 cm and 0.1 degrees. Stamps differ by what the jitter of
+/// arrivals does to a clock that is set by them.
+void expect_same(const std::vector<StampedPose>& replay, const std::vector<HeardPose>& heard, Duration shift,
+                 const std::string& who) {
+  double worst_m = 0, worst_deg = 0;
+  for (const StampedPose& expected : replay) {
+    const auto found = std::ranges::min_element(
+        heard, {}, [&](const HeardPose& pose) { return std::chrono::abs(pose.stamp - shift - expected.stamp); });
+    ASSERT_NE(found, heard.end());
+    ASSERT_LT(std::chrono::abs(found->stamp - shift - expected.stamp), milliseconds{2}) << who << " missed a sweep";
+    const Pose error = expected.T_source_base.inverse() * found->T_odom_base;
+    worst_m = std::max(worst_m, error.translation.norm());
+    worst_deg = std::max(worst_deg, angle_rad(error.rotation) * 180 / std::numbers::pi);
+  }
+  EXPECT_LT(worst_m, 0.01) << who;
+  EXPECT_LT(worst_deg, 0.1) << who;
+  testing::Test::RecordProperty(who + "_worst_um", static_cast<int>(1e6 * worst_m));
+  testing::Test::RecordProperty(who + "_worst_mdeg", static_cast<int>(1e3 * worst_deg));
+}
+
+TEST_F(EndToEnd, LiveOdometryIsThatOfTheReplayForCycloneAndForFastDds) {
+  const std::filesystem::path config = this->config();
+  Child daemon(locusd(config));
+  Child cyclone({CYCLONE_PEER, "0", "listen", "/locus"});
+  Child fast_dds({FAST_DDS_PEER, "0", "listen", "/locus"});
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  std::this_thread::sleep_for(seconds{2}); // the listeners find each other
+  Child play({LOCUS_PLAY, capture().string()});
+  ASSERT_EQ(play.wait_for_exit(seconds{60}), 0) << testing::PrintToString(play.lines());
+  std::this_thread::sleep_for(milliseconds{500});
+
+  const nlohmann::json status = this->status();
+  EXPECT_EQ(status["sweeps"]["dropped"], 0);
+  EXPECT_EQ(status["sweeps"]["failed"].get<int>() + status["sweeps"]["processed"].get<int>(), status["sweeps"]["seen"]);
+  EXPECT_EQ(status["packets"]["kernel_drops"], 0);
+  EXPECT_EQ(status["packets"]["total"]["lost"], 0);
+  const Replay replay({"--quiet", capture().string()});
+  ASSERT_EQ(replay.run().status, 0) << replay.run().err;
+  const std::vector<StampedPose> expected = replay.trajectory();
+  EXPECT_GE(expected.size(), 198U);
+  expect_same(expected, heard(cyclone), shift_of(play), "cyclone");
+  expect_same(expected, heard(fast_dds), shift_of(play), "fast_dds");
+  EXPECT_GT(heard(cyclone, "odometry_fast").size(), 15 * expected.size()) << "at the rate of the IMU";
+
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait_for_exit(seconds{1}), 0) << testing::PrintToString(daemon.lines());
+}
+
+} // namespace
+} // namespace locus::test

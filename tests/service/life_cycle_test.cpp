@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <set>
+#include <thread>
+
+#include <sched.h>
+#include <sys/mount.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "replay/synthetic_robot.hpp"
+#include "service/robot_network.hpp"
+
+namespace locus::test {
+namespace {
+
+using nlohmann::json;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+/// What systemd would hear of the service.
+class NotifySocket {
+ public:
+  explicit NotifySocket(const std::filesystem::path& path) : socket_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path.native().copy(address.sun_path, sizeof(address.sun_path) - 1);
+    EXPECT_EQ(bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
+    const timeval patience{0, 100'000};
+    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+    setenv("NOTIFY_SOCKET", path.c_str(), 1); // NOLINT(concurrency-mt-unsafe): before the program is started
+  }
+  ~NotifySocket() {
+    unsetenv("NOTIFY_SOCKET"); // NOLINT(concurrency-mt-unsafe)
+    close(socket_);
+  }
+  NotifySocket(const NotifySocket&) = delete;
+  NotifySocket& operator=(const NotifySocket&) = delete;
+
+  /// Whether a message with this word comes in time; all that come are counted.
+  bool hears(const std::string& word, Duration timeout) {
+    const auto give_up = std::chrono::steady_clock::now() + timeout;
+    while (std::chrono::steady_clock::now() < give_up) {
+      std::array<char, 4096> text{};
+      const ssize_t size = recv(socket_, text.data(), text.size(), 0);
+      if (size > 0 && std::string(text.data(), static_cast<std::size_t>(size)).find(word) != std::string::npos)
+        return true;
+    }
+    return false;
+  }
+
+ private:
+  int socket_;
+};
+
+class LifeCycle : public RobotNetwork {
+ protected:
+  static void play_to_end(std::vector<std::string> options = {}) {
+    options.insert(options.begin(), LOCUS_PLAY);
+    options.push_back(capture().string());
+    Child play(options);
+    EXPECT_EQ(play.wait_for_exit(seconds{60}), 0) << testing::PrintToString(play.lines());
+  }
+
+  bool status_comes(const std::function<bool(const json&)>& holds, Duration timeout) const {
+    const auto give_up = std::chrono::steady_clock::now() + timeout;
+    while (std::chrono::steady_clock::now() < give_up) {
+      if (holds(status()))
+        return true;
+      std::this_thread::sleep_for(milliseconds{100});
+    }
+    return false;
+  }
+};
+
+TEST_F(LifeCycle, ConfigurationIsCheckedAndPrinted) {
+  const ProgramRun printed = run_program(LOCUSD, {"--config", config().string(), "--print-config"});
+  EXPECT_EQ(printed.status, 0);
+  std::ofstream{file("printed.yaml")} << printed.out;
+  EXPECT_EQ(run_program(LOCUSD, {"--config", file("printed.yaml").string(), "--check-config"}).status, 0);
+  std::ofstream{file("bad.yaml")} << "dds:\n  domian: 3\n";
+  const ProgramRun bad = run_program(LOCUSD, {"--config", file("bad.yaml").string(), "--check-config"});
+  EXPECT_EQ(bad.status, 2);
+  EXPECT_NE(bad.err.find("bad.yaml:2"), std::string::npos) << bad.err;
+}
+
+/// Ready does not wait for sensors, the watchdog is fed without any, a stop is told and takes less than a second.
+TEST_F(LifeCycle, SystemdIsToldOfStartReloadStopAndThatThreadsLive) {
+  NotifySocket systemd(file("notify"));
+  setenv("WATCHDOG_USEC", "600000", 1); // NOLINT(concurrency-mt-unsafe)
+  Child daemon(locusd(config()));
+  unsetenv("WATCHDOG_USEC"); // NOLINT(concurrency-mt-unsafe)
+  EXPECT_TRUE(systemd.hears("READY=1", seconds{3}));
+  EXPECT_TRUE(systemd.hears("WATCHDOG=1", seconds{2}));
+  EXPECT_TRUE(systemd.hears("WATCHDOG=1", seconds{1}));
+  EXPECT_TRUE(systemd.hears("STATUS=Waiting for the first lidar packet", seconds{3}));
+  daemon.signal(SIGHUP);
+  EXPECT_TRUE(systemd.hears("RELOADING=1", seconds{2}));
+  EXPECT_TRUE(systemd.hears("READY=1", seconds{2}));
+  daemon.signal(SIGTERM);
+  EXPECT_TRUE(systemd.hears("STOPPING=1", seconds{1}));
+  EXPECT_EQ(daemon.wait_for_exit(seconds{1}), 0);
+}
+
+TEST_F(LifeCycle, SensorsThatAreNotHeardAreNamedWithTheInterfaceOfDds) {
+  Child daemon(locusd(config()));
+  EXPECT_TRUE(daemon.wait_for_line("motion source wio: not heard", seconds{7}));
+  EXPECT_TRUE(daemon.wait_for_line("nobody is seen that publishes /wheel_odometry; DDS listens on interface lo",
+                                   milliseconds{10}));
+  EXPECT_TRUE(daemon.wait_for_line("lidar front: no data packet on UDP port 2368", seconds{1}));
+  EXPECT_EQ(status()["state"], "waiting");
+  Child play({LOCUS_PLAY, capture().string()}); // switched on at last
+  EXPECT_TRUE(daemon.wait_for_line("tracking", seconds{8}));
+}
+
+TEST_F(LifeCycle, BadConfigurationAtReloadLeavesTheOldOneInForce) {
+  const std::filesystem::path file = config();
+  Child daemon(locusd(file));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  std::ofstream{file, std::ios::app} << "no_such_key: 1\n";
+  const ProgramRun refused = ctl({"reload"});
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_NE(refused.err.find("no_such_key"), std::string::npos) << refused.err;
+  EXPECT_TRUE(daemon.wait_for_line("the old configuration stays in force", seconds{1}));
+  EXPECT_EQ(status()["state"], "waiting");
+  static_cast<void>(config("threads: 1\n"));
+  EXPECT_EQ(ctl({"reload"}).status, 0);
+  EXPECT_EQ(status()["threads"], 1);
+}
+
+TEST_F(LifeCycle, NetworkOfDdsMayComeLater) {
+  Child daemon(locusd(config("dds: {interface: robot0}\n")));
+  EXPECT_TRUE(daemon.wait_for_line("interface robot0", seconds{5}));
+  for (const char* command : {"ip link add robot0 type veth peer name robot1", "ip addr add 10.7.0.1/24 dev robot0",
+                              "ip link set robot1 up", "ip link set robot0 up"})
+    ASSERT_EQ(std::system(command), 0); // NOLINT(concurrency-mt-unsafe, cert-env33-c)
+  EXPECT_TRUE(daemon.wait_for_line("DDS is up: domain 0 on interface robot0", seconds{20}));
+}
+
+/// The cable of the lidar is pulled for 12 s: odometry goes on at its pace, dead-reckoned, and finds back.
+TEST_F(LifeCycle, CablePullIsBridgedByDeadReckoning) {
+  Child daemon(locusd(config()));
+  Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  play_to_end({"--fail", "all-lidars:lost@4-16"});
+  EXPECT_TRUE(daemon.wait_for_line("dead reckoning", milliseconds{10}));
+  const std::vector<HeardPose> poses = heard(listener);
+  EXPECT_GT(poses.size(), 190U);
+  Duration longest{};
+  for (std::size_t i = 1; i < poses.size(); ++i)
+    longest = std::max<Duration>(longest, poses[i].stamp - poses[i - 1].stamp);
+  EXPECT_LT(longest, milliseconds{250});
+  const std::vector<std::string> states = listener.lines_of("state");
+  EXPECT_GT(std::ranges::count(states, "2"), 100);
+  ASSERT_GT(states.size(), 190U);
+  EXPECT_EQ(states[185], "0") << "it tracks again before the end";
+}
+
+/// At walking pace of a toddler: the state is resumed if the robot is within half a metre of where it was.
+TEST_F(LifeCycle, RestartInMidDriveGoesOnWhereItWas) {
+  const TemporaryFolder slow;
+  write_room_drive(slow.path(), seconds{15}, 1, 0.2);
+  const std::filesystem::path file = config();
+  auto daemon = std::make_unique<Child>(locusd(file));
+  ASSERT_TRUE(daemon->wait_for_line("DDS is up", seconds{10}));
+  Child play({LOCUS_PLAY, slow.path().string()});
+  ASSERT_TRUE(daemon->wait_for_line("tracking", seconds{10}));
+  std::this_thread::sleep_for(seconds{5});
+  const json before = status();
+  daemon->signal(SIGTERM);
+  ASSERT_EQ(daemon->wait_for_exit(seconds{1}), 0);
+  daemon = std::make_unique<Child>(locusd(file));
+  EXPECT_TRUE(daemon->wait_for_line("resumed where the service ended", seconds{5}))
+      << testing::PrintToString(daemon->lines());
+  const auto at = [](const json& status, std::size_t axis) { return status["pose"]["xyz_m"][axis].get<double>(); };
+  const json after = status();
+  EXPECT_GT(std::hypot(at(before, 0), at(before, 1)), 0.4);
+  EXPECT_LT(std::hypot(at(after, 0) - at(before, 0), at(after, 1) - at(before, 1)), 0.6) << "a few seconds at 0.2 m/s";
+}
+
+TEST_F(LifeCycle, KilledInMidDriveItComesBackAndSaysHow) {
+  const std::filesystem::path file = config();
+  auto daemon = std::make_unique<Child>(locusd(file));
+  ASSERT_TRUE(daemon->wait_for_line("DDS is up", seconds{10}));
+  Child play({LOCUS_PLAY, capture().string()});
+  ASSERT_TRUE(daemon->wait_for_line("tracking", seconds{10}));
+  std::this_thread::sleep_for(seconds{4});
+  daemon->signal(SIGKILL);
+  ASSERT_EQ(daemon->wait_for_exit(seconds{1}), 128 + SIGKILL);
+  daemon = std::make_unique<Child>(locusd(file));
+  EXPECT_TRUE(daemon->wait_until(seconds{5}, [](const std::vector<std::string>& lines) {
+    return std::ranges::any_of(lines, [](const std::string& line) {
+      return line.find("resumed where") != std::string::npos || line.find("a fresh start") != std::string::npos;
+    });
+  })) << testing::PrintToString(daemon->lines());
+  EXPECT_TRUE(status_comes([](const json& s) { return s["state"] == "tracking"; }, seconds{5}));
+}
+
+TEST_F(LifeCycle, DamagedStateIsAFreshStart) {
+  std::ofstream{file("state")} << "half of a sta";
+  Child daemon(locusd(config()));
+  EXPECT_TRUE(
+      daemon.wait_for_line("a fresh start: " + file("state").string() + ": is cut short or damaged", seconds{3}));
+}
+
+TEST_F(LifeCycle, FullDiskCostsTheStateAndNothingElse) {
+  std::filesystem::create_directory(file("full"));
+  if (unshare(CLONE_NEWNS) != 0 || mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
+      mount("tmpfs", file("full").c_str(), "tmpfs", 0, "size=4k") != 0)
+    GTEST_SKIP() << "no file system of one's own: run as root";
+  setenv("STATE_DIRECTORY", file("full").c_str(), 1); // NOLINT(concurrency-mt-unsafe)
+  {
+    Child daemon(locusd(config()));
+    ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+    Child play({LOCUS_PLAY, capture().string()});
+    EXPECT_TRUE(daemon.wait_for_line("the state cannot be saved (No space left on device)", seconds{10}));
+    EXPECT_TRUE(status_comes([](const json& s) { return s["sweeps"]["processed"].get<int>() > 50; }, seconds{15}));
+    EXPECT_EQ(status()["state"], "tracking");
+  }
+  umount2(file("full").c_str(), MNT_DETACH);
+}
+
+TEST_F(LifeCycle, ControlShowsSavesResetsAndSwitches) {
+  Child daemon(locusd(config()));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  Child play({LOCUS_PLAY, capture().string()});
+  ASSERT_TRUE(status_comes([](const json& s) { return s["sweeps"]["processed"].get<int>() > 30; }, seconds{15}));
+
+  const json status = this->status();
+  for (const char* key :
+       {"version", "config_sha256", "packets", "sweeps", "process_ms", "process_cpu_ms", "stage_ms", "points",
+        "iterations_mean", "sources", "state", "age_ms", "rate_hz", "pose", "covariance", "observability", "lidars"})
+    EXPECT_TRUE(status.contains(key)) << key;
+  EXPECT_EQ(status["state"], "tracking");
+  EXPECT_NEAR(status["rate_hz"].get<double>(), 10, 1);
+  EXPECT_EQ(status["lidars"]["front"]["model"], "VLP-16");
+  EXPECT_EQ(status["sources"]["imu"]["health"], "healthy");
+  EXPECT_EQ(status["observability"].size(), 6U);
+  EXPECT_EQ(status["covariance"].size(), 36U);
+
+  const ProgramRun text = ctl({"status"});
+  EXPECT_LE(lines_of(text.out).size(), 24U);
+  for (const std::string& line : lines_of(text.out))
+    EXPECT_LE(line.size(), 80U) << line;
+
+  EXPECT_EQ(ctl({"flat-ground", "on"}).status, 0);
+  EXPECT_EQ(this->status()["flat_ground"], "on");
+  EXPECT_EQ(ctl({"flat-ground", "perhaps"}).status, 2);
+
+  EXPECT_EQ(ctl({"save-map", file("map.pcd").string()}).status, 0);
+  EXPECT_NE(read_text(file("map.pcd")).find("FIELDS x y z"), std::string::npos);
+
+  EXPECT_EQ(ctl({"reset", "--pose", "100,50,0,0,0,90"}).status, 0);
+  ASSERT_TRUE(status_comes([](const json& s) { return s["sweeps"]["processed"].get<int>() > 5; }, seconds{10}));
+  EXPECT_NEAR(this->status()["pose"]["xyz_m"][0].get<double>(), 100, 5);
+  EXPECT_NEAR(this->status()["pose"]["xyz_m"][1].get<double>(), 50, 5);
+
+  const ProgramRun sensors = ctl({"sensors"});
+  EXPECT_EQ(sensors.status, 0) << sensors.err;
+  EXPECT_NE(sensors.out.find("VLP-16"), std::string::npos) << sensors.out;
+  EXPECT_NE(sensors.out.find("port: 2368"), std::string::npos) << sensors.out;
+}
+
+TEST_F(LifeCycle, ControlWithoutAServiceSaysHowToStartOne) {
+  const ProgramRun run = ctl({"status"});
+  EXPECT_EQ(run.status, 1);
+  EXPECT_NE(run.err.find("no service answers"), std::string::npos);
+}
+
+/// Packets come four times as fast as they were fired, by the sensor's own clock: a quarter of the time for each sweep.
+TEST_F(LifeCycle, OverloadDropsAndCountsAndIsOver) {
+  const std::filesystem::path overloaded =
+      config("segment_filter: {enabled: false}\nscan_to_scan: {mode: always}\nthreads: 1\n");
+  Child daemon(locusd(overloaded));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  play_to_end({"--speed", "4"});
+  std::this_thread::sleep_for(seconds{1});
+  const json sweeps = status()["sweeps"];
+  EXPECT_EQ(sweeps["seen"].get<int>(),
+            sweeps["processed"].get<int>() + sweeps["dropped"].get<int>() + sweeps["failed"].get<int>());
+  RecordProperty("dropped", sweeps["dropped"].get<int>());
+  EXPECT_LT(status()["process_ms"]["max"].get<double>(), 200.0) << "age of what is processed stays under a period more";
+}
+
+TEST_F(LifeCycle, SocketsMayComeFromSystemd) {
+  Child daemon({"/usr/bin/systemd-socket-activate", "--datagram", "--listen", "2368", "-E", "RUNTIME_DIRECTORY", "-E",
+                "STATE_DIRECTORY", LOCUSD, "--config", config().string()});
+  ASSERT_TRUE(daemon.wait_for_line("Listening on", seconds{3})) << testing::PrintToString(daemon.lines());
+  Child play({LOCUS_PLAY, capture().string()});
+  EXPECT_TRUE(daemon.wait_for_line("tracking", seconds{15})) << testing::PrintToString(daemon.lines());
+  EXPECT_EQ(status()["lidars"]["front"]["source_ip"], "127.0.0.1");
+}
+
+} // namespace
+} // namespace locus::test

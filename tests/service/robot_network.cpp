@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "service/robot_network.hpp"
+
+#include <array>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+#include <net/if.h>
+#include <sched.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "locus_sim/capture_writer.hpp"
+#include "replay/synthetic_robot.hpp"
+
+namespace locus::test {
+namespace {
+
+bool bring_up(const char* interface) {
+  const int any = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  ifreq request{};
+  std::strncpy(request.ifr_name, interface, IFNAMSIZ - 1);
+  bool up = ioctl(any, SIOCGIFFLAGS, &request) == 0;
+  request.ifr_flags = static_cast<short>(request.ifr_flags | IFF_UP); // NOLINT(cppcoreguidelines-pro-type-union-access)
+  up = up && ioctl(any, SIOCSIFFLAGS, &request) == 0;
+  close(any);
+  return up;
+}
+
+} // namespace
+
+void RobotNetwork::SetUp() {
+  if (unshare(CLONE_NEWNET) != 0 && unshare(CLONE_NEWUSER | CLONE_NEWNET) != 0)
+    GTEST_SKIP() << "no network namespace of one's own: run as root, or allow user namespaces";
+  ASSERT_TRUE(bring_up("lo"));
+  setenv("RUNTIME_DIRECTORY", folder_.path().c_str(), 1); // NOLINT(concurrency-mt-unsafe): nobody else yet
+  setenv("STATE_DIRECTORY", folder_.path().c_str(), 1);   // NOLINT(concurrency-mt-unsafe)
+}
+
+ProgramRun RobotNetwork::ctl(std::vector<std::string> words) const {
+  words.insert(words.begin(), {"--socket", file("control").string()});
+  return run_program(LOCUSCTL, words);
+}
+
+nlohmann::json RobotNetwork::status() const {
+  const ProgramRun run = ctl({"status", "--json"});
+  EXPECT_EQ(run.status, 0) << run.err;
+  return nlohmann::json::parse(run.out, nullptr, false);
+}
+
+const std::filesystem::path& RobotNetwork::capture() {
+  static const TemporaryFolder folder;
+  static const bool written = (write_room_drive(folder.path(), std::chrono::seconds{20}), true);
+  static_cast<void>(written);
+  return folder.path();
+}
+
+std::filesystem::path RobotNetwork::config(const std::string& more) const {
+  const std::filesystem::path path = file("locusd.yaml");
+  std::ofstream{path} << read_text(capture() / "config.yaml") << more;
+  return path;
+}
+
+std::vector<HeardPose> heard(const Child& peer, const std::string& topic) {
+  std::vector<HeardPose> poses;
+  for (const std::string& line : peer.lines_of(topic)) {
+    std::istringstream row{line};
+    std::array<double, 7> v{};
+    std::int64_t seconds = 0, nanoseconds = 0, heard_ns = 0;
+    char dot = 0;
+    std::string frame, child, yaw_variance, yaw_rate;
+    row >> seconds >> dot >> nanoseconds;
+    for (double& value : v)
+      row >> value;
+    row >> frame >> child >> yaw_variance >> yaw_rate >> heard_ns;
+    poses.push_back({stamp_from_ns(seconds * 1'000'000'000 + nanoseconds),
+                     {Eigen::Quaterniond(v[6], v[3], v[4], v[5]).normalized(), {v[0], v[1], v[2]}},
+                     stamp_from_ns(heard_ns)});
+  }
+  return poses;
+}
+
+} // namespace locus::test

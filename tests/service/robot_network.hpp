@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "replay/replay_run.hpp"
+#include "support/child.hpp"
+
+namespace locus::test {
+
+/// A network of the test's own, with the loopback interface up: no port and no DDS domain is shared with anybody. The
+/// programs that a test starts live in it, too. Skips where the system does not allow that.
+class RobotNetwork : public testing::Test {
+ protected:
+  void SetUp() override;
+
+  /// What a robot brings back from 20 s, with odometry and IMU; made once for all tests of a process.
+  static const std::filesystem::path& capture();
+
+  [[nodiscard]] std::filesystem::path file(const std::string& name) const { return folder_ / name; }
+  /// Of the capture, with more lines of YAML.
+  [[nodiscard]] std::filesystem::path config(const std::string& more = "") const;
+
+  [[nodiscard]] static std::vector<std::string> locusd(const std::filesystem::path& config) {
+    return {LOCUSD, "--config", config.string()};
+  }
+
+  /// What locusctl says; its control socket and its state lie in the folder of the test.
+  [[nodiscard]] ProgramRun ctl(std::vector<std::string> words) const;
+  [[nodiscard]] nlohmann::json status() const;
+
+ private:
+  TemporaryFolder folder_;
+};
+
+/// Where a peer heard the robot to be.
+struct HeardPose {
+  Stamp stamp;
+  Pose T_odom_base;
+  Stamp heard;
+};
+std::vector<HeardPose> heard(const Child& peer, const std::string& topic = "odometry");
+
+} // namespace locus::test

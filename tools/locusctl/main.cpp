@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+// locusctl: talks to a running locusd.
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <exception>
+#include <functional>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "locus_replay/failure.hpp"
+#include "locus_replay/map_file.hpp"
+#include "locus_replay/say.hpp"
+#include "locusctl/sensors.hpp"
+#include "locusctl/service_client.hpp"
+#include "locusctl/status_text.hpp"
+
+namespace locus::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct CtlArguments {
+  std::string instance, socket, mode, file;
+  std::vector<double> pose;
+  bool json = false, watch = false;
+
+  [[nodiscard]] std::filesystem::path control() const {
+    if (!socket.empty())
+      return socket;
+    return "/run/locusd" + (instance.empty() ? "" : "@" + instance) + "/control";
+  }
+};
+
+volatile std::sig_atomic_t interrupted = 0;
+
+/// The alternate screen of the terminal, as long as it lives.
+class Screen {
+ public:
+  Screen() {
+    std::signal(SIGINT, [](int) { interrupted = 1; });
+    std::signal(SIGTERM, [](int) { interrupted = 1; });
+    fmt::print("\x1b[?1049h\x1b[?25l");
+  }
+  ~Screen() {
+    fmt::print("\x1b[?25h\x1b[?1049l");
+    std::fflush(stdout);
+  }
+  Screen(const Screen&) = delete;
+  Screen& operator=(const Screen&) = delete;
+
+  /// Over what was there, so that nothing flickers.
+  void show(const std::string& text) const {
+    std::string out = "\x1b[H";
+    for (const char c : text)
+      out += c == '\n' ? std::string{"\x1b[K\n"} : std::string{c};
+    fmt::print("{}\x1b[J", out);
+    std::fflush(stdout);
+  }
+};
+
+void watch(const CtlArguments& arguments) {
+  const Screen screen;
+  while (interrupted == 0) {
+    try {
+      screen.show(status_text(ask(arguments.control(), {{"command", "status"}}).json));
+    } catch (const Failure& failure) { // it may come back
+      screen.show(fmt::format("{}\n", failure.what()));
+    }
+    for (int i = 0; i < 10 && interrupted == 0; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds{50});
+  }
+}
+
+void status(const CtlArguments& arguments) {
+  if (arguments.watch)
+    return watch(arguments);
+  const Json json = ask(arguments.control(), {{"command", "status"}}).json;
+  fmt::print("{}", arguments.json ? json.dump(1) + '\n' : status_text(json));
+}
+
+void save_map(const CtlArguments& arguments) {
+  const std::vector<std::byte> bytes = ask(arguments.control(), {{"command", "save-map"}}).bytes;
+  std::vector<SurfacePoint> points(bytes.size() / sizeof(SurfacePoint));
+  if (!points.empty())
+    std::memcpy(std::as_writable_bytes(std::span(points)).data(), bytes.data(), points.size() * sizeof(SurfacePoint));
+  write_map(arguments.file, points);
+  fmt::print("{}: {} points\n", arguments.file, points.size());
+}
+
+void reset(const CtlArguments& arguments) {
+  Json request{{"command", "reset"}};
+  if (!arguments.pose.empty())
+    request["pose"] = arguments.pose;
+  ask(arguments.control(), request);
+}
+
+/// What is to be done, once the words are understood; nothing where help or version were asked for.
+std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
+  std::function<void()> action;
+  CLI::App app{"Talks to a running locusd.", "locusctl"};
+  app.require_subcommand(1);
+  app.fallthrough();
+  app.add_option("--instance", arguments.instance, "Of the service, as in locusd@NAME")->type_name("NAME");
+  app.add_option("--socket", arguments.socket, "Of the service, where it is not in /run")->type_name("PATH");
+  app.set_version_flag("--version", "locusctl " LOCUS_VERSION);
+  app.footer("All but status and sensors are for root and members of group locusd.\n"
+             "Examples:\n"
+             "  locusctl status --watch\n"
+             "  locusctl reset --pose 1,2,0,0,0,90\n"
+             "  locusctl save-map map.pcd");
+  CLI::App* const show = app.add_subcommand("status", "What the service does and has counted");
+  show->add_flag("--json", arguments.json, "For programs");
+  show->add_flag("--watch", arguments.watch, "Goes on until Ctrl-C");
+  show->callback([&] { action = [&] { status(arguments); }; });
+  CLI::App* const flat = app.add_subcommand("flat-ground", "Whether the ground is taken to be level");
+  flat->add_option("MODE", arguments.mode, "on, off or auto")->required()->check(CLI::IsMember({"on", "off", "auto"}));
+  flat->callback([&] {
+    action = [&] { ask(arguments.control(), {{"command", "flat-ground"}, {"mode", arguments.mode}}); };
+  });
+  CLI::App* const save = app.add_subcommand("save-map", "Writes the map as PCD");
+  save->add_option("FILE", arguments.file)->required();
+  save->callback([&] { action = [&] { save_map(arguments); }; });
+  CLI::App* const again = app.add_subcommand("reset", "Begins the odometry anew, with an empty map");
+  again->add_option("--pose", arguments.pose, "Where: x,y,z in metres, roll,pitch,yaw in degrees; default: the origin")
+      ->type_name("X,Y,Z,R,P,Y")
+      ->delimiter(',')
+      ->expected(6);
+  again->callback([&] { action = [&] { reset(arguments); }; });
+  app.add_subcommand("reload", "Reads the configuration again")->callback([&] {
+    action = [&] { ask(arguments.control(), {{"command", "reload"}}); };
+  });
+  app.add_subcommand("sensors", "Finds the lidars on the wire; needs no service")->callback([&] {
+    action = [] { fmt::print("{}", find_sensors(std::chrono::seconds{2})); };
+  });
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& asked_for_text) {
+    app.exit(asked_for_text);
+    return {};
+  } catch (const CLI::ParseError& error) {
+    throw Failure(ExitStatus::wrong_usage, fmt::format("{}; see locusctl --help", error.what()));
+  }
+  return action;
+}
+
+} // namespace
+} // namespace locus::tools
+
+int main(int argc, char** argv) {
+  using namespace locus::tools;
+  try {
+    CtlArguments arguments;
+    if (const std::function<void()> action = parse(argc, argv, arguments))
+      action();
+    return static_cast<int>(ExitStatus::done);
+  } catch (const Failure& failure) {
+    say("locusctl", failure.what());
+    return static_cast<int>(failure.status());
+  } catch (const std::exception& error) {
+    say("locusctl", error.what());
+    return static_cast<int>(ExitStatus::failed);
+  }
+}

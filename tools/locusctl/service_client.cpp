@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locusctl/service_client.hpp"
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <string>
+
+#include <fmt/format.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "locus_replay/failure.hpp"
+
+namespace locus::tools {
+namespace {
+
+constexpr std::size_t kMaxAnswerBytes = 1 << 18;
+
+class Connection {
+ public:
+  explicit Connection(const std::filesystem::path& path)
+      : socket_(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path.native().copy(address.sun_path, sizeof(address.sun_path) - 1);
+    const timeval patience{5, 0};
+    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+    if (connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
+      throw Failure(ExitStatus::failed,
+                    fmt::format("{}: no service answers ({}); start it with: systemctl start locusd", path.string(),
+                                std::strerror(errno))); // NOLINT
+  }
+  ~Connection() { close(socket_); }
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+
+  void send(const std::string& text) const { ::send(socket_, text.data(), text.size(), MSG_NOSIGNAL); }
+
+  /// The text, and the descriptor that came along or -1.
+  std::pair<std::string, int> receive() const {
+    std::string text(kMaxAnswerBytes, '\0');
+    iovec vector{text.data(), text.size()};
+    alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control{};
+    msghdr message{};
+    message.msg_iov = &vector;
+    message.msg_iovlen = 1;
+    message.msg_control = control.data();
+    message.msg_controllen = control.size();
+    const ssize_t size = recvmsg(socket_, &message, MSG_CMSG_CLOEXEC);
+    if (size <= 0)
+      throw Failure(ExitStatus::failed, "the service does not answer; look at: systemctl status locusd");
+    text.resize(static_cast<std::size_t>(size));
+    int descriptor = -1;
+    if (const cmsghdr* header = CMSG_FIRSTHDR(&message); header != nullptr && header->cmsg_type == SCM_RIGHTS)
+      std::memcpy(&descriptor, CMSG_DATA(header), sizeof(descriptor));
+    return {text, descriptor};
+  }
+
+ private:
+  int socket_;
+};
+
+std::vector<std::byte> read_all(int descriptor) {
+  const off_t size = lseek(descriptor, 0, SEEK_END);
+  std::vector<std::byte> bytes(static_cast<std::size_t>(std::max<off_t>(size, 0)));
+  std::size_t done = 0;
+  for (ssize_t count = 1; count > 0 && done < bytes.size();
+       done += static_cast<std::size_t>(std::max<ssize_t>(count, 0)))
+    count = pread(descriptor, bytes.data() + done, bytes.size() - done, static_cast<off_t>(done));
+  close(descriptor);
+  if (done != bytes.size())
+    throw Failure(ExitStatus::failed, "the service's answer broke off; try again");
+  return bytes;
+}
+
+} // namespace
+
+ServiceAnswer ask(const std::filesystem::path& socket, const nlohmann::ordered_json& request) {
+  const Connection connection(socket);
+  connection.send(request.dump());
+  const auto [text, descriptor] = connection.receive();
+  ServiceAnswer answer{nlohmann::ordered_json::parse(text, nullptr, false), {}};
+  if (descriptor >= 0)
+    answer.bytes = read_all(descriptor);
+  if (!answer.json.is_object())
+    throw Failure(ExitStatus::failed, "the service's answer makes no sense; use locusctl of the same version");
+  if (answer.json.contains("error"))
+    throw Failure(ExitStatus::failed, answer.json["error"].get<std::string>());
+  return answer;
+}
+
+} // namespace locus::tools

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locusctl/status_text.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <string_view>
+
+#include <fmt/format.h>
+
+namespace locus::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::uint64_t sum(const Json& counters) {
+  std::uint64_t total = 0;
+  for (const auto& [name, value] : counters.items())
+    total += value.get<std::uint64_t>();
+  return total;
+}
+
+std::string bar(double share) {
+  constexpr int kLength = 6;
+  std::string text(kLength, '.');
+  for (int i = 0; i < kLength && i < std::lround(share * 2 * kLength); ++i)
+    text[static_cast<std::size_t>(i)] = '#';
+  return text;
+}
+
+std::string pose_text(const Json& status) {
+  if (!status.contains("pose"))
+    return "pose        none yet\n";
+  const auto p = status["pose"]["xyz_m"].get<std::array<double, 3>>();
+  const auto a = status["pose"]["rpy_deg"].get<std::array<double, 3>>();
+  const auto sigma = [&](std::size_t axis, double unit) {
+    return unit * std::sqrt(std::max(0.0, status["covariance"][7 * axis].get<double>()));
+  };
+  constexpr double kDeg = 180 / 3.14159265358979;
+  std::string text = fmt::format("position    {:9.3f} {:9.3f} {:9.3f} m     +- {:.3f} {:.3f} {:.3f}\n"
+                                 "attitude    {:9.2f} {:9.2f} {:9.2f} deg   +- {:.2f} {:.2f} {:.2f}\n",
+                                 p[0], p[1], p[2], sigma(0, 1), sigma(1, 1), sigma(2, 1), a[0], a[1], a[2],
+                                 sigma(3, kDeg), sigma(4, kDeg), sigma(5, kDeg));
+  static constexpr std::array<std::string_view, 6> kAxes{"x", "y", "z", "roll", "pitch", "yaw"};
+  text += "lidar sees ";
+  for (std::size_t i = 0; i < kAxes.size(); ++i)
+    text += fmt::format(" {} {}", kAxes[i], bar(status["observability"][i].get<double>()));
+  return text + '\n';
+}
+
+std::string lidars_text(const Json& status) {
+  std::string text = fmt::format("\n{:<12}{:<12}{:>6}{:>10}{:>8}{:>9}{:>10}  {}\n", "lidar", "model", "rpm", "packets",
+                                 "lost", "refused", "disorder", "pps");
+  for (const auto& [name, lidar] : status["lidars"].items()) {
+    const Json& packets = status["packets"][name];
+    text += fmt::format("{:<12.11}{:<12}{:>6.0f}{:>10}{:>8}{:>9}{:>10}  {}\n", name,
+                        lidar["model"].is_string() ? lidar["model"].get<std::string>() : "unheard",
+                        lidar["rpm"].get<double>(), packets["data"].get<std::uint64_t>(),
+                        packets["lost"].get<std::uint64_t>(), sum(packets["rejected"]),
+                        packets["reordered"].get<std::uint64_t>(), lidar["pps"].get<std::string>());
+  }
+  return text;
+}
+
+std::string sources_text(const Json& status) {
+  if (status["sources"].empty())
+    return "";
+  std::string text = fmt::format("\n{:<12}{:<12}{:>12}{:>12}{:>12}{:>10}\n", "source", "health", "samples", "refused",
+                                 "for sweeps", "changes");
+  for (const auto& [name, source] : status["sources"].items())
+    text += fmt::format("{:<12.11}{:<12}{:>12}{:>12}{:>12}{:>10}\n", name, source["health"].get<std::string>(),
+                        source["received"].get<std::uint64_t>(), sum(source["rejected"]),
+                        source["used_sweeps"].get<std::uint64_t>(), source["health_changes"].get<std::uint64_t>());
+  return text;
+}
+
+} // namespace
+
+std::string status_text(const Json& status) {
+  const Json& sweeps = status["sweeps"];
+  const Json& wall = status["process_ms"];
+  const double up_s = status["duration_s"].get<double>();
+  std::string text =
+      fmt::format("locusd {}   {}   up {:.0f} s   flat ground {}\n", status["version"].get<std::string>(),
+                  status["state"].get<std::string>(), up_s, status["flat_ground"].get<std::string>());
+  text += fmt::format("rate        {:.1f} Hz   last {:.0f} ms ago\n", status["rate_hz"].get<double>(),
+                      status.value("age_ms", 0.0));
+  text += fmt::format("a sweep     {:.2f} ms   90 % {:.2f}   99 % {:.2f}   worst {:.2f}\n", wall["p50"].get<double>(),
+                      wall["p90"].get<double>(), wall["p99"].get<double>(), wall["max"].get<double>());
+  text += fmt::format("sweeps      {} seen   {} processed   {} dropped   {} failed   {} lost by kernel\n",
+                      sweeps["seen"].get<std::uint64_t>(), sweeps["processed"].get<std::uint64_t>(),
+                      sweeps["dropped"].get<std::uint64_t>(), sweeps["failed"].get<std::uint64_t>(),
+                      status["packets"]["kernel_drops"].get<std::uint64_t>());
+  text += fmt::format("machine     {:.1f} % of a core since the start   {:.0f} MB at most\n",
+                      up_s > 0 ? 100 * status["cpu_s"].get<double>() / up_s : 0.0, status["peak_rss_mb"].get<double>());
+  text += fmt::format("dds         {}, domain {}, interface {}\n",
+                      status["dds"]["connected"].get<bool>() ? "up" : "not up, is tried again",
+                      status["dds"]["domain"].get<int>(), status["dds"]["interface"].get<std::string>());
+  return text + pose_text(status) + lidars_text(status) + sources_text(status);
+}
+
+} // namespace locus::tools
