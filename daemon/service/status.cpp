@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <ctime>
+#include <numbers>
 #include <string>
 
 #include <fmt/format.h>
@@ -92,7 +93,7 @@ void add_estimate(const LiveFigures::Snapshot& figures, ordered_json& json) {
   }
   const OdometryEstimate& last = *figures.last;
   const Eigen::Vector3d& p = last.T_odom_base.translation;
-  const Eigen::Vector3d rpy_deg = to_rpy_rad(last.T_odom_base.rotation) * (180.0 / EIGEN_PI);
+  const Eigen::Vector3d rpy_deg = to_rpy_rad(last.T_odom_base.rotation) * (180.0 / std::numbers::pi);
   json["state"] = to_string(last.state);
   json["age_ms"] = rounded(1e3 * to_seconds(Stamp{read_clock(CLOCK_REALTIME)} - last.stamp));
   json["t_ns"] = to_ns(last.stamp);
