@@ -65,6 +65,21 @@ TEST(Merge, PutsTheRunsOfShardsTogether) {
   EXPECT_EQ(all["robustness"][0]["wio_fail"], "OK") << "judged across shards";
 }
 
+TEST(Merge, KeepsTheOrderOfTheWholePlan) {
+  const test::TemporaryFolder folder;
+  const auto at = [](std::size_t place, const std::string& configuration) {
+    Results result = run("beta", configuration, 0.1);
+    result["place"] = place;
+    return result;
+  };
+  const auto one = saved(folder / "1", results({at(0, "a"), at(2, "c")}));
+  const auto two = saved(folder / "2", results({at(1, "b"), at(3, "d")}));
+  std::string order;
+  for (const Results& each : merged({two, one})["runs"])
+    order += each["configuration"].get<std::string>();
+  EXPECT_EQ(order, "abcd");
+}
+
 TEST(Merge, RefusesWhatDoesNotBelongTogether) {
   const test::TemporaryFolder folder;
   const auto one = saved(folder / "1", results({run("beta", "locusd", 0.1)}));

@@ -155,8 +155,10 @@ Results Experiments::results() const {
                   {"simulated", arguments_.recordings.empty()},
                   {"duration_s", arguments_.recordings.empty() ? Results(arguments_.duration_s) : Results(nullptr)},
                   {"runs", Results::array()}};
-  for (const Run& run : plan_.runs)
+  for (const Run& run : plan_.runs) {
     results["runs"].push_back(done_.at(run.id()));
+    results["runs"].back()["place"] = run.place;
+  }
   judge_robustness(results);
   return results;
 }

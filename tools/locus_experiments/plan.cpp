@@ -142,8 +142,9 @@ const std::vector<std::string>& paper_settings() {
 
 Plan make_plan(const Arguments& arguments) {
   Plan plan = arguments.recordings.empty() ? plan_of_paper(arguments) : plan_of_recordings(arguments);
-  std::size_t index = 0;
-  std::erase_if(plan.runs, [&](const Run&) { return !arguments.shard.has(index++); });
+  for (std::size_t place = 0; place < plan.runs.size(); ++place)
+    plan.runs[place].place = place;
+  std::erase_if(plan.runs, [&](const Run& run) { return !arguments.shard.has(run.place); });
   std::erase_if(plan.courses, [&](const Course& course) {
     return std::ranges::none_of(plan.runs, [&](const Run& run) { return run.course == course.name; });
   });

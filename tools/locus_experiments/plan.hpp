@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -23,6 +24,7 @@ struct Run {
   std::vector<std::string> options; ///< of locus-replay
   int paced_cpus = 0;               ///< at the pace of the recording on so many processors; 0: as fast as can be
   bool loam_features = false;       ///< LOAM's points in place of the filters
+  std::size_t place = 0;            ///< among all runs of the plan, whichever shard does them
 
   [[nodiscard]] std::string id() const { return course + '/' + configuration; }
 };

@@ -77,6 +77,8 @@ Results merged(const std::vector<std::filesystem::path>& folders) {
       all["runs"].push_back(run);
     }
   }
+  auto& runs = all["runs"].get_ref<Results::array_t&>(); // in the order that one machine would have done them in
+  std::ranges::stable_sort(runs, {}, [](const Results& run) { return run.value("place", std::size_t{0}); });
   judge_robustness(all);
   return all;
 }
