@@ -33,7 +33,7 @@ bool stderr_is_journal() {
 
 Log::Log() : to_journal_(stderr_is_journal()) {}
 
-void Log::say(Severity severity, const std::string& message, Fields fields, const std::source_location& where) {
+void Log::say(Severity severity, const std::string& message, Fields fields, const CodePlace& where) {
   std::uint64_t silenced = 0;
   if (!may_speak(where, silenced))
     return;
@@ -43,10 +43,10 @@ void Log::say(Severity severity, const std::string& message, Fields fields, cons
     write(severity, message, fields, where);
 }
 
-bool Log::may_speak(const std::source_location& where, std::uint64_t& silenced_before) {
+bool Log::may_speak(const CodePlace& where, std::uint64_t& silenced_before) {
   const std::scoped_lock lock(mutex_);
   const Duration now = read_clock(CLOCK_MONOTONIC);
-  Site& site = sites_[{where.file_name(), where.line()}];
+  Site& site = sites_[{where.file, where.line}];
   if (site.said == 0 || now - site.since > kInterval) {
     silenced_before = site.silenced;
     site = {now, 0, 0};
@@ -59,16 +59,16 @@ bool Log::may_speak(const std::source_location& where, std::uint64_t& silenced_b
   return true;
 }
 
-void Log::write(Severity severity, const std::string& message, Fields fields, const std::source_location& where) const {
+void Log::write(Severity severity, const std::string& message, Fields fields, const CodePlace& where) const {
   if (!to_journal_) {
     static constexpr std::array<std::string_view, 7> kWords{"", "", "", "error: ", "warning: ", "", ""};
     fmt::print(stderr, "locusd: {}{}\n", kWords[static_cast<std::size_t>(severity)], message);
     return;
   }
-  std::vector<std::string> lines{
-      fmt::format("MESSAGE={}", message), fmt::format("PRIORITY={}", static_cast<int>(severity)),
-      fmt::format("CODE_FILE={}", where.file_name()), fmt::format("CODE_LINE={}", where.line()),
-      fmt::format("CODE_FUNC={}", where.function_name())};
+  std::vector<std::string> lines{fmt::format("MESSAGE={}", message),
+                                 fmt::format("PRIORITY={}", static_cast<int>(severity)),
+                                 fmt::format("CODE_FILE={}", where.file), fmt::format("CODE_LINE={}", where.line),
+                                 fmt::format("CODE_FUNC={}", where.function)};
   for (const auto& [name, value] : fields)
     lines.push_back(fmt::format("{}={}", name, value));
   std::vector<iovec> vectors;

@@ -5,7 +5,6 @@
 #include <initializer_list>
 #include <map>
 #include <mutex>
-#include <source_location>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -16,6 +15,18 @@ namespace locus::daemon {
 
 /// As syslog numbers them.
 enum class Severity : std::uint8_t { error = 3, warning = 4, notice = 5, info = 6 };
+
+/// A place in the program: std::source_location, which clang has not yet.
+struct CodePlace {
+  const char* file;
+  std::uint32_t line;
+  const char* function;
+
+  static constexpr CodePlace current(const char* file = __builtin_FILE(), std::uint32_t line = __builtin_LINE(),
+                                     const char* function = __builtin_FUNCTION()) {
+    return {file, line, function};
+  }
+};
 
 /// What the service tells those who look after it: to the journal with fields where stderr leads there, else as a line
 /// of text to stderr.
@@ -32,17 +43,14 @@ class Log {
   Log();
 
   void say(Severity severity, const std::string& message, Fields fields = {},
-           const std::source_location& where = std::source_location::current());
-  void error(const std::string& message, Fields fields = {},
-             const std::source_location& where = std::source_location::current()) {
+           const CodePlace& where = CodePlace::current());
+  void error(const std::string& message, Fields fields = {}, const CodePlace& where = CodePlace::current()) {
     say(Severity::error, message, fields, where);
   }
-  void warn(const std::string& message, Fields fields = {},
-            const std::source_location& where = std::source_location::current()) {
+  void warn(const std::string& message, Fields fields = {}, const CodePlace& where = CodePlace::current()) {
     say(Severity::warning, message, fields, where);
   }
-  void info(const std::string& message, Fields fields = {},
-            const std::source_location& where = std::source_location::current()) {
+  void info(const std::string& message, Fields fields = {}, const CodePlace& where = CodePlace::current()) {
     say(Severity::info, message, fields, where);
   }
 
@@ -53,8 +61,8 @@ class Log {
     std::uint64_t silenced = 0;
   };
 
-  [[nodiscard]] bool may_speak(const std::source_location& where, std::uint64_t& silenced_before);
-  void write(Severity severity, const std::string& message, Fields fields, const std::source_location& where) const;
+  [[nodiscard]] bool may_speak(const CodePlace& where, std::uint64_t& silenced_before);
+  void write(Severity severity, const std::string& message, Fields fields, const CodePlace& where) const;
 
   bool to_journal_;
   std::mutex mutex_;
