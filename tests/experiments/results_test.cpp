@@ -74,8 +74,9 @@ TEST(Merge, KeepsTheOrderOfTheWholePlan) {
   };
   const auto one = saved(folder / "1", results({at(0, "a"), at(2, "c")}));
   const auto two = saved(folder / "2", results({at(1, "b"), at(3, "d")}));
+  const Results all = merged({two, one});
   std::string order;
-  for (const Results& each : merged({two, one})["runs"])
+  for (const Results& each : all["runs"])
     order += each["configuration"].get<std::string>();
   EXPECT_EQ(order, "abcd");
 }
