@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "core/gravity.hpp"
+
 namespace locus {
 
 namespace {
@@ -12,14 +14,8 @@ constexpr Duration kLongEnough = std::chrono::seconds{2}; ///< level all along, 
 
 } // namespace
 
-Eigen::Vector3d level_rpy_rad(const Eigen::Vector3d& specific_force_base_mps2) {
-  const Eigen::Vector3d& f = specific_force_base_mps2;
-  return {std::atan2(f.y(), f.z()), std::atan2(-f.x(), std::hypot(f.y(), f.z())), 0.0};
-}
-
-void FlatGroundAssumption::observe(Stamp stamp, const std::optional<Eigen::Vector3d>& specific_force_base_mps2) {
-  const bool level =
-      specific_force_base_mps2 && (level_rpy_rad(*specific_force_base_mps2).array().abs() < kLevel_rad).all();
+void FlatGroundAssumption::observe(Stamp stamp, const std::optional<Eigen::Vector3d>& up_base) {
+  const bool level = up_base && (level_rpy_rad(*up_base).array().abs() < kLevel_rad).all();
   if (!level)
     level_since_.reset();
   else if (!level_since_)

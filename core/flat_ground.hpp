@@ -9,9 +9,6 @@
 
 namespace locus {
 
-/// Roll and pitch (rad) that a resting base must have for gravity to read as it does; the yaw is zero.
-Eigen::Vector3d level_rpy_rad(const Eigen::Vector3d& specific_force_base_mps2);
-
 /// The flat ground assumption (paper II-C): no motion up or down, no roll, no pitch, in the gravity-aligned odometry
 /// frame.
 ///
@@ -21,8 +18,8 @@ class FlatGroundAssumption {
  public:
   explicit FlatGroundAssumption(FlatGround mode) : mode_(mode) {}
 
-  /// Looks at the mean specific force of a sweep, where there is one.
-  void observe(Stamp stamp, const std::optional<Eigen::Vector3d>& specific_force_base_mps2);
+  /// Looks at which way is up during a sweep, where that is known.
+  void observe(Stamp stamp, const std::optional<Eigen::Vector3d>& up_base);
 
   [[nodiscard]] bool holds() const { return mode_ == FlatGround::on || (mode_ == FlatGround::automatic && found_); }
 

@@ -21,7 +21,8 @@ class NotANumber : public HealthMetric {
 
  private:
   static bool finite(const ImuSample& sample) {
-    return sample.angular_velocity_radps.allFinite() && sample.specific_force_mps2.allFinite();
+    return sample.angular_velocity_radps.allFinite() && sample.specific_force_mps2.allFinite() &&
+           (!sample.attitude || sample.attitude->coeffs().allFinite());
   }
   static bool finite(const OdometrySample& sample) {
     constexpr double kLeastNorm = 0.5; ///< of a quaternion that still says something

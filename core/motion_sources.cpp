@@ -81,6 +81,7 @@ std::optional<Pose> MotionSources::motion(const SourceChoice& choice, Stamp from
 
 void MotionSources::describe(Sweep& sweep) const {
   sweep.specific_force_base_mps2.reset();
+  sweep.up_base.reset();
   for (std::size_t i = 0; i < sweep.sources.size(); ++i) {
     sweep.sources[i] = SourcePose{};
     if (i >= sources_.size() || !sources_[i].track.has_sample_in(sweep.start, sweep.end))
@@ -92,6 +93,8 @@ void MotionSources::describe(Sweep& sweep) const {
     sweep.sources[i] = {true, healthy(i), sources_[i].spell, *T_source_base};
     if (healthy(i) && sources_[i].health.trusts_accelerometer() && !sweep.specific_force_base_mps2)
       sweep.specific_force_base_mps2 = track.mean_specific_force_mps2(sweep.start, sweep.end);
+    if (healthy(i) && !sweep.up_base)
+      sweep.up_base = track.up_base(sweep.start, sweep.end);
   }
 }
 

@@ -10,7 +10,9 @@ MotionTrack::MotionTrack(const MotionSourceOptions& options)
 
 void MotionTrack::add(const ImuSample& sample) {
   const Eigen::Vector3d angular_velocity_base = T_base_source_.rotation * sample.angular_velocity_radps;
-  Node node{sample.stamp, Pose{}, T_base_source_.rotation * sample.specific_force_mps2};
+  Node node{sample.stamp, Pose{}, T_base_source_.rotation * sample.specific_force_mps2, {}};
+  if (sample.attitude)
+    node.up_base = T_base_source_.rotation * (sample.attitude->conjugate() * Eigen::Vector3d::UnitZ());
   if (size_ > 0) {
     const Node& last = from_newest(0);
     const Eigen::Vector3d mean = 0.5 * (last_angular_velocity_base_radps_ + angular_velocity_base);
@@ -22,7 +24,7 @@ void MotionTrack::add(const ImuSample& sample) {
 }
 
 void MotionTrack::add(const OdometrySample& sample) {
-  push({sample.stamp, Pose{sample.T_source_base.rotation.normalized(), sample.T_source_base.translation}});
+  push({sample.stamp, Pose{sample.T_source_base.rotation.normalized(), sample.T_source_base.translation}, {}, {}});
 }
 
 void MotionTrack::push(const Node& node) {
@@ -68,6 +70,12 @@ bool MotionTrack::has_sample_in(Stamp from, Stamp to) const {
 bool MotionTrack::is_live(Stamp now) const {
   return size_ > 1 && now <= from_newest(0).stamp + kMaxExtrapolation &&
          from_newest(0).stamp <= from_newest(1).stamp + kMaxExtrapolation;
+}
+
+std::optional<Eigen::Vector3d> MotionTrack::up_base(Stamp from, Stamp to) const {
+  if (!has_sample_in(from, to))
+    return std::nullopt;
+  return from_newest(age_at(to)).up_base;
 }
 
 std::optional<Eigen::Vector3d> MotionTrack::mean_specific_force_mps2(Stamp from, Stamp to) const {

@@ -48,6 +48,9 @@ class MotionTrack {
   /// Mean specific force in the base frame over the samples in (from, to]; nothing for odometry or without samples.
   [[nodiscard]] std::optional<Eigen::Vector3d> mean_specific_force_mps2(Stamp from, Stamp to) const;
 
+  /// Unit vector in the base frame, from the attitude of the newest sample in (from, to]; nothing where it has none.
+  [[nodiscard]] std::optional<Eigen::Vector3d> up_base(Stamp from, Stamp to) const;
+
   [[nodiscard]] SourceKind kind() const { return kind_; }
 
  private:
@@ -55,6 +58,7 @@ class MotionTrack {
     Stamp stamp;
     Pose T_source_base;
     Eigen::Vector3d specific_force_base_mps2 = Eigen::Vector3d::Zero();
+    std::optional<Eigen::Vector3d> up_base;
   };
 
   void push(const Node& node);

@@ -37,9 +37,6 @@ constexpr double kAskew = 0.25;
 constexpr double kRest_mps = 0.03;
 constexpr double kRest_radps = 0.02;
 
-constexpr double kGravity_mps2 = 9.80665;
-constexpr double kGravityTolerance_mps2 = 0.5;
-
 /// A prior that is less sure than this looks for counterparts all around each point.
 constexpr double kWide_m = 0.3;
 
@@ -160,7 +157,8 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
   if (processed_ == 0)
     return begin(sweep, stop);
   const Prior prior = integrate_sensors(sweep);
-  flat_ground_.observe(sweep.end, sweep.specific_force_base_mps2);
+  gravity_.observe(prior.T_last_now.rotation, sweep);
+  flat_ground_.observe(sweep.end, gravity_.up_base());
   Pose T_last_now = prior.T_last_now;
   correct_motion(sweep, T_last_now);
 
@@ -195,7 +193,7 @@ void Odometry::begin_at(const Pose& T_odom_base, std::span<const SurfacePoint> m
 OdometryEstimate Odometry::begin(const Sweep& sweep, const Gicp::StopRequested& stop) {
   correct_all(sweep.points, Vector6::Zero(), Duration::zero(), scan_);
   registered_ = sweep.registered;
-  const auto& force = sweep.specific_force_base_mps2;
+  gravity_.observe(Eigen::Quaterniond::Identity(), sweep);
   if (T_odom_start_)
     T_odom_last_ = *T_odom_start_;
   if (knows_start_ && scan_.size() >= kMinPoints) {
@@ -207,8 +205,8 @@ OdometryEstimate Odometry::begin(const Sweep& sweep, const Gicp::StopRequested& 
     else
       T_odom_start_.reset();
   }
-  if (!T_odom_start_ && force && std::abs(force->norm() - kGravity_mps2) < kGravityTolerance_mps2)
-    T_odom_last_.rotation = from_rpy_rad(level_rpy_rad(*force));
+  if (const auto up_base = gravity_.up_base(); up_base && !T_odom_start_)
+    T_odom_last_.rotation = from_rpy_rad(level_rpy_rad(*up_base));
   if (sweep.uncorrected != Uncorrected::nothing)
     first_points_ = sweep.points;
   OdometryEstimate estimate;
@@ -416,6 +414,8 @@ void Odometry::update_map(OdometryEstimate& estimate) {
   if ((estimate.failed && !restarts) || !(moved || first || restarts))
     return;
   const StageScope scope(clock_, Stage::map);
+  estimate.T_odom_base.rotation =
+      (so3_exp(tilt_keeper_.take_correction_rad()) * estimate.T_odom_base.rotation).normalized();
   map_.insert(scan_, estimate.T_odom_base);
   T_odom_keyframe_ = estimate.T_odom_base;
   refused_in_a_row_ = 0;
@@ -517,6 +517,7 @@ void Odometry::finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& 
     settle(sweep, prior, estimate);
   estimate.pose_covariance = uncertainty_.since_start();
   adrift_ = estimate.failed;
+  tilt_keeper_.observe(estimate.T_odom_base.rotation, gravity_.up_base());
 
   update_map(estimate);
   if (estimate.keyframe)

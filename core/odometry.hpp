@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/flat_ground.hpp"
+#include "core/gravity.hpp"
 #include "core/gyro_bias.hpp"
 #include "core/odometry_estimate.hpp"
 #include "core/options.hpp"
@@ -94,6 +95,8 @@ class Odometry {
   OdometryOptions options_;
   StageClock* clock_;
   Gicp gicp_;
+  Gravity gravity_;
+  TiltKeeper tilt_keeper_;
   FlatGroundAssumption flat_ground_;
   SurfaceMap map_;
   SurfaceMap last_scan_map_;       ///< the last processed sweep alone, the target of scan-to-scan

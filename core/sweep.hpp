@@ -46,7 +46,8 @@ struct Sweep {
   std::size_t raw_returns = 0;                ///< returns that came in
   std::array<SourcePose, kMaxSources> sources;
   std::optional<Eigen::Vector3d>
-      specific_force_base_mps2; ///< mean over the sweep, from the first usable inertial source
+      specific_force_base_mps2;           ///< mean over the sweep, from the first usable inertial source
+  std::optional<Eigen::Vector3d> up_base; ///< unit vector, from that source's attitude where it has one
   std::vector<SweepPoint> points;
   std::size_t registered = 0; ///< the first so many points, spread evenly, are registered; the rest only serves the map
 };

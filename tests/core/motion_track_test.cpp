@@ -102,6 +102,22 @@ TEST(MotionTrack, TheGyroIsIntegratedInTheFrameOfTheBase) {
   EXPECT_LT((*force - Eigen::Vector3d{0, 0, 9.81}).norm(), 1e-9);
 }
 
+TEST(MotionTrack, AnAttitudeSaysWhichWayIsUpInTheBaseFrame) {
+  MotionTrack track = imu_track({from_rpy_rad({0, 0, std::numbers::pi / 2}), {0, 0, 0}});
+  ImuSample sample;
+  sample.stamp = sample.arrival = at_ms(10);
+  sample.attitude = from_rpy_rad({0.1, 0, 1.0}); // rolls about what is the base's y axis
+  track.add(sample);
+  const auto up = track.up_base(at_ms(0), at_ms(20));
+  ASSERT_TRUE(up);
+  EXPECT_LT((*up - Eigen::Vector3d(-std::sin(0.1), 0, std::cos(0.1))).norm(), 1e-9);
+  EXPECT_FALSE(track.up_base(at_ms(20), at_ms(30))) << "no sample";
+  sample.stamp = sample.arrival = at_ms(25);
+  sample.attitude.reset();
+  track.add(sample);
+  EXPECT_FALSE(track.up_base(at_ms(20), at_ms(30))) << "a sample without attitude";
+}
+
 TEST(MotionTrack, AChangingTurnRateIsIntegratedByTrapezoids) {
   MotionTrack track = imu_track();
   for (int ms = 0; ms <= 1000; ms += 10)
