@@ -116,13 +116,14 @@ std::string yaml(const Pose& pose) {
 
 std::string configuration(const RobotOptions& robot) {
   std::string text = "lidars:\n";
-  for (const auto& [name, options] : robot.lidars) {
+  for (const NamedLidar& lidar : robot.lidars) {
+    const auto& options = lidar.options;
     const bool shares_port = std::count_if(robot.lidars.begin(), robot.lidars.end(), [&](const NamedLidar& other) {
                                return other.options.port == options.port;
                              }) > 1;
-    text += fmt::format("  - {{name: {}, model: {}, port: {}{}, T_base_lidar: {}}}\n", name, to_string(options.model),
-                        options.port, shares_port ? ", source_ip: " + dotted(options.source_ip) : "",
-                        yaml(options.T_base_lidar));
+    text += fmt::format("  - {{name: {}, model: {}, port: {}{}, T_base_lidar: {}}}\n", lidar.name,
+                        to_string(options.model), options.port,
+                        shares_port ? ", source_ip: " + dotted(options.source_ip) : "", yaml(options.T_base_lidar));
   }
   text += fmt::format("motion_sources:{}\n", robot.odometry.empty() && !robot.imu ? " []" : "");
   for (const NamedOdometry& odometry : robot.odometry)
