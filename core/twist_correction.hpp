@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/pose.hpp"
+#include "core/stamp.hpp"
+#include "core/surface_map.hpp"
+#include "core/sweep.hpp"
+
+namespace locus {
+
+/// Writes to `scan` where the points of a sweep lay at its end, for a base that moved with a constant twist (m/s,
+/// rad/s) while the sweep came in: the part of motion correction that no motion source could do. Any thread.
+void correct_all(std::span<const SweepPoint> points, const Vector6& twist_base, Duration duration,
+                 std::vector<SurfacePoint>& scan);
+
+} // namespace locus
