@@ -2,6 +2,7 @@
 #include "accuracy/trajectory_accuracy.hpp"
 
 #include <Eigen/Geometry>
+#include <Eigen/SVD>
 
 #include <algorithm>
 #include <array>
@@ -17,18 +18,28 @@ namespace {
 /// Points that move with the attitude of the base, and are centred on it.
 const std::array<Eigen::Vector3d, 4> kAroundBase{{{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}}};
 
-/// Least squares between points that are fixed to the base.
+/// Least squares between points that are fixed to the base (Umeyama, 1991), without a copy of them all.
 Pose aligned(std::span<const PosePair> pairs, std::span<const Eigen::Vector3d> points_base) {
-  Eigen::Matrix3Xd odom(3, pairs.size() * points_base.size()), truth(3, pairs.size() * points_base.size());
-  Eigen::Index column = 0;
-  for (const PosePair& pair : pairs) {
-    for (const Eigen::Vector3d& point : points_base) {
-      odom.col(column) = pair.T_odom_base * point;
-      truth.col(column++) = pair.T_truth_base * point;
+  const auto for_each_point = [&](auto&& visit) {
+    for (const PosePair& pair : pairs) {
+      for (const Eigen::Vector3d& point : points_base)
+        visit(Eigen::Vector3d{pair.T_odom_base * point}, Eigen::Vector3d{pair.T_truth_base * point});
     }
-  }
-  const Eigen::Matrix4d T = Eigen::umeyama(odom, truth, false);
-  return {Eigen::Quaterniond{Eigen::Matrix3d{T.topLeftCorner<3, 3>()}}, T.topRightCorner<3, 1>()};
+  };
+  const auto count = static_cast<double>(pairs.size() * points_base.size());
+  Eigen::Vector3d odom_mean = Eigen::Vector3d::Zero(), truth_mean = Eigen::Vector3d::Zero();
+  for_each_point([&](const Eigen::Vector3d& odom, const Eigen::Vector3d& truth) {
+    odom_mean += odom / count;
+    truth_mean += truth / count;
+  });
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for_each_point([&](const Eigen::Vector3d& odom, const Eigen::Vector3d& truth) {
+    covariance += (truth - truth_mean) * (odom - odom_mean).transpose();
+  });
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Vector3d no_mirror{1, 1, svd.matrixU().determinant() * svd.matrixV().determinant() < 0 ? -1.0 : 1.0};
+  const Eigen::Matrix3d R = svd.matrixU() * no_mirror.asDiagonal() * svd.matrixV().transpose();
+  return {Eigen::Quaterniond{R}, truth_mean - R * odom_mean};
 }
 
 struct StretchError {
