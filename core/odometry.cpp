@@ -30,8 +30,10 @@ constexpr int kRefusalsToRestart = 10;
 constexpr double kDegenerateBelow = 0.01;
 constexpr double kObservableAbove = 0.02;
 
-/// Of a change of twist during a sweep, how much of it shows in where the sweep comes to lie.
-constexpr double kAskew = 0.25;
+/// Of what was not foreseen of the motion in a sweep, how much shows in where it comes to lie, and how much of that
+/// goes on in the next.
+constexpr double kAskew = 0.2;
+constexpr double kShakesOn = 0.7;
 
 /// Motion sources that see no more than this see a robot at rest.
 constexpr double kRest_mps = 0.03;
@@ -406,23 +408,18 @@ void Odometry::settle(const Sweep& sweep, const Prior& prior, OdometryEstimate& 
   if (adrift_) // the way back to the submap is no motion of the robot
     return move_on(prior.T_last_now, uncertainty_.against_submap(), estimate);
   judge_sources(sweep, prior, T_last_now, estimate);
-  const Vector6 last_twist = twist_base_;
   move_on(T_last_now, uncertainty_.against_submap(), estimate);
-  bend(sweep, twist_base_ - last_twist, estimate);
+  bend(difference(T_last_now, prior.T_last_now));
   if (estimate.state != TrackingState::degenerate)
     feedback_.twist_base = twist_base_;
 }
 
-/// A sweep that no source corrected was corrected with one twist throughout. Where the robot accelerated it is bent,
-/// and lies the more askew.
-void Odometry::bend(const Sweep& sweep, const Vector6& twist_change, const OdometryEstimate& estimate) {
-  if (sweep.uncorrected == Uncorrected::nothing)
-    return;
-  Vector6 askew = kAskew * to_seconds(sweep.end - sweep.start) * twist_change;
-  if (sweep.uncorrected == Uncorrected::translation)
-    askew.tail<3>().setZero();
-  const Matrix6 R = turn_both(estimate.T_odom_base.rotation);
-  uncertainty_.predict(Eigen::Vector3d::Zero(), R * askew.cwiseAbs2().asDiagonal() * R.transpose(), Vector6::Zero());
+/// A sweep that was corrected for another motion than the robot's is bent, and lies askew. A robot that shakes or whose
+/// wheels slip does so for a while.
+void Odometry::bend(const Vector6& surprise) {
+  askew_variance_ = (kAskew * surprise).cwiseAbs2().cwiseMax(kShakesOn * askew_variance_);
+  const Matrix6 R = turn_both(T_odom_last_.rotation);
+  uncertainty_.predict(Eigen::Vector3d::Zero(), R * askew_variance_.asDiagonal() * R.transpose(), Vector6::Zero());
 }
 
 /// Which axes of the base the lidar sees, and whether they are enough.

@@ -87,7 +87,7 @@ class Odometry {
   void hold_still(const Sweep& sweep, OdometryEstimate& estimate);
   [[nodiscard]] bool sources_saw_motion(const Sweep& sweep) const;
   void settle(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate);
-  void bend(const Sweep& sweep, const Vector6& twist_change, const OdometryEstimate& estimate);
+  void bend(const Vector6& surprise);
   void observe(OdometryEstimate& estimate);
   void move_on(const Pose& T_last_now, const Matrix6& covariance_odom, OdometryEstimate& estimate);
   void finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate);
@@ -120,6 +120,7 @@ class Odometry {
   Vector6 twist_base_ = Vector6::Zero();
   Pose T_odom_keyframe_;
   PoseUncertainty uncertainty_;
+  Vector6 askew_variance_ = Vector6::Zero(); ///< of the last sweep, base axes
   std::vector<GyroBias> gyro_biases_;
   Standstill standstill_;
   int refused_in_a_row_ = 0;   ///< sweeps with points
