@@ -10,6 +10,7 @@
 
 #include "daemon/allocation_counter.hpp"
 #include "daemon/machine_time.hpp"
+#include "support/kernel_stamps.hpp"
 #include "support/temporary_file.hpp"
 #include "support/udp_sender.hpp"
 
@@ -35,6 +36,7 @@ ImuInput imu_at(Stamp arrival) {
 }
 
 TEST(LiveInput, GivesSocketsAndMotionInTheOrderOfArrival) {
+  const test::KernelStamps stamps;
   LiveInput input(two_sockets());
   const test::UdpSender sender;
   const std::uint16_t first = input.sockets()[0].port(), second = input.sockets()[1].port();

@@ -5,12 +5,12 @@
 
 #include <ctime>
 #include <stdexcept>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include <fcntl.h>
 
+#include "support/kernel_stamps.hpp"
 #include "support/temporary_file.hpp"
 #include "support/udp_sender.hpp"
 
@@ -34,24 +34,9 @@ Stamp now() {
   return Stamp{std::chrono::seconds{t.tv_sec} + Duration{t.tv_nsec}};
 }
 
-/// The kernel turns its stamps on in the background once the first socket asks for them, and until then stamps packets
-/// when they are looked at.
-void wait_for_stamps() {
-  UdpSocket socket = open_any();
-  const UdpSender sender;
-  for (int attempt = 0; attempt < 1000; ++attempt) {
-    sender.send(socket.port(), test::bytes_of("is it on?"));
-    const Stamp sent = now();
-    std::this_thread::sleep_for(std::chrono::milliseconds{1});
-    if (const auto datagrams = socket.receive(); datagrams.size() == 1 && datagrams[0].receive_stamp <= sent)
-      return;
-  }
-  FAIL() << "the kernel gives no stamps";
-}
-
 TEST(UdpSocket, GivesPayloadSenderPortAndTheKernelsStamp) {
-  UdpSocket socket = open_any(); // keeps the stamps on
-  ASSERT_NO_FATAL_FAILURE(wait_for_stamps());
+  const test::KernelStamps stamps;
+  UdpSocket socket = open_any();
   const UdpSender sender;
   const Stamp before = now();
   sender.send(socket.port(), test::bytes_of("first"));
