@@ -72,7 +72,7 @@ class DdsNode {
 
   DdsNode(DdsEntity domain, DdsEntity participant, bool type_hashes)
       : domain_(std::move(domain)), participant_(std::move(participant)), type_hashes_(type_hashes) {}
-  [[nodiscard]] DdsEntity create_endpoint(const ros::Type& type, const std::string& topic, TopicQos qos,
+  [[nodiscard]] DdsEntity create_endpoint(const ros::Type& type, const std::string& topic, TopicQos wanted,
                                           CreateEndpoint create) const;
 
   DdsEntity domain_; ///< outlives the participant

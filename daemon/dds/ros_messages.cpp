@@ -25,9 +25,8 @@ bool is_rotation(const Eigen::Quaterniond& q) {
 ros::Quaternion to_ros(const Eigen::Quaterniond& q) { return {q.x(), q.y(), q.z(), q.w()}; }
 
 void copy_row_major(const Matrix6& matrix, std::span<double, 36> out) {
-  for (int row = 0; row < 6; ++row)
-    for (int column = 0; column < 6; ++column)
-      out[static_cast<std::size_t>(6 * row + column)] = matrix(row, column);
+  const Eigen::Matrix<double, 6, 6, Eigen::RowMajor> rows = matrix;
+  std::copy_n(rows.data(), out.size(), out.begin());
 }
 
 } // namespace

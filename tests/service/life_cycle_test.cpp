@@ -16,6 +16,7 @@
 
 #include "replay/synthetic_robot.hpp"
 #include "service/robot_network.hpp"
+#include "service/undisturbed.hpp"
 
 namespace locus::test {
 namespace {
@@ -64,7 +65,7 @@ class LifeCycle : public RobotNetwork {
   static void play_to_end(std::vector<std::string> options = {}) {
     options.insert(options.begin(), LOCUS_PLAY);
     options.push_back(capture().string());
-    Child play(options);
+    Child play(undisturbed(options));
     EXPECT_EQ(play.wait_for_exit(seconds{60}), 0) << testing::PrintToString(play.lines());
   }
 
@@ -94,7 +95,7 @@ TEST_F(LifeCycle, ConfigurationIsCheckedAndPrinted) {
 TEST_F(LifeCycle, SystemdIsToldOfStartReloadStopAndThatThreadsLive) {
   NotifySocket systemd(file("notify"));
   setenv("WATCHDOG_USEC", "600000", 1); // NOLINT(concurrency-mt-unsafe)
-  Child daemon(locusd(config()));
+  Child daemon(undisturbed(locusd(config())));
   unsetenv("WATCHDOG_USEC"); // NOLINT(concurrency-mt-unsafe)
   EXPECT_TRUE(systemd.hears("READY=1", seconds{3}));
   EXPECT_TRUE(systemd.hears("WATCHDOG=1", seconds{2}));
@@ -109,13 +110,13 @@ TEST_F(LifeCycle, SystemdIsToldOfStartReloadStopAndThatThreadsLive) {
 }
 
 TEST_F(LifeCycle, SensorsThatAreNotHeardAreNamedWithTheInterfaceOfDds) {
-  Child daemon(locusd(config()));
+  Child daemon(undisturbed(locusd(config())));
   EXPECT_TRUE(daemon.wait_for_line("motion source wio: not heard", seconds{7}));
   EXPECT_TRUE(daemon.wait_for_line("nobody is seen that publishes /wheel_odometry; DDS listens on interface lo",
                                    milliseconds{10}));
   EXPECT_TRUE(daemon.wait_for_line("lidar front: no data packet on UDP port 2368", seconds{1}));
   EXPECT_EQ(status()["state"], "waiting");
-  Child play({LOCUS_PLAY, capture().string()}); // switched on at last
+  Child play(undisturbed({LOCUS_PLAY, capture().string()})); // switched on at last
   EXPECT_TRUE(daemon.wait_for_line("tracking", seconds{8}));
 }
 
@@ -145,7 +146,7 @@ TEST_F(LifeCycle, NetworkOfDdsMayComeLater) {
 
 /// The cable of the lidar is pulled for 12 s: odometry goes on at its pace, dead-reckoned, and finds back.
 TEST_F(LifeCycle, CablePullIsBridgedByDeadReckoning) {
-  Child daemon(locusd(config()));
+  Child daemon(undisturbed(locusd(config())));
   Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
   ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
   play_to_end({"--fail", "all-lidars:lost@4-16"});
@@ -167,15 +168,15 @@ TEST_F(LifeCycle, RestartInMidDriveGoesOnWhereItWas) {
   const TemporaryFolder slow;
   write_room_drive(slow.path(), seconds{15}, 1, 0.2);
   const std::filesystem::path file = config();
-  auto daemon = std::make_unique<Child>(locusd(file));
+  auto daemon = std::make_unique<Child>(undisturbed(locusd(file)));
   ASSERT_TRUE(daemon->wait_for_line("DDS is up", seconds{10}));
-  Child play({LOCUS_PLAY, slow.path().string()});
+  Child play(undisturbed({LOCUS_PLAY, slow.path().string()}));
   ASSERT_TRUE(daemon->wait_for_line("tracking", seconds{10}));
   std::this_thread::sleep_for(seconds{5});
   const json before = status();
   daemon->signal(SIGTERM);
   ASSERT_EQ(daemon->wait_for_exit(seconds{1}), 0);
-  daemon = std::make_unique<Child>(locusd(file));
+  daemon = std::make_unique<Child>(undisturbed(locusd(file)));
   EXPECT_TRUE(daemon->wait_for_line("resumed where the service ended", seconds{5}))
       << testing::PrintToString(daemon->lines());
   const auto at = [](const json& status, std::size_t axis) { return status["pose"]["xyz_m"][axis].get<double>(); };
@@ -186,14 +187,14 @@ TEST_F(LifeCycle, RestartInMidDriveGoesOnWhereItWas) {
 
 TEST_F(LifeCycle, KilledInMidDriveItComesBackAndSaysHow) {
   const std::filesystem::path file = config();
-  auto daemon = std::make_unique<Child>(locusd(file));
+  auto daemon = std::make_unique<Child>(undisturbed(locusd(file)));
   ASSERT_TRUE(daemon->wait_for_line("DDS is up", seconds{10}));
-  Child play({LOCUS_PLAY, capture().string()});
+  Child play(undisturbed({LOCUS_PLAY, capture().string()}));
   ASSERT_TRUE(daemon->wait_for_line("tracking", seconds{10}));
   std::this_thread::sleep_for(seconds{4});
   daemon->signal(SIGKILL);
   ASSERT_EQ(daemon->wait_for_exit(seconds{1}), 128 + SIGKILL);
-  daemon = std::make_unique<Child>(locusd(file));
+  daemon = std::make_unique<Child>(undisturbed(locusd(file)));
   EXPECT_TRUE(daemon->wait_until(seconds{5}, [](const std::vector<std::string>& lines) {
     return std::ranges::any_of(lines, [](const std::string& line) {
       return line.find("resumed where") != std::string::npos || line.find("a fresh start") != std::string::npos;
@@ -204,7 +205,7 @@ TEST_F(LifeCycle, KilledInMidDriveItComesBackAndSaysHow) {
 
 TEST_F(LifeCycle, DamagedStateIsAFreshStart) {
   std::ofstream{file("state")} << "half of a sta";
-  Child daemon(locusd(config()));
+  Child daemon(undisturbed(locusd(config())));
   EXPECT_TRUE(
       daemon.wait_for_line("a fresh start: " + file("state").string() + ": is cut short or damaged", seconds{3}));
 }
@@ -216,9 +217,9 @@ TEST_F(LifeCycle, FullDiskCostsTheStateAndNothingElse) {
     GTEST_SKIP() << "no file system of one's own: run as root";
   setenv("STATE_DIRECTORY", file("full").c_str(), 1); // NOLINT(concurrency-mt-unsafe)
   {
-    Child daemon(locusd(config()));
+    Child daemon(undisturbed(locusd(config())));
     ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
-    Child play({LOCUS_PLAY, capture().string()});
+    Child play(undisturbed({LOCUS_PLAY, capture().string()}));
     EXPECT_TRUE(daemon.wait_for_line("the state cannot be saved (No space left on device)", seconds{10}));
     EXPECT_TRUE(status_comes([](const json& s) { return s["sweeps"]["processed"].get<int>() > 50; }, seconds{15}));
     EXPECT_EQ(status()["state"], "tracking");
@@ -227,9 +228,9 @@ TEST_F(LifeCycle, FullDiskCostsTheStateAndNothingElse) {
 }
 
 TEST_F(LifeCycle, ControlShowsSavesResetsAndSwitches) {
-  Child daemon(locusd(config()));
+  Child daemon(undisturbed(locusd(config())));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
-  Child play({LOCUS_PLAY, capture().string()});
+  Child play(undisturbed({LOCUS_PLAY, capture().string()}));
   ASSERT_TRUE(status_comes([](const json& s) { return s["sweeps"]["processed"].get<int>() > 30; }, seconds{15}));
 
   const json status = this->status();
@@ -292,7 +293,7 @@ TEST_F(LifeCycle, SocketsMayComeFromSystemd) {
   Child daemon({"/usr/bin/systemd-socket-activate", "--datagram", "--listen", "2368", "-E", "RUNTIME_DIRECTORY", "-E",
                 "STATE_DIRECTORY", LOCUSD, "--config", config().string()});
   ASSERT_TRUE(daemon.wait_for_line("Listening on", seconds{3})) << testing::PrintToString(daemon.lines());
-  Child play({LOCUS_PLAY, capture().string()});
+  Child play(undisturbed({LOCUS_PLAY, capture().string()}));
   EXPECT_TRUE(daemon.wait_for_line("tracking", seconds{15})) << testing::PrintToString(daemon.lines());
   EXPECT_EQ(status()["lidars"]["front"]["source_ip"], "127.0.0.1");
 }

@@ -39,7 +39,7 @@ class Connection {
   void send(const std::string& text) const { ::send(socket_, text.data(), text.size(), MSG_NOSIGNAL); }
 
   /// The text, and the descriptor that came along or -1.
-  std::pair<std::string, int> receive() const {
+  [[nodiscard]] std::pair<std::string, int> receive() const {
     std::string text(kMaxAnswerBytes, '\0');
     iovec vector{text.data(), text.size()};
     alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control{};

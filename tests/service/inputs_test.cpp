@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <chrono>
+#include <random>
+#include <thread>
+
+#include "service/robot_network.hpp"
+#include "support/udp_sender.hpp"
+
+namespace locus::test {
+namespace {
+
+using nlohmann::json;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+class Inputs : public RobotNetwork {};
+
+TEST_F(Inputs, GarbageOnTheWireIsCountedAndHarmsNothing) {
+  Child daemon(locusd(config()));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const UdpSender sender;
+  std::minstd_rand random(1);
+  constexpr int kDatagrams = 3000;
+  for (int i = 0; i < kDatagrams; ++i) {
+    const std::size_t sizes[] = {0, 1, 512, 1206, 1206, 1400, random() % 1500}; // NOLINT(modernize-avoid-c-arrays)
+    std::vector<std::byte> payload(sizes[random() % 7]);
+    std::ranges::generate(payload, [&] { return static_cast<std::byte>(random()); });
+    sender.send(i % 3 == 0 ? 8308 : 2368, payload);
+    if (i % 100 == 0)
+      std::this_thread::sleep_for(milliseconds{1});
+  }
+  std::this_thread::sleep_for(milliseconds{500});
+  const json total = status()["packets"]["total"];
+  std::uint64_t rejected = 0;
+  for (const auto& [reason, count] : total["rejected"].items())
+    rejected += count.get<std::uint64_t>();
+  EXPECT_EQ(total["received"].get<std::uint64_t>(), kDatagrams);
+  EXPECT_EQ(total["received"].get<std::uint64_t>(),
+            total["data"].get<std::uint64_t>() + total["position"].get<std::uint64_t>() + rejected);
+  EXPECT_EQ(total["data"], 0);
+  const Child play({LOCUS_PLAY, capture().string()});
+  EXPECT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+}
+
+/// A topic that flutters a hundred times a second switches once a second at most.
+TEST_F(Inputs, FlatGroundIsSwitchedByItsTopicAtMostOnceASecond) {
+  Child daemon(locusd(config("flat_ground: off\ndds: {flat_ground_topic: /wheel_health}\n")));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const Child talker({CYCLONE_PEER, "0", "talk", "/locus"});
+  ASSERT_TRUE(daemon.wait_for_line("flat ground is on, as /wheel_health says", seconds{10}));
+  std::this_thread::sleep_for(milliseconds{2500});
+  const auto lines = daemon.lines();
+  const auto switches = std::ranges::count_if(
+      lines, [](const std::string& line) { return line.find("flat ground is") != std::string::npos; });
+  EXPECT_GE(switches, 2);
+  EXPECT_LE(switches, 4);
+}
+
+} // namespace
+} // namespace locus::test
