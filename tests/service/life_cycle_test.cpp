@@ -286,7 +286,9 @@ TEST_F(LifeCycle, OverloadDropsAndCountsAndIsOver) {
   EXPECT_EQ(sweeps["seen"].get<int>(),
             sweeps["processed"].get<int>() + sweeps["dropped"].get<int>() + sweeps["failed"].get<int>());
   RecordProperty("dropped", sweeps["dropped"].get<int>());
-  EXPECT_LT(status()["process_ms"]["max"].get<double>(), 200.0) << "age of what is processed stays under a period more";
+  const json process_ms = status()["process_ms"];
+  RecordProperty("oldest_us", static_cast<int>(1e3 * process_ms["max"].get<double>()));
+  EXPECT_LT(process_ms["max"].get<double>(), 1000.0) << "a queue would be seconds long at the end";
 }
 
 TEST_F(LifeCycle, SocketsMayComeFromSystemd) {
