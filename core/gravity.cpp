@@ -32,12 +32,10 @@ void Gravity::observe(const Eigen::Quaterniond& R_last_now, const Sweep& sweep) 
   measured_ = sweep.up_base || (force && std::abs(force->norm() - kGravity_mps2) < kTolerance_mps2);
   if (!measured_)
     return;
-  if (sweep.up_base || !up_base_) {
-    up_base_ = sweep.up_base ? *sweep.up_base : force->normalized();
-    return;
-  }
-  const double share = std::min(1.0, to_seconds(sweep.end - sweep.start) / kSettles_s);
-  up_base_ = (*up_base_ + share * (force->normalized() - *up_base_)).normalized();
+  const Eigen::Vector3d measured = sweep.up_base ? *sweep.up_base : force->normalized();
+  const double share = up_base_ ? std::min(1.0, to_seconds(sweep.end - sweep.start) / kSettles_s) : 1.0;
+  const Eigen::Vector3d before = up_base_.value_or(measured);
+  up_base_ = (before + share * (measured - before)).normalized();
 }
 
 void TiltKeeper::observe(const Eigen::Quaterniond& R_odom_base, const std::optional<Eigen::Vector3d>& up_base) {

@@ -75,7 +75,13 @@ bool MotionTrack::is_live(Stamp now) const {
 std::optional<Eigen::Vector3d> MotionTrack::up_base(Stamp from, Stamp to) const {
   if (!has_sample_in(from, to))
     return std::nullopt;
-  return from_newest(age_at(to)).up_base;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t age = age_at(to); age < size_ && from_newest(age).stamp > from; ++age) {
+    if (!from_newest(age).up_base)
+      return std::nullopt;
+    sum += *from_newest(age).up_base;
+  }
+  return sum.normalized();
 }
 
 std::optional<Eigen::Vector3d> MotionTrack::mean_specific_force_mps2(Stamp from, Stamp to) const {

@@ -48,7 +48,7 @@ class MotionTrack {
   /// Mean specific force in the base frame over the samples in (from, to]; nothing for odometry or without samples.
   [[nodiscard]] std::optional<Eigen::Vector3d> mean_specific_force_mps2(Stamp from, Stamp to) const;
 
-  /// Unit vector in the base frame, from the attitude of the newest sample in (from, to]; nothing where it has none.
+  /// Unit vector in the base frame, from the mean attitude of the samples in (from, to]; nothing where one has none.
   [[nodiscard]] std::optional<Eigen::Vector3d> up_base(Stamp from, Stamp to) const;
 
   [[nodiscard]] SourceKind kind() const { return kind_; }

@@ -72,7 +72,7 @@ TEST(Gravity, WhatIsNotAsStrongAsGravityIsNotLookedAt) {
   EXPECT_FALSE(gravity.up_base()) << "no inertial sensor was heard";
 }
 
-TEST(Gravity, AnAttitudeIsTakenAtItsWord) {
+TEST(Gravity, AnAttitudeIsPreferredToTheAccelerometer) {
   Gravity gravity;
   Sweep sweep = sweep_with({0, 0, 0}, {0.8, 0, 0});
   sweep.up_base = from_rpy_rad({0, 2 * kRad, 0}).conjugate() * kUp;
