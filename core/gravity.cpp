@@ -52,7 +52,7 @@ Eigen::Vector3d TiltKeeper::take_correction_rad() {
   const double tilt_rad = tilt_rad_.norm();
   if (observed_ < kMemory_sweeps || tilt_rad < kNotWorthIt_rad)
     return Eigen::Vector3d::Zero();
-  const Eigen::Vector3d correction_rad = kPerKeyframe_rad / tilt_rad * tilt_rad_;
+  Eigen::Vector3d correction_rad = kPerKeyframe_rad / tilt_rad * tilt_rad_;
   tilt_rad_ -= correction_rad;
   return correction_rad;
 }
