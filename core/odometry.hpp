@@ -109,8 +109,6 @@ class Odometry {
 
   std::uint64_t processed_ = 0;
   std::optional<Pose> T_odom_start_; ///< where to begin
-  bool knows_start_ = false;         ///< the map holds what was seen there
-  bool resumed_ = false;
   std::vector<SweepPoint>
       first_points_; ///< of the first sweep, as they came: no velocity was known to correct them with
   Stamp last_stamp_;
@@ -123,8 +121,10 @@ class Odometry {
   Vector6 askew_variance_ = Vector6::Zero(); ///< of the last sweep, base axes
   std::vector<GyroBias> gyro_biases_;
   Standstill standstill_;
-  int refused_in_a_row_ = 0;   ///< sweeps with points
-  bool adrift_ = false;        ///< the last sweep was a prediction
+  int refused_in_a_row_ = 0; ///< sweeps with points
+  bool adrift_ = false;      ///< the last sweep was a prediction
+  bool knows_start_ = false; ///< the map holds what was seen at T_odom_start_
+  bool resumed_ = false;
   std::array<bool, 6> weak_{}; ///< axes that lidar hardly sees
   RegistrationFeedback feedback_;
 };

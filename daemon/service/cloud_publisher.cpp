@@ -2,6 +2,7 @@
 #include "daemon/service/cloud_publisher.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include <pthread.h>
 
@@ -36,7 +37,7 @@ void map_points(const SurfaceGrid& grid, std::vector<CloudMessage::Point>& out) 
 
 } // namespace
 
-CloudPublisher::CloudPublisher(const DdsOptions& options, RosLink& link) : options_(options), link_(link) {
+CloudPublisher::CloudPublisher(DdsOptions options, RosLink& link) : options_(std::move(options)), link_(link) {
   if (!options_.publish_cloud && !options_.publish_map)
     return;
   thread_ = std::thread([this] { run(); });

@@ -19,7 +19,7 @@ namespace locus::daemon {
 class CloudPublisher {
  public:
   /// `link` must outlive this. Idle where the configuration asks for neither.
-  CloudPublisher(const DdsOptions& options, RosLink& link);
+  CloudPublisher(DdsOptions options, RosLink& link);
   ~CloudPublisher();
   CloudPublisher(const CloudPublisher&) = delete;
   CloudPublisher& operator=(const CloudPublisher&) = delete;

@@ -27,7 +27,7 @@ constexpr Duration kLongestAnswer = std::chrono::seconds{3};
 
 std::vector<gid_t> groups_of(int client) {
   std::vector<gid_t> groups(256);
-  socklen_t size = static_cast<socklen_t>(groups.size() * sizeof(gid_t));
+  auto size = static_cast<socklen_t>(groups.size() * sizeof(gid_t));
   if (getsockopt(client, SOL_SOCKET, SO_PEERGROUPS, groups.data(), &size) != 0)
     size = 0;
   groups.resize(size / sizeof(gid_t));

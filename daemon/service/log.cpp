@@ -72,6 +72,7 @@ void Log::write(Severity severity, const std::string& message, Fields fields, co
   for (const auto& [name, value] : fields)
     lines.push_back(fmt::format("{}={}", name, value));
   std::vector<iovec> vectors;
+  vectors.reserve(lines.size());
   for (std::string& line : lines)
     vectors.push_back({line.data(), line.size()});
   sd_journal_sendv(vectors.data(), static_cast<int>(vectors.size()));
