@@ -2,6 +2,7 @@
 #include "daemon/service/live_figures.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 namespace locus::daemon {
@@ -51,7 +52,8 @@ Percentiles LiveFigures::percentiles(float Timing::*figure) const {
     return {};
   std::ranges::sort(values);
   const auto at = [&](double share) {
-    return static_cast<double>(values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5)]);
+    return static_cast<double>(
+        values[static_cast<std::size_t>(std::lround(share * static_cast<double>(values.size() - 1)))]);
   };
   return {at(0.5), at(0.9), at(0.99), at(1.0)};
 }

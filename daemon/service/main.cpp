@@ -51,7 +51,7 @@ int run(const Arguments& arguments) {
 
 } // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) { // NOLINT(bugprone-exception-escape): what throws while telling of an exception
   Arguments arguments;
   CLI::App app{"Real-time lidar odometry as a service.", "locusd"};
   describe(app, arguments);

@@ -66,7 +66,7 @@ std::string to_bytes(const SavedState& state) {
                 0};
   std::string bytes(sizeof(header) + state.start.map_odom.size() * sizeof(SurfacePoint), '\0');
   std::memcpy(bytes.data(), &header, sizeof(header));
-  if (header.points > 0)
+  if (header.points > 0) // NOLINTNEXTLINE(bugprone-undefined-memory-manipulation): six floats, but for Eigen's word
     std::memcpy(bytes.data() + sizeof(header), state.start.map_odom.data(), bytes.size() - sizeof(header));
   header.checksum = checksum_of(bytes);
   std::memcpy(bytes.data(), &header, sizeof(header));
