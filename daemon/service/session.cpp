@@ -48,7 +48,7 @@ Session::Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket
       flat_ground_(state ? state->flat_ground : config.odometry.flat_ground),
       link_(config, [this](const RosInput& input) { receive(input); }), clouds_(config.dds, link_),
       state_(state_path(), [this](const std::string& problem) { log_.error(problem); }) {
-  tells_resumed_ = state.has_value();
+  tells_resumed_ = state.has_value(); // NOLINT(cppcoreguidelines-prefer-member-initializer): stands after its like
   begin(std::move(lidars), state ? std::optional{std::move(state->start)} : std::nullopt);
 }
 

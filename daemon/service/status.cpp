@@ -99,6 +99,7 @@ void add_estimate(const LiveFigures::Snapshot& figures, ordered_json& json) {
   json["t_ns"] = to_ns(last.stamp);
   json["pose"] = {{"xyz_m", {p.x(), p.y(), p.z()}}, {"rpy_deg", {rpy_deg.x(), rpy_deg.y(), rpy_deg.z()}}};
   std::vector<double> covariance;
+  covariance.reserve(36);
   for (int i = 0; i < 36; ++i)
     covariance.push_back(last.pose_covariance(i / 6, i % 6));
   json["covariance"] = covariance;
