@@ -2,7 +2,6 @@
 #include "locus_replay/report.hpp"
 
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <numeric>
@@ -13,6 +12,7 @@
 #include "locus_replay/report_map.hpp"
 #include "locus_replay/report_series.hpp"
 #include "sample_run.hpp"
+#include "support/temporary_file.hpp"
 
 namespace locus::tools {
 namespace {
@@ -22,12 +22,10 @@ using nlohmann::ordered_json;
 using test::SampleRun;
 
 std::string written(const SampleRun& run) {
-  const std::filesystem::path file = std::filesystem::path{testing::TempDir()} / "locus-report-test.html";
-  write_report(file, run.report());
-  std::ifstream stream{file, std::ios::binary};
-  std::string page{std::istreambuf_iterator<char>{stream}, {}};
-  std::filesystem::remove(file);
-  return page;
+  const test::TemporaryFile file("report.html");
+  write_report(file.path(), run.report());
+  std::ifstream stream{file.path(), std::ios::binary};
+  return {std::istreambuf_iterator<char>{stream}, {}};
 }
 
 /// The run as a browser would read it: up to the first thing that ends a script element.
