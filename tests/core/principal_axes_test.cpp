@@ -24,7 +24,7 @@ Eigen::Matrix3d scatter(const Eigen::Vector3d& variance, unsigned seed) {
 }
 
 template <class Real> PrincipalAxes<Real> axes_of(const Eigen::Matrix3d& m) {
-  const Eigen::Matrix<Real, 3, 3> r = m.cast<Real>();
+  const auto r = m.cast<Real>();
   return principal_axes<Real>({r(0, 0), r(0, 1), r(0, 2), r(1, 1), r(1, 2), r(2, 2)});
 }
 

@@ -18,7 +18,7 @@ class EndToEnd : public RobotNetwork {
   /// A drive of locus-sim, whose lidar is locked to PPS: how late this machine wakes up who plays it is not seen in the
   /// stamps.
   [[nodiscard]] std::filesystem::path plant() const {
-    const std::filesystem::path folder = file("plant");
+    std::filesystem::path folder = file("plant");
     const ProgramRun run = run_program(
         LOCUS_SIM, {"--world", "urban", "--robot", "husky", "--duration", "20", "--seed", "3", "-o", folder.string()});
     EXPECT_EQ(run.status, 0) << run.err;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <random>
 #include <thread>
@@ -23,8 +24,8 @@ TEST_F(Inputs, GarbageOnTheWireIsCountedAndHarmsNothing) {
   std::minstd_rand random(1);
   constexpr int kDatagrams = 3000;
   for (int i = 0; i < kDatagrams; ++i) {
-    const std::size_t sizes[] = {0, 1, 512, 1206, 1206, 1400, random() % 1500}; // NOLINT(modernize-avoid-c-arrays)
-    std::vector<std::byte> payload(sizes[random() % 7]);
+    const std::array<std::size_t, 7> sizes{0, 1, 512, 1206, 1206, 1400, random() % 1500};
+    std::vector<std::byte> payload(sizes[random() % sizes.size()]);
     std::ranges::generate(payload, [&] { return static_cast<std::byte>(random()); });
     sender.send(i % 3 == 0 ? 8308 : 2368, payload);
     if (i % 100 == 0)

@@ -59,7 +59,7 @@ const std::filesystem::path& RobotNetwork::capture() {
 }
 
 std::filesystem::path RobotNetwork::config(const std::string& more) const {
-  const std::filesystem::path path = file("locusd.yaml");
+  std::filesystem::path path = file("locusd.yaml");
   std::ofstream{path} << read_text(capture() / "config.yaml") << more;
   return path;
 }

@@ -18,6 +18,7 @@ constexpr double kShortest_s = 1, kLongest_s = 24 * 3600;
 
 template <class Named> std::vector<std::string> names_of(const Named& all) {
   std::vector<std::string> names;
+  names.reserve(all.size());
   for (const auto& each : all)
     names.emplace_back(each.name);
   return names;
@@ -41,6 +42,7 @@ sim::Slip parse_slip(const std::string& text, double duration_s) {
 
 std::vector<sim::Slip> parse_slips(const std::vector<std::string>& texts, double duration_s) {
   std::vector<sim::Slip> slips;
+  slips.reserve(texts.size());
   for (const std::string& text : texts)
     slips.push_back(parse_slip(text, duration_s));
   std::sort(slips.begin(), slips.end(), [](const sim::Slip& a, const sim::Slip& b) { return a.from < b.from; });

@@ -17,10 +17,9 @@ constexpr double kWeave_m = 12;     // lanes longer than this are not driven str
 /// Walks from place to place; where there is a choice, by the lane that was used least.
 class Walk {
  public:
-  Walk(const Roads& roads, Dice& dice) : roads_(roads), dice_(dice), uses_(roads.lanes().size()) {
-    here_ = dice.below(roads.places_m().size());
-    position_m_ = roads.places_m()[here_];
-  }
+  Walk(const Roads& roads, Dice& dice)
+      : roads_(roads), dice_(dice), uses_(roads.lanes().size()), here_(dice.below(roads.places_m().size())),
+        position_m_(roads.places_m()[here_]) {}
 
   /// The next point to drive to: a place, or a point on the way there.
   Eigen::Vector2d next() {
@@ -68,7 +67,7 @@ class Walk {
   const Roads& roads_;
   Dice& dice_;
   std::vector<int> uses_; ///< of each lane
-  std::size_t here_ = 0;
+  std::size_t here_;
   std::size_t last_lane_ = kNone;
   Eigen::Vector2d position_m_;
   std::vector<Eigen::Vector2d> on_the_way_; ///< the next one last
@@ -77,7 +76,7 @@ class Walk {
 /// What is left of a leg between the turns at its ends, driven: up to cruising speed, on, down again.
 class Leg {
  public:
-  Leg(double length_m, double from_mps, double to_mps, const Agility& agility, Dice& dice) {
+  Leg(double length_m, double from_mps, double to_mps, const Agility& agility, Dice& dice) : to_mps_(to_mps) {
     const auto pull = [&] {
       return dice.chance(agility.sudden_share) ? agility.sudden_mps2 : agility.acceleration_mps2;
     };
@@ -89,7 +88,6 @@ class Leg {
     fall_s_ = (cruise_mps_ - to_mps) / down;
     const double changing_m = rise_s_ * (from_mps + cruise_mps_) / 2 + fall_s_ * (cruise_mps_ + to_mps) / 2;
     straight_m_ = std::max(0.0, length_m - changing_m);
-    to_mps_ = to_mps;
   }
 
   [[nodiscard]] double duration_s() const { return rise_s_ + straight_m_ / cruise_mps_ + fall_s_; }
@@ -99,7 +97,7 @@ class Leg {
   }
 
  private:
-  double cruise_mps_, rise_s_, fall_s_, straight_m_, to_mps_;
+  double to_mps_, cruise_mps_, rise_s_, fall_s_, straight_m_;
 };
 
 double duration_s(const Course& course) {

@@ -81,7 +81,7 @@ class Scene::TreeMaker {
     for (const Surface& surface : surfaces) {
       order_.push_back(static_cast<std::uint32_t>(order_.size()));
       bounds_.push_back(bounds_of(surface));
-      middles_m_.push_back((bounds_.back().min_m + bounds_.back().max_m) / 2);
+      middles_m_.emplace_back((bounds_.back().min_m + bounds_.back().max_m) / 2);
     }
   }
 

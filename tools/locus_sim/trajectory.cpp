@@ -64,8 +64,8 @@ Trajectory::Trajectory(const Course& course, const Start& start, const Terrain& 
     const double steps = std::max(1.0, std::ceil(stretch.duration_s / kLongestStep_s));
     Placed placed{stretch, begin_s, driven_m, heading_rad, stretch.duration_s / steps, {position_m}};
     for (double step = 0; step < steps; ++step)
-      placed.positions_m.push_back(placed.positions_m.back() +
-                                   displacement(placed, step * placed.step_s, (step + 1) * placed.step_s));
+      placed.positions_m.emplace_back(placed.positions_m.back() +
+                                      displacement(placed, step * placed.step_s, (step + 1) * placed.step_s));
     const Planar end = planar(placed, stretch.duration_s);
     begin_s += stretch.duration_s;
     driven_m = end.driven_m;

@@ -57,7 +57,7 @@ class Screen {
   Screen& operator=(const Screen&) = delete;
 
   /// Over what was there, so that nothing flickers.
-  void show(const std::string& text) const {
+  static void show(const std::string& text) {
     std::string out = "\x1b[H";
     for (const char c : text)
       out += c == '\n' ? std::string{"\x1b[K\n"} : std::string{c};
@@ -70,9 +70,9 @@ void watch(const CtlArguments& arguments) {
   const Screen screen;
   while (interrupted == 0) {
     try {
-      screen.show(status_text(ask(arguments.control(), {{"command", "status"}}).json));
+      Screen::show(status_text(ask(arguments.control(), {{"command", "status"}}).json));
     } catch (const Failure& failure) { // it may come back
-      screen.show(fmt::format("{}\n", failure.what()));
+      Screen::show(fmt::format("{}\n", failure.what()));
     }
     for (int i = 0; i < 10 && interrupted == 0; ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds{50});
