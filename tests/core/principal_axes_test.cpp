@@ -24,8 +24,8 @@ Eigen::Matrix3d scatter(const Eigen::Vector3d& variance, unsigned seed) {
 }
 
 template <class Real> PrincipalAxes<Real> axes_of(const Eigen::Matrix3d& m) {
-  const auto r = m.cast<Real>();
-  return principal_axes<Real>({r(0, 0), r(0, 1), r(0, 2), r(1, 1), r(1, 2), r(2, 2)});
+  const auto of = [&](int row, int column) { return static_cast<Real>(m(row, column)); };
+  return principal_axes<Real>({of(0, 0), of(0, 1), of(0, 2), of(1, 1), of(1, 2), of(2, 2)});
 }
 
 TEST(PrincipalAxes, OfPointsOnAPlaneAreThoseOfAGeneralSolver) {

@@ -14,9 +14,10 @@ constexpr double kShaken_mps = 0.5; // from here on vibration is at its full
 } // namespace
 
 SyntheticImu::SyntheticImu(const Trajectory& trajectory, double rate_hz, ImuFaults faults, std::uint64_t seed,
-                           const Pose& T_base_imu)
-    : trajectory_(trajectory), period_(from_seconds(1 / rate_hz)), faults_(std::move(faults)), T_base_imu_(T_base_imu),
-      gyro_bias_radps_(faults_.gyro_bias_radps), random_(seed), stamp_(trajectory.start()) {}
+                           Pose T_base_imu)
+    : trajectory_(trajectory), period_(from_seconds(1 / rate_hz)), faults_(std::move(faults)),
+      T_base_imu_(std::move(T_base_imu)), gyro_bias_radps_(faults_.gyro_bias_radps), random_(seed),
+      stamp_(trajectory.start()) {}
 
 Eigen::Vector3d SyntheticImu::noise(double sigma) {
   const double x = normal_(random_), y = normal_(random_), z = normal_(random_);

@@ -27,7 +27,7 @@ class SyntheticImu {
  public:
   /// The trajectory must outlive it. The same arguments give the same samples.
   SyntheticImu(const Trajectory& trajectory, double rate_hz, ImuFaults faults = {}, std::uint64_t seed = 1,
-               const Pose& T_base_imu = {});
+               Pose T_base_imu = {});
 
   ImuSample next(); ///< the first is at the start of the trajectory
 
