@@ -32,7 +32,7 @@ constexpr double kObservableAbove = 0.02;
 
 /// Of what was not foreseen of the motion in a sweep, how much shows in where it comes to lie, and how much of that
 /// goes on in the next.
-constexpr double kAskew = 0.2;
+constexpr double kAskew = 0.4;
 constexpr double kShakesOn = 0.7;
 
 /// Motion sources that see no more than this see a robot at rest.
@@ -371,10 +371,21 @@ void Odometry::update_map(OdometryEstimate& estimate) {
   const StageScope scope(clock_, Stage::map);
   estimate.T_odom_base.rotation =
       (so3_exp(tilt_keeper_.take_correction_rad()) * estimate.T_odom_base.rotation).normalized();
-  map_.insert(scan_, estimate.T_odom_base);
+  const double fresh = map_.insert(scan_, estimate.T_odom_base);
+  uncertainty_.keep(share_of_map(fresh, estimate.scan_to_submap.observability));
   T_odom_keyframe_ = estimate.T_odom_base;
   refused_in_a_row_ = 0;
   estimate.keyframe = true;
+}
+
+/// Of what sweeps to come are laid against, the part that a sweep makes up. If a share s of it is new, then 2/s - 1
+/// sweeps are in sight at a time, and a step of the mean over so many shifts it by 2s/(1 + s) of a step in the end.
+/// Along axes that no surface constrains nothing old holds it back.
+Matrix6 Odometry::share_of_map(double fresh, const Matrix6& observability) {
+  const Matrix6 all = Matrix6::Identity();
+  const Matrix6 unseen = kDegenerateBelow * (observability + kDegenerateBelow * all).inverse();
+  const double share = 2.0 * fresh / (1.0 + fresh);
+  return share * all + (1.0 - share) * unseen;
 }
 
 /// Where the robot stands the estimate stays where it was.
@@ -470,8 +481,6 @@ void Odometry::finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& 
   tilt_keeper_.observe(estimate.T_odom_base.rotation, gravity_.up_base());
 
   update_map(estimate);
-  if (estimate.keyframe)
-    uncertainty_.keep();
   ++processed_;
   T_odom_last_ = estimate.T_odom_base;
   last_stamp_ = sweep.end;

@@ -84,6 +84,7 @@ class Odometry {
   void judge_sources(const Sweep& sweep, const Prior& prior, const Pose& T_last_now, const OdometryEstimate& estimate);
   [[nodiscard]] std::span<const SurfacePoint> registered() const { return std::span(scan_).first(registered_); }
   void update_map(OdometryEstimate& estimate);
+  static Matrix6 share_of_map(double fresh, const Matrix6& observability);
   void hold_still(const Sweep& sweep, OdometryEstimate& estimate);
   [[nodiscard]] bool sources_saw_motion(const Sweep& sweep) const;
   void settle(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate);

@@ -40,10 +40,12 @@ void PoseUncertainty::see(const Matrix6& lidar_information) {
   of_sweep_.bias = kept.cwiseAbs() * of_sweep_.bias;
 }
 
-void PoseUncertainty::keep() {
-  of_map_.noise += of_sweep_.noise;
-  of_map_.bias += of_sweep_.bias;
-  of_sweep_ = {};
+void PoseUncertainty::keep(const Matrix6& share) {
+  const Matrix6 left = Matrix6::Identity() - share;
+  of_map_.noise += share * of_sweep_.noise * share.transpose();
+  of_map_.bias += share.cwiseAbs() * of_sweep_.bias;
+  of_sweep_.noise = left * of_sweep_.noise * left.transpose();
+  of_sweep_.bias = left.cwiseAbs() * of_sweep_.bias;
 }
 
 Matrix6 PoseUncertainty::against_submap() const { return of_sweep_.covariance(); }

@@ -10,8 +10,8 @@ namespace locus {
 /// A Kalman filter of the error alone: a prediction adds its own error to that of the pose before, what lidar sees
 /// takes it away along the axes that lidar sees, and along the others it adds up, sweep by sweep. The part of an error
 /// that is the same from sweep to sweep, as those of a wheel's radius or of a gyro's bias, adds up faster than noise
-/// and is carried beside it. Once the map takes a sweep the error it was placed with stays. All in odom axes, as
-/// (translation, turn) about the robot. One owner.
+/// and is carried beside it. Of the error of a sweep that the map takes, a share stays in the map. All in odom
+/// axes, as (translation, turn) about the robot. One owner.
 class PoseUncertainty {
  public:
   /// The robot is said to have moved by `moved_m`, with a noise and with a part that comes again each time.
@@ -20,8 +20,10 @@ class PoseUncertainty {
   /// Lidar has placed the robot in the submap.
   void see(const Matrix6& lidar_information);
 
-  /// The map has taken the sweep as it was placed.
-  void keep();
+  /// The map has taken the sweep as it was placed. Sweeps to come are laid against it and against all before it: where
+  /// it showed much that was new its error comes back with them, where it only went over what was there it is one of
+  /// many. `share` of it, along each axis, is now the map's.
+  void keep(const Matrix6& share);
 
   [[nodiscard]] Matrix6 against_submap() const;
   [[nodiscard]] Matrix6 since_start() const;

@@ -181,13 +181,14 @@ void SurfaceGrid::erase_entry(VoxelIndex index) {
   entries_[gap] = Entry{};
 }
 
-void SurfaceGrid::insert(std::span<const Point> points) {
+std::size_t SurfaceGrid::insert(std::span<const Point> points) {
   struct Place {
     const Point* point;
     VoxelIndex index;
     std::uint64_t hash;
   };
   std::array<Place, kAtOnce> places;
+  std::size_t fresh = 0;
   while (!points.empty()) {
     std::size_t count = 0;
     for (const Point& point : points.first(std::min(kAtOnce, points.size()))) {
@@ -200,10 +201,14 @@ void SurfaceGrid::insert(std::span<const Point> points) {
     for (const Place& place : std::span(places).first(count))
       if (const Entry& home = entries_[place.hash & (entries_.size() - 1)]; home.slot != kEmpty)
         __builtin_prefetch(&moments_[home.slot], 1);
-    for (const Place& place : std::span(places).first(count))
-      add(*place.point, place.index, find_or_create(place.index, place.hash));
+    for (const Place& place : std::span(places).first(count)) {
+      const std::uint32_t slot = find_or_create(place.index, place.hash);
+      add(*place.point, place.index, slot);
+      fresh += moments_[slot].fresh ? 1U : 0U;
+    }
     points = points.subspan(std::min(kAtOnce, points.size()));
   }
+  return fresh;
 }
 
 void SurfaceGrid::add(const Point& point, VoxelIndex index, std::uint32_t slot) {
@@ -260,7 +265,7 @@ Surface SurfaceGrid::fit(const Moments& moments) const {
 void SurfaceGrid::refresh() {
   for (const std::uint32_t slot : touched_) {
     voxels_[slot].surface = fit(moments_[slot]);
-    moments_[slot].touched = false;
+    moments_[slot].touched = moments_[slot].fresh = false;
   }
   touched_.clear();
 }

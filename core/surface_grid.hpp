@@ -43,8 +43,9 @@ class SurfaceGrid {
     Eigen::Vector3f normal;
   };
 
-  /// Takes in points. Call refresh() before the surfaces are read again. Points out of reach are left out.
-  void insert(std::span<const Point> points);
+  /// Takes in points. Call refresh() before the surfaces are read again. Points out of reach are left out. Returns how
+  /// many fell into voxels that were empty at the last refresh().
+  std::size_t insert(std::span<const Point> points);
   /// Brings the surfaces of the voxels up to date that were written to since the last call.
   void refresh();
   void clear();
@@ -94,6 +95,7 @@ class SurfaceGrid {
     Upper normals = Upper::Zero(); ///< outer products of the normals, of those points that have one
     float normal_count = 0.0F;
     bool touched = false;
+    bool fresh = true; ///< not refreshed yet
   };
 
   [[nodiscard]] std::size_t home_of(VoxelIndex index) const;

@@ -28,8 +28,8 @@ class SurfaceMap {
 
   explicit SurfaceMap(std::size_t max_bytes);
 
-  /// Takes in a sweep seen from T_map_base.
-  void insert(std::span<const SurfacePoint> points_base, const Pose& T_map_base);
+  /// Takes in a sweep seen from T_map_base. Returns the share of its points that fell where nothing was.
+  double insert(std::span<const SurfacePoint> points_base, const Pose& T_map_base);
   void clear();
 
   /// Whether a point can be looked up: finite, and no farther than voxels can be counted.

@@ -15,14 +15,14 @@ namespace {
 
 constexpr double kNoError_m = 0.01;
 
-/// Of the pose at the end as seen from the one at the beginning, odom axes: what has been added between the two.
+/// Of the pose at the end as seen from the one at the beginning, odom axes: both are off, each on its own account.
 Matrix6 covariance_between(const PosePair& begin, const PosePair& end, std::span<const Matrix6> covariances) {
   Matrix6 transport = Matrix6::Identity();
   transport.topRightCorner<3, 3>() = -skew(end.T_odom_base.translation - begin.T_odom_base.translation);
-  return covariances[end.estimate] - transport * covariances[begin.estimate] * transport.transpose();
+  return covariances[end.estimate] + transport * covariances[begin.estimate] * transport.transpose();
 }
 
-/// Nothing where the covariance has not grown along some axis.
+/// Nothing where some axis is said to be known without any doubt.
 std::optional<double> normalised_squared_error(const PosePair& begin, const PosePair& end,
                                                std::span<const Matrix6> covariances) {
   const Pose T_odom = begin.T_odom_base.inverse() * end.T_odom_base;
