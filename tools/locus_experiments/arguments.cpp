@@ -37,8 +37,8 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   CLI::App app{
       "The evaluation of the LOCUS paper, on simulated courses or on recordings of yours: one page of figures.",
       "locus-experiments"};
-  app.add_option("RECORDING", arguments.recordings,
-                 "Capture folders to run on; without any, the courses of the paper are simulated");
+  auto* recordings = app.add_option("RECORDING", arguments.recordings,
+                                    "Capture folders to run on; without any, the courses of the paper are simulated");
   app.add_option("-o,--output", arguments.output,
                  "Folder for experiments.html, results.json and the runs; made if need be")
       ->required()
@@ -51,6 +51,20 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
       ->type_name("S")
       ->capture_default_str()
       ->check(CLI::Range(10, 36'000));
+  auto* faults = app.add_flag("--faults", arguments.faults,
+                              "What a fault of each sensor does, in place of the paper's experiments: faults.md")
+                     ->excludes(recordings);
+  app.add_option("--seeds", arguments.seeds, "Of each course with --faults")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100))
+      ->needs(faults);
+  app.add_option("--consistency", arguments.honesty_runs,
+                 "Runs of 60 s by which --faults judges the covariances; 0: none")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 10'000))
+      ->needs(faults);
   app.add_option("--jobs", arguments.jobs, "Runs at the same time; those that measure speed run alone")
       ->type_name("N")
       ->capture_default_str()
@@ -66,7 +80,8 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
              "  locus-experiments -o experiments\n"
              "  locus-experiments --shard 1/2 -o part1 & locus-experiments --shard 2/2 -o part2; wait\n"
              "  locus-experiments --merge part1 part2 -o experiments\n"
-             "  locus-experiments -o fleet robot1/ robot2/ robot3/");
+             "  locus-experiments -o fleet robot1/ robot2/ robot3/\n"
+             "  locus-experiments --faults --duration 120 -o faults");
   if (!tools::parse_command_line(app, argc, argv))
     return std::nullopt;
   const std::optional<Shard> parsed = Shard::parse(shard);

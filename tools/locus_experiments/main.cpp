@@ -159,7 +159,9 @@ Results Experiments::results() const {
     results["runs"].push_back(done_.at(run.id()));
     results["runs"].back()["place"] = run.place;
   }
-  judge_robustness(results);
+  if (arguments_.faults)
+    results["faults"] = {{"seeds", arguments_.seeds}, {"consistency_runs", arguments_.honesty_runs}};
+  judge(results);
   return results;
 }
 
@@ -178,11 +180,11 @@ void run(const Arguments& arguments) {
   make_folder(arguments.output);
   const Results results =
       arguments.merge.empty() ? Experiments(arguments, make_plan(arguments)).carry_out() : merged(arguments.merge);
-  write_results(arguments.output, results);
+  const std::filesystem::path page = write_results(arguments.output, results);
   if (!arguments.keep_captures)
     std::filesystem::remove_all(arguments.output / "courses");
   if (!arguments.quiet)
-    fmt::print("results in {}\n", (arguments.output / "experiments.html").string());
+    fmt::print("results in {}\n", page.string());
   if (const std::string failures = failures_in(results); !failures.empty())
     throw Failure(ExitStatus::failed, failures);
 }

@@ -12,6 +12,7 @@
 #include "accuracy/trajectory_accuracy.hpp"
 #include "drivers/capture_folder.hpp"
 #include "locus_experiments/child_process.hpp"
+#include "locus_experiments/fault_figures.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/quantiles.hpp"
 
@@ -91,6 +92,8 @@ ordered_json measurement(const Run& run, const std::filesystem::path& folder, co
   const CaptureFolder capture = value_or_fail(CaptureFolder::find(course.folder), ExitStatus::failed);
   if (!capture.ground_truth.empty() && run.paced_cpus == 0)
     add_errors(folder / "odometry.tum", capture.ground_truth, result);
+  if (run.watched)
+    result["fault"] = fault_figures(*run.watched, folder, capture);
   return result;
 }
 

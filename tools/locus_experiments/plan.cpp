@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "locus_experiments/fault_plan.hpp"
+
 namespace locus::experiments {
 namespace {
 
@@ -141,9 +143,18 @@ const std::vector<std::string>& paper_settings() {
 }
 
 Plan make_plan(const Arguments& arguments) {
-  Plan plan = arguments.recordings.empty() ? plan_of_paper(arguments) : plan_of_recordings(arguments);
+  Plan plan = arguments.faults               ? plan_of_faults(arguments)
+              : arguments.recordings.empty() ? plan_of_paper(arguments)
+                                             : plan_of_recordings(arguments);
   for (std::size_t place = 0; place < plan.runs.size(); ++place)
     plan.runs[place].place = place;
+  const auto course_of = [&](const Run& run) { return std::ranges::find(plan.courses, run.course, &Course::name); };
+  if (arguments.faults) { // to simulate a course takes longer than its runs
+    std::size_t index = 0;
+    std::erase_if(plan.courses, [&](const Course&) { return !arguments.shard.has(index++); });
+    std::erase_if(plan.runs, [&](const Run& run) { return course_of(run) == plan.courses.end(); });
+    return plan;
+  }
   std::erase_if(plan.runs, [&](const Run& run) { return !arguments.shard.has(run.place); });
   std::erase_if(plan.courses, [&](const Course& course) {
     return std::ranges::none_of(plan.runs, [&](const Run& run) { return run.course == course.name; });

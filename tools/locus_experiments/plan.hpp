@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,14 +18,20 @@ struct Course {
   std::vector<std::string> simulation; ///< options of locus-sim that make it; empty for a recording
 };
 
+/// Of a recording, seconds from its start.
+struct Interval {
+  int from_s, until_s;
+};
+
 /// One run of locus-replay.
 struct Run {
   std::string course;
-  std::string configuration;        ///< what it is called in the results
-  std::vector<std::string> options; ///< of locus-replay
-  int paced_cpus = 0;               ///< at the pace of the recording on so many processors; 0: as fast as can be
-  bool loam_features = false;       ///< LOAM's points in place of the filters
-  std::size_t place = 0;            ///< among all runs of the plan, whichever shard does them
+  std::string configuration;            ///< what it is called in the results
+  std::vector<std::string> options;     ///< of locus-replay
+  int paced_cpus = 0;                   ///< at the pace of the recording on so many processors; 0: as fast as can be
+  bool loam_features = false;           ///< LOAM's points in place of the filters
+  std::size_t place = 0;                ///< among all runs of the plan, whichever shard does them
+  std::optional<Interval> watched = {}; ///< what happens there is measured for the table of faults
 
   [[nodiscard]] std::string id() const { return course + '/' + configuration; }
 };
@@ -37,8 +44,8 @@ struct Plan {
 /// Settings of the paper's Section II and Table IV as --set options: what paper-husky.yaml says beyond husky.yaml.
 const std::vector<std::string>& paper_settings();
 
-/// The paper's experiments, or as much of them as a recording allows; of these the part of one shard, with the courses
-/// that it needs.
+/// The faults, or the paper's experiments, or as much of them as a recording allows; of these the part of one shard: of
+/// the faults every N-th course with all its runs, else every N-th run with the courses that they need.
 Plan make_plan(const Arguments& arguments);
 
 } // namespace locus::experiments

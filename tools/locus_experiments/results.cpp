@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "locus_experiments/fault_table.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/output_file.hpp"
 #include "pages/data_page.hpp"
@@ -64,11 +65,13 @@ Results merged(const std::vector<std::filesystem::path>& folders) {
       all = part;
       all["runs"] = Results::array();
     }
-    for (const char* key : {"version", "simulated", "duration_s"}) {
-      if (all.value(key, Results{}) != part.value(key, Results{}))
+    for (const char* key : {"/version", "/simulated", "/duration_s", "/faults/seeds", "/faults/consistency_runs"}) {
+      const Results::json_pointer pointer(key);
+      if (all.value(pointer, Results{}) != part.value(pointer, Results{}))
         throw Failure(ExitStatus::failed,
                       fmt::format("{}: its {} differs from that of {}; merge the shards of one experiment",
-                                  (folder / kFileName).string(), key, (folders.front() / kFileName).string()));
+                                  (folder / kFileName).string(), pointer.back(),
+                                  (folders.front() / kFileName).string()));
     }
     for (const Results& run : part.at("runs")) {
       if (!seen.insert(id_of(run)).second)
@@ -79,7 +82,7 @@ Results merged(const std::vector<std::filesystem::path>& folders) {
   }
   auto& runs = all["runs"].get_ref<Results::array_t&>(); // in the order that one machine would have done them in
   std::ranges::stable_sort(runs, {}, [](const Results& run) { return run.value("place", std::size_t{0}); });
-  judge_robustness(all);
+  judge(all);
   return all;
 }
 
@@ -101,13 +104,28 @@ void judge_robustness(Results& results) {
   results["robustness"] = std::move(rows);
 }
 
-void write_results(const std::filesystem::path& folder, const Results& results) {
+void judge(Results& results) {
+  if (results.contains("faults"))
+    judge_faults(results);
+  else
+    judge_robustness(results);
+}
+
+std::filesystem::path write_results(const std::filesystem::path& folder, const Results& results) {
   const std::string text = results.dump(1, ' ', false, Results::error_handler_t::replace);
   tools::OutputFile json(folder / kFileName);
   json.print("{}\n", text);
   json.close();
-  tools::write_data_page(folder / "experiments.html", {locus_experiments_page_begin, locus_experiments_page_end},
-                         results);
+  if (results.contains("faults")) {
+    const std::filesystem::path table = folder / "faults.md";
+    tools::OutputFile file(table);
+    file.print("{}", fault_table(results));
+    file.close();
+    return table;
+  }
+  const std::filesystem::path page = folder / "experiments.html";
+  tools::write_data_page(page, {locus_experiments_page_begin, locus_experiments_page_end}, results);
+  return page;
 }
 
 } // namespace locus::experiments

@@ -10,7 +10,8 @@
 namespace locus::experiments {
 
 /// What results.json holds: {"version", "simulated", "duration_s", "runs": [...], "robustness": [...]}. A run is a
-/// measurement(), or its course and configuration with "failed", the reason why there is none.
+/// measurement(), or its course and configuration with "failed", the reason why there is none. With --faults "faults"
+/// stands in place of "robustness": {"seeds", "consistency_runs", "rows": [...], "consistency"}, of judge_faults().
 using Results = nlohmann::ordered_json;
 
 /// Puts the runs of several shards together. Throws tools::Failure where a folder holds no results, where two hold the
@@ -23,7 +24,10 @@ Results merged(const std::vector<std::filesystem::path>& folders);
 /// by more than 20 cm; OK, the rest.
 void judge_robustness(Results& results);
 
-/// Writes results.json and experiments.html. Throws tools::Failure.
-void write_results(const std::filesystem::path& folder, const Results& results);
+/// What the runs say together: judge_robustness() or judge_faults().
+void judge(Results& results);
+
+/// Writes results.json and experiments.html, or faults.md; that is what it returns. Throws tools::Failure.
+std::filesystem::path write_results(const std::filesystem::path& folder, const Results& results);
 
 } // namespace locus::experiments
