@@ -30,9 +30,10 @@ constexpr int kRefusalsToRestart = 10;
 constexpr double kDegenerateBelow = 0.01;
 constexpr double kObservableAbove = 0.02;
 
-/// Of what was not foreseen of the motion in a sweep, how much shows in where it comes to lie, and how much of that
-/// goes on in the next.
+/// Of what was not foreseen of the motion in a sweep, how much shows in where it comes to lie, how far a turn shifts
+/// it, for what it sees stands to one side, and how much of that goes on in the next.
 constexpr double kAskew = 0.4;
+constexpr double kArm_m = 2.0;
 constexpr double kShakesOn = 0.7;
 
 /// Motion sources that see no more than this see a robot at rest.
@@ -383,7 +384,8 @@ void Odometry::update_map(OdometryEstimate& estimate) {
 /// Along axes that no surface constrains nothing old holds it back.
 Matrix6 Odometry::share_of_map(double fresh, const Matrix6& observability) {
   const Matrix6 all = Matrix6::Identity();
-  const Matrix6 unseen = kDegenerateBelow * (observability + kDegenerateBelow * all).inverse();
+  const Matrix6 seen = observability / kDegenerateBelow;
+  const Matrix6 unseen = (seen * seen + all).inverse();
   const double share = 2.0 * fresh / (1.0 + fresh);
   return share * all + (1.0 - share) * unseen;
 }
@@ -428,7 +430,9 @@ void Odometry::settle(const Sweep& sweep, const Prior& prior, OdometryEstimate& 
 /// A sweep that was corrected for another motion than the robot's is bent, and lies askew. A robot that shakes or whose
 /// wheels slip does so for a while.
 void Odometry::bend(const Vector6& surprise) {
-  askew_variance_ = (kAskew * surprise).cwiseAbs2().cwiseMax(kShakesOn * askew_variance_);
+  Vector6 bent = surprise.cwiseAbs();
+  bent.head<3>().array() += kArm_m * surprise.tail<3>().norm();
+  askew_variance_ = (kAskew * bent).cwiseAbs2().cwiseMax(kShakesOn * askew_variance_);
   const Matrix6 R = turn_both(T_odom_last_.rotation);
   uncertainty_.predict(Eigen::Vector3d::Zero(), R * askew_variance_.asDiagonal() * R.transpose(), Vector6::Zero());
 }

@@ -51,7 +51,7 @@ TEST(PoseUncertainty, WhereNothingIsNewASweepIsOneOfManyAndTheMapHardlyMoves) {
   const auto after = [](int sweeps, double share) {
     PoseUncertainty uncertainty;
     for (int sweep = 0; sweep < sweeps; ++sweep) {
-      uncertainty.predict(kStep_m, kNoise, kNoBias);
+      uncertainty.predict(Eigen::Vector3d::Zero(), kNoise, kNoBias);
       uncertainty.see(1e6 * Matrix6::Identity());
       if (sweep % 10 == 9)
         uncertainty.keep(share * Matrix6::Identity());

@@ -61,8 +61,8 @@ TEST(FaultFigures, TellOfFlagsGrowthAndTheSourcesThemselves) {
   const auto figures = fault_figures({10, 20}, folder.path(), sources);
   EXPECT_NEAR(figures["added_m"].get<double>(), 0.0, 1e-9);
   EXPECT_NEAR(figures["told"].get<double>(), 6.0 / 11.0, 1e-9) << "since the interval's beginning";
-  EXPECT_NEAR(figures["growth"]["x"].get<double>(), 4.0, 1e-9) << "from 5 m to 20 m";
-  EXPECT_NEAR(figures["growth"]["y"].get<double>(), 1.0, 1e-9);
+  EXPECT_NEAR(figures["growth"]["along"].get<double>(), 4.0, 1e-9) << "from 5 m to 20 m";
+  EXPECT_NEAR(figures["growth"]["across"].get<double>(), 1.0, 1e-9);
   EXPECT_NEAR(figures["sources"]["wio"]["added_m"].get<double>(), 0.1, 1e-9);
   EXPECT_GT(figures["sources"]["wio"]["ape_mean_m"].get<double>(), 0.02);
 }

@@ -19,7 +19,7 @@ Results run(const std::string& course, const std::string& configuration, double 
                     {"covariance", {{"nees_10m", 6.0}, {"worst_sigma", 2.0}}}};
   run["fault"] = {{"added_m", 0.0},
                   {"told", 0.0},
-                  {"growth", {{"x", 50.0}, {"y", 1.5}}},
+                  {"growth", {{"along", 50.0}, {"across", 1.5}}},
                   {"sources", {{"wio", {{"added_m", 0.1}, {"ape_mean_m", 0.2}}}}}};
   return run;
 }
@@ -114,7 +114,7 @@ TEST(FaultTable, ALossThatAddsErrorMustBeFlaggedAndHonest) {
 TEST(FaultTable, InACorridorTheWheelsAndTheGrowthOfDoubtDecide) {
   Results corridor = run("corridor_1", "none", 0.19);
   EXPECT_TRUE(row_of({corridor}, "corridor", "none")["holds"]);
-  corridor["fault"]["growth"]["y"] = 3.0;
+  corridor["fault"]["growth"]["across"] = 11.0;
   EXPECT_EQ(row_of({corridor}, "corridor", "none")["broken"][0], "doubt across the way grows");
   EXPECT_EQ(row_of({run("corridor_1", "none", 0.21)}, "corridor", "none")["broken"][0], "worse than the wheels");
 }

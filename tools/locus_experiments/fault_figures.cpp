@@ -2,7 +2,6 @@
 #include "locus_experiments/fault_figures.hpp"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <fstream>
 #include <string>
@@ -26,11 +25,11 @@ using tools::value_or_fail;
 /// A row of odometry.csv, as far as it is of use here.
 struct Row {
   std::string state;
-  std::array<double, 2> variance_m2{}; ///< along x and y of odom
+  Eigen::Matrix2d covariance_m2; ///< of x and y of odom
 };
 
 constexpr std::size_t kStateColumn = 1;
-constexpr std::array<std::size_t, 2> kVarianceColumns{5, 12}; // the diagonal of a matrix of 6 x 6 from column 5 on
+constexpr std::size_t kCovarianceColumn = 5; // of 6 x 6, row by row
 
 std::vector<std::string_view> columns_of(std::string_view line) {
   std::vector<std::string_view> columns;
@@ -49,15 +48,17 @@ std::vector<Row> read_rows(const std::filesystem::path& file) {
   std::getline(stream, line); // header
   while (std::getline(stream, line)) {
     const std::vector<std::string_view> columns = columns_of(line);
-    if (columns.size() <= kVarianceColumns.back())
+    if (columns.size() < kCovarianceColumn + 36)
       throw Failure(ExitStatus::failed,
                     fmt::format("{}:{}: ends too early; run again", file.string(), rows.size() + 2));
-    Row row{.state = std::string(columns[kStateColumn])};
-    for (std::size_t axis = 0; axis < row.variance_m2.size(); ++axis) {
-      const std::string_view text = columns[kVarianceColumns[axis]];
-      std::from_chars(text.data(), text.data() + text.size(), row.variance_m2[axis]);
-    }
-    rows.push_back(std::move(row));
+    const auto covariance = [&](std::size_t i, std::size_t j) {
+      const std::string_view text = columns[kCovarianceColumn + 6 * i + j];
+      double value = 0;
+      std::from_chars(text.data(), text.data() + text.size(), value);
+      return value;
+    };
+    rows.push_back({std::string(columns[kStateColumn]),
+                    Eigen::Matrix2d{{covariance(0, 0), covariance(0, 1)}, {covariance(1, 0), covariance(1, 1)}}});
   }
   return rows;
 }
@@ -70,16 +71,22 @@ double share_told(std::span<const Row> rows) {
 
 ordered_json growth(const std::vector<Row>& rows, std::span<const StampedPose> estimates) {
   constexpr double kBegun_m = 5;
-  const auto away_m = [&](const StampedPose& pose) {
-    return (pose.T_source_base.translation - estimates.front().T_source_base.translation).norm();
+  const auto way_m = [&](const StampedPose& pose) -> Eigen::Vector2d {
+    return (pose.T_source_base.translation - estimates.front().T_source_base.translation).head<2>();
   };
+  const auto away_m = [&](const StampedPose& pose) { return way_m(pose).norm(); };
   const auto begun = std::ranges::find_if(estimates, [&](const StampedPose& pose) { return away_m(pose) >= kBegun_m; });
   const auto farthest = std::ranges::max_element(estimates, {}, away_m);
   if (begun == estimates.end())
     return nullptr;
-  const Row& first = rows[static_cast<std::size_t>(begun - estimates.begin())];
-  const Row& last = rows[static_cast<std::size_t>(farthest - estimates.begin())];
-  return {{"x", last.variance_m2[0] / first.variance_m2[0]}, {"y", last.variance_m2[1] / first.variance_m2[1]}};
+  const Eigen::Vector2d along = way_m(*farthest).normalized(), across = along.unitOrthogonal();
+  const auto growth_along = [&](const Eigen::Vector2d& axis) {
+    const auto variance_m2 = [&](const auto& pose) {
+      return axis.dot(rows[static_cast<std::size_t>(pose - estimates.begin())].covariance_m2 * axis);
+    };
+    return variance_m2(farthest) / variance_m2(begun);
+  };
+  return {{"along", growth_along(along)}, {"across", growth_along(across)}};
 }
 
 } // namespace

@@ -17,7 +17,7 @@ enum class Demand : std::uint8_t {
   unharmed_or_told,    ///< that; or sweeps are flagged, and no position is farther off than three standard deviations
   carried,             ///< error added while the fault lasts at most `limit` times that of the motion source alone
   resisted,            ///< error added while the fault lasts, and to the mean error, at most `limit` metres
-  no_worse_than_wheels ///< mean error at most that of the wheels; variance grows ten times along x, not across
+  no_worse_than_wheels ///< mean error at most that of the wheels; variance grows ten times along the way, not across
 };
 
 /// How long a fault lasts: from half time on, unless it is there from the start.

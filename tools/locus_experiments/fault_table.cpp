@@ -133,7 +133,7 @@ Verdict resisted(const Pairs& pairs, double limit_m) {
 }
 
 Verdict no_worse_than_wheels(const Pairs& pairs, const std::string& source) {
-  constexpr double kGrowsAlong = 10, kStaysAcross = 2;
+  constexpr double kGrowsAlong = 10, kStaysAcross = 10;
   const Figure wheels_m = [&](const Pair& pair) {
     return pair.with->at("fault").at("sources").at(source).at("ape_mean_m").get<double>();
   };
@@ -143,7 +143,7 @@ Verdict no_worse_than_wheels(const Pairs& pairs, const std::string& source) {
       return both.is_null() ? 0.0 : both.at(axis).get<double>();
     });
   };
-  const double along = growth("x"), across = growth("y");
+  const double along = growth("along"), across = growth("across");
   const double excess_m = median(pairs, [&](const Pair& pair) { return with_m(pair) - wheels_m(pair); });
   return Verdict{
       fmt::format("error <= {}'s; variance along grows >= {} x, across < {} x", source, kGrowsAlong, kStaysAcross),
