@@ -108,16 +108,18 @@ Expected<UdpSocket, std::string> UdpSocket::adopt(int descriptor) {
   return adopted;
 }
 
-/// SO_RCVBUFFORCE needs a privilege; without it the kernel gives as much as net.core.rmem_max allows.
+/// SO_RCVBUFFORCE needs a privilege; without it the kernel gives as much as net.core.rmem_max allows. A socket of
+/// systemd's may have more already (ReceiveBuffer=), which is not to be taken from it.
 std::optional<std::string> UdpSocket::prepare() {
   sockaddr_storage address{};
   socklen_t size = sizeof(address);
   if (getsockname(descriptor_, reinterpret_cast<sockaddr*>(&address), &size) != 0 || port_of(address) == 0)
     return fmt::format("descriptor {} is bound to no UDP port", descriptor_);
   port_ = port_of(address);
-  if (!set(descriptor_, SOL_SOCKET, SO_RCVBUFFORCE, kWantedBufferBytes))
-    set(descriptor_, SOL_SOCKET, SO_RCVBUF, kWantedBufferBytes);
   size = sizeof(buffer_bytes_);
+  getsockopt(descriptor_, SOL_SOCKET, SO_RCVBUF, &buffer_bytes_, &size);
+  if (buffer_bytes_ < kWantedBufferBytes && !set(descriptor_, SOL_SOCKET, SO_RCVBUFFORCE, kWantedBufferBytes))
+    set(descriptor_, SOL_SOCKET, SO_RCVBUF, kWantedBufferBytes);
   getsockopt(descriptor_, SOL_SOCKET, SO_RCVBUF, &buffer_bytes_, &size);
   if (!set(descriptor_, SOL_SOCKET, SO_TIMESTAMPNS, 1) || !set(descriptor_, SOL_SOCKET, SO_RXQ_OVFL, 1))
     return because("no stamps of arrival", port_);

@@ -22,7 +22,7 @@ std::string refused(const char* what, const char* advice) {
 std::optional<std::string> lock_memory() {
   if (mlockall(MCL_CURRENT | MCL_FUTURE) == 0)
     return std::nullopt;
-  return refused("realtime.lock_memory", "set LimitMEMLOCK=infinity in the unit");
+  return refused("realtime.lock_memory", "grant it as /usr/share/doc/locusd/examples/realtime.conf does");
 }
 
 std::optional<std::string> keep_to_cpus(const std::vector<int>& cpus) {
@@ -39,7 +39,7 @@ std::optional<std::string> raise_priority(int fifo_priority) {
   const sched_param wanted{fifo_priority};
   if (fifo_priority == 0 || sched_setscheduler(0, SCHED_FIFO, &wanted) == 0)
     return std::nullopt;
-  return refused("realtime.priority", "set LimitRTPRIO=99 in the unit, or the priority to 0");
+  return refused("realtime.priority", "grant it as /usr/share/doc/locusd/examples/realtime.conf does");
 }
 
 } // namespace locus::daemon

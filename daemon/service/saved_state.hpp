@@ -51,6 +51,9 @@ class StateKeeper {
   /// Producer, one thread: after every estimate.
   void take(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground);
 
+  /// Producer: what was written is no longer true; the next estimate is written at once.
+  void begin_anew() { last_.reset(); }
+
  private:
   void run();
 

@@ -102,6 +102,7 @@ void Session::reset(std::optional<Pose> T_odom_base) {
     return;
   }
   end();
+  state_.begin_anew();
   begin(std::move(*lidars), T_odom_base ? std::optional{StartPoint{*T_odom_base, {}}} : std::nullopt);
   log_.info("odometry begins anew, as it was told to");
 }

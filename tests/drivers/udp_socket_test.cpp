@@ -108,6 +108,18 @@ TEST(UdpSocket, TakesOverWhatIsBoundToBothFamilies) {
   EXPECT_EQ(datagrams[0].source_ip, INADDR_LOOPBACK);
 }
 
+TEST(UdpSocket, TakesOverALargerBufferAsItIs) {
+  const int large = ::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  const int wanted = 4 * UdpSocket::kWantedBufferBytes;
+  if (setsockopt(large, SOL_SOCKET, SO_RCVBUFFORCE, &wanted, sizeof(wanted)) != 0)
+    GTEST_SKIP() << "only root gives a socket more than others";
+  const sockaddr_in address{AF_INET, kAnyPort, {htonl(INADDR_LOOPBACK)}, {}};
+  ASSERT_EQ(bind(large, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
+  const auto socket = UdpSocket::adopt(large);
+  ASSERT_TRUE(socket) << socket.error();
+  EXPECT_GE(socket->buffer_bytes(), wanted);
+}
+
 TEST(UdpSocket, TakesOverNothingElse) {
   EXPECT_FALSE(UdpSocket::adopt(open("/dev/null", O_RDONLY | O_CLOEXEC)));
   EXPECT_FALSE(UdpSocket::adopt(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)));
