@@ -8,6 +8,6 @@ while read -r file; do
     echo "$file:1: lacks the line 'SPDX-License-Identifier: Apache-2.0'"
     status=1
   fi
-done < <(cpp_sources; find "${rooms[@]}" packaging .ci CMakeLists.txt ./*.sh \
-           -name CMakeLists.txt -o -name '*.cmake' -o -name '*.sh' -o -name '*.yaml' -o -path .ci/run)
+done < <(cpp_sources; find "${rooms[@]}" packaging systemd docs .ci CMakeLists.txt ./*.sh \
+           -name CMakeLists.txt -o -name '*.cmake' -o -name '*.sh' -o -name '*.yaml' -o -name '*.conf' -o -name 'locusd.s*' -o -path .ci/run)
 exit $status
