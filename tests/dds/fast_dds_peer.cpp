@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A participant made with Fast DDS, ROS 2's default: fast_dds_peer DOMAIN listen|talk PREFIX. See peer_words.hpp.
+// A participant made with Fast DDS, ROS 2's default: fast_dds_peer DOMAIN listen|talk PREFIX [ADDRESS].
+// On the loopback interface, or on that of ADDRESS. See peer_words.hpp.
 #include <cstdlib>
 #include <memory>
 #include <stdexcept>
@@ -25,12 +26,12 @@ namespace dds = eprosima::fastdds::dds;
 
 constexpr auto kAsNeeded = eprosima::fastrtps::rtps::DYNAMIC_RESERVE_MEMORY_MODE; ///< and not as a message may need
 
-dds::DomainParticipant* join(std::uint32_t domain) {
-  auto loopback = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-  loopback->interfaceWhiteList.emplace_back("127.0.0.1");
+dds::DomainParticipant* join(std::uint32_t domain, const std::string& address) {
+  auto wire = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+  wire->interfaceWhiteList.push_back(address);
   dds::DomainParticipantQos qos;
   qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports.push_back(loopback);
+  qos.transport().user_transports.push_back(wire);
   dds::DomainParticipant* participant = dds::DomainParticipantFactory::get_instance()->create_participant(domain, qos);
   if (participant == nullptr)
     throw std::runtime_error("no participant");
@@ -119,9 +120,10 @@ void talk(dds::DomainParticipant& participant) {
 }
 
 void run(int argc, char** argv) {
-  if (argc != 4)
-    throw std::runtime_error("usage: fast_dds_peer DOMAIN listen|talk PREFIX");
-  dds::DomainParticipant& participant = *join(static_cast<std::uint32_t>(std::atoi(argv[1]))); // NOLINT
+  if (argc != 4 && argc != 5)
+    throw std::runtime_error("usage: fast_dds_peer DOMAIN listen|talk PREFIX [ADDRESS]");
+  const auto domain = static_cast<std::uint32_t>(std::atoi(argv[1])); // NOLINT
+  dds::DomainParticipant& participant = *join(domain, argc == 5 ? argv[4] : "127.0.0.1");
   const std::string prefix = argv[3];
   if (std::string(argv[2]) == "talk")
     return talk(participant);

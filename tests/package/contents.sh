@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# contents.sh SOURCE FOLDER: the packages there have the version of the sources, ask for little, and know nothing of the
+# folder that they were built in.
+set -euo pipefail
+source=$1 folder=$2
+status=0
+complain() { echo "$*"; status=1; }
+version=$(grep -oP '^project\(locusd VERSION \K[0-9.]+' "$source/CMakeLists.txt")
+for package in locusd locus-tools; do
+  deb=$(echo "$folder/${package}"_*.deb)
+  [ "$(dpkg-deb -f "$deb" Version)" = "$version" ] ||
+    complain "$deb: is not of version $version, as CMakeLists.txt says; look at packaging/debian/changelog"
+  depends=$(dpkg-deb -f "$deb" Depends)
+  ! grep -qE 'vtk|pcl-io|boost|ros' <<<"$depends" || complain "$deb: drags in a lot: $depends"
+  [ $package != locusd ] || ! grep -q pcl <<<"$depends" || complain "$deb: needs PCL: $depends"
+  ! dpkg-deb --fsys-tarfile "$deb" | grep -aqE 'locusd-deb\.' || complain "$deb: names the folder that it was built in"
+done
+diff <(dpkg-deb -I "$folder"/locusd_*.deb conffiles | sort) \
+  <(cd "$source/config" && printf '/etc/locusd/%s\n' *.yaml | sort) || complain "conffiles are not those of config/ (>)"
+exit $status

@@ -1,0 +1,98 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# robot.sh BIN FOLDER: the package locusd of FOLDER on a robot: a Debian system of its own, booted, with a lidar wire and
+# an uplink. This side is the rest of the world: it sends what the robot's sensors say and listens to what it publishes.
+# What happens on the robot stands in robot_inside.sh.
+set -euo pipefail
+here=$(dirname "$(realpath "$0")")
+bin=$(realpath "$1") folder=$(realpath "$2")
+source "$here/base_tree.sh"
+probe
+base=$(base_tree "$folder")
+
+work=$(mktemp -d -t locusd-robot.XXXXXX)
+net=locusd-$$
+clean_up() {
+  trap '' TERM
+  kill -- $(jobs -p) 2>/dev/null || true
+  wait
+  umount "$work/root" 2>/dev/null || true
+  ip netns del "$net-robot" 2>/dev/null || true
+  ip netns del "$net-world" 2>/dev/null || true
+  rm -rf "$work"
+}
+trap clean_up EXIT
+
+# Two wires, as robots have them: lidars on one, ROS 2 on the other.
+ip netns add "$net-robot"
+ip netns add "$net-world"
+world() { ip netns exec "$net-world" "$@"; }
+robot() { ip netns exec "$net-robot" "$@"; }
+wire() { # NAME WORLD_ADDRESS ROBOT_ADDRESS
+  world ip link add "$1" type veth peer name "$1" netns "$net-robot"
+  world ip address add "$2" broadcast + dev "$1"
+  robot ip address add "$3" broadcast + dev "$1"
+  world ip link set "$1" up
+  robot ip link set "$1" up
+}
+world ip link set lo up
+robot ip link set lo up
+wire lidar0 192.168.1.201/24 192.168.1.100/24
+wire uplink0 10.7.0.2/24 10.7.0.1/24
+
+# The robot drives for 8 s; then it stands, and its wheels spin.
+"$bin/locus-sim" --world tunnel --robot husky --seed 1 --duration 90 --slip 8-90 -o "$work/drive" >/dev/null 2>&1
+
+# The package, one that was before it, and the script for the inside lie where both sides see them.
+exchange=$work/exchange
+mkdir -p "$exchange" "$work"/{upper,overlay,root}
+cp "$here/robot_inside.sh" "$bin/hang_thread" "$folder"/locusd_*.deb "$exchange"
+cp "$work/drive/config.yaml" "$exchange/robot.yaml"
+printf 'dds: {interface: uplink0, domain: 7}\n' >>"$exchange/robot.yaml"
+dpkg-deb -R "$folder"/locusd_*.deb "$work/previous"
+sed -i 's/^Version: .*/Version: 0.0.1/' "$work/previous/DEBIAN/control"
+sed -i 's/^threads: 2 /threads: 1 /' "$work/previous/etc/locusd/locusd.yaml"
+echo "# of the previous version" >>"$work/previous/etc/locusd/spot.yaml"
+dpkg-deb -b "$work/previous" "$exchange/previous.deb" >/dev/null
+
+mount -t overlay overlay -o "lowerdir=$base,upperdir=$work/upper,workdir=$work/overlay" "$work/root"
+cat >"$work/root/etc/systemd/system/robot-test.service" <<UNIT
+[Service]
+Type=idle
+ExecStart=/bin/bash -c '/exchange/robot_inside.sh >/exchange/log 2>&1; systemctl exit \$\$?'
+[Install]
+WantedBy=multi-user.target
+UNIT
+ln -s ../robot-test.service "$work/root/etc/systemd/system/multi-user.target.wants/robot-test.service"
+
+world "$bin/fast_dds_peer" 7 listen /locus 10.7.0.2 < <(exec sleep infinity) >"$work/heard" 2>&1 &
+SYSTEMD_NSPAWN_UNIFIED_HIERARCHY=1 systemd-nspawn --quiet --directory="$work/root" --bind="$exchange:/exchange" \
+  --register=no --keep-unit --capability=all --network-namespace-path="/run/netns/$net-robot" --boot --console=pipe \
+  </dev/null >"$work/console" 2>&1 &
+robot_process=$!
+
+(
+  until [ -e "$exchange/waits_for_drive" ]; do sleep 0.2; done
+  while true; do
+    world "$bin/locus-play" --quiet --to 192.168.1.255 --interface uplink0 --domain 7 "$work/drive"
+  done
+) >"$work/played" 2>&1 &
+
+status=0
+wait "$robot_process" || status=$?
+cat "$exchange/log" 2>/dev/null || cat "$work/console"
+[ $status -eq 0 ] || { echo "robot_inside.sh ended with $status"; tail "$work/played" "$work/heard"; exit 1; }
+
+# Outside, the drive was heard as it was: where the robot stood after 10 s of it, to 10 cm of the way from its start.
+awk '
+  function way(x, y, z) { return sqrt(x * x + y * y + z * z) }
+  FNR == NR && !first { first = $1; x = $2; y = $3; z = $4 }
+  FNR == NR { if ($1 - first <= 10) truth = way($2 - x, $3 - y, $4 - z); next }
+  $1 == "odometry" { if (!start) start = $2; if ($2 - start <= 10) heard = way($3, $4, $5); poses++ }
+  $1 == "state" { states++ }
+  $1 == "diagnostics" { diagnostics++ }
+  END {
+    printf "outside: %d poses, %d states, %d diagnostics; after 10 s %.2f m away, in truth %.2f m\n", poses, states,
+      diagnostics, heard, truth
+    exit !(poses > 60 && states > 60 && diagnostics > 20 && truth > 2 && (heard - truth) ^ 2 < 0.1 ^ 2)
+  }' "$work/drive/gt.tum" "$work/heard"

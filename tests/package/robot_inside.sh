@@ -1,0 +1,173 @@
+#!/bin/bash
+# SPDX-License-Identifier: Apache-2.0
+# What robot.sh does on the robot: a Debian system that has just been booted, with systemd.
+set -Eeuo pipefail
+trap 'echo "FAILED in line $LINENO: $BASH_COMMAND"; systemctl status --no-pager locusd; journalctl --no-pager -u locusd | tail -n 40' ERR
+cd /exchange
+export DEBIAN_FRONTEND=noninteractive
+
+step() { echo "-- $*"; }
+# wait_for SECONDS COMMAND...: until it succeeds
+wait_for() {
+  local end=$((SECONDS + $1))
+  shift
+  until "$@"; do
+    [ $SECONDS -lt $end ] || { echo "waited in vain for: $*"; return 1; }
+    sleep 0.1
+  done
+}
+install_package() { dpkg --force-confold --force-confdef -i "$1"; }
+is() { [ "$(systemctl show -P "$2" locusd)" = "$1" ]; }
+status_is() { locusctl status --json | grep -qE "^ \"state\": \"($1)\""; }
+tracks() { status_is "tracking|standstill"; }
+alive() { is active ActiveState && ! is "$1" MainPID; }
+says() { journalctl --no-pager -u locusd --since "$1" | grep -q "$2"; }
+# goes_on SINCE: it tracks again, and said whether where it was; on a machine that starves the first sweep may be too thin.
+resumed=0
+goes_on() {
+  wait_for 20 says "$1" "resumed where the service ended\|a fresh start"
+  if says "$1" "resumed where the service ended"; then resumed=$((resumed + 1)); fi
+  wait_for 20 tracks
+}
+now() { date '+%Y-%m-%d %H:%M:%S.%N' | head -c 26; }
+
+step "installing it enables and starts it, ready without a sensor"
+install_package previous.deb
+systemctl is-enabled --quiet locusd
+is active ActiveState
+is running SubState
+wait_for 3 is "Waiting for the first lidar packet" StatusText
+[ "$(stat -c %U "/proc/$(systemctl show -P MainPID locusd)")" = locusd ]
+for unit in locusd@.service locusd.socket; do
+  if systemctl is-enabled --quiet $unit; then false; fi
+done
+
+step "an edited configuration is taken by a reload, a bad one is refused"
+cp robot.yaml /etc/locusd/locusd.yaml
+systemctl reload locusd
+wait_for 10 says -1min "DDS is up: domain 7 on interface uplink0"
+echo "no_such_key: 1" >>/etc/locusd/locusd.yaml
+if locusctl reload || systemctl reload locusd; then false; fi
+is active ActiveState
+cp robot.yaml /etc/locusd/locusd.yaml
+
+step "it says which sensors it does not hear"
+wait_for 10 says -1min "lidar .*: no data packet on UDP port 2368"
+journalctl --no-pager -u locusd -o json | grep '"LOCUS_LIDAR":"' | grep '"CODE_FILE":"' | grep -q '"PRIORITY":"4"'
+
+step "it drives, and stands"
+touch waits_for_drive
+wait_for 20 status_is tracking
+wait_for 30 status_is standstill # at the start
+wait_for 30 status_is tracking
+wait_for 30 status_is standstill
+locusctl status
+locusctl save-map /tmp/map.pcd
+[ -s /tmp/map.pcd ]
+locusctl sensors | grep -q "192.168.1.201.*VLP-16"
+
+step "the upgrade keeps what was edited, brings what was not, and goes on where it was"
+since=$(now)
+process=$(systemctl show -P MainPID locusd)
+install_package "$(echo locusd_*.deb)"
+cmp robot.yaml /etc/locusd/locusd.yaml
+[ -e /etc/locusd/locusd.yaml.dpkg-dist ]
+if grep -q "previous version" /etc/locusd/spot.yaml; then false; fi
+wait_for 10 alive "$process"
+[ "$(dpkg-query -W -f '${Version}' locusd)" != 0.0.1 ]
+goes_on "$since"
+
+step "a thread that hangs is a watchdog's kill and a restart; the odometry goes on where it was"
+since=$(now)
+process=$(systemctl show -P MainPID locusd)
+./hang_thread "$process" odometry &
+wait_for 20 says "$since" "Watchdog timeout"
+wait_for 10 alive "$process"
+goes_on "$since"
+
+step "so does a crash"
+since=$(now)
+process=$(systemctl show -P MainPID locusd)
+kill -SEGV "$process"
+wait_for 10 alive "$process"
+goes_on "$since"
+is 2 NRestarts
+echo "resumed $resumed of 3 times"
+[ $resumed -ge 1 ]
+
+step "the sandbox is in force: what may be tried in the service's place fails"
+mkdir -p /etc/systemd/system/locusd@sandbox.service.d
+cat >/etc/systemd/system/locusd@sandbox.service.d/probe.conf <<'UNIT'
+[Service]
+Type=oneshot
+Restart=no
+ExecStart=
+ExecStart=/bin/bash /run/sandbox_probe.sh
+UNIT
+cat >/run/sandbox_probe.sh <<'PROBE'
+refused() { if "$@" 2>/dev/null; then echo "was allowed: $*"; exit 1; fi; }
+touch "$STATE_DIRECTORY/mine" "$RUNTIME_DIRECTORY/mine" || exit 1
+for folder in /etc /etc/locusd /usr /var /var/lib/locusd /home /root /run /boot; do
+  refused touch "$folder/mine"
+done
+refused perl -MSocket -e 'socket(my $s, AF_INET, SOCK_RAW, 1) or exit 1'
+refused perl -MSocket -e 'socket(my $s, 17, SOCK_DGRAM, 0) or exit 1' # AF_PACKET
+refused mount -t tmpfs none /mnt
+refused unshare --user true
+refused dmesg
+perl -MSocket -e 'socket(my $s, AF_INET, SOCK_DGRAM, 0) or exit 1' || exit 1
+PROBE
+systemctl daemon-reload
+systemctl start locusd@sandbox || { journalctl --no-pager -u locusd@sandbox; false; }
+[ -e /var/lib/locusd@sandbox/mine ]
+rm -r /etc/systemd/system/locusd@sandbox.service.d
+systemctl daemon-reload
+
+step "a second instance has a file, a socket and a state of its own"
+sed 's/port: 2368/port: 2400/; s/domain: 7/domain: 8/' robot.yaml >/etc/locusd/second.yaml
+systemctl start locusd@second
+locusctl --instance second status --json | grep -q '"port": 2400'
+[ -d /var/lib/locusd@second ]
+process=$(systemctl show -P MainPID locusd@second)
+dpkg-reconfigure locusd
+[ "$(systemctl show -P MainPID locusd@second)" != "$process" ]
+wait_for 5 locusctl --instance second status >/dev/null
+
+step "systemd may hold the sockets; then packets wait through a restart, in a large buffer"
+systemctl stop locusd
+systemctl start locusd.socket
+systemctl start locusd
+wait_for 20 tracks
+buffer=$(ss --udp --listening --numeric --memory --no-header 'sport = :2368' | grep -oP '\brb\K\d+')
+[ "$buffer" -ge $((8 << 20)) ]
+systemctl stop locusd.socket
+systemctl restart locusd
+wait_for 20 tracks
+
+step "what was saved before a reset does not come back"
+touch /tmp/before_reset
+locusctl reset --pose 100,0,0,0,0,90
+wait_for 10 test /var/lib/locusd/state -nt /tmp/before_reset
+
+step "removal stops it and keeps configuration and state"
+dpkg -r locusd
+if systemctl is-active --quiet locusd locusd@second; then false; fi
+cmp robot.yaml /etc/locusd/locusd.yaml
+[ -e /var/lib/locusd/state ]
+
+step "installed again it goes on with what was edited"
+install_package "$(echo locusd_*.deb)"
+cmp robot.yaml /etc/locusd/locusd.yaml
+wait_for 20 tracks
+
+step "a purge removes configuration and state"
+dpkg -P locusd
+[ ! -e /etc/locusd/locusd.yaml ]
+[ ! -e /var/lib/locusd ] && [ ! -e /var/lib/locusd@second ] && [ ! -e /run/locusd ]
+
+step "and it is as new once more"
+install_package "$(echo locusd_*.deb)"
+systemctl is-enabled --quiet locusd
+is active ActiveState
+grep -q "^threads: 2 " /etc/locusd/locusd.yaml
+step "done"
