@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdio>
 #include <fstream>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -65,20 +66,25 @@ TEST(Soak, FifteenKilometresTakeNoMoreMemoryThanOne) {
   EXPECT_NEAR(driven_m, 15'000, 0.002 * 15'000);
 }
 
-TEST(Soak, AThousandSweepsAtAStandAddNothingToTheMap) {
+TEST(Soak, AThousandSweepsAtAStandAddNothingToTheMapAndMoveNothing) {
   const sim::Trajectory trajectory(sim::Course{}.stand(seconds{101}));
   const sim::Scene scene = sim::street(100);
   const RobotSetup setup = robot();
   Odometry odometry(setup.odometry());
   std::vector<std::size_t> sizes;
+  double farthest_m = 0.0, farthest_rad = 0.0;
   drive(scene, trajectory, setup, seconds{101}, [&](const Sweep& sweep) {
-    odometry.process(sweep);
+    const Pose T_odom_base = odometry.process(sweep).T_odom_base;
     sizes.push_back(odometry.map().fine().size());
+    farthest_m = std::max(farthest_m, T_odom_base.translation.norm());
+    farthest_rad = std::max(farthest_rad, angle_rad(T_odom_base.rotation));
   });
   ASSERT_GE(sizes.size(), 1000U);
   EXPECT_GT(sizes[1], 0U);
   for (std::size_t i = 1; i < sizes.size(); ++i)
     ASSERT_EQ(sizes[i], sizes[1]) << "sweep " << i;
+  EXPECT_LT(farthest_m, 0.01);
+  EXPECT_LT(farthest_rad, 0.05 * std::numbers::pi / 180.0);
 }
 
 } // namespace
