@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "locus_replay/truth.hpp"
 
+#include <utility>
+
 #include <fmt/format.h>
 
 #include "locus_replay/failure.hpp"
@@ -24,11 +26,11 @@ void Truth::take(const OdometryEstimate& estimate) {
   covariances_.push_back(estimate.pose_covariance);
 }
 
-Accuracy Truth::compare(std::span<const SurfacePoint> map, bool show_progress) const {
+Accuracy Truth::compare(std::span<const SurfacePoint> map, bool show_progress) {
   Accuracy accuracy;
   if (!trajectory_.empty()) {
     accuracy.trajectory = trajectory_accuracy(estimates_, trajectory_);
-    accuracy.consistency = consistency(estimates_, covariances_, trajectory_);
+    accuracy.consistency = consistency(estimates_, std::exchange(covariances_, {}), trajectory_);
     if (!accuracy.trajectory)
       accuracy.problems.push_back(why_nothing_in_common());
   }
