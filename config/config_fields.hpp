@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <string_view>
 #include <utility>
 
@@ -66,14 +65,13 @@ struct MotionSource {
 };
 
 template <class Section> void fields(Section& section, Pose& T) {
-  constexpr double kDeg = std::numbers::pi / 180;
   // A nanodegree is less than rounding makes of an angle on its way through a rotation: 30 stays 30.
-  Eigen::Vector3d rpy_deg = (to_rpy_rad(T.rotation) / kDeg).unaryExpr([](double angle_deg) {
+  Eigen::Vector3d rpy_deg = (to_rpy_rad(T.rotation) / kRadPerDeg).unaryExpr([](double angle_deg) {
     return std::round(angle_deg * 1e9) / 1e9 + 0.0; // no negative zero
   });
   section.key("xyz_m", T.translation);
   section.key("rpy_deg", rpy_deg);
-  T.rotation = from_rpy_rad(rpy_deg * kDeg);
+  T.rotation = from_rpy_rad(rpy_deg * kRadPerDeg);
 }
 
 template <class Section> void fields(Section& section, LidarOptions& options) {

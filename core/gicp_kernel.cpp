@@ -17,8 +17,6 @@ constexpr float kAlongVariance_m2 = 100.0F;
 /// target, a normal wrong by one degree would cost the point its weight, and the few luckiest normals would decide.
 constexpr float kAlongSourceVariance_m2 = 0.1F * 0.1F;
 
-constexpr float kPointVariance_m2 = 0.01F * 0.01F; ///< as in the grid
-
 /// Points farther than this from the origin have no counterpart: no lidar sees so far, and single precision counts
 /// there in tenths of a millimetre.
 constexpr float kMaxDistance_m = 1000.0F;

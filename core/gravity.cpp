@@ -3,21 +3,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "core/motion_sample.hpp"
 
 namespace locus {
 
 namespace {
 
-constexpr double kGravity_mps2 = 9.80665;
 constexpr double kTolerance_mps2 = 0.5;
 constexpr double kSettles_s = 3.0; ///< longer than a robot accelerates at a stretch
 
-constexpr double kRad = std::numbers::pi / 180.0;
-constexpr double kMemory_sweeps = 200.0;
-constexpr double kOutlier_rad = 5.0 * kRad;      ///< no drift of the odometry, but a blow
-constexpr double kNotWorthIt_rad = 1.0 * kRad;   ///< a common accelerometer is off by as much
-constexpr double kPerKeyframe_rad = 0.02 * kRad; ///< 3 mm in 10 m: less than the map's own noise
+constexpr double kMemoryOfTilt_sweeps = 200.0;
+constexpr double kOutlier_rad = 5.0 * kRadPerDeg;      ///< no drift of the odometry, but a blow
+constexpr double kNotWorthIt_rad = 1.0 * kRadPerDeg;   ///< a common accelerometer is off by as much
+constexpr double kPerKeyframe_rad = 0.02 * kRadPerDeg; ///< 3 mm in 10 m: less than the map's own noise
 
 } // namespace
 
@@ -44,13 +43,13 @@ void TiltKeeper::observe(const Eigen::Quaterniond& R_odom_base, const std::optio
   const Eigen::Vector3d tilt_rad = (R_odom_base * *up_base).cross(Eigen::Vector3d::UnitZ());
   if (tilt_rad.norm() > kOutlier_rad)
     return;
-  observed_ = std::min(observed_ + 1.0, kMemory_sweeps);
+  observed_ = std::min(observed_ + 1.0, kMemoryOfTilt_sweeps);
   tilt_rad_ += (tilt_rad - tilt_rad_) / observed_;
 }
 
 Eigen::Vector3d TiltKeeper::take_correction_rad() {
   const double tilt_rad = tilt_rad_.norm();
-  if (observed_ < kMemory_sweeps || tilt_rad < kNotWorthIt_rad)
+  if (observed_ < kMemoryOfTilt_sweeps || tilt_rad < kNotWorthIt_rad)
     return Eigen::Vector3d::Zero();
   Eigen::Vector3d correction_rad = kPerKeyframe_rad / tilt_rad * tilt_rad_;
   tilt_rad_ -= correction_rad;

@@ -9,7 +9,6 @@ namespace locus {
 namespace {
 
 constexpr Duration kWeighFor = std::chrono::seconds{1};
-constexpr double kGravity_mps2 = 9.80665;
 constexpr double kGravityTolerance = 0.15; ///< of the whole: a robot may be driving off
 constexpr double kMaxTilt_deg = 60.0;      ///< no robot begins on a steeper slope
 

@@ -8,6 +8,8 @@
 
 namespace locus {
 
+inline constexpr double kGravity_mps2 = 9.80665; ///< standard gravity
+
 /// One reading of an inertial measurement unit, in the sensor's own frame.
 struct ImuSample {
   Stamp stamp;   ///< of the measurement

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "core/motion_sources.hpp"
 #include "core/twist_correction.hpp"
@@ -49,7 +48,7 @@ constexpr int kStartRounds = 3; ///< until motion and correction of the first tw
 constexpr std::size_t kLastScanBytes = 2'500'000;
 
 Vector6 sigma(double translation_m, double rotation_deg) {
-  const double rotation_rad = rotation_deg * std::numbers::pi / 180.0;
+  const double rotation_rad = rotation_deg * kRadPerDeg;
   Vector6 s;
   s << Eigen::Vector3d::Constant(translation_m), Eigen::Vector3d::Constant(rotation_rad);
   return s;
@@ -362,7 +361,7 @@ void Odometry::judge_sources(const Sweep& sweep, const Prior& prior, const Pose&
 
 void Odometry::update_map(OdometryEstimate& estimate) {
   const Pose T_keyframe_base = T_odom_keyframe_.inverse() * estimate.T_odom_base;
-  const double turned_deg = angle_rad(T_keyframe_base.rotation) * 180.0 / std::numbers::pi;
+  const double turned_deg = angle_rad(T_keyframe_base.rotation) / kRadPerDeg;
   const bool moved =
       T_keyframe_base.translation.norm() > options_.map.keyframe_m || turned_deg > options_.map.keyframe_deg;
   const bool first = processed_ == 0;

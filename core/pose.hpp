@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <numbers>
+
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
 namespace locus {
+
+/// Angles are degrees where people read and write them, radians everywhere else.
+inline constexpr double kRadPerDeg = std::numbers::pi / 180;
 
 /// Tangent of SE(3): translation (m) first, then rotation (rad). Order of every 6-vector and 6x6 matrix of the project.
 using Vector6 = Eigen::Matrix<double, 6, 1>;

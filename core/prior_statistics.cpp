@@ -7,7 +7,7 @@ namespace locus {
 
 namespace {
 
-constexpr double kMemory_sweeps = 30.0;
+constexpr double kMemoryOfNoise_sweeps = 30.0;
 constexpr double kMemoryOfBias_sweeps = 100.0; ///< long enough for the noise to go out
 
 /// An axis counts as seen by the lidar where its points outweigh the prior by this much.
@@ -24,7 +24,7 @@ void PriorStatistics::learn(const Vector6& difference, const Matrix6& lidar_info
     if (lidar_information(axis, axis) * variance_[axis] < kLidarDominates)
       continue;
     learned_[axis] = std::min(learned_[axis] + 1.0, kMemoryOfBias_sweeps);
-    const double memory_sweeps = std::min(learned_[axis], kMemory_sweeps);
+    const double memory_sweeps = std::min(learned_[axis], kMemoryOfNoise_sweeps);
     variance_[axis] += (difference[axis] * difference[axis] - variance_[axis]) / (memory_sweeps + 1.0);
     bias_[axis] += (difference[axis] - bias_[axis]) / (learned_[axis] + 1.0);
     variance_[axis] = std::max(variance_[axis], least_variance_[axis]);

@@ -15,31 +15,31 @@ namespace {
 constexpr float kMaxDistancePerRange = 0.15F;
 constexpr float kMinReach_m = 0.6F;
 
-constexpr float kMaxRoughness_m = 0.04F;      ///< across the plane, one standard deviation
-constexpr float kMinMiddleToGreatest = 0.02F; ///< below this they lie on one line
+constexpr float kMaxRoughnessOfScan_m = 0.04F;      ///< across the plane, one standard deviation
+constexpr float kMinMiddleToGreatestOfScan = 0.02F; ///< below this they lie on one line
 constexpr float kMaxLeastToMiddle = 0.1F;
-constexpr float kMinPoints = 5.0F; ///< itself counted
+constexpr float kMinNeighbours = 5.0F; ///< itself counted
 
-constexpr std::size_t kChunk = 64; ///< points at a time: their moments stay in the fastest cache
-using PerPoint = std::array<float, kChunk>;
+constexpr std::size_t kBatch = 64; ///< points at a time: their moments stay in the fastest cache
+using Batch = std::array<float, kBatch>;
 
 /// Sums over a point's neighbours, from the point.
 struct Moments {
-  PerPoint count, x, y, z, xx, xy, xz, yy, yz, zz;
+  Batch count, x, y, z, xx, xy, xz, yy, yz, zz;
 };
 
 /// Unit normals towards the lidar's side of planes through the points of the moments, or zero.
-void normals_of(const Moments& moments, const PerPoint& px, const PerPoint& py, const PerPoint& pz, PerPoint& nx,
-                PerPoint& ny, PerPoint& nz) {
-  for (std::size_t i = 0; i < kChunk; ++i) {
+void normals_of(const Moments& moments, const Batch& px, const Batch& py, const Batch& pz, Batch& nx, Batch& ny,
+                Batch& nz) {
+  for (std::size_t i = 0; i < kBatch; ++i) {
     const float count = moments.count[i];
     const float share = 1.0F / count;
     const float x = share * moments.x[i], y = share * moments.y[i], z = share * moments.z[i];
     const PrincipalAxes<float> axes = principal_axes<float>(
         {share * moments.xx[i] - x * x, share * moments.xy[i] - x * y, share * moments.xz[i] - x * z,
          share * moments.yy[i] - y * y, share * moments.yz[i] - y * z, share * moments.zz[i] - z * z});
-    const bool trusted = (count >= kMinPoints) & (axes.least <= kMaxRoughness_m * kMaxRoughness_m) &
-                         (axes.middle >= kMinMiddleToGreatest * axes.greatest) &
+    const bool trusted = (count >= kMinNeighbours) & (axes.least <= kMaxRoughnessOfScan_m * kMaxRoughnessOfScan_m) &
+                         (axes.middle >= kMinMiddleToGreatestOfScan * axes.greatest) &
                          (axes.least <= kMaxLeastToMiddle * axes.middle);
     const bool looks_away = axes.x * px[i] + axes.y * py[i] + axes.z * pz[i] > 0.0F;
     const float sign = trusted ? (looks_away ? -1.0F : 1.0F) : 0.0F;
@@ -53,9 +53,9 @@ void normals_of(const Moments& moments, const PerPoint& px, const PerPoint& py, 
 
 ScanNormals::ScanNormals(std::size_t max_points) {
   lines_.reserve(max_points);
-  neighbours_.reserve(max_points + kChunk);
+  neighbours_.reserve(max_points + kBatch);
   for (std::vector<float>* figures : {&x_, &y_, &z_})
-    figures->reserve(max_points + kChunk);
+    figures->reserve(max_points + kBatch);
 }
 
 void ScanNormals::find_lines(const std::vector<SweepPoint>& points) {
@@ -104,8 +104,8 @@ void ScanNormals::find_neighbours(const std::vector<SweepPoint>& points, std::si
 void ScanNormals::fit_planes(std::vector<SweepPoint>& points, std::size_t begin) const {
   Moments moments{};
   moments.count.fill(1.0F);
-  PerPoint px, py, pz, reach2, nx, ny, nz;
-  for (std::size_t i = 0; i < kChunk; ++i) {
+  Batch px, py, pz, reach2, nx, ny, nz;
+  for (std::size_t i = 0; i < kBatch; ++i) {
     px[i] = x_[begin + i];
     py[i] = y_[begin + i];
     pz[i] = z_[begin + i];
@@ -114,7 +114,7 @@ void ScanNormals::fit_planes(std::vector<SweepPoint>& points, std::size_t begin)
     reach2[i] = reach_m * reach_m;
   }
   for (std::size_t n = 0; n < Neighbours::kMost; ++n) {
-    for (std::size_t i = 0; i < kChunk; ++i) {
+    for (std::size_t i = 0; i < kBatch; ++i) {
       const std::uint32_t j = neighbours_[begin + i].place[n];
       const float x = x_[j] - px[i], y = y_[j] - py[i], z = z_[j] - pz[i];
       const bool is_near = (j != begin + i) & (x * x + y * y + z * z <= reach2[i]);
@@ -133,12 +133,12 @@ void ScanNormals::fit_planes(std::vector<SweepPoint>& points, std::size_t begin)
     }
   }
   normals_of(moments, px, py, pz, nx, ny, nz);
-  for (std::size_t i = 0; i < std::min(kChunk, points.size() - begin); ++i)
+  for (std::size_t i = 0; i < std::min(kBatch, points.size() - begin); ++i)
     points[begin + i].normal_base = {nx[i], ny[i], nz[i]};
 }
 
 void ScanNormals::estimate(std::vector<SweepPoint>& points) {
-  const std::size_t padded = points.size() + kChunk;
+  const std::size_t padded = points.size() + kBatch;
   for (std::vector<float>* figures : {&x_, &y_, &z_})
     figures->assign(padded, 0.0F);
   neighbours_.assign(padded, {});
@@ -150,7 +150,7 @@ void ScanNormals::estimate(std::vector<SweepPoint>& points) {
   find_lines(points);
   for (std::size_t line = 0; line < lines_.size(); ++line)
     find_neighbours(points, line);
-  for (std::size_t begin = 0; begin < points.size(); begin += kChunk)
+  for (std::size_t begin = 0; begin < points.size(); begin += kBatch)
     fit_planes(points, begin);
 }
 

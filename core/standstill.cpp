@@ -1,18 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/standstill.hpp"
 
-#include <numbers>
-
 namespace locus {
 
 namespace {
 
-constexpr Duration kLongEnough = std::chrono::seconds{1};
-constexpr double kRad = std::numbers::pi / 180.0;
+constexpr Duration kHeldAfter = std::chrono::seconds{1};
 
 /// What noise may look like before the robot counts as standing, and what it takes to count as driving off.
-constexpr double kStands_m = 0.005, kStands_rad = 0.05 * kRad;
-constexpr double kLeaves_m = 0.01, kLeaves_rad = 0.1 * kRad;
+constexpr double kStands_m = 0.005, kStands_rad = 0.05 * kRadPerDeg;
+constexpr double kLeaves_m = 0.01, kLeaves_rad = 0.1 * kRadPerDeg;
 
 } // namespace
 
@@ -26,7 +23,7 @@ std::optional<Pose> Standstill::observe(Stamp stamp, const Pose& T_odom_base, bo
     since_ = stamp;
     T_odom_held_ = T_odom_base;
   }
-  standing_ = standing_ || stamp - since_ >= kLongEnough;
+  standing_ = standing_ || stamp - since_ >= kHeldAfter;
   return standing_ ? std::optional{T_odom_held_} : std::nullopt;
 }
 

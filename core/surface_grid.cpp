@@ -12,10 +12,6 @@ namespace locus {
 
 namespace {
 
-/// Variance of one point across its surface: ranging noise of the lidars this is for (2 to 3 cm), averaged over the ten
-/// and more returns of an arc. On walls 6 mm are seen, of real lidars and of synthetic ones.
-constexpr float kPointVariance_m2 = 0.01F * 0.01F;
-
 /// A point stands for a disc, or for a ball where its normal is not known; the radius as a share of the voxel.
 constexpr float kDiscRadiusInLeaves = 0.5F;
 

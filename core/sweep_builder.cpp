@@ -15,7 +15,7 @@ constexpr Duration kMaxPeriod = std::chrono::milliseconds{250};
 constexpr Duration kDefaultPeriod = std::chrono::milliseconds{100};
 
 /// A gap longer than this is a jump of the clock or a new start, not a run of empty windows.
-constexpr Duration kMaxGap = std::chrono::seconds{60};
+constexpr Duration kMaxPause = std::chrono::seconds{60};
 constexpr std::uint64_t kLatePacketsToRestart = 500;
 
 constexpr std::size_t kReturnsPerSegmentPoint = 4; ///< room for what the leaf has not learned yet
@@ -87,7 +87,8 @@ void SweepBuilder::add(const LidarPacket& packet, Stamp arrival) {
     if (++consecutive_late_ < kLatePacketsToRestart)
       return;
   }
-  const bool jumped = window_ && (consecutive_late_ >= kLatePacketsToRestart || packet.stamp > window_->end + kMaxGap);
+  const bool jumped =
+      window_ && (consecutive_late_ >= kLatePacketsToRestart || packet.stamp > window_->end + kMaxPause);
   consecutive_late_ = 0;
   if (jumped) {
     close();
@@ -112,7 +113,7 @@ void SweepBuilder::add(const LidarPacket& packet, Stamp arrival) {
 
 void SweepBuilder::advance(Stamp now) {
   sources_.advance(now);
-  if (!window_ || now - lag_ > window_->end + kMaxGap)
+  if (!window_ || now - lag_ > window_->end + kMaxPause)
     return;
   while (now - lag_ > window_->end + kGrace)
     close();

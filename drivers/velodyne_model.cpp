@@ -2,7 +2,6 @@
 #include "drivers/velodyne_model.hpp"
 
 #include <algorithm>
-#include <numbers>
 #include <numeric>
 
 namespace locus::velodyne {
@@ -10,8 +9,6 @@ namespace locus::velodyne {
 namespace {
 
 using std::chrono::nanoseconds;
-
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
 // VLP-16 user manual 63-9243, table 9-1: lasers in the order of firing, vertical corrections in millimetres.
 constexpr std::array<double, 16> kVlp16ElevationDeg{-15, 1, -13, 3, -11, 5, -9, 7, -7, 9, -5, 11, -3, 13, -1, 15};

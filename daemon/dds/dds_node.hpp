@@ -88,7 +88,9 @@ template <class Message> class DdsWriter {
       : writer_(node.create_writer<Message>(topic, qos)) {}
 
   /// Whether DDS took it; it may not while a reliable reader is far behind.
-  bool write(const Message& message) const { return dds_write(writer_.handle(), &message) == DDS_RETCODE_OK; }
+  [[nodiscard]] bool write(const Message& message) const {
+    return dds_write(writer_.handle(), &message) == DDS_RETCODE_OK;
+  }
   [[nodiscard]] bool has_readers() const {
     dds_publication_matched_status_t status{};
     return dds_get_publication_matched_status(writer_.handle(), &status) == DDS_RETCODE_OK && status.current_count > 0;

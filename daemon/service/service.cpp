@@ -3,7 +3,6 @@
 
 #include <array>
 #include <csignal>
-#include <numbers>
 #include <span>
 #include <utility>
 
@@ -183,8 +182,7 @@ std::optional<ControlServer::Answer> Service::answer(const nlohmann::json& reque
     std::optional<Pose> T_odom_base;
     if (request.contains("pose")) {
       const auto v = request["pose"].get<std::array<double, 6>>();
-      T_odom_base =
-          Pose{from_rpy_rad(Eigen::Vector3d{v[3], v[4], v[5]} * (std::numbers::pi / 180)), {v[0], v[1], v[2]}};
+      T_odom_base = Pose{from_rpy_rad(Eigen::Vector3d{v[3], v[4], v[5]} * kRadPerDeg), {v[0], v[1], v[2]}};
     }
     session_->reset(T_odom_base);
     return done();

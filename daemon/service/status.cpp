@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <ctime>
-#include <numbers>
 #include <string>
 
 #include <fmt/format.h>
 
 #include "config/config_yaml.hpp"
+#include "core/pose.hpp"
 #include "daemon/figures_json.hpp"
 #include "daemon/machine_time.hpp"
 
@@ -93,7 +93,7 @@ void add_estimate(const LiveFigures::Snapshot& figures, ordered_json& json) {
   }
   const OdometryEstimate& last = *figures.last;
   const Eigen::Vector3d& p = last.T_odom_base.translation;
-  const Eigen::Vector3d rpy_deg = to_rpy_rad(last.T_odom_base.rotation) * (180.0 / std::numbers::pi);
+  const Eigen::Vector3d rpy_deg = to_rpy_rad(last.T_odom_base.rotation) / kRadPerDeg;
   json["state"] = to_string(last.state);
   json["age_ms"] = rounded(1e3 * to_seconds(Stamp{read_clock(CLOCK_REALTIME)} - last.stamp));
   json["t_ns"] = to_ns(last.stamp);

@@ -13,8 +13,6 @@ namespace {
 using std::chrono::milliseconds;
 using Trajectory = std::vector<StampedPose>;
 
-constexpr double kDeg = std::numbers::pi / 180.0;
-
 Pose yawed(double yaw_rad, const Eigen::Vector3d& position) { return {from_rpy_rad({0, 0, yaw_rad}), position}; }
 
 /// A pose every `interval`, `pose_at(i)`.
@@ -89,7 +87,7 @@ TEST(TrajectoryAccuracy, WrongScaleIsNotAlignedAway) {
 
 TEST(TrajectoryAccuracy, TurningTooFastShowsPerTenMetres) {
   const Trajectory estimates = drive(31, milliseconds{1000}, [](int i) {
-    return yawed(0.1 * kDeg * i, {1.0 * i, 0, 0});
+    return yawed(0.1 * kRadPerDeg * i, {1.0 * i, 0, 0});
   });
   const auto accuracy = trajectory_accuracy(estimates, straight(31));
   ASSERT_TRUE(accuracy);
@@ -98,22 +96,22 @@ TEST(TrajectoryAccuracy, TurningTooFastShowsPerTenMetres) {
 
 TEST(TrajectoryAccuracy, EndDriftCountsTheFirstHeading) {
   Trajectory estimates = straight(101);
-  estimates.front().T_source_base.rotation = from_rpy_rad({0, 0, 1 * kDeg});
+  estimates.front().T_source_base.rotation = from_rpy_rad({0, 0, 1 * kRadPerDeg});
   const auto accuracy = trajectory_accuracy(estimates, straight(101));
   ASSERT_TRUE(accuracy);
-  EXPECT_NEAR(accuracy->end_drift_m, 100 * 2 * std::sin(0.5 * kDeg), 1e-9);
+  EXPECT_NEAR(accuracy->end_drift_m, 100 * 2 * std::sin(0.5 * kRadPerDeg), 1e-9);
   EXPECT_NEAR(accuracy->ape_m.max, 0, 1e-9);
 }
 
 TEST(TrajectoryAccuracy, TruthIsInterpolatedAtTheStampOfTheEstimate) {
   const Trajectory truth = drive(2, milliseconds{1000}, [](int i) {
-    return yawed(90 * kDeg * i, {2.0 * i, 4.0 * i, 0});
+    return yawed(90 * kRadPerDeg * i, {2.0 * i, 4.0 * i, 0});
   });
   const Trajectory estimates{{truth.front().stamp + milliseconds{250}, Pose{}}};
   const auto accuracy = trajectory_accuracy(estimates, truth);
   ASSERT_TRUE(accuracy);
   EXPECT_LT((accuracy->T_truth_odom.translation - Eigen::Vector3d(0.5, 1, 0)).norm(), 1e-9);
-  EXPECT_LT(accuracy->T_truth_odom.rotation.angularDistance(from_rpy_rad({0, 0, 22.5 * kDeg})), 1e-9);
+  EXPECT_LT(accuracy->T_truth_odom.rotation.angularDistance(from_rpy_rad({0, 0, 22.5 * kRadPerDeg})), 1e-9);
 }
 
 TEST(TrajectoryAccuracy, FewPosesGiveWhatTheyCan) {

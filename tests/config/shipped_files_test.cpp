@@ -3,7 +3,6 @@
 
 #include <fstream>
 #include <iterator>
-#include <numbers>
 
 #include "config/config_yaml.hpp"
 #include "yaml_tree.hpp"
@@ -38,9 +37,7 @@ Config without_robot(Config config) {
   return config;
 }
 
-double pitch_deg(const LidarOptions& lidar) {
-  return to_rpy_rad(lidar.T_base_lidar.rotation).y() * 180 / std::numbers::pi;
-}
+double pitch_deg(const LidarOptions& lidar) { return to_rpy_rad(lidar.T_base_lidar.rotation).y() / kRadPerDeg; }
 
 TEST(ShippedFiles, LocusdNamesEveryKeyWithItsBuiltInDefault) {
   std::ifstream file{shipped("locusd.yaml")};

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <random>
 #include <string>
@@ -25,7 +24,6 @@ namespace {
 constexpr int kStarts = 50;
 constexpr double kStartOff_m = 0.5, kStartOff_deg = 10.0;
 constexpr double kSuccess_m = 0.05, kSuccess_deg = 0.5;
-constexpr double kPerDegree_rad = std::numbers::pi / 180;
 
 constexpr int kMaxIterations = 60; ///< PCL's default allows itself 200
 
@@ -74,7 +72,7 @@ std::vector<Pose> starts_around(const Pose& truth) {
   std::vector<Pose> starts;
   for (int i = 0; i < kStarts; ++i) {
     const Eigen::Vector3d off_m = kStartOff_m * share(random) * direction();
-    const Eigen::Vector3d off_rad = kStartOff_deg * kPerDegree_rad * share(random) * direction();
+    const Eigen::Vector3d off_rad = kStartOff_deg * kRadPerDeg * share(random) * direction();
     starts.push_back({(truth.rotation * so3_exp(off_rad)).normalized(), truth.translation + off_m});
   }
   return starts;
@@ -85,7 +83,7 @@ struct Outcome {
 
   void add(const Pose& found, const Pose& truth) {
     const double off_m = (found.translation - truth.translation).norm();
-    const double off_deg = angle_rad(truth.rotation.conjugate() * found.rotation) / kPerDegree_rad;
+    const double off_deg = angle_rad(truth.rotation.conjugate() * found.rotation) / kRadPerDeg;
     if (!(off_m < kSuccess_m && off_deg < kSuccess_deg))
       return;
     error_m.push_back(off_m);

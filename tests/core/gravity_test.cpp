@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <numbers>
-
 #include "core/flat_ground.hpp"
 
 namespace locus {
@@ -12,7 +10,6 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr double kRad = std::numbers::pi / 180.0;
 constexpr Duration kPeriod = milliseconds{100};
 const Eigen::Vector3d kUp = Eigen::Vector3d::UnitZ();
 
@@ -20,11 +17,12 @@ const Eigen::Vector3d kUp = Eigen::Vector3d::UnitZ();
 Sweep sweep_with(const Eigen::Vector3d& rpy_deg, const Eigen::Vector3d& acceleration_base_mps2 = {0, 0, 0}) {
   Sweep sweep;
   sweep.end = sweep.start + kPeriod;
-  sweep.specific_force_base_mps2 = from_rpy_rad(rpy_deg * kRad).conjugate() * (9.80665 * kUp) + acceleration_base_mps2;
+  sweep.specific_force_base_mps2 =
+      from_rpy_rad(rpy_deg * kRadPerDeg).conjugate() * (9.80665 * kUp) + acceleration_base_mps2;
   return sweep;
 }
 
-double tilt_deg(const Gravity& gravity) { return std::acos(std::min(1.0, gravity.up_base()->z())) / kRad; }
+double tilt_deg(const Gravity& gravity) { return std::acos(std::min(1.0, gravity.up_base()->z())) / kRadPerDeg; }
 
 const Eigen::Quaterniond kNoTurn = Eigen::Quaterniond::Identity();
 
@@ -32,7 +30,7 @@ TEST(Gravity, IsReadAtOnceOfARobotAtRest) {
   Gravity gravity;
   gravity.observe(kNoTurn, sweep_with({5, -3, 0}));
   ASSERT_TRUE(gravity.up_base());
-  EXPECT_LT((level_rpy_rad(*gravity.up_base()) - Eigen::Vector3d(5, -3, 0) * kRad).norm(), 1e-9);
+  EXPECT_LT((level_rpy_rad(*gravity.up_base()) - Eigen::Vector3d(5, -3, 0) * kRadPerDeg).norm(), 1e-9);
 }
 
 TEST(Gravity, AnAccelerationOfASecondTiltsNothingMuch) {
@@ -49,7 +47,7 @@ TEST(Gravity, ARampIsNoticedAtOnceByTheGyro) {
   double pitch_deg = 0;
   for (int i = 0; i < 5; ++i) {
     pitch_deg -= 2;
-    gravity.observe(from_rpy_rad({0, -2 * kRad, 0}), sweep_with({0, pitch_deg, 0}));
+    gravity.observe(from_rpy_rad({0, -2 * kRadPerDeg, 0}), sweep_with({0, pitch_deg, 0}));
   }
   EXPECT_NEAR(tilt_deg(gravity), 10.0, 0.01);
 }
@@ -58,7 +56,7 @@ TEST(Gravity, AGyroThatDriftsIsOutvotedInTime) {
   Gravity gravity;
   gravity.observe(kNoTurn, sweep_with({0, 0, 0}));
   for (int i = 0; i < 300; ++i)
-    gravity.observe(from_rpy_rad({0.001 * kRad, 0, 0}), sweep_with({0, 0, 0}));
+    gravity.observe(from_rpy_rad({0.001 * kRadPerDeg, 0, 0}), sweep_with({0, 0, 0}));
   EXPECT_LT(tilt_deg(gravity), 0.05);
 }
 
@@ -75,14 +73,16 @@ TEST(Gravity, WhatIsNotAsStrongAsGravityIsNotLookedAt) {
 TEST(Gravity, AnAttitudeIsPreferredToTheAccelerometer) {
   Gravity gravity;
   Sweep sweep = sweep_with({0, 0, 0}, {0.8, 0, 0});
-  sweep.up_base = from_rpy_rad({0, 2 * kRad, 0}).conjugate() * kUp;
+  sweep.up_base = from_rpy_rad({0, 2 * kRadPerDeg, 0}).conjugate() * kUp;
   gravity.observe(kNoTurn, sweep);
   EXPECT_NEAR(tilt_deg(gravity), 2.0, 1e-9);
 }
 
 // --- Flat ground ------------------------------------------------------------------------------------------------
 
-Eigen::Vector3d up_at_pitch_deg(double pitch_deg) { return from_rpy_rad({0, pitch_deg * kRad, 0}).conjugate() * kUp; }
+Eigen::Vector3d up_at_pitch_deg(double pitch_deg) {
+  return from_rpy_rad({0, pitch_deg * kRadPerDeg, 0}).conjugate() * kUp;
+}
 Stamp at(int sweep) { return stamp_from_ns(1'000'000'000) + sweep * kPeriod; }
 
 TEST(FlatGround, IsFoundAfterTwoLevelSecondsAndLeftAtOnceOnARamp) {
@@ -141,17 +141,19 @@ double tilt_after(int sweeps, double tilt_rad, double up_noise_rad = 0.0) {
 }
 
 TEST(TiltKeeper, BringsADriftBackToWhatAnAccelerometerKnows) {
-  EXPECT_LT(tilt_after(10'000, 3 * kRad), 1.1 * kRad);
-  EXPECT_GT(tilt_after(10'000, 3 * kRad), 0.8 * kRad) << "and no farther";
+  EXPECT_LT(tilt_after(10'000, 3 * kRadPerDeg), 1.1 * kRadPerDeg);
+  EXPECT_GT(tilt_after(10'000, 3 * kRadPerDeg), 0.8 * kRadPerDeg) << "and no farther";
 }
 
 TEST(TiltKeeper, TurnsNoKeyframeByMoreThanTheMapCanBear) {
-  EXPECT_GT(tilt_after(1000, 3 * kRad), (3 - 100 * 0.02) * kRad);
+  EXPECT_GT(tilt_after(1000, 3 * kRadPerDeg), (3 - 100 * 0.02) * kRadPerDeg);
 }
 
-TEST(TiltKeeper, LeavesALevelOdometryAlone) { EXPECT_NEAR(tilt_after(1000, 0.5 * kRad, 0.02), 0.5 * kRad, 1e-9); }
+TEST(TiltKeeper, LeavesALevelOdometryAlone) {
+  EXPECT_NEAR(tilt_after(1000, 0.5 * kRadPerDeg, 0.02), 0.5 * kRadPerDeg, 1e-9);
+}
 
-TEST(TiltKeeper, ABlowIsNoDrift) { EXPECT_NEAR(tilt_after(1000, 8 * kRad), 8 * kRad, 1e-9); }
+TEST(TiltKeeper, ABlowIsNoDrift) { EXPECT_NEAR(tilt_after(1000, 8 * kRadPerDeg), 8 * kRadPerDeg, 1e-9); }
 
 } // namespace
 } // namespace locus

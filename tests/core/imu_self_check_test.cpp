@@ -77,7 +77,7 @@ TEST_F(ImuSelfCheckTest, AccelerationsThatAreNoGravityAreNotUsed) {
 
 TEST_F(ImuSelfCheckTest, AGyroInDegreesIsRefusedByName) {
   ImuSelfCheck check(Pose{});
-  drive(check, seconds{5}, [](ImuSample& sample) { sample.angular_velocity_radps *= 180.0 / std::numbers::pi; });
+  drive(check, seconds{5}, [](ImuSample& sample) { sample.angular_velocity_radps /= kRadPerDeg; });
   EXPECT_TRUE(refused_);
   EXPECT_NE(check.verdict().find("deg/s"), std::string_view::npos);
 }

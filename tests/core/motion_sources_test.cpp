@@ -3,12 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include "stamps.hpp"
+
 namespace locus {
 namespace {
 
 using std::chrono::milliseconds;
-
-constexpr Stamp at_ms(int ms) { return stamp_from_ns(1'000'000'000) + milliseconds{ms}; }
 
 const std::vector<MotionSourceOptions> kWheelsImuVisual{
     {"wheels", SourceKind::odometry, {}}, {"imu", SourceKind::imu, {}}, {"visual", SourceKind::odometry, {}}};

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/motion_track.hpp"
 
+#include <numbers>
+
 #include <gtest/gtest.h>
 
-#include <numbers>
+#include "stamps.hpp"
 
 namespace locus {
 namespace {
 
 using std::chrono::milliseconds;
-
-constexpr Stamp at_ms(int ms) { return stamp_from_ns(1'000'000'000) + milliseconds{ms}; }
 
 MotionTrack odometry_track() {
   return MotionTrack({.name = "wheels", .kind = SourceKind::odometry, .T_base_source = {}});

@@ -22,8 +22,6 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr double kPerDegree_rad = std::numbers::pi / 180;
-
 /// Wheels that slip by half a percent and veer, and a gyro with noise.
 RobotSetup robot_with_wheels_and_imu() {
   RobotSetup setup;
@@ -67,7 +65,7 @@ Outcome drive_through(const sim::Scene& scene, const sim::Trajectory& trajectory
     const Pose truth = true_motion(trajectory, result.estimates.front().stamp, estimate.stamp);
     const Pose error = truth.inverse() * (result.estimates.front().T_odom_base.inverse() * estimate.T_odom_base);
     result.worst_error_m = std::max(result.worst_error_m, error.translation.norm());
-    result.worst_error_deg = std::max(result.worst_error_deg, angle_rad(error.rotation) / kPerDegree_rad);
+    result.worst_error_deg = std::max(result.worst_error_deg, angle_rad(error.rotation) / kRadPerDeg);
     result.failed += estimate.failed ? 1 : 0;
   });
   testing::Test::RecordProperty("worst_error_mm", std::to_string(1e3 * result.worst_error_m));
@@ -336,7 +334,7 @@ TEST(Odometry, TheMapTakesASweepAfterAMetreOrThirtyDegrees) {
   for (std::size_t i = 1; i < result.estimates.size(); ++i) {
     const OdometryEstimate& e = result.estimates[i];
     const Pose moved = T_odom_keyframe.inverse() * e.T_odom_base;
-    const bool far = moved.translation.norm() > 1.0 || angle_rad(moved.rotation) > 30 * kPerDegree_rad;
+    const bool far = moved.translation.norm() > 1.0 || angle_rad(moved.rotation) > 30 * kRadPerDeg;
     EXPECT_EQ(e.keyframe, far) << "estimate " << i;
     if (e.keyframe)
       T_odom_keyframe = e.T_odom_base;
@@ -364,14 +362,14 @@ TEST(Odometry, ARobotThatStandsIsHeldAndAddsNothingToTheMap) {
   }
   const Pose error = estimates.front().T_odom_base.inverse() * estimates.back().T_odom_base;
   EXPECT_LT(error.translation.norm(), 0.005);
-  EXPECT_LT(angle_rad(error.rotation), 0.05 * kPerDegree_rad);
+  EXPECT_LT(angle_rad(error.rotation), 0.05 * kRadPerDeg);
 }
 
 TEST(Odometry, BeginsLevelByGravityAndWithoutYaw) {
   const sim::Trajectory trajectory(sim::Course{}.stand(seconds{1}));
   std::vector<Sweep> sweeps = sweeps_of(sim::room(), trajectory, RobotSetup{}, milliseconds{250});
   ASSERT_FALSE(sweeps.empty());
-  const Eigen::Vector3d rpy_rad{5 * kPerDegree_rad, -3 * kPerDegree_rad, 0.0};
+  const Eigen::Vector3d rpy_rad{5 * kRadPerDeg, -3 * kRadPerDeg, 0.0};
   sweeps.front().specific_force_base_mps2 = from_rpy_rad(rpy_rad).conjugate() * Eigen::Vector3d{0, 0, 9.80665};
   const OdometryEstimate estimate = Odometry(OdometryOptions{}).process(sweeps.front());
   EXPECT_EQ(estimate.T_odom_base.translation, Eigen::Vector3d::Zero());

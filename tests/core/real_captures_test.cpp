@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,8 +15,6 @@ namespace locus::test {
 namespace {
 
 using std::chrono::milliseconds;
-
-constexpr double kPerDegree_rad = std::numbers::pi / 180;
 
 /// Captures of real sensors: lidar alone, no configuration.
 class RealSensor : public testing::Test {
@@ -36,7 +33,7 @@ class RealSensor : public testing::Test {
   }
 
   static double turned_deg(const OdometryEstimate& estimate) {
-    return angle_rad(estimate.T_odom_base.rotation) / kPerDegree_rad;
+    return angle_rad(estimate.T_odom_base.rotation) / kRadPerDeg;
   }
 
   static void expect_still(const std::vector<OdometryEstimate>& estimates, double max_turned_deg) {
@@ -71,7 +68,7 @@ TEST_F(RealSensor, ACarAtFifteenMetresPerSecondThatTurnsRight) {
   }
   const double elapsed_s = to_seconds(run.back().stamp - run[1].stamp);
   const Eigen::Quaterniond turn = run[1].T_odom_base.rotation.conjugate() * run.back().T_odom_base.rotation;
-  const double yaw_dps = to_rpy_rad(turn).z() / kPerDegree_rad / elapsed_s;
+  const double yaw_dps = to_rpy_rad(turn).z() / kRadPerDeg / elapsed_s;
   std::printf("%.2f m/s, %.2f deg/s\n", path_m / elapsed_s, yaw_dps);
   EXPECT_NEAR(path_m / elapsed_s, 15.45, 0.35) << "GPS a second before: 14.8 to 15.2, and gaining";
   EXPECT_LT(yaw_dps, 0.0) << "GPS: the course goes from 158.3 to 159.8 deg";

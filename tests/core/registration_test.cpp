@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <limits>
-#include <numbers>
 #include <random>
 
 #include "surfaces.hpp"
@@ -13,7 +12,6 @@
 namespace locus {
 namespace {
 
-constexpr double kPerDegree_rad = std::numbers::pi / 180;
 constexpr std::size_t kBytes = 20'000'000;
 constexpr RegistrationOptions kOptions{20, 1.0};
 const PosePrior kNoPrior;
@@ -28,7 +26,7 @@ SurfaceMap map_of(const std::vector<SurfacePoint>& points) {
 
 double off_m(const Pose& found, const Pose& truth) { return (found.translation - truth.translation).norm(); }
 double off_deg(const Pose& found, const Pose& truth) {
-  return angle_rad(truth.rotation.conjugate() * found.rotation) / kPerDegree_rad;
+  return angle_rad(truth.rotation.conjugate() * found.rotation) / kRadPerDeg;
 }
 
 bool same_bits(const Registration& a, const Registration& b) {
@@ -43,7 +41,7 @@ TEST(Gicp, FindsAKnownMotion) {
   std::uniform_real_distribution<double> unit{-1.0, 1.0};
   const auto any = [&] { return Eigen::Vector3d{unit(random), unit(random), unit(random)}; };
   for (int i = 0; i < 20; ++i) {
-    const Pose truth{so3_exp(5 * kPerDegree_rad * any()), 0.2 * any()};
+    const Pose truth{so3_exp(5 * kRadPerDeg * any()), 0.2 * any()};
     const auto source = test::seen_from(truth, test::points_on(test::furnished_room(), 400, 2, 0.01));
     const Registration found = gicp.align(source, map, Pose{}, kNoPrior, kOptions, false, never);
     EXPECT_TRUE(found.converged);
@@ -65,7 +63,7 @@ TEST(Gicp, PointsWithoutNormalsWillDo) {
 
 TEST(Gicp, WideReachesHalfAMetreAndTenDegrees) {
   const SurfaceMap map = map_of(test::points_on(test::furnished_room(), 3000, 1, 0.01));
-  const Pose truth{so3_exp({0, 0, 10 * kPerDegree_rad}), {0.4, -0.3, 0.0}};
+  const Pose truth{so3_exp({0, 0, 10 * kRadPerDeg}), {0.4, -0.3, 0.0}};
   const auto source = test::seen_from(truth, test::points_on(test::furnished_room(), 400, 2, 0.01));
   const Registration found = Gicp(1).align(source, map, Pose{}, kNoPrior, kOptions, true, never);
   EXPECT_LT(off_m(found.T_target_source, truth), 0.005);
@@ -171,14 +169,14 @@ TEST(Gicp, FarFromTheMapTheStartIsTheResult) {
 }
 
 TEST(Gicp, PointsThatAreNotNumbersDoNotCount) {
-  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   const SurfaceMap map = map_of(test::points_on(test::furnished_room(), 3000, 1, 0.01));
   const Pose truth{so3_exp({0, 0, 0.05}), {0.1, 0.1, 0}};
   auto source = test::seen_from(truth, test::points_on(test::furnished_room(), 400, 2, 0.01));
-  source[7].position_m.x() = kNan;
+  source[7].position_m.x() = kNotANumber;
   source[8].position_m = {kInfinity, 0, 0};
-  source[9].position_m = {0, -kInfinity, kNan};
+  source[9].position_m = {0, -kInfinity, kNotANumber};
   const Registration found = Gicp(1).align(source, map, Pose{}, kNoPrior, kOptions, false, never);
   EXPECT_LT(off_m(found.T_target_source, truth), 0.01);
 }

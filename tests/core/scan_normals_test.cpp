@@ -6,15 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <optional>
 #include <random>
 #include <vector>
 
 namespace locus {
 namespace {
-
-constexpr double kPerDegree_rad = std::numbers::pi / 180;
 
 /// A spherical scan: lines two degrees apart, points a degree apart; what each ray meets is given by its direction.
 std::vector<SweepPoint> scan(int lines, const std::function<std::optional<double>(const Eigen::Vector3d&)>& range_m,
@@ -23,9 +20,9 @@ std::vector<SweepPoint> scan(int lines, const std::function<std::optional<double
   std::normal_distribution<double> noise{0.0, noise_m};
   std::vector<SweepPoint> points;
   for (int line = 0; line < lines; ++line) {
-    const double elevation = (2.0 * line - 15.0) * kPerDegree_rad;
+    const double elevation = (2.0 * line - 15.0) * kRadPerDeg;
     for (int step = 0; step < 360; ++step) {
-      const double azimuth = step * kPerDegree_rad;
+      const double azimuth = step * kRadPerDeg;
       const Eigen::Vector3d direction{std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * -std::sin(azimuth),
                                       std::sin(elevation)};
       const std::optional<double> range = range_m(direction);
@@ -49,7 +46,7 @@ std::optional<double> walls(const Eigen::Vector3d& direction) {
 }
 
 double angle_deg(const Eigen::Vector3f& a, const Eigen::Vector3d& b) {
-  return std::acos(std::min(1.0, std::abs(a.cast<double>().dot(b)))) / kPerDegree_rad;
+  return std::acos(std::min(1.0, std::abs(a.cast<double>().dot(b)))) / kRadPerDeg;
 }
 
 /// Inward normal of the wall that a point lies on.

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdio>
 #include <fstream>
-#include <numbers>
 #include <string>
 #include <vector>
 
@@ -84,7 +83,7 @@ TEST(Soak, AThousandSweepsAtAStandAddNothingToTheMapAndMoveNothing) {
   for (std::size_t i = 1; i < sizes.size(); ++i)
     ASSERT_EQ(sizes[i], sizes[1]) << "sweep " << i;
   EXPECT_LT(farthest_m, 0.01);
-  EXPECT_LT(farthest_rad, 0.05 * std::numbers::pi / 180.0);
+  EXPECT_LT(farthest_rad, 0.05 * kRadPerDeg);
 }
 
 } // namespace

@@ -10,19 +10,19 @@ using std::chrono::hours;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr Stamp at_ms(int ms) { return stamp_from_ns(1'700'000'000'000'000'000) + milliseconds{ms}; }
+constexpr Stamp today_ms(int ms) { return stamp_from_ns(1'700'000'000'000'000'000) + milliseconds{ms}; }
 
 /// A sample every 20 ms that takes 3 ms to arrive, from a source whose clock is `ahead` of the host's.
 std::optional<Stamp> sample(SourceClock& clock, int index, Duration ahead) {
-  const Stamp measured = at_ms(20 * index);
+  const Stamp measured = today_ms(20 * index);
   return clock.on_host_clock(measured + ahead, measured + milliseconds{3});
 }
 
 TEST(SourceClock, StampsThatArriveWithinASecondAreTrue) {
   SourceClock clock;
-  EXPECT_EQ(clock.on_host_clock(at_ms(0), at_ms(0)), at_ms(0));
-  EXPECT_EQ(clock.on_host_clock(at_ms(20), at_ms(220)), at_ms(20));
-  EXPECT_EQ(clock.on_host_clock(at_ms(225), at_ms(220)), at_ms(225)) << "rounded up";
+  EXPECT_EQ(clock.on_host_clock(today_ms(0), today_ms(0)), today_ms(0));
+  EXPECT_EQ(clock.on_host_clock(today_ms(20), today_ms(220)), today_ms(20));
+  EXPECT_EQ(clock.on_host_clock(today_ms(225), today_ms(220)), today_ms(225)) << "rounded up";
   EXPECT_EQ(clock.offset(), Duration::zero());
 }
 
@@ -32,10 +32,10 @@ TEST(SourceClock, AStepIsLearnedFromFiveSamplesAndTakenOut) {
     SourceClock clock;
     int i = 0;
     for (; i < 100; ++i)
-      ASSERT_EQ(sample(clock, i, {}), at_ms(20 * i));
+      ASSERT_EQ(sample(clock, i, {}), today_ms(20 * i));
     for (int held_back = 1; held_back < SourceClock::kSamplesToLearn; ++held_back)
       EXPECT_FALSE(sample(clock, i++, step));
-    EXPECT_EQ(sample(clock, i, step), at_ms(20 * i)) << "the usual latency is not taken for a part of the step";
+    EXPECT_EQ(sample(clock, i, step), today_ms(20 * i)) << "the usual latency is not taken for a part of the step";
     EXPECT_EQ(clock.steps(), 1U);
     EXPECT_EQ(clock.offset(), step);
   }
@@ -50,7 +50,7 @@ TEST(SourceClock, AClockThatIsSetRightAgainIsLearnedAnew) {
     sample(clock, i, hours{1});
   for (; i < 30; ++i)
     sample(clock, i, {});
-  EXPECT_EQ(sample(clock, i, {}), at_ms(20 * i));
+  EXPECT_EQ(sample(clock, i, {}), today_ms(20 * i));
   EXPECT_EQ(clock.steps(), 2U);
 }
 
@@ -61,7 +61,7 @@ TEST(SourceClock, AClockThatNeverWasTheHostsIsNoStep) {
     sample(clock, i, -hours{5});
   const auto stamp = sample(clock, i, -hours{5});
   ASSERT_TRUE(stamp);
-  EXPECT_EQ(*stamp, at_ms(20 * i + 3)) << "what its latency is nobody can know";
+  EXPECT_EQ(*stamp, today_ms(20 * i + 3)) << "what its latency is nobody can know";
   EXPECT_EQ(clock.steps(), 0U);
 }
 
@@ -72,7 +72,7 @@ TEST(SourceClock, StampsThatContradictEachOtherTeachNothing) {
     sample(clock, i, {});
   for (; i < 60; ++i)
     EXPECT_FALSE(sample(clock, i, hours{i}));
-  EXPECT_EQ(sample(clock, i, {}), at_ms(20 * i));
+  EXPECT_EQ(sample(clock, i, {}), today_ms(20 * i));
   EXPECT_EQ(clock.steps(), 0U);
 }
 

@@ -10,10 +10,10 @@
 namespace locus {
 namespace {
 
-constexpr std::size_t kBytes = 20'000'000;
+constexpr std::size_t kLimit_bytes = 20'000'000;
 
 TEST(SurfaceMap, ASweepIsInsertedFromWhereItWasSeen) {
-  SurfaceMap map(kBytes);
+  SurfaceMap map(kLimit_bytes);
   const Pose T_map_base{so3_exp({0, 0, 1.0}), {30, -20, 1}};
   map.insert(test::seen_from(T_map_base, test::points_on({{{10, 10, 2}, {2, 0, 0}, {0, 2, 0}}}, 1000)), T_map_base);
   const SurfaceGrid& fine = map.fine();
@@ -25,13 +25,13 @@ TEST(SurfaceMap, ASweepIsInsertedFromWhereItWasSeen) {
 }
 
 TEST(SurfaceMap, TheFineGridIsFinerThanTheCoarse) {
-  SurfaceMap map(kBytes);
+  SurfaceMap map(kLimit_bytes);
   map.insert(test::points_on({{{0, 0, 0}, {20, 0, 0}, {0, 20, 0}}}, 20'000), Pose{});
   EXPECT_GT(map.fine().size(), 7 * map.coarse().size());
 }
 
 TEST(SurfaceMap, TheSameSweepAgainMakesNoNewVoxels) {
-  SurfaceMap map(kBytes);
+  SurfaceMap map(kLimit_bytes);
   const auto points = test::points_on(test::furnished_room(), 2000);
   map.insert(points, Pose{});
   const std::size_t size = map.fine().size();
@@ -51,7 +51,7 @@ TEST(SurfaceMap, NeverHoldsMoreThanItsBudget) {
 }
 
 TEST(SurfaceMap, ClearedIsEmpty) {
-  SurfaceMap map(kBytes);
+  SurfaceMap map(kLimit_bytes);
   map.insert(test::points_on(test::furnished_room(), 500), Pose{});
   map.clear();
   EXPECT_EQ(map.fine().size(), 0U);

@@ -74,9 +74,8 @@ void talk(const DdsNode& node) {
     odometry.pose_.pose_.position_.x_ = said.figure;
     odometry.pose_.pose_.orientation_.w_ = 1;
     odometry.twist_.covariance_[0] = 0.01;
-    imus.write(imu);
-    odometries.write(odometry);
-    healths.write({i % 2 == 0});
+    if (!imus.write(imu) || !odometries.write(odometry) || !healths.write({i % 2 == 0}))
+      throw std::runtime_error("DDS did not take a message");
   });
 }
 

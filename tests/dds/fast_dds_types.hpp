@@ -159,8 +159,7 @@ template <class Message> class FastType : public eprosima::fastdds::dds::TopicDa
 
   FastType() {
     setName(Message::kName);
-    m_typeSize = 1 << 20; // at most, of what the tests send
-    m_isGetKeyDefined = false;
+    m_typeSize = 1 << 20; // at most, of what the tests send NOLINT(cppcoreguidelines-prefer-member-initializer)
   }
   bool serialize(void* data, Payload* payload) override {
     eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(payload->data), payload->max_size);

@@ -5,17 +5,12 @@
 
 #include <gtest/gtest.h>
 
+#include "support/errors.hpp"
+
 namespace locus {
 namespace {
 
 using namespace std::chrono_literals;
-
-bool contains(std::string_view text, std::string_view part) { return text.find(part) != std::string_view::npos; }
-
-std::string error_of(std::string_view text) {
-  const Expected<Fault, std::string> fault = Fault::parse(text);
-  return fault ? "" : fault.error();
-}
 
 Fault parsed(std::string_view text) {
   const Expected<Fault, std::string> fault = Fault::parse(text);
@@ -58,21 +53,23 @@ TEST(Fault, ValuesHaveTheDocumentedDefaults) {
 
 TEST(Fault, WhatCannotBeReadIsAnErrorThatSaysWhatCan) {
   for (const char* text : {"", "wio", "wio@3", "wio:lost", ":lost@3", "wio@3:lost"}) {
-    EXPECT_TRUE(contains(error_of(text), "expected NAME:KIND[=VALUE]@T[-T1]")) << text;
+    EXPECT_TRUE(contains(error_of(Fault::parse(text)), "expected NAME:KIND[=VALUE]@T[-T1]")) << text;
   }
-  EXPECT_TRUE(contains(error_of("wio:broken@3"), "unknown kind \"broken\"; known are lost, frozen, jump, nan, late, "
-                                                 "covariance, clock-step, packet-loss, reorder, duplicate"));
+  EXPECT_TRUE(contains(error_of(Fault::parse("wio:broken@3")),
+                       "unknown kind \"broken\"; known are lost, frozen, jump, nan, late, "
+                       "covariance, clock-step, packet-loss, reorder, duplicate"));
   for (const char* text : {"wio:lost=3@1", "wio:nan=@1"}) {
-    EXPECT_TRUE(contains(error_of(text), "takes no value")) << text;
+    EXPECT_TRUE(contains(error_of(Fault::parse(text)), "takes no value")) << text;
   }
   for (const char* text : {"wio:late=@1", "wio:late=x@1", "wio:late=0@1", "wio:late=-1@1", "wio:late=11@1",
                            "wio:late=1s@1", "wio:late=nan@1", "wio:late=inf@1"}) {
-    EXPECT_TRUE(contains(error_of(text), "the value of late is a number of seconds above 0 and up to 10")) << text;
+    EXPECT_TRUE(contains(error_of(Fault::parse(text)), "the value of late is a number of seconds above 0 and up to 10"))
+        << text;
   }
-  EXPECT_TRUE(contains(error_of("front:packet-loss=101@1"), "percent above 0 and up to 100"));
+  EXPECT_TRUE(contains(error_of(Fault::parse("front:packet-loss=101@1")), "percent above 0 and up to 100"));
   for (const char* text : {"wio:lost@", "wio:lost@x", "wio:lost@-1", "wio:lost@1-", "wio:lost@2-1", "wio:lost@1-1",
                            "wio:lost@1-2-3", "wio:lost@1,2", "wio:lost@nan", "wio:lost@1e300"}) {
-    EXPECT_TRUE(contains(error_of(text), "after @ expected T or T-T1")) << text;
+    EXPECT_TRUE(contains(error_of(Fault::parse(text)), "after @ expected T or T-T1")) << text;
   }
 }
 

@@ -42,7 +42,7 @@ class Stream {
   std::optional<VelodyneTestPacket> packet_;
 };
 
-LidarInput open(const LidarOptions& options = {}) {
+LidarInput opened(const LidarOptions& options = {}) {
   auto lidar = LidarInput::open(options, 0);
   EXPECT_TRUE(lidar);
   return std::move(*lidar);
@@ -64,7 +64,7 @@ std::uint64_t rejected(const PacketCounters& counters) {
 }
 
 TEST(LidarInput, GoodPacketsComeOutStampedAtTheirFirstFiring) {
-  LidarInput lidar = open();
+  LidarInput lidar = opened();
   Stream stream;
   for (int i = 0; i < 100; ++i) {
     const Datagram datagram = stream(i);
@@ -80,7 +80,7 @@ TEST(LidarInput, GoodPacketsComeOutStampedAtTheirFirstFiring) {
 }
 
 TEST(LidarInput, Vls128StampsAreThoseOfItsFirstFiringToo) {
-  LidarInput lidar = open();
+  LidarInput lidar = opened();
   const VelodyneTestPacket bytes{Model::vls128, ReturnMode::strongest};
   const Stamp receive = stamp_from_ns(1'700'000'000'000'000'000);
   const LidarPacket* packet = lidar.receive({bytes.payload(), kLidarIp, 2368, 2368, receive});
@@ -89,7 +89,7 @@ TEST(LidarInput, Vls128StampsAreThoseOfItsFirstFiringToo) {
 }
 
 TEST(LidarInput, GapOfStampAndAzimuthIsLoss) {
-  LidarInput lidar = open();
+  LidarInput lidar = opened();
   Stream stream;
   for (const int number : {0, 1, 2, 5, 6, 106})
     lidar.receive(stream(number));
@@ -97,7 +97,7 @@ TEST(LidarInput, GapOfStampAndAzimuthIsLoss) {
 }
 
 TEST(LidarInput, GapOfStampWithoutOneOfAzimuthIsNoLoss) {
-  LidarInput lidar = open();
+  LidarInput lidar = opened();
   Stream stream;
   for (int i = 0; i < 10; ++i)
     lidar.receive(stream(i));
@@ -108,7 +108,7 @@ TEST(LidarInput, GapOfStampWithoutOneOfAzimuthIsNoLoss) {
 }
 
 TEST(LidarInput, OvertakenPacketIsReorderedAndNotLost) {
-  LidarInput lidar = open();
+  LidarInput lidar = opened();
   Stream stream;
   for (const int number : {0, 1, 3, 2, 4})
     EXPECT_NE(lidar.receive(stream(number)), nullptr);
@@ -118,7 +118,7 @@ TEST(LidarInput, OvertakenPacketIsReorderedAndNotLost) {
 }
 
 TEST(LidarInput, PacketThatWasThereBeforeIsADuplicate) {
-  LidarInput lidar = open();
+  LidarInput lidar = opened();
   Stream stream;
   for (const int number : {0, 1, 1, 2, 0, 3})
     lidar.receive(stream(number));
@@ -128,7 +128,7 @@ TEST(LidarInput, PacketThatWasThereBeforeIsADuplicate) {
 }
 
 TEST(LidarInput, TimeFarOffIsRefusedAndASetClockCounted) {
-  LidarInput lidar = open();
+  LidarInput lidar = opened();
   Stream stream;
   for (int i = 0; i < 10; ++i)
     lidar.receive(stream(i));
@@ -141,7 +141,7 @@ TEST(LidarInput, TimeFarOffIsRefusedAndASetClockCounted) {
 }
 
 TEST(LidarInput, FirstSenderIsTheLidarUntilItFallsSilent) {
-  LidarInput lidar = open();
+  LidarInput lidar = opened();
   Stream stream;
   Stream other{kOtherIp};
   EXPECT_NE(lidar.receive(stream(0)), nullptr);
@@ -153,7 +153,7 @@ TEST(LidarInput, FirstSenderIsTheLidarUntilItFallsSilent) {
 }
 
 TEST(LidarInput, TruncatedDatagramIsTruncatedWhateverItsLength) {
-  LidarInput lidar = open();
+  LidarInput lidar = opened();
   Stream stream;
   Datagram datagram = stream(0);
   datagram.truncated = true;
@@ -164,7 +164,7 @@ TEST(LidarInput, TruncatedDatagramIsTruncatedWhateverItsLength) {
 }
 
 TEST(LidarInput, EveryDatagramIsCountedOnceWhateverItHolds) {
-  LidarInput lidar = open();
+  LidarInput lidar = opened();
   Stream stream;
   std::mt19937 random{11};
   std::uniform_int_distribution<int> byte{0, 255};

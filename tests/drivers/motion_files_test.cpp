@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "drivers/capture_folder.hpp"
+#include "support/errors.hpp"
 #include "support/temporary_file.hpp"
 
 namespace locus {
@@ -39,10 +40,6 @@ Expected<std::vector<OdometrySample>, std::string> odometry_from(const std::stri
   const TemporaryFile meta_file{"wio.meta.csv", bytes_of(meta)};
   return read<OdometrySample>(file.path());
 }
-
-template <class T> std::string error_of(const Expected<T, std::string>& result) { return result ? "" : result.error(); }
-
-bool contains(std::string_view text, std::string_view part) { return text.find(part) != std::string_view::npos; }
 
 TEST(MotionFiles, ImuRowsHoldRatesForcesAndWhereGivenAttitude) {
   const auto samples = imu_from("t_ns,wx,wy,wz,ax,ay,az,qw,qx,qy,qz\n"

@@ -82,8 +82,8 @@ TEST(VelodyneDecoder, AxesAreForwardLeftUp) {
   const std::vector<LidarReturn> returns = returns_in(bytes);
   ASSERT_EQ(returns.size(), 1U);
   EXPECT_NEAR(returns[0].x_m, 0.0, 1e-5);
-  EXPECT_NEAR(returns[0].y_m, -10.0 * std::cos(15.0 * std::numbers::pi / 180.0), 1e-5);
-  EXPECT_NEAR(returns[0].z_m, 10.0 * std::sin(15.0 * std::numbers::pi / 180.0) - 0.0112, 1e-5);
+  EXPECT_NEAR(returns[0].y_m, -10.0 * std::cos(15.0 * kRadPerDeg), 1e-5);
+  EXPECT_NEAR(returns[0].z_m, 10.0 * std::sin(15.0 * kRadPerDeg) - 0.0112, 1e-5);
 }
 
 TEST(VelodyneDecoder, AzimuthIsInterpolatedAtAnySpeedAndThroughTheWrap) {

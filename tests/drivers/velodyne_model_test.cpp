@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <numbers>
 #include <set>
 
 #include "drivers/velodyne_model.hpp"
@@ -14,7 +13,7 @@ using std::chrono::microseconds;
 using std::chrono::nanoseconds;
 
 double elevation_deg(Model model, std::size_t laser) {
-  return spec(model).calibration.storage[laser].elevation_rad * 180.0 / std::numbers::pi;
+  return spec(model).calibration.storage[laser].elevation_rad / kRadPerDeg;
 }
 
 TEST(VelodyneModel, NamesAndProductIdsReadBack) {

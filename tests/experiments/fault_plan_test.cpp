@@ -11,7 +11,7 @@
 namespace locus::experiments {
 namespace {
 
-Arguments arguments() {
+Arguments fault_arguments() {
   Arguments arguments;
   arguments.output = "out";
   arguments.faults = true;
@@ -24,7 +24,7 @@ Arguments arguments() {
 const Run& run_of(const Plan& plan, const std::string& id) { return *std::ranges::find(plan.runs, id, &Run::id); }
 
 TEST(FaultPlan, DoesEachCaseOnEverySeedOnce) {
-  const Plan plan = make_plan(arguments());
+  const Plan plan = make_plan(fault_arguments());
   std::set<std::string> ids;
   for (const auto& run : plan.runs)
     EXPECT_TRUE(ids.insert(run.id()).second) << run.id() << " twice";
@@ -38,7 +38,7 @@ TEST(FaultPlan, DoesEachCaseOnEverySeedOnce) {
 }
 
 TEST(FaultPlan, EveryFaultIsOneThatReplayKnowsAndIsWatchedWhileItLasts) {
-  for (const auto& run : make_plan(arguments()).runs) {
+  for (const auto& run : make_plan(fault_arguments()).runs) {
     for (std::size_t i = 1; i < run.options.size(); i += 2) {
       const auto fault = Fault::parse(run.options[i]);
       ASSERT_TRUE(fault) << fault.error();
@@ -50,7 +50,7 @@ TEST(FaultPlan, EveryFaultIsOneThatReplayKnowsAndIsWatchedWhileItLasts) {
 }
 
 TEST(FaultPlan, FaultsBeginAtHalfTime) {
-  const Plan plan = make_plan(arguments());
+  const Plan plan = make_plan(fault_arguments());
   const auto options = [&](const char* id) { return run_of(plan, id).options; };
   EXPECT_EQ(options("urban_1/wio_lost"), (std::vector<std::string>{"--fail", "wio:lost@60"}));
   EXPECT_EQ(options("tunnel_2/lidar_gap"), (std::vector<std::string>{"--fail", "all-lidars:lost@60-70"}));
@@ -61,11 +61,11 @@ TEST(FaultPlan, FaultsBeginAtHalfTime) {
 }
 
 TEST(FaultPlan, ShardsShareOutTheCoursesEachWithAllItsRuns) {
-  const Plan whole = make_plan(arguments());
+  const Plan whole = make_plan(fault_arguments());
   std::set<std::string> courses;
   std::size_t runs = 0;
   for (std::size_t i = 0; i < 4; ++i) {
-    Arguments part = arguments();
+    Arguments part = fault_arguments();
     part.shard = {i, 4};
     const Plan plan = make_plan(part);
     for (const Course& course : plan.courses) {

@@ -12,7 +12,7 @@
 namespace locus::experiments {
 namespace {
 
-Results run(const std::string& course, const std::string& configuration, double max_ape_m, double silent_s = 0) {
+Results paper_run(const std::string& course, const std::string& configuration, double max_ape_m, double silent_s = 0) {
   return {{"course", course},
           {"configuration", configuration},
           {"summary", {{"ape_m", {{"max", max_ape_m}}}}},
@@ -40,8 +40,8 @@ std::string error_of_merging(const std::vector<std::filesystem::path>& folders) 
 }
 
 TEST(Robustness, IsJudgedBesideTheRunWithoutFailure) {
-  Results all = results({run("beta", "locusd", 0.1), run("beta", "wio_imu_fail", 0.29), run("beta", "wio_fail", 0.31),
-                         run("beta", "lidar_drop", 0.1, 200)});
+  Results all = results({paper_run("beta", "locusd", 0.1), paper_run("beta", "wio_imu_fail", 0.29),
+                         paper_run("beta", "wio_fail", 0.31), paper_run("beta", "lidar_drop", 0.1, 200)});
   judge_robustness(all);
   ASSERT_EQ(all["robustness"].size(), 1U);
   EXPECT_EQ(all["robustness"][0]["wio_imu_fail"], "OK");
@@ -50,16 +50,16 @@ TEST(Robustness, IsJudgedBesideTheRunWithoutFailure) {
 }
 
 TEST(Robustness, WithoutTheRunToCompareWithThereIsNoVerdict) {
-  Results all =
-      results({run("beta", "wio_fail", 0.3), {{"course", "alpha"}, {"configuration", "locusd"}, {"failed", "x"}}});
+  Results all = results(
+      {paper_run("beta", "wio_fail", 0.3), {{"course", "alpha"}, {"configuration", "locusd"}, {"failed", "x"}}});
   judge_robustness(all);
   EXPECT_TRUE(all["robustness"].empty());
 }
 
 TEST(Merge, PutsTheRunsOfShardsTogether) {
   const test::TemporaryFolder folder;
-  const auto one = saved(folder / "1", results({run("beta", "locusd", 0.1)}));
-  const auto two = saved(folder / "2", results({run("beta", "wio_fail", 0.1)}));
+  const auto one = saved(folder / "1", results({paper_run("beta", "locusd", 0.1)}));
+  const auto two = saved(folder / "2", results({paper_run("beta", "wio_fail", 0.1)}));
   const Results all = merged({one, two});
   EXPECT_EQ(all["runs"].size(), 2U);
   EXPECT_EQ(all["robustness"][0]["wio_fail"], "OK") << "judged across shards";
@@ -68,7 +68,7 @@ TEST(Merge, PutsTheRunsOfShardsTogether) {
 TEST(Merge, KeepsTheOrderOfTheWholePlan) {
   const test::TemporaryFolder folder;
   const auto at = [](std::size_t place, const std::string& configuration) {
-    Results result = run("beta", configuration, 0.1);
+    Results result = paper_run("beta", configuration, 0.1);
     result["place"] = place;
     return result;
   };
@@ -83,8 +83,8 @@ TEST(Merge, KeepsTheOrderOfTheWholePlan) {
 
 TEST(Merge, RefusesWhatDoesNotBelongTogether) {
   const test::TemporaryFolder folder;
-  const auto one = saved(folder / "1", results({run("beta", "locusd", 0.1)}));
-  Results longer = results({run("beta", "wio_fail", 0.1)});
+  const auto one = saved(folder / "1", results({paper_run("beta", "locusd", 0.1)}));
+  Results longer = results({paper_run("beta", "wio_fail", 0.1)});
   longer["duration_s"] = 600;
   EXPECT_NE(error_of_merging({one, saved(folder / "2", longer)}).find("duration_s differs"), std::string::npos);
   EXPECT_NE(error_of_merging({one, one}).find("beta/locusd is in another folder too"), std::string::npos);

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 #include <string>
 #include <vector>
 
@@ -39,7 +38,7 @@ class RealCapture : public testing::Test {
       if (row.stamp - trajectory.front().stamp > duration)
         break;
       moved_m = std::max(moved_m, row.T_source_base.translation.norm());
-      turned_deg = std::max(turned_deg, angle_rad(row.T_source_base.rotation) * 180 / std::numbers::pi);
+      turned_deg = std::max(turned_deg, angle_rad(row.T_source_base.rotation) / kRadPerDeg);
     }
     EXPECT_LT(moved_m, 0.02);
     EXPECT_LT(turned_deg, 0.1);
@@ -106,7 +105,7 @@ TEST_F(RealCapture, CarAtFifteenMetresPerSecond) {
   EXPECT_NEAR(path_m / to_seconds(elapsed), 15.45, 0.35);
   const Eigen::Quaterniond turn =
       trajectory[1].T_source_base.rotation.conjugate() * trajectory.back().T_source_base.rotation;
-  const double yaw_dps = to_rpy_rad(turn).z() * 180 / std::numbers::pi / to_seconds(elapsed);
+  const double yaw_dps = to_rpy_rad(turn).z() / kRadPerDeg / to_seconds(elapsed);
   EXPECT_LT(yaw_dps, 0.0) << "clockwise";
   EXPECT_GT(yaw_dps, -3.0);
 }

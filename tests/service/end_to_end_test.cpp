@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <csignal>
-#include <numbers>
 #include <sstream>
 
 #include "service/robot_network.hpp"
@@ -47,7 +46,7 @@ void expect_same(const std::vector<StampedPose>& replay, const std::vector<Heard
     ASSERT_LT(std::chrono::abs(found->stamp - shift - expected.stamp), milliseconds{2}) << who << " missed a sweep";
     const Pose error = expected.T_source_base.inverse() * found->T_odom_base;
     worst_m = std::max(worst_m, error.translation.norm());
-    worst_deg = std::max(worst_deg, angle_rad(error.rotation) * 180 / std::numbers::pi);
+    worst_deg = std::max(worst_deg, angle_rad(error.rotation) / kRadPerDeg);
   }
   EXPECT_LT(worst_m, 0.01) << who;
   EXPECT_LT(worst_deg, 0.1) << who;

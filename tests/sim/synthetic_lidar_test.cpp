@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <numbers>
 #include <string>
 
 #include "drivers/velodyne_decoder.hpp"
@@ -90,7 +89,7 @@ TEST_P(EverySensor, EveryReturnLiesOnASurfaceFromWhereItWasFired) {
   velodyne::Decoder decoder(decoder_options);
   const auto packet = std::make_unique<LidarPacket>();
   const double half_step_m = velodyne::spec(model).calibration.distance_resolution_m / 2;
-  const double aside_rad = 0.01 * std::numbers::pi / 180 + (mode == ReturnMode::dual ? kHalfBeam_rad : 0);
+  const double aside_rad = 0.01 * kRadPerDeg + (mode == ReturnMode::dual ? kHalfBeam_rad : 0);
   std::size_t packets = 0, returns = 0;
   ASSERT_FALSE(decoder.decode(lidar.next().payload, *packet)); // from one column alone the decoder cannot tell the turn
   for (Datagram datagram = lidar.next(); datagram.receive_stamp < trajectory.end(); datagram = lidar.next()) {

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <memory>
-#include <numbers>
 #include <string>
 #include <vector>
 
@@ -64,7 +63,7 @@ TEST_P(EveryWorld, WithoutNoiseEveryReturnLiesOnASurface) {
       const Stamp fired = sent + Duration{echo.offset_ns};
       const Pose T_world_lidar = drive.trajectory.T_world_base(fired) * options.T_base_lidar;
       const Eigen::Vector3d point = T_world_lidar * Eigen::Vector3f{echo.x_m, echo.y_m, echo.z_m}.cast<double>();
-      const double aside_m = 0.01 * std::numbers::pi / 180 * static_cast<double>(echo.range_m);
+      const double aside_m = 0.01 * kRadPerDeg * static_cast<double>(echo.range_m);
       ASSERT_LT(drive.world.scene.distance_to_surface(point, fired), half_step_m + aside_m + 1e-5);
     }
   }

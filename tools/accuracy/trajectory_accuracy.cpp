@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 
 #include "accuracy/pose_pairs.hpp"
@@ -57,7 +56,7 @@ std::optional<StretchError> relative_error(std::span<const PosePair> pairs, doub
     const Pose T_truth = begin.T_truth_base.inverse() * end.T_truth_base;
     const Pose error = T_truth.inverse() * (begin.T_odom_base.inverse() * end.T_odom_base);
     sum.percent += 100.0 * error.translation.norm() / stretch.length_m;
-    sum.deg += angle_rad(error.rotation) * 180.0 / std::numbers::pi;
+    sum.deg += angle_rad(error.rotation) / kRadPerDeg;
   }
   const auto count = static_cast<double>(stretches.size());
   return StretchError{sum.percent / count, sum.deg / count};

@@ -117,13 +117,13 @@ std::filesystem::path write_results(const std::filesystem::path& folder, const R
   json.print("{}\n", text);
   json.close();
   if (results.contains("faults")) {
-    const std::filesystem::path table = folder / "faults.md";
+    std::filesystem::path table = folder / "faults.md";
     tools::OutputFile file(table);
     file.print("{}", fault_table(results));
     file.close();
     return table;
   }
-  const std::filesystem::path page = folder / "experiments.html";
+  std::filesystem::path page = folder / "experiments.html";
   tools::write_data_page(page, {locus_experiments_page_begin, locus_experiments_page_end}, results);
   return page;
 }

@@ -102,6 +102,8 @@ void run(const PlayArguments& arguments) {
   play(arguments, recording, packets, motion);
   for (const std::string& warning : recording.capture().warnings())
     warn(warning);
+  if (motion.refused() > 0)
+    warn(fmt::format("{} motion samples were not sent: DDS did not take them", motion.refused()));
   if (packets.sent() == 0)
     throw Failure(ExitStatus::failed,
                   fmt::format("{}: holds no UDP datagram; nothing was sent", folder.lidar.string()));

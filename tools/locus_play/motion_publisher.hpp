@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <string>
 #include <vector>
@@ -23,6 +24,8 @@ class MotionPublisher {
 
   /// Topics to which nobody listens.
   [[nodiscard]] std::vector<std::string> unheard() const;
+  /// Samples that DDS did not take.
+  [[nodiscard]] std::uint64_t refused() const { return refused_; }
 
  private:
   daemon::DdsNode node_;
@@ -30,6 +33,7 @@ class MotionPublisher {
   std::vector<std::string> topics_; ///< by source
   std::map<std::size_t, daemon::DdsWriter<daemon::ros::Imu>> imus_;
   std::map<std::size_t, daemon::DdsWriter<daemon::ros::Odometry>> odometries_;
+  std::uint64_t refused_ = 0;
 };
 
 } // namespace locus::tools

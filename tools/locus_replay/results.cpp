@@ -30,7 +30,7 @@ const std::filesystem::path& made(const std::filesystem::path& folder) {
 
 void warn(const std::vector<std::string>& lines) {
   for (const std::string& line : lines)
-    say("locus-replay", "warning: " + line);
+    tools::say("locus-replay", "warning: " + line);
 }
 
 } // namespace

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numbers>
 #include <utility>
 
 #include "locus_sim/folder_sink.hpp"
@@ -109,7 +108,7 @@ std::string dotted(std::uint32_t ip) {
 
 std::string yaml(const Pose& pose) {
   const Eigen::Vector3d& xyz_m = pose.translation;
-  const Eigen::Vector3d rpy_deg = to_rpy_rad(pose.rotation) * (180 / std::numbers::pi) + Eigen::Vector3d::Zero();
+  const Eigen::Vector3d rpy_deg = to_rpy_rad(pose.rotation) / kRadPerDeg + Eigen::Vector3d::Zero();
   return fmt::format("{{xyz_m: [{:.6f}, {:.6f}, {:.6f}], rpy_deg: [{:.6f}, {:.6f}, {:.6f}]}}", xyz_m.x(), xyz_m.y(),
                      xyz_m.z(), rpy_deg.x(), rpy_deg.y(), rpy_deg.z());
 }

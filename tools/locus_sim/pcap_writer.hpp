@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <memory>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -86,18 +87,9 @@ class PcapWriter {
  public:
   explicit PcapWriter(const std::filesystem::path& path, int link_type = DLT_EN10MB)
       : pcap_(pcap_open_dead_with_tstamp_precision(link_type, 65535, PCAP_TSTAMP_PRECISION_NANO)),
-        dumper_(pcap_dump_open(pcap_, path.c_str())), path_(path.string()) {
-    if (dumper_ == nullptr) {
-      const std::runtime_error error = cannot_be_written();
-      pcap_close(pcap_);
-      throw error;
-    }
-  }
-  PcapWriter(const PcapWriter&) = delete;
-  PcapWriter& operator=(const PcapWriter&) = delete;
-  ~PcapWriter() {
-    pcap_dump_close(dumper_);
-    pcap_close(pcap_);
+        dumper_(pcap_dump_open(pcap_.get(), path.c_str())), path_(path.string()) {
+    if (!dumper_)
+      throw cannot_be_written();
   }
 
   /// A UDP datagram in IPv4 in Ethernet; only for a writer of that link type.
@@ -114,7 +106,7 @@ class PcapWriter {
 
   /// Throws unless everything has reached the file.
   void flush() {
-    if (pcap_dump_flush(dumper_) != 0 || std::ferror(pcap_dump_file(dumper_)) != 0)
+    if (pcap_dump_flush(dumper_.get()) != 0 || std::ferror(pcap_dump_file(dumper_.get())) != 0)
       throw cannot_be_written();
   }
 
@@ -126,7 +118,7 @@ class PcapWriter {
     header.len = static_cast<bpf_u_int32>(frame.size());
     header.caplen = static_cast<bpf_u_int32>(std::min(frame.size(), snap_length));
     const std::span<const std::byte> kept = frame.first(header.caplen);
-    pcap_dump(reinterpret_cast<u_char*>(dumper_), &header, reinterpret_cast<const u_char*>(kept.data()));
+    pcap_dump(reinterpret_cast<u_char*>(dumper_.get()), &header, reinterpret_cast<const u_char*>(kept.data()));
   }
 
  private:
@@ -135,8 +127,12 @@ class PcapWriter {
                               "); check permissions and free space");
   }
 
-  pcap_t* pcap_;
-  pcap_dumper_t* dumper_;
+  struct Closer {
+    void operator()(pcap_t* handle) const { pcap_close(handle); }
+    void operator()(pcap_dumper_t* file) const { pcap_dump_close(file); }
+  };
+  std::unique_ptr<pcap_t, Closer> pcap_;
+  std::unique_ptr<pcap_dumper_t, Closer> dumper_;
   std::string path_;
 };
 

@@ -10,8 +10,6 @@
 namespace locus::sim {
 namespace {
 
-constexpr double kRadPerDeg = std::numbers::pi / 180;
-
 struct Mounting {
   std::string_view name;
   Eigen::Vector3d xyz_m, rpy_deg;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <numbers>
 #include <span>
 #include <utility>
@@ -12,7 +11,6 @@
 namespace locus::sim {
 namespace {
 
-constexpr double kNowhere = std::numeric_limits<double>::infinity();
 constexpr double kFar_m = 1e30;                 // where no ray comes
 constexpr std::uint32_t kSurface = 0x8000'0000; // with the index of a surface, in place of that of a node
 constexpr std::size_t kStackSize = 256;         // three more per level

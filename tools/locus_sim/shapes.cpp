@@ -5,12 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace locus::sim {
 namespace {
 
-constexpr double kNowhere = std::numeric_limits<double>::infinity();
 constexpr double kTouching_m = 1e-9; // a ray that starts on a surface leaves it
 constexpr double kSeam = 1e-9;       // of an edge: no ray slips through between two triangles
 

@@ -4,9 +4,12 @@
 #include <Eigen/Core>
 
 #include <cstdint>
+#include <limits>
 #include <variant>
 
 namespace locus::sim {
+
+inline constexpr double kNowhere = std::numeric_limits<double>::infinity(); ///< along a ray that meets nothing
 
 /// A ray from a point in a direction of unit length, world frame.
 struct Ray {
@@ -23,7 +26,7 @@ struct Bounds {
 Bounds united(const Bounds& a, const Bounds& b);
 
 /// The shapes a scene is made of. Each is a surface without thickness, seen from both sides, and answers four
-/// questions: where a ray first meets it (metres along the ray, infinity when nowhere), its unit normal (to either
+/// questions: where a ray first meets it (metres along the ray, or kNowhere), its unit normal (to either
 /// side) nearest to a point on it, how far a point is from it, and its bounds.
 
 struct Rectangle {

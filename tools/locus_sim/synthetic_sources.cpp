@@ -8,7 +8,6 @@
 namespace locus::sim {
 namespace {
 
-constexpr double kGravity_mps2 = 9.81;
 constexpr double kShaken_mps = 0.5; // from here on vibration is at its full
 
 } // namespace

@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "core/pose.hpp"
+
 namespace locus::tools {
 namespace {
 
@@ -36,11 +38,10 @@ std::string pose_text(const Json& status) {
   const auto sigma = [&](std::size_t axis, double unit) {
     return unit * std::sqrt(std::max(0.0, status["covariance"][7 * axis].get<double>()));
   };
-  constexpr double kDeg = 180 / 3.14159265358979;
   std::string text = fmt::format("position    {:9.3f} {:9.3f} {:9.3f} m     +- {:.3f} {:.3f} {:.3f}\n"
                                  "attitude    {:9.2f} {:9.2f} {:9.2f} deg   +- {:.2f} {:.2f} {:.2f}\n",
                                  p[0], p[1], p[2], sigma(0, 1), sigma(1, 1), sigma(2, 1), a[0], a[1], a[2],
-                                 sigma(3, kDeg), sigma(4, kDeg), sigma(5, kDeg));
+                                 sigma(3, 1 / kRadPerDeg), sigma(4, 1 / kRadPerDeg), sigma(5, 1 / kRadPerDeg));
   static constexpr std::array<std::string_view, 6> kAxes{"x", "y", "z", "roll", "pitch", "yaw"};
   text += "lidar sees ";
   for (std::size_t i = 0; i < kAxes.size(); ++i)
