@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "core/pose.hpp"
+
 namespace locus::velodyne {
 
 namespace {
