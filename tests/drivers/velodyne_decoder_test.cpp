@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "core/pose.hpp"
 #include "drivers/velodyne_decoder.hpp"
 #include "support/returns.hpp"
 #include "velodyne_test_packet.hpp"

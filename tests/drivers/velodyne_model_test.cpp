@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <set>
 
+#include "core/pose.hpp"
 #include "drivers/velodyne_model.hpp"
 
 namespace locus::velodyne {
