@@ -38,7 +38,7 @@ void MotionPublisher::publish(const daemon::ImuInput& input, Duration shift) {
     message.orientation_covariance_[0] = -1; // REP 145: it has none
   message.angular_velocity_ = {w.x(), w.y(), w.z()};
   message.linear_acceleration_ = {f.x(), f.y(), f.z()};
-  refused_ += writer->second.write(message) ? 0 : 1;
+  refused_ += writer->second.write(message) ? 0U : 1U;
 }
 
 void MotionPublisher::publish(const daemon::OdometryInput& input, Duration shift) {
@@ -49,7 +49,7 @@ void MotionPublisher::publish(const daemon::OdometryInput& input, Duration shift
   daemon::OdometryReport report{.stamp = input.sample.stamp + shift, .T_odom_base = input.sample.T_source_base};
   report.twist_covariance.diagonal().setConstant(kUsualVariance * input.sample.covariance_scale);
   const daemon::FrameNames frames{frame_odom_, frame_base_};
-  refused_ += writer->second.write(daemon::to_ros(report, frames)) ? 0 : 1;
+  refused_ += writer->second.write(daemon::to_ros(report, frames)) ? 0U : 1U;
 }
 
 std::vector<std::string> MotionPublisher::unheard() const {
