@@ -125,6 +125,7 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
     T_last_now = flatten(estimate.scan_to_scan.T_target_source);
     correct_motion(sweep, T_last_now);
   }
+  estimate.scan_to_scan.T_target_source = T_last_now; // also where it was not trusted
   const PoseUncertainty before = uncertainty_;
   predict(prior);
   estimate.scan_to_submap = match_submap(prior, T_last_now, stop);
@@ -330,13 +331,16 @@ bool Odometry::trusts(const Registration& registration, const Pose& T_last_now, 
   return (difference(T_last_now, T_last_predicted).cwiseAbs().array() <= allowed.array()).all();
 }
 
-/// Compares what each source predicted, and a constant velocity if that was the prior, with what lidar found. A source
-/// that is in agreement teaches its statistics; one in disagreement would only teach them to expect the worst. Standing
-/// must not teach that it lasts.
+/// Compares what each source predicted with what lidar found, and a constant velocity with what both know: it has to
+/// serve once the sources are lost. A source that is in agreement teaches its statistics; one in disagreement would
+/// only teach them to expect the worst. Standing must not teach that it lasts.
 void Odometry::judge_sources(const Sweep& sweep, const Prior& prior, const Pose& T_last_now,
                              const OdometryEstimate& estimate) {
   const Matrix6 R = turn_both(T_odom_last_.rotation.conjugate());
-  const Matrix6 information = R * estimate.scan_to_submap.information * R.transpose();
+  Matrix6 information = R * estimate.scan_to_submap.information * R.transpose();
+  for (std::size_t axis = 0; axis < weak_.size(); ++axis)
+    if (weak_[axis]) // the little that is said of it is said by its neighbours
+      information.row(static_cast<Eigen::Index>(axis)).setZero();
   const bool stands = estimate.state == TrackingState::standstill;
   for (std::size_t i = 0; i < options_.motion_sources.size(); ++i) {
     const std::optional<Pose> T_last_predicted = step(sweep, i);
@@ -355,8 +359,12 @@ void Odometry::judge_sources(const Sweep& sweep, const Prior& prior, const Pose&
     if (imu)
       gyro_biases_[i].learn(-error.tail<3>(), so3_log(T_last_now.rotation), sweep.end - last_stamp_);
   }
-  if (prior.source.translation < 0 && !stands)
-    constant_velocity_statistics_.learn(difference(T_last_now, prior.T_last_now), information);
+  if (stands)
+    return;
+  if (prior.source.translation >= 0)
+    information += prior.variance.cwiseInverse().asDiagonal();
+  const Pose T_last_kept = se3_exp(to_seconds(sweep.end - last_stamp_) * twist_base_);
+  constant_velocity_statistics_.learn(difference(T_last_now, T_last_kept), information);
 }
 
 void Odometry::update_map(OdometryEstimate& estimate) {
@@ -420,10 +428,21 @@ void Odometry::settle(const Sweep& sweep, const Prior& prior, OdometryEstimate& 
   if (adrift_) // the way back to the submap is no motion of the robot
     return move_on(prior.T_last_now, uncertainty_.against_submap(), estimate);
   judge_sources(sweep, prior, T_last_now, estimate);
-  move_on(T_last_now, uncertainty_.against_submap(), estimate);
-  bend(difference(T_last_now, prior.T_last_now));
+  const Pose T_last_moved = motion(T_last_now, estimate.scan_to_scan.T_target_source);
+  move_on(T_last_moved, uncertainty_.against_submap(), estimate);
+  bend(difference(T_last_moved, prior.T_last_now));
   if (estimate.state != TrackingState::degenerate)
     feedback_.twist_base = twist_base_;
+}
+
+/// T_last_now as far as it is a motion of the robot. Along axes that lidar hardly sees the place in the submap may be
+/// off by much, and a few points may pull it far: there the motion is that from sweep to sweep.
+Pose Odometry::motion(const Pose& T_last_now, const Pose& T_last_seen) const {
+  Vector6 corrected = difference(T_last_now, T_last_seen);
+  for (std::size_t axis = 0; axis < weak_.size(); ++axis)
+    if (weak_[axis])
+      corrected[static_cast<Eigen::Index>(axis)] = 0.0;
+  return {so3_exp(corrected.tail<3>()) * T_last_seen.rotation, T_last_seen.translation + corrected.head<3>()};
 }
 
 /// A sweep that was corrected for another motion than the robot's is bent, and lies askew. A robot that shakes or whose

@@ -88,6 +88,7 @@ class Odometry {
   void hold_still(const Sweep& sweep, OdometryEstimate& estimate);
   [[nodiscard]] bool sources_saw_motion(const Sweep& sweep) const;
   void settle(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate);
+  [[nodiscard]] Pose motion(const Pose& T_last_now, const Pose& T_last_seen) const;
   void bend(const Vector6& surprise);
   void observe(OdometryEstimate& estimate);
   void move_on(const Pose& T_last_now, const Matrix6& covariance_odom, OdometryEstimate& estimate);

@@ -33,8 +33,8 @@ void PriorStatistics::learn(const Vector6& difference, const Matrix6& lidar_info
 
 /// A mean that the noise of the samples may have made says nothing.
 Vector6 PriorStatistics::bias(double periods) const {
-  const Vector6 noise = (learned_.array() > 0.0).select(variance_.array() / learned_.array().max(1.0), 0.0).sqrt();
-  return periods * (bias_.cwiseAbs() - noise).cwiseMax(0.0);
+  const Vector6 of_noise = (learned_.array() > 0.0).select(variance_.array() / learned_.array().max(1.0), 0.0);
+  return periods * (bias_.cwiseAbs2() - of_noise).cwiseMax(0.0).cwiseSqrt();
 }
 
 Vector6 PriorStatistics::variance(double periods) const { return variance_ * (periods * periods); }

@@ -45,6 +45,18 @@ WeakDirections weak_directions(const Normals& normals) {
   return weak;
 }
 
+/// What the gradients of the points count for. A handful of points is not a hundredth of a crowd: along a weak
+/// direction there are no others to be checked against, and what is wrong with them comes again with every sweep.
+Matrix6 belief(const WeakDirections& weak, const Normals& normals) {
+  Matrix6 belief = Matrix6::Identity();
+  for (const Eigen::Vector3f& unit : std::span(weak.unit).first(weak.count)) {
+    const Eigen::Vector3d along = unit.cast<double>();
+    const double share = along.dot(normals.squares * along) / std::max(normals.points, 1.0);
+    belief.topLeftCorner<3, 3>() -= std::max(0.0, 1.0 - share / kFewNormals) * along * along.transpose();
+  }
+  return belief;
+}
+
 } // namespace
 
 struct Gicp::Workers {
@@ -77,6 +89,8 @@ struct Gicp::Workers {
     NormalEquations total;
     for (std::size_t block = 0; block < blocks.size(); ++block)
       total += partial[block];
+    total.H = believed * total.H * believed;
+    total.b = believed * total.b;
     return total;
   }
 
@@ -85,6 +99,7 @@ struct Gicp::Workers {
     const WeakDirections weak = weak_directions(normals());
     for (std::size_t block = 0; block < blocks.size() && weak.count > 0; ++block)
       straighten(weak, matches[block]);
+    believed = weak.count > 0 ? belief(weak, normals()) : Matrix6::Identity();
   }
 
   [[nodiscard]] Normals normals() const {
@@ -108,6 +123,7 @@ struct Gicp::Workers {
   std::vector<SourceBlock> blocks;
   std::vector<MatchBlock> matches;
   std::vector<NormalEquations> partial;
+  Matrix6 believed = Matrix6::Identity();
 };
 
 Gicp::Gicp(int threads, Isa isa) : workers_(std::make_unique<Workers>(threads, isa)) {}

@@ -206,6 +206,19 @@ TEST(Odometry, AlongABareCorridorTheWheelsCarryOnAndTheDoubtGrows) {
   EXPECT_LT(result.worst_error_m, 3 * sigma_m(late, 0));
 }
 
+TEST(Odometry, AlongABareCorridorWithoutWheelsItGoesOnAsItDid) {
+  const sim::Trajectory trajectory = sixty_metres({.position_m = {50, 0}});
+  RobotSetup setup = robot_with_wheels_and_imu();
+  const Stamp lost = trajectory.start() + seconds{7};
+  setup.is_silent = [=](std::size_t, Stamp stamp) { return stamp >= lost; };
+  const Outcome result = drive_through(sim::corridor(200, sim::Walls::bare), trajectory, setup, seconds{14});
+  const OdometryEstimate& last = result.estimates.back();
+  EXPECT_EQ(last.state, TrackingState::degenerate);
+  EXPECT_NEAR(last.twist_base[0], 2.0, 0.1);
+  EXPECT_LT(result.worst_error_m, 0.5) << "over 14 m";
+  EXPECT_LT(result.worst_error_m, 3 * std::sqrt(last.pose_covariance(0, 0)));
+}
+
 TEST(Odometry, TheErrorOfABlindStretchIsTakenBackWhereTheMapIsKnown) {
   const sim::Trajectory trajectory(sim::room_course(seconds{40}, 1.0), sim::room_start());
   const Stamp dark = trajectory.start() + seconds{15}, light = dark + seconds{10};
