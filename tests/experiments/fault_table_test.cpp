@@ -114,7 +114,7 @@ TEST(FaultTable, ALossThatAddsErrorMustBeFlaggedAndHonest) {
 TEST(FaultTable, InACorridorTheWheelsAndTheGrowthOfDoubtDecide) {
   Results corridor = run("corridor_1", "none", 0.19);
   EXPECT_TRUE(row_of({corridor}, "corridor", "none")["holds"]);
-  corridor["fault"]["growth"]["across"] = 11.0;
+  corridor["fault"]["growth"]["across"] = 2.1;
   EXPECT_EQ(row_of({corridor}, "corridor", "none")["broken"][0], "doubt across the way grows");
   EXPECT_EQ(row_of({run("corridor_1", "none", 0.21)}, "corridor", "none")["broken"][0], "worse than the wheels");
 }

@@ -13,8 +13,9 @@ namespace {
 
 using nlohmann::json;
 
-/// What does not hold yet, by course and configuration.
+/// What does not hold, by course and configuration; docs/robustness.md tells why.
 const std::map<std::string, std::set<std::string>> kKnown{
+    {"corridor/none", {"doubt across the way grows"}},
     {"spot/vio_kio_imu_lost", {"more error than allowed", "not flagged"}}};
 
 TEST(FaultsOnCourses, EveryRowOfTheTableHoldsForAMinute) {
@@ -23,7 +24,7 @@ TEST(FaultsOnCourses, EveryRowOfTheTableHoldsForAMinute) {
                                                          "--consistency", "0", "-o", folder / "out"});
   ASSERT_EQ(run.status, 0) << run.err;
   const json faults = json::parse(read_text(folder / "out/results.json"))["faults"];
-  EXPECT_EQ(faults["rows"].size(), 49U);
+  EXPECT_EQ(faults["rows"].size(), 51U);
   for (const json& row : faults["rows"]) {
     const std::string id = row["course"].get<std::string>() + '/' + row["configuration"].get<std::string>();
     const auto known = kKnown.find(id);

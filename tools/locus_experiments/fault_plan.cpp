@@ -57,7 +57,7 @@ void add_losses(std::vector<FaultCase>& cases) {
                      Lasting::always,
                      Demand::accurate_and_honest,
                      limit_m});
-  for (const char* course : {"urban", "tunnel"}) {
+  for (const char* course : {"urban", "tunnel", "corridor"}) {
     add("wio_lost", "WIO lost", course, {"wio:lost"});
     add("wio_imu_lost", "WIO and IMU lost", course, {"wio:lost", "imu:lost"});
   }

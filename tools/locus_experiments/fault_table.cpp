@@ -133,7 +133,7 @@ Verdict resisted(const Pairs& pairs, double limit_m) {
 }
 
 Verdict no_worse_than_wheels(const Pairs& pairs, const std::string& source) {
-  constexpr double kGrowsAlong = 10, kStaysAcross = 10;
+  constexpr double kGrowsAlong = 10, kStaysAcross = 2;
   const Figure wheels_m = [&](const Pair& pair) {
     return pair.with->at("fault").at("sources").at(source).at("ape_mean_m").get<double>();
   };
