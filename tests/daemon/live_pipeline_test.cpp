@@ -120,7 +120,10 @@ TEST(LivePipeline, OverloadDropsSweepsAndNeverMakesEstimatesOlder) {
   const Duration registration = median_wall(alone.begin(), alone.end());
   DriveInput drive;
   PacedInput input(drive, 3.0 * to_seconds(milliseconds{100}) / to_seconds(registration));
-  LivePipeline pipeline(config, open_lidars(config), input, {.speed = kNoHurry});
+  std::vector<std::uint64_t> seen; // when the odometry had time again
+  LivePipeline pipeline(config, open_lidars(config), input, {.speed = kNoHurry, .after_estimate = [&](const auto&...) {
+                                                               seen.push_back(pipeline.counters().seen);
+                                                             }});
   const std::vector<ProcessedSweep> fetched = fetch_all(pipeline);
   pipeline.stop();
 
@@ -133,6 +136,8 @@ TEST(LivePipeline, OverloadDropsSweepsAndNeverMakesEstimatesOlder) {
   EXPECT_TRUE(std::is_sorted(fetched.begin(), fetched.end(),
                              [](const ProcessedSweep& a, const ProcessedSweep& b) { return a.sequence < b.sequence; }));
   EXPECT_EQ(fetched.back().sequence, alone.back().sequence) << "the newest sweep always is processed";
+  for (std::size_t i = 1; i < fetched.size(); ++i) // the last one seen may not quite have been handed over
+    EXPECT_GE(fetched[i].sequence + 2, seen[i - 1]) << "older than a period when it was taken";
   const auto third = static_cast<std::ptrdiff_t>(fetched.size() / 3);
   const Duration at_first = median_wall(fetched.begin(), fetched.begin() + third);
   const Duration at_last = median_wall(fetched.end() - third, fetched.end());
