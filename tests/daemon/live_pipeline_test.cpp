@@ -51,6 +51,38 @@ class PatientInput : public InputSource {
   Stamp last_arrival_;
 };
 
+/// Gives the drive out up to the sweep that the test asks for.
+class MeteredInput : public InputSource {
+ public:
+  /// Until the ingest has handed over so many sweeps in all, and rests.
+  void hand_over(const LivePipeline& pipeline, std::uint64_t sweeps) {
+    wanted_.store(sweeps);
+    pipeline_.store(&pipeline);
+    while (resting_at_.load() < sweeps)
+      std::this_thread::sleep_for(microseconds{100});
+  }
+
+  Input next(Duration timeout) override {
+    const LivePipeline* pipeline = pipeline_.load();
+    const std::uint64_t seen = pipeline != nullptr ? pipeline->counters().seen : 0;
+    if (seen >= wanted_.load()) {
+      resting_at_.store(seen); // who asks for input has handed over what it saw
+      std::this_thread::sleep_for(std::min<Duration>(timeout, microseconds{100}));
+      return Silence{last_arrival_};
+    }
+    Input input = drive_.next(timeout);
+    if (!std::holds_alternative<EndOfInput>(input))
+      last_arrival_ = arrival_of(input);
+    return input;
+  }
+
+ private:
+  DriveInput drive_;
+  std::atomic<const LivePipeline*> pipeline_{nullptr};
+  std::atomic<std::uint64_t> wanted_{0}, resting_at_{0};
+  Stamp last_arrival_;
+};
+
 /// A robot that is switched off.
 class SilentInput : public InputSource {
  public:
@@ -66,6 +98,14 @@ std::vector<ProcessedSweep> fetch_all(LivePipeline& pipeline) {
     if (const auto done = pipeline.next(milliseconds{100}))
       fetched.push_back(*done);
   return fetched;
+}
+
+/// Sequence of the next estimate.
+std::optional<std::uint64_t> next_sequence(LivePipeline& pipeline) {
+  for (const Duration give_up = read_clock(CLOCK_MONOTONIC) + seconds{60}; read_clock(CLOCK_MONOTONIC) < give_up;)
+    if (const auto done = pipeline.next(milliseconds{100}))
+      return done->sequence;
+  return std::nullopt;
 }
 
 void expect_adds_up(const SweepCounters& counters) {
@@ -146,6 +186,38 @@ TEST(LivePipeline, OverloadDropsSweepsAndNeverMakesEstimatesOlder) {
   RecordProperty("age_us_first_third", static_cast<int>(at_first / microseconds{1}));
   RecordProperty("age_us_last_third", static_cast<int>(at_last / microseconds{1}));
   EXPECT_LT(to_seconds(at_last), 3.0 * to_seconds(at_first));
+}
+
+/// The odometry is kept busy while sweeps come in. Free again it takes the newest, all others have been dropped and
+/// counted; those that come then are processed one by one.
+TEST(LivePipeline, QueueIsBackWithTheFirstSweepAfterAnOverload) {
+  const Config config = Drive::config();
+  MeteredInput input;
+  constexpr std::uint64_t kNone = ~0ULL;
+  std::atomic<std::uint64_t> busy_with{kNone};
+  const auto keep_busy = [&](const Sweep& sweep, const auto&...) {
+    while (sweep.sequence == busy_with.load())
+      std::this_thread::sleep_for(microseconds{100});
+  };
+  LivePipeline pipeline(config, open_lidars(config), input, {.speed = kNoHurry, .after_estimate = keep_busy});
+  std::uint64_t seen = 0, dropped = 0;
+  for (const std::uint64_t meanwhile : {1U, 2U, 9U, 30U}) {
+    busy_with.store(seen);
+    input.hand_over(pipeline, seen += 1);
+    ASSERT_EQ(next_sequence(pipeline), seen - 1);
+    input.hand_over(pipeline, seen += meanwhile);
+    busy_with.store(kNone);
+    EXPECT_EQ(next_sequence(pipeline), seen - 1) << "the newest";
+    dropped += meanwhile - 1;
+    for (int i = 0; i < 3; ++i) {
+      input.hand_over(pipeline, seen += 1);
+      EXPECT_EQ(next_sequence(pipeline), seen - 1);
+    }
+    EXPECT_EQ(pipeline.counters().dropped, dropped);
+  }
+  pipeline.stop();
+  expect_adds_up(pipeline.counters());
+  EXPECT_EQ(pipeline.counters().seen, seen);
 }
 
 /// What the deadline is for: a registration that is too slow for its sweeps is cut short, and few are dropped.
