@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "config/command_line.hpp"
 #include "config/config_yaml.hpp"
 #include "daemon/service/log.hpp"
 #include "daemon/service/service.hpp"
@@ -61,7 +62,7 @@ int main(int argc, char** argv) { // NOLINT(bugprone-exception-escape): what thr
   } catch (const CLI::Success& asked_for_text) {
     return app.exit(asked_for_text);
   } catch (const CLI::ParseError& error) {
-    fmt::print(stderr, "locusd: {}; see locusd --help\n", error.what());
+    fmt::print(stderr, "locusd: {}\n", locus::explain(app, error));
     return kWrongUsage;
   } catch (const std::exception& error) { // out of memory or threads
     fmt::print(stderr, "locusd: {}\n", error.what());

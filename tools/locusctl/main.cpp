@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "command_line.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/map_file.hpp"
 #include "locus_replay/say.hpp"
@@ -140,14 +141,8 @@ std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
   app.add_subcommand("sensors", "Finds the lidars on the wire; needs no service")->callback([&] {
     action = [] { fmt::print("{}", find_sensors(std::chrono::seconds{2})); };
   });
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& asked_for_text) {
-    app.exit(asked_for_text);
+  if (!parse_command_line(app, argc, argv))
     return {};
-  } catch (const CLI::ParseError& error) {
-    throw Failure(ExitStatus::wrong_usage, fmt::format("{}; see locusctl --help", error.what()));
-  }
   return action;
 }
 
