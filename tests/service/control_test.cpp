@@ -1,13 +1,108 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <string>
+#include <utility>
+#include <vector>
+
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "service/robot_network.hpp"
+#include "service/terminal.hpp"
+#include "service/undisturbed.hpp"
 
 namespace locus::test {
 namespace {
 
-class Control : public RobotNetwork {};
+using std::chrono::seconds;
+
+class Control : public RobotNetwork {
+ protected:
+  [[nodiscard]] std::vector<std::string> watch() const {
+    return {LOCUSCTL, "--socket", file("control").string(), "status", "--watch"};
+  }
+
+  /// locusctl as somebody who is neither root nor in any group of ours.
+  [[nodiscard]] ProgramRun as_stranger(std::vector<std::string> words) const {
+    words.insert(words.begin(), {"--reuid=65534", "--regid=65534", "--clear-groups", file("locusctl").string(),
+                                 "--socket", file("control").string()});
+    return run_program("/usr/bin/setpriv", words);
+  }
+};
+
+bool same(const termios& a, const termios& b) {
+  return a.c_iflag == b.c_iflag && a.c_oflag == b.c_oflag && a.c_cflag == b.c_cflag && a.c_lflag == b.c_lflag &&
+         std::memcmp(a.c_cc, b.c_cc, sizeof(a.c_cc)) == 0;
+}
+
+/// Watches until `ends` is typed; the terminal then is as it was found.
+void expect_watch_ends(const std::vector<std::string>& command, const std::string& ends) {
+  Terminal terminal(command);
+  const termios before = terminal.settings();
+  ASSERT_TRUE(terminal.shows("sweeps", seconds{5}));
+  EXPECT_TRUE(terminal.on_page_of_its_own());
+  EXPECT_FALSE(terminal.cursor_is_shown());
+  const int pages = terminal.pages();
+  EXPECT_TRUE(terminal.wait_until(seconds{5}, [&] { return terminal.pages() >= pages + 2; })) << "it is drawn again";
+  terminal.type(ends);
+  EXPECT_EQ(terminal.wait_for_exit(seconds{2}), 0);
+  EXPECT_FALSE(terminal.on_page_of_its_own());
+  EXPECT_TRUE(terminal.cursor_is_shown());
+  EXPECT_TRUE(same(terminal.settings(), before));
+  EXPECT_EQ(terminal.overflows(), 0);
+}
+
+TEST_F(Control, WatchFillsATerminalOf80By24AndLeavesItAsItWas) {
+  Child daemon(locusd(config()));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const Child play({LOCUS_PLAY, capture().string()});
+  ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+  expect_watch_ends(watch(), "q");
+  expect_watch_ends(watch(), "\x03");
+}
+
+TEST_F(Control, WatchOutlivesTheService) {
+  Child daemon(locusd(config()));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  Terminal terminal(watch());
+  ASSERT_TRUE(terminal.shows("waiting", seconds{5}));
+  daemon.signal(SIGTERM);
+  ASSERT_EQ(daemon.wait_for_exit(seconds{2}), 0);
+  EXPECT_TRUE(terminal.shows("no service answers", seconds{5}));
+  const Child again(locusd(config()));
+  EXPECT_TRUE(terminal.shows("waiting", seconds{10}));
+}
+
+TEST_F(Control, WatchWithoutATerminalIsWrongUsage) {
+  const ProgramRun run = ctl({"status", "--watch"});
+  EXPECT_EQ(run.status, 2);
+  EXPECT_NE(run.err.find("--watch draws on a terminal"), std::string::npos) << run.err;
+  EXPECT_EQ(run.out, "");
+}
+
+TEST_F(Control, StrangersMayLookAndNotTouch) {
+  if (geteuid() != 0)
+    GTEST_SKIP() << "no second user to be: run as root";
+  std::filesystem::copy_file(LOCUSCTL, file("locusctl")); // where everybody can reach it
+  chmod(file("").parent_path().c_str(), 0755);
+  Child daemon(locusd(config()));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const ProgramRun look = as_stranger({"status", "--json"});
+  EXPECT_EQ(look.status, 0) << look.err;
+  EXPECT_NE(look.out.find("\"waiting\""), std::string::npos);
+  using Words = std::vector<std::string>;
+  for (const Words& command :
+       {Words{"reset"}, Words{"reload"}, Words{"flat-ground", "on"}, Words{"save-map", "/dev/null"}}) {
+    const ProgramRun touch = as_stranger(command);
+    EXPECT_EQ(touch.status, 1) << command.front();
+    EXPECT_EQ(touch.err, "locusctl: not permitted; be root or a member of group locusd\n") << command.front();
+  }
+  EXPECT_EQ(status()["flat_ground"], "off");
+}
 
 TEST_F(Control, MistypedWordsNameTheNearestThatExists) {
   const auto refused = [](const ProgramRun& run, const std::string& words) {

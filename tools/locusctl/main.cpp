@@ -1,24 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 // locusctl: talks to a running locusd.
-#include <atomic>
-#include <csignal>
-#include <cstdio>
+#include <chrono>
 #include <cstring>
 #include <exception>
 #include <functional>
 #include <span>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "command_line.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/map_file.hpp"
 #include "locus_replay/say.hpp"
+#include "locusctl/screen.hpp"
 #include "locusctl/sensors.hpp"
 #include "locusctl/service_client.hpp"
 #include "locusctl/status_text.hpp"
@@ -40,44 +37,15 @@ struct CtlArguments {
   }
 };
 
-volatile std::sig_atomic_t interrupted = 0;
-
-/// The alternate screen of the terminal, as long as it lives.
-class Screen {
- public:
-  Screen() {
-    std::signal(SIGINT, [](int) { interrupted = 1; });
-    std::signal(SIGTERM, [](int) { interrupted = 1; });
-    fmt::print("\x1b[?1049h\x1b[?25l");
-  }
-  ~Screen() {
-    fmt::print("\x1b[?25h\x1b[?1049l");
-    std::fflush(stdout);
-  }
-  Screen(const Screen&) = delete;
-  Screen& operator=(const Screen&) = delete;
-
-  /// Over what was there, so that nothing flickers.
-  static void show(const std::string& text) {
-    std::string out = "\x1b[H";
-    for (const char c : text)
-      out += c == '\n' ? std::string{"\x1b[K\n"} : std::string{c};
-    fmt::print("{}\x1b[J", out);
-    std::fflush(stdout);
-  }
-};
-
 void watch(const CtlArguments& arguments) {
-  const Screen screen;
-  while (interrupted == 0) {
+  Screen screen;
+  do {
     try {
-      Screen::show(status_text(ask(arguments.control(), {{"command", "status"}}).json));
+      screen.show(status_text(ask(arguments.control(), {{"command", "status"}}).json));
     } catch (const Failure& failure) { // it may come back
-      Screen::show(fmt::format("{}\n", failure.what()));
+      screen.show(failure.what());
     }
-    for (int i = 0; i < 10 && interrupted == 0; ++i)
-      std::this_thread::sleep_for(std::chrono::milliseconds{50});
-  }
+  } while (!screen.wait_for_end(std::chrono::milliseconds{500}));
 }
 
 void status(const CtlArguments& arguments) {
@@ -119,7 +87,7 @@ std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
              "  locusctl save-map map.pcd");
   CLI::App* const show = app.add_subcommand("status", "What the service does and has counted");
   show->add_flag("--json", arguments.json, "For programs");
-  show->add_flag("--watch", arguments.watch, "Goes on until Ctrl-C");
+  show->add_flag("--watch", arguments.watch, "Goes on until q or Ctrl-C");
   show->callback([&] { action = [&] { status(arguments); }; });
   CLI::App* const flat = app.add_subcommand("flat-ground", "Whether the ground is taken to be level");
   flat->add_option("MODE", arguments.mode, "on, off or auto")->required()->check(CLI::IsMember({"on", "off", "auto"}));

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <sys/types.h>
+#include <termios.h>
+
+#include "core/stamp.hpp"
+
+namespace locus::test {
+
+/// A terminal of 24 rows and 80 columns with one program in it, and what somebody in front of it would see. Knows as
+/// much of the language of terminals as a page that is drawn over and over needs.
+class Terminal {
+ public:
+  static constexpr std::size_t kRows = 24, kColumns = 80;
+
+  explicit Terminal(std::vector<std::string> command);
+  ~Terminal();
+  Terminal(const Terminal&) = delete;
+  Terminal& operator=(const Terminal&) = delete;
+
+  void type(std::string_view keys) const;
+
+  /// Whether this comes true of the rows within `timeout`.
+  bool wait_until(Duration timeout, const std::function<bool()>& holds);
+  bool shows(const std::string& text, Duration timeout);
+  std::optional<int> wait_for_exit(Duration timeout);
+
+  [[nodiscard]] bool on_page_of_its_own() const { return on_page_of_its_own_; }
+  [[nodiscard]] bool cursor_is_shown() const { return cursor_is_shown_; }
+  /// Times that a page was begun at its top.
+  [[nodiscard]] int pages() const { return pages_; }
+  /// Letters beyond the right edge and lines beyond the bottom.
+  [[nodiscard]] int overflows() const { return overflows_; }
+  /// How keys are treated now.
+  [[nodiscard]] termios settings() const;
+
+ private:
+  void read_some(Duration timeout);
+  void take(char c);
+  void obey(const std::string& sequence);
+
+  int master_ = -1, slave_ = -1;
+  pid_t pid_ = 0;
+  std::optional<int> status_;
+  std::vector<std::string> rows_{kRows, std::string(kColumns, ' ')};
+  std::size_t row_ = 0, column_ = 0;
+  std::optional<std::string> escape_; ///< what has come of a sequence
+  bool on_page_of_its_own_ = false, cursor_is_shown_ = true;
+  int pages_ = 0, overflows_ = 0;
+};
+
+} // namespace locus::test

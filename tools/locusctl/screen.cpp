@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locusctl/screen.hpp"
+
+#include <csignal>
+#include <cstdio>
+#include <string>
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include "daemon/machine_time.hpp"
+#include "locus_replay/failure.hpp"
+
+namespace locus::tools {
+namespace {
+
+volatile std::sig_atomic_t interrupted = 0;
+
+struct Size {
+  std::size_t rows = 24, columns = 80;
+};
+
+Size size_of_terminal() {
+  winsize size{};
+  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_row == 0 || size.ws_col == 0)
+    return {};
+  return {size.ws_row, size.ws_col};
+}
+
+} // namespace
+
+Screen::Screen() {
+  if (isatty(STDOUT_FILENO) == 0)
+    throw Failure(ExitStatus::wrong_usage,
+                  "--watch draws on a terminal, and there is none; use status or status --json");
+  for (const int number : {SIGINT, SIGTERM, SIGHUP})
+    std::signal(number, [](int) { interrupted = 1; });
+  if (termios settings{}; tcgetattr(STDIN_FILENO, &settings) == 0) {
+    found_ = settings;
+    settings.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
+    settings.c_cc[VSUSP] = _POSIX_VDISABLE; // a shell in the middle of this page would be no use
+    tcsetattr(STDIN_FILENO, TCSANOW, &settings);
+  }
+  fmt::print("\x1b[?1049h\x1b[?25l");
+}
+
+Screen::~Screen() {
+  std::fputs("\x1b[?25h\x1b[?1049l", stdout);
+  std::fflush(stdout);
+  if (found_)
+    tcsetattr(STDIN_FILENO, TCSAFLUSH, &*found_);
+}
+
+void Screen::show(std::string_view text) {
+  const Size size = size_of_terminal();
+  std::string out = "\x1b[H";
+  for (std::size_t row = 0; row < size.rows && !text.empty(); ++row) {
+    const std::string_view line = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(text.size(), line.size() + 1));
+    out += row > 0 ? "\n" : "";
+    out += line.substr(0, size.columns);
+    out += line.size() < size.columns ? "\x1b[K" : ""; // it would wipe the last letter of a full line
+  }
+  fmt::print("{}\x1b[J", out);
+  std::fflush(stdout);
+}
+
+bool Screen::wait_for_end(Duration timeout) {
+  pollfd keys{found_ ? STDIN_FILENO : -1, POLLIN, 0};
+  const Duration end = daemon::read_clock(CLOCK_MONOTONIC) + timeout;
+  for (Duration now{}; interrupted == 0 && (now = daemon::read_clock(CLOCK_MONOTONIC)) < end;) {
+    const timespec wait = daemon::to_timespec(end - now);
+    if (ppoll(&keys, 1, &wait, nullptr) <= 0)
+      continue;
+    char key = 'q'; // a terminal that is gone ends it, too
+    if (read(STDIN_FILENO, &key, 1) <= 0 || key == 'q')
+      return true;
+  }
+  return interrupted != 0;
+}
+
+} // namespace locus::tools
