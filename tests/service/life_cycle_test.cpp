@@ -68,16 +68,6 @@ class LifeCycle : public RobotNetwork {
     Child play(undisturbed(options));
     EXPECT_EQ(play.wait_for_exit(seconds{60}), 0) << testing::PrintToString(play.lines());
   }
-
-  bool status_comes(const std::function<bool(const json&)>& holds, Duration timeout) const {
-    const auto give_up = std::chrono::steady_clock::now() + timeout;
-    while (std::chrono::steady_clock::now() < give_up) {
-      if (holds(status()))
-        return true;
-      std::this_thread::sleep_for(milliseconds{100});
-    }
-    return false;
-  }
 };
 
 TEST_F(LifeCycle, ConfigurationIsCheckedAndPrinted) {

@@ -2,10 +2,12 @@
 #include "service/robot_network.hpp"
 
 #include <array>
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <sstream>
+#include <thread>
 
 #include <net/if.h>
 #include <sched.h>
@@ -49,6 +51,16 @@ nlohmann::json RobotNetwork::status() const {
   const ProgramRun run = ctl({"status", "--json"});
   EXPECT_EQ(run.status, 0) << run.err;
   return nlohmann::json::parse(run.out, nullptr, false);
+}
+
+bool RobotNetwork::status_comes(const std::function<bool(const nlohmann::json&)>& holds, Duration timeout) const {
+  const auto give_up = std::chrono::steady_clock::now() + timeout;
+  while (std::chrono::steady_clock::now() < give_up) {
+    if (holds(status()))
+      return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds{100});
+  }
+  return false;
 }
 
 const std::filesystem::path& RobotNetwork::capture() {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,7 @@ class RobotNetwork : public testing::Test {
   /// What locusctl says; its control socket and its state lie in the folder of the test.
   [[nodiscard]] ProgramRun ctl(std::vector<std::string> words) const;
   [[nodiscard]] nlohmann::json status() const;
+  bool status_comes(const std::function<bool(const nlohmann::json&)>& holds, Duration timeout) const;
 
  private:
   TemporaryFolder folder_;
