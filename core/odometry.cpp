@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/motion_sources.hpp"
+#include "core/relocation.hpp"
 #include "core/twist_correction.hpp"
 
 namespace locus {
@@ -110,7 +111,7 @@ Odometry::Odometry(const OdometryOptions& options, StageClock* clock)
 
 OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested& stop) {
   if (processed_ == 0)
-    return begin(sweep, stop);
+    return begin(sweep);
   const Prior prior = integrate_sensors(sweep);
   gravity_.observe(prior.T_last_now.rotation, sweep);
   flat_ground_.observe(sweep.end, gravity_.up_base());
@@ -146,24 +147,27 @@ void Odometry::begin_at(const Pose& T_odom_base, std::span<const SurfacePoint> m
 }
 
 /// The world begins at the first sweep: where it is told to, or at its origin, without yaw, level if gravity is known.
-OdometryEstimate Odometry::begin(const Sweep& sweep, const Gicp::StopRequested& stop) {
+OdometryEstimate Odometry::begin(const Sweep& sweep) {
   correct_all(sweep.points, Vector6::Zero(), Duration::zero(), scan_);
   registered_ = sweep.registered;
   gravity_.observe(Eigen::Quaterniond::Identity(), sweep);
   if (T_odom_start_)
     T_odom_last_ = *T_odom_start_;
   if (knows_start_ && scan_.size() >= kMinPoints) {
-    const std::optional<Registration> found = find_again(stop);
-    resumed_ = found.has_value();
+    const StageScope scope(clock_, Stage::scan_to_submap);
+    const std::optional<Pose> T_odom_found =
+        relocate(gicp_, registered(), map_, *T_odom_start_, options_.scan_to_submap);
+    resumed_ = T_odom_found.has_value();
     knows_start_ = false;
-    if (found)
-      T_odom_last_ = found->T_target_source;
-    else
+    T_odom_last_ = T_odom_found.value_or(Pose{});
+    if (!resumed_) {
       T_odom_start_.reset();
+      map_.clear();
+    }
   }
   if (const auto up_base = gravity_.up_base(); up_base && !T_odom_start_)
     T_odom_last_.rotation = from_rpy_rad(level_rpy_rad(*up_base));
-  if (sweep.uncorrected != Uncorrected::nothing)
+  if (sweep.uncorrected != Uncorrected::nothing && !resumed_)
     first_points_ = sweep.points;
   OdometryEstimate estimate;
   estimate.T_odom_base = T_odom_last_;
@@ -172,21 +176,6 @@ OdometryEstimate Odometry::begin(const Sweep& sweep, const Gicp::StopRequested& 
   if (estimate.failed)
     processed_ = 0; // nothing was seen yet: the next sweep is the first
   return estimate;
-}
-
-/// The first sweep in the map that it is to begin with; without it the map is cleared.
-std::optional<Registration> Odometry::find_again(const Gicp::StopRequested& stop) {
-  constexpr double kLeastInlierShare = 0.6, kFarthest_m = 0.5;
-  const StageScope scope(clock_, Stage::scan_to_submap);
-  const PosePrior prior{T_odom_last_, sigma(kFarthest_m, 5.0).cwiseAbs2().cwiseInverse().asDiagonal()};
-  const Registration found = gicp_.align(registered(), map_, T_odom_last_, prior, options_.scan_to_submap, true, stop);
-  const Eigen::Vector3d moved_m = found.T_target_source.translation - T_odom_last_.translation;
-  if (found.iterations > 0 && found.T_target_source.finite() && moved_m.norm() < kFarthest_m &&
-      static_cast<double>(found.inliers) >= kLeastInlierShare * static_cast<double>(registered_))
-    return found;
-  map_.clear();
-  T_odom_last_ = {};
-  return std::nullopt;
 }
 
 Odometry::Prior Odometry::integrate_sensors(const Sweep& sweep) const {

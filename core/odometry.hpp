@@ -66,8 +66,7 @@ class Odometry {
     bool blind = false; ///< nothing at all is known yet, not even a velocity
   };
 
-  OdometryEstimate begin(const Sweep& sweep, const Gicp::StopRequested& stop);
-  [[nodiscard]] std::optional<Registration> find_again(const Gicp::StopRequested& stop);
+  OdometryEstimate begin(const Sweep& sweep);
   [[nodiscard]] Prior integrate_sensors(const Sweep& sweep) const;
   [[nodiscard]] std::optional<Pose> step(const Sweep& sweep, std::size_t source) const;
   void correct_motion(const Sweep& sweep, const Pose& T_last_now);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstddef>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
@@ -23,24 +24,40 @@ namespace {
 
 constexpr double kInSight_m = 60.0;
 
+constexpr std::array<char, 8> kMagic{'l', 'o', 'c', 'u', 's', 'd', ' ', '2'};
+
 /// What the file begins with, as the machine holds it: it is read where it was written.
-struct Header {
+struct Head {
   std::array<char, 8> magic;
   std::int64_t stamp_ns;
+  std::array<double, 7> xyz_xyzw;
+  std::array<double, 6> twist;
+  std::uint64_t checksum; ///< of what stands above
+};
+
+/// What follows, and is followed by the points.
+struct Body {
   std::int32_t flat_ground;
   std::uint32_t points;
-  std::array<double, 7> xyz_xyzw;
-  std::uint64_t checksum; ///< of the rest, with zero here
+  std::uint64_t checksum; ///< of what stands above, and of the points
 };
-constexpr std::array<char, 8> kMagic{'l', 'o', 'c', 'u', 's', 'd', ' ', '1'};
-static_assert(std::is_trivially_copyable_v<Header> && sizeof(SurfacePoint) == 6 * sizeof(float));
+static_assert(std::has_unique_object_representations_v<Body> && sizeof(SurfacePoint) == 6 * sizeof(float));
+
+template <class Block> std::string_view bytes_of(const Block& block) {
+  return {reinterpret_cast<const char*>(&block), sizeof(block)};
+}
 
 /// FNV-1a: a file cut short or mixed up is to be noticed, not a forged one.
-std::uint64_t checksum_of(const std::string& bytes) {
-  std::uint64_t hash = 0xcbf29ce484222325U;
+std::uint64_t checksum_of(std::string_view bytes, std::uint64_t hash = 0xcbf29ce484222325U) {
   for (const char byte : bytes)
     hash = (hash ^ static_cast<unsigned char>(byte)) * 0x100000001b3U;
   return hash;
+}
+
+std::uint64_t checksum_of(const Head& head) { return checksum_of(bytes_of(head).substr(0, offsetof(Head, checksum))); }
+
+std::uint64_t checksum_of(const Body& body, std::string_view points) {
+  return checksum_of(points, checksum_of(bytes_of(body).substr(0, offsetof(Body, checksum))));
 }
 
 /// A disk that is full takes part of what is written, and says why only when it is asked for the rest.
@@ -54,37 +71,66 @@ bool write_all(int descriptor, std::string_view bytes) {
   return true;
 }
 
+Head head_of(const Whereabouts& last) {
+  Head head{kMagic, to_ns(last.stamp), {}, {}, 0};
+  const auto& p = last.T_odom_base.translation;
+  const auto& q = last.T_odom_base.rotation;
+  head.xyz_xyzw = {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
+  Eigen::Map<Vector6>(head.twist.data()) = last.twist_base;
+  head.checksum = checksum_of(head);
+  return head;
+}
+
 std::string to_bytes(const SavedState& state) {
-  const Pose& T = state.start.T_odom_base;
-  const auto& p = T.translation;
-  const auto& q = T.rotation;
-  Header header{kMagic,
-                to_ns(state.stamp),
-                static_cast<std::int32_t>(state.flat_ground),
-                static_cast<std::uint32_t>(state.start.map_odom.size()),
-                {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()},
-                0};
-  std::string bytes(sizeof(header) + state.start.map_odom.size() * sizeof(SurfacePoint), '\0');
-  std::memcpy(bytes.data(), &header, sizeof(header));
-  if (header.points > 0) // NOLINTNEXTLINE(bugprone-undefined-memory-manipulation): six floats, but for Eigen's word
-    std::memcpy(bytes.data() + sizeof(header), state.start.map_odom.data(), bytes.size() - sizeof(header));
-  header.checksum = checksum_of(bytes);
-  std::memcpy(bytes.data(), &header, sizeof(header));
-  return bytes;
+  const Head head = head_of(state.last);
+  Body body{static_cast<std::int32_t>(state.flat_ground), static_cast<std::uint32_t>(state.map_odom.size()), 0};
+  const auto points = std::as_bytes(std::span(state.map_odom));
+  const std::string_view text{reinterpret_cast<const char*>(points.data()), points.size()};
+  body.checksum = checksum_of(body, text);
+  return std::string{bytes_of(head)}.append(bytes_of(body)).append(text);
+}
+
+/// Nothing if it is cut short or damaged.
+std::optional<SavedState> from_bytes(std::string_view bytes) {
+  Head head{};
+  Body body{};
+  if (bytes.size() < sizeof(head) + sizeof(body))
+    return std::nullopt;
+  std::memcpy(&head, bytes.data(), sizeof(head));
+  std::memcpy(&body, bytes.data() + sizeof(head), sizeof(body));
+  const std::string_view points = bytes.substr(sizeof(head) + sizeof(body));
+  if (head.magic != kMagic || head.checksum != checksum_of(head) || body.checksum != checksum_of(body, points) ||
+      points.size() != body.points * sizeof(SurfacePoint) || body.flat_ground < 0 ||
+      body.flat_ground > static_cast<std::int32_t>(FlatGround::automatic))
+    return std::nullopt;
+  SavedState state;
+  const auto& v = head.xyz_xyzw;
+  state.last.stamp = stamp_from_ns(head.stamp_ns);
+  state.last.T_odom_base = {Eigen::Quaterniond(v[6], v[3], v[4], v[5]).normalized(), {v[0], v[1], v[2]}};
+  state.last.twist_base = Eigen::Map<const Vector6>(head.twist.data());
+  state.flat_ground = static_cast<FlatGround>(body.flat_ground);
+  state.map_odom.resize(body.points);
+  if (body.points > 0)
+    std::memcpy(std::as_writable_bytes(std::span(state.map_odom)).data(), points.data(), points.size());
+  return state;
 }
 
 } // namespace
 
+Pose Whereabouts::carried_to(Stamp now) const {
+  constexpr Duration kMoment = std::chrono::seconds{2};
+  return T_odom_base * se3_exp(to_seconds(std::clamp(now - stamp, Duration::zero(), kMoment)) * twist_base);
+}
+
 void read_state(const Odometry& odometry, const OdometryEstimate& estimate, SavedState& state) {
-  state.stamp = estimate.stamp;
-  state.start.T_odom_base = estimate.T_odom_base;
-  state.start.map_odom.clear();
+  state.last = Whereabouts(estimate);
+  state.map_odom.clear();
   const SurfaceGrid& grid = odometry.map().fine();
   for (std::size_t slot = 0; slot < grid.size(); ++slot) {
     const Surface& surface = grid.surface(slot);
     const Eigen::Vector3d point = grid.centre(slot) + surface.mean_m.cast<double>();
     if (surface.planar() && (point - estimate.T_odom_base.translation).norm() < kInSight_m)
-      state.start.map_odom.push_back({point.cast<float>(), surface.normal});
+      state.map_odom.push_back({point.cast<float>(), surface.normal});
   }
 }
 
@@ -108,28 +154,20 @@ Expected<SavedState, std::string> load_state(const std::filesystem::path& file) 
   std::ifstream stream{file, std::ios::binary};
   if (!stream)
     return fmt::format("{}: there is none", file.string());
-  std::string bytes{std::istreambuf_iterator<char>{stream}, {}};
-  Header header{};
-  const auto broken = [&] { return fmt::format("{}: is cut short or damaged", file.string()); };
-  if (bytes.size() < sizeof(header))
-    return broken();
-  std::memcpy(&header, bytes.data(), sizeof(header));
-  const std::uint64_t checksum = std::exchange(header.checksum, 0);
-  std::memcpy(bytes.data(), &header, sizeof(header));
-  if (header.magic != kMagic || bytes.size() != sizeof(header) + header.points * sizeof(SurfacePoint) ||
-      checksum != checksum_of(bytes) || header.flat_ground < 0 ||
-      header.flat_ground > static_cast<std::int32_t>(FlatGround::automatic))
-    return broken();
-  SavedState state;
-  state.stamp = stamp_from_ns(header.stamp_ns);
-  state.flat_ground = static_cast<FlatGround>(header.flat_ground);
-  const auto& v = header.xyz_xyzw;
-  state.start.T_odom_base = {Eigen::Quaterniond(v[6], v[3], v[4], v[5]).normalized(), {v[0], v[1], v[2]}};
-  state.start.map_odom.resize(header.points);
-  if (header.points > 0)
-    std::memcpy(std::as_writable_bytes(std::span(state.start.map_odom)).data(), bytes.data() + sizeof(header),
-                header.points * sizeof(SurfacePoint));
-  return state;
+  const std::string bytes{std::istreambuf_iterator<char>{stream}, {}};
+  std::optional<SavedState> state = from_bytes(bytes);
+  if (!state)
+    return fmt::format("{}: is cut short or damaged", file.string());
+  return std::move(*state);
+}
+
+void update_whereabouts(const std::filesystem::path& file, const Whereabouts& last) {
+  const Head head = head_of(last);
+  const int descriptor = open(file.c_str(), O_WRONLY | O_CLOEXEC);
+  if (descriptor < 0)
+    return;
+  static_cast<void>(write_all(descriptor, bytes_of(head)));
+  close(descriptor);
 }
 
 std::optional<std::filesystem::path> state_path() {
@@ -152,26 +190,39 @@ StateKeeper::~StateKeeper() {
     thread_.join();
 }
 
+bool StateKeeper::is_due(const OdometryEstimate& estimate) const {
+  return !last_ || estimate.stamp - last_->stamp > kEvery ||
+         (estimate.T_odom_base.translation - last_->T_odom_base.translation).norm() > kEvery_m;
+}
+
 void StateKeeper::take(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground) {
-  const bool due = !last_ || estimate.stamp - last_->stamp > kEvery ||
-                   (estimate.T_odom_base.translation - last_->T_odom_base.translation).norm() > kEvery_m;
-  if (!file_ || estimate.failed || !due)
+  if (!file_ || (!last_ && estimate.failed))
     return;
-  last_ = estimate;
-  read_state(odometry, estimate, slot_.back());
-  slot_.back().flat_ground = flat_ground;
-  static_cast<void>(slot_.publish()); // an older one that was not written yet is worth nothing any more
+  if (!estimate.failed && is_due(estimate)) {
+    last_ = Whereabouts(estimate);
+    read_state(odometry, estimate, states_.back());
+    states_.back().flat_ground = flat_ground;
+    static_cast<void>(states_.publish()); // an older one that was not written yet is worth nothing any more
+  }
+  whereabouts_.back() = Whereabouts(estimate);
+  static_cast<void>(whereabouts_.publish());
   wakeup_.notify();
 }
 
+/// The whereabouts are taken first: a map that belongs to them is then there, or has been written.
 void StateKeeper::run() {
+  Stamp written = Stamp::max(); ///< of the map that lies in the file
   while (!stopping_.load(std::memory_order_relaxed)) {
     wakeup_.wait_for(std::chrono::milliseconds{500});
-    const SavedState* state = slot_.take();
-    if (state == nullptr)
-      continue;
-    if (const auto problem = write_state(*file_, *state))
-      complain_(*problem);
+    const Whereabouts* const last = whereabouts_.take();
+    if (const SavedState* const state = states_.take()) {
+      const auto problem = write_state(*file_, *state);
+      written = problem ? Stamp::max() : state->last.stamp;
+      if (problem)
+        complain_(*problem);
+    }
+    if (last != nullptr && last->stamp > written)
+      update_whereabouts(*file_, *last);
   }
 }
 

@@ -17,11 +17,25 @@
 
 namespace locus::daemon {
 
+/// Where the robot was last, and how it moved.
+struct Whereabouts {
+  Stamp stamp; ///< of the estimate
+  Pose T_odom_base;
+  Vector6 twist_base = Vector6::Zero();
+
+  Whereabouts() = default;
+  explicit Whereabouts(const OdometryEstimate& estimate)
+      : stamp(estimate.stamp), T_odom_base(estimate.T_odom_base), twist_base(estimate.twist_base) {}
+
+  /// Where it is at `now` if it goes on as before, which for more than a moment it does not.
+  [[nodiscard]] Pose carried_to(Stamp now) const;
+};
+
 /// What a service must know to go on where another one ended: where the robot is, and what is to be seen from there.
 struct SavedState {
-  Stamp stamp; ///< of the estimate
+  Whereabouts last;
   FlatGround flat_ground = FlatGround::off;
-  StartPoint start;
+  std::vector<SurfacePoint> map_odom;
 };
 
 /// The state as it is after an estimate: the surfaces within sight.
@@ -32,10 +46,15 @@ void read_state(const Odometry& odometry, const OdometryEstimate& estimate, Save
 std::optional<std::string> write_state(const std::filesystem::path& file, const SavedState& state);
 Expected<SavedState, std::string> load_state(const std::filesystem::path& file);
 
+/// In a file that holds the map of the same odom frame. It is for a crash of the service, not of the machine: it does
+/// not wait for the disk, and whether it fails shows with the next state.
+void update_whereabouts(const std::filesystem::path& file, const Whereabouts& last);
+
 /// $STATE_DIRECTORY/state as systemd sets it; nothing without, and then no state is kept.
 std::optional<std::filesystem::path> state_path();
 
-/// Writes the state now and then, from a thread of its own.
+/// Writes the state now and then, and the whereabouts after every estimate, from a thread of its own. The map is worth
+/// its cost once in many metres; who crashed while driving is elsewhere a second later.
 class StateKeeper {
  public:
   static constexpr Duration kEvery = std::chrono::seconds{30};
@@ -51,16 +70,18 @@ class StateKeeper {
   /// Producer, one thread: after every estimate.
   void take(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground);
 
-  /// Producer: what was written is no longer true; the next estimate is written at once.
+  /// Producer: what was written is no longer true; the next state is written at once.
   void begin_anew() { last_.reset(); }
 
  private:
   void run();
+  [[nodiscard]] bool is_due(const OdometryEstimate& estimate) const;
 
   std::optional<std::filesystem::path> file_;
   Complain complain_;
-  LatestSlot<SavedState> slot_;
-  std::optional<OdometryEstimate> last_; ///< that was taken; of the producer
+  LatestSlot<SavedState> states_;
+  LatestSlot<Whereabouts> whereabouts_;
+  std::optional<Whereabouts> last_; ///< of the state that was taken last; of the producer
   Wakeup wakeup_;
   std::atomic<bool> stopping_{false};
   std::thread thread_;

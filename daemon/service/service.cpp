@@ -97,7 +97,7 @@ std::optional<SavedState> Service::recent_state() {
     log_.warn(fmt::format("a fresh start: {}", state.error()));
     return std::nullopt;
   }
-  const Duration age = Stamp{read_clock(CLOCK_REALTIME)} - state->stamp;
+  const Duration age = Stamp{read_clock(CLOCK_REALTIME)} - state->last.stamp;
   if (age < Duration::zero() || age > kOldest) {
     log_.info(fmt::format("a fresh start: the saved state is {:.0f} s old, more than {:.0f} s", to_seconds(age),
                           to_seconds(kOldest)));

@@ -49,7 +49,10 @@ Session::Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket
       link_(config, [this](const RosInput& input) { receive(input); }), clouds_(config.dds, link_),
       state_(state_path(), [this](const std::string& problem) { log_.error(problem); }) {
   tells_resumed_ = state.has_value(); // NOLINT(cppcoreguidelines-prefer-member-initializer): stands after its like
-  begin(std::move(lidars), state ? std::optional{std::move(state->start)} : std::nullopt);
+  std::optional<StartPoint> start;
+  if (state)
+    start = {state->last.carried_to(Stamp{read_clock(CLOCK_REALTIME)}), std::move(state->map_odom)};
+  begin(std::move(lidars), std::move(start));
 }
 
 Session::~Session() { end(); }

@@ -14,7 +14,6 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include "replay/synthetic_robot.hpp"
 #include "service/robot_network.hpp"
 #include "service/undisturbed.hpp"
 
@@ -153,44 +152,32 @@ TEST_F(LifeCycle, CablePullIsBridgedByDeadReckoning) {
   EXPECT_EQ(states[185], "0") << "it tracks again before the end";
 }
 
-/// At walking pace of a toddler: the state is resumed if the robot is within half a metre of where it was.
-TEST_F(LifeCycle, RestartInMidDriveGoesOnWhereItWas) {
-  const TemporaryFolder slow;
-  write_room_drive(slow.path(), seconds{15}, 1, 0.2);
-  const std::filesystem::path file = config();
+/// In a plant. After a crash nothing but the whereabouts of the last sweep tells how far it came since the map was
+/// saved.
+TEST_F(LifeCycle, StoppedAndKilledInMidDriveItGoesOnWhereTheRobotIs) {
+  const std::filesystem::path drive = plant(), file = drive / "config.yaml";
   auto daemon = std::make_unique<Child>(undisturbed(locusd(file)));
+  Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
   ASSERT_TRUE(daemon->wait_for_line("DDS is up", seconds{10}));
-  Child play(undisturbed({LOCUS_PLAY, slow.path().string()}));
+  Child play(undisturbed({LOCUS_PLAY, drive.string()}));
   ASSERT_TRUE(daemon->wait_for_line("tracking", seconds{10}));
-  std::this_thread::sleep_for(seconds{5});
-  const json before = status();
-  daemon->signal(SIGTERM);
-  ASSERT_EQ(daemon->wait_for_exit(seconds{1}), 0);
-  daemon = std::make_unique<Child>(undisturbed(locusd(file)));
-  EXPECT_TRUE(daemon->wait_for_line("resumed where the service ended", seconds{5}))
-      << testing::PrintToString(daemon->lines());
-  const auto at = [](const json& status, std::size_t axis) { return status["pose"]["xyz_m"][axis].get<double>(); };
-  const json after = status();
-  EXPECT_GT(std::hypot(at(before, 0), at(before, 1)), 0.4);
-  EXPECT_LT(std::hypot(at(after, 0) - at(before, 0), at(after, 1) - at(before, 1)), 0.6) << "a few seconds at 0.2 m/s";
-}
+  for (const int end : {SIGTERM, SIGKILL}) {
+    std::this_thread::sleep_for(seconds{4});
+    daemon->signal(end);
+    ASSERT_TRUE(daemon->wait_for_exit(seconds{1}));
+    std::this_thread::sleep_for(milliseconds{500}); // as RestartSec= has it
+    daemon = std::make_unique<Child>(undisturbed(locusd(file)));
+    EXPECT_TRUE(daemon->wait_for_line("resumed where the service ended", seconds{5}))
+        << testing::PrintToString(daemon->lines());
+  }
+  ASSERT_EQ(play.wait_for_exit(seconds{30}), 0);
 
-TEST_F(LifeCycle, KilledInMidDriveItComesBackAndSaysHow) {
-  const std::filesystem::path file = config();
-  auto daemon = std::make_unique<Child>(undisturbed(locusd(file)));
-  ASSERT_TRUE(daemon->wait_for_line("DDS is up", seconds{10}));
-  Child play(undisturbed({LOCUS_PLAY, capture().string()}));
-  ASSERT_TRUE(daemon->wait_for_line("tracking", seconds{10}));
-  std::this_thread::sleep_for(seconds{4});
-  daemon->signal(SIGKILL);
-  ASSERT_EQ(daemon->wait_for_exit(seconds{1}), 128 + SIGKILL);
-  daemon = std::make_unique<Child>(undisturbed(locusd(file)));
-  EXPECT_TRUE(daemon->wait_until(seconds{5}, [](const std::vector<std::string>& lines) {
-    return std::ranges::any_of(lines, [](const std::string& line) {
-      return line.find("resumed where") != std::string::npos || line.find("a fresh start") != std::string::npos;
-    });
-  })) << testing::PrintToString(daemon->lines());
-  EXPECT_TRUE(status_comes([](const json& s) { return s["state"] == "tracking"; }, seconds{5}));
+  const Replay replay({"--quiet", drive.string()});
+  const std::vector<HeardPose> poses = heard(listener);
+  ASSERT_GT(poses.size(), 120U);
+  const double error_m = worst_distance_m(replay.trajectory(), poses, shift_of(play));
+  RecordProperty("worst_um", static_cast<int>(1e6 * error_m));
+  EXPECT_LT(error_m, 0.1);
 }
 
 TEST_F(LifeCycle, DamagedStateIsAFreshStart) {

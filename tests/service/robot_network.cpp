@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "service/robot_network.hpp"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdlib>
@@ -70,10 +71,41 @@ const std::filesystem::path& RobotNetwork::capture() {
   return folder.path();
 }
 
+std::filesystem::path RobotNetwork::plant() const {
+  std::filesystem::path folder = file("plant");
+  const ProgramRun run = run_program(
+      LOCUS_SIM, {"--world", "urban", "--robot", "husky", "--duration", "20", "--seed", "3", "-o", folder.string()});
+  EXPECT_EQ(run.status, 0) << run.err;
+  return folder;
+}
+
 std::filesystem::path RobotNetwork::config(const std::string& more) const {
   std::filesystem::path path = file("locusd.yaml");
   std::ofstream{path} << read_text(capture() / "config.yaml") << more;
   return path;
+}
+
+Duration shift_of(const Child& play) {
+  for (const std::string& line : play.lines())
+    if (const std::size_t at = line.find("shifted by "); at != std::string::npos)
+      return Duration{std::stoll(line.substr(at + 11))};
+  ADD_FAILURE() << testing::PrintToString(play.lines());
+  return {};
+}
+
+double worst_distance_m(const std::vector<StampedPose>& expected, const std::vector<HeardPose>& heard, Duration shift) {
+  double worst_m = 0;
+  for (const HeardPose& pose : heard) {
+    const Stamp stamp = pose.stamp - shift;
+    const auto after = std::ranges::upper_bound(expected, stamp, {}, &StampedPose::stamp);
+    if (after == expected.begin() || after == expected.end())
+      continue;
+    const StampedPose& before = *std::prev(after);
+    const double share = to_seconds(stamp - before.stamp) / to_seconds(after->stamp - before.stamp);
+    const Pose T_odom_base = interpolate(before.T_source_base, after->T_source_base, share);
+    worst_m = std::max(worst_m, (T_odom_base.translation - pose.T_odom_base.translation).norm());
+  }
+  return worst_m;
 }
 
 std::vector<HeardPose> heard(const Child& peer, const std::string& topic) {

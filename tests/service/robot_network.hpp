@@ -22,6 +22,10 @@ class RobotNetwork : public testing::Test {
   /// What a robot brings back from 20 s, with odometry and IMU; made once for all tests of a process.
   static const std::filesystem::path& capture();
 
+  /// A drive of locus-sim, whose lidar is locked to PPS: how late this machine wakes up who plays it is not seen in the
+  /// stamps.
+  [[nodiscard]] std::filesystem::path plant() const;
+
   [[nodiscard]] std::filesystem::path file(const std::string& name) const { return folder_ / name; }
   /// Of the capture, with more lines of YAML.
   [[nodiscard]] std::filesystem::path config(const std::string& more = "") const;
@@ -46,5 +50,11 @@ struct HeardPose {
   Stamp heard;
 };
 std::vector<HeardPose> heard(const Child& peer, const std::string& topic = "odometry");
+
+/// By what locus-play, which has come to its end, moved all stamps.
+Duration shift_of(const Child& play);
+
+/// How far the poses are from where they were expected at their stamps, less the shift.
+double worst_distance_m(const std::vector<StampedPose>& expected, const std::vector<HeardPose>& heard, Duration shift);
 
 } // namespace locus::test

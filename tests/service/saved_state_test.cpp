@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/service/saved_state.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <fstream>
+#include <thread>
+
+#include "replay/replay_run.hpp"
+
+namespace locus::daemon {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+/// A keeper that is told of a robot; the mode of the ground, which is part of the state and not of the whereabouts,
+/// tells when the state was written last.
+class Keeper : public testing::Test {
+ protected:
+  void take(Duration after_start, double x_m, FlatGround mode, bool failed = false) {
+    OdometryEstimate estimate;
+    estimate.stamp = stamp_from_ns(1'700'000'000'000'000'000) + after_start;
+    estimate.T_odom_base.translation.x() = x_m;
+    estimate.twist_base[0] = 1.5;
+    estimate.failed = failed;
+    keeper_.take(odometry_, estimate, mode);
+  }
+
+  /// Whether the file comes to say so.
+  [[nodiscard]] bool says(double x_m, FlatGround mode) const {
+    for (int look = 0; look < 500; ++look) {
+      if (const auto state = load_state(file_);
+          state && state->last.T_odom_base.translation.x() == x_m && state->flat_ground == mode)
+        return true;
+      std::this_thread::sleep_for(milliseconds{10});
+    }
+    return false;
+  }
+
+  test::TemporaryFolder folder_;
+  std::filesystem::path file_ = folder_ / "state";
+  Odometry odometry_{OdometryOptions{}};
+  StateKeeper keeper_{file_, [](const std::string& problem) { ADD_FAILURE() << problem; }};
+};
+
+TEST_F(Keeper, WritesTheMapEveryThirtySecondsOrTenMetresAndTheWhereaboutsAlways) {
+  take(seconds{0}, 0, FlatGround::off, true);
+  EXPECT_FALSE(std::filesystem::exists(file_)) << "nothing was seen yet";
+  take(seconds{1}, 1, FlatGround::off);
+  EXPECT_TRUE(says(1, FlatGround::off));
+  take(seconds{2}, 10.5, FlatGround::on);
+  EXPECT_TRUE(says(10.5, FlatGround::off));
+  take(seconds{3}, 11.5, FlatGround::on);
+  EXPECT_TRUE(says(11.5, FlatGround::on)) << "ten metres on";
+  take(seconds{32}, 12, FlatGround::automatic);
+  EXPECT_TRUE(says(12, FlatGround::on));
+  take(seconds{34}, 12.5, FlatGround::automatic);
+  EXPECT_TRUE(says(12.5, FlatGround::automatic)) << "thirty seconds later";
+  keeper_.begin_anew();
+  take(seconds{35}, 0, FlatGround::off);
+  EXPECT_TRUE(says(0, FlatGround::off)) << "at once";
+}
+
+TEST_F(Keeper, RobotThatDrivesIsCarriedOnForAMoment) {
+  take(seconds{0}, 3, FlatGround::off);
+  ASSERT_TRUE(says(3, FlatGround::off));
+  const Whereabouts last = load_state(file_)->last;
+  const auto x_m = [&](Duration later) { return last.carried_to(last.stamp + later).translation.x(); };
+  EXPECT_NEAR(x_m(seconds{1}), 4.5, 1e-9);
+  EXPECT_NEAR(x_m(seconds{60}), 6, 1e-9);
+  EXPECT_NEAR(x_m(-seconds{1}), 3, 1e-9) << "clocks are set";
+}
+
+TEST_F(Keeper, EveryDamagedByteIsNoticed) {
+  SavedState state;
+  state.map_odom.resize(3, {Eigen::Vector3f::Ones(), Eigen::Vector3f::UnitZ()});
+  ASSERT_FALSE(write_state(file_, state));
+  ASSERT_TRUE(load_state(file_));
+  const std::string whole = test::read_text(file_);
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    std::string damaged = whole;
+    damaged[i] = static_cast<char>(damaged[i] ^ 4);
+    std::ofstream{file_} << damaged;
+    EXPECT_FALSE(load_state(file_)) << i;
+    std::ofstream{file_} << whole.substr(0, i);
+    EXPECT_FALSE(load_state(file_)) << i;
+  }
+}
+
+} // namespace
+} // namespace locus::daemon
