@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <csignal>
+#include <ctime>
 #include <fstream>
 #include <map>
 #include <memory>
@@ -9,6 +10,8 @@
 
 #include <sched.h>
 
+#include "daemon/machine_time.hpp"
+#include "drivers/capture.hpp"
 #include "replay/synthetic_robot.hpp"
 #include "service/robot_network.hpp"
 #include "service/undisturbed.hpp"
@@ -47,11 +50,13 @@ bool add_up(const json& sweeps) {
          sweeps["processed"].get<int>() + sweeps["dropped"].get<int>() + sweeps["failed"].get<int>();
 }
 
-double median_ms(std::vector<Duration> values) {
+Duration median(std::vector<Duration> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
-  return 1e3 * to_seconds(*middle);
+  return *middle;
 }
+
+double milliseconds_of(Duration duration) { return 1e3 * to_seconds(duration); }
 
 TEST_F(RealTime, PriorityIsThatOfIngestOdometryAndItsHelpers) {
   Child daemon(locusd(config("realtime: {priority: 7}\nthreads: 2\n")));
@@ -74,26 +79,48 @@ TEST_F(RealTime, WishesThatAreNotGrantedAreSaidAndCostNothing) {
   EXPECT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
 }
 
-/// From the instant that an estimate speaks of to a subscriber's hands. The sweep is closed by the packet after that
-/// instant, which the lidar sends when it has fired it: up to 1.33 ms later, and as much to its end.
+/// When the packets of the drive were fired to their ends, which is when a lidar sends them.
+std::vector<Stamp> sent_packets(const std::filesystem::path& folder) {
+  std::vector<Stamp> sent;
+  auto capture = Capture::open(folder / "lidar.pcap");
+  while (const Datagram* const datagram = capture->next())
+    if (datagram->destination_port == 2368)
+      sent.push_back(datagram->receive_stamp);
+  return sent;
+}
+
+/// From the packet that closes a sweep, the first that reaches beyond it, to a subscriber's hands. Of ten stretches
+/// of the drive the middle one counts: on a machine that others use a bad second is none of ours.
 TEST_F(RealTime, EstimateIsInTheSubscribersHandsAMomentAfterItsSweep) {
   Child daemon(undisturbed(locusd(config())));
   Child listener(undisturbed({FAST_DDS_PEER, "0", "listen", "/locus"}));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
   std::this_thread::sleep_for(seconds{1});
-  play(capture());
+  Child lidar(undisturbed({LOCUS_PLAY, capture().string()}));
+  ASSERT_EQ(lidar.wait_for_exit(seconds{60}), 0) << testing::PrintToString(lidar.lines());
+
+  constexpr Duration kJitter = std::chrono::microseconds{100}; // of arrivals, by which the sensor's clock is set
+  const std::vector<Stamp> sent = sent_packets(capture());
+  const Duration shift = shift_of(lidar);
   std::vector<Duration> latencies;
-  for (const HeardPose& pose : heard(listener))
-    latencies.push_back(pose.heard - pose.stamp);
-  ASSERT_GT(latencies.size(), 150U);
-  latencies.resize(150); // the lidar's; at the end windows close in silence
-  const json process_ms = status()["process_ms"];
+  for (const HeardPose& pose : heard(listener)) {
+    const auto closing = std::ranges::lower_bound(sent, pose.stamp - shift - kJitter);
+    if (closing != sent.end())
+      latencies.push_back(pose.heard - (*closing + shift));
+  }
+  constexpr std::size_t kStretches = 10, kSweeps = 15;
+  ASSERT_GE(latencies.size(), kStretches * kSweeps);
+  std::vector<Duration> medians;
+  for (std::size_t i = 0; i < kStretches; ++i) {
+    const auto begin = latencies.begin() + static_cast<std::ptrdiff_t>(i * kSweeps);
+    medians.push_back(median({begin, begin + kSweeps}));
+  }
+  const double process_ms = status()["process_ms"]["p50"].get<double>();
   std::ranges::sort(latencies);
-  RecordProperty("latency_p50_us", static_cast<int>(1e3 * median_ms(latencies)));
-  RecordProperty("latency_p99_us", static_cast<int>(1e6 * to_seconds(latencies[148])));
-  RecordProperty("process_p50_us", static_cast<int>(1e3 * process_ms["p50"].get<double>()));
-  constexpr double kUntilThePacketCloses_ms = 2.66, kOnTheWay_ms = 1.5;
-  EXPECT_LT(median_ms(latencies), process_ms["p50"].get<double>() + kUntilThePacketCloses_ms + kOnTheWay_ms);
+  RecordProperty("latency_p50_us", static_cast<int>(1e3 * milliseconds_of(median(medians))));
+  RecordProperty("latency_p99_us", static_cast<int>(1e3 * milliseconds_of(latencies[latencies.size() * 99 / 100])));
+  RecordProperty("process_p50_us", static_cast<int>(1e3 * process_ms));
+  EXPECT_LT(milliseconds_of(median(medians)), process_ms + 1.5);
 }
 
 TEST_F(RealTime, TwoLidarsImuAndOdometryOnOneCore) {
@@ -115,6 +142,35 @@ TEST_F(RealTime, TwoLidarsImuAndOdometryOnOneCore) {
   EXPECT_LT(share, 0.3);
 }
 
+/// The worst of overloads: for a second and a half nothing is processed at all, while packets wait in the kernel. Two
+/// sweeps later every single one is processed again, when it is new.
+TEST_F(RealTime, StallIsForgottenTwoSweepsAfterIt) {
+  Child daemon(undisturbed(locusd(config())));
+  Child listener(undisturbed({CYCLONE_PEER, "0", "listen", "/locus"}));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  Child lidar(undisturbed({LOCUS_PLAY, capture().string()}));
+  ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+  std::this_thread::sleep_for(seconds{2});
+  daemon.signal(SIGSTOP);
+  std::this_thread::sleep_for(milliseconds{1500});
+  daemon.signal(SIGCONT);
+  const Stamp two_sweeps_later{daemon::read_clock(CLOCK_REALTIME) + milliseconds{200}};
+  std::this_thread::sleep_for(seconds{3});
+  std::vector<HeardPose> poses = heard(listener);
+  std::erase_if(poses, [&](const HeardPose& pose) { return pose.stamp < two_sweeps_later; });
+  ASSERT_GT(poses.size(), 20U);
+  std::vector<Duration> ages;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    EXPECT_LT(poses[i].stamp - poses[i - 1].stamp, milliseconds{150}) << "a sweep was dropped, " << i << " after it";
+    ages.push_back(poses[i].heard - poses[i].stamp);
+  }
+  EXPECT_LT(median(ages), milliseconds{100});
+  EXPECT_LT(ages.front(), milliseconds{200}) << "a period, and as much to process it";
+  const json status = this->status();
+  EXPECT_EQ(status["packets"]["kernel_drops"], 0);
+  EXPECT_EQ(status["packets"]["total"]["lost"], 0);
+}
+
 /// Half of one core: what is too much is dropped and counted, what is processed is not older for it.
 TEST_F(RealTime, OneCoreSharedWithABusyLoop) {
   Child daemon(locusd(config("realtime: {cpus: [0]}\n")));
@@ -128,6 +184,34 @@ TEST_F(RealTime, OneCoreSharedWithABusyLoop) {
   RecordProperty("oldest_us", static_cast<int>(1e3 * status["process_ms"]["max"].get<double>()));
   EXPECT_LT(status["process_ms"]["p50"].get<double>(), 100.0)
       << "an estimate is not older than a period when it is there";
+}
+
+/// A loop of the same real-time priority gives the core away for others once in 100 ms, and takes it back as soon as a
+/// thread of ours waits: most sweeps are dropped, all are counted, and the one that is taken is the newest.
+TEST_F(RealTime, OneCoreSharedWithABusyLoopOfTheSameRealTimePriority) {
+  Child daemon(locusd(config("realtime: {priority: 2, cpus: [0]}\nthreads: 1\n")));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  if (daemon.wait_for_line("realtime.priority was not granted", milliseconds{10}))
+    GTEST_SKIP() << "real-time scheduling is not permitted here";
+  Child lidar(undisturbed({LOCUS_PLAY, capture().string()}));
+  ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+  {
+    const Child busy(
+        {"/usr/bin/chrt", "--rr", "2", "/usr/bin/taskset", "-c", "0", "/bin/sh", "-c", "while :; do :; done"});
+    std::this_thread::sleep_for(seconds{4});
+  }
+  std::this_thread::sleep_for(milliseconds{500});
+  const json status = this->status();
+  const json& sweeps = status["sweeps"];
+  EXPECT_LE(sweeps["seen"].get<int>() - sweeps["processed"].get<int>() - sweeps["dropped"].get<int>() -
+                sweeps["failed"].get<int>(),
+            1)
+      << sweeps;
+  EXPECT_EQ(status["packets"]["kernel_drops"], 0);
+  EXPECT_EQ(status["packets"]["total"]["lost"], 0);
+  RecordProperty("dropped", sweeps["dropped"].get<int>());
+  RecordProperty("oldest_us", static_cast<int>(1e3 * status["process_ms"]["max"].get<double>()));
+  EXPECT_LT(status["process_ms"]["max"].get<double>(), 1000.0) << "four seconds, were there a queue";
 }
 
 } // namespace
