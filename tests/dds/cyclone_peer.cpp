@@ -80,10 +80,12 @@ void talk(const DdsNode& node) {
 }
 
 void run(int argc, char** argv) {
-  if (argc != 4)
-    throw std::runtime_error("usage: cyclone_peer DOMAIN listen|talk PREFIX");
+  if (argc != 4 && argc != 5)
+    throw std::runtime_error("usage: cyclone_peer DOMAIN listen|talk PREFIX [INTERFACE]");
   DdsOptions options;
   options.domain = std::atoi(argv[1]); // NOLINT
+  if (argc == 5)
+    options.interface = argv[4];
   const auto node = DdsNode::open(options);
   if (!node)
     throw std::runtime_error(node.error());

@@ -161,6 +161,44 @@ INSTANTIATE_TEST_SUITE_P(Dds, Peers, testing::Values(CYCLONE_PEER, FAST_DDS_PEER
   return std::string(peer.param).find("fast") == std::string::npos ? "Cyclone" : "FastDds";
 });
 
+/// A robot is told apart from another by its prefix, or by its domain. Each says where it is by a figure of its own.
+TEST(RosLink, RobotsOnOneNetworkAreToldApart) {
+  const test::DdsDomain domain, other_domain;
+  std::vector<std::unique_ptr<RosLink>> robots;
+  for (const auto& [number, prefix] : {std::pair{domain.number(), "/robot_7/locus"},
+                                       {domain.number(), "/robot_8/locus"},
+                                       {other_domain.number(), "/robot_7/locus"}}) {
+    Config config;
+    config.dds.domain = number;
+    config.dds.prefix = prefix;
+    robots.push_back(std::make_unique<RosLink>(config, [](const RosInput&) {}));
+  }
+  const test::Child listener({CYCLONE_PEER, std::to_string(domain.number()), "listen", "/robot_7/locus"});
+  const test::Child other({CYCLONE_PEER, std::to_string(other_domain.number()), "listen", "/robot_7/locus"});
+  const auto heard_all = [&] {
+    return listener.lines_of("odometry").size() >= 20 && other.lines_of("odometry").size() >= 20;
+  };
+  EXPECT_TRUE(eventually([&] {
+    for (std::size_t i = 0; i < robots.size(); ++i) {
+      OdometryReport report;
+      report.T_odom_base.translation.x() = static_cast<double>(i);
+      robots[i]->publish(report, TrackingState::tracking);
+    }
+    std::this_thread::sleep_for(milliseconds{20});
+    return heard_all();
+  }));
+  const auto only_hears = [](const test::Child& peer, double robot) {
+    for (const std::string& line : peer.lines_of("odometry")) {
+      std::istringstream row(line);
+      double t = 0, x = 0;
+      row >> t >> x;
+      EXPECT_EQ(x, robot);
+    }
+  };
+  only_hears(listener, 0);
+  only_hears(other, 2);
+}
+
 TEST(RosLink, WithoutItsInterfaceGoesOnTryingAndSaysWhichOne) {
   const test::DdsDomain domain;
   Config config = config_in(domain);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -8,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include <sched.h>
+#include <sys/mount.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -28,8 +31,16 @@ class Control : public RobotNetwork {
 
   /// locusctl as somebody who is neither root nor in any group of ours.
   [[nodiscard]] ProgramRun as_stranger(std::vector<std::string> words) const {
-    words.insert(words.begin(), {"--reuid=65534", "--regid=65534", "--clear-groups", file("locusctl").string(),
-                                 "--socket", file("control").string()});
+    words.insert(words.begin(), {"--socket", file("control").string()});
+    return as_nobody("--clear-groups", words);
+  }
+
+  [[nodiscard]] ProgramRun as_nobody(const std::string& groups, std::vector<std::string> words) const {
+    const std::filesystem::path locusctl = file("locusctl"); // where everybody can reach it
+    if (!std::filesystem::exists(locusctl))
+      std::filesystem::copy_file(LOCUSCTL, locusctl);
+    chmod(locusctl.parent_path().c_str(), 0755);
+    words.insert(words.begin(), {"--reuid=65534", "--regid=65534", groups, locusctl.string()});
     return run_program("/usr/bin/setpriv", words);
   }
 };
@@ -87,8 +98,6 @@ TEST_F(Control, WatchWithoutATerminalIsWrongUsage) {
 TEST_F(Control, StrangersMayLookAndNotTouch) {
   if (geteuid() != 0)
     GTEST_SKIP() << "no second user to be: run as root";
-  std::filesystem::copy_file(LOCUSCTL, file("locusctl")); // where everybody can reach it
-  chmod(file("").parent_path().c_str(), 0755);
   Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
   const ProgramRun look = as_stranger({"status", "--json"});
@@ -102,6 +111,41 @@ TEST_F(Control, StrangersMayLookAndNotTouch) {
     EXPECT_EQ(touch.err, "locusctl: not permitted; be root or a member of group locusd\n") << command.front();
   }
   EXPECT_EQ(status()["flat_ground"], "off");
+}
+
+/// The service is an instance with a name, and the group one that nobody else on this machine knows.
+TEST_F(Control, MembersOfTheGroupMayCommandAnInstanceByItsName) {
+  if (unshare(CLONE_NEWNS) != 0 || mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
+      mount("tmpfs", "/run", "tmpfs", 0, nullptr) != 0)
+    GTEST_SKIP() << "no file system of one's own: run as root";
+  std::ofstream{file("group")} << "root:x:0:\nlocusd:x:4242:\n";
+  ASSERT_EQ(mount(file("group").c_str(), "/etc/group", nullptr, MS_BIND, nullptr), 0);
+  setenv("RUNTIME_DIRECTORY", "/run/locusd@left", 1); // NOLINT(concurrency-mt-unsafe)
+  {
+    const Child daemon(locusd(config()));
+    ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+    const ProgramRun member = as_nobody("--groups=4242", {"--instance", "left", "flat-ground", "on"});
+    EXPECT_EQ(member.status, 0) << member.err;
+    EXPECT_NE(run_program(LOCUSCTL, {"--instance", "left", "status", "--json"}).out.find("\"flat_ground\": \"on\""),
+              std::string::npos);
+    EXPECT_EQ(as_nobody("--groups=4243", {"--instance", "left", "flat-ground", "off"}).status, 1);
+    const ProgramRun other = run_program(LOCUSCTL, {"--instance", "right", "status"});
+    EXPECT_EQ(other.status, 1);
+    EXPECT_NE(other.err.find("/run/locusd@right/control"), std::string::npos) << other.err;
+  }
+  umount2("/etc/group", MNT_DETACH);
+  umount2("/run", MNT_DETACH);
+}
+
+TEST_F(Control, SensorsAreFoundWithoutAServiceAndByAnybody) {
+  if (geteuid() != 0)
+    GTEST_SKIP() << "no second user to be: run as root";
+  const Child play({LOCUS_PLAY, capture().string()});
+  ASSERT_TRUE(play.wait_for_line("nobody listens", seconds{5})) << "it waits for a service, and then sends";
+  const ProgramRun sensors = as_nobody("--clear-groups", {"sensors"});
+  EXPECT_EQ(sensors.status, 0) << sensors.err;
+  EXPECT_NE(sensors.out.find("127.0.0.1"), std::string::npos) << sensors.out;
+  EXPECT_NE(sensors.out.find("model: VLP-16, port: 2368"), std::string::npos) << sensors.out;
 }
 
 TEST_F(Control, MistypedWordsNameTheNearestThatExists) {
