@@ -46,8 +46,10 @@ constexpr std::array<std::string_view, 6> kCaptureMagics{"\xD4\xC3\xB2\xA1", "\x
 
 /// What a file is that libpcap cannot read, judged by its first bytes; libpcap's own words where it is a capture.
 std::string foreign_file(std::FILE* file, std::string_view libpcap_says) {
+  if (std::fseek(file, 0, SEEK_SET) != 0) { // a pipe
+    return fmt::format("not a pcap or pcapng capture ({})", libpcap_says);
+  }
   std::array<char, 64> buffer{};
-  std::rewind(file);
   const std::string_view start{buffer.data(), std::fread(buffer.data(), 1, buffer.size(), file)};
   const auto starts_with = [&](std::string_view magic) { return start.substr(0, magic.size()) == magic; };
   if (start.empty()) {
@@ -111,7 +113,7 @@ Expected<Capture, std::string> Capture::open(const std::filesystem::path& file) 
   if (std::filesystem::is_directory(file, ignored)) {
     return fmt::format("{}: a folder, not a capture; name the pcap file in it", file.string());
   }
-  FilePointer stream{std::fopen(file.c_str(), "rb")};
+  FilePointer stream{file == "-" ? stdin : std::fopen(file.c_str(), "rb")};
   if (!stream) {
     return fmt::format("{}: {}; check the path", file.string(), std::generic_category().message(errno));
   }
@@ -164,7 +166,8 @@ const Datagram* Capture::next() {
 /// libpcap reports a file that is cut and one that is damaged alike; only the stream knows whether its end was reached.
 void Capture::note_break() {
   const bool cut = std::feof(pcap_file(pcap_.get())) != 0;
-  break_ = fmt::format("{}: byte {}: {} ({}); the {} frames before it are used{}", file_.string(), bytes_read(),
+  const std::string place = bytes_total_ > 0 ? fmt::format("byte {}: ", bytes_read()) : ""; // a pipe counts none
+  break_ = fmt::format("{}: {}{} ({}); the {} frames before it are used{}", file_.string(), place,
                        cut ? "the capture ends in mid-packet" : "the capture is damaged", pcap_geterr(pcap_.get()),
                        stats_.frames, cut ? "" : ", what follows is not");
 }

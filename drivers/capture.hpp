@@ -33,7 +33,8 @@ class Capture {
     std::uint64_t malformed = 0; ///< lengths that contradict each other, headers cut short, a time beyond the year 2255
   };
 
-  /// Fails with one line for the user when the file cannot be read, is not a capture or has a foreign link type.
+  /// "-" is standard input. Fails with one line for the user when the file cannot be read, is not a capture or has a
+  /// foreign link type.
   static Expected<Capture, std::string> open(const std::filesystem::path& file);
 
   /// The next datagram, valid until the next call; nullptr at the end.

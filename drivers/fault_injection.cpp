@@ -42,44 +42,6 @@ void distort_reading(const FaultPlan::Verdict& verdict, OdometrySample& sample) 
   }
 }
 
-template <class Sample>
-void inject(std::span<const Fault> faults, std::string_view source, Stamp capture_start, std::uint64_t seed,
-            std::vector<Sample>& samples) {
-  FaultPlan plan{faults, capture_start, seed};
-  std::vector<Sample> arriving;
-  arriving.reserve(samples.size());
-  std::optional<Sample> healthy;
-  std::optional<Sample> overtaken;
-  for (Sample sample : samples) {
-    const FaultPlan::Verdict verdict = plan.judge(source, false, sample.arrival);
-    if (verdict.frozen && healthy) {
-      copy_reading(*healthy, sample);
-    } else {
-      healthy = sample;
-    }
-    if (verdict.lost) {
-      continue;
-    }
-    distort_reading(verdict, sample);
-    sample.stamp += verdict.clock_step;
-    sample.arrival += verdict.delay;
-    if (verdict.overtaken && !overtaken) {
-      overtaken = sample;
-      continue;
-    }
-    arriving.insert(arriving.end(), verdict.duplicated ? 2 : 1, sample);
-    if (overtaken) {
-      overtaken->arrival = std::max(overtaken->arrival, sample.arrival);
-      arriving.push_back(*std::exchange(overtaken, std::nullopt));
-    }
-  }
-  if (overtaken) {
-    arriving.push_back(*overtaken);
-  }
-  std::ranges::stable_sort(arriving, {}, &Sample::arrival);
-  samples = std::move(arriving);
-}
-
 /// Where a packet holds the sensor's clock, microseconds past the hour; nullptr for a packet without.
 std::byte* sensor_clock_in(std::vector<std::byte>& payload) {
   switch (payload.size()) {
@@ -108,15 +70,60 @@ void step_sensor_clock(std::vector<std::byte>& payload, Duration step) {
 
 } // namespace
 
-void inject_faults(std::span<const Fault> faults, std::string_view source, Stamp capture_start, std::uint64_t seed,
-                   std::vector<ImuSample>& samples) {
-  inject(faults, source, capture_start, seed, samples);
+template <class Sample> void SampleFaults<Sample>::pass(Sample sample, const Emit& emit) {
+  const FaultPlan::Verdict verdict = plan_.judge(source_, false, sample.arrival);
+  if (verdict.frozen && healthy_) {
+    copy_reading(*healthy_, sample);
+  } else {
+    healthy_ = sample;
+  }
+  if (verdict.lost) {
+    return;
+  }
+  distort_reading(verdict, sample);
+  sample.stamp += verdict.clock_step;
+  sample.arrival += verdict.delay;
+  if (verdict.overtaken && !overtaken_) {
+    overtaken_ = sample;
+    return;
+  }
+  emit(sample);
+  if (verdict.duplicated) {
+    emit(sample);
+  }
+  if (std::optional<Sample> overtaken = std::exchange(overtaken_, std::nullopt)) {
+    overtaken->arrival = std::max(overtaken->arrival, sample.arrival);
+    emit(*overtaken);
+  }
 }
 
-void inject_faults(std::span<const Fault> faults, std::string_view source, Stamp capture_start, std::uint64_t seed,
-                   std::vector<OdometrySample>& samples) {
-  inject(faults, source, capture_start, seed, samples);
+template <class Sample> void SampleFaults<Sample>::finish(const Emit& emit) {
+  if (const std::optional<Sample> overtaken = std::exchange(overtaken_, std::nullopt)) {
+    emit(*overtaken);
+  }
 }
+
+template class SampleFaults<ImuSample>;
+template class SampleFaults<OdometrySample>;
+
+template <class Sample>
+void inject_faults(std::span<const Fault> faults, const std::string& source, Stamp capture_start, std::uint64_t seed,
+                   std::vector<Sample>& samples) {
+  SampleFaults<Sample> injection(faults, source, capture_start, seed);
+  std::vector<Sample> arriving;
+  arriving.reserve(samples.size());
+  const auto keep = [&](const Sample& sample) { arriving.push_back(sample); };
+  for (const Sample& sample : samples) {
+    injection.pass(sample, keep);
+  }
+  injection.finish(keep);
+  std::ranges::stable_sort(arriving, {}, &Sample::arrival);
+  samples = std::move(arriving);
+}
+
+template void inject_faults(std::span<const Fault>, const std::string&, Stamp, std::uint64_t, std::vector<ImuSample>&);
+template void inject_faults(std::span<const Fault>, const std::string&, Stamp, std::uint64_t,
+                            std::vector<OdometrySample>&);
 
 void DatagramFaults::Copy::emit_to(const Emit& emit) const {
   Datagram complete = datagram;

@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/motion_sample.hpp"
@@ -16,12 +17,33 @@
 
 namespace locus {
 
-/// Applies the faults meant for `source` to its recorded samples, which stay in the order of their arrival.
-/// Precondition: they are in it, and fault_problem() finds nothing.
-void inject_faults(std::span<const Fault> faults, std::string_view source, Stamp capture_start, std::uint64_t seed,
-                   std::vector<ImuSample>& samples);
-void inject_faults(std::span<const Fault> faults, std::string_view source, Stamp capture_start, std::uint64_t seed,
-                   std::vector<OdometrySample>& samples);
+/// Applies the faults meant for one motion source to its samples as they come. What is given out has the arrival that
+/// the faults leave it, and so may arrive after what is given out next. One owner.
+template <class Sample> class SampleFaults {
+ public:
+  using Emit = std::function<void(const Sample&)>;
+
+  /// Precondition: fault_problem() finds nothing.
+  SampleFaults(std::span<const Fault> faults, std::string source, Stamp capture_start, std::uint64_t seed)
+      : plan_(faults, capture_start, seed), source_(std::move(source)) {}
+
+  /// Emits what becomes of this sample, and what it overtakes. Precondition: it arrives after those before.
+  void pass(Sample sample, const Emit& emit);
+
+  /// Emits what is still held back. The recording is over.
+  void finish(const Emit& emit);
+
+ private:
+  FaultPlan plan_;
+  std::string source_;
+  std::optional<Sample> healthy_;   ///< the latest that was not frozen
+  std::optional<Sample> overtaken_; ///< waits for the next one to pass it
+};
+
+/// The same for all samples of a recording, which stay in the order of their arrival.
+template <class Sample>
+void inject_faults(std::span<const Fault> faults, const std::string& source, Stamp capture_start, std::uint64_t seed,
+                   std::vector<Sample>& samples);
 
 /// Applies the faults meant for lidars to the datagrams of a capture as they stream by. The receive stamp of a datagram
 /// that is late or overtaken moves along; what is held back comes out in the order of arrival. Frozen are data packets

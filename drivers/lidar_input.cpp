@@ -170,6 +170,14 @@ LidarInput* LidarRouter::find(const Datagram& datagram) {
   return found;
 }
 
+std::string_view LidarRouter::configured_for(const Datagram& datagram) const {
+  const auto found = std::ranges::find_if(lidars_, [&](const LidarInput& lidar) {
+    return lidar.listens_to(datagram.destination_port) &&
+           lidar.options().source_ip.value_or(datagram.source_ip) == datagram.source_ip;
+  });
+  return found == lidars_.end() ? std::string_view{} : found->options().name;
+}
+
 PacketCounters LidarRouter::total() const {
   PacketCounters sum = foreign_;
   for (const LidarInput& lidar : lidars_)

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/expected.hpp"
@@ -95,6 +96,10 @@ class LidarRouter {
   const LidarPacket* receive(const Datagram& datagram);
 
   [[nodiscard]] const std::vector<LidarInput>& lidars() const { return lidars_; }
+
+  /// The name of the lidar that a datagram comes from by the configuration alone, whether or not the lidar has made
+  /// itself known; empty for none.
+  [[nodiscard]] std::string_view configured_for(const Datagram& datagram) const;
 
   /// Of all lidars, and of the datagrams that are for none of them (rejected as sender).
   [[nodiscard]] PacketCounters total() const;

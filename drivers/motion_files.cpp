@@ -7,8 +7,10 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <memory>
 #include <optional>
 #include <span>
+#include <sstream>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -203,16 +205,20 @@ void apply(const Meta& meta, OdometrySample& sample) {
 /// The rows of a table, one after the other. Blank lines, comments and a header line are none.
 template <class Row> class RowReader {
  public:
-  RowReader(std::filesystem::path file, char separator, Problem (*parse_row)(Fields, Row&))
-      : file_(std::move(file)), stream_(file_), split_(separator), parse_row_(parse_row) {
-    if (!stream_ || std::filesystem::is_directory(file_)) {
-      problem_ = fmt::format("{}: cannot be read; check the path and its permissions", file_.string());
+  RowReader(const std::filesystem::path& file, char separator, Problem (*parse_row)(Fields, Row&))
+      : RowReader(std::make_unique<std::ifstream>(file), file.string(), separator, parse_row) {
+    if (!*stream_ || std::filesystem::is_directory(file)) {
+      problem_ = fmt::format("{}: cannot be read; check the path and its permissions", name_);
     }
   }
 
+  /// Of any lines; `name` stands for them in problems.
+  RowReader(std::unique_ptr<std::istream> stream, std::string name, char separator, Problem (*parse_row)(Fields, Row&))
+      : stream_(std::move(stream)), name_(std::move(name)), split_(separator), parse_row_(parse_row) {}
+
   /// False at the end, and where there is a problem.
   bool next(Row& row) {
-    while (!problem_ && std::getline(stream_, buffer_)) {
+    while (!problem_ && std::getline(*stream_, buffer_)) {
       ++line_;
       const std::string_view line = trimmed(buffer_);
       if (line.empty() || line.starts_with('#')) {
@@ -232,12 +238,12 @@ template <class Row> class RowReader {
   }
 
   /// Puts the place of the latest row before what is wrong with it.
-  void report(const std::string& problem) { problem_ = fmt::format("{}:{}: {}", file_.string(), line_, problem); }
+  void report(const std::string& problem) { problem_ = fmt::format("{}:{}: {}", name_, line_, problem); }
   [[nodiscard]] const Problem& problem() const { return problem_; }
 
  private:
-  std::filesystem::path file_;
-  std::ifstream stream_;
+  std::unique_ptr<std::istream> stream_;
+  std::string name_;
   FieldSplitter split_;
   Problem (*parse_row_)(Fields, Row&);
   std::string buffer_;
@@ -246,10 +252,7 @@ template <class Row> class RowReader {
   Problem problem_;
 };
 
-template <class Row>
-Expected<std::vector<Row>, std::string> read_rows(const std::filesystem::path& file, char separator,
-                                                  Problem (*parse_row)(Fields, Row&)) {
-  RowReader<Row> reader(file, separator, parse_row);
+template <class Row> Expected<std::vector<Row>, std::string> all_rows(RowReader<Row>& reader) {
   std::vector<Row> rows;
   for (Row row; reader.next(row);) {
     rows.push_back(row);
@@ -282,40 +285,43 @@ Problem apply_meta(const std::filesystem::path& file, std::vector<Sample>& sampl
 /// How the table of a kind of sample is written.
 template <class Sample> struct Table;
 template <> struct Table<ImuSample> {
-  static RowReader<ImuSample> open(const std::filesystem::path& file) { return {file, ',', &parse_imu}; }
+  static constexpr char kSeparator = ',';
+  static constexpr auto kParse = &parse_imu;
 };
 template <> struct Table<OdometrySample> {
-  static RowReader<OdometrySample> open(const std::filesystem::path& file) { return {file, ' ', &parse_odometry}; }
+  static constexpr char kSeparator = ' ';
+  static constexpr auto kParse = &parse_odometry;
 };
+template <class Sample> RowReader<Sample> open_table(const std::filesystem::path& file) {
+  return {file, Table<Sample>::kSeparator, Table<Sample>::kParse};
+}
 
 std::filesystem::path meta_file_of(std::filesystem::path file) { return file.replace_extension(".meta.csv"); }
 
 template <class Sample> Expected<std::vector<Sample>, std::string> read_samples(const std::filesystem::path& file) {
-  RowReader<Sample> reader = Table<Sample>::open(file);
-  std::vector<Sample> samples;
-  for (Sample sample; reader.next(sample);) {
-    samples.push_back(sample);
-  }
-  if (reader.problem()) {
-    return *reader.problem();
+  RowReader<Sample> reader = open_table<Sample>(file);
+  Expected<std::vector<Sample>, std::string> samples = all_rows(reader);
+  if (!samples) {
+    return samples;
   }
   if (const std::filesystem::path meta_file = meta_file_of(file); std::filesystem::exists(meta_file)) {
-    const Expected<std::vector<Meta>, std::string> rows = read_rows(meta_file, ',', &parse_meta);
+    RowReader<Meta> meta_reader(meta_file, ',', &parse_meta);
+    const Expected<std::vector<Meta>, std::string> rows = all_rows(meta_reader);
     if (!rows) {
       return rows.error();
     }
-    if (Problem problem = apply_meta(meta_file, samples, *rows)) {
+    if (Problem problem = apply_meta(meta_file, *samples, *rows)) {
       return *std::move(problem);
     }
   }
-  std::ranges::stable_sort(samples, {}, &Sample::arrival);
+  std::ranges::stable_sort(*samples, {}, &Sample::arrival);
   return samples;
 }
 
 } // namespace
 
 Expected<std::vector<StampedPose>, std::string> read_trajectory(const std::filesystem::path& file) {
-  RowReader<OdometrySample> reader = Table<OdometrySample>::open(file);
+  RowReader<OdometrySample> reader = open_table<OdometrySample>(file);
   std::vector<StampedPose> poses;
   for (OdometrySample sample; reader.next(sample);) {
     if (!sample.T_source_base.finite()) {
@@ -335,9 +341,18 @@ Expected<std::vector<StampedPose>, std::string> read_trajectory(const std::files
   return poses;
 }
 
+template <class Sample> Expected<std::vector<Sample>, std::string> parse_samples(std::string lines, std::string name) {
+  RowReader<Sample> reader(std::make_unique<std::istringstream>(std::move(lines)), std::move(name),
+                           Table<Sample>::kSeparator, Table<Sample>::kParse);
+  return all_rows(reader);
+}
+
+template Expected<std::vector<ImuSample>, std::string> parse_samples(std::string, std::string);
+template Expected<std::vector<OdometrySample>, std::string> parse_samples(std::string, std::string);
+
 template <class Sample> class MotionSamples<Sample>::Rows {
  public:
-  explicit Rows(const std::filesystem::path& file) : reader_(Table<Sample>::open(file)) {}
+  explicit Rows(const std::filesystem::path& file) : reader_(open_table<Sample>(file)) {}
 
   bool next(Sample& sample) { return reader_.next(sample); }
   [[nodiscard]] const Problem& problem() const { return reader_.problem(); }

@@ -62,6 +62,9 @@ template <class Sample> class MotionSamples {
   bool ended_ = false;
 };
 
+/// The samples in lines of such a file, arrival = stamp; `name` stands for the file in errors.
+template <class Sample> Expected<std::vector<Sample>, std::string> parse_samples(std::string lines, std::string name);
+
 /// Where the base was at one instant.
 struct StampedPose {
   Stamp stamp;

@@ -16,7 +16,8 @@ std::optional<PlayArguments> parse_play_arguments(int argc, char** argv) {
   CLI::App app{"Sends a recorded capture as the robot would: lidar packets by UDP, IMU and odometry by DDS.",
                "locus-play"};
   app.add_option("CAPTURE_FOLDER", arguments.capture,
-                 "Folder with lidar.pcap and any of imu.csv, NAME.tum and config.yaml, which names the topics")
+                 "Folder with lidar.pcap and any of imu.csv, NAME.tum and config.yaml, which names the topics; or a "
+                 "capture file; -: the stream of locus-sim on standard input")
       ->required();
   app.add_option("--to", arguments.to, "Where packets go: a host, a broadcast or a multicast address")
       ->type_name("ADDRESS")
@@ -43,7 +44,8 @@ std::optional<PlayArguments> parse_play_arguments(int argc, char** argv) {
   app.footer("Examples:\n"
              "  locus-play robot_folder/\n"
              "  locus-play --to 192.168.1.255 --interface eth0 --domain 7 robot_folder/\n"
-             "  locus-play --fail wio:jump=5@30 robot_folder/");
+             "  locus-play --fail wio:jump=5@30 robot_folder/\n"
+             "  locus-sim --world urban --robot husky --duration 600 -o - | locus-play -");
   if (!parse_command_line(app, argc, argv))
     return std::nullopt;
   for (const std::string& text : faults)

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// locus-play: a capture folder to the wire, as a robot would send it.
+// locus-play: a capture folder, or a stream, to the wire, as a robot would send it.
 #include <algorithm>
 #include <ctime>
 #include <exception>
+#include <filesystem>
+#include <functional>
 #include <optional>
 #include <thread>
 #include <utility>
 #include <variant>
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "config/config_yaml.hpp"
 #include "daemon/machine_time.hpp"
@@ -16,6 +19,7 @@
 #include "locus_play/arguments.hpp"
 #include "locus_play/motion_publisher.hpp"
 #include "locus_play/packet_sender.hpp"
+#include "locus_play/stream_recording.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/motion_recordings.hpp"
 #include "locus_replay/progress_bar.hpp"
@@ -27,21 +31,20 @@ namespace {
 
 void warn(const std::string& line) { say("locus-play", "warning: " + line); }
 
-Config configuration(const PlayArguments& arguments, const CaptureFolder& folder) {
-  Config config;
-  if (!folder.config.empty()) {
-    const auto loaded = load_config(folder.config);
-    if (!loaded)
-      throw Failure(ExitStatus::wrong_usage, fmt::format("{}", fmt::join(loaded.error(), "\n")));
-    config = *loaded;
-  }
+Config value_or_refuse(Expected<Config, ConfigErrors> config) {
+  if (!config)
+    throw Failure(ExitStatus::wrong_usage, fmt::format("{}", fmt::join(config.error(), "\n")));
+  return *std::move(config);
+}
+
+Config with_options(Config config, const PlayArguments& arguments) {
   config.dds.interface = arguments.interface.value_or(config.dds.interface);
   config.dds.domain = arguments.domain.value_or(config.dds.domain);
+  check_faults(arguments.faults, config);
   return config;
 }
 
 Recording open_recording(const PlayArguments& arguments, const CaptureFolder& folder, const Config& config) {
-  check_faults(arguments.faults, config);
   std::vector<std::string> warnings;
   std::vector<MotionRecording> motion = read_motion({}, folder, config, !folder.config.empty(), warnings);
   for (const std::string& warning : warnings)
@@ -65,7 +68,8 @@ void wait_for_listeners(const MotionPublisher& motion, const DdsOptions& dds) {
 
 /// Sends all there is, each at its time. The first input is sent now: what separates its arrival from that is what all
 /// stamps are shifted by, in whole microseconds as the lidars count.
-void play(const PlayArguments& arguments, Recording& recording, PacketSender& packets, MotionPublisher& motion) {
+void send_all(const PlayArguments& arguments, daemon::InputSource& recording, PacketSender& packets,
+              MotionPublisher& motion, const std::function<double()>& progress) {
   daemon::PacedInput paced(recording, arguments.speed);
   ProgressBar bar(!arguments.quiet);
   std::optional<Duration> shift;
@@ -85,34 +89,68 @@ void play(const PlayArguments& arguments, Recording& recording, PacketSender& pa
     else if (const auto* odometry = std::get_if<daemon::OdometryInput>(&input))
       motion.publish(*odometry, shift_from(odometry->sample.arrival));
     more = !std::holds_alternative<daemon::EndOfInput>(input);
-    bar.show(recording.progress());
+    bar.show(progress());
   }
   bar.wipe();
   if (!arguments.quiet)
     fmt::print("{} packets sent, stamps shifted by {} ns\n", packets.sent(), shift.value_or(Duration::zero()).count());
 }
 
-void run(const PlayArguments& arguments) {
-  const CaptureFolder folder = value_or_fail(CaptureFolder::find(arguments.capture), ExitStatus::failed);
-  const Config config = configuration(arguments, folder);
-  Recording recording = open_recording(arguments, folder, config);
+void play(const PlayArguments& arguments, const Config& config, daemon::InputSource& recording, const Capture& capture,
+          const std::function<double()>& progress) {
   PacketSender packets(arguments.to, arguments.interface.value_or(""));
   MotionPublisher motion(config);
   wait_for_listeners(motion, config.dds);
-  play(arguments, recording, packets, motion);
-  for (const std::string& warning : recording.capture().warnings())
+  send_all(arguments, recording, packets, motion, progress);
+  for (const std::string& warning : capture.warnings())
     warn(warning);
   if (motion.refused() > 0)
     warn(fmt::format("{} motion samples were not sent: DDS did not take them", motion.refused()));
   if (packets.sent() == 0)
     throw Failure(ExitStatus::failed,
-                  fmt::format("{}: holds no UDP datagram; nothing was sent", folder.lidar.string()));
+                  fmt::format("{}: holds no UDP datagram; nothing was sent", arguments.capture.string()));
   const bool asked_for_sender =
       std::ranges::any_of(config.lidars, [](const auto& l) { return l.source_ip.has_value(); });
   if (packets.changed_sender() && asked_for_sender)
     warn(
         "this host has not the addresses of the lidars: a receiver whose configuration names source_ip has refused the "
         "packets");
+}
+
+void play_folder(const PlayArguments& arguments) {
+  const CaptureFolder folder = value_or_fail(CaptureFolder::find(arguments.capture), ExitStatus::failed);
+  Config config;
+  if (!folder.config.empty())
+    config = value_or_refuse(load_config(folder.config));
+  config = with_options(std::move(config), arguments);
+  Recording recording = open_recording(arguments, folder, config);
+  play(arguments, config, recording, recording.capture(), [&] { return recording.progress(); });
+}
+
+/// A file, or standard input, whose length nobody knows.
+void play_stream(const PlayArguments& arguments) {
+  if (arguments.capture == "-" && isatty(STDIN_FILENO) == 1)
+    throw Failure(ExitStatus::wrong_usage, "-: standard input is a terminal; try: locus-sim ... -o - | locus-play -");
+  CaptureStream stream(value_or_fail(Capture::open(arguments.capture), ExitStatus::failed));
+  const Config config = with_options(
+      value_or_refuse(parse_config(stream.config(), arguments.capture.string() + ": config.yaml")), arguments);
+  StreamRecording recording(stream, config, value_or_fail(LidarRouter::open(config.lidars), ExitStatus::wrong_usage),
+                            arguments.faults);
+  const Capture& capture = stream.capture();
+  const auto total = static_cast<double>(capture.bytes_total());
+  play(arguments, config, recording, capture,
+       [&] { return total > 0 ? static_cast<double>(capture.bytes_read()) / total : 0.0; });
+  for (const std::string& file : recording.unknown_files())
+    warn(fmt::format("{}: no motion source is configured for it; left out", file));
+  if (recording.problem())
+    throw Failure(ExitStatus::failed, *recording.problem());
+}
+
+void run(const PlayArguments& arguments) {
+  if (std::filesystem::is_directory(arguments.capture))
+    play_folder(arguments);
+  else
+    play_stream(arguments);
 }
 
 } // namespace

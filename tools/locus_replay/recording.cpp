@@ -123,7 +123,7 @@ Recording::Pending Recording::fetch() {
       note(*datagram);
       if (!faults_)
         return {*datagram, datagram->receive_stamp};
-      faults_->pass(lidar_of(*datagram), *datagram, keep);
+      faults_->pass(lidars_.configured_for(*datagram), *datagram, keep);
       if (faulty_.empty())
         return {Silence{datagram->receive_stamp}, datagram->receive_stamp};
     } else if (faults_) {
@@ -164,15 +164,6 @@ std::vector<std::string> Recording::warnings() const {
                                      motion.recording.file.string(), text_of(span), text_of(TimeSpan{first_, last_})));
   }
   return warnings;
-}
-
-/// By the configuration alone: a fault may strike before the lidar has made itself known.
-std::string_view Recording::lidar_of(const Datagram& datagram) const {
-  const auto found = std::ranges::find_if(lidars_.lidars(), [&](const LidarInput& lidar) {
-    return lidar.listens_to(datagram.destination_port) &&
-           lidar.options().source_ip.value_or(datagram.source_ip) == datagram.source_ip;
-  });
-  return found == lidars_.lidars().end() ? std::string_view{} : found->options().name;
 }
 
 } // namespace locus::tools

@@ -8,7 +8,6 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "daemon/input.hpp"
@@ -79,8 +78,6 @@ class Recording : public daemon::InputSource {
 
   const Datagram* read();
   void note(const Datagram& datagram);
-  void inject_faults_into(const Datagram& datagram);
-  [[nodiscard]] std::string_view lidar_of(const Datagram& datagram) const;
   Pending fetch();
 
   Capture capture_;

@@ -98,7 +98,8 @@ std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
       "Examples:\n"
       "  locus-sim --world urban --robot husky --duration 60 --seed 1 -o plant\n"
       "  locus-sim --world tunnel --robot spot --duration 300 --seed 7 --slip 20-25 --dust 0.02 -o mine\n"
-      "  locus-replay -o out plant");
+      "  locus-replay -o out plant\n"
+      "  locus-sim --world urban --robot husky --duration 600 -o - | locus-play -");
   if (!parse_command_line(app, argc, argv))
     return std::nullopt;
 

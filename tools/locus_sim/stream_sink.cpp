@@ -8,9 +8,8 @@
 namespace locus::sim {
 
 void StreamSink::text(std::string_view file, Stamp arrival, const std::string& lines) {
-  constexpr std::uint32_t kLoopback = 0x7F00'0001;
   const std::string payload = fmt::format("{}\n{}", file, lines);
-  pcap_.write(arrival, kLoopback, kTextPort, kLoopback, kTextPort, std::as_bytes(std::span(payload)));
+  pcap_.write(arrival, kTextAddress, kTextPort, kTextAddress, kTextPort, std::as_bytes(std::span(payload)));
 }
 
 } // namespace locus::sim

@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
-
 #include "locus_sim/capture_sink.hpp"
 #include "locus_sim/pcap_writer.hpp"
+#include "locus_sim/stream_text.hpp"
 
 namespace locus::sim {
-
-/// The port that texts in a stream are addressed to: discard, so that nobody takes them for a lidar's.
-inline constexpr std::uint16_t kTextPort = 9;
 
 /// A capture on standard output, for a program that plays it on as it comes (`locus-sim -o - | locus-play -`).
 ///
