@@ -123,6 +123,21 @@ TEST(Faults, WithoutAnyTheHealthOfASourceNeverChanges) {
   }
 }
 
+/// By the clock that --fail goes by; the first sweep ends a tenth of a second after that begins to run.
+TEST(Faults, WhenTheyStruckIsToldFromTheStartOfTheCapture) {
+  const auto lost_at_s = [](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {room_drive().string(), "--fail", "wio:lost@3-5"});
+    const std::string said = Replay(arguments).run().out, key = ", lost at ";
+    const std::size_t at = said.find(key);
+    EXPECT_NE(at, std::string::npos) << said;
+    return at == std::string::npos ? 0.0 : std::stod(said.substr(at + key.size()));
+  };
+  const double lost_s = lost_at_s({});
+  EXPECT_GE(lost_s, 3.0);
+  EXPECT_LT(lost_s, 3.1);
+  EXPECT_NEAR(lost_at_s({"--start", "1.5"}), lost_s, 0.03);
+}
+
 TEST(Faults, WithoutWheelsAndGyroLidarCarriesOnAlone) {
   const Replay replay({room_drive().string(), "--fail", "wio:lost@4", "--fail", "imu:lost@4"});
   EXPECT_EQ(replay.summary()["sweeps"]["failed"], 0);

@@ -171,6 +171,14 @@ TEST(Report, OfAnHourTakesLessThanTenMegabytes) {
   EXPECT_LT(page.size(), 10'000'000U);
 }
 
+TEST(Report, TimesAreThoseOfTheCapture) {
+  SampleRun run = SampleRun::bare();
+  run.capture_start -= std::chrono::seconds{60};
+  const json shown = run_in(written(run));
+  EXPECT_EQ(shown["path"]["t"].dump(), "[60.0,60.1,60.2]");
+  EXPECT_EQ(shown["state"]["t"].front(), 60.0);
+}
+
 TEST(Report, NoNameEndsTheScriptThatHoldsIt) {
   const std::string hostile = "</script><script>alert(1)</script><!--";
   SampleRun run = SampleRun::bare();

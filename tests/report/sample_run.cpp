@@ -131,6 +131,7 @@ ordered_json summary_of(const std::string& capture, double duration_s, std::size
 
 SampleRun SampleRun::of(std::chrono::seconds length, const std::string& capture) {
   SampleRun run;
+  run.capture_start = kBegin;
   const double length_s = to_seconds(length);
   for (double t_s = 0.0; t_s < length_s; t_s += 0.1)
     run.sweeps.push_back(sweep_at(t_s));
@@ -154,6 +155,7 @@ SampleRun SampleRun::of(std::chrono::seconds length, const std::string& capture)
 
 SampleRun SampleRun::bare() {
   SampleRun run;
+  run.capture_start = kBegin;
   run.config.odometry.motion_sources.clear();
   run.config.source_topics.clear();
   for (const double t_s : {0.0, 0.1, 0.2})

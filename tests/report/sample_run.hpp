@@ -18,10 +18,11 @@ struct SampleRun {
   /// A moment without truth, map or motion sources.
   static SampleRun bare();
 
-  [[nodiscard]] tools::Report report() const { return {summary, config, path_m, sweeps, map, truth, accuracy}; }
+  [[nodiscard]] tools::Report report() const { return {summary, config, capture_start, path_m, sweeps, map, truth, accuracy}; }
 
   nlohmann::ordered_json summary;
   Config config;
+  Stamp capture_start;
   double path_m = 0;
   std::vector<tools::SweepRecord> sweeps;
   std::vector<SurfacePoint> map;

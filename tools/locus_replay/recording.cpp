@@ -47,16 +47,16 @@ void check_faults(const std::vector<Fault>& faults, const Config& config) {
 
 Recording::Recording(Capture capture, std::vector<MotionRecording> motion, const Config& config, LidarRouter lidars,
                      const PlayOptions& options)
-    : capture_(std::move(capture)), lidars_(std::move(lidars)), play_for_(options.duration), head_(capture_.next()) {
-  const Stamp capture_start = head_ != nullptr ? head_->receive_stamp : Stamp{};
-  begin_ = capture_start + options.start;
+    : capture_(std::move(capture)), lidars_(std::move(lidars)), play_for_(options.duration), head_(capture_.next()),
+      capture_start_(head_ != nullptr ? head_->receive_stamp : Stamp{}) {
+  begin_ = capture_start_ + options.start;
   end_ = play_for_ ? begin_ + *play_for_ : Stamp::max();
   if (!options.faults.empty())
-    faults_.emplace(options.faults, capture_start, options.seed);
+    faults_.emplace(options.faults, capture_start_, options.seed);
   for (MotionRecording& recording : motion) {
     const std::string& name = config.odometry.motion_sources[recording.source].name;
     if (std::ranges::find(options.faults, name, &Fault::name) != options.faults.end())
-      std::visit([&](auto& samples) { samples = with_faults(samples.drain(), options, name, capture_start); },
+      std::visit([&](auto& samples) { samples = with_faults(samples.drain(), options, name, capture_start_); },
                  recording.samples);
     motion_.push_back({std::move(recording)});
     MotionCursor& cursor = motion_.back();

@@ -53,6 +53,8 @@ class Recording : public daemon::InputSource {
   [[nodiscard]] double progress() const { return progress_.load(std::memory_order_relaxed); }
 
   [[nodiscard]] const Capture& capture() const { return capture_; }
+  /// When its first datagram came: what --start and the seconds of faults count from.
+  [[nodiscard]] Stamp capture_start() const { return capture_start_; }
   /// From the first to the last datagram played.
   [[nodiscard]] Duration duration() const { return last_ - first_; }
   [[nodiscard]] const std::map<std::uint16_t, PortTraffic>& traffic() const { return traffic_; }
@@ -85,7 +87,8 @@ class Recording : public daemon::InputSource {
   LidarRouter lidars_; ///< never receives anything
   std::optional<Duration> play_for_;
   const Datagram* head_; ///< read ahead to learn when the capture begins
-  Stamp begin_, end_;
+  Stamp capture_start_;
+  Stamp begin_, end_; ///< of the part that is played
   bool capture_is_over_ = false;
   std::optional<DatagramFaults> faults_;
   std::deque<OwnedDatagram> faulty_; ///< came out of the faults, not given out yet

@@ -22,10 +22,10 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// Seconds since the first sweep.
+/// Seconds since the start of the capture, as --start and --fail have them.
 class TimeAxis {
  public:
-  explicit TimeAxis(const Report& report) : zero_(report.sweeps.front().stamp) {}
+  explicit TimeAxis(const Report& report) : zero_(report.capture_start) {}
   [[nodiscard]] double operator()(Stamp stamp) const { return to_seconds(stamp - zero_); }
 
  private:

@@ -19,7 +19,8 @@ namespace locus::tools {
 struct Report {
   const nlohmann::ordered_json& summary; ///< as in summary.json
   const Config& config;
-  double path_m; ///< length of the path
+  Stamp capture_start; ///< which times are told from
+  double path_m;       ///< length of the path
   std::span<const SweepRecord> sweeps;
   std::span<const SurfacePoint> map;                 ///< odom frame; see visible_surfaces()
   std::span<const StampedPose> truth;                ///< in its own frame

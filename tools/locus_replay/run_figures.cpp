@@ -48,7 +48,7 @@ std::string readable_health(const FinishedRun& run, std::size_t source) {
   for (const HealthEvent& event : run.figures.health_events()) {
     if (event.source != source || told++ >= kTold)
       continue;
-    const double after_s = to_seconds(event.stamp - run.figures.first_stamp());
+    const double after_s = to_seconds(event.stamp - run.capture_start);
     text += event.healthy ? fmt::format(", back at {:.2f} s", after_s)
                           : fmt::format(", lost at {:.2f} s ({})", after_s, to_string(event.reason));
   }
@@ -106,9 +106,7 @@ std::string readable(const Accuracy& accuracy, std::size_t estimates) {
 
 void RunFigures::take(const daemon::ProcessedSweep& sweep) {
   const OdometryEstimate& estimate = sweep.estimate;
-  if (sweeps() == 0)
-    first_stamp_ = estimate.stamp;
-  else
+  if (sweeps() > 0)
     path_m_ += (estimate.T_odom_base.translation - last_T_odom_base_.translation).norm();
   last_T_odom_base_ = estimate.T_odom_base;
   wall_ms_.push_back(static_cast<float>(1e3 * to_seconds(sweep.took.wall)));

@@ -40,7 +40,6 @@ class RunFigures {
   [[nodiscard]] std::uint64_t used_sweeps(std::size_t source) const { return used_sweeps_[source]; }
   /// In the order in which they happened.
   [[nodiscard]] const std::vector<HealthEvent>& health_events() const { return health_events_; }
-  [[nodiscard]] Stamp first_stamp() const { return first_stamp_; }
   [[nodiscard]] double path_m() const { return path_m_; }
   [[nodiscard]] const Pose& last_T_odom_base() const { return last_T_odom_base_; }
 
@@ -50,7 +49,6 @@ class RunFigures {
   std::vector<float> wall_ms_, cpu_ms_;
   std::vector<std::uint64_t> used_sweeps_;
   std::vector<HealthEvent> health_events_;
-  Stamp first_stamp_; ///< end of the first sweep
   Means sums_;
   double path_m_ = 0;
   Pose last_T_odom_base_;
@@ -73,6 +71,7 @@ struct FinishedRun {
   const daemon::SweepProcessor& processor;
   daemon::SweepCounters sweeps;
   const RunFigures& figures;
+  Stamp capture_start;       ///< which times are told from, as --fail has them
   Duration duration;         ///< of the recording
   daemon::MachineTime spent; ///< without what it took to compare with the truth
   const Accuracy& accuracy;

@@ -33,7 +33,7 @@ export function ablation(figure, width) {
   const x = scaleLinear([kMargin.left, width - kMargin.right]).domain([0, span_s]);
   const y = metreScale(min(errors_m), max(errors_m), [height - kMargin.bottom, kMargin.top]);
   bottomAxis(svg, x, {y: height - kMargin.bottom, height: height - kMargin.bottom - kMargin.top,
-                      ticks: timeTicks(span_s, width / 90), format: (s) => clock(s)});
+                      ticks: timeTicks(0, span_s, width / 90), format: (s) => clock(s)});
   leftAxis(svg, y, {x: kMargin.left, width: width - kMargin.left - kMargin.right, count: 4});
   for (const {result, className} of drawn) {
     const {t_s, error_m} = result.position_error;

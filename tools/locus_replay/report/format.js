@@ -41,10 +41,11 @@ export function duration(seconds) {
 }
 
 /** Round instants in a span of time, about `wanted` of them. */
-export function timeTicks(span_s, wanted) {
+export function timeTicks(begin_s, end_s, wanted) {
   const steps = [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 43200];
-  const step = steps.find((candidate) => span_s / candidate <= wanted) ?? 86400;
-  return Array.from({length: Math.floor(span_s / step + 1e-9) + 1}, (_, i) => i * step);
+  const step = steps.find((candidate) => (end_s - begin_s) / candidate <= wanted) ?? 86400;
+  const first = Math.ceil(begin_s / step - 1e-9), last = Math.floor(end_s / step + 1e-9);
+  return Array.from({length: last - first + 1}, (_, i) => (first + i) * step);
 }
 
 /** Keeps a name that somebody chose from running over what is beside it. */

@@ -4,8 +4,9 @@
 export const run = JSON.parse(document.getElementById("run").textContent);
 export const summary = run.summary;
 
-/** Time of the last sweep, in seconds after the first. */
-export const duration_s = run.path?.t.at(-1) ?? 0;
+/** Times of the sweep before the first and of the last sweep, in seconds after the start of the capture. */
+export const begin_s = Math.max((run.path?.t[0] ?? 0) - (run.period_s ?? 0), 0);
+export const end_s = run.path?.t.at(-1) ?? 0;
 
 /** The tiles of the map: centres, unit normals, and the side of a tile. */
 export const map = run.map ? decode(run.map) : {count: 0};

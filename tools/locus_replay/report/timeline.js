@@ -8,7 +8,7 @@ import {line} from "d3-shape";
 import {cursor, moveCursor, nearest, onCursor} from "./cursor.js";
 import {bottomAxis, canvasOf, leftAxis, legend} from "./drawing.js";
 import {clock, figure as written, lengthUnit, shortened, timeTicks} from "./format.js";
-import {duration_s, run, summary} from "./run.js";
+import {begin_s, end_s, run, summary} from "./run.js";
 
 const kMargin = {
   top: 6,
@@ -36,13 +36,14 @@ export function timeline(figure, width) {
   const bottom = bands_top + bands.length * kBand.pitch;
   const svg = canvasOf(
       figure, width, bottom + kMargin.bottom, "Error, deviation, speed and cost over time, and health of the sources");
-  const x = scaleLinear([kMargin.left, width - kMargin.right]).domain([0, Math.max(duration_s, run.period_s, 1e-3)]);
+  const shown_s = Math.max(end_s - begin_s, run.period_s, 1e-3);
+  const x = scaleLinear([kMargin.left, width - kMargin.right]).domain([begin_s, begin_s + shown_s]);
 
   bottomAxis(svg, x, {
     y: bottom,
     height: bottom - kMargin.top,
-    ticks: timeTicks(duration_s, width / 80),
-    format: (t) => (duration_s < 10 ? `${written(t)} s` : clock(t))
+    ticks: timeTicks(begin_s, end_s, width / 80),
+    format: (t) => (end_s < 10 ? `${written(t)} s` : clock(t))
   });
   const readings = panels.map(
       (panel, i) =>
@@ -174,7 +175,7 @@ function drawCursor(svg, x, bottom, readings) {
     for (const read of readings) read(t);
   });
 
-  const within = (t) => Math.min(Math.max(t, 0), duration_s);
+  const within = (t) => Math.min(Math.max(t, begin_s), end_s);
   svg.attr("tabindex", 0).node().addEventListener("pointermove", (event) => {
     const box = svg.node().getBoundingClientRect();
     moveCursor(within(x.invert(event.clientX - box.left)));
@@ -183,7 +184,7 @@ function drawCursor(svg, x, bottom, readings) {
   svg.node().addEventListener("keydown", (event) => {
     const step = {ArrowLeft: -1, ArrowRight: 1}[event.key];
     if (step)
-      moveCursor(within((cursor() ?? 0) + step * duration_s / 200));
+      moveCursor(within((cursor() ?? begin_s) + step * (end_s - begin_s) / 200));
     else if (event.key === "Escape")
       moveCursor(null);
     else
