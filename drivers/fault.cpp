@@ -125,6 +125,8 @@ bool parse_window(std::string_view text, Fault& fault) {
 
 } // namespace
 
+std::string_view to_string(FaultKind kind) { return traits_of(kind).name; }
+
 Expected<Fault, std::string> Fault::parse(std::string_view text) {
   const std::size_t colon = text.find(':');
   const std::size_t at = text.rfind('@');

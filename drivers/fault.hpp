@@ -27,6 +27,9 @@ enum class FaultKind : std::uint8_t {
   duplicate,   ///< `value` percent of the messages arrive twice (10)
 };
 
+/// As users write it: clock-step.
+std::string_view to_string(FaultKind kind);
+
 /// A fault to inject into the recording of one sensor, as users write it: `NAME:KIND[=VALUE]@T[-T1]`, for example
 /// `front:lost@10-20` or `wio:jump=5@30`. KIND is named as in FaultKind with - for _; the defaults of VALUE stand
 /// there.
@@ -38,6 +41,9 @@ struct Fault {
   double value = 0.0;
   Duration from{};                  ///< after the start of the capture
   Duration until = Duration::max(); ///< the first instant at which all is well again
+
+  /// Whether it befalls the lidar of this name.
+  [[nodiscard]] bool strikes_lidar(std::string_view lidar) const { return name == lidar || name == kAllLidars; }
 
   /// Fails with one line for the user: what is wrong with the text, what is accepted.
   static Expected<Fault, std::string> parse(std::string_view text);

@@ -168,13 +168,23 @@ TEST(Faults, WithoutLidarTheMotionSourcesCarryOnFlaggedAndLidarFindsTheMapAgain)
   EXPECT_LT(variance_of_x(path.size() - 1), variance_of_x(40)) << "lidar has made up for what was gathered";
 }
 
+/// Nothing is wrong with the capture then, nor with the configuration.
+TEST(Faults, ThatLeaveNoPacketAreNamedAsTheReason) {
+  const Replay replay = replay_with("all-lidars:lost@0");
+  EXPECT_EQ(replay.run().status, 1);
+  EXPECT_EQ(lines_of(replay.run().err).size(), 1U) << replay.run().err;
+  EXPECT_NE(replay.run().err.find("no valid data packet: --fail all-lidars:lost keeps all "), std::string::npos)
+      << replay.run().err;
+}
+
 TEST(Faults, OneOfTwoLidarsMayDieAndComeBack) {
   const TemporaryFolder folder;
   write_room_drive(folder.path(), seconds{6}, 2);
   const auto whole = Replay({folder.path().string()}).trajectory();
   for (const std::string fault : {"front:lost@2-4", "rear:lost@2-4", "front:lost@0", "rear:lost@0"}) {
     const Replay replay({folder.path().string(), "--fail", fault});
-    ASSERT_EQ(replay.run().status, 0) << replay.run().err;
+    ASSERT_EQ(replay.run().status, 0);
+    EXPECT_EQ(replay.run().err, "") << "it was asked for";
     EXPECT_EQ(replay.summary()["sweeps"]["failed"], 0) << fault;
     const auto path = replay.trajectory();
     ASSERT_NEAR(static_cast<double>(path.size()), static_cast<double>(whole.size()), 2);

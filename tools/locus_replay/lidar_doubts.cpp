@@ -33,6 +33,24 @@ std::optional<velodyne::Model> other_model(const LidarInput& lidar) {
   return lidar.options().model && recognised != lidar.options().model ? recognised : std::nullopt;
 }
 
+/// The faults that can keep every packet of a lidar back, as --fail has them.
+std::vector<std::string> losses_of(const LidarInput& lidar, const Recording& recording) {
+  std::vector<std::string> losses;
+  for (const Fault& fault : recording.faults()) {
+    const bool can_lose_all = fault.kind == FaultKind::lost || fault.kind == FaultKind::packet_loss;
+    if (can_lose_all && fault.strikes_lidar(lidar.options().name))
+      losses.push_back(fmt::format("{}:{}", fault.name, to_string(fault.kind)));
+  }
+  return losses;
+}
+
+/// Packets went to its port, and none of them came to it: what --fail asked for. Position packets may be another's.
+bool lost_by_request(const LidarInput& lidar, const Recording& recording) {
+  const auto listens = [&](const auto& entry) { return lidar.listens_to(entry.first); };
+  return lidar.counters().received == lidar.counters().position && !losses_of(lidar, recording).empty() &&
+         std::ranges::any_of(recording.traffic(), listens);
+}
+
 std::string not_heard(const LidarInput& lidar, const Recording& recording, const LidarRouter& lidars) {
   const LidarOptions& options = lidar.options();
   std::string line = fmt::format("lidar {}: no valid data packet to port {}", options.name, options.port);
@@ -72,6 +90,11 @@ std::string why_no_data(const Recording& recording, const LidarRouter& lidars) {
   if (!is_configured(lidars, port))
     return fmt::format("{} packets to port {}, configured {}; use --set lidars.0.port={}", busiest.data_packet_sized,
                        port, first.port, port);
+  const LidarInput& lidar =
+      *std::ranges::find_if(lidars.lidars(), [port = port](const LidarInput& l) { return l.listens_to(port); });
+  if (lost_by_request(lidar, recording))
+    return fmt::format("--fail {} keeps all {} packets to port {} back; let some through, for example with @10-20",
+                       fmt::join(losses_of(lidar, recording), " and "), busiest.data_packet_sized, port);
   const PacketCounters total = lidars.total();
   if (first.source_ip && total[PacketError::sender] > 0)
     return fmt::format("{} packets to port {} come from {}, configured {}; use --set lidars.0.source_ip={}",
@@ -87,7 +110,7 @@ std::string why_no_data(const Recording& recording, const LidarRouter& lidars) {
 std::vector<std::string> lidar_warnings(const Recording& recording, const LidarRouter& lidars) {
   std::vector<std::string> warnings;
   for (const LidarInput& lidar : lidars.lidars()) {
-    if (lidar.counters().data == 0)
+    if (lidar.counters().data == 0 && !lost_by_request(lidar, recording))
       warnings.push_back(not_heard(lidar, recording, lidars));
     if (const auto model = other_model(lidar))
       warnings.push_back(fmt::format("lidar {0}: configured as {1}, but its packets are those of a {2}, and read as a "

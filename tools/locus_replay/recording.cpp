@@ -48,7 +48,7 @@ void check_faults(const std::vector<Fault>& faults, const Config& config) {
 Recording::Recording(Capture capture, std::vector<MotionRecording> motion, const Config& config, LidarRouter lidars,
                      const PlayOptions& options)
     : capture_(std::move(capture)), lidars_(std::move(lidars)), play_for_(options.duration), head_(capture_.next()),
-      capture_start_(head_ != nullptr ? head_->receive_stamp : Stamp{}) {
+      capture_start_(head_ != nullptr ? head_->receive_stamp : Stamp{}), injected_(options.faults) {
   begin_ = capture_start_ + options.start;
   end_ = play_for_ ? begin_ + *play_for_ : Stamp::max();
   if (!options.faults.empty())

@@ -53,6 +53,7 @@ class Recording : public daemon::InputSource {
   [[nodiscard]] double progress() const { return progress_.load(std::memory_order_relaxed); }
 
   [[nodiscard]] const Capture& capture() const { return capture_; }
+  [[nodiscard]] const std::vector<Fault>& faults() const { return injected_; }
   /// When its first datagram came: what --start and the seconds of faults count from.
   [[nodiscard]] Stamp capture_start() const { return capture_start_; }
   /// From the first to the last datagram played.
@@ -90,6 +91,7 @@ class Recording : public daemon::InputSource {
   Stamp capture_start_;
   Stamp begin_, end_; ///< of the part that is played
   bool capture_is_over_ = false;
+  std::vector<Fault> injected_;
   std::optional<DatagramFaults> faults_;
   std::deque<OwnedDatagram> faulty_; ///< came out of the faults, not given out yet
   OwnedDatagram given_out_;
