@@ -322,10 +322,13 @@ template <class Sample> Expected<std::vector<Sample>, std::string> read_samples(
 
 Expected<std::vector<StampedPose>, std::string> read_trajectory(const std::filesystem::path& file) {
   RowReader<OdometrySample> reader = open_table<OdometrySample>(file);
+  constexpr double kFarthest_m = 1e8; // geocentric coordinates are within it, and their squares are numbers
   std::vector<StampedPose> poses;
   for (OdometrySample sample; reader.next(sample);) {
     if (!sample.T_source_base.finite()) {
       reader.report("the pose is not finite; remove the line");
+    } else if (sample.T_source_base.translation.cwiseAbs().maxCoeff() > kFarthest_m) {
+      reader.report("the position is more than 100000 km from the origin; write metres, or remove the line");
     } else if (!poses.empty() && sample.stamp <= poses.back().stamp) {
       reader.report("its time is not after that of the pose before; sort the lines by time and keep one of each");
     }

@@ -270,6 +270,9 @@ TEST(MotionFiles, TrajectoryThatCannotBeMeasuredByIsRefusedWithItsLine) {
   EXPECT_TRUE(contains(error_of(trajectory_from(good + "11 nan 0 0 0 0 0 1\n")), "gt.tum:2: the pose is not finite"));
   EXPECT_TRUE(contains(error_of(trajectory_from(good + "11 0 0 0 nan 0 0 1\n")), "gt.tum:2: the pose is not finite"));
   EXPECT_TRUE(contains(error_of(trajectory_from(good + "11 0 inf 0 0 0 0 1\n")), "gt.tum:2: the pose is not finite"));
+  EXPECT_TRUE(contains(error_of(trajectory_from(good + "11 0 -1e300 0 0 0 0 1\n")),
+                       "gt.tum:2: the position is more than 100000 km from the origin"));
+  EXPECT_TRUE(trajectory_from(good + "11 4e6 -5e6 2e6 0 0 0 1\n")) << "geocentric";
   EXPECT_TRUE(contains(error_of(trajectory_from(good + "\n9 0 0 0 0 0 0 1\n")), "gt.tum:3: its time is not after"));
   EXPECT_TRUE(contains(error_of(trajectory_from(good + good)), "gt.tum:2: its time is not after"));
   EXPECT_TRUE(contains(error_of(trajectory_from(good + "11 0 0 0\n")), "gt.tum:2: 4 columns"));
