@@ -59,6 +59,7 @@ TEST(FaultFigures, TellOfFlagsGrowthAndTheSourcesThemselves) {
   std::erase_if(sources.odometry, [](const CaptureFolder::Source& source) { return source.name != "wio"; });
 
   const auto figures = fault_figures({10, 20}, folder.path(), sources);
+  EXPECT_NEAR(figures["length_m"].get<double>(), 20.0, 1e-9);
   EXPECT_NEAR(figures["added_m"].get<double>(), 0.0, 1e-9);
   EXPECT_NEAR(figures["told"].get<double>(), 6.0 / 11.0, 1e-9) << "since the interval's beginning";
   EXPECT_NEAR(figures["growth"]["along"].get<double>(), 4.0, 1e-9) << "from 5 m to 20 m";

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "drivers/fault.hpp"
+#include "locus_sim/trajectory.hpp"
 
 namespace locus::experiments {
 namespace {
@@ -47,6 +48,15 @@ TEST(FaultPlan, EveryFaultIsOneThatReplayKnowsAndIsWatchedWhileItLasts) {
       EXPECT_TRUE(fault->until == Duration::max() || fault->until == from_seconds(run.watched->until_s));
     }
   }
+}
+
+TEST(FaultPlan, HourOfTheLidarEndsEarlyOnEveryCourse) {
+  const auto row = std::ranges::find(fault_cases(), "hour_rollover", &FaultCase::configuration);
+  const auto fault = Fault::parse(row->faults.front() + "@0");
+  ASSERT_TRUE(fault) << fault.error();
+  const Duration begins = sim::Start{}.stamp.time_since_epoch() + from_seconds(fault->value);
+  const Duration until_the_hour = std::chrono::hours{1} - begins % std::chrono::hours{1};
+  EXPECT_EQ(until_the_hour, std::chrono::seconds{20});
 }
 
 TEST(FaultPlan, FaultsBeginAtHalfTime) {

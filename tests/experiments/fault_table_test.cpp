@@ -17,7 +17,8 @@ Results run(const std::string& course, const std::string& configuration, double 
                     {"sources", {{"wio", {{"health_changes", 0}}}, {"imu", {{"health_changes", 0}}}}},
                     {"ape_m", {{"mean", ape_m}}},
                     {"covariance", {{"nees_10m", 6.0}, {"worst_sigma", 2.0}}}};
-  run["fault"] = {{"added_m", 0.0},
+  run["fault"] = {{"length_m", 228.4},
+                  {"added_m", 0.0},
                   {"told", 0.0},
                   {"growth", {{"along", 50.0}, {"across", 1.5}}},
                   {"sources", {{"wio", {{"added_m", 0.1}, {"ape_mean_m", 0.2}}}}}};
@@ -133,6 +134,34 @@ TEST(FaultTable, ARunThatFailedIsNoRunThatHolds) {
   EXPECT_EQ(row["broken"][0], "seed 1 did not run");
 }
 
+/// The mean of those that are left would say that all is well.
+TEST(FaultTable, RunsForTheCovariancesThatFailAreCountedAndNothingHoldsByThem) {
+  Results stood = run("honesty_2", "none", 0.1);
+  stood["summary"]["covariance"]["nees_10m"] = nullptr;
+  const Results crashed{{"course", "honesty_3"}, {"configuration", "none"}, {"failed", "it crashed"}};
+  Results results{{"version", "1"},
+                  {"simulated", true},
+                  {"duration_s", 60},
+                  {"runs", {run("honesty_1", "none", 0.1), stood, crashed}},
+                  {"faults", {{"seeds", 1}, {"consistency_runs", 3}}}};
+  judge_faults(results);
+  const Results& consistency = results["faults"]["consistency"];
+  EXPECT_EQ(consistency["runs"], 1);
+  EXPECT_EQ(consistency["failed"], 2);
+  EXPECT_FALSE(consistency["holds"]);
+  const std::string text = fault_table(results);
+  EXPECT_NE(text.find("**does not hold**; 2 more runs failed."), std::string::npos) << text;
+}
+
+TEST(FaultTable, ASweepMayFailWhileALateLidarIsSilent) {
+  Results late = run("urban_1", "lidar_late", 0.1);
+  late["summary"]["sweeps"]["failed"] = 3;
+  const Results without = run("urban_1", "none", 0.1);
+  EXPECT_TRUE(row_of({without, late}, "urban", "lidar_late")["holds"]);
+  late["summary"]["sweeps"]["failed"] = 4;
+  EXPECT_EQ(row_of({without, late}, "urban", "lidar_late")["broken"][0], "sweeps fail");
+}
+
 TEST(FaultTable, SaysInMarkdownWhatHoldsAndWhatDoesNot) {
   Results results{{"version", "1"},
                   {"simulated", true},
@@ -144,8 +173,9 @@ TEST(FaultTable, SaysInMarkdownWhatHoldsAndWhatDoesNot) {
   judge_faults(results);
   const std::string text = fault_table(results);
   EXPECT_NE(text.find("a machine. 1 of 2 rows hold."), std::string::npos) << text;
-  EXPECT_NE(text.find("| none | husky, plant | 2.0 | 2.0 | error <= 20.0 mm | 2.0 mm | yes | 0, 0 |  | 2.0 | 6.0 |"),
-            std::string::npos)
+  EXPECT_NE(
+      text.find("| none | husky, plant, 228 m | 2.0 | 2.0 | error <= 20.0 mm | 2.0 mm | yes | 0, 0 |  | 2.0 | 6.0 |"),
+      std::string::npos)
       << text;
   EXPECT_NE(text.find("| **no**: more error than allowed |"), std::string::npos) << text;
   EXPECT_NE(text.find("mean over 2 seeded runs of 60 s, is 6.0"), std::string::npos) << text;

@@ -63,6 +63,20 @@ std::vector<Row> read_rows(const std::filesystem::path& file) {
   return rows;
 }
 
+/// In steps of a second: a robot that shakes does not get anywhere.
+double driven_m(std::span<const StampedPose> truth) {
+  constexpr Duration kStep = std::chrono::seconds{1};
+  double sum_m = 0.0;
+  const StampedPose* last = &truth.front();
+  for (const StampedPose& pose : truth) {
+    if (pose.stamp - last->stamp < kStep && &pose != &truth.back())
+      continue;
+    sum_m += (pose.T_source_base.translation - last->T_source_base.translation).norm();
+    last = &pose;
+  }
+  return sum_m;
+}
+
 double share_told(std::span<const Row> rows) {
   const auto told = std::ranges::count_if(
       rows, [](const Row& row) { return row.state == "degenerate" || row.state == "dead_reckoning"; });
@@ -120,7 +134,8 @@ ordered_json fault_figures(const Interval& interval, const std::filesystem::path
                   fmt::format("{}: odometry.tum and odometry.csv differ in length; run again", run_folder.string()));
   const Stamp from = truth.front().stamp + from_seconds(interval.from_s);
   const auto before = std::ranges::lower_bound(estimates, from, {}, &StampedPose::stamp) - estimates.begin();
-  ordered_json figures{{"added_m", error_added_m(estimates, truth, interval)},
+  ordered_json figures{{"length_m", driven_m(truth)},
+                       {"added_m", error_added_m(estimates, truth, interval)},
                        {"told", share_told(std::span{rows}.subspan(static_cast<std::size_t>(before)))},
                        {"growth", growth(rows, estimates)},
                        {"sources", ordered_json::object()}};

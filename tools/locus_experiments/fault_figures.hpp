@@ -13,11 +13,12 @@
 namespace locus::experiments {
 
 /// What the table of faults wants to know of a run beyond its summary:
-/// {"added_m", "told", "growth": {"along", "across"}, "sources": {NAME: {"added_m", "ape_mean_m"}}}.
+/// {"length_m", "added_m", "told", "growth": {"along", "across"}, "sources": {NAME: {"added_m", "ape_mean_m"}}}.
 ///
-/// added_m is the error of the motion across the interval; told the share of sweeps flagged as degenerate or dead
-/// reckoning since its beginning; growth by how much the variance of the position along the way and across it has grown
-/// from 5 m of way to the farthest place; sources the same errors of the motion sources alone. Throws tools::Failure.
+/// length_m is the way that the robot goes; added_m is the error of the motion across the interval; told the share of
+/// sweeps flagged as degenerate or dead reckoning since its beginning; growth by how much the variance of the position
+/// along the way and across it has grown from 5 m of way to the farthest place; sources the same errors of the motion
+/// sources alone. Throws tools::Failure.
 nlohmann::ordered_json fault_figures(const Interval& interval, const std::filesystem::path& run_folder,
                                      const CaptureFolder& capture);
 

@@ -97,6 +97,22 @@ void add_lidar_faults(std::vector<FaultCase>& cases) {
   }
 }
 
+/// A lidar that speaks, and is not to be believed.
+void add_lidar_clock_faults(std::vector<FaultCase>& cases) {
+  const auto add = [&](const char* configuration, const char* what, const char* course, const char* fault,
+                       Lasting lasting, int silent_sweeps) {
+    cases.push_back({configuration, what, course, {fault}, lasting, Demand::unharmed, 0.2, silent_sweeps});
+  };
+  for (const char* course : {"urban", "tunnel"}) {
+    cases.push_back(
+        {"lidar_frozen", "lidar frozen", course, {"top:frozen"}, Lasting::five_seconds, Demand::carried, 1.5});
+    add("lidar_late", "lidar late=0.2", course, "top:late=0.2", Lasting::five_seconds, 3);
+    // Minutes and seconds are all that it tells: a step of an hour is none, half an hour the longest.
+    add("lidar_clock-step", "lidar clock-step=1800", course, "top:clock-step=1800", Lasting::five_seconds, 0);
+    add("hour_rollover", "hour ends on the lidar's clock", course, "top:clock-step=2780", Lasting::always, 0);
+  }
+}
+
 /// A source that says what is not so, for five seconds.
 void add_source_faults(std::vector<FaultCase>& cases) {
   const Options any{"frozen", "nan", "late=0.2", "clock-step=3600"};
@@ -192,6 +208,7 @@ const std::vector<FaultCase>& fault_cases() {
     add_without_faults(all);
     add_losses(all);
     add_lidar_faults(all);
+    add_lidar_clock_faults(all);
     add_source_faults(all);
     return all;
   }();

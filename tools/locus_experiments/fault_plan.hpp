@@ -35,6 +35,7 @@ struct FaultCase {
   Lasting lasting = Lasting::always;
   Demand demand = Demand::accurate;
   double limit = 0;
+  int silent_sweeps = 0; ///< for which the fault leaves no packet, on each seed: those may fail
 
   /// The sensors that have a fault, each once.
   [[nodiscard]] std::vector<std::string> faulty() const;

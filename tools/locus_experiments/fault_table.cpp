@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <set>
 #include <vector>
@@ -58,6 +59,7 @@ double with_m(const Pair& pair) { return ape_m(*pair.with); }
 double without_m(const Pair& pair) { return ape_m(*pair.without); }
 double difference_m(const Pair& pair) { return with_m(pair) - without_m(pair); }
 double added_m(const Pair& pair) { return pair.with->at("fault").at("added_m"); }
+double length_m(const Pair& pair) { return pair.with->at("fault").at("length_m"); }
 double told(const Pair& pair) { return pair.with->at("fault").at("told"); }
 double worst_sigma(const Pair& pair) { return pair.with->at("summary").at("covariance").at("worst_sigma"); }
 
@@ -250,7 +252,8 @@ Results judged(const FaultCase& fault_case, const Pairs& pairs) {
   std::vector<std::string> broken = verdict.broken, health;
   if (sweeps.lost > 0)
     broken.emplace_back("sweeps are lost");
-  if (fault_case.demand != Demand::carried && sweeps.failed > sweeps.failed_without)
+  const auto silent = static_cast<std::int64_t>(pairs.size()) * fault_case.silent_sweeps;
+  if (fault_case.demand != Demand::carried && sweeps.failed > sweeps.failed_without + silent)
     broken.emplace_back("sweeps fail");
   for (const std::string& source : names_of_sources(pairs)) {
     const HealthFound found = judge_health(source, health_changes(pairs, source), fault_case);
@@ -262,6 +265,7 @@ Results judged(const FaultCase& fault_case, const Pairs& pairs) {
   return {{"asked", verdict.asked},
           {"found", verdict.found},
           {"broken", broken},
+          {"length_m", median(pairs, length_m)},
           {"ape_mean_m", {{"without", median(pairs, without_m)}, {"with", median(pairs, with_m)}}},
           {"sweeps", {{"lost", sweeps.lost}, {"failed", sweeps.failed}}},
           {"health", health},
@@ -296,26 +300,28 @@ std::optional<Results> row_of(const FaultCase& fault_case, const RunsById& runs,
   return row;
 }
 
-/// {"runs", "nees_10m", "holds"} of the runs for the covariances; null without any.
+/// {"runs", "failed", "nees_10m", "median", "p90", "holds"} of the runs for the covariances; null without any. A run
+/// that gives no figure has failed, and what fails does not hold.
 Results consistency_of(const RunsById& runs, int count) {
   std::vector<double> values;
+  int failed = 0;
   for (int i = 0; i < count; ++i) {
     const Results* run = find(runs, honesty_course(i), kNoFault);
-    if (run != nullptr && !run->contains("failed") && run->at("summary").at("covariance").at("nees_10m").is_number())
+    if (run == nullptr)
+      continue;
+    if (!run->contains("failed") && run->at("summary").at("covariance").at("nees_10m").is_number())
       values.push_back(run->at("summary").at("covariance").at("nees_10m"));
+    else
+      ++failed;
   }
-  if (values.empty())
+  if (values.empty() && failed == 0)
     return nullptr;
-  double sum = 0;
-  for (const double value : values)
-    sum += value;
-  const double mean = sum / static_cast<double>(values.size());
+  const double mean =
+      std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(std::max<std::size_t>(1, values.size()));
   const tools::Quantiles quantiles(values);
-  return {{"runs", values.size()},
-          {"nees_10m", mean},
-          {"median", quantiles.at(0.5)},
-          {"p90", quantiles.at(0.9)},
-          {"holds", mean >= kHonestLeast && mean <= kHonestMost}};
+  return {{"runs", values.size()},    {"failed", failed},
+          {"nees_10m", mean},         {"median", quantiles.at(0.5)},
+          {"p90", quantiles.at(0.9)}, {"holds", failed == 0 && mean >= kHonestLeast && mean <= kHonestMost}};
 }
 
 std::string line_of(const Results& row) {
@@ -326,22 +332,24 @@ std::string line_of(const Results& row) {
     return fmt::format("| {} | {} | | | | | {} | | | | |\n", fault, course, holds);
   const Results &ape = row.at("ape_mean_m"), &sweeps = row.at("sweeps"), &nees = row.at("nees_10m");
   return fmt::format(
-      "| {} | {} | {:.1f} | {:.1f} | {} | {} | {} | {}, {} | {} | {:.1f} | {} |\n", fault, course,
-      1e3 * ape.at("without").get<double>(), 1e3 * ape.at("with").get<double>(), row.at("asked").get<std::string>(),
-      row.at("found").get<std::string>(), holds, sweeps.at("lost").get<int>(), sweeps.at("failed").get<int>(),
-      fmt::join(row.at("health").get<std::vector<std::string>>(), "; "), row.at("worst_sigma").get<double>(),
-      nees.is_number() ? fmt::format("{:.1f}", nees.get<double>()) : "");
+      "| {} | {}, {:.0f} m | {:.1f} | {:.1f} | {} | {} | {} | {}, {} | {} | {:.1f} | {} |\n", fault, course,
+      row.at("length_m").get<double>(), 1e3 * ape.at("without").get<double>(), 1e3 * ape.at("with").get<double>(),
+      row.at("asked").get<std::string>(), row.at("found").get<std::string>(), holds, sweeps.at("lost").get<int>(),
+      sweeps.at("failed").get<int>(), fmt::join(row.at("health").get<std::vector<std::string>>(), "; "),
+      row.at("worst_sigma").get<double>(), nees.is_number() ? fmt::format("{:.1f}", nees.get<double>()) : "");
 }
 
 std::string consistency_line(const Results& consistency) {
   if (consistency.is_null())
     return "";
+  const int failed = consistency.at("failed");
   return fmt::format("\nCovariances: the normalised squared error of the relative pose over 10 m, mean over {} seeded "
                      "runs of 60 s, is {:.1f} (median {:.1f}, 90 % below {:.1f}); {:.0f} to {:.0f} is asked for six "
-                     "axes: {}.\n",
+                     "axes: {}{}.\n",
                      consistency.at("runs").get<int>(), consistency.at("nees_10m").get<double>(),
                      consistency.at("median").get<double>(), consistency.at("p90").get<double>(), kHonestLeast,
-                     kHonestMost, consistency.at("holds").get<bool>() ? "holds" : "**does not hold**");
+                     kHonestMost, consistency.at("holds").get<bool>() ? "holds" : "**does not hold**",
+                     failed > 0 ? fmt::format("; {} more runs failed", failed) : "");
 }
 
 std::string machines_of(const Results& runs) {
