@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <chrono>
+#include <csignal>
 #include <set>
+#include <thread>
 
 #include <gtest/gtest.h>
 
 #include "replay/replay_run.hpp"
 #include "replay/synthetic_robot.hpp"
+#include "support/child.hpp"
 
 namespace locus::test {
 namespace {
@@ -77,6 +82,25 @@ TEST(LocusExperiments, ARunThatFailsIsNamedAndTheOthersGoOn) {
   ASSERT_EQ(results["runs"].size(), 2U);
   EXPECT_TRUE(results["runs"][0].contains("failed"));
   EXPECT_FALSE(results["runs"][1].contains("failed"));
+}
+
+bool some_program_runs_with(const std::string& word) {
+  return std::ranges::any_of(std::filesystem::directory_iterator("/proc"), [&](const auto& process) {
+    return read_text(process.path() / "cmdline").find(word) != std::string::npos;
+  });
+}
+
+/// They may be gigabytes.
+TEST(LocusExperiments, InterruptedItLeavesNoCoursesAndNoProgramBehind) {
+  const TemporaryFolder folder;
+  const std::filesystem::path courses = folder / "out/courses";
+  Child run({LOCUS_EXPERIMENTS, "--duration", "36000", "--quiet", "-o", folder / "out"});
+  for (int i = 0; i < 200 && (!std::filesystem::exists(courses) || std::filesystem::is_empty(courses)); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds{50});
+  run.signal(SIGTERM);
+  EXPECT_EQ(run.wait_for_exit(std::chrono::seconds{10}), 128 + SIGTERM) << testing::PrintToString(run.lines());
+  EXPECT_FALSE(std::filesystem::exists(courses));
+  EXPECT_FALSE(some_program_runs_with(courses.string())) << "it simulates still";
 }
 
 TEST(LocusExperiments, WrongUsageIsExplainedInOneLine) {

@@ -2,7 +2,9 @@
 #include "locus_experiments/child_process.hpp"
 
 #include <cerrno>
+#include <csignal>
 #include <fstream>
+#include <set>
 #include <system_error>
 
 #include <fcntl.h>
@@ -14,6 +16,16 @@
 
 namespace locus::experiments {
 namespace {
+
+/// The programs that run.
+struct Children {
+  std::mutex mutex;
+  std::set<pid_t> running;
+};
+Children& children() {
+  static Children all;
+  return all;
+}
 
 cpu_set_t affinity() {
   cpu_set_t set;
@@ -53,7 +65,14 @@ int spawn(const std::vector<std::string>& command, const std::filesystem::path& 
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
   posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
-  const int error = posix_spawn(&child, command.front().c_str(), &actions, nullptr, argv.data(), environ);
+  posix_spawnattr_t attributes; // signals that this program waits for are to reach the other one
+  sigset_t none;
+  sigemptyset(&none);
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
+  const int error = posix_spawn(&child, command.front().c_str(), &actions, &attributes, argv.data(), environ);
+  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   return error;
 }
@@ -84,10 +103,17 @@ std::optional<std::string> run_program(const std::vector<std::string>& command, 
                                        const std::vector<int>& cpus) {
   pid_t child = 0;
   {
+    const std::lock_guard lock(children().mutex);
     const PinnedThread pinned(cpus);
     if (const int error = spawn(command, log, child))
       return fmt::format("{}: cannot be started ({})", command.front(), std::generic_category().message(error));
+    children().running.insert(child);
   }
+  siginfo_t ignored{};
+  while (waitid(P_PID, static_cast<id_t>(child), &ignored, WEXITED | WNOWAIT) < 0 && errno == EINTR) {
+  }
+  const std::lock_guard lock(children().mutex);
+  children().running.erase(child);
   int status = 0;
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
@@ -97,6 +123,16 @@ std::optional<std::string> run_program(const std::vector<std::string>& command, 
     return fmt::format("{}: ended by signal {}", command.front(), WTERMSIG(status));
   const std::string said = last_line_of(log);
   return said.empty() ? fmt::format("{}: failed without a word", command.front()) : said;
+}
+
+std::unique_lock<std::mutex> end_programs() {
+  std::unique_lock lock(children().mutex);
+  for (const pid_t child : children().running) {
+    siginfo_t ignored{};
+    kill(child, SIGTERM);
+    waitid(P_PID, static_cast<id_t>(child), &ignored, WEXITED | WNOWAIT); // its starter takes note of the end
+  }
+  return lock;
 }
 
 } // namespace locus::experiments

@@ -28,14 +28,17 @@ class Board {
     for (const Task& task : tasks) {
       (task.alone ? alone_ : parallel_).push_back(&task);
       expected_s_ += task.expected_s;
+      for (const Task& next : task.then)
+        expected_s_ += next.expected_s;
     }
   }
 
-  /// The next task that may begin; nullptr at the end. Those that must be alone go to the caller who asks when the
-  /// others are over.
+  /// The next task that may begin, waiting for one while what runs may still be followed by some; nullptr at the end.
+  /// Those that must be alone go to the caller who asks when the others are over.
   const Task* begin(bool alone) {
-    const std::lock_guard lock(mutex_);
+    std::unique_lock lock(mutex_);
     std::deque<const Task*>& tasks = alone ? alone_ : parallel_;
+    may_begin_.wait(lock, [&] { return !tasks.empty() || running_.empty(); });
     if (tasks.empty())
       return nullptr;
     const Task* const task = tasks.front();
@@ -48,7 +51,10 @@ class Board {
     std::erase_if(running_, [&](const Running& running) { return running.task == task; });
     done_s_ += task->expected_s;
     finished_.push_back(task->name);
+    for (auto next = task->then.rbegin(); next != task->then.rend(); ++next)
+      (next->alone ? alone_ : parallel_).push_front(&*next);
     changed_.notify_one();
+    may_begin_.notify_all();
   }
   void leave() {
     const std::lock_guard lock(mutex_);
@@ -78,7 +84,7 @@ class Board {
   };
 
   std::mutex mutex_;
-  std::condition_variable changed_;
+  std::condition_variable changed_, may_begin_;
   std::deque<const Task*> parallel_, alone_;
   std::vector<Running> running_;
   std::vector<std::string> finished_;

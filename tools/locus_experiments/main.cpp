@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // locus-experiments: the evaluation of the LOCUS paper in one page.
 #include <algorithm>
+#include <csignal>
 #include <exception>
+#include <iterator>
 #include <map>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <thread>
 #include <vector>
 
 #include <fmt/format.h>
@@ -58,15 +61,16 @@ class Experiments {
       : arguments_(arguments), plan_(std::move(plan)), replay_(sibling("locus-replay")) {}
 
   Results carry_out() {
-    simulate();
-    replay();
+    conduct(tasks(), arguments_.jobs, arguments_.quiet);
     return results();
   }
 
  private:
-  void simulate();
-  void replay();
+  [[nodiscard]] std::vector<Task> tasks();
+  [[nodiscard]] Task simulation_of(const Course& course);
+  [[nodiscard]] std::vector<Task> runs_on(const Course& course);
   void carry_out(const Run& run);
+  void leave(const Course& course);
   [[nodiscard]] std::optional<std::string> why_impossible(const Run& run) const;
   [[nodiscard]] const Course& course_of(const Run& run) const {
     return *std::ranges::find(plan_.courses, run.course, &Course::name);
@@ -79,36 +83,56 @@ class Experiments {
   std::mutex mutex_;
   std::map<std::string, std::string> broken_courses_; ///< by name, why
   std::map<std::string, Results> done_;               ///< by Run::id()
+  std::map<std::string, int> runs_left_;              ///< on a course, by its name
 };
 
-void Experiments::simulate() {
+/// A course is simulated when there is somebody to drive on it, and is gone after the last: only a few of them lie on
+/// the disk at a time.
+std::vector<Task> Experiments::tasks() {
+  make_folder(arguments_.output / "courses");
   std::vector<Task> tasks;
   for (const Course& course : plan_.courses) {
-    if (course.simulation.empty())
-      continue;
-    make_folder(course.folder);
-    std::vector<std::string> command{sibling("locus-sim")};
-    command.insert(command.end(), course.simulation.begin(), course.simulation.end());
-    command.insert(command.end(), {"-o", course.folder.string()});
-    const std::filesystem::path log = course.folder.string() + ".log";
-    tasks.push_back({"simulated " + course.name, arguments_.duration_s / kSimulationSpeed, false, [=, this, &course] {
-                       if (const auto problem = run_program(command, log)) {
-                         const std::lock_guard lock(mutex_);
-                         broken_courses_[course.name] = *problem;
-                       }
-                     }});
+    std::vector<Task> runs = runs_on(course);
+    runs_left_[course.name] = static_cast<int>(runs.size());
+    if (course.simulation.empty()) {
+      std::ranges::move(runs, std::back_inserter(tasks));
+    } else {
+      tasks.push_back(simulation_of(course));
+      tasks.back().then = std::move(runs);
+    }
   }
-  conduct(tasks, arguments_.jobs, arguments_.quiet);
+  return tasks;
 }
 
-void Experiments::replay() {
+Task Experiments::simulation_of(const Course& course) {
+  std::vector<std::string> command{sibling("locus-sim")};
+  command.insert(command.end(), course.simulation.begin(), course.simulation.end());
+  command.insert(command.end(), {"-o", course.folder.string()});
+  return {"simulated " + course.name, arguments_.duration_s / kSimulationSpeed, false, [=, this] {
+            if (const auto problem = run_program(command, course.folder.string() + ".log")) {
+              const std::lock_guard lock(mutex_);
+              broken_courses_[course.name] = *problem;
+            }
+          }};
+}
+
+std::vector<Task> Experiments::runs_on(const Course& course) {
   std::vector<Task> tasks;
   for (const Run& run : plan_.runs) {
     const bool paced = run.paced_cpus > 0;
-    tasks.push_back({"ran " + run.id(), paced ? arguments_.pace_s : arguments_.duration_s / kReplaySpeed, paced,
-                     [&run, this] { carry_out(run); }});
+    if (run.course == course.name)
+      tasks.push_back({"ran " + run.id(), paced ? arguments_.pace_s : arguments_.duration_s / kReplaySpeed, paced,
+                       [&run, this] { carry_out(run); }});
   }
-  conduct(tasks, arguments_.jobs, arguments_.quiet);
+  return tasks;
+}
+
+/// A run on it is over. The last one takes along what was simulated.
+void Experiments::leave(const Course& course) {
+  const bool over = --runs_left_[course.name] == 0;
+  std::error_code ignored;
+  if (over && !course.simulation.empty() && !arguments_.keep_captures)
+    std::filesystem::remove_all(course.folder, ignored);
 }
 
 std::optional<std::string> Experiments::why_impossible(const Run& run) const {
@@ -148,6 +172,7 @@ void Experiments::carry_out(const Run& run) {
   }
   const std::lock_guard lock(mutex_);
   done_[run.id()] = std::move(result);
+  leave(course);
 }
 
 Results Experiments::results() const {
@@ -176,8 +201,29 @@ std::string failures_in(const Results& results) {
   return lines;
 }
 
+/// When somebody ends this program: ends the programs that it runs, takes the courses away, which may be gigabytes, and
+/// ends as others do. To be called before there are threads.
+void leave_nothing_when_interrupted(const std::filesystem::path& courses) {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  std::thread([=] {
+    int signal = 0;
+    sigwait(&signals, &signal);
+    const auto none_goes_on = end_programs();
+    std::error_code ignored;
+    std::filesystem::remove_all(courses, ignored);
+    pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
+    raise(signal);
+  }).detach();
+}
+
 void run(const Arguments& arguments) {
   make_folder(arguments.output);
+  if (arguments.merge.empty() && !arguments.keep_captures)
+    leave_nothing_when_interrupted(arguments.output / "courses");
   const Results results =
       arguments.merge.empty() ? Experiments(arguments, make_plan(arguments)).carry_out() : merged(arguments.merge);
   const std::filesystem::path page = write_results(arguments.output, results);
