@@ -164,39 +164,24 @@ INSTANTIATE_TEST_SUITE_P(Dds, Peers, testing::Values(CYCLONE_PEER, FAST_DDS_PEER
 /// A robot is told apart from another by its prefix, or by its domain. Each says where it is by a figure of its own.
 TEST(RosLink, RobotsOnOneNetworkAreToldApart) {
   const test::DdsDomain domain, other_domain;
-  std::vector<std::unique_ptr<RosLink>> robots;
-  for (const auto& [number, prefix] : {std::pair{domain.number(), "/robot_7/locus"},
-                                       {domain.number(), "/robot_8/locus"},
-                                       {other_domain.number(), "/robot_7/locus"}}) {
-    Config config;
-    config.dds.domain = number;
-    config.dds.prefix = prefix;
-    robots.push_back(std::make_unique<RosLink>(config, [](const RosInput&) {}));
-  }
-  const test::Child listener({CYCLONE_PEER, std::to_string(domain.number()), "listen", "/robot_7/locus"});
-  const test::Child other({CYCLONE_PEER, std::to_string(other_domain.number()), "listen", "/robot_7/locus"});
-  const auto heard_all = [&] {
-    return listener.lines_of("odometry").size() >= 20 && other.lines_of("odometry").size() >= 20;
+  RosLink robot(config_in(domain), [](const RosInput&) {}), other(config_in(other_domain), [](const RosInput&) {});
+  const auto peer_of = [](const test::DdsDomain& d, const char* prefix) {
+    return test::Child({CYCLONE_PEER, std::to_string(d.number()), "listen", prefix});
   };
+  const test::Child hears_robot = peer_of(domain, "/robot_7/locus"),
+                    hears_other = peer_of(other_domain, "/robot_7/locus");
+  const test::Child hears_none = peer_of(domain, "/robot_8/locus");
   EXPECT_TRUE(eventually([&] {
-    for (std::size_t i = 0; i < robots.size(); ++i) {
-      OdometryReport report;
-      report.T_odom_base.translation.x() = static_cast<double>(i);
-      robots[i]->publish(report, TrackingState::tracking);
-    }
+    robot.publish(report(1), TrackingState::tracking);
+    other.publish(report(2), TrackingState::tracking);
     std::this_thread::sleep_for(milliseconds{20});
-    return heard_all();
+    return hears_robot.lines_of("odometry").size() >= 20 && hears_other.lines_of("odometry").size() >= 20;
   }));
-  const auto only_hears = [](const test::Child& peer, double robot) {
-    for (const std::string& line : peer.lines_of("odometry")) {
-      std::istringstream row(line);
-      double t = 0, x = 0;
-      row >> t >> x;
-      EXPECT_EQ(x, robot);
-    }
-  };
-  only_hears(listener, 0);
-  only_hears(other, 2);
+  const auto sent = [](const std::string& line) { return line.substr(0, line.find(' ', line.find(' ') + 1)); };
+  for (const std::string& line : hears_robot.lines_of("odometry"))
+    EXPECT_EQ(sent(line), sent(hears_robot.lines_of("odometry").front()));
+  EXPECT_NE(sent(hears_robot.lines_of("odometry").front()), sent(hears_other.lines_of("odometry").front()));
+  EXPECT_TRUE(hears_none.lines_of("odometry").empty());
 }
 
 TEST(RosLink, WithoutItsInterfaceGoesOnTryingAndSaysWhichOne) {

@@ -119,10 +119,10 @@ TEST(SyntheticImu, GyroIntegratesToTheTrueRotation) {
 TEST(SyntheticImu, SpecificForceIntegratesToTheTrueVelocity) {
   const Trajectory trajectory(winding(), {}, kRough);
   SyntheticImu imu(trajectory, 1000);
-  EXPECT_NEAR(imu.next().specific_force_mps2.norm(), 9.81, 1e-9);
+  EXPECT_NEAR(imu.next().specific_force_mps2.norm(), kGravity_mps2, 1e-9);
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
   for (ImuSample now = imu.next(); now.stamp <= trajectory.end(); now = imu.next()) {
-    velocity += 1e-3 * (*now.attitude * now.specific_force_mps2 - Eigen::Vector3d{0, 0, 9.81});
+    velocity += 1e-3 * (*now.attitude * now.specific_force_mps2 - Eigen::Vector3d{0, 0, kGravity_mps2});
     ASSERT_LT((velocity - trajectory.at(now.stamp).velocity_world_mps).norm(), 0.02);
   }
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/motion_sample.hpp"
 #include "drivers/velodyne_decoder.hpp"
 #include "locus_sim/driver.hpp"
 #include "locus_sim/robot.hpp"
@@ -130,7 +131,7 @@ TEST(Imu, AccelerometerIntegratesToTheTruthWhereItIsMounted) {
     const double step_s = to_seconds(next.stamp - now.stamp);
     const Eigen::Vector3d mean_mps2 =
         (*now.attitude * now.specific_force_mps2 + *next.attitude * next.specific_force_mps2) / 2 -
-        Eigen::Vector3d{0, 0, 9.81};
+        Eigen::Vector3d{0, 0, kGravity_mps2};
     position += step_s * velocity + step_s * step_s / 2 * mean_mps2;
     velocity += step_s * mean_mps2;
   }
