@@ -51,8 +51,8 @@ class Board {
     std::erase_if(running_, [&](const Running& running) { return running.task == task; });
     done_s_ += task->expected_s;
     finished_.push_back(task->name);
-    for (auto next = task->then.rbegin(); next != task->then.rend(); ++next)
-      (next->alone ? alone_ : parallel_).push_front(&*next);
+    std::for_each(task->then.rbegin(), task->then.rend(),
+                  [&](const Task& next) { (next.alone ? alone_ : parallel_).push_front(&next); });
     changed_.notify_one();
     may_begin_.notify_all();
   }
