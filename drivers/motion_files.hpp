@@ -71,8 +71,8 @@ struct StampedPose {
   Pose T_source_base; ///< in the frame of whoever says so
 };
 
-/// TUM's table as something to measure by, so more is asked of it: finite, on Earth, in the order of time, at least one pose. Any
-/// thread.
+/// TUM's table as something to measure by, so more is asked of it: finite, on Earth, in the order of time, at least one
+/// pose. Any thread.
 Expected<std::vector<StampedPose>, std::string> read_trajectory(const std::filesystem::path& file);
 
 } // namespace locus

@@ -22,6 +22,7 @@ constexpr double kSettlingSlew = 0.05;
 constexpr double kMaxDrift = 500e-6;
 constexpr Duration kMaxOffsetError = milliseconds{5};
 constexpr Duration kMaxUtcError = milliseconds{20};
+constexpr Duration kLongestDelay = std::chrono::seconds{30}; ///< of all packets of a lidar whose time is true
 
 /// Of all times that differ from `time` by whole hours, the one closest to `target`.
 Duration nearest_hour(Duration time, Duration target) {
@@ -41,6 +42,7 @@ std::optional<SensorClock::Reading> SensorClock::read(Duration time_of_hour, Dur
       return std::nullopt;
     steps_ += anchored_ ? 1 : 0;
     anchor(time_of_hour, until_sent, receive);
+    believe_sensor(time_of_hour, receive);
     return Reading{stamp(time_of_hour, receive), Duration{}, false};
   }
   suspects_ = 0;
@@ -48,6 +50,7 @@ std::optional<SensorClock::Reading> SensorClock::read(Duration time_of_hour, Dur
   if (advance > Duration{}) {
     if (mode_ != LidarTime::sensor)
       track(sensor_time, until_sent, receive);
+    believe_sensor(sensor_time, receive);
     latest_ = sensor_time;
     latest_receive_ = receive;
   }
@@ -56,6 +59,7 @@ std::optional<SensorClock::Reading> SensorClock::read(Duration time_of_hour, Dur
 
 void SensorClock::anchor(Duration time_of_hour, Duration until_sent, Stamp receive) {
   anchored_ = true;
+  knows_utc_ = false;
   suspects_ = 0;
   latest_ = time_of_hour;
   latest_receive_ = receive;
@@ -87,32 +91,44 @@ bool SensorClock::proves_step(Duration time_of_hour) {
   return suspects_ == kProofOfStep;
 }
 
-/// Moves the offset towards the envelope. Precondition: sensor_time > latest_.
+/// Moves the offset towards the envelope, unless it is known better. Precondition: sensor_time > latest_.
 void SensorClock::track(Duration sensor_time, Duration until_sent, Stamp receive) {
   const Duration delay = receive.time_since_epoch() - until_sent - sensor_time;
   envelope_.minimum = std::min(envelope_.minimum, delay);
   const bool settled = receive >= settled_at_;
   if (receive - envelope_.span_start >= kEnvelopeSpan) {
     const Duration error = envelope_.lowest() - offset_;
-    if (settled && std::chrono::abs(error) > kMaxOffsetError) {
+    if (std::chrono::abs(error) <= kMaxUtcError)
+      agreed_at_ = receive;
+    knows_utc_ = knows_utc_ && receive - agreed_at_ <= kLongestDelay;
+    if (settled && !knows_utc_ && std::chrono::abs(error) > kMaxOffsetError) {
       ++steps_;
       offset_ += error;
     }
     envelope_ = {receive, delay, envelope_.minimum};
   }
+  if (knows_utc_)
+    return;
   const Duration most = from_seconds((settled ? kMaxDrift : kSettlingSlew) * to_seconds(sensor_time - latest_));
   offset_ += std::clamp(envelope_.lowest() - offset_, -most, most);
 }
 
+/// From here on the offset is whole hours, where the lidar's clock and the host's are both on UTC.
+void SensorClock::believe_sensor(Duration sensor_time, Stamp receive) {
+  if (mode_ != LidarTime::automatic || !synchronised_ || knows_utc_)
+    return;
+  const Duration by_reception = sensor_time + offset_;
+  const Duration by_sensor = nearest_hour(sensor_time, by_reception);
+  if (std::chrono::abs(by_sensor - by_reception) > kMaxUtcError)
+    return;
+  knows_utc_ = true;
+  agreed_at_ = receive;
+  offset_ = by_sensor - sensor_time;
+}
+
 Stamp SensorClock::stamp(Duration sensor_time, Stamp receive) const {
-  const Stamp by_reception{sensor_time + offset_};
-  if (mode_ == LidarTime::receive || (mode_ == LidarTime::automatic && !synchronised_))
-    return by_reception;
-  const Stamp reference = mode_ == LidarTime::sensor ? receive : by_reception;
-  const Stamp by_sensor{nearest_hour(sensor_time, reference.time_since_epoch())};
-  if (mode_ == LidarTime::automatic && std::chrono::abs(by_sensor - by_reception) > kMaxUtcError)
-    return by_reception;
-  return by_sensor;
+  return Stamp{mode_ == LidarTime::sensor ? nearest_hour(sensor_time, receive.time_since_epoch())
+                                          : sensor_time + offset_};
 }
 
 } // namespace locus

@@ -12,15 +12,14 @@ namespace locus {
 /// Turns a lidar's time of hour into stamps of the host's clock. The lidar's clock always is the ruler; LidarTime says
 /// what fixes its zero:
 /// - receive: the stamps of reception. A packet cannot arrive before its last firing and is sometimes late, so the
-/// lower
-///   envelope of (reception - end of packet) over the last second is the offset. It is followed at 500 ppm at most (5 %
-///   in the first second), so jitter of the network does not reach the stamps.
-/// - sensor: the time of hour itself; of all hours the one that puts the packet closest to its reception. Right as long
-/// as
-///   the host's clock is right to half an hour; the host's clock should be on UTC too, or the lidar's stamps are not
-///   those of the other sensors.
-/// - automatic: sensor while the lidar is synchronised *and* its time is within 20 ms of what reception says (else the
-///   host's clock is not on UTC, and stamps are promised to be the host's), otherwise receive.
+///   lower envelope of (reception - end of packet) over the last second is the offset. It is followed at 500 ppm at
+///   most (5 % in the first second), so jitter of the network does not reach the stamps.
+/// - sensor: the time of hour itself; of all hours the one that puts the packet closest to its reception. Right as
+///   long as the host's clock is right to half an hour; the host's clock should be on UTC too, or the lidar's stamps
+///   are not those of the other sensors.
+/// - automatic: sensor while the lidar is synchronised, otherwise receive. It begins where the lidar's time is within
+///   20 ms of what reception says (else the host's clock is not on UTC, and stamps are promised to be the host's) and
+///   does not end because packets come late, unless they do so for half a minute: no network does.
 ///
 /// A time that does not follow from the ones before is refused. When five in a row follow from each other instead, the
 /// clock was set: a step, counted, and time goes on from there. A drift that the envelope cannot be followed at (error
@@ -41,7 +40,10 @@ class SensorClock {
   std::optional<Reading> read(Duration time_of_hour, Duration until_sent, Stamp receive);
 
   /// Whether the lidar's clock is on UTC, as its position packets say.
-  void set_synchronised(bool synchronised) { synchronised_ = synchronised; }
+  void set_synchronised(bool synchronised) {
+    synchronised_ = synchronised;
+    knows_utc_ = knows_utc_ && synchronised;
+  }
 
   [[nodiscard]] std::uint64_t steps() const { return steps_; }
 
@@ -58,10 +60,13 @@ class SensorClock {
   [[nodiscard]] bool follows(Duration sensor_time, Duration until_sent, Stamp receive) const;
   bool proves_step(Duration time_of_hour);
   void track(Duration sensor_time, Duration until_sent, Stamp receive);
+  void believe_sensor(Duration sensor_time, Stamp receive);
   [[nodiscard]] Stamp stamp(Duration sensor_time, Stamp receive) const;
 
   LidarTime mode_;
   bool synchronised_ = false;
+  bool knows_utc_ = false; ///< automatic: offset_ is that of the lidar's own time
+  Stamp agreed_at_;        ///< when reception last said the same
   std::uint64_t steps_ = 0;
 
   bool anchored_ = false;

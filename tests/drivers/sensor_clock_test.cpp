@@ -138,6 +138,58 @@ TEST(SensorClock, AutomaticTakesSensorTimeOnlyWhileSynchronisedAndInAgreementWit
   EXPECT_NEAR(to_seconds(error_after(milliseconds{368}, true)), 100e-6, 2e-6) << "the host's clock is not on UTC";
 }
 
+TEST(SensorClock, PacketsThatComeLateDoNotShakeATrueTime) {
+  SensorClock clock{LidarTime::automatic};
+  clock.set_synchronised(true);
+  Link link{.sensor_ahead = milliseconds{2}};
+  for (int i = 0; i < 9000; ++i) {
+    const bool late = i >= 3000 && i < 6000;
+    const auto error = link.send(clock, late ? milliseconds{200} : microseconds{100});
+    ASSERT_TRUE(error);
+    ASSERT_LE(std::chrono::abs(*error - milliseconds{2}), microseconds{1});
+  }
+  EXPECT_EQ(clock.steps(), 0U);
+}
+
+TEST(SensorClock, PacketsThatComeLateForHalfAMinuteShowThatAClockIsWrong) {
+  SensorClock clock{LidarTime::automatic};
+  clock.set_synchronised(true);
+  Link link;
+  link.send(clock);
+  for (const Stamp end = link.now + seconds{35}; link.now < end;)
+    link.send(clock, milliseconds{50});
+  EXPECT_LT(std::chrono::abs(link.send(clock, milliseconds{50}).value() - milliseconds{50}), microseconds{150});
+  EXPECT_EQ(clock.steps(), 1U);
+}
+
+TEST(SensorClock, TrueTimeIsLeftWhenTheLockIsLostAndWhenAClockIsSet) {
+  for (const Duration step : {Duration{-milliseconds{500}}, Duration{seconds{-10}}, Duration{seconds{10}}}) {
+    SensorClock clock{LidarTime::automatic};
+    clock.set_synchronised(true);
+    Link link;
+    for (int i = 0; i < 1000; ++i)
+      link.send(clock);
+    link.sensor_ahead += step;
+    for (int i = 0; i < 1000; ++i)
+      link.send(clock);
+    EXPECT_EQ(clock.steps(), 1U);
+    EXPECT_LT(std::chrono::abs(link.send(clock).value()), microseconds{150}) << "by reception: one is not on UTC";
+    link.sensor_ahead -= step;
+    for (int i = 0; i < 1000; ++i)
+      link.send(clock);
+    EXPECT_LE(std::chrono::abs(link.send(clock).value()), microseconds{1}) << "both are again";
+  }
+  SensorClock clock{LidarTime::automatic};
+  clock.set_synchronised(true);
+  Link link{.sensor_ahead = milliseconds{2}};
+  link.send(clock);
+  clock.set_synchronised(false);
+  for (int i = 0; i < 9000; ++i)
+    link.send(clock);
+  EXPECT_LT(std::chrono::abs(link.send(clock).value()), microseconds{150});
+  EXPECT_EQ(clock.steps(), 0U) << "the zero of the ruler has moved, not the clock";
+}
+
 TEST(SensorClock, SetClockIsAStepThatIsSurvived) {
   for (const LidarTime mode : {LidarTime::receive, LidarTime::sensor}) {
     for (const Duration step : {Duration{seconds{10}}, Duration{seconds{-10}}, Duration{-milliseconds{500}}}) {

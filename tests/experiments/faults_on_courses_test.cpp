@@ -21,8 +21,7 @@ using std::chrono::milliseconds;
 const std::map<std::string, std::set<std::string>> kKnown{
     {"corridor/none", {"doubt across the way grows"}},
     {"spot/vio_kio_imu_lost", {"more error than allowed", "not flagged"}},
-    {"urban/lidar_late", {"more error than allowed"}},
-    {"tunnel/lidar_late", {"more error than allowed"}}};
+};
 
 /// Without lidar the motion sources carry the sweeps, and say so.
 const std::set<std::string> kLidarSilent{"lidar_gap", "lidar_frozen", "lidar_late"};

@@ -18,7 +18,9 @@ struct SampleRun {
   /// A moment without truth, map or motion sources.
   static SampleRun bare();
 
-  [[nodiscard]] tools::Report report() const { return {summary, config, capture_start, path_m, sweeps, map, truth, accuracy}; }
+  [[nodiscard]] tools::Report report() const {
+    return {summary, config, capture_start, path_m, sweeps, map, truth, accuracy};
+  }
 
   nlohmann::ordered_json summary;
   Config config;

@@ -57,8 +57,9 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
   const bool has_data = ingest.lidars().total().data > 0;
   const std::vector<SurfacePoint> map = points_of(processor.odometry().map());
   const Accuracy accuracy = has_data ? truth_.compare(map, !arguments_.quiet) : Accuracy{};
-  const FinishedRun run{arguments_.capture.string(), config_, ingest,  processor, sweeps, figures_,
-                        recording_.capture_start(), recording_.duration(),       spent,   accuracy};
+  const FinishedRun run{
+      arguments_.capture.string(), config_, ingest,  processor, sweeps, figures_, recording_.capture_start(),
+      recording_.duration(),       spent,   accuracy};
   const nlohmann::ordered_json figures = write_summary(run);
   warn(recording_.warnings());
   if (!has_data) {
@@ -68,8 +69,8 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
   }
   write_map(arguments_.output / "map.pcd", map);
   write_report(arguments_.output / "report.html",
-               {figures, config_, recording_.capture_start(), figures_.path_m(), sweeps_, visible_surfaces(processor.odometry().map()),
-                truth_.trajectory(), accuracy.trajectory});
+               {figures, config_, recording_.capture_start(), figures_.path_m(), sweeps_,
+                visible_surfaces(processor.odometry().map()), truth_.trajectory(), accuracy.trajectory});
   warn(lidar_warnings(recording_, ingest.lidars()));
   warn(accuracy.warnings);
   if (!arguments_.quiet)
