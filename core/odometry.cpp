@@ -350,11 +350,9 @@ void Odometry::judge_sources(const Sweep& sweep, const Prior& prior, const Pose&
   }
   if (stands)
     return;
-  if (prior.source.translation >= 0) { // of what it sees lidar teaches enough once the sources are gone
+  if (prior.source.translation >= 0) { // a robot that drove gently may yet turn sharply: lidar will see that it does
     information.setZero();
-    for (std::size_t axis = 0; axis < weak_.size(); ++axis)
-      if (const auto i = static_cast<Eigen::Index>(axis); weak_[axis])
-        information(i, i) = 1.0 / prior.variance[i];
+    information.diagonal().head<3>() = prior.variance.head<3>().cwiseInverse();
   }
   const Pose T_last_kept = se3_exp(to_seconds(sweep.end - last_stamp_) * twist_base_);
   constant_velocity_statistics_.learn(difference(T_last_now, T_last_kept), information);
