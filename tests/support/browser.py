@@ -48,6 +48,7 @@ class Browser:
             options.add_argument(argument)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
         self.driver = webdriver.Chrome(service=webdriver.chrome.service.Service(DRIVER), options=options)
+        self.driver.set_script_timeout(120)  # software draws the first page, on whatever processor is left
         self.set_size(width)
         self.set_dark(dark)
         self.driver.get(f"file://{page}")
