@@ -48,21 +48,16 @@ constexpr int kStartRounds = 3; ///< until motion and correction of the first tw
 /// Room for the 16 000 voxels of a large sweep, and small enough for the second cache.
 constexpr std::size_t kLastScanBytes = 2'500'000;
 
-Vector6 sigma(double translation_m, double rotation_deg) {
-  const double rotation_rad = rotation_deg * kRadPerDeg;
-  Vector6 s;
-  s << Eigen::Vector3d::Constant(translation_m), Eigen::Vector3d::Constant(rotation_rad);
-  return s;
-}
-
 /// A robot accelerates by 4 m/s^2 and 2 rad/s^2 in a sweep; standing must not teach that it lasts.
 const PriorExpectation kConstantVelocity{
-    .sigma = sigma(0.3, 3.0), .bias = sigma(0.3, 3.0), .least_sigma = sigma(0.02, 0.5)};
-const PriorExpectation kOdometrySource{
-    .sigma = sigma(0.02, 0.5), .bias = sigma(0.005, 0.1), .least_sigma = sigma(0.002, 0.02)};
-const PriorExpectation kInertialUnit{
-    .sigma = sigma(0.3, 0.1), .bias = sigma(0.3, 0.05), .least_sigma = sigma(0.002, 0.02)};
-const Vector6 kUnknownMotion = sigma(3.0, 10.0); ///< per sweep, of a robot of which nothing is known
+    .sigma = along_each_axis(0.3, 3.0), .bias = along_each_axis(0.3, 3.0), .least_sigma = along_each_axis(0.02, 0.5)};
+const PriorExpectation kOdometrySource{.sigma = along_each_axis(0.02, 0.5),
+                                       .bias = along_each_axis(0.005, 0.1),
+                                       .least_sigma = along_each_axis(0.002, 0.02)};
+const PriorExpectation kInertialUnit{.sigma = along_each_axis(0.3, 0.1),
+                                     .bias = along_each_axis(0.3, 0.05),
+                                     .least_sigma = along_each_axis(0.002, 0.02)};
+const Vector6 kUnknownMotion = along_each_axis(3.0, 10.0); ///< per sweep, of a robot of which nothing is known
 
 /// Block-diagonal matrix that turns both halves of a 6-vector.
 Matrix6 turn_both(const Eigen::Quaterniond& rotation) {
@@ -76,27 +71,6 @@ Vector6 difference(const Pose& T, const Pose& reference) {
   Vector6 d;
   d << T.translation - reference.translation, so3_log(T.rotation * reference.rotation.conjugate());
   return d;
-}
-
-/// What a source may be off by in a sweep before lidar objects, one standard deviation. Above what a healthy one is off
-/// by on bad ground, well below spinning wheels: a prior that is merely poor has its weight for that.
-const Vector6 kHonestError = sigma(0.01, 0.2);
-
-/// Chi-square test of the axes that lidar sees, which are those it knows better than an honest source does.
-LidarOpinion opinion_on(const Vector6& error, const Matrix6& lidar_information) {
-  constexpr double kMaxChiSquare = 38.0; ///< exceeded once in a million by six honest axes
-  double chi_square = 0.0;
-  bool sees = false;
-  for (int axis = 0; axis < 6; ++axis) {
-    const double variance = kHonestError[axis] * kHonestError[axis];
-    if (lidar_information(axis, axis) * variance < 1.0)
-      continue;
-    sees = true;
-    chi_square += error[axis] * error[axis] / (variance + 1.0 / lidar_information(axis, axis));
-  }
-  if (!sees)
-    return LidarOpinion::none;
-  return chi_square > kMaxChiSquare ? LidarOpinion::disagrees : LidarOpinion::agrees;
 }
 
 } // namespace

@@ -41,7 +41,7 @@ class Odometry {
   [[nodiscard]] bool resumed() const { return resumed_; }
 
   /// The estimate for the end of the sweep. Never fails: a sweep that cannot be registered yields the prediction,
-  /// flagged. `stop` ends a registration early.
+  /// flagged. `stop` ends a registration early, but for the one that finds where to go on.
   OdometryEstimate process(
       const Sweep& sweep, const Gicp::StopRequested& stop = [] { return false; });
 

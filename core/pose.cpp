@@ -45,6 +45,13 @@ Eigen::Vector3d so3_log(const Eigen::Quaterniond& rotation) {
   return 2.0 * std::atan2(sine, sign * rotation.w()) / sine * xyz;
 }
 
+Vector6 along_each_axis(double translation_m, double rotation_deg) {
+  const double rotation_rad = rotation_deg * kRadPerDeg;
+  Vector6 v;
+  v << Eigen::Vector3d::Constant(translation_m), Eigen::Vector3d::Constant(rotation_rad);
+  return v;
+}
+
 Pose se3_exp(const Vector6& tangent) {
   const Eigen::Vector3d w = tangent.tail<3>();
   return {so3_exp(w), left_jacobian(w) * tangent.head<3>()};

@@ -2,9 +2,8 @@
 #include "core/relocation.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <numbers>
-#include <vector>
 
 namespace locus {
 
@@ -14,8 +13,7 @@ constexpr double kFarthest_m = 0.5;
 constexpr double kAround_m = 2.0;
 
 /// One standard deviation, of the robot at each of the places.
-constexpr double kSigma_m = 0.5;
-constexpr double kSigma_rad = 5.0 * std::numbers::pi / 180.0;
+const Vector6 kSigma = along_each_axis(0.5, 5.0);
 
 constexpr double kLeast = 0.2; ///< share of the points of the sweep
 
@@ -27,11 +25,12 @@ double least_ratio(double share) {
 }
 
 /// The expected place and those around it.
-std::vector<Pose> places_around(const Pose& T_map_expected) {
-  std::vector<Pose> places;
-  for (const double ahead_m : {-kAround_m, 0.0, kAround_m})
-    for (const double aside_m : {-kAround_m, 0.0, kAround_m})
-      places.push_back(T_map_expected * Pose{Eigen::Quaterniond::Identity(), {ahead_m, aside_m, 0}});
+std::array<Pose, 9> places_around(const Pose& T_map_expected) {
+  std::array<Pose, 9> places;
+  for (int place = 0; place < 9; ++place) {
+    const Eigen::Vector3d away_m{(place / 3 - 1) * kAround_m, (place % 3 - 1) * kAround_m, 0};
+    places[static_cast<std::size_t>(place)] = T_map_expected * Pose{Eigen::Quaterniond::Identity(), away_m};
+  }
   return places;
 }
 
@@ -39,9 +38,7 @@ std::vector<Pose> places_around(const Pose& T_map_expected) {
 
 std::optional<Pose> relocate(Gicp& gicp, std::span<const SurfacePoint> scan_base, const SurfaceMap& map,
                              const Pose& T_map_expected, const RegistrationOptions& options) {
-  Vector6 sigma;
-  sigma << Eigen::Vector3d::Constant(kSigma_m), Eigen::Vector3d::Constant(kSigma_rad);
-  const Matrix6 information = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
+  const Matrix6 information = kSigma.cwiseAbs2().cwiseInverse().asDiagonal();
   std::optional<Pose> T_map_here;
   double here = 0.0, elsewhere = 0.0; // share of the points with a counterpart
   for (const Pose& T_start : places_around(T_map_expected)) {
