@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
@@ -117,20 +118,26 @@ std::optional<SavedState> from_bytes(std::string_view bytes) {
 
 } // namespace
 
+Whereabouts Whereabouts::followed_by(const OdometryEstimate& estimate) const {
+  constexpr double kMemory_s = 0.3;
+  const double elapsed_s = to_seconds(estimate.stamp - stamp);
+  const double share = elapsed_s > 0.0 ? 1.0 - std::exp(-elapsed_s / kMemory_s) : 1.0;
+  return {estimate.stamp, estimate.T_odom_base, twist_base + share * (estimate.twist_base - twist_base)};
+}
+
 Pose Whereabouts::carried_to(Stamp now) const {
   constexpr Duration kMoment = std::chrono::seconds{2};
   return T_odom_base * se3_exp(to_seconds(std::clamp(now - stamp, Duration::zero(), kMoment)) * twist_base);
 }
 
-void read_state(const Odometry& odometry, const OdometryEstimate& estimate, SavedState& state) {
-  state.last = Whereabouts(estimate);
-  state.map_odom.clear();
+void read_map(const Odometry& odometry, const Pose& T_odom_base, std::vector<SurfacePoint>& map_odom) {
+  map_odom.clear();
   const SurfaceGrid& grid = odometry.map().fine();
   for (std::size_t slot = 0; slot < grid.size(); ++slot) {
     const Surface& surface = grid.surface(slot);
     const Eigen::Vector3d point = grid.centre(slot) + surface.mean_m.cast<double>();
-    if (surface.planar() && (point - estimate.T_odom_base.translation).norm() < kInSight_m)
-      state.map_odom.push_back({point.cast<float>(), surface.normal});
+    if (surface.planar() && (point - T_odom_base.translation).norm() < kInSight_m)
+      map_odom.push_back({point.cast<float>(), surface.normal});
   }
 }
 
@@ -190,21 +197,24 @@ StateKeeper::~StateKeeper() {
     thread_.join();
 }
 
-bool StateKeeper::is_due(const OdometryEstimate& estimate) const {
-  return !last_ || estimate.stamp - last_->stamp > kEvery ||
-         (estimate.T_odom_base.translation - last_->T_odom_base.translation).norm() > kEvery_m;
+bool StateKeeper::is_due() const {
+  return !saved_ || now_->stamp - saved_->stamp > kEvery ||
+         (now_->T_odom_base.translation - saved_->T_odom_base.translation).norm() > kEvery_m;
 }
 
 void StateKeeper::take(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground) {
-  if (!file_ || (!last_ && estimate.failed))
+  now_ = now_.value_or(Whereabouts{}).followed_by(estimate);
+  if (!file_ || (!saved_ && estimate.failed))
     return;
-  if (!estimate.failed && is_due(estimate)) {
-    last_ = Whereabouts(estimate);
-    read_state(odometry, estimate, states_.back());
-    states_.back().flat_ground = flat_ground;
+  if (!estimate.failed && is_due()) {
+    saved_ = now_;
+    SavedState& state = states_.back();
+    state.last = *now_;
+    state.flat_ground = flat_ground;
+    read_map(odometry, now_->T_odom_base, state.map_odom);
     static_cast<void>(states_.publish()); // an older one that was not written yet is worth nothing any more
   }
-  whereabouts_.back() = Whereabouts(estimate);
+  whereabouts_.back() = *now_;
   static_cast<void>(whereabouts_.publish());
   wakeup_.notify();
 }

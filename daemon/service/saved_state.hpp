@@ -21,11 +21,11 @@ namespace locus::daemon {
 struct Whereabouts {
   Stamp stamp; ///< of the estimate
   Pose T_odom_base;
-  Vector6 twist_base = Vector6::Zero();
+  Vector6 twist_base = Vector6::Zero(); ///< mean of the last sweeps
 
-  Whereabouts() = default;
-  explicit Whereabouts(const OdometryEstimate& estimate)
-      : stamp(estimate.stamp), T_odom_base(estimate.T_odom_base), twist_base(estimate.twist_base) {}
+  /// After the next estimate. A single twist is not to be relied on: where a source that was wrong is lost, the sweep
+  /// after lies askew to those before.
+  [[nodiscard]] Whereabouts followed_by(const OdometryEstimate& estimate) const;
 
   /// Where it is at `now` if it goes on as before, which for more than a moment it does not.
   [[nodiscard]] Pose carried_to(Stamp now) const;
@@ -38,8 +38,8 @@ struct SavedState {
   std::vector<SurfacePoint> map_odom;
 };
 
-/// The state as it is after an estimate: the surfaces within sight.
-void read_state(const Odometry& odometry, const OdometryEstimate& estimate, SavedState& state);
+/// The map as it is after an estimate: the surfaces within sight of where the robot is.
+void read_map(const Odometry& odometry, const Pose& T_odom_base, std::vector<SurfacePoint>& map_odom);
 
 /// To a file and back, all or nothing: it is written beside the old one, which it then replaces; when read it is
 /// checked by length and checksum. Both fail with one line for the user.
@@ -70,18 +70,21 @@ class StateKeeper {
   /// Producer, one thread: after every estimate.
   void take(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground);
 
+  /// Producer: nothing before the first estimate.
+  [[nodiscard]] const std::optional<Whereabouts>& now() const { return now_; }
+
   /// Producer: what was written is no longer true; the next state is written at once.
-  void begin_anew() { last_.reset(); }
+  void begin_anew() { saved_.reset(); }
 
  private:
   void run();
-  [[nodiscard]] bool is_due(const OdometryEstimate& estimate) const;
+  [[nodiscard]] bool is_due() const;
 
   std::optional<std::filesystem::path> file_;
   Complain complain_;
   LatestSlot<SavedState> states_;
   LatestSlot<Whereabouts> whereabouts_;
-  std::optional<Whereabouts> last_; ///< of the state that was taken last; of the producer
+  std::optional<Whereabouts> now_, saved_; ///< after the last estimate, and of the state taken last; of the producer
   Wakeup wakeup_;
   std::atomic<bool> stopping_{false};
   std::thread thread_;

@@ -112,12 +112,10 @@ void Session::reset(std::optional<Pose> T_odom_base) {
 
 std::optional<SavedState> Session::stop() {
   end();
-  const std::optional<OdometryEstimate> last = figures_.snapshot().last;
-  if (!last)
+  if (!state_.now())
     return std::nullopt;
-  SavedState state;
-  read_state(pipeline_->processor().odometry(), *last, state);
-  state.flat_ground = flat_ground();
+  SavedState state{*state_.now(), flat_ground(), {}};
+  read_map(pipeline_->processor().odometry(), state.last.T_odom_base, state.map_odom);
   return state;
 }
 

@@ -22,11 +22,9 @@ status_is() { locusctl status --json | grep -qE "^ \"state\": \"($1)\""; }
 tracks() { status_is "tracking|standstill"; }
 alive() { is active ActiveState && ! is "$1" MainPID; }
 says() { journalctl --no-pager -u locusd --since "$1" | grep -q "$2"; }
-# goes_on SINCE: it tracks again, and said whether where it was; on a machine that starves the first sweep may be too thin.
-resumed=0
+# goes_on SINCE: where it was, and tracks again.
 goes_on() {
-  wait_for 20 says "$1" "resumed where the service ended\|a fresh start"
-  if says "$1" "resumed where the service ended"; then resumed=$((resumed + 1)); fi
+  wait_for 20 says "$1" "resumed where the service ended"
   wait_for 20 tracks
 }
 now() { date '+%Y-%m-%d %H:%M:%S.%N' | head -c 26; }
@@ -92,8 +90,6 @@ kill -SEGV "$process"
 wait_for 10 alive "$process"
 goes_on "$since"
 is 2 NRestarts
-echo "resumed $resumed of 3 times"
-[ $resumed -ge 1 ]
 
 step "the sandbox is in force: what may be tried in the service's place fails"
 mkdir -p /etc/systemd/system/locusd@sandbox.service.d

@@ -73,6 +73,18 @@ TEST_F(Keeper, RobotThatDrivesIsCarriedOnForAMoment) {
   EXPECT_NEAR(x_m(-seconds{1}), 3, 1e-9) << "clocks are set";
 }
 
+TEST_F(Keeper, SweepThatLiesAskewCarriesNobodyAway) {
+  constexpr double kOff_mps = 1.0;
+  OdometryEstimate estimate;
+  for (int sweep = 0; sweep < 5; ++sweep) {
+    estimate.stamp = stamp_from_ns(1'700'000'000'000'000'000) + milliseconds{100 * sweep};
+    estimate.twist_base[0] = sweep == 4 ? kOff_mps : 0.0;
+    keeper_.take(odometry_, estimate, FlatGround::off);
+  }
+  ASSERT_TRUE(keeper_.now());
+  EXPECT_LT(keeper_.now()->carried_to(estimate.stamp + seconds{1}).translation.norm(), 0.3 * kOff_mps);
+}
+
 TEST_F(Keeper, EveryDamagedByteIsNoticed) {
   SavedState state;
   state.map_odom.resize(3, {Eigen::Vector3f::Ones(), Eigen::Vector3f::UnitZ()});
