@@ -26,14 +26,11 @@ using std::chrono::seconds;
 /// So slow a world that no registration is ended by its deadline.
 constexpr double kNoHurry = 1e-3;
 
-/// Gives the drive out no faster than the odometry processes it, so that nothing is dropped.
-class PatientInput : public InputSource {
+/// A drive that waits for the pipeline now and then.
+class HeldInput : public InputSource {
  public:
-  void wait_for(const LivePipeline& pipeline) { pipeline_.store(&pipeline); }
-
   Input next(Duration timeout) override {
-    const LivePipeline* pipeline = pipeline_.load();
-    if (pipeline == nullptr || is_behind(pipeline->counters())) {
+    if (waits()) {
       std::this_thread::sleep_for(std::min<Duration>(timeout, microseconds{100}));
       return Silence{last_arrival_};
     }
@@ -43,16 +40,33 @@ class PatientInput : public InputSource {
     return input;
   }
 
- private:
-  static bool is_behind(const SweepCounters& counters) { return counters.seen > counters.processed + counters.failed; }
+ protected:
+  virtual bool waits() = 0;
 
+  std::atomic<const LivePipeline*> pipeline_{nullptr}; ///< until there is one, it waits
+
+ private:
   DriveInput drive_;
-  std::atomic<const LivePipeline*> pipeline_{nullptr};
   Stamp last_arrival_;
 };
 
+/// Gives the drive out no faster than the odometry processes it, so that nothing is dropped.
+class PatientInput : public HeldInput {
+ public:
+  void wait_for(const LivePipeline& pipeline) { pipeline_.store(&pipeline); }
+
+ private:
+  bool waits() override {
+    const LivePipeline* pipeline = pipeline_.load();
+    if (pipeline == nullptr)
+      return true;
+    const SweepCounters counters = pipeline->counters();
+    return counters.seen > counters.processed + counters.failed;
+  }
+};
+
 /// Gives the drive out up to the sweep that the test asks for.
-class MeteredInput : public InputSource {
+class MeteredInput : public HeldInput {
  public:
   /// Until the ingest has handed over so many sweeps in all, and rests.
   void hand_over(const LivePipeline& pipeline, std::uint64_t sweeps) {
@@ -62,25 +76,17 @@ class MeteredInput : public InputSource {
       std::this_thread::sleep_for(microseconds{100});
   }
 
-  Input next(Duration timeout) override {
+ private:
+  bool waits() override {
     const LivePipeline* pipeline = pipeline_.load();
     const std::uint64_t seen = pipeline != nullptr ? pipeline->counters().seen : 0;
-    if (seen >= wanted_.load()) {
-      resting_at_.store(seen); // who asks for input has handed over what it saw
-      std::this_thread::sleep_for(std::min<Duration>(timeout, microseconds{100}));
-      return Silence{last_arrival_};
-    }
-    Input input = drive_.next(timeout);
-    if (!std::holds_alternative<EndOfInput>(input))
-      last_arrival_ = arrival_of(input);
-    return input;
+    if (seen < wanted_.load())
+      return false;
+    resting_at_.store(seen); // who asks for input has handed over what it saw
+    return true;
   }
 
- private:
-  DriveInput drive_;
-  std::atomic<const LivePipeline*> pipeline_{nullptr};
   std::atomic<std::uint64_t> wanted_{0}, resting_at_{0};
-  Stamp last_arrival_;
 };
 
 /// A robot that is switched off.
