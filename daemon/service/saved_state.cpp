@@ -122,7 +122,10 @@ Whereabouts Whereabouts::followed_by(const OdometryEstimate& estimate) const {
   constexpr double kMemory_s = 0.3;
   const double elapsed_s = to_seconds(estimate.stamp - stamp);
   const double share = elapsed_s > 0.0 ? 1.0 - std::exp(-elapsed_s / kMemory_s) : 1.0;
-  return {estimate.stamp, estimate.T_odom_base, twist_base + share * (estimate.twist_base - twist_base)};
+  constexpr double kUnsure = 0.1; ///< m/s and rad/s, one standard deviation: of such a twist one half is taken
+  const Vector6 unsureness = estimate.twist_covariance.diagonal() / (kUnsure * kUnsure);
+  const Vector6 news = share * (estimate.twist_base - twist_base).array() / (1.0 + unsureness.array());
+  return {estimate.stamp, estimate.T_odom_base, twist_base + news};
 }
 
 Pose Whereabouts::carried_to(Stamp now) const {

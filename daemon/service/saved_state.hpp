@@ -21,10 +21,10 @@ namespace locus::daemon {
 struct Whereabouts {
   Stamp stamp; ///< of the estimate
   Pose T_odom_base;
-  Vector6 twist_base = Vector6::Zero(); ///< mean of the last sweeps
+  Vector6 twist_base = Vector6::Zero(); ///< mean over the last sweeps
 
-  /// After the next estimate. A single twist is not to be relied on: where a source that was wrong is lost, the sweep
-  /// after lies askew to those before.
+  /// After the next estimate. Its twist alone is not to be relied on, the less the less sure it is: where a source that
+  /// was wrong is lost, the next sweep lies askew to those before.
   [[nodiscard]] Whereabouts followed_by(const OdometryEstimate& estimate) const;
 
   /// Where it is at `now` if it goes on as before, which for more than a moment it does not.

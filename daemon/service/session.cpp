@@ -84,7 +84,8 @@ void Session::end() {
 
 /// In the odometry thread, when the estimate has left.
 void Session::after(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
-  resumed_.store(odometry.resumed() ? Resumed::yes : Resumed::no, std::memory_order_relaxed);
+  if (!estimate.failed) // a first sweep of a few points does not say yet
+    resumed_.store(odometry.resumed() ? Resumed::yes : Resumed::no, std::memory_order_relaxed);
   clouds_.take(sweep, odometry, estimate);
   state_.take(odometry, estimate, flat_ground());
   if (!map_wanted_.exchange(false, std::memory_order_relaxed))

@@ -74,15 +74,21 @@ TEST_F(Keeper, RobotThatDrivesIsCarriedOnForAMoment) {
 }
 
 TEST_F(Keeper, SweepThatLiesAskewCarriesNobodyAway) {
-  constexpr double kOff_mps = 1.0;
   OdometryEstimate estimate;
   for (int sweep = 0; sweep < 5; ++sweep) {
     estimate.stamp = stamp_from_ns(1'700'000'000'000'000'000) + milliseconds{100 * sweep};
-    estimate.twist_base[0] = sweep == 4 ? kOff_mps : 0.0;
     keeper_.take(odometry_, estimate, FlatGround::off);
   }
+  const Stamp later = estimate.stamp + seconds{2};
+  estimate.stamp += milliseconds{100};
+  estimate.twist_base[0] = -0.8;
+  keeper_.take(odometry_, estimate, FlatGround::off);
   ASSERT_TRUE(keeper_.now());
-  EXPECT_LT(keeper_.now()->carried_to(estimate.stamp + seconds{1}).translation.norm(), 0.3 * kOff_mps);
+  EXPECT_LT(keeper_.now()->carried_to(later).translation.norm(), 0.5) << "of a motion that is believed";
+  estimate.stamp += milliseconds{100};
+  estimate.twist_covariance.diagonal().setConstant(0.5 * 0.5);
+  keeper_.take(odometry_, estimate, FlatGround::off);
+  EXPECT_LT(keeper_.now()->carried_to(later).translation.norm(), 0.5) << "and of one that is not";
 }
 
 TEST_F(Keeper, EveryDamagedByteIsNoticed) {
