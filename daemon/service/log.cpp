@@ -31,7 +31,7 @@ bool stderr_is_journal() {
 
 } // namespace
 
-Log::Log() : to_journal_(stderr_is_journal()) {}
+Log::Log(Duration interval) : interval_(interval), to_journal_(stderr_is_journal()) {}
 
 void Log::say(Severity severity, const std::string& message, Fields fields, const CodePlace& where) {
   std::uint64_t silenced = 0;
@@ -47,7 +47,7 @@ bool Log::may_speak(const CodePlace& where, std::uint64_t& silenced_before) {
   const std::scoped_lock lock(mutex_);
   const Duration now = read_clock(CLOCK_MONOTONIC);
   Site& site = sites_[{where.file, where.line}];
-  if (site.said == 0 || now - site.since > kInterval) {
+  if (site.said == 0 || now - site.since > interval_) {
     silenced_before = site.silenced;
     site = {now, 0, 0};
   }
