@@ -6,6 +6,7 @@
 #include <pcl/registration/gicp.h>
 
 #include <algorithm>
+#include <chrono>
 #include <functional>
 #include <map>
 #include <memory>
@@ -16,7 +17,6 @@
 
 #include "core/odometry.hpp"
 #include "recording.hpp"
-#include "support/scenes.hpp"
 
 namespace {
 
@@ -188,19 +188,9 @@ class Medians : public benchmark::ConsoleReporter {
   std::map<std::string, double> cpu_ms_;
 };
 
-test::Recording plant_recording() {
-  constexpr Duration kDuration = std::chrono::seconds{20};
-  const sim::Scene scene = sim::plant();
-  const sim::Trajectory trajectory(sim::plant_course(kDuration, 1.0), sim::plant_start());
-  sim::SyntheticLidarOptions lidar;
-  lidar.T_base_lidar.translation.z() = 0.75;
-  lidar.range_noise_m = 0.02;
-  return test::Recording::synthetic(scene, trajectory, lidar, kDuration);
-}
-
 std::vector<NamedRecording> recordings() {
   std::vector<NamedRecording> all;
-  all.push_back({"vlp16_plant_synthetic", plant_recording()});
+  all.push_back({"vlp16_plant_synthetic", test::plant_recording(std::chrono::seconds{20})});
   for (const std::string name : {"hdl32e_moving_15mps", "hdl32e_static_monterey", "vlp16_static_1200rpm_product21"})
     if (std::optional<test::Recording> recording = test::Recording::real(name))
       all.push_back({name, std::move(*recording)});

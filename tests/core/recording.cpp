@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "drivers/capture.hpp"
+#include "support/scenes.hpp"
 #include "support/test_data.hpp"
 
 namespace locus::test {
@@ -51,6 +52,15 @@ void Recording::keep(const Datagram& datagram) {
   const auto& payload = payloads_.emplace_back(datagram.payload.begin(), datagram.payload.end());
   datagrams_.push_back(datagram);
   datagrams_.back().payload = payload;
+}
+
+Recording plant_recording(Duration duration) {
+  const sim::Scene scene = sim::plant();
+  const sim::Trajectory trajectory(sim::plant_course(duration, 1.0), sim::plant_start());
+  sim::SyntheticLidarOptions lidar;
+  lidar.T_base_lidar.translation.z() = 0.75;
+  lidar.range_noise_m = 0.02;
+  return Recording::synthetic(scene, trajectory, lidar, duration);
 }
 
 SweepsOfRecording::SweepsOfRecording(const Recording& recording, const SweepOptions& options, StageClock* clock)

@@ -39,6 +39,9 @@ class Recording {
   std::vector<Datagram> datagrams_;
 };
 
+/// A VLP-16 at 10 Hz with 2 cm of noise, driven through sim::plant() at 1 m/s.
+Recording plant_recording(Duration duration);
+
 /// From the datagrams of a recording to sweeps, as in the daemon: decoder, clock, builder; no motion source.
 class SweepsOfRecording {
  public:

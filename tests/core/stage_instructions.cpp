@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// stage_instructions STAGE: drives through the plant, lidar alone, and has callgrind count what that stage executes, or
+// `all` of the pipeline. stage_instructions.sh runs it and compares.
+#include <valgrind/callgrind.h>
+
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <string_view>
+#include <vector>
+
+#include "core/odometry.hpp"
+#include "recording.hpp"
+
+namespace {
+
+using namespace locus;
+
+constexpr std::array<std::string_view, kStages> kStageNames{"decode",       "correct",        "filter", "covariance",
+                                                            "scan_to_scan", "scan_to_submap", "map"};
+
+/// Counts while the innermost stage is the one that is wanted.
+class InstructionCounter : public StageClock {
+ public:
+  explicit InstructionCounter(std::string_view wanted) : wanted_(wanted), outside_(wanted == "all") {}
+
+  void enter(Stage stage) override {
+    counts_.push_back(outside_ || kStageNames[static_cast<std::size_t>(stage)] == wanted_);
+    count(counts_.back());
+  }
+  void leave() override {
+    counts_.pop_back();
+    count(counts_.empty() ? outside_ : counts_.back());
+  }
+
+  /// Once what only the first sweeps need is behind.
+  void start() {
+    CALLGRIND_START_INSTRUMENTATION;
+    started_ = true;
+    count(outside_);
+  }
+
+ private:
+  void count(bool on) {
+    if (started_ && on != counting_)
+      CALLGRIND_TOGGLE_COLLECT;
+    counting_ = started_ && on;
+  }
+
+  std::string_view wanted_;
+  bool outside_;
+  std::vector<bool> counts_; ///< of the stages that are open
+  bool started_ = false, counting_ = false;
+};
+
+} // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fputs("usage: stage_instructions STAGE\n", stderr);
+    return 2;
+  }
+  constexpr int kWarmUp = 30; // it stands, and then accelerates
+  const test::Recording recording = test::plant_recording(std::chrono::milliseconds{4450});
+  InstructionCounter counter(argv[1]);
+  test::SweepsOfRecording sweeps(recording, SweepOptions{}, &counter);
+  OdometryOptions options;
+  options.threads = 1;
+  options.map.keyframe_m = 0.25; // some of so short a drive
+  Odometry odometry(options, &counter);
+  int sweeps_seen = 0;
+  while (const Sweep* sweep = sweeps.next()) {
+    odometry.process(*sweep);
+    if (++sweeps_seen == kWarmUp)
+      counter.start();
+  }
+  std::printf("%d\n", sweeps_seen - kWarmUp);
+}
