@@ -66,6 +66,7 @@ int main(int argc, char** argv) {
   test::SweepsOfRecording sweeps(recording, SweepOptions{}, &counter);
   OdometryOptions options;
   options.threads = 1;
+  options.isa = Isa::baseline;
   options.map.keyframe_m = 0.25; // some of so short a drive
   Odometry odometry(options, &counter);
   int sweeps_seen = 0;

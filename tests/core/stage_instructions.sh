@@ -9,7 +9,7 @@ measured=$(mktemp)
 trap 'rm -f "$measured"*' EXIT
 
 for stage in all correct filter covariance scan_to_scan scan_to_submap map; do
-  sweeps=$(LOCUS_ISA=baseline valgrind --tool=callgrind --instr-atstart=no --collect-atstart=no \
+  sweeps=$(valgrind --tool=callgrind --instr-atstart=no --collect-atstart=no \
     --callgrind-out-file="$measured.$stage" "$bin/stage_instructions" $stage 2>"$measured.log") || { cat "$measured.log" >&2; exit 1; }
   total=$(sed -n 's/^\(summary\|totals\): \([0-9]*\).*/\2/p' "$measured.$stage" | head -n 1)
   printf '%-15s %9d\n' $stage $((total / sweeps)) >>"$measured"
