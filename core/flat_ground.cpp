@@ -12,6 +12,10 @@ namespace {
 constexpr double kLevel_rad = 0.03;                       ///< 1.7 degrees
 constexpr Duration kLongEnough = std::chrono::seconds{2}; ///< level all along, before the ground counts as flat
 
+/// What the ground leaves open while the base seems level, one standard deviation.
+constexpr double kRipple_m = 0.005; ///< from sweep to sweep
+constexpr double kTilt_rad = 0.5 * kLevel_rad;
+
 } // namespace
 
 void FlatGroundAssumption::observe(Stamp stamp, const std::optional<Eigen::Vector3d>& up_base) {
@@ -23,11 +27,17 @@ void FlatGroundAssumption::observe(Stamp stamp, const std::optional<Eigen::Vecto
   found_ = level_since_ && stamp - *level_since_ >= kLongEnough;
 }
 
-Pose FlatGroundAssumption::flatten(const Pose& T_odom_last, const Pose& T_odom_base) {
+Pose FlatGroundAssumption::flatten(const Pose& T_odom_last, const Pose& T_odom_base, const Matrix6& information) const {
+  const auto share = [&](int axis, double sigma) {
+    return mode_ == FlatGround::on ? 1.0 : 1.0 / (1.0 + sigma * sigma * information(axis, axis));
+  };
   const Eigen::Vector3d ahead = T_odom_base.rotation * Eigen::Vector3d::UnitX();
+  const Eigen::Quaterniond level = from_rpy_rad({0.0, 0.0, std::atan2(ahead.y(), ahead.x())});
+  const Eigen::Vector3d righting_rad = so3_log(level * T_odom_base.rotation.conjugate());
+  const Eigen::Vector3d shares{share(3, kTilt_rad), share(4, kTilt_rad), 1.0};
   Pose flat = T_odom_base;
-  flat.translation.z() = T_odom_last.translation.z();
-  flat.rotation = from_rpy_rad({0.0, 0.0, std::atan2(ahead.y(), ahead.x())});
+  flat.translation.z() += share(2, kRipple_m) * (T_odom_last.translation.z() - T_odom_base.translation.z());
+  flat.rotation = (so3_exp(shares.cwiseProduct(righting_rad)) * T_odom_base.rotation).normalized();
   return flat;
 }
 

@@ -13,7 +13,8 @@ namespace locus {
 /// frame.
 ///
 /// Known from context (on), or found (automatic): the inertial sensor has seen the base level for long enough. It ends
-/// at once when the base is level no more. One owner.
+/// at once when the base is level no more. What is known is taken at its word. What was found only to the accuracy of
+/// that sensor gives way to lidar along the axes that it sees better. One owner.
 class FlatGroundAssumption {
  public:
   explicit FlatGroundAssumption(FlatGround mode) : mode_(mode) {}
@@ -23,8 +24,8 @@ class FlatGroundAssumption {
 
   [[nodiscard]] bool holds() const { return mode_ == FlatGround::on || (mode_ == FlatGround::automatic && found_); }
 
-  /// T_odom_base as it is on the plane of T_odom_last.
-  [[nodiscard]] static Pose flatten(const Pose& T_odom_last, const Pose& T_odom_base);
+  /// T_odom_base, known with `information` (odom axes), as it is on the plane of T_odom_last. Precondition: holds().
+  [[nodiscard]] Pose flatten(const Pose& T_odom_last, const Pose& T_odom_base, const Matrix6& information) const;
 
  private:
   FlatGround mode_;

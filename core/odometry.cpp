@@ -97,7 +97,8 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
   if (trusts(estimate.scan_to_scan, estimate.scan_to_scan.T_target_source, prior.T_last_now, prior.variance)) {
     if (prior.blind)
       begin_again(sweep, prior, estimate.scan_to_scan, stop);
-    T_last_now = flatten(estimate.scan_to_scan.T_target_source);
+    const Matrix6 R = turn_both(T_odom_last_.rotation);
+    T_last_now = flatten(estimate.scan_to_scan.T_target_source, R * estimate.scan_to_scan.information * R.transpose());
     correct_motion(sweep, T_last_now);
   }
   estimate.scan_to_scan.T_target_source = T_last_now; // also where it was not trusted
@@ -106,7 +107,8 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
   estimate.scan_to_submap = match_submap(prior, T_last_now, stop);
   const Pose T_last_submap = T_odom_last_.inverse() * estimate.scan_to_submap.T_target_source;
   estimate.failed = !trusts(estimate.scan_to_submap, T_last_submap, prior.T_last_now, variance_against_submap());
-  estimate.T_odom_base = T_odom_last_ * (estimate.failed ? T_last_now : flatten(T_last_submap));
+  estimate.T_odom_base = T_odom_last_ * (estimate.failed ? flatten(T_last_now, Matrix6::Zero())
+                                                         : flatten(T_last_submap, estimate.scan_to_submap.information));
   hold_still(sweep, estimate);
   if (estimate.state == TrackingState::standstill)
     uncertainty_ = before; // standing adds nothing
@@ -277,10 +279,10 @@ Vector6 Odometry::variance_against_submap() const {
   return (R.transpose() * uncertainty_.against_submap() * R).diagonal();
 }
 
-Pose Odometry::flatten(const Pose& T_last_now) const {
+Pose Odometry::flatten(const Pose& T_last_now, const Matrix6& information_odom) const {
   if (!flat_ground_.holds())
     return T_last_now;
-  return T_odom_last_.inverse() * FlatGroundAssumption::flatten(T_odom_last_, T_odom_last_ * T_last_now);
+  return T_odom_last_.inverse() * flat_ground_.flatten(T_odom_last_, T_odom_last_ * T_last_now, information_odom);
 }
 
 bool Odometry::trusts(const Registration& registration, const Pose& T_last_now, const Pose& T_last_predicted,

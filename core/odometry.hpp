@@ -74,7 +74,7 @@ class Odometry {
   Registration match_scan(const Prior& prior, const Pose& T_start, bool wide, const Gicp::StopRequested& stop);
   Registration match_submap(const Prior& prior, const Pose& T_last_now, const Gicp::StopRequested& stop);
   void begin_again(const Sweep& sweep, const Prior& prior, Registration& found, const Gicp::StopRequested& stop);
-  [[nodiscard]] Pose flatten(const Pose& T_last_now) const;
+  [[nodiscard]] Pose flatten(const Pose& T_last_now, const Matrix6& information_odom) const;
   void predict(const Prior& prior);
   [[nodiscard]] Matrix6 covariance_of(const Prior& prior) const;
   [[nodiscard]] Vector6 variance_against_submap() const;

@@ -118,11 +118,30 @@ TEST(FlatGround, ByContextHoldsWhateverGravitySays) {
   EXPECT_FALSE(off.holds());
 }
 
-TEST(FlatGround, KeepsHeadingAndWayAndTakesOutTheRest) {
-  const Pose T_odom_last{Eigen::Quaterniond::Identity(), {0, 0, 0.2}};
-  const Pose flat = FlatGroundAssumption::flatten(T_odom_last, {from_rpy_rad({0.02, -0.03, 0.5}), {1.0, 0.3, 0.25}});
+const Pose kLast{Eigen::Quaterniond::Identity(), {0, 0, 0.2}};
+const Pose kRolledUpward{from_rpy_rad({0.02, -0.03, 0.5}), {1.0, 0.3, 0.25}};
+
+TEST(FlatGround, ByContextKeepsHeadingAndWayAndTakesOutTheRest) {
+  const FlatGroundAssumption ground(FlatGround::on);
+  const Pose flat = ground.flatten(kLast, kRolledUpward, 1e8 * Matrix6::Identity());
   EXPECT_LT((flat.translation - Eigen::Vector3d(1.0, 0.3, 0.2)).norm(), 1e-12);
   EXPECT_LT((to_rpy_rad(flat.rotation) - Eigen::Vector3d(0, 0, 0.5)).norm(), 1e-3);
+}
+
+TEST(FlatGround, FoundGivesWayToLidarWhereThatSeesBetter) {
+  FlatGroundAssumption ground(FlatGround::automatic);
+  for (int i = 0; i < 30; ++i)
+    ground.observe(at(i), kUp);
+  const Pose blind = ground.flatten(kLast, kRolledUpward, Matrix6::Zero());
+  EXPECT_LT((blind.translation - Eigen::Vector3d(1.0, 0.3, 0.2)).norm(), 1e-12);
+  EXPECT_LT((to_rpy_rad(blind.rotation) - Eigen::Vector3d(0, 0, 0.5)).norm(), 1e-3);
+
+  Vector6 sigma;
+  sigma << Eigen::Vector3d::Constant(0.001), Eigen::Vector3d::Constant(0.0005);
+  const Matrix6 information = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
+  const Pose seen = ground.flatten(kLast, kRolledUpward, information);
+  EXPECT_LT((seen.translation - kRolledUpward.translation).norm(), 0.003);
+  EXPECT_LT(angle_rad(seen.rotation * kRolledUpward.rotation.conjugate()), 5e-4);
 }
 
 // --- Tilt -------------------------------------------------------------------------------------------------------

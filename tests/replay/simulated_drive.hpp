@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "replay_run.hpp"
+
+namespace locus::test {
+
+/// What locus-sim makes of a drive, in a folder that is gone after the test.
+class SimulatedDrive {
+ public:
+  SimulatedDrive(const std::string& world, const std::string& robot, int duration_s) {
+    const ProgramRun run = run_program(LOCUS_SIM, {"--world", world, "--robot", robot, "--duration",
+                                                   std::to_string(duration_s), "--seed", "1", "-o", capture()});
+    EXPECT_EQ(run.status, 0) << run.err;
+  }
+
+  /// With more arguments than the capture.
+  [[nodiscard]] Replay replay(std::vector<std::string> arguments = {}) const {
+    arguments.push_back(capture());
+    return Replay(arguments);
+  }
+  [[nodiscard]] std::string capture() const { return folder_ / "capture"; }
+
+ private:
+  TemporaryFolder folder_;
+};
+
+inline double ape_mean_m(const Replay& replay) { return replay.summary()["ape_m"]["mean"]; }
+
+} // namespace locus::test
