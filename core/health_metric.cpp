@@ -102,8 +102,8 @@ class FrozenOdometry : public HealthMetric {
 
   std::optional<HealthReason> hear(LidarOpinion, const RegistrationFeedback& feedback) override {
     constexpr double kMoves_mps = 0.2, kTurns_radps = 0.2;
-    const auto& twist = feedback.twist_base;
-    lidar_sees_motion_ = twist && (twist->head<3>().norm() > kMoves_mps || twist->tail<3>().norm() > kTurns_radps);
+    const Vector6& twist = feedback.twist_base;
+    lidar_sees_motion_ = twist.head<3>().norm() > kMoves_mps || twist.tail<3>().norm() > kTurns_radps;
     return std::nullopt;
   }
 

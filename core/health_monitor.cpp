@@ -77,7 +77,7 @@ void HealthMonitor::advance(Stamp now) {
 void HealthMonitor::hear(LidarOpinion opinion, const RegistrationFeedback& feedback, Stamp now) {
   for (const auto& metric : metrics_) {
     const auto reason = metric->hear(opinion, feedback);
-    if (!reason || state_ == State::lost || state_ == State::unheard)
+    if (!reason || state_ == State::unheard || (state_ == State::lost && reason != HealthReason::self_check))
       continue;
     leave_out(*reason);
     lose(*reason, now);
@@ -94,6 +94,8 @@ void HealthMonitor::lose(HealthReason reason, Stamp now) {
   if (state_ == State::healthy) {
     lost_for_ = reason;
     change(false, reason, now);
+  } else if (reason == HealthReason::self_check) { // news of a lost one, too: it may be for good
+    event_ = HealthEvent{.stamp = now, .healthy = false, .reason = reason, .verdict = verdict()};
   }
   state_ = State::lost;
   ++spell_;
@@ -103,7 +105,9 @@ void HealthMonitor::lose(HealthReason reason, Stamp now) {
 
 void HealthMonitor::change(bool healthy, HealthReason reason, Stamp now) {
   ++counters_.health_changes;
-  event_ = HealthEvent{.stamp = now, .healthy = healthy, .reason = reason};
+  event_ = HealthEvent{.stamp = now, .healthy = healthy, .reason = reason, .verdict = {}};
+  if (!healthy && reason == HealthReason::self_check)
+    event_->verdict = verdict();
 }
 
 std::optional<HealthEvent> HealthMonitor::take_event() { return std::exchange(event_, std::nullopt); }

@@ -12,11 +12,15 @@ constexpr Duration kWeighFor = std::chrono::seconds{1};
 constexpr double kGravityTolerance = 0.15; ///< of the whole: a robot may be driving off
 constexpr double kMaxTilt_deg = 60.0;      ///< no robot begins on a steeper slope
 
-/// Turn rates of lidar below this are noise beside the gyro's.
-constexpr double kTurns_radps = 0.15;
-/// After so many turning sweeps the comparison is sure.
-constexpr int kSweepsToCompare = 10;
-constexpr double kDegPerRad = 57.3;
+/// Lesser turns in a sweep are noise to lidar.
+constexpr double kTurns_rad = 0.4 * kRadPerDeg;
+/// Turning sweeps to set a gyro aside, to use it again, and to judge it.
+constexpr int kSweepsToDoubt = 2, kSweepsToConfirm = 3, kSweepsToJudge = 10;
+constexpr int kRounds = 3; ///< of being set aside, until it is refused though nothing is clear
+
+constexpr double kLikeness = 0.7;
+constexpr double kScaleTolerance = 0.5; ///< a sweep that nobody corrects is bent
+constexpr double kDegPerRad = 1.0 / kRadPerDeg;
 
 constexpr Duration kMaxGap = std::chrono::milliseconds{100};   ///< across which a gyro can be followed
 constexpr Duration kResolution = std::chrono::milliseconds{5}; ///< of what is remembered of its turns
@@ -32,7 +36,12 @@ std::optional<HealthReason> ImuSelfCheck::judge(const SourceReading& reading) {
     return HealthReason::self_check;
   follow_turns(R_base_imu_ * reading.imu->angular_velocity_radps, reading.stamp);
   weigh(R_base_imu_ * reading.imu->specific_force_mps2, reading.stamp);
-  return refused_ ? std::optional{HealthReason::self_check} : std::nullopt;
+  return refused_ || set_aside_ ? std::optional{HealthReason::self_check} : std::nullopt;
+}
+
+std::string_view ImuSelfCheck::verdict() const {
+  return set_aside_ && !refused_ ? "does not turn as lidar sees the robot turn: it is not used until it does"
+                                 : verdict_;
 }
 
 void ImuSelfCheck::weigh(const Eigen::Vector3d& specific_force_base_mps2, Stamp stamp) {
@@ -47,9 +56,11 @@ void ImuSelfCheck::weigh(const Eigen::Vector3d& specific_force_base_mps2, Stamp 
 }
 
 void ImuSelfCheck::follow_turns(const Eigen::Vector3d& turn_rate_base_radps, Stamp stamp) {
-  if (last_ && stamp > *last_ && stamp - *last_ < kMaxGap)
+  if (last_ && stamp <= *last_)
+    return;
+  if (last_ && stamp - *last_ < kMaxGap)
     angle_rad_ += to_seconds(stamp - *last_) * turn_rate_base_radps;
-  else if (last_)
+  else
     known_ = 0;
   last_ = stamp;
   if (known_ > 0 && stamp - turned_[newest_].stamp < kResolution)
@@ -59,13 +70,25 @@ void ImuSelfCheck::follow_turns(const Eigen::Vector3d& turn_rate_base_radps, Sta
   known_ = std::min(known_ + 1, turned_.size());
 }
 
-const ImuSelfCheck::Turned* ImuSelfCheck::turned_at(Stamp stamp) const {
-  for (std::size_t age = 0; age < known_; ++age) {
-    const Turned& turned = turned_[(newest_ + turned_.size() - age) % turned_.size()];
-    if (turned.stamp <= stamp)
-      return &turned;
-  }
-  return nullptr;
+const ImuSelfCheck::Turned& ImuSelfCheck::remembered(std::size_t age) const {
+  return turned_[(newest_ + turned_.size() - age) % turned_.size()];
+}
+
+bool ImuSelfCheck::remembers(Stamp stamp) const {
+  return known_ > 1 && stamp >= remembered(known_ - 1).stamp && stamp < remembered(0).stamp + kMaxGap;
+}
+
+/// Interpolated; of what is not remembered, the nearest that is. Precondition: something is.
+Eigen::Vector3d ImuSelfCheck::angle_rad_at(Stamp stamp) const {
+  std::size_t age = 0;
+  while (age + 1 < known_ && remembered(age).stamp > stamp)
+    ++age;
+  const Turned& before = remembered(age);
+  if (age == 0 || stamp <= before.stamp)
+    return before.angle_rad;
+  const Turned& after = remembered(age - 1);
+  const double fraction = to_seconds(stamp - before.stamp) / to_seconds(after.stamp - before.stamp);
+  return before.angle_rad + fraction * (after.angle_rad - before.angle_rad);
 }
 
 void ImuSelfCheck::weigh_gravity() {
@@ -78,41 +101,89 @@ void ImuSelfCheck::weigh_gravity() {
     trusts_accelerometer_ = false;
     verdict_ = "reports accelerations that are not those of gravity: they are not used";
   }
-  if (force.norm() > 0.0 && force.normalized().z() < std::cos(kMaxTilt_deg / kDegPerRad))
+  if (force.norm() > 0.0 && force.normalized().z() < std::cos(kMaxTilt_deg * kRadPerDeg))
     refuse(
         "gravity is not below the robot: T_base_source is wrong, or the unit is mounted another way; it is not used");
 }
 
 std::optional<HealthReason> ImuSelfCheck::hear(LidarOpinion /*opinion*/, const RegistrationFeedback& feedback) {
-  if (refused_ || turning_sweeps_ == kSweepsToCompare || !weighed_ || !feedback.twist_base)
+  if (refused_ || !remembers(feedback.from) || !remembers(feedback.to))
     return std::nullopt;
-  const Turned* const from = turned_at(feedback.from);
-  const Turned* const to = turned_at(feedback.to);
-  if (from == nullptr || from->stamp >= to->stamp)
-    return std::nullopt;
-  const Eigen::Vector3d gyro = (to->angle_rad - from->angle_rad) / to_seconds(to->stamp - from->stamp);
-  const Eigen::Vector3d lidar = feedback.twist_base->tail<3>();
-  if (lidar.norm() < kTurns_radps)
-    return std::nullopt;
-  lidar_lidar_ += lidar.squaredNorm();
-  gyro_lidar_ += gyro.dot(lidar);
-  gyro_gyro_ += gyro.squaredNorm();
-  if (++turning_sweeps_ == kSweepsToCompare)
-    compare_turns();
-  return refused_ ? std::optional{HealthReason::self_check} : std::nullopt;
+  const bool was_set_aside = set_aside_;
+  compare(feedback);
+  review();
+  return refused_ || (set_aside_ && !was_set_aside) ? std::optional{HealthReason::self_check} : std::nullopt;
 }
 
-void ImuSelfCheck::compare_turns() {
-  const double likeness = gyro_lidar_ / std::sqrt(gyro_gyro_ * lidar_lidar_);
-  const double scale = gyro_lidar_ / lidar_lidar_;
-  constexpr double kAlike = 0.7;
-  if (likeness > kAlike && is_about(scale, kDegPerRad, 0.3))
-    refuse("reports turn rates in deg/s, not in rad/s: it is not used");
-  else if (likeness < -kAlike)
-    refuse(
-        "turns the other way than lidar sees: T_base_source is wrong, or an axis has the wrong sign; it is not used");
-  else if (!(likeness > kAlike) || !is_about(scale, 1.0, 0.3))
+void ImuSelfCheck::compare(const RegistrationFeedback& feedback) {
+  const Eigen::Vector3d gyro_rad = angle_rad_at(feedback.to) - angle_rad_at(feedback.from);
+  const Eigen::Vector3d lidar_rad = to_seconds(feedback.to - feedback.from) * feedback.twist_base.tail<3>();
+  for (std::size_t i = 0; i < turns_.size(); ++i) {
+    const auto axis = static_cast<Eigen::Index>(i);
+    const bool turned = std::max(std::abs(gyro_rad[axis]), std::abs(lidar_rad[axis])) > kTurns_rad;
+    if (turned && feedback.sees[3 + i] && !(turns_[i].agree() && turns_[i].sweeps >= kSweepsToJudge))
+      turns_[i].add(gyro_rad[axis], lidar_rad[axis]);
+  }
+}
+
+void ImuSelfCheck::Turns::add(double gyro_rad, double lidar_rad) {
+  lidar_lidar += lidar_rad * lidar_rad;
+  gyro_lidar += gyro_rad * lidar_rad;
+  gyro_gyro += gyro_rad * gyro_rad;
+  ++sweeps;
+}
+
+double ImuSelfCheck::Turns::likeness() const { return gyro_lidar / std::sqrt(gyro_gyro * lidar_lidar); }
+
+/// All noise is taken for that of lidar.
+bool ImuSelfCheck::Turns::has_scale(double scale) const {
+  return likeness() > kLikeness && std::abs(gyro_gyro / gyro_lidar - scale) < kScaleTolerance * scale;
+}
+
+void ImuSelfCheck::review() {
+  const auto any = [&](int sweeps, bool agrees) {
+    return std::ranges::any_of(turns_, [=](const Turns& t) { return t.sweeps >= sweeps && t.agree() == agrees; });
+  };
+  const bool contradicted = any(kSweepsToDoubt, false);
+  if (!set_aside_ && contradicted) {
+    set_aside_ = true;
+    turns_ = {};
+  } else if (set_aside_ && contradicted && any(kSweepsToJudge, false)) {
+    judge();
+  } else if (set_aside_ && !contradicted && any(kSweepsToConfirm, true)) {
+    set_aside_ = false;
+  }
+}
+
+/// Refuses the unit, or tries it once more where nothing is clear: lidar may not see what a gait does without it.
+void ImuSelfCheck::judge() {
+  for (const Turns& turns : turns_) {
+    if (turns.sweeps < kSweepsToJudge)
+      continue;
+    if (turns.likeness() < -kLikeness)
+      refuse("turns the other way than lidar sees: T_base_source is wrong, or an axis has the wrong sign; it is not "
+             "used");
+    else if (turns.has_scale(kDegPerRad))
+      refuse("reports turn rates in deg/s, not in rad/s: it is not used");
+  }
+  if (!refused_ && ++rounds_ == kRounds)
     refuse("does not turn as lidar sees the robot turn: T_base_source or its scale is wrong; it is not used");
+  set_aside_ = false;
+  turns_ = {};
+}
+
+/// What comes back is checked as at the start.
+void ImuSelfCheck::forget() {
+  if (refused_)
+    return;
+  if (!set_aside_)
+    turns_ = {};
+  first_.reset();
+  last_.reset();
+  known_ = 0;
+  weighed_ = false;
+  force_sum_mps2_.setZero();
+  forces_ = 0.0;
 }
 
 void ImuSelfCheck::refuse(std::string_view verdict) {

@@ -10,8 +10,13 @@
 
 namespace locus {
 
-/// Start-up check of an inertial unit: are its units those of the contract, does gravity point down where the
-/// configuration says that down is, does its gyro turn as lidar sees the robot turn?
+/// Check of an inertial unit when it starts, and when it comes back: are its units those of the contract, does gravity
+/// point down where the configuration says that down is, does its gyro turn as lidar sees the robot turn?
+///
+/// A gyro is used at once. About each axis of the base on its own, for on legs the turns of a gait would drown a yaw of
+/// the wrong sign, its first turns are compared with what lidar sees. Once they differ it is set aside, for while it is
+/// used it bends the sweeps; what lidar sees without it decides whether it is used again or refused. While the robot
+/// goes straight nothing is proven and nothing bent.
 ///
 /// A unit whose accelerations are of another unit is downgraded: they are not used. One whose axes or turn rates are
 /// wrong is refused for good. What was found stands in verdict(), in plain words. One owner.
@@ -21,8 +26,9 @@ class ImuSelfCheck : public HealthMetric {
 
   std::optional<HealthReason> judge(const SourceReading& reading) override;
   std::optional<HealthReason> hear(LidarOpinion opinion, const RegistrationFeedback& feedback) override;
+  void forget() override;
 
-  [[nodiscard]] std::string_view verdict() const override { return verdict_; }
+  [[nodiscard]] std::string_view verdict() const override;
   [[nodiscard]] bool trusts_accelerometer() const override { return trusts_accelerometer_; }
 
  private:
@@ -31,12 +37,26 @@ class ImuSelfCheck : public HealthMetric {
     Stamp stamp;
     Eigen::Vector3d angle_rad; ///< base axes
   };
+  /// What gyro and lidar saw of the turns about one axis.
+  struct Turns {
+    double lidar_lidar = 0.0, gyro_lidar = 0.0, gyro_gyro = 0.0; ///< sums of products
+    int sweeps = 0;
+
+    void add(double gyro_rad, double lidar_rad);
+    [[nodiscard]] double likeness() const; ///< cosine
+    [[nodiscard]] bool has_scale(double scale) const;
+    [[nodiscard]] bool agree() const { return has_scale(1.0); }
+  };
 
   void weigh(const Eigen::Vector3d& specific_force_base_mps2, Stamp stamp);
   void weigh_gravity();
   void follow_turns(const Eigen::Vector3d& turn_rate_base_radps, Stamp stamp);
-  [[nodiscard]] const Turned* turned_at(Stamp stamp) const;
-  void compare_turns();
+  [[nodiscard]] const Turned& remembered(std::size_t age) const;
+  [[nodiscard]] bool remembers(Stamp stamp) const;
+  [[nodiscard]] Eigen::Vector3d angle_rad_at(Stamp stamp) const;
+  void compare(const RegistrationFeedback& feedback);
+  void review();
+  void judge();
   void refuse(std::string_view verdict);
 
   Eigen::Quaterniond R_base_imu_;
@@ -53,8 +73,9 @@ class ImuSelfCheck : public HealthMetric {
   std::size_t newest_ = 0, known_ = 0;
   Eigen::Vector3d angle_rad_ = Eigen::Vector3d::Zero();
   std::optional<Stamp> last_;
-  double lidar_lidar_ = 0.0, gyro_lidar_ = 0.0, gyro_gyro_ = 0.0; ///< sums of products of turn rates
-  int turning_sweeps_ = 0;
+  std::array<Turns, 3> turns_; ///< by axis of the base
+  bool set_aside_ = false;
+  int rounds_ = 0; ///< of being set aside without a result
 };
 
 } // namespace locus

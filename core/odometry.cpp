@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "core/motion_sources.hpp"
 #include "core/relocation.hpp"
@@ -81,6 +82,7 @@ Odometry::Odometry(const OdometryOptions& options, StageClock* clock)
   for (const MotionSourceOptions& source : options.motion_sources)
     statistics_.emplace_back(source.kind == SourceKind::imu ? kInertialUnit : kOdometrySource);
   gyro_biases_.resize(options.motion_sources.size());
+  gyro_scales_.resize(options.motion_sources.size());
 }
 
 OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested& stop) {
@@ -175,6 +177,8 @@ Odometry::Prior Odometry::integrate_sensors(const Sweep& sweep) const {
   if (choice.rotation) {
     prior.T_last_now.rotation = step(sweep, *choice.rotation)->rotation;
     prior.variance.tail<3>() = statistics_[*choice.rotation].variance(periods).tail<3>();
+    if (kind_of(*choice.rotation) == SourceKind::imu)
+      prior.variance.tail<3>() += gyro_scales_[*choice.rotation].variance(so3_log(prior.T_last_now.rotation));
     prior.bias.tail<3>() = statistics_[*choice.rotation].bias(periods).tail<3>();
     prior.source.rotation = static_cast<int>(*choice.rotation);
   }
@@ -321,8 +325,10 @@ void Odometry::judge_sources(const Sweep& sweep, const Prior& prior, const Pose&
       continue;
     if (!stands)
       statistics_[i].learn(error, seen);
-    if (imu)
+    if (imu) {
       gyro_biases_[i].learn(-error.tail<3>(), so3_log(T_last_now.rotation), sweep.end - last_stamp_);
+      gyro_scales_[i].learn(-seen_part(error).tail<3>(), seen_part(se3_log(*T_last_predicted)).tail<3>());
+    }
   }
   if (stands)
     return;
@@ -398,17 +404,22 @@ void Odometry::settle(const Sweep& sweep, const Prior& prior, OdometryEstimate& 
   const Pose T_last_moved = motion(T_last_now, estimate.scan_to_scan.T_target_source);
   move_on(T_last_moved, uncertainty_.against_submap(), estimate);
   bend(difference(T_last_moved, prior.T_last_now));
-  if (estimate.state != TrackingState::degenerate)
-    feedback_.twist_base = twist_base_;
+  feedback_.twist_base = seen_part(twist_base_);
+  std::ranges::transform(weak_, feedback_.sees.begin(), std::logical_not{});
+}
+
+/// Nothing along axes of the base that lidar hardly sees.
+Vector6 Odometry::seen_part(Vector6 along_base) const {
+  for (std::size_t axis = 0; axis < weak_.size(); ++axis)
+    if (weak_[axis])
+      along_base[static_cast<Eigen::Index>(axis)] = 0.0;
+  return along_base;
 }
 
 /// T_last_now as far as it is a motion of the robot. Along axes that lidar hardly sees the place in the submap may be
 /// off by much, and a few points may pull it far: there the motion is that from sweep to sweep.
 Pose Odometry::motion(const Pose& T_last_now, const Pose& T_last_seen) const {
-  Vector6 corrected = difference(T_last_now, T_last_seen);
-  for (std::size_t axis = 0; axis < weak_.size(); ++axis)
-    if (weak_[axis])
-      corrected[static_cast<Eigen::Index>(axis)] = 0.0;
+  const Vector6 corrected = seen_part(difference(T_last_now, T_last_seen));
   return {so3_exp(corrected.tail<3>()) * T_last_seen.rotation, T_last_seen.translation + corrected.head<3>()};
 }
 
@@ -458,7 +469,7 @@ void Odometry::finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& 
     refused_in_a_row_ = 0;
   else if (scan_.size() >= kMinPoints)
     ++refused_in_a_row_;
-  feedback_ = {.from = last_stamp_, .to = sweep.end, .opinions = {}, .twist_base = {}};
+  feedback_ = {.from = last_stamp_, .to = sweep.end, .opinions = {}, .twist_base = Vector6::Zero(), .sees = {}};
   if (estimate.failed)
     estimate.state = TrackingState::dead_reckoning;
   if (processed_ > 0 && estimate.failed)
@@ -474,6 +485,9 @@ void Odometry::finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& 
   T_odom_last_ = estimate.T_odom_base;
   last_stamp_ = sweep.end;
   last_period_ = sweep.end - sweep.start;
+  for (std::size_t i = 0; i < gyro_scales_.size(); ++i)
+    if (!sweep.sources[i].usable) // what comes back may come back as another
+      gyro_scales_[i] = GyroScale{};
   last_sources_ = sweep.sources;
   std::swap(last_scan_, scan_);
   last_registered_ = registered_;

@@ -10,6 +10,7 @@
 #include "core/flat_ground.hpp"
 #include "core/gravity.hpp"
 #include "core/gyro_bias.hpp"
+#include "core/gyro_scale.hpp"
 #include "core/odometry_estimate.hpp"
 #include "core/options.hpp"
 #include "core/pose_uncertainty.hpp"
@@ -88,6 +89,7 @@ class Odometry {
   [[nodiscard]] bool sources_saw_motion(const Sweep& sweep) const;
   void settle(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate);
   [[nodiscard]] Pose motion(const Pose& T_last_now, const Pose& T_last_seen) const;
+  [[nodiscard]] Vector6 seen_part(Vector6 along_base) const;
   void bend(const Vector6& surprise);
   void observe(OdometryEstimate& estimate);
   void move_on(const Pose& T_last_now, const Matrix6& covariance_odom, OdometryEstimate& estimate);
@@ -121,6 +123,7 @@ class Odometry {
   PoseUncertainty uncertainty_;
   Vector6 askew_variance_ = Vector6::Zero(); ///< of the last sweep, base axes
   std::vector<GyroBias> gyro_biases_;
+  std::vector<GyroScale> gyro_scales_;
   Standstill standstill_;
   int refused_in_a_row_ = 0; ///< sweeps with points
   bool adrift_ = false;      ///< the last sweep was a prediction

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 
 #include "core/pose.hpp"
 #include "core/stamp.hpp"
@@ -23,7 +22,8 @@ LidarOpinion opinion_on(const Vector6& error, const Matrix6& lidar_information);
 struct RegistrationFeedback {
   Stamp from, to; ///< ends of the two sweeps between which it saw the motion
   std::array<LidarOpinion, Sweep::kMaxSources> opinions{};
-  std::optional<Vector6> twist_base; ///< m/s and rad/s as lidar saw it; nothing where it saw too little
+  Vector6 twist_base = Vector6::Zero(); ///< m/s and rad/s as lidar saw it; zero along axes that it hardly sees
+  std::array<bool, 6> sees{};           ///< by axis
 };
 
 } // namespace locus

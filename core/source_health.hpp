@@ -49,6 +49,7 @@ struct HealthEvent {
   Stamp stamp;            ///< when it was found out, in stamps of arrival
   bool healthy = false;
   HealthReason reason = HealthReason::stale; ///< why it was lost
+  std::string_view verdict;                  ///< of HealthMonitor, where a self-check is the reason
 };
 
 } // namespace locus

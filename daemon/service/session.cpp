@@ -195,7 +195,9 @@ void Session::tell(const HealthEvent& event) {
   if (event.healthy)
     log_.info(fmt::format("motion source {} is back", name), {{"LOCUS_SOURCE", name}});
   else
-    log_.warn(fmt::format("motion source {} is lost ({}); the next best one is used", name, to_string(event.reason)),
+    log_.warn(fmt::format("motion source {} {}; the next best one is used", name,
+                          event.verdict.empty() ? fmt::format("is lost ({})", to_string(event.reason))
+                                                : std::string(event.verdict)),
               {{"LOCUS_SOURCE", name}, {"LOCUS_REASON", std::string{to_string(event.reason)}}});
 }
 

@@ -227,8 +227,7 @@ TEST_F(WheelsTest, ThatStandAreNotFrozen) {
 TEST_F(WheelsTest, ThatStandWhileLidarSeesMotionAreFrozen) {
   brake_and_stand(seconds{2});
   RegistrationFeedback moving;
-  moving.twist_base = Vector6::Zero();
-  moving.twist_base->x() = 0.5;
+  moving.twist_base.x() = 0.5;
   monitor_.hear(LidarOpinion::none, moving, now_);
   begin_fault();
   brake_and_stand(seconds{1});

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -26,14 +27,30 @@ class ImuSelfCheckTest : public testing::Test {
       RegistrationFeedback seen; // of the sweep before the last: a live pipeline is that late
       seen.to = now_ - milliseconds{100};
       seen.from = seen.to - milliseconds{100};
-      seen.twist_base = Vector6::Zero();
-      seen.twist_base->tail<3>() = Eigen::Vector3d{0, 0, turn_rate_radps(seen.from + milliseconds{50})};
+      seen.sees = sees_;
+      seen.twist_base.tail<3>() = Eigen::Vector3d{0, 0, turn_rate_radps(seen.from + milliseconds{50})};
       check.hear(LidarOpinion::none, seen);
     }
   }
+  /// Turns steadily for so many sweeps.
+  void turn(ImuSelfCheck& check, int sweeps, const Eigen::Vector3d& gyro_radps, const Eigen::Vector3d& lidar_radps) {
+    for (int i = 1; i <= 20 * sweeps; ++i) {
+      now_ += milliseconds{5};
+      const ImuSample sample{now_, now_, gyro_radps, {0.3, 0.1, 9.8}, {}};
+      refused_ = check.judge(SourceReading{.stamp = now_, .arrival = now_, .imu = &sample}).has_value();
+      if (i % 20 != 0)
+        continue;
+      RegistrationFeedback seen{
+          .from = now_ - milliseconds{100}, .to = now_, .opinions = {}, .twist_base = {}, .sees = sees_};
+      seen.twist_base << Eigen::Vector3d::Zero(), lidar_radps;
+      refused_ = check.hear(LidarOpinion::none, seen).has_value() || refused_;
+    }
+  }
+  void stand(ImuSelfCheck& check) { turn(check, 1, {0, 0, 0}, {0, 0, 0}); }
   static double turn_rate_radps(Stamp stamp) {
     return 0.7 * std::sin(2.0 * std::numbers::pi * to_seconds(stamp.time_since_epoch() % seconds{1}));
   }
+  std::array<bool, 6> sees_{true, true, true, true, true, true};
   Stamp now_ = stamp_from_ns(1'700'000'000'000'000'000);
   bool refused_ = false;
 };
@@ -87,6 +104,83 @@ TEST_F(ImuSelfCheckTest, AGyroThatTurnsTheOtherWayIsRefused) {
   drive(check, seconds{5}, [](ImuSample& sample) { sample.angular_velocity_radps *= -1.0; });
   EXPECT_TRUE(refused_);
   EXPECT_NE(check.verdict().find("other way"), std::string_view::npos);
+}
+
+TEST_F(ImuSelfCheckTest, AGoodGyroIsUsedFromItsFirstTurnOn) {
+  ImuSelfCheck check(Pose{});
+  for (int i = 0; i < 20; ++i) {
+    turn(check, 1, {0, 0, 2.0}, {0, 0, 2.1});
+    ASSERT_FALSE(refused_);
+  }
+}
+
+TEST_F(ImuSelfCheckTest, AGyroThatLidarContradictsIsSetAsideAfterTwoSweepsThoughItIsRightAboutOtherAxes) {
+  ImuSelfCheck check(Pose{});
+  turn(check, 12, {0.1, 0.2, 0.0}, {0.1, 0.2, 0.0});
+  turn(check, 1, {0.1, 0.2, 0.1}, {0.1, 0.2, -0.1});
+  EXPECT_FALSE(refused_) << "one sweep may be wrong";
+  turn(check, 1, {0.1, 0.2, 0.1}, {0.1, 0.2, -0.1});
+  EXPECT_TRUE(refused_);
+  EXPECT_NE(check.verdict().find("until"), std::string_view::npos) << "it may come back";
+  turn(check, 10, {0.1, 0.0, 0.1}, {0.1, 0.0, -0.1});
+  EXPECT_TRUE(refused_);
+  EXPECT_NE(check.verdict().find("other way"), std::string_view::npos);
+}
+
+TEST_F(ImuSelfCheckTest, AGyroThatWasSetAsideIsUsedAgainWhenLidarAgrees) {
+  ImuSelfCheck check(Pose{});
+  stand(check);
+  turn(check, 2, {0, 0.3, 0}, {0, -0.1, 0});
+  EXPECT_TRUE(refused_);
+  check.forget(); // as the monitor tells it then
+  stand(check);
+  turn(check, 5, {0, 0.3, 0}, {0, 0.3, 0});
+  EXPECT_FALSE(refused_);
+  EXPECT_EQ(check.verdict(), "");
+}
+
+TEST_F(ImuSelfCheckTest, AGyroIsTriedAgainWhereLidarSeesNothingClearWithoutItButNotForEver) {
+  ImuSelfCheck check(Pose{});
+  stand(check);
+  for (int round = 0; round < 3; ++round) {
+    turn(check, 2, {0, 0.3, 0}, {0, -0.1, 0});
+    EXPECT_TRUE(refused_);
+    EXPECT_NE(check.verdict().find("until"), std::string_view::npos);
+    for (int i = 0; i < 10; ++i)
+      turn(check, 1, {0, 0.3, 0}, {0, i % 2 == 0 ? 0.3 : -0.3, 0});
+    stand(check);
+    EXPECT_EQ(refused_, round == 2);
+  }
+  EXPECT_NE(check.verdict().find("scale is wrong"), std::string_view::npos);
+}
+
+TEST_F(ImuSelfCheckTest, WhatLidarDoesNotSeeSpeaksAgainstNoGyro) {
+  ImuSelfCheck check(Pose{});
+  sees_ = {true, true, true, true, true, false};
+  turn(check, 30, {0, 0, 1.0}, {0, 0, 0});
+  EXPECT_FALSE(refused_);
+}
+
+TEST_F(ImuSelfCheckTest, WhatComesBackIsCheckedAnew) {
+  ImuSelfCheck check(Pose{});
+  turn(check, 15, {0, 0, 1.0}, {0, 0, 1.0});
+  check.forget();
+  now_ += seconds{2};
+  turn(check, 3, {0, 0, -1.0}, {0, 0, 1.0});
+  EXPECT_TRUE(refused_);
+}
+
+TEST_F(ImuSelfCheckTest, SamplesOutOfOrderDoNotHinderIt) {
+  ImuSelfCheck check(Pose{});
+  int count = 0;
+  drive(check, seconds{5}, [&](ImuSample& sample) {
+    sample.angular_velocity_radps *= -1.0;
+    if (++count % 7 == 0) {
+      ImuSample stale = sample;
+      check.judge(SourceReading{.stamp = now_ - milliseconds{12}, .arrival = now_, .imu = &stale});
+    }
+  });
+  EXPECT_TRUE(refused_);
 }
 
 TEST_F(ImuSelfCheckTest, AGyroThatDoesNotTurnWithTheRobotIsRefused) {

@@ -163,5 +163,28 @@ TEST_F(MotionSourcesTest, EachChangeOfHealthIsToldOnceWithItsSource) {
   EXPECT_TRUE(events[1].healthy);
 }
 
+TEST_F(MotionSourcesTest, WhatTheSelfCheckFoundIsToldInWords) {
+  std::vector<HealthEvent> events;
+  MotionSources sources(kWheelsImuVisual, Fusion::combined, [&](const HealthEvent& event) { events.push_back(event); });
+  for (int ms = 0; ms < 2000; ms += 100) {
+    feed(sources, 1, ms, ms + 80);
+    RegistrationFeedback seen{
+        .from = at_ms(ms - 100), .to = at_ms(ms), .opinions = {}, .twist_base = Vector6::Zero(), .sees = {}};
+    seen.sees.fill(true);
+    seen.twist_base[5] = -1.0;
+    sources.hear(seen);
+  }
+  ASSERT_EQ(events.size(), 2U);
+  for (const HealthEvent& event : events) {
+    EXPECT_EQ(event.source, 1U);
+    EXPECT_FALSE(event.healthy);
+    EXPECT_EQ(event.reason, HealthReason::self_check);
+  }
+  EXPECT_NE(events.front().verdict.find("until"), std::string_view::npos) << "set aside";
+  EXPECT_NE(events.back().verdict.find("other way"), std::string_view::npos) << "refused";
+  EXPECT_EQ(sources.verdict(1), events.back().verdict);
+  EXPECT_EQ(sources.counters(1).health_changes, 1U);
+}
+
 } // namespace
 } // namespace locus
