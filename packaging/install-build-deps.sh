@@ -1,8 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Installs what building and testing locusd needs: the Build-Depends of packaging/debian/control. At once done when all
-# of it is there. Runs as root or with sudo, on Debian 12 or newer.
+# install-build-deps.sh [ARCH]: installs what building and testing locusd, for ARCH, needs: the Build-Depends of
+# packaging/debian/control, less what the profiles of DEB_BUILD_PROFILES leave out. At once done when all of it is there.
+# Runs as root or with sudo, on Debian 12 or newer.
 set -euo pipefail
+host=(${1:+-a "$1"})
 packaging=$(dirname "$(realpath "$0")")
 
 fail() {
@@ -11,7 +13,7 @@ fail() {
   exit 1
 }
 
-if command -v dpkg-checkbuilddeps >/dev/null && dpkg-checkbuilddeps "$packaging/debian/control" 2>/dev/null; then
+if command -v dpkg-checkbuilddeps >/dev/null && dpkg-checkbuilddeps "${host[@]}" "$packaging/debian/control" 2>/dev/null; then
   exit 0
 fi
 
@@ -23,8 +25,8 @@ if [ "$(id -u)" -ne 0 ]; then
 fi
 
 install() {
-  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-    apt-get build-dep --yes --no-install-recommends --option DPkg::Lock::Timeout=600 "$packaging"
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive ${DEB_BUILD_PROFILES:+DEB_BUILD_PROFILES="$DEB_BUILD_PROFILES"} \
+    apt-get build-dep "${host[@]}" --yes --no-install-recommends --option DPkg::Lock::Timeout=600 "$packaging"
 }
 
 # The lists of a fresh or stale machine do not know the packages: then, and only then, fetch them.
