@@ -49,6 +49,14 @@ bool set(int descriptor, int level, int option, int value) {
   return setsockopt(descriptor, level, option, &value, sizeof(value)) == 0;
 }
 
+/// As it is asked for: the kernel doubles that for its book-keeping, and reports the double (socket(7)).
+int granted_buffer_bytes(int descriptor) {
+  int doubled = 0;
+  socklen_t size = sizeof(doubled);
+  getsockopt(descriptor, SOL_SOCKET, SO_RCVBUF, &doubled, &size);
+  return doubled / 2;
+}
+
 } // namespace
 
 /// What recvmmsg() fills, laid out once.
@@ -116,11 +124,10 @@ std::optional<std::string> UdpSocket::prepare() {
   if (getsockname(descriptor_, reinterpret_cast<sockaddr*>(&address), &size) != 0 || port_of(address) == 0)
     return fmt::format("descriptor {} is bound to no UDP port", descriptor_);
   port_ = port_of(address);
-  size = sizeof(buffer_bytes_);
-  getsockopt(descriptor_, SOL_SOCKET, SO_RCVBUF, &buffer_bytes_, &size);
-  if (buffer_bytes_ < kWantedBufferBytes && !set(descriptor_, SOL_SOCKET, SO_RCVBUFFORCE, kWantedBufferBytes))
+  if (granted_buffer_bytes(descriptor_) < kWantedBufferBytes &&
+      !set(descriptor_, SOL_SOCKET, SO_RCVBUFFORCE, kWantedBufferBytes))
     set(descriptor_, SOL_SOCKET, SO_RCVBUF, kWantedBufferBytes);
-  getsockopt(descriptor_, SOL_SOCKET, SO_RCVBUF, &buffer_bytes_, &size);
+  buffer_bytes_ = granted_buffer_bytes(descriptor_);
   if (!set(descriptor_, SOL_SOCKET, SO_TIMESTAMPNS, 1) || !set(descriptor_, SOL_SOCKET, SO_RXQ_OVFL, 1))
     return because("no stamps of arrival", port_);
   return std::nullopt;

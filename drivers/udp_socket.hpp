@@ -44,7 +44,7 @@ class UdpSocket {
 
   [[nodiscard]] int descriptor() const { return descriptor_; }
   [[nodiscard]] std::uint16_t port() const { return port_; }
-  /// What the kernel gave, as it counts: about half of it holds payloads.
+  /// What the kernel gave of kWantedBufferBytes. It holds as much again for its own book-keeping.
   [[nodiscard]] int buffer_bytes() const { return buffer_bytes_; }
   /// Datagrams that the kernel threw away, because the buffer was full. Known from the next one that it delivers.
   [[nodiscard]] std::uint64_t kernel_drops() const { return kernel_drops_; }

@@ -8,12 +8,14 @@
 #include <set>
 #include <thread>
 
+#include <fmt/format.h>
 #include <sched.h>
 #include <sys/mount.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "drivers/udp_socket.hpp"
 #include "service/robot_network.hpp"
 #include "service/undisturbed.hpp"
 
@@ -170,6 +172,24 @@ TEST_F(LifeCycle, PortThatIsTakenEndsItWithStatusOne) {
 }
 
 /// The cable of the lidar is pulled for 12 s: odometry goes on at its pace, dead-reckoned, and finds back.
+/// Without the right to go beyond what the kernel allows to all, as systemd starts it.
+TEST_F(LifeCycle, BufferThatIsSmallerThanAskedForIsSaidWithTheSettingToChange) {
+  int allowed = UdpSocket::kWantedBufferBytes;
+  std::ifstream("/proc/sys/net/core/rmem_max") >> allowed;
+  if (allowed >= UdpSocket::kWantedBufferBytes)
+    GTEST_SKIP() << "this machine gives all that is asked for";
+  std::vector<std::string> command = locusd(config());
+  if (geteuid() == 0)
+    command.insert(command.begin(), {"/usr/bin/setpriv", "--bounding-set", "-net_admin"});
+  Child daemon(command);
+  EXPECT_TRUE(
+      daemon.wait_for_line(fmt::format("the kernel gives lidar sockets {} bytes of the 8388608 asked for: packets "
+                                       "will be lost under load; sysctl net.core.rmem_max=8388608",
+                                       allowed),
+                           seconds{5}))
+      << testing::PrintToString(daemon.lines());
+}
+
 TEST_F(LifeCycle, CablePullIsBridgedByDeadReckoning) {
   Child daemon(undisturbed(locusd(config())));
   Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
