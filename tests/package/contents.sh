@@ -14,7 +14,8 @@ for package in locusd locus-tools; do
   depends=$(dpkg-deb -f "$deb" Depends)
   ! grep -qE 'vtk|pcl-io|boost|ros' <<<"$depends" || complain "$deb: drags in a lot: $depends"
   [ $package != locusd ] || ! grep -q pcl <<<"$depends" || complain "$deb: needs PCL: $depends"
-  ! dpkg-deb --fsys-tarfile "$deb" | grep -aqE 'locusd-deb\.' || complain "$deb: names the folder that it was built in"
+  ! dpkg-deb --fsys-tarfile "$deb" | grep -aE 'locusd-deb\.' >/dev/null ||
+    complain "$deb: names the folder that it was built in"
 done
 diff <(dpkg-deb -I "$folder"/locusd_*.deb conffiles | sort) \
   <(cd "$source/config" && printf '/etc/locusd/%s\n' *.yaml | sort) || complain "conffiles are not those of config/ (>)"

@@ -18,10 +18,10 @@ wait_for() {
 }
 install_package() { dpkg --force-confold --force-confdef -i "$1"; }
 is() { [ "$(systemctl show -P "$2" locusd)" = "$1" ]; }
-status_is() { locusctl status --json | grep -qE "^ \"state\": \"($1)\""; }
+status_is() { locusctl status --json | grep -E "^ \"state\": \"($1)\"" >/dev/null; }
 tracks() { status_is "tracking|standstill"; }
 alive() { is active ActiveState && ! is "$1" MainPID; }
-says() { journalctl --no-pager -u locusd --since "$1" | grep -q "$2"; }
+says() { journalctl --no-pager -u locusd --since "$1" | grep "$2" >/dev/null; }
 # goes_on SINCE: where it was, and tracks again.
 goes_on() {
   wait_for 20 says "$1" "resumed where the service ended"
@@ -53,7 +53,7 @@ step "it says which sensors it does not hear"
 wait_for 10 says -1min "lidar .*: no data packet on UDP port 2368"
 wait_for 10 says -1min "motion source wio: not heard"
 for field in LOCUS_LIDAR LOCUS_SOURCE; do
-  journalctl --no-pager -u locusd -o json | grep "\"$field\":\"" | grep '"CODE_FILE":"' | grep -q '"PRIORITY":"4"'
+  journalctl --no-pager -u locusd -o json | grep "\"$field\":\"" | grep '"CODE_FILE":"' | grep '"PRIORITY":"4"' >/dev/null
 done
 
 step "a buffer that is smaller than asked for is said, with the setting"
@@ -71,7 +71,7 @@ wait_for 30 status_is standstill
 locusctl status
 locusctl save-map /tmp/map.pcd
 [ -s /tmp/map.pcd ]
-locusctl sensors | grep -q "192.168.1.201.*VLP-16"
+locusctl sensors | grep "192.168.1.201.*VLP-16" >/dev/null
 
 step "the upgrade keeps what was edited, brings what was not, and goes on where it was"
 since=$(now)
@@ -131,7 +131,7 @@ systemctl daemon-reload
 step "a second instance has a file, a socket and a state of its own"
 sed 's/port: 2368/port: 2400/; s/domain: 7/domain: 8/' robot.yaml >/etc/locusd/second.yaml
 systemctl start locusd@second
-locusctl --instance second status --json | grep -q '"port": 2400'
+locusctl --instance second status --json | grep '"port": 2400' >/dev/null
 [ -d /var/lib/locusd@second ]
 process=$(systemctl show -P MainPID locusd@second)
 dpkg-reconfigure locusd

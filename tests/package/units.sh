@@ -31,6 +31,6 @@ verify
 asked=$(sed -n 's/.*kWantedBufferBytes = \(.*\);.*/\1/p' "$1/drivers/udp_socket.hpp")
 grep -q "^net.core.rmem_max = $((asked))$" "$source/sysctl.conf" ||
   { echo "systemd/sysctl.conf: rmem_max is not kWantedBufferBytes = $asked"; status=1; }
-systemd-sysusers --dry-run --root="$work" "$source/sysusers.conf" 2>&1 | grep -q "locusd" ||
+systemd-sysusers --dry-run --root="$work" "$source/sysusers.conf" 2>&1 | grep "locusd" >/dev/null ||
   { echo "systemd/sysusers.conf: makes no user locusd"; status=1; }
 exit $status
