@@ -32,8 +32,8 @@ struct CodePlace {
 /// of text to stderr.
 ///
 /// Each message says what happened and, unless all is well, what to do. A place in the program that says more than
-/// kBurst messages within an interval is silenced until the interval is over, and then tells how many were left out. Any
-/// thread but those of the packet path.
+/// kBurst messages within an interval is silenced until the interval is over, and then tells how many were left out.
+/// Any thread but those of the packet path.
 class Log {
  public:
   using Fields = std::initializer_list<std::pair<std::string_view, std::string>>; ///< names in capitals: LOCUS_SOURCE
