@@ -28,8 +28,9 @@ double least_ratio(double share) {
 std::array<Pose, 9> places_around(const Pose& T_map_expected) {
   std::array<Pose, 9> places;
   for (int place = 0; place < 9; ++place) {
-    const Eigen::Vector3d away_m{(place / 3 - 1) * kAround_m, (place % 3 - 1) * kAround_m, 0};
-    places[static_cast<std::size_t>(place)] = T_map_expected * Pose{Eigen::Quaterniond::Identity(), away_m};
+    const int ahead = place / 3 - 1, aside = place % 3 - 1;
+    const Pose T_expected_place{Eigen::Quaterniond::Identity(), {ahead * kAround_m, aside * kAround_m, 0}};
+    places[static_cast<std::size_t>(place)] = T_map_expected * T_expected_place;
   }
   return places;
 }
