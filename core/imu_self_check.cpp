@@ -23,6 +23,7 @@ constexpr double kScaleTolerance = 0.5; ///< a sweep that nobody corrects is ben
 constexpr double kDegPerRad = 1.0 / kRadPerDeg;
 
 constexpr Duration kMaxGap = std::chrono::milliseconds{100};   ///< across which a gyro can be followed
+constexpr int kFrozen = 3;                                     ///< repeats of a value that say nothing of the gyro
 constexpr Duration kResolution = std::chrono::milliseconds{5}; ///< of what is remembered of its turns
 
 bool is_about(double value, double expected, double tolerance) {
@@ -58,7 +59,9 @@ void ImuSelfCheck::weigh(const Eigen::Vector3d& specific_force_base_mps2, Stamp 
 void ImuSelfCheck::follow_turns(const Eigen::Vector3d& turn_rate_base_radps, Stamp stamp) {
   if (last_ && stamp <= *last_)
     return;
-  if (last_ && stamp - *last_ < kMaxGap)
+  repeats_ = turn_rate_base_radps == last_rate_base_radps_ ? repeats_ + 1 : 0;
+  last_rate_base_radps_ = turn_rate_base_radps;
+  if (last_ && stamp - *last_ < kMaxGap && repeats_ < kFrozen)
     angle_rad_ += to_seconds(stamp - *last_) * turn_rate_base_radps;
   else
     known_ = 0;

@@ -53,7 +53,6 @@ bool same(const termios& a, const termios& b) {
 /// Watches until `ends` is typed; the terminal then is as it was found.
 void expect_watch_ends(const std::vector<std::string>& command, const std::string& ends) {
   Terminal terminal(command);
-  const termios before = terminal.settings();
   ASSERT_TRUE(terminal.shows("sweeps", seconds{5}));
   EXPECT_TRUE(terminal.on_page_of_its_own());
   EXPECT_FALSE(terminal.cursor_is_shown());
@@ -63,7 +62,7 @@ void expect_watch_ends(const std::vector<std::string>& command, const std::strin
   EXPECT_EQ(terminal.wait_for_exit(seconds{2}), 0);
   EXPECT_FALSE(terminal.on_page_of_its_own());
   EXPECT_TRUE(terminal.cursor_is_shown());
-  EXPECT_TRUE(same(terminal.settings(), before));
+  EXPECT_TRUE(same(terminal.settings(), terminal.settings_before()));
   EXPECT_EQ(terminal.overflows(), 0);
 }
 

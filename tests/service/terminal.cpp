@@ -24,6 +24,7 @@ Terminal::Terminal(std::vector<std::string> command) {
     throw std::runtime_error("no terminal");
   for (const int end : {master_, slave_})
     fcntl(end, F_SETFD, FD_CLOEXEC);
+  settings_before_ = settings();
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   for (const int standard : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) // opened by a new session: it is its terminal

@@ -39,8 +39,9 @@ class Terminal {
   [[nodiscard]] int pages() const { return pages_; }
   /// Letters beyond the right edge and lines beyond the bottom.
   [[nodiscard]] int overflows() const { return overflows_; }
-  /// How keys are treated now.
+  /// How keys are treated now, and were before the program began.
   [[nodiscard]] termios settings() const;
+  [[nodiscard]] const termios& settings_before() const { return settings_before_; }
 
  private:
   void read_some(Duration timeout);
@@ -48,6 +49,7 @@ class Terminal {
   void obey(const std::string& sequence);
 
   int master_ = -1, slave_ = -1;
+  termios settings_before_{};
   pid_t pid_ = 0;
   std::optional<int> status_;
   std::vector<std::string> rows_{kRows, std::string(kColumns, ' ')};
