@@ -32,11 +32,13 @@ class ImuSelfCheckTest : public testing::Test {
       check.hear(LidarOpinion::none, seen);
     }
   }
-  /// Turns steadily for so many sweeps.
-  void turn(ImuSelfCheck& check, int sweeps, const Eigen::Vector3d& gyro_radps, const Eigen::Vector3d& lidar_radps) {
+  /// Turns steadily for so many sweeps. The gyro lives: it ripples.
+  void turn(ImuSelfCheck& check, int sweeps, const Eigen::Vector3d& gyro_radps, const Eigen::Vector3d& lidar_radps,
+            double ripple_radps = 1e-6) {
     for (int i = 1; i <= 20 * sweeps; ++i) {
       now_ += milliseconds{5};
-      const ImuSample sample{now_, now_, gyro_radps, {0.3, 0.1, 9.8}, {}};
+      const Eigen::Vector3d ripple = Eigen::Vector3d::Constant(i % 2 == 0 ? ripple_radps : -ripple_radps);
+      const ImuSample sample{now_, now_, gyro_radps + ripple, {0.3, 0.1, 9.8}, {}};
       refused_ = check.judge(SourceReading{.stamp = now_, .arrival = now_, .imu = &sample}).has_value();
       if (i % 20 != 0)
         continue;
@@ -125,6 +127,17 @@ TEST_F(ImuSelfCheckTest, AGyroThatLidarContradictsIsSetAsideAfterTwoSweepsThough
   turn(check, 10, {0.1, 0.0, 0.1}, {0.1, 0.0, -0.1});
   EXPECT_TRUE(refused_);
   EXPECT_NE(check.verdict().find("other way"), std::string_view::npos);
+}
+
+TEST_F(ImuSelfCheckTest, AGyroThatIsFrozenSaysNothingOfItself) {
+  ImuSelfCheck check(Pose{});
+  stand(check);
+  turn(check, 2, {0, 0, 0.5}, {0, 0, 0.5});
+  turn(check, 20, {0, 0, 0.5}, {0, 0, -0.3}, 0.0);
+  EXPECT_FALSE(refused_) << "that is for another metric to say";
+  EXPECT_EQ(check.verdict(), "");
+  turn(check, 2, {0, 0, -0.3}, {0, 0, -0.3});
+  EXPECT_FALSE(refused_);
 }
 
 TEST_F(ImuSelfCheckTest, AGyroThatWasSetAsideIsUsedAgainWhenLidarAgrees) {
