@@ -198,7 +198,9 @@ TEST_F(ImuSelfCheckTest, SamplesOutOfOrderDoNotHinderIt) {
 
 TEST_F(ImuSelfCheckTest, AGyroThatDoesNotTurnWithTheRobotIsRefused) {
   ImuSelfCheck check(Pose{});
-  drive(check, seconds{5}, [](ImuSample& sample) { sample.angular_velocity_radps = {0.5, 0, 0.01}; });
+  drive(check, seconds{5}, [](ImuSample& sample) {
+    sample.angular_velocity_radps = {0.5, 0, 0.01 + 0.01 * sample.angular_velocity_radps.z()};
+  });
   EXPECT_TRUE(refused_);
 }
 
