@@ -73,9 +73,9 @@ class ImuSelfCheck : public HealthMetric {
   std::size_t newest_ = 0, known_ = 0;
   Eigen::Vector3d angle_rad_ = Eigen::Vector3d::Zero();
   std::optional<Stamp> last_;
-  Eigen::Vector3d last_rate_base_radps_ = Eigen::Vector3d::Zero();
-  int repeats_ = 0;            ///< of that
-  std::array<Turns, 3> turns_; ///< by axis of the base
+  Vector6 last_values_ = Vector6::Zero(); ///< gyro and accelerometer
+  int repeats_ = 0;                       ///< of them
+  std::array<Turns, 3> turns_;            ///< by axis of the base
   bool set_aside_ = false;
   int rounds_ = 0; ///< of being set aside without a result
 };
