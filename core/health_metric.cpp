@@ -184,12 +184,11 @@ class LidarDisagrees : public HealthMetric {
 std::vector<std::unique_ptr<HealthMetric>> health_metrics(const MotionSourceOptions& source) {
   std::vector<std::unique_ptr<HealthMetric>> metrics;
   metrics.push_back(std::make_unique<NotANumber>()); // first, so that the others need not think of it
-  if (source.kind == SourceKind::imu)
-    metrics.push_back(std::make_unique<ImuSelfCheck>(source.T_base_source)); // looks at all the others leave out
   metrics.push_back(std::make_unique<Late>());
   metrics.push_back(std::make_unique<OutOfOrder>());
   if (source.kind == SourceKind::imu) {
     metrics.push_back(std::make_unique<FrozenImu>());
+    metrics.push_back(std::make_unique<ImuSelfCheck>(source.T_base_source)); // must see turn rates in deg/s
     metrics.push_back(std::make_unique<ImpossibleTurnRate>());
   } else {
     metrics.push_back(std::make_unique<Uncertain>());

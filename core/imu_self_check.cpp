@@ -22,8 +22,7 @@ constexpr double kLikeness = 0.7;
 constexpr double kScaleTolerance = 0.5; ///< a sweep that nobody corrects is bent
 constexpr double kDegPerRad = 1.0 / kRadPerDeg;
 
-constexpr Duration kMaxGap = std::chrono::milliseconds{100}; ///< across which a gyro can be followed
-constexpr int kFrozen = 3;                                   ///< repeats of all values to the last bit: no living unit
+constexpr Duration kMaxGap = std::chrono::milliseconds{100};   ///< across which a gyro can be followed
 constexpr Duration kResolution = std::chrono::milliseconds{5}; ///< of what is remembered of its turns
 
 bool is_about(double value, double expected, double tolerance) {
@@ -35,10 +34,6 @@ bool is_about(double value, double expected, double tolerance) {
 std::optional<HealthReason> ImuSelfCheck::judge(const SourceReading& reading) {
   if (refused_)
     return HealthReason::self_check;
-  Vector6 values;
-  values << reading.imu->angular_velocity_radps, reading.imu->specific_force_mps2;
-  repeats_ = values == last_values_ ? repeats_ + 1 : 0;
-  last_values_ = values;
   follow_turns(R_base_imu_ * reading.imu->angular_velocity_radps, reading.stamp);
   weigh(R_base_imu_ * reading.imu->specific_force_mps2, reading.stamp);
   return refused_ || set_aside_ ? std::optional{HealthReason::self_check} : std::nullopt;
@@ -63,7 +58,7 @@ void ImuSelfCheck::weigh(const Eigen::Vector3d& specific_force_base_mps2, Stamp 
 void ImuSelfCheck::follow_turns(const Eigen::Vector3d& turn_rate_base_radps, Stamp stamp) {
   if (last_ && stamp <= *last_)
     return;
-  if (last_ && stamp - *last_ < kMaxGap && repeats_ < kFrozen)
+  if (last_ && stamp - *last_ < kMaxGap)
     angle_rad_ += to_seconds(stamp - *last_) * turn_rate_base_radps;
   else
     known_ = 0;
@@ -154,14 +149,14 @@ void ImuSelfCheck::review() {
     set_aside_ = true;
     turns_ = {};
   } else if (set_aside_ && contradicted && any(kSweepsToJudge, false)) {
-    judge();
+    conclude();
   } else if (set_aside_ && !contradicted && any(kSweepsToConfirm, true)) {
     set_aside_ = false;
   }
 }
 
 /// Refuses the unit, or tries it once more where nothing is clear: lidar may not see what a gait does without it.
-void ImuSelfCheck::judge() {
+void ImuSelfCheck::conclude() {
   for (const Turns& turns : turns_) {
     if (turns.sweeps < kSweepsToJudge)
       continue;

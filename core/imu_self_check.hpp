@@ -56,7 +56,7 @@ class ImuSelfCheck : public HealthMetric {
   [[nodiscard]] Eigen::Vector3d angle_rad_at(Stamp stamp) const;
   void compare(const RegistrationFeedback& feedback);
   void review();
-  void judge();
+  void conclude();
   void refuse(std::string_view verdict);
 
   Eigen::Quaterniond R_base_imu_;
@@ -73,9 +73,7 @@ class ImuSelfCheck : public HealthMetric {
   std::size_t newest_ = 0, known_ = 0;
   Eigen::Vector3d angle_rad_ = Eigen::Vector3d::Zero();
   std::optional<Stamp> last_;
-  Vector6 last_values_ = Vector6::Zero(); ///< gyro and accelerometer
-  int repeats_ = 0;                       ///< of them
-  std::array<Turns, 3> turns_;            ///< by axis of the base
+  std::array<Turns, 3> turns_; ///< by axis of the base
   bool set_aside_ = false;
   int rounds_ = 0; ///< of being set aside without a result
 };

@@ -43,10 +43,10 @@ Eigen::Matrix3d skew(const Eigen::Vector3d& v);
 Eigen::Quaterniond so3_exp(const Eigen::Vector3d& rotation_vector_rad);
 Eigen::Vector3d so3_log(const Eigen::Quaterniond& rotation);
 
-/// SE(3) exponential of a twist held for unit time, and its inverse.
-/// The same along each axis, as metres and radians.
+/// A tangent that is the same along each axis.
 Vector6 along_each_axis(double translation_m, double rotation_deg);
 
+/// SE(3) exponential of a twist held for unit time, and its inverse.
 Pose se3_exp(const Vector6& tangent);
 Vector6 se3_log(const Pose& pose);
 

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 
 namespace locus {
 
 /// The stages whose cost is reported.
 enum class Stage : std::uint8_t { decode, correct, filter, covariance, scan_to_scan, scan_to_submap, map };
 inline constexpr std::size_t kStages = 7;
+inline constexpr std::array<std::string_view, kStages> kStageNames{
+    "decode", "correct", "filter", "covariance", "scan_to_scan", "scan_to_submap", "map"};
 
 /// Told when a stage begins and ends. The core has no clock of its own; who wants timing brings one.
 class StageClock {

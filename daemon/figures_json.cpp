@@ -5,18 +5,10 @@
 #include <cmath>
 #include <fstream>
 #include <string>
-#include <string_view>
 
 namespace locus::daemon {
 
 using nlohmann::ordered_json;
-
-namespace {
-
-constexpr std::array<std::string_view, kStages> kStageNames{"decode",       "correct",        "filter", "covariance",
-                                                            "scan_to_scan", "scan_to_submap", "map"};
-
-} // namespace
 
 double rounded(double value) { return std::round(value * 1e4) / 1e4; }
 

@@ -4,7 +4,7 @@
 # leaving out whatever touches TBB would hide those that are. Built once, in half a minute; prints its folder.
 set -euo pipefail
 version=$(dpkg-query -W -f '${source:Version}' libtbb-dev)
-cache=${XDG_CACHE_HOME:-$HOME/.cache}/locusd/tbb-tsan-${version}
+cache=${XDG_CACHE_HOME:-~/.cache}/locusd/tbb-tsan-${version}
 if [[ ! -d $cache/lib ]]; then
   work=$(mktemp -d)
   trap 'rm -rf "$work"' EXIT

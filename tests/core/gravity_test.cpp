@@ -136,9 +136,7 @@ TEST(FlatGround, FoundGivesWayToLidarWhereThatSeesBetter) {
   EXPECT_LT((blind.translation - Eigen::Vector3d(1.0, 0.3, 0.2)).norm(), 1e-12);
   EXPECT_LT((to_rpy_rad(blind.rotation) - Eigen::Vector3d(0, 0, 0.5)).norm(), 1e-3);
 
-  Vector6 sigma;
-  sigma << Eigen::Vector3d::Constant(0.001), Eigen::Vector3d::Constant(0.0005);
-  const Matrix6 information = sigma.cwiseAbs2().cwiseInverse().asDiagonal();
+  const Matrix6 information = along_each_axis(0.001, 0.03).cwiseAbs2().cwiseInverse().asDiagonal();
   const Pose seen = ground.flatten(kLast, kRolledUpward, information);
   EXPECT_LT((seen.translation - kRolledUpward.translation).norm(), 0.003);
   EXPECT_LT(angle_rad(seen.rotation * kRolledUpward.rotation.conjugate()), 5e-4);

@@ -364,6 +364,22 @@ TEST_F(ImuTest, ThatRepeatsItsReadingIsFrozen) {
   EXPECT_TRUE(monitor_.healthy());
 }
 
+TEST_F(ImuTest, ThatFreezesInATurnIsNotTakenForAWrongOne) {
+  RegistrationFeedback otherwise;
+  otherwise.sees.fill(true);
+  otherwise.twist_base << 1.0, 0, 0, 0, 0, -0.3;
+  for (int sweep = 0; sweep < 20; ++sweep) {
+    run(milliseconds{100}, 0.5, 0.0);
+    otherwise.from = now_ - milliseconds{200};
+    otherwise.to = now_ - milliseconds{100};
+    monitor_.hear(LidarOpinion::none, otherwise, now_);
+  }
+  EXPECT_FALSE(monitor_.healthy());
+  EXPECT_EQ(monitor_.verdict(), "");
+  run(seconds{2}, -0.3);
+  EXPECT_TRUE(monitor_.healthy());
+}
+
 TEST_F(ImuTest, WithoutNoiseIsNotFrozenAtRest) {
   run(seconds{2}, 0.0, 0.0);
   EXPECT_TRUE(monitor_.healthy());

@@ -32,13 +32,11 @@ class ImuSelfCheckTest : public testing::Test {
       check.hear(LidarOpinion::none, seen);
     }
   }
-  /// Turns steadily for so many sweeps. The gyro lives: it ripples.
-  void turn(ImuSelfCheck& check, int sweeps, const Eigen::Vector3d& gyro_radps, const Eigen::Vector3d& lidar_radps,
-            double ripple_radps = 1e-6) {
+  /// Turns steadily for so many sweeps.
+  void turn(ImuSelfCheck& check, int sweeps, const Eigen::Vector3d& gyro_radps, const Eigen::Vector3d& lidar_radps) {
     for (int i = 1; i <= 20 * sweeps; ++i) {
       now_ += milliseconds{5};
-      const Eigen::Vector3d ripple = Eigen::Vector3d::Constant(i % 2 == 0 ? ripple_radps : -ripple_radps);
-      const ImuSample sample{now_, now_, gyro_radps + ripple, {0.3, 0.1, 9.8}, {}};
+      const ImuSample sample{now_, now_, gyro_radps, {0.3, 0.1, 9.8}, {}};
       refused_ = check.judge(SourceReading{.stamp = now_, .arrival = now_, .imu = &sample}).has_value();
       if (i % 20 != 0)
         continue;
@@ -129,17 +127,6 @@ TEST_F(ImuSelfCheckTest, AGyroThatLidarContradictsIsSetAsideAfterTwoSweepsThough
   EXPECT_NE(check.verdict().find("other way"), std::string_view::npos);
 }
 
-TEST_F(ImuSelfCheckTest, AGyroThatIsFrozenSaysNothingOfItself) {
-  ImuSelfCheck check(Pose{});
-  stand(check);
-  turn(check, 2, {0, 0, 0.5}, {0, 0, 0.5});
-  turn(check, 20, {0, 0, 0.5}, {0, 0, -0.3}, 0.0);
-  EXPECT_FALSE(refused_) << "that is for another metric to say";
-  EXPECT_EQ(check.verdict(), "");
-  turn(check, 2, {0, 0, -0.3}, {0, 0, -0.3});
-  EXPECT_FALSE(refused_);
-}
-
 TEST_F(ImuSelfCheckTest, AGyroThatWasSetAsideIsUsedAgainWhenLidarAgrees) {
   ImuSelfCheck check(Pose{});
   stand(check);
@@ -198,9 +185,7 @@ TEST_F(ImuSelfCheckTest, SamplesOutOfOrderDoNotHinderIt) {
 
 TEST_F(ImuSelfCheckTest, AGyroThatDoesNotTurnWithTheRobotIsRefused) {
   ImuSelfCheck check(Pose{});
-  drive(check, seconds{5}, [](ImuSample& sample) {
-    sample.angular_velocity_radps = {0.5, 0, 0.01 + 0.01 * sample.angular_velocity_radps.z()};
-  });
+  drive(check, seconds{5}, [](ImuSample& sample) { sample.angular_velocity_radps = {0.5, 0, 0.01}; });
   EXPECT_TRUE(refused_);
 }
 

@@ -16,9 +16,6 @@ namespace {
 
 using namespace locus;
 
-constexpr std::array<std::string_view, kStages> kStageNames{"decode",       "correct",        "filter", "covariance",
-                                                            "scan_to_scan", "scan_to_submap", "map"};
-
 /// Counts while the innermost stage is the one that is wanted.
 class InstructionCounter : public StageClock {
  public:

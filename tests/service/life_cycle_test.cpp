@@ -15,6 +15,8 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "daemon/machine_time.hpp"
+#include "daemon/service/saved_state.hpp"
 #include "drivers/udp_socket.hpp"
 #include "service/robot_network.hpp"
 #include "service/undisturbed.hpp"
@@ -171,7 +173,6 @@ TEST_F(LifeCycle, PortThatIsTakenEndsItWithStatusOne) {
   EXPECT_NE(second.err.find("2368"), std::string::npos) << second.err;
 }
 
-/// The cable of the lidar is pulled for 12 s: odometry goes on at its pace, dead-reckoned, and finds back.
 /// Without the right to go beyond what the kernel allows to all, as systemd starts it.
 TEST_F(LifeCycle, BufferThatIsSmallerThanAskedForIsSaidWithTheSettingToChange) {
   int allowed = UdpSocket::kWantedBufferBytes;
@@ -190,6 +191,7 @@ TEST_F(LifeCycle, BufferThatIsSmallerThanAskedForIsSaidWithTheSettingToChange) {
       << testing::PrintToString(daemon.lines());
 }
 
+/// The cable of the lidar is pulled for 12 s: odometry goes on at its pace, dead-reckoned, and finds back.
 TEST_F(LifeCycle, CablePullIsBridgedByDeadReckoning) {
   Child daemon(undisturbed(locusd(config())));
   Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
@@ -246,6 +248,15 @@ TEST_F(LifeCycle, DamagedStateIsAFreshStart) {
   Child daemon(undisturbed(locusd(config())));
   EXPECT_TRUE(
       daemon.wait_for_line("a fresh start: " + file("state").string() + ": is cut short or damaged", seconds{3}));
+}
+
+TEST_F(LifeCycle, StateOfAnotherTimeIsAFreshStart) {
+  daemon::SavedState old;
+  old.last.stamp = Stamp{daemon::read_clock(CLOCK_REALTIME)} - seconds{61};
+  ASSERT_FALSE(daemon::write_state(file("state"), old));
+  Child daemon(undisturbed(locusd(config())));
+  EXPECT_TRUE(daemon.wait_for_line("a fresh start: the saved state is 61 s old", seconds{3}))
+      << testing::PrintToString(daemon.lines());
 }
 
 TEST_F(LifeCycle, FullDiskCostsTheStateAndNothingElse) {
