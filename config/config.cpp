@@ -123,4 +123,10 @@ std::optional<std::string> Config::problem() const {
   return problems.result();
 }
 
+void Config::use(Isa isa) {
+  for (LidarOptions& lidar : lidars)
+    lidar.isa = isa;
+  sweep.isa = odometry.isa = isa;
+}
+
 } // namespace locus

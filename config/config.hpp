@@ -57,6 +57,9 @@ struct Config {
 
   /// As problem() of every module, and what only shows when all are seen together: names and ports used twice.
   [[nodiscard]] std::optional<std::string> problem() const;
+
+  /// Has all of it computed by the instructions of one set.
+  void use(Isa isa);
   bool operator==(const Config&) const = default;
 
  private:

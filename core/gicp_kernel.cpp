@@ -90,35 +90,70 @@ struct Placed {
 
 using Places = std::array<std::uint32_t, kGicpBlock>;
 
-/// Lists the points near enough to be looked up and gives back how many they are.
-std::size_t take_near_ones(const Placed& points, std::size_t count, Places& places) {
-  std::size_t near = 0;
+/// SurfaceGrid::index_of for all points of a block, in single precision; points out of reach go anywhere.
+[[gnu::always_inline]] inline void index_all(const SurfaceGrid& grid, const Eigen::Vector3d& origin_m,
+                                             const Placed& points, Cells& cells) {
+  const auto per_m = static_cast<float>(1.0 / grid.leaf_m());
+  const auto index = [per_m](const PerPoint& at_m, double origin_m_, double leaf_m, auto& cell) {
+    const double origin_cells = origin_m_ / leaf_m + 0.5;
+    const double whole = std::floor(origin_cells);
+    const auto part = static_cast<float>(origin_cells - whole);
+    const auto first = static_cast<std::int32_t>(whole);
+    constexpr float kMost = 2.0F * kMaxDistance_m / static_cast<float>(SurfaceMap::kFineLeaf_m);
+    for (std::size_t i = 0; i < kGicpBlock; ++i) {
+      const float cells_from = std::clamp(at_m[i] * per_m + part, -kMost, kMost);
+      const auto truncated = static_cast<std::int32_t>(cells_from);
+      cell[i] = first + truncated - static_cast<std::int32_t>(cells_from < static_cast<float>(truncated));
+    }
+  };
+  index(points.x_m, origin_m.x(), grid.leaf_m(), cells.x);
+  index(points.y_m, origin_m.y(), grid.leaf_m(), cells.y);
+  index(points.z_m, origin_m.z(), grid.leaf_m(), cells.z);
+}
+
+bool is_near(const Eigen::Vector3f& point) { return (point.array().abs() < kMaxDistance_m).all(); }
+
+/// Lists the points that are to be looked up and gives back how many they are. To the others belongs what is there.
+std::size_t list_open(const GicpPass& pass, const Placed& points, std::size_t count, const Cells& fine,
+                      MatchBlock& matches, Places& open) {
+  std::size_t listed = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    places[near] = static_cast<std::uint32_t>(i);
-    near += (points[i].array().abs() < kMaxDistance_m).all() ? 1U : 0U;
+    if (pass.look_up == LookUp::follow && fine[i] == matches.fine[i])
+      continue;
+    put({}, i, matches);
+    open[listed] = static_cast<std::uint32_t>(i);
+    listed += is_near(points[i]) ? 1U : 0U;
   }
-  return near;
+  return listed;
 }
 
 /// The plane of the voxel around each point, in the fine grid if it has one, else in the coarse one.
-void find_here(const GicpPass& pass, const Placed& points, std::size_t count, MatchBlock& matches) {
+void find_here(const GicpPass& pass, const Placed& points, std::size_t count, MatchBlock& matches, Isa isa) {
+  Cells fine, coarse;
+  run_as(isa, [&] {
+    index_all(pass.target.fine(), pass.origin_m, points, fine);
+    index_all(pass.target.coarse(), pass.origin_m, points, coarse);
+  });
+  Places open; // of points still without a counterpart
+  count = list_open(pass, points, count, fine, matches, open);
+  matches.fine = fine;
   std::array<VoxelIndex, kGicpBlock> index;
   std::array<const Surface*, kGicpBlock> surface;
-  Places open; // of points still without a counterpart
   const auto reach_m = static_cast<float>(pass.max_correspondence_m);
-  count = take_near_ones(points, count, open);
-  for (const SurfaceGrid* grid : {&pass.target.fine(), &pass.target.coarse()}) {
+  for (const bool in_fine : {true, false}) {
+    const SurfaceGrid& grid = in_fine ? pass.target.fine() : pass.target.coarse();
     for (std::size_t k = 0; k < count; ++k)
-      index[k] = grid->index_of(pass.origin_m + points[open[k]].cast<double>());
-    grid->find(std::span(index).first(count), std::span(surface).first(count));
+      index[k] = in_fine ? fine[open[k]] : coarse[open[k]];
+    grid.find(std::span(index).first(count), std::span(surface).first(count));
     std::size_t left = 0;
     for (std::size_t k = 0; k < count; ++k) {
       const std::uint32_t i = open[k];
-      const Counterpart match = at(pass, *grid, index[k], surface[k]);
+      const Counterpart match = at(pass, grid, index[k], surface[k]);
       const bool near =
           match.surface != nullptr &&
           (!match.surface->planar() || std::abs(match.surface->normal.dot(points[i] - match.mean_m)) < reach_m);
-      put(near ? match : Counterpart{}, i, matches);
+      if (near)
+        put(match, i, matches);
       open[left] = i;
       left += near ? 0U : 1U;
     }
@@ -129,9 +164,10 @@ void find_here(const GicpPass& pass, const Placed& points, std::size_t count, Ma
 /// Near each point: in the coarse grid if there is one within reach, else in the fine one. From afar the nearest of the
 /// small voxels is rarely the right one.
 void find_around(const GicpPass& pass, const Placed& points, std::size_t count, MatchBlock& matches) {
-  Places near;
-  count = take_near_ones(points, count, near);
-  for (const std::uint32_t i : std::span(near).first(count)) {
+  for (std::size_t i = 0; i < count; ++i) {
+    put({}, i, matches);
+    if (!is_near(points[i]))
+      continue;
     Counterpart match = nearest_around(pass, pass.target.coarse(), points[i]);
     if (match.surface == nullptr)
       match = nearest_around(pass, pass.target.fine(), points[i]);
@@ -265,36 +301,6 @@ using Sums = std::array<std::array<float, kLanes>, kTerms>;
   }
 }
 
-/// The same source for three instruction sets. Only these functions are compiled for more than the baseline, so no type
-/// changes its layout.
-void sum_baseline(const Affine& T, const SourceBlock& source, const MatchBlock& matches, float width2, Sums& sums) {
-  sum_block(T, source, matches, width2, sums);
-}
-
-#if defined(__x86_64__)
-[[gnu::flatten, gnu::target("avx2,fma")]] void sum_avx2(const Affine& T, const SourceBlock& source,
-                                                        const MatchBlock& matches, float width2, Sums& sums) {
-  sum_block(T, source, matches, width2, sums);
-}
-
-[[gnu::flatten, gnu::target("avx512f,avx512vl,avx512dq,fma")]] void
-sum_avx512(const Affine& T, const SourceBlock& source, const MatchBlock& matches, float width2, Sums& sums) {
-  sum_block(T, source, matches, width2, sums);
-}
-#endif
-
-void sum_with(Isa isa, const Affine& T, const SourceBlock& source, const MatchBlock& matches, float width2,
-              Sums& sums) {
-#if defined(__x86_64__)
-  if (isa == Isa::avx512)
-    return sum_avx512(T, source, matches, width2, sums);
-  if (isa == Isa::avx2)
-    return sum_avx2(T, source, matches, width2, sums);
-#endif
-  static_cast<void>(isa);
-  sum_baseline(T, source, matches, width2, sums);
-}
-
 NormalEquations equations_of(const Sums& sums) {
   const auto total = [&sums](std::size_t term) {
     double sum = 0.0;
@@ -342,7 +348,7 @@ SourceBlock::SourceBlock(std::span<const SurfacePoint> points) : count(points.si
   }
 }
 
-void find(const GicpPass& pass, const SourceBlock& source, MatchBlock& matches) {
+void find(const GicpPass& pass, const SourceBlock& source, MatchBlock& matches, Isa isa) {
   const auto [R, t] = about_origin(pass);
   Placed points;
   for (std::size_t i = 0; i < kGicpBlock; ++i) {
@@ -350,12 +356,12 @@ void find(const GicpPass& pass, const SourceBlock& source, MatchBlock& matches) 
     points.y_m[i] = R(1, 0) * source.x_m[i] + R(1, 1) * source.y_m[i] + R(1, 2) * source.z_m[i] + t.y();
     points.z_m[i] = R(2, 0) * source.x_m[i] + R(2, 1) * source.y_m[i] + R(2, 2) * source.z_m[i] + t.z();
   }
-  for (std::size_t i = 0; i < kGicpBlock; ++i)
+  for (std::size_t i = source.count; i < kGicpBlock; ++i)
     put({}, i, matches);
   if (pass.look_up == LookUp::around)
     find_around(pass, points, source.count, matches);
   else
-    find_here(pass, points, source.count, matches);
+    find_here(pass, points, source.count, matches, isa);
 }
 
 void straighten(const WeakDirections& weak, MatchBlock& matches) {
@@ -374,7 +380,8 @@ void straighten(const WeakDirections& weak, MatchBlock& matches) {
 
 NormalEquations linearise(const GicpPass& pass, const SourceBlock& source, const MatchBlock& matches, Isa isa) {
   Sums sums{};
-  sum_with(isa, about_origin(pass), source, matches, static_cast<float>(pass.width2), sums);
+  const Affine T = about_origin(pass);
+  run_as(isa, [&] { sum_block(T, source, matches, static_cast<float>(pass.width2), sums); });
   return equations_of(sums);
 }
 

@@ -26,12 +26,19 @@ struct SourceBlock {
   explicit SourceBlock(std::span<const SurfacePoint> points);
 };
 
+/// Voxels that the points of a block fall into.
+struct Cells {
+  std::array<std::int32_t, kGicpBlock> x, y, z;
+  [[nodiscard]] VoxelIndex operator[](std::size_t i) const { return {x[i], y[i], z[i]}; }
+};
+
 /// Their counterparts: planes of the target, or Gaussians of shapeless voxels.
 struct MatchBlock {
   PerPoint x_m, y_m, z_m;                ///< mean, from GicpPass::origin_m
   PerPoint normal_x, normal_y, normal_z; ///< zero for a shapeless one
   PerPoint across_m2, along_m2;          ///< variances; equal for a shapeless one
   PerPoint found;                        ///< 1, or 0 where there is no counterpart
+  Cells fine;                            ///< where they were looked up
 };
 
 /// Sums over the points of one block.
@@ -56,6 +63,7 @@ struct NormalEquations {
 /// How counterparts come about in a pass.
 enum class LookUp {
   keep,   ///< those of the pass before
+  follow, ///< those of the pass before where the point is still in its voxel, else as `here`
   here,   ///< the plane of the voxel around the point, fine or else coarse
   around, ///< the nearest plane of the 27 voxels around it, coarse or else fine
 };
@@ -79,7 +87,7 @@ struct GicpPass {
 
 /// Finds the counterparts of the points as the pass says, which is not to keep them. Pure but for `matches`; any
 /// thread.
-void find(const GicpPass& pass, const SourceBlock& source, MatchBlock& matches);
+void find(const GicpPass& pass, const SourceBlock& source, MatchBlock& matches, Isa isa);
 
 /// Takes counterparts that lean along a weak direction by no more than the error of a normal as not leaning there. They
 /// would tie the robot to where the scan lines fell.

@@ -24,4 +24,25 @@ std::optional<Isa> isa_from_string(std::string_view name);
 /// Whether this processor can run it.
 bool is_supported(Isa isa);
 
+#if defined(__x86_64__)
+template <class Body> [[gnu::flatten, gnu::target("avx2,fma")]] void run_as_avx2(const Body& body) { body(); }
+template <class Body>
+[[gnu::flatten, gnu::target("avx512f,avx512vl,avx512dq,fma")]] void run_as_avx512(const Body& body) {
+  body();
+}
+#endif
+
+/// Runs `body` in the instructions of a set that the processor has: one source, compiled for each. That holds for what
+/// is inlined, so no type changes its layout; a body is a loop or two over plain arrays.
+template <class Body> void run_as(Isa isa, const Body& body) {
+#if defined(__x86_64__)
+  if (isa == Isa::avx512)
+    return run_as_avx512(body);
+  if (isa == Isa::avx2)
+    return run_as_avx2(body);
+#endif
+  static_cast<void>(isa);
+  body();
+}
+
 } // namespace locus

@@ -57,6 +57,7 @@ struct SweepOptions {
   VoxelFilterOptions voxel_filter;
   RandomFilterOptions random_filter;
   std::uint64_t seed = 1;
+  Isa isa = best_isa(); ///< no key: a result of the machine, or of the environment variable LOCUS_ISA
 
   [[nodiscard]] std::optional<std::string> problem() const;
   bool operator==(const SweepOptions&) const = default;

@@ -27,10 +27,10 @@ constexpr double kDamping = 1e-6; ///< keeps directions solvable that neither po
 constexpr double kWidthStartWide = 80.0;
 constexpr double kWidthStart = 12.0;
 constexpr double kWidthEnd = 3.5;
-constexpr double kNarrowing = 0.3;
+constexpr double kNarrowing = 0.25;
 
-constexpr double kConvergedTranslation_m = 5e-4;
-constexpr double kConvergedRotation_rad = 5e-5;
+constexpr double kConvergedTranslation_m = 1e-3;
+constexpr double kConvergedRotation_rad = 1e-4;
 constexpr int kStepsPerLookUp = 2; ///< Gauss-Newton steps on the same counterparts
 
 /// Where fewer than this share of the normals points, there is next to nothing to hold on to.
@@ -95,11 +95,12 @@ struct Gicp::Workers {
   }
 
   void look_up(const GicpPass& pass) {
-    for_each_block([&](std::size_t block) { find(pass, blocks[block], matches[block]); });
+    for_each_block([&](std::size_t block) { find(pass, blocks[block], matches[block], isa); });
     const WeakDirections weak = weak_directions(normals());
     for (std::size_t block = 0; block < blocks.size() && weak.count > 0; ++block)
       straighten(weak, matches[block]);
-    believed = weak.count > 0 ? belief(weak, normals()) : Matrix6::Identity();
+    straightened = weak.count > 0;
+    believed = straightened ? belief(weak, normals()) : Matrix6::Identity();
   }
 
   [[nodiscard]] Normals normals() const {
@@ -123,6 +124,7 @@ struct Gicp::Workers {
   std::vector<SourceBlock> blocks;
   std::vector<MatchBlock> matches;
   std::vector<NormalEquations> partial;
+  bool straightened = false; ///< the matches
   Matrix6 believed = Matrix6::Identity();
 };
 
@@ -162,17 +164,23 @@ Registration Gicp::align(std::span<const SurfacePoint> source, const SurfaceMap&
   workers_->take(source);
   double width = wide ? kWidthStartWide : kWidthStart;
   bool few_planes = false;
+  bool can_follow = false;
   while (result.iterations < options.max_iterations && (result.iterations == 0 || !stop())) {
     const Pose& T = result.T_target_source;
     const bool looks_up = result.iterations % kStepsPerLookUp == 0;
     if (looks_up && result.iterations > 0)
       width = std::max(kNarrowing * width, kWidthEnd);
-    const LookUp anew = wide && width > kWidthStart ? LookUp::around : LookUp::here;
+    const LookUp anew = wide && width > kWidthStart ? LookUp::around : can_follow ? LookUp::follow : LookUp::here;
     const NormalEquations points = workers_->run({target, T, T_start.translation, looks_up ? anew : LookUp::keep,
                                                   few_planes, options.max_correspondence_m, width * width});
     if (!(points.weight > 0.0))
       break;
-    few_planes = few_planes || static_cast<double>(points.planes) < kFewPlanes * static_cast<double>(source.size());
+    if (looks_up)
+      can_follow = anew != LookUp::around && !workers_->straightened;
+    if (!few_planes && static_cast<double>(points.planes) < kFewPlanes * static_cast<double>(source.size())) {
+      few_planes = true;
+      can_follow = false;
+    }
     const Vector6 step = solve(points, T, prior);
     if (!step.allFinite())
       break;

@@ -22,19 +22,25 @@ constexpr float kMaxLeaf_m = 0.4F;
 constexpr float kRangeJump_m = 0.1F;
 constexpr float kRangeJumpPerRange = 0.02F;
 
-/// Calls `visit` with each place where the mask is set.
-template <class Visit> void for_each_set(const RingSegments::Mask& mask, const Visit& visit) {
+/// Of a mask, one bit each.
+std::uint32_t bits_of(const RingSegments::Mask& mask) {
   std::uint32_t bits = 0;
   for (std::size_t k = 0; k < mask.size(); ++k)
     bits |= static_cast<std::uint32_t>(mask[k]) & 1U << k;
+  return bits;
+}
+
+/// Calls `visit` with the place of each bit that is set.
+template <class Visit> void for_each_set(std::uint32_t bits, const Visit& visit) {
   for (; bits != 0; bits &= bits - 1)
     visit(static_cast<std::size_t>(std::countr_zero(bits)));
 }
 
 } // namespace
 
-RingSegments::RingSegments(std::size_t lidars, std::size_t points_wanted)
-    : points_wanted_(points_wanted), leaf_m_(kFirstLeaf_m), lidars_(lidars), line_begin_(lidars * kLinesPerLidar + 1) {
+RingSegments::RingSegments(std::size_t lidars, std::size_t points_wanted, Isa isa)
+    : isa_(isa), points_wanted_(points_wanted), leaf_m_(kFirstLeaf_m), lidars_(lidars),
+      line_begin_(lidars * kLinesPerLidar + 1) {
   segments_.reserve(kMaxSegments);
   place_.reserve(kMaxSegments);
 }
@@ -47,12 +53,13 @@ void RingSegments::begin_packet(std::size_t lidar, const PacketMotion& motion) {
     Mask abandoned;
     for (std::size_t k = 0; k < Salvo::kLasers; ++k)
       abandoned[k] = bank.count[k] > 0.0F && bank.last_packet[k] + 1 < at.packet ? -1 : 0;
-    for_each_set(abandoned, [&](std::size_t k) { close(lidar, bank, k); });
+    for_each_set(bits_of(abandoned), [&](std::size_t k) { close(lidar, bank, k); });
   }
 }
 
 /// Where a return that counts does not go on with the open segment of its laser.
-RingSegments::Mask RingSegments::beginnings(const Bank& bank, const Salvo& salvo, const Mask& counts) const {
+[[gnu::always_inline]] inline RingSegments::Mask RingSegments::beginnings_in(const Bank& bank, const Salvo& salvo,
+                                                                             const Mask& counts) const {
   Mask begins;
   for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
     const float dx = salvo.x_m[k] - bank.first_x[k];
@@ -72,12 +79,14 @@ std::size_t RingSegments::add(std::size_t lidar, const Salvo& salvo, const Mask&
   const std::size_t place = salvo.first_laser / Salvo::kLasers;
   lidars_[lidar].banks_used = std::max(lidars_[lidar].banks_used, place + 1);
   Bank& bank = lidars_[lidar].storage[place];
-  const PacketMotion& motion = lidars_[lidar].motion;
-  const std::int32_t packet = lidars_[lidar].packet;
-  Mask takes = counts;
+  Mask begins, takes = counts;
+  std::uint32_t beginnings = 0;
+  run_as(isa_, [&] {
+    begins = beginnings_in(bank, salvo, counts);
+    beginnings = bits_of(begins);
+  });
   std::size_t refused = 0;
-  const Mask begins = beginnings(bank, salvo, counts);
-  for_each_set(begins, [&](std::size_t k) {
+  for_each_set(beginnings, [&](std::size_t k) {
     if (bank.count[k] > 0.0F)
       close(lidar, bank, k);
     bank.id[k] = open();
@@ -87,30 +96,37 @@ std::size_t RingSegments::add(std::size_t lidar, const Salvo& salvo, const Mask&
       ++refused;
     }
   });
+  run_as(isa_, [&] { bank.take(salvo, begins, takes, lidars_[lidar].motion.stamp_s, lidars_[lidar].packet); });
+  return refused;
+}
+
+/// Takes in the returns that `takes` names; those that `begins` names are the first of their segments. Sums instead of
+/// choices: branches would make sixteen laps of the loop.
+[[gnu::always_inline]] inline void RingSegments::Bank::take(Salvo salvo, Mask begins, Mask takes, float stamp_s,
+                                                            std::int32_t packet) {
+  PerLaser<float> intensity;
+  for (std::size_t k = 0; k < Salvo::kLasers; ++k)
+    intensity[k] = static_cast<float>(salvo.intensity[k]);
   for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
     const float x = salvo.x_m[k], y = salvo.y_m[k], z = salvo.z_m[k];
-    const float time_s = motion.stamp_s + 1e-9F * static_cast<float>(salvo.offset_ns[k]);
-    const auto intensity = static_cast<float>(salvo.intensity[k]);
-    const bool takes_it = takes[k] != 0;
-    const bool begins_here = (begins[k] & takes[k]) != 0;
-    const float earlier = begins_here ? 0.0F : 1.0F; // what the open segment had goes on to count
-    const float share = takes_it ? 1.0F : 0.0F;
-    bank.first_x[k] = begins_here ? x : bank.first_x[k];
-    bank.first_y[k] = begins_here ? y : bank.first_y[k];
-    bank.first_z[k] = begins_here ? z : bank.first_z[k];
-    bank.last_x[k] = takes_it ? x : bank.last_x[k];
-    bank.last_y[k] = takes_it ? y : bank.last_y[k];
-    bank.last_z[k] = takes_it ? z : bank.last_z[k];
-    bank.sum_x[k] = earlier * bank.sum_x[k] + share * x;
-    bank.sum_y[k] = earlier * bank.sum_y[k] + share * y;
-    bank.sum_z[k] = earlier * bank.sum_z[k] + share * z;
-    bank.time_sum_s[k] = earlier * bank.time_sum_s[k] + share * time_s;
-    bank.intensity_sum[k] = earlier * bank.intensity_sum[k] + share * intensity;
-    bank.count[k] = earlier * bank.count[k] + share;
-    bank.last_range_m[k] = counts[k] != 0 ? salvo.range_m[k] : bank.last_range_m[k];
-    bank.last_packet[k] = takes_it ? packet : bank.last_packet[k];
+    const float time_s = stamp_s + 1e-9F * static_cast<float>(salvo.offset_ns[k]);
+    const auto share = static_cast<float>(-takes[k]), keeps = 1.0F - share;
+    const auto is_first = static_cast<float>(-(begins[k] & takes[k])), earlier = 1.0F - is_first;
+    first_x[k] = earlier * first_x[k] + is_first * x;
+    first_y[k] = earlier * first_y[k] + is_first * y;
+    first_z[k] = earlier * first_z[k] + is_first * z;
+    last_x[k] = keeps * last_x[k] + share * x;
+    last_y[k] = keeps * last_y[k] + share * y;
+    last_z[k] = keeps * last_z[k] + share * z;
+    sum_x[k] = earlier * sum_x[k] + share * x;
+    sum_y[k] = earlier * sum_y[k] + share * y;
+    sum_z[k] = earlier * sum_z[k] + share * z;
+    time_sum_s[k] = earlier * time_sum_s[k] + share * time_s;
+    intensity_sum[k] = earlier * intensity_sum[k] + share * intensity[k];
+    count[k] = earlier * count[k] + share;
+    last_range_m[k] = keeps * last_range_m[k] + share * salvo.range_m[k];
+    last_packet[k] = (last_packet[k] & ~takes[k]) | (packet & takes[k]);
   }
-  return refused;
 }
 
 std::uint32_t RingSegments::latest(std::size_t lidar, std::size_t laser) const {

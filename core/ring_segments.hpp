@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "core/isa.hpp"
 #include "core/lidar_packet.hpp"
 #include "core/sweep.hpp"
 
@@ -39,7 +40,7 @@ class RingSegments {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
   using Mask = Salvo::PerLaser<std::int32_t>; ///< -1 for a return that counts, 0 for one that does not
 
-  RingSegments(std::size_t lidars, std::size_t points_wanted);
+  RingSegments(std::size_t lidars, std::size_t points_wanted, Isa isa = best_isa());
 
   /// Says how the lidar moves from now on. To be called before the salvos of each packet.
   void begin_packet(std::size_t lidar, const PacketMotion& motion);
@@ -68,6 +69,8 @@ class RingSegments {
     PerLaser<std::int32_t> last_packet{};
     PerLaser<std::uint32_t> id{};
     PerLaser<std::uint8_t> ring{};
+
+    void take(Salvo salvo, Mask begins, Mask takes, float stamp_s, std::int32_t packet);
   };
   struct Lidar {
     PacketMotion motion;
@@ -81,10 +84,11 @@ class RingSegments {
     std::uint32_t id;
   };
 
-  [[nodiscard]] Mask beginnings(const Bank& bank, const Salvo& salvo, const Mask& counts) const;
+  [[nodiscard]] Mask beginnings_in(const Bank& bank, const Salvo& salvo, const Mask& counts) const;
   std::uint32_t open();
   void close(std::size_t lidar, Bank& bank, std::size_t laser);
 
+  Isa isa_;
   std::size_t points_wanted_;
   float leaf_m_;
   std::vector<Lidar> lidars_;

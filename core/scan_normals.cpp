@@ -28,9 +28,48 @@ struct Moments {
   Batch count, x, y, z, xx, xy, xz, yy, yz, zz;
 };
 
+/// Points of a batch, and the squared distance within which their neighbours speak for them.
+struct Places {
+  Batch x, y, z, reach2;
+};
+
+[[gnu::always_inline]] inline Places places_of(const float* x, const float* y, const float* z) {
+  Places p;
+  for (std::size_t i = 0; i < kBatch; ++i) {
+    p.x[i] = x[i];
+    p.y[i] = y[i];
+    p.z[i] = z[i];
+    const float reach2 = kMaxDistancePerRange * kMaxDistancePerRange * (x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
+    p.reach2[i] = std::max(kMinReach_m * kMinReach_m, reach2);
+  }
+  return p;
+}
+
+/// Adds one neighbour of each point; one in the same place as the point is none.
+[[gnu::always_inline]] inline void add_neighbour(const Places& p, const float* x_m, const float* y_m, const float* z_m,
+                                                 const std::int32_t* neighbour, Moments& moments) {
+  for (std::size_t i = 0; i < kBatch; ++i) {
+    const auto j = static_cast<std::ptrdiff_t>(neighbour[i]);
+    const float x = x_m[j] - p.x[i], y = y_m[j] - p.y[i], z = z_m[j] - p.z[i];
+    const float distance2 = x * x + y * y + z * z;
+    const auto counts = static_cast<float>((distance2 <= p.reach2[i]) & (distance2 > 0.0F));
+    const float cx = counts * x, cy = counts * y, cz = counts * z;
+    moments.count[i] += counts;
+    moments.x[i] += cx;
+    moments.y[i] += cy;
+    moments.z[i] += cz;
+    moments.xx[i] += cx * x;
+    moments.xy[i] += cx * y;
+    moments.xz[i] += cx * z;
+    moments.yy[i] += cy * y;
+    moments.yz[i] += cy * z;
+    moments.zz[i] += cz * z;
+  }
+}
+
 /// Unit normals towards the lidar's side of planes through the points of the moments, or zero.
-void normals_of(const Moments& moments, const Batch& px, const Batch& py, const Batch& pz, Batch& nx, Batch& ny,
-                Batch& nz) {
+[[gnu::always_inline]] inline void normals_of(const Moments& moments, const Places& p, Batch& nx, Batch& ny,
+                                              Batch& nz) {
   for (std::size_t i = 0; i < kBatch; ++i) {
     const float count = moments.count[i];
     const float share = 1.0F / count;
@@ -38,11 +77,12 @@ void normals_of(const Moments& moments, const Batch& px, const Batch& py, const 
     const PrincipalAxes<float> axes = principal_axes<float>(
         {share * moments.xx[i] - x * x, share * moments.xy[i] - x * y, share * moments.xz[i] - x * z,
          share * moments.yy[i] - y * y, share * moments.yz[i] - y * z, share * moments.zz[i] - z * z});
-    const bool trusted = (count >= kMinNeighbours) & (axes.least <= kMaxRoughnessOfScan_m * kMaxRoughnessOfScan_m) &
-                         (axes.middle >= kMinMiddleToGreatestOfScan * axes.greatest) &
-                         (axes.least <= kMaxLeastToMiddle * axes.middle);
-    const bool looks_away = axes.x * px[i] + axes.y * py[i] + axes.z * pz[i] > 0.0F;
-    const float sign = trusted ? (looks_away ? -1.0F : 1.0F) : 0.0F;
+    const std::int32_t trusted =
+        -(count >= kMinNeighbours) & -(axes.least <= kMaxRoughnessOfScan_m * kMaxRoughnessOfScan_m) &
+        -(axes.middle >= kMinMiddleToGreatestOfScan * axes.greatest) &
+        -(axes.least <= kMaxLeastToMiddle * axes.middle); // masks: conditions would be branches
+    const float towards = axes.x * p.x[i] + axes.y * p.y[i] + axes.z * p.z[i];
+    const float sign = static_cast<float>(-trusted) * -std::copysign(1.0F, towards);
     nx[i] = sign * axes.x;
     ny[i] = sign * axes.y;
     nz[i] = sign * axes.z;
@@ -51,9 +91,10 @@ void normals_of(const Moments& moments, const Batch& px, const Batch& py, const 
 
 } // namespace
 
-ScanNormals::ScanNormals(std::size_t max_points) {
+ScanNormals::ScanNormals(std::size_t max_points, Isa isa) : isa_(isa) {
   lines_.reserve(max_points);
-  neighbours_.reserve(max_points + kBatch);
+  for (std::vector<std::int32_t>& places : neighbours_)
+    places.reserve(max_points + kBatch);
   for (std::vector<float>* figures : {&x_, &y_, &z_})
     figures->reserve(max_points + kBatch);
 }
@@ -80,10 +121,8 @@ void ScanNormals::find_neighbours(const std::vector<SweepPoint>& points, std::si
     beside[1] = {lines_[line + 1].begin, lines_[line + 1].end, lines_[line + 1].begin};
 
   for (std::size_t i = begin; i < end; ++i) {
-    auto& places = neighbours_[i].place;
-    places.fill(static_cast<std::uint32_t>(i));
     std::size_t found = 0;
-    const auto add = [&](std::size_t j) { places[found++] = static_cast<std::uint32_t>(j); };
+    const auto add = [&](std::size_t j) { neighbours_[found++][i] = static_cast<std::int32_t>(j); };
     if (i > begin)
       add(i - 1);
     if (i + 1 < end)
@@ -97,42 +136,22 @@ void ScanNormals::find_neighbours(const std::vector<SweepPoint>& points, std::si
       for (std::size_t j = std::max(nearest, first + 1) - 1; j < std::min(nearest + 2, last); ++j)
         add(j);
     }
+    while (found < kMostNeighbours)
+      add(i);
   }
 }
 
-/// For the points from `begin` on, as many as a chunk holds; those beyond the last one are padding.
+/// For the points from `begin` on, as many as a batch holds; those beyond the last one are padding.
 void ScanNormals::fit_planes(std::vector<SweepPoint>& points, std::size_t begin) const {
-  Moments moments{};
-  moments.count.fill(1.0F);
-  Batch px, py, pz, reach2, nx, ny, nz;
-  for (std::size_t i = 0; i < kBatch; ++i) {
-    px[i] = x_[begin + i];
-    py[i] = y_[begin + i];
-    pz[i] = z_[begin + i];
-    const float reach_m =
-        std::max(kMinReach_m, kMaxDistancePerRange * std::sqrt(px[i] * px[i] + py[i] * py[i] + pz[i] * pz[i]));
-    reach2[i] = reach_m * reach_m;
-  }
-  for (std::size_t n = 0; n < Neighbours::kMost; ++n) {
-    for (std::size_t i = 0; i < kBatch; ++i) {
-      const std::uint32_t j = neighbours_[begin + i].place[n];
-      const float x = x_[j] - px[i], y = y_[j] - py[i], z = z_[j] - pz[i];
-      const bool is_near = (j != begin + i) & (x * x + y * y + z * z <= reach2[i]);
-      const float counts = is_near ? 1.0F : 0.0F;
-      const float cx = counts * x, cy = counts * y, cz = counts * z;
-      moments.count[i] += counts;
-      moments.x[i] += cx;
-      moments.y[i] += cy;
-      moments.z[i] += cz;
-      moments.xx[i] += cx * x;
-      moments.xy[i] += cx * y;
-      moments.xz[i] += cx * z;
-      moments.yy[i] += cy * y;
-      moments.yz[i] += cy * z;
-      moments.zz[i] += cz * z;
-    }
-  }
-  normals_of(moments, px, py, pz, nx, ny, nz);
+  Batch nx, ny, nz;
+  run_as(isa_, [&] {
+    Moments moments{};
+    moments.count.fill(1.0F);
+    const Places places = places_of(&x_[begin], &y_[begin], &z_[begin]);
+    for (const std::vector<std::int32_t>& neighbour : neighbours_)
+      add_neighbour(places, x_.data(), y_.data(), z_.data(), &neighbour[begin], moments);
+    normals_of(moments, places, nx, ny, nz);
+  });
   for (std::size_t i = 0; i < std::min(kBatch, points.size() - begin); ++i)
     points[begin + i].normal_base = {nx[i], ny[i], nz[i]};
 }
@@ -141,7 +160,8 @@ void ScanNormals::estimate(std::vector<SweepPoint>& points) {
   const std::size_t padded = points.size() + kBatch;
   for (std::vector<float>* figures : {&x_, &y_, &z_})
     figures->assign(padded, 0.0F);
-  neighbours_.assign(padded, {});
+  for (std::vector<std::int32_t>& places : neighbours_)
+    places.assign(padded, 0);
   for (std::size_t i = 0; i < points.size(); ++i) {
     x_[i] = points[i].position_base_m.x();
     y_[i] = points[i].position_base_m.y();

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/isa.hpp"
 #include "core/sweep.hpp"
 
 namespace locus {
@@ -17,7 +18,7 @@ namespace locus {
 /// through them is trusted when they spread in two directions and little across; else the normal stays zero. One owner.
 class ScanNormals {
  public:
-  explicit ScanNormals(std::size_t max_points);
+  explicit ScanNormals(std::size_t max_points, Isa isa = best_isa());
 
   /// `points` sorted by scan line, within it by time (that is, by falling age). Writes normal_base, nothing else.
   void estimate(std::vector<SweepPoint>& points);
@@ -27,17 +28,15 @@ class ScanNormals {
     std::uint16_t id;
     std::size_t begin, end;
   };
-  /// Of one point; its own place stands where it has fewer.
-  struct Neighbours {
-    static constexpr std::size_t kMost = 8;
-    std::array<std::uint32_t, kMost> place;
-  };
+  static constexpr std::size_t kMostNeighbours = 8;
   void find_lines(const std::vector<SweepPoint>& points);
   void find_neighbours(const std::vector<SweepPoint>& points, std::size_t line);
   void fit_planes(std::vector<SweepPoint>& points, std::size_t begin) const;
 
+  Isa isa_;
   std::vector<Line> lines_;
-  std::vector<Neighbours> neighbours_;
+  /// Places of the first neighbour of all points, of the second and so on; its own place where a point has fewer.
+  std::array<std::vector<std::int32_t>, kMostNeighbours> neighbours_;
   std::vector<float> x_, y_, z_; ///< of the points
 };
 

@@ -25,13 +25,12 @@ RingSegments::Mask select(const Salvo& salvo, std::int32_t first_ns, std::int32_
                           float max_range_m, std::size_t& fired) {
   RingSegments::Mask counts;
   std::int32_t number = 0;
-  for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
+  for (std::size_t k = 0; k < Salvo::kLasers; ++k) { // masks instead of conditions: branches would make 16 laps of it
     const float range_m = salvo.range_m[k];
     const std::int32_t offset_ns = salvo.offset_ns[k];
-    const bool is_return = (range_m > 0.0F) & (offset_ns >= first_ns) & (offset_ns < last_ns); // no branch in the loop
-    const bool in_range = (range_m >= min_range_m) & (range_m <= max_range_m);
-    number += is_return ? 1 : 0;
-    counts[k] = (is_return & in_range) ? -1 : 0;
+    const std::int32_t is_return = -(range_m > 0.0F) & -(offset_ns >= first_ns) & -(offset_ns < last_ns);
+    number -= is_return;
+    counts[k] = is_return & -(range_m >= min_range_m) & -(range_m <= max_range_m);
   }
   fired += static_cast<std::size_t>(number);
   return counts;
@@ -65,8 +64,9 @@ Duration RevolutionTimer::period() const {
 SweepBuilder::SweepBuilder(const SweepOptions& options, std::vector<Pose> T_base_lidar, MotionSources sources,
                            std::size_t max_returns, Sink sink, StageClock* clock)
     : options_(options), T_base_lidar_(std::move(T_base_lidar)), sources_(std::move(sources)), sink_(std::move(sink)),
-      clock_(clock), max_returns_(max_returns), segments_(T_base_lidar_.size(), options.segment_filter.points),
-      normals_(RingSegments::kMaxSegments),
+      clock_(clock), max_returns_(max_returns),
+      segments_(T_base_lidar_.size(), options.segment_filter.points, options.isa),
+      normals_(RingSegments::kMaxSegments, options.isa),
       voxel_filter_(options.voxel_filter, options.voxel_filter.enabled ? max_returns : 0),
       random_filter_(options.random_filter, options.seed) {
   const std::size_t points =
@@ -211,7 +211,9 @@ void SweepBuilder::append(const LidarPacket& packet, Stamp from, Stamp to) {
   const auto min_range_m = static_cast<float>(options_.min_range_m);
   const auto max_range_m = static_cast<float>(options_.max_range_m);
   for (const Salvo& salvo : packet.salvos()) {
-    RingSegments::Mask counts = select(salvo, first_ns, last_ns, min_range_m, max_range_m, sweep_.raw_returns);
+    RingSegments::Mask counts;
+    run_as(options_.isa,
+           [&] { counts = select(salvo, first_ns, last_ns, min_range_m, max_range_m, sweep_.raw_returns); });
     if (options_.body_box.enabled)
       leave_out_body(T_base_lidar_[packet.lidar], salvo, counts);
     counters_.overflowed_points += segments_.add(packet.lidar, salvo, counts);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "core/isa.hpp"
 #include "core/pose.hpp"
 
 namespace locus {
@@ -30,6 +31,7 @@ struct LidarOptions {
   LidarTime time = LidarTime::automatic;
   std::string calibration; ///< file of per-laser corrections; empty: the model's built-in table
   Pose T_base_lidar;
+  Isa isa = best_isa(); ///< no key: a result of the machine, or of the environment variable LOCUS_ISA
 
   bool operator==(const LidarOptions&) const = default;
 };

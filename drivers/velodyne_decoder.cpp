@@ -182,7 +182,7 @@ void Decoder::measure_turn_since_last_packet(Duration time_of_hour, double max_t
 }
 
 /// Turns the column's azimuth by each firing's share of the turn (first, a small angle) and by its laser's offset.
-Decoder::Aim Decoder::take_aim(std::size_t column, std::size_t first_firing) const {
+[[gnu::always_inline]] inline Decoder::Aim Decoder::take_aim(std::size_t column, std::size_t first_firing) const {
   Aim aim;
   const float turn_rad = static_cast<float>(kRadPerCdeg) * turn_cdeg_[column];
   for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
@@ -203,38 +203,47 @@ Decoder::Aim Decoder::take_aim(std::size_t column, std::size_t first_firing) con
 void Decoder::read_salvos(Packet packet, std::size_t column, std::size_t first_firing, LidarPacket& out) const {
   const std::size_t bank = first_firing / kChannels;
   const std::byte* block = block_at(packet, column * layout_.blocks_per_column() + bank * layout_.returns);
-  const Aim aim = take_aim(column, first_firing);
+  Aim aim;
+  run_as(options_.isa, [&] { aim = take_aim(column, first_firing); });
   Distances previous{}; // 0 is no return: nothing is lost when the first echo equals it
   for (std::size_t echo = 0; echo < layout_.returns; ++echo) {
     Salvo& salvo = out.storage[out.count++];
     Distances distances;
     for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
       const std::byte* at = channel_at(block + echo * kBlockBytes, first_firing % kChannels + k);
-      const std::uint16_t distance = read_u16(at);
+      distances[k] = read_u16(at);
       salvo.intensity[k] = std::to_integer<std::uint8_t>(at[2]);
-      distances[k] = distance == previous[k] ? std::uint16_t{0} : distance;
-      previous[k] = distance;
     }
-    place(distances, aim, first_firing, salvo);
-    for (std::size_t k = 0; k < Salvo::kLasers; ++k)
-      salvo.offset_ns[k] = column_offset_ns_[column] + firings_.offset_ns[first_firing + k];
+    run_as(options_.isa, [&] { place(distances, previous, aim, column, first_firing, salvo); });
+    previous = distances;
   }
 }
 
-/// Everything about a salvo that follows from its distances.
-void Decoder::place(const Distances& distances, const Aim& aim, std::size_t first_firing, Salvo& salvo) const {
-  salvo.first_laser = firings_.laser[first_firing];
+/// Everything about a salvo that follows from its distances. Works on a copy: where what is written could be what is
+/// read, loops do not become vector instructions.
+[[gnu::always_inline]] inline void Decoder::place(const Distances& distances, const Distances& previous, const Aim& aim,
+                                                  std::size_t column, std::size_t first_firing, Salvo& salvo) const {
+  Salvo placed;
   for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
     const std::size_t i = first_firing + k;
     const float range_m = static_cast<float>(distances[k]) * distance_resolution_m_ + firings_.range_offset_m[i];
     const float radial_m = range_m * firings_.cos_elevation[i] + firings_.radial_offset_m[i];
     const float lateral_m = firings_.lateral_offset_m[i];
-    salvo.x_m[k] = radial_m * aim.cos_azimuth[k] + lateral_m * aim.sin_azimuth[k];
-    salvo.y_m[k] = lateral_m * aim.cos_azimuth[k] - radial_m * aim.sin_azimuth[k];
-    salvo.z_m[k] = range_m * firings_.sin_elevation[i] + firings_.vertical_offset_m[i];
-    salvo.range_m[k] = distances[k] != 0 && range_m > 0.0F ? range_m : 0.0F;
-    salvo.ring[k] = firings_.ring[i];
+    placed.x_m[k] = radial_m * aim.cos_azimuth[k] + lateral_m * aim.sin_azimuth[k];
+    placed.y_m[k] = lateral_m * aim.cos_azimuth[k] - radial_m * aim.sin_azimuth[k];
+    placed.z_m[k] = range_m * firings_.sin_elevation[i] + firings_.vertical_offset_m[i];
+    const bool is_return = (distances[k] != 0) & (distances[k] != previous[k]) & (range_m > 0.0F);
+    placed.range_m[k] = is_return ? range_m : 0.0F;
+    placed.offset_ns[k] = column_offset_ns_[column] + firings_.offset_ns[i];
   }
+  salvo.first_laser = firings_.laser[first_firing];
+  salvo.x_m = placed.x_m;
+  salvo.y_m = placed.y_m;
+  salvo.z_m = placed.z_m;
+  salvo.range_m = placed.range_m;
+  salvo.offset_ns = placed.offset_ns;
+  for (std::size_t k = 0; k < Salvo::kLasers; ++k)
+    salvo.ring[k] = firings_.ring[first_firing + k];
 }
 
 } // namespace locus::velodyne

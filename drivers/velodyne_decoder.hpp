@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 
+#include "core/isa.hpp"
 #include "core/lidar_packet.hpp"
 #include "core/stamp.hpp"
 #include "drivers/model_recognition.hpp"
@@ -20,6 +21,7 @@ struct DecoderOptions {
   std::optional<Model> model = std::nullopt;             ///< nothing: told by ModelRecognition
   std::optional<ReturnMode> return_mode = std::nullopt;  ///< nothing: the packet's own factory byte
   std::optional<Calibration> calibration = std::nullopt; ///< nothing: the model's own table
+  Isa isa = best_isa();
 };
 
 /// Turns data packets into returns, each with the direction and the time of its own firing.
@@ -70,7 +72,7 @@ class Decoder {
   struct Aim {
     Salvo::PerLaser<float> cos_azimuth, sin_azimuth;
   };
-  using Distances = Salvo::PerLaser<std::uint16_t>;
+  using Distances = Salvo::PerLaser<std::int32_t>; ///< as wide as all else about them
 
   std::optional<PacketError> recognise(Packet packet, Duration time_of_hour);
   void prepare(Model model, ReturnMode mode, const Calibration& calibration);
@@ -79,7 +81,8 @@ class Decoder {
   void measure_turn_since_last_packet(Duration time_of_hour, double max_turn_cdeg);
   [[nodiscard]] Aim take_aim(std::size_t column, std::size_t first_firing) const;
   void read_salvos(Packet packet, std::size_t column, std::size_t first_firing, LidarPacket& out) const;
-  void place(const Distances& distances, const Aim& aim, std::size_t first_firing, Salvo& salvo) const;
+  void place(const Distances& distances, const Distances& previous, const Aim& aim, std::size_t column,
+             std::size_t first_firing, Salvo& salvo) const;
 
   DecoderOptions options_;
   ModelRecognition recognition_;

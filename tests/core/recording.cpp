@@ -14,8 +14,10 @@ namespace {
 
 constexpr std::size_t kMaxReturnsPerSweep = 200'000; ///< a HDL-32E makes 140 000 at 300 rpm
 
-LidarInput open_lidar() {
-  Expected<LidarInput, std::string> lidar = LidarInput::open(LidarOptions{}, 0);
+LidarInput open_lidar(Isa isa) {
+  LidarOptions options;
+  options.isa = isa;
+  Expected<LidarInput, std::string> lidar = LidarInput::open(options, 0);
   if (!lidar)
     throw std::runtime_error(lidar.error());
   return std::move(*lidar);
@@ -64,7 +66,7 @@ Recording plant_recording(Duration duration) {
 }
 
 SweepsOfRecording::SweepsOfRecording(const Recording& recording, const SweepOptions& options, StageClock* clock)
-    : recording_(recording), lidar_(open_lidar()),
+    : recording_(recording), lidar_(open_lidar(options.isa)),
       builder_(
           options, {Pose{}}, MotionSources({}, Fusion::combined), kMaxReturnsPerSweep,
           [this](Sweep& sweep) {

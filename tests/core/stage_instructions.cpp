@@ -60,11 +60,12 @@ int main(int argc, char** argv) {
   constexpr int kWarmUp = 30; // it stands, and then accelerates
   const test::Recording recording = test::plant_recording(std::chrono::milliseconds{4450});
   InstructionCounter counter(argv[1]);
-  test::SweepsOfRecording sweeps(recording, SweepOptions{}, &counter);
+  SweepOptions sweep_options;
   OdometryOptions options;
+  sweep_options.isa = options.isa = Isa::baseline;
   options.threads = 1;
-  options.isa = Isa::baseline;
   options.map.keyframe_m = 0.25; // some of so short a drive
+  test::SweepsOfRecording sweeps(recording, sweep_options, &counter);
   Odometry odometry(options, &counter);
   int sweeps_seen = 0;
   while (const Sweep* sweep = sweeps.next()) {

@@ -55,7 +55,7 @@ Config configuration(const std::filesystem::path& file, const std::vector<std::s
     config = config_or_fail(load_config(file));
   config = config_or_fail(override_config(config, overrides));
   if (const char* const isa = std::getenv("LOCUS_ISA"))
-    config.odometry.isa = isa_or_fail(isa);
+    config.use(isa_or_fail(isa));
   return config;
 }
 
