@@ -22,6 +22,10 @@ std::optional<Stamp> HealthMonitor::judge(const OdometrySample& sample) {
 }
 
 std::optional<Stamp> HealthMonitor::judge(SourceReading reading) {
+  if (state_ != State::unheard && reading.arrival < last_arrival_ - kLongestTimeout) { // the host's clock was set back
+    lose(HealthReason::out_of_order, reading.arrival);
+    last_arrival_ = reading.arrival;
+  }
   advance(reading.arrival);
   ++counters_.received;
   const std::optional<Stamp> stamp = clock_.on_host_clock(reading.stamp, reading.arrival);

@@ -9,7 +9,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace locus;
   using fuzz::demand;
   static const fuzz::MemoryFile kFile;
-  const auto calibration = velodyne::read_calibration(kFile.with(data, size));
+  const auto calibration = velodyne::read_calibration(kFile.with(fuzz::text_of(data, size)));
   if (!calibration)
     return 0;
   demand(calibration->laser_count <= velodyne::kMaxLasers && calibration->distance_resolution_m > 0.0);

@@ -7,7 +7,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace locus;
   using fuzz::demand;
   static const fuzz::MemoryFile kFile;
-  auto capture = Capture::open(kFile.with(data, size));
+  auto capture = Capture::open(kFile.with(fuzz::text_of(data, size)));
   if (!capture)
     return 0;
   while (const Datagram* const datagram = capture->next()) {

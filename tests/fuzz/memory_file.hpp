@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include <sys/mman.h>
 #include <unistd.h>
@@ -22,9 +21,9 @@ class MemoryFile {
   MemoryFile& operator=(const MemoryFile&) = delete;
 
   /// The path of the file with this content.
-  [[nodiscard]] std::filesystem::path with(const std::uint8_t* data, std::size_t size) const {
-    demand(ftruncate(descriptor_, static_cast<off_t>(size)) == 0);
-    demand(pwrite(descriptor_, data, size, 0) == static_cast<ssize_t>(size));
+  [[nodiscard]] std::filesystem::path with(std::string_view content) const {
+    demand(ftruncate(descriptor_, static_cast<off_t>(content.size())) == 0);
+    demand(pwrite(descriptor_, content.data(), content.size(), 0) == static_cast<ssize_t>(content.size()));
     return "/proc/self/fd/" + std::to_string(descriptor_);
   }
 

@@ -47,9 +47,10 @@ class PacketStream {
     return datagram_;
   }
 
-  /// A capture tells times from 1970 to 2255.
+  /// As a capture tells it.
   static Stamp any_stamp(FuzzBytes& bytes) {
-    return Stamp{std::chrono::nanoseconds{bytes.take<std::uint64_t>() % 9'000'000'000'000'000'000}};
+    const auto latest_ns = static_cast<std::uint64_t>(to_ns(kLatestStamp));
+    return stamp_from_ns(static_cast<std::int64_t>(bytes.take<std::uint64_t>() % latest_ns));
   }
 
  private:

@@ -7,7 +7,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace locus;
   using fuzz::demand;
   static const fuzz::MemoryFile kFile;
-  const auto cloud = PointCloudFile::open(kFile.with(data, size));
+  const auto cloud = PointCloudFile::open(kFile.with(fuzz::text_of(data, size)));
   if (!cloud)
     return 0;
   std::uint64_t seen = 0;

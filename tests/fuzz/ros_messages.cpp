@@ -2,6 +2,7 @@
 // Samples as DDS hands them over, of an IMU and of an odometry, judged and followed as the ingest does. A message is
 // the one before with another part, so that a few bytes make a stream.
 #include <chrono>
+#include <utility>
 
 #include "core/health_monitor.hpp"
 #include "core/motion_track.hpp"
@@ -34,9 +35,8 @@ struct Source {
   explicit Source(SourceKind kind) : options{.name = "fuzz", .kind = kind, .T_base_source = {}}, track(options) {}
 
   template <class Sample> void take(Sample sample) {
-    const std::uint32_t spell = health.spell();
     const auto stamp = health.judge(sample);
-    if (health.spell() != spell)
+    if (std::exchange(spell, health.spell()) != health.spell())
       track.clear();
     if (!stamp)
       return;
@@ -49,11 +49,13 @@ struct Source {
   }
   void begin_anew() {
     health = HealthMonitor{options};
+    spell = health.spell();
     track.clear();
   }
 
   MotionSourceOptions options;
   HealthMonitor health{options};
+  std::uint32_t spell = 0;
   MotionTrack track;
 };
 

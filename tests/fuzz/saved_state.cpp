@@ -40,9 +40,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace locus;
   using fuzz::demand;
   static const fuzz::MemoryFile kFile;
-  static_cast<void>(daemon::load_state(kFile.with(data, size)));
+  static_cast<void>(daemon::load_state(kFile.with(fuzz::text_of(data, size))));
   const std::vector<std::uint8_t> file = with_checksums({data, size});
-  const auto state = daemon::load_state(kFile.with(file.data(), file.size()));
+  const auto state = daemon::load_state(kFile.with(fuzz::text_of(file.data(), file.size())));
   if (!state)
     return 0;
   demand(state->map_odom.size() * sizeof(SurfacePoint) + kHeadBytes + kBodyBytes == size);

@@ -65,6 +65,9 @@ write("data_packets", "lost", b"\0" + packet + turns + again(39810, 14310) + tur
 write("data_packets", "step", b"\6" + packet + turns + again(65535, 0) * 3 + again(1327, 477) * 8)
 write("data_packets", "strangers", b"\0" + packet + turns + again(1327, 477, OTHER_SENDER) + again(0, 0, TRUNCATED))
 write("data_packets", "any_time", b"\0" + packet + struct.pack("<BQHH", ANY_TIME, 8_999_999_999_999_999_999, 1, 1) + turns)
+standing = bytearray(data_packet(0x22, 0x37, 1, 0))
+standing[7 * 100 + 2] = 1
+write("data_packets", "standing", b"\0" + struct.pack("<BH", NEW, 1327) + standing)
 write("data_packets", "length", b"\0" + struct.pack("<BHH", OTHER_LENGTH, 1205, 0) + turns)
 
 write("position_packets", "packet", position_tail())
@@ -121,7 +124,11 @@ write("motion_files", "imu", imu)
 write("motion_files", "attitude", "1,0,0,0,0,0,9.81,1,0,0,0\r\n2,nan,0,0,0,0,9.81,0,0,0,0\r\n")
 write("motion_files", "tum", "".join(f"1700000000.{i}00000000 {i} 0.5 -1e-3 0 0 0 1\n" for i in range(8)))
 write("motion_files", "numpy", "1.403636579763555527e+09 0 0 0 0 0 0.6 0.8\n.5e1\t1 2 3 0 0 0 +1\n-2. 1 2 3 0 0 0 1\n")
-write("motion_files", "meta", "t_ns,arrival_ns,covariance_scale\n1,2,1\n3,2,7.5\n")
+write("motion_files", "meta", "1,0,0,0,0,0,9.81\n3,0,0,0,0,0,9.81\n---\nt_ns,arrival_ns,covariance_scale\n1,4,1\n3,2,7.5\n")
+write("motion_files", "meta_tum", "1e-9 0 0 0 0 0 0 1\n1e-9 1 0 0 0 0 0 1\n---\n1,2000,1\n1,1000,8\n")
+stamps = [-3_999_999_999_999_999_999 + i for i in range(6)] + [3_999_999_999_999_999_999]
+write("motion_files", "absurd_meta", "".join(f"{t},0,0,0,0,0,9.81\n" for t in stamps) + "---\n"
+      + "".join(f"{t},{3_999_999_999_999_999_990 + i},1\n" for i, t in enumerate(stamps)))
 write("motion_files", "absurd", "-3999999999999999999,0,0,0,0,0,9.81\n3999999999999999999,0,0,0,0,0,9.81\n")
 
 PLY = "ply\nformat {} 1.0\ncomment a map\nelement vertex 2\nproperty {} x\nproperty {} y\nproperty {} z\nproperty uchar i\nend_header\n"

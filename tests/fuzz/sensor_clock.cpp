@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The clock of a lidar, told any times of hour at any times of reception.
 #include "drivers/sensor_clock.hpp"
-#include "fuzz/fuzz_bytes.hpp"
+#include "fuzz/packet_stream.hpp"
 
 namespace locus {
 namespace {
@@ -35,7 +35,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if ((step & kAnyTimeOfHour) != 0)
       time_of_hour = wrapped(microseconds{bytes.take<std::uint32_t>()});
     if ((step & kAnyReception) != 0)
-      received = std::chrono::nanoseconds{bytes.take<std::uint64_t>() % 9'000'000'000'000'000'000};
+      received = fuzz::PacketStream::any_stamp(bytes).time_since_epoch();
     const auto reading = clock.read(time_of_hour, microseconds{1327}, Stamp{received});
     fuzz::demand(clock.steps() >= steps);
     fuzz::demand(!reading || reading->continuous || reading->advance == Duration{});
