@@ -109,6 +109,7 @@ for file in sorted((project / "config").glob("*.yaml")):
     plain = "".join(line + "\n" for line in file.read_text().split("\n") if line and not line.strip().startswith("#"))
     for index, section in enumerate(re.split(r"\n(?=\w)", plain)):  # whole files are slow
         write("config", f"{file.stem}_{index}", section)
+write("config", "comma", ",lidars: []\n")
 write("config_values", "port", "lidars.front.port=2369\nlidars.0.name=rear")
 write("config_values", "list", "motion_sources=[{name: vio, kind: odometry, T_base_source: {xyz_m: [0, 0, 1], rpy_deg: [0, 90, 180]}}]")
 write("config_values", "sweep", "sweep_period_ms=50")
