@@ -93,7 +93,7 @@ std::string to_bytes(const SavedState& state) {
 
 /// Whether a robot can go on from there: what another hand wrote may hold anything.
 bool makes_sense(const SavedState& state) {
-  constexpr double kFarthest_m = 1e6;
+  constexpr double kFarthest_m = 1e8; // geocentric coordinates are within it
   if (state.last.stamp < Stamp{})
     return false;
   const auto [rotation, translation] = state.last.carried_to(Stamp::max());
