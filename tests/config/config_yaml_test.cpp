@@ -269,7 +269,7 @@ TEST(ConfigYaml, WhatIsNotYamlIsRefusedWithItsLine) {
   EXPECT_EQ(errors_in("just words"), ConfigErrors{"robot.yaml:1: must be a section of keys"});
   EXPECT_EQ(errors_in("? [a, b]\n: c\n"), ConfigErrors{"robot.yaml:1: a key must be a word"});
   EXPECT_EQ(errors_in("---\nthreads: 1\n---\nthreads: 2\n"),
-            ConfigErrors{"robot.yaml:4: a second YAML document begins; keep one, and begin every top-level key in "
+            ConfigErrors{"robot.yaml:3: a second YAML document begins; keep one, and begin every top-level key in "
                          "the first column"});
 }
 
