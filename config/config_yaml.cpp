@@ -3,12 +3,14 @@
 
 #include <fmt/format.h>
 #include <nettle/sha2.h>
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <cctype>
 #include <fstream>
 #include <map>
+#include <sstream>
 
 #include "config/config_fields.hpp"
 #include "config/nearest_word.hpp"
@@ -304,27 +306,58 @@ std::string in_plain_words(const std::string& complaint, const std::string& yaml
   return known == kWords.end() ? "not YAML: " + complaint : std::string{known->second};
 }
 
+/// Hears where the documents of a text begin, and nothing else.
+class DocumentStart : public YAML::EventHandler {
+ public:
+  YAML::Mark latest;
+
+  void OnDocumentStart(const YAML::Mark& mark) override { latest = mark; }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+};
+
+/// What stands behind the first document. YAML::LoadAll() would read it, but of a comma in front of everything it makes
+/// empty documents for ever.
+std::optional<Mistake> second_document(const std::string& yaml) {
+  std::istringstream stream{yaml};
+  YAML::Parser parser{stream};
+  DocumentStart start;
+  if (!parser.HandleNextDocument(start))
+    return std::nullopt;
+  const YAML::Mark first = start.latest;
+  if (!parser.HandleNextDocument(start))
+    return std::nullopt;
+  return Mistake{"", start.latest.line + 1,
+                 start.latest.pos == first.pos
+                     ? "no key begins like this; remove what stands in front of it"
+                     : "a second YAML document begins; keep one, and begin every top-level key in the first column"};
+}
+
 } // namespace
 
 Expected<Config, ConfigErrors> parse_config(const std::string& yaml, const std::string& origin) {
-  std::vector<YAML::Node> documents;
+  YAML::Node document;
+  std::optional<Mistake> second;
   try {
-    documents = YAML::LoadAll(yaml);
+    second = second_document(yaml);
+    document = YAML::Load(yaml);
   } catch (const YAML::Exception& error) {
     const int line = error.mark.line + 1;
     return ConfigErrors{error_line(at_line(origin, line), in_plain_words(error.msg, yaml, line))};
   } catch (const std::exception& error) {
     return ConfigErrors{error_line(at_line(origin, 1), std::string{"not YAML: "} + error.what())};
   }
-  if (documents.size() > 1)
-    return ConfigErrors{
-        error_line(at_line(origin, documents[1].Mark().line + 1),
-                   "a second YAML document begins; keep one, and begin every top-level key in the first column")};
+  if (second)
+    return ConfigErrors{error_line(at_line(origin, second->line), second->what)};
   Config config;
-  if (documents.empty())
-    return config;
   Reading reading;
-  reading.read_section(documents.front(), "", 1, config);
+  reading.read_section(document, "", 1, config);
   reading.blame_problems(config.problem());
   ConfigErrors errors;
   for (const Mistake& mistake : reading.take_mistakes())

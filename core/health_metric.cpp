@@ -13,21 +13,27 @@ std::optional<HealthReason> reason_if(bool wrong, HealthReason reason) {
   return wrong ? std::optional{reason} : std::nullopt;
 }
 
+/// What is farther than any robot or sensor goes is a number no more than NaN is: sums of it would never be again.
 class NotANumber : public HealthMetric {
  public:
   std::optional<HealthReason> judge(const SourceReading& reading) override {
-    return reason_if(!(reading.imu != nullptr ? finite(*reading.imu) : finite(*reading.odometry)), HealthReason::nan);
+    return reason_if(!(reading.imu != nullptr ? is_number(*reading.imu) : is_number(*reading.odometry)),
+                     HealthReason::nan);
   }
 
  private:
-  static bool finite(const ImuSample& sample) {
-    return sample.angular_velocity_radps.allFinite() && sample.specific_force_mps2.allFinite() &&
+  static bool is_number(const ImuSample& sample) {
+    constexpr double kMost = 1e5; ///< deg/s and milli-g are heard too, for ImuSelfCheck to name them
+    return is_within(kMost, sample.angular_velocity_radps) && is_within(kMost, sample.specific_force_mps2) &&
            (!sample.attitude || sample.attitude->coeffs().allFinite());
   }
-  static bool finite(const OdometrySample& sample) {
-    constexpr double kLeastNorm = 0.5; ///< of a quaternion that still says something
-    return sample.T_source_base.finite() && sample.T_source_base.rotation.norm() > kLeastNorm;
+  static bool is_number(const OdometrySample& sample) {
+    constexpr double kFarthest_m = 1e8; ///< geocentric coordinates are within it
+    constexpr double kLeastNorm = 0.5;  ///< of a quaternion that still says something
+    return is_within(kFarthest_m, sample.T_source_base.translation) && sample.T_source_base.finite() &&
+           sample.T_source_base.rotation.norm() > kLeastNorm;
   }
+  static bool is_within(double most, const Eigen::Vector3d& v) { return (v.array().abs() <= most).all(); }
 };
 
 class OutOfOrder : public HealthMetric {
@@ -84,6 +90,10 @@ class FrozenOdometry : public HealthMetric {
       frozen_ = false;
       return std::nullopt;
     }
+    if (reading.stamp < changed_at_) { // a clock was set back: how long it has stood is not known
+      changed_at_ = reading.stamp;
+      twist_.setZero();
+    }
     constexpr Duration kLidarLags = std::chrono::milliseconds{300}; ///< and goes on seeing what has ended
     const Duration unchanged = reading.stamp - changed_at_;
     frozen_ = frozen_ || cannot_stop_within(unchanged) || (lidar_sees_motion_ && unchanged > kLidarLags);
@@ -94,7 +104,7 @@ class FrozenOdometry : public HealthMetric {
     const Pose& T_source_base = reading.odometry->T_source_base;
     if (last_ && T_source_base == *last_)
       return;
-    if (last_)
+    if (last_ && reading.stamp > changed_at_)
       twist_ = se3_log(last_->inverse() * T_source_base) / to_seconds(reading.stamp - changed_at_);
     last_ = T_source_base;
     changed_at_ = reading.stamp;

@@ -22,6 +22,10 @@ std::optional<Stamp> HealthMonitor::judge(const OdometrySample& sample) {
 }
 
 std::optional<Stamp> HealthMonitor::judge(SourceReading reading) {
+  if (state_ != State::unheard && reading.arrival < last_arrival_ - kLongestTimeout) { // the host's clock was set back
+    lose(HealthReason::out_of_order, reading.arrival);
+    last_arrival_ = reading.arrival;
+  }
   advance(reading.arrival);
   ++counters_.received;
   const std::optional<Stamp> stamp = clock_.on_host_clock(reading.stamp, reading.arrival);
@@ -131,8 +135,10 @@ Duration HealthMonitor::timeout() const {
 }
 
 /// Steps beyond the timeout count too, or a source that has slowed down for good would be silent for ever; but a long
-/// silence counts no more than a short one.
+/// silence counts no more than a short one, and a step back, after a clock was set, says nothing.
 void HealthMonitor::learn_period(Duration step) {
+  if (step <= Duration{})
+    return;
   const double step_s = to_seconds(step);
   if (period_s_ == 0.0)
     period_s_ = std::min(step_s, to_seconds(kLongestTimeout));

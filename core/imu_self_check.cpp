@@ -56,10 +56,11 @@ void ImuSelfCheck::weigh(const Eigen::Vector3d& specific_force_base_mps2, Stamp 
 }
 
 void ImuSelfCheck::follow_turns(const Eigen::Vector3d& turn_rate_base_radps, Stamp stamp) {
-  if (last_ && stamp <= *last_)
+  const Duration step = last_ ? stamp - *last_ : kMaxGap;
+  if (step <= Duration{} && step > -kMaxGap)
     return;
-  if (last_ && stamp - *last_ < kMaxGap)
-    angle_rad_ += to_seconds(stamp - *last_) * turn_rate_base_radps;
+  if (std::chrono::abs(step) < kMaxGap)
+    angle_rad_ += to_seconds(step) * turn_rate_base_radps;
   else
     known_ = 0;
   last_ = stamp;

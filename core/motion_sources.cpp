@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/motion_sources.hpp"
 
-#include <algorithm>
 #include <utility>
 
 namespace locus {
@@ -11,7 +10,7 @@ MotionSources::MotionSources(const std::vector<MotionSourceOptions>& options, Fu
 
 template <class Sample> void MotionSources::take(std::size_t source, Sample sample) {
   Source& from = sources_[source];
-  now_ = std::max(now_, sample.arrival);
+  tell_time(sample.arrival);
   const std::optional<Stamp> stamp = from.health.judge(sample);
   follow_health(source);
   if (!stamp)
@@ -23,11 +22,17 @@ template void MotionSources::take(std::size_t, ImuSample);
 template void MotionSources::take(std::size_t, OdometrySample);
 
 void MotionSources::advance(Stamp now) {
-  now_ = std::max(now_, now);
+  tell_time(now);
   for (std::size_t i = 0; i < sources_.size(); ++i) {
     sources_[i].health.advance(now_);
     follow_health(i);
   }
+}
+
+/// Inputs may come a little out of order. What lies further back is told by a clock that was set.
+void MotionSources::tell_time(Stamp now) {
+  if (now > now_ || now < now_ - HealthMonitor::kLongestTimeout)
+    now_ = now;
 }
 
 void MotionSources::hear(const RegistrationFeedback& feedback) {

@@ -80,6 +80,7 @@ class MotionSources {
   };
 
   template <class Sample> void take(std::size_t source, Sample sample);
+  void tell_time(Stamp now);
   void follow_health(std::size_t source);
 
   Fusion fusion_;

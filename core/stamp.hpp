@@ -21,6 +21,10 @@ struct RobotTime {
 /// Instant of a measurement: nanoseconds since the Unix epoch.
 using Stamp = RobotTime::time_point;
 
+/// What a file may claim, the years 1951 to 2096: the difference between two differences of such times fits a Duration.
+inline constexpr Stamp kEarliestStamp{std::chrono::seconds{-600'000'000}};
+inline constexpr Stamp kLatestStamp{std::chrono::seconds{4'000'000'000}};
+
 constexpr Stamp stamp_from_ns(std::int64_t ns) { return Stamp{Duration{ns}}; }
 constexpr std::int64_t to_ns(Stamp stamp) { return stamp.time_since_epoch().count(); }
 

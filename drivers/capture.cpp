@@ -92,10 +92,10 @@ void count(FrameError error, Capture::Stats& stats) {
   }
 }
 
-/// Empty when the time does not fit a Stamp: a pcapng file may claim any 64-bit number of seconds.
+/// Empty when the time is none to reckon with: a pcapng file may claim any 64-bit number of seconds.
 std::optional<Stamp> stamp_of(const pcap_pkthdr& header) {
-  constexpr std::int64_t kMaxSeconds = 9'000'000'000;
-  if (header.ts.tv_sec < 0 || header.ts.tv_sec > kMaxSeconds) {
+  constexpr std::int64_t kMaxSeconds = kLatestStamp.time_since_epoch() / std::chrono::seconds{1};
+  if (header.ts.tv_sec < 0 || header.ts.tv_sec >= kMaxSeconds) {
     return std::nullopt;
   }
   return stamp_from_ns(header.ts.tv_sec * 1'000'000'000 + header.ts.tv_usec); // nanoseconds, as asked for in open()

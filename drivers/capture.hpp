@@ -30,7 +30,7 @@ class Capture {
     std::uint64_t ipv6 = 0;
     std::uint64_t fragments = 0;
     std::uint64_t not_udp = 0;
-    std::uint64_t malformed = 0; ///< lengths that contradict each other, headers cut short, a time beyond the year 2255
+    std::uint64_t malformed = 0; ///< lengths that contradict each other, headers cut short, a time beyond the year 2096
   };
 
   /// "-" is standard input. Fails with one line for the user when the file cannot be read, is not a capture or has a

@@ -66,12 +66,12 @@ bool parse_all(Fields fields, std::span<double> numbers) {
   return std::ranges::equal(fields, numbers, [](std::string_view text, double& number) { return parse(text, number); });
 }
 
-/// A whole number of nanoseconds. Bounded to the years 1843 to 2096, so that differences of stamps cannot overflow.
-constexpr std::int64_t kMaxNs = 4'000'000'000'000'000'000;
+bool is_sensible(Stamp stamp) { return stamp > kEarliestStamp && stamp < kLatestStamp; }
 
+/// A whole number of nanoseconds.
 std::optional<Stamp> parse_ns(std::string_view text) {
   std::int64_t ns = 0;
-  return parse(text, ns) && ns > -kMaxNs && ns < kMaxNs ? std::optional{stamp_from_ns(ns)} : std::nullopt;
+  return parse(text, ns) && is_sensible(stamp_from_ns(ns)) ? std::optional{stamp_from_ns(ns)} : std::nullopt;
 }
 
 /// Decimal seconds, rounded to nanoseconds without a detour over double, whose steps are 200 ns at today's dates. Takes

@@ -16,6 +16,9 @@ constexpr double kRadPerCdeg = std::numbers::pi / 18000.0;
 /// whose columns are shorter, seems to turn 2.4 times as fast and must not be refused for it.
 constexpr double kMaxTurnCdegPerNs = 3.0 * 20.0 * kCdegPerTurn * 1e-9;
 
+/// Half the slowest setting of any model, 300 rpm. Of a motor that hardly turns no time can be told from its turn.
+constexpr double kMinTurnCdegPerNs = 0.5 * 5.0 * kCdegPerTurn * 1e-9;
+
 /// Longest time over which the turn of the VLS-128 is told from two packets: at 3600 rpm three fifths of a turn.
 constexpr Duration kMaxTurnGap = std::chrono::milliseconds{10};
 
@@ -158,10 +161,12 @@ bool Decoder::measure_turns(Packet packet, Duration time_of_hour) {
   else
     measure_turn_since_last_packet(time_of_hour, max_turn_cdeg);
 
+  const bool turns =
+      static_cast<double>(mean_turn_cdeg_) >= kMinTurnCdegPerNs * static_cast<double>(column_duration_.count());
   std::int64_t columns_passed = 0;
   for (std::size_t column = 0; column < columns; ++column) {
     column_offset_ns_[column] = static_cast<std::int32_t>(columns_passed * column_duration_.count());
-    const bool skips_blind_sector = !is_possible[column] && column + 1 < columns && impossible == 1 && sum_cdeg > 0;
+    const bool skips_blind_sector = !is_possible[column] && column + 1 < columns && impossible == 1 && turns;
     columns_passed += skips_blind_sector ? std::lround(turn_cdeg_[column] / mean_turn_cdeg_) : 1;
     if (!is_possible[column])
       turn_cdeg_[column] = mean_turn_cdeg_;

@@ -91,6 +91,18 @@ std::string to_bytes(const SavedState& state) {
   return std::string{bytes_of(head)}.append(bytes_of(body)).append(text);
 }
 
+/// Whether a robot can go on from there: what another hand wrote may hold anything.
+bool makes_sense(const SavedState& state) {
+  constexpr double kFarthest_m = 1e8; // geocentric coordinates are within it
+  if (state.last.stamp < Stamp{})
+    return false;
+  const auto [rotation, translation] = state.last.carried_to(Stamp::max());
+  return rotation.norm() > 0.5 && translation.norm() < kFarthest_m && // false for NaN
+         std::ranges::all_of(state.map_odom, [](const SurfacePoint& point) {
+           return point.position_m.cast<double>().norm() < kFarthest_m && point.normal.allFinite();
+         });
+}
+
 /// Nothing if it is cut short or damaged.
 std::optional<SavedState> from_bytes(std::string_view bytes) {
   Head head{};
@@ -113,7 +125,7 @@ std::optional<SavedState> from_bytes(std::string_view bytes) {
   state.map_odom.resize(body.points);
   if (body.points > 0)
     std::memcpy(std::as_writable_bytes(std::span(state.map_odom)).data(), points.data(), points.size());
-  return state;
+  return makes_sense(state) ? std::optional(std::move(state)) : std::nullopt;
 }
 
 } // namespace

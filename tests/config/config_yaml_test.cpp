@@ -256,6 +256,12 @@ TEST(ConfigYaml, OffAndOnAreWordsWhateverYamlMakesOfThem) {
   EXPECT_EQ(valid(parse_config("scan_to_scan: {mode: false}", "")).odometry.scan_to_scan_mode, ScanToScanMode::off);
 }
 
+/// It was read as empty documents, one after the other, until the memory was full.
+TEST(ConfigYaml, CommaInFrontOfEverythingIsAMistake) {
+  EXPECT_EQ(errors_in(",lidars: []\n"),
+            ConfigErrors{"robot.yaml:1: no key begins like this; remove what stands in front of it"});
+}
+
 TEST(ConfigYaml, WhatIsNotYamlIsRefusedWithItsLine) {
   EXPECT_EQ(errors_in("threads: 1\nlidars: [a\n").size(), 1U);
   EXPECT_TRUE(errors_in("threads: 1\nlidars: ]\n")[0].starts_with("robot.yaml:2: not YAML: "));
@@ -263,7 +269,7 @@ TEST(ConfigYaml, WhatIsNotYamlIsRefusedWithItsLine) {
   EXPECT_EQ(errors_in("just words"), ConfigErrors{"robot.yaml:1: must be a section of keys"});
   EXPECT_EQ(errors_in("? [a, b]\n: c\n"), ConfigErrors{"robot.yaml:1: a key must be a word"});
   EXPECT_EQ(errors_in("---\nthreads: 1\n---\nthreads: 2\n"),
-            ConfigErrors{"robot.yaml:4: a second YAML document begins; keep one, and begin every top-level key in "
+            ConfigErrors{"robot.yaml:3: a second YAML document begins; keep one, and begin every top-level key in "
                          "the first column"});
 }
 

@@ -180,6 +180,13 @@ TEST_F(WheelsTest, AQuaternionOfLengthZeroIsNotANumberEither) {
   EXPECT_EQ(left_out(HealthReason::nan), 1U);
 }
 
+TEST_F(WheelsTest, AnAbsurdPositionIsNotANumberEither) {
+  OdometrySample sample = next();
+  sample.T_source_base.translation.y() = -1e300;
+  EXPECT_FALSE(monitor_.judge(sample));
+  EXPECT_EQ(left_out(HealthReason::nan), 1U);
+}
+
 TEST_F(WheelsTest, OldAndDoubleSamplesAreLeftOut) {
   const OdometrySample before = next();
   OdometrySample after = next();
@@ -287,6 +294,24 @@ TEST_F(WheelsTest, AClockThatStepsByAnHourCostsTheirHealthAndIsLearnedAnew) {
   sample.stamp += hours{1};
   EXPECT_EQ(monitor_.judge(sample), measured);
   EXPECT_EQ(monitor_.counters().clock_steps, 1U);
+}
+
+/// The step back was taken for a period of minus an hour, which no later sample made good.
+TEST_F(WheelsTest, AClockOfTheHostThatIsSetBackDoesNotChangeTheirTimeout) {
+  const Duration timeout = monitor_.timeout();
+  run(seconds{4}, [](OdometrySample& sample) { sample.arrival -= hours{1}; });
+  EXPECT_TRUE(monitor_.healthy());
+  EXPECT_EQ(monitor_.timeout(), timeout);
+}
+
+TEST_F(WheelsTest, ThatStandWhileTheClockOfTheHostIsSetBackAreNotFrozen) {
+  brake_and_stand(seconds{3});
+  run(seconds{4}, [&](OdometrySample& sample) {
+    sample.arrival -= hours{1};
+    sample.T_source_base.translation.x() = stopping_at_m_;
+  });
+  EXPECT_TRUE(monitor_.healthy());
+  EXPECT_EQ(left_out(HealthReason::frozen), 0U);
 }
 
 TEST_F(WheelsTest, ThreeSweepsOfDisagreementWithLidarCostTheirHealth) {
@@ -397,6 +422,23 @@ TEST_F(ImuTest, NotANumberInAnyPartIsLeftOut) {
   EXPECT_FALSE(monitor_.judge(ImuSample{now_, now_, {0, 0, kNan}, {0, 0, 9.81}, {}}));
   EXPECT_FALSE(monitor_.judge(ImuSample{now_, now_, {0, 0, 0.1}, {kNan, 0, 9.81}, {}}));
   EXPECT_EQ(monitor_.counters().rejected_as(HealthReason::nan), 2U);
+}
+
+/// It stayed in the sum of all turns, in which those of the robot were then lost, and the unit was refused for good.
+TEST_F(ImuTest, OneAbsurdReadingCostsNothing) {
+  now_ += milliseconds{5};
+  EXPECT_FALSE(monitor_.judge(ImuSample{now_, now_, {0, 0, 1e20}, {0, 0, 9.81}, {}}));
+  RegistrationFeedback agreeing;
+  agreeing.sees.fill(true);
+  agreeing.twist_base[5] = 0.5;
+  for (int sweep = 0; sweep < 40; ++sweep) {
+    run(milliseconds{100}, 0.5);
+    agreeing.from = now_ - milliseconds{200};
+    agreeing.to = now_ - milliseconds{100};
+    monitor_.hear(LidarOpinion::agrees, agreeing, now_);
+  }
+  EXPECT_TRUE(monitor_.healthy());
+  EXPECT_EQ(monitor_.verdict(), "");
 }
 
 } // namespace

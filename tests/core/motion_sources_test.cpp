@@ -163,6 +163,23 @@ TEST_F(MotionSourcesTest, EachChangeOfHealthIsToldOnceWithItsSource) {
   EXPECT_TRUE(events[1].healthy);
 }
 
+/// It cost them as long as it was set back: their samples were older than the last ones.
+TEST_F(MotionSourcesTest, AClockOfTheHostThatIsSetBackCostsThemTwoSeconds) {
+  MotionSources sources(kWheelsImuVisual, Fusion::combined);
+  const int an_hour_ago = -3'600'000;
+  for (const int from_ms : {0, an_hour_ago}) {
+    for (int ms = from_ms; ms <= from_ms + 2000; ms += 20) {
+      feed(sources, 0, ms, ms);
+      feed(sources, 1, ms, ms);
+      sources.advance(at_ms(ms));
+    }
+  }
+  const SourceChoice choice = sources.choose(at_ms(an_hour_ago + 2000));
+  EXPECT_EQ(choice.rotation, 1U);
+  EXPECT_EQ(choice.translation, 0U);
+  EXPECT_TRUE(sources.motion(choice, at_ms(an_hour_ago + 1900), at_ms(an_hour_ago + 2000)));
+}
+
 TEST_F(MotionSourcesTest, WhatTheSelfCheckFoundIsToldInWords) {
   std::vector<HealthEvent> events;
   MotionSources sources(kWheelsImuVisual, Fusion::combined, [&](const HealthEvent& event) { events.push_back(event); });

@@ -107,6 +107,12 @@ TEST(MotionFiles, TimesThatAreNoneAreErrors) {
   }
 }
 
+TEST(MotionFiles, TimesThatCannotBeReckonedWithAreErrors) {
+  EXPECT_TRUE(imu_from("-599999999999999999,0,0,0,0,0,0\n3999999999999999999,0,0,0,0,0,0\n"));
+  for (const char* text : {"-600000000000000000", "4000000000000000000"})
+    EXPECT_TRUE(contains(error_of(imu_from(std::string{text} + ",0,0,0,0,0,0\n")), "imu.csv:1: time ")) << text;
+}
+
 TEST(MotionFiles, CommentsBlankLinesCrlfAndAMissingLastNewlineAreAccepted) {
   const auto imu = imu_from("#timestamp [ns],w_x\r\n\r\n1,0,0,0,0,0,9.81\r\n# interlude\r\n  \t\r\n2,0,0,0,0,0,9.81");
   ASSERT_TRUE(imu) << imu.error();

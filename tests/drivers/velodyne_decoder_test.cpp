@@ -170,6 +170,14 @@ TEST(VelodyneDecoder, ColumnsBehindABlindSectorAreLaterByTheColumnsItTook) {
   EXPECT_NEAR(to_seconds(packet.duration), (27'080 - 9'000) * seconds_per_cdeg, 1e-4);
 }
 
+/// The jitter of its encoder was taken for a blind sector, at a speed at which that takes twenty seconds.
+TEST(VelodyneDecoder, MotorThatStandsHasNoBlindSector) {
+  VelodyneTestPacket bytes{Model::vlp16, ReturnMode::strongest, 0, 100, 0.0};
+  bytes.set_azimuth(7, 101);
+  bytes.set_all_returns(1000);
+  EXPECT_EQ(decoded(bytes).duration, packet_duration(Model::vlp16, ReturnMode::strongest));
+}
+
 TEST(VelodyneDecoder, AnyOtherLengthIsRefused) {
   Decoder decoder;
   LidarPacket packet;

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// What --set does, one option a line; the outcome is printed and read again, to the same.
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "config/config_yaml.hpp"
+#include "fuzz/fuzz_bytes.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace locus;
+  static const Config kDefaults;
+  std::istringstream text{std::string{fuzz::text_of(data, size)}};
+  std::vector<std::string> assignments;
+  for (std::string line; std::getline(text, line);)
+    assignments.push_back(line);
+  const auto config = override_config(kDefaults, assignments);
+  if (!config)
+    return 0;
+  const std::string printed = print_config(*config);
+  const auto again = parse_config(printed, "printed.yaml");
+  fuzz::demand(again.has_value() && print_config(*again) == printed);
+  return 0;
+}

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Position packets, and what a GPS receiver says in them. Only the part that is looked at is fed: the time of hour, the
+// state of the PPS and the sentence.
+#include <array>
+#include <cmath>
+
+#include "drivers/position_packet.hpp"
+#include "fuzz/fuzz_bytes.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace locus;
+  using fuzz::demand;
+  static_cast<void>(velodyne::parse_rmc(fuzz::text_of(data, size)));
+
+  std::array<std::byte, velodyne::kPositionPacketBytes> payload{};
+  fuzz::FuzzBytes bytes{data, size};
+  bytes.fill(std::span{payload}.subspan(velodyne::kTimeOfHourOffset));
+  const velodyne::PositionPacket packet = velodyne::parse_position_packet(payload);
+  demand(packet.pps <= velodyne::PpsState::error);
+  if (!packet.rmc)
+    return 0;
+  demand(packet.rmc->time_of_day >= Duration{} &&
+         packet.rmc->time_of_day < std::chrono::hours{24} + std::chrono::seconds{1});
+  demand(!packet.rmc->date || packet.rmc->date->ok());
+  demand(std::isfinite(packet.rmc->speed_mps.value_or(0.0)) && std::isfinite(packet.rmc->course_deg.value_or(0.0)));
+  return 0;
+}

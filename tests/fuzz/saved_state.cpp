@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// The saved state of the service, with checksums made right, for nothing gets past wrong ones: what is left is a file
+// that was written by another version, or by somebody else.
+#include <cstring>
+#include <vector>
+
+#include "daemon/service/saved_state.hpp"
+#include "fuzz/memory_file.hpp"
+
+namespace locus {
+namespace {
+
+constexpr std::size_t kHeadBytes = 128, kBodyBytes = 16, kChecksumBytes = 8;
+
+std::uint64_t fnv_1a(std::span<const std::uint8_t> bytes, std::uint64_t hash) {
+  for (const std::uint8_t byte : bytes)
+    hash = (hash ^ byte) * 0x100000001b3U;
+  return hash;
+}
+
+std::vector<std::uint8_t> with_checksums(std::span<const std::uint8_t> input) {
+  constexpr std::uint64_t kBasis = 0xcbf29ce484222325U;
+  std::vector<std::uint8_t> file(input.begin(), input.end());
+  if (file.size() < kHeadBytes + kBodyBytes)
+    return file;
+  const std::span all{file};
+  const auto head = all.first(kHeadBytes), body = all.subspan(kHeadBytes, kBodyBytes);
+  const auto put = [](std::uint64_t checksum, std::span<std::uint8_t> block) {
+    std::memcpy(block.last(kChecksumBytes).data(), &checksum, kChecksumBytes);
+  };
+  put(fnv_1a(head.first(kHeadBytes - kChecksumBytes), kBasis), head);
+  put(fnv_1a(all.subspan(kHeadBytes + kBodyBytes), fnv_1a(body.first(kBodyBytes - kChecksumBytes), kBasis)), body);
+  return file;
+}
+
+} // namespace
+} // namespace locus
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace locus;
+  using fuzz::demand;
+  static const fuzz::MemoryFile kFile;
+  static_cast<void>(daemon::load_state(kFile.with(fuzz::text_of(data, size))));
+  const std::vector<std::uint8_t> file = with_checksums({data, size});
+  const auto state = daemon::load_state(kFile.with(fuzz::text_of(file.data(), file.size())));
+  if (!state)
+    return 0;
+  demand(state->map_odom.size() * sizeof(SurfacePoint) + kHeadBytes + kBodyBytes == size);
+  demand(state->last.carried_to(stamp_from_ns(1'700'000'000'000'000'000)).finite());
+  for (const SurfacePoint& point : state->map_odom)
+    demand(point.position_m.allFinite() && point.normal.allFinite());
+  return 0;
+}

@@ -1,0 +1,162 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""seeds.py FOLDER: writes a first corpus into FOLDER/TARGET/, one well-formed input for every form that is read."""
+import pathlib
+import re
+import struct
+import sys
+
+folder = pathlib.Path(sys.argv[1])
+project = pathlib.Path(__file__).resolve().parents[2]
+
+
+def write(target, name, content):
+    (folder / target).mkdir(parents=True, exist_ok=True)
+    (folder / target / name).write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+# Data packets: model, product id, banks, column duration in ns.
+MODELS = [("vlp16", 0x22, 1, 110592), ("hires", 0x24, 1, 110592), ("vlp32c", 0x28, 1, 55296),
+          ("hdl32e", 0x21, 1, 46080), ("vls128", 0xA1, 4, 53300)]
+BANK_FLAGS = [0xEEFF, 0xDDFF, 0xCCFF, 0xBBFF]
+NEW, OTHER_LENGTH, TRUNCATED, OTHER_SENDER, POSITION, ANY_TIME = 1, 2, 4, 8, 16, 32
+
+
+def data_packet(product, mode, banks, column_ns):
+    returns = 2 if mode == 0x39 else 1
+    blocks = b""
+    for block in range(12):
+        column = block // (banks * returns)
+        azimuth = int(column * column_ns * 1e-9 * 10 * 36000) % 36000
+        channels = b"".join(struct.pack("<HB", 500 + 7 * channel + block % 2, 9) for channel in range(32))
+        blocks += struct.pack("<HH", BANK_FLAGS[block % (banks * returns) // returns], azimuth) + channels
+    return blocks + struct.pack("<IBB", 3599_990_000, mode, product)
+
+
+def position_tail():
+    body = "GPRMC,105500,A,4807.038,N,01131.000,E,022.4,084.4,200926,003.1,W"
+    checksum = 0
+    for c in body.encode():
+        checksum ^= c
+    sentence = f"${body}*{checksum:02X}\r\n".encode()
+    return struct.pack("<IB3x", 3599_990_000, 2) + sentence
+
+
+def again(later_us, turn_cdeg, step=0):
+    return struct.pack("<BHH", step, later_us, turn_cdeg)
+
+
+position = bytes(0xC6) + position_tail()
+position += bytes(512 - len(position))
+for index, (name, product, banks, column_ns) in enumerate(MODELS):
+    for mode in (0x37, 0x38, 0x39):
+        packet = data_packet(product, mode, banks, column_ns)
+        columns = 12 // (banks * (2 if mode == 0x39 else 1))
+        later_us = columns * column_ns // 1000
+        stream = struct.pack("<BH", NEW, later_us) + packet
+        stream += again(later_us, later_us * 36 // 100) * 12
+        for kind in (0, 1 + index):
+            write("data_packets", f"{name}_{mode:x}_{kind}", bytes([kind]) + stream)
+packet = struct.pack("<BH", NEW, 1327) + data_packet(0x22, 0x37, 1, 110592)
+turns = again(1327, 477) * 4
+write("data_packets", "synchronised", b"\0" + struct.pack("<BH", NEW | POSITION, 10) + position + packet + turns)
+write("data_packets", "duplicate", b"\0" + packet + again(0, 0) * 3)
+write("data_packets", "lost", b"\0" + packet + turns + again(39810, 14310) + turns)
+write("data_packets", "step", b"\6" + packet + turns + again(65535, 0) * 3 + again(1327, 477) * 8)
+write("data_packets", "strangers", b"\0" + packet + turns + again(1327, 477, OTHER_SENDER) + again(0, 0, TRUNCATED))
+write("data_packets", "any_time", b"\0" + packet + struct.pack("<BQHH", ANY_TIME, 8_999_999_999_999_999_999, 1, 1) + turns)
+standing = bytearray(data_packet(0x22, 0x37, 1, 0))
+standing[7 * 100 + 2] = 1
+write("data_packets", "standing", b"\0" + struct.pack("<BH", NEW, 1327) + standing)
+write("data_packets", "length", b"\0" + struct.pack("<BHH", OTHER_LENGTH, 1205, 0) + turns)
+
+write("position_packets", "packet", position_tail())
+write("position_packets", "sentence", position_tail()[8:])
+write("position_packets", "glonass", b"$GNRMC,235960.99,V,,,,,,,010100,,,N*00\r\n")
+
+write("sensor_clock", "regular", b"\0" + struct.pack("<BHh", 0, 1327, 40) * 40)
+write("sensor_clock", "slow", b"\0" + struct.pack("<BHh", 0, 60000, -40) * 60)
+write("sensor_clock", "step", b"\2" + struct.pack("<BHh", 0, 1327, 4) * 8 + struct.pack("<BHhI", 1, 1327, 0, 12345678)
+      + struct.pack("<BHh", 0, 1327, 4) * 8)
+write("sensor_clock", "sensor", b"\1" + struct.pack("<BHh", 8, 1327, 4) * 8 + struct.pack("<BHhQ", 2, 9, 9, 7 << 60) * 2
+      + struct.pack("<BHh", 4, 1327, 4) * 8)
+
+# Captures.
+udp = struct.pack(">HHHH", 2368, 2368, 8 + 24, 0) + bytes(range(24))
+ip = struct.pack(">BBHHHBBH4s4s", 0x45, 0, 20 + len(udp), 1, 0x4000, 64, 17, 0, bytes([192, 168, 1, 201]), b"\xff" * 4) + udp
+loopback = struct.pack("<I", 2) + ip
+FRAMES = {"ethernet": (1, bytes(12) + b"\x08\x00" + ip), "vlan": (1, bytes(12) + b"\x81\x00\x00\x05\x08\x00" + ip),
+          "arp": (1, bytes(12) + b"\x08\x06" + bytes(28)), "ipv6": (1, bytes(12) + b"\x86\xdd" + bytes(40)),
+          "sll": (113, bytes(14) + b"\x08\x00" + ip), "sll2": (276, b"\x08\x00" + bytes(18) + ip),
+          "null": (0, loopback), "loop": (108, loopback[3::-1] + ip), "raw": (101, ip), "ipv4": (228, ip)}
+for name, (link, frame) in FRAMES.items():
+    for form, magic, order in (("us", 0xA1B2C3D4, "<"), ("ns", 0xA1B23C4D, "<"), ("swapped", 0xA1B2C3D4, ">")):
+        record = struct.pack(order + "IIII", 1700000000, 7, len(frame), len(frame)) + frame
+        head = struct.pack(order + "IHHiIII", magic, 2, 4, 0, 0, 65535, link)
+        write("capture", f"{name}_{form}", head + record * 2)
+    section = struct.pack("<IIIHHqI", 0x0A0D0D0A, 28, 0x1A2B3C4D, 1, 0, -1, 28)
+    interface = struct.pack("<IIHHIHHB3xHHI", 1, 32, link, 0, 65535, 9, 1, 9, 0, 0, 32)
+    padded = frame + bytes(-len(frame) % 4)
+    size = 32 + len(padded)
+    enhanced = struct.pack("<IIIIIII", 6, size, 0, 396000000, 7, len(frame), len(frame)) + padded + struct.pack("<I", size)
+    simple = struct.pack("<III", 3, 16 + len(padded), len(frame)) + padded + struct.pack("<I", 16 + len(padded))
+    write("capture", f"{name}_ng", section + interface + enhanced * 2 + simple)
+snapped = struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 40, 1) + struct.pack("<IIII", 1, 7, 40, 66) + FRAMES["ethernet"][1][:40]
+write("capture", "snapped", snapped)
+
+# Text.
+for file in sorted((project / "config").glob("*.yaml")):
+    plain = "".join(line + "\n" for line in file.read_text().split("\n") if line and not line.strip().startswith("#"))
+    for index, section in enumerate(re.split(r"\n(?=\w)", plain)):  # whole files are slow
+        write("config", f"{file.stem}_{index}", section)
+write("config", "comma", ",lidars: []\n")
+write("config_values", "port", "lidars.front.port=2369\nlidars.0.name=rear")
+write("config_values", "list", "motion_sources=[{name: vio, kind: odometry, T_base_source: {xyz_m: [0, 0, 1], rpy_deg: [0, 90, 180]}}]")
+write("config_values", "sweep", "sweep_period_ms=50")
+write("config", "anchors", "lidars: &a\n  - {name: front, model: VLP-16}\nmotion_sources: *a\n")
+
+lasers = "\n".join(f"- {{dist_correction: 0.0, horiz_offset_correction: 0.01, laser_id: {i}, rot_correction: 0.0, "
+                   f"two_pt_correction_available: false, vert_correction: {0.01 * i - 0.02}, vert_offset_correction: 0.0}}"
+                   for i in range(4))
+write("calibration", "short", f"num_lasers: 4\ndistance_resolution: 0.002\nlasers:\n{lasers}\n")
+
+imu = "#t_ns,wx,wy,wz,ax,ay,az\n" + "".join(f"{1_700_000_000_000_000_000 + i * 5_000_000},0.0{i},0,0,0,0,9.8{i}\n" for i in range(8))
+write("motion_files", "imu", imu)
+write("motion_files", "attitude", "1,0,0,0,0,0,9.81,1,0,0,0\r\n2,nan,0,0,0,0,9.81,0,0,0,0\r\n")
+write("motion_files", "tum", "".join(f"1700000000.{i}00000000 {i} 0.5 -1e-3 0 0 0 1\n" for i in range(8)))
+write("motion_files", "numpy", "1.403636579763555527e+09 0 0 0 0 0 0.6 0.8\n.5e1\t1 2 3 0 0 0 +1\n-2. 1 2 3 0 0 0 1\n")
+write("motion_files", "meta", "1,0,0,0,0,0,9.81\n3,0,0,0,0,0,9.81\n---\nt_ns,arrival_ns,covariance_scale\n1,4,1\n3,2,7.5\n")
+write("motion_files", "meta_tum", "1e-9 0 0 0 0 0 0 1\n1e-9 1 0 0 0 0 0 1\n---\n1,2000,1\n1,1000,8\n")
+stamps = [-3_999_999_999_999_999_999 + i for i in range(6)] + [3_999_999_999_999_999_999]
+write("motion_files", "absurd_meta", "".join(f"{t},0,0,0,0,0,9.81\n" for t in stamps) + "---\n"
+      + "".join(f"{t},{3_999_999_999_999_999_990 + i},1\n" for i, t in enumerate(stamps)))
+write("motion_files", "absurd", "-3999999999999999999,0,0,0,0,0,9.81\n3999999999999999999,0,0,0,0,0,9.81\n")
+
+PLY = "ply\nformat {} 1.0\ncomment a map\nelement vertex 2\nproperty {} x\nproperty {} y\nproperty {} z\nproperty uchar i\nend_header\n"
+POINTS = ((1.0, 2.0, 3.0, 4), (-1.0, 0.5, float("nan"), 5))
+for form, order in (("binary_little_endian", "<"), ("binary_big_endian", ">")):
+    for real, code in (("float", "f"), ("double", "d")):
+        data = b"".join(struct.pack(order + 3 * code + "B", *point) for point in POINTS)
+        write("point_cloud", f"{form}_{real}", PLY.format(form, real, real, real).encode() + data)
+write("point_cloud", "ascii", PLY.format("ascii", "float", "double", "float32") + "1 2 3 4\n-1e3 nan .5 5\n")
+PCD = "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z h\nSIZE 4 4 8 4\nTYPE F F F U\nCOUNT 1 1 1 3\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\nDATA {}\n"
+write("point_cloud", "pcd_ascii", PCD.format("ascii") + "1 2 3 4 5 6\n7 8 9 10 11 12\n")
+write("point_cloud", "pcd_binary", PCD.format("binary").encode() + struct.pack("<ffdIII", 1, 2, 3, 4, 5, 6) * 2)
+
+# The state of the service; checksums are made right by the target.
+head = b"locusd 2" + struct.pack("<q13dQ", 1_700_000_000_000_000_000, 1, 2, 3, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0.1, 0)
+for points in (0, 3):
+    write("saved_state", f"points_{points}", head + struct.pack("<iIQ", 1, points, 0) + struct.pack("<6f", 1, 2, 3, 0, 0, 1) * points)
+
+# Messages: what each step brings with it is in the target.
+ODOMETRY, STAMP, ARRIVAL, ROTATION, VECTORS, COVARIANCE, OUTSIDE = 1, 2, 4, 8, 16, 32, 64
+drive = struct.pack("<BHddddddd", ODOMETRY | ROTATION | VECTORS, 20000, 0, 0, 0, 1, 1, 2, 3)
+drive += b"".join(struct.pack("<BHddd", ODOMETRY | VECTORS, 20000, 1 + 0.01 * i, 2, 3) for i in range(8))
+write("ros_messages", "odometry", drive)
+write("ros_messages", "uncertain", drive + struct.pack("<BHBd", ODOMETRY | COVARIANCE, 20000, 7, 0.01) * 3)
+turn = struct.pack("<BHddddddddddd", ROTATION | VECTORS | COVARIANCE, 5000, 0, 0, 0, 1, 0.1, 0, 0, 0, 0, 9.81, 0.1)
+turn += b"".join(struct.pack("<BHdddddd", VECTORS, 5000, 0.1 + 0.01 * i, 0, 0, 0, 0.01, 9.8) for i in range(8))
+write("ros_messages", "imu", turn)
+write("ros_messages", "both", turn + drive + struct.pack("<BHB", ODOMETRY | OUTSIDE, 9, 1))
+write("ros_messages", "own_clock", b"".join(struct.pack("<BHiIdddddd", STAMP | VECTORS, 5000, 5, i * 5_000_000, i, 0, 0, 0, 0, 9.81)
+                                           for i in range(9)) + struct.pack("<BHI", ARRIVAL, 1, 7))

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// The clock of a lidar, told any times of hour at any times of reception.
+#include "drivers/sensor_clock.hpp"
+#include "fuzz/packet_stream.hpp"
+
+namespace locus {
+namespace {
+
+using std::chrono::microseconds;
+
+/// Bits that open a step.
+enum Step : std::uint8_t { kAnyTimeOfHour = 1, kAnyReception = 2, kBackwards = 4, kUnsynchronised = 8 };
+
+Duration wrapped(Duration time_of_hour) { return time_of_hour % std::chrono::hours{1}; }
+
+} // namespace
+} // namespace locus
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace locus;
+  fuzz::FuzzBytes bytes{data, size};
+  SensorClock clock{static_cast<LidarTime>(bytes.take<std::uint8_t>() % 3)};
+  Duration time_of_hour{};
+  Duration received = std::chrono::hours{472'222};
+  std::uint64_t steps = 0;
+  while (!bytes.empty()) {
+    const auto step = bytes.take<std::uint8_t>();
+    clock.set_synchronised((step & kUnsynchronised) == 0);
+    const Duration later = microseconds{bytes.take<std::uint16_t>()};
+    const Duration jitter = microseconds{bytes.take<std::int16_t>()};
+    received += later + jitter;
+    time_of_hour = wrapped(time_of_hour + later);
+    if ((step & kBackwards) != 0)
+      time_of_hour = wrapped(time_of_hour + std::chrono::hours{1} - 2 * later);
+    if ((step & kAnyTimeOfHour) != 0)
+      time_of_hour = wrapped(microseconds{bytes.take<std::uint32_t>()});
+    if ((step & kAnyReception) != 0)
+      received = fuzz::PacketStream::any_stamp(bytes).time_since_epoch();
+    const auto reading = clock.read(time_of_hour, microseconds{1327}, Stamp{received});
+    fuzz::demand(clock.steps() >= steps);
+    fuzz::demand(!reading || reading->continuous || reading->advance == Duration{});
+    steps = clock.steps();
+  }
+  return 0;
+}
