@@ -48,7 +48,7 @@ class Ros2Bag : public Bag {
   };
 
   static Statement prepare(const File& file, const char* sql);
-  std::optional<std::string> add(const std::filesystem::path& path);
+  std::optional<std::string> add(const std::filesystem::path& file);
   std::optional<std::string> read_topics(File& file);
   bool read_row();
   void break_off(const File& file);
