@@ -19,6 +19,7 @@
 #include "daemon/live_pipeline.hpp"
 #include "daemon/paced_input.hpp"
 #include "daemon/sweep_processor.hpp"
+#include "kitti/kitti_drive.hpp"
 #include "locus_replay/arguments.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/recorded_input.hpp"
@@ -60,20 +61,22 @@ Config configuration(const std::filesystem::path& file, const std::vector<std::s
   return config;
 }
 
+bool is_all_in_one(const std::filesystem::path& where) { return looks_like_bag(where) || KittiDrive::is(where); }
+
 /// Results in the folder of a recording would be taken for its files by the next run.
 void check_output(const std::filesystem::path& folder) {
-  if (std::filesystem::is_directory(folder) && (CaptureFolder::find(folder) || looks_like_bag(folder)))
+  if (std::filesystem::is_directory(folder) && (CaptureFolder::find(folder) || is_all_in_one(folder)))
     throw Failure(ExitStatus::wrong_usage,
                   fmt::format("-o {}: holds a recording; choose another folder for the results", folder.string()));
 }
 
-/// The files of a capture folder; a bag is all in one.
+/// The files of a capture folder; a bag or a drive of KITTI has all in one.
 CaptureFolder find_files(const std::filesystem::path& capture) {
   Expected<CaptureFolder, std::string> folder = CaptureFolder::find(capture);
-  if (!folder && looks_like_bag(capture)) {
-    CaptureFolder bag;
-    bag.lidar = capture;
-    return bag;
+  if (!folder && is_all_in_one(capture)) {
+    CaptureFolder all;
+    all.lidar = capture;
+    return all;
   }
   return value_or_fail(std::move(folder), ExitStatus::failed);
 }
@@ -137,7 +140,7 @@ void run(const Arguments& arguments, const SweepStage& stage) {
   if (!input.taken.empty() && !arguments.quiet)
     fmt::print("{}\n", input.taken);
 
-  Truth truth(arguments, folder);
+  Truth truth(arguments, folder, std::move(input.truth));
   const PlayOptions options{arguments.start, arguments.duration, arguments.faults, config.sweep.seed};
   Recording recording(std::move(input.lidars), std::move(input.motion), config, lidars, options);
   Results results(arguments, config, recording, std::move(truth), begin);
