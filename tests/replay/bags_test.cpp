@@ -197,25 +197,37 @@ TEST_P(BagOfRosbag, IsReadFieldByField) {
 }
 INSTANTIATE_TEST_SUITE_P(Compression, BagOfRosbag, testing::Values("none.bag", "lz4.bag", "bz2.bag"));
 
-/// Whatever byte of a real bag is another one, reading ends, and with no more messages than there were.
-TEST_P(BagOfRosbag, DamageNeverHangsNorCrashes) {
-  const std::string bytes = read_text(std::filesystem::path(LOCUS_TEST_BAGS) / GetParam());
+/// Whatever byte of a bag is another one, reading it ends, and with no more messages than there were.
+void expect_damage_is_borne(const std::string& bytes, const std::string& name, int messages) {
   const TemporaryFolder folder;
   for (std::size_t at = 0; at < bytes.size(); at += at < 6000 ? 11 : 37) {
     std::string damaged = bytes;
     damaged[at] = static_cast<char>(~damaged[at]);
-    write_text(folder / "damaged.bag", damaged);
-    const auto bag = tools::open_bag(folder / "damaged.bag");
-    int messages = 0;
+    write_text(folder / name, damaged);
+    const auto bag = tools::open_bag(folder / name);
+    int read = 0;
     while (const tools::BagMessage* message = bag ? (*bag)->next() : nullptr) {
-      ++messages;
-      const tools::MessageReader reader(message->data, tools::Serialisation::ros1);
+      ++read;
+      const tools::MessageReader reader(message->data, (*bag)->serialisation());
       static_cast<void>(tools::read_imu(reader));
       static_cast<void>(tools::read_odometry(reader));
       static_cast<void>(tools::read_velodyne_scan(reader));
     }
-    EXPECT_LE(messages, 9);
+    EXPECT_LE(read, messages) << "byte " << at;
   }
+}
+
+TEST_P(BagOfRosbag, DamageNeverHangsNorCrashes) {
+  expect_damage_is_borne(read_text(std::filesystem::path(LOCUS_TEST_BAGS) / GetParam()), "damaged.bag", 9);
+}
+
+TEST(Bags, DamageOfADatabaseNeverHangsNorCrashes) {
+  const TemporaryFolder folder;
+  std::vector<RecordedMessage> messages;
+  for (int i = 0; i < 60; ++i)
+    messages.push_back({"/imu/data", "sensor_msgs/Imu", stamp_from_ns(i), imu_message({}, RosVersion::ros2)});
+  write_db3(folder / "whole.db3", messages);
+  expect_damage_is_borne(read_text(folder / "whole.db3"), "damaged.db3", 60);
 }
 
 /// A recorder that was killed leaves a bag without index, and often with half a chunk at its end.
