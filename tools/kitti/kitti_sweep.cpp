@@ -37,7 +37,7 @@ bool KittiSweep::find_rings(std::span<const KittiPoint> points) {
     const float range_m = std::hypot(point.x_m, point.y_m, point.z_m);
     if (!(std::isfinite(range_m) && range_m > 0.0F))
       continue;
-    const double clockwise = std::atan2(-point.y_m, point.x_m); // 0 in front
+    const double clockwise = std::atan2(-static_cast<double>(point.y_m), static_cast<double>(point.x_m)); // 0 in front
     const double azimuth = clockwise > 0 ? kTurn - clockwise : -clockwise;
     if (returns_.empty())
       first_of_ring = azimuth;

@@ -21,8 +21,8 @@ Stamp arrival_of(Stamp stamp, Stamp recorded) {
 /// Gathers the samples of one topic.
 class MotionTopic {
  public:
-  MotionTopic(std::size_t source, std::size_t topic, const BagTopic& name)
-      : source_(source), topic_(topic), name_(name) {}
+  MotionTopic(std::size_t source, std::size_t topic, BagTopic name)
+      : source_(source), topic_(topic), name_(std::move(name)) {}
 
   [[nodiscard]] std::size_t topic() const { return topic_; }
 

@@ -50,6 +50,8 @@ RecordedInput open_drive_input(const Arguments& arguments, const std::filesystem
   KittiDrive drive = value_or_fail(KittiDrive::open(folder), ExitStatus::failed);
   RecordedInput input{nullptr, read_motion(arguments, {}, config, false, warnings), "", {}};
   std::ranges::copy(drive.warnings, std::back_inserter(warnings));
+  if (!arguments.ground_truth.empty())
+    drive.truth.clear();
   for (const StampedPose& pose : drive.truth)
     input.truth.push_back({pose.stamp, pose.T_source_base * config.lidars.front().T_base_lidar.inverse()});
   const std::vector<MotionSourceOptions>& sources = config.odometry.motion_sources;
