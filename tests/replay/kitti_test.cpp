@@ -185,7 +185,7 @@ TEST(Kitti, PointHasTheTimeOfItsAzimuthAndTheRingOfItsPlace) {
         if (r.range_m <= 0)
           continue;
         ++returns;
-        const Eigen::Vector3d p_m{r.x_m, r.y_m, r.z_m};
+        const Eigen::Vector3d p_m = Eigen::Vector3f{r.x_m, r.y_m, r.z_m}.cast<double>();
         const double elevation_deg = std::asin(p_m.normalized().z()) * 360 / kTurn;
         const double from_rear = 0.5 + std::atan2(-p_m.y(), p_m.x()) / kTurn; // left is a quarter, the front a half
         EXPECT_NEAR(to_seconds(packet->stamp + Duration{r.offset_ns} - start), 0.1 * from_rear, 1e-6);

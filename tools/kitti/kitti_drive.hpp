@@ -30,7 +30,7 @@ struct KittiDrive {
   static bool is(const std::filesystem::path& folder);
 
   /// Reads all but the points. A drive without oxts has neither imu nor truth. Fails with one line for the user.
-  static Expected<KittiDrive, std::string> open(const std::filesystem::path& folder);
+  static Expected<KittiDrive, std::string> open(const std::filesystem::path& where);
 };
 
 } // namespace locus::tools
