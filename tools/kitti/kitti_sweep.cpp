@@ -91,7 +91,8 @@ void KittiSweep::fill(std::size_t column, std::size_t bank, Salvo& salvo) const 
     salvo.range_m[k] = std::hypot(point.x_m, point.y_m, point.z_m);
     const Stamp fired = start_ + from_seconds(turned * to_seconds(end_ - start_));
     salvo.offset_ns[k] = static_cast<std::int32_t>((fired - packet_.stamp).count());
-    salvo.intensity[k] = static_cast<std::uint8_t>(kMaxIntensity * std::clamp(point.reflectance, 0.0F, 1.0F));
+    salvo.intensity[k] = static_cast<std::uint8_t>(
+        kMaxIntensity * (point.reflectance > 0.0F ? std::min(point.reflectance, 1.0F) : 0.0F)); // 0 for NaN
   }
 }
 
