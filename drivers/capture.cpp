@@ -172,6 +172,11 @@ void Capture::note_break() {
                        stats_.frames, cut ? "" : ", what follows is not");
 }
 
+std::string Capture::why_none() const {
+  return fmt::format("no UDP datagram in {} frames; record next to the lidar with: tcpdump -s 0 -w lidar.pcap udp",
+                     stats_.frames);
+}
+
 std::vector<std::string> Capture::warnings() const {
   std::vector<std::string> lines;
   if (!break_.empty()) {
@@ -190,6 +195,10 @@ std::vector<std::string> Capture::warnings() const {
                          "record again if the lidar's packets are among them");
   warn(stats_.ipv6, "IPv6 packets left out; Velodyne lidars send IPv4");
   return lines;
+}
+
+double Capture::progress() const {
+  return bytes_total_ > 0 ? static_cast<double>(bytes_read()) / static_cast<double>(bytes_total_) : 0.0;
 }
 
 std::uint64_t Capture::bytes_read() const {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/expected.hpp"
-#include "drivers/datagram.hpp"
+#include "drivers/datagram_source.hpp"
 
 struct pcap;
 
@@ -19,7 +19,7 @@ namespace locus {
 /// Link types: Ethernet with any VLAN tags, Linux cooked (SLL, SLL2), loopback, raw IP. Whatever is not a whole IPv4
 /// UDP datagram is counted and skipped. A file that breaks off is read up to the break, and warnings() says where that
 /// is. One owner. Allocates nothing from packet to packet.
-class Capture {
+class Capture : public DatagramSource {
  public:
   /// What became of the frames so far: frames = datagrams + not_ip + ipv6 + fragments + not_udp + malformed.
   struct Stats {
@@ -37,17 +37,13 @@ class Capture {
   /// foreign link type.
   static Expected<Capture, std::string> open(const std::filesystem::path& file);
 
-  /// The next datagram, valid until the next call; nullptr at the end.
-  const Datagram* next();
+  const Datagram* next() override;
 
   [[nodiscard]] const Stats& stats() const { return stats_; }
-
-  /// One line each about what was met so far and the user can do something about.
-  [[nodiscard]] std::vector<std::string> warnings() const;
-
-  /// For a progress bar; the total is 0 where it is not known (a pipe).
-  [[nodiscard]] std::uint64_t bytes_read() const;
-  [[nodiscard]] std::uint64_t bytes_total() const { return bytes_total_; }
+  [[nodiscard]] std::uint64_t datagrams() const override { return stats_.datagrams; }
+  [[nodiscard]] std::string why_none() const override;
+  [[nodiscard]] std::vector<std::string> warnings() const override;
+  [[nodiscard]] double progress() const override;
 
  private:
   struct Closer {
@@ -56,10 +52,11 @@ class Capture {
 
   Capture(std::filesystem::path file, pcap* handle, std::uint64_t bytes_total);
   void note_break();
+  [[nodiscard]] std::uint64_t bytes_read() const;
 
   std::filesystem::path file_;
   std::unique_ptr<pcap, Closer> pcap_;
-  std::uint64_t bytes_total_;
+  std::uint64_t bytes_total_; ///< 0 where it is not known
   Datagram datagram_;
   Stats stats_;
   std::string break_; ///< where and why reading stopped before the end; empty while all is well

@@ -53,6 +53,8 @@ std::optional<std::uint32_t> LidarInput::source_ip() const {
 }
 
 std::optional<PacketError> LidarInput::take(const Datagram& datagram) {
+  if (datagram.decoded != nullptr)
+    return take_decoded(datagram);
   if (datagram.truncated)
     return PacketError::truncated;
   if (!is_sender(datagram))
@@ -64,6 +66,16 @@ std::optional<PacketError> LidarInput::take(const Datagram& datagram) {
   position_ = velodyne::parse_position_packet(datagram.payload.first<velodyne::kPositionPacketBytes>());
   clock_.set_synchronised(position_->is_synchronised());
   ++counters_.position;
+  return std::nullopt;
+}
+
+/// Its stamp is that of the recording: there is no sensor's clock to reckon it from.
+std::optional<PacketError> LidarInput::take_decoded(const Datagram& datagram) {
+  const std::uint8_t index = packet_.lidar;
+  packet_ = *datagram.decoded;
+  packet_.lidar = index;
+  packet_is_ready_ = true;
+  ++counters_.data;
   return std::nullopt;
 }
 

@@ -61,6 +61,7 @@ class LidarInput {
   LidarInput(LidarOptions options, std::uint8_t index, std::optional<velodyne::Calibration> calibration);
 
   std::optional<PacketError> take(const Datagram& datagram);
+  std::optional<PacketError> take_decoded(const Datagram& datagram);
   std::optional<PacketError> take_data(const Datagram& datagram);
   [[nodiscard]] bool is_sender(const Datagram& datagram) const;
   [[nodiscard]] bool is_duplicate(std::span<const std::byte> payload) const;

@@ -5,6 +5,7 @@
 #include <exception>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -49,7 +50,7 @@ Recording open_recording(const PlayArguments& arguments, const CaptureFolder& fo
   std::vector<MotionRecording> motion = read_motion({}, folder, config, !folder.config.empty(), warnings);
   for (const std::string& warning : warnings)
     warn(warning);
-  return {value_or_fail(Capture::open(folder.lidar), ExitStatus::failed),
+  return {std::make_unique<Capture>(value_or_fail(Capture::open(folder.lidar), ExitStatus::failed)),
           std::move(motion),
           config,
           value_or_fail(LidarRouter::open(config.lidars), ExitStatus::wrong_usage),
@@ -96,13 +97,13 @@ void send_all(const PlayArguments& arguments, daemon::InputSource& recording, Pa
     fmt::print("{} packets sent, stamps shifted by {} ns\n", packets.sent(), shift.value_or(Duration::zero()).count());
 }
 
-void play(const PlayArguments& arguments, const Config& config, daemon::InputSource& recording, const Capture& capture,
-          const std::function<double()>& progress) {
+void play(const PlayArguments& arguments, const Config& config, daemon::InputSource& recording,
+          const DatagramSource& source, const std::function<double()>& progress) {
   PacketSender packets(arguments.to, arguments.interface.value_or(""));
   MotionPublisher motion(config);
   wait_for_listeners(motion, config.dds);
   send_all(arguments, recording, packets, motion, progress);
-  for (const std::string& warning : capture.warnings())
+  for (const std::string& warning : source.warnings())
     warn(warning);
   if (motion.refused() > 0)
     warn(fmt::format("{} motion samples were not sent: DDS did not take them", motion.refused()));
@@ -124,7 +125,7 @@ void play_folder(const PlayArguments& arguments) {
     config = value_or_refuse(load_config(folder.config));
   config = with_options(std::move(config), arguments);
   Recording recording = open_recording(arguments, folder, config);
-  play(arguments, config, recording, recording.capture(), [&] { return recording.progress(); });
+  play(arguments, config, recording, recording.source(), [&] { return recording.progress(); });
 }
 
 /// A file, or standard input, whose length nobody knows.
@@ -136,10 +137,7 @@ void play_stream(const PlayArguments& arguments) {
       value_or_refuse(parse_config(stream.config(), arguments.capture.string() + ": config.yaml")), arguments);
   StreamRecording recording(stream, config, value_or_fail(LidarRouter::open(config.lidars), ExitStatus::wrong_usage),
                             arguments.faults);
-  const Capture& capture = stream.capture();
-  const auto total = static_cast<double>(capture.bytes_total());
-  play(arguments, config, recording, capture,
-       [&] { return total > 0 ? static_cast<double>(capture.bytes_read()) / total : 0.0; });
+  play(arguments, config, recording, stream.capture(), [&] { return stream.capture().progress(); });
   for (const std::string& file : recording.unknown_files())
     warn(fmt::format("{}: no motion source is configured for it; left out", file));
   if (recording.problem())

@@ -31,8 +31,8 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
 
   CLI::App app{"Recorded lidar packets in; odometry, map and figures out.", "locus-replay"};
   app.add_option("CAPTURE", arguments.capture,
-                 "A pcap or pcapng file, or a folder with lidar.pcap and any of imu.csv, NAME.tum, config.yaml, "
-                 "gt.tum, gt_map.ply")
+                 "A pcap or pcapng file; a ROS 1 bag; a ROS 2 bag, its folder or a .db3 file; a drive of KITTI's "
+                 "raw data; or a folder with lidar.pcap and any of imu.csv, NAME.tum, config.yaml, gt.tum, gt_map.ply")
       ->required();
   app.add_option("-o,--output", arguments.output,
                  "Folder for odometry.tum, odometry.csv, map.pcd, report.html and summary.json; made if need be")
@@ -77,6 +77,7 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   app.footer("Examples:\n"
              "  locus-replay -o out drive.pcap\n"
              "  locus-replay -c husky.yaml --imu imu.csv --odometry wio=wheels.tum -o out drive.pcap\n"
+             "  locus-replay --set motion_sources.wio.topic=/odom -o out drive.bag\n"
              "  locus-replay --set lidars.front.port=2369 --fail front:lost@10-20 -o out robot_folder/");
   if (!parse_command_line(app, argc, argv))
     return std::nullopt;

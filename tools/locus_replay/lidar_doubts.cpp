@@ -66,12 +66,11 @@ std::string not_heard(const LidarInput& lidar, const Recording& recording, const
   return line + "; check its port and address, or take it out of the configuration";
 }
 
-std::string without_datagrams(const Capture::Stats& seen) {
-  if (seen.datagrams > 0)
-    return fmt::format("none of its {} UDP datagrams lies within --start and --duration; choose another part",
-                       seen.datagrams);
-  return fmt::format("no UDP datagram in {} frames; record next to the lidar with: tcpdump -s 0 -w lidar.pcap udp",
-                     seen.frames);
+std::string without_datagrams(const DatagramSource& source) {
+  if (source.datagrams() == 0)
+    return source.why_none();
+  return fmt::format("none of its {} UDP datagrams lies within --start and --duration; choose another part",
+                     source.datagrams());
 }
 
 } // namespace
@@ -79,7 +78,7 @@ std::string without_datagrams(const Capture::Stats& seen) {
 std::string why_no_data(const Recording& recording, const LidarRouter& lidars) {
   const std::map<std::uint16_t, PortTraffic>& traffic = recording.traffic();
   if (traffic.empty())
-    return without_datagrams(recording.capture().stats());
+    return without_datagrams(recording.source());
   const auto& [port, busiest] = *std::ranges::max_element(
       traffic, {}, [](const auto& entry) { return std::pair(entry.second.data_packet_sized, entry.second.datagrams); });
   const LidarOptions& first = lidars.lidars().front().options();

@@ -45,9 +45,9 @@ void check_faults(const std::vector<Fault>& faults, const Config& config) {
   }
 }
 
-Recording::Recording(Capture capture, std::vector<MotionRecording> motion, const Config& config, LidarRouter lidars,
-                     const PlayOptions& options)
-    : capture_(std::move(capture)), lidars_(std::move(lidars)), play_for_(options.duration), head_(capture_.next()),
+Recording::Recording(std::unique_ptr<DatagramSource> source, std::vector<MotionRecording> motion, const Config& config,
+                     LidarRouter lidars, const PlayOptions& options)
+    : source_(std::move(source)), lidars_(std::move(lidars)), play_for_(options.duration), head_(source_->next()),
       capture_start_(head_ != nullptr ? head_->receive_stamp : Stamp{}), injected_(options.faults) {
   begin_ = capture_start_ + options.start;
   end_ = play_for_ ? begin_ + *play_for_ : Stamp::max();
@@ -105,7 +105,7 @@ Input Recording::next(Duration) {
 /// The next datagram of the part that is played, or nullptr for ever.
 const Datagram* Recording::read() {
   while (!capture_is_over_) {
-    const Datagram* datagram = head_ != nullptr ? std::exchange(head_, nullptr) : capture_.next();
+    const Datagram* datagram = head_ != nullptr ? std::exchange(head_, nullptr) : source_->next();
     capture_is_over_ = datagram == nullptr || datagram->receive_stamp >= end_;
     if (!capture_is_over_ && datagram->receive_stamp >= begin_)
       return datagram;
@@ -149,13 +149,12 @@ void Recording::note(const Datagram& datagram) {
   traffic.source_ip = datagram.source_ip;
   if (play_for_)
     progress_.store(to_seconds(now - begin_) / to_seconds(*play_for_), std::memory_order_relaxed);
-  else if (capture_.bytes_total() > 0)
-    progress_.store(static_cast<double>(capture_.bytes_read()) / static_cast<double>(capture_.bytes_total()),
-                    std::memory_order_relaxed);
+  else
+    progress_.store(source_->progress(), std::memory_order_relaxed);
 }
 
 std::vector<std::string> Recording::warnings() const {
-  std::vector<std::string> warnings = capture_.warnings();
+  std::vector<std::string> warnings = source_->warnings();
   for (const MotionCursor& motion : motion_) {
     const std::optional<TimeSpan> span = motion.arrivals();
     if (started_ && (!span || span->last < first_ || span->first > last_))

@@ -6,12 +6,13 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "daemon/input.hpp"
-#include "drivers/capture.hpp"
+#include "drivers/datagram_source.hpp"
 #include "drivers/fault_injection.hpp"
 #include "drivers/lidar_input.hpp"
 #include "locus_replay/motion_recordings.hpp"
@@ -44,15 +45,15 @@ struct PortTraffic {
 class Recording : public daemon::InputSource {
  public:
   /// `lidars`: to tell by port and address whose datagram a fault strikes.
-  Recording(Capture capture, std::vector<MotionRecording> motion, const Config& config, LidarRouter lidars,
-            const PlayOptions& options);
+  Recording(std::unique_ptr<DatagramSource> source, std::vector<MotionRecording> motion, const Config& config,
+            LidarRouter lidars, const PlayOptions& options);
 
   daemon::Input next(Duration timeout) override;
 
   /// Share of the recording that is over, 0..1. Any thread.
   [[nodiscard]] double progress() const { return progress_.load(std::memory_order_relaxed); }
 
-  [[nodiscard]] const Capture& capture() const { return capture_; }
+  [[nodiscard]] const DatagramSource& source() const { return *source_; }
   [[nodiscard]] const std::vector<Fault>& faults() const { return injected_; }
   /// When its first datagram came: what --start and the seconds of faults count from.
   [[nodiscard]] Stamp capture_start() const { return capture_start_; }
@@ -83,7 +84,7 @@ class Recording : public daemon::InputSource {
   void note(const Datagram& datagram);
   Pending fetch();
 
-  Capture capture_;
+  std::unique_ptr<DatagramSource> source_;
   std::vector<MotionCursor> motion_;
   LidarRouter lidars_; ///< never receives anything
   std::optional<Duration> play_for_;

@@ -13,14 +13,16 @@
 
 #include <fmt/format.h>
 
+#include "bags/bag.hpp"
 #include "config/config_yaml.hpp"
 #include "daemon/ingest.hpp"
 #include "daemon/live_pipeline.hpp"
 #include "daemon/paced_input.hpp"
 #include "daemon/sweep_processor.hpp"
+#include "kitti/kitti_drive.hpp"
 #include "locus_replay/arguments.hpp"
 #include "locus_replay/failure.hpp"
-#include "locus_replay/motion_recordings.hpp"
+#include "locus_replay/recorded_input.hpp"
 #include "locus_replay/recording.hpp"
 #include "locus_replay/results.hpp"
 #include "locus_replay/say.hpp"
@@ -59,11 +61,24 @@ Config configuration(const std::filesystem::path& file, const std::vector<std::s
   return config;
 }
 
+bool is_all_in_one(const std::filesystem::path& where) { return looks_like_bag(where) || KittiDrive::is(where); }
+
 /// Results in the folder of a recording would be taken for its files by the next run.
 void check_output(const std::filesystem::path& folder) {
-  if (std::filesystem::is_directory(folder) && CaptureFolder::find(folder))
+  if (std::filesystem::is_directory(folder) && (CaptureFolder::find(folder) || is_all_in_one(folder)))
     throw Failure(ExitStatus::wrong_usage,
                   fmt::format("-o {}: holds a recording; choose another folder for the results", folder.string()));
+}
+
+/// The files of a capture folder; a bag or a drive of KITTI has all in one.
+CaptureFolder find_files(const std::filesystem::path& capture) {
+  Expected<CaptureFolder, std::string> folder = CaptureFolder::find(capture);
+  if (!folder && is_all_in_one(capture)) {
+    CaptureFolder all;
+    all.lidar = capture;
+    return all;
+  }
+  return value_or_fail(std::move(folder), ExitStatus::failed);
 }
 
 /// As fast as the machine can; the same bits on every run.
@@ -111,22 +126,23 @@ void replay_live(const Config& config, LidarRouter lidars, Recording& recording,
 
 void run(const Arguments& arguments, const SweepStage& stage) {
   const MachineTime begin = MachineTime::now();
-  const CaptureFolder folder = value_or_fail(CaptureFolder::find(arguments.capture), ExitStatus::failed);
+  const CaptureFolder folder = find_files(arguments.capture);
   check_output(arguments.output);
   const std::filesystem::path& config_file = arguments.config.empty() ? folder.config : arguments.config;
   const Config config = configuration(config_file, arguments.overrides);
   check_faults(arguments.faults, config);
   LidarRouter lidars = value_or_fail(LidarRouter::open(config.lidars), ExitStatus::wrong_usage);
 
-  Capture capture = value_or_fail(Capture::open(folder.lidar), ExitStatus::failed);
   std::vector<std::string> warnings;
-  std::vector<MotionRecording> motion = read_motion(arguments, folder, config, !config_file.empty(), warnings);
+  RecordedInput input = open_input(arguments, folder, config, !config_file.empty(), warnings);
   for (const std::string& warning : warnings)
     say("warning: " + warning);
+  if (!input.taken.empty() && !arguments.quiet)
+    fmt::print("{}\n", input.taken);
 
-  Truth truth(arguments, folder);
+  Truth truth(arguments, folder, std::move(input.truth));
   const PlayOptions options{arguments.start, arguments.duration, arguments.faults, config.sweep.seed};
-  Recording recording(std::move(capture), std::move(motion), config, lidars, options);
+  Recording recording(std::move(input.lidars), std::move(input.motion), config, lidars, options);
   Results results(arguments, config, recording, std::move(truth), begin);
   if (arguments.realtime_speed)
     replay_live(config, std::move(lidars), recording, *arguments.realtime_speed, results);

@@ -10,11 +10,14 @@
 
 namespace locus::tools {
 
-Truth::Truth(const Arguments& arguments, const CaptureFolder& folder)
+Truth::Truth(const Arguments& arguments, const CaptureFolder& folder, std::vector<StampedPose> recorded)
     : trajectory_file_(arguments.ground_truth.empty() ? folder.ground_truth : arguments.ground_truth),
-      map_file_(arguments.map_truth.empty() ? folder.map_truth : arguments.map_truth) {
+      map_file_(arguments.map_truth.empty() ? folder.map_truth : arguments.map_truth),
+      trajectory_(std::move(recorded)) {
   if (!trajectory_file_.empty())
     trajectory_ = value_or_fail(read_trajectory(trajectory_file_), ExitStatus::failed);
+  else
+    trajectory_file_ = arguments.capture; // for what is to be said of the recorded ones
   if (!map_file_.empty())
     map_ = value_or_fail(PointCloudFile::open(map_file_), ExitStatus::failed);
 }

@@ -20,8 +20,9 @@ namespace locus::tools {
 /// The truth that the user or the folder gave, and what of a run is compared with it. One owner.
 class Truth {
  public:
-  /// Reads the poses and looks at the map, so that what is wrong with them is known before the run. Throws Failure.
-  Truth(const Arguments& arguments, const CaptureFolder& folder);
+  /// Reads the poses and looks at the map, so that what is wrong with them is known before the run. `recorded`: the
+  /// poses where there is no file. Throws Failure.
+  Truth(const Arguments& arguments, const CaptureFolder& folder, std::vector<StampedPose> recorded);
 
   void take(const OdometryEstimate& estimate);
 

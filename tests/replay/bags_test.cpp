@@ -1,0 +1,407 @@
+// SPDX-License-Identifier: Apache-2.0
+// Bags of ROS 1 and ROS 2 in place of a capture.
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <numeric>
+
+#include <gtest/gtest.h>
+
+#include "bag_writer.hpp"
+#include "bags/bag.hpp"
+#include "bags/messages.hpp"
+#include "daemon/dds/ros_messages.hpp"
+#include "support/errors.hpp"
+#include "synthetic_robot.hpp"
+
+namespace locus::test {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+const std::vector<RecordedMessage>& room_messages(RosVersion ros) {
+  static const std::vector<RecordedMessage> ros1 = messages_of(room_drive(), RosVersion::ros1),
+                                            ros2 = messages_of(room_drive(), RosVersion::ros2);
+  return ros == RosVersion::ros1 ? ros1 : ros2;
+}
+
+void write_text(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream{file, std::ios::binary} << text;
+}
+
+/// Of the same room drive. A capture has position packets too, which a bag has not, so times are told by reception.
+Replay replay_room(const std::string& capture, std::vector<std::string> arguments = {}) {
+  arguments.insert(arguments.end(), {"-c", room_drive() / "config.yaml", "--set", "lidars.0.time=receive", capture});
+  return Replay(arguments);
+}
+
+/// But for rounding: a quaternion that was normalised is normalised once more on its way through a message.
+void expect_same_odometry(const Replay& replay) {
+  static const std::vector<StampedPose> of_capture = replay_room(room_drive()).trajectory();
+  ASSERT_EQ(replay.run().status, 0) << replay.run().err;
+  const std::vector<StampedPose> trajectory = replay.trajectory();
+  ASSERT_EQ(trajectory.size(), of_capture.size());
+  for (std::size_t i = 0; i < trajectory.size(); ++i) {
+    EXPECT_EQ(trajectory[i].stamp, of_capture[i].stamp);
+    const Pose &pose = trajectory[i].T_source_base, &expected = of_capture[i].T_source_base;
+    EXPECT_LT((pose.translation - expected.translation).norm(), 1e-9);
+    EXPECT_LT(pose.rotation.angularDistance(expected.rotation), 1e-7) << "acos near 1";
+  }
+}
+
+void expect_line(const std::string& text, const std::vector<std::string>& parts) {
+  for (const std::string& part : parts)
+    EXPECT_NE(text.find(part), std::string::npos) << "no '" << part << "' in: " << text;
+}
+
+TEST(Bags, Ros1BagGivesTheOdometryOfTheCapture) {
+  const TemporaryFolder folder;
+  write_text(folder / "drive.bag", ros1_bag(room_messages(RosVersion::ros1)));
+  const Replay replay = replay_room(folder / "drive.bag");
+  expect_same_odometry(replay);
+  expect_line(replay.run().out,
+              {"/2368/velodyne_packets is lidar front", "/imu/data is imu", "/wheel_odometry is wio"});
+}
+
+TEST(Bags, PacketsAloneGiveTheSameBits) {
+  const TemporaryFolder folder;
+  std::vector<RecordedMessage> scans = room_messages(RosVersion::ros1);
+  std::erase_if(scans, [](const RecordedMessage& message) { return !message.topic.ends_with("packets"); });
+  write_text(folder / "drive.bag", ros1_bag(scans));
+  const Replay bag({folder / "drive.bag"});
+  const Replay capture({"--set", "lidars.0.time=receive", room_drive() / "lidar.pcap"});
+  EXPECT_EQ(bag.run().err, "");
+  EXPECT_EQ(read_text(bag.file("odometry.csv")), read_text(capture.file("odometry.csv")));
+  EXPECT_EQ(read_text(bag.file("odometry.tum")), read_text(capture.file("odometry.tum")));
+}
+
+TEST(Bags, Ros2BagGivesTheOdometryOfTheCapture) {
+  const TemporaryFolder folder;
+  write_db3(folder / "drive_0.db3", room_messages(RosVersion::ros2));
+  expect_same_odometry(replay_room(folder / "drive_0.db3"));
+}
+
+TEST(Bags, Ros2FolderIsReadInTheOrderOfItsMetadata) {
+  const TemporaryFolder folder;
+  const std::span<const RecordedMessage> messages = room_messages(RosVersion::ros2);
+  write_db3(folder / "b.db3", messages.first(messages.size() / 3));
+  write_db3(folder / "a.db3", messages.subspan(messages.size() / 3));
+  write_text(folder / "metadata.yaml", "rosbag2_bagfile_information:\n  storage_identifier: sqlite3\n"
+                                       "  relative_file_paths:\n    - drive/b.db3\n    - a.db3\n"
+                                       "  compression_format: \"\"\n  compression_mode: \"\"\n");
+  expect_same_odometry(replay_room(folder.path()));
+}
+
+TEST(Bags, BagOfTwoLidarsGivesTheirPacketsInTheOrderOfReception) {
+  const TemporaryFolder folder;
+  write_room_drive(folder / "capture", seconds{3}, 2);
+  std::vector<RecordedMessage> messages = messages_of(folder / "capture", RosVersion::ros1);
+  for (RecordedMessage& message : messages) {
+    if (message.topic.starts_with("/236"))
+      message.topic = message.topic.starts_with("/2368") ? "/front/velodyne_packets" : "/rear/velodyne_packets";
+  }
+  write_text(folder / "drive.bag", ros1_bag(messages));
+  const std::vector<std::string> options{"-c",    folder / "capture/config.yaml", "--set", "lidars.front.time=receive",
+                                         "--set", "lidars.rear.time=receive"};
+  const auto odometry = [&](const std::string& capture) {
+    std::vector<std::string> arguments = options;
+    arguments.push_back(capture);
+    const Replay replay(arguments);
+    EXPECT_EQ(replay.run().err, "");
+    EXPECT_EQ(replay.summary()["packets"]["rear"]["lost"], 0);
+    return replay.trajectory();
+  };
+  const std::vector<StampedPose> of_bag = odometry(folder / "drive.bag"), of_capture = odometry(folder / "capture");
+  ASSERT_EQ(of_bag.size(), of_capture.size());
+  for (std::size_t i = 0; i < of_bag.size(); ++i)
+    EXPECT_LT((of_bag[i].T_source_base.translation - of_capture[i].T_source_base.translation).norm(), 1e-9) << i;
+}
+
+TEST(Bags, OnlyTopicOfAKindIsTakenWhateverItsName) {
+  const TemporaryFolder folder;
+  std::vector<RecordedMessage> messages = room_messages(RosVersion::ros1);
+  for (RecordedMessage& message : messages)
+    message.topic = message.topic == "/imu/data" ? "/mti/sensor" : message.topic == "/wheel_odometry" ? "/odom" : "/v";
+  write_text(folder / "drive.bag", ros1_bag(messages));
+  const Replay replay = replay_room(folder / "drive.bag");
+  expect_same_odometry(replay);
+  expect_line(replay.run().out, {"/v is lidar front", "/mti/sensor is imu", "/odom is wio"});
+}
+
+TEST(Bags, TopicIsNotGuessedAmongSeveral) {
+  const TemporaryFolder folder;
+  std::vector<RecordedMessage> messages = room_messages(RosVersion::ros1);
+  for (std::size_t i = 0; i < messages.size(); ++i) {
+    if (messages[i].topic == "/wheel_odometry")
+      messages[i].topic = i % 2 == 0 ? "/odom_a" : "/odom_b";
+  }
+  write_text(folder / "drive.bag", ros1_bag(messages));
+  const Replay doubtful = replay_room(folder / "drive.bag", {"--duration", "2"});
+  EXPECT_EQ(doubtful.run().status, 0);
+  expect_line(doubtful.run().err, {"motion source wio", "/odom_a", "/odom_b", "--set motion_sources.wio.topic="});
+  const Replay told =
+      replay_room(folder / "drive.bag", {"--duration", "2", "--set", "motion_sources.wio.topic=/odom_b"});
+  EXPECT_EQ(told.run().err, "");
+  expect_line(told.run().out, {"/odom_b is wio", "left out: /odom_a"});
+}
+
+TEST(Bags, FileThatTheUserNamesTakesThePlaceOfATopic) {
+  const TemporaryFolder folder;
+  write_text(folder / "drive.bag", ros1_bag(room_messages(RosVersion::ros1)));
+  const Replay replay = replay_room(folder / "drive.bag", {"--imu", room_drive() / "imu.csv"});
+  expect_same_odometry(replay);
+  expect_line(replay.run().out, {"left out: /imu/data"});
+}
+
+/// As rosbag itself wrote them with the messages' own Python code, the chunks left plain or compressed.
+class BagOfRosbag : public testing::TestWithParam<const char*> {};
+
+TEST_P(BagOfRosbag, IsReadFieldByField) {
+  const auto bag = tools::open_bag(std::filesystem::path(LOCUS_TEST_BAGS) / GetParam());
+  ASSERT_TRUE(bag) << bag.error();
+  std::array<std::int64_t, 3> seen{};
+  while (const tools::BagMessage* message = (*bag)->next()) {
+    const tools::BagTopic& topic = (*bag)->topics()[message->topic];
+    const tools::MessageReader reader(message->data, tools::Serialisation::ros1);
+    const std::int64_t since_start_ns = to_ns(message->recorded) - 1'700'000'000'000'000'000;
+    if (topic.type == tools::kImuType) {
+      const std::int64_t k = seen[0]++;
+      const ImuSample imu = daemon::to_sample(tools::read_imu(reader).value(), message->recorded);
+      EXPECT_EQ(topic.name, "/imu/data");
+      EXPECT_EQ(since_start_ns, 2000 * k + 500);
+      EXPECT_EQ(to_ns(imu.stamp), 1'700'000'000'000'000'001 + 1000 * k);
+      EXPECT_EQ(imu.angular_velocity_radps, Eigen::Vector3d(0.1 + static_cast<double>(k), 0.2, 0.3));
+      EXPECT_EQ(imu.specific_force_mps2, Eigen::Vector3d(1, 2, 9.81));
+      EXPECT_EQ(imu.attitude.has_value(), k < 2) << "the last one says that it has none";
+    } else if (topic.type == tools::kOdometryType) {
+      const std::int64_t k = seen[1]++;
+      const auto odometry = tools::read_odometry(reader).value();
+      EXPECT_EQ(since_start_ns, 5000 * k + 700);
+      EXPECT_EQ(odometry.pose_.pose_.position_.x_, 1.5 + static_cast<double>(k));
+      EXPECT_EQ(odometry.pose_.pose_.position_.z_, 0.25);
+      EXPECT_EQ(odometry.pose_.pose_.orientation_.z_, 1.0);
+      EXPECT_EQ(odometry.twist_.covariance_[0], 0.5);
+    } else if (topic.type == tools::kVelodyneScanType) {
+      const std::int64_t k = seen[2]++;
+      const auto scan = tools::read_velodyne_scan(reader).value();
+      ASSERT_EQ(scan.packets.size(), 2U);
+      EXPECT_EQ(to_ns(scan.packets[1].stamp), 1'700'000'000'001'327'000 + 100'000'000 * k);
+      EXPECT_EQ(scan.packets[1].payload.back(), std::byte{2});
+    }
+  }
+  EXPECT_EQ(seen, (std::array<std::int64_t, 3>{3, 3, 3}));
+  EXPECT_TRUE((*bag)->warnings().empty());
+}
+INSTANTIATE_TEST_SUITE_P(Compression, BagOfRosbag, testing::Values("none.bag", "lz4.bag", "bz2.bag"));
+
+/// Whatever byte of a bag is another one, reading it ends, and with no more messages than there were.
+void expect_damage_is_borne(const std::string& bytes, const std::string& name, int messages) {
+  const TemporaryFolder folder;
+  for (std::size_t at = 0; at < bytes.size(); at += at < 6000 ? 11 : 37) {
+    std::string damaged = bytes;
+    damaged[at] = static_cast<char>(~damaged[at]);
+    write_text(folder / name, damaged);
+    const auto bag = tools::open_bag(folder / name);
+    int read = 0;
+    while (const tools::BagMessage* message = bag ? (*bag)->next() : nullptr) {
+      ++read;
+      const tools::MessageReader reader(message->data, (*bag)->serialisation());
+      static_cast<void>(tools::read_imu(reader));
+      static_cast<void>(tools::read_odometry(reader));
+      static_cast<void>(tools::read_velodyne_scan(reader));
+    }
+    EXPECT_LE(read, messages) << "byte " << at;
+  }
+}
+
+TEST_P(BagOfRosbag, DamageNeverHangsNorCrashes) {
+  expect_damage_is_borne(read_text(std::filesystem::path(LOCUS_TEST_BAGS) / GetParam()), "damaged.bag", 9);
+}
+
+TEST(Bags, DamageOfADatabaseNeverHangsNorCrashes) {
+  const TemporaryFolder folder;
+  std::vector<RecordedMessage> messages;
+  for (int i = 0; i < 60; ++i)
+    messages.push_back({"/imu/data", "sensor_msgs/Imu", stamp_from_ns(i), imu_message({}, RosVersion::ros2)});
+  write_db3(folder / "whole.db3", messages);
+  expect_damage_is_borne(read_text(folder / "whole.db3"), "damaged.db3", 60);
+}
+
+/// A recorder that was killed leaves a bag without index, and often with half a chunk at its end.
+TEST(Bags, BagWithoutIndexIsReadToItsEnd) {
+  const TemporaryFolder folder;
+  write_text(folder / "drive.bag.active", ros1_bag(room_messages(RosVersion::ros1), BagEnd::without_index));
+  const Replay replay = replay_room(folder / "drive.bag.active");
+  EXPECT_EQ(replay.run().status, 0);
+  expect_line(replay.run().err, {"warning: ", "drive.bag.active", "no index", "rosbag reindex"});
+  expect_same_odometry(replay);
+}
+
+TEST(Bags, BagThatBreaksOffIsReadUpToThere) {
+  const TemporaryFolder folder;
+  std::string bytes = ros1_bag(room_messages(RosVersion::ros1));
+  bytes.resize(bytes.size() / 2);
+  write_text(folder / "cut.bag", bytes);
+  const Replay replay = replay_room(folder / "cut.bag");
+  EXPECT_EQ(replay.run().status, 0);
+  ASSERT_EQ(lines_of(replay.run().err).size(), 1U) << replay.run().err;
+  expect_line(replay.run().err, {"warning: ", "cut.bag: byte ", "ends in mid-record"});
+  EXPECT_NEAR(static_cast<double>(replay.trajectory().size()), 40, 2);
+}
+
+TEST(Bags, DatabaseThatBreaksOffIsReadUpToThere) {
+  const TemporaryFolder folder;
+  write_db3(folder / "cut.db3", room_messages(RosVersion::ros2));
+  std::filesystem::resize_file(folder / "cut.db3", std::filesystem::file_size(folder / "cut.db3") / 2);
+  const Replay replay = replay_room(folder / "cut.db3");
+  EXPECT_EQ(replay.run().status, 0);
+  ASSERT_EQ(lines_of(replay.run().err).size(), 1U) << replay.run().err;
+  expect_line(replay.run().err, {"warning: ", "cut.db3: message ", "breaks off or is damaged"});
+  EXPECT_NEAR(static_cast<double>(replay.trajectory().size()), 40, 10);
+}
+
+class BadBag : public testing::Test {
+ protected:
+  /// One line on stderr that says so.
+  void expect_refused(const std::string& name, const std::vector<std::string>& said) {
+    const ProgramRun run = run_program(LOCUS_REPLAY, {"-o", folder_ / "out", folder_ / name});
+    EXPECT_EQ(run.status, 1) << run.err;
+    EXPECT_EQ(lines_of(run.err).size(), 1U) << run.err;
+    expect_line(run.err, {name});
+    expect_line(run.err, said);
+  }
+  void expect_refused(const std::string& name, const std::string& content, const std::vector<std::string>& said) {
+    write_text(folder_ / name, content);
+    expect_refused(name, said);
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(BadBag, Empty) {
+  expect_refused("a.bag", "", {"empty"});
+  expect_refused("a.db3", "", {"empty"});
+}
+
+TEST_F(BadBag, WrongMagic) {
+  expect_refused("a.bag", "hello, I am a text", {"not a ROS 1 bag"});
+  expect_refused("a.db3", "hello, I am a text", {"not a ROS 2 bag"});
+  expect_refused("a.bag", "#ROSBAG V1.2\nand so on", {"format", "rosbag"});
+  expect_refused("a.mcap", "\x89MCAP0\r\n", {"MCAP", "ros2 bag convert"});
+}
+
+TEST_F(BadBag, HeaderWithAbsurdLengths) {
+  for (const char* const length : {"\xFF\xFF\xFF\xFF", "\xFF\xFF\xFF\x0F", "\x10\0\0\0"})
+    expect_refused("a.bag", "#ROSBAG V2.0\n" + std::string(length, 4) + std::string(100, '\x7F'), {"header"});
+  expect_refused("a.bag", "#ROSBAG V2.0\n", {"header"});
+}
+
+TEST_F(BadBag, DatabaseOfSomethingElse) {
+  write_db3(folder_ / "a.db3", {}, "cdr");
+  expect_refused("a.db3", {"no velodyne_msgs/VelodyneScan in it, but no topics"});
+  std::string bytes = read_text(folder_ / "a.db3");
+  for (std::size_t i = 100; i < bytes.size(); ++i)
+    bytes[i] = static_cast<char>(bytes[i] + 1);
+  expect_refused("b.db3", bytes, {"not a ROS 2 bag, or damaged"});
+}
+
+TEST_F(BadBag, CompressedOrOtherwiseSerialisedRos2Bag) {
+  RecordedMessage message = room_messages(RosVersion::ros2).front();
+  write_db3(folder_ / "flat.db3", std::vector{message}, "flatbuffers");
+  expect_refused("flat.db3", {"flatbuffers"});
+  message.data = {std::byte{0x28}, std::byte{0xB5}, std::byte{0x2F}, std::byte{0xFD}, std::byte{}};
+  write_db3(folder_ / "a.db3", std::vector{message});
+  expect_refused("a.db3", {"zstd", "ros2 bag convert"});
+}
+
+TEST_F(BadBag, Ros2FolderThatIsNotWhole) {
+  const auto metadata = [&](const std::string& text) {
+    std::filesystem::create_directories(folder_ / "drive");
+    write_text(folder_ / "drive/metadata.yaml", "rosbag2_bagfile_information:\n" + text);
+  };
+  metadata("  relative_file_paths: [drive_0.db3]\n");
+  expect_refused("drive", {"drive_0.db3", "no such file"});
+  metadata("  relative_file_paths: [drive_0.db3.zstd]\n  compression_format: zstd\n");
+  expect_refused("drive", {"compressed with zstd", "ros2 bag convert"});
+  metadata("  storage_identifier: mcap\n  relative_file_paths: [drive_0.mcap]\n");
+  expect_refused("drive", {"mcap", "ros2 bag convert"});
+  metadata("  relative_file_paths: 7\n");
+  expect_refused("drive", {"metadata.yaml", "ros2 bag reindex"});
+  metadata("  {{{\n");
+  expect_refused("drive", {"metadata.yaml", "ros2 bag reindex"});
+}
+
+TEST_F(BadBag, WithoutLidarSaysWhatIsInIt) {
+  std::vector<RecordedMessage> messages = room_messages(RosVersion::ros1);
+  std::erase_if(messages, [](const RecordedMessage& m) { return m.topic.ends_with("packets"); });
+  messages.push_back({"/points_raw", "sensor_msgs/PointCloud2", messages.back().recorded, {}});
+  expect_refused(
+      "a.bag", ros1_bag(messages),
+      {"no velodyne_msgs/VelodyneScan", "/imu/data (sensor_msgs/Imu)", "/points_raw (sensor_msgs/PointCloud2)"});
+}
+
+TEST_F(BadBag, ScansThatAreCutShort) {
+  std::vector<RecordedMessage> messages{
+      *std::ranges::find(room_messages(RosVersion::ros1), "velodyne_msgs/VelodyneScan", &RecordedMessage::type)};
+  messages.front().data.resize(2000);
+  write_text(folder_ / "a.bag", ros1_bag(messages));
+  const ProgramRun run = run_program(LOCUS_REPLAY, {"-o", folder_ / "out", folder_ / "a.bag"});
+  EXPECT_EQ(run.status, 1);
+  expect_line(run.err, {"1 of 1 messages", "cut short", "no whole packet in 1 messages"});
+}
+
+/// What a message claims is never believed beyond its end.
+TEST(BagMessages, AbsurdCountsAndEveryCutAreNoMessage) {
+  for (const RosVersion ros : {RosVersion::ros1, RosVersion::ros2}) {
+    const auto serialisation = ros == RosVersion::ros1 ? tools::Serialisation::ros1 : tools::Serialisation::cdr;
+    const ReceivedPacket packet{stamp_from_ns(5), std::vector<std::byte>(1206)};
+    const std::vector<std::byte> scan = scan_message({&packet, 1}, ros), imu = imu_message({}, ros),
+                                 odometry = odometry_message({}, ros);
+    ASSERT_TRUE(tools::read_velodyne_scan({scan, serialisation}));
+    ASSERT_TRUE(tools::read_imu({imu, serialisation}));
+    ASSERT_TRUE(tools::read_odometry({odometry, serialisation}));
+    for (std::size_t length = 0; length < scan.size(); ++length)
+      EXPECT_FALSE(tools::read_velodyne_scan({std::span(scan).first(length), serialisation})) << length;
+    for (std::size_t length = 0; length < imu.size(); ++length)
+      EXPECT_FALSE(tools::read_imu({std::span(imu).first(length), serialisation})) << length;
+    for (std::size_t length = 0; length < odometry.size(); ++length)
+      EXPECT_FALSE(tools::read_odometry({std::span(odometry).first(length), serialisation})) << length;
+    for (std::size_t at = 0; at + 4 < scan.size() - packet.payload.size(); ++at) {
+      std::vector<std::byte> absurd = scan;
+      std::fill_n(absurd.begin() + static_cast<std::ptrdiff_t>(at), 4, std::byte{0xFF});
+      static_cast<void>(tools::read_velodyne_scan({absurd, serialisation}));
+    }
+  }
+}
+
+/// Stamps that nobody set, of another clock, and numbers that are none: what a robot's bag may hold.
+TEST(Bags, StampsOfAnotherClockAndNanAreBorne) {
+  const TemporaryFolder folder;
+  std::vector<RecordedMessage> messages = room_messages(RosVersion::ros1);
+  for (RecordedMessage& message : messages)
+    message.recorded += std::chrono::hours{24 * 365}; // played back and recorded again, a year later
+  write_text(folder / "again.bag", ros1_bag(messages));
+  expect_same_odometry(replay_room(folder / "again.bag"));
+
+  messages = room_messages(RosVersion::ros1);
+  for (std::size_t i = 0; i < messages.size(); ++i) {
+    if (messages[i].type != "sensor_msgs/Imu" || i % 3 != 0)
+      continue;
+    ImuSample sample;
+    sample.stamp = i % 2 == 0 ? Stamp{} : messages[i].recorded - seconds{1};
+    sample.angular_velocity_radps.x() = std::numeric_limits<double>::quiet_NaN();
+    messages[i].data = imu_message(sample, RosVersion::ros1);
+  }
+  std::reverse(messages.begin() + 100, messages.begin() + 300);
+  write_text(folder / "wild.bag", ros1_bag(messages));
+  const Replay replay = replay_room(folder / "wild.bag");
+  EXPECT_EQ(replay.run().status, 0) << replay.run().err;
+  EXPECT_GT(replay.trajectory().size(), 70U);
+  EXPECT_GT(replay.summary()["sources"]["imu"]["rejected"]["nan"], 0);
+}
+
+} // namespace
+} // namespace locus::test

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bags/ros1_record.hpp"
+
+#include <memory>
+
+#include <bzlib.h>
+#include <fmt/format.h>
+#include <lz4frame.h>
+
+namespace locus::tools {
+namespace {
+
+using Bytes = std::span<const std::byte>;
+
+/// A length, and as many bytes behind it.
+std::optional<Bytes> take_block(Bytes& bytes) {
+  std::uint32_t length = 0;
+  if (bytes.size() < sizeof(length))
+    return std::nullopt;
+  std::memcpy(&length, bytes.data(), sizeof(length));
+  if (length > bytes.size() - sizeof(length))
+    return std::nullopt;
+  const Bytes block = bytes.subspan(sizeof(length), length);
+  bytes = bytes.subspan(sizeof(length) + length);
+  return block;
+}
+
+bool decompress_bzip2(Bytes in, std::span<std::byte> out) {
+  std::vector<char> source(in.size()); // bzip2 knows no const
+  std::memcpy(source.data(), in.data(), in.size());
+  auto size = static_cast<unsigned>(out.size());
+  return BZ2_bzBuffToBuffDecompress(reinterpret_cast<char*>(out.data()), &size, source.data(),
+                                    static_cast<unsigned>(source.size()), 0, 0) == BZ_OK &&
+         size == out.size();
+}
+
+bool decompress_lz4(Bytes in, std::span<std::byte> out) {
+  LZ4F_dctx* made = nullptr;
+  if (LZ4F_isError(LZ4F_createDecompressionContext(&made, LZ4F_VERSION)) != 0)
+    return false;
+  const std::unique_ptr<LZ4F_dctx, decltype([](LZ4F_dctx* c) { LZ4F_freeDecompressionContext(c); })> context(made);
+  std::size_t hint = 1;
+  while (hint != 0 && !in.empty()) {
+    std::size_t read = in.size(), written = out.size();
+    hint = LZ4F_decompress(context.get(), out.data(), &written, in.data(), &read, nullptr);
+    if (LZ4F_isError(hint) != 0 || (read == 0 && written == 0))
+      return false;
+    in = in.subspan(read);
+    out = out.subspan(written);
+  }
+  return hint == 0 && out.empty();
+}
+
+} // namespace
+
+std::string_view BagFields::text(std::string_view name) const {
+  Bytes left = bytes_;
+  while (const std::optional<Bytes> field = take_block(left)) {
+    const std::string_view text(reinterpret_cast<const char*>(field->data()), field->size());
+    if (text.size() > name.size() && text.starts_with(name) && text[name.size()] == '=')
+      return text.substr(name.size() + 1);
+  }
+  return {};
+}
+
+std::optional<BagOp> BagFields::op() const {
+  const auto value = number<std::uint8_t>("op");
+  return value ? std::optional(static_cast<BagOp>(*value)) : std::nullopt;
+}
+
+std::optional<BagRecord> take_record(Bytes& bytes) {
+  const std::optional<Bytes> header = take_block(bytes);
+  const std::optional<Bytes> data = header ? take_block(bytes) : std::nullopt;
+  if (!data || !BagFields(*header).op())
+    return std::nullopt;
+  return BagRecord{BagFields(*header), *data};
+}
+
+std::optional<std::string> decompress_chunk(const BagRecord& chunk, std::vector<std::byte>& out) {
+  const std::string_view compression = chunk.fields.text("compression");
+  const auto size = chunk.fields.number<std::uint32_t>("size");
+  if (!size || *size > kMaxBlockBytes)
+    return fmt::format("a chunk of {} bytes", size ? std::to_string(*size) : "no");
+  out.resize(*size);
+  bool good = false;
+  if (compression == "none") {
+    good = chunk.data.size() == out.size();
+    out.assign(chunk.data.begin(), chunk.data.end());
+  } else if (compression == "lz4") {
+    good = decompress_lz4(chunk.data, out);
+  } else if (compression == "bz2") {
+    good = decompress_bzip2(chunk.data, out);
+  } else {
+    return fmt::format("a chunk compressed by \"{}\"; none, lz4 and bz2 are read", compression.substr(0, 20));
+  }
+  return good ? std::nullopt : std::optional<std::string>("a chunk is damaged");
+}
+
+} // namespace locus::tools

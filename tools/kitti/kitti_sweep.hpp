@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/lidar_packet.hpp"
+
+namespace locus::tools {
+
+/// As it lies in a .bin of KITTI: in the frame of the lidar, x forward, y left, z up.
+struct KittiPoint {
+  float x_m, y_m, z_m;
+  float reflectance; ///< 0..1
+};
+
+/// Makes packets again of a sweep of KITTI's HDL-64E: a turn that begins at the rear and goes clockwise, at one speed.
+///
+/// A point has no time and no ring in the file. Its time follows from its azimuth; its ring from the order of the
+/// points, which lie ring by ring from the highest down, in each counter-clockwise from the front. One owner; memory is
+/// used again from sweep to sweep.
+class KittiSweep {
+ public:
+  /// More than the lidar can fire.
+  static constexpr std::size_t kMaxPoints = 200'000;
+
+  /// Begins with the packets of these points; those that are not finite or at zero range are left out. False if the
+  /// points are not in that order, and nothing is begun. Precondition: at most kMaxPoints; start < end.
+  bool begin(std::span<const KittiPoint> points, Stamp start, Stamp end);
+
+  /// The next packet, valid until the next call; nullptr after the last of the sweep. Packets may be empty.
+  const LidarPacket* next();
+
+ private:
+  static constexpr std::size_t kRings = 64;
+  static constexpr std::size_t kColumns = 4000; ///< twice as many as it fires, so that two points seldom meet in one
+  static constexpr std::size_t kSalvosPerColumn = kRings / Salvo::kLasers;
+  static constexpr std::size_t kColumnsPerPacket = LidarPacket::kMaxSalvos / kSalvosPerColumn;
+
+  struct Return {
+    KittiPoint point;
+    double turned;    ///< share of the turn, 0..1
+    std::size_t ring; ///< counted as they lie in the file
+  };
+
+  bool find_rings(std::span<const KittiPoint> points);
+  void fill(std::size_t column, std::size_t bank, Salvo& salvo) const;
+
+  std::vector<Return> returns_;
+  std::size_t rings_ = 0;            ///< that were seen
+  std::vector<std::uint32_t> cells_; ///< by column and ring: the place in returns_ plus one, or 0
+  Stamp start_, end_;
+  std::size_t column_ = kColumns;
+  LidarPacket packet_;
+};
+
+} // namespace locus::tools

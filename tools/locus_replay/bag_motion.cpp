@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_replay/bag_motion.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "bags/messages.hpp"
+#include "daemon/dds/ros_messages.hpp"
+
+namespace locus::tools {
+namespace {
+
+Stamp arrival_of(Stamp stamp, Stamp recorded) {
+  constexpr Duration kLongestDelay = std::chrono::seconds{10};
+  return std::chrono::abs(recorded - stamp) > kLongestDelay ? stamp : recorded;
+}
+
+/// Gathers the samples of one topic.
+class MotionTopic {
+ public:
+  MotionTopic(std::size_t source, std::size_t topic, BagTopic name)
+      : source_(source), topic_(topic), name_(std::move(name)) {}
+
+  [[nodiscard]] std::size_t topic() const { return topic_; }
+
+  void take(const BagMessage& message, MessageReader reader) {
+    if (name_.type == kImuType)
+      keep(
+          read_imu(reader), imu_, [&](const auto& imu) { return daemon::to_sample(imu, message.recorded); }, message);
+    else
+      keep(
+          read_odometry(reader), odometry_,
+          [&](const auto& odometry) { return daemon::to_sample(odometry, message.recorded, usual_); }, message);
+  }
+
+  [[nodiscard]] MotionRecording recording(const std::filesystem::path& file) && {
+    const std::filesystem::path place = fmt::format("{}: {}", file.string(), name_.name);
+    if (name_.type == kImuType)
+      return {source_, place, in_order(std::move(imu_))};
+    return {source_, place, in_order(std::move(odometry_))};
+  }
+
+  /// What to say of messages that could not be read; empty if all could.
+  [[nodiscard]] std::string problem(const std::filesystem::path& file) const {
+    return malformed_ == 0 ? ""
+                           : fmt::format("{}: {} messages on {} are cut short or no {} and were left out; record again "
+                                         "if it matters",
+                                         file.string(), malformed_, name_.name, name_.type);
+  }
+
+ private:
+  template <class Message, class Sample, class Convert>
+  void keep(const std::optional<Message>& read, std::vector<Sample>& samples, const Convert& convert,
+            const BagMessage& message) {
+    if (!read) {
+      ++malformed_;
+      return;
+    }
+    Sample sample = convert(*read);
+    sample.stamp = stamp_or(message.recorded, sample.stamp);
+    sample.arrival = arrival_of(sample.stamp, message.recorded);
+    samples.push_back(std::move(sample));
+  }
+
+  template <class Sample> static MotionSamples<Sample> in_order(std::vector<Sample> samples) {
+    std::ranges::stable_sort(samples, {}, &Sample::arrival);
+    return MotionSamples<Sample>(std::move(samples));
+  }
+
+  std::size_t source_, topic_;
+  BagTopic name_;
+  std::vector<ImuSample> imu_;
+  std::vector<OdometrySample> odometry_;
+  daemon::UsualCovariance usual_;
+  std::uint64_t malformed_ = 0;
+};
+
+} // namespace
+
+std::vector<MotionRecording> read_bag_motion(Bag& bag, const std::filesystem::path& file,
+                                             const std::vector<std::optional<std::size_t>>& topic_of_source,
+                                             std::vector<std::string>& warnings) {
+  std::vector<MotionTopic> motion;
+  for (std::size_t source = 0; source < topic_of_source.size(); ++source) {
+    if (const auto topic = topic_of_source[source])
+      motion.emplace_back(source, *topic, bag.topics()[*topic]);
+  }
+  while (const BagMessage* message = motion.empty() ? nullptr : bag.next()) {
+    const auto found = std::ranges::find(motion, message->topic, &MotionTopic::topic);
+    if (found != motion.end())
+      found->take(*message, {message->data, bag.serialisation()});
+  }
+  bag.rewind();
+  std::vector<MotionRecording> recordings;
+  for (MotionTopic& topic : motion) {
+    if (std::string problem = topic.problem(file); !problem.empty())
+      warnings.push_back(std::move(problem));
+    recordings.push_back(std::move(topic).recording(file));
+  }
+  return recordings;
+}
+
+} // namespace locus::tools

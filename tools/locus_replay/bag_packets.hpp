@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bags/bag.hpp"
+#include "bags/messages.hpp"
+#include "config/config.hpp"
+#include "drivers/datagram_source.hpp"
+
+namespace locus::tools {
+
+/// The packets in a bag as the datagrams that they were: to the port and from the address that the configuration has
+/// for their lidar, received when the driver says.
+///
+/// A message holds the packets of a whole turn. So that those of several lidars come in the order of their reception,
+/// messages are read half a second ahead. One owner.
+class BagPackets : public DatagramSource {
+ public:
+  /// `topic_of_lidar`: by index in the configuration. The bag stands at its first message.
+  BagPackets(std::unique_ptr<Bag> bag, std::filesystem::path file, const Config& config,
+             const std::vector<std::optional<std::size_t>>& topic_of_lidar);
+
+  const Datagram* next() override;
+  [[nodiscard]] std::uint64_t datagrams() const override { return datagrams_; }
+  [[nodiscard]] std::string why_none() const override;
+  [[nodiscard]] std::vector<std::string> warnings() const override;
+  [[nodiscard]] double progress() const override { return bag_->progress(); }
+
+ private:
+  struct Lidar {
+    std::size_t topic;
+    std::uint16_t port;
+    std::uint32_t ip;
+  };
+  struct Scan {
+    const Lidar* lidar;
+    Stamp recorded;
+    std::vector<VelodyneScan::Packet> packets;
+    std::size_t next = 0; ///< to be given out; before the end
+
+    [[nodiscard]] Stamp stamp() const { return packets[next].stamp; }
+  };
+
+  void read_ahead();
+  void take(const BagMessage& message);
+
+  std::unique_ptr<Bag> bag_;
+  std::filesystem::path file_;
+  std::vector<Lidar> lidars_;
+  std::deque<Scan> scans_;  ///< read, not given out yet; as they lie in the bag
+  std::size_t waiting_ = 0; ///< packets of them
+  Stamp newest_;            ///< when the latest message was recorded
+  bool bag_is_over_ = false;
+  VelodyneScan::Packet packet_{};
+  Datagram datagram_;
+  std::uint64_t datagrams_ = 0, messages_ = 0, malformed_ = 0;
+};
+
+} // namespace locus::tools

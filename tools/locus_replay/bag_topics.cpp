@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_replay/bag_topics.hpp"
+
+#include <algorithm>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "bags/messages.hpp"
+#include "locus_replay/failure.hpp"
+
+namespace locus::tools {
+namespace {
+
+using Topics = std::vector<BagTopic>;
+using Index = std::optional<std::size_t>;
+
+std::string_view type_of(SourceKind kind) { return kind == SourceKind::imu ? kImuType : kOdometryType; }
+
+/// Deals the topics of one type out to those that want one.
+class Dealer {
+ public:
+  Dealer(const Topics& topics, std::string_view type) : topics_(topics) {
+    for (std::size_t i = 0; i < topics.size(); ++i) {
+      if (topics[i].type == type)
+        left_.push_back(i);
+    }
+  }
+
+  /// To the first in the line of those whose name for it fits.
+  template <class Fits> void deal(Index& place, const Fits& fits) {
+    const auto found = std::ranges::find_if(left_, [&](std::size_t i) { return fits(topics_[i].name); });
+    if (found == left_.end()) {
+      waiting_.push_back(&place);
+      return;
+    }
+    place = *found;
+    left_.erase(found);
+  }
+
+  /// The last one to the last that waits.
+  void finish() {
+    if (left_.size() != 1 || waiting_.size() != 1)
+      return;
+    *waiting_.front() = left_.front();
+    left_.clear();
+  }
+
+  [[nodiscard]] std::string names_left() const {
+    std::vector<std::string> names;
+    for (const std::size_t i : left_)
+      names.push_back(topics_[i].name);
+    return fmt::format("{}", fmt::join(names, ", "));
+  }
+  [[nodiscard]] std::size_t left() const { return left_.size(); }
+
+ private:
+  const Topics& topics_;
+  std::vector<std::size_t> left_;
+  std::vector<Index*> waiting_;
+};
+
+/// With and without the slash in front.
+bool is_same_topic(std::string_view a, std::string_view b) {
+  const auto bare = [](std::string_view name) { return name.substr(name.starts_with('/') ? 1 : 0); };
+  return !a.empty() && bare(a) == bare(b);
+}
+
+std::string all_of(const Topics& topics) {
+  std::vector<std::string> lines;
+  for (const BagTopic& topic : topics)
+    lines.push_back(fmt::format("{} ({})", topic.name, topic.type));
+  return lines.empty() ? "no topics" : fmt::format("{}", fmt::join(lines, ", "));
+}
+
+void deal_lidars(const Bag& bag, const std::string& bag_name, const Config& config, BagTopics& chosen) {
+  Dealer dealer(bag.topics(), kVelodyneScanType);
+  if (dealer.left() == 0)
+    throw Failure(ExitStatus::failed,
+                  fmt::format("{}: no {} in it, but {}; record the lidar's packets, mostly on /velodyne_packets",
+                              bag_name, kVelodyneScanType, all_of(bag.topics())));
+  chosen.of_lidar.resize(config.lidars.size());
+  for (std::size_t i = 0; i < config.lidars.size(); ++i)
+    dealer.deal(chosen.of_lidar[i],
+                [&](const std::string& topic) { return topic.find(config.lidars[i].name) != std::string::npos; });
+  dealer.finish();
+  if (std::ranges::none_of(chosen.of_lidar, [](const Index& topic) { return topic.has_value(); }))
+    throw Failure(ExitStatus::wrong_usage,
+                  fmt::format("{}: it is not clear which of {} is lidar {}; give it a name that is part of one with "
+                              "--set lidars.0.name=NAME",
+                              bag_name, dealer.names_left(), config.lidars.front().name));
+}
+
+void deal_sources(const Bag& bag, const std::string& bag_name, const Config& config,
+                  const std::function<bool(std::size_t)>& has_file, SourceKind kind, BagTopics& chosen) {
+  const std::vector<MotionSourceOptions>& sources = config.odometry.motion_sources;
+  const auto is_wanted = [&](std::size_t i) { return sources[i].kind == kind && !has_file(i); };
+  Dealer dealer(bag.topics(), type_of(kind));
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    if (is_wanted(i))
+      dealer.deal(chosen.of_source[i],
+                  [&](const std::string& topic) { return is_same_topic(topic, config.source_topics[i].topic); });
+  }
+  dealer.finish();
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    if (is_wanted(i) && !chosen.of_source[i] && dealer.left() > 0)
+      chosen.doubts.push_back(fmt::format("{}: motion source {}: nothing on {}, and it is not clear whether it is "
+                                          "one of {}; name it with --set motion_sources.{}.topic=TOPIC",
+                                          bag_name, sources[i].name, config.source_topics[i].topic, dealer.names_left(),
+                                          sources[i].name));
+  }
+}
+
+std::string describe(const Bag& bag, const std::string& bag_name, const Config& config, const BagTopics& chosen) {
+  std::vector<std::string> taken, left_out;
+  std::vector<bool> is_taken(bag.topics().size());
+  const auto take = [&](const std::string& name, const Index& topic) {
+    if (!topic)
+      return;
+    is_taken[*topic] = true;
+    taken.push_back(fmt::format("{} is {}", bag.topics()[*topic].name, name));
+  };
+  for (std::size_t i = 0; i < chosen.of_lidar.size(); ++i)
+    take("lidar " + config.lidars[i].name, chosen.of_lidar[i]);
+  for (std::size_t i = 0; i < chosen.of_source.size(); ++i)
+    take(config.odometry.motion_sources[i].name, chosen.of_source[i]);
+  for (std::size_t i = 0; i < bag.topics().size(); ++i) {
+    const BagTopic& topic = bag.topics()[i];
+    if (!is_taken[i] && (topic.type == kVelodyneScanType || topic.type == kImuType || topic.type == kOdometryType))
+      left_out.push_back(topic.name);
+  }
+  return fmt::format("{}: {}{}{}", bag_name, fmt::join(taken, ", "),
+                     left_out.empty() ? "" : "; left out: ", fmt::join(left_out, ", "));
+}
+
+} // namespace
+
+BagTopics BagTopics::choose(const Bag& bag, const std::string& bag_name, const Config& config,
+                            const std::function<bool(std::size_t)>& has_file) {
+  BagTopics chosen;
+  deal_lidars(bag, bag_name, config, chosen);
+  chosen.of_source.resize(config.odometry.motion_sources.size());
+  for (const SourceKind kind : {SourceKind::imu, SourceKind::odometry})
+    deal_sources(bag, bag_name, config, has_file, kind, chosen);
+  chosen.taken = describe(bag, bag_name, config, chosen);
+  return chosen;
+}
+
+} // namespace locus::tools

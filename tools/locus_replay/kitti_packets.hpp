@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "drivers/datagram_source.hpp"
+#include "drivers/lidar_options.hpp"
+#include "kitti/kitti_drive.hpp"
+#include "kitti/kitti_sweep.hpp"
+
+namespace locus::tools {
+
+/// The sweeps of a drive as packets that need no decoding, for one lidar, each received when it was fired. One sweep is
+/// in memory at a time. One owner.
+class KittiPackets : public DatagramSource {
+ public:
+  KittiPackets(std::vector<KittiDrive::Sweep> sweeps, const LidarOptions& lidar);
+
+  const Datagram* next() override;
+  [[nodiscard]] std::uint64_t datagrams() const override { return datagrams_; }
+  [[nodiscard]] std::string why_none() const override;
+  [[nodiscard]] std::vector<std::string> warnings() const override;
+  [[nodiscard]] double progress() const override;
+
+ private:
+  void read(const KittiDrive::Sweep& sweep);
+
+  std::vector<KittiDrive::Sweep> sweeps_;
+  std::size_t next_sweep_ = 0;
+  std::vector<KittiPoint> points_;
+  KittiSweep sweep_;
+  Datagram datagram_;
+  std::uint64_t datagrams_ = 0;
+  std::uint64_t damaged_ = 0, unordered_ = 0; ///< sweeps
+};
+
+} // namespace locus::tools

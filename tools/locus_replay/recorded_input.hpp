@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "config/config.hpp"
+#include "drivers/capture_folder.hpp"
+#include "drivers/datagram_source.hpp"
+#include "locus_replay/arguments.hpp"
+#include "locus_replay/motion_recordings.hpp"
+
+namespace locus::tools {
+
+/// What is to be played, whatever the format that it was recorded in.
+struct RecordedInput {
+  std::unique_ptr<DatagramSource> lidars;
+  std::vector<MotionRecording> motion;
+  std::string taken;              ///< of a bag or drive: what was taken for what, in one line for the user
+  std::vector<StampedPose> truth; ///< of a drive: true poses of the base
+};
+
+/// Opens folder.lidar, a capture, a bag or a drive of KITTI, and all motion that belongs to it. Files that the user
+/// named take the place of a bag's topics. `config_is_users_own`: then a motion source without samples is worth a
+/// warning. Throws Failure.
+RecordedInput open_input(const Arguments& arguments, const CaptureFolder& folder, const Config& config,
+                         bool config_is_users_own, std::vector<std::string>& warnings);
+
+} // namespace locus::tools
