@@ -29,12 +29,12 @@ struct Moments {
 };
 
 /// Points of a batch, and the squared distance within which their neighbours speak for them.
-struct Places {
+struct BatchPoints {
   Batch x, y, z, reach2;
 };
 
-[[gnu::always_inline]] inline Places places_of(const float* x, const float* y, const float* z) {
-  Places p;
+[[gnu::always_inline]] inline BatchPoints points_of(const float* x, const float* y, const float* z) {
+  BatchPoints p;
   for (std::size_t i = 0; i < kBatch; ++i) {
     p.x[i] = x[i];
     p.y[i] = y[i];
@@ -46,13 +46,14 @@ struct Places {
 }
 
 /// Adds one neighbour of each point; one in the same place as the point is none.
-[[gnu::always_inline]] inline void add_neighbour(const Places& p, const float* x_m, const float* y_m, const float* z_m,
-                                                 const std::int32_t* neighbour, Moments& moments) {
+[[gnu::always_inline]] inline void add_neighbour(const BatchPoints& p, const float* x_m, const float* y_m,
+                                                 const float* z_m, const std::int32_t* neighbour, Moments& moments) {
   for (std::size_t i = 0; i < kBatch; ++i) {
     const auto j = static_cast<std::ptrdiff_t>(neighbour[i]);
     const float x = x_m[j] - p.x[i], y = y_m[j] - p.y[i], z = z_m[j] - p.z[i];
     const float distance2 = x * x + y * y + z * z;
-    const auto counts = static_cast<float>((distance2 <= p.reach2[i]) & (distance2 > 0.0F));
+    const std::int32_t speaks = -(distance2 <= p.reach2[i]) & -(distance2 > 0.0F);
+    const auto counts = static_cast<float>(-speaks);
     const float cx = counts * x, cy = counts * y, cz = counts * z;
     moments.count[i] += counts;
     moments.x[i] += cx;
@@ -68,7 +69,7 @@ struct Places {
 }
 
 /// Unit normals towards the lidar's side of planes through the points of the moments, or zero.
-[[gnu::always_inline]] inline void normals_of(const Moments& moments, const Places& p, Batch& nx, Batch& ny,
+[[gnu::always_inline]] inline void normals_of(const Moments& moments, const BatchPoints& p, Batch& nx, Batch& ny,
                                               Batch& nz) {
   for (std::size_t i = 0; i < kBatch; ++i) {
     const float count = moments.count[i];
@@ -147,10 +148,10 @@ void ScanNormals::fit_planes(std::vector<SweepPoint>& points, std::size_t begin)
   run_as(isa_, [&] {
     Moments moments{};
     moments.count.fill(1.0F);
-    const Places places = places_of(&x_[begin], &y_[begin], &z_[begin]);
+    const BatchPoints batch = points_of(&x_[begin], &y_[begin], &z_[begin]);
     for (const std::vector<std::int32_t>& neighbour : neighbours_)
-      add_neighbour(places, x_.data(), y_.data(), z_.data(), &neighbour[begin], moments);
-    normals_of(moments, places, nx, ny, nz);
+      add_neighbour(batch, x_.data(), y_.data(), z_.data(), &neighbour[begin], moments);
+    normals_of(moments, batch, nx, ny, nz);
   });
   for (std::size_t i = 0; i < std::min(kBatch, points.size() - begin); ++i)
     points[begin + i].normal_base = {nx[i], ny[i], nz[i]};

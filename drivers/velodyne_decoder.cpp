@@ -237,8 +237,8 @@ void Decoder::read_salvos(Packet packet, std::size_t column, std::size_t first_f
     placed.x_m[k] = radial_m * aim.cos_azimuth[k] + lateral_m * aim.sin_azimuth[k];
     placed.y_m[k] = lateral_m * aim.cos_azimuth[k] - radial_m * aim.sin_azimuth[k];
     placed.z_m[k] = range_m * firings_.sin_elevation[i] + firings_.vertical_offset_m[i];
-    const bool is_return = (distances[k] != 0) & (distances[k] != previous[k]) & (range_m > 0.0F);
-    placed.range_m[k] = is_return ? range_m : 0.0F;
+    const std::int32_t is_return = -(distances[k] != 0) & -(distances[k] != previous[k]) & -(range_m > 0.0F);
+    placed.range_m[k] = is_return != 0 ? range_m : 0.0F;
     placed.offset_ns[k] = column_offset_ns_[column] + firings_.offset_ns[i];
   }
   salvo.first_laser = firings_.laser[first_firing];
