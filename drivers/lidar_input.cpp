@@ -31,7 +31,8 @@ Expected<LidarInput, std::string> LidarInput::open(LidarOptions options, std::ui
 }
 
 LidarInput::LidarInput(LidarOptions options, std::uint8_t index, std::optional<velodyne::Calibration> calibration)
-    : options_(std::move(options)), decoder_({options_.model, std::nullopt, calibration, options_.isa}), clock_(options_.time) {
+    : options_(std::move(options)), decoder_({options_.model, std::nullopt, calibration, options_.isa}),
+      clock_(options_.time) {
   packet_.lidar = index;
 }
 
