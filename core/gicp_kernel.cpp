@@ -93,22 +93,21 @@ using Places = std::array<std::uint32_t, kGicpBlock>;
 /// SurfaceGrid::index_of for all points of a block, in single precision; points out of reach go anywhere.
 [[gnu::always_inline]] inline void index_all(const SurfaceGrid& grid, const Eigen::Vector3d& origin_m,
                                              const Placed& points, Cells& cells) {
+  constexpr float kMost = 2.0F * kMaxDistance_m / static_cast<float>(SurfaceMap::kFineLeaf_m);
   const auto per_m = static_cast<float>(1.0 / grid.leaf_m());
-  const auto index = [per_m](const PerPoint& at_m, double origin_m_, double leaf_m, auto& cell) {
-    const double origin_cells = origin_m_ / leaf_m + 0.5;
-    const double whole = std::floor(origin_cells);
-    const auto part = static_cast<float>(origin_cells - whole);
-    const auto first = static_cast<std::int32_t>(whole);
-    constexpr float kMost = 2.0F * kMaxDistance_m / static_cast<float>(SurfaceMap::kFineLeaf_m);
+  const auto index = [&](double from_m, const PerPoint& at_m, auto& cell) {
+    const double from_cells = from_m / grid.leaf_m() + 0.5;
+    const auto whole = static_cast<std::int32_t>(std::floor(from_cells));
+    const auto part = static_cast<float>(from_cells - static_cast<double>(whole));
     for (std::size_t i = 0; i < kGicpBlock; ++i) {
-      const float cells_from = std::clamp(at_m[i] * per_m + part, -kMost, kMost);
-      const auto truncated = static_cast<std::int32_t>(cells_from);
-      cell[i] = first + truncated - static_cast<std::int32_t>(cells_from < static_cast<float>(truncated));
+      const float cells_on = std::clamp(at_m[i] * per_m + part, -kMost, kMost);
+      const auto truncated = static_cast<std::int32_t>(cells_on);
+      cell[i] = whole + truncated - static_cast<std::int32_t>(cells_on < static_cast<float>(truncated));
     }
   };
-  index(points.x_m, origin_m.x(), grid.leaf_m(), cells.x);
-  index(points.y_m, origin_m.y(), grid.leaf_m(), cells.y);
-  index(points.z_m, origin_m.z(), grid.leaf_m(), cells.z);
+  index(origin_m.x(), points.x_m, cells.x);
+  index(origin_m.y(), points.y_m, cells.y);
+  index(origin_m.z(), points.z_m, cells.z);
 }
 
 bool is_near(const Eigen::Vector3f& point) { return (point.array().abs() < kMaxDistance_m).all(); }

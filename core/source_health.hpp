@@ -14,7 +14,7 @@ namespace locus {
 enum class HealthReason : std::uint8_t {
   stale,        ///< silent for too long, or a sample that came too late
   jump,         ///< a motion that no robot can make
-  nan,          ///< not a number
+  nan,          ///< not a number, or one beyond all sense
   frozen,       ///< the same reading again, though the robot moves
   out_of_order, ///< a stamp that does not follow from the ones before
   covariance,   ///< much less certain than usual, as the source itself says
