@@ -54,6 +54,20 @@ TEST(SourceClock, AClockThatIsSetRightAgainIsLearnedAnew) {
   EXPECT_EQ(clock.steps(), 2U);
 }
 
+/// What somebody else's samples took on their way, before the clock stepped, is no business of those that come now.
+TEST(SourceClock, WhoComesBackToTheHostsClockIsTakenAtItsWord) {
+  SourceClock clock;
+  int i = 0;
+  for (; i < 10; ++i)
+    EXPECT_EQ(clock.on_host_clock(today_ms(20 * i), today_ms(20 * i + 300)), today_ms(20 * i));
+  for (; i < 20; ++i)
+    sample(clock, i, -hours{5});
+  for (; i < 30; ++i)
+    sample(clock, i, {});
+  EXPECT_EQ(sample(clock, i, {}), today_ms(20 * i));
+  EXPECT_EQ(clock.offset(), Duration::zero());
+}
+
 TEST(SourceClock, AClockThatNeverWasTheHostsIsNoStep) {
   SourceClock clock;
   int i = 0;
