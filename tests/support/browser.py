@@ -21,7 +21,7 @@ for program, package in (CHROMIUM, "chromium"), (DRIVER, "chromium-driver"):
 
 # How many colours the picture on a canvas has, and which share of it is painted.
 LOOK_AT_CANVAS = """
-  const [source] = arguments, copy = document.createElement("canvas");
+  const source = document.querySelector(arguments[0]), copy = document.createElement("canvas");
   copy.width = source.width; copy.height = source.height;
   const context = copy.getContext("2d");
   context.drawImage(source, 0, 0);
@@ -81,7 +81,8 @@ class Browser:
         return {part.get_attribute("id") for part in self.all("[data-drawn]")}
 
     def canvas(self, selector):
-        return self.run(LOOK_AT_CANVAS, self.one(selector))
+        """Found and looked at in one go: the page puts a new canvas in the place of the old one as it likes."""
+        return self.run(LOOK_AT_CANVAS, selector)
 
     def complaints(self):
         return [entry["message"] for entry in self.driver.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")]
