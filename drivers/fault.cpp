@@ -16,6 +16,7 @@ struct KindTraits {
   FaultKind kind;
   std::string_view name;
   bool fits_lidar;
+  bool fits_position_packets;
   bool fits_odometry;
   bool fits_imu;
   std::string_view unit; ///< of VALUE; empty for a kind that takes none
@@ -28,20 +29,22 @@ struct KindTraits {
 /// `late` also bounds what an injector has to hold back.
 constexpr double kMaxDelay_s = 10.0;
 constexpr double kMaxClockStep_s = 1e8;
-constexpr double kMaxJump_m = 1e6;
+constexpr double kMaxJump = 1e6;
 constexpr double kMaxScale = 1e12;
 
 constexpr std::array kKinds{
-    KindTraits{FaultKind::lost, "lost", true, true, true, "", 0, 0, 0},
-    KindTraits{FaultKind::frozen, "frozen", true, true, true, "", 0, 0, 0},
-    KindTraits{FaultKind::jump, "jump", false, true, false, "metres", 2, -kMaxJump_m, kMaxJump_m},
-    KindTraits{FaultKind::nan, "nan", false, true, true, "", 0, 0, 0},
-    KindTraits{FaultKind::late, "late", true, true, true, "seconds", 0.2, 0, kMaxDelay_s},
-    KindTraits{FaultKind::covariance, "covariance", false, true, false, "times", 10, 0, kMaxScale},
-    KindTraits{FaultKind::clock_step, "clock-step", true, true, true, "seconds", 60, -kMaxClockStep_s, kMaxClockStep_s},
-    KindTraits{FaultKind::packet_loss, "packet-loss", true, true, true, "percent", 10, 0, 100},
-    KindTraits{FaultKind::reorder, "reorder", true, true, true, "percent", 10, 0, 100},
-    KindTraits{FaultKind::duplicate, "duplicate", true, true, true, "percent", 10, 0, 100},
+    KindTraits{FaultKind::lost, "lost", true, true, true, true, "", 0, 0, 0},
+    KindTraits{FaultKind::frozen, "frozen", true, true, true, true, "", 0, 0, 0},
+    KindTraits{FaultKind::jump, "jump", true, false, true, true, "metres or rad/s", 2, -kMaxJump, kMaxJump},
+    KindTraits{FaultKind::nan, "nan", false, false, true, true, "", 0, 0, 0},
+    KindTraits{FaultKind::late, "late", true, true, true, true, "seconds", 0.2, 0, kMaxDelay_s},
+    KindTraits{FaultKind::covariance, "covariance", false, false, true, false, "times", 10, 0, kMaxScale},
+    KindTraits{FaultKind::clock_step, "clock-step", true, true, true, true, "seconds", 60, -kMaxClockStep_s,
+               kMaxClockStep_s},
+    KindTraits{FaultKind::packet_loss, "packet-loss", true, true, true, true, "percent", 10, 0, 100},
+    KindTraits{FaultKind::reorder, "reorder", true, true, true, true, "percent", 10, 0, 100},
+    KindTraits{FaultKind::duplicate, "duplicate", true, true, true, true, "percent", 10, 0, 100},
+    KindTraits{FaultKind::corrupt, "corrupt", true, true, true, true, "percent", 10, 0, 100},
 };
 
 const KindTraits& traits_of(FaultKind kind) { return *std::ranges::find(kKinds, kind, &KindTraits::kind); }
@@ -63,6 +66,8 @@ bool fits(const KindTraits& traits, FaultTarget::Kind target) {
   switch (target) {
   case FaultTarget::Kind::lidar:
     return traits.fits_lidar;
+  case FaultTarget::Kind::position_packets:
+    return traits.fits_position_packets;
   case FaultTarget::Kind::odometry:
     return traits.fits_odometry;
   case FaultTarget::Kind::imu:
@@ -75,6 +80,8 @@ std::string_view description(FaultTarget::Kind target) {
   switch (target) {
   case FaultTarget::Kind::lidar:
     return "a lidar";
+  case FaultTarget::Kind::position_packets:
+    return "a position packet";
   case FaultTarget::Kind::odometry:
     return "an odometry source";
   case FaultTarget::Kind::imu:
@@ -124,6 +131,11 @@ bool parse_window(std::string_view text, Fault& fault) {
 }
 
 } // namespace
+
+bool Fault::strikes_lidar(std::string_view lidar) const {
+  return name == kAllLidars || name == lidar ||
+         (lidar.starts_with(name) && lidar.substr(name.size()) == kPositionPackets);
+}
 
 std::string_view to_string(FaultKind kind) { return traits_of(kind).name; }
 
@@ -196,8 +208,9 @@ FaultPlan::Verdict FaultPlan::judge(std::string_view sensor, bool is_lidar, Stam
   Verdict verdict;
   for (Entry& entry : entries_) {
     const Fault& fault = entry.fault;
-    const bool meant = fault.name == sensor || (is_lidar && fault.name == Fault::kAllLidars);
-    if (!meant || since_start < fault.from || since_start >= fault.until) {
+    const bool meant = is_lidar ? fault.strikes_lidar(sensor) : fault.name == sensor;
+    const bool begun = fault.from == Duration::zero() || since_start >= fault.from;
+    if (!meant || !begun || since_start >= fault.until) {
       continue;
     }
     const auto drawn = [&] { return static_cast<double>(entry.random() >> 11) * 0x1p-53 * 100.0 < fault.value; };
@@ -209,7 +222,7 @@ FaultPlan::Verdict FaultPlan::judge(std::string_view sensor, bool is_lidar, Stam
       verdict.frozen = true;
       break;
     case FaultKind::jump:
-      verdict.jump_m += fault.value;
+      verdict.jump += fault.value;
       break;
     case FaultKind::nan:
       verdict.nan = true;
@@ -231,6 +244,11 @@ FaultPlan::Verdict FaultPlan::judge(std::string_view sensor, bool is_lidar, Stam
       break;
     case FaultKind::duplicate:
       verdict.duplicated |= drawn();
+      break;
+    case FaultKind::corrupt:
+      if (drawn()) {
+        verdict.corruption = entry.random();
+      }
       break;
     }
   }

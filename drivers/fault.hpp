@@ -17,7 +17,8 @@ namespace locus {
 enum class FaultKind : std::uint8_t {
   lost,        ///< nothing arrives
   frozen,      ///< the last reading before the fault is repeated; messages of motion sources get new stamps
-  jump,        ///< the pose is off by `value` metres along x of the source's frame (2)
+  jump,        ///< the reading is off by `value` (2): a pose by metres along x of the source's frame, a lidar's ranges
+               ///< by metres, an IMU's turn about its z by rad/s
   nan,         ///< all readings are NaN
   late,        ///< everything arrives `value` seconds late (0.2)
   covariance,  ///< the reported covariance is `value` times larger (10)
@@ -25,6 +26,7 @@ enum class FaultKind : std::uint8_t {
   packet_loss, ///< `value` percent of the messages are lost (10)
   reorder,     ///< `value` percent of the messages are overtaken by the next one of the same sensor (10)
   duplicate,   ///< `value` percent of the messages arrive twice (10)
+  corrupt,     ///< `value` percent of the messages hold random bits, a packet's from a random byte on (10)
 };
 
 /// As users write it: clock-step.
@@ -35,15 +37,16 @@ std::string_view to_string(FaultKind kind);
 /// there.
 struct Fault {
   static constexpr std::string_view kAllLidars = "all-lidars";
+  static constexpr std::string_view kPositionPackets = ".position"; ///< after a lidar's name: these alone
 
   std::string name; ///< of a lidar or motion source, or kAllLidars
   FaultKind kind = FaultKind::lost;
   double value = 0.0;
-  Duration from{};                  ///< after the start of the capture
+  Duration from{};                  ///< after the start of the capture; 0: from the first message of all on
   Duration until = Duration::max(); ///< the first instant at which all is well again
 
-  /// Whether it befalls the lidar of this name.
-  [[nodiscard]] bool strikes_lidar(std::string_view lidar) const { return name == lidar || name == kAllLidars; }
+  /// Whether it befalls the lidar of this name, or, with kPositionPackets behind it, its position packets.
+  [[nodiscard]] bool strikes_lidar(std::string_view lidar) const;
 
   /// Fails with one line for the user: what is wrong with the text, what is accepted.
   static Expected<Fault, std::string> parse(std::string_view text);
@@ -51,7 +54,7 @@ struct Fault {
 
 /// A sensor that a fault may be meant for.
 struct FaultTarget {
-  enum class Kind : std::uint8_t { lidar, odometry, imu };
+  enum class Kind : std::uint8_t { lidar, position_packets, odometry, imu };
   std::string name;
   Kind kind = Kind::lidar;
 };
@@ -71,9 +74,10 @@ class FaultPlan {
     bool nan = false;
     bool overtaken = false;
     bool duplicated = false;
+    std::optional<std::uint64_t> corruption; ///< seed of the bits
     Duration delay{};
     Duration clock_step{};
-    double jump_m = 0.0;
+    double jump = 0.0;
     double covariance_scale = 1.0;
 
     [[nodiscard]] bool harmless() const { return *this == Verdict{}; }

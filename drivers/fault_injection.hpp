@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -45,9 +46,14 @@ template <class Sample>
 void inject_faults(std::span<const Fault> faults, const std::string& source, Stamp capture_start, std::uint64_t seed,
                    std::vector<Sample>& samples);
 
+/// Sets the sensor's own clock forward in a data or position packet; other payloads stay as they are. It shows minutes
+/// and seconds alone, so an hour makes no difference. The sentence of the GPS in a position packet keeps its time.
+void step_sensor_clock(std::span<std::byte> payload, Duration step);
+
 /// Applies the faults meant for lidars to the datagrams of a capture as they stream by. The receive stamp of a datagram
-/// that is late or overtaken moves along; what is held back comes out in the order of arrival. Frozen are data packets
-/// only: position packets go on. One owner.
+/// that is late or overtaken moves along; what is held back comes out in the order of arrival. The position packets of
+/// a lidar are a stream of their own: its faults strike them too, but one packet repeats or overtakes its like only.
+/// One owner.
 class DatagramFaults {
  public:
   /// Takes a datagram, valid only during the call.
@@ -72,16 +78,16 @@ class DatagramFaults {
 
     void emit_to(const Emit& emit) const;
   };
-  struct LidarState {
-    std::vector<std::byte> last_data_packet; ///< before the lidar froze
-    std::optional<Copy> overtaken;           ///< waits for the next one to pass it
+  struct Stream {
+    std::vector<std::byte> healthy; ///< the latest payload that was not frozen
+    std::optional<Copy> overtaken;  ///< waits for the next one to pass it
   };
 
   void deliver(Copy copy, Stamp now, const Emit& emit);
   void emit_delayed(Stamp now, const Emit& emit);
 
   FaultPlan plan_;
-  std::map<std::string, LidarState, std::less<>> lidars_;
+  std::map<std::string, Stream, std::less<>> streams_;
   std::multimap<Stamp, Copy> delayed_; ///< by time of arrival; at most the traffic of the longest delay
 };
 

@@ -191,6 +191,18 @@ std::string_view LidarRouter::configured_for(const Datagram& datagram) const {
   return found == lidars_.end() ? std::string_view{} : found->options().name;
 }
 
+LidarRouter::Senders LidarRouter::senders_to(std::uint16_t port) const {
+  Senders senders;
+  for (const LidarInput& lidar : lidars_) {
+    if (!lidar.listens_to(port))
+      continue;
+    if (!lidar.source_ip() || senders.count == Senders::kMax)
+      return {};
+    senders.ips[senders.count++] = *lidar.source_ip();
+  }
+  return senders;
+}
+
 PacketCounters LidarRouter::total() const {
   PacketCounters sum = foreign_;
   for (const LidarInput& lidar : lidars_)

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -101,6 +102,19 @@ class LidarRouter {
   /// The name of the lidar that a datagram comes from by the configuration alone, whether or not the lidar has made
   /// itself known; empty for none.
   [[nodiscard]] std::string_view configured_for(const Datagram& datagram) const;
+
+  /// Addresses, host byte order. None: anybody may be one.
+  struct Senders {
+    static constexpr std::size_t kMax = 16;
+    std::array<std::uint32_t, kMax> ips{};
+    std::size_t count = 0;
+
+    [[nodiscard]] std::span<const std::uint32_t> all() const { return {ips.data(), count}; }
+    bool operator==(const Senders&) const = default;
+  };
+
+  /// Of the lidars that may send to this port; none while one of them has no address, configured or learnt.
+  [[nodiscard]] Senders senders_to(std::uint16_t port) const;
 
   /// Of all lidars, and of the datagrams that are for none of them (rejected as sender).
   [[nodiscard]] PacketCounters total() const;

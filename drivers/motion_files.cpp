@@ -2,255 +2,28 @@
 #include "drivers/motion_files.hpp"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
-#include <cmath>
+#include <chrono>
 #include <cstdint>
-#include <fstream>
+#include <cstdlib>
+#include <initializer_list>
+#include <iterator>
 #include <memory>
 #include <optional>
-#include <span>
 #include <sstream>
-#include <string_view>
-#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "drivers/motion_rows.hpp"
+
 namespace locus {
 namespace {
-
-constexpr std::size_t kMaxFields = 11;
-using Fields = std::span<const std::string_view>;
-using Problem = std::optional<std::string>; ///< what is wrong with a line, and what to do
-
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t\r";
-  const std::size_t first = text.find_first_not_of(kBlanks);
-  return first == std::string_view::npos ? std::string_view{}
-                                         : text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
-}
-
-/// Splits at commas, or at runs of blanks for the separator ' '. A line with more fields than fit is returned with one
-/// more than kMaxFields, which no format has.
-class FieldSplitter {
- public:
-  explicit FieldSplitter(char separator) : separator_(separator) {}
-
-  Fields operator()(std::string_view line) {
-    std::size_t count = 0;
-    while (count < fields_.size()) {
-      const std::size_t end = separator_ == ' ' ? line.find_first_of(" \t") : line.find(separator_);
-      fields_[count++] = trimmed(line.substr(0, end));
-      if (end == std::string_view::npos) {
-        break;
-      }
-      line = separator_ == ' ' ? trimmed(line.substr(end)) : line.substr(end + 1);
-    }
-    return {fields_.data(), count};
-  }
-
- private:
-  char separator_;
-  std::array<std::string_view, kMaxFields + 1> fields_;
-};
-
-template <class Number> bool parse(std::string_view text, Number& number) {
-  const char* end = text.data() + text.size();
-  const char* begin = text.data() + (text.starts_with('+') ? 1 : 0); // from_chars takes no plus sign
-  const auto [stop, error] = std::from_chars(begin, end, number);
-  return error == std::errc{} && stop == end;
-}
-
-bool parse_all(Fields fields, std::span<double> numbers) {
-  return std::ranges::equal(fields, numbers, [](std::string_view text, double& number) { return parse(text, number); });
-}
-
-bool is_sensible(Stamp stamp) { return stamp > kEarliestStamp && stamp < kLatestStamp; }
-
-/// A whole number of nanoseconds.
-std::optional<Stamp> parse_ns(std::string_view text) {
-  std::int64_t ns = 0;
-  return parse(text, ns) && is_sensible(stamp_from_ns(ns)) ? std::optional{stamp_from_ns(ns)} : std::nullopt;
-}
-
-/// Decimal seconds, rounded to nanoseconds without a detour over double, whose steps are 200 ns at today's dates. Takes
-/// an exponent too: NumPy writes 1.403636579763555527e+09.
-std::optional<Stamp> parse_seconds(std::string_view text) {
-  constexpr int kMaxExponent = 18;
-  const std::size_t exponent_at = std::min(text.find_first_of("eE"), text.size());
-  int exponent = 0;
-  if (exponent_at < text.size() &&
-      (!parse(text.substr(exponent_at + 1), exponent) || exponent < -kMaxExponent || exponent > kMaxExponent)) {
-    return std::nullopt;
-  }
-  const bool negative = text.starts_with('-');
-  std::string digits{text.substr(negative ? 1 : 0, exponent_at - (negative ? 1 : 0))};
-  const std::size_t point = std::min(digits.find('.'), digits.size());
-  if (point < digits.size()) {
-    digits.erase(point, 1);
-  }
-  if (digits.empty() || digits.find_first_not_of("0123456789") != std::string::npos) {
-    return std::nullopt;
-  }
-  const int digits_of_ns = static_cast<int>(point) + exponent + 9;
-  if (digits_of_ns <= 0) {
-    return Stamp{};
-  }
-  const auto kept = static_cast<std::size_t>(digits_of_ns);
-  const bool rounds_up = kept < digits.size() && digits[kept] >= '5';
-  digits.resize(kept, '0');
-  const std::optional<Stamp> stamp = parse_ns(digits);
-  if (!stamp) {
-    return std::nullopt;
-  }
-  const std::int64_t ns = to_ns(*stamp) + (rounds_up ? 1 : 0);
-  return stamp_from_ns(negative ? -ns : ns);
-}
-
-/// A first line in which nothing is a number.
-bool is_header(Fields fields) {
-  return std::ranges::none_of(fields, [](std::string_view field) {
-    double ignored = 0.0;
-    return parse(field, ignored);
-  });
-}
-
-/// A rotation, NaN included. Nothing when the four numbers are none, which tells columns in another order from a
-/// quaternion rounded by the writer.
-std::optional<Eigen::Quaterniond> unit_quaternion(double w, double x, double y, double z) {
-  constexpr double kTolerance = 0.05;
-  const Eigen::Quaterniond q{w, x, y, z};
-  if (std::abs(q.norm() - 1.0) > kTolerance) {
-    return std::nullopt;
-  }
-  return q.normalized();
-}
-
-Problem parse_imu(Fields fields, ImuSample& sample) {
-  if (fields.size() != 7 && fields.size() != 11) {
-    return fmt::format("{} columns; expected t_ns,wx,wy,wz,ax,ay,az and optionally qw,qx,qy,qz",
-                       fields.size() > kMaxFields ? "too many" : std::to_string(fields.size()));
-  }
-  const std::optional<Stamp> time = parse_ns(fields[0]);
-  if (!time) {
-    return fmt::format(
-        "time \"{}\" is not a whole number of nanoseconds; since 1970; write it without point or exponent", fields[0]);
-  }
-  std::array<double, kMaxFields - 1> v{};
-  if (!parse_all(fields.subspan(1), std::span{v}.first(fields.size() - 1))) {
-    return "a value is not a number; correct or remove the line";
-  }
-  sample.stamp = sample.arrival = *time;
-  sample.angular_velocity_radps = {v[0], v[1], v[2]};
-  sample.specific_force_mps2 = {v[3], v[4], v[5]};
-  const bool unknown_attitude =
-      fields.size() == 7 || std::all_of(v.begin() + 6, v.end(), [](double q) { return q == 0; });
-  if (unknown_attitude) {
-    return std::nullopt;
-  }
-  sample.attitude = unit_quaternion(v[6], v[7], v[8], v[9]);
-  if (!sample.attitude) {
-    return "the attitude is not a unit quaternion; the columns are qw,qx,qy,qz, all four 0 where it is not known";
-  }
-  return std::nullopt;
-}
-
-Problem parse_odometry(Fields fields, OdometrySample& sample) {
-  if (fields.size() != 8) {
-    return fmt::format("{} columns; expected t x y z qx qy qz qw",
-                       fields.size() > kMaxFields ? "too many" : std::to_string(fields.size()));
-  }
-  const std::optional<Stamp> time = parse_seconds(fields[0]);
-  if (!time) {
-    return fmt::format("time \"{}\" is not a number of seconds since 1970; write it as 1700000000.123456789",
-                       fields[0]);
-  }
-  std::array<double, 7> v{};
-  if (!parse_all(fields.subspan(1), v)) {
-    return "a value is not a number; correct or remove the line";
-  }
-  const std::optional<Eigen::Quaterniond> rotation = unit_quaternion(v[6], v[3], v[4], v[5]);
-  if (!rotation) {
-    return "the rotation is not a unit quaternion; the columns are t x y z qx qy qz qw";
-  }
-  sample.stamp = sample.arrival = *time;
-  sample.T_source_base = {*rotation, {v[0], v[1], v[2]}};
-  return std::nullopt;
-}
-
-struct Meta {
-  Stamp stamp;
-  Stamp arrival;
-  double covariance_scale = 1.0;
-};
-
-Problem parse_meta(Fields fields, Meta& meta) {
-  const std::optional<Stamp> time = fields.size() == 3 ? parse_ns(fields[0]) : std::nullopt;
-  const std::optional<Stamp> arrival = fields.size() == 3 ? parse_ns(fields[1]) : std::nullopt;
-  if (!time || !arrival || !parse(fields[2], meta.covariance_scale)) {
-    return "expected t_ns,arrival_ns,covariance_scale: two whole numbers and a number; correct or remove the line";
-  }
-  meta.stamp = *time;
-  meta.arrival = *arrival;
-  return std::nullopt;
-}
 
 void apply(const Meta& meta, ImuSample& sample) { sample.arrival = meta.arrival; }
 void apply(const Meta& meta, OdometrySample& sample) {
   sample.arrival = meta.arrival;
   sample.covariance_scale = meta.covariance_scale;
 }
-
-/// The rows of a table, one after the other. Blank lines, comments and a header line are none.
-template <class Row> class RowReader {
- public:
-  RowReader(const std::filesystem::path& file, char separator, Problem (*parse_row)(Fields, Row&))
-      : RowReader(std::make_unique<std::ifstream>(file), file.string(), separator, parse_row) {
-    if (!*stream_ || std::filesystem::is_directory(file)) {
-      problem_ = fmt::format("{}: cannot be read; check the path and its permissions", name_);
-    }
-  }
-
-  /// Of any lines; `name` stands for them in problems.
-  RowReader(std::unique_ptr<std::istream> stream, std::string name, char separator, Problem (*parse_row)(Fields, Row&))
-      : stream_(std::move(stream)), name_(std::move(name)), split_(separator), parse_row_(parse_row) {}
-
-  /// False at the end, and where there is a problem.
-  bool next(Row& row) {
-    while (!problem_ && std::getline(*stream_, buffer_)) {
-      ++line_;
-      const std::string_view line = trimmed(buffer_);
-      if (line.empty() || line.starts_with('#')) {
-        continue;
-      }
-      const Fields fields = split_(line);
-      if (std::exchange(first_, false) && is_header(fields)) {
-        continue;
-      }
-      row = {};
-      if (const Problem problem = parse_row_(fields, row)) {
-        report(*problem);
-      }
-      return !problem_;
-    }
-    return false;
-  }
-
-  /// Puts the place of the latest row before what is wrong with it.
-  void report(const std::string& problem) { problem_ = fmt::format("{}:{}: {}", name_, line_, problem); }
-  [[nodiscard]] const Problem& problem() const { return problem_; }
-
- private:
-  std::unique_ptr<std::istream> stream_;
-  std::string name_;
-  FieldSplitter split_;
-  Problem (*parse_row_)(Fields, Row&);
-  std::string buffer_;
-  std::size_t line_ = 0;
-  bool first_ = true;
-  Problem problem_;
-};
 
 template <class Row> Expected<std::vector<Row>, std::string> all_rows(RowReader<Row>& reader) {
   std::vector<Row> rows;
@@ -314,11 +87,49 @@ template <class Sample> Expected<std::vector<Sample>, std::string> read_samples(
       return *std::move(problem);
     }
   }
-  std::ranges::stable_sort(*samples, {}, &Sample::arrival);
   return samples;
 }
 
+/// With as few digits as tell a number from its neighbours, unless so many decimals are asked for.
+void append_number(std::string& line, double number, std::optional<int> decimals) {
+  if (decimals) {
+    fmt::format_to(std::back_inserter(line), "{:.{}f}", number, *decimals);
+  } else {
+    fmt::format_to(std::back_inserter(line), "{}", number);
+  }
+}
+
 } // namespace
+
+std::string to_line(const ImuSample& sample, std::optional<int> decimals) {
+  const Eigen::Vector3d &w = sample.angular_velocity_radps, &a = sample.specific_force_mps2;
+  std::string line = fmt::format("{}", to_ns(sample.stamp));
+  const auto append = [&](std::initializer_list<double> numbers) {
+    for (const double number : numbers) {
+      line += ',';
+      append_number(line, number, decimals);
+    }
+  };
+  append({w.x(), w.y(), w.z(), a.x(), a.y(), a.z()});
+  if (sample.attitude) {
+    append({sample.attitude->w(), sample.attitude->x(), sample.attitude->y(), sample.attitude->z()});
+  }
+  return line + '\n';
+}
+
+/// Integer arithmetic keeps the stamp to the nanosecond.
+std::string to_line(const StampedPose& pose, std::optional<int> decimals) {
+  const std::int64_t ns = to_ns(pose.stamp);
+  const Eigen::Vector3d& p = pose.T_source_base.translation;
+  const Eigen::Quaterniond& q = pose.T_source_base.rotation;
+  std::string line =
+      fmt::format("{}{}.{:09}", ns < 0 ? "-" : "", std::abs(ns) / 1'000'000'000, std::abs(ns) % 1'000'000'000);
+  for (const double number : {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()}) {
+    line += ' ';
+    append_number(line, number, decimals);
+  }
+  return line + '\n';
+}
 
 Expected<std::vector<StampedPose>, std::string> read_trajectory(const std::filesystem::path& file) {
   RowReader<OdometrySample> reader = open_table<OdometrySample>(file);
@@ -353,37 +164,122 @@ template <class Sample> Expected<std::vector<Sample>, std::string> parse_samples
 template Expected<std::vector<ImuSample>, std::string> parse_samples(std::string, std::string);
 template Expected<std::vector<OdometrySample>, std::string> parse_samples(std::string, std::string);
 
+/// The rows of all files as they stand, each with its row of the meta file beside it.
 template <class Sample> class MotionSamples<Sample>::Rows {
  public:
-  explicit Rows(const std::filesystem::path& file) : reader_(open_table<Sample>(file)) {}
+  explicit Rows(std::vector<std::filesystem::path> files) : files_(std::move(files)) {}
 
-  bool next(Sample& sample) { return reader_.next(sample); }
-  [[nodiscard]] const Problem& problem() const { return reader_.problem(); }
+  /// False at the end, and where there is a problem or a meta file is of another order.
+  bool next(Sample& sample) {
+    while (!problem_ && in_step_ && (samples_ || next_file_ < files_.size())) {
+      if (!samples_) {
+        open();
+      }
+      if (samples_->next(sample)) {
+        latest_ = sample.stamp;
+        add_meta(sample);
+        return !problem_ && in_step_;
+      }
+      end_file();
+    }
+    return false;
+  }
+
+  [[nodiscard]] const Problem& problem() const { return problem_; }
+  /// Whether every row of a meta file belongs to the sample that stands in the same place.
+  [[nodiscard]] bool in_step() const { return in_step_; }
+  [[nodiscard]] const std::vector<std::string>& breaks() const { return breaks_; }
 
  private:
-  RowReader<Sample> reader_;
+  void open() {
+    const std::filesystem::path& file = files_[next_file_++];
+    samples_.emplace(open_table<Sample>(file));
+    if (const std::filesystem::path meta = meta_file_of(file); std::filesystem::exists(meta)) {
+      meta_.emplace(meta, ',', &parse_meta);
+    }
+  }
+
+  void add_meta(Sample& sample) {
+    Meta row;
+    if (meta_ && meta_->next(row)) {
+      in_step_ = row.stamp == sample.stamp;
+      apply(row, sample);
+    } else if (meta_) {
+      note(*meta_);
+      meta_.reset();
+    }
+  }
+
+  /// Of two files that were not written to their ends, one is shorter.
+  void end_file() {
+    note(*samples_);
+    Meta row;
+    if (meta_ && meta_->next(row)) {
+      in_step_ = !latest_ || row.stamp > *latest_;
+      breaks_.push_back(fmt::format("{}: breaks off before its meta file does; what is there is used",
+                                    files_[next_file_ - 1].string()));
+    } else if (meta_) {
+      note(*meta_);
+    }
+    samples_.reset();
+    meta_.reset();
+    latest_.reset();
+  }
+
+  template <class Row> void note(const RowReader<Row>& ended) {
+    if (ended.breaks_off()) {
+      breaks_.push_back(fmt::format("{}; the file breaks off there, what is before it is used", *ended.problem()));
+    } else {
+      problem_ = problem_ ? problem_ : ended.problem();
+    }
+  }
+
+  std::vector<std::filesystem::path> files_;
+  std::size_t next_file_ = 0;
+  std::optional<RowReader<Sample>> samples_; ///< nothing between two files
+  std::optional<RowReader<Meta>> meta_;
+  std::optional<Stamp> latest_; ///< of the samples of this file
+  bool in_step_ = true;
+  Problem problem_;
+  std::vector<std::string> breaks_;
 };
 
 template <class Sample>
-Expected<MotionSamples<Sample>, std::string> MotionSamples<Sample>::open(const std::filesystem::path& file) {
-  bool in_order = !std::filesystem::exists(meta_file_of(file));
-  Rows rows(file);
+Expected<MotionSamples<Sample>, std::string> MotionSamples<Sample>::open(std::vector<std::filesystem::path> files) {
+  Rows rows(files);
   std::optional<TimeSpan> arrivals;
-  for (Sample sample; in_order && rows.next(sample);) {
-    in_order = !arrivals || sample.arrival >= arrivals->last;
+  bool in_order = true;
+  for (Sample sample; rows.next(sample);) {
+    in_order &= !arrivals || sample.arrival >= arrivals->last;
     arrivals = {arrivals ? arrivals->first : sample.arrival, sample.arrival};
   }
   if (rows.problem()) {
     return *rows.problem();
   }
-  if (in_order) {
-    return MotionSamples(std::make_unique<Rows>(file), arrivals);
+  if (rows.in_step() && in_order) {
+    MotionSamples samples(std::make_unique<Rows>(std::move(files)), arrivals);
+    samples.breaks_ = rows.breaks();
+    return samples;
   }
-  Expected<std::vector<Sample>, std::string> samples = read_samples<Sample>(file);
-  if (!samples) {
-    return samples.error();
+  std::vector<Sample> all;
+  if (rows.in_step()) {
+    Rows again(std::move(files));
+    for (Sample sample; again.next(sample);) {
+      all.push_back(sample);
+    }
+  } else {
+    for (const std::filesystem::path& file : files) {
+      Expected<std::vector<Sample>, std::string> of_file = read_samples<Sample>(file);
+      if (!of_file) {
+        return of_file.error();
+      }
+      std::ranges::move(*of_file, std::back_inserter(all));
+    }
   }
-  return MotionSamples(std::move(*samples));
+  std::ranges::stable_sort(all, {}, &Sample::arrival);
+  MotionSamples samples(std::move(all));
+  samples.breaks_ = rows.breaks();
+  return samples;
 }
 
 template <class Sample>

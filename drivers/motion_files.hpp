@@ -27,12 +27,18 @@ struct TimeSpan {
 /// and m/s^2: `t_ns,wx,wy,wz,ax,ay,az[,qw,qx,qy,qz]`; of OdometrySample TUM's, seconds and metres: `t x y z qx qy qz
 /// qw`, of whose time the nanoseconds are kept.
 ///
-/// One hour of an IMU would fill 100 MB: a file in which the samples stand in the order of arrival is read as they are
-/// asked for, and only another one is held. One owner.
+/// A recording in pieces has several files, one after the other. One that breaks off in mid-line, because the computer
+/// was switched off, is read up to there.
+///
+/// One hour of an IMU would fill 100 MB: files in which the samples stand in the order of arrival, and their meta rows
+/// in that of the samples, are read as they are asked for, and only others are held. One owner.
 template <class Sample> class MotionSamples {
  public:
-  /// Reads the file through, so that what is wrong with it is known before the first sample is used.
-  static Expected<MotionSamples, std::string> open(const std::filesystem::path& file);
+  /// Reads the files through, so that what is wrong with them is known before the first sample is used.
+  static Expected<MotionSamples, std::string> open(std::vector<std::filesystem::path> files);
+  static Expected<MotionSamples, std::string> open(const std::filesystem::path& file) {
+    return open(std::vector{file});
+  }
 
   /// In the order of their arrival.
   explicit MotionSamples(std::vector<Sample> samples);
@@ -42,6 +48,9 @@ template <class Sample> class MotionSamples {
 
   /// When the first and the last one arrive; nothing if there is none.
   [[nodiscard]] const std::optional<TimeSpan>& arrivals() const { return arrivals_; }
+
+  /// Where a file breaks off, one line for the user each.
+  [[nodiscard]] const std::vector<std::string>& breaks() const { return breaks_; }
 
   /// The next one, valid until pop(); nullptr after the last.
   [[nodiscard]] const Sample* front() const { return ended_ ? nullptr : &front_; }
@@ -55,6 +64,7 @@ template <class Sample> class MotionSamples {
   MotionSamples(std::unique_ptr<Rows> rows, std::optional<TimeSpan> arrivals);
 
   std::optional<TimeSpan> arrivals_;
+  std::vector<std::string> breaks_;
   std::unique_ptr<Rows> rows_; ///< nullptr: the samples are held
   std::vector<Sample> held_;
   std::size_t next_ = 0; ///< of those held
@@ -70,6 +80,11 @@ struct StampedPose {
   Stamp stamp;
   Pose T_source_base; ///< in the frame of whoever says so
 };
+
+/// One line of such a file, line feed included, with `decimals` of each number; without, with as many digits as it
+/// takes to read the same number again.
+std::string to_line(const ImuSample& sample, std::optional<int> decimals = {});
+std::string to_line(const StampedPose& pose, std::optional<int> decimals = {});
 
 /// TUM's table as something to measure by, so more is asked of it: finite, on Earth, in the order of time, at least one
 /// pose. Any thread.

@@ -8,15 +8,15 @@
 namespace locus {
 namespace {
 
-using Bytes = std::span<const std::byte>;
+using ByteSpan = std::span<const std::byte>;
 
-std::uint8_t byte_at(Bytes bytes, std::size_t at) { return std::to_integer<std::uint8_t>(bytes[at]); }
+std::uint8_t byte_at(ByteSpan bytes, std::size_t at) { return std::to_integer<std::uint8_t>(bytes[at]); }
 
-std::uint16_t big_endian_16(Bytes bytes, std::size_t at) {
+std::uint16_t big_endian_16(ByteSpan bytes, std::size_t at) {
   return static_cast<std::uint16_t>(byte_at(bytes, at) << 8 | byte_at(bytes, at + 1));
 }
 
-std::uint32_t big_endian_32(Bytes bytes, std::size_t at) {
+std::uint32_t big_endian_32(ByteSpan bytes, std::size_t at) {
   return std::uint32_t{big_endian_16(bytes, at)} << 16 | big_endian_16(bytes, at + 2);
 }
 
@@ -26,13 +26,13 @@ bool is_vlan_tag(std::uint16_t ether_type) {
 }
 
 /// The IP packet behind a link header of `header_bytes` with an EtherType at `type_at`.
-Expected<Bytes, FrameError> behind_ether_type(Bytes frame, std::size_t header_bytes, std::size_t type_at) {
+Expected<ByteSpan, FrameError> behind_ether_type(ByteSpan frame, std::size_t header_bytes, std::size_t type_at) {
   constexpr std::size_t kVlanTagBytes = 4;
   if (frame.size() < header_bytes) {
     return FrameError::malformed;
   }
   std::uint16_t ether_type = big_endian_16(frame, type_at);
-  Bytes rest = frame.subspan(header_bytes);
+  ByteSpan rest = frame.subspan(header_bytes);
   while (is_vlan_tag(ether_type)) {
     if (rest.size() < kVlanTagBytes) {
       return FrameError::malformed;
@@ -52,7 +52,7 @@ Expected<Bytes, FrameError> behind_ether_type(Bytes frame, std::size_t header_by
 
 /// The IP packet behind a BSD loopback header: an address family in the byte order of the capturing computer, and for
 /// IPv6 a different number on every system.
-Expected<Bytes, FrameError> behind_loopback(Bytes frame) {
+Expected<ByteSpan, FrameError> behind_loopback(ByteSpan frame) {
   constexpr std::size_t kHeaderBytes = 4;
   if (frame.size() < kHeaderBytes) {
     return FrameError::malformed;
@@ -70,7 +70,7 @@ Expected<Bytes, FrameError> behind_loopback(Bytes frame) {
   }
 }
 
-Expected<Bytes, FrameError> ip_packet(int link_type, Bytes frame) {
+Expected<ByteSpan, FrameError> ip_packet(int link_type, ByteSpan frame) {
   switch (link_type) {
   case DLT_EN10MB:
     return behind_ether_type(frame, 14, 12);
@@ -90,7 +90,7 @@ Expected<Bytes, FrameError> ip_packet(int link_type, Bytes frame) {
 }
 
 /// `cut_bytes` of the packet were on the wire, but not captured.
-Expected<Datagram, FrameError> datagram_in(Bytes packet, std::size_t cut_bytes) {
+Expected<Datagram, FrameError> datagram_in(ByteSpan packet, std::size_t cut_bytes) {
   constexpr std::size_t kMinIpHeaderBytes = 20;
   constexpr std::size_t kUdpHeaderBytes = 8;
   constexpr std::uint8_t kUdp = 17;
@@ -116,7 +116,7 @@ Expected<Datagram, FrameError> datagram_in(Bytes packet, std::size_t cut_bytes) 
   if (packet.size() < ip_header_bytes + kUdpHeaderBytes) {
     return FrameError::malformed;
   }
-  const Bytes udp = packet.subspan(ip_header_bytes);
+  const ByteSpan udp = packet.subspan(ip_header_bytes);
   const std::size_t udp_bytes = big_endian_16(udp, 4);
   // The IP length alone may claim too much: a VLP-16 of 2014 puts that of its data packets in its position packets.
   if (udp_bytes < kUdpHeaderBytes || udp_bytes > std::min(ip_bytes - ip_header_bytes, udp.size() + cut_bytes)) {
@@ -150,7 +150,7 @@ bool link_type_supported(int link_type) {
 }
 
 Expected<Datagram, FrameError> udp_datagram(int link_type, std::span<const std::byte> frame, std::size_t wire_bytes) {
-  const Expected<Bytes, FrameError> packet = ip_packet(link_type, frame);
+  const Expected<ByteSpan, FrameError> packet = ip_packet(link_type, frame);
   if (!packet) {
     return packet.error();
   }

@@ -9,6 +9,7 @@
 #include <arpa/inet.h>
 #include <fmt/format.h>
 #include <ifaddrs.h>
+#include <linux/sock_diag.h>
 #include <net/if.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -28,13 +29,15 @@ std::string because(const char* what, std::uint16_t port) {
                      advice); // NOLINT(concurrency-mt-unsafe)
 }
 
-/// Lidars speak IPv4; a socket of both families, as systemd makes them, sees their addresses mapped.
+/// Lidars speak IPv4; a socket of both families, as systemd makes them, sees their addresses mapped. Who speaks IPv6
+/// has none.
 std::uint32_t ip_of(const sockaddr_storage& address) {
   std::uint32_t ip = 0;
   if (address.ss_family == AF_INET)
     std::memcpy(&ip, &reinterpret_cast<const sockaddr_in&>(address).sin_addr, sizeof(ip));
-  else if (address.ss_family == AF_INET6)
-    std::memcpy(&ip, &reinterpret_cast<const sockaddr_in6&>(address).sin6_addr.s6_addr[12], sizeof(ip));
+  else if (const auto& v6 = reinterpret_cast<const sockaddr_in6&>(address).sin6_addr;
+           address.ss_family == AF_INET6 && IN6_IS_ADDR_V4MAPPED(&v6))
+    std::memcpy(&ip, &v6.s6_addr[12], sizeof(ip));
   return ntohl(ip);
 }
 
@@ -61,7 +64,7 @@ int granted_buffer_bytes(int descriptor) {
 
 /// What recvmmsg() fills, laid out once.
 struct UdpSocket::Batch {
-  using Control = std::array<std::byte, CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t))>;
+  using Control = std::array<std::byte, CMSG_SPACE(sizeof(timespec))>;
 
   std::array<std::array<std::byte, kMaxPayloadBytes>, kBatch> payloads;
   alignas(cmsghdr) std::array<Control, kBatch> controls;
@@ -83,7 +86,8 @@ UdpSocket::UdpSocket(int descriptor) : descriptor_(descriptor), batch_(std::make
 
 UdpSocket::UdpSocket(UdpSocket&& other) noexcept
     : descriptor_(std::exchange(other.descriptor_, -1)), port_(other.port_), buffer_bytes_(other.buffer_bytes_),
-      kernel_drops_(other.kernel_drops_), last_drops_(other.last_drops_), batch_(std::move(other.batch_)) {}
+      kernel_drops_(other.kernel_drops_), filtered_(other.filtered_), has_filter_(other.has_filter_),
+      last_drops_(other.last_drops_), batch_(std::move(other.batch_)) {}
 
 UdpSocket::~UdpSocket() {
   if (descriptor_ >= 0)
@@ -128,9 +132,30 @@ std::optional<std::string> UdpSocket::prepare() {
       !set(descriptor_, SOL_SOCKET, SO_RCVBUFFORCE, kWantedBufferBytes))
     set(descriptor_, SOL_SOCKET, SO_RCVBUF, kWantedBufferBytes);
   buffer_bytes_ = granted_buffer_bytes(descriptor_);
-  if (!set(descriptor_, SOL_SOCKET, SO_TIMESTAMPNS, 1) || !set(descriptor_, SOL_SOCKET, SO_RXQ_OVFL, 1))
+  if (!set(descriptor_, SOL_SOCKET, SO_TIMESTAMPNS, 1))
     return because("no stamps of arrival", port_);
+  set(descriptor_, SOL_SOCKET, SO_DETACH_FILTER, 0); // of one that systemd holds and that had another owner before
   return std::nullopt;
+}
+
+bool UdpSocket::filter(std::span<sock_filter> program) {
+  count_drops();
+  const sock_fprog all{static_cast<unsigned short>(program.size()), program.data()};
+  const bool done = program.empty() ? set(descriptor_, SOL_SOCKET, SO_DETACH_FILTER, 0)
+                                    : setsockopt(descriptor_, SOL_SOCKET, SO_ATTACH_FILTER, &all, sizeof(all)) == 0;
+  has_filter_ = done ? !program.empty() : has_filter_;
+  return done;
+}
+
+/// The kernel has one count, in 32 bits, for what found no room and what a filter rejected.
+void UdpSocket::count_drops() {
+  std::array<std::uint32_t, SK_MEMINFO_VARS> figures{};
+  socklen_t size = sizeof(figures);
+  if (getsockopt(descriptor_, SOL_SOCKET, SO_MEMINFO, figures.data(), &size) != 0)
+    return;
+  const std::uint32_t drops = figures[SK_MEMINFO_DROPS];
+  (has_filter_ ? filtered_ : kernel_drops_) += drops - last_drops_; // modulo 2^32
+  last_drops_ = drops;
 }
 
 bool UdpSocket::join(std::uint32_t group_host_order) const {
@@ -154,6 +179,7 @@ bool UdpSocket::join(std::uint32_t group_host_order) const {
 }
 
 std::span<const Datagram> UdpSocket::receive() {
+  count_drops();
   batch_->prepare();
   const int count = recvmmsg(descriptor_, batch_->messages.data(), kBatch, MSG_DONTWAIT, nullptr);
   if (count <= 0)
@@ -166,18 +192,11 @@ std::span<const Datagram> UdpSocket::receive() {
     const sockaddr_storage& sender = batch_->senders[i];
     Stamp stamp = to_stamp(clock);
     for (cmsghdr* control = CMSG_FIRSTHDR(&header); control != nullptr; control = CMSG_NXTHDR(&header, control)) {
-      if (control->cmsg_level != SOL_SOCKET)
+      if (control->cmsg_level != SOL_SOCKET || control->cmsg_type != SO_TIMESTAMPNS)
         continue;
-      if (control->cmsg_type == SO_TIMESTAMPNS) {
-        timespec arrival{};
-        std::memcpy(&arrival, CMSG_DATA(control), sizeof(arrival));
-        stamp = to_stamp(arrival);
-      } else if (control->cmsg_type == SO_RXQ_OVFL) {
-        std::uint32_t drops = 0;
-        std::memcpy(&drops, CMSG_DATA(control), sizeof(drops));
-        kernel_drops_ += drops - last_drops_; // modulo 2^32, as the kernel counts
-        last_drops_ = drops;
-      }
+      timespec arrival{};
+      std::memcpy(&arrival, CMSG_DATA(control), sizeof(arrival));
+      stamp = to_stamp(arrival);
     }
     batch_->datagrams[i] = {{batch_->payloads[i].data(), batch_->messages[i].msg_len},
                             ip_of(sender),

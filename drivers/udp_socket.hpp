@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include <linux/filter.h>
+
 #include "core/expected.hpp"
 #include "drivers/datagram.hpp"
 
@@ -39,6 +41,10 @@ class UdpSocket {
   /// has. Any thread.
   bool join(std::uint32_t group_host_order) const; // NOLINT(modernize-use-nodiscard)
 
+  /// Has the kernel drop datagrams before they take room, as a program of socket filters says; none: no more. Whether
+  /// it took the program. A socket that was adopted is without one.
+  bool filter(std::span<sock_filter> program);
+
   /// What has come, at most kBatch, in order; valid until the next call. Does not wait.
   std::span<const Datagram> receive();
 
@@ -46,19 +52,23 @@ class UdpSocket {
   [[nodiscard]] std::uint16_t port() const { return port_; }
   /// What the kernel gave of kWantedBufferBytes. It holds as much again for its own book-keeping.
   [[nodiscard]] int buffer_bytes() const { return buffer_bytes_; }
-  /// Datagrams that the kernel threw away, because the buffer was full. Known from the next one that it delivers.
+  /// Datagrams that the kernel threw away, because the buffer was full. Known by the next receive().
   [[nodiscard]] std::uint64_t kernel_drops() const { return kernel_drops_; }
+  /// Those that it threw away while there was a filter; what it had no room for then is among them.
+  [[nodiscard]] std::uint64_t filtered() const { return filtered_; }
 
  private:
   struct Batch;
 
   explicit UdpSocket(int descriptor);
   std::optional<std::string> prepare();
+  void count_drops();
 
   int descriptor_;
   std::uint16_t port_ = 0;
   int buffer_bytes_ = 0;
-  std::uint64_t kernel_drops_ = 0;
+  std::uint64_t kernel_drops_ = 0, filtered_ = 0;
+  bool has_filter_ = false;
   std::uint32_t last_drops_ = 0; ///< as the kernel counts, in 32 bits
   std::unique_ptr<Batch> batch_;
 };

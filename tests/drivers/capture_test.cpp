@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/capture.hpp"
 
+#include <algorithm>
 #include <map>
 #include <optional>
 #include <random>
 
 #include <gtest/gtest.h>
+#include <pcap/pcap.h>
 
+#include "drivers/pcap_writer.hpp"
 #include "drivers/udp_frame.hpp"
-#include "locus_sim/pcap_writer.hpp"
 #include "support/errors.hpp"
 #include "support/temporary_file.hpp"
 #include "support/test_data.hpp"
@@ -16,11 +18,6 @@
 namespace locus {
 namespace {
 
-using sim::append_big_endian;
-using sim::Bytes;
-using sim::ethernet;
-using sim::ipv4_udp;
-using sim::PcapWriter;
 using test::TemporaryFile;
 
 Bytes payload_of(std::size_t size) {
@@ -42,7 +39,7 @@ Capture opened(const std::filesystem::path& file) {
 /// The payload of the single datagram in a file of one frame, empty optional if there is none.
 std::optional<Bytes> payload_in(int link_type, const Bytes& frame) {
   const TemporaryFile file{"single.pcap"};
-  { PcapWriter{file.path(), link_type}.write_frame(stamp_from_ns(1), frame); }
+  { PcapWriter::open(file.path(), link_type)->write_frame(stamp_from_ns(1), frame); }
   Capture capture = opened(file.path());
   const Datagram* datagram = capture.next();
   if (datagram == nullptr) {
@@ -54,7 +51,7 @@ std::optional<Bytes> payload_in(int link_type, const Bytes& frame) {
 /// The counters after reading an Ethernet capture of one frame.
 Capture::Stats stats_after(const Bytes& frame) {
   const TemporaryFile file{"single.pcap"};
-  { PcapWriter{file.path()}.write_frame(stamp_from_ns(1), frame); }
+  { PcapWriter::open(file.path())->write_frame(stamp_from_ns(1), frame); }
   Capture capture = opened(file.path());
   while (capture.next() != nullptr) {
   }
@@ -78,7 +75,7 @@ void append_block(Bytes& file, std::uint32_t type, Bytes body) {
   body.resize((body.size() + 3) / 4 * 4);
   append_little_endian(file, type, 4);
   append_little_endian(file, body.size() + 12, 4);
-  sim::append(file, body);
+  append(file, body);
   append_little_endian(file, body.size() + 12, 4);
 }
 
@@ -109,7 +106,7 @@ void append_pcapng_frame(Bytes& file, std::uint64_t time_ns, const Bytes& frame)
   append_little_endian(body, time_ns & 0xFFFFFFFF, 4);
   append_little_endian(body, frame.size(), 4);
   append_little_endian(body, frame.size(), 4);
-  sim::append(body, frame);
+  append(body, frame);
   append_block(file, 6, body);
 }
 
@@ -117,8 +114,8 @@ TEST(Capture, KeepsAddressesPayloadAndNanoseconds) {
   const TemporaryFile file{"one.pcap"};
   const Bytes payload = payload_of(1206);
   {
-    PcapWriter{file.path()}.write(stamp_from_ns(1'700'000'000'123'456'789), 0xC0A801C9, 2369, 0xFFFFFFFF, 2368,
-                                  payload);
+    PcapWriter::open(file.path())
+        ->write(stamp_from_ns(1'700'000'000'123'456'789), {0xC0A801C9, 2369, 0xFFFFFFFF, 2368}, payload);
   }
   Capture capture = opened(file.path());
   const Datagram* datagram = capture.next();
@@ -138,10 +135,10 @@ TEST(Capture, KeepsAddressesPayloadAndNanoseconds) {
 TEST(Capture, TwoLidarsInOneFileAreToldApartByPortAndAddress) {
   const TemporaryFile file{"two.pcap"};
   {
-    PcapWriter writer{file.path()};
+    PcapWriter writer = std::move(*PcapWriter::open(file.path()));
     for (std::int64_t i = 0; i < 10; ++i) {
-      writer.write(stamp_from_ns(2 * i), 0xC0A801C9, 2368, 0xFFFFFFFF, 2368, payload_of(1206));
-      writer.write(stamp_from_ns(2 * i + 1), 0xC0A801CA, 2368, 0xFFFFFFFF, 2369, payload_of(1206));
+      writer.write(stamp_from_ns(2 * i), {0xC0A801C9, 2368, 0xFFFFFFFF, 2368}, payload_of(1206));
+      writer.write(stamp_from_ns(2 * i + 1), {0xC0A801CA, 2368, 0xFFFFFFFF, 2369}, payload_of(1206));
     }
   }
   Capture capture = opened(file.path());
@@ -162,7 +159,7 @@ TEST(Capture, EveryLinkTypeOfTheContractGivesTheSamePayload) {
     for (const auto& [value, count] : fields) {
       append_big_endian(frame, value, count);
     }
-    sim::append(frame, packet);
+    append(frame, packet);
     return frame;
   };
   Bytes vlan;
@@ -212,7 +209,7 @@ TEST(Capture, FragmentsAreRefusedByNameWithTheRemedy) {
   const TemporaryFile file{"fragments.pcap"};
   {
     const Bytes packet = ipv4_udp({}, payload_of(100));
-    PcapWriter writer{file.path()};
+    PcapWriter writer = std::move(*PcapWriter::open(file.path()));
     writer.write_frame(stamp_from_ns(1), ethernet(with_16(packet, 6, 0x2000))); // the first: more fragments
     writer.write_frame(stamp_from_ns(2), ethernet(with_16(packet, 6, 0x000D))); // the last: an offset
     writer.write_frame(stamp_from_ns(3), ethernet(packet));
@@ -260,7 +257,7 @@ TEST(Capture, SnapLengthMarksDatagramsTruncatedAndWarns) {
   constexpr std::size_t kHeaders = 14 + 20 + 8;
   for (const std::size_t snap_length : {std::size_t{20}, kHeaders - 1, kHeaders, kHeaders + 500, kHeaders + 1205}) {
     const TemporaryFile file{"snap.pcap"};
-    { PcapWriter{file.path()}.write_frame(stamp_from_ns(1), frame, snap_length); }
+    { PcapWriter::open(file.path())->write_frame(stamp_from_ns(1), frame, snap_length); }
     Capture capture = opened(file.path());
     const Datagram* datagram = capture.next();
     if (snap_length < kHeaders) {
@@ -281,9 +278,9 @@ TEST(Capture, FileCutAtAnyByteIsReadUpToTheCut) {
   constexpr std::size_t kRecord = 16 + 14 + 20 + 8 + 30;
   const TemporaryFile file{"whole.pcap"};
   {
-    PcapWriter writer{file.path()};
+    PcapWriter writer = std::move(*PcapWriter::open(file.path()));
     for (int i = 0; i < 3; ++i) {
-      writer.write(stamp_from_ns(i), 1, 2368, 2, 2368, payload_of(30));
+      writer.write(stamp_from_ns(i), {1, 2368, 2, 2368}, payload_of(30));
     }
   }
   const Bytes whole = file.read();
@@ -351,9 +348,9 @@ TEST(Capture, PcapngTimeBeyondAllStampsIsMalformed) {
 TEST(Capture, DamageInTheMiddleKeepsWhatPrecedesIt) {
   const TemporaryFile file{"damaged.pcap"};
   {
-    PcapWriter writer{file.path()};
+    PcapWriter writer = std::move(*PcapWriter::open(file.path()));
     for (int i = 0; i < 3; ++i) {
-      writer.write(stamp_from_ns(i), 1, 2368, 2, 2368, payload_of(30));
+      writer.write(stamp_from_ns(i), {1, 2368, 2, 2368}, payload_of(30));
     }
   }
   Bytes content = file.read();
@@ -388,7 +385,7 @@ TEST(Capture, FilesThatAreNoCapturesAreNamedForWhatTheyAre) {
 
 TEST(Capture, ForeignLinkTypeIsNamed) {
   const TemporaryFile file{"wifi.pcap"};
-  { PcapWriter{file.path(), DLT_IEEE802_11}; }
+  PcapWriter::open(file.path(), DLT_IEEE802_11);
   const std::string error = error_of(Capture::open(file.path()));
   EXPECT_TRUE(contains(error, "link type IEEE802_11 (105) is not supported")) << error;
 }
@@ -408,7 +405,7 @@ TEST(Capture, RandomBytesNeverCrashAndEveryFrameIsAccountedFor) {
   for (const int link_type : {DLT_EN10MB, DLT_LINUX_SLL, DLT_LINUX_SLL2, DLT_NULL, DLT_LOOP, DLT_RAW, DLT_IPV4}) {
     constexpr std::uint64_t kFrames = 500;
     {
-      PcapWriter writer{file.path(), link_type};
+      PcapWriter writer = std::move(*PcapWriter::open(file.path(), link_type));
       for (std::uint64_t i = 0; i < kFrames; ++i) {
         writer.write_frame(stamp_from_ns(1), random_bytes(random() % 100), 1 + random() % 100);
       }

@@ -94,6 +94,23 @@ TEST(InjectFaults, NanIsInEveryReading) {
   EXPECT_TRUE(imu[0].attitude->coeffs().array().isNaN().all());
 }
 
+TEST(InjectFaults, CorruptReadingsAreNoReadingsAndTheirStampsStand) {
+  const std::vector<OdometrySample> samples = drive_with({"wio:corrupt=100@0"});
+  ASSERT_EQ(samples.size(), 20u);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    EXPECT_EQ(samples[i].stamp, drive()[i].stamp);
+    const double norm = samples[i].T_source_base.rotation.coeffs().norm();
+    EXPECT_FALSE(std::abs(norm - 1.0) < 1e-6) << norm;
+  }
+}
+
+TEST(InjectFaults, JumpOfAnImuIsATurnAboutItsZ) {
+  std::vector<ImuSample> imu(1);
+  imu[0].arrival = kStart;
+  inject_faults(faults_of({"imu:jump=0.5@0"}), "imu", kStart, 1, imu);
+  EXPECT_EQ(imu[0].angular_velocity_radps, Eigen::Vector3d(0, 0, 0.5));
+}
+
 TEST(InjectFaults, LateSamplesKeepTheirStampAndArriveAfterPunctualOnes) {
   const std::vector<OdometrySample> samples = drive_with({"wio:late=0.25@0.5-0.6"}); // one sample: x = 5
   ASSERT_EQ(samples.size(), 20u);
@@ -225,7 +242,48 @@ TEST(DatagramFaults, FrozenLidarRepeatsItsLastDataPacketWithNewReceiveStamps) {
     EXPECT_EQ(data[static_cast<std::size_t>(i)], (Arrival{4, kStart + i * 10ms, 40'000, 2368}));
   }
   EXPECT_EQ(data[10].number, 10);
-  EXPECT_EQ(recording.to_port(8308)[7].number, 7);
+  EXPECT_EQ(recording.numbers(8308)[7], 4) << "and its last position packet";
+}
+
+TEST(DatagramFaults, PositionPacketsFailAlone) {
+  const Recording recording{"front.position:frozen@0.05", "front.position:lost@0.1"};
+  EXPECT_EQ(recording.numbers(2368), Recording{}.numbers(2368));
+  EXPECT_EQ(recording.numbers(8308), (std::vector{0, 1, 2, 3, 4, 4, 4, 4, 4, 4}));
+}
+
+/// A data packet of a VLP-16 with one return, in its last firing.
+std::vector<std::byte> with_one_return(std::uint16_t raw_range) {
+  std::vector<std::byte> payload(velodyne::kDataPacketBytes);
+  payload[velodyne::kProductIdOffset] = std::byte{0x22};
+  payload[velodyne::kTimeOffset - 3] = static_cast<std::byte>(raw_range);
+  payload[velodyne::kTimeOffset - 2] = static_cast<std::byte>(raw_range >> 8);
+  return payload;
+}
+
+std::vector<std::byte> after(std::initializer_list<std::string_view> faults, const std::vector<std::byte>& payload) {
+  DatagramFaults injector{faults_of(faults), kStart, 1};
+  Datagram datagram;
+  datagram.payload = payload;
+  datagram.receive_stamp = kStart;
+  std::vector<std::byte> arrived;
+  injector.pass("front", datagram, [&](const Datagram& d) { arrived.assign(d.payload.begin(), d.payload.end()); });
+  return arrived;
+}
+
+TEST(DatagramFaults, JumpLengthensTheRangesThatThereAre) {
+  EXPECT_EQ(after({"front:jump=2@0"}, with_one_return(1000)), with_one_return(2000));
+  EXPECT_EQ(after({"front:jump=-3@0"}, with_one_return(1000)), with_one_return(1)) << "and still is a return";
+  EXPECT_EQ(after({"front:jump=1e6@0"}, with_one_return(1000)), with_one_return(65535));
+  EXPECT_EQ(after({"front:jump=2@0"}, with_one_return(0)), with_one_return(0));
+}
+
+TEST(DatagramFaults, CorruptPacketsAreRandomFromSomeByteOnAndTheSameOnEveryRun) {
+  const std::vector<std::byte> healthy = with_one_return(1000);
+  const std::vector<std::byte> corrupt = after({"front:corrupt=100@0"}, healthy);
+  ASSERT_EQ(corrupt.size(), healthy.size());
+  EXPECT_NE(corrupt, healthy);
+  EXPECT_EQ(corrupt, after({"front:corrupt=100@0"}, healthy));
+  EXPECT_EQ(after({"front:corrupt=100@0"}, {}), std::vector<std::byte>{});
 }
 
 TEST(DatagramFaults, LidarFrozenFromTheStartRepeatsItsFirstPacket) {

@@ -20,7 +20,9 @@ Fault parsed(std::string_view text) {
   return *fault;
 }
 
-const std::array kTargets{FaultTarget{"front", FaultTarget::Kind::lidar}, FaultTarget{"rear", FaultTarget::Kind::lidar},
+const std::array kTargets{FaultTarget{"front", FaultTarget::Kind::lidar},
+                          FaultTarget{"front.position", FaultTarget::Kind::position_packets},
+                          FaultTarget{"rear", FaultTarget::Kind::lidar},
                           FaultTarget{"wio", FaultTarget::Kind::odometry}, FaultTarget{"imu", FaultTarget::Kind::imu}};
 
 std::string problem_of(std::string_view text) { return fault_problem(parsed(text), kTargets).value_or(""); }
@@ -48,6 +50,7 @@ TEST(Fault, ValuesHaveTheDocumentedDefaults) {
   EXPECT_EQ(parsed("a:packet-loss@1").value, 10.0);
   EXPECT_EQ(parsed("a:reorder@1").value, 10.0);
   EXPECT_EQ(parsed("a:duplicate@1").value, 10.0);
+  EXPECT_EQ(parsed("a:corrupt@1").value, 10.0);
   EXPECT_EQ(parsed("a:clock-step=-3@1").value, -3.0);
 }
 
@@ -57,7 +60,7 @@ TEST(Fault, WhatCannotBeReadIsAnErrorThatSaysWhatCan) {
   }
   EXPECT_TRUE(contains(error_of(Fault::parse("wio:broken@3")),
                        "unknown kind \"broken\"; known are lost, frozen, jump, nan, late, "
-                       "covariance, clock-step, packet-loss, reorder, duplicate"));
+                       "covariance, clock-step, packet-loss, reorder, duplicate, corrupt"));
   for (const char* text : {"wio:lost=3@1", "wio:nan=@1"}) {
     EXPECT_TRUE(contains(error_of(Fault::parse(text)), "takes no value")) << text;
   }
@@ -75,15 +78,17 @@ TEST(Fault, WhatCannotBeReadIsAnErrorThatSaysWhatCan) {
 
 TEST(Fault, MustFitTheSensorItNames) {
   for (const char* text : {"front:late@1", "all-lidars:clock-step@1", "wio:jump@1", "wio:covariance@1", "imu:nan@1",
-                           "imu:frozen@1", "rear:duplicate@1"}) {
+                           "imu:frozen@1", "rear:duplicate@1", "imu:jump@1", "front:jump@1", "wio:corrupt@1",
+                           "front.position:corrupt@1", "front.position:frozen@1"}) {
     EXPECT_EQ(problem_of(text), "") << text;
   }
+  EXPECT_TRUE(contains(problem_of("vio:lost@1"),
+                       "no such lidar or source; there are front, front.position, rear, wio, imu, all-lidars"));
   EXPECT_TRUE(
-      contains(problem_of("vio:lost@1"), "no such lidar or source; there are front, rear, wio, imu, all-lidars"));
-  EXPECT_TRUE(
-      contains(problem_of("front:nan@1"), "a lidar cannot have it; it can have lost, frozen, late, clock-step"));
+      contains(problem_of("front:nan@1"), "a lidar cannot have it; it can have lost, frozen, jump, late, clock-step"));
   EXPECT_TRUE(contains(problem_of("all-lidars:covariance@1"), "a lidar cannot have it"));
-  EXPECT_TRUE(contains(problem_of("imu:jump@1"), "an IMU cannot have it"));
+  EXPECT_TRUE(contains(problem_of("imu:covariance@1"), "an IMU cannot have it"));
+  EXPECT_TRUE(contains(problem_of("front.position:jump@1"), "a position packet cannot have it"));
 }
 
 TEST(FaultPlan, ActsFromItsFirstInstantToTheOneBeforeItsLast) {
@@ -93,6 +98,22 @@ TEST(FaultPlan, ActsFromItsFirstInstantToTheOneBeforeItsLast) {
   EXPECT_TRUE(plan.judge("wio", false, stamp_from_ns(1'999'999'999)).lost);
   EXPECT_FALSE(plan.judge("wio", false, stamp_from_ns(2'000'000'000)).lost);
   EXPECT_FALSE(plan.judge("vio", false, stamp_from_ns(1'500'000'000)).lost);
+}
+
+TEST(FaultPlan, FromTheStartIsFromBeforeTheFirstPacketOn) {
+  FaultPlan plan{std::array{parsed("imu:lost@0-2"), parsed("wio:lost@1-2")}, stamp_from_ns(0), 1};
+  const Stamp before = stamp_from_ns(-500'000'000);
+  EXPECT_TRUE(plan.judge("imu", false, before).lost);
+  EXPECT_FALSE(plan.judge("wio", false, before).lost);
+}
+
+TEST(FaultPlan, PositionPacketsHaveTheFaultsOfTheirLidarAndSomeOfTheirOwn) {
+  FaultPlan plan{std::array{parsed("front:late@0"), parsed("front.position:lost@0")}, stamp_from_ns(0), 1};
+  const auto of = [&](const char* stream) { return plan.judge(stream, true, stamp_from_ns(0)); };
+  EXPECT_TRUE(of("front.position").lost);
+  EXPECT_EQ(of("front.position").delay, 200ms);
+  EXPECT_FALSE(of("front").lost);
+  EXPECT_TRUE(of("rear.position").harmless());
 }
 
 TEST(FaultPlan, AllLidarsAreLidarsOnly) {
@@ -107,7 +128,7 @@ TEST(FaultPlan, FaultsOfOneSensorAddUp) {
                  1};
   const FaultPlan::Verdict verdict = plan.judge("wio", false, stamp_from_ns(0));
   EXPECT_EQ(verdict.delay, 1500ms);
-  EXPECT_EQ(verdict.jump_m, 3.0);
+  EXPECT_EQ(verdict.jump, 3.0);
   EXPECT_FALSE(verdict.harmless());
 }
 

@@ -220,6 +220,17 @@ TEST(LidarRouter, PositionPacketsGoToTheLidarThatSendsThem) {
   EXPECT_EQ(router->lidars()[1].counters().position, 1U);
 }
 
+TEST(LidarRouter, SendersAreKnownOnceEveryLidarOfThePortIs) {
+  auto lidars = LidarRouter::open({options("front", 2368, kOtherIp), options("rear", 2368), options("top", 2400)});
+  ASSERT_TRUE(lidars);
+  EXPECT_EQ(lidars->senders_to(2368).count, 0U);
+  Stream rear;
+  ASSERT_NE(lidars->receive(rear(0)), nullptr);
+  const auto senders = lidars->senders_to(2368);
+  EXPECT_EQ(std::vector(senders.all().begin(), senders.all().end()), (std::vector{kOtherIp, kLidarIp}));
+  EXPECT_EQ(lidars->senders_to(8308).count, 0U) << "the third may send its position packets there";
+}
+
 TEST(LidarRouter, ForeignSendersAreCounted) {
   auto router = LidarRouter::open({options("front", 2368, kLidarIp)});
   ASSERT_TRUE(router);

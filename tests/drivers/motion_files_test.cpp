@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/motion_files.hpp"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -218,16 +220,16 @@ TEST_F(CaptureFolders, FilesOfTheContractAreFoundByName) {
   }
   const auto found = CaptureFolder::find(folder_);
   ASSERT_TRUE(found) << found.error();
-  EXPECT_EQ(found->lidar, folder_ / "lidar.pcap");
-  EXPECT_EQ(found->imu, folder_ / "imu.csv");
+  EXPECT_EQ(found->lidar, std::vector{folder_ / "lidar.pcap"});
+  EXPECT_EQ(found->imu, std::vector{folder_ / "imu.csv"});
   EXPECT_EQ(found->ground_truth, folder_ / "gt.tum");
   EXPECT_EQ(found->map_truth, folder_ / "gt_map.ply");
-  EXPECT_EQ(found->config, folder_ / "config.yaml");
+  EXPECT_EQ(found->config, std::vector{folder_ / "config.yaml"});
   ASSERT_EQ(found->odometry.size(), 3u);
   EXPECT_EQ(found->odometry[0].name, "kio");
   EXPECT_EQ(found->odometry[1].name, "vio");
   EXPECT_EQ(found->odometry[2].name, "wio");
-  EXPECT_EQ(found->odometry[2].file, folder_ / "wio.tum");
+  EXPECT_EQ(found->odometry[2].files, std::vector{folder_ / "wio.tum"});
 }
 
 TEST_F(CaptureFolders, OnlyTheCaptureMustBeThere) {
@@ -235,7 +237,7 @@ TEST_F(CaptureFolders, OnlyTheCaptureMustBeThere) {
   add("lidar.pcapng");
   const auto found = CaptureFolder::find(folder_);
   ASSERT_TRUE(found) << found.error();
-  EXPECT_EQ(found->lidar, folder_ / "lidar.pcapng");
+  EXPECT_EQ(found->lidar, std::vector{folder_ / "lidar.pcapng"});
   EXPECT_TRUE(found->imu.empty());
   EXPECT_TRUE(found->config.empty());
   EXPECT_TRUE(found->odometry.empty());
@@ -247,7 +249,39 @@ TEST_F(CaptureFolders, FileStandsForItself) {
   add("drive.pcap");
   const auto found = CaptureFolder::find(folder_ / "drive.pcap");
   ASSERT_TRUE(found) << found.error();
-  EXPECT_EQ(found->lidar, folder_ / "drive.pcap");
+  EXPECT_EQ(found->lidar, std::vector{folder_ / "drive.pcap"});
+}
+
+TEST_F(CaptureFolders, PiecesAreOneRecordingInTheOrderOfTheirNumbers) {
+  for (const char* piece : {"000001_2026-11-22T08-12-05Z/000009", "000001_2026-11-22T08-12-05Z/000010",
+                            "000002_2026-11-22T09-00-00Z/000001", "000002_2026-11-22T09-00-00Z/000002", "notes"})
+    std::filesystem::create_directories(folder_ / piece);
+  const auto run = [&](const char* name) { return folder_ / name; };
+  const std::string first = "000001_2026-11-22T08-12-05Z", second = "000002_2026-11-22T09-00-00Z";
+  for (const std::string& piece : {first + "/000009", first + "/000010", second + "/000001", std::string{"notes"}}) {
+    add(piece + "/lidar.pcap");
+    add(piece + "/config.yaml");
+  }
+  add(first + "/000009/wio.tum");
+  add(second + "/000001/wio.tum");
+  add(second + "/000001/vio.tum");
+  const auto found = CaptureFolder::find(folder_);
+  ASSERT_TRUE(found) << found.error();
+  EXPECT_EQ(found->lidar, (std::vector{folder_ / first / "000009/lidar.pcap", folder_ / first / "000010/lidar.pcap",
+                                       folder_ / second / "000001/lidar.pcap"}))
+      << "and the last piece had just been begun";
+  ASSERT_EQ(found->odometry.size(), 2U);
+  EXPECT_EQ(found->odometry[0].files,
+            (std::vector{folder_ / first / "000009/wio.tum", folder_ / second / "000001/wio.tum"}));
+  EXPECT_EQ(found->first_config(), folder_ / first / "000009/config.yaml");
+  EXPECT_FALSE(found->changed_config());
+  EXPECT_EQ(CaptureFolder::find(run(first.c_str()))->lidar.size(), 2U);
+  EXPECT_EQ(CaptureFolder::find(folder_ / second / "000001")->lidar.size(), 1U);
+  std::ofstream{folder_ / second / "000001/config.yaml"} << "changed";
+  EXPECT_TRUE(contains(CaptureFolder::find(folder_)->changed_config().value_or(""),
+                       second + "/000001/config.yaml: differs from "));
+  add(second + "/000001/kio.meta.csv");
+  EXPECT_TRUE(contains(error_of(CaptureFolder::find(folder_)), "kio.meta.csv: belongs to no source"));
 }
 
 TEST_F(CaptureFolders, WhatWouldBeIgnoredInSilenceIsAnError) {
@@ -320,6 +354,97 @@ TEST(MotionSamples, AreKnownToBeGoodBeforeTheFirstIsUsed) {
   const TemporaryFile file{"wio.tum", bytes_of(row_at("1") + row_at("2") + "3 0 0\n")};
   EXPECT_TRUE(contains(error_of(MotionSamples<OdometrySample>::open(file.path())), "wio.tum:3: 3 columns"));
   EXPECT_TRUE(contains(error_of(MotionSamples<OdometrySample>::open("/nowhere/wio.tum")), "cannot be read"));
+}
+
+/// The computer was switched off, and each file was on the disk up to another point.
+TEST(MotionSamples, AreReadAsFarAsABrokenRecordingGoes) {
+  const std::string rows = row_at("1") + row_at("2") + row_at("3");
+  const std::string meta = "1000000000,1000000001,1\n2000000000,2000000002,2\n3000000000,3000000003,3\n";
+  for (std::size_t kept = 0; kept <= rows.size(); ++kept) {
+    for (std::size_t meta_kept = 0; meta_kept <= meta.size(); meta_kept += 5) {
+      const TemporaryFile file{"wio.tum", bytes_of(rows.substr(0, kept))};
+      const TemporaryFile meta_file{"wio.meta.csv", bytes_of(meta.substr(0, meta_kept))};
+      auto samples = MotionSamples<OdometrySample>::open(file.path());
+      ASSERT_TRUE(samples) << kept << ' ' << meta_kept << ' ' << samples.error();
+      const auto whole = static_cast<std::size_t>(std::ranges::count(rows.substr(0, kept), '\n'));
+      const std::vector<OdometrySample> read = samples->drain();
+      EXPECT_GE(read.size(), whole);
+      EXPECT_LE(read.size(), whole + 1) << "a last line may only lack its line feed";
+    }
+  }
+  const TemporaryFile file{"wio.tum", bytes_of(row_at("1") + "2 0 0")};
+  auto samples = MotionSamples<OdometrySample>::open(file.path());
+  ASSERT_TRUE(samples);
+  ASSERT_EQ(samples->breaks().size(), 1U);
+  EXPECT_TRUE(
+      contains(samples->breaks()[0], "wio.tum:2: 3 columns; expected t x y z qx qy qz qw; the file breaks off"));
+  EXPECT_EQ(stamps_of(std::move(*samples)), std::vector<std::int64_t>{1'000'000'000});
+  const TemporaryFile blocks{"wio.tum", bytes_of(row_at("1") + "2 0" + std::string(4096, '\0'))};
+  EXPECT_EQ(MotionSamples<OdometrySample>::open(blocks.path())->drain().size(), 1U) << "blocks that were never written";
+}
+
+TEST(MotionSamples, PiecesFollowEachOtherEachWithItsOwnMeta) {
+  const std::vector<std::string> names{"a.tum", "b.tum", "c.tum"};
+  const TemporaryFile a{"a.tum", bytes_of(row_at("1") + row_at("2"))}, b{"b.tum", bytes_of("")},
+      c{"c.tum", bytes_of(row_at("3") + row_at("4") + "5 0")};
+  const TemporaryFile a_meta{"a.meta.csv", bytes_of("1000000000,1500000000,7\n2000000000,2500000000,8\n")};
+  const TemporaryFile c_meta{"c.meta.csv", bytes_of("3000000000,3500000000,9\n4000000000,4500000000,10\n5000000000,5")};
+  auto samples = MotionSamples<OdometrySample>::open({a.path(), b.path(), c.path()});
+  ASSERT_TRUE(samples) << samples.error();
+  EXPECT_EQ(to_ns(samples->arrivals()->first), 1'500'000'000);
+  EXPECT_EQ(to_ns(samples->arrivals()->last), 4'500'000'000);
+  EXPECT_EQ(samples->breaks().size(), 2U);
+  const std::vector<OdometrySample> read = samples->drain();
+  ASSERT_EQ(read.size(), 4U);
+  for (std::size_t i = 0; i < read.size(); ++i) {
+    EXPECT_EQ(to_ns(read[i].arrival), static_cast<std::int64_t>(i + 1) * 1'000'000'000 + 500'000'000);
+    EXPECT_EQ(read[i].covariance_scale, 7.0 + static_cast<double>(i));
+  }
+  const TemporaryFile bad{"bad.tum", bytes_of("1 0\n")};
+  EXPECT_TRUE(contains(error_of(MotionSamples<OdometrySample>::open({a.path(), bad.path()})), "bad.tum:1: 2 columns"));
+}
+
+/// The clock was set back between two samples: no reason to refuse what follows, in one file or in two.
+TEST(MotionSamples, PiecesOutOfOrderAreSortedByArrival) {
+  const TemporaryFile a{"a.tum", bytes_of(row_at("5") + row_at("6"))}, b{"b.tum", bytes_of(row_at("1") + row_at("2"))};
+  const TemporaryFile a_meta{"a.meta.csv", bytes_of("5000000000,5000000001,1\n6000000000,6000000001,1\n7000000000,")};
+  auto samples = MotionSamples<OdometrySample>::open({a.path(), b.path()});
+  ASSERT_TRUE(samples) << samples.error();
+  EXPECT_EQ(stamps_of(std::move(*samples)),
+            (std::vector<std::int64_t>{1'000'000'000, 2'000'000'000, 5'000'000'000, 6'000'000'000}));
+}
+
+TEST(MotionFiles, LinesAreReadAgainToTheLastBit) {
+  std::minstd_rand random(1);
+  std::uniform_real_distribution<double> number(-1000, 1000);
+  const auto vector = [&] { return Eigen::Vector3d(number(random), number(random) * 1e-12, number(random) * 1e12); };
+  std::string imu_lines, odometry_lines;
+  std::vector<ImuSample> imu;
+  std::vector<StampedPose> odometry;
+  for (int i = 0; i < 1000; ++i) {
+    const Stamp stamp = stamp_from_ns(i % 2 == 0 ? 1'700'000'000'000'000'000 + i : std::int64_t{-1'234'567'890} * i);
+    const Eigen::Quaterniond q =
+        Eigen::Quaterniond(number(random), number(random), number(random), number(random)).normalized();
+    imu.push_back({stamp, stamp, vector(), vector(), i % 3 == 0 ? std::nullopt : std::optional{q}});
+    odometry.push_back({stamp, {q, vector()}});
+    imu_lines += to_line(imu.back());
+    odometry_lines += to_line(odometry.back());
+  }
+  const auto read_imu = parse_samples<ImuSample>(imu_lines, "imu.csv");
+  const auto read_odometry = parse_samples<OdometrySample>(odometry_lines, "wio.tum");
+  ASSERT_TRUE(read_imu) << read_imu.error();
+  ASSERT_TRUE(read_odometry) << read_odometry.error();
+  for (std::size_t i = 0; i < imu.size(); ++i) {
+    EXPECT_EQ((*read_imu)[i].stamp, imu[i].stamp);
+    EXPECT_EQ((*read_imu)[i].angular_velocity_radps, imu[i].angular_velocity_radps);
+    EXPECT_EQ((*read_imu)[i].specific_force_mps2, imu[i].specific_force_mps2);
+    ASSERT_EQ((*read_imu)[i].attitude.has_value(), imu[i].attitude.has_value());
+    EXPECT_TRUE(!imu[i].attitude || (*read_imu)[i].attitude->coeffs() == imu[i].attitude->coeffs());
+    EXPECT_EQ((*read_odometry)[i].stamp, odometry[i].stamp);
+    EXPECT_TRUE((*read_odometry)[i].T_source_base == odometry[i].T_source_base);
+  }
+  EXPECT_EQ(to_line(StampedPose{stamp_from_ns(1'500'000'001), {}}, 3),
+            "1.500000001 0.000 0.000 0.000 0.000 0.000 0.000 1.000\n");
 }
 
 TEST(MotionSamples, TellWhenTheFirstAndTheLastArrive) {
