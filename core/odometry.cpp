@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include "core/motion_sources.hpp"
 #include "core/relocation.hpp"
@@ -27,10 +26,6 @@ constexpr double kAlwaysAllowed_rad = 0.1;
 /// After so many refusals in a row the submap is behind us, and the map goes on from the prediction.
 constexpr int kRefusalsToRestart = 10;
 
-/// OdometryEstimate::observability of an axis that counts as seen, with hysteresis.
-constexpr double kDegenerateBelow = 0.01;
-constexpr double kObservableAbove = 0.02;
-
 /// Of what was not foreseen of the motion in a sweep, how much shows in where it comes to lie, how far a turn shifts
 /// it, for what it sees stands to one side, and how much of that goes on in the next.
 constexpr double kAskew = 0.4;
@@ -44,7 +39,8 @@ constexpr double kRest_radps = 0.02;
 /// A prior that is less sure than this looks for counterparts all around each point.
 constexpr double kWide_m = 0.3;
 
-constexpr int kStartRounds = 3; ///< until motion and correction of the first two sweeps agree
+constexpr int kStartRounds = 8;        ///< at the most, until motion and correction of the first two sweeps agree:
+constexpr double kStartAgrees = 0.002; ///< metres, radians
 
 /// Room for the 16 000 voxels of a large sweep, and small enough for the second cache.
 constexpr std::size_t kLastScanBytes = 2'500'000;
@@ -60,25 +56,21 @@ const PriorExpectation kInertialUnit{.sigma = along_each_axis(0.3, 0.1),
                                      .least_sigma = along_each_axis(0.002, 0.02)};
 const Vector6 kUnknownMotion = along_each_axis(3.0, 10.0); ///< per sweep, of a robot of which nothing is known
 
-/// Block-diagonal matrix that turns both halves of a 6-vector.
-Matrix6 turn_both(const Eigen::Quaterniond& rotation) {
-  Matrix6 R = Matrix6::Zero();
-  R.topLeftCorner<3, 3>() = R.bottomRightCorner<3, 3>() = rotation.toRotationMatrix();
-  return R;
-}
-
-/// Difference T - reference as translation and turn, both along the axes of the common left frame.
-Vector6 difference(const Pose& T, const Pose& reference) {
-  Vector6 d;
-  d << T.translation - reference.translation, so3_log(T.rotation * reference.rotation.conjugate());
-  return d;
+/// Of two registrations of the same points. A point without a counterpart counts as one that is three sigma off.
+bool fits_better(const Registration& one, const Registration& other) {
+  constexpr double kMissing = 9.0;
+  const auto gain = [](const Registration& fit) {
+    return static_cast<double>(fit.inliers) * (kMissing - fit.mean_error);
+  };
+  return gain(one) > gain(other);
 }
 
 } // namespace
 
 Odometry::Odometry(const OdometryOptions& options, StageClock* clock)
     : options_(options), clock_(clock), gicp_(options.threads, options.isa), flat_ground_(options.flat_ground),
-      map_(options.map.max_bytes), last_scan_map_(kLastScanBytes), constant_velocity_statistics_(kConstantVelocity) {
+      map_(options.map.max_bytes, options.isa), last_scan_map_(kLastScanBytes, options.isa),
+      constant_velocity_statistics_(kConstantVelocity) {
   for (const MotionSourceOptions& source : options.motion_sources)
     statistics_.emplace_back(source.kind == SourceKind::imu ? kInertialUnit : kOdometrySource);
   gyro_biases_.resize(options.motion_sources.size());
@@ -86,9 +78,11 @@ Odometry::Odometry(const OdometryOptions& options, StageClock* clock)
 }
 
 OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested& stop) {
+  prepare_next();
   if (processed_ == 0)
     return begin(sweep);
-  const Prior prior = integrate_sensors(sweep);
+  const Prior prior = settle_dispute(sweep, integrate_sensors(sweep), stop);
+  lacks_prior_ = needs_scan_to_scan(prior);
   gravity_.observe(prior.T_last_now.rotation, sweep);
   flat_ground_.observe(sweep.end, gravity_.up_base());
   Pose T_last_now = prior.T_last_now;
@@ -118,6 +112,25 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
   return estimate;
 }
 
+void Odometry::prepare_next() {
+  if (keyframe_observability_) {
+    const StageScope scope(clock_, Stage::map);
+    const double fresh = map_.insert(last_scan_, T_odom_last_);
+    uncertainty_.keep(share_of_map(fresh, *keyframe_observability_));
+    keyframe_observability_.reset();
+  }
+  if (lacks_prior_ && !last_scan_mapped_) // most likely the next one will, too
+    map_last_scan(last_registered_);
+}
+
+/// The target of scan-to-scan: the first so many points of the last sweep.
+void Odometry::map_last_scan(std::size_t points) {
+  const StageScope scope(clock_, Stage::scan_to_scan);
+  last_scan_map_.clear();
+  last_scan_map_.insert(std::span(last_scan_).first(points), Pose{});
+  last_scan_mapped_ = true;
+}
+
 void Odometry::begin_at(const Pose& T_odom_base, std::span<const SurfacePoint> map_odom) {
   T_odom_start_ = T_odom_base;
   knows_start_ = !map_odom.empty();
@@ -126,7 +139,7 @@ void Odometry::begin_at(const Pose& T_odom_base, std::span<const SurfacePoint> m
 
 /// The world begins at the first sweep: where it is told to, or at its origin, without yaw, level if gravity is known.
 OdometryEstimate Odometry::begin(const Sweep& sweep) {
-  correct_all(sweep.points, Vector6::Zero(), Duration::zero(), scan_);
+  correct_all(sweep.points, Vector6::Zero(), options_.isa, scan_);
   registered_ = sweep.registered;
   gravity_.observe(Eigen::Quaterniond::Identity(), sweep);
   if (T_odom_start_)
@@ -156,7 +169,7 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
   return estimate;
 }
 
-Odometry::Prior Odometry::integrate_sensors(const Sweep& sweep) const {
+Odometry::Prior Odometry::integrate_sensors(const Sweep& sweep, int without) const {
   Prior prior;
   const double elapsed_s = to_seconds(sweep.end - last_stamp_);
   const double periods = last_period_ > Duration::zero() ? std::max(1.0, elapsed_s / to_seconds(last_period_)) : 1.0;
@@ -171,7 +184,7 @@ Odometry::Prior Odometry::integrate_sensors(const Sweep& sweep) const {
 
   const auto kind_of = [this](std::size_t i) { return options_.motion_sources[i].kind; };
   const auto usable = [&](std::size_t i) {
-    return sweep.sources[i].usable && last_sources_[i].usable && step(sweep, i).has_value();
+    return static_cast<int>(i) != without && sweep.sources[i].usable && last_sources_[i].usable && step(sweep, i);
   };
   const SourceChoice choice = choose_sources(kind_of, options_.motion_sources.size(), options_.fusion, usable);
   if (choice.rotation) {
@@ -192,6 +205,36 @@ Odometry::Prior Odometry::integrate_sensors(const Sweep& sweep) const {
   return prior;
 }
 
+/// Where the source of the rotation turns quite otherwise than the robot would without it, the surfaces say which is
+/// true: as a prior, a gyro is too sure for them to say so later. The loser makes the winner less sure.
+Odometry::Prior Odometry::settle_dispute(const Sweep& sweep, const Prior& prior, const Gicp::StopRequested& stop) {
+  refuted_.reset();
+  if (prior.source.rotation < 0 || adrift_ || sweep.points.size() < kMinPoints)
+    return prior;
+  const Prior rival = integrate_sensors(sweep, prior.source.rotation);
+  const Eigen::Vector3d dispute = difference(prior.T_last_now, rival.T_last_now).tail<3>();
+  if (dispute.norm() < kAlwaysAllowed_rad)
+    return prior;
+  const Registration with_source = attempt(sweep, prior.T_last_now, stop);
+  refuted_ = prior.T_last_now;
+  const Registration without_source = attempt(sweep, rival.T_last_now, stop);
+  Prior accepted = rival;
+  if (!fits_better(without_source, with_source)) {
+    accepted = prior;
+    refuted_.reset();
+  }
+  accepted.variance.tail<3>() += dispute.cwiseAbs2();
+  return accepted;
+}
+
+/// Lays the sweep into the submap from where T_last_now takes it, with nothing to hold it there.
+Registration Odometry::attempt(const Sweep& sweep, const Pose& T_last_now, const Gicp::StopRequested& stop) {
+  correct_motion(sweep, T_last_now);
+  const StageScope scope(clock_, Stage::scan_to_submap);
+  const Pose T_start = T_odom_last_ * T_last_now;
+  return gicp_.align(registered(), map_, T_start, {.T_target_source = T_start}, options_.scan_to_submap, true, stop);
+}
+
 /// T_last_now as one source saw it, less what is known of its error; nothing where it does not know.
 std::optional<Pose> Odometry::step(const Sweep& sweep, std::size_t source) const {
   const SourcePose& last = last_sources_[source];
@@ -206,32 +249,37 @@ std::optional<Pose> Odometry::step(const Sweep& sweep, std::size_t source) const
 
 /// Takes out of the points what no motion source could, with the twist that T_last_now means.
 void Odometry::correct_motion(const Sweep& sweep, const Pose& T_last_now) {
-  correct_all(sweep.points, uncorrected_twist(sweep, T_last_now), sweep.end - sweep.start, scan_);
+  correct_all(sweep.points, uncorrected_twist(sweep, T_last_now), options_.isa, scan_);
   registered_ = sweep.registered;
 }
 
 /// The part of the motion that is still in the points of the sweep.
 Vector6 Odometry::uncorrected_twist(const Sweep& sweep, const Pose& T_last_now) const {
   const double elapsed_s = to_seconds(sweep.end - last_stamp_);
-  if (sweep.uncorrected == Uncorrected::nothing || elapsed_s <= 0.0)
+  if (elapsed_s <= 0.0)
     return Vector6::Zero();
-  Vector6 twist = se3_log(T_last_now) / elapsed_s;
-  if (sweep.uncorrected == Uncorrected::translation)
-    twist.tail<3>().setZero();
-  return twist;
+  const Vector6 twist = se3_log(T_last_now) / elapsed_s;
+  Vector6 corrected = refuted_ ? se3_log(*refuted_) / elapsed_s : twist;
+  if (sweep.uncorrected != Uncorrected::nothing)
+    corrected.head<3>().setZero();
+  if (sweep.uncorrected == Uncorrected::all)
+    corrected.tail<3>().setZero();
+  return twist - corrected;
+}
+
+bool Odometry::needs_scan_to_scan(const Prior& prior) const {
+  return options_.scan_to_scan_mode == ScanToScanMode::always ||
+         (options_.scan_to_scan_mode == ScanToScanMode::automatic && prior.source.translation < 0);
 }
 
 Registration Odometry::match_scan(const Prior& prior, const Pose& T_start, bool wide, const Gicp::StopRequested& stop) {
   Registration none;
   none.T_target_source = T_start;
-  const bool needed = options_.scan_to_scan_mode == ScanToScanMode::always || prior.source.translation < 0;
-  if (options_.scan_to_scan_mode == ScanToScanMode::off || !needed || scan_.size() < kMinPoints)
+  if (!needs_scan_to_scan(prior) || scan_.size() < kMinPoints)
     return none;
+  if (!last_scan_mapped_) // once the motion is roughly known, the points that are registered make map enough
+    map_last_scan(prior.blind ? last_scan_.size() : last_registered_);
   const StageScope scope(clock_, Stage::scan_to_scan);
-  last_scan_map_.clear();
-  // Once the motion is roughly known, the points that are registered make map enough.
-  const std::size_t points = prior.blind ? last_scan_.size() : last_registered_;
-  last_scan_map_.insert(std::span(last_scan_).first(points), Pose{});
   const PosePrior pose_prior{prior.T_last_now, prior.variance.cwiseInverse().asDiagonal()};
   return gicp_.align(registered(), last_scan_map_, T_start, pose_prior, options_.scan_to_scan, wide, stop);
 }
@@ -244,9 +292,12 @@ void Odometry::begin_again(const Sweep& sweep, const Prior& prior, Registration&
     return;
   for (int round = 0; round < kStartRounds; ++round) {
     const Pose T_last_now = found.T_target_source;
-    correct_all(first_points_, uncorrected_twist(sweep, T_last_now), sweep.end - sweep.start, last_scan_);
+    correct_all(first_points_, uncorrected_twist(sweep, T_last_now), options_.isa, last_scan_);
+    last_scan_mapped_ = false;
     correct_motion(sweep, T_last_now);
-    found = match_scan(prior, T_last_now, false, stop);
+    found = match_scan(prior, T_last_now, true, stop);
+    if (difference(found.T_target_source, T_last_now).cwiseAbs().maxCoeff() < kStartAgrees)
+      break;
   }
   first_points_ = {};
   map_.clear();
@@ -306,10 +357,7 @@ bool Odometry::trusts(const Registration& registration, const Pose& T_last_now, 
 void Odometry::judge_sources(const Sweep& sweep, const Prior& prior, const Pose& T_last_now,
                              const OdometryEstimate& estimate) {
   const Matrix6 R = turn_both(T_odom_last_.rotation.conjugate());
-  Matrix6 information = R * estimate.scan_to_submap.information * R.transpose();
-  for (std::size_t axis = 0; axis < weak_.size(); ++axis)
-    if (weak_[axis]) // the little that is said of it is said by its neighbours
-      information.row(static_cast<Eigen::Index>(axis)).setZero();
+  Matrix6 information = seen_axes_.rows_of(R * estimate.scan_to_submap.information * R.transpose());
   const bool stands = estimate.state == TrackingState::standstill;
   for (std::size_t i = 0; i < options_.motion_sources.size(); ++i) {
     const std::optional<Pose> T_last_predicted = step(sweep, i);
@@ -327,7 +375,8 @@ void Odometry::judge_sources(const Sweep& sweep, const Prior& prior, const Pose&
       statistics_[i].learn(error, seen);
     if (imu) {
       gyro_biases_[i].learn(-error.tail<3>(), so3_log(T_last_now.rotation), sweep.end - last_stamp_);
-      gyro_scales_[i].learn(-seen_part(error).tail<3>(), seen_part(se3_log(*T_last_predicted)).tail<3>());
+      gyro_scales_[i].learn(-seen_axes_.part_of(error).tail<3>(),
+                            seen_axes_.part_of(se3_log(*T_last_predicted)).tail<3>());
     }
   }
   if (stands)
@@ -340,7 +389,8 @@ void Odometry::judge_sources(const Sweep& sweep, const Prior& prior, const Pose&
   constant_velocity_statistics_.learn(difference(T_last_now, T_last_kept), information);
 }
 
-void Odometry::update_map(OdometryEstimate& estimate) {
+/// A sweep that the map is to take in.
+void Odometry::choose_keyframe(OdometryEstimate& estimate) {
   const Pose T_keyframe_base = T_odom_keyframe_.inverse() * estimate.T_odom_base;
   const double turned_deg = angle_rad(T_keyframe_base.rotation) / kRadPerDeg;
   const bool moved =
@@ -349,11 +399,9 @@ void Odometry::update_map(OdometryEstimate& estimate) {
   const bool restarts = refused_in_a_row_ >= kRefusalsToRestart && scan_.size() >= kMinPoints;
   if ((estimate.failed && !restarts) || !(moved || first || restarts))
     return;
-  const StageScope scope(clock_, Stage::map);
   estimate.T_odom_base.rotation =
       (so3_exp(tilt_keeper_.take_correction_rad()) * estimate.T_odom_base.rotation).normalized();
-  const double fresh = map_.insert(scan_, estimate.T_odom_base);
-  uncertainty_.keep(share_of_map(fresh, estimate.scan_to_submap.observability));
+  keyframe_observability_ = estimate.scan_to_submap.observability;
   T_odom_keyframe_ = estimate.T_odom_base;
   refused_in_a_row_ = 0;
   estimate.keyframe = true;
@@ -364,7 +412,7 @@ void Odometry::update_map(OdometryEstimate& estimate) {
 /// Along axes that no surface constrains nothing old holds it back.
 Matrix6 Odometry::share_of_map(double fresh, const Matrix6& observability) {
   const Matrix6 all = Matrix6::Identity();
-  const Matrix6 seen = observability / kDegenerateBelow;
+  const Matrix6 seen = observability / SeenAxes::kWeakBelow;
   const Matrix6 unseen = (seen * seen + all).inverse();
   const double share = 2.0 * fresh / (1.0 + fresh);
   return share * all + (1.0 - share) * unseen;
@@ -404,22 +452,14 @@ void Odometry::settle(const Sweep& sweep, const Prior& prior, OdometryEstimate& 
   const Pose T_last_moved = motion(T_last_now, estimate.scan_to_scan.T_target_source);
   move_on(T_last_moved, uncertainty_.against_submap(), estimate);
   bend(difference(T_last_moved, prior.T_last_now));
-  feedback_.twist_base = seen_part(twist_base_);
-  std::ranges::transform(weak_, feedback_.sees.begin(), std::logical_not{});
-}
-
-/// Nothing along axes of the base that lidar hardly sees.
-Vector6 Odometry::seen_part(Vector6 along_base) const {
-  for (std::size_t axis = 0; axis < weak_.size(); ++axis)
-    if (weak_[axis])
-      along_base[static_cast<Eigen::Index>(axis)] = 0.0;
-  return along_base;
+  feedback_.twist_base = seen_axes_.part_of(twist_base_);
+  feedback_.sees = seen_axes_.each();
 }
 
 /// T_last_now as far as it is a motion of the robot. Along axes that lidar hardly sees the place in the submap may be
 /// off by much, and a few points may pull it far: there the motion is that from sweep to sweep.
 Pose Odometry::motion(const Pose& T_last_now, const Pose& T_last_seen) const {
-  const Vector6 corrected = seen_part(difference(T_last_now, T_last_seen));
+  const Vector6 corrected = seen_axes_.part_of(difference(T_last_now, T_last_seen));
   return {so3_exp(corrected.tail<3>()) * T_last_seen.rotation, T_last_seen.translation + corrected.head<3>()};
 }
 
@@ -435,17 +475,9 @@ void Odometry::bend(const Vector6& surprise) {
 
 /// Which axes of the base the lidar sees, and whether they are enough.
 void Odometry::observe(OdometryEstimate& estimate) {
-  constexpr double kLeast = 1e-6; ///< keeps an axis of which nothing is seen solvable
   const Matrix6 R = turn_both(estimate.T_odom_base.rotation);
-  const Matrix6 seen = R.transpose() * estimate.scan_to_submap.observability * R + kLeast * Matrix6::Identity();
-  estimate.observability = seen.inverse().diagonal().cwiseInverse().cwiseMin(1.0);
-  bool degenerate = false;
-  for (std::size_t axis = 0; axis < weak_.size(); ++axis) {
-    const double observability = estimate.observability[static_cast<Eigen::Index>(axis)];
-    weak_[axis] = observability < (weak_[axis] ? kObservableAbove : kDegenerateBelow);
-    degenerate = degenerate || weak_[axis];
-  }
-  if (degenerate && estimate.state == TrackingState::tracking)
+  estimate.observability = seen_axes_.observe(R.transpose() * estimate.scan_to_submap.observability * R);
+  if (!seen_axes_.all() && estimate.state == TrackingState::tracking)
     estimate.state = TrackingState::degenerate;
 }
 
@@ -460,7 +492,7 @@ void Odometry::move_on(const Pose& T_last_now, const Matrix6& covariance_odom, O
   estimate.twist_base = twist_base_;
 }
 
-/// Fills in what the estimate says beside its pose, takes the sweep into the map and remembers it as the last.
+/// Fills in what the estimate says beside its pose, and remembers the sweep as the last.
 void Odometry::finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate) {
   estimate.stamp = sweep.end;
   estimate.points = registered_;
@@ -480,7 +512,7 @@ void Odometry::finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& 
   adrift_ = estimate.failed;
   tilt_keeper_.observe(estimate.T_odom_base.rotation, gravity_.up_base());
 
-  update_map(estimate);
+  choose_keyframe(estimate);
   ++processed_;
   T_odom_last_ = estimate.T_odom_base;
   last_stamp_ = sweep.end;
@@ -491,6 +523,7 @@ void Odometry::finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& 
   last_sources_ = sweep.sources;
   std::swap(last_scan_, scan_);
   last_registered_ = registered_;
+  last_scan_mapped_ = false;
 }
 
 } // namespace locus

@@ -17,6 +17,7 @@
 #include "core/prior_statistics.hpp"
 #include "core/registration.hpp"
 #include "core/registration_feedback.hpp"
+#include "core/seen_axes.hpp"
 #include "core/stage_clock.hpp"
 #include "core/standstill.hpp"
 #include "core/surface_map.hpp"
@@ -46,9 +47,14 @@ class Odometry {
   OdometryEstimate process(
       const Sweep& sweep, const Gicp::StopRequested& stop = [] { return false; });
 
+  /// What the next sweep needs of the last one: the map takes in a keyframe, and scan-to-scan gets its target. For when
+  /// the estimate is on its way; what is not done here, process() does before it begins. The results are the same.
+  void prepare_next();
+
   /// What the sweep processed last says of the motion sources, for their health.
   [[nodiscard]] const RegistrationFeedback& feedback() const { return feedback_; }
 
+  /// A keyframe is in it from prepare_next() on.
   [[nodiscard]] const SurfaceMap& map() const { return map_; }
 
   /// The points of the sweep processed last, fully corrected: base frame at its end, in the order of Sweep::points.
@@ -68,7 +74,10 @@ class Odometry {
   };
 
   OdometryEstimate begin(const Sweep& sweep);
-  [[nodiscard]] Prior integrate_sensors(const Sweep& sweep) const;
+  static constexpr int kNone = -1;
+  [[nodiscard]] Prior integrate_sensors(const Sweep& sweep, int without = kNone) const;
+  Prior settle_dispute(const Sweep& sweep, const Prior& prior, const Gicp::StopRequested& stop);
+  Registration attempt(const Sweep& sweep, const Pose& T_last_now, const Gicp::StopRequested& stop);
   [[nodiscard]] std::optional<Pose> step(const Sweep& sweep, std::size_t source) const;
   void correct_motion(const Sweep& sweep, const Pose& T_last_now);
   [[nodiscard]] Vector6 uncorrected_twist(const Sweep& sweep, const Pose& T_last_now) const;
@@ -83,13 +92,14 @@ class Odometry {
                             const Vector6& variance) const;
   void judge_sources(const Sweep& sweep, const Prior& prior, const Pose& T_last_now, const OdometryEstimate& estimate);
   [[nodiscard]] std::span<const SurfacePoint> registered() const { return std::span(scan_).first(registered_); }
-  void update_map(OdometryEstimate& estimate);
+  [[nodiscard]] bool needs_scan_to_scan(const Prior& prior) const;
+  void map_last_scan(std::size_t points);
+  void choose_keyframe(OdometryEstimate& estimate);
   static Matrix6 share_of_map(double fresh, const Matrix6& observability);
   void hold_still(const Sweep& sweep, OdometryEstimate& estimate);
   [[nodiscard]] bool sources_saw_motion(const Sweep& sweep) const;
   void settle(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate);
   [[nodiscard]] Pose motion(const Pose& T_last_now, const Pose& T_last_seen) const;
-  [[nodiscard]] Vector6 seen_part(Vector6 along_base) const;
   void bend(const Vector6& surprise);
   void observe(OdometryEstimate& estimate);
   void move_on(const Pose& T_last_now, const Matrix6& covariance_odom, OdometryEstimate& estimate);
@@ -103,6 +113,7 @@ class Odometry {
   FlatGroundAssumption flat_ground_;
   SurfaceMap map_;
   SurfaceMap last_scan_map_;       ///< the last processed sweep alone, the target of scan-to-scan
+  bool last_scan_mapped_ = false;  ///< last_scan_map_ is up to date
   std::vector<SurfacePoint> scan_; ///< the sweep at hand, fully corrected
   std::size_t registered_ = 0;     ///< the first so many points of scan_ are registered
   std::vector<SurfacePoint> last_scan_;
@@ -120,16 +131,19 @@ class Odometry {
   Pose T_odom_last_;
   Vector6 twist_base_ = Vector6::Zero();
   Pose T_odom_keyframe_;
+  std::optional<Matrix6> keyframe_observability_; ///< of the last sweep, if the map is still to take it in
   PoseUncertainty uncertainty_;
   Vector6 askew_variance_ = Vector6::Zero(); ///< of the last sweep, base axes
   std::vector<GyroBias> gyro_biases_;
   std::vector<GyroScale> gyro_scales_;
   Standstill standstill_;
   int refused_in_a_row_ = 0; ///< sweeps with points
+  bool lacks_prior_ = false; ///< the last sweep had to be registered with the one before it
   bool adrift_ = false;      ///< the last sweep was a prediction
   bool knows_start_ = false; ///< the map holds what was seen at T_odom_start_
   bool resumed_ = false;
-  std::array<bool, 6> weak_{}; ///< axes that lidar hardly sees
+  std::optional<Pose> refuted_; ///< T_last_now that the points of the sweep are corrected for, and that is not true
+  SeenAxes seen_axes_;
   RegistrationFeedback feedback_;
 };
 

@@ -73,6 +73,18 @@ Matrix6 adjoint(const Pose& T_a_b) {
   return ad;
 }
 
+Matrix6 turn_both(const Eigen::Quaterniond& rotation) {
+  Matrix6 R = Matrix6::Zero();
+  R.topLeftCorner<3, 3>() = R.bottomRightCorner<3, 3>() = rotation.toRotationMatrix();
+  return R;
+}
+
+Vector6 difference(const Pose& T_a_b, const Pose& T_a_reference) {
+  Vector6 d;
+  d << T_a_b.translation - T_a_reference.translation, so3_log(T_a_b.rotation * T_a_reference.rotation.conjugate());
+  return d;
+}
+
 Pose interpolate(const Pose& T_a_from, const Pose& T_a_to, double fraction) {
   const Eigen::Vector3d turn = so3_log(T_a_from.rotation.conjugate() * T_a_to.rotation);
   return {(T_a_from.rotation * so3_exp(fraction * turn)).normalized(),

@@ -53,6 +53,12 @@ Vector6 se3_log(const Pose& pose);
 /// Ad(T): takes a twist seen in b to the same twist seen in a, for T_a_b.
 Matrix6 adjoint(const Pose& T_a_b);
 
+/// Block-diagonal matrix that turns both halves of a tangent.
+Matrix6 turn_both(const Eigen::Quaterniond& rotation);
+
+/// T_a_b - T_a_reference as translation and turn, both along the axes of a.
+Vector6 difference(const Pose& T_a_b, const Pose& T_a_reference);
+
 /// Linear in translation, slerp in rotation; fraction 0 gives `from`, 1 gives `to`, others extrapolate.
 Pose interpolate(const Pose& T_a_from, const Pose& T_a_to, double fraction);
 

@@ -28,11 +28,13 @@ template <class Real> [[gnu::always_inline]] inline PrincipalAxes<Real> principa
   const Real minors = m.yy * m.zz - m.yz * m.yz + m.xx * m.zz - m.xz * m.xz + m.xx * m.yy - m.xy * m.xy;
   const Real determinant =
       m.xx * (m.yy * m.zz - m.yz * m.yz) - m.xy * (m.xy * m.zz - m.xz * m.yz) + m.xz * (m.xy * m.yz - m.xz * m.yy);
+  const Real mean = trace / 3;
   Real least = 0;
   for (int step = 0; step < kSteps; ++step) {
     const Real value = ((trace - least) * least - minors) * least + determinant;
     const Real slope = (3 * least - 2 * trace) * least + minors;
-    least += (value > 0 ? value : Real(0)) / (slope > kTiny ? slope : kTiny);
+    const Real next = least + (value > 0 ? value : Real(0)) / (slope > kTiny ? slope : kTiny);
+    least = next < mean ? next : mean; // where rounding is all there is, as on a line
   }
   const Real sum = trace - least;
   const Real discriminant = sum * sum - 4 * (minors - least * sum);

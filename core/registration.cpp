@@ -106,14 +106,14 @@ struct Gicp::Workers {
   [[nodiscard]] Normals normals() const {
     Normals total;
     for (std::size_t block = 0; block < blocks.size(); ++block)
-      total += normals_of(matches[block]);
+      total += normals_of(matches[block], isa);
     return total;
   }
 
   [[nodiscard]] Matrix6 observability(const Eigen::Matrix3d& R_target_source) const {
     Matrix6 gradients = Matrix6::Zero();
     for (std::size_t block = 0; block < blocks.size(); ++block)
-      gradients += gradients_of(R_target_source, blocks[block], matches[block]);
+      gradients += gradients_of(R_target_source, blocks[block], matches[block], isa);
     return gradients / std::max(normals().points, 1.0);
   }
 

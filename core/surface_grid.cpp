@@ -38,19 +38,64 @@ constexpr std::size_t kEvictionAttempts = 64;
 /// Voxels that are looked for at a time: their waits for memory overlap.
 constexpr std::size_t kAtOnce = 64;
 
-using Upper = Eigen::Matrix<float, 6, 1>;
-const Upper kIdentity{1.0F, 0.0F, 0.0F, 1.0F, 0.0F, 1.0F};
+using PerVoxel = std::array<float, kAtOnce>;
+using Symmetric = Symmetric3<float>;
 
-Upper upper_of_outer(const Eigen::Vector3f& v) {
-  return {v.x() * v.x(), v.x() * v.y(), v.x() * v.z(), v.y() * v.y(), v.y() * v.z(), v.z() * v.z()};
+/// What is known of the points of some voxels, and the surfaces that follow from it.
+struct Fits {
+  PerVoxel count, x, y, z, xx, xy, xz, yy, yz, zz; ///< sums over the points
+  PerVoxel nxx, nxy, nxz, nyy, nyz, nzz;
+  PerVoxel mean_x, mean_y, mean_z, normal_x, normal_y, normal_z, variance_m2, strewn_m2;
+};
+
+/// -1 for a plane, else 0; masks instead of conditions, which would be branches.
+[[gnu::always_inline]] inline std::int32_t is_plane(const PrincipalAxes<float>& axes, float min_spread_m2,
+                                                    float max_across_to_middle, float agreement, float normals) {
+  return -(axes.middle > min_spread_m2) & -(axes.middle > kMinMiddleToGreatest * axes.greatest) &
+         -(axes.least < max_across_to_middle * axes.middle) & -(axes.least < kMaxRoughness_m * kMaxRoughness_m) &
+         -(agreement >= kMinAgreement * normals);
 }
 
-PrincipalAxes<float> axes_of(const Upper& m) { return principal_axes<float>({m[0], m[1], m[2], m[3], m[4], m[5]}); }
-
 /// v' m v
-float quadratic(const Upper& m, const Eigen::Vector3f& v) {
-  return m[0] * v.x() * v.x() + m[3] * v.y() * v.y() + m[5] * v.z() * v.z() +
-         2.0F * (m[1] * v.x() * v.y() + m[2] * v.x() * v.z() + m[4] * v.y() * v.z());
+[[gnu::always_inline]] inline float quadratic(const Symmetric& m, float x, float y, float z) {
+  return m.xx * x * x + m.yy * y * y + m.zz * z * z + 2.0F * (m.xy * x * y + m.xz * x * z + m.yz * y * z);
+}
+
+[[gnu::always_inline]] inline void fit_all(Fits& voxels, float leaf_m) {
+  const float min_spread_m2 = kMinSpreadInLeaves * kMinSpreadInLeaves * leaf_m * leaf_m;
+  const float along_m2 = kDiscRadiusInLeaves * kDiscRadiusInLeaves * leaf_m * leaf_m;
+  Fits f = voxels; // what is written is not what is read: vector instructions
+  for (std::size_t i = 0; i < kAtOnce; ++i) {
+    const float share = 1.0F / voxels.count[i];
+    const float x = share * voxels.x[i], y = share * voxels.y[i], z = share * voxels.z[i];
+    const Symmetric scatter{share * voxels.xx[i] - x * x, share * voxels.xy[i] - x * y, share * voxels.xz[i] - x * z,
+                            share * voxels.yy[i] - y * y, share * voxels.yz[i] - y * z, share * voxels.zz[i] - z * z};
+    const Symmetric normals{voxels.nxx[i], voxels.nxy[i], voxels.nxz[i], voxels.nyy[i], voxels.nyz[i], voxels.nzz[i]};
+    const float known = normals.xx + normals.yy + normals.zz; // as many as there are: they are of unit length
+    const float disc = share * (kPointVariance_m2 - along_m2);
+    const PrincipalAxes<float> points = principal_axes<float>(scatter);
+    const PrincipalAxes<float> discs =
+        principal_axes<float>({scatter.xx + along_m2 + disc * normals.xx, scatter.xy + disc * normals.xy,
+                               scatter.xz + disc * normals.xz, scatter.yy + along_m2 + disc * normals.yy,
+                               scatter.yz + disc * normals.yz, scatter.zz + along_m2 + disc * normals.zz});
+    const std::int32_t enough = -(voxels.count[i] >= kEnoughPoints);
+    const std::int32_t by_points = enough & is_plane(points, min_spread_m2, kMaxAcrossToMiddle,
+                                                     quadratic(normals, points.x, points.y, points.z), known);
+    const std::int32_t by_discs =
+        is_plane(discs, min_spread_m2, kMaxAcrossToMiddleOfDiscs, quadratic(normals, discs.x, discs.y, discs.z), known);
+    const auto best = [=](float of_points, float of_discs) { return by_points != 0 ? of_points : of_discs; };
+    const auto planar = static_cast<float>(-(by_points | by_discs)), strewn = static_cast<float>(-enough);
+    const float least = std::max(best(points.least, discs.least), kPointVariance_m2);
+    f.mean_x[i] = x;
+    f.mean_y[i] = y;
+    f.mean_z[i] = z;
+    f.normal_x[i] = best(points.x, discs.x);
+    f.normal_y[i] = best(points.y, discs.y);
+    f.normal_z[i] = best(points.z, discs.z);
+    f.variance_m2[i] = planar * least - (1.0F - planar);
+    f.strewn_m2[i] = strewn * ((scatter.xx + scatter.yy + scatter.zz) / 3.0F + kPointVariance_m2) - (1.0F - strewn);
+  }
+  voxels = f;
 }
 
 /// std::floor is a call where the baseline has no instruction for it.
@@ -64,14 +109,13 @@ std::uint64_t hash_of(VoxelIndex index) {
     return static_cast<std::uint64_t>(static_cast<std::uint32_t>(i)) & 0x1FFFFFU;
   };
   std::uint64_t h = bits(index.x) | bits(index.y) << 21U | bits(index.z) << 42U;
-  h = (h ^ h >> 32U) * 0xD6E8FEB86659FD93ULL;
-  h = (h ^ h >> 32U) * 0xD6E8FEB86659FD93ULL;
+  h *= 0xD6E8FEB86659FD93ULL;
   return h ^ h >> 32U;
 }
 
 } // namespace
 
-SurfaceGrid::SurfaceGrid(double leaf_m, std::size_t max_bytes) : leaf_m_(leaf_m) {
+SurfaceGrid::SurfaceGrid(double leaf_m, std::size_t max_bytes, Isa isa) : leaf_m_(leaf_m), isa_(isa) {
   constexpr std::size_t kBytesPerVoxel = sizeof(Voxel) + sizeof(Moments) + sizeof(std::uint32_t) + 4 * sizeof(Entry);
   const std::size_t capacity = std::max<std::size_t>(max_bytes / kBytesPerVoxel, 64);
   entries_.resize(std::bit_ceil(2 * capacity));
@@ -177,92 +221,110 @@ void SurfaceGrid::erase_entry(VoxelIndex index) {
   entries_[gap] = Entry{};
 }
 
-std::size_t SurfaceGrid::insert(std::span<const Point> points) {
-  struct Place {
-    const Point* point;
-    VoxelIndex index;
-    std::uint64_t hash;
+/// Where points fall: voxels, and offsets from their centres.
+struct SurfaceGrid::Places {
+  std::array<std::int32_t, Points::kMost> cell_x, cell_y, cell_z;
+  std::array<float, Points::kMost> x_m, y_m, z_m;
+  std::array<std::uint64_t, Points::kMost> hash;
+};
+
+/// What is out of reach goes anywhere.
+void SurfaceGrid::place(const Points& points, Places& places) const {
+  const auto along = [leaf_m = leaf_m_](const auto& points_m, auto& cell, auto& offset_m) {
+    const double per_m = 1.0 / leaf_m;
+    for (std::size_t i = 0; i < Points::kMost; ++i) {
+      const double cells = std::clamp(points_m[i] * per_m, -2.0 * kMaxIndex, 2.0 * kMaxIndex) + 0.5;
+      const auto truncated = static_cast<std::int32_t>(cells);
+      cell[i] = truncated - static_cast<std::int32_t>(cells < static_cast<double>(truncated));
+    }
+    for (std::size_t i = 0; i < Points::kMost; ++i)
+      offset_m[i] = static_cast<float>(points_m[i] - leaf_m * static_cast<double>(cell[i]));
   };
-  std::array<Place, kAtOnce> places;
+  run_as(isa_, [&] {
+    along(points.x_m, places.cell_x, places.x_m);
+    along(points.y_m, places.cell_y, places.y_m);
+    along(points.z_m, places.cell_z, places.z_m);
+  });
+}
+
+std::size_t SurfaceGrid::insert(const Points& points) {
+  Places places;
+  place(points, places);
+  const auto index_of_place = [&](std::size_t i) {
+    return VoxelIndex{places.cell_x[i], places.cell_y[i], places.cell_z[i]};
+  };
+  const std::size_t mask = entries_.size() - 1;
+  for (std::size_t i = 0; i < points.count; ++i) {
+    places.hash[i] = hash_of(index_of_place(i));
+    __builtin_prefetch(&entries_[places.hash[i] & mask]);
+  }
+  for (std::size_t i = 0; i < points.count; ++i)
+    if (const Entry& home = entries_[places.hash[i] & mask]; home.slot != kEmpty)
+      __builtin_prefetch(&moments_[home.slot], 1);
   std::size_t fresh = 0;
-  while (!points.empty()) {
-    std::size_t count = 0;
-    for (const Point& point : points.first(std::min(kAtOnce, points.size()))) {
-      if (!reaches(point.position_m))
-        continue;
-      const VoxelIndex index = index_of(point.position_m);
-      places[count++] = {&point, index, hash_of(index)};
-      __builtin_prefetch(&entries_[places[count - 1].hash & (entries_.size() - 1)]);
-    }
-    for (const Place& place : std::span(places).first(count))
-      if (const Entry& home = entries_[place.hash & (entries_.size() - 1)]; home.slot != kEmpty)
-        __builtin_prefetch(&moments_[home.slot], 1);
-    for (const Place& place : std::span(places).first(count)) {
-      const std::uint32_t slot = find_or_create(place.index, place.hash);
-      add(*place.point, place.index, slot);
-      fresh += moments_[slot].fresh ? 1U : 0U;
-    }
-    points = points.subspan(std::min(kAtOnce, points.size()));
+  for (std::size_t i = 0; i < points.count; ++i) {
+    if (!reaches(points.position_m(i)))
+      continue;
+    const std::uint32_t slot = find_or_create(index_of_place(i), places.hash[i]);
+    add(points, places, i, slot);
+    fresh += moments_[slot].fresh ? 1U : 0U;
   }
   return fresh;
 }
 
-void SurfaceGrid::add(const Point& point, VoxelIndex index, std::uint32_t slot) {
+void SurfaceGrid::add(const Points& points, const Places& places, std::size_t i, std::uint32_t slot) {
   Moments& moments = moments_[slot];
   if (!moments.touched) {
     moments.touched = true;
     touched_.push_back(slot);
   }
-  if (moments.count >= kMaxCount) {
-    moments.count *= 0.5F;
-    moments.sum *= 0.5F;
-    moments.outer *= 0.5F;
-    moments.normals *= 0.5F;
-    moments.normal_count *= 0.5F;
-  }
-  const Eigen::Vector3f offset = (point.position_m - centre_of(index)).cast<float>();
-  moments.count += 1.0F;
-  moments.sum += offset;
-  moments.outer += upper_of_outer(offset);
-  moments.normals += upper_of_outer(point.normal);
-  moments.normal_count += point.normal.isZero() ? 0.0F : 1.0F;
+  if (moments.sums[kCount] >= kMaxCount)
+    for (float& sum : moments.sums)
+      sum *= 0.5F;
+  const float x = places.x_m[i], y = places.y_m[i], z = places.z_m[i];
+  const float nx = points.normal_x[i], ny = points.normal_y[i], nz = points.normal_z[i];
+  const std::array<float, kSums> of_point{1.0F,  x,     y,       z,       x * x,   x * y,   x * z,   y * y,
+                                          y * z, z * z, nx * nx, nx * ny, nx * nz, ny * ny, ny * nz, nz * nz};
+  for (std::size_t sum = 0; sum < kSums; ++sum)
+    moments.sums[sum] += of_point[sum];
 }
 
-Surface SurfaceGrid::fit(const Moments& moments) const {
-  const auto leaf_m = static_cast<float>(leaf_m_);
-  const auto is_plane = [&](const PrincipalAxes<float>& axes, float max_across_to_middle) {
-    const float min_spread_m = kMinSpreadInLeaves * leaf_m;
-    return axes.middle > min_spread_m * min_spread_m && axes.middle > kMinMiddleToGreatest * axes.greatest &&
-           axes.least < max_across_to_middle * axes.middle && axes.least < kMaxRoughness_m * kMaxRoughness_m &&
-           quadratic(moments.normals, {axes.x, axes.y, axes.z}) >= kMinAgreement * moments.normal_count;
-  };
-  Surface surface;
-  surface.mean_m = moments.sum / moments.count;
-  const Upper scatter = moments.outer / moments.count - upper_of_outer(surface.mean_m);
-  PrincipalAxes<float> axes{};
-  bool planar = false;
-  if (moments.count >= kEnoughPoints) {
-    axes = axes_of(scatter);
-    planar = is_plane(axes, kMaxAcrossToMiddle);
+/// At most kAtOnce of them.
+void SurfaceGrid::fit(std::span<const std::uint32_t> slots) {
+  Fits fits{};
+  fits.count.fill(1.0F);
+  for (std::size_t i = 0; i < slots.size(); ++i) {
+    Moments& moments = moments_[slots[i]];
+    const auto& sums = moments.sums;
+    fits.count[i] = sums[kCount];
+    fits.x[i] = sums[kX];
+    fits.y[i] = sums[kY];
+    fits.z[i] = sums[kZ];
+    fits.xx[i] = sums[kXx];
+    fits.xy[i] = sums[kXy];
+    fits.xz[i] = sums[kXz];
+    fits.yy[i] = sums[kYy];
+    fits.yz[i] = sums[kYz];
+    fits.zz[i] = sums[kZz];
+    fits.nxx[i] = sums[kNxx];
+    fits.nxy[i] = sums[kNxy];
+    fits.nxz[i] = sums[kNxz];
+    fits.nyy[i] = sums[kNyy];
+    fits.nyz[i] = sums[kNyz];
+    fits.nzz[i] = sums[kNzz];
+    moments.touched = moments.fresh = false;
   }
-  if (!planar) {
-    const float along_m2 = kDiscRadiusInLeaves * kDiscRadiusInLeaves * leaf_m * leaf_m;
-    axes = axes_of(scatter + along_m2 * kIdentity + (kPointVariance_m2 - along_m2) / moments.count * moments.normals);
-    planar = is_plane(axes, kMaxAcrossToMiddleOfDiscs);
-  }
-  surface.normal = {axes.x, axes.y, axes.z};
-  if (moments.count >= kEnoughPoints)
-    surface.strewn_m2 = (scatter[0] + scatter[3] + scatter[5]) / 3.0F + kPointVariance_m2;
-  if (planar)
-    surface.variance_m2 = std::max(axes.least, kPointVariance_m2);
-  return surface;
+  run_as(isa_, [&] { fit_all(fits, static_cast<float>(leaf_m_)); });
+  for (std::size_t i = 0; i < slots.size(); ++i)
+    voxels_[slots[i]].surface = {{fits.mean_x[i], fits.mean_y[i], fits.mean_z[i]},
+                                 {fits.normal_x[i], fits.normal_y[i], fits.normal_z[i]},
+                                 fits.variance_m2[i],
+                                 fits.strewn_m2[i]};
 }
 
 void SurfaceGrid::refresh() {
-  for (const std::uint32_t slot : touched_) {
-    voxels_[slot].surface = fit(moments_[slot]);
-    moments_[slot].touched = moments_[slot].fresh = false;
-  }
+  for (std::size_t begin = 0; begin < touched_.size(); begin += kAtOnce)
+    fit(std::span(touched_).subspan(begin, std::min(kAtOnce, touched_.size() - begin)));
   touched_.clear();
 }
 

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "core/isa.hpp"
 #include "core/pose.hpp"
 
 namespace locus {
@@ -39,17 +41,20 @@ struct Surface {
 /// full the oldest one far from the robot gives way. Nothing walks the whole map. One writer or many readers.
 class SurfaceGrid {
  public:
-  SurfaceGrid(double leaf_m, std::size_t max_bytes);
+  SurfaceGrid(double leaf_m, std::size_t max_bytes, Isa isa = best_isa());
 
-  /// A point and the unit normal of its surface, or zero.
-  struct Point {
-    Eigen::Vector3d position_m;
-    Eigen::Vector3f normal;
+  /// Points and the unit normals of their surfaces, or zero: as many as are taken in at a time.
+  struct Points {
+    static constexpr std::size_t kMost = 64;
+    std::array<double, kMost> x_m{}, y_m{}, z_m{};
+    std::array<float, kMost> normal_x{}, normal_y{}, normal_z{};
+    std::size_t count = 0;
+    [[nodiscard]] Eigen::Vector3d position_m(std::size_t i) const { return {x_m[i], y_m[i], z_m[i]}; }
   };
 
   /// Takes in points. Call refresh() before the surfaces are read again. Points out of reach are left out. Returns how
   /// many fell into voxels that were empty at the last refresh().
-  std::size_t insert(std::span<const Point> points);
+  std::size_t insert(const Points& points);
   /// Brings the surfaces of the voxels up to date that were written to since the last call.
   void refresh();
   void clear();
@@ -58,7 +63,6 @@ class SurfaceGrid {
 
   /// Whether a point is finite and within 2^20 voxels of the origin: 500 km at half a metre.
   [[nodiscard]] bool reaches(const Eigen::Vector3d& point_m) const {
-    constexpr double kMaxIndex = 1 << 20;
     return (point_m.array().abs() < kMaxIndex * leaf_m_).all();
   }
 
@@ -80,9 +84,8 @@ class SurfaceGrid {
   [[nodiscard]] Eigen::Vector3d centre(std::size_t slot) const { return centre_of(voxels_[slot].index); }
 
  private:
+  static constexpr double kMaxIndex = 1 << 20;
   static constexpr std::uint32_t kEmpty = 0xFFFFFFFFU;
-  using Upper = Eigen::Matrix<float, 6, 1>; ///< xx xy xz yy yz zz of a symmetric matrix
-
   struct Entry {
     std::uint32_t tag = 0; ///< upper half of the hash: most foreign voxels are told apart without a look at the pool
     std::uint32_t slot = kEmpty;
@@ -91,26 +94,44 @@ class SurfaceGrid {
     VoxelIndex index;
     Surface surface;
   };
-  struct Moments { ///< sums over points, relative to the centre of the voxel; apart from Voxel, which is read far more
-                   ///< often
-    float count = 0.0F;
-    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-    Upper outer = Upper::Zero();
-    Upper normals = Upper::Zero(); ///< outer products of the normals, of those points that have one
-    float normal_count = 0.0F;
+  /// Sums over points, relative to the centre of the voxel.
+  enum Sum : std::size_t {
+    kCount,
+    kX,
+    kY,
+    kZ,
+    kXx,
+    kXy,
+    kXz,
+    kYy,
+    kYz,
+    kZz,
+    kNxx,
+    kNxy,
+    kNxz,
+    kNyy,
+    kNyz,
+    kNzz, ///< of the normals of those points that have one
+    kSums
+  };
+  struct Moments { ///< apart from Voxel, which is read far more often
+    std::array<float, kSums> sums{};
     bool touched = false;
     bool fresh = true; ///< not refreshed yet
   };
+  struct Places;
 
   [[nodiscard]] std::size_t home_of(VoxelIndex index) const;
   [[nodiscard]] std::uint32_t slot_of(VoxelIndex index, std::uint64_t hash) const;
   std::uint32_t find_or_create(VoxelIndex index, std::uint64_t hash);
-  void add(const Point& point, VoxelIndex index, std::uint32_t slot);
+  void place(const Points& points, Places& places) const;
+  void add(const Points& points, const Places& places, std::size_t i, std::uint32_t slot);
   std::uint32_t take_slot();
   void erase_entry(VoxelIndex index);
-  [[nodiscard]] Surface fit(const Moments& moments) const;
+  void fit(std::span<const std::uint32_t> slots);
 
   double leaf_m_;
+  Isa isa_;
   std::vector<Entry> entries_; ///< open addressing, linear probing, power of two, at most half full
   std::vector<Voxel> voxels_;
   std::vector<Moments> moments_;

@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <vector>
 
+#include "core/isa.hpp"
 #include "core/pose.hpp"
 #include "core/surface_grid.hpp"
 
@@ -24,9 +24,10 @@ struct SurfacePoint {
 class SurfaceMap {
  public:
   static constexpr double kFineLeaf_m = 0.5;
-  static constexpr double kCoarseLeaf_m = 1.5;
+  static constexpr int kFinePerCoarse = 3; ///< odd: no fine voxel lies in two coarse ones
+  static constexpr double kCoarseLeaf_m = kFinePerCoarse * kFineLeaf_m;
 
-  explicit SurfaceMap(std::size_t max_bytes);
+  explicit SurfaceMap(std::size_t max_bytes, Isa isa = best_isa());
 
   /// Takes in a sweep seen from T_map_base. Returns the share of its points that fell where nothing was.
   double insert(std::span<const SurfacePoint> points_base, const Pose& T_map_base);
@@ -35,13 +36,22 @@ class SurfaceMap {
   /// Whether a point can be looked up: finite, and no farther than voxels can be counted.
   [[nodiscard]] bool reaches(const Eigen::Vector3d& point_m) const { return fine_.reaches(point_m); }
 
+  /// The coarse voxel that a fine one lies in.
+  [[nodiscard]] static VoxelIndex coarse_of(VoxelIndex fine) {
+    const auto cell = [](std::int32_t i) {
+      const std::int32_t moved = i + kFinePerCoarse / 2;
+      return moved / kFinePerCoarse - (moved % kFinePerCoarse < 0 ? 1 : 0);
+    };
+    return {cell(fine.x), cell(fine.y), cell(fine.z)};
+  }
+
   [[nodiscard]] const SurfaceGrid& fine() const { return fine_; }
   [[nodiscard]] const SurfaceGrid& coarse() const { return coarse_; }
 
  private:
+  Isa isa_;
   SurfaceGrid fine_;
   SurfaceGrid coarse_;
-  std::vector<SurfaceGrid::Point> points_map_; ///< of the sweep being inserted
 };
 
 } // namespace locus

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
+#include "core/isa.hpp"
 #include "core/pose.hpp"
-#include "core/stamp.hpp"
 #include "core/surface_map.hpp"
 #include "core/sweep.hpp"
 
@@ -13,7 +13,7 @@ namespace locus {
 
 /// Writes to `scan` where the points of a sweep lay at its end, for a base that moved with a constant twist (m/s,
 /// rad/s) while the sweep came in: the part of motion correction that no motion source could do. Any thread.
-void correct_all(std::span<const SweepPoint> points, const Vector6& twist_base, Duration duration,
+void correct_all(std::span<const SweepPoint> points, const Vector6& twist_base, Isa isa,
                  std::vector<SurfacePoint>& scan);
 
 } // namespace locus

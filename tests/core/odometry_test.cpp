@@ -148,13 +148,16 @@ TEST(Odometry, SameBitsForAnyNumberOfThreadsAndOnEveryRun) {
   const sim::Trajectory trajectory(sim::room_course(seconds{10}, 1.0), sim::room_start());
   for (const RobotSetup& setup : {robot_with_wheels_and_imu(), robot_with_lidar_alone()}) {
     const std::vector<Sweep> sweeps = sweeps_of(scene, trajectory, setup, seconds{6});
-    const auto poses = [&](int threads) {
+    const auto poses = [&](int threads, bool prepares = false) {
       OdometryOptions options = setup.odometry();
       options.threads = threads;
       Odometry odometry(options);
       std::vector<Pose> result;
-      for (const Sweep& sweep : sweeps)
+      for (const Sweep& sweep : sweeps) {
         result.push_back(odometry.process(sweep).T_odom_base);
+        if (prepares)
+          odometry.prepare_next();
+      }
       return result;
     };
     const std::vector<Pose> expected = poses(1);
@@ -162,6 +165,7 @@ TEST(Odometry, SameBitsForAnyNumberOfThreadsAndOnEveryRun) {
     runs.insert(runs.end(), 10, 2);
     for (const int threads : runs)
       EXPECT_TRUE(poses(threads) == expected) << threads << " threads";
+    EXPECT_TRUE(poses(1, true) == expected) << "what the next sweep needs done beforehand";
   }
 }
 

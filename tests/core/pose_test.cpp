@@ -94,6 +94,17 @@ TEST(Pose, InterpolationIgnoresTheSignOfTheQuaternion) {
   EXPECT_LT(largest_difference(interpolate(from, to, 0.5), {so3_exp({0, 0, 0.2}), Eigen::Vector3d::Zero()}), 1e-12);
 }
 
+TEST(Pose, DifferenceIsAlongTheAxesOfTheCommonFrame) {
+  const Pose reference{so3_exp({0.1, 2.0, -0.3}), {1.0, 2.0, 3.0}};
+  Vector6 off;
+  off << 0.4, -0.5, 0.6, -0.1, 0.2, 0.3;
+  const Pose T{so3_exp(off.tail<3>()) * reference.rotation, reference.translation + off.head<3>()};
+  EXPECT_LT((difference(T, reference) - off).norm(), 1e-12);
+
+  const Pose T_b_a{so3_exp({0.7, -0.2, 1.1}), Eigen::Vector3d::Zero()};
+  EXPECT_LT((difference(T_b_a * T, T_b_a * reference) - turn_both(T_b_a.rotation) * off).norm(), 1e-12);
+}
+
 TEST(Pose, RollPitchYawComeBack) {
   for (const double yaw : {-3.0, 0.0, 1.0})
     for (const double pitch : {-1.5, 0.0, 0.7})

@@ -54,6 +54,21 @@ TEST(PrincipalAxes, OfABallOrALineLookLikeNoPlane) {
   }
 }
 
+/// All but the greatest variance is what rounding leaves, of either sign.
+TEST(PrincipalAxes, OfTwoPointsAreFinite) {
+  std::mt19937 random{1};
+  std::uniform_real_distribution<float> within{-0.25F, 0.25F};
+  const auto any = [&] { return Eigen::Vector3f{within(random), within(random), within(random)}; };
+  for (int pair = 0; pair < 10000; ++pair) {
+    const Eigen::Vector3f a = any(), b = any(), mean = 0.5F * (a + b);
+    const Eigen::Matrix3f m = 0.5F * (a * a.transpose() + b * b.transpose()) - mean * mean.transpose();
+    const PrincipalAxes<float> axes = axes_of<float>(m.cast<double>());
+    for (const float figure : {axes.least, axes.middle, axes.greatest, axes.x, axes.y, axes.z})
+      ASSERT_TRUE(std::isfinite(figure)) << pair;
+    ASSERT_LT(axes.middle, 1e-3F * axes.greatest) << pair;
+  }
+}
+
 TEST(PrincipalAxes, OfOnePlaceAreFinite) {
   const PrincipalAxes<float> axes = axes_of<float>(Eigen::Matrix3d::Zero());
   for (const float figure : {axes.least, axes.middle, axes.greatest, axes.x, axes.y, axes.z})

@@ -66,7 +66,7 @@ Recording plant_recording(Duration duration) {
 }
 
 SweepsOfRecording::SweepsOfRecording(const Recording& recording, const SweepOptions& options, StageClock* clock)
-    : recording_(recording), lidar_(open_lidar(options.isa)),
+    : recording_(recording), clock_(clock), lidar_(open_lidar(options.isa)),
       builder_(
           options, {Pose{}}, MotionSources({}, Fusion::combined), kMaxReturnsPerSweep,
           [this](Sweep& sweep) {
@@ -76,11 +76,16 @@ SweepsOfRecording::SweepsOfRecording(const Recording& recording, const SweepOpti
           },
           clock) {}
 
+const LidarPacket* SweepsOfRecording::decode(const Datagram& datagram) {
+  const StageScope scope(clock_, Stage::decode);
+  return lidar_.receive(datagram);
+}
+
 Sweep* SweepsOfRecording::next() {
   ready_ = false;
   while (!ready_ && played_ < recording_.datagrams().size()) {
     const Datagram& datagram = recording_.datagrams()[played_++];
-    if (const LidarPacket* packet = lidar_.receive(datagram))
+    if (const LidarPacket* packet = decode(datagram))
       builder_.add(*packet, datagram.receive_stamp);
   }
   if (!ready_ && !std::exchange(finished_, true))

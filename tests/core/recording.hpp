@@ -52,7 +52,10 @@ class SweepsOfRecording {
   Sweep* next();
 
  private:
+  const LidarPacket* decode(const Datagram& datagram);
+
   const Recording& recording_;
+  StageClock* clock_;
   LidarInput lidar_;
   std::size_t played_ = 0;
   bool ready_ = false;

@@ -15,7 +15,15 @@ constexpr std::size_t kEnoughBytes = 10'000'000;
 const Eigen::Vector3f kNoNormal = Eigen::Vector3f::Zero();
 
 void insert(SurfaceGrid& grid, const Eigen::Vector3d& point_m, const Eigen::Vector3f& normal) {
-  grid.insert(std::array{SurfaceGrid::Point{point_m, normal}});
+  SurfaceGrid::Points points;
+  points.x_m[0] = point_m.x();
+  points.y_m[0] = point_m.y();
+  points.z_m[0] = point_m.z();
+  points.normal_x[0] = normal.x();
+  points.normal_y[0] = normal.y();
+  points.normal_z[0] = normal.z();
+  points.count = 1;
+  grid.insert(points);
 }
 
 /// One point in the middle of each voxel of a line along x.

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "surfaces.hpp"
 
@@ -28,6 +29,16 @@ TEST(SurfaceMap, TheFineGridIsFinerThanTheCoarse) {
   SurfaceMap map(kLimit_bytes);
   map.insert(test::points_on({{{0, 0, 0}, {20, 0, 0}, {0, 20, 0}}}, 20'000), Pose{});
   EXPECT_GT(map.fine().size(), 7 * map.coarse().size());
+}
+
+TEST(SurfaceMap, AFineVoxelLiesInOneCoarseOne) {
+  const SurfaceMap map(kLimit_bytes);
+  std::mt19937 random{1};
+  std::uniform_real_distribution<double> within{-20.0, 20.0};
+  for (int i = 0; i < 10000; ++i) {
+    const Eigen::Vector3d p{within(random), within(random), within(random)};
+    ASSERT_EQ(SurfaceMap::coarse_of(map.fine().index_of(p)), map.coarse().index_of(p)) << p.transpose();
+  }
 }
 
 TEST(SurfaceMap, TheSameSweepAgainMakesNoNewVoxels) {
