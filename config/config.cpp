@@ -103,6 +103,16 @@ void check_dds(Problems& problems, const DdsOptions& dds) {
   require_topic_or_empty(problems, "dds.flat_ground_topic", dds.flat_ground_topic);
 }
 
+/// A name of a source is that of its file.
+void check_record(Problems& problems, const Config& config) {
+  const std::vector<MotionSourceOptions>& sources = config.odometry.motion_sources;
+  for (std::size_t i = 0; i < sources.size() && !config.record.folder.empty(); ++i)
+    problems.require(sources[i].kind == SourceKind::imu || (sources[i].name != "gt" && sources[i].name != "imu"),
+                     item("motion_sources", i, "name"),
+                     fmt::format("{}.tum has another meaning in a recording; rename the source", sources[i].name));
+  problems.require_range<std::uint64_t>("record.max_bytes", config.record.max_bytes, 10'000'000, 1'000'000'000'000'000);
+}
+
 } // namespace
 
 OdometryOptions Config::default_odometry() {
@@ -120,6 +130,7 @@ std::optional<std::string> Config::problem() const {
   problems.add(odometry.problem());
   check_realtime(problems, realtime);
   check_dds(problems, dds);
+  check_record(problems, *this);
   return problems.result();
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -38,9 +39,18 @@ struct DdsOptions {
   bool publish_cloud = false;
   bool publish_map = false;
   std::string flat_ground_topic; ///< std_msgs/Bool that overrides flat_ground; empty: none
+  std::string security;          ///< folder of an enclave as ROS 2 lays it out (DDS Security); empty: none
   bool type_hashes = true;       ///< announce the types' hashes, which ROS 2 from Iron on looks for
 
   bool operator==(const DdsOptions&) const = default;
+};
+
+/// Where the daemon records what it receives.
+struct RecordOptions {
+  std::string folder; ///< empty: nothing is recorded; a relative one lies in the daemon's state directory
+  std::uint64_t max_bytes = 4'000'000'000; ///< of the folder; the oldest is removed first
+
+  bool operator==(const RecordOptions&) const = default;
 };
 
 /// All that can be set: the options of every module, as one file describes them. Any thread may read it.
@@ -54,6 +64,7 @@ struct Config {
                                           {"/imu/data", ""}}; ///< of odometry.motion_sources[i]
   RealtimeOptions realtime;
   DdsOptions dds;
+  RecordOptions record;
 
   /// As problem() of every module, and what only shows when all are seen together: names and ports used twice.
   [[nodiscard]] std::optional<std::string> problem() const;

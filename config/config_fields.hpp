@@ -192,7 +192,13 @@ template <class Section> void fields(Section& section, DdsOptions& options) {
   section.key("publish_cloud", options.publish_cloud);
   section.key("publish_map", options.publish_map);
   section.key("flat_ground_topic", options.flat_ground_topic);
+  section.key("security", options.security);
   section.key("type_hashes", options.type_hashes);
+}
+
+template <class Section> void fields(Section& section, RecordOptions& options) {
+  section.key("folder", options.folder);
+  section.key("max_bytes", options.max_bytes);
 }
 
 template <class Section> void fields(Section& section, Config& config) {
@@ -206,6 +212,7 @@ template <class Section> void fields(Section& section, Config& config) {
   fields(section, config.odometry);
   section.key("realtime", config.realtime);
   section.key("dds", config.dds);
+  section.key("record", config.record);
   config.odometry.motion_sources.clear();
   config.source_topics.clear();
   for (MotionSource& source : sources) {

@@ -14,6 +14,9 @@ namespace locus::daemon {
 
 namespace {
 
+/// An input that is later than this is none that was held up: the clock was set back.
+constexpr Duration kMostLate = std::chrono::milliseconds{50};
+
 /// A verdict has no time of its own: it counts at once.
 Stamp arrival_of(const LiveInput::Motion& motion) {
   if (const auto* imu = std::get_if<ImuInput>(&motion))
@@ -23,10 +26,17 @@ Stamp arrival_of(const LiveInput::Motion& motion) {
   return Stamp::min();
 }
 
+void set_arrival(LiveInput::Motion& motion, Stamp arrival) {
+  if (auto* imu = std::get_if<ImuInput>(&motion))
+    imu->sample.arrival = arrival;
+  else if (auto* odometry = std::get_if<OdometryInput>(&motion))
+    odometry->sample.arrival = arrival;
+}
+
 } // namespace
 
 LiveInput::LiveInput(std::vector<UdpSocket> sockets)
-    : sockets_(std::move(sockets)), waiting_(sockets_.size()),
+    : sockets_(std::move(sockets)), guards_(sockets_.size()), waiting_(sockets_.size()),
       motion_is_there_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
   for (const UdpSocket& socket : sockets_)
     poll_.push_back({socket.descriptor(), POLLIN, 0});
@@ -50,20 +60,35 @@ Input LiveInput::next(Duration timeout) {
     receive(next_motion_ ? Duration::zero() : timeout);
   if (auto input = take_earliest())
     return *input;
-  return Silence{asked};
+  return Silence{in_order(asked)};
+}
+
+/// What this thread gives out now: after what it gave out before, unless the clock was set back.
+Stamp LiveInput::in_order(Stamp arrival) {
+  const bool late = arrival <= latest_ && latest_ - arrival <= kMostLate;
+  return latest_ = late ? latest_ + Duration{1} : arrival;
+}
+
+void LiveInput::expect(const LidarRouter& lidars) {
+  for (std::size_t i = 0; i < sockets_.size(); ++i)
+    guards_[i].expect(lidars.senders_to(sockets_[i].port()), sockets_[i]);
 }
 
 /// Waits until something is there, at most for `timeout`.
 void LiveInput::receive(Duration timeout) {
   const timespec wait = to_timespec(timeout);
   ppoll(poll_.data(), poll_.size(), &wait, nullptr);
-  std::uint64_t drops = 0;
+  std::uint64_t drops = 0, filtered = 0;
   for (std::size_t i = 0; i < sockets_.size(); ++i) {
-    if (poll_[i].revents != 0)
+    if (poll_[i].revents != 0) {
       waiting_[i] = sockets_[i].receive();
+      guards_[i].look_at(waiting_[i], sockets_[i]);
+    }
     drops += sockets_[i].kernel_drops();
+    filtered += sockets_[i].filtered();
   }
   kernel_drops_.store(drops, std::memory_order_relaxed);
+  filtered_.store(filtered, std::memory_order_relaxed);
   if (poll_.back().revents != 0) {
     eventfd_t notifications = 0;
     eventfd_read(motion_is_there_, &notifications);
@@ -82,12 +107,15 @@ std::optional<Input> LiveInput::take_earliest() {
     from = &waiting;
   }
   if (from != nullptr) {
-    const Datagram& datagram = from->front();
+    Datagram datagram = from->front();
     *from = from->subspan(1);
+    datagram.receive_stamp = in_order(datagram.receive_stamp);
     return datagram;
   }
   if (!next_motion_)
     return std::nullopt;
+  if (!std::holds_alternative<OutsideVerdict>(*next_motion_))
+    set_arrival(*next_motion_, in_order(earliest));
   Input input = std::visit([](const auto& motion) { return Input{motion}; }, *next_motion_);
   next_motion_.reset();
   return input;

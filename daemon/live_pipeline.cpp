@@ -76,6 +76,7 @@ void LivePipeline::report() {
   if (now - reported_ < kMaxSleep)
     return;
   reported_ = now;
+  input_.expect(ingest_.lidars());
   reports_.back().read(ingest_);
   static_cast<void>(reports_.publish());
 }
@@ -128,6 +129,7 @@ void LivePipeline::process(const CutSweep& taken) {
   if (!estimates_.push(done))
     unfetched_.fetch_add(1, std::memory_order_relaxed);
   estimate_is_there_.notify();
+  processor_.prepare_next();
   if (options_.after_estimate)
     options_.after_estimate(taken.sweep, processor_.odometry(), estimate);
 }

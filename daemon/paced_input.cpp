@@ -9,22 +9,6 @@
 
 namespace locus::daemon {
 
-namespace {
-
-Stamp arrival_of(const Input& input, Stamp otherwise) {
-  if (const auto* datagram = std::get_if<Datagram>(&input))
-    return datagram->receive_stamp;
-  if (const auto* imu = std::get_if<ImuInput>(&input))
-    return imu->sample.arrival;
-  if (const auto* odometry = std::get_if<OdometryInput>(&input))
-    return odometry->sample.arrival;
-  if (const auto* silence = std::get_if<Silence>(&input))
-    return silence->now;
-  return otherwise;
-}
-
-} // namespace
-
 void PacedInput::read_ahead() {
   held_ = Held{recording_.next(Duration::zero()), {}};
   held_->arrival = arrival_of(held_->input, last_arrival_);

@@ -39,7 +39,7 @@ struct ProcessedSweep {
   std::size_t raw_returns = 0;
   std::bitset<Sweep::kMaxSources> usable_sources; ///< SourcePose::usable, by the index of the source
   MachineTime took;                               ///< from the cut of the sweep to the estimate
-  StageTimes stages_took;                         ///< those of the ingest included
+  StageTimes stages_took; ///< those of the ingest included, and what was prepared for it since the sweep before
 };
 
 /// Odometry with its costs measured; what the daemon's odometry thread and the replay in one thread share. One owner.
@@ -64,6 +64,9 @@ class SweepProcessor {
       done.usable_sources[source] = sweep.sources[source].usable;
     return done;
   }
+
+  /// Once the estimate is on its way, see Odometry::prepare_next().
+  void prepare_next() { odometry_.prepare_next(); }
 
   void set_flat_ground(FlatGround mode) { odometry_.set_flat_ground(mode); }
 

@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/dds/dds_node.hpp"
 
+#include <array>
+#include <cerrno>
+#include <cstring>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 namespace locus::daemon {
 namespace {
@@ -41,6 +46,39 @@ Qos make_qos(TopicQos wanted) {
 }
 
 void set_user_data(dds_qos_t* qos, std::string_view text) { dds_qset_userdata(qos, text.data(), text.size()); }
+
+struct SecurityFile {
+  const char* property;
+  const char* name;
+};
+constexpr std::array kEnclave{SecurityFile{"dds.sec.auth.identity_ca", "identity_ca.cert.pem"},
+                              SecurityFile{"dds.sec.auth.identity_certificate", "cert.pem"},
+                              SecurityFile{"dds.sec.auth.private_key", "key.pem"},
+                              SecurityFile{"dds.sec.access.permissions_ca", "permissions_ca.cert.pem"},
+                              SecurityFile{"dds.sec.access.governance", "governance.p7s"},
+                              SecurityFile{"dds.sec.access.permissions", "permissions.p7s"}};
+
+/// The plugins that come with Cyclone DDS, and what they are to read, for a participant. What is wrong, if something
+/// is.
+std::optional<std::string> set_security(dds_qos_t* qos, const std::string& folder) {
+  for (const auto& [kind, library, suffix] : {std::array{"auth", "dds_security_auth", "authentication"},
+                                              std::array{"access", "dds_security_ac", "access_control"},
+                                              std::array{"crypto", "dds_security_crypto", "crypto"}}) {
+    const std::string prefix = fmt::format("dds.sec.{}.library.", kind);
+    dds_qset_prop(qos, (prefix + "path").c_str(), library);
+    dds_qset_prop(qos, (prefix + "init").c_str(), fmt::format("init_{}", suffix).c_str());
+    dds_qset_prop(qos, (prefix + "finalize").c_str(), fmt::format("finalize_{}", suffix).c_str());
+  }
+  for (const auto& [property, name] : kEnclave) {
+    const std::string file = folder + "/" + name;
+    if (access(file.c_str(), R_OK) != 0)
+      return fmt::format("{}: {}; dds.security names a folder with the files of an enclave, readable for this user",
+                         file,
+                         std::strerror(errno)); // NOLINT(concurrency-mt-unsafe)
+    dds_qset_prop(qos, property, ("file:" + file).c_str());
+  }
+  return std::nullopt;
+}
 
 std::function<void(bool, std::string_view)>& log_sink() {
   static std::function<void(bool, std::string_view)> sink;
@@ -80,6 +118,8 @@ Expected<DdsNode, std::string> DdsNode::open(const DdsOptions& options) {
     return failed("domain", domain.handle());
   const Qos qos{dds_create_qos()};
   set_user_data(qos.get(), "enclave=/;"); // as every node of ROS 2 says
+  if (const auto problem = options.security.empty() ? std::nullopt : set_security(qos.get(), options.security))
+    return *problem;
   DdsEntity participant{dds_create_participant(id, qos.get(), nullptr)};
   if (participant.handle() < 0)
     return failed("participant", participant.handle());

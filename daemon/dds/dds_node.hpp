@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include <dds/dds.h>
 
@@ -106,16 +109,18 @@ template <class Message> class DdsReader {
   DdsReader(const DdsNode& node, const std::string& topic, TopicQos qos)
       : reader_(node.create_reader<Message>(topic, qos)) {}
 
-  /// Hands out what has come, the oldest first; valid during the call only.
+  /// Hands out what has come, the oldest first, and if it is asked for the writer; valid during the call only. Comes to
+  /// an end however fast more comes.
   template <class Use> void take(const Use& use) {
-    constexpr std::uint32_t kBatch = 32;
-    for (dds_return_t count = kBatch; count == kBatch;) {
+    constexpr std::uint32_t kBatch = 32, kMostBatches = 4;
+    dds_return_t count = kBatch;
+    for (std::uint32_t batch = 0; batch < kMostBatches && count == kBatch; ++batch) {
       std::array<void*, kBatch> samples{};
       std::array<dds_sample_info_t, kBatch> infos{};
       count = dds_take(reader_.handle(), samples.data(), infos.data(), kBatch, kBatch);
       for (std::size_t i = 0; count > 0 && i < static_cast<std::size_t>(count); ++i)
         if (infos[i].valid_data)
-          use(*static_cast<const Message*>(samples[i]));
+          hand_out(use, *static_cast<const Message*>(samples[i]), infos[i].publication_handle);
       if (count > 0)
         dds_return_loan(reader_.handle(), samples.data(), count);
     }
@@ -125,9 +130,22 @@ template <class Message> class DdsReader {
     dds_subscription_matched_status_t status{};
     return dds_get_subscription_matched_status(reader_.handle(), &status) == DDS_RETCODE_OK ? status.current_count : 0;
   }
+  [[nodiscard]] bool hears(dds_instance_handle_t writer) const {
+    std::array<dds_instance_handle_t, 64> all{};
+    const dds_return_t count = dds_get_matched_publications(reader_.handle(), all.data(), all.size());
+    const auto end = all.begin() + std::clamp<dds_return_t>(count, 0, all.size());
+    return std::find(all.begin(), end, writer) != end;
+  }
   [[nodiscard]] dds_entity_t handle() const { return reader_.handle(); }
 
  private:
+  template <class Use> static void hand_out(const Use& use, const Message& message, dds_instance_handle_t writer) {
+    if constexpr (std::is_invocable_v<Use, const Message&, dds_instance_handle_t>)
+      use(message, writer);
+    else
+      use(message);
+  }
+
   DdsEntity reader_;
 };
 

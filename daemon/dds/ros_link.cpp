@@ -18,6 +18,44 @@ constexpr Duration kMaxSleep = std::chrono::milliseconds{100}; ///< before a loo
 constexpr Duration kFirstPause = std::chrono::seconds{1};      ///< between two attempts to connect; doubled each time
 constexpr Duration kLongestPause = std::chrono::seconds{15};
 
+/// Whose samples a topic takes: of one writer, the first, until it is silent or gone, and no more than any sensor
+/// sends. What a second writer sends, however much, is counted and comes no further.
+class Admission {
+ public:
+  bool admits(dds_instance_handle_t writer, Stamp now) {
+    if (writer != writer_ && now - last_heard_ < kSilence)
+      return refuse();
+    writer_ = writer;
+    last_heard_ = now;
+    if (now - window_began_ >= kWindow || now < window_began_) {
+      window_began_ = now;
+      in_window_ = 0;
+    }
+    return ++in_window_ <= kMostInWindow || refuse();
+  }
+  [[nodiscard]] std::uint64_t refused() const { return refused_; }
+
+  template <class Message> void look_after(const DdsReader<Message>& reader) {
+    if (!reader.hears(writer_))
+      last_heard_ = {};
+  }
+
+ private:
+  static constexpr Duration kSilence = std::chrono::seconds{2}; ///< longer than the period of any source
+  static constexpr Duration kWindow = std::chrono::milliseconds{100};
+  static constexpr std::uint32_t kMostInWindow = 1000; ///< 10 kHz
+
+  bool refuse() {
+    ++refused_;
+    return false;
+  }
+
+  dds_instance_handle_t writer_ = 0;
+  Stamp last_heard_, window_began_;
+  std::uint32_t in_window_ = 0;
+  std::uint64_t refused_ = 0;
+};
+
 } // namespace
 
 /// What exists while there is a network.
@@ -25,17 +63,20 @@ struct RosLink::Session {
   struct ImuSource {
     std::size_t source;
     DdsReader<ros::Imu> reader;
+    Admission admission;
     std::uint64_t received = 0;
   };
   struct OdometrySource {
     std::size_t source;
     DdsReader<ros::Odometry> reader;
     UsualCovariance usual;
+    Admission admission;
     std::uint64_t received = 0;
   };
   struct HealthTopic {
     std::size_t source;
     DdsReader<ros::Bool> reader;
+    Admission admission;
   };
 
   Session(DdsNode node_, const Config& config) : node(std::move(node_)) {
@@ -62,11 +103,13 @@ struct RosLink::Session {
     for (std::size_t i = 0; i < config.source_topics.size(); ++i) {
       const auto& [topic, health_topic] = config.source_topics[i];
       if (!topic.empty() && config.odometry.motion_sources[i].kind == SourceKind::imu)
-        wake_by(imus.emplace_back(ImuSource{i, {node, topic, TopicQos::sensor_in()}}).reader.handle());
+        wake_by(imus.emplace_back(ImuSource{i, {node, topic, TopicQos::sensor_in()}, {}}).reader.handle());
       else if (!topic.empty())
-        wake_by(odometries.emplace_back(OdometrySource{i, {node, topic, TopicQos::sensor_in()}, {}}).reader.handle());
+        wake_by(
+            odometries.emplace_back(OdometrySource{i, {node, topic, TopicQos::sensor_in()}, {}, {}}).reader.handle());
       if (!health_topic.empty())
-        wake_by(health_topics.emplace_back(HealthTopic{i, {node, health_topic, TopicQos::standard()}}).reader.handle());
+        wake_by(
+            health_topics.emplace_back(HealthTopic{i, {node, health_topic, TopicQos::standard()}, {}}).reader.handle());
     }
     if (!config.dds.flat_ground_topic.empty())
       wake_by(flat_ground.emplace(node, config.dds.flat_ground_topic, TopicQos::standard()).handle());
@@ -109,7 +152,7 @@ void RosLink::run() {
     dds_waitset_wait(session_->waitset.handle(), triggered.data(), triggered.size(), kMaxSleep.count());
     receive(*session_);
     if (const Duration now = read_clock(CLOCK_MONOTONIC); now - told >= kMaxSleep) {
-      tell_sources(*session_);
+      look_after_sources(*session_);
       told = now;
     }
   }
@@ -141,26 +184,35 @@ std::unique_ptr<RosLink::Session> RosLink::connect() {
 void RosLink::receive(Session& session) {
   const Stamp arrival{read_clock(CLOCK_REALTIME)};
   for (auto& from : session.imus)
-    from.reader.take([&](const ros::Imu& message) {
+    from.reader.take([&](const ros::Imu& message, dds_instance_handle_t writer) {
       ++from.received;
-      sink_(ImuInput{from.source, to_sample(message, arrival)});
+      if (from.admission.admits(writer, arrival))
+        sink_(ImuInput{from.source, to_sample(message, arrival)});
     });
   for (auto& from : session.odometries)
-    from.reader.take([&](const ros::Odometry& message) {
+    from.reader.take([&](const ros::Odometry& message, dds_instance_handle_t writer) {
       ++from.received;
-      sink_(OdometryInput{from.source, to_sample(message, arrival, from.usual)});
+      if (from.admission.admits(writer, arrival))
+        sink_(OdometryInput{from.source, to_sample(message, arrival, from.usual)});
     });
   for (auto& from : session.health_topics)
-    from.reader.take([&](const ros::Bool& message) { sink_(OutsideVerdict{from.source, message.data_}); });
+    from.reader.take([&](const ros::Bool& message, dds_instance_handle_t writer) {
+      if (from.admission.admits(writer, arrival))
+        sink_(OutsideVerdict{from.source, message.data_});
+    });
   if (session.flat_ground)
     session.flat_ground->take([&](const ros::Bool& message) { sink_(FlatGroundWord{message.data_}); });
 }
 
-void RosLink::tell_sources(const Session& session) {
+void RosLink::look_after_sources(Session& session) {
+  for (auto& from : session.health_topics)
+    from.admission.look_after(from.reader);
   const std::scoped_lock lock(status_mutex_);
-  const auto tell = [this](const auto& sources) {
-    for (const auto& from : sources)
-      status_.sources[from.source] = {from.reader.writers(), from.received};
+  const auto tell = [this](auto& sources) {
+    for (auto& from : sources) {
+      from.admission.look_after(from.reader);
+      status_.sources[from.source] = {from.reader.writers(), from.received, from.admission.refused()};
+    }
   };
   tell(session.imus);
   tell(session.odometries);

@@ -41,7 +41,8 @@ class RosLink {
     std::string problem;        ///< why the last one failed
     struct Source {
       std::uint32_t writers = 0;  ///< that send its topic now
-      std::uint64_t received = 0; ///< samples
+      std::uint64_t received = 0; ///< samples, those refused included
+      std::uint64_t refused = 0;  ///< of other writers than the first, or more than any sensor sends
     };
     std::vector<Source> sources; ///< by the index of the configuration
   };
@@ -70,7 +71,7 @@ class RosLink {
   void run();
   [[nodiscard]] std::unique_ptr<Session> connect();
   void receive(Session& session);
-  void tell_sources(const Session& session);
+  void look_after_sources(Session& session);
   [[nodiscard]] Session* session() const { return connected_.load(std::memory_order_acquire); }
 
   Config config_;

@@ -125,21 +125,34 @@ void ControlServer::add_to(std::vector<pollfd>& poll) const {
     poll.push_back({client.socket.number(), POLLIN, 0});
 }
 
-void ControlServer::serve() {
-  accept_all();
+bool ControlServer::serve() {
+  const std::uint64_t answered_before = answered_;
+  accept_waiting();
   std::erase_if(clients_, [this](Client& client) { return !serve(client); });
+  return answered_ != answered_before;
 }
 
-void ControlServer::accept_all() {
-  while (true) {
+/// At most as many as may stay, for somebody may call again and again.
+void ControlServer::accept_waiting() {
+  for (std::size_t i = 0; i < kMaxClients; ++i) {
     Descriptor client{accept4(listener_.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC)};
     if (client.number() < 0)
       return;
+    if (clients_.size() == kMaxClients && may_command(client.number()))
+      drop_a_stranger();
     if (clients_.size() < kMaxClients)
       clients_.push_back({std::move(client), std::nullopt, {}});
     else
       send(client.number(), refusal("too many clients; end a locusctl that still runs"));
   }
+}
+
+/// Who may only look keeps nobody out who may do more.
+void ControlServer::drop_a_stranger() {
+  const auto stranger =
+      std::ranges::find_if(clients_, [](const Client& client) { return !may_command(client.socket.number()); });
+  if (stranger != clients_.end())
+    clients_.erase(stranger);
 }
 
 bool ControlServer::serve(Client& client) {
@@ -157,6 +170,7 @@ bool ControlServer::serve(Client& client) {
   if (!answer)
     return true;
   client.pending.reset();
+  ++answered_;
   return send(client.socket.number(), *answer);
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -37,7 +38,8 @@ class Descriptor {
 ///
 /// A request is {"command": NAME, ...}. An answer holds "error" if it was refused, and may bring bytes along in a
 /// memory file, so that nobody waits for a slow reader. Everybody on the machine may ask for the status; the other
-/// commands are for root, the service's own user and members of group locusd. One owner, the main thread.
+/// commands are for root, the service's own user and members of group locusd, who find room however many others are
+/// there. One owner, the main thread.
 class ControlServer {
  public:
   struct Answer {
@@ -53,8 +55,8 @@ class ControlServer {
   static Expected<ControlServer, std::string> open(const std::filesystem::path& path, Handler handler);
 
   void add_to(std::vector<pollfd>& poll) const;
-  /// Takes what has come, without waiting.
-  void serve();
+  /// Takes what has come, without waiting, one request of each client. Whether anything was answered.
+  bool serve();
 
  private:
   struct Client {
@@ -64,7 +66,8 @@ class ControlServer {
   };
 
   ControlServer(Descriptor listener, Handler handler) : listener_(std::move(listener)), handler_(std::move(handler)) {}
-  void accept_all();
+  void accept_waiting();
+  void drop_a_stranger();
   /// Whether the client stays.
   bool serve(Client& client);
   [[nodiscard]] std::optional<Answer> handle(Client& client);
@@ -72,6 +75,7 @@ class ControlServer {
   Descriptor listener_;
   Handler handler_;
   std::vector<Client> clients_;
+  std::uint64_t answered_ = 0;
 };
 
 /// $RUNTIME_DIRECTORY/control as systemd sets it, else /run/locusd/control.

@@ -4,6 +4,7 @@
 #include <array>
 #include <csignal>
 #include <span>
+#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
@@ -24,6 +25,7 @@ namespace locus::daemon {
 namespace {
 
 constexpr Duration kTick = std::chrono::milliseconds{100};
+constexpr Duration kAfterAnswers = std::chrono::milliseconds{50}; ///< or who asks without end has a core of ours
 constexpr Duration kTellEvery = std::chrono::seconds{1};
 
 /// Blocked before the first thread is made, so that none of them ever takes one.
@@ -73,8 +75,8 @@ int Service::run(const Config& config) {
     const timespec tick = to_timespec(kTick);
     ppoll(wait.data(), wait.size(), &tick, nullptr);
     wanted = take_signal();
-    if (wanted && control_)
-      control_->serve();
+    if (wanted && control_ && control_->serve())
+      std::this_thread::sleep_for(kAfterAnswers);
     look_after();
   }
   sd_notify(0, "STOPPING=1\nSTATUS=Stopping");

@@ -27,6 +27,12 @@ OdometryReport report_of(const FastSample& s) {
   return {s.stamp, s.T_odom_base, s.pose_covariance, s.twist_base, s.twist_covariance};
 }
 
+/// Without a state directory a relative one lies where the service was started.
+std::filesystem::path record_folder(const std::filesystem::path& folder) {
+  const auto state = state_path();
+  return state ? state->parent_path() / folder : folder;
+}
+
 } // namespace
 
 std::string_view to_string(TrackingState state) { return kStateNames[static_cast<std::size_t>(state)]; }
@@ -67,12 +73,27 @@ void Session::begin(LidarRouter lidars, std::optional<StartPoint> start) {
   options.after_estimate = [this](const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
     after(sweep, odometry, estimate);
   };
+  InputSource& input = begin_recording();
   const std::scoped_lock lock(pipeline_mutex_);
-  pipeline_ = std::make_unique<LivePipeline>(config_, std::move(lidars), input_, std::move(options));
+  pipeline_ = std::make_unique<LivePipeline>(config_, std::move(lidars), input, std::move(options));
   pipeline_->set_flat_ground(flat_ground());
   stopping_.store(false, std::memory_order_relaxed);
   publisher_ = std::thread([this] { publish(); });
   pthread_setname_np(publisher_.native_handle(), "publisher");
+}
+
+/// A run is what one life of the odometry has taken: its replay gives the same poses.
+InputSource& Session::begin_recording() {
+  if (config_.record.folder.empty())
+    return input_;
+  recorder_.reset(); // of the life before, whose pipeline is at rest
+  const auto files = sample_files(config_);
+  for (std::size_t i = 0; i < files.size(); ++i)
+    if (!files[i])
+      log_.warn(fmt::format("motion source {}: is not recorded, for a recording holds one IMU; the first one is",
+                            config_.odometry.motion_sources[i].name));
+  recorder_ = std::make_unique<Recorder>(record_folder(config_.record.folder), config_);
+  return recording_input_.emplace(input_, *recorder_);
 }
 
 void Session::end() {
@@ -199,6 +220,10 @@ void Session::tell(const HealthEvent& event) {
                           event.verdict.empty() ? fmt::format("is lost ({})", to_string(event.reason))
                                                 : std::string(event.verdict)),
               {{"LOCUS_SOURCE", name}, {"LOCUS_REASON", std::string{to_string(event.reason)}}});
+}
+
+std::optional<Recorder::Status> Session::recording() const {
+  return recorder_ ? std::optional{recorder_->status()} : std::nullopt;
 }
 
 Duration Session::age() const { return read_clock(CLOCK_MONOTONIC) - started_; }

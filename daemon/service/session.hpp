@@ -16,6 +16,7 @@
 #include "daemon/dds/ros_link.hpp"
 #include "daemon/live_input.hpp"
 #include "daemon/live_pipeline.hpp"
+#include "daemon/recorder.hpp"
 #include "daemon/service/cloud_publisher.hpp"
 #include "daemon/service/live_figures.hpp"
 #include "daemon/service/log.hpp"
@@ -43,6 +44,8 @@ class Session {
   [[nodiscard]] RosLink& link() { return link_; }
   [[nodiscard]] LivePipeline& pipeline() { return *pipeline_; }
   [[nodiscard]] Duration age() const;
+  /// Nothing where nothing is to be recorded.
+  [[nodiscard]] std::optional<Recorder::Status> recording() const;
 
   /// A thread has done nothing since the last call if its number is the same.
   struct Progress {
@@ -68,6 +71,7 @@ class Session {
   Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket> sockets, std::optional<SavedState> state,
           Log& log);
   void begin(LidarRouter lidars, std::optional<StartPoint> start);
+  InputSource& begin_recording();
   void end();
   void after(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate);
   void receive(const RosInput& input);
@@ -82,7 +86,9 @@ class Session {
   LiveFigures figures_;
   LiveInput input_;
   std::atomic<FlatGround> flat_ground_;
-  Duration flat_ground_changed_{}; ///< of the thread of the link
+  Duration flat_ground_changed_{};     ///< of the thread of the link
+  std::unique_ptr<Recorder> recorder_; ///< of one run, where there is to be any
+  std::optional<RecordingInput> recording_input_;
   std::unique_ptr<LivePipeline> pipeline_;
   std::mutex pipeline_mutex_; ///< of those who change pipeline_ and the thread of the link
   enum class Resumed : std::uint8_t { unknown, yes, no };

@@ -80,6 +80,7 @@ ordered_json sources_json(const Config& config, const LiveFigures::Snapshot& fig
     json["health"] = source.healthy ? "healthy" : source.counters.received == 0 ? "never heard" : "lost";
     json["verdict"] = source.verdict;
     json["writers"] = link.sources[i].writers;
+    json["refused"] = link.sources[i].refused;
     sources[config.odometry.motion_sources[i].name] = json;
   }
   return sources;
@@ -143,9 +144,15 @@ ordered_json status_json(Session& session) {
   json["dropped"] = {{"late_packets", builder.late_packets},
                      {"overflowed_points", builder.overflowed_points},
                      {"motion_samples", session.input().motion_drops()},
+                     {"flood_datagrams", session.input().filtered()},
                      {"estimates_unfetched", session.pipeline().unfetched()},
                      {"estimates_unpublished", figures.unpublished}};
   json["restarts"] = builder.restarts;
+  if (const auto recording = session.recording())
+    json["recording"] = {
+        {"run", recording->run.string()},  {"mb", rounded(1e-6 * static_cast<double>(recording->bytes))},
+        {"recorded", recording->recorded}, {"dropped", recording->dropped},
+        {"unfit", recording->unfit},       {"problem", recording->problem}};
   json["dds"] = {{"connected", link.connected},
                  {"domain", config.dds.domain},
                  {"interface", config.dds.interface},
@@ -168,6 +175,11 @@ std::vector<Diagnostic> diagnostics(Session& session) {
                   subset(json, {"rate_hz", "sweeps", "process_ms", "process_cpu_ms", "stage_ms", "points",
                                 "iterations_mean", "dropped", "restarts", "flat_ground", "cpu_s", "peak_rss_mb"})));
   all.push_back(with_values(Level::ok, ": dds", "connected", json["dds"]));
+  if (json.contains("recording")) {
+    const std::string problem = json["recording"]["problem"];
+    all.push_back(with_values(problem.empty() ? Level::ok : Level::warning, ": recording",
+                              problem.empty() ? "recording" : problem, json["recording"]));
+  }
   for (const auto& [name, lidar] : json["lidars"].items()) {
     ordered_json values = lidar;
     values["packets"] = json["packets"][name];

@@ -14,12 +14,15 @@ namespace locus::daemon {
 void Watch::look() {
   const RosLink::Status link = session_.link().status();
   look_at_link(link);
+  look_at_intruders(link);
   if (session_.age() > kPatience) {
     if (link.connected)
       look_at_sources(link);
     look_at_lidars();
   }
   look_at_drops();
+  if (const auto recording = session_.recording())
+    look_at_recording(*recording);
   if (const Duration now = read_clock(CLOCK_MONOTONIC); now - joined_ > kPatience) {
     join_multicast(session_.config(), session_.input().sockets());
     joined_ = now;
@@ -80,6 +83,38 @@ void Watch::look_at_drops() {
                           "net.core.rmem_max={}, or a higher realtime.priority",
                           drops - kernel_drops_, UdpSocket::kWantedBufferBytes));
   kernel_drops_ = drops;
+  const std::uint64_t filtered = session_.input().filtered();
+  if (filtered != filtered_)
+    log_.warn(
+        fmt::format("the ports of the lidars are flooded: the kernel has kept out {} datagrams that are no lidar's "
+                    "by length or sender; tcpdump shows whose, docs/security.md what to set against them",
+                    filtered - filtered_));
+  filtered_ = filtered;
+}
+
+void Watch::look_at_intruders(const RosLink::Status& link) {
+  for (std::size_t i = 0; i < link.sources.size(); ++i) {
+    const std::string& name = session_.config().odometry.motion_sources[i].name;
+    if (link.sources[i].refused > 0 && intruded_.insert(name).second)
+      log_.warn(
+          fmt::format("motion source {}: samples on {} are refused, for another publishes there, too, or more come "
+                      "than any sensor sends; give each publisher a topic of its own",
+                      name, session_.config().source_topics[i].topic),
+          {{"LOCUS_SOURCE", name}});
+  }
+}
+
+/// What is dropped while the disk takes nothing goes without saying.
+void Watch::look_at_recording(const Recorder::Status& recording) {
+  const std::uint64_t dropped = recording.dropped - std::min(recording.dropped, recording_.dropped);
+  if (recording_.problem.empty() && !recording.problem.empty())
+    log_.error(fmt::format("{}; the odometry goes on without a recording", recording.problem));
+  else if (recording.run != recording_.run || (!recording_.problem.empty() && recording.problem.empty()))
+    log_.info(fmt::format("recording to {}", recording.run.string()));
+  else if (recording.problem.empty() && dropped > 0)
+    log_.warn(
+        fmt::format("{} inputs were not recorded, for the disk is too slow; see record in locusd.yaml(5)", dropped));
+  recording_ = recording;
 }
 
 Watchdog::Watchdog() {

@@ -12,8 +12,8 @@
 namespace locus::daemon {
 
 /// Looks after a session a few times a second and tells what its owner should know: sensors that are not heard, a
-/// network that is not there, packets that the kernel threw away. Tells each once per turn for the worse or the better.
-/// One owner.
+/// network that is not there, packets that the kernel threw away, a disk that takes no recording. Tells each once per
+/// turn for the worse or the better. One owner.
 class Watch {
  public:
   /// Silence of a sensor that should have spoken by then.
@@ -28,13 +28,17 @@ class Watch {
   void look_at_sources(const RosLink::Status& link);
   void look_at_lidars();
   void look_at_drops();
+  void look_at_intruders(const RosLink::Status& link);
+  void look_at_recording(const Recorder::Status& recording);
 
   Session& session_;
   Log& log_;
   bool was_connected_ = false;
   std::uint64_t told_attempts_ = 0;
-  std::set<std::string> unheard_; ///< lidars and sources that were told of
-  std::uint64_t kernel_drops_ = 0;
+  std::set<std::string> unheard_;  ///< lidars and sources that were told of
+  std::set<std::string> intruded_; ///< sources that were told of
+  std::uint64_t kernel_drops_ = 0, filtered_ = 0;
+  Recorder::Status recording_; ///< as it was told
   Duration joined_{};
 };
 

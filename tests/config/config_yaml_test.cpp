@@ -37,7 +37,8 @@ map: {keyframe_m: 2, keyframe_deg: 31, max_bytes: 123456789}
 flat_ground: on
 threads: 3
 realtime: {priority: 50, cpus: [2, 3], lock_memory: true}
-dds: {domain: 7, interface: eth1, prefix: /robot/locus, frame_odom: odom_2, frame_base: base, publish_tf: true, publish_cloud: true, publish_map: true, flat_ground_topic: /flat, type_hashes: false}
+dds: {domain: 7, interface: eth1, prefix: /robot/locus, frame_odom: odom_2, frame_base: base, publish_tf: true, publish_cloud: true, publish_map: true, flat_ground_topic: /flat, security: /etc/enclave, type_hashes: false}
+record: {folder: /data/drives, max_bytes: 98765432}
 )";
 
 /// The defaults, but such that each value of kAllChanged fits among them alone.
@@ -210,6 +211,8 @@ TEST(ConfigYaml, EveryKindOfBadValueIsRefusedWithItsKeyAndReason) {
       {"realtime.priority=100", "is outside 0 .. 99"},
       {"realtime.cpus=[-1]", "is outside 0 .. 1023"},
       {"realtime.cpus=0", "must be a list"},
+      {"record.max_bytes=9999999", "is outside 10000000 .. "},
+      {"record.max_bytes=-1", "must be a whole number"},
       {"dds.domain=233", "is outside 0 .. 232"},
       {"dds.interface=\"\"", "must name a network interface"},
       {"dds.interface=eth0\"/>", "must name a network interface"},

@@ -18,14 +18,6 @@ constexpr Duration kDuration = std::chrono::seconds{8};
 
 } // namespace
 
-Stamp arrival_of(const Input& input) {
-  if (const auto* imu = std::get_if<ImuInput>(&input))
-    return imu->sample.arrival;
-  if (const auto* odometry = std::get_if<OdometryInput>(&input))
-    return odometry->sample.arrival;
-  return std::get<Datagram>(input).receive_stamp;
-}
-
 Config Drive::config() {
   Config config;
   config.lidars.front().T_base_lidar.translation.z() = 0.75;
@@ -58,7 +50,7 @@ Drive::Drive() {
   for (ImuSample sample = imu.next(); sample.arrival < end; sample = imu.next())
     inputs_.emplace_back(ImuInput{1, sample});
   std::stable_sort(inputs_.begin(), inputs_.end(),
-                   [](const Input& a, const Input& b) { return arrival_of(a) < arrival_of(b); });
+                   [](const Input& a, const Input& b) { return arrival_of(a, {}) < arrival_of(b, {}); });
 }
 
 Input DriveInput::next(Duration) {

@@ -35,8 +35,6 @@ class Drive {
   std::vector<Input> inputs_;
 };
 
-Stamp arrival_of(const Input& input);
-
 /// Gives the inputs of the drive out as fast as they are asked for.
 class DriveInput : public InputSource {
  public:

@@ -64,7 +64,7 @@ TEST(Ingest, MakesOneSweepPerRevolutionAndCountsEveryPacket) {
 TEST(Ingest, SilenceBetweenTheInputsChangesNoSweep) {
   const auto alone = sweeps_of(Drive::config(), [](Ingest& ingest, const Input& input) { ingest.take(input); });
   const auto with_silence = sweeps_of(Drive::config(), [](Ingest& ingest, const Input& input) {
-    ingest.take(Silence{arrival_of(input)});
+    ingest.take(Silence{arrival_of(input, {})});
     ingest.take(input);
   });
   ASSERT_FALSE(alone.empty());
@@ -72,9 +72,9 @@ TEST(Ingest, SilenceBetweenTheInputsChangesNoSweep) {
 }
 
 TEST(Ingest, WindowsWithoutLidarAreSweepsToo) {
-  const Stamp dies = arrival_of(Drive::instance().inputs().front()) + std::chrono::seconds{2};
+  const Stamp dies = arrival_of(Drive::instance().inputs().front(), {}) + std::chrono::seconds{2};
   const auto sweeps = sweeps_of(Drive::config(), [&](Ingest& ingest, const Input& input) {
-    if (!is_datagram(input) || arrival_of(input) < dies)
+    if (!is_datagram(input) || arrival_of(input, {}) < dies)
       ingest.take(input);
   });
   ASSERT_NEAR(static_cast<double>(sweeps.size()), Drive::kSweeps, 2);

@@ -97,6 +97,23 @@ TEST(LiveInput, MotionWakesTheWaitingThread) {
   reader.join();
 }
 
+/// In the order in which they were given out, a recording of the inputs gives them out again. A clock that is set back
+/// by an hour is none of this.
+TEST(LiveInput, MotionThatIsHandedOverLateArrivesAfterWhatWasGivenOut) {
+  const test::KernelStamps stamps;
+  LiveInput input(two_sockets());
+  const test::UdpSender sender;
+  sender.send(input.sockets()[0].port(), test::bytes_of("a"));
+  const Input first = input.next(seconds{10});
+  const Stamp given_out = std::get<Datagram>(first).receive_stamp;
+  for (const Duration late : {Duration{milliseconds{3}}, Duration{milliseconds{2}}, Duration{seconds{3600}}})
+    input.push(imu_at(given_out - late));
+  const auto next_arrival = [&] { return std::get<ImuInput>(input.next(seconds{10})).sample.arrival; };
+  EXPECT_EQ(next_arrival(), given_out + Duration{1});
+  EXPECT_EQ(next_arrival(), given_out + Duration{2});
+  EXPECT_EQ(next_arrival(), given_out - seconds{3600});
+}
+
 TEST(LiveInput, MotionThatNobodyFetchesIsCounted) {
   LiveInput input(two_sockets());
   for (std::size_t i = 0; i < LiveInput::kMaxUnread + 7; ++i)

@@ -15,6 +15,7 @@
 #include "daemon/allocation_counter.hpp"
 #include "daemon/drive.hpp"
 #include "daemon/paced_input.hpp"
+#include "support/held_input.hpp"
 
 namespace locus::daemon {
 namespace {
@@ -26,48 +27,11 @@ using std::chrono::seconds;
 /// So slow a world that no registration is ended by its deadline.
 constexpr double kNoHurry = 1e-3;
 
-/// A drive that waits for the pipeline now and then.
-class HeldInput : public InputSource {
- public:
-  Input next(Duration timeout) override {
-    if (waits()) {
-      std::this_thread::sleep_for(std::min<Duration>(timeout, microseconds{100}));
-      return Silence{last_arrival_};
-    }
-    Input input = drive_.next(timeout);
-    if (!std::holds_alternative<EndOfInput>(input))
-      last_arrival_ = arrival_of(input);
-    return input;
-  }
-
- protected:
-  virtual bool waits() = 0;
-
-  std::atomic<const LivePipeline*> pipeline_{nullptr}; ///< until there is one, it waits
-
- private:
-  DriveInput drive_;
-  Stamp last_arrival_;
-};
-
-/// Gives the drive out no faster than the odometry processes it, so that nothing is dropped.
-class PatientInput : public HeldInput {
- public:
-  void wait_for(const LivePipeline& pipeline) { pipeline_.store(&pipeline); }
-
- private:
-  bool waits() override {
-    const LivePipeline* pipeline = pipeline_.load();
-    if (pipeline == nullptr)
-      return true;
-    const SweepCounters counters = pipeline->counters();
-    return counters.seen > counters.processed + counters.failed;
-  }
-};
-
 /// Gives the drive out up to the sweep that the test asks for.
-class MeteredInput : public HeldInput {
+class MeteredInput : public test::HeldInput {
  public:
+  using test::HeldInput::HeldInput;
+
   /// Until the ingest has handed over so many sweeps in all, and rests.
   void hand_over(const LivePipeline& pipeline, std::uint64_t sweeps) {
     wanted_.store(sweeps);
@@ -135,9 +99,10 @@ Duration time_to_stop(LivePipeline& pipeline) {
 TEST(LivePipeline, GivesTheBitsOfOneThreadWhenNothingIsDropped) {
   const Config config = Drive::config();
   const std::vector<ProcessedSweep> expected = process_in_one_thread(config);
-  PatientInput input;
+  DriveInput drive;
+  test::PatientInput input(drive);
   LivePipeline pipeline(config, open_lidars(config), input, {.speed = kNoHurry});
-  input.wait_for(pipeline);
+  input.wait_for(&pipeline);
   const std::vector<ProcessedSweep> fetched = fetch_all(pipeline);
   pipeline.stop();
 
@@ -198,7 +163,8 @@ TEST(LivePipeline, OverloadDropsSweepsAndNeverMakesEstimatesOlder) {
 /// counted; those that come then are processed one by one.
 TEST(LivePipeline, QueueIsBackWithTheFirstSweepAfterAnOverload) {
   const Config config = Drive::config();
-  MeteredInput input;
+  DriveInput drive;
+  MeteredInput input(drive);
   constexpr std::uint64_t kNone = ~0ULL;
   std::atomic<std::uint64_t> busy_with{kNone};
   const auto keep_busy = [&](const Sweep& sweep, const auto&...) {
@@ -229,10 +195,11 @@ TEST(LivePipeline, QueueIsBackWithTheFirstSweepAfterAnOverload) {
 /// What the deadline is for: a registration that is too slow for its sweeps is cut short, and few are dropped.
 TEST(LivePipeline, RegistrationEndsAnIterationAfterItsDeadline) {
   constexpr double kImpossible = 1e9; // every deadline has passed before the registration begins
-  PatientInput input;
+  DriveInput drive;
+  test::PatientInput input(drive);
   const Config config = Drive::config();
   LivePipeline pipeline(config, open_lidars(config), input, {.speed = kImpossible});
-  input.wait_for(pipeline);
+  input.wait_for(&pipeline);
   const std::vector<ProcessedSweep> fetched = fetch_all(pipeline);
   ASSERT_FALSE(fetched.empty());
   for (const ProcessedSweep& done : fetched)
@@ -241,9 +208,10 @@ TEST(LivePipeline, RegistrationEndsAnIterationAfterItsDeadline) {
 
 TEST(LivePipeline, ConsumerThatFetchesNothingLosesEstimatesAndDelaysNobody) {
   const Config config = Drive::config();
-  PatientInput input;
+  DriveInput drive;
+  test::PatientInput input(drive);
   LivePipeline pipeline(config, open_lidars(config), input, {.speed = kNoHurry});
-  input.wait_for(pipeline);
+  input.wait_for(&pipeline);
   const Duration give_up = read_clock(CLOCK_MONOTONIC) + seconds{60};
   while (pipeline.counters().seen < Drive::kSweeps - 1 && read_clock(CLOCK_MONOTONIC) < give_up)
     std::this_thread::sleep_for(milliseconds{1});
@@ -284,10 +252,11 @@ TEST(LivePipeline, AllocatesNothingOnceWarm) {
     GTEST_SKIP() << "a sanitizer is in the way of counting";
   constexpr std::uint64_t kWarm = 40;
   const Config config = Drive::config();
-  PatientInput input;
+  DriveInput drive;
+  test::PatientInput input(drive);
   Drive::instance();
   LivePipeline pipeline(config, open_lidars(config), input, {.speed = kNoHurry});
-  input.wait_for(pipeline);
+  input.wait_for(&pipeline);
   std::optional<std::uint64_t> before;
   std::optional<std::uint64_t> after;
   while (!pipeline.finished())

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A participant made with Cyclone DDS: cyclone_peer DOMAIN listen|talk PREFIX. See peer_words.hpp.
+// A participant made with Cyclone DDS: cyclone_peer DOMAIN listen|talk|flood|mistype PREFIX. See peer_words.hpp.
+#include <array>
 #include <cstdlib>
+#include <limits>
 #include <stdexcept>
 
 #include "daemon/dds/dds_node.hpp"
@@ -79,18 +81,64 @@ void talk(const DdsNode& node) {
   });
 }
 
+/// What no sensor says, as fast as it goes, and says in the end how much that was.
+void flood(const DdsNode& node) {
+  const DdsWriter<ros::Imu> imus{node, "/imu/data", {false, 5}};
+  const DdsWriter<ros::Odometry> odometries{node, "/wheel_odometry", {false, 5}};
+  const DdsWriter<ros::Bool> healths{node, "/wheel_health", {false, 5}};
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN(), kEndless = std::numeric_limits<double>::infinity();
+  constexpr std::array kAbsurd{kNone, kEndless, -kEndless, 1e300, -1e300, 1e-300, 0.0, 1e9};
+  std::string empty, large(60'000, 'x');
+  std::uint64_t sent = 0;
+  for (std::uint32_t i = 0; i % 1024 != 0 || stdin_is_open(); ++i) {
+    const double absurd = kAbsurd[i % kAbsurd.size()];
+    std::string& frame = i % 100 == 0 ? large : empty;
+    const auto now_s = static_cast<std::int32_t>(realtime_ns() / 1'000'000'000);
+    const std::array seconds{now_s, 0, std::numeric_limits<std::int32_t>::max(), -1};
+    ros::Imu imu{};
+    imu.header_ = {{seconds[i / 8 % seconds.size()], i}, frame.data()};
+    imu.orientation_.w_ = absurd;
+    imu.angular_velocity_.x_ = imu.linear_acceleration_.z_ = absurd;
+    ros::Odometry odometry{};
+    odometry.header_ = {imu.header_.stamp_, frame.data()};
+    odometry.child_frame_id_ = frame.data();
+    odometry.pose_.pose_.position_.x_ = odometry.pose_.pose_.orientation_.w_ = absurd;
+    odometry.twist_.covariance_[0] = absurd;
+    sent += imus.write(imu) ? 1U : 0U;
+    sent += odometries.write(odometry) ? 1U : 0U;
+    sent += healths.write({i % 2 == 0}) ? 1U : 0U;
+  }
+  tell("flooded {}", sent);
+}
+
+/// The names of topics that exist, with a type that they have not.
+void mistype(const DdsNode& node) {
+  const DdsWriter<ros::UInt8> imus{node, "/imu/data", {false, 5}}, odometries{node, "/wheel_odometry", {false, 5}};
+  talk_on([&](int i) {
+    if (!imus.write({static_cast<std::uint8_t>(i)}) || !odometries.write({static_cast<std::uint8_t>(i)}))
+      throw std::runtime_error("DDS did not take a message");
+  });
+}
+
 void run(int argc, char** argv) {
-  if (argc != 4 && argc != 5)
-    throw std::runtime_error("usage: cyclone_peer DOMAIN listen|talk PREFIX [INTERFACE]");
+  if (argc < 4 || argc > 6)
+    throw std::runtime_error("usage: cyclone_peer DOMAIN listen|talk|flood|mistype PREFIX [INTERFACE [ENCLAVE]]");
   DdsOptions options;
   options.domain = std::atoi(argv[1]); // NOLINT
-  if (argc == 5)
+  if (argc >= 5)
     options.interface = argv[4];
+  if (argc == 6)
+    options.security = argv[5];
   const auto node = DdsNode::open(options);
   if (!node)
     throw std::runtime_error(node.error());
-  if (std::string(argv[2]) == "talk")
+  const std::string role = argv[2];
+  if (role == "talk")
     talk(*node);
+  else if (role == "flood")
+    flood(*node);
+  else if (role == "mistype")
+    mistype(*node);
   else
     listen(*node, argv[3]);
 }

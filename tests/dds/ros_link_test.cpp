@@ -3,12 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <functional>
 #include <mutex>
 #include <sstream>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "dds/peer_words.hpp"
@@ -160,6 +162,32 @@ TEST_P(Peers, AreHeardInOrderWithEveryFigure) {
 INSTANTIATE_TEST_SUITE_P(Dds, Peers, testing::Values(CYCLONE_PEER, FAST_DDS_PEER), [](const auto& peer) {
   return std::string(peer.param).find("fast") == std::string::npos ? "Cyclone" : "FastDds";
 });
+
+/// Two that publish a source's topic would be one that jumps: the first has it until it goes.
+TEST(RosLink, TopicBelongsToTheFirstPublisherUntilItGoes) {
+  const test::DdsDomain domain;
+  Inbox inbox;
+  RosLink link(config_in(domain), inbox.sink());
+  const std::vector<std::string> talker{CYCLONE_PEER, std::to_string(domain.number()), "talk", "/locus"};
+  test::Child first(talker);
+  ASSERT_TRUE(eventually([&] { return inbox.all<ImuInput>().size() > 100; }));
+  const test::Child second(talker);
+  const auto imu = [&] { return link.status().sources[1]; };
+  ASSERT_TRUE(eventually([&] { return imu().refused > 100; }));
+  const auto is_in_order = [&] {
+    double last = -1;
+    return std::ranges::all_of(inbox.all<ImuInput>(), [&](const ImuInput& one) {
+      return one.sample.angular_velocity_radps.z() > std::exchange(last, one.sample.angular_velocity_radps.z());
+    });
+  };
+  EXPECT_TRUE(is_in_order()) << "the second counts from the beginning";
+  EXPECT_EQ(imu().writers, 2U);
+  first.close_stdin();
+  ASSERT_EQ(first.wait_for_exit(seconds{5}), 0);
+  const auto left = std::chrono::steady_clock::now();
+  EXPECT_TRUE(eventually([&] { return !is_in_order(); }));
+  EXPECT_LT(std::chrono::steady_clock::now() - left, seconds{1});
+}
 
 /// A robot is told apart from another by its prefix, or by its domain. Each says where it is by a figure of its own.
 TEST(RosLink, RobotsOnOneNetworkAreToldApart) {

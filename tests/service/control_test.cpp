@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -6,12 +8,18 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <string_view>
+#include <thread>
 #include <utility>
 #include <vector>
 
+#include <poll.h>
 #include <sched.h>
 #include <sys/mount.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include "service/robot_network.hpp"
@@ -110,6 +118,88 @@ TEST_F(Control, StrangersMayLookAndNotTouch) {
     EXPECT_EQ(touch.err, "locusctl: not permitted; be root or a member of group locusd\n") << command.front();
   }
   EXPECT_EQ(status()["flat_ground"], "off");
+}
+
+/// Somebody with a local account and nothing better to do.
+class Pest {
+ public:
+  explicit Pest(std::string path) : path_(std::move(path)) {
+    for (std::thread& thread : threads_)
+      thread = std::thread([this] { run(); });
+  }
+  ~Pest() {
+    stopping_ = true;
+    for (std::thread& thread : threads_)
+      thread.join();
+  }
+  Pest(const Pest&) = delete;
+  Pest& operator=(const Pest&) = delete;
+
+  [[nodiscard]] int answers() const { return answers_; }
+
+ private:
+  /// Asks on connections that it makes anew each time, and keeps a hundred that never say a word.
+  void run() {
+    constexpr int kNobody = 65534;
+    syscall(SYS_setgroups, 0, nullptr); // of this thread alone
+    syscall(SYS_setresuid, kNobody, kNobody, kNobody);
+    const auto call = [&] {
+      const int socket = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+      sockaddr_un address{AF_UNIX, {}};
+      path_.copy(address.sun_path, sizeof(address.sun_path) - 1);
+      static_cast<void>(connect(socket, reinterpret_cast<const sockaddr*>(&address), sizeof(address)));
+      return socket;
+    };
+    std::array<int, 100> silent{};
+    for (std::size_t i = 0; !stopping_; ++i) {
+      int& idle = silent[i % silent.size()];
+      if (idle > 0)
+        close(idle);
+      idle = call();
+      const int socket = call();
+      constexpr std::string_view kAsk = R"({"command": "status"})", kReset = R"({"command": "reset"})";
+      for (const std::string_view request : {kAsk, kReset, kAsk.substr(1), std::string_view{}}) {
+        pollfd answer{socket, POLLIN, 0};
+        if (::send(socket, request.data(), request.size(), MSG_NOSIGNAL) >= 0 && poll(&answer, 1, 20) > 0)
+          ++answers_;
+      }
+      close(socket);
+    }
+    for (const int idle : silent)
+      if (idle > 0)
+        close(idle);
+  }
+
+  std::string path_;
+  std::atomic<bool> stopping_{false};
+  std::atomic<int> answers_{0};
+  std::array<std::thread, 4> threads_;
+};
+
+TEST_F(Control, StrangersWhoAskWithoutEndKeepNobodyOutAndCostLittle) {
+  if (geteuid() != 0)
+    GTEST_SKIP() << "no second user to be: run as root";
+  Child daemon(undisturbed(locusd(config())));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+  ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+  chmod(file("control").parent_path().c_str(), 0755);
+  const nlohmann::json before = status();
+  {
+    const Pest pest(file("control").string());
+    std::this_thread::sleep_for(seconds{6});
+    EXPECT_GT(pest.answers(), 50);
+    for (int i = 0; i < 10; ++i)
+      EXPECT_EQ(ctl({"flat-ground", "off"}).status, 0);
+  }
+  const nlohmann::json after = status();
+  const double elapsed_s = after["duration_s"].get<double>() - before["duration_s"].get<double>();
+  const double cpu_share = (after["cpu_s"].get<double>() - before["cpu_s"].get<double>()) / elapsed_s;
+  RecordProperty("cpu_share", std::to_string(cpu_share));
+  EXPECT_LT(cpu_share, 0.6) << "of a core, the odometry's share included";
+  EXPECT_EQ(after["state"], "tracking");
+  EXPECT_EQ(after["packets"]["total"]["lost"], 0);
+  EXPECT_EQ(after["sweeps"]["dropped"], 0);
 }
 
 /// The service is an instance with a name, and the group one that nobody else on this machine knows.

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -107,6 +108,31 @@ TEST_F(LidarNetwork, LidarThatChangesItsAddressIsTakenBack) {
         return s["packets"]["total"]["data"].get<std::uint64_t>() > before + 750 && s["state"] == "tracking";
       },
       seconds{8}));
+}
+
+/// docs/examples/locusd.nft: another host on the lidar's cable gets nothing through, the lidar everything.
+TEST_F(LidarNetwork, FirewallLetsTheLidarPassAndNobodyElse) {
+  lay_cable();
+  std::string rules = read_text(FIREWALL);
+  for (const auto& [of_the_example, ours] :
+       {std::pair{"\"eth1\"", "\"lidar0\""}, std::pair{"192.168.1.201, 192.168.1.202", "10.9.0.201"}}) {
+    ASSERT_NE(rules.find(of_the_example), std::string::npos);
+    rules.replace(rules.find(of_the_example), std::string(of_the_example).size(), ours);
+  }
+  std::ofstream{file("locusd.nft")} << rules;
+  here("/usr/sbin/nft -f " + file("locusd.nft").string());
+  const Child daemon(undisturbed(locusd(config())));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  at_lidar("ip route replace 10.9.0.0/24 dev eth0 src 10.9.0.202");
+  {
+    const Child other(play("10.9.0.1"));
+    std::this_thread::sleep_for(seconds{2});
+  }
+  EXPECT_EQ(status()["packets"]["total"]["received"], 0);
+  at_lidar("ip route replace 10.9.0.0/24 dev eth0 src 10.9.0.201");
+  expect_heard("10.9.0.1");
+  const json total = status()["packets"]["total"];
+  EXPECT_EQ(total["data"].get<int>() + total["position"].get<int>(), total["received"].get<int>());
 }
 
 TEST_F(LidarNetwork, CableThatIsPulledAndPutBack) {

@@ -16,6 +16,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "drivers/capture.hpp"
 #include "locus_sim/capture_writer.hpp"
 #include "replay/synthetic_robot.hpp"
 
@@ -83,6 +84,14 @@ std::filesystem::path RobotNetwork::config(const std::string& more) const {
   std::filesystem::path path = file("locusd.yaml");
   std::ofstream{path} << read_text(capture() / "config.yaml") << more;
   return path;
+}
+
+std::uint64_t datagrams_in(const std::filesystem::path& file) {
+  auto capture = Capture::open(file);
+  std::uint64_t count = 0;
+  while (capture && capture->next() != nullptr)
+    ++count;
+  return count;
 }
 
 Duration shift_of(const Child& play) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -42,6 +43,9 @@ class RobotNetwork : public testing::Test {
  private:
   TemporaryFolder folder_;
 };
+
+/// How many packets a capture holds.
+std::uint64_t datagrams_in(const std::filesystem::path& file);
 
 /// Where a peer heard the robot to be.
 struct HeardPose {

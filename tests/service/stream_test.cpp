@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // locus-sim -o - | locus-play -: a robot that nobody ever recorded.
-#include "drivers/capture.hpp"
 #include "drivers/udp_socket.hpp"
 #include "locus_sim/stream_text.hpp"
 #include "service/robot_network.hpp"
@@ -31,14 +30,6 @@ std::filesystem::path recorded(const std::filesystem::path& folder) {
   const ProgramRun run = run_program("/bin/sh", {"-c", LOCUS_SIM + std::string(kDrive) + folder.string()});
   EXPECT_EQ(run.status, 0) << run.err;
   return folder;
-}
-
-std::size_t datagrams_in(const std::filesystem::path& file) {
-  auto capture = Capture::open(file);
-  std::size_t count = 0;
-  while (capture && capture->next() != nullptr)
-    ++count;
-  return count;
 }
 
 /// The truth among them, which no robot sends.

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/recorder.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <thread>
+#include <vector>
+
+#include "daemon/allocation_counter.hpp"
+#include "daemon/drive.hpp"
+#include "drivers/capture_folder.hpp"
+#include "drivers/capture_sequence.hpp"
+#include "drivers/motion_files.hpp"
+#include "support/temporary_folder.hpp"
+
+namespace locus::daemon {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+Config recorded_config() {
+  Config config = Drive::config();
+  config.record.max_bytes = 1'000'000'000;
+  return config;
+}
+
+/// What is in a folder, in the order in which locus-replay plays it.
+struct Recorded {
+  std::vector<Datagram> datagrams; ///< without payload
+  std::vector<std::vector<std::byte>> payloads;
+  std::vector<ImuSample> imu;
+  std::vector<OdometrySample> odometry;
+};
+
+Recorded read(const std::filesystem::path& folder) {
+  Recorded recorded;
+  const auto files = CaptureFolder::find(folder);
+  EXPECT_TRUE(files) << files.error();
+  auto capture = CaptureSequence::open(files->lidar);
+  EXPECT_TRUE(capture) << capture.error();
+  while (const Datagram* datagram = capture->next()) {
+    recorded.payloads.emplace_back(datagram->payload.begin(), datagram->payload.end());
+    recorded.datagrams.push_back(*datagram);
+  }
+  if (!files->imu.empty())
+    recorded.imu = MotionSamples<ImuSample>::open(files->imu)->drain();
+  if (!files->odometry.empty())
+    recorded.odometry = MotionSamples<OdometrySample>::open(files->odometry.front().files)->drain();
+  return recorded;
+}
+
+/// All of it, told at the pace of a disk that keeps up.
+void record(const std::filesystem::path& folder, const Config& config, std::span<const Input> inputs) {
+  Recorder recorder(folder, config);
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    recorder.take(inputs[i]);
+    if (i % 2000 == 1999)
+      std::this_thread::sleep_for(milliseconds{50});
+  }
+}
+
+bool is_same(const Datagram& a, const Datagram& b) {
+  return a.receive_stamp == b.receive_stamp && a.source_ip == b.source_ip && a.source_port == b.source_port &&
+         a.destination_port == b.destination_port;
+}
+
+/// In many pieces, that no bit is lost on the way from one to the next.
+TEST(Recorder, EveryBitIsReadAgain) {
+  const test::TemporaryFolder folder;
+  Config config = recorded_config();
+  config.record.max_bytes = 20'000'000;
+  const std::vector<Input>& inputs = Drive::instance().inputs();
+  record(folder / "record", config, inputs);
+  const Recorded recorded = read(folder / "record");
+  EXPECT_GT(CaptureFolder::find(folder / "record")->lidar.size(), 5U);
+  std::size_t datagram = 0, imu = 0, odometry = 0;
+  for (const Input& input : inputs) {
+    if (const auto* sent = std::get_if<Datagram>(&input)) {
+      ASSERT_LT(datagram, recorded.datagrams.size());
+      EXPECT_TRUE(is_same(recorded.datagrams[datagram], *sent));
+      EXPECT_TRUE(std::ranges::equal(recorded.payloads[datagram++], sent->payload));
+    } else if (const auto* sample = std::get_if<ImuInput>(&input)) {
+      ASSERT_LT(imu, recorded.imu.size());
+      const ImuSample& read = recorded.imu[imu++];
+      EXPECT_EQ(read.stamp, sample->sample.stamp);
+      EXPECT_EQ(read.arrival, sample->sample.arrival);
+      EXPECT_EQ(read.angular_velocity_radps, sample->sample.angular_velocity_radps);
+      EXPECT_EQ(read.specific_force_mps2, sample->sample.specific_force_mps2);
+      ASSERT_EQ(read.attitude.has_value(), sample->sample.attitude.has_value());
+      EXPECT_TRUE(!read.attitude || read.attitude->coeffs() == sample->sample.attitude->normalized().coeffs());
+    } else {
+      ASSERT_LT(odometry, recorded.odometry.size());
+      const OdometrySample& read = recorded.odometry[odometry++];
+      const auto& wanted = std::get<OdometryInput>(input).sample;
+      EXPECT_EQ(read.stamp, wanted.stamp);
+      EXPECT_EQ(read.arrival, wanted.arrival);
+      EXPECT_EQ(read.covariance_scale, wanted.covariance_scale);
+      EXPECT_EQ(read.T_source_base.translation, wanted.T_source_base.translation);
+      EXPECT_LT((read.T_source_base.rotation.coeffs() - wanted.T_source_base.rotation.coeffs()).norm(), 1e-15);
+    }
+  }
+  EXPECT_EQ(datagram, recorded.datagrams.size());
+  EXPECT_EQ(imu, recorded.imu.size());
+  EXPECT_EQ(odometry, recorded.odometry.size());
+}
+
+/// What a broken driver sends is no reason why all else could not be replayed.
+TEST(Recorder, AbsurdSamplesAreReadAgainOrLeftOut) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  const Stamp now = stamp_from_ns(1'700'000'000'000'000'000);
+  Config config = recorded_config();
+  config.odometry.motion_sources.push_back({"second", SourceKind::imu, {}});
+  config.source_topics.push_back({});
+  ImuSample imu{now, now, {kNan, 1, 2}, {1e300, -1e-300, 0}, {}};
+  OdometrySample good{now, now + Duration{1}, Pose{}, std::numeric_limits<double>::infinity()};
+  OdometrySample no_rotation = good, before_1951 = good;
+  no_rotation.T_source_base.rotation.coeffs().setZero();
+  before_1951.stamp = stamp_from_ns(-2'000'000'000'000'000'000);
+  std::vector<std::byte> longer(2000, std::byte{7});
+  Datagram datagram;
+  datagram.payload = longer;
+  datagram.receive_stamp = now;
+
+  const test::TemporaryFolder folder;
+  {
+    Recorder recorder(folder / "record", config);
+    for (const OdometrySample& sample : {no_rotation, good, before_1951})
+      recorder.take(OdometryInput{0, sample});
+    recorder.take(ImuInput{1, imu});
+    recorder.take(ImuInput{2, imu});
+    recorder.take(datagram);
+    recorder.take(Silence{now});
+    recorder.take(OutsideVerdict{0, false});
+    for (int look = 0; look < 500 && recorder.status().recorded < 3; ++look)
+      std::this_thread::sleep_for(milliseconds{10});
+    EXPECT_EQ(recorder.status().recorded, 3U);
+    EXPECT_EQ(recorder.status().unfit, 2U);
+    EXPECT_EQ(recorder.status().dropped, 0U) << "and the second IMU has no file";
+  }
+  const Recorded recorded = read(folder / "record");
+  ASSERT_EQ(recorded.imu.size(), 1U);
+  EXPECT_TRUE(std::isnan(recorded.imu[0].angular_velocity_radps.x()));
+  EXPECT_EQ(recorded.imu[0].specific_force_mps2, imu.specific_force_mps2);
+  ASSERT_EQ(recorded.odometry.size(), 1U);
+  EXPECT_EQ(recorded.odometry[0].covariance_scale, good.covariance_scale);
+  EXPECT_EQ(recorded.odometry[0].arrival, good.arrival);
+  ASSERT_EQ(recorded.payloads.size(), 1U);
+  EXPECT_GT(recorded.payloads[0].size(), velodyne::kDataPacketBytes) << "as no lidar sends them";
+}
+
+TEST(Recorder, WhatTheDiskIsTooSlowForIsDroppedAndCounted) {
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder / "record", recorded_config());
+  constexpr std::uint64_t kInputs = 4 * Recorder::kMaxUnwritten;
+  const ImuInput imu{1, {}};
+  const auto begin = std::chrono::steady_clock::now();
+  for (std::uint64_t i = 0; i < kInputs; ++i)
+    recorder.take(imu);
+  RecordProperty("ns_per_input",
+                 static_cast<int>((std::chrono::steady_clock::now() - begin).count() / static_cast<long>(kInputs)));
+  const auto all_told = [&] { return recorder.status().recorded + recorder.status().dropped == kInputs; };
+  for (int look = 0; look < 1000 && !all_told(); ++look)
+    std::this_thread::sleep_for(milliseconds{10});
+  EXPECT_TRUE(all_told());
+  EXPECT_GT(recorder.status().dropped, 0U);
+  EXPECT_GE(recorder.status().recorded, Recorder::kMaxUnwritten);
+}
+
+TEST(Recorder, NothingIsMadeBeforeTheFirstInput) {
+  const test::TemporaryFolder folder;
+  {
+    const Recorder recorder(folder / "record", recorded_config());
+    std::this_thread::sleep_for(milliseconds{250});
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "record"));
+}
+
+/// The thread of the recorder may; here it has nothing to do, for the disk takes nothing for ten seconds.
+TEST(Recorder, TakingAllocatesNothing) {
+  if (!allocations())
+    GTEST_SKIP() << "a sanitizer is in the way of counting";
+  const test::TemporaryFolder folder;
+  std::ofstream{folder / "plain"} << "a file";
+  Drive::instance();
+  Recorder recorder(folder / "plain/record", recorded_config());
+  recorder.take(Drive::instance().inputs().front());
+  while (recorder.status().problem.empty())
+    std::this_thread::sleep_for(milliseconds{10});
+  DriveInput drive;
+  RecordingInput input(drive, recorder);
+  std::this_thread::sleep_for(milliseconds{150});
+  const auto before = allocations();
+  int taken = 0;
+  while (!std::holds_alternative<EndOfInput>(input.next({})))
+    ++taken;
+  EXPECT_EQ(allocations(), before);
+  EXPECT_EQ(taken, Drive::instance().inputs().size());
+}
+
+} // namespace
+} // namespace locus::daemon

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// DDS Security as docs/examples/dds-security.sh sets it up.
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <thread>
+
+#include "service/robot_network.hpp"
+#include "service/undisturbed.hpp"
+
+namespace locus::test {
+namespace {
+
+using nlohmann::json;
+using std::chrono::seconds;
+
+class DdsSecurity : public RobotNetwork {
+ protected:
+  [[nodiscard]] std::filesystem::path enclaves(const std::string& name) const {
+    setenv("INPUTS", "/wheel_odometry /wheel_health /imu/data", 1); // NOLINT(concurrency-mt-unsafe)
+    const ProgramRun run = run_program(DDS_SECURITY, {file(name).string(), "0"});
+    EXPECT_EQ(run.status, 0) << run.err;
+    return file(name);
+  }
+  static std::vector<std::string> peer(const char* role, const std::filesystem::path& enclave = {}) {
+    return {CYCLONE_PEER, "0", role, "/locus", "lo", enclave.string()};
+  }
+  [[nodiscard]] std::filesystem::path secured(const std::filesystem::path& enclave) const {
+    return config("dds: {security: " + enclave.string() + "}\n");
+  }
+};
+
+/// While one who may hears the robot and is heard, one without credentials, one with those of another authority and one
+/// whose permissions do not allow it hear nothing and are not heard.
+TEST_F(DdsSecurity, WhoHasNoCredentialsNeitherHearsNorIsHeard) {
+  const std::filesystem::path ours = enclaves("ours"), theirs = enclaves("theirs");
+  Child daemon(undisturbed(locusd(secured(ours / "locusd"))));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10})) << testing::PrintToString(daemon.lines());
+  const Child viewer(peer("listen", ours / "viewer"));
+  const Child stranger(peer("listen")), of_others(peer("listen", theirs / "viewer"));
+  const Child talks(peer("talk")), talks_of_others(peer("talk", theirs / "sensors")),
+      views_and_talks(peer("talk", ours / "viewer"));
+  const auto diagnosed = [&](const auto& lines) {
+    return std::ranges::any_of(lines, [](const std::string& line) { return line.starts_with("diagnostics "); });
+  };
+  ASSERT_TRUE(viewer.wait_until(seconds{10}, diagnosed)) << testing::PrintToString(viewer.lines());
+  std::this_thread::sleep_for(seconds{4});
+  for (const char* name : {"wio", "imu"}) {
+    const json source = status()["sources"][name];
+    EXPECT_EQ(source["received"], 0) << name;
+    EXPECT_EQ(source["writers"], 0) << name;
+  }
+  EXPECT_GT(viewer.lines_of("diagnostics").size(), 4U);
+  EXPECT_TRUE(stranger.lines_of("diagnostics").empty()) << testing::PrintToString(stranger.lines());
+  EXPECT_TRUE(of_others.lines_of("diagnostics").empty()) << testing::PrintToString(of_others.lines());
+
+  const Child sensors(peer("talk", ours / "sensors"));
+  EXPECT_TRUE(status_comes([](const json& s) { return s["sources"]["imu"]["received"] > 50; }, seconds{10}))
+      << testing::PrintToString(sensors.lines());
+}
+
+TEST_F(DdsSecurity, FileThatIsMissingIsNamedAndWaitedFor) {
+  const std::filesystem::path ours = enclaves("ours"), key = ours / "locusd" / "key.pem";
+  std::filesystem::rename(key, file("key.pem"));
+  const Child daemon(locusd(secured(ours / "locusd")));
+  EXPECT_TRUE(daemon.wait_for_line("key.pem: No such file or directory; dds.security names a folder", seconds{10}))
+      << testing::PrintToString(daemon.lines());
+  std::filesystem::rename(file("key.pem"), key);
+  EXPECT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+}
+
+} // namespace
+} // namespace locus::test

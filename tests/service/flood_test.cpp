@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+// Somebody on the robot's networks who sends as fast as it goes.
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <fstream>
+#include <memory>
+#include <random>
+#include <thread>
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "service/robot_network.hpp"
+#include "service/undisturbed.hpp"
+
+namespace locus::test {
+namespace {
+
+using nlohmann::json;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+/// Garbage to the ports of the lidars from another address than theirs, as fast as the kernel takes it, by a thread of
+/// its own.
+class UdpFlood {
+ public:
+  UdpFlood() : thread_([this] { run(); }) {}
+  ~UdpFlood() { stop(); }
+  UdpFlood(const UdpFlood&) = delete;
+  UdpFlood& operator=(const UdpFlood&) = delete;
+
+  /// Datagrams sent.
+  std::uint64_t stop() {
+    stopping_ = true;
+    if (thread_.joinable())
+      thread_.join();
+    return sent_;
+  }
+
+ private:
+  void run() {
+    const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    const sockaddr_in from{AF_INET, 0, {htonl(INADDR_LOOPBACK + 1)}, {}};
+    EXPECT_EQ(bind(socket, reinterpret_cast<const sockaddr*>(&from), sizeof(from)), 0);
+    constexpr std::size_t kBatch = 64;
+    std::array<std::byte, 1400> garbage{};
+    std::minstd_rand random(1);
+    std::ranges::generate(garbage, [&] { return static_cast<std::byte>(random()); });
+    const std::array<std::size_t, 4> lengths{1206, 512, 1400, 0};
+    std::array<sockaddr_in, kBatch> to{};
+    std::array<iovec, kBatch> vectors{};
+    std::array<mmsghdr, kBatch> messages{};
+    for (std::size_t i = 0; i < kBatch; ++i) {
+      to[i] = {AF_INET, htons(i % 8 == 0 ? 8308 : 2368), {htonl(INADDR_LOOPBACK)}, {}};
+      vectors[i] = {garbage.data(), lengths[i % lengths.size()]};
+      messages[i].msg_hdr = {&to[i], sizeof(sockaddr_in), &vectors[i], 1, nullptr, 0, 0};
+    }
+    while (!stopping_)
+      if (const int count = sendmmsg(socket, messages.data(), kBatch, 0); count > 0)
+        sent_ += static_cast<std::uint64_t>(count);
+    close(socket);
+  }
+
+  std::atomic<bool> stopping_{false};
+  std::uint64_t sent_ = 0;
+  std::thread thread_;
+};
+
+class Flood : public RobotNetwork {
+ protected:
+  /// By name: figures over the seconds of a flood.
+  void record(const char* name, double value) const { RecordProperty(name, std::to_string(value)); }
+};
+
+std::uint64_t sum(const json& counts) {
+  std::uint64_t total = 0;
+  for (const auto& [reason, count] : counts.items())
+    total += count.get<std::uint64_t>();
+  return total;
+}
+
+/// Every datagram is accounted for, the lidar's and the others': decoded, refused with a reason, or kept out by the
+/// kernel.
+TEST_F(Flood, OfGarbageOnTheLidarsPortsCostsNoPacketOfTheLidar) {
+  Child daemon(undisturbed(locusd(config())));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+  ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+  const json before = status();
+  std::uint64_t garbage = 0;
+  constexpr double kFlood_s = 8;
+  {
+    UdpFlood flood;
+    std::this_thread::sleep_for(from_seconds(kFlood_s));
+    garbage = flood.stop();
+  }
+  const json after = status();
+  ASSERT_EQ(play.wait_for_exit(seconds{60}), 0) << testing::PrintToString(play.lines());
+  std::this_thread::sleep_for(milliseconds{500});
+
+  const json end = status(), total = end["packets"]["total"];
+  const auto lidar = datagrams_in(capture() / "lidar.pcap");
+  const auto filtered = end["dropped"]["flood_datagrams"].get<std::uint64_t>();
+  EXPECT_GT(garbage, kFlood_s * 20'000) << "else it was no flood";
+  EXPECT_EQ(total["lost"], 0);
+  EXPECT_EQ(end["packets"]["kernel_drops"], 0);
+  EXPECT_EQ(total["data"].get<std::uint64_t>() + total["position"].get<std::uint64_t>(), lidar);
+  EXPECT_EQ(sum(total["rejected"]) + filtered, garbage);
+  EXPECT_GT(filtered, garbage * 9 / 10);
+  EXPECT_GT(total["rejected"]["sender"], 100);
+  EXPECT_EQ(end["sweeps"]["dropped"], 0);
+  const double cpu_share = (after["cpu_s"].get<double>() - before["cpu_s"].get<double>()) / kFlood_s;
+  EXPECT_LT(cpu_share, 0.5) << "of a core, the odometry's share included";
+  EXPECT_TRUE(daemon.wait_for_line("the ports of the lidars are flooded", {}));
+  record("garbage_per_s", static_cast<double>(garbage) / kFlood_s);
+  record("cpu_share", cpu_share);
+}
+
+/// The inputs by DDS belong to who had them first, and what a source says that nobody was before is judged.
+class FloodOfDds : public Flood {
+ protected:
+  static std::vector<std::string> peer(const char* role) { return {CYCLONE_PEER, "0", role, "/locus"}; }
+
+  [[nodiscard]] std::filesystem::path with_health_topic() const {
+    std::string text = read_text(config());
+    const std::string topic = "topic: /wheel_odometry";
+    EXPECT_NE(text.find(topic), std::string::npos) << text;
+    text.replace(text.find(topic), topic.size(), topic + ", health_topic: /wheel_health");
+    std::ofstream{file("health.yaml")} << text;
+    return file("health.yaml");
+  }
+};
+
+TEST_F(FloodOfDds, BesideTheSensorsChangesNothingButACounter) {
+  const Replay replay({"--quiet", capture().string()});
+  ASSERT_EQ(replay.run().status, 0) << replay.run().err;
+  Child daemon(undisturbed(locusd(config())));
+  const Child mistyped(peer("mistype"));
+  Child listener(undisturbed(peer("listen")));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+  ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+  std::this_thread::sleep_for(seconds{1});
+  const json before = status();
+  Child flood(peer("flood"));
+  std::this_thread::sleep_for(seconds{8});
+  const json after = status();
+  flood.close_stdin();
+  EXPECT_EQ(flood.wait_for_exit(seconds{5}), 0) << testing::PrintToString(flood.lines());
+  ASSERT_EQ(play.wait_for_exit(seconds{60}), 0) << testing::PrintToString(play.lines());
+
+  for (const char* name : {"wio", "imu"}) {
+    const json& source = after["sources"][name];
+    EXPECT_EQ(source["health"], "healthy") << source;
+    EXPECT_GT(source["refused"], 1000) << source;
+    EXPECT_EQ(sum(source["rejected"]), sum(before["sources"][name]["rejected"])) << source;
+    EXPECT_EQ(source["writers"], 2) << "what has another type is none";
+    record((std::string(name) + "_refused").c_str(), source["refused"].get<double>());
+  }
+  EXPECT_TRUE(daemon.wait_for_line("another publishes there", {}));
+  EXPECT_LT(worst_distance_m(replay.trajectory(), heard(listener), shift_of(play)), 0.05);
+  EXPECT_LT(after["peak_rss_mb"].get<double>(), before["peak_rss_mb"].get<double>() + 50);
+  const double elapsed_s = after["duration_s"].get<double>() - before["duration_s"].get<double>();
+  const double cpu_share = (after["cpu_s"].get<double>() - before["cpu_s"].get<double>()) / elapsed_s;
+  record("cpu_share", cpu_share);
+  EXPECT_LT(cpu_share, 1.6) << "cores: that of the DDS library, and that of its reader";
+  EXPECT_EQ(after["sweeps"]["dropped"], 0);
+}
+
+/// Nobody else publishes these topics at first: then the flood is the source, and lidar carries the odometry.
+TEST_F(FloodOfDds, AsTheOnlySourceIsJudgedUnfitAndLidarGoesOn) {
+  Child daemon(undisturbed(locusd(with_health_topic())));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  Child flood(peer("flood"));
+  ASSERT_TRUE(status_comes([](const json& s) { return s["sources"]["imu"]["received"] > 1000; }, seconds{10}));
+  auto play = std::make_unique<Child>(undisturbed({LOCUS_PLAY, capture().string()}));
+  ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+  const json before = status();
+  std::this_thread::sleep_for(seconds{6});
+  const json after = status();
+  EXPECT_EQ(after["state"], "tracking");
+  EXPECT_EQ(after["packets"]["total"]["lost"], 0);
+  EXPECT_GT(after["sweeps"]["processed"].get<int>() - before["sweeps"]["processed"].get<int>(), 50);
+  for (const char* name : {"wio", "imu"}) {
+    EXPECT_NE(after["sources"][name]["health"], "healthy") << after["sources"][name];
+    EXPECT_GT(sum(after["sources"][name]["rejected"]), 1000);
+  }
+  EXPECT_LT(after["peak_rss_mb"].get<double>(), before["peak_rss_mb"].get<double>() + 50);
+  record("motion_drops", after["dropped"]["motion_samples"].get<double>());
+  record("cpu_share", (after["cpu_s"].get<double>() - before["cpu_s"].get<double>()) / 6);
+  // Who goes leaves the topic to the next one, who begins only now: a flood keeps newcomers from being found.
+  flood.close_stdin();
+  ASSERT_EQ(flood.wait_for_exit(seconds{5}), 0) << testing::PrintToString(flood.lines());
+  play.reset();
+  const Child sensors(undisturbed({LOCUS_PLAY, capture().string()}));
+  EXPECT_TRUE(status_comes([](const json& s) { return s["sources"]["imu"]["health"] == "healthy"; }, seconds{15}))
+      << status()["sources"];
+}
+
+} // namespace
+} // namespace locus::test

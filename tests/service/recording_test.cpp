@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the service records, and what locus-replay makes of it.
+#include <algorithm>
+#include <csignal>
+#include <fstream>
+
+#include <sched.h>
+#include <sys/mount.h>
+
+#include <fmt/format.h>
+
+#include "service/robot_network.hpp"
+#include "service/undisturbed.hpp"
+
+namespace locus::test {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+class Recording : public RobotNetwork {
+ protected:
+  /// A robot with two lidars that drives through the plant.
+  [[nodiscard]] std::filesystem::path drive() const {
+    std::filesystem::path folder = file("drive");
+    const ProgramRun run = run_program(LOCUS_SIM, {"--world", "urban", "--robot", "husky", "--lidars", "2",
+                                                   "--duration", "8", "--seed", "3", "-o", folder.string()});
+    EXPECT_EQ(run.status, 0) << run.err;
+    return folder;
+  }
+
+  /// Of a robot, which records: to the state directory unless another folder is named.
+  [[nodiscard]] std::filesystem::path recording(const std::filesystem::path& robot, std::uint64_t max_bytes,
+                                                const std::string& folder = "record") const {
+    std::filesystem::path path = file("recording.yaml");
+    std::ofstream{path} << read_text(robot / "config.yaml")
+                        << fmt::format("record: {{folder: {}, max_bytes: {}}}\n", folder, max_bytes);
+    return path;
+  }
+
+  [[nodiscard]] std::vector<std::filesystem::path> runs() const { return folders_in(file("record")); }
+
+  static std::vector<std::filesystem::path> folders_in(const std::filesystem::path& folder) {
+    std::vector<std::filesystem::path> found;
+    for (const auto& entry : std::filesystem::directory_iterator(folder))
+      found.push_back(entry.path());
+    std::ranges::sort(found);
+    return found;
+  }
+
+  static std::uint64_t bytes_in(const std::filesystem::path& folder) {
+    std::uint64_t bytes = 0;
+    std::error_code vanished;
+    for (std::filesystem::recursive_directory_iterator entry(folder, vanished), end; !vanished && entry != end;
+         entry.increment(vanished))
+      bytes += entry->is_regular_file(vanished) ? entry->file_size(vanished) : 0;
+    return bytes;
+  }
+};
+
+/// How many of the poses that were heard the replay has, at the same nanosecond, and how far they are off at most.
+struct Agreement {
+  std::size_t poses = 0;
+  double worst_m = 0, worst_rad = 0;
+};
+
+Agreement agreement(const std::vector<StampedPose>& replay, const std::vector<HeardPose>& heard) {
+  Agreement found;
+  for (const HeardPose& pose : heard) {
+    const auto same = std::ranges::find(replay, pose.stamp, &StampedPose::stamp);
+    if (same == replay.end())
+      continue;
+    ++found.poses;
+    found.worst_m = std::max(found.worst_m, (same->T_source_base.translation - pose.T_odom_base.translation).norm());
+    found.worst_rad =
+        std::max(found.worst_rad, angle_rad(same->T_source_base.rotation.conjugate() * pose.T_odom_base.rotation));
+  }
+  return found;
+}
+
+TEST_F(Recording, ReplayIsWhatTheServiceComputed) {
+  const std::filesystem::path robot = drive();
+  Child daemon(undisturbed(locusd(recording(robot, 1'000'000'000))));
+  Child listener(undisturbed({CYCLONE_PEER, "0", "listen", "/locus"}));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  std::this_thread::sleep_for(seconds{2}); // the listener is found
+  Child play(undisturbed({LOCUS_PLAY, robot.string()}));
+  ASSERT_EQ(play.wait_for_exit(seconds{60}), 0) << testing::PrintToString(play.lines());
+  std::this_thread::sleep_for(milliseconds{500});
+  const nlohmann::json status = this->status();
+  EXPECT_EQ(status["recording"]["dropped"], 0);
+  EXPECT_EQ(status["recording"]["problem"], "");
+  EXPECT_EQ(status["recording"]["recorded"].get<std::uint64_t>(),
+            status["packets"]["total"]["received"].get<std::uint64_t>() +
+                status["sources"]["imu"]["received"].get<std::uint64_t>() +
+                status["sources"]["wio"]["received"].get<std::uint64_t>());
+  EXPECT_EQ(status["sweeps"]["dropped"], 0);
+  daemon.signal(SIGTERM);
+  ASSERT_EQ(daemon.wait_for_exit(seconds{5}), 0);
+
+  ASSERT_EQ(runs().size(), 1U);
+  EXPECT_TRUE(runs().front().filename().string().starts_with("000001_20")) << runs().front();
+  const Replay replay({"--quiet", file("record").string()});
+  ASSERT_EQ(replay.run().status, 0) << replay.run().err;
+  EXPECT_EQ(replay.run().err, "");
+  for (const auto& [name, packets] : replay.summary()["packets"].items())
+    EXPECT_EQ(packets["data"], status["packets"][name]["data"]) << name;
+  const Agreement live = agreement(replay.trajectory(), heard(listener));
+  EXPECT_GE(live.poses, 77U) << "of 80";
+  // A registration that is ended at its deadline, one period after the cut, ends otherwise in a replay.
+  const bool in_time = status["process_ms"]["max"] < 90.0;
+  EXPECT_LT(live.worst_m, in_time ? 2e-9 : 1e-3) << "it was heard with nine decimals";
+  EXPECT_LT(live.worst_rad, in_time ? 1e-7 : 1e-3);
+  RecordProperty("live_worst_nm", static_cast<int>(1e9 * live.worst_m));
+
+  const Replay original({"--quiet", robot.string()});
+  ASSERT_EQ(original.run().status, 0) << original.run().err;
+  EXPECT_LT(worst_distance_m(original.trajectory(), heard(listener), shift_of(play)), 0.01);
+}
+
+/// The plug is pulled in mid-drive; then the robot drives again, on a disk share for six seconds of it.
+TEST_F(Recording, OldestGoesFirstAndWhatWasKilledReplaysAsFarAsItGoes) {
+  constexpr std::uint64_t kMaxBytes = 10'000'000;
+  const std::filesystem::path robot = drive();
+  {
+    Child daemon(undisturbed(locusd(recording(robot, kMaxBytes))));
+    ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+    const Child play(undisturbed({LOCUS_PLAY, robot.string()}));
+    ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+    std::this_thread::sleep_for(seconds{3});
+    daemon.signal(SIGKILL);
+    EXPECT_EQ(daemon.wait_for_exit(seconds{5}), 128 + SIGKILL);
+  }
+  ASSERT_EQ(runs().size(), 1U);
+  const std::filesystem::path killed = runs().front();
+  const Replay first({"--quiet", killed.string()});
+  EXPECT_EQ(first.run().status, 0) << first.run().err;
+  EXPECT_GE(first.trajectory().size(), 15U);
+  EXPECT_GT(folders_in(killed).size(), 2U) << "pieces";
+  const Replay piece({"--quiet", folders_in(killed)[1].string()});
+  EXPECT_EQ(piece.run().status, 0) << piece.run().err;
+  EXPECT_GT(piece.trajectory().size(), 0U);
+
+  Child daemon(undisturbed(locusd(recording(robot, kMaxBytes))));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  Child play(undisturbed({LOCUS_PLAY, robot.string()}));
+  ASSERT_TRUE(daemon.wait_for_line("recording to", seconds{10})) << testing::PrintToString(daemon.lines());
+  EXPECT_TRUE(std::filesystem::exists(killed)) << "as long as there is room";
+  std::uint64_t most_bytes = 0;
+  while (!play.wait_for_exit(milliseconds{50}))
+    most_bytes = std::max(most_bytes, bytes_in(file("record")));
+  EXPECT_LE(most_bytes, kMaxBytes);
+  EXPECT_GT(most_bytes, kMaxBytes * 3 / 4);
+  EXPECT_EQ(status()["recording"]["problem"], "");
+  daemon.signal(SIGTERM);
+  ASSERT_EQ(daemon.wait_for_exit(seconds{5}), 0);
+  EXPECT_FALSE(std::filesystem::exists(killed / "000001")) << "it was the oldest";
+  ASSERT_GE(runs().size(), 1U);
+  EXPECT_TRUE(runs().back().filename().string().starts_with("000002_"));
+  const Replay all({"--quiet", file("record").string()});
+  EXPECT_EQ(all.run().status, 0) << all.run().err;
+  EXPECT_GE(all.trajectory().size(), 30U);
+}
+
+TEST_F(Recording, DiskThatIsFullIsSaidOnceAndTheOdometryGoesOn) {
+  if (unshare(CLONE_NEWNS) != 0 || mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0)
+    GTEST_SKIP() << "no mounts of one's own: run as root, or allow user namespaces";
+  const std::filesystem::path disk = file("disk");
+  std::filesystem::create_directory(disk);
+  ASSERT_EQ(mount("disk", disk.c_str(), "tmpfs", 0, "size=6m"), 0);
+  const std::filesystem::path& robot = capture();
+  Child daemon(locusd(recording(robot, 10'000'000, disk / "record")));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const Child play({LOCUS_PLAY, robot.string()});
+  ASSERT_TRUE(daemon.wait_for_line("recording to", seconds{10})) << testing::PrintToString(daemon.lines());
+  {
+    std::ofstream filler{disk / "filler"};
+    while (filler << std::string(1 << 16, 'x') << std::flush) {
+    }
+  }
+  ASSERT_TRUE(daemon.wait_for_line("error: ", seconds{10}));
+  const auto error_lines = [&] {
+    std::vector<std::string> errors = daemon.lines();
+    std::erase_if(errors, [](const std::string& line) { return line.find("error: ") == std::string::npos; });
+    return errors;
+  };
+  EXPECT_NE(error_lines()[0].find("No space left on device"), std::string::npos) << error_lines()[0];
+  EXPECT_NE(error_lines()[0].find("the odometry goes on"), std::string::npos) << error_lines()[0];
+  const auto processed = [&] { return status()["sweeps"]["processed"].get<int>(); };
+  const int before = processed();
+  EXPECT_TRUE(status_comes([&](const auto& now) { return now["sweeps"]["processed"] > before + 10; }, seconds{5}));
+  EXPECT_GT(status()["recording"]["dropped"], 0);
+  EXPECT_NE(ctl({"status"}).out.find("recording   none: "), std::string::npos) << ctl({"status"}).out;
+  std::filesystem::remove(disk / "filler");
+  EXPECT_TRUE(status_comes([](const auto& now) { return now["recording"]["problem"] == ""; }, seconds{15}));
+  EXPECT_EQ(error_lines().size(), 1U) << testing::PrintToString(error_lines());
+  std::this_thread::sleep_for(milliseconds{500});
+  daemon.signal(SIGTERM);
+  ASSERT_EQ(daemon.wait_for_exit(seconds{5}), 0);
+  const Replay replay({"--quiet", (disk / "record").string()});
+  EXPECT_EQ(replay.run().status, 0) << replay.run().err;
+  EXPECT_GT(replay.trajectory().size(), 5U);
+  umount2(disk.c_str(), MNT_DETACH);
+}
+
+TEST_F(Recording, FolderThatCannotBeMadeIsSaidOnceAndTheOdometryGoesOn) {
+  std::ofstream{file("plain")} << "a file";
+  Child daemon(locusd(recording(capture(), 10'000'000, "plain/record")));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const Child play({LOCUS_PLAY, capture().string()});
+  EXPECT_TRUE(daemon.wait_for_line("plain/record: cannot be made (Not a directory)", seconds{10}))
+      << testing::PrintToString(daemon.lines());
+  EXPECT_TRUE(status_comes([](const auto& now) { return now["sweeps"]["processed"] > 10; }, seconds{10}));
+  const nlohmann::json recording = status()["recording"];
+  EXPECT_EQ(recording["recorded"], 0);
+  EXPECT_GT(recording["dropped"], 1000);
+}
+
+} // namespace
+} // namespace locus::test
