@@ -3,16 +3,14 @@
 #include <random>
 
 #include <gtest/gtest.h>
+#include <pcap/pcap.h>
 #include <unistd.h>
 
-#include "locus_sim/pcap_writer.hpp"
+#include "drivers/pcap_writer.hpp"
 #include "synthetic_robot.hpp"
 
 namespace locus::test {
 namespace {
-
-using sim::Bytes;
-using sim::PcapWriter;
 
 /// One line on stderr that says so, and the exit status.
 void expect_error(const ProgramRun& run, int status, const std::vector<std::string>& said) {
@@ -48,23 +46,23 @@ TEST_F(BadCapture, RandomBytes) {
 }
 
 TEST_F(BadCapture, ForeignLinkType) {
-  { const PcapWriter pcap(folder_ / "bad.pcap", DLT_USB_LINUX); }
+  { PcapWriter::open(folder_ / "bad.pcap", DLT_USB_LINUX); }
   expect_error(replay(), 1, {"bad.pcap", "link type"});
 }
 
 TEST_F(BadCapture, MissingFile) { expect_error(replay(), 1, {"bad.pcap", "no such file"}); }
 
 TEST_F(BadCapture, NoDatagramsAtAll) {
-  { PcapWriter(folder_ / "bad.pcap").write_frame(stamp_from_ns(1), Bytes(60)); }
+  { PcapWriter::open(folder_ / "bad.pcap")->write_frame(stamp_from_ns(1), Bytes(60)); }
   expect_error(replay(), 1, {"bad.pcap", "no valid data packet", "no UDP datagram"});
 }
 
 TEST_F(BadCapture, DatagramsOfAllLengthsAreCountedAndNoneIsData) {
   {
-    PcapWriter pcap(folder_ / "bad.pcap");
+    PcapWriter pcap = std::move(*PcapWriter::open(folder_ / "bad.pcap"));
     for (std::size_t length = 0; length < 1500; ++length)
-      pcap.write(stamp_from_ns(static_cast<std::int64_t>(1'700'000'000'000'000'000 + 1'000'000 * length)), 0xC0A801C9,
-                 2368, 0xFFFFFFFF, 2368, Bytes(length));
+      pcap.write(stamp_from_ns(static_cast<std::int64_t>(1'700'000'000'000'000'000 + 1'000'000 * length)),
+                 UdpAddresses{}, Bytes(length));
   }
   expect_error(replay(), 1, {"bad.pcap", "no valid data packet", "model 1"});
   const auto summary = nlohmann::json::parse(read_text(folder_ / "out/summary.json"));

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "simulated_drive.hpp"
@@ -84,6 +85,23 @@ TEST(WrongImu, OnWheelsIsRefusedBeforeItBendsTheMap) {
 TEST(WrongImu, ThatWasGoodBeforeALossIsRefused) {
   const SimulatedDrive& drive = wheels();
   expect_refused(replay_with(kOtherWay, drive, {}, seconds{8}), kOtherWay, without_imu_m(drive));
+}
+
+/// A sure gyro that is wrong all of a sudden must not win against wheels and surfaces.
+TEST(WrongImu, ThatJumpsNowAndThenIsOutvoted) {
+  const SimulatedDrive& drive = wheels();
+  std::vector<std::string> jumps;
+  for (int at_s = 8; at_s < 60; at_s += 5) {
+    jumps.emplace_back("--fail");
+    jumps.push_back(fmt::format("imu:jump=2@{}-{}", at_s, at_s + 1));
+  }
+  const Replay replay = drive.replay(jumps);
+  const json summary = replay.summary();
+  EXPECT_GE(summary["sources"]["imu"]["rejected"]["self_check"], 1);
+  EXPECT_EQ(summary["sources"]["wio"]["health_changes"], 0);
+  EXPECT_EQ(summary["sweeps"]["failed"], 0);
+  EXPECT_LT(ape_mean_m(replay), 1.2 * without_imu_m(drive));
+  EXPECT_LT(summary["ape_m"]["max"], 0.05);
 }
 
 TEST(WrongImu, BesideLidarAloneIsRefused) {

@@ -5,7 +5,6 @@
 #include <fstream>
 #include <iterator>
 #include <sstream>
-#include <stdexcept>
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -25,18 +24,6 @@ std::vector<std::string> split(const std::string& text, char separator) {
 }
 
 } // namespace
-
-TemporaryFolder::TemporaryFolder() {
-  std::string name = testing::TempDir() + "/locus-replay-XXXXXX";
-  if (::mkdtemp(name.data()) == nullptr)
-    throw std::runtime_error("no temporary folder " + name);
-  path_ = name;
-}
-
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-}
 
 std::string read_text(const std::filesystem::path& file) {
   std::ifstream stream{file, std::ios::binary};

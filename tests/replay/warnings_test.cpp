@@ -50,5 +50,9 @@ TEST(Warnings, MotionOfAnotherTimeNamesBothSpans) {
                  {"imu.csv: its samples (none)"});
 }
 
+TEST(Warnings, SourceThatIsLostOnPurposeIsNotBlamed) {
+  EXPECT_EQ(Replay({"--fail", "wio:lost@0", "--duration", "1", room_drive().string()}).run().err, "");
+}
+
 } // namespace
 } // namespace locus::test

@@ -98,6 +98,22 @@ TEST(Trajectory, CourseAlongWaypointsEndsAtTheLastOne) {
   EXPECT_LT((end.translation.head<2>() - waypoints.back()).norm(), 1e-6);
 }
 
+TEST(Trajectory, CourseThereAndBackEndsAsItBeganByTheSameWay) {
+  const Course out = winding();
+  const Duration there = Trajectory(out).end() - Trajectory(out).start();
+  const Trajectory trajectory(Course(out).back(2.0), {.position_m = {3, 4}, .heading_rad = 1});
+  const Pose begin = trajectory.T_world_base(trajectory.start()), end = trajectory.T_world_base(trajectory.end());
+  EXPECT_LT((end.translation - begin.translation).norm(), 1e-9);
+  EXPECT_LT(angle_rad(begin.rotation.conjugate() * end.rotation), 1e-7);
+  const Duration turning = (trajectory.end() - trajectory.start()) / 2 - there;
+  for (Duration t{}; t < there; t += milliseconds{100}) {
+    const BaseMotion on_way_out = trajectory.at(trajectory.start() + t);
+    const BaseMotion on_way_back = trajectory.at(trajectory.end() - turning - t);
+    ASSERT_LT((on_way_out.T_world_base.translation - on_way_back.T_world_base.translation).norm(), 1e-6);
+    ASSERT_LT((on_way_out.velocity_world_mps + on_way_back.velocity_world_mps).norm(), 1e-6);
+  }
+}
+
 TEST(Trajectory, LegTooShortForItsTurnsIsRefused) {
   EXPECT_THROW(Course::along({{0, 0}, {10, 0}, {10, 1}, {0, 1}}, {.speed_mps = 2, .turn_rate_radps = 0.5}),
                std::invalid_argument);

@@ -46,7 +46,7 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   app.add_option("--duration", arguments.duration_s, "Of each simulated course, seconds; the paper's last 3600")
       ->type_name("S")
       ->capture_default_str()
-      ->check(CLI::Range(30, 36'000));
+      ->check(CLI::Range(10, 36'000));
   app.add_option("--pace", arguments.pace_s, "Of each run at the pace of the recording, seconds")
       ->type_name("S")
       ->capture_default_str()
@@ -54,6 +54,10 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   auto* faults = app.add_flag("--faults", arguments.faults,
                               "What a fault of each sensor does, in place of the paper's experiments: faults.md")
                      ->excludes(recordings);
+  app.add_flag("--fault-matrix", arguments.fault_matrix,
+               "Every fault of every input, from the start and mid-drive, in their place: matrix.md")
+      ->excludes(recordings)
+      ->excludes(faults);
   app.add_option("--seeds", arguments.seeds, "Of each course with --faults")
       ->type_name("N")
       ->capture_default_str()
@@ -81,7 +85,8 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
              "  locus-experiments --shard 1/2 -o part1 & locus-experiments --shard 2/2 -o part2; wait\n"
              "  locus-experiments --merge part1 part2 -o experiments\n"
              "  locus-experiments -o fleet robot1/ robot2/ robot3/\n"
-             "  locus-experiments --faults --duration 120 -o faults");
+             "  locus-experiments --faults --duration 120 -o faults\n"
+             "  locus-experiments --fault-matrix --duration 120 -o matrix");
   if (!tools::parse_command_line(app, argc, argv))
     return std::nullopt;
   const std::optional<Shard> parsed = Shard::parse(shard);

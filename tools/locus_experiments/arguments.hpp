@@ -27,6 +27,7 @@ struct Arguments {
   int duration_s = 300;                          ///< of a simulated course
   int pace_s = 60;                               ///< of a run at the pace of the recording
   bool faults = false;                           ///< the table of faults in place of the paper's experiments
+  bool fault_matrix = false;                     ///< the matrix of faults in their place
   int seeds = 3;                                 ///< of each course of that table
   int honesty_runs = 100;                        ///< for its line on the covariances
   int jobs = 1;

@@ -140,7 +140,7 @@ ordered_json fault_figures(const Interval& interval, const std::filesystem::path
                        {"growth", growth(rows, estimates)},
                        {"sources", ordered_json::object()}};
   for (const CaptureFolder::Source& source : capture.odometry) {
-    const std::vector<StampedPose> poses = read(source.file);
+    const std::vector<StampedPose> poses = read(source.files.front());
     const auto accuracy = trajectory_accuracy(poses, truth);
     figures["sources"][source.name] = {{"added_m", error_added_m(poses, truth, interval)},
                                        {"ape_mean_m", accuracy ? accuracy->ape_m.mean : 0.0}};

@@ -217,6 +217,10 @@ const std::vector<FaultCase>& fault_cases() {
 
 std::string describe_course(const std::string& kind) { return kind_of(kind).words; }
 
+Course simulated_course(const Arguments& arguments, const std::string& kind, int seed) {
+  return simulated(arguments, fault_course(kind, seed), kind_of(kind), seed, arguments.duration_s);
+}
+
 std::string fault_course(const std::string& kind, int seed) { return fmt::format("{}_{}", kind, seed); }
 
 std::string best_motion_source(const std::string& kind) { return kind_of(kind).best_source; }
@@ -227,7 +231,7 @@ Plan plan_of_faults(const Arguments& arguments) {
   Plan plan;
   for (int seed = 1; seed <= arguments.seeds; ++seed) {
     for (const CourseKind& kind : course_kinds())
-      plan.courses.push_back(simulated(arguments, fault_course(kind.name, seed), kind, seed, arguments.duration_s));
+      plan.courses.push_back(simulated_course(arguments, kind.name, seed));
     for (const FaultCase& fault_case : fault_cases())
       plan.runs.push_back(run_of(fault_case, seed, arguments.duration_s));
   }

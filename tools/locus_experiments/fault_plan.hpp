@@ -51,6 +51,9 @@ const std::vector<FaultCase>& fault_cases();
 /// In words, of FaultCase::course.
 std::string describe_course(const std::string& kind);
 
+/// A course of this kind, of the length that is asked for.
+Course simulated_course(const Arguments& arguments, const std::string& kind, int seed);
+
 /// Name of a course: one kind, one seed.
 std::string fault_course(const std::string& kind, int seed);
 

@@ -14,169 +14,13 @@
 #include <fmt/ranges.h>
 
 #include "locus_experiments/fault_plan.hpp"
+#include "locus_experiments/fault_verdict.hpp"
 #include "locus_replay/quantiles.hpp"
 
 namespace locus::experiments {
 namespace {
 
-constexpr double kAlwaysAllowed_m = 0.01;
-constexpr double kHonestSigmas = 3;
 constexpr double kHonestLeast = 3, kHonestMost = 12; ///< normalised squared error of six axes
-
-/// One seed: the run of a case, and the one without its fault.
-struct Pair {
-  const Results* with;
-  const Results* without;
-};
-using Pairs = std::vector<Pair>;
-
-using RunsById = std::map<std::string, const Results*>;
-
-RunsById by_id(const Results& runs) {
-  RunsById found;
-  for (const Results& run : runs)
-    found[run.at("course").get<std::string>() + '/' + run.at("configuration").get<std::string>()] = &run;
-  return found;
-}
-
-const Results* find(const RunsById& runs, const std::string& course, const std::string& configuration) {
-  const auto found = runs.find(course + '/' + configuration);
-  return found == runs.end() ? nullptr : found->second;
-}
-
-using Figure = std::function<double(const Pair&)>;
-
-std::vector<double> values_of(const Pairs& pairs, const Figure& figure) {
-  std::vector<double> values;
-  std::ranges::transform(pairs, std::back_inserter(values), figure);
-  return values;
-}
-double median(const Pairs& pairs, const Figure& figure) { return tools::Quantiles(values_of(pairs, figure)).at(0.5); }
-double largest(const Pairs& pairs, const Figure& figure) { return tools::Quantiles(values_of(pairs, figure)).at(1.0); }
-
-double ape_m(const Results& run) { return run.at("summary").at("ape_m").at("mean"); }
-double with_m(const Pair& pair) { return ape_m(*pair.with); }
-double without_m(const Pair& pair) { return ape_m(*pair.without); }
-double difference_m(const Pair& pair) { return with_m(pair) - without_m(pair); }
-double added_m(const Pair& pair) { return pair.with->at("fault").at("added_m"); }
-double length_m(const Pair& pair) { return pair.with->at("fault").at("length_m"); }
-double told(const Pair& pair) { return pair.with->at("fault").at("told"); }
-double worst_sigma(const Pair& pair) { return pair.with->at("summary").at("covariance").at("worst_sigma"); }
-
-std::string mm(double metres) { return fmt::format("{:.1f} mm", 1e3 * metres); }
-
-/// What was asked, what was found, what of it is not good enough.
-struct Verdict {
-  std::string asked, found;
-  std::vector<std::string> broken;
-
-  /// `what` is broken unless `good`.
-  Verdict& expect(bool good, const char* what) {
-    if (!good)
-      broken.emplace_back(what);
-    return *this;
-  }
-};
-
-Verdict accurate(const Pairs& pairs, double limit_m) {
-  const double mean_m = median(pairs, with_m);
-  return Verdict{"error <= " + mm(limit_m), mm(mean_m), {}}.expect(mean_m <= limit_m, "too large an error");
-}
-
-Verdict honest(const Pairs& pairs) {
-  const double sigmas = largest(pairs, worst_sigma);
-  return Verdict{fmt::format("<= {} sigma", kHonestSigmas),
-                 fmt::format("{:.0f} % flagged, {:.1f} sigma", 100 * median(pairs, told), sigmas),
-                 {}}
-      .expect(sigmas <= kHonestSigmas, "farther off than its covariance says");
-}
-
-Verdict both(Verdict one, const Verdict& other, const char* conjunction) {
-  one.asked += conjunction + other.asked;
-  one.found += "; " + other.found;
-  one.broken.insert(one.broken.end(), other.broken.begin(), other.broken.end());
-  return one;
-}
-
-Verdict unharmed(const Pairs& pairs, double limit) {
-  const double allowed_m = std::max(limit * median(pairs, without_m), kAlwaysAllowed_m);
-  const double more_m = median(pairs, difference_m);
-  return Verdict{
-      fmt::format("within {:.0f} %", 100 * limit), fmt::format("{:+.1f} mm of {}", 1e3 * more_m, mm(allowed_m)), {}}
-      .expect(more_m <= allowed_m, "more error than allowed");
-}
-
-Verdict unharmed_or_told(const Pairs& pairs, double limit) {
-  const Verdict error = unharmed(pairs, limit);
-  Verdict either = both(error, honest(pairs).expect(median(pairs, told) > 0, "not flagged"), ", or flagged and ");
-  if (error.broken.empty() || either.broken.size() == error.broken.size())
-    either.broken.clear();
-  return either;
-}
-
-Verdict carried(const Pairs& pairs, double limit, const std::string& source) {
-  const Figure drift_m = [&](const Pair& pair) {
-    return pair.with->at("fault").at("sources").at(source).at("added_m").get<double>();
-  };
-  const Figure excess_m = [&](const Pair& pair) {
-    return added_m(pair) - std::max(limit * drift_m(pair), kAlwaysAllowed_m);
-  };
-  return Verdict{fmt::format("added <= {} x {}'s drift", limit, source),
-                 fmt::format("{}; {} {}", mm(median(pairs, added_m)), source, mm(median(pairs, drift_m))),
-                 {}}
-      .expect(median(pairs, excess_m) <= 0, "more added than allowed");
-}
-
-Verdict resisted(const Pairs& pairs, double limit_m) {
-  const double across_m = median(pairs, added_m), more_m = median(pairs, difference_m);
-  return Verdict{
-      "added <= " + mm(limit_m), fmt::format("{} meanwhile, {:+.1f} mm in the mean", mm(across_m), 1e3 * more_m), {}}
-      .expect(std::max(across_m, more_m) <= limit_m, "more added than allowed");
-}
-
-Verdict no_worse_than_wheels(const Pairs& pairs, const std::string& source) {
-  constexpr double kGrowsAlong = 10, kStaysAcross = 2;
-  const Figure wheels_m = [&](const Pair& pair) {
-    return pair.with->at("fault").at("sources").at(source).at("ape_mean_m").get<double>();
-  };
-  const auto growth = [&](const char* axis) {
-    return median(pairs, [axis](const Pair& pair) {
-      const Results& both = pair.with->at("fault").at("growth");
-      return both.is_null() ? 0.0 : both.at(axis).get<double>();
-    });
-  };
-  const double along = growth("along"), across = growth("across");
-  const double excess_m = median(pairs, [&](const Pair& pair) { return with_m(pair) - wheels_m(pair); });
-  return Verdict{
-      fmt::format("error <= {}'s; variance along grows >= {} x, across < {} x", source, kGrowsAlong, kStaysAcross),
-      fmt::format("{}, {} {}; along {:.0f} x, across {:.0f} x", mm(median(pairs, with_m)), source,
-                  mm(median(pairs, wheels_m)), along, across),
-      {}}
-      .expect(excess_m <= 0, "worse than the wheels")
-      .expect(along >= kGrowsAlong, "doubt along the way does not grow")
-      .expect(across < kStaysAcross, "doubt across the way grows");
-}
-
-Verdict judge(const FaultCase& fault_case, const Pairs& pairs) {
-  const std::string source = best_motion_source(fault_case.course);
-  switch (fault_case.demand) {
-  case Demand::accurate:
-    return accurate(pairs, fault_case.limit);
-  case Demand::accurate_and_honest:
-    return both(accurate(pairs, fault_case.limit), honest(pairs), "; ");
-  case Demand::unharmed:
-    return unharmed(pairs, fault_case.limit);
-  case Demand::unharmed_or_told:
-    return unharmed_or_told(pairs, fault_case.limit);
-  case Demand::carried:
-    return carried(pairs, fault_case.limit, source);
-  case Demand::resisted:
-    return resisted(pairs, fault_case.limit);
-  case Demand::no_worse_than_wheels:
-    return no_worse_than_wheels(pairs, source);
-  }
-  return {};
-}
 
 struct Sweeps {
   std::int64_t lost = 0, failed = 0, failed_without = 0;
@@ -247,7 +91,7 @@ Results median_nees(const Pairs& pairs) {
 }
 
 Results judged(const FaultCase& fault_case, const Pairs& pairs) {
-  const Verdict verdict = judge(fault_case, pairs);
+  const Verdict verdict = judge(fault_case.demand, fault_case.limit, fault_case.course, pairs);
   const Sweeps sweeps = count_sweeps(pairs);
   std::vector<std::string> broken = verdict.broken, health;
   if (sweeps.lost > 0)
@@ -350,15 +194,6 @@ std::string consistency_line(const Results& consistency) {
                      consistency.at("median").get<double>(), consistency.at("p90").get<double>(), kHonestLeast,
                      kHonestMost, consistency.at("holds").get<bool>() ? "holds" : "**does not hold**",
                      failed > 0 ? fmt::format("; {} more runs failed", failed) : "");
-}
-
-std::string machines_of(const Results& runs) {
-  std::set<std::string> machines;
-  for (const Results& run : runs) {
-    if (run.contains("machine"))
-      machines.insert(run.at("machine").get<std::string>());
-  }
-  return fmt::format("{}", fmt::join(machines, "; "));
 }
 
 } // namespace

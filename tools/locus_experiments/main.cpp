@@ -165,7 +165,10 @@ void Experiments::carry_out(const Run& run) {
     std::optional<std::string> problem = why_impossible(run);
     if (!problem)
       problem = run_program(command, folder / "log", cpus);
-    result = problem ? Results{{"course", run.course}, {"configuration", run.configuration}, {"failed", *problem}}
+    const bool refused = problem && !run.refusal.empty() && problem->find(run.refusal) != std::string::npos;
+    result = problem ? Results{{"course", run.course},
+                               {"configuration", run.configuration},
+                               {refused ? "refused" : "failed", *problem}}
                      : measurement(run, folder, course);
   } catch (const std::exception& error) {
     result = {{"course", run.course}, {"configuration", run.configuration}, {"failed", error.what()}};
@@ -186,6 +189,8 @@ Results Experiments::results() const {
   }
   if (arguments_.faults)
     results["faults"] = {{"seeds", arguments_.seeds}, {"consistency_runs", arguments_.honesty_runs}};
+  if (arguments_.fault_matrix)
+    results["matrix"] = Results::object();
   judge(results);
   return results;
 }

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "locus_experiments/fault_plan.hpp"
+#include "locus_experiments/matrix_plan.hpp"
 
 namespace locus::experiments {
 namespace {
@@ -144,6 +145,7 @@ const std::vector<std::string>& paper_settings() {
 
 Plan make_plan(const Arguments& arguments) {
   Plan plan = arguments.faults               ? plan_of_faults(arguments)
+              : arguments.fault_matrix       ? plan_of_matrix(arguments)
               : arguments.recordings.empty() ? plan_of_paper(arguments)
                                              : plan_of_recordings(arguments);
   for (std::size_t place = 0; place < plan.runs.size(); ++place)

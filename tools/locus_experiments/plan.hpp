@@ -32,6 +32,7 @@ struct Run {
   bool loam_features = false;           ///< LOAM's points in place of the filters
   std::size_t place = 0;                ///< among all runs of the plan, whichever shard does them
   std::optional<Interval> watched = {}; ///< what happens there is measured for the table of faults
+  std::string refusal = {};             ///< what locus-replay has to say instead of running; empty: it has to run
 
   [[nodiscard]] std::string id() const { return course + '/' + configuration; }
 };
@@ -44,8 +45,9 @@ struct Plan {
 /// Settings of the paper's Section II and Table IV as --set options: what paper-husky.yaml says beyond husky.yaml.
 const std::vector<std::string>& paper_settings();
 
-/// The faults, or the paper's experiments, or as much of them as a recording allows; of these the part of one shard: of
-/// the faults every N-th course with all its runs, else every N-th run with the courses that they need.
+/// The faults, or their matrix, or the paper's experiments, or as much of them as a recording allows; of these the part
+/// of one shard: of the faults every N-th course with all its runs, else every N-th run with the courses that they
+/// need.
 Plan make_plan(const Arguments& arguments);
 
 } // namespace locus::experiments

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "locus_experiments/fault_table.hpp"
+#include "locus_experiments/matrix_table.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/output_file.hpp"
 #include "pages/data_page.hpp"
@@ -44,6 +45,13 @@ const Results* find(const Results& runs, const std::string& course, std::string_
     return run.at("course") == course && run.at("configuration") == configuration && !run.contains("failed");
   });
   return found == runs.end() ? nullptr : &*found;
+}
+
+std::filesystem::path write_table(std::filesystem::path path, const std::string& table) {
+  tools::OutputFile file(path);
+  file.print("{}", table);
+  file.close();
+  return path;
 }
 
 std::string verdict(const Results& failed, const Results& reference) {
@@ -107,6 +115,8 @@ void judge_robustness(Results& results) {
 void judge(Results& results) {
   if (results.contains("faults"))
     judge_faults(results);
+  else if (results.contains("matrix"))
+    judge_matrix(results);
   else
     judge_robustness(results);
 }
@@ -116,13 +126,10 @@ std::filesystem::path write_results(const std::filesystem::path& folder, const R
   tools::OutputFile json(folder / kFileName);
   json.print("{}\n", text);
   json.close();
-  if (results.contains("faults")) {
-    std::filesystem::path table = folder / "faults.md";
-    tools::OutputFile file(table);
-    file.print("{}", fault_table(results));
-    file.close();
-    return table;
-  }
+  if (results.contains("faults"))
+    return write_table(folder / "faults.md", fault_table(results));
+  if (results.contains("matrix"))
+    return write_table(folder / "matrix.md", matrix_table(results));
   std::filesystem::path page = folder / "experiments.html";
   tools::write_data_page(page, {locus_experiments_page_begin, locus_experiments_page_end}, results);
   return page;

@@ -11,7 +11,10 @@ namespace locus::experiments {
 
 /// What results.json holds: {"version", "simulated", "duration_s", "runs": [...], "robustness": [...]}. A run is a
 /// measurement(), or its course and configuration with "failed", the reason why there is none. With --faults "faults"
-/// stands in place of "robustness": {"seeds", "consistency_runs", "rows": [...], "consistency"}, of judge_faults().
+/// stands in place of "robustness": {"seeds", "consistency_runs", "rows": [...], "consistency"}, of judge_faults();
+/// with
+/// --fault-matrix "matrix": {"cells": [...]}, of judge_matrix(). A run that was to be refused, and was, has "refused",
+/// what locus-replay said.
 using Results = nlohmann::ordered_json;
 
 /// Puts the runs of several shards together. Throws tools::Failure where a folder holds no results, where two hold the
@@ -24,10 +27,10 @@ Results merged(const std::vector<std::filesystem::path>& folders);
 /// by more than 20 cm; OK, the rest.
 void judge_robustness(Results& results);
 
-/// What the runs say together: judge_robustness() or judge_faults().
+/// What the runs say together: judge_robustness(), judge_faults() or judge_matrix().
 void judge(Results& results);
 
-/// Writes results.json and experiments.html, or faults.md; that is what it returns. Throws tools::Failure.
+/// Writes results.json and experiments.html, faults.md or matrix.md; that is what it returns. Throws tools::Failure.
 std::filesystem::path write_results(const std::filesystem::path& folder, const Results& results);
 
 } // namespace locus::experiments

@@ -17,6 +17,7 @@
 #include "config/config_yaml.hpp"
 #include "daemon/machine_time.hpp"
 #include "daemon/paced_input.hpp"
+#include "drivers/capture_sequence.hpp"
 #include "locus_play/arguments.hpp"
 #include "locus_play/motion_publisher.hpp"
 #include "locus_play/packet_sender.hpp"
@@ -50,7 +51,7 @@ Recording open_recording(const PlayArguments& arguments, const CaptureFolder& fo
   std::vector<MotionRecording> motion = read_motion({}, folder, config, !folder.config.empty(), warnings);
   for (const std::string& warning : warnings)
     warn(warning);
-  return {std::make_unique<Capture>(value_or_fail(Capture::open(folder.lidar), ExitStatus::failed)),
+  return {std::make_unique<CaptureSequence>(value_or_fail(CaptureSequence::open(folder.lidar), ExitStatus::failed)),
           std::move(motion),
           config,
           value_or_fail(LidarRouter::open(config.lidars), ExitStatus::wrong_usage),
@@ -122,7 +123,9 @@ void play_folder(const PlayArguments& arguments) {
   const CaptureFolder folder = value_or_fail(CaptureFolder::find(arguments.capture), ExitStatus::failed);
   Config config;
   if (!folder.config.empty())
-    config = value_or_refuse(load_config(folder.config));
+    config = value_or_refuse(load_config(folder.first_config()));
+  if (const auto changed = folder.changed_config())
+    warn(*changed);
   config = with_options(std::move(config), arguments);
   Recording recording = open_recording(arguments, folder, config);
   play(arguments, config, recording, recording.source(), [&] { return recording.progress(); });

@@ -2,7 +2,9 @@
 #include "locus_replay/motion_recordings.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -14,21 +16,21 @@ namespace {
 struct MotionFile {
   std::string name; ///< of the source; of an IMU none
   SourceKind kind;
-  std::filesystem::path file;
+  std::vector<std::filesystem::path> files; ///< at least one
   bool named_by_user;
 };
 
 std::vector<MotionFile> motion_files(const Arguments& arguments, const CaptureFolder& folder) {
   std::vector<MotionFile> files;
   if (!arguments.imu.empty())
-    files.push_back({"", SourceKind::imu, arguments.imu, true});
+    files.push_back({"", SourceKind::imu, {arguments.imu}, true});
   else if (!folder.imu.empty())
     files.push_back({"", SourceKind::imu, folder.imu, false});
   for (const Arguments::OdometryFile& named : arguments.odometry)
-    files.push_back({named.name, SourceKind::odometry, named.file, true});
+    files.push_back({named.name, SourceKind::odometry, {named.file}, true});
   for (const CaptureFolder::Source& found : folder.odometry) {
     if (std::ranges::none_of(arguments.odometry, [&](const auto& named) { return named.name == found.name; }))
-      files.push_back({found.name, SourceKind::odometry, found.file, false});
+      files.push_back({found.name, SourceKind::odometry, found.files, false});
   }
   return files;
 }
@@ -44,7 +46,7 @@ std::optional<std::size_t> source_of(const MotionFile& file, const std::vector<M
 std::string without_source(const MotionFile& file) {
   const std::string name = file.kind == SourceKind::imu ? "imu" : file.name;
   return fmt::format("{}: no motion source {} is configured; add {{name: {}, kind: {}}} to motion_sources",
-                     file.file.string(), file.kind == SourceKind::imu ? "of kind imu" : "named " + name, name,
+                     file.files.front().string(), file.kind == SourceKind::imu ? "of kind imu" : "named " + name, name,
                      file.kind == SourceKind::imu ? "imu" : "odometry");
 }
 
@@ -57,10 +59,16 @@ std::string without_file(const MotionSourceOptions& source) {
                            source.name);
 }
 
-MotionRecording read(const MotionFile& file, std::size_t source) {
-  if (file.kind == SourceKind::imu)
-    return {source, file.file, value_or_fail(MotionSamples<ImuSample>::open(file.file), ExitStatus::failed)};
-  return {source, file.file, value_or_fail(MotionSamples<OdometrySample>::open(file.file), ExitStatus::failed)};
+template <class Sample>
+MotionRecording read_as(const MotionFile& file, std::size_t source, std::vector<std::string>& warnings) {
+  auto samples = value_or_fail(MotionSamples<Sample>::open(file.files), ExitStatus::failed);
+  std::ranges::copy(samples.breaks(), std::back_inserter(warnings));
+  return {source, file.files.front(), std::move(samples)};
+}
+
+MotionRecording read(const MotionFile& file, std::size_t source, std::vector<std::string>& warnings) {
+  return file.kind == SourceKind::imu ? read_as<ImuSample>(file, source, warnings)
+                                      : read_as<OdometrySample>(file, source, warnings);
 }
 
 } // namespace
@@ -75,10 +83,10 @@ std::vector<MotionRecording> read_motion(const Arguments& arguments, const Captu
   for (const MotionFile& file : motion_files(arguments, folder)) {
     const std::optional<std::size_t> source = source_of(file, sources);
     if (source && is_read(*source))
-      throw Failure(ExitStatus::wrong_usage,
-                    fmt::format("{}: a second file for motion source {}; keep one", file.file.string(), file.name));
+      throw Failure(ExitStatus::wrong_usage, fmt::format("{}: a second file for motion source {}; keep one",
+                                                         file.files.front().string(), file.name));
     if (source)
-      recordings.push_back(read(file, *source));
+      recordings.push_back(read(file, *source, warnings));
     else if (file.named_by_user)
       throw Failure(ExitStatus::wrong_usage, without_source(file));
     else

@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "drivers/motion_files.hpp"
+
 namespace locus::tools {
 namespace {
 
@@ -56,10 +58,7 @@ std::string OdometryFiles::name_of(const PriorSource& prior) const {
 
 void OdometryFiles::write(const OdometryEstimate& estimate) {
   const std::int64_t ns = to_ns(estimate.stamp);
-  const Eigen::Vector3d& p = estimate.T_odom_base.translation;
-  const Eigen::Quaterniond& q = estimate.T_odom_base.rotation;
-  tum_.print("{}.{:09} {} {} {} {} {} {} {}\n", ns / 1'000'000'000, ns % 1'000'000'000, p.x(), p.y(), p.z(), q.x(),
-             q.y(), q.z(), q.w());
+  tum_.print("{}", to_line({estimate.stamp, estimate.T_odom_base}));
   csv_.print("{},{},{},{},{}", ns, tools::name_of(estimate.state), name_of(estimate.prior),
              estimate.scan_to_submap.iterations, estimate.scan_to_submap.inliers);
   for (int row = 0; row < 6; ++row) {

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "bags/bag.hpp"
-#include "drivers/capture.hpp"
+#include "drivers/capture_sequence.hpp"
 #include "kitti/kitti_drive.hpp"
 #include "locus_replay/bag_motion.hpp"
 #include "locus_replay/bag_packets.hpp"
@@ -72,11 +72,12 @@ RecordedInput open_drive_input(const Arguments& arguments, const std::filesystem
 
 RecordedInput open_input(const Arguments& arguments, const CaptureFolder& folder, const Config& config,
                          bool config_is_users_own, std::vector<std::string>& warnings) {
-  if (looks_like_bag(folder.lidar))
-    return open_bag_input(arguments, folder.lidar, config, config_is_users_own, warnings);
-  if (KittiDrive::is(folder.lidar))
-    return open_drive_input(arguments, folder.lidar, config, warnings);
-  auto capture = std::make_unique<Capture>(value_or_fail(Capture::open(folder.lidar), ExitStatus::failed));
+  if (looks_like_bag(folder.lidar.front()))
+    return open_bag_input(arguments, folder.lidar.front(), config, config_is_users_own, warnings);
+  if (KittiDrive::is(folder.lidar.front()))
+    return open_drive_input(arguments, folder.lidar.front(), config, warnings);
+  auto capture =
+      std::make_unique<CaptureSequence>(value_or_fail(CaptureSequence::open(folder.lidar), ExitStatus::failed));
   return {std::move(capture), read_motion(arguments, folder, config, config_is_users_own, warnings), "", {}};
 }
 

@@ -34,8 +34,10 @@ using daemon::Silence;
 
 void check_faults(const std::vector<Fault>& faults, const Config& config) {
   std::vector<FaultTarget> targets;
-  for (const LidarOptions& lidar : config.lidars)
+  for (const LidarOptions& lidar : config.lidars) {
     targets.push_back({lidar.name, FaultTarget::Kind::lidar});
+    targets.push_back({lidar.name + std::string{Fault::kPositionPackets}, FaultTarget::Kind::position_packets});
+  }
   for (const MotionSourceOptions& source : config.odometry.motion_sources)
     targets.push_back(
         {source.name, source.kind == SourceKind::imu ? FaultTarget::Kind::imu : FaultTarget::Kind::odometry});
@@ -55,10 +57,11 @@ Recording::Recording(std::unique_ptr<DatagramSource> source, std::vector<MotionR
     faults_.emplace(options.faults, capture_start_, options.seed);
   for (MotionRecording& recording : motion) {
     const std::string& name = config.odometry.motion_sources[recording.source].name;
-    if (std::ranges::find(options.faults, name, &Fault::name) != options.faults.end())
+    const bool has_faults = std::ranges::find(options.faults, name, &Fault::name) != options.faults.end();
+    if (has_faults)
       std::visit([&](auto& samples) { samples = with_faults(samples.drain(), options, name, capture_start_); },
                  recording.samples);
-    motion_.push_back({std::move(recording)});
+    motion_.push_back({std::move(recording), has_faults});
     MotionCursor& cursor = motion_.back();
     while (cursor.arrival() < begin_ - kMotionAhead)
       cursor.take();
@@ -157,7 +160,7 @@ std::vector<std::string> Recording::warnings() const {
   std::vector<std::string> warnings = source_->warnings();
   for (const MotionCursor& motion : motion_) {
     const std::optional<TimeSpan> span = motion.arrivals();
-    if (started_ && (!span || span->last < first_ || span->first > last_))
+    if (started_ && !motion.has_faults && (!span || span->last < first_ || span->first > last_))
       warnings.push_back(fmt::format("{}: its samples ({}) and the packets ({}) have no time in common, so nothing of "
                                      "it was used; give what was recorded with them, by the same clock",
                                      motion.recording.file.string(), text_of(span), text_of(TimeSpan{first_, last_})));

@@ -74,6 +74,7 @@ class Recording : public daemon::InputSource {
   };
   struct MotionCursor {
     MotionRecording recording;
+    bool has_faults; ///< injected
 
     [[nodiscard]] Stamp arrival() const; ///< of the next sample; Stamp::max() after the last
     [[nodiscard]] std::optional<TimeSpan> arrivals() const;

@@ -75,7 +75,7 @@ CaptureFolder find_files(const std::filesystem::path& capture) {
   Expected<CaptureFolder, std::string> folder = CaptureFolder::find(capture);
   if (!folder && is_all_in_one(capture)) {
     CaptureFolder all;
-    all.lidar = capture;
+    all.lidar = {capture};
     return all;
   }
   return value_or_fail(std::move(folder), ExitStatus::failed);
@@ -89,6 +89,7 @@ void replay(const Config& config, LidarRouter lidars, Recording& recording, Resu
     if (stage)
       stage(sweep);
     const daemon::ProcessedSweep done = processor.process(sweep, cut);
+    processor.prepare_next();
     ingest.take(processor.odometry().feedback());
     ++counters.seen;
     ++(done.estimate.failed ? counters.failed : counters.processed);
@@ -128,12 +129,14 @@ void run(const Arguments& arguments, const SweepStage& stage) {
   const MachineTime begin = MachineTime::now();
   const CaptureFolder folder = find_files(arguments.capture);
   check_output(arguments.output);
-  const std::filesystem::path& config_file = arguments.config.empty() ? folder.config : arguments.config;
+  const std::filesystem::path config_file = arguments.config.empty() ? folder.first_config() : arguments.config;
   const Config config = configuration(config_file, arguments.overrides);
   check_faults(arguments.faults, config);
   LidarRouter lidars = value_or_fail(LidarRouter::open(config.lidars), ExitStatus::wrong_usage);
 
   std::vector<std::string> warnings;
+  if (const auto changed = arguments.config.empty() ? folder.changed_config() : std::nullopt)
+    warnings.push_back(*changed);
   RecordedInput input = open_input(arguments, folder, config, !config_file.empty(), warnings);
   for (const std::string& warning : warnings)
     say("warning: " + warning);

@@ -6,28 +6,14 @@
 #include <algorithm>
 #include <utility>
 
+#include "drivers/motion_files.hpp"
 #include "locus_sim/folder_sink.hpp"
 
 namespace locus::sim {
 namespace {
 
 constexpr double kImuRate_hz = 200, kTruthRate_hz = 100;
-
-/// One line of a TUM file; integer arithmetic keeps the stamp to the nanosecond.
-std::string tum_line(Stamp stamp, const Pose& pose) {
-  const std::int64_t ns = to_ns(stamp);
-  const Eigen::Vector3d& p = pose.translation;
-  const Eigen::Quaterniond& q = pose.rotation;
-  return fmt::format("{}.{:09} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f}\n", ns / 1'000'000'000,
-                     ns % 1'000'000'000, p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w());
-}
-
-std::string imu_line(const ImuSample& sample) {
-  const Eigen::Vector3d &w = sample.angular_velocity_radps, &a = sample.specific_force_mps2;
-  const Eigen::Quaterniond& q = *sample.attitude;
-  return fmt::format("{},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f}\n", to_ns(sample.stamp),
-                     w.x(), w.y(), w.z(), a.x(), a.y(), a.z(), q.w(), q.x(), q.y(), q.z());
-}
+constexpr int kDecimals = 9;
 
 struct Line {
   Stamp arrival;
@@ -58,17 +44,17 @@ std::vector<LineSource> line_sources(const Trajectory& trajectory, const RobotOp
     sources.emplace_back("imu.csv", [imu = SyntheticImu(trajectory, kImuRate_hz, robot.imu->faults, seed,
                                                         robot.imu->T_base_imu)]() mutable {
       const ImuSample sample = imu.next();
-      return Line{sample.arrival, imu_line(sample)};
+      return Line{sample.arrival, to_line(sample, kDecimals)};
     });
   for (const NamedOdometry& odometry : robot.odometry)
     sources.emplace_back(odometry.name + ".tum",
                          [source = SyntheticOdometry(trajectory, odometry.rate_hz, odometry.faults, ++seed)]() mutable {
                            const OdometrySample sample = source.next();
-                           return Line{sample.arrival, tum_line(sample.stamp, sample.T_source_base)};
+                           return Line{sample.arrival, to_line({sample.stamp, sample.T_source_base}, kDecimals)};
                          });
   sources.emplace_back("gt.tum", [&trajectory, next = trajectory.start()]() mutable {
     const Stamp stamp = std::exchange(next, next + from_seconds(1 / kTruthRate_hz));
-    return Line{stamp, tum_line(stamp, trajectory.T_world_base(stamp))};
+    return Line{stamp, to_line({stamp, trajectory.T_world_base(stamp)}, kDecimals)};
   });
   return sources;
 }

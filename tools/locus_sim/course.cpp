@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <numbers>
 #include <stdexcept>
 #include <string>
 
@@ -58,6 +60,17 @@ Course& Course::turn(double angle_rad, double peak_rate_radps) {
   stretches_.push_back({rate == 0 ? 0 : angle_rad / rate - kTurnRamp_s, v, v, rate, rate});
   stretches_.push_back({kTurnRamp_s, v, v, rate, 0});
   return *this;
+}
+
+Course& Course::back(double peak_rate_radps) {
+  if (speed_mps_ != 0)
+    throw std::invalid_argument("Course::back: brake to a speed of zero first");
+  const std::vector<Stretch> out = stretches_;
+  turn(std::numbers::pi, peak_rate_radps);
+  std::transform(out.rbegin(), out.rend(), std::back_inserter(stretches_), [](const Stretch& there) {
+    return Stretch{there.duration_s, there.to_mps, there.from_mps, -there.to_radps, -there.from_radps};
+  });
+  return turn(std::numbers::pi, peak_rate_radps);
 }
 
 Course Course::along(const std::vector<Eigen::Vector2d>& waypoints_m, const Pace& pace) {

@@ -17,6 +17,9 @@ class Course {
   Course& change_speed(double to_mps, Duration over);
   Course& straight(double distance_m);                    ///< at the present speed, which must not be zero
   Course& turn(double angle_rad, double peak_rate_radps); ///< at the present speed; at speed zero, on the spot
+  /// From a standstill: turns about on the spot, drives all of it the other way and turns about again, to end where and
+  /// as it began.
+  Course& back(double peak_rate_radps);
 
   struct Pace {
     double speed_mps = 1.0;

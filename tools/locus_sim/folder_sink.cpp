@@ -19,7 +19,9 @@ std::filesystem::path made(const std::filesystem::path& folder) {
 
 } // namespace
 
-FolderSink::FolderSink(const std::filesystem::path& folder) : folder_(made(folder)), pcap_(folder / "lidar.pcap") {}
+FolderSink::FolderSink(const std::filesystem::path& folder)
+    : folder_(made(folder)),
+      pcap_(tools::value_or_fail(PcapWriter::open(folder / "lidar.pcap"), tools::ExitStatus::failed)) {}
 
 void FolderSink::datagram(const Datagram& datagram) { pcap_.write(datagram); }
 
@@ -31,7 +33,8 @@ void FolderSink::text(std::string_view file, Stamp, const std::string& lines) {
 }
 
 void FolderSink::close() {
-  pcap_.flush();
+  if (const auto problem = pcap_.flush())
+    throw tools::Failure(tools::ExitStatus::failed, *problem);
   for (auto& [name, file] : files_)
     file.close();
 }

@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <map>
 
+#include "drivers/pcap_writer.hpp"
 #include "locus_replay/output_file.hpp"
 #include "locus_sim/capture_sink.hpp"
-#include "locus_sim/pcap_writer.hpp"
 
 namespace locus::sim {
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // locus-sim: a synthetic robot with exact truth to a capture folder.
-#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <optional>
@@ -13,7 +12,6 @@
 #include "locus_replay/progress_bar.hpp"
 #include "locus_sim/arguments.hpp"
 #include "locus_sim/capture_writer.hpp"
-#include "locus_sim/driver.hpp"
 #include "locus_sim/folder_sink.hpp"
 #include "locus_sim/seen_space.hpp"
 #include "locus_sim/stream_sink.hpp"
@@ -21,20 +19,6 @@
 
 namespace locus::tools {
 namespace {
-
-sim::Trajectory drive(const sim::World& world, const sim::Robot& robot, const SimArguments& arguments) {
-  Duration driving = arguments.duration;
-  for (const sim::Slip& slip : arguments.slips)
-    driving -= slip.to - slip.from; // the course goes on where it stood still
-  sim::Dice dice(arguments.seed + 1);
-  sim::Agility agility = robot.agility;
-  agility.cruise_mps = std::min(agility.cruise_mps, world.max_speed_mps);
-  const sim::PlannedCourse planned = plan_course(world.roads, agility, driving, dice);
-  sim::Ride ride = robot.ride;
-  ride.ground_m = world.ground_m;
-  ride.slips = arguments.slips;
-  return sim::Trajectory(planned.course, planned.start, world.terrain, ride);
-}
 
 void run(const SimArguments& arguments) {
   const daemon::MachineTime begin = daemon::MachineTime::now();
@@ -46,7 +30,8 @@ void run(const SimArguments& arguments) {
   }
   const sim::World world = arguments.world.make(arguments.seed);
   const sim::Robot robot = arguments.robot.make(arguments.sensors, arguments.seed);
-  const sim::Trajectory trajectory = drive(world, robot, arguments);
+  const sim::Trajectory trajectory =
+      sim::drive_about(world, robot, arguments.duration, arguments.slips, arguments.seed);
   if (!folder) {
     sim::StreamSink sink;
     write_capture(sink, world.scene, trajectory, arguments.duration, robot.sensors);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "locus_sim/robot.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <span>
@@ -135,6 +136,21 @@ Robot make_spot(const SensorChoice& choice, std::uint64_t seed) {
                             {.name = "kio", .topic = "/kinematic_odometry", .rate_hz = 50, .faults = legs}};
   robot.sensors.seed = seed;
   return robot;
+}
+
+Trajectory drive_about(const World& world, const Robot& robot, Duration duration, const std::vector<Slip>& slips,
+                       std::uint64_t seed) {
+  Duration driving = duration;
+  for (const Slip& slip : slips)
+    driving -= slip.to - slip.from; // the course goes on where it stood still
+  Dice dice(seed + 1);
+  Agility agility = robot.agility;
+  agility.cruise_mps = std::min(agility.cruise_mps, world.max_speed_mps);
+  const PlannedCourse planned = plan_course(world.roads, agility, driving, dice);
+  Ride ride = robot.ride;
+  ride.ground_m = world.ground_m;
+  ride.slips = slips;
+  return Trajectory(planned.course, planned.start, world.terrain, ride);
 }
 
 } // namespace locus::sim

@@ -3,9 +3,11 @@
 
 #include <array>
 #include <string_view>
+#include <vector>
 
 #include "locus_sim/capture_writer.hpp"
 #include "locus_sim/driver.hpp"
+#include "locus_sim/world.hpp"
 
 namespace locus::sim {
 
@@ -37,5 +39,10 @@ struct NamedRobot {
   Robot (*make)(const SensorChoice& choice, std::uint64_t seed);
 };
 inline constexpr std::array kRobots{NamedRobot{"husky", make_husky}, NamedRobot{"spot", make_spot}};
+
+/// How the robot goes about a world for `duration`, with wheels or feet that slip at times. The seed decides the
+/// course.
+Trajectory drive_about(const World& world, const Robot& robot, Duration duration, const std::vector<Slip>& slips,
+                       std::uint64_t seed);
 
 } // namespace locus::sim

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "drivers/pcap_writer.hpp"
 #include "locus_sim/capture_sink.hpp"
-#include "locus_sim/pcap_writer.hpp"
 #include "locus_sim/stream_text.hpp"
 
 namespace locus::sim {
@@ -16,12 +16,14 @@ namespace locus::sim {
 /// seen is known only at the end. Any reader of pcap files can look at it, and all but the texts can be replayed.
 class StreamSink : public CaptureSink {
  public:
+  StreamSink();
+
   void datagram(const Datagram& datagram) override { pcap_.write(datagram); }
   void text(std::string_view file, Stamp arrival, const std::string& lines) override;
-  void close() override { pcap_.flush(); }
+  void close() override;
 
  private:
-  PcapWriter pcap_{"-"};
+  PcapWriter pcap_;
 };
 
 } // namespace locus::sim

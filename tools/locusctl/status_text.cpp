@@ -75,6 +75,19 @@ std::string sources_text(const Json& status) {
   return text;
 }
 
+std::string recording_text(const Json& status) {
+  if (!status.contains("recording"))
+    return "";
+  const Json& recording = status["recording"];
+  const std::string problem = recording["problem"], run = recording["run"];
+  return fmt::format("recording   {}, {:.0f} MB   {} inputs   {} left out\n",
+                     !problem.empty() ? "none: " + problem
+                     : run.empty()    ? "nothing yet"
+                                      : run,
+                     recording["mb"].get<double>(), recording["recorded"].get<std::uint64_t>(),
+                     recording["dropped"].get<std::uint64_t>());
+}
+
 } // namespace
 
 std::string status_text(const Json& status) {
@@ -92,11 +105,14 @@ std::string status_text(const Json& status) {
                       sweeps["seen"].get<std::uint64_t>(), sweeps["processed"].get<std::uint64_t>(),
                       sweeps["dropped"].get<std::uint64_t>(), sweeps["failed"].get<std::uint64_t>(),
                       status["packets"]["kernel_drops"].get<std::uint64_t>());
+  if (const auto flood = status["dropped"]["flood_datagrams"].get<std::uint64_t>(); flood > 0)
+    text += fmt::format("flood       {} datagrams of no lidar were kept out by the kernel\n", flood);
   text += fmt::format("machine     {:.1f} % of a core since the start   {:.0f} MB at most\n",
                       up_s > 0 ? 100 * status["cpu_s"].get<double>() / up_s : 0.0, status["peak_rss_mb"].get<double>());
   text += fmt::format("dds         {}, domain {}, interface {}\n",
                       status["dds"]["connected"].get<bool>() ? "up" : "not up, is tried again",
                       status["dds"]["domain"].get<int>(), status["dds"]["interface"].get<std::string>());
+  text += recording_text(status);
   return text + pose_text(status) + lidars_text(status) + sources_text(status);
 }
 

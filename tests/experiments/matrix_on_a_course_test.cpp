@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// The matrix of faults in small: every cell on a drive of ten seconds.
+#include <set>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "replay/replay_run.hpp"
+
+namespace locus::test {
+namespace {
+
+using nlohmann::json;
+
+/// Cells that do not hold; docs/robustness.md tells why.
+const std::set<std::string> kBroken{"top frozen", "top jumping, 2 m or 2 rad/s", "imu jumping, 2 m or 2 rad/s"};
+
+TEST(FaultMatrix, EveryCellHoldsOnAShortDrive) {
+  const TemporaryFolder folder;
+  const ProgramRun run = run_program(
+      LOCUS_EXPERIMENTS, {"--fault-matrix", "--quiet", "--duration", "10", "--jobs", "2", "-o", folder / "out"});
+  ASSERT_EQ(run.status, 0) << run.err;
+  const json cells = json::parse(read_text(folder / "out/results.json"))["matrix"]["cells"];
+  EXPECT_EQ(cells.size(), 96U);
+  for (const json& cell : cells) {
+    const std::string fault = cell["input"].get<std::string>() + ' ' + cell["fault"].get<std::string>();
+    if (!cell.contains("impossible") && !kBroken.contains(fault)) {
+      EXPECT_TRUE(cell["holds"]) << cell.dump(1);
+    }
+  }
+  EXPECT_NE(read_text(folder / "out/matrix.md").find("| imu | frozen | yes"), std::string::npos);
+}
+
+} // namespace
+} // namespace locus::test

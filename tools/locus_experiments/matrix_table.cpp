@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_experiments/matrix_table.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "locus_experiments/fault_verdict.hpp"
+#include "locus_experiments/matrix_plan.hpp"
+
+namespace locus::experiments {
+namespace {
+
+using Pointer = Results::json_pointer;
+
+/// Below it nobody can say that a fault has done anything.
+constexpr double kNothing_m = 0.001;
+
+/// What of a summary speaks of an input, each with the name that it goes by in the table.
+struct Account {
+  std::string name;
+  Pointer pointer;
+};
+std::vector<Account> accounts_of(const std::string& input) {
+  if (input == "wio" || input == "imu")
+    return {{input + '.', Pointer("/sources") / input}};
+  const std::string lidar = input.substr(0, input.find('.'));
+  return {{"", Pointer("/packets") / lidar}, {"sweeps.", Pointer("/sweeps")}};
+}
+
+/// Counters of an input that differ, in words, but for those which only follow from others.
+std::vector<std::string> differences(const std::string& input, const Pair& pair) {
+  constexpr std::array kOfNoNews{"processed", "used_sweeps", "seen"};
+  std::vector<std::string> found;
+  for (const Account& account : accounts_of(input)) {
+    const Results with = pair.with->at("summary").at(account.pointer).flatten();
+    const Results without = pair.without->at("summary").at(account.pointer).flatten();
+    for (const auto& [key, value] : with.items()) {
+      std::string name = key.substr(1);
+      std::ranges::replace(name, '/', '.');
+      const auto now = value.get<std::int64_t>(), before = without.value(key, std::int64_t{0});
+      if (now != before && std::ranges::count(kOfNoNews, name) == 0)
+        found.push_back(fmt::format("{}{} {}", account.name, name, now) +
+                        (before == 0 ? "" : fmt::format(" of {}", before)));
+    }
+  }
+  return found;
+}
+
+/// By its own counters, else by those of the inputs that suffer from it.
+std::vector<std::string> shown_by(const MatrixCell& cell, const Pair& pair) {
+  std::vector<std::string> shown = differences(cell.input, pair);
+  for (const char* other : {"top", "wio", "imu"}) {
+    if (shown.empty())
+      shown = differences(other, pair);
+  }
+  return shown;
+}
+
+bool changes_nothing(const Pair& pair) {
+  return std::ranges::all_of(std::vector{"mean", "max"}, [&](const char* figure) {
+    const Pointer pointer = Pointer("/summary/ape_m") / figure;
+    return std::abs(pair.with->at(pointer).get<double>() - pair.without->at(pointer).get<double>()) < kNothing_m;
+  });
+}
+
+/// A run may end one window earlier than another.
+bool loses_sweeps(const MatrixCell& cell, const Pair& pair) {
+  const auto sweeps = [](const Results* run, const char* which) {
+    return run->at("summary").at("sweeps").at(which).get<double>();
+  };
+  const double all = sweeps(pair.without, "seen");
+  const double silent = all * cell.silent_from_s / pair.without->at("summary").at("duration_s").get<double>();
+  return sweeps(pair.with, "dropped") > 0 || sweeps(pair.with, "seen") < std::floor(all - silent) - 1;
+}
+
+Results driven(const MatrixCell& cell, const Pair& pair) {
+  Verdict verdict = judge(cell.demand, cell.limit, kMatrixCourse, {pair});
+  const std::vector<std::string> shown = shown_by(cell, pair);
+  verdict.expect(!loses_sweeps(cell, pair), "sweeps are lost");
+  verdict.expect(!shown.empty() || changes_nothing(pair), "silent");
+  return {{"asked", verdict.asked}, {"found", verdict.found}, {"shown", shown}, {"broken", verdict.broken}};
+}
+
+/// Of a cell whose run was refused, or ended as it should not.
+Results ended(const MatrixCell& cell, const Results& run) {
+  const bool refused = run.contains("refused");
+  const std::string said = run.value(refused ? "refused" : "failed", "");
+  const auto broken = refused ? Results::array() : Results::array({"does not end with 0: " + said});
+  return {{"asked", cell.refusal.empty() ? "" : "status 1"},
+          {"found", refused ? "status 1" : ""},
+          {"shown", Results::array({cell.refusal.empty() ? said : cell.refusal})},
+          {"broken", broken}};
+}
+
+/// Nothing where the run that it takes is not among these: it is another shard's.
+std::optional<Results> judged(const MatrixCell& cell, const RunsById& runs) {
+  Results head{{"input", cell.input}, {"fault", cell.what}, {"from_start", cell.from_start}};
+  if (!cell.impossible.empty()) {
+    head["impossible"] = cell.impossible;
+    return head;
+  }
+  const Results* const with = find(runs, matrix_course(), cell.configuration());
+  const Results* const without = find(runs, matrix_course(), kNoFault);
+  if (with == nullptr || without == nullptr)
+    return std::nullopt;
+  head["faults"] = cell.faults;
+  if (with->contains("summary") && without->contains("summary")) {
+    head.update(driven(cell, {with, without}));
+    if (!cell.refusal.empty())
+      head["broken"].push_back("is not refused");
+  } else {
+    head.update(ended(cell, with->contains("summary") ? *without : *with));
+  }
+  head["holds"] = head.at("broken").empty();
+  return head;
+}
+
+std::string text_of(const Results& cell) {
+  if (cell.contains("impossible"))
+    return "cannot be: " + cell.at("impossible").get<std::string>() + " | |";
+  const auto broken = cell.at("broken").get<std::vector<std::string>>();
+  const auto shown = cell.at("shown").get<std::vector<std::string>>();
+  return fmt::format("{}{} | {} |", broken.empty() ? "yes: " : fmt::format("**no**, {}: ", fmt::join(broken, "; ")),
+                     cell.at("found").get<std::string>(),
+                     shown.empty() ? "nothing: changes nothing" : fmt::format("{}", fmt::join(shown, ", ")));
+}
+
+} // namespace
+
+void judge_matrix(Results& results) {
+  const RunsById runs = by_id(results.at("runs"));
+  Results cells = Results::array();
+  for (const MatrixCell& cell : matrix_cells(results.at("duration_s"))) {
+    if (std::optional<Results> judgement = judged(cell, runs))
+      cells.push_back(std::move(*judgement));
+  }
+  results["matrix"]["cells"] = std::move(cells);
+}
+
+std::string matrix_table(const Results& results) {
+  const Results& cells = results.at("matrix").at("cells");
+  const auto count = [&](const auto& which) { return std::ranges::count_if(cells, which); };
+  const auto run = count([](const Results& cell) { return cell.contains("holds"); });
+  const auto hold = count([](const Results& cell) { return cell.value("holds", false); });
+  const auto impossible = count([](const Results& cell) { return cell.contains("impossible"); });
+  std::string text = fmt::format("`locus-experiments --fault-matrix --duration {}`, version {}, {}. {} of {} cells "
+                                 "hold; {} more cannot be.\n\n",
+                                 results.at("duration_s").get<int>(), results.at("version").get<std::string>(),
+                                 machines_of(results.at("runs")), hold, run, impossible);
+  text += "| input | fault | from the start: holds, error | shown by | mid-drive: holds, error | shown by |\n"
+          "|---|---|---|---|---|---|\n";
+  for (const Results& cell : cells) {
+    if (cell.at("from_start").get<bool>())
+      text += fmt::format("| {} | {} |", cell.at("input").get<std::string>(), cell.at("fault").get<std::string>());
+    text += ' ' + text_of(cell) + (cell.at("from_start").get<bool>() ? "" : "\n");
+  }
+  return text;
+}
+
+} // namespace locus::experiments
