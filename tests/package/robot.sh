@@ -51,7 +51,8 @@ exchange=$work/exchange
 mkdir -p "$exchange" "$work"/{upper,overlay,root}
 cp "$here/robot_inside.sh" "$bin/hang_thread" "$folder"/locusd_*.deb "$exchange"
 cp "$work/drive/config.yaml" "$exchange/robot.yaml"
-printf 'dds: {interface: uplink0, domain: 7}\n' >>"$exchange/robot.yaml"
+printf 'dds: {interface: uplink0, domain: 7}\nrecord: {folder: record}\n' >>"$exchange/robot.yaml"
+"$here/../../docs/examples/dds-security.sh" "$exchange/enclaves" 9
 dpkg-deb -R "$folder"/locusd_*.deb "$work/previous"
 sed -i 's/^Version: .*/Version: 0.0.1/' "$work/previous/DEBIAN/control"
 sed -i 's/^threads: 2 /threads: 1 /' "$work/previous/etc/locusd/locusd.yaml"

@@ -73,6 +73,10 @@ locusctl save-map /tmp/map.pcd
 [ -s /tmp/map.pcd ]
 locusctl sensors | grep "192.168.1.201.*VLP-16" >/dev/null
 
+step "what it receives is recorded where the unit lets it write"
+compgen -G "/var/lib/locusd/record/000001_*/000001/lidar.pcap" >/dev/null
+[ "$(stat -c %U /var/lib/locusd/record)" = locusd ]
+
 step "the upgrade keeps what was edited, brings what was not, and goes on where it was"
 since=$(now)
 process=$(systemctl show -P MainPID locusd)
@@ -137,6 +141,18 @@ process=$(systemctl show -P MainPID locusd@second)
 dpkg-reconfigure locusd
 [ "$(systemctl show -P MainPID locusd@second)" != "$process" ]
 wait_for 5 locusctl --instance second status >/dev/null
+
+step "DDS Security works in the sandbox, with a key that the service alone may read"
+cp -r enclaves/locusd /etc/locusd/enclave
+chown -R root:locusd /etc/locusd/enclave
+chmod 750 /etc/locusd/enclave
+chmod 640 /etc/locusd/enclave/*
+sed 's/port: 2368/port: 2410/; s,domain: 7,domain: 9\, security: /etc/locusd/enclave,' robot.yaml >/etc/locusd/secured.yaml
+systemctl start locusd@secured
+is_secured() { journalctl --no-pager -u locusd@secured | grep "DDS is up: domain 9" >/dev/null; }
+wait_for 10 is_secured
+systemctl stop locusd@secured
+rm -r /etc/locusd/enclave /etc/locusd/secured.yaml
 
 step "systemd may hold the sockets; then packets wait through a restart, in a large buffer"
 systemctl stop locusd

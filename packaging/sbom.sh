@@ -1,0 +1,104 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# sbom.sh PACKAGE TREE BUILD: what the programs of a package consist of, as SPDX 2.3, to stdout. TREE holds them as they
+# are installed, BUILD is the folder of ninja that they were linked in. Everything is read from what was really built:
+#   DYNAMIC_LINK              package of a library that a program names as needed
+#   RUNTIME_DEPENDENCY_OF     package of a library that only such libraries need
+#   BUILD_DEPENDENCY_OF       package whose headers were compiled in
+#   CONTAINS                  package whose scripts are bundled into a page
+# The same packages of Debian give the same bytes; the time is SOURCE_DATE_EPOCH.
+set -euo pipefail
+export LC_ALL=C.UTF-8
+package=$1 tree=$(realpath "$2") build=$(realpath "$3")
+arch=$(dpkg-architecture -q DEB_HOST_ARCH) triplet=$(dpkg-architecture -q DEB_HOST_MULTIARCH)
+version=$(dpkg-parsechangelog -S Version)
+programs=("$tree"/usr/bin/*)
+
+needed() { readelf --dynamic "$@" | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p' | sort -u; }
+path_of() { # LIBRARY, as the loader finds it
+  local folder
+  for folder in {,/usr}/lib{/"$triplet",,64} "/usr/$triplet/lib"; do
+    [ ! -e "$folder/$1" ] || { realpath "$folder/$1"; return; }
+  done
+  echo "sbom.sh: $1: no such library in /lib/$triplet; is its package installed?" >&2
+  return 1
+}
+# Lines "PACKAGE FILE" for files that packages of Debian brought.
+owners() { { xargs --no-run-if-empty dpkg -S 2>/dev/null || true; } | sed -E 's/^([^:,]+).*: /\1 /'; }
+related() { owners | sed "s/^\([^ ]*\) .*/$1 \1/" | sort -u; } # "RELATION PACKAGE"
+
+libraries() {
+  local -A seen=()
+  local wave relation=DYNAMIC_LINK library path
+  wave=$(needed "${programs[@]}")
+  while [ -n "$wave" ]; do
+    local next=()
+    for library in $wave; do
+      [ -z "${seen[$library]:-}" ] || continue
+      seen[$library]=1
+      path=$(path_of "$library")
+      # A library that was merged into /usr is known to dpkg under the path that its package has.
+      printf '%s\n%s\n' "$path" "${path#/usr}" | owners | sed "s,^\([^ ]*\) .*,$relation \1 $library," | grep . ||
+        { echo "sbom.sh: $path: of no package of Debian" >&2; return 1; }
+      next+=("$path")
+    done
+    relation=RUNTIME_DEPENDENCY_OF
+    wave=$([ ${#next[@]} -eq 0 ] || needed "${next[@]}")
+  done
+}
+
+# What ninja makes of what, order alone aside: "FILE..." of the files on standard input.
+made_of() { (cd "$build" && xargs --no-run-if-empty ninja -t query) | awk '/^  input:/ {on = 1; next} /^  outputs:/ {on = 0}
+  on && $1 != "||" {print $NF}'; }
+symbols() { awk '/^File:/ {file = $2} $5 == "GLOBAL" && $7 != "UND" {print $8, file}'; } # "SYMBOL FILE"
+candidates() { # objects, those of static libraries included
+  local wave
+  wave=$(for program in "${programs[@]}"; do echo "bin/$(basename "$program")"; done)
+  while [ -n "$wave" ]; do
+    wave=$(made_of <<<"$wave" | sort -u)
+    grep '\.o$' <<<"$wave" || true
+    wave=$(grep '\.a$' <<<"$wave" | grep -v '^/' || true)
+  done | sort -u
+}
+linked() { # those of them that went into a program, to tell by what they define
+  (cd "$build" && awk 'FNR == NR {linked[$1]; next} $1 in linked {print $2}' <(readelf --syms --wide "${programs[@]}" | symbols) \
+    <(candidates | xargs readelf --syms --wide | symbols)) | sort -u
+}
+headers() {
+  linked | (cd "$build" && xargs --no-run-if-empty ninja -t deps) | grep -oE '/usr/include/.*' | sort -u | related BUILD_DEPENDENCY_OF
+}
+scripts() {
+  linked | { grep 'page\.S\.o$' || true; } | made_of | { grep '\.html$' || true; } | sed 's/html$/js.meta.json/' |
+    (cd "$build" && xargs --no-run-if-empty cat) | { grep -oE 'usr/share/[^"]+' || true; } | sed 's,^,/,' | sort -u |
+    related CONTAINS
+}
+
+{ libraries; headers; scripts; } | sort -u | while read -r relation name library; do
+  printf '%s\t%s\t%s\t%s\n' "$relation" "$name" "$(dpkg-query -W -f '${Version}\t${Architecture}' "$name:$arch" \
+    2>/dev/null || dpkg-query -W -f '${Version}\t${Architecture}' "$name")" "$library"
+done | sort -u | jq --raw-input --slurp --sort-keys --arg package "$package" --arg version "$version" --arg arch "$arch" \
+  --argjson time "${SOURCE_DATE_EPOCH:-$(dpkg-parsechangelog -S Timestamp)}" '
+  def id: "SPDXRef-Package-" + gsub("[^A-Za-z0-9.-]"; "-");
+  def described: {downloadLocation: "NOASSERTION", filesAnalyzed: false, copyrightText: "NOASSERTION",
+                  licenseConcluded: "NOASSERTION"};
+  [split("\n")[] | select(. != "") | split("\t") | {relation: .[0], name: .[1], version: .[2], arch: .[3], library: .[4]}] as $parts |
+  {
+    spdxVersion: "SPDX-2.3", dataLicense: "CC0-1.0", SPDXID: "SPDXRef-DOCUMENT",
+    name: "\($package)_\($version)_\($arch)",
+    documentNamespace: "https://locusd.example.org/spdx/\($package)_\($version)_\($arch)",
+    creationInfo: {created: ($time | todate), creators: ["Tool: locusd-packaging-sbom.sh"]},
+    packages: ([{SPDXID: ($package | id), name: $package, versionInfo: $version, licenseDeclared: "Apache-2.0"} + described]
+      + ($parts | group_by(.name) | map({
+          SPDXID: (.[0].name | id), name: .[0].name, versionInfo: .[0].version, licenseDeclared: "NOASSERTION",
+          supplier: "Organization: Debian",
+          comment: ([.[].library | select(. != "")] | unique | join(" ")),
+          externalRefs: [{referenceCategory: "PACKAGE-MANAGER", referenceType: "purl",
+            referenceLocator: "pkg:deb/debian/\(.[0].name)@\(.[0].version | @uri)?arch=\(.[0].arch)"}]} + described
+        | if .comment == "" then del(.comment) else . end))),
+    relationships: ([{spdxElementId: "SPDXRef-DOCUMENT", relationshipType: "DESCRIBES",
+                      relatedSpdxElement: ($package | id)}]
+      + ($parts | map({relation, name}) | unique | map(
+          if .relation | endswith("_OF")
+          then {spdxElementId: (.name | id), relationshipType: .relation, relatedSpdxElement: ($package | id)}
+          else {spdxElementId: ($package | id), relationshipType: .relation, relatedSpdxElement: (.name | id)} end)))
+  }'

@@ -1,0 +1,39 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# sbom.sh FOLDER: each package there says what it consists of: every library that its programs need, in the version that
+# is asked for at installation or a newer one, and what was compiled in.
+set -euo pipefail
+folder=$1
+work=$(mktemp -d)
+trap 'rm -r "$work"' EXIT
+status=0
+complain() { echo "$*"; status=1; }
+for package in locusd locus-tools; do
+  deb=$(echo "$folder/${package}"_*.deb)
+  dpkg-deb -x "$deb" "$work/$package"
+  sbom=$work/$package/usr/share/doc/$package/$package.spdx.json
+  jq -e '.spdxVersion == "SPDX-2.3" and .creationInfo.created != null and
+    ([.packages[].SPDXID, .SPDXID] as $ids | ($ids | unique | length) == ($ids | length) and
+      all(.relationships[]; [.spdxElementId, .relatedSpdxElement] - $ids == []))' "$sbom" >/dev/null ||
+    complain "$sbom: is no SPDX 2.3, or its relations lead nowhere"
+  jq -r '.packages[].comment // "" | split(" ")[]' "$sbom" | sort >"$work/named"
+  readelf --dynamic "$work/$package"/usr/bin/* | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p' | sort -u >"$work/needed"
+  [ -s "$work/needed" ] || complain "$deb: its programs need no library; is this test out of date?"
+  missing=$(comm -23 "$work/needed" "$work/named")
+  [ -z "$missing" ] || complain "$sbom: lacks" "$missing"
+  for library in $(dpkg-deb -f "$deb" Depends | grep -oP 'lib[a-z0-9.+-]+(?= \(>=)'); do
+    least=$(dpkg-deb -f "$deb" Depends | grep -oP "(?<![a-z0-9.+-])\Q$library\E \(>= \K[^)]*")
+    version=$(jq -r --arg name "$library" '.packages[] | select(.name == $name).versionInfo' "$sbom")
+    dpkg --compare-versions "${version:-0~}" ge "$least" || complain "$sbom: $library is '$version', needed is $least"
+  done
+  for header_only in libeigen3-dev nlohmann-json3-dev; do
+    jq -e --arg name $header_only 'any(.packages[]; .name == $name)' "$sbom" >/dev/null ||
+      complain "$sbom: lacks $header_only, which is compiled in"
+  done
+done
+for script in libjs-three node-d3-scale; do
+  jq -e --arg id "SPDXRef-Package-$script" 'any(.relationships[]; .relationshipType == "CONTAINS" and
+    .relatedSpdxElement == $id)' "$work/locus-tools/usr/share/doc/locus-tools/locus-tools.spdx.json" >/dev/null ||
+    complain "locus-tools.spdx.json: does not contain $script, which the report is drawn with"
+done
+exit $status
