@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "config/config.hpp"
+#include "daemon/ingest.hpp"
+#include "daemon/input.hpp"
+#include "daemon/sweep_processor.hpp"
+
+namespace locus::performance {
+
+/// The whole of locus in one thread, as the service and locus-replay run it: datagrams and samples in, estimates out.
+/// One owner.
+class Pipeline {
+ public:
+  /// Without motion sources in the configuration it passes over their samples.
+  explicit Pipeline(const Config& config);
+  Pipeline(const Pipeline&) = delete;
+  Pipeline& operator=(const Pipeline&) = delete;
+
+  /// The sweep that the input completed, valid until the next call; nullptr if none.
+  const daemon::ProcessedSweep* take(const daemon::Input& input);
+
+  [[nodiscard]] const Odometry& odometry() const { return processor_.odometry(); }
+  /// CPU time so far.
+  [[nodiscard]] daemon::StageTimes stages() const;
+  /// The points of the sweep processed last, as they were cut.
+  [[nodiscard]] const std::vector<SweepPoint>& points() const { return points_; }
+
+ private:
+  void process(Sweep& sweep, const daemon::SweepCut& cut);
+
+  bool hears_motion_;
+  daemon::SweepProcessor processor_;
+  std::vector<SweepPoint> points_;
+  std::optional<daemon::ProcessedSweep> processed_;
+  daemon::Ingest ingest_;
+};
+
+} // namespace locus::performance
