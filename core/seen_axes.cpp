@@ -7,9 +7,9 @@
 namespace locus {
 
 Vector6 SeenAxes::observe(const Matrix6& observability_base) {
-  constexpr double kLeast = 1e-6; ///< keeps an axis of which nothing is seen solvable
-  const Matrix6 solvable = observability_base + kLeast * Matrix6::Identity();
-  const Vector6 observability = solvable.inverse().diagonal().cwiseInverse().cwiseMin(1.0);
+  constexpr double kSolvable = 1e-6; ///< keeps an axis of which nothing is seen solvable
+  const Matrix6 solvable = observability_base + kSolvable * Matrix6::Identity();
+  Vector6 observability = solvable.inverse().diagonal().cwiseInverse().cwiseMin(1.0);
   for (std::size_t axis = 0; axis < seen_.size(); ++axis)
     seen_[axis] = observability[static_cast<Eigen::Index>(axis)] >= (seen_[axis] ? kWeakBelow : kSeenFrom);
   return observability;

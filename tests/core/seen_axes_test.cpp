@@ -6,8 +6,8 @@
 namespace locus {
 namespace {
 
-constexpr int kAlong = 0;
-constexpr int kYaw = 5;
+constexpr int kForward = 0;
+constexpr int kHeading = 5;
 
 /// Every axis well seen but one, of which the surfaces say `observability` and nothing of the others.
 Matrix6 weak_along(int axis, double observability) {
@@ -21,10 +21,10 @@ TEST(SeenAxes, AreAllBeforeTheFirstLook) { EXPECT_TRUE(SeenAxes{}.all()); }
 TEST(SeenAxes, AnAxisIsLostBelowAHundredthAndBackFromTwoOn) {
   SeenAxes axes;
   const auto sees_after = [&axes](double observability) {
-    const Vector6 observed = axes.observe(weak_along(kAlong, observability));
-    EXPECT_NEAR(observed[kAlong], observability, 2e-6);
-    EXPECT_TRUE(axes.each()[kYaw]);
-    EXPECT_EQ(axes.all(), axes.each()[kAlong]);
+    const Vector6 observed = axes.observe(weak_along(kForward, observability));
+    EXPECT_NEAR(observed[kForward], observability, 2e-6);
+    EXPECT_TRUE(axes.each()[kHeading]);
+    EXPECT_EQ(axes.all(), axes.each()[kForward]);
     return axes.all();
   };
   EXPECT_TRUE(sees_after(0.011));
@@ -37,13 +37,13 @@ TEST(SeenAxes, AnAxisIsLostBelowAHundredthAndBackFromTwoOn) {
 /// A wall that shows a turn and a shift only together, as one from far aside does, shows neither.
 TEST(SeenAxes, WhatIsOnlySeenTogetherWithAnotherAxisIsNotSeen) {
   SeenAxes axes;
-  Matrix6 together = weak_along(kAlong, 0.3);
-  together(kAlong, kYaw) = together(kYaw, kAlong) = 0.3;
+  Matrix6 together = weak_along(kForward, 0.3);
+  together(kForward, kHeading) = together(kHeading, kForward) = 0.3;
   const Vector6 observed = axes.observe(together);
-  EXPECT_LT(observed[kAlong], 1e-5);
-  EXPECT_LT(observed[kYaw], 1e-5);
-  EXPECT_FALSE(axes.each()[kAlong]);
-  EXPECT_FALSE(axes.each()[kYaw]);
+  EXPECT_LT(observed[kForward], 1e-5);
+  EXPECT_LT(observed[kHeading], 1e-5);
+  EXPECT_FALSE(axes.each()[kForward]);
+  EXPECT_FALSE(axes.each()[kHeading]);
 }
 
 TEST(SeenAxes, NothingSeenAtAllIsAFigureAllTheSame) {
@@ -56,12 +56,12 @@ TEST(SeenAxes, NothingSeenAtAllIsAFigureAllTheSame) {
 
 TEST(SeenAxes, OnlyWhatIsSeenIsLeft) {
   SeenAxes axes;
-  axes.observe(weak_along(kAlong, 0.001));
+  axes.observe(weak_along(kForward, 0.001));
   Vector6 left = Vector6::Ones();
-  left[kAlong] = 0.0;
+  left[kForward] = 0.0;
   EXPECT_EQ(axes.part_of(Vector6::Ones()), left);
   Matrix6 rows = Matrix6::Ones();
-  rows.row(kAlong).setZero();
+  rows.row(kForward).setZero();
   EXPECT_EQ(axes.rows_of(Matrix6::Ones()), rows);
 }
 
