@@ -8,9 +8,13 @@ void IngestReport::read(const Ingest& ingest) {
   for (std::size_t i = 0; i < ingest.lidars().lidars().size(); ++i) {
     const LidarInput& lidar = ingest.lidars().lidars()[i];
     const velodyne::Decoder& decoder = lidar.decoder();
-    lidars[i] = {lidar.counters(),      decoder.model(),
-                 decoder.return_mode(), decoder.model() ? decoder.rotation_rate_rpm() : 0.0,
-                 lidar.source_ip(),     lidar.position() ? lidar.position()->pps : velodyne::PpsState::absent};
+    lidars[i] = {.packets = lidar.counters(),
+                 .model = decoder.model(),
+                 .return_mode = decoder.return_mode(),
+                 .rotation_rate_rpm = decoder.model() ? decoder.rotation_rate_rpm() : 0.0,
+                 .source_ip = lidar.source_ip(),
+                 .refused_ip = lidar.refused_ip(),
+                 .pps = lidar.position() ? lidar.position()->pps : velodyne::PpsState::absent};
   }
   for (std::size_t i = 0; i < ingest.sources().size(); ++i)
     sources[i] = {ingest.sources().counters(i), ingest.sources().healthy(i), ingest.sources().verdict(i)};

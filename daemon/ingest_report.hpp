@@ -20,7 +20,8 @@ struct IngestReport {
     std::optional<velodyne::Model> model;
     std::optional<velodyne::ReturnMode> return_mode;
     double rotation_rate_rpm = 0.0;
-    std::optional<std::uint32_t> source_ip; ///< host byte order
+    std::optional<std::uint32_t> source_ip;  ///< host byte order
+    std::optional<std::uint32_t> refused_ip; ///< LidarInput::refused_ip()
     velodyne::PpsState pps = velodyne::PpsState::absent;
   };
   struct Source {

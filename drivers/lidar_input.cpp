@@ -58,8 +58,11 @@ std::optional<PacketError> LidarInput::take(const Datagram& datagram) {
     return take_decoded(datagram);
   if (datagram.truncated)
     return PacketError::truncated;
-  if (!is_sender(datagram))
+  if (!is_sender(datagram)) {
+    if (datagram.payload.size() == velodyne::kDataPacketBytes)
+      refused_ip_ = datagram.source_ip;
     return PacketError::sender;
+  }
   if (datagram.payload.size() == velodyne::kDataPacketBytes)
     return take_data(datagram);
   if (datagram.payload.size() != velodyne::kPositionPacketBytes)

@@ -50,6 +50,9 @@ class LidarInput {
   /// Address of the lidar: configured, or learnt from its data packets.
   [[nodiscard]] std::optional<std::uint32_t> source_ip() const;
 
+  /// Who sent the last packet of a lidar that was refused for its sender.
+  [[nodiscard]] std::optional<std::uint32_t> refused_ip() const { return refused_ip_; }
+
   [[nodiscard]] const LidarOptions& options() const { return options_; }
   [[nodiscard]] const PacketCounters& counters() const { return counters_; }
   [[nodiscard]] const velodyne::Decoder& decoder() const { return decoder_; }
@@ -78,7 +81,7 @@ class LidarInput {
   PacketCounters counters_;
   std::optional<velodyne::PositionPacket> position_;
 
-  std::optional<std::uint32_t> learnt_ip_;
+  std::optional<std::uint32_t> learnt_ip_, refused_ip_;
   Stamp last_heard_;
   std::uint16_t last_azimuth_cdeg_ = 0; ///< of the first firing of the latest packet
   Duration last_duration_{};            ///< of that packet

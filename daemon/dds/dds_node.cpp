@@ -8,8 +8,10 @@
 #include <mutex>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
+#include <net/if.h>
 #include <unistd.h>
 
 namespace locus::daemon {
@@ -80,6 +82,14 @@ std::optional<std::string> set_security(dds_qos_t* qos, const std::string& folde
   return std::nullopt;
 }
 
+std::vector<std::string> interfaces() {
+  std::vector<std::string> names;
+  const std::unique_ptr<struct if_nameindex[], decltype(&if_freenameindex)> all{if_nameindex(), &if_freenameindex};
+  for (std::size_t i = 0; all != nullptr && all[i].if_index != 0; ++i)
+    names.emplace_back(all[i].if_name);
+  return names;
+}
+
 std::function<void(bool, std::string_view)>& log_sink() {
   static std::function<void(bool, std::string_view)> sink;
   return sink;
@@ -107,9 +117,12 @@ void set_dds_log(std::function<void(bool, std::string_view)> sink) {
 }
 
 Expected<DdsNode, std::string> DdsNode::open(const DdsOptions& options) {
+  if (if_nametoindex(options.interface.c_str()) == 0)
+    return fmt::format("dds.interface: there is no network interface {}; there are {}", options.interface,
+                       fmt::join(interfaces(), ", "));
   const auto failed = [&](const char* what, dds_entity_t code) {
-    return fmt::format("no {} in DDS domain {} on interface {} ({}); bring the interface up, or set dds.interface to "
-                       "one that is",
+    return fmt::format("DDS did not give a {} in domain {} on interface {} ({}); bring the interface up, or set "
+                       "dds.interface to one that is",
                        what, options.domain, options.interface, dds_strretcode(code));
   };
   const auto id = static_cast<dds_domainid_t>(options.domain);
@@ -121,6 +134,10 @@ Expected<DdsNode, std::string> DdsNode::open(const DdsOptions& options) {
   if (const auto problem = options.security.empty() ? std::nullopt : set_security(qos.get(), options.security))
     return *problem;
   DdsEntity participant{dds_create_participant(id, qos.get(), nullptr)};
+  if (participant.handle() < 0 && !options.security.empty())
+    return fmt::format("DDS did not take the enclave {} for domain {}; look whether its certificates are in date, "
+                       "their permissions name this domain, and all are signed by its authorities (security.md)",
+                       options.security, options.domain);
   if (participant.handle() < 0)
     return failed("participant", participant.handle());
   return DdsNode{std::move(domain), std::move(participant), options.type_hashes};

@@ -81,6 +81,12 @@ bool send(int client, const ControlServer::Answer& answer) {
   return sendmsg(client, &message, MSG_DONTWAIT | MSG_NOSIGNAL) >= 0;
 }
 
+/// Whether a service lives behind a socket.
+bool answers(const sockaddr_un& address) {
+  const Descriptor client{::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)};
+  return connect(client.number(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0 || errno == EAGAIN;
+}
+
 ControlServer::Answer refusal(const std::string& why) { return {{{"error", why}}, {}}; }
 
 } // namespace
@@ -97,25 +103,30 @@ std::filesystem::path control_path() {
 
 Expected<ControlServer, std::string> ControlServer::open(const std::filesystem::path& path, Handler handler) {
   const auto failed = [&](const char* what) {
-    return fmt::format("{}: {}: {}; locusctl will not reach this service", path.string(), what,
-                       std::strerror(errno)); // NOLINT(concurrency-mt-unsafe)
+    return fmt::format("{}: {}; locusctl will not reach this service: {}", path.string(), std::strerror(errno),
+                       what); // NOLINT(concurrency-mt-unsafe)
   };
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path.native().size() >= sizeof(address.sun_path)) {
     errno = ENAMETOOLONG;
-    return failed("no socket");
+    return failed("set RUNTIME_DIRECTORY to a shorter path");
   }
   path.native().copy(address.sun_path, sizeof(address.sun_path) - 1);
+  if (answers(address))
+    return fmt::format(
+        "{}: another service answers there; locusctl will not reach this one: set RUNTIME_DIRECTORY to a "
+        "folder of its own",
+        path.string());
   std::error_code ignored;
   std::filesystem::create_directories(path.parent_path(), ignored);
   unlink(path.c_str()); // left behind by one that crashed
   Descriptor listener{::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)};
   if (bind(listener.number(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
-    return failed("cannot be made");
+    return failed("set RUNTIME_DIRECTORY to a folder that may be written");
   constexpr mode_t kEverybody = 0666; // who may do what is told by who asks
   if (chmod(path.c_str(), kEverybody) != 0 || listen(listener.number(), kMaxClients) != 0)
-    return failed("cannot be listened to");
+    return failed("it cannot be listened to");
   return ControlServer{std::move(listener), std::move(handler)};
 }
 

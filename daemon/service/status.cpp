@@ -12,6 +12,7 @@
 #include "core/pose.hpp"
 #include "daemon/figures_json.hpp"
 #include "daemon/machine_time.hpp"
+#include "drivers/ip_address.hpp"
 
 namespace locus::daemon {
 
@@ -24,16 +25,13 @@ constexpr std::array<std::string_view, 4> kPpsNames{"absent", "synchronizing", "
 /// Estimates older than this say nothing about now.
 constexpr Duration kStale = std::chrono::seconds{2};
 
-std::string dotted(std::uint32_t ip) {
-  return fmt::format("{}.{}.{}.{}", ip >> 24, ip >> 16 & 255U, ip >> 8 & 255U, ip & 255U);
-}
-
 ordered_json lidar_json(const LidarOptions& options, const IngestReport::Lidar& lidar) {
   const auto text_or_null = [](const auto& value, const auto& to_text) {
     return value ? ordered_json(to_text(*value)) : ordered_json(nullptr);
   };
   return {{"port", options.port},
           {"source_ip", text_or_null(lidar.source_ip, &dotted)},
+          {"refused_ip", text_or_null(lidar.refused_ip, &dotted)},
           {"model", text_or_null(lidar.model, [](auto m) { return std::string{velodyne::to_string(m)}; })},
           {"return_mode", text_or_null(lidar.return_mode, [](auto m) { return std::string{velodyne::to_string(m)}; })},
           {"rpm", rounded(lidar.rotation_rate_rpm)},

@@ -8,6 +8,7 @@
 
 #include "daemon/machine_time.hpp"
 #include "daemon/service/lidar_sockets.hpp"
+#include "drivers/ip_address.hpp"
 
 namespace locus::daemon {
 
@@ -15,11 +16,11 @@ void Watch::look() {
   const RosLink::Status link = session_.link().status();
   look_at_link(link);
   look_at_intruders(link);
-  if (session_.age() > kPatience) {
-    if (link.connected)
-      look_at_sources(link);
-    look_at_lidars();
-  }
+  if (session_.age() > kPatience && link.connected)
+    look_at_sources(link);
+  look_at_lidars();
+  look_at_verdicts();
+  look_at_load();
   look_at_drops();
   if (const auto recording = session_.recording())
     look_at_recording(*recording);
@@ -62,18 +63,68 @@ void Watch::look_at_sources(const RosLink::Status& link) {
 void Watch::look_at_lidars() {
   const IngestReport ingest = session_.figures().snapshot().ingest;
   const std::vector<LidarOptions>& lidars = session_.config().lidars;
+  const Duration now = read_clock(CLOCK_MONOTONIC);
   for (std::size_t i = 0; i < lidars.size(); ++i) {
     const PacketCounters& packets = ingest.lidars[i].packets;
-    if (packets.data > 0 || !unheard_.insert(lidars[i].name).second)
+    Lidar& lidar = lidars_[i];
+    const bool heard = packets.data > lidar.data;
+    if (packets.data != lidar.data || lidar.heard == Duration::zero()) { // fewer: the counters began anew
+      if (heard && !lidar.told.empty())
+        log_.info(fmt::format("lidar {}: heard", lidars[i].name), {{"LOCUS_LIDAR", lidars[i].name}});
+      lidar = {.data = packets.data, .received = packets.received, .heard = now, .told = {}};
+    }
+    if (now - lidar.heard < kPatience)
       continue;
-    const std::string found =
-        packets.received == 0
-            ? "look at its power and cable, and where it sends to (locusctl sensors)"
-            : "datagrams come, but none is a data packet of a lidar that is known; locusctl status says why";
-    log_.warn(fmt::format("lidar {}: no data packet on UDP port {} since the start; {}", lidars[i].name, lidars[i].port,
-                          found),
+    const std::string why = why_silent(lidar, lidars[i], ingest.lidars[i]);
+    if (why == lidar.told)
+      continue;
+    lidar.told = why;
+    log_.warn(fmt::format("lidar {}: no data packet on UDP port {} for {} s; {}", lidars[i].name, lidars[i].port,
+                          std::chrono::duration_cast<std::chrono::seconds>(now - lidar.heard).count(), why),
               {{"LOCUS_LIDAR", lidars[i].name}});
   }
+}
+
+std::string Watch::why_silent(const Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now) {
+  const PacketCounters& packets = now.packets;
+  if (packets.received == lidar.received)
+    return "look at its power and cable, and where it sends to (locusctl sensors)";
+  if (packets[PacketError::sender] > 0 && now.refused_ip && now.source_ip)
+    return fmt::format("packets come from {}, {} {}: set lidars.{}.source_ip to that of the lidar",
+                       dotted(*now.refused_ip), options.source_ip ? "configured is" : "the lidar was",
+                       dotted(*now.source_ip), options.name);
+  if (packets.data + packets.position == packets.received)
+    return fmt::format("its position packets come, so it is on and sends the others elsewhere: locusctl sensors tells "
+                       "to which port, for lidars.{}.port",
+                       options.name);
+  return fmt::format("what comes is refused, for the reasons that locusctl status counts: is it a Velodyne, and "
+                     "lidars.{}.model the right one?",
+                     options.name);
+}
+
+/// What a check has found wrong with a source that goes on being used in part. Of one that is lost, its loss tells.
+void Watch::look_at_verdicts() {
+  const IngestReport ingest = session_.figures().snapshot().ingest;
+  const auto& sources = session_.config().odometry.motion_sources;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    const std::string_view verdict = ingest.sources[i].healthy ? ingest.sources[i].verdict : std::string_view{};
+    if (!verdict.empty() && verdict != verdicts_[i])
+      log_.warn(fmt::format("motion source {} {}", sources[i].name, verdict), {{"LOCUS_SOURCE", sources[i].name}});
+    verdicts_[i] = verdict;
+  }
+}
+
+void Watch::look_at_load() {
+  const Duration now = read_clock(CLOCK_MONOTONIC);
+  if (now - weighed_ < kPatience)
+    return;
+  weighed_ = now;
+  const std::uint64_t drops = session_.pipeline().counters().dropped;
+  if (drops > sweep_drops_)
+    log_.warn(fmt::format("this computer is too busy: {} sweeps were dropped within {} s; see docs/tuning.md, and what "
+                          "else runs here",
+                          drops - sweep_drops_, std::chrono::duration_cast<std::chrono::seconds>(kPatience).count()));
+  sweep_drops_ = drops;
 }
 
 void Watch::look_at_drops() {

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 
 #include "daemon/service/log.hpp"
 #include "daemon/service/session.hpp"
@@ -12,8 +14,8 @@
 namespace locus::daemon {
 
 /// Looks after a session a few times a second and tells what its owner should know: sensors that are not heard, a
-/// network that is not there, packets that the kernel threw away, a disk that takes no recording. Tells each once per
-/// turn for the worse or the better. One owner.
+/// network that is not there, packets that the kernel threw away, a computer that is too busy, a disk that takes no
+/// recording. Tells each once per turn for the worse or the better. One owner.
 class Watch {
  public:
   /// Silence of a sensor that should have spoken by then.
@@ -27,19 +29,31 @@ class Watch {
   void look_at_link(const RosLink::Status& link);
   void look_at_sources(const RosLink::Status& link);
   void look_at_lidars();
+  void look_at_verdicts();
+  void look_at_load();
   void look_at_drops();
   void look_at_intruders(const RosLink::Status& link);
   void look_at_recording(const Recorder::Status& recording);
+
+  /// What was last seen of a lidar.
+  struct Lidar {
+    std::uint64_t data = 0, received = 0; ///< when it was last heard
+    Duration heard{};                     ///< when that was, or since when it is waited for
+    std::string told;                     ///< why it is silent, as it was told; empty: it is not
+  };
+  static std::string why_silent(const Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now);
 
   Session& session_;
   Log& log_;
   bool was_connected_ = false;
   std::uint64_t told_attempts_ = 0;
-  std::set<std::string> unheard_;  ///< lidars and sources that were told of
-  std::set<std::string> intruded_; ///< sources that were told of
-  std::uint64_t kernel_drops_ = 0, filtered_ = 0;
+  std::array<Lidar, Config::kMaxLidars> lidars_;
+  std::array<std::string_view, Sweep::kMaxSources> verdicts_; ///< as they were told
+  std::set<std::string> unheard_;                             ///< sources that were told of
+  std::set<std::string> intruded_;                            ///< sources that were told of
+  std::uint64_t kernel_drops_ = 0, filtered_ = 0, sweep_drops_ = 0;
   Recorder::Status recording_; ///< as it was told
-  Duration joined_{};
+  Duration joined_{}, weighed_{};
 };
 
 /// Tells a hung thread from a quiet one: fed to systemd's watchdog only while all threads go on. One owner.

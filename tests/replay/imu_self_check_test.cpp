@@ -58,7 +58,7 @@ void expect_refused(const Replay& replay, const Wrong& wrong, double without_m) 
   SCOPED_TRACE(wrong.words);
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
   const json summary = replay.summary();
-  EXPECT_NE(replay.run().out.find(wrong.words), std::string::npos) << replay.run().out;
+  EXPECT_NE(replay.run().err.find(wrong.words), std::string::npos) << replay.run().err;
   EXPECT_GE(summary["sources"]["imu"]["rejected"]["self_check"], 1);
   EXPECT_EQ(summary["sweeps"]["failed"], 0);
   EXPECT_LT(ape_mean_m(replay), 1.2 * without_m);
@@ -110,7 +110,7 @@ TEST(WrongImu, BesideLidarAloneIsRefused) {
   for (const Wrong& wrong : {kOtherWay, kDegrees}) {
     SCOPED_TRACE(wrong.words);
     const Replay replay = replay_with(wrong, drive, {"--fail", "wio:lost@0"});
-    EXPECT_NE(replay.run().out.find(wrong.words), std::string::npos) << replay.run().out;
+    EXPECT_NE(replay.run().err.find(wrong.words), std::string::npos) << replay.run().err;
     EXPECT_LT(ape_mean_m(replay), 1.5 * alone_m);
   }
 }

@@ -69,5 +69,13 @@ TEST_F(DdsSecurity, FileThatIsMissingIsNamedAndWaitedFor) {
   EXPECT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
 }
 
+TEST_F(DdsSecurity, EnclaveThatIsNotTakenIsNamed) {
+  const std::filesystem::path ours = enclaves("ours");
+  std::ofstream{ours / "locusd" / "permissions.p7s"} << "hello";
+  const Child daemon(locusd(secured(ours / "locusd")));
+  EXPECT_TRUE(daemon.wait_for_line("DDS did not take the enclave " + (ours / "locusd").string(), seconds{10}))
+      << testing::PrintToString(daemon.lines());
+}
+
 } // namespace
 } // namespace locus::test

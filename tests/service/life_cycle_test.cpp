@@ -17,6 +17,7 @@
 
 #include "daemon/machine_time.hpp"
 #include "daemon/service/saved_state.hpp"
+#include "drivers/motion_files.hpp"
 #include "drivers/udp_socket.hpp"
 #include "service/robot_network.hpp"
 #include "service/undisturbed.hpp"
@@ -71,6 +72,18 @@ class LifeCycle : public RobotNetwork {
     Child play(undisturbed(options));
     EXPECT_EQ(play.wait_for_exit(seconds{60}), 0) << testing::PrintToString(play.lines());
   }
+
+  /// A configuration with another value of a key of the lidar.
+  [[nodiscard]] std::filesystem::path lidar_with(const std::string& key_and_value) const {
+    std::string text = read_text(capture() / "config.yaml");
+    const std::string name = "name: front", key = key_and_value.substr(0, key_and_value.find(' '));
+    if (const std::size_t at = text.find(key, text.find(name)); at != std::string::npos)
+      text.replace(at, text.find_first_of(",}\n", at) - at, key_and_value);
+    else
+      text.replace(text.find(name), name.size(), name + ", " + key_and_value);
+    std::ofstream{file("wrong.yaml")} << text;
+    return file("wrong.yaml");
+  }
 };
 
 TEST_F(LifeCycle, ConfigurationIsCheckedAndPrinted) {
@@ -113,6 +126,76 @@ TEST_F(LifeCycle, SensorsThatAreNotHeardAreNamedWithTheInterfaceOfDds) {
   EXPECT_TRUE(daemon.wait_for_line("tracking", seconds{8}));
 }
 
+/// What is said changes with what is found: at first nothing comes.
+TEST_F(LifeCycle, LidarOfAnotherAddressIsNamedWithBoth) {
+  const std::filesystem::path wrong = lidar_with("source_ip: 192.168.1.77");
+  Child daemon(undisturbed(locusd(wrong)));
+  ASSERT_TRUE(daemon.wait_for_line("lidar front: no data packet on UDP port 2368 for 5 s; look at its power and cable",
+                                   seconds{8}));
+  const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+  EXPECT_TRUE(daemon.wait_for_line("; packets come from 127.0.0.1, configured is 192.168.1.77: set "
+                                   "lidars.front.source_ip to that of the lidar",
+                                   seconds{5}))
+      << testing::PrintToString(daemon.lines());
+  const std::string shown = ctl({"status"}).out;
+  EXPECT_NE(shown.find("refused: sender "), std::string::npos) << shown;
+  EXPECT_NE(shown.find("the last sender: 127.0.0.1"), std::string::npos) << shown;
+}
+
+TEST_F(LifeCycle, LidarOnAnotherPortIsToldByItsPositionPackets) {
+  const std::filesystem::path wrong = lidar_with("port: 2390");
+  Child daemon(undisturbed(locusd(wrong)));
+  const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+  EXPECT_TRUE(
+      daemon.wait_for_line("lidar front: no data packet on UDP port 2390 for 5 s; its position packets come, so "
+                           "it is on and sends the others elsewhere: locusctl sensors tells to which port",
+                           seconds{8}))
+      << testing::PrintToString(daemon.lines());
+}
+
+TEST_F(LifeCycle, AccelerationsInGAreNamed) {
+  const std::filesystem::path drive = file("in_g");
+  std::filesystem::copy(capture(), drive);
+  auto samples = MotionSamples<ImuSample>::open((capture() / "imu.csv").string());
+  ASSERT_TRUE(samples) << samples.error();
+  std::ofstream imu(drive / "imu.csv");
+  for (const ImuSample& sample : samples->drain()) {
+    imu << sample.stamp.time_since_epoch().count();
+    for (const Eigen::Vector3d& axes :
+         {sample.angular_velocity_radps, Eigen::Vector3d(sample.specific_force_mps2 / 9.80665)})
+      imu << ',' << axes.x() << ',' << axes.y() << ',' << axes.z();
+    imu << '\n';
+  }
+  imu.close();
+  Child daemon(undisturbed(locusd(config())));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const Child play(undisturbed({LOCUS_PLAY, drive.string()}));
+  EXPECT_TRUE(daemon.wait_for_line("motion source imu reports accelerations in g", seconds{15}))
+      << testing::PrintToString(daemon.lines());
+  EXPECT_NE(ctl({"status"}).out.find("reports accelerations in g"), std::string::npos);
+}
+
+TEST_F(LifeCycle, SweepsThatAreDroppedAreSaidWithTheReason) {
+  Child daemon(undisturbed(locusd(config())));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+  ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+  const Child hang({HANG_THREAD, std::to_string(daemon.pid()), "odometry"});
+  EXPECT_TRUE(daemon.wait_for_line("this computer is too busy: ", seconds{12}))
+      << testing::PrintToString(daemon.lines());
+}
+
+TEST_F(LifeCycle, SecondServiceLeavesTheSocketOfTheFirstAlone) {
+  const Child first(locusd(config()));
+  ASSERT_TRUE(first.wait_for_line("DDS is up", seconds{10}));
+  {
+    const Child second(locusd(lidar_with("port: 2390")));
+    EXPECT_TRUE(second.wait_for_line("control: another service answers there", seconds{10}))
+        << testing::PrintToString(second.lines());
+  }
+  EXPECT_EQ(status()["lidars"]["front"]["port"], 2368);
+}
+
 TEST_F(LifeCycle, BadConfigurationAtReloadLeavesTheOldOneInForce) {
   const std::filesystem::path file = config();
   Child daemon(locusd(file));
@@ -130,7 +213,7 @@ TEST_F(LifeCycle, BadConfigurationAtReloadLeavesTheOldOneInForce) {
 
 TEST_F(LifeCycle, NetworkOfDdsMayComeLater) {
   Child daemon(locusd(config("dds: {interface: robot0}\n")));
-  EXPECT_TRUE(daemon.wait_for_line("interface robot0", seconds{5}));
+  EXPECT_TRUE(daemon.wait_for_line("dds.interface: there is no network interface robot0; there are lo", seconds{5}));
   for (const char* command : {"ip link add robot0 type veth peer name robot1", "ip addr add 10.7.0.1/24 dev robot0",
                               "ip link set robot1 up", "ip link set robot0 up"})
     ASSERT_EQ(std::system(command), 0); // NOLINT(concurrency-mt-unsafe, cert-env33-c)
@@ -198,6 +281,9 @@ TEST_F(LifeCycle, CablePullIsBridgedByDeadReckoning) {
   ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
   play_to_end({"--fail", "all-lidars:lost@4-16"});
   EXPECT_TRUE(daemon.wait_for_line("dead reckoning", milliseconds{10}));
+  EXPECT_TRUE(daemon.wait_for_line("lidar front: no data packet on UDP port 2368 for 5 s; look at its power and cable",
+                                   milliseconds{10}));
+  EXPECT_TRUE(daemon.wait_for_line("lidar front: heard", milliseconds{10}));
   const std::vector<HeardPose> poses = heard(listener);
   EXPECT_GT(poses.size(), 190U);
   Duration longest{};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "locus_replay/lidar_doubts.hpp"
+#include "drivers/ip_address.hpp"
 
 #include <algorithm>
 #include <optional>
@@ -9,10 +10,6 @@
 
 namespace locus::tools {
 namespace {
-
-std::string dotted(std::uint32_t ip) {
-  return fmt::format("{}.{}.{}.{}", ip >> 24U, ip >> 16U & 0xFFU, ip >> 8U & 0xFFU, ip & 0xFFU);
-}
 
 std::string rejections(const PacketCounters& counters) {
   std::vector<std::string> reasons;

@@ -2,6 +2,8 @@
 #include "locus_replay/results.hpp"
 
 #include <optional>
+#include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -31,6 +33,15 @@ const std::filesystem::path& made(const std::filesystem::path& folder) {
 void warn(const std::vector<std::string>& lines) {
   for (const std::string& line : lines)
     tools::say("locus-replay", "warning: " + line);
+}
+
+/// What is wrong with motion sources altogether, a line each.
+std::vector<std::string> source_verdicts(const Config& config, const MotionSources& sources) {
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < sources.size(); ++i)
+    if (const std::string_view verdict = sources.verdict(i); !verdict.empty())
+      lines.push_back(fmt::format("motion source {} {}", config.odometry.motion_sources[i].name, verdict));
+  return lines;
 }
 
 } // namespace
@@ -72,6 +83,7 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
                {figures, config_, recording_.capture_start(), figures_.path_m(), sweeps_,
                 visible_surfaces(processor.odometry().map()), truth_.trajectory(), accuracy.trajectory});
   warn(lidar_warnings(recording_, ingest.lidars()));
+  warn(source_verdicts(config_, ingest.sources()));
   warn(accuracy.warnings);
   if (!arguments_.quiet)
     fmt::print("{}results    {}\n", readable(run), arguments_.output.string());

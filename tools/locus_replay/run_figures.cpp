@@ -40,7 +40,7 @@ ordered_json sources(const FinishedRun& run) {
   return sources;
 }
 
-/// When a source was lost and why, when it came back, and what is wrong with it altogether.
+/// When a source was lost and why, and when it came back.
 std::string readable_health(const FinishedRun& run, std::size_t source) {
   constexpr std::size_t kTold = 4; ///< a source that flaps is not worth a page
   std::string text;
@@ -54,8 +54,6 @@ std::string readable_health(const FinishedRun& run, std::size_t source) {
   }
   if (told > kTold)
     text += fmt::format(" and {} more changes", told - kTold);
-  if (const std::string_view verdict = run.ingest.sources().verdict(source); !verdict.empty())
-    text += fmt::format("\n           {}", verdict);
   return text;
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "drivers/ip_address.hpp"
 #include "drivers/motion_files.hpp"
 #include "locus_sim/folder_sink.hpp"
 
@@ -87,10 +88,6 @@ class Lidars {
   std::vector<SyntheticLidar> lidars_;
   std::vector<Datagram> waiting_;
 };
-
-std::string dotted(std::uint32_t ip) {
-  return fmt::format("{}.{}.{}.{}", ip >> 24, ip >> 16 & 0xFFu, ip >> 8 & 0xFFu, ip & 0xFFu);
-}
 
 std::string yaml(const Pose& pose) {
   const Eigen::Vector3d& xyz_m = pose.translation;

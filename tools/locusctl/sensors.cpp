@@ -21,6 +21,7 @@
 #include <unistd.h>
 
 #include "daemon/machine_time.hpp"
+#include "drivers/ip_address.hpp"
 #include "drivers/lidar_input.hpp"
 #include "drivers/udp_frame.hpp"
 #include "drivers/udp_socket.hpp"
@@ -90,10 +91,6 @@ struct Heard {
   std::uint64_t data = 0, refused = 0;
   Stamp first, last;
 };
-
-std::string dotted(std::uint32_t ip) {
-  return fmt::format("{}.{}.{}.{}", ip >> 24, ip >> 16 & 255U, ip >> 8 & 255U, ip & 255U);
-}
 
 using Key = std::pair<std::uint32_t, std::uint16_t>; ///< address and port
 

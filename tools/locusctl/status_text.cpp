@@ -49,6 +49,15 @@ std::string pose_text(const Json& status) {
   return text + '\n';
 }
 
+/// "sender 12, time 3": what was not taken, and why.
+std::string reasons(const Json& counters) {
+  std::string text;
+  for (const auto& [name, value] : counters.items())
+    if (value.get<std::uint64_t>() > 0)
+      text += fmt::format("{}{} {}", text.empty() ? "" : ", ", name, value.get<std::uint64_t>());
+  return text;
+}
+
 std::string lidars_text(const Json& status) {
   std::string text = fmt::format("\n{:<12}{:<12}{:>6}{:>10}{:>8}{:>9}{:>10}  {}\n", "lidar", "model", "rpm", "packets",
                                  "lost", "refused", "disorder", "pps");
@@ -59,6 +68,10 @@ std::string lidars_text(const Json& status) {
                         lidar["rpm"].get<double>(), packets["data"].get<std::uint64_t>(),
                         packets["lost"].get<std::uint64_t>(), sum(packets["rejected"]),
                         packets["reordered"].get<std::uint64_t>(), lidar["pps"].get<std::string>());
+    if (const std::string refused = reasons(packets["rejected"]); !refused.empty())
+      text += fmt::format(
+          "{:<12}refused: {}{}\n", "", refused,
+          lidar["refused_ip"].is_string() ? "; the last sender: " + lidar["refused_ip"].get<std::string>() : "");
   }
   return text;
 }
@@ -68,10 +81,15 @@ std::string sources_text(const Json& status) {
     return "";
   std::string text = fmt::format("\n{:<12}{:<12}{:>12}{:>12}{:>12}{:>10}\n", "source", "health", "samples", "refused",
                                  "for sweeps", "changes");
-  for (const auto& [name, source] : status["sources"].items())
+  for (const auto& [name, source] : status["sources"].items()) {
     text += fmt::format("{:<12.11}{:<12}{:>12}{:>12}{:>12}{:>10}\n", name, source["health"].get<std::string>(),
                         source["received"].get<std::uint64_t>(), sum(source["rejected"]),
                         source["used_sweeps"].get<std::uint64_t>(), source["health_changes"].get<std::uint64_t>());
+    if (const std::string refused = reasons(source["rejected"]); !refused.empty())
+      text += fmt::format("{:<12}refused: {}\n", "", refused);
+    if (const std::string verdict = source["verdict"]; !verdict.empty())
+      text += fmt::format("{:<12}{}\n", "", verdict);
+  }
   return text;
 }
 
@@ -97,8 +115,9 @@ std::string status_text(const Json& status) {
   std::string text =
       fmt::format("locusd {}   {}   up {:.0f} s   flat ground {}\n", status["version"].get<std::string>(),
                   status["state"].get<std::string>(), up_s, status["flat_ground"].get<std::string>());
-  text += fmt::format("rate        {:.1f} Hz   last {:.0f} ms ago\n", status["rate_hz"].get<double>(),
-                      status.value("age_ms", 0.0));
+  text +=
+      fmt::format("rate        {:.1f} Hz   last {}\n", status["rate_hz"].get<double>(),
+                  status.contains("age_ms") ? fmt::format("{:.0f} ms ago", status["age_ms"].get<double>()) : "never");
   text += fmt::format("a sweep     {:.2f} ms   90 % {:.2f}   99 % {:.2f}   worst {:.2f}\n", wall["p50"].get<double>(),
                       wall["p90"].get<double>(), wall["p99"].get<double>(), wall["max"].get<double>());
   text += fmt::format("sweeps      {} seen   {} processed   {} dropped   {} failed   {} lost by kernel\n",
