@@ -84,9 +84,9 @@ std::optional<std::string> set_security(dds_qos_t* qos, const std::string& folde
 
 std::vector<std::string> interfaces() {
   std::vector<std::string> names;
-  const std::unique_ptr<struct if_nameindex[], decltype(&if_freenameindex)> all{if_nameindex(), &if_freenameindex};
-  for (std::size_t i = 0; all != nullptr && all[i].if_index != 0; ++i)
-    names.emplace_back(all[i].if_name);
+  const std::unique_ptr<struct if_nameindex, decltype(&if_freenameindex)> all{if_nameindex(), &if_freenameindex};
+  for (const struct if_nameindex* one = all.get(); one != nullptr && one->if_index != 0; ++one)
+    names.emplace_back(one->if_name);
   return names;
 }
 
