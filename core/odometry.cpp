@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/motion_sources.hpp"
 #include "core/relocation.hpp"
 #include "core/twist_correction.hpp"
 
@@ -32,10 +31,6 @@ constexpr double kAskew = 0.4;
 constexpr double kArm_m = 2.0;
 constexpr double kShakesOn = 0.7;
 
-/// Motion sources that see no more than this see a robot at rest.
-constexpr double kRest_mps = 0.03;
-constexpr double kRest_radps = 0.02;
-
 /// A prior that is less sure than this looks for counterparts all around each point.
 constexpr double kWide_m = 0.3;
 
@@ -44,17 +39,6 @@ constexpr double kStartAgrees = 0.002; ///< metres, radians
 
 /// Room for the 16 000 voxels of a large sweep, and small enough for the second cache.
 constexpr std::size_t kLastScanBytes = 2'500'000;
-
-/// A robot accelerates by 4 m/s^2 and 2 rad/s^2 in a sweep; standing must not teach that it lasts.
-const PriorExpectation kConstantVelocity{
-    .sigma = along_each_axis(0.3, 3.0), .bias = along_each_axis(0.3, 3.0), .least_sigma = along_each_axis(0.02, 0.5)};
-const PriorExpectation kOdometrySource{.sigma = along_each_axis(0.02, 0.5),
-                                       .bias = along_each_axis(0.005, 0.1),
-                                       .least_sigma = along_each_axis(0.002, 0.02)};
-const PriorExpectation kInertialUnit{.sigma = along_each_axis(0.3, 0.1),
-                                     .bias = along_each_axis(0.3, 0.05),
-                                     .least_sigma = along_each_axis(0.002, 0.02)};
-const Vector6 kUnknownMotion = along_each_axis(3.0, 10.0); ///< per sweep, of a robot of which nothing is known
 
 /// Of two registrations of the same points. A point without a counterpart counts as one that is three sigma off.
 bool fits_better(const Registration& one, const Registration& other) {
@@ -69,19 +53,13 @@ bool fits_better(const Registration& one, const Registration& other) {
 
 Odometry::Odometry(const OdometryOptions& options, StageClock* clock)
     : options_(options), clock_(clock), gicp_(options.threads, options.isa), flat_ground_(options.flat_ground),
-      map_(options.map.max_bytes, options.isa), last_scan_map_(kLastScanBytes, options.isa),
-      constant_velocity_statistics_(kConstantVelocity) {
-  for (const MotionSourceOptions& source : options.motion_sources)
-    statistics_.emplace_back(source.kind == SourceKind::imu ? kInertialUnit : kOdometrySource);
-  gyro_biases_.resize(options.motion_sources.size());
-  gyro_scales_.resize(options.motion_sources.size());
-}
+      map_(options.map.max_bytes, options.isa), last_scan_map_(kLastScanBytes, options.isa), sensors_(options) {}
 
 OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested& stop) {
   prepare_next();
   if (processed_ == 0)
     return begin(sweep);
-  const Prior prior = settle_dispute(sweep, integrate_sensors(sweep), stop);
+  const MotionPrior prior = settle_dispute(sweep, sensors_.integrate(sweep, last_twist()), stop);
   lacks_prior_ = needs_scan_to_scan(prior);
   gravity_.observe(prior.T_last_now.rotation, sweep);
   flat_ground_.observe(sweep.end, gravity_.up_base());
@@ -163,62 +141,31 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
   OdometryEstimate estimate;
   estimate.T_odom_base = T_odom_last_;
   estimate.failed = scan_.size() < kMinPoints;
-  finish(sweep, Prior{}, estimate);
+  finish(sweep, MotionPrior{}, estimate);
   if (estimate.failed)
     processed_ = 0; // nothing was seen yet: the next sweep is the first
   return estimate;
 }
 
-Odometry::Prior Odometry::integrate_sensors(const Sweep& sweep, int without) const {
-  Prior prior;
-  const double elapsed_s = to_seconds(sweep.end - last_stamp_);
-  const double periods = last_period_ > Duration::zero() ? std::max(1.0, elapsed_s / to_seconds(last_period_)) : 1.0;
-  const bool keeps_velocity = options_.no_source_prior == NoSourcePrior::constant_velocity && elapsed_s > 0.0;
-  if (keeps_velocity)
-    prior.T_last_now = se3_exp(elapsed_s * twist_base_);
-  prior.source.rotation = prior.source.translation =
-      keeps_velocity ? PriorSource::kConstantVelocity : PriorSource::kIdentity;
-  prior.blind = processed_ == 1;
-  prior.variance = prior.blind ? kUnknownMotion.cwiseAbs2().eval() : constant_velocity_statistics_.variance(periods);
-  prior.bias = prior.variance.cwiseSqrt(); // who goes on as before errs more the longer it does
-
-  const auto kind_of = [this](std::size_t i) { return options_.motion_sources[i].kind; };
-  const auto usable = [&](std::size_t i) {
-    return static_cast<int>(i) != without && sweep.sources[i].usable && last_sources_[i].usable && step(sweep, i);
-  };
-  const SourceChoice choice = choose_sources(kind_of, options_.motion_sources.size(), options_.fusion, usable);
-  if (choice.rotation) {
-    prior.T_last_now.rotation = step(sweep, *choice.rotation)->rotation;
-    prior.variance.tail<3>() = statistics_[*choice.rotation].variance(periods).tail<3>();
-    if (kind_of(*choice.rotation) == SourceKind::imu)
-      prior.variance.tail<3>() += gyro_scales_[*choice.rotation].variance(so3_log(prior.T_last_now.rotation));
-    prior.bias.tail<3>() = statistics_[*choice.rotation].bias(periods).tail<3>();
-    prior.source.rotation = static_cast<int>(*choice.rotation);
-  }
-  if (choice.translation) {
-    prior.T_last_now.translation = step(sweep, *choice.translation)->translation;
-    prior.variance.head<3>() = statistics_[*choice.translation].variance(periods).head<3>();
-    prior.bias.head<3>() = statistics_[*choice.translation].bias(periods).head<3>();
-    prior.source.translation = static_cast<int>(*choice.translation);
-    prior.blind = false;
-  }
-  return prior;
+/// The velocity in the last sweep; nothing where there was no motion to tell it from.
+std::optional<Vector6> Odometry::last_twist() const {
+  return processed_ > 1 ? std::optional{twist_base_} : std::nullopt;
 }
 
 /// Where the source of the rotation turns quite otherwise than the robot would without it, the surfaces say which is
 /// true: as a prior, a gyro is too sure for them to say so later. The loser makes the winner less sure.
-Odometry::Prior Odometry::settle_dispute(const Sweep& sweep, const Prior& prior, const Gicp::StopRequested& stop) {
+MotionPrior Odometry::settle_dispute(const Sweep& sweep, const MotionPrior& prior, const Gicp::StopRequested& stop) {
   refuted_.reset();
   if (prior.source.rotation < 0 || adrift_ || sweep.points.size() < kMinPoints)
     return prior;
-  const Prior rival = integrate_sensors(sweep, prior.source.rotation);
+  const MotionPrior rival = sensors_.integrate(sweep, last_twist(), prior.source.rotation);
   const Eigen::Vector3d dispute = difference(prior.T_last_now, rival.T_last_now).tail<3>();
   if (dispute.norm() < kAlwaysAllowed_rad)
     return prior;
   const Registration with_source = attempt(sweep, prior.T_last_now, stop);
   refuted_ = prior.T_last_now;
   const Registration without_source = attempt(sweep, rival.T_last_now, stop);
-  Prior accepted = rival;
+  MotionPrior accepted = rival;
   if (!fits_better(without_source, with_source)) {
     accepted = prior;
     refuted_.reset();
@@ -235,18 +182,6 @@ Registration Odometry::attempt(const Sweep& sweep, const Pose& T_last_now, const
   return gicp_.align(registered(), map_, T_start, {.T_target_source = T_start}, options_.scan_to_submap, true, stop);
 }
 
-/// T_last_now as one source saw it, less what is known of its error; nothing where it does not know.
-std::optional<Pose> Odometry::step(const Sweep& sweep, std::size_t source) const {
-  const SourcePose& last = last_sources_[source];
-  const SourcePose& now = sweep.sources[source];
-  if (!last.known || !now.known || last.spell != now.spell)
-    return std::nullopt;
-  Pose T_last_now = last.T_source_base.inverse() * now.T_source_base;
-  if (options_.motion_sources[source].kind == SourceKind::imu)
-    T_last_now.rotation = T_last_now.rotation * so3_exp(-gyro_biases_[source].turn_rad(sweep.end - last_stamp_));
-  return T_last_now;
-}
-
 /// Takes out of the points what no motion source could, with the twist that T_last_now means.
 void Odometry::correct_motion(const Sweep& sweep, const Pose& T_last_now) {
   correct_all(sweep.points, uncorrected_twist(sweep, T_last_now), options_.isa, scan_);
@@ -255,7 +190,7 @@ void Odometry::correct_motion(const Sweep& sweep, const Pose& T_last_now) {
 
 /// The part of the motion that is still in the points of the sweep.
 Vector6 Odometry::uncorrected_twist(const Sweep& sweep, const Pose& T_last_now) const {
-  const double elapsed_s = to_seconds(sweep.end - last_stamp_);
+  const double elapsed_s = sensors_.elapsed_s(sweep);
   if (elapsed_s <= 0.0)
     return Vector6::Zero();
   const Vector6 twist = se3_log(T_last_now) / elapsed_s;
@@ -267,12 +202,13 @@ Vector6 Odometry::uncorrected_twist(const Sweep& sweep, const Pose& T_last_now) 
   return twist - corrected;
 }
 
-bool Odometry::needs_scan_to_scan(const Prior& prior) const {
+bool Odometry::needs_scan_to_scan(const MotionPrior& prior) const {
   return options_.scan_to_scan_mode == ScanToScanMode::always ||
          (options_.scan_to_scan_mode == ScanToScanMode::automatic && prior.source.translation < 0);
 }
 
-Registration Odometry::match_scan(const Prior& prior, const Pose& T_start, bool wide, const Gicp::StopRequested& stop) {
+Registration Odometry::match_scan(const MotionPrior& prior, const Pose& T_start, bool wide,
+                                  const Gicp::StopRequested& stop) {
   Registration none;
   none.T_target_source = T_start;
   if (!needs_scan_to_scan(prior) || scan_.size() < kMinPoints)
@@ -286,7 +222,7 @@ Registration Odometry::match_scan(const Prior& prior, const Pose& T_start, bool 
 
 /// The first two sweeps came without any idea of the motion. What was found between them corrects both, so it can be
 /// found better; then the map begins anew with the first one corrected.
-void Odometry::begin_again(const Sweep& sweep, const Prior& prior, Registration& found,
+void Odometry::begin_again(const Sweep& sweep, const MotionPrior& prior, Registration& found,
                            const Gicp::StopRequested& stop) {
   if (first_points_.empty())
     return;
@@ -304,7 +240,7 @@ void Odometry::begin_again(const Sweep& sweep, const Prior& prior, Registration&
   map_.insert(last_scan_, T_odom_last_);
 }
 
-Registration Odometry::match_submap(const Prior& prior, const Pose& T_last_now, const Gicp::StopRequested& stop) {
+Registration Odometry::match_submap(const MotionPrior& prior, const Pose& T_last_now, const Gicp::StopRequested& stop) {
   const StageScope scope(clock_, Stage::scan_to_submap);
   const Pose T_start = T_odom_last_ * T_last_now;
   Registration none;
@@ -317,13 +253,13 @@ Registration Odometry::match_submap(const Prior& prior, const Pose& T_last_now, 
 }
 
 /// What is known before the sweep is compared with the submap.
-void Odometry::predict(const Prior& prior) {
+void Odometry::predict(const MotionPrior& prior) {
   uncertainty_.predict(T_odom_last_.rotation * prior.T_last_now.translation, covariance_of(prior),
                        turn_both(T_odom_last_.rotation).cwiseAbs() * prior.bias);
 }
 
 /// Of a prior, odom axes.
-Matrix6 Odometry::covariance_of(const Prior& prior) const {
+Matrix6 Odometry::covariance_of(const MotionPrior& prior) const {
   const Matrix6 R = turn_both(T_odom_last_.rotation);
   return R * prior.variance.asDiagonal() * R.transpose();
 }
@@ -349,44 +285,6 @@ bool Odometry::trusts(const Registration& registration, const Pose& T_last_now, 
   allowed << Eigen::Vector3d::Constant(kAlwaysAllowed_m), Eigen::Vector3d::Constant(kAlwaysAllowed_rad);
   allowed = allowed.cwiseMax(kMaxDeviation_sigma * variance.cwiseSqrt());
   return (difference(T_last_now, T_last_predicted).cwiseAbs().array() <= allowed.array()).all();
-}
-
-/// Compares what each source predicted with what lidar found, and a constant velocity with what both know: it has to
-/// serve once the sources are lost. A source that is in agreement teaches its statistics; one in disagreement would
-/// only teach them to expect the worst. Standing must not teach that it lasts.
-void Odometry::judge_sources(const Sweep& sweep, const Prior& prior, const Pose& T_last_now,
-                             const OdometryEstimate& estimate) {
-  const Matrix6 R = turn_both(T_odom_last_.rotation.conjugate());
-  Matrix6 information = seen_axes_.rows_of(R * estimate.scan_to_submap.information * R.transpose());
-  const bool stands = estimate.state == TrackingState::standstill;
-  for (std::size_t i = 0; i < options_.motion_sources.size(); ++i) {
-    const std::optional<Pose> T_last_predicted = step(sweep, i);
-    if (!T_last_predicted)
-      continue;
-    const bool imu = options_.motion_sources[i].kind == SourceKind::imu;
-    Matrix6 seen = information;
-    if (imu)
-      seen.topRows<3>().setZero(); // knows nothing of translation
-    const Vector6 error = difference(T_last_now, *T_last_predicted);
-    feedback_.opinions[i] = opinion_on(error, seen);
-    if (feedback_.opinions[i] == LidarOpinion::disagrees)
-      continue;
-    if (!stands)
-      statistics_[i].learn(error, seen);
-    if (imu) {
-      gyro_biases_[i].learn(-error.tail<3>(), so3_log(T_last_now.rotation), sweep.end - last_stamp_);
-      gyro_scales_[i].learn(-seen_axes_.part_of(error).tail<3>(),
-                            seen_axes_.part_of(se3_log(*T_last_predicted)).tail<3>());
-    }
-  }
-  if (stands)
-    return;
-  if (prior.source.translation >= 0) { // a robot that drove gently may yet turn sharply: lidar will see that it does
-    information.setZero();
-    information.diagonal().head<3>() = prior.variance.head<3>().cwiseInverse();
-  }
-  const Pose T_last_kept = se3_exp(to_seconds(sweep.end - last_stamp_) * twist_base_);
-  constant_velocity_statistics_.learn(difference(T_last_now, T_last_kept), information);
 }
 
 /// A sweep that the map is to take in.
@@ -423,32 +321,26 @@ void Odometry::hold_still(const Sweep& sweep, OdometryEstimate& estimate) {
   if (estimate.failed)
     return standstill_.lose_sight();
   const std::optional<Pose> T_odom_held =
-      standstill_.observe(sweep.end, estimate.T_odom_base, sources_saw_motion(sweep));
+      standstill_.observe(sweep.end, estimate.T_odom_base, sensors_.saw_motion(sweep));
   if (!T_odom_held)
     return;
   estimate.T_odom_base = *T_odom_held;
   estimate.state = TrackingState::standstill;
 }
 
-bool Odometry::sources_saw_motion(const Sweep& sweep) const {
-  const double elapsed_s = to_seconds(sweep.end - last_stamp_);
-  for (std::size_t i = 0; i < options_.motion_sources.size(); ++i) {
-    const std::optional<Pose> T_last_now = sweep.sources[i].usable ? step(sweep, i) : std::nullopt;
-    if (T_last_now && (T_last_now->translation.norm() > kRest_mps * elapsed_s ||
-                       angle_rad(T_last_now->rotation) > kRest_radps * elapsed_s))
-      return true;
-  }
-  return false;
-}
-
 /// What a registered sweep says of itself, of its prior and of the motion sources.
-void Odometry::settle(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate) {
+void Odometry::settle(const Sweep& sweep, const MotionPrior& prior, OdometryEstimate& estimate) {
   const Pose T_last_now = T_odom_last_.inverse() * estimate.T_odom_base;
   uncertainty_.see(estimate.scan_to_submap.information);
   observe(estimate);
   if (adrift_) // the way back to the submap is no motion of the robot
     return move_on(prior.T_last_now, uncertainty_.against_submap(), estimate);
-  judge_sources(sweep, prior, T_last_now, estimate);
+  const Matrix6 R = turn_both(T_odom_last_.rotation.conjugate());
+  feedback_.opinions = sensors_.judge(sweep, prior,
+                                      {.T_last_now = T_last_now,
+                                       .information = R * estimate.scan_to_submap.information * R.transpose(),
+                                       .stands = estimate.state == TrackingState::standstill},
+                                      seen_axes_);
   const Pose T_last_moved = motion(T_last_now, estimate.scan_to_scan.T_target_source);
   move_on(T_last_moved, uncertainty_.against_submap(), estimate);
   bend(difference(T_last_moved, prior.T_last_now));
@@ -483,7 +375,7 @@ void Odometry::observe(OdometryEstimate& estimate) {
 
 /// The twist that T_last_now means, with its covariance.
 void Odometry::move_on(const Pose& T_last_now, const Matrix6& covariance_odom, OdometryEstimate& estimate) {
-  const double elapsed_s = to_seconds(estimate.stamp - last_stamp_);
+  const double elapsed_s = to_seconds(estimate.stamp - sensors_.last_stamp());
   if (elapsed_s > 0.0) {
     twist_base_ = se3_log(T_last_now) / elapsed_s;
     const Matrix6 R = turn_both(estimate.T_odom_base.rotation.conjugate());
@@ -493,7 +385,7 @@ void Odometry::move_on(const Pose& T_last_now, const Matrix6& covariance_odom, O
 }
 
 /// Fills in what the estimate says beside its pose, and remembers the sweep as the last.
-void Odometry::finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate) {
+void Odometry::finish(const Sweep& sweep, const MotionPrior& prior, OdometryEstimate& estimate) {
   estimate.stamp = sweep.end;
   estimate.points = registered_;
   estimate.prior = prior.source;
@@ -501,7 +393,8 @@ void Odometry::finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& 
     refused_in_a_row_ = 0;
   else if (scan_.size() >= kMinPoints)
     ++refused_in_a_row_;
-  feedback_ = {.from = last_stamp_, .to = sweep.end, .opinions = {}, .twist_base = Vector6::Zero(), .sees = {}};
+  feedback_ = {
+      .from = sensors_.last_stamp(), .to = sweep.end, .opinions = {}, .twist_base = Vector6::Zero(), .sees = {}};
   if (estimate.failed)
     estimate.state = TrackingState::dead_reckoning;
   if (processed_ > 0 && estimate.failed)
@@ -515,12 +408,7 @@ void Odometry::finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& 
   choose_keyframe(estimate);
   ++processed_;
   T_odom_last_ = estimate.T_odom_base;
-  last_stamp_ = sweep.end;
-  last_period_ = sweep.end - sweep.start;
-  for (std::size_t i = 0; i < gyro_scales_.size(); ++i)
-    if (!sweep.sources[i].usable) // what comes back may come back as another
-      gyro_scales_[i] = GyroScale{};
-  last_sources_ = sweep.sources;
+  sensors_.remember(sweep);
   std::swap(last_scan_, scan_);
   last_registered_ = registered_;
   last_scan_mapped_ = false;

@@ -9,15 +9,13 @@
 
 #include "core/flat_ground.hpp"
 #include "core/gravity.hpp"
-#include "core/gyro_bias.hpp"
-#include "core/gyro_scale.hpp"
 #include "core/odometry_estimate.hpp"
 #include "core/options.hpp"
 #include "core/pose_uncertainty.hpp"
-#include "core/prior_statistics.hpp"
 #include "core/registration.hpp"
 #include "core/registration_feedback.hpp"
 #include "core/seen_axes.hpp"
+#include "core/sensor_integration.hpp"
 #include "core/stage_clock.hpp"
 #include "core/standstill.hpp"
 #include "core/surface_map.hpp"
@@ -64,46 +62,33 @@ class Odometry {
   void set_flat_ground(FlatGround mode) { flat_ground_ = FlatGroundAssumption(mode); }
 
  private:
-  /// E of the paper's II-B.1: the motion since the last processed sweep, before a look at the points.
-  struct Prior {
-    Pose T_last_now;
-    Vector6 variance = Vector6::Zero(); ///< in the axes of the base at the last sweep
-    Vector6 bias = Vector6::Zero();     ///< the part of the deviation that comes again with the next sweep
-    PriorSource source;
-    bool blind = false; ///< nothing at all is known yet, not even a velocity
-  };
-
   OdometryEstimate begin(const Sweep& sweep);
-  static constexpr int kNone = -1;
-  [[nodiscard]] Prior integrate_sensors(const Sweep& sweep, int without = kNone) const;
-  Prior settle_dispute(const Sweep& sweep, const Prior& prior, const Gicp::StopRequested& stop);
+  [[nodiscard]] std::optional<Vector6> last_twist() const;
+  MotionPrior settle_dispute(const Sweep& sweep, const MotionPrior& prior, const Gicp::StopRequested& stop);
   Registration attempt(const Sweep& sweep, const Pose& T_last_now, const Gicp::StopRequested& stop);
-  [[nodiscard]] std::optional<Pose> step(const Sweep& sweep, std::size_t source) const;
   void correct_motion(const Sweep& sweep, const Pose& T_last_now);
   [[nodiscard]] Vector6 uncorrected_twist(const Sweep& sweep, const Pose& T_last_now) const;
-  Registration match_scan(const Prior& prior, const Pose& T_start, bool wide, const Gicp::StopRequested& stop);
-  Registration match_submap(const Prior& prior, const Pose& T_last_now, const Gicp::StopRequested& stop);
-  void begin_again(const Sweep& sweep, const Prior& prior, Registration& found, const Gicp::StopRequested& stop);
+  Registration match_scan(const MotionPrior& prior, const Pose& T_start, bool wide, const Gicp::StopRequested& stop);
+  Registration match_submap(const MotionPrior& prior, const Pose& T_last_now, const Gicp::StopRequested& stop);
+  void begin_again(const Sweep& sweep, const MotionPrior& prior, Registration& found, const Gicp::StopRequested& stop);
   [[nodiscard]] Pose flatten(const Pose& T_last_now, const Matrix6& information_odom) const;
-  void predict(const Prior& prior);
-  [[nodiscard]] Matrix6 covariance_of(const Prior& prior) const;
+  void predict(const MotionPrior& prior);
+  [[nodiscard]] Matrix6 covariance_of(const MotionPrior& prior) const;
   [[nodiscard]] Vector6 variance_against_submap() const;
   [[nodiscard]] bool trusts(const Registration& registration, const Pose& T_last_now, const Pose& T_last_predicted,
                             const Vector6& variance) const;
-  void judge_sources(const Sweep& sweep, const Prior& prior, const Pose& T_last_now, const OdometryEstimate& estimate);
   [[nodiscard]] std::span<const SurfacePoint> registered() const { return std::span(scan_).first(registered_); }
-  [[nodiscard]] bool needs_scan_to_scan(const Prior& prior) const;
+  [[nodiscard]] bool needs_scan_to_scan(const MotionPrior& prior) const;
   void map_last_scan(std::size_t points);
   void choose_keyframe(OdometryEstimate& estimate);
   static Matrix6 share_of_map(double fresh, const Matrix6& observability);
   void hold_still(const Sweep& sweep, OdometryEstimate& estimate);
-  [[nodiscard]] bool sources_saw_motion(const Sweep& sweep) const;
-  void settle(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate);
+  void settle(const Sweep& sweep, const MotionPrior& prior, OdometryEstimate& estimate);
   [[nodiscard]] Pose motion(const Pose& T_last_now, const Pose& T_last_seen) const;
   void bend(const Vector6& surprise);
   void observe(OdometryEstimate& estimate);
   void move_on(const Pose& T_last_now, const Matrix6& covariance_odom, OdometryEstimate& estimate);
-  void finish(const Sweep& sweep, const Prior& prior, OdometryEstimate& estimate);
+  void finish(const Sweep& sweep, const MotionPrior& prior, OdometryEstimate& estimate);
 
   OdometryOptions options_;
   StageClock* clock_;
@@ -118,24 +103,18 @@ class Odometry {
   std::size_t registered_ = 0;     ///< the first so many points of scan_ are registered
   std::vector<SurfacePoint> last_scan_;
   std::size_t last_registered_ = 0;
-  std::vector<PriorStatistics> statistics_; ///< by motion source
-  PriorStatistics constant_velocity_statistics_;
+  SensorIntegration sensors_;
 
   std::uint64_t processed_ = 0;
   std::optional<Pose> T_odom_start_; ///< where to begin
   std::vector<SweepPoint>
       first_points_; ///< of the first sweep, as they came: no velocity was known to correct them with
-  Stamp last_stamp_;
-  Duration last_period_{};
-  std::array<SourcePose, Sweep::kMaxSources> last_sources_;
   Pose T_odom_last_;
   Vector6 twist_base_ = Vector6::Zero();
   Pose T_odom_keyframe_;
   std::optional<Matrix6> keyframe_observability_; ///< of the last sweep, if the map is still to take it in
   PoseUncertainty uncertainty_;
   Vector6 askew_variance_ = Vector6::Zero(); ///< of the last sweep, base axes
-  std::vector<GyroBias> gyro_biases_;
-  std::vector<GyroScale> gyro_scales_;
   Standstill standstill_;
   int refused_in_a_row_ = 0; ///< sweeps with points
   bool lacks_prior_ = false; ///< the last sweep had to be registered with the one before it
