@@ -1,12 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# run.sh SECONDS [TARGET]...: fuzzes each target (all of them, if none is named) for so long, one after the other, and
-# leaves in corpus/TARGET/ the fewest inputs that reach all the code that any input reached.
-#
-# A target is tests/fuzz/TARGET.cpp with libFuzzer's entry, so AFL++ takes it as it is:
-#   cmake -B build/afl -DCMAKE_C_COMPILER=afl-clang-fast -DCMAKE_CXX_COMPILER=afl-clang-fast++ \
-#     -DCMAKE_CXX_FLAGS=-fsanitize=address -DLOCUS_COMPARE_WITH_PCL=OFF && cmake --build build/afl --target fuzz_targets
-#   afl-fuzz -i tests/fuzz/corpus/TARGET -o build/afl/found -- build/afl/bin/fuzz_TARGET
+# run.sh MINUTES [TARGET]...: fuzzes each target (all of them, if none is named), one after the other, until so many
+# minutes of CPU found no new way through the code, and leaves in corpus/TARGET/ the fewest inputs that reach all that any
+# input reached. Called again, it goes on with what was found. afl.sh does the same with AFL++.
 #
 # An input that breaks something is kept in build/fuzz/broken/, the reason in build/fuzz/log/TARGET:
 #   build/fuzz/bin/fuzz_TARGET FILE                                    runs it again, with the trace
@@ -15,7 +11,7 @@
 # tests feeds it. Where the form of the input of a target has changed, seeds.py makes new ones.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
-seconds=$1
+asked_s=$(($1 * 60))
 shift
 targets=("$@")
 [[ ${#targets[@]} -gt 0 ]] || mapfile -t targets < <(basename -s .cpp -a tests/fuzz/*.cpp)
@@ -24,19 +20,32 @@ cmake --preset fuzz --log-level=WARNING
 cmake --build --preset fuzz
 build=$PWD/build/fuzz
 mkdir -p "$build/log" "$build/broken"
+
+last() { grep -aoP "$1" "$log" | tail -n 1; }
+
 for target in "${targets[@]}"; do
-  corpus=tests/fuzz/corpus/$target found=$build/found/$target merged=$build/merged/$target
+  corpus=tests/fuzz/corpus/$target found=$build/found/$target merged=$build/merged/$target log=$build/log/$target
   mkdir -p "$corpus" "$found"
   seeds=("$corpus")
   [[ ! -d tests/fuzz/mended/$target ]] || seeds+=("tests/fuzz/mended/$target")
   fuzzer=("$build/bin/fuzz_$target" -timeout=10 "-artifact_prefix=$build/broken/$target-")
-  if "${fuzzer[@]}" "-max_total_time=$seconds" -print_final_stats=1 "$found" "${seeds[@]}" \
-    &> "$build/log/$target"; then
-    echo "$target: $(grep -a DONE "$build/log/$target")"
-  else
-    echo "$target: $(grep -aE 'runtime error|ERROR' "$build/log/$target" | head -n 1), see $build/log/$target"
-  fi
+
+  inputs=0 edges=0 at_first= quiet_s=0 round=0
+  while ((quiet_s < asked_s)); do
+    TIMEFORMAT=%0U
+    if ! cpu_s=$({ time "${fuzzer[@]}" -max_total_time=300 -print_final_stats=1 "$found" "${seeds[@]}" &>"$log"; } 2>&1); then
+      echo "$target: $(grep -aE 'runtime error|ERROR' "$log" | head -n 1), see $log"
+      break
+    fi
+    inputs=$((inputs + $(last 'number_of_executed_units: \K\d+')))
+    reached=$(last 'cov: \K\d+')
+    : "${at_first:=$(grep -aoP 'INITED cov: \K\d+' "$log")}"
+    if ((reached > edges && (round > 0 || reached > at_first))); then quiet_s=0; else quiet_s=$((quiet_s + cpu_s)); fi
+    edges=$((reached > edges ? reached : edges)) round=$((round + 1))
+    echo "$target: $inputs inputs, $edges edges ($at_first at first), none of them new for $((quiet_s / 60)) minutes of CPU"
+  done
+
   rm -rf "$merged" && mkdir -p "$merged"
-  "${fuzzer[@]}" -set_cover_merge=1 -use_counters=0 -max_len=8192 "$merged" "$corpus" "$found" &>> "$build/log/$target"
+  "${fuzzer[@]}" -set_cover_merge=1 -use_counters=0 -max_len=8192 "$merged" "$corpus" "$found" &>> "$log"
   rm -f "$corpus"/* && cp "$merged"/* "$corpus"
 done
