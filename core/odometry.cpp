@@ -22,6 +22,13 @@ constexpr double kMaxDeviation_sigma = 8.0;
 constexpr double kAlwaysAllowed_m = 0.5;
 constexpr double kAlwaysAllowed_rad = 0.1;
 
+/// No place changes so fast that from one sweep to the next less than this part of the usual counterparts is left: the
+/// air is full of dust, or the lidar measures otherwise than before. Such a sweep is not for the map, and may
+/// contradict the motion sources by no more than this. (The worst of honest drives is 0.78; in dust, 2.2 sigma.)
+constexpr double kLeastOfUsual = 0.5;
+constexpr double kLoneDeviation_sigma = 3.0;
+constexpr double kMemoryOfShare_sweeps = 10.0;
+
 /// After so many refusals in a row the submap is behind us, and the map goes on from the prediction.
 constexpr int kRefusalsToRestart = 10;
 
@@ -80,7 +87,8 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
   predict(prior);
   estimate.scan_to_submap = match_submap(prior, T_last_now, stop);
   const Pose T_last_submap = T_odom_last_.inverse() * estimate.scan_to_submap.T_target_source;
-  estimate.failed = !trusts(estimate.scan_to_submap, T_last_submap, prior.T_last_now, variance_against_submap());
+  estimate.failed = !trusts(estimate.scan_to_submap, T_last_submap, prior.T_last_now, variance_against_submap()) ||
+                    is_outvoted(estimate.scan_to_submap, T_last_submap, prior);
   estimate.T_odom_base = T_odom_last_ * (estimate.failed ? flatten(T_last_now, Matrix6::Zero())
                                                          : flatten(T_last_submap, estimate.scan_to_submap.information));
   hold_still(sweep, estimate);
@@ -278,13 +286,30 @@ Pose Odometry::flatten(const Pose& T_last_now, const Matrix6& information_odom) 
 
 bool Odometry::trusts(const Registration& registration, const Pose& T_last_now, const Pose& T_last_predicted,
                       const Vector6& variance) const {
-  if (registration.iterations == 0 || !T_last_now.finite() ||
-      static_cast<double>(registration.inliers) < kMinInlierShare * static_cast<double>(registered_))
+  if (registration.iterations == 0 || !T_last_now.finite() || share_of_inliers(registration) < kMinInlierShare)
     return false;
   Vector6 allowed;
   allowed << Eigen::Vector3d::Constant(kAlwaysAllowed_m), Eigen::Vector3d::Constant(kAlwaysAllowed_rad);
   allowed = allowed.cwiseMax(kMaxDeviation_sigma * variance.cwiseSqrt());
   return (difference(T_last_now, T_last_predicted).cwiseAbs().array() <= allowed.array()).all();
+}
+
+/// Whether the motion sources know better than what is left of the counterparts. After a time without lidar they do
+/// not.
+bool Odometry::is_outvoted(const Registration& registration, const Pose& T_last_now, const MotionPrior& prior) const {
+  const bool had_sight = !adrift_ || refused_in_a_row_ > 0;
+  if (prior.source.translation < 0 || !had_sight || !misses_most(registration))
+    return false;
+  const Vector6 deviation = difference(T_last_now, prior.T_last_now).cwiseAbs();
+  return (deviation.array() > kLoneDeviation_sigma * variance_against_submap().cwiseSqrt().array()).any();
+}
+
+bool Odometry::misses_most(const Registration& registration) const {
+  return share_of_inliers(registration) < kLeastOfUsual * usual_share_;
+}
+
+double Odometry::share_of_inliers(const Registration& registration) const {
+  return static_cast<double>(registration.inliers) / static_cast<double>(registered_);
 }
 
 /// A sweep that the map is to take in.
@@ -293,9 +318,9 @@ void Odometry::choose_keyframe(OdometryEstimate& estimate) {
   const double turned_deg = angle_rad(T_keyframe_base.rotation) / kRadPerDeg;
   const bool moved =
       T_keyframe_base.translation.norm() > options_.map.keyframe_m || turned_deg > options_.map.keyframe_deg;
-  const bool first = processed_ == 0;
+  const bool takes_in = !estimate.failed && (processed_ == 0 || (moved && !misses_most(estimate.scan_to_submap)));
   const bool restarts = refused_in_a_row_ >= kRefusalsToRestart && scan_.size() >= kMinPoints;
-  if ((estimate.failed && !restarts) || !(moved || first || restarts))
+  if (!takes_in && !restarts)
     return;
   estimate.T_odom_base.rotation =
       (so3_exp(tilt_keeper_.take_correction_rad()) * estimate.T_odom_base.rotation).normalized();
@@ -331,6 +356,8 @@ void Odometry::hold_still(const Sweep& sweep, OdometryEstimate& estimate) {
 /// What a registered sweep says of itself, of its prior and of the motion sources.
 void Odometry::settle(const Sweep& sweep, const MotionPrior& prior, OdometryEstimate& estimate) {
   const Pose T_last_now = T_odom_last_.inverse() * estimate.T_odom_base;
+  const double share = share_of_inliers(estimate.scan_to_submap);
+  usual_share_ = processed_ == 1 ? share : usual_share_ + (share - usual_share_) / kMemoryOfShare_sweeps;
   uncertainty_.see(estimate.scan_to_submap.information);
   observe(estimate);
   if (adrift_) // the way back to the submap is no motion of the robot
@@ -397,10 +424,12 @@ void Odometry::finish(const Sweep& sweep, const MotionPrior& prior, OdometryEsti
       .from = sensors_.last_stamp(), .to = sweep.end, .opinions = {}, .twist_base = Vector6::Zero(), .sees = {}};
   if (estimate.failed)
     estimate.state = TrackingState::dead_reckoning;
-  if (processed_ > 0 && estimate.failed)
+  if (processed_ > 0 && estimate.failed) {
+    sensors_.judge_blind(sweep);
     move_on(T_odom_last_.inverse() * estimate.T_odom_base, covariance_of(prior), estimate);
-  else if (processed_ > 0)
+  } else if (processed_ > 0) {
     settle(sweep, prior, estimate);
+  }
   estimate.pose_covariance = uncertainty_.since_start();
   adrift_ = estimate.failed;
   tilt_keeper_.observe(estimate.T_odom_base.rotation, gravity_.up_base());

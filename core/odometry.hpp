@@ -77,6 +77,10 @@ class Odometry {
   [[nodiscard]] Vector6 variance_against_submap() const;
   [[nodiscard]] bool trusts(const Registration& registration, const Pose& T_last_now, const Pose& T_last_predicted,
                             const Vector6& variance) const;
+  [[nodiscard]] bool is_outvoted(const Registration& registration, const Pose& T_last_now,
+                                 const MotionPrior& prior) const;
+  [[nodiscard]] bool misses_most(const Registration& registration) const;
+  [[nodiscard]] double share_of_inliers(const Registration& registration) const;
   [[nodiscard]] std::span<const SurfacePoint> registered() const { return std::span(scan_).first(registered_); }
   [[nodiscard]] bool needs_scan_to_scan(const MotionPrior& prior) const;
   void map_last_scan(std::size_t points);
@@ -116,6 +120,7 @@ class Odometry {
   PoseUncertainty uncertainty_;
   Vector6 askew_variance_ = Vector6::Zero(); ///< of the last sweep, base axes
   Standstill standstill_;
+  double usual_share_ = 0.0; ///< of the registered points that find a counterpart
   int refused_in_a_row_ = 0; ///< sweeps with points
   bool lacks_prior_ = false; ///< the last sweep had to be registered with the one before it
   bool adrift_ = false;      ///< the last sweep was a prediction

@@ -24,6 +24,9 @@ const PriorExpectation kInertialUnit{.sigma = along_each_axis(0.3, 0.1),
                                      .least_sigma = along_each_axis(0.002, 0.02)};
 const Vector6 kUnknownMotion = along_each_axis(3.0, 10.0); ///< per sweep, of a robot of which nothing is known
 
+/// So many sweeps of lidar tell more of a gyro than wheels ever do.
+constexpr int kTaught_sweeps = 100;
+
 } // namespace
 
 SensorIntegration::SensorIntegration(const OdometryOptions& options)
@@ -100,6 +103,7 @@ bool SensorIntegration::saw_motion(const Sweep& sweep) const {
 std::array<LidarOpinion, Sweep::kMaxSources> SensorIntegration::judge(const Sweep& sweep, const MotionPrior& prior,
                                                                       const SeenMotion& found, const SeenAxes& axes) {
   std::array<LidarOpinion, Sweep::kMaxSources> opinions{};
+  judged_sweeps_ = std::min(judged_sweeps_ + 1, kTaught_sweeps);
   Matrix6 information = axes.rows_of(found.information);
   for (std::size_t i = 0; i < sources_.size(); ++i) {
     const std::optional<Pose> T_last_predicted = step(sweep, i);
@@ -128,6 +132,22 @@ std::array<LidarOpinion, Sweep::kMaxSources> SensorIntegration::judge(const Swee
   }
   constant_velocity_statistics_.learn(difference(found.T_last_now, prior.T_last_kept), information);
   return opinions;
+}
+
+void SensorIntegration::judge_blind(const Sweep& sweep) {
+  if (judged_sweeps_ >= kTaught_sweeps)
+    return;
+  const auto turn = [&](std::size_t i) -> std::optional<Eigen::Vector3d> {
+    const std::optional<Pose> T_last_now = sweep.sources[i].usable ? step(sweep, i) : std::nullopt;
+    return T_last_now ? std::optional{so3_log(T_last_now->rotation)} : std::nullopt;
+  };
+  std::optional<Eigen::Vector3d> true_turn_rad;
+  for (std::size_t i = 0; i < sources_.size() && !true_turn_rad; ++i)
+    if (sources_[i].kind == SourceKind::odometry)
+      true_turn_rad = turn(i);
+  for (std::size_t i = 0; i < sources_.size() && true_turn_rad; ++i)
+    if (const auto turn_rad = sources_[i].kind == SourceKind::imu ? turn(i) : std::nullopt)
+      gyro_biases_[i].learn(*turn_rad - *true_turn_rad, *true_turn_rad, sweep.end - last_stamp_);
 }
 
 void SensorIntegration::remember(const Sweep& sweep) {

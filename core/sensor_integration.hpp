@@ -55,6 +55,10 @@ class SensorIntegration {
   std::array<LidarOpinion, Sweep::kMaxSources> judge(const Sweep& sweep, const MotionPrior& prior,
                                                      const SeenMotion& found, const SeenAxes& axes);
 
+  /// In place of judge() where lidar found nothing: gyros that it has not taught yet learn what they read at rest from
+  /// the best odometry source.
+  void judge_blind(const Sweep& sweep);
+
   /// `sweep` has been processed: it is the last one now.
   void remember(const Sweep& sweep);
 
@@ -74,6 +78,7 @@ class SensorIntegration {
   PriorStatistics constant_velocity_statistics_;
   std::vector<GyroBias> gyro_biases_;
   std::vector<GyroScale> gyro_scales_;
+  int judged_sweeps_ = 0;
 };
 
 } // namespace locus
