@@ -52,6 +52,8 @@ class HealthMonitor {
   /// What is wrong with the source as a whole, in words for the user; empty if nothing is.
   [[nodiscard]] std::string_view verdict() const;
   [[nodiscard]] bool trusts_accelerometer() const;
+  /// When the last good sample arrived; Stamp{} before the first.
+  [[nodiscard]] Stamp last_heard() const { return last_arrival_; }
   /// The latest change since the last call; HealthEvent::source is left to the caller.
   std::optional<HealthEvent> take_event();
   [[nodiscard]] const SourceCounters& counters() const { return counters_; }

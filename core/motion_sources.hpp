@@ -67,6 +67,7 @@ class MotionSources {
   [[nodiscard]] bool healthy(std::size_t source) const { return sources_[source].health.healthy(); }
   /// What is wrong with a source as a whole, in words for the user; empty if nothing is.
   [[nodiscard]] std::string_view verdict(std::size_t source) const { return sources_[source].health.verdict(); }
+  [[nodiscard]] Stamp last_heard(std::size_t source) const { return sources_[source].health.last_heard(); }
   [[nodiscard]] const SourceCounters& counters(std::size_t source) const { return sources_[source].health.counters(); }
   [[nodiscard]] std::size_t size() const { return sources_.size(); }
 

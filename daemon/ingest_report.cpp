@@ -14,10 +14,14 @@ void IngestReport::read(const Ingest& ingest) {
                  .rotation_rate_rpm = decoder.model() ? decoder.rotation_rate_rpm() : 0.0,
                  .source_ip = lidar.source_ip(),
                  .refused_ip = lidar.refused_ip(),
+                 .last_heard = lidar.last_heard(),
                  .pps = lidar.position() ? lidar.position()->pps : velodyne::PpsState::absent};
   }
   for (std::size_t i = 0; i < ingest.sources().size(); ++i)
-    sources[i] = {ingest.sources().counters(i), ingest.sources().healthy(i), ingest.sources().verdict(i)};
+    sources[i] = {.counters = ingest.sources().counters(i),
+                  .healthy = ingest.sources().healthy(i),
+                  .last_heard = ingest.sources().last_heard(i),
+                  .verdict = ingest.sources().verdict(i)};
   sweeps = ingest.sweeps().counters();
 }
 

@@ -22,11 +22,13 @@ struct IngestReport {
     double rotation_rate_rpm = 0.0;
     std::optional<std::uint32_t> source_ip;  ///< host byte order
     std::optional<std::uint32_t> refused_ip; ///< LidarInput::refused_ip()
+    Stamp last_heard;                        ///< LidarInput::last_heard()
     velodyne::PpsState pps = velodyne::PpsState::absent;
   };
   struct Source {
     SourceCounters counters;
     bool healthy = false;
+    Stamp last_heard;         ///< HealthMonitor::last_heard()
     std::string_view verdict; ///< text that lives for ever; see HealthMonitor
   };
 

@@ -53,6 +53,9 @@ class LidarInput {
   /// Who sent the last packet of a lidar that was refused for its sender.
   [[nodiscard]] std::optional<std::uint32_t> refused_ip() const { return refused_ip_; }
 
+  /// When the last packet that was taken arrived; Stamp{} before the first.
+  [[nodiscard]] Stamp last_heard() const { return last_heard_; }
+
   [[nodiscard]] const LidarOptions& options() const { return options_; }
   [[nodiscard]] const PacketCounters& counters() const { return counters_; }
   [[nodiscard]] const velodyne::Decoder& decoder() const { return decoder_; }

@@ -81,7 +81,7 @@ done | sort -u | jq --raw-input --slurp --sort-keys --arg package "$package" --a
   def id: "SPDXRef-Package-" + gsub("[^A-Za-z0-9.-]"; "-");
   def described: {downloadLocation: "NOASSERTION", filesAnalyzed: false, copyrightText: "NOASSERTION",
                   licenseConcluded: "NOASSERTION"};
-  [split("\n")[] | select(. != "") | split("\t") | {relation: .[0], name: .[1], version: .[2], arch: .[3], library: .[4]}] as $parts |
+  [split("\n")[] | select(. != "") | split("\t") | {relation: .[0], name: .[1], version: .[2], arch: .[3], shared_object: .[4]}] as $parts |
   {
     spdxVersion: "SPDX-2.3", dataLicense: "CC0-1.0", SPDXID: "SPDXRef-DOCUMENT",
     name: "\($package)_\($version)_\($arch)",
@@ -91,7 +91,7 @@ done | sort -u | jq --raw-input --slurp --sort-keys --arg package "$package" --a
       + ($parts | group_by(.name) | map({
           SPDXID: (.[0].name | id), name: .[0].name, versionInfo: .[0].version, licenseDeclared: "NOASSERTION",
           supplier: "Organization: Debian",
-          comment: ([.[].library | select(. != "")] | unique | join(" ")),
+          comment: ([.[].shared_object | select(. != "")] | unique | join(" ")),
           externalRefs: [{referenceCategory: "PACKAGE-MANAGER", referenceType: "purl",
             referenceLocator: "pkg:deb/debian/\(.[0].name)@\(.[0].version | @uri)?arch=\(.[0].arch)"}]} + described
         | if .comment == "" then del(.comment) else . end))),

@@ -66,10 +66,10 @@ std::optional<std::string> set_security(dds_qos_t* qos, const std::string& folde
   for (const auto& [kind, library, suffix] : {std::array{"auth", "dds_security_auth", "authentication"},
                                               std::array{"access", "dds_security_ac", "access_control"},
                                               std::array{"crypto", "dds_security_crypto", "crypto"}}) {
-    const std::string prefix = fmt::format("dds.sec.{}.library.", kind);
-    dds_qset_prop(qos, (prefix + "path").c_str(), library);
-    dds_qset_prop(qos, (prefix + "init").c_str(), fmt::format("init_{}", suffix).c_str());
-    dds_qset_prop(qos, (prefix + "finalize").c_str(), fmt::format("finalize_{}", suffix).c_str());
+    const std::string prefix = fmt::format("dds.sec.{}.", kind);
+    dds_qset_prop(qos, (prefix + "library.path").c_str(), library);
+    dds_qset_prop(qos, (prefix + "library.init").c_str(), fmt::format("init_{}", suffix).c_str());
+    dds_qset_prop(qos, (prefix + "library.finalize").c_str(), fmt::format("finalize_{}", suffix).c_str());
   }
   for (const auto& [property, name] : kEnclave) {
     const std::string file = folder + "/" + name;

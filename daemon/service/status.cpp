@@ -25,6 +25,13 @@ constexpr std::array<std::string_view, 4> kPpsNames{"absent", "synchronizing", "
 /// Estimates older than this say nothing about now.
 constexpr Duration kStale = std::chrono::seconds{2};
 
+/// Milliseconds since then; null for never.
+ordered_json ms_since(Stamp then) {
+  if (then == Stamp{})
+    return nullptr;
+  return rounded(1e3 * to_seconds(Stamp{read_clock(CLOCK_REALTIME)} - then));
+}
+
 ordered_json lidar_json(const LidarOptions& options, const IngestReport::Lidar& lidar) {
   const auto text_or_null = [](const auto& value, const auto& to_text) {
     return value ? ordered_json(to_text(*value)) : ordered_json(nullptr);
@@ -35,6 +42,7 @@ ordered_json lidar_json(const LidarOptions& options, const IngestReport::Lidar& 
           {"model", text_or_null(lidar.model, [](auto m) { return std::string{velodyne::to_string(m)}; })},
           {"return_mode", text_or_null(lidar.return_mode, [](auto m) { return std::string{velodyne::to_string(m)}; })},
           {"rpm", rounded(lidar.rotation_rate_rpm)},
+          {"heard_ms_ago", ms_since(lidar.last_heard)},
           {"pps", kPpsNames[static_cast<std::size_t>(lidar.pps) % kPpsNames.size()]}};
 }
 
@@ -76,6 +84,7 @@ ordered_json sources_json(const Config& config, const LiveFigures::Snapshot& fig
     const IngestReport::Source& source = figures.ingest.sources[i];
     ordered_json json = to_json(source.counters, figures.used_sweeps[i]);
     json["health"] = source.healthy ? "healthy" : source.counters.received == 0 ? "never heard" : "lost";
+    json["heard_ms_ago"] = ms_since(source.last_heard);
     json["verdict"] = source.verdict;
     json["writers"] = link.sources[i].writers;
     json["refused"] = link.sources[i].refused;
@@ -94,7 +103,7 @@ void add_estimate(const LiveFigures::Snapshot& figures, ordered_json& json) {
   const Eigen::Vector3d& p = last.T_odom_base.translation;
   const Eigen::Vector3d rpy_deg = to_rpy_rad(last.T_odom_base.rotation) / kRadPerDeg;
   json["state"] = to_string(last.state);
-  json["age_ms"] = rounded(1e3 * to_seconds(Stamp{read_clock(CLOCK_REALTIME)} - last.stamp));
+  json["age_ms"] = ms_since(last.stamp);
   json["t_ns"] = to_ns(last.stamp);
   json["pose"] = {{"xyz_m", {p.x(), p.y(), p.z()}}, {"rpy_deg", {rpy_deg.x(), rpy_deg.y(), rpy_deg.z()}}};
   std::vector<double> covariance;

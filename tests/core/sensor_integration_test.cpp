@@ -8,8 +8,8 @@
 namespace locus {
 namespace {
 
-constexpr int kImu = 0, kWheels = 1;
-constexpr Duration kSweep = std::chrono::milliseconds{100};
+constexpr int kGyro = 0, kWheelOdometry = 1;
+constexpr Duration kPerSweep = std::chrono::milliseconds{100};
 
 OdometryOptions with_imu_and_wheels() {
   OdometryOptions options;
@@ -22,9 +22,9 @@ Vector6 twist(double forward_mps, double yaw_radps) {
   return (Vector6{} << forward_mps, 0, 0, 0, 0, yaw_radps).finished();
 }
 Pose motion(double forward_mps, double yaw_radps) {
-  return se3_exp(to_seconds(kSweep) * twist(forward_mps, yaw_radps));
+  return se3_exp(to_seconds(kPerSweep) * twist(forward_mps, yaw_radps));
 }
-double yaw_radps(const MotionPrior& prior) { return so3_log(prior.T_last_now.rotation).z() / to_seconds(kSweep); }
+double yaw_radps(const MotionPrior& prior) { return so3_log(prior.T_last_now.rotation).z() / to_seconds(kPerSweep); }
 
 /// What a lidar that sees all axes well found.
 SeenMotion seen(const Pose& T_last_now) {
@@ -38,9 +38,9 @@ class Sources {
 
   Sweep next(const Pose& imu, const Pose& wheels) {
     sweep_.start = sweep_.end;
-    sweep_.end += kSweep;
-    add(kImu, imu);
-    add(kWheels, wheels);
+    sweep_.end += kPerSweep;
+    add(kGyro, imu);
+    add(kWheelOdometry, wheels);
     return sweep_;
   }
 
@@ -69,20 +69,20 @@ TEST_F(SensorIntegrationTest, TheGyroTurnsAndTheWheelsMove) {
   const MotionPrior prior = sensors.integrate(sources.next(motion(0, 0.5), motion(1, 0.3)), std::nullopt);
   EXPECT_NEAR(yaw_radps(prior), 0.5, 1e-9);
   EXPECT_NEAR(prior.T_last_now.translation.x(), 0.1, 1e-3);
-  EXPECT_EQ(prior.source.rotation, kImu);
-  EXPECT_EQ(prior.source.translation, kWheels);
+  EXPECT_EQ(prior.source.rotation, kGyro);
+  EXPECT_EQ(prior.source.translation, kWheelOdometry);
   EXPECT_FALSE(prior.blind);
 }
 
 TEST_F(SensorIntegrationTest, WithoutTheGyroTheWheelsDoBoth) {
-  const MotionPrior prior = sensors.integrate(sources.next(motion(0, 0.5), motion(1, 0.3)), std::nullopt, kImu);
+  const MotionPrior prior = sensors.integrate(sources.next(motion(0, 0.5), motion(1, 0.3)), std::nullopt, kGyro);
   EXPECT_NEAR(yaw_radps(prior), 0.3, 1e-9);
-  EXPECT_EQ(prior.source.rotation, kWheels);
+  EXPECT_EQ(prior.source.rotation, kWheelOdometry);
 }
 
 TEST_F(SensorIntegrationTest, WhatNobodySaysGoesOnAsBefore) {
   Sweep sweep = sources.next(motion(0, 0.5), motion(1, 0.3));
-  sweep.sources[kWheels].usable = false;
+  sweep.sources[kWheelOdometry].usable = false;
   const MotionPrior prior = sensors.integrate(sweep, twist(2, 0));
   EXPECT_NEAR(prior.T_last_now.translation.x(), 0.2, 1e-9);
   EXPECT_NEAR(yaw_radps(prior), 0.5, 1e-9);
@@ -93,8 +93,8 @@ TEST_F(SensorIntegrationTest, WhatNobodySaysGoesOnAsBefore) {
 
 TEST_F(SensorIntegrationTest, ASourceThatCameBackIsNotComparedWithWhatItWasBefore) {
   Sweep sweep = sources.next(motion(0, 0.5), motion(1, 0.3));
-  ++sweep.sources[kImu].spell;
-  EXPECT_EQ(sensors.integrate(sweep, std::nullopt).source.rotation, kWheels);
+  ++sweep.sources[kGyro].spell;
+  EXPECT_EQ(sensors.integrate(sweep, std::nullopt).source.rotation, kWheelOdometry);
 }
 
 TEST(SensorIntegration, AQueueTakesAllFromTheFirst) {
@@ -113,8 +113,8 @@ TEST(SensorIntegration, AQueueTakesAllFromTheFirst) {
 TEST_F(SensorIntegrationTest, LidarContradictsWhoIsFarOff) {
   const Sweep sweep = sources.next(motion(0, 0.3), motion(5, 0.3));
   const auto opinions = sensors.judge(sweep, sensors.integrate(sweep, std::nullopt), seen(motion(1, 0.3)), {});
-  EXPECT_EQ(opinions[kImu], LidarOpinion::agrees);
-  EXPECT_EQ(opinions[kWheels], LidarOpinion::disagrees);
+  EXPECT_EQ(opinions[kGyro], LidarOpinion::agrees);
+  EXPECT_EQ(opinions[kWheelOdometry], LidarOpinion::disagrees);
   EXPECT_EQ(opinions[2], LidarOpinion::none) << "there is no third";
 }
 

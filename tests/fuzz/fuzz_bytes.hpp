@@ -18,6 +18,7 @@ class FuzzBytes {
   FuzzBytes(const std::uint8_t* data, std::size_t size) : rest_(std::as_bytes(std::span{data, size})) {}
 
   [[nodiscard]] bool empty() const { return rest_.empty(); }
+  [[nodiscard]] std::span<const std::byte> rest() const { return rest_; }
 
   /// Overwrites as much of `target` as there are bytes for.
   void fill(std::span<std::byte> target) {

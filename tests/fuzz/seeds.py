@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """seeds.py FOLDER: writes a first corpus into FOLDER/TARGET/, one well-formed input for every form that is read."""
+import bz2
+import ctypes
 import pathlib
 import re
 import struct
@@ -160,3 +162,45 @@ write("ros_messages", "imu", turn)
 write("ros_messages", "both", turn + drive + struct.pack("<BHB", ODOMETRY | OUTSIDE, 9, 1))
 write("ros_messages", "own_clock", b"".join(struct.pack("<BHiIdddddd", STAMP | VECTORS, 5000, 5, i * 5_000_000, i, 0, 0, 0, 0, 9.81)
                                            for i in range(9)) + struct.pack("<BHI", ARRIVAL, 1, 7))
+
+# Bags of ROS 1, and the messages in them: ROS 1's numbers lie close together, CDR's are aligned behind four bytes.
+
+
+def text(value):
+    return struct.pack("<I", len(value)) + value
+
+
+def record(op, data=b"", **fields):
+    header = text(b"op=" + bytes([op])) + b"".join(text(name.encode() + b"=" + value) for name, value in fields.items())
+    return text(header) + text(data)
+
+
+def lz4(data):
+    library = ctypes.CDLL("liblz4.so.1")
+    library.LZ4F_compressFrame.restype = ctypes.c_size_t
+    out = ctypes.create_string_buffer(len(data) + 1000)
+    return out.raw[:library.LZ4F_compressFrame(out, len(out), data, len(data), None)]
+
+
+def connection(number, topic, kind):
+    return record(7, text(b"topic=" + topic) + text(b"type=" + kind), conn=struct.pack("<I", number), topic=topic)
+
+
+STAMP_AND_FRAME = struct.pack("<II", 1_700_000_000, 5) + text(b"base")
+BODIES = [struct.pack("<37d", *range(37)), text(b"odom") + struct.pack("<85d", *range(85)),
+          struct.pack("<III", 1, 1_700_000_000, 7) + data_packet(0x22, 0x37, 1, 110592)]
+ros1 = [struct.pack("<I", 1) + STAMP_AND_FRAME + body for body in BODIES]
+cdr_head = struct.pack("<4BIII5s3x", 0, 1, 0, 0, 1_700_000_000, 5, 5, b"base")
+cdr = [cdr_head + bytes(4) + BODIES[0], cdr_head + struct.pack("<I5s3x", 5, b"odom") + BODIES[1][8:], cdr_head + BODIES[2]]
+for kind in range(3):
+    write("bag_messages", f"ros1_{kind}", bytes([2 * kind]) + ros1[kind])
+    write("bag_messages", f"cdr_{kind}", bytes([2 * kind + 1]) + cdr[kind])
+topics = connection(0, b"/imu", b"sensor_msgs/Imu") + connection(1, b"/scan", b"velodyne_msgs/VelodyneScan")
+messages = b"".join(record(2, ros1[kind], conn=struct.pack("<I", number), time=struct.pack("<II", 1_700_000_001, 9))
+                    for number, kind in ((0, 0), (0, 0), (1, 2)))
+for name, compress in (("none", bytes), ("lz4", lz4), ("bz2", bz2.compress)):
+    chunk = record(5, compress(topics + messages), compression=name.encode(), size=struct.pack("<I", len(topics + messages)))
+    bag = b"#ROSBAG V2.0\n" + record(3, index_pos=bytes(8), conn_count=struct.pack("<I", 2), chunk_count=struct.pack("<I", 1))
+    closed = bag.replace(b"index_pos=" + bytes(8), b"index_pos=" + struct.pack("<Q", len(bag + chunk)))
+    write("bags", name, bag + chunk)
+    write("bags", f"{name}_closed", closed + chunk + topics + record(6, struct.pack("<II", 0, 2), count=struct.pack("<I", 2)))

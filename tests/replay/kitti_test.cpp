@@ -28,9 +28,9 @@ constexpr int kRings = 64;
 constexpr Duration kPeriod = milliseconds{100};
 
 std::string time_text(Stamp stamp) {
-  const auto seconds = std::chrono::floor<std::chrono::seconds>(stamp.time_since_epoch());
-  return fmt::format("{:%Y-%m-%d %H:%M:%S}.{:09}\n", fmt::gmtime(static_cast<std::time_t>(seconds.count())),
-                     (stamp.time_since_epoch() - seconds).count());
+  const auto whole_seconds = std::chrono::floor<std::chrono::seconds>(stamp.time_since_epoch());
+  return fmt::format("{:%Y-%m-%d %H:%M:%S}.{:09}\n", fmt::gmtime(static_cast<std::time_t>(whole_seconds.count())),
+                     (stamp.time_since_epoch() - whole_seconds).count());
 }
 
 /// `clockwise_rad` 0 in front.

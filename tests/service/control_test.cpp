@@ -102,6 +102,13 @@ TEST_F(Control, WatchWithoutATerminalIsWrongUsage) {
   EXPECT_EQ(run.out, "");
 }
 
+TEST_F(Control, StatusTellsWhoWasNeverHeard) {
+  Child daemon(locusd(config()));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  EXPECT_TRUE(status()["lidars"].front()["heard_ms_ago"].is_null());
+  EXPECT_NE(ctl({"status"}).out.find("never"), std::string::npos);
+}
+
 TEST_F(Control, StrangersMayLookAndNotTouch) {
   if (geteuid() != 0)
     GTEST_SKIP() << "no second user to be: run as root";
