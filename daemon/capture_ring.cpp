@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/capture_ring.hpp"
 
+#include <cerrno>
 #include <ctime>
 #include <system_error>
 #include <utility>
 
+#include <fcntl.h>
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "drivers/capture_folder.hpp"
 
@@ -40,6 +43,18 @@ std::string cannot(const char* what, const path& where, const std::error_code& e
 CaptureRing::CaptureRing(path folder, std::uint64_t max_bytes) : folder_(std::move(folder)), max_bytes_(max_bytes) {}
 
 std::uint64_t CaptureRing::piece_bytes() const { return max_bytes_ / kPieces - kBlocksOfPiece * kBlockBytes; }
+
+std::optional<std::string> CaptureRing::obstacle() const {
+  std::error_code error;
+  path there = std::filesystem::absolute(folder_, error);
+  while (!std::filesystem::exists(there, error) && there.has_relative_path())
+    there = there.parent_path();
+  if (!std::filesystem::is_directory(there, error))
+    return cannot("cannot be made", folder_, std::make_error_code(std::errc::not_a_directory));
+  if (faccessat(AT_FDCWD, there.c_str(), W_OK, AT_EACCESS) != 0)
+    return cannot("cannot be written to", there, {errno, std::generic_category()});
+  return std::nullopt;
+}
 
 /// What other runs have left behind.
 std::optional<std::string> CaptureRing::look() {

@@ -23,6 +23,8 @@ class CaptureRing {
   /// Looks at the disk with the first piece.
   CaptureRing(std::filesystem::path folder, std::uint64_t max_bytes);
 
+  /// What is sure to stand in the way of a piece, in one line for the user. Makes nothing.
+  [[nodiscard]] std::optional<std::string> obstacle() const;
   /// Makes room, and a folder for the next piece. Fails with one line for the user.
   Expected<std::filesystem::path, std::string> begin_piece(Stamp now);
   /// It is complete.

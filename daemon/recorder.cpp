@@ -60,6 +60,7 @@ Recorder::Status Recorder::status() const {
 void Recorder::run() {
   constexpr int kLeastPriority = 19;
   setpriority(PRIO_PROCESS, 0, kLeastPriority); // of this thread alone, on Linux
+  problem_ = disk_.obstacle().value_or("");     // before anything is lost by it
   while (!stopping_.load(std::memory_order_relaxed)) {
     wakeup_.wait_for(kRound);
     write_waiting();

@@ -207,13 +207,25 @@ TEST_F(Recording, FolderThatCannotBeMadeIsSaidOnceAndTheOdometryGoesOn) {
   std::ofstream{file("plain")} << "a file";
   Child daemon(locusd(recording(capture(), 10'000'000, "plain/record")));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
-  const Child play({LOCUS_PLAY, capture().string()});
   EXPECT_TRUE(daemon.wait_for_line("plain/record: cannot be made (Not a directory)", seconds{10}))
       << testing::PrintToString(daemon.lines());
+  const Child play({LOCUS_PLAY, capture().string()});
   EXPECT_TRUE(status_comes([](const auto& now) { return now["sweeps"]["processed"] > 10; }, seconds{10}));
   const nlohmann::json recording = status()["recording"];
   EXPECT_EQ(recording["recorded"], 0);
   EXPECT_GT(recording["dropped"], 1000);
+}
+
+TEST_F(Recording, DiskThatIsReadOnlyIsSaidBeforeAnythingComesIn) {
+  if (unshare(CLONE_NEWNS) != 0 || mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0)
+    GTEST_SKIP() << "no mounts of one's own: run as root, or allow user namespaces";
+  const std::filesystem::path disk = file("disk");
+  std::filesystem::create_directory(disk);
+  ASSERT_EQ(mount("disk", disk.c_str(), "tmpfs", MS_RDONLY, nullptr), 0);
+  Child daemon(locusd(recording(capture(), 10'000'000, disk)));
+  EXPECT_TRUE(daemon.wait_for_line("disk: cannot be written to (Read-only file system)", seconds{10}))
+      << testing::PrintToString(daemon.lines());
+  umount2(disk.c_str(), MNT_DETACH);
 }
 
 } // namespace
