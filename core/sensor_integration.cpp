@@ -25,7 +25,7 @@ const PriorExpectation kInertialUnit{.sigma = along_each_axis(0.3, 0.1),
 const Vector6 kUnknownMotion = along_each_axis(3.0, 10.0); ///< per sweep, of a robot of which nothing is known
 
 /// So many sweeps of lidar tell more of a gyro than wheels ever do.
-constexpr int kTaught_sweeps = 100;
+constexpr int kTaught_sweeps = 20;
 
 } // namespace
 

@@ -12,6 +12,7 @@
 #include "bag_writer.hpp"
 #include "bags/bag.hpp"
 #include "bags/messages.hpp"
+#include "bags/ros1_record.hpp"
 #include "daemon/dds/ros_messages.hpp"
 #include "support/errors.hpp"
 #include "synthetic_robot.hpp"
@@ -21,6 +22,7 @@ namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
+using namespace std::string_literals;
 
 const std::vector<RecordedMessage>& room_messages(RosVersion ros) {
   static const std::vector<RecordedMessage> ros1 = messages_of(room_drive(), RosVersion::ros1),
@@ -351,6 +353,16 @@ TEST_F(BadBag, ScansThatAreCutShort) {
   const ProgramRun run = run_program(LOCUS_REPLAY, {"-o", folder_ / "out", folder_ / "a.bag"});
   EXPECT_EQ(run.status, 1);
   expect_line(run.err, {"1 of 1 messages", "cut short", "no whole packet in 1 messages"});
+}
+
+TEST(BagChunk, WithNothingToDecompressIsDamaged) {
+  for (const char* compression : {"lz4", "bz2"}) {
+    const std::string fields = "\x0f\0\0\0compression="s + compression + "\x09\0\0\0size=\x10\0\0\0"s;
+    std::vector<std::byte> chunk;
+    EXPECT_EQ(tools::decompress_chunk({tools::BagFields(std::as_bytes(std::span(fields))), {}}, chunk),
+              "a chunk is damaged")
+        << compression;
+  }
 }
 
 /// What a message claims is never believed beyond its end.

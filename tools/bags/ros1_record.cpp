@@ -26,8 +26,8 @@ std::optional<Bytes> take_block(Bytes& bytes) {
 }
 
 bool decompress_bzip2(Bytes in, std::span<std::byte> out) {
-  std::vector<char> source(in.size()); // bzip2 knows no const
-  std::memcpy(source.data(), in.data(), in.size());
+  const auto* begin = reinterpret_cast<const char*>(in.data());
+  std::vector<char> source(begin, begin + in.size()); // bzip2 knows no const
   auto size = static_cast<unsigned>(out.size());
   return BZ2_bzBuffToBuffDecompress(reinterpret_cast<char*>(out.data()), &size, source.data(),
                                     static_cast<unsigned>(source.size()), 0, 0) == BZ_OK &&
