@@ -50,9 +50,9 @@ TEST_F(EndToEnd, LiveOdometryIsThatOfTheReplayForCycloneAndForFastDds) {
   EXPECT_EQ(status["sweeps"]["failed"].get<int>() + status["sweeps"]["processed"].get<int>(), status["sweeps"]["seen"]);
   EXPECT_EQ(status["packets"]["kernel_drops"], 0);
   EXPECT_EQ(status["packets"]["total"]["lost"], 0);
-  for (const char* heard : {"/lidars/front/heard_ms_ago", "/sources/wio/heard_ms_ago"}) {
-    EXPECT_GT(status.at(nlohmann::json::json_pointer(heard)), 300) << heard;
-    EXPECT_LT(status.at(nlohmann::json::json_pointer(heard)), 5000) << heard;
+  for (const nlohmann::json& heard : {status["lidars"].front(), status["sources"]["wio"]}) {
+    EXPECT_GT(heard["heard_ms_ago"], 300);
+    EXPECT_LT(heard["heard_ms_ago"], 5000);
   }
   const Replay replay({"--quiet", capture.string()});
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;

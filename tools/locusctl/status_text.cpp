@@ -58,20 +58,21 @@ std::string reasons(const Json& counters) {
   return text;
 }
 
-std::string heard_text(const Json& heard_ms_ago) {
-  return heard_ms_ago.is_null() ? "never" : fmt::format("{:.1f} s ago", 1e-3 * heard_ms_ago.get<double>());
+std::string silence_text(const Json& heard_ms_ago) {
+  return heard_ms_ago.is_null() ? "always" : fmt::format("{:.1f} s", 1e-3 * heard_ms_ago.get<double>());
 }
 
 std::string lidars_text(const Json& status) {
-  std::string text = fmt::format("\n{:<12}{:<12}{:>6}{:>10}{:>8}{:>9}{:>10}{:>13}  {}\n", "lidar", "model", "rpm",
-                                 "packets", "lost", "refused", "disorder", "heard", "pps");
+  std::string text = fmt::format("\n{:<10}{:<10}{:>5}{:>10}{:>8}{:>9}{:>10}{:>9}  {}\n", "lidar", "model", "rpm",
+                                 "packets", "lost", "refused", "disorder", "silent", "pps");
   for (const auto& [name, lidar] : status["lidars"].items()) {
     const Json& packets = status["packets"][name];
-    text += fmt::format(
-        "{:<12.11}{:<12}{:>6.0f}{:>10}{:>8}{:>9}{:>10}{:>13}  {}\n", name,
-        lidar["model"].is_string() ? lidar["model"].get<std::string>() : "unheard", lidar["rpm"].get<double>(),
-        packets["data"].get<std::uint64_t>(), packets["lost"].get<std::uint64_t>(), sum(packets["rejected"]),
-        packets["reordered"].get<std::uint64_t>(), heard_text(lidar["heard_ms_ago"]), lidar["pps"].get<std::string>());
+    text += fmt::format("{:<10.9}{:<10}{:>5.0f}{:>10}{:>8}{:>9}{:>10}{:>9}  {}\n", name,
+                        lidar["model"].is_string() ? lidar["model"].get<std::string>() : "unheard",
+                        lidar["rpm"].get<double>(), packets["data"].get<std::uint64_t>(),
+                        packets["lost"].get<std::uint64_t>(), sum(packets["rejected"]),
+                        packets["reordered"].get<std::uint64_t>(), silence_text(lidar["heard_ms_ago"]),
+                        lidar["pps"].get<std::string>());
     if (const std::string refused = reasons(packets["rejected"]); !refused.empty())
       text += fmt::format(
           "{:<12}refused: {}{}\n", "", refused,
@@ -83,13 +84,13 @@ std::string lidars_text(const Json& status) {
 std::string sources_text(const Json& status) {
   if (status["sources"].empty())
     return "";
-  std::string text = fmt::format("\n{:<12}{:<12}{:>12}{:>12}{:>12}{:>10}{:>13}\n", "source", "health", "samples",
-                                 "refused", "for sweeps", "changes", "heard");
+  std::string text = fmt::format("\n{:<12}{:<12}{:>12}{:>12}{:>12}{:>10}{:>9}\n", "source", "health", "samples",
+                                 "refused", "for sweeps", "changes", "silent");
   for (const auto& [name, source] : status["sources"].items()) {
-    text += fmt::format("{:<12.11}{:<12}{:>12}{:>12}{:>12}{:>10}{:>13}\n", name, source["health"].get<std::string>(),
+    text += fmt::format("{:<12.11}{:<12}{:>12}{:>12}{:>12}{:>10}{:>9}\n", name, source["health"].get<std::string>(),
                         source["received"].get<std::uint64_t>(), sum(source["rejected"]),
                         source["used_sweeps"].get<std::uint64_t>(), source["health_changes"].get<std::uint64_t>(),
-                        heard_text(source["heard_ms_ago"]));
+                        silence_text(source["heard_ms_ago"]));
     if (const std::string refused = reasons(source["rejected"]); !refused.empty())
       text += fmt::format("{:<12}refused: {}\n", "", refused);
     if (const std::string verdict = source["verdict"]; !verdict.empty())
