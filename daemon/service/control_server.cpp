@@ -34,6 +34,19 @@ std::vector<gid_t> groups_of(int client) {
   return groups;
 }
 
+/// The group of those who may command, looked up once a second at most: strangers may ask without end. For the main
+/// thread alone.
+std::optional<gid_t> commanders() {
+  static std::optional<gid_t> commanders;
+  static Duration looked_up = -std::chrono::hours{1};
+  if (const Duration now = read_clock(CLOCK_MONOTONIC); now - looked_up > std::chrono::seconds{1}) {
+    const group* const found = getgrnam("locusd"); // NOLINT(concurrency-mt-unsafe)
+    commanders = found != nullptr ? std::optional{found->gr_gid} : std::nullopt;
+    looked_up = now;
+  }
+  return commanders;
+}
+
 bool may_command(int client) {
   ucred peer{};
   socklen_t size = sizeof(peer);
@@ -41,11 +54,11 @@ bool may_command(int client) {
     return false;
   if (peer.uid == 0 || peer.uid == geteuid())
     return true;
-  const group* const allowed = getgrnam("locusd"); // NOLINT(concurrency-mt-unsafe): the main thread alone asks
-  if (allowed == nullptr)
+  const std::optional<gid_t> allowed = commanders();
+  if (!allowed)
     return false;
   const std::vector<gid_t> groups = groups_of(client);
-  return peer.gid == allowed->gr_gid || std::ranges::find(groups, allowed->gr_gid) != groups.end();
+  return peer.gid == *allowed || std::ranges::find(groups, *allowed) != groups.end();
 }
 
 Descriptor memory_file(std::span<const std::byte> bytes) {
