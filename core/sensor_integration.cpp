@@ -87,10 +87,14 @@ std::optional<Pose> SensorIntegration::step(const Sweep& sweep, std::size_t sour
   return T_last_now;
 }
 
+std::optional<Pose> SensorIntegration::healthy_step(const Sweep& sweep, std::size_t source) const {
+  return sweep.sources[source].usable ? step(sweep, source) : std::nullopt;
+}
+
 bool SensorIntegration::saw_motion(const Sweep& sweep) const {
   const double elapsed = elapsed_s(sweep);
   for (std::size_t i = 0; i < sources_.size(); ++i) {
-    const std::optional<Pose> T_last_now = sweep.sources[i].usable ? step(sweep, i) : std::nullopt;
+    const std::optional<Pose> T_last_now = healthy_step(sweep, i);
     if (T_last_now && (T_last_now->translation.norm() > kRest_mps * elapsed ||
                        angle_rad(T_last_now->rotation) > kRest_radps * elapsed))
       return true;
@@ -138,7 +142,7 @@ void SensorIntegration::judge_blind(const Sweep& sweep) {
   if (judged_sweeps_ >= kTaught_sweeps)
     return;
   const auto turn = [&](std::size_t i) -> std::optional<Eigen::Vector3d> {
-    const std::optional<Pose> T_last_now = sweep.sources[i].usable ? step(sweep, i) : std::nullopt;
+    const std::optional<Pose> T_last_now = healthy_step(sweep, i);
     return T_last_now ? std::optional{so3_log(T_last_now->rotation)} : std::nullopt;
   };
   std::optional<Eigen::Vector3d> true_turn_rad;

@@ -48,6 +48,7 @@ class SensorIntegration {
   [[nodiscard]] MotionPrior integrate(const Sweep& sweep, const std::optional<Vector6>& twist_base,
                                       int without = kNone) const;
 
+  /// Whether any healthy source says that the robot moved since the last processed sweep.
   [[nodiscard]] bool saw_motion(const Sweep& sweep) const;
 
   /// Compares what each source predicted with what lidar found, and a constant velocity with what both know: it has to
@@ -67,6 +68,7 @@ class SensorIntegration {
 
  private:
   [[nodiscard]] std::optional<Pose> step(const Sweep& sweep, std::size_t source) const;
+  [[nodiscard]] std::optional<Pose> healthy_step(const Sweep& sweep, std::size_t source) const;
 
   std::vector<MotionSourceOptions> sources_;
   Fusion fusion_;
@@ -78,7 +80,7 @@ class SensorIntegration {
   PriorStatistics constant_velocity_statistics_;
   std::vector<GyroBias> gyro_biases_;
   std::vector<GyroScale> gyro_scales_;
-  int judged_sweeps_ = 0;
+  int judged_sweeps_ = 0; ///< by lidar; no more are counted than judge_blind() asks for
 };
 
 } // namespace locus

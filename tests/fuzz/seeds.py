@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""seeds.py FOLDER: writes a first corpus into FOLDER/TARGET/, one well-formed input for every form that is read."""
+"""seeds.py FOLDER: writes a first corpus into FOLDER/TARGET/: one well-formed input for every form that is read, and each
+key of the configuration and each number of a motion file set to what makes no sense."""
 import bz2
 import ctypes
 import pathlib
@@ -112,6 +113,17 @@ for file in sorted((project / "config").glob("*.yaml")):
     for index, section in enumerate(re.split(r"\n(?=\w)", plain)):  # whole files are slow
         write("config", f"{file.stem}_{index}", section)
 write("config", "comma", ",lidars: []\n")
+ODD = ["-1", "0", "7", "1e400", ".nan", "true", "word", "[]", "[1, 2]", "[-1, 2, x]", "{}", "{x: 1}", "~", '""', "*a", "'"]
+for section in re.split(r"\n(?=\w)", re.sub(r"\s*#.*", "", (project / "config/locusd.yaml").read_text())):
+    name = section.strip().split(":")[0]
+    for place in re.finditer(r"(\w+):\s+(?=(\[[^\]]*\]|\{[^{}]*\}|[^\s,}]+))", section):  # of a key, and of what it is set to
+        outer = {"lidars": "lidars.front", "motion_sources": "motion_sources.imu"}.get(name, name)
+        if place[1] in ("xyz_m", "rpy_deg"):
+            outer += ".T_base_lidar" if name == "lidars" else ".T_base_source"
+        path = name if place[1] == name else f"{outer}.{place[1]}"
+        for index, odd in enumerate(ODD):
+            write("config", f"odd_{path}_{index}", section[:place.start(2)] + odd + section[place.end(2):] + "\n")
+            write("config_values", f"odd_{path}_{index}", f"{path}={odd}")
 write("config_values", "port", "lidars.front.port=2369\nlidars.0.name=rear")
 write("config_values", "list", "motion_sources=[{name: vio, kind: odometry, T_base_source: {xyz_m: [0, 0, 1], rpy_deg: [0, 90, 180]}}]")
 write("config_values", "sweep", "sweep_period_ms=50")
@@ -129,6 +141,15 @@ write("motion_files", "tum", "".join(f"1700000000.{i}00000000 {i} 0.5 -1e-3 0 0 
 write("motion_files", "numpy", "1.403636579763555527e+09 0 0 0 0 0 0.6 0.8\n.5e1\t1 2 3 0 0 0 +1\n-2. 1 2 3 0 0 0 1\n")
 write("motion_files", "meta", "1,0,0,0,0,0,9.81\n3,0,0,0,0,0,9.81\n---\nt_ns,arrival_ns,covariance_scale\n1,4,1\n3,2,7.5\n")
 write("motion_files", "meta_tum", "1e-9 0 0 0 0 0 0 1\n1e-9 1 0 0 0 0 0 1\n---\n1,2000,1\n1,1000,8\n")
+NUMBERS = ["", "x", "-", "+1", "-0", "1.", ".5", "1e5", "1e400", "1e-400", "nan", "-inf", "0x10", "1 ", "9223372036854775808", "1" * 40]
+for form, comma, line in (("imu", ",", "1,0,0,0,0,0,9.81"), ("attitude", ",", "1,0,0,0,0,0,9.81,1,0,0,0"),
+                          ("tum", " ", "1.5 0 0 0 0 0 0 1"), ("meta", ",", "1,4,1")):
+    before = "1,0,0,0,0,0,9.81\n---\nt_ns,arrival_ns,covariance_scale\n" if form == "meta" else line + "\n"
+    for column in range(len(line.split(comma))):
+        for index, number in enumerate(NUMBERS):
+            fields = line.split(comma)
+            fields[column] = number
+            write("motion_files", f"odd_{form}_{column}_{index}", before + comma.join(fields) + "\n")
 stamps = [-3_999_999_999_999_999_999 + i for i in range(6)] + [3_999_999_999_999_999_999]
 write("motion_files", "absurd_meta", "".join(f"{t},0,0,0,0,0,9.81\n" for t in stamps) + "---\n"
       + "".join(f"{t},{3_999_999_999_999_999_990 + i},1\n" for i, t in enumerate(stamps)))

@@ -60,6 +60,7 @@ void expect_refused(const Replay& replay, const Wrong& wrong, double without_m) 
   const json summary = replay.summary();
   EXPECT_NE(replay.run().err.find(wrong.words), std::string::npos) << replay.run().err;
   EXPECT_GE(summary["sources"]["imu"]["rejected"]["self_check"], 1);
+  EXPECT_NE(summary["sources"]["imu"]["verdict"].get<std::string>().find(wrong.words), std::string::npos);
   EXPECT_EQ(summary["sweeps"]["failed"], 0);
   EXPECT_LT(ape_mean_m(replay), 1.2 * without_m);
   for (const auto& [name, source] : summary["sources"].items()) {

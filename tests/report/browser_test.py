@@ -123,6 +123,10 @@ class Report(unittest.TestCase):
             self.assertEqual(len({looks["used"], looks["healthy, not used"], looks["lost"]}), 3, looks)
             self.assertNotEqual(looks["tracking"], looks["degenerate"])
 
+    def test_what_is_wrong_with_a_source_is_told_beside_its_counts(self):
+        with self.browser("hostile") as browser:
+            self.assertIn("▲ nan 7, turns the other way", browser.one("#sources").text)
+
     def test_map_turns_under_the_mouse_and_comes_nearer_with_the_wheel(self):
         with self.browser("hostile") as browser:
             canvas = browser.one("#map canvas")

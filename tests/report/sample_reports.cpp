@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
   SampleRun hostile = SampleRun::of(std::chrono::minutes{1}, kHostile);
   hostile.config.odometry.motion_sources.front().name = kHostile;
   hostile.summary["sources"][kHostile] = hostile.summary["sources"]["wio"];
+  hostile.summary["sources"][kHostile]["verdict"] = "turns the other way";
   locus::tools::write_report(folder / "hostile.html", hostile.report());
 
   locus::tools::write_report(folder / "bare.html", SampleRun::bare().report());

@@ -34,9 +34,12 @@ ordered_json stages(const FinishedRun& run) {
 
 ordered_json sources(const FinishedRun& run) {
   ordered_json sources = ordered_json::object();
-  for (std::size_t i = 0; i < run.config.odometry.motion_sources.size(); ++i)
-    sources[run.config.odometry.motion_sources[i].name] =
-        to_json(run.ingest.sources().counters(i), run.figures.used_sweeps(i));
+  for (std::size_t i = 0; i < run.config.odometry.motion_sources.size(); ++i) {
+    ordered_json& source = sources[run.config.odometry.motion_sources[i].name];
+    source = to_json(run.ingest.sources().counters(i), run.figures.used_sweeps(i));
+    if (const std::string_view verdict = run.ingest.sources().verdict(i); !verdict.empty())
+      source["verdict"] = verdict;
+  }
   return sources;
 }
 

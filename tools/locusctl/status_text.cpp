@@ -59,15 +59,18 @@ std::string reasons(const Json& counters) {
 }
 
 std::string silence_text(const Json& heard_ms_ago) {
-  return heard_ms_ago.is_null() ? "always" : fmt::format("{:.1f} s", 1e-3 * heard_ms_ago.get<double>());
+  if (heard_ms_ago.is_null())
+    return "always";
+  const double heard_s_ago = 1e-3 * heard_ms_ago.get<double>();
+  return heard_s_ago < 1000 ? fmt::format("{:.1f} s", heard_s_ago) : fmt::format("{:.1f} h", heard_s_ago / 3600);
 }
 
 std::string lidars_text(const Json& status) {
-  std::string text = fmt::format("\n{:<10}{:<10}{:>5}{:>10}{:>8}{:>9}{:>10}{:>9}  {}\n", "lidar", "model", "rpm",
+  std::string text = fmt::format("\n{:<9}{:<12}{:>5}{:>10}{:>8}{:>9}{:>9}{:>8} {}\n", "lidar", "model", "rpm",
                                  "packets", "lost", "refused", "disorder", "silent", "pps");
   for (const auto& [name, lidar] : status["lidars"].items()) {
     const Json& packets = status["packets"][name];
-    text += fmt::format("{:<10.9}{:<10}{:>5.0f}{:>10}{:>8}{:>9}{:>10}{:>9}  {}\n", name,
+    text += fmt::format("{:<9.8}{:<12}{:>5.0f}{:>10}{:>8}{:>9}{:>9}{:>8} {:.8}\n", name,
                         lidar["model"].is_string() ? lidar["model"].get<std::string>() : "unheard",
                         lidar["rpm"].get<double>(), packets["data"].get<std::uint64_t>(),
                         packets["lost"].get<std::uint64_t>(), sum(packets["rejected"]),
@@ -75,7 +78,7 @@ std::string lidars_text(const Json& status) {
                         lidar["pps"].get<std::string>());
     if (const std::string refused = reasons(packets["rejected"]); !refused.empty())
       text += fmt::format(
-          "{:<12}refused: {}{}\n", "", refused,
+          "{:<9}refused: {}{}\n", "", refused,
           lidar["refused_ip"].is_string() ? "; the last sender: " + lidar["refused_ip"].get<std::string>() : "");
   }
   return text;

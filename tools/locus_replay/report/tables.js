@@ -112,6 +112,9 @@ export function sources(section) {
       drawing, ["source", "samples", "used in sweeps", "changes of health", "rejected"],
       Object.entries(summary.sources).map(([name, source]) => {
         const reasons = rejections(source.rejected).map(([reason, times]) => `${words(reason)} ${count(times)}`);
+        if (source.verdict) {
+          reasons.push(source.verdict);
+        }
         return [
           name, count(source.received), count(source.used_sweeps), mishap(source.health_changes),
           reasons.length > 0 ? {text: `▲ ${reasons.join(", ")}`, warning: true} : "none"
