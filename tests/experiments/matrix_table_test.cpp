@@ -54,6 +54,12 @@ TEST(MatrixTable, AnInputThatSuffersMayTellOfAnother) {
   EXPECT_EQ(judged(frozen)["shown"], Results::array({"imu.health_changes 2"}));
 }
 
+TEST(MatrixTable, AVerdictOnASourceTellsOfIt) {
+  Results frozen = run(kFrozen);
+  frozen["summary"]["sources"]["wio"]["verdict"] = "turns the other way";
+  EXPECT_EQ(judged(frozen)["shown"], Results::array({"wio.verdict turns the other way"}));
+}
+
 TEST(MatrixTable, WhatChangesNothingNeedsNoCounter) { EXPECT_TRUE(judged(run(kFrozen))["holds"]); }
 
 TEST(MatrixTable, TooLargeAnErrorAndLostSweepsBreakACell) {

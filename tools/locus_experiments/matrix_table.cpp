@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -34,20 +33,22 @@ std::vector<Account> accounts_of(const std::string& input) {
   return {{"", Pointer("/packets") / lidar}, {"sweeps.", Pointer("/sweeps")}};
 }
 
-/// Counters of an input that differ, in words, but for those which only follow from others.
+std::string in_words(const Results& value) { return value.is_string() ? value.get<std::string>() : value.dump(); }
+
+/// Counters of an input and the verdict on it where they differ, in words, but for what only follows from others.
 std::vector<std::string> differences(const std::string& input, const Pair& pair) {
   constexpr std::array kOfNoNews{"processed", "used_sweeps", "seen"};
   std::vector<std::string> found;
   for (const Account& account : accounts_of(input)) {
     const Results with = pair.with->at("summary").at(account.pointer).flatten();
     const Results without = pair.without->at("summary").at(account.pointer).flatten();
-    for (const auto& [key, value] : with.items()) {
+    for (const auto& [key, now] : with.items()) {
       std::string name = key.substr(1);
       std::ranges::replace(name, '/', '.');
-      const auto now = value.get<std::int64_t>(), before = without.value(key, std::int64_t{0});
+      const Results before = without.value(key, Results(0));
       if (now != before && std::ranges::count(kOfNoNews, name) == 0)
-        found.push_back(fmt::format("{}{} {}", account.name, name, now) +
-                        (before == 0 ? "" : fmt::format(" of {}", before)));
+        found.push_back(fmt::format("{}{} {}", account.name, name, in_words(now)) +
+                        (before == 0 ? "" : fmt::format(" of {}", in_words(before))));
     }
   }
   return found;
