@@ -7,6 +7,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -22,9 +23,11 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "drivers/position_packet.hpp"
 #include "service/robot_network.hpp"
 #include "service/terminal.hpp"
 #include "service/undisturbed.hpp"
+#include "support/udp_sender.hpp"
 
 namespace locus::test {
 namespace {
@@ -107,6 +110,23 @@ TEST_F(Control, StatusTellsWhoWasAlwaysSilent) {
   ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
   EXPECT_TRUE(status()["lidars"].front()["heard_ms_ago"].is_null());
   EXPECT_NE(ctl({"status"}).out.find("always"), std::string::npos);
+}
+
+TEST_F(Control, StatusKeepsItsColumnsWhileALidarSynchronises) {
+  Child daemon(locusd(config()));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  std::vector<std::byte> packet(velodyne::kPositionPacketBytes);
+  packet[0xCA] = std::byte{1}; // PPS
+  UdpSender().send(8308, packet);
+  ASSERT_TRUE(
+      status_comes([](const auto& status) { return status["lidars"]["front"]["pps"] == "synchronizing"; }, seconds{5}));
+  std::istringstream lines(ctl({"status"}).out);
+  bool said = false;
+  for (std::string line; std::getline(lines, line);) {
+    EXPECT_LE(line.size(), 80U) << line;
+    said = said || (line.starts_with("front") && line.ends_with(" synchron"));
+  }
+  EXPECT_TRUE(said);
 }
 
 TEST_F(Control, StrangersMayLookAndNotTouch) {
