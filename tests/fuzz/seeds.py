@@ -124,6 +124,38 @@ for section in re.split(r"\n(?=\w)", re.sub(r"\s*#.*", "", (project / "config/lo
         for index, odd in enumerate(ODD):
             write("config", f"odd_{path}_{index}", section[:place.start(2)] + odd + section[place.end(2):] + "\n")
             write("config_values", f"odd_{path}_{index}", f"{path}={odd}")
+# Each rule of a value by itself, kept and broken.
+RULES = [("sweep_period_ms", "50"), ("sweep_period_ms", "5"), ("range_m", "[-1, 5]"), ("range_m", "[5, 2]"), ("range_m", "[0, 2000]"),
+         ("range_m", "[1, 2, 3]"), ("range_m", "[1, inf]"), ("body_box", "{enabled: true, min_m: [1, 1, 1], max_m: [2, 2, 2]}"),
+         ("body_box", "{enabled: true, min_m: [1, 1, 1], max_m: [2, 2, 0]}"), ("threads", "99999999999999999999"), ("threads", "2 "),
+         ("lidars", "[]"), ("lidars", "[{name: front, source_ip: 192.168.1.201, multicast_ip: 239.1.2.3, calibration: a.yaml}]"),
+         ("lidars", "[{source_ip: {}, multicast_ip: 10.0.0.1, port: 0, model: [], time: {}}]"), ("lidars", "[{name: total}]"),
+         ("lidars", "[{name: a, port: 1, source_ip: 10.0.0.1}, {name: b, port: 1, source_ip: 10.0.0.2}, {name: c, port: 2}]"),
+         ("lidars", "[{name: a, port: 1, source_ip: 10.0.0.1}, {name: a, port: 1, source_ip: 10.0.0.1}, {name: c, port: 1}]"),
+         ("lidars", "[" + ", ".join(f"{{name: l{i}, port: {i + 1}}}" for i in range(17)) + "]"),
+         ("lidars", "[{name: a, T_base_lidar: {xyz_m: [0, 0, 0], rpy_deg: [1, 90, 2]}}, {name: b, port: 7, T_base_lidar: {rpy_deg: [1, -90]}}]"),
+         ("motion_sources", "[{name: gt, kind: odometry, topic: /a/b_1}, {name: imu, kind: odometry, topic: a, health_topic: //a}]"),
+         ("motion_sources", "[" + ", ".join(f"{{name: m{i}, kind: imu, topic: /a/}}" for i in range(9)) + "]"),
+         ("motion_sources", "[{name: wio, kind: odometry, T_base_source: {xyz_m: [1, 0, 0]}}]"),
+         ("realtime", "{priority: 100, cpus: [0, 2000], lock_memory: 1}"), ("realtime", "{cpus: [0, 1]}"), ("realtime", "{cpus: 1}"),
+         ("dds", "{interface: a_name_of_16_and, frame_odom: '', prefix: /a//b}"), ("dds", "{interface: '', frame_base: odom}"),
+         ("dds", "{interface: 'a b', frame_base: '', domain: 233, flat_ground_topic: /1}"), ("dds", "{interface: eth0.1:2@3-4}"),
+         ("record", "{folder: /x, max_bytes: 1}"), ("seed", "-1"), ("fusion", "queue"), ("record", ""), ("map", "word"), ("map", "{[a]: 1}")]
+for index, (key, value) in enumerate(RULES):
+    write("config", f"rule_{index}", f"{key}: {value}\n")
+    write("config_values", f"rule_{index}", f"{key}={value}")
+recorded = "record: {folder: /x}\nmotion_sources: [{name: gt, kind: odometry}, {name: imu, kind: odometry}, {name: wio, kind: odometry}]\n"
+for index, text in enumerate((recorded, "seed: 1\nseed: 2\n", "map:\n\tkeyframe_m: 1\n", "map:\n  keyframe_m: 1\n keyframe_deg: 2\n", "lidars:\n - a: 1\n  - b\n",
+                              "lidars:\n  - name: a\n b\n", "seed: a: b\n", "map: {keyframe_m: 1\nseed: 1\n", "range_m: [1, 2\nseed: 1\n", "seed: @\n", "seed: 1\n---\nseed: 2\n",
+                              "seed: 1\n...\n", "? [a]\n: 1\n", "[]\n", "word\n", "~\n", "seed: !!int 1\n", "seed: !own 1\n", "%YAML 1.2\n---\nseed: 1\n", "%TAG ! x\n---\n",
+                              "seed: |\n  1\n", "seed: >-\n  1\n", 'fusion: "\\x71ueue"\n', 'fusion: "\\u0071\\n\\q"\n', "fusion: 'qu''eue'\n", "seed: *none\n", "map: &m {<<: *m}\n",
+                              "seed: 1 # why\n", "\ufeffseed: 1\n", "seed: \x01\n", "<<: {seed: 1}\n", "{a: b}: c\n", "seed: &a\n  1\n", "- seed\n")):
+    write("config", f"text_{index}", text)
+for index, text in enumerate(("x", "=1", "seed=[", "seed=@", ".seed=1", "seed.a=1", "lidars.9.port=1", "lidars.front.name.a=1", "lidars.=1", "map.=1", "none=1",
+                              "range_m=[5, 2]\nbody_box.enabled=true", "seed=1\nrange_m=[5, 2]", "seed=x\nthreads=0", "record.folder=/x\nmotion_sources.wio.name=gt",
+                              "lidars.front=word\nlidars.0.port=1", "motion_sources.imu.T_base_source.rpy_deg=[0, 90, 1]", "realtime.cpus=[3, 4]",
+                              "dds.prefix=/a/b\ndds.frame_base=odom", "map={keyframe_m: 0}", "map.keyframe_m=1\nmap={keyframe_m: 0}")):
+    write("config_values", f"text_{index}", text)
 write("config_values", "port", "lidars.front.port=2369\nlidars.0.name=rear")
 write("config_values", "list", "motion_sources=[{name: vio, kind: odometry, T_base_source: {xyz_m: [0, 0, 1], rpy_deg: [0, 90, 180]}}]")
 write("config_values", "sweep", "sweep_period_ms=50")
@@ -141,6 +173,11 @@ write("motion_files", "tum", "".join(f"1700000000.{i}00000000 {i} 0.5 -1e-3 0 0 
 write("motion_files", "numpy", "1.403636579763555527e+09 0 0 0 0 0 0.6 0.8\n.5e1\t1 2 3 0 0 0 +1\n-2. 1 2 3 0 0 0 1\n")
 write("motion_files", "meta", "1,0,0,0,0,0,9.81\n3,0,0,0,0,0,9.81\n---\nt_ns,arrival_ns,covariance_scale\n1,4,1\n3,2,7.5\n")
 write("motion_files", "meta_tum", "1e-9 0 0 0 0 0 0 1\n1e-9 1 0 0 0 0 0 1\n---\n1,2000,1\n1,1000,8\n")
+for force in (1, 5, -9.81, 0):  # a second of an accelerometer in g, of no gravity, upside down
+    lines = [f"{i * 60_000_000},0,0,0,0,0,{force}\n" for i in range(1, 20)]
+    write("motion_files", f"gravity_{force}", "".join(lines))
+    write("motion_files", f"other_clock_{force}", "".join(lines) + "---\n" + "".join(f"{i * 60_000_000},{(i + 5000) * 60_000_000},1\n" for i in range(1, 20)))
+write("motion_files", "stands", "".join(f"{i}.5 {min(i, 2) * 20} 0 0 0 0 0 -1\n" for i in range(6)) + "4.5 40 0 0 0 0 0 -1\n0.5 40 0 0 0 0 0 -1\n")
 NUMBERS = ["", "x", "-", "+1", "-0", "1.", ".5", "1e5", "1e400", "1e-400", "nan", "-inf", "0x10", "1 ", "9223372036854775808", "1" * 40]
 for form, comma, line in (("imu", ",", "1,0,0,0,0,0,9.81"), ("attitude", ",", "1,0,0,0,0,0,9.81,1,0,0,0"),
                           ("tum", " ", "1.5 0 0 0 0 0 0 1"), ("meta", ",", "1,4,1")):
@@ -180,6 +217,16 @@ write("ros_messages", "uncertain", drive + struct.pack("<BHBd", ODOMETRY | COVAR
 turn = struct.pack("<BHddddddddddd", ROTATION | VECTORS | COVARIANCE, 5000, 0, 0, 0, 1, 0.1, 0, 0, 0, 0, 9.81, 0.1)
 turn += b"".join(struct.pack("<BHdddddd", VECTORS, 5000, 0.1 + 0.01 * i, 0, 0, 0, 0.01, 9.8) for i in range(8))
 write("ros_messages", "imu", turn)
+for force in (1, 5, -9.81, 0):  # a second of an accelerometer in g, of no gravity, upside down
+    write("ros_messages", f"gravity_{force}", struct.pack("<BH6d", VECTORS, 60000, 0, 0, 0, 0, 0, force) + struct.pack("<BH", 0, 60000) * 19)
+write("ros_messages", "no_attitude", struct.pack("<BHd", COVARIANCE, 5000, -1.0) + turn)
+for index, numbers in enumerate(((float("inf"),), (float("-inf"),), (1e308, 1e308), (0.01, 1e308, 1e308))):
+    write("ros_messages", f"covariance_{index}",
+          drive + b"".join(struct.pack("<BHBd", ODOMETRY | COVARIANCE, 20000, 7 * i, number) for i, number in enumerate(numbers)))
+write("ros_messages", "stands", drive + struct.pack("<BH", ODOMETRY, 20000) * 40)
+write("ros_messages", "jumps", drive + struct.pack("<BHddd", ODOMETRY | VECTORS, 20000, 1000, 2, 3) * 2)
+write("ros_messages", "late", drive + struct.pack("<BHiI", ODOMETRY | STAMP, 20000, 1_000_000_000, 7) * 8 + drive)
+write("ros_messages", "host_clock_back", turn + drive + struct.pack("<BHI", ODOMETRY | ARRIVAL, 0, 1_600_000_000) + drive + turn)
 write("ros_messages", "both", turn + drive + struct.pack("<BHB", ODOMETRY | OUTSIDE, 9, 1))
 write("ros_messages", "own_clock", b"".join(struct.pack("<BHiIdddddd", STAMP | VECTORS, 5000, 5, i * 5_000_000, i, 0, 0, 0, 0, 9.81)
                                            for i in range(9)) + struct.pack("<BHI", ARRIVAL, 1, 7))
@@ -200,7 +247,8 @@ def lz4(data):
     library = ctypes.CDLL("liblz4.so.1")
     library.LZ4F_compressFrame.restype = ctypes.c_size_t
     out = ctypes.create_string_buffer(len(data) + 1000)
-    return out.raw[:library.LZ4F_compressFrame(out, len(out), data, len(data), None)]
+    size = library.LZ4F_compressFrame(out, len(out), data, len(data), None)
+    return out.raw[:size]
 
 
 def connection(number, topic, kind):
@@ -224,4 +272,15 @@ for name, compress in (("none", bytes), ("lz4", lz4), ("bz2", bz2.compress)):
     bag = b"#ROSBAG V2.0\n" + record(3, index_pos=bytes(8), conn_count=struct.pack("<I", 2), chunk_count=struct.pack("<I", 1))
     closed = bag.replace(b"index_pos=" + bytes(8), b"index_pos=" + struct.pack("<Q", len(bag + chunk)))
     write("bags", name, bag + chunk)
+    write("bags", f"{name}_cut", bag + record(5, compress(topics + messages)[:-9], compression=name.encode(), size=struct.pack("<I", len(topics + messages))))
+    write("bags", f"{name}_longer", bag + record(5, compress(topics + messages), compression=name.encode(), size=struct.pack("<I", 9999)))
+    write("bags", f"{name}_shorter", bag + record(5, compress(topics + messages), compression=name.encode(), size=struct.pack("<I", 99)))
     write("bags", f"{name}_closed", closed + chunk + topics + record(6, struct.pack("<II", 0, 2), count=struct.pack("<I", 2)))
+for name, part in (("no_time", record(2, ros1[0], conn=bytes(4))), ("no_connection", record(2, ros1[0], time=bytes(8))),
+                   ("unknown_connection", record(2, ros1[0], conn=struct.pack("<I", 7), time=bytes(8))), ("other_record", record(9)),
+                   ("no_size", record(5, topics, compression=b"none")), ("no_compression", record(5, topics, size=bytes(4))),
+                   ("other_compression", record(5, topics, compression=b"zip", size=bytes(4))), ("bare_message", messages)):
+    write("bags", name, bag + record(5, topics + part, compression=b"none", size=struct.pack("<I", len(topics + part))))
+    write("bags", f"{name}_outside", bag + part)
+write("bags", "no_head", b"#ROSBAG V2.0\n" + record(5, topics, compression=b"none", size=struct.pack("<I", len(topics))))
+write("bags", "other_version", b"#ROSBAG V1.2\n")
