@@ -32,15 +32,15 @@ for target in "${targets[@]}"; do
 
   inputs=0 edges=0 at_first= quiet_s=0 round=0
   while ((quiet_s < asked_s)); do
-    TIMEFORMAT=%0U
-    if ! cpu_s=$({ time "${fuzzer[@]}" -max_total_time=300 -print_final_stats=1 "$found" "${seeds[@]}" &>"$log"; } 2>&1); then
+    TIMEFORMAT='%0U %0S'
+    if ! cpu=$({ time "${fuzzer[@]}" -max_total_time=300 -print_final_stats=1 "$found" "${seeds[@]}" &>"$log"; } 2>&1); then
       echo "$target: $(grep -aE 'runtime error|ERROR' "$log" | head -n 1), see $log"
       break
     fi
     inputs=$((inputs + $(last 'number_of_executed_units: \K\d+')))
     reached=$(last 'cov: \K\d+')
     : "${at_first:=$(grep -aoP 'INITED cov: \K\d+' "$log")}"
-    if ((reached > edges && (round > 0 || reached > at_first))); then quiet_s=0; else quiet_s=$((quiet_s + cpu_s)); fi
+    if ((reached > edges && (round > 0 || reached > at_first))); then quiet_s=0; else quiet_s=$((quiet_s + ${cpu/ / + })); fi
     edges=$((reached > edges ? reached : edges)) round=$((round + 1))
     echo "$target: $inputs inputs, $edges edges ($at_first at first), none of them new for $((quiet_s / 60)) minutes of CPU"
   done

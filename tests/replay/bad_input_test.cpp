@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "drivers/pcap_writer.hpp"
+#include "replay_run.hpp"
 #include "synthetic_robot.hpp"
 
 namespace locus::test {

@@ -15,6 +15,7 @@
 #include "bags/ros1_record.hpp"
 #include "daemon/dds/ros_messages.hpp"
 #include "support/errors.hpp"
+#include "replay_run.hpp"
 #include "synthetic_robot.hpp"
 
 namespace locus::test {

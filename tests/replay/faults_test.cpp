@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "replay_run.hpp"
 #include "synthetic_robot.hpp"
 
 namespace locus::test {

@@ -2,9 +2,9 @@
 #pragma once
 
 #include <chrono>
+#include <filesystem>
 
 #include "locus_sim/capture_writer.hpp"
-#include "replay_run.hpp"
 #include "support/scenes.hpp"
 
 namespace locus::test {
@@ -30,12 +30,8 @@ inline void write_room_drive(const std::filesystem::path& folder, Duration durat
   sim::write_capture_folder(folder, sim::room(), trajectory, duration, robot);
 }
 
-/// Eight seconds of it, written once for all tests of a process.
-inline const std::filesystem::path& room_drive() {
-  static const TemporaryFolder folder;
-  static const bool written = (write_room_drive(folder.path(), std::chrono::seconds{8}), true);
-  static_cast<void>(written);
-  return folder.path();
-}
+/// What it brings back from eight seconds, and from twenty: written as the tests are built, and to be read alone.
+inline std::filesystem::path room_drive() { return LOCUS_TEST_DRIVES "/room"; }
+inline std::filesystem::path long_room_drive() { return LOCUS_TEST_DRIVES "/long_room"; }
 
 } // namespace locus::test

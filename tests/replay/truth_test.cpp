@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "replay_run.hpp"
 #include "synthetic_robot.hpp"
 
 namespace locus::test {

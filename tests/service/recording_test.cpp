@@ -103,7 +103,9 @@ TEST_F(Recording, ReplayIsWhatTheServiceComputed) {
   const Replay replay({"--quiet", file("record").string()});
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
   EXPECT_EQ(replay.run().err, "");
-  for (const auto& [name, packets] : replay.summary()["packets"].items())
+  const json packets_of_replay = replay.summary()["packets"];
+  EXPECT_EQ(packets_of_replay.size(), 3U) << "two lidars and the total";
+  for (const auto& [name, packets] : packets_of_replay.items())
     EXPECT_EQ(packets["data"], status["packets"][name]["data"]) << name;
   const Agreement live = agreement(replay.trajectory(), heard(listener));
   EXPECT_GE(live.poses, 77U) << "of 80";

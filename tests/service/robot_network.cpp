@@ -65,20 +65,9 @@ bool RobotNetwork::status_comes(const std::function<bool(const nlohmann::json&)>
   return false;
 }
 
-const std::filesystem::path& RobotNetwork::capture() {
-  static const TemporaryFolder folder;
-  static const bool written = (write_room_drive(folder.path(), std::chrono::seconds{20}), true);
-  static_cast<void>(written);
-  return folder.path();
-}
+std::filesystem::path RobotNetwork::capture() { return long_room_drive(); }
 
-std::filesystem::path RobotNetwork::plant() const {
-  std::filesystem::path folder = file("plant");
-  const ProgramRun run = run_program(
-      LOCUS_SIM, {"--world", "urban", "--robot", "husky", "--duration", "20", "--seed", "3", "-o", folder.string()});
-  EXPECT_EQ(run.status, 0) << run.err;
-  return folder;
-}
+std::filesystem::path RobotNetwork::plant() { return LOCUS_TEST_DRIVES "/plant"; }
 
 std::filesystem::path RobotNetwork::config(const std::string& more) const {
   std::filesystem::path path = file("locusd.yaml");

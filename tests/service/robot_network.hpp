@@ -20,12 +20,12 @@ class RobotNetwork : public testing::Test {
  protected:
   void SetUp() override;
 
-  /// What a robot brings back from 20 s, with odometry and IMU; made once for all tests of a process.
-  static const std::filesystem::path& capture();
+  /// What a robot brings back from 20 s, with odometry and IMU.
+  static std::filesystem::path capture();
 
   /// A drive of locus-sim, whose lidar is locked to PPS: how late this machine wakes up who plays it is not seen in the
   /// stamps.
-  [[nodiscard]] std::filesystem::path plant() const;
+  static std::filesystem::path plant();
 
   [[nodiscard]] std::filesystem::path file(const std::string& name) const { return folder_ / name; }
   /// Of the capture, with more lines of YAML.

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// room_drives FOLDER: the drives around a room that the tests replay, written once for all of them.
+#include <chrono>
+#include <filesystem>
+
+#include "replay/synthetic_robot.hpp"
+
+int main(int argc, char** argv) {
+  using namespace std::chrono_literals;
+  if (argc != 2)
+    return 2;
+  const std::filesystem::path folder = argv[1];
+  locus::test::write_room_drive(folder / "room", 8s);
+  locus::test::write_room_drive(folder / "long_room", 20s);
+  return 0;
+}
