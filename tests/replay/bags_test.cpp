@@ -14,8 +14,8 @@
 #include "bags/messages.hpp"
 #include "bags/ros1_record.hpp"
 #include "daemon/dds/ros_messages.hpp"
-#include "support/errors.hpp"
 #include "replay_run.hpp"
+#include "support/errors.hpp"
 #include "synthetic_robot.hpp"
 
 namespace locus::test {

@@ -76,6 +76,10 @@ std::optional<int> Child::wait_for_exit(Duration timeout) {
     else
       std::this_thread::sleep_for(std::chrono::milliseconds{2});
   }
+  if (status_) { // what it said last may still be on its way; a process of its own may hold the pipe for longer
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, std::chrono::seconds{1}, [&] { return all_read_; });
+  }
   return status_;
 }
 
@@ -92,6 +96,9 @@ void Child::read_lines(int descriptor) {
     changed_.notify_all();
   }
   close(descriptor);
+  const std::scoped_lock lock(mutex_);
+  all_read_ = true;
+  changed_.notify_all();
 }
 
 std::vector<std::string> Child::lines() const {

@@ -27,7 +27,8 @@ class Child {
   void close_stdin();
   void signal(int number) const;
 
-  /// Exit status, 128 + signal if one ended it; nothing while it still runs after `timeout`.
+  /// Exit status, 128 + signal if one ended it; nothing while it still runs after `timeout`. Of one that
+  /// ended all lines are heard.
   std::optional<int> wait_for_exit(Duration timeout);
 
   /// So far.
@@ -49,6 +50,7 @@ class Child {
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   std::vector<std::string> lines_;
+  bool all_read_ = false;
   std::thread reader_;
 };
 
