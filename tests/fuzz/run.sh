@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 # run.sh MINUTES [TARGET]...: fuzzes each target (all of them, if none is named), one after the other, until so many
 # minutes of CPU found no new way through the code, and leaves in corpus/TARGET/ the fewest inputs that reach all that any
-# input reached. Called again, it goes on with what was found. afl.sh does the same with AFL++.
+# input reached. It begins with that and with what seeds.py makes, and called again goes on with what was found. afl.sh does
+# the same with AFL++; coverage.sh tells what is reached.
 #
 # An input that breaks something is kept in build/fuzz/broken/, the reason in build/fuzz/log/TARGET:
 #   build/fuzz/bin/fuzz_TARGET FILE                                    runs it again, with the trace
 #   build/fuzz/bin/fuzz_TARGET -minimize_crash=1 -runs=100000 FILE     makes it small
 # Mend the program, write a test that tells the story, and copy the file to mended/TARGET/: from then on every run of the
-# tests feeds it. Where the form of the input of a target has changed, seeds.py makes new ones.
+# tests feeds it.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 asked_s=$(($1 * 60))
@@ -20,13 +21,14 @@ cmake --preset fuzz --log-level=WARNING
 cmake --build --preset fuzz
 build=$PWD/build/fuzz
 mkdir -p "$build/log" "$build/broken"
+tests/fuzz/seeds.py "$build/seeds"
 
 last() { grep -aoP "$1" "$log" | tail -n 1; }
 
 for target in "${targets[@]}"; do
   corpus=tests/fuzz/corpus/$target found=$build/found/$target merged=$build/merged/$target log=$build/log/$target
   mkdir -p "$corpus" "$found"
-  seeds=("$corpus")
+  seeds=("$corpus" "$build/seeds/$target")
   [[ ! -d tests/fuzz/mended/$target ]] || seeds+=("tests/fuzz/mended/$target")
   fuzzer=("$build/bin/fuzz_$target" -timeout=10 "-artifact_prefix=$build/broken/$target-")
 
@@ -46,6 +48,6 @@ for target in "${targets[@]}"; do
   done
 
   rm -rf "$merged" && mkdir -p "$merged"
-  "${fuzzer[@]}" -set_cover_merge=1 -use_counters=0 -max_len=8192 "$merged" "$corpus" "$found" &>> "$log"
+  "${fuzzer[@]}" -set_cover_merge=1 -use_counters=0 -max_len=8192 "$merged" "$corpus" "$build/seeds/$target" "$found" &>> "$log"
   rm -f "$corpus"/* && cp "$merged"/* "$corpus"
 done
