@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 
 #include "replay/replay_run.hpp"
-#include "replay/synthetic_robot.hpp"
 #include "support/child.hpp"
+#include "support/test_drives.hpp"
 
 namespace locus::test {
 namespace {

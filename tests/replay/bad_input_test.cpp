@@ -8,7 +8,7 @@
 
 #include "drivers/pcap_writer.hpp"
 #include "replay_run.hpp"
-#include "synthetic_robot.hpp"
+#include "support/test_drives.hpp"
 
 namespace locus::test {
 namespace {

@@ -16,7 +16,7 @@
 #include "daemon/dds/ros_messages.hpp"
 #include "replay_run.hpp"
 #include "support/errors.hpp"
-#include "synthetic_robot.hpp"
+#include "support/test_drives.hpp"
 
 namespace locus::test {
 namespace {

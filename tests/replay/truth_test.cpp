@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "replay_run.hpp"
-#include "synthetic_robot.hpp"
+#include "support/test_drives.hpp"
 
 namespace locus::test {
 namespace {

@@ -12,9 +12,9 @@
 
 #include "daemon/machine_time.hpp"
 #include "drivers/capture.hpp"
-#include "replay/synthetic_robot.hpp"
 #include "service/robot_network.hpp"
 #include "service/undisturbed.hpp"
+#include "support/test_drives.hpp"
 
 namespace locus::test {
 namespace {

@@ -17,8 +17,7 @@
 #include <unistd.h>
 
 #include "drivers/capture.hpp"
-#include "locus_sim/capture_writer.hpp"
-#include "replay/synthetic_robot.hpp"
+#include "support/test_drives.hpp"
 
 namespace locus::test {
 namespace {
@@ -67,7 +66,7 @@ bool RobotNetwork::status_comes(const std::function<bool(const nlohmann::json&)>
 
 std::filesystem::path RobotNetwork::capture() { return long_room_drive(); }
 
-std::filesystem::path RobotNetwork::plant() { return LOCUS_TEST_DRIVES "/plant"; }
+std::filesystem::path RobotNetwork::plant() { return plant_drive(); }
 
 std::filesystem::path RobotNetwork::config(const std::string& more) const {
   std::filesystem::path path = file("locusd.yaml");

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// room_drives FOLDER: the drives around a room that the tests replay, written once for all of them.
+// write_room_drives FOLDER: the drives around a room that the tests replay, written once for all of them.
 #include <chrono>
 #include <filesystem>
 
-#include "replay/synthetic_robot.hpp"
+#include "support/test_drives.hpp"
 
 int main(int argc, char** argv) {
   using namespace std::chrono_literals;

@@ -30,8 +30,10 @@ inline void write_room_drive(const std::filesystem::path& folder, Duration durat
   sim::write_capture_folder(folder, sim::room(), trajectory, duration, robot);
 }
 
-/// What it brings back from eight seconds, and from twenty: written as the tests are built, and to be read alone.
+/// Drives that are written as the tests are built (CMakeLists.txt), and are to be read alone: eight and twenty seconds
+/// around the room, and twenty of a husky of locus-sim through the plant.
 inline std::filesystem::path room_drive() { return LOCUS_TEST_DRIVES "/room"; }
 inline std::filesystem::path long_room_drive() { return LOCUS_TEST_DRIVES "/long_room"; }
+inline std::filesystem::path plant_drive() { return LOCUS_TEST_DRIVES "/plant"; }
 
 } // namespace locus::test
