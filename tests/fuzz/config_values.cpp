@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What --set does, one option a line; the outcome is printed and read again, to the same.
+// What --set does, one option a line and eight of them at most, for each costs as much; the outcome is printed and read
+// again, to the same.
 #include <sstream>
 #include <string>
 #include <vector>
@@ -10,9 +11,10 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace locus;
   static const Config kDefaults;
+  static constexpr std::size_t kMostAssignments = 8;
   std::istringstream text{std::string{fuzz::text_of(data, size)}};
   std::vector<std::string> assignments;
-  for (std::string line; std::getline(text, line);)
+  for (std::string line; assignments.size() < kMostAssignments && std::getline(text, line);)
     assignments.push_back(line);
   const auto config = override_config(kDefaults, assignments);
   if (!config)

@@ -23,6 +23,9 @@ build=$PWD/build/fuzz
 mkdir -p "$build/log" "$build/broken"
 tests/fuzz/seeds.py "$build/seeds"
 
+# Where memory was taken is told by the run that repeats a failure; here it would cost a third of the time.
+export ASAN_OPTIONS=malloc_context_size=0
+
 last() { grep -aoP "$1" "$log" | tail -n 1; }
 
 for target in "${targets[@]}"; do

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <filesystem>
 
+#include "support/kitti_room.hpp"
 #include "support/test_drives.hpp"
 
 int main(int argc, char** argv) {
@@ -12,5 +13,6 @@ int main(int argc, char** argv) {
   const std::filesystem::path folder = argv[1];
   locus::test::write_room_drive(folder / "room", 8s);
   locus::test::write_room_drive(folder / "long_room", 20s);
+  locus::test::kitti_room::write_drive(folder / "kitti_room");
   return 0;
 }
