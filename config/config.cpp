@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <map>
 #include <set>
 #include <string_view>
 
@@ -49,7 +50,7 @@ std::string item(const char* list, std::size_t index, const char* key) {
 
 /// Names are keys of the figures and words of the command line: one meaning each, over lidars and sources together.
 void check_names(Problems& problems, const Config& config) {
-  std::set<std::string_view> taken{"total", "all-lidars"};
+  std::set<std::string_view> taken{"total", "all-lidars", "kernel_drops"};
   const auto check = [&](const std::string& key, std::string_view name) {
     problems.require(is_word(name, "_-"), key,
                      fmt::format("'{}' is no name; write a letter, then letters, digits, _ or -", name));
@@ -84,6 +85,23 @@ void check_sources(Problems& problems, const Config& config) {
     require_topic_or_empty(problems, item("motion_sources", i, "topic"), config.source_topics[i].topic);
     require_topic_or_empty(problems, item("motion_sources", i, "health_topic"), config.source_topics[i].health_topic);
   }
+}
+
+/// DDS hands the messages of a topic to those who expect their type, and to nobody else without a word.
+void check_types_of_topics(Problems& problems, const Config& config) {
+  std::map<std::string_view, std::string_view> types;
+  const auto check = [&](const std::string& key, std::string_view topic, std::string_view type) {
+    const std::string_view first = topic.empty() ? type : types.try_emplace(topic, type).first->second;
+    problems.require(
+        first == type, key,
+        fmt::format("'{}' cannot carry {} here and {} elsewhere; give each a topic of its own", topic, type, first));
+  };
+  for (std::size_t i = 0; i < config.source_topics.size() && i < config.odometry.motion_sources.size(); ++i) {
+    const bool is_imu = config.odometry.motion_sources[i].kind == SourceKind::imu;
+    check(item("motion_sources", i, "topic"), config.source_topics[i].topic, is_imu ? "Imu" : "Odometry");
+    check(item("motion_sources", i, "health_topic"), config.source_topics[i].health_topic, "Bool");
+  }
+  check("dds.flat_ground_topic", config.dds.flat_ground_topic, "Bool");
 }
 
 void check_realtime(Problems& problems, const RealtimeOptions& realtime) {
@@ -126,6 +144,7 @@ std::optional<std::string> Config::problem() const {
   check_names(problems, *this);
   check_lidars(problems, lidars);
   check_sources(problems, *this);
+  check_types_of_topics(problems, *this);
   problems.add(sweep.problem());
   problems.add(odometry.problem());
   check_realtime(problems, realtime);

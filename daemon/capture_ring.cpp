@@ -56,8 +56,10 @@ std::optional<std::string> CaptureRing::obstacle() const {
   return std::nullopt;
 }
 
-/// What other runs have left behind.
+/// What is there by now.
 std::optional<std::string> CaptureRing::look() {
+  pieces_.clear();
+  bytes_ = 0;
   std::error_code error;
   std::filesystem::create_directories(folder_, error);
   if (error)
@@ -102,9 +104,16 @@ std::optional<std::string> CaptureRing::remove_oldest() {
   return std::nullopt;
 }
 
+/// After a failure the disk is looked at again: somebody may have removed the folder.
 Expected<path, std::string> CaptureRing::begin_piece(Stamp now) {
   if (auto problem = looked_ ? std::nullopt : look())
     return *problem;
+  auto piece = make_piece(now);
+  looked_ = piece.has_value();
+  return piece;
+}
+
+Expected<path, std::string> CaptureRing::make_piece(Stamp now) {
   if (auto problem = make_room())
     return *problem;
   if (run_.empty()) {

@@ -47,6 +47,7 @@ class CaptureRing {
 
   std::optional<std::string> look();
   std::optional<std::string> make_room();
+  Expected<std::filesystem::path, std::string> make_piece(Stamp now);
   std::optional<std::string> remove_oldest();
 
   std::filesystem::path folder_;

@@ -109,6 +109,7 @@ class RecordingInput : public InputSource {
     recorder_.take(input);
     return input;
   }
+  void expect(const LidarRouter& lidars) override { source_.expect(lidars); }
 
  private:
   InputSource& source_;

@@ -22,11 +22,12 @@ Expected<LidarInput, std::string> LidarInput::open(LidarOptions options, std::ui
   if (options.calibration.empty())
     return LidarInput{std::move(options), index, std::nullopt};
   auto calibration = velodyne::read_calibration(options.calibration);
+  const std::string key = "lidars." + options.name + ".calibration: ";
   if (!calibration)
-    return calibration.error();
+    return key + calibration.error();
   if (options.model && calibration->laser_count != velodyne::spec(*options.model).calibration.laser_count)
-    return options.calibration + ": " + std::to_string(calibration->laser_count) + " lasers, but lidar " +
-           options.name + " is a " + std::string{to_string(*options.model)};
+    return key + options.calibration + ": " + std::to_string(calibration->laser_count) +
+           " lasers, but the lidar is a " + std::string{to_string(*options.model)};
   return LidarInput{std::move(options), index, *calibration};
 }
 

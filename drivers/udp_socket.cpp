@@ -135,6 +135,8 @@ std::optional<std::string> UdpSocket::prepare() {
   if (!set(descriptor_, SOL_SOCKET, SO_TIMESTAMPNS, 1))
     return because("no stamps of arrival", port_);
   set(descriptor_, SOL_SOCKET, SO_DETACH_FILTER, 0); // of one that systemd holds and that had another owner before
+  count_drops();                                     // as many as it had with that owner
+  kernel_drops_ = 0;
   return std::nullopt;
 }
 

@@ -100,7 +100,8 @@ Expected<Calibration, std::string> read_calibration(const std::filesystem::path&
   } catch (const Problem& problem) {
     return message(file, problem.mark, problem.what);
   } catch (const YAML::BadFile&) {
-    return file.string() + ": cannot be read";
+    return file.string() +
+           ": cannot be read; give a file of velodyne_pointcloud, or leave the key empty for the model's own table";
   } catch (const YAML::Exception& exception) {
     return message(file, exception.mark, exception.msg);
   }

@@ -130,11 +130,12 @@ template <class Message> class DdsReader {
     dds_subscription_matched_status_t status{};
     return dds_get_subscription_matched_status(reader_.handle(), &status) == DDS_RETCODE_OK ? status.current_count : 0;
   }
+  /// Of more writers than anybody has, any may be heard.
   [[nodiscard]] bool hears(dds_instance_handle_t writer) const {
     std::array<dds_instance_handle_t, 64> all{};
     const dds_return_t count = dds_get_matched_publications(reader_.handle(), all.data(), all.size());
     const auto end = all.begin() + std::clamp<dds_return_t>(count, 0, all.size());
-    return std::find(all.begin(), end, writer) != end;
+    return count > static_cast<dds_return_t>(all.size()) || std::find(all.begin(), end, writer) != end;
   }
   [[nodiscard]] dds_entity_t handle() const { return reader_.handle(); }
 

@@ -41,6 +41,10 @@ struct RosLink::Session {
     DdsReader<ros::Bool> reader;
     Admission admission;
   };
+  struct FlatGroundTopic {
+    DdsReader<ros::Bool> reader;
+    Admission admission;
+  };
 
   Session(DdsNode node_, const Config& config) : node(std::move(node_)) {
     const DdsOptions& dds = config.dds;
@@ -75,7 +79,8 @@ struct RosLink::Session {
             health_topics.emplace_back(HealthTopic{i, {node, health_topic, TopicQos::standard()}, {}}).reader.handle());
     }
     if (!config.dds.flat_ground_topic.empty())
-      wake_by(flat_ground.emplace(node, config.dds.flat_ground_topic, TopicQos::standard()).handle());
+      wake_by(flat_ground.emplace(FlatGroundTopic{{node, config.dds.flat_ground_topic, TopicQos::standard()}, {}})
+                  .reader.handle());
   }
 
   DdsNode node; ///< outlives all that is made from it
@@ -88,7 +93,7 @@ struct RosLink::Session {
   std::vector<ImuSource> imus;
   std::vector<OdometrySource> odometries;
   std::vector<HealthTopic> health_topics;
-  std::optional<DdsReader<ros::Bool>> flat_ground;
+  std::optional<FlatGroundTopic> flat_ground;
 };
 
 RosLink::RosLink(const Config& config, Sink sink)
@@ -163,22 +168,31 @@ void RosLink::receive(Session& session) {
       if (from.admission.admits(writer, arrival))
         sink_(OutsideVerdict{from.source, message.data_});
     });
-  if (session.flat_ground)
-    session.flat_ground->take([&](const ros::Bool& message) { sink_(FlatGroundWord{message.data_}); });
+  if (auto& from = session.flat_ground)
+    from->reader.take([&](const ros::Bool& message, dds_instance_handle_t writer) {
+      if (from->admission.admits(writer, arrival))
+        sink_(FlatGroundWord{message.data_});
+    });
 }
 
 void RosLink::look_after_sources(Session& session) {
-  for (auto& from : session.health_topics)
-    from.admission.look_after(from.reader);
   const std::scoped_lock lock(status_mutex_);
   const auto tell = [this](auto& sources) {
     for (auto& from : sources) {
       from.admission.look_after(from.reader);
-      status_.sources[from.source] = {from.reader.writers(), from.received, from.admission.refused()};
+      status_.sources[from.source] = {from.reader.writers(), from.received, from.admission.refused(), 0};
     }
   };
   tell(session.imus);
   tell(session.odometries);
+  for (auto& from : session.health_topics) {
+    from.admission.look_after(from.reader);
+    status_.sources[from.source].health_refused = from.admission.refused();
+  }
+  if (auto& from = session.flat_ground) {
+    from->admission.look_after(from->reader);
+    status_.flat_ground_refused = from->admission.refused();
+  }
 }
 
 bool RosLink::publish(const OdometryReport& report, TrackingState state) {

@@ -40,11 +40,13 @@ class RosLink {
     std::uint64_t attempts = 0; ///< so far, the one that succeeded included
     std::string problem;        ///< why the last one failed
     struct Source {
-      std::uint32_t writers = 0;  ///< that send its topic now
-      std::uint64_t received = 0; ///< samples, those refused included
-      std::uint64_t refused = 0;  ///< of other writers than the first, or more than any sensor sends
+      std::uint32_t writers = 0;        ///< that send its topic now
+      std::uint64_t received = 0;       ///< samples, those refused included
+      std::uint64_t refused = 0;        ///< of other writers than the first, or more than any sensor sends
+      std::uint64_t health_refused = 0; ///< of its health topic, the same
     };
-    std::vector<Source> sources; ///< by the index of the configuration
+    std::vector<Source> sources;           ///< by the index of the configuration
+    std::uint64_t flat_ground_refused = 0; ///< of its topic, the same
   };
 
   /// Begins at once and does not wait.

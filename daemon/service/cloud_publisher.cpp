@@ -57,7 +57,7 @@ void CloudPublisher::take(const Sweep& sweep, const Odometry& odometry, const Od
     sweep_.back().stamp = estimate.stamp;
     static_cast<void>(sweep_.publish());
   }
-  if (options_.publish_map && estimate.stamp - map_published_ > kMapPeriod) {
+  if (options_.publish_map && std::chrono::abs(estimate.stamp - map_published_) > kMapPeriod) {
     map_points(odometry.map().coarse(), map_.back().points);
     map_.back().stamp = map_published_ = estimate.stamp;
     static_cast<void>(map_.publish());

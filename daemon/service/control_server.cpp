@@ -23,7 +23,6 @@ namespace locus::daemon {
 namespace {
 
 constexpr std::size_t kMaxRequestBytes = 4096;
-constexpr Duration kLongestAnswer = std::chrono::seconds{3};
 
 std::vector<gid_t> groups_of(int client) {
   std::vector<gid_t> groups(256);
@@ -100,8 +99,6 @@ bool answers(const sockaddr_un& address) {
   return connect(client.number(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0 || errno == EAGAIN;
 }
 
-ControlServer::Answer refusal(const std::string& why) { return {{{"error", why}}, {}}; }
-
 } // namespace
 
 Descriptor::~Descriptor() {
@@ -167,7 +164,7 @@ void ControlServer::accept_waiting() {
     if (clients_.size() < kMaxClients)
       clients_.push_back({std::move(client), std::nullopt, {}});
     else
-      send(client.number(), refusal("too many clients; end a locusctl that still runs"));
+      send(client.number(), Answer::refusal("too many clients; end a locusctl that still runs"));
   }
 }
 
@@ -187,7 +184,7 @@ bool ControlServer::serve(Client& client) {
       return errno == EAGAIN || errno == EINTR;
     if (size == 0)
       return false;
-    client.pending = nlohmann::json::parse(text.data(), text.data() + size, nullptr, false);
+    client.pending = parse_control_request({text.data(), static_cast<std::size_t>(size)});
     client.asked = read_clock(CLOCK_MONOTONIC);
   }
   const std::optional<Answer> answer = handle(client);
@@ -199,18 +196,14 @@ bool ControlServer::serve(Client& client) {
 }
 
 std::optional<ControlServer::Answer> ControlServer::handle(Client& client) {
-  const nlohmann::json& request = *client.pending;
-  if (!request.is_object() || !request.contains("command") || !request["command"].is_string())
-    return refusal("no request; use locusctl of the same version");
-  if (request["command"] != "status" && !may_command(client.socket.number()))
-    return refusal("not permitted; be root or a member of group locusd");
+  const Expected<ControlRequest, std::string>& request = *client.pending;
+  if (!request)
+    return Answer::wrong_usage(request.error());
+  if (!std::holds_alternative<ShowStatus>(*request) && !may_command(client.socket.number()))
+    return Answer::refusal("not permitted; be root or a member of group locusd");
   if (read_clock(CLOCK_MONOTONIC) - client.asked > kLongestAnswer)
-    return refusal("no answer in time; is there lidar data (locusctl status)?");
-  try {
-    return handler_(request);
-  } catch (const nlohmann::json::exception&) {
-    return refusal("the request lacks something; use locusctl of the same version");
-  }
+    return Answer::refusal("no answer in time; is there lidar data (locusctl status)?");
+  return handler_(*request);
 }
 
 } // namespace locus::daemon

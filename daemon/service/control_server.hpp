@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -14,6 +15,7 @@
 #include <poll.h>
 
 #include "core/expected.hpp"
+#include "daemon/service/control_request.hpp"
 #include "daemon/service/log.hpp"
 
 namespace locus::daemon {
@@ -36,20 +38,25 @@ class Descriptor {
 
 /// Where locusctl reaches the service: a Unix socket on which each message is one request or one answer, in JSON.
 ///
-/// A request is {"command": NAME, ...}. An answer holds "error" if it was refused, and may bring bytes along in a
-/// memory file, so that nobody waits for a slow reader. Everybody on the machine may ask for the status; the other
-/// commands are for root, the service's own user and members of group locusd, who find room however many others are
-/// there. One owner, the main thread.
+/// An answer holds "error" if it was refused, and "wrong_usage" if what was asked for was wrong; it may bring bytes
+/// along in a memory file, so that nobody waits for a slow reader. Everybody on the machine may ask for the status; the
+/// other commands are for root, the service's own user and members of group locusd, who find room however many others
+/// are there. One owner, the main thread.
 class ControlServer {
  public:
   struct Answer {
     nlohmann::ordered_json json;
     std::vector<std::byte> bytes;
+
+    static Answer done() { return {{{"done", true}}, {}}; }
+    static Answer refusal(const std::string& why) { return {{{"error", why}}, {}}; }
+    static Answer wrong_usage(const std::string& why) { return {{{"error", why}, {"wrong_usage", true}}, {}}; }
   };
   /// Nothing: the answer is not there yet; the same request is made again at the next serve(), for a few seconds.
-  using Handler = std::function<std::optional<Answer>(const nlohmann::json& request)>;
+  using Handler = std::function<std::optional<Answer>(const ControlRequest& request)>;
 
   static constexpr std::size_t kMaxClients = 16;
+  static constexpr Duration kLongestAnswer = std::chrono::seconds{3};
 
   /// Fails with one line for the user.
   static Expected<ControlServer, std::string> open(const std::filesystem::path& path, Handler handler);
@@ -61,7 +68,7 @@ class ControlServer {
  private:
   struct Client {
     Descriptor socket;
-    std::optional<nlohmann::json> pending;
+    std::optional<Expected<ControlRequest, std::string>> pending;
     Duration asked{};
   };
 

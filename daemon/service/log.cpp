@@ -62,7 +62,8 @@ bool Log::may_speak(const CodePlace& where, std::uint64_t& silenced_before) {
 void Log::write(Severity severity, const std::string& message, Fields fields, const CodePlace& where) const {
   if (!to_journal_) {
     static constexpr std::array<std::string_view, 7> kWords{"", "", "", "error: ", "warning: ", "", ""};
-    fmt::print(stderr, "locusd: {}{}\n", kWords[static_cast<std::size_t>(severity)], message);
+    const std::string line = fmt::format("locusd: {}{}\n", kWords[static_cast<std::size_t>(severity)], message);
+    static_cast<void>(std::fputs(line.c_str(), stderr)); // a log that is full ends no service
     return;
   }
   std::vector<std::string> lines{fmt::format("MESSAGE={}", message),

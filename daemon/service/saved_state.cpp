@@ -8,16 +8,20 @@
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <fstream>
 #include <iterator>
 #include <span>
 #include <string_view>
+#include <system_error>
 #include <type_traits>
 
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <pthread.h>
 #include <unistd.h>
+
+#include "daemon/machine_time.hpp"
 
 namespace locus::daemon {
 
@@ -212,9 +216,19 @@ StateKeeper::~StateKeeper() {
     thread_.join();
 }
 
+/// A clock that was set back does not put it off.
 bool StateKeeper::is_due() const {
-  return !saved_ || now_->stamp - saved_->stamp > kEvery ||
+  return !saved_ || std::chrono::abs(now_->stamp - saved_->stamp) > kEvery ||
          (now_->T_odom_base.translation - saved_->T_odom_base.translation).norm() > kEvery_m;
+}
+
+void StateKeeper::begin_anew(const std::optional<Pose>& T_odom_base, FlatGround flat_ground) {
+  now_ = T_odom_base ? std::optional{Whereabouts{Stamp{read_clock(CLOCK_REALTIME)}, *T_odom_base}} : std::nullopt;
+  saved_.reset();
+  Due& due = states_.back();
+  due = {++number_, now_.has_value(), {now_.value_or(Whereabouts{}), flat_ground, {}}};
+  static_cast<void>(states_.publish());
+  wakeup_.notify();
 }
 
 void StateKeeper::take(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground) {
@@ -223,31 +237,41 @@ void StateKeeper::take(const Odometry& odometry, const OdometryEstimate& estimat
     return;
   if (!estimate.failed && is_due()) {
     saved_ = now_;
-    SavedState& state = states_.back();
-    state.last = *now_;
-    state.flat_ground = flat_ground;
-    read_map(odometry, now_->T_odom_base, state.map_odom);
+    Due& due = states_.back();
+    due.number = ++number_;
+    due.exists = true;
+    due.state.last = *now_;
+    due.state.flat_ground = flat_ground;
+    read_map(odometry, now_->T_odom_base, due.state.map_odom);
     static_cast<void>(states_.publish()); // an older one that was not written yet is worth nothing any more
   }
-  whereabouts_.back() = *now_;
+  whereabouts_.back() = {number_, *now_};
   static_cast<void>(whereabouts_.publish());
   wakeup_.notify();
 }
 
-/// The whereabouts are taken first: a map that belongs to them is then there, or has been written.
+/// Whether the file is as it is to be.
+bool StateKeeper::write(const Due& due) const {
+  if (!due.exists) {
+    std::error_code ignored; // there was none
+    return std::filesystem::remove(*file_, ignored);
+  }
+  const auto problem = write_state(*file_, due.state);
+  if (problem)
+    complain_(*problem);
+  return !problem;
+}
+
+/// The whereabouts are taken first: the state that they belong to is then there, or has been written.
 void StateKeeper::run() {
-  Stamp written = Stamp::max(); ///< of the map that lies in the file
+  std::optional<std::uint64_t> written; ///< number of the state that lies in the file
   while (!stopping_.load(std::memory_order_relaxed)) {
     wakeup_.wait_for(std::chrono::milliseconds{500});
-    const Whereabouts* const last = whereabouts_.take();
-    if (const SavedState* const state = states_.take()) {
-      const auto problem = write_state(*file_, *state);
-      written = problem ? Stamp::max() : state->last.stamp;
-      if (problem)
-        complain_(*problem);
-    }
-    if (last != nullptr && last->stamp > written)
-      update_whereabouts(*file_, *last);
+    const Update* const update = whereabouts_.take();
+    if (const Due* const due = states_.take())
+      written = write(*due) && due->exists ? std::optional{due->number} : std::nullopt;
+    if (update != nullptr && update->number == written)
+      update_whereabouts(*file_, update->last);
   }
 }
 

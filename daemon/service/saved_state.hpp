@@ -73,18 +73,33 @@ class StateKeeper {
   /// Producer: nothing before the first estimate.
   [[nodiscard]] const std::optional<Whereabouts>& now() const { return now_; }
 
-  /// Producer: what was written is no longer true; the next state is written at once.
-  void begin_anew() { saved_.reset(); }
+  /// Producer: what was written is no longer true. Until the next estimate there is nothing to go on from but the pose
+  /// that was told, if any.
+  void begin_anew(const std::optional<Pose>& T_odom_base, FlatGround flat_ground);
 
  private:
+  /// What is to lie in the file; nothing: no file is to be there.
+  struct Due {
+    std::uint64_t number = 0;
+    bool exists = false;
+    SavedState state;
+  };
+  /// Of the same odom frame as the state with that number.
+  struct Update {
+    std::uint64_t number = 0;
+    Whereabouts last;
+  };
+
   void run();
   [[nodiscard]] bool is_due() const;
+  [[nodiscard]] bool write(const Due& due) const;
 
   std::optional<std::filesystem::path> file_;
   Complain complain_;
-  LatestSlot<SavedState> states_;
-  LatestSlot<Whereabouts> whereabouts_;
+  LatestSlot<Due> states_;
+  LatestSlot<Update> whereabouts_;
   std::optional<Whereabouts> now_, saved_; ///< after the last estimate, and of the state taken last; of the producer
+  std::uint64_t number_ = 0;               ///< of the state handed over last; of the producer
   Wakeup wakeup_;
   std::atomic<bool> stopping_{false};
   std::thread thread_;

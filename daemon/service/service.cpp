@@ -6,6 +6,7 @@
 #include <span>
 #include <thread>
 #include <utility>
+#include <variant>
 
 #include <fmt/format.h>
 #include <poll.h>
@@ -19,6 +20,7 @@
 #include "daemon/service/lidar_sockets.hpp"
 #include "daemon/service/realtime.hpp"
 #include "daemon/service/status.hpp"
+#include "drivers/lidar_input.hpp"
 
 namespace locus::daemon {
 
@@ -41,9 +43,14 @@ int open_signals() {
 } // namespace
 
 Expected<Config, ConfigErrors> read_config(const std::filesystem::path& file) {
-  if (file.empty())
-    return Config{};
-  return load_config(file);
+  Expected<Config, ConfigErrors> config = Config{};
+  if (!file.empty())
+    config = load_config(file);
+  if (!config)
+    return config;
+  if (const auto lidars = LidarRouter::open(config->lidars); !lidars)
+    return ConfigErrors{lidars.error()};
+  return config;
 }
 
 Service::Service(std::filesystem::path config_file, Log& log)
@@ -60,15 +67,17 @@ int Service::run(const Config& config) {
     log_.warn(*problem);
   if (const auto problem = config.realtime.lock_memory ? lock_memory() : std::nullopt)
     log_.warn(*problem);
-  if (!begin(config, recent_state()))
+  if (const auto problem = begin(config, recent_state())) {
+    log_.error(*problem);
     return 1;
-  auto control = ControlServer::open(control_path(), [this](const nlohmann::json& request) { return answer(request); });
+  }
+  auto control = ControlServer::open(control_path(), [this](const ControlRequest& request) { return answer(request); });
   if (control)
     control_ = std::move(*control);
   else
     log_.warn(control.error());
   sd_notify(0, "READY=1");
-  for (bool wanted = true; wanted;) {
+  for (bool wanted = true; wanted && session_;) {
     std::vector<pollfd> wait{{signals_, POLLIN, 0}};
     if (control_)
       control_->add_to(wait);
@@ -80,10 +89,12 @@ int Service::run(const Config& config) {
     look_after();
   }
   sd_notify(0, "STOPPING=1\nSTATUS=Stopping");
+  if (!session_)
+    return 1;
   watch_.reset();
-  if (session_)
-    keep_state(session_->stop());
-  session_.reset();
+  const std::optional<SavedState> state = session_->stop();
+  session_.reset(); // with who else writes states
+  keep_state(state);
   log_.info("stopped");
   return 0;
 }
@@ -108,7 +119,7 @@ std::optional<SavedState> Service::recent_state() {
   return std::move(*state);
 }
 
-void Service::keep_state(std::optional<SavedState> state) {
+void Service::keep_state(const std::optional<SavedState>& state) {
   const auto file = state_path();
   if (!file || !state)
     return;
@@ -116,39 +127,52 @@ void Service::keep_state(std::optional<SavedState> state) {
     log_.error(*problem);
 }
 
-bool Service::begin(const Config& config, std::optional<SavedState> state) {
+std::optional<std::string> Service::begin(const Config& config, std::optional<SavedState> state) {
   watch_.reset();
   session_.reset();
   auto session = Session::start(config, inherited_, std::move(state), log_);
-  if (!session) {
-    log_.error(session.error());
-    return false;
-  }
+  if (!session)
+    return session.error();
   session_ = std::move(*session);
+  map_asked_.reset();
   watch_.emplace(*session_, log_);
-  return true;
+  return std::nullopt;
 }
 
-std::optional<std::string> Service::reload() {
+ControlServer::Answer Service::reload() {
+  using Answer = ControlServer::Answer;
   sd_notify(0, fmt::format("RELOADING=1\nMONOTONIC_USEC={}", read_clock(CLOCK_MONOTONIC).count() / 1000).c_str());
-  std::optional<std::string> problem;
-  const auto config = read_config(config_file_);
-  const Config old = session_->config();
-  if (!config) {
-    problem = fmt::format("{}", fmt::join(config.error(), "; "));
-  } else {
-    std::optional<SavedState> state = session_->stop();
-    if (state)
-      state->flat_ground = config->odometry.flat_ground;
-    if (!begin(*config, state))
-      problem =
-          begin(old, state) ? "its sockets cannot be opened" : "its sockets cannot be opened, nor can the old ones";
-  }
-  if (problem)
-    log_.error(fmt::format("reload refused, the old configuration stays in force: {}", *problem));
+  Answer answer = Answer::done();
+  if (const auto config = read_config(config_file_); !config)
+    answer = Answer::wrong_usage(fmt::format("{}", fmt::join(config.error(), "; ")));
+  else if (const auto problem = go_on_with(*config))
+    answer = Answer::refusal(*problem);
+  if (answer.json.contains("error"))
+    log_.error(fmt::format("reload refused, the old configuration stays in force: {}",
+                           answer.json["error"].get<std::string>()));
   else
     log_.info("reloaded");
   sd_notify(0, "READY=1");
+  return answer;
+}
+
+/// The odometry goes on where it is. Where the new sockets cannot be had, with the old configuration: it had to let go
+/// of its own, for they may be the same.
+std::optional<std::string> Service::go_on_with(const Config& config) {
+  const Config old = session_->config();
+  std::optional<SavedState> state = session_->stop();
+  if (!state) // no sweep has come yet
+    state = recent_state();
+  std::optional<SavedState> its_state = state;
+  if (its_state)
+    its_state->flat_ground = config.odometry.flat_ground;
+  auto problem = begin(config, std::move(its_state));
+  if (!problem)
+    return std::nullopt;
+  if (const auto old_problem = begin(old, state)) {
+    *problem += "; nor does the old configuration work any more, the service ends: " + *old_problem;
+    keep_state(state);
+  }
   return problem;
 }
 
@@ -158,52 +182,46 @@ bool Service::take_signal() {
   while (read(signals_, &info, sizeof(info)) == static_cast<ssize_t>(sizeof(info))) {
     if (info.ssi_signo != SIGHUP)
       return false;
-    if (reload() && !session_)
-      return false;
+    reload();
   }
   return true;
 }
 
-std::optional<ControlServer::Answer> Service::answer(const nlohmann::json& request) {
-  using Answer = ControlServer::Answer;
-  const auto done = [] { return Answer{{{"done", true}}, {}}; };
-  const auto refused = [](const std::string& why) { return Answer{{{"error", why}}, {}}; };
-  const std::string command = request["command"];
-  if (command == "status")
-    return Answer{status_json(*session_), {}};
-  if (command == "save-map")
-    return answer_map();
-  if (command == "flat-ground") {
-    const std::string mode = request["mode"];
-    if (mode != "on" && mode != "off" && mode != "auto")
-      return refused("flat-ground must be on, off or auto");
-    session_->set_flat_ground(mode == "on" ? FlatGround::on : mode == "off" ? FlatGround::off : FlatGround::automatic);
-    return done();
-  }
-  if (command == "reset") {
-    std::optional<Pose> T_odom_base;
-    if (request.contains("pose")) {
-      const auto v = request["pose"].get<std::array<double, 6>>();
-      T_odom_base = Pose{from_rpy_rad(Eigen::Vector3d{v[3], v[4], v[5]} * kRadPerDeg), {v[0], v[1], v[2]}};
-    }
-    session_->reset(T_odom_base);
-    return done();
-  }
-  if (command == "reload") {
-    const auto problem = reload();
-    return problem ? refused(*problem) : done();
-  }
-  return refused(fmt::format("unknown command {}; use locusctl of the same version", command));
+std::optional<ControlServer::Answer> Service::answer(const ControlRequest& request) {
+  if (!session_) // another client's reload has ended it
+    return ControlServer::Answer::refusal("the service ends; look at: journalctl -u locusd");
+  return std::visit([this](const auto& one) { return answer(one); }, request);
 }
 
-/// The points of the map as they lie in memory. Nothing until the odometry thread has brought them.
-std::optional<ControlServer::Answer> Service::answer_map() {
-  if (!std::exchange(map_asked_, true))
+std::optional<ControlServer::Answer> Service::answer(ShowStatus /*request*/) {
+  return ControlServer::Answer{status_json(*session_), {}};
+}
+
+std::optional<ControlServer::Answer> Service::answer(SetFlatGround request) {
+  session_->set_flat_ground(request.mode);
+  return ControlServer::Answer::done();
+}
+
+std::optional<ControlServer::Answer> Service::answer(const Reset& request) {
+  if (const auto problem = session_->reset(request.T_odom_base))
+    return ControlServer::Answer::refusal(*problem);
+  return ControlServer::Answer::done();
+}
+
+std::optional<ControlServer::Answer> Service::answer(Reload /*request*/) { return reload(); }
+
+/// The points of the map as they lie in memory. Nothing until the odometry thread has brought them. One that comes
+/// after nobody waits for it any more is of another time.
+std::optional<ControlServer::Answer> Service::answer(SaveMap /*request*/) {
+  const Duration now = read_clock(CLOCK_MONOTONIC);
+  if (!map_asked_ || now - *map_asked_ > ControlServer::kLongestAnswer) {
     session_->request_map();
+    map_asked_ = now;
+  }
   const std::vector<SurfacePoint>* const points = session_->take_map();
   if (points == nullptr)
     return std::nullopt;
-  map_asked_ = false;
+  map_asked_.reset();
   const auto bytes = std::as_bytes(std::span(*points));
   return ControlServer::Answer{{{"points", points->size()}}, {bytes.begin(), bytes.end()}};
 }

@@ -15,7 +15,7 @@
 
 namespace locus::daemon {
 
-/// Without a file, every key has its default.
+/// Without a file, every key has its default. What it names has been read, too: the calibrations of the lidars.
 Expected<Config, ConfigErrors> read_config(const std::filesystem::path& file);
 
 /// The life of the service in the main thread: start, look after the session, reload, stop.
@@ -30,13 +30,19 @@ class Service {
   int run(const Config& config);
 
  private:
-  bool begin(const Config& config, std::optional<SavedState> state);
+  /// What failed, if anything did: there is no session then.
+  std::optional<std::string> begin(const Config& config, std::optional<SavedState> state);
   [[nodiscard]] std::optional<SavedState> recent_state();
-  void keep_state(std::optional<SavedState> state);
-  std::optional<ControlServer::Answer> answer(const nlohmann::json& request);
-  std::optional<ControlServer::Answer> answer_map();
+  void keep_state(const std::optional<SavedState>& state);
+  std::optional<ControlServer::Answer> answer(const ControlRequest& request);
+  std::optional<ControlServer::Answer> answer(ShowStatus request);
+  std::optional<ControlServer::Answer> answer(SaveMap request);
+  std::optional<ControlServer::Answer> answer(SetFlatGround request);
+  std::optional<ControlServer::Answer> answer(const Reset& request);
+  std::optional<ControlServer::Answer> answer(Reload request);
   /// Takes the configuration file again; a bad one leaves the old configuration in force, and that is said.
-  std::optional<std::string> reload();
+  ControlServer::Answer reload();
+  std::optional<std::string> go_on_with(const Config& config);
   void look_after();
   void tell_world();
   bool take_signal();
@@ -47,7 +53,7 @@ class Service {
   int signals_; ///< signalfd
   std::unique_ptr<Session> session_;
   std::optional<ControlServer> control_;
-  bool map_asked_ = false;
+  std::optional<Duration> map_asked_; ///< when the session was; nothing: no answer is waited for
   std::optional<Watch> watch_;
   Watchdog watchdog_;
   Duration told_{};

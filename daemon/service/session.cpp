@@ -54,7 +54,8 @@ Session::Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket
       flat_ground_(state ? state->flat_ground : config.odometry.flat_ground),
       link_(config, [this](const RosInput& input) { receive(input); }), clouds_(config.dds, link_),
       state_(state_path(), [this](const std::string& problem) { log_.error(problem); }) {
-  tells_resumed_ = state.has_value(); // NOLINT(cppcoreguidelines-prefer-member-initializer): stands after its like
+  // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): stands after its like
+  tells_resumed_ = state.has_value() && !state->map_odom.empty(); // without a map it begins where it was told to
   std::optional<StartPoint> start;
   if (state)
     start = {state->last.carried_to(Stamp{read_clock(CLOCK_REALTIME)}), std::move(state->map_odom)};
@@ -109,9 +110,12 @@ void Session::after(const Sweep& sweep, const Odometry& odometry, const Odometry
     resumed_.store(odometry.resumed() ? Resumed::yes : Resumed::no, std::memory_order_relaxed);
   clouds_.take(sweep, odometry, estimate);
   state_.take(odometry, estimate, flat_ground());
-  if (!map_wanted_.exchange(false, std::memory_order_relaxed))
+  const std::uint64_t wanted = map_wanted_.load(std::memory_order_relaxed);
+  if (wanted == map_answered_)
     return;
-  std::vector<SurfacePoint>& points = map_.back();
+  map_answered_ = wanted;
+  map_.back().request = wanted;
+  std::vector<SurfacePoint>& points = map_.back().points;
   points.clear();
   const SurfaceGrid& grid = odometry.map().fine();
   for (std::size_t slot = 0; slot < grid.size(); ++slot)
@@ -120,16 +124,20 @@ void Session::after(const Sweep& sweep, const Odometry& odometry, const Odometry
   static_cast<void>(map_.publish());
 }
 
-void Session::reset(std::optional<Pose> T_odom_base) {
+const std::vector<SurfacePoint>* Session::take_map() {
+  const Map* const map = map_.take();
+  return map != nullptr && map->request == map_wanted_.load(std::memory_order_relaxed) ? &map->points : nullptr;
+}
+
+std::optional<std::string> Session::reset(std::optional<Pose> T_odom_base) {
   auto lidars = LidarRouter::open(config_.lidars);
-  if (!lidars) {
-    log_.error(fmt::format("reset refused: {}", lidars.error()));
-    return;
-  }
+  if (!lidars)
+    return lidars.error();
   end();
-  state_.begin_anew();
+  state_.begin_anew(T_odom_base, flat_ground());
   begin(std::move(*lidars), T_odom_base ? std::optional{StartPoint{*T_odom_base, {}}} : std::nullopt);
   log_.info("odometry begins anew, as it was told to");
+  return std::nullopt;
 }
 
 std::optional<SavedState> Session::stop() {

@@ -54,15 +54,16 @@ class Session {
   };
   [[nodiscard]] Progress progress() const;
 
-  /// Begins anew, at a pose or level at the origin, with an empty map.
-  void reset(std::optional<Pose> T_odom_base);
+  /// Begins anew, at a pose or level at the origin, with an empty map. Says why not, where a calibration cannot be read
+  /// any more: all goes on as it was then.
+  std::optional<std::string> reset(std::optional<Pose> T_odom_base);
 
   /// Ends the live threads for good, and tells what another session needs to go on; nothing without an estimate.
   std::optional<SavedState> stop();
 
-  /// Asks for the surfaces of the map, which come with the next sweep.
-  void request_map() { map_wanted_.store(true, std::memory_order_relaxed); }
-  [[nodiscard]] const std::vector<SurfacePoint>* take_map() { return map_.take(); }
+  /// Asks for the surfaces of the map, which come with the next sweep. An earlier request is forgotten.
+  void request_map() { map_wanted_.fetch_add(1, std::memory_order_relaxed); }
+  [[nodiscard]] const std::vector<SurfacePoint>* take_map();
 
   void set_flat_ground(FlatGround mode);
   [[nodiscard]] FlatGround flat_ground() const { return flat_ground_.load(std::memory_order_relaxed); }
@@ -94,8 +95,13 @@ class Session {
   enum class Resumed : std::uint8_t { unknown, yes, no };
   std::atomic<Resumed> resumed_{Resumed::unknown};
   bool tells_resumed_ = false; ///< of the publisher
-  std::atomic<bool> map_wanted_{false};
-  LatestSlot<std::vector<SurfacePoint>> map_;
+  struct Map {
+    std::uint64_t request = 0;
+    std::vector<SurfacePoint> points;
+  };
+  std::atomic<std::uint64_t> map_wanted_{0}; ///< number of the last request
+  std::uint64_t map_answered_ = 0;           ///< of the odometry thread
+  LatestSlot<Map> map_;
   RosLink link_;
   CloudPublisher clouds_;
   StateKeeper state_;

@@ -88,6 +88,7 @@ ordered_json sources_json(const Config& config, const LiveFigures::Snapshot& fig
     json["verdict"] = source.verdict;
     json["writers"] = link.sources[i].writers;
     json["refused"] = link.sources[i].refused;
+    json["health_refused"] = link.sources[i].health_refused;
     sources[config.odometry.motion_sources[i].name] = json;
   }
   return sources;
@@ -152,6 +153,7 @@ ordered_json status_json(Session& session) {
                      {"overflowed_points", builder.overflowed_points},
                      {"motion_samples", session.input().motion_drops()},
                      {"flood_datagrams", session.input().filtered()},
+                     {"flat_ground_messages", link.flat_ground_refused},
                      {"estimates_unfetched", session.pipeline().unfetched()},
                      {"estimates_unpublished", figures.unpublished}};
   json["restarts"] = builder.restarts;

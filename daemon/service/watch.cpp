@@ -144,15 +144,20 @@ void Watch::look_at_drops() {
 }
 
 void Watch::look_at_intruders(const RosLink::Status& link) {
+  const Config& config = session_.config();
+  const auto tell = [this](std::uint64_t refused, const std::string& topic, const std::string& source) {
+    if (refused > 0 && intruded_.insert(topic).second)
+      log_.warn(fmt::format("{}messages on {} are refused, for another publishes there, too, or more come than any "
+                            "sensor sends; give each publisher a topic of its own",
+                            source.empty() ? "" : "motion source " + source + ": ", topic),
+                {{"LOCUS_SOURCE", source}});
+  };
   for (std::size_t i = 0; i < link.sources.size(); ++i) {
-    const std::string& name = session_.config().odometry.motion_sources[i].name;
-    if (link.sources[i].refused > 0 && intruded_.insert(name).second)
-      log_.warn(
-          fmt::format("motion source {}: samples on {} are refused, for another publishes there, too, or more come "
-                      "than any sensor sends; give each publisher a topic of its own",
-                      name, session_.config().source_topics[i].topic),
-          {{"LOCUS_SOURCE", name}});
+    const std::string& name = config.odometry.motion_sources[i].name;
+    tell(link.sources[i].refused, config.source_topics[i].topic, name);
+    tell(link.sources[i].health_refused, config.source_topics[i].health_topic, name);
   }
+  tell(link.flat_ground_refused, config.dds.flat_ground_topic, "");
 }
 
 /// What is dropped while the disk takes nothing goes without saying.
@@ -160,7 +165,8 @@ void Watch::look_at_recording(const Recorder::Status& recording) {
   const std::uint64_t dropped = recording.dropped - std::min(recording.dropped, recording_.dropped);
   if (recording_.problem.empty() && !recording.problem.empty())
     log_.error(fmt::format("{}; the odometry goes on without a recording", recording.problem));
-  else if (recording.run != recording_.run || (!recording_.problem.empty() && recording.problem.empty()))
+  else if (!recording.run.empty() &&
+           (recording.run != recording_.run || (!recording_.problem.empty() && recording.problem.empty())))
     log_.info(fmt::format("recording to {}", recording.run.string()));
   else if (recording.problem.empty() && dropped > 0)
     log_.warn(

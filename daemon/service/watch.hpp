@@ -50,7 +50,7 @@ class Watch {
   std::array<Lidar, Config::kMaxLidars> lidars_;
   std::array<std::string_view, Sweep::kMaxSources> verdicts_; ///< as they were told
   std::set<std::string> unheard_;                             ///< sources that were told of
-  std::set<std::string> intruded_;                            ///< sources that were told of
+  std::set<std::string> intruded_;                            ///< topics that were told of
   std::uint64_t kernel_drops_ = 0, filtered_ = 0, sweep_drops_ = 0;
   Recorder::Status recording_; ///< as it was told
   Duration joined_{}, weighed_{};

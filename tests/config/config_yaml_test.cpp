@@ -219,6 +219,10 @@ TEST(ConfigYaml, EveryKindOfBadValueIsRefusedWithItsKeyAndReason) {
       {"dds.prefix=/locus//", "is no topic"},
       {"dds.frame_base=odom", "must differ from frame_odom"},
       {"dds.flat_ground_topic=flat", "is no topic"},
+      {"dds.flat_ground_topic=/imu/data", "'/imu/data' cannot carry Bool here and Imu elsewhere"},
+      {"motion_sources.wio.topic=/imu/data", "cannot carry Imu here and Odometry elsewhere"},
+      {"motion_sources.imu.health_topic=/imu/data", "cannot carry Bool here and Imu elsewhere"},
+      {"lidars.0.name=kernel_drops", "is taken"},
   };
   for (const BadValue& bad : bad_values) {
     const ConfigErrors errors = errors_with({bad.assignment});

@@ -97,6 +97,18 @@ TEST(CaptureRing, DiskThatIsTooSmallIsNotEmptiedForNothing) {
   EXPECT_TRUE(std::filesystem::exists(piece));
 }
 
+TEST(CaptureRing, FolderThatWasRemovedIsMadeAgain) {
+  const test::TemporaryFolder folder;
+  CaptureRing ring(folder / "record", kMaxBytes);
+  for (int i = 0; i < 3; ++i)
+    fill_piece(ring);
+  std::filesystem::remove_all(folder / "record");
+  EXPECT_TRUE(contains(error_of(ring.begin_piece(kNow)), "record: cannot be looked at"));
+  const std::filesystem::path piece = fill_piece(ring);
+  EXPECT_TRUE(std::filesystem::exists(piece));
+  EXPECT_LT(ring.bytes(), kMaxBytes / 10) << "what is gone takes no room";
+}
+
 TEST(CaptureRing, FolderThatCannotBeMadeIsAnError) {
   const test::TemporaryFolder folder;
   std::ofstream{folder / "plain"} << "a file";

@@ -171,6 +171,21 @@ TEST(Recorder, WhatTheDiskIsTooSlowForIsDroppedAndCounted) {
   EXPECT_GE(recorder.status().recorded, Recorder::kMaxUnwritten);
 }
 
+/// Who keeps floods out is to know the lidars whether or not all is recorded.
+TEST(Recorder, TellsTheSourceOfTheLidars) {
+  struct Source : InputSource {
+    const LidarRouter* told = nullptr;
+    Input next(Duration /*timeout*/) override { return EndOfInput{}; }
+    void expect(const LidarRouter& lidars) override { told = &lidars; }
+  } source;
+  const test::TemporaryFolder folder;
+  Recorder recorder(folder / "record", recorded_config());
+  const auto lidars = LidarRouter::open(recorded_config().lidars);
+  ASSERT_TRUE(lidars);
+  RecordingInput(source, recorder).expect(*lidars);
+  EXPECT_EQ(source.told, &*lidars);
+}
+
 TEST(Recorder, NothingIsMadeBeforeTheFirstInput) {
   const test::TemporaryFolder folder;
   {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A participant made with Cyclone DDS: cyclone_peer DOMAIN listen|talk|flood|mistype PREFIX. See peer_words.hpp.
+// A participant made with Cyclone DDS: cyclone_peer DOMAIN listen|talk|command|flood|mistype PREFIX. See
+// peer_words.hpp.
 #include <array>
 #include <cstdlib>
 #include <limits>
@@ -62,6 +63,7 @@ void talk(const DdsNode& node) {
   const DdsWriter<ros::Imu> imus{node, "/imu/data", {false, 5}};
   const DdsWriter<ros::Odometry> odometries{node, "/wheel_odometry", TopicQos::standard()};
   const DdsWriter<ros::Bool> healths{node, "/wheel_health", TopicQos::standard()};
+  const DdsWriter<ros::Bool> grounds{node, "/flat_ground", TopicQos::standard()};
   std::string empty;
   talk_on([&](int i) {
     const Said said(i);
@@ -76,7 +78,16 @@ void talk(const DdsNode& node) {
     odometry.pose_.pose_.position_.x_ = said.figure;
     odometry.pose_.pose_.orientation_.w_ = 1;
     odometry.twist_.covariance_[0] = 0.01;
-    if (!imus.write(imu) || !odometries.write(odometry) || !healths.write({i % 2 == 0}))
+    if (!imus.write(imu) || !odometries.write(odometry) || !healths.write({i % 2 == 0}) || !grounds.write({true}))
+      throw std::runtime_error("DDS did not take a message");
+  });
+}
+
+/// Nothing but that the ground is not flat.
+void command(const DdsNode& node) {
+  const DdsWriter<ros::Bool> grounds{node, "/flat_ground", TopicQos::standard()};
+  talk_on([&](int /*i*/) {
+    if (!grounds.write({false}))
       throw std::runtime_error("DDS did not take a message");
   });
 }
@@ -85,7 +96,9 @@ void talk(const DdsNode& node) {
 void flood(const DdsNode& node) {
   const DdsWriter<ros::Imu> imus{node, "/imu/data", {false, 5}};
   const DdsWriter<ros::Odometry> odometries{node, "/wheel_odometry", {false, 5}};
-  const DdsWriter<ros::Bool> healths{node, "/wheel_health", {false, 5}};
+  const DdsWriter<ros::Bool> healths{node, "/wheel_health", TopicQos::standard()}; // others are not heard
+  const DdsWriter<ros::Bool> grounds{node, "/flat_ground", TopicQos::standard()};
+  constexpr std::uint32_t kWords = 64; ///< who waits for those who hear floods less
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN(), kEndless = std::numeric_limits<double>::infinity();
   constexpr std::array kAbsurd{kNone, kEndless, -kEndless, 1e300, -1e300, 1e-300, 0.0, 1e9};
   std::string empty, large(60'000, 'x');
@@ -106,7 +119,10 @@ void flood(const DdsNode& node) {
     odometry.twist_.covariance_[0] = absurd;
     sent += imus.write(imu) ? 1U : 0U;
     sent += odometries.write(odometry) ? 1U : 0U;
-    sent += healths.write({i % 2 == 0}) ? 1U : 0U;
+    if (i % kWords == 0) {
+      sent += healths.write({i % (2 * kWords) == 0}) ? 1U : 0U;
+      sent += grounds.write({true}) ? 1U : 0U;
+    }
   }
   tell("flooded {}", sent);
 }
@@ -122,7 +138,8 @@ void mistype(const DdsNode& node) {
 
 void run(int argc, char** argv) {
   if (argc < 4 || argc > 6)
-    throw std::runtime_error("usage: cyclone_peer DOMAIN listen|talk|flood|mistype PREFIX [INTERFACE [ENCLAVE]]");
+    throw std::runtime_error(
+        "usage: cyclone_peer DOMAIN listen|talk|command|flood|mistype PREFIX [INTERFACE [ENCLAVE]]");
   DdsOptions options;
   options.domain = std::atoi(argv[1]); // NOLINT
   if (argc >= 5)
@@ -135,6 +152,8 @@ void run(int argc, char** argv) {
   const std::string role = argv[2];
   if (role == "talk")
     talk(*node);
+  else if (role == "command")
+    command(*node);
   else if (role == "flood")
     flood(*node);
   else if (role == "mistype")

@@ -13,6 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/dds/dds_node.hpp"
+#include "daemon/dds/ros_messages.hpp"
 #include "dds/peer_words.hpp"
 #include "support/child.hpp"
 #include "support/dds_domain.hpp"
@@ -63,6 +65,7 @@ Config config_in(const test::DdsDomain& domain) {
   config.dds.domain = domain.number();
   config.dds.prefix = "/robot_7/locus";
   config.dds.publish_tf = config.dds.publish_cloud = config.dds.publish_map = true;
+  config.dds.flat_ground_topic = "/flat_ground";
   config.source_topics[0].health_topic = "/wheel_health";
   return config;
 }
@@ -174,6 +177,8 @@ TEST(RosLink, TopicBelongsToTheFirstPublisherUntilItGoes) {
   const test::Child second(talker);
   const auto imu = [&] { return link.status().sources[1]; };
   ASSERT_TRUE(eventually([&] { return imu().refused > 100; }));
+  EXPECT_TRUE(eventually([&] { return link.status().sources[0].health_refused > 100; }));
+  EXPECT_TRUE(eventually([&] { return link.status().flat_ground_refused > 100; }));
   const auto is_in_order = [&] {
     double last = -1;
     return std::ranges::all_of(inbox.all<ImuInput>(), [&](const ImuInput& one) {
@@ -187,6 +192,23 @@ TEST(RosLink, TopicBelongsToTheFirstPublisherUntilItGoes) {
   const auto left = std::chrono::steady_clock::now();
   EXPECT_TRUE(eventually([&] { return !is_in_order(); }));
   EXPECT_LT(std::chrono::steady_clock::now() - left, seconds{1});
+}
+
+/// Idle writers that nobody needs are no reason to take a topic from its owner.
+TEST(RosLink, ManyWritersDoNotHideTheOwner) {
+  const test::DdsDomain domain;
+  DdsOptions options;
+  options.domain = domain.number();
+  const auto node = DdsNode::open(options);
+  ASSERT_TRUE(node) << node.error();
+  const DdsReader<ros::Bool> reader{*node, "/word", TopicQos::standard()};
+  std::vector<DdsWriter<ros::Bool>> writers;
+  for (int i = 0; i < 100; ++i)
+    writers.emplace_back(*node, "/word", TopicQos::standard());
+  ASSERT_TRUE(eventually([&] { return reader.writers() == writers.size(); }));
+  std::vector<dds_instance_handle_t> all(writers.size());
+  ASSERT_EQ(dds_get_matched_publications(reader.handle(), all.data(), all.size()), all.size());
+  EXPECT_TRUE(std::ranges::all_of(all, [&](dds_instance_handle_t writer) { return reader.hears(writer); }));
 }
 
 /// A robot is told apart from another by its prefix, or by its domain. Each says where it is by a figure of its own.

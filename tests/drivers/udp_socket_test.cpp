@@ -109,6 +109,23 @@ TEST(UdpSocket, TakesOverWhatIsBoundToBothFamilies) {
   EXPECT_EQ(datagrams[0].source_ip, INADDR_LOOPBACK);
 }
 
+TEST(UdpSocket, WhatAnOwnerBeforeHasLostIsNotItsOwn) {
+  UdpSocket first = open_any();
+  const int again = dup(first.descriptor());
+  const UdpSender sender;
+  const std::vector<std::byte> packet(1206);
+  for (std::size_t i = 0; i < 2 * static_cast<std::size_t>(first.buffer_bytes()) / packet.size() + 1000; ++i)
+    sender.send(first.port(), packet);
+  while (!first.receive().empty()) {
+  }
+  ASSERT_GT(first.kernel_drops(), 0U);
+  auto second = UdpSocket::adopt(again);
+  ASSERT_TRUE(second) << second.error();
+  sender.send(second->port(), packet);
+  EXPECT_EQ(second->receive().size(), 1U);
+  EXPECT_EQ(second->kernel_drops(), 0U);
+}
+
 TEST(UdpSocket, TakesOverALargerBufferAsItIs) {
   const int large = ::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   const int wanted = 4 * UdpSocket::kWantedBufferBytes;

@@ -145,8 +145,9 @@ class FloodOfDds : public Flood {
 TEST_F(FloodOfDds, BesideTheSensorsChangesNothingButACounter) {
   const Replay replay({"--quiet", capture().string()});
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
-  Child daemon(undisturbed(locusd(config())));
+  Child daemon(undisturbed(locusd(config("flat_ground: off\ndds: {flat_ground_topic: /flat_ground}\n"))));
   const Child mistyped(peer("mistype"));
+  const Child commander(peer("command"));
   Child listener(undisturbed(peer("listen")));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
   Child play(undisturbed({LOCUS_PLAY, capture().string()}));
@@ -170,6 +171,8 @@ TEST_F(FloodOfDds, BesideTheSensorsChangesNothingButACounter) {
     record((std::string(name) + "_refused").c_str(), source["refused"].get<double>());
   }
   EXPECT_TRUE(daemon.wait_for_line("another publishes there", {}));
+  EXPECT_GT(after["dropped"]["flat_ground_messages"], 100);
+  EXPECT_FALSE(daemon.wait_for_line("flat ground is on", {})) << "as the flood says";
   EXPECT_LT(worst_distance_m(replay.trajectory(), heard(listener), shift_of(play)), 0.05);
   EXPECT_LT(after["peak_rss_mb"].get<double>(), before["peak_rss_mb"].get<double>() + 50);
   const double elapsed_s = after["duration_s"].get<double>() - before["duration_s"].get<double>();

@@ -21,6 +21,7 @@
 #include "drivers/udp_socket.hpp"
 #include "service/robot_network.hpp"
 #include "service/undisturbed.hpp"
+#include "support/errors.hpp"
 
 namespace locus::test {
 namespace {
@@ -95,6 +96,16 @@ TEST_F(LifeCycle, ConfigurationIsCheckedAndPrinted) {
   const ProgramRun bad = run_program(LOCUSD, {"--config", file("bad.yaml").string(), "--check-config"});
   EXPECT_EQ(bad.status, 2);
   EXPECT_NE(bad.err.find("bad.yaml:2"), std::string::npos) << bad.err;
+}
+
+TEST_F(LifeCycle, CalibrationThatCannotBeReadIsAWrongConfiguration) {
+  for (const char* option : {"--check-config", "--print-config"}) {
+    const ProgramRun bad = run_program(LOCUSD, {"--config", lidar_with("calibration: nothere.yaml").string(), option});
+    EXPECT_EQ(bad.status, 2) << option;
+    EXPECT_EQ(bad.out, "");
+    EXPECT_TRUE(contains(bad.err, "lidars.front.calibration: nothere.yaml: cannot be read")) << bad.err;
+  }
+  EXPECT_EQ(run_program(LOCUSD, {"--config", file("wrong.yaml").string()}).status, 2);
 }
 
 /// Ready does not wait for sensors, the watchdog is fed without any, a stop is told and takes less than a second.
@@ -202,13 +213,107 @@ TEST_F(LifeCycle, BadConfigurationAtReloadLeavesTheOldOneInForce) {
   ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
   std::ofstream{file, std::ios::app} << "no_such_key: 1\n";
   const ProgramRun refused = ctl({"reload"});
-  EXPECT_EQ(refused.status, 1);
+  EXPECT_EQ(refused.status, 2);
   EXPECT_NE(refused.err.find("no_such_key"), std::string::npos) << refused.err;
   EXPECT_TRUE(daemon.wait_for_line("the old configuration stays in force", seconds{1}));
   EXPECT_EQ(status()["state"], "waiting");
   static_cast<void>(config("threads: 1\n"));
   EXPECT_EQ(ctl({"reload"}).status, 0);
   EXPECT_EQ(status()["threads"], 1);
+}
+
+TEST_F(LifeCycle, PortThatIsTakenAtReloadLeavesTheOldConfigurationInForce) {
+  const std::filesystem::path file = config("flat_ground: off\n");
+  Child daemon(locusd(file));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const auto taken = UdpSocket::open(2399);
+  ASSERT_TRUE(taken) << taken.error();
+  std::filesystem::copy_file(lidar_with("port: 2399"), file, std::filesystem::copy_options::overwrite_existing);
+  std::ofstream{file, std::ios::app} << "flat_ground: on\n";
+  const ProgramRun refused = ctl({"reload"});
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_TRUE(contains(refused.err, "UDP port 2399")) << refused.err;
+  EXPECT_EQ(status()["lidars"]["front"]["port"], 2368);
+  EXPECT_EQ(status()["flat_ground"], "off");
+}
+
+/// Neither the new configuration nor the old one works: systemd is to start it again, from where the robot is.
+TEST_F(LifeCycle, ReloadThatFailsTwiceEndsTheServiceWithItsStateSaved) {
+  for (const bool by_signal : {false, true}) {
+    std::ofstream calibration{this->file("unit.yaml")};
+    calibration << "num_lasers: 16\nlasers:\n";
+    for (int laser = 0; laser < 16; ++laser)
+      calibration << fmt::format("- {{laser_id: {}, vert_correction: {}}}\n", laser, laser / 64.0);
+    calibration.close();
+    const std::filesystem::path file = config();
+    const std::string right = read_text(file);
+    std::filesystem::copy_file(lidar_with("calibration: " + this->file("unit.yaml").string()), file,
+                               std::filesystem::copy_options::overwrite_existing);
+    Child daemon(locusd(file));
+    ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+    ASSERT_EQ(ctl({"reset", "--pose", "1,2,0,0,0,0"}).status, 0);
+    std::filesystem::remove(this->file("unit.yaml"));
+    const auto taken = UdpSocket::open(2399);
+    ASSERT_TRUE(taken) << taken.error();
+    std::filesystem::copy_file(lidar_with("port: 2399"), file, std::filesystem::copy_options::overwrite_existing);
+    if (by_signal)
+      daemon.signal(SIGHUP);
+    else
+      EXPECT_TRUE(contains(ctl({"reload"}).err, "nor does the old configuration work any more"));
+    EXPECT_EQ(daemon.wait_for_exit(seconds{5}), 1) << by_signal;
+    const auto state = daemon::load_state(this->file("state"));
+    ASSERT_TRUE(state) << state.error();
+    EXPECT_EQ(state->last.T_odom_base.translation.y(), 2);
+    std::ofstream{file} << right;
+  }
+}
+
+TEST_F(LifeCycle, ResetWithoutLidarOutlivesAReloadAndARestart) {
+  const auto starts_at_x = [this](Child& daemon) {
+    const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+    EXPECT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+    return status()["pose"]["xyz_m"][0].get<double>();
+  };
+  {
+    Child daemon(undisturbed(locusd(config())));
+    ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+    starts_at_x(daemon);
+    std::this_thread::sleep_for(seconds{1});
+    ASSERT_EQ(ctl({"reset", "--pose", "100,0,0,0,0,0"}).status, 0);
+    ASSERT_EQ(ctl({"reload"}).status, 0);
+    daemon.signal(SIGTERM);
+    ASSERT_EQ(daemon.wait_for_exit(seconds{5}), 0);
+  }
+  {
+    Child daemon(undisturbed(locusd(config())));
+    EXPECT_NEAR(starts_at_x(daemon), 100, 5);
+    ASSERT_EQ(ctl({"reset"}).status, 0);
+    daemon.signal(SIGKILL);
+    daemon.wait_for_exit(seconds{5});
+  }
+  Child daemon(undisturbed(locusd(config())));
+  EXPECT_NEAR(starts_at_x(daemon), 0, 5);
+}
+
+TEST_F(LifeCycle, MapIsThatOfTheMomentAlsoAfterOneThatNeverCame) {
+  Child daemon(undisturbed(locusd(config())));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  EXPECT_EQ(ctl({"save-map", file("none.pcd").string()}).status, 1) << "there is no lidar";
+  const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+  ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+  std::this_thread::sleep_for(seconds{3});
+  std::array<std::uintmax_t, 2> bytes{};
+  for (std::uintmax_t& size : bytes) {
+    ASSERT_EQ(ctl({"save-map", file("map.pcd").string()}).status, 0);
+    size = std::filesystem::file_size(file("map.pcd"));
+  }
+  EXPECT_GT(bytes[0], bytes[1] * 9 / 10) << "the first is as the second";
+}
+
+TEST_F(LifeCycle, LogThatIsFullEndsNoService) {
+  const std::string command =
+      std::string("exec timeout --preserve-status 3 ") + LOCUSD + " --config " + config().string() + " 2> /dev/full";
+  EXPECT_EQ(run_program("/bin/sh", {"-c", command}).status, 0);
 }
 
 TEST_F(LifeCycle, NetworkOfDdsMayComeLater) {

@@ -58,9 +58,32 @@ TEST_F(Keeper, WritesTheMapEveryThirtySecondsOrTenMetresAndTheWhereaboutsAlways)
   EXPECT_TRUE(says(12, FlatGround::on));
   take(seconds{34}, 12.5, FlatGround::automatic);
   EXPECT_TRUE(says(12.5, FlatGround::automatic)) << "thirty seconds later";
-  keeper_.begin_anew();
+  keeper_.begin_anew(std::nullopt, FlatGround::off);
   take(seconds{35}, 0, FlatGround::off);
   EXPECT_TRUE(says(0, FlatGround::off)) << "at once";
+}
+
+TEST_F(Keeper, WhatWasIsForgottenAtAResetAndThePoseThatIsToldKept) {
+  take(seconds{0}, 3, FlatGround::off);
+  ASSERT_TRUE(says(3, FlatGround::off));
+  keeper_.begin_anew(Pose{Eigen::Quaterniond::Identity(), {7, 0, 0}}, FlatGround::on);
+  EXPECT_TRUE(says(7, FlatGround::on));
+  ASSERT_TRUE(keeper_.now());
+  EXPECT_EQ(keeper_.now()->T_odom_base.translation.x(), 7);
+  keeper_.begin_anew(std::nullopt, FlatGround::on);
+  EXPECT_FALSE(keeper_.now());
+  for (int look = 0; look < 500 && std::filesystem::exists(file_); ++look)
+    std::this_thread::sleep_for(milliseconds{10});
+  EXPECT_FALSE(std::filesystem::exists(file_));
+}
+
+TEST_F(Keeper, ClockThatIsSetBackPutsNothingOff) {
+  take(seconds{0}, 1, FlatGround::off);
+  ASSERT_TRUE(says(1, FlatGround::off));
+  take(-seconds{10}, 2, FlatGround::on);
+  EXPECT_TRUE(says(2, FlatGround::off)) << "the whereabouts";
+  take(-std::chrono::hours{1}, 3, FlatGround::on);
+  EXPECT_TRUE(says(3, FlatGround::on)) << "and the map";
 }
 
 TEST_F(Keeper, RobotThatDrivesIsCarriedOnForAMoment) {

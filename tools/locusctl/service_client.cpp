@@ -87,7 +87,8 @@ ServiceAnswer ask(const std::filesystem::path& socket, const nlohmann::ordered_j
   if (!answer.json.is_object())
     throw Failure(ExitStatus::failed, "the service's answer makes no sense; use locusctl of the same version");
   if (answer.json.contains("error"))
-    throw Failure(ExitStatus::failed, answer.json["error"].get<std::string>());
+    throw Failure(answer.json.contains("wrong_usage") ? ExitStatus::wrong_usage : ExitStatus::failed,
+                  answer.json["error"].get<std::string>());
   return answer;
 }
 
