@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "config/config.hpp"
@@ -40,5 +41,8 @@ struct IngestReport {
   /// Called by the ingest thread.
   void read(const Ingest& ingest);
 };
+
+/// What the owner of a lidar should know of sweeps that are shorter than its turn; nothing where they are not.
+std::optional<std::string> short_sweep(const SweepOptions& options, const std::string& lidar, double rotation_rate_rpm);
 
 } // namespace locus::daemon

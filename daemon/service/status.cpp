@@ -123,7 +123,9 @@ ordered_json status_json(Session& session) {
   const RosLink::Status link = session.link().status();
   const double sweeps = std::max<double>(1.0, static_cast<double>(figures.estimates));
   const Duration cpu = read_clock(CLOCK_PROCESS_CPUTIME_ID);
+  const std::optional<Recorder::Status> recording = session.recording();
   ordered_json json{{"version", LOCUS_VERSION},
+                    {"capture", recording ? recording->run.string() : ""},
                     {"config_sha256", config_sha256(config)},
                     {"threads", config.odometry.threads},
                     {"isa", std::string(to_string(config.odometry.isa))},
@@ -157,7 +159,7 @@ ordered_json status_json(Session& session) {
                      {"estimates_unfetched", session.pipeline().unfetched()},
                      {"estimates_unpublished", figures.unpublished}};
   json["restarts"] = builder.restarts;
-  if (const auto recording = session.recording())
+  if (recording)
     json["recording"] = {
         {"run", recording->run.string()},  {"mb", rounded(1e-6 * static_cast<double>(recording->bytes))},
         {"recorded", recording->recorded}, {"dropped", recording->dropped},

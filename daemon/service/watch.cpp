@@ -71,8 +71,15 @@ void Watch::look_at_lidars() {
     if (packets.data != lidar.data || lidar.heard == Duration::zero()) { // fewer: the counters began anew
       if (heard && !lidar.told.empty())
         log_.info(fmt::format("lidar {}: heard", lidars[i].name), {{"LOCUS_LIDAR", lidars[i].name}});
-      lidar = {.data = packets.data, .received = packets.received, .heard = now, .told = {}};
+      lidar = {.data = packets.data,
+               .received = packets.received,
+               .heard = now,
+               .told = {},
+               .short_sweep_told = lidar.short_sweep_told};
     }
+    const auto warning = short_sweep(session_.config().sweep, lidars[i].name, ingest.lidars[i].rotation_rate_rpm);
+    if (warning && !std::exchange(lidar.short_sweep_told, true))
+      log_.warn(*warning, {{"LOCUS_LIDAR", lidars[i].name}});
     if (now - lidar.heard < kPatience)
       continue;
     const std::string why = why_silent(lidar, lidars[i], ingest.lidars[i]);

@@ -40,6 +40,7 @@ class Watch {
     std::uint64_t data = 0, received = 0; ///< when it was last heard
     Duration heard{};                     ///< when that was, or since when it is waited for
     std::string told;                     ///< why it is silent, as it was told; empty: it is not
+    bool short_sweep_told = false;
   };
   static std::string why_silent(const Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now);
 

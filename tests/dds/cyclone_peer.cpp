@@ -63,7 +63,6 @@ void talk(const DdsNode& node) {
   const DdsWriter<ros::Imu> imus{node, "/imu/data", {false, 5}};
   const DdsWriter<ros::Odometry> odometries{node, "/wheel_odometry", TopicQos::standard()};
   const DdsWriter<ros::Bool> healths{node, "/wheel_health", TopicQos::standard()};
-  const DdsWriter<ros::Bool> grounds{node, "/flat_ground", TopicQos::standard()};
   std::string empty;
   talk_on([&](int i) {
     const Said said(i);
@@ -78,7 +77,7 @@ void talk(const DdsNode& node) {
     odometry.pose_.pose_.position_.x_ = said.figure;
     odometry.pose_.pose_.orientation_.w_ = 1;
     odometry.twist_.covariance_[0] = 0.01;
-    if (!imus.write(imu) || !odometries.write(odometry) || !healths.write({i % 2 == 0}) || !grounds.write({true}))
+    if (!imus.write(imu) || !odometries.write(odometry) || !healths.write({i % 2 == 0}))
       throw std::runtime_error("DDS did not take a message");
   });
 }

@@ -178,6 +178,8 @@ TEST(RosLink, TopicBelongsToTheFirstPublisherUntilItGoes) {
   const auto imu = [&] { return link.status().sources[1]; };
   ASSERT_TRUE(eventually([&] { return imu().refused > 100; }));
   EXPECT_TRUE(eventually([&] { return link.status().sources[0].health_refused > 100; }));
+  const std::vector<std::string> commander{CYCLONE_PEER, std::to_string(domain.number()), "command", "/locus"};
+  const test::Child commands(commander), contradicts(commander);
   EXPECT_TRUE(eventually([&] { return link.status().flat_ground_refused > 100; }));
   const auto is_in_order = [&] {
     double last = -1;

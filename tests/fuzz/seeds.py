@@ -255,6 +255,12 @@ def connection(number, topic, kind):
     return record(7, text(b"topic=" + topic) + text(b"type=" + kind), conn=struct.pack("<I", number), topic=topic)
 
 
+for name, request in (("status", '{"command": "status"}'), ("map", '{"command":"save-map"}'), ("reload", '{"command": "reload"}'),
+                      ("reset", '{"command": "reset"}'), ("there", '{"command": "reset", "pose": [1.5, -2e3, 0, 0, 0, 90]}'),
+                      ("far", '{"pose": [1e300, 0, 0, 0, 0, 361], "command": "reset"}'), ("other", '{"command": "dan\\u0063e", "a": {"b": [null, true]}}'),
+                      *((mode, f'{{"command": "flat-ground", "mode": "{mode}"}}') for mode in ("on", "off", "auto", "maybe"))):
+    write("control_requests", name, request)
+
 STAMP_AND_FRAME = struct.pack("<II", 1_700_000_000, 5) + text(b"base")
 BODIES = [struct.pack("<37d", *range(37)), text(b"odom") + struct.pack("<85d", *range(85)),
           struct.pack("<III", 1, 1_700_000_000, 7) + data_packet(0x22, 0x37, 1, 110592)]

@@ -176,6 +176,19 @@ TEST(LocusReplay, BareFolderWithoutConfigurationUsesItsMotionFilesByTheirNames) 
   EXPECT_GT(replay.summary()["sources"]["imu"]["used_sweeps"].get<int>(), 70);
 }
 
+TEST(LocusReplay, BareFolderOfAWalkingRobotUsesItsMotionFilesToo) {
+  const TemporaryFolder folder;
+  for (const char* name : {"lidar.pcap", "imu.csv"})
+    std::filesystem::copy(room_drive() / name, folder / name);
+  for (const char* name : {"vio.tum", "kio.tum"})
+    std::filesystem::copy(room_drive() / "wio.tum", folder / name);
+  const Replay replay({"--set", "motion_sources.imu.T_base_source.xyz_m=[0, 0, 0]", folder.path().string()});
+  ASSERT_EQ(replay.run().status, 0);
+  EXPECT_EQ(replay.run().err, "");
+  EXPECT_GT(replay.summary()["sources"]["vio"]["used_sweeps"].get<int>(), 70) << "it stands before kio";
+  EXPECT_GT(replay.summary()["sources"]["kio"]["received"].get<int>(), 70);
+}
+
 TEST(LocusReplay, BareCaptureRunsOnLidarAloneWithoutNoise) {
   const Replay replay({(room_drive() / "lidar.pcap").string()});
   ASSERT_EQ(replay.run().status, 0);

@@ -41,6 +41,12 @@ TEST(Warnings, LidarThatIsNotHeardWhileAnotherIs) {
                  {"lidar rear: no valid data packet to port 2369 from 10.0.0.9", "rejected: sender"});
 }
 
+/// Half a turn sees what the half before did not: each second sweep fails.
+TEST(Warnings, SweepThatIsShorterThanATurn) {
+  expect_warning({"--set", "sweep_period_ms=50", "--duration", "2", room_drive().string()},
+                 {"lidar front: turns in 100 ms, so a sweep of 50 ms sees a part", "sweep_period_ms: auto"});
+}
+
 TEST(Warnings, MotionOfAnotherTimeNamesBothSpans) {
   const TemporaryFolder folder;
   std::ofstream(folder / "wio.tum") << "10 0 0 0 0 0 0 1\n12.5 0 0 0 0 0 0 1\n";

@@ -41,7 +41,7 @@ std::optional<std::string> Ros1Bag::read_start() {
   stream_.read(start.data(), start.size());
   const std::string_view magic(start.data(), static_cast<std::size_t>(stream_.gcount()));
   if (!magic.starts_with("#ROSBAG V"))
-    return "not a ROS 1 bag; its first bytes are not #ROSBAG V2.0";
+    return "not a ROS 1 bag, its first bytes are not #ROSBAG V2.0; give one that rosbag info reads";
   if (magic != kMagic)
     return "a bag of another format than 2.0; convert it with: rosbag reindex, then rosbag fix";
   at_ = kMagic.size();

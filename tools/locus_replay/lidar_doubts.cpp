@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "locus_replay/lidar_doubts.hpp"
+#include "daemon/ingest_report.hpp"
 #include "drivers/ip_address.hpp"
 
 #include <algorithm>
@@ -103,7 +104,8 @@ std::string why_no_data(const Recording& recording, const LidarRouter& lidars) {
                      busiest.data_packet_sized, port, rejections(total));
 }
 
-std::vector<std::string> lidar_warnings(const Recording& recording, const LidarRouter& lidars) {
+std::vector<std::string> lidar_warnings(const Recording& recording, const LidarRouter& lidars,
+                                        const SweepOptions& sweeps) {
   std::vector<std::string> warnings;
   for (const LidarInput& lidar : lidars.lidars()) {
     if (lidar.counters().data == 0 && !lost_by_request(lidar, recording))
@@ -112,6 +114,10 @@ std::vector<std::string> lidar_warnings(const Recording& recording, const LidarR
       warnings.push_back(fmt::format("lidar {0}: configured as {1}, but its packets are those of a {2}, and read as a "
                                      "{1}'s they make a wrong world; use --set lidars.{0}.model=auto",
                                      lidar.options().name, to_string(*lidar.options().model), to_string(*model)));
+    if (auto warning = lidar.decoder().model()
+                           ? daemon::short_sweep(sweeps, lidar.options().name, lidar.decoder().rotation_rate_rpm())
+                           : std::nullopt)
+      warnings.push_back(std::move(*warning));
   }
   return warnings;
 }

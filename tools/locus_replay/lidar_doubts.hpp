@@ -13,7 +13,8 @@ namespace locus::tools {
 std::string why_no_data(const Recording& recording, const LidarRouter& lidars);
 
 /// What about the lidars of a recording that was played is unlikely to be what the user meant, a line each: one that
-/// was not heard though others were, one whose packets are another model's.
-std::vector<std::string> lidar_warnings(const Recording& recording, const LidarRouter& lidars);
+/// was not heard though others were, one whose packets are another model's, one that turns more slowly than sweeps end.
+std::vector<std::string> lidar_warnings(const Recording& recording, const LidarRouter& lidars,
+                                        const SweepOptions& sweeps);
 
 } // namespace locus::tools

@@ -51,10 +51,21 @@ Isa isa_or_fail(const std::string& name) {
   return *isa;
 }
 
-Config configuration(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
+/// Without a configuration the files of a folder tell which sources there were. Those of a walking robot go first.
+Config configuration_of(const CaptureFolder& folder) {
   Config config;
-  if (!file.empty())
-    config = config_or_fail(load_config(file));
+  for (const char* const name : {"kio", "vio"}) {
+    if (std::ranges::find(folder.odometry, name, &CaptureFolder::Source::name) == folder.odometry.end())
+      continue;
+    config.odometry.motion_sources.insert(config.odometry.motion_sources.begin(), {name, SourceKind::odometry, {}});
+    config.source_topics.insert(config.source_topics.begin(), SourceTopics{});
+  }
+  return config;
+}
+
+Config configuration(const std::filesystem::path& file, const CaptureFolder& folder,
+                     const std::vector<std::string>& overrides) {
+  Config config = file.empty() ? configuration_of(folder) : config_or_fail(load_config(file));
   config = config_or_fail(override_config(config, overrides));
   if (const char* const isa = std::getenv("LOCUS_ISA"))
     config.use(isa_or_fail(isa));
@@ -130,7 +141,7 @@ void run(const Arguments& arguments, const SweepStage& stage) {
   const CaptureFolder folder = find_files(arguments.capture);
   check_output(arguments.output);
   const std::filesystem::path config_file = arguments.config.empty() ? folder.first_config() : arguments.config;
-  const Config config = configuration(config_file, arguments.overrides);
+  const Config config = configuration(config_file, folder, arguments.overrides);
   check_faults(arguments.faults, config);
   LidarRouter lidars = value_or_fail(LidarRouter::open(config.lidars), ExitStatus::wrong_usage);
 

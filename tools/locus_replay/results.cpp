@@ -82,7 +82,7 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
   write_report(arguments_.output / "report.html",
                {figures, config_, recording_.capture_start(), figures_.path_m(), sweeps_,
                 visible_surfaces(processor.odometry().map()), truth_.trajectory(), accuracy.trajectory});
-  warn(lidar_warnings(recording_, ingest.lidars()));
+  warn(lidar_warnings(recording_, ingest.lidars(), config_.sweep));
   warn(source_verdicts(config_, ingest.sources()));
   warn(accuracy.warnings);
   if (!arguments_.quiet)
