@@ -8,7 +8,6 @@
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
-#include <ctime>
 #include <fstream>
 #include <iterator>
 #include <span>
@@ -20,8 +19,6 @@
 #include <fmt/format.h>
 #include <pthread.h>
 #include <unistd.h>
-
-#include "daemon/machine_time.hpp"
 
 namespace locus::daemon {
 
@@ -203,13 +200,20 @@ std::optional<std::filesystem::path> state_path() {
 
 StateKeeper::StateKeeper(std::optional<std::filesystem::path> file, Complain complain)
     : file_(std::move(file)), complain_(std::move(complain)) {
+  begin();
+}
+
+StateKeeper::~StateKeeper() { end(); }
+
+void StateKeeper::begin() {
   if (!file_)
     return;
+  stopping_.store(false, std::memory_order_relaxed);
   thread_ = std::thread([this] { run(); });
   pthread_setname_np(thread_.native_handle(), "state");
 }
 
-StateKeeper::~StateKeeper() {
+void StateKeeper::end() {
   stopping_.store(true, std::memory_order_relaxed);
   wakeup_.notify();
   if (thread_.joinable())
@@ -222,13 +226,21 @@ bool StateKeeper::is_due() const {
          (now_->T_odom_base.translation - saved_->T_odom_base.translation).norm() > kEvery_m;
 }
 
-void StateKeeper::begin_anew(const std::optional<Pose>& T_odom_base, FlatGround flat_ground) {
-  now_ = T_odom_base ? std::optional{Whereabouts{Stamp{read_clock(CLOCK_REALTIME)}, *T_odom_base}} : std::nullopt;
+void StateKeeper::begin_anew(const std::optional<SavedState>& start) {
+  end();
+  now_.reset();
   saved_.reset();
-  Due& due = states_.back();
-  due = {++number_, now_.has_value(), {now_.value_or(Whereabouts{}), flat_ground, {}}};
-  static_cast<void>(states_.publish());
-  wakeup_.notify();
+  static_cast<void>(states_.take()); // of the time before
+  static_cast<void>(whereabouts_.take());
+  std::error_code error;
+  if (file_ && start) {
+    if (const auto problem = write_state(*file_, *start))
+      complain_(*problem);
+  } else if (file_ && !std::filesystem::remove(*file_, error) && error) {
+    complain_(fmt::format("{}: cannot be removed ({}); a restart within a minute goes on from it", file_->string(),
+                          error.message()));
+  }
+  begin();
 }
 
 void StateKeeper::take(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground) {
@@ -239,7 +251,6 @@ void StateKeeper::take(const Odometry& odometry, const OdometryEstimate& estimat
     saved_ = now_;
     Due& due = states_.back();
     due.number = ++number_;
-    due.exists = true;
     due.state.last = *now_;
     due.state.flat_ground = flat_ground;
     read_map(odometry, now_->T_odom_base, due.state.map_odom);
@@ -250,26 +261,18 @@ void StateKeeper::take(const Odometry& odometry, const OdometryEstimate& estimat
   wakeup_.notify();
 }
 
-/// Whether the file is as it is to be.
-bool StateKeeper::write(const Due& due) const {
-  if (!due.exists) {
-    std::error_code ignored; // there was none
-    return std::filesystem::remove(*file_, ignored);
-  }
-  const auto problem = write_state(*file_, due.state);
-  if (problem)
-    complain_(*problem);
-  return !problem;
-}
-
 /// The whereabouts are taken first: the state that they belong to is then there, or has been written.
 void StateKeeper::run() {
   std::optional<std::uint64_t> written; ///< number of the state that lies in the file
   while (!stopping_.load(std::memory_order_relaxed)) {
     wakeup_.wait_for(std::chrono::milliseconds{500});
     const Update* const update = whereabouts_.take();
-    if (const Due* const due = states_.take())
-      written = write(*due) && due->exists ? std::optional{due->number} : std::nullopt;
+    if (const Due* const due = states_.take()) {
+      const auto problem = write_state(*file_, due->state);
+      written = problem ? std::nullopt : std::optional{due->number};
+      if (problem)
+        complain_(*problem);
+    }
     if (update != nullptr && update->number == written)
       update_whereabouts(*file_, update->last);
   }

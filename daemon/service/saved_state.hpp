@@ -73,15 +73,13 @@ class StateKeeper {
   /// Producer: nothing before the first estimate.
   [[nodiscard]] const std::optional<Whereabouts>& now() const { return now_; }
 
-  /// Producer: what was written is no longer true. Until the next estimate there is nothing to go on from but the pose
-  /// that was told, if any.
-  void begin_anew(const std::optional<Pose>& T_odom_base, FlatGround flat_ground);
+  /// Producer, at rest: what was written is no longer true. When this returns the file says what is to be gone on from
+  /// until the next estimate, or there is none. Waits for the disk.
+  void begin_anew(const std::optional<SavedState>& start);
 
  private:
-  /// What is to lie in the file; nothing: no file is to be there.
   struct Due {
     std::uint64_t number = 0;
-    bool exists = false;
     SavedState state;
   };
   /// Of the same odom frame as the state with that number.
@@ -90,9 +88,10 @@ class StateKeeper {
     Whereabouts last;
   };
 
+  void begin();
+  void end();
   void run();
   [[nodiscard]] bool is_due() const;
-  [[nodiscard]] bool write(const Due& due) const;
 
   std::optional<std::filesystem::path> file_;
   Complain complain_;

@@ -111,7 +111,11 @@ std::optional<SavedState> Service::recent_state() {
     return std::nullopt;
   }
   const Duration age = Stamp{read_clock(CLOCK_REALTIME)} - state->last.stamp;
-  if (age < Duration::zero() || age > kOldest) {
+  if (age < Duration::zero()) {
+    log_.info("a fresh start: the saved state is of the future, for the clock was set back");
+    return std::nullopt;
+  }
+  if (age > kOldest) {
     log_.info(fmt::format("a fresh start: the saved state is {:.0f} s old, more than {:.0f} s", to_seconds(age),
                           to_seconds(kOldest)));
     return std::nullopt;
@@ -147,12 +151,13 @@ ControlServer::Answer Service::reload() {
     answer = Answer::wrong_usage(fmt::format("{}", fmt::join(config.error(), "; ")));
   else if (const auto problem = go_on_with(*config))
     answer = Answer::refusal(*problem);
-  if (answer.json.contains("error"))
-    log_.error(fmt::format("reload refused, the old configuration stays in force: {}",
-                           answer.json["error"].get<std::string>()));
-  else
+  if (!answer.json.contains("error"))
     log_.info("reloaded");
-  sd_notify(0, "READY=1");
+  else
+    log_.error(fmt::format("reload refused{}: {}", session_ ? ", the old configuration stays in force" : "",
+                           answer.json["error"].get<std::string>()));
+  if (session_)
+    sd_notify(0, "READY=1");
   return answer;
 }
 
@@ -160,9 +165,8 @@ ControlServer::Answer Service::reload() {
 /// of its own, for they may be the same.
 std::optional<std::string> Service::go_on_with(const Config& config) {
   const Config old = session_->config();
-  std::optional<SavedState> state = session_->stop();
-  if (!state) // no sweep has come yet
-    state = recent_state();
+  const FlatGround mode = session_->flat_ground();
+  const std::optional<SavedState> state = session_->stop();
   std::optional<SavedState> its_state = state;
   if (its_state)
     its_state->flat_ground = config.odometry.flat_ground;
@@ -172,18 +176,23 @@ std::optional<std::string> Service::go_on_with(const Config& config) {
   if (const auto old_problem = begin(old, state)) {
     *problem += "; nor does the old configuration work any more, the service ends: " + *old_problem;
     keep_state(state);
+  } else {
+    session_->set_flat_ground(mode);
   }
   return problem;
 }
 
-/// Whether the service is to go on.
+/// Whether the service is to go on. However many ask for a reload, it is one.
 bool Service::take_signal() {
   signalfd_siginfo info{};
+  bool is_to_reload = false;
   while (read(signals_, &info, sizeof(info)) == static_cast<ssize_t>(sizeof(info))) {
     if (info.ssi_signo != SIGHUP)
       return false;
-    reload();
+    is_to_reload = true;
   }
+  if (is_to_reload)
+    reload();
   return true;
 }
 

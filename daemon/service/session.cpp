@@ -53,20 +53,18 @@ Session::Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket
     : config_(config), log_(log), started_(read_clock(CLOCK_MONOTONIC)), input_(std::move(sockets)),
       flat_ground_(state ? state->flat_ground : config.odometry.flat_ground),
       link_(config, [this](const RosInput& input) { receive(input); }), clouds_(config.dds, link_),
-      state_(state_path(), [this](const std::string& problem) { log_.error(problem); }) {
+      start_(std::move(state)), state_(state_path(), [this](const std::string& problem) { log_.error(problem); }) {
   // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): stands after its like
-  tells_resumed_ = state.has_value() && !state->map_odom.empty(); // without a map it begins where it was told to
-  std::optional<StartPoint> start;
-  if (state)
-    start = {state->last.carried_to(Stamp{read_clock(CLOCK_REALTIME)}), std::move(state->map_odom)};
-  begin(std::move(lidars), std::move(start));
+  tells_resumed_ = start_.has_value() && !start_->map_odom.empty(); // without a map it begins where it was told to
+  begin(std::move(lidars));
 }
 
 Session::~Session() { end(); }
 
-void Session::begin(LidarRouter lidars, std::optional<StartPoint> start) {
+void Session::begin(LidarRouter lidars) {
   LiveOptions options;
-  options.start = std::move(start);
+  if (start_)
+    options.start = {start_->last.carried_to(Stamp{read_clock(CLOCK_REALTIME)}), start_->map_odom};
   options.on_thread_start = [this] {
     if (const auto problem = raise_priority(config_.realtime.priority))
       log_.warn(*problem);
@@ -106,8 +104,10 @@ void Session::end() {
 
 /// In the odometry thread, when the estimate has left.
 void Session::after(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
-  if (!estimate.failed) // a first sweep of a few points does not say yet
+  if (!estimate.failed) { // a first sweep of a few points does not say yet
+    start_.reset();
     resumed_.store(odometry.resumed() ? Resumed::yes : Resumed::no, std::memory_order_relaxed);
+  }
   clouds_.take(sweep, odometry, estimate);
   state_.take(odometry, estimate, flat_ground());
   const std::uint64_t wanted = map_wanted_.load(std::memory_order_relaxed);
@@ -134,16 +134,23 @@ std::optional<std::string> Session::reset(std::optional<Pose> T_odom_base) {
   if (!lidars)
     return lidars.error();
   end();
-  state_.begin_anew(T_odom_base, flat_ground());
-  begin(std::move(*lidars), T_odom_base ? std::optional{StartPoint{*T_odom_base, {}}} : std::nullopt);
+  start_.reset();
+  if (T_odom_base)
+    start_ = {{Stamp{read_clock(CLOCK_REALTIME)}, *T_odom_base}, flat_ground(), {}};
+  state_.begin_anew(start_);
+  tells_resumed_ = false;
+  begin(std::move(*lidars));
   log_.info("odometry begins anew, as it was told to");
   return std::nullopt;
 }
 
 std::optional<SavedState> Session::stop() {
   end();
-  if (!state_.now())
-    return std::nullopt;
+  if (!state_.now()) {
+    if (start_)
+      start_->flat_ground = flat_ground();
+    return std::move(start_);
+  }
   SavedState state{*state_.now(), flat_ground(), {}};
   read_map(pipeline_->processor().odometry(), state.last.T_odom_base, state.map_odom);
   return state;

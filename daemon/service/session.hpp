@@ -58,7 +58,8 @@ class Session {
   /// any more: all goes on as it was then.
   std::optional<std::string> reset(std::optional<Pose> T_odom_base);
 
-  /// Ends the live threads for good, and tells what another session needs to go on; nothing without an estimate.
+  /// Ends the live threads for good, and tells what another session needs to go on: where the robot is, or without an
+  /// estimate what this one began with, if anything.
   std::optional<SavedState> stop();
 
   /// Asks for the surfaces of the map, which come with the next sweep. An earlier request is forgotten.
@@ -71,7 +72,7 @@ class Session {
  private:
   Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket> sockets, std::optional<SavedState> state,
           Log& log);
-  void begin(LidarRouter lidars, std::optional<StartPoint> start);
+  void begin(LidarRouter lidars);
   InputSource& begin_recording();
   void end();
   void after(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate);
@@ -104,6 +105,7 @@ class Session {
   LatestSlot<Map> map_;
   RosLink link_;
   CloudPublisher clouds_;
+  std::optional<SavedState> start_; ///< what it began with, until the first estimate
   StateKeeper state_;
   std::optional<TrackingState> told_state_;
   std::atomic<std::uint64_t> publisher_progress_{0};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -235,6 +236,27 @@ TEST_F(LifeCycle, PortThatIsTakenAtReloadLeavesTheOldConfigurationInForce) {
   EXPECT_TRUE(contains(refused.err, "UDP port 2399")) << refused.err;
   EXPECT_EQ(status()["lidars"]["front"]["port"], 2368);
   EXPECT_EQ(status()["flat_ground"], "off");
+  ASSERT_EQ(ctl({"flat-ground", "auto"}).status, 0);
+  EXPECT_EQ(ctl({"reload"}).status, 1);
+  EXPECT_EQ(status()["flat_ground"], "auto");
+}
+
+/// Each costs more than the time to the next one.
+TEST_F(LifeCycle, ReloadsThatComeTooFastHoldUpNeitherAnswersNorTheEnd) {
+  Child daemon(locusd(config()));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  std::atomic<bool> stopping{false};
+  std::thread pest([&] {
+    for (; !stopping; std::this_thread::sleep_for(milliseconds{20}))
+      daemon.signal(SIGHUP);
+  });
+  std::this_thread::sleep_for(seconds{1});
+  EXPECT_EQ(status()["state"], "waiting");
+  daemon.signal(SIGTERM);
+  EXPECT_TRUE(daemon.wait_for_line("stopped", seconds{3}));
+  stopping = true;
+  pest.join();
+  EXPECT_EQ(daemon.wait_for_exit(seconds{5}), 0);
 }
 
 /// Neither the new configuration nor the old one works: systemd is to start it again, from where the robot is.
@@ -256,10 +278,12 @@ TEST_F(LifeCycle, ReloadThatFailsTwiceEndsTheServiceWithItsStateSaved) {
     const auto taken = UdpSocket::open(2399);
     ASSERT_TRUE(taken) << taken.error();
     std::filesystem::copy_file(lidar_with("port: 2399"), file, std::filesystem::copy_options::overwrite_existing);
-    if (by_signal)
+    for (int signal = 0; by_signal && signal < 50; ++signal, std::this_thread::sleep_for(milliseconds{5}))
       daemon.signal(SIGHUP);
-    else
-      EXPECT_TRUE(contains(ctl({"reload"}).err, "nor does the old configuration work any more"));
+    if (!by_signal) {
+      const ProgramRun reload = ctl({"reload"});
+      EXPECT_TRUE(contains(reload.err, "nor does the old configuration work any more")) << reload.err;
+    }
     EXPECT_EQ(daemon.wait_for_exit(seconds{5}), 1) << by_signal;
     const auto state = daemon::load_state(this->file("state"));
     ASSERT_TRUE(state) << state.error();
@@ -281,6 +305,7 @@ TEST_F(LifeCycle, ResetWithoutLidarOutlivesAReloadAndARestart) {
     std::this_thread::sleep_for(seconds{1});
     ASSERT_EQ(ctl({"reset", "--pose", "100,0,0,0,0,0"}).status, 0);
     ASSERT_EQ(ctl({"reload"}).status, 0);
+    ASSERT_EQ(ctl({"reload"}).status, 0);
     daemon.signal(SIGTERM);
     ASSERT_EQ(daemon.wait_for_exit(seconds{5}), 0);
   }
@@ -293,6 +318,32 @@ TEST_F(LifeCycle, ResetWithoutLidarOutlivesAReloadAndARestart) {
   }
   Child daemon(undisturbed(locusd(config())));
   EXPECT_NEAR(starts_at_x(daemon), 0, 5);
+}
+
+TEST_F(LifeCycle, ResetBeforeTheFirstSweepIsNoDoubtAboutTheSavedState) {
+  {
+    Child daemon(undisturbed(locusd(config())));
+    const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+    ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+    daemon.signal(SIGTERM);
+    ASSERT_EQ(daemon.wait_for_exit(seconds{5}), 0);
+  }
+  Child daemon(undisturbed(locusd(config())));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  ASSERT_EQ(ctl({"reset"}).status, 0);
+  const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+  ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+  EXPECT_FALSE(daemon.wait_for_line("does not fit the saved state", {})) << testing::PrintToString(daemon.lines());
+}
+
+TEST_F(LifeCycle, SweepsThatAreShorterThanATurnAreSaidOnce) {
+  Child daemon(undisturbed(locusd(config("sweep_period_ms: 50\n"))));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+  EXPECT_TRUE(daemon.wait_for_line("lidar front: turns in 100 ms, so a sweep of 50 ms sees a part", seconds{10}));
+  std::this_thread::sleep_for(seconds{1});
+  const auto lines = daemon.lines();
+  EXPECT_EQ(std::ranges::count_if(lines, [](const std::string& line) { return contains(line, "turns in 100 ms"); }), 1);
 }
 
 TEST_F(LifeCycle, MapIsThatOfTheMomentAlsoAfterOneThatNeverCame) {

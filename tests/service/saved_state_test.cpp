@@ -58,7 +58,7 @@ TEST_F(Keeper, WritesTheMapEveryThirtySecondsOrTenMetresAndTheWhereaboutsAlways)
   EXPECT_TRUE(says(12, FlatGround::on));
   take(seconds{34}, 12.5, FlatGround::automatic);
   EXPECT_TRUE(says(12.5, FlatGround::automatic)) << "thirty seconds later";
-  keeper_.begin_anew(std::nullopt, FlatGround::off);
+  keeper_.begin_anew(std::nullopt);
   take(seconds{35}, 0, FlatGround::off);
   EXPECT_TRUE(says(0, FlatGround::off)) << "at once";
 }
@@ -66,15 +66,16 @@ TEST_F(Keeper, WritesTheMapEveryThirtySecondsOrTenMetresAndTheWhereaboutsAlways)
 TEST_F(Keeper, WhatWasIsForgottenAtAResetAndThePoseThatIsToldKept) {
   take(seconds{0}, 3, FlatGround::off);
   ASSERT_TRUE(says(3, FlatGround::off));
-  keeper_.begin_anew(Pose{Eigen::Quaterniond::Identity(), {7, 0, 0}}, FlatGround::on);
-  EXPECT_TRUE(says(7, FlatGround::on));
-  ASSERT_TRUE(keeper_.now());
-  EXPECT_EQ(keeper_.now()->T_odom_base.translation.x(), 7);
-  keeper_.begin_anew(std::nullopt, FlatGround::on);
+  const SavedState told{{Stamp{}, Pose{Eigen::Quaterniond::Identity(), {7, 0, 0}}}, FlatGround::on, {}};
+  keeper_.begin_anew(told);
   EXPECT_FALSE(keeper_.now());
-  for (int look = 0; look < 500 && std::filesystem::exists(file_); ++look)
-    std::this_thread::sleep_for(milliseconds{10});
+  EXPECT_EQ(load_state(file_)->last.T_odom_base.translation.x(), 7) << "at once";
+  take(seconds{1}, 8, FlatGround::off);
+  keeper_.begin_anew(std::nullopt); // whether or not that was written yet
+  std::this_thread::sleep_for(milliseconds{100});
   EXPECT_FALSE(std::filesystem::exists(file_));
+  take(seconds{2}, 9, FlatGround::off);
+  EXPECT_TRUE(says(9, FlatGround::off));
 }
 
 TEST_F(Keeper, ClockThatIsSetBackPutsNothingOff) {
