@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/imu_self_check.hpp"
+#include "core/motion_track.hpp"
 
 namespace locus {
 
@@ -104,7 +105,7 @@ class FrozenOdometry : public HealthMetric {
     const Pose& T_source_base = reading.odometry->T_source_base;
     if (last_ && T_source_base == *last_)
       return;
-    if (last_ && reading.stamp > changed_at_)
+    if (last_ && reading.stamp - changed_at_ >= MotionTrack::kShortestBaseline)
       twist_ = se3_log(last_->inverse() * T_source_base) / to_seconds(reading.stamp - changed_at_);
     last_ = T_source_base;
     changed_at_ = reading.stamp;
@@ -157,7 +158,10 @@ class PoseJump : public HealthMetric {
                              std::max(kAlwaysAllowed_rad, kMaxChange_radps * step_s),
                      HealthReason::jump);
   }
+  /// A velocity is told by samples that lie apart; those between them are compared with what it foretells.
   void accept(const SourceReading& reading) override {
+    if (last_ && reading.stamp - last_stamp_ < MotionTrack::kShortestBaseline)
+      return;
     const Pose& T_source_base = reading.odometry->T_source_base;
     moving_ = last_.has_value();
     if (moving_)

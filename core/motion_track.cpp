@@ -54,10 +54,22 @@ std::optional<Pose> MotionTrack::at(Stamp stamp) const {
   const std::size_t age = age_at(stamp);
   if (age == size_ || stamp > from_newest(0).stamp + kMaxExtrapolation)
     return std::nullopt;
-  if (age == 0 && size_ == 1)
-    return from_newest(0).T_source_base;
-  const Node& before = from_newest(age == 0 ? 1 : age);
-  const Node& after = from_newest(age == 0 ? 0 : age - 1);
+  if (age == 0)
+    return extrapolated(stamp);
+  return between(from_newest(age), from_newest(age - 1), stamp);
+}
+
+/// Precondition: there is a sample, and `stamp` is not before the newest.
+Pose MotionTrack::extrapolated(Stamp stamp) const {
+  const Node& newest = from_newest(0);
+  std::size_t age = 1;
+  while (kind_ == SourceKind::odometry && age < size_ && newest.stamp - from_newest(age).stamp < kShortestBaseline)
+    ++age;
+  return age < size_ ? between(from_newest(age), newest, stamp) : newest.T_source_base;
+}
+
+/// On the line through two nodes, or beyond.
+Pose MotionTrack::between(const Node& before, const Node& after, Stamp stamp) {
   const double fraction = to_seconds(stamp - before.stamp) / to_seconds(after.stamp - before.stamp);
   return interpolate(before.T_source_base, after.T_source_base, fraction);
 }

@@ -16,11 +16,14 @@ namespace locus {
 ///
 /// Poses are in the source's own odometry frame, so only their differences mean anything. An inertial source integrates
 /// its gyro: its poses turn but do not move. Between samples poses are interpolated; beyond the newest they are
-/// extrapolated with the last velocity, for kMaxExtrapolation at most. Memory is fixed at construction. One owner.
+/// extrapolated with the last velocity, for kMaxExtrapolation at most. The velocity of an odometry is told by two
+/// samples that lie kShortestBaseline apart: of closer ones a stamp that is off by a moment would make any. Memory is
+/// fixed at construction. One owner.
 class MotionTrack {
  public:
   static constexpr std::size_t kCapacity = 2048;                               ///< two seconds at 1 kHz
   static constexpr Duration kMaxExtrapolation = std::chrono::milliseconds{50}; ///< beyond the newest sample (contract)
+  static constexpr Duration kShortestBaseline = std::chrono::milliseconds{15}; ///< sources of 50 Hz jitter, too
 
   explicit MotionTrack(const MotionSourceOptions& options);
 
@@ -61,6 +64,8 @@ class MotionTrack {
     std::optional<Eigen::Vector3d> up_base;
   };
 
+  [[nodiscard]] Pose extrapolated(Stamp stamp) const;
+  [[nodiscard]] static Pose between(const Node& before, const Node& after, Stamp stamp);
   void push(const Node& node);
   [[nodiscard]] const Node& from_newest(std::size_t age) const;
   /// Age of the newest node that is not later than `stamp`; size_ when all are.

@@ -18,7 +18,9 @@ bool credible(Duration latency) { return latency >= -SourceClock::kMaxAhead && l
 std::optional<Stamp> SourceClock::on_host_clock(Stamp stamp, Stamp arrival) {
   const Duration latency = arrival - (stamp - offset_);
   if (credible(latency)) {
-    least_latency_ = known_ ? std::min(least_latency_, latency) : latency;
+    if (!known_)
+      begin_anew(arrival, latency);
+    follow_drift(arrival, latency);
     known_ = true;
     suspects_ = 0;
     return stamp - offset_;
@@ -31,12 +33,37 @@ std::optional<Stamp> SourceClock::on_host_clock(Stamp stamp, Stamp arrival) {
     return std::nullopt;
   const bool at_its_word = credible(-suspect_);
   offset_ = at_its_word ? Duration::zero() : suspect_ + least_latency_;
-  if (at_its_word)
-    least_latency_ = -suspect_;
+  const Duration shortest = offset_ - suspect_;
+  if (!known_ || at_its_word)
+    begin_anew(arrival, shortest);
+  window_began_ = arrival;
+  least_in_window_ = shortest;
   steps_ += known_ ? 1 : 0;
   known_ = true;
   suspects_ = 0;
   return stamp - offset_;
+}
+
+/// The first window says how long samples take.
+void SourceClock::begin_anew(Stamp arrival, Duration latency) {
+  window_began_ = arrival;
+  least_latency_ = least_in_window_ = latency;
+  first_window_ = true;
+}
+
+void SourceClock::follow_drift(Stamp arrival, Duration latency) {
+  least_in_window_ = std::min(least_in_window_, latency);
+  if (first_window_)
+    least_latency_ = least_in_window_;
+  if (std::chrono::abs(arrival - window_began_) < kWindow)
+    return;
+  const Duration drift = least_in_window_ - least_latency_;
+  const bool is_drift = std::chrono::abs(drift) >= kLeastDrift && std::chrono::abs(drift) <= kMostDrift;
+  if (is_drift)
+    offset_ -= drift;
+  window_began_ = arrival;
+  least_in_window_ = is_drift ? latency - drift : latency;
+  first_window_ = false;
 }
 
 } // namespace locus

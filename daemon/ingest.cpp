@@ -12,7 +12,7 @@ namespace locus::daemon {
 
 namespace {
 
-constexpr Duration kUsualPeriod = std::chrono::milliseconds{100}; ///< 600 rpm, as all models leave the factory
+constexpr Duration kLongestTurn = std::chrono::milliseconds{200}; ///< at 300 rpm, the slowest that the models have
 
 std::vector<Pose> mounts(const std::vector<LidarOptions>& lidars) {
   std::vector<Pose> T_base_lidar;
@@ -25,7 +25,7 @@ std::vector<Pose> mounts(const std::vector<LidarOptions>& lidars) {
 /// In dual return mode, with an echo for every firing. A lidar that is yet to be recognised may be the largest; memory
 /// that it then does not need is asked for, but never touched.
 std::size_t max_returns(const Config& config) {
-  const Duration period = std::max(kUsualPeriod, config.sweep.sweep_period.value_or(kUsualPeriod));
+  const Duration period = std::max(kLongestTurn, config.sweep.sweep_period.value_or(kLongestTurn));
   std::size_t returns = 0;
   for (const LidarOptions& lidar : config.lidars) {
     const velodyne::ModelSpec& spec = velodyne::spec(lidar.model.value_or(velodyne::Model::vls128));

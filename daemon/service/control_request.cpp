@@ -25,7 +25,7 @@ Parsed parse_flat_ground(const nlohmann::json& request) {
 }
 
 Parsed parse_reset(const nlohmann::json& request) {
-  constexpr double kFarthest_m = 1e6, kMost_deg = 360.0;
+  constexpr double kFarthest_m = 500e3, kMost_deg = 360.0; // a map reaches as far, see SurfaceGrid::reaches()
   if (!request.contains("pose"))
     return ControlRequest{Reset{}};
   const auto v = request["pose"].get<std::array<double, 6>>();

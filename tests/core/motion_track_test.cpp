@@ -42,6 +42,19 @@ TEST(MotionTrack, PosesBetweenSamplesAreInterpolated) {
   EXPECT_NEAR(so3_log(T->rotation).z(), 0.1, 1e-12);
 }
 
+/// 0.1 ms apart two poses 2 cm apart would be 200 m/s.
+TEST(MotionTrack, StampThatIsOffByAMomentMakesNoVelocity) {
+  MotionTrack track = odometry_track();
+  for (int i = 0; i < 5; ++i)
+    track.add(odometry(at_ms(20 * i), 0.02 * i));
+  track.add(odometry(at_ms(80) + std::chrono::microseconds{100}, 0.1));
+  EXPECT_NEAR(track.at(at_ms(120))->translation.x(), 0.12, 0.1);
+  MotionTrack young = odometry_track();
+  young.add(odometry(at_ms(0), 0.0));
+  young.add(odometry(at_ms(1), 1.0));
+  EXPECT_EQ(young.at(at_ms(40))->translation.x(), 1.0) << "nothing is known of its velocity";
+}
+
 TEST(MotionTrack, BeforeTheOldestSampleThereIsNothing) {
   MotionTrack track = odometry_track();
   EXPECT_FALSE(track.at(at_ms(0)));

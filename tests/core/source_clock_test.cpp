@@ -41,6 +41,37 @@ TEST(SourceClock, AStepIsLearnedFromFiveSamplesAndTakenOut) {
   }
 }
 
+/// Ten hours at 100 ppm are 3.6 s.
+TEST(SourceClock, AClockThatRunsFasterOrSlowerIsFollowed) {
+  for (const double rate : {100e-6, -100e-6, 20e-6, -20e-6}) {
+    for (const Duration ahead : {Duration{}, Duration{hours{3}}}) {
+      SourceClock clock;
+      std::size_t held_back = 0;
+      for (int i = 0; i < 10 * 3600; ++i) {
+        const Stamp measured = today_ms(0) + milliseconds{1000} * i;
+        const Duration way = milliseconds{3 + i * 7 % 11};
+        const auto stamp = clock.on_host_clock(measured + ahead + from_seconds(rate * i), measured + way);
+        held_back += stamp ? 0U : 1U;
+        if (stamp) {
+          ASSERT_LT(std::chrono::abs(*stamp - measured), milliseconds{25}) << rate << " after " << i << " s";
+        }
+      }
+      EXPECT_LT(held_back, 5U) << rate;
+      EXPECT_EQ(clock.steps(), 0U) << rate;
+    }
+  }
+}
+
+/// A way that becomes longer at once is a delay, and no clock.
+TEST(SourceClock, ADelayIsNotFollowed) {
+  SourceClock clock;
+  for (int i = 0; i < 600; ++i) {
+    const Stamp measured = today_ms(0) + seconds{1} * i;
+    const auto stamp = clock.on_host_clock(measured, measured + milliseconds{i < 200 ? 3 : 203});
+    ASSERT_EQ(stamp, measured) << i;
+  }
+}
+
 TEST(SourceClock, AClockThatIsSetRightAgainIsLearnedAnew) {
   SourceClock clock;
   int i = 0;

@@ -271,6 +271,13 @@ TEST(LocusReplay, RealtimeTakesAsLongAsTheRecordingAndLosesCountOfNothing) {
   EXPECT_GT(summary["wall_s"].get<double>(), 1.9);
 }
 
+TEST(LocusReplay, RealtimeMayBeSlowedDown) {
+  const Replay replay({"--realtime=0.5", "--duration", "1", room_drive().string()});
+  ASSERT_EQ(replay.run().status, 0) << replay.run().err;
+  EXPECT_GT(replay.summary()["wall_s"], 1.7);
+  EXPECT_LT(replay.summary()["wall_s"], 8);
+}
+
 TEST(LocusReplay, FiguresGoToStdoutUnlessQuiet) {
   EXPECT_NE(Replay({room_drive().string()}).run().out.find("sweeps"), std::string::npos);
   const Replay quiet({"--quiet", room_drive().string()});

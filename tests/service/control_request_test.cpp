@@ -46,9 +46,9 @@ TEST(ControlRequest, WhatLacksSomethingIsNone) {
 }
 
 TEST(ControlRequest, PoseIsOneThatARobotCanHave) {
-  for (const char* pose : {"[1e300, 0, 0, 0, 0, 0]", "[0, -1000001, 0, 0, 0, 0]", "[0, 0, 0, 0, 0, 361]"})
+  for (const char* pose : {"[1e300, 0, 0, 0, 0, 0]", "[0, -500001, 0, 0, 0, 0]", "[0, 0, 0, 0, 0, 361]"})
     EXPECT_TRUE(contains(error_of(parse_control_request(R"({"command": "reset", "pose": )" + std::string(pose) + "}")),
-                         "the pose must lie within 1000000 m and 360 degrees"))
+                         "the pose must lie within 500000 m and 360 degrees"))
         << pose;
 }
 

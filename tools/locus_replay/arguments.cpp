@@ -27,7 +27,8 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   Arguments arguments;
   std::vector<std::string> odometry, faults;
   int threads = 0;
-  double start_s = 0, duration_s = 0, speed = 0;
+  double start_s = 0, duration_s = 0;
+  std::string speed; // a flag with a number takes whole ones
 
   CLI::App app{"Recorded lidar packets in; odometry, map and figures out.", "locus-replay"};
   app.add_option("CAPTURE", arguments.capture,
@@ -92,7 +93,7 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   if (duration->count() > 0)
     arguments.duration = from_seconds(duration_s);
   if (realtime->count() > 0)
-    arguments.realtime_speed = speed;
+    arguments.realtime_speed = std::stod(speed);
   return arguments;
 }
 
