@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/health_monitor.hpp"
+
 namespace locus {
 
 namespace {
@@ -107,8 +109,19 @@ void ImuSelfCheck::weigh_gravity() {
         "gravity is not below the robot: T_base_source is wrong, or the unit is mounted another way; it is not used");
 }
 
+void ImuSelfCheck::accept(const SourceReading& reading) {
+  if (was_lost_ && !back_since_)
+    back_since_ = reading.stamp;
+}
+
+/// Who has come back is not used at once. Until then lidar is alone, and what it sees of a robot that turns is bent:
+/// that proves nothing against a gyro that nobody has doubted.
+bool ImuSelfCheck::is_yet_to_be_used(const RegistrationFeedback& feedback) const {
+  return !set_aside_ && back_since_ && feedback.from < *back_since_ + HealthMonitor::kProbation;
+}
+
 std::optional<HealthReason> ImuSelfCheck::hear(LidarOpinion /*opinion*/, const RegistrationFeedback& feedback) {
-  if (refused_ || !remembers(feedback.from) || !remembers(feedback.to))
+  if (refused_ || !remembers(feedback.from) || !remembers(feedback.to) || is_yet_to_be_used(feedback))
     return std::nullopt;
   const bool was_set_aside = set_aside_;
   compare(feedback);
@@ -179,6 +192,8 @@ void ImuSelfCheck::forget() {
     return;
   if (!set_aside_)
     turns_ = {};
+  was_lost_ = true;
+  back_since_.reset();
   first_.reset();
   last_.reset();
   known_ = 0;

@@ -25,6 +25,7 @@ class ImuSelfCheck : public HealthMetric {
   explicit ImuSelfCheck(const Pose& T_base_imu) : R_base_imu_(T_base_imu.rotation) {}
 
   std::optional<HealthReason> judge(const SourceReading& reading) override;
+  void accept(const SourceReading& reading) override;
   std::optional<HealthReason> hear(LidarOpinion opinion, const RegistrationFeedback& feedback) override;
   void forget() override;
 
@@ -54,6 +55,7 @@ class ImuSelfCheck : public HealthMetric {
   [[nodiscard]] const Turned& remembered(std::size_t age) const;
   [[nodiscard]] bool remembers(Stamp stamp) const;
   [[nodiscard]] Eigen::Vector3d angle_rad_at(Stamp stamp) const;
+  [[nodiscard]] bool is_yet_to_be_used(const RegistrationFeedback& feedback) const;
   void compare(const RegistrationFeedback& feedback);
   void review();
   void conclude();
@@ -73,7 +75,9 @@ class ImuSelfCheck : public HealthMetric {
   std::size_t newest_ = 0, known_ = 0;
   Eigen::Vector3d angle_rad_ = Eigen::Vector3d::Zero();
   std::optional<Stamp> last_;
-  std::array<Turns, 3> turns_; ///< by axis of the base
+  bool was_lost_ = false;
+  std::optional<Stamp> back_since_; ///< after it was lost
+  std::array<Turns, 3> turns_;      ///< by axis of the base
   bool set_aside_ = false;
   int rounds_ = 0; ///< of being set aside without a result
 };

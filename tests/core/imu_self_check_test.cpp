@@ -154,6 +154,19 @@ TEST_F(ImuSelfCheckTest, AGyroIsTriedAgainWhereLidarSeesNothingClearWithoutItBut
   EXPECT_NE(check.verdict().find("scale is wrong"), std::string_view::npos);
 }
 
+/// Nobody uses it in the second after a loss.
+TEST_F(ImuSelfCheckTest, WhatLidarSeesAloneAfterALossSpeaksAgainstNoGyro) {
+  ImuSelfCheck check(Pose{});
+  stand(check);
+  check.forget();
+  now_ += milliseconds{200};
+  check.accept(SourceReading{.stamp = now_, .arrival = now_});
+  turn(check, 9, {0, 0, 1.0}, {0, 0, -1.0});
+  EXPECT_FALSE(refused_);
+  turn(check, 4, {0, 0, 1.0}, {0, 0, -1.0});
+  EXPECT_TRUE(refused_);
+}
+
 TEST_F(ImuSelfCheckTest, WhatLidarDoesNotSeeSpeaksAgainstNoGyro) {
   ImuSelfCheck check(Pose{});
   sees_ = {true, true, true, true, true, false};
