@@ -35,9 +35,10 @@ std::optional<std::string> short_sweep(const SweepOptions& options, const std::s
   const double turn_ms = kMsPerMinute / rotation_rate_rpm, sweep_ms = 1e3 * to_seconds(*options.sweep_period);
   if (sweep_ms >= kAlmost * turn_ms)
     return std::nullopt;
-  return fmt::format("lidar {}: turns in {:.0f} ms, so a sweep of {:.0f} ms sees a part of what is around, each another "
-                     "one; set sweep_period_ms: auto",
-                     lidar, turn_ms, sweep_ms);
+  return fmt::format(
+      "lidar {}: turns in {:.0f} ms, so a sweep of {:.0f} ms sees a part of what is around, each another "
+      "one; set sweep_period_ms: auto",
+      lidar, turn_ms, sweep_ms);
 }
 
 } // namespace locus::daemon
