@@ -82,7 +82,6 @@ void SweepBuilder::add(const LidarPacket& packet, Stamp arrival) {
   const StageScope scope(clock_, Stage::correct);
   revolution_.observe(packet);
   lag_ = std::max(Duration::zero(), arrival - packet.stamp);
-  step_noticed_.reset();
   if (window_ && packet.stamp < window_->start - kMaxLateness) {
     ++counters_.late_packets;
     if (++consecutive_late_ < kLatePacketsToRestart)
@@ -114,29 +113,10 @@ void SweepBuilder::add(const LidarPacket& packet, Stamp arrival) {
 
 void SweepBuilder::advance(Stamp now) {
   sources_.advance(now);
-  if (!window_)
+  if (!window_ || now - lag_ > window_->end + kMaxPause)
     return;
-  const Stamp due = now - lag_;
-  if (due > window_->end + kMaxPause || due < window_->start - kMaxLateness)
-    return follow_step(now);
-  step_noticed_.reset();
-  while (due > window_->end + kGrace)
+  while (now - lag_ > window_->end + kGrace)
     close();
-}
-
-/// The host's clock has stepped. A lidar that sends tells where its windows go on; where none does they go on at the
-/// new time.
-void SweepBuilder::follow_step(Stamp now) {
-  constexpr Duration kSilence = std::chrono::seconds{1};
-  if (!step_noticed_ || now < *step_noticed_)
-    step_noticed_ = now;
-  if (now - *step_noticed_ < kSilence)
-    return;
-  step_noticed_.reset();
-  close();
-  window_.reset();
-  ++counters_.restarts;
-  open(now - lag_);
 }
 
 void SweepBuilder::finish() {

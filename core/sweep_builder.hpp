@@ -87,7 +87,6 @@ class SweepBuilder {
     std::uint32_t segment;
   };
 
-  void follow_step(Stamp now);
   void open(Stamp start);
   void close();
   void append(const LidarPacket& packet, Stamp from, Stamp to);
@@ -118,8 +117,7 @@ class SweepBuilder {
   std::vector<RawPoint> raw_;                 ///< only where segments are not the points themselves
   Sweep sweep_;
   std::vector<SweepPoint> unregistered_;
-  Duration lag_{};                    ///< of arrival behind firing, as last seen
-  std::optional<Stamp> step_noticed_; ///< when the time was first not that of the window; no packet has come since
+  Duration lag_{}; ///< of arrival behind firing, as last seen
   std::uint64_t consecutive_late_ = 0;
   Counters counters_;
 };

@@ -228,21 +228,6 @@ TEST(SweepBuilder, WindowsCloseOnTimeWhenNoPacketComes) {
   EXPECT_TRUE(built.sweeps.back().points.empty());
 }
 
-TEST(SweepBuilder, WindowsGoOnWhereTheHostsClockStepsWhileNoPacketComes) {
-  for (const Duration step : {Duration{seconds{70}}, -Duration{seconds{60}}, Duration{hours{10}}}) {
-    NumberedLidar lidar;
-    Built built;
-    built.play(lidar, seconds{1});
-    built.builder.advance(lidar.next() + seconds{3});
-    const std::size_t before = built.sweeps.size();
-    for (Duration later = seconds{3}; later < seconds{6}; later += milliseconds{10})
-      built.builder.advance(lidar.next() + later + step);
-    EXPECT_NEAR(static_cast<double>(built.sweeps.size() - before), 20, 2) << "a second is waited for the lidar";
-    EXPECT_EQ(built.builder.counters().restarts, 1U);
-    EXPECT_NEAR(to_seconds(built.sweeps.back().end - (lidar.next() + seconds{6} + step)), 0, 0.15);
-  }
-}
-
 TEST(SweepBuilder, WindowsDoNotCloseBeforeTheirTime) {
   NumberedLidar lidar;
   Built built;
