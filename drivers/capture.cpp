@@ -165,11 +165,18 @@ const Datagram* Capture::next() {
 
 /// libpcap reports a file that is cut and one that is damaged alike; only the stream knows whether its end was reached.
 void Capture::note_break() {
+  const std::string_view why = pcap_geterr(pcap_.get());
+  if (why.find("different from") != std::string_view::npos) {
+    break_ = fmt::format("{}: it was recorded on several interfaces of different kinds, which libpcap does not read "
+                         "({}); the {} frames before are used; record with: tcpdump -i CARD, of the lidar's card alone",
+                         file_.string(), why, stats_.frames);
+    return;
+  }
   const bool cut = std::feof(pcap_file(pcap_.get())) != 0;
   const std::string place = bytes_total_ > 0 ? fmt::format("byte {}: ", bytes_read()) : ""; // a pipe counts none
   break_ = fmt::format("{}: {}{} ({}); the {} frames before it are used{}", file_.string(), place,
-                       cut ? "the capture ends in mid-packet" : "the capture is damaged", pcap_geterr(pcap_.get()),
-                       stats_.frames, cut ? "" : ", what follows is not");
+                       cut ? "the capture ends in mid-packet" : "the capture is damaged", why, stats_.frames,
+                       cut ? "" : ", what follows is not");
 }
 
 std::string Capture::why_none() const {

@@ -247,27 +247,34 @@ template <class Sample> class MotionSamples<Sample>::Rows {
 template <class Sample>
 Expected<MotionSamples<Sample>, std::string> MotionSamples<Sample>::open(std::vector<std::filesystem::path> files) {
   Rows rows(files);
+  const auto is_pipe = [](const std::filesystem::path& file) { return !std::filesystem::is_regular_file(file); };
+  const bool read_once = std::ranges::any_of(files, is_pipe);
   std::optional<TimeSpan> arrivals;
+  std::vector<Sample> all;
   bool in_order = true;
   for (Sample sample; rows.next(sample);) {
+    if (read_once)
+      all.push_back(sample);
     in_order &= !arrivals || sample.arrival >= arrivals->last;
     arrivals = {arrivals ? arrivals->first : sample.arrival, sample.arrival};
   }
   if (rows.problem()) {
     return *rows.problem();
   }
-  if (rows.in_step() && in_order) {
+  if (read_once && !rows.in_step()) {
+    return fmt::format("{}: a pipe, whose meta file is not in its order; save it as a file", files.front().string());
+  }
+  if (!read_once && rows.in_step() && in_order) {
     MotionSamples samples(std::make_unique<Rows>(std::move(files)), arrivals);
     samples.breaks_ = rows.breaks();
     return samples;
   }
-  std::vector<Sample> all;
-  if (rows.in_step()) {
+  if (!read_once && rows.in_step()) {
     Rows again(std::move(files));
     for (Sample sample; again.next(sample);) {
       all.push_back(sample);
     }
-  } else {
+  } else if (!read_once) {
     for (const std::filesystem::path& file : files) {
       Expected<std::vector<Sample>, std::string> of_file = read_samples<Sample>(file);
       if (!of_file) {

@@ -31,7 +31,7 @@ struct TimeSpan {
 /// was switched off, is read up to there.
 ///
 /// One hour of an IMU would fill 100 MB: files in which the samples stand in the order of arrival, and their meta rows
-/// in that of the samples, are read as they are asked for, and only others are held. One owner.
+/// in that of the samples, are read as they are asked for, and only others are held, as are those of a pipe. One owner.
 template <class Sample> class MotionSamples {
  public:
   /// Reads the files through, so that what is wrong with them is known before the first sample is used.

@@ -115,6 +115,7 @@ Expected<UdpSocket, std::string> UdpSocket::adopt(int descriptor) {
   socklen_t size = sizeof(type);
   if (getsockopt(descriptor, SOL_SOCKET, SO_TYPE, &type, &size) != 0 || type != SOCK_DGRAM)
     return fmt::format("descriptor {} is no UDP socket; write ListenDatagram= in the socket unit", descriptor);
+  set(descriptor, SOL_SOCKET, SO_REUSEADDR, 0); // systemd's, by which any account might bind the port and take packets
   if (auto problem = adopted.prepare())
     return *problem;
   return adopted;

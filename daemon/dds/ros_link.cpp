@@ -63,6 +63,8 @@ struct RosLink::Session {
 
   void listen(const Config& config) {
     waitset = DdsEntity{dds_create_waitset(node.participant())};
+    no_topic = DdsEntity{dds_create_guardcondition(node.participant())};
+    dds_waitset_attach(waitset.handle(), no_topic.handle(), 0);
     const auto wake_by = [this](dds_entity_t reader) {
       dds_set_status_mask(reader, DDS_DATA_AVAILABLE_STATUS);
       dds_waitset_attach(waitset.handle(), reader, 0);
@@ -89,6 +91,7 @@ struct RosLink::Session {
   DdsWriter<ros::DiagnosticArray> diagnostics;
   std::optional<DdsWriter<ros::TFMessage>> tf;
   std::optional<DdsWriter<ros::PointCloud2>> cloud, map;
+  DdsEntity no_topic; ///< is never triggered; without anything to wait for a waitset does not wait at all
   DdsEntity waitset;
   std::vector<ImuSource> imus;
   std::vector<OdometrySource> odometries;

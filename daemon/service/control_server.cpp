@@ -148,17 +148,17 @@ void ControlServer::add_to(std::vector<pollfd>& poll) const {
 
 bool ControlServer::serve() {
   const std::uint64_t answered_before = answered_;
-  accept_waiting();
-  std::erase_if(clients_, [this](Client& client) { return !serve(client); });
-  return answered_ != answered_before;
+  const bool called = accept_waiting();
+  const std::size_t gone = std::erase_if(clients_, [this](Client& client) { return !serve(client); });
+  return called || gone > 0 || answered_ != answered_before;
 }
 
 /// At most as many as may stay, for somebody may call again and again.
-void ControlServer::accept_waiting() {
+bool ControlServer::accept_waiting() {
   for (std::size_t i = 0; i < kMaxClients; ++i) {
     Descriptor client{accept4(listener_.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC)};
     if (client.number() < 0)
-      return;
+      return i > 0;
     if (clients_.size() == kMaxClients && may_command(client.number()))
       drop_a_stranger();
     if (clients_.size() < kMaxClients)
@@ -166,6 +166,7 @@ void ControlServer::accept_waiting() {
     else
       send(client.number(), Answer::refusal("too many clients; end a locusctl that still runs"));
   }
+  return true;
 }
 
 /// Who may only look keeps nobody out who may do more.

@@ -62,7 +62,8 @@ class ControlServer {
   static Expected<ControlServer, std::string> open(const std::filesystem::path& path, Handler handler);
 
   void add_to(std::vector<pollfd>& poll) const;
-  /// Takes what has come, without waiting, one request of each client. Whether anything was answered.
+  /// Takes what has come, without waiting, one request of each client. Whether anybody called, hung up or was
+  /// answered.
   bool serve();
 
  private:
@@ -73,7 +74,8 @@ class ControlServer {
   };
 
   ControlServer(Descriptor listener, Handler handler) : listener_(std::move(listener)), handler_(std::move(handler)) {}
-  void accept_waiting();
+  /// Whether there was one.
+  bool accept_waiting();
   void drop_a_stranger();
   /// Whether the client stays.
   bool serve(Client& client);

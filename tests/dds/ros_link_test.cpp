@@ -249,6 +249,18 @@ TEST(RosLink, WithoutItsInterfaceGoesOnTryingAndSaysWhichOne) {
   EXPECT_TRUE(eventually([&] { return link.progress() > before; })) << "waiting is no standstill";
 }
 
+TEST(RosLink, WithNothingToHearSleeps) {
+  const test::DdsDomain domain;
+  Config config = config_in(domain);
+  config.odometry.motion_sources.clear();
+  config.source_topics.clear();
+  const RosLink link(config, [](const RosInput&) {});
+  EXPECT_TRUE(eventually([&] { return link.status().connected; }));
+  const std::uint64_t before = link.progress();
+  std::this_thread::sleep_for(seconds{1});
+  EXPECT_LT(link.progress() - before, 100U);
+}
+
 TEST(RosLink, IsGoneWithinASecond) {
   const test::DdsDomain domain;
   auto link = std::make_unique<RosLink>(config_in(domain), [](const RosInput&) {});

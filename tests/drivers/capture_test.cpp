@@ -336,6 +336,23 @@ TEST(Capture, PcapngIsReadWithItsNanosecondsAndCutAtAnyByte) {
   }
 }
 
+TEST(Capture, PcapngOfUnlikeInterfacesIsNotCalledDamaged) {
+  Bytes whole = pcapng_header(DLT_EN10MB);
+  append_pcapng_frame(whole, 1'700'000'000'123'456'789, ethernet(ipv4_udp({}, payload_of(31))));
+  Bytes interface;
+  append_little_endian(interface, DLT_LINUX_SLL, 2);
+  append_little_endian(interface, 0, 2);
+  append_little_endian(interface, 0, 4);
+  append_block(whole, 1, interface);
+  const TemporaryFile file{"any.pcapng", whole};
+  Capture capture = opened(file.path());
+  EXPECT_NE(capture.next(), nullptr);
+  EXPECT_EQ(capture.next(), nullptr);
+  ASSERT_EQ(capture.warnings().size(), 1U);
+  EXPECT_TRUE(contains(capture.warnings()[0], "interfaces of different kinds")) << capture.warnings()[0];
+  EXPECT_TRUE(contains(capture.warnings()[0], "the 1 frames before are used")) << capture.warnings()[0];
+}
+
 TEST(Capture, PcapngTimeBeyondAllStampsIsMalformed) {
   Bytes whole = pcapng_header(DLT_EN10MB);
   append_pcapng_frame(whole, ~0ULL, ethernet(ipv4_udp({}, payload_of(31))));

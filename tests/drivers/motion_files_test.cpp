@@ -5,13 +5,17 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <fstream>
 #include <random>
+#include <thread>
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "drivers/capture_folder.hpp"
 #include "support/errors.hpp"
 #include "support/temporary_file.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace locus {
 namespace {
@@ -405,6 +409,17 @@ TEST(MotionSamples, PiecesFollowEachOtherEachWithItsOwnMeta) {
 }
 
 /// The clock was set back between two samples: no reason to refuse what follows, in one file or in two.
+TEST(MotionSamples, PipeIsReadOnce) {
+  const test::TemporaryFolder folder;
+  const std::filesystem::path pipe = folder / "wio.tum";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  std::thread writer([&] { std::ofstream{pipe} << "2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n3 0 0 0 0 0 0 1\n"; });
+  auto samples = MotionSamples<OdometrySample>::open(pipe);
+  writer.join();
+  ASSERT_TRUE(samples) << samples.error();
+  EXPECT_EQ(stamps_of(std::move(*samples)), (std::vector<std::int64_t>{1'000'000'000, 2'000'000'000, 3'000'000'000}));
+}
+
 TEST(MotionSamples, PiecesOutOfOrderAreSortedByArrival) {
   const TemporaryFile a{"a.tum", bytes_of(row_at("5") + row_at("6"))}, b{"b.tum", bytes_of(row_at("1") + row_at("2"))};
   const TemporaryFile a_meta{"a.meta.csv", bytes_of("5000000000,5000000001,1\n6000000000,6000000001,1\n7000000000,")};

@@ -126,6 +126,23 @@ TEST(UdpSocket, WhatAnOwnerBeforeHasLostIsNotItsOwn) {
   EXPECT_EQ(second->kernel_drops(), 0U);
 }
 
+/// As systemd binds the sockets of a socket unit: without more, who binds last gets what is sent.
+TEST(UdpSocket, PortTakenOverIsSharedWithNobody) {
+  const auto bind_again = [](std::uint16_t port) {
+    const int descriptor = ::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    const int yes = 1;
+    EXPECT_EQ(setsockopt(descriptor, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes)), 0);
+    const sockaddr_in address{AF_INET, htons(port), {htonl(INADDR_ANY)}, {}};
+    if (bind(descriptor, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0)
+      return descriptor;
+    close(descriptor);
+    return -1;
+  };
+  const auto owned = UdpSocket::adopt(bind_again(kAnyPort));
+  ASSERT_TRUE(owned) << owned.error();
+  EXPECT_EQ(bind_again(owned->port()), -1);
+}
+
 TEST(UdpSocket, TakesOverALargerBufferAsItIs) {
   const int large = ::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   const int wanted = 4 * UdpSocket::kWantedBufferBytes;

@@ -123,6 +123,72 @@ TEST(Bags, BagOfTwoLidarsGivesTheirPacketsInTheOrderOfReception) {
     EXPECT_LT((of_bag[i].T_source_base.translation - of_capture[i].T_source_base.translation).norm(), 1e-9) << i;
 }
 
+/// As scripts leave it that merge or convert: players go by the time of reception.
+TEST(Bags, DatabaseThatWasWrittenTopicByTopicGivesTheOdometryOfTheCapture) {
+  const TemporaryFolder folder;
+  std::vector<RecordedMessage> messages = room_messages(RosVersion::ros2);
+  std::ranges::stable_sort(messages, {}, &RecordedMessage::topic);
+  write_db3(folder / "drive.db3", messages);
+  const Replay replay = replay_room(folder / "drive.db3");
+  expect_same_odometry(replay);
+  EXPECT_EQ(replay.run().err, "");
+}
+
+TEST(Bags, Ros1BagThatIsNotInOrderIsCalledSo) {
+  const TemporaryFolder folder;
+  std::vector<RecordedMessage> messages = room_messages(RosVersion::ros1);
+  std::ranges::rotate(messages, messages.begin() + static_cast<std::ptrdiff_t>(messages.size() / 2));
+  write_text(folder / "drive.bag", ros1_bag(messages));
+  expect_line(replay_room(folder / "drive.bag").run().err, {"goes back 1 times", "rosbag filter"});
+}
+
+/// rosbag2 keeps a write-ahead log in some versions, which SQLite would make again to read it.
+TEST(Bags, NothingIsWrittenBesideADatabase) {
+  const TemporaryFolder folder;
+  const std::filesystem::path bag = folder / "bag 100% #1?", file = bag / "drive_0.db3";
+  std::filesystem::create_directories(bag);
+  write_db3(file, room_messages(RosVersion::ros2));
+  {
+    std::fstream header{file, std::ios::in | std::ios::out | std::ios::binary};
+    header.seekp(18).write("\2\2", 2); // journal mode WAL
+  }
+  std::filesystem::permissions(bag, std::filesystem::perms{0555});
+  expect_same_odometry(replay_room(file));
+  std::filesystem::permissions(bag, std::filesystem::perms{0755});
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator{bag}, {}), 1);
+}
+
+TEST(Bags, LidarWhoseNameIsPartOfAnothersHasItsOwnTopic) {
+  const TemporaryFolder folder;
+  write_room_drive(folder / "capture", seconds{2}, 2);
+  std::vector<RecordedMessage> messages = messages_of(folder / "capture", RosVersion::ros1);
+  for (const auto& [first, second] : {std::pair{"/left/velodyne_packets", "/left_rear/velodyne_packets"},
+                                      std::pair{"/scan_left", "/scan_left_rear"}}) {
+    std::vector<RecordedMessage> renamed = messages;
+    for (RecordedMessage& message : renamed) {
+      if (message.topic.starts_with("/236"))
+        message.topic = message.topic.starts_with("/2368") ? second : first;
+    }
+    write_text(folder / "drive.bag", ros1_bag(renamed));
+    const Replay replay({"-c", folder / "capture/config.yaml", "--set", "lidars.front.name=left_rear", "--set",
+                         "lidars.rear.name=left", folder / "drive.bag"});
+    expect_line(replay.run().out, {first + " is lidar left,"s, second + " is lidar left_rear"s});
+    const Replay other({"-c", folder / "capture/config.yaml", "--set", "lidars.front.name=lef", "--set",
+                        "lidars.rear.name=left_rear", folder / "drive.bag"});
+    expect_line(other.run().out, {first + " is lidar lef,"s, second + " is lidar left_rear"s});
+  }
+}
+
+TEST(Bags, TopicThatTheUserNamesIsTakenForNoOther) {
+  const TemporaryFolder folder;
+  write_text(folder / "drive.bag", ros1_bag(room_messages(RosVersion::ros1)));
+  const Replay replay =
+      replay_room(folder / "drive.bag", {"--duration", "2", "--set", "motion_sources.wio.topic=/gps/odometry"});
+  EXPECT_EQ(replay.run().status, 0);
+  expect_line(replay.run().err, {"motion source wio: nothing on /gps/odometry", "/wheel_odometry"});
+  expect_line(replay.run().out, {"left out: /wheel_odometry"});
+}
+
 TEST(Bags, OnlyTopicOfAKindIsTakenWhateverItsName) {
   const TemporaryFolder folder;
   std::vector<RecordedMessage> messages = room_messages(RosVersion::ros1);
@@ -335,6 +401,13 @@ TEST_F(BadBag, Ros2FolderThatIsNotWhole) {
   expect_refused("drive", {"metadata.yaml", "ros2 bag reindex"});
   metadata("  {{{\n");
   expect_refused("drive", {"metadata.yaml", "ros2 bag reindex"});
+  for (const auto& [file, start] :
+       {std::pair{"drive_0.mcap", "\x89MCAP0\r\n"}, {"drive_0.db3.zstd", "\x28\xB5\x2F\xFD"}}) {
+    std::filesystem::remove_all(folder_ / "drive");
+    std::filesystem::create_directories(folder_ / "drive");
+    write_text(folder_ / "drive" / file, start);
+    expect_refused("drive", {"ros2 bag convert"});
+  }
 }
 
 TEST_F(BadBag, WithoutLidarSaysWhatIsInIt) {

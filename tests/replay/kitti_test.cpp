@@ -32,7 +32,7 @@ class KittiReplay : public testing::Test {
   KittiReplay() { std::filesystem::copy(kitti_room_drive(), drive_, std::filesystem::copy_options::recursive); }
 
   [[nodiscard]] std::filesystem::path points(int sweep) const {
-    return drive_ / fmt::format("velodyne_points/data/{:010}.bin", sweep);
+    return drive_ / fmt::format("velodyne_points/data/{:010}.txt", sweep);
   }
   void expect_refused(const std::vector<std::string>& said) const {
     const ProgramRun run = Replay({drive_}).run();
@@ -125,14 +125,51 @@ TEST(Kitti, PointsThatAreNoneAreLeftOutAndAnotherOrderIsRefused) {
 
 TEST_F(KittiReplay, SweepsThatAreMissingOrDamagedAreLeftOut) {
   std::filesystem::remove(points(5));
-  std::filesystem::resize_file(points(12), 1001);
+  std::ofstream{points(12), std::ios::app} << "1.0 2.0\n";
   std::filesystem::resize_file(points(20), 0);
+  std::ofstream{points(30)} << "1.0 2.0 metres 0.3\n";
   const Replay replay({drive_});
   EXPECT_EQ(replay.run().status, 0);
-  EXPECT_TRUE(contains(replay.run().err, "1 sweeps have a time but no .bin")) << replay.run().err;
-  EXPECT_TRUE(contains(replay.run().err, "2 sweeps are cut or no points, 0 not in the order")) << replay.run().err;
+  EXPECT_TRUE(contains(replay.run().err, "1 sweeps lack their points in data or their time")) << replay.run().err;
+  EXPECT_TRUE(contains(replay.run().err, "3 sweeps are cut or no points, 0 not in the order")) << replay.run().err;
   EXPECT_TRUE(contains(replay.run().err, "calib_imu_to_velo.txt")) << "it was not copied";
   EXPECT_GT(replay.summary()["sweeps"]["processed"], 30);
+}
+
+/// So are drives of which KITTI lacks a few sweeps: no file, and a blank line in its place.
+TEST_F(KittiReplay, BlankTimesStandForSweepsThatAreMissing) {
+  for (const char* const name : {"timestamps_start.txt", "timestamps_end.txt"}) {
+    const std::filesystem::path file = drive_ / "velodyne_points" / name;
+    std::vector<std::string> times = lines_of(read_text(file));
+    std::ofstream stream{file};
+    for (std::size_t i = 0; i < times.size(); ++i)
+      stream << (i >= 17 && i < 21 ? "" : times[i]) << '\n';
+  }
+  for (const int sweep : {17, 18, 19, 20})
+    std::filesystem::remove(points(sweep));
+  std::filesystem::copy(kitti_room_drive().parent_path() / "calib_imu_to_velo.txt", folder_.path());
+  const Replay replay({drive_});
+  EXPECT_EQ(replay.run().status, 0);
+  EXPECT_EQ(replay.run().err, "");
+  EXPECT_LT(replay.summary()["ape_m"]["max"], 0.02);
+}
+
+/// A drive that was synchronised has them in binary.
+TEST_F(KittiReplay, PointsInBinaryGiveTheSameBits) {
+  const Replay text({drive_});
+  for (int sweep = 0; sweep < kitti_room::kSweeps; ++sweep) {
+    std::vector<KittiPoint> all;
+    ASSERT_TRUE(tools::read_kitti_points(points(sweep), all));
+    std::ofstream{points(sweep).replace_extension(".bin"), std::ios::binary}.write(
+        reinterpret_cast<const char*>(all.data()), static_cast<std::streamsize>(all.size() * sizeof(KittiPoint)));
+    std::filesystem::remove(points(sweep));
+  }
+  std::filesystem::resize_file(points(39).replace_extension(".bin"), 1001);
+  const Replay binary({drive_});
+  EXPECT_TRUE(contains(binary.run().err, "1 sweeps are cut or no points")) << binary.run().err;
+  const std::string all = read_text(text.file("odometry.tum")), less = read_text(binary.file("odometry.tum"));
+  EXPECT_EQ(less.substr(0, less.size() / 2), all.substr(0, less.size() / 2));
+  EXPECT_GT(lines_of(less).size(), 35U);
 }
 
 TEST_F(KittiReplay, BadTimesAreNamedWithFileAndLine) {
@@ -144,7 +181,7 @@ TEST_F(KittiReplay, BadTimesAreNamedWithFileAndLine) {
   std::filesystem::remove(starts);
   expect_refused({"timestamps_start.txt", "cannot be read"});
   std::ofstream{starts} << "2023-11-14 23:13:20.0\n";
-  expect_refused({"no sweep that has a .bin and a time"});
+  expect_refused({"no sweep that has points"});
 }
 
 TEST_F(KittiReplay, WithoutInertialUnitTheLidarIsAlone) {

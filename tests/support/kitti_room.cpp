@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include "core/motion_sample.hpp"
-#include "kitti/kitti_sweep.hpp"
 #include "support/scenes.hpp"
 
 namespace locus::test::kitti_room {
@@ -16,7 +15,6 @@ namespace locus::test::kitti_room {
 namespace {
 
 using std::chrono::milliseconds;
-using tools::KittiPoint;
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
@@ -34,11 +32,18 @@ class RoomDrive {
     std::filesystem::create_directories(drive_ / "oxts/data");
     write_points();
     write_oxts();
-    std::ofstream{day_ / "calib_imu_to_velo.txt"}
-        << "calib_time: 25-May-2012 16:47:16\nR: 1 0 0 0 1 0 0 0 1\nT: -0.8 0.3 -0.8\n";
+    write_calibration();
   }
 
  private:
+  void write_calibration() const {
+    const Eigen::Matrix3d R = T_lidar_unit_.rotation.toRotationMatrix();
+    const Eigen::Vector3d& T = T_lidar_unit_.translation;
+    const Eigen::IOFormat kInOneLine(Eigen::FullPrecision, Eigen::DontAlignCols, " ", " ");
+    std::ofstream{day_ / "calib_imu_to_velo.txt"} << "calib_time: 25-May-2012 16:47:16\nR: " << R.format(kInOneLine)
+                                                  << "\nT: " << T.format(kInOneLine) << '\n';
+  }
+
   [[nodiscard]] Pose T_world_lidar(Stamp stamp) const {
     return trajectory_.T_world_base(stamp) * Pose{Eigen::Quaterniond::Identity(), {0, 0, 1}};
   }
@@ -51,7 +56,7 @@ class RoomDrive {
       const Stamp start = trajectory_.start() + sweep * kPeriod;
       starts << time_text(start);
       ends << time_text(start + kPeriod);
-      std::ofstream points{drive_ / fmt::format("velodyne_points/data/{:010}.bin", sweep), std::ios::binary};
+      std::ofstream points{drive_ / fmt::format("velodyne_points/data/{:010}.txt", sweep)};
       for (int ring = 0; ring < kRings; ++ring) {
         for (int column = 0; column < kColumns; ++column) { // counter-clockwise, the first few ahead of the front
           const double clockwise_rad = std::remainder(-kTurn * (column - ring % 3) / kColumns, kTurn);
@@ -60,9 +65,8 @@ class RoomDrive {
           const auto hit = room.cast({T.translation, T.rotation * ray}, 100);
           if (!hit)
             continue;
-          const Eigen::Vector3f p_m = (hit->range_m * ray).cast<float>();
-          const KittiPoint point{p_m.x(), p_m.y(), p_m.z(), 0.5F};
-          points.write(reinterpret_cast<const char*>(&point), sizeof(point));
+          const Eigen::Vector3d p_m = hit->range_m * ray;
+          points << fmt::format("{:.3f} {:.3f} {:.3f} 0.50\n", p_m.x(), p_m.y(), p_m.z());
         }
       }
     }
@@ -72,18 +76,17 @@ class RoomDrive {
     constexpr double kEarth_m = 6378137.0, kDegPerRad = 180.0 / std::numbers::pi, kLat_deg = 49.0, kLon_deg = 8.4;
     const double scale_m = kEarth_m * std::cos(kLat_deg / kDegPerRad);
     const double first_y_m = scale_m * std::log(std::tan((90 + kLat_deg) / kDegPerRad / 2));
-    const Pose T_lidar_unit{Eigen::Quaterniond::Identity(), {-0.8, 0.3, -0.8}};
-    const Eigen::Vector3d first = (T_world_lidar(trajectory_.start()) * T_lidar_unit).translation;
+    const Eigen::Vector3d first = (T_world_lidar(trajectory_.start()) * T_lidar_unit_).translation;
     std::ofstream times{drive_ / "oxts/timestamps.txt"};
     for (int i = 0; i < 10 * kSweeps; ++i) {
       const Stamp stamp = trajectory_.start() + i * milliseconds{10};
       const sim::BaseMotion motion = trajectory_.at(stamp);
-      const Pose T = T_world_lidar(stamp) * T_lidar_unit;
+      const Pose T = T_world_lidar(stamp) * T_lidar_unit_;
       const Eigen::Vector3d moved = T.translation - first;
       const Eigen::Vector3d rpy = to_rpy_rad(T.rotation);
       const Eigen::Vector3d force =
           T.rotation.inverse() * (motion.acceleration_world_mps2 + kGravity_mps2 * Eigen::Vector3d::UnitZ());
-      const Eigen::Vector3d& rate = motion.angular_velocity_base_radps;
+      const Eigen::Vector3d rate = T_lidar_unit_.rotation.inverse() * motion.angular_velocity_base_radps;
       times << time_text(stamp);
       std::ofstream{drive_ / fmt::format("oxts/data/{:010}.txt", i)}
           << fmt::format("{:.17g} {:.17g} {} {} {} {} 0 0 0 0 0 {} {} {} 0 0 0 {} {} {} 0 0 0 0 0 4 11 6 6 6\n",
@@ -94,6 +97,7 @@ class RoomDrive {
   }
 
   std::filesystem::path day_, drive_;
+  Pose T_lidar_unit_{from_rpy_rad({0.01, 0.005, -0.03}), {-0.8, 0.3, -0.8}};
   sim::Trajectory trajectory_{sim::room_course(kSweeps * kPeriod, 1.0), sim::room_start()};
 };
 

@@ -28,11 +28,13 @@ bool starts_with(const path& file, std::string_view magic) {
   return start == magic;
 }
 
-std::vector<path> databases_in(const path& folder) {
+/// Those that can be read and those that are refused by name.
+std::vector<path> bag_files_in(const path& folder) {
   std::vector<path> files;
   std::error_code error;
   for (std::filesystem::directory_iterator entry{folder, error}, end; !error && entry != end; entry.increment(error)) {
-    if (entry->path().extension() == ".db3")
+    const std::string name = entry->path().filename().string();
+    if (name.ends_with(".db3") || name.ends_with(".mcap") || name.ends_with(".db3.zstd"))
       files.push_back(entry->path());
   }
   std::ranges::sort(files);
@@ -44,7 +46,7 @@ Expected<std::vector<path>, std::string> files_of(const path& folder) {
   const path metadata = folder / kMetadata;
   std::error_code ignored;
   if (!std::filesystem::exists(metadata, ignored))
-    return databases_in(folder);
+    return bag_files_in(folder);
   try {
     const YAML::Node bag = YAML::LoadFile(metadata.string())["rosbag2_bagfile_information"];
     const auto storage = bag["storage_identifier"].as<std::string>("sqlite3");
@@ -61,6 +63,20 @@ Expected<std::vector<path>, std::string> files_of(const path& folder) {
     return fmt::format("{}:{}: not what rosbag2 writes ({}); make it again with: ros2 bag reindex", metadata.string(),
                        error.mark.line + 1, error.msg);
   }
+}
+
+/// Nothing is written beside a bag that nobody is writing to; SQLite would, of one that keeps a write-ahead log.
+std::string uri_of(const path& file) {
+  std::string uri = "file:";
+  for (const char c : std::filesystem::absolute(file).string()) {
+    const bool has_meaning = c == '%' || c == '?' || c == '#';
+    uri += has_meaning ? fmt::format("%{:02X}", c) : std::string(1, c);
+  }
+  const auto has = [&](const char* ending) {
+    std::error_code ignored;
+    return std::filesystem::exists(file.string() + ending, ignored);
+  };
+  return uri + (has("-wal") || has("-journal") ? "" : "?immutable=1");
 }
 
 /// ROS 2 puts /msg between package and name.
@@ -84,12 +100,12 @@ std::span<const std::byte> bytes_of(sqlite3_stmt* row, int column) {
 
 bool is_ros2_bag_folder(const path& folder) {
   std::error_code ignored;
-  return std::filesystem::exists(folder / kMetadata, ignored) || !databases_in(folder).empty();
+  return std::filesystem::exists(folder / kMetadata, ignored) || !bag_files_in(folder).empty();
 }
 
 bool is_ros2_bag_file(const path& file) {
-  return file.extension() == ".db3" || file.extension() == ".mcap" || starts_with(file, kSqlite) ||
-         starts_with(file, kMcap);
+  return file.extension() == ".db3" || file.extension() == ".mcap" || file.string().ends_with(".db3.zstd") ||
+         starts_with(file, kSqlite) || starts_with(file, kMcap);
 }
 
 void Ros2Bag::Closer::operator()(sqlite3* database) const { sqlite3_close(database); }
@@ -123,10 +139,12 @@ std::optional<std::string> Ros2Bag::add(const path& file) {
     return "the file is empty (0 bytes); record with: ros2 bag record -s sqlite3 /velodyne_packets /imu/data";
   if (starts_with(file, kMcap) || file.extension() == ".mcap")
     return fmt::format("an MCAP bag, which is not read; {}", kConvert);
+  if (starts_with(file, kZstd))
+    return fmt::format("compressed with zstd, which is not read; {}", kConvert);
   if (!starts_with(file, kSqlite))
     return "not a ROS 2 bag: no SQLite database; copy or record it again";
-  sqlite3* opened = nullptr;
-  sqlite3_open_v2(file.c_str(), &opened, SQLITE_OPEN_READONLY, nullptr); // what is wrong shows in the first query
+  sqlite3* opened = nullptr; // what is wrong shows in the first query
+  sqlite3_open_v2(uri_of(file).c_str(), &opened, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
   files_.push_back({file, Database(opened), {}, 0});
   sqlite3_limit(opened, SQLITE_LIMIT_LENGTH, 1 << 28);                            // no message is so long
   sqlite3_exec(opened, "PRAGMA writable_schema = ON", nullptr, nullptr, nullptr); // else a file that is cut is refused
@@ -155,7 +173,7 @@ std::optional<std::string> Ros2Bag::read_topics(File& file) {
     return why();
   const Statement last = prepare(file, "SELECT max(id) FROM messages");
   if (sqlite3_step(last.get()) == SQLITE_ROW)
-    file.last_row = sqlite3_column_double(last.get(), 0);
+    file.rows = sqlite3_column_double(last.get(), 0);
   const Statement first = prepare(file, "SELECT data FROM messages ORDER BY id LIMIT 1");
   if (const int status = sqlite3_step(first.get()); status != SQLITE_ROW && status != SQLITE_DONE)
     return why();
@@ -177,13 +195,13 @@ const BagMessage* Ros2Bag::next() {
   constexpr std::int64_t kMaxNs = 4'000'000'000'000'000'000; // so that differences of stamps cannot overflow
   while (read_row()) {
     const File& file = files_[current_];
-    const auto topic = file.topic_of.find(sqlite3_column_int64(rows_.get(), 1));
-    const std::int64_t ns = sqlite3_column_int64(rows_.get(), 2);
+    const auto topic = file.topic_of.find(sqlite3_column_int64(rows_.get(), 0));
+    const std::int64_t ns = sqlite3_column_int64(rows_.get(), 1);
     const bool has_time = ns >= 0 && ns <= kMaxNs;
     timeless_ += has_time ? 0U : 1U;
     if (topic == file.topic_of.end() || !has_time)
       continue;
-    message_ = {topic->second, stamp_from_ns(ns), bytes_of(rows_.get(), 3)};
+    message_ = {topic->second, stamp_from_ns(ns), bytes_of(rows_.get(), 2)};
     return &message_;
   }
   return nullptr;
@@ -193,11 +211,14 @@ const BagMessage* Ros2Bag::next() {
 bool Ros2Bag::read_row() {
   while (current_ < files_.size()) {
     const File& file = files_[current_];
+    if (!rows_) // as players read it; without the index that rosbag2 makes they would be sorted with all their data
+      rows_ = prepare(file, "SELECT topic_id, timestamp, data FROM messages INDEXED BY timestamp_idx ORDER BY "
+                            "timestamp, id");
     if (!rows_)
-      rows_ = prepare(file, "SELECT id, topic_id, timestamp, data FROM messages ORDER BY id");
+      rows_ = prepare(file, "SELECT topic_id, timestamp, data FROM messages ORDER BY id");
     const int status = sqlite3_step(rows_.get());
     if (status == SQLITE_ROW) {
-      row_ = sqlite3_column_double(rows_.get(), 0);
+      ++row_;
       return true;
     }
     if (status != SQLITE_DONE)
@@ -211,7 +232,7 @@ bool Ros2Bag::read_row() {
 
 void Ros2Bag::break_off(const File& file) {
   break_ = fmt::format("{}: message {}: the database breaks off or is damaged ({}); what lies before it is used",
-                       file.path.string(), static_cast<std::uint64_t>(row_) + 1, sqlite3_errmsg(file.database.get()));
+                       file.path.string(), row_ + 1, sqlite3_errmsg(file.database.get()));
 }
 
 std::vector<std::string> Ros2Bag::warnings() const {
@@ -227,8 +248,8 @@ std::vector<std::string> Ros2Bag::warnings() const {
 double Ros2Bag::progress() const {
   if (current_ == files_.size())
     return 1;
-  const double last_row = files_[current_].last_row;
-  const double of_file = last_row > 0 ? row_ / last_row : 0;
+  const double rows = files_[current_].rows;
+  const double of_file = rows > 0 ? std::min(1.0, static_cast<double>(row_) / rows) : 0;
   return (static_cast<double>(current_) + of_file) / static_cast<double>(files_.size());
 }
 

@@ -16,12 +16,13 @@ struct sqlite3_stmt;
 
 namespace locus::tools {
 
-/// A folder that rosbag2 wrote: with metadata.yaml, or with .db3 files alone.
+/// A folder that rosbag2 wrote: with metadata.yaml, or with its files alone.
 bool is_ros2_bag_folder(const std::filesystem::path& folder);
-/// By name or first bytes: an SQLite database, or MCAP, which is refused by name.
+/// By name or first bytes: an SQLite database, or what is refused by name: MCAP, or compressed.
 bool is_ros2_bag_file(const std::filesystem::path& file);
 
-/// A bag of ROS 2 in SQLite, of one file or of several that follow each other. Reads and never writes.
+/// A bag of ROS 2 in SQLite, of one file or of several that follow each other, each in the order of reception. Reads
+/// and never writes.
 class Ros2Bag : public Bag {
  public:
   /// Fails with one line for the user.
@@ -44,7 +45,7 @@ class Ros2Bag : public Bag {
     std::filesystem::path path;
     Database database;
     std::map<std::int64_t, std::size_t> topic_of; ///< by its number in this file
-    double last_row = 0;                          ///< greatest number of a message
+    double rows = 0;                              ///< greatest number of a message
   };
 
   static Statement prepare(const File& file, const char* sql);
@@ -56,7 +57,7 @@ class Ros2Bag : public Bag {
   std::vector<File> files_;
   std::size_t current_ = 0; ///< of the files
   Statement rows_;          ///< of the current file; declared after the databases, to go before them
-  double row_ = 0;
+  std::uint64_t row_ = 0;   ///< as many of it are read
   BagMessage message_{};
   std::uint64_t timeless_ = 0; ///< messages left out
   std::string break_;          ///< where and why reading stopped before the end; empty while all is well

@@ -41,19 +41,19 @@ std::optional<Stamp> parse_time(const std::string& text) {
   return Stamp{since_epoch};
 }
 
-Expected<std::vector<Stamp>, std::string> read_times(const path& file) {
+/// By the number of the file that they belong to; where one is missing its line is blank.
+Expected<std::vector<std::optional<Stamp>>, std::string> read_times(const path& file) {
   std::ifstream stream{file};
   if (!stream)
     return fmt::format("{}: cannot be read; a drive needs it, copy the whole folder", file.string());
-  std::vector<Stamp> times;
+  std::vector<std::optional<Stamp>> times;
   for (std::string line; std::getline(stream, line);) {
-    if (line.find_first_not_of(" \t\r") == std::string::npos)
-      continue;
+    const bool is_blank = line.find_first_not_of(" \t\r") == std::string::npos;
     const std::optional<Stamp> time = parse_time(line);
-    if (!time)
+    if (!time && !is_blank)
       return fmt::format("{}:{}: not a time like 2011-09-26 13:02:25.964389445; copy the file again", file.string(),
                          times.size() + 1);
-    times.push_back(*time);
+    times.push_back(time);
   }
   return times;
 }
@@ -68,6 +68,15 @@ bool has(const path& file) {
   return std::filesystem::exists(file, ignored);
 }
 
+/// As a drive has them that was synchronised, or one that was not.
+std::optional<path> points_of(const path& folder, std::size_t sweep) {
+  for (const char* const extension : {".bin", ".txt"}) {
+    if (const path file = numbered(folder, sweep, extension); has(file))
+      return file;
+  }
+  return std::nullopt;
+}
+
 Problem read_sweeps(const path& folder, KittiDrive& drive) {
   constexpr Duration kShortest = std::chrono::milliseconds{40}, kLongest = std::chrono::milliseconds{250};
   const auto starts = read_times(folder / "timestamps_start.txt"), ends = read_times(folder / "timestamps_end.txt");
@@ -75,21 +84,22 @@ Problem read_sweeps(const path& folder, KittiDrive& drive) {
     return starts ? ends.error() : starts.error();
   std::size_t missing = 0, odd = 0;
   for (std::size_t i = 0; i < std::min(starts->size(), ends->size()); ++i) {
-    const Stamp start = (*starts)[i], end = (*ends)[i];
-    const path file = numbered(folder / "data", i, ".bin");
+    const std::optional<Stamp> start = (*starts)[i], end = (*ends)[i];
+    const std::optional<path> file = points_of(folder / "data", i);
     const bool in_order = drive.sweeps.empty() || start > drive.sweeps.back().start;
-    if (!has(file))
-      ++missing;
-    else if (end - start < kShortest || end - start > kLongest || !in_order)
+    if (!start || !end || !file)
+      missing += start || end || file ? 1U : 0U;
+    else if (*end - *start < kShortest || *end - *start > kLongest || !in_order)
       ++odd;
     else
-      drive.sweeps.push_back({file, start, end});
+      drive.sweeps.push_back({*file, *start, *end});
   }
   if (drive.sweeps.empty())
-    return fmt::format("{}: no sweep that has a .bin and a time; copy the whole drive", folder.string());
+    return fmt::format("{}: no sweep that has points (data/0000000000.bin or .txt) and a time; copy the whole drive",
+                       folder.string());
   if (missing > 0)
-    drive.warnings.push_back(
-        fmt::format("{}: {} sweeps have a time but no .bin in data and are left out", folder.string(), missing));
+    drive.warnings.push_back(fmt::format("{}: {} sweeps lack their points in data or their time and are left out",
+                                         folder.string(), missing));
   if (odd > 0)
     drive.warnings.push_back(fmt::format("{}: {} sweeps left out, whose times are out of order or no turn of 40 to 250 "
                                          "ms",
@@ -156,21 +166,28 @@ Problem read_inertial_unit(const path& folder, KittiDrive& drive) {
     drive.warnings.push_back(fmt::format("{}: cannot be read, so true poses are those of the inertial unit, a metre "
                                          "from the lidar; put the day's calibration beside the drive",
                                          calibration.string()));
+  const Pose T_unit_lidar = T_lidar_unit.value_or(Pose{}).inverse();
+  const Eigen::Quaterniond R_lidar_unit = T_unit_lidar.rotation.conjugate();
   std::optional<Oxts> first;
   std::size_t unread = 0;
   for (std::size_t i = 0; i < times->size(); ++i) {
-    const std::optional<Oxts> oxts = read_oxts(numbered(folder / "oxts/data", i, ".txt"));
-    if (!oxts || (!drive.imu.empty() && (*times)[i] <= drive.imu.back().stamp)) {
+    const std::optional<Stamp> time = (*times)[i];
+    const path file = numbered(folder / "oxts/data", i, ".txt");
+    if (!time && !has(file))
+      continue;
+    const std::optional<Oxts> oxts = read_oxts(file);
+    if (!time || !oxts || (!drive.imu.empty() && *time <= drive.imu.back().stamp)) {
       ++unread;
       continue;
     }
     first = first ? first : oxts;
     const Eigen::Quaterniond attitude = from_rpy_rad(oxts->rpy_rad);
-    drive.imu.push_back({(*times)[i], (*times)[i], oxts->angular_velocity_radps, oxts->specific_force_mps2, attitude});
     const Pose T_world_unit{attitude, position_of(*oxts, first->lat_deg) - position_of(*first, first->lat_deg)};
-    const Pose T_world_lidar = T_world_unit * T_lidar_unit.value_or(Pose{}).inverse();
+    const Pose T_world_lidar = T_world_unit * T_unit_lidar;
+    drive.imu.push_back({*time, *time, R_lidar_unit * oxts->angular_velocity_radps,
+                         R_lidar_unit * oxts->specific_force_mps2, T_world_lidar.rotation});
     if (T_world_lidar.finite())
-      drive.truth.push_back({(*times)[i], T_world_lidar});
+      drive.truth.push_back({*time, T_world_lidar});
   }
   if (unread > 0)
     drive.warnings.push_back(fmt::format("{}: {} records cannot be read or are out of order and are left out",

@@ -13,8 +13,9 @@
 
 namespace locus::tools {
 
-/// A drive of KITTI's raw data, `..._drive_NNNN_sync` or `_extract`, as far as it is of use: names and times, what the
-/// inertial unit (oxts) said, and where it was. The times are taken as UTC.
+/// A drive of KITTI's raw data as far as it is of use: names and times, what the inertial unit (oxts) said, and where
+/// it was. `..._drive_NNNN_extract` has points as text and 100 records of the unit in a second, `_sync` has points in
+/// binary and a record for each sweep. The times are taken as UTC.
 struct KittiDrive {
   struct Sweep {
     std::filesystem::path file;
@@ -22,7 +23,7 @@ struct KittiDrive {
   };
 
   std::vector<Sweep> sweeps;         ///< that have a file, in the order of their numbers
-  std::vector<ImuSample> imu;        ///< in the unit's own frame: x forward, y left, z up; arrival = stamp
+  std::vector<ImuSample> imu;        ///< turned into the lidar's axes; arrival = stamp
   std::vector<StampedPose> truth;    ///< of the lidar, from where the unit began, x to the east, y to the north
   std::vector<std::string> warnings; ///< a line each
 

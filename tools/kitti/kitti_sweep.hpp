@@ -7,14 +7,9 @@
 #include <vector>
 
 #include "core/lidar_packet.hpp"
+#include "kitti/kitti_points.hpp"
 
 namespace locus::tools {
-
-/// As it lies in a .bin of KITTI: in the frame of the lidar, x forward, y left, z up.
-struct KittiPoint {
-  float x_m, y_m, z_m;
-  float reflectance; ///< 0..1
-};
 
 /// Makes packets again of a sweep of KITTI's HDL-64E: a turn that begins at the rear and goes clockwise, at one speed.
 ///
@@ -23,11 +18,8 @@ struct KittiPoint {
 /// used again from sweep to sweep.
 class KittiSweep {
  public:
-  /// More than the lidar can fire.
-  static constexpr std::size_t kMaxPoints = 200'000;
-
   /// Begins with the packets of these points; those that are not finite or at zero range are left out. False if the
-  /// points are not in that order, and nothing is begun. Precondition: at most kMaxPoints; start < end.
+  /// points are not in that order, and nothing is begun. Precondition: at most kMaxKittiPoints; start < end.
   bool begin(std::span<const KittiPoint> points, Stamp start, Stamp end);
 
   /// The next packet, valid until the next call; nullptr after the last of the sweep. Packets may be empty.

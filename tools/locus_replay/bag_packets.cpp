@@ -7,6 +7,11 @@
 #include <fmt/format.h>
 
 namespace locus::tools {
+namespace {
+
+constexpr Duration kAhead = std::chrono::milliseconds{500};
+
+} // namespace
 
 BagPackets::BagPackets(std::unique_ptr<Bag> bag, std::filesystem::path file, const Config& config,
                        const std::vector<std::optional<std::size_t>>& topic_of_lidar)
@@ -33,7 +38,6 @@ const Datagram* BagPackets::next() {
 }
 
 void BagPackets::read_ahead() {
-  constexpr Duration kAhead = std::chrono::milliseconds{500};
   constexpr std::size_t kMaxWaiting = 30'000; // what sixteen lidars send in that time, and 40 MB
   const auto is_ahead = [&] {
     return !scans_.empty() &&
@@ -48,6 +52,7 @@ void BagPackets::read_ahead() {
 }
 
 void BagPackets::take(const BagMessage& message) {
+  misplaced_ += message.recorded < newest_ - kAhead ? 1U : 0U;
   newest_ = message.recorded;
   const auto lidar = std::ranges::find(lidars_, message.topic, &Lidar::topic);
   if (lidar == lidars_.end())
@@ -71,10 +76,16 @@ std::string BagPackets::why_none() const {
 
 std::vector<std::string> BagPackets::warnings() const {
   std::vector<std::string> lines = bag_->warnings();
+  if (misplaced_ > 0)
+    lines.push_back(fmt::format("{}: the time of reception goes back {} times from one message to the next: the "
+                                "recorder's clock was set, or the bag is not in order, and what was made of it is "
+                                "wrong; sort it with: rosbag filter BAG SORTED_BAG True",
+                                file_.string(), misplaced_));
   if (malformed_ > 0)
-    lines.push_back(fmt::format("{}: {} of {} messages of type {} are cut short and were left out; record again if it "
-                                "matters",
-                                file_.string(), malformed_, messages_, kVelodyneScanType));
+    lines.push_back(
+        fmt::format("{}: {} of {} messages of type {} are cut short, or not serialised as little-endian, and "
+                    "were left out; record again if it matters",
+                    file_.string(), malformed_, messages_, kVelodyneScanType));
   return lines;
 }
 

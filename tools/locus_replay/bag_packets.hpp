@@ -62,6 +62,7 @@ class BagPackets : public DatagramSource {
   VelodyneScan::Packet packet_{};
   Datagram datagram_;
   std::uint64_t datagrams_ = 0, messages_ = 0, malformed_ = 0;
+  std::uint64_t misplaced_ = 0; ///< messages that were received well before the one that lies before them
 };
 
 } // namespace locus::tools

@@ -2,7 +2,11 @@
 #include "locus_replay/bag_topics.hpp"
 
 #include <algorithm>
+#include <functional>
+#include <iterator>
+#include <numeric>
 #include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -27,23 +31,22 @@ class Dealer {
     }
   }
 
-  /// To the first in the line of those whose name for it fits.
+  /// The only one whose name fits, if there is one and no more, to who has none.
   template <class Fits> void deal(Index& place, const Fits& fits) {
-    const auto found = std::ranges::find_if(left_, [&](std::size_t i) { return fits(topics_[i].name); });
-    if (found == left_.end()) {
-      waiting_.push_back(&place);
+    const auto is_fit = [&](std::size_t i) { return fits(topics_[i].name); };
+    const auto found = std::ranges::find_if(left_, is_fit);
+    if (place || found == left_.end() || std::find_if(std::next(found), left_.end(), is_fit) != left_.end())
       return;
-    }
     place = *found;
     left_.erase(found);
   }
 
-  /// The last one to the last that waits.
-  void finish() {
-    if (left_.size() != 1 || waiting_.size() != 1)
-      return;
-    *waiting_.front() = left_.front();
-    left_.clear();
+  /// The last one to the last who has none.
+  void finish(const std::vector<Index*>& places) {
+    std::vector<Index*> waiting;
+    std::ranges::copy_if(places, std::back_inserter(waiting), [](const Index* place) { return !place->has_value(); });
+    if (left_.size() == 1 && waiting.size() == 1)
+      *waiting.front() = std::exchange(left_, {}).front();
   }
 
   [[nodiscard]] std::string names_left() const {
@@ -57,13 +60,26 @@ class Dealer {
  private:
   const Topics& topics_;
   std::vector<std::size_t> left_;
-  std::vector<Index*> waiting_;
 };
 
 /// With and without the slash in front.
 bool is_same_topic(std::string_view a, std::string_view b) {
   const auto bare = [](std::string_view name) { return name.substr(name.starts_with('/') ? 1 : 0); };
   return !a.empty() && bare(a) == bare(b);
+}
+
+bool is_segment(std::string_view name, std::string_view topic) {
+  return fmt::format("/{}/", topic).find(fmt::format("/{}/", name)) != std::string::npos;
+}
+
+bool is_part(std::string_view name, std::string_view topic) { return topic.find(name) != std::string_view::npos; }
+
+/// By the length of their names: a topic of front_left has front in it, too.
+std::vector<std::size_t> longest_name_first(const std::vector<LidarOptions>& lidars) {
+  std::vector<std::size_t> order(lidars.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, std::greater{}, [&](std::size_t i) { return lidars[i].name.size(); });
+  return order;
 }
 
 std::string all_of(const Topics& topics) {
@@ -73,6 +89,21 @@ std::string all_of(const Topics& topics) {
   return lines.empty() ? "no topics" : fmt::format("{}", fmt::join(lines, ", "));
 }
 
+std::vector<Index*> places_of(std::vector<Index>& places) {
+  std::vector<Index*> all;
+  for (Index& place : places)
+    all.push_back(&place);
+  return all;
+}
+
+/// A topic that is none of the defaults is meant.
+bool is_named(const SourceTopics& topics) {
+  static const Config kDefaults;
+  return !topics.topic.empty() && std::ranges::none_of(kDefaults.source_topics, [&](const SourceTopics& defaults) {
+    return is_same_topic(defaults.topic, topics.topic);
+  });
+}
+
 void deal_lidars(const Bag& bag, const std::string& bag_name, const Config& config, BagTopics& chosen) {
   Dealer dealer(bag.topics(), kVelodyneScanType);
   if (dealer.left() == 0)
@@ -80,15 +111,22 @@ void deal_lidars(const Bag& bag, const std::string& bag_name, const Config& conf
                   fmt::format("{}: no {} in it, but {}; record the lidar's packets, mostly on /velodyne_packets",
                               bag_name, kVelodyneScanType, all_of(bag.topics())));
   chosen.of_lidar.resize(config.lidars.size());
-  for (std::size_t i = 0; i < config.lidars.size(); ++i)
-    dealer.deal(chosen.of_lidar[i],
-                [&](const std::string& topic) { return topic.find(config.lidars[i].name) != std::string::npos; });
-  dealer.finish();
+  for (const auto is_in : {&is_segment, &is_part}) {
+    for (const std::size_t i : longest_name_first(config.lidars))
+      dealer.deal(chosen.of_lidar[i], [&](const std::string& topic) { return is_in(config.lidars[i].name, topic); });
+  }
+  dealer.finish(places_of(chosen.of_lidar));
   if (std::ranges::none_of(chosen.of_lidar, [](const Index& topic) { return topic.has_value(); }))
     throw Failure(ExitStatus::wrong_usage,
                   fmt::format("{}: it is not clear which of {} is lidar {}; give it a name that is part of one with "
                               "--set lidars.0.name=NAME",
                               bag_name, dealer.names_left(), config.lidars.front().name));
+  for (std::size_t i = 0; i < config.lidars.size(); ++i) {
+    if (!chosen.of_lidar[i] && dealer.left() > 0)
+      chosen.doubts.push_back(fmt::format("{}: lidar {}: it is not clear whether it is one of {}; give it a name that "
+                                          "is part of one with --set lidars.{}.name=NAME",
+                                          bag_name, config.lidars[i].name, dealer.names_left(), i));
+  }
 }
 
 void deal_sources(const Bag& bag, const std::string& bag_name, const Config& config,
@@ -96,12 +134,16 @@ void deal_sources(const Bag& bag, const std::string& bag_name, const Config& con
   const std::vector<MotionSourceOptions>& sources = config.odometry.motion_sources;
   const auto is_wanted = [&](std::size_t i) { return sources[i].kind == kind && !has_file(i); };
   Dealer dealer(bag.topics(), type_of(kind));
+  std::vector<Index*> nameless;
   for (std::size_t i = 0; i < sources.size(); ++i) {
-    if (is_wanted(i))
-      dealer.deal(chosen.of_source[i],
-                  [&](const std::string& topic) { return is_same_topic(topic, config.source_topics[i].topic); });
+    if (!is_wanted(i))
+      continue;
+    dealer.deal(chosen.of_source[i],
+                [&](const std::string& topic) { return is_same_topic(topic, config.source_topics[i].topic); });
+    if (!is_named(config.source_topics[i]))
+      nameless.push_back(&chosen.of_source[i]);
   }
-  dealer.finish();
+  dealer.finish(nameless);
   for (std::size_t i = 0; i < sources.size(); ++i) {
     if (is_wanted(i) && !chosen.of_source[i] && dealer.left() > 0)
       chosen.doubts.push_back(fmt::format("{}: motion source {}: nothing on {}, and it is not clear whether it is "

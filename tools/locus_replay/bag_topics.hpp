@@ -14,14 +14,14 @@ namespace locus::tools {
 
 /// Which topics of a bag speak for the lidars and the motion sources of a configuration: indices in Bag::topics().
 ///
-/// A lidar's is the one of velodyne_msgs/VelodyneScan that has the lidar's name in it; a motion source's the one that
-/// the configuration names. Where one lidar is left without, and one topic, they are taken for each other, and likewise
-/// of the motion sources of a kind.
+/// A lidar's is the one of velodyne_msgs/VelodyneScan that has the lidar's name in it, as a part between slashes sooner
+/// than within one; a motion source's the one that the configuration names. Where one lidar is left without, and one
+/// topic, they are taken for each other, and likewise of the motion sources of a kind whose topics are the defaults.
 struct BagTopics {
   std::vector<std::optional<std::size_t>> of_lidar;  ///< by index in the configuration
   std::vector<std::optional<std::size_t>> of_source; ///< likewise
   std::string taken;                                 ///< what was taken for what, in one line for the user
-  std::vector<std::string> doubts;                   ///< a line for each motion source that several topics may be
+  std::vector<std::string> doubts; ///< a line for each lidar and motion source that topics left may be
 
   /// `has_file`: of a motion source that the bag need not speak for. Throws Failure if there is nothing for any lidar.
   static BagTopics choose(const Bag& bag, const std::string& bag_name, const Config& config,

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "locus_replay/kitti_packets.hpp"
 
-#include <fstream>
-#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -30,17 +28,10 @@ const Datagram* KittiPackets::next() {
 }
 
 void KittiPackets::read(const KittiDrive::Sweep& sweep) {
-  std::error_code ignored;
-  const std::uintmax_t size = std::filesystem::file_size(sweep.file, ignored);
-  std::ifstream stream{sweep.file, std::ios::binary};
-  if (!stream || ignored || size == 0 || size % sizeof(KittiPoint) != 0 ||
-      size > KittiSweep::kMaxPoints * sizeof(KittiPoint)) {
+  if (!read_kitti_points(sweep.file, points_))
     ++damaged_;
-    return;
-  }
-  points_.resize(size / sizeof(KittiPoint));
-  stream.read(reinterpret_cast<char*>(points_.data()), static_cast<std::streamsize>(size));
-  unordered_ += sweep_.begin(points_, sweep.start, sweep.end) ? 0U : 1U;
+  else if (!sweep_.begin(points_, sweep.start, sweep.end))
+    ++unordered_;
 }
 
 std::string KittiPackets::why_none() const {
