@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What --set does, one option a line and eight of them at most, for each costs as much; the outcome is printed and read
+// What --set does, one option a line and three of them at most, for each costs as much; the outcome is printed and read
 // again, to the same.
 #include <sstream>
 #include <string>
@@ -11,7 +11,7 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace locus;
   static const Config kDefaults;
-  static constexpr std::size_t kMostAssignments = 8;
+  static constexpr std::size_t kMostAssignments = 3;
   std::istringstream text{std::string{fuzz::text_of(data, size)}};
   std::vector<std::string> assignments;
   for (std::string line; assignments.size() < kMostAssignments && std::getline(text, line);)

@@ -137,7 +137,7 @@ TEST(Bags, DatabaseThatWasWrittenTopicByTopicGivesTheOdometryOfTheCapture) {
 TEST(Bags, Ros1BagThatIsNotInOrderIsCalledSo) {
   const TemporaryFolder folder;
   std::vector<RecordedMessage> messages = room_messages(RosVersion::ros1);
-  std::ranges::rotate(messages, messages.begin() + static_cast<std::ptrdiff_t>(messages.size() / 2));
+  std::rotate(messages.begin(), messages.begin() + static_cast<std::ptrdiff_t>(messages.size() / 2), messages.end());
   write_text(folder / "drive.bag", ros1_bag(messages));
   expect_line(replay_room(folder / "drive.bag").run().err, {"goes back 1 times", "rosbag filter"});
 }

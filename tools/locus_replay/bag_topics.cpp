@@ -91,6 +91,7 @@ std::string all_of(const Topics& topics) {
 
 std::vector<Index*> places_of(std::vector<Index>& places) {
   std::vector<Index*> all;
+  all.reserve(places.size());
   for (Index& place : places)
     all.push_back(&place);
   return all;
