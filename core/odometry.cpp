@@ -27,7 +27,15 @@ constexpr double kAlwaysAllowed_rad = 0.1;
 /// contradict the motion sources by no more than this. (The worst of honest drives is 0.78; in dust, 2.2 sigma.)
 constexpr double kLeastOfUsual = 0.5;
 constexpr double kLoneDeviation_sigma = 3.0;
-constexpr double kMemoryOfShare_sweeps = 10.0;
+constexpr double kMemoryOfUsual_sweeps = 10.0;
+
+/// A lidar that falls silent leaves a last sweep that is hardly begun. A sweep of so few points, as part of the usual,
+/// tells a place but no velocity: what noise there is in it would carry the robot away for as long as nothing is seen.
+constexpr double kFragment = 1.0 / 3.0;
+
+/// A robot of which nothing is seen is taken to go on as it did for so long, and to come to rest then.
+constexpr Duration kGoesOn = std::chrono::seconds{1};
+constexpr double kComesToRest_s = 1.0;
 
 /// After so many refusals in a row the submap is behind us, and the map goes on from the prediction.
 constexpr int kRefusalsToRestart = 10;
@@ -66,7 +74,7 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
   prepare_next();
   if (processed_ == 0)
     return begin(sweep);
-  const MotionPrior prior = settle_dispute(sweep, sensors_.integrate(sweep, last_twist()), stop);
+  const MotionPrior prior = settle_dispute(sweep, sensors_.integrate(sweep, kept_twist(sweep)), stop);
   lacks_prior_ = needs_scan_to_scan(prior);
   gravity_.observe(prior.T_last_now.rotation, sweep);
   flat_ground_.observe(sweep.end, gravity_.up_base());
@@ -155,9 +163,13 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
   return estimate;
 }
 
-/// The velocity in the last sweep; nothing where there was no motion to tell it from.
-std::optional<Vector6> Odometry::last_twist() const {
-  return processed_ > 1 ? std::optional{twist_base_} : std::nullopt;
+/// The velocity in the last sweep, as far as it may have lasted; nothing where there was no motion to tell it from.
+std::optional<Vector6> Odometry::kept_twist(const Sweep& sweep) const {
+  if (processed_ < 2)
+    return std::nullopt;
+  if (sweep.end - last_seen_ <= kGoesOn)
+    return twist_base_;
+  return twist_base_ * std::exp(-std::max(0.0, sensors_.elapsed_s(sweep)) / kComesToRest_s);
 }
 
 /// Where the source of the rotation turns quite otherwise than the robot would without it, the surfaces say which is
@@ -166,7 +178,7 @@ MotionPrior Odometry::settle_dispute(const Sweep& sweep, const MotionPrior& prio
   refuted_.reset();
   if (prior.source.rotation < 0 || adrift_ || sweep.points.size() < kMinPoints)
     return prior;
-  const MotionPrior rival = sensors_.integrate(sweep, last_twist(), prior.source.rotation);
+  const MotionPrior rival = sensors_.integrate(sweep, kept_twist(sweep), prior.source.rotation);
   const Eigen::Vector3d dispute = difference(prior.T_last_now, rival.T_last_now).tail<3>();
   if (dispute.norm() < kAlwaysAllowed_rad)
     return prior;
@@ -308,6 +320,10 @@ bool Odometry::misses_most(const Registration& registration) const {
   return share_of_inliers(registration) < kLeastOfUsual * usual_share_;
 }
 
+bool Odometry::is_fragment(const Sweep& sweep) const {
+  return static_cast<double>(sweep.points.size()) < kFragment * usual_points_;
+}
+
 double Odometry::share_of_inliers(const Registration& registration) const {
   return static_cast<double>(registration.inliers) / static_cast<double>(registered_);
 }
@@ -345,8 +361,8 @@ Matrix6 Odometry::share_of_map(double fresh, const Matrix6& observability) {
 void Odometry::hold_still(const Sweep& sweep, OdometryEstimate& estimate) {
   if (estimate.failed)
     return standstill_.lose_sight();
-  const std::optional<Pose> T_odom_held =
-      standstill_.observe(sweep.end, estimate.T_odom_base, sensors_.saw_motion(sweep));
+  const Pose& T_odom_seen = is_fragment(sweep) ? T_odom_last_ : estimate.T_odom_base;
+  const std::optional<Pose> T_odom_held = standstill_.observe(sweep.end, T_odom_seen, sensors_.saw_motion(sweep));
   if (!T_odom_held)
     return;
   estimate.T_odom_base = *T_odom_held;
@@ -357,10 +373,13 @@ void Odometry::hold_still(const Sweep& sweep, OdometryEstimate& estimate) {
 void Odometry::settle(const Sweep& sweep, const MotionPrior& prior, OdometryEstimate& estimate) {
   const Pose T_last_now = T_odom_last_.inverse() * estimate.T_odom_base;
   const double share = share_of_inliers(estimate.scan_to_submap);
-  usual_share_ = processed_ == 1 ? share : usual_share_ + (share - usual_share_) / kMemoryOfShare_sweeps;
+  usual_share_ = processed_ == 1 ? share : usual_share_ + (share - usual_share_) / kMemoryOfUsual_sweeps;
+  const bool tells_no_velocity = adrift_ || is_fragment(sweep); // the way back to the submap is no motion of the robot
+  const auto points = static_cast<double>(sweep.points.size());
+  usual_points_ = processed_ == 1 ? points : usual_points_ + (points - usual_points_) / kMemoryOfUsual_sweeps;
   uncertainty_.see(estimate.scan_to_submap.information);
   observe(estimate);
-  if (adrift_) // the way back to the submap is no motion of the robot
+  if (tells_no_velocity)
     return move_on(prior.T_last_now, uncertainty_.against_submap(), estimate);
   const Matrix6 R = turn_both(T_odom_last_.rotation.conjugate());
   feedback_.opinions = sensors_.judge(sweep, prior,
@@ -432,6 +451,8 @@ void Odometry::finish(const Sweep& sweep, const MotionPrior& prior, OdometryEsti
   }
   estimate.pose_covariance = uncertainty_.since_start();
   adrift_ = estimate.failed;
+  if (!estimate.failed)
+    last_seen_ = sweep.end;
   tilt_keeper_.observe(estimate.T_odom_base.rotation, gravity_.up_base());
 
   choose_keyframe(estimate);

@@ -63,7 +63,7 @@ class Odometry {
 
  private:
   OdometryEstimate begin(const Sweep& sweep);
-  [[nodiscard]] std::optional<Vector6> last_twist() const;
+  [[nodiscard]] std::optional<Vector6> kept_twist(const Sweep& sweep) const;
   MotionPrior settle_dispute(const Sweep& sweep, const MotionPrior& prior, const Gicp::StopRequested& stop);
   Registration attempt(const Sweep& sweep, const Pose& T_last_now, const Gicp::StopRequested& stop);
   void correct_motion(const Sweep& sweep, const Pose& T_last_now);
@@ -79,6 +79,7 @@ class Odometry {
                             const Vector6& variance) const;
   [[nodiscard]] bool is_outvoted(const Registration& registration, const Pose& T_last_now,
                                  const MotionPrior& prior) const;
+  [[nodiscard]] bool is_fragment(const Sweep& sweep) const;
   [[nodiscard]] bool misses_most(const Registration& registration) const;
   [[nodiscard]] double share_of_inliers(const Registration& registration) const;
   [[nodiscard]] std::span<const SurfacePoint> registered() const { return std::span(scan_).first(registered_); }
@@ -120,11 +121,13 @@ class Odometry {
   PoseUncertainty uncertainty_;
   Vector6 askew_variance_ = Vector6::Zero(); ///< of the last sweep, base axes
   Standstill standstill_;
-  double usual_share_ = 0.0; ///< of the registered points that find a counterpart
-  int refused_in_a_row_ = 0; ///< sweeps with points
-  bool lacks_prior_ = false; ///< the last sweep had to be registered with the one before it
-  bool adrift_ = false;      ///< the last sweep was a prediction
-  bool knows_start_ = false; ///< the map holds what was seen at T_odom_start_
+  double usual_share_ = 0.0;  ///< of the registered points that find a counterpart
+  double usual_points_ = 0.0; ///< of a sweep
+  Stamp last_seen_;           ///< of the last sweep that lidar placed
+  int refused_in_a_row_ = 0;  ///< sweeps with points
+  bool lacks_prior_ = false;  ///< the last sweep had to be registered with the one before it
+  bool adrift_ = false;       ///< the last sweep was a prediction
+  bool knows_start_ = false;  ///< the map holds what was seen at T_odom_start_
   bool resumed_ = false;
   std::optional<Pose> refuted_; ///< T_last_now that the points of the sweep are corrected for, and that is not true
   SeenAxes seen_axes_;

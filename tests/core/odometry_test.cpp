@@ -223,6 +223,54 @@ TEST(Odometry, AlongABareCorridorWithoutWheelsItGoesOnAsItDid) {
   EXPECT_LT(result.worst_error_m, 3 * std::sqrt(last.pose_covariance(0, 0)));
 }
 
+/// The lidar falls silent in the midst of a turn: the last sweep is a tenth of one, and what it seems to move is noise.
+TEST(Odometry, WhatSeesNothingAnyMoreAndHasStoppedStaysThere) {
+  const sim::Trajectory trajectory(sim::Course{}
+                                       .stand(seconds{1})
+                                       .change_speed(1.0, seconds{1})
+                                       .straight(3)
+                                       .change_speed(0.0, seconds{1})
+                                       .stand(seconds{20}),
+                                   {.position_m = {50, 0}});
+  const sim::Scene street = sim::street(200);
+  for (int into_the_turn_ms = 5; into_the_turn_ms < 30; into_the_turn_ms += 5) {
+    RobotSetup setup;
+    setup.lidars[0].range_noise_m = 0.03;
+    const Stamp dark = trajectory.start() + milliseconds{6600 + into_the_turn_ms};
+    setup.is_lost = [=](std::size_t, Stamp stamp) { return stamp >= dark; };
+    Odometry odometry(setup.odometry());
+    Pose last_seen;
+    OdometryEstimate last;
+    for (const Sweep& sweep : sweeps_of(street, trajectory, setup, seconds{15})) {
+      last = odometry.process(sweep);
+      if (sweep.end < dark)
+        last_seen = last.T_odom_base;
+    }
+    ASSERT_EQ(last.state, TrackingState::dead_reckoning);
+    EXPECT_LT((last.T_odom_base.translation - last_seen.translation).norm(), 0.06) << into_the_turn_ms;
+  }
+}
+
+TEST(Odometry, WhatSeesNothingAnyMoreAndDroveComesToRest) {
+  const sim::Trajectory trajectory = sixty_metres({.position_m = {50, 0}});
+  RobotSetup setup;
+  const Stamp dark = trajectory.start() + seconds{10};
+  setup.is_lost = [=](std::size_t, Stamp stamp) { return stamp >= dark; };
+  Odometry odometry(setup.odometry());
+  double gone_m = 0, after_a_second_m = 0;
+  for (const Sweep& sweep : sweeps_of(sim::street(200), trajectory, setup, seconds{25})) {
+    const OdometryEstimate estimate = odometry.process(sweep);
+    EXPECT_TRUE(sweep.end < dark + milliseconds{900} || estimate.failed);
+    if (sweep.end < dark)
+      gone_m = estimate.T_odom_base.translation.norm();
+    if (sweep.end < dark + seconds{1})
+      after_a_second_m = estimate.T_odom_base.translation.norm();
+    EXPECT_TRUE(sweep.end < dark || estimate.T_odom_base.translation.norm() < gone_m + 4.5) << "two seconds at 2 m/s";
+    EXPECT_TRUE(sweep.end < dark + seconds{10} || estimate.twist_base.norm() < 0.001) << estimate.twist_base;
+  }
+  EXPECT_NEAR(after_a_second_m, gone_m + 2.0, 0.3);
+}
+
 TEST(Odometry, TheErrorOfABlindStretchIsTakenBackWhereTheMapIsKnown) {
   const sim::Trajectory trajectory(sim::room_course(seconds{40}, 1.0), sim::room_start());
   const Stamp dark = trajectory.start() + seconds{15}, light = dark + seconds{10};
