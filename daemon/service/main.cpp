@@ -43,6 +43,10 @@ int run(const Arguments& arguments) {
   }
   if (arguments.print_config)
     fmt::print("{}", locus::print_config(*config));
+  if (std::fflush(stdout) != 0) {
+    fmt::print(stderr, "locusd: standard output cannot be written; check free space\n");
+    return kFailed;
+  }
   if (arguments.print_config || arguments.check_config)
     return kDone;
   locus::daemon::Log log;

@@ -19,18 +19,24 @@ std::string refused(const char* what, const char* advice) {
 
 } // namespace
 
-std::optional<std::string> lock_memory() {
-  if (mlockall(MCL_CURRENT | MCL_FUTURE) == 0)
+std::optional<std::string> lock_memory(bool wanted) {
+  if ((wanted ? mlockall(MCL_CURRENT | MCL_FUTURE) : munlockall()) == 0)
     return std::nullopt;
   return refused("realtime.lock_memory", "grant it as /usr/share/doc/locusd/examples/realtime.conf does");
 }
 
 std::optional<std::string> keep_to_cpus(const std::vector<int>& cpus) {
+  static const cpu_set_t kAtFirst = [] {
+    cpu_set_t set;
+    CPU_ZERO(&set);
+    sched_getaffinity(0, sizeof(set), &set);
+    return set;
+  }();
   cpu_set_t set;
   CPU_ZERO(&set);
   for (const int cpu : cpus)
     CPU_SET(static_cast<std::size_t>(cpu), &set);
-  if (cpus.empty() || sched_setaffinity(0, sizeof(set), &set) == 0)
+  if (sched_setaffinity(0, sizeof(set), cpus.empty() ? &kAtFirst : &set) == 0)
     return std::nullopt;
   return refused("realtime.cpus", "name processors that this machine has and the unit may use");
 }

@@ -63,10 +63,6 @@ Service::Service(std::filesystem::path config_file, Log& log)
 Service::~Service() { close(signals_); }
 
 int Service::run(const Config& config) {
-  if (const auto problem = keep_to_cpus(config.realtime.cpus))
-    log_.warn(*problem);
-  if (const auto problem = config.realtime.lock_memory ? lock_memory() : std::nullopt)
-    log_.warn(*problem);
   if (const auto problem = begin(config, recent_state())) {
     log_.error(*problem);
     return 1;
@@ -134,6 +130,10 @@ void Service::keep_state(const std::optional<SavedState>& state) {
 std::optional<std::string> Service::begin(const Config& config, std::optional<SavedState> state) {
   watch_.reset();
   session_.reset();
+  if (const auto problem = keep_to_cpus(config.realtime.cpus)) // as the threads to come do
+    log_.warn(*problem);
+  if (const auto problem = lock_memory(config.realtime.lock_memory))
+    log_.warn(*problem);
   auto session = Session::start(config, inherited_, std::move(state), log_);
   if (!session)
     return session.error();

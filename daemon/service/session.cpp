@@ -50,7 +50,7 @@ Expected<std::unique_ptr<Session>, std::string> Session::start(const Config& con
 
 Session::Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket> sockets,
                  std::optional<SavedState> state, Log& log)
-    : config_(config), log_(log), started_(read_clock(CLOCK_MONOTONIC)), input_(std::move(sockets)),
+    : config_(config), log_(log), started_(MachineTime::now()), input_(std::move(sockets)),
       flat_ground_(state ? state->flat_ground : config.odometry.flat_ground),
       link_(config, [this](const RosInput& input) { receive(input); }), clouds_(config.dds, link_),
       start_(std::move(state)), state_(state_path(), [this](const std::string& problem) { log_.error(problem); }) {
@@ -241,7 +241,9 @@ std::optional<Recorder::Status> Session::recording() const {
   return recorder_ ? std::optional{recorder_->status()} : std::nullopt;
 }
 
-Duration Session::age() const { return read_clock(CLOCK_MONOTONIC) - started_; }
+Duration Session::age() const { return (MachineTime::now() - started_).wall; }
+
+Duration Session::cpu() const { return (MachineTime::now() - started_).cpu; }
 
 Session::Progress Session::progress() const {
   return {pipeline_->progress(), publisher_progress_.load(std::memory_order_relaxed), link_.progress()};

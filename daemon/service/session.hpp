@@ -44,6 +44,8 @@ class Session {
   [[nodiscard]] RosLink& link() { return link_; }
   [[nodiscard]] LivePipeline& pipeline() { return *pipeline_; }
   [[nodiscard]] Duration age() const;
+  /// That the process, all threads of it, has spent in that time.
+  [[nodiscard]] Duration cpu() const;
   /// Nothing where nothing is to be recorded.
   [[nodiscard]] std::optional<Recorder::Status> recording() const;
 
@@ -84,7 +86,7 @@ class Session {
 
   Config config_;
   Log& log_;
-  Duration started_;
+  MachineTime started_;
   LiveFigures figures_;
   LiveInput input_;
   std::atomic<FlatGround> flat_ground_;

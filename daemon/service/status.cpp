@@ -122,7 +122,6 @@ ordered_json status_json(Session& session) {
   const LiveFigures::Snapshot figures = session.figures().snapshot();
   const RosLink::Status link = session.link().status();
   const double sweeps = std::max<double>(1.0, static_cast<double>(figures.estimates));
-  const Duration cpu = read_clock(CLOCK_PROCESS_CPUTIME_ID);
   const std::optional<Recorder::Status> recording = session.recording();
   ordered_json json{{"version", LOCUS_VERSION},
                     {"capture", recording ? recording->run.string() : ""},
@@ -131,7 +130,7 @@ ordered_json status_json(Session& session) {
                     {"isa", std::string(to_string(config.odometry.isa))},
                     {"duration_s", rounded(to_seconds(session.age()))},
                     {"wall_s", rounded(to_seconds(session.age()))},
-                    {"cpu_s", rounded(to_seconds(cpu))},
+                    {"cpu_s", rounded(to_seconds(session.cpu()))},
                     {"peak_rss_mb", rounded(peak_rss_mb())}};
   add_estimate(figures, json);
   json["packets"] = packets_json(config, figures.ingest);
@@ -194,9 +193,17 @@ std::vector<Diagnostic> diagnostics(Session& session) {
   for (const auto& [name, lidar] : json["lidars"].items()) {
     ordered_json values = lidar;
     values["packets"] = json["packets"][name];
-    const bool heard = values["packets"]["data"].get<std::uint64_t>() > 0;
-    all.push_back(with_values(heard ? Level::ok : Level::error, ": lidar " + name,
-                              heard ? "heard" : "never heard; look at its cable, address and port", values));
+    const ordered_json& heard_ms_ago = values["heard_ms_ago"];
+    const bool heard = values["packets"]["data"].get<std::uint64_t>() > 0 && !heard_ms_ago.is_null();
+    const bool silent = heard && heard_ms_ago.get<double>() > 1e3 * to_seconds(kStale);
+    all.push_back(with_values(!heard   ? Level::error
+                              : silent ? Level::stale
+                                       : Level::ok,
+                              ": lidar " + name,
+                              !heard   ? "never heard; look at its cable, address and port"
+                              : silent ? "silent; look at its cable and power"
+                                       : "heard",
+                              values));
   }
   for (const auto& [name, source] : json["sources"].items()) {
     const std::string health = source["health"];

@@ -31,7 +31,8 @@ std::set<std::string> runs_in(const json& results) {
 
 TEST(LocusExperiments, TwoShardsOfAFleetsRecordingsMakeOnePage) {
   const TemporaryFolder folder;
-  const std::string robot = folder / "robot", one = folder / "1", two = folder / "2", all = folder / "all";
+  const std::string robot = folder / "1/courses/robot", one = folder / "1", two = folder / "2", all = folder / "all";
+  std::filesystem::create_directories(folder / "1/courses");
   std::filesystem::copy(room_drive(), robot);
   for (const auto& [shard, output] : {std::pair{"1/2", one}, std::pair{"2/2", two}}) {
     const ProgramRun run = experiments({"--shard", shard, "--pace", "10", "-o", output, robot});
@@ -41,7 +42,14 @@ TEST(LocusExperiments, TwoShardsOfAFleetsRecordingsMakeOnePage) {
   EXPECT_EQ(first.size(), 2U);
   EXPECT_EQ(second.size(), 2U);
 
+  EXPECT_TRUE(std::filesystem::exists(robot + "/lidar.pcap"));
+  const ProgramRun part = experiments({"--merge", two, "-o", all});
+  EXPECT_EQ(part.status, 1);
+  EXPECT_NE(part.err.find("2 of the 4 runs"), std::string::npos) << part.err;
+
+  std::filesystem::create_directories(std::filesystem::path(all) / "courses/mine");
   const ProgramRun merging = experiments({"--merge", one, two, "-o", all});
+  EXPECT_TRUE(std::filesystem::exists(std::filesystem::path(all) / "courses/mine"));
   ASSERT_EQ(merging.status, 0) << merging.err;
   const json merged = results_in(all);
   EXPECT_EQ(runs_in(merged),
@@ -97,8 +105,8 @@ TEST(LocusExperiments, InterruptedItLeavesNoCoursesAndNoProgramBehind) {
   Child run({LOCUS_EXPERIMENTS, "--duration", "36000", "--quiet", "-o", folder / "out"});
   for (int i = 0; i < 200 && (!std::filesystem::exists(courses) || std::filesystem::is_empty(courses)); ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds{50});
-  run.signal(SIGTERM);
-  EXPECT_EQ(run.wait_for_exit(std::chrono::seconds{10}), 128 + SIGTERM) << testing::PrintToString(run.lines());
+  run.signal(SIGHUP);
+  EXPECT_EQ(run.wait_for_exit(std::chrono::seconds{10}), 128 + SIGHUP) << testing::PrintToString(run.lines());
   EXPECT_FALSE(std::filesystem::exists(courses));
   EXPECT_FALSE(some_program_runs_with(courses.string())) << "it simulates still";
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <csignal>
 #include <fstream>
 #include <random>
+#include <thread>
 
 #include <gtest/gtest.h>
 #include <pcap/pcap.h>
@@ -8,6 +10,7 @@
 
 #include "drivers/pcap_writer.hpp"
 #include "replay_run.hpp"
+#include "support/child.hpp"
 #include "support/test_drives.hpp"
 
 namespace locus::test {
@@ -33,6 +36,55 @@ class BadCapture : public testing::Test {
 
   TemporaryFolder folder_;
 };
+
+class OutputFolder : public testing::Test {
+ protected:
+  [[nodiscard]] ProgramRun replay(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.end(), {"-o", out_, room_drive() / "lidar.pcap"});
+    return run_program(LOCUS_REPLAY, arguments);
+  }
+
+  TemporaryFolder folder_;
+  std::filesystem::path out_ = folder_ / "out";
+};
+
+TEST_F(OutputFolder, InputIsNotWrittenOver) {
+  ASSERT_EQ(replay({"--duration", "2"}).status, 0);
+  const std::string poses = read_text(out_ / "odometry.tum");
+  for (const std::vector<std::string>& input :
+       {std::vector<std::string>{"--odometry", "wio=" + (out_ / "odometry.tum").string()},
+        {"--ground-truth", out_ / "../out/odometry.tum"},
+        {"--imu", out_ / "odometry.csv"},
+        {"--map-truth", out_ / "map.pcd"}})
+    expect_error(replay(input), 2, {"the run would write its own", "choose another folder with -o"});
+  EXPECT_EQ(read_text(out_ / "odometry.tum"), poses);
+}
+
+TEST_F(OutputFolder, RunThatIsEndedLeavesNothingOfTheOneBefore) {
+  ASSERT_EQ(replay({"--duration", "2"}).status, 0);
+  Child second({LOCUS_REPLAY, "--realtime", "-o", out_, room_drive() / "lidar.pcap"});
+  for (int i = 0; i < 200 && std::filesystem::exists(out_ / "summary.json"); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds{20});
+  second.signal(SIGTERM);
+  EXPECT_EQ(second.wait_for_exit(std::chrono::seconds{10}), 128 + SIGTERM);
+  for (const char* const name : {"summary.json", "report.html", "map.pcd"})
+    EXPECT_FALSE(std::filesystem::exists(out_ / name)) << name;
+}
+
+TEST_F(OutputFolder, CutWithoutAWholeSweepIsSaidWithTruthAndWithout) {
+  for (const std::vector<std::string>& truth :
+       {std::vector<std::string>{}, {"--ground-truth", room_drive() / "gt.tum"}}) {
+    std::vector<std::string> arguments{"--duration", "0.02"};
+    arguments.insert(arguments.end(), truth.begin(), truth.end());
+    expect_error(replay(arguments), 0, {"no whole sweep", "--duration"});
+  }
+}
+
+TEST_F(OutputFolder, WhatCannotBePrintedIsNoSuccess) {
+  const ProgramRun run = run_program("/bin/sh", {"-c", std::string(LOCUS_REPLAY) + " -o " + out_.string() + " " +
+                                                           (room_drive() / "lidar.pcap").string() + " > /dev/full"});
+  expect_error(run, 1, {"standard output cannot be written"});
+}
 
 TEST_F(BadCapture, ZeroBytes) { expect_error(replay(""), 1, {"bad.pcap", "empty"}); }
 

@@ -52,6 +52,8 @@ TEST_F(DdsSecurity, WhoHasNoCredentialsNeitherHearsNorIsHeard) {
     EXPECT_EQ(source["writers"], 0) << name;
   }
   EXPECT_GT(viewer.lines_of("diagnostics").size(), 4U);
+  for (const Child* peer : {&stranger, &of_others, &talks, &talks_of_others, &views_and_talks})
+    EXPECT_EQ(kill(peer->pid(), 0), 0) << testing::PrintToString(peer->lines());
   EXPECT_TRUE(stranger.lines_of("diagnostics").empty()) << testing::PrintToString(stranger.lines());
   EXPECT_TRUE(of_others.lines_of("diagnostics").empty()) << testing::PrintToString(of_others.lines());
 

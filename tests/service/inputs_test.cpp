@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <csignal>
 #include <random>
 #include <thread>
 
@@ -42,6 +43,24 @@ TEST_F(Inputs, GarbageOnTheWireIsCountedAndHarmsNothing) {
   EXPECT_EQ(total["data"], 0);
   const Child play({LOCUS_PLAY, capture().string()});
   EXPECT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+}
+
+TEST_F(Inputs, LidarThatFallsSilentIsStaleInTheDiagnostics) {
+  const auto says = [](const char* level) {
+    return [=](const std::vector<std::string>& lines) {
+      return std::ranges::any_of(lines, [&](const std::string& line) {
+        return line.starts_with(std::string("diagnostics ") + level) && line.ends_with("locusd: lidar front");
+      });
+    };
+  };
+  const Child daemon(locusd(config()));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
+  Child play({LOCUS_PLAY, capture().string()});
+  EXPECT_TRUE(listener.wait_until(seconds{10}, says("0 "))) << testing::PrintToString(listener.lines());
+  EXPECT_FALSE(says("3 ")(listener.lines()));
+  play.signal(SIGKILL);
+  EXPECT_TRUE(listener.wait_until(seconds{6}, says("3 "))) << testing::PrintToString(listener.lines());
 }
 
 /// A topic that flutters a hundred times a second switches once a second at most.

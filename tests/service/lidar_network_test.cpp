@@ -126,9 +126,14 @@ TEST_F(LidarNetwork, FirewallLetsTheLidarPassAndNobodyElse) {
   at_lidar("ip route replace 10.9.0.0/24 dev eth0 src 10.9.0.202");
   {
     const Child other(play("10.9.0.1"));
+    ASSERT_TRUE(other.wait_for_line("it is sent all the same", seconds{10})) << testing::PrintToString(other.lines());
     std::this_thread::sleep_for(seconds{2});
   }
   EXPECT_EQ(status()["packets"]["total"]["received"], 0);
+  const std::string counted = run_program("/usr/sbin/nft", {"list", "chain", "inet", "locusd", "from_lidars"}).out;
+  const std::size_t counter = counted.find("counter packets ");
+  ASSERT_NE(counter, std::string::npos) << counted;
+  EXPECT_GT(std::stoi(counted.substr(counter + 16)), 1000) << "dropped of what it sent";
   at_lidar("ip route replace 10.9.0.0/24 dev eth0 src 10.9.0.201");
   expect_heard("10.9.0.1");
   const json total = status()["packets"]["total"];

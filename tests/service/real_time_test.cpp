@@ -6,7 +6,9 @@
 #include <fstream>
 #include <map>
 #include <memory>
+#include <set>
 #include <thread>
+#include <tuple>
 
 #include <sched.h>
 
@@ -77,6 +79,27 @@ TEST_F(RealTime, WishesThatAreNotGrantedAreSaidAndCostNothing) {
   Child daemon(locusd(config("realtime: {cpus: [1000]}\n")));
   EXPECT_TRUE(daemon.wait_for_line("realtime.cpus was not granted", seconds{5}));
   EXPECT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+}
+
+TEST_F(RealTime, ReloadMovesTheThreadsToOtherProcessorsAndBack) {
+  const auto processors = [](pid_t process) {
+    std::set<int> counts;
+    for (const auto& task : std::filesystem::directory_iterator("/proc/" + std::to_string(process) + "/task")) {
+      cpu_set_t set;
+      if (sched_getaffinity(std::stoi(task.path().filename().string()), sizeof(set), &set) == 0)
+        counts.insert(CPU_COUNT(&set));
+    }
+    return counts;
+  };
+  const Child daemon(locusd(config()));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const std::set<int> at_first = processors(daemon.pid());
+  std::ignore = config("realtime: {cpus: [0]}\n");
+  ASSERT_EQ(ctl({"reload"}).status, 0);
+  EXPECT_EQ(processors(daemon.pid()), std::set<int>{1});
+  std::ignore = config();
+  ASSERT_EQ(ctl({"reload"}).status, 0);
+  EXPECT_EQ(processors(daemon.pid()), at_first);
 }
 
 /// When the packets of the drive were fired to their ends, which is when a lidar sends them.

@@ -92,6 +92,7 @@ Duration shift_of(const Child& play) {
 
 double worst_distance_m(const std::vector<StampedPose>& expected, const std::vector<HeardPose>& heard, Duration shift) {
   double worst_m = 0;
+  int compared = 0;
   for (const HeardPose& pose : heard) {
     const Stamp stamp = pose.stamp - shift;
     const auto after = std::ranges::upper_bound(expected, stamp, {}, &StampedPose::stamp);
@@ -101,7 +102,9 @@ double worst_distance_m(const std::vector<StampedPose>& expected, const std::vec
     const double share = to_seconds(stamp - before.stamp) / to_seconds(after->stamp - before.stamp);
     const Pose T_odom_base = interpolate(before.T_source_base, after->T_source_base, share);
     worst_m = std::max(worst_m, (T_odom_base.translation - pose.T_odom_base.translation).norm());
+    ++compared;
   }
+  EXPECT_GT(compared, 20) << "of " << heard.size() << " that were heard";
   return worst_m;
 }
 

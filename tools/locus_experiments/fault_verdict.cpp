@@ -122,7 +122,7 @@ const Results* find(const RunsById& runs, const std::string& course, const std::
   return found == runs.end() ? nullptr : found->second;
 }
 
-double median(const Pairs& pairs, const Figure& figure) { return tools::Quantiles(values_of(pairs, figure)).at(0.5); }
+double median(const Pairs& pairs, const Figure& figure) { return tools::Quantiles(values_of(pairs, figure)).median(); }
 double largest(const Pairs& pairs, const Figure& figure) { return tools::Quantiles(values_of(pairs, figure)).at(1.0); }
 double with_m(const Pair& pair) { return ape_m(*pair.with); }
 double without_m(const Pair& pair) { return ape_m(*pair.without); }

@@ -35,6 +35,8 @@ using tools::Failure;
 /// How much faster than the recording things go, roughly: for the progress bar.
 constexpr double kSimulationSpeed = 5, kReplaySpeed = 30;
 
+constexpr const char* kCourses = "courses";
+
 /// First argument of the children that run locus-replay with LOAM's points in place of the filters.
 constexpr std::string_view kLoamReplay = "replay-with-loam-features";
 
@@ -54,6 +56,13 @@ void make_folder(const std::filesystem::path& folder) {
                                                   folder.string(), error.message()));
 }
 
+/// What was simulated; a recording stays.
+void take_away(const Course& course) {
+  std::error_code ignored;
+  if (!course.simulation.empty())
+    std::filesystem::remove_all(course.folder, ignored);
+}
+
 /// The plan carried out, and what came of it.
 class Experiments {
  public:
@@ -71,7 +80,7 @@ class Experiments {
   [[nodiscard]] std::vector<Task> runs_on(const Course& course);
   void carry_out(const Run& run);
   void leave(const Course& course);
-  [[nodiscard]] std::optional<std::string> why_impossible(const Run& run) const;
+  [[nodiscard]] std::optional<std::string> why_impossible(const Run& run);
   [[nodiscard]] const Course& course_of(const Run& run) const {
     return *std::ranges::find(plan_.courses, run.course, &Course::name);
   }
@@ -89,7 +98,7 @@ class Experiments {
 /// A course is simulated when there is somebody to drive on it, and is gone after the last: only a few of them lie on
 /// the disk at a time.
 std::vector<Task> Experiments::tasks() {
-  make_folder(arguments_.output / "courses");
+  make_folder(arguments_.output / kCourses);
   std::vector<Task> tasks;
   for (const Course& course : plan_.courses) {
     std::vector<Task> runs = runs_on(course);
@@ -130,12 +139,12 @@ std::vector<Task> Experiments::runs_on(const Course& course) {
 /// A run on it is over. The last one takes along what was simulated.
 void Experiments::leave(const Course& course) {
   const bool over = --runs_left_[course.name] == 0;
-  std::error_code ignored;
-  if (over && !course.simulation.empty() && !arguments_.keep_captures)
-    std::filesystem::remove_all(course.folder, ignored);
+  if (over && !arguments_.keep_captures)
+    take_away(course);
 }
 
-std::optional<std::string> Experiments::why_impossible(const Run& run) const {
+std::optional<std::string> Experiments::why_impossible(const Run& run) {
+  const std::lock_guard lock(mutex_);
   if (const auto broken = broken_courses_.find(run.course); broken != broken_courses_.end())
     return broken->second;
   if (const auto cpus = usable_cpus().size(); static_cast<std::size_t>(run.paced_cpus) > cpus)
@@ -182,6 +191,7 @@ Results Experiments::results() const {
   Results results{{"version", LOCUS_VERSION},
                   {"simulated", arguments_.recordings.empty()},
                   {"duration_s", arguments_.recordings.empty() ? Results(arguments_.duration_s) : Results(nullptr)},
+                  {"planned", plan_.size},
                   {"runs", Results::array()}};
   for (const Run& run : plan_.runs) {
     results["runs"].push_back(done_.at(run.id()));
@@ -206,34 +216,50 @@ std::string failures_in(const Results& results) {
   return lines;
 }
 
+/// All that may be left of them, and the folder if nobody else has put anything there.
+void take_away(const std::vector<Course>& courses, const std::filesystem::path& folder) {
+  std::error_code ignored;
+  for (const Course& course : courses) {
+    take_away(course);
+    if (!course.simulation.empty())
+      std::filesystem::remove(course.folder.string() + ".log", ignored);
+  }
+  std::filesystem::remove(folder, ignored);
+}
+
 /// When somebody ends this program: ends the programs that it runs, takes the courses away, which may be gigabytes, and
 /// ends as others do. To be called before there are threads.
-void leave_nothing_when_interrupted(const std::filesystem::path& courses) {
+void leave_nothing_when_interrupted(const std::vector<Course>& courses, const std::filesystem::path& folder) {
   sigset_t signals;
   sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP})
+    sigaddset(&signals, signal);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   std::thread([=] {
     int signal = 0;
     sigwait(&signals, &signal);
     const auto none_goes_on = end_programs();
-    std::error_code ignored;
-    std::filesystem::remove_all(courses, ignored);
+    take_away(courses, folder);
     pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
     raise(signal);
   }).detach();
 }
 
+Results experiment(const Arguments& arguments) {
+  const Plan plan = make_plan(arguments);
+  const std::filesystem::path courses = arguments.output / kCourses;
+  if (!arguments.keep_captures)
+    leave_nothing_when_interrupted(plan.courses, courses);
+  Results results = Experiments(arguments, plan).carry_out();
+  if (!arguments.keep_captures)
+    take_away(plan.courses, courses);
+  return results;
+}
+
 void run(const Arguments& arguments) {
   make_folder(arguments.output);
-  if (arguments.merge.empty() && !arguments.keep_captures)
-    leave_nothing_when_interrupted(arguments.output / "courses");
-  const Results results =
-      arguments.merge.empty() ? Experiments(arguments, make_plan(arguments)).carry_out() : merged(arguments.merge);
+  const Results results = arguments.merge.empty() ? experiment(arguments) : merged(arguments.merge);
   const std::filesystem::path page = write_results(arguments.output, results);
-  if (!arguments.keep_captures)
-    std::filesystem::remove_all(arguments.output / "courses");
   if (!arguments.quiet)
     fmt::print("results in {}\n", page.string());
   if (const std::string failures = failures_in(results); !failures.empty())
@@ -251,6 +277,7 @@ int main(int argc, char** argv) {
   try {
     if (const std::optional<Arguments> arguments = parse_arguments(argc, argv))
       run(*arguments);
+    locus::tools::flush_standard_output();
     return static_cast<int>(ExitStatus::done);
   } catch (const Failure& failure) {
     say(failure.what());

@@ -148,7 +148,8 @@ Plan make_plan(const Arguments& arguments) {
               : arguments.fault_matrix       ? plan_of_matrix(arguments)
               : arguments.recordings.empty() ? plan_of_paper(arguments)
                                              : plan_of_recordings(arguments);
-  for (std::size_t place = 0; place < plan.runs.size(); ++place)
+  plan.size = plan.runs.size();
+  for (std::size_t place = 0; place < plan.size; ++place)
     plan.runs[place].place = place;
   const auto course_of = [&](const Run& run) { return std::ranges::find(plan.courses, run.course, &Course::name); };
   if (arguments.faults) { // to simulate a course takes longer than its runs

@@ -40,6 +40,7 @@ struct Run {
 struct Plan {
   std::vector<Course> courses;
   std::vector<Run> runs;
+  std::size_t size = 0; ///< runs of all shards
 };
 
 /// Settings of the paper's Section II and Table IV as --set options: what paper-husky.yaml says beyond husky.yaml.

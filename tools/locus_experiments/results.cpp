@@ -73,7 +73,8 @@ Results merged(const std::vector<std::filesystem::path>& folders) {
       all = part;
       all["runs"] = Results::array();
     }
-    for (const char* key : {"/version", "/simulated", "/duration_s", "/faults/seeds", "/faults/consistency_runs"}) {
+    for (const char* key :
+         {"/version", "/simulated", "/duration_s", "/planned", "/faults/seeds", "/faults/consistency_runs"}) {
       const Results::json_pointer pointer(key);
       if (all.value(pointer, Results{}) != part.value(pointer, Results{}))
         throw Failure(ExitStatus::failed,
@@ -88,6 +89,9 @@ Results merged(const std::vector<std::filesystem::path>& folders) {
       all["runs"].push_back(run);
     }
   }
+  if (const std::size_t planned = all.value("planned", std::size_t{0}); seen.size() < planned)
+    throw Failure(ExitStatus::failed, fmt::format("{} of the {} runs are in these folders; name those of all shards",
+                                                  seen.size(), planned));
   auto& runs = all["runs"].get_ref<Results::array_t&>(); // in the order that one machine would have done them in
   std::ranges::stable_sort(runs, {}, [](const Results& run) { return run.value("place", std::size_t{0}); });
   judge(all);

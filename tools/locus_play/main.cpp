@@ -100,7 +100,7 @@ void send_all(const PlayArguments& arguments, daemon::InputSource& recording, Pa
 
 void play(const PlayArguments& arguments, const Config& config, daemon::InputSource& recording,
           const DatagramSource& source, const std::function<double()>& progress) {
-  PacketSender packets(arguments.to, arguments.interface.value_or(""));
+  PacketSender packets(arguments.to, arguments.interface.value_or(config.dds.interface));
   MotionPublisher motion(config);
   wait_for_listeners(motion, config.dds);
   send_all(arguments, recording, packets, motion, progress);
@@ -162,6 +162,7 @@ int main(int argc, char** argv) {
   try {
     if (const std::optional<PlayArguments> arguments = parse_play_arguments(argc, argv))
       run(*arguments);
+    flush_standard_output();
     return static_cast<int>(ExitStatus::done);
   } catch (const Failure& failure) {
     say("locus-play", failure.what());

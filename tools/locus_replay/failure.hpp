@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cerrno>
+#include <cstdio>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "core/expected.hpp"
@@ -20,6 +23,13 @@ class Failure : public std::runtime_error {
  private:
   ExitStatus status_;
 };
+
+/// What was printed is lost on a full disk: that is no success. To be called at the end.
+inline void flush_standard_output() {
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+    throw Failure(ExitStatus::failed, "standard output cannot be written (" + std::generic_category().message(errno) +
+                                          "); check free space");
+}
 
 template <class T> T value_or_fail(Expected<T, std::string> expected, ExitStatus status) {
   if (!expected)

@@ -22,6 +22,13 @@ class Quantiles {
     return sorted_[static_cast<std::size_t>(std::max(1.0, rank)) - 1];
   }
 
+  /// Of an even number the mean of the two in the middle.
+  [[nodiscard]] double median() const {
+    if (sorted_.empty())
+      return 0.0;
+    return 0.5 * (sorted_[(sorted_.size() - 1) / 2] + sorted_[sorted_.size() / 2]);
+  }
+
  private:
   std::vector<double> sorted_;
 };

@@ -81,6 +81,22 @@ void check_output(const std::filesystem::path& folder) {
                   fmt::format("-o {}: holds a recording; choose another folder for the results", folder.string()));
 }
 
+void check_inputs_outlive_the_run(const Arguments& arguments) {
+  std::vector<std::filesystem::path> inputs{arguments.capture, arguments.config, arguments.imu, arguments.ground_truth,
+                                            arguments.map_truth};
+  for (const Arguments::OdometryFile& odometry : arguments.odometry)
+    inputs.push_back(odometry.file);
+  for (const std::filesystem::path& input : inputs) {
+    for (const char* const name : kResultFiles) {
+      std::error_code ignored;
+      if (std::filesystem::equivalent(arguments.output / name, input, ignored))
+        throw Failure(ExitStatus::wrong_usage, fmt::format("{}: the run would write its own {} there; choose another "
+                                                           "folder with -o",
+                                                           input.string(), name));
+    }
+  }
+}
+
 /// The files of a capture folder; a bag or a drive of KITTI has all in one.
 CaptureFolder find_files(const std::filesystem::path& capture) {
   Expected<CaptureFolder, std::string> folder = CaptureFolder::find(capture);
@@ -140,6 +156,7 @@ void run(const Arguments& arguments, const SweepStage& stage) {
   const MachineTime begin = MachineTime::now();
   const CaptureFolder folder = find_files(arguments.capture);
   check_output(arguments.output);
+  check_inputs_outlive_the_run(arguments);
   const std::filesystem::path config_file = arguments.config.empty() ? folder.first_config() : arguments.config;
   const Config config = configuration(config_file, folder, arguments.overrides);
   check_faults(arguments.faults, config);
@@ -170,6 +187,7 @@ int replay_program(int argc, char** argv, const SweepStage& stage) {
   try {
     if (const std::optional<Arguments> arguments = parse_arguments(argc, argv))
       run(*arguments, stage);
+    flush_standard_output();
     return static_cast<int>(ExitStatus::done);
   } catch (const Failure& failure) {
     say(failure.what());

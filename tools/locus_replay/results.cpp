@@ -21,12 +21,22 @@
 namespace locus::tools {
 namespace {
 
+/// So that nothing of an earlier run is taken for the result of this one, however it ends.
+void remove_results(const std::filesystem::path& folder, bool summary_too) {
+  std::error_code ignored;
+  for (const char* const name : kResultFiles) {
+    if (summary_too || name != kResultFiles.front())
+      std::filesystem::remove(folder / name, ignored);
+  }
+}
+
 const std::filesystem::path& made(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error)
     throw Failure(ExitStatus::failed, fmt::format("{}: the folder cannot be made ({}); choose another with -o",
                                                   folder.string(), error.message()));
+  remove_results(folder, true);
   return folder;
 }
 
@@ -38,9 +48,17 @@ void warn(const std::vector<std::string>& lines) {
 /// What is wrong with motion sources altogether, a line each.
 std::vector<std::string> source_verdicts(const Config& config, const MotionSources& sources) {
   std::vector<std::string> lines;
-  for (std::size_t i = 0; i < sources.size(); ++i)
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    const std::string& name = config.odometry.motion_sources[i].name;
+    const bool is_doubted = !sources.healthy(i) && sources.counters(i).rejected_as(HealthReason::self_check) > 0;
     if (const std::string_view verdict = sources.verdict(i); !verdict.empty())
-      lines.push_back(fmt::format("motion source {} {}", config.odometry.motion_sources[i].name, verdict));
+      lines.push_back(fmt::format("motion source {} {}", name, verdict));
+    else if (is_doubted)
+      lines.push_back(
+          fmt::format("motion source {} is set aside, for it turns otherwise than lidar sees the robot turn, "
+                      "in a drive too short to say why; look at its unit (rad/s) and T_base_source",
+                      name));
+  }
   return lines;
 }
 
@@ -67,14 +85,14 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
   odometry_.close();
   const bool has_data = ingest.lidars().total().data > 0;
   const std::vector<SurfacePoint> map = points_of(processor.odometry().map());
-  const Accuracy accuracy = has_data ? truth_.compare(map, !arguments_.quiet) : Accuracy{};
+  const Accuracy accuracy = sweeps.seen > 0 ? truth_.compare(map, !arguments_.quiet) : Accuracy{};
   const FinishedRun run{
       arguments_.capture.string(), config_, ingest,  processor, sweeps, figures_, recording_.capture_start(),
       recording_.duration(),       spent,   accuracy};
   const nlohmann::ordered_json figures = write_summary(run);
   warn(recording_.warnings());
   if (!has_data) {
-    remove_all_but_the_summary();
+    remove_results(arguments_.output, false);
     throw Failure(ExitStatus::failed, fmt::format("{}: no valid data packet: {}", arguments_.capture.string(),
                                                   why_no_data(recording_, ingest.lidars())));
   }
@@ -82,6 +100,10 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
   write_report(arguments_.output / "report.html",
                {figures, config_, recording_.capture_start(), figures_.path_m(), sweeps_,
                 visible_surfaces(processor.odometry().map()), truth_.trajectory(), accuracy.trajectory});
+  if (sweeps.seen == 0)
+    warn({fmt::format("{}: there is lidar data and no whole sweep, which takes 0.05 to 0.2 s; look at --start and "
+                      "--duration",
+                      arguments_.capture.string())});
   warn(lidar_warnings(recording_, ingest.lidars(), config_.sweep));
   warn(source_verdicts(config_, ingest.sources()));
   warn(accuracy.warnings);
@@ -97,13 +119,6 @@ nlohmann::ordered_json Results::write_summary(const FinishedRun& run) const {
   file.print("{}\n", figures.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   file.close();
   return figures;
-}
-
-/// So that nothing, of an earlier run either, is taken for the result of one that failed.
-void Results::remove_all_but_the_summary() const {
-  std::error_code ignored;
-  for (const char* const name : {"odometry.tum", "odometry.csv", "map.pcd", "report.html"})
-    std::filesystem::remove(arguments_.output / name, ignored);
 }
 
 } // namespace locus::tools

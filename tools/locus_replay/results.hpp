@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -17,10 +18,15 @@
 
 namespace locus::tools {
 
+/// What a run leaves in the output folder.
+inline constexpr std::array<const char*, 5> kResultFiles{"summary.json", "odometry.tum", "odometry.csv", "map.pcd",
+                                                         "report.html"};
+
 /// All that comes out of a run: the files in the output folder and the figures on the terminal. One owner.
 class Results {
  public:
-  /// Makes the folder. The arguments must outlive this. Throws Failure, as do the others.
+  /// Makes the folder, and takes the results of an earlier run out of it. The arguments must outlive this. Throws
+  /// Failure, as do the others.
   Results(const Arguments& arguments, const Config& config, const Recording& recording, Truth truth,
           const daemon::MachineTime& begin);
 
@@ -34,7 +40,6 @@ class Results {
 
  private:
   nlohmann::ordered_json write_summary(const FinishedRun& run) const;
-  void remove_all_but_the_summary() const;
 
   const Arguments& arguments_;
   const Config& config_;

@@ -82,7 +82,7 @@ void add_accuracy(const Accuracy& accuracy, ordered_json& json) {
 std::string readable(const Accuracy& accuracy, std::size_t estimates) {
   std::string text;
   if (const auto& trajectory = accuracy.trajectory) {
-    text += fmt::format("truth      off by {:.3f} m in the mean, {:.3f} m at most, {:.3f} m at the end",
+    text += fmt::format("truth      off by {:.3f} m in the mean, {:.3f} m at most; unaligned, {:.3f} m at the end",
                         trajectory->ape_m.mean, trajectory->ape_m.max, trajectory->end_drift_m);
     if (trajectory->rpe_10m_percent)
       text +=
@@ -93,8 +93,8 @@ std::string readable(const Accuracy& accuracy, std::size_t estimates) {
   }
   if (const auto& consistency = accuracy.consistency; consistency && consistency->nees_10m)
     text += fmt::format(
-        "honesty    normalised squared error over 10 m {:.1f} (6 is the truth about six axes), worst position "
-        "{:.1f} sigma off\n",
+        "honesty    normalised squared error over 10 m {:.1f} (6: the covariances are right; below: too cautious; "
+        "above: too sure), worst position {:.1f} sigma off\n",
         *consistency->nees_10m, consistency->worst_sigma);
   if (const auto& map = accuracy.map) {
     text += fmt::format("map truth  {} of {} points within 1 m", map->compared, map->compared + map->outliers);

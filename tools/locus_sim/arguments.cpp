@@ -71,7 +71,9 @@ std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
       ->required()
       ->type_name("S")
       ->check(number_between(kShortest_s, kLongest_s));
-  app.add_option("--seed", arguments.seed, "Of course, clutter, moving things and noise; default 1")->type_name("N");
+  app.add_option("--seed", arguments.seed, "Of course, clutter, moving things and noise; default 1")
+      ->type_name("N")
+      ->check(CLI::Range(0.0, 1e15));
   app.add_option("--lidars", arguments.sensors.lidars, "1: level, 2: and one pitched forward, 3: and one backward")
       ->type_name("N")
       ->check(CLI::Range(1, 3));

@@ -14,6 +14,9 @@ std::filesystem::path made(const std::filesystem::path& folder) {
   if (error)
     throw tools::Failure(tools::ExitStatus::failed, fmt::format("{}: no folder can be made there ({}); choose another",
                                                                 folder.string(), error.message()));
+  for (const char* const source : {"imu", "wio", "vio", "kio"}) // of another robot, which this one may not have
+    for (const char* const ending : {".csv", ".tum", ".meta.csv"})
+      std::filesystem::remove(folder / (source + std::string(ending)), error);
   return folder;
 }
 

@@ -57,6 +57,7 @@ int main(int argc, char** argv) {
   try {
     if (const std::optional<SimArguments> arguments = parse_sim_arguments(argc, argv))
       run(*arguments);
+    flush_standard_output();
     return static_cast<int>(ExitStatus::done);
   } catch (const Failure& failure) {
     fmt::print(stderr, "locus-sim: {}\n", failure.what());

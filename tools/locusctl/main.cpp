@@ -123,6 +123,7 @@ int main(int argc, char** argv) {
     CtlArguments arguments;
     if (const std::function<void()> action = parse(argc, argv, arguments))
       action();
+    flush_standard_output();
     return static_cast<int>(ExitStatus::done);
   } catch (const Failure& failure) {
     say("locusctl", failure.what());

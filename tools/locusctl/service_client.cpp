@@ -18,6 +18,17 @@ namespace {
 
 constexpr std::size_t kMaxAnswerBytes = 1 << 18;
 
+/// The folder has the name of the unit, where systemd has made it.
+std::string remedy(const std::filesystem::path& socket, int error) {
+  const std::filesystem::path folder = socket.parent_path();
+  const std::string unit = folder.filename().string();
+  if (error == EACCES)
+    return fmt::format("this account may not enter {}; ask its owner, or be root", folder.string());
+  if (folder.parent_path() != "/run" || !unit.starts_with("locusd"))
+    return fmt::format("is there a locusd whose RUNTIME_DIRECTORY is {}?", folder.string());
+  return fmt::format("start it with: systemctl start {0}; if it does not stay: journalctl -u {0}", unit);
+}
+
 class Connection {
  public:
   explicit Connection(const std::filesystem::path& path)
@@ -29,8 +40,8 @@ class Connection {
     setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
     if (connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
       throw Failure(ExitStatus::failed,
-                    fmt::format("{}: no service answers ({}); start it with: systemctl start locusd", path.string(),
-                                std::strerror(errno))); // NOLINT
+                    fmt::format("{}: no service answers ({}); {}", path.string(), std::strerror(errno), // NOLINT
+                                remedy(path, errno)));
   }
   ~Connection() { close(socket_); }
   Connection(const Connection&) = delete;

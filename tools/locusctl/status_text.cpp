@@ -36,7 +36,8 @@ std::string pose_text(const Json& status) {
   const auto p = status["pose"]["xyz_m"].get<std::array<double, 3>>();
   const auto a = status["pose"]["rpy_deg"].get<std::array<double, 3>>();
   const auto sigma = [&](std::size_t axis, double unit) {
-    return unit * std::sqrt(std::max(0.0, status["covariance"][7 * axis].get<double>()));
+    const double value = unit * std::sqrt(std::max(0.0, status["covariance"][7 * axis].get<double>()));
+    return axis < 3 ? value : std::min(value, 180.0);
   };
   std::string text = fmt::format("position    {:9.3f} {:9.3f} {:9.3f} m     +- {:.3f} {:.3f} {:.3f}\n"
                                  "attitude    {:9.2f} {:9.2f} {:9.2f} deg   +- {:.2f} {:.2f} {:.2f}\n",
