@@ -128,9 +128,10 @@ void Watch::look_at_load() {
   weighed_ = now;
   const std::uint64_t drops = session_.pipeline().counters().dropped;
   if (drops > sweep_drops_)
-    log_.warn(fmt::format("this computer is too busy: {} sweeps were dropped within {} s; see docs/tuning.md, and what "
-                          "else runs here",
-                          drops - sweep_drops_, std::chrono::duration_cast<std::chrono::seconds>(kPatience).count()));
+    log_.warn(fmt::format(
+        "this computer is too busy: {} sweeps were dropped within {} s; see /usr/share/doc/locusd/tuning.md, and what "
+        "else runs here",
+        drops - sweep_drops_, std::chrono::duration_cast<std::chrono::seconds>(kPatience).count()));
   sweep_drops_ = drops;
 }
 
@@ -143,10 +144,10 @@ void Watch::look_at_drops() {
   kernel_drops_ = drops;
   const std::uint64_t filtered = session_.input().filtered();
   if (filtered != filtered_)
-    log_.warn(
-        fmt::format("the ports of the lidars are flooded: the kernel has kept out {} datagrams that are no lidar's "
-                    "by length or sender; tcpdump shows whose, docs/security.md what to set against them",
-                    filtered - filtered_));
+    log_.warn(fmt::format(
+        "the ports of the lidars are flooded: the kernel has kept out {} datagrams that are no lidar's "
+        "by length or sender; tcpdump shows whose, /usr/share/doc/locusd/security.md what to set against them",
+        filtered - filtered_));
   filtered_ = filtered;
 }
 

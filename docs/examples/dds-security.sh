@@ -9,6 +9,7 @@
 # of motion_sources, health and flat ground, if they are others than those of the shipped locusd.yaml.
 set -eu
 [ $# -eq 2 ] || { echo "usage: dds-security.sh FOLDER DOMAIN" >&2; exit 2; }
+command -v openssl >/dev/null || { echo "dds-security.sh: needs openssl: sudo apt install openssl" >&2; exit 1; }
 folder=$1 domain=$2
 inputs=${INPUTS:-/wheel_odometry /imu/data}
 umask 077
