@@ -21,11 +21,13 @@
 namespace locus::tools {
 namespace {
 
-/// So that nothing of an earlier run is taken for the result of this one, however it ends.
+/// So that nothing of an earlier run is taken for the result of this one, however it ends. A link is the user's, who
+/// wants it to lead somewhere.
 void remove_results(const std::filesystem::path& folder, bool summary_too) {
   std::error_code ignored;
   for (const char* const name : kResultFiles) {
-    if (summary_too || name != kResultFiles.front())
+    const bool is_wanted = name == kResultFiles.front() && !summary_too;
+    if (!is_wanted && std::filesystem::is_regular_file(std::filesystem::symlink_status(folder / name, ignored)))
       std::filesystem::remove(folder / name, ignored);
   }
 }
