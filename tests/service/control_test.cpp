@@ -183,8 +183,10 @@ class Pest {
       if (idle > 0)
         close(idle);
       idle = call();
-      if (!speaks_)
+      if (!speaks_) { // ten thousand times a second, and does not take the processors itself
+        std::this_thread::sleep_for(std::chrono::microseconds{300});
         continue;
+      }
       const int socket = call();
       constexpr std::string_view kAsk = R"({"command": "status"})", kReset = R"({"command": "reset"})";
       for (const std::string_view request : {kAsk, kReset, kAsk.substr(1), std::string_view{}}) {
@@ -227,7 +229,7 @@ TEST_F(Control, StrangersWhoAskWithoutEndKeepNobodyOutAndCostLittle) {
     const double elapsed_s = after["duration_s"].get<double>() - before["duration_s"].get<double>();
     const double cpu_share = (after["cpu_s"].get<double>() - before["cpu_s"].get<double>()) / elapsed_s;
     RecordProperty(speaks ? "cpu_share" : "cpu_share_silent", std::to_string(cpu_share));
-    EXPECT_LT(cpu_share, 0.6) << "of a core, the odometry's share included";
+    EXPECT_LT(cpu_share, speaks ? 0.6 : 0.25) << "of a core, the odometry's share included";
   }
   const nlohmann::json after = status();
   EXPECT_EQ(after["state"], "tracking");
