@@ -22,6 +22,11 @@ constexpr double kMaxDeviation_sigma = 8.0;
 constexpr double kAlwaysAllowed_m = 0.5;
 constexpr double kAlwaysAllowed_rad = 0.1;
 
+/// A source of the rotation that turns otherwise than the robot would without it by more than this many standard
+/// deviations of that, and by more than the least, is put to the vote; at kAlwaysAllowed_rad in any case.
+constexpr double kDispute_sigma = 6.0;
+constexpr double kLeastDispute_rad = 0.03;
+
 /// No place changes so fast that from one sweep to the next less than this part of the usual counterparts is left: the
 /// air is full of dust, or the lidar measures otherwise than before. Such a sweep is not for the map, and may
 /// contradict the motion sources by no more than this. (The worst of honest drives is 0.78; in dust, 2.2 sigma.)
@@ -37,8 +42,12 @@ constexpr double kFragment = 1.0 / 3.0;
 constexpr Duration kGoesOn = std::chrono::seconds{1};
 constexpr double kComesToRest_s = 1.0;
 
-/// After so many refusals in a row the submap is behind us, and the map goes on from the prediction.
-constexpr int kRefusalsToRestart = 10;
+/// After so many refusals in a row the submap is behind us, and the map goes on from the prediction. Where wheels or
+/// legs carry the estimate it may wait longer: what the lidar measures wrong must not get into the map.
+constexpr int kRefusalsToRestart = 10, kRefusalsWhileCarried = 50;
+
+/// A map that was begun so few sweeps ago was begun wrong, then, and there is nothing in it to go on from.
+constexpr std::uint64_t kYoungMap_sweeps = 3 * kRefusalsToRestart;
 
 /// Of what was not foreseen of the motion in a sweep, how much shows in where it comes to lie, how far a turn shifts
 /// it, for what it sees stands to one side, and how much of that goes on in the next.
@@ -175,20 +184,22 @@ std::optional<Vector6> Odometry::kept_twist(const Sweep& sweep) const {
 /// Where the source of the rotation turns quite otherwise than the robot would without it, the surfaces say which is
 /// true: as a prior, a gyro is too sure for them to say so later. The loser makes the winner less sure.
 MotionPrior Odometry::settle_dispute(const Sweep& sweep, const MotionPrior& prior, const Gicp::StopRequested& stop) {
-  refuted_.reset();
-  if (prior.source.rotation < 0 || adrift_ || sweep.points.size() < kMinPoints)
+  source_is_refuted_ = false;
+  if (prior.source.rotation < 0 || !had_sight() || sweep.points.size() < kMinPoints)
     return prior;
   const MotionPrior rival = sensors_.integrate(sweep, kept_twist(sweep), prior.source.rotation);
   const Eigen::Vector3d dispute = difference(prior.T_last_now, rival.T_last_now).tail<3>();
-  if (dispute.norm() < kAlwaysAllowed_rad)
+  const Eigen::Vector3d usual =
+      (kDispute_sigma * rival.variance.tail<3>().cwiseSqrt()).cwiseMax(kLeastDispute_rad).cwiseMin(kAlwaysAllowed_rad);
+  if ((dispute.array().abs() < usual.array()).all())
     return prior;
   const Registration with_source = attempt(sweep, prior.T_last_now, stop);
-  refuted_ = prior.T_last_now;
+  source_is_refuted_ = true;
   const Registration without_source = attempt(sweep, rival.T_last_now, stop);
   MotionPrior accepted = rival;
   if (!fits_better(without_source, with_source)) {
     accepted = prior;
-    refuted_.reset();
+    source_is_refuted_ = false;
   }
   accepted.variance.tail<3>() += dispute.cwiseAbs2();
   return accepted;
@@ -204,22 +215,27 @@ Registration Odometry::attempt(const Sweep& sweep, const Pose& T_last_now, const
 
 /// Takes out of the points what no motion source could, with the twist that T_last_now means.
 void Odometry::correct_motion(const Sweep& sweep, const Pose& T_last_now) {
-  correct_all(sweep.points, uncorrected_twist(sweep, T_last_now), options_.isa, scan_);
+  if (source_is_refuted_)
+    correct_anew(sweep, twist_in(sweep, T_last_now), scan_);
+  else
+    correct_all(sweep.points, uncorrected_twist(sweep, T_last_now), options_.isa, scan_);
   registered_ = sweep.registered;
+}
+
+/// The twist of which T_last_now comes; zero where no time has passed.
+Vector6 Odometry::twist_in(const Sweep& sweep, const Pose& T_last_now) const {
+  const double elapsed_s = sensors_.elapsed_s(sweep);
+  return elapsed_s > 0.0 ? (se3_log(T_last_now) / elapsed_s).eval() : Vector6::Zero();
 }
 
 /// The part of the motion that is still in the points of the sweep.
 Vector6 Odometry::uncorrected_twist(const Sweep& sweep, const Pose& T_last_now) const {
-  const double elapsed_s = sensors_.elapsed_s(sweep);
-  if (elapsed_s <= 0.0)
-    return Vector6::Zero();
-  const Vector6 twist = se3_log(T_last_now) / elapsed_s;
-  Vector6 corrected = refuted_ ? se3_log(*refuted_) / elapsed_s : twist;
-  if (sweep.uncorrected != Uncorrected::nothing)
-    corrected.head<3>().setZero();
-  if (sweep.uncorrected == Uncorrected::all)
-    corrected.tail<3>().setZero();
-  return twist - corrected;
+  Vector6 twist = twist_in(sweep, T_last_now);
+  if (sweep.uncorrected == Uncorrected::nothing)
+    twist.setZero();
+  if (sweep.uncorrected == Uncorrected::translation)
+    twist.tail<3>().setZero();
+  return twist;
 }
 
 bool Odometry::needs_scan_to_scan(const MotionPrior& prior) const {
@@ -309,8 +325,7 @@ bool Odometry::trusts(const Registration& registration, const Pose& T_last_now, 
 /// Whether the motion sources know better than what is left of the counterparts. After a time without lidar they do
 /// not.
 bool Odometry::is_outvoted(const Registration& registration, const Pose& T_last_now, const MotionPrior& prior) const {
-  const bool had_sight = !adrift_ || refused_in_a_row_ > 0;
-  if (prior.source.translation < 0 || !had_sight || !misses_most(registration))
+  if (prior.source.translation < 0 || !had_sight() || !misses_most(registration))
     return false;
   const Vector6 deviation = difference(T_last_now, prior.T_last_now).cwiseAbs();
   return (deviation.array() > kLoneDeviation_sigma * variance_against_submap().cwiseSqrt().array()).any();
@@ -335,9 +350,13 @@ void Odometry::choose_keyframe(OdometryEstimate& estimate) {
   const bool moved =
       T_keyframe_base.translation.norm() > options_.map.keyframe_m || turned_deg > options_.map.keyframe_deg;
   const bool takes_in = !estimate.failed && (processed_ == 0 || (moved && !misses_most(estimate.scan_to_submap)));
-  const bool restarts = refused_in_a_row_ >= kRefusalsToRestart && scan_.size() >= kMinPoints;
+  const bool carried = estimate.prior.translation >= 0 && !is_map_young();
+  const bool restarts =
+      refused_in_a_row_ >= (carried ? kRefusalsWhileCarried : kRefusalsToRestart) && scan_.size() >= kMinPoints;
   if (!takes_in && !restarts)
     return;
+  if (restarts && is_map_young())
+    map_.clear();
   estimate.T_odom_base.rotation =
       (so3_exp(tilt_keeper_.take_correction_rad()) * estimate.T_odom_base.rotation).normalized();
   keyframe_observability_ = estimate.scan_to_submap.observability;
@@ -345,6 +364,8 @@ void Odometry::choose_keyframe(OdometryEstimate& estimate) {
   refused_in_a_row_ = 0;
   estimate.keyframe = true;
 }
+
+bool Odometry::is_map_young() const { return !resumed_ && processed_ <= kYoungMap_sweeps; }
 
 /// Of what sweeps to come are laid against, the part that a sweep makes up. If a share s of it is new, then 2/s - 1
 /// sweeps are in sight at a time, and a step of the mean over so many shifts it by 2s/(1 + s) of a step in the end.

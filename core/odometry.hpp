@@ -67,6 +67,7 @@ class Odometry {
   MotionPrior settle_dispute(const Sweep& sweep, const MotionPrior& prior, const Gicp::StopRequested& stop);
   Registration attempt(const Sweep& sweep, const Pose& T_last_now, const Gicp::StopRequested& stop);
   void correct_motion(const Sweep& sweep, const Pose& T_last_now);
+  [[nodiscard]] Vector6 twist_in(const Sweep& sweep, const Pose& T_last_now) const;
   [[nodiscard]] Vector6 uncorrected_twist(const Sweep& sweep, const Pose& T_last_now) const;
   Registration match_scan(const MotionPrior& prior, const Pose& T_start, bool wide, const Gicp::StopRequested& stop);
   Registration match_submap(const MotionPrior& prior, const Pose& T_last_now, const Gicp::StopRequested& stop);
@@ -79,12 +80,14 @@ class Odometry {
                             const Vector6& variance) const;
   [[nodiscard]] bool is_outvoted(const Registration& registration, const Pose& T_last_now,
                                  const MotionPrior& prior) const;
+  [[nodiscard]] bool had_sight() const { return !adrift_ || refused_in_a_row_ > 0; }
   [[nodiscard]] bool is_fragment(const Sweep& sweep) const;
   [[nodiscard]] bool misses_most(const Registration& registration) const;
   [[nodiscard]] double share_of_inliers(const Registration& registration) const;
   [[nodiscard]] std::span<const SurfacePoint> registered() const { return std::span(scan_).first(registered_); }
   [[nodiscard]] bool needs_scan_to_scan(const MotionPrior& prior) const;
   void map_last_scan(std::size_t points);
+  [[nodiscard]] bool is_map_young() const;
   void choose_keyframe(OdometryEstimate& estimate);
   static Matrix6 share_of_map(double fresh, const Matrix6& observability);
   void hold_still(const Sweep& sweep, OdometryEstimate& estimate);
@@ -129,7 +132,7 @@ class Odometry {
   bool adrift_ = false;       ///< the last sweep was a prediction
   bool knows_start_ = false;  ///< the map holds what was seen at T_odom_start_
   bool resumed_ = false;
-  std::optional<Pose> refuted_; ///< T_last_now that the points of the sweep are corrected for, and that is not true
+  bool source_is_refuted_ = false; ///< of the rotation that the points of the sweep came corrected for
   SeenAxes seen_axes_;
   RegistrationFeedback feedback_;
 };

@@ -24,6 +24,19 @@ struct SweepPoint {
 /// The part of the robot's motion during a sweep that no motion source could take out of its points.
 enum class Uncorrected : std::uint8_t { nothing, translation, all };
 
+/// Where the base was while a sweep came in, as its points were corrected for: at instants from first to last, the last
+/// of them its end, and linear between them. Empty where nothing was corrected, and nothing is to be.
+struct CorrectedPath {
+  struct Place {
+    Stamp stamp;
+    Pose T_end_base;
+  };
+  static constexpr std::size_t kMaxPlaces = 33;
+
+  std::array<Place, kMaxPlaces> places;
+  std::size_t count = 0;
+};
+
 /// Where one motion source saw the base at the end of a sweep.
 struct SourcePose {
   bool known = false;      ///< with a sample inside the sweep
@@ -43,7 +56,8 @@ struct Sweep {
   Stamp start;
   Stamp end;                                  ///< the stamp of the sweep
   Uncorrected uncorrected = Uncorrected::all; ///< left to Odometry
-  std::size_t raw_returns = 0;                ///< returns that came in
+  CorrectedPath path;
+  std::size_t raw_returns = 0; ///< returns that came in
   std::array<SourcePose, kMaxSources> sources;
   std::optional<Eigen::Vector3d>
       specific_force_base_mps2;           ///< mean over the sweep, from the first usable inertial source

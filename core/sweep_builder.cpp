@@ -133,6 +133,7 @@ void SweepBuilder::open(Stamp start) {
     window_->choice = sources_.choose(start);
   window_->uncorrected = options_.motion_correction ? window_->choice.uncorrected() : Uncorrected::nothing;
   sweep_.raw_returns = 0;
+  sweep_.path.count = 0;
 }
 
 Pose SweepBuilder::T_start_base(Stamp stamp) {
@@ -190,13 +191,25 @@ void SweepBuilder::leave_out_body(const Pose& T_base_lidar, const Salvo& salvo, 
 /// Within the packet the motion is taken as linear: a transform and its rate.
 PacketMotion SweepBuilder::motion_of(const LidarPacket& packet) {
   const Pose& T_base_lidar = T_base_lidar_[packet.lidar];
-  const Pose begin = T_start_base(packet.stamp) * T_base_lidar;
+  const Pose T_start_begin = T_start_base(packet.stamp);
+  note_place(packet.stamp, T_start_begin);
+  const Pose begin = T_start_begin * T_base_lidar;
   const Pose end = T_start_base(packet.stamp + packet.duration) * T_base_lidar;
   const double per_s = 1.0 / std::max(1e-9, to_seconds(packet.duration));
   const Eigen::Matrix3d R = begin.R();
   return {R.cast<float>(), begin.translation.cast<float>(), (per_s * (end.R() - R)).cast<float>(),
           (per_s * (end.translation - begin.translation)).cast<float>(),
           static_cast<float>(to_seconds(packet.stamp - window_->start))};
+}
+
+/// Remembers the way of the base in even steps, until move_to_end() from the start.
+void SweepBuilder::note_place(Stamp stamp, const Pose& T_start_base) {
+  CorrectedPath& path = sweep_.path;
+  constexpr std::size_t kSteps = CorrectedPath::kMaxPlaces - 1;
+  const bool soon =
+      path.count > 0 && stamp < path.places[path.count - 1].stamp + (window_->end - window_->start) / kSteps;
+  if (options_.motion_correction && !soon && path.count < kSteps)
+    path.places[path.count++] = {stamp, T_start_base};
 }
 
 /// Takes in the returns fired in [from, to).
@@ -287,9 +300,13 @@ void SweepBuilder::choose_registered() {
 void SweepBuilder::move_to_end() {
   const Pose T_start_end = T_start_base(window_->end);
   last_twist_base_ = se3_log(T_start_end) / to_seconds(window_->end - window_->start);
+  const Pose T_end_start = T_start_end.inverse();
+  if (options_.motion_correction)
+    sweep_.path.places[sweep_.path.count++] = {window_->end, T_start_end};
+  for (CorrectedPath::Place& place : std::span(sweep_.path.places).first(sweep_.path.count))
+    place.T_end_base = T_end_start * place.T_end_base;
   if (T_start_end == Pose{})
     return;
-  const Pose T_end_start = T_start_end.inverse();
   const Eigen::Matrix3f R = T_end_start.R().cast<float>();
   const Eigen::Vector3f t = T_end_start.translation.cast<float>();
   for (SweepPoint& point : sweep_.points) {

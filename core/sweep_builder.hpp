@@ -94,6 +94,7 @@ class SweepBuilder {
   void choose_registered();
   void move_to_end();
   [[nodiscard]] Pose T_start_base(Stamp stamp);
+  void note_place(Stamp stamp, const Pose& T_start_base);
   [[nodiscard]] std::optional<Pose> follow_sources(Stamp stamp) const;
   void hand_over(Stamp now);
   [[nodiscard]] Duration period() const;

@@ -45,7 +45,42 @@ struct Vectors {
   return moved;
 }
 
+/// From one place of the path to the next the correction of the correction is linear.
+struct Correction {
+  float age_s;
+  Eigen::Matrix3f R;
+  Eigen::Vector3f t;
+};
+using Corrections = std::array<Correction, CorrectedPath::kMaxPlaces>;
+
+/// Precondition: there are some, from the oldest on.
+Correction at_age(std::span<const Correction> corrections, float age_s) {
+  const auto after = std::ranges::find_if(corrections, [=](const Correction& c) { return c.age_s <= age_s; });
+  if (after == corrections.begin() || after == corrections.end())
+    return after == corrections.end() ? corrections.back() : *after;
+  const Correction& before = *std::prev(after);
+  const float fraction = (before.age_s - age_s) / (before.age_s - after->age_s);
+  return {age_s, before.R + fraction * (after->R - before.R), before.t + fraction * (after->t - before.t)};
+}
+
 } // namespace
+
+void correct_anew(const Sweep& sweep, const Vector6& twist_base, std::vector<SurfacePoint>& scan) {
+  Corrections corrections;
+  for (std::size_t i = 0; i < sweep.path.count; ++i) {
+    const CorrectedPath::Place& place = sweep.path.places[i];
+    const double age_s = to_seconds(sweep.end - place.stamp);
+    const Pose T = se3_exp(-age_s * twist_base) * place.T_end_base.inverse();
+    corrections[i] = {static_cast<float>(age_s), T.R().cast<float>(), T.translation.cast<float>()};
+  }
+  const std::span known = std::span(corrections).first(sweep.path.count);
+  scan.clear();
+  for (const SweepPoint& point : sweep.points) {
+    const auto [age_s, R, t] = known.empty() ? Correction{0, Eigen::Matrix3f::Identity(), Eigen::Vector3f::Zero()}
+                                             : at_age(known, point.age_s);
+    scan.push_back({R * point.position_base_m + t, R * point.normal_base});
+  }
+}
 
 void correct_all(std::span<const SweepPoint> points, const Vector6& twist_base, Isa isa,
                  std::vector<SurfacePoint>& scan) {

@@ -16,4 +16,8 @@ namespace locus {
 void correct_all(std::span<const SweepPoint> points, const Vector6& twist_base, Isa isa,
                  std::vector<SurfacePoint>& scan);
 
+/// The same whatever motion the points were corrected for, which is taken out of them again: for a source that is not
+/// believed after all.
+void correct_anew(const Sweep& sweep, const Vector6& twist_base, std::vector<SurfacePoint>& scan);
+
 } // namespace locus

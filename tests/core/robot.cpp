@@ -70,9 +70,11 @@ SweepBuilder::Counters drive(const sim::Scene& scene, const sim::Trajectory& tra
     for (; setup.wheels && next_wheels.stamp <= arrival; next_wheels = wheels.next())
       if (!setup.is_silent(0, next_wheels.stamp))
         builder.sources().add(0, next_wheels);
-    for (; setup.imu && next_imu.stamp <= arrival; next_imu = imu.next())
+    for (; setup.imu && next_imu.stamp <= arrival; next_imu = imu.next()) {
+      next_imu.angular_velocity_radps.z() += setup.gyro_error_radps(next_imu.stamp);
       if (!setup.is_silent(imu_index, next_imu.stamp))
         builder.sources().add(imu_index, next_imu);
+    }
     builder.advance(arrival);
     if (!setup.is_lost(static_cast<std::size_t>(std::distance(lidars.begin(), next)), arrival))
       builder.add(next->packet(), arrival);

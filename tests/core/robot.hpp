@@ -30,6 +30,7 @@ struct RobotSetup {
   Fusion fusion = Fusion::combined;
   std::function<bool(std::size_t lidar, Stamp)> is_lost = [](std::size_t, Stamp) { return false; }; ///< packets
   std::function<bool(std::size_t source, Stamp)> is_silent = [](std::size_t, Stamp) { return false; };
+  std::function<double(Stamp)> gyro_error_radps = [](Stamp) { return 0.0; }; ///< about z
 
   static sim::SyntheticLidarOptions on_mast();
   [[nodiscard]] std::vector<MotionSourceOptions> motion_sources() const;

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -88,21 +89,33 @@ TEST(WrongImu, ThatWasGoodBeforeALossIsRefused) {
   expect_refused(replay_with(kOtherWay, drive, {}, seconds{8}), kOtherWay, without_imu_m(drive));
 }
 
-/// A sure gyro that is wrong all of a sudden must not win against wheels and surfaces.
+/// A sure gyro that is wrong all of a sudden, wherever in a sweep, must not win against wheels and surfaces.
 TEST(WrongImu, ThatJumpsNowAndThenIsOutvoted) {
   const SimulatedDrive& drive = wheels();
-  std::vector<std::string> jumps;
-  for (int at_s = 8; at_s < 60; at_s += 5) {
-    jumps.emplace_back("--fail");
-    jumps.push_back(fmt::format("imu:jump=2@{}-{}", at_s, at_s + 1));
+  const double without_m = without_imu_m(drive);
+  const std::vector<std::pair<double, double>> jumps{{0.7, 8.0}, {1.0, 8.02}, {2.0, 8.0}, {2.0, 8.05}, {5.0, 8.08}};
+  for (const auto& [by_radps, from_s] : jumps) {
+    SCOPED_TRACE(fmt::format("{} rad/s from {} s on", by_radps, from_s));
+    const Replay replay = drive.replay(a_second_in_five(fmt::format("imu:jump={}", by_radps), from_s, 60.0));
+    const json summary = replay.summary();
+    EXPECT_GE(summary["sources"]["imu"]["rejected"]["self_check"], 1);
+    EXPECT_EQ(summary["sources"]["wio"]["health_changes"], 0);
+    EXPECT_EQ(summary["sweeps"]["failed"], 0);
+    EXPECT_LT(ape_mean_m(replay), 1.2 * without_m);
+    EXPECT_LT(summary["ape_m"]["max"], 0.05);
   }
-  const Replay replay = drive.replay(jumps);
-  const json summary = replay.summary();
-  EXPECT_GE(summary["sources"]["imu"]["rejected"]["self_check"], 1);
-  EXPECT_EQ(summary["sources"]["wio"]["health_changes"], 0);
-  EXPECT_EQ(summary["sweeps"]["failed"], 0);
-  EXPECT_LT(ape_mean_m(replay), 1.2 * without_imu_m(drive));
-  EXPECT_LT(summary["ape_m"]["max"], 0.05);
+}
+
+TEST(WrongImu, ThatJumpsBesideLidarAloneIsOutvoted) {
+  const SimulatedDrive& drive = wheels();
+  for (const double from_s : {8.0, 8.05}) {
+    SCOPED_TRACE(from_s);
+    std::vector<std::string> faults = a_second_in_five("imu:jump=2", from_s, 60.0);
+    faults.insert(faults.end(), {"--fail", "wio:lost@0"});
+    const Replay replay = drive.replay(faults);
+    EXPECT_EQ(replay.summary()["sweeps"]["failed"], 0);
+    EXPECT_LT(ape_mean_m(replay), 0.03);
+  }
 }
 
 TEST(WrongImu, BesideLidarAloneIsRefused) {

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "replay_run.hpp"
@@ -32,6 +33,16 @@ class SimulatedDrive {
  private:
   TemporaryFolder folder_;
 };
+
+/// Arguments of a fault that is there for a second in five.
+inline std::vector<std::string> a_second_in_five(const std::string& fault, double from_s, double to_s) {
+  std::vector<std::string> arguments;
+  for (double at_s = from_s; at_s < to_s; at_s += 5.0) {
+    arguments.emplace_back("--fail");
+    arguments.push_back(fmt::format("{}@{}-{}", fault, at_s, at_s + 1.0));
+  }
+  return arguments;
+}
 
 inline double ape_mean_m(const Replay& replay) { return replay.summary()["ape_m"]["mean"]; }
 
