@@ -42,9 +42,10 @@ constexpr double kFragment = 1.0 / 3.0;
 constexpr Duration kGoesOn = std::chrono::seconds{1};
 constexpr double kComesToRest_s = 1.0;
 
-/// After so many refusals in a row the submap is behind us, and the map goes on from the prediction. Where wheels or
-/// legs carry the estimate it may wait longer: what the lidar measures wrong must not get into the map.
-constexpr int kRefusalsToRestart = 10, kRefusalsWhileCarried = 50;
+/// After so many refusals in a row the submap is behind us, and the map goes on from the prediction. Wheels or legs may
+/// carry the estimate for a while before: what the lidar measures wrong must not get into the map.
+constexpr int kRefusalsToRestart = 10;
+constexpr Duration kCarried = std::chrono::seconds{5};
 
 /// A map that was begun so few sweeps ago was begun wrong, then, and there is nothing in it to go on from.
 constexpr std::uint64_t kYoungMap_sweeps = 3 * kRefusalsToRestart;
@@ -350,9 +351,8 @@ void Odometry::choose_keyframe(OdometryEstimate& estimate) {
   const bool moved =
       T_keyframe_base.translation.norm() > options_.map.keyframe_m || turned_deg > options_.map.keyframe_deg;
   const bool takes_in = !estimate.failed && (processed_ == 0 || (moved && !misses_most(estimate.scan_to_submap)));
-  const bool carried = estimate.prior.translation >= 0 && !is_map_young();
-  const bool restarts =
-      refused_in_a_row_ >= (carried ? kRefusalsWhileCarried : kRefusalsToRestart) && scan_.size() >= kMinPoints;
+  const bool carried = estimate.prior.translation >= 0 && estimate.stamp - last_seen_ < kCarried && !is_map_young();
+  const bool restarts = refused_in_a_row_ >= kRefusalsToRestart && !carried && scan_.size() >= kMinPoints;
   if (!takes_in && !restarts)
     return;
   if (restarts && is_map_young())
