@@ -25,7 +25,7 @@ constexpr double kAlwaysAllowed_rad = 0.1;
 /// A source of the rotation that turns otherwise than the robot would without it by more than this many standard
 /// deviations of that, and by more than the least, is put to the vote; at kAlwaysAllowed_rad in any case.
 constexpr double kDispute_sigma = 6.0;
-constexpr double kLeastDispute_rad = 0.03;
+constexpr double kLeastDispute_rad = 0.02;
 
 /// No place changes so fast that from one sweep to the next less than this part of the usual counterparts is left: the
 /// air is full of dust, or the lidar measures otherwise than before. Such a sweep is not for the map, and may

@@ -93,7 +93,8 @@ TEST(WrongImu, ThatWasGoodBeforeALossIsRefused) {
 TEST(WrongImu, ThatJumpsNowAndThenIsOutvoted) {
   const SimulatedDrive& drive = wheels();
   const double without_m = without_imu_m(drive);
-  const std::vector<std::pair<double, double>> jumps{{0.7, 8.0}, {1.0, 8.02}, {2.0, 8.0}, {2.0, 8.05}, {5.0, 8.08}};
+  const std::vector<std::pair<double, double>> jumps{{0.3, 8.0}, {0.7, 8.0},  {1.0, 8.02},
+                                                     {2.0, 8.0}, {2.0, 8.05}, {5.0, 8.08}};
   for (const auto& [by_radps, from_s] : jumps) {
     SCOPED_TRACE(fmt::format("{} rad/s from {} s on", by_radps, from_s));
     const Replay replay = drive.replay(a_second_in_five(fmt::format("imu:jump={}", by_radps), from_s, 60.0));
@@ -103,6 +104,17 @@ TEST(WrongImu, ThatJumpsNowAndThenIsOutvoted) {
     EXPECT_EQ(summary["sweeps"]["failed"], 0);
     EXPECT_LT(ape_mean_m(replay), 1.2 * without_m);
     EXPECT_LT(summary["ape_m"]["max"], 0.05);
+  }
+}
+
+TEST(WrongImu, ThatJumpsOnLegsIsOutvoted) {
+  const SimulatedDrive drive("urban", "spot", 40);
+  const double without_m = without_imu_m(drive);
+  for (const double by_radps : {0.3, 0.4, 2.0}) {
+    SCOPED_TRACE(by_radps);
+    const Replay replay = drive.replay(a_second_in_five(fmt::format("imu:jump={}", by_radps), 8.0, 40.0));
+    EXPECT_LT(ape_mean_m(replay), 1.2 * without_m + 0.002);
+    EXPECT_LT(replay.summary()["ape_m"]["max"], 0.05);
   }
 }
 
