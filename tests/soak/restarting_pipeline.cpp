@@ -2,6 +2,7 @@
 #include "restarting_pipeline.hpp"
 
 #include <numeric>
+#include <thread>
 #include <utility>
 
 #include "daemon/machine_time.hpp"
@@ -56,6 +57,8 @@ void RestartingPipeline::end(End how) {
   report.read(pipeline_->ingest());
   before_ = with(report);
   const std::optional<daemon::Whereabouts> last = keeper_->now();
+  if (how == End::crash && last)
+    wait_for_disk(*last);
   keeper_.reset();
   if (how == End::orderly && last) {
     daemon::SavedState state{*last, FlatGround::off, {}};
@@ -64,6 +67,18 @@ void RestartingPipeline::end(End how) {
       throw tools::Failure(tools::ExitStatus::failed, *problem);
   }
   pipeline_.reset();
+}
+
+/// Who drives a day in minutes outruns the disk, by seconds of stamps when it is busy. A robot does not.
+void RestartingPipeline::wait_for_disk(const daemon::Whereabouts& last) const {
+  constexpr Duration kPatience = std::chrono::seconds{10};
+  const Duration give_up = daemon::read_clock(CLOCK_MONOTONIC) + kPatience;
+  while (daemon::read_clock(CLOCK_MONOTONIC) < give_up) {
+    const auto written = daemon::load_state(state_file_);
+    if (written && written->last.stamp == last.stamp)
+      return;
+    std::this_thread::sleep_for(std::chrono::milliseconds{1});
+  }
 }
 
 void RestartingPipeline::fetch(Duration timeout) {
