@@ -22,8 +22,8 @@ constexpr double kMaxDeviation_sigma = 8.0;
 constexpr double kAlwaysAllowed_m = 0.5;
 constexpr double kAlwaysAllowed_rad = 0.1;
 
-/// A source of the rotation that turns otherwise than the robot would without it by more than this many standard
-/// deviations of that, and by more than the least, is put to the vote; at kAlwaysAllowed_rad in any case.
+/// A source of the rotation is put to the vote if, about any axis, it turns otherwise than the robot would without it
+/// by more than this many standard deviations of that and by more than the least, or by more than kAlwaysAllowed_rad.
 constexpr double kDispute_sigma = 6.0;
 constexpr double kLeastDispute_rad = 0.02;
 
@@ -42,13 +42,11 @@ constexpr double kFragment = 1.0 / 3.0;
 constexpr Duration kGoesOn = std::chrono::seconds{1};
 constexpr double kComesToRest_s = 1.0;
 
-/// After so many refusals in a row the submap is behind us, and the map goes on from the prediction. Wheels or legs may
-/// carry the estimate for a while before: what the lidar measures wrong must not get into the map.
+/// After so many refusals in a row the submap is behind us, and the map goes on from the prediction. Where wheels or
+/// legs carry the estimate it waits, for so long since lidar last placed the robot: what is measured wrong must not get
+/// into the map.
 constexpr int kRefusalsToRestart = 10;
-constexpr Duration kCarried = std::chrono::seconds{5};
-
-/// A map that was begun so few sweeps ago was begun wrong, then, and there is nothing in it to go on from.
-constexpr std::uint64_t kYoungMap_sweeps = 3 * kRefusalsToRestart;
+constexpr Duration kLately = std::chrono::seconds{5};
 
 /// Of what was not foreseen of the motion in a sweep, how much shows in where it comes to lie, how far a turn shifts
 /// it, for what it sees stands to one side, and how much of that goes on in the next.
@@ -106,7 +104,7 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
   estimate.scan_to_submap = match_submap(prior, T_last_now, stop);
   const Pose T_last_submap = T_odom_last_.inverse() * estimate.scan_to_submap.T_target_source;
   estimate.failed = !trusts(estimate.scan_to_submap, T_last_submap, prior.T_last_now, variance_against_submap()) ||
-                    is_outvoted(estimate.scan_to_submap, T_last_submap, prior);
+                    is_outvoted(sweep, estimate.scan_to_submap, T_last_submap, prior);
   estimate.T_odom_base = T_odom_last_ * (estimate.failed ? flatten(T_last_now, Matrix6::Zero())
                                                          : flatten(T_last_submap, estimate.scan_to_submap.information));
   hold_still(sweep, estimate);
@@ -163,7 +161,7 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
   if (const auto up_base = gravity_.up_base(); up_base && !T_odom_start_)
     T_odom_last_.rotation = from_rpy_rad(level_rpy_rad(*up_base));
   if (sweep.uncorrected != Uncorrected::nothing && !resumed_)
-    first_points_ = sweep.points;
+    first_ = sweep;
   OdometryEstimate estimate;
   estimate.T_odom_base = T_odom_last_;
   estimate.failed = scan_.size() < kMinPoints;
@@ -186,7 +184,7 @@ std::optional<Vector6> Odometry::kept_twist(const Sweep& sweep) const {
 /// true: as a prior, a gyro is too sure for them to say so later. The loser makes the winner less sure.
 MotionPrior Odometry::settle_dispute(const Sweep& sweep, const MotionPrior& prior, const Gicp::StopRequested& stop) {
   source_is_refuted_ = false;
-  if (prior.source.rotation < 0 || !had_sight() || sweep.points.size() < kMinPoints)
+  if (prior.source.rotation < 0 || !had_sight(sweep) || sweep.points.size() < kMinPoints)
     return prior;
   const MotionPrior rival = sensors_.integrate(sweep, kept_twist(sweep), prior.source.rotation);
   const Eigen::Vector3d dispute = difference(prior.T_last_now, rival.T_last_now).tail<3>();
@@ -216,27 +214,25 @@ Registration Odometry::attempt(const Sweep& sweep, const Pose& T_last_now, const
 
 /// Takes out of the points what no motion source could, with the twist that T_last_now means.
 void Odometry::correct_motion(const Sweep& sweep, const Pose& T_last_now) {
-  if (source_is_refuted_)
-    correct_anew(sweep, twist_in(sweep, T_last_now), scan_);
-  else
-    correct_all(sweep.points, uncorrected_twist(sweep, T_last_now), options_.isa, scan_);
+  correct(sweep, twist_in(sweep, T_last_now), scan_);
   registered_ = sweep.registered;
 }
 
-/// The twist of which T_last_now comes; zero where no time has passed.
+void Odometry::correct(const Sweep& sweep, const Vector6& twist_base, std::vector<SurfacePoint>& scan) const {
+  if (source_is_refuted_)
+    return correct_anew(sweep, twist_base, scan);
+  Vector6 uncorrected = twist_base;
+  if (sweep.uncorrected == Uncorrected::nothing)
+    uncorrected.setZero();
+  if (sweep.uncorrected == Uncorrected::translation)
+    uncorrected.tail<3>().setZero();
+  correct_all(sweep.points, uncorrected, options_.isa, scan);
+}
+
+/// The twist that takes the base from the last sweep to this one; zero where no time has passed.
 Vector6 Odometry::twist_in(const Sweep& sweep, const Pose& T_last_now) const {
   const double elapsed_s = sensors_.elapsed_s(sweep);
   return elapsed_s > 0.0 ? (se3_log(T_last_now) / elapsed_s).eval() : Vector6::Zero();
-}
-
-/// The part of the motion that is still in the points of the sweep.
-Vector6 Odometry::uncorrected_twist(const Sweep& sweep, const Pose& T_last_now) const {
-  Vector6 twist = twist_in(sweep, T_last_now);
-  if (sweep.uncorrected == Uncorrected::nothing)
-    twist.setZero();
-  if (sweep.uncorrected == Uncorrected::translation)
-    twist.tail<3>().setZero();
-  return twist;
 }
 
 bool Odometry::needs_scan_to_scan(const MotionPrior& prior) const {
@@ -261,18 +257,18 @@ Registration Odometry::match_scan(const MotionPrior& prior, const Pose& T_start,
 /// found better; then the map begins anew with the first one corrected.
 void Odometry::begin_again(const Sweep& sweep, const MotionPrior& prior, Registration& found,
                            const Gicp::StopRequested& stop) {
-  if (first_points_.empty())
+  if (first_.points.empty())
     return;
   for (int round = 0; round < kStartRounds; ++round) {
     const Pose T_last_now = found.T_target_source;
-    correct_all(first_points_, uncorrected_twist(sweep, T_last_now), options_.isa, last_scan_);
+    correct(first_, twist_in(sweep, T_last_now), last_scan_);
     last_scan_mapped_ = false;
     correct_motion(sweep, T_last_now);
     found = match_scan(prior, T_last_now, true, stop);
     if (difference(found.T_target_source, T_last_now).cwiseAbs().maxCoeff() < kStartAgrees)
       break;
   }
-  first_points_ = {};
+  first_ = {};
   map_.clear();
   map_.insert(last_scan_, T_odom_last_);
 }
@@ -325,11 +321,19 @@ bool Odometry::trusts(const Registration& registration, const Pose& T_last_now, 
 
 /// Whether the motion sources know better than what is left of the counterparts. After a time without lidar they do
 /// not.
-bool Odometry::is_outvoted(const Registration& registration, const Pose& T_last_now, const MotionPrior& prior) const {
-  if (prior.source.translation < 0 || !had_sight() || !misses_most(registration))
+bool Odometry::is_outvoted(const Sweep& sweep, const Registration& registration, const Pose& T_last_now,
+                           const MotionPrior& prior) const {
+  if (prior.source.translation < 0 || !had_sight(sweep) || !misses_most(registration))
     return false;
   const Vector6 deviation = difference(T_last_now, prior.T_last_now).cwiseAbs();
   return (deviation.array() > kLoneDeviation_sigma * variance_against_submap().cwiseSqrt().array()).any();
+}
+
+bool Odometry::was_seen_lately(Stamp now) const { return std::chrono::abs(now - last_seen_) < kLately; }
+
+/// Whether the last sweep says where this one may be looked for: placed, or refused in the midst of those that were.
+bool Odometry::had_sight(const Sweep& sweep) const {
+  return !adrift_ || (refused_in_a_row_ > 0 && was_seen_lately(sweep.end));
 }
 
 bool Odometry::misses_most(const Registration& registration) const {
@@ -351,12 +355,14 @@ void Odometry::choose_keyframe(OdometryEstimate& estimate) {
   const bool moved =
       T_keyframe_base.translation.norm() > options_.map.keyframe_m || turned_deg > options_.map.keyframe_deg;
   const bool takes_in = !estimate.failed && (processed_ == 0 || (moved && !misses_most(estimate.scan_to_submap)));
-  const bool carried = estimate.prior.translation >= 0 && estimate.stamp - last_seen_ < kCarried && !is_map_young();
+  const bool carried = estimate.prior.translation >= 0 && was_seen_lately(estimate.stamp) && !is_map_in_doubt();
   const bool restarts = refused_in_a_row_ >= kRefusalsToRestart && !carried && scan_.size() >= kMinPoints;
   if (!takes_in && !restarts)
     return;
-  if (restarts && is_map_young())
+  if (restarts && is_map_in_doubt()) {
     map_.clear();
+    fitted_ = 1;
+  }
   estimate.T_odom_base.rotation =
       (so3_exp(tilt_keeper_.take_correction_rad()) * estimate.T_odom_base.rotation).normalized();
   keyframe_observability_ = estimate.scan_to_submap.observability;
@@ -365,7 +371,9 @@ void Odometry::choose_keyframe(OdometryEstimate& estimate) {
   estimate.keyframe = true;
 }
 
-bool Odometry::is_map_young() const { return !resumed_ && processed_ <= kYoungMap_sweeps; }
+/// Whether as many sweeps contradict the map as ever fitted: it was begun wrong, and there is nothing in it to go on
+/// from. What the service left behind has been confirmed.
+bool Odometry::is_map_in_doubt() const { return !resumed_ && refused_in_a_row_ >= fitted_; }
 
 /// Of what sweeps to come are laid against, the part that a sweep makes up. If a share s of it is new, then 2/s - 1
 /// sweeps are in sight at a time, and a step of the mean over so many shifts it by 2s/(1 + s) of a step in the end.
@@ -472,8 +480,10 @@ void Odometry::finish(const Sweep& sweep, const MotionPrior& prior, OdometryEsti
   }
   estimate.pose_covariance = uncertainty_.since_start();
   adrift_ = estimate.failed;
-  if (!estimate.failed)
+  if (!estimate.failed) {
     last_seen_ = sweep.end;
+    ++fitted_;
+  }
   tilt_keeper_.observe(estimate.T_odom_base.rotation, gravity_.up_base());
 
   choose_keyframe(estimate);

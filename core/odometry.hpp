@@ -68,7 +68,7 @@ class Odometry {
   Registration attempt(const Sweep& sweep, const Pose& T_last_now, const Gicp::StopRequested& stop);
   void correct_motion(const Sweep& sweep, const Pose& T_last_now);
   [[nodiscard]] Vector6 twist_in(const Sweep& sweep, const Pose& T_last_now) const;
-  [[nodiscard]] Vector6 uncorrected_twist(const Sweep& sweep, const Pose& T_last_now) const;
+  void correct(const Sweep& sweep, const Vector6& twist_base, std::vector<SurfacePoint>& scan) const;
   Registration match_scan(const MotionPrior& prior, const Pose& T_start, bool wide, const Gicp::StopRequested& stop);
   Registration match_submap(const MotionPrior& prior, const Pose& T_last_now, const Gicp::StopRequested& stop);
   void begin_again(const Sweep& sweep, const MotionPrior& prior, Registration& found, const Gicp::StopRequested& stop);
@@ -78,16 +78,17 @@ class Odometry {
   [[nodiscard]] Vector6 variance_against_submap() const;
   [[nodiscard]] bool trusts(const Registration& registration, const Pose& T_last_now, const Pose& T_last_predicted,
                             const Vector6& variance) const;
-  [[nodiscard]] bool is_outvoted(const Registration& registration, const Pose& T_last_now,
+  [[nodiscard]] bool is_outvoted(const Sweep& sweep, const Registration& registration, const Pose& T_last_now,
                                  const MotionPrior& prior) const;
-  [[nodiscard]] bool had_sight() const { return !adrift_ || refused_in_a_row_ > 0; }
+  [[nodiscard]] bool was_seen_lately(Stamp now) const;
+  [[nodiscard]] bool had_sight(const Sweep& sweep) const;
   [[nodiscard]] bool is_fragment(const Sweep& sweep) const;
   [[nodiscard]] bool misses_most(const Registration& registration) const;
   [[nodiscard]] double share_of_inliers(const Registration& registration) const;
   [[nodiscard]] std::span<const SurfacePoint> registered() const { return std::span(scan_).first(registered_); }
   [[nodiscard]] bool needs_scan_to_scan(const MotionPrior& prior) const;
   void map_last_scan(std::size_t points);
-  [[nodiscard]] bool is_map_young() const;
+  [[nodiscard]] bool is_map_in_doubt() const;
   void choose_keyframe(OdometryEstimate& estimate);
   static Matrix6 share_of_map(double fresh, const Matrix6& observability);
   void hold_still(const Sweep& sweep, OdometryEstimate& estimate);
@@ -115,8 +116,7 @@ class Odometry {
 
   std::uint64_t processed_ = 0;
   std::optional<Pose> T_odom_start_; ///< where to begin
-  std::vector<SweepPoint>
-      first_points_; ///< of the first sweep, as they came: no velocity was known to correct them with
+  Sweep first_; ///< as it came, while no velocity was known to correct it with; else without points
   Pose T_odom_last_;
   Vector6 twist_base_ = Vector6::Zero();
   Pose T_odom_keyframe_;
@@ -128,11 +128,12 @@ class Odometry {
   double usual_points_ = 0.0; ///< of a sweep
   Stamp last_seen_;           ///< of the last sweep that lidar placed
   int refused_in_a_row_ = 0;  ///< sweeps with points
+  std::int64_t fitted_ = 0;   ///< sweeps, since the map was begun
   bool lacks_prior_ = false;  ///< the last sweep had to be registered with the one before it
   bool adrift_ = false;       ///< the last sweep was a prediction
   bool knows_start_ = false;  ///< the map holds what was seen at T_odom_start_
   bool resumed_ = false;
-  bool source_is_refuted_ = false; ///< of the rotation that the points of the sweep came corrected for
+  bool source_is_refuted_ = false; ///< that of the rotation of the sweep at hand, which came corrected for it
   SeenAxes seen_axes_;
   RegistrationFeedback feedback_;
 };

@@ -25,7 +25,7 @@ struct SweepPoint {
 enum class Uncorrected : std::uint8_t { nothing, translation, all };
 
 /// Where the base was while a sweep came in, as its points were corrected for: at instants from first to last, the last
-/// of them its end, and linear between them. Empty where nothing was corrected, and nothing is to be.
+/// of them its end, and linear between them. What no source told is not in it; without motion correction it is empty.
 struct CorrectedPath {
   struct Place {
     Stamp stamp;

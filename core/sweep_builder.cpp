@@ -205,9 +205,9 @@ PacketMotion SweepBuilder::motion_of(const LidarPacket& packet) {
 /// Remembers the way of the base in even steps, until move_to_end() from the start.
 void SweepBuilder::note_place(Stamp stamp, const Pose& T_start_base) {
   CorrectedPath& path = sweep_.path;
-  constexpr std::size_t kSteps = CorrectedPath::kMaxPlaces - 1;
-  const bool soon =
-      path.count > 0 && stamp < path.places[path.count - 1].stamp + (window_->end - window_->start) / kSteps;
+  constexpr std::size_t kSteps = CorrectedPath::kMaxPlaces - 1; // and the end
+  const bool soon = path.count > 0 &&
+                    stamp < path.places[path.count - 1].stamp + (window_->end - window_->start) / Duration::rep{kSteps};
   if (options_.motion_correction && !soon && path.count < kSteps)
     path.places[path.count++] = {stamp, T_start_base};
 }

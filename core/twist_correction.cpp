@@ -45,7 +45,7 @@ struct Vectors {
   return moved;
 }
 
-/// From one place of the path to the next the correction of the correction is linear.
+/// What turns the old correction into the new one, at a place of the path; linear from one to the next.
 struct Correction {
   float age_s;
   Eigen::Matrix3f R;

@@ -130,6 +130,17 @@ TEST(WrongImu, ThatJumpsBesideLidarAloneIsOutvoted) {
   }
 }
 
+/// The first two sweeps are made anew, without what the gyro said.
+TEST(WrongImu, ThatJumpsFromTheStartInATurnDoesNotBendTheMap) {
+  const SimulatedDrive drive("tunnel", "husky", 60);
+  for (const std::string start_s : {"21", "24", "42"}) {
+    SCOPED_TRACE(start_s);
+    const Replay replay =
+        drive.replay({"--start", start_s, "--duration", "15", "--fail", "wio:lost@0", "--fail", "imu:jump=5@0"});
+    EXPECT_LT(ape_mean_m(replay), 0.05);
+  }
+}
+
 TEST(WrongImu, BesideLidarAloneIsRefused) {
   const SimulatedDrive& drive = wheels();
   const double alone_m = ape_mean_m(drive.replay({"--fail", "wio:lost@0", "--fail", "imu:lost@0"}));

@@ -26,14 +26,16 @@ TEST(WrongLidar, ThatMeasuresTooFarNowAndThenIsOutvoted) {
   }
 }
 
-/// The map was begun with walls where there are none, and they must not be there when the fault comes again.
+/// Neither a map that was begun with walls where there are none nor one that was good before must bring down what
+/// comes after the fault.
 TEST(WrongLidar, ThatMeasuresTooFarAtTheStartBeginsAnew) {
   const SimulatedDrive drive("tunnel", "husky", 60);
-  const Replay replay = drive.replay(a_second_in_five("top:jump=2", 0.0, 60.0));
-  const json summary = replay.summary();
-  EXPECT_GE(summary["sweeps"]["failed"], 60);
-  EXPECT_EQ(summary["sources"]["wio"]["health_changes"], 0);
-  EXPECT_LT(ape_mean_m(replay), 0.02);
+  for (const double from_s : {0.0, 1.3, 1.5, 2.0}) {
+    SCOPED_TRACE(from_s);
+    const Replay replay = drive.replay(a_second_in_five("top:jump=2", from_s, 60.0));
+    EXPECT_GE(replay.summary()["sweeps"]["failed"], 60);
+    EXPECT_LT(ape_mean_m(replay), 0.04);
+  }
 }
 
 TEST(WrongLidar, OnlyDustIsBelieved) {
