@@ -24,12 +24,13 @@ struct SweepPoint {
 /// The part of the robot's motion during a sweep that no motion source could take out of its points.
 enum class Uncorrected : std::uint8_t { nothing, translation, all };
 
-/// Where the base was while a sweep came in, as its points were corrected for: at instants from first to last, the last
-/// of them its end, and linear between them. What no source told is not in it; without motion correction it is empty.
+/// Where the base was while a sweep came in, from where it was at its start, as its points were corrected for: at
+/// instants from first to last, the last of them its end, and linear between them. What no source told is not in it;
+/// without motion correction it is empty.
 struct CorrectedPath {
   struct Place {
     Stamp stamp;
-    Pose T_end_base;
+    Pose T_start_base;
   };
   static constexpr std::size_t kMaxPlaces = 33;
 

@@ -202,7 +202,7 @@ PacketMotion SweepBuilder::motion_of(const LidarPacket& packet) {
           static_cast<float>(to_seconds(packet.stamp - window_->start))};
 }
 
-/// Remembers the way of the base in even steps, until move_to_end() from the start.
+/// Remembers the way of the base in even steps.
 void SweepBuilder::note_place(Stamp stamp, const Pose& T_start_base) {
   CorrectedPath& path = sweep_.path;
   constexpr std::size_t kSteps = CorrectedPath::kMaxPlaces - 1; // and the end
@@ -300,13 +300,11 @@ void SweepBuilder::choose_registered() {
 void SweepBuilder::move_to_end() {
   const Pose T_start_end = T_start_base(window_->end);
   last_twist_base_ = se3_log(T_start_end) / to_seconds(window_->end - window_->start);
-  const Pose T_end_start = T_start_end.inverse();
   if (options_.motion_correction)
     sweep_.path.places[sweep_.path.count++] = {window_->end, T_start_end};
-  for (CorrectedPath::Place& place : std::span(sweep_.path.places).first(sweep_.path.count))
-    place.T_end_base = T_end_start * place.T_end_base;
   if (T_start_end == Pose{})
     return;
+  const Pose T_end_start = T_start_end.inverse();
   const Eigen::Matrix3f R = T_end_start.R().cast<float>();
   const Eigen::Vector3f t = T_end_start.translation.cast<float>();
   for (SweepPoint& point : sweep_.points) {

@@ -70,8 +70,10 @@ void correct_anew(const Sweep& sweep, const Vector6& twist_base, std::vector<Sur
   for (std::size_t i = 0; i < sweep.path.count; ++i) {
     const CorrectedPath::Place& place = sweep.path.places[i];
     const double age_s = to_seconds(sweep.end - place.stamp);
-    const Pose T = se3_exp(-age_s * twist_base) * place.T_end_base.inverse();
-    corrections[i] = {static_cast<float>(age_s), T.R().cast<float>(), T.translation.cast<float>()};
+    const Pose T_base_end = place.T_start_base.inverse() * sweep.path.places[sweep.path.count - 1].T_start_base;
+    const Pose T_true_corrected = se3_exp(-age_s * twist_base) * T_base_end;
+    corrections[i] = {static_cast<float>(age_s), T_true_corrected.R().cast<float>(),
+                      T_true_corrected.translation.cast<float>()};
   }
   const std::span known = std::span(corrections).first(sweep.path.count);
   scan.clear();
