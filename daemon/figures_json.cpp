@@ -10,6 +10,28 @@ namespace locus::daemon {
 
 using nlohmann::ordered_json;
 
+namespace {
+
+double mean(double sum, std::uint64_t sweeps) {
+  return rounded(sum / static_cast<double>(std::max<std::uint64_t>(1, sweeps)));
+}
+
+} // namespace
+
+void SweepSums::add(const ProcessedSweep& sweep) {
+  const OdometryEstimate& estimate = sweep.estimate;
+  ++sweeps;
+  raw_points += static_cast<double>(sweep.raw_returns);
+  filtered_points += static_cast<double>(estimate.points);
+  scan_to_scan_iterations += estimate.scan_to_scan.iterations;
+  scan_to_submap_iterations += estimate.scan_to_submap.iterations;
+  const PriorSource& prior = estimate.prior;
+  if (prior.rotation >= 0)
+    ++used_sweeps[static_cast<std::size_t>(prior.rotation)];
+  if (prior.translation >= 0 && prior.translation != prior.rotation)
+    ++used_sweeps[static_cast<std::size_t>(prior.translation)];
+}
+
 double rounded(double value) { return std::round(value * 1e4) / 1e4; }
 
 ordered_json to_json(const PacketCounters& counters) {
@@ -45,11 +67,19 @@ ordered_json to_json(const SourceCounters& counters, std::uint64_t used_sweeps) 
           {"health_changes", counters.health_changes}};
 }
 
+ordered_json points_json(const SweepSums& sums) {
+  return {{"raw_mean", mean(sums.raw_points, sums.sweeps)}, {"filtered_mean", mean(sums.filtered_points, sums.sweeps)}};
+}
+
+ordered_json iterations_json(const SweepSums& sums) {
+  return {{"scan_to_scan", mean(sums.scan_to_scan_iterations, sums.sweeps)},
+          {"scan_to_submap", mean(sums.scan_to_submap_iterations, sums.sweeps)}};
+}
+
 ordered_json stages_json(const StageTimes& totals, std::uint64_t sweeps) {
   ordered_json stages;
   for (std::size_t i = 0; i < kStages; ++i)
-    stages[std::string{kStageNames[i]}] =
-        rounded(1e3 * to_seconds(totals[i]) / static_cast<double>(std::max<std::uint64_t>(1, sweeps)));
+    stages[std::string{kStageNames[i]}] = mean(1e3 * to_seconds(totals[i]), sweeps);
   return stages;
 }
 

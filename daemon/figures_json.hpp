@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cstdint>
+
 #include <nlohmann/json.hpp>
 
 #include "config/config.hpp"
@@ -17,14 +20,27 @@ struct Percentiles {
   double p50 = 0, p90 = 0, p99 = 0, max = 0;
 };
 
+/// Over the estimates of a run.
+struct SweepSums {
+  std::uint64_t sweeps = 0;
+  double raw_points = 0, filtered_points = 0, scan_to_scan_iterations = 0, scan_to_submap_iterations = 0;
+  /// Those whose prior came from the source, all of it or in part.
+  std::array<std::uint64_t, Sweep::kMaxSources> used_sweeps{};
+
+  void add(const ProcessedSweep& sweep);
+};
+
 /// Four digits behind the point: no figure here is known better.
 double rounded(double value);
 
 nlohmann::ordered_json to_json(const PacketCounters& counters);
 nlohmann::ordered_json to_json(const SweepCounters& counters);
 nlohmann::ordered_json to_json(const Percentiles& percentiles);
-/// `used_sweeps`: those whose prior came from the source, all of it or in part.
+/// `used_sweeps`: SweepSums::used_sweeps of it.
 nlohmann::ordered_json to_json(const SourceCounters& counters, std::uint64_t used_sweeps);
+/// In the mean over the sweeps.
+nlohmann::ordered_json points_json(const SweepSums& sums);
+nlohmann::ordered_json iterations_json(const SweepSums& sums);
 /// Milliseconds, in the mean over `sweeps`.
 nlohmann::ordered_json stages_json(const StageTimes& totals, std::uint64_t sweeps);
 

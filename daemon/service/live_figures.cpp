@@ -9,35 +9,25 @@ namespace locus::daemon {
 
 void LiveFigures::take(const ProcessedSweep& sweep, bool published) {
   const std::scoped_lock lock(mutex_);
-  const OdometryEstimate& estimate = sweep.estimate;
   const Duration now = read_clock(CLOCK_MONOTONIC);
-  window_[sums_.estimates % kWindow] = {now, static_cast<float>(1e3 * to_seconds(sweep.took.wall)),
-                                        static_cast<float>(1e3 * to_seconds(sweep.took.cpu))};
-  ++sums_.estimates;
-  sums_.last = estimate;
-  sums_.last_at = now;
+  window_[told_.sums.sweeps % kWindow] = {now, static_cast<float>(1e3 * to_seconds(sweep.took.wall)),
+                                          static_cast<float>(1e3 * to_seconds(sweep.took.cpu))};
+  told_.sums.add(sweep);
+  told_.last = sweep.estimate;
+  told_.last_at = now;
   for (std::size_t i = 0; i < kStages; ++i)
-    sums_.stages[i] += sweep.stages_took[i];
-  sums_.raw_points += static_cast<double>(sweep.raw_returns);
-  sums_.filtered_points += static_cast<double>(estimate.points);
-  sums_.scan_to_scan_iterations += estimate.scan_to_scan.iterations;
-  sums_.scan_to_submap_iterations += estimate.scan_to_submap.iterations;
-  const PriorSource& prior = estimate.prior;
-  if (prior.rotation >= 0)
-    ++sums_.used_sweeps[static_cast<std::size_t>(prior.rotation)];
-  if (prior.translation >= 0 && prior.translation != prior.rotation)
-    ++sums_.used_sweeps[static_cast<std::size_t>(prior.translation)];
-  sums_.unpublished += published ? 0 : 1;
+    told_.stages[i] += sweep.stages_took[i];
+  told_.unpublished += published ? 0 : 1;
 }
 
 void LiveFigures::take(const IngestReport& report) {
   const std::scoped_lock lock(mutex_);
-  sums_.ingest = report;
+  told_.ingest = report;
 }
 
 LiveFigures::Snapshot LiveFigures::snapshot() const {
   const std::scoped_lock lock(mutex_);
-  Snapshot snapshot = sums_;
+  Snapshot snapshot = told_;
   snapshot.process_ms = percentiles(&Timing::wall_ms);
   snapshot.process_cpu_ms = percentiles(&Timing::cpu_ms);
   snapshot.rate_hz = rate_hz();
@@ -46,7 +36,7 @@ LiveFigures::Snapshot LiveFigures::snapshot() const {
 
 Percentiles LiveFigures::percentiles(float Timing::*figure) const {
   std::vector<float> values;
-  for (std::size_t i = 0; i < std::min<std::size_t>(sums_.estimates, kWindow); ++i)
+  for (std::size_t i = 0; i < std::min<std::size_t>(told_.sums.sweeps, kWindow); ++i)
     values.push_back(window_[i].*figure);
   if (values.empty())
     return {};
@@ -62,11 +52,11 @@ Percentiles LiveFigures::percentiles(float Timing::*figure) const {
 double LiveFigures::rate_hz() const {
   constexpr Duration kSpan = std::chrono::seconds{5};
   const Duration now = read_clock(CLOCK_MONOTONIC);
-  const std::size_t known = std::min<std::size_t>(sums_.estimates, kWindow);
+  const std::size_t known = std::min<std::size_t>(told_.sums.sweeps, kWindow);
   std::size_t young = 0;
   Duration oldest = now;
   for (; young < known; ++young) {
-    const Timing& timing = window_[(sums_.estimates - 1 - young) % kWindow];
+    const Timing& timing = window_[(told_.sums.sweeps - 1 - young) % kWindow];
     if (now - timing.at > kSpan)
       break;
     oldest = timing.at;

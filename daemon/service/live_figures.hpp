@@ -23,11 +23,9 @@ class LiveFigures {
     std::optional<OdometryEstimate> last;
     Duration last_at{}; ///< CLOCK_MONOTONIC when it was published
     double rate_hz = 0; ///< over the last few seconds
-    std::uint64_t estimates = 0;
+    SweepSums sums;
     Percentiles process_ms, process_cpu_ms;
     StageTimes stages{};
-    double raw_points = 0, filtered_points = 0, scan_to_scan_iterations = 0, scan_to_submap_iterations = 0; ///< sums
-    std::array<std::uint64_t, Sweep::kMaxSources> used_sweeps{};
     std::uint64_t unpublished = 0; ///< that DDS did not take
     IngestReport ingest;
   };
@@ -45,7 +43,7 @@ class LiveFigures {
   [[nodiscard]] double rate_hz() const;
 
   mutable std::mutex mutex_;
-  Snapshot sums_; ///< without percentiles and rate
+  Snapshot told_; ///< without percentiles and rate
   std::array<Timing, kWindow> window_{};
 };
 

@@ -82,7 +82,7 @@ ordered_json sources_json(const Config& config, const LiveFigures::Snapshot& fig
   ordered_json sources = ordered_json::object();
   for (std::size_t i = 0; i < config.odometry.motion_sources.size(); ++i) {
     const IngestReport::Source& source = figures.ingest.sources[i];
-    ordered_json json = to_json(source.counters, figures.used_sweeps[i]);
+    ordered_json json = to_json(source.counters, figures.sums.used_sweeps[i]);
     json["health"] = source.healthy ? "healthy" : source.counters.received == 0 ? "never heard" : "lost";
     json["heard_ms_ago"] = ms_since(source.last_heard);
     json["verdict"] = source.verdict;
@@ -121,7 +121,6 @@ ordered_json status_json(Session& session) {
   const Config& config = session.config();
   const LiveFigures::Snapshot figures = session.figures().snapshot();
   const RosLink::Status link = session.link().status();
-  const double sweeps = std::max<double>(1.0, static_cast<double>(figures.estimates));
   const std::optional<Recorder::Status> recording = session.recording();
   ordered_json json{{"version", LOCUS_VERSION},
                     {"capture", recording ? recording->run.string() : ""},
@@ -138,11 +137,9 @@ ordered_json status_json(Session& session) {
   json["sweeps"] = to_json(session.pipeline().counters());
   json["process_ms"] = to_json(figures.process_ms);
   json["process_cpu_ms"] = to_json(figures.process_cpu_ms);
-  json["stage_ms"] = stages_json(figures.stages, figures.estimates);
-  json["points"] = {{"raw_mean", rounded(figures.raw_points / sweeps)},
-                    {"filtered_mean", rounded(figures.filtered_points / sweeps)}};
-  json["iterations_mean"] = {{"scan_to_scan", rounded(figures.scan_to_scan_iterations / sweeps)},
-                             {"scan_to_submap", rounded(figures.scan_to_submap_iterations / sweeps)}};
+  json["stage_ms"] = stages_json(figures.stages, figures.sums.sweeps);
+  json["points"] = points_json(figures.sums);
+  json["iterations_mean"] = iterations_json(figures.sums);
   json["sources"] = sources_json(config, figures, link);
   for (std::size_t i = 0; i < config.lidars.size(); ++i)
     json["lidars"][config.lidars[i].name] = lidar_json(config.lidars[i], figures.ingest.lidars[i]);

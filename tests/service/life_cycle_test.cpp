@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
-#include <set>
 #include <thread>
 
-#include <fmt/format.h>
-#include <sched.h>
 #include <sys/mount.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -18,8 +14,6 @@
 
 #include "daemon/machine_time.hpp"
 #include "daemon/service/saved_state.hpp"
-#include "drivers/motion_files.hpp"
-#include "drivers/udp_socket.hpp"
 #include "service/robot_network.hpp"
 #include "service/undisturbed.hpp"
 #include "support/errors.hpp"
@@ -74,18 +68,6 @@ class LifeCycle : public RobotNetwork {
     Child play(undisturbed(options));
     EXPECT_EQ(play.wait_for_exit(seconds{60}), 0) << testing::PrintToString(play.lines());
   }
-
-  /// A configuration with another value of a key of the lidar.
-  [[nodiscard]] std::filesystem::path lidar_with(const std::string& key_and_value) const {
-    std::string text = read_text(capture() / "config.yaml");
-    const std::string name = "name: front", key = key_and_value.substr(0, key_and_value.find(' '));
-    if (const std::size_t at = text.find(key, text.find(name)); at != std::string::npos)
-      text.replace(at, text.find_first_of(",}\n", at) - at, key_and_value);
-    else
-      text.replace(text.find(name), name.size(), name + ", " + key_and_value);
-    std::ofstream{file("wrong.yaml")} << text;
-    return file("wrong.yaml");
-  }
 };
 
 TEST_F(LifeCycle, ConfigurationIsCheckedAndPrinted) {
@@ -127,76 +109,6 @@ TEST_F(LifeCycle, SystemdIsToldOfStartReloadStopAndThatThreadsLive) {
   EXPECT_EQ(daemon.wait_for_exit(seconds{1}), 0);
 }
 
-TEST_F(LifeCycle, SensorsThatAreNotHeardAreNamedWithTheInterfaceOfDds) {
-  Child daemon(undisturbed(locusd(config())));
-  EXPECT_TRUE(daemon.wait_for_line("motion source wio: not heard", seconds{7}));
-  EXPECT_TRUE(daemon.wait_for_line("nobody is seen that publishes /wheel_odometry; DDS listens on interface lo",
-                                   milliseconds{10}));
-  EXPECT_TRUE(daemon.wait_for_line("lidar front: no data packet on UDP port 2368", seconds{1}));
-  EXPECT_EQ(status()["state"], "waiting");
-  Child play(undisturbed({LOCUS_PLAY, capture().string()})); // switched on at last
-  EXPECT_TRUE(daemon.wait_for_line("tracking", seconds{8}));
-}
-
-/// What is said changes with what is found: at first nothing comes.
-TEST_F(LifeCycle, LidarOfAnotherAddressIsNamedWithBoth) {
-  const std::filesystem::path wrong = lidar_with("source_ip: 192.168.1.77");
-  Child daemon(undisturbed(locusd(wrong)));
-  ASSERT_TRUE(daemon.wait_for_line("lidar front: no data packet on UDP port 2368 for 5 s; look at its power and cable",
-                                   seconds{8}));
-  const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
-  EXPECT_TRUE(daemon.wait_for_line("; packets come from 127.0.0.1, configured is 192.168.1.77: set "
-                                   "lidars.front.source_ip to that of the lidar",
-                                   seconds{5}))
-      << testing::PrintToString(daemon.lines());
-  const std::string shown = ctl({"status"}).out;
-  EXPECT_NE(shown.find("refused: sender "), std::string::npos) << shown;
-  EXPECT_NE(shown.find("the last sender: 127.0.0.1"), std::string::npos) << shown;
-}
-
-TEST_F(LifeCycle, LidarOnAnotherPortIsToldByItsPositionPackets) {
-  const std::filesystem::path wrong = lidar_with("port: 2390");
-  Child daemon(undisturbed(locusd(wrong)));
-  const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
-  EXPECT_TRUE(
-      daemon.wait_for_line("lidar front: no data packet on UDP port 2390 for 5 s; its position packets come, so "
-                           "it is on and sends the others elsewhere: locusctl sensors tells to which port",
-                           seconds{8}))
-      << testing::PrintToString(daemon.lines());
-}
-
-TEST_F(LifeCycle, AccelerationsInGAreNamed) {
-  const std::filesystem::path drive = file("in_g");
-  std::filesystem::copy(capture(), drive);
-  auto samples = MotionSamples<ImuSample>::open((capture() / "imu.csv").string());
-  ASSERT_TRUE(samples) << samples.error();
-  std::ofstream imu(drive / "imu.csv");
-  for (const ImuSample& sample : samples->drain()) {
-    imu << sample.stamp.time_since_epoch().count();
-    for (const Eigen::Vector3d& axes :
-         {sample.angular_velocity_radps, Eigen::Vector3d(sample.specific_force_mps2 / 9.80665)})
-      imu << ',' << axes.x() << ',' << axes.y() << ',' << axes.z();
-    imu << '\n';
-  }
-  imu.close();
-  Child daemon(undisturbed(locusd(config())));
-  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
-  const Child play(undisturbed({LOCUS_PLAY, drive.string()}));
-  EXPECT_TRUE(daemon.wait_for_line("motion source imu reports accelerations in g", seconds{15}))
-      << testing::PrintToString(daemon.lines());
-  EXPECT_NE(ctl({"status"}).out.find("reports accelerations in g"), std::string::npos);
-}
-
-TEST_F(LifeCycle, SweepsThatAreDroppedAreSaidWithTheReason) {
-  Child daemon(undisturbed(locusd(config())));
-  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
-  const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
-  ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
-  const Child hang({HANG_THREAD, std::to_string(daemon.pid()), "odometry"});
-  EXPECT_TRUE(daemon.wait_for_line("this computer is too busy: ", seconds{12}))
-      << testing::PrintToString(daemon.lines());
-}
-
 TEST_F(LifeCycle, SecondServiceLeavesTheSocketOfTheFirstAlone) {
   const Child first(locusd(config()));
   ASSERT_TRUE(first.wait_for_line("DDS is up", seconds{10}));
@@ -206,90 +118,6 @@ TEST_F(LifeCycle, SecondServiceLeavesTheSocketOfTheFirstAlone) {
         << testing::PrintToString(second.lines());
   }
   EXPECT_EQ(status()["lidars"]["front"]["port"], 2368);
-}
-
-TEST_F(LifeCycle, BadConfigurationAtReloadLeavesTheOldOneInForce) {
-  const std::filesystem::path file = config();
-  Child daemon(locusd(file));
-  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
-  std::ofstream{file, std::ios::app} << "no_such_key: 1\n";
-  const ProgramRun refused = ctl({"reload"});
-  EXPECT_EQ(refused.status, 2);
-  EXPECT_NE(refused.err.find("no_such_key"), std::string::npos) << refused.err;
-  EXPECT_TRUE(daemon.wait_for_line("the old configuration stays in force", seconds{1}));
-  EXPECT_EQ(status()["state"], "waiting");
-  static_cast<void>(config("threads: 1\n"));
-  EXPECT_EQ(ctl({"reload"}).status, 0);
-  EXPECT_EQ(status()["threads"], 1);
-}
-
-TEST_F(LifeCycle, PortThatIsTakenAtReloadLeavesTheOldConfigurationInForce) {
-  const std::filesystem::path file = config("flat_ground: off\n");
-  Child daemon(locusd(file));
-  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
-  const auto taken = UdpSocket::open(2399);
-  ASSERT_TRUE(taken) << taken.error();
-  std::filesystem::copy_file(lidar_with("port: 2399"), file, std::filesystem::copy_options::overwrite_existing);
-  std::ofstream{file, std::ios::app} << "flat_ground: on\n";
-  const ProgramRun refused = ctl({"reload"});
-  EXPECT_EQ(refused.status, 1);
-  EXPECT_TRUE(contains(refused.err, "UDP port 2399")) << refused.err;
-  EXPECT_EQ(status()["lidars"]["front"]["port"], 2368);
-  EXPECT_EQ(status()["flat_ground"], "off");
-  ASSERT_EQ(ctl({"flat-ground", "auto"}).status, 0);
-  EXPECT_EQ(ctl({"reload"}).status, 1);
-  EXPECT_EQ(status()["flat_ground"], "auto");
-}
-
-/// Each costs more than the time to the next one.
-TEST_F(LifeCycle, ReloadsThatComeTooFastHoldUpNeitherAnswersNorTheEnd) {
-  Child daemon(locusd(config()));
-  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
-  std::atomic<bool> stopping{false};
-  std::thread pest([&] {
-    for (; !stopping; std::this_thread::sleep_for(milliseconds{20}))
-      daemon.signal(SIGHUP);
-  });
-  std::this_thread::sleep_for(seconds{1});
-  EXPECT_EQ(status()["state"], "waiting");
-  daemon.signal(SIGTERM);
-  EXPECT_TRUE(daemon.wait_for_line("stopped", seconds{3}));
-  stopping = true;
-  pest.join();
-  EXPECT_EQ(daemon.wait_for_exit(seconds{5}), 0);
-}
-
-/// Neither the new configuration nor the old one works: systemd is to start it again, from where the robot is.
-TEST_F(LifeCycle, ReloadThatFailsTwiceEndsTheServiceWithItsStateSaved) {
-  for (const bool by_signal : {false, true}) {
-    std::ofstream calibration{this->file("unit.yaml")};
-    calibration << "num_lasers: 16\nlasers:\n";
-    for (int laser = 0; laser < 16; ++laser)
-      calibration << fmt::format("- {{laser_id: {}, vert_correction: {}}}\n", laser, laser / 64.0);
-    calibration.close();
-    const std::filesystem::path file = config();
-    const std::string right = read_text(file);
-    std::filesystem::copy_file(lidar_with("calibration: " + this->file("unit.yaml").string()), file,
-                               std::filesystem::copy_options::overwrite_existing);
-    Child daemon(locusd(file));
-    ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
-    ASSERT_EQ(ctl({"reset", "--pose", "1,2,0,0,0,0"}).status, 0);
-    std::filesystem::remove(this->file("unit.yaml"));
-    const auto taken = UdpSocket::open(2399);
-    ASSERT_TRUE(taken) << taken.error();
-    std::filesystem::copy_file(lidar_with("port: 2399"), file, std::filesystem::copy_options::overwrite_existing);
-    for (int signal = 0; by_signal && signal < 50; ++signal, std::this_thread::sleep_for(milliseconds{5}))
-      daemon.signal(SIGHUP);
-    if (!by_signal) {
-      const ProgramRun reload = ctl({"reload"});
-      EXPECT_TRUE(contains(reload.err, "nor does the old configuration work any more")) << reload.err;
-    }
-    EXPECT_EQ(daemon.wait_for_exit(seconds{5}), 1) << by_signal;
-    const auto state = daemon::load_state(this->file("state"));
-    ASSERT_TRUE(state) << state.error();
-    EXPECT_EQ(state->last.T_odom_base.translation.y(), 2);
-    std::ofstream{file} << right;
-  }
 }
 
 TEST_F(LifeCycle, ResetWithoutLidarOutlivesAReloadAndARestart) {
@@ -334,16 +162,6 @@ TEST_F(LifeCycle, ResetBeforeTheFirstSweepIsNoDoubtAboutTheSavedState) {
   const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
   ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
   EXPECT_FALSE(daemon.wait_for_line("does not fit the saved state", {})) << testing::PrintToString(daemon.lines());
-}
-
-TEST_F(LifeCycle, SweepsThatAreShorterThanATurnAreSaidOnce) {
-  Child daemon(undisturbed(locusd(config("sweep_period_ms: 50\n"))));
-  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
-  const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
-  EXPECT_TRUE(daemon.wait_for_line("lidar front: turns in 100 ms, so a sweep of 50 ms sees a part", seconds{10}));
-  std::this_thread::sleep_for(seconds{1});
-  const auto lines = daemon.lines();
-  EXPECT_EQ(std::ranges::count_if(lines, [](const std::string& line) { return contains(line, "turns in 100 ms"); }), 1);
 }
 
 TEST_F(LifeCycle, MapIsThatOfTheMomentAlsoAfterOneThatNeverCame) {
@@ -410,24 +228,6 @@ TEST_F(LifeCycle, PortThatIsTakenEndsItWithStatusOne) {
   const ProgramRun second = run_program(LOCUSD, {"--config", config().string()});
   EXPECT_EQ(second.status, 1);
   EXPECT_NE(second.err.find("2368"), std::string::npos) << second.err;
-}
-
-/// Without the right to go beyond what the kernel allows to all, as systemd starts it.
-TEST_F(LifeCycle, BufferThatIsSmallerThanAskedForIsSaidWithTheSettingToChange) {
-  int allowed = UdpSocket::kWantedBufferBytes;
-  std::ifstream("/proc/sys/net/core/rmem_max") >> allowed;
-  if (allowed >= UdpSocket::kWantedBufferBytes)
-    GTEST_SKIP() << "this machine gives all that is asked for";
-  std::vector<std::string> command = locusd(config());
-  if (geteuid() == 0)
-    command.insert(command.begin(), {"/usr/bin/setpriv", "--bounding-set", "-net_admin"});
-  Child daemon(command);
-  EXPECT_TRUE(
-      daemon.wait_for_line(fmt::format("the kernel gives lidar sockets {} bytes of the 8388608 asked for: packets "
-                                       "will be lost under load; sysctl net.core.rmem_max=8388608",
-                                       allowed),
-                           seconds{5}))
-      << testing::PrintToString(daemon.lines());
 }
 
 /// The cable of the lidar is pulled for 12 s: odometry goes on at its pace, dead-reckoned, and finds back.

@@ -74,6 +74,17 @@ std::filesystem::path RobotNetwork::config(const std::string& more) const {
   return path;
 }
 
+std::filesystem::path RobotNetwork::lidar_with(const std::string& key_and_value) const {
+  std::string text = read_text(capture() / "config.yaml");
+  const std::string name = "name: front", key = key_and_value.substr(0, key_and_value.find(' '));
+  if (const std::size_t at = text.find(key, text.find(name)); at != std::string::npos)
+    text.replace(at, text.find_first_of(",}\n", at) - at, key_and_value);
+  else
+    text.replace(text.find(name), name.size(), name + ", " + key_and_value);
+  std::ofstream{file("wrong.yaml")} << text;
+  return file("wrong.yaml");
+}
+
 std::uint64_t datagrams_in(const std::filesystem::path& file) {
   auto capture = Capture::open(file);
   std::uint64_t count = 0;

@@ -30,6 +30,8 @@ class RobotNetwork : public testing::Test {
   [[nodiscard]] std::filesystem::path file(const std::string& name) const { return folder_ / name; }
   /// Of the capture, with more lines of YAML.
   [[nodiscard]] std::filesystem::path config(const std::string& more = "") const;
+  /// Of the capture, with another value of a key of the lidar.
+  [[nodiscard]] std::filesystem::path lidar_with(const std::string& key_and_value) const;
 
   [[nodiscard]] static std::vector<std::string> locusd(const std::filesystem::path& config) {
     return {LOCUSD, "--config", config.string()};

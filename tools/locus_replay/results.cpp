@@ -69,8 +69,8 @@ std::vector<std::string> source_verdicts(const Config& config, const MotionSourc
 Results::Results(const Arguments& arguments, const Config& config, const Recording& recording, Truth truth,
                  const daemon::MachineTime& begin)
     : arguments_(arguments), config_(config), recording_(recording), begin_(begin),
-      odometry_(made(arguments.output), config.odometry.motion_sources),
-      figures_(config.odometry.motion_sources.size()), truth_(std::move(truth)), progress_(!arguments.quiet) {}
+      odometry_(made(arguments.output), config.odometry.motion_sources), truth_(std::move(truth)),
+      progress_(!arguments.quiet) {}
 
 void Results::take(const daemon::ProcessedSweep& sweep) {
   odometry_.write(sweep.estimate);

@@ -36,7 +36,7 @@ ordered_json sources(const FinishedRun& run) {
   ordered_json sources = ordered_json::object();
   for (std::size_t i = 0; i < run.config.odometry.motion_sources.size(); ++i) {
     ordered_json& source = sources[run.config.odometry.motion_sources[i].name];
-    source = to_json(run.ingest.sources().counters(i), run.figures.used_sweeps(i));
+    source = to_json(run.ingest.sources().counters(i), run.figures.sums().used_sweeps[i]);
     if (const std::string_view verdict = run.ingest.sources().verdict(i); !verdict.empty())
       source["verdict"] = verdict;
   }
@@ -112,21 +112,7 @@ void RunFigures::take(const daemon::ProcessedSweep& sweep) {
   last_T_odom_base_ = estimate.T_odom_base;
   wall_ms_.push_back(static_cast<float>(1e3 * to_seconds(sweep.took.wall)));
   cpu_ms_.push_back(static_cast<float>(1e3 * to_seconds(sweep.took.cpu)));
-  sums_.raw_points += static_cast<double>(sweep.raw_returns);
-  sums_.filtered_points += static_cast<double>(estimate.points);
-  sums_.scan_to_scan_iterations += estimate.scan_to_scan.iterations;
-  sums_.scan_to_submap_iterations += estimate.scan_to_submap.iterations;
-  const PriorSource& prior = estimate.prior;
-  if (prior.rotation >= 0)
-    ++used_sweeps_[static_cast<std::size_t>(prior.rotation)];
-  if (prior.translation >= 0 && prior.translation != prior.rotation)
-    ++used_sweeps_[static_cast<std::size_t>(prior.translation)];
-}
-
-RunFigures::Means RunFigures::means() const {
-  const double count = std::max<double>(1.0, static_cast<double>(sweeps()));
-  return {sums_.raw_points / count, sums_.filtered_points / count, sums_.scan_to_scan_iterations / count,
-          sums_.scan_to_submap_iterations / count};
+  sums_.add(sweep);
 }
 
 daemon::Percentiles RunFigures::percentiles(std::span<const float> values) {
@@ -135,27 +121,23 @@ daemon::Percentiles RunFigures::percentiles(std::span<const float> values) {
 }
 
 ordered_json summary(const FinishedRun& run) {
-  const RunFigures::Means means = run.figures.means();
-  ordered_json json{
-      {"version", LOCUS_VERSION},
-      {"capture", run.capture},
-      {"config_sha256", config_sha256(run.config)},
-      {"threads", run.config.odometry.threads},
-      {"isa", std::string(to_string(run.config.odometry.isa))},
-      {"duration_s", rounded(to_seconds(run.duration))},
-      {"wall_s", rounded(to_seconds(run.spent.wall))},
-      {"cpu_s", rounded(to_seconds(run.spent.cpu))},
-      {"peak_rss_mb", rounded(daemon::peak_rss_mb())},
-      {"packets", packets(run.ingest.lidars())},
-      {"sweeps", to_json(run.sweeps)},
-      {"process_ms", to_json(run.figures.process_ms())},
-      {"process_cpu_ms", to_json(run.figures.process_cpu_ms())},
-      {"stage_ms", stages(run)},
-      {"points", {{"raw_mean", rounded(means.raw_points)}, {"filtered_mean", rounded(means.filtered_points)}}},
-      {"iterations_mean",
-       {{"scan_to_scan", rounded(means.scan_to_scan_iterations)},
-        {"scan_to_submap", rounded(means.scan_to_submap_iterations)}}},
-      {"sources", sources(run)}};
+  ordered_json json{{"version", LOCUS_VERSION},
+                    {"capture", run.capture},
+                    {"config_sha256", config_sha256(run.config)},
+                    {"threads", run.config.odometry.threads},
+                    {"isa", std::string(to_string(run.config.odometry.isa))},
+                    {"duration_s", rounded(to_seconds(run.duration))},
+                    {"wall_s", rounded(to_seconds(run.spent.wall))},
+                    {"cpu_s", rounded(to_seconds(run.spent.cpu))},
+                    {"peak_rss_mb", rounded(daemon::peak_rss_mb())},
+                    {"packets", packets(run.ingest.lidars())},
+                    {"sweeps", to_json(run.sweeps)},
+                    {"process_ms", to_json(run.figures.process_ms())},
+                    {"process_cpu_ms", to_json(run.figures.process_cpu_ms())},
+                    {"stage_ms", stages(run)},
+                    {"points", points_json(run.figures.sums())},
+                    {"iterations_mean", iterations_json(run.figures.sums())},
+                    {"sources", sources(run)}};
   add_accuracy(run.accuracy, json);
   return json;
 }
@@ -172,7 +154,7 @@ std::string readable(const FinishedRun& run) {
   for (std::size_t i = 0; i < run.config.odometry.motion_sources.size(); ++i) {
     if (const auto received = run.ingest.sources().counters(i).received; received > 0)
       text += fmt::format("{:10} {} samples, used for {} sweeps{}\n", run.config.odometry.motion_sources[i].name,
-                          received, run.figures.used_sweeps(i), readable_health(run, i));
+                          received, run.figures.sums().used_sweeps[i], readable_health(run, i));
   }
   text += fmt::format("path       {:.2f} m, ends at {:.3f} {:.3f} {:.3f} m\n", run.figures.path_m(), end_m.x(),
                       end_m.y(), end_m.z());

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -23,21 +22,13 @@ namespace locus::tools {
 /// Gathers what is told of every sweep of a run: a few bytes for each.
 class RunFigures {
  public:
-  struct Means {
-    double raw_points = 0, filtered_points = 0, scan_to_scan_iterations = 0, scan_to_submap_iterations = 0;
-  };
-
-  explicit RunFigures(std::size_t sources) : used_sweeps_(sources) {}
-
   void take(const daemon::ProcessedSweep& sweep);
   void take(const HealthEvent& event) { health_events_.push_back(event); }
 
   [[nodiscard]] std::size_t sweeps() const { return wall_ms_.size(); }
   [[nodiscard]] daemon::Percentiles process_ms() const { return percentiles(wall_ms_); }
   [[nodiscard]] daemon::Percentiles process_cpu_ms() const { return percentiles(cpu_ms_); }
-  [[nodiscard]] Means means() const;
-  /// Sweeps whose prior came from this source, all of it or in part.
-  [[nodiscard]] std::uint64_t used_sweeps(std::size_t source) const { return used_sweeps_[source]; }
+  [[nodiscard]] const daemon::SweepSums& sums() const { return sums_; }
   /// In the order in which they happened.
   [[nodiscard]] const std::vector<HealthEvent>& health_events() const { return health_events_; }
   [[nodiscard]] double path_m() const { return path_m_; }
@@ -47,9 +38,8 @@ class RunFigures {
   static daemon::Percentiles percentiles(std::span<const float> values);
 
   std::vector<float> wall_ms_, cpu_ms_;
-  std::vector<std::uint64_t> used_sweeps_;
   std::vector<HealthEvent> health_events_;
-  Means sums_;
+  daemon::SweepSums sums_;
   double path_m_ = 0;
   Pose last_T_odom_base_;
 };

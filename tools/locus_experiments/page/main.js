@@ -3,7 +3,7 @@
 // out, and one that fails says why and stops no other.
 import {select} from "d3-selection";
 
-import {note} from "../../locus_replay/report/drawing.js";
+import {note, onNewWidth} from "../../locus_replay/report/drawing.js";
 import {duration} from "../../locus_replay/report/format.js";
 import {ablation, ablationTable} from "./ablation.js";
 import {accuracyTable, boxes} from "./accuracy.js";
@@ -52,10 +52,4 @@ function draw() {
 
 heading();
 draw();
-
-let drawn_width = window.innerWidth;
-window.addEventListener("resize", () => {
-  if (window.innerWidth === drawn_width) return; // a phone's address bar comes and goes
-  drawn_width = window.innerWidth;
-  draw();
-});
+onNewWidth(draw);

@@ -14,6 +14,16 @@ export function canvasOf(figure, width, height, description) {
       .attr("aria-label", description);
 }
 
+/** Draws anew when the page is wider or narrower than before. */
+export function onNewWidth(draw) {
+  let drawn_width = window.innerWidth;
+  window.addEventListener("resize", () => {
+    if (window.innerWidth === drawn_width) return;  // a phone's address bar comes and goes
+    drawn_width = window.innerWidth;
+    draw();
+  });
+}
+
 const withMinus = (format) => (value) => format(value).replace("-", "−");
 
 /** An axis along the bottom of a field, with a grid as tall as the field. */

@@ -4,7 +4,7 @@
 import {select} from "d3-selection";
 
 import {boxes} from "./boxes.js";
-import {note} from "./drawing.js";
+import {note, onNewWidth} from "./drawing.js";
 import {heading} from "./heading.js";
 import {mapView} from "./map_view.js";
 import {plan, side} from "./projection.js";
@@ -49,11 +49,5 @@ function drawFigures() {
 heading();
 draw(kTables);
 drawFigures();
-
-let drawn_width = window.innerWidth;
-window.addEventListener("resize", () => {
-  if (window.innerWidth === drawn_width) return;  // a phone's address bar comes and goes
-  drawn_width = window.innerWidth;
-  drawFigures();
-});
+onNewWidth(drawFigures);
 window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawFigures);

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <thread>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "drivers/motion_files.hpp"
+#include "drivers/udp_socket.hpp"
+#include "service/robot_network.hpp"
+#include "service/undisturbed.hpp"
+#include "support/errors.hpp"
+
+namespace locus::test {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+/// What is wrong with the sensors, the network and the machine is said by the service itself.
+class Diagnosis : public RobotNetwork {};
+
+TEST_F(Diagnosis, SensorsThatAreNotHeardAreNamedWithTheInterfaceOfDds) {
+  Child daemon(undisturbed(locusd(config())));
+  EXPECT_TRUE(daemon.wait_for_line("motion source wio: not heard", seconds{7}));
+  EXPECT_TRUE(daemon.wait_for_line("nobody is seen that publishes /wheel_odometry; DDS listens on interface lo",
+                                   milliseconds{10}));
+  EXPECT_TRUE(daemon.wait_for_line("lidar front: no data packet on UDP port 2368", seconds{1}));
+  EXPECT_EQ(status()["state"], "waiting");
+  Child play(undisturbed({LOCUS_PLAY, capture().string()})); // switched on at last
+  EXPECT_TRUE(daemon.wait_for_line("tracking", seconds{8}));
+}
+
+/// What is said changes with what is found: at first nothing comes.
+TEST_F(Diagnosis, LidarOfAnotherAddressIsNamedWithBoth) {
+  const std::filesystem::path wrong = lidar_with("source_ip: 192.168.1.77");
+  Child daemon(undisturbed(locusd(wrong)));
+  ASSERT_TRUE(daemon.wait_for_line("lidar front: no data packet on UDP port 2368 for 5 s; look at its power and cable",
+                                   seconds{8}));
+  const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+  EXPECT_TRUE(daemon.wait_for_line("; packets come from 127.0.0.1, configured is 192.168.1.77: set "
+                                   "lidars.front.source_ip to that of the lidar",
+                                   seconds{5}))
+      << testing::PrintToString(daemon.lines());
+  const std::string shown = ctl({"status"}).out;
+  EXPECT_NE(shown.find("refused: sender "), std::string::npos) << shown;
+  EXPECT_NE(shown.find("the last sender: 127.0.0.1"), std::string::npos) << shown;
+}
+
+TEST_F(Diagnosis, LidarOnAnotherPortIsToldByItsPositionPackets) {
+  const std::filesystem::path wrong = lidar_with("port: 2390");
+  Child daemon(undisturbed(locusd(wrong)));
+  const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+  EXPECT_TRUE(
+      daemon.wait_for_line("lidar front: no data packet on UDP port 2390 for 5 s; its position packets come, so "
+                           "it is on and sends the others elsewhere: locusctl sensors tells to which port",
+                           seconds{8}))
+      << testing::PrintToString(daemon.lines());
+}
+
+TEST_F(Diagnosis, AccelerationsInGAreNamed) {
+  const std::filesystem::path drive = file("in_g");
+  std::filesystem::copy(capture(), drive);
+  auto samples = MotionSamples<ImuSample>::open((capture() / "imu.csv").string());
+  ASSERT_TRUE(samples) << samples.error();
+  std::ofstream imu(drive / "imu.csv");
+  for (const ImuSample& sample : samples->drain()) {
+    imu << sample.stamp.time_since_epoch().count();
+    for (const Eigen::Vector3d& axes :
+         {sample.angular_velocity_radps, Eigen::Vector3d(sample.specific_force_mps2 / 9.80665)})
+      imu << ',' << axes.x() << ',' << axes.y() << ',' << axes.z();
+    imu << '\n';
+  }
+  imu.close();
+  Child daemon(undisturbed(locusd(config())));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const Child play(undisturbed({LOCUS_PLAY, drive.string()}));
+  EXPECT_TRUE(daemon.wait_for_line("motion source imu reports accelerations in g", seconds{15}))
+      << testing::PrintToString(daemon.lines());
+  EXPECT_NE(ctl({"status"}).out.find("reports accelerations in g"), std::string::npos);
+}
+
+TEST_F(Diagnosis, SweepsThatAreDroppedAreSaidWithTheReason) {
+  Child daemon(undisturbed(locusd(config())));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+  ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+  const Child hang({HANG_THREAD, std::to_string(daemon.pid()), "odometry"});
+  EXPECT_TRUE(daemon.wait_for_line("this computer is too busy: ", seconds{12}))
+      << testing::PrintToString(daemon.lines());
+}
+
+TEST_F(Diagnosis, SweepsThatAreShorterThanATurnAreSaidOnce) {
+  Child daemon(undisturbed(locusd(config("sweep_period_ms: 50\n"))));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+  EXPECT_TRUE(daemon.wait_for_line("lidar front: turns in 100 ms, so a sweep of 50 ms sees a part", seconds{10}));
+  std::this_thread::sleep_for(seconds{1});
+  const auto lines = daemon.lines();
+  EXPECT_EQ(std::ranges::count_if(lines, [](const std::string& line) { return contains(line, "turns in 100 ms"); }), 1);
+}
+
+/// Without the right to go beyond what the kernel allows to all, as systemd starts it.
+TEST_F(Diagnosis, BufferThatIsSmallerThanAskedForIsSaidWithTheSettingToChange) {
+  int allowed = UdpSocket::kWantedBufferBytes;
+  std::ifstream("/proc/sys/net/core/rmem_max") >> allowed;
+  if (allowed >= UdpSocket::kWantedBufferBytes)
+    GTEST_SKIP() << "this machine gives all that is asked for";
+  std::vector<std::string> command = locusd(config());
+  if (geteuid() == 0)
+    command.insert(command.begin(), {"/usr/bin/setpriv", "--bounding-set", "-net_admin"});
+  Child daemon(command);
+  EXPECT_TRUE(
+      daemon.wait_for_line(fmt::format("the kernel gives lidar sockets {} bytes of the 8388608 asked for: packets "
+                                       "will be lost under load; sysctl net.core.rmem_max=8388608",
+                                       allowed),
+                           seconds{5}))
+      << testing::PrintToString(daemon.lines());
+}
+
+} // namespace
+} // namespace locus::test
