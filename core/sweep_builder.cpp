@@ -16,7 +16,10 @@ constexpr Duration kDefaultPeriod = std::chrono::milliseconds{100};
 
 /// A gap longer than this is a jump of the clock or a new start, not a run of empty windows.
 constexpr Duration kMaxPause = std::chrono::seconds{60};
+
+/// So many late packets in a row, and for so long: what a network held up comes late, too, but then all at once.
 constexpr std::uint64_t kLatePacketsToRestart = 500;
+constexpr Duration kLateToRestart = std::chrono::milliseconds{500};
 
 constexpr std::size_t kReturnsPerSegmentPoint = 4; ///< room for what the leaf has not learned yet
 
@@ -82,15 +85,15 @@ void SweepBuilder::add(const LidarPacket& packet, Stamp arrival) {
   const StageScope scope(clock_, Stage::correct);
   revolution_.observe(packet);
   lag_ = std::max(Duration::zero(), arrival - packet.stamp);
-  if (window_ && packet.stamp < window_->start - kMaxLateness) {
+  const bool late = window_ && packet.stamp < window_->start - kMaxLateness;
+  if (late) {
     ++counters_.late_packets;
-    if (++consecutive_late_ < kLatePacketsToRestart)
+    late_since_ = consecutive_late_ == 0 ? arrival : std::min(late_since_, arrival);
+    if (++consecutive_late_ < kLatePacketsToRestart || arrival - late_since_ < kLateToRestart)
       return;
   }
-  const bool jumped =
-      window_ && (consecutive_late_ >= kLatePacketsToRestart || packet.stamp > window_->end + kMaxPause);
   consecutive_late_ = 0;
-  if (jumped) {
+  if (late || (window_ && packet.stamp > window_->end + kMaxPause)) {
     close();
     window_.reset();
     ++counters_.restarts;

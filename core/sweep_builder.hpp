@@ -120,6 +120,7 @@ class SweepBuilder {
   std::vector<SweepPoint> unregistered_;
   Duration lag_{}; ///< of arrival behind firing, as last seen
   std::uint64_t consecutive_late_ = 0;
+  Stamp late_since_; ///< arrival of the first of them
   Counters counters_;
 };
 

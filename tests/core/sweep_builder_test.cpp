@@ -253,6 +253,24 @@ TEST(SweepBuilder, TimeThatRanBackwardsIsANewStart) {
   EXPECT_GT(built.sweeps.back().points.size(), 25'000U);
 }
 
+/// By a network that stood still, while other sensors told the time.
+TEST(SweepBuilder, PacketsThatWereHeldUpAndComeAllAtOnceAreNoNewStart) {
+  NumberedLidar lidar;
+  Built built;
+  built.play(lidar, seconds{1});
+  const Stamp released = lidar.next() + milliseconds{950};
+  for (Stamp now = lidar.next(); now < released; now += milliseconds{10})
+    built.builder.advance(now);
+  while (lidar.next() < released)
+    built.builder.add(lidar.packet(), released);
+  built.play(lidar, seconds{1});
+  EXPECT_GT(built.builder.counters().late_packets, 600U);
+  EXPECT_EQ(built.builder.counters().restarts, 0U);
+  for (std::size_t i = 1; i < built.sweeps.size(); ++i)
+    ASSERT_EQ(built.sweeps[i].start, built.sweeps[i - 1].end);
+  EXPECT_GT(built.sweeps.back().points.size(), 25'000U);
+}
+
 TEST(SweepBuilder, AJumpForwardByAnHourIsNoRunOfEmptyWindows) {
   NumberedLidar lidar;
   Built built;
