@@ -89,6 +89,7 @@ class FrozenOdometry : public HealthMetric {
   std::optional<HealthReason> judge(const SourceReading& reading) override {
     if (!last_ || reading.odometry->T_source_base != *last_) {
       frozen_ = false;
+      lidar_sees_way_.setZero();
       return std::nullopt;
     }
     if (reading.stamp < changed_at_) { // a clock was set back: how long it has stood is not known
@@ -97,7 +98,7 @@ class FrozenOdometry : public HealthMetric {
     }
     constexpr Duration kLidarLags = std::chrono::milliseconds{300}; ///< and goes on seeing what has ended
     const Duration unchanged = reading.stamp - changed_at_;
-    frozen_ = frozen_ || cannot_stop_within(unchanged) || (lidar_sees_motion_ && unchanged > kLidarLags);
+    frozen_ = frozen_ || cannot_stop_within(unchanged) || (unchanged > kLidarLags && lidar_sees_it_move());
     return reason_if(frozen_, HealthReason::frozen);
   }
 
@@ -112,13 +113,24 @@ class FrozenOdometry : public HealthMetric {
   }
 
   std::optional<HealthReason> hear(LidarOpinion, const RegistrationFeedback& feedback) override {
-    constexpr double kMoves_mps = 0.2, kTurns_radps = 0.2;
     const Vector6& twist = feedback.twist_base;
-    lidar_sees_motion_ = twist.head<3>().norm() > kMoves_mps || twist.tail<3>().norm() > kTurns_radps;
+    if (twist.head<3>().norm() > kMoves_mps || twist.tail<3>().norm() > kTurns_radps)
+      lidar_sees_way_ += to_seconds(feedback.to - feedback.from) * twist;
+    else
+      lidar_sees_way_.setZero();
     return std::nullopt;
   }
 
  private:
+  static constexpr double kMoves_mps = 0.2, kTurns_radps = 0.2;
+
+  /// Farther than a sweep or two that a wrong gyro shook.
+  [[nodiscard]] bool lidar_sees_it_move() const {
+    constexpr double kFor_s = 0.3;
+    return lidar_sees_way_.head<3>().norm() > kFor_s * kMoves_mps ||
+           lidar_sees_way_.tail<3>().norm() > kFor_s * kTurns_radps;
+  }
+
   [[nodiscard]] bool cannot_stop_within(Duration duration) const {
     constexpr double kHardest_mps2 = 10.0, kHardest_radps2 = 20.0;
     const double duration_s = to_seconds(duration);
@@ -130,7 +142,7 @@ class FrozenOdometry : public HealthMetric {
   Stamp changed_at_;
   Vector6 twist_ = Vector6::Zero(); ///< until then
   bool frozen_ = false;
-  bool lidar_sees_motion_ = false;
+  Vector6 lidar_sees_way_ = Vector6::Zero(); ///< m and rad, while it sees motion without a pause, since the last change
 };
 
 /// A turn rate that no robot has.

@@ -233,12 +233,23 @@ TEST_F(WheelsTest, ThatStandAreNotFrozen) {
 
 TEST_F(WheelsTest, ThatStandWhileLidarSeesMotionAreFrozen) {
   brake_and_stand(seconds{2});
-  RegistrationFeedback moving;
+  RegistrationFeedback moving{now_ - milliseconds{200}, now_};
   moving.twist_base.x() = 0.5;
   monitor_.hear(LidarOpinion::none, moving, now_);
   begin_fault();
   brake_and_stand(seconds{1});
   expect_lost(HealthReason::frozen, kDetected);
+}
+
+TEST_F(WheelsTest, ThatStandWhileLidarIsShakenAreNotFrozen) {
+  brake_and_stand(seconds{2});
+  for (int sweep = 0; sweep < 20; ++sweep) {
+    RegistrationFeedback shaken{now_, now_ + milliseconds{100}};
+    shaken.twist_base.x() = sweep % 2 == 0 ? 0.5 : -0.5;
+    brake_and_stand(milliseconds{100});
+    monitor_.hear(LidarOpinion::none, shaken, now_);
+  }
+  EXPECT_EQ(left_out(HealthReason::frozen), 0U);
 }
 
 TEST_F(WheelsTest, ThatJumpLoseTheirHealthUntilTheyGoOnFromThere) {
