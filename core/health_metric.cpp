@@ -113,22 +113,19 @@ class FrozenOdometry : public HealthMetric {
   }
 
   std::optional<HealthReason> hear(LidarOpinion, const RegistrationFeedback& feedback) override {
-    const Vector6& twist = feedback.twist_base;
-    if (twist.head<3>().norm() > kMoves_mps || twist.tail<3>().norm() > kTurns_radps)
-      lidar_sees_way_ += to_seconds(feedback.to - feedback.from) * twist;
-    else
-      lidar_sees_way_.setZero();
+    lidar_sees_twist_ = feedback.twist_base;
+    lidar_sees_way_ += to_seconds(feedback.to - feedback.from) * feedback.twist_base;
     return std::nullopt;
   }
 
  private:
-  static constexpr double kMoves_mps = 0.2, kTurns_radps = 0.2;
-
-  /// Farther than a sweep or two that a wrong gyro shook.
+  /// Moving, and farther than a wrong gyro shakes a sweep or two.
   [[nodiscard]] bool lidar_sees_it_move() const {
-    constexpr double kFor_s = 0.3;
-    return lidar_sees_way_.head<3>().norm() > kFor_s * kMoves_mps ||
-           lidar_sees_way_.tail<3>().norm() > kFor_s * kTurns_radps;
+    constexpr double kMoves_mps = 0.2, kTurns_radps = 0.2, kFor_s = 0.3;
+    return (lidar_sees_twist_.head<3>().norm() > kMoves_mps &&
+            lidar_sees_way_.head<3>().norm() > kFor_s * kMoves_mps) ||
+           (lidar_sees_twist_.tail<3>().norm() > kTurns_radps &&
+            lidar_sees_way_.tail<3>().norm() > kFor_s * kTurns_radps);
   }
 
   [[nodiscard]] bool cannot_stop_within(Duration duration) const {
@@ -142,7 +139,8 @@ class FrozenOdometry : public HealthMetric {
   Stamp changed_at_;
   Vector6 twist_ = Vector6::Zero(); ///< until then
   bool frozen_ = false;
-  Vector6 lidar_sees_way_ = Vector6::Zero(); ///< m and rad, while it sees motion without a pause, since the last change
+  Vector6 lidar_sees_twist_ = Vector6::Zero();
+  Vector6 lidar_sees_way_ = Vector6::Zero(); ///< m and rad, since the last change
 };
 
 /// A turn rate that no robot has.
