@@ -14,6 +14,7 @@ constexpr Duration kReorderWindow = milliseconds{100}; ///< a packet later than 
 constexpr Duration kMaxEarly = milliseconds{20};       ///< ahead of the envelope
 constexpr Duration kMaxLate = std::chrono::seconds{1}; ///< behind it: no network holds packets for longer
 constexpr int kMaxReplaySpeed = 10; ///< sensor time per time of reception, where only `sensor` counts
+constexpr int kMaxBurstSpeed = 2;   ///< the same, of what comes at its own pace but for jitter
 constexpr int kProofOfStep = 5;
 
 constexpr Duration kEnvelopeSpan = milliseconds{500};
@@ -38,7 +39,7 @@ Duration nearest_hour(Duration time, Duration target) {
 std::optional<SensorClock::Reading> SensorClock::read(Duration time_of_hour, Duration until_sent, Stamp receive) {
   const Duration sensor_time = anchored_ ? unwrap(time_of_hour, receive) : time_of_hour;
   if (!anchored_ || !follows(sensor_time, until_sent, receive)) {
-    if (anchored_ && !proves_step(time_of_hour))
+    if (anchored_ && !proves_step(time_of_hour, receive))
       return std::nullopt;
     steps_ += anchored_ ? 1 : 0;
     anchor(time_of_hour, until_sent, receive);
@@ -82,13 +83,18 @@ bool SensorClock::follows(Duration sensor_time, Duration until_sent, Stamp recei
   return lateness >= -kMaxEarly && lateness <= kMaxLate;
 }
 
-/// Whether the refused times, this one included, tell the same story often enough to be believed.
-bool SensorClock::proves_step(Duration time_of_hour) {
+/// Whether the refused times, this one included, tell the same story often enough to be believed. Packets that a
+/// network held up and sends all at once follow from each other, too, but not at the pace of a clock.
+bool SensorClock::proves_step(Duration time_of_hour, Stamp receive) {
   const Duration advance = nearest_hour(time_of_hour - suspect_time_of_hour_, Duration{});
-  const bool goes_on = suspects_ > 0 && advance > Duration{} && advance <= kReorderWindow;
-  suspects_ = goes_on ? suspects_ + 1 : 1;
+  const bool goes_on =
+      suspects_ > 0 && advance > Duration{} && advance <= kReorderWindow && receive >= suspected_since_;
+  suspects_ = goes_on ? std::min(suspects_ + 1, kProofOfStep) : 1;
+  suspected_since_ = goes_on ? suspected_since_ : receive;
+  suspected_for_ = goes_on ? suspected_for_ + advance : Duration{};
   suspect_time_of_hour_ = time_of_hour;
-  return suspects_ == kProofOfStep;
+  const int fastest = mode_ == LidarTime::sensor ? kMaxReplaySpeed : kMaxBurstSpeed;
+  return suspects_ == kProofOfStep && suspected_for_ / fastest <= receive - suspected_since_;
 }
 
 /// Moves the offset towards the envelope, unless it is known better. Precondition: sensor_time > latest_.

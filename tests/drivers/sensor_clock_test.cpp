@@ -210,6 +210,40 @@ TEST(SensorClock, SetClockIsAStepThatIsSurvived) {
   }
 }
 
+TEST(SensorClock, PacketsHeldUpForSecondsThatComeAllAtOnceAreNoStep) {
+  for (const Duration held_up : {Duration{milliseconds{1500}}, Duration{seconds{5}}}) {
+    SensorClock clock{LidarTime::receive};
+    Link link;
+    for (int i = 0; i < 2000; ++i)
+      link.send(clock);
+    const Stamp released = link.now + held_up;
+    int refused = 0;
+    for (int i = 0; link.now < released; ++i) {
+      const auto error = link.send(clock, released - link.now + i * microseconds{10});
+      refused += error ? 0 : 1;
+      EXPECT_LT(std::chrono::abs(error.value_or(Duration{})), microseconds{150});
+    }
+    EXPECT_NEAR(refused, to_seconds(held_up - seconds{1}) / to_seconds(kPacket), 30.0)
+        << "those that are later than a network ever is";
+    ASSERT_TRUE(link.send(clock));
+    EXPECT_EQ(clock.steps(), 0U);
+  }
+}
+
+TEST(SensorClock, StartAmidPacketsThatComeAllAtOnceIsMendedOnceTheyComeInTime) {
+  SensorClock clock{LidarTime::receive};
+  Link link;
+  const Stamp released = link.now + seconds{2};
+  while (link.now < released)
+    link.send(clock, released - link.now);
+  for (int i = 0; i < 3000; ++i)
+    link.send(clock);
+  EXPECT_EQ(clock.steps(), 1U);
+  const auto error = link.send(clock);
+  ASSERT_TRUE(error);
+  EXPECT_LT(std::chrono::abs(*error), microseconds{150});
+}
+
 TEST(SensorClock, LoneWrongTimesAreRefusedAndChangeNothing) {
   SensorClock clock{LidarTime::receive};
   Link link;
