@@ -89,6 +89,7 @@ class FrozenOdometry : public HealthMetric {
   std::optional<HealthReason> judge(const SourceReading& reading) override {
     if (!last_ || reading.odometry->T_source_base != *last_) {
       frozen_ = false;
+      lidar_sees_twist_.setZero();
       lidar_sees_way_.setZero();
       return std::nullopt;
     }
@@ -96,9 +97,7 @@ class FrozenOdometry : public HealthMetric {
       changed_at_ = reading.stamp;
       twist_.setZero();
     }
-    constexpr Duration kLidarLags = std::chrono::milliseconds{300}; ///< and goes on seeing what has ended
-    const Duration unchanged = reading.stamp - changed_at_;
-    frozen_ = frozen_ || cannot_stop_within(unchanged) || (unchanged > kLidarLags && lidar_sees_it_move());
+    frozen_ = frozen_ || cannot_stop_within(reading.stamp - changed_at_) || lidar_sees_it_move();
     return reason_if(frozen_, HealthReason::frozen);
   }
 
@@ -113,6 +112,8 @@ class FrozenOdometry : public HealthMetric {
   }
 
   std::optional<HealthReason> hear(LidarOpinion, const RegistrationFeedback& feedback) override {
+    if (feedback.from < changed_at_)
+      return std::nullopt;
     lidar_sees_twist_ = feedback.twist_base;
     lidar_sees_way_ += to_seconds(feedback.to - feedback.from) * feedback.twist_base;
     return std::nullopt;

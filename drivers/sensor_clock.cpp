@@ -14,7 +14,7 @@ constexpr Duration kReorderWindow = milliseconds{100}; ///< a packet later than 
 constexpr Duration kMaxEarly = milliseconds{20};       ///< ahead of the envelope
 constexpr Duration kMaxLate = std::chrono::seconds{1}; ///< behind it: no network holds packets for longer
 constexpr int kMaxReplaySpeed = 10; ///< sensor time per time of reception, where only `sensor` counts
-constexpr int kMaxBurstSpeed = 2;   ///< the same, of what comes at its own pace but for jitter
+constexpr int kMaxLiveSpeed = 2;    ///< the same, of packets that no network holds up
 constexpr int kProofOfStep = 5;
 
 constexpr Duration kEnvelopeSpan = milliseconds{500};
@@ -39,7 +39,8 @@ Duration nearest_hour(Duration time, Duration target) {
 std::optional<SensorClock::Reading> SensorClock::read(Duration time_of_hour, Duration until_sent, Stamp receive) {
   const Duration sensor_time = anchored_ ? unwrap(time_of_hour, receive) : time_of_hour;
   if (!anchored_ || !follows(sensor_time, until_sent, receive)) {
-    if (anchored_ && !proves_step(time_of_hour, receive))
+    const bool late = mode_ != LidarTime::sensor && lateness(sensor_time, until_sent, receive) > kMaxLate;
+    if (anchored_ && !proves_step(time_of_hour, receive, late))
       return std::nullopt;
     steps_ += anchored_ ? 1 : 0;
     anchor(time_of_hour, until_sent, receive);
@@ -79,22 +80,26 @@ bool SensorClock::follows(Duration sensor_time, Duration until_sent, Stamp recei
   const Duration advance = sensor_time - latest_;
   if (mode_ == LidarTime::sensor)
     return advance <= kReorderWindow || advance / kMaxReplaySpeed <= receive - latest_receive_;
-  const Duration lateness = receive.time_since_epoch() - until_sent - offset_ - sensor_time;
-  return lateness >= -kMaxEarly && lateness <= kMaxLate;
+  const Duration late_by = lateness(sensor_time, until_sent, receive);
+  return late_by >= -kMaxEarly && late_by <= kMaxLate;
 }
 
-/// Whether the refused times, this one included, tell the same story often enough to be believed. Packets that a
-/// network held up and sends all at once follow from each other, too, but not at the pace of a clock.
-bool SensorClock::proves_step(Duration time_of_hour, Stamp receive) {
+Duration SensorClock::lateness(Duration sensor_time, Duration until_sent, Stamp receive) const {
+  return receive.time_since_epoch() - until_sent - offset_ - sensor_time;
+}
+
+/// Whether the refused times, this one included, tell the same story often enough to be believed. Late packets that a
+/// network held up and sends all at once tell one, too, but faster than a clock runs.
+bool SensorClock::proves_step(Duration time_of_hour, Stamp receive, bool late) {
   const Duration advance = nearest_hour(time_of_hour - suspect_time_of_hour_, Duration{});
-  const bool goes_on =
-      suspects_ > 0 && advance > Duration{} && advance <= kReorderWindow && receive >= suspected_since_;
+  const bool goes_on = suspects_ > 0 && advance > Duration{} && advance <= kReorderWindow;
+  const Duration passed = std::clamp(receive - suspect_receive_, Duration{}, kReorderWindow);
+  const Duration ahead = suspects_ahead_ + advance - kMaxLiveSpeed * passed;
   suspects_ = goes_on ? std::min(suspects_ + 1, kProofOfStep) : 1;
-  suspected_since_ = goes_on ? suspected_since_ : receive;
-  suspected_for_ = goes_on ? suspected_for_ + advance : Duration{};
+  suspects_ahead_ = goes_on ? std::clamp(ahead, Duration{}, kReorderWindow) : Duration{};
   suspect_time_of_hour_ = time_of_hour;
-  const int fastest = mode_ == LidarTime::sensor ? kMaxReplaySpeed : kMaxBurstSpeed;
-  return suspects_ == kProofOfStep && suspected_for_ / fastest <= receive - suspected_since_;
+  suspect_receive_ = receive;
+  return suspects_ == kProofOfStep && !(late && suspects_ahead_ > Duration{});
 }
 
 /// Moves the offset towards the envelope, unless it is known better. Precondition: sensor_time > latest_.

@@ -21,10 +21,10 @@ namespace locus {
 ///   20 ms of what reception says (else the host's clock is not on UTC, and stamps are promised to be the host's) and
 ///   does not end because packets come late, unless they do so for half a minute: no network does.
 ///
-/// A time that does not follow from the ones before is refused. When five in a row follow from each other instead, at
-/// the pace at which they come, the clock was set: a step, counted, and time goes on from there. A drift that the
-/// envelope cannot be followed at (error beyond 5 ms) is a step too. Time of hour wraps every hour, unnoticed. Reads no
-/// clock, allocates nothing. One owner.
+/// A time that does not follow from the ones before is refused. When five in a row follow from each other instead, the
+/// clock was set: a step, counted, and time goes on from there. Packets that come late must come at the pace of a clock
+/// for that, not all at once from where a network held them up. A drift that the envelope cannot be followed at (error
+/// beyond 5 ms) is a step too. Time of hour wraps every hour, unnoticed. Reads no clock, allocates nothing. One owner.
 class SensorClock {
  public:
   /// One packet's place in time.
@@ -59,7 +59,8 @@ class SensorClock {
   void anchor(Duration time_of_hour, Duration until_sent, Stamp receive);
   [[nodiscard]] Duration unwrap(Duration time_of_hour, Stamp receive) const;
   [[nodiscard]] bool follows(Duration sensor_time, Duration until_sent, Stamp receive) const;
-  bool proves_step(Duration time_of_hour, Stamp receive);
+  [[nodiscard]] Duration lateness(Duration sensor_time, Duration until_sent, Stamp receive) const;
+  bool proves_step(Duration time_of_hour, Stamp receive, bool late);
   void track(Duration sensor_time, Duration until_sent, Stamp receive);
   void believe_sensor(Duration sensor_time, Stamp receive);
   [[nodiscard]] Stamp stamp(Duration sensor_time, Stamp receive) const;
@@ -79,8 +80,8 @@ class SensorClock {
 
   int suspects_ = 0; ///< refused times that follow from each other
   Duration suspect_time_of_hour_{};
-  Stamp suspected_since_;    ///< reception of the first
-  Duration suspected_for_{}; ///< by the sensor's clock
+  Stamp suspect_receive_;
+  Duration suspects_ahead_{}; ///< of the pace that is possible
 };
 
 } // namespace locus

@@ -252,6 +252,21 @@ TEST_F(WheelsTest, ThatStandWhileLidarIsShakenAreNotFrozen) {
   EXPECT_EQ(left_out(HealthReason::frozen), 0U);
 }
 
+/// A sweep at 5 Hz is heard of when the next is there.
+TEST_F(WheelsTest, ThatStoppedBeforeLidarToldOfTheDriveAreNotFrozen) {
+  brake_and_stand(milliseconds{520});
+  RegistrationFeedback before_the_stop{now_ - milliseconds{220}, now_ - milliseconds{20}};
+  before_the_stop.twist_base.x() = 0.4;
+  brake_and_stand(milliseconds{320});
+  monitor_.hear(LidarOpinion::none, before_the_stop, now_);
+  brake_and_stand(seconds{1});
+  RegistrationFeedback shaken{now_ - milliseconds{200}, now_};
+  shaken.twist_base.x() = 0.25;
+  monitor_.hear(LidarOpinion::none, shaken, now_);
+  brake_and_stand(seconds{1});
+  EXPECT_EQ(left_out(HealthReason::frozen), 0U);
+}
+
 TEST_F(WheelsTest, ThatJumpLoseTheirHealthUntilTheyGoOnFromThere) {
   begin_fault();
   x_m_ += 2.0;
