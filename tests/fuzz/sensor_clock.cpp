@@ -8,10 +8,20 @@ namespace {
 
 using std::chrono::microseconds;
 
+constexpr Duration kPacket = microseconds{1327};
+
 /// Bits that open a step.
 enum Step : std::uint8_t { kAnyTimeOfHour = 1, kAnyReception = 2, kBackwards = 4, kUnsynchronised = 8 };
 
 Duration wrapped(Duration time_of_hour) { return time_of_hour % std::chrono::hours{1}; }
+
+/// Whatever came before.
+void demand_that_a_living_lidar_is_heard(SensorClock& clock, Duration time_of_hour, Duration received) {
+  std::optional<SensorClock::Reading> reading;
+  for (int packet = 1; packet <= 200; ++packet)
+    reading = clock.read(wrapped(time_of_hour + packet * kPacket), kPacket, Stamp{received + packet * kPacket});
+  fuzz::demand(reading.has_value());
+}
 
 } // namespace
 } // namespace locus
@@ -36,10 +46,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       time_of_hour = wrapped(microseconds{bytes.take<std::uint32_t>()});
     if ((step & kAnyReception) != 0)
       received = fuzz::PacketStream::any_stamp(bytes).time_since_epoch();
-    const auto reading = clock.read(time_of_hour, microseconds{1327}, Stamp{received});
+    const auto reading = clock.read(time_of_hour, kPacket, Stamp{received});
     fuzz::demand(clock.steps() >= steps);
     fuzz::demand(!reading || reading->continuous || reading->advance == Duration{});
     steps = clock.steps();
   }
+  demand_that_a_living_lidar_is_heard(clock, time_of_hour, received);
   return 0;
 }
