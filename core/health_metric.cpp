@@ -112,7 +112,7 @@ class FrozenOdometry : public HealthMetric {
   }
 
   std::optional<HealthReason> hear(LidarOpinion, const RegistrationFeedback& feedback) override {
-    if (feedback.from < changed_at_)
+    if (feedback.from < changed_at_) // heard of late: it moved then
       return std::nullopt;
     lidar_sees_twist_ = feedback.twist_base;
     lidar_sees_way_ += to_seconds(feedback.to - feedback.from) * feedback.twist_base;

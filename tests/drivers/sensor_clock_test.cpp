@@ -230,7 +230,7 @@ TEST(SensorClock, PacketsHeldUpForSecondsThatComeAllAtOnceAreNoStep) {
   }
 }
 
-TEST(SensorClock, BurstThatPausesCostsNothingOfWhatComesInTimeAfterIt) {
+TEST(SensorClock, BurstThatPausesCostsLittleOfWhatComesInTimeAfterIt) {
   SensorClock clock{LidarTime::receive};
   Link link;
   for (int i = 0; i < 2000; ++i)
@@ -259,7 +259,7 @@ TEST(SensorClock, StartAmidPacketsThatComeAllAtOnceIsForgottenAtOnce) {
   EXPECT_LT(std::chrono::abs(*error), microseconds{150});
 }
 
-TEST(SensorClock, PacketsThatComeInBatchesAreTakenFromTheSecondOn) {
+TEST(SensorClock, PacketsThatComeInBatchesAreTakenFromTheThirdOn) {
   SensorClock clock{LidarTime::receive};
   Link link;
   const Duration batch = milliseconds{100};

@@ -133,6 +133,7 @@ class FloodOfDds : public Flood {
   FloodOfDds() {
     setenv("ASAN_OPTIONS", "quarantine_size_mb=8", 1); // NOLINT(concurrency-mt-unsafe): before the programs are started
   }
+
   static std::vector<std::string> peer(const char* role) { return {CYCLONE_PEER, "0", role, "/locus"}; }
 
   [[nodiscard]] std::filesystem::path with_health_topic() const {
