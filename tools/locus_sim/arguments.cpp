@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <optional>
 #include <string>
 
 #include "command_line.hpp"
@@ -55,12 +57,32 @@ std::vector<sim::Slip> parse_slips(const std::vector<std::string>& texts, double
   return slips;
 }
 
+sim::Realism realism_from(const std::string& name) {
+  return static_cast<sim::Realism>(std::ranges::find(sim::kRealismNames, name) - sim::kRealismNames.begin());
+}
+
+/// What --realism says of each holds where it is not named.
+void add_imperfection(CLI::App& app, const sim::NamedImperfection& one, std::optional<double>& size) {
+  const std::string text = fmt::format("{}; real {:g}, harsh {:g}", one.what, one.real, one.harsh);
+  auto* option = app.add_option(fmt::format("--{}", one.name), size, text)
+                     ->type_name(std::string(one.unit))
+                     ->group("Imperfections")
+                     ->check(number_between(0, one.most));
+  if (one.whole)
+    option->check(CLI::Validator(
+        [](const std::string& number) {
+          return number.find_first_not_of("0123456789") == std::string::npos ? "" : number + " is no whole number";
+        },
+        ""));
+}
+
 } // namespace
 
 std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
   SimArguments arguments;
   std::string world, robot, model = "VLP-16", return_mode = "strongest";
   double duration_s = 0;
+  std::string realism{sim::kRealismNames[static_cast<std::size_t>(sim::Realism::real)]};
   bool no_noise = false;
   std::vector<std::string> slips;
 
@@ -81,7 +103,12 @@ std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
       ->check(CLI::IsMember({"VLP-16", "VLP-32C", "HDL-32E"}));
   app.add_option("--return", return_mode, "Echoes that they report; default strongest")
       ->check(CLI::IsMember({"strongest", "dual"}));
-  app.add_flag("--no-noise", no_noise, "Perfect sensors");
+  auto* realism_option =
+      app.add_option("--realism", realism, "Sets all imperfections below: none, as real robots have them, or harsh")
+          ->capture_default_str()
+          ->check(CLI::IsMember(std::vector<std::string>(sim::kRealismNames.begin(), sim::kRealismNames.end())));
+  app.add_flag("--no-noise", no_noise, "Perfect sensors in a clean world, but for the imperfections that are named")
+      ->excludes(realism_option);
   app.add_option("--slip", slips,
                  "Wheels or feet spin and the robot stays where it is, seconds from the start; may be repeated")
       ->type_name("T-T1")
@@ -93,6 +120,9 @@ std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
                  "Capture folder; made if need be. -: a stream on standard output, for locus-play")
       ->required()
       ->type_name("DIR");
+  std::array<std::optional<double>, sim::kImperfections.size()> sizes;
+  for (std::size_t i = 0; i < sizes.size(); ++i)
+    add_imperfection(app, sim::kImperfections[i], sizes[i]);
   app.set_version_flag("--version", "locus-sim " LOCUS_VERSION);
   app.footer(
       "Writes lidar.pcap, imu.csv, one NAME.tum per odometry source, gt.tum, gt_map.ply and config.yaml. The same\n"
@@ -100,6 +130,7 @@ std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
       "Examples:\n"
       "  locus-sim --world urban --robot husky --duration 60 --seed 1 -o plant\n"
       "  locus-sim --world tunnel --robot spot --duration 300 --seed 7 --slip 20-25 --dust 0.02 -o mine\n"
+      "  locus-sim --world corridor --robot husky --duration 60 --realism clean --people 4 -o crowd\n"
       "  locus-replay -o out plant\n"
       "  locus-sim --world urban --robot husky --duration 600 -o - | locus-play -");
   if (!parse_command_line(app, argc, argv))
@@ -112,6 +143,10 @@ std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
   arguments.sensors.model = *velodyne::model_from_string(model);
   arguments.sensors.return_mode = return_mode == "dual" ? velodyne::ReturnMode::dual : velodyne::ReturnMode::strongest;
   arguments.sensors.noise = !no_noise;
+  arguments.sensors.imperfections = sim::imperfections_of(no_noise ? sim::Realism::clean : realism_from(realism));
+  for (std::size_t i = 0; i < sizes.size(); ++i)
+    if (sizes[i])
+      arguments.sensors.imperfections.*sim::kImperfections[i].size = *sizes[i];
   return arguments;
 }
 

@@ -7,6 +7,7 @@
 
 #include "locus_sim/capture_writer.hpp"
 #include "locus_sim/driver.hpp"
+#include "locus_sim/imperfections.hpp"
 #include "locus_sim/world.hpp"
 
 namespace locus::sim {
@@ -18,6 +19,7 @@ struct SensorChoice {
   velodyne::ReturnMode return_mode = velodyne::ReturnMode::strongest;
   bool noise = true; ///< false: every sensor is perfect
   double dust = 0;   ///< share of the pulses that meet dust
+  Imperfections imperfections = {};
 };
 
 /// A robot, how it moves and what it carries.

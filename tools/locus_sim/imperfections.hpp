@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+namespace locus::sim {
+
+/// What a real robot has to live with and a clean simulation leaves out, each in its physical unit; as it stands,
+/// nothing. Where a direction, a sign or a moment is not given, the seed decides it. What is usual, and who says so,
+/// stands in the manual page of locus-sim.
+struct Imperfections {
+  // Mounting: config.yaml holds what the user believes, the sensors are where they are.
+  double mounting_deg = 0; ///< each lidar and the IMU are turned by this
+  double mounting_mm = 0;  ///< and shifted by this
+
+  // Time.
+  double imu_late_ms = 0;      ///< the IMU's stamps are this much later than what they speak of
+  double imu_jitter_ms = 0;    ///< standard deviation of each of them
+  double odometry_late_ms = 0; ///< the same of every odometry source
+  double odometry_jitter_ms = 0;
+  double lidar_drift_ppm = 0; ///< the lidars' clocks run fast by this, without GPS to hold them
+
+  // Ranges and directions of the lidars.
+  double beam_mrad = 0;           ///< full divergence: at an edge the range lies between both surfaces (mixed pixels)
+  double laser_bias_mm = 0;       ///< standard deviation of a constant error of each laser's ranges
+  double incidence_bias_mm = 0;   ///< a surface that is met at 75 degrees seems farther by this
+  double intensity_bias_mm = 0;   ///< black seems farther than white by this
+  double laser_elevation_deg = 0; ///< standard deviation of a constant error of each laser's elevation
+  double body_parts = 0;          ///< parts of the robot that its lidars see: one inside the body box, one outside, ...
+
+  // Motion sources.
+  double slip_bursts_per_min = 0; ///< wheels or feet slip for half a second or two, and report motion that was not
+  double yaw_error_percent = 0;   ///< odometry reports turns too large or too small by this
+  double gyro_scale_percent = 0;  ///< each axis of the gyro shows too much or too little
+  double gyro_walk_dps = 0;       ///< random walk of the gyro's bias, deg/s per square root of a second
+  double g_sensitivity_dps = 0;   ///< deg/s that the gyro shows for each g of specific force
+  double vibration_mps2 = 0;      ///< more noise of the accelerometer while the robot moves
+
+  // Surroundings.
+  double people = 0;            ///< who stand and walk 0.5 to 3 m from the robot, and go with it
+  double vehicle_s_per_min = 0; ///< a vehicle drives alongside, at the robot's speed, for so long
+  double steam_per_min = 0;     ///< clouds of dust or steam burst out near the way, stay for seconds and are gone
+  double wet_floor_percent = 0; ///< share of level ground that mirrors what is above it
+  double glass_percent = 0;     ///< share of upright surfaces that mirror what is before them
+};
+
+/// An imperfection by its name on the command line, with what it amounts to on an ordinary robot and in hard use.
+struct NamedImperfection {
+  std::string_view name;
+  double Imperfections::*size;
+  double real, harsh;
+  double most; ///< that is accepted
+  std::string_view unit, what;
+  bool whole = false; ///< a count
+};
+
+inline constexpr std::array kImperfections{
+    NamedImperfection{"mounting-deg", &Imperfections::mounting_deg, 0.5, 1.5, 10, "DEG",
+                      "Lidars and IMU are turned by this against what config.yaml says"},
+    NamedImperfection{"mounting-mm", &Imperfections::mounting_mm, 10, 30, 1000, "MM",
+                      "Lidars and IMU are shifted by this against what config.yaml says"},
+    NamedImperfection{"imu-late-ms", &Imperfections::imu_late_ms, 5, 15, 1000, "MS", "Stamps of the IMU are late"},
+    NamedImperfection{"imu-jitter-ms", &Imperfections::imu_jitter_ms, 0.5, 2, 100, "MS",
+                      "Stamps of the IMU scatter, standard deviation"},
+    NamedImperfection{"odometry-late-ms", &Imperfections::odometry_late_ms, 20, 60, 1000, "MS",
+                      "Stamps of odometry are late"},
+    NamedImperfection{"odometry-jitter-ms", &Imperfections::odometry_jitter_ms, 2, 8, 100, "MS",
+                      "Stamps of odometry scatter, standard deviation"},
+    NamedImperfection{"lidar-drift-ppm", &Imperfections::lidar_drift_ppm, 20, 100, 400, "PPM",
+                      "Clocks of the lidars run fast, and have no GPS"},
+    NamedImperfection{"beam-mrad", &Imperfections::beam_mrad, 3, 4.5, 20, "MRAD",
+                      "Beam divergence: mixed pixels at edges"},
+    NamedImperfection{"laser-bias-mm", &Imperfections::laser_bias_mm, 8, 20, 200, "MM",
+                      "Range error of each laser, standard deviation"},
+    NamedImperfection{"incidence-bias-mm", &Imperfections::incidence_bias_mm, 10, 30, 500, "MM",
+                      "Range error of a surface met at 75 degrees"},
+    NamedImperfection{"intensity-bias-mm", &Imperfections::intensity_bias_mm, 10, 25, 500, "MM",
+                      "Range error of black against white"},
+    NamedImperfection{"laser-elevation-deg", &Imperfections::laser_elevation_deg, 0.05, 0.15, 2, "DEG",
+                      "Elevation error of each laser, standard deviation"},
+    NamedImperfection{"body-parts", &Imperfections::body_parts, 2, 4, 8, "N",
+                      "Parts of the robot in view, by turns inside and outside the body box", true},
+    NamedImperfection{"slip-bursts-per-min", &Imperfections::slip_bursts_per_min, 2, 8, 60, "N",
+                      "Wheels or feet slip for half a second to two"},
+    NamedImperfection{"yaw-error-percent", &Imperfections::yaw_error_percent, 4, 10, 50, "PERCENT",
+                      "Odometry reports turns wrong by this"},
+    NamedImperfection{"gyro-scale-percent", &Imperfections::gyro_scale_percent, 0.5, 2, 20, "PERCENT",
+                      "Scale error of the gyro's axes"},
+    NamedImperfection{"gyro-walk-dps", &Imperfections::gyro_walk_dps, 0.005, 0.02, 1, "DPS",
+                      "Random walk of the gyro's bias, per square root of a second"},
+    NamedImperfection{"g-sensitivity-dps", &Imperfections::g_sensitivity_dps, 0.05, 0.2, 5, "DPS",
+                      "What the gyro shows for each g of specific force"},
+    NamedImperfection{"vibration-mps2", &Imperfections::vibration_mps2, 1.5, 5, 100, "MPS2",
+                      "Noise of the accelerometer while the robot moves"},
+    NamedImperfection{"people", &Imperfections::people, 3, 6, 20, "N",
+                      "Stand and walk 0.5 to 3 m from the robot, and go with it", true},
+    NamedImperfection{"vehicle-s-per-min", &Imperfections::vehicle_s_per_min, 5, 20, 60, "S",
+                      "A vehicle drives alongside for so long of each minute"},
+    NamedImperfection{"steam-per-min", &Imperfections::steam_per_min, 1, 6, 60, "N",
+                      "Clouds of dust or steam near the way, each for seconds"},
+    NamedImperfection{"wet-floor-percent", &Imperfections::wet_floor_percent, 3, 20, 100, "PERCENT",
+                      "Share of the floor that mirrors"},
+    NamedImperfection{"glass-percent", &Imperfections::glass_percent, 2, 10, 100, "PERCENT",
+                      "Share of walls that mirror"}};
+
+/// How kind a simulated world is: clean, without any imperfection; as real robots know it; or harsh.
+enum class Realism : std::uint8_t { clean, real, harsh };
+
+inline constexpr std::array<std::string_view, 3> kRealismNames{"clean", "real", "harsh"}; ///< by Realism
+
+Imperfections imperfections_of(Realism realism);
+
+} // namespace locus::sim
