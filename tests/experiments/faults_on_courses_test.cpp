@@ -36,8 +36,8 @@ std::size_t courses_in(const std::filesystem::path& folder) {
 
 TEST(FaultsOnCourses, EveryRowOfTheTableHoldsForAMinute) {
   const TemporaryFolder folder;
-  Child run({LOCUS_EXPERIMENTS, "--faults", "--quiet", "--duration", "60", "--seeds", "1", "--consistency", "4",
-             "--jobs", "2", "-o", folder / "out"});
+  Child run({LOCUS_EXPERIMENTS, "--faults", "--realism", "clean", "--quiet", "--duration", "60", "--seeds", "1",
+             "--consistency", "4", "--jobs", "2", "-o", folder / "out"});
   std::size_t most = 0;
   while (!run.wait_for_exit(milliseconds{100}))
     most = std::max(most, courses_in(folder / "out/courses"));

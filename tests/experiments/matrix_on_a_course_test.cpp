@@ -13,8 +13,8 @@ using nlohmann::json;
 
 TEST(FaultMatrix, EveryCellHoldsOnAShortDrive) {
   const TemporaryFolder folder;
-  const ProgramRun run = run_program(
-      LOCUS_EXPERIMENTS, {"--fault-matrix", "--quiet", "--duration", "10", "--jobs", "2", "-o", folder / "out"});
+  const ProgramRun run = run_program(LOCUS_EXPERIMENTS, {"--fault-matrix", "--realism", "clean", "--quiet",
+                                                         "--duration", "10", "--jobs", "2", "-o", folder / "out"});
   ASSERT_EQ(run.status, 0) << run.err;
   const json cells = json::parse(read_text(folder / "out/results.json"))["matrix"]["cells"];
   EXPECT_EQ(cells.size(), 96U);

@@ -9,7 +9,9 @@
 #include <fmt/format.h>
 
 #include "command_line.hpp"
+#include "locus_experiments/harsh_plan.hpp"
 #include "locus_replay/failure.hpp"
+#include "locus_sim/imperfections.hpp"
 
 namespace locus::experiments {
 
@@ -43,10 +45,19 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
                  "Folder for experiments.html, results.json and the runs; made if need be")
       ->required()
       ->type_name("DIR");
-  app.add_option("--duration", arguments.duration_s, "Of each simulated course, seconds; the paper's last 3600")
-      ->type_name("S")
-      ->capture_default_str()
-      ->check(CLI::Range(10, 36'000));
+  auto* duration =
+      app.add_option("--duration", arguments.duration_s,
+                     fmt::format("Of each simulated course, seconds; the paper's last 3600, a harsh one {} "
+                                 "where this is not given",
+                                 kHarshCourse_s))
+          ->type_name("S")
+          ->capture_default_str()
+          ->check(CLI::Range(10, 36'000));
+  auto* realism =
+      app.add_option("--realism", arguments.realism, "Of the simulated courses, as locus-sim has it")
+          ->capture_default_str()
+          ->check(CLI::IsMember(std::vector<std::string>(sim::kRealismNames.begin(), sim::kRealismNames.end())))
+          ->excludes(recordings);
   app.add_option("--pace", arguments.pace_s, "Of each run at the pace of the recording, seconds")
       ->type_name("S")
       ->capture_default_str()
@@ -54,15 +65,27 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   auto* faults = app.add_flag("--faults", arguments.faults,
                               "What a fault of each sensor does, in place of the paper's experiments: faults.md")
                      ->excludes(recordings);
-  app.add_flag("--fault-matrix", arguments.fault_matrix,
-               "Every fault of every input, from the start and mid-drive, in their place: matrix.md")
-      ->excludes(recordings)
-      ->excludes(faults);
-  app.add_option("--seeds", arguments.seeds, "Of each course with --faults")
+  auto* matrix = app.add_flag("--fault-matrix", arguments.fault_matrix,
+                              "Every fault of every input, from the start and mid-drive, in their place: matrix.md")
+                     ->excludes(recordings)
+                     ->excludes(faults);
+  auto* harsh =
+      app.add_flag("--harsh", arguments.harsh,
+                   "Every course in a real and in a harsh world, and each hardship alone, from ten starts, with "
+                   "all sensors, lidar and IMU, lidar alone: harsh.md")
+          ->excludes(recordings)
+          ->excludes(faults)
+          ->excludes(matrix)
+          ->excludes(realism);
+  app.add_option("--only", arguments.only,
+                 "Of --harsh the rows whose COURSE/HARDSHIP holds this, as in corridor/people")
+      ->type_name("TEXT")
+      ->needs(harsh);
+  app.add_option("--seeds", arguments.seeds, "Of each course with --faults or --harsh")
       ->type_name("N")
       ->capture_default_str()
       ->check(CLI::Range(1, 100))
-      ->needs(faults);
+      ->excludes(recordings);
   app.add_option("--consistency", arguments.honesty_runs,
                  "Runs of 60 s by which --faults judges the covariances; 0: none")
       ->type_name("N")
@@ -86,9 +109,12 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
              "  locus-experiments --merge part1 part2 -o experiments\n"
              "  locus-experiments -o fleet robot1/ robot2/ robot3/\n"
              "  locus-experiments --faults --duration 120 -o faults\n"
-             "  locus-experiments --fault-matrix --duration 120 -o matrix");
+             "  locus-experiments --fault-matrix --duration 120 -o matrix\n"
+             "  locus-experiments --harsh --seeds 1 -o harsh");
   if (!tools::parse_command_line(app, argc, argv))
     return std::nullopt;
+  if (arguments.harsh && duration->empty())
+    arguments.duration_s = kHarshCourse_s;
   const std::optional<Shard> parsed = Shard::parse(shard);
   if (!parsed)
     throw Failure(ExitStatus::wrong_usage, fmt::format("--shard {}: must be I/N with I from 1 to N, as in 2/8", shard));

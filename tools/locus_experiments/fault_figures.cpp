@@ -2,66 +2,16 @@
 #include "locus_experiments/fault_figures.hpp"
 
 #include <algorithm>
-#include <charconv>
-#include <fstream>
-#include <string>
-#include <string_view>
 #include <vector>
-
-#include <fmt/format.h>
 
 #include "accuracy/pose_pairs.hpp"
 #include "accuracy/trajectory_accuracy.hpp"
-#include "locus_replay/failure.hpp"
+#include "locus_experiments/odometry_rows.hpp"
 
 namespace locus::experiments {
 namespace {
 
 using nlohmann::ordered_json;
-using tools::ExitStatus;
-using tools::Failure;
-using tools::value_or_fail;
-
-/// A row of odometry.csv, as far as it is of use here.
-struct Row {
-  std::string state;
-  Eigen::Matrix2d covariance_m2; ///< of x and y of odom
-};
-
-constexpr std::size_t kStateColumn = 1;
-constexpr std::size_t kCovarianceColumn = 5; // of 6 x 6, row by row
-
-std::vector<std::string_view> columns_of(std::string_view line) {
-  std::vector<std::string_view> columns;
-  for (std::size_t begin = 0; begin <= line.size();) {
-    const std::size_t end = std::min(line.find(',', begin), line.size());
-    columns.push_back(line.substr(begin, end - begin));
-    begin = end + 1;
-  }
-  return columns;
-}
-
-std::vector<Row> read_rows(const std::filesystem::path& file) {
-  std::ifstream stream{file};
-  std::vector<Row> rows;
-  std::string line;
-  std::getline(stream, line); // header
-  while (std::getline(stream, line)) {
-    const std::vector<std::string_view> columns = columns_of(line);
-    if (columns.size() < kCovarianceColumn + 36)
-      throw Failure(ExitStatus::failed,
-                    fmt::format("{}:{}: ends too early; run again", file.string(), rows.size() + 2));
-    const auto covariance = [&](std::size_t i, std::size_t j) {
-      const std::string_view text = columns[kCovarianceColumn + 6 * i + j];
-      double value = 0;
-      std::from_chars(text.data(), text.data() + text.size(), value);
-      return value;
-    };
-    rows.push_back({std::string(columns[kStateColumn]),
-                    Eigen::Matrix2d{{covariance(0, 0), covariance(0, 1)}, {covariance(1, 0), covariance(1, 1)}}});
-  }
-  return rows;
-}
 
 /// In steps of a second: a robot that shakes does not get anywhere.
 double driven_m(std::span<const StampedPose> truth) {
@@ -77,13 +27,12 @@ double driven_m(std::span<const StampedPose> truth) {
   return sum_m;
 }
 
-double share_told(std::span<const Row> rows) {
-  const auto told = std::ranges::count_if(
-      rows, [](const Row& row) { return row.state == "degenerate" || row.state == "dead_reckoning"; });
+double share_told(std::span<const OdometryRow> rows) {
+  const auto told = std::ranges::count_if(rows, &OdometryRow::flagged);
   return static_cast<double>(told) / std::max(1.0, static_cast<double>(rows.size()));
 }
 
-ordered_json growth(const std::vector<Row>& rows, std::span<const StampedPose> estimates) {
+ordered_json growth(const std::vector<OdometryRow>& rows, std::span<const StampedPose> estimates) {
   constexpr double kBegun_m = 5;
   const auto way_m = [&](const StampedPose& pose) -> Eigen::Vector2d {
     return (pose.T_source_base.translation - estimates.front().T_source_base.translation).head<2>();
@@ -124,14 +73,8 @@ double error_added_m(std::span<const StampedPose> estimates, std::span<const Sta
 
 ordered_json fault_figures(const Interval& interval, const std::filesystem::path& run_folder,
                            const CaptureFolder& capture) {
-  const auto read = [](const std::filesystem::path& file) {
-    return value_or_fail(read_trajectory(file), ExitStatus::failed);
-  };
-  const std::vector<StampedPose> estimates = read(run_folder / "odometry.tum"), truth = read(capture.ground_truth);
-  const std::vector<Row> rows = read_rows(run_folder / "odometry.csv");
-  if (rows.size() != estimates.size())
-    throw Failure(ExitStatus::failed,
-                  fmt::format("{}: odometry.tum and odometry.csv differ in length; run again", run_folder.string()));
+  const auto [estimates, rows] = read_odometry(run_folder);
+  const std::vector<StampedPose> truth = read_poses(capture.ground_truth);
   const Stamp from = truth.front().stamp + from_seconds(interval.from_s);
   const auto before = std::ranges::lower_bound(estimates, from, {}, &StampedPose::stamp) - estimates.begin();
   ordered_json figures{{"length_m", driven_m(truth)},
@@ -140,7 +83,7 @@ ordered_json fault_figures(const Interval& interval, const std::filesystem::path
                        {"growth", growth(rows, estimates)},
                        {"sources", ordered_json::object()}};
   for (const CaptureFolder::Source& source : capture.odometry) {
-    const std::vector<StampedPose> poses = read(source.files.front());
+    const std::vector<StampedPose> poses = read_poses(source.files.front());
     const auto accuracy = trajectory_accuracy(poses, truth);
     figures["sources"][source.name] = {{"added_m", error_added_m(poses, truth, interval)},
                                        {"ape_mean_m", accuracy ? accuracy->ape_m.mean : 0.0}};

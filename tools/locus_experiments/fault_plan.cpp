@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 
 #include <fmt/format.h>
 
@@ -172,6 +173,7 @@ Course simulated(const Arguments& arguments, const std::string& name, const Cour
   Course course{name, arguments.output / "courses" / name, kind.simulation};
   course.simulation.insert(course.simulation.end(),
                            {"--seed", std::to_string(seed), "--duration", std::to_string(duration_s)});
+  std::ranges::copy(realism_of(arguments), std::back_inserter(course.simulation));
   if (kind.name == kSlipCourse) {
     const Interval slip = interval_of(Lasting::five_seconds, duration_s);
     course.simulation.insert(course.simulation.end(), {"--slip", fmt::format("{}-{}", slip.from_s, slip.until_s)});

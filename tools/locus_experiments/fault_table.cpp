@@ -214,10 +214,12 @@ std::string fault_table(const Results& results) {
   const Results& faults = results.at("faults");
   const Results& rows = faults.at("rows");
   const auto hold = std::ranges::count_if(rows, [](const Results& row) { return row.at("holds").get<bool>(); });
-  std::string text = fmt::format(
-      "`locus-experiments --faults --duration {} --seeds {} --consistency {}`, version {}, {}. {} of {} rows hold.\n\n",
-      results.at("duration_s").get<int>(), faults.at("seeds").get<int>(), faults.at("consistency_runs").get<int>(),
-      results.at("version").get<std::string>(), machines_of(results.at("runs")), hold, rows.size());
+  std::string text =
+      fmt::format("`locus-experiments --faults --realism {} --duration {} --seeds {} --consistency {}`, version {}, "
+                  "{}. {} of {} rows hold.\n\n",
+                  realism_of(results), results.at("duration_s").get<int>(), faults.at("seeds").get<int>(),
+                  faults.at("consistency_runs").get<int>(), results.at("version").get<std::string>(),
+                  machines_of(results.at("runs")), hold, rows.size());
   if (const std::size_t done = results.at("runs").size(), planned = results.value("planned", done); done < planned)
     text += fmt::format("A shard: {} of {} runs.\n\n", done, planned);
   text += "| fault | robot, place | error without, mm | with, mm | asked | found | holds | sweeps lost, failed | "

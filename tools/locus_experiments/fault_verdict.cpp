@@ -165,4 +165,6 @@ std::string machines_of(const Results& runs) {
   return fmt::format("{}", fmt::join(machines, "; "));
 }
 
+std::string realism_of(const Results& results) { return results.value("realism", std::string{"clean"}); }
+
 } // namespace locus::experiments

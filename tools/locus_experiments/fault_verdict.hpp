@@ -49,4 +49,7 @@ Verdict judge(Demand demand, double limit, const std::string& kind_of_course, co
 /// The processors that the runs were done on, for the head of a table.
 std::string machines_of(const Results& runs);
 
+/// How realistic the simulated courses were; results of versions that knew no realism are of clean ones.
+std::string realism_of(const Results& results);
+
 } // namespace locus::experiments

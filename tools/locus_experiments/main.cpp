@@ -63,6 +63,13 @@ void take_away(const Course& course) {
     std::filesystem::remove_all(course.folder, ignored);
 }
 
+/// A thousand drives would leave a gigabyte of maps and reports.
+void keep_figures_alone(const std::filesystem::path& run_folder) {
+  std::error_code ignored;
+  for (const char* const name : {"map.pcd", "odometry.csv", "odometry.tum", "report.html"})
+    std::filesystem::remove(run_folder / name, ignored);
+}
+
 /// The plan carried out, and what came of it.
 class Experiments {
  public:
@@ -122,6 +129,10 @@ Task Experiments::simulation_of(const Course& course) {
               const std::lock_guard lock(mutex_);
               broken_courses_[course.name] = *problem;
             }
+            if (!course.has_true_map) {
+              std::error_code ignored;
+              std::filesystem::remove(course.folder / "gt_map.ply", ignored);
+            }
           }};
 }
 
@@ -179,6 +190,8 @@ void Experiments::carry_out(const Run& run) {
                                {"configuration", run.configuration},
                                {refused ? "refused" : "failed", *problem}}
                      : measurement(run, folder, course);
+    if (run.from_a_start && !problem)
+      keep_figures_alone(folder);
   } catch (const std::exception& error) {
     result = {{"course", run.course}, {"configuration", run.configuration}, {"failed", error.what()}};
   }
@@ -201,6 +214,10 @@ Results Experiments::results() const {
     results["faults"] = {{"seeds", arguments_.seeds}, {"consistency_runs", arguments_.honesty_runs}};
   if (arguments_.fault_matrix)
     results["matrix"] = Results::object();
+  if (arguments_.harsh)
+    results["harsh"] = {{"seeds", arguments_.seeds}, {"only", arguments_.only}};
+  else if (arguments_.recordings.empty())
+    results["realism"] = arguments_.realism;
   judge(results);
   return results;
 }

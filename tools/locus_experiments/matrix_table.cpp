@@ -151,10 +151,11 @@ std::string matrix_table(const Results& results) {
   const auto run = count([](const Results& cell) { return cell.contains("holds"); });
   const auto hold = count([](const Results& cell) { return cell.value("holds", false); });
   const auto impossible = count([](const Results& cell) { return cell.contains("impossible"); });
-  std::string text = fmt::format("`locus-experiments --fault-matrix --duration {}`, version {}, {}. {} of {} cells "
-                                 "hold; {} more cannot be.\n\n",
-                                 results.at("duration_s").get<int>(), results.at("version").get<std::string>(),
-                                 machines_of(results.at("runs")), hold, run, impossible);
+  std::string text =
+      fmt::format("`locus-experiments --fault-matrix --realism {} --duration {}`, version {}, {}. {} of {} cells "
+                  "hold; {} more cannot be.\n\n",
+                  realism_of(results), results.at("duration_s").get<int>(), results.at("version").get<std::string>(),
+                  machines_of(results.at("runs")), hold, run, impossible);
   text += "| input | fault | from the start: holds, error | shown by | mid-drive: holds, error | shown by |\n"
           "|---|---|---|---|---|---|\n";
   for (const Results& cell : cells) {

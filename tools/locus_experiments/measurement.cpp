@@ -13,6 +13,7 @@
 #include "drivers/capture_folder.hpp"
 #include "locus_experiments/child_process.hpp"
 #include "locus_experiments/fault_figures.hpp"
+#include "locus_experiments/harsh_figures.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/quantiles.hpp"
 
@@ -90,7 +91,9 @@ ordered_json measurement(const Run& run, const std::filesystem::path& folder, co
                       {"machine", machine_name()},
                       {"summary", read_json(folder / "summary.json")}};
   const CaptureFolder capture = value_or_fail(CaptureFolder::find(course.folder), ExitStatus::failed);
-  if (!capture.ground_truth.empty() && run.paced_cpus == 0)
+  if (run.from_a_start)
+    result["harsh"] = harsh_figures(folder, capture, result["summary"]);
+  else if (!capture.ground_truth.empty() && run.paced_cpus == 0)
     add_errors(folder / "odometry.tum", capture.ground_truth, result);
   if (run.watched)
     result["fault"] = fault_figures(*run.watched, folder, capture);

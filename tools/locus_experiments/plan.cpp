@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "locus_experiments/fault_plan.hpp"
+#include "locus_experiments/harsh_plan.hpp"
 #include "locus_experiments/matrix_plan.hpp"
 
 namespace locus::experiments {
@@ -38,10 +39,10 @@ Options with(Options options, const Options& more) {
 Course simulated(const Arguments& arguments, const std::string& name, const std::string& world,
                  const std::string& robot, int seed) {
   const std::string lidars = robot == "husky" ? "2" : "1";
-  return {name,
-          arguments.output / "courses" / name,
-          {"--world", world, "--robot", robot, "--lidars", lidars, "--seed", std::to_string(seed), "--duration",
-           std::to_string(arguments.duration_s)}};
+  return {name, arguments.output / "courses" / name,
+          with({"--world", world, "--robot", robot, "--lidars", lidars, "--seed", std::to_string(seed), "--duration",
+                std::to_string(arguments.duration_s)},
+               realism_of(arguments))};
 }
 
 /// Table II, and what it takes for Table III. The paper has no flat ground in the tunnel.
@@ -143,16 +144,19 @@ const std::vector<std::string>& paper_settings() {
   return settings;
 }
 
+std::vector<std::string> realism_of(const Arguments& arguments) { return {"--realism", arguments.realism}; }
+
 Plan make_plan(const Arguments& arguments) {
   Plan plan = arguments.faults               ? plan_of_faults(arguments)
               : arguments.fault_matrix       ? plan_of_matrix(arguments)
+              : arguments.harsh              ? plan_of_harsh(arguments)
               : arguments.recordings.empty() ? plan_of_paper(arguments)
                                              : plan_of_recordings(arguments);
   plan.size = plan.runs.size();
   for (std::size_t place = 0; place < plan.size; ++place)
     plan.runs[place].place = place;
   const auto course_of = [&](const Run& run) { return std::ranges::find(plan.courses, run.course, &Course::name); };
-  if (arguments.faults) { // to simulate a course takes longer than its runs
+  if (arguments.faults || arguments.harsh) { // to simulate a course takes longer than its runs
     std::size_t index = 0;
     std::erase_if(plan.courses, [&](const Course&) { return !arguments.shard.has(index++); });
     std::erase_if(plan.runs, [&](const Run& run) { return course_of(run) == plan.courses.end(); });

@@ -16,6 +16,7 @@ struct Course {
   std::string name;
   std::filesystem::path folder;        ///< the capture
   std::vector<std::string> simulation; ///< options of locus-sim that make it; empty for a recording
+  bool has_true_map = true;            ///< false: poses alone are compared, which takes a fourth of the time
 };
 
 /// Of a recording, seconds from its start.
@@ -32,10 +33,14 @@ struct Run {
   bool loam_features = false;           ///< LOAM's points in place of the filters
   std::size_t place = 0;                ///< among all runs of the plan, whichever shard does them
   std::optional<Interval> watched = {}; ///< what happens there is measured for the table of faults
+  bool from_a_start = false;            ///< measured for the harsh table, and what it wrote is not kept
   std::string refusal = {};             ///< what locus-replay has to say instead of running; empty: it has to run
 
   [[nodiscard]] std::string id() const { return course + '/' + configuration; }
 };
+
+/// Options of locus-sim that every simulated course of an experiment shares: how realistic the world is.
+std::vector<std::string> realism_of(const Arguments& arguments);
 
 struct Plan {
   std::vector<Course> courses;
@@ -46,9 +51,9 @@ struct Plan {
 /// Settings of the paper's Section II and Table IV as --set options: what paper-husky.yaml says beyond husky.yaml.
 const std::vector<std::string>& paper_settings();
 
-/// The faults, or their matrix, or the paper's experiments, or as much of them as a recording allows; of these the part
-/// of one shard: of the faults every N-th course with all its runs, else every N-th run with the courses that they
-/// need.
+/// The harsh courses, the faults, or their matrix, or the paper's experiments, or as much of them as a recording
+/// allows; of these the part of one shard: of faults and harsh courses every N-th course with all its runs, else every
+/// N-th run with the courses that they need.
 Plan make_plan(const Arguments& arguments);
 
 } // namespace locus::experiments

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "locus_experiments/fault_table.hpp"
+#include "locus_experiments/harsh_table.hpp"
 #include "locus_experiments/matrix_table.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/output_file.hpp"
@@ -73,8 +74,8 @@ Results merged(const std::vector<std::filesystem::path>& folders) {
       all = part;
       all["runs"] = Results::array();
     }
-    for (const char* key :
-         {"/version", "/simulated", "/duration_s", "/planned", "/faults/seeds", "/faults/consistency_runs"}) {
+    for (const char* key : {"/version", "/simulated", "/duration_s", "/realism", "/planned", "/faults/seeds",
+                            "/faults/consistency_runs", "/harsh/seeds", "/harsh/only"}) {
       const Results::json_pointer pointer(key);
       if (all.value(pointer, Results{}) != part.value(pointer, Results{}))
         throw Failure(ExitStatus::failed,
@@ -121,6 +122,8 @@ void judge(Results& results) {
     judge_faults(results);
   else if (results.contains("matrix"))
     judge_matrix(results);
+  else if (results.contains("harsh"))
+    judge_harsh(results);
   else
     judge_robustness(results);
 }
@@ -134,6 +137,8 @@ std::filesystem::path write_results(const std::filesystem::path& folder, const R
     return write_table(folder / "faults.md", fault_table(results));
   if (results.contains("matrix"))
     return write_table(folder / "matrix.md", matrix_table(results));
+  if (results.contains("harsh"))
+    return write_table(folder / "harsh.md", harsh_table(results));
   std::filesystem::path page = folder / "experiments.html";
   tools::write_data_page(page, {locus_experiments_page_begin, locus_experiments_page_end}, results);
   return page;

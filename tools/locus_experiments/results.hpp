@@ -13,8 +13,8 @@ namespace locus::experiments {
 /// measurement(), or its course and configuration with "failed", the reason why there is none. With --faults "faults"
 /// stands in place of "robustness": {"seeds", "consistency_runs", "rows": [...], "consistency"}, of judge_faults();
 /// with
-/// --fault-matrix "matrix": {"cells": [...]}, of judge_matrix(). A run that was to be refused, and was, has "refused",
-/// what locus-replay said.
+/// --fault-matrix "matrix": {"cells": [...]}, of judge_matrix(); with --harsh "harsh": {"seeds", "only", "rows":
+/// [...]}, of judge_harsh(). A run that was to be refused, and was, has "refused", what locus-replay said.
 using Results = nlohmann::ordered_json;
 
 /// Puts the runs of several shards together. Throws tools::Failure where a folder holds no results, where two hold the
@@ -27,10 +27,11 @@ Results merged(const std::vector<std::filesystem::path>& folders);
 /// by more than 20 cm; OK, the rest.
 void judge_robustness(Results& results);
 
-/// What the runs say together: judge_robustness(), judge_faults() or judge_matrix().
+/// What the runs say together: judge_robustness(), judge_faults(), judge_matrix() or judge_harsh().
 void judge(Results& results);
 
-/// Writes results.json and experiments.html, faults.md or matrix.md; that is what it returns. Throws tools::Failure.
+/// Writes results.json and experiments.html, faults.md, matrix.md or harsh.md; that is what it returns. Throws
+/// tools::Failure.
 std::filesystem::path write_results(const std::filesystem::path& folder, const Results& results);
 
 } // namespace locus::experiments

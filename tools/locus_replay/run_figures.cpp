@@ -110,6 +110,7 @@ void RunFigures::take(const daemon::ProcessedSweep& sweep) {
   if (sweeps() > 0)
     path_m_ += (estimate.T_odom_base.translation - last_T_odom_base_.translation).norm();
   last_T_odom_base_ = estimate.T_odom_base;
+  largest_speed_mps_ = std::max(largest_speed_mps_, estimate.twist_base.head<3>().norm());
   wall_ms_.push_back(static_cast<float>(1e3 * to_seconds(sweep.took.wall)));
   cpu_ms_.push_back(static_cast<float>(1e3 * to_seconds(sweep.took.cpu)));
   sums_.add(sweep);
@@ -137,6 +138,7 @@ ordered_json summary(const FinishedRun& run) {
                     {"stage_ms", stages(run)},
                     {"points", points_json(run.figures.sums())},
                     {"iterations_mean", iterations_json(run.figures.sums())},
+                    {"largest_speed_mps", rounded(run.figures.largest_speed_mps())},
                     {"sources", sources(run)}};
   add_accuracy(run.accuracy, json);
   return json;

@@ -32,6 +32,8 @@ class RunFigures {
   /// In the order in which they happened.
   [[nodiscard]] const std::vector<HealthEvent>& health_events() const { return health_events_; }
   [[nodiscard]] double path_m() const { return path_m_; }
+  /// That any estimate claims.
+  [[nodiscard]] double largest_speed_mps() const { return largest_speed_mps_; }
   [[nodiscard]] const Pose& last_T_odom_base() const { return last_T_odom_base_; }
 
  private:
@@ -40,7 +42,7 @@ class RunFigures {
   std::vector<float> wall_ms_, cpu_ms_;
   std::vector<HealthEvent> health_events_;
   daemon::SweepSums sums_;
-  double path_m_ = 0;
+  double path_m_ = 0, largest_speed_mps_ = 0;
   Pose last_T_odom_base_;
 };
 

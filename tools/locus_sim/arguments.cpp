@@ -113,6 +113,9 @@ std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
                  "Wheels or feet spin and the robot stays where it is, seconds from the start; may be repeated")
       ->type_name("T-T1")
       ->allow_extra_args(false);
+  app.add_option("--halts", arguments.halts_s, "Stops at every other corner, for so long at the longest")
+      ->type_name("S")
+      ->check(number_between(0.5, 3600));
   app.add_option("--dust", arguments.sensors.dust, "Share of the laser pulses that meet dust, 0..1")
       ->type_name("P")
       ->check(number_between(0, 1));

@@ -148,7 +148,7 @@ PlannedCourse plan_course(const Roads& roads, const Agility& agility, Duration d
   while (true) {
     const Eigen::Vector2d leg = to - at, next = walk.next();
     const double angle_rad = angle_between(leg, next - to);
-    const bool stops = dice.chance(0.12);
+    const bool stops = dice.chance(agility.halts.share);
     const double corner_mps = stops ? 0 : corner_speed_mps(angle_rad, agility);
     const double kept_m = corner_mps > 0 ? tangent_m(corner_mps, angle_rad, agility.turn_rate_radps) : 0;
     const double length_m = leg.norm() - used_m - kept_m;
@@ -162,7 +162,7 @@ PlannedCourse plan_course(const Roads& roads, const Agility& agility, Duration d
     }
     driven.drive(course);
     if (stops)
-      course.stand(from_seconds(dice.between(0.5, 3)));
+      course.stand(from_seconds(dice.between(0.5, agility.halts.longest_s)));
     course.turn(angle_rad, agility.turn_rate_radps);
     speed_mps = corner_mps;
     used_m = kept_m;

@@ -8,6 +8,12 @@
 
 namespace locus::sim {
 
+/// How often a robot stops at a corner, and for how long at the longest.
+struct Halts {
+  double share = 0.12; ///< of the corners, 0..1
+  double longest_s = 3;
+};
+
 /// What a robot can do, and how it is driven.
 struct Agility {
   double cruise_mps;        ///< at most
@@ -15,6 +21,7 @@ struct Agility {
   double acceleration_mps2; ///< ordinary, mean of a change of speed
   double sudden_mps2;       ///< now and then, as a driver in a hurry does it
   double sudden_share;      ///< of all changes of speed, 0..1
+  Halts halts = {};
 };
 
 struct PlannedCourse {

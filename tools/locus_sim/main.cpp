@@ -29,7 +29,9 @@ void run(const SimArguments& arguments) {
     map.emplace(arguments.output / "gt_map.ply");
   }
   const sim::World world = arguments.world.make(arguments.seed);
-  const sim::Robot robot = arguments.robot.make(arguments.sensors, arguments.seed);
+  sim::Robot robot = arguments.robot.make(arguments.sensors, arguments.seed);
+  if (arguments.halts_s)
+    robot.agility.halts = {.share = 0.5, .longest_s = *arguments.halts_s};
   const sim::Trajectory trajectory =
       sim::drive_about(world, robot, arguments.duration, arguments.slips, arguments.seed);
   if (!folder) {

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_experiments/harsh_figures.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <fstream>
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "accuracy/pose_pairs.hpp"
+#include "locus_experiments/odometry_rows.hpp"
+#include "locus_replay/failure.hpp"
+
+namespace locus::experiments {
+namespace {
+
+using nlohmann::ordered_json;
+
+/// The largest mean speed from one sweep to the next.
+double largest_speed_mps(std::span<const PosePair> pairs) {
+  double largest = 0;
+  for (std::size_t i = 1; i < pairs.size(); ++i) {
+    const Eigen::Vector3d way_m = pairs[i].T_truth_base.translation - pairs[i - 1].T_truth_base.translation;
+    largest = std::max(largest, way_m.norm() / to_seconds(pairs[i].stamp - pairs[i - 1].stamp));
+  }
+  return largest;
+}
+
+bool stands_at_first(std::span<const PosePair> pairs) {
+  constexpr double kStill_m = 0.02;
+  const Stamp until = pairs.front().stamp + std::chrono::seconds{1};
+  return std::ranges::all_of(pairs, [&](const PosePair& pair) {
+    return pair.stamp > until ||
+           (pair.T_truth_base.translation - pairs.front().T_truth_base.translation).norm() < kStill_m;
+  });
+}
+
+/// When it was lost, and how long it took to say so.
+void add_loss(std::span<const PosePair> pairs, std::span<const OdometryRow> rows, ordered_json& figures) {
+  const Pose T_odom_truth = pairs.front().T_odom_base * pairs.front().T_truth_base.inverse();
+  const auto lost = std::ranges::find_if(pairs, [&](const PosePair& pair) {
+    return !((pair.T_odom_base.translation - T_odom_truth * pair.T_truth_base.translation).norm() < kLost_m);
+  });
+  const auto flagged =
+      std::find_if(lost, pairs.end(), [&](const PosePair& pair) { return rows[pair.estimate].flagged(); });
+  figures["lost_after_s"] =
+      lost == pairs.end() ? ordered_json(nullptr) : ordered_json(to_seconds(lost->stamp - pairs.front().stamp));
+  figures["flagged_after_s"] =
+      flagged == pairs.end() ? ordered_json(nullptr) : ordered_json(to_seconds(flagged->stamp - lost->stamp));
+}
+
+std::string without_numbers(std::string_view line) {
+  std::string text;
+  for (const char c : line) {
+    const bool digit = std::isdigit(static_cast<unsigned char>(c)) != 0;
+    if (!digit)
+      text += c;
+    else if (text.empty() || text.back() != '#')
+      text += '#';
+    if (text.ends_with("#.#"))
+      text.resize(text.size() - 2);
+  }
+  return text;
+}
+
+/// The warnings of its log, and which of the sources that spoke was taken out of use.
+std::vector<std::string> said(const std::filesystem::path& log, const ordered_json& summary) {
+  constexpr std::string_view kWarning = "locus-replay: warning: ";
+  std::set<std::string> lines;
+  std::ifstream stream{log};
+  for (std::string line; std::getline(stream, line);) {
+    if (line.starts_with(kWarning))
+      lines.insert(without_numbers(std::string_view(line).substr(kWarning.size())));
+  }
+  for (const auto& [name, source] : summary.at("sources").items()) {
+    if (source.at("received").get<std::uint64_t>() > 0 && source.at("health_changes").get<int>() > 0)
+      lines.insert(name + " set aside");
+  }
+  return {lines.begin(), lines.end()};
+}
+
+} // namespace
+
+ordered_json harsh_figures(const std::filesystem::path& run_folder, const CaptureFolder& capture,
+                           const ordered_json& summary) {
+  const auto [estimates, rows] = read_odometry(run_folder);
+  const std::vector<StampedPose> truth = read_poses(capture.ground_truth);
+  const std::vector<PosePair> pairs = paired(estimates, truth);
+  if (pairs.empty())
+    throw tools::Failure(
+        tools::ExitStatus::failed,
+        fmt::format("{}: has no estimate within the time of the truth; run again", run_folder.string()));
+  ordered_json figures{{"standing", stands_at_first(pairs)}, {"true_mps", largest_speed_mps(pairs)}};
+  add_loss(pairs, rows, figures);
+  figures["said"] = said(run_folder / "log", summary);
+  return figures;
+}
+
+} // namespace locus::experiments

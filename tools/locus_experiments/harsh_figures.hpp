@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+#include <nlohmann/json.hpp>
+
+#include "drivers/capture_folder.hpp"
+
+namespace locus::experiments {
+
+/// From here on an estimate is lost.
+inline constexpr double kLost_m = 0.3;
+
+/// What the harsh table wants to know of a drive beyond its summary:
+/// {"standing", "true_mps", "lost_after_s", "flagged_after_s", "said"}.
+///
+/// standing: the robot did not move in the first second of the drive. true_mps: the largest speed it truly had.
+/// lost_after_s: from the start to the first estimate that is farther than kLost_m from the truth, with the first poses
+/// aligned; null if there is none. flagged_after_s: from then to the first state that warns, degenerate or dead
+/// reckoning; null if none does. said: what the user was told, a line each, numbers left out. Throws tools::Failure.
+nlohmann::ordered_json harsh_figures(const std::filesystem::path& run_folder, const CaptureFolder& capture,
+                                     const nlohmann::ordered_json& summary);
+
+} // namespace locus::experiments

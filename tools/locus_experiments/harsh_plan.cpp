@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_experiments/harsh_plan.hpp"
+
+#include <algorithm>
+#include <span>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "locus_replay/failure.hpp"
+#include "locus_sim/imperfections.hpp"
+
+namespace locus::experiments {
+namespace {
+
+using tools::ExitStatus;
+using tools::Failure;
+using Options = std::vector<std::string>;
+
+struct Drive {
+  std::string name;
+  Options simulation;
+  std::vector<std::string> odometry;
+  bool bare = false;
+};
+
+const std::vector<Drive>& drives() {
+  static const std::vector<Drive> all{
+      {"plant", {"--world", "urban", "--robot", "husky"}, {"wio"}},
+      {"plant, two lidars", {"--world", "urban", "--robot", "husky", "--lidars", "2"}, {"wio"}},
+      {"mine", {"--world", "tunnel", "--robot", "husky"}, {"wio"}},
+      {"corridor", {"--world", "corridor", "--robot", "husky"}, {"wio"}, true},
+      {"field", {"--world", "field", "--robot", "husky"}, {"wio"}},
+      {"stairs, spot", {"--world", "stairs", "--robot", "spot"}, {"vio", "kio"}},
+      {"plant, spot", {"--world", "urban", "--robot", "spot"}, {"vio", "kio"}},
+      {"plant, hand-held", {"--world", "urban", "--robot", "handheld"}, {}},
+      {"road, car", {"--world", "road", "--robot", "car"}, {"wio"}}};
+  return all;
+}
+
+/// Those on which each group of imperfections is tried alone.
+constexpr std::array<std::string_view, 3> kTriedAlone{"plant", "corridor", "plant, spot"};
+
+struct Group {
+  std::string_view name;
+  std::vector<std::string_view> imperfections;
+};
+
+const std::vector<Group>& groups() {
+  static const std::vector<Group> all{
+      {"mounting", {"mounting-deg", "mounting-mm"}},
+      {"stamps", {"imu-late-ms", "imu-jitter-ms", "odometry-late-ms", "odometry-jitter-ms", "lidar-drift-ppm"}},
+      {"ranges", {"beam-mrad", "laser-bias-mm", "incidence-bias-mm", "intensity-bias-mm", "laser-elevation-deg"}},
+      {"own body", {"body-parts"}},
+      {"sources",
+       {"slip-bursts-per-min", "yaw-error-percent", "gyro-scale-percent", "gyro-walk-dps", "g-sensitivity-dps",
+        "vibration-mps2"}},
+      {"people", {"people"}},
+      {"vehicle", {"vehicle-s-per-min"}},
+      {"steam", {"steam-per-min"}},
+      {"mirrors", {"wet-floor-percent", "glass-percent"}}};
+  return all;
+}
+
+Hardship alone(const Group& group) {
+  Hardship hardship{std::string(group.name), {"--realism", "clean"}};
+  for (const std::string_view name : group.imperfections) {
+    const auto& one = *std::ranges::find(sim::kImperfections, name, &sim::NamedImperfection::name);
+    hardship.options.insert(hardship.options.end(), {fmt::format("--{}", name), fmt::format("{:g}", one.harsh)});
+  }
+  return hardship;
+}
+
+bool is_tried(const Drive& drive, const Hardship& hardship) {
+  const bool is_level = std::ranges::count(sim::kRealismNames, hardship.name) > 0;
+  return is_level || std::ranges::count(kTriedAlone, drive.name) > 0;
+}
+
+/// A name of files: without blanks and commas.
+std::string file_name(std::string name) {
+  std::erase(name, ',');
+  std::ranges::replace(name, ' ', '_');
+  return name;
+}
+
+Options without(const HarshCase& harsh_case, Sensors sensors) {
+  Options options;
+  const auto lose = [&](const std::string& source) {
+    options.insert(options.end(), {"--fail", fmt::format("{}:lost@0", source)});
+  };
+  if (sensors != Sensors::all)
+    std::ranges::for_each(harsh_case.odometry, lose);
+  if (sensors == Sensors::lidar)
+    lose("imu");
+  return options;
+}
+
+void add_runs(Plan& plan, const HarshCase& harsh_case, const std::string& course, int duration_s) {
+  for (const Sensors sensors : harsh_case.sensors()) {
+    for (int start = 0; start < kHarshStarts; ++start) {
+      Run run{course, harsh_configuration(sensors, start), without(harsh_case, sensors)};
+      const int start_s = start * (duration_s - kHarshDrive_s) / (kHarshStarts - 1);
+      run.options.insert(run.options.end(), {"--start", std::to_string(start_s), "--duration",
+                                             std::to_string(std::min(kHarshDrive_s, duration_s - start_s))});
+      run.from_a_start = true;
+      plan.runs.push_back(std::move(run));
+    }
+  }
+}
+
+} // namespace
+
+std::string name_of(Sensors sensors) {
+  switch (sensors) {
+  case Sensors::all:
+    return "all";
+  case Sensors::lidar_and_imu:
+    return "lidar and IMU";
+  case Sensors::lidar:
+    break;
+  }
+  return "lidar";
+}
+
+const std::vector<Hardship>& hardships() {
+  static const std::vector<Hardship> all = [] {
+    std::vector<Hardship> made;
+    for (const std::string_view level : {"real", "harsh"})
+      made.push_back({std::string(level), {"--realism", std::string(level)}});
+    std::ranges::transform(groups(), std::back_inserter(made), alone);
+    return made;
+  }();
+  return all;
+}
+
+std::vector<Sensors> HarshCase::sensors() const {
+  if (odometry.empty())
+    return {Sensors::lidar_and_imu, Sensors::lidar};
+  return {Sensors::all, Sensors::lidar_and_imu, Sensors::lidar};
+}
+
+std::string HarshCase::course_name(int seed) const {
+  return file_name(fmt::format("{}_{}_{}", course, hardship, seed));
+}
+
+std::vector<HarshCase> harsh_cases(const std::string& only) {
+  constexpr const char* kLongestHalt_s = "12"; // at every other corner: about half of the starts find it standing
+  std::vector<HarshCase> cases;
+  for (const Hardship& hardship : hardships()) {
+    for (const Drive& drive : drives()) {
+      const bool is_named = fmt::format("{}/{}", drive.name, hardship.name).find(only) != std::string::npos;
+      if (!is_tried(drive, hardship) || !is_named)
+        continue;
+      Options simulation = drive.simulation;
+      simulation.insert(simulation.end(), {"--halts", kLongestHalt_s});
+      simulation.insert(simulation.end(), hardship.options.begin(), hardship.options.end());
+      cases.push_back({drive.name, hardship.name, std::move(simulation), drive.odometry, drive.bare});
+    }
+  }
+  return cases;
+}
+
+std::string harsh_configuration(Sensors sensors, int start) {
+  return file_name(fmt::format("{}_{}", name_of(sensors), start));
+}
+
+Plan plan_of_harsh(const Arguments& arguments) {
+  if (arguments.duration_s <= kHarshDrive_s)
+    throw Failure(ExitStatus::wrong_usage,
+                  fmt::format("--duration {}: a harsh course has to be longer than its drives of {} s",
+                              arguments.duration_s, kHarshDrive_s));
+  const std::vector<HarshCase> cases = harsh_cases(arguments.only);
+  if (cases.empty())
+    throw Failure(ExitStatus::wrong_usage,
+                  fmt::format("--only {}: no COURSE/HARDSHIP holds that; there are plant/real, corridor/people, ...; "
+                              "--harsh without it shows all",
+                              arguments.only));
+  Plan plan;
+  for (int seed = 1; seed <= arguments.seeds; ++seed) {
+    for (const HarshCase& harsh_case : cases) {
+      const std::string name = harsh_case.course_name(seed);
+      Course course{name, arguments.output / "courses" / name, harsh_case.simulation};
+      course.simulation.insert(course.simulation.end(),
+                               {"--seed", std::to_string(seed), "--duration", std::to_string(arguments.duration_s)});
+      course.has_true_map = false;
+      plan.courses.push_back(std::move(course));
+      add_runs(plan, harsh_case, name, arguments.duration_s);
+    }
+  }
+  return plan;
+}
+
+} // namespace locus::experiments

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "drivers/motion_files.hpp"
+
+namespace locus::experiments {
+
+/// A row of odometry.csv, as far as it is of use here.
+struct OdometryRow {
+  std::string state;
+  Eigen::Matrix2d covariance_m2; ///< of x and y of odom
+
+  /// Whether it warns of itself.
+  [[nodiscard]] bool flagged() const { return state == "degenerate" || state == "dead_reckoning"; }
+};
+
+/// What a run of locus-replay left behind: each estimate with its row.
+struct OdometryRows {
+  std::vector<StampedPose> estimates;
+  std::vector<OdometryRow> rows; ///< as many
+};
+
+/// Reads odometry.tum and odometry.csv of a run's folder. Throws tools::Failure.
+OdometryRows read_odometry(const std::filesystem::path& run_folder);
+
+/// Reads a file of poses. Throws tools::Failure.
+std::vector<StampedPose> read_poses(const std::filesystem::path& file);
+
+} // namespace locus::experiments
