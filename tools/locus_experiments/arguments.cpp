@@ -77,6 +77,9 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   app.add_option("--merge", arguments.merge, "Makes one page of the output folders of all parts, and runs nothing")
       ->type_name("DIR...")
       ->excludes(shard_option);
+  app.add_option("--compare", arguments.compare,
+                 "Results of an earlier run of the same rows: which are better, which worse; compare.md")
+      ->type_name("BEFORE.json");
   app.add_flag("--keep-captures", arguments.keep_captures, "Leaves the simulated courses in DIR/courses");
   app.add_flag("--quiet", arguments.quiet, "Prints errors alone");
   app.set_version_flag("--version", "locus-experiments " LOCUS_VERSION);
@@ -86,7 +89,8 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
              "  locus-experiments --merge part1 part2 -o experiments\n"
              "  locus-experiments -o fleet robot1/ robot2/ robot3/\n"
              "  locus-experiments --faults --duration 120 -o faults\n"
-             "  locus-experiments --fault-matrix --duration 120 -o matrix");
+             "  locus-experiments --fault-matrix --duration 120 -o matrix\n"
+             "  locus-experiments --merge faults --compare before/results.json -o compared");
   if (!tools::parse_command_line(app, argc, argv))
     return std::nullopt;
   const std::optional<Shard> parsed = Shard::parse(shard);

@@ -24,6 +24,7 @@ struct Arguments {
   std::filesystem::path output;
   std::vector<std::filesystem::path> recordings; ///< capture folders; empty: the paper's courses, simulated
   std::vector<std::filesystem::path> merge;      ///< folders of finished shards; empty: run
+  std::filesystem::path compare;                 ///< results.json to compare the rows with; empty: none
   int duration_s = 300;                          ///< of a simulated course
   int pace_s = 60;                               ///< of a run at the pace of the recording
   bool faults = false;                           ///< the table of faults in place of the paper's experiments
