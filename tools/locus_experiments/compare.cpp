@@ -24,7 +24,7 @@ namespace {
 using tools::ExitStatus;
 using tools::Failure;
 
-/// A figure that differs by less, up or down, is the same.
+/// A figure that differs by less, up or down, is the same: half of what the tables allow a fault to add.
 constexpr double kSameShare = 0.1;
 
 /// The worst first.
@@ -35,7 +35,7 @@ struct RowChange {
   Change change;
   bool holding_changes;
   double gain; ///< of the worst figure, or the best one where the row is better: logarithm of before to after
-  bool bit_equal;
+  bool equal;  ///< all figures
 };
 
 /// Positive where less came out.
@@ -105,7 +105,7 @@ std::string shown(const FigureKind& kind, const std::optional<double>& before, c
   };
   if (!before && !after)
     return "";
-  if (before == after)
+  if (number(before) == number(after))
     return number(after);
   const bool counts = gain_of(kind, before, after) != 0;
   const bool has_share = counts && before && after && *before > 0;
@@ -139,11 +139,11 @@ std::string summary_of(const std::vector<RowChange>& changes) {
   const auto holding = [&](Change change) {
     return count([=](const RowChange& row) { return row.holding_changes && row.change == change; });
   };
-  return fmt::format("{} rows: {} worse, {} better, {} same, {} of these to the last bit. {} hold no longer, {} hold "
-                     "anew.\n",
-                     changes.size(), are(Change::worse), are(Change::better), are(Change::same),
-                     count([](const RowChange& row) { return row.bit_equal; }), holding(Change::worse),
-                     holding(Change::better));
+  return fmt::format(
+      "{} rows: {} worse, {} better, {} same, {} of these with equal figures. {} hold no longer, {} hold "
+      "anew.\n",
+      changes.size(), are(Change::worse), are(Change::better), are(Change::same),
+      count([](const RowChange& row) { return row.equal; }), holding(Change::worse), holding(Change::better));
 }
 
 std::string what_is_same(const std::vector<FigureKind>& kinds) {
@@ -152,11 +152,11 @@ std::string what_is_same(const std::vector<FigureKind>& kinds) {
     if (kind.negligible > 0)
       negligible.push_back(fmt::format("{} {:g}", kind.name, kind.shown_per_unit * kind.negligible));
   }
-  return fmt::format(
-      "A figure is the same if it differs by no more than {:.0f} %, or by no more than the last bits of a computation "
-      "can make of it ({}). A row is worse if any of its figures is, better if none is and one is better; whether it "
-      "holds goes before its figures.\n",
-      100 * kSameShare, fmt::join(negligible, "; "));
+  return fmt::format("A figure is the same if it differs by no more than {:.0f} %, half of what is allowed a fault, or "
+                     "by no more than nobody would notice, some ten times what another instruction set makes of the "
+                     "same code ({}). A row is worse if any of its figures is, better if none is and one is better; "
+                     "whether it holds goes before its figures.\n",
+                     100 * kSameShare, fmt::join(negligible, "; "));
 }
 
 std::string header_of(const std::vector<FigureKind>& kinds) {

@@ -12,7 +12,7 @@
 namespace locus::experiments {
 namespace {
 
-/// A millimetre of error: half of what a VLP-16 tells ranges by.
+/// Below a millimetre nobody can say that anything has changed: half of what a VLP-16 tells ranges by.
 constexpr FigureKind kError{"error, mm", 1e3, 1, 1e-3}, kMedianError{"median error, mm", 1e3, 1, 1e-3},
     kWorstError{"worst error, mm", 1e3, 1, 1e-3};
 constexpr FigureKind kSigma{"worst sigma", 1, 1, 0.1};
