@@ -32,10 +32,10 @@ double value_of(const std::vector<std::string>& options, const std::string& opti
 
 TEST(HarshPlan, EveryImperfectionIsTriedAloneInHardUseOnceOnEachCourse) {
   for (const sim::NamedImperfection& one : sim::kImperfections) {
-    const auto has_it = [&](const Hardship& hardship) {
-      return value_of(hardship.options, "--" + std::string(one.name)) == one.harsh;
+    const auto has_it = [&](const Imperfection& imperfection) {
+      return value_of(imperfection.options, "--" + std::string(one.name)) == one.harsh;
     };
-    EXPECT_EQ(std::ranges::count_if(hardships(), has_it), 1) << one.name;
+    EXPECT_EQ(std::ranges::count_if(imperfections(), has_it), 1) << one.name;
   }
 }
 
@@ -44,7 +44,7 @@ TEST(HarshPlan, RealAndHarshWorldsAreDrivenOnEveryCourse) {
   std::map<std::string, std::set<std::string>> driven;
   for (const HarshCase& harsh_case : harsh_cases("")) {
     courses.insert(harsh_case.course);
-    driven[harsh_case.hardship].insert(harsh_case.course);
+    driven[harsh_case.imperfection].insert(harsh_case.course);
   }
   EXPECT_EQ(courses.size(), 9U);
   EXPECT_EQ(driven["real"], courses);

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <csignal>
+#include <fstream>
 #include <set>
 #include <thread>
 
@@ -124,6 +125,19 @@ TEST(LocusExperiments, WrongUsageIsExplainedInOneLine) {
   const ProgramRun merging = experiments({"--merge", "/nowhere", "-o", TemporaryFolder() / "out"});
   EXPECT_EQ(merging.status, 1);
   EXPECT_NE(merging.err.find("/nowhere/results.json: no results"), std::string::npos) << merging.err;
+}
+
+TEST(LocusExperiments, WhatCannotBeComparedWithIsRefusedBeforeAnythingRuns) {
+  const TemporaryFolder folder;
+  std::ofstream{folder / "paper.json"} << R"({"version": "1", "duration_s": 300, "runs": []})";
+  for (const auto& [before, problem] : {std::pair{"/nowhere/results.json", "/nowhere/results.json: no results"},
+                                        std::pair{"paper.json", "paper.json: holds no results of the same"}}) {
+    const ProgramRun run = experiments({"--faults", "--compare", folder.path() / before, "-o", folder / "out"});
+    EXPECT_EQ(run.status, 1);
+    EXPECT_NE(run.err.find(problem), std::string::npos) << run.err;
+    EXPECT_EQ(lines_of(run.err).size(), 1U) << run.err;
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
 }
 
 TEST(LocusExperiments, HelpHasAnExampleAndVersionIsTold) {

@@ -71,14 +71,14 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
                      ->excludes(faults);
   auto* harsh =
       app.add_flag("--harsh", arguments.harsh,
-                   "Every course in a real and in a harsh world, and each hardship alone, from ten starts, with "
+                   "Every course in a real and in a harsh world, and each imperfection alone, from ten starts, with "
                    "all sensors, lidar and IMU, lidar alone: harsh.md")
           ->excludes(recordings)
           ->excludes(faults)
           ->excludes(matrix)
           ->excludes(realism);
   app.add_option("--only", arguments.only,
-                 "Of --harsh the rows whose COURSE/HARDSHIP holds this, as in corridor/people")
+                 "Of --harsh the rows whose COURSE/IMPERFECTION holds this, as in corridor/people")
       ->type_name("TEXT")
       ->needs(harsh);
   app.add_option("--seeds", arguments.seeds, "Of each course with --faults or --harsh")
@@ -100,6 +100,9 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   app.add_option("--merge", arguments.merge, "Makes one page of the output folders of all parts, and runs nothing")
       ->type_name("DIR...")
       ->excludes(shard_option);
+  app.add_option("--compare", arguments.compare,
+                 "Results of an earlier run of the same rows: which are better, which worse; compare.md")
+      ->type_name("BEFORE.json");
   app.add_flag("--keep-captures", arguments.keep_captures, "Leaves the simulated courses in DIR/courses");
   app.add_flag("--quiet", arguments.quiet, "Prints errors alone");
   app.set_version_flag("--version", "locus-experiments " LOCUS_VERSION);
@@ -110,7 +113,8 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
              "  locus-experiments -o fleet robot1/ robot2/ robot3/\n"
              "  locus-experiments --faults --duration 120 -o faults\n"
              "  locus-experiments --fault-matrix --duration 120 -o matrix\n"
-             "  locus-experiments --harsh --seeds 1 -o harsh");
+             "  locus-experiments --harsh --seeds 1 -o harsh\n"
+             "  locus-experiments --merge faults --compare before/results.json -o compared");
   if (!tools::parse_command_line(app, argc, argv))
     return std::nullopt;
   if (arguments.harsh && duration->empty())

@@ -24,13 +24,14 @@ struct Arguments {
   std::filesystem::path output;
   std::vector<std::filesystem::path> recordings; ///< capture folders; empty: the paper's courses, simulated
   std::vector<std::filesystem::path> merge;      ///< folders of finished shards; empty: run
+  std::filesystem::path compare;                 ///< results.json to compare the rows with; empty: none
   int duration_s = 300;                          ///< of a simulated course
   std::string realism = "real";                  ///< of simulated courses, as locus-sim has it
   int pace_s = 60;                               ///< of a run at the pace of the recording
   bool faults = false;                           ///< the table of faults in place of the paper's experiments
   bool fault_matrix = false;                     ///< the matrix of faults in their place
   bool harsh = false;                            ///< the harsh courses in their place
-  std::string only = {};                         ///< of these, whose COURSE/HARDSHIP holds this
+  std::string only = {};                         ///< of these, whose COURSE/IMPERFECTION holds this
   int seeds = 3;                                 ///< of each course of the faults and of the harsh ones
   int honesty_runs = 100;                        ///< for its line on the covariances
   int jobs = 1;

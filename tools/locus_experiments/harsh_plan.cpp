@@ -63,17 +63,18 @@ const std::vector<Group>& groups() {
   return all;
 }
 
-Hardship alone(const Group& group) {
-  Hardship hardship{std::string(group.name), {"--realism", "clean"}};
+Imperfection alone(const Group& group) {
+  Imperfection imperfection{std::string(group.name), {"--realism", "clean"}};
   for (const std::string_view name : group.imperfections) {
     const auto& one = *std::ranges::find(sim::kImperfections, name, &sim::NamedImperfection::name);
-    hardship.options.insert(hardship.options.end(), {fmt::format("--{}", name), fmt::format("{:g}", one.harsh)});
+    imperfection.options.insert(imperfection.options.end(),
+                                {fmt::format("--{}", name), fmt::format("{:g}", one.harsh)});
   }
-  return hardship;
+  return imperfection;
 }
 
-bool is_tried(const Drive& drive, const Hardship& hardship) {
-  const bool is_level = std::ranges::count(sim::kRealismNames, hardship.name) > 0;
+bool is_tried(const Drive& drive, const Imperfection& imperfection) {
+  const bool is_level = std::ranges::count(sim::kRealismNames, imperfection.name) > 0;
   return is_level || std::ranges::count(kTriedAlone, drive.name) > 0;
 }
 
@@ -123,9 +124,9 @@ std::string name_of(Sensors sensors) {
   return "lidar";
 }
 
-const std::vector<Hardship>& hardships() {
-  static const std::vector<Hardship> all = [] {
-    std::vector<Hardship> made;
+const std::vector<Imperfection>& imperfections() {
+  static const std::vector<Imperfection> all = [] {
+    std::vector<Imperfection> made;
     for (const std::string_view level : {"real", "harsh"})
       made.push_back({std::string(level), {"--realism", std::string(level)}});
     std::ranges::transform(groups(), std::back_inserter(made), alone);
@@ -141,21 +142,21 @@ std::vector<Sensors> HarshCase::sensors() const {
 }
 
 std::string HarshCase::course_name(int seed) const {
-  return file_name(fmt::format("{}_{}_{}", course, hardship, seed));
+  return file_name(fmt::format("{}_{}_{}", course, imperfection, seed));
 }
 
 std::vector<HarshCase> harsh_cases(const std::string& only) {
   constexpr const char* kLongestHalt_s = "12"; // at every other corner: about half of the starts find it standing
   std::vector<HarshCase> cases;
-  for (const Hardship& hardship : hardships()) {
+  for (const Imperfection& imperfection : imperfections()) {
     for (const Drive& drive : drives()) {
-      const bool is_named = fmt::format("{}/{}", drive.name, hardship.name).find(only) != std::string::npos;
-      if (!is_tried(drive, hardship) || !is_named)
+      const bool is_named = fmt::format("{}/{}", drive.name, imperfection.name).find(only) != std::string::npos;
+      if (!is_tried(drive, imperfection) || !is_named)
         continue;
       Options simulation = drive.simulation;
       simulation.insert(simulation.end(), {"--halts", kLongestHalt_s});
-      simulation.insert(simulation.end(), hardship.options.begin(), hardship.options.end());
-      cases.push_back({drive.name, hardship.name, std::move(simulation), drive.odometry, drive.bare});
+      simulation.insert(simulation.end(), imperfection.options.begin(), imperfection.options.end());
+      cases.push_back({drive.name, imperfection.name, std::move(simulation), drive.odometry, drive.bare});
     }
   }
   return cases;
@@ -172,10 +173,11 @@ Plan plan_of_harsh(const Arguments& arguments) {
                               arguments.duration_s, kHarshDrive_s));
   const std::vector<HarshCase> cases = harsh_cases(arguments.only);
   if (cases.empty())
-    throw Failure(ExitStatus::wrong_usage,
-                  fmt::format("--only {}: no COURSE/HARDSHIP holds that; there are plant/real, corridor/people, ...; "
-                              "--harsh without it shows all",
-                              arguments.only));
+    throw Failure(
+        ExitStatus::wrong_usage,
+        fmt::format("--only {}: no COURSE/IMPERFECTION holds that; there are plant/real, corridor/people, ...; "
+                    "--harsh without it shows all",
+                    arguments.only));
   Plan plan;
   for (int seed = 1; seed <= arguments.seeds; ++seed) {
     for (const HarshCase& harsh_case : cases) {

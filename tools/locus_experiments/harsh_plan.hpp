@@ -21,15 +21,15 @@ enum class Sensors { all, lidar_and_imu, lidar };
 std::string name_of(Sensors sensors);
 
 /// What makes a course hard: a level of realism, or one group of imperfections in hard use in an otherwise clean world.
-struct Hardship {
+struct Imperfection {
   std::string name;
   std::vector<std::string> options; ///< of locus-sim
 };
-const std::vector<Hardship>& hardships();
+const std::vector<Imperfection>& imperfections();
 
-/// A robot in a place with a hardship: a row of the table for each choice of sensors.
+/// A robot in a place with a imperfection: a row of the table for each choice of sensors.
 struct HarshCase {
-  std::string course, hardship;
+  std::string course, imperfection;
   std::vector<std::string> simulation; ///< options of locus-sim, but for seed and duration
   std::vector<std::string> odometry;   ///< names of the robot's odometry sources
   bool bare = false;                   ///< lidar tells nothing of one direction
@@ -40,7 +40,7 @@ struct HarshCase {
   [[nodiscard]] std::string course_name(int seed) const;
 };
 
-/// The cases whose COURSE/HARDSHIP holds `only`; all if it is empty.
+/// The cases whose COURSE/IMPERFECTION holds `only`; all if it is empty.
 std::vector<HarshCase> harsh_cases(const std::string& only);
 
 /// Of a run: which sensors, which start.

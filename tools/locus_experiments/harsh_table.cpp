@@ -127,7 +127,7 @@ std::optional<Results> row_of(const HarshCase& harsh_case, Sensors sensors, cons
   if (drives.empty() && failed == 0)
     return std::nullopt;
   Results row{{"course", harsh_case.course},
-              {"hardship", harsh_case.hardship},
+              {"imperfection", harsh_case.imperfection},
               {"sensors", name_of(sensors)},
               {"drives", drives.size()},
               {"failed", failed}};
@@ -185,7 +185,7 @@ std::string line_of(const Results& row) {
   const auto broken = row.at("broken").get<std::vector<std::string>>();
   const std::string holds = broken.empty() ? "yes" : fmt::format("**no**: {}", fmt::join(broken, ", "));
   const std::string head = fmt::format("| {} | {} | {} ", row.at("course").get<std::string>(),
-                                       row.at("hardship").get<std::string>(), row.at("sensors").get<std::string>());
+                                       row.at("imperfection").get<std::string>(), row.at("sensors").get<std::string>());
   if (!row.contains("median_m"))
     return fmt::format("{}| 0 | | | | | | | {} | |\n", head, holds);
   const Results& nees = row.at("nees_10m");
@@ -225,8 +225,9 @@ std::string harsh_table(const Results& results) {
                   machines_of(results.at("runs")), hold, rows.size());
   if (const std::size_t done = results.at("runs").size(), planned = results.value("planned", done); done < planned)
     text += fmt::format("A shard: {} of {} runs.\n\n", done, planned);
-  text += "| course | hardship | sensors | drives, from a stand | mean error, mm | worst, mm | worst sigma | NEES | "
-          "claims, has m/s | lost, said | holds | said |\n|---|---|---|---|---:|---:|---:|---:|---|---|---|---|\n";
+  text +=
+      "| course | imperfection | sensors | drives, from a stand | mean error, mm | worst, mm | worst sigma | NEES | "
+      "claims, has m/s | lost, said | holds | said |\n|---|---|---|---|---:|---:|---:|---:|---|---|---|---|\n";
   for (const Results& row : rows)
     text += line_of(row);
   return text;

@@ -7,9 +7,9 @@
 
 namespace locus::experiments {
 
-/// Adds "rows" to results["harsh"], one for each course, hardship and choice of sensors of which there are runs:
-/// {"course", "hardship", "sensors", "drives", "standing", "failed", "median_m", "worst_m", "worst_sigma", "nees_10m",
-/// "claimed_mps", "true_mps", "lost", "flagged", "flagged_after_s", "said", "broken", "holds"}.
+/// Adds "rows" to results["harsh"], one for each course, imperfection and choice of sensors of which there are runs:
+/// {"course", "imperfection", "sensors", "drives", "standing", "failed", "median_m", "worst_m", "worst_sigma",
+/// "nees_10m", "claimed_mps", "true_mps", "lost", "flagged", "flagged_after_s", "said", "broken", "holds"}.
 ///
 /// drives: those that ran, of them standing at first. median_m: of their mean position errors; worst_m: the largest
 /// position error of any. claimed_mps and true_mps: the largest speed that any estimate claims, and that the robot had.

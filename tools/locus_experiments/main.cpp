@@ -17,6 +17,7 @@
 
 #include "locus_experiments/arguments.hpp"
 #include "locus_experiments/child_process.hpp"
+#include "locus_experiments/compare.hpp"
 #include "locus_experiments/conductor.hpp"
 #include "locus_experiments/loam_features.hpp"
 #include "locus_experiments/measurement.hpp"
@@ -68,6 +69,22 @@ void keep_figures_alone(const std::filesystem::path& run_folder) {
   std::error_code ignored;
   for (const char* const name : {"map.pcd", "odometry.csv", "odometry.tum", "report.html"})
     std::filesystem::remove(run_folder / name, ignored);
+}
+
+/// What results say before any run is done.
+Results what_is_asked(const Arguments& arguments) {
+  Results asked{{"version", LOCUS_VERSION},
+                {"simulated", arguments.recordings.empty()},
+                {"duration_s", arguments.recordings.empty() ? Results(arguments.duration_s) : Results(nullptr)}};
+  if (arguments.faults)
+    asked["faults"] = {{"seeds", arguments.seeds}, {"consistency_runs", arguments.honesty_runs}};
+  if (arguments.fault_matrix)
+    asked["matrix"] = Results::object();
+  if (arguments.harsh)
+    asked["harsh"] = {{"seeds", arguments.seeds}, {"only", arguments.only}};
+  else if (arguments.recordings.empty())
+    asked["realism"] = arguments.realism;
+  return asked;
 }
 
 /// The plan carried out, and what came of it.
@@ -201,23 +218,13 @@ void Experiments::carry_out(const Run& run) {
 }
 
 Results Experiments::results() const {
-  Results results{{"version", LOCUS_VERSION},
-                  {"simulated", arguments_.recordings.empty()},
-                  {"duration_s", arguments_.recordings.empty() ? Results(arguments_.duration_s) : Results(nullptr)},
-                  {"planned", plan_.size},
-                  {"runs", Results::array()}};
+  Results results = what_is_asked(arguments_);
+  results["planned"] = plan_.size;
+  results["runs"] = Results::array();
   for (const Run& run : plan_.runs) {
     results["runs"].push_back(done_.at(run.id()));
     results["runs"].back()["place"] = run.place;
   }
-  if (arguments_.faults)
-    results["faults"] = {{"seeds", arguments_.seeds}, {"consistency_runs", arguments_.honesty_runs}};
-  if (arguments_.fault_matrix)
-    results["matrix"] = Results::object();
-  if (arguments_.harsh)
-    results["harsh"] = {{"seeds", arguments_.seeds}, {"only", arguments_.only}};
-  else if (arguments_.recordings.empty())
-    results["realism"] = arguments_.realism;
   judge(results);
   return results;
 }
@@ -274,11 +281,21 @@ Results experiment(const Arguments& arguments) {
 }
 
 void run(const Arguments& arguments) {
+  std::optional<ResultsBefore> before;
+  if (!arguments.compare.empty())
+    before.emplace(arguments.compare);
+  if (before && arguments.merge.empty()) // an hour before it would be of use
+    before->check_is_of(what_is_asked(arguments));
   make_folder(arguments.output);
   const Results results = arguments.merge.empty() ? experiment(arguments) : merged(arguments.merge);
   const std::filesystem::path page = write_results(arguments.output, results);
   if (!arguments.quiet)
     fmt::print("results in {}\n", page.string());
+  if (before) {
+    const std::string comparison = write_comparison(*before, results, arguments.output);
+    if (!arguments.quiet)
+      fmt::print("{}", comparison);
+  }
   if (const std::string failures = failures_in(results); !failures.empty())
     throw Failure(ExitStatus::failed, failures);
 }

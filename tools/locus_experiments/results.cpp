@@ -31,16 +31,6 @@ std::string id_of(const Results& run) {
   return run.at("course").get<std::string>() + '/' + run.at("configuration").get<std::string>();
 }
 
-Results read_results(const std::filesystem::path& folder) {
-  std::ifstream stream{folder / kFileName};
-  Results results = Results::parse(stream, nullptr, false);
-  if (!results.is_object() || !results.contains("runs") || !results.at("runs").is_array())
-    throw Failure(ExitStatus::failed, fmt::format("{}: no results of locus-experiments; name the folder that it was "
-                                                  "given with -o",
-                                                  (folder / kFileName).string()));
-  return results;
-}
-
 const Results* find(const Results& runs, const std::string& course, std::string_view configuration) {
   const auto found = std::ranges::find_if(runs, [&](const Results& run) {
     return run.at("course") == course && run.at("configuration") == configuration && !run.contains("failed");
@@ -65,11 +55,21 @@ std::string verdict(const Results& failed, const Results& reference) {
 
 } // namespace
 
+Results read_results(const std::filesystem::path& file) {
+  std::ifstream stream{file};
+  Results results = Results::parse(stream, nullptr, false);
+  if (!results.is_object() || !results.contains("runs") || !results.at("runs").is_array())
+    throw Failure(ExitStatus::failed, fmt::format("{}: no results of locus-experiments; name what it left in the "
+                                                  "folder that it was given with -o",
+                                                  file.string()));
+  return results;
+}
+
 Results merged(const std::vector<std::filesystem::path>& folders) {
   Results all;
   std::set<std::string> seen;
   for (const std::filesystem::path& folder : folders) {
-    Results part = read_results(folder);
+    Results part = read_results(folder / kFileName);
     if (all.is_null()) {
       all = part;
       all["runs"] = Results::array();

@@ -17,6 +17,9 @@ namespace locus::experiments {
 /// [...]}, of judge_harsh(). A run that was to be refused, and was, has "refused", what locus-replay said.
 using Results = nlohmann::ordered_json;
 
+/// Reads a results.json. Throws tools::Failure.
+Results read_results(const std::filesystem::path& file);
+
 /// Puts the runs of several shards together. Throws tools::Failure where a folder holds no results, where two hold the
 /// same run, or where they do not belong together.
 Results merged(const std::vector<std::filesystem::path>& folders);

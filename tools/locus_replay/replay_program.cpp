@@ -109,7 +109,8 @@ CaptureFolder find_files(const std::filesystem::path& capture) {
 }
 
 /// As fast as the machine can; the same bits on every run.
-void replay(const Config& config, LidarRouter lidars, Recording& recording, Results& results, const SweepStage& stage) {
+void replay(const Config& config, LidarRouter lidars, Recording& recording, Results& results, const SweepStage& stage,
+            const EstimateObserver& observer) {
   daemon::SweepCounters counters;
   daemon::SweepProcessor processor(config.odometry);
   const auto process = [&](daemon::Ingest& ingest, Sweep& sweep, const daemon::SweepCut& cut) {
@@ -120,6 +121,8 @@ void replay(const Config& config, LidarRouter lidars, Recording& recording, Resu
     ingest.take(processor.odometry().feedback());
     ++counters.seen;
     ++(done.estimate.failed ? counters.failed : counters.processed);
+    if (observer)
+      observer(done.estimate);
     results.take(done);
   };
   daemon::Ingest ingest(
@@ -152,7 +155,7 @@ void replay_live(const Config& config, LidarRouter lidars, Recording& recording,
   results.finish(pipeline.ingest(), pipeline.processor(), pipeline.counters());
 }
 
-void run(const Arguments& arguments, const SweepStage& stage) {
+void run(const Arguments& arguments, const SweepStage& stage, const EstimateObserver& observer) {
   const MachineTime begin = MachineTime::now();
   const CaptureFolder folder = find_files(arguments.capture);
   check_output(arguments.output);
@@ -178,15 +181,15 @@ void run(const Arguments& arguments, const SweepStage& stage) {
   if (arguments.realtime_speed)
     replay_live(config, std::move(lidars), recording, *arguments.realtime_speed, results);
   else
-    replay(config, std::move(lidars), recording, results, stage);
+    replay(config, std::move(lidars), recording, results, stage, observer);
 }
 
 } // namespace
 
-int replay_program(int argc, char** argv, const SweepStage& stage) {
+int replay_program(int argc, char** argv, const SweepStage& stage, const EstimateObserver& observer) {
   try {
     if (const std::optional<Arguments> arguments = parse_arguments(argc, argv))
-      run(*arguments, stage);
+      run(*arguments, stage, observer);
     flush_standard_output();
     return static_cast<int>(ExitStatus::done);
   } catch (const Failure& failure) {

@@ -3,6 +3,7 @@
 
 #include <functional>
 
+#include "core/odometry_estimate.hpp"
 #include "core/sweep.hpp"
 
 namespace locus::tools {
@@ -10,8 +11,11 @@ namespace locus::tools {
 /// What an experiment does to a sweep between its cut and the odometry, which the service does not.
 using SweepStage = std::function<void(Sweep&)>;
 
-/// The program locus-replay, from its arguments to its exit status. A stage has no place in --realtime, which runs what
-/// the service runs.
-int replay_program(int argc, char** argv, const SweepStage& stage = {});
+/// What is shown each estimate as it is, sweep by sweep: the files round it and leave the twist out.
+using EstimateObserver = std::function<void(const OdometryEstimate&)>;
+
+/// The program locus-replay, from its arguments to its exit status. A stage and an observer have no place in
+/// --realtime, which runs what the service runs.
+int replay_program(int argc, char** argv, const SweepStage& stage = {}, const EstimateObserver& observer = {});
 
 } // namespace locus::tools

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_experiments/compare.hpp"
+
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "locus_experiments/matrix_plan.hpp"
+#include "locus_replay/failure.hpp"
+#include "replay/replay_run.hpp"
+
+namespace locus::experiments {
+namespace {
+
+/// A row as judge_faults() makes it.
+Results fault_row(const std::string& configuration, double error_m, double worst_sigma = 2.0, bool holds = true) {
+  return {{"fault", "a fault"},
+          {"course", "urban"},
+          {"configuration", configuration},
+          {"broken", holds ? Results::array() : Results::array({"too large an error"})},
+          {"ape_mean_m", {{"without", 0.004}, {"with", error_m}}},
+          {"sweeps", {{"lost", 0}, {"failed", 0}}},
+          {"worst_sigma", worst_sigma},
+          {"holds", holds}};
+}
+
+Results faults(const std::vector<Results>& rows) {
+  return {{"version", "1"},
+          {"duration_s", 60},
+          {"runs", Results::array()},
+          {"faults", {{"seeds", 1}, {"consistency_runs", 0}, {"rows", rows}, {"consistency", nullptr}}}};
+}
+
+class Compare : public testing::Test {
+ protected:
+  [[nodiscard]] ResultsBefore before(const Results& results) const {
+    std::ofstream{folder_ / "before.json"} << results;
+    return ResultsBefore(folder_ / "before.json");
+  }
+  [[nodiscard]] std::string page(const Results& was, const Results& is) const {
+    return before(was).comparison_with(is);
+  }
+  [[nodiscard]] std::string error(const Results& was, const Results& is) const {
+    try {
+      before(was).check_is_of(is);
+    } catch (const tools::Failure& failure) {
+      return failure.what();
+    }
+    return "";
+  }
+  /// What becomes of a row by its figures alone.
+  [[nodiscard]] std::string verdict(double was_m, double is_m, double was_sigma = 2.0, double is_sigma = 2.0) const {
+    const std::string text = page(faults({fault_row("a", was_m, was_sigma)}), faults({fault_row("a", is_m, is_sigma)}));
+    const std::size_t end = text.find(" | urban/a |");
+    const std::size_t begin = text.rfind('\n', end) + 3;
+    return text.substr(begin, end - begin);
+  }
+
+  test::TemporaryFolder folder_;
+};
+
+bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+TEST_F(Compare, ADifferenceCountsBeyondAMillimetreAndATenth) {
+  EXPECT_EQ(verdict(0.0040, 0.0049), "same") << "less than a millimetre";
+  EXPECT_EQ(verdict(0.100, 0.109), "same") << "less than a tenth";
+  EXPECT_EQ(verdict(0.0040, 0.0051), "**worse**");
+  EXPECT_EQ(verdict(0.100, 0.111), "**worse**");
+  EXPECT_EQ(verdict(0.0051, 0.0040), "better");
+  EXPECT_EQ(verdict(0.004, 0.004, 2.0, 2.15), "same");
+  EXPECT_EQ(verdict(0.004, 0.004, 2.0, 2.3), "**worse**");
+}
+
+TEST_F(Compare, ARowIsWorseIfAnyFigureIs) {
+  EXPECT_EQ(verdict(0.1, 0.01, 2.0, 4.0), "**worse**");
+  EXPECT_EQ(verdict(0.01, 0.1, 4.0, 2.0), "**worse**");
+}
+
+TEST_F(Compare, WhetherItHoldsGoesBeforeItsFigures) {
+  const std::string lost = page(faults({fault_row("a", 0.0201)}), faults({fault_row("a", 0.0200, 2.0, false)}));
+  EXPECT_TRUE(has(lost, "| **worse** | urban/a | yes -> **no**: too large an error | 20.1 -> 20.0 |")) << lost;
+  EXPECT_TRUE(has(lost, "1 worse, 0 better, 0 same")) << lost;
+  EXPECT_TRUE(has(lost, "1 hold no longer, 0 hold anew")) << lost;
+  const std::string found = page(faults({fault_row("a", 0.02, 2.0, false)}), faults({fault_row("a", 0.04)}));
+  EXPECT_TRUE(has(found, "| better | urban/a | **no** -> yes | 20.0 -> 40.0 (+100 %) |")) << found;
+}
+
+TEST_F(Compare, TheWorstComesFirst) {
+  const std::vector<Results> was{fault_row("same", 0.01), fault_row("better", 0.1), fault_row("worse", 0.01),
+                                 fault_row("worst", 0.01), fault_row("breaks", 0.02)};
+  const std::vector<Results> is{fault_row("same", 0.01), fault_row("better", 0.01), fault_row("worse", 0.02),
+                                fault_row("worst", 0.5), fault_row("breaks", 0.02, 2.0, false)};
+  const std::string text = page(faults(was), faults(is));
+  std::size_t at = 0;
+  for (const char* name : {"breaks", "worst", "worse", "same", "better"}) {
+    const std::size_t here = text.find(std::string("| urban/") + name + " |");
+    EXPECT_GT(here, at) << name << '\n' << text;
+    at = here;
+  }
+  EXPECT_TRUE(has(text, "5 rows: 3 worse, 1 better, 1 same, 1 of these with equal figures")) << text;
+}
+
+TEST_F(Compare, RowsThatOnlyOneOfThemHasAreNamed) {
+  const std::string text =
+      page(faults({fault_row("a", 0.1), fault_row("gone", 0.1)}), faults({fault_row("a", 0.1), fault_row("new", 0.1)}));
+  EXPECT_TRUE(has(text, "1 rows: 0 worse, 0 better, 1 same")) << text;
+  EXPECT_TRUE(has(text, "Only before, 1: urban/gone.")) << text;
+  EXPECT_TRUE(has(text, "Only after, 1: urban/new.")) << text;
+}
+
+TEST_F(Compare, ARunThatGivesNoFigureAnyMoreIsWorse) {
+  const Results failed{{"fault", "a fault"},
+                       {"course", "urban"},
+                       {"configuration", "a"},
+                       {"broken", {"seed 1 did not run"}},
+                       {"holds", false}};
+  EXPECT_TRUE(has(page(faults({fault_row("a", 0.1, 2.0, false)}), faults({failed})), "| **worse** | urban/a |"));
+  EXPECT_TRUE(has(page(faults({failed}), faults({failed})), "| same | urban/a |"));
+}
+
+TEST_F(Compare, TheCovariancesAreARowThatIsBestAtSix) {
+  const auto with_nees = [](double nees, int runs) {
+    Results results = faults({});
+    results["faults"]["consistency"] = {{"runs", runs}, {"failed", 0}, {"nees_10m", nees}, {"holds", true}};
+    return results;
+  };
+  EXPECT_TRUE(has(page(with_nees(3.6, 100), with_nees(8.0, 100)), "| better | covariances, 100 runs | yes |"));
+  EXPECT_TRUE(has(page(with_nees(8.0, 100), with_nees(11.0, 100)), "| **worse** | covariances, 100 runs | yes |"));
+  EXPECT_TRUE(has(page(with_nees(8.0, 100), with_nees(8.0, 4)), "Only after, 1: covariances, 4 runs."));
+}
+
+/// One cell of the matrix and the run that it is judged by.
+Results matrix(double error_m) {
+  MatrixCell cell;
+  cell.input = "wio";
+  cell.what = "frozen";
+  const Results figures{{"ape_m", {{"mean", error_m}}},
+                        {"covariance", {{"worst_sigma", 2.0}}},
+                        {"sweeps", {{"dropped", 0}, {"failed", 0}}}};
+  const Results run{{"course", matrix_course()}, {"configuration", cell.configuration()}, {"summary", figures}};
+  const Results judged{
+      {"input", "wio"}, {"fault", "frozen"}, {"from_start", false}, {"broken", Results::array()}, {"holds", true}};
+  const Results impossible{{"input", "top"}, {"fault", "NaN"}, {"from_start", false}, {"impossible", "no number"}};
+  return {{"version", "1"}, {"duration_s", 60}, {"runs", {run}}, {"matrix", {{"cells", {judged, impossible}}}}};
+}
+
+TEST_F(Compare, ACellOfTheMatrixHasTheFiguresOfItsRun) {
+  const std::string text = page(matrix(0.004), matrix(0.008));
+  EXPECT_TRUE(has(text, "| **worse** | wio: frozen, mid-drive | yes | 4.0 -> 8.0 (+100 %) | 2.0 | 0 | 0 |")) << text;
+  EXPECT_TRUE(has(text, "1 rows: 1 worse")) << text;
+}
+
+TEST_F(Compare, HarshRowsAreKeyedByCourseImperfectionAndSensors) {
+  const auto harsh = [](double worst_m) {
+    const Results row{{"course", "urban"}, {"imperfection", "late IMU"}, {"sensors", "all"},
+                      {"median_m", 0.02},  {"worst_m", worst_m},         {"worst_sigma", 1.0}};
+    return Results{{"version", "1"}, {"duration_s", 60}, {"runs", Results::array()}, {"harsh", {{"rows", {row}}}}};
+  };
+  const std::string text = page(harsh(0.1), harsh(124));
+  EXPECT_TRUE(has(text, "| **worse** | urban, late IMU, all |  | 20.0 | 100.0 -> 124000.0 (+123900 %) | 1.0 |"))
+      << text;
+}
+
+TEST_F(Compare, WhatIsNotOfTheSameExperimentIsRefused) {
+  Results longer = faults({}), more_seeds = faults({}), paper = faults({});
+  longer["duration_s"] = 300;
+  more_seeds["faults"]["seeds"] = 3;
+  paper.erase("faults");
+  EXPECT_EQ(error(faults({}), faults({})), "");
+  EXPECT_TRUE(has(error(longer, faults({})), "before.json: duration_s is 300 there and 60 here"));
+  EXPECT_TRUE(has(error(more_seeds, faults({})), "before.json: seeds is 3 there and 1 here"));
+  EXPECT_TRUE(has(error(matrix(0.1), faults({})), "before.json: holds no results of the same experiment (faults)"));
+  EXPECT_TRUE(has(error(paper, faults({})), "before.json: holds no results of the same experiment (faults)"));
+  EXPECT_TRUE(has(error(faults({}), paper), "--compare: the paper's experiments have no rows"));
+}
+
+TEST_F(Compare, AFileThatHoldsNoResultsIsRefused) {
+  EXPECT_THROW(ResultsBefore(folder_ / "nowhere.json"), tools::Failure);
+  for (const Results& other : {Results::array(), Results{{"runs", 3}}, Results("text")})
+    EXPECT_TRUE(has(error(other, faults({})), "before.json: no results of locus-experiments")) << other;
+  Results without_rows = faults({}), absurd_row = faults({{{"course", 7}}}), absurd_table = faults({});
+  without_rows["faults"].erase("rows");
+  absurd_table["faults"] = Results::array({1});
+  for (const Results& other : {without_rows, absurd_row, absurd_table})
+    EXPECT_TRUE(has(error(other, faults({})), "before.json: its faults are not as locus-experiments writes them"))
+        << error(other, faults({}));
+}
+
+} // namespace
+} // namespace locus::experiments

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_experiments/compared_rows.hpp"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "locus_experiments/fault_verdict.hpp"
+#include "locus_experiments/matrix_plan.hpp"
+
+namespace locus::experiments {
+namespace {
+
+/// Below a millimetre nobody can say that anything has changed: half of what a VLP-16 tells ranges by.
+constexpr FigureKind kError{"error, mm", 1e3, 1, 1e-3}, kMedianError{"median error, mm", 1e3, 1, 1e-3},
+    kWorstError{"worst error, mm", 1e3, 1, 1e-3};
+constexpr FigureKind kSigma{"worst sigma", 1, 1, 0.1};
+/// A run may end one window earlier than another.
+constexpr FigureKind kLost{"sweeps lost", 1, 0, 0}, kFailed{"failed", 1, 0, 1};
+/// Of the normalised squared error of six axes, 6 where the covariances say the truth: too humble is as wrong as too
+/// sure.
+constexpr FigureKind kNees{"NEES, times off 6", 1, 2, 0.1};
+
+using Pointer = Results::json_pointer;
+
+/// Nothing for null and where it is absent.
+std::optional<double> number_at(const Results& row, const char* pointer) {
+  const Results value = row.value(Pointer(pointer), Results{});
+  return value.is_number() ? std::optional(value.get<double>()) : std::nullopt;
+}
+
+ComparedRow row_of(std::string name, const Results& row, std::vector<std::optional<double>> figures) {
+  const bool asked = row.contains("holds");
+  const auto broken = row.value("broken", std::vector<std::string>{});
+  return {std::move(name), asked ? std::optional(row.at("holds").get<bool>()) : std::nullopt,
+          fmt::format("{}", fmt::join(broken, "; ")), std::move(figures)};
+}
+
+ComparedRow consistency_row(const Results& consistency) {
+  const double nees = number_at(consistency, "/nees_10m").value_or(0);
+  const std::optional<double> off = nees > 0 ? std::optional(std::max(nees / 6, 6 / nees)) : std::nullopt;
+  return row_of(fmt::format("covariances, {} runs", consistency.at("runs").get<int>()), consistency,
+                {std::nullopt, std::nullopt, std::nullopt, consistency.at("failed").get<double>(), off});
+}
+
+std::vector<ComparedRow> fault_rows(const Results& results) {
+  std::vector<ComparedRow> rows;
+  for (const Results& row : results.at("faults").at("rows"))
+    rows.push_back(row_of(row.at("course").get<std::string>() + '/' + row.at("configuration").get<std::string>(), row,
+                          {number_at(row, "/ape_mean_m/with"), number_at(row, "/worst_sigma"),
+                           number_at(row, "/sweeps/lost"), number_at(row, "/sweeps/failed"), std::nullopt}));
+  if (const Results& consistency = results.at("faults").at("consistency"); !consistency.is_null())
+    rows.push_back(consistency_row(consistency));
+  return rows;
+}
+
+/// A cell says in words what it found: its figures are those of its run.
+std::vector<ComparedRow> matrix_rows(const Results& results) {
+  const RunsById runs = by_id(results.at("runs"));
+  std::vector<ComparedRow> rows;
+  for (const Results& row : results.at("matrix").at("cells")) {
+    if (row.contains("impossible"))
+      continue;
+    MatrixCell cell;
+    cell.input = row.at("input");
+    cell.what = row.at("fault");
+    cell.from_start = row.at("from_start");
+    const Results* const found = find(runs, matrix_course(), cell.configuration());
+    const Results run = found != nullptr ? *found : Results::object();
+    rows.push_back(
+        row_of(fmt::format("{}: {}, {}", cell.input, cell.what, cell.from_start ? "from the start" : "mid-drive"), row,
+               {number_at(run, "/summary/ape_m/mean"), number_at(run, "/summary/covariance/worst_sigma"),
+                number_at(run, "/summary/sweeps/dropped"), number_at(run, "/summary/sweeps/failed")}));
+  }
+  return rows;
+}
+
+std::vector<ComparedRow> harsh_rows(const Results& results) {
+  std::vector<ComparedRow> rows;
+  for (const Results& row : results.at("harsh").at("rows"))
+    rows.push_back(row_of(fmt::format("{}, {}, {}", row.at("course").get<std::string>(),
+                                      row.at("imperfection").get<std::string>(), row.at("sensors").get<std::string>()),
+                          row,
+                          {number_at(row, "/median_m"), number_at(row, "/worst_m"), number_at(row, "/worst_sigma")}));
+  return rows;
+}
+
+} // namespace
+
+const ComparedTable* table_of(const Results& results) {
+  static const std::array tables{ComparedTable{"faults", {kError, kSigma, kLost, kFailed, kNees}, fault_rows},
+                                 ComparedTable{"matrix", {kError, kSigma, kLost, kFailed}, matrix_rows},
+                                 ComparedTable{"harsh", {kMedianError, kWorstError, kSigma}, harsh_rows}};
+  const auto* const found =
+      std::ranges::find_if(tables, [&](const ComparedTable& table) { return results.contains(table.key); });
+  return found == tables.end() ? nullptr : found;
+}
+
+} // namespace locus::experiments
