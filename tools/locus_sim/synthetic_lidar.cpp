@@ -362,11 +362,13 @@ SyntheticLidar::Footprint SyntheticLidar::footprint(std::size_t index) {
   return beam;
 }
 
-/// On one surface the ranges of three columns lie on a line, nearly.
+/// On one surface, and on several that go over into each other, the ranges of three columns lie on a line, nearly.
 bool SyntheticLidar::is_parted_along_turn(std::size_t index) const {
   const std::optional<Sight>&a = before_.centers[index], &b = now_.centers[index], &c = ahead_.centers[index];
   if (!a || !b || !c)
     return a || b || c;
+  if (b->hit.surface != nullptr && a->hit.surface == b->hit.surface && b->hit.surface == c->hit.surface)
+    return false;
   return std::abs(a->hit.range_m - 2 * b->hit.range_m + c->hit.range_m) > kPartingStep_m;
 }
 
