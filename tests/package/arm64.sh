@@ -32,7 +32,7 @@ done
 # One processor gives the same bits for every number of threads. Two do not: arm64 rounds a product and its sum once, its
 # mathematical functions end in other bits, and then a point falls on the other side of a limit. That comes to tenths of a
 # millimetre; a mistake would be more than 3 mm or 1 mrad.
-"$bin/locus-sim" --world urban --robot husky --seed 1 --duration 10 -o "$work/drive" >/dev/null 2>&1
+"$bin/locus-sim" --world urban --robot husky --seed 1 --duration 10 --realism clean -o "$work/drive" >/dev/null 2>&1
 "$bin/locus-replay" --quiet -o "$work/here" "$work/drive"
 for threads in 1 2; do
   in_tree "$work/root/usr/bin/locus-replay" --quiet --threads $threads -o "$work/arm64-$threads" "$work/drive"

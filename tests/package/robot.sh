@@ -44,7 +44,7 @@ wire lidar0 192.168.1.201/24 192.168.1.100/24
 wire uplink0 10.7.0.2/24 10.7.0.1/24
 
 # The robot drives for 8 s; then it stands, and its wheels spin.
-"$bin/locus-sim" --world tunnel --robot husky --seed 1 --duration 90 --slip 8-90 -o "$work/drive" >/dev/null 2>&1
+"$bin/locus-sim" --world tunnel --robot husky --seed 1 --duration 90 --slip 8-90 --realism clean -o "$work/drive" >/dev/null 2>&1
 
 # The package, one that was before it, and the script for the inside lie where both sides see them.
 exchange=$work/exchange

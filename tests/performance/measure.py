@@ -62,7 +62,7 @@ def drive(binaries, folder, world, lidars, seconds):
     """One drive, simulated and replayed."""
     capture, out = folder / "capture", folder / "out"
     simulating_s = cpu_s(binaries / "locus-sim", "--world", world, "--robot", "husky", "--duration", seconds, "--seed", 1,
-                         "--lidars", lidars, "-o", capture)
+                         "--lidars", lidars, "--realism", "clean", "-o", capture)
     run(binaries / "locus-replay", "--threads", 1, "--quiet", "-o", out, capture)
     return {"world": world, "lidars": lidars, "seconds": seconds, "simulating_s": simulating_s,
             "summary": json.loads((out / "summary.json").read_text())}

@@ -11,13 +11,13 @@
 
 namespace locus::test {
 
-/// What locus-sim makes of a drive, in a folder that is gone after the test.
+/// What locus-sim makes of a clean drive, in a folder that is gone after the test.
 class SimulatedDrive {
  public:
   SimulatedDrive(const std::string& world, const std::string& robot, int duration_s,
                  const std::vector<std::string>& more = {}) {
-    std::vector<std::string> arguments{"--world", world, "--robot", robot,    "--duration", std::to_string(duration_s),
-                                       "--seed",  "1",   "-o",      capture()};
+    std::vector<std::string> arguments{"--world",   world,   "--robot", robot, "--duration", std::to_string(duration_s),
+                                       "--realism", "clean", "--seed",  "1",   "-o",         capture()};
     arguments.insert(arguments.end(), more.begin(), more.end());
     const ProgramRun run = run_program(LOCUS_SIM, arguments);
     EXPECT_EQ(run.status, 0) << run.err;

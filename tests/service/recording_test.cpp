@@ -23,8 +23,9 @@ class Recording : public RobotNetwork {
   /// A robot with two lidars that drives through the plant.
   [[nodiscard]] std::filesystem::path drive() const {
     std::filesystem::path folder = file("drive");
-    const ProgramRun run = run_program(LOCUS_SIM, {"--world", "urban", "--robot", "husky", "--lidars", "2",
-                                                   "--duration", "8", "--seed", "3", "-o", folder.string()});
+    const ProgramRun run =
+        run_program(LOCUS_SIM, {"--world", "urban", "--robot", "husky", "--lidars", "2", "--duration", "8", "--seed",
+                                "3", "--realism", "clean", "-o", folder.string()});
     EXPECT_EQ(run.status, 0) << run.err;
     return folder;
   }

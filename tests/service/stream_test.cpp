@@ -12,7 +12,7 @@ using nlohmann::json;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr const char* kDrive = " --world urban --robot husky --duration 10 --seed 3 -o ";
+constexpr const char* kDrive = " --world urban --robot husky --duration 10 --seed 3 --realism clean -o ";
 
 class Stream : public RobotNetwork {
  protected:

@@ -27,9 +27,10 @@ class LineSource {
   LineSource(std::string file, std::function<Line()> make)
       : file_(std::move(file)), make_(std::move(make)), next_(make_()) {}
 
-  void write_until(Stamp stamp, CaptureSink& sink) {
-    for (; next_.arrival <= stamp; next_ = make_())
-      sink.text(file_, next_.arrival, next_.text);
+  [[nodiscard]] Stamp arrival() const { return next_.arrival; }
+  void write(CaptureSink& sink) {
+    sink.text(file_, next_.arrival, next_.text);
+    next_ = make_();
   }
 
  private:
@@ -89,11 +90,13 @@ class Lidars {
   std::vector<Datagram> waiting_;
 };
 
+std::string yaml(const Eigen::Vector3d& vector) {
+  return fmt::format("[{:.6f}, {:.6f}, {:.6f}]", vector.x(), vector.y(), vector.z());
+}
+
 std::string yaml(const Pose& pose) {
-  const Eigen::Vector3d& xyz_m = pose.translation;
   const Eigen::Vector3d rpy_deg = to_rpy_rad(pose.rotation) / kRadPerDeg + Eigen::Vector3d::Zero();
-  return fmt::format("{{xyz_m: [{:.6f}, {:.6f}, {:.6f}], rpy_deg: [{:.6f}, {:.6f}, {:.6f}]}}", xyz_m.x(), xyz_m.y(),
-                     xyz_m.z(), rpy_deg.x(), rpy_deg.y(), rpy_deg.z());
+  return fmt::format("{{xyz_m: {}, rpy_deg: {}}}", yaml(pose.translation), yaml(rpy_deg));
 }
 
 std::string configuration(const RobotOptions& robot) {
@@ -103,16 +106,20 @@ std::string configuration(const RobotOptions& robot) {
     const bool shares_port = std::count_if(robot.lidars.begin(), robot.lidars.end(), [&](const NamedLidar& other) {
                                return other.options.port == options.port;
                              }) > 1;
-    text += fmt::format("  - {{name: {}, model: {}, port: {}{}, T_base_lidar: {}}}\n", lidar.name,
-                        to_string(options.model), options.port,
-                        shares_port ? ", source_ip: " + dotted(options.source_ip) : "", yaml(options.T_base_lidar));
+    text +=
+        fmt::format("  - {{name: {}, model: {}, port: {}{}, T_base_lidar: {}}}\n", lidar.name, to_string(options.model),
+                    options.port, shares_port ? ", source_ip: " + dotted(options.source_ip) : "",
+                    yaml(lidar.T_base_believed.value_or(options.T_base_lidar)));
   }
   text += fmt::format("motion_sources:{}\n", robot.odometry.empty() && !robot.imu ? " []" : "");
   for (const NamedOdometry& odometry : robot.odometry)
     text += fmt::format("  - {{name: {}, kind: odometry, topic: {}}}\n", odometry.name, odometry.topic);
   if (robot.imu)
-    text +=
-        fmt::format("  - {{name: imu, kind: imu, topic: /imu/data, T_base_source: {}}}\n", yaml(robot.imu->T_base_imu));
+    text += fmt::format("  - {{name: imu, kind: imu, topic: /imu/data, T_base_source: {}}}\n",
+                        yaml(robot.imu->T_base_believed.value_or(robot.imu->T_base_imu)));
+  if (robot.body_box)
+    text += fmt::format("body_box: {{enabled: true, min_m: {}, max_m: {}}}\n", yaml(robot.body_box->min_m),
+                        yaml(robot.body_box->max_m));
   return text;
 }
 
@@ -126,8 +133,14 @@ void write_capture(CaptureSink& sink, const Scene& scene, const Trajectory& traj
     sink.text("imu.csv", start, "#t_ns,wx,wy,wz,ax,ay,az,qw,qx,qy,qz\n");
   std::vector<LineSource> texts = line_sources(trajectory, robot);
   const auto write_texts_until = [&](Stamp stamp) {
-    for (LineSource& text : texts)
-      text.write_until(stamp, sink);
+    while (true) {
+      const auto next = std::min_element(texts.begin(), texts.end(), [](const LineSource& a, const LineSource& b) {
+        return a.arrival() < b.arrival();
+      });
+      if (next->arrival() > stamp)
+        return;
+      next->write(sink);
+    }
   };
   for (Lidars lidars(scene, trajectory, robot.lidars, seen); lidars.front().receive_stamp <= end; lidars.pop()) {
     write_texts_until(lidars.front().receive_stamp);

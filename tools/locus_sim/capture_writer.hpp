@@ -19,11 +19,13 @@ namespace locus::sim {
 struct NamedLidar {
   std::string name = "front";
   SyntheticLidarOptions options;
+  std::optional<Pose> T_base_believed{}; ///< what config.yaml says of its place; nothing: the truth
 };
 
 struct MountedImu {
   ImuFaults faults;
   Pose T_base_imu;
+  std::optional<Pose> T_base_believed{}; ///< as of a lidar
 };
 
 struct NamedOdometry {
@@ -39,12 +41,14 @@ struct RobotOptions {
   std::optional<MountedImu> imu = MountedImu{}; ///< 200 Hz, nothing: no IMU
   std::vector<NamedOdometry> odometry{{}};      ///< the best first
   std::uint64_t seed = 1;                       ///< of IMU and odometry; lidars have their own
+  std::optional<Bounds> body_box{};             ///< base frame, of which config.yaml says that it holds the robot
 };
 
 /// Drives a robot through a scene for `duration` and hands over, in the order of arrival, what its sensors saw: the
 /// datagrams of its lidars, imu.csv, NAME.tum of each odometry source, the true poses as gt.tum (100 Hz); first of all
-/// a config.yaml that names the sensors and overrides nothing else. `seen` takes note of every surface point that an
-/// echo comes from; `progress` is told what share of the duration is done. What the sink throws passes through.
+/// a config.yaml that names the sensors, and the box of the robot's body where there is one, and overrides nothing
+/// else. `seen` takes note of every surface point that an echo comes from; `progress` is told what share of the
+/// duration is done. What the sink throws passes through.
 void write_capture(
     CaptureSink& sink, const Scene& scene, const Trajectory& trajectory, Duration duration, const RobotOptions& robot,
     SeenSpace* seen = nullptr, const std::function<void(double done)>& progress = [](double) {});

@@ -4,8 +4,17 @@
 #include <cstddef>
 #include <cstdint>
 #include <random>
+#include <string_view>
 
 namespace locus::sim {
+
+/// A seed of its own for each purpose, so that what is asked for beside it does not change what the dice show (FNV-1a).
+inline std::uint64_t seed_for(std::uint64_t seed, std::string_view purpose) {
+  std::uint64_t hash = 0xCBF2'9CE4'8422'2325U ^ (seed * 0x9E37'79B9'7F4A'7C15U);
+  for (const char c : purpose)
+    hash = (hash ^ static_cast<unsigned char>(c)) * 0x0000'0100'0000'01B3U;
+  return hash;
+}
 
 /// Uniform numbers that are the same with every standard library. One owner.
 class Dice {

@@ -69,7 +69,7 @@ inline constexpr std::array kImperfections{
                       "Stamps of odometry are late"},
     NamedImperfection{"odometry-jitter-ms", &Imperfections::odometry_jitter_ms, 2, 8, 100, "MS",
                       "Stamps of odometry scatter, standard deviation"},
-    NamedImperfection{"lidar-drift-ppm", &Imperfections::lidar_drift_ppm, 20, 100, 400, "PPM",
+    NamedImperfection{"lidar-drift-ppm", &Imperfections::lidar_drift_ppm, 60, 100, 400, "PPM",
                       "Clocks of the lidars run fast, and have no GPS"},
     NamedImperfection{"beam-mrad", &Imperfections::beam_mrad, 3, 4.5, 20, "MRAD",
                       "Beam divergence: mixed pixels at edges"},

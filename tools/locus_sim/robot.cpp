@@ -5,8 +5,10 @@
 #include <cmath>
 #include <numbers>
 #include <span>
+#include <utility>
 
 #include "locus_sim/dice.hpp"
+#include "locus_sim/impairment.hpp"
 
 namespace locus::sim {
 namespace {
@@ -98,7 +100,7 @@ Robot make_husky(const SensorChoice& choice, std::uint64_t seed) {
   }
   robot.sensors.odometry = {{.faults = wheels}};
   robot.sensors.seed = seed;
-  return robot;
+  return impaired(std::move(robot), choice.imperfections, seed);
 }
 
 Robot make_spot(const SensorChoice& choice, std::uint64_t seed) {
@@ -135,7 +137,7 @@ Robot make_spot(const SensorChoice& choice, std::uint64_t seed) {
   robot.sensors.odometry = {{.name = "vio", .topic = "/visual_odometry", .rate_hz = 30, .faults = vision},
                             {.name = "kio", .topic = "/kinematic_odometry", .rate_hz = 50, .faults = legs}};
   robot.sensors.seed = seed;
-  return robot;
+  return impaired(std::move(robot), choice.imperfections, seed);
 }
 
 Trajectory drive_about(const World& world, const Robot& robot, Duration duration, const std::vector<Slip>& slips,

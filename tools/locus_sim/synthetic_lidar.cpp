@@ -9,6 +9,10 @@
 #include <cstring>
 #include <numbers>
 #include <numeric>
+#include <span>
+#include <utility>
+
+#include "locus_sim/dice.hpp"
 
 namespace locus::sim {
 namespace {
@@ -16,6 +20,17 @@ namespace {
 constexpr double kTurn_rad = 2 * std::numbers::pi;
 constexpr double kTellingApart_m = 1.0; // echoes nearer to each other than this are one
 constexpr int kDataPacketsPerPosition = 5;
+
+// A Gaussian beam is narrowed down to five rays that have its moments up to the fifth (Gauss-Hermite): the middle, and
+// four at the square root of three of its standard deviations. The divergence, to 1/e^2 of its brightness, is four.
+constexpr double kMiddleWeight = 1.0 / 3, kSideWeight = 1.0 / 6;
+const double kSideAt = std::sqrt(3.0) / 4; // of the divergence
+constexpr double kNarrowness = 0.5;     // of the beam from top to bottom: 1.5 mrad of 3.0, VLP-16 user manual 63-9243
+constexpr double kPartingStep_m = 0.03; // smaller steps are lost in the noise
+constexpr std::size_t kColumnsPerGlance = 8; // an edge that lies along the turn is crossed slowly
+
+constexpr double kMostSlant = 3; // times the slant that kSlant_deg is at kSlantRange_m; beyond there is hardly an echo
+constexpr double kWhite = 100;   // Velodyne's scale: the brightest that does not throw the light straight back
 
 // Velodyne's data sheets: a surface that throws back a tenth of the light is seen at about half the reach.
 constexpr double kDark = 10, kReachOfDark = 0.5;
@@ -42,22 +57,76 @@ std::string gprmc(Stamp stamp, bool valid_fix) {
 
 } // namespace
 
-struct SyntheticLidar::Mount {
-  Stamp fired;
-  Eigen::Matrix3d R_world_lidar;
-  Eigen::Matrix3d R_world_rotor;
-  Eigen::Vector3d position_m;
-  Eigen::Vector3d velocity_mps;
-  Eigen::Vector3d angular_velocity_radps; ///< all in world frame, at the first firing of the column
-
-  Mount(Stamp stamp, const BaseMotion& base, const Pose& T_base_lidar, double azimuth_rad) : fired(stamp) {
-    const Pose T_world_lidar = base.T_world_base * T_base_lidar;
-    R_world_lidar = T_world_lidar.R();
-    R_world_rotor = R_world_lidar * Eigen::AngleAxisd(-azimuth_rad, Eigen::Vector3d::UnitZ());
-    position_m = T_world_lidar.translation;
-    angular_velocity_radps = base.T_world_base.rotation * base.angular_velocity_base_radps;
-    velocity_mps = base.velocity_world_mps + angular_velocity_radps.cross(position_m - base.T_world_base.translation);
+/// What the rays of one beam meet, as echoes: light that comes back from places too near to each other to be told apart
+/// makes one echo, in the middle of its energy (mixed pixels).
+class SyntheticLidar::Footprint {
+ public:
+  void add(const std::optional<Sight>& sight, double weight) {
+    if (!sight)
+      return;
+    const Hit& hit = sight->hit;
+    const double light = weight * hit.reflectivity;
+    glimpses_[count_++] = {*sight, light, light * hit.cos_incidence / (hit.range_m * hit.range_m)};
   }
+
+  /// Sorts what was added; the nearest first.
+  void merge() {
+    std::sort(glimpses_.begin(), glimpses_.begin() + static_cast<std::ptrdiff_t>(count_),
+              [](const Glimpse& a, const Glimpse& b) { return a.sight.hit.range_m < b.sight.hit.range_m; });
+    std::size_t merged = 0;
+    for (std::size_t i = 0, end = 0; i < count_; i = end) {
+      const double from_m = glimpses_[i].sight.hit.range_m;
+      for (end = i; end < count_ && glimpses_[end].sight.hit.range_m < from_m + kTellingApart_m;)
+        ++end;
+      glimpses_[merged++] = mixed(std::span(glimpses_).subspan(i, end - i));
+    }
+    count_ = merged;
+  }
+
+  [[nodiscard]] bool empty() const { return count_ == 0; }
+  [[nodiscard]] const Sight& last() const { return glimpses_[count_ - 1].sight; }
+  [[nodiscard]] const Sight& strongest() const { return strongest_of(count_); }
+  /// When the strongest is also the last, the sensor reports the second strongest in its place.
+  [[nodiscard]] const Sight& strongest_beside_last() const {
+    return strongest_of(std::max<std::size_t>(count_, 2) - 1);
+  }
+
+ private:
+  struct Glimpse {
+    Sight sight;
+    double light;  ///< that it throws back of the beam's: reflectivity times share
+    double energy; ///< that comes back, of any scale
+  };
+
+  [[nodiscard]] const Sight& strongest_of(std::size_t count) const {
+    return std::max_element(glimpses_.begin(), glimpses_.begin() + static_cast<std::ptrdiff_t>(count),
+                            [](const Glimpse& a, const Glimpse& b) { return a.energy < b.energy; })
+        ->sight;
+  }
+
+  /// Of one echo, at the place of the brightest.
+  static Glimpse mixed(std::span<const Glimpse> parts) {
+    Glimpse all = *std::max_element(parts.begin(), parts.end(),
+                                    [](const Glimpse& a, const Glimpse& b) { return a.energy < b.energy; });
+    double light = 0, energy = 0, range = 0, slant = 0;
+    for (const Glimpse& part : parts) {
+      light += part.light;
+      energy += part.energy;
+      range += part.energy * part.sight.hit.range_m;
+      slant += part.energy * part.sight.hit.cos_incidence;
+    }
+    all.light = light;
+    all.energy = energy;
+    all.sight.hit.reflectivity = static_cast<std::uint8_t>(std::clamp(std::round(light), 1.0, 255.0));
+    if (energy > 0) {
+      all.sight.hit.range_m = range / energy;
+      all.sight.hit.cos_incidence = slant / energy;
+    }
+    return all;
+  }
+
+  std::array<Glimpse, 5> glimpses_;
+  std::size_t count_ = 0;
 };
 
 SyntheticLidar::SyntheticLidar(const Scene& scene, const Trajectory& trajectory, const SyntheticLidarOptions& options,
@@ -66,13 +135,25 @@ SyntheticLidar::SyntheticLidar(const Scene& scene, const Trajectory& trajectory,
       layout_(velodyne::packet_layout(options.model, options.return_mode)), dice_(options.seed), seen_(seen),
       packet_begin_(trajectory.start()), data_packets_until_position_(kDataPacketsPerPosition) {
   const double rotor_rate_radps = options.rpm / 60 * kTurn_rad;
+  QuickDice laser_dice(seed_for(options.seed, "lasers"));
+  std::vector<double> elevations_rad, biases_m;
+  for (const velodyne::Laser& laser : spec_.calibration.lasers()) {
+    elevations_rad.push_back(laser.elevation_rad + options.laser_elevation_rad * laser_dice.normal());
+    biases_m.push_back(options.laser_bias_m * laser_dice.normal());
+  }
   for (const velodyne::Firing& firing : spec_.firings()) {
     const velodyne::Laser& laser = spec_.calibration.lasers()[firing.laser];
     const double azimuth_rad = rotor_rate_radps * 1e-9 * firing.offset_ns + laser.azimuth_offset_rad;
-    const double level = std::cos(laser.elevation_rad);
-    aims_.push_back({{level * std::cos(azimuth_rad), -level * std::sin(azimuth_rad), std::sin(laser.elevation_rad)},
+    const double elevation_rad = elevations_rad[firing.laser], level = std::cos(elevation_rad);
+    aims_.push_back({{level * std::cos(azimuth_rad), -level * std::sin(azimuth_rad), std::sin(elevation_rad)},
                      laser.vertical_offset_m,
-                     Duration{firing.offset_ns}});
+                     Duration{firing.offset_ns},
+                     biases_m[firing.laser]});
+  }
+  if (options_.beam_rad > 0) {
+    look_ahead(packet_begin_);
+    look_ahead(packet_begin_ + spec_.column_duration);
+    before_ = now_;
   }
 }
 
@@ -101,7 +182,7 @@ Stamp SyntheticLidar::arrival() {
   const Duration delay = options_.latency > Duration::zero()
                              ? from_seconds(-to_seconds(options_.latency) * std::log1p(-dice_.uniform()))
                              : Duration::zero();
-  last_arrival_ = std::max(last_arrival_, packet_begin_ + delay);
+  last_arrival_ = std::max(last_arrival_, true_time(packet_begin_) + delay);
   return last_arrival_;
 }
 
@@ -114,13 +195,15 @@ void SyntheticLidar::fill_data_packet() {
 }
 
 void SyntheticLidar::fill_column(std::size_t column) {
-  const Stamp fired = packet_begin_ + static_cast<Duration::rep>(column) * spec_.column_duration;
+  const Stamp own_time = packet_begin_ + static_cast<Duration::rep>(column) * spec_.column_duration;
+  const Stamp fired = true_time(own_time);
   put_block_headers(column, fired);
-  const Mount mount(fired, trajectory_.at(fired), options_.T_base_lidar, rotor_azimuth_rad(fired));
+  const bool is_line = options_.beam_rad <= 0;
+  const Mount mount = is_line ? mount_at(fired) : now_.mount;
   const std::size_t first_block = column * layout_.blocks_per_column();
   for (std::size_t i = 0; i < aims_.size(); ++i) {
     const std::size_t block = first_block + i / velodyne::kChannels * layout_.returns;
-    const Echoes echoes = fire(mount, aims_[i]);
+    const Echoes echoes = is_line ? fire_line(mount, aims_[i]) : fire_beam(i);
     if (layout_.returns == 2) {
       put_echo(block, i % velodyne::kChannels, echoes.last);
       put_echo(block + 1, i % velodyne::kChannels, echoes.strongest);
@@ -129,6 +212,9 @@ void SyntheticLidar::fill_column(std::size_t column) {
       put_echo(block, i % velodyne::kChannels, wants_last ? echoes.last : echoes.strongest);
     }
   }
+  ++columns_fired_;
+  if (!is_line)
+    look_ahead(own_time + 2 * spec_.column_duration);
 }
 
 void SyntheticLidar::put_block_headers(std::size_t column, Stamp fired) {
@@ -148,58 +234,191 @@ void SyntheticLidar::put_echo(std::size_t block, std::size_t channel, const Echo
   put(data_, offset + 2, echo.intensity, 1);
 }
 
-SyntheticLidar::Echoes SyntheticLidar::fire(const Mount& mount, Aim& aim) {
-  const auto center = look(mount, aim, 0);
-  aim.met = center ? center->surface : nullptr;
-  const Echo center_echo = measure(center);
-  if (options_.dust > 0 && dice_.uniform() < options_.dust) {
-    const Echo grain = measure_dust();
-    if (center_echo.ticks == 0 || grain.ticks < center_echo.ticks)
-      return {center_echo.ticks == 0 ? grain : center_echo, grain};
-  }
-  if (options_.return_mode != velodyne::ReturnMode::dual)
-    return {center_echo, center_echo};
-
-  const auto edge = look(mount, aim, kHalfBeam_rad);
-  if (!center || !edge || std::abs(edge->range_m - center->range_m) < kTellingApart_m)
-    return {center_echo, center_echo};
-  const Echo edge_echo = measure(edge);
-  if (edge_echo.ticks == 0 || center_echo.ticks == 0) // one of them was lost
-    return edge_echo.ticks == 0 ? Echoes{center_echo, center_echo} : Echoes{edge_echo, edge_echo};
-  // When the strongest return is also the last, the sensor reports the second strongest in its place.
-  return edge->range_m > center->range_m ? Echoes{edge_echo, center_echo} : Echoes{center_echo, edge_echo};
+SyntheticLidar::Mount SyntheticLidar::mount_at(Stamp fired) const {
+  const BaseMotion base = trajectory_.at(fired);
+  const Pose T_world_lidar = base.T_world_base * options_.T_base_lidar;
+  Mount mount{.fired = fired,
+              .R_world_lidar = T_world_lidar.R(),
+              .R_world_rotor = {},
+              .R_base_world = base.T_world_base.R().transpose(),
+              .position_m = T_world_lidar.translation,
+              .velocity_mps = {},
+              .angular_velocity_radps = base.T_world_base.rotation * base.angular_velocity_base_radps};
+  mount.R_world_rotor = mount.R_world_lidar * Eigen::AngleAxisd(-rotor_azimuth_rad(fired), Eigen::Vector3d::UnitZ());
+  mount.velocity_mps =
+      base.velocity_world_mps + mount.angular_velocity_radps.cross(mount.position_m - base.T_world_base.translation);
+  return mount;
 }
 
 /// The motion within a column is followed to first order: over its 0.1 ms the rest is below 1e-7 m and 1e-7 rad.
-std::optional<Hit> SyntheticLidar::look(const Mount& mount, const Aim& aim, double aside_rad) const {
+std::optional<SyntheticLidar::Sight> SyntheticLidar::look(const Mount& mount, const Aim& aim,
+                                                          const Eigen::Vector3d& aimed) const {
   const double since_s = to_seconds(aim.after);
-  Eigen::Vector3d aimed = mount.R_world_rotor * aim.direction;
-  if (aside_rad != 0)
-    aimed = Eigen::AngleAxisd(-aside_rad, mount.R_world_lidar.col(2)) * aimed;
   const Ray ray{mount.position_m + since_s * mount.velocity_mps + aim.origin_z_m * mount.R_world_lidar.col(2),
                 aimed + since_s * mount.angular_velocity_radps.cross(aimed)};
-  return scene_.cast(ray, options_.max_range_m, mount.fired + aim.after, aim.met);
+  std::optional<Sight> sight;
+  if (const auto hit = scene_.cast(ray, options_.max_range_m, mount.fired + aim.after, aim.met))
+    sight = Sight{*hit};
+  if (!options_.own_parts.empty())
+    consider_own_parts(mount, aim, aimed, sight);
+  return sight;
 }
 
-SyntheticLidar::Echo SyntheticLidar::measure(const std::optional<Hit>& hit) {
-  if (!hit || (options_.dropout > 0 && dice_.uniform() < options_.dropout))
+/// They turn with the lidar.
+void SyntheticLidar::consider_own_parts(const Mount& mount, const Aim& aim, const Eigen::Vector3d& aimed,
+                                        std::optional<Sight>& sight) const {
+  const Ray ray{options_.T_base_lidar * Eigen::Vector3d{0, 0, aim.origin_z_m}, mount.R_base_world * aimed};
+  for (const Surface& part : options_.own_parts) {
+    const double range_m = std::visit([&](const auto& shape) { return shape.range_m(ray); }, part.shape);
+    if (range_m >= (sight ? sight->hit.range_m : options_.max_range_m))
+      continue;
+    const Eigen::Vector3d point_m = ray.origin_m + range_m * ray.direction;
+    const Eigen::Vector3d normal = std::visit([&](const auto& shape) { return shape.normal(point_m); }, part.shape);
+    sight = Sight{{point_m, range_m, std::abs(normal.dot(ray.direction)), part.reflectivity, nullptr}, true};
+  }
+}
+
+SyntheticLidar::Echoes SyntheticLidar::fire_line(const Mount& mount, Aim& aim) {
+  const Eigen::Vector3d aimed = mount.R_world_rotor * aim.direction;
+  const auto center = look(mount, aim, aimed);
+  aim.met = center ? center->hit.surface : nullptr;
+  const Echo center_echo = measure(aim, center);
+  if (const auto grain = meet_dust(center_echo))
+    return {center_echo.ticks == 0 ? *grain : center_echo, *grain};
+  if (options_.return_mode != velodyne::ReturnMode::dual)
+    return {center_echo, center_echo};
+
+  const auto edge = look(mount, aim, Eigen::AngleAxisd(-kHalfBeam_rad, mount.R_world_lidar.col(2)) * aimed);
+  if (!center || !edge || std::abs(edge->hit.range_m - center->hit.range_m) < kTellingApart_m)
+    return {center_echo, center_echo};
+  const Echo edge_echo = measure(aim, edge);
+  if (edge_echo.ticks == 0 || center_echo.ticks == 0) // one of them was lost
+    return edge_echo.ticks == 0 ? Echoes{center_echo, center_echo} : Echoes{edge_echo, edge_echo};
+  // When the strongest return is also the last, the sensor reports the second strongest in its place.
+  return edge->hit.range_m > center->hit.range_m ? Echoes{edge_echo, center_echo} : Echoes{center_echo, edge_echo};
+}
+
+/// An edge that beams come to one after the other shows in the one after, so the middles of their beams are looked at
+/// one column before they are fired.
+void SyntheticLidar::look_ahead(Stamp own_time) {
+  std::swap(before_, now_);
+  std::swap(now_, ahead_);
+  ahead_.mount = mount_at(true_time(own_time));
+  ahead_.centers.clear();
+  for (Aim& aim : aims_) {
+    const auto center = look(ahead_.mount, aim, ahead_.mount.R_world_rotor * aim.direction);
+    aim.met = center ? center->hit.surface : nullptr;
+    ahead_.centers.push_back(center);
+  }
+}
+
+SyntheticLidar::Echoes SyntheticLidar::fire_beam(std::size_t index) {
+  const Aim& aim = aims_[index];
+  Footprint beam = footprint(index);
+  beam.merge();
+  Echoes echoes;
+  if (!beam.empty()) {
+    const bool dual = options_.return_mode == velodyne::ReturnMode::dual;
+    const Sight &last = beam.last(), &strongest = dual ? beam.strongest_beside_last() : beam.strongest();
+    echoes.last = measure(aim, last);
+    echoes.strongest = &strongest == &last ? echoes.last : measure(aim, strongest);
+    if (dual && echoes.last.ticks == 0) // one of them was lost
+      echoes.last = echoes.strongest;
+    if (dual && echoes.strongest.ticks == 0)
+      echoes.strongest = echoes.last;
+  }
+  if (const auto grain = meet_dust(echoes.strongest))
+    return {echoes.last.ticks == 0 ? *grain : echoes.last, *grain};
+  return echoes;
+}
+
+/// Rays are cast to the sides where the beam may be parted; elsewhere they meet what its middle meets. From top to
+/// bottom it is parted along lines that the turn follows for a while: a glance now and then finds their beginning.
+SyntheticLidar::Footprint SyntheticLidar::footprint(std::size_t index) {
+  Aim& aim = aims_[index];
+  const std::optional<Sight>& center = now_.centers[index];
+  const Eigen::Vector3d aimed = now_.mount.R_world_rotor * aim.direction;
+  const Eigen::Vector3d left = now_.mount.R_world_lidar.col(2).cross(aimed).normalized(), up = aimed.cross(left);
+  const double away = kSideAt * options_.beam_rad;
+  Footprint beam;
+  double middle_weight = 1;
+  const auto look_aside = [&](const Eigen::Vector3d& side) {
+    const auto sight = look(now_.mount, aim, (aimed + side).normalized());
+    beam.add(sight, kSideWeight);
+    middle_weight -= kSideWeight;
+    return sight;
+  };
+  if (is_parted_along_turn(index)) {
+    look_aside(away * left);
+    look_aside(-away * left);
+  }
+  if (aim.near_edge || (columns_fired_ + index) % kColumnsPerGlance == 0) {
+    const auto above = look_aside(kNarrowness * away * up), below = look_aside(-kNarrowness * away * up);
+    aim.near_edge = above.has_value() != below.has_value() ||
+                    (above && center && below &&
+                     std::abs(above->hit.range_m - 2 * center->hit.range_m + below->hit.range_m) > kPartingStep_m);
+  }
+  beam.add(center, middle_weight);
+  return beam;
+}
+
+/// On one surface, and on several that go over into each other, the ranges of three columns lie on a line, nearly.
+bool SyntheticLidar::is_parted_along_turn(std::size_t index) const {
+  const std::optional<Sight>&a = before_.centers[index], &b = now_.centers[index], &c = ahead_.centers[index];
+  if (!a || !b || !c)
+    return a || b || c;
+  if (b->hit.surface != nullptr && a->hit.surface == b->hit.surface && b->hit.surface == c->hit.surface)
+    return false;
+  return std::abs(a->hit.range_m - 2 * b->hit.range_m + c->hit.range_m) > kPartingStep_m;
+}
+
+/// Nothing where the pulse meets none, or only behind what threw it back.
+std::optional<SyntheticLidar::Echo> SyntheticLidar::meet_dust(const Echo& nearest) {
+  if (options_.dust <= 0 || dice_.uniform() >= options_.dust)
+    return std::nullopt;
+  const Echo grain = measure_dust();
+  if (nearest.ticks != 0 && grain.ticks >= nearest.ticks)
+    return std::nullopt;
+  return grain;
+}
+
+SyntheticLidar::Echo SyntheticLidar::measure(const Aim& aim, const std::optional<Sight>& sight) {
+  if (!sight || (options_.dropout > 0 && dice_.uniform() < options_.dropout))
     return {};
-  double noise_m = options_.range_noise_m, brightness = hit->reflectivity;
+  const Hit& hit = sight->hit;
+  double noise_m = options_.range_noise_m, brightness = hit.reflectivity;
   if (options_.fades) {
-    const double nearness = kReachOfDark * options_.max_range_m / hit->range_m;
-    const double strength = brightness / kDark * hit->cos_incidence * nearness * nearness;
+    const double nearness = kReachOfDark * options_.max_range_m / hit.range_m;
+    const double strength = brightness / kDark * hit.cos_incidence * nearness * nearness;
     if (is_lost(strength))
       return {};
     noise_m *= 1 + 1 / strength;
-    brightness *= 0.5 * (1 + hit->cos_incidence) * (0.9 + 0.2 * dice_.uniform()); // not quite calibrated away
+    brightness *= 0.5 * (1 + hit.cos_incidence) * (0.9 + 0.2 * dice_.uniform()); // not quite calibrated away
   }
-  const double range_m = noise_m > 0 ? hit->range_m + noise_m * dice_.normal() : hit->range_m;
+  const double wrong_m = hit.range_m + aim.bias_m + leaning_m(hit);
+  const double range_m = noise_m > 0 ? wrong_m + noise_m * dice_.normal() : wrong_m;
   const double ticks = std::round(range_m / spec_.calibration.distance_resolution_m);
   if (range_m < options_.min_range_m || ticks > 65'535)
     return {};
-  if (seen_ != nullptr)
-    seen_->mark(hit->point_m);
+  if (seen_ != nullptr && !sight->is_own_part)
+    seen_->mark(hit.point_m);
   return {static_cast<std::uint16_t>(ticks), static_cast<std::uint8_t>(std::clamp(brightness, 1.0, 255.0))};
+}
+
+/// Because of what it meets. On a slant the pulse is stretched over the depth of its footprint, range times tangent;
+/// where its edge or peak is found moves with the square of a stretch that is short beside the pulse. A weak pulse is
+/// found later than a strong one (range walk).
+double SyntheticLidar::leaning_m(const Hit& hit) const {
+  double leaning_m = 0;
+  if (options_.incidence_bias_m > 0) {
+    const double sine = std::sqrt(std::max(0.0, 1 - hit.cos_incidence * hit.cos_incidence));
+    const double reference = kSlantRange_m * std::tan(kRadPerDeg * kSlant_deg);
+    const double slant = std::min(kMostSlant, hit.range_m * sine / std::max(1e-6, hit.cos_incidence) / reference);
+    leaning_m += options_.incidence_bias_m * slant * slant;
+  }
+  if (options_.intensity_bias_m > 0)
+    leaning_m += options_.intensity_bias_m * (1 - std::min(1.0, hit.reflectivity / kWhite));
+  return leaning_m;
 }
 
 /// Echoes do not end at once: some a little above the threshold are lost, some a little below are not.
@@ -213,6 +432,13 @@ SyntheticLidar::Echo SyntheticLidar::measure_dust() {
   const double range_m = options_.min_range_m - kMeanWay_m * std::log1p(-dice_.uniform());
   const double ticks = std::min(65'535.0, std::round(range_m / spec_.calibration.distance_resolution_m));
   return {static_cast<std::uint16_t>(ticks), static_cast<std::uint8_t>(1 + 8 * dice_.uniform())};
+}
+
+/// When the clock shows what it was meant to show in a drive without drift: it also times the firings. Within a column
+/// that is 5 ns, and left out.
+Stamp SyntheticLidar::true_time(Stamp own_time) const {
+  const auto own_ns = static_cast<double>((own_time - trajectory_.start()).count());
+  return own_time - Duration{std::llround(own_ns * options_.drift / (1 + options_.drift))};
 }
 
 /// 0 .. 2 pi, clockwise seen from above.

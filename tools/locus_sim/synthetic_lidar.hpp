@@ -24,6 +24,9 @@ inline constexpr std::size_t kPositionPacketBytes = 512;
 /// it.
 inline constexpr double kHalfBeam_rad = 0.0015;
 
+/// What leans a range: at 10 m a surface that is met at 75 degrees has the whole error of its slant.
+inline constexpr double kSlantRange_m = 10, kSlant_deg = 75;
+
 /// A lidar, how it is mounted and what is wrong with it; as it stands, a perfect one that stands level in the base.
 struct SyntheticLidarOptions {
   velodyne::Model model = velodyne::Model::vlp16;
@@ -42,6 +45,13 @@ struct SyntheticLidarOptions {
   Duration clock_offset{}; ///< what its clock is ahead of true time
   bool sends_position_packets = false; ///< one after every fifth data packet
   bool pps_locked = true;              ///< and a valid fix, in its position packets
+  double drift = 0;                    ///< share by which its clock, and all that the clock times, runs fast
+  double beam_rad = 0;                 ///< full divergence along the turn, across it half as much; 0: a line
+  double laser_bias_m = 0;             ///< standard deviation of a constant error of each laser's ranges
+  double laser_elevation_rad = 0;      ///< the same of its elevation; the decoder believes the table
+  double incidence_bias_m = 0;         ///< what is met at kSlant_deg and kSlantRange_m seems farther by this
+  double intensity_bias_m = 0;         ///< black seems farther than white by this
+  std::vector<Surface> own_parts{};    ///< of the robot, base frame
   std::uint64_t seed = 1;
 };
 
@@ -63,7 +73,13 @@ class SyntheticLidar {
     Eigen::Vector3d direction;
     double origin_z_m;
     Duration after;               ///< the column's first firing
+    double bias_m = 0;            ///< of its laser's ranges
     const Surface* met = nullptr; ///< by the ray of the column before
+    bool near_edge = false;       ///< the beam of the column before was parted from top to bottom
+  };
+  struct Sight { ///< of one ray
+    Hit hit;
+    bool is_own_part = false;
   };
   struct Echo {
     std::uint16_t ticks = 0; ///< of the model's distance resolution; 0: none
@@ -72,17 +88,41 @@ class SyntheticLidar {
   struct Echoes {
     Echo last, strongest;
   };
-  struct Mount; ///< where the lidar is, how it moves and how far its rotor has turned while one column is fired
+  /// Where the lidar is, how it moves and how far its rotor has turned while one column is fired.
+  struct Mount {
+    Stamp fired;
+    Eigen::Matrix3d R_world_lidar;
+    Eigen::Matrix3d R_world_rotor;
+    Eigen::Matrix3d R_base_world;
+    Eigen::Vector3d position_m;
+    Eigen::Vector3d velocity_mps;
+    Eigen::Vector3d angular_velocity_radps; ///< all in world frame, at the first firing of the column
+  };
+  struct Column {
+    Mount mount;
+    std::vector<std::optional<Sight>> centers; ///< what the middle of each beam meets
+  };
+  class Footprint;
 
   void fill_data_packet();
   void fill_column(std::size_t column);
   void put_block_headers(std::size_t column, Stamp fired);
   void put_echo(std::size_t block, std::size_t channel, const Echo& echo);
-  Echoes fire(const Mount& mount, Aim& aim);
-  [[nodiscard]] std::optional<Hit> look(const Mount& mount, const Aim& aim, double aside_rad) const;
-  Echo measure(const std::optional<Hit>& hit);
+  [[nodiscard]] Mount mount_at(Stamp fired) const;
+  [[nodiscard]] std::optional<Sight> look(const Mount& mount, const Aim& aim, const Eigen::Vector3d& aimed) const;
+  void consider_own_parts(const Mount& mount, const Aim& aim, const Eigen::Vector3d& aimed,
+                          std::optional<Sight>& sight) const;
+  Echoes fire_line(const Mount& mount, Aim& aim);
+  void look_ahead(Stamp own_time);
+  Echoes fire_beam(std::size_t index);
+  [[nodiscard]] Footprint footprint(std::size_t index);
+  [[nodiscard]] bool is_parted_along_turn(std::size_t index) const;
+  std::optional<Echo> meet_dust(const Echo& nearest);
+  Echo measure(const Aim& aim, const std::optional<Sight>& sight);
+  [[nodiscard]] double leaning_m(const Hit& hit) const;
   Echo measure_dust();
   bool is_lost(double strength);
+  [[nodiscard]] Stamp true_time(Stamp own_time) const;
   [[nodiscard]] double rotor_azimuth_rad(Stamp stamp) const;
   [[nodiscard]] std::uint32_t microseconds_past_hour(Stamp stamp) const;
   void fill_position_packet();
@@ -94,11 +134,13 @@ class SyntheticLidar {
   SyntheticLidarOptions options_;
   const velodyne::ModelSpec& spec_;
   velodyne::PacketLayout layout_;
-  std::vector<Aim> aims_; ///< of the firings of a column
+  std::vector<Aim> aims_;       ///< of the firings of a column
+  Column before_, now_, ahead_; ///< of a beam that is no line
+  std::size_t columns_fired_ = 0;
   QuickDice dice_;
 
   SeenSpace* seen_;
-  Stamp packet_begin_; ///< first firing of the data packet to come
+  Stamp packet_begin_; ///< first firing of the data packet to come, by the lidar's clock
   Stamp last_arrival_;
   int data_packets_until_position_;
   std::array<std::byte, velodyne::kDataPacketBytes> data_{};

@@ -1,0 +1,331 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the imperfections do to a robot's sensors, and to what its motion sources say.
+#include "locus_sim/impairment.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "locus_sim/own_parts.hpp"
+
+namespace locus::sim {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+Robot spot_with(const Imperfections& imperfections, std::uint64_t seed = 1) {
+  return make_spot({.lidars = 3, .imperfections = imperfections}, seed);
+}
+
+/// Of what a robot writes, the one file.
+std::string config_of(const RobotOptions& robot) {
+  struct : CaptureSink {
+    void datagram(const Datagram&) override {}
+    void text(std::string_view file, Stamp, const std::string& lines) override {
+      if (file == "config.yaml")
+        config = lines;
+    }
+    void close() override {}
+
+    std::string config;
+  } sink;
+  const Trajectory trajectory(Course{}.stand(seconds{1}));
+  write_capture(sink, Scene({}), trajectory, milliseconds{10}, robot);
+  return sink.config;
+}
+
+TEST(Mounting, IsWrongByWhatIsAskedForAndConfigSaysWhatIsBelieved) {
+  const Robot right = spot_with({}), wrong = spot_with({.mounting_deg = 2, .mounting_mm = 30});
+  const auto expect_displaced = [](const Pose& truth, const Pose& intended) {
+    EXPECT_NEAR((truth.translation - intended.translation).norm(), 0.03, 1e-9);
+    EXPECT_NEAR(angle_rad(intended.rotation.conjugate() * truth.rotation), 2 * kRadPerDeg, 1e-9);
+  };
+  for (std::size_t i = 0; i < 3; ++i)
+    expect_displaced(wrong.sensors.lidars[i].options.T_base_lidar, right.sensors.lidars[i].options.T_base_lidar);
+  expect_displaced(wrong.sensors.imu->T_base_imu, right.sensors.imu->T_base_imu);
+  EXPECT_EQ(config_of(wrong.sensors), config_of(right.sensors));
+}
+
+TEST(Mounting, OfEachSensorAndSeedIsWrongInItsOwnDirection) {
+  std::vector<Eigen::Vector3d> shifts, turns;
+  for (const std::uint64_t seed : {1U, 2U}) {
+    const Robot wrong = spot_with({.mounting_deg = 2, .mounting_mm = 30}, seed);
+    const auto add = [&](const Pose& truth, const Pose& believed) {
+      shifts.emplace_back((truth.translation - believed.translation).normalized());
+      turns.emplace_back(so3_log(believed.rotation.conjugate() * truth.rotation).normalized());
+    };
+    for (const NamedLidar& lidar : wrong.sensors.lidars)
+      add(lidar.options.T_base_lidar, *lidar.T_base_believed);
+    add(wrong.sensors.imu->T_base_imu, *wrong.sensors.imu->T_base_believed);
+  }
+  for (std::size_t i = 0; i < shifts.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      EXPECT_GT((shifts[i] - shifts[j]).norm(), 0.01);
+      EXPECT_GT((turns[i] - turns[j]).norm(), 0.01);
+    }
+}
+
+TEST(Impairment, OfOneKindIsTheSameWhateverElseIsWrong) {
+  const Robot alone = spot_with({.mounting_mm = 30, .gyro_scale_percent = 1});
+  Imperfections all = imperfections_of(Realism::harsh);
+  all.mounting_mm = 30;
+  all.gyro_scale_percent = 1;
+  const Robot among = spot_with(all);
+  EXPECT_EQ(alone.sensors.lidars[0].options.T_base_lidar.translation,
+            among.sensors.lidars[0].options.T_base_lidar.translation);
+  EXPECT_EQ(alone.sensors.imu->faults.gyro_axis_scale_error, among.sensors.imu->faults.gyro_axis_scale_error);
+}
+
+TEST(BodyBox, HoldsEveryOtherPartOfTheRobotAndNoOther) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Dice dice(seed);
+    const Eigen::Vector3d lidar_m{0.1, 0, 0.8};
+    const OwnParts parts = own_parts(8, lidar_m, dice);
+    ASSERT_EQ(parts.surfaces.size(), 8U);
+    for (std::size_t i = 0; i < parts.surfaces.size(); ++i) {
+      const Bounds part = std::visit([](const auto& shape) { return shape.bounds(); }, parts.surfaces[i].shape);
+      const bool holds = (part.min_m.array() > parts.body_box->min_m.array()).all() &&
+                         (part.max_m.array() < parts.body_box->max_m.array()).all();
+      const bool is_apart = (part.min_m.array() > parts.body_box->max_m.array()).any() ||
+                            (part.max_m.array() < parts.body_box->min_m.array()).any();
+      EXPECT_EQ(holds, i % 2 == 0) << "part " << i << " seed " << seed;
+      EXPECT_EQ(is_apart, i % 2 == 1) << "part " << i << " seed " << seed;
+      const double away_m =
+          std::visit([&](const auto& shape) { return shape.distance_m(lidar_m); }, parts.surfaces[i].shape);
+      EXPECT_GT(away_m, SyntheticLidarOptions{}.min_range_m) << "part " << i << " seed " << seed;
+    }
+  }
+}
+
+TEST(BodyBox, StandsInConfigWhereTheRobotHasPartsInView) {
+  EXPECT_EQ(config_of(spot_with({}).sensors).find("body_box"), std::string::npos);
+  const Robot robot = spot_with({.body_parts = 2});
+  EXPECT_NE(config_of(robot.sensors).find("body_box: {enabled: true, min_m: [-"), std::string::npos);
+  for (const NamedLidar& lidar : robot.sensors.lidars)
+    EXPECT_EQ(lidar.options.own_parts.size(), 2U);
+}
+
+TEST(LidarClock, ThatDriftsHasNoGps) {
+  const SyntheticLidarOptions kept = spot_with({}).sensors.lidars[0].options;
+  EXPECT_TRUE(kept.pps_locked);
+  EXPECT_EQ(kept.clock_offset, Duration::zero());
+  const SyntheticLidarOptions left = spot_with({.lidar_drift_ppm = 60}).sensors.lidars[0].options;
+  EXPECT_DOUBLE_EQ(left.drift, 60e-6);
+  EXPECT_FALSE(left.pps_locked);
+  EXPECT_NE(left.clock_offset, Duration::zero());
+}
+
+struct Scatter {
+  double mean_s = 0, deviation_s = 0;
+};
+
+Scatter scatter_of(const std::vector<double>& all_s) {
+  Scatter scatter;
+  const auto count = static_cast<double>(all_s.size());
+  for (const double each_s : all_s)
+    scatter.mean_s += each_s / count;
+  for (const double each_s : all_s)
+    scatter.deviation_s += std::pow(each_s - scatter.mean_s, 2) / count;
+  scatter.deviation_s = std::sqrt(scatter.deviation_s);
+  return scatter;
+}
+
+/// How much later than every 5 ms its stamps are; what it says is of then.
+template <class Source> Scatter lateness(Source source, Stamp start) {
+  std::vector<double> all_s;
+  Stamp last = start - seconds{1};
+  for (int i = 0; i < 4000; ++i) {
+    const auto sample = source.next();
+    EXPECT_GT(sample.stamp, last);
+    EXPECT_EQ(sample.arrival, sample.stamp);
+    last = sample.stamp;
+    all_s.push_back(to_seconds(sample.stamp - start) - 0.005 * i);
+  }
+  return scatter_of(all_s);
+}
+
+TEST(SourceStamps, AreLateAndScatterAndNeverRunBackwards) {
+  const Trajectory trajectory(Course{}.stand(seconds{30}));
+  for (const double jitter_s : {0.0005, 0.02}) { // the larger one puts many out of order
+    const StampFaults faults{.late = milliseconds{50}, .jitter_s = jitter_s};
+    for (const Scatter scatter :
+         {lateness(SyntheticImu(trajectory, 200, {.stamps = faults}), trajectory.start()),
+          lateness(SyntheticOdometry(trajectory, 200, {.stamps = faults}), trajectory.start())}) {
+      if (jitter_s < 0.001) {
+        EXPECT_NEAR(scatter.mean_s, 0.05, 4 * jitter_s / std::sqrt(4000));
+        EXPECT_NEAR(scatter.deviation_s, jitter_s, 0.05 * jitter_s);
+      } else {
+        EXPECT_GT(scatter.mean_s, 0.05); // those that would have gone back
+      }
+    }
+  }
+}
+
+/// What is written is the motion of before.
+TEST(SourceStamps, ThatAreLateStandForWhatWas) {
+  const Trajectory trajectory(Course{}.change_speed(2, seconds{1}).turn(3, 2.0));
+  const Duration late = milliseconds{30};
+  SyntheticOdometry odometry(trajectory, 50, {.stamps = {.late = late}});
+  SyntheticImu imu(trajectory, 200, {.stamps = {.late = late}});
+  const Pose T_source_world = trajectory.T_world_base(trajectory.start()).inverse();
+  for (int i = 0; i < 100; ++i) {
+    const OdometrySample sample = odometry.next();
+    const Pose T_source_base = T_source_world * trajectory.T_world_base(sample.stamp - late);
+    ASSERT_LT((sample.T_source_base.translation - T_source_base.translation).norm(), 1e-9);
+    const ImuSample inertial = imu.next();
+    ASSERT_LT(
+        (inertial.angular_velocity_radps - trajectory.at(inertial.stamp - late).angular_velocity_base_radps).norm(),
+        1e-12);
+  }
+}
+
+/// Metres that are reported for each that is driven, at 50 Hz.
+std::vector<double> reported_shares(const Trajectory& trajectory, double per_min, std::uint64_t seed) {
+  SyntheticOdometry odometry(trajectory, 50, {.slip_bursts_per_min = per_min}, seed);
+  OdometrySample last = odometry.next();
+  std::vector<double> shares;
+  for (OdometrySample now = odometry.next(); now.stamp <= trajectory.end(); last = now, now = odometry.next()) {
+    const double driven_m =
+        (trajectory.T_world_base(now.stamp).translation - trajectory.T_world_base(last.stamp).translation).norm();
+    const double reported_m = (now.T_source_base.translation - last.T_source_base.translation).x();
+    if (driven_m == 0)
+      EXPECT_EQ(reported_m, 0);
+    else
+      shares.push_back(reported_m / driven_m);
+  }
+  return shares;
+}
+
+/// At an even speed. The bursts of ten minutes are Poisson's: the bounds are passed one time in ten thousand.
+TEST(SlipBursts, ReportTooMuchAsOftenAndAsLongAsAskedFor) {
+  const Trajectory trajectory(Course{}.change_speed(1, milliseconds{1}).straight(600));
+  int bursts = 0, run = 0;
+  std::vector<double> shares = reported_shares(trajectory, 5, 3);
+  shares.resize(shares.size() - 100); // who stops dead brakes
+  for (const double share : shares) {
+    if (share > 1 + 1e-6) {
+      EXPECT_GE(share, 1.2 - 1e-6);
+      EXPECT_LE(share, 2 + 1e-6);
+      ++run;
+      continue;
+    }
+    EXPECT_NEAR(share, 1, 1e-6);
+    if (run > 0) {
+      EXPECT_GE(run, 24);
+      ++bursts;
+    }
+    run = 0;
+  }
+  EXPECT_GT(bursts, 23);
+  EXPECT_LT(bursts, 78);
+}
+
+TEST(SlipBursts, ReportTooLittleWhileTheRobotBrakesAndNothingWhileItStands) {
+  const Trajectory trajectory(
+      Course{}.change_speed(10, milliseconds{1}).change_speed(0, seconds{20}).stand(seconds{20}));
+  const std::vector<double> shares = reported_shares(trajectory, 60, 3);
+  int dragging = 0;
+  for (std::size_t i = 300; i < 700; ++i) { // where it brakes hard enough to be called so
+    EXPECT_LE(shares[i], 1 + 1e-6);
+    EXPECT_GE(shares[i], -1e-6);
+    dragging += shares[i] < 0.9;
+  }
+  EXPECT_GT(dragging, 25);
+}
+
+TEST(SlipBursts, AndTurnErrorsAreOfWheelsAndFeetAlone) {
+  const Robot right = spot_with({}), wrong = spot_with({.slip_bursts_per_min = 3, .yaw_error_percent = 5});
+  const auto &vision = wrong.sensors.odometry[0].faults, &legs = wrong.sensors.odometry[1].faults;
+  EXPECT_EQ(vision.slip_bursts_per_min, 0);
+  EXPECT_EQ(vision.turn_error, right.sensors.odometry[0].faults.turn_error);
+  EXPECT_EQ(legs.slip_bursts_per_min, 3);
+  EXPECT_NEAR(std::abs(legs.turn_error - right.sensors.odometry[1].faults.turn_error), 0.05, 1e-12);
+}
+
+TEST(TurnErrors, HaveEitherSign) {
+  std::set<bool> signs;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed)
+    signs.insert(spot_with({.yaw_error_percent = 50}, seed).sensors.odometry[1].faults.turn_error > 0);
+  EXPECT_EQ(signs.size(), 2U);
+}
+
+/// What an IMU with faults shows more than one without.
+ImuSample excess(const Trajectory& trajectory, const ImuFaults& faults, Duration at) {
+  const auto sample_at = [&](const ImuFaults& of) {
+    SyntheticImu imu(trajectory, 200, of);
+    ImuSample sample = imu.next();
+    while (sample.stamp < trajectory.start() + at)
+      sample = imu.next();
+    return sample;
+  };
+  ImuSample with = sample_at(faults);
+  const ImuSample without = sample_at({});
+  with.angular_velocity_radps -= without.angular_velocity_radps;
+  with.specific_force_mps2 -= without.specific_force_mps2;
+  return with;
+}
+
+TEST(Gyro, ShowsTooMuchOrTooLittleOnEachAxis) {
+  const Trajectory trajectory(Course{}.change_speed(2, seconds{1}).turn(6, 2.0), {},
+                              {.tilt_rad = 0.1, .wavelength_m = 2});
+  const ImuFaults faults =
+      make_spot({.noise = false, .imperfections = {.gyro_scale_percent = 3}}, 1).sensors.imu->faults;
+  const Duration at = milliseconds{2500};
+  const Eigen::Vector3d truth = trajectory.at(trajectory.start() + at).angular_velocity_base_radps;
+  const Eigen::Vector3d error = excess(trajectory, faults, at).angular_velocity_radps;
+  for (const Eigen::Index axis : {0, 1, 2}) {
+    EXPECT_GT(std::abs(truth[axis]), 0.01);
+    EXPECT_NEAR(std::abs(error[axis]), 0.03 * std::abs(truth[axis]), 1e-9);
+  }
+}
+
+TEST(Gyro, ShowsAccelerationButNotTheGravityThatItWasCalibratedIn) {
+  const Trajectory trajectory(Course{}.change_speed(6, seconds{2}));
+  const ImuFaults faults =
+      make_spot({.noise = false, .imperfections = {.g_sensitivity_dps = 0.2}}, 1).sensors.imu->faults;
+  EXPECT_EQ(excess(trajectory, faults, Duration::zero()).angular_velocity_radps.norm(), 0);
+  const Duration at = seconds{1};
+  const double g = trajectory.at(trajectory.start() + at).acceleration_world_mps2.norm() / kGravity_mps2;
+  EXPECT_GT(g, 0.5);
+  EXPECT_NEAR(excess(trajectory, faults, at).angular_velocity_radps.norm(), 0.2 * kRadPerDeg * g, 1e-9);
+}
+
+TEST(Gyro, BiasWalksAwayWithTheRootOfTheTime) {
+  const Trajectory trajectory(Course{}.stand(seconds{1}));
+  ImuFaults faults = make_spot({.noise = false, .imperfections = {.gyro_walk_dps = 0.1}}, 1).sensors.imu->faults;
+  SyntheticImu imu(trajectory, 200, faults);
+  constexpr int kRuns = 200, kSamples = 200; // of a second
+  double sum = 0;
+  Eigen::Vector3d begin = imu.next().angular_velocity_radps, now = begin;
+  for (int run = 0; run < kRuns; ++run, begin = now) {
+    for (int i = 0; i < kSamples; ++i)
+      now = imu.next().angular_velocity_radps;
+    sum += (now - begin).squaredNorm() / 3 / kRuns;
+  }
+  EXPECT_NEAR(std::sqrt(sum), 0.1 * kRadPerDeg, 0.12 * 0.1 * kRadPerDeg); // 600 draws
+}
+
+TEST(Accelerometer, ShakesWhileTheRobotMoves) {
+  const Trajectory trajectory(Course{}.stand(seconds{5}).change_speed(1, milliseconds{1}).straight(20));
+  const ImuFaults faults = make_spot({.noise = false, .imperfections = {.vibration_mps2 = 3}}, 1).sensors.imu->faults;
+  SyntheticImu imu(trajectory, 200, faults);
+  double standing = 0, driving = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const double error = imu.next().specific_force_mps2.x();
+    if (i < 1000)
+      standing = std::max(standing, std::abs(error));
+    else if (i > 1000)
+      driving += error * error / 1999;
+  }
+  EXPECT_LT(standing, 1e-9);
+  EXPECT_NEAR(std::sqrt(driving), 3, 0.2);
+}
+
+} // namespace
+} // namespace locus::sim
