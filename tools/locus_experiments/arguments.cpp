@@ -37,8 +37,10 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   CLI::App app{
       "The evaluation of the LOCUS paper, on simulated courses or on recordings of yours: one page of figures.",
       "locus-experiments"};
-  auto* recordings = app.add_option("RECORDING", arguments.recordings,
-                                    "Capture folders to run on; without any, the courses of the paper are simulated");
+  auto* recordings =
+      app.add_option("RECORDING", arguments.recordings,
+                     "Capture folders to run on; without any, the courses of the paper are simulated. With "
+                     "--accuracy: files and folders to search");
   app.add_option("-o,--output", arguments.output,
                  "Folder for experiments.html, results.json and the runs; made if need be")
       ->required()
@@ -58,6 +60,11 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
                "Every fault of every input, from the start and mid-drive, in their place: matrix.md")
       ->excludes(recordings)
       ->excludes(faults);
+  auto* accuracy = app.add_flag("--accuracy", arguments.accuracy,
+                                "What all recordings in these folders show, at any depth, in their place: accuracy.md")
+                       ->excludes(faults)
+                       ->excludes("--fault-matrix");
+  app.add_flag("--simulated", arguments.simulated, "Simulates three drives for --accuracy, too")->needs(accuracy);
   app.add_option("--seeds", arguments.seeds, "Of each course with --faults")
       ->type_name("N")
       ->capture_default_str()
@@ -73,10 +80,13 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
       ->type_name("N")
       ->capture_default_str()
       ->check(CLI::Range(1, 1024));
-  auto* shard_option = app.add_option("--shard", shard, "Does only the I-th of N parts, for --merge")->type_name("I/N");
+  auto* shard_option = app.add_option("--shard", shard, "Does only the I-th of N parts, for --merge")
+                           ->type_name("I/N")
+                           ->excludes(accuracy);
   app.add_option("--merge", arguments.merge, "Makes one page of the output folders of all parts, and runs nothing")
       ->type_name("DIR...")
-      ->excludes(shard_option);
+      ->excludes(shard_option)
+      ->excludes(accuracy);
   app.add_flag("--keep-captures", arguments.keep_captures, "Leaves the simulated courses in DIR/courses");
   app.add_flag("--quiet", arguments.quiet, "Prints errors alone");
   app.set_version_flag("--version", "locus-experiments " LOCUS_VERSION);
@@ -86,13 +96,16 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
              "  locus-experiments --merge part1 part2 -o experiments\n"
              "  locus-experiments -o fleet robot1/ robot2/ robot3/\n"
              "  locus-experiments --faults --duration 120 -o faults\n"
-             "  locus-experiments --fault-matrix --duration 120 -o matrix");
+             "  locus-experiments --fault-matrix --duration 120 -o matrix\n"
+             "  locus-experiments --accuracy -o accuracy recordings/");
   if (!tools::parse_command_line(app, argc, argv))
     return std::nullopt;
   const std::optional<Shard> parsed = Shard::parse(shard);
   if (!parsed)
     throw Failure(ExitStatus::wrong_usage, fmt::format("--shard {}: must be I/N with I from 1 to N, as in 2/8", shard));
   arguments.shard = *parsed;
+  if (arguments.accuracy && arguments.recordings.empty() && !arguments.simulated)
+    throw Failure(ExitStatus::wrong_usage, "--accuracy: name folders with recordings, or --simulated");
   return arguments;
 }
 

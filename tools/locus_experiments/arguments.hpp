@@ -28,6 +28,8 @@ struct Arguments {
   int pace_s = 60;                               ///< of a run at the pace of the recording
   bool faults = false;                           ///< the table of faults in place of the paper's experiments
   bool fault_matrix = false;                     ///< the matrix of faults in their place
+  bool accuracy = false;                         ///< what recordings show in their place; `recordings`: where to look
+  bool simulated = false;                        ///< and a few simulated drives beside them
   int seeds = 3;                                 ///< of each course of that table
   int honesty_runs = 100;                        ///< for its line on the covariances
   int jobs = 1;

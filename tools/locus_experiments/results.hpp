@@ -14,7 +14,7 @@ namespace locus::experiments {
 /// stands in place of "robustness": {"seeds", "consistency_runs", "rows": [...], "consistency"}, of judge_faults();
 /// with
 /// --fault-matrix "matrix": {"cells": [...]}, of judge_matrix(). A run that was to be refused, and was, has "refused",
-/// what locus-replay said.
+/// what locus-replay said. With --accuracy it holds what accuracy_of() says.
 using Results = nlohmann::ordered_json;
 
 /// Puts the runs of several shards together. Throws tools::Failure where a folder holds no results, where two hold the
@@ -30,7 +30,8 @@ void judge_robustness(Results& results);
 /// What the runs say together: judge_robustness(), judge_faults() or judge_matrix().
 void judge(Results& results);
 
-/// Writes results.json and experiments.html, faults.md or matrix.md; that is what it returns. Throws tools::Failure.
+/// Writes results.json and experiments.html, faults.md, matrix.md or accuracy.md; that is what it returns. Throws
+/// tools::Failure.
 std::filesystem::path write_results(const std::filesystem::path& folder, const Results& results);
 
 } // namespace locus::experiments
