@@ -94,6 +94,32 @@ TEST(TrajectoryAccuracy, TurningTooFastShowsPerTenMetres) {
   EXPECT_NEAR(*accuracy->rpe_10m_deg, 1.0, 1e-6);
 }
 
+TEST(WayDrift, IsTheMeanOverHundredsOfMetres) {
+  const auto drift = way_drift(straight(301, 1.01), straight(301));
+  ASSERT_TRUE(drift);
+  EXPECT_NEAR(drift->way_m, 300, 1e-9);
+  EXPECT_NEAR(*drift->percent, 1.0, 1e-9) << "over 100, 200 and 300 m";
+  EXPECT_NEAR(*drift->deg_per_100m, 0, 1e-6);
+  const Trajectory turning = drive(151, milliseconds{1000}, [](int i) {
+    return yawed(0.01 * kRadPerDeg * i, {1.0 * i, 0, 0});
+  });
+  EXPECT_NEAR(*way_drift(turning, straight(151))->deg_per_100m, 1.0, 1e-6);
+}
+
+TEST(WayDrift, OfAShortWayIsNotTold) {
+  EXPECT_FALSE(way_drift(straight(100), straight(100))->percent) << "99 m";
+  EXPECT_TRUE(way_drift(straight(101), straight(101))->percent);
+  EXPECT_FALSE(way_drift(straight(10), {}));
+}
+
+/// As KITTI's own tool: of a hundred stretches of 100 m that begin at every estimate, ten count.
+TEST(WayDrift, CountsStretchesFromEveryTenthEstimate) {
+  Trajectory estimates = straight(200);
+  for (std::size_t i = 0; i < estimates.size(); ++i)
+    estimates[i].T_source_base.translation.y() = i % 10 == 0 ? 0 : 1; // ends of stretches that count are right, too
+  EXPECT_NEAR(*way_drift(estimates, straight(200))->percent, 0, 1e-9);
+}
+
 TEST(TrajectoryAccuracy, EndDriftCountsTheFirstHeading) {
   Trajectory estimates = straight(101);
   estimates.front().T_source_base.rotation = from_rpy_rad({0, 0, 1 * kRadPerDeg});

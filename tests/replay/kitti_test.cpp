@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A drive in the format of KITTI's raw data in place of a capture.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -9,7 +10,9 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "core/pose.hpp"
 #include "kitti/kitti_drive.hpp"
+#include "kitti/kitti_points.hpp"
 #include "kitti/kitti_sweep.hpp"
 #include "replay_run.hpp"
 #include "support/errors.hpp"
@@ -26,6 +29,17 @@ using tools::KittiSweep;
 constexpr double kTurn = 2.0 * std::numbers::pi;
 using kitti_room::kPeriod;
 
+Eigen::Vector3d position_of(const KittiPoint& p) { return Eigen::Vector3f{p.x_m, p.y_m, p.z_m}.cast<double>(); }
+double elevation_rad(const KittiPoint& p) { return std::asin(position_of(p).normalized().z()); }
+double azimuth_rad(const KittiPoint& p) { return std::atan2(position_of(p).y(), position_of(p).x()); }
+
+KittiPoint point_at(double range_m, double azimuth_rad, double elevation_rad) {
+  const double level_m = range_m * std::cos(elevation_rad);
+  const Eigen::Vector3d p{level_m * std::cos(azimuth_rad), level_m * std::sin(azimuth_rad),
+                          range_m * std::sin(elevation_rad)};
+  return {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()), 0.25F};
+}
+
 /// A copy that a test may spoil.
 class KittiReplay : public testing::Test {
  protected:
@@ -33,6 +47,17 @@ class KittiReplay : public testing::Test {
 
   [[nodiscard]] std::filesystem::path points(int sweep) const {
     return drive_ / fmt::format("velodyne_points/data/{:010}.txt", sweep);
+  }
+  /// All points of the drive changed, and in binary.
+  template <class Change> void rewrite_points(Change&& change) const {
+    for (int sweep = 0; sweep < kitti_room::kSweeps; ++sweep) {
+      std::vector<KittiPoint> all;
+      ASSERT_TRUE(tools::read_kitti_points(points(sweep), all));
+      std::ranges::for_each(all, change);
+      std::ofstream{points(sweep).replace_extension(".bin"), std::ios::binary}.write(
+          reinterpret_cast<const char*>(all.data()), static_cast<std::streamsize>(all.size() * sizeof(KittiPoint)));
+      std::filesystem::remove(points(sweep));
+    }
   }
   void expect_refused(const std::vector<std::string>& said) const {
     const ProgramRun run = Replay({drive_}).run();
@@ -47,7 +72,7 @@ class KittiReplay : public testing::Test {
 };
 
 TEST(Kitti, DriveIsReplayedAndMeasuredByItsInertialUnit) {
-  const Replay replay({kitti_room_drive()});
+  const Replay replay({"--kitti-as-published", kitti_room_drive()});
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
   EXPECT_EQ(replay.run().err, "");
   EXPECT_TRUE(contains(replay.run().out, "velodyne_points is lidar front, oxts is imu, oxts is the truth"))
@@ -128,7 +153,7 @@ TEST_F(KittiReplay, SweepsThatAreMissingOrDamagedAreLeftOut) {
   std::ofstream{points(12), std::ios::app} << "1.0 2.0\n";
   std::filesystem::resize_file(points(20), 0);
   std::ofstream{points(30)} << "1.0 2.0 metres 0.3\n";
-  const Replay replay({drive_});
+  const Replay replay({"--kitti-as-published", drive_});
   EXPECT_EQ(replay.run().status, 0);
   EXPECT_TRUE(contains(replay.run().err, "1 sweeps lack their points in data or their time")) << replay.run().err;
   EXPECT_TRUE(contains(replay.run().err, "3 sweeps are cut or no points, 0 not in the order")) << replay.run().err;
@@ -148,7 +173,7 @@ TEST_F(KittiReplay, BlankTimesStandForSweepsThatAreMissing) {
   for (const int sweep : {17, 18, 19, 20})
     std::filesystem::remove(points(sweep));
   std::filesystem::copy(kitti_room_drive().parent_path() / "calib_imu_to_velo.txt", folder_.path());
-  const Replay replay({drive_});
+  const Replay replay({"--kitti-as-published", drive_});
   EXPECT_EQ(replay.run().status, 0);
   EXPECT_EQ(replay.run().err, "");
   EXPECT_LT(replay.summary()["ape_m"]["max"], 0.02);
@@ -156,16 +181,10 @@ TEST_F(KittiReplay, BlankTimesStandForSweepsThatAreMissing) {
 
 /// A drive that was synchronised has them in binary.
 TEST_F(KittiReplay, PointsInBinaryGiveTheSameBits) {
-  const Replay text({drive_});
-  for (int sweep = 0; sweep < kitti_room::kSweeps; ++sweep) {
-    std::vector<KittiPoint> all;
-    ASSERT_TRUE(tools::read_kitti_points(points(sweep), all));
-    std::ofstream{points(sweep).replace_extension(".bin"), std::ios::binary}.write(
-        reinterpret_cast<const char*>(all.data()), static_cast<std::streamsize>(all.size() * sizeof(KittiPoint)));
-    std::filesystem::remove(points(sweep));
-  }
+  const Replay text({"--kitti-as-published", drive_});
+  rewrite_points([](const KittiPoint&) {});
   std::filesystem::resize_file(points(39).replace_extension(".bin"), 1001);
-  const Replay binary({drive_});
+  const Replay binary({"--kitti-as-published", drive_});
   EXPECT_TRUE(contains(binary.run().err, "1 sweeps are cut or no points")) << binary.run().err;
   const std::string all = read_text(text.file("odometry.tum")), less = read_text(binary.file("odometry.tum"));
   EXPECT_EQ(less.substr(0, less.size() / 2), all.substr(0, less.size() / 2));
@@ -186,10 +205,10 @@ TEST_F(KittiReplay, BadTimesAreNamedWithFileAndLine) {
 
 TEST_F(KittiReplay, WithoutInertialUnitTheLidarIsAlone) {
   std::filesystem::remove_all(drive_ / "oxts");
-  const Replay replay({drive_});
+  const Replay replay({"--kitti-as-published", drive_});
   EXPECT_EQ(replay.run().status, 0) << replay.run().err;
   EXPECT_FALSE(replay.summary().contains("ape_m"));
-  EXPECT_TRUE(contains(replay.run().out, "velodyne_points is lidar front\n")) << replay.run().out;
+  EXPECT_TRUE(contains(replay.run().out, "velodyne_points is lidar front; its vertical")) << replay.run().out;
 }
 
 /// As in a drive that was synchronised.
@@ -198,11 +217,61 @@ TEST_F(KittiReplay, InertialUnitAtTenHertzDoesToo) {
     if (i % 10 != 0)
       std::filesystem::remove(drive_ / fmt::format("oxts/data/{:010}.txt", i));
   }
-  const Replay replay({drive_});
+  const Replay replay({"--kitti-as-published", drive_});
   EXPECT_EQ(replay.run().status, 0);
   EXPECT_TRUE(contains(replay.run().err, "360 records cannot be read")) << replay.run().err;
   EXPECT_EQ(replay.summary()["sources"]["imu"]["received"], kitti_room::kSweeps);
   EXPECT_LT(replay.summary()["ape_m"]["max"], 0.05);
+}
+
+TEST(Kitti, RaisedPointsKeepTheirRangeAndAzimuth) {
+  constexpr std::array kElevations_deg{-24.8, -10.0, -0.205, 0.0, 2.0};
+  for (const double elevation_deg : kElevations_deg) {
+    for (double azimuth_deg = -180; azimuth_deg < 180; azimuth_deg += 45) {
+      std::vector<KittiPoint> points{point_at(40, azimuth_deg * kRadPerDeg, elevation_deg * kRadPerDeg)};
+      tools::raise(points, 0.205);
+      const KittiPoint& raised = points.front();
+      constexpr double kOfFloats = 2e-5;
+      EXPECT_NEAR(elevation_rad(raised) / kRadPerDeg, elevation_deg + 0.205, kOfFloats);
+      EXPECT_NEAR(position_of(raised).norm(), 40, kOfFloats);
+      EXPECT_NEAR(std::remainder(azimuth_rad(raised) / kRadPerDeg - azimuth_deg, 360.0), 0, kOfFloats);
+      EXPECT_EQ(raised.reflectance, 0.25F);
+    }
+  }
+}
+
+TEST(Kitti, PointsWithoutAVerticalPlaneStayWhereTheyAre) {
+  std::vector<KittiPoint> points{{0, 0, 0, 0}, {0, 0, 5, 0}, {std::numeric_limits<float>::quiet_NaN(), 1, 1, 0}};
+  tools::raise(points, 0.205);
+  EXPECT_EQ(points[0].z_m, 0);
+  EXPECT_EQ(points[1].z_m, 5);
+  EXPECT_TRUE(std::isnan(points[2].x_m));
+}
+
+/// Each point lies as much too low as KITTI's do: four metres away the floor is 14 mm too deep.
+TEST_F(KittiReplay, AnglesThatAreTooSmallAreMadeRight) {
+  const Replay truth({"--kitti-as-published", drive_});
+  rewrite_points([](KittiPoint& p) {
+    p = point_at(position_of(p).norm(), azimuth_rad(p), elevation_rad(p) - 0.205 * kRadPerDeg);
+  });
+  const std::string map = truth.file("map.pcd");
+  const Replay wrong({"--kitti-as-published", "--map-truth", map, drive_}), right({"--map-truth", map, drive_});
+  ASSERT_EQ(wrong.run().status, 0) << wrong.run().err;
+  ASSERT_EQ(right.run().status, 0) << right.run().err;
+  const double wrong_m = wrong.summary()["map_error_m"]["rmse"], right_m = right.summary()["map_error_m"]["rmse"];
+  EXPECT_GT(wrong_m, 0.003);
+  EXPECT_LT(right_m, 0.1 * wrong_m);
+  EXPECT_LT(right.summary()["ape_m"]["max"], 0.02) << "as that of the points as they were";
+  EXPECT_TRUE(contains(right.run().out, "0.205 degrees are added to its vertical angles")) << right.run().out;
+  EXPECT_TRUE(contains(wrong.run().out, "its vertical angles are as published")) << wrong.run().out;
+  EXPECT_EQ(right.summary()["kitti_vertical_angle_added_deg"], 0.205);
+  EXPECT_EQ(wrong.summary()["kitti_vertical_angle_added_deg"], 0);
+}
+
+TEST(Kitti, WhatIsNoDriveHasNothingToLeaveAsPublished) {
+  const Replay replay({"--kitti-as-published", room_drive()});
+  EXPECT_EQ(replay.run().status, 2);
+  EXPECT_TRUE(contains(replay.run().err, "is no drive of KITTI")) << replay.run().err;
 }
 
 TEST_F(KittiReplay, FaultsOfPacketsAreRefused) {

@@ -45,6 +45,13 @@ struct StretchError {
   double percent, deg;
 };
 
+StretchError error_of(std::span<const PosePair> pairs, const Stretch& stretch) {
+  const PosePair &begin = pairs[stretch.begin], &end = pairs[stretch.end];
+  const Pose T_truth = begin.T_truth_base.inverse() * end.T_truth_base;
+  const Pose error = T_truth.inverse() * (begin.T_odom_base.inverse() * end.T_odom_base);
+  return {100.0 * error.translation.norm() / stretch.length_m, angle_rad(error.rotation) / kRadPerDeg};
+}
+
 /// The mean over all stretches.
 std::optional<StretchError> relative_error(std::span<const PosePair> pairs, double length_m) {
   const std::vector<Stretch> stretches = stretches_of(pairs, length_m);
@@ -52,11 +59,9 @@ std::optional<StretchError> relative_error(std::span<const PosePair> pairs, doub
     return std::nullopt;
   StretchError sum{0, 0};
   for (const Stretch& stretch : stretches) {
-    const PosePair &begin = pairs[stretch.begin], &end = pairs[stretch.end];
-    const Pose T_truth = begin.T_truth_base.inverse() * end.T_truth_base;
-    const Pose error = T_truth.inverse() * (begin.T_odom_base.inverse() * end.T_odom_base);
-    sum.percent += 100.0 * error.translation.norm() / stretch.length_m;
-    sum.deg += angle_rad(error.rotation) / kRadPerDeg;
+    const StretchError error = error_of(pairs, stretch);
+    sum.percent += error.percent;
+    sum.deg += error.deg;
   }
   const auto count = static_cast<double>(stretches.size());
   return StretchError{sum.percent / count, sum.deg / count};
@@ -102,6 +107,33 @@ std::optional<TrajectoryAccuracy> trajectory_accuracy(std::span<const StampedPos
   accuracy.end_drift_m = end_drift_m(pairs.front(), pairs.back());
   accuracy.T_truth_odom = aligned(pairs, kAroundBase);
   return accuracy;
+}
+
+std::optional<WayDrift> way_drift(std::span<const StampedPose> estimates, std::span<const StampedPose> truth) {
+  constexpr double kShortest_m = 100, kLongest_m = 800, kMetresPerUnit = 100;
+  constexpr std::size_t kEvery = 10;
+  const std::vector<PosePair> pairs = paired(estimates, truth);
+  if (pairs.empty())
+    return std::nullopt;
+  WayDrift drift;
+  for (std::size_t i = 1; i < pairs.size(); ++i)
+    drift.way_m += (pairs[i].T_truth_base.translation - pairs[i - 1].T_truth_base.translation).norm();
+  double percent = 0, deg_per_100m = 0, count = 0;
+  for (double length_m = kShortest_m; length_m <= kLongest_m; length_m += kShortest_m) {
+    for (const Stretch& stretch : stretches_of(pairs, length_m)) {
+      if (stretch.begin % kEvery != 0)
+        continue;
+      const StretchError error = error_of(pairs, stretch);
+      percent += error.percent;
+      deg_per_100m += error.deg * kMetresPerUnit / stretch.length_m;
+      ++count;
+    }
+  }
+  if (count > 0) {
+    drift.percent = percent / count;
+    drift.deg_per_100m = deg_per_100m / count;
+  }
+  return drift;
 }
 
 } // namespace locus

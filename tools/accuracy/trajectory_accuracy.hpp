@@ -34,4 +34,16 @@ struct TrajectoryAccuracy {
 std::optional<TrajectoryAccuracy> trajectory_accuracy(std::span<const StampedPose> estimates,
                                                       std::span<const StampedPose> truth);
 
+/// How far a trajectory goes astray on its way, as KITTI's odometry benchmark has it (Geiger, Lenz, Urtasun: "Are We
+/// Ready for Autonomous Driving?", CVPR 2012).
+struct WayDrift {
+  double way_m = 0;                   ///< true, between the first and the last estimate compared
+  std::optional<double> percent;      ///< mean error of translation over stretches of 100, 200, ... 800 m of it, by
+                                      ///< their length, from every tenth estimate on; nothing on a shorter way
+  std::optional<double> deg_per_100m; ///< mean error of rotation over the same stretches
+};
+
+/// Both in the order of time. Nothing where the truth spans no estimate. Any thread.
+std::optional<WayDrift> way_drift(std::span<const StampedPose> estimates, std::span<const StampedPose> truth);
+
 } // namespace locus

@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <string>
 #include <system_error>
+
+#include "core/pose.hpp"
 
 namespace locus::tools {
 namespace {
@@ -33,6 +36,19 @@ bool read_text(const std::string& text, std::vector<KittiPoint>& points) {
 }
 
 } // namespace
+
+void raise(std::vector<KittiPoint>& points, double angle_deg) {
+  const double cosine = std::cos(angle_deg * kRadPerDeg), sine = std::sin(angle_deg * kRadPerDeg);
+  for (KittiPoint& point : points) {
+    const double x_m = point.x_m, y_m = point.y_m, z_m = point.z_m, level_m = std::hypot(x_m, y_m);
+    if (!(level_m > 0))
+      continue;
+    const double stretch = (level_m * cosine - z_m * sine) / level_m;
+    point.x_m = static_cast<float>(x_m * stretch);
+    point.y_m = static_cast<float>(y_m * stretch);
+    point.z_m = static_cast<float>(level_m * sine + z_m * cosine);
+  }
+}
 
 bool read_kitti_points(const std::filesystem::path& file, std::vector<KittiPoint>& points) {
   constexpr std::uintmax_t kMostText_bytes = kMaxKittiPoints * kNumbersOfPoint * 16;

@@ -39,8 +39,10 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   CLI::App app{
       "The evaluation of the LOCUS paper, on simulated courses or on recordings of yours: one page of figures.",
       "locus-experiments"};
-  auto* recordings = app.add_option("RECORDING", arguments.recordings,
-                                    "Capture folders to run on; without any, the courses of the paper are simulated");
+  auto* recordings =
+      app.add_option("RECORDING", arguments.recordings,
+                     "Capture folders to run on; without any, the courses of the paper are simulated. With "
+                     "--accuracy: files and folders to search");
   app.add_option("-o,--output", arguments.output,
                  "Folder for experiments.html, results.json and the runs; made if need be")
       ->required()
@@ -56,8 +58,7 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   auto* realism =
       app.add_option("--realism", arguments.realism, "Of the simulated courses, as locus-sim has it")
           ->capture_default_str()
-          ->check(CLI::IsMember(std::vector<std::string>(sim::kRealismNames.begin(), sim::kRealismNames.end())))
-          ->excludes(recordings);
+          ->check(CLI::IsMember(std::vector<std::string>(sim::kRealismNames.begin(), sim::kRealismNames.end())));
   app.add_option("--pace", arguments.pace_s, "Of each run at the pace of the recording, seconds")
       ->type_name("S")
       ->capture_default_str()
@@ -81,6 +82,12 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
                  "Of --harsh the rows whose COURSE/IMPERFECTION holds this, as in corridor/people")
       ->type_name("TEXT")
       ->needs(harsh);
+  auto* accuracy = app.add_flag("--accuracy", arguments.accuracy,
+                                "What all recordings in these folders show, at any depth, in their place: accuracy.md")
+                       ->excludes(faults)
+                       ->excludes(matrix)
+                       ->excludes(harsh);
+  app.add_flag("--simulated", arguments.simulated, "Simulates three drives for --accuracy, too")->needs(accuracy);
   app.add_option("--seeds", arguments.seeds, "Of each course with --faults or --harsh")
       ->type_name("N")
       ->capture_default_str()
@@ -96,13 +103,17 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
       ->type_name("N")
       ->capture_default_str()
       ->check(CLI::Range(1, 1024));
-  auto* shard_option = app.add_option("--shard", shard, "Does only the I-th of N parts, for --merge")->type_name("I/N");
+  auto* shard_option = app.add_option("--shard", shard, "Does only the I-th of N parts, for --merge")
+                           ->type_name("I/N")
+                           ->excludes(accuracy);
   app.add_option("--merge", arguments.merge, "Makes one page of the output folders of all parts, and runs nothing")
       ->type_name("DIR...")
-      ->excludes(shard_option);
+      ->excludes(shard_option)
+      ->excludes(accuracy);
   app.add_option("--compare", arguments.compare,
                  "Results of an earlier run of the same rows: which are better, which worse; compare.md")
-      ->type_name("BEFORE.json");
+      ->type_name("BEFORE.json")
+      ->excludes(accuracy);
   app.add_flag("--keep-captures", arguments.keep_captures, "Leaves the simulated courses in DIR/courses");
   app.add_flag("--quiet", arguments.quiet, "Prints errors alone");
   app.set_version_flag("--version", "locus-experiments " LOCUS_VERSION);
@@ -114,7 +125,8 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
              "  locus-experiments --faults --duration 120 -o faults\n"
              "  locus-experiments --fault-matrix --duration 120 -o matrix\n"
              "  locus-experiments --harsh --seeds 1 -o harsh\n"
-             "  locus-experiments --merge faults --compare before/results.json -o compared");
+             "  locus-experiments --merge faults --compare before/results.json -o compared\n"
+             "  locus-experiments --accuracy -o accuracy recordings/");
   if (!tools::parse_command_line(app, argc, argv))
     return std::nullopt;
   if (arguments.harsh && duration->empty())
@@ -123,6 +135,8 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   if (!parsed)
     throw Failure(ExitStatus::wrong_usage, fmt::format("--shard {}: must be I/N with I from 1 to N, as in 2/8", shard));
   arguments.shard = *parsed;
+  if (arguments.accuracy && arguments.recordings.empty() && !arguments.simulated)
+    throw Failure(ExitStatus::wrong_usage, "--accuracy: name folders with recordings, or --simulated");
   return arguments;
 }
 

@@ -33,6 +33,8 @@ struct Arguments {
   bool harsh = false;                            ///< the harsh courses in their place
   std::string only = {};                         ///< of these, whose COURSE/IMPERFECTION holds this
   int seeds = 3;                                 ///< of each course of the faults and of the harsh ones
+  bool accuracy = false;                         ///< what recordings show in their place; `recordings`: where to look
+  bool simulated = false;                        ///< and a few simulated drives beside them
   int honesty_runs = 100;                        ///< for its line on the covariances
   int jobs = 1;
   Shard shard;

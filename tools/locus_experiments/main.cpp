@@ -15,6 +15,7 @@
 
 #include <fmt/format.h>
 
+#include "locus_experiments/accuracy_page.hpp"
 #include "locus_experiments/arguments.hpp"
 #include "locus_experiments/child_process.hpp"
 #include "locus_experiments/compare.hpp"
@@ -22,6 +23,7 @@
 #include "locus_experiments/loam_features.hpp"
 #include "locus_experiments/measurement.hpp"
 #include "locus_experiments/plan.hpp"
+#include "locus_experiments/recordings.hpp"
 #include "locus_experiments/results.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/replay_program.hpp"
@@ -232,7 +234,7 @@ Results Experiments::results() const {
 /// Each failed run in a line of its own; nothing if all is well.
 std::string failures_in(const Results& results) {
   std::string lines;
-  for (const Results& run : results.at("runs")) {
+  for (const Results& run : results.value("runs", Results::array())) {
     if (run.contains("failed"))
       lines += fmt::format("{}{}/{}: {}", lines.empty() ? "" : "\n", run.at("course").get<std::string>(),
                            run.at("configuration").get<std::string>(), run.at("failed").get<std::string>());
@@ -280,6 +282,23 @@ Results experiment(const Arguments& arguments) {
   return results;
 }
 
+Results accuracy(const Arguments& arguments) {
+  const std::vector<FoundRecording> recordings = find_recordings(arguments.recordings, arguments.output);
+  const std::vector<Course> drives = drives_of_accuracy(arguments);
+  if (recordings.empty() && drives.empty()) {
+    const std::vector<std::string> places(arguments.recordings.begin(), arguments.recordings.end());
+    throw Failure(ExitStatus::failed, fmt::format("{}: no recording, at any depth; looked for {}",
+                                                  fmt::join(places, ", "), kKindsOfRecordings));
+  }
+  const std::filesystem::path courses = arguments.output / kCourses;
+  if (!arguments.keep_captures)
+    leave_nothing_when_interrupted(drives, courses);
+  Results results = accuracy_of(arguments, recordings, drives, {sibling("locus-replay"), sibling("locus-sim")});
+  if (!arguments.keep_captures)
+    take_away(drives, courses);
+  return results;
+}
+
 void run(const Arguments& arguments) {
   std::optional<ResultsBefore> before;
   if (!arguments.compare.empty())
@@ -287,7 +306,9 @@ void run(const Arguments& arguments) {
   if (before && arguments.merge.empty()) // an hour before it would be of use
     before->check_is_of(what_is_asked(arguments));
   make_folder(arguments.output);
-  const Results results = arguments.merge.empty() ? experiment(arguments) : merged(arguments.merge);
+  const Results results = arguments.accuracy        ? accuracy(arguments)
+                          : arguments.merge.empty() ? experiment(arguments)
+                                                    : merged(arguments.merge);
   const std::filesystem::path page = write_results(arguments.output, results);
   if (!arguments.quiet)
     fmt::print("results in {}\n", page.string());

@@ -62,6 +62,8 @@ void add_errors(const std::filesystem::path& trajectory_file, const std::filesys
   result["silent_at_end_s"] = std::max(0.0, to_seconds(truth.back().stamp - estimates.back().stamp));
 }
 
+} // namespace
+
 ordered_json read_json(const std::filesystem::path& file) {
   std::ifstream stream{file};
   ordered_json json = ordered_json::parse(stream, nullptr, false);
@@ -69,8 +71,6 @@ ordered_json read_json(const std::filesystem::path& file) {
     throw Failure(ExitStatus::failed, fmt::format("{}: is missing or no JSON; run again", file.string()));
   return json;
 }
-
-} // namespace
 
 std::string machine_name() {
   std::ifstream stream{"/proc/cpuinfo"};

@@ -16,6 +16,9 @@ namespace locus::experiments {
 /// tools::Failure where the run has not left its files.
 nlohmann::ordered_json measurement(const Run& run, const std::filesystem::path& folder, const Course& course);
 
+/// A file that a run has left. Throws tools::Failure where it is missing or something else.
+nlohmann::ordered_json read_json(const std::filesystem::path& file);
+
 /// The processor, for figures from several machines.
 std::string machine_name();
 

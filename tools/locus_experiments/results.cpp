@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "locus_experiments/accuracy_table.hpp"
 #include "locus_experiments/fault_table.hpp"
 #include "locus_experiments/harsh_table.hpp"
 #include "locus_experiments/matrix_table.hpp"
@@ -135,6 +136,8 @@ std::filesystem::path write_results(const std::filesystem::path& folder, const R
   json.close();
   if (results.contains("faults"))
     return write_table(folder / "faults.md", fault_table(results));
+  if (results.contains("recordings"))
+    return write_table(folder / "accuracy.md", accuracy_table(results));
   if (results.contains("matrix"))
     return write_table(folder / "matrix.md", matrix_table(results));
   if (results.contains("harsh"))

@@ -14,7 +14,8 @@ namespace locus::experiments {
 /// stands in place of "robustness": {"seeds", "consistency_runs", "rows": [...], "consistency"}, of judge_faults();
 /// with
 /// --fault-matrix "matrix": {"cells": [...]}, of judge_matrix(); with --harsh "harsh": {"seeds", "only", "rows":
-/// [...]}, of judge_harsh(). A run that was to be refused, and was, has "refused", what locus-replay said.
+/// [...]}, of judge_harsh(). A run that was to be refused, and was, has "refused", what locus-replay said. With
+/// --accuracy it holds what accuracy_of() says.
 using Results = nlohmann::ordered_json;
 
 /// Reads a results.json. Throws tools::Failure.
@@ -33,8 +34,8 @@ void judge_robustness(Results& results);
 /// What the runs say together: judge_robustness(), judge_faults(), judge_matrix() or judge_harsh().
 void judge(Results& results);
 
-/// Writes results.json and experiments.html, faults.md, matrix.md or harsh.md; that is what it returns. Throws
-/// tools::Failure.
+/// Writes results.json and experiments.html, faults.md, matrix.md, harsh.md or accuracy.md; that is what it returns.
+/// Throws tools::Failure.
 std::filesystem::path write_results(const std::filesystem::path& folder, const Results& results);
 
 } // namespace locus::experiments

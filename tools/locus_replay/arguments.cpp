@@ -73,6 +73,10 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
                                 "At the pace of the recording, or SPEED times it (--realtime=SPEED), through the "
                                 "threads of the service: sweeps that come too fast are dropped")
                        ->check(number_between(0.01, 1000));
+  app.add_flag(
+      "--kitti-as-published", arguments.kitti_as_published,
+      "Leaves the points of a drive of KITTI as they are; default: their vertical angles are too small by 0.205 "
+      "degrees, which is put right");
   app.add_flag("--quiet", arguments.quiet, "Prints warnings and errors alone");
   app.set_version_flag("--version", "locus-replay " LOCUS_VERSION);
   app.footer("Examples:\n"

@@ -30,6 +30,7 @@ struct Arguments {
   std::optional<Duration> duration;
   std::vector<Fault> faults;
   std::optional<double> realtime_speed;
+  bool kitti_as_published = false; ///< the points of a drive of KITTI stay as they are
   bool quiet = false;
 };
 

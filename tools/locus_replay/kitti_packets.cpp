@@ -7,8 +7,8 @@
 
 namespace locus::tools {
 
-KittiPackets::KittiPackets(std::vector<KittiDrive::Sweep> sweeps, const LidarOptions& lidar)
-    : sweeps_(std::move(sweeps)) {
+KittiPackets::KittiPackets(std::vector<KittiDrive::Sweep> sweeps, const LidarOptions& lidar, double raised_deg)
+    : sweeps_(std::move(sweeps)), raised_deg_(raised_deg) {
   datagram_.source_ip = lidar.source_ip.value_or(0);
   datagram_.source_port = datagram_.destination_port = lidar.port;
 }
@@ -28,9 +28,12 @@ const Datagram* KittiPackets::next() {
 }
 
 void KittiPackets::read(const KittiDrive::Sweep& sweep) {
-  if (!read_kitti_points(sweep.file, points_))
+  if (!read_kitti_points(sweep.file, points_)) {
     ++damaged_;
-  else if (!sweep_.begin(points_, sweep.start, sweep.end))
+    return;
+  }
+  raise(points_, raised_deg_);
+  if (!sweep_.begin(points_, sweep.start, sweep.end))
     ++unordered_;
 }
 

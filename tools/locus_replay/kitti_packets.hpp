@@ -17,7 +17,8 @@ namespace locus::tools {
 /// in memory at a time. One owner.
 class KittiPackets : public DatagramSource {
  public:
-  KittiPackets(std::vector<KittiDrive::Sweep> sweeps, const LidarOptions& lidar);
+  /// The vertical angles of the points are made larger by `raised_deg`.
+  KittiPackets(std::vector<KittiDrive::Sweep> sweeps, const LidarOptions& lidar, double raised_deg);
 
   const Datagram* next() override;
   [[nodiscard]] std::uint64_t datagrams() const override { return datagrams_; }
@@ -29,6 +30,7 @@ class KittiPackets : public DatagramSource {
   void read(const KittiDrive::Sweep& sweep);
 
   std::vector<KittiDrive::Sweep> sweeps_;
+  double raised_deg_;
   std::size_t next_sweep_ = 0;
   std::vector<KittiPoint> points_;
   KittiSweep sweep_;

@@ -10,6 +10,7 @@
 #include "bags/bag.hpp"
 #include "drivers/capture_sequence.hpp"
 #include "kitti/kitti_drive.hpp"
+#include "kitti/kitti_points.hpp"
 #include "locus_replay/bag_motion.hpp"
 #include "locus_replay/bag_packets.hpp"
 #include "locus_replay/bag_topics.hpp"
@@ -61,17 +62,29 @@ RecordedInput open_drive_input(const Arguments& arguments, const std::filesystem
                           std::ranges::find(input.motion, source, &MotionRecording::source) == input.motion.end();
   if (takes_oxts)
     input.motion.push_back({source, folder / "oxts", MotionSamples<ImuSample>(std::move(drive.imu))});
+  const double raised_deg = raised_by_deg(arguments).value_or(0);
   input.taken =
-      fmt::format("{}: velodyne_points is lidar {}{}{}", folder.string(), config.lidars.front().name,
-                  takes_oxts ? ", oxts is " + imu->name : "", input.truth.empty() ? "" : ", oxts is the truth");
-  input.lidars = std::make_unique<KittiPackets>(std::move(drive.sweeps), config.lidars.front());
+      fmt::format("{}: velodyne_points is lidar {}{}{}; {}", folder.string(), config.lidars.front().name,
+                  takes_oxts ? ", oxts is " + imu->name : "", input.truth.empty() ? "" : ", oxts is the truth",
+                  raised_deg > 0 ? fmt::format("{} degrees are added to its vertical angles", raised_deg)
+                                 : "its vertical angles are as published");
+  input.lidars = std::make_unique<KittiPackets>(std::move(drive.sweeps), config.lidars.front(), raised_deg);
   return input;
 }
 
 } // namespace
 
+std::optional<double> raised_by_deg(const Arguments& arguments) {
+  if (!KittiDrive::is(arguments.capture))
+    return std::nullopt;
+  return arguments.kitti_as_published ? 0 : kKittiVerticalAngle_deg;
+}
+
 RecordedInput open_input(const Arguments& arguments, const CaptureFolder& folder, const Config& config,
                          bool config_is_users_own, std::vector<std::string>& warnings) {
+  if (arguments.kitti_as_published && !KittiDrive::is(folder.lidar.front()))
+    throw Failure(ExitStatus::wrong_usage, fmt::format("--kitti-as-published: {} is no drive of KITTI; leave it out",
+                                                       folder.lidar.front().string()));
   if (looks_like_bag(folder.lidar.front()))
     return open_bag_input(arguments, folder.lidar.front(), config, config_is_users_own, warnings);
   if (KittiDrive::is(folder.lidar.front()))

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,5 +27,9 @@ struct RecordedInput {
 /// warning. Throws Failure.
 RecordedInput open_input(const Arguments& arguments, const CaptureFolder& folder, const Config& config,
                          bool config_is_users_own, std::vector<std::string>& warnings);
+
+/// By how much the vertical angles of a drive of KITTI are made larger, kKittiVerticalAngle_deg or, as the user may
+/// wish, nothing; no value for what is no such drive.
+std::optional<double> raised_by_deg(const Arguments& arguments);
 
 } // namespace locus::tools

@@ -14,6 +14,7 @@
 #include "locus_replay/lidar_doubts.hpp"
 #include "locus_replay/map_file.hpp"
 #include "locus_replay/output_file.hpp"
+#include "locus_replay/recorded_input.hpp"
 #include "locus_replay/report.hpp"
 #include "locus_replay/report_map.hpp"
 #include "locus_replay/say.hpp"
@@ -118,6 +119,8 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
 nlohmann::ordered_json Results::write_summary(const FinishedRun& run) const {
   OutputFile file(arguments_.output / "summary.json");
   nlohmann::ordered_json figures = summary(run);
+  if (const std::optional<double> raised_deg = raised_by_deg(arguments_))
+    figures["kitti_vertical_angle_added_deg"] = *raised_deg;
   file.print("{}\n", figures.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   file.close();
   return figures;

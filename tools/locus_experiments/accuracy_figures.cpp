@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_experiments/accuracy_figures.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "drivers/capture_folder.hpp"
+#include "drivers/capture_sequence.hpp"
+#include "drivers/position_packet.hpp"
+#include "kitti/kitti_drive.hpp"
+#include "locus_replay/failure.hpp"
+#include "locus_replay/quantiles.hpp"
+
+namespace locus::experiments {
+namespace {
+
+using nlohmann::ordered_json;
+using tools::ExitStatus;
+using tools::Failure;
+using tools::Quantiles;
+using tools::value_or_fail;
+
+/// Speeds of all fixes, each once: a receiver speaks more seldom than the lidar repeats it.
+std::vector<double> speeds_of_fixes_mps(DatagramSource& capture) {
+  std::vector<double> speeds;
+  std::optional<Duration> last;
+  while (const Datagram* datagram = capture.next()) {
+    if (datagram->payload.size() != velodyne::kPositionPacketBytes)
+      continue;
+    const auto rmc = velodyne::parse_position_packet(datagram->payload.first<velodyne::kPositionPacketBytes>()).rmc;
+    if (!rmc || !rmc->valid || !rmc->speed_mps || rmc->time_of_day == last)
+      continue;
+    last = rmc->time_of_day;
+    speeds.push_back(*rmc->speed_mps);
+  }
+  return speeds;
+}
+
+} // namespace
+
+ordered_json claims_of(const std::vector<StampedPose>& trajectory) {
+  constexpr Duration kAtFirst = std::chrono::milliseconds{500};
+  double farthest_at_first_m = 0, farthest_m = 0, most_turned_deg = 0;
+  std::vector<double> speeds;
+  for (std::size_t i = 1; i < trajectory.size(); ++i) {
+    const Pose T_first_now = trajectory.front().T_source_base.inverse() * trajectory[i].T_source_base;
+    const Pose T_last_now = trajectory[i - 1].T_source_base.inverse() * trajectory[i].T_source_base;
+    farthest_m = std::max(farthest_m, T_first_now.translation.norm());
+    if (trajectory[i].stamp - trajectory.front().stamp <= kAtFirst)
+      farthest_at_first_m = farthest_m;
+    most_turned_deg = std::max(most_turned_deg, angle_rad(T_first_now.rotation) / kRadPerDeg);
+    if (const double elapsed_s = to_seconds(trajectory[i].stamp - trajectory[i - 1].stamp); elapsed_s > 0)
+      speeds.push_back(T_last_now.translation.norm() / elapsed_s);
+  }
+  const Quantiles quantiles(speeds);
+  return {{"poses", trajectory.size()},
+          {"farthest_at_first_m", farthest_at_first_m},
+          {"farthest_m", farthest_m},
+          {"most_turned_deg", most_turned_deg},
+          {"speed_mps", speeds.empty() ? ordered_json(nullptr)
+                                       : ordered_json{{"median", quantiles.median()}, {"max", quantiles.at(1)}}}};
+}
+
+ordered_json states_in(const std::filesystem::path& odometry_csv) {
+  std::ifstream stream{odometry_csv};
+  ordered_json states = ordered_json::object();
+  std::string line;
+  if (!std::getline(stream, line)) // header
+    throw Failure(ExitStatus::failed, fmt::format("{}: is missing or empty; run again", odometry_csv.string()));
+  while (std::getline(stream, line)) {
+    const std::size_t begin = std::min(line.find(','), line.size() - 1) + 1;
+    const std::string state = line.substr(begin, line.find(',', begin) - begin);
+    states[state] = states.value(state, 0) + 1;
+  }
+  return states;
+}
+
+ordered_json receiver_speed(const std::filesystem::path& recording) {
+  const auto folder = CaptureFolder::find(recording);
+  if (!folder)
+    return nullptr;
+  auto capture = CaptureSequence::open(folder->lidar);
+  if (!capture)
+    return nullptr;
+  const std::vector<double> speeds = speeds_of_fixes_mps(*capture);
+  if (speeds.empty())
+    return nullptr;
+  const Quantiles quantiles(speeds);
+  return {{"fixes", speeds.size()},
+          {"min_mps", quantiles.at(0)},
+          {"median_mps", quantiles.median()},
+          {"max_mps", quantiles.at(1)}};
+}
+
+std::vector<StampedPose> truth_of(const std::filesystem::path& recording) {
+  if (tools::KittiDrive::is(recording))
+    return value_or_fail(tools::KittiDrive::open(recording), ExitStatus::failed).truth;
+  const auto folder = CaptureFolder::find(recording);
+  if (!folder || folder->ground_truth.empty())
+    return {};
+  return value_or_fail(read_trajectory(folder->ground_truth), ExitStatus::failed);
+}
+
+} // namespace locus::experiments

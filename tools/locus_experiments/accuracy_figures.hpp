@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "drivers/motion_files.hpp"
+
+namespace locus::experiments {
+
+/// What a run of locus-replay says where no truth contradicts: {"poses", "farthest_at_first_m", "farthest_m",
+/// "most_turned_deg", "speed_mps": {"median", "max"}}: from the first pose, within half a second and ever, and from
+/// pose to pose (null with fewer than two).
+nlohmann::ordered_json claims_of(const std::vector<StampedPose>& trajectory);
+
+/// How many sweeps were in which state, of a run's odometry.csv. Throws tools::Failure.
+nlohmann::ordered_json states_in(const std::filesystem::path& odometry_csv);
+
+/// {"fixes", "min_mps", "median_mps", "max_mps"} by the satellite receiver at the lidar, whose sentences stand in the
+/// position packets of a capture or capture folder; null where there is none, none has a fix, or it tells no speed.
+nlohmann::ordered_json receiver_speed(const std::filesystem::path& recording);
+
+/// True poses that belong to a recording: gt.tum of a capture folder, the inertial unit of a drive of KITTI. Empty
+/// where there are none. Throws tools::Failure.
+std::vector<StampedPose> truth_of(const std::filesystem::path& recording);
+
+} // namespace locus::experiments
