@@ -71,6 +71,16 @@ TEST(Mounting, OfEachSensorAndSeedIsWrongInItsOwnDirection) {
     }
 }
 
+TEST(Impairment, IsOfEveryRobot) {
+  for (const NamedRobot& named : kRobots) {
+    const Robot robot = named.make({.imperfections = {.mounting_mm = 30, .imu_late_ms = 5, .odometry_late_ms = 20}}, 1);
+    EXPECT_TRUE(robot.sensors.lidars.front().T_base_believed) << named.name;
+    EXPECT_TRUE(!robot.sensors.imu || robot.sensors.imu->faults.stamps.late == milliseconds{5}) << named.name;
+    for (const NamedOdometry& odometry : robot.sensors.odometry)
+      EXPECT_EQ(odometry.faults.stamps.late, milliseconds{20}) << named.name;
+  }
+}
+
 TEST(Impairment, OfOneKindIsTheSameWhateverElseIsWrong) {
   const Robot alone = spot_with({.mounting_mm = 30, .gyro_scale_percent = 1});
   Imperfections all = imperfections_of(Realism::harsh);

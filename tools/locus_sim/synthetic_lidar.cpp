@@ -343,7 +343,7 @@ SyntheticLidar::Footprint SyntheticLidar::footprint(std::size_t index) {
   Footprint beam;
   double middle_weight = 1;
   const auto look_aside = [&](const Eigen::Vector3d& side) {
-    const auto sight = look(now_.mount, aim, (aimed + side).normalized());
+    auto sight = look(now_.mount, aim, (aimed + side).normalized());
     beam.add(sight, kSideWeight);
     middle_weight -= kSideWeight;
     return sight;
@@ -395,7 +395,7 @@ SyntheticLidar::Echo SyntheticLidar::measure(const Aim& aim, const std::optional
     noise_m *= 1 + 1 / strength;
     brightness *= 0.5 * (1 + hit.cos_incidence) * (0.9 + 0.2 * dice_.uniform()); // not quite calibrated away
   }
-  const double wrong_m = hit.range_m + aim.bias_m + leaning_m(hit);
+  const double wrong_m = hit.range_m + aim.bias_m + bias_of_surface_m(hit);
   const double range_m = noise_m > 0 ? wrong_m + noise_m * dice_.normal() : wrong_m;
   const double ticks = std::round(range_m / spec_.calibration.distance_resolution_m);
   if (range_m < options_.min_range_m || ticks > 65'535)
@@ -405,20 +405,20 @@ SyntheticLidar::Echo SyntheticLidar::measure(const Aim& aim, const std::optional
   return {static_cast<std::uint16_t>(ticks), static_cast<std::uint8_t>(std::clamp(brightness, 1.0, 255.0))};
 }
 
-/// Because of what it meets. On a slant the pulse is stretched over the depth of its footprint, range times tangent;
+/// Constant for what it meets. On a slant the pulse is stretched over the depth of its footprint, range times tangent;
 /// where its edge or peak is found moves with the square of a stretch that is short beside the pulse. A weak pulse is
 /// found later than a strong one (range walk).
-double SyntheticLidar::leaning_m(const Hit& hit) const {
-  double leaning_m = 0;
+double SyntheticLidar::bias_of_surface_m(const Hit& hit) const {
+  double bias_m = 0;
   if (options_.incidence_bias_m > 0) {
     const double sine = std::sqrt(std::max(0.0, 1 - hit.cos_incidence * hit.cos_incidence));
     const double reference = kSlantRange_m * std::tan(kRadPerDeg * kSlant_deg);
     const double slant = std::min(kMostSlant, hit.range_m * sine / std::max(1e-6, hit.cos_incidence) / reference);
-    leaning_m += options_.incidence_bias_m * slant * slant;
+    bias_m += options_.incidence_bias_m * slant * slant;
   }
   if (options_.intensity_bias_m > 0)
-    leaning_m += options_.intensity_bias_m * (1 - std::min(1.0, hit.reflectivity / kWhite));
-  return leaning_m;
+    bias_m += options_.intensity_bias_m * (1 - std::min(1.0, hit.reflectivity / kWhite));
+  return bias_m;
 }
 
 /// Echoes do not end at once: some a little above the threshold are lost, some a little below are not.

@@ -24,7 +24,7 @@ inline constexpr std::size_t kPositionPacketBytes = 512;
 /// it.
 inline constexpr double kHalfBeam_rad = 0.0015;
 
-/// What leans a range: at 10 m a surface that is met at 75 degrees has the whole error of its slant.
+/// What the error of a slanting surface is given for.
 inline constexpr double kSlantRange_m = 10, kSlant_deg = 75;
 
 /// A lidar, how it is mounted and what is wrong with it; as it stands, a perfect one that stands level in the base.
@@ -119,7 +119,7 @@ class SyntheticLidar {
   [[nodiscard]] bool is_parted_along_turn(std::size_t index) const;
   std::optional<Echo> meet_dust(const Echo& nearest);
   Echo measure(const Aim& aim, const std::optional<Sight>& sight);
-  [[nodiscard]] double leaning_m(const Hit& hit) const;
+  [[nodiscard]] double bias_of_surface_m(const Hit& hit) const;
   Echo measure_dust();
   bool is_lost(double strength);
   [[nodiscard]] Stamp true_time(Stamp own_time) const;
