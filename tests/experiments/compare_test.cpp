@@ -61,7 +61,7 @@ class Compare : public testing::Test {
   test::TemporaryFolder folder_;
 };
 
-bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool contains_text(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 TEST_F(Compare, ADifferenceCountsBeyondAMillimetreAndATenth) {
   EXPECT_EQ(verdict(0.0040, 0.0049), "same") << "less than a millimetre";
@@ -80,11 +80,11 @@ TEST_F(Compare, ARowIsWorseIfAnyFigureIs) {
 
 TEST_F(Compare, WhetherItHoldsGoesBeforeItsFigures) {
   const std::string lost = page(faults({fault_row("a", 0.0201)}), faults({fault_row("a", 0.0200, 2.0, false)}));
-  EXPECT_TRUE(has(lost, "| **worse** | urban/a | yes -> **no**: too large an error | 20.1 -> 20.0 |")) << lost;
-  EXPECT_TRUE(has(lost, "1 worse, 0 better, 0 same")) << lost;
-  EXPECT_TRUE(has(lost, "1 hold no longer, 0 hold anew")) << lost;
+  EXPECT_TRUE(contains_text(lost, "| **worse** | urban/a | yes -> **no**: too large an error | 20.1 -> 20.0 |")) << lost;
+  EXPECT_TRUE(contains_text(lost, "1 worse, 0 better, 0 same")) << lost;
+  EXPECT_TRUE(contains_text(lost, "1 hold no longer, 0 hold anew")) << lost;
   const std::string found = page(faults({fault_row("a", 0.02, 2.0, false)}), faults({fault_row("a", 0.04)}));
-  EXPECT_TRUE(has(found, "| better | urban/a | **no** -> yes | 20.0 -> 40.0 (+100 %) |")) << found;
+  EXPECT_TRUE(contains_text(found, "| better | urban/a | **no** -> yes | 20.0 -> 40.0 (+100 %) |")) << found;
 }
 
 TEST_F(Compare, TheWorstComesFirst) {
@@ -99,15 +99,15 @@ TEST_F(Compare, TheWorstComesFirst) {
     EXPECT_GT(here, at) << name << '\n' << text;
     at = here;
   }
-  EXPECT_TRUE(has(text, "5 rows: 3 worse, 1 better, 1 same, 1 of these with equal figures")) << text;
+  EXPECT_TRUE(contains_text(text, "5 rows: 3 worse, 1 better, 1 same, 1 of these with equal figures")) << text;
 }
 
 TEST_F(Compare, RowsThatOnlyOneOfThemHasAreNamed) {
   const std::string text =
       page(faults({fault_row("a", 0.1), fault_row("gone", 0.1)}), faults({fault_row("a", 0.1), fault_row("new", 0.1)}));
-  EXPECT_TRUE(has(text, "1 rows: 0 worse, 0 better, 1 same")) << text;
-  EXPECT_TRUE(has(text, "Only before, 1: urban/gone.")) << text;
-  EXPECT_TRUE(has(text, "Only after, 1: urban/new.")) << text;
+  EXPECT_TRUE(contains_text(text, "1 rows: 0 worse, 0 better, 1 same")) << text;
+  EXPECT_TRUE(contains_text(text, "Only before, 1: urban/gone.")) << text;
+  EXPECT_TRUE(contains_text(text, "Only after, 1: urban/new.")) << text;
 }
 
 TEST_F(Compare, ARunThatGivesNoFigureAnyMoreIsWorse) {
@@ -116,8 +116,8 @@ TEST_F(Compare, ARunThatGivesNoFigureAnyMoreIsWorse) {
                        {"configuration", "a"},
                        {"broken", {"seed 1 did not run"}},
                        {"holds", false}};
-  EXPECT_TRUE(has(page(faults({fault_row("a", 0.1, 2.0, false)}), faults({failed})), "| **worse** | urban/a |"));
-  EXPECT_TRUE(has(page(faults({failed}), faults({failed})), "| same | urban/a |"));
+  EXPECT_TRUE(contains_text(page(faults({fault_row("a", 0.1, 2.0, false)}), faults({failed})), "| **worse** | urban/a |"));
+  EXPECT_TRUE(contains_text(page(faults({failed}), faults({failed})), "| same | urban/a |"));
 }
 
 TEST_F(Compare, TheCovariancesAreARowThatIsBestAtSix) {
@@ -126,9 +126,9 @@ TEST_F(Compare, TheCovariancesAreARowThatIsBestAtSix) {
     results["faults"]["consistency"] = {{"runs", runs}, {"failed", 0}, {"nees_10m", nees}, {"holds", true}};
     return results;
   };
-  EXPECT_TRUE(has(page(with_nees(3.6, 100), with_nees(8.0, 100)), "| better | covariances, 100 runs | yes |"));
-  EXPECT_TRUE(has(page(with_nees(8.0, 100), with_nees(11.0, 100)), "| **worse** | covariances, 100 runs | yes |"));
-  EXPECT_TRUE(has(page(with_nees(8.0, 100), with_nees(8.0, 4)), "Only after, 1: covariances, 4 runs."));
+  EXPECT_TRUE(contains_text(page(with_nees(3.6, 100), with_nees(8.0, 100)), "| better | covariances, 100 runs | yes |"));
+  EXPECT_TRUE(contains_text(page(with_nees(8.0, 100), with_nees(11.0, 100)), "| **worse** | covariances, 100 runs | yes |"));
+  EXPECT_TRUE(contains_text(page(with_nees(8.0, 100), with_nees(8.0, 4)), "Only after, 1: covariances, 4 runs."));
 }
 
 /// One cell of the matrix and the run that it is judged by.
@@ -148,8 +148,8 @@ Results matrix(double error_m) {
 
 TEST_F(Compare, ACellOfTheMatrixHasTheFiguresOfItsRun) {
   const std::string text = page(matrix(0.004), matrix(0.008));
-  EXPECT_TRUE(has(text, "| **worse** | wio: frozen, mid-drive | yes | 4.0 -> 8.0 (+100 %) | 2.0 | 0 | 0 |")) << text;
-  EXPECT_TRUE(has(text, "1 rows: 1 worse")) << text;
+  EXPECT_TRUE(contains_text(text, "| **worse** | wio: frozen, mid-drive | yes | 4.0 -> 8.0 (+100 %) | 2.0 | 0 | 0 |")) << text;
+  EXPECT_TRUE(contains_text(text, "1 rows: 1 worse")) << text;
 }
 
 TEST_F(Compare, HarshRowsAreKeyedByCourseImperfectionAndSensors) {
@@ -159,7 +159,7 @@ TEST_F(Compare, HarshRowsAreKeyedByCourseImperfectionAndSensors) {
     return Results{{"version", "1"}, {"duration_s", 60}, {"runs", Results::array()}, {"harsh", {{"rows", {row}}}}};
   };
   const std::string text = page(harsh(0.1), harsh(124));
-  EXPECT_TRUE(has(text, "| **worse** | urban, late IMU, all |  | 20.0 | 100.0 -> 124000.0 (+123900 %) | 1.0 |"))
+  EXPECT_TRUE(contains_text(text, "| **worse** | urban, late IMU, all |  | 20.0 | 100.0 -> 124000.0 (+123900 %) | 1.0 |"))
       << text;
 }
 
@@ -169,22 +169,22 @@ TEST_F(Compare, WhatIsNotOfTheSameExperimentIsRefused) {
   more_seeds["faults"]["seeds"] = 3;
   paper.erase("faults");
   EXPECT_EQ(error(faults({}), faults({})), "");
-  EXPECT_TRUE(has(error(longer, faults({})), "before.json: duration_s is 300 there and 60 here"));
-  EXPECT_TRUE(has(error(more_seeds, faults({})), "before.json: seeds is 3 there and 1 here"));
-  EXPECT_TRUE(has(error(matrix(0.1), faults({})), "before.json: holds no results of the same experiment (faults)"));
-  EXPECT_TRUE(has(error(paper, faults({})), "before.json: holds no results of the same experiment (faults)"));
-  EXPECT_TRUE(has(error(faults({}), paper), "--compare: the paper's experiments have no rows"));
+  EXPECT_TRUE(contains_text(error(longer, faults({})), "before.json: duration_s is 300 there and 60 here"));
+  EXPECT_TRUE(contains_text(error(more_seeds, faults({})), "before.json: seeds is 3 there and 1 here"));
+  EXPECT_TRUE(contains_text(error(matrix(0.1), faults({})), "before.json: holds no results of the same experiment (faults)"));
+  EXPECT_TRUE(contains_text(error(paper, faults({})), "before.json: holds no results of the same experiment (faults)"));
+  EXPECT_TRUE(contains_text(error(faults({}), paper), "--compare: the paper's experiments have no rows"));
 }
 
 TEST_F(Compare, AFileThatHoldsNoResultsIsRefused) {
   EXPECT_THROW(ResultsBefore(folder_ / "nowhere.json"), tools::Failure);
   for (const Results& other : {Results::array(), Results{{"runs", 3}}, Results("text")})
-    EXPECT_TRUE(has(error(other, faults({})), "before.json: no results of locus-experiments")) << other;
+    EXPECT_TRUE(contains_text(error(other, faults({})), "before.json: no results of locus-experiments")) << other;
   Results without_rows = faults({}), absurd_row = faults({{{"course", 7}}}), absurd_table = faults({});
   without_rows["faults"].erase("rows");
   absurd_table["faults"] = Results::array({1});
   for (const Results& other : {without_rows, absurd_row, absurd_table})
-    EXPECT_TRUE(has(error(other, faults({})), "before.json: its faults are not as locus-experiments writes them"))
+    EXPECT_TRUE(contains_text(error(other, faults({})), "before.json: its faults are not as locus-experiments writes them"))
         << error(other, faults({}));
 }
 

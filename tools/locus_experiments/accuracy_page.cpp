@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <exception>
 #include <fstream>
+#include <iterator>
 #include <set>
 #include <string_view>
 #include <system_error>
@@ -178,8 +179,11 @@ std::vector<Course> drives_of_accuracy(const Arguments& arguments) {
         arguments.output / "courses" / name,
         {"--world", world, "--robot", robot, "--seed", "1", "--duration", std::to_string(arguments.duration_s)}};
   };
-  return {drive("husky-plant", "urban", "husky"), drive("husky-mine", "tunnel", "husky"),
-          drive("spot-plant", "urban", "spot")};
+  std::vector<Course> drives{drive("husky-plant", "urban", "husky"), drive("husky-mine", "tunnel", "husky"),
+                             drive("spot-plant", "urban", "spot")};
+  for (Course& course : drives)
+    std::ranges::copy(realism_of(arguments), std::back_inserter(course.simulation));
+  return drives;
 }
 
 Results accuracy_of(const Arguments& arguments, const std::vector<FoundRecording>& recordings,
