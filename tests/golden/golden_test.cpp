@@ -39,7 +39,8 @@ std::optional<std::vector<OdometryEstimate>> replay(const std::filesystem::path&
   std::vector<char*> argv;
   for (std::string& word : words)
     argv.push_back(word.data());
-  setenv("LOCUS_ISA", std::string{to_string(isa)}.c_str(), 1); // NOLINT(concurrency-mt-unsafe): one thread as yet
+  setenv("LOCUS_ISA", std::string{to_string(isa)}.c_str(),
+         1); // NOLINT(concurrency-mt-unsafe): no thread reads it meanwhile
   std::vector<OdometryEstimate> estimates;
   const int status = tools::replay_program(static_cast<int>(argv.size()), argv.data(), {},
                                            [&](const OdometryEstimate& estimate) { estimates.push_back(estimate); });
@@ -53,6 +54,8 @@ std::vector<Isa> isas(bool others_too) {
     if (is_supported(isa) && (isa == kIsaOfTraces || others_too))
       all.push_back(isa);
   }
+  if (all.empty())
+    fmt::print("a drive is not compared: this processor lacks {}\n", to_string(kIsaOfTraces));
   return all;
 }
 
