@@ -15,6 +15,10 @@ struct Agility {
   double acceleration_mps2; ///< ordinary, mean of a change of speed
   double sudden_mps2;       ///< now and then, as a driver in a hurry does it
   double sudden_share;      ///< of all changes of speed, 0..1
+  /// Across, in corners: these are driven as fast as that allows. 0: slowly, sharp ones on the spot.
+  double cornering_mps2 = 0;
+  double stop_share = 0.12;  ///< of the corners at which it stops
+  double flicks_per_min = 0; ///< of the wrist that carries it
 };
 
 struct PlannedCourse {

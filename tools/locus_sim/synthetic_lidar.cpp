@@ -197,7 +197,7 @@ SyntheticLidar::Echo SyntheticLidar::measure(const std::optional<Hit>& hit) {
   const double ticks = std::round(range_m / spec_.calibration.distance_resolution_m);
   if (range_m < options_.min_range_m || ticks > 65'535)
     return {};
-  if (seen_ != nullptr)
+  if (seen_ != nullptr && !hit->apparent)
     seen_->mark(hit->point_m);
   return {static_cast<std::uint16_t>(ticks), static_cast<std::uint8_t>(std::clamp(brightness, 1.0, 255.0))};
 }
