@@ -9,17 +9,17 @@
 namespace locus::sim {
 namespace {
 
-constexpr double kStanding_s = 2;   // before the start and after the end, where there is time for it
-constexpr double kOnSpot_rad = 1.8; // sharper corners are turned on the spot
-constexpr double kAside_m = 0.25;   // off the middle of a lane, at most
-constexpr double kWeave_m = 12;     // lanes longer than this are not driven straight
+constexpr double kStanding_s = 2;             // before the start and after the end, where there is time for it
+constexpr double kOnSpot_rad = 1.8;           // sharper corners are turned on the spot
+constexpr double kAside_m = 0.25;             // off the middle of a lane, at most
+constexpr double kWeave_m = 12, kWeave_s = 8; // lanes longer than both are not driven straight
 
 /// Walks from place to place; where there is a choice, by the lane that was used least.
 class Walk {
  public:
-  Walk(const Roads& roads, Dice& dice)
-      : roads_(roads), dice_(dice), uses_(roads.lanes().size()), here_(dice.below(roads.places_m().size())),
-        position_m_(roads.places_m()[here_]) {}
+  Walk(const Roads& roads, double cruise_mps, Dice& dice)
+      : roads_(roads), straight_m_(std::max(kWeave_m, kWeave_s * cruise_mps)), dice_(dice), uses_(roads.lanes().size()),
+        here_(dice.below(roads.places_m().size())), position_m_(roads.places_m()[here_]) {}
 
   /// The next point to drive to: a place, or a point on the way there.
   Eigen::Vector2d next() {
@@ -56,7 +56,7 @@ class Walk {
 
   void take(const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
     const Eigen::Vector2d along = to - from, left = Eigen::Vector2d{-along.y(), along.x()}.normalized();
-    const auto parts = static_cast<int>(std::max(1.0, along.norm() / kWeave_m));
+    const auto parts = static_cast<int>(std::max(1.0, along.norm() / straight_m_));
     for (int i = parts; i >= 1; --i) {
       const Eigen::Vector2d on_line = from + along * (static_cast<double>(i) / parts);
       on_the_way_.emplace_back(on_line + dice_.between(-kAside_m, kAside_m) * left);
@@ -65,6 +65,7 @@ class Walk {
 
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
   const Roads& roads_;
+  double straight_m_; ///< at a stretch, at most
   Dice& dice_;
   std::vector<int> uses_; ///< of each lane
   std::size_t here_;
@@ -107,12 +108,35 @@ double duration_s(const Course& course) {
   return sum_s;
 }
 
-/// How fast a corner is driven: gentle ones at speed, sharp ones slowly, the sharpest on the spot.
-double corner_speed_mps(double angle_rad, const Agility& agility) {
+/// A corner, how fast it is driven and how fast it is turned in.
+struct Corner {
+  double angle_rad;
+  double speed_mps, rate_radps;
+
+  /// From the turn to the corner itself.
+  [[nodiscard]] double kept_m() const { return speed_mps > 0 ? tangent_m(speed_mps, angle_rad, rate_radps) : 0; }
+};
+
+/// Gentle ones at speed, sharp ones slowly, the sharpest on the spot.
+Corner slow_corner(double angle_rad, const Agility& agility) {
   const double sharpness = std::abs(angle_rad);
-  if (sharpness > kOnSpot_rad)
-    return 0;
-  return agility.cruise_mps * (sharpness < 0.3 ? 0.65 : 0.4);
+  const double share = sharpness > kOnSpot_rad ? 0 : sharpness < 0.3 ? 0.65 : 0.4;
+  return {angle_rad, share * agility.cruise_mps, agility.turn_rate_radps};
+}
+
+/// As fast as the legs before and behind it allow, of which a turn takes a part at either end.
+Corner fast_corner(double angle_rad, double before_m, double behind_m, double from_mps, const Agility& agility) {
+  constexpr double kSharp_rad = 1.0, kSlower = 0.9;
+  Corner corner{angle_rad, std::abs(angle_rad) > kSharp_rad ? 0 : agility.cruise_mps, agility.turn_rate_radps};
+  for (; corner.speed_mps > 0.5; corner.speed_mps *= kSlower) {
+    corner.rate_radps = std::min(agility.turn_rate_radps, agility.cornering_mps2 / corner.speed_mps);
+    const double kept_m = corner.kept_m();
+    const double reached_mps = std::sqrt(from_mps * from_mps + 2 * agility.acceleration_mps2 * (before_m - kept_m));
+    const double stops_from_mps = std::sqrt(2 * agility.acceleration_mps2 * (behind_m - 2 * kept_m));
+    if (before_m > kept_m && behind_m > 2 * kept_m && corner.speed_mps <= std::min(reached_mps, stops_from_mps))
+      return corner;
+  }
+  return {angle_rad, 0, agility.turn_rate_radps};
 }
 
 /// The longest leg that ends at rest in time, if any is worth it.
@@ -134,7 +158,7 @@ void drive_last_leg(Course& course, double longest_m, double from_mps, const Agi
 } // namespace
 
 PlannedCourse plan_course(const Roads& roads, const Agility& agility, Duration duration, Dice& dice) {
-  Walk walk(roads, dice);
+  Walk walk(roads, agility.cruise_mps, dice);
   PlannedCourse planned;
   Course& course = planned.course;
   const double standing_s = std::min(kStanding_s, to_seconds(duration) / 4);
@@ -149,13 +173,17 @@ PlannedCourse plan_course(const Roads& roads, const Agility& agility, Duration d
     const Eigen::Vector2d leg = to - at, next = walk.next();
     const double angle_rad = angle_between(leg, next - to);
     const bool stops = dice.chance(agility.halts.share);
-    const double corner_mps = stops ? 0 : corner_speed_mps(angle_rad, agility);
-    const double kept_m = corner_mps > 0 ? tangent_m(corner_mps, angle_rad, agility.turn_rate_radps) : 0;
+    Corner corner = agility.cornering_mps2 > 0
+                        ? fast_corner(angle_rad, leg.norm() - used_m, (next - to).norm(), speed_mps, agility)
+                        : slow_corner(angle_rad, agility);
+    if (stops)
+      corner = {angle_rad, 0, agility.turn_rate_radps};
+    const double kept_m = corner.kept_m();
     const double length_m = leg.norm() - used_m - kept_m;
     Dice before = dice;
-    const Leg driven(length_m, speed_mps, corner_mps, agility, dice);
-    const double turning_s = std::abs(angle_rad) / agility.turn_rate_radps + 0.5;
-    const double braking_s = corner_mps / agility.acceleration_mps2;
+    const Leg driven(length_m, speed_mps, corner.speed_mps, agility, dice);
+    const double turning_s = std::abs(angle_rad) / corner.rate_radps + 0.5;
+    const double braking_s = corner.speed_mps / agility.acceleration_mps2;
     if (duration_s(course) + driven.duration_s() + turning_s + braking_s > drive_until_s) {
       drive_last_leg(course, length_m, speed_mps, agility, drive_until_s - duration_s(course), before);
       break;
@@ -163,8 +191,8 @@ PlannedCourse plan_course(const Roads& roads, const Agility& agility, Duration d
     driven.drive(course);
     if (stops)
       course.stand(from_seconds(dice.between(0.5, agility.halts.longest_s)));
-    course.turn(angle_rad, agility.turn_rate_radps);
-    speed_mps = corner_mps;
+    course.turn(angle_rad, corner.rate_radps);
+    speed_mps = corner.speed_mps;
     used_m = kept_m;
     at = to;
     to = next;

@@ -22,6 +22,9 @@ struct Agility {
   double sudden_mps2;       ///< now and then, as a driver in a hurry does it
   double sudden_share;      ///< of all changes of speed, 0..1
   Halts halts = {};
+  /// Across, in corners: these are driven as fast as that allows. 0: slowly, sharp ones on the spot.
+  double cornering_mps2 = 0;
+  double flicks_per_min = 0; ///< of the wrist that carries it
 };
 
 struct PlannedCourse {

@@ -5,32 +5,14 @@
 #include <cmath>
 #include <numbers>
 
+#include "locus_sim/figures.hpp"
+
 namespace locus::sim {
 namespace {
 
 constexpr double kSlab_m = 5, kSeam_m = 0.02; // slabs overlap by a seam, so that nobody looks through
 constexpr double kDoorway_m = 3;
 constexpr double kFree_m = 0.9; // from the middle of a road to what stands beside it
-
-/// Two legs, a trunk and a head.
-std::vector<Surface> person_parts() {
-  return {{Cylinder{{0.08, 0.1, 0}, 0.07, 0.85}, 25},
-          {Cylinder{{-0.08, -0.1, 0}, 0.07, 0.85}, 25},
-          {Cylinder{{0, 0, 0.8}, 0.19, 0.65}, 60},
-          {Sphere{{0, 0, 1.62}, 0.12}, 45}};
-}
-
-std::vector<Surface> forklift_parts(double yaw_rad) {
-  const double c = std::cos(yaw_rad), s = std::sin(yaw_rad);
-  const auto box = [&](double ahead, double z, double length, double width, double height, std::uint8_t bright) {
-    return Surface{Box{{c * ahead, s * ahead, z + height / 2}, {length / 2, width / 2, height / 2}, c, s}, bright};
-  };
-  return {box(-0.2, 0.1, 2.0, 1.1, 1.0, 70),
-          box(0.85, 0.05, 0.15, 0.9, 2.1, 40),
-          box(1.4, 0.1, 1.0, 0.7, 0.08, 50),
-          box(-0.3, 1.1, 1.1, 0.9, 0.08, 50),
-          {Cylinder{{-0.2 * c, -0.2 * s, 1.1}, 0.22, 0.7}, 60}};
-}
 
 } // namespace
 
@@ -146,13 +128,13 @@ void Furnishing::railing(const Eigen::Vector3d& from, const Eigen::Vector3d& to)
 
 void Furnishing::person(const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
   const double period_s = std::numbers::pi * (to - from).norm() / dice_.between(0.8, 1.3);
-  build_.mover({person_parts(), {from.x(), from.y(), 0}, {to.x(), to.y(), 0}, period_s, dice_.between(0, 1)});
+  build_.mover({standing_person(), {from.x(), from.y(), 0}, {to.x(), to.y(), 0}, period_s, dice_.between(0, 1)});
 }
 
 void Furnishing::forklift(const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
   const Eigen::Vector2d along = to - from;
   const double period_s = std::numbers::pi * along.norm() / dice_.between(1, 2);
-  build_.mover({forklift_parts(std::atan2(along.y(), along.x())),
+  build_.mover({sim::forklift(std::atan2(along.y(), along.x())),
                 {from.x(), from.y(), 0},
                 {to.x(), to.y(), 0},
                 period_s,

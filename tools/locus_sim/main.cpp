@@ -15,6 +15,7 @@
 #include "locus_sim/folder_sink.hpp"
 #include "locus_sim/seen_space.hpp"
 #include "locus_sim/stream_sink.hpp"
+#include "locus_sim/surroundings.hpp"
 #include "locus_sim/truth_map.hpp"
 
 namespace locus::tools {
@@ -28,12 +29,13 @@ void run(const SimArguments& arguments) {
     folder.emplace(arguments.output);
     map.emplace(arguments.output / "gt_map.ply");
   }
-  const sim::World world = arguments.world.make(arguments.seed);
+  sim::World world = arguments.world.make(arguments.seed);
   sim::Robot robot = arguments.robot.make(arguments.sensors, arguments.seed);
   if (arguments.halts_s)
     robot.agility.halts = {.share = 0.5, .longest_s = *arguments.halts_s};
   const sim::Trajectory trajectory =
       sim::drive_about(world, robot, arguments.duration, arguments.slips, arguments.seed);
+  surround(world, robot, trajectory, arguments.sensors.imperfections, arguments.seed);
   if (!folder) {
     sim::StreamSink sink;
     write_capture(sink, world.scene, trajectory, arguments.duration, robot.sensors);

@@ -71,6 +71,24 @@ ImuFaults imu_faults(Dice& dice, double vibration_mps2) {
           .heading_rad = dice.between(-std::numbers::pi, std::numbers::pi)};
 }
 
+/// Every so often the wrist turns, up to 4 rad/s fast, mostly to the side.
+std::vector<Flick> flicks(double per_min, Duration duration, Dice& dice) {
+  constexpr double kPeak_radps = 4, kPeakOfMean = 1.875;
+  std::vector<Flick> all;
+  double at_s = 3;
+  while (per_min > 0) {
+    at_s += dice.between(0.5, 1.5) * 60 / per_min;
+    const double yaw_rad = (dice.chance(0.5) ? 1 : -1) * dice.between(0.5, 1.2);
+    const double there_s = kPeakOfMean * std::abs(yaw_rad) / dice.between(0.75 * kPeak_radps, kPeak_radps);
+    if (at_s + 2 * there_s > to_seconds(duration))
+      break;
+    all.push_back(
+        {from_seconds(at_s), from_seconds(there_s), {dice.between(-0.15, 0.15), dice.between(-0.25, 0.25), yaw_rad}});
+    at_s += 2 * there_s;
+  }
+  return all;
+}
+
 } // namespace
 
 Robot make_husky(const SensorChoice& choice, std::uint64_t seed) {
@@ -140,6 +158,66 @@ Robot make_spot(const SensorChoice& choice, std::uint64_t seed) {
   return impaired(std::move(robot), choice.imperfections, seed);
 }
 
+Robot make_handheld(const SensorChoice& choice, std::uint64_t seed) {
+  static const std::array<Mounting, 3> kLidars{
+      {{"top", {0, 0, 0.1}, {0, 0, 0}}, {"front", {0.1, 0, 0}, {0, 30, 0}}, {"rear", {-0.1, 0, 0}, {0, 30, 180}}}};
+  Dice dice(seed);
+  Robot robot;
+  robot.agility = {.cruise_mps = 1.2,
+                   .turn_rate_radps = 1.6, // and what the gait adds
+                   .acceleration_mps2 = 0.9,
+                   .sudden_mps2 = 2,
+                   .sudden_share = 0.2,
+                   .flicks_per_min = 4};
+  robot.ride.base_height_m = dice.between(1.25, 1.45); // and the lidar a hand above it
+  robot.ride.oscillations = {
+      {0.45, {0.02, 0.15, 0}, kRadPerDeg * Eigen::Vector3d{3, 2, 6}, 0.2},     // the arm swings it from side to side
+      {0.95, {0.01, 0.02, 0.005}, kRadPerDeg * Eigen::Vector3d{1.5, 1, 2}, 1}, // the stride
+      {1.9, {0.01, 0, 0.02}, kRadPerDeg * Eigen::Vector3d{0.3, 1, 0.3}, 1.7}}; // its two steps
+  robot.sensors.lidars = lidars(kLidars, choice, dice);
+  robot.sensors.imu = MountedImu{};
+  if (choice.noise)
+    robot.sensors.imu->faults = imu_faults(dice, 0.2);
+  robot.sensors.odometry = {};
+  robot.sensors.seed = seed;
+  robot.reach_m = 0.25;
+  return impaired(std::move(robot), choice.imperfections, seed);
+}
+
+Robot make_car(const SensorChoice& choice, std::uint64_t seed) {
+  static const std::array<Mounting, 3> kLidars{
+      {{"top", {0, 0, 1.5}, {0, 0, 0}}, {"front", {0.6, 0, 1.3}, {0, 20, 0}}, {"rear", {-0.6, 0, 1.3}, {0, 20, 180}}}};
+  Dice dice(seed);
+  Robot robot;
+  robot.agility = {.cruise_mps = 15,
+                   .turn_rate_radps = 0.5,
+                   .acceleration_mps2 = 2,
+                   .sudden_mps2 = 3,
+                   .sudden_share = 0.15,
+                   .halts = {.share = 0.03},
+                   .cornering_mps2 = 2.5};
+  robot.ride.base_height_m = 0.3;
+  robot.ride.oscillations = {{1.3, {0, 0, 0.008}, kRadPerDeg * Eigen::Vector3d{0.25, 0.2, 0}, 0.4},    // on its springs
+                             {11.5, {0, 0, 0.0005}, kRadPerDeg * Eigen::Vector3d{0.03, 0.04, 0}, 1.1}, // wheels
+                             {28, {0.0001, 0.0001, 0.0001}, kRadPerDeg * Eigen::Vector3d{0.01, 0.02, 0}, 2}}; // engine
+  robot.sensors.lidars = lidars(kLidars, choice, dice);
+  robot.sensors.imu = MountedImu{.faults = {}, .T_base_imu = {Eigen::Quaterniond::Identity(), {0, 0, 0.2}}};
+  OdometryFaults wheels{.spinning_mps = 1};
+  if (choice.noise) {
+    robot.sensors.imu->faults = imu_faults(dice, 0.5);
+    wheels.scale_error = about(dice, 0.01);
+    wheels.noise_m_per_sqrt_m = 0.005;
+    wheels.noise_rad_per_sqrt_m = 0.0007;
+    wheels.yaw_drift_rad_per_s = about(dice, 0.0005);
+    wheels.turn_error = about(dice, 0.01);
+    wheels.climb_m_per_sqrt_m = 0.004;
+  }
+  robot.sensors.odometry = {{.faults = wheels}};
+  robot.sensors.seed = seed;
+  robot.reach_m = 0.9;
+  return impaired(std::move(robot), choice.imperfections, seed);
+}
+
 Trajectory drive_about(const World& world, const Robot& robot, Duration duration, const std::vector<Slip>& slips,
                        std::uint64_t seed) {
   Duration driving = duration;
@@ -152,6 +230,8 @@ Trajectory drive_about(const World& world, const Robot& robot, Duration duration
   Ride ride = robot.ride;
   ride.ground_m = world.ground_m;
   ride.slips = slips;
+  Dice wrist(seed + 2);
+  ride.flicks = flicks(agility.flicks_per_min, duration, wrist);
   return Trajectory(planned.course, planned.start, world.terrain, ride);
 }
 

@@ -2,6 +2,7 @@
 #include "locus_sim/scene.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <iterator>
 #include <numbers>
@@ -58,6 +59,14 @@ bool passes_through(const Eigen::Array3d& origin, const Eigen::Array3d& inverse,
                     double max_range_m) {
   const Eigen::Array3d a = (box.min_m.array() - origin) * inverse, b = (box.max_m.array() - origin) * inverse;
   return std::max(0.0, a.min(b).maxCoeff()) <= std::min(max_range_m, a.max(b).minCoeff());
+}
+
+/// Of every ray its own, whatever rays were cast before.
+QuickDice dice_of(const Ray& ray, Stamp stamp) {
+  auto seed = static_cast<std::uint64_t>(stamp.time_since_epoch().count());
+  for (const double coordinate : ray.direction)
+    seed = (seed ^ std::bit_cast<std::uint64_t>(coordinate)) * 0x9E37'79B9'7F4A'7C15U;
+  return QuickDice(seed);
 }
 
 } // namespace
@@ -189,8 +198,9 @@ class Scene::TreeMaker {
   std::vector<Eigen::Vector3d> middles_m_;
 };
 
-Scene::Scene(std::vector<Surface> surfaces, std::vector<Mover> movers)
-    : surfaces_(std::move(surfaces)), movers_(std::move(movers)), bounds_(bounds_of(surfaces_)) {
+Scene::Scene(std::vector<Surface> surfaces, std::vector<Mover> movers, std::vector<Passer> passers)
+    : surfaces_(std::move(surfaces)), movers_(std::move(movers)), passers_(std::move(passers)),
+      bounds_(bounds_of(surfaces_)) {
   TreeMaker(surfaces_, nodes_).make();
   std::transform(movers_.begin(), movers_.end(), std::back_inserter(mover_bounds_),
                  [](const Mover& mover) { return mover.bounds(); });
@@ -255,7 +265,7 @@ void Scene::cast_at_movers(const Ray& ray, Stamp stamp, Met& nearest) const {
   }
 }
 
-std::optional<Hit> Scene::cast(const Ray& ray, double max_range_m, Stamp stamp, const Surface* guess) const {
+std::optional<Hit> Scene::cast_at_solid(const Ray& ray, double max_range_m, Stamp stamp, const Surface* guess) const {
   Met nearest{.range_m = max_range_m};
   if (guess != nullptr) {
     if (const double range = range_m(*guess, ray); range < max_range_m)
@@ -263,14 +273,69 @@ std::optional<Hit> Scene::cast(const Ray& ray, double max_range_m, Stamp stamp, 
   }
   cast_at_surfaces(ray, nearest);
   cast_at_movers(ray, stamp, nearest);
+  std::optional<Passer::Met> passing;
+  for (const Passer& passer : passers_) {
+    if (const auto met = passer.met_by(ray, passing ? passing->range_m : nearest.range_m, stamp))
+      passing = met;
+  }
+  if (passing)
+    return Hit{ray.origin_m + passing->range_m * ray.direction,
+               passing->range_m,
+               std::abs(passing->normal.dot(ray.direction)),
+               passing->reflectivity,
+               nullptr,
+               passing->normal};
   if (nearest.surface == nullptr)
     return std::nullopt;
   const Eigen::Vector3d point_m = ray.origin_m + nearest.range_m * ray.direction;
   const Eigen::Vector3d own_m = nearest.mover != nullptr ? point_m - nearest.mover->position_m(stamp) : point_m;
   const Eigen::Vector3d normal =
       std::visit([&](const auto& shape) { return shape.normal(own_m); }, nearest.surface->shape);
-  return Hit{point_m, nearest.range_m, std::abs(normal.dot(ray.direction)), nearest.surface->reflectivity,
-             nearest.mover == nullptr ? nearest.surface : nullptr};
+  return Hit{point_m,
+             nearest.range_m,
+             std::abs(normal.dot(ray.direction)),
+             nearest.surface->reflectivity,
+             nearest.mover == nullptr ? nearest.surface : nullptr,
+             normal};
+}
+
+std::optional<Hit> Scene::through_steam(const Ray& ray, const std::optional<Hit>& solid, double max_range_m,
+                                        Stamp stamp, QuickDice& dice) const {
+  constexpr double kDimmest = 2, kBrightest = 8; // as grains of dust
+  const auto echo_m = steam_.range_m(ray, solid ? solid->range_m : max_range_m, stamp, dice);
+  if (!echo_m)
+    return std::nullopt;
+  const auto reflectivity = static_cast<std::uint8_t>(kDimmest + (kBrightest - kDimmest) * dice.uniform());
+  return Hit{.point_m = ray.origin_m + *echo_m * ray.direction,
+             .range_m = *echo_m,
+             .cos_incidence = 1,
+             .reflectivity = reflectivity,
+             .surface = solid ? solid->surface : nullptr, // the next ray may pass
+             .normal = -ray.direction,
+             .apparent = true};
+}
+
+std::optional<Hit> Scene::in_mirror(const Ray& ray, const Hit& solid, double max_range_m, Stamp stamp,
+                                    QuickDice& dice) const {
+  const auto cast = [&](const Ray& mirrored, double range_m) {
+    return cast_at_solid(mirrored, range_m, stamp, nullptr);
+  };
+  if (mirrors_->is_wet(ray, solid))
+    return mirrors_->on_water(ray, solid, max_range_m, dice.uniform(), cast);
+  if (mirrors_->is_glass(solid, static_cast<std::size_t>(solid.surface - surfaces_.data())))
+    return mirrors_->on_glass(ray, solid, max_range_m, dice.uniform(), cast);
+  return solid;
+}
+
+std::optional<Hit> Scene::cast(const Ray& ray, double max_range_m, Stamp stamp, const Surface* guess) const {
+  const std::optional<Hit> solid = cast_at_solid(ray, max_range_m, stamp, guess);
+  const bool may_mirror = mirrors_ && solid && solid->surface != nullptr;
+  if (!may_mirror && steam_.clouds().empty())
+    return solid;
+  QuickDice dice = dice_of(ray, stamp);
+  if (const auto steam = through_steam(ray, solid, max_range_m, stamp, dice))
+    return steam;
+  return may_mirror ? in_mirror(ray, *solid, max_range_m, stamp, dice) : solid;
 }
 
 double Scene::distance_to_surface(const Eigen::Vector3d& point, Stamp stamp) const {
@@ -279,6 +344,8 @@ double Scene::distance_to_surface(const Eigen::Vector3d& point, Stamp stamp) con
     for (const Surface& part : mover.parts)
       nearest = std::min(nearest, distance_m(part, point - mover.position_m(stamp)));
   }
+  for (const Passer& passer : passers_)
+    nearest = std::min(nearest, passer.distance_m(point, stamp));
   struct Near { // the squared distance to the box of a child
     double squared_m2;
     std::uint32_t child;

@@ -39,11 +39,14 @@ class SceneBuilder {
   }
   void mover(Mover mover) { movers_.push_back(std::move(mover)); }
 
-  Scene scene() { return Scene(std::move(surfaces_), std::move(movers_)); }
+  void passer(Passer passer) { passers_.push_back(std::move(passer)); }
+
+  Scene scene() { return Scene(std::move(surfaces_), std::move(movers_), std::move(passers_)); }
 
  private:
   std::vector<Surface> surfaces_;
   std::vector<Mover> movers_;
+  std::vector<Passer> passers_;
 };
 
 } // namespace locus::sim

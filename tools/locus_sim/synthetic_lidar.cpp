@@ -274,7 +274,7 @@ void SyntheticLidar::consider_own_parts(const Mount& mount, const Aim& aim, cons
       continue;
     const Eigen::Vector3d point_m = ray.origin_m + range_m * ray.direction;
     const Eigen::Vector3d normal = std::visit([&](const auto& shape) { return shape.normal(point_m); }, part.shape);
-    sight = Sight{{point_m, range_m, std::abs(normal.dot(ray.direction)), part.reflectivity, nullptr}, true};
+    sight = Sight{{point_m, range_m, std::abs(normal.dot(ray.direction)), part.reflectivity, nullptr, normal}, true};
   }
 }
 
@@ -400,7 +400,7 @@ SyntheticLidar::Echo SyntheticLidar::measure(const Aim& aim, const std::optional
   const double ticks = std::round(range_m / spec_.calibration.distance_resolution_m);
   if (range_m < options_.min_range_m || ticks > 65'535)
     return {};
-  if (seen_ != nullptr && !sight->is_own_part)
+  if (seen_ != nullptr && !sight->is_own_part && !hit.apparent)
     seen_->mark(hit.point_m);
   return {static_cast<std::uint16_t>(ticks), static_cast<std::uint8_t>(std::clamp(brightness, 1.0, 255.0))};
 }

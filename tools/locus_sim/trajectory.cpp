@@ -155,7 +155,20 @@ Trajectory::Swing Trajectory::swing(double since_start_s, const Jet& speed, cons
       sum.turn_rad[axis] = sum.turn_rad[axis] + oscillation.amplitude_rpy_rad[i] * wave;
     }
   }
+  add_flick(sum, since_start_s);
   return sum;
+}
+
+void Trajectory::add_flick(Swing& sum, double since_start_s) const {
+  const auto after = std::upper_bound(ride_.flicks.begin(), ride_.flicks.end(), from_seconds(since_start_s),
+                                      [](Duration since, const Flick& flick) { return since < flick.from; });
+  if (after == ride_.flicks.begin())
+    return;
+  const Flick& flick = *(after - 1);
+  const double rate = 1 / to_seconds(flick.there), gone = rate * (since_start_s - to_seconds(flick.from));
+  const Jet share = ease(Jet(gone, rate)) - ease(Jet(gone - 1, rate));
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    sum.turn_rad[axis] = sum.turn_rad[axis] + flick.turn_rpy_rad[static_cast<Eigen::Index>(axis)] * share;
 }
 
 BaseMotion Trajectory::at(Stamp stamp) const {

@@ -44,12 +44,21 @@ struct Slip {
   Duration from, to;
 };
 
+/// The body is turned, about its own forward, left and up, by as much as this and back again: someone who carries it
+/// looks round. At its fastest that is 1.875 times the mean.
+struct Flick {
+  Duration from;                ///< after the start
+  Duration there;               ///< to get there, and as long to get back
+  Eigen::Vector3d turn_rpy_rad; ///< roll, pitch, yaw
+};
+
 /// How the body rides on its wheels or legs.
 struct Ride {
   double base_height_m = 0; ///< of the base above the ground
   Ground ground_m = {};     ///< what the wheels stand on, beneath the ripples of the terrain; none: level at 0
   std::vector<Oscillation> oscillations = {};
-  std::vector<Slip> slips = {}; ///< in order, apart from each other
+  std::vector<Slip> slips = {};   ///< in order, apart from each other
+  std::vector<Flick> flicks = {}; ///< the same
 };
 
 /// The state of the base at one instant.
@@ -100,6 +109,7 @@ class Trajectory {
   };
   static Planar planar(const Placed& placed, double since_s);
   static Eigen::Vector2d displacement(const Placed& placed, double from_s, double to_s);
+  void add_flick(Swing& sum, double since_start_s) const;
   [[nodiscard]] Jet time_on_course(double since_start_s) const;
   [[nodiscard]] Attitude on_ground(const Jet& x, const Jet& y, const Jet& heading, const Jet& driven) const;
   [[nodiscard]] Swing swing(double since_start_s, const Jet& speed, const Jet& yaw_rate) const;

@@ -38,13 +38,17 @@ World make_field(std::uint64_t seed);
 /// Stairs of two flights between corridors on three storeys.
 World make_stairs(std::uint64_t seed);
 
+/// A road of several lanes round a small town, 2.2 km: houses, trees, poles, guard rails, parked cars; others drive
+/// too, some the same way.
+World make_road(std::uint64_t seed);
+
 /// A world by its name on the command line. The seed moves what is movable; the site stays the same.
 struct NamedWorld {
   std::string_view name;
   WorldMaker make;
 };
-inline constexpr std::array kWorlds{NamedWorld{"urban", make_urban}, NamedWorld{"tunnel", make_tunnel},
+inline constexpr std::array kWorlds{NamedWorld{"urban", make_urban},       NamedWorld{"tunnel", make_tunnel},
                                     NamedWorld{"corridor", make_corridor}, NamedWorld{"field", make_field},
-                                    NamedWorld{"stairs", make_stairs}};
+                                    NamedWorld{"stairs", make_stairs},     NamedWorld{"road", make_road}};
 
 } // namespace locus::sim
