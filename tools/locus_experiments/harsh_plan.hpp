@@ -14,7 +14,7 @@ inline constexpr int kHarshStarts = 10;
 inline constexpr int kHarshDrive_s = 20;
 
 /// How long a harsh course lasts unless the user says otherwise.
-inline constexpr int kHarshCourse_s = 100;
+inline constexpr int kHarshCourse_s = 80;
 
 /// Which sensors there are.
 enum class Sensors { all, lidar_and_imu, lidar };
