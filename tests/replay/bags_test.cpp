@@ -87,6 +87,13 @@ TEST(Bags, Ros2BagGivesTheOdometryOfTheCapture) {
   expect_same_odometry(replay_room(folder / "drive_0.db3"));
 }
 
+/// Converters and early recorders leave the column empty: there was one serialisation to choose from.
+TEST(Bags, Ros2BagThatNamesNoSerialisationIsCdr) {
+  const TemporaryFolder folder;
+  write_db3(folder / "drive_0.db3", room_messages(RosVersion::ros2), "");
+  expect_same_odometry(replay_room(folder / "drive_0.db3"));
+}
+
 TEST(Bags, Ros2FolderIsReadInTheOrderOfItsMetadata) {
   const TemporaryFolder folder;
   const std::span<const RecordedMessage> messages = room_messages(RosVersion::ros2);

@@ -149,5 +149,14 @@ TEST_F(RealCapture, StandingVlp16WithGps) {
   expect_still(standing.trajectory(), milliseconds{500});
 }
 
+/// A ROS 2 bag that names no serialisation. Of its 2193 packets none is missing: each follows the one before by the
+/// packet spacing of the sensor.
+TEST_F(RealCapture, StandingVls128InABag) {
+  const Replay standing({(test_data() / "velodyne/vls128").string()});
+  ASSERT_EQ(standing.run().status, 0) << standing.run().err;
+  EXPECT_EQ(standing.summary()["packets"]["total"]["data"], 2193);
+  EXPECT_GE(standing.trajectory().size(), 3U);
+}
+
 } // namespace
 } // namespace locus::test

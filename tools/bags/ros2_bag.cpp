@@ -164,7 +164,7 @@ std::optional<std::string> Ros2Bag::read_topics(File& file) {
   };
   const Statement topics = prepare(file, "SELECT id, name, type, serialization_format FROM topics ORDER BY id");
   while (sqlite3_step(topics.get()) == SQLITE_ROW) {
-    if (const std::string format = text_of(topics.get(), 3); format != "cdr")
+    if (const std::string format = text_of(topics.get(), 3); format != "cdr" && !format.empty()) // early rosbag2: empty
       return fmt::format("its messages are serialised as \"{}\", not cdr; {}", format.substr(0, 20), kConvert);
     file.topic_of[sqlite3_column_int64(topics.get(), 0)] =
         topic_index(text_of(topics.get(), 1), ros1_type(text_of(topics.get(), 2)));
