@@ -60,8 +60,7 @@ std::optional<PacketError> LidarInput::take(const Datagram& datagram) {
   if (datagram.truncated)
     return PacketError::truncated;
   if (!is_sender(datagram)) {
-    if (datagram.payload.size() == velodyne::kDataPacketBytes)
-      refused_ip_ = datagram.source_ip;
+    refuse_sender(datagram);
     return PacketError::sender;
   }
   if (datagram.payload.size() == velodyne::kDataPacketBytes)
@@ -106,6 +105,16 @@ bool LidarInput::is_sender(const Datagram& datagram) const {
   if (options_.source_ip || !learnt_ip_)
     return !options_.source_ip || *options_.source_ip == datagram.source_ip;
   return *learnt_ip_ == datagram.source_ip || datagram.receive_stamp - last_heard_ > kSenderTimeout;
+}
+
+void LidarInput::refuse_sender(const Datagram& datagram) {
+  if (datagram.payload.size() != velodyne::kDataPacketBytes)
+    return;
+  refused_ip_ = datagram.source_ip;
+  const auto known = std::ranges::find_if(
+      strangers_, [&](const Stranger& stranger) { return stranger.packets == 0 || stranger.ip == datagram.source_ip; });
+  if (known != strangers_.end())
+    *known = {datagram.source_ip, known->packets + 1};
 }
 
 bool LidarInput::is_duplicate(std::span<const std::byte> payload) const {

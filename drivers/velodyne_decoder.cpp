@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/velodyne_decoder.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include <fmt/format.h>
 
 #include "drivers/wire.hpp"
 
@@ -38,6 +41,11 @@ int clockwise_turn(std::uint16_t from_cdeg, std::uint16_t to_cdeg) {
 }
 
 } // namespace
+
+std::string to_string(const UnknownPackets& unknown) {
+  return fmt::format("product id 0x{:02x} and return mode 0x{:02x} in {} packets", unknown.product_id,
+                     unknown.return_mode, unknown.packets);
+}
 
 Duration time_of_hour(std::span<const std::byte> payload) {
   return std::chrono::microseconds{read_u32(payload.data() + kTimeOffset)};
@@ -81,13 +89,13 @@ std::optional<PacketError> Decoder::recognise(Packet packet, Duration time_of_ho
                         ? options_.return_mode
                         : return_mode_from_byte(std::to_integer<std::uint8_t>(packet[kReturnModeOffset]));
   if (!mode)
-    return PacketError::model;
+    return refuse_unknown(packet);
   recognised_ = model_from_product_id(std::to_integer<std::uint8_t>(packet[kProductIdOffset]));
   if (recognised_)
     recognised_ = recognition_.recognise(*recognised_, *mode, time_of_hour, packet);
   const auto model = options_.model ? options_.model : recognised_;
   if (!model)
-    return PacketError::model;
+    return refuse_unknown(packet);
   if (model == model_ && mode == mode_)
     return std::nullopt;
   const Calibration& own = spec(*model).calibration;
@@ -95,6 +103,18 @@ std::optional<PacketError> Decoder::recognise(Packet packet, Duration time_of_ho
     return PacketError::model;
   prepare(*model, *mode, options_.calibration ? *options_.calibration : own);
   return std::nullopt;
+}
+
+PacketError Decoder::refuse_unknown(Packet packet) {
+  const auto product_id = std::to_integer<std::uint8_t>(packet[kProductIdOffset]);
+  const auto mode = std::to_integer<std::uint8_t>(packet[kReturnModeOffset]);
+  unknown_[product_id] = {product_id, mode, unknown_[product_id].packets + 1};
+  return PacketError::model;
+}
+
+std::optional<UnknownPackets> Decoder::unknown_packets() const {
+  const UnknownPackets most = *std::ranges::max_element(unknown_, {}, &UnknownPackets::packets);
+  return most.packets > 0 ? std::optional{most} : std::nullopt;
 }
 
 void Decoder::prepare(Model model, ReturnMode mode, const Calibration& calibration) {

@@ -56,6 +56,22 @@ LidarOptions options(const char* name, std::uint16_t port, std::optional<std::ui
   return result;
 }
 
+TEST(LidarInput, OthersWhoSendToItsPortAreCountedByAddress) {
+  LidarInput lidar = opened();
+  Stream stream;
+  Stream other(kOtherIp);
+  for (int i = 0; i < 100; ++i) {
+    EXPECT_NE(lidar.receive(stream(i)), nullptr);
+    EXPECT_EQ(lidar.receive(other(i)), nullptr);
+  }
+  EXPECT_EQ(lidar.strangers()[0].ip, kOtherIp);
+  EXPECT_EQ(lidar.strangers()[0].packets, 100U);
+  EXPECT_EQ(lidar.strangers()[1].packets, 0U);
+  for (std::uint32_t ip = 1; ip < 100; ++ip) // of a flood the first few are enough
+    EXPECT_EQ(lidar.receive(Stream(ip)(100)), nullptr);
+  EXPECT_EQ(lidar.strangers().back().packets, 1U);
+}
+
 std::uint64_t rejected(const PacketCounters& counters) {
   std::uint64_t sum = 0;
   for (const std::uint64_t one : counters.rejected)

@@ -197,6 +197,19 @@ TEST(VelodyneDecoder, WrongFlagIsRefused) {
   }
 }
 
+TEST(VelodyneDecoder, PacketsOfUnknownModelsAreCountedByTheirMostFrequentProductId) {
+  Decoder decoder;
+  LidarPacket packet;
+  EXPECT_FALSE(decoder.unknown_packets());
+  for (const int product_id : {0x31, 0x63, 0x31}) {
+    VelodyneTestPacket bytes{Model::vlp16, ReturnMode::strongest};
+    bytes.set_product_id(static_cast<std::uint8_t>(product_id));
+    EXPECT_EQ(decoder.decode(bytes.payload(), packet), PacketError::model);
+  }
+  ASSERT_TRUE(decoder.unknown_packets());
+  EXPECT_EQ(to_string(*decoder.unknown_packets()), "product id 0x31 and return mode 0x37 in 2 packets");
+}
+
 TEST(VelodyneDecoder, UnusedBlocksOfTheVls128MayHoldAnything) {
   VelodyneTestPacket bytes{Model::vls128, ReturnMode::dual};
   for (std::size_t block = 8; block < kBlocks; ++block)

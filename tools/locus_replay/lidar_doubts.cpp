@@ -21,6 +21,12 @@ std::string rejections(const PacketCounters& counters) {
   return fmt::format("{}", fmt::join(reasons, ", "));
 }
 
+/// Of what model the packets say that they are, where it is unknown.
+std::string unknown_model(const LidarInput& lidar) {
+  const auto unknown = lidar.decoder().unknown_packets();
+  return unknown ? fmt::format(" ({})", velodyne::to_string(*unknown)) : "";
+}
+
 bool is_configured(const LidarRouter& lidars, std::uint16_t port) {
   return std::ranges::any_of(lidars.lidars(), [&](const LidarInput& lidar) { return lidar.listens_to(port); });
 }
@@ -55,7 +61,7 @@ std::string not_heard(const LidarInput& lidar, const Recording& recording, const
   if (options.source_ip)
     line += " from " + dotted(*options.source_ip);
   if (const std::string rejected = rejections(lidar.counters()); !rejected.empty())
-    return fmt::format("{}, rejected: {}; check its address and model", line, rejected);
+    return fmt::format("{}, rejected: {}{}; check its address and model", line, rejected, unknown_model(lidar));
   for (const auto& [port, traffic] : recording.traffic()) {
     if (traffic.data_packet_sized > 0 && !is_configured(lidars, port))
       return fmt::format("{}; {} packets went to port {}: if they are its own, use --set lidars.{}.port={}", line,
@@ -100,8 +106,8 @@ std::string why_no_data(const Recording& recording, const LidarRouter& lidars) {
   if (const auto model = other_model(lidars.lidars().front()))
     return fmt::format("{} packets to port {}, those of a {}, configured {}; use --set lidars.0.model=auto",
                        busiest.data_packet_sized, port, to_string(*model), to_string(*first.model));
-  return fmt::format("{} packets to port {}, rejected: {}; is it a Velodyne, and lidars.0.model the right one?",
-                     busiest.data_packet_sized, port, rejections(total));
+  return fmt::format("{} packets to port {}, rejected: {}{}; is it a Velodyne, and lidars.0.model the right one?",
+                     busiest.data_packet_sized, port, rejections(total), unknown_model(lidar));
 }
 
 std::vector<std::string> lidar_warnings(const Recording& recording, const LidarRouter& lidars,
@@ -114,6 +120,11 @@ std::vector<std::string> lidar_warnings(const Recording& recording, const LidarR
       warnings.push_back(fmt::format("lidar {0}: configured as {1}, but its packets are those of a {2}, and read as a "
                                      "{1}'s they make a wrong world; use --set lidars.{0}.model=auto",
                                      lidar.options().name, to_string(*lidar.options().model), to_string(*model)));
+    const auto report = daemon::IngestReport::Lidar::of(lidar);
+    if (auto warning = report.packets.data > 0 ? daemon::unknown_model(lidar.options(), report) : std::nullopt)
+      warnings.push_back(std::move(*warning));
+    if (auto warning = daemon::shared_port(lidar.options(), report))
+      warnings.push_back(std::move(*warning));
     if (auto warning = lidar.decoder().model()
                            ? daemon::short_sweep(sweeps, lidar.options().name, lidar.decoder().rotation_rate_rpm())
                            : std::nullopt)
