@@ -158,5 +158,17 @@ TEST_F(RealCapture, StandingVls128InABag) {
   EXPECT_GE(standing.trajectory().size(), 3U);
 }
 
+TEST_F(RealCapture, OfOusterAndHesaiAreRefusedByTheirNames) {
+  const ProgramRun ouster = Replay({(test_data() / "ouster/OS-1-32-G_v2.1.1_1024x10.pcap").string()}).run();
+  EXPECT_EQ(ouster.status, 1);
+  EXPECT_NE(ouster.err.find("64 packets look like those of a lidar of Ouster"), std::string::npos) << ouster.err;
+  for (const char* const model : {"40p", "qt128", "xt16", "xt32", "xt32m"}) {
+    const ProgramRun hesai = Replay({(test_data() / "hesai" / model).string()}).run();
+    EXPECT_EQ(hesai.status, 1);
+    EXPECT_NE(hesai.err.find("/pandar_packets (pandar_msgs/PandarScan) is of a lidar of Hesai"), std::string::npos)
+        << hesai.err;
+  }
+}
+
 } // namespace
 } // namespace locus::test

@@ -70,6 +70,26 @@ std::string not_heard(const LidarInput& lidar, const Recording& recording, const
   return line + "; check its port and address, or take it out of the configuration";
 }
 
+/// Whose packets these are, where most that could be a lidar's look like another maker's.
+std::string other_makers(const std::map<std::uint16_t, PortTraffic>& traffic) {
+  for (const OtherMaker maker : {OtherMaker::hesai, OtherMaker::ouster}) {
+    const auto packets_of = [&](const auto& entry) {
+      return entry.second.of_other_maker[static_cast<std::size_t>(maker)];
+    };
+    const auto& [port, busiest] = *std::ranges::max_element(traffic, {}, packets_of);
+    std::uint64_t packets = 0, velodyne = 0;
+    for (const auto& entry : traffic) {
+      packets += packets_of(entry);
+      velodyne += entry.second.data_packet_sized;
+    }
+    if (packets > velodyne)
+      return fmt::format("{} packets look like those of a lidar of {} (most go to port {}, the last of them with {} "
+                         "bytes); only Velodyne's are decoded, so record one of those",
+                         packets, to_string(maker), port, busiest.bytes);
+  }
+  return "";
+}
+
 std::string without_datagrams(const DatagramSource& source) {
   if (source.datagrams() == 0)
     return source.why_none();
@@ -83,6 +103,8 @@ std::string why_no_data(const Recording& recording, const LidarRouter& lidars) {
   const std::map<std::uint16_t, PortTraffic>& traffic = recording.traffic();
   if (traffic.empty())
     return without_datagrams(recording.source());
+  if (const std::string maker = other_makers(traffic); !maker.empty())
+    return maker;
   const auto& [port, busiest] = *std::ranges::max_element(
       traffic, {}, [](const auto& entry) { return std::pair(entry.second.data_packet_sized, entry.second.datagrams); });
   const LidarOptions& first = lidars.lidars().front().options();

@@ -93,8 +93,11 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
       recording_.duration(),       spent,   accuracy};
   const nlohmann::ordered_json figures = write_summary(run);
   warn(recording_.warnings());
-  if (!has_data) {
+  const std::optional<std::string> backwards = recording_.runs_backwards();
+  if (!has_data || backwards) {
     remove_results(arguments_.output, false);
+    if (backwards)
+      throw Failure(ExitStatus::failed, fmt::format("{}: {}", arguments_.capture.string(), *backwards));
     throw Failure(ExitStatus::failed, fmt::format("{}: no valid data packet: {}", arguments_.capture.string(),
                                                   why_no_data(recording_, ingest.lidars())));
   }
