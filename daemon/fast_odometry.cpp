@@ -18,9 +18,10 @@ std::optional<Eigen::Vector3d> turn_rate(const MotionSources& sources, const Sou
   return so3_log(T_then_now->rotation) / to_seconds(kTwistSpan);
 }
 
-/// Velocity over the last kTwistSpan, m/s in base axes; nothing where no source tells the translation.
-std::optional<Eigen::Vector3d> velocity(const MotionSources& sources, const SourceChoice& choice, Stamp measured) {
-  const std::optional<Pose> T_then_now = sources.motion(choice, measured - kTwistSpan, measured);
+/// Velocity over the kTwistSpan up to the last sample of a translation, m/s in base axes; nothing where no source tells
+/// the translation.
+std::optional<Eigen::Vector3d> velocity(const MotionSources& sources, const SourceChoice& choice, Stamp last) {
+  const std::optional<Pose> T_then_now = sources.motion(choice, last - kTwistSpan, last);
   if (!choice.translation || !T_then_now)
     return std::nullopt;
   return se3_log(*T_then_now).head<3>() / to_seconds(kTwistSpan);
@@ -46,14 +47,15 @@ std::optional<FastSample> FastOdometry::carry(const MotionSources& sources, std:
   if (!estimate_ || choice.rotation != source || !newest || *newest <= estimate_->stamp)
     return std::nullopt;
   const std::optional<Stamp> translated = choice.translation ? sources.newest(*choice.translation) : std::nullopt;
-  const Stamp measured = std::clamp(translated.value_or(estimate_->stamp), estimate_->stamp, *newest);
+  const Stamp last = std::min(translated.value_or(estimate_->stamp), *newest);
+  const Stamp measured = std::max(last, estimate_->stamp);
   const std::optional<Pose> T_estimate_measured = sources.motion(choice, estimate_->stamp, measured);
   const std::optional<Pose> T_measured_now = sources.motion({choice.rotation, {}}, measured, *newest);
   if (!T_estimate_measured || !T_measured_now)
     return std::nullopt;
   FastSample now = *estimate_;
   now.stamp = *newest;
-  now.twist_base.head<3>() = velocity(sources, choice, measured).value_or(estimate_->twist_base.head<3>());
+  now.twist_base.head<3>() = velocity(sources, choice, last).value_or(estimate_->twist_base.head<3>());
   now.twist_base.tail<3>() = turn_rate(sources, choice, *newest).value_or(estimate_->twist_base.tail<3>());
   Vector6 arc;
   arc << to_seconds(*newest - measured) * now.twist_base.head<3>(), so3_log(T_measured_now->rotation);
