@@ -89,7 +89,7 @@ std::optional<PacketError> LidarInput::take_data(const Datagram& datagram) {
   if (const auto error = decoder_.decode(datagram.payload, packet_))
     return error;
   const Duration time_of_hour = velodyne::time_of_hour(datagram.payload);
-  const Duration stamp_delay = velodyne::spec(*decoder_.model()).stamp_delay;
+  const Duration stamp_delay = velodyne::spec(*decoder_.model(), decoder_.pace()).stamp_delay;
   const auto reading = clock_.read(time_of_hour, packet_.duration - stamp_delay, datagram.receive_stamp);
   counters_.clock_steps = clock_.steps();
   if (!reading)
@@ -127,7 +127,7 @@ bool LidarInput::is_duplicate(std::span<const std::byte> payload) const {
 
 /// Packets that should lie between the latest one and this one, and do not.
 std::uint64_t LidarInput::missing_before(const SensorClock::Reading& reading) const {
-  const Duration nominal = velodyne::packet_duration(*decoder_.model(), *decoder_.return_mode());
+  const Duration nominal = velodyne::packet_duration(*decoder_.model(), *decoder_.return_mode(), decoder_.pace());
   const auto missing = std::llround(to_seconds(reading.advance - last_duration_) / to_seconds(nominal));
   if (missing <= 0)
     return 0;

@@ -96,12 +96,13 @@ std::optional<PacketError> Decoder::recognise(Packet packet, Duration time_of_ho
   const auto model = options_.model ? options_.model : recognised_;
   if (!model)
     return refuse_unknown(packet);
-  if (model == model_ && mode == mode_)
+  const Pace pace = pace_recognition_.recognise(*model, *mode, time_of_hour);
+  if (model == model_ && mode == mode_ && pace == pace_)
     return std::nullopt;
   const Calibration& own = spec(*model).calibration;
   if (options_.calibration && options_.calibration->laser_count != own.laser_count)
     return PacketError::model;
-  prepare(*model, *mode, options_.calibration ? *options_.calibration : own);
+  prepare(*model, *mode, pace, options_.calibration ? *options_.calibration : own);
   return std::nullopt;
 }
 
@@ -117,16 +118,17 @@ std::optional<UnknownPackets> Decoder::unknown_packets() const {
   return most.packets > 0 ? std::optional{most} : std::nullopt;
 }
 
-void Decoder::prepare(Model model, ReturnMode mode, const Calibration& calibration) {
+void Decoder::prepare(Model model, ReturnMode mode, Pace pace, const Calibration& calibration) {
   model_ = model;
   mode_ = mode;
+  pace_ = pace;
   layout_ = packet_layout(model, mode);
-  column_duration_ = spec(model).column_duration;
+  column_duration_ = spec(model, pace).column_duration;
   distance_resolution_m_ = static_cast<float>(calibration.distance_resolution_m);
   last_time_of_hour_.reset();
   mean_turn_cdeg_ = 0.0F;
 
-  const std::span<const Firing> firings = spec(model).firings();
+  const std::span<const Firing> firings = spec(model, pace).firings();
   for (std::size_t i = 0; i < firings.size(); ++i) {
     const Laser& laser = calibration.storage[firings[i].laser];
     firings_.share_of_column[i] =

@@ -56,6 +56,7 @@ class Decoder {
   /// Of the packets so far; nothing before the first good one.
   [[nodiscard]] std::optional<Model> model() const { return model_; }
   [[nodiscard]] std::optional<ReturnMode> return_mode() const { return mode_; }
+  [[nodiscard]] Pace pace() const { return pace_; }
 
   /// What the packets say they come from, by ModelRecognition; another than model() where the options say otherwise.
   /// Nothing while their product id is unknown.
@@ -91,7 +92,7 @@ class Decoder {
 
   std::optional<PacketError> recognise(Packet packet, Duration time_of_hour);
   PacketError refuse_unknown(Packet packet);
-  void prepare(Model model, ReturnMode mode, const Calibration& calibration);
+  void prepare(Model model, ReturnMode mode, Pace pace, const Calibration& calibration);
   [[nodiscard]] std::optional<PacketError> check_blocks(Packet packet) const;
   bool measure_turns(Packet packet, Duration time_of_hour);
   void measure_turn_since_last_packet(Duration time_of_hour, double max_turn_cdeg);
@@ -102,10 +103,12 @@ class Decoder {
 
   DecoderOptions options_;
   ModelRecognition recognition_;
+  PaceRecognition pace_recognition_;
   std::optional<Model> recognised_;
   std::array<UnknownPackets, 256> unknown_{}; ///< by product id
   std::optional<Model> model_;
   std::optional<ReturnMode> mode_;
+  Pace pace_ = Pace::first;
   PacketLayout layout_{};
   Duration column_duration_{};
   float distance_resolution_m_ = 0.0F;

@@ -95,6 +95,26 @@ TEST(LidarInput, GoodPacketsComeOutStampedAtTheirFirstFiring) {
   EXPECT_EQ(lidar.counters().lost, 0U);
 }
 
+/// As many were counted as packets of the first pace fit into the gap: 104.
+TEST(LidarInput, LostPacketsOfAVls128AreCountedAtItsPace) {
+  for (const velodyne::Pace pace : {velodyne::Pace::first, velodyne::Pace::slower}) {
+    LidarInput lidar = opened();
+    const double packet_us = 1e6 * to_seconds(packet_duration(Model::vls128, ReturnMode::strongest, pace));
+    for (int i = 0; i < 200; ++i) {
+      if (i >= 50 && i < 150)
+        continue;
+      const double us = packet_us * i;
+      VelodyneTestPacket bytes(Model::vls128, ReturnMode::strongest, static_cast<std::uint32_t>(1e9 + us),
+                               static_cast<std::uint16_t>(std::lround(0.36 * us) % velodyne::kCdegPerTurn), 600.0,
+                               pace);
+      bytes.set_all_returns(1000);
+      const Stamp received = stamp_from_ns(1'700'000'000'000'000'000) + from_seconds(1e-6 * (us + packet_us + 80.0));
+      EXPECT_NE(lidar.receive({bytes.payload(), kLidarIp, 2368, 2368, received}), nullptr) << i;
+    }
+    EXPECT_EQ(lidar.counters().lost, 100U);
+  }
+}
+
 TEST(LidarInput, Vls128StampsAreThoseOfItsFirstFiringToo) {
   LidarInput lidar = opened();
   const VelodyneTestPacket bytes{Model::vls128, ReturnMode::strongest};

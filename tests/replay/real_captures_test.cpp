@@ -156,6 +156,13 @@ TEST_F(RealCapture, StandingVls128InABag) {
   ASSERT_EQ(standing.run().status, 0) << standing.run().err;
   EXPECT_EQ(standing.summary()["packets"]["total"]["data"], 2193);
   EXPECT_GE(standing.trajectory().size(), 3U);
+  EXPECT_EQ(standing.summary()["lidars"]["front"]["model"], "VLS-128");
+  EXPECT_NEAR(standing.summary()["lidars"]["front"]["rpm"].get<double>(), 600, 10);
+
+  const Replay with_gap({"--fail", "front:lost@0.1-0.2", (test_data() / "velodyne/vls128").string()});
+  const nlohmann::json packets = with_gap.summary()["packets"]["front"];
+  EXPECT_GT(packets["lost"], 500);
+  EXPECT_EQ(packets["data"].get<int>() + packets["lost"].get<int>(), 2193) << "all that was lost is counted";
 }
 
 TEST_F(RealCapture, OfOusterAndHesaiAreRefusedByTheirNames) {
