@@ -125,6 +125,18 @@ bool LidarInput::is_duplicate(std::span<const std::byte> payload) const {
   });
 }
 
+/// Share by which the speed may differ over a gap: the motor's own, or what the azimuths of a packet, in hundredths of
+/// a degree, tell it to. The VLS-128 turns by 0.4 degrees between the first and the last column of a packet, or less.
+double LidarInput::speed_tolerance() const {
+  constexpr double kRoundingCdeg = 1.5;
+  const velodyne::Model model = *decoder_.model();
+  const auto columns = velodyne::packet_layout(model, *decoder_.return_mode()).columns;
+  const double turned_s = to_seconds(velodyne::spec(model, decoder_.pace()).column_duration) *
+                          static_cast<double>(std::max<std::size_t>(columns - 1, 1));
+  const double turned_cdeg = decoder_.rotation_rate_rpm() / 60.0 * velodyne::kCdegPerTurn * turned_s;
+  return std::max(kSpeedTolerance, kRoundingCdeg / std::max(turned_cdeg, kRoundingCdeg));
+}
+
 /// Packets that should lie between the latest one and this one, and do not.
 std::uint64_t LidarInput::missing_before(const SensorClock::Reading& reading) const {
   const Duration nominal = velodyne::packet_duration(*decoder_.model(), *decoder_.return_mode(), decoder_.pace());
@@ -136,7 +148,7 @@ std::uint64_t LidarInput::missing_before(const SensorClock::Reading& reading) co
         decoder_.rotation_rate_rpm() / 60.0 * velodyne::kCdegPerTurn * to_seconds(reading.advance);
     const double turned_cdeg = packet_.first_azimuth_cdeg - last_azimuth_cdeg_;
     const double error_cdeg = std::remainder(turned_cdeg - expected_cdeg, velodyne::kCdegPerTurn);
-    if (std::abs(error_cdeg) > kAzimuthToleranceCdeg + kSpeedTolerance * expected_cdeg)
+    if (std::abs(error_cdeg) > kAzimuthToleranceCdeg + speed_tolerance() * expected_cdeg)
       return 0;
   }
   return static_cast<std::uint64_t>(missing);

@@ -84,6 +84,7 @@ class LidarInput {
   [[nodiscard]] bool is_sender(const Datagram& datagram) const;
   [[nodiscard]] bool is_duplicate(std::span<const std::byte> payload) const;
   void refuse_sender(const Datagram& datagram);
+  [[nodiscard]] double speed_tolerance() const;
   [[nodiscard]] std::uint64_t missing_before(const SensorClock::Reading& reading) const;
   void count(const SensorClock::Reading& reading);
   void remember(const Datagram& datagram);
