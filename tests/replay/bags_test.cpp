@@ -103,6 +103,9 @@ TEST(Bags, Ros2FolderIsReadInTheOrderOfItsMetadata) {
                                        "  relative_file_paths:\n    - drive/b.db3\n    - a.db3\n"
                                        "  compression_format: \"\"\n  compression_mode: \"\"\n");
   expect_same_odometry(replay_room(folder.path()));
+  write_text(folder / "metadata.yaml", "rosbag2_bagfile_information:\n  storage_identifier: \"\"\n"
+                                       "  relative_file_paths: [b.db3, a.db3]\n");
+  expect_same_odometry(replay_room(folder.path()));
 }
 
 TEST(Bags, BagOfTwoLidarsGivesTheirPacketsInTheOrderOfReception) {

@@ -49,9 +49,9 @@ Expected<std::vector<path>, std::string> files_of(const path& folder) {
     return bag_files_in(folder);
   try {
     const YAML::Node bag = YAML::LoadFile(metadata.string())["rosbag2_bagfile_information"];
-    const auto storage = bag["storage_identifier"].as<std::string>("sqlite3");
+    const auto storage = bag["storage_identifier"].as<std::string>("");
     const auto compression = bag["compression_format"].as<std::string>("");
-    if (storage != "sqlite3")
+    if (!storage.empty() && storage != "sqlite3") // where it is not named, the files themselves tell
       return fmt::format("{}: storage {} is not read; {}", folder.string(), storage, kConvert);
     if (!compression.empty())
       return fmt::format("{}: compressed with {}, which is not read; {}", folder.string(), compression, kConvert);
