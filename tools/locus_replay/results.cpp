@@ -57,8 +57,9 @@ std::vector<std::string> source_verdicts(const Config& config, const MotionSourc
       lines.push_back(fmt::format("motion source {} {}", name, verdict));
     else if (is_doubted)
       lines.push_back(
-          fmt::format("motion source {} is set aside, for it turns otherwise than lidar sees the robot turn, "
-                      "in a drive too short to say why; look at its unit (rad/s) and T_base_source",
+          fmt::format("motion source {} and lidar disagreed on how the robot turns, and it was not yet used again at "
+                      "the end (possible causes: T_base_source, the unit (rad/s) or the stamps of the gyro, or lidar "
+                      "that follows what moves around the robot)",
                       name));
   }
   return lines;

@@ -51,6 +51,13 @@ ordered_json sources(const FinishedRun& run) {
   return sources;
 }
 
+/// Who is right when a source and lidar contradict each other is not known.
+std::string_view reason_of(const HealthEvent& event) {
+  if (event.reason == HealthReason::disagreement)
+    return "disagrees with lidar";
+  return event.verdict.starts_with("and lidar disagree") ? "disagrees with lidar on turns" : to_string(event.reason);
+}
+
 /// When a source was lost and why, and when it came back.
 std::string readable_health(const FinishedRun& run, std::size_t source) {
   constexpr std::size_t kTold = 4; ///< a source that flaps is not worth a page
@@ -61,7 +68,7 @@ std::string readable_health(const FinishedRun& run, std::size_t source) {
       continue;
     const double after_s = to_seconds(event.stamp - run.capture_start);
     text += event.healthy ? fmt::format(", back at {:.2f} s", after_s)
-                          : fmt::format(", lost at {:.2f} s ({})", after_s, to_string(event.reason));
+                          : fmt::format(", lost at {:.2f} s ({})", after_s, reason_of(event));
   }
   if (told > kTold)
     text += fmt::format(" and {} more changes", told - kTold);
