@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "core/health_monitor.hpp"
 
@@ -41,10 +42,7 @@ std::optional<HealthReason> ImuSelfCheck::judge(const SourceReading& reading) {
   return refused_ || set_aside_ ? std::optional{HealthReason::self_check} : std::nullopt;
 }
 
-std::string_view ImuSelfCheck::verdict() const {
-  return set_aside_ && !refused_ ? "does not turn as lidar sees the robot turn: it is not used until it does"
-                                 : verdict_;
-}
+std::string_view ImuSelfCheck::verdict() const { return set_aside_ && !refused_ ? set_aside_verdict_ : verdict_; }
 
 void ImuSelfCheck::weigh(const Eigen::Vector3d& specific_force_base_mps2, Stamp stamp) {
   if (weighed_)
@@ -99,14 +97,17 @@ void ImuSelfCheck::weigh_gravity() {
   const Eigen::Vector3d force = force_sum_mps2_ / forces_;
   if (is_about(force.norm(), 1.0, kGravityTolerance)) {
     trusts_accelerometer_ = false;
-    verdict_ = "reports accelerations in g, not in m/s^2: they are not used";
+    verdict_ = "reports accelerations of about 1 where gravity is 9.8 m/s^2, as if in g: they are not used";
   } else if (!is_about(force.norm(), kGravity_mps2, kGravityTolerance)) {
     trusts_accelerometer_ = false;
-    verdict_ = "reports accelerations that are not those of gravity: they are not used";
+    verdict_ =
+        "reports accelerations that are not those of gravity in the mean of a second: they are not used (possible "
+        "causes: their unit or scale, or a robot that sped up all the while)";
   }
   if (force.norm() > 0.0 && force.normalized().z() < std::cos(kMaxTilt_deg * kRadPerDeg))
     refuse(
-        "gravity is not below the robot: T_base_source is wrong, or the unit is mounted another way; it is not used");
+        "measures that gravity is not below the robot, but more than 60 degrees from there: it is not used (possible "
+        "causes: T_base_source, how the unit is mounted, the convention of its axes, or a robot that lay on its side)");
 }
 
 void ImuSelfCheck::accept(const SourceReading& reading) {
@@ -149,6 +150,15 @@ void ImuSelfCheck::Turns::add(double gyro_rad, double lidar_rad) {
 
 double ImuSelfCheck::Turns::likeness() const { return gyro_lidar / std::sqrt(gyro_gyro * lidar_lidar); }
 
+/// Its own turns are what a gyro is told from: of one that reports none, nothing is known but that.
+ImuSelfCheck::Difference ImuSelfCheck::Turns::difference() const {
+  if (gyro_gyro < sweeps * kTurns_rad * kTurns_rad)
+    return Difference::gyro_still;
+  if (likeness() < -kLikeness)
+    return Difference::opposite;
+  return has_scale(kDegPerRad) ? Difference::degrees : Difference::any;
+}
+
 /// All noise is taken for that of lidar.
 bool ImuSelfCheck::Turns::has_scale(double scale) const {
   return likeness() > kLikeness && std::abs(gyro_gyro / gyro_lidar - scale) < kScaleTolerance * scale;
@@ -161,6 +171,8 @@ void ImuSelfCheck::review() {
   const bool contradicted = any(kSweepsToDoubt, false);
   if (!set_aside_ && contradicted) {
     set_aside_ = true;
+    const std::size_t axis = contradicted_axis(kSweepsToDoubt);
+    set_aside_verdict_ = words(turns_[axis].difference(), axis, false);
     turns_ = {};
   } else if (set_aside_ && contradicted && any(kSweepsToJudge, false)) {
     conclude();
@@ -171,19 +183,54 @@ void ImuSelfCheck::review() {
 
 /// Refuses the unit, or tries it once more where nothing is clear: lidar may not see what a gait does without it.
 void ImuSelfCheck::conclude() {
-  for (const Turns& turns : turns_) {
-    if (turns.sweeps < kSweepsToJudge)
-      continue;
-    if (turns.likeness() < -kLikeness)
-      refuse("turns the other way than lidar sees: T_base_source is wrong, or an axis has the wrong sign; it is not "
-             "used");
-    else if (turns.has_scale(kDegPerRad))
-      refuse("reports turn rates in deg/s, not in rad/s: it is not used");
+  for (std::size_t axis = 0; axis < turns_.size(); ++axis) {
+    const Turns& turns = turns_[axis];
+    if (turns.sweeps >= kSweepsToJudge && (turns.likeness() < -kLikeness || turns.has_scale(kDegPerRad)))
+      refuse(words(turns.difference(), axis, true));
   }
+  const std::size_t axis = contradicted_axis(kSweepsToJudge);
   if (!refused_ && ++rounds_ == kRounds)
-    refuse("does not turn as lidar sees the robot turn: T_base_source or its scale is wrong; it is not used");
+    refuse(words(turns_[axis].difference(), axis, true));
   set_aside_ = false;
   turns_ = {};
+}
+
+/// The first about which gyro and lidar do not agree. Precondition: there is one with so many turning sweeps.
+std::size_t ImuSelfCheck::contradicted_axis(int sweeps) const {
+  const auto found =
+      std::ranges::find_if(turns_, [=](const Turns& turns) { return turns.sweeps >= sweeps && !turns.agree(); });
+  return static_cast<std::size_t>(found - turns_.begin());
+}
+
+/// Text that lives for ever.
+std::string_view ImuSelfCheck::words(Difference difference, std::size_t axis, bool for_good) {
+  struct Finding {
+    const char* seen;
+    const char* causes;
+  };
+  constexpr std::array<Finding, 4> kFindings{
+      Finding{"they see different turns",
+              "T_base_source, scale, stamps or delay of the gyro, or lidar that follows what moves around the robot"},
+      Finding{"lidar sees turns and the gyro none",
+              "people or things that move around a robot that stands, T_base_source, delay or a dead axis of the gyro"},
+      Finding{
+          "the gyro turns the other way",
+          "T_base_source, the sign of an axis, delay of the gyro, or lidar that follows what moves around the robot"},
+      Finding{"the gyro reports some 57 times as much, as if in deg/s, not in rad/s", "the unit of its driver"}};
+  constexpr std::array<const char*, 3> kAxes{"x (roll)", "y (pitch)", "z (yaw)"};
+  using Words = std::array<std::array<std::array<std::string, 2>, kAxes.size()>, kFindings.size()>;
+  static const Words all = [&] {
+    Words words;
+    for (std::size_t i = 0; i < words.size(); ++i)
+      for (std::size_t k = 0; k < kAxes.size(); ++k)
+        for (std::size_t good = 0; good < 2; ++good)
+          words[i][k][good] = std::string("and lidar disagree on how the robot turns about ") + kAxes[k] + ": " +
+                              kFindings[i].seen + "; it is not used " +
+                              (good == 1 ? "any more, until a restart" : "until they agree") +
+                              " (possible causes: " + kFindings[i].causes + ")";
+    return words;
+  }();
+  return all[static_cast<std::size_t>(difference)][axis][for_good ? 1 : 0];
 }
 
 /// What comes back is checked as at the start.

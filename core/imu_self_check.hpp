@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string_view>
 
@@ -18,8 +19,10 @@ namespace locus {
 /// used it bends the sweeps; what lidar sees without it decides whether it is used again or refused. While the robot
 /// goes straight nothing is proven and nothing bent.
 ///
-/// A unit whose accelerations are of another unit is downgraded: they are not used. One whose axes or turn rates are
-/// wrong is refused for good. What was found stands in verdict(), in plain words. One owner.
+/// A unit whose accelerations are of another unit is downgraded: they are not used. One that goes on turning otherwise
+/// than lidar sees is refused for good. What was observed stands in verdict(), in plain words, with what may be the
+/// cause: who of the two is right is not known, for people who walk around a robot that stands mislead lidar. One
+/// owner.
 class ImuSelfCheck : public HealthMetric {
  public:
   explicit ImuSelfCheck(const Pose& T_base_imu) : R_base_imu_(T_base_imu.rotation) {}
@@ -33,6 +36,9 @@ class ImuSelfCheck : public HealthMetric {
   [[nodiscard]] bool trusts_accelerometer() const override { return trusts_accelerometer_; }
 
  private:
+  /// What gyro and lidar are seen to differ in.
+  enum class Difference : std::uint8_t { any, gyro_still, opposite, degrees };
+
   /// How far the gyro had turned when; lidar speaks of what was a few sweeps ago.
   struct Turned {
     Stamp stamp;
@@ -47,6 +53,7 @@ class ImuSelfCheck : public HealthMetric {
     [[nodiscard]] double likeness() const; ///< cosine
     [[nodiscard]] bool has_scale(double scale) const;
     [[nodiscard]] bool agree() const { return has_scale(1.0); }
+    [[nodiscard]] Difference difference() const;
   };
 
   void weigh(const Eigen::Vector3d& specific_force_base_mps2, Stamp stamp);
@@ -60,9 +67,11 @@ class ImuSelfCheck : public HealthMetric {
   void review();
   void conclude();
   void refuse(std::string_view verdict);
+  [[nodiscard]] std::size_t contradicted_axis(int sweeps) const;
+  [[nodiscard]] static std::string_view words(Difference difference, std::size_t axis, bool for_good);
 
   Eigen::Quaterniond R_base_imu_;
-  std::string_view verdict_;
+  std::string_view verdict_, set_aside_verdict_;
   bool refused_ = false;
   bool trusts_accelerometer_ = true;
 

@@ -79,6 +79,12 @@ Matrix6 turn_both(const Eigen::Quaterniond& rotation) {
   return R;
 }
 
+Matrix6 transport(const Eigen::Vector3d& moved_m) {
+  Matrix6 further = Matrix6::Identity();
+  further.topRightCorner<3, 3>() = -skew(moved_m);
+  return further;
+}
+
 Vector6 difference(const Pose& T_a_b, const Pose& T_a_reference) {
   Vector6 d;
   d << T_a_b.translation - T_a_reference.translation, so3_log(T_a_b.rotation * T_a_reference.rotation.conjugate());

@@ -56,6 +56,10 @@ Matrix6 adjoint(const Pose& T_a_b);
 /// Block-diagonal matrix that turns both halves of a tangent.
 Matrix6 turn_both(const Eigen::Quaterniond& rotation);
 
+/// Takes an error (translation, turn) of a pose along fixed axes to that of a pose `moved_m` further on: an error of
+/// the turn shifts what lies ahead.
+Matrix6 transport(const Eigen::Vector3d& moved_m);
+
 /// T_a_b - T_a_reference as translation and turn, both along the axes of a.
 Vector6 difference(const Pose& T_a_b, const Pose& T_a_reference);
 

@@ -13,10 +13,9 @@ constexpr double kLeastVariance = 1e-10;
 } // namespace
 
 void PoseUncertainty::Error::carry(const Eigen::Vector3d& moved_m) {
-  Matrix6 transport = Matrix6::Identity();
-  transport.topRightCorner<3, 3>() = -skew(moved_m);
-  noise = transport * noise * transport.transpose();
-  bias = transport.cwiseAbs() * bias;
+  const Matrix6 further = transport(moved_m);
+  noise = further * noise * further.transpose();
+  bias = further.cwiseAbs() * bias;
 }
 
 Matrix6 PoseUncertainty::Error::covariance() const {

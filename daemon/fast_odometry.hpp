@@ -13,13 +13,14 @@ namespace locus::daemon {
 struct FastSample {
   Stamp stamp;
   Pose T_odom_base;
-  Matrix6 pose_covariance = Matrix6::Zero(); ///< frames as in OdometryEstimate
-  Vector6 twist_base = Vector6::Zero();
-  Matrix6 twist_covariance = Matrix6::Zero();
+  Matrix6 pose_covariance = Matrix6::Zero();  ///< of x, y, z and turns about the odom axes
+  Vector6 twist_base = Vector6::Zero();       ///< m/s and rad/s, base frame
+  Matrix6 twist_covariance = Matrix6::Zero(); ///< base frame
 };
 
 /// Carries the last estimate forward with each sample of the source that gives the rotation, the quickest of those
-/// chosen. Goes on without lidar: dead reckoning gives estimates, too. One owner, the ingest thread.
+/// chosen. Between the last translation that was measured and now the base moves with a constant twist: on an arc. Goes
+/// on without lidar: dead reckoning gives estimates, too. One owner, the ingest thread.
 class FastOdometry {
  public:
   void take(const FastSample& estimate) { estimate_ = estimate; }

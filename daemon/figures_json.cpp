@@ -43,6 +43,15 @@ ordered_json to_json(const PacketCounters& counters) {
           {"rejected", rejected}};
 }
 
+ordered_json model_json(const IngestReport::Lidar& lidar) {
+  const auto name_or_null = [](const auto& value) {
+    return value ? ordered_json(std::string{velodyne::to_string(*value)}) : ordered_json(nullptr);
+  };
+  return {{"model", name_or_null(lidar.model)},
+          {"return_mode", name_or_null(lidar.return_mode)},
+          {"rpm", rounded(lidar.rotation_rate_rpm)}};
+}
+
 ordered_json to_json(const SweepCounters& counters) {
   return {{"seen", counters.seen},
           {"processed", counters.processed},

@@ -8,6 +8,7 @@
 
 #include "config/config.hpp"
 #include "core/source_health.hpp"
+#include "daemon/ingest_report.hpp"
 #include "daemon/stage_stopwatch.hpp"
 #include "daemon/sweep_processor.hpp"
 #include "drivers/packet_counters.hpp"
@@ -34,6 +35,9 @@ struct SweepSums {
 double rounded(double value);
 
 nlohmann::ordered_json to_json(const PacketCounters& counters);
+/// As what the packets of a lidar are read: model, return_mode and rpm; null before the first good one.
+nlohmann::ordered_json model_json(const IngestReport::Lidar& lidar);
+
 nlohmann::ordered_json to_json(const SweepCounters& counters);
 nlohmann::ordered_json to_json(const Percentiles& percentiles);
 /// `used_sweeps`: SweepSums::used_sweeps of it.

@@ -21,10 +21,14 @@ struct IngestReport {
     std::optional<velodyne::Model> model;
     std::optional<velodyne::ReturnMode> return_mode;
     double rotation_rate_rpm = 0.0;
-    std::optional<std::uint32_t> source_ip;  ///< host byte order
-    std::optional<std::uint32_t> refused_ip; ///< LidarInput::refused_ip()
-    Stamp last_heard;                        ///< LidarInput::last_heard()
+    std::optional<std::uint32_t> source_ip;                  ///< host byte order
+    std::optional<std::uint32_t> refused_ip;                 ///< LidarInput::refused_ip()
+    LidarInput::Strangers strangers;                         ///< LidarInput::strangers()
+    std::optional<velodyne::UnknownPackets> unknown_packets; ///< velodyne::Decoder::unknown_packets()
+    Stamp last_heard;                                        ///< LidarInput::last_heard()
     velodyne::PpsState pps = velodyne::PpsState::absent;
+
+    static Lidar of(const LidarInput& lidar);
   };
   struct Source {
     SourceCounters counters;
@@ -41,6 +45,14 @@ struct IngestReport {
   /// Called by the ingest thread.
   void read(const Ingest& ingest);
 };
+
+/// That somebody else, who may be a second lidar, sends to the port of a lidar whose address is not configured: who,
+/// and the configuration that tells them apart. Nothing while next to nothing is refused for it.
+std::optional<std::string> shared_port(const LidarOptions& options, const IngestReport::Lidar& lidar);
+
+/// That packets of a model which cannot be read come to a lidar's port, and what they say of themselves. Nothing while
+/// there are next to none.
+std::optional<std::string> unknown_model(const LidarOptions& options, const IngestReport::Lidar& lidar);
 
 /// What the owner of a lidar should know of sweeps that are shorter than its turn; nothing where they are not.
 std::optional<std::string> short_sweep(const SweepOptions& options, const std::string& lidar, double rotation_rate_rpm);

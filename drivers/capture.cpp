@@ -25,16 +25,20 @@ constexpr std::string_view kRecordOne = "record one with: tcpdump -s 0 -w lidar.
 struct Signature {
   std::string_view start;
   std::string_view what;
-  std::string_view what_to_do;
+  std::string_view what_to_do; ///< a command "unpack it with" stands before the name of the file
 };
 
 /// What people hand over in place of a capture.
 constexpr std::array kForeignFiles{
     Signature{"\x89PNG", "a PNG image", kRecordOne},
     Signature{"\xFF\xD8\xFF", "a JPEG image", kRecordOne},
-    Signature{"\x1F\x8B", "a gzip-compressed file", "decompress it first"},
-    Signature{"\x28\xB5\x2F\xFD", "a zstd-compressed file", "decompress it first"},
-    Signature{"PK\x03\x04", "a zip archive", "unpack it first"},
+    Signature{"\x1F\x8B", "a gzip-compressed file", "unpack it with: gunzip -k"},
+    Signature{"\xFD"
+              "7zXZ",
+              "an xz-compressed file", "unpack it with: unxz -k"},
+    Signature{"BZh", "a bzip2-compressed file", "unpack it with: bunzip2 -k"},
+    Signature{"\x28\xB5\x2F\xFD", "a zstd-compressed file", "unpack it with: unzstd"},
+    Signature{"PK\x03\x04", "a zip archive", "unpack it with: unzip"},
     Signature{"#ROSBAG", "a ROS 1 bag", kRecordOne},
     Signature{"SQLite format 3", "an SQLite database (a ROS 2 bag?)", kRecordOne},
     Signature{"\x89MCAP", "an MCAP file", kRecordOne},
@@ -45,7 +49,7 @@ constexpr std::array<std::string_view, 6> kCaptureMagics{"\xD4\xC3\xB2\xA1", "\x
                                                          "\xA1\xB2\x3C\x4D", "\x0A\x0D\x0D\x0A", "\x34\xCD\xB2\xA1"};
 
 /// What a file is that libpcap cannot read, judged by its first bytes; libpcap's own words where it is a capture.
-std::string foreign_file(std::FILE* file, std::string_view libpcap_says) {
+std::string foreign_file(std::FILE* file, const std::filesystem::path& name, std::string_view libpcap_says) {
   if (std::fseek(file, 0, SEEK_SET) != 0) { // a pipe
     return fmt::format("not a pcap or pcapng capture ({})", libpcap_says);
   }
@@ -64,7 +68,9 @@ std::string foreign_file(std::FILE* file, std::string_view libpcap_says) {
   for (const Signature& signature : kForeignFiles) {
     found = starts_with(signature.start) ? signature : found;
   }
-  return fmt::format("{}, not a pcap or pcapng capture; {}", found.what, found.what_to_do);
+  const bool is_packed = found.what_to_do.starts_with("unpack");
+  return fmt::format("{}, not a pcap or pcapng capture; {}{}", found.what, found.what_to_do,
+                     is_packed ? " " + name.string() : "");
 }
 
 std::string link_type_name(int link_type) {
@@ -120,7 +126,7 @@ Expected<Capture, std::string> Capture::open(const std::filesystem::path& file) 
   std::array<char, PCAP_ERRBUF_SIZE> reason{};
   pcap_t* handle = pcap_fopen_offline_with_tstamp_precision(stream.get(), PCAP_TSTAMP_PRECISION_NANO, reason.data());
   if (handle == nullptr) {
-    return fmt::format("{}: {}", file.string(), foreign_file(stream.get(), reason.data()));
+    return fmt::format("{}: {}", file.string(), foreign_file(stream.get(), file, reason.data()));
   }
   static_cast<void>(stream.release()); // pcap_close() closes it
   const std::uintmax_t bytes_total =
@@ -196,7 +202,8 @@ std::vector<std::string> Capture::warnings() const {
   };
   warn(stats_.fragments,
        "IP fragments refused: a lidar's packets fit one Ethernet frame, so something on the way (tunnel, "
-       "router, Wi-Fi bridge) has a smaller MTU; set it to 1500 or record next to the lidar");
+       "router, Wi-Fi bridge) has a smaller MTU; set it to 1500 or record next to the lidar (an Ouster's do not fit: "
+       "it is not decoded)");
   warn(stats_.truncated, "datagrams cut by the capture's snap length; record again with: tcpdump -s 0");
   warn(stats_.malformed, "frames with contradictory lengths, headers cut short or absurd times left out; "
                          "record again if the lidar's packets are among them");

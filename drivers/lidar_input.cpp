@@ -60,8 +60,7 @@ std::optional<PacketError> LidarInput::take(const Datagram& datagram) {
   if (datagram.truncated)
     return PacketError::truncated;
   if (!is_sender(datagram)) {
-    if (datagram.payload.size() == velodyne::kDataPacketBytes)
-      refused_ip_ = datagram.source_ip;
+    refuse_sender(datagram);
     return PacketError::sender;
   }
   if (datagram.payload.size() == velodyne::kDataPacketBytes)
@@ -90,7 +89,7 @@ std::optional<PacketError> LidarInput::take_data(const Datagram& datagram) {
   if (const auto error = decoder_.decode(datagram.payload, packet_))
     return error;
   const Duration time_of_hour = velodyne::time_of_hour(datagram.payload);
-  const Duration stamp_delay = velodyne::spec(*decoder_.model()).stamp_delay;
+  const Duration stamp_delay = velodyne::spec(*decoder_.model(), decoder_.pace()).stamp_delay;
   const auto reading = clock_.read(time_of_hour, packet_.duration - stamp_delay, datagram.receive_stamp);
   counters_.clock_steps = clock_.steps();
   if (!reading)
@@ -108,6 +107,16 @@ bool LidarInput::is_sender(const Datagram& datagram) const {
   return *learnt_ip_ == datagram.source_ip || datagram.receive_stamp - last_heard_ > kSenderTimeout;
 }
 
+void LidarInput::refuse_sender(const Datagram& datagram) {
+  if (datagram.payload.size() != velodyne::kDataPacketBytes)
+    return;
+  refused_ip_ = datagram.source_ip;
+  const auto known = std::ranges::find_if(
+      strangers_, [&](const Stranger& stranger) { return stranger.packets == 0 || stranger.ip == datagram.source_ip; });
+  if (known != strangers_.end())
+    *known = {datagram.source_ip, known->packets + 1};
+}
+
 bool LidarInput::is_duplicate(std::span<const std::byte> payload) const {
   const auto end = recent_.begin() + static_cast<std::ptrdiff_t>(std::min(remembered_, kRemembered));
   return std::any_of(recent_.begin(), end, [&](const Payload& seen) {
@@ -116,9 +125,21 @@ bool LidarInput::is_duplicate(std::span<const std::byte> payload) const {
   });
 }
 
+/// Share by which the speed may differ over a gap: the motor's own, or what the azimuths of a packet, in hundredths of
+/// a degree, tell it to. The VLS-128 turns by 0.4 degrees between the first and the last column of a packet, or less.
+double LidarInput::speed_tolerance() const {
+  constexpr double kRoundingCdeg = 1.5;
+  const velodyne::Model model = *decoder_.model();
+  const auto columns = velodyne::packet_layout(model, *decoder_.return_mode()).columns;
+  const double turned_s = to_seconds(velodyne::spec(model, decoder_.pace()).column_duration) *
+                          static_cast<double>(std::max<std::size_t>(columns - 1, 1));
+  const double turned_cdeg = decoder_.rotation_rate_rpm() / 60.0 * velodyne::kCdegPerTurn * turned_s;
+  return std::max(kSpeedTolerance, kRoundingCdeg / std::max(turned_cdeg, kRoundingCdeg));
+}
+
 /// Packets that should lie between the latest one and this one, and do not.
 std::uint64_t LidarInput::missing_before(const SensorClock::Reading& reading) const {
-  const Duration nominal = velodyne::packet_duration(*decoder_.model(), *decoder_.return_mode());
+  const Duration nominal = velodyne::packet_duration(*decoder_.model(), *decoder_.return_mode(), decoder_.pace());
   const auto missing = std::llround(to_seconds(reading.advance - last_duration_) / to_seconds(nominal));
   if (missing <= 0)
     return 0;
@@ -127,7 +148,7 @@ std::uint64_t LidarInput::missing_before(const SensorClock::Reading& reading) co
         decoder_.rotation_rate_rpm() / 60.0 * velodyne::kCdegPerTurn * to_seconds(reading.advance);
     const double turned_cdeg = packet_.first_azimuth_cdeg - last_azimuth_cdeg_;
     const double error_cdeg = std::remainder(turned_cdeg - expected_cdeg, velodyne::kCdegPerTurn);
-    if (std::abs(error_cdeg) > kAzimuthToleranceCdeg + kSpeedTolerance * expected_cdeg)
+    if (std::abs(error_cdeg) > kAzimuthToleranceCdeg + speed_tolerance() * expected_cdeg)
       return 0;
   }
   return static_cast<std::uint64_t>(missing);

@@ -53,6 +53,17 @@ class LidarInput {
   /// Who sent the last packet of a lidar that was refused for its sender.
   [[nodiscard]] std::optional<std::uint32_t> refused_ip() const { return refused_ip_; }
 
+  /// Somebody else who sends data packets to this lidar's port.
+  struct Stranger {
+    std::uint32_t ip = 0;      ///< host byte order
+    std::uint64_t packets = 0; ///< that were refused for it
+  };
+  static constexpr std::size_t kMaxStrangers = 4;
+  using Strangers = std::array<Stranger, kMaxStrangers>;
+
+  /// The first few, in the order in which they were heard; those without packets are none.
+  [[nodiscard]] const Strangers& strangers() const { return strangers_; }
+
   /// When the last packet that was taken arrived; Stamp{} before the first.
   [[nodiscard]] Stamp last_heard() const { return last_heard_; }
 
@@ -72,6 +83,8 @@ class LidarInput {
   std::optional<PacketError> take_data(const Datagram& datagram);
   [[nodiscard]] bool is_sender(const Datagram& datagram) const;
   [[nodiscard]] bool is_duplicate(std::span<const std::byte> payload) const;
+  void refuse_sender(const Datagram& datagram);
+  [[nodiscard]] double speed_tolerance() const;
   [[nodiscard]] std::uint64_t missing_before(const SensorClock::Reading& reading) const;
   void count(const SensorClock::Reading& reading);
   void remember(const Datagram& datagram);
@@ -85,6 +98,7 @@ class LidarInput {
   std::optional<velodyne::PositionPacket> position_;
 
   std::optional<std::uint32_t> learnt_ip_, refused_ip_;
+  Strangers strangers_{};
   Stamp last_heard_;
   std::uint16_t last_azimuth_cdeg_ = 0; ///< of the first firing of the latest packet
   Duration last_duration_{};            ///< of that packet

@@ -13,14 +13,17 @@ namespace {
 constexpr Duration kSpacingTolerance = std::chrono::microseconds{2}; // both stamps are whole microseconds
 constexpr int kMaxLostInARow = 3;
 
+/// Of the difference of two stamps of a VLS-128 from what the mean spacing makes of it: in a recording 2.2 us at most.
+constexpr Duration kStampNoise = std::chrono::microseconds{3};
+
 bool is_close(Duration a, Duration b) { return std::chrono::abs(a - b) <= kSpacingTolerance; }
 
 /// The model that sends packets at this spacing; nothing when it fits none.
 std::optional<Model> model_of_spacing(Model claimed, ReturnMode mode, Duration spacing) {
-  const Duration expected = packet_duration(claimed, mode);
-  for (int packets = 1; packets <= 1 + kMaxLostInARow; ++packets)
-    if (is_close(spacing, packets * expected))
-      return claimed;
+  for (const Pace pace : {Pace::first, Pace::slower})
+    for (int packets = 1; packets <= 1 + kMaxLostInARow; ++packets)
+      if (is_close(spacing, packets * packet_duration(claimed, mode, pace)))
+        return claimed;
   const auto* found = std::find_if(kModels.begin(), kModels.end(),
                                    [&](Model m) { return is_close(spacing, packet_duration(m, mode)); });
   return found == kModels.end() ? std::nullopt : std::optional{*found};
@@ -61,6 +64,25 @@ Model ModelRecognition::recognise(Model claimed, ReturnMode mode, Duration time_
   if (!verdict_)
     verdict_ = claimed == Model::hdl32e && fires_sixteen_lasers_twice(packet) ? Model::vlp16 : claimed;
   return *verdict_;
+}
+
+Pace PaceRecognition::recognise(Model model, ReturnMode mode, Duration time_of_hour) {
+  const Duration spacing = last_time_of_hour_ ? time_of_hour - *last_time_of_hour_ : Duration{};
+  last_time_of_hour_ = time_of_hour;
+  if (!has_two_paces(model))
+    return pace_ = Pace::first;
+  const Duration first = packet_duration(model, mode, Pace::first);
+  const Duration slower = packet_duration(model, mode, Pace::slower);
+  if (spacing < first - kStampNoise || spacing > slower + kStampNoise) {
+    beyond_middle_ = {};
+    return pace_;
+  }
+  beyond_middle_ += spacing - (first + slower) / 2;
+  if (std::chrono::abs(beyond_middle_) > kStampNoise) {
+    pace_ = beyond_middle_ > Duration{} ? Pace::slower : Pace::first;
+    beyond_middle_ = {};
+  }
+  return pace_;
 }
 
 } // namespace locus::velodyne

@@ -29,4 +29,18 @@ class ModelRecognition {
   std::optional<Model> verdict_; ///< on claimed_
 };
 
+/// Tells the pace of a model that has two, by the stamps of its packets: the two differ by 6 us a packet, in dual
+/// return mode by 2 us, and a stamp is off by up to 3 us. Spacings are added up until they differ by more than that
+/// from what lies between both paces; a lost or overtaken packet begins the sum anew. Until then, and for models with
+/// one pace, it is the first. One owner.
+class PaceRecognition {
+ public:
+  Pace recognise(Model model, ReturnMode mode, Duration time_of_hour);
+
+ private:
+  std::optional<Duration> last_time_of_hour_;
+  Duration beyond_middle_{}; ///< of the spacings added up
+  Pace pace_ = Pace::first;
+};
+
 } // namespace locus::velodyne

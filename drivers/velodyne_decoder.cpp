@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/velodyne_decoder.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include <fmt/format.h>
 
 #include "drivers/wire.hpp"
 
@@ -38,6 +41,11 @@ int clockwise_turn(std::uint16_t from_cdeg, std::uint16_t to_cdeg) {
 }
 
 } // namespace
+
+std::string to_string(const UnknownPackets& unknown) {
+  return fmt::format("product id 0x{:02x} and return mode 0x{:02x} in {} packets", unknown.product_id,
+                     unknown.return_mode, unknown.packets);
+}
 
 Duration time_of_hour(std::span<const std::byte> payload) {
   return std::chrono::microseconds{read_u32(payload.data() + kTimeOffset)};
@@ -81,32 +89,46 @@ std::optional<PacketError> Decoder::recognise(Packet packet, Duration time_of_ho
                         ? options_.return_mode
                         : return_mode_from_byte(std::to_integer<std::uint8_t>(packet[kReturnModeOffset]));
   if (!mode)
-    return PacketError::model;
+    return refuse_unknown(packet);
   recognised_ = model_from_product_id(std::to_integer<std::uint8_t>(packet[kProductIdOffset]));
   if (recognised_)
     recognised_ = recognition_.recognise(*recognised_, *mode, time_of_hour, packet);
   const auto model = options_.model ? options_.model : recognised_;
   if (!model)
-    return PacketError::model;
-  if (model == model_ && mode == mode_)
+    return refuse_unknown(packet);
+  const Pace pace = pace_recognition_.recognise(*model, *mode, time_of_hour);
+  if (model == model_ && mode == mode_ && pace == pace_)
     return std::nullopt;
   const Calibration& own = spec(*model).calibration;
   if (options_.calibration && options_.calibration->laser_count != own.laser_count)
     return PacketError::model;
-  prepare(*model, *mode, options_.calibration ? *options_.calibration : own);
+  prepare(*model, *mode, pace, options_.calibration ? *options_.calibration : own);
   return std::nullopt;
 }
 
-void Decoder::prepare(Model model, ReturnMode mode, const Calibration& calibration) {
+PacketError Decoder::refuse_unknown(Packet packet) {
+  const auto product_id = std::to_integer<std::uint8_t>(packet[kProductIdOffset]);
+  const auto mode = std::to_integer<std::uint8_t>(packet[kReturnModeOffset]);
+  unknown_[product_id] = {product_id, mode, unknown_[product_id].packets + 1};
+  return PacketError::model;
+}
+
+std::optional<UnknownPackets> Decoder::unknown_packets() const {
+  const UnknownPackets most = *std::ranges::max_element(unknown_, {}, &UnknownPackets::packets);
+  return most.packets > 0 ? std::optional{most} : std::nullopt;
+}
+
+void Decoder::prepare(Model model, ReturnMode mode, Pace pace, const Calibration& calibration) {
   model_ = model;
   mode_ = mode;
+  pace_ = pace;
   layout_ = packet_layout(model, mode);
-  column_duration_ = spec(model).column_duration;
+  column_duration_ = spec(model, pace).column_duration;
   distance_resolution_m_ = static_cast<float>(calibration.distance_resolution_m);
   last_time_of_hour_.reset();
   mean_turn_cdeg_ = 0.0F;
 
-  const std::span<const Firing> firings = spec(model).firings();
+  const std::span<const Firing> firings = spec(model, pace).firings();
   for (std::size_t i = 0; i < firings.size(); ++i) {
     const Laser& laser = calibration.storage[firings[i].laser];
     firings_.share_of_column[i] =

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 
 #include "core/isa.hpp"
 #include "core/lidar_packet.hpp"
@@ -24,6 +25,16 @@ struct DecoderOptions {
   Isa isa = best_isa();
 };
 
+/// What packets of no known model, or in no known return mode, say of themselves.
+struct UnknownPackets {
+  std::uint8_t product_id = 0;  ///< the most frequent one
+  std::uint8_t return_mode = 0; ///< of the latest packet that has it
+  std::uint64_t packets = 0;    ///< that have it
+};
+
+/// "product id 0x31 and return mode 0x37 in 120 packets".
+std::string to_string(const UnknownPackets& unknown);
+
 /// Turns data packets into returns, each with the direction and the time of its own firing.
 ///
 /// The azimuth of a firing is that of its column plus the share of the turn to the next column that had passed when it
@@ -33,7 +44,7 @@ struct DecoderOptions {
 /// In dual mode two equal distances are one return.
 ///
 /// One owner. Allocates nothing, throws nothing. A packet that is refused leaves the decoder as it was, but for what
-/// the model is recognised by.
+/// the model is recognised by and for unknown_packets().
 class Decoder {
  public:
   explicit Decoder(const DecoderOptions& options = {}) : options_(options) {}
@@ -45,10 +56,15 @@ class Decoder {
   /// Of the packets so far; nothing before the first good one.
   [[nodiscard]] std::optional<Model> model() const { return model_; }
   [[nodiscard]] std::optional<ReturnMode> return_mode() const { return mode_; }
+  [[nodiscard]] Pace pace() const { return pace_; }
 
   /// What the packets say they come from, by ModelRecognition; another than model() where the options say otherwise.
   /// Nothing while their product id is unknown.
   [[nodiscard]] std::optional<Model> recognised_model() const { return recognised_; }
+
+  /// Of the packets that were refused for their factory bytes, those of the most frequent product id; nothing without
+  /// any.
+  [[nodiscard]] std::optional<UnknownPackets> unknown_packets() const;
 
   /// Of the last good packet, from the turn of its columns.
   [[nodiscard]] double rotation_rate_rpm() const;
@@ -75,7 +91,8 @@ class Decoder {
   using Distances = Salvo::PerLaser<std::int32_t>; ///< as wide as all else about them
 
   std::optional<PacketError> recognise(Packet packet, Duration time_of_hour);
-  void prepare(Model model, ReturnMode mode, const Calibration& calibration);
+  PacketError refuse_unknown(Packet packet);
+  void prepare(Model model, ReturnMode mode, Pace pace, const Calibration& calibration);
   [[nodiscard]] std::optional<PacketError> check_blocks(Packet packet) const;
   bool measure_turns(Packet packet, Duration time_of_hour);
   void measure_turn_since_last_packet(Duration time_of_hour, double max_turn_cdeg);
@@ -86,9 +103,12 @@ class Decoder {
 
   DecoderOptions options_;
   ModelRecognition recognition_;
+  PaceRecognition pace_recognition_;
   std::optional<Model> recognised_;
+  std::array<UnknownPackets, 256> unknown_{}; ///< by product id
   std::optional<Model> model_;
   std::optional<ReturnMode> mode_;
+  Pace pace_ = Pace::first;
   PacketLayout layout_{};
   Duration column_duration_{};
   float distance_resolution_m_ = 0.0F;

@@ -110,15 +110,22 @@ ModelSpec hdl32e() {
           calibration(kHdl32eElevationDeg, 0.002)};
 }
 
-/// VLS-128: groups of eight lasers, a group every 2.665 us, one such slot of maintenance after the eighth group and
-/// three after the sixteenth. The time in the packet is that of the fourth group, 8.7 us after the first.
-ModelSpec vls128() {
+/// VLS-128: groups of eight lasers, a slot of maintenance after the eighth group and a longer pause after the
+/// sixteenth. The time in the packet is that of the fourth group, 8.7 us after the first. The manual (63-9483, chapter
+/// 9) has a group every 2.665 us and a column every 53.3 us.
+///
+/// Since firmware 5.2.3.0 it is a group every 2.89 us: Rev. 4 of the manual, as the decoder github.com/valgur/
+/// velodyne_decoder (packet_decoder.cpp) quotes it; it is also what those 8.7 us are three of. How long a column takes
+/// then is measured: 165.83 us a packet of three, in the mean of 2192, in the recording of a unit of April 2020.
+ModelSpec vls128(Pace pace) {
+  const bool slower = pace == Pace::slower;
+  const std::size_t slot_ns = slower ? 2'890 : 2'665;
   ModelSpec result{"VLS-128",
                    0xA1,
                    4,
-                   nanoseconds{53'300},
+                   nanoseconds{slower ? 55'277 : 53'300},
                    nanoseconds{8'700},
-                   firings(128, [](std::size_t i) { return 2'665 * (i / 8 + i / 64); }),
+                   firings(128, [=](std::size_t i) { return slot_ns * (i / 8 + i / 64); }),
                    calibration(kVls128ElevationDeg, 0.004)};
   for (std::size_t i = 0; i < kMaxLasers; ++i)
     result.calibration.storage[i].azimuth_offset_rad = kVls128AzimuthDeg[i % 8] * kRadPerDeg;
@@ -138,10 +145,13 @@ void Calibration::assign_rings() {
     storage[upwards[ring]].ring = static_cast<std::uint8_t>(ring);
 }
 
-const ModelSpec& spec(Model model) {
+const ModelSpec& spec(Model model, Pace pace) {
+  static const ModelSpec slower_vls128 = vls128(Pace::slower);
+  if (model == Model::vls128 && pace == Pace::slower)
+    return slower_vls128;
   static const std::array<ModelSpec, kModels.size()> specs{
       puck("VLP-16", 0x22, kVlp16ElevationDeg, kVlp16VerticalMm),
-      puck("Puck-Hi-Res", 0x24, kHiResElevationDeg, kHiResVerticalMm), vlp32c(), hdl32e(), vls128()};
+      puck("Puck-Hi-Res", 0x24, kHiResElevationDeg, kHiResVerticalMm), vlp32c(), hdl32e(), vls128(Pace::first)};
   return specs[static_cast<std::size_t>(model)];
 }
 
@@ -183,8 +193,8 @@ PacketLayout packet_layout(Model model, ReturnMode mode) {
   return {banks, returns, kBlocks / (banks * returns)};
 }
 
-Duration packet_duration(Model model, ReturnMode mode) {
-  return static_cast<Duration::rep>(packet_layout(model, mode).columns) * spec(model).column_duration;
+Duration packet_duration(Model model, ReturnMode mode, Pace pace) {
+  return static_cast<Duration::rep>(packet_layout(model, mode).columns) * spec(model, pace).column_duration;
 }
 
 } // namespace locus::velodyne

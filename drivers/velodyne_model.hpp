@@ -16,6 +16,10 @@ namespace locus::velodyne {
 enum class Model : std::uint8_t { vlp16, puck_hi_res, vlp32c, hdl32e, vls128 };
 inline constexpr std::array kModels{Model::vlp16, Model::puck_hi_res, Model::vlp32c, Model::hdl32e, Model::vls128};
 
+/// How fast the lasers of a model fire. One model has two paces: firmware 5.2.3.0 of the VLS-128 made it slower, and
+/// its packets do not say so.
+enum class Pace : std::uint8_t { first, slower };
+
 /// Which of the echoes of a laser pulse a packet reports; the values are those of the first factory byte.
 enum class ReturnMode : std::uint8_t { strongest = 0x37, last = 0x38, dual = 0x39 };
 
@@ -85,8 +89,11 @@ struct ModelSpec {
   [[nodiscard]] std::span<const Firing> firings() const { return {storage.data(), banks * kChannels}; }
 };
 
-/// The manual's figures of a model. Any thread.
-const ModelSpec& spec(Model model);
+/// The manual's figures of a model; a model with one pace fires at that whatever is asked for. Any thread.
+const ModelSpec& spec(Model model, Pace pace = Pace::first);
+
+/// Whether there are units of both paces.
+inline bool has_two_paces(Model model) { return model == Model::vls128; }
 
 std::string_view to_string(Model model);
 std::optional<Model> model_from_string(std::string_view name);
@@ -108,6 +115,6 @@ struct PacketLayout {
 PacketLayout packet_layout(Model model, ReturnMode mode);
 
 /// Time from the first firing of a packet to that of the next packet.
-Duration packet_duration(Model model, ReturnMode mode);
+Duration packet_duration(Model model, ReturnMode mode, Pace pace = Pace::first);
 
 } // namespace locus::velodyne

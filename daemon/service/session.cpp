@@ -226,14 +226,26 @@ void Session::tell(const ProcessedSweep& done) {
     log_.info(name, {{"LOCUS_STATE", name}});
 }
 
+namespace {
+
+/// Who is right when a source and lidar contradict each other is not known.
+std::string why_lost(const HealthEvent& event) {
+  if (!event.verdict.empty())
+    return std::string(event.verdict);
+  if (event.reason == HealthReason::disagreement)
+    return "and lidar disagree on how the robot moves; it is not used until they agree (possible causes: its slip, "
+           "scale or stamps, an IMU whose stamps are late, or lidar that follows what moves around the robot)";
+  return fmt::format("is lost ({})", to_string(event.reason));
+}
+
+} // namespace
+
 void Session::tell(const HealthEvent& event) {
   const std::string& name = config_.odometry.motion_sources[event.source].name;
   if (event.healthy)
     log_.info(fmt::format("motion source {} is back", name), {{"LOCUS_SOURCE", name}});
   else
-    log_.warn(fmt::format("motion source {} {}; the next best one is used", name,
-                          event.verdict.empty() ? fmt::format("is lost ({})", to_string(event.reason))
-                                                : std::string(event.verdict)),
+    log_.warn(fmt::format("motion source {} {}; the next best one is used", name, why_lost(event)),
               {{"LOCUS_SOURCE", name}, {"LOCUS_REASON", std::string{to_string(event.reason)}}});
 }
 

@@ -32,18 +32,23 @@ ordered_json ms_since(Stamp then) {
   return rounded(1e3 * to_seconds(Stamp{read_clock(CLOCK_REALTIME)} - then));
 }
 
+/// What its packets tell is wrong with a lidar, though it may be heard; empty if nothing is.
+std::string problem_of(const LidarOptions& options, const IngestReport::Lidar& lidar) {
+  return shared_port(options, lidar).value_or(unknown_model(options, lidar).value_or(""));
+}
+
 ordered_json lidar_json(const LidarOptions& options, const IngestReport::Lidar& lidar) {
-  const auto text_or_null = [](const auto& value, const auto& to_text) {
-    return value ? ordered_json(to_text(*value)) : ordered_json(nullptr);
+  const auto address_or_null = [](const std::optional<std::uint32_t>& ip) {
+    return ip ? ordered_json(dotted(*ip)) : ordered_json(nullptr);
   };
-  return {{"port", options.port},
-          {"source_ip", text_or_null(lidar.source_ip, &dotted)},
-          {"refused_ip", text_or_null(lidar.refused_ip, &dotted)},
-          {"model", text_or_null(lidar.model, [](auto m) { return std::string{velodyne::to_string(m)}; })},
-          {"return_mode", text_or_null(lidar.return_mode, [](auto m) { return std::string{velodyne::to_string(m)}; })},
-          {"rpm", rounded(lidar.rotation_rate_rpm)},
-          {"heard_ms_ago", ms_since(lidar.last_heard)},
-          {"pps", kPpsNames[static_cast<std::size_t>(lidar.pps) % kPpsNames.size()]}};
+  ordered_json json{{"port", options.port},
+                    {"source_ip", address_or_null(lidar.source_ip)},
+                    {"refused_ip", address_or_null(lidar.refused_ip)}};
+  json.update(model_json(lidar));
+  json["heard_ms_ago"] = ms_since(lidar.last_heard);
+  json["pps"] = kPpsNames[static_cast<std::size_t>(lidar.pps) % kPpsNames.size()];
+  json["problem"] = problem_of(options, lidar);
+  return json;
 }
 
 /// "a.b.c": "1" of everything below `json`, as diagnostics have it.
@@ -193,13 +198,16 @@ std::vector<Diagnostic> diagnostics(Session& session) {
     const ordered_json& heard_ms_ago = values["heard_ms_ago"];
     const bool heard = values["packets"]["data"].get<std::uint64_t>() > 0 && !heard_ms_ago.is_null();
     const bool silent = heard && heard_ms_ago.get<double>() > 1e3 * to_seconds(kStale);
-    all.push_back(with_values(!heard   ? Level::error
-                              : silent ? Level::stale
-                                       : Level::ok,
+    const std::string problem = values["problem"];
+    all.push_back(with_values(!heard             ? Level::error
+                              : silent           ? Level::stale
+                              : !problem.empty() ? Level::warning
+                                                 : Level::ok,
                               ": lidar " + name,
-                              !heard   ? "never heard; look at its cable, address and port"
-                              : silent ? "silent; look at its cable and power"
-                                       : "heard",
+                              !problem.empty() ? problem
+                              : !heard         ? "never heard; look at its cable, address and port"
+                              : silent         ? "silent; look at its cable and power"
+                                               : "heard",
                               values));
   }
   for (const auto& [name, source] : json["sources"].items()) {

@@ -75,11 +75,15 @@ void Watch::look_at_lidars() {
                .received = packets.received,
                .heard = now,
                .told = {},
-               .short_sweep_told = lidar.short_sweep_told};
+               .short_sweep_told = lidar.short_sweep_told,
+               .shared_port_told = lidar.shared_port_told};
     }
     const auto warning = short_sweep(session_.config().sweep, lidars[i].name, ingest.lidars[i].rotation_rate_rpm);
     if (warning && !std::exchange(lidar.short_sweep_told, true))
       log_.warn(*warning, {{"LOCUS_LIDAR", lidars[i].name}});
+    const auto shared = session_.age() > kPatience ? shared_port(lidars[i], ingest.lidars[i]) : std::nullopt;
+    if (shared && !std::exchange(lidar.shared_port_told, true))
+      log_.warn(*shared, {{"LOCUS_LIDAR", lidars[i].name}});
     if (now - lidar.heard < kPatience)
       continue;
     const std::string why = why_silent(lidar, lidars[i], ingest.lidars[i]);
@@ -104,9 +108,11 @@ std::string Watch::why_silent(const Lidar& lidar, const LidarOptions& options, c
     return fmt::format("its position packets come, so it is on and sends the others elsewhere: locusctl sensors tells "
                        "to which port, for lidars.{}.port",
                        options.name);
-  return fmt::format("what comes is refused, for the reasons that locusctl status counts: is it a Velodyne, and "
+  const std::string unknown =
+      now.unknown_packets ? fmt::format(" ({})", velodyne::to_string(*now.unknown_packets)) : "";
+  return fmt::format("what comes is refused, for the reasons that locusctl status counts{}: is it a Velodyne, and "
                      "lidars.{}.model the right one?",
-                     options.name);
+                     unknown, options.name);
 }
 
 /// What a check has found wrong with a source that goes on being used in part. Of one that is lost, its loss tells.

@@ -41,6 +41,7 @@ class Watch {
     Duration heard{};                     ///< when that was, or since when it is waited for
     std::string told;                     ///< why it is silent, as it was told; empty: it is not
     bool short_sweep_told = false;
+    bool shared_port_told = false;
   };
   static std::string why_silent(const Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now);
 

@@ -151,7 +151,26 @@ TEST_F(ImuSelfCheckTest, AGyroIsTriedAgainWhereLidarSeesNothingClearWithoutItBut
     stand(check);
     EXPECT_EQ(refused_, round == 2);
   }
-  EXPECT_NE(check.verdict().find("scale is wrong"), std::string_view::npos);
+  EXPECT_NE(check.verdict().find("disagree on how the robot turns about y (pitch): they see different turns"),
+            std::string_view::npos)
+      << check.verdict();
+  EXPECT_EQ(check.verdict().find("wrong"), std::string_view::npos) << "who is right is not known";
+}
+
+/// A robot stands, and lidar follows the people who walk around it: the gyro was said to be mounted wrongly.
+TEST_F(ImuSelfCheckTest, AGyroThatStandsStillWhileLidarTurnsIsNotCalledWrong) {
+  ImuSelfCheck check(Pose{});
+  stand(check);
+  for (int round = 0; round < 3; ++round) {
+    turn(check, 2, {0, 0, 1e-3}, {0, 0, -0.2});
+    EXPECT_TRUE(refused_);
+    turn(check, 10, {0, 0, 1e-3}, {0, 0, -0.2});
+    stand(check);
+  }
+  EXPECT_NE(check.verdict().find("about z (yaw): lidar sees turns and the gyro none"), std::string_view::npos)
+      << check.verdict();
+  EXPECT_NE(check.verdict().find("people or things that move around a robot that stands"), std::string_view::npos);
+  EXPECT_EQ(check.verdict().find("other way"), std::string_view::npos) << "two readings of noise have any sign";
 }
 
 /// Nobody uses it in the second after a loss.

@@ -197,6 +197,51 @@ TEST(VelodyneDecoder, WrongFlagIsRefused) {
   }
 }
 
+/// Number `i` of a VLS-128 at 600 rpm, its stamp in whole microseconds.
+VelodyneTestPacket vls128_packet(ReturnMode mode, Pace pace, int i) {
+  const double us = 1e6 * to_seconds(packet_duration(Model::vls128, mode, pace)) * i;
+  return {Model::vls128, mode, static_cast<std::uint32_t>(1e6 + us), static_cast<std::uint16_t>(std::lround(0.36 * us)),
+          600.0,         pace};
+}
+
+TEST(VelodyneDecoder, Vls128IsReadAtThePaceOfItsPackets) {
+  for (const Pace pace : {Pace::first, Pace::slower}) {
+    for (const ReturnMode mode : {ReturnMode::strongest, ReturnMode::dual}) {
+      Decoder decoder;
+      LidarPacket packet;
+      for (int i = 0; i < 10; ++i)
+        EXPECT_FALSE(decoder.decode(vls128_packet(mode, pace, i).payload(), packet));
+      EXPECT_EQ(decoder.pace(), pace);
+      EXPECT_EQ(decoder.recognised_model(), Model::vls128);
+      EXPECT_EQ(packet.duration, packet_duration(Model::vls128, mode, pace));
+      EXPECT_NEAR(decoder.rotation_rate_rpm(), 600.0, 15.0) << "of azimuths in whole hundredths of a degree";
+    }
+  }
+}
+
+/// Four packets of it take as long as one of a VLP-32C.
+TEST(VelodyneDecoder, Vls128OfTheSlowerPaceThatLosesThreePacketsIsNoVlp32c) {
+  Decoder decoder;
+  LidarPacket packet;
+  for (const int i : {0, 1, 2, 3, 7, 8, 12})
+    EXPECT_FALSE(decoder.decode(vls128_packet(ReturnMode::strongest, Pace::slower, i).payload(), packet)) << i;
+  EXPECT_EQ(decoder.model(), Model::vls128);
+  EXPECT_EQ(decoder.pace(), Pace::slower);
+}
+
+TEST(VelodyneDecoder, PacketsOfUnknownModelsAreCountedByTheirMostFrequentProductId) {
+  Decoder decoder;
+  LidarPacket packet;
+  EXPECT_FALSE(decoder.unknown_packets());
+  for (const int product_id : {0x31, 0x63, 0x31}) {
+    VelodyneTestPacket bytes{Model::vlp16, ReturnMode::strongest};
+    bytes.set_product_id(static_cast<std::uint8_t>(product_id));
+    EXPECT_EQ(decoder.decode(bytes.payload(), packet), PacketError::model);
+  }
+  ASSERT_TRUE(decoder.unknown_packets());
+  EXPECT_EQ(to_string(*decoder.unknown_packets()), "product id 0x31 and return mode 0x37 in 2 packets");
+}
+
 TEST(VelodyneDecoder, UnusedBlocksOfTheVls128MayHoldAnything) {
   VelodyneTestPacket bytes{Model::vls128, ReturnMode::dual};
   for (std::size_t block = 8; block < kBlocks; ++block)

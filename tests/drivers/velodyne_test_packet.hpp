@@ -16,10 +16,10 @@ namespace locus::test {
 class VelodyneTestPacket {
  public:
   VelodyneTestPacket(velodyne::Model model, velodyne::ReturnMode mode, std::uint32_t time_of_hour_us = 1'000'000,
-                     std::uint16_t azimuth_cdeg = 0, double rpm = 600.0) {
+                     std::uint16_t azimuth_cdeg = 0, double rpm = 600.0, velodyne::Pace pace = velodyne::Pace::first) {
     using namespace velodyne;
     const PacketLayout layout = packet_layout(model, mode);
-    const double turn_cdeg = rpm / 60.0 * kCdegPerTurn * to_seconds(spec(model).column_duration);
+    const double turn_cdeg = rpm / 60.0 * kCdegPerTurn * to_seconds(spec(model, pace).column_duration);
     for (std::size_t block = 0; block < layout.used_blocks(); ++block) {
       const std::size_t column = block / layout.blocks_per_column();
       set_flag(block, kBankFlags[block % layout.blocks_per_column() / layout.returns]);

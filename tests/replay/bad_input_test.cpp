@@ -2,12 +2,14 @@
 #include <csignal>
 #include <fstream>
 #include <random>
+#include <ranges>
 #include <thread>
 
 #include <gtest/gtest.h>
 #include <pcap/pcap.h>
 #include <unistd.h>
 
+#include "drivers/capture.hpp"
 #include "drivers/pcap_writer.hpp"
 #include "replay_run.hpp"
 #include "support/child.hpp"
@@ -133,6 +135,68 @@ TEST_F(BadCapture, TruncatedInMidPacketIsAWarningAndNoFailure) {
   ASSERT_EQ(lines_of(run.err).size(), 1U) << run.err;
   EXPECT_NE(run.err.find("ends in mid-packet"), std::string::npos) << run.err;
   EXPECT_NEAR(static_cast<double>(read_tum(folder_ / "out/odometry.tum").size()), 40, 2);
+}
+
+/// It played one packet and said that all was well.
+TEST_F(BadCapture, ThatRunsBackwardsIsSaidWithTheProgramThatSortsIt) {
+  constexpr std::size_t kPackets = 500;
+  std::vector<std::pair<Stamp, Bytes>> packets;
+  auto capture = Capture::open(room_drive() / "lidar.pcap");
+  while (const Datagram* datagram = packets.size() < kPackets ? capture->next() : nullptr)
+    packets.emplace_back(datagram->receive_stamp, Bytes(datagram->payload.begin(), datagram->payload.end()));
+  {
+    PcapWriter pcap = std::move(*PcapWriter::open(folder_ / "bad.pcap"));
+    for (const auto& [stamp, payload] : std::views::reverse(packets))
+      pcap.write(stamp, UdpAddresses{}, payload);
+  }
+  expect_error(replay(), 1, {"bad.pcap", "499 of its 500 datagrams", "runs backwards", "reordercap IN OUT"});
+}
+
+TEST_F(BadCapture, CompressedFilesAreNamedWithTheCommandThatUnpacksThem) {
+  const std::string rest = " and so on and so on and so on and so on";
+  expect_error(replay("\x1F\x8B\x08" + rest), 1, {"a gzip-compressed file", "gunzip -k ", "/bad.pcap"});
+  expect_error(replay("\xFD"
+                      "7zXZ" +
+                      rest),
+               1, {"an xz-compressed file", "unxz -k ", "/bad.pcap"});
+  expect_error(replay("\x28\xB5\x2F\xFD" + rest), 1, {"a zstd-compressed file", "unzstd ", "/bad.pcap"});
+  expect_error(replay("BZh91AY&SY" + rest), 1, {"a bzip2-compressed file", "bunzip2 -k ", "/bad.pcap"});
+}
+
+TEST_F(BadCapture, OfAnotherMakersLidarIsSaidWithTheMaker) {
+  const auto write = [&](std::uint16_t port, std::size_t bytes, int first, int second) {
+    PcapWriter pcap = std::move(*PcapWriter::open(folder_ / "bad.pcap"));
+    Bytes payload(bytes);
+    payload[0] = std::byte(first);
+    payload[1] = std::byte(second);
+    for (int i = 0; i < 20; ++i)
+      pcap.write(stamp_from_ns(1'700'000'000'000'000'000 + 1'000'000 * i), UdpAddresses{.destination_port = port},
+                 payload);
+  };
+  write(2368, 1080, 0xEE, 0xFF);
+  expect_error(replay(), 1,
+               {"bad.pcap", "20 packets look like those of a lidar of Hesai", "port 2368", "1080 bytes",
+                "only Velodyne's are decoded"});
+  write(7502, 6464, 1, 0);
+  expect_error(replay(), 1, {"bad.pcap", "20 packets look like those of a lidar of Ouster", "port 7502", "6464 bytes"});
+}
+
+TEST(WrongUsage, StandardInputIsNoRecording) {
+  expect_error(Replay({"-"}).run(), 2, {"-: a recording is read from a file, not from a pipe", "cat > lidar.pcap"});
+}
+
+TEST(WrongUsage, FolderAboveADriveOfKittiNamesTheDrive) {
+  const std::filesystem::path day = kitti_room_drive().parent_path();
+  expect_error(Replay({day.string()}).run(), 1,
+               {day.string() + ": holds recordings, but is none itself; name the one in it", kitti_room_drive()});
+  const TemporaryFolder empty;
+  expect_error(Replay({empty.path().string()}).run(), 1, {"holds no lidar.pcap"});
+}
+
+/// The day's folder within one more, and other recordings beside it.
+TEST(WrongUsage, FolderOfManyRecordingsNamesSome) {
+  expect_error(Replay({kitti_room_drive().parent_path().parent_path().string()}).run(), 1,
+               {"name one of them: ", kitti_room_drive(), "more"});
 }
 
 /// What there is then would be taken for a result.

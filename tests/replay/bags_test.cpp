@@ -87,6 +87,13 @@ TEST(Bags, Ros2BagGivesTheOdometryOfTheCapture) {
   expect_same_odometry(replay_room(folder / "drive_0.db3"));
 }
 
+/// Converters and early recorders leave the column empty: there was one serialisation to choose from.
+TEST(Bags, Ros2BagThatNamesNoSerialisationIsCdr) {
+  const TemporaryFolder folder;
+  write_db3(folder / "drive_0.db3", room_messages(RosVersion::ros2), "");
+  expect_same_odometry(replay_room(folder / "drive_0.db3"));
+}
+
 TEST(Bags, Ros2FolderIsReadInTheOrderOfItsMetadata) {
   const TemporaryFolder folder;
   const std::span<const RecordedMessage> messages = room_messages(RosVersion::ros2);
@@ -95,6 +102,9 @@ TEST(Bags, Ros2FolderIsReadInTheOrderOfItsMetadata) {
   write_text(folder / "metadata.yaml", "rosbag2_bagfile_information:\n  storage_identifier: sqlite3\n"
                                        "  relative_file_paths:\n    - drive/b.db3\n    - a.db3\n"
                                        "  compression_format: \"\"\n  compression_mode: \"\"\n");
+  expect_same_odometry(replay_room(folder.path()));
+  write_text(folder / "metadata.yaml", "rosbag2_bagfile_information:\n  storage_identifier: \"\"\n"
+                                       "  relative_file_paths: [b.db3, a.db3]\n");
   expect_same_odometry(replay_room(folder.path()));
 }
 

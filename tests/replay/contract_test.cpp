@@ -75,11 +75,11 @@ TEST(LocusReplay, SummaryHasTheKeysOfTheContract) {
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
   const json summary = replay.summary();
   EXPECT_EQ(keys(summary),
-            (std::set<std::string>{"version",         "capture",    "config_sha256",  "threads",         "isa",
-                                   "duration_s",      "wall_s",     "cpu_s",          "peak_rss_mb",     "packets",
-                                   "sweeps",          "process_ms", "process_cpu_ms", "stage_ms",        "points",
-                                   "iterations_mean", "sources",    "ape_m",          "rpe_10m_percent", "end_drift_m",
-                                   "covariance"}))
+            (std::set<std::string>{
+                "version",   "capture",     "config_sha256",   "threads", "isa",    "duration_s",      "wall_s",
+                "cpu_s",     "peak_rss_mb", "packets",         "lidars",  "sweeps", "process_ms",      "process_cpu_ms",
+                "stage_ms",  "points",      "iterations_mean", "sources", "ape_m",  "rpe_10m_percent", "end_drift_m",
+                "covariance"}))
       << "the folder has the true poses, but not the map";
   EXPECT_EQ(keys(summary["ape_m"]), (std::set<std::string>{"max", "mean", "std", "rmse"}));
   const std::set<std::string> percentiles{"p50", "p90", "p99", "max"};
@@ -94,6 +94,9 @@ TEST(LocusReplay, SummaryHasTheKeysOfTheContract) {
             (std::set<std::string>{"received", "data", "position", "lost", "reordered", "clock_steps", "rejected"}));
   EXPECT_EQ(keys(summary["packets"]["front"]["rejected"]),
             (std::set<std::string>{"length", "flag", "model", "sender", "azimuth", "time", "duplicate", "truncated"}));
+  EXPECT_EQ(summary["lidars"]["front"]["model"], "VLP-16");
+  EXPECT_EQ(summary["lidars"]["front"]["return_mode"], "strongest");
+  EXPECT_NEAR(summary["lidars"]["front"]["rpm"].get<double>(), 600, 5);
   EXPECT_EQ(keys(summary["sources"]), (std::set<std::string>{"wio", "imu"}));
   EXPECT_EQ(keys(summary["sources"]["imu"]),
             (std::set<std::string>{"received", "used_sweeps", "rejected", "health_changes"}));

@@ -22,7 +22,7 @@ struct Wrong {
   void (*gyro)(Eigen::Vector3d& turn_radps);
   std::string words;
 };
-const Wrong kOtherWay{[](Eigen::Vector3d& turn_radps) { turn_radps.z() *= -1.0; }, "turns the other way"};
+const Wrong kOtherWay{[](Eigen::Vector3d& turn_radps) { turn_radps.z() *= -1.0; }, "the gyro turns the other way"};
 const Wrong kDegrees{[](Eigen::Vector3d& turn_radps) { turn_radps /= kRadPerDeg; }, "deg/s"};
 
 /// The samples of the drive, wrong from a time on, before which nothing comes for a second, and without attitude.

@@ -149,5 +149,33 @@ TEST_F(RealCapture, StandingVlp16WithGps) {
   expect_still(standing.trajectory(), milliseconds{500});
 }
 
+/// A ROS 2 bag that names no serialisation. Of its 2193 packets none is missing: each follows the one before by the
+/// packet spacing of the sensor.
+TEST_F(RealCapture, StandingVls128InABag) {
+  const Replay standing({(test_data() / "velodyne/vls128").string()});
+  ASSERT_EQ(standing.run().status, 0) << standing.run().err;
+  EXPECT_EQ(standing.summary()["packets"]["total"]["data"], 2193);
+  EXPECT_GE(standing.trajectory().size(), 3U);
+  EXPECT_EQ(standing.summary()["lidars"]["front"]["model"], "VLS-128");
+  EXPECT_NEAR(standing.summary()["lidars"]["front"]["rpm"].get<double>(), 600, 10);
+
+  const Replay with_gap({"--fail", "front:lost@0.1-0.2", (test_data() / "velodyne/vls128").string()});
+  const nlohmann::json packets = with_gap.summary()["packets"]["front"];
+  EXPECT_GT(packets["lost"], 500);
+  EXPECT_EQ(packets["data"].get<int>() + packets["lost"].get<int>(), 2193) << "all that was lost is counted";
+}
+
+TEST_F(RealCapture, OfOusterAndHesaiAreRefusedByTheirNames) {
+  const ProgramRun ouster = Replay({(test_data() / "ouster/OS-1-32-G_v2.1.1_1024x10.pcap").string()}).run();
+  EXPECT_EQ(ouster.status, 1);
+  EXPECT_NE(ouster.err.find("64 packets look like those of a lidar of Ouster"), std::string::npos) << ouster.err;
+  for (const char* const model : {"40p", "qt128", "xt16", "xt32", "xt32m"}) {
+    const ProgramRun hesai = Replay({(test_data() / "hesai" / model).string()}).run();
+    EXPECT_EQ(hesai.status, 1);
+    EXPECT_NE(hesai.err.find("/pandar_packets (pandar_msgs/PandarScan) is of a lidar of Hesai"), std::string::npos)
+        << hesai.err;
+  }
+}
+
 } // namespace
 } // namespace locus::test

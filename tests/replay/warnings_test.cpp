@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is unlikely to be what the user meant, and used to pass in silence.
 #include <fstream>
+#include <functional>
 
 #include <gtest/gtest.h>
 
+#include "drivers/capture.hpp"
+#include "drivers/pcap_writer.hpp"
+#include "drivers/velodyne_model.hpp"
 #include "replay_run.hpp"
 #include "support/test_drives.hpp"
 
@@ -39,6 +43,59 @@ TEST(Warnings, LidarThatIsNotHeardWhileAnotherIs) {
       {"lidar rear: no valid data packet to port 3000", "packets went to port 2369", "--set lidars.rear.port=2369"});
   expect_warning({"--set", "lidars.rear.source_ip=10.0.0.9", folder.path().string()},
                  {"lidar rear: no valid data packet to port 2369 from 10.0.0.9", "rejected: sender"});
+}
+
+/// Each of the packets of a capture as `change` has it.
+void rewrite(const std::filesystem::path& from, const std::filesystem::path& to,
+             const std::function<void(UdpAddresses&, Bytes&)>& change) {
+  auto capture = Capture::open(from);
+  auto writer = PcapWriter::open(to);
+  while (const Datagram* datagram = capture->next()) {
+    UdpAddresses addresses{.source_ip = datagram->source_ip, .destination_port = datagram->destination_port};
+    Bytes payload(datagram->payload.begin(), datagram->payload.end());
+    change(addresses, payload);
+    writer->write(datagram->receive_stamp, addresses, payload);
+  }
+}
+
+/// The packets of the second lidar were refused, and nobody said so.
+TEST(Warnings, TwoLidarsOnOnePortAreNamedWithTheConfigurationThatSeparatesThem) {
+  const TemporaryFolder folder;
+  write_room_drive(folder / "two", std::chrono::seconds{2}, 2);
+  const std::string capture = folder / "one_port.pcap";
+  rewrite(folder / "two/lidar.pcap", capture, [](UdpAddresses& addresses, Bytes& payload) {
+    if (payload.size() == velodyne::kDataPacketBytes)
+      addresses.destination_port = 2368;
+  });
+  expect_warning({capture}, {"lidar front: others send to its port 2368, too", "packets of 192.168.1.201 are read",
+                             " of 192.168.1.202 are refused",
+                             "lidars: [{name: front, port: 2368, source_ip: 192.168.1.201}, {name: front_2, port: "
+                             "2368, source_ip: 192.168.1.202}]"});
+  std::ofstream(folder / "both.yaml") << "lidars: [{name: front, port: 2368, source_ip: 192.168.1.201}, "
+                                         "{name: front_2, port: 2368, source_ip: 192.168.1.202}]\n"
+                                         "motion_sources: []\n";
+  const Replay both({"-c", folder / "both.yaml", capture});
+  EXPECT_EQ(both.run().err, "");
+  EXPECT_EQ(both.summary()["packets"]["front"]["data"], both.summary()["packets"]["front_2"]["data"]);
+  EXPECT_EQ(both.summary()["packets"]["total"]["rejected"]["sender"], 0);
+}
+
+TEST(Warnings, PacketsOfAnUnknownModelAreNamedByTheirProductId) {
+  const TemporaryFolder folder;
+  const std::string capture = folder / "unknown.pcap";
+  rewrite(room_drive() / "lidar.pcap", capture, [number = 0](UdpAddresses&, Bytes& payload) mutable {
+    if (payload.size() == velodyne::kDataPacketBytes && ++number % 2 == 0)
+      payload[velodyne::kProductIdOffset] = std::byte{0x31};
+  });
+  expect_warning({"--duration", "1", capture},
+                 {"lidar front: refused product id 0x31 and return mode 0x37 in ", "lidars.front.source_ip"});
+  rewrite(room_drive() / "lidar.pcap", capture, [](UdpAddresses&, Bytes& payload) {
+    if (payload.size() == velodyne::kDataPacketBytes)
+      payload[velodyne::kProductIdOffset] = std::byte{0x63};
+  });
+  const Replay none({capture});
+  EXPECT_EQ(none.run().status, 1);
+  EXPECT_NE(none.run().err.find("(product id 0x63 and return mode 0x37 in "), std::string::npos) << none.run().err;
 }
 
 /// Half a turn sees what the half before did not: each second sweep fails.

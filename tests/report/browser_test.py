@@ -180,6 +180,7 @@ class Report(unittest.TestCase):
             self.assertEqual(browser.drawn(), TABLES)
             self.assertIn("No sweep was seen", browser.one("#plan .note").text)
             self.assertIn("rejected: length", browser.one("#packets").text)
+            self.assertIn("VLP-16", browser.one("#packets").text)
             self.assertEqual(browser.complaints(), [])
 
 

@@ -111,6 +111,7 @@ ordered_json summary_of(const std::string& capture, double duration_s, std::size
           {"cpu_s", duration_s / 15.0},
           {"peak_rss_mb", 150.0},
           {"packets", {{"total", packets}, {"front", packets}, {"rear", packets}}},
+          {"lidars", {{"front", {{"model", "VLP-16"}}}, {"rear", {{"model", nullptr}}}}},
           {"sweeps", {{"seen", sweeps + 3}, {"processed", sweeps}, {"dropped", 2}, {"failed", 1}}},
           {"process_ms", percentiles},
           {"process_cpu_ms", percentiles},

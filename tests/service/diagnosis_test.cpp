@@ -9,9 +9,11 @@
 
 #include "drivers/motion_files.hpp"
 #include "drivers/udp_socket.hpp"
+#include "drivers/velodyne_model.hpp"
 #include "service/robot_network.hpp"
 #include "service/undisturbed.hpp"
 #include "support/errors.hpp"
+#include "support/udp_sender.hpp"
 
 namespace locus::test {
 namespace {
@@ -47,6 +49,32 @@ TEST_F(Diagnosis, LidarOfAnotherAddressIsNamedWithBoth) {
   const std::string shown = ctl({"status"}).out;
   EXPECT_NE(shown.find("refused: sender "), std::string::npos) << shown;
   EXPECT_NE(shown.find("the last sender: 127.0.0.1"), std::string::npos) << shown;
+}
+
+/// Half of what came was refused, and nobody said so.
+TEST_F(Diagnosis, SecondLidarOnThePortIsNamedWithTheConfigurationOfBoth) {
+  Child daemon(undisturbed(locusd(config())));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+  ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+  const std::jthread second([](const std::stop_token& stop) {
+    const UdpSender lidar(INADDR_LOOPBACK + 1);
+    const std::vector<std::byte> packet(velodyne::kDataPacketBytes);
+    while (!stop.stop_requested()) {
+      lidar.send(2368, packet);
+      std::this_thread::sleep_for(milliseconds{5});
+    }
+  });
+  EXPECT_TRUE(daemon.wait_for_line("lidar front: others send to its port 2368, too: the packets of 127.0.0.1 are read",
+                                   seconds{8}))
+      << testing::PrintToString(daemon.lines());
+  EXPECT_TRUE(status_comes([](const nlohmann::json& json) { return json["lidars"]["front"]["model"] == "VLP-16"; },
+                           seconds{1}));
+  const std::string problem = status()["lidars"]["front"]["problem"];
+  EXPECT_NE(problem.find("lidars: [{name: front, port: 2368, source_ip: 127.0.0.1}, "
+                         "{name: front_2, port: 2368, source_ip: 127.0.0.2}]"),
+            std::string::npos)
+      << problem;
 }
 
 TEST_F(Diagnosis, LidarOnAnotherPortIsToldByItsPositionPackets) {

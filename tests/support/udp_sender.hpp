@@ -17,7 +17,12 @@ namespace locus::test {
 /// Sends datagrams by the loopback interface.
 class UdpSender {
  public:
-  UdpSender() : socket_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+  /// `from_ip`: an address of this host, host byte order.
+  explicit UdpSender(std::uint32_t from_ip = INADDR_ANY) : socket_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_in from{};
+    from.sin_family = AF_INET;
+    from.sin_addr.s_addr = htonl(from_ip);
+    EXPECT_EQ(bind(socket_, reinterpret_cast<const sockaddr*>(&from), sizeof(from)), 0);
     in_addr loopback{htonl(INADDR_LOOPBACK)};
     setsockopt(socket_, IPPROTO_IP, IP_MULTICAST_IF, &loopback, sizeof(loopback));
   }

@@ -49,9 +49,9 @@ Expected<std::vector<path>, std::string> files_of(const path& folder) {
     return bag_files_in(folder);
   try {
     const YAML::Node bag = YAML::LoadFile(metadata.string())["rosbag2_bagfile_information"];
-    const auto storage = bag["storage_identifier"].as<std::string>("sqlite3");
+    const auto storage = bag["storage_identifier"].as<std::string>("");
     const auto compression = bag["compression_format"].as<std::string>("");
-    if (storage != "sqlite3")
+    if (!storage.empty() && storage != "sqlite3") // where it is not named, the files themselves tell
       return fmt::format("{}: storage {} is not read; {}", folder.string(), storage, kConvert);
     if (!compression.empty())
       return fmt::format("{}: compressed with {}, which is not read; {}", folder.string(), compression, kConvert);
@@ -164,7 +164,7 @@ std::optional<std::string> Ros2Bag::read_topics(File& file) {
   };
   const Statement topics = prepare(file, "SELECT id, name, type, serialization_format FROM topics ORDER BY id");
   while (sqlite3_step(topics.get()) == SQLITE_ROW) {
-    if (const std::string format = text_of(topics.get(), 3); format != "cdr")
+    if (const std::string format = text_of(topics.get(), 3); format != "cdr" && !format.empty()) // early rosbag2: empty
       return fmt::format("its messages are serialised as \"{}\", not cdr; {}", format.substr(0, 20), kConvert);
     file.topic_of[sqlite3_column_int64(topics.get(), 0)] =
         topic_index(text_of(topics.get(), 1), ros1_type(text_of(topics.get(), 2)));

@@ -2,6 +2,7 @@
 #include "locus_replay/bag_topics.hpp"
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <iterator>
 #include <numeric>
@@ -89,6 +90,23 @@ std::string all_of(const Topics& topics) {
   return lines.empty() ? "no topics" : fmt::format("{}", fmt::join(lines, ", "));
 }
 
+/// Which topics hold packets of lidars that are not decoded; empty without any.
+std::string other_makers(const Topics& topics) {
+  struct Package {
+    std::string_view name, maker;
+  };
+  constexpr std::array kPackages{Package{"pandar_msgs/", "Hesai"}, Package{"hesai_ros_driver/", "Hesai"},
+                                 Package{"ouster_ros/", "Ouster"}, Package{"ouster_sensor_msgs/", "Ouster"}};
+  std::vector<std::string> found;
+  for (const BagTopic& topic : topics) {
+    const auto package =
+        std::ranges::find_if(kPackages, [&](const Package& p) { return topic.type.starts_with(p.name); });
+    if (package != kPackages.end())
+      found.push_back(fmt::format("{} ({}) is of a lidar of {}", topic.name, topic.type, package->maker));
+  }
+  return fmt::format("{}", fmt::join(found, ", "));
+}
+
 std::vector<Index*> places_of(std::vector<Index>& places) {
   std::vector<Index*> all;
   all.reserve(places.size());
@@ -107,10 +125,15 @@ bool is_named(const SourceTopics& topics) {
 
 void deal_lidars(const Bag& bag, const std::string& bag_name, const Config& config, BagTopics& chosen) {
   Dealer dealer(bag.topics(), kVelodyneScanType);
-  if (dealer.left() == 0)
+  if (dealer.left() == 0) {
+    const std::string others = other_makers(bag.topics());
     throw Failure(ExitStatus::failed,
-                  fmt::format("{}: no {} in it, but {}; record the lidar's packets, mostly on /velodyne_packets",
-                              bag_name, kVelodyneScanType, all_of(bag.topics())));
+                  others.empty()
+                      ? fmt::format("{}: no {} in it, but {}; record the lidar's packets, mostly on /velodyne_packets",
+                                    bag_name, kVelodyneScanType, all_of(bag.topics()))
+                      : fmt::format("{}: {}; only Velodyne's packets ({}) are decoded, so record those of one",
+                                    bag_name, others, kVelodyneScanType));
+  }
   chosen.of_lidar.resize(config.lidars.size());
   for (const auto is_in : {&is_segment, &is_part}) {
     for (const std::size_t i : longest_name_first(config.lidars))

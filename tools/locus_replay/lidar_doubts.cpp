@@ -21,6 +21,12 @@ std::string rejections(const PacketCounters& counters) {
   return fmt::format("{}", fmt::join(reasons, ", "));
 }
 
+/// Of what model the packets say that they are, where it is unknown.
+std::string unknown_model(const LidarInput& lidar) {
+  const auto unknown = lidar.decoder().unknown_packets();
+  return unknown ? fmt::format(" ({})", velodyne::to_string(*unknown)) : "";
+}
+
 bool is_configured(const LidarRouter& lidars, std::uint16_t port) {
   return std::ranges::any_of(lidars.lidars(), [&](const LidarInput& lidar) { return lidar.listens_to(port); });
 }
@@ -55,13 +61,33 @@ std::string not_heard(const LidarInput& lidar, const Recording& recording, const
   if (options.source_ip)
     line += " from " + dotted(*options.source_ip);
   if (const std::string rejected = rejections(lidar.counters()); !rejected.empty())
-    return fmt::format("{}, rejected: {}; check its address and model", line, rejected);
+    return fmt::format("{}, rejected: {}{}; check its address and model", line, rejected, unknown_model(lidar));
   for (const auto& [port, traffic] : recording.traffic()) {
     if (traffic.data_packet_sized > 0 && !is_configured(lidars, port))
       return fmt::format("{}; {} packets went to port {}: if they are its own, use --set lidars.{}.port={}", line,
                          traffic.data_packet_sized, port, options.name, port);
   }
   return line + "; check its port and address, or take it out of the configuration";
+}
+
+/// Whose packets these are, where most that could be a lidar's look like another maker's.
+std::string other_makers(const std::map<std::uint16_t, PortTraffic>& traffic) {
+  for (const OtherMaker maker : {OtherMaker::hesai, OtherMaker::ouster}) {
+    const auto packets_of = [&](const auto& entry) {
+      return entry.second.of_other_maker[static_cast<std::size_t>(maker)];
+    };
+    const auto& [port, busiest] = *std::ranges::max_element(traffic, {}, packets_of);
+    std::uint64_t packets = 0, velodyne = 0;
+    for (const auto& entry : traffic) {
+      packets += packets_of(entry);
+      velodyne += entry.second.data_packet_sized;
+    }
+    if (packets > velodyne)
+      return fmt::format("{} packets look like those of a lidar of {} (most go to port {}, the last of them with {} "
+                         "bytes); only Velodyne's are decoded, so record one of those",
+                         packets, to_string(maker), port, busiest.bytes);
+  }
+  return "";
 }
 
 std::string without_datagrams(const DatagramSource& source) {
@@ -77,6 +103,8 @@ std::string why_no_data(const Recording& recording, const LidarRouter& lidars) {
   const std::map<std::uint16_t, PortTraffic>& traffic = recording.traffic();
   if (traffic.empty())
     return without_datagrams(recording.source());
+  if (const std::string maker = other_makers(traffic); !maker.empty())
+    return maker;
   const auto& [port, busiest] = *std::ranges::max_element(
       traffic, {}, [](const auto& entry) { return std::pair(entry.second.data_packet_sized, entry.second.datagrams); });
   const LidarOptions& first = lidars.lidars().front().options();
@@ -100,8 +128,8 @@ std::string why_no_data(const Recording& recording, const LidarRouter& lidars) {
   if (const auto model = other_model(lidars.lidars().front()))
     return fmt::format("{} packets to port {}, those of a {}, configured {}; use --set lidars.0.model=auto",
                        busiest.data_packet_sized, port, to_string(*model), to_string(*first.model));
-  return fmt::format("{} packets to port {}, rejected: {}; is it a Velodyne, and lidars.0.model the right one?",
-                     busiest.data_packet_sized, port, rejections(total));
+  return fmt::format("{} packets to port {}, rejected: {}{}; is it a Velodyne, and lidars.0.model the right one?",
+                     busiest.data_packet_sized, port, rejections(total), unknown_model(lidar));
 }
 
 std::vector<std::string> lidar_warnings(const Recording& recording, const LidarRouter& lidars,
@@ -114,6 +142,11 @@ std::vector<std::string> lidar_warnings(const Recording& recording, const LidarR
       warnings.push_back(fmt::format("lidar {0}: configured as {1}, but its packets are those of a {2}, and read as a "
                                      "{1}'s they make a wrong world; use --set lidars.{0}.model=auto",
                                      lidar.options().name, to_string(*lidar.options().model), to_string(*model)));
+    const auto report = daemon::IngestReport::Lidar::of(lidar);
+    if (auto warning = report.packets.data > 0 ? daemon::unknown_model(lidar.options(), report) : std::nullopt)
+      warnings.push_back(std::move(*warning));
+    if (auto warning = daemon::shared_port(lidar.options(), report))
+      warnings.push_back(std::move(*warning));
     if (auto warning = lidar.decoder().model()
                            ? daemon::short_sweep(sweeps, lidar.options().name, lidar.decoder().rotation_rate_rpm())
                            : std::nullopt)

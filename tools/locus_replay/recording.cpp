@@ -109,6 +109,10 @@ Input Recording::next(Duration) {
 const Datagram* Recording::read() {
   while (!capture_is_over_) {
     const Datagram* datagram = head_ != nullptr ? std::exchange(head_, nullptr) : source_->next();
+    if (datagram != nullptr) {
+      backwards_ += read_++ > 0 && datagram->receive_stamp < latest_read_ ? 1U : 0U;
+      latest_read_ = datagram->receive_stamp;
+    }
     capture_is_over_ = datagram == nullptr || datagram->receive_stamp >= end_;
     if (!capture_is_over_ && datagram->receive_stamp >= begin_)
       return datagram;
@@ -150,10 +154,21 @@ void Recording::note(const Datagram& datagram) {
   ++traffic.datagrams;
   traffic.data_packet_sized += datagram.payload.size() == velodyne::kDataPacketBytes ? 1U : 0U;
   traffic.source_ip = datagram.source_ip;
+  traffic.bytes = datagram.payload.size();
+  if (const std::optional<OtherMaker> maker = other_maker(datagram))
+    ++traffic.of_other_maker[static_cast<std::size_t>(*maker)];
   if (play_for_)
     progress_.store(to_seconds(now - begin_) / to_seconds(*play_for_), std::memory_order_relaxed);
   else
     progress_.store(source_->progress(), std::memory_order_relaxed);
+}
+
+std::optional<std::string> Recording::runs_backwards() const {
+  if (2 * backwards_ <= read_)
+    return std::nullopt;
+  return fmt::format("{} of its {} datagrams are older than the one before them: it runs backwards in time; put it in "
+                     "order with: reordercap IN OUT (of Debian's wireshark-common), and replay OUT",
+                     backwards_, read_);
 }
 
 std::vector<std::string> Recording::warnings() const {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -15,6 +16,7 @@
 #include "drivers/datagram_source.hpp"
 #include "drivers/fault_injection.hpp"
 #include "drivers/lidar_input.hpp"
+#include "drivers/other_maker.hpp"
 #include "locus_replay/motion_recordings.hpp"
 
 namespace locus::tools {
@@ -34,7 +36,9 @@ void check_faults(const std::vector<Fault>& faults, const Config& config);
 struct PortTraffic {
   std::uint64_t datagrams = 0;
   std::uint64_t data_packet_sized = 0;
-  std::uint32_t source_ip = 0; ///< of the latest
+  std::array<std::uint64_t, kOtherMakers> of_other_maker{}; ///< by what they look like
+  std::size_t bytes = 0;                                    ///< of the latest
+  std::uint32_t source_ip = 0;                              ///< of the latest
 };
 
 /// A recording as it once came in: datagrams and motion samples in the order of their arrival, faults injected.
@@ -60,6 +64,9 @@ class Recording : public daemon::InputSource {
   /// From the first to the last datagram played.
   [[nodiscard]] Duration duration() const { return last_ - first_; }
   [[nodiscard]] const std::map<std::uint16_t, PortTraffic>& traffic() const { return traffic_; }
+  /// That more datagrams than not are older than the one before them in the file, with what helps; nothing where they
+  /// are in order, but for some that were overtaken on their way.
+  [[nodiscard]] std::optional<std::string> runs_backwards() const;
   /// What is wrong with the capture and with the motion played along with it, a line for the user each.
   [[nodiscard]] std::vector<std::string> warnings() const;
 
@@ -99,6 +106,8 @@ class Recording : public daemon::InputSource {
   OwnedDatagram given_out_;
   std::optional<Pending> pending_;
 
+  std::uint64_t read_ = 0, backwards_ = 0; ///< datagrams of the file, and those older than the one before
+  Stamp latest_read_;
   bool started_ = false;
   Stamp first_, last_;
   std::map<std::uint16_t, PortTraffic> traffic_; ///< by destination port

@@ -7,6 +7,7 @@
 #include <exception>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -97,13 +98,54 @@ void check_inputs_outlive_the_run(const Arguments& arguments) {
   }
 }
 
+/// What of a folder that is no recording itself, or of its folders, could be replayed.
+std::vector<std::string> recordings_in(const std::filesystem::path& where) {
+  constexpr int kDepth = 2; // KITTI: a day, and the drives of a day
+  std::vector<std::string> found;
+  std::error_code ignored;
+  using std::filesystem::directory_options;
+  std::filesystem::recursive_directory_iterator entry{where, directory_options::skip_permission_denied, ignored};
+  for (const std::filesystem::recursive_directory_iterator end; !ignored && entry != end; entry.increment(ignored)) {
+    const bool is_folder = entry->is_directory(ignored);
+    const bool is_recording = is_folder && (is_all_in_one(entry->path()) || CaptureFolder::find(entry->path()));
+    if (is_recording)
+      found.push_back(entry->path().string());
+    if (is_recording || entry.depth() + 1 >= kDepth)
+      entry.disable_recursion_pending();
+  }
+  std::ranges::sort(found);
+  return found;
+}
+
+/// A pipe cannot be read twice, and which format it has and when it begins is found out first.
+void check_is_file_or_folder(const std::filesystem::path& capture) {
+  std::error_code ignored;
+  if (capture == "-" || std::filesystem::is_fifo(capture, ignored) ||
+      std::filesystem::is_character_file(capture, ignored))
+    throw Failure(
+        ExitStatus::wrong_usage,
+        fmt::format("{}: a recording is read from a file, not from a pipe; write it to one first, with: cat > "
+                    "lidar.pcap, and name that",
+                    capture.string()));
+}
+
 /// The files of a capture folder; a bag or a drive of KITTI has all in one.
 CaptureFolder find_files(const std::filesystem::path& capture) {
+  check_is_file_or_folder(capture);
   Expected<CaptureFolder, std::string> folder = CaptureFolder::find(capture);
   if (!folder && is_all_in_one(capture)) {
     CaptureFolder all;
     all.lidar = {capture};
     return all;
+  }
+  if (const auto inside = folder ? std::vector<std::string>{} : recordings_in(capture); !inside.empty()) {
+    constexpr std::size_t kNamed = 3;
+    const std::size_t named = std::min(kNamed, inside.size());
+    throw Failure(ExitStatus::failed,
+                  fmt::format("{}: holds recordings, but is none itself; name {}: {}{}", capture.string(),
+                              inside.size() == 1 ? "the one in it" : "one of them",
+                              fmt::join(inside.begin(), inside.begin() + static_cast<std::ptrdiff_t>(named), ", "),
+                              inside.size() > named ? fmt::format(" and {} more", inside.size() - named) : ""));
   }
   return value_or_fail(std::move(folder), ExitStatus::failed);
 }

@@ -58,8 +58,9 @@ std::vector<std::string> source_verdicts(const Config& config, const MotionSourc
       lines.push_back(fmt::format("motion source {} {}", name, verdict));
     else if (is_doubted)
       lines.push_back(
-          fmt::format("motion source {} is set aside, for it turns otherwise than lidar sees the robot turn, "
-                      "in a drive too short to say why; look at its unit (rad/s) and T_base_source",
+          fmt::format("motion source {} and lidar disagreed on how the robot turns, and it was not yet used again at "
+                      "the end (possible causes: T_base_source, the unit (rad/s) or the stamps of the gyro, or lidar "
+                      "that follows what moves around the robot)",
                       name));
   }
   return lines;
@@ -94,8 +95,11 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
       recording_.duration(),       spent,   accuracy};
   const nlohmann::ordered_json figures = write_summary(run);
   warn(recording_.warnings());
-  if (!has_data) {
+  const std::optional<std::string> backwards = recording_.runs_backwards();
+  if (!has_data || backwards) {
     remove_results(arguments_.output, false);
+    if (backwards)
+      throw Failure(ExitStatus::failed, fmt::format("{}: {}", arguments_.capture.string(), *backwards));
     throw Failure(ExitStatus::failed, fmt::format("{}: no valid data packet: {}", arguments_.capture.string(),
                                                   why_no_data(recording_, ingest.lidars())));
   }

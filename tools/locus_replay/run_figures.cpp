@@ -25,6 +25,14 @@ ordered_json packets(const LidarRouter& lidars) {
   return packets;
 }
 
+/// As what the packets of each lidar were read.
+ordered_json lidars(const LidarRouter& router) {
+  ordered_json lidars;
+  for (const LidarInput& lidar : router.lidars())
+    lidars[lidar.options().name] = daemon::model_json(daemon::IngestReport::Lidar::of(lidar));
+  return lidars;
+}
+
 ordered_json stages(const FinishedRun& run) {
   daemon::StageTimes totals;
   for (std::size_t i = 0; i < kStages; ++i)
@@ -43,6 +51,13 @@ ordered_json sources(const FinishedRun& run) {
   return sources;
 }
 
+/// Who is right when a source and lidar contradict each other is not known.
+std::string_view reason_of(const HealthEvent& event) {
+  if (event.reason == HealthReason::disagreement)
+    return "disagrees with lidar";
+  return event.verdict.starts_with("and lidar disagree") ? "disagrees with lidar on turns" : to_string(event.reason);
+}
+
 /// When a source was lost and why, and when it came back.
 std::string readable_health(const FinishedRun& run, std::size_t source) {
   constexpr std::size_t kTold = 4; ///< a source that flaps is not worth a page
@@ -53,7 +68,7 @@ std::string readable_health(const FinishedRun& run, std::size_t source) {
       continue;
     const double after_s = to_seconds(event.stamp - run.capture_start);
     text += event.healthy ? fmt::format(", back at {:.2f} s", after_s)
-                          : fmt::format(", lost at {:.2f} s ({})", after_s, to_string(event.reason));
+                          : fmt::format(", lost at {:.2f} s ({})", after_s, reason_of(event));
   }
   if (told > kTold)
     text += fmt::format(" and {} more changes", told - kTold);
@@ -132,6 +147,7 @@ ordered_json summary(const FinishedRun& run) {
                     {"cpu_s", rounded(to_seconds(run.spent.cpu))},
                     {"peak_rss_mb", rounded(daemon::peak_rss_mb())},
                     {"packets", packets(run.ingest.lidars())},
+                    {"lidars", lidars(run.ingest.lidars())},
                     {"sweeps", to_json(run.sweeps)},
                     {"process_ms", to_json(run.figures.process_ms())},
                     {"process_cpu_ms", to_json(run.figures.process_cpu_ms())},
@@ -151,6 +167,12 @@ std::string readable(const FinishedRun& run) {
   const Eigen::Vector3d& end_m = run.figures.last_T_odom_base().translation;
   std::string text = fmt::format("recording  {:.1f} s; packets: {} data, {} position, {} lost, {} rejected\n",
                                  to_seconds(run.duration), packets.data, packets.position, packets.lost, rejected);
+  for (const LidarInput& lidar : run.ingest.lidars().lidars()) {
+    const velodyne::Decoder& decoder = lidar.decoder();
+    if (decoder.model())
+      text += fmt::format("{:10} {}, {} returns, {:.0f} rpm\n", lidar.options().name, to_string(*decoder.model()),
+                          to_string(*decoder.return_mode()), decoder.rotation_rate_rpm());
+  }
   text += fmt::format("sweeps     {} seen: {} processed, {} dropped, {} failed\n", run.sweeps.seen,
                       run.sweeps.processed, run.sweeps.dropped, run.sweeps.failed);
   for (std::size_t i = 0; i < run.config.odometry.motion_sources.size(); ++i) {

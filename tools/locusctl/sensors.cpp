@@ -129,11 +129,13 @@ std::string find_sensors(Duration duration) {
   for (Duration now{}; (now = daemon::read_clock(CLOCK_MONOTONIC)) < end;)
     wire.listen(end - now, take);
 
-  std::string text, yaml;
+  std::string text, refused, yaml;
   std::map<std::uint16_t, int> on_port;
   for (const auto& [key, heard] : lidars)
     on_port[key.second] += heard->data > 0 ? 1 : 0;
   for (const auto& [key, heard] : lidars) {
+    if (const auto unknown = heard->decoder.unknown_packets())
+      refused += fmt::format("{:<16}{:<7}not read: {}\n", dotted(key.first), key.second, to_string(*unknown));
     if (heard->data == 0)
       continue;
     const auto position = positions.find(key.first);
@@ -145,9 +147,9 @@ std::string find_sensors(Duration duration) {
   }
   if (text.empty())
     throw Failure(ExitStatus::failed,
-                  fmt::format("no lidar was heard within {:.0f} s; look at power, cable and the address it sends to",
-                              to_seconds(duration)));
-  return text + "\nlidars:\n" + yaml;
+                  fmt::format("{}no lidar was heard within {:.0f} s; look at power, cable and the address it sends to",
+                              refused, to_seconds(duration)));
+  return text + refused + "\nlidars:\n" + yaml;
 }
 
 } // namespace locus::tools

@@ -81,6 +81,8 @@ std::string lidars_text(const Json& status) {
       text += fmt::format(
           "{:<9}refused: {}{}\n", "", refused,
           lidar["refused_ip"].is_string() ? "; the last sender: " + lidar["refused_ip"].get<std::string>() : "");
+    if (const std::string problem = lidar["problem"]; !problem.empty())
+      text += fmt::format("{:<9}{}\n", "", problem);
   }
   return text;
 }

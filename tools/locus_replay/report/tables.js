@@ -88,6 +88,7 @@ export function packets(section) {
   const row = (name, write) => [name, ...columns.map(([, counters]) => write(counters))];
   const rejections = Object.keys(total.rejected).filter((reason) => total.rejected[reason] > 0);
   table(drawing, ["", ...columns.map(([name]) => name)], [
+    ["model", ...columns.map(([lidar]) => summary.lidars[lidar]?.model ?? "")],
     ...["received", "data", "position"].map((key) => row(key, (counters) => count(counters[key]))),
     ...["lost", "reordered", "clock_steps"].map((key) => row(words(key), (counters) => mishap(counters[key]))),
     ...rejections.map((reason) => row(`rejected: ${words(reason)}`, (counters) => mishap(counters.rejected[reason]))),

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/fast_odometry.hpp"
+
+#include <gtest/gtest.h>
+
+namespace locus::daemon {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr double kTurnRate_radps = 0.7;
+constexpr double kSpeed_mps = 1.3;
+
+/// Forward and to the left, all the while.
+Vector6 turning() {
+  Vector6 twist = Vector6::Zero();
+  twist[0] = kSpeed_mps;
+  twist[5] = kTurnRate_radps;
+  return twist;
+}
+
+Vector6 straight_on() {
+  Vector6 twist = Vector6::Zero();
+  twist[0] = kSpeed_mps;
+  return twist;
+}
+
+Stamp at(Duration since_start) { return stamp_from_ns(0) + since_start; }
+
+/// A gyro every 5 ms and, where asked for, wheels every 20 ms; both tell what a constant twist does from time 0 on.
+class ArcDrive {
+ public:
+  ArcDrive(const Vector6& twist_base, Duration gyro_until, Duration wheels_until) : twist_base_(twist_base) {
+    for (Duration t{}; t <= std::max(gyro_until, wheels_until); t += milliseconds{5}) {
+      const double t_s = to_seconds(t);
+      if (t <= wheels_until && t % milliseconds{20} == Duration{})
+        sources_.add(0, OdometrySample{at(t), at(t), se3_exp(t_s * twist_base), 1.0});
+      if (t <= gyro_until) // never twice the same: it would count as frozen
+        sources_.add(1, ImuSample{at(t), at(t), twist_base.tail<3>(), {1e-6 * t_s, 0, 9.81}, {}});
+    }
+  }
+
+  /// Facing along +y of odom, at 1 s, on the true path but for where it started.
+  [[nodiscard]] FastSample estimate() const {
+    FastSample sample;
+    sample.stamp = at(milliseconds{1000});
+    sample.T_odom_base = {so3_exp({0, 0, 90 * kRadPerDeg}), {2, 3, 0.5}};
+    sample.twist_base = twist_base_;
+    return sample;
+  }
+
+  [[nodiscard]] FastSample carried(const FastSample& estimate, Duration now) const {
+    FastOdometry fast;
+    fast.take(estimate);
+    const std::optional<FastSample> sample = fast.carry(sources_, 1, at(now));
+    EXPECT_TRUE(sample);
+    return sample.value_or(FastSample{});
+  }
+
+ private:
+  Vector6 twist_base_;
+  MotionSources sources_{{{"wheels", SourceKind::odometry, {}}, {"imu", SourceKind::imu, {}}}, Fusion::combined};
+};
+
+/// The constant twist from the estimate on.
+void expect_on_arc(const ArcDrive& drive, Duration now) {
+  const FastSample from = drive.estimate();
+  const FastSample sample = drive.carried(from, now);
+  const double elapsed_s = to_seconds(at(now) - from.stamp);
+  const Pose expected = from.T_odom_base * se3_exp(elapsed_s * from.twist_base);
+  EXPECT_EQ(sample.stamp, at(now));
+  EXPECT_LT((sample.T_odom_base.translation - expected.translation).norm(), 1e-9);
+  EXPECT_LT((sample.T_odom_base.R() - expected.R()).norm(), 1e-9);
+  EXPECT_LT((sample.twist_base - from.twist_base).norm(), 1e-9);
+}
+
+/// It went straight on while it turned: 4.5 mm beside this arc.
+TEST(FastOdometry, GyroAloneCarriesTheSpeedOfTheEstimateRoundTheArc) {
+  expect_on_arc(ArcDrive(turning(), milliseconds{1100}, milliseconds{-1}), milliseconds{1100});
+}
+
+/// The track of the wheels goes straight on from their last sample, here 15 ms before that of the gyro.
+TEST(FastOdometry, BeyondTheLastSampleOfTheWheelsTheArcGoesOn) {
+  expect_on_arc(ArcDrive(turning(), milliseconds{1095}, milliseconds{1080}), milliseconds{1095});
+}
+
+TEST(FastOdometry, WheelsOlderThanTheEstimateTellTheSpeed) {
+  expect_on_arc(ArcDrive(turning(), milliseconds{1015}, milliseconds{980}), milliseconds{1015});
+}
+
+TEST(FastOdometry, UncertainSpeedGrowsAlongTheHeading) {
+  const ArcDrive drive(straight_on(), milliseconds{1100}, milliseconds{-1});
+  FastSample from = drive.estimate();
+  from.twist_covariance(0, 0) = 0.04; // forward
+  from.twist_covariance(1, 1) = 0.01; // to the left
+  const Matrix6 covariance = drive.carried(from, milliseconds{1100}).pose_covariance;
+  EXPECT_NEAR(covariance(1, 1), 0.01 * 0.04, 1e-12) << "it heads along +y";
+  EXPECT_NEAR(covariance(0, 0), 0.01 * 0.01, 1e-12);
+}
+
+TEST(FastOdometry, UncertainHeadingOfTheEstimateShiftsWhatLiesAhead) {
+  const ArcDrive drive(straight_on(), milliseconds{1100}, milliseconds{-1});
+  FastSample from = drive.estimate();
+  from.pose_covariance(5, 5) = 1e-4;
+  const Matrix6 covariance = drive.carried(from, milliseconds{1100}).pose_covariance;
+  const double moved_m = 0.1 * kSpeed_mps; // along +y: a turn to the left takes it towards -x
+  EXPECT_NEAR(covariance(0, 0), moved_m * moved_m * 1e-4, 1e-12);
+  EXPECT_NEAR(covariance(0, 5), -moved_m * 1e-4, 1e-12);
+  EXPECT_NEAR(covariance(1, 1), 0.0, 1e-12);
+  EXPECT_NEAR(covariance(5, 5), 1e-4, 1e-12);
+}
+
+/// Each error of the twist by itself, against what the same error does to the exact motion.
+TEST(FastOdometry, UncertainTwistMovesThePoseAsAnotherTwistWould) {
+  constexpr double kError = 1e-6;
+  constexpr double kElapsed_s = 0.1;
+  const ArcDrive drive(turning(), milliseconds{1100}, milliseconds{-1});
+  FastSample from = drive.estimate();
+  const Pose T_odom_now = from.T_odom_base * se3_exp(kElapsed_s * turning());
+  for (int axis = 0; axis < 6; ++axis) {
+    Vector6 other = turning();
+    other[axis] += kError;
+    const Vector6 effect = difference(from.T_odom_base * se3_exp(kElapsed_s * other), T_odom_now) / kError;
+    from.twist_covariance.setZero();
+    from.twist_covariance(axis, axis) = 1;
+    const Matrix6 covariance = drive.carried(from, milliseconds{1100}).pose_covariance;
+    EXPECT_LT((covariance - effect * effect.transpose()).norm(), 1e-3 * covariance.norm()) << axis;
+  }
+}
+
+TEST(FastOdometry, NothingBeforeTheFirstEstimateAndForOtherSources) {
+  const MotionSources none({{"imu", SourceKind::imu, {}}}, Fusion::combined);
+  FastOdometry fast;
+  EXPECT_FALSE(fast.carry(none, 0, at(milliseconds{1}))) << "no estimate";
+  fast.take(FastSample{});
+  EXPECT_FALSE(fast.carry(none, 0, at(milliseconds{1}))) << "no sample";
+}
+
+} // namespace
+} // namespace locus::daemon
