@@ -30,7 +30,7 @@ expect "flat-ground reload reset save-map sensors status" locusctl ""
 expect "save-map" locusctl --instance front sa
 expect "--help --instance --json --socket --watch" locusctl status --
 expect "auto off on" locusctl flat-ground ""
-expect "corridor field stairs tunnel urban" locus-sim --world ""
+expect "corridor field road stairs tunnel urban" locus-sim --world ""
 expect "tunnel" locus-sim --seed 3 --world t
 cd "$(mktemp -d)" && touch drive.pcap
 expect "drive.pcap" locus-replay -o out dri

@@ -20,7 +20,7 @@ constexpr double kOffWalls_m = 0.3, kApart_m = 0.6; // that people keep from wal
 constexpr double kLost_m = 7;                       // who is farther away is left behind
 constexpr double kStride_m = 1.4, kSwing_rad = 0.45;
 
-Eigen::Vector2d unit(double bearing_rad) { return {std::cos(bearing_rad), std::sin(bearing_rad)}; }
+Eigen::Vector2d towards(double bearing_rad) { return {std::cos(bearing_rad), std::sin(bearing_rad)}; }
 
 Eigen::Vector2d at_most(const Eigen::Vector2d& v, double norm) {
   return v.norm() > norm ? Eigen::Vector2d(norm / v.norm() * v) : v;
@@ -78,7 +78,7 @@ class Person {
     const double reach_rad = places_.empty() ? std::numbers::pi : strolls_ ? 2.0 : 0.4;
     for (int i = 0; i < kTries && best_m < clear_m_ + kOffWalls_m; ++i) {
       const double bearing = bearing_rad_ + dice_.between(-reach_rad, reach_rad) * (1 + 0.5 * i);
-      if (const double room_m = free_m(step, unit(bearing), clear_m_ + kFarthest_m); room_m > best_m) {
+      if (const double room_m = free_m(step, towards(bearing), clear_m_ + kFarthest_m); room_m > best_m) {
         best_m = room_m;
         goal_rad_ = bearing;
       }
@@ -88,10 +88,10 @@ class Person {
   }
 
   Eigen::Vector2d wanted_place(std::size_t step) {
-    const double room_m = free_m(step, unit(bearing_rad_), distance_m_ + kOffWalls_m) - kOffWalls_m;
+    const double room_m = free_m(step, towards(bearing_rad_), distance_m_ + kOffWalls_m) - kOffWalls_m;
     if (room_m < clear_m_)
       choose_bearing(step);
-    return way_.at(step) + std::clamp(room_m, clear_m_, distance_m_) * unit(bearing_rad_);
+    return way_.at(step) + std::clamp(room_m, clear_m_, distance_m_) * towards(bearing_rad_);
   }
 
   Eigen::Vector2d wanted_mps(std::size_t step, const std::vector<Eigen::Vector2d>& others_m) {
@@ -131,7 +131,7 @@ class Person {
   void keep_clear(std::size_t step) {
     const Eigen::Vector2d from_robot = at_m_ - way_.at(step);
     if (const double gap_m = from_robot.norm(); gap_m < clear_m_)
-      at_m_ = way_.at(step) + clear_m_ * (gap_m > 1e-6 ? Eigen::Vector2d(from_robot / gap_m) : unit(bearing_rad_));
+      at_m_ = way_.at(step) + clear_m_ * (gap_m > 1e-6 ? Eigen::Vector2d(from_robot / gap_m) : towards(bearing_rad_));
   }
 
   [[nodiscard]] bool is_left_behind(std::size_t step) const {
@@ -178,7 +178,7 @@ class Person {
     }
     stride_rad_ += 2 * std::numbers::pi * std::max(speed_mps / kStride_m, 0.15) * kStep_s;
     const double swing = kSwing_rad * std::clamp(speed_mps / kWalking_mps, 0.1, 1.0) * std::sin(stride_rad_);
-    const Eigen::Vector2d shift = 0.04 * std::sin(0.31 * stride_rad_) * unit(yaw_rad_ + std::numbers::pi / 2);
+    const Eigen::Vector2d shift = 0.04 * std::sin(0.31 * stride_rad_) * towards(yaw_rad_ + std::numbers::pi / 2);
     Eigen::Vector2d stands = at_m_ + (speed_mps > kWalks_mps ? Eigen::Vector2d::Zero().eval() : shift);
     const Eigen::Vector2d from_robot = stands - way_.at(step);
     if (from_robot.norm() < clear_m_)

@@ -10,7 +10,7 @@
 namespace locus::sim {
 namespace {
 
-constexpr double kStep_s = 0.1;
+constexpr double kTenth_s = 0.1;
 constexpr double kFast_mps = 3;      // a robot that a van drives beside
 constexpr double kSample_m = 0.5;    // of the way
 constexpr double kAlongside_m = 1.5; // ahead of the robot's middle, or behind it
@@ -120,7 +120,7 @@ class Driver {
   [[nodiscard]] std::vector<double> along_m(std::size_t start, std::size_t steps) const {
     constexpr std::size_t kPatience = 300;
     const bool stops = as_.leave_mps == 0;
-    const double robot_mps = (lane_.along_m(start + 5) - lane_.along_m(start)) / (5 * kStep_s);
+    const double robot_mps = (lane_.along_m(start + 5) - lane_.along_m(start)) / (5 * kTenth_s);
     double at_m = lane_.along_m(start) - as_.behind_m, speed_mps = stops ? 0 : robot_mps;
     if (at_m < 0)
       return {};
@@ -128,16 +128,16 @@ class Driver {
     std::size_t beside = 0;
     for (std::size_t i = 0; i < 2 * kPatience + steps && start + i < way_.steps(); ++i) {
       const double gap_m = lane_.along_m(start + i) - at_m;
-      const double its_mps = (lane_.along_m(start + i + 3) - lane_.along_m(start + i)) / (3 * kStep_s);
+      const double its_mps = (lane_.along_m(start + i + 3) - lane_.along_m(start + i)) / (3 * kTenth_s);
       beside += beside > 0 || std::abs(gap_m) < kAlongside_m;
       const bool leaves = beside > steps;
       double wanted_mps = its_mps + std::clamp(0.6 * gap_m, -as_.catch_up_mps, as_.catch_up_mps);
       if (leaves)
         wanted_mps = stops ? 0 : its_mps + as_.leave_mps;
-      const double change = as_.acceleration_mps2 * kStep_s;
+      const double change = as_.acceleration_mps2 * kTenth_s;
       speed_mps = std::max(0.0, speed_mps + std::clamp(wanted_mps - speed_mps, -change, change));
       all.push_back(at_m);
-      at_m += kStep_s * speed_mps;
+      at_m += kTenth_s * speed_mps;
       if (at_m > lane_.length_m() || (beside == 0 && i > kPatience))
         return {};
       if (leaves && (stops ? speed_mps == 0 : -gap_m > as_.behind_m))
@@ -241,7 +241,7 @@ std::optional<Job> job_in_minute(const Driver& driver, const Manner& as, std::si
       const double aside_m = (dice.chance(0.5) ? 1 : -1) * dice.between(as.nearest_m, as.farthest_m);
       if (start < free_from)
         continue;
-      if (auto job = driver.job(start, static_cast<std::size_t>(wanted_s / kStep_s), aside_m, free_from))
+      if (auto job = driver.job(start, static_cast<std::size_t>(wanted_s / kTenth_s), aside_m, free_from))
         return job;
     }
   }

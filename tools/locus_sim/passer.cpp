@@ -17,7 +17,7 @@ bool is_one_way(const Place& from, const Place& to) {
   return (to.ground_m - from.ground_m).squaredNorm() < kFarthestStep_m * kFarthestStep_m;
 }
 
-double radius_m(Passer::Kind kind) {
+double reach_of(Passer::Kind kind) {
   switch (kind) {
   case Passer::Kind::person:
     return 0.75; // a leg put forward
@@ -94,7 +94,7 @@ Place Track::at(Duration since) const {
 
 Passer::Passer(Kind kind, std::shared_ptr<const Track> track, Stamp begin)
     : kind_(kind), track_(std::move(track)), begin_(begin), parts_(rigid_parts(kind)),
-      radius_m_(radius_m(kind) + track_->reach_m()) {}
+      radius_m_(reach_of(kind) + track_->reach_m()) {}
 
 std::vector<Surface> Passer::parts(const Place& place) const {
   return kind_ == Kind::person ? walking_person(static_cast<double>(place.swing_rad)) : parts_;
