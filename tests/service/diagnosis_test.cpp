@@ -68,7 +68,7 @@ TEST_F(Diagnosis, SecondLidarOnThePortIsNamedWithTheConfigurationOfBoth) {
   EXPECT_TRUE(daemon.wait_for_line("lidar front: others send to its port 2368, too: the packets of 127.0.0.1 are read",
                                    seconds{8}))
       << testing::PrintToString(daemon.lines());
-  EXPECT_TRUE(status_comes([](const nlohmann::json& json) { return json["lidars"]["front"]["model"] == "VLP-16"; },
+  EXPECT_TRUE(status_comes([](const nlohmann::json& status) { return status["lidars"]["front"]["model"] == "VLP-16"; },
                            seconds{1}));
   const std::string problem = status()["lidars"]["front"]["problem"];
   EXPECT_NE(problem.find("lidars: [{name: front, port: 2368, source_ip: 127.0.0.1}, "
