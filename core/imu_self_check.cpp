@@ -34,6 +34,10 @@ bool is_about(double value, double expected, double tolerance) {
 
 } // namespace
 
+ImuSelfCheck::ImuSelfCheck(const Pose& T_base_imu) : R_base_imu_(T_base_imu.rotation) {
+  static_cast<void>(words(Difference::any, 0, false)); // they take memory: not while packets come
+}
+
 std::optional<HealthReason> ImuSelfCheck::judge(const SourceReading& reading) {
   if (refused_)
     return HealthReason::self_check;

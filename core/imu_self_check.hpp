@@ -25,7 +25,7 @@ namespace locus {
 /// owner.
 class ImuSelfCheck : public HealthMetric {
  public:
-  explicit ImuSelfCheck(const Pose& T_base_imu) : R_base_imu_(T_base_imu.rotation) {}
+  explicit ImuSelfCheck(const Pose& T_base_imu);
 
   std::optional<HealthReason> judge(const SourceReading& reading) override;
   void accept(const SourceReading& reading) override;

@@ -17,7 +17,8 @@ constexpr int kSweeps = 100; // ten a second
 class HarshFigures : public testing::Test {
  protected:
   nlohmann::ordered_json figures(const std::function<double(double)>& error_m,
-                                 const std::function<bool(double)>& flagged, const std::string& log = "") {
+                                 const std::function<bool(double)>& flagged, const std::string& log = "",
+                                 double mounting_rad = 0) {
     std::ofstream truth{folder_ / "gt.tum"}, odometry{folder_ / "odometry.tum"}, csv{folder_ / "odometry.csv"};
     csv << "t_ns,state,source,iterations,inliers,36 covariances\n";
     for (int sweep = 0; sweep <= kSweeps; ++sweep) {
@@ -35,7 +36,7 @@ class HarshFigures : public testing::Test {
     std::ofstream{folder_ / "log"} << log;
     CaptureFolder capture;
     capture.ground_truth = folder_ / "gt.tum";
-    return harsh_figures(folder_.path(), capture, {{"sources", sources_}});
+    return harsh_figures(folder_.path(), capture, {{"sources", sources_}}, mounting_rad);
   }
 
   nlohmann::ordered_json sources_ = nlohmann::ordered_json::object();
@@ -61,6 +62,13 @@ TEST_F(HarshFigures, WhatWarnedBeforeItWasLostDoesNotCount) {
   EXPECT_NEAR(found["lost_after_s"].get<double>(), 6.0, 1e-6);
   EXPECT_NEAR(found["flagged_after_s"].get<double>(), 2.5, 1e-6);
   EXPECT_TRUE(figures(lost_at_6, [](double t_s) { return t_s < 5; })["flagged_after_s"].is_null());
+}
+
+/// At 1 m/s from 2 s on, 0.01 rad off the way after 4 s is 20 mm.
+TEST_F(HarshFigures, ALidarMountedAskewTurnsTheWay) {
+  const auto askew = [](double t_s) { return t_s < 3.95 ? 0.0 : 0.29 + 0.01 * (t_s - 2); };
+  EXPECT_NEAR(figures(askew, never)["lost_after_s"].get<double>(), 4.0, 1e-6);
+  EXPECT_TRUE(figures(askew, never, "", 0.01)["lost_after_s"].is_null());
 }
 
 TEST_F(HarshFigures, WhatWasSaidIsToldOnceAndWithoutItsNumbers) {

@@ -288,12 +288,8 @@ TEST(Mirrors, GlassIsAMirrorWhereAWallStoodAndShowsItselfStraightOn) {
   }
   EXPECT_GT(ghosts, 50);
   const double slanting = kRadPerDeg * 40;
-  EXPECT_LT(
-      scene.cast({{0, 0, 1}, {std::cos(slanting), -std::sin(slanting), 0}}, 100)
-          .value_or(
-              Hit{.point_m = {}, .range_m = 0, .cos_incidence = 0, .reflectivity = 0, .surface = nullptr, .normal = {}})
-          .reflectivity,
-      5); // the wall itself is nearly dark
+  const auto wall = scene.cast({{0, 0, 1}, {std::cos(slanting), -std::sin(slanting), 0}}, 100);
+  EXPECT_TRUE(!wall || wall->reflectivity < 5) << "the wall itself is nearly dark";
 }
 
 TEST(Mirrors, AsManyPanesAreGlassAsAsked) {

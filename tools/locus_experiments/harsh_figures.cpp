@@ -41,10 +41,16 @@ bool stands_at_first(std::span<const PosePair> pairs) {
 }
 
 /// When it was lost, and how long it took to say so.
-void add_loss(std::span<const PosePair> pairs, std::span<const OdometryRow> rows, ordered_json& figures) {
+void add_loss(std::span<const PosePair> pairs, std::span<const OdometryRow> rows, double mounting_rad,
+              ordered_json& figures) {
   const Pose T_odom_truth = pairs.front().T_odom_base * pairs.front().T_truth_base.inverse();
+  const Eigen::Vector3d* last_m = &pairs.front().T_truth_base.translation;
+  double way_m = 0;
   const auto lost = std::ranges::find_if(pairs, [&](const PosePair& pair) {
-    return !((pair.T_odom_base.translation - T_odom_truth * pair.T_truth_base.translation).norm() < kLost_m);
+    way_m += (pair.T_truth_base.translation - *last_m).norm();
+    last_m = &pair.T_truth_base.translation;
+    const double error_m = (pair.T_odom_base.translation - T_odom_truth * pair.T_truth_base.translation).norm();
+    return !(error_m < kLost_m + way_m * mounting_rad);
   });
   const auto flagged =
       std::find_if(lost, pairs.end(), [&](const PosePair& pair) { return rows[pair.estimate].flagged(); });
@@ -87,7 +93,7 @@ std::vector<std::string> said(const std::filesystem::path& log, const ordered_js
 } // namespace
 
 ordered_json harsh_figures(const std::filesystem::path& run_folder, const CaptureFolder& capture,
-                           const ordered_json& summary) {
+                           const ordered_json& summary, double mounting_rad) {
   const auto [estimates, rows] = read_odometry(run_folder);
   const std::vector<StampedPose> truth = read_poses(capture.ground_truth);
   const std::vector<PosePair> pairs = paired(estimates, truth);
@@ -96,7 +102,7 @@ ordered_json harsh_figures(const std::filesystem::path& run_folder, const Captur
         tools::ExitStatus::failed,
         fmt::format("{}: has no estimate within the time of the truth; run again", run_folder.string()));
   ordered_json figures{{"standing", stands_at_first(pairs)}, {"true_mps", largest_speed_mps(pairs)}};
-  add_loss(pairs, rows, figures);
+  add_loss(pairs, rows, mounting_rad, figures);
   figures["said"] = said(run_folder / "log", summary);
   return figures;
 }

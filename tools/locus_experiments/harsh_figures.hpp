@@ -9,7 +9,7 @@
 
 namespace locus::experiments {
 
-/// From here on an estimate is lost.
+/// From here on an estimate is lost, beside what a lidar that is mounted askew turns the way by.
 inline constexpr double kLost_m = 0.3;
 
 /// What the harsh table wants to know of a drive beyond its summary:
@@ -17,9 +17,11 @@ inline constexpr double kLost_m = 0.3;
 ///
 /// standing: the robot did not move in the first second of the drive. true_mps: the largest speed it truly had.
 /// lost_after_s: from the start to the first estimate that is farther than kLost_m from the truth, with the first poses
-/// aligned; null if there is none. flagged_after_s: from then to the first state that warns, degenerate or dead
-/// reckoning; null if none does. said: what the user was told, a line each, numbers left out. Throws tools::Failure.
+/// aligned; null if there is none. Lidars that are turned by `mounting_rad` against what the user believes see the base
+/// go so much beside where it goes: that share of the way is allowed on top. flagged_after_s: from then to the first
+/// state that warns, degenerate or dead reckoning; null if none does. said: what the user was told, a line each,
+/// numbers left out. Throws tools::Failure.
 nlohmann::ordered_json harsh_figures(const std::filesystem::path& run_folder, const CaptureFolder& capture,
-                                     const nlohmann::ordered_json& summary);
+                                     const nlohmann::ordered_json& summary, double mounting_rad);
 
 } // namespace locus::experiments

@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "core/pose.hpp"
 #include "locus_replay/failure.hpp"
-#include "locus_sim/imperfections.hpp"
 
 namespace locus::experiments {
 namespace {
@@ -64,9 +64,10 @@ const std::vector<Group>& groups() {
 }
 
 Imperfection alone(const Group& group) {
-  Imperfection imperfection{std::string(group.name), {"--realism", "clean"}};
+  Imperfection imperfection{std::string(group.name), {"--realism", "clean"}, {}};
   for (const std::string_view name : group.imperfections) {
     const auto& one = *std::ranges::find(sim::kImperfections, name, &sim::NamedImperfection::name);
+    imperfection.sizes.*one.size = one.harsh;
     imperfection.options.insert(imperfection.options.end(),
                                 {fmt::format("--{}", name), fmt::format("{:g}", one.harsh)});
   }
@@ -104,7 +105,7 @@ void add_runs(Plan& plan, const HarshCase& harsh_case, const std::string& course
       const int start_s = start * (duration_s - kHarshDrive_s) / (kHarshStarts - 1);
       run.options.insert(run.options.end(), {"--start", std::to_string(start_s), "--duration",
                                              std::to_string(std::min(kHarshDrive_s, duration_s - start_s))});
-      run.from_a_start = true;
+      run.mounting_rad = kRadPerDeg * harsh_case.mounting_deg;
       plan.runs.push_back(std::move(run));
     }
   }
@@ -127,8 +128,10 @@ std::string name_of(Sensors sensors) {
 const std::vector<Imperfection>& imperfections() {
   static const std::vector<Imperfection> all = [] {
     std::vector<Imperfection> made;
-    for (const std::string_view level : {"real", "harsh"})
-      made.push_back({std::string(level), {"--realism", std::string(level)}});
+    for (const sim::Realism realism : {sim::Realism::real, sim::Realism::harsh}) {
+      const std::string level{sim::kRealismNames[static_cast<std::size_t>(realism)]};
+      made.push_back({level, {"--realism", level}, sim::imperfections_of(realism)});
+    }
     std::ranges::transform(groups(), std::back_inserter(made), alone);
     return made;
   }();
@@ -156,7 +159,8 @@ std::vector<HarshCase> harsh_cases(const std::string& only) {
       Options simulation = drive.simulation;
       simulation.insert(simulation.end(), {"--halts", kLongestHalt_s});
       simulation.insert(simulation.end(), imperfection.options.begin(), imperfection.options.end());
-      cases.push_back({drive.name, imperfection.name, std::move(simulation), drive.odometry, drive.bare});
+      cases.push_back({drive.name, imperfection.name, std::move(simulation), drive.odometry,
+                       imperfection.sizes.mounting_deg, drive.bare});
     }
   }
   return cases;

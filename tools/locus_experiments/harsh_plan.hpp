@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "locus_experiments/plan.hpp"
+#include "locus_sim/imperfections.hpp"
 
 namespace locus::experiments {
 
@@ -24,6 +25,7 @@ std::string name_of(Sensors sensors);
 struct Imperfection {
   std::string name;
   std::vector<std::string> options; ///< of locus-sim
+  sim::Imperfections sizes;
 };
 const std::vector<Imperfection>& imperfections();
 
@@ -32,6 +34,7 @@ struct HarshCase {
   std::string course, imperfection;
   std::vector<std::string> simulation; ///< options of locus-sim, but for seed and duration
   std::vector<std::string> odometry;   ///< names of the robot's odometry sources
+  double mounting_deg = 0;             ///< by which its lidars are turned against what config.yaml says
   bool bare = false;                   ///< lidar tells nothing of one direction
 
   /// Without odometry sources all sensors are lidar and IMU.

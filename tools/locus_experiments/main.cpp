@@ -209,7 +209,7 @@ void Experiments::carry_out(const Run& run) {
                                {"configuration", run.configuration},
                                {refused ? "refused" : "failed", *problem}}
                      : measurement(run, folder, course);
-    if (run.from_a_start && !problem)
+    if (run.mounting_rad && !problem)
       keep_figures_alone(folder);
   } catch (const std::exception& error) {
     result = {{"course", run.course}, {"configuration", run.configuration}, {"failed", error.what()}};

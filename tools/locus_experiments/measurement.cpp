@@ -91,8 +91,8 @@ ordered_json measurement(const Run& run, const std::filesystem::path& folder, co
                       {"machine", machine_name()},
                       {"summary", read_json(folder / "summary.json")}};
   const CaptureFolder capture = value_or_fail(CaptureFolder::find(course.folder), ExitStatus::failed);
-  if (run.from_a_start)
-    result["harsh"] = harsh_figures(folder, capture, result["summary"]);
+  if (run.mounting_rad)
+    result["harsh"] = harsh_figures(folder, capture, result["summary"], *run.mounting_rad);
   else if (!capture.ground_truth.empty() && run.paced_cpus == 0)
     add_errors(folder / "odometry.tum", capture.ground_truth, result);
   if (run.watched)

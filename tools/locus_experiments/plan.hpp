@@ -33,8 +33,10 @@ struct Run {
   bool loam_features = false;           ///< LOAM's points in place of the filters
   std::size_t place = 0;                ///< among all runs of the plan, whichever shard does them
   std::optional<Interval> watched = {}; ///< what happens there is measured for the table of faults
-  bool from_a_start = false;            ///< measured for the harsh table, and what it wrote is not kept
-  std::string refusal = {};             ///< what locus-replay has to say instead of running; empty: it has to run
+  /// A drive of the harsh table: by how much its lidars are turned against what config.yaml says. What such a drive
+  /// wrote is not kept.
+  std::optional<double> mounting_rad = {};
+  std::string refusal = {}; ///< what locus-replay has to say instead of running; empty: it has to run
 
   [[nodiscard]] std::string id() const { return course + '/' + configuration; }
 };
