@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <csignal>
 #include <fstream>
 #include <random>
-#include <ranges>
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -144,9 +144,10 @@ TEST_F(BadCapture, ThatRunsBackwardsIsSaidWithTheProgramThatSortsIt) {
   auto capture = Capture::open(room_drive() / "lidar.pcap");
   while (const Datagram* datagram = packets.size() < kPackets ? capture->next() : nullptr)
     packets.emplace_back(datagram->receive_stamp, Bytes(datagram->payload.begin(), datagram->payload.end()));
+  std::ranges::reverse(packets);
   {
     PcapWriter pcap = std::move(*PcapWriter::open(folder_ / "bad.pcap"));
-    for (const auto& [stamp, payload] : std::views::reverse(packets))
+    for (const auto& [stamp, payload] : packets)
       pcap.write(stamp, UdpAddresses{}, payload);
   }
   expect_error(replay(), 1, {"bad.pcap", "499 of its 500 datagrams", "runs backwards", "reordercap IN OUT"});

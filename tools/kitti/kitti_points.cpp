@@ -40,7 +40,9 @@ bool read_text(const std::string& text, std::vector<KittiPoint>& points) {
 void raise(std::vector<KittiPoint>& points, double angle_deg) {
   const double cosine = std::cos(angle_deg * kRadPerDeg), sine = std::sin(angle_deg * kRadPerDeg);
   for (KittiPoint& point : points) {
-    const double x_m = point.x_m, y_m = point.y_m, z_m = point.z_m, level_m = std::hypot(x_m, y_m);
+    const auto x_m = static_cast<double>(point.x_m), y_m = static_cast<double>(point.y_m),
+               z_m = static_cast<double>(point.z_m);
+    const double level_m = std::hypot(x_m, y_m);
     if (!(level_m > 0))
       continue;
     const double stretch = (level_m * cosine - z_m * sine) / level_m;

@@ -73,7 +73,7 @@ auto place_of(const RowChange& row) {
   return std::tuple(static_cast<int>(row.change), first, last, row.gain);
 }
 
-const ComparedRow* find(const std::vector<ComparedRow>& rows, const std::string& name) {
+const ComparedRow* row_named(const std::vector<ComparedRow>& rows, const std::string& name) {
   const auto found = std::ranges::find(rows, name, &ComparedRow::name);
   return found == rows.end() ? nullptr : &*found;
 }
@@ -83,7 +83,7 @@ std::vector<RowChange> changes_between(const ComparedTable& table, const std::ve
                                        const std::vector<ComparedRow>& after) {
   std::vector<RowChange> changes;
   for (const ComparedRow& row : after) {
-    if (const ComparedRow* was = find(before, row.name))
+    if (const ComparedRow* was = row_named(before, row.name))
       changes.push_back(change_of(table.kinds, *was, row));
   }
   std::ranges::stable_sort(changes, {}, place_of);
@@ -127,7 +127,7 @@ std::string line_of(const std::vector<FigureKind>& kinds, const RowChange& row) 
 std::string only_in(const char* when, const std::vector<ComparedRow>& rows, const std::vector<ComparedRow>& others) {
   std::vector<std::string> names;
   for (const ComparedRow& row : rows) {
-    if (find(others, row.name) == nullptr)
+    if (row_named(others, row.name) == nullptr)
       names.push_back(row.name);
   }
   return names.empty() ? "" : fmt::format("\nOnly {}, {}: {}.\n", when, names.size(), fmt::join(names, "; "));

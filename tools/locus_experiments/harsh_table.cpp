@@ -160,7 +160,7 @@ std::optional<Results> row_of(const HarshCase& harsh_case, Sensors sensors, cons
 /// Three digits, whether it is millimetres or kilometres.
 std::string in_mm(double metres) { return fmt::format("{:.{}f}", 1e3 * metres, metres < 0.1 ? 1 : 0); }
 
-std::string in_words(const Results& said) {
+std::string said_in_words(const Results& said) {
   constexpr std::size_t kLongest = 90;
   std::vector<std::string> texts;
   for (const Results& line : said) {
@@ -181,7 +181,7 @@ std::string lost_in_words(const Results& row) {
                      after_s.is_null() ? "" : fmt::format(" within {:.1f} s", after_s.get<double>()));
 }
 
-std::string line_of(const Results& row) {
+std::string harsh_line(const Results& row) {
   const auto broken = row.at("broken").get<std::vector<std::string>>();
   const std::string holds = broken.empty() ? "yes" : fmt::format("**no**: {}", fmt::join(broken, ", "));
   const std::string head = fmt::format("| {} | {} | {} ", row.at("course").get<std::string>(),
@@ -194,7 +194,7 @@ std::string line_of(const Results& row) {
                      in_mm(row.at("worst_m")), row.at("worst_sigma").get<double>(),
                      nees.is_number() ? fmt::format("{:.1f}", nees.get<double>()) : "",
                      row.at("claimed_mps").get<double>(), row.at("true_mps").get<double>(), lost_in_words(row), holds,
-                     in_words(row.at("said")));
+                     said_in_words(row.at("said")));
 }
 
 } // namespace
@@ -229,7 +229,7 @@ std::string harsh_table(const Results& results) {
       "| course | imperfection | sensors | drives, from a stand | mean error, mm | worst, mm | worst sigma | NEES | "
       "claims, has m/s | lost, said | holds | said |\n|---|---|---|---|---:|---:|---:|---:|---|---|---|---|\n";
   for (const Results& row : rows)
-    text += line_of(row);
+    text += harsh_line(row);
   return text;
 }
 

@@ -154,10 +154,10 @@ class Driver {
 
   /// Nothing stands between the robot's way and the far side of the vehicle's, nor on it; and both are level across.
   [[nodiscard]] bool has_room(double from_m, double to_m, double aside_m) const {
-    constexpr double kOffWalls_m = 0.3, kLevel_m = 0.25, kBend = 0.5;
+    constexpr double kRoom_m = 0.3, kLevel_m = 0.25, kBend = 0.5;
     if (from_m < 0 || to_m > lane_.length_m())
       return false;
-    const double side = aside_m > 0 ? 1 : -1, edge_m = aside_m + side * (as_.half_width_m + kOffWalls_m);
+    const double side = aside_m > 0 ? 1 : -1, edge_m = aside_m + side * (as_.half_width_m + kRoom_m);
     const auto first = static_cast<std::size_t>(from_m / kSample_m), last = static_cast<std::size_t>(to_m / kSample_m);
     for (std::size_t i = first; i < last; ++i) {
       const Eigen::Vector2d middle = lane_.beside(i, 0), edge = lane_.beside(i, edge_m);

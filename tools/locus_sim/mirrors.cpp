@@ -18,7 +18,7 @@ constexpr double kPuddle_m = 1.6;             // from one bump of the noise to t
 constexpr double kWetDarker = 0.5;            // of what is below the film (Lekner and Dorf, 1988)
 constexpr double kPane_m = 2, kSmallest_m = 1.5;
 constexpr double kStraightOn = 0.998, kGlare = 200, kDirt = 3; // within 4 degrees; brightness of mirrored and scattered
-constexpr double kLeast = 0.5;                                 // brightness that any lidar sees
+constexpr double kDarkest = 0.5;                               // brightness that any lidar sees
 
 double puddle(const Noise& noise, const Eigen::Vector3d& point) {
   return noise({point.x() / kPuddle_m, point.y() / kPuddle_m, 0});
@@ -78,7 +78,7 @@ std::optional<Hit> stronger(const Hit& own, double own_brightness, const std::op
   const double of_own = strength(own, own_brightness), of_ghost = ghost ? strength(*ghost, ghost_brightness) : 0;
   const bool shows_ghost = chance * (of_own + of_ghost) < of_ghost;
   const double brightness = shows_ghost ? ghost_brightness : own_brightness;
-  if (brightness < kLeast)
+  if (brightness < kDarkest)
     return std::nullopt;
   Hit hit = shows_ghost ? *ghost : own;
   hit.reflectivity = static_cast<std::uint8_t>(std::clamp(brightness, 1.0, 255.0));

@@ -16,14 +16,15 @@ constexpr double kPercent = 0.01;
 /// Bursts of 2 to 5 s, at any time, within 3 m of where the robot is about to be, from the floor to the height of a
 /// man.
 std::vector<Cloud> bursts(const Way& way, double per_min, Dice& dice) {
-  constexpr double kStepsPerMin = 600, kAside_m = 3;
+  constexpr double kStepsPerMin = 600, kNearTheWay_m = 3;
   const double expected = per_min * static_cast<double>(way.steps()) / kStepsPerMin;
   const auto count = static_cast<std::size_t>(expected) + (dice.chance(expected - std::floor(expected)) ? 1 : 0);
   std::vector<Cloud> clouds;
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t step = dice.below(way.steps());
-    const double ahead_s = dice.between(0, 4), x = dice.between(-kAside_m, kAside_m),
-                 y = dice.between(-kAside_m, kAside_m), z = dice.between(0, 1.6), lasts_s = dice.between(2, 5);
+    const double ahead_s = dice.between(0, 4), x = dice.between(-kNearTheWay_m, kNearTheWay_m),
+                 y = dice.between(-kNearTheWay_m, kNearTheWay_m), z = dice.between(0, 1.6),
+                 lasts_s = dice.between(2, 5);
     const Eigen::Vector2d near = way.at(step + static_cast<std::size_t>(10 * ahead_s)) + Eigen::Vector2d{x, y};
     const Stamp begin = way.stamp(step);
     clouds.push_back({way.on_ground(near) + Eigen::Vector3d{0, 0, z}, dice.between(0.2, 0.4), dice.between(0.9, 1.7),
