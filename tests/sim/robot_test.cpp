@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 
 namespace locus::sim {
@@ -31,7 +32,10 @@ TEST(Robots, EachDrivesInEachWorldNoFasterThanIsSensibleThere) {
         const BaseMotion motion = trajectory.at(t);
         fastest_mps = std::max(fastest_mps, motion.velocity_world_mps.head<2>().norm());
         const Eigen::Vector3d middle = motion.T_world_base.translation + Eigen::Vector3d{0, 0, 0.3};
-        ASSERT_GT(world.scene.distance_to_surface(middle, t), 0.25) << middle.transpose();
+        // On stairs the lowest robot has its middle 0.43 m above the line that it drives on, and the noses of the steps
+        // are a rise of 0.175 m above that, on a slope of 31.1 degrees; a centimetre for the ripples.
+        constexpr double kOnStairs_m = (0.43 - 0.175) * 0.856 - 0.01;
+        ASSERT_GT(world.scene.distance_to_surface(middle, t), kOnStairs_m) << middle.transpose();
       }
       EXPECT_LT(fastest_mps, most_mps + 0.6); // and what the swinging of a gait adds
     }
@@ -40,7 +44,12 @@ TEST(Robots, EachDrivesInEachWorldNoFasterThanIsSensibleThere) {
 
 TEST(Car, GoesAt15MetresPerSecondForFiveMinutesAsCarsDo) {
   const World road = world_called("road").make(1);
-  const Trajectory trajectory = drive_about(road, make_car({}, 1), seconds{300}, {}, 1);
+  const Robot car = make_car({}, 1);
+  const Trajectory trajectory = drive_about(road, car, seconds{300}, {}, 1);
+  double shaking_mps2 = 0;
+  for (const Oscillation& oscillation : car.ride.oscillations)
+    shaking_mps2 +=
+        std::pow(2 * std::numbers::pi * oscillation.frequency_hz, 2) * oscillation.amplitude_m.head<2>().norm();
   EXPECT_GT(trajectory.length_m(), 300 * 10); // stops included
   int fast = 0, all = 0;
   for (Stamp t = trajectory.start(); t < trajectory.end(); t += milliseconds{50}, ++all) {
@@ -48,7 +57,7 @@ TEST(Car, GoesAt15MetresPerSecondForFiveMinutesAsCarsDo) {
     const Eigen::Vector2d velocity = motion.velocity_world_mps.head<2>();
     fast += velocity.norm() > 14;
     // On an eased change of speed the peak is 1.875 times the mean of 3 m/s^2.
-    ASSERT_LT(motion.acceleration_world_mps2.head<2>().norm(), 1.875 * 3 + 0.5);
+    ASSERT_LT(motion.acceleration_world_mps2.head<2>().norm(), 1.875 * 3 + shaking_mps2);
     ASSERT_LT(velocity.norm() * std::abs(motion.angular_velocity_base_radps.z()), 3.5);
     ASSERT_GT(road.scene.distance_to_surface(motion.T_world_base.translation + Eigen::Vector3d{0, 0, 0.5}, t), 0.7);
   }

@@ -135,7 +135,7 @@ TEST(People, WaitBesideTheWayOfWhoIsFasterThanTheyAre) {
 }
 
 TEST(Vehicle, DrivesAlongsideAtTheRobotsSpeedForSoManySecondsOfAMinute) {
-  for (const auto& [speed_mps, length_m] : {std::pair{1.0, 119.0}, std::pair{1.0, 60.0}}) {
+  for (const auto& [speed_mps, length_m] : {std::pair{1.0, 179.0}, std::pair{1.0, 119.0}}) {
     const Trajectory trajectory = straight_on(speed_mps, length_m);
     constexpr double kAsked_s = 12;
     const World world = yard_with({.vehicle_s_per_min = kAsked_s}, trajectory);
@@ -156,7 +156,7 @@ TEST(Vehicle, DrivesAlongsideAtTheRobotsSpeedForSoManySecondsOfAMinute) {
       alongside_s += std::abs(at.x() - base.x()) < 2 && std::abs(faster_mps) < 0.5 ? 0.1 : 0;
     }
     const double minutes = std::floor(to_seconds(trajectory.end() - trajectory.start()) / 60);
-    EXPECT_GT(alongside_s, 0.8 * minutes * kAsked_s);
+    EXPECT_GT(alongside_s, 0.8 * (minutes - 1) * kAsked_s) << "the last minute may end before it could leave";
     EXPECT_LT(alongside_s, 1.5 * (minutes + 1) * kAsked_s);
   }
 }
@@ -276,7 +276,7 @@ TEST(Mirrors, GlassIsAMirrorWhereAWallStoodAndShowsItselfStraightOn) {
   ASSERT_TRUE(straight_on);
   EXPECT_EQ(straight_on->range_m, 10);
   int ghosts = 0;
-  for (int i = 0; i < 300; ++i) {
+  for (int i = 0; i < 200; ++i) {
     const double along = kRadPerDeg * (78 + 0.01 * i); // along the pane at y = 12, to the wall and its image behind
     const Ray ray{{-8, 9, 1}, {std::sin(along), std::cos(along), 0}};
     const auto hit = scene.cast(ray, 100);
