@@ -80,7 +80,8 @@ TEST_F(Compare, ARowIsWorseIfAnyFigureIs) {
 
 TEST_F(Compare, WhetherItHoldsGoesBeforeItsFigures) {
   const std::string lost = page(faults({fault_row("a", 0.0201)}), faults({fault_row("a", 0.0200, 2.0, false)}));
-  EXPECT_TRUE(contains_text(lost, "| **worse** | urban/a | yes -> **no**: too large an error | 20.1 -> 20.0 |")) << lost;
+  EXPECT_TRUE(contains_text(lost, "| **worse** | urban/a | yes -> **no**: too large an error | 20.1 -> 20.0 |"))
+      << lost;
   EXPECT_TRUE(contains_text(lost, "1 worse, 0 better, 0 same")) << lost;
   EXPECT_TRUE(contains_text(lost, "1 hold no longer, 0 hold anew")) << lost;
   const std::string found = page(faults({fault_row("a", 0.02, 2.0, false)}), faults({fault_row("a", 0.04)}));
@@ -116,7 +117,8 @@ TEST_F(Compare, ARunThatGivesNoFigureAnyMoreIsWorse) {
                        {"configuration", "a"},
                        {"broken", {"seed 1 did not run"}},
                        {"holds", false}};
-  EXPECT_TRUE(contains_text(page(faults({fault_row("a", 0.1, 2.0, false)}), faults({failed})), "| **worse** | urban/a |"));
+  EXPECT_TRUE(
+      contains_text(page(faults({fault_row("a", 0.1, 2.0, false)}), faults({failed})), "| **worse** | urban/a |"));
   EXPECT_TRUE(contains_text(page(faults({failed}), faults({failed})), "| same | urban/a |"));
 }
 
@@ -126,8 +128,10 @@ TEST_F(Compare, TheCovariancesAreARowThatIsBestAtSix) {
     results["faults"]["consistency"] = {{"runs", runs}, {"failed", 0}, {"nees_10m", nees}, {"holds", true}};
     return results;
   };
-  EXPECT_TRUE(contains_text(page(with_nees(3.6, 100), with_nees(8.0, 100)), "| better | covariances, 100 runs | yes |"));
-  EXPECT_TRUE(contains_text(page(with_nees(8.0, 100), with_nees(11.0, 100)), "| **worse** | covariances, 100 runs | yes |"));
+  EXPECT_TRUE(
+      contains_text(page(with_nees(3.6, 100), with_nees(8.0, 100)), "| better | covariances, 100 runs | yes |"));
+  EXPECT_TRUE(
+      contains_text(page(with_nees(8.0, 100), with_nees(11.0, 100)), "| **worse** | covariances, 100 runs | yes |"));
   EXPECT_TRUE(contains_text(page(with_nees(8.0, 100), with_nees(8.0, 4)), "Only after, 1: covariances, 4 runs."));
 }
 
@@ -148,7 +152,8 @@ Results matrix(double error_m) {
 
 TEST_F(Compare, ACellOfTheMatrixHasTheFiguresOfItsRun) {
   const std::string text = page(matrix(0.004), matrix(0.008));
-  EXPECT_TRUE(contains_text(text, "| **worse** | wio: frozen, mid-drive | yes | 4.0 -> 8.0 (+100 %) | 2.0 | 0 | 0 |")) << text;
+  EXPECT_TRUE(contains_text(text, "| **worse** | wio: frozen, mid-drive | yes | 4.0 -> 8.0 (+100 %) | 2.0 | 0 | 0 |"))
+      << text;
   EXPECT_TRUE(contains_text(text, "1 rows: 1 worse")) << text;
 }
 
@@ -159,7 +164,8 @@ TEST_F(Compare, HarshRowsAreKeyedByCourseImperfectionAndSensors) {
     return Results{{"version", "1"}, {"duration_s", 60}, {"runs", Results::array()}, {"harsh", {{"rows", {row}}}}};
   };
   const std::string text = page(harsh(0.1), harsh(124));
-  EXPECT_TRUE(contains_text(text, "| **worse** | urban, late IMU, all |  | 20.0 | 100.0 -> 124000.0 (+123900 %) | 1.0 |"))
+  EXPECT_TRUE(
+      contains_text(text, "| **worse** | urban, late IMU, all |  | 20.0 | 100.0 -> 124000.0 (+123900 %) | 1.0 |"))
       << text;
 }
 
@@ -171,7 +177,8 @@ TEST_F(Compare, WhatIsNotOfTheSameExperimentIsRefused) {
   EXPECT_EQ(error(faults({}), faults({})), "");
   EXPECT_TRUE(contains_text(error(longer, faults({})), "before.json: duration_s is 300 there and 60 here"));
   EXPECT_TRUE(contains_text(error(more_seeds, faults({})), "before.json: seeds is 3 there and 1 here"));
-  EXPECT_TRUE(contains_text(error(matrix(0.1), faults({})), "before.json: holds no results of the same experiment (faults)"));
+  EXPECT_TRUE(
+      contains_text(error(matrix(0.1), faults({})), "before.json: holds no results of the same experiment (faults)"));
   EXPECT_TRUE(contains_text(error(paper, faults({})), "before.json: holds no results of the same experiment (faults)"));
   EXPECT_TRUE(contains_text(error(faults({}), paper), "--compare: the paper's experiments have no rows"));
 }
@@ -184,7 +191,8 @@ TEST_F(Compare, AFileThatHoldsNoResultsIsRefused) {
   without_rows["faults"].erase("rows");
   absurd_table["faults"] = Results::array({1});
   for (const Results& other : {without_rows, absurd_row, absurd_table})
-    EXPECT_TRUE(contains_text(error(other, faults({})), "before.json: its faults are not as locus-experiments writes them"))
+    EXPECT_TRUE(
+        contains_text(error(other, faults({})), "before.json: its faults are not as locus-experiments writes them"))
         << error(other, faults({}));
 }
 
