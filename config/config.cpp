@@ -10,8 +10,8 @@
 #include <fmt/format.h>
 #include <net/if.h>
 
-#include "core/problems.hpp"
-#include "core/sweep.hpp"
+#include "core/base/problems.hpp"
+#include "core/ingest/sweep.hpp"
 
 namespace locus {
 namespace {
@@ -79,8 +79,8 @@ void check_lidars(Problems& problems, const std::vector<LidarOptions>& lidars) {
 }
 
 void check_sources(Problems& problems, const Config& config) {
-  problems.require(config.odometry.motion_sources.size() <= Sweep::kMaxSources, "motion_sources",
-                   "there may be " + std::to_string(Sweep::kMaxSources) + " at most");
+  problems.require(config.odometry.motion_sources.size() <= kMaxSources, "motion_sources",
+                   "there may be " + std::to_string(kMaxSources) + " at most");
   for (std::size_t i = 0; i < config.source_topics.size(); ++i) {
     require_topic_or_empty(problems, item("motion_sources", i, "topic"), config.source_topics[i].topic);
     require_topic_or_empty(problems, item("motion_sources", i, "health_topic"), config.source_topics[i].health_topic);

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/options.hpp"
+#include "core/base/options.hpp"
 #include "drivers/lidar_options.hpp"
 
 namespace locus {

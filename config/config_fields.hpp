@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "config/config.hpp"
-#include "drivers/velodyne_model.hpp"
+#include "drivers/velodyne/model.hpp"
 
 /// The one place where a key is spelled. fields() shows a section each key of a struct with its field; a reader fills
 /// the fields from YAML, a writer makes YAML of them. Both therefore know the same keys. Where the file says a thing

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "config/config.hpp"
-#include "core/expected.hpp"
+#include "core/base/expected.hpp"
 
 namespace locus {
 

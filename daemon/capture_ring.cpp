@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "drivers/capture_folder.hpp"
+#include "drivers/files/capture_folder.hpp"
 
 namespace locus::daemon {
 namespace {

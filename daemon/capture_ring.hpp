@@ -7,8 +7,8 @@
 #include <optional>
 #include <string>
 
-#include "core/expected.hpp"
-#include "core/stamp.hpp"
+#include "core/base/expected.hpp"
+#include "core/base/stamp.hpp"
 
 namespace locus::daemon {
 

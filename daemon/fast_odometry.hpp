@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <optional>
 
-#include "core/motion_sources.hpp"
-#include "core/odometry_estimate.hpp"
+#include "core/odometry/odometry_estimate.hpp"
+#include "core/sources/motion_sources.hpp"
 
 namespace locus::daemon {
 

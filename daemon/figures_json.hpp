@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "config/config.hpp"
-#include "core/source_health.hpp"
+#include "core/sources/source_health.hpp"
 #include "daemon/ingest_report.hpp"
 #include "daemon/stage_stopwatch.hpp"
 #include "daemon/sweep_processor.hpp"
@@ -26,7 +26,7 @@ struct SweepSums {
   std::uint64_t sweeps = 0;
   double raw_points = 0, filtered_points = 0, scan_to_scan_iterations = 0, scan_to_submap_iterations = 0;
   /// Those whose prior came from the source, all of it or in part.
-  std::array<std::uint64_t, Sweep::kMaxSources> used_sweeps{};
+  std::array<std::uint64_t, kMaxSources> used_sweeps{};
 
   void add(const ProcessedSweep& sweep);
 };

@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/ring_segments.hpp"
-#include "drivers/velodyne_model.hpp"
+#include "core/ingest/ring_segments.hpp"
+#include "drivers/velodyne/model.hpp"
 
 namespace locus::daemon {
 

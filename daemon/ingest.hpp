@@ -5,7 +5,7 @@
 #include <functional>
 
 #include "config/config.hpp"
-#include "core/sweep_builder.hpp"
+#include "core/ingest/sweep_builder.hpp"
 #include "daemon/input.hpp"
 #include "daemon/machine_time.hpp"
 #include "daemon/stage_stopwatch.hpp"

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "drivers/ip_address.hpp"
+#include "drivers/net/ip_address.hpp"
 
 namespace locus::daemon {
 

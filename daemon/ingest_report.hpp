@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "config/config.hpp"
-#include "core/sweep.hpp"
+#include "core/ingest/sweep.hpp"
 #include "daemon/ingest.hpp"
 
 namespace locus::daemon {
@@ -38,8 +38,8 @@ struct IngestReport {
   };
 
   PacketCounters total;
-  std::array<Lidar, Config::kMaxLidars> lidars;   ///< by index
-  std::array<Source, Sweep::kMaxSources> sources; ///< by index
+  std::array<Lidar, Config::kMaxLidars> lidars; ///< by index
+  std::array<Source, kMaxSources> sources;      ///< by index
   SweepBuilder::Counters sweeps;
 
   /// Called by the ingest thread.

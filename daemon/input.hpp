@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <variant>
 
-#include "core/motion_sample.hpp"
-#include "drivers/datagram.hpp"
+#include "core/sources/motion_sample.hpp"
+#include "drivers/net/datagram.hpp"
 
 namespace locus {
 class LidarRouter;

@@ -13,8 +13,8 @@
 
 #include "daemon/input.hpp"
 #include "daemon/spsc_ring.hpp"
-#include "drivers/flood_guard.hpp"
-#include "drivers/udp_socket.hpp"
+#include "drivers/net/flood_guard.hpp"
+#include "drivers/net/udp_socket.hpp"
 
 namespace locus::daemon {
 

@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "config/config.hpp"
-#include "core/sweep.hpp"
+#include "core/ingest/sweep.hpp"
 #include "daemon/fast_odometry.hpp"
 #include "daemon/ingest.hpp"
 #include "daemon/ingest_report.hpp"

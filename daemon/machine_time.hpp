@@ -3,7 +3,7 @@
 
 #include <ctime>
 
-#include "core/stamp.hpp"
+#include "core/base/stamp.hpp"
 
 namespace locus::daemon {
 

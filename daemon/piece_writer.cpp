@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #include "config/config_yaml.hpp"
-#include "drivers/motion_files.hpp"
+#include "drivers/files/motion_files.hpp"
 
 namespace locus::daemon {
 namespace {

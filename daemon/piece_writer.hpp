@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "config/config.hpp"
-#include "core/expected.hpp"
+#include "core/base/expected.hpp"
 #include "daemon/input.hpp"
-#include "drivers/pcap_writer.hpp"
+#include "drivers/files/pcap_writer.hpp"
 
 namespace locus::daemon {
 

@@ -15,13 +15,13 @@
 #include <variant>
 
 #include "config/config.hpp"
-#include "core/sweep.hpp"
+#include "core/ingest/sweep.hpp"
 #include "daemon/capture_ring.hpp"
 #include "daemon/input.hpp"
 #include "daemon/piece_writer.hpp"
 #include "daemon/spsc_ring.hpp"
 #include "daemon/wakeup.hpp"
-#include "drivers/velodyne_model.hpp"
+#include "drivers/velodyne/model.hpp"
 
 namespace locus::daemon {
 
@@ -78,7 +78,7 @@ class Recorder {
   void tell();
 
   Config config_;
-  std::bitset<Sweep::kMaxSources> has_file_; ///< by the index of the source
+  std::bitset<kMaxSources> has_file_; ///< by the index of the source
   using Waiting = SpscRing<Entry, kMaxUnwritten>;
   std::unique_ptr<Waiting> waiting_ = std::make_unique<Waiting>(); ///< larger than a stack
   std::atomic<std::uint64_t> overflowed_{0};                       ///< inputs that the ring in memory had no room for

@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "core/stage_clock.hpp"
-#include "core/stamp.hpp"
+#include "core/base/stage_clock.hpp"
+#include "core/base/stamp.hpp"
 
 namespace locus::daemon {
 

@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/odometry.hpp"
+#include "core/odometry/odometry.hpp"
 #include "daemon/machine_time.hpp"
 #include "daemon/stage_stopwatch.hpp"
 #include "daemon/sweep_cut.hpp"
@@ -37,8 +37,8 @@ struct ProcessedSweep {
   OdometryEstimate estimate;
   std::uint64_t sequence = 0; ///< Sweep::sequence
   std::size_t raw_returns = 0;
-  std::bitset<Sweep::kMaxSources> usable_sources; ///< SourcePose::usable, by the index of the source
-  MachineTime took;                               ///< from the cut of the sweep to the estimate
+  std::bitset<kMaxSources> usable_sources; ///< SourcePose::usable, by the index of the source
+  MachineTime took;                        ///< from the cut of the sweep to the estimate
   StageTimes stages_took; ///< those of the ingest included, and what was prepared for it since the sweep before
 };
 
@@ -60,8 +60,8 @@ class SweepProcessor {
     done.took = MachineTime::now() - cut.began;
     const StageTimes odometry_took = stages_.lap();
     std::ranges::transform(done.stages_took, odometry_took, done.stages_took.begin(), std::plus{});
-    for (std::size_t source = 0; source < Sweep::kMaxSources; ++source)
-      done.usable_sources[source] = sweep.sources[source].usable;
+    for (std::size_t source = 0; source < kMaxSources; ++source)
+      done.usable_sources[source] = sweep.motion.sources[source].usable;
     return done;
   }
 

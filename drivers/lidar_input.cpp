@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "drivers/velodyne_calibration.hpp"
+#include "drivers/velodyne/calibration.hpp"
 
 namespace locus {
 

@@ -10,14 +10,14 @@
 #include <string_view>
 #include <vector>
 
-#include "core/expected.hpp"
-#include "core/lidar_packet.hpp"
-#include "drivers/datagram.hpp"
+#include "core/base/expected.hpp"
+#include "core/ingest/lidar_packet.hpp"
 #include "drivers/lidar_options.hpp"
+#include "drivers/net/datagram.hpp"
 #include "drivers/packet_counters.hpp"
-#include "drivers/position_packet.hpp"
 #include "drivers/sensor_clock.hpp"
-#include "drivers/velodyne_decoder.hpp"
+#include "drivers/velodyne/decoder.hpp"
+#include "drivers/velodyne/position_packet.hpp"
 
 namespace locus {
 

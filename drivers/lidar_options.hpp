@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "core/isa.hpp"
-#include "core/pose.hpp"
+#include "core/base/isa.hpp"
+#include "core/base/pose.hpp"
 
 namespace locus {
 

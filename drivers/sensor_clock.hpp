@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "core/stamp.hpp"
+#include "core/base/stamp.hpp"
 #include "drivers/lidar_options.hpp"
 
 namespace locus {

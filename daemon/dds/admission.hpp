@@ -6,7 +6,7 @@
 
 #include <dds/dds.h>
 
-#include "core/stamp.hpp"
+#include "core/base/stamp.hpp"
 #include "daemon/dds/dds_node.hpp"
 
 namespace locus::daemon {

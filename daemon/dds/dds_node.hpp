@@ -12,7 +12,7 @@
 #include <dds/dds.h>
 
 #include "config/config.hpp"
-#include "core/expected.hpp"
+#include "core/base/expected.hpp"
 #include "daemon/dds/ros_types.hpp"
 
 namespace locus::daemon {

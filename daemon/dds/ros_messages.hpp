@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/motion_sample.hpp"
-#include "core/odometry_estimate.hpp"
+#include "core/odometry/odometry_estimate.hpp"
+#include "core/sources/motion_sample.hpp"
 #include "daemon/dds/ros_types.hpp"
 
 /// Between the messages of ROS 2 and the types of the core. Nothing here touches a network.

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "config/config.hpp"
-#include "core/odometry.hpp"
+#include "core/odometry/odometry.hpp"
 #include "daemon/dds/ros_link.hpp"
 #include "daemon/latest_slot.hpp"
 #include "daemon/wakeup.hpp"

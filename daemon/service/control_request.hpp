@@ -6,9 +6,9 @@
 #include <string_view>
 #include <variant>
 
-#include "core/expected.hpp"
-#include "core/options.hpp"
-#include "core/pose.hpp"
+#include "core/base/expected.hpp"
+#include "core/base/options.hpp"
+#include "core/base/pose.hpp"
 
 namespace locus::daemon {
 

@@ -14,7 +14,7 @@
 #include <nlohmann/json.hpp>
 #include <poll.h>
 
-#include "core/expected.hpp"
+#include "core/base/expected.hpp"
 #include "daemon/service/control_request.hpp"
 #include "daemon/service/log.hpp"
 

@@ -6,7 +6,7 @@
 
 #include "config/config.hpp"
 #include "daemon/service/log.hpp"
-#include "drivers/udp_socket.hpp"
+#include "drivers/net/udp_socket.hpp"
 
 namespace locus::daemon {
 

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "core/stamp.hpp"
+#include "core/base/stamp.hpp"
 
 namespace locus::daemon {
 

@@ -9,8 +9,8 @@
 #include <thread>
 #include <vector>
 
-#include "core/expected.hpp"
-#include "core/odometry.hpp"
+#include "core/base/expected.hpp"
+#include "core/odometry/odometry.hpp"
 #include "daemon/latest_slot.hpp"
 #include "daemon/sweep_processor.hpp"
 #include "daemon/wakeup.hpp"

@@ -12,7 +12,7 @@
 #include <thread>
 
 #include "config/config.hpp"
-#include "core/expected.hpp"
+#include "core/base/expected.hpp"
 #include "daemon/dds/ros_link.hpp"
 #include "daemon/live_input.hpp"
 #include "daemon/live_pipeline.hpp"

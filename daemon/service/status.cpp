@@ -9,10 +9,10 @@
 #include <fmt/format.h>
 
 #include "config/config_yaml.hpp"
-#include "core/pose.hpp"
+#include "core/base/pose.hpp"
 #include "daemon/figures_json.hpp"
 #include "daemon/machine_time.hpp"
-#include "drivers/ip_address.hpp"
+#include "drivers/net/ip_address.hpp"
 
 namespace locus::daemon {
 

@@ -8,7 +8,7 @@
 
 #include "daemon/machine_time.hpp"
 #include "daemon/service/lidar_sockets.hpp"
-#include "drivers/ip_address.hpp"
+#include "drivers/net/ip_address.hpp"
 
 namespace locus::daemon {
 

@@ -50,9 +50,9 @@ class Watch {
   bool was_connected_ = false;
   std::uint64_t told_attempts_ = 0;
   std::array<Lidar, Config::kMaxLidars> lidars_;
-  std::array<std::string_view, Sweep::kMaxSources> verdicts_; ///< as they were told
-  std::set<std::string> unheard_;                             ///< sources that were told of
-  std::set<std::string> intruded_;                            ///< topics that were told of
+  std::array<std::string_view, kMaxSources> verdicts_; ///< as they were told
+  std::set<std::string> unheard_;                      ///< sources that were told of
+  std::set<std::string> intruded_;                     ///< topics that were told of
   std::uint64_t kernel_drops_ = 0, filtered_ = 0, sweep_drops_ = 0;
   Recorder::Status recording_; ///< as it was told
   Duration joined_{}, weighed_{};

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "recording.hpp"
+#include "core/recording.hpp"
 
 #include <stdexcept>
 #include <utility>
 
-#include "drivers/capture.hpp"
+#include "drivers/files/capture.hpp"
 #include "support/scenes.hpp"
 #include "support/test_data.hpp"
 

@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "core/odometry_estimate.hpp"
-#include "core/sweep.hpp"
-#include "core/sweep_builder.hpp"
-#include "drivers/datagram.hpp"
+#include "core/ingest/sweep.hpp"
+#include "core/ingest/sweep_builder.hpp"
+#include "core/odometry/odometry_estimate.hpp"
 #include "drivers/lidar_input.hpp"
+#include "drivers/net/datagram.hpp"
 #include "locus_sim/synthetic_lidar.hpp"
 
 namespace locus::test {

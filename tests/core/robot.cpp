@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "robot.hpp"
+#include "core/robot.hpp"
 
 #include <algorithm>
 #include <iterator>

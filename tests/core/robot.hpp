@@ -7,10 +7,10 @@
 #include <optional>
 #include <vector>
 
-#include "core/odometry.hpp"
-#include "core/options.hpp"
-#include "core/sweep_builder.hpp"
-#include "drivers/velodyne_decoder.hpp"
+#include "core/base/options.hpp"
+#include "core/ingest/sweep_builder.hpp"
+#include "core/odometry/odometry.hpp"
+#include "drivers/velodyne/decoder.hpp"
 #include "locus_sim/scene.hpp"
 #include "locus_sim/synthetic_lidar.hpp"
 #include "locus_sim/synthetic_sources.hpp"

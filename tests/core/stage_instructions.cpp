@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include "core/odometry.hpp"
-#include "recording.hpp"
+#include "core/odometry/odometry.hpp"
+#include "core/recording.hpp"
 
 namespace {
 

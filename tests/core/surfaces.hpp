@@ -4,7 +4,7 @@
 #include <random>
 #include <vector>
 
-#include "core/surface_map.hpp"
+#include "core/map/surface_map.hpp"
 
 namespace locus::test {
 

@@ -10,7 +10,7 @@
 #include "daemon/input.hpp"
 #include "daemon/sweep_processor.hpp"
 #include "drivers/lidar_input.hpp"
-#include "drivers/velodyne_model.hpp"
+#include "drivers/velodyne/model.hpp"
 
 namespace locus::daemon {
 

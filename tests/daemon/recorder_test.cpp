@@ -12,9 +12,9 @@
 
 #include "daemon/allocation_counter.hpp"
 #include "daemon/drive.hpp"
-#include "drivers/capture_folder.hpp"
-#include "drivers/capture_sequence.hpp"
-#include "drivers/motion_files.hpp"
+#include "drivers/files/capture_folder.hpp"
+#include "drivers/files/capture_sequence.hpp"
+#include "drivers/files/motion_files.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace locus::daemon {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "drivers/lidar_input.hpp"
+#include "drivers/velodyne_test_packet.hpp"
 #include "support/returns.hpp"
-#include "velodyne_test_packet.hpp"
 
 namespace locus {
 namespace {

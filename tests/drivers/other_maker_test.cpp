@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "drivers/capture.hpp"
-#include "drivers/velodyne_model.hpp"
+#include "drivers/files/capture.hpp"
+#include "drivers/velodyne/model.hpp"
 #include "support/test_data.hpp"
 
 namespace locus {

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <span>
 
-#include "drivers/velodyne_model.hpp"
+#include "drivers/velodyne/model.hpp"
 
 namespace locus::test {
 

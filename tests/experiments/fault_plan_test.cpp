@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "drivers/fault.hpp"
+#include "faults/fault.hpp"
 #include "locus_sim/trajectory.hpp"
 
 namespace locus::experiments {

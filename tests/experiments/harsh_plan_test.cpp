@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "drivers/fault.hpp"
+#include "faults/fault.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_sim/imperfections.hpp"
 

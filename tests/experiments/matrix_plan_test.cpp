@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "drivers/fault.hpp"
+#include "faults/fault.hpp"
 
 namespace locus::experiments {
 namespace {

@@ -2,7 +2,7 @@
 // Calibration files of one lidar.
 #include <cmath>
 
-#include "drivers/velodyne_calibration.hpp"
+#include "drivers/velodyne/calibration.hpp"
 #include "fuzz/memory_file.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

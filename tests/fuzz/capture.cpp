@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Captures, and the frames in them.
-#include "drivers/capture.hpp"
+#include "drivers/files/capture.hpp"
 #include "fuzz/memory_file.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

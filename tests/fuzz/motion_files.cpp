@@ -4,8 +4,8 @@
 #include <cmath>
 #include <string>
 
-#include "core/health_monitor.hpp"
-#include "drivers/motion_files.hpp"
+#include "core/sources/health_monitor.hpp"
+#include "drivers/files/motion_files.hpp"
 #include "fuzz/memory_file.hpp"
 
 namespace locus {

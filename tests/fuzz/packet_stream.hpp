@@ -7,10 +7,10 @@
 #include <cstdint>
 #include <span>
 
-#include "drivers/datagram.hpp"
-#include "drivers/position_packet.hpp"
-#include "drivers/velodyne_model.hpp"
-#include "drivers/wire.hpp"
+#include "drivers/net/datagram.hpp"
+#include "drivers/velodyne/model.hpp"
+#include "drivers/velodyne/position_packet.hpp"
+#include "drivers/velodyne/wire.hpp"
 #include "fuzz/fuzz_bytes.hpp"
 
 namespace locus::fuzz {

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "drivers/position_packet.hpp"
+#include "drivers/velodyne/position_packet.hpp"
 #include "fuzz/fuzz_bytes.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -4,8 +4,8 @@
 #include <chrono>
 #include <utility>
 
-#include "core/health_monitor.hpp"
-#include "core/motion_track.hpp"
+#include "core/sources/health_monitor.hpp"
+#include "core/sources/motion_track.hpp"
 #include "daemon/dds/ros_messages.hpp"
 #include "fuzz/fuzz_bytes.hpp"
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "core/isa.hpp"
+#include "core/base/isa.hpp"
 #include "trace.hpp"
 
 namespace locus::test {

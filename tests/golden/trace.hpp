@@ -11,7 +11,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "core/odometry_estimate.hpp"
+#include "core/odometry/odometry_estimate.hpp"
 
 namespace locus::test {
 

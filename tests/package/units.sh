@@ -28,7 +28,7 @@ cp "$source/realtime.conf" "$work/locusd.service.d"
 verify
 
 # The kernel allows what the sockets ask for.
-asked=$(sed -n 's/.*kWantedBufferBytes = \(.*\);.*/\1/p' "$1/drivers/udp_socket.hpp")
+asked=$(sed -n 's/.*kWantedBufferBytes = \(.*\);.*/\1/p' "$1/drivers/net/udp_socket.hpp")
 grep -q "^net.core.rmem_max = $((asked))$" "$source/sysctl.conf" ||
   { echo "systemd/sysctl.conf: rmem_max is not kWantedBufferBytes = $asked"; status=1; }
 systemd-sysusers --dry-run --root="$work" "$source/sysusers.conf" 2>&1 | grep "locusd" >/dev/null ||

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <string>
 
-#include "drivers/velodyne_decoder.hpp"
+#include "drivers/velodyne/decoder.hpp"
 #include "drivers/velodyne_test_packet.hpp"
 #include "suite.hpp"
 

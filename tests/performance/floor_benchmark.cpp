@@ -10,8 +10,8 @@
 #include <variant>
 #include <vector>
 
-#include "core/isa.hpp"
-#include "core/surface_grid.hpp"
+#include "core/base/isa.hpp"
+#include "core/map/surface_grid.hpp"
 #include "suite.hpp"
 
 namespace locus::performance {

@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "core/registration.hpp"
+#include "core/map/registration.hpp"
 #include "suite.hpp"
 
 namespace locus::performance {

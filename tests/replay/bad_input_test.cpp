@@ -9,8 +9,8 @@
 #include <pcap/pcap.h>
 #include <unistd.h>
 
-#include "drivers/capture.hpp"
-#include "drivers/pcap_writer.hpp"
+#include "drivers/files/capture.hpp"
+#include "drivers/files/pcap_writer.hpp"
 #include "replay_run.hpp"
 #include "support/child.hpp"
 #include "support/test_drives.hpp"

@@ -13,9 +13,9 @@
 #include <sqlite3.h>
 
 #include "dds/fast_dds_types.hpp"
-#include "drivers/capture.hpp"
-#include "drivers/motion_files.hpp"
-#include "drivers/velodyne_model.hpp"
+#include "drivers/files/capture.hpp"
+#include "drivers/files/motion_files.hpp"
+#include "drivers/velodyne/model.hpp"
 
 namespace locus::test {
 namespace {

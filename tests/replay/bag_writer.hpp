@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "core/motion_sample.hpp"
-#include "drivers/datagram.hpp"
+#include "core/sources/motion_sample.hpp"
+#include "drivers/net/datagram.hpp"
 
 namespace locus::test {
 

@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "core/pose.hpp"
+#include "core/base/pose.hpp"
 #include "kitti/kitti_drive.hpp"
 #include "kitti/kitti_points.hpp"
 #include "kitti/kitti_sweep.hpp"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/capture.hpp"
+#include "drivers/files/capture.hpp"
 #include "drivers/lidar_input.hpp"
 #include "replay_run.hpp"
 #include "support/returns.hpp"

@@ -8,9 +8,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/pose.hpp"
-#include "core/stamp.hpp"
-#include "drivers/motion_files.hpp"
+#include "core/base/pose.hpp"
+#include "core/base/stamp.hpp"
+#include "drivers/files/motion_files.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace locus::test {

@@ -5,9 +5,9 @@
 
 #include <gtest/gtest.h>
 
-#include "drivers/capture.hpp"
-#include "drivers/pcap_writer.hpp"
-#include "drivers/velodyne_model.hpp"
+#include "drivers/files/capture.hpp"
+#include "drivers/files/pcap_writer.hpp"
+#include "drivers/velodyne/model.hpp"
 #include "replay_run.hpp"
 #include "support/test_drives.hpp"
 

@@ -23,7 +23,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include "drivers/position_packet.hpp"
+#include "drivers/velodyne/position_packet.hpp"
 #include "service/robot_network.hpp"
 #include "service/terminal.hpp"
 #include "service/undisturbed.hpp"

@@ -13,7 +13,7 @@
 #include <sched.h>
 
 #include "daemon/machine_time.hpp"
-#include "drivers/capture.hpp"
+#include "drivers/files/capture.hpp"
 #include "service/robot_network.hpp"
 #include "service/undisturbed.hpp"
 #include "support/test_drives.hpp"

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "daemon/service/saved_state.hpp"
-#include "drivers/udp_socket.hpp"
+#include "drivers/net/udp_socket.hpp"
 #include "service/robot_network.hpp"
 #include "support/errors.hpp"
 

@@ -16,7 +16,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "drivers/capture.hpp"
+#include "drivers/files/capture.hpp"
 #include "support/test_drives.hpp"
 
 namespace locus::test {

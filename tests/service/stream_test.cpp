@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // locus-sim -o - | locus-play -: a robot that nobody ever recorded.
-#include "drivers/udp_socket.hpp"
+#include "drivers/net/udp_socket.hpp"
 #include "locus_sim/stream_text.hpp"
 #include "service/robot_network.hpp"
 #include "service/undisturbed.hpp"

@@ -11,7 +11,7 @@
 #include <sys/types.h>
 #include <termios.h>
 
-#include "core/stamp.hpp"
+#include "core/base/stamp.hpp"
 
 namespace locus::test {
 

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "drivers/capture.hpp"
+#include "drivers/files/capture.hpp"
 #include "support/scenes.hpp"
 
 namespace locus::sim {

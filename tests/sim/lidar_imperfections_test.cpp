@@ -8,7 +8,7 @@
 #include <numeric>
 #include <vector>
 
-#include "drivers/velodyne_decoder.hpp"
+#include "drivers/velodyne/decoder.hpp"
 #include "locus_sim/synthetic_lidar.hpp"
 #include "support/returns.hpp"
 

@@ -12,8 +12,8 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
-#include "drivers/capture.hpp"
-#include "drivers/position_packet.hpp"
+#include "drivers/files/capture.hpp"
+#include "drivers/velodyne/position_packet.hpp"
 #include "locus_sim/imperfections.hpp"
 #include "locus_sim/stream_sink.hpp"
 #include "replay/replay_run.hpp"

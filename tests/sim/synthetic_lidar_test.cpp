@@ -8,7 +8,7 @@
 #include <memory>
 #include <string>
 
-#include "drivers/velodyne_decoder.hpp"
+#include "drivers/velodyne/decoder.hpp"
 #include "support/returns.hpp"
 #include "support/scenes.hpp"
 

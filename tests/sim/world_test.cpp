@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "core/motion_sample.hpp"
-#include "drivers/velodyne_decoder.hpp"
+#include "core/sources/motion_sample.hpp"
+#include "drivers/velodyne/decoder.hpp"
 #include "locus_sim/driver.hpp"
 #include "locus_sim/robot.hpp"
 #include "support/returns.hpp"

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <numbers>
 
-#include "drivers/velodyne_model.hpp"
+#include "drivers/velodyne/model.hpp"
 #include "locus_sim/capture_writer.hpp"
 #include "locus_sim/driver.hpp"
 #include "locus_sim/robot.hpp"

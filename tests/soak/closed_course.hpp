@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "core/stamp.hpp"
+#include "core/base/stamp.hpp"
 
 namespace locus::soak {
 

@@ -5,9 +5,9 @@
 #include <thread>
 #include <utility>
 
-#include "drivers/capture_folder.hpp"
-#include "drivers/capture_sequence.hpp"
-#include "drivers/fault_injection.hpp"
+#include "drivers/files/capture_folder.hpp"
+#include "drivers/files/capture_sequence.hpp"
+#include "faults/fault_injection.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/motion_recordings.hpp"
 #include "locus_replay/recording.hpp"

@@ -10,10 +10,10 @@
 
 #include "closed_course.hpp"
 #include "config/config.hpp"
-#include "core/pose.hpp"
-#include "core/sweep.hpp"
+#include "core/base/pose.hpp"
+#include "core/ingest/sweep.hpp"
 #include "daemon/input.hpp"
-#include "drivers/fault.hpp"
+#include "faults/fault.hpp"
 
 namespace locus::tools {
 class Recording;
@@ -31,7 +31,7 @@ class LoopedCourse : public daemon::InputSource {
   /// What was given out so far.
   struct Given {
     std::uint64_t datagrams = 0;
-    std::array<std::uint64_t, Sweep::kMaxSources> samples{}; ///< by index of the motion source
+    std::array<std::uint64_t, kMaxSources> samples{}; ///< by index of the motion source
   };
 
   /// Begins with the lap of this number, at rest.

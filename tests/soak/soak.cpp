@@ -14,7 +14,7 @@
 #include "accuracy/trajectory_accuracy.hpp"
 #include "config/config_yaml.hpp"
 #include "daemon/machine_time.hpp"
-#include "drivers/fault.hpp"
+#include "faults/fault.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/quantiles.hpp"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "config/config.hpp"
-#include "drivers/motion_files.hpp"
+#include "drivers/files/motion_files.hpp"
 #include "looped_course.hpp"
 #include "piece.hpp"
 #include "restarting_pipeline.hpp"

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/expected.hpp"
+#include "core/base/expected.hpp"
 
 namespace locus {
 

@@ -7,7 +7,7 @@
 #include <thread>
 #include <utility>
 
-#include "drivers/udp_socket.hpp"
+#include "drivers/net/udp_socket.hpp"
 #include "support/temporary_file.hpp"
 #include "support/udp_sender.hpp"
 

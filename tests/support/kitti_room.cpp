@@ -7,7 +7,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include "core/motion_sample.hpp"
+#include "core/sources/motion_sample.hpp"
 #include "support/scenes.hpp"
 
 namespace locus::test::kitti_room {

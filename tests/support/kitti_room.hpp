@@ -8,7 +8,7 @@
 
 #include <Eigen/Core>
 
-#include "core/stamp.hpp"
+#include "core/base/stamp.hpp"
 
 /// What a car with a lidar of 64 rings brings back from a drive around a room, in the format of KITTI's raw data.
 namespace locus::test::kitti_room {

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "core/lidar_packet.hpp"
+#include "core/ingest/lidar_packet.hpp"
 
 namespace locus::test {
 

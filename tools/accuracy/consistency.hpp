@@ -4,8 +4,8 @@
 #include <optional>
 #include <span>
 
-#include "core/pose.hpp"
-#include "drivers/motion_files.hpp"
+#include "core/base/pose.hpp"
+#include "drivers/files/motion_files.hpp"
 
 namespace locus {
 

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "core/pose.hpp"
+#include "core/base/pose.hpp"
 
 namespace locus {
 

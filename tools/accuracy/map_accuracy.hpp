@@ -10,8 +10,8 @@
 #include <Eigen/Core>
 
 #include "accuracy/point_cloud_file.hpp"
-#include "core/expected.hpp"
-#include "core/pose.hpp"
+#include "core/base/expected.hpp"
+#include "core/base/pose.hpp"
 
 namespace locus {
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "drivers/motion_files.hpp"
+#include "drivers/files/motion_files.hpp"
 
 namespace locus {
 

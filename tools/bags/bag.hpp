@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "bags/message_reader.hpp"
-#include "core/expected.hpp"
-#include "core/stamp.hpp"
+#include "core/base/expected.hpp"
+#include "core/base/stamp.hpp"
 
 namespace locus::tools {
 

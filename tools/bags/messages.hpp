@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "bags/message_reader.hpp"
-#include "core/stamp.hpp"
+#include "core/base/stamp.hpp"
 #include "daemon/dds/ros_types.hpp"
-#include "drivers/velodyne_model.hpp"
+#include "drivers/velodyne/model.hpp"
 
 /// The messages that are of use in a bag, from their bytes. What breaks off in their midst is none.
 namespace locus::tools {

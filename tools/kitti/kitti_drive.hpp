@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "core/expected.hpp"
-#include "core/motion_sample.hpp"
-#include "drivers/motion_files.hpp"
+#include "core/base/expected.hpp"
+#include "core/sources/motion_sample.hpp"
+#include "drivers/files/motion_files.hpp"
 
 namespace locus::tools {
 

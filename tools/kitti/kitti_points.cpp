@@ -10,7 +10,7 @@
 #include <string>
 #include <system_error>
 
-#include "core/pose.hpp"
+#include "core/base/pose.hpp"
 
 namespace locus::tools {
 namespace {

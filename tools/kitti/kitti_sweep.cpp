@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "drivers/velodyne_model.hpp"
+#include "drivers/velodyne/model.hpp"
 
 namespace locus::tools {
 

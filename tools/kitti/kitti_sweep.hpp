@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "core/lidar_packet.hpp"
+#include "core/ingest/lidar_packet.hpp"
 #include "kitti/kitti_points.hpp"
 
 namespace locus::tools {

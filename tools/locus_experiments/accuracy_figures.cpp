@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
-#include "drivers/capture_folder.hpp"
-#include "drivers/capture_sequence.hpp"
-#include "drivers/position_packet.hpp"
+#include "drivers/files/capture_folder.hpp"
+#include "drivers/files/capture_sequence.hpp"
+#include "drivers/velodyne/position_packet.hpp"
 #include "kitti/kitti_drive.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/quantiles.hpp"

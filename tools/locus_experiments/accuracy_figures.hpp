@@ -7,7 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "drivers/motion_files.hpp"
+#include "drivers/files/motion_files.hpp"
 
 namespace locus::experiments {
 

@@ -13,7 +13,7 @@
 
 #include "accuracy/trajectory_accuracy.hpp"
 #include "config/config_yaml.hpp"
-#include "drivers/capture_folder.hpp"
+#include "drivers/files/capture_folder.hpp"
 #include "locus_experiments/accuracy_figures.hpp"
 #include "locus_experiments/child_process.hpp"
 #include "locus_experiments/conductor.hpp"

@@ -6,8 +6,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "drivers/capture_folder.hpp"
-#include "drivers/motion_files.hpp"
+#include "drivers/files/capture_folder.hpp"
+#include "drivers/files/motion_files.hpp"
 #include "locus_experiments/plan.hpp"
 
 namespace locus::experiments {

@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "drivers/capture_folder.hpp"
+#include "drivers/files/capture_folder.hpp"
 
 namespace locus::experiments {
 

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "core/pose.hpp"
+#include "core/base/pose.hpp"
 #include "locus_replay/failure.hpp"
 
 namespace locus::experiments {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "core/sweep.hpp"
+#include "core/ingest/sweep.hpp"
 
 namespace locus::experiments {
 

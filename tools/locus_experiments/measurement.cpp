@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 
 #include "accuracy/trajectory_accuracy.hpp"
-#include "drivers/capture_folder.hpp"
+#include "drivers/files/capture_folder.hpp"
 #include "locus_experiments/child_process.hpp"
 #include "locus_experiments/fault_figures.hpp"
 #include "locus_experiments/harsh_figures.hpp"

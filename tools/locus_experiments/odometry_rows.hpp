@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/motion_files.hpp"
+#include "drivers/files/motion_files.hpp"
 
 namespace locus::experiments {
 

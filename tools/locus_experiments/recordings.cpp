@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "bags/bag.hpp"
-#include "drivers/capture_folder.hpp"
+#include "drivers/files/capture_folder.hpp"
 #include "kitti/kitti_drive.hpp"
 #include "locus_replay/failure.hpp"
 

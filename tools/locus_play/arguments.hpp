@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/fault.hpp"
+#include "faults/fault.hpp"
 
 namespace locus::tools {
 

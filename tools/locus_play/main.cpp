@@ -17,7 +17,7 @@
 #include "config/config_yaml.hpp"
 #include "daemon/machine_time.hpp"
 #include "daemon/paced_input.hpp"
-#include "drivers/capture_sequence.hpp"
+#include "drivers/files/capture_sequence.hpp"
 #include "locus_play/arguments.hpp"
 #include "locus_play/motion_publisher.hpp"
 #include "locus_play/packet_sender.hpp"

@@ -13,9 +13,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "drivers/position_packet.hpp"
-#include "drivers/velodyne_model.hpp"
-#include "drivers/wire.hpp"
+#include "drivers/velodyne/model.hpp"
+#include "drivers/velodyne/position_packet.hpp"
+#include "drivers/velodyne/wire.hpp"
 #include "locus_replay/failure.hpp"
 
 namespace locus::tools {

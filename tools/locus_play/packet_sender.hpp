@@ -7,7 +7,7 @@
 #include <map>
 #include <string>
 
-#include "drivers/datagram.hpp"
+#include "drivers/net/datagram.hpp"
 
 namespace locus::tools {
 

@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "drivers/motion_files.hpp"
+#include "drivers/files/motion_files.hpp"
 
 namespace locus::tools {
 

@@ -12,9 +12,9 @@
 
 #include "config/config.hpp"
 #include "daemon/input.hpp"
-#include "drivers/capture.hpp"
-#include "drivers/fault_injection.hpp"
+#include "drivers/files/capture.hpp"
 #include "drivers/lidar_input.hpp"
+#include "faults/fault_injection.hpp"
 #include "locus_sim/stream_text.hpp"
 
 namespace locus::tools {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "core/stamp.hpp"
-#include "drivers/fault.hpp"
+#include "core/base/stamp.hpp"
+#include "faults/fault.hpp"
 
 namespace locus::tools {
 

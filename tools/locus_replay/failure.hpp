@@ -8,7 +8,7 @@
 #include <system_error>
 #include <utility>
 
-#include "core/expected.hpp"
+#include "core/base/expected.hpp"
 
 namespace locus::tools {
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "drivers/datagram_source.hpp"
 #include "drivers/lidar_options.hpp"
+#include "drivers/net/datagram_source.hpp"
 #include "kitti/kitti_drive.hpp"
 #include "kitti/kitti_sweep.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "locus_replay/lidar_doubts.hpp"
 #include "daemon/ingest_report.hpp"
-#include "drivers/ip_address.hpp"
+#include "drivers/net/ip_address.hpp"
 
 #include <algorithm>
 #include <optional>

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "core/surface_map.hpp"
+#include "core/map/surface_map.hpp"
 
 namespace locus::tools {
 

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "config/config.hpp"
-#include "core/motion_sample.hpp"
-#include "drivers/capture_folder.hpp"
-#include "drivers/motion_files.hpp"
+#include "core/sources/motion_sample.hpp"
+#include "drivers/files/capture_folder.hpp"
+#include "drivers/files/motion_files.hpp"
 #include "locus_replay/arguments.hpp"
 
 namespace locus::tools {

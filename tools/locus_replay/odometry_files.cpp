@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "drivers/motion_files.hpp"
+#include "drivers/files/motion_files.hpp"
 
 namespace locus::tools {
 namespace {

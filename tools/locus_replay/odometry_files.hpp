@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "core/odometry_estimate.hpp"
-#include "core/options.hpp"
+#include "core/base/options.hpp"
+#include "core/odometry/odometry_estimate.hpp"
 #include "locus_replay/output_file.hpp"
 
 namespace locus::tools {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "core/stamp.hpp"
+#include "core/base/stamp.hpp"
 
 namespace locus::tools {
 

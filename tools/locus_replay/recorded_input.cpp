@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "bags/bag.hpp"
-#include "drivers/capture_sequence.hpp"
+#include "drivers/files/capture_sequence.hpp"
 #include "kitti/kitti_drive.hpp"
 #include "kitti/kitti_points.hpp"
 #include "locus_replay/bag_motion.hpp"

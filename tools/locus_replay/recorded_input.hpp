@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "config/config.hpp"
-#include "drivers/capture_folder.hpp"
-#include "drivers/datagram_source.hpp"
+#include "drivers/files/capture_folder.hpp"
+#include "drivers/net/datagram_source.hpp"
 #include "locus_replay/arguments.hpp"
 #include "locus_replay/motion_recordings.hpp"
 

@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include "core/motion_sources.hpp"
-#include "drivers/velodyne_model.hpp"
+#include "core/sources/motion_sources.hpp"
+#include "drivers/velodyne/model.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/time_span_text.hpp"
 

@@ -13,10 +13,10 @@
 #include <vector>
 
 #include "daemon/input.hpp"
-#include "drivers/datagram_source.hpp"
-#include "drivers/fault_injection.hpp"
 #include "drivers/lidar_input.hpp"
+#include "drivers/net/datagram_source.hpp"
 #include "drivers/other_maker.hpp"
+#include "faults/fault_injection.hpp"
 #include "locus_replay/motion_recordings.hpp"
 
 namespace locus::tools {

@@ -3,8 +3,8 @@
 
 #include <functional>
 
-#include "core/odometry_estimate.hpp"
-#include "core/sweep.hpp"
+#include "core/ingest/sweep.hpp"
+#include "core/odometry/odometry_estimate.hpp"
 
 namespace locus::tools {
 

@@ -9,8 +9,8 @@
 
 #include "accuracy/trajectory_accuracy.hpp"
 #include "config/config.hpp"
-#include "core/surface_map.hpp"
-#include "drivers/motion_files.hpp"
+#include "core/map/surface_map.hpp"
+#include "drivers/files/motion_files.hpp"
 #include "locus_replay/sweep_record.hpp"
 
 namespace locus::tools {

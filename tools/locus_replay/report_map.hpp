@@ -8,7 +8,7 @@
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
 
-#include "core/surface_map.hpp"
+#include "core/map/surface_map.hpp"
 
 namespace locus::tools {
 

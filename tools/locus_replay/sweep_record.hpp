@@ -4,8 +4,8 @@
 #include <array>
 #include <cstdint>
 
-#include "core/odometry_estimate.hpp"
-#include "core/sweep.hpp"
+#include "core/ingest/sweep.hpp"
+#include "core/odometry/odometry_estimate.hpp"
 #include "daemon/sweep_processor.hpp"
 
 namespace locus::tools {
@@ -27,7 +27,7 @@ struct SweepRecord {
   daemon::StageTimes stages_took{};
   TrackingState state = TrackingState::tracking;
   SourceHealth lidars = SourceHealth::used; ///< healthy: the registration was refused
-  std::array<SourceHealth, Sweep::kMaxSources> sources{};
+  std::array<SourceHealth, kMaxSources> sources{};
 };
 
 SweepRecord record_of(const daemon::ProcessedSweep& sweep);

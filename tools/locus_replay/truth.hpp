@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "accuracy/point_cloud_file.hpp"
-#include "core/odometry_estimate.hpp"
-#include "core/surface_map.hpp"
-#include "drivers/capture_folder.hpp"
+#include "core/map/surface_map.hpp"
+#include "core/odometry/odometry_estimate.hpp"
+#include "drivers/files/capture_folder.hpp"
 #include "locus_replay/arguments.hpp"
 #include "locus_replay/progress_bar.hpp"
 #include "locus_replay/run_figures.hpp"

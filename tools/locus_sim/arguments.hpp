@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/stamp.hpp"
+#include "core/base/stamp.hpp"
 #include "locus_sim/robot.hpp"
 #include "locus_sim/world.hpp"
 

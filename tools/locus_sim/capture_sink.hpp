@@ -4,8 +4,8 @@
 #include <string>
 #include <string_view>
 
-#include "core/stamp.hpp"
-#include "drivers/datagram.hpp"
+#include "core/base/stamp.hpp"
+#include "drivers/net/datagram.hpp"
 
 namespace locus::sim {
 

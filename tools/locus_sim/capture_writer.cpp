@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "drivers/ip_address.hpp"
-#include "drivers/motion_files.hpp"
+#include "drivers/files/motion_files.hpp"
+#include "drivers/net/ip_address.hpp"
 #include "locus_sim/folder_sink.hpp"
 
 namespace locus::sim {

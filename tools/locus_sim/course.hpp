@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "core/stamp.hpp"
+#include "core/base/stamp.hpp"
 
 namespace locus::sim {
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <map>
 
-#include "drivers/pcap_writer.hpp"
+#include "drivers/files/pcap_writer.hpp"
 #include "locus_replay/output_file.hpp"
 #include "locus_sim/capture_sink.hpp"
 

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "core/pose.hpp"
+#include "core/base/pose.hpp"
 
 namespace locus::sim {
 namespace {

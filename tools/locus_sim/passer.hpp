@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/stamp.hpp"
+#include "core/base/stamp.hpp"
 #include "locus_sim/shapes.hpp"
 
 namespace locus::sim {

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/stamp.hpp"
+#include "core/base/stamp.hpp"
 #include "locus_sim/hit.hpp"
 #include "locus_sim/mirrors.hpp"
 #include "locus_sim/passer.hpp"

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/stamp.hpp"
+#include "core/base/stamp.hpp"
 #include "locus_sim/quick_dice.hpp"
 #include "locus_sim/shapes.hpp"
 

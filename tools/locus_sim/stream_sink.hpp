@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "drivers/pcap_writer.hpp"
+#include "drivers/files/pcap_writer.hpp"
 #include "locus_sim/capture_sink.hpp"
 #include "locus_sim/stream_text.hpp"
 

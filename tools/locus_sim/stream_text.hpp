@@ -5,7 +5,7 @@
 #include <optional>
 #include <string_view>
 
-#include "drivers/datagram.hpp"
+#include "drivers/net/datagram.hpp"
 
 namespace locus::sim {
 

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "core/pose.hpp"
-#include "drivers/datagram.hpp"
-#include "drivers/velodyne_model.hpp"
+#include "core/base/pose.hpp"
+#include "drivers/net/datagram.hpp"
+#include "drivers/velodyne/model.hpp"
 #include "locus_sim/quick_dice.hpp"
 #include "locus_sim/scene.hpp"
 #include "locus_sim/seen_space.hpp"

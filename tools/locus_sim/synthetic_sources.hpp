@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "core/motion_sample.hpp"
+#include "core/sources/motion_sample.hpp"
 #include "locus_sim/quick_dice.hpp"
 #include "locus_sim/trajectory.hpp"
 

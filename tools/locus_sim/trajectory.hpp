@@ -7,8 +7,8 @@
 #include <functional>
 #include <vector>
 
-#include "core/pose.hpp"
-#include "core/stamp.hpp"
+#include "core/base/pose.hpp"
+#include "core/base/stamp.hpp"
 #include "locus_sim/course.hpp"
 #include "locus_sim/jet.hpp"
 

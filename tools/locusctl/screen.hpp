@@ -6,7 +6,7 @@
 
 #include <termios.h>
 
-#include "core/stamp.hpp"
+#include "core/base/stamp.hpp"
 
 namespace locus::tools {
 

@@ -21,10 +21,10 @@
 #include <unistd.h>
 
 #include "daemon/machine_time.hpp"
-#include "drivers/ip_address.hpp"
+#include "drivers/files/udp_frame.hpp"
 #include "drivers/lidar_input.hpp"
-#include "drivers/udp_frame.hpp"
-#include "drivers/udp_socket.hpp"
+#include "drivers/net/ip_address.hpp"
+#include "drivers/net/udp_socket.hpp"
 #include "locus_replay/failure.hpp"
 
 namespace locus::tools {

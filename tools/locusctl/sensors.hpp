@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "core/stamp.hpp"
+#include "core/base/stamp.hpp"
 
 namespace locus::tools {
 

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "core/pose.hpp"
+#include "core/base/pose.hpp"
 
 namespace locus::tools {
 namespace {

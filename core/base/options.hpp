@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/isa.hpp"
+#include "core/base/pose.hpp"
+#include "core/base/stamp.hpp"
+
+namespace locus {
+
+/// What can be set about the algorithm, module by module. A field is named as its key in the YAML file, the unit in its
+/// name. problem() says what is wrong, one line "key: reason" for each key that is, and nothing when all is well.
+
+struct BodyBoxOptions { ///< returns inside the box belong to the robot itself and are dropped
+  bool enabled = false;
+  Eigen::Vector3d min_m = Eigen::Vector3d::Zero(); ///< base frame
+  Eigen::Vector3d max_m = Eigen::Vector3d::Zero();
+
+  bool operator==(const BodyBoxOptions&) const = default;
+};
+
+struct SegmentFilterOptions { ///< centroids of short arcs of each ring, in firing order; its leaf follows the scene
+  bool enabled = true;
+  std::size_t points = 2000; ///< aimed at per sweep
+
+  bool operator==(const SegmentFilterOptions&) const = default;
+};
+
+struct VoxelFilterOptions { ///< one centroid per voxel (paper II-A)
+  bool enabled = false;
+  double leaf_m = 0.1;
+
+  bool operator==(const VoxelFilterOptions&) const = default;
+};
+
+struct RandomFilterOptions { ///< keeps a seeded random share of the points (paper II-A)
+  bool enabled = false;
+  double keep = 0.1; ///< share kept, 0..1
+
+  bool operator==(const RandomFilterOptions&) const = default;
+};
+
+/// How returns become the points of a sweep (paper II-A).
+struct SweepOptions {
+  std::optional<Duration> sweep_period; ///< nothing: one revolution of the first lidar (key sweep_period_ms: auto)
+  bool motion_correction = true;
+  double min_range_m = 0.5, max_range_m = 100.0; ///< key range_m: [min, max]
+  BodyBoxOptions body_box;
+  SegmentFilterOptions segment_filter;
+  VoxelFilterOptions voxel_filter;
+  RandomFilterOptions random_filter;
+  std::uint64_t seed = 1;
+  Isa isa = best_isa(); ///< no key: a result of the machine, or of the environment variable LOCUS_ISA
+
+  [[nodiscard]] std::optional<std::string> problem() const;
+  bool operator==(const SweepOptions&) const = default;
+};
+
+enum class ScanToScanMode { always, automatic, off }; ///< automatic (key: auto): only without a healthy six-axis prior
+
+struct RegistrationOptions {
+  int max_iterations = 20;           ///< Gauss-Newton steps at most
+  double max_correspondence_m = 1.0; ///< points farther than this from their counterpart do not count
+
+  bool operator==(const RegistrationOptions&) const = default;
+};
+
+struct MapOptions {
+  double keyframe_m = 1.0;    ///< the map takes a sweep after every so many metres ...
+  double keyframe_deg = 30.0; ///< ... or so many degrees (paper II-B.3)
+  std::size_t max_bytes = 100'000'000;
+
+  bool operator==(const MapOptions&) const = default;
+};
+
+enum class SourceKind { imu, odometry }; ///< imu gives rotation only, odometry all six axes
+
+struct MotionSourceOptions {
+  std::string name;
+  SourceKind kind = SourceKind::odometry;
+  Pose T_base_source; ///< imu: where the sensor sits and how it is turned
+
+  bool operator==(const MotionSourceOptions&) const = default;
+};
+
+enum class Fusion { combined, queue }; ///< combined: gyro rotation with odometry translation; queue: paper II-B.1
+enum class NoSourcePrior { constant_velocity, identity }; ///< identity: paper II-B.2
+enum class FlatGround { off, on, automatic };             ///< automatic (key: auto)
+
+/// Everything Odometry wants to know.
+struct OdometryOptions {
+  std::vector<MotionSourceOptions> motion_sources; ///< highest priority first
+  Fusion fusion = Fusion::combined;
+  NoSourcePrior no_source_prior = NoSourcePrior::constant_velocity;
+  ScanToScanMode scan_to_scan_mode = ScanToScanMode::automatic; ///< key scan_to_scan.mode
+  RegistrationOptions scan_to_scan{20, 1.0};
+  RegistrationOptions scan_to_submap{20, 0.5};
+  MapOptions map;
+  FlatGround flat_ground = FlatGround::off;
+  int threads = 2;
+  Isa isa = best_isa(); ///< no key: a result of the machine, or of the environment variable LOCUS_ISA
+
+  [[nodiscard]] std::optional<std::string> problem() const;
+  bool operator==(const OdometryOptions&) const = default;
+};
+
+} // namespace locus

@@ -1,0 +1,332 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/ingest/sweep_builder.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+namespace locus {
+
+namespace {
+
+constexpr int kFullTurn_cdeg = 36000;
+constexpr Duration kMinPeriod = std::chrono::milliseconds{40}; ///< 1500 rpm
+constexpr Duration kMaxPeriod = std::chrono::milliseconds{250};
+constexpr Duration kDefaultPeriod = std::chrono::milliseconds{100};
+
+/// A gap longer than this is a jump of the clock or a new start, not a run of empty windows.
+constexpr Duration kMaxPause = std::chrono::seconds{60};
+
+/// So many late packets in a row, and for so long: what a network held up comes late, too, but then all at once.
+constexpr std::uint64_t kLatePacketsToRestart = 500;
+constexpr Duration kLateToRestart = std::chrono::milliseconds{500};
+
+constexpr std::size_t kReturnsPerSegmentPoint = 4; ///< room for what the leaf has not learned yet
+
+/// Of one salvo: -1 for a return fired in [first_ns, last_ns) and within range, 0 for all others. Counts those fired.
+RingSegments::Mask select(const Salvo& salvo, std::int32_t first_ns, std::int32_t last_ns, float min_range_m,
+                          float max_range_m, std::size_t& fired) {
+  RingSegments::Mask counts;
+  std::int32_t number = 0;
+  for (std::size_t k = 0; k < Salvo::kLasers; ++k) { // masks instead of conditions: branches would make 16 laps of it
+    const float range_m = salvo.range_m[k];
+    const std::int32_t offset_ns = salvo.offset_ns[k];
+    const std::int32_t is_return = -(range_m > 0.0F) & -(offset_ns >= first_ns) & -(offset_ns < last_ns);
+    number -= is_return;
+    counts[k] = is_return & -(range_m >= min_range_m) & -(range_m <= max_range_m);
+  }
+  fired += static_cast<std::size_t>(number);
+  return counts;
+}
+
+} // namespace
+
+void RevolutionTimer::observe(const LidarPacket& packet) {
+  constexpr double kMaxStep_s = 0.02;
+  constexpr double kForget = 0.995; ///< a memory of a few sweeps
+  if (lidar_ && packet.lidar > *lidar_)
+    return;
+  const bool follows = lidar_ == packet.lidar;
+  const double step_s = to_seconds(packet.stamp - last_stamp_);
+  const int step_cdeg = (packet.first_azimuth_cdeg + kFullTurn_cdeg - last_azimuth_cdeg_) % kFullTurn_cdeg;
+  lidar_ = packet.lidar;
+  last_stamp_ = packet.stamp;
+  last_azimuth_cdeg_ = packet.first_azimuth_cdeg;
+  if (!follows || step_s <= 0.0 || step_s > kMaxStep_s || step_cdeg == 0)
+    return;
+  azimuth_sum_cdeg_ = kForget * azimuth_sum_cdeg_ + step_cdeg;
+  time_sum_s_ = kForget * time_sum_s_ + step_s;
+}
+
+Duration RevolutionTimer::period() const {
+  if (azimuth_sum_cdeg_ <= 0.0)
+    return kDefaultPeriod;
+  return std::clamp(from_seconds(kFullTurn_cdeg * time_sum_s_ / azimuth_sum_cdeg_), kMinPeriod, kMaxPeriod);
+}
+
+SweepBuilder::SweepBuilder(const SweepOptions& options, std::vector<Pose> T_base_lidar, MotionSources sources,
+                           std::size_t max_returns, Sink sink, StageClock* clock)
+    : options_(options), T_base_lidar_(std::move(T_base_lidar)), sources_(std::move(sources)), sink_(std::move(sink)),
+      clock_(clock), max_returns_(max_returns),
+      segments_(T_base_lidar_.size(), options.segment_filter.points, options.isa),
+      normals_(RingSegments::kMaxSegments, options.isa),
+      voxel_filter_(options.voxel_filter, options.voxel_filter.enabled ? max_returns : 0),
+      random_filter_(options.random_filter, options.seed) {
+  const std::size_t points =
+      options.segment_filter.enabled ? kReturnsPerSegmentPoint * options.segment_filter.points : max_returns;
+  sweep_.points.reserve(std::min(points, max_returns));
+  if (!options.segment_filter.enabled)
+    raw_.reserve(max_returns);
+}
+
+Duration SweepBuilder::period() const { return options_.sweep_period.value_or(revolution_.period()); }
+
+void SweepBuilder::add(const LidarPacket& packet, Stamp arrival) {
+  const StageScope scope(clock_, Stage::correct);
+  revolution_.observe(packet);
+  lag_ = std::max(Duration::zero(), arrival - packet.stamp);
+  const bool late = window_ && packet.stamp < window_->start - kMaxLateness;
+  if (late) {
+    ++counters_.late_packets;
+    late_since_ = consecutive_late_ == 0 ? arrival : std::min(late_since_, arrival);
+    if (++consecutive_late_ < kLatePacketsToRestart || arrival - late_since_ < kLateToRestart)
+      return;
+  }
+  consecutive_late_ = 0;
+  if (late || (window_ && packet.stamp > window_->end + kMaxPause)) {
+    close();
+    window_.reset();
+    ++counters_.restarts;
+  }
+  if (!window_)
+    open(packet.stamp);
+  else if (sweep_.sequence == 0)
+    window_->end = window_->start + period(); // the first window still learns how long a revolution is
+
+  while (packet.stamp >= window_->end)
+    close();
+  const Stamp after = packet.stamp + packet.duration;
+  append(packet, packet.stamp, std::min(after, window_->end));
+  if (after > window_->end) {
+    const Stamp cut = window_->end;
+    close();
+    append(packet, cut, after);
+  }
+}
+
+void SweepBuilder::advance(Stamp now) {
+  sources_.advance(now);
+  if (!window_ || now - lag_ > window_->end + kMaxPause)
+    return;
+  while (now - lag_ > window_->end + kGrace)
+    close();
+}
+
+void SweepBuilder::finish() {
+  if (window_ && 2 * (window_->last_firing - window_->start) > window_->end - window_->start) {
+    window_->end = window_->last_firing;
+    close();
+  }
+  window_.reset();
+}
+
+void SweepBuilder::open(Stamp start) {
+  window_.emplace(start, start + period());
+  if (options_.motion_correction)
+    window_->choice = sources_.choose(start);
+  window_->uncorrected = options_.motion_correction ? window_->choice.uncorrected() : Uncorrected::nothing;
+  sweep_.raw_returns = 0;
+  sweep_.path.count = 0;
+}
+
+Pose SweepBuilder::T_start_base(Stamp stamp) {
+  std::optional<Pose> T_start_base = follow_sources(stamp);
+  if (!T_start_base) {
+    hand_over(stamp);
+    T_start_base = follow_sources(stamp);
+  }
+  if (!T_start_base) // a packet from before a track begins
+    return window_->T_start_placed;
+  if (stamp > window_->placed) {
+    window_->placed = stamp;
+    window_->T_start_placed = *T_start_base;
+  }
+  return *T_start_base;
+}
+
+/// Where the base was after the sources of the window; nothing where one of them has fallen silent. Whatever none of
+/// them tells, but one did when the window began, goes on as it went.
+std::optional<Pose> SweepBuilder::follow_sources(Stamp stamp) const {
+  const SourceChoice& choice = window_->choice;
+  std::optional<Pose> T_anchor_base = sources_.motion(choice, window_->anchor, stamp);
+  if (!T_anchor_base)
+    return std::nullopt;
+  if (choice.uncorrected() != window_->uncorrected) {
+    const Pose T_coasting = se3_exp(to_seconds(stamp - window_->anchor) * last_twist_base_);
+    if (!choice.translation)
+      T_anchor_base->translation = T_coasting.translation;
+    if (!choice.rotation)
+      T_anchor_base->rotation = T_coasting.rotation;
+  }
+  return window_->T_start_anchor * *T_anchor_base;
+}
+
+/// A source has fallen silent in mid-sweep: the next best one takes over where it was last heard.
+void SweepBuilder::hand_over(Stamp now) {
+  window_->anchor = window_->placed;
+  window_->T_start_anchor = window_->T_start_placed;
+  window_->choice = sources_.choose(now);
+}
+
+/// Leaves out the returns that hit the robot itself.
+void SweepBuilder::leave_out_body(const Pose& T_base_lidar, const Salvo& salvo, RingSegments::Mask& counts) const {
+  const BodyBoxOptions& box = options_.body_box;
+  const Eigen::Matrix3f R = T_base_lidar.R().cast<float>();
+  const Eigen::Vector3f t = T_base_lidar.translation.cast<float>();
+  const Eigen::Array3f min_m = box.min_m.cast<float>(), max_m = box.max_m.cast<float>();
+  for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
+    const Eigen::Array3f p_base = R * Eigen::Vector3f{salvo.x_m[k], salvo.y_m[k], salvo.z_m[k]} + t;
+    if ((p_base > min_m).all() && (p_base < max_m).all())
+      counts[k] = 0;
+  }
+}
+
+/// Within the packet the motion is taken as linear: a transform and its rate.
+PacketMotion SweepBuilder::motion_of(const LidarPacket& packet) {
+  const Pose& T_base_lidar = T_base_lidar_[packet.lidar];
+  const Pose T_start_begin = T_start_base(packet.stamp);
+  note_place(packet.stamp, T_start_begin);
+  const Pose begin = T_start_begin * T_base_lidar;
+  const Pose end = T_start_base(packet.stamp + packet.duration) * T_base_lidar;
+  const double per_s = 1.0 / std::max(1e-9, to_seconds(packet.duration));
+  const Eigen::Matrix3d R = begin.R();
+  return {R.cast<float>(), begin.translation.cast<float>(), (per_s * (end.R() - R)).cast<float>(),
+          (per_s * (end.translation - begin.translation)).cast<float>(),
+          static_cast<float>(to_seconds(packet.stamp - window_->start))};
+}
+
+/// Remembers the way of the base in even steps.
+void SweepBuilder::note_place(Stamp stamp, const Pose& T_start_base) {
+  CorrectedPath& path = sweep_.path;
+  constexpr std::size_t kSteps = CorrectedPath::kMaxPlaces - 1; // and the end
+  const bool soon = path.count > 0 &&
+                    stamp < path.places[path.count - 1].stamp + (window_->end - window_->start) / Duration::rep{kSteps};
+  if (options_.motion_correction && !soon && path.count < kSteps)
+    path.places[path.count++] = {stamp, T_start_base};
+}
+
+/// Takes in the returns fired in [from, to).
+void SweepBuilder::append(const LidarPacket& packet, Stamp from, Stamp to) {
+  const PacketMotion motion = motion_of(packet);
+  segments_.begin_packet(packet.lidar, motion);
+  constexpr std::int32_t kAhead = std::numeric_limits<std::int32_t>::min();
+  // The first part takes what was fired ahead of the stamp, too.
+  const std::int32_t first_ns =
+      from == packet.stamp ? kAhead : static_cast<std::int32_t>((from - packet.stamp).count());
+  const auto last_ns = static_cast<std::int32_t>((to - packet.stamp).count());
+  const auto min_range_m = static_cast<float>(options_.min_range_m);
+  const auto max_range_m = static_cast<float>(options_.max_range_m);
+  for (const Salvo& salvo : packet.salvos()) {
+    RingSegments::Mask counts;
+    run_as(options_.isa,
+           [&] { counts = select(salvo, first_ns, last_ns, min_range_m, max_range_m, sweep_.raw_returns); });
+    if (options_.body_box.enabled)
+      leave_out_body(T_base_lidar_[packet.lidar], salvo, counts);
+    counters_.overflowed_points += segments_.add(packet.lidar, salvo, counts);
+    if (!options_.segment_filter.enabled)
+      keep_singly(packet.lidar, salvo, counts, motion);
+  }
+  window_->last_firing = std::max(window_->last_firing, to);
+}
+
+/// Keeps the returns themselves; their segments only give them normals.
+void SweepBuilder::keep_singly(std::size_t lidar, const Salvo& salvo, const RingSegments::Mask& counts,
+                               const PacketMotion& motion) {
+  for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
+    const std::uint32_t segment = segments_.latest(lidar, salvo.first_laser + k);
+    if (counts[k] == 0 || segment == RingSegments::kNone)
+      continue;
+    if (raw_.size() == max_returns_) {
+      ++counters_.overflowed_points;
+      continue;
+    }
+    const LidarReturn r = salvo[k];
+    const float time_s = motion.stamp_s + 1e-9F * static_cast<float>(r.offset_ns);
+    raw_.push_back({{motion.place({r.x_m, r.y_m, r.z_m}, time_s), Eigen::Vector3f::Zero(), time_s,
+                     static_cast<float>(r.intensity), static_cast<std::uint16_t>(lidar * 256U + r.ring)},
+                    segment});
+  }
+}
+
+/// The filters over the sweep, and the normals, which are found on the segments whatever becomes of these.
+void SweepBuilder::reduce(float duration_s) {
+  segments_.finish(duration_s, sweep_.points);
+  {
+    const StageScope scope(clock_, Stage::covariance);
+    normals_.estimate(sweep_.points);
+  }
+  if (!options_.segment_filter.enabled) {
+    for (RawPoint& raw : raw_) {
+      if (const std::uint32_t place = segments_.place_of(raw.segment); place != RingSegments::kNone)
+        raw.point.normal_base = sweep_.points[place].normal_base;
+      raw.point.age_s = duration_s - raw.point.age_s;
+    }
+    sweep_.points.clear();
+    for (const RawPoint& raw : raw_)
+      sweep_.points.push_back(raw.point);
+    raw_.clear();
+  }
+  if (options_.voxel_filter.enabled)
+    voxel_filter_.apply(sweep_.points);
+  if (options_.random_filter.enabled)
+    random_filter_.apply(sweep_.points);
+  sweep_.registered = sweep_.points.size();
+  if (options_.segment_filter.enabled && sweep_.points.size() > options_.segment_filter.points)
+    choose_registered();
+}
+
+/// Moves as many points to the front as are wanted, evenly chosen along the scan lines.
+void SweepBuilder::choose_registered() {
+  const std::size_t wanted = options_.segment_filter.points;
+  const std::size_t total = sweep_.points.size();
+  unregistered_.clear();
+  sweep_.registered = 0;
+  for (std::size_t i = 0; i < total; ++i) {
+    if ((i + 1) * wanted / total != i * wanted / total)
+      sweep_.points[sweep_.registered++] = sweep_.points[i];
+    else
+      unregistered_.push_back(sweep_.points[i]);
+  }
+  std::copy(unregistered_.begin(), unregistered_.end(), sweep_.points.begin() + static_cast<std::ptrdiff_t>(wanted));
+}
+
+void SweepBuilder::move_to_end() {
+  const Pose T_start_end = T_start_base(window_->end);
+  last_twist_base_ = se3_log(T_start_end) / to_seconds(window_->end - window_->start);
+  if (options_.motion_correction)
+    sweep_.path.places[sweep_.path.count++] = {window_->end, T_start_end};
+  if (T_start_end == Pose{})
+    return;
+  const Pose T_end_start = T_start_end.inverse();
+  const Eigen::Matrix3f R = T_end_start.R().cast<float>();
+  const Eigen::Vector3f t = T_end_start.translation.cast<float>();
+  for (SweepPoint& point : sweep_.points) {
+    point.position_base_m = R * point.position_base_m + t;
+    point.normal_base = R * point.normal_base;
+  }
+}
+
+void SweepBuilder::close() {
+  const StageScope scope(clock_, Stage::filter);
+  sweep_.start = window_->start;
+  sweep_.end = window_->end;
+  sweep_.uncorrected = window_->uncorrected;
+  reduce(static_cast<float>(to_seconds(sweep_.end - sweep_.start)));
+  move_to_end();
+  sweep_.motion = sources_.sensed_in(sweep_.start, sweep_.end);
+  sink_(sweep_);
+  ++sweep_.sequence;
+  open(window_->end);
+}
+
+} // namespace locus

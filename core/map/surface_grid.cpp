@@ -1,0 +1,349 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/map/surface_grid.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include "core/base/principal_axes.hpp"
+
+namespace locus {
+
+namespace {
+
+/// A point stands for a disc, or for a ball where its normal is not known; the radius as a share of the voxel.
+constexpr float kDiscRadiusInLeaves = 0.5F;
+
+/// Points on a plane spread in two directions, by an absolute and by a relative measure (one scan line spreads in one
+/// only), and little across them. With discs around them they always spread, so there the test across may be milder.
+constexpr float kMinSpreadInLeaves = 0.15F;
+constexpr float kMinMiddleToGreatest = 0.05F;
+constexpr float kMaxAcrossToMiddle = 0.05F;
+constexpr float kMaxAcrossToMiddleOfDiscs = 0.15F;
+constexpr float kMaxRoughness_m = 0.15F;
+
+/// Enough to be judged by where they lie alone.
+constexpr float kEnoughPoints = 4.0F;
+
+/// Least share of the points' own normals that must agree with the plane: where wall and floor meet, a few points of
+/// the one tilt the plane through the many of the other, and the tilt drags the map along with the scan lines.
+constexpr float kMinAgreement = 0.8F;
+
+/// Older points fade once a voxel has seen this many, so a long stay does not freeze it.
+constexpr float kMaxCount = 400.0F;
+
+constexpr std::size_t kEvictionAttempts = 64;
+
+/// Voxels that are looked for at a time: their waits for memory overlap.
+constexpr std::size_t kAtOnce = 64;
+
+using PerVoxel = std::array<float, kAtOnce>;
+using Symmetric = Symmetric3<float>;
+
+/// What is known of the points of some voxels, and the surfaces that follow from it.
+struct Fits {
+  PerVoxel count, x, y, z, xx, xy, xz, yy, yz, zz; ///< sums over the points
+  PerVoxel nxx, nxy, nxz, nyy, nyz, nzz;
+  PerVoxel mean_x, mean_y, mean_z, normal_x, normal_y, normal_z, variance_m2, strewn_m2;
+};
+
+/// -1 for a plane, else 0; masks instead of conditions, which would be branches.
+[[gnu::always_inline]] inline std::int32_t is_plane(const PrincipalAxes<float>& axes, float min_spread_m2,
+                                                    float max_across_to_middle, float agreement, float normals) {
+  return -(axes.middle > min_spread_m2) & -(axes.middle > kMinMiddleToGreatest * axes.greatest) &
+         -(axes.least < max_across_to_middle * axes.middle) & -(axes.least < kMaxRoughness_m * kMaxRoughness_m) &
+         -(agreement >= kMinAgreement * normals);
+}
+
+/// v' m v
+[[gnu::always_inline]] inline float quadratic(const Symmetric& m, float x, float y, float z) {
+  return m.xx * x * x + m.yy * y * y + m.zz * z * z + 2.0F * (m.xy * x * y + m.xz * x * z + m.yz * y * z);
+}
+
+[[gnu::always_inline]] inline void fit_all(Fits& voxels, float leaf_m) {
+  const float min_spread_m2 = kMinSpreadInLeaves * kMinSpreadInLeaves * leaf_m * leaf_m;
+  const float along_m2 = kDiscRadiusInLeaves * kDiscRadiusInLeaves * leaf_m * leaf_m;
+  Fits f = voxels; // what is written is not what is read: vector instructions
+  for (std::size_t i = 0; i < kAtOnce; ++i) {
+    const float share = 1.0F / voxels.count[i];
+    const float x = share * voxels.x[i], y = share * voxels.y[i], z = share * voxels.z[i];
+    const Symmetric scatter{share * voxels.xx[i] - x * x, share * voxels.xy[i] - x * y, share * voxels.xz[i] - x * z,
+                            share * voxels.yy[i] - y * y, share * voxels.yz[i] - y * z, share * voxels.zz[i] - z * z};
+    const Symmetric normals{voxels.nxx[i], voxels.nxy[i], voxels.nxz[i], voxels.nyy[i], voxels.nyz[i], voxels.nzz[i]};
+    const float known = normals.xx + normals.yy + normals.zz; // as many as there are: they are of unit length
+    const float disc = share * (kPointVariance_m2 - along_m2);
+    const PrincipalAxes<float> points = principal_axes<float>(scatter);
+    const PrincipalAxes<float> discs =
+        principal_axes<float>({scatter.xx + along_m2 + disc * normals.xx, scatter.xy + disc * normals.xy,
+                               scatter.xz + disc * normals.xz, scatter.yy + along_m2 + disc * normals.yy,
+                               scatter.yz + disc * normals.yz, scatter.zz + along_m2 + disc * normals.zz});
+    const std::int32_t enough = -(voxels.count[i] >= kEnoughPoints);
+    const std::int32_t by_points = enough & is_plane(points, min_spread_m2, kMaxAcrossToMiddle,
+                                                     quadratic(normals, points.x, points.y, points.z), known);
+    const std::int32_t by_discs =
+        is_plane(discs, min_spread_m2, kMaxAcrossToMiddleOfDiscs, quadratic(normals, discs.x, discs.y, discs.z), known);
+    const auto best = [=](float of_points, float of_discs) { return by_points != 0 ? of_points : of_discs; };
+    const auto planar = static_cast<float>(-(by_points | by_discs)), strewn = static_cast<float>(-enough);
+    const float least = std::max(best(points.least, discs.least), kPointVariance_m2);
+    f.mean_x[i] = x;
+    f.mean_y[i] = y;
+    f.mean_z[i] = z;
+    f.normal_x[i] = best(points.x, discs.x);
+    f.normal_y[i] = best(points.y, discs.y);
+    f.normal_z[i] = best(points.z, discs.z);
+    f.variance_m2[i] = planar * least - (1.0F - planar);
+    f.strewn_m2[i] = strewn * ((scatter.xx + scatter.yy + scatter.zz) / 3.0F + kPointVariance_m2) - (1.0F - strewn);
+  }
+  voxels = f;
+}
+
+/// std::floor is a call where the baseline has no instruction for it.
+std::int32_t floor_of(double v) {
+  const auto truncated = static_cast<std::int32_t>(v);
+  return truncated - (v < truncated ? 1 : 0);
+}
+
+std::uint64_t hash_of(VoxelIndex index) {
+  const auto bits = [](std::int32_t i) {
+    return static_cast<std::uint64_t>(static_cast<std::uint32_t>(i)) & 0x1FFFFFU;
+  };
+  std::uint64_t h = bits(index.x) | bits(index.y) << 21U | bits(index.z) << 42U;
+  h *= 0xD6E8FEB86659FD93ULL;
+  return h ^ h >> 32U;
+}
+
+} // namespace
+
+SurfaceGrid::SurfaceGrid(double leaf_m, std::size_t max_bytes, Isa isa) : leaf_m_(leaf_m), isa_(isa) {
+  constexpr std::size_t kBytesPerVoxel = sizeof(Voxel) + sizeof(Moments) + sizeof(std::uint32_t) + 4 * sizeof(Entry);
+  const std::size_t capacity = std::max<std::size_t>(max_bytes / kBytesPerVoxel, 64);
+  entries_.resize(std::bit_ceil(2 * capacity));
+  voxels_.resize(capacity);
+  moments_.resize(capacity);
+  touched_.reserve(capacity);
+}
+
+VoxelIndex SurfaceGrid::index_of(const Eigen::Vector3d& point_m) const {
+  const auto cell = [this](double v) { return floor_of(v / leaf_m_ + 0.5); };
+  return {cell(point_m.x()), cell(point_m.y()), cell(point_m.z())};
+}
+
+Eigen::Vector3d SurfaceGrid::centre_of(VoxelIndex index) const {
+  return leaf_m_ *
+         Eigen::Vector3d{static_cast<double>(index.x), static_cast<double>(index.y), static_cast<double>(index.z)};
+}
+
+std::size_t SurfaceGrid::home_of(VoxelIndex index) const { return hash_of(index) & (entries_.size() - 1); }
+
+std::uint32_t SurfaceGrid::slot_of(VoxelIndex index, std::uint64_t hash) const {
+  const auto tag = static_cast<std::uint32_t>(hash >> 32U);
+  const std::size_t mask = entries_.size() - 1;
+  for (std::size_t i = hash & mask;; i = (i + 1) & mask) {
+    const Entry& entry = entries_[i];
+    if (entry.slot == kEmpty || (entry.tag == tag && voxels_[entry.slot].index == index))
+      return entry.slot;
+  }
+}
+
+const Surface* SurfaceGrid::find(VoxelIndex index) const {
+  const std::uint32_t slot = slot_of(index, hash_of(index));
+  return slot == kEmpty ? nullptr : &voxels_[slot].surface;
+}
+
+void SurfaceGrid::find(std::span<const VoxelIndex> indices, std::span<const Surface*> surfaces) const {
+  std::array<std::uint64_t, kAtOnce> hashes;
+  const std::size_t mask = entries_.size() - 1;
+  for (std::size_t begin = 0; begin < indices.size(); begin += kAtOnce) {
+    const std::size_t count = std::min(kAtOnce, indices.size() - begin);
+    for (std::size_t i = 0; i < count; ++i) {
+      hashes[i] = hash_of(indices[begin + i]);
+      __builtin_prefetch(&entries_[hashes[i] & mask]);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      const Entry& home = entries_[hashes[i] & mask];
+      if (home.slot != kEmpty)
+        __builtin_prefetch(&voxels_[home.slot]);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint32_t slot = slot_of(indices[begin + i], hashes[i]);
+      surfaces[begin + i] = slot == kEmpty ? nullptr : &voxels_[slot].surface;
+    }
+  }
+}
+
+std::uint32_t SurfaceGrid::find_or_create(VoxelIndex index, std::uint64_t hash) {
+  const std::uint32_t found = slot_of(index, hash);
+  if (found != kEmpty)
+    return found;
+  const std::uint32_t slot = take_slot();
+  voxels_[slot] = {index, Surface{}};
+  moments_[slot] = Moments{};
+  const std::size_t mask = entries_.size() - 1;
+  std::size_t i = hash & mask;
+  while (entries_[i].slot != kEmpty)
+    i = (i + 1) & mask;
+  entries_[i] = {static_cast<std::uint32_t>(hash >> 32U), slot};
+  return slot;
+}
+
+std::uint32_t SurfaceGrid::take_slot() {
+  if (used_ < capacity())
+    return static_cast<std::uint32_t>(used_++);
+  if (2 * touched_.size() > capacity())
+    refresh(); // touched voxels cannot be evicted, and there must be some that can
+  const double radius2 = protected_radius_m_ * protected_radius_m_;
+  const auto is_near = [&] { return (centre(hand_) - protected_centre_m_).squaredNorm() < radius2; };
+  for (std::size_t attempt = 0; attempt < kEvictionAttempts && is_near(); ++attempt)
+    hand_ = (hand_ + 1) % capacity();
+  while (moments_[hand_].touched)
+    hand_ = (hand_ + 1) % capacity();
+  const std::size_t slot = hand_;
+  hand_ = (hand_ + 1) % capacity();
+  erase_entry(voxels_[slot].index);
+  ++evicted_;
+  return static_cast<std::uint32_t>(slot);
+}
+
+/// Linear probing without tombstones: entries behind the gap move up as long as that brings them nearer to their home.
+void SurfaceGrid::erase_entry(VoxelIndex index) {
+  const std::size_t mask = entries_.size() - 1;
+  std::size_t gap = home_of(index);
+  while (voxels_[entries_[gap].slot].index != index)
+    gap = (gap + 1) & mask;
+  for (std::size_t i = (gap + 1) & mask; entries_[i].slot != kEmpty; i = (i + 1) & mask) {
+    const std::size_t home = home_of(voxels_[entries_[i].slot].index);
+    if (((i - home) & mask) >= ((i - gap) & mask)) {
+      entries_[gap] = entries_[i];
+      gap = i;
+    }
+  }
+  entries_[gap] = Entry{};
+}
+
+/// Where points fall: voxels, and offsets from their centres.
+struct SurfaceGrid::Places {
+  std::array<std::int32_t, Points::kMost> cell_x, cell_y, cell_z;
+  std::array<float, Points::kMost> x_m, y_m, z_m;
+  std::array<std::uint64_t, Points::kMost> hash;
+};
+
+/// What is out of reach goes anywhere.
+void SurfaceGrid::place(const Points& points, Places& places) const {
+  const auto along = [leaf_m = leaf_m_](const auto& points_m, auto& cell, auto& offset_m) {
+    const double per_m = 1.0 / leaf_m;
+    for (std::size_t i = 0; i < Points::kMost; ++i) {
+      const double cells = std::clamp(points_m[i] * per_m, -2.0 * kMaxIndex, 2.0 * kMaxIndex) + 0.5;
+      const auto truncated = static_cast<std::int32_t>(cells);
+      cell[i] = truncated - static_cast<std::int32_t>(cells < static_cast<double>(truncated));
+    }
+    for (std::size_t i = 0; i < Points::kMost; ++i)
+      offset_m[i] = static_cast<float>(points_m[i] - leaf_m * static_cast<double>(cell[i]));
+  };
+  run_as(isa_, [&] {
+    along(points.x_m, places.cell_x, places.x_m);
+    along(points.y_m, places.cell_y, places.y_m);
+    along(points.z_m, places.cell_z, places.z_m);
+  });
+}
+
+std::size_t SurfaceGrid::insert(const Points& points) {
+  Places places;
+  place(points, places);
+  const auto index_of_place = [&](std::size_t i) {
+    return VoxelIndex{places.cell_x[i], places.cell_y[i], places.cell_z[i]};
+  };
+  const std::size_t mask = entries_.size() - 1;
+  for (std::size_t i = 0; i < points.count; ++i) {
+    places.hash[i] = hash_of(index_of_place(i));
+    __builtin_prefetch(&entries_[places.hash[i] & mask]);
+  }
+  for (std::size_t i = 0; i < points.count; ++i)
+    if (const Entry& home = entries_[places.hash[i] & mask]; home.slot != kEmpty)
+      __builtin_prefetch(&moments_[home.slot], 1);
+  std::size_t fresh = 0;
+  for (std::size_t i = 0; i < points.count; ++i) {
+    if (!reaches(points.position_m(i)))
+      continue;
+    const std::uint32_t slot = find_or_create(index_of_place(i), places.hash[i]);
+    add(points, places, i, slot);
+    fresh += moments_[slot].fresh ? 1U : 0U;
+  }
+  return fresh;
+}
+
+void SurfaceGrid::add(const Points& points, const Places& places, std::size_t i, std::uint32_t slot) {
+  Moments& moments = moments_[slot];
+  if (!moments.touched) {
+    moments.touched = true;
+    touched_.push_back(slot);
+  }
+  if (moments.sums[kCount] >= kMaxCount)
+    for (float& sum : moments.sums)
+      sum *= 0.5F;
+  const float x = places.x_m[i], y = places.y_m[i], z = places.z_m[i];
+  const float nx = points.normal_x[i], ny = points.normal_y[i], nz = points.normal_z[i];
+  const std::array<float, kSums> of_point{1.0F,  x,     y,       z,       x * x,   x * y,   x * z,   y * y,
+                                          y * z, z * z, nx * nx, nx * ny, nx * nz, ny * ny, ny * nz, nz * nz};
+  for (std::size_t sum = 0; sum < kSums; ++sum)
+    moments.sums[sum] += of_point[sum];
+}
+
+/// At most kAtOnce of them.
+void SurfaceGrid::fit(std::span<const std::uint32_t> slots) {
+  Fits fits{};
+  fits.count.fill(1.0F);
+  for (std::size_t i = 0; i < slots.size(); ++i) {
+    Moments& moments = moments_[slots[i]];
+    const auto& sums = moments.sums;
+    fits.count[i] = sums[kCount];
+    fits.x[i] = sums[kX];
+    fits.y[i] = sums[kY];
+    fits.z[i] = sums[kZ];
+    fits.xx[i] = sums[kXx];
+    fits.xy[i] = sums[kXy];
+    fits.xz[i] = sums[kXz];
+    fits.yy[i] = sums[kYy];
+    fits.yz[i] = sums[kYz];
+    fits.zz[i] = sums[kZz];
+    fits.nxx[i] = sums[kNxx];
+    fits.nxy[i] = sums[kNxy];
+    fits.nxz[i] = sums[kNxz];
+    fits.nyy[i] = sums[kNyy];
+    fits.nyz[i] = sums[kNyz];
+    fits.nzz[i] = sums[kNzz];
+    moments.touched = moments.fresh = false;
+  }
+  run_as(isa_, [&] { fit_all(fits, static_cast<float>(leaf_m_)); });
+  for (std::size_t i = 0; i < slots.size(); ++i)
+    voxels_[slots[i]].surface = {{fits.mean_x[i], fits.mean_y[i], fits.mean_z[i]},
+                                 {fits.normal_x[i], fits.normal_y[i], fits.normal_z[i]},
+                                 fits.variance_m2[i],
+                                 fits.strewn_m2[i]};
+}
+
+void SurfaceGrid::refresh() {
+  for (std::size_t begin = 0; begin < touched_.size(); begin += kAtOnce)
+    fit(std::span(touched_).subspan(begin, std::min(kAtOnce, touched_.size() - begin)));
+  touched_.clear();
+}
+
+/// Every entry lies behind its voxel's home with no gap between, so emptying from each home to the next gap empties
+/// all.
+void SurfaceGrid::clear() {
+  const std::size_t mask = entries_.size() - 1;
+  for (std::size_t slot = 0; slot < used_; ++slot) {
+    for (std::size_t i = home_of(voxels_[slot].index); entries_[i].slot != kEmpty; i = (i + 1) & mask)
+      entries_[i] = Entry{};
+  }
+  touched_.clear();
+  used_ = 0;
+  hand_ = 0;
+}
+
+void SurfaceGrid::protect(const Eigen::Vector3d& centre_m, double radius_m) {
+  protected_centre_m_ = centre_m;
+  protected_radius_m_ = radius_m;
+}
+
+} // namespace locus

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/base/isa.hpp"
+#include "core/base/pose.hpp"
+
+namespace locus {
+
+/// Variance of one point across its surface: ranging noise of the lidars this is for (2 to 3 cm), averaged over the ten
+/// and more returns of an arc. On walls 6 mm are seen, of real lidars and of synthetic ones.
+inline constexpr float kPointVariance_m2 = 0.01F * 0.01F;
+
+/// Index of a voxel: 21 bits an axis, so 1000 km at half a metre.
+struct VoxelIndex {
+  std::int32_t x, y, z;
+  friend bool operator==(const VoxelIndex&, const VoxelIndex&) = default;
+};
+
+/// What registration reads of a voxel: the plane through its points, or how widely they are strewn.
+struct Surface {
+  Eigen::Vector3f mean_m = Eigen::Vector3f::Zero(); ///< from the centre of the voxel
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero(); ///< unit
+  float variance_m2 = -1.0F;                        ///< along the normal; negative: the points lie on no plane
+  float strewn_m2 = -1.0F; ///< mean variance of the points about their mean; negative: too few to tell
+  [[nodiscard]] bool planar() const { return variance_m2 > 0.0F; }
+  [[nodiscard]] bool shapeless() const { return !planar() && strewn_m2 > 0.0F; }
+};
+
+/// Running Gaussians of points in cubic voxels, found by hashing.
+///
+/// Only planes are read from it. Along a plane the points of a sweep lie where the scan lines happen to fall, a pattern
+/// that moves with the lidar: whatever else were read from a voxel would follow the robot. A voxel with enough points
+/// is judged by how they lie. One with fewer takes into account what each point knows of its surface: the moment match
+/// of discs, so a single point that knows its normal makes a plane. Voxels live in a pool of fixed size; when it is
+/// full the oldest one far from the robot gives way. Nothing walks the whole map. One writer or many readers.
+class SurfaceGrid {
+ public:
+  SurfaceGrid(double leaf_m, std::size_t max_bytes, Isa isa = best_isa());
+
+  /// Points and the unit normals of their surfaces, or zero: as many as are taken in at a time.
+  struct Points {
+    static constexpr std::size_t kMost = 64;
+    std::array<double, kMost> x_m{}, y_m{}, z_m{};
+    std::array<float, kMost> normal_x{}, normal_y{}, normal_z{};
+    std::size_t count = 0;
+    [[nodiscard]] Eigen::Vector3d position_m(std::size_t i) const { return {x_m[i], y_m[i], z_m[i]}; }
+  };
+
+  /// Takes in points. Call refresh() before the surfaces are read again. Points out of reach are left out. Returns how
+  /// many fell into voxels that were empty at the last refresh().
+  std::size_t insert(const Points& points);
+  /// Brings the surfaces of the voxels up to date that were written to since the last call.
+  void refresh();
+  void clear();
+  /// Voxels nearer than `radius_m` to `centre_m` are spared from eviction while there are others.
+  void protect(const Eigen::Vector3d& centre_m, double radius_m);
+
+  /// Whether a point is finite and within 2^20 voxels of the origin: 500 km at half a metre.
+  [[nodiscard]] bool reaches(const Eigen::Vector3d& point_m) const {
+    return (point_m.array().abs() < kMaxIndex * leaf_m_).all();
+  }
+
+  /// Precondition: reaches(point). The voxel whose centre, a multiple of the leaf, is nearest: the floor at height zero
+  /// does not lie between two of them.
+  [[nodiscard]] VoxelIndex index_of(const Eigen::Vector3d& point_m) const;
+  [[nodiscard]] Eigen::Vector3d centre_of(VoxelIndex index) const;
+  /// Nothing where no point has fallen.
+  [[nodiscard]] const Surface* find(VoxelIndex index) const;
+  /// The same for many at once, of equal number: their waits for memory overlap.
+  void find(std::span<const VoxelIndex> indices, std::span<const Surface*> surfaces) const;
+
+  [[nodiscard]] double leaf_m() const { return leaf_m_; }
+  [[nodiscard]] std::size_t size() const { return used_; }
+  [[nodiscard]] std::size_t capacity() const { return voxels_.size(); }
+  [[nodiscard]] std::uint64_t evicted() const { return evicted_; }
+  /// Slots 0..size()-1, in no order that means anything.
+  [[nodiscard]] const Surface& surface(std::size_t slot) const { return voxels_[slot].surface; }
+  [[nodiscard]] Eigen::Vector3d centre(std::size_t slot) const { return centre_of(voxels_[slot].index); }
+
+ private:
+  static constexpr double kMaxIndex = 1 << 20;
+  static constexpr std::uint32_t kEmpty = 0xFFFFFFFFU;
+  struct Entry {
+    std::uint32_t tag = 0; ///< upper half of the hash: most foreign voxels are told apart without a look at the pool
+    std::uint32_t slot = kEmpty;
+  };
+  struct Voxel {
+    VoxelIndex index;
+    Surface surface;
+  };
+  /// Sums over points, relative to the centre of the voxel.
+  enum Sum : std::size_t {
+    kCount,
+    kX,
+    kY,
+    kZ,
+    kXx,
+    kXy,
+    kXz,
+    kYy,
+    kYz,
+    kZz,
+    kNxx,
+    kNxy,
+    kNxz,
+    kNyy,
+    kNyz,
+    kNzz, ///< of the normals of those points that have one
+    kSums
+  };
+  struct Moments { ///< apart from Voxel, which is read far more often
+    std::array<float, kSums> sums{};
+    bool touched = false;
+    bool fresh = true; ///< not refreshed yet
+  };
+  struct Places;
+
+  [[nodiscard]] std::size_t home_of(VoxelIndex index) const;
+  [[nodiscard]] std::uint32_t slot_of(VoxelIndex index, std::uint64_t hash) const;
+  std::uint32_t find_or_create(VoxelIndex index, std::uint64_t hash);
+  void place(const Points& points, Places& places) const;
+  void add(const Points& points, const Places& places, std::size_t i, std::uint32_t slot);
+  std::uint32_t take_slot();
+  void erase_entry(VoxelIndex index);
+  void fit(std::span<const std::uint32_t> slots);
+
+  double leaf_m_;
+  Isa isa_;
+  std::vector<Entry> entries_; ///< open addressing, linear probing, power of two, at most half full
+  std::vector<Voxel> voxels_;
+  std::vector<Moments> moments_;
+  std::vector<std::uint32_t> touched_;
+  std::size_t used_ = 0;
+  std::size_t hand_ = 0; ///< next slot to be considered for eviction
+  std::uint64_t evicted_ = 0;
+  Eigen::Vector3d protected_centre_m_ = Eigen::Vector3d::Zero();
+  double protected_radius_m_ = 0.0;
+};
+
+} // namespace locus

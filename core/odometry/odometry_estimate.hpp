@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "core/base/pose.hpp"
+#include "core/base/stamp.hpp"
+#include "core/map/registration.hpp"
+
+namespace locus {
+
+enum class TrackingState : std::uint8_t { tracking, degenerate, dead_reckoning, standstill };
+
+/// Where the start of a registration came from.
+struct PriorSource {
+  static constexpr int kConstantVelocity = -1;
+  static constexpr int kIdentity = -2;
+  int rotation = kIdentity;    ///< index of a motion source, or one of the above
+  int translation = kIdentity; ///< the same
+};
+
+/// What one sweep says about the robot, with all that is needed to distrust it.
+struct OdometryEstimate {
+  Stamp stamp;                                ///< end of the sweep
+  Pose T_odom_base;                           ///< paper X_k
+  Matrix6 pose_covariance = Matrix6::Zero();  ///< of x, y, z and turns about the odom axes; since the start
+  Vector6 twist_base = Vector6::Zero();       ///< m/s and rad/s, base frame
+  Matrix6 twist_covariance = Matrix6::Zero(); ///< base frame
+  /// How well lidar sees x, y, z, roll, pitch and yaw of the base, from 0 (not at all) to 1: the share of the normals
+  /// around that lies along an axis, for turns the square of their mean lever in metres; after what a motion along the
+  /// other axes could be mistaken for is taken out.
+  Vector6 observability = Vector6::Zero();
+  TrackingState state = TrackingState::tracking;
+  PriorSource prior;
+  Registration scan_to_scan;   ///< paper equation 1; zero iterations where it did not run
+  Registration scan_to_submap; ///< paper equation 2
+  std::size_t points = 0;      ///< that were registered
+  bool failed = false;         ///< the registration was refused: the pose is the prediction
+  bool keyframe = false;       ///< the map took this sweep
+};
+
+} // namespace locus

@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/sources/health_metric.hpp"
+
+#include <algorithm>
+
+#include "core/sources/imu_self_check.hpp"
+#include "core/sources/motion_track.hpp"
+
+namespace locus {
+
+namespace {
+
+std::optional<HealthReason> reason_if(bool wrong, HealthReason reason) {
+  return wrong ? std::optional{reason} : std::nullopt;
+}
+
+/// What is farther than any robot or sensor goes is a number no more than NaN is: sums of it would never be again.
+class NotANumber : public HealthMetric {
+ public:
+  std::optional<HealthReason> judge(const SourceReading& reading) override {
+    return reason_if(!(reading.imu != nullptr ? is_number(*reading.imu) : is_number(*reading.odometry)),
+                     HealthReason::nan);
+  }
+
+ private:
+  static bool is_number(const ImuSample& sample) {
+    constexpr double kMost = 1e5; ///< deg/s and milli-g are heard too, for ImuSelfCheck to name them
+    return is_within(kMost, sample.angular_velocity_radps) && is_within(kMost, sample.specific_force_mps2) &&
+           (!sample.attitude || sample.attitude->coeffs().allFinite());
+  }
+  static bool is_number(const OdometrySample& sample) {
+    constexpr double kFarthest_m = 1e8; ///< geocentric coordinates are within it
+    constexpr double kLeastNorm = 0.5;  ///< of a quaternion that still says something
+    return is_within(kFarthest_m, sample.T_source_base.translation) && sample.T_source_base.finite() &&
+           sample.T_source_base.rotation.norm() > kLeastNorm;
+  }
+  static bool is_within(double most, const Eigen::Vector3d& v) { return (v.array().abs() <= most).all(); }
+};
+
+class OutOfOrder : public HealthMetric {
+ public:
+  std::optional<HealthReason> judge(const SourceReading& reading) override {
+    return reason_if(newest_ && reading.stamp <= *newest_, HealthReason::out_of_order);
+  }
+  void accept(const SourceReading& reading) override { newest_ = reading.stamp; }
+  void forget() override { newest_.reset(); }
+
+ private:
+  std::optional<Stamp> newest_;
+};
+
+/// A sample that comes later than tracks are extrapolated is of little use to the sweep it was made in.
+class Late : public HealthMetric {
+ public:
+  std::optional<HealthReason> judge(const SourceReading& reading) override {
+    constexpr Duration kMaxLatency = std::chrono::milliseconds{100};
+    return reason_if(reading.arrival - reading.stamp > kMaxLatency, HealthReason::stale);
+  }
+};
+
+class Uncertain : public HealthMetric {
+ public:
+  std::optional<HealthReason> judge(const SourceReading& reading) override {
+    constexpr double kMaxScale = 4.0; ///< twice the usual standard deviation
+    return reason_if(reading.odometry->covariance_scale > kMaxScale, HealthReason::covariance);
+  }
+};
+
+/// Tells a unit that hangs from a robot that stands. Readings of a living inertial unit are never the same to the last
+/// bit, unless it is made without noise, and then it reads no turn at rest.
+class FrozenImu : public HealthMetric {
+ public:
+  std::optional<HealthReason> judge(const SourceReading& reading) override {
+    const ImuSample& now = *reading.imu;
+    return reason_if(last_ && last_->angular_velocity_radps == now.angular_velocity_radps &&
+                         last_->specific_force_mps2 == now.specific_force_mps2 && !now.angular_velocity_radps.isZero(0),
+                     HealthReason::frozen);
+  }
+  void accept(const SourceReading& reading) override { last_ = *reading.imu; }
+
+ private:
+  std::optional<ImuSample> last_;
+};
+
+/// An odometry repeats its pose while the robot stands. It hangs if it was moving fast the sample before, for no robot
+/// stops like that, or if lidar goes on seeing the robot move.
+class FrozenOdometry : public HealthMetric {
+ public:
+  std::optional<HealthReason> judge(const SourceReading& reading) override {
+    if (!last_ || reading.odometry->T_source_base != *last_) {
+      frozen_ = false;
+      lidar_sees_twist_.setZero();
+      lidar_sees_way_.setZero();
+      return std::nullopt;
+    }
+    if (reading.stamp < changed_at_) { // a clock was set back: how long it has stood is not known
+      changed_at_ = reading.stamp;
+      twist_.setZero();
+    }
+    frozen_ = frozen_ || cannot_stop_within(reading.stamp - changed_at_) || lidar_sees_it_move();
+    return reason_if(frozen_, HealthReason::frozen);
+  }
+
+  void accept(const SourceReading& reading) override {
+    const Pose& T_source_base = reading.odometry->T_source_base;
+    if (last_ && T_source_base == *last_)
+      return;
+    if (last_ && reading.stamp - changed_at_ >= MotionTrack::kShortestBaseline)
+      twist_ = se3_log(last_->inverse() * T_source_base) / to_seconds(reading.stamp - changed_at_);
+    last_ = T_source_base;
+    changed_at_ = reading.stamp;
+  }
+
+  std::optional<HealthReason> hear(LidarOpinion, const RegistrationFeedback& feedback) override {
+    if (feedback.from < changed_at_) // heard of late: it moved then
+      return std::nullopt;
+    lidar_sees_twist_ = feedback.twist_base;
+    lidar_sees_way_ += to_seconds(feedback.to - feedback.from) * feedback.twist_base;
+    return std::nullopt;
+  }
+
+ private:
+  /// Moving, and farther than a wrong gyro shakes a sweep or two.
+  [[nodiscard]] bool lidar_sees_it_move() const {
+    constexpr double kMoves_mps = 0.2, kTurns_radps = 0.2, kFor_s = 0.3;
+    return (lidar_sees_twist_.head<3>().norm() > kMoves_mps &&
+            lidar_sees_way_.head<3>().norm() > kFor_s * kMoves_mps) ||
+           (lidar_sees_twist_.tail<3>().norm() > kTurns_radps &&
+            lidar_sees_way_.tail<3>().norm() > kFor_s * kTurns_radps);
+  }
+
+  [[nodiscard]] bool cannot_stop_within(Duration duration) const {
+    constexpr double kHardest_mps2 = 10.0, kHardest_radps2 = 20.0;
+    const double duration_s = to_seconds(duration);
+    return twist_.head<3>().norm() > kHardest_mps2 * duration_s ||
+           twist_.tail<3>().norm() > kHardest_radps2 * duration_s;
+  }
+
+  std::optional<Pose> last_; ///< that differed from the one before
+  Stamp changed_at_;
+  Vector6 twist_ = Vector6::Zero(); ///< until then
+  bool frozen_ = false;
+  Vector6 lidar_sees_twist_ = Vector6::Zero();
+  Vector6 lidar_sees_way_ = Vector6::Zero(); ///< m and rad, since the last change
+};
+
+/// A turn rate that no robot has.
+class ImpossibleTurnRate : public HealthMetric {
+ public:
+  std::optional<HealthReason> judge(const SourceReading& reading) override {
+    constexpr double kMax_radps = 12.0; ///< two turns a second; what a gyro in deg/s soon goes beyond
+    return reason_if(reading.imu->angular_velocity_radps.norm() > kMax_radps, HealthReason::jump);
+  }
+};
+
+/// A pose that does not follow from the last ones: to be there the robot would have had to change its speed or its turn
+/// rate at once by more than any can.
+class PoseJump : public HealthMetric {
+ public:
+  std::optional<HealthReason> judge(const SourceReading& reading) override {
+    constexpr double kMaxChange_mps = 5.0, kMaxChange_radps = 5.0;
+    constexpr double kAlwaysAllowed_m = 0.05, kAlwaysAllowed_rad = 0.05; ///< corrections of a visual odometry
+    if (!last_ || !moving_)
+      return std::nullopt;
+    const double step_s = to_seconds(reading.stamp - last_stamp_);
+    const Pose T_expected_base = (*last_ * se3_exp(step_s * twist_)).inverse() * reading.odometry->T_source_base;
+    return reason_if(T_expected_base.translation.norm() > std::max(kAlwaysAllowed_m, kMaxChange_mps * step_s) ||
+                         angle_rad(T_expected_base.rotation.normalized()) >
+                             std::max(kAlwaysAllowed_rad, kMaxChange_radps * step_s),
+                     HealthReason::jump);
+  }
+  /// A velocity is told by samples that lie apart; those between them are compared with what it foretells.
+  void accept(const SourceReading& reading) override {
+    if (last_ && reading.stamp - last_stamp_ < MotionTrack::kShortestBaseline)
+      return;
+    const Pose& T_source_base = reading.odometry->T_source_base;
+    moving_ = last_.has_value();
+    if (moving_)
+      twist_ = se3_log(last_->inverse() * T_source_base) / to_seconds(reading.stamp - last_stamp_);
+    last_ = T_source_base;
+    last_stamp_ = reading.stamp;
+  }
+  void forget() override { last_.reset(); }
+
+ private:
+  std::optional<Pose> last_;
+  Stamp last_stamp_;
+  bool moving_ = false; ///< twist_ is known
+  Vector6 twist_ = Vector6::Zero();
+};
+
+/// Lidar saw another motion several sweeps in a row.
+class LidarDisagrees : public HealthMetric {
+ public:
+  std::optional<HealthReason> hear(LidarOpinion opinion, const RegistrationFeedback&) override {
+    constexpr int kSweepsInARow = 3;
+    if (opinion == LidarOpinion::none)
+      return std::nullopt;
+    disagreements_ = opinion == LidarOpinion::disagrees ? disagreements_ + 1 : 0;
+    return reason_if(disagreements_ >= kSweepsInARow, HealthReason::disagreement);
+  }
+
+ private:
+  int disagreements_ = 0;
+};
+
+} // namespace
+
+std::vector<std::unique_ptr<HealthMetric>> health_metrics(const MotionSourceOptions& source) {
+  std::vector<std::unique_ptr<HealthMetric>> metrics;
+  metrics.push_back(std::make_unique<NotANumber>()); // first, so that the others need not think of it
+  metrics.push_back(std::make_unique<Late>());
+  metrics.push_back(std::make_unique<OutOfOrder>());
+  if (source.kind == SourceKind::imu) {
+    metrics.push_back(std::make_unique<FrozenImu>());
+    metrics.push_back(std::make_unique<ImuSelfCheck>(source.T_base_source)); // must see turn rates in deg/s
+    metrics.push_back(std::make_unique<ImpossibleTurnRate>());
+  } else {
+    metrics.push_back(std::make_unique<Uncertain>());
+    metrics.push_back(std::make_unique<FrozenOdometry>());
+    metrics.push_back(std::make_unique<PoseJump>());
+  }
+  metrics.push_back(std::make_unique<LidarDisagrees>());
+  return metrics;
+}
+
+} // namespace locus

@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/sources/imu_self_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "core/sources/health_monitor.hpp"
+
+namespace locus {
+
+namespace {
+
+constexpr Duration kWeighFor = std::chrono::seconds{1};
+constexpr double kGravityTolerance = 0.15; ///< of the whole: a robot may be driving off
+constexpr double kMaxTilt_deg = 60.0;      ///< no robot begins on a steeper slope
+
+/// Lesser turns in a sweep are noise to lidar.
+constexpr double kTurns_rad = 0.4 * kRadPerDeg;
+/// Turning sweeps to set a gyro aside, to use it again, and to judge it.
+constexpr int kSweepsToDoubt = 2, kSweepsToConfirm = 3, kSweepsToJudge = 10;
+constexpr int kRounds = 3; ///< of being set aside, until it is refused though nothing is clear
+
+constexpr double kLikeness = 0.7;
+constexpr double kScaleTolerance = 0.5; ///< a sweep that nobody corrects is bent
+constexpr double kDegPerRad = 1.0 / kRadPerDeg;
+
+constexpr Duration kMaxGap = std::chrono::milliseconds{100};   ///< across which a gyro can be followed
+constexpr Duration kResolution = std::chrono::milliseconds{5}; ///< of what is remembered of its turns
+
+bool is_about(double value, double expected, double tolerance) {
+  return std::abs(value - expected) < tolerance * expected;
+}
+
+} // namespace
+
+ImuSelfCheck::ImuSelfCheck(const Pose& T_base_imu) : R_base_imu_(T_base_imu.rotation) {
+  static_cast<void>(words(Difference::any, 0, false)); // they take memory: not while packets come
+}
+
+std::optional<HealthReason> ImuSelfCheck::judge(const SourceReading& reading) {
+  if (refused_)
+    return HealthReason::self_check;
+  follow_turns(R_base_imu_ * reading.imu->angular_velocity_radps, reading.stamp);
+  weigh(R_base_imu_ * reading.imu->specific_force_mps2, reading.stamp);
+  return refused_ || set_aside_ ? std::optional{HealthReason::self_check} : std::nullopt;
+}
+
+std::string_view ImuSelfCheck::verdict() const { return set_aside_ && !refused_ ? set_aside_verdict_ : verdict_; }
+
+void ImuSelfCheck::weigh(const Eigen::Vector3d& specific_force_base_mps2, Stamp stamp) {
+  if (weighed_)
+    return;
+  if (!first_)
+    first_ = stamp;
+  force_sum_mps2_ += specific_force_base_mps2;
+  forces_ += 1.0;
+  if (stamp - *first_ >= kWeighFor)
+    weigh_gravity();
+}
+
+void ImuSelfCheck::follow_turns(const Eigen::Vector3d& turn_rate_base_radps, Stamp stamp) {
+  const Duration step = last_ ? stamp - *last_ : kMaxGap;
+  if (step <= Duration{} && step > -kMaxGap)
+    return;
+  if (std::chrono::abs(step) < kMaxGap)
+    angle_rad_ += to_seconds(step) * turn_rate_base_radps;
+  else
+    known_ = 0;
+  last_ = stamp;
+  if (known_ > 0 && stamp - turned_[newest_].stamp < kResolution)
+    return;
+  newest_ = (newest_ + 1) % turned_.size();
+  turned_[newest_] = {stamp, angle_rad_};
+  known_ = std::min(known_ + 1, turned_.size());
+}
+
+const ImuSelfCheck::Turned& ImuSelfCheck::remembered(std::size_t age) const {
+  return turned_[(newest_ + turned_.size() - age) % turned_.size()];
+}
+
+bool ImuSelfCheck::remembers(Stamp stamp) const {
+  return known_ > 1 && stamp >= remembered(known_ - 1).stamp && stamp < remembered(0).stamp + kMaxGap;
+}
+
+/// Interpolated; of what is not remembered, the nearest that is. Precondition: something is.
+Eigen::Vector3d ImuSelfCheck::angle_rad_at(Stamp stamp) const {
+  std::size_t age = 0;
+  while (age + 1 < known_ && remembered(age).stamp > stamp)
+    ++age;
+  const Turned& before = remembered(age);
+  if (age == 0 || stamp <= before.stamp)
+    return before.angle_rad;
+  const Turned& after = remembered(age - 1);
+  const double fraction = to_seconds(stamp - before.stamp) / to_seconds(after.stamp - before.stamp);
+  return before.angle_rad + fraction * (after.angle_rad - before.angle_rad);
+}
+
+void ImuSelfCheck::weigh_gravity() {
+  weighed_ = true;
+  const Eigen::Vector3d force = force_sum_mps2_ / forces_;
+  if (is_about(force.norm(), 1.0, kGravityTolerance)) {
+    trusts_accelerometer_ = false;
+    verdict_ = "reports accelerations of about 1 where gravity is 9.8 m/s^2, as if in g: they are not used";
+  } else if (!is_about(force.norm(), kGravity_mps2, kGravityTolerance)) {
+    trusts_accelerometer_ = false;
+    verdict_ =
+        "reports accelerations that are not those of gravity in the mean of a second: they are not used (possible "
+        "causes: their unit or scale, or a robot that sped up all the while)";
+  }
+  if (force.norm() > 0.0 && force.normalized().z() < std::cos(kMaxTilt_deg * kRadPerDeg))
+    refuse(
+        "measures that gravity is not below the robot, but more than 60 degrees from there: it is not used (possible "
+        "causes: T_base_source, how the unit is mounted, the convention of its axes, or a robot that lay on its side)");
+}
+
+void ImuSelfCheck::accept(const SourceReading& reading) {
+  if (was_lost_ && !back_since_)
+    back_since_ = reading.stamp;
+}
+
+/// Who has come back is not used at once. Until then lidar is alone, and what it sees of a robot that turns is bent:
+/// that proves nothing against a gyro that nobody has doubted.
+bool ImuSelfCheck::is_yet_to_be_used(const RegistrationFeedback& feedback) const {
+  return !set_aside_ && back_since_ && feedback.from < *back_since_ + HealthMonitor::kProbation;
+}
+
+std::optional<HealthReason> ImuSelfCheck::hear(LidarOpinion /*opinion*/, const RegistrationFeedback& feedback) {
+  if (refused_ || !remembers(feedback.from) || !remembers(feedback.to) || is_yet_to_be_used(feedback))
+    return std::nullopt;
+  const bool was_set_aside = set_aside_;
+  compare(feedback);
+  review();
+  return refused_ || (set_aside_ && !was_set_aside) ? std::optional{HealthReason::self_check} : std::nullopt;
+}
+
+void ImuSelfCheck::compare(const RegistrationFeedback& feedback) {
+  const Eigen::Vector3d gyro_rad = angle_rad_at(feedback.to) - angle_rad_at(feedback.from);
+  const Eigen::Vector3d lidar_rad = to_seconds(feedback.to - feedback.from) * feedback.twist_base.tail<3>();
+  for (std::size_t i = 0; i < turns_.size(); ++i) {
+    const auto axis = static_cast<Eigen::Index>(i);
+    const bool turned = std::max(std::abs(gyro_rad[axis]), std::abs(lidar_rad[axis])) > kTurns_rad;
+    if (turned && feedback.sees[3 + i] && !(turns_[i].agree() && turns_[i].sweeps >= kSweepsToJudge))
+      turns_[i].add(gyro_rad[axis], lidar_rad[axis]);
+  }
+}
+
+void ImuSelfCheck::Turns::add(double gyro_rad, double lidar_rad) {
+  lidar_lidar += lidar_rad * lidar_rad;
+  gyro_lidar += gyro_rad * lidar_rad;
+  gyro_gyro += gyro_rad * gyro_rad;
+  ++sweeps;
+}
+
+double ImuSelfCheck::Turns::likeness() const { return gyro_lidar / std::sqrt(gyro_gyro * lidar_lidar); }
+
+/// Its own turns are what a gyro is told from: of one that reports none, nothing is known but that.
+ImuSelfCheck::Difference ImuSelfCheck::Turns::difference() const {
+  if (gyro_gyro < sweeps * kTurns_rad * kTurns_rad)
+    return Difference::gyro_still;
+  if (likeness() < -kLikeness)
+    return Difference::opposite;
+  return has_scale(kDegPerRad) ? Difference::degrees : Difference::any;
+}
+
+/// All noise is taken for that of lidar.
+bool ImuSelfCheck::Turns::has_scale(double scale) const {
+  return likeness() > kLikeness && std::abs(gyro_gyro / gyro_lidar - scale) < kScaleTolerance * scale;
+}
+
+void ImuSelfCheck::review() {
+  const auto any = [&](int sweeps, bool agrees) {
+    return std::ranges::any_of(turns_, [=](const Turns& t) { return t.sweeps >= sweeps && t.agree() == agrees; });
+  };
+  const bool contradicted = any(kSweepsToDoubt, false);
+  if (!set_aside_ && contradicted) {
+    set_aside_ = true;
+    const std::size_t axis = contradicted_axis(kSweepsToDoubt);
+    set_aside_verdict_ = words(turns_[axis].difference(), axis, false);
+    turns_ = {};
+  } else if (set_aside_ && contradicted && any(kSweepsToJudge, false)) {
+    conclude();
+  } else if (set_aside_ && !contradicted && any(kSweepsToConfirm, true)) {
+    set_aside_ = false;
+  }
+}
+
+/// Refuses the unit, or tries it once more where nothing is clear: lidar may not see what a gait does without it.
+void ImuSelfCheck::conclude() {
+  for (std::size_t axis = 0; axis < turns_.size(); ++axis) {
+    const Turns& turns = turns_[axis];
+    if (turns.sweeps >= kSweepsToJudge && (turns.likeness() < -kLikeness || turns.has_scale(kDegPerRad)))
+      refuse(words(turns.difference(), axis, true));
+  }
+  const std::size_t axis = contradicted_axis(kSweepsToJudge);
+  if (!refused_ && ++rounds_ == kRounds)
+    refuse(words(turns_[axis].difference(), axis, true));
+  set_aside_ = false;
+  turns_ = {};
+}
+
+/// The first about which gyro and lidar do not agree. Precondition: there is one with so many turning sweeps.
+std::size_t ImuSelfCheck::contradicted_axis(int sweeps) const {
+  const auto found =
+      std::ranges::find_if(turns_, [=](const Turns& turns) { return turns.sweeps >= sweeps && !turns.agree(); });
+  return static_cast<std::size_t>(found - turns_.begin());
+}
+
+/// Text that lives for ever.
+std::string_view ImuSelfCheck::words(Difference difference, std::size_t axis, bool for_good) {
+  struct Finding {
+    const char* seen;
+    const char* causes;
+  };
+  constexpr std::array<Finding, 4> kFindings{
+      Finding{"they see different turns",
+              "T_base_source, scale, stamps or delay of the gyro, or lidar that follows what moves around the robot"},
+      Finding{"lidar sees turns and the gyro none",
+              "people or things that move around a robot that stands, T_base_source, delay or a dead axis of the gyro"},
+      Finding{
+          "the gyro turns the other way",
+          "T_base_source, the sign of an axis, delay of the gyro, or lidar that follows what moves around the robot"},
+      Finding{"the gyro reports some 57 times as much, as if in deg/s, not in rad/s", "the unit of its driver"}};
+  constexpr std::array<const char*, 3> kAxes{"x (roll)", "y (pitch)", "z (yaw)"};
+  using Words = std::array<std::array<std::array<std::string, 2>, kAxes.size()>, kFindings.size()>;
+  static const Words all = [&] {
+    Words words;
+    for (std::size_t i = 0; i < words.size(); ++i)
+      for (std::size_t k = 0; k < kAxes.size(); ++k)
+        for (std::size_t good = 0; good < 2; ++good)
+          words[i][k][good] = std::string("and lidar disagree on how the robot turns about ") + kAxes[k] + ": " +
+                              kFindings[i].seen + "; it is not used " +
+                              (good == 1 ? "any more, until a restart" : "until they agree") +
+                              " (possible causes: " + kFindings[i].causes + ")";
+    return words;
+  }();
+  return all[static_cast<std::size_t>(difference)][axis][for_good ? 1 : 0];
+}
+
+/// What comes back is checked as at the start.
+void ImuSelfCheck::forget() {
+  if (refused_)
+    return;
+  if (!set_aside_)
+    turns_ = {};
+  was_lost_ = true;
+  back_since_.reset();
+  first_.reset();
+  last_.reset();
+  known_ = 0;
+  weighed_ = false;
+  force_sum_mps2_.setZero();
+  forces_ = 0.0;
+}
+
+void ImuSelfCheck::refuse(std::string_view verdict) {
+  refused_ = true;
+  verdict_ = verdict;
+}
+
+} // namespace locus

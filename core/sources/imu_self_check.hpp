@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "core/sources/health_metric.hpp"
+
+namespace locus {
+
+/// Check of an inertial unit when it starts, and when it comes back: are its units those of the contract, does gravity
+/// point down where the configuration says that down is, does its gyro turn as lidar sees the robot turn?
+///
+/// A gyro is used at once. About each axis of the base on its own, for on legs the turns of a gait would drown a yaw of
+/// the wrong sign, its first turns are compared with what lidar sees. Once they differ it is set aside, for while it is
+/// used it bends the sweeps; what lidar sees without it decides whether it is used again or refused. While the robot
+/// goes straight nothing is proven and nothing bent.
+///
+/// A unit whose accelerations are of another unit is downgraded: they are not used. One that goes on turning otherwise
+/// than lidar sees is refused for good. What was observed stands in verdict(), in plain words, with what may be the
+/// cause: who of the two is right is not known, for people who walk around a robot that stands mislead lidar. One
+/// owner.
+class ImuSelfCheck : public HealthMetric {
+ public:
+  explicit ImuSelfCheck(const Pose& T_base_imu);
+
+  std::optional<HealthReason> judge(const SourceReading& reading) override;
+  void accept(const SourceReading& reading) override;
+  std::optional<HealthReason> hear(LidarOpinion opinion, const RegistrationFeedback& feedback) override;
+  void forget() override;
+
+  [[nodiscard]] std::string_view verdict() const override;
+  [[nodiscard]] bool trusts_accelerometer() const override { return trusts_accelerometer_; }
+
+ private:
+  /// What gyro and lidar are seen to differ in.
+  enum class Difference : std::uint8_t { any, gyro_still, opposite, degrees };
+
+  /// How far the gyro had turned when; lidar speaks of what was a few sweeps ago.
+  struct Turned {
+    Stamp stamp;
+    Eigen::Vector3d angle_rad; ///< base axes
+  };
+  /// What gyro and lidar saw of the turns about one axis.
+  struct Turns {
+    double lidar_lidar = 0.0, gyro_lidar = 0.0, gyro_gyro = 0.0; ///< sums of products
+    int sweeps = 0;
+
+    void add(double gyro_rad, double lidar_rad);
+    [[nodiscard]] double likeness() const; ///< cosine
+    [[nodiscard]] bool has_scale(double scale) const;
+    [[nodiscard]] bool agree() const { return has_scale(1.0); }
+    [[nodiscard]] Difference difference() const;
+  };
+
+  void weigh(const Eigen::Vector3d& specific_force_base_mps2, Stamp stamp);
+  void weigh_gravity();
+  void follow_turns(const Eigen::Vector3d& turn_rate_base_radps, Stamp stamp);
+  [[nodiscard]] const Turned& remembered(std::size_t age) const;
+  [[nodiscard]] bool remembers(Stamp stamp) const;
+  [[nodiscard]] Eigen::Vector3d angle_rad_at(Stamp stamp) const;
+  [[nodiscard]] bool is_yet_to_be_used(const RegistrationFeedback& feedback) const;
+  void compare(const RegistrationFeedback& feedback);
+  void review();
+  void conclude();
+  void refuse(std::string_view verdict);
+  [[nodiscard]] std::size_t contradicted_axis(int sweeps) const;
+  [[nodiscard]] static std::string_view words(Difference difference, std::size_t axis, bool for_good);
+
+  Eigen::Quaterniond R_base_imu_;
+  std::string_view verdict_, set_aside_verdict_;
+  bool refused_ = false;
+  bool trusts_accelerometer_ = true;
+
+  std::optional<Stamp> first_;
+  bool weighed_ = false;
+  Eigen::Vector3d force_sum_mps2_ = Eigen::Vector3d::Zero(); ///< base axes
+  double forces_ = 0.0;
+
+  std::array<Turned, 128> turned_; ///< ring
+  std::size_t newest_ = 0, known_ = 0;
+  Eigen::Vector3d angle_rad_ = Eigen::Vector3d::Zero();
+  std::optional<Stamp> last_;
+  bool was_lost_ = false;
+  std::optional<Stamp> back_since_; ///< after it was lost
+  std::array<Turns, 3> turns_;      ///< by axis of the base
+  bool set_aside_ = false;
+  int rounds_ = 0; ///< of being set aside without a result
+};
+
+} // namespace locus

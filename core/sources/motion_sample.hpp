@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+
+#include "core/base/pose.hpp"
+#include "core/base/stamp.hpp"
+
+namespace locus {
+
+inline constexpr double kGravity_mps2 = 9.80665; ///< standard gravity
+
+/// One reading of an inertial measurement unit, in the sensor's own frame.
+struct ImuSample {
+  Stamp stamp;   ///< of the measurement
+  Stamp arrival; ///< when it reached this computer
+  Eigen::Vector3d angular_velocity_radps = Eigen::Vector3d::Zero();
+  Eigen::Vector3d specific_force_mps2 = Eigen::Vector3d::Zero(); ///< +9.81 on z at rest and level
+  std::optional<Eigen::Quaterniond>
+      attitude; ///< R_world_imu, gravity-aligned world of arbitrary heading, where the unit has one
+};
+
+/// One pose of an odometry source (wheel, visual, kinematic).
+struct OdometrySample {
+  Stamp stamp;
+  Stamp arrival;
+  Pose T_source_base;            ///< pose of the base in the source's own odometry frame
+  double covariance_scale = 1.0; ///< how much worse than usual the source says it is
+};
+
+} // namespace locus

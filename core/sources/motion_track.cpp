@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/sources/motion_track.hpp"
+
+#include <algorithm>
+
+namespace locus {
+
+MotionTrack::MotionTrack(const MotionSourceOptions& options)
+    : kind_(options.kind), T_base_source_(options.T_base_source), nodes_(kCapacity) {}
+
+void MotionTrack::add(const ImuSample& sample) {
+  const Eigen::Vector3d angular_velocity_base = T_base_source_.rotation * sample.angular_velocity_radps;
+  Node node{sample.stamp, Pose{}, T_base_source_.rotation * sample.specific_force_mps2, {}};
+  if (sample.attitude)
+    node.up_base = T_base_source_.rotation * (sample.attitude->conjugate() * Eigen::Vector3d::UnitZ());
+  if (size_ > 0) {
+    const Node& last = from_newest(0);
+    const Eigen::Vector3d mean = 0.5 * (last_angular_velocity_base_radps_ + angular_velocity_base);
+    const Eigen::Vector3d turn_rad = to_seconds(sample.stamp - last.stamp) * mean;
+    node.T_source_base.rotation = (last.T_source_base.rotation * so3_exp(turn_rad)).normalized();
+  }
+  last_angular_velocity_base_radps_ = angular_velocity_base;
+  push(node);
+}
+
+void MotionTrack::add(const OdometrySample& sample) {
+  push({sample.stamp, Pose{sample.T_source_base.rotation.normalized(), sample.T_source_base.translation}, {}, {}});
+}
+
+void MotionTrack::push(const Node& node) {
+  newest_ = (newest_ + 1) % kCapacity;
+  nodes_[newest_] = node;
+  size_ = std::min(size_ + 1, kCapacity);
+}
+
+const MotionTrack::Node& MotionTrack::from_newest(std::size_t age) const {
+  return nodes_[(newest_ + kCapacity - age) % kCapacity];
+}
+
+std::size_t MotionTrack::age_at(Stamp stamp) const {
+  std::size_t younger = 0;
+  std::size_t older = size_;
+  while (younger < older) {
+    const std::size_t middle = (younger + older) / 2;
+    if (from_newest(middle).stamp <= stamp)
+      older = middle;
+    else
+      younger = middle + 1;
+  }
+  return younger;
+}
+
+std::optional<Pose> MotionTrack::at(Stamp stamp) const {
+  const std::size_t age = age_at(stamp);
+  if (age == size_ || stamp > from_newest(0).stamp + kMaxExtrapolation)
+    return std::nullopt;
+  if (age == 0)
+    return extrapolated(stamp);
+  return between(from_newest(age), from_newest(age - 1), stamp);
+}
+
+/// Precondition: there is a sample, and `stamp` is not before the newest.
+Pose MotionTrack::extrapolated(Stamp stamp) const {
+  const Node& newest = from_newest(0);
+  std::size_t age = 1;
+  while (kind_ == SourceKind::odometry && age < size_ && newest.stamp - from_newest(age).stamp < kShortestBaseline)
+    ++age;
+  return age < size_ ? between(from_newest(age), newest, stamp) : newest.T_source_base;
+}
+
+/// On the line through two nodes, or beyond.
+Pose MotionTrack::between(const Node& before, const Node& after, Stamp stamp) {
+  const double fraction = to_seconds(stamp - before.stamp) / to_seconds(after.stamp - before.stamp);
+  return interpolate(before.T_source_base, after.T_source_base, fraction);
+}
+
+bool MotionTrack::has_sample_in(Stamp from, Stamp to) const {
+  const std::size_t age = age_at(to);
+  return age < size_ && from_newest(age).stamp > from;
+}
+
+bool MotionTrack::is_live(Stamp now) const {
+  return size_ > 1 && now <= from_newest(0).stamp + kMaxExtrapolation &&
+         from_newest(0).stamp <= from_newest(1).stamp + kMaxExtrapolation;
+}
+
+std::optional<Eigen::Vector3d> MotionTrack::up_base(Stamp from, Stamp to) const {
+  if (!has_sample_in(from, to))
+    return std::nullopt;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t age = age_at(to); age < size_ && from_newest(age).stamp > from; ++age) {
+    if (!from_newest(age).up_base)
+      return std::nullopt;
+    sum += *from_newest(age).up_base;
+  }
+  return sum.normalized();
+}
+
+std::optional<Eigen::Vector3d> MotionTrack::mean_specific_force_mps2(Stamp from, Stamp to) const {
+  if (kind_ != SourceKind::imu || !has_sample_in(from, to))
+    return std::nullopt;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double count = 0.0;
+  for (std::size_t age = age_at(to); age < size_ && from_newest(age).stamp > from; ++age) {
+    sum += from_newest(age).specific_force_base_mps2;
+    count += 1.0;
+  }
+  return sum / count;
+}
+
+} // namespace locus

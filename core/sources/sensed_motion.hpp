@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "core/base/pose.hpp"
+
+namespace locus {
+
+inline constexpr std::size_t kMaxSources = 8; ///< motion sources of a robot, at most
+
+/// The part of the robot's motion during a sweep that no motion source could take out of its points.
+enum class Uncorrected : std::uint8_t { nothing, translation, all };
+
+/// Where one motion source saw the base at the end of a sweep.
+struct SourcePose {
+  bool known = false;      ///< with a sample inside the sweep
+  bool usable = false;     ///< known, and healthy
+  std::uint32_t spell = 0; ///< HealthMonitor::spell; poses of different spells have nothing to do with each other
+  Pose T_source_base;      ///< an inertial source gives rotation only
+};
+
+/// What all motion sources say of a sweep.
+struct SensedMotion {
+  std::array<SourcePose, kMaxSources> sources; ///< by index in the configuration
+  std::optional<Eigen::Vector3d>
+      specific_force_base_mps2;           ///< mean over the sweep, from the first usable inertial source
+  std::optional<Eigen::Vector3d> up_base; ///< unit vector, from that source's attitude where it has one
+};
+
+} // namespace locus

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "core/base/stamp.hpp"
+
+namespace locus {
+
+/// What can be wrong with a motion source.
+enum class HealthReason : std::uint8_t {
+  stale,        ///< silent for too long, or a sample that came too late
+  jump,         ///< a motion that no robot can make
+  nan,          ///< not a number, or one beyond all sense
+  frozen,       ///< the same reading again, though the robot moves
+  out_of_order, ///< a stamp that does not follow from the ones before
+  covariance,   ///< much less certain than usual, as the source itself says
+  disagreement, ///< lidar saw another motion
+  outside,      ///< somebody else says so
+  self_check    ///< ImuSelfCheck has refused it
+};
+inline constexpr std::size_t kHealthReasonCount = 9;
+inline constexpr std::array<std::string_view, kHealthReasonCount> kHealthReasonNames{
+    "stale", "jump", "nan", "frozen", "out_of_order", "covariance", "disagreement", "outside", "self_check"};
+
+constexpr std::string_view to_string(HealthReason reason) {
+  return kHealthReasonNames[static_cast<std::size_t>(reason)];
+}
+
+/// What became of the samples of one motion source.
+struct SourceCounters {
+  std::uint64_t received = 0; ///< samples
+  /// Samples left out, by reason, and once each the silences and disagreements that cost the source its health.
+  std::array<std::uint64_t, kHealthReasonCount> rejected{};
+  std::uint64_t health_changes = 0; ///< lost and regained
+  std::uint64_t clock_steps = 0;    ///< of the source's clock against the host's
+
+  [[nodiscard]] std::uint64_t rejected_as(HealthReason reason) const {
+    return rejected[static_cast<std::size_t>(reason)];
+  }
+};
+
+/// A motion source has lost its health or regained it.
+struct HealthEvent {
+  std::size_t source = 0; ///< index in the configuration
+  Stamp stamp;            ///< when it was found out, in stamps of arrival
+  bool healthy = false;
+  HealthReason reason = HealthReason::stale; ///< why it was lost
+  std::string_view verdict;                  ///< of HealthMonitor, where a self-check is the reason
+};
+
+} // namespace locus

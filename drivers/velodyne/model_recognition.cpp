@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/velodyne/model_recognition.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "drivers/velodyne/wire.hpp"
+
+namespace locus::velodyne {
+
+namespace {
+
+constexpr Duration kSpacingTolerance = std::chrono::microseconds{2}; // both stamps are whole microseconds
+constexpr int kMaxLostInARow = 3;
+
+/// Of the difference of two stamps of a VLS-128 from what the mean spacing makes of it: in a recording 2.2 us at most.
+constexpr Duration kStampNoise = std::chrono::microseconds{3};
+
+bool is_close(Duration a, Duration b) { return std::chrono::abs(a - b) <= kSpacingTolerance; }
+
+/// The model that sends packets at this spacing; nothing when it fits none.
+std::optional<Model> model_of_spacing(Model claimed, ReturnMode mode, Duration spacing) {
+  for (const Pace pace : {Pace::first, Pace::slower})
+    for (int packets = 1; packets <= 1 + kMaxLostInARow; ++packets)
+      if (is_close(spacing, packets * packet_duration(claimed, mode, pace)))
+        return claimed;
+  const auto* found = std::find_if(kModels.begin(), kModels.end(),
+                                   [&](Model m) { return is_close(spacing, packet_duration(m, mode)); });
+  return found == kModels.end() ? std::nullopt : std::optional{*found};
+}
+
+/// Whether the two halves of the blocks measure the same distances, as they do when 16 lasers fire twice. In recorded
+/// packets 60 % of the pairs within 2 % is above every HDL-32E and below nine tenths of the VLP-16.
+bool fires_sixteen_lasers_twice(std::span<const std::byte, kDataPacketBytes> packet) {
+  constexpr std::size_t kLasers = 16;
+  std::size_t pairs = 0;
+  std::size_t alike = 0;
+  for (std::size_t block = 0; block < kBlocks; ++block) {
+    const std::byte* channels = packet.data() + block * kBlockBytes + kBlockHeaderBytes;
+    for (std::size_t laser = 0; laser < kLasers; ++laser) {
+      const int first = read_u16(channels + laser * kChannelBytes);
+      const int second = read_u16(channels + (laser + kLasers) * kChannelBytes);
+      if (first == 0 || second == 0)
+        continue;
+      ++pairs;
+      if (50 * std::abs(first - second) <= std::max(first, second))
+        ++alike;
+    }
+  }
+  return 10 * alike > 6 * pairs;
+}
+
+} // namespace
+
+Model ModelRecognition::recognise(Model claimed, ReturnMode mode, Duration time_of_hour,
+                                  std::span<const std::byte, kDataPacketBytes> packet) {
+  if (claimed != claimed_)
+    verdict_.reset();
+  claimed_ = claimed;
+  if (last_time_of_hour_)
+    if (const auto told = model_of_spacing(claimed, mode, time_of_hour - *last_time_of_hour_))
+      verdict_ = told;
+  last_time_of_hour_ = time_of_hour;
+  if (!verdict_)
+    verdict_ = claimed == Model::hdl32e && fires_sixteen_lasers_twice(packet) ? Model::vlp16 : claimed;
+  return *verdict_;
+}
+
+Pace PaceRecognition::recognise(Model model, ReturnMode mode, Duration time_of_hour) {
+  const Duration spacing = last_time_of_hour_ ? time_of_hour - *last_time_of_hour_ : Duration{};
+  last_time_of_hour_ = time_of_hour;
+  if (!has_two_paces(model))
+    return pace_ = Pace::first;
+  const Duration first = packet_duration(model, mode, Pace::first);
+  const Duration slower = packet_duration(model, mode, Pace::slower);
+  if (spacing < first - kStampNoise || spacing > slower + kStampNoise) {
+    beyond_middle_ = {};
+    return pace_;
+  }
+  beyond_middle_ += spacing - (first + slower) / 2;
+  if (std::chrono::abs(beyond_middle_) > kStampNoise) {
+    pace_ = beyond_middle_ > Duration{} ? Pace::slower : Pace::first;
+    beyond_middle_ = {};
+  }
+  return pace_;
+}
+
+} // namespace locus::velodyne

@@ -1,0 +1,473 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/ingest/sweep_builder.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+namespace locus {
+namespace {
+
+using std::chrono::hours;
+using std::chrono::milliseconds;
+using std::chrono::nanoseconds;
+using std::chrono::seconds;
+
+constexpr Stamp kStart = stamp_from_ns(1'700'000'000'000'000'000);
+constexpr Duration kColumn = nanoseconds{55'296};
+constexpr Duration kLaser = nanoseconds{2'304};
+constexpr int kColumns = 24;
+constexpr Duration kPacket = kColumns * kColumn;
+constexpr std::size_t kMaxReturns = 60'000; ///< two lidars at 300 rpm make no more
+
+/// A lidar whose returns can be told apart: each has its number as x. Remembers when each was fired.
+class NumberedLidar {
+ public:
+  explicit NumberedLidar(std::uint8_t index = 0, double rpm = 600, double first_azimuth_deg = 0, Stamp start = kStart)
+      : index_(index), rpm_(rpm), azimuth_deg_(first_azimuth_deg), next_(start) {}
+
+  LidarPacket packet() {
+    LidarPacket packet;
+    packet.lidar = index_;
+    packet.stamp = next_;
+    packet.duration = kPacket;
+    packet.first_azimuth_cdeg = azimuth_cdeg(Duration{0});
+    for (int column = 0; column < kColumns; ++column) {
+      Salvo& salvo = packet.storage[packet.count++];
+      salvo.y_m = salvo.z_m = {};
+      salvo.range_m.fill(range_m_);
+      salvo.intensity.fill(10);
+      for (std::size_t laser = 0; laser < Salvo::kLasers; ++laser) {
+        const Duration offset = column * kColumn + static_cast<int>(laser) * kLaser;
+        salvo.x_m[laser] = static_cast<float>(fired_.size());
+        salvo.offset_ns[laser] = static_cast<std::int32_t>(offset.count());
+        salvo.ring[laser] = static_cast<std::uint8_t>(laser);
+        fired_.push_back(next_ + offset);
+      }
+    }
+    skip(kPacket);
+    return packet;
+  }
+
+  void skip(Duration time) {
+    azimuth_deg_ = std::fmod(azimuth_deg_ + 6.0 * rpm_ * to_seconds(time), 360.0);
+    next_ += time;
+  }
+  void jump(Duration by) { next_ += by; } ///< of its clock alone
+  void set_range_m(float range_m) { range_m_ = range_m; }
+
+  [[nodiscard]] Stamp next() const { return next_; }
+  [[nodiscard]] Stamp fired(std::size_t number) const { return fired_[number]; }
+  [[nodiscard]] std::size_t count() const { return fired_.size(); }
+
+ private:
+  [[nodiscard]] std::uint16_t azimuth_cdeg(Duration since_packet) const {
+    const double turned_deg = azimuth_deg_ + 6.0 * rpm_ * to_seconds(since_packet);
+    return static_cast<std::uint16_t>(static_cast<int>(100.0 * turned_deg) % 36000);
+  }
+
+  std::uint8_t index_;
+  double rpm_;
+  double azimuth_deg_;
+  float range_m_ = 5.0F;
+  Stamp next_;
+  std::vector<Stamp> fired_;
+};
+
+SweepOptions keep_all() {
+  SweepOptions options;
+  options.segment_filter.enabled = false;
+  return options;
+}
+
+/// A builder whose sweeps are kept.
+class Built {
+ public:
+  explicit Built(const SweepOptions& options = keep_all(), std::size_t lidars = 1,
+                 const std::vector<MotionSourceOptions>& sources = {}, std::size_t max_returns = kMaxReturns)
+      : builder(options, std::vector<Pose>(lidars), MotionSources(sources, Fusion::combined), max_returns,
+                [this](Sweep& sweep) { sweeps.push_back(sweep); }) {}
+
+  void add(const LidarPacket& packet) { builder.add(packet, packet.stamp + packet.duration); }
+  void play(NumberedLidar& lidar, Duration duration) {
+    for (const Stamp end = lidar.next() + duration; lidar.next() < end;)
+      add(lidar.packet());
+  }
+
+  std::vector<Sweep> sweeps;
+  SweepBuilder builder;
+};
+
+std::size_t number_of(const SweepPoint& point) {
+  return static_cast<std::size_t>(std::lround(point.position_base_m.x()));
+}
+
+/// Each return once, in the window it was fired in, with the age it has at its end; windows without gaps between. A
+/// packet that comes after another lidar's has closed the window goes into the next one, up to `late`.
+void expect_each_return_in_its_sweep(const std::vector<Sweep>& sweeps, const std::vector<const NumberedLidar*>& lidars,
+                                     Duration late = {}) {
+  std::map<std::pair<std::size_t, std::size_t>, int> times_seen; // by lidar and number
+  for (std::size_t s = 0; s < sweeps.size(); ++s) {
+    const Sweep& sweep = sweeps[s];
+    ASSERT_EQ(sweep.sequence, s);
+    ASSERT_EQ(sweep.start, s == 0 ? sweep.start : sweeps[s - 1].end);
+    ASSERT_EQ(sweep.raw_returns, sweep.points.size());
+    for (const SweepPoint& point : sweep.points) {
+      const std::size_t lidar = point.scan_line / 256U;
+      const Stamp fired = lidars[lidar]->fired(number_of(point));
+      ASSERT_GE(fired, sweep.start - late);
+      ASSERT_LT(fired, sweep.end);
+      ASSERT_NEAR(point.age_s, to_seconds(sweep.end - fired), 1e-6);
+      ++times_seen[{lidar, number_of(point)}];
+    }
+  }
+  for (std::size_t lidar = 0; lidar < lidars.size(); ++lidar) {
+    for (std::size_t number = 0; number < lidars[lidar]->count(); ++number) {
+      const Stamp fired = lidars[lidar]->fired(number);
+      if (fired < sweeps.back().end - late) {
+        ASSERT_EQ((times_seen[{lidar, number}]), 1);
+      } else {
+        ASSERT_LE((times_seen[{lidar, number}]), fired < sweeps.back().end ? 1 : 0);
+      }
+    }
+  }
+}
+
+class SweepsAtAnySpeed : public testing::TestWithParam<std::tuple<double, double>> {};
+
+TEST_P(SweepsAtAnySpeed, EachReturnIsInExactlyOneSweepOfOneRevolution) {
+  const auto& [rpm, first_azimuth_deg] = GetParam();
+  NumberedLidar lidar(0, rpm, first_azimuth_deg);
+  Built built;
+  built.play(lidar, seconds{2});
+  built.builder.finish();
+  const double revolution_s = 60.0 / rpm;
+  ASSERT_GE(built.sweeps.size(), static_cast<std::size_t>(2.0 / revolution_s) - 1);
+  expect_each_return_in_its_sweep(built.sweeps, {&lidar});
+  for (std::size_t i = 0; i + 1 < built.sweeps.size(); ++i) // the last may be partial
+    EXPECT_NEAR(to_seconds(built.sweeps[i].end - built.sweeps[i].start), revolution_s, 5e-4 * revolution_s);
+}
+
+INSTANTIATE_TEST_SUITE_P(Speeds, SweepsAtAnySpeed,
+                         testing::Combine(testing::Values(300.0, 593.0, 600.0, 707.0, 1200.0),
+                                          testing::Values(0.0, 123.4, 359.9)));
+
+TEST(SweepBuilder, TheCutIsBetweenFiringsNotBetweenPackets) {
+  SweepOptions options = keep_all();
+  options.sweep_period = milliseconds{100};
+  NumberedLidar lidar;
+  Built built(options);
+  built.play(lidar, seconds{1});
+  ASSERT_GE(built.sweeps.size(), 9U);
+  const Sweep& sweep = built.sweeps[4];
+  ASSERT_NE((sweep.end - kStart) % kPacket, Duration::zero()) << "the cut must lie within a packet";
+  float youngest_s = 1.0F;
+  for (const SweepPoint& point : sweep.points)
+    youngest_s = std::min(youngest_s, point.age_s);
+  EXPECT_LT(youngest_s, 3 * to_seconds(kColumn));
+}
+
+TEST(SweepBuilder, TwoLidarsNeedNoPhaseLock) {
+  NumberedLidar front(0, 600, 0);
+  NumberedLidar rear(1, 597, 77, kStart + nanoseconds{700'123});
+  Built built(keep_all(), 2);
+  while (front.next() < kStart + seconds{2})
+    built.add(front.next() <= rear.next() ? front.packet() : rear.packet());
+  built.builder.finish();
+  expect_each_return_in_its_sweep(built.sweeps, {&front, &rear}, kPacket);
+  for (const Sweep& sweep : built.sweeps) {
+    const auto of_rear =
+        std::count_if(sweep.points.begin(), sweep.points.end(), [](const SweepPoint& p) { return p.scan_line >= 256; });
+    EXPECT_NEAR(static_cast<double>(of_rear), 0.5 * static_cast<double>(sweep.points.size()),
+                0.02 * static_cast<double>(sweep.points.size()));
+  }
+}
+
+TEST(SweepBuilder, ADeadLidarIsSimplyNotThere) {
+  NumberedLidar front(0), rear(1, 600, 90);
+  Built built(keep_all(), 2);
+  while (rear.next() < kStart + seconds{2}) {
+    if (front.next() < kStart + seconds{1} && front.next() <= rear.next())
+      built.add(front.packet()); // dies after a second
+    else
+      built.add(rear.packet());
+  }
+  ASSERT_GE(built.sweeps.size(), 19U);
+  EXPECT_NEAR(static_cast<double>(built.sweeps[5].points.size()), 2.0 * 28'930, 800);
+  for (std::size_t i = 11; i < built.sweeps.size(); ++i) {
+    EXPECT_NEAR(to_seconds(built.sweeps[i].end - built.sweeps[i].start), 0.1, 1e-3);
+    EXPECT_NEAR(static_cast<double>(built.sweeps[i].points.size()), 28'930, 400);
+  }
+}
+
+TEST(SweepBuilder, AGapOfTenSecondsYieldsEmptyWindows) {
+  NumberedLidar lidar;
+  Built built;
+  built.play(lidar, seconds{1});
+  lidar.skip(seconds{10});
+  built.play(lidar, seconds{1});
+  const auto empty =
+      std::count_if(built.sweeps.begin(), built.sweeps.end(), [](const Sweep& sweep) { return sweep.points.empty(); });
+  EXPECT_NEAR(static_cast<double>(empty), 99, 2);
+  EXPECT_EQ(built.builder.counters().restarts, 0U);
+  expect_each_return_in_its_sweep(built.sweeps, {&lidar});
+}
+
+TEST(SweepBuilder, WindowsCloseOnTimeWhenNoPacketComes) {
+  NumberedLidar lidar;
+  Built built;
+  built.play(lidar, seconds{1});
+  const std::size_t before = built.sweeps.size();
+  built.builder.advance(lidar.next() + seconds{3});
+  EXPECT_NEAR(static_cast<double>(built.sweeps.size() - before), 30, 1);
+  EXPECT_FALSE(built.sweeps[before].points.empty());
+  EXPECT_TRUE(built.sweeps.back().points.empty());
+}
+
+TEST(SweepBuilder, WindowsDoNotCloseBeforeTheirTime) {
+  NumberedLidar lidar;
+  Built built;
+  built.play(lidar, milliseconds{950});
+  const std::size_t before = built.sweeps.size();
+  built.builder.advance(lidar.next() + milliseconds{40});
+  EXPECT_EQ(built.sweeps.size(), before);
+}
+
+TEST(SweepBuilder, TimeThatRanBackwardsIsANewStart) {
+  NumberedLidar lidar;
+  Built built;
+  built.play(lidar, seconds{1});
+  const std::size_t before = built.sweeps.size();
+  lidar.jump(-hours{1});
+  const Stamp jumped_to = lidar.next();
+  built.play(lidar, seconds{2});
+  EXPECT_EQ(built.builder.counters().restarts, 1U);
+  EXPECT_GT(built.builder.counters().late_packets, 0U);
+  EXPECT_LT(built.builder.counters().late_packets, 1000U) << "no more than a second and a bit is lost";
+  ASSERT_GT(built.sweeps.size(), before + 5);
+  EXPECT_GE(built.sweeps.back().start, jumped_to);
+  EXPECT_GT(built.sweeps.back().points.size(), 25'000U);
+}
+
+/// By a network that stood still, while other sensors told the time.
+TEST(SweepBuilder, PacketsThatWereHeldUpAndComeAllAtOnceAreNoNewStart) {
+  NumberedLidar lidar;
+  Built built;
+  built.play(lidar, seconds{1});
+  const Stamp released = lidar.next() + milliseconds{950};
+  for (Stamp now = lidar.next(); now < released; now += milliseconds{10})
+    built.builder.advance(now);
+  while (lidar.next() < released)
+    built.builder.add(lidar.packet(), released);
+  built.play(lidar, seconds{1});
+  EXPECT_GT(built.builder.counters().late_packets, 600U);
+  EXPECT_EQ(built.builder.counters().restarts, 0U);
+  for (std::size_t i = 1; i < built.sweeps.size(); ++i)
+    ASSERT_EQ(built.sweeps[i].start, built.sweeps[i - 1].end);
+  EXPECT_GT(built.sweeps.back().points.size(), 25'000U);
+}
+
+TEST(SweepBuilder, AJumpForwardByAnHourIsNoRunOfEmptyWindows) {
+  NumberedLidar lidar;
+  Built built;
+  built.play(lidar, seconds{1});
+  lidar.jump(hours{1});
+  const Stamp jumped_to = lidar.next();
+  built.play(lidar, seconds{1});
+  EXPECT_EQ(built.builder.counters().restarts, 1U);
+  EXPECT_LT(built.sweeps.size(), 25U);
+  EXPECT_GE(built.sweeps.back().start, jumped_to);
+}
+
+TEST(SweepBuilder, AnOldPacketIsCountedAndLeftOut) {
+  NumberedLidar lidar;
+  Built built;
+  const LidarPacket old = lidar.packet();
+  built.add(old);
+  built.play(lidar, seconds{1});
+  const std::size_t before = built.sweeps.size();
+  built.add(old);
+  EXPECT_EQ(built.builder.counters().late_packets, 1U);
+  EXPECT_EQ(built.sweeps.size(), before);
+  built.play(lidar, seconds{1});
+  expect_each_return_in_its_sweep(built.sweeps, {&lidar});
+}
+
+TEST(SweepBuilder, PacketsThatOvertakeEachOtherAreNoLoss) {
+  NumberedLidar lidar;
+  Built built;
+  while (lidar.next() < kStart + seconds{1}) {
+    const LidarPacket first = lidar.packet();
+    const LidarPacket second = lidar.packet();
+    built.add(second);
+    built.add(first);
+  }
+  built.builder.finish();
+  std::map<std::size_t, int> times_seen;
+  for (const Sweep& sweep : built.sweeps)
+    for (const SweepPoint& point : sweep.points)
+      ++times_seen[number_of(point)];
+  for (const auto& [number, times] : times_seen)
+    ASSERT_EQ(times, 1) << number;
+  EXPECT_EQ(built.builder.counters().late_packets, 0U);
+  const Stamp end = built.sweeps.back().end;
+  for (std::size_t number = 0; number < lidar.count(); ++number) {
+    ASSERT_EQ(times_seen[number], lidar.fired(number) < end ? 1 : 0) << number;
+  }
+}
+
+TEST(SweepBuilder, TheLastWindowCountsWhenItIsLongerThanHalfAPeriod) {
+  SweepOptions options = keep_all();
+  options.sweep_period = milliseconds{100};
+  for (const auto& [played, expected] : {std::pair{940, 9U}, std::pair{960, 10U}}) {
+    NumberedLidar lidar;
+    Built built(options);
+    built.play(lidar, milliseconds{played});
+    EXPECT_EQ(built.sweeps.size(), 9U);
+    built.builder.finish();
+    EXPECT_EQ(built.sweeps.size(), expected) << played << " ms";
+    built.builder.finish();
+    EXPECT_EQ(built.sweeps.size(), expected) << "the end comes once";
+  }
+}
+
+TEST(SweepBuilder, ReturnsOutsideTheRangeAreDropped) {
+  SweepOptions options = keep_all();
+  options.min_range_m = 1.0;
+  options.max_range_m = 50.0;
+  for (const auto& [range_m, kept] : {std::pair{0.99F, false}, {1.0F, true}, {50.0F, true}, {50.1F, false}}) {
+    NumberedLidar lidar;
+    lidar.set_range_m(range_m);
+    Built built(options);
+    built.play(lidar, milliseconds{250});
+    ASSERT_FALSE(built.sweeps.empty());
+    EXPECT_EQ(!built.sweeps.front().points.empty(), kept) << range_m;
+    EXPECT_GT(built.sweeps.front().raw_returns, 0U);
+  }
+}
+
+TEST(SweepBuilder, ReturnsFromTheRobotItselfAreDropped) {
+  SweepOptions options = keep_all();
+  options.body_box = {.enabled = true, .min_m = {999.5, -1, -1}, .max_m = {2000.5, 1, 1}};
+  NumberedLidar lidar;
+  Built built(options);
+  built.play(lidar, milliseconds{250});
+  ASSERT_GE(built.sweeps.size(), 2U);
+  std::size_t seen = 0;
+  for (const SweepPoint& point : built.sweeps.front().points) {
+    EXPECT_FALSE(number_of(point) >= 1000 && number_of(point) <= 2000);
+    ++seen;
+  }
+  EXPECT_EQ(seen, built.sweeps.front().raw_returns - 1001);
+}
+
+TEST(SweepBuilder, MoreThanFitIntoMemoryAreCounted) {
+  NumberedLidar lidar;
+  Built built(keep_all(), 1, {}, 10'000);
+  built.play(lidar, milliseconds{150});
+  ASSERT_FALSE(built.sweeps.empty());
+  EXPECT_EQ(built.sweeps.front().points.size(), 10'000U);
+  EXPECT_GE(built.builder.counters().overflowed_points, built.sweeps.front().raw_returns - 10'000);
+}
+
+TEST(SweepBuilder, ASinkMayTakeThePointsAway) {
+  NumberedLidar lidar;
+  std::vector<SweepPoint> mine;
+  std::size_t sweeps = 0;
+  SweepBuilder builder(keep_all(), {Pose{}}, MotionSources({}, Fusion::combined), kMaxReturns, [&](Sweep& sweep) {
+    std::swap(mine, sweep.points);
+    ++sweeps;
+    if (sweeps > 2) {
+      EXPECT_NEAR(static_cast<double>(mine.size()), 28'930, 400);
+    }
+  });
+  while (lidar.next() < kStart + seconds{1}) {
+    const LidarPacket packet = lidar.packet();
+    builder.add(packet, packet.stamp);
+  }
+  EXPECT_GE(sweeps, 9U);
+}
+
+/// Wheels that go 10 m/s to the left, along y, where the numbered returns all lie at zero.
+class SweepsOfAMovingRobot : public testing::Test {
+ protected:
+  static constexpr double kSpeed_mps = 10.0;
+
+  static std::vector<Sweep> sweeps(SweepOptions options, bool with_wheels) {
+    std::vector<MotionSourceOptions> sources;
+    if (with_wheels)
+      sources.push_back({"wheels", SourceKind::odometry, {}});
+    NumberedLidar lidar;
+    Built built(options, 1, sources);
+    Stamp next_sample = kStart - milliseconds{100};
+    while (lidar.next() < kStart + seconds{1}) {
+      for (; with_wheels && next_sample <= lidar.next() + kPacket; next_sample += milliseconds{5})
+        built.builder.sources().add(
+            0, OdometrySample{next_sample,
+                              next_sample,
+                              {Eigen::Quaterniond::Identity(), {0, kSpeed_mps * to_seconds(next_sample - kStart), 0}},
+                              1.0});
+      built.add(lidar.packet());
+    }
+    return built.sweeps;
+  }
+};
+
+TEST_F(SweepsOfAMovingRobot, PointsAreSeenFromTheEndOfTheSweep) {
+  const std::vector<Sweep> corrected = sweeps(keep_all(), true);
+  ASSERT_GE(corrected.size(), 9U);
+  for (const Sweep& sweep : corrected) {
+    EXPECT_EQ(sweep.uncorrected, Uncorrected::nothing);
+    EXPECT_TRUE(sweep.motion.sources[0].usable);
+    for (const SweepPoint& point : sweep.points)
+      ASSERT_NEAR(point.position_base_m.y(), -kSpeed_mps * static_cast<double>(point.age_s), 1e-3);
+  }
+}
+
+TEST_F(SweepsOfAMovingRobot, WithoutCorrectionPointsStayWhereTheyWereMeasured) {
+  SweepOptions options = keep_all();
+  options.motion_correction = false;
+  for (const Sweep& sweep : sweeps(options, true)) {
+    EXPECT_EQ(sweep.uncorrected, Uncorrected::nothing) << "nor does anybody else correct them";
+    EXPECT_TRUE(sweep.motion.sources[0].usable) << "the wheels still tell how far";
+    for (const SweepPoint& point : sweep.points)
+      ASSERT_EQ(point.position_base_m.y(), 0.0F);
+  }
+}
+
+TEST_F(SweepsOfAMovingRobot, WithoutASourceAllIsLeftToOdometry) {
+  for (const Sweep& sweep : sweeps(keep_all(), false)) {
+    EXPECT_EQ(sweep.uncorrected, Uncorrected::all);
+    for (const SweepPoint& point : sweep.points)
+      ASSERT_EQ(point.position_base_m.y(), 0.0F);
+  }
+}
+
+TEST(RevolutionTimer, KnowsTheSpeedAfterOneRevolution) {
+  for (const double rpm : {300.0, 599.0, 600.0, 901.0, 1200.0}) {
+    RevolutionTimer timer;
+    NumberedLidar lidar(0, rpm, 200);
+    while (lidar.next() < kStart + from_seconds(60.0 / rpm))
+      timer.observe(lidar.packet());
+    EXPECT_NEAR(to_seconds(timer.period()), 60.0 / rpm, 2e-4 * 60.0 / rpm) << rpm;
+  }
+}
+
+TEST(RevolutionTimer, IsNotConfusedByAGapOrAnotherLidar) {
+  RevolutionTimer timer;
+  NumberedLidar front(0, 600), rear(1, 1200);
+  for (int i = 0; i < 300; ++i) {
+    timer.observe(rear.packet());
+    timer.observe(front.packet());
+    if (i % 100 == 50)
+      front.skip(seconds{3} + milliseconds{33});
+  }
+  EXPECT_NEAR(to_seconds(timer.period()), 0.1, 2e-5);
+}
+
+} // namespace
+} // namespace locus

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/map/registration.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <random>
+
+#include "core/surfaces.hpp"
+
+namespace locus {
+namespace {
+
+constexpr std::size_t kBytes = 20'000'000;
+constexpr RegistrationOptions kOptions{20, 1.0};
+const PosePrior kNoPrior;
+
+bool never() { return false; }
+
+SurfaceMap map_of(const std::vector<SurfacePoint>& points) {
+  SurfaceMap map(kBytes);
+  map.insert(points, Pose{});
+  return map;
+}
+
+double off_m(const Pose& found, const Pose& truth) { return (found.translation - truth.translation).norm(); }
+double off_deg(const Pose& found, const Pose& truth) {
+  return angle_rad(truth.rotation.conjugate() * found.rotation) / kRadPerDeg;
+}
+
+bool same_bits(const Registration& a, const Registration& b) {
+  return a.T_target_source == b.T_target_source && a.iterations == b.iterations && a.inliers == b.inliers &&
+         a.mean_error == b.mean_error && a.information == b.information;
+}
+
+TEST(Gicp, FindsAKnownMotion) {
+  const SurfaceMap map = map_of(test::points_on(test::furnished_room(), 3000, 1, 0.01));
+  Gicp gicp(1);
+  std::mt19937 random{3};
+  std::uniform_real_distribution<double> unit{-1.0, 1.0};
+  const auto any = [&] { return Eigen::Vector3d{unit(random), unit(random), unit(random)}; };
+  for (int i = 0; i < 20; ++i) {
+    const Pose truth{so3_exp(5 * kRadPerDeg * any()), 0.2 * any()};
+    const auto source = test::seen_from(truth, test::points_on(test::furnished_room(), 400, 2, 0.01));
+    const Registration found = gicp.align(source, map, Pose{}, kNoPrior, kOptions, false, never);
+    EXPECT_TRUE(found.converged);
+    EXPECT_LT(off_m(found.T_target_source, truth), 0.005);
+    EXPECT_LT(off_deg(found.T_target_source, truth), 0.1);
+    EXPECT_GT(found.inliers, source.size() / 2);
+  }
+}
+
+TEST(Gicp, PointsWithoutNormalsWillDo) {
+  const SurfaceMap map = map_of(test::points_on(test::furnished_room(), 3000, 1, 0.01));
+  const Pose truth{so3_exp({0.02, -0.01, 0.05}), {0.1, -0.15, 0.05}};
+  const auto source = test::seen_from(truth, test::points_on(test::furnished_room(), 400, 2, 0.01));
+  const Registration found =
+      Gicp(1).align(test::without_normals(source), map, Pose{}, kNoPrior, kOptions, false, never);
+  EXPECT_LT(off_m(found.T_target_source, truth), 0.01);
+  EXPECT_LT(off_deg(found.T_target_source, truth), 0.1);
+}
+
+TEST(Gicp, WideReachesHalfAMetreAndTenDegrees) {
+  const SurfaceMap map = map_of(test::points_on(test::furnished_room(), 3000, 1, 0.01));
+  const Pose truth{so3_exp({0, 0, 10 * kRadPerDeg}), {0.4, -0.3, 0.0}};
+  const auto source = test::seen_from(truth, test::points_on(test::furnished_room(), 400, 2, 0.01));
+  const Registration found = Gicp(1).align(source, map, Pose{}, kNoPrior, kOptions, true, never);
+  EXPECT_LT(off_m(found.T_target_source, truth), 0.005);
+  EXPECT_LT(off_deg(found.T_target_source, truth), 0.1);
+}
+
+TEST(Gicp, OutliersArePushedAside) {
+  const SurfaceMap map = map_of(test::points_on(test::furnished_room(), 3000, 1, 0.01));
+  const Pose truth{so3_exp({0, 0, 0.05}), {0.15, 0.1, 0}};
+  auto points = test::points_on(test::furnished_room(), 400, 2, 0.01);
+  const auto somebody = test::points_on({{{-2, -3.8, 0}, {0, 0.6, 0}, {0, 0, 1.8}}}, 400, 3); // not in the map
+  points.insert(points.end(), somebody.begin(), somebody.end());
+  const Registration found =
+      Gicp(1).align(test::seen_from(truth, points), map, Pose{}, kNoPrior, kOptions, false, never);
+  EXPECT_LT(off_m(found.T_target_source, truth), 0.01);
+}
+
+TEST(Gicp, TheSameBitsForAnyNumberOfThreads) {
+  const SurfaceMap map = map_of(test::points_on(test::furnished_room(), 3000, 1, 0.02));
+  const auto source =
+      test::seen_from({so3_exp({0, 0, 0.1}), {0.2, 0.1, 0}}, test::points_on(test::furnished_room(), 600, 2, 0.02));
+  const Registration alone = Gicp(1).align(source, map, Pose{}, kNoPrior, kOptions, true, never);
+  for (const int threads : {1, 2, 4, 8}) {
+    Gicp gicp(threads);
+    for (int run = 0; run < 10; ++run)
+      EXPECT_TRUE(same_bits(gicp.align(source, map, Pose{}, kNoPrior, kOptions, true, never), alone))
+          << threads << " threads";
+  }
+}
+
+TEST(Gicp, AWeakAxisFallsBackToThePrior) {
+  const SurfaceMap map = map_of(test::points_on(test::endless_corridor(), 20'000, 1, 0.01));
+  const auto points = test::points_on({{{-10, -1.5, 0}, {20, 0, 0}, {0, 3, 0}},
+                                       {{-10, -1.5, 0}, {20, 0, 0}, {0, 0, 3}},
+                                       {{-10, 1.5, 0}, {20, 0, 0}, {0, 0, 3}}},
+                                      600, 2, 0.01);
+  const Pose truth{so3_exp({0, 0, 0.02}), {1.0, 0.05, 0}};
+  PosePrior prior{{Eigen::Quaterniond::Identity(), {1.0, 0.0, 0.0}}, Matrix6::Identity() / (0.05 * 0.05)};
+  const Registration found =
+      Gicp(1).align(test::seen_from(truth, points), map, prior.T_target_source, prior, kOptions, false, never);
+  EXPECT_NEAR(found.T_target_source.translation.x(), 1.0, 0.02) << "from the prior";
+  EXPECT_NEAR(found.T_target_source.translation.y(), 0.05, 0.005) << "from the walls";
+  EXPECT_LT(off_deg(found.T_target_source, truth), 0.1);
+  EXPECT_LT(found.observability(0, 0), 0.02);
+  EXPECT_GT(found.observability(1, 1), 0.1);
+  EXPECT_GT(found.observability(2, 2), 0.1);
+}
+
+TEST(Gicp, ARoomIsObservableAllAround) {
+  const SurfaceMap map = map_of(test::points_on(test::furnished_room(), 3000));
+  const auto source = test::points_on(test::furnished_room(), 400, 2);
+  const Registration found = Gicp(1).align(source, map, Pose{}, kNoPrior, kOptions, false, never);
+  EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6>(found.observability).eigenvalues()[0], 0.02);
+  EXPECT_NEAR(found.observability.diagonal().head(3).sum(), 1.0, 1e-6) << "a mean of unit normals";
+}
+
+TEST(Gicp, StopEndsTheWorkEarly) {
+  const SurfaceMap map = map_of(test::points_on(test::furnished_room(), 3000));
+  const auto source =
+      test::seen_from({so3_exp({0, 0, 0.1}), {0.3, 0, 0}}, test::points_on(test::furnished_room(), 400, 2));
+  int asked = 0;
+  const Registration stopped =
+      Gicp(1).align(source, map, Pose{}, kNoPrior, kOptions, false, [&] { return ++asked >= 3; });
+  EXPECT_FALSE(stopped.converged);
+  EXPECT_GE(stopped.iterations, 1);
+  EXPECT_LE(stopped.iterations, 3);
+  EXPECT_TRUE(stopped.T_target_source.finite());
+}
+
+TEST(Gicp, NeverStepsMoreOftenThanItMay) {
+  const SurfaceMap map = map_of(test::points_on(test::furnished_room(), 3000));
+  const auto source =
+      test::seen_from({so3_exp({0, 0, 0.1}), {0.3, 0, 0}}, test::points_on(test::furnished_room(), 400, 2));
+  const Registration found = Gicp(1).align(source, map, Pose{}, kNoPrior, {3, 1.0}, false, never);
+  EXPECT_EQ(found.iterations, 3);
+  EXPECT_FALSE(found.converged);
+}
+
+TEST(Gicp, WithoutPointsOrMapTheStartIsTheResult) {
+  const SurfaceMap room = map_of(test::points_on(test::furnished_room(), 500));
+  const SurfaceMap nothing(kBytes);
+  const std::vector<SurfacePoint> points = test::points_on(test::furnished_room(), 100);
+  const Pose start{so3_exp({0, 0, 0.3}), {1, 2, 3}};
+  Gicp gicp(2);
+  for (const bool wide : {false, true}) {
+    const Registration no_points = gicp.align({}, room, start, kNoPrior, kOptions, wide, never);
+    EXPECT_EQ(no_points.T_target_source, start);
+    EXPECT_FALSE(no_points.converged);
+    EXPECT_EQ(no_points.inliers, 0U);
+    const Registration no_map = gicp.align(points, nothing, start, kNoPrior, kOptions, wide, never);
+    EXPECT_EQ(no_map.T_target_source, start);
+    EXPECT_FALSE(no_map.converged);
+    EXPECT_EQ(no_map.inliers, 0U);
+  }
+}
+
+TEST(Gicp, FarFromTheMapTheStartIsTheResult) {
+  const SurfaceMap room = map_of(test::points_on(test::furnished_room(), 500));
+  const Pose start{Eigen::Quaterniond::Identity(), {1e5, 0, 0}};
+  const Registration found =
+      Gicp(1).align(test::points_on(test::furnished_room(), 100), room, start, kNoPrior, kOptions, true, never);
+  EXPECT_EQ(found.T_target_source, start);
+}
+
+TEST(Gicp, PointsThatAreNotNumbersDoNotCount) {
+  constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const SurfaceMap map = map_of(test::points_on(test::furnished_room(), 3000, 1, 0.01));
+  const Pose truth{so3_exp({0, 0, 0.05}), {0.1, 0.1, 0}};
+  auto source = test::seen_from(truth, test::points_on(test::furnished_room(), 400, 2, 0.01));
+  source[7].position_m.x() = kNotANumber;
+  source[8].position_m = {kInfinity, 0, 0};
+  source[9].position_m = {0, -kInfinity, kNotANumber};
+  const Registration found = Gicp(1).align(source, map, Pose{}, kNoPrior, kOptions, false, never);
+  EXPECT_LT(off_m(found.T_target_source, truth), 0.01);
+}
+
+TEST(Gicp, TheInformationTellsTheErrorsThatAreMade) {
+  const SurfaceMap map = map_of(test::points_on(test::furnished_room(), 5000, 1, 0.0));
+  Gicp gicp(1);
+  double squared = 0.0, dimensions = 0.0;
+  for (unsigned seed = 10; seed < 60; ++seed) {
+    const auto source = test::points_on(test::furnished_room(), 200, seed, 0.02);
+    const Registration found = gicp.align(source, map, Pose{}, kNoPrior, kOptions, false, never);
+    Vector6 error;
+    error << found.T_target_source.translation, so3_log(found.T_target_source.rotation);
+    squared += error.dot(found.information * error);
+    dimensions += 6.0;
+  }
+  // 1 where the information is exact; the surfaces' own share of the variance makes it cautious.
+  EXPECT_LT(squared / dimensions, 2.0);
+  EXPECT_GT(squared / dimensions, 0.1);
+}
+
+} // namespace
+} // namespace locus

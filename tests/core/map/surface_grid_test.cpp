@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/map/surface_grid.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <random>
+
+namespace locus {
+namespace {
+
+constexpr double kLeaf_m = 0.5;
+constexpr std::size_t kEnoughBytes = 10'000'000;
+const Eigen::Vector3f kNoNormal = Eigen::Vector3f::Zero();
+
+void insert(SurfaceGrid& grid, const Eigen::Vector3d& point_m, const Eigen::Vector3f& normal) {
+  SurfaceGrid::Points points;
+  points.x_m[0] = point_m.x();
+  points.y_m[0] = point_m.y();
+  points.z_m[0] = point_m.z();
+  points.normal_x[0] = normal.x();
+  points.normal_y[0] = normal.y();
+  points.normal_z[0] = normal.z();
+  points.count = 1;
+  grid.insert(points);
+}
+
+/// One point in the middle of each voxel of a line along x.
+void insert_voxels_along_x(SurfaceGrid& grid, int from, int to) {
+  for (int i = from; i < to; ++i)
+    insert(grid, {kLeaf_m * i, 0, 0}, kNoNormal);
+  grid.refresh();
+}
+
+bool has_voxel_along_x(const SurfaceGrid& grid, int i) { return grid.find({i, 0, 0}) != nullptr; }
+
+TEST(SurfaceGrid, FindsWhatWasInserted) {
+  SurfaceGrid grid(kLeaf_m, kEnoughBytes);
+  const Eigen::Vector3d p{3.1, -2.2, 0.7};
+  EXPECT_EQ(grid.find(grid.index_of(p)), nullptr);
+  insert(grid, p, Eigen::Vector3f::UnitX());
+  grid.refresh();
+  const Surface* surface = grid.find(grid.index_of(p));
+  ASSERT_NE(surface, nullptr);
+  EXPECT_EQ(grid.size(), 1U);
+  EXPECT_LT((grid.centre_of(grid.index_of(p)) + surface->mean_m.cast<double>() - p).norm(), 1e-6);
+  EXPECT_EQ(grid.find({0, 0, 0}), nullptr);
+}
+
+TEST(SurfaceGrid, TheIndexIsOfTheNearestCentre) {
+  const SurfaceGrid grid(kLeaf_m, kEnoughBytes);
+  EXPECT_EQ(grid.index_of({0.24, -0.24, 0.0}), (VoxelIndex{0, 0, 0}));
+  EXPECT_EQ(grid.index_of({0.26, -0.26, 0.0}), (VoxelIndex{1, -1, 0}));
+  EXPECT_EQ(grid.centre_of({2, -3, 0}), Eigen::Vector3d(1.0, -1.5, 0.0));
+}
+
+TEST(SurfaceGrid, APointThatKnowsItsNormalIsAPlane) {
+  SurfaceGrid grid(kLeaf_m, kEnoughBytes);
+  const Eigen::Vector3f normal = Eigen::Vector3f{1, 2, 2}.normalized();
+  insert(grid, {0.1, 0.1, 0.1}, normal);
+  grid.refresh();
+  const Surface* surface = grid.find({0, 0, 0});
+  ASSERT_TRUE(surface->planar());
+  EXPECT_NEAR(std::abs(surface->normal.dot(normal)), 1.0F, 1e-5F);
+}
+
+TEST(SurfaceGrid, APointThatDoesNotIsNone) {
+  SurfaceGrid grid(kLeaf_m, kEnoughBytes);
+  insert(grid, {0.1, 0.1, 0.1}, kNoNormal);
+  grid.refresh();
+  EXPECT_FALSE(grid.find({0, 0, 0})->planar());
+}
+
+TEST(SurfaceGrid, OneScanLineIsNoPlane) {
+  SurfaceGrid grid(kLeaf_m, kEnoughBytes);
+  std::mt19937 random{1};
+  std::normal_distribution<double> noise{0.0, 0.01};
+  for (int i = -20; i <= 20; ++i)
+    insert(grid, {0.01 * i, noise(random), noise(random)}, kNoNormal);
+  grid.refresh();
+  ASSERT_EQ(grid.size(), 1U);
+  EXPECT_FALSE(grid.find({0, 0, 0})->planar());
+}
+
+TEST(SurfaceGrid, ThePointsOfACornerAreNoPlane) {
+  SurfaceGrid grid(kLeaf_m, kEnoughBytes);
+  std::mt19937 random{1};
+  std::uniform_real_distribution<double> along{-0.24, 0.24};
+  for (int i = 0; i < 100; ++i) {
+    insert(grid, {-0.1, along(random), along(random)}, Eigen::Vector3f::UnitX());
+    insert(grid, {along(random), -0.1, along(random)}, Eigen::Vector3f::UnitY());
+  }
+  grid.refresh();
+  EXPECT_FALSE(grid.find({0, 0, 0})->planar());
+}
+
+TEST(SurfaceGrid, ANoisyFloorAtHeightZeroIsOneLayerOfPlanes) {
+  SurfaceGrid grid(kLeaf_m, kEnoughBytes);
+  std::mt19937 random{1};
+  std::uniform_real_distribution<double> along{-1.74, 1.74};
+  std::normal_distribution<double> noise{0.0, 0.02};
+  for (int i = 0; i < 5000; ++i)
+    insert(grid, {along(random), along(random), noise(random)}, Eigen::Vector3f::UnitZ());
+  grid.refresh();
+  EXPECT_EQ(grid.size(), 49U) << "7 x 7 voxels, one above the other none";
+  for (std::size_t slot = 0; slot < grid.size(); ++slot) {
+    ASSERT_TRUE(grid.surface(slot).planar());
+    EXPECT_GT(std::abs(grid.surface(slot).normal.z()), 0.99F);
+    EXPECT_NEAR(grid.surface(slot).mean_m.z(), 0.0, 0.01);
+    EXPECT_NEAR(std::sqrt(grid.surface(slot).variance_m2), 0.02, 0.005);
+  }
+}
+
+TEST(SurfaceGrid, ALongStayDoesNotFreezeAVoxel) {
+  SurfaceGrid grid(kLeaf_m, kEnoughBytes);
+  for (int i = 0; i < 20'000; ++i)
+    insert(grid, {0, 0, 0}, Eigen::Vector3f::UnitZ());
+  for (int i = 0; i < 2000; ++i)
+    insert(grid, {0, 0, 0.1}, Eigen::Vector3f::UnitZ());
+  grid.refresh();
+  EXPECT_NEAR(grid.find({0, 0, 0})->mean_m.z(), 0.1, 0.01);
+}
+
+TEST(SurfaceGrid, AFullGridEvictsTheOldest) {
+  SurfaceGrid grid(kLeaf_m, 20'000);
+  const int capacity = static_cast<int>(grid.capacity());
+  ASSERT_LT(capacity, 1000);
+  insert_voxels_along_x(grid, 0, capacity);
+  EXPECT_EQ(grid.evicted(), 0U);
+  insert_voxels_along_x(grid, capacity, capacity + 10);
+  EXPECT_EQ(grid.evicted(), 10U);
+  EXPECT_EQ(grid.size(), grid.capacity());
+  for (int i = 0; i < 10; ++i)
+    EXPECT_FALSE(has_voxel_along_x(grid, i));
+  for (int i = 10; i < capacity + 10; ++i)
+    EXPECT_TRUE(has_voxel_along_x(grid, i));
+}
+
+TEST(SurfaceGrid, WhatIsHeldCanBeFoundAfterAnyNumberOfEvictions) {
+  SurfaceGrid grid(kLeaf_m, 20'000);
+  std::mt19937 random{1};
+  std::uniform_int_distribution<int> cell{-20, 20};
+  for (int i = 0; i < 50'000; ++i) {
+    insert(grid, kLeaf_m * Eigen::Vector3d(cell(random), cell(random), cell(random)), kNoNormal);
+    if (i % 1000 == 0)
+      grid.refresh();
+  }
+  grid.refresh();
+  EXPECT_EQ(grid.size(), grid.capacity());
+  EXPECT_GT(grid.evicted(), 10'000U);
+  for (std::size_t slot = 0; slot < grid.size(); ++slot)
+    ASSERT_EQ(grid.find(grid.index_of(grid.centre(slot))), &grid.surface(slot));
+}
+
+TEST(SurfaceGrid, VoxelsNearTheRobotAreSpared) {
+  SurfaceGrid grid(kLeaf_m, 20'000);
+  const int capacity = static_cast<int>(grid.capacity());
+  grid.protect({0, 0, 0}, 10.1 * kLeaf_m);
+  insert_voxels_along_x(grid, 0, 2 * capacity);
+  for (int i = 0; i <= 10; ++i)
+    EXPECT_TRUE(has_voxel_along_x(grid, i));
+}
+
+TEST(SurfaceGrid, ProtectingEverythingDoesNotStopIt) {
+  SurfaceGrid grid(kLeaf_m, 20'000);
+  grid.protect({0, 0, 0}, 1e9);
+  const int capacity = static_cast<int>(grid.capacity());
+  insert_voxels_along_x(grid, 0, 3 * capacity);
+  EXPECT_EQ(grid.size(), grid.capacity());
+  EXPECT_TRUE(has_voxel_along_x(grid, 3 * capacity - 1));
+}
+
+TEST(SurfaceGrid, AMapsWorthOfInsertionsInOneGoFitsTheSmallestBudget) {
+  SurfaceGrid grid(kLeaf_m, 1);
+  EXPECT_GT(grid.capacity(), 0U);
+  for (int i = 0; i < 10'000; ++i) // without a refresh in between
+    insert(grid, {kLeaf_m * i, 0, 0}, kNoNormal);
+  grid.refresh();
+  EXPECT_EQ(grid.size(), grid.capacity());
+}
+
+TEST(SurfaceGrid, ClearedIsEmptyAndUsable) {
+  SurfaceGrid grid(kLeaf_m, 20'000);
+  insert_voxels_along_x(grid, 0, 1000);
+  grid.clear();
+  EXPECT_EQ(grid.size(), 0U);
+  for (int i = 0; i < 1000; ++i)
+    ASSERT_FALSE(has_voxel_along_x(grid, i));
+  insert_voxels_along_x(grid, 0, 10);
+  EXPECT_EQ(grid.size(), 10U);
+  EXPECT_TRUE(has_voxel_along_x(grid, 9));
+}
+
+} // namespace
+} // namespace locus

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/odometry/gravity.hpp"
+
+#include <gtest/gtest.h>
+
+#include "core/odometry/flat_ground.hpp"
+
+namespace locus {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr Duration kPeriod = milliseconds{100};
+const Eigen::Vector3d kUp = Eigen::Vector3d::UnitZ();
+
+/// A sweep of a base with roll and pitch that accelerates.
+Sweep sweep_with(const Eigen::Vector3d& rpy_deg, const Eigen::Vector3d& acceleration_base_mps2 = {0, 0, 0}) {
+  Sweep sweep;
+  sweep.end = sweep.start + kPeriod;
+  sweep.motion.specific_force_base_mps2 =
+      from_rpy_rad(rpy_deg * kRadPerDeg).conjugate() * (9.80665 * kUp) + acceleration_base_mps2;
+  return sweep;
+}
+
+double tilt_deg(const Gravity& gravity) { return std::acos(std::min(1.0, gravity.up_base()->z())) / kRadPerDeg; }
+
+const Eigen::Quaterniond kNoTurn = Eigen::Quaterniond::Identity();
+
+TEST(Gravity, IsReadAtOnceOfARobotAtRest) {
+  Gravity gravity;
+  gravity.observe(kNoTurn, sweep_with({5, -3, 0}));
+  ASSERT_TRUE(gravity.up_base());
+  EXPECT_LT((level_rpy_rad(*gravity.up_base()) - Eigen::Vector3d(5, -3, 0) * kRadPerDeg).norm(), 1e-9);
+}
+
+TEST(Gravity, AnAccelerationOfASecondTiltsNothingMuch) {
+  Gravity gravity;
+  gravity.observe(kNoTurn, sweep_with({0, 0, 0}));
+  for (int i = 0; i < 10; ++i)
+    gravity.observe(kNoTurn, sweep_with({0, 0, 0}, {0.8, 0, 0})); // reads like 4.7 deg
+  EXPECT_LT(tilt_deg(gravity), 1.5);
+}
+
+TEST(Gravity, ARampIsNoticedAtOnceByTheGyro) {
+  Gravity gravity;
+  gravity.observe(kNoTurn, sweep_with({0, 0, 0}));
+  double pitch_deg = 0;
+  for (int i = 0; i < 5; ++i) {
+    pitch_deg -= 2;
+    gravity.observe(from_rpy_rad({0, -2 * kRadPerDeg, 0}), sweep_with({0, pitch_deg, 0}));
+  }
+  EXPECT_NEAR(tilt_deg(gravity), 10.0, 0.01);
+}
+
+TEST(Gravity, AGyroThatDriftsIsOutvotedInTime) {
+  Gravity gravity;
+  gravity.observe(kNoTurn, sweep_with({0, 0, 0}));
+  for (int i = 0; i < 300; ++i)
+    gravity.observe(from_rpy_rad({0.001 * kRadPerDeg, 0, 0}), sweep_with({0, 0, 0}));
+  EXPECT_LT(tilt_deg(gravity), 0.05);
+}
+
+TEST(Gravity, WhatIsNotAsStrongAsGravityIsNotLookedAt) {
+  Gravity gravity;
+  gravity.observe(kNoTurn, sweep_with({0, 0, 0}, {6, 0, 0}));
+  EXPECT_FALSE(gravity.up_base());
+  gravity.observe(kNoTurn, sweep_with({1, 0, 0}));
+  EXPECT_NEAR(tilt_deg(gravity), 1.0, 1e-6);
+  gravity.observe(kNoTurn, Sweep{});
+  EXPECT_FALSE(gravity.up_base()) << "no inertial sensor was heard";
+}
+
+TEST(Gravity, AnAttitudeIsPreferredToTheAccelerometer) {
+  Gravity gravity;
+  Sweep sweep = sweep_with({0, 0, 0}, {0.8, 0, 0});
+  sweep.motion.up_base = from_rpy_rad({0, 2 * kRadPerDeg, 0}).conjugate() * kUp;
+  gravity.observe(kNoTurn, sweep);
+  EXPECT_NEAR(tilt_deg(gravity), 2.0, 1e-9);
+}
+
+// --- Flat ground ------------------------------------------------------------------------------------------------
+
+Eigen::Vector3d up_at_pitch_deg(double pitch_deg) {
+  return from_rpy_rad({0, pitch_deg * kRadPerDeg, 0}).conjugate() * kUp;
+}
+Stamp at(int sweep) { return stamp_from_ns(1'000'000'000) + sweep * kPeriod; }
+
+TEST(FlatGround, IsFoundAfterTwoLevelSecondsAndLeftAtOnceOnARamp) {
+  FlatGroundAssumption ground(FlatGround::automatic);
+  for (int i = 0; i < 20; ++i) {
+    ground.observe(at(i), up_at_pitch_deg(0.5));
+    EXPECT_FALSE(ground.holds()) << i;
+  }
+  ground.observe(at(20), up_at_pitch_deg(0.5));
+  EXPECT_TRUE(ground.holds());
+  ground.observe(at(21), up_at_pitch_deg(4.0));
+  EXPECT_FALSE(ground.holds());
+  ground.observe(at(22), up_at_pitch_deg(0.0));
+  EXPECT_FALSE(ground.holds()) << "one level sweep is no floor";
+}
+
+TEST(FlatGround, IsNotKnownWithoutGravity) {
+  FlatGroundAssumption ground(FlatGround::automatic);
+  for (int i = 0; i < 30; ++i)
+    ground.observe(at(i), kUp);
+  EXPECT_TRUE(ground.holds());
+  ground.observe(at(30), std::nullopt);
+  EXPECT_FALSE(ground.holds());
+}
+
+TEST(FlatGround, ByContextHoldsWhateverGravitySays) {
+  FlatGroundAssumption on(FlatGround::on), off(FlatGround::off);
+  for (int i = 0; i < 30; ++i) {
+    on.observe(at(i), up_at_pitch_deg(10));
+    off.observe(at(i), kUp);
+  }
+  EXPECT_TRUE(on.holds());
+  EXPECT_FALSE(off.holds());
+}
+
+const Pose kLast{Eigen::Quaterniond::Identity(), {0, 0, 0.2}};
+const Pose kRolledUpward{from_rpy_rad({0.02, -0.03, 0.5}), {1.0, 0.3, 0.25}};
+
+TEST(FlatGround, ByContextKeepsHeadingAndWayAndTakesOutTheRest) {
+  const FlatGroundAssumption ground(FlatGround::on);
+  const Pose flat = ground.flatten(kLast, kRolledUpward, 1e8 * Matrix6::Identity());
+  EXPECT_LT((flat.translation - Eigen::Vector3d(1.0, 0.3, 0.2)).norm(), 1e-12);
+  EXPECT_LT((to_rpy_rad(flat.rotation) - Eigen::Vector3d(0, 0, 0.5)).norm(), 1e-3);
+}
+
+TEST(FlatGround, FoundGivesWayToLidarWhereThatSeesBetter) {
+  FlatGroundAssumption ground(FlatGround::automatic);
+  for (int i = 0; i < 30; ++i)
+    ground.observe(at(i), kUp);
+  const Pose blind = ground.flatten(kLast, kRolledUpward, Matrix6::Zero());
+  EXPECT_LT((blind.translation - Eigen::Vector3d(1.0, 0.3, 0.2)).norm(), 1e-12);
+  EXPECT_LT((to_rpy_rad(blind.rotation) - Eigen::Vector3d(0, 0, 0.5)).norm(), 1e-3);
+
+  const Matrix6 information = along_each_axis(0.001, 0.03).cwiseAbs2().cwiseInverse().asDiagonal();
+  const Pose seen = ground.flatten(kLast, kRolledUpward, information);
+  EXPECT_LT((seen.translation - kRolledUpward.translation).norm(), 0.003);
+  EXPECT_LT(angle_rad(seen.rotation * kRolledUpward.rotation.conjugate()), 5e-4);
+}
+
+// --- Tilt -------------------------------------------------------------------------------------------------------
+
+/// A keyframe every ten sweeps; gives back the tilt that is left.
+double tilt_after(int sweeps, double tilt_rad, double up_noise_rad = 0.0) {
+  TiltKeeper keeper;
+  Eigen::Quaterniond R_odom_base = from_rpy_rad({tilt_rad, 0, 0.7}); // of a base that is level in truth
+  for (int i = 0; i < sweeps; ++i) {
+    const double noise = i % 2 == 0 ? up_noise_rad : -up_noise_rad;
+    keeper.observe(R_odom_base, from_rpy_rad({noise, 0, 0}).conjugate() * kUp);
+    if (i % 10 == 9)
+      R_odom_base = so3_exp(keeper.take_correction_rad()) * R_odom_base;
+  }
+  return std::acos((R_odom_base * kUp).z());
+}
+
+TEST(TiltKeeper, BringsADriftBackToWhatAnAccelerometerKnows) {
+  EXPECT_LT(tilt_after(10'000, 3 * kRadPerDeg), 1.1 * kRadPerDeg);
+  EXPECT_GT(tilt_after(10'000, 3 * kRadPerDeg), 0.8 * kRadPerDeg) << "and no farther";
+}
+
+TEST(TiltKeeper, TurnsNoKeyframeByMoreThanTheMapCanBear) {
+  EXPECT_GT(tilt_after(1000, 3 * kRadPerDeg), (3 - 100 * 0.02) * kRadPerDeg);
+}
+
+TEST(TiltKeeper, LeavesALevelOdometryAlone) {
+  EXPECT_NEAR(tilt_after(1000, 0.5 * kRadPerDeg, 0.02), 0.5 * kRadPerDeg, 1e-9);
+}
+
+TEST(TiltKeeper, ABlowIsNoDrift) { EXPECT_NEAR(tilt_after(1000, 8 * kRadPerDeg), 8 * kRadPerDeg, 1e-9); }
+
+} // namespace
+} // namespace locus

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/odometry/seen_axes.hpp"
+
+#include <gtest/gtest.h>
+
+namespace locus {
+namespace {
+
+constexpr int kForward = 0;
+constexpr int kHeading = 5;
+
+/// Every axis well seen but one, of which the surfaces say `observability` and nothing of the others.
+Matrix6 weak_along(int axis, double observability) {
+  Matrix6 seen = 0.3 * Matrix6::Identity();
+  seen(axis, axis) = observability;
+  return seen;
+}
+
+TEST(SeenAxes, AreAllBeforeTheFirstLook) { EXPECT_TRUE(SeenAxes{}.all()); }
+
+TEST(SeenAxes, AnAxisIsLostBelowAHundredthAndBackFromTwoOn) {
+  SeenAxes axes;
+  const auto sees_after = [&axes](double observability) {
+    const Vector6 observed = axes.observe(weak_along(kForward, observability));
+    EXPECT_NEAR(observed[kForward], observability, 2e-6);
+    EXPECT_TRUE(axes.each()[kHeading]);
+    EXPECT_EQ(axes.all(), axes.each()[kForward]);
+    return axes.all();
+  };
+  EXPECT_TRUE(sees_after(0.011));
+  EXPECT_FALSE(sees_after(0.009));
+  EXPECT_FALSE(sees_after(0.019)) << "once lost";
+  EXPECT_TRUE(sees_after(0.021));
+  EXPECT_TRUE(sees_after(0.011)) << "once seen";
+}
+
+/// A wall that shows a turn and a shift only together, as one from far aside does, shows neither.
+TEST(SeenAxes, WhatIsOnlySeenTogetherWithAnotherAxisIsNotSeen) {
+  SeenAxes axes;
+  Matrix6 together = weak_along(kForward, 0.3);
+  together(kForward, kHeading) = together(kHeading, kForward) = 0.3;
+  const Vector6 observed = axes.observe(together);
+  EXPECT_LT(observed[kForward], 1e-5);
+  EXPECT_LT(observed[kHeading], 1e-5);
+  EXPECT_FALSE(axes.each()[kForward]);
+  EXPECT_FALSE(axes.each()[kHeading]);
+}
+
+TEST(SeenAxes, NothingSeenAtAllIsAFigureAllTheSame) {
+  SeenAxes axes;
+  const Vector6 observed = axes.observe(Matrix6::Zero());
+  EXPECT_TRUE(observed.allFinite());
+  for (const bool seen : axes.each())
+    EXPECT_FALSE(seen);
+}
+
+TEST(SeenAxes, OnlyWhatIsSeenIsLeft) {
+  SeenAxes axes;
+  axes.observe(weak_along(kForward, 0.001));
+  Vector6 left = Vector6::Ones();
+  left[kForward] = 0.0;
+  EXPECT_EQ(axes.part_of(Vector6::Ones()), left);
+  Matrix6 rows = Matrix6::Ones();
+  rows.row(kForward).setZero();
+  EXPECT_EQ(axes.rows_of(Matrix6::Ones()), rows);
+}
+
+} // namespace
+} // namespace locus

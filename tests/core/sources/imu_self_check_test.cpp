@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/sources/imu_self_check.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace locus {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+/// A unit at 200 Hz on a robot that sways left and right, seen by lidar every 100 ms; `wrong` tells what it reports.
+class ImuSelfCheckTest : public testing::Test {
+ protected:
+  template <class Wrong> void drive(ImuSelfCheck& check, Duration duration, const Wrong& wrong) {
+    for (int i = 0; i < duration / milliseconds{5}; ++i) {
+      now_ += milliseconds{5};
+      ImuSample sample{now_, now_, {0.01, 0.02, turn_rate_radps(now_)}, {0.3, 0.1, 9.8}, {}};
+      wrong(sample);
+      refused_ = check.judge(SourceReading{.stamp = now_, .arrival = now_, .imu = &sample}).has_value();
+      if (i % 20 != 19)
+        continue;
+      RegistrationFeedback seen; // of the sweep before the last: a live pipeline is that late
+      seen.to = now_ - milliseconds{100};
+      seen.from = seen.to - milliseconds{100};
+      seen.sees = sees_;
+      seen.twist_base.tail<3>() = Eigen::Vector3d{0, 0, turn_rate_radps(seen.from + milliseconds{50})};
+      check.hear(LidarOpinion::none, seen);
+    }
+  }
+  /// Turns steadily for so many sweeps.
+  void turn(ImuSelfCheck& check, int sweeps, const Eigen::Vector3d& gyro_radps, const Eigen::Vector3d& lidar_radps) {
+    for (int i = 1; i <= 20 * sweeps; ++i) {
+      now_ += milliseconds{5};
+      const ImuSample sample{now_, now_, gyro_radps, {0.3, 0.1, 9.8}, {}};
+      refused_ = check.judge(SourceReading{.stamp = now_, .arrival = now_, .imu = &sample}).has_value();
+      if (i % 20 != 0)
+        continue;
+      RegistrationFeedback seen{
+          .from = now_ - milliseconds{100}, .to = now_, .opinions = {}, .twist_base = {}, .sees = sees_};
+      seen.twist_base << Eigen::Vector3d::Zero(), lidar_radps;
+      refused_ = check.hear(LidarOpinion::none, seen).has_value() || refused_;
+    }
+  }
+  void stand(ImuSelfCheck& check) { turn(check, 1, {0, 0, 0}, {0, 0, 0}); }
+  static double turn_rate_radps(Stamp stamp) {
+    return 0.7 * std::sin(2.0 * std::numbers::pi * to_seconds(stamp.time_since_epoch() % seconds{1}));
+  }
+  std::array<bool, 6> sees_{true, true, true, true, true, true};
+  Stamp now_ = stamp_from_ns(1'700'000'000'000'000'000);
+  bool refused_ = false;
+};
+
+TEST_F(ImuSelfCheckTest, AGoodUnitPasses) {
+  ImuSelfCheck check(Pose{});
+  drive(check, seconds{5}, [](ImuSample&) {});
+  EXPECT_FALSE(refused_);
+  EXPECT_EQ(check.verdict(), "");
+  EXPECT_TRUE(check.trusts_accelerometer());
+}
+
+TEST_F(ImuSelfCheckTest, AUnitOnItsSidePassesIfTheConfigurationSaysSo) {
+  const Pose T_base_imu{so3_exp({std::numbers::pi / 2, 0, 0}), {}};
+  const auto turned = [&](ImuSample& sample) {
+    sample.angular_velocity_radps = T_base_imu.rotation.conjugate() * sample.angular_velocity_radps;
+    sample.specific_force_mps2 = T_base_imu.rotation.conjugate() * sample.specific_force_mps2;
+  };
+  ImuSelfCheck configured(T_base_imu), unconfigured(Pose{});
+  drive(configured, seconds{5}, turned);
+  EXPECT_EQ(configured.verdict(), "");
+  drive(unconfigured, seconds{5}, turned);
+  EXPECT_TRUE(refused_);
+  EXPECT_NE(unconfigured.verdict().find("gravity is not below the robot"), std::string_view::npos);
+}
+
+TEST_F(ImuSelfCheckTest, AccelerationsInGAreNotUsedButTheGyroIs) {
+  ImuSelfCheck check(Pose{});
+  drive(check, seconds{5}, [](ImuSample& sample) { sample.specific_force_mps2 /= 9.81; });
+  EXPECT_FALSE(refused_);
+  EXPECT_FALSE(check.trusts_accelerometer());
+  EXPECT_NE(check.verdict().find("in g"), std::string_view::npos);
+}
+
+TEST_F(ImuSelfCheckTest, AccelerationsThatAreNoGravityAreNotUsed) {
+  ImuSelfCheck check(Pose{});
+  drive(check, seconds{5}, [](ImuSample& sample) { sample.specific_force_mps2 *= 2.0; });
+  EXPECT_FALSE(refused_);
+  EXPECT_FALSE(check.trusts_accelerometer());
+}
+
+TEST_F(ImuSelfCheckTest, AGyroInDegreesIsRefusedByName) {
+  ImuSelfCheck check(Pose{});
+  drive(check, seconds{5}, [](ImuSample& sample) { sample.angular_velocity_radps /= kRadPerDeg; });
+  EXPECT_TRUE(refused_);
+  EXPECT_NE(check.verdict().find("deg/s"), std::string_view::npos);
+}
+
+TEST_F(ImuSelfCheckTest, AGyroThatTurnsTheOtherWayIsRefused) {
+  ImuSelfCheck check(Pose{});
+  drive(check, seconds{5}, [](ImuSample& sample) { sample.angular_velocity_radps *= -1.0; });
+  EXPECT_TRUE(refused_);
+  EXPECT_NE(check.verdict().find("other way"), std::string_view::npos);
+}
+
+TEST_F(ImuSelfCheckTest, AGoodGyroIsUsedFromItsFirstTurnOn) {
+  ImuSelfCheck check(Pose{});
+  for (int i = 0; i < 20; ++i) {
+    turn(check, 1, {0, 0, 2.0}, {0, 0, 2.1});
+    ASSERT_FALSE(refused_);
+  }
+}
+
+TEST_F(ImuSelfCheckTest, AGyroThatLidarContradictsIsSetAsideAfterTwoSweepsThoughItIsRightAboutOtherAxes) {
+  ImuSelfCheck check(Pose{});
+  turn(check, 12, {0.1, 0.2, 0.0}, {0.1, 0.2, 0.0});
+  turn(check, 1, {0.1, 0.2, 0.1}, {0.1, 0.2, -0.1});
+  EXPECT_FALSE(refused_) << "one sweep may be wrong";
+  turn(check, 1, {0.1, 0.2, 0.1}, {0.1, 0.2, -0.1});
+  EXPECT_TRUE(refused_);
+  EXPECT_NE(check.verdict().find("until"), std::string_view::npos) << "it may come back";
+  turn(check, 10, {0.1, 0.0, 0.1}, {0.1, 0.0, -0.1});
+  EXPECT_TRUE(refused_);
+  EXPECT_NE(check.verdict().find("other way"), std::string_view::npos);
+}
+
+TEST_F(ImuSelfCheckTest, AGyroThatWasSetAsideIsUsedAgainWhenLidarAgrees) {
+  ImuSelfCheck check(Pose{});
+  stand(check);
+  turn(check, 2, {0, 0.3, 0}, {0, -0.1, 0});
+  EXPECT_TRUE(refused_);
+  check.forget(); // as the monitor tells it then
+  stand(check);
+  turn(check, 5, {0, 0.3, 0}, {0, 0.3, 0});
+  EXPECT_FALSE(refused_);
+  EXPECT_EQ(check.verdict(), "");
+}
+
+TEST_F(ImuSelfCheckTest, AGyroIsTriedAgainWhereLidarSeesNothingClearWithoutItButNotForEver) {
+  ImuSelfCheck check(Pose{});
+  stand(check);
+  for (int round = 0; round < 3; ++round) {
+    turn(check, 2, {0, 0.3, 0}, {0, -0.1, 0});
+    EXPECT_TRUE(refused_);
+    EXPECT_NE(check.verdict().find("until"), std::string_view::npos);
+    for (int i = 0; i < 10; ++i)
+      turn(check, 1, {0, 0.3, 0}, {0, i % 2 == 0 ? 0.3 : -0.3, 0});
+    stand(check);
+    EXPECT_EQ(refused_, round == 2);
+  }
+  EXPECT_NE(check.verdict().find("disagree on how the robot turns about y (pitch): they see different turns"),
+            std::string_view::npos)
+      << check.verdict();
+  EXPECT_EQ(check.verdict().find("wrong"), std::string_view::npos) << "who is right is not known";
+}
+
+/// A robot stands, and lidar follows the people who walk around it: the gyro was said to be mounted wrongly.
+TEST_F(ImuSelfCheckTest, AGyroThatStandsStillWhileLidarTurnsIsNotCalledWrong) {
+  ImuSelfCheck check(Pose{});
+  stand(check);
+  for (int round = 0; round < 3; ++round) {
+    turn(check, 2, {0, 0, 1e-3}, {0, 0, -0.2});
+    EXPECT_TRUE(refused_);
+    turn(check, 10, {0, 0, 1e-3}, {0, 0, -0.2});
+    stand(check);
+  }
+  EXPECT_NE(check.verdict().find("about z (yaw): lidar sees turns and the gyro none"), std::string_view::npos)
+      << check.verdict();
+  EXPECT_NE(check.verdict().find("people or things that move around a robot that stands"), std::string_view::npos);
+  EXPECT_EQ(check.verdict().find("other way"), std::string_view::npos) << "two readings of noise have any sign";
+}
+
+/// Nobody uses it in the second after a loss.
+TEST_F(ImuSelfCheckTest, WhatLidarSeesAloneAfterALossSpeaksAgainstNoGyro) {
+  ImuSelfCheck check(Pose{});
+  stand(check);
+  check.forget();
+  now_ += milliseconds{200};
+  check.accept(SourceReading{.stamp = now_, .arrival = now_});
+  turn(check, 9, {0, 0, 1.0}, {0, 0, -1.0});
+  EXPECT_FALSE(refused_);
+  turn(check, 4, {0, 0, 1.0}, {0, 0, -1.0});
+  EXPECT_TRUE(refused_);
+}
+
+TEST_F(ImuSelfCheckTest, WhatLidarDoesNotSeeSpeaksAgainstNoGyro) {
+  ImuSelfCheck check(Pose{});
+  sees_ = {true, true, true, true, true, false};
+  turn(check, 30, {0, 0, 1.0}, {0, 0, 0});
+  EXPECT_FALSE(refused_);
+}
+
+TEST_F(ImuSelfCheckTest, WhatComesBackIsCheckedAnew) {
+  ImuSelfCheck check(Pose{});
+  turn(check, 15, {0, 0, 1.0}, {0, 0, 1.0});
+  check.forget();
+  now_ += seconds{2};
+  turn(check, 3, {0, 0, -1.0}, {0, 0, 1.0});
+  EXPECT_TRUE(refused_);
+}
+
+TEST_F(ImuSelfCheckTest, SamplesOutOfOrderDoNotHinderIt) {
+  ImuSelfCheck check(Pose{});
+  int count = 0;
+  drive(check, seconds{5}, [&](ImuSample& sample) {
+    sample.angular_velocity_radps *= -1.0;
+    if (++count % 7 == 0) {
+      ImuSample stale = sample;
+      check.judge(SourceReading{.stamp = now_ - milliseconds{12}, .arrival = now_, .imu = &stale});
+    }
+  });
+  EXPECT_TRUE(refused_);
+}
+
+TEST_F(ImuSelfCheckTest, AGyroThatDoesNotTurnWithTheRobotIsRefused) {
+  ImuSelfCheck check(Pose{});
+  drive(check, seconds{5}, [](ImuSample& sample) { sample.angular_velocity_radps = {0.5, 0, 0.01}; });
+  EXPECT_TRUE(refused_);
+}
+
+} // namespace
+} // namespace locus

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/sources/motion_sources.hpp"
+
+#include <gtest/gtest.h>
+
+#include "core/stamps.hpp"
+
+namespace locus {
+namespace {
+
+using std::chrono::milliseconds;
+
+const std::vector<MotionSourceOptions> kWheelsImuVisual{
+    {"wheels", SourceKind::odometry, {}}, {"imu", SourceKind::imu, {}}, {"visual", SourceKind::odometry, {}}};
+
+/// Wheels that say 1 m/s and no turn, a gyro that says 1 rad/s, a visual odometry that says 2 m/s and 2 rad/s.
+class MotionSourcesTest : public testing::Test {
+ protected:
+  static void feed(MotionSources& sources, std::size_t source, int from_ms, int to_ms) {
+    for (int ms = from_ms; ms <= to_ms; ms += 20) {
+      const Stamp stamp = at_ms(ms);
+      const double t_s = 1e-3 * ms;
+      if (source == 0)
+        sources.add(0, OdometrySample{stamp, stamp, {Eigen::Quaterniond::Identity(), {t_s, 0, 0}}, 1.0});
+      else if (source == 1)
+        sources.add(1, ImuSample{stamp, stamp, {0, 0, 1.0}, {1e-6 * ms, 0, 9.81}, {}}); // never twice the same
+      else
+        sources.add(2, OdometrySample{stamp, stamp, {so3_exp({0, 0, 2 * t_s}), {2 * t_s, 0, 0}}, 1.0});
+    }
+  }
+};
+
+TEST_F(MotionSourcesTest, CombinedTakesRotationFromTheGyroAndTranslationFromTheOdometry) {
+  MotionSources sources(kWheelsImuVisual, Fusion::combined);
+  for (const std::size_t source : {0U, 1U, 2U})
+    feed(sources, source, 0, 1000);
+  const SourceChoice choice = sources.choose(at_ms(1000));
+  EXPECT_EQ(choice.rotation, 1U);
+  EXPECT_EQ(choice.translation, 0U);
+  EXPECT_EQ(choice.uncorrected(), Uncorrected::nothing);
+  const auto T = sources.motion(choice, at_ms(400), at_ms(500));
+  ASSERT_TRUE(T);
+  EXPECT_NEAR(T->translation.x(), 0.1, 1e-9);
+  EXPECT_NEAR(so3_log(T->rotation).z(), 0.1, 1e-9);
+}
+
+TEST_F(MotionSourcesTest, QueueTakesAllFromTheFirstHealthyOne) {
+  MotionSources sources(kWheelsImuVisual, Fusion::queue);
+  for (const std::size_t source : {0U, 1U, 2U})
+    feed(sources, source, 0, 1000);
+  const SourceChoice choice = sources.choose(at_ms(1000));
+  EXPECT_EQ(choice.rotation, 0U);
+  EXPECT_EQ(choice.translation, 0U);
+  EXPECT_NEAR(so3_log(sources.motion(choice, at_ms(400), at_ms(500))->rotation).z(), 0.0, 1e-12);
+}
+
+TEST_F(MotionSourcesTest, AnInertialSourceFirstInTheQueueLeavesTheTranslationOpen) {
+  MotionSources sources({kWheelsImuVisual[1], kWheelsImuVisual[0]}, Fusion::queue);
+  for (const int ms : {0, 10}) {
+    sources.add(0, ImuSample{at_ms(ms), at_ms(ms), {0, 0, 1.0}, {1e-6 * ms, 0, 9.81}, {}});
+    sources.add(1, OdometrySample{at_ms(ms), at_ms(ms), {}, 1.0});
+  }
+  const SourceChoice choice = sources.choose(at_ms(20));
+  EXPECT_EQ(choice.rotation, 0U);
+  EXPECT_FALSE(choice.translation);
+  EXPECT_EQ(choice.uncorrected(), Uncorrected::translation);
+}
+
+TEST_F(MotionSourcesTest, ASilentSourceIsNotChosen) {
+  MotionSources sources(kWheelsImuVisual, Fusion::queue);
+  feed(sources, 0, 0, 1000);
+  feed(sources, 2, 0, 2500);
+  const Stamp silent_since = at_ms(1000);
+  EXPECT_EQ(sources.choose(silent_since + MotionTrack::kMaxExtrapolation).translation, 0U);
+  EXPECT_EQ(sources.choose(silent_since + MotionTrack::kMaxExtrapolation + milliseconds{1}).translation, 2U);
+}
+
+// Its track stands between one sample's extrapolation and the next sample: half of a sweep would count as standing
+// still.
+TEST_F(MotionSourcesTest, ASourceSlowerThanTracksAreExtrapolatedIsNotChosen) {
+  MotionSources sources(kWheelsImuVisual, Fusion::queue);
+  for (int ms = 0; ms <= 1000; ms += 100)
+    sources.add(0, OdometrySample{at_ms(ms), at_ms(ms), {Eigen::Quaterniond::Identity(), {1e-3 * ms, 0, 0}}, 1.0});
+  EXPECT_FALSE(sources.choose(at_ms(1000)).translation);
+}
+
+TEST_F(MotionSourcesTest, WithoutAnySourceNothingIsCorrected) {
+  const MotionSources sources({}, Fusion::combined);
+  const SourceChoice choice = sources.choose(at_ms(0));
+  EXPECT_FALSE(choice.rotation);
+  EXPECT_FALSE(choice.translation);
+  EXPECT_EQ(choice.uncorrected(), Uncorrected::all);
+  EXPECT_EQ(*sources.motion(choice, at_ms(0), at_ms(100)), Pose{});
+}
+
+TEST_F(MotionSourcesTest, NoMotionWhereATrackDoesNotReach) {
+  MotionSources sources(kWheelsImuVisual, Fusion::combined);
+  feed(sources, 0, 0, 1000);
+  feed(sources, 1, 500, 1000);
+  const SourceChoice choice = sources.choose(at_ms(1000));
+  EXPECT_TRUE(sources.motion(choice, at_ms(500), at_ms(600)));
+  EXPECT_FALSE(sources.motion(choice, at_ms(400), at_ms(600)));
+}
+
+TEST_F(MotionSourcesTest, SensesThePoseOfEverySourceThatSpokeDuringTheSweep) {
+  MotionSources sources(kWheelsImuVisual, Fusion::queue);
+  feed(sources, 0, 0, 1000);
+  feed(sources, 1, 0, 1000);
+  feed(sources, 2, 0, 800);
+  const SensedMotion motion = sources.sensed_in(at_ms(900), at_ms(1000));
+  EXPECT_TRUE(motion.sources[0].usable);
+  EXPECT_TRUE(motion.sources[1].usable);
+  EXPECT_FALSE(motion.sources[2].usable);
+  EXPECT_FALSE(motion.sources[3].usable) << "there is no such source";
+  EXPECT_NEAR(motion.sources[0].T_source_base.translation.x(), 1.0, 1e-12);
+  EXPECT_NEAR(so3_log(motion.sources[1].T_source_base.rotation).z(), 1.0, 1e-6);
+  ASSERT_TRUE(motion.specific_force_base_mps2);
+  EXPECT_NEAR(motion.specific_force_base_mps2->z(), 9.81, 1e-12);
+
+  const SensedMotion silence = sources.sensed_in(at_ms(2000), at_ms(2100));
+  EXPECT_FALSE(silence.sources[0].usable);
+  EXPECT_FALSE(silence.specific_force_base_mps2);
+}
+
+TEST_F(MotionSourcesTest, WhoeverLosesHealthIsKnownToTheSweepButNotUsable) {
+  MotionSources sources(kWheelsImuVisual, Fusion::combined);
+  feed(sources, 0, 0, 1000);
+  sources.set_outside_verdict(0, false);
+  sources.set_outside_verdict(0, true);
+  feed(sources, 0, 1020, 1100); // on probation
+  const SensedMotion motion = sources.sensed_in(at_ms(1000), at_ms(1100));
+  EXPECT_TRUE(motion.sources[0].known);
+  EXPECT_FALSE(motion.sources[0].usable);
+  EXPECT_EQ(motion.sources[0].spell, 1U);
+  EXPECT_FALSE(sources.choose(at_ms(1100)).translation);
+}
+
+TEST_F(MotionSourcesTest, EachChangeOfHealthIsToldOnceWithItsSource) {
+  std::vector<HealthEvent> events;
+  MotionSources sources(kWheelsImuVisual, Fusion::combined, [&](const HealthEvent& event) { events.push_back(event); });
+  feed(sources, 0, 0, 1000);
+  feed(sources, 2, 0, 1000);
+  for (int ms = 1000; ms <= 1500; ms += 10) {
+    sources.advance(at_ms(ms));
+    if (ms % 20 == 0)
+      feed(sources, 0, ms, ms);
+  }
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_EQ(events[0].source, 2U);
+  EXPECT_EQ(events[0].stamp, at_ms(1070));
+  EXPECT_FALSE(events[0].healthy);
+  feed(sources, 2, 1520, 2540);
+  ASSERT_EQ(events.size(), 2U);
+  EXPECT_EQ(events[1].source, 2U);
+  EXPECT_TRUE(events[1].healthy);
+}
+
+/// It cost them as long as it was set back: their samples were older than the last ones.
+TEST_F(MotionSourcesTest, AClockOfTheHostThatIsSetBackCostsThemTwoSeconds) {
+  MotionSources sources(kWheelsImuVisual, Fusion::combined);
+  const int an_hour_ago = -3'600'000;
+  for (const int from_ms : {0, an_hour_ago}) {
+    for (int ms = from_ms; ms <= from_ms + 2000; ms += 20) {
+      feed(sources, 0, ms, ms);
+      feed(sources, 1, ms, ms);
+      sources.advance(at_ms(ms));
+    }
+  }
+  const SourceChoice choice = sources.choose(at_ms(an_hour_ago + 2000));
+  EXPECT_EQ(choice.rotation, 1U);
+  EXPECT_EQ(choice.translation, 0U);
+  EXPECT_TRUE(sources.motion(choice, at_ms(an_hour_ago + 1900), at_ms(an_hour_ago + 2000)));
+}
+
+TEST_F(MotionSourcesTest, WhatTheSelfCheckFoundIsToldInWords) {
+  std::vector<HealthEvent> events;
+  MotionSources sources(kWheelsImuVisual, Fusion::combined, [&](const HealthEvent& event) { events.push_back(event); });
+  for (int ms = 0; ms < 2000; ms += 100) {
+    feed(sources, 1, ms, ms + 80);
+    RegistrationFeedback seen{
+        .from = at_ms(ms - 100), .to = at_ms(ms), .opinions = {}, .twist_base = Vector6::Zero(), .sees = {}};
+    seen.sees.fill(true);
+    seen.twist_base[5] = -1.0;
+    sources.hear(seen);
+  }
+  ASSERT_EQ(events.size(), 2U);
+  for (const HealthEvent& event : events) {
+    EXPECT_EQ(event.source, 1U);
+    EXPECT_FALSE(event.healthy);
+    EXPECT_EQ(event.reason, HealthReason::self_check);
+  }
+  EXPECT_NE(events.front().verdict.find("until"), std::string_view::npos) << "set aside";
+  EXPECT_NE(events.back().verdict.find("other way"), std::string_view::npos) << "refused";
+  EXPECT_EQ(sources.verdict(1), events.back().verdict);
+  EXPECT_EQ(sources.counters(1).health_changes, 1U);
+}
+
+} // namespace
+} // namespace locus
