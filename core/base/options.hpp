@@ -67,7 +67,7 @@ enum class ScanToScanMode { always, automatic, off }; ///< automatic (key: auto)
 
 struct RegistrationOptions {
   int max_iterations = 20;           ///< Gauss-Newton steps at most
-  double max_correspondence_m = 1.0; ///< points farther than this from their counterpart do not count
+  double max_correspondence_m = 1.0; ///< points farther than this from their correspondence do not count
 
   bool operator==(const RegistrationOptions&) const = default;
 };

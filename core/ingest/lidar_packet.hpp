@@ -22,7 +22,7 @@ struct LidarReturn {
 
 /// What sixteen lasers of one lidar saw that fired one upon the other, at most one return of each. One array per figure
 /// makes the work on them vector instructions.
-struct Salvo {
+struct FiringGroup {
   static constexpr std::size_t kLasers = 16;
   template <class T> using PerLaser = std::array<T, kLasers>;
 
@@ -40,18 +40,18 @@ struct Salvo {
 /// The returns of one data packet, in the order in which they were fired. Plain memory, reused from packet to packet:
 /// decoding allocates nothing.
 struct LidarPacket {
-  static constexpr std::size_t kMaxSalvos = 24; ///< 12 blocks of 32 channels, whatever the model
-  static constexpr std::size_t kMaxReturns = kMaxSalvos * Salvo::kLasers;
+  static constexpr std::size_t kMaxFiringGroups = 24; ///< 12 blocks of 32 channels, whatever the model
+  static constexpr std::size_t kMaxReturns = kMaxFiringGroups * FiringGroup::kLasers;
   static constexpr std::size_t kMaxLasers = 128;
 
   std::uint8_t lidar = 0;               ///< index in the configuration
   Stamp stamp;                          ///< of the first firing
   Duration duration{};                  ///< from the first firing to the one after the last
   std::uint16_t first_azimuth_cdeg = 0; ///< of the first firing, whether or not it has returns
-  std::size_t count = 0;                ///< of the salvos
-  std::array<Salvo, kMaxSalvos> storage;
+  std::size_t count = 0;                ///< of the firing groups
+  std::array<FiringGroup, kMaxFiringGroups> storage;
 
-  [[nodiscard]] std::span<const Salvo> salvos() const { return {storage.data(), count}; }
+  [[nodiscard]] std::span<const FiringGroup> firing_groups() const { return {storage.data(), count}; }
 };
 
 } // namespace locus

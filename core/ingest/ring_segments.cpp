@@ -51,22 +51,22 @@ void RingSegments::begin_packet(std::size_t lidar, const PacketMotion& motion) {
   ++at.packet;
   for (Bank& bank : at.banks()) {
     Mask abandoned;
-    for (std::size_t k = 0; k < Salvo::kLasers; ++k)
+    for (std::size_t k = 0; k < FiringGroup::kLasers; ++k)
       abandoned[k] = bank.count[k] > 0.0F && bank.last_packet[k] + 1 < at.packet ? -1 : 0;
     for_each_set(bits_of(abandoned), [&](std::size_t k) { close(lidar, bank, k); });
   }
 }
 
 /// Where a return that counts does not go on with the open segment of its laser.
-[[gnu::always_inline]] inline RingSegments::Mask RingSegments::beginnings_in(const Bank& bank, const Salvo& salvo,
+[[gnu::always_inline]] inline RingSegments::Mask RingSegments::beginnings_in(const Bank& bank, const FiringGroup& group,
                                                                              const Mask& counts) const {
   Mask begins;
-  for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
-    const float dx = salvo.x_m[k] - bank.first_x[k];
-    const float dy = salvo.y_m[k] - bank.first_y[k];
-    const float dz = salvo.z_m[k] - bank.first_z[k];
-    const float step_m = std::abs(salvo.range_m[k] - bank.last_range_m[k]);
-    const float max_step_m = kRangeJump_m + kRangeJumpPerRange * salvo.range_m[k];
+  for (std::size_t k = 0; k < FiringGroup::kLasers; ++k) {
+    const float dx = group.x_m[k] - bank.first_x[k];
+    const float dy = group.y_m[k] - bank.first_y[k];
+    const float dz = group.z_m[k] - bank.first_z[k];
+    const float step_m = std::abs(group.range_m[k] - bank.last_range_m[k]);
+    const float max_step_m = kRangeJump_m + kRangeJumpPerRange * group.range_m[k];
     const bool is_open = bank.count[k] > 0.0F;
     const bool same_surface =
         is_open & (step_m < max_step_m) & (dx * dx + dy * dy + dz * dz < leaf_m_ * leaf_m_); // no branch in the loop
@@ -75,14 +75,14 @@ void RingSegments::begin_packet(std::size_t lidar, const PacketMotion& motion) {
   return begins;
 }
 
-std::size_t RingSegments::add(std::size_t lidar, const Salvo& salvo, const Mask& counts) {
-  const std::size_t place = salvo.first_laser / Salvo::kLasers;
+std::size_t RingSegments::add(std::size_t lidar, const FiringGroup& group, const Mask& counts) {
+  const std::size_t place = group.first_laser / FiringGroup::kLasers;
   lidars_[lidar].banks_used = std::max(lidars_[lidar].banks_used, place + 1);
   Bank& bank = lidars_[lidar].storage[place];
   Mask begins, takes = counts;
   std::uint32_t beginnings = 0;
   run_as(isa_, [&] {
-    begins = beginnings_in(bank, salvo, counts);
+    begins = beginnings_in(bank, group, counts);
     beginnings = bits_of(begins);
   });
   std::size_t refused = 0;
@@ -90,26 +90,26 @@ std::size_t RingSegments::add(std::size_t lidar, const Salvo& salvo, const Mask&
     if (bank.count[k] > 0.0F)
       close(lidar, bank, k);
     bank.id[k] = open();
-    bank.ring[k] = salvo.ring[k];
+    bank.ring[k] = group.ring[k];
     if (bank.id[k] == kNone) {
       takes[k] = 0;
       ++refused;
     }
   });
-  run_as(isa_, [&] { bank.take(salvo, begins, takes, lidars_[lidar].motion.stamp_s, lidars_[lidar].packet); });
+  run_as(isa_, [&] { bank.take(group, begins, takes, lidars_[lidar].motion.stamp_s, lidars_[lidar].packet); });
   return refused;
 }
 
 /// Takes in the returns that `takes` names; those that `begins` names are the first of their segments. Sums instead of
 /// choices, and copies of what is read: else the loop becomes no vector instructions.
-[[gnu::always_inline]] inline void RingSegments::Bank::take(Salvo salvo, Mask begins, Mask takes, float stamp_s,
+[[gnu::always_inline]] inline void RingSegments::Bank::take(FiringGroup group, Mask begins, Mask takes, float stamp_s,
                                                             std::int32_t packet) {
   PerLaser<float> intensity;
-  for (std::size_t k = 0; k < Salvo::kLasers; ++k)
-    intensity[k] = static_cast<float>(salvo.intensity[k]);
-  for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
-    const float x = salvo.x_m[k], y = salvo.y_m[k], z = salvo.z_m[k];
-    const float time_s = stamp_s + 1e-9F * static_cast<float>(salvo.offset_ns[k]);
+  for (std::size_t k = 0; k < FiringGroup::kLasers; ++k)
+    intensity[k] = static_cast<float>(group.intensity[k]);
+  for (std::size_t k = 0; k < FiringGroup::kLasers; ++k) {
+    const float x = group.x_m[k], y = group.y_m[k], z = group.z_m[k];
+    const float time_s = stamp_s + 1e-9F * static_cast<float>(group.offset_ns[k]);
     const auto share = static_cast<float>(-takes[k]), keeps = 1.0F - share;
     const auto is_first = static_cast<float>(-(begins[k] & takes[k])), earlier = 1.0F - is_first;
     first_x[k] = earlier * first_x[k] + is_first * x;
@@ -124,13 +124,13 @@ std::size_t RingSegments::add(std::size_t lidar, const Salvo& salvo, const Mask&
     time_sum_s[k] = earlier * time_sum_s[k] + share * time_s;
     intensity_sum[k] = earlier * intensity_sum[k] + share * intensity[k];
     count[k] = earlier * count[k] + share;
-    last_range_m[k] = keeps * last_range_m[k] + share * salvo.range_m[k];
+    last_range_m[k] = keeps * last_range_m[k] + share * group.range_m[k];
     last_packet[k] = (last_packet[k] & ~takes[k]) | (packet & takes[k]);
   }
 }
 
 std::uint32_t RingSegments::latest(std::size_t lidar, std::size_t laser) const {
-  return lidars_[lidar].storage[laser / Salvo::kLasers].id[laser % Salvo::kLasers];
+  return lidars_[lidar].storage[laser / FiringGroup::kLasers].id[laser % FiringGroup::kLasers];
 }
 
 std::uint32_t RingSegments::open() { return opened_ < kMaxSegments ? opened_++ : kNone; }
@@ -155,7 +155,7 @@ void RingSegments::close(std::size_t lidar, Bank& bank, std::size_t laser) {
 void RingSegments::finish(float duration_s, std::vector<SweepPoint>& points) {
   for (std::size_t lidar = 0; lidar < lidars_.size(); ++lidar) {
     for (Bank& bank : lidars_[lidar].banks()) {
-      for (std::size_t k = 0; k < Salvo::kLasers; ++k)
+      for (std::size_t k = 0; k < FiringGroup::kLasers; ++k)
         if (bank.count[k] > 0.0F)
           close(lidar, bank, k);
     }

@@ -38,15 +38,15 @@ class RingSegments {
  public:
   static constexpr std::size_t kMaxSegments = 65536;
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
-  using Mask = Salvo::PerLaser<std::int32_t>; ///< -1 for a return that counts, 0 for one that does not
+  using Mask = FiringGroup::PerLaser<std::int32_t>; ///< -1 for a return that counts, 0 for one that does not
 
   RingSegments(std::size_t lidars, std::size_t points_wanted, Isa isa = best_isa());
 
-  /// Says how the lidar moves from now on. To be called before the salvos of each packet.
+  /// Says how the lidar moves from now on. To be called before the firing groups of each packet.
   void begin_packet(std::size_t lidar, const PacketMotion& motion);
 
-  /// Takes in those returns of a salvo that count. Gives back how many of them did not fit into memory.
-  std::size_t add(std::size_t lidar, const Salvo& salvo, const Mask& counts);
+  /// Takes in those returns of a firing group that count. Gives back how many of them did not fit into memory.
+  std::size_t add(std::size_t lidar, const FiringGroup& group, const Mask& counts);
 
   /// The segment that the latest return of a laser went into; kNone when all were in use.
   [[nodiscard]] std::uint32_t latest(std::size_t lidar, std::size_t laser) const;
@@ -60,7 +60,7 @@ class RingSegments {
  private:
   /// The open segments of sixteen lasers.
   struct Bank {
-    template <class T> using PerLaser = Salvo::PerLaser<T>;
+    template <class T> using PerLaser = FiringGroup::PerLaser<T>;
     PerLaser<float> first_x{}, first_y{}, first_z{};
     PerLaser<float> last_x{}, last_y{}, last_z{};
     PerLaser<float> sum_x{}, sum_y{}, sum_z{};
@@ -70,13 +70,13 @@ class RingSegments {
     PerLaser<std::uint32_t> id{};
     PerLaser<std::uint8_t> ring{};
 
-    void take(Salvo salvo, Mask begins, Mask takes, float stamp_s, std::int32_t packet);
+    void take(FiringGroup group, Mask begins, Mask takes, float stamp_s, std::int32_t packet);
   };
   struct Lidar {
     PacketMotion motion;
     std::int32_t packet = 0;    ///< counted from 1 in each sweep
     std::size_t banks_used = 0; ///< as many as the lidar has shown
-    std::array<Bank, LidarPacket::kMaxLasers / Salvo::kLasers> storage;
+    std::array<Bank, LidarPacket::kMaxLasers / FiringGroup::kLasers> storage;
     std::span<Bank> banks() { return std::span(storage).first(banks_used); }
   };
   struct Segment {
@@ -84,7 +84,7 @@ class RingSegments {
     std::uint32_t id;
   };
 
-  [[nodiscard]] Mask beginnings_in(const Bank& bank, const Salvo& salvo, const Mask& counts) const;
+  [[nodiscard]] Mask beginnings_in(const Bank& bank, const FiringGroup& group, const Mask& counts) const;
   std::uint32_t open();
   void close(std::size_t lidar, Bank& bank, std::size_t laser);
 

@@ -23,14 +23,16 @@ constexpr Duration kLateToRestart = std::chrono::milliseconds{500};
 
 constexpr std::size_t kReturnsPerSegmentPoint = 4; ///< room for what the leaf has not learned yet
 
-/// Of one salvo: -1 for a return fired in [first_ns, last_ns) and within range, 0 for all others. Counts those fired.
-RingSegments::Mask select(const Salvo& salvo, std::int32_t first_ns, std::int32_t last_ns, float min_range_m,
+/// Of one firing group: -1 for a return fired in [first_ns, last_ns) and within range, 0 for all others. Counts those
+/// fired.
+RingSegments::Mask select(const FiringGroup& group, std::int32_t first_ns, std::int32_t last_ns, float min_range_m,
                           float max_range_m, std::size_t& fired) {
   RingSegments::Mask counts;
   std::int32_t number = 0;
-  for (std::size_t k = 0; k < Salvo::kLasers; ++k) { // masks instead of conditions: branches would make 16 laps of it
-    const float range_m = salvo.range_m[k];
-    const std::int32_t offset_ns = salvo.offset_ns[k];
+  for (std::size_t k = 0; k < FiringGroup::kLasers;
+       ++k) { // masks instead of conditions: branches would make 16 laps of it
+    const float range_m = group.range_m[k];
+    const std::int32_t offset_ns = group.offset_ns[k];
     const std::int32_t is_return = -(range_m > 0.0F) & -(offset_ns >= first_ns) & -(offset_ns < last_ns);
     number -= is_return;
     counts[k] = is_return & -(range_m >= min_range_m) & -(range_m <= max_range_m);
@@ -179,13 +181,14 @@ void SweepBuilder::hand_over(Stamp now) {
 }
 
 /// Leaves out the returns that hit the robot itself.
-void SweepBuilder::leave_out_body(const Pose& T_base_lidar, const Salvo& salvo, RingSegments::Mask& counts) const {
+void SweepBuilder::leave_out_body(const Pose& T_base_lidar, const FiringGroup& group,
+                                  RingSegments::Mask& counts) const {
   const BodyBoxOptions& box = options_.body_box;
   const Eigen::Matrix3f R = T_base_lidar.R().cast<float>();
   const Eigen::Vector3f t = T_base_lidar.translation.cast<float>();
   const Eigen::Array3f min_m = box.min_m.cast<float>(), max_m = box.max_m.cast<float>();
-  for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
-    const Eigen::Array3f p_base = R * Eigen::Vector3f{salvo.x_m[k], salvo.y_m[k], salvo.z_m[k]} + t;
+  for (std::size_t k = 0; k < FiringGroup::kLasers; ++k) {
+    const Eigen::Array3f p_base = R * Eigen::Vector3f{group.x_m[k], group.y_m[k], group.z_m[k]} + t;
     if ((p_base > min_m).all() && (p_base < max_m).all())
       counts[k] = 0;
   }
@@ -226,31 +229,31 @@ void SweepBuilder::append(const LidarPacket& packet, Stamp from, Stamp to) {
   const auto last_ns = static_cast<std::int32_t>((to - packet.stamp).count());
   const auto min_range_m = static_cast<float>(options_.min_range_m);
   const auto max_range_m = static_cast<float>(options_.max_range_m);
-  for (const Salvo& salvo : packet.salvos()) {
+  for (const FiringGroup& group : packet.firing_groups()) {
     RingSegments::Mask counts;
     run_as(options_.isa,
-           [&] { counts = select(salvo, first_ns, last_ns, min_range_m, max_range_m, sweep_.raw_returns); });
+           [&] { counts = select(group, first_ns, last_ns, min_range_m, max_range_m, sweep_.raw_returns); });
     if (options_.body_box.enabled)
-      leave_out_body(T_base_lidar_[packet.lidar], salvo, counts);
-    counters_.overflowed_points += segments_.add(packet.lidar, salvo, counts);
+      leave_out_body(T_base_lidar_[packet.lidar], group, counts);
+    counters_.overflowed_points += segments_.add(packet.lidar, group, counts);
     if (!options_.segment_filter.enabled)
-      keep_singly(packet.lidar, salvo, counts, motion);
+      keep_singly(packet.lidar, group, counts, motion);
   }
   window_->last_firing = std::max(window_->last_firing, to);
 }
 
 /// Keeps the returns themselves; their segments only give them normals.
-void SweepBuilder::keep_singly(std::size_t lidar, const Salvo& salvo, const RingSegments::Mask& counts,
+void SweepBuilder::keep_singly(std::size_t lidar, const FiringGroup& group, const RingSegments::Mask& counts,
                                const PacketMotion& motion) {
-  for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
-    const std::uint32_t segment = segments_.latest(lidar, salvo.first_laser + k);
+  for (std::size_t k = 0; k < FiringGroup::kLasers; ++k) {
+    const std::uint32_t segment = segments_.latest(lidar, group.first_laser + k);
     if (counts[k] == 0 || segment == RingSegments::kNone)
       continue;
     if (raw_.size() == max_returns_) {
       ++counters_.overflowed_points;
       continue;
     }
-    const LidarReturn r = salvo[k];
+    const LidarReturn r = group[k];
     const float time_s = motion.stamp_s + 1e-9F * static_cast<float>(r.offset_ns);
     raw_.push_back({{motion.place({r.x_m, r.y_m, r.z_m}, time_s), Eigen::Vector3f::Zero(), time_s,
                      static_cast<float>(r.intensity), static_cast<std::uint16_t>(lidar * 256U + r.ring)},

@@ -99,8 +99,9 @@ class SweepBuilder {
   void hand_over(Stamp now);
   [[nodiscard]] Duration period() const;
   [[nodiscard]] PacketMotion motion_of(const LidarPacket& packet);
-  void leave_out_body(const Pose& T_base_lidar, const Salvo& salvo, RingSegments::Mask& counts) const;
-  void keep_singly(std::size_t lidar, const Salvo& salvo, const RingSegments::Mask& counts, const PacketMotion& motion);
+  void leave_out_body(const Pose& T_base_lidar, const FiringGroup& group, RingSegments::Mask& counts) const;
+  void keep_singly(std::size_t lidar, const FiringGroup& group, const RingSegments::Mask& counts,
+                   const PacketMotion& motion);
 
   SweepOptions options_;
   std::vector<Pose> T_base_lidar_;

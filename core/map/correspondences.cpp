@@ -16,7 +16,7 @@ constexpr float kAlongVariance_m2 = 100.0F;
 /// target, a normal wrong by one degree would cost the point its weight, and the few luckiest normals would decide.
 constexpr float kAlongSourceVariance_m2 = 0.1F * 0.1F;
 
-/// Points farther than this from the origin have no counterpart: no lidar sees so far, and single precision counts
+/// Points farther than this from the origin have no correspondence: no lidar sees so far, and single precision counts
 /// there in tenths of a millimetre.
 constexpr float kMaxDistance_m = 1000.0F;
 
@@ -153,7 +153,7 @@ std::size_t find_in(const GicpPass& pass, const SurfaceGrid& grid, const VoxelOf
 void find_here(const GicpPass& pass, const Placed& points, std::size_t count, MatchBlock& matches, Isa isa) {
   Cells fine;
   run_as(isa, [&] { index_all(pass.target.fine(), pass.origin_m, points, fine); });
-  Places open; // of points still without a counterpart
+  Places open; // of points still without a correspondence
   count = list_open(pass, points, count, fine, matches, open);
   matches.fine = fine;
   const auto in_fine = [&](std::uint32_t i) { return fine[i]; };

@@ -33,16 +33,16 @@ struct Cells {
   [[nodiscard]] VoxelIndex operator[](std::size_t i) const { return {x[i], y[i], z[i]}; }
 };
 
-/// Their counterparts: planes of the target, or Gaussians of shapeless voxels.
+/// Their correspondences: planes of the target, or Gaussians of shapeless voxels.
 struct MatchBlock {
   PerPoint x_m, y_m, z_m;                ///< mean, from GicpPass::origin_m
   PerPoint normal_x, normal_y, normal_z; ///< zero for a shapeless one
   PerPoint across_m2, along_m2;          ///< variances; equal for a shapeless one
-  PerPoint found;                        ///< 1, or 0 where there is no counterpart
+  PerPoint found;                        ///< 1, or 0 where there is no correspondence
   Cells fine;                            ///< where they were looked up
 };
 
-/// How counterparts come about in a pass.
+/// How correspondences come about in a pass.
 enum class LookUp {
   keep,   ///< those of the pass before
   follow, ///< those of the pass before where the point is still in its voxel, else as `here`
@@ -62,7 +62,7 @@ struct Affine {
   Eigen::Vector3f t;
 };
 
-/// One pass over some of the points: finds their counterparts and sums the normal equations at T_target_source.
+/// One pass over some of the points: finds their correspondences and sums the normal equations at T_target_source.
 struct GicpPass {
   const SurfaceMap& target;
   Pose T_target_source;
@@ -78,12 +78,12 @@ struct GicpPass {
   }
 };
 
-/// Finds the counterparts of the points as the pass says, which is not to keep them. Pure but for `matches`; any
+/// Finds the correspondences of the points as the pass says, which is not to keep them. Pure but for `matches`; any
 /// thread.
 void find(const GicpPass& pass, const SourceBlock& source, MatchBlock& matches, Isa isa);
 
-/// Takes counterparts that lean along a weak direction by no more than the error of a normal as not leaning there. They
-/// would tie the robot to where the scan lines fell.
+/// Takes correspondences that lean along a weak direction by no more than the error of a normal as not leaning there.
+/// They would tie the robot to where the scan lines fell.
 void straighten(const WeakDirections& weak, MatchBlock& matches);
 
 } // namespace locus

@@ -170,7 +170,8 @@ NormalEquations equations_of(const Sums& sums) {
   return result;
 }
 
-/// Terms of an H whose information is that of unit normals; a shapeless counterpart has a third of it along each axis.
+/// Terms of an H whose information is that of unit normals; a shapeless correspondence has a third of it along each
+/// axis.
 [[gnu::always_inline]] inline Sums sum_gradients(const Eigen::Matrix3f& R, const SourceBlock& source,
                                                  const MatchBlock& match) {
   const float r00 = R(0, 0), r01 = R(0, 1), r02 = R(0, 2), r10 = R(1, 0), r11 = R(1, 1), r12 = R(1, 2), r20 = R(2, 0),

@@ -15,7 +15,7 @@ struct NormalEquations {
   Vector6 b = Vector6::Zero();
   double error = 0.0;
   double weight = 0.0;
-  std::size_t planes = 0; ///< points whose counterpart is a plane
+  std::size_t planes = 0; ///< points whose correspondence is a plane
   std::size_t inliers = 0;
 
   void operator+=(const NormalEquations& other) {
@@ -31,8 +31,8 @@ struct NormalEquations {
 /// Sums up the normal equations. Pure; any thread. The result depends on the instruction set in its last digits.
 NormalEquations linearise(const GicpPass& pass, const SourceBlock& source, const MatchBlock& matches, Isa isa);
 
-/// How many of the points of a block have a counterpart, and which way it faces; a shapeless one counts as a third of a
-/// plane along each axis.
+/// How many of the points of a block have a correspondence, and which way it faces; a shapeless one counts as a third
+/// of a plane along each axis.
 struct Normals {
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero(); ///< sum of n n'
   double points = 0.0;
@@ -44,8 +44,8 @@ struct Normals {
 };
 Normals normals_of(const MatchBlock& matches, Isa isa);
 
-/// Sum over the points of a block of (n, R p x n) with itself: how distances to the counterparts change with the pose.
-/// Of unit normals, so it tells where surfaces stand and not how well they are known. Counts as normals_of().
+/// Sum over the points of a block of (n, R p x n) with itself: how distances to the correspondences change with the
+/// pose. Of unit normals, so it tells where surfaces stand and not how well they are known. Counts as normals_of().
 Matrix6 gradients_of(const Eigen::Matrix3d& R_target_source, const SourceBlock& source, const MatchBlock& matches,
                      Isa isa);
 

@@ -31,7 +31,7 @@ constexpr double kNarrowing = 0.25;
 
 constexpr double kConvergedTranslation_m = 1e-3;
 constexpr double kConvergedRotation_rad = 1e-4;
-constexpr int kStepsPerLookUp = 2; ///< Gauss-Newton steps on the same counterparts
+constexpr int kStepsPerLookUp = 2; ///< Gauss-Newton steps on the same correspondences
 
 /// Where fewer than this share of the normals points, there is next to nothing to hold on to.
 constexpr double kFewNormals = 0.01;

@@ -26,11 +26,11 @@ struct Registration {
   Pose T_target_source;
   bool converged = false;                ///< the last step was below the thresholds
   int iterations = 0;                    ///< Gauss-Newton steps
-  std::size_t inliers = 0;               ///< points with a counterpart within reach
+  std::size_t inliers = 0;               ///< points with a correspondence within reach
   double mean_error = 0.0;               ///< mean squared Mahalanobis distance of the inliers
   Matrix6 information = Matrix6::Zero(); ///< of the points alone, without the prior; order and frame as in PosePrior
-  /// Mean over the points of (n, p x n) with itself, n the unit normal of the counterpart, p the point in m about the
-  /// source's origin: what the surfaces around allow to be seen. Target axes.
+  /// Mean over the points of (n, p x n) with itself, n the unit normal of the correspondence, p the point in m about
+  /// the source's origin: what the surfaces around allow to be seen. Target axes.
   Matrix6 observability = Matrix6::Zero();
 };
 
@@ -38,7 +38,7 @@ struct Registration {
 /// surfaces.
 ///
 /// Minimises the sum of robust d' (C_target + R C_source R')^-1 d by Gauss-Newton on SE(3). One pass over the points
-/// finds the counterparts and sums the normal equations. The sums are taken over fixed blocks of points in a fixed
+/// finds the correspondences and sums the normal equations. The sums are taken over fixed blocks of points in a fixed
 /// order: same input, same bits, for any number of threads. One owner.
 class Gicp {
  public:
@@ -50,8 +50,8 @@ class Gicp {
   Gicp(const Gicp&) = delete;
   Gicp& operator=(const Gicp&) = delete;
 
-  /// Begins at `T_start`. `wide` first looks for counterparts all around each point, for a start that may be off by
-  /// more than a voxel. Never throws; without counterparts the result is the start, not converged.
+  /// Begins at `T_start`. `wide` first looks for correspondences all around each point, for a start that may be off by
+  /// more than a voxel. Never throws; without correspondences the result is the start, not converged.
   Registration align(std::span<const SurfacePoint> source, const SurfaceMap& target, const Pose& T_start,
                      const PosePrior& prior, const RegistrationOptions& options, bool wide, const StopRequested& stop);
 

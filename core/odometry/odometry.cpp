@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kMinPoints = 30; ///< fewer say nothing reliable about six axes
 
-/// Least share of the points that must find a counterpart for a registration to be believed.
+/// Least share of the points that must find a correspondence for a registration to be believed.
 constexpr double kMinInlierShare = 0.1;
 
 /// A registration that contradicts the prior by more than this many standard deviations, and by more than the least, is
@@ -27,8 +27,8 @@ constexpr double kAlwaysAllowed_rad = 0.1;
 constexpr double kDispute_sigma = 6.0;
 constexpr double kLeastDispute_rad = 0.02;
 
-/// No place changes so fast that from one sweep to the next less than this part of the usual counterparts is left: the
-/// air is full of dust, or the lidar measures otherwise than before. Such a sweep is not for the map, and may
+/// No place changes so fast that from one sweep to the next less than this part of the usual correspondences is left:
+/// the air is full of dust, or the lidar measures otherwise than before. Such a sweep is not for the map, and may
 /// contradict the motion sources by no more than this. (The worst of honest drives is 0.78; in dust, 2.2 sigma.)
 constexpr double kLeastOfUsual = 0.5;
 constexpr double kLoneDeviation_sigma = 3.0;
@@ -54,7 +54,7 @@ constexpr double kAskew = 0.4;
 constexpr double kArm_m = 2.0;
 constexpr double kShakesOn = 0.7;
 
-/// A prior that is less sure than this looks for counterparts all around each point.
+/// A prior that is less sure than this looks for correspondences all around each point.
 constexpr double kWide_m = 0.3;
 
 constexpr int kStartRounds = 8;        ///< at the most, until motion and correction of the first two sweeps agree:
@@ -63,7 +63,7 @@ constexpr double kStartAgrees = 0.002; ///< metres, radians
 /// Room for the 16 000 voxels of a large sweep, and small enough for the second cache.
 constexpr std::size_t kLastScanBytes = 2'500'000;
 
-/// Of two registrations of the same points. A point without a counterpart counts as one that is three sigma off.
+/// Of two registrations of the same points. A point without a correspondence counts as one that is three sigma off.
 bool fits_better(const Registration& one, const Registration& other) {
   constexpr double kMissing = 9.0;
   const auto gain = [](const Registration& fit) {
@@ -319,7 +319,7 @@ bool Odometry::trusts(const Registration& registration, const Pose& T_last_now, 
   return (difference(T_last_now, T_last_predicted).cwiseAbs().array() <= allowed.array()).all();
 }
 
-/// Whether the motion sources know better than what is left of the counterparts. After a time without lidar they do
+/// Whether the motion sources know better than what is left of the correspondences. After a time without lidar they do
 /// not.
 bool Odometry::is_outvoted(const Sweep& sweep, const Registration& registration, const Pose& T_last_now,
                            const MotionPrior& prior) const {

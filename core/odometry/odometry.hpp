@@ -124,7 +124,7 @@ class Odometry {
   PoseUncertainty uncertainty_;
   Vector6 askew_variance_ = Vector6::Zero(); ///< of the last sweep, base axes
   Standstill standstill_;
-  double usual_share_ = 0.0;  ///< of the registered points that find a counterpart
+  double usual_share_ = 0.0;  ///< of the registered points that find a correspondence
   double usual_points_ = 0.0; ///< of a sweep
   Stamp last_seen_;           ///< of the last sweep that lidar placed
   int refused_in_a_row_ = 0;  ///< sweeps with points

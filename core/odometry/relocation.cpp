@@ -41,7 +41,7 @@ std::optional<Pose> relocate(Gicp& gicp, std::span<const SurfacePoint> scan_base
                              const Pose& T_map_expected, const RegistrationOptions& options) {
   const Matrix6 information = kSigma.cwiseAbs2().cwiseInverse().asDiagonal();
   std::optional<Pose> T_map_here;
-  double here = 0.0, elsewhere = 0.0; // share of the points with a counterpart
+  double here = 0.0, elsewhere = 0.0; // share of the points with a correspondence
   for (const Pose& T_start : places_around(T_map_expected)) {
     const Registration found =
         gicp.align(scan_base, map, T_start, {T_start, information}, options, true, [] { return false; });

@@ -80,7 +80,7 @@ MotionPrior SensorIntegration::integrate(const Sweep& sweep, const std::optional
 std::optional<Pose> SensorIntegration::step(const Sweep& sweep, std::size_t source) const {
   const SourcePose& last = last_sources_[source];
   const SourcePose& now = sweep.motion.sources[source];
-  if (!last.known || !now.known || last.spell != now.spell)
+  if (!last.known || !now.known || last.epoch != now.epoch)
     return std::nullopt;
   Pose T_last_now = last.T_source_base.inverse() * now.T_source_base;
   if (sources_[source].kind == SourceKind::imu)

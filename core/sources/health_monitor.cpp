@@ -102,7 +102,7 @@ void HealthMonitor::lose(HealthReason reason, Stamp now) {
     event_ = HealthEvent{.stamp = now, .healthy = false, .reason = reason, .verdict = verdict()};
   }
   state_ = State::lost;
-  ++spell_;
+  ++epoch_;
   for (const auto& metric : metrics_)
     metric->forget();
 }

@@ -45,8 +45,8 @@ class HealthMonitor {
   void set_outside_verdict(bool healthy, Stamp now);
 
   [[nodiscard]] bool healthy() const { return state_ == State::healthy; }
-  /// Counts losses of health. Samples of two spells are not to be compared: what lies between was not watched.
-  [[nodiscard]] std::uint32_t spell() const { return spell_; }
+  /// Counts losses of health. Samples of two epochs are not to be compared: what lies between was not watched.
+  [[nodiscard]] std::uint32_t epoch() const { return epoch_; }
   /// Silence that costs the source its health: three of its own periods.
   [[nodiscard]] Duration timeout() const;
   /// What is wrong with the source as a whole, in words for the user; empty if nothing is.
@@ -71,7 +71,7 @@ class HealthMonitor {
   std::vector<std::unique_ptr<HealthMetric>> metrics_;
   SourceClock clock_;
   State state_ = State::unheard;
-  std::uint32_t spell_ = 0;
+  std::uint32_t epoch_ = 0;
   bool outside_objects_ = false;
   std::optional<HealthReason> objection_; ///< the last one since the last good sample
   HealthReason lost_for_ = HealthReason::stale;

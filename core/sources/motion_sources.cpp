@@ -49,8 +49,8 @@ void MotionSources::set_outside_verdict(std::size_t source, bool healthy) {
 
 void MotionSources::follow_health(std::size_t source) {
   Source& of = sources_[source];
-  if (of.health.spell() != of.spell) {
-    of.spell = of.health.spell();
+  if (of.health.epoch() != of.epoch) {
+    of.epoch = of.health.epoch();
     of.track.clear();
   }
   if (std::optional<HealthEvent> event = of.health.take_event(); event && health_sink_) {
@@ -91,7 +91,7 @@ SensedMotion MotionSources::sensed_in(Stamp from, Stamp to) const {
     const std::optional<Pose> T_source_base = track.has_sample_in(from, to) ? track.at(to) : std::nullopt;
     if (!T_source_base)
       continue;
-    motion.sources[i] = {true, healthy(i), sources_[i].spell, *T_source_base};
+    motion.sources[i] = {true, healthy(i), sources_[i].epoch, *T_source_base};
     if (healthy(i) && sources_[i].health.trusts_accelerometer() && !motion.specific_force_base_mps2)
       motion.specific_force_base_mps2 = track.mean_specific_force_mps2(from, to);
     if (healthy(i) && !motion.up_base)

@@ -77,7 +77,7 @@ class MotionSources {
 
     HealthMonitor health;
     MotionTrack track;
-    std::uint32_t spell = 0; ///< that the track belongs to
+    std::uint32_t epoch = 0; ///< that the track belongs to
   };
 
   template <class Sample> void take(std::size_t source, Sample sample);

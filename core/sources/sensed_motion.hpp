@@ -19,7 +19,7 @@ enum class Uncorrected : std::uint8_t { nothing, translation, all };
 struct SourcePose {
   bool known = false;      ///< with a sample inside the sweep
   bool usable = false;     ///< known, and healthy
-  std::uint32_t spell = 0; ///< HealthMonitor::spell; poses of different spells have nothing to do with each other
+  std::uint32_t epoch = 0; ///< HealthMonitor::epoch; poses of different epochs have nothing to do with each other
   Pose T_source_base;      ///< an inertial source gives rotation only
 };
 

@@ -24,7 +24,7 @@
 
 namespace locus::daemon {
 
-/// As summaries and logs spell it.
+/// As summaries and logs epoch it.
 std::string_view to_string(TrackingState state);
 
 /// The service as one configuration makes it: sockets, DDS, the live threads, the publisher. A reload ends one and

@@ -70,8 +70,8 @@ std::optional<PacketError> Decoder::decode(std::span<const std::byte> payload, L
     const double azimuth_rad = kRadPerCdeg * azimuth_cdeg_[column];
     cos_column_ = static_cast<float>(std::cos(azimuth_rad));
     sin_column_ = static_cast<float>(std::sin(azimuth_rad));
-    for (std::size_t firing = 0; firing < layout_.banks * kChannels; firing += Salvo::kLasers)
-      read_salvos(bytes, column, firing, packet);
+    for (std::size_t firing = 0; firing < layout_.banks * kChannels; firing += FiringGroup::kLasers)
+      read_firing_groups(bytes, column, firing, packet);
   }
   packet.duration = duration_;
   packet.first_azimuth_cdeg = azimuth_cdeg_.front();
@@ -212,7 +212,7 @@ void Decoder::measure_turn_since_last_packet(Duration time_of_hour, double max_t
 [[gnu::always_inline]] inline Decoder::Aim Decoder::take_aim(std::size_t column, std::size_t first_firing) const {
   Aim aim;
   const float turn_rad = static_cast<float>(kRadPerCdeg) * turn_cdeg_[column];
-  for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
+  for (std::size_t k = 0; k < FiringGroup::kLasers; ++k) {
     const std::size_t i = first_firing + k;
     const float angle = firings_.share_of_column[i] * turn_rad;
     const float cos_angle = 1.0F - 0.5F * angle * angle; // at most 1.6 deg: the next terms are below 3e-8
@@ -225,33 +225,34 @@ void Decoder::measure_turn_since_last_packet(Duration time_of_hour, double max_t
   return aim;
 }
 
-/// Appends what sixteen firings of a column brought, in dual return mode one salvo for each echo. A second echo at the
-/// distance of the first is none.
-void Decoder::read_salvos(Packet packet, std::size_t column, std::size_t first_firing, LidarPacket& out) const {
+/// Appends what sixteen firings of a column brought, in dual return mode one firing group for each echo. A second echo
+/// at the distance of the first is none.
+void Decoder::read_firing_groups(Packet packet, std::size_t column, std::size_t first_firing, LidarPacket& out) const {
   const std::size_t bank = first_firing / kChannels;
   const std::byte* block = block_at(packet, column * layout_.blocks_per_column() + bank * layout_.returns);
   Aim aim;
   run_as(options_.isa, [&] { aim = take_aim(column, first_firing); });
   Distances previous{}; // 0 is no return: nothing is lost when the first echo equals it
   for (std::size_t echo = 0; echo < layout_.returns; ++echo) {
-    Salvo& salvo = out.storage[out.count++];
+    FiringGroup& group = out.storage[out.count++];
     Distances distances;
-    for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
+    for (std::size_t k = 0; k < FiringGroup::kLasers; ++k) {
       const std::byte* at = channel_at(block + echo * kBlockBytes, first_firing % kChannels + k);
       distances[k] = read_u16(at);
-      salvo.intensity[k] = std::to_integer<std::uint8_t>(at[2]);
+      group.intensity[k] = std::to_integer<std::uint8_t>(at[2]);
     }
-    run_as(options_.isa, [&] { place(distances, previous, aim, column, first_firing, salvo); });
+    run_as(options_.isa, [&] { place(distances, previous, aim, column, first_firing, group); });
     previous = distances;
   }
 }
 
-/// Everything about a salvo that follows from its distances. Works on a copy: where what is written could be what is
-/// read, loops do not become vector instructions.
+/// Everything about a firing group that follows from its distances. Works on a copy: where what is written could be
+/// what is read, loops do not become vector instructions.
 [[gnu::always_inline]] inline void Decoder::place(const Distances& distances, const Distances& previous, const Aim& aim,
-                                                  std::size_t column, std::size_t first_firing, Salvo& salvo) const {
-  Salvo placed;
-  for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
+                                                  std::size_t column, std::size_t first_firing,
+                                                  FiringGroup& group) const {
+  FiringGroup placed;
+  for (std::size_t k = 0; k < FiringGroup::kLasers; ++k) {
     const std::size_t i = first_firing + k;
     const float range_m = static_cast<float>(distances[k]) * distance_resolution_m_ + firings_.range_offset_m[i];
     const float radial_m = range_m * firings_.cos_elevation[i] + firings_.radial_offset_m[i];
@@ -263,14 +264,14 @@ void Decoder::read_salvos(Packet packet, std::size_t column, std::size_t first_f
     placed.range_m[k] = is_return != 0 ? range_m : 0.0F;
     placed.offset_ns[k] = column_offset_ns_[column] + firings_.offset_ns[i];
   }
-  salvo.first_laser = firings_.laser[first_firing];
-  salvo.x_m = placed.x_m;
-  salvo.y_m = placed.y_m;
-  salvo.z_m = placed.z_m;
-  salvo.range_m = placed.range_m;
-  salvo.offset_ns = placed.offset_ns;
-  for (std::size_t k = 0; k < Salvo::kLasers; ++k)
-    salvo.ring[k] = firings_.ring[first_firing + k];
+  group.first_laser = firings_.laser[first_firing];
+  group.x_m = placed.x_m;
+  group.y_m = placed.y_m;
+  group.z_m = placed.z_m;
+  group.range_m = placed.range_m;
+  group.offset_ns = placed.offset_ns;
+  for (std::size_t k = 0; k < FiringGroup::kLasers; ++k)
+    group.ring[k] = firings_.ring[first_firing + k];
 }
 
 } // namespace locus::velodyne

@@ -84,11 +84,11 @@ class Decoder {
     PerFiring<std::uint8_t> ring, laser;
   };
 
-  /// Where the lasers of a salvo point when they fire.
+  /// Where the lasers of a firing group point when they fire.
   struct Aim {
-    Salvo::PerLaser<float> cos_azimuth, sin_azimuth;
+    FiringGroup::PerLaser<float> cos_azimuth, sin_azimuth;
   };
-  using Distances = Salvo::PerLaser<std::int32_t>; ///< as wide as all else about them
+  using Distances = FiringGroup::PerLaser<std::int32_t>; ///< as wide as all else about them
 
   std::optional<PacketError> recognise(Packet packet, Duration time_of_hour);
   PacketError refuse_unknown(Packet packet);
@@ -97,9 +97,9 @@ class Decoder {
   bool measure_turns(Packet packet, Duration time_of_hour);
   void measure_turn_since_last_packet(Duration time_of_hour, double max_turn_cdeg);
   [[nodiscard]] Aim take_aim(std::size_t column, std::size_t first_firing) const;
-  void read_salvos(Packet packet, std::size_t column, std::size_t first_firing, LidarPacket& out) const;
+  void read_firing_groups(Packet packet, std::size_t column, std::size_t first_firing, LidarPacket& out) const;
   void place(const Distances& distances, const Distances& previous, const Aim& aim, std::size_t column,
-             std::size_t first_firing, Salvo& salvo) const;
+             std::size_t first_firing, FiringGroup& group) const;
 
   DecoderOptions options_;
   ModelRecognition recognition_;

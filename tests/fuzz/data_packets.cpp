@@ -29,14 +29,14 @@ std::vector<LidarInput> all_kinds() {
 
 void check(const LidarPacket& packet) {
   constexpr Duration kLongest = std::chrono::seconds{1};
-  demand(packet.count > 0 && packet.count <= LidarPacket::kMaxSalvos);
+  demand(packet.count > 0 && packet.count <= LidarPacket::kMaxFiringGroups);
   demand(packet.first_azimuth_cdeg < velodyne::kCdegPerTurn);
   demand(packet.duration > Duration{} && packet.duration < kLongest);
-  for (const Salvo& salvo : packet.salvos()) {
-    demand(salvo.first_laser + Salvo::kLasers <= velodyne::kMaxLasers);
-    for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
-      demand(std::isfinite(salvo.x_m[k] + salvo.y_m[k] + salvo.z_m[k]) && salvo.range_m[k] >= 0.0F);
-      demand(salvo.ring[k] < velodyne::kMaxLasers && std::abs(salvo.offset_ns[k]) < kLongest.count());
+  for (const FiringGroup& group : packet.firing_groups()) {
+    demand(group.first_laser + FiringGroup::kLasers <= velodyne::kMaxLasers);
+    for (std::size_t k = 0; k < FiringGroup::kLasers; ++k) {
+      demand(std::isfinite(group.x_m[k] + group.y_m[k] + group.z_m[k]) && group.range_m[k] >= 0.0F);
+      demand(group.ring[k] < velodyne::kMaxLasers && std::abs(group.offset_ns[k]) < kLongest.count());
     }
   }
 }

@@ -36,7 +36,7 @@ struct Source {
 
   template <class Sample> void take(Sample sample) {
     const auto stamp = health.judge(sample);
-    if (std::exchange(spell, health.spell()) != health.spell())
+    if (std::exchange(epoch, health.epoch()) != health.epoch())
       track.clear();
     if (!stamp)
       return;
@@ -49,13 +49,13 @@ struct Source {
   }
   void begin_anew() {
     health = HealthMonitor{options};
-    spell = health.spell();
+    epoch = health.epoch();
     track.clear();
   }
 
   MotionSourceOptions options;
   HealthMonitor health{options};
-  std::uint32_t spell = 0;
+  std::uint32_t epoch = 0;
   MotionTrack track;
 };
 

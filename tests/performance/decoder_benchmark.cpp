@@ -28,8 +28,8 @@ test::VelodyneTestPacket full_packet(velodyne::Model model, velodyne::ReturnMode
 
 std::size_t returns_of(const LidarPacket& packet) {
   std::size_t returns = 0;
-  for (const Salvo& salvo : packet.salvos())
-    for (const float range_m : salvo.range_m)
+  for (const FiringGroup& group : packet.firing_groups())
+    for (const float range_m : group.range_m)
       returns += range_m > 0.0F ? 1 : 0;
   return returns;
 }

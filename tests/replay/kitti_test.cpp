@@ -110,9 +110,9 @@ TEST(Kitti, PointHasTheTimeOfItsAzimuthAndTheRingOfItsPlace) {
   while (const LidarPacket* packet = sweep.next()) {
     EXPECT_EQ(packet->stamp, last) << "no gap";
     last = packet->stamp + packet->duration;
-    for (const Salvo& salvo : packet->salvos()) {
-      for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
-        const LidarReturn r = salvo[k];
+    for (const FiringGroup& group : packet->firing_groups()) {
+      for (std::size_t k = 0; k < FiringGroup::kLasers; ++k) {
+        const LidarReturn r = group[k];
         if (r.range_m <= 0)
           continue;
         ++returns;
@@ -121,7 +121,7 @@ TEST(Kitti, PointHasTheTimeOfItsAzimuthAndTheRingOfItsPlace) {
         const double from_rear = 0.5 + std::atan2(-p_m.y(), p_m.x()) / kTurn; // left is a quarter, the front a half
         EXPECT_NEAR(to_seconds(packet->stamp + Duration{r.offset_ns} - start), 0.1 * from_rear, 1e-6);
         EXPECT_EQ(r.ring, 2 - std::lround((2.0 - elevation_deg) / (20 * 26.8 / 63)));
-        EXPECT_EQ(r.ring, salvo.first_laser + k);
+        EXPECT_EQ(r.ring, group.first_laser + k);
       }
     }
   }
@@ -137,8 +137,8 @@ TEST(Kitti, PointsThatAreNoneAreLeftOutAndAnotherOrderIsRefused) {
                           start, start + kPeriod));
   std::size_t returns = 0;
   while (const LidarPacket* packet = sweep.next())
-    for (const Salvo& salvo : packet->salvos())
-      returns += static_cast<std::size_t>(std::ranges::count_if(salvo.range_m, [](float r) { return r != 0; }));
+    for (const FiringGroup& group : packet->firing_groups())
+      returns += static_cast<std::size_t>(std::ranges::count_if(group.range_m, [](float r) { return r != 0; }));
   EXPECT_EQ(returns, 1U);
   ASSERT_TRUE(sweep.begin({}, start, start + kPeriod));
   std::vector<KittiPoint> clockwise;

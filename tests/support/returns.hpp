@@ -7,13 +7,13 @@
 
 namespace locus::test {
 
-/// The returns of a packet one by one, salvo by salvo; firings without one are left out.
+/// The returns of a packet one by one, firing group by firing group; firings without one are left out.
 inline std::vector<LidarReturn> returns_of(const LidarPacket& packet) {
   std::vector<LidarReturn> returns;
-  for (const Salvo& salvo : packet.salvos())
-    for (std::size_t k = 0; k < Salvo::kLasers; ++k)
-      if (salvo.range_m[k] > 0.0F)
-        returns.push_back(salvo[k]);
+  for (const FiringGroup& group : packet.firing_groups())
+    for (std::size_t k = 0; k < FiringGroup::kLasers; ++k)
+      if (group.range_m[k] > 0.0F)
+        returns.push_back(group[k]);
   return returns;
 }
 

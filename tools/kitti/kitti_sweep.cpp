@@ -68,30 +68,30 @@ const LidarPacket* KittiSweep::next() {
       (velodyne::kCdegPerTurn / 2U + velodyne::kCdegPerTurn * column_ / kColumns) % velodyne::kCdegPerTurn);
   packet_.count = 0;
   for (; column_ < end; ++column_) {
-    for (std::size_t bank = 0; bank < kSalvosPerColumn; ++bank)
+    for (std::size_t bank = 0; bank < kGroupsPerColumn; ++bank)
       fill(column_, bank, packet_.storage[packet_.count++]);
   }
   return &packet_;
 }
 
-void KittiSweep::fill(std::size_t column, std::size_t bank, Salvo& salvo) const {
+void KittiSweep::fill(std::size_t column, std::size_t bank, FiringGroup& group) const {
   constexpr float kMaxIntensity = 255.0F;
-  salvo = {};
-  salvo.first_laser = static_cast<std::uint8_t>(bank * Salvo::kLasers);
-  for (std::size_t k = 0; k < Salvo::kLasers; ++k) {
-    const std::size_t ring = bank * Salvo::kLasers + k;
-    salvo.ring[k] = static_cast<std::uint8_t>(ring);
+  group = {};
+  group.first_laser = static_cast<std::uint8_t>(bank * FiringGroup::kLasers);
+  for (std::size_t k = 0; k < FiringGroup::kLasers; ++k) {
+    const std::size_t ring = bank * FiringGroup::kLasers + k;
+    group.ring[k] = static_cast<std::uint8_t>(ring);
     const std::uint32_t cell = cells_[column * kRings + ring];
     if (cell == 0)
       continue;
     const auto& [point, turned, unused] = returns_[cell - 1];
-    salvo.x_m[k] = point.x_m;
-    salvo.y_m[k] = point.y_m;
-    salvo.z_m[k] = point.z_m;
-    salvo.range_m[k] = std::hypot(point.x_m, point.y_m, point.z_m);
+    group.x_m[k] = point.x_m;
+    group.y_m[k] = point.y_m;
+    group.z_m[k] = point.z_m;
+    group.range_m[k] = std::hypot(point.x_m, point.y_m, point.z_m);
     const Stamp fired = start_ + from_seconds(turned * to_seconds(end_ - start_));
-    salvo.offset_ns[k] = static_cast<std::int32_t>((fired - packet_.stamp).count());
-    salvo.intensity[k] = static_cast<std::uint8_t>(
+    group.offset_ns[k] = static_cast<std::int32_t>((fired - packet_.stamp).count());
+    group.intensity[k] = static_cast<std::uint8_t>(
         kMaxIntensity * (point.reflectance > 0.0F ? std::min(point.reflectance, 1.0F) : 0.0F)); // 0 for NaN
   }
 }

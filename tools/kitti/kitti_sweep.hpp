@@ -28,8 +28,8 @@ class KittiSweep {
  private:
   static constexpr std::size_t kRings = 64;
   static constexpr std::size_t kColumns = 4000; ///< twice as many as it fires, so that two points seldom meet in one
-  static constexpr std::size_t kSalvosPerColumn = kRings / Salvo::kLasers;
-  static constexpr std::size_t kColumnsPerPacket = LidarPacket::kMaxSalvos / kSalvosPerColumn;
+  static constexpr std::size_t kGroupsPerColumn = kRings / FiringGroup::kLasers;
+  static constexpr std::size_t kColumnsPerPacket = LidarPacket::kMaxFiringGroups / kGroupsPerColumn;
 
   struct Return {
     KittiPoint point;
@@ -38,7 +38,7 @@ class KittiSweep {
   };
 
   bool find_rings(std::span<const KittiPoint> points);
-  void fill(std::size_t column, std::size_t bank, Salvo& salvo) const;
+  void fill(std::size_t column, std::size_t bank, FiringGroup& group) const;
 
   std::vector<Return> returns_;
   std::size_t rings_ = 0;            ///< that were seen

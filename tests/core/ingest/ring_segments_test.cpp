@@ -18,19 +18,19 @@ constexpr int kReturns = 1800; ///< of a scan line
 /// Takes in a single return of one scan line. Gives back its segment.
 std::uint32_t add(RingSegments& segments, std::uint16_t scan_line, const Eigen::Vector3f& p, float range_m,
                   float time_s, float intensity) {
-  const std::size_t lidar = scan_line / 256, laser = scan_line % 256, lane = laser % Salvo::kLasers;
-  Salvo salvo{};
-  salvo.first_laser = static_cast<std::uint8_t>(laser - lane);
-  salvo.x_m[lane] = p.x();
-  salvo.y_m[lane] = p.y();
-  salvo.z_m[lane] = p.z();
-  salvo.range_m[lane] = range_m;
-  salvo.offset_ns[lane] = static_cast<std::int32_t>(1e9F * time_s);
-  salvo.ring[lane] = static_cast<std::uint8_t>(laser);
-  salvo.intensity[lane] = static_cast<std::uint8_t>(intensity);
+  const std::size_t lidar = scan_line / 256, laser = scan_line % 256, lane = laser % FiringGroup::kLasers;
+  FiringGroup group{};
+  group.first_laser = static_cast<std::uint8_t>(laser - lane);
+  group.x_m[lane] = p.x();
+  group.y_m[lane] = p.y();
+  group.z_m[lane] = p.z();
+  group.range_m[lane] = range_m;
+  group.offset_ns[lane] = static_cast<std::int32_t>(1e9F * time_s);
+  group.ring[lane] = static_cast<std::uint8_t>(laser);
+  group.intensity[lane] = static_cast<std::uint8_t>(intensity);
   RingSegments::Mask counts{};
   counts[lane] = -1;
-  const std::size_t refused = segments.add(lidar, salvo, counts);
+  const std::size_t refused = segments.add(lidar, group, counts);
   const std::uint32_t segment = segments.latest(lidar, laser);
   EXPECT_EQ(refused, segment == RingSegments::kNone ? 1U : 0U);
   return segment;

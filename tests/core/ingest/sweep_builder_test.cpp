@@ -37,15 +37,15 @@ class NumberedLidar {
     packet.duration = kPacket;
     packet.first_azimuth_cdeg = azimuth_cdeg(Duration{0});
     for (int column = 0; column < kColumns; ++column) {
-      Salvo& salvo = packet.storage[packet.count++];
-      salvo.y_m = salvo.z_m = {};
-      salvo.range_m.fill(range_m_);
-      salvo.intensity.fill(10);
-      for (std::size_t laser = 0; laser < Salvo::kLasers; ++laser) {
+      FiringGroup& group = packet.storage[packet.count++];
+      group.y_m = group.z_m = {};
+      group.range_m.fill(range_m_);
+      group.intensity.fill(10);
+      for (std::size_t laser = 0; laser < FiringGroup::kLasers; ++laser) {
         const Duration offset = column * kColumn + static_cast<int>(laser) * kLaser;
-        salvo.x_m[laser] = static_cast<float>(fired_.size());
-        salvo.offset_ns[laser] = static_cast<std::int32_t>(offset.count());
-        salvo.ring[laser] = static_cast<std::uint8_t>(laser);
+        group.x_m[laser] = static_cast<float>(fired_.size());
+        group.offset_ns[laser] = static_cast<std::int32_t>(offset.count());
+        group.ring[laser] = static_cast<std::uint8_t>(laser);
         fired_.push_back(next_ + offset);
       }
     }

@@ -93,7 +93,7 @@ TEST_F(SensorIntegrationTest, WhatNobodySaysGoesOnAsBefore) {
 
 TEST_F(SensorIntegrationTest, ASourceThatCameBackIsNotComparedWithWhatItWasBefore) {
   Sweep sweep = sources.next(motion(0, 0.5), motion(1, 0.3));
-  ++sweep.motion.sources[kGyro].spell;
+  ++sweep.motion.sources[kGyro].epoch;
   EXPECT_EQ(sensors.integrate(sweep, std::nullopt).source.rotation, kWheelOdometry);
 }
 

@@ -378,12 +378,12 @@ TEST_F(WheelsTest, AFlappingSourceChangesItsHealthOnceNotEachTime) {
 }
 
 TEST_F(WheelsTest, ASpellEndsWithEachLoss) {
-  const std::uint32_t spell = monitor_.spell();
+  const std::uint32_t epoch = monitor_.epoch();
   be_silent(milliseconds{200});
-  EXPECT_NE(monitor_.spell(), spell);
-  const std::uint32_t next_spell = monitor_.spell();
+  EXPECT_NE(monitor_.epoch(), epoch);
+  const std::uint32_t next_epoch = monitor_.epoch();
   run(seconds{2});
-  EXPECT_EQ(monitor_.spell(), next_spell) << "probation and health are one spell";
+  EXPECT_EQ(monitor_.epoch(), next_epoch) << "probation and health are one epoch";
 }
 
 /// A gyro at 200 Hz with a little noise.

@@ -131,7 +131,7 @@ TEST_F(MotionSourcesTest, WhoeverLosesHealthIsKnownToTheSweepButNotUsable) {
   const SensedMotion motion = sources.sensed_in(at_ms(1000), at_ms(1100));
   EXPECT_TRUE(motion.sources[0].known);
   EXPECT_FALSE(motion.sources[0].usable);
-  EXPECT_EQ(motion.sources[0].spell, 1U);
+  EXPECT_EQ(motion.sources[0].epoch, 1U);
   EXPECT_FALSE(sources.choose(at_ms(1100)).translation);
 }
 

@@ -385,7 +385,7 @@ TEST(VelodyneDecoder, NoBytesBreakIt) {
     if (decoder.decode(bytes, packet))
       continue;
     ++decoded_packets;
-    ASSERT_LE(packet.count, LidarPacket::kMaxSalvos);
+    ASSERT_LE(packet.count, LidarPacket::kMaxFiringGroups);
     for (const LidarReturn& r : test::returns_of(packet)) {
       ASSERT_TRUE(std::isfinite(r.x_m) && std::isfinite(r.y_m) && std::isfinite(r.z_m));
       ASSERT_GT(r.range_m, 0.0F);
