@@ -105,7 +105,8 @@ TEST_F(Diagnosis, AccelerationsInGAreNamed) {
   Child daemon(undisturbed(locusd(config())));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
   const Child play(undisturbed({LOCUS_PLAY, drive.string()}));
-  EXPECT_TRUE(daemon.wait_for_line("motion source imu reports accelerations of about 1 where gravity is 9.8 m/s^2, as if in g", seconds{15}))
+  EXPECT_TRUE(daemon.wait_for_line(
+      "motion source imu reports accelerations of about 1 where gravity is 9.8 m/s^2, as if in g", seconds{15}))
       << testing::PrintToString(daemon.lines());
   EXPECT_NE(ctl({"status"}).out.find("as if in g"), std::string::npos);
 }
