@@ -18,7 +18,7 @@ enum class HealthReason : std::uint8_t {
   frozen,       ///< the same reading again, though the robot moves
   out_of_order, ///< a stamp that does not follow from the ones before
   covariance,   ///< much less certain than usual, as the source itself says
-  disagreement, ///< lidar saw another motion
+  disagreement, ///< it and lidar saw different motions: who is right is not known
   outside,      ///< somebody else says so
   self_check    ///< ImuSelfCheck has refused it
 };

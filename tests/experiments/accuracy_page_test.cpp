@@ -51,12 +51,14 @@ TEST(AccuracyPage, ShowsWhatEachRecordingIsWorth) {
   std::filesystem::copy(room_drive(), folder / "data/robot");
   write_standing_capture(folder / "data/standing.pcap", folder / "scratch");
   std::ofstream{folder / "data/garbage.pcap"} << "no capture at all";
+  std::filesystem::copy(kitti_room_drive().parent_path(), folder / "data/kitti",
+                        std::filesystem::copy_options::recursive);
   const ProgramRun run = accuracy({folder / "data", "-o", folder / "out"});
   ASSERT_EQ(run.status, 0) << run.err;
 
   const json recordings = recordings_in(folder / "out");
-  ASSERT_EQ(recordings.size(), 3U);
-  const json &garbage = recordings[0], &robot = recordings[1], &standing = recordings[2];
+  ASSERT_EQ(recordings.size(), 4U);
+  const json &garbage = recordings[0], &kitti = recordings[1], &robot = recordings[2], &standing = recordings[3];
   EXPECT_EQ(garbage["recording"], "garbage.pcap");
   EXPECT_NE(garbage["runs"][0]["failed"].get<std::string>().find("pcap"), std::string::npos);
 
@@ -72,6 +74,13 @@ TEST(AccuracyPage, ShowsWhatEachRecordingIsWorth) {
       EXPECT_EQ(source["used_sweeps"] > 0, std::ranges::count(of_robot["sources"], json(name)) > 0) << name;
   }
 
+  ASSERT_EQ(kitti["runs"].size(), 2U) << "an IMU is all it has beside lidar";
+  EXPECT_EQ(kitti["runs"][0]["sources"], json{"imu"});
+  for (const json& of_kitti : kitti["runs"]) {
+    EXPECT_EQ(of_kitti["summary"]["kitti_vertical_angle_added_deg"], 0.205);
+    EXPECT_GT(of_kitti["way"]["way_m"], 0.8) << "measured by its inertial unit";
+  }
+
   ASSERT_EQ(standing["runs"].size(), 1U) << "lidar is all it has";
   EXPECT_LT(standing["runs"][0]["claims"]["farthest_m"].get<double>(), 0.02);
   EXPECT_EQ(standing["receiver"]["max_mps"], 0.0);
@@ -79,6 +88,8 @@ TEST(AccuracyPage, ShowsWhatEachRecordingIsWorth) {
   const std::string page = read_text(folder / "out/accuracy.md");
   EXPECT_NE(page.find("| robot, VLP-16 | lidar alone |"), std::string::npos) << page;
   EXPECT_NE(page.find("| standing.pcap, VLP-16 | lidar alone |"), std::string::npos) << page;
+  EXPECT_NE(page.find("| kitti/2023_11_14_drive_0001_extract | imu | 0.9"), std::string::npos) << page;
+  EXPECT_NE(page.find("0.205 degrees are added"), std::string::npos) << page;
   EXPECT_NE(page.find("| garbage.pcap | "), std::string::npos) << page;
   EXPECT_EQ(page.find(folder.path().string()), std::string::npos) << "names only: " << page;
 }

@@ -69,6 +69,8 @@ TEST(AccuracyTable, OverconfidenceAndLostSweepsDoNotHold) {
   result["summary"]["sweeps"]["dropped"] = 1;
   EXPECT_EQ(what_does_not_hold(result), (std::vector<std::string>{"farther off than it says", "3 sweeps failed"}));
   EXPECT_TRUE(has(page_of(result), "**no**: farther off than it says; 3 sweeps failed |"));
+  result["summary"]["sweeps"]["failed"] = 0;
+  EXPECT_TRUE(has(page_of(result), "**no**: farther off than it says; 1 sweep failed |"));
 }
 
 TEST(AccuracyTable, TruthIsShownWhereItIsKnown) {
@@ -107,7 +109,9 @@ TEST(AccuracyTable, KittiIsShownWithWhatOthersPublish) {
 TEST(AccuracyTable, WhatFailedIsARowWithTheReason) {
   const std::string page = page_of({{"sources", Results::array()}, {"failed", "no whole turn"}});
   EXPECT_TRUE(has(page, "| a/b | no whole turn |")) << page;
-  EXPECT_TRUE(has(page, "`locus-experiments --accuracy data`, version 1, a machine. Recordings found: 1."));
+  EXPECT_TRUE(
+      has(page, "`locus-experiments --accuracy data`, version 1, a machine. Recordings found: 1. Each is taken at its "
+                "word: whether it is of a robot or of a simulator, only who made it knows."));
 }
 
 TEST(AccuracyTable, AWarningIsSaidOnceForARecording) {

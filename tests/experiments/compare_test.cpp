@@ -157,26 +157,54 @@ TEST_F(Compare, ACellOfTheMatrixHasTheFiguresOfItsRun) {
   EXPECT_TRUE(contains_text(text, "1 rows: 1 worse")) << text;
 }
 
+/// One row as judge_harsh() makes it.
+Results harsh(double worst_m, int lost = 0, int flagged = 0, double claimed_mps = 1.2) {
+  const Results row{
+      {"course", "urban"},  {"imperfection", "late IMU"}, {"sensors", "all"}, {"median_m", 0.02}, {"worst_m", worst_m},
+      {"worst_sigma", 1.0}, {"claimed_mps", claimed_mps}, {"true_mps", 1.0},  {"lost", lost},     {"flagged", flagged}};
+  return {{"version", "1"},
+          {"duration_s", 60},
+          {"runs", Results::array()},
+          {"harsh", {{"seeds", 1}, {"only", ""}, {"rows", {row}}}}};
+}
+
 TEST_F(Compare, HarshRowsAreKeyedByCourseImperfectionAndSensors) {
-  const auto harsh = [](double worst_m) {
-    const Results row{{"course", "urban"}, {"imperfection", "late IMU"}, {"sensors", "all"},
-                      {"median_m", 0.02},  {"worst_m", worst_m},         {"worst_sigma", 1.0}};
-    return Results{{"version", "1"}, {"duration_s", 60}, {"runs", Results::array()}, {"harsh", {{"rows", {row}}}}};
-  };
   const std::string text = page(harsh(0.1), harsh(124));
-  EXPECT_TRUE(
-      contains_text(text, "| **worse** | urban, late IMU, all |  | 20.0 | 100.0 -> 124000.0 (+123900 %) | 1.0 |"))
+  EXPECT_TRUE(contains_text(text, "| **worse** | urban, late IMU, all |  | 20.0 | 100.0 -> 124000.0 (+123900 %) | 1.0 "
+                                  "| 0 | 0 | 0.2 |"))
       << text;
 }
 
+TEST_F(Compare, HarshRowsAreWorseForDrivesLostUnsaidAndForSpeedThatNoRobotHad) {
+  const std::string lost = page(harsh(0.1), harsh(0.1, 1, 1));
+  EXPECT_TRUE(contains_text(lost, "| **worse** | urban, late IMU, all |  | 20.0 | 100.0 | 1.0 | 0 -> 1 | 0 | 0.2 |"))
+      << lost;
+  const std::string unsaid = page(harsh(0.1, 2, 2), harsh(0.1, 2, 1));
+  EXPECT_TRUE(contains_text(unsaid, "| **worse** | urban, late IMU, all |  | 20.0 | 100.0 | 1.0 | 2 | 0 -> 1 | 0.2 |"))
+      << unsaid;
+  const std::string fast = page(harsh(0.1), harsh(0.1, 0, 0, 9.0));
+  EXPECT_TRUE(contains_text(fast, "| 1.0 | 0 | 0 | 0.2 -> 8.0 (+3900 %) |")) << fast;
+  EXPECT_TRUE(contains_text(page(harsh(0.1), harsh(0.1, 0, 0, 0.7)), "| better | urban, late IMU, all |"))
+      << "0.2 m/s too fast, and then none; slower than the robot is no gain";
+  EXPECT_TRUE(contains_text(page(harsh(0.1, 0, 0, 0.9), harsh(0.1, 0, 0, 0.5)), "1 same, 1 of these with equal"));
+}
+
 TEST_F(Compare, WhatIsNotOfTheSameExperimentIsRefused) {
-  Results longer = faults({}), more_seeds = faults({}), paper = faults({});
+  Results longer = faults({}), more_seeds = faults({}), paper = faults({}), real = faults({}), more_drives = harsh(0.1);
   longer["duration_s"] = 300;
   more_seeds["faults"]["seeds"] = 3;
   paper.erase("faults");
+  real["realism"] = "real";
+  more_drives["harsh"]["seeds"] = 3;
   EXPECT_EQ(error(faults({}), faults({})), "");
   EXPECT_TRUE(contains_text(error(longer, faults({})), "before.json: duration_s is 300 there and 60 here"));
   EXPECT_TRUE(contains_text(error(more_seeds, faults({})), "before.json: seeds is 3 there and 1 here"));
+  EXPECT_TRUE(contains_text(error(more_drives, harsh(0.1)), "before.json: seeds is 3 there and 1 here"));
+  EXPECT_EQ(error(harsh(0.1), harsh(0.1)), "");
+  EXPECT_EQ(error(real, real), "");
+  EXPECT_TRUE(contains_text(error(real, faults({})), "before.json: its courses are real, these are clean; compare"))
+      << "results that do not say are of a time when all were clean";
+  EXPECT_TRUE(contains_text(error(faults({}), real), "before.json: its courses are clean, these are real; compare"));
   EXPECT_TRUE(
       contains_text(error(matrix(0.1), faults({})), "before.json: holds no results of the same experiment (faults)"));
   EXPECT_TRUE(contains_text(error(paper, faults({})), "before.json: holds no results of the same experiment (faults)"));

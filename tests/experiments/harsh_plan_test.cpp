@@ -51,6 +51,18 @@ TEST(HarshPlan, RealAndHarshWorldsAreDrivenOnEveryCourse) {
   EXPECT_EQ(driven["harsh"], courses);
 }
 
+TEST(HarshPlan, GroupsAreTriedAloneOnThreeCoursesAndTheVehicleWhereItHasRoom) {
+  std::map<std::string, std::set<std::string>> driven;
+  for (const HarshCase& harsh_case : harsh_cases(""))
+    driven[harsh_case.imperfection].insert(harsh_case.course);
+  const std::set<std::string> usual{"plant", "corridor", "plant, spot"}, with_room{"plant", "field", "road, car"};
+  for (const Imperfection& group : imperfections()) {
+    if (group.courses.empty())
+      continue;
+    EXPECT_EQ(driven[group.name], group.name == "vehicle" ? with_room : usual) << group.name;
+  }
+}
+
 TEST(HarshPlan, DrivesBeginAtTenPlacesOfTheCourseAndStayWithinIt) {
   const Plan plan = make_plan(harsh_arguments("plant/real"));
   std::map<std::string, std::set<double>> starts_s;

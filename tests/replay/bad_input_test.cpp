@@ -152,7 +152,7 @@ TEST_F(BadCapture, ThatRunsBackwardsIsSaidWithTheProgramThatSortsIt) {
   }
   std::size_t older = 0; // than the one before; a position packet arrives with a data packet
   for (std::size_t i = 1; i < packets.size(); ++i)
-    older += packets[i].first < packets[i - 1].first ? 1 : 0;
+    older += packets[i].first < packets[i - 1].first ? 1U : 0U;
   const std::string counted = std::to_string(older) + " of its 500 datagrams";
   expect_error(replay(), 1, {"bad.pcap", counted, "runs backwards", "reordercap IN OUT"});
 }

@@ -298,6 +298,11 @@ TEST(LocusReplay, RealtimeMayBeSlowedDown) {
   EXPECT_LT(replay.summary()["wall_s"], 8);
 }
 
+TEST(LocusReplay, LidarsAreToldWithWhatTheirPacketsAreReadAs) {
+  const std::string told = Replay({"--duration", "2", room_drive().string()}).run().out;
+  EXPECT_NE(told.find("\nfront      VLP-16, strongest returns, 600 rpm\n"), std::string::npos) << told;
+}
+
 TEST(LocusReplay, FiguresGoToStdoutUnlessQuiet) {
   EXPECT_NE(Replay({room_drive().string()}).run().out.find("sweeps"), std::string::npos);
   const Replay quiet({"--quiet", room_drive().string()});

@@ -38,6 +38,14 @@ std::vector<StampedPose> read_tum(const std::filesystem::path& file) {
   return trajectory ? *trajectory : std::vector<StampedPose>{};
 }
 
+void write_scaled_tum(const std::filesystem::path& from, double factor, const std::filesystem::path& to) {
+  std::ofstream file(to);
+  for (StampedPose pose : read_tum(from)) {
+    pose.T_source_base.translation *= factor;
+    file << to_line(pose);
+  }
+}
+
 ProgramRun run_program(const std::string& program, const std::vector<std::string>& arguments) {
   const TemporaryFolder folder;
   std::vector<std::string> command{program};

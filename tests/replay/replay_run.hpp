@@ -21,6 +21,9 @@ std::vector<std::string> lines_of(const std::string& text);
 /// What is no trajectory fails the test and is empty.
 std::vector<StampedPose> read_tum(const std::filesystem::path& file);
 
+/// The trajectory of a file, its way so many times as long.
+void write_scaled_tum(const std::filesystem::path& from, double factor, const std::filesystem::path& to);
+
 /// What a run of a program left on its terminal.
 struct ProgramRun {
   int status = -1; ///< of exit; -1: it crashed or never ran

@@ -15,9 +15,13 @@ namespace locus::test {
 class SimulatedDrive {
  public:
   SimulatedDrive(const std::string& world, const std::string& robot, int duration_s,
-                 const std::vector<std::string>& more = {}) {
-    std::vector<std::string> arguments{"--world",   world,   "--robot", robot, "--duration", std::to_string(duration_s),
-                                       "--realism", "clean", "--seed",  "1",   "-o",         capture()};
+                 const std::vector<std::string>& more = {}, int seed = 1) {
+    std::vector<std::string> arguments{"--world",    world,
+                                       "--robot",    robot,
+                                       "--duration", std::to_string(duration_s),
+                                       "--realism",  "clean",
+                                       "--seed",     std::to_string(seed),
+                                       "-o",         capture()};
     arguments.insert(arguments.end(), more.begin(), more.end());
     const ProgramRun run = run_program(LOCUS_SIM, arguments);
     EXPECT_EQ(run.status, 0) << run.err;

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "drivers/files/capture.hpp"
 #include "drivers/files/motion_files.hpp"
 #include "drivers/net/udp_socket.hpp"
 #include "drivers/velodyne/model.hpp"
@@ -77,6 +78,54 @@ TEST_F(Diagnosis, SecondLidarOnThePortIsNamedWithTheConfigurationOfBoth) {
       << problem;
 }
 
+/// Sends data packets as a VLP-16 does, but for their product id, until it is gone.
+std::jthread unknown_device(const std::filesystem::path& capture, std::byte product_id,
+                            std::uint32_t from_ip = INADDR_ANY) {
+  std::vector<std::byte> packet;
+  auto datagrams = Capture::open(capture / "lidar.pcap");
+  while (packet.size() != velodyne::kDataPacketBytes) {
+    const auto payload = datagrams->next()->payload;
+    packet.assign(payload.begin(), payload.end());
+  }
+  packet[velodyne::kProductIdOffset] = product_id;
+  return std::jthread([packet, from_ip](const std::stop_token& stop) {
+    const UdpSender sender(from_ip);
+    while (!stop.stop_requested()) {
+      sender.send(2368, packet);
+      std::this_thread::sleep_for(milliseconds{2});
+    }
+  });
+}
+
+TEST_F(Diagnosis, UnknownProductIdIsSaidByTheServiceAndByLocusctlSensors) {
+  Child daemon(undisturbed(locusd(lidar_with("model: auto"))));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const std::jthread device = unknown_device(capture(), std::byte{0x31});
+  EXPECT_TRUE(
+      daemon.wait_for_line("what comes is refused, for the reasons that locusctl status counts (product id 0x31 "
+                           "and return mode 0x37 in ",
+                           seconds{10}))
+      << testing::PrintToString(daemon.lines());
+  EXPECT_TRUE(daemon.wait_for_line("is it a Velodyne, and lidars.front.model the right one?", milliseconds{10}));
+  const ProgramRun alone = ctl({"sensors"});
+  EXPECT_EQ(alone.status, 1);
+  EXPECT_TRUE(contains(alone.err, "127.0.0.1       2368   not read: product id 0x31 and return mode 0x37 in "))
+      << alone.err;
+  EXPECT_TRUE(contains(alone.err, "no lidar was heard")) << alone.err;
+}
+
+/// What can be read is listed for the configuration, and the other device told of beside it.
+TEST_F(Diagnosis, UnknownProductIdBesideALidarIsToldOnALineOfItsOwn) {
+  const std::jthread device = unknown_device(capture(), std::byte{0x31}, INADDR_LOOPBACK + 1);
+  const Child play({LOCUS_PLAY, capture().string()});
+  ASSERT_TRUE(play.wait_for_line("nobody listens", seconds{5})) << "it waits for a service, and then sends";
+  const ProgramRun both = ctl({"sensors"});
+  EXPECT_EQ(both.status, 0) << both.err;
+  EXPECT_TRUE(contains(both.out, "127.0.0.2       2368   not read: product id 0x31 and return mode 0x37 in "))
+      << both.out;
+  EXPECT_TRUE(contains(both.out, "model: VLP-16, port: 2368, T_base_lidar")) << both.out;
+}
+
 TEST_F(Diagnosis, LidarOnAnotherPortIsToldByItsPositionPackets) {
   const std::filesystem::path wrong = lidar_with("port: 2390");
   Child daemon(undisturbed(locusd(wrong)));
@@ -109,6 +158,22 @@ TEST_F(Diagnosis, AccelerationsInGAreNamed) {
       "motion source imu reports accelerations of about 1 where gravity is 9.8 m/s^2, as if in g", seconds{15}))
       << testing::PrintToString(daemon.lines());
   EXPECT_NE(ctl({"status"}).out.find("as if in g"), std::string::npos);
+}
+
+/// Wheels of which nothing is wrong but the scale, and lidar: who is right is not known to the service.
+TEST_F(Diagnosis, WheelsAndLidarThatDisagreeAreSaidWithAllPossibleCauses) {
+  const std::filesystem::path drive = file("scaled");
+  std::filesystem::copy(capture(), drive);
+  write_scaled_tum(capture() / "wio.tum", 3.0, drive / "wio.tum");
+  Child daemon(undisturbed(locusd(config())));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const Child play(undisturbed({LOCUS_PLAY, drive.string()}));
+  EXPECT_TRUE(daemon.wait_for_line(
+      "motion source wio and lidar disagree on how the robot moves; it is not used until they agree (possible causes: "
+      "its slip, scale or stamps, an IMU whose stamps are late, or lidar that follows what moves around the robot); "
+      "the next best one is used",
+      seconds{20}))
+      << testing::PrintToString(daemon.lines());
 }
 
 TEST_F(Diagnosis, SweepsThatAreDroppedAreSaidWithTheReason) {

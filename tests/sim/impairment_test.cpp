@@ -7,11 +7,18 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <memory>
+#include <numbers>
 #include <set>
 #include <string>
 #include <vector>
 
+#include <Eigen/Eigenvalues>
+
+#include "drivers/position_packet.hpp"
+#include "drivers/velodyne_decoder.hpp"
 #include "locus_sim/own_parts.hpp"
+#include "support/returns.hpp"
 
 namespace locus::sim {
 namespace {
@@ -69,6 +76,105 @@ TEST(Mounting, OfEachSensorAndSeedIsWrongInItsOwnDirection) {
       EXPECT_GT((shifts[i] - shifts[j]).norm(), 0.01);
       EXPECT_GT((turns[i] - turns[j]).norm(), 0.01);
     }
+}
+
+constexpr double kBelow_m = 0.5, kAhead_m = 6; // from the base to the floor and to two walls
+
+/// A floor below the base, a wall ahead of it and one to its left, and points of each.
+struct Corner {
+  static Scene scene() {
+    return Scene({{Rectangle{{-kAhead_m, -kAhead_m, -kBelow_m}, {2 * kAhead_m, 0, 0}, {0, 2 * kAhead_m, 0}}},
+                  {Rectangle{{kAhead_m, -kAhead_m, -kBelow_m}, {0, 2 * kAhead_m, 0}, {0, 0, 5}}},
+                  {Rectangle{{-kAhead_m, kAhead_m, -kBelow_m}, {2 * kAhead_m, 0, 0}, {0, 0, 5}}}});
+  }
+
+  std::vector<Eigen::Vector3d> ahead, left, floor;
+};
+
+/// What a lidar sees of the corner in ten turns, put where its user believes that it is.
+Corner seen_of_corner(const NamedLidar& named) {
+  constexpr double kNear_m = 0.7, kClear_m = 1; // of the plane; and from the other two
+  const Scene scene = Corner::scene();
+  const Trajectory trajectory(Course{}.stand(seconds{2}));
+  SyntheticLidar lidar(scene, trajectory, named.options);
+  velodyne::Decoder decoder({.model = named.options.model});
+  const auto packet = std::make_unique<LidarPacket>();
+  Corner seen;
+  for (int i = 0; i < 753; ++i) {
+    if (decoder.decode(lidar.next().payload, *packet))
+      continue;
+    for (const LidarReturn& echo : test::returns_of(*packet)) {
+      const Eigen::Vector3d point =
+          *named.T_base_believed * Eigen::Vector3f{echo.x_m, echo.y_m, echo.z_m}.cast<double>();
+      const Eigen::Array3d off = (point - Eigen::Vector3d{kAhead_m, kAhead_m, -kBelow_m}).array().abs();
+      if (off.x() < kNear_m && off.y() > kClear_m && off.z() > kClear_m)
+        seen.ahead.push_back(point);
+      if (off.y() < kNear_m && off.x() > kClear_m && off.z() > kClear_m)
+        seen.left.push_back(point);
+      if (off.z() < kNear_m && off.x() > kClear_m && off.y() > kClear_m)
+        seen.floor.push_back(point);
+    }
+  }
+  return seen;
+}
+
+Eigen::Vector3d mean_of(const std::vector<Eigen::Vector3d>& points) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& point : points)
+    sum += point;
+  return sum / static_cast<double>(points.size());
+}
+
+/// Of the plane through the points, on the side of `about`.
+Eigen::Vector3d normal_of(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& about) {
+  const Eigen::Vector3d mean = mean_of(points);
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& point : points)
+    spread += (point - mean) * (point - mean).transpose();
+  const Eigen::Vector3d normal = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors().col(0);
+  return normal.dot(about) < 0 ? Eigen::Vector3d(-normal) : normal;
+}
+
+NamedLidar level_lidar(const Imperfections& imperfections, std::uint64_t seed) {
+  return make_spot({.noise = false, .imperfections = imperfections}, seed).sensors.lidars.front();
+}
+
+TEST(Mounting, TurnsFloorAndWallsByWhatIsAskedFor) {
+  double steepest_rad = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const Corner seen = seen_of_corner(level_lidar({.mounting_deg = 2}, seed));
+    Eigen::Matrix3d turned;
+    turned << normal_of(seen.ahead, Eigen::Vector3d::UnitX()), normal_of(seen.left, Eigen::Vector3d::UnitY()),
+        normal_of(seen.floor, Eigen::Vector3d::UnitZ());
+    EXPECT_NEAR(angle_rad(Eigen::Quaterniond(turned)), 2 * kRadPerDeg, 0.03 * kRadPerDeg) << "seed " << seed;
+    steepest_rad = std::max(steepest_rad, std::acos(turned.col(2).z()));
+  }
+  EXPECT_GT(steepest_rad, 1.5 * kRadPerDeg) << "nowhere the floor is tilted";
+  EXPECT_LT(steepest_rad, 2.03 * kRadPerDeg);
+}
+
+TEST(Mounting, ShiftsFloorAndWallsByWhatIsAskedFor) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const Corner seen = seen_of_corner(level_lidar({.mounting_mm = 30}, seed));
+    const Eigen::Vector3d shift_m{mean_of(seen.ahead).x() - kAhead_m, mean_of(seen.left).y() - kAhead_m,
+                                  mean_of(seen.floor).z() + kBelow_m};
+    EXPECT_NEAR(shift_m.norm(), 0.03, 0.001) << "seed " << seed;
+  }
+}
+
+TEST(Mounting, OfAnImuThatStandsTiltsItsGravity) {
+  const Trajectory trajectory(Course{}.stand(seconds{1}));
+  double steepest_rad = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const MountedImu mounted = *make_husky({.noise = false, .imperfections = {.mounting_deg = 2}}, seed).sensors.imu;
+    SyntheticImu imu(trajectory, 200, mounted.faults, 1, mounted.T_base_imu);
+    const Eigen::Vector3d up_mps2 = mounted.T_base_believed->rotation * imu.next().specific_force_mps2;
+    EXPECT_NEAR(up_mps2.norm(), kGravity_mps2, 1e-9);
+    const double tilt_rad = std::asin(up_mps2.head<2>().norm() / kGravity_mps2);
+    EXPECT_LT(tilt_rad, 2 * kRadPerDeg + 1e-9) << "about an axis that is not level it is less";
+    steepest_rad = std::max(steepest_rad, tilt_rad);
+  }
+  EXPECT_GT(steepest_rad, 1.95 * kRadPerDeg);
 }
 
 TEST(Impairment, IsOfEveryRobot) {
@@ -129,6 +235,26 @@ TEST(LidarClock, ThatDriftsHasNoGps) {
   EXPECT_DOUBLE_EQ(left.drift, 60e-6);
   EXPECT_FALSE(left.pps_locked);
   EXPECT_NE(left.clock_offset, Duration::zero());
+}
+
+velodyne::PositionPacket position_packet_of(const Robot& robot) {
+  const Scene nothing({});
+  const Trajectory trajectory(Course{}.stand(seconds{1}));
+  SyntheticLidar lidar(nothing, trajectory, robot.sensors.lidars[0].options);
+  Datagram datagram = lidar.next();
+  while (datagram.payload.size() != velodyne::kPositionPacketBytes)
+    datagram = lidar.next();
+  return velodyne::parse_position_packet(datagram.payload.first<velodyne::kPositionPacketBytes>());
+}
+
+TEST(LidarClock, ThatDriftsSaysSoInItsPositionPackets) {
+  const velodyne::PositionPacket kept = position_packet_of(spot_with({}));
+  EXPECT_TRUE(kept.is_synchronised());
+  const velodyne::PositionPacket left = position_packet_of(spot_with({.lidar_drift_ppm = 60}));
+  EXPECT_EQ(left.pps, velodyne::PpsState::absent);
+  ASSERT_TRUE(left.rmc);
+  EXPECT_FALSE(left.rmc->valid);
+  EXPECT_NE(left.time_of_hour, kept.time_of_hour);
 }
 
 struct Scatter {
@@ -258,10 +384,32 @@ TEST(SlipBursts, AndTurnErrorsAreOfWheelsAndFeetAlone) {
   EXPECT_NEAR(std::abs(legs.turn_error - right.sensors.odometry[1].faults.turn_error), 0.05, 1e-12);
 }
 
-TEST(TurnErrors, HaveEitherSign) {
+/// Of one and a half turns to the left, at speed.
+double reported_of_true_yaw(const NamedOdometry& named) {
+  const double turn_rad = 3 * std::numbers::pi;
+  const Trajectory trajectory(Course{}.change_speed(0.5, seconds{1}).turn(turn_rad, 0.9).change_speed(0, seconds{1}));
+  SyntheticOdometry odometry(trajectory, named.rate_hz, named.faults);
+  double sum_rad = 0;
+  OdometrySample last = odometry.next();
+  while (last.stamp < trajectory.end()) {
+    const OdometrySample now = odometry.next();
+    sum_rad += so3_log(last.T_source_base.rotation.conjugate() * now.T_source_base.rotation).z();
+    last = now;
+  }
+  return sum_rad / turn_rad;
+}
+
+TEST(TurnErrors, MakeTheReportedYawTooLargeOrTooSmallByWhatIsAskedFor) {
   std::set<bool> signs;
-  for (std::uint64_t seed = 1; seed <= 20; ++seed)
-    signs.insert(spot_with({.yaw_error_percent = 50}, seed).sensors.odometry[1].faults.turn_error > 0);
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const SensorChoice choice{.noise = false, .imperfections = {.yaw_error_percent = 5}};
+    const double wheels = reported_of_true_yaw(make_husky(choice, seed).sensors.odometry[0]);
+    EXPECT_NEAR(std::abs(wheels - 1), 0.05, 1e-6) << "seed " << seed;
+    signs.insert(wheels > 1);
+    const auto spot = make_spot(choice, seed).sensors.odometry;
+    EXPECT_NEAR(reported_of_true_yaw(spot[0]), 1, 1e-6) << "vision, seed " << seed;
+    EXPECT_NEAR(std::abs(reported_of_true_yaw(spot[1]) - 1), 0.05, 1e-6) << "legs, seed " << seed;
+  }
   EXPECT_EQ(signs.size(), 2U);
 }
 

@@ -204,6 +204,19 @@ TEST(LocusSim, WrongOptionsAreAnErrorOfOneLineThatNamesThem) {
   expect_refused({"--world", "urban", "--robot", "husky", "--duration", "nan", "-o", x}, "duration");
 }
 
+TEST(LocusSim, VehicleThatIsNamedAndHasNoRoomIsAWarningOfOneLine) {
+  const TemporaryFolder folder;
+  const auto said = [&](const std::vector<std::string>& options) {
+    const ProgramRun run = run_program(LOCUS_SIM, husky_in("corridor", folder / "c", options));
+    EXPECT_EQ(run.status, 0) << run.err;
+    return run.err;
+  };
+  EXPECT_EQ(said({"--realism", "clean", "--vehicle-s-per-min", "20"}),
+            "locus-sim: warning: --vehicle-s-per-min: nowhere on this drive is room for a vehicle beside a husky in "
+            "--world corridor, so none comes; try a wider world, another seed or a longer drive\n");
+  EXPECT_EQ(said({"--realism", "harsh"}), "");
+}
+
 TEST(LocusSim, FolderThatCannotBeMadeIsAFailure) {
   const ProgramRun run = run_program(LOCUS_SIM, husky_in("corridor", "/dev/null/folder"));
   EXPECT_EQ(run.status, 1);

@@ -89,6 +89,36 @@ TEST(Handheld, SwaysTurnsFastAndHasAnImuAlone) {
   EXPECT_LT(above_two, 0.1 * 18'000);
 }
 
+/// Straight on, at walking pace.
+TEST(Handheld, SwaysBy30CentimetresFromSideToSide) {
+  const Trajectory trajectory(Course{}.change_speed(1.2, seconds{1}).straight(60), {}, {}, make_handheld({}, 1).ride);
+  double leftmost_m = 0, rightmost_m = 0;
+  for (Stamp t = trajectory.start() + seconds{5}; t < trajectory.start() + seconds{45}; t += milliseconds{10}) {
+    const double left_m = trajectory.T_world_base(t).translation.y();
+    leftmost_m = std::max(leftmost_m, left_m);
+    rightmost_m = std::min(rightmost_m, left_m);
+  }
+  EXPECT_GT(leftmost_m - rightmost_m, 0.3);
+  EXPECT_LT(leftmost_m - rightmost_m, 0.35); // and the stride
+}
+
+TEST(Handheld, TurnsWithUpToTwoRadiansPerSecondAndFlicksWithFour) {
+  const World plant = world_called("urban").make(1);
+  Robot robot = make_handheld({}, 1);
+  const Trajectory with_flicks = drive_about(plant, robot, seconds{180}, {}, 1);
+  robot.agility.flicks_per_min = 0;
+  const Trajectory without = drive_about(plant, robot, seconds{180}, {}, 1);
+  double turn_radps = 0, flick_radps = 0;
+  for (Stamp t = without.start(); t < without.end(); t += milliseconds{10}) {
+    const double calm_radps = without.at(t).angular_velocity_base_radps.z();
+    turn_radps = std::max(turn_radps, std::abs(calm_radps));
+    flick_radps = std::max(flick_radps, std::abs(with_flicks.at(t).angular_velocity_base_radps.z() - calm_radps));
+  }
+  EXPECT_NEAR(turn_radps, 2, 0.2);
+  EXPECT_GT(flick_radps, 3.5);
+  EXPECT_LT(flick_radps, 4.2);
+}
+
 TEST(Handheld, MotionHasExactDerivativesInAFlick) {
   Ride ride;
   ride.flicks = {{seconds{1}, milliseconds{500}, {0.1, -0.2, 1}}, {seconds{3}, milliseconds{400}, {0, 0, -0.8}}};

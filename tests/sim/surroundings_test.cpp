@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include "locus_sim/company.hpp"
@@ -53,10 +54,16 @@ Trajectory straight_on(double speed_mps, double length_m) {
   return Trajectory(Course{}.change_speed(speed_mps, seconds{5}).straight(length_m));
 }
 
-/// Of the returns of a level VLP-16 on a husky, what share comes from what moves; over the whole drive.
-double share_of_view(const World& world, const Trajectory& trajectory) {
-  std::size_t returns = 0, moving = 0;
+/// Of the returns of a level VLP-16 on a husky, what share comes from what moves.
+struct Share {
+  double of_drive = 0, largest = 0; ///< that of a single look
+};
+
+Share share_of_view(const World& world, const Trajectory& trajectory) {
+  std::size_t all_returns = 0, all_moving = 0;
+  Share share;
   for (Stamp t = trajectory.start(); t < trajectory.end(); t += milliseconds{900}) {
+    std::size_t returns = 0, moving = 0;
     const Pose T_world_lidar = trajectory.T_world_base(t) * Pose{Eigen::Quaterniond::Identity(), {0, 0, 0.93}};
     for (int ring = 0; ring < 16; ++ring) {
       for (int azimuth = 0; azimuth < 360; ++azimuth) {
@@ -67,8 +74,12 @@ double share_of_view(const World& world, const Trajectory& trajectory) {
         moving += hit && hit->surface == nullptr;
       }
     }
+    share.largest = std::max(share.largest, static_cast<double>(moving) / static_cast<double>(returns));
+    all_returns += returns;
+    all_moving += moving;
   }
-  return static_cast<double>(moving) / static_cast<double>(returns);
+  share.of_drive = static_cast<double>(all_moving) / static_cast<double>(all_returns);
+  return share;
 }
 
 World yard_with(const Imperfections& imperfections, const Trajectory& trajectory) {
@@ -77,21 +88,29 @@ World yard_with(const Imperfections& imperfections, const Trajectory& trajectory
   return world;
 }
 
-TEST(People, HideAModeratePartOfTheViewAndInHarshUseUpToTwoFifths) {
+TEST(People, HideAModeratePartOfTheViewAndInHarshUseAThird) {
   const Trajectory trajectory = stroll();
   const auto share_at = [&](Realism realism) {
     return share_of_view(yard_with({.people = imperfections_of(realism).people}, trajectory), trajectory);
   };
-  const double real = share_at(Realism::real), harsh = share_at(Realism::harsh);
-  RecordProperty("real_permille", static_cast<int>(1e3 * real));
-  RecordProperty("harsh_permille", static_cast<int>(1e3 * harsh));
+  const Share real = share_at(Realism::real), harsh = share_at(Realism::harsh);
+  const auto record = [](const std::string& name, double share) {
+    RecordProperty(name + "_permille", static_cast<int>(1e3 * share));
+  };
+  record("real", real.of_drive);
+  record("real_largest", real.largest);
+  record("harsh", harsh.of_drive);
+  record("harsh_largest", harsh.largest);
   // Who stands as far off as he may, 3.4 m from the middle, hides with his trunk alone 6.4 degrees to either side of it
   // together, on a third of the rings.
   const double one = 2 * std::asin(0.19 / 3.4) / (2 * std::numbers::pi) / 3;
-  EXPECT_GT(real, 3 * one);
-  EXPECT_GT(harsh, real);
-  EXPECT_GT(harsh, 0.1);
-  EXPECT_LT(harsh, 0.4);
+  EXPECT_GT(real.of_drive, 3 * one);
+  EXPECT_LT(real.of_drive, 0.25);
+  EXPECT_GT(harsh.of_drive, 0.25);
+  EXPECT_LT(harsh.of_drive, 0.4);
+  EXPECT_LT(real.largest, 0.25);
+  EXPECT_GT(harsh.largest, 0.35);
+  EXPECT_LT(harsh.largest, 0.45);
 }
 
 TEST(People, KeepClearOfTheRobotStayWithItAndNeverRun) {
@@ -166,6 +185,27 @@ TEST(Vehicle, KeepsOutOfANarrowCorridor) {
   const Way way(trajectory, 0.35, {});
   Dice dice(1);
   EXPECT_FALSE(escort(corridor(80), way, 20, dice));
+}
+
+/// Of three courses of 80 s, as the harsh table of locus-experiments has them, on how many there is one.
+int courses_with_vehicle(WorldMaker make_world, const NamedRobot& named) {
+  int count = 0;
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    World world = make_world(seed);
+    Robot robot = named.make({}, seed);
+    robot.agility.halts = {.share = 0.5, .longest_s = 12};
+    const Trajectory trajectory = drive_about(world, robot, seconds{80}, {}, seed);
+    count += surround(world, robot, trajectory, {.vehicle_s_per_min = 20}, seed);
+  }
+  return count;
+}
+
+TEST(Vehicle, FindsRoomOnSomeCoursesOfPlantFieldAndRoadAndOnNoneOfTheCorridor) {
+  const NamedRobot husky{"husky", make_husky}, car{"car", make_car};
+  EXPECT_GE(courses_with_vehicle(make_urban, husky), 1);
+  EXPECT_GE(courses_with_vehicle(make_field, husky), 1);
+  EXPECT_GE(courses_with_vehicle(make_road, car), 1);
+  EXPECT_EQ(courses_with_vehicle(make_corridor, husky), 0);
 }
 
 const Cloud kCloud{{5, 0, 0}, 1, 1, Start{}.stamp, Start{}.stamp + seconds{4}};
@@ -309,7 +349,7 @@ TEST(Surroundings, OfACleanWorldAreNone) {
   const World clean = yard_with(imperfections_of(Realism::clean), trajectory);
   EXPECT_TRUE(clean.scene.passers().empty());
   EXPECT_TRUE(clean.scene.steam().clouds().empty());
-  EXPECT_EQ(share_of_view(clean, trajectory), 0);
+  EXPECT_EQ(share_of_view(clean, trajectory).largest, 0);
 }
 
 } // namespace

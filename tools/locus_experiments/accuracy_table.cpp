@@ -194,7 +194,8 @@ std::string command_of(const Results& results) {
 std::string introduction(const Results& results) {
   return fmt::format(
       "# What recordings show\n\n"
-      "`{}`, version {}, {}. Recordings found: {}. Each is replayed with all motion sources that it has, with its IMU, "
+      "`{}`, version {}, {}. Recordings found: {}. Each is taken at its word: whether it is of a robot or of a "
+      "simulator, only who made it knows. It is replayed with all motion sources that it has, with its IMU, "
       "and with lidar alone, as far as these differ. Times are those of one thread, {} runs at a time, from the cut of "
       "a "
       "sweep to its estimate: the median and what 99 % stay below, by the clock, which is worth no more than the "
@@ -231,7 +232,7 @@ std::vector<std::string> what_does_not_hold(const Results& run) {
   if (sigma > kAllowedSigma)
     broken.push_back("farther off than it says");
   if (failed + dropped > 0)
-    broken.push_back(fmt::format("{} sweeps failed", failed + dropped));
+    broken.push_back(fmt::format("{} sweep{} failed", failed + dropped, failed + dropped == 1 ? "" : "s"));
   return broken;
 }
 

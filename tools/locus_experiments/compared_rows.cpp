@@ -18,6 +18,8 @@ constexpr FigureKind kError{"error, mm", 1e3, 1, 1e-3}, kMedianError{"median err
 constexpr FigureKind kSigma{"worst sigma", 1, 1, 0.1};
 /// A run may end one window earlier than another.
 constexpr FigureKind kLost{"sweeps lost", 1, 0, 0}, kFailed{"failed", 1, 0, 1};
+constexpr FigureKind kDrivesLost{"drives lost", 1, 0, 0}, kUnsaid{"unsaid", 1, 0, 0};
+constexpr FigureKind kTooFast{"claims too much, m/s", 1, 1, 0.1};
 /// Of the normalised squared error of six axes, 6 where the covariances say the truth: too humble is as wrong as too
 /// sure.
 constexpr FigureKind kNees{"NEES, times off 6", 1, 2, 0.1};
@@ -76,22 +78,31 @@ std::vector<ComparedRow> matrix_rows(const Results& results) {
   return rows;
 }
 
+/// By how much the first figure is above the second; nothing where either is absent.
+std::optional<double> excess(const Results& row, const char* figure, const char* over) {
+  const auto value = number_at(row, figure), limit = number_at(row, over);
+  return value && limit ? std::optional(std::max(0.0, *value - *limit)) : std::nullopt;
+}
+
 std::vector<ComparedRow> harsh_rows(const Results& results) {
   std::vector<ComparedRow> rows;
   for (const Results& row : results.at("harsh").at("rows"))
-    rows.push_back(row_of(fmt::format("{}, {}, {}", row.at("course").get<std::string>(),
-                                      row.at("imperfection").get<std::string>(), row.at("sensors").get<std::string>()),
-                          row,
-                          {number_at(row, "/median_m"), number_at(row, "/worst_m"), number_at(row, "/worst_sigma")}));
+    rows.push_back(
+        row_of(fmt::format("{}, {}, {}", row.at("course").get<std::string>(), row.at("imperfection").get<std::string>(),
+                           row.at("sensors").get<std::string>()),
+               row,
+               {number_at(row, "/median_m"), number_at(row, "/worst_m"), number_at(row, "/worst_sigma"),
+                number_at(row, "/lost"), excess(row, "/lost", "/flagged"), excess(row, "/claimed_mps", "/true_mps")}));
   return rows;
 }
 
 } // namespace
 
 const ComparedTable* table_of(const Results& results) {
-  static const std::array tables{ComparedTable{"faults", {kError, kSigma, kLost, kFailed, kNees}, fault_rows},
-                                 ComparedTable{"matrix", {kError, kSigma, kLost, kFailed}, matrix_rows},
-                                 ComparedTable{"harsh", {kMedianError, kWorstError, kSigma}, harsh_rows}};
+  static const std::array tables{
+      ComparedTable{"faults", {kError, kSigma, kLost, kFailed, kNees}, fault_rows},
+      ComparedTable{"matrix", {kError, kSigma, kLost, kFailed}, matrix_rows},
+      ComparedTable{"harsh", {kMedianError, kWorstError, kSigma, kDrivesLost, kUnsaid, kTooFast}, harsh_rows}};
   const auto* const found =
       std::ranges::find_if(tables, [&](const ComparedTable& table) { return results.contains(table.key); });
   return found == tables.end() ? nullptr : found;

@@ -39,12 +39,10 @@ const std::vector<Drive>& drives() {
   return all;
 }
 
-/// Those on which each group of imperfections is tried alone.
-constexpr std::array<std::string_view, 3> kTriedAlone{"plant", "corridor", "plant, spot"};
-
 struct Group {
   std::string_view name;
   std::vector<std::string_view> imperfections;
+  std::vector<std::string> courses{"plant", "corridor", "plant, spot"}; ///< on which it is tried alone
 };
 
 const std::vector<Group>& groups() {
@@ -57,14 +55,14 @@ const std::vector<Group>& groups() {
        {"slip-bursts-per-min", "yaw-error-percent", "gyro-scale-percent", "gyro-walk-dps", "g-sensitivity-dps",
         "vibration-mps2"}},
       {"people", {"people"}},
-      {"vehicle", {"vehicle-s-per-min"}},
+      {"vehicle", {"vehicle-s-per-min"}, {"plant", "field", "road, car"}}, // in the corridor it has no room
       {"steam", {"steam-per-min"}},
       {"mirrors", {"wet-floor-percent", "glass-percent"}}};
   return all;
 }
 
 Imperfection alone(const Group& group) {
-  Imperfection imperfection{std::string(group.name), {"--realism", "clean"}, {}};
+  Imperfection imperfection{std::string(group.name), {"--realism", "clean"}, {}, group.courses};
   for (const std::string_view name : group.imperfections) {
     const auto& one = *std::ranges::find(sim::kImperfections, name, &sim::NamedImperfection::name);
     imperfection.sizes.*one.size = one.harsh;
@@ -75,8 +73,7 @@ Imperfection alone(const Group& group) {
 }
 
 bool is_tried(const Drive& drive, const Imperfection& imperfection) {
-  const bool is_level = std::ranges::count(sim::kRealismNames, imperfection.name) > 0;
-  return is_level || std::ranges::count(kTriedAlone, drive.name) > 0;
+  return imperfection.courses.empty() || std::ranges::count(imperfection.courses, drive.name) > 0;
 }
 
 /// A name of files: without blanks and commas.
@@ -130,7 +127,7 @@ const std::vector<Imperfection>& imperfections() {
     std::vector<Imperfection> made;
     for (const sim::Realism realism : {sim::Realism::real, sim::Realism::harsh}) {
       const std::string level{sim::kRealismNames[static_cast<std::size_t>(realism)]};
-      made.push_back({level, {"--realism", level}, sim::imperfections_of(realism)});
+      made.push_back({level, {"--realism", level}, sim::imperfections_of(realism), {}});
     }
     std::ranges::transform(groups(), std::back_inserter(made), alone);
     return made;

@@ -26,6 +26,7 @@ struct Imperfection {
   std::string name;
   std::vector<std::string> options; ///< of locus-sim
   sim::Imperfections sizes;
+  std::vector<std::string> courses; ///< on which it is tried; none: on all
 };
 const std::vector<Imperfection>& imperfections();
 

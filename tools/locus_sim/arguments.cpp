@@ -142,6 +142,7 @@ std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
   arguments.world = by_name(sim::kWorlds, world);
   arguments.robot = by_name(sim::kRobots, robot);
   arguments.duration = from_seconds(duration_s);
+  arguments.names_vehicle = app.count("--vehicle-s-per-min") > 0;
   arguments.slips = parse_slips(slips, duration_s);
   arguments.sensors.model = *velodyne::model_from_string(model);
   arguments.sensors.return_mode = return_mode == "dual" ? velodyne::ReturnMode::dual : velodyne::ReturnMode::strongest;

@@ -20,6 +20,7 @@ struct SimArguments {
   std::uint64_t seed = 1;
   sim::SensorChoice sensors;
   std::vector<sim::Slip> slips;
+  bool names_vehicle = false;    ///< it is not only part of a realism
   std::optional<double> halts_s; ///< the longest, at every other corner; nothing: the robot's own
   std::filesystem::path output;
 };

@@ -10,6 +10,7 @@
 #include "locus_replay/failure.hpp"
 #include "locus_replay/output_file.hpp"
 #include "locus_replay/progress_bar.hpp"
+#include "locus_replay/say.hpp"
 #include "locus_sim/arguments.hpp"
 #include "locus_sim/capture_writer.hpp"
 #include "locus_sim/folder_sink.hpp"
@@ -35,7 +36,11 @@ void run(const SimArguments& arguments) {
     robot.agility.halts = {.share = 0.5, .longest_s = *arguments.halts_s};
   const sim::Trajectory trajectory =
       sim::drive_about(world, robot, arguments.duration, arguments.slips, arguments.seed);
-  surround(world, robot, trajectory, arguments.sensors.imperfections, arguments.seed);
+  const bool has_room = surround(world, robot, trajectory, arguments.sensors.imperfections, arguments.seed);
+  if (!has_room && arguments.names_vehicle)
+    say("locus-sim", fmt::format("warning: --vehicle-s-per-min: nowhere on this drive is room for a vehicle beside a "
+                                 "{} in --world {}, so none comes; try a wider world, another seed or a longer drive",
+                                 arguments.robot.name, arguments.world.name));
   if (!folder) {
     sim::StreamSink sink;
     write_capture(sink, world.scene, trajectory, arguments.duration, robot.sensors);

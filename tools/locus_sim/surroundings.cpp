@@ -35,16 +35,19 @@ std::vector<Cloud> bursts(const Way& way, double per_min, Dice& dice) {
 
 } // namespace
 
-void surround(World& world, const Robot& robot, const Trajectory& trajectory, const Imperfections& imperfections,
+bool surround(World& world, const Robot& robot, const Trajectory& trajectory, const Imperfections& imperfections,
               std::uint64_t seed) {
   constexpr std::uint64_t kVehicle = 1, kPeople = 2, kSteam = 3, kMirrors = 4; // each has its own dice
   const auto seed_of = [&](std::uint64_t purpose) { return seed + 0x5EED'0000'0000U * purpose; };
+  bool has_room = true;
   const bool moves = imperfections.vehicle_s_per_min > 0 || imperfections.people > 0 || imperfections.steam_per_min > 0;
   if (moves) {
     const Way way(trajectory, robot.reach_m, world.ground_m);
     if (imperfections.vehicle_s_per_min > 0) {
       Dice dice(seed_of(kVehicle));
-      if (auto vehicle = escort(world.scene, way, imperfections.vehicle_s_per_min, dice))
+      auto vehicle = escort(world.scene, way, imperfections.vehicle_s_per_min, dice);
+      has_room = vehicle.has_value();
+      if (vehicle)
         world.scene.add(std::move(*vehicle));
     }
     Dice dice(seed_of(kPeople)), steam_dice(seed_of(kSteam));
@@ -55,6 +58,7 @@ void surround(World& world, const Robot& robot, const Trajectory& trajectory, co
   if (imperfections.wet_floor_percent > 0 || imperfections.glass_percent > 0)
     world.scene.add(
         Mirrors(kPercent * imperfections.wet_floor_percent, kPercent * imperfections.glass_percent, seed_of(kMirrors)));
+  return has_room;
 }
 
 } // namespace locus::sim

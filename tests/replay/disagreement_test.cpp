@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the user is told where sensors contradict each other: that they do, and what it may be; never who is wrong.
+#include <regex>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "simulated_drive.hpp"
+#include "support/errors.hpp"
+#include "support/test_drives.hpp"
+
+namespace locus::test {
+namespace {
+
+/// All that `pattern` finds in a text: its first group.
+std::vector<std::string> found_in(const std::string& text, const std::string& pattern) {
+  const std::regex regex(pattern);
+  std::vector<std::string> found;
+  for (std::sregex_iterator match(text.begin(), text.end(), regex), end; match != end; ++match)
+    found.push_back((*match)[1]);
+  return found;
+}
+
+/// A sentence about a motion source names lidar beside it, and what else may be the cause.
+void expect_blames_nobody(const std::string& sentence) {
+  EXPECT_TRUE(contains(sentence, "and lidar disagree")) << sentence;
+  EXPECT_TRUE(contains(sentence, "(possible causes: ")) << sentence;
+  EXPECT_TRUE(contains(sentence, "stamps") || contains(sentence, "delay")) << sentence;
+  EXPECT_TRUE(contains(sentence, "lidar that follows what moves around the robot") ||
+              contains(sentence, "people or things that move around a robot"))
+      << sentence;
+}
+
+/// Of all that a run says; how many disagreements it tells of.
+std::size_t disagreements_without_blame(const Replay& replay) {
+  EXPECT_EQ(replay.run().status, 0) << replay.run().err;
+  const std::vector<std::string> reasons = found_in(replay.run().out, R"(lost at [0-9.]+ s \(([^)]*)\))");
+  for (const std::string& reason : reasons)
+    EXPECT_TRUE(reason == "disagrees with lidar" || reason == "disagrees with lidar on turns") << reason;
+  for (const std::string& line : lines_of(replay.run().err))
+    expect_blames_nobody(line);
+  for (const auto& [name, source] : replay.summary()["sources"].items()) {
+    if (source.contains("verdict"))
+      expect_blames_nobody(source["verdict"]);
+  }
+  return reasons.size();
+}
+
+/// Every stamp is right but those of the IMU. Simulated once for all tests of a process.
+const SimulatedDrive& late_imu() {
+  static const SimulatedDrive drive("urban", "husky", 80, {"--halts", "12", "--imu-late-ms", "40"}, 2);
+  return drive;
+}
+
+/// Where a replay starts decides whether anybody notices.
+TEST(WrongStamps, OfAnImuAreSaidToBeNobodysFault) {
+  const SimulatedDrive& drive = late_imu();
+  std::size_t disagreements = disagreements_without_blame(drive.replay());
+  for (const std::string start_s : {"20", "24", "48", "50", "56"}) {
+    SCOPED_TRACE(start_s);
+    disagreements += disagreements_without_blame(drive.replay({"--start", start_s, "--duration", "20"}));
+  }
+  EXPECT_GT(disagreements, 0U) << "else nothing was asked";
+}
+
+/// That source and lidar agree again, but for less than the second that it takes to be used.
+TEST(WrongStamps, OfAnImuThatIsYetToBeUsedAtTheEndAreToldInAWarning) {
+  const SimulatedDrive& drive = late_imu();
+  int told = 0;
+  for (const int start_s : {48, 50, 56}) {
+    SCOPED_TRACE(start_s);
+    const auto replay_for = [&](double duration_s) {
+      return drive.replay({"--start", std::to_string(start_s), "--duration", fmt::format("{:.2f}", duration_s)});
+    };
+    const std::vector<std::string> back_s = found_in(replay_for(20).run().out, "imu .*back at ([0-9.]+) s");
+    if (back_s.empty())
+      continue;
+    const Replay cut = replay_for(std::stod(back_s.back()) - start_s - 0.3);
+    EXPECT_GT(disagreements_without_blame(cut), 0U);
+    EXPECT_TRUE(contains(cut.run().err, "motion source imu and lidar disagreed on how the robot turns, and it was not "
+                                        "yet used again at the end (possible causes: "))
+        << cut.run().err;
+    ++told;
+  }
+  EXPECT_GT(told, 0) << "else nothing was asked";
+}
+
+/// Wheels of which all is right but the scale are no worse than lidar, for all that is known.
+TEST(Disagreement, OfWheelsAndLidarIsToldAsOne) {
+  const TemporaryFolder folder;
+  const std::string wheels = folder / "wheels.tum";
+  write_scaled_tum(room_drive() / "wio.tum", 3.0, wheels);
+  const Replay replay({"--odometry", "wio=" + wheels, room_drive().string()});
+  EXPECT_GT(disagreements_without_blame(replay), 0U);
+  EXPECT_FALSE(found_in(replay.run().out, R"((wio .*lost at [0-9.]+ s \(disagrees with lidar\)))").empty())
+      << replay.run().out;
+}
+
+} // namespace
+} // namespace locus::test
