@@ -15,8 +15,8 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "drivers/position_packet.hpp"
-#include "drivers/velodyne_decoder.hpp"
+#include "drivers/velodyne/decoder.hpp"
+#include "drivers/velodyne/position_packet.hpp"
 #include "locus_sim/own_parts.hpp"
 #include "support/returns.hpp"
 
