@@ -6,7 +6,6 @@
 #include <type_traits>
 #include <utility>
 
-#include <pthread.h>
 #include <sys/resource.h>
 
 #include "daemon/machine_time.hpp"
@@ -21,18 +20,12 @@ constexpr Duration kTryAgainAfter = std::chrono::seconds{10};
 } // namespace
 
 Recorder::Recorder(const std::filesystem::path& folder, Config config)
-    : config_(std::move(config)), disk_(folder, config_.record.max_bytes) {
+    : config_(std::move(config)), disk_(folder, config_.record.max_bytes),
+      worker_(
+          "recorder", kRound, [this] { write_waiting(); }, [this] { begin(); }) {
   const auto files = sample_files(config_);
   for (std::size_t i = 0; i < files.size(); ++i)
     has_file_[i] = files[i].has_value();
-  thread_ = std::thread([this] { run(); });
-  pthread_setname_np(thread_.native_handle(), "recorder");
-}
-
-Recorder::~Recorder() {
-  stopping_.store(true, std::memory_order_relaxed);
-  wakeup_.notify();
-  thread_.join();
 }
 
 void Recorder::take(const Input& input) noexcept {
@@ -57,15 +50,10 @@ Recorder::Status Recorder::status() const {
   return status;
 }
 
-void Recorder::run() {
+void Recorder::begin() {
   constexpr int kLeastPriority = 19;
   setpriority(PRIO_PROCESS, 0, kLeastPriority); // of this thread alone, on Linux
   problem_ = disk_.obstacle().value_or("");     // before anything is lost by it
-  while (!stopping_.load(std::memory_order_relaxed)) {
-    wakeup_.wait_for(kRound);
-    write_waiting();
-  }
-  write_waiting(); // what was taken before it was told to stop
 }
 
 /// Not more than fit the ring: what comes in meanwhile waits for the next round.

@@ -11,7 +11,6 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <variant>
 
 #include "config/config.hpp"
@@ -20,7 +19,7 @@
 #include "daemon/input.hpp"
 #include "daemon/piece_writer.hpp"
 #include "daemon/spsc_ring.hpp"
-#include "daemon/wakeup.hpp"
+#include "daemon/worker.hpp"
 #include "drivers/velodyne/model.hpp"
 
 namespace locus::daemon {
@@ -45,12 +44,8 @@ class Recorder {
     std::string problem;        ///< why nothing can be recorded; empty while all is well
   };
 
-  /// Begins a run with the first input.
+  /// Begins a run with the first input. When it is destroyed, it first writes what it has taken.
   Recorder(const std::filesystem::path& folder, Config config);
-  /// What has been taken is written first.
-  ~Recorder();
-  Recorder(const Recorder&) = delete;
-  Recorder& operator=(const Recorder&) = delete;
 
   /// Producer: datagrams and motion samples; other inputs are none of a sensor's. Takes no lock, allocates nothing.
   void take(const Input& input) noexcept;
@@ -69,7 +64,7 @@ class Recorder {
   };
   using Entry = std::variant<ImuInput, OdometryInput, StoredDatagram>;
 
-  void run();
+  void begin();
   void write_waiting();
   void write(const Entry& entry);
   bool begin_piece(Stamp now);
@@ -93,9 +88,7 @@ class Recorder {
 
   mutable std::mutex status_mutex_; ///< never taken by the producer
   Status status_;
-  Wakeup wakeup_;
-  std::atomic<bool> stopping_{false};
-  std::thread thread_;
+  Worker worker_;
 };
 
 /// Inputs on their way to the ingest, a copy of each left with a recorder. One owner.

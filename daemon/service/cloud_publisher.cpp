@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <utility>
 
-#include <pthread.h>
-
 namespace locus::daemon {
 
 namespace {
@@ -38,17 +36,8 @@ void map_points(const SurfaceGrid& grid, std::vector<CloudMessage::Point>& out) 
 } // namespace
 
 CloudPublisher::CloudPublisher(DdsOptions options, RosLink& link) : options_(std::move(options)), link_(link) {
-  if (!options_.publish_cloud && !options_.publish_map)
-    return;
-  thread_ = std::thread([this] { run(); });
-  pthread_setname_np(thread_.native_handle(), "clouds");
-}
-
-CloudPublisher::~CloudPublisher() {
-  stopping_.store(true, std::memory_order_relaxed);
-  wakeup_.notify();
-  if (thread_.joinable())
-    thread_.join();
+  if (options_.publish_cloud || options_.publish_map)
+    worker_.emplace("clouds", std::chrono::milliseconds{100}, [this] { publish(); });
 }
 
 void CloudPublisher::take(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
@@ -62,18 +51,15 @@ void CloudPublisher::take(const Sweep& sweep, const Odometry& odometry, const Od
     map_.back().stamp = map_published_ = estimate.stamp;
     static_cast<void>(map_.publish());
   }
-  if (thread_.joinable())
-    wakeup_.notify();
+  if (worker_)
+    worker_->notify();
 }
 
-void CloudPublisher::run() {
-  while (!stopping_.load(std::memory_order_relaxed)) {
-    if (const Cloud* sweep = sweep_.take())
-      link_.publish_cloud(sweep->points, sweep->stamp);
-    if (const Cloud* map = map_.take())
-      link_.publish_map(map->points, map->stamp);
-    wakeup_.wait_for(std::chrono::milliseconds{100});
-  }
+void CloudPublisher::publish() {
+  if (const Cloud* sweep = sweep_.take())
+    link_.publish_cloud(sweep->points, sweep->stamp);
+  if (const Cloud* map = map_.take())
+    link_.publish_map(map->points, map->stamp);
 }
 
 } // namespace locus::daemon

@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <atomic>
 #include <optional>
-#include <thread>
 #include <vector>
 
 #include "config/config.hpp"
 #include "core/odometry/odometry.hpp"
 #include "daemon/dds/ros_link.hpp"
 #include "daemon/latest_slot.hpp"
-#include "daemon/wakeup.hpp"
+#include "daemon/worker.hpp"
 
 namespace locus::daemon {
 
@@ -20,9 +18,6 @@ class CloudPublisher {
  public:
   /// `link` must outlive this. Idle where the configuration asks for neither.
   CloudPublisher(DdsOptions options, RosLink& link);
-  ~CloudPublisher();
-  CloudPublisher(const CloudPublisher&) = delete;
-  CloudPublisher& operator=(const CloudPublisher&) = delete;
 
   /// Producer, one thread: what is worth publishing of a sweep that was processed.
   void take(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate);
@@ -33,15 +28,13 @@ class CloudPublisher {
     Stamp stamp;
   };
 
-  void run();
+  void publish();
 
   DdsOptions options_;
   RosLink& link_;
   LatestSlot<Cloud> sweep_, map_;
   Stamp map_published_; ///< of the producer
-  Wakeup wakeup_;
-  std::atomic<bool> stopping_{false};
-  std::thread thread_;
+  std::optional<Worker> worker_;
 };
 
 } // namespace locus::daemon

@@ -17,7 +17,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <pthread.h>
 #include <unistd.h>
 
 namespace locus::daemon {
@@ -203,21 +202,10 @@ StateKeeper::StateKeeper(std::optional<std::filesystem::path> file, Complain com
   begin();
 }
 
-StateKeeper::~StateKeeper() { end(); }
-
 void StateKeeper::begin() {
-  if (!file_)
-    return;
-  stopping_.store(false, std::memory_order_relaxed);
-  thread_ = std::thread([this] { run(); });
-  pthread_setname_np(thread_.native_handle(), "state");
-}
-
-void StateKeeper::end() {
-  stopping_.store(true, std::memory_order_relaxed);
-  wakeup_.notify();
-  if (thread_.joinable())
-    thread_.join();
+  written_.reset();
+  if (file_)
+    worker_.emplace("state", std::chrono::milliseconds{500}, [this] { write(); });
 }
 
 /// A clock that was set back does not put it off.
@@ -227,7 +215,7 @@ bool StateKeeper::is_due() const {
 }
 
 void StateKeeper::begin_anew(const std::optional<SavedState>& start) {
-  end();
+  worker_.reset();
   now_.reset();
   saved_.reset();
   static_cast<void>(states_.take()); // of the time before
@@ -258,24 +246,20 @@ void StateKeeper::take(const Odometry& odometry, const OdometryEstimate& estimat
   }
   whereabouts_.back() = {number_, *now_};
   static_cast<void>(whereabouts_.publish());
-  wakeup_.notify();
+  worker_->notify();
 }
 
 /// The whereabouts are taken first: the state that they belong to is then there, or has been written.
-void StateKeeper::run() {
-  std::optional<std::uint64_t> written; ///< number of the state that lies in the file
-  while (!stopping_.load(std::memory_order_relaxed)) {
-    wakeup_.wait_for(std::chrono::milliseconds{500});
-    const Update* const update = whereabouts_.take();
-    if (const Due* const due = states_.take()) {
-      const auto problem = write_state(*file_, due->state);
-      written = problem ? std::nullopt : std::optional{due->number};
-      if (problem)
-        complain_(*problem);
-    }
-    if (update != nullptr && update->number == written)
-      update_whereabouts(*file_, update->last);
+void StateKeeper::write() {
+  const Update* const update = whereabouts_.take();
+  if (const Due* const due = states_.take()) {
+    const auto problem = write_state(*file_, due->state);
+    written_ = problem ? std::nullopt : std::optional{due->number};
+    if (problem)
+      complain_(*problem);
   }
+  if (update != nullptr && update->number == written_)
+    update_whereabouts(*file_, update->last);
 }
 
 } // namespace locus::daemon

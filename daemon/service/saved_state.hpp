@@ -1,19 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <atomic>
 #include <filesystem>
 #include <functional>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "core/base/expected.hpp"
 #include "core/odometry/odometry.hpp"
 #include "daemon/latest_slot.hpp"
 #include "daemon/sweep_processor.hpp"
-#include "daemon/wakeup.hpp"
+#include "daemon/worker.hpp"
 
 namespace locus::daemon {
 
@@ -63,9 +61,6 @@ class StateKeeper {
 
   /// Without a file it does nothing.
   StateKeeper(std::optional<std::filesystem::path> file, Complain complain);
-  ~StateKeeper();
-  StateKeeper(const StateKeeper&) = delete;
-  StateKeeper& operator=(const StateKeeper&) = delete;
 
   /// Producer, one thread: after every estimate.
   void take(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground);
@@ -89,8 +84,7 @@ class StateKeeper {
   };
 
   void begin();
-  void end();
-  void run();
+  void write();
   [[nodiscard]] bool is_due() const;
 
   std::optional<std::filesystem::path> file_;
@@ -99,9 +93,8 @@ class StateKeeper {
   LatestSlot<Update> whereabouts_;
   std::optional<Whereabouts> now_, saved_; ///< after the last estimate, and of the state taken last; of the producer
   std::uint64_t number_ = 0;               ///< of the state handed over last; of the producer
-  Wakeup wakeup_;
-  std::atomic<bool> stopping_{false};
-  std::thread thread_;
+  std::optional<std::uint64_t> written_;   ///< number of the state that lies in the file; of the worker
+  std::optional<Worker> worker_;
 };
 
 } // namespace locus::daemon
