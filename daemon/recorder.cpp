@@ -124,7 +124,7 @@ void Recorder::end_piece() {
 /// A piece that the disk does not take is ended where it is. Who is told to stop does not wait for the disk: the system
 /// has it all.
 void Recorder::flush(bool to_disk) {
-  const bool waits = to_disk && !stopping_.load(std::memory_order_relaxed);
+  const bool waits = to_disk && !worker_.stopping();
   const std::optional<std::string> problem = piece_->flush(waits);
   const std::uint64_t inputs = std::exchange(unflushed_, 0);
   problem_ = problem.value_or("");

@@ -11,7 +11,7 @@ Worker::Worker(const char* name, Duration period, std::function<void()> round, s
     : thread_([this, period, round = std::move(round), begin = std::move(begin)] {
         if (begin)
           begin();
-        while (!stopping_.load(std::memory_order_relaxed)) {
+        while (!stopping()) {
           wakeup_.wait_for(period);
           round();
         }

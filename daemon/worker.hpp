@@ -24,6 +24,9 @@ class Worker {
 
   void notify() noexcept { wakeup_.notify(); }
 
+  /// In a round: whether its owner waits for it to end.
+  [[nodiscard]] bool stopping() const { return stopping_.load(std::memory_order_relaxed); }
+
  private:
   Wakeup wakeup_;
   std::atomic<bool> stopping_{false};

@@ -435,7 +435,7 @@ TEST(Odometry, BeginsLevelByGravityAndWithoutYaw) {
   std::vector<Sweep> sweeps = sweeps_of(sim::room(), trajectory, RobotSetup{}, milliseconds{250});
   ASSERT_FALSE(sweeps.empty());
   const Eigen::Vector3d rpy_rad{5 * kRadPerDeg, -3 * kRadPerDeg, 0.0};
-  sweeps.front().specific_force_base_mps2 = from_rpy_rad(rpy_rad).conjugate() * Eigen::Vector3d{0, 0, 9.80665};
+  sweeps.front().motion.specific_force_base_mps2 = from_rpy_rad(rpy_rad).conjugate() * Eigen::Vector3d{0, 0, 9.80665};
   const OdometryEstimate estimate = Odometry(OdometryOptions{}).process(sweeps.front());
   EXPECT_EQ(estimate.T_odom_base.translation, Eigen::Vector3d::Zero());
   EXPECT_LT((to_rpy_rad(estimate.T_odom_base.rotation) - rpy_rad).norm(), 1e-9);
@@ -444,7 +444,7 @@ TEST(Odometry, BeginsLevelByGravityAndWithoutYaw) {
 TEST(Odometry, AnAcceleratingRobotIsNotLevelledByWhatIsNotGravity) {
   const sim::Trajectory trajectory(sim::Course{}.stand(seconds{1}));
   std::vector<Sweep> sweeps = sweeps_of(sim::room(), trajectory, RobotSetup{}, milliseconds{250});
-  sweeps.front().specific_force_base_mps2 = Eigen::Vector3d{6.0, 0, 9.80665};
+  sweeps.front().motion.specific_force_base_mps2 = Eigen::Vector3d{6.0, 0, 9.80665};
   EXPECT_EQ(Odometry(OdometryOptions{}).process(sweeps.front()).T_odom_base, Pose{});
 }
 
