@@ -104,6 +104,16 @@ TEST(AccuracyPage, WithoutARecordingItSaysWhatItLookedFor) {
   EXPECT_EQ(accuracy({folder / "nowhere", "-o", folder / "out"}).status, 1);
 }
 
+TEST(AccuracyPage, OfNothingThatCanBeReplayedIsAFailure) {
+  const TemporaryFolder folder;
+  std::ofstream{folder / "garbage.pcap"} << "no capture at all";
+  const ProgramRun run = accuracy({folder.path(), "-o", folder / "out"});
+  EXPECT_EQ(run.status, 1);
+  EXPECT_EQ(lines_of(run.err).size(), 1U) << run.err;
+  EXPECT_NE(run.err.find("no recording could be replayed"), std::string::npos) << run.err;
+  EXPECT_NE(read_text(folder / "out/accuracy.md").find("| garbage.pcap | "), std::string::npos);
+}
+
 TEST(AccuracyPage, WrongUsageIsExplainedInOneLine) {
   for (const std::vector<std::string>& arguments : {std::vector<std::string>{"--accuracy", "-o", "/tmp/x"},
                                                     {"--accuracy", "--faults", "-o", "/tmp/x"},

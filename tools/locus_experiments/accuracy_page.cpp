@@ -143,7 +143,7 @@ Results runs_on(const std::string& replay, const FoundRecording& recording, cons
 Task task_of_recording(const Arguments& arguments, const FoundRecording& recording, const Programs& programs,
                        Results& entry) {
   entry = {{"recording", recording.name}};
-  return {"replayed " + recording.name, 1, false, [=, &arguments, &entry] {
+  return {"looked at " + recording.name, 1, false, [=, &arguments, &entry] {
             entry["receiver"] = receiver_speed(recording.where);
             entry["runs"] = runs_on(programs.replay, recording, arguments.output / "runs" / recording.name);
           }};

@@ -70,14 +70,14 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
                               "Every fault of every input, from the start and mid-drive, in their place: matrix.md")
                      ->excludes(recordings)
                      ->excludes(faults);
-  auto* harsh =
-      app.add_flag("--harsh", arguments.harsh,
-                   "Every course in a real and in a harsh world, and each imperfection alone, from ten starts, with "
-                   "all sensors, lidar and IMU, lidar alone: harsh.md")
-          ->excludes(recordings)
-          ->excludes(faults)
-          ->excludes(matrix)
-          ->excludes(realism);
+  auto* harsh = app.add_flag("--harsh", arguments.harsh,
+                             "Every course in a real and in a harsh world, and each group of imperfections alone, from "
+                             "ten starts, with "
+                             "all sensors, lidar and IMU, lidar alone: harsh.md")
+                    ->excludes(recordings)
+                    ->excludes(faults)
+                    ->excludes(matrix)
+                    ->excludes(realism);
   app.add_option("--only", arguments.only,
                  "Of --harsh the rows whose COURSE/IMPERFECTION holds this, as in corridor/people")
       ->type_name("TEXT")
@@ -125,6 +125,7 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
              "  locus-experiments --faults --duration 120 -o faults\n"
              "  locus-experiments --fault-matrix --duration 120 -o matrix\n"
              "  locus-experiments --harsh --seeds 1 -o harsh\n"
+             "  locus-experiments --harsh --only plant/real --duration 40 --seeds 1 -o small\n"
              "  locus-experiments --merge faults --compare before/results.json -o compared\n"
              "  locus-experiments --accuracy -o accuracy recordings/");
   if (!tools::parse_command_line(app, argc, argv))

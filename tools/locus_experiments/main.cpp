@@ -239,6 +239,10 @@ std::string failures_in(const Results& results) {
       lines += fmt::format("{}{}/{}: {}", lines.empty() ? "" : "\n", run.at("course").get<std::string>(),
                            run.at("configuration").get<std::string>(), run.at("failed").get<std::string>());
   }
+  const Results recordings = results.value("recordings", Results::array()); // those of --accuracy
+  const auto failed = [](const Results& recording) { return recording.at("runs").front().contains("failed"); };
+  if (!recordings.empty() && std::ranges::all_of(recordings, failed))
+    lines = "no recording could be replayed; accuracy.md says of each why not";
   return lines;
 }
 

@@ -53,7 +53,7 @@ void run(const SimArguments& arguments) {
   write_truth_map(*map, world.scene, seen);
   bar.wipe();
   const daemon::MachineTime spent = daemon::MachineTime::now() - begin;
-  fmt::print("{}: {:.0f} m in {:.0f} s, {:.0f} times faster than that on one core ({:.1f} s)\n",
+  fmt::print("{}: {:.0f} m in {:.0f} s, {:.1f} times faster than that on one core ({:.1f} s)\n",
              arguments.output.string(), trajectory.length_m(), to_seconds(arguments.duration),
              to_seconds(arguments.duration) / to_seconds(spent.cpu), to_seconds(spent.cpu));
 }
