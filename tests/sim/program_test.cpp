@@ -169,7 +169,7 @@ TEST(LocusSim, LevelsOfRealismAreTheSizesOfTheirImperfections) {
   simulate("harsh_by_name", harsh);
   simulate("clean", {"--realism", "clean"});
   for (const std::string file : {"lidar.pcap", "imu.csv", "vio.tum", "kio.tum", "gt.tum", "config.yaml"}) {
-    const auto bytes = [&](const std::string& name) { return read_text(folder / (name + "/" + file)); };
+    const auto bytes = [&](const std::string& name) { return read_text(folder / name / file); };
     EXPECT_FALSE(bytes("real").empty()) << file;
     EXPECT_TRUE(bytes("default") == bytes("real")) << file;
     EXPECT_TRUE(bytes("real_by_name") == bytes("real")) << file;

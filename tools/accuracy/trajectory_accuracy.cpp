@@ -110,7 +110,8 @@ std::optional<TrajectoryAccuracy> trajectory_accuracy(std::span<const StampedPos
 }
 
 std::optional<WayDrift> way_drift(std::span<const StampedPose> estimates, std::span<const StampedPose> truth) {
-  constexpr double kShortest_m = 100, kLongest_m = 800, kMetresPerUnit = 100;
+  constexpr int kShortest_m = 100, kLongest_m = 800;
+  constexpr double kMetresPerUnit = 100;
   constexpr std::size_t kEvery = 10;
   const std::vector<PosePair> pairs = paired(estimates, truth);
   if (pairs.empty())
@@ -119,7 +120,7 @@ std::optional<WayDrift> way_drift(std::span<const StampedPose> estimates, std::s
   for (std::size_t i = 1; i < pairs.size(); ++i)
     drift.way_m += (pairs[i].T_truth_base.translation - pairs[i - 1].T_truth_base.translation).norm();
   double percent = 0, deg_per_100m = 0, count = 0;
-  for (double length_m = kShortest_m; length_m <= kLongest_m; length_m += kShortest_m) {
+  for (int length_m = kShortest_m; length_m <= kLongest_m; length_m += kShortest_m) {
     for (const Stretch& stretch : stretches_of(pairs, length_m)) {
       if (stretch.begin % kEvery != 0)
         continue;

@@ -103,7 +103,7 @@ std::string why_no_data(const Recording& recording, const LidarRouter& lidars) {
   const std::map<std::uint16_t, PortTraffic>& traffic = recording.traffic();
   if (traffic.empty())
     return without_datagrams(recording.source());
-  if (const std::string maker = other_makers(traffic); !maker.empty())
+  if (std::string maker = other_makers(traffic); !maker.empty())
     return maker;
   const auto& [port, busiest] = *std::ranges::max_element(
       traffic, {}, [](const auto& entry) { return std::pair(entry.second.data_packet_sized, entry.second.datagrams); });

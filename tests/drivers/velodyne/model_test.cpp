@@ -82,7 +82,7 @@ TEST(VelodyneModel, Vls128OfLaterFirmwareFiresAtASlowerPace) {
   EXPECT_EQ(packet_duration(Model::vls128, ReturnMode::strongest, Pace::slower), nanoseconds{3 * 55'277});
   EXPECT_EQ(packet_duration(Model::vls128, ReturnMode::dual, Pace::slower), nanoseconds{55'277});
   const auto firings = spec(Model::vls128, Pace::slower).firings();
-  EXPECT_EQ(firings[3 * 8].offset_ns, 3 * 2'890) << "the fourth group, which the stamp names: 8.7 us";
+  EXPECT_EQ(firings[24].offset_ns, 3 * 2'890) << "the fourth group, which the stamp names: 8.7 us";
   EXPECT_EQ(firings[127].offset_ns, 16 * 2'890);
   EXPECT_EQ(&spec(Model::vlp16, Pace::slower), &spec(Model::vlp16));
 }
