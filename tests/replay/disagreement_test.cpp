@@ -41,7 +41,8 @@ std::size_t disagreements_without_blame(const Replay& replay) {
     EXPECT_TRUE(reason == "disagrees with lidar" || reason == "disagrees with lidar on turns") << reason;
   for (const std::string& line : lines_of(replay.run().err))
     expect_blames_nobody(line);
-  for (const auto& [name, source] : replay.summary()["sources"].items()) {
+  const nlohmann::json summary = replay.summary();
+  for (const auto& [name, source] : summary["sources"].items()) {
     if (source.contains("verdict"))
       expect_blames_nobody(source["verdict"]);
   }
