@@ -175,7 +175,7 @@ TEST_F(BadCapture, OfAnotherMakersLidarIsSaidWithTheMaker) {
     payload[0] = std::byte(first);
     payload[1] = std::byte(second);
     for (int i = 0; i < 20; ++i)
-      pcap.write(stamp_from_ns(1'700'000'000'000'000'000 + 1'000'000 * i), UdpAddresses{.destination_port = port},
+      pcap.write(stamp_from_ns(1'700'000'000'000'000'000 + 1'000'000LL * i), UdpAddresses{.destination_port = port},
                  payload);
   };
   write(2368, 1080, 0xEE, 0xFF);

@@ -190,6 +190,7 @@ Results accuracy_of(const Arguments& arguments, const std::vector<FoundRecording
                     const std::vector<Course>& drives, const Programs& programs) {
   std::vector<Results> entries(recordings.size() + drives.size());
   std::vector<Task> tasks;
+  tasks.reserve(entries.size());
   auto entry = entries.begin();
   for (const FoundRecording& recording : recordings)
     tasks.push_back(task_of_recording(arguments, recording, programs, *entry++));

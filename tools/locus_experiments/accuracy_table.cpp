@@ -230,7 +230,7 @@ std::vector<std::string> what_does_not_hold(const Results& run) {
   if (off_m > std::max(kAllowed_m, kAllowedShare * way_m))
     broken.push_back(fmt::format("off by {} m", number(off_m)));
   if (sigma > kAllowedSigma)
-    broken.push_back("farther off than it says");
+    broken.emplace_back("farther off than it says");
   if (failed + dropped > 0)
     broken.push_back(fmt::format("{} sweep{} failed", failed + dropped, failed + dropped == 1 ? "" : "s"));
   return broken;

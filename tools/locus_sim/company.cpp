@@ -29,13 +29,15 @@ Eigen::Vector2d at_most(const Eigen::Vector2d& v, double norm) {
 /// One of those about the robot, step by step.
 class Person {
  public:
-  Person(const Scene& scene, const Way& way, Dice& dice) : scene_(scene), way_(way), dice_(dice) {
-    clear_m_ = way.reach_m + kPersonalSpace_m + 0.03; // between two steps they come a little nearer
-    strolls_ = dice.chance(0.5);
+  Person(const Scene& scene, const Way& way, Dice& dice)
+      : scene_(scene), way_(way), dice_(dice),
+        clear_m_(way.reach_m + kPersonalSpace_m + 0.03), // between two steps they come a little nearer
+        strolls_(dice.chance(0.5)) {
     choose_bearing(0);
     bearing_rad_ = goal_rad_;
     at_m_ = wanted_place(0);
-    yaw_rad_ = dice.between(-std::numbers::pi, std::numbers::pi);
+    yaw_rad_ = // NOLINT(cppcoreguidelines-prefer-member-initializer): the bearing has thrown the dice before
+        dice.between(-std::numbers::pi, std::numbers::pi);
     places_.reserve(way.steps());
     note(0);
   }
@@ -190,7 +192,7 @@ class Person {
   const Way& way_;
   Dice& dice_;
   double clear_m_;         ///< from the robot's middle
-  bool strolls_ = false;   ///< about the robot; others stay on their side of it
+  bool strolls_;           ///< about the robot; others stay on their side of it
   bool waits_ = false;     ///< for the robot to come
   double bearing_rad_ = 0; ///< from the robot, of where he wants to be, as the next three
   double goal_rad_ = 0;
@@ -234,6 +236,7 @@ std::vector<Passer> company(const Scene& scene, const Way& way, std::size_t coun
     }
   }
   std::vector<Passer> passers;
+  passers.reserve(people.size());
   for (Person& person : people)
     passers.emplace_back(Passer::Kind::person, std::make_shared<Track>(std::move(person).places(), false), way.begin);
   return passers;

@@ -173,14 +173,12 @@ class Driver {
 
   [[nodiscard]] bool is_open(const Eigen::Vector2d& from, const Eigen::Vector2d& to) const {
     const Eigen::Vector2d way = to - from;
-    for (const double height_m : {0.4, 1.2}) {
+    return std::ranges::all_of(std::array{0.4, 1.2}, [&](double height_m) {
       const Eigen::Vector3d begin = way_.on_ground(from) + Eigen::Vector3d{0, 0, height_m};
       const Eigen::Vector3d end = way_.on_ground(to) + Eigen::Vector3d{0, 0, height_m};
       const double length_m = (end - begin).norm();
-      if (way.norm() > 1e-6 && scene_.cast({begin, (end - begin) / length_m}, length_m, way_.begin))
-        return false;
-    }
-    return true;
+      return way.norm() <= 1e-6 || !scene_.cast({begin, (end - begin) / length_m}, length_m, way_.begin);
+    });
   }
 
   /// It comes to where it waits, and goes from where it stops, when the robot cannot see it: until then it stands.

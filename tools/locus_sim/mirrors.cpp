@@ -116,7 +116,7 @@ bool Mirrors::is_glass(const Hit& hit, std::size_t surface_index) const {
 
 /// Twice through the film there, twice back; and the ground below it looks darker.
 std::optional<Hit> Mirrors::on_water(const Ray& ray, const Hit& water, double max_range_m, double chance,
-                                     const Cast& cast) const {
+                                     const Cast& cast) {
   const double mirrored = mirrored_share(water.cos_incidence, kWater), through = 1 - mirrored;
   const Eigen::Vector3d up = Eigen::Vector3d::UnitZ(); // water lies level on rough ground too
   return stronger(water, kWetDarker * through * through * water.reflectivity, ghost(ray, water, up, max_range_m, cast),
@@ -125,7 +125,7 @@ std::optional<Hit> Mirrors::on_water(const Ray& ray, const Hit& water, double ma
 
 /// Both faces of a pane mirror, and what goes through is lost. Straight on it dazzles.
 std::optional<Hit> Mirrors::on_glass(const Ray& ray, const Hit& pane, double max_range_m, double chance,
-                                     const Cast& cast) const {
+                                     const Cast& cast) {
   const double face = mirrored_share(pane.cos_incidence, kPane), mirrored = 2 * face / (1 + face);
   const double own = pane.cos_incidence > kStraightOn ? kGlare : kDirt;
   return stronger(pane, own, ghost(ray, pane, pane.normal, max_range_m, cast), mirrored * mirrored, chance);

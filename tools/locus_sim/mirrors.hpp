@@ -23,10 +23,10 @@ class Mirrors {
   /// What the lidar sees where its ray meets such a surface: the surface itself, what is mirrored in it (as if it lay
   /// behind, as far along the ray as the light goes), or nothing. `cast` tells what a ray meets.
   using Cast = std::function<std::optional<Hit>(const Ray& ray, double max_range_m)>;
-  [[nodiscard]] std::optional<Hit> on_water(const Ray& ray, const Hit& water, double max_range_m, double chance,
-                                            const Cast& cast) const;
-  [[nodiscard]] std::optional<Hit> on_glass(const Ray& ray, const Hit& pane, double max_range_m, double chance,
-                                            const Cast& cast) const;
+  [[nodiscard]] static std::optional<Hit> on_water(const Ray& ray, const Hit& water, double max_range_m, double chance,
+                                                   const Cast& cast);
+  [[nodiscard]] static std::optional<Hit> on_glass(const Ray& ray, const Hit& pane, double max_range_m, double chance,
+                                                   const Cast& cast);
 
   [[nodiscard]] std::uint64_t seed() const { return seed_; }
 

@@ -321,19 +321,19 @@ std::optional<Hit> Scene::in_mirror(const Ray& ray, const Hit& solid, double max
     return cast_at_solid(mirrored, range_m, stamp, nullptr);
   };
   if (mirrors_->is_wet(ray, solid))
-    return mirrors_->on_water(ray, solid, max_range_m, dice.uniform(), cast);
+    return Mirrors::on_water(ray, solid, max_range_m, dice.uniform(), cast);
   if (mirrors_->is_glass(solid, static_cast<std::size_t>(solid.surface - surfaces_.data())))
-    return mirrors_->on_glass(ray, solid, max_range_m, dice.uniform(), cast);
+    return Mirrors::on_glass(ray, solid, max_range_m, dice.uniform(), cast);
   return solid;
 }
 
 std::optional<Hit> Scene::cast(const Ray& ray, double max_range_m, Stamp stamp, const Surface* guess) const {
-  const std::optional<Hit> solid = cast_at_solid(ray, max_range_m, stamp, guess);
+  std::optional<Hit> solid = cast_at_solid(ray, max_range_m, stamp, guess);
   const bool may_mirror = mirrors_ && solid && solid->surface != nullptr;
   if (!may_mirror && steam_.clouds().empty())
     return solid;
   QuickDice dice = dice_of(ray, stamp);
-  if (const auto steam = through_steam(ray, solid, max_range_m, stamp, dice))
+  if (auto steam = through_steam(ray, solid, max_range_m, stamp, dice))
     return steam;
   return may_mirror ? in_mirror(ray, *solid, max_range_m, stamp, dice) : solid;
 }
