@@ -140,11 +140,13 @@ TEST(LocusSim, TakesAFifthOfTheTimeThatItSimulatesAtMost) {
   }
 }
 
-TEST(LocusSim, TakesAQuarterOfTheTimeThatItSimulatesAtMostWithAllImperfections) {
+/// Rays to the sides of a beam, people, mirrors. Beside a clean drive of the same run: a share of the time that is
+/// simulated would be that of one machine.
+TEST(LocusSim, TakesFourTimesAsLongAtMostInARealWorldAsInACleanOne) {
   for (const std::string world : {"urban", "tunnel"}) {
-    const double took_s = cpu_of_a_minute_s(world, "real");
-    EXPECT_LT(took_s, 60.0 / 4) << world;
-    RecordProperty(world + "_real_cpu_ms", static_cast<int>(1e3 * took_s));
+    const double clean_s = cpu_of_a_minute_s(world, "clean"), real_s = cpu_of_a_minute_s(world, "real");
+    EXPECT_LT(real_s, 4 * clean_s) << world;
+    RecordProperty(world + "_real_cpu_ms", static_cast<int>(1e3 * real_s));
   }
 }
 

@@ -6,9 +6,14 @@
 namespace locus::sim {
 namespace {
 
-/// A limb that hangs from a joint.
-Surface limb(const Eigen::Vector3d& joint_m, double radius_m, double length_m, double swing_rad, std::uint8_t bright) {
-  return {Cylinder{joint_m, radius_m, length_m, {std::sin(swing_rad), 0, -std::cos(swing_rad)}}, bright};
+/// Two limbs that hang from joints on both sides and swing against each other.
+struct Limbs {
+  Surface left, right;
+};
+Limbs limbs(double aside_m, double up_m, double radius_m, double length_m, double swing_rad, std::uint8_t bright) {
+  const double s = std::sin(swing_rad), c = std::cos(swing_rad);
+  return {{Cylinder{{0, aside_m, up_m}, radius_m, length_m, {s, 0, -c}}, bright},
+          {Cylinder{{0, -aside_m, up_m}, radius_m, length_m, {-s, 0, -c}}, bright}};
 }
 
 /// By the middle of its floor and its size.
@@ -33,12 +38,14 @@ std::vector<Surface> standing_person() {
 }
 
 std::vector<Surface> walking_person(double swing_rad) {
+  const Limbs legs = limbs(0.1, 0.87, 0.07, 0.85, swing_rad, 25);
+  const Limbs arms = limbs(0.24, 1.42, 0.045, 0.62, -0.8 * swing_rad, 60);
   return {{Cylinder{{0, 0, 0.8}, 0.19, 0.65}, 60},
           {Sphere{{0, 0, 1.62}, 0.12}, 45},
-          limb({0, 0.1, 0.87}, 0.07, 0.85, swing_rad, 25),
-          limb({0, -0.1, 0.87}, 0.07, 0.85, -swing_rad, 25),
-          limb({0, 0.24, 1.42}, 0.045, 0.62, -0.8 * swing_rad, 60),
-          limb({0, -0.24, 1.42}, 0.045, 0.62, 0.8 * swing_rad, 60)};
+          legs.left,
+          legs.right,
+          arms.left,
+          arms.right};
 }
 
 std::vector<Surface> forklift(double yaw_rad) {
