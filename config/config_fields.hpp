@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <string_view>
-#include <utility>
 
 #include "config/config.hpp"
 #include "drivers/velodyne/model.hpp"
@@ -15,42 +14,11 @@
 /// otherwise than the struct does, fields() converts before the key and back after it.
 namespace locus {
 
-template <class E> using EnumName = std::pair<std::string_view, E>;
-
-/// The words of an enumeration. YAML 1.1 tools rewrite a plain off or on as false or true: both are understood where
-/// they may occur, the first word is the one that is written.
+/// The other enumerations have their words beside them.
 inline auto names_of(velodyne::Model) {
-  std::array<EnumName<velodyne::Model>, velodyne::kModels.size()> names;
-  std::transform(velodyne::kModels.begin(), velodyne::kModels.end(), names.begin(), [](velodyne::Model model) {
-    return EnumName<velodyne::Model>{to_string(model), model};
-  });
+  std::array<std::string_view, velodyne::kModels.size()> names;
+  std::ranges::transform(velodyne::kModels, names.begin(), [](velodyne::Model model) { return to_string(model); });
   return names;
-}
-constexpr auto names_of(LidarTime) {
-  using enum LidarTime;
-  return std::to_array<EnumName<LidarTime>>({{"auto", automatic}, {"sensor", sensor}, {"receive", receive}});
-}
-constexpr auto names_of(SourceKind) {
-  using enum SourceKind;
-  return std::to_array<EnumName<SourceKind>>({{"imu", imu}, {"odometry", odometry}});
-}
-constexpr auto names_of(Fusion) {
-  using enum Fusion;
-  return std::to_array<EnumName<Fusion>>({{"combined", combined}, {"queue", queue}});
-}
-constexpr auto names_of(NoSourcePrior) {
-  using enum NoSourcePrior;
-  return std::to_array<EnumName<NoSourcePrior>>({{"constant_velocity", constant_velocity}, {"identity", identity}});
-}
-constexpr auto names_of(ScanToScanMode) {
-  using enum ScanToScanMode;
-  return std::to_array<EnumName<ScanToScanMode>>(
-      {{"always", always}, {"auto", automatic}, {"off", off}, {"false", off}});
-}
-constexpr auto names_of(FlatGround) {
-  using enum FlatGround;
-  return std::to_array<EnumName<FlatGround>>(
-      {{"off", off}, {"on", on}, {"auto", automatic}, {"false", off}, {"true", on}});
 }
 
 /// An address as dotted text.

@@ -62,17 +62,17 @@ requires std::is_arithmetic_v<T> Reason parse(const YAML::Node& node, T& value) 
   return std::nullopt;
 }
 
+/// YAML 1.1 tools rewrite a plain off or on as false or true.
 template <class E>
 requires std::is_enum_v<E> Reason parse(const YAML::Node& node, E& value) {
-  std::string words;
-  for (const auto& [word, enumerator] : names_of(value)) {
-    if (node.IsScalar() && node.Scalar() == word) {
-      value = enumerator;
-      return std::nullopt;
-    }
-    words.append(words.empty() ? "" : " | ").append(word);
-  }
-  return "must be " + words;
+  const std::string word = node.IsScalar() ? node.Scalar() : "";
+  const std::string_view written = word == "false" ? "off" : word == "true" ? "on" : std::string_view{word};
+  const auto names = names_of(value);
+  const auto* const name = std::ranges::find(names, written);
+  if (name == names.end())
+    return fmt::format("must be {}", fmt::join(names, " | "));
+  value = static_cast<E>(name - names.begin());
+  return std::nullopt;
 }
 
 template <std::size_t kCount> Reason parse(const YAML::Node& node, std::array<double, kCount>& values) {
@@ -123,9 +123,7 @@ requires std::is_arithmetic_v<T> YAML::Node to_node(T value) { return YAML::Node
 
 template <class E>
 requires std::is_enum_v<E> YAML::Node to_node(E value) {
-  const auto names = names_of(value);
-  const auto* const name = std::find_if(names.begin(), names.end(), [&](const auto& n) { return n.second == value; });
-  return YAML::Node{std::string{name->first}};
+  return YAML::Node{std::string{to_string(value)}};
 }
 
 template <class Numbers> YAML::Node list_node(const Numbers& numbers) {

@@ -37,7 +37,7 @@ double rounded(double value) { return std::round(value * 1e4) / 1e4; }
 ordered_json to_json(const PacketCounters& counters) {
   ordered_json rejected;
   for (std::size_t i = 0; i < kPacketErrorCount; ++i)
-    rejected[std::string{kPacketErrorNames[i]}] = counters.rejected[i];
+    rejected[std::string{to_string(static_cast<PacketError>(i))}] = counters.rejected[i];
   return {{"received", counters.received}, {"data", counters.data},           {"position", counters.position},
           {"lost", counters.lost},         {"reordered", counters.reordered}, {"clock_steps", counters.clock_steps},
           {"rejected", rejected}};
@@ -68,7 +68,7 @@ ordered_json to_json(const SourceCounters& counters, std::uint64_t used_sweeps) 
   ordered_json rejected;
   for (std::size_t reason = 0; reason < kHealthReasonCount; ++reason) {
     if (reason < kAlwaysTold || counters.rejected[reason] > 0)
-      rejected[std::string{kHealthReasonNames[reason]}] = counters.rejected[reason];
+      rejected[std::string{to_string(static_cast<HealthReason>(reason))}] = counters.rejected[reason];
   }
   return {{"received", counters.received},
           {"used_sweeps", used_sweeps},
@@ -88,7 +88,7 @@ ordered_json iterations_json(const SweepSums& sums) {
 ordered_json stages_json(const StageTimes& totals, std::uint64_t sweeps) {
   ordered_json stages;
   for (std::size_t i = 0; i < kStages; ++i)
-    stages[std::string{kStageNames[i]}] = mean(1e3 * to_seconds(totals[i]), sweeps);
+    stages[std::string{to_string(static_cast<Stage>(i))}] = mean(1e3 * to_seconds(totals[i]), sweeps);
   return stages;
 }
 

@@ -9,7 +9,7 @@
 #include "config/config.hpp"
 #include "core/sources/source_health.hpp"
 #include "daemon/ingest_report.hpp"
-#include "daemon/stage_stopwatch.hpp"
+#include "daemon/machine_time.hpp"
 #include "daemon/sweep_processor.hpp"
 #include "drivers/packet_counters.hpp"
 

@@ -8,8 +8,6 @@
 #include "core/ingest/sweep_builder.hpp"
 #include "daemon/input.hpp"
 #include "daemon/machine_time.hpp"
-#include "daemon/stage_stopwatch.hpp"
-#include "daemon/sweep_cut.hpp"
 #include "drivers/lidar_input.hpp"
 
 namespace locus::daemon {

@@ -14,11 +14,9 @@
 #include "daemon/ingest.hpp"
 #include "daemon/ingest_report.hpp"
 #include "daemon/input.hpp"
-#include "daemon/latest_slot.hpp"
-#include "daemon/spsc_ring.hpp"
-#include "daemon/sweep_cut.hpp"
+#include "daemon/machine_time.hpp"
 #include "daemon/sweep_processor.hpp"
-#include "daemon/wakeup.hpp"
+#include "daemon/threads.hpp"
 
 namespace locus::daemon {
 

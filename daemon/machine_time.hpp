@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <ctime>
 
+#include "core/base/stage_clock.hpp"
 #include "core/base/stamp.hpp"
 
 namespace locus::daemon {
@@ -27,6 +31,66 @@ struct MachineTime {
 
   static MachineTime now() noexcept { return {read_clock(CLOCK_MONOTONIC), read_clock(CLOCK_PROCESS_CPUTIME_ID)}; }
   friend MachineTime operator-(const MachineTime& a, const MachineTime& b) { return {a.wall - b.wall, a.cpu - b.cpu}; }
+};
+
+/// CPU time by stage.
+using StageTimes = std::array<Duration, kStages>;
+
+/// Adds up the CPU time that its thread spends in each stage; the time of an inner stage is not charged to the outer.
+///
+/// Reading the clock of a thread is a system call, as long as the decoding of a packet. So of the stages that every
+/// packet goes through only one visit in kSampling is timed, and counts for all; and what the reading itself costs is
+/// taken off. One owner, and a stage ends on the thread that it began on.
+class StageStopwatch : public StageClock {
+ public:
+  static constexpr std::uint64_t kSampling = 13; ///< a prime, for packets come in rhythm with the revolution
+
+  StageStopwatch();
+
+  void enter(Stage stage) override { enter(static_cast<std::size_t>(stage)); }
+  void leave() override;
+
+  /// CPU time spent in `stage` so far.
+  [[nodiscard]] Duration total(Stage stage) const;
+  /// CPU time spent in each stage since the last call.
+  StageTimes lap();
+
+  /// What is done in the life of this object belongs to none of the stages that are open.
+  class Pause {
+   public:
+    explicit Pause(StageStopwatch& stopwatch) : stopwatch_(stopwatch) { stopwatch_.enter(kOutside); }
+    ~Pause() { stopwatch_.leave(); }
+    Pause(const Pause&) = delete;
+    Pause& operator=(const Pause&) = delete;
+
+   private:
+    StageStopwatch& stopwatch_;
+  };
+
+ private:
+  static constexpr std::size_t kOutside = kStages;
+  static constexpr std::size_t kMaxDepth = 8;
+  struct Frame {
+    std::size_t stage;
+    bool timed;
+  };
+
+  void enter(std::size_t stage);
+  void charge_innermost();
+
+  Duration reading_cost_{};
+  Duration mark_{}; ///< up to here everything is charged
+  std::array<Duration, kStages + 1> totals_{};
+  std::array<std::uint64_t, kStages + 1> visits_{};
+  StageTimes totals_at_lap_{};
+  std::array<Frame, kMaxDepth> open_{};
+  std::size_t depth_ = 0;
+};
+
+/// What goes with a sweep from where it was cut to where it is processed, to tell what it costs.
+struct SweepCut {
+  MachineTime began;      ///< when the work on the cut began
+  StageTimes ingest_took; ///< since the cut before
 };
 
 } // namespace locus::daemon

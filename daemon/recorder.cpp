@@ -2,27 +2,262 @@
 #include "daemon/recorder.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <ctime>
+#include <system_error>
 #include <type_traits>
 #include <utility>
 
-#include <sys/resource.h>
+#include <fcntl.h>
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <unistd.h>
 
+#include "config/config_yaml.hpp"
 #include "daemon/machine_time.hpp"
+#include "drivers/files/capture_folder.hpp"
+#include "drivers/files/motion_files.hpp"
 
 namespace locus::daemon {
+
 namespace {
 
-constexpr Duration kRound = std::chrono::milliseconds{100}; ///< between two looks for what is to be written
+using std::filesystem::path;
+
+constexpr std::uint64_t kPieces = 16; ///< of the size of one that fill the folder
+constexpr std::uint64_t kBlockBytes = 4096;
+constexpr std::uint64_t kBlocksOfPiece = 32; ///< that its folder and the ends of its files take
+
+std::uint64_t bytes_on_disk(const path& folder) {
+  std::uint64_t blocks = 1;
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry{folder, error}, end; !error && entry != end; entry.increment(error)) {
+    std::error_code vanished;
+    const std::uintmax_t bytes = entry->file_size(vanished);
+    blocks += vanished ? 1 : (bytes + kBlockBytes - 1) / kBlockBytes;
+  }
+  return blocks * kBlockBytes;
+}
+
+std::string cannot(const char* what, const path& where, const std::error_code& error) {
+  return fmt::format("{}: {} ({}); let locusd write there, see record.folder in locusd.yaml(5)", where.string(), what,
+                     error.message());
+}
+
+} // namespace
+
+CaptureRing::CaptureRing(path folder, std::uint64_t max_bytes) : folder_(std::move(folder)), max_bytes_(max_bytes) {}
+
+std::uint64_t CaptureRing::piece_bytes() const { return max_bytes_ / kPieces - kBlocksOfPiece * kBlockBytes; }
+
+std::optional<std::string> CaptureRing::obstacle() const {
+  std::error_code error;
+  path there = std::filesystem::absolute(folder_, error);
+  while (!std::filesystem::exists(there, error) && there.has_relative_path())
+    there = there.parent_path();
+  if (!std::filesystem::is_directory(there, error))
+    return cannot("cannot be made", folder_, std::make_error_code(std::errc::not_a_directory));
+  if (faccessat(AT_FDCWD, there.c_str(), W_OK, AT_EACCESS) != 0)
+    return cannot("cannot be written to", there, {errno, std::generic_category()});
+  return std::nullopt;
+}
+
+/// What is there by now.
+std::optional<std::string> CaptureRing::look() {
+  pieces_.clear();
+  bytes_ = 0;
+  std::error_code error;
+  std::filesystem::create_directories(folder_, error);
+  if (error)
+    return cannot("cannot be made", folder_, error);
+  for (const path& run : runs_in(folder_)) {
+    last_run_ = number_of(run);
+    for (const path& piece : pieces_in(run)) {
+      pieces_.push_back({piece, bytes_on_disk(piece)});
+      bytes_ += pieces_.back().bytes;
+    }
+  }
+  looked_ = true;
+  return std::nullopt;
+}
+
+std::optional<std::string> CaptureRing::make_room() {
+  const std::uint64_t piece = max_bytes_ / kPieces;
+  for (;;) {
+    std::error_code error;
+    const std::uint64_t free = std::filesystem::space(folder_, error).available;
+    if (error)
+      return cannot("cannot be looked at", folder_, error);
+    if (bytes_ + piece <= max_bytes_ && free >= 2 * piece)
+      return std::nullopt;
+    if (free + bytes_ < 2 * piece)
+      return fmt::format("{}: {} MB free on the disk, and {} are wanted; free some, or lower record.max_bytes",
+                         folder_.string(), free / 1'000'000, 2 * piece / 1'000'000);
+    if (auto problem = remove_oldest())
+      return problem;
+  }
+}
+
+std::optional<std::string> CaptureRing::remove_oldest() {
+  const Piece oldest = pieces_.front();
+  std::error_code error;
+  std::filesystem::remove_all(oldest.folder, error);
+  if (error)
+    return cannot("cannot be removed", oldest.folder, error);
+  std::filesystem::remove(oldest.folder.parent_path(), error); // if it was the last of its run
+  bytes_ -= oldest.bytes;
+  pieces_.pop_front();
+  return std::nullopt;
+}
+
+/// After a failure the disk is looked at again: somebody may have removed the folder.
+Expected<path, std::string> CaptureRing::begin_piece(Stamp now) {
+  if (auto problem = looked_ ? std::nullopt : look())
+    return *problem;
+  auto piece = make_piece(now);
+  looked_ = piece.has_value();
+  return piece;
+}
+
+Expected<path, std::string> CaptureRing::make_piece(Stamp now) {
+  if (auto problem = make_room())
+    return *problem;
+  if (run_.empty()) {
+    const auto seconds = std::chrono::floor<std::chrono::seconds>(now.time_since_epoch());
+    run_ = folder_ / fmt::format("{:06}_{:%Y-%m-%dT%H-%M-%SZ}", last_run_ + 1,
+                                 fmt::gmtime(static_cast<std::time_t>(seconds.count())));
+  }
+  piece_ = run_ / fmt::format("{:06}", ++last_piece_);
+  std::error_code error;
+  const bool is_new = std::filesystem::create_directories(piece_, error);
+  if (error)
+    return cannot("cannot be made", piece_, error);
+  if (!is_new)
+    return fmt::format("{}: is there already; give each locusd a record.folder of its own", piece_.string());
+  return piece_;
+}
+
+void CaptureRing::end_piece() {
+  pieces_.push_back({piece_, bytes_on_disk(piece_)});
+  bytes_ += pieces_.back().bytes;
+}
+
+void CaptureRing::discard_piece() {
+  std::error_code ignored;
+  std::filesystem::remove_all(piece_, ignored);
+  std::filesystem::remove(run_, ignored);
+}
+
+namespace {
+
+/// What the sensors send within a round of the recorder leaves in one piece.
+constexpr std::size_t kBufferBytes = 1 << 16;
+
+bool is_sensible(Stamp stamp) { return stamp > kEarliestStamp && stamp < kLatestStamp; }
+
+std::string cannot_be_written(const std::filesystem::path& file) {
+  return fmt::format("{}: cannot be written ({}); check permissions and free space", file.string(),
+                     std::generic_category().message(errno));
+}
+
+} // namespace
+
+std::vector<std::optional<std::string>> sample_files(const Config& config) {
+  std::vector<std::optional<std::string>> files;
+  bool has_imu = false;
+  for (const MotionSourceOptions& source : config.odometry.motion_sources) {
+    if (source.kind == SourceKind::odometry)
+      files.emplace_back(source.name + ".tum");
+    else
+      files.push_back(std::exchange(has_imu, true) ? std::nullopt : std::optional<std::string>{"imu.csv"});
+  }
+  return files;
+}
+
+Expected<PieceWriter, std::string> PieceWriter::open(const std::filesystem::path& folder, const Config& config) {
+  auto pcap = PcapWriter::open(folder / "lidar.pcap");
+  if (!pcap)
+    return pcap.error();
+  PieceWriter writer(std::move(*pcap), folder, config);
+  writer.append(writer.config_, print_config(config));
+  if (auto problem = writer.flush(false))
+    return *problem;
+  return writer;
+}
+
+PieceWriter::PieceWriter(PcapWriter pcap, const std::filesystem::path& folder, const Config& config)
+    : pcap_(std::move(pcap)), config_{folder / "config.yaml"} {
+  for (const std::optional<std::string>& file : sample_files(config)) {
+    SourceFiles& source = sources_.emplace_back();
+    if (file) {
+      source.samples.path = source.meta.path = folder / *file;
+      source.meta.path.replace_extension(".meta.csv");
+    }
+  }
+}
+
+bool PieceWriter::write(const ImuInput& input) {
+  return write(input.source, input.sample.stamp, input.sample.arrival, 1.0, to_line(input.sample));
+}
+
+bool PieceWriter::write(const OdometryInput& input) {
+  const OdometrySample& sample = input.sample;
+  return sample.T_source_base.rotation.norm() != 0.0 &&
+         write(input.source, sample.stamp, sample.arrival, sample.covariance_scale,
+               to_line({sample.stamp, sample.T_source_base}));
+}
+
+bool PieceWriter::write(std::size_t source, Stamp stamp, Stamp arrival, double covariance_scale,
+                        const std::string& line) {
+  SourceFiles& files = sources_[source];
+  if (files.samples.path.empty() || !is_sensible(stamp) || !is_sensible(arrival))
+    return false;
+  append(files.samples, line);
+  append(files.meta, fmt::format("{},{},{}\n", to_ns(stamp), to_ns(arrival), covariance_scale));
+  return true;
+}
+
+void PieceWriter::append(TextFile& file, const std::string& text) {
+  if (!file.file && !problem_) {
+    file.file.reset(std::fopen(file.path.c_str(), "we"));
+    if (file.file)
+      std::setvbuf(file.file.get(), nullptr, _IOFBF, kBufferBytes);
+    else
+      problem_ = cannot_be_written(file.path);
+  }
+  if (file.file && std::fwrite(text.data(), 1, text.size(), file.file.get()) != text.size() && !problem_)
+    problem_ = cannot_be_written(file.path);
+  text_bytes_ += text.size();
+}
+
+/// The samples before their meta rows: a crash in between costs the rows.
+std::optional<std::string> PieceWriter::flush(bool to_disk) {
+  const auto flush_text = [&](TextFile& file) {
+    if (file.file && !problem_ &&
+        (std::fflush(file.file.get()) != 0 || (to_disk && fdatasync(fileno(file.file.get())) != 0)))
+      problem_ = cannot_be_written(file.path);
+  };
+  if (!problem_)
+    problem_ = pcap_.flush();
+  if (to_disk && !problem_ && fdatasync(pcap_.descriptor()) != 0)
+    problem_ = cannot_be_written(config_.path.parent_path() / "lidar.pcap");
+  flush_text(config_);
+  for (SourceFiles& source : sources_) {
+    flush_text(source.samples);
+    flush_text(source.meta);
+  }
+  return problem_;
+}
+
+namespace {
+
 constexpr Duration kToDiskEvery = std::chrono::seconds{5};
 constexpr Duration kTryAgainAfter = std::chrono::seconds{10};
 
 } // namespace
 
 Recorder::Recorder(const std::filesystem::path& folder, Config config)
-    : config_(std::move(config)), disk_(folder, config_.record.max_bytes),
-      worker_(
-          "recorder", kRound, [this] { write_waiting(); }, [this] { begin(); }) {
+    : config_(std::move(config)), disk_(folder, config_.record.max_bytes) {
   const auto files = sample_files(config_);
   for (std::size_t i = 0; i < files.size(); ++i)
     has_file_[i] = files[i].has_value();
@@ -50,14 +285,11 @@ Recorder::Status Recorder::status() const {
   return status;
 }
 
-void Recorder::begin() {
-  constexpr int kLeastPriority = 19;
-  setpriority(PRIO_PROCESS, 0, kLeastPriority); // of this thread alone, on Linux
-  problem_ = disk_.obstacle().value_or("");     // before anything is lost by it
-}
-
 /// Not more than fit the ring: what comes in meanwhile waits for the next round.
-void Recorder::write_waiting() {
+void Recorder::write(bool last_round) {
+  is_last_round_ = last_round;
+  if (!std::exchange(has_begun_, true))
+    problem_ = disk_.obstacle().value_or(""); // before anything is lost by it
   for (std::size_t written = 0; written < kMaxUnwritten; ++written) {
     const std::optional<Entry> entry = waiting_->pop();
     if (!entry)
@@ -121,11 +353,9 @@ void Recorder::end_piece() {
   disk_.end_piece();
 }
 
-/// A piece that the disk does not take is ended where it is. Who is told to stop does not wait for the disk: the system
-/// has it all.
+/// A piece that the disk does not take is ended where it is.
 void Recorder::flush(bool to_disk) {
-  const bool waits = to_disk && !worker_.stopping();
-  const std::optional<std::string> problem = piece_->flush(waits);
+  const std::optional<std::string> problem = piece_->flush(to_disk && !is_last_round_);
   const std::uint64_t inputs = std::exchange(unflushed_, 0);
   problem_ = problem.value_or("");
   if (to_disk)

@@ -11,8 +11,6 @@
 
 #include "core/odometry/odometry.hpp"
 #include "daemon/machine_time.hpp"
-#include "daemon/stage_stopwatch.hpp"
-#include "daemon/sweep_cut.hpp"
 
 namespace locus::daemon {
 

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "core/base/isa.hpp"
+#include "core/base/names.hpp"
 #include "core/base/pose.hpp"
 
 namespace locus {
@@ -18,6 +21,7 @@ enum class Model : std::uint8_t; // opaque: an option names a model and knows no
 /// of reception fix the offset and the sensor's clock is the ruler; `automatic` (key: auto): `sensor` while it says
 /// that it is locked to PPS, else `receive`.
 enum class LidarTime : std::uint8_t { automatic, sensor, receive };
+constexpr auto names_of(LidarTime) { return std::to_array<std::string_view>({"auto", "sensor", "receive"}); }
 
 /// One lidar: how its packets are told from others, how they are read, and where it sits on the robot.
 struct LidarOptions {

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <string_view>
 
+#include "core/base/names.hpp"
+
 namespace locus {
 
 /// Why a datagram was not turned into data. Each has its counter in PacketCounters::rejected.
@@ -19,11 +21,11 @@ enum class PacketError : std::uint8_t {
   duplicate, ///< a packet that was already there
   truncated, ///< part of the payload is missing
 };
-inline constexpr std::size_t kPacketErrorCount = 8;
-
-/// By the name of its counter, in the order of the enumeration.
-inline constexpr std::array<std::string_view, kPacketErrorCount> kPacketErrorNames{
-    "length", "flag", "model", "sender", "azimuth", "time", "duplicate", "truncated"};
+constexpr auto names_of(PacketError) {
+  return std::to_array<std::string_view>(
+      {"length", "flag", "model", "sender", "azimuth", "time", "duplicate", "truncated"});
+}
+inline constexpr std::size_t kPacketErrorCount = names_of(PacketError{}).size();
 
 /// What became of the datagrams of one lidar, or of all: received = data + position + the sum of rejected.
 struct PacketCounters {

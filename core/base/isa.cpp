@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/base/isa.hpp"
 
-#include <algorithm>
-
 namespace locus {
 
 bool is_supported(Isa isa) {
@@ -20,13 +18,6 @@ Isa best_isa() {
   if (is_supported(Isa::avx512))
     return Isa::avx512;
   return is_supported(Isa::avx2) ? Isa::avx2 : Isa::baseline;
-}
-
-std::optional<Isa> isa_from_string(std::string_view name) {
-  const auto* const found = std::find(kIsaNames.begin(), kIsaNames.end(), name);
-  if (found == kIsaNames.end())
-    return std::nullopt;
-  return static_cast<Isa>(found - kIsaNames.begin());
 }
 
 } // namespace locus

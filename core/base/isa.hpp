@@ -3,23 +3,20 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <string_view>
+
+#include "core/base/names.hpp"
 
 namespace locus {
 
 /// Instruction sets that the hot kernels are built for. Results are the same bits for one of them, not between them.
 enum class Isa : std::uint8_t { baseline, avx2, avx512 };
 
-inline constexpr std::array<std::string_view, 3> kIsaNames{"baseline", "avx2", "avx512"};
-constexpr std::string_view to_string(Isa isa) { return kIsaNames[static_cast<std::size_t>(isa)]; }
+/// The words of the environment variable LOCUS_ISA.
+constexpr auto names_of(Isa) { return std::to_array<std::string_view>({"baseline", "avx2", "avx512"}); }
 
 /// The best one that this processor has.
 Isa best_isa();
-
-/// By name, for those who want to choose (environment variable LOCUS_ISA); nothing for a name that is none of
-/// kIsaNames.
-std::optional<Isa> isa_from_string(std::string_view name);
 
 /// Whether this processor can run it.
 bool is_supported(Isa isa);

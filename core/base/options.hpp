@@ -3,20 +3,23 @@
 
 #include <Eigen/Core>
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/base/isa.hpp"
+#include "core/base/names.hpp"
 #include "core/base/pose.hpp"
 #include "core/base/stamp.hpp"
 
 namespace locus {
 
 /// What can be set about the algorithm, module by module. A field is named as its key in the YAML file, the unit in its
-/// name. problem() says what is wrong, one line "key: reason" for each key that is, and nothing when all is well.
+/// name, and an enumeration has the words of the file beside it. problem() says what is wrong, one line "key: reason" for each key that is, and nothing when all is well.
 
 struct BodyBoxOptions { ///< returns inside the box belong to the robot itself and are dropped
   bool enabled = false;
@@ -63,7 +66,8 @@ struct SweepOptions {
   bool operator==(const SweepOptions&) const = default;
 };
 
-enum class ScanToScanMode { always, automatic, off }; ///< automatic (key: auto): only without a healthy six-axis prior
+enum class ScanToScanMode { always, automatic, off }; ///< automatic: only without a healthy six-axis prior
+constexpr auto names_of(ScanToScanMode) { return std::to_array<std::string_view>({"always", "auto", "off"}); }
 
 struct RegistrationOptions {
   int max_iterations = 20;           ///< Gauss-Newton steps at most
@@ -81,6 +85,7 @@ struct MapOptions {
 };
 
 enum class SourceKind { imu, odometry }; ///< imu gives rotation only, odometry all six axes
+constexpr auto names_of(SourceKind) { return std::to_array<std::string_view>({"imu", "odometry"}); }
 
 struct MotionSourceOptions {
   std::string name;
@@ -91,8 +96,11 @@ struct MotionSourceOptions {
 };
 
 enum class Fusion { combined, queue }; ///< combined: gyro rotation with odometry translation; queue: paper II-B.1
+constexpr auto names_of(Fusion) { return std::to_array<std::string_view>({"combined", "queue"}); }
 enum class NoSourcePrior { constant_velocity, identity }; ///< identity: paper II-B.2
-enum class FlatGround { off, on, automatic };             ///< automatic (key: auto)
+constexpr auto names_of(NoSourcePrior) { return std::to_array<std::string_view>({"constant_velocity", "identity"}); }
+enum class FlatGround { off, on, automatic };
+constexpr auto names_of(FlatGround) { return std::to_array<std::string_view>({"off", "on", "auto"}); }
 
 /// Everything Odometry wants to know.
 struct OdometryOptions {

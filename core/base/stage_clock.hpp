@@ -6,13 +6,17 @@
 #include <cstdint>
 #include <string_view>
 
+#include "core/base/names.hpp"
+
 namespace locus {
 
 /// The stages whose cost is reported.
 enum class Stage : std::uint8_t { decode, correct, filter, covariance, scan_to_scan, scan_to_submap, map };
-inline constexpr std::size_t kStages = 7;
-inline constexpr std::array<std::string_view, kStages> kStageNames{
-    "decode", "correct", "filter", "covariance", "scan_to_scan", "scan_to_submap", "map"};
+constexpr auto names_of(Stage) {
+  return std::to_array<std::string_view>(
+      {"decode", "correct", "filter", "covariance", "scan_to_scan", "scan_to_submap", "map"});
+}
+inline constexpr std::size_t kStages = names_of(Stage{}).size();
 
 /// Told when a stage begins and ends. The core has no clock of its own; who wants timing brings one.
 class StageClock {

@@ -346,4 +346,13 @@ void SurfaceGrid::protect(const Eigen::Vector3d& centre_m, double radius_m) {
   protected_radius_m_ = radius_m;
 }
 
+void read_planes(const SurfaceGrid& grid, std::vector<SurfacePoint>& planes, const Eigen::Vector3d& centre_m,
+                 double radius_m) {
+  planes.clear();
+  grid.for_each([&](const Eigen::Vector3d& mean_m, const Surface& surface) {
+    if (surface.planar() && (mean_m - centre_m).norm() < radius_m)
+      planes.push_back({mean_m.cast<float>(), surface.normal});
+  });
+}
+
 } // namespace locus

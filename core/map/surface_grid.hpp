@@ -4,11 +4,13 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
 #include "core/base/isa.hpp"
 #include "core/base/pose.hpp"
+#include "core/base/surface_point.hpp"
 
 namespace locus {
 
@@ -79,6 +81,11 @@ class SurfaceGrid {
   [[nodiscard]] std::size_t size() const { return used_; }
   [[nodiscard]] std::size_t capacity() const { return voxels_.size(); }
   [[nodiscard]] std::uint64_t evicted() const { return evicted_; }
+  /// Shows `use` each surface with its mean, in no order that means anything.
+  template <class Use> void for_each(const Use& use) const {
+    for (std::size_t slot = 0; slot < used_; ++slot)
+      use(Eigen::Vector3d{centre(slot) + surface(slot).mean_m.cast<double>()}, surface(slot));
+  }
   /// Slots 0..size()-1, in no order that means anything.
   [[nodiscard]] const Surface& surface(std::size_t slot) const { return voxels_[slot].surface; }
   [[nodiscard]] Eigen::Vector3d centre(std::size_t slot) const { return centre_of(voxels_[slot].index); }
@@ -142,5 +149,10 @@ class SurfaceGrid {
   Eigen::Vector3d protected_centre_m_ = Eigen::Vector3d::Zero();
   double protected_radius_m_ = 0.0;
 };
+
+/// The planes of a grid, in place of what `planes` holds: all, or those nearer than `radius_m` to `centre_m`.
+void read_planes(const SurfaceGrid& grid, std::vector<SurfacePoint>& planes,
+                 const Eigen::Vector3d& centre_m = Eigen::Vector3d::Zero(),
+                 double radius_m = std::numeric_limits<double>::infinity());
 
 } // namespace locus

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <string_view>
 
+#include "core/base/names.hpp"
 #include "core/base/stamp.hpp"
 
 namespace locus {
@@ -22,13 +23,11 @@ enum class HealthReason : std::uint8_t {
   outside,      ///< somebody else says so
   self_check    ///< ImuSelfCheck has refused it
 };
-inline constexpr std::size_t kHealthReasonCount = 9;
-inline constexpr std::array<std::string_view, kHealthReasonCount> kHealthReasonNames{
-    "stale", "jump", "nan", "frozen", "out_of_order", "covariance", "disagreement", "outside", "self_check"};
-
-constexpr std::string_view to_string(HealthReason reason) {
-  return kHealthReasonNames[static_cast<std::size_t>(reason)];
+constexpr auto names_of(HealthReason) {
+  return std::to_array<std::string_view>({"stale", "jump", "nan", "frozen", "out_of_order", "covariance",
+                                          "disagreement", "outside", "self_check"});
 }
+inline constexpr std::size_t kHealthReasonCount = names_of(HealthReason{}).size();
 
 /// What became of the samples of one motion source.
 struct SourceCounters {

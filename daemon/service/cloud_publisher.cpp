@@ -25,19 +25,18 @@ void sweep_points(const Sweep& sweep, const Odometry& odometry, std::vector<Clou
 /// The coarse surfaces: some ten thousand of a map that fills its memory.
 void map_points(const SurfaceGrid& grid, std::vector<CloudMessage::Point>& out) {
   out.clear();
-  for (std::size_t slot = 0; slot < grid.size(); ++slot) {
-    if (!grid.surface(slot).planar())
-      continue;
-    const Eigen::Vector3f p = grid.centre(slot).cast<float>() + grid.surface(slot).mean_m;
-    out.push_back({p.x(), p.y(), p.z(), 0, 0, 0, 0});
-  }
+  grid.for_each([&](const Eigen::Vector3d& mean_m, const Surface& surface) {
+    const Eigen::Vector3f p = mean_m.cast<float>();
+    if (surface.planar())
+      out.push_back({p.x(), p.y(), p.z(), 0, 0, 0, 0});
+  });
 }
 
 } // namespace
 
 CloudPublisher::CloudPublisher(DdsOptions options, RosLink& link) : options_(std::move(options)), link_(link) {
   if (options_.publish_cloud || options_.publish_map)
-    worker_.emplace("clouds", std::chrono::milliseconds{100}, [this] { publish(); });
+    worker_.emplace("clouds", std::chrono::milliseconds{100}, [this](bool /*last*/) { publish(); });
 }
 
 void CloudPublisher::take(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {

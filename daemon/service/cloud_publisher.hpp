@@ -7,8 +7,7 @@
 #include "config/config.hpp"
 #include "core/odometry/odometry.hpp"
 #include "daemon/dds/ros_link.hpp"
-#include "daemon/latest_slot.hpp"
-#include "daemon/worker.hpp"
+#include "daemon/threads.hpp"
 
 namespace locus::daemon {
 

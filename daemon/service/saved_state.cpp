@@ -146,14 +146,7 @@ Pose Whereabouts::carried_to(Stamp now) const {
 }
 
 void read_map(const Odometry& odometry, const Pose& T_odom_base, std::vector<SurfacePoint>& map_odom) {
-  map_odom.clear();
-  const SurfaceGrid& grid = odometry.map().fine();
-  for (std::size_t slot = 0; slot < grid.size(); ++slot) {
-    const Surface& surface = grid.surface(slot);
-    const Eigen::Vector3d point = grid.centre(slot) + surface.mean_m.cast<double>();
-    if (surface.planar() && (point - T_odom_base.translation).norm() < kInSight_m)
-      map_odom.push_back({point.cast<float>(), surface.normal});
-  }
+  read_planes(odometry.map().fine(), map_odom, T_odom_base.translation, kInSight_m);
 }
 
 std::optional<std::string> write_state(const std::filesystem::path& file, const SavedState& state) {
@@ -197,17 +190,6 @@ std::optional<std::filesystem::path> state_path() {
   return folder != nullptr ? std::optional{std::filesystem::path(folder) / "state"} : std::nullopt;
 }
 
-StateKeeper::StateKeeper(std::optional<std::filesystem::path> file, Complain complain)
-    : file_(std::move(file)), complain_(std::move(complain)) {
-  begin();
-}
-
-void StateKeeper::begin() {
-  written_.reset();
-  if (file_)
-    worker_.emplace("state", std::chrono::milliseconds{500}, [this] { write(); });
-}
-
 /// A clock that was set back does not put it off.
 bool StateKeeper::is_due() const {
   return !saved_ || std::chrono::abs(now_->stamp - saved_->stamp) > kEvery ||
@@ -215,9 +197,9 @@ bool StateKeeper::is_due() const {
 }
 
 void StateKeeper::begin_anew(const std::optional<SavedState>& start) {
-  worker_.reset();
   now_.reset();
   saved_.reset();
+  written_.reset();
   static_cast<void>(states_.take()); // of the time before
   static_cast<void>(whereabouts_.take());
   std::error_code error;
@@ -228,7 +210,6 @@ void StateKeeper::begin_anew(const std::optional<SavedState>& start) {
     complain_(fmt::format("{}: cannot be removed ({}); a restart within a minute goes on from it", file_->string(),
                           error.message()));
   }
-  begin();
 }
 
 void StateKeeper::take(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground) {
@@ -246,7 +227,6 @@ void StateKeeper::take(const Odometry& odometry, const OdometryEstimate& estimat
   }
   whereabouts_.back() = {number_, *now_};
   static_cast<void>(whereabouts_.publish());
-  worker_->notify();
 }
 
 /// The whereabouts are taken first: the state that they belong to is then there, or has been written.

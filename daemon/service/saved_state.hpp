@@ -9,9 +9,8 @@
 
 #include "core/base/expected.hpp"
 #include "core/odometry/odometry.hpp"
-#include "daemon/latest_slot.hpp"
 #include "daemon/sweep_processor.hpp"
-#include "daemon/worker.hpp"
+#include "daemon/threads.hpp"
 
 namespace locus::daemon {
 
@@ -51,8 +50,8 @@ void update_whereabouts(const std::filesystem::path& file, const Whereabouts& la
 /// $STATE_DIRECTORY/state as systemd sets it; nothing without, and then no state is kept.
 std::optional<std::filesystem::path> state_path();
 
-/// Writes the state now and then, and the whereabouts after every estimate, from a thread of its own. The map is worth
-/// its cost once in many metres; who crashed while driving is elsewhere a second later.
+/// Writes the state now and then, and the whereabouts as they are by then, from a thread that may wait for the disk. The
+/// map is worth its cost once in many metres; who crashed while driving is elsewhere a second later.
 class StateKeeper {
  public:
   static constexpr Duration kEvery = std::chrono::seconds{30};
@@ -60,7 +59,8 @@ class StateKeeper {
   using Complain = std::function<void(const std::string&)>;
 
   /// Without a file it does nothing.
-  StateKeeper(std::optional<std::filesystem::path> file, Complain complain);
+  StateKeeper(std::optional<std::filesystem::path> file, Complain complain)
+      : file_(std::move(file)), complain_(std::move(complain)) {}
 
   /// Producer, one thread: after every estimate.
   void take(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground);
@@ -68,7 +68,10 @@ class StateKeeper {
   /// Producer: nothing before the first estimate.
   [[nodiscard]] const std::optional<Whereabouts>& now() const { return now_; }
 
-  /// Producer, at rest: what was written is no longer true. When this returns the file says what is to be gone on from
+  /// Thread of the disk, again and again: writes what was taken last.
+  void write();
+
+  /// Producer, while nobody writes: what was written is no longer true. When this returns the file says what is to be gone on from
   /// until the next estimate, or there is none. Waits for the disk.
   void begin_anew(const std::optional<SavedState>& start);
 
@@ -83,8 +86,6 @@ class StateKeeper {
     Whereabouts last;
   };
 
-  void begin();
-  void write();
   [[nodiscard]] bool is_due() const;
 
   std::optional<std::filesystem::path> file_;
@@ -93,8 +94,7 @@ class StateKeeper {
   LatestSlot<Update> whereabouts_;
   std::optional<Whereabouts> now_, saved_; ///< after the last estimate, and of the state taken last; of the producer
   std::uint64_t number_ = 0;               ///< of the state handed over last; of the producer
-  std::optional<std::uint64_t> written_;   ///< number of the state that lies in the file; of the worker
-  std::optional<Worker> worker_;
+  std::optional<std::uint64_t> written_;   ///< number of the state that lies in the file; of the thread of the disk
 };
 
 } // namespace locus::daemon

@@ -17,8 +17,7 @@
 #include "config/config_yaml.hpp"
 #include "daemon/dds/dds_node.hpp"
 #include "daemon/machine_time.hpp"
-#include "daemon/service/lidar_sockets.hpp"
-#include "daemon/service/realtime.hpp"
+#include "daemon/service/machine.hpp"
 #include "daemon/service/status.hpp"
 #include "drivers/lidar_input.hpp"
 

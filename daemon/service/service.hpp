@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "config/config_yaml.hpp"
-#include "daemon/service/control_server.hpp"
+#include "daemon/service/control.hpp"
 #include "daemon/service/log.hpp"
 #include "daemon/service/session.hpp"
 #include "daemon/service/watch.hpp"

@@ -10,12 +10,13 @@
 #include <pthread.h>
 
 #include "daemon/machine_time.hpp"
-#include "daemon/service/lidar_sockets.hpp"
-#include "daemon/service/realtime.hpp"
+#include "daemon/service/machine.hpp"
 
 namespace locus::daemon {
 
 namespace {
+
+constexpr Duration kDiskRound = std::chrono::milliseconds{100}; ///< between two looks for what is to be written
 
 constexpr std::array<std::string_view, 4> kStateNames{"tracking", "degenerate", "dead_reckoning", "standstill"};
 
@@ -73,6 +74,14 @@ void Session::begin(LidarRouter lidars) {
     after(sweep, odometry, estimate);
   };
   InputSource& input = begin_recording();
+  disk_.emplace(
+      "disk", kDiskRound,
+      [this](bool last) {
+        state_.write();
+        if (recorder_)
+          recorder_->write(last);
+      },
+      [] { take_least_priority(); });
   const std::scoped_lock lock(pipeline_mutex_);
   pipeline_ = std::make_unique<LivePipeline>(config_, std::move(lidars), input, std::move(options));
   pipeline_->set_flat_ground(flat_ground());
@@ -100,6 +109,7 @@ void Session::end() {
   if (publisher_.joinable())
     publisher_.join();
   pipeline_->stop();
+  disk_.reset();
 }
 
 /// In the odometry thread, when the estimate has left.
@@ -115,12 +125,7 @@ void Session::after(const Sweep& sweep, const Odometry& odometry, const Odometry
     return;
   map_answered_ = wanted;
   map_.back().request = wanted;
-  std::vector<SurfacePoint>& points = map_.back().points;
-  points.clear();
-  const SurfaceGrid& grid = odometry.map().fine();
-  for (std::size_t slot = 0; slot < grid.size(); ++slot)
-    if (const Surface& surface = grid.surface(slot); surface.planar())
-      points.push_back({grid.centre(slot).cast<float>() + surface.mean_m, surface.normal});
+  read_planes(odometry.map().fine(), map_.back().points);
   static_cast<void>(map_.publish());
 }
 

@@ -14,7 +14,7 @@
 #include "config/config.hpp"
 #include "core/base/expected.hpp"
 #include "daemon/dds/ros_link.hpp"
-#include "daemon/live_input.hpp"
+#include "daemon/input.hpp"
 #include "daemon/live_pipeline.hpp"
 #include "daemon/recorder.hpp"
 #include "daemon/service/cloud_publisher.hpp"
@@ -113,6 +113,7 @@ class Session {
   std::atomic<std::uint64_t> publisher_progress_{0};
   std::atomic<bool> stopping_{false};
   std::thread publisher_;
+  std::optional<Worker> disk_; ///< writes states and recordings
 };
 
 } // namespace locus::daemon

@@ -20,8 +20,6 @@ using nlohmann::ordered_json;
 
 namespace {
 
-constexpr std::array<std::string_view, 4> kPpsNames{"absent", "synchronizing", "locked", "error"};
-
 /// Estimates older than this say nothing about now.
 constexpr Duration kStale = std::chrono::seconds{2};
 
@@ -46,7 +44,7 @@ ordered_json lidar_json(const LidarOptions& options, const IngestReport::Lidar& 
                     {"refused_ip", address_or_null(lidar.refused_ip)}};
   json.update(model_json(lidar));
   json["heard_ms_ago"] = ms_since(lidar.last_heard);
-  json["pps"] = kPpsNames[static_cast<std::size_t>(lidar.pps) % kPpsNames.size()];
+  json["pps"] = to_string(lidar.pps);
   json["problem"] = problem_of(options, lidar);
   return json;
 }
@@ -148,9 +146,7 @@ ordered_json status_json(Session& session) {
   json["sources"] = sources_json(config, figures, link);
   for (std::size_t i = 0; i < config.lidars.size(); ++i)
     json["lidars"][config.lidars[i].name] = lidar_json(config.lidars[i], figures.ingest.lidars[i]);
-  json["flat_ground"] = session.flat_ground() == FlatGround::on    ? "on"
-                        : session.flat_ground() == FlatGround::off ? "off"
-                                                                   : "auto";
+  json["flat_ground"] = to_string(session.flat_ground());
   const SweepBuilder::Counters& builder = figures.ingest.sweeps;
   json["dropped"] = {{"late_packets", builder.late_packets},
                      {"overflowed_points", builder.overflowed_points},

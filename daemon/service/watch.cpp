@@ -7,7 +7,7 @@
 #include <systemd/sd-daemon.h>
 
 #include "daemon/machine_time.hpp"
-#include "daemon/service/lidar_sockets.hpp"
+#include "daemon/service/machine.hpp"
 #include "drivers/net/ip_address.hpp"
 
 namespace locus::daemon {

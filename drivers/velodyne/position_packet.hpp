@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -8,6 +9,7 @@
 #include <span>
 #include <string_view>
 
+#include "core/base/names.hpp"
 #include "core/base/stamp.hpp"
 
 namespace locus::velodyne {
@@ -30,6 +32,10 @@ std::optional<RmcSentence> parse_rmc(std::string_view sentence);
 
 /// Pulse per second, as the sensor sees it.
 enum class PpsState : std::uint8_t { absent = 0, synchronizing = 1, locked = 2, error = 3 };
+constexpr auto names_of(PpsState) {
+  return std::to_array<std::string_view>({"absent", "synchronizing", "locked", "error"});
+}
+using locus::to_string;
 
 /// Position ("telemetry") packet: how well the sensor knows the time.
 struct PositionPacket {

@@ -22,7 +22,7 @@ class InstructionCounter : public StageClock {
   explicit InstructionCounter(std::string_view wanted) : wanted_(wanted), outside_(wanted == "all") {}
 
   void enter(Stage stage) override {
-    counts_.push_back(outside_ || kStageNames[static_cast<std::size_t>(stage)] == wanted_);
+    counts_.push_back(outside_ || to_string(stage) == wanted_);
     count(counts_.back());
   }
   void leave() override {

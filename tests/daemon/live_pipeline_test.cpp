@@ -14,7 +14,7 @@
 
 #include "daemon/allocation_counter.hpp"
 #include "daemon/drive.hpp"
-#include "daemon/paced_input.hpp"
+#include "daemon/input.hpp"
 #include "support/held_input.hpp"
 
 namespace locus::daemon {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <variant>
 
-#include "daemon/service/control_request.hpp"
+#include "daemon/service/control.hpp"
 #include "fuzz/fuzz_bytes.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -51,7 +51,7 @@ struct Tally {
     counters["scan_to_submap_iterations"] = scan_to_submap / sweeps;
     counters["keyframes"] = keyframes / sweeps;
     for (std::size_t stage = 0; stage < kStages; ++stage)
-      counters[std::string(kStageNames[stage]) + "_ms"] = to_ms(stages[stage]) / sweeps;
+      counters[std::string(to_string(static_cast<Stage>(stage))) + "_ms"] = to_ms(stages[stage]) / sweeps;
   }
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/service/control_request.hpp"
+#include "daemon/service/control.hpp"
 
 #include <gtest/gtest.h>
 

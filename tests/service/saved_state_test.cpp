@@ -39,10 +39,19 @@ class Keeper : public testing::Test {
     return false;
   }
 
+  /// As a reset does it.
+  void begin_anew(const std::optional<SavedState>& start) {
+    disk_.reset();
+    keeper_.begin_anew(start);
+    disk_.emplace("disk", milliseconds{20}, write_);
+  }
+
+  Worker::Round write_ = [this](bool /*last*/) { keeper_.write(); };
   test::TemporaryFolder folder_;
   std::filesystem::path file_ = folder_ / "state";
   Odometry odometry_{OdometryOptions{}};
   StateKeeper keeper_{file_, [](const std::string& problem) { ADD_FAILURE() << problem; }};
+  std::optional<Worker> disk_{std::in_place, "disk", milliseconds{20}, write_};
 };
 
 TEST_F(Keeper, WritesTheMapEveryThirtySecondsOrTenMetresAndTheWhereaboutsAlways) {
@@ -58,7 +67,7 @@ TEST_F(Keeper, WritesTheMapEveryThirtySecondsOrTenMetresAndTheWhereaboutsAlways)
   EXPECT_TRUE(says(12, FlatGround::on));
   take(seconds{34}, 12.5, FlatGround::automatic);
   EXPECT_TRUE(says(12.5, FlatGround::automatic)) << "thirty seconds later";
-  keeper_.begin_anew(std::nullopt);
+  begin_anew(std::nullopt);
   take(seconds{35}, 0, FlatGround::off);
   EXPECT_TRUE(says(0, FlatGround::off)) << "at once";
 }
@@ -67,11 +76,11 @@ TEST_F(Keeper, WhatWasIsForgottenAtAResetAndThePoseThatIsToldKept) {
   take(seconds{0}, 3, FlatGround::off);
   ASSERT_TRUE(says(3, FlatGround::off));
   const SavedState told{{Stamp{}, Pose{Eigen::Quaterniond::Identity(), {7, 0, 0}}}, FlatGround::on, {}};
-  keeper_.begin_anew(told);
+  begin_anew(told);
   EXPECT_FALSE(keeper_.now());
   EXPECT_EQ(load_state(file_)->last.T_odom_base.translation.x(), 7) << "at once";
   take(seconds{1}, 8, FlatGround::off);
-  keeper_.begin_anew(std::nullopt); // whether or not that was written yet
+  begin_anew(std::nullopt); // whether or not that was written yet
   std::this_thread::sleep_for(milliseconds{100});
   EXPECT_FALSE(std::filesystem::exists(file_));
   take(seconds{2}, 9, FlatGround::off);

@@ -43,6 +43,7 @@ void RestartingPipeline::begin(Stamp now) {
   };
   resumed_.store(false, std::memory_order_relaxed);
   keeper_.emplace(state_file_, [](const std::string& problem) { tools::say("soak", problem); });
+  disk_.emplace("disk", std::chrono::milliseconds{10}, [this](bool /*last*/) { keeper_->write(); });
   pipeline_.emplace(config_, tools::value_or_fail(LidarRouter::open(config_.lidars), tools::ExitStatus::failed), input_,
                     std::move(options));
   input_.wait_for(&*pipeline_);
@@ -59,6 +60,7 @@ void RestartingPipeline::end(End how) {
   const std::optional<daemon::Whereabouts> last = keeper_->now();
   if (how == End::crash && last)
     wait_for_disk(*last);
+  disk_.reset();
   keeper_.reset();
   if (how == End::orderly && last) {
     daemon::SavedState state{*last, FlatGround::off, {}};

@@ -53,6 +53,7 @@ class RestartingPipeline {
   std::filesystem::path state_file_;
   Take take_;
   std::optional<daemon::StateKeeper> keeper_;
+  std::optional<daemon::Worker> disk_;
   std::optional<daemon::LivePipeline> pipeline_;
   std::atomic<bool> resumed_{false};
   Counts before_; ///< of the pipelines that have ended

@@ -15,8 +15,8 @@
 #include <unistd.h>
 
 #include "config/config_yaml.hpp"
+#include "daemon/input.hpp"
 #include "daemon/machine_time.hpp"
-#include "daemon/paced_input.hpp"
 #include "drivers/files/capture_sequence.hpp"
 #include "locus_play/arguments.hpp"
 #include "locus_play/motion_publisher.hpp"

@@ -16,7 +16,7 @@ std::string rejections(const PacketCounters& counters) {
   std::vector<std::string> reasons;
   for (std::size_t i = 0; i < kPacketErrorCount; ++i) {
     if (counters.rejected[i] > 0)
-      reasons.push_back(fmt::format("{} {}", kPacketErrorNames[i], counters.rejected[i]));
+      reasons.push_back(fmt::format("{} {}", to_string(static_cast<PacketError>(i)), counters.rejected[i]));
   }
   return fmt::format("{}", fmt::join(reasons, ", "));
 }

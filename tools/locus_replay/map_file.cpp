@@ -7,18 +7,6 @@
 
 namespace locus::tools {
 
-std::vector<SurfacePoint> points_of(const SurfaceMap& map) {
-  const SurfaceGrid& grid = map.fine();
-  std::vector<SurfacePoint> points;
-  for (std::size_t slot = 0; slot < grid.size(); ++slot) {
-    const Surface& surface = grid.surface(slot);
-    if (!surface.planar())
-      continue;
-    points.push_back({(grid.centre(slot) + surface.mean_m.cast<double>()).cast<float>(), surface.normal});
-  }
-  return points;
-}
-
 void write_map(const std::filesystem::path& path, std::span<const SurfacePoint> points) {
   static_assert(std::endian::native == std::endian::little, "PCD holds the machine's bytes, everybody's are little");
   static_assert(sizeof(SurfacePoint) == 6 * sizeof(float));

@@ -47,7 +47,7 @@ std::string without_source(const MotionFile& file) {
   const std::string name = file.kind == SourceKind::imu ? "imu" : file.name;
   return fmt::format("{}: no motion source {} is configured; add {{name: {}, kind: {}}} to motion_sources",
                      file.files.front().string(), file.kind == SourceKind::imu ? "of kind imu" : "named " + name, name,
-                     file.kind == SourceKind::imu ? "imu" : "odometry");
+                     to_string(file.kind));
 }
 
 std::string without_file(const MotionSourceOptions& source) {

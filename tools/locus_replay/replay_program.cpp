@@ -17,8 +17,8 @@
 #include "bags/bag.hpp"
 #include "config/config_yaml.hpp"
 #include "daemon/ingest.hpp"
+#include "daemon/input.hpp"
 #include "daemon/live_pipeline.hpp"
-#include "daemon/paced_input.hpp"
 #include "daemon/sweep_processor.hpp"
 #include "kitti/kitti_drive.hpp"
 #include "locus_replay/arguments.hpp"
@@ -43,12 +43,12 @@ Config config_or_fail(Expected<Config, ConfigErrors> config) {
 }
 
 Isa isa_or_fail(const std::string& name) {
-  const std::optional<Isa> isa = isa_from_string(name);
+  const std::optional<Isa> isa = from_string<Isa>(name);
   if (!isa || !is_supported(*isa))
     throw Failure(ExitStatus::wrong_usage,
                   fmt::format("LOCUS_ISA={}: {}; unset it, or choose one of {} that this processor has", name,
                               isa ? "this processor cannot run it" : "no such instruction set",
-                              fmt::join(kIsaNames, ", ")));
+                              fmt::join(names_of(Isa{}), ", ")));
   return *isa;
 }
 

@@ -87,13 +87,11 @@ const Surface* coarse_plane_under(const Eigen::Vector3d& point_m, const SurfaceG
 
 std::vector<SurfacePoint> visible_surfaces(const SurfaceMap& map) {
   std::vector<SurfacePoint> surfaces;
-  for (std::size_t slot = 0; slot < map.fine().size(); ++slot) {
-    const Surface& fine = map.fine().surface(slot);
-    const Eigen::Vector3d point_m = map.fine().centre(slot) + fine.mean_m.cast<double>();
-    const Surface* surface = fine.planar() ? &fine : coarse_plane_under(point_m, map.coarse());
+  map.fine().for_each([&](const Eigen::Vector3d& mean_m, const Surface& fine) {
+    const Surface* surface = fine.planar() ? &fine : coarse_plane_under(mean_m, map.coarse());
     if (surface != nullptr)
-      surfaces.push_back({point_m.cast<float>(), surface->normal});
-  }
+      surfaces.push_back({mean_m.cast<float>(), surface->normal});
+  });
   return surfaces;
 }
 

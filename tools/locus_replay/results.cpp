@@ -88,7 +88,8 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
   progress_.wipe();
   odometry_.close();
   const bool has_data = ingest.lidars().total().data > 0;
-  const std::vector<SurfacePoint> map = points_of(processor.odometry().map());
+  std::vector<SurfacePoint> map;
+  read_planes(processor.odometry().map().fine(), map);
   const Accuracy accuracy = sweeps.seen > 0 ? truth_.compare(map, !arguments_.quiet) : Accuracy{};
   const FinishedRun run{
       arguments_.capture.string(), config_, ingest,  processor, sweeps, figures_, recording_.capture_start(),

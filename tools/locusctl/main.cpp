@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "command_line.hpp"
+#include "core/base/options.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/map_file.hpp"
 #include "locus_replay/say.hpp"
@@ -90,7 +91,10 @@ std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
   show->add_flag("--watch", arguments.watch, "Goes on until q or Ctrl-C");
   show->callback([&] { action = [&] { status(arguments); }; });
   CLI::App* const flat = app.add_subcommand("flat-ground", "Whether the ground is taken to be level");
-  flat->add_option("MODE", arguments.mode, "on, off or auto")->required()->check(CLI::IsMember({"on", "off", "auto"}));
+  const auto modes = names_of(FlatGround{});
+  flat->add_option("MODE", arguments.mode, "on, off or auto")
+      ->required()
+      ->check(CLI::IsMember(std::vector<std::string>(modes.begin(), modes.end())));
   flat->callback([&] {
     action = [&] { ask(arguments.control(), {{"command", "flat-ground"}, {"mode", arguments.mode}}); };
   });

@@ -95,12 +95,11 @@ struct Heard {
 using Key = std::pair<std::uint32_t, std::uint16_t>; ///< address and port
 
 std::string describe(const Key& key, const Heard& heard, std::optional<velodyne::PositionPacket> position) {
-  static constexpr std::array<std::string_view, 4> kPps{"absent", "synchronizing", "locked", "error"};
   const double seconds = std::max(1e-3, to_seconds(heard.last - heard.first));
   return fmt::format("{:<16}{:<7}{:<12}{:>5.0f} rpm  {:<10}{:>7.0f} packets/s  PPS {}\n", dotted(key.first), key.second,
                      velodyne::to_string(*heard.decoder.model()), heard.decoder.rotation_rate_rpm(),
                      velodyne::to_string(*heard.decoder.return_mode()), static_cast<double>(heard.data - 1) / seconds,
-                     position ? kPps[static_cast<std::size_t>(position->pps) % kPps.size()] : "unknown");
+                     position ? to_string(position->pps) : "unknown");
 }
 
 } // namespace

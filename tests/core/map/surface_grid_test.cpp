@@ -112,6 +112,21 @@ TEST(SurfaceGrid, ANoisyFloorAtHeightZeroIsOneLayerOfPlanes) {
   }
 }
 
+TEST(SurfaceGrid, PlanesAreReadAllOrThoseWithinARadius) {
+  SurfaceGrid grid(kLeaf_m, kEnoughBytes);
+  insert(grid, {0, 0, 0.1}, Eigen::Vector3f::UnitZ());
+  insert(grid, {10, 0, 0.1}, Eigen::Vector3f::UnitZ());
+  insert(grid, {20, 0, 0.1}, kNoNormal);
+  grid.refresh();
+  std::vector<SurfacePoint> planes(7);
+  read_planes(grid, planes);
+  ASSERT_EQ(planes.size(), 2U) << "and no more of what was there before";
+  read_planes(grid, planes, {9, 0, 0}, 5.0);
+  ASSERT_EQ(planes.size(), 1U);
+  EXPECT_TRUE(planes[0].position_m.isApprox(Eigen::Vector3f{10, 0, 0.1F}));
+  EXPECT_EQ(planes[0].normal, Eigen::Vector3f::UnitZ());
+}
+
 TEST(SurfaceGrid, ALongStayDoesNotFreezeAVoxel) {
   SurfaceGrid grid(kLeaf_m, kEnoughBytes);
   for (int i = 0; i < 20'000; ++i)

@@ -25,10 +25,7 @@ struct Legacy {
 
 Legacy legacy_of(const Odometry& odometry, const Pose& T_odom_base) {
   Legacy legacy{T_odom_base, {}};
-  const SurfaceGrid& grid = odometry.map().fine();
-  for (std::size_t slot = 0; slot < grid.size(); ++slot)
-    if (const Surface& surface = grid.surface(slot); surface.planar())
-      legacy.map_odom.push_back({grid.centre(slot).cast<float>() + surface.mean_m, surface.normal});
+  read_planes(odometry.map().fine(), legacy.map_odom);
   return legacy;
 }
 

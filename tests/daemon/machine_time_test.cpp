@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/stage_stopwatch.hpp"
+#include "daemon/machine_time.hpp"
 
 #include <gtest/gtest.h>
 
 #include <chrono>
 #include <ctime>
-
-#include "daemon/machine_time.hpp"
 
 namespace locus::daemon {
 namespace {

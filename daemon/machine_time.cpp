@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/stage_stopwatch.hpp"
+#include "daemon/machine_time.hpp"
 
 #include <algorithm>
 #include <cassert>
 #include <ctime>
-
-#include "daemon/machine_time.hpp"
 
 namespace locus::daemon {
 
