@@ -13,7 +13,7 @@
 #include <sstream>
 
 #include "config/config_fields.hpp"
-#include "config/nearest_word.hpp"
+#include "config/mistyped.hpp"
 #include "config/yaml_values.hpp"
 
 namespace locus {

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/figures_json.hpp"
-
 #include <algorithm>
-#include <cmath>
-#include <fstream>
+#include <array>
+#include <cstddef>
 #include <string>
+#include <vector>
+
+#include "config/config_yaml.hpp"
+#include "core/base/pose.hpp"
+#include "daemon/figures.hpp"
+#include "drivers/net/datagram.hpp"
 
 namespace locus::daemon {
 
@@ -12,94 +16,177 @@ using nlohmann::ordered_json;
 
 namespace {
 
-double mean(double sum, std::uint64_t sweeps) {
-  return rounded(sum / static_cast<double>(std::max<std::uint64_t>(1, sweeps)));
+template <class T> ordered_json text_or_null(const std::optional<T>& value, const auto& to_text) {
+  return value ? ordered_json(std::string{to_text(*value)}) : ordered_json(nullptr);
+}
+
+ordered_json ms_since(Stamp then) {
+  const std::optional<Duration> since = time_since(then);
+  return since ? ordered_json(rounded(1e3 * to_seconds(*since))) : ordered_json(nullptr);
+}
+
+/// Counts by the names of `E`: of the first `always` each, of the others those that are not zero.
+template <class E, std::size_t kCount>
+ordered_json counts_json(const std::array<std::uint64_t, kCount>& counts, std::size_t always = kCount) {
+  ordered_json json;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    if (i < always || counts[i] > 0)
+      json[std::string{to_string(static_cast<E>(i))}] = counts[i];
+  }
+  return json;
+}
+
+ordered_json percentiles_json(const Percentiles& p) {
+  return {{"p50", rounded(p.p50)}, {"p90", rounded(p.p90)}, {"p99", rounded(p.p99)}, {"max", rounded(p.max)}};
+}
+
+ordered_json packets_json(const PacketCounters& counters) {
+  return {{"received", counters.received},
+          {"data", counters.data},
+          {"position", counters.position},
+          {"lost", counters.lost},
+          {"reordered", counters.reordered},
+          {"clock_steps", counters.clock_steps},
+          {"rejected", counts_json<PacketError>(counters.rejected)}};
+}
+
+ordered_json all_packets_json(const Figures& figures) {
+  ordered_json json{{"total", packets_json(figures.ingest.total)}};
+  for (std::size_t i = 0; i < figures.config.lidars.size(); ++i)
+    json[figures.config.lidars[i].name] = packets_json(figures.ingest.lidars[i].packets);
+  if (figures.live)
+    json["kernel_drops"] = figures.live->kernel_drops;
+  return json;
+}
+
+/// As what its packets are read, null before the first good one; of a service, how it is heard, too.
+ordered_json lidar_json(const Figures& figures, std::size_t i) {
+  const auto name = [](auto value) { return velodyne::to_string(value); };
+  const LidarOptions& options = figures.config.lidars[i];
+  const IngestReport::Lidar& lidar = figures.ingest.lidars[i];
+  ordered_json json{{"model", text_or_null(lidar.model, name)},
+                    {"return_mode", text_or_null(lidar.return_mode, name)},
+                    {"rpm", rounded(lidar.rotation_rate_rpm)}};
+  if (figures.live)
+    json.update({{"port", options.port},
+                 {"source_ip", text_or_null(lidar.source_ip, dotted)},
+                 {"refused_ip", text_or_null(lidar.refused_ip, dotted)},
+                 {"heard_ms_ago", ms_since(lidar.last_heard)},
+                 {"pps", to_string(lidar.pps)},
+                 {"problem", problem_of(options, lidar)}});
+  return json;
+}
+
+ordered_json source_json(const Figures& figures, std::size_t i) {
+  constexpr std::size_t kAlwaysTold = 7; ///< reasons; the others are rare, and told where they occur
+  const IngestReport::Source& source = figures.ingest.sources[i];
+  ordered_json json{{"received", source.counters.received},
+                    {"used_sweeps", figures.sweeps.used_sweeps[i]},
+                    {"rejected", counts_json<HealthReason>(source.counters.rejected, kAlwaysTold)},
+                    {"health_changes", source.counters.health_changes}};
+  if (figures.live || !source.verdict.empty())
+    json["verdict"] = source.verdict;
+  if (figures.live)
+    json.update({{"health", health_of(source)},
+                 {"heard_ms_ago", ms_since(source.last_heard)},
+                 {"writers", figures.live->link.sources[i].writers},
+                 {"refused", figures.live->link.sources[i].refused},
+                 {"health_refused", figures.live->link.sources[i].health_refused}});
+  return json;
+}
+
+ordered_json estimate_json(const SweepFigures& sweeps) {
+  if (!sweeps.last)
+    return {{"rate_hz", rounded(sweeps.rate_hz)}, {"state", "waiting"}};
+  const OdometryEstimate& last = *sweeps.last;
+  const Eigen::Vector3d& p = last.T_odom_base.translation;
+  const Eigen::Vector3d rpy_deg = to_rpy_rad(last.T_odom_base.rotation) / kRadPerDeg;
+  std::vector<double> covariance;
+  covariance.reserve(36);
+  for (int i = 0; i < 36; ++i)
+    covariance.push_back(last.pose_covariance(i / 6, i % 6));
+  return {{"rate_hz", rounded(sweeps.rate_hz)},
+          {"state", to_string(last.state)},
+          {"age_ms", ms_since(last.stamp)},
+          {"t_ns", to_ns(last.stamp)},
+          {"pose", {{"xyz_m", {p.x(), p.y(), p.z()}}, {"rpy_deg", {rpy_deg.x(), rpy_deg.y(), rpy_deg.z()}}}},
+          {"covariance", covariance},
+          {"observability", std::vector<double>(last.observability.begin(), last.observability.end())}};
+}
+
+/// The means are those over all sweeps.
+ordered_json sweeps_json(const SweepFigures& sweeps) {
+  const auto mean = [&](double sum) {
+    return rounded(sum / static_cast<double>(std::max<std::uint64_t>(1, sweeps.sweeps)));
+  };
+  ordered_json stages;
+  for (std::size_t i = 0; i < kStages; ++i)
+    stages[std::string{to_string(static_cast<Stage>(i))}] = mean(1e3 * to_seconds(sweeps.stages[i]));
+  return {{"process_ms", percentiles_json(sweeps.process_ms)},
+          {"process_cpu_ms", percentiles_json(sweeps.process_cpu_ms)},
+          {"stage_ms", stages},
+          {"points", {{"raw_mean", mean(sweeps.raw_points)}, {"filtered_mean", mean(sweeps.filtered_points)}}},
+          {"iterations_mean",
+           {{"scan_to_scan", mean(sweeps.scan_to_scan_iterations)},
+            {"scan_to_submap", mean(sweeps.scan_to_submap_iterations)}}},
+          {"largest_speed_mps", rounded(sweeps.largest_speed_mps)}};
+}
+
+ordered_json live_json(const Figures& figures, const Figures::Live& live) {
+  const SweepBuilder::Counters& builder = figures.ingest.sweeps;
+  ordered_json json{{"flat_ground", to_string(live.flat_ground)},
+                    {"dropped",
+                     {{"late_packets", builder.late_packets},
+                      {"overflowed_points", builder.overflowed_points},
+                      {"motion_samples", live.motion_drops},
+                      {"flood_datagrams", live.filtered},
+                      {"flat_ground_messages", live.link.flat_ground_refused},
+                      {"estimates_unfetched", live.unfetched},
+                      {"estimates_unpublished", live.unpublished}}},
+                    {"restarts", builder.restarts}};
+  if (const auto& recording = live.recording)
+    json["recording"] = {
+        {"run", recording->run.string()},  {"mb", rounded(1e-6 * static_cast<double>(recording->bytes))},
+        {"recorded", recording->recorded}, {"dropped", recording->dropped},
+        {"unfit", recording->unfit},       {"problem", recording->problem}};
+  json["dds"] = {{"connected", live.link.connected},
+                 {"domain", figures.config.dds.domain},
+                 {"interface", figures.config.dds.interface},
+                 {"attempts", live.link.attempts},
+                 {"problem", live.link.connected ? "" : live.link.problem}};
+  return json;
 }
 
 } // namespace
 
-void SweepSums::add(const ProcessedSweep& sweep) {
-  const OdometryEstimate& estimate = sweep.estimate;
-  ++sweeps;
-  raw_points += static_cast<double>(sweep.raw_returns);
-  filtered_points += static_cast<double>(estimate.points);
-  scan_to_scan_iterations += estimate.scan_to_scan.iterations;
-  scan_to_submap_iterations += estimate.scan_to_submap.iterations;
-  const PriorSource& prior = estimate.prior;
-  if (prior.rotation >= 0)
-    ++used_sweeps[static_cast<std::size_t>(prior.rotation)];
-  if (prior.translation >= 0 && prior.translation != prior.rotation)
-    ++used_sweeps[static_cast<std::size_t>(prior.translation)];
-}
-
-double rounded(double value) { return std::round(value * 1e4) / 1e4; }
-
-ordered_json to_json(const PacketCounters& counters) {
-  ordered_json rejected;
-  for (std::size_t i = 0; i < kPacketErrorCount; ++i)
-    rejected[std::string{to_string(static_cast<PacketError>(i))}] = counters.rejected[i];
-  return {{"received", counters.received}, {"data", counters.data},           {"position", counters.position},
-          {"lost", counters.lost},         {"reordered", counters.reordered}, {"clock_steps", counters.clock_steps},
-          {"rejected", rejected}};
-}
-
-ordered_json model_json(const IngestReport::Lidar& lidar) {
-  const auto name_or_null = [](const auto& value) {
-    return value ? ordered_json(std::string{velodyne::to_string(*value)}) : ordered_json(nullptr);
-  };
-  return {{"model", name_or_null(lidar.model)},
-          {"return_mode", name_or_null(lidar.return_mode)},
-          {"rpm", rounded(lidar.rotation_rate_rpm)}};
-}
-
-ordered_json to_json(const SweepCounters& counters) {
-  return {{"seen", counters.seen},
-          {"processed", counters.processed},
-          {"dropped", counters.dropped},
-          {"failed", counters.failed}};
-}
-
-ordered_json to_json(const Percentiles& p) {
-  return {{"p50", rounded(p.p50)}, {"p90", rounded(p.p90)}, {"p99", rounded(p.p99)}, {"max", rounded(p.max)}};
-}
-
-ordered_json to_json(const SourceCounters& counters, std::uint64_t used_sweeps) {
-  constexpr std::size_t kAlwaysTold = 7; ///< reasons; the others are rare, and told where they occur
-  ordered_json rejected;
-  for (std::size_t reason = 0; reason < kHealthReasonCount; ++reason) {
-    if (reason < kAlwaysTold || counters.rejected[reason] > 0)
-      rejected[std::string{to_string(static_cast<HealthReason>(reason))}] = counters.rejected[reason];
-  }
-  return {{"received", counters.received},
-          {"used_sweeps", used_sweeps},
-          {"rejected", rejected},
-          {"health_changes", counters.health_changes}};
-}
-
-ordered_json points_json(const SweepSums& sums) {
-  return {{"raw_mean", mean(sums.raw_points, sums.sweeps)}, {"filtered_mean", mean(sums.filtered_points, sums.sweeps)}};
-}
-
-ordered_json iterations_json(const SweepSums& sums) {
-  return {{"scan_to_scan", mean(sums.scan_to_scan_iterations, sums.sweeps)},
-          {"scan_to_submap", mean(sums.scan_to_submap_iterations, sums.sweeps)}};
-}
-
-ordered_json stages_json(const StageTimes& totals, std::uint64_t sweeps) {
-  ordered_json stages;
-  for (std::size_t i = 0; i < kStages; ++i)
-    stages[std::string{to_string(static_cast<Stage>(i))}] = mean(1e3 * to_seconds(totals[i]), sweeps);
-  return stages;
-}
-
-/// Not from getrusage(): its figure survives exec, so it may be that of the program that started this one.
-double peak_rss_mb() {
-  std::ifstream status{"/proc/self/status"};
-  for (std::string word; status >> word;) {
-    if (double kib = 0; word == "VmHWM:" && status >> kib)
-      return kib * 1024.0 / 1e6;
-  }
-  return 0.0;
+ordered_json to_json(const Figures& figures) {
+  const Config& config = figures.config;
+  const SweepCounters& counters = figures.counters;
+  ordered_json json{{"version", LOCUS_VERSION},
+                    {"capture", figures.capture},
+                    {"config_sha256", config_sha256(config)},
+                    {"threads", config.odometry.threads},
+                    {"isa", to_string(config.odometry.isa)},
+                    {"duration_s", rounded(to_seconds(figures.duration))},
+                    {"wall_s", rounded(to_seconds(figures.spent.wall))},
+                    {"cpu_s", rounded(to_seconds(figures.spent.cpu))},
+                    {"peak_rss_mb", rounded(peak_rss_mb())}};
+  if (figures.live)
+    json.update(estimate_json(figures.sweeps));
+  json["packets"] = all_packets_json(figures);
+  for (std::size_t i = 0; i < config.lidars.size(); ++i)
+    json["lidars"][config.lidars[i].name] = lidar_json(figures, i);
+  json["sweeps"] = {{"seen", counters.seen},
+                    {"processed", counters.processed},
+                    {"dropped", counters.dropped},
+                    {"failed", counters.failed}};
+  json.update(sweeps_json(figures.sweeps));
+  json["sources"] = ordered_json::object();
+  for (std::size_t i = 0; i < config.odometry.motion_sources.size(); ++i)
+    json["sources"][config.odometry.motion_sources[i].name] = source_json(figures, i);
+  if (figures.live)
+    json.update(live_json(figures, *figures.live));
+  return json;
 }
 
 } // namespace locus::daemon

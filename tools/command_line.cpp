@@ -3,7 +3,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "config/command_line.hpp"
+#include "config/mistyped.hpp"
 #include "locus_replay/failure.hpp"
 
 namespace locus::tools {

@@ -8,7 +8,6 @@
 
 #include <pthread.h>
 
-#include "daemon/dds/admission.hpp"
 #include "daemon/dds/dds_node.hpp"
 #include "daemon/machine_time.hpp"
 
@@ -230,7 +229,7 @@ bool RosLink::publish(const DiagnosticsMessage& diagnostics) {
   return to != nullptr && to->diagnostics.write(diagnostics.message());
 }
 
-RosLink::Status RosLink::status() const {
+LinkFigures RosLink::status() const {
   const std::scoped_lock lock(status_mutex_);
   return status_;
 }

@@ -14,6 +14,7 @@
 
 #include "config/config.hpp"
 #include "daemon/dds/ros_messages.hpp"
+#include "daemon/figures.hpp"
 #include "daemon/input.hpp"
 
 namespace locus::daemon {
@@ -34,21 +35,6 @@ class RosLink {
  public:
   using Sink = std::function<void(const RosInput&)>;
 
-  /// What is to be told of the link.
-  struct Status {
-    bool connected = false;
-    std::uint64_t attempts = 0; ///< so far, the one that succeeded included
-    std::string problem;        ///< why the last one failed
-    struct Source {
-      std::uint32_t writers = 0;        ///< that send its topic now
-      std::uint64_t received = 0;       ///< samples, those refused included
-      std::uint64_t refused = 0;        ///< of other writers than the first, or more than any sensor sends
-      std::uint64_t health_refused = 0; ///< of its health topic, the same
-    };
-    std::vector<Source> sources;           ///< by the index of the configuration
-    std::uint64_t flat_ground_refused = 0; ///< of its topic, the same
-  };
-
   /// Begins at once and does not wait.
   RosLink(const Config& config, Sink sink);
   ~RosLink();
@@ -63,7 +49,7 @@ class RosLink {
   bool publish(const DiagnosticsMessage& diagnostics);
 
   /// Any thread.
-  [[nodiscard]] Status status() const;
+  [[nodiscard]] LinkFigures status() const;
   /// Grows as long as the thread of the link lives, at least ten times a second.
   [[nodiscard]] std::uint64_t progress() const { return progress_.load(std::memory_order_relaxed); }
 
@@ -83,7 +69,7 @@ class RosLink {
   std::unique_ptr<Session> session_;         ///< made by the thread of the link
   std::atomic<Session*> connected_{nullptr}; ///< the same once it is complete
   mutable std::mutex status_mutex_;          ///< no thread of the packet path takes it
-  Status status_;
+  LinkFigures status_;
   std::atomic<std::uint64_t> progress_{0};
   std::atomic<bool> stopping_{false};
   std::thread thread_;

@@ -51,7 +51,7 @@ Expected<ControlRequest, std::string> parse_control_request(std::string_view mes
     const auto request = nlohmann::json::parse(message);
     const std::string command = request.at("command");
     if (command == "status")
-      return ControlRequest{ShowStatus{}};
+      return ControlRequest{ShowStatus{request.value("text", false)}};
     if (command == "save-map")
       return ControlRequest{SaveMap{}};
     if (command == "flat-ground")

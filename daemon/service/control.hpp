@@ -24,7 +24,9 @@
 namespace locus::daemon {
 
 /// What locusctl may ask for.
-struct ShowStatus {};
+struct ShowStatus {
+  bool as_text = false; ///< for human eyes; else as JSON
+};
 struct SaveMap {};
 struct SetFlatGround {
   FlatGround mode;
@@ -35,9 +37,10 @@ struct Reset {
 struct Reload {};
 using ControlRequest = std::variant<ShowStatus, SaveMap, SetFlatGround, Reset, Reload>;
 
-/// Of the bytes of one message, which may be anything: {"command": "status" | "save-map" | "reload"}, {"command":
-/// "flat-ground", "mode": "on" | "off" | "auto"}, {"command": "reset"} with "pose": [x, y, z, roll, pitch, yaw] in
-/// metres and degrees if need be. Fails with one line for the user. Any thread.
+/// Of the bytes of one message, which may be anything: {"command": "save-map" | "reload"}, {"command": "status"} with
+/// "text": true for an answer {"text": "..."}, {"command": "flat-ground", "mode": "on" | "off" | "auto"}, {"command":
+/// "reset"} with "pose": [x, y, z, roll, pitch, yaw] in metres and degrees if need be. Fails with one line for the
+/// user. Any thread.
 Expected<ControlRequest, std::string> parse_control_request(std::string_view message);
 
 /// A file descriptor, closed at the end of its life.

@@ -7,8 +7,8 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "config/command_line.hpp"
 #include "config/config_yaml.hpp"
+#include "config/mistyped.hpp"
 #include "daemon/service/log.hpp"
 #include "daemon/service/service.hpp"
 

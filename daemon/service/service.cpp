@@ -18,7 +18,6 @@
 #include "daemon/dds/dds_node.hpp"
 #include "daemon/machine_time.hpp"
 #include "daemon/service/machine.hpp"
-#include "daemon/service/status.hpp"
 #include "drivers/lidar_input.hpp"
 
 namespace locus::daemon {
@@ -201,8 +200,11 @@ std::optional<ControlServer::Answer> Service::answer(const ControlRequest& reque
   return std::visit([this](const auto& one) { return answer(one); }, request);
 }
 
-std::optional<ControlServer::Answer> Service::answer(ShowStatus /*request*/) {
-  return ControlServer::Answer{status_json(*session_), {}};
+std::optional<ControlServer::Answer> Service::answer(ShowStatus request) {
+  const Figures figures = session_->figures();
+  if (request.as_text)
+    return ControlServer::Answer{{{"text", to_text(figures)}}, {}};
+  return ControlServer::Answer{to_json(figures), {}};
 }
 
 std::optional<ControlServer::Answer> Service::answer(SetFlatGround request) {
@@ -237,21 +239,18 @@ std::optional<ControlServer::Answer> Service::answer(SaveMap /*request*/) {
 void Service::look_after() {
   if (!session_)
     return;
-  watch_->look();
+  const Figures figures = session_->figures();
+  watch_->look(figures);
   watchdog_.look(*session_);
-  const auto last = session_->figures().snapshot().last;
+  const auto& last = figures.sweeps.last;
   const std::optional<TrackingState> state = last ? std::optional{last->state} : std::nullopt;
   const Duration now = read_clock(CLOCK_MONOTONIC);
   if (state == told_state_ && now - told_ < kTellEvery)
     return;
   told_state_ = state;
   told_ = now;
-  tell_world();
-}
-
-void Service::tell_world() {
-  sd_notify(0, fmt::format("STATUS={}", status_line(*session_)).c_str());
-  session_->link().publish(DiagnosticsMessage(diagnostics(*session_), Stamp{read_clock(CLOCK_REALTIME)}));
+  sd_notify(0, fmt::format("STATUS={}", status_line(figures)).c_str());
+  session_->link().publish(DiagnosticsMessage(diagnostics(figures), Stamp{read_clock(CLOCK_REALTIME)}));
 }
 
 } // namespace locus::daemon

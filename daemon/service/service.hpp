@@ -11,7 +11,7 @@
 #include "daemon/service/control.hpp"
 #include "daemon/service/log.hpp"
 #include "daemon/service/session.hpp"
-#include "daemon/service/watch.hpp"
+#include "daemon/service/status.hpp"
 
 namespace locus::daemon {
 
@@ -44,7 +44,6 @@ class Service {
   ControlServer::Answer reload();
   std::optional<std::string> go_on_with(const Config& config);
   void look_after();
-  void tell_world();
   bool take_signal();
 
   std::filesystem::path config_file_;

@@ -18,8 +18,6 @@ namespace {
 
 constexpr Duration kDiskRound = std::chrono::milliseconds{100}; ///< between two looks for what is to be written
 
-constexpr std::array<std::string_view, 4> kStateNames{"tracking", "degenerate", "dead_reckoning", "standstill"};
-
 OdometryReport report_of(const OdometryEstimate& e) {
   return {e.stamp, e.T_odom_base, e.pose_covariance, e.twist_base, e.twist_covariance};
 }
@@ -35,8 +33,6 @@ std::filesystem::path record_folder(const std::filesystem::path& folder) {
 }
 
 } // namespace
-
-std::string_view to_string(TrackingState state) { return kStateNames[static_cast<std::size_t>(state)]; }
 
 Expected<std::unique_ptr<Session>, std::string> Session::start(const Config& config, std::span<const int> inherited,
                                                                std::optional<SavedState> state, Log& log) {
@@ -194,21 +190,30 @@ void Session::set_flat_ground(FlatGround mode) {
 void Session::publish() {
   while (!stopping_.load(std::memory_order_relaxed)) {
     publisher_progress_.fetch_add(1, std::memory_order_relaxed);
-    if (const auto done = pipeline_->next(std::chrono::milliseconds{50})) {
-      const bool published = link_.publish(report_of(done->estimate), done->estimate.state);
-      figures_.take(*done, published);
-      tell(*done);
-    }
+    if (const auto done = pipeline_->next(std::chrono::milliseconds{50}))
+      publish(*done);
     while (const auto sample = pipeline_->next_fast())
       link_.publish_fast(report_of(*sample));
     while (const auto event = pipeline_->next_health_event())
       tell(*event);
-    if (const IngestReport* report = pipeline_->next_report())
-      figures_.take(*report);
+    if (const IngestReport* report = pipeline_->next_report()) {
+      const std::scoped_lock lock(told_mutex_);
+      told_.ingest = *report;
+    }
   }
 }
 
-void Session::tell(const ProcessedSweep& done) {
+void Session::publish(const ProcessedSweep& done) {
+  const bool is_published = link_.publish(report_of(done.estimate), done.estimate.state);
+  {
+    const std::scoped_lock lock(told_mutex_);
+    told_.sweeps.take(done);
+    told_.unpublished += is_published ? 0 : 1;
+  }
+  tell(done.estimate.state);
+}
+
+void Session::tell(TrackingState state) {
   if (const Resumed resumed = resumed_.load(std::memory_order_relaxed); tells_resumed_ && resumed != Resumed::unknown) {
     tells_resumed_ = false;
     if (resumed == Resumed::yes)
@@ -216,7 +221,6 @@ void Session::tell(const ProcessedSweep& done) {
     else
       log_.warn("a fresh start: the first sweep does not fit the saved state");
   }
-  const TrackingState state = done.estimate.state;
   if (told_state_ == state)
     return;
   told_state_ = state;
@@ -254,13 +258,27 @@ void Session::tell(const HealthEvent& event) {
               {{"LOCUS_SOURCE", name}, {"LOCUS_REASON", std::string{to_string(event.reason)}}});
 }
 
-std::optional<Recorder::Status> Session::recording() const {
-  return recorder_ ? std::optional{recorder_->status()} : std::nullopt;
+Figures Session::figures() const {
+  Figures figures{.config = config_, .spent = MachineTime::now() - started_};
+  figures.duration = figures.spent.wall;
+  figures.counters = pipeline_->counters();
+  Figures::Live& live = figures.live.emplace();
+  live.flat_ground = flat_ground();
+  live.kernel_drops = input_.kernel_drops();
+  live.filtered = input_.filtered();
+  live.motion_drops = input_.motion_drops();
+  live.unfetched = pipeline_->unfetched();
+  live.link = link_.status();
+  if (recorder_) {
+    live.recording = recorder_->status();
+    figures.capture = live.recording->run.string();
+  }
+  const std::scoped_lock lock(told_mutex_);
+  figures.ingest = told_.ingest;
+  figures.sweeps = told_.sweeps.figures();
+  live.unpublished = told_.unpublished;
+  return figures;
 }
-
-Duration Session::age() const { return (MachineTime::now() - started_).wall; }
-
-Duration Session::cpu() const { return (MachineTime::now() - started_).cpu; }
 
 Session::Progress Session::progress() const {
   return {pipeline_->progress(), publisher_progress_.load(std::memory_order_relaxed), link_.progress()};

@@ -14,18 +14,15 @@
 #include "config/config.hpp"
 #include "core/base/expected.hpp"
 #include "daemon/dds/ros_link.hpp"
+#include "daemon/figures.hpp"
 #include "daemon/input.hpp"
 #include "daemon/live_pipeline.hpp"
 #include "daemon/recorder.hpp"
 #include "daemon/service/cloud_publisher.hpp"
-#include "daemon/service/live_figures.hpp"
 #include "daemon/service/log.hpp"
 #include "daemon/service/saved_state.hpp"
 
 namespace locus::daemon {
-
-/// As summaries and logs epoch it.
-std::string_view to_string(TrackingState state);
 
 /// The service as one configuration makes it: sockets, DDS, the live threads, the publisher. A reload ends one and
 /// begins another.
@@ -39,15 +36,10 @@ class Session {
   Session& operator=(const Session&) = delete;
 
   [[nodiscard]] const Config& config() const { return config_; }
-  [[nodiscard]] const LiveFigures& figures() const { return figures_; }
   [[nodiscard]] const LiveInput& input() const { return input_; }
   [[nodiscard]] RosLink& link() { return link_; }
-  [[nodiscard]] LivePipeline& pipeline() { return *pipeline_; }
-  [[nodiscard]] Duration age() const;
-  /// That the process, all threads of it, has spent in that time.
-  [[nodiscard]] Duration cpu() const;
-  /// Nothing where nothing is to be recorded.
-  [[nodiscard]] std::optional<Recorder::Status> recording() const;
+  /// As they are now; the session must outlive them.
+  [[nodiscard]] Figures figures() const;
 
   /// A thread has done nothing since the last call if its number is the same.
   struct Progress {
@@ -81,13 +73,20 @@ class Session {
   void receive(const RosInput& input);
   void take(FlatGroundWord word);
   void publish();
-  void tell(const ProcessedSweep& done);
+  void publish(const ProcessedSweep& done);
+  void tell(TrackingState state);
   void tell(const HealthEvent& event);
 
   Config config_;
   Log& log_;
   MachineTime started_;
-  LiveFigures figures_;
+  struct Told { ///< what the publisher has heard
+    SweepTally sweeps{600};
+    IngestReport ingest;
+    std::uint64_t unpublished = 0;
+  };
+  Told told_;
+  mutable std::mutex told_mutex_; ///< of the publisher and those who ask for figures
   LiveInput input_;
   std::atomic<FlatGround> flat_ground_;
   Duration flat_ground_changed_{};     ///< of the thread of the link

@@ -2,17 +2,15 @@
 #include "daemon/service/status.hpp"
 
 #include <algorithm>
-#include <array>
 #include <ctime>
-#include <string>
+#include <utility>
 
 #include <fmt/format.h>
+#include <systemd/sd-daemon.h>
 
-#include "config/config_yaml.hpp"
-#include "core/base/pose.hpp"
-#include "daemon/figures_json.hpp"
 #include "daemon/machine_time.hpp"
-#include "drivers/net/ip_address.hpp"
+#include "daemon/service/machine.hpp"
+#include "drivers/net/datagram.hpp"
 
 namespace locus::daemon {
 
@@ -20,34 +18,10 @@ using nlohmann::ordered_json;
 
 namespace {
 
-/// Estimates older than this say nothing about now.
+using Level = Diagnostic::Level;
+
+/// Estimates and packets older than this say nothing about now.
 constexpr Duration kStale = std::chrono::seconds{2};
-
-/// Milliseconds since then; null for never.
-ordered_json ms_since(Stamp then) {
-  if (then == Stamp{})
-    return nullptr;
-  return rounded(1e3 * to_seconds(Stamp{read_clock(CLOCK_REALTIME)} - then));
-}
-
-/// What its packets tell is wrong with a lidar, though it may be heard; empty if nothing is.
-std::string problem_of(const LidarOptions& options, const IngestReport::Lidar& lidar) {
-  return shared_port(options, lidar).value_or(unknown_model(options, lidar).value_or(""));
-}
-
-ordered_json lidar_json(const LidarOptions& options, const IngestReport::Lidar& lidar) {
-  const auto address_or_null = [](const std::optional<std::uint32_t>& ip) {
-    return ip ? ordered_json(dotted(*ip)) : ordered_json(nullptr);
-  };
-  ordered_json json{{"port", options.port},
-                    {"source_ip", address_or_null(lidar.source_ip)},
-                    {"refused_ip", address_or_null(lidar.refused_ip)}};
-  json.update(model_json(lidar));
-  json["heard_ms_ago"] = ms_since(lidar.last_heard);
-  json["pps"] = to_string(lidar.pps);
-  json["problem"] = problem_of(options, lidar);
-  return json;
-}
 
 /// "a.b.c": "1" of everything below `json`, as diagnostics have it.
 void flatten(const ordered_json& json, const std::string& prefix,
@@ -60,166 +34,269 @@ void flatten(const ordered_json& json, const std::string& prefix,
   }
 }
 
-Diagnostic with_values(Diagnostic::Level level, const std::string& name, const std::string& message,
-                       const ordered_json& json) {
+Diagnostic diagnostic(Level level, const std::string& name, const std::string& message, const ordered_json& values) {
   Diagnostic diagnostic{level, "locusd" + name, message, {}};
-  flatten(json, "", diagnostic.values);
+  flatten(values, "", diagnostic.values);
   return diagnostic;
 }
 
-ordered_json subset(const ordered_json& json, std::initializer_list<const char*> keys) {
-  ordered_json part;
-  for (const char* key : keys)
-    part[key] = json[key];
-  return part;
+Diagnostic odometry_diagnostic(const Figures& figures, const ordered_json& json) {
+  ordered_json values;
+  for (const char* key : {"rate_hz", "sweeps", "process_ms", "process_cpu_ms", "stage_ms", "points", "iterations_mean",
+                          "dropped", "restarts", "flat_ground", "cpu_s", "peak_rss_mb"})
+    values[key] = json[key];
+  const std::optional<OdometryEstimate>& last = figures.sweeps.last;
+  if (!last || time_since(last->stamp).value_or(Duration::max()) >= kStale)
+    return diagnostic(Level::stale, "", "no lidar data; look whether the lidars send", values);
+  const bool is_well = last->state == TrackingState::tracking || last->state == TrackingState::standstill;
+  return diagnostic(is_well ? Level::ok : Level::warning, "", std::string{to_string(last->state)}, values);
 }
 
-ordered_json packets_json(const Config& config, const IngestReport& ingest) {
-  ordered_json packets{{"total", to_json(ingest.total)}};
-  for (std::size_t i = 0; i < config.lidars.size(); ++i)
-    packets[config.lidars[i].name] = to_json(ingest.lidars[i].packets);
-  return packets;
-}
-
-ordered_json sources_json(const Config& config, const LiveFigures::Snapshot& figures, const RosLink::Status& link) {
-  ordered_json sources = ordered_json::object();
-  for (std::size_t i = 0; i < config.odometry.motion_sources.size(); ++i) {
-    const IngestReport::Source& source = figures.ingest.sources[i];
-    ordered_json json = to_json(source.counters, figures.sums.used_sweeps[i]);
-    json["health"] = source.healthy ? "healthy" : source.counters.received == 0 ? "never heard" : "lost";
-    json["heard_ms_ago"] = ms_since(source.last_heard);
-    json["verdict"] = source.verdict;
-    json["writers"] = link.sources[i].writers;
-    json["refused"] = link.sources[i].refused;
-    json["health_refused"] = link.sources[i].health_refused;
-    sources[config.odometry.motion_sources[i].name] = json;
-  }
-  return sources;
-}
-
-void add_estimate(const LiveFigures::Snapshot& figures, ordered_json& json) {
-  json["rate_hz"] = rounded(figures.rate_hz);
-  if (!figures.last) {
-    json["state"] = "waiting";
-    return;
-  }
-  const OdometryEstimate& last = *figures.last;
-  const Eigen::Vector3d& p = last.T_odom_base.translation;
-  const Eigen::Vector3d rpy_deg = to_rpy_rad(last.T_odom_base.rotation) / kRadPerDeg;
-  json["state"] = to_string(last.state);
-  json["age_ms"] = ms_since(last.stamp);
-  json["t_ns"] = to_ns(last.stamp);
-  json["pose"] = {{"xyz_m", {p.x(), p.y(), p.z()}}, {"rpy_deg", {rpy_deg.x(), rpy_deg.y(), rpy_deg.z()}}};
-  std::vector<double> covariance;
-  covariance.reserve(36);
-  for (int i = 0; i < 36; ++i)
-    covariance.push_back(last.pose_covariance(i / 6, i % 6));
-  json["covariance"] = covariance;
-  json["observability"] = std::vector<double>(last.observability.begin(), last.observability.end());
+Diagnostic lidar_diagnostic(const LidarOptions& options, const IngestReport::Lidar& lidar, const ordered_json& values) {
+  const std::optional<Duration> silence = lidar.packets.data > 0 ? time_since(lidar.last_heard) : std::nullopt;
+  const bool is_silent = silence && *silence > kStale;
+  const std::string problem = problem_of(options, lidar);
+  return diagnostic(!silence           ? Level::error
+                    : is_silent        ? Level::stale
+                    : !problem.empty() ? Level::warning
+                                       : Level::ok,
+                    ": lidar " + options.name,
+                    !problem.empty() ? problem
+                    : !silence       ? "never heard; look at its cable, address and port"
+                    : is_silent      ? "silent; look at its cable and power"
+                                     : "heard",
+                    values);
 }
 
 } // namespace
 
-ordered_json status_json(Session& session) {
-  const Config& config = session.config();
-  const LiveFigures::Snapshot figures = session.figures().snapshot();
-  const RosLink::Status link = session.link().status();
-  const std::optional<Recorder::Status> recording = session.recording();
-  ordered_json json{{"version", LOCUS_VERSION},
-                    {"capture", recording ? recording->run.string() : ""},
-                    {"config_sha256", config_sha256(config)},
-                    {"threads", config.odometry.threads},
-                    {"isa", std::string(to_string(config.odometry.isa))},
-                    {"duration_s", rounded(to_seconds(session.age()))},
-                    {"wall_s", rounded(to_seconds(session.age()))},
-                    {"cpu_s", rounded(to_seconds(session.cpu()))},
-                    {"peak_rss_mb", rounded(peak_rss_mb())}};
-  add_estimate(figures, json);
-  json["packets"] = packets_json(config, figures.ingest);
-  json["packets"]["kernel_drops"] = session.input().kernel_drops();
-  json["sweeps"] = to_json(session.pipeline().counters());
-  json["process_ms"] = to_json(figures.process_ms);
-  json["process_cpu_ms"] = to_json(figures.process_cpu_ms);
-  json["stage_ms"] = stages_json(figures.stages, figures.sums.sweeps);
-  json["points"] = points_json(figures.sums);
-  json["iterations_mean"] = iterations_json(figures.sums);
-  json["sources"] = sources_json(config, figures, link);
-  for (std::size_t i = 0; i < config.lidars.size(); ++i)
-    json["lidars"][config.lidars[i].name] = lidar_json(config.lidars[i], figures.ingest.lidars[i]);
-  json["flat_ground"] = to_string(session.flat_ground());
-  const SweepBuilder::Counters& builder = figures.ingest.sweeps;
-  json["dropped"] = {{"late_packets", builder.late_packets},
-                     {"overflowed_points", builder.overflowed_points},
-                     {"motion_samples", session.input().motion_drops()},
-                     {"flood_datagrams", session.input().filtered()},
-                     {"flat_ground_messages", link.flat_ground_refused},
-                     {"estimates_unfetched", session.pipeline().unfetched()},
-                     {"estimates_unpublished", figures.unpublished}};
-  json["restarts"] = builder.restarts;
-  if (recording)
-    json["recording"] = {
-        {"run", recording->run.string()},  {"mb", rounded(1e-6 * static_cast<double>(recording->bytes))},
-        {"recorded", recording->recorded}, {"dropped", recording->dropped},
-        {"unfit", recording->unfit},       {"problem", recording->problem}};
-  json["dds"] = {{"connected", link.connected},
-                 {"domain", config.dds.domain},
-                 {"interface", config.dds.interface},
-                 {"attempts", link.attempts},
-                 {"problem", link.connected ? "" : link.problem}};
-  return json;
-}
-
-std::vector<Diagnostic> diagnostics(Session& session) {
-  using Level = Diagnostic::Level;
-  const ordered_json json = status_json(session);
-  const std::string state = json["state"];
-  const bool fresh = json.contains("age_ms") && json["age_ms"].get<double>() < 1e3 * to_seconds(kStale);
-  std::vector<Diagnostic> all;
-  all.push_back(
-      with_values(!fresh                                         ? Level::stale
-                  : state == "tracking" || state == "standstill" ? Level::ok
-                                                                 : Level::warning,
-                  "", fresh ? state : "no lidar data; look whether the lidars send",
-                  subset(json, {"rate_hz", "sweeps", "process_ms", "process_cpu_ms", "stage_ms", "points",
-                                "iterations_mean", "dropped", "restarts", "flat_ground", "cpu_s", "peak_rss_mb"})));
-  all.push_back(with_values(Level::ok, ": dds", "connected", json["dds"]));
-  if (json.contains("recording")) {
-    const std::string problem = json["recording"]["problem"];
-    all.push_back(with_values(problem.empty() ? Level::ok : Level::warning, ": recording",
-                              problem.empty() ? "recording" : problem, json["recording"]));
+/// The values are those of the JSON, so a figure that is added there is here, too.
+std::vector<Diagnostic> diagnostics(const Figures& figures) {
+  const ordered_json json = to_json(figures);
+  std::vector<Diagnostic> all{odometry_diagnostic(figures, json),
+                              diagnostic(Level::ok, ": dds", "connected", json["dds"])};
+  if (const auto& recording = figures.live->recording) {
+    const bool is_well = recording->problem.empty();
+    all.push_back(diagnostic(is_well ? Level::ok : Level::warning, ": recording",
+                             is_well ? "recording" : recording->problem, json["recording"]));
   }
-  for (const auto& [name, lidar] : json["lidars"].items()) {
-    ordered_json values = lidar;
-    values["packets"] = json["packets"][name];
-    const ordered_json& heard_ms_ago = values["heard_ms_ago"];
-    const bool heard = values["packets"]["data"].get<std::uint64_t>() > 0 && !heard_ms_ago.is_null();
-    const bool silent = heard && heard_ms_ago.get<double>() > 1e3 * to_seconds(kStale);
-    const std::string problem = values["problem"];
-    all.push_back(with_values(!heard             ? Level::error
-                              : silent           ? Level::stale
-                              : !problem.empty() ? Level::warning
-                                                 : Level::ok,
-                              ": lidar " + name,
-                              !problem.empty() ? problem
-                              : !heard         ? "never heard; look at its cable, address and port"
-                              : silent         ? "silent; look at its cable and power"
-                                               : "heard",
-                              values));
+  for (std::size_t i = 0; i < figures.config.lidars.size(); ++i) {
+    const LidarOptions& options = figures.config.lidars[i];
+    ordered_json values = json["lidars"][options.name];
+    values["packets"] = json["packets"][options.name];
+    all.push_back(lidar_diagnostic(options, figures.ingest.lidars[i], values));
   }
-  for (const auto& [name, source] : json["sources"].items()) {
-    const std::string health = source["health"];
-    all.push_back(with_values(health == "healthy" ? Level::ok : Level::warning, ": source " + name, health, source));
+  for (std::size_t i = 0; i < figures.config.odometry.motion_sources.size(); ++i) {
+    const std::string& name = figures.config.odometry.motion_sources[i].name;
+    const IngestReport::Source& source = figures.ingest.sources[i];
+    all.push_back(diagnostic(source.healthy ? Level::ok : Level::warning, ": source " + name,
+                             std::string{health_of(source)}, json["sources"][name]));
   }
   return all;
 }
 
-std::string status_line(Session& session) {
-  const LiveFigures::Snapshot figures = session.figures().snapshot();
-  if (!figures.last || read_clock(CLOCK_MONOTONIC) - figures.last_at > kStale)
+std::string status_line(const Figures& figures) {
+  const SweepFigures& sweeps = figures.sweeps;
+  if (!sweeps.last || read_clock(CLOCK_MONOTONIC) - sweeps.last_at > kStale)
     return figures.ingest.total.received == 0 ? "Waiting for the first lidar packet" : "Waiting for lidar data";
-  const SweepCounters sweeps = session.pipeline().counters();
-  return fmt::format("{}, {:.1f} Hz, {:.1f} ms a sweep, {} dropped", to_string(figures.last->state), figures.rate_hz,
-                     figures.process_ms.p50, sweeps.dropped);
+  return fmt::format("{}, {:.1f} Hz, {:.1f} ms a sweep, {} dropped", to_string(sweeps.last->state), sweeps.rate_hz,
+                     sweeps.process_ms.p50, figures.counters.dropped);
+}
+
+void Watch::look(const Figures& figures) {
+  const Figures::Live& live = *figures.live;
+  look_at_link(live.link);
+  look_at_intruders(live.link);
+  if (figures.duration > kPatience && live.link.connected)
+    look_at_sources(live.link);
+  look_at_lidars(figures);
+  look_at_verdicts(figures.ingest);
+  look_at_load(figures.counters);
+  look_at_drops(live);
+  if (live.recording)
+    look_at_recording(*live.recording);
+  if (const Duration now = read_clock(CLOCK_MONOTONIC); now - joined_ > kPatience) {
+    join_multicast(session_.config(), session_.input().sockets());
+    joined_ = now;
+  }
+}
+
+void Watch::look_at_link(const LinkFigures& link) {
+  if (link.connected && !was_connected_)
+    log_.info(fmt::format("DDS is up: domain {} on interface {}", session_.config().dds.domain,
+                          session_.config().dds.interface));
+  else if (!link.connected && link.attempts != told_attempts_)
+    log_.warn(fmt::format("{}; trying again", link.problem), {{"LOCUS_ATTEMPT", std::to_string(link.attempts)}});
+  was_connected_ = link.connected;
+  told_attempts_ = link.attempts;
+}
+
+void Watch::look_at_sources(const LinkFigures& link) {
+  const Config& config = session_.config();
+  for (std::size_t i = 0; i < link.sources.size(); ++i) {
+    const std::string& name = config.odometry.motion_sources[i].name;
+    const std::string& topic = config.source_topics[i].topic;
+    if (topic.empty() || link.sources[i].received > 0 || !unheard_.insert(name).second)
+      continue;
+    const std::string found =
+        link.sources[i].writers == 0
+            ? fmt::format("nobody is seen that publishes {}; DDS listens on interface {} in domain {}, to change with "
+                          "dds.interface and dds.domain",
+                          topic, config.dds.interface, config.dds.domain)
+            : fmt::format("{} of DDS on interface {} has {} publishers, but none has sent anything", topic,
+                          config.dds.interface, link.sources[i].writers);
+    log_.warn(fmt::format("motion source {}: not heard since the start, {} s ago: {}", name,
+                          kPatience.count() / 1'000'000'000, found),
+              {{"LOCUS_SOURCE", name}});
+  }
+}
+
+void Watch::look_at_lidars(const Figures& figures) {
+  const IngestReport& ingest = figures.ingest;
+  const std::vector<LidarOptions>& lidars = figures.config.lidars;
+  const Duration now = read_clock(CLOCK_MONOTONIC);
+  for (std::size_t i = 0; i < lidars.size(); ++i) {
+    const PacketCounters& packets = ingest.lidars[i].packets;
+    Lidar& lidar = lidars_[i];
+    const bool heard = packets.data > lidar.data;
+    if (packets.data != lidar.data || lidar.heard == Duration::zero()) { // fewer: the counters began anew
+      if (heard && !lidar.told.empty())
+        log_.info(fmt::format("lidar {}: heard", lidars[i].name), {{"LOCUS_LIDAR", lidars[i].name}});
+      lidar = {.data = packets.data,
+               .received = packets.received,
+               .heard = now,
+               .told = {},
+               .short_sweep_told = lidar.short_sweep_told,
+               .shared_port_told = lidar.shared_port_told};
+    }
+    const auto warning = short_sweep(figures.config.sweep, lidars[i].name, ingest.lidars[i].rotation_rate_rpm);
+    if (warning && !std::exchange(lidar.short_sweep_told, true))
+      log_.warn(*warning, {{"LOCUS_LIDAR", lidars[i].name}});
+    const auto shared = figures.duration > kPatience ? shared_port(lidars[i], ingest.lidars[i]) : std::nullopt;
+    if (shared && !std::exchange(lidar.shared_port_told, true))
+      log_.warn(*shared, {{"LOCUS_LIDAR", lidars[i].name}});
+    if (now - lidar.heard < kPatience)
+      continue;
+    const std::string why = why_silent(lidar, lidars[i], ingest.lidars[i]);
+    if (why == lidar.told)
+      continue;
+    lidar.told = why;
+    log_.warn(fmt::format("lidar {}: no data packet on UDP port {} for {} s; {}", lidars[i].name, lidars[i].port,
+                          std::chrono::duration_cast<std::chrono::seconds>(now - lidar.heard).count(), why),
+              {{"LOCUS_LIDAR", lidars[i].name}});
+  }
+}
+
+std::string Watch::why_silent(const Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now) {
+  const PacketCounters& packets = now.packets;
+  if (packets.received == lidar.received)
+    return "look at its power and cable, and where it sends to (locusctl sensors)";
+  if (packets[PacketError::sender] > 0 && now.refused_ip && now.source_ip)
+    return fmt::format("packets come from {}, {} {}: set lidars.{}.source_ip to that of the lidar",
+                       dotted(*now.refused_ip), options.source_ip ? "configured is" : "the lidar was",
+                       dotted(*now.source_ip), options.name);
+  if (packets.data + packets.position == packets.received)
+    return fmt::format("its position packets come, so it is on and sends the others elsewhere: locusctl sensors tells "
+                       "to which port, for lidars.{}.port",
+                       options.name);
+  const std::string unknown =
+      now.unknown_packets ? fmt::format(" ({})", velodyne::to_string(*now.unknown_packets)) : "";
+  return fmt::format("what comes is refused, for the reasons that locusctl status counts{}: is it a Velodyne, and "
+                     "lidars.{}.model the right one?",
+                     unknown, options.name);
+}
+
+/// What a check has found wrong with a source that goes on being used in part. Of one that is lost, its loss tells.
+void Watch::look_at_verdicts(const IngestReport& ingest) {
+  const auto& sources = session_.config().odometry.motion_sources;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    const std::string_view verdict = ingest.sources[i].healthy ? ingest.sources[i].verdict : std::string_view{};
+    if (!verdict.empty() && verdict != verdicts_[i])
+      log_.warn(fmt::format("motion source {} {}", sources[i].name, verdict), {{"LOCUS_SOURCE", sources[i].name}});
+    verdicts_[i] = verdict;
+  }
+}
+
+void Watch::look_at_load(const SweepCounters& counters) {
+  const Duration now = read_clock(CLOCK_MONOTONIC);
+  if (now - weighed_ < kPatience)
+    return;
+  weighed_ = now;
+  const std::uint64_t drops = counters.dropped;
+  if (drops > sweep_drops_)
+    log_.warn(fmt::format(
+        "this computer is too busy: {} sweeps were dropped within {} s; see /usr/share/doc/locusd/tuning.md, and what "
+        "else runs here",
+        drops - sweep_drops_, std::chrono::duration_cast<std::chrono::seconds>(kPatience).count()));
+  sweep_drops_ = drops;
+}
+
+void Watch::look_at_drops(const Figures::Live& live) {
+  const std::uint64_t drops = live.kernel_drops;
+  if (drops != kernel_drops_)
+    log_.warn(fmt::format("the kernel threw away {} lidar packets, for their buffer was full; sysctl "
+                          "net.core.rmem_max={}, or a higher realtime.priority",
+                          drops - kernel_drops_, UdpSocket::kWantedBufferBytes));
+  kernel_drops_ = drops;
+  const std::uint64_t filtered = live.filtered;
+  if (filtered != filtered_)
+    log_.warn(fmt::format(
+        "the ports of the lidars are flooded: the kernel has kept out {} datagrams that are no lidar's "
+        "by length or sender; tcpdump shows whose, /usr/share/doc/locusd/security.md what to set against them",
+        filtered - filtered_));
+  filtered_ = filtered;
+}
+
+void Watch::look_at_intruders(const LinkFigures& link) {
+  const Config& config = session_.config();
+  const auto tell = [this](std::uint64_t refused, const std::string& topic, const std::string& source) {
+    if (refused > 0 && intruded_.insert(topic).second)
+      log_.warn(fmt::format("{}messages on {} are refused, for another publishes there, too, or more come than any "
+                            "sensor sends; give each publisher a topic of its own",
+                            source.empty() ? "" : "motion source " + source + ": ", topic),
+                {{"LOCUS_SOURCE", source}});
+  };
+  for (std::size_t i = 0; i < link.sources.size(); ++i) {
+    const std::string& name = config.odometry.motion_sources[i].name;
+    tell(link.sources[i].refused, config.source_topics[i].topic, name);
+    tell(link.sources[i].health_refused, config.source_topics[i].health_topic, name);
+  }
+  tell(link.flat_ground_refused, config.dds.flat_ground_topic, "");
+}
+
+/// What is dropped while the disk takes nothing goes without saying.
+void Watch::look_at_recording(const Recorder::Status& recording) {
+  const std::uint64_t dropped = recording.dropped - std::min(recording.dropped, recording_.dropped);
+  if (recording_.problem.empty() && !recording.problem.empty())
+    log_.error(fmt::format("{}; the odometry goes on without a recording", recording.problem));
+  else if (!recording.run.empty() &&
+           (recording.run != recording_.run || (!recording_.problem.empty() && recording.problem.empty())))
+    log_.info(fmt::format("recording to {}", recording.run.string()));
+  else if (recording.problem.empty() && dropped > 0)
+    log_.warn(
+        fmt::format("{} inputs were not recorded, for the disk is too slow; see record in locusd.yaml(5)", dropped));
+  recording_ = recording;
+}
+
+Watchdog::Watchdog() {
+  std::uint64_t period_us = 0;
+  if (sd_watchdog_enabled(0, &period_us) > 0)
+    period_ = std::chrono::microseconds{period_us / 3};
+}
+
+void Watchdog::look(const Session& session) {
+  const Duration now = read_clock(CLOCK_MONOTONIC);
+  if (period_ == Duration::zero() || now - fed_ < period_)
+    return;
+  const Session::Progress progress = session.progress();
+  const bool all_go_on =
+      !last_ || (progress.live.ingest != last_->live.ingest && progress.live.odometry != last_->live.odometry &&
+                 progress.publisher != last_->publisher && progress.dds != last_->dds);
+  if (!all_go_on)
+    return;
+  sd_notify(0, "WATCHDOG=1");
+  fed_ = now;
+  last_ = progress;
 }
 
 } // namespace locus::daemon

@@ -1,23 +1,86 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
 #include "daemon/dds/ros_messages.hpp"
+#include "daemon/figures.hpp"
+#include "daemon/service/log.hpp"
 #include "daemon/service/session.hpp"
 
+/// What a running service tells of its figures beside to_json() and to_text(): to who administers it, to the robot's
+/// network, and to systemd. Figures are live ones.
 namespace locus::daemon {
 
-/// All that can be told of a running service: the keys of locus-replay's summary.json that make sense here, and what
-/// only a live service has.
-nlohmann::ordered_json status_json(Session& session);
-
-/// The same for /diagnostics: one line for the odometry, DDS, each lidar and each motion source, every counter in it.
-std::vector<Diagnostic> diagnostics(Session& session);
+/// For /diagnostics: one line for the odometry, DDS, each lidar and each motion source, every counter in it.
+std::vector<Diagnostic> diagnostics(const Figures& figures);
 
 /// In one line of plain words, for systemctl status.
-std::string status_line(Session& session);
+std::string status_line(const Figures& figures);
+
+/// Looks after a session a few times a second and tells what its owner should know: sensors that are not heard, a
+/// network that is not there, packets that the kernel threw away, a computer that is too busy, a disk that takes no
+/// recording. Tells each once per turn for the worse or the better. One owner.
+class Watch {
+ public:
+  /// Silence of a sensor that should have spoken by then.
+  static constexpr Duration kPatience = std::chrono::seconds{5};
+
+  Watch(Session& session, Log& log) : session_(session), log_(log) {}
+
+  /// At the figures of that session.
+  void look(const Figures& figures);
+
+ private:
+  void look_at_link(const LinkFigures& link);
+  void look_at_sources(const LinkFigures& link);
+  void look_at_lidars(const Figures& figures);
+  void look_at_verdicts(const IngestReport& ingest);
+  void look_at_load(const SweepCounters& counters);
+  void look_at_drops(const Figures::Live& live);
+  void look_at_intruders(const LinkFigures& link);
+  void look_at_recording(const Recorder::Status& recording);
+
+  /// What was last seen of a lidar.
+  struct Lidar {
+    std::uint64_t data = 0, received = 0; ///< when it was last heard
+    Duration heard{};                     ///< when that was, or since when it is waited for
+    std::string told;                     ///< why it is silent, as it was told; empty: it is not
+    bool short_sweep_told = false;
+    bool shared_port_told = false;
+  };
+  static std::string why_silent(const Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now);
+
+  Session& session_;
+  Log& log_;
+  bool was_connected_ = false;
+  std::uint64_t told_attempts_ = 0;
+  std::array<Lidar, Config::kMaxLidars> lidars_;
+  std::array<std::string_view, kMaxSources> verdicts_; ///< as they were told
+  std::set<std::string> unheard_;                      ///< sources that were told of
+  std::set<std::string> intruded_;                     ///< topics that were told of
+  std::uint64_t kernel_drops_ = 0, filtered_ = 0, sweep_drops_ = 0;
+  Recorder::Status recording_; ///< as it was told
+  Duration joined_{}, weighed_{};
+};
+
+/// Tells a hung thread from a quiet one: fed to systemd's watchdog only while all threads go on. One owner.
+class Watchdog {
+ public:
+  /// Nothing to do unless systemd asks for it (WatchdogSec=).
+  Watchdog();
+  void look(const Session& session);
+
+ private:
+  Duration period_{}; ///< zero: nobody asks
+  Duration fed_{};
+  std::optional<Session::Progress> last_;
+};
 
 } // namespace locus::daemon

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/expected.hpp"
-#include "drivers/net/datagram_source.hpp"
+#include "drivers/net/datagram.hpp"
 
 struct pcap;
 

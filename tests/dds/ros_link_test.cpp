@@ -156,7 +156,7 @@ TEST_P(Peers, AreHeardInOrderWithEveryFigure) {
     EXPECT_NEAR(odometry.sample.covariance_scale, 1.0, 1e-9);
   }
   EXPECT_EQ(inbox_.all<OutsideVerdict>().front().source, 0U);
-  const RosLink::Status status = link.status();
+  const LinkFigures status = link.status();
   EXPECT_TRUE(status.connected);
   EXPECT_EQ(status.sources[1].writers, 1U);
   EXPECT_GE(inbox_.all<ImuInput>().size(), status.sources[1].received);

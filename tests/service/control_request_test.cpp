@@ -16,6 +16,8 @@ TEST(ControlRequest, IsWhatLocusctlSends) {
     return request && std::holds_alternative<decltype(kind)>(*request);
   };
   EXPECT_TRUE(is(R"({"command": "status"})", ShowStatus{}));
+  EXPECT_FALSE(std::get<ShowStatus>(*parse_control_request(R"({"command": "status"})")).as_text);
+  EXPECT_TRUE(std::get<ShowStatus>(*parse_control_request(R"({"command": "status", "text": true})")).as_text);
   EXPECT_TRUE(is(R"({"command": "save-map", "more": 1})", SaveMap{}));
   EXPECT_TRUE(is(R"({"command": "reload"})", Reload{}));
   const auto flat = parse_control_request(R"({"command": "flat-ground", "mode": "auto"})");

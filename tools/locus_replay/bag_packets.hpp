@@ -13,7 +13,7 @@
 #include "bags/bag.hpp"
 #include "bags/messages.hpp"
 #include "config/config.hpp"
-#include "drivers/net/datagram_source.hpp"
+#include "drivers/net/datagram.hpp"
 
 namespace locus::tools {
 

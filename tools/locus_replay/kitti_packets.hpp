@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "drivers/lidar_options.hpp"
-#include "drivers/net/datagram_source.hpp"
+#include "drivers/net/datagram.hpp"
 #include "kitti/kitti_drive.hpp"
 #include "kitti/kitti_sweep.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "locus_replay/lidar_doubts.hpp"
-#include "daemon/ingest_report.hpp"
-#include "drivers/net/ip_address.hpp"
+#include "daemon/figures.hpp"
+#include "drivers/net/datagram.hpp"
 
 #include <algorithm>
 #include <optional>

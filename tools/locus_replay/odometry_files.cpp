@@ -7,24 +7,11 @@
 
 #include <fmt/format.h>
 
+#include "daemon/figures.hpp"
 #include "drivers/files/motion_files.hpp"
 
 namespace locus::tools {
 namespace {
-
-std::string_view name_of(TrackingState state) {
-  switch (state) {
-  case TrackingState::tracking:
-    return "tracking";
-  case TrackingState::degenerate:
-    return "degenerate";
-  case TrackingState::dead_reckoning:
-    return "dead_reckoning";
-  case TrackingState::standstill:
-    return "standstill";
-  }
-  return "";
-}
 
 std::string csv_header() {
   constexpr std::array<std::string_view, 6> kAxes{"x", "y", "z", "roll", "pitch", "yaw"};
@@ -59,7 +46,7 @@ std::string OdometryFiles::name_of(const PriorSource& prior) const {
 void OdometryFiles::write(const OdometryEstimate& estimate) {
   const std::int64_t ns = to_ns(estimate.stamp);
   tum_.print("{}", to_line({estimate.stamp, estimate.T_odom_base}));
-  csv_.print("{},{},{},{},{}", ns, tools::name_of(estimate.state), name_of(estimate.prior),
+  csv_.print("{},{},{},{},{}", ns, to_string(estimate.state), name_of(estimate.prior),
              estimate.scan_to_submap.iterations, estimate.scan_to_submap.inliers);
   for (int row = 0; row < 6; ++row) {
     for (int column = 0; column < 6; ++column)

@@ -8,7 +8,7 @@
 
 #include "config/config.hpp"
 #include "drivers/files/capture_folder.hpp"
-#include "drivers/net/datagram_source.hpp"
+#include "drivers/net/datagram.hpp"
 #include "locus_replay/arguments.hpp"
 #include "locus_replay/motion_recordings.hpp"
 

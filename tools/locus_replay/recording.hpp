@@ -14,7 +14,7 @@
 
 #include "daemon/input.hpp"
 #include "drivers/lidar_input.hpp"
-#include "drivers/net/datagram_source.hpp"
+#include "drivers/net/datagram.hpp"
 #include "drivers/other_maker.hpp"
 #include "faults/fault_injection.hpp"
 #include "locus_replay/motion_recordings.hpp"

@@ -76,7 +76,7 @@ Results::Results(const Arguments& arguments, const Config& config, const Recordi
 
 void Results::take(const daemon::ProcessedSweep& sweep) {
   odometry_.write(sweep.estimate);
-  figures_.take(sweep);
+  tally_.take(sweep);
   sweeps_.push_back(record_of(sweep));
   truth_.take(sweep.estimate);
   progress_.show(recording_.progress());
@@ -91,10 +91,15 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
   std::vector<SurfacePoint> map;
   read_planes(processor.odometry().map().fine(), map);
   const Accuracy accuracy = sweeps.seen > 0 ? truth_.compare(map, !arguments_.quiet) : Accuracy{};
-  const FinishedRun run{
-      arguments_.capture.string(), config_, ingest,  processor, sweeps, figures_, recording_.capture_start(),
-      recording_.duration(),       spent,   accuracy};
-  const nlohmann::ordered_json figures = write_summary(run);
+  daemon::Figures figures{.config = config_,
+                          .capture = arguments_.capture.string(),
+                          .duration = recording_.duration(),
+                          .spent = spent,
+                          .counters = sweeps,
+                          .sweeps = tally_.figures()};
+  figures.ingest.read(ingest);
+  const FinishedRun run{figures, health_events_, recording_.capture_start(), accuracy};
+  const nlohmann::ordered_json summary = write_summary(run);
   warn(recording_.warnings());
   const std::optional<std::string> backwards = recording_.runs_backwards();
   if (!has_data || backwards) {
@@ -106,7 +111,7 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
   }
   write_map(arguments_.output / "map.pcd", map);
   write_report(arguments_.output / "report.html",
-               {figures, config_, recording_.capture_start(), figures_.path_m(), sweeps_,
+               {summary, config_, recording_.capture_start(), figures.sweeps.path_m, sweeps_,
                 visible_surfaces(processor.odometry().map()), truth_.trajectory(), accuracy.trajectory});
   if (sweeps.seen == 0)
     warn({fmt::format("{}: there is lidar data and no whole sweep, which takes 0.05 to 0.2 s; look at --start and "
@@ -123,12 +128,12 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
 
 nlohmann::ordered_json Results::write_summary(const FinishedRun& run) const {
   OutputFile file(arguments_.output / "summary.json");
-  nlohmann::ordered_json figures = summary(run);
+  nlohmann::ordered_json json = summary(run);
   if (const std::optional<double> raised_deg = raised_by_deg(arguments_))
-    figures["kitti_vertical_angle_added_deg"] = *raised_deg;
-  file.print("{}\n", figures.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    json["kitti_vertical_angle_added_deg"] = *raised_deg;
+  file.print("{}\n", json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   file.close();
-  return figures;
+  return json;
 }
 
 } // namespace locus::tools

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <limits>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -31,7 +33,7 @@ class Results {
           const daemon::MachineTime& begin);
 
   void take(const daemon::ProcessedSweep& sweep);
-  void take(const HealthEvent& event) { figures_.take(event); }
+  void take(const HealthEvent& event) { health_events_.push_back(event); }
 
   /// After the last sweep. Warns of what in the input is unlikely to be what the user meant. Fails for a recording
   /// without a valid data packet: summary.json, whose counters tell why, is all that it then leaves.
@@ -46,7 +48,8 @@ class Results {
   const Recording& recording_;
   daemon::MachineTime begin_;
   OdometryFiles odometry_;
-  RunFigures figures_;
+  daemon::SweepTally tally_{std::numeric_limits<std::size_t>::max()};
+  std::vector<HealthEvent> health_events_;
   std::vector<SweepRecord> sweeps_;
   Truth truth_;
   ProgressBar progress_;

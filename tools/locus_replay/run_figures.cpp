@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "locus_replay/run_figures.hpp"
 
-#include <algorithm>
 #include <numeric>
 #include <string_view>
 
 #include <fmt/format.h>
-
-#include "config/config_yaml.hpp"
-#include "locus_replay/quantiles.hpp"
 
 namespace locus::tools {
 namespace {
@@ -16,40 +12,6 @@ namespace {
 using nlohmann::ordered_json;
 
 using daemon::rounded;
-using daemon::to_json;
-
-ordered_json packets(const LidarRouter& lidars) {
-  ordered_json packets{{"total", to_json(lidars.total())}};
-  for (const LidarInput& lidar : lidars.lidars())
-    packets[lidar.options().name] = to_json(lidar.counters());
-  return packets;
-}
-
-/// As what the packets of each lidar were read.
-ordered_json lidars(const LidarRouter& router) {
-  ordered_json lidars;
-  for (const LidarInput& lidar : router.lidars())
-    lidars[lidar.options().name] = daemon::model_json(daemon::IngestReport::Lidar::of(lidar));
-  return lidars;
-}
-
-ordered_json stages(const FinishedRun& run) {
-  daemon::StageTimes totals;
-  for (std::size_t i = 0; i < kStages; ++i)
-    totals[i] = run.ingest.stages().total(static_cast<Stage>(i)) + run.processor.stages().total(static_cast<Stage>(i));
-  return daemon::stages_json(totals, run.figures.sweeps());
-}
-
-ordered_json sources(const FinishedRun& run) {
-  ordered_json sources = ordered_json::object();
-  for (std::size_t i = 0; i < run.config.odometry.motion_sources.size(); ++i) {
-    ordered_json& source = sources[run.config.odometry.motion_sources[i].name];
-    source = to_json(run.ingest.sources().counters(i), run.figures.sums().used_sweeps[i]);
-    if (const std::string_view verdict = run.ingest.sources().verdict(i); !verdict.empty())
-      source["verdict"] = verdict;
-  }
-  return sources;
-}
 
 /// Who is right when a source and lidar contradict each other is not known.
 std::string_view reason_of(const HealthEvent& event) {
@@ -63,7 +25,7 @@ std::string readable_health(const FinishedRun& run, std::size_t source) {
   constexpr std::size_t kTold = 4; ///< a source that flaps is not worth a page
   std::string text;
   std::size_t told = 0;
-  for (const HealthEvent& event : run.figures.health_events()) {
+  for (const HealthEvent& event : run.health_events) {
     if (event.source != source || told++ >= kTold)
       continue;
     const double after_s = to_seconds(event.stamp - run.capture_start);
@@ -120,71 +82,41 @@ std::string readable(const Accuracy& accuracy, std::size_t estimates) {
 
 } // namespace
 
-void RunFigures::take(const daemon::ProcessedSweep& sweep) {
-  const OdometryEstimate& estimate = sweep.estimate;
-  if (sweeps() > 0)
-    path_m_ += (estimate.T_odom_base.translation - last_T_odom_base_.translation).norm();
-  last_T_odom_base_ = estimate.T_odom_base;
-  largest_speed_mps_ = std::max(largest_speed_mps_, estimate.twist_base.head<3>().norm());
-  wall_ms_.push_back(static_cast<float>(1e3 * to_seconds(sweep.took.wall)));
-  cpu_ms_.push_back(static_cast<float>(1e3 * to_seconds(sweep.took.cpu)));
-  sums_.add(sweep);
-}
-
-daemon::Percentiles RunFigures::percentiles(std::span<const float> values) {
-  const Quantiles quantiles({values.begin(), values.end()});
-  return {quantiles.at(0.5), quantiles.at(0.9), quantiles.at(0.99), quantiles.at(1.0)};
-}
-
 ordered_json summary(const FinishedRun& run) {
-  ordered_json json{{"version", LOCUS_VERSION},
-                    {"capture", run.capture},
-                    {"config_sha256", config_sha256(run.config)},
-                    {"threads", run.config.odometry.threads},
-                    {"isa", std::string(to_string(run.config.odometry.isa))},
-                    {"duration_s", rounded(to_seconds(run.duration))},
-                    {"wall_s", rounded(to_seconds(run.spent.wall))},
-                    {"cpu_s", rounded(to_seconds(run.spent.cpu))},
-                    {"peak_rss_mb", rounded(daemon::peak_rss_mb())},
-                    {"packets", packets(run.ingest.lidars())},
-                    {"lidars", lidars(run.ingest.lidars())},
-                    {"sweeps", to_json(run.sweeps)},
-                    {"process_ms", to_json(run.figures.process_ms())},
-                    {"process_cpu_ms", to_json(run.figures.process_cpu_ms())},
-                    {"stage_ms", stages(run)},
-                    {"points", points_json(run.figures.sums())},
-                    {"iterations_mean", iterations_json(run.figures.sums())},
-                    {"largest_speed_mps", rounded(run.figures.largest_speed_mps())},
-                    {"sources", sources(run)}};
+  ordered_json json = to_json(run.figures);
   add_accuracy(run.accuracy, json);
   return json;
 }
 
 std::string readable(const FinishedRun& run) {
-  const PacketCounters packets = run.ingest.lidars().total();
+  const daemon::Figures& figures = run.figures;
+  const daemon::SweepFigures& sweeps = figures.sweeps;
+  const PacketCounters& packets = figures.ingest.total;
   const auto rejected = std::accumulate(packets.rejected.begin(), packets.rejected.end(), std::uint64_t{0});
-  const daemon::Percentiles wall_ms = run.figures.process_ms();
-  const Eigen::Vector3d& end_m = run.figures.last_T_odom_base().translation;
   std::string text = fmt::format("recording  {:.1f} s; packets: {} data, {} position, {} lost, {} rejected\n",
-                                 to_seconds(run.duration), packets.data, packets.position, packets.lost, rejected);
-  for (const LidarInput& lidar : run.ingest.lidars().lidars()) {
-    const velodyne::Decoder& decoder = lidar.decoder();
-    if (decoder.model())
-      text += fmt::format("{:10} {}, {} returns, {:.0f} rpm\n", lidar.options().name, to_string(*decoder.model()),
-                          to_string(*decoder.return_mode()), decoder.rotation_rate_rpm());
+                                 to_seconds(figures.duration), packets.data, packets.position, packets.lost, rejected);
+  for (std::size_t i = 0; i < figures.config.lidars.size(); ++i) {
+    const daemon::IngestReport::Lidar& lidar = figures.ingest.lidars[i];
+    if (lidar.model)
+      text += fmt::format("{:10} {}, {} returns, {:.0f} rpm\n", figures.config.lidars[i].name, to_string(*lidar.model),
+                          to_string(*lidar.return_mode), lidar.rotation_rate_rpm);
   }
-  text += fmt::format("sweeps     {} seen: {} processed, {} dropped, {} failed\n", run.sweeps.seen,
-                      run.sweeps.processed, run.sweeps.dropped, run.sweeps.failed);
-  for (std::size_t i = 0; i < run.config.odometry.motion_sources.size(); ++i) {
-    if (const auto received = run.ingest.sources().counters(i).received; received > 0)
-      text += fmt::format("{:10} {} samples, used for {} sweeps{}\n", run.config.odometry.motion_sources[i].name,
-                          received, run.figures.sums().used_sweeps[i], readable_health(run, i));
+  const daemon::SweepCounters& counters = figures.counters;
+  text += fmt::format("sweeps     {} seen: {} processed, {} dropped, {} failed\n", counters.seen, counters.processed,
+                      counters.dropped, counters.failed);
+  const std::vector<MotionSourceOptions>& sources = figures.config.odometry.motion_sources;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    if (const auto received = figures.ingest.sources[i].counters.received; received > 0)
+      text += fmt::format("{:10} {} samples, used for {} sweeps{}\n", sources[i].name, received, sweeps.used_sweeps[i],
+                          readable_health(run, i));
   }
-  text += fmt::format("path       {:.2f} m, ends at {:.3f} {:.3f} {:.3f} m\n", run.figures.path_m(), end_m.x(),
-                      end_m.y(), end_m.z());
-  text += fmt::format("time       {:.2f} ms a sweep from its cut, 99 % within {:.2f} ms; {:.1f} s in all, {:.0f} MB\n",
-                      wall_ms.p50, wall_ms.p99, to_seconds(run.spent.wall), daemon::peak_rss_mb());
-  return text + readable(run.accuracy, run.figures.sweeps());
+  const Eigen::Vector3d end_m = sweeps.last.value_or(OdometryEstimate{}).T_odom_base.translation;
+  text += fmt::format("path       {:.2f} m, ends at {:.3f} {:.3f} {:.3f} m\n", sweeps.path_m, end_m.x(), end_m.y(),
+                      end_m.z());
+  text +=
+      fmt::format("time       {:.2f} ms a sweep from its cut, 99 % within {:.2f} ms; {:.1f} s in all, {:.0f} MB\n",
+                  sweeps.process_ms.p50, sweeps.process_ms.p99, to_seconds(figures.spent.wall), daemon::peak_rss_mb());
+  return text + readable(run.accuracy, sweeps.sweeps);
 }
 
 } // namespace locus::tools

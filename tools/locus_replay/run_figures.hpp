@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
 #include <optional>
 #include <span>
 #include <string>
@@ -12,39 +11,10 @@
 #include "accuracy/consistency.hpp"
 #include "accuracy/map_accuracy.hpp"
 #include "accuracy/trajectory_accuracy.hpp"
-#include "config/config.hpp"
-#include "daemon/figures_json.hpp"
-#include "daemon/ingest.hpp"
-#include "daemon/sweep_processor.hpp"
+#include "core/sources/source_health.hpp"
+#include "daemon/figures.hpp"
 
 namespace locus::tools {
-
-/// Gathers what is told of every sweep of a run: a few bytes for each.
-class RunFigures {
- public:
-  void take(const daemon::ProcessedSweep& sweep);
-  void take(const HealthEvent& event) { health_events_.push_back(event); }
-
-  [[nodiscard]] std::size_t sweeps() const { return wall_ms_.size(); }
-  [[nodiscard]] daemon::Percentiles process_ms() const { return percentiles(wall_ms_); }
-  [[nodiscard]] daemon::Percentiles process_cpu_ms() const { return percentiles(cpu_ms_); }
-  [[nodiscard]] const daemon::SweepSums& sums() const { return sums_; }
-  /// In the order in which they happened.
-  [[nodiscard]] const std::vector<HealthEvent>& health_events() const { return health_events_; }
-  [[nodiscard]] double path_m() const { return path_m_; }
-  /// That any estimate claims.
-  [[nodiscard]] double largest_speed_mps() const { return largest_speed_mps_; }
-  [[nodiscard]] const Pose& last_T_odom_base() const { return last_T_odom_base_; }
-
- private:
-  static daemon::Percentiles percentiles(std::span<const float> values);
-
-  std::vector<float> wall_ms_, cpu_ms_;
-  std::vector<HealthEvent> health_events_;
-  daemon::SweepSums sums_;
-  double path_m_ = 0, largest_speed_mps_ = 0;
-  Pose last_T_odom_base_;
-};
 
 /// How far a run is from the truth, as far as that was given.
 struct Accuracy {
@@ -57,15 +27,9 @@ struct Accuracy {
 
 /// All that a finished run is described by.
 struct FinishedRun {
-  std::string capture; ///< as the user named it
-  const Config& config;
-  const daemon::Ingest& ingest;
-  const daemon::SweepProcessor& processor;
-  daemon::SweepCounters sweeps;
-  const RunFigures& figures;
-  Stamp capture_start;       ///< which times are told from, as --fail has them
-  Duration duration;         ///< of the recording
-  daemon::MachineTime spent; ///< without what it took to compare with the truth
+  const daemon::Figures& figures;             ///< the time spent is without what it took to compare with the truth
+  std::span<const HealthEvent> health_events; ///< in the order in which they happened
+  Stamp capture_start;                        ///< which times are told from, as --fail has them
   const Accuracy& accuracy;
 };
 

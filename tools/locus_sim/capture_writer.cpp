@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "drivers/files/motion_files.hpp"
-#include "drivers/net/ip_address.hpp"
+#include "drivers/net/datagram.hpp"
 #include "locus_sim/folder_sink.hpp"
 
 namespace locus::sim {

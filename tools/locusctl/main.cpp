@@ -19,7 +19,6 @@
 #include "locusctl/screen.hpp"
 #include "locusctl/sensors.hpp"
 #include "locusctl/service_client.hpp"
-#include "locusctl/status_text.hpp"
 
 namespace locus::tools {
 namespace {
@@ -38,11 +37,15 @@ struct CtlArguments {
   }
 };
 
+std::string status_text(const CtlArguments& arguments) {
+  return ask(arguments.control(), {{"command", "status"}, {"text", true}}).json.value("text", "");
+}
+
 void watch(const CtlArguments& arguments) {
   Screen screen;
   do {
     try {
-      screen.show(status_text(ask(arguments.control(), {{"command", "status"}}).json));
+      screen.show(status_text(arguments));
     } catch (const Failure& failure) { // it may come back
       screen.show(failure.what());
     }
@@ -52,8 +55,8 @@ void watch(const CtlArguments& arguments) {
 void status(const CtlArguments& arguments) {
   if (arguments.watch)
     return watch(arguments);
-  const Json json = ask(arguments.control(), {{"command", "status"}}).json;
-  fmt::print("{}", arguments.json ? json.dump(1) + '\n' : status_text(json));
+  fmt::print("{}", arguments.json ? ask(arguments.control(), {{"command", "status"}}).json.dump(1) + '\n'
+                                  : status_text(arguments));
 }
 
 void save_map(const CtlArguments& arguments) {

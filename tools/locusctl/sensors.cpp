@@ -23,7 +23,7 @@
 #include "daemon/machine_time.hpp"
 #include "drivers/files/udp_frame.hpp"
 #include "drivers/lidar_input.hpp"
-#include "drivers/net/ip_address.hpp"
+#include "drivers/net/datagram.hpp"
 #include "drivers/net/udp_socket.hpp"
 #include "locus_replay/failure.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "drivers/net/ip_address.hpp"
+#include "drivers/net/datagram.hpp"
 
 #include <fmt/format.h>
 

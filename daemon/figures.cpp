@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/ingest_report.hpp"
+#include "daemon/figures.hpp"
 
-#include <vector>
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <fstream>
 
 #include <fmt/format.h>
 
-#include "drivers/net/ip_address.hpp"
+#include "config/config_yaml.hpp"
+#include "drivers/net/datagram.hpp"
 
 namespace locus::daemon {
 
@@ -83,6 +87,94 @@ std::optional<std::string> short_sweep(const SweepOptions& options, const std::s
       "lidar {}: turns in {:.0f} ms, so a sweep of {:.0f} ms sees a part of what is around, each another "
       "one; set sweep_period_ms: auto",
       lidar, turn_ms, sweep_ms);
+}
+
+void SweepTally::take(const ProcessedSweep& sweep) {
+  const OdometryEstimate& estimate = sweep.estimate;
+  const Timing timing{read_clock(CLOCK_MONOTONIC), static_cast<float>(1e3 * to_seconds(sweep.took.wall)),
+                      static_cast<float>(1e3 * to_seconds(sweep.took.cpu))};
+  if (timings_.size() < window_)
+    timings_.push_back(timing);
+  else
+    timings_[sums_.sweeps % window_] = timing;
+  ++sums_.sweeps;
+  sums_.raw_points += static_cast<double>(sweep.raw_returns);
+  sums_.filtered_points += static_cast<double>(estimate.points);
+  sums_.scan_to_scan_iterations += estimate.scan_to_scan.iterations;
+  sums_.scan_to_submap_iterations += estimate.scan_to_submap.iterations;
+  const PriorSource& prior = estimate.prior;
+  if (prior.rotation >= 0)
+    ++sums_.used_sweeps[static_cast<std::size_t>(prior.rotation)];
+  if (prior.translation >= 0 && prior.translation != prior.rotation)
+    ++sums_.used_sweeps[static_cast<std::size_t>(prior.translation)];
+  for (std::size_t i = 0; i < kStages; ++i)
+    sums_.stages[i] += sweep.stages_took[i];
+  if (sums_.last)
+    sums_.path_m += (estimate.T_odom_base.translation - sums_.last->T_odom_base.translation).norm();
+  sums_.largest_speed_mps = std::max(sums_.largest_speed_mps, estimate.twist_base.head<3>().norm());
+  sums_.last = estimate;
+  sums_.last_at = timing.at;
+}
+
+SweepFigures SweepTally::figures() const {
+  SweepFigures figures = sums_;
+  figures.process_ms = percentiles(&Timing::wall_ms);
+  figures.process_cpu_ms = percentiles(&Timing::cpu_ms);
+  figures.rate_hz = rate_hz();
+  return figures;
+}
+
+/// By the nearest rank: each is one of the values.
+Percentiles SweepTally::percentiles(float Timing::*figure) const {
+  if (timings_.empty())
+    return {};
+  std::vector<float> values(timings_.size());
+  std::ranges::transform(timings_, values.begin(), [figure](const Timing& timing) { return timing.*figure; });
+  std::ranges::sort(values);
+  const auto at = [&](double share) {
+    const double rank = std::max(1.0, std::ceil(share * static_cast<double>(values.size())));
+    return static_cast<double>(values[static_cast<std::size_t>(rank) - 1]);
+  };
+  return {at(0.5), at(0.9), at(0.99), at(1.0)};
+}
+
+double SweepTally::rate_hz() const {
+  constexpr Duration kSpan = std::chrono::seconds{5};
+  const Duration now = read_clock(CLOCK_MONOTONIC);
+  std::size_t young = 0;
+  Duration oldest = now;
+  for (; young < timings_.size(); ++young) {
+    const Timing& timing = timings_[(sums_.sweeps - 1 - young) % window_];
+    if (now - timing.at > kSpan)
+      break;
+    oldest = timing.at;
+  }
+  const double elapsed_s = to_seconds(now - oldest);
+  return young > 1 && elapsed_s > 0 ? static_cast<double>(young - 1) / elapsed_s : 0.0;
+}
+
+std::optional<Duration> time_since(Stamp then) {
+  return then == Stamp{} ? std::nullopt : std::optional{Stamp{read_clock(CLOCK_REALTIME)} - then};
+}
+
+std::string_view health_of(const IngestReport::Source& source) {
+  return source.healthy ? "healthy" : source.counters.received == 0 ? "never heard" : "lost";
+}
+
+std::string problem_of(const LidarOptions& options, const IngestReport::Lidar& lidar) {
+  return shared_port(options, lidar).value_or(unknown_model(options, lidar).value_or(""));
+}
+
+double rounded(double value) { return std::round(value * 1e4) / 1e4; }
+
+/// Not from getrusage(): its figure survives exec, so it may be that of the program that started this one.
+double peak_rss_mb() {
+  std::ifstream status{"/proc/self/status"};
+  for (std::string word; status >> word;) {
+    if (double kib = 0; word == "VmHWM:" && status >> kib)
+      return kib * 1024.0 / 1e6;
+  }
+  return 0.0;
 }
 
 } // namespace locus::daemon

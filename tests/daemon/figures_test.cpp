@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/figures.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <string>
+
+namespace locus::daemon {
+namespace {
+
+using std::chrono::milliseconds;
+
+/// The one of a drive along x, a metre a sweep, that took so long; its rotation is that of source 1.
+ProcessedSweep sweep(int number, Duration wall) {
+  ProcessedSweep done;
+  done.estimate.T_odom_base.translation.x() = number;
+  done.estimate.twist_base[0] = 10.0;
+  done.estimate.prior = {.rotation = 1, .translation = number % 2};
+  done.raw_returns = 100;
+  done.took.wall = wall;
+  done.stages_took[0] = milliseconds{2};
+  return done;
+}
+
+TEST(SweepTally, SumsAreOfAllSweepsAndDistributionsOfTheLast) {
+  SweepTally tally(100);
+  for (int i = 0; i < 200; ++i)
+    tally.take(sweep(i, milliseconds{i}));
+  const SweepFigures figures = tally.figures();
+  EXPECT_EQ(figures.sweeps, 200U);
+  EXPECT_EQ(figures.raw_points, 20'000);
+  EXPECT_EQ(figures.path_m, 199);
+  EXPECT_EQ(figures.largest_speed_mps, 10);
+  EXPECT_EQ(figures.used_sweeps[0], 100U);
+  EXPECT_EQ(figures.used_sweeps[1], 200U) << "one that gives both counts once";
+  EXPECT_EQ(figures.stages[0], milliseconds{400});
+  EXPECT_EQ(figures.process_ms.p50, 149) << "of 100 to 199";
+  EXPECT_EQ(figures.process_ms.p99, 198);
+  EXPECT_EQ(figures.process_ms.max, 199);
+  EXPECT_EQ(figures.last->T_odom_base.translation.x(), 199);
+  EXPECT_GT(figures.rate_hz, 10);
+}
+
+TEST(SweepTally, HasNothingBeforeTheFirst) {
+  const SweepFigures figures = SweepTally(100).figures();
+  EXPECT_FALSE(figures.last);
+  EXPECT_EQ(figures.process_ms.max, 0);
+  EXPECT_EQ(figures.rate_hz, 0);
+}
+
+TEST(Figures, ServiceHasTheKeysOfARunAndMore) {
+  const Config config = Config{};
+  Figures figures{.config = config};
+  const auto of_a_run = to_json(figures).flatten();
+  figures.live.emplace().link.sources.resize(config.odometry.motion_sources.size());
+  const auto live = to_json(figures).flatten();
+  for (const auto& [key, value] : of_a_run.items())
+    EXPECT_TRUE(live.contains(key)) << key;
+  for (const char* key : {"/state", "/sources/wio/health", "/lidars/front/pps", "/dropped/flood_datagrams",
+                          "/dds/domain", "/packets/kernel_drops"}) {
+    EXPECT_TRUE(live.contains(key)) << key;
+    EXPECT_FALSE(of_a_run.contains(key)) << key;
+  }
+}
+
+TEST(Figures, TextOfAServiceThatHasHeardNothingSaysSo) {
+  const Config config = Config{};
+  Figures figures{.config = config};
+  figures.live.emplace();
+  const std::string text = to_text(figures);
+  for (const char* words : {"   waiting   ", "last never", "pose        none yet", "unheard", "never heard", "always"})
+    EXPECT_NE(text.find(words), std::string::npos) << words << '\n' << text;
+}
+
+} // namespace
+} // namespace locus::daemon
