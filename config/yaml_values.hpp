@@ -122,9 +122,7 @@ template <class T>
 requires std::is_arithmetic_v<T> YAML::Node to_node(T value) { return YAML::Node{fmt::format("{}", value)}; }
 
 template <class E>
-requires std::is_enum_v<E> YAML::Node to_node(E value) {
-  return YAML::Node{std::string{to_string(value)}};
-}
+requires std::is_enum_v<E> YAML::Node to_node(E value) { return YAML::Node{std::string{to_string(value)}}; }
 
 template <class Numbers> YAML::Node list_node(const Numbers& numbers) {
   YAML::Node node{YAML::NodeType::Sequence};

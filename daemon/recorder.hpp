@@ -122,10 +122,10 @@ class PieceWriter {
 
 /// Records what comes in, for locus-replay, in a CaptureRing.
 ///
-/// The producer, the ingest thread, leaves a copy of each input in a ring in memory and is never held up. Another thread
-/// takes them to the disk; what does not fit the ring meanwhile, or what the disk does not take, is dropped and counted.
-/// After a failure it is tried again with a new piece, every few seconds. A crash costs what came since the last round
-/// of that thread, a power cut the last few seconds.
+/// The producer, the ingest thread, leaves a copy of each input in a ring in memory and is never held up. Another
+/// thread takes them to the disk; what does not fit the ring meanwhile, or what the disk does not take, is dropped and
+/// counted. After a failure it is tried again with a new piece, every few seconds. A crash costs what came since the
+/// last round of that thread, a power cut the last few seconds.
 class Recorder {
  public:
   /// 20 MB: twenty seconds of a VLP-16.

@@ -10,7 +10,10 @@ namespace locus {
 
 /// An enumeration whose values count from zero and which has a names_of(E) beside it: an array of the names of its
 /// values, in their order. These are the words that users read and write.
-template <class E> concept Named = requires(E value) { names_of(value)[0]; };
+template <class E>
+concept Named = requires(E value) {
+  names_of(value)[0];
+};
 
 template <Named E> constexpr std::string_view to_string(E value) {
   return names_of(value)[static_cast<std::size_t>(value)];

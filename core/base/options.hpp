@@ -19,7 +19,8 @@
 namespace locus {
 
 /// What can be set about the algorithm, module by module. A field is named as its key in the YAML file, the unit in its
-/// name, and an enumeration has the words of the file beside it. problem() says what is wrong, one line "key: reason" for each key that is, and nothing when all is well.
+/// name, and an enumeration has the words of the file beside it. problem() says what is wrong, one line "key: reason"
+/// for each key that is, and nothing when all is well.
 
 struct BodyBoxOptions { ///< returns inside the box belong to the robot itself and are dropped
   bool enabled = false;

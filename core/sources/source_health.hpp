@@ -24,8 +24,8 @@ enum class HealthReason : std::uint8_t {
   self_check    ///< ImuSelfCheck has refused it
 };
 constexpr auto names_of(HealthReason) {
-  return std::to_array<std::string_view>({"stale", "jump", "nan", "frozen", "out_of_order", "covariance",
-                                          "disagreement", "outside", "self_check"});
+  return std::to_array<std::string_view>(
+      {"stale", "jump", "nan", "frozen", "out_of_order", "covariance", "disagreement", "outside", "self_check"});
 }
 inline constexpr std::size_t kHealthReasonCount = names_of(HealthReason{}).size();
 

@@ -50,8 +50,8 @@ void update_whereabouts(const std::filesystem::path& file, const Whereabouts& la
 /// $STATE_DIRECTORY/state as systemd sets it; nothing without, and then no state is kept.
 std::optional<std::filesystem::path> state_path();
 
-/// Writes the state now and then, and the whereabouts as they are by then, from a thread that may wait for the disk. The
-/// map is worth its cost once in many metres; who crashed while driving is elsewhere a second later.
+/// Writes the state now and then, and the whereabouts as they are by then, from a thread that may wait for the disk.
+/// The map is worth its cost once in many metres; who crashed while driving is elsewhere a second later.
 class StateKeeper {
  public:
   static constexpr Duration kEvery = std::chrono::seconds{30};
@@ -71,8 +71,8 @@ class StateKeeper {
   /// Thread of the disk, again and again: writes what was taken last.
   void write();
 
-  /// Producer, while nobody writes: what was written is no longer true. When this returns the file says what is to be gone on from
-  /// until the next estimate, or there is none. Waits for the disk.
+  /// Producer, while nobody writes: what was written is no longer true. When this returns the file says what is to be
+  /// gone on from until the next estimate, or there is none. Waits for the disk.
   void begin_anew(const std::optional<SavedState>& start);
 
  private:
