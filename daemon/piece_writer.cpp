@@ -29,7 +29,7 @@ std::string cannot_be_written(const std::filesystem::path& file) {
 std::vector<std::optional<std::string>> sample_files(const Config& config) {
   std::vector<std::optional<std::string>> files;
   bool has_imu = false;
-  for (const MotionSourceOptions& source : config.odometry.motion_sources) {
+  for (const MotionSourceOptions& source : config.motion_sources) {
     if (source.kind == SourceKind::odometry)
       files.emplace_back(source.name + ".tum");
     else

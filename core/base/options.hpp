@@ -94,9 +94,8 @@ enum class Fusion { combined, queue }; ///< combined: gyro rotation with odometr
 enum class NoSourcePrior { constant_velocity, identity }; ///< identity: paper II-B.2
 enum class FlatGround { off, on, automatic };             ///< automatic (key: auto)
 
-/// Everything Odometry wants to know.
+/// Everything Odometry wants to know, but for the motion sources.
 struct OdometryOptions {
-  std::vector<MotionSourceOptions> motion_sources; ///< highest priority first
   Fusion fusion = Fusion::combined;
   NoSourcePrior no_source_prior = NoSourcePrior::constant_velocity;
   ScanToScanMode scan_to_scan_mode = ScanToScanMode::automatic; ///< key scan_to_scan.mode

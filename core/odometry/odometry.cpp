@@ -74,9 +74,10 @@ bool fits_better(const Registration& one, const Registration& other) {
 
 } // namespace
 
-Odometry::Odometry(const OdometryOptions& options, StageClock* clock)
+Odometry::Odometry(const OdometryOptions& options, const std::vector<MotionSourceOptions>& sources, StageClock* clock)
     : options_(options), clock_(clock), gicp_(options.threads, options.isa), flat_ground_(options.flat_ground),
-      map_(options.map.max_bytes, options.isa), last_scan_map_(kLastScanBytes, options.isa), sensors_(options) {}
+      map_(options.map.max_bytes, options.isa), last_scan_map_(kLastScanBytes, options.isa),
+      sensors_(options, sources) {}
 
 OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested& stop) {
   prepare_next();

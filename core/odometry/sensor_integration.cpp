@@ -29,8 +29,8 @@ constexpr int kTaught_sweeps = 20;
 
 } // namespace
 
-SensorIntegration::SensorIntegration(const OdometryOptions& options)
-    : sources_(options.motion_sources), fusion_(options.fusion), no_source_prior_(options.no_source_prior),
+SensorIntegration::SensorIntegration(const OdometryOptions& options, const std::vector<MotionSourceOptions>& sources)
+    : sources_(sources), fusion_(options.fusion), no_source_prior_(options.no_source_prior),
       constant_velocity_statistics_(kConstantVelocity), gyro_biases_(sources_.size()), gyro_scales_(sources_.size()) {
   for (const MotionSourceOptions& source : sources_)
     statistics_.emplace_back(source.kind == SourceKind::imu ? kInertialUnit : kOdometrySource);

@@ -41,7 +41,7 @@ class SensorIntegration {
  public:
   static constexpr int kNone = -1;
 
-  explicit SensorIntegration(const OdometryOptions& options);
+  SensorIntegration(const OdometryOptions& options, const std::vector<MotionSourceOptions>& sources);
 
   /// The prior from the best healthy sources but `without`. What none of them says goes on with `twist_base` (m/s,
   /// rad/s), the velocity in the last sweep; nothing: not even that is known.

@@ -69,16 +69,16 @@ struct RosLink::Session {
       dds_set_status_mask(reader, DDS_DATA_AVAILABLE_STATUS);
       dds_waitset_attach(waitset.handle(), reader, 0);
     };
-    for (std::size_t i = 0; i < config.source_topics.size(); ++i) {
-      const auto& [topic, health_topic] = config.source_topics[i];
-      if (!topic.empty() && config.odometry.motion_sources[i].kind == SourceKind::imu)
-        wake_by(imus.emplace_back(ImuSource{i, {node, topic, TopicQos::sensor_in()}, {}}).reader.handle());
-      else if (!topic.empty())
-        wake_by(
-            odometries.emplace_back(OdometrySource{i, {node, topic, TopicQos::sensor_in()}, {}, {}}).reader.handle());
-      if (!health_topic.empty())
-        wake_by(
-            health_topics.emplace_back(HealthTopic{i, {node, health_topic, TopicQos::standard()}, {}}).reader.handle());
+    for (std::size_t i = 0; i < config.motion_sources.size(); ++i) {
+      const MotionSource& source = config.motion_sources[i];
+      if (!source.topic.empty() && source.kind == SourceKind::imu)
+        wake_by(imus.emplace_back(ImuSource{i, {node, source.topic, TopicQos::sensor_in()}, {}}).reader.handle());
+      else if (!source.topic.empty())
+        wake_by(odometries.emplace_back(OdometrySource{i, {node, source.topic, TopicQos::sensor_in()}, {}, {}})
+                    .reader.handle());
+      if (!source.health_topic.empty())
+        wake_by(health_topics.emplace_back(HealthTopic{i, {node, source.health_topic, TopicQos::standard()}, {}})
+                    .reader.handle());
     }
     if (!config.dds.flat_ground_topic.empty())
       wake_by(flat_ground.emplace(FlatGroundTopic{{node, config.dds.flat_ground_topic, TopicQos::standard()}, {}})
@@ -101,7 +101,7 @@ struct RosLink::Session {
 
 RosLink::RosLink(const Config& config, Sink sink)
     : config_(config), frames_{config.dds.frame_odom, config.dds.frame_base}, sink_(std::move(sink)) {
-  status_.sources.resize(config.source_topics.size());
+  status_.sources.resize(config.motion_sources.size());
   thread_ = std::thread([this] { run(); });
   pthread_setname_np(thread_.native_handle(), "dds");
 }

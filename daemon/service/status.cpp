@@ -85,7 +85,7 @@ ordered_json packets_json(const Config& config, const IngestReport& ingest) {
 
 ordered_json sources_json(const Config& config, const LiveFigures::Snapshot& figures, const RosLink::Status& link) {
   ordered_json sources = ordered_json::object();
-  for (std::size_t i = 0; i < config.odometry.motion_sources.size(); ++i) {
+  for (std::size_t i = 0; i < config.motion_sources.size(); ++i) {
     const IngestReport::Source& source = figures.ingest.sources[i];
     ordered_json json = to_json(source.counters, figures.sums.used_sweeps[i]);
     json["health"] = source.healthy ? "healthy" : source.counters.received == 0 ? "never heard" : "lost";
@@ -94,7 +94,7 @@ ordered_json sources_json(const Config& config, const LiveFigures::Snapshot& fig
     json["writers"] = link.sources[i].writers;
     json["refused"] = link.sources[i].refused;
     json["health_refused"] = link.sources[i].health_refused;
-    sources[config.odometry.motion_sources[i].name] = json;
+    sources[config.motion_sources[i].name] = json;
   }
   return sources;
 }

@@ -24,7 +24,6 @@ std::vector<MotionSourceOptions> RobotSetup::motion_sources() const {
 
 OdometryOptions RobotSetup::odometry() const {
   OdometryOptions options;
-  options.motion_sources = motion_sources();
   options.fusion = fusion;
   options.threads = 1;
   return options;

@@ -60,7 +60,7 @@ Input DriveInput::next(Duration) {
 
 std::vector<ProcessedSweep> process_in_one_thread(const Config& config) {
   std::vector<ProcessedSweep> processed;
-  SweepProcessor processor(config.odometry);
+  SweepProcessor processor(config);
   const auto process = [&](Ingest& ingest, const Sweep& sweep) {
     processed.push_back(processor.process(sweep, {MachineTime::now(), {}}));
     ingest.take(processor.odometry().feedback());

@@ -114,8 +114,7 @@ TEST(Recorder, AbsurdSamplesAreReadAgainOrLeftOut) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const Stamp now = stamp_from_ns(1'700'000'000'000'000'000);
   Config config = recorded_config();
-  config.odometry.motion_sources.push_back({"second", SourceKind::imu, {}});
-  config.source_topics.push_back({});
+  config.motion_sources.push_back({{"second", SourceKind::imu, {}}, "", ""});
   ImuSample imu{now, now, {kNan, 1, 2}, {1e300, -1e-300, 0}, {}};
   OdometrySample good{now, now + Duration{1}, Pose{}, std::numeric_limits<double>::infinity()};
   OdometrySample no_rotation = good, before_1951 = good;

@@ -66,7 +66,7 @@ Config config_in(const test::DdsDomain& domain) {
   config.dds.prefix = "/robot_7/locus";
   config.dds.publish_tf = config.dds.publish_cloud = config.dds.publish_map = true;
   config.dds.flat_ground_topic = "/flat_ground";
-  config.source_topics[0].health_topic = "/wheel_health";
+  config.motion_sources[0].health_topic = "/wheel_health";
   return config;
 }
 
@@ -252,8 +252,7 @@ TEST(RosLink, WithoutItsInterfaceGoesOnTryingAndSaysWhichOne) {
 TEST(RosLink, WithNothingToHearSleeps) {
   const test::DdsDomain domain;
   Config config = config_in(domain);
-  config.odometry.motion_sources.clear();
-  config.source_topics.clear();
+  config.motion_sources.clear();
   const RosLink link(config, [](const RosInput&) {});
   EXPECT_TRUE(eventually([&] { return link.status().connected; }));
   const std::uint64_t before = link.progress();

@@ -34,7 +34,7 @@ Config SimulatedRobot::config() const {
     options.port = lidar.options.port;
     options.T_base_lidar = lidar.options.T_base_lidar;
   }
-  config.odometry.motion_sources[kImu].T_base_source = robot_.sensors.imu->T_base_imu;
+  config.motion_sources[kImu].T_base_source = robot_.sensors.imu->T_base_imu;
   config.odometry.threads = 1;
   return config;
 }

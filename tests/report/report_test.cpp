@@ -203,7 +203,7 @@ TEST(Report, HoldsSummaryConfigurationAndTheTruthInTheFrameOfTheEstimate) {
   EXPECT_NEAR(shown["truth"]["x"].front().get<double>(), run.sweeps.front().T_odom_base.translation.x(), 0.02);
   EXPECT_NEAR(shown["truth"]["y"].back().get<double>(), run.sweeps.back().T_odom_base.translation.y(), 0.02);
   EXPECT_EQ(shown["error_boxes"].size(), 6U);
-  EXPECT_EQ(shown["health"].size(), 1 + run.config.odometry.motion_sources.size());
+  EXPECT_EQ(shown["health"].size(), 1 + run.config.motion_sources.size());
   EXPECT_EQ(shown["stages"].size(), kStages);
 }
 

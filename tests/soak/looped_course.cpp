@@ -32,7 +32,7 @@ std::vector<tools::MotionRecording> read_motion(const ClosedCourse& course, cons
 
 LoopedCourse::LoopedCourse(ClosedCourse course, const Config& config, std::uint64_t lap)
     : course_(std::move(course)), config_(config), offset_(static_cast<Duration::rep>(lap) * course_.lap),
-      T_begin_end_(config.odometry.motion_sources.size()), T_source_lap_(T_begin_end_.size()) {
+      T_begin_end_(config.motion_sources.size()), T_source_lap_(T_begin_end_.size()) {
   learn_wheels();
   for (std::uint64_t before = 0; before < lap; ++before)
     for (std::size_t source = 0; source < T_begin_end_.size(); ++source)

@@ -57,8 +57,8 @@ void StreamRecording::begin(Stamp start) {
   const std::uint64_t seed = config_.sweep.seed;
   lidar_faults_.emplace(faults_, start, seed);
   bool has_imu = false; // the first one has the file
-  for (std::size_t i = 0; i < config_.odometry.motion_sources.size(); ++i) {
-    const MotionSourceOptions& source = config_.odometry.motion_sources[i];
+  for (std::size_t i = 0; i < config_.motion_sources.size(); ++i) {
+    const MotionSourceOptions& source = config_.motion_sources[i];
     if (source.kind == SourceKind::odometry)
       sources_.emplace(source.name + ".tum",
                        Source{i, SampleFaults<OdometrySample>(faults_, source.name, start, seed)});

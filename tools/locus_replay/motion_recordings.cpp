@@ -36,7 +36,7 @@ std::vector<MotionFile> motion_files(const Arguments& arguments, const CaptureFo
 }
 
 /// The source that a file speaks for: the first one of kind imu, or the odometry of this name.
-std::optional<std::size_t> source_of(const MotionFile& file, const std::vector<MotionSourceOptions>& sources) {
+std::optional<std::size_t> source_of(const MotionFile& file, const std::vector<MotionSource>& sources) {
   const auto found = std::ranges::find_if(sources, [&](const MotionSourceOptions& source) {
     return source.kind == file.kind && (file.kind == SourceKind::imu || source.name == file.name);
   });
@@ -75,7 +75,7 @@ MotionRecording read(const MotionFile& file, std::size_t source, std::vector<std
 
 std::vector<MotionRecording> read_motion(const Arguments& arguments, const CaptureFolder& folder, const Config& config,
                                          bool config_is_users_own, std::vector<std::string>& warnings) {
-  const std::vector<MotionSourceOptions>& sources = config.odometry.motion_sources;
+  const std::vector<MotionSource>& sources = config.motion_sources;
   std::vector<MotionRecording> recordings;
   const auto is_read = [&](std::size_t source) {
     return std::ranges::any_of(recordings, [&](const MotionRecording& r) { return r.source == source; });

@@ -38,7 +38,7 @@ std::string csv_header() {
 
 } // namespace
 
-OdometryFiles::OdometryFiles(const std::filesystem::path& folder, const std::vector<MotionSourceOptions>& sources)
+OdometryFiles::OdometryFiles(const std::filesystem::path& folder, const std::vector<MotionSource>& sources)
     : tum_(folder / "odometry.tum"), csv_(folder / "odometry.csv") {
   for (const MotionSourceOptions& source : sources)
     source_names_.push_back(source.name);

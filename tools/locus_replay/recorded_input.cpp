@@ -34,7 +34,7 @@ RecordedInput open_bag_input(const Arguments& arguments, const std::filesystem::
        ++source) {
     if (!has_file(source))
       warnings.push_back(fmt::format("{}: motion source {}: never heard from, nothing of its kind in the bag",
-                                     file.string(), config.odometry.motion_sources[source].name));
+                                     file.string(), config.motion_sources[source].name));
   }
   return {
       std::make_unique<BagPackets>(std::move(bag), file, config, topics.of_lidar), std::move(motion), topics.taken, {}};
@@ -55,7 +55,7 @@ RecordedInput open_drive_input(const Arguments& arguments, const std::filesystem
     drive.truth.clear();
   for (const StampedPose& pose : drive.truth)
     input.truth.push_back({pose.stamp, pose.T_source_base * config.lidars.front().T_base_lidar.inverse()});
-  const std::vector<MotionSourceOptions>& sources = config.odometry.motion_sources;
+  const std::vector<MotionSource>& sources = config.motion_sources;
   const auto imu = std::ranges::find(sources, SourceKind::imu, &MotionSourceOptions::kind);
   const auto source = static_cast<std::size_t>(imu - sources.begin());
   const bool takes_oxts = !drive.imu.empty() && imu != sources.end() &&

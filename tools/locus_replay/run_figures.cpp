@@ -42,8 +42,8 @@ ordered_json stages(const FinishedRun& run) {
 
 ordered_json sources(const FinishedRun& run) {
   ordered_json sources = ordered_json::object();
-  for (std::size_t i = 0; i < run.config.odometry.motion_sources.size(); ++i) {
-    ordered_json& source = sources[run.config.odometry.motion_sources[i].name];
+  for (std::size_t i = 0; i < run.config.motion_sources.size(); ++i) {
+    ordered_json& source = sources[run.config.motion_sources[i].name];
     source = to_json(run.ingest.sources().counters(i), run.figures.sums().used_sweeps[i]);
     if (const std::string_view verdict = run.ingest.sources().verdict(i); !verdict.empty())
       source["verdict"] = verdict;
@@ -175,10 +175,10 @@ std::string readable(const FinishedRun& run) {
   }
   text += fmt::format("sweeps     {} seen: {} processed, {} dropped, {} failed\n", run.sweeps.seen,
                       run.sweeps.processed, run.sweeps.dropped, run.sweeps.failed);
-  for (std::size_t i = 0; i < run.config.odometry.motion_sources.size(); ++i) {
+  for (std::size_t i = 0; i < run.config.motion_sources.size(); ++i) {
     if (const auto received = run.ingest.sources().counters(i).received; received > 0)
-      text += fmt::format("{:10} {} samples, used for {} sweeps{}\n", run.config.odometry.motion_sources[i].name,
-                          received, run.figures.sums().used_sweeps[i], readable_health(run, i));
+      text += fmt::format("{:10} {} samples, used for {} sweeps{}\n", run.config.motion_sources[i].name, received,
+                          run.figures.sums().used_sweeps[i], readable_health(run, i));
   }
   text += fmt::format("path       {:.2f} m, ends at {:.3f} {:.3f} {:.3f} m\n", run.figures.path_m(), end_m.x(),
                       end_m.y(), end_m.z());

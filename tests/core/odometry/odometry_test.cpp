@@ -58,7 +58,7 @@ struct Outcome {
 
 Outcome drive_through(const sim::Scene& scene, const sim::Trajectory& trajectory, const RobotSetup& setup,
                       Duration duration) {
-  Odometry odometry(setup.odometry());
+  Odometry odometry(setup.odometry(), setup.motion_sources());
   Outcome result;
   drive(scene, trajectory, setup, duration, [&](const Sweep& sweep) {
     const OdometryEstimate& estimate = result.estimates.emplace_back(odometry.process(sweep));
@@ -151,7 +151,7 @@ TEST(Odometry, SameBitsForAnyNumberOfThreadsAndOnEveryRun) {
     const auto poses = [&](int threads, bool prepares = false) {
       OdometryOptions options = setup.odometry();
       options.threads = threads;
-      Odometry odometry(options);
+      Odometry odometry(options, setup.motion_sources());
       std::vector<Pose> result;
       for (const Sweep& sweep : sweeps) {
         result.push_back(odometry.process(sweep).T_odom_base);
@@ -238,7 +238,7 @@ TEST(Odometry, WhatSeesNothingAnyMoreAndHasStoppedStaysThere) {
     setup.lidars[0].range_noise_m = 0.03;
     const Stamp dark = trajectory.start() + milliseconds{6600 + into_the_turn_ms};
     setup.is_lost = [=](std::size_t, Stamp stamp) { return stamp >= dark; };
-    Odometry odometry(setup.odometry());
+    Odometry odometry(setup.odometry(), setup.motion_sources());
     Pose last_seen;
     OdometryEstimate last;
     for (const Sweep& sweep : sweeps_of(street, trajectory, setup, seconds{15})) {
@@ -256,7 +256,7 @@ TEST(Odometry, WhatSeesNothingAnyMoreAndDroveComesToRest) {
   RobotSetup setup;
   const Stamp dark = trajectory.start() + seconds{10};
   setup.is_lost = [=](std::size_t, Stamp stamp) { return stamp >= dark; };
-  Odometry odometry(setup.odometry());
+  Odometry odometry(setup.odometry(), setup.motion_sources());
   double gone_m = 0, after_a_second_m = 0;
   for (const Sweep& sweep : sweeps_of(sim::street(200), trajectory, setup, seconds{25})) {
     const OdometryEstimate estimate = odometry.process(sweep);
@@ -312,7 +312,7 @@ class OdometryUnderWay : public testing::Test {
   }
 
   RobotSetup setup_ = robot_with_wheels_and_imu();
-  Odometry odometry_{setup_.odometry()};
+  Odometry odometry_{setup_.odometry(), setup_.motion_sources()};
   std::vector<Sweep> sweeps_;
   OdometryEstimate last_;
 };
@@ -411,7 +411,7 @@ TEST(Odometry, TheMapTakesASweepAfterAMetreOrThirtyDegrees) {
 TEST(Odometry, ARobotThatStandsIsHeldAndAddsNothingToTheMap) {
   const sim::Trajectory trajectory(sim::Course{}.stand(seconds{10}));
   const RobotSetup setup = robot_with_lidar_alone();
-  Odometry odometry(setup.odometry());
+  Odometry odometry(setup.odometry(), setup.motion_sources());
   std::vector<std::size_t> sizes;
   std::vector<OdometryEstimate> estimates;
   drive(sim::room(), trajectory, setup, seconds{10}, [&](const Sweep& sweep) {

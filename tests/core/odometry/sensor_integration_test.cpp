@@ -11,12 +11,8 @@ namespace {
 constexpr int kGyro = 0, kWheelOdometry = 1;
 constexpr Duration kPerSweep = std::chrono::milliseconds{100};
 
-OdometryOptions with_imu_and_wheels() {
-  OdometryOptions options;
-  options.motion_sources = {{.name = "imu", .kind = SourceKind::imu, .T_base_source = {}},
-                            {.name = "wheels", .kind = SourceKind::odometry, .T_base_source = {}}};
-  return options;
-}
+const MotionSourceOptions kGyroOptions{.name = "imu", .kind = SourceKind::imu, .T_base_source = {}};
+const MotionSourceOptions kWheelOdometryOptions{.name = "wheels", .kind = SourceKind::odometry, .T_base_source = {}};
 
 Vector6 twist(double forward_mps, double yaw_radps) {
   return (Vector6{} << forward_mps, 0, 0, 0, 0, yaw_radps).finished();
@@ -57,7 +53,8 @@ class Sources {
 class SensorIntegrationTest : public testing::Test {
  protected:
   /// After a first sweep.
-  explicit SensorIntegrationTest(const OdometryOptions& options = with_imu_and_wheels()) : sensors(options) {
+  explicit SensorIntegrationTest(const OdometryOptions& options = {})
+      : sensors(options, {kGyroOptions, kWheelOdometryOptions}) {
     sensors.remember(sources.next({}, {}));
   }
 
@@ -98,10 +95,9 @@ TEST_F(SensorIntegrationTest, ASourceThatCameBackIsNotComparedWithWhatItWasBefor
 }
 
 TEST(SensorIntegration, AQueueTakesAllFromTheFirst) {
-  OdometryOptions options = with_imu_and_wheels();
+  OdometryOptions options;
   options.fusion = Fusion::queue;
-  std::swap(options.motion_sources[0], options.motion_sources[1]);
-  SensorIntegration sensors(options);
+  SensorIntegration sensors(options, {kWheelOdometryOptions, kGyroOptions});
   Sources sources;
   sensors.remember(sources.next({}, {}));
   const MotionPrior prior = sensors.integrate(sources.next(motion(1, 0.3), motion(0, 0.5)), std::nullopt);
