@@ -26,10 +26,10 @@ void SweepSums::add(const ProcessedSweep& sweep) {
   scan_to_scan_iterations += estimate.scan_to_scan.iterations;
   scan_to_submap_iterations += estimate.scan_to_submap.iterations;
   const PriorSource& prior = estimate.prior;
-  if (prior.rotation >= 0)
-    ++used_sweeps[static_cast<std::size_t>(prior.rotation)];
-  if (prior.translation >= 0 && prior.translation != prior.rotation)
-    ++used_sweeps[static_cast<std::size_t>(prior.translation)];
+  if (prior.rotation)
+    ++used_sweeps[index_of(*prior.rotation)];
+  if (prior.translation && prior.translation != prior.rotation)
+    ++used_sweeps[index_of(*prior.translation)];
 }
 
 double rounded(double value) { return std::round(value * 1e4) / 1e4; }

@@ -35,11 +35,13 @@ void IngestReport::read(const Ingest& ingest) {
   for (std::size_t i = 0; i < ingest.lidars().lidars().size(); ++i) {
     lidars[i] = Lidar::of(ingest.lidars().lidars()[i]);
   }
-  for (std::size_t i = 0; i < ingest.sources().size(); ++i)
-    sources[i] = {.counters = ingest.sources().counters(i),
-                  .healthy = ingest.sources().healthy(i),
-                  .last_heard = ingest.sources().last_heard(i),
-                  .verdict = ingest.sources().verdict(i)};
+  for (std::size_t i = 0; i < ingest.sources().size(); ++i) {
+    const SourceId source{i};
+    sources[i] = {.counters = ingest.sources().counters(source),
+                  .healthy = ingest.sources().healthy(source),
+                  .last_heard = ingest.sources().last_heard(source),
+                  .verdict = ingest.sources().verdict(source)};
+  }
   sweeps = ingest.sweeps().counters();
 }
 

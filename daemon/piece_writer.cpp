@@ -71,9 +71,8 @@ bool PieceWriter::write(const OdometryInput& input) {
                to_line({sample.stamp, sample.T_source_base}));
 }
 
-bool PieceWriter::write(std::size_t source, Stamp stamp, Stamp arrival, double covariance_scale,
-                        const std::string& line) {
-  SourceFiles& files = sources_[source];
+bool PieceWriter::write(SourceId source, Stamp stamp, Stamp arrival, double covariance_scale, const std::string& line) {
+  SourceFiles& files = sources_[index_of(source)];
   if (files.samples.path.empty() || !is_sensible(stamp) || !is_sensible(arrival))
     return false;
   append(files.samples, line);

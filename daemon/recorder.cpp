@@ -34,7 +34,7 @@ void Recorder::take(const Input& input) noexcept {
     StoredDatagram stored{*datagram, std::min(datagram->payload.size(), StoredDatagram::kMaxBytes)};
     std::copy_n(datagram->payload.begin(), stored.bytes, stored.payload.begin());
     taken = waiting_->push(stored);
-  } else if (const auto* imu = std::get_if<ImuInput>(&input); imu != nullptr && has_file_[imu->source]) {
+  } else if (const auto* imu = std::get_if<ImuInput>(&input); imu != nullptr && has_file_[index_of(imu->source)]) {
     taken = waiting_->push(*imu);
   } else if (const auto* odometry = std::get_if<OdometryInput>(&input)) {
     taken = waiting_->push(*odometry);

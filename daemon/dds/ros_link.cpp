@@ -24,20 +24,20 @@ constexpr Duration kLongestPause = std::chrono::seconds{15};
 /// What exists while there is a network.
 struct RosLink::Session {
   struct ImuSource {
-    std::size_t source;
+    SourceId source;
     DdsReader<ros::Imu> reader;
     Admission admission;
     std::uint64_t received = 0;
   };
   struct OdometrySource {
-    std::size_t source;
+    SourceId source;
     DdsReader<ros::Odometry> reader;
     UsualCovariance usual;
     Admission admission;
     std::uint64_t received = 0;
   };
   struct HealthTopic {
-    std::size_t source;
+    SourceId source;
     DdsReader<ros::Bool> reader;
     Admission admission;
   };
@@ -72,13 +72,16 @@ struct RosLink::Session {
     for (std::size_t i = 0; i < config.motion_sources.size(); ++i) {
       const MotionSource& source = config.motion_sources[i];
       if (!source.topic.empty() && source.kind == SourceKind::imu)
-        wake_by(imus.emplace_back(ImuSource{i, {node, source.topic, TopicQos::sensor_in()}, {}}).reader.handle());
+        wake_by(
+            imus.emplace_back(ImuSource{SourceId{i}, {node, source.topic, TopicQos::sensor_in()}, {}}).reader.handle());
       else if (!source.topic.empty())
-        wake_by(odometries.emplace_back(OdometrySource{i, {node, source.topic, TopicQos::sensor_in()}, {}, {}})
-                    .reader.handle());
+        wake_by(
+            odometries.emplace_back(OdometrySource{SourceId{i}, {node, source.topic, TopicQos::sensor_in()}, {}, {}})
+                .reader.handle());
       if (!source.health_topic.empty())
-        wake_by(health_topics.emplace_back(HealthTopic{i, {node, source.health_topic, TopicQos::standard()}, {}})
-                    .reader.handle());
+        wake_by(
+            health_topics.emplace_back(HealthTopic{SourceId{i}, {node, source.health_topic, TopicQos::standard()}, {}})
+                .reader.handle());
     }
     if (!config.dds.flat_ground_topic.empty())
       wake_by(flat_ground.emplace(FlatGroundTopic{{node, config.dds.flat_ground_topic, TopicQos::standard()}, {}})
@@ -183,14 +186,14 @@ void RosLink::look_after_sources(Session& session) {
   const auto tell = [this](auto& sources) {
     for (auto& from : sources) {
       from.admission.look_after(from.reader);
-      status_.sources[from.source] = {from.reader.writers(), from.received, from.admission.refused(), 0};
+      status_.sources[index_of(from.source)] = {from.reader.writers(), from.received, from.admission.refused(), 0};
     }
   };
   tell(session.imus);
   tell(session.odometries);
   for (auto& from : session.health_topics) {
     from.admission.look_after(from.reader);
-    status_.sources[from.source].health_refused = from.admission.refused();
+    status_.sources[index_of(from.source)].health_refused = from.admission.refused();
   }
   if (auto& from = session.flat_ground) {
     from->admission.look_after(from->reader);

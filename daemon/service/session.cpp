@@ -241,7 +241,7 @@ std::string why_lost(const HealthEvent& event) {
 } // namespace
 
 void Session::tell(const HealthEvent& event) {
-  const std::string& name = config_.motion_sources[event.source].name;
+  const std::string& name = config_.motion_sources[index_of(event.source)].name;
   if (event.healthy)
     log_.info(fmt::format("motion source {} is back", name), {{"LOCUS_SOURCE", name}});
   else

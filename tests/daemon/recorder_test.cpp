@@ -129,12 +129,12 @@ TEST(Recorder, AbsurdSamplesAreReadAgainOrLeftOut) {
   {
     Recorder recorder(folder / "record", config);
     for (const OdometrySample& sample : {no_rotation, good, before_1951})
-      recorder.take(OdometryInput{0, sample});
-    recorder.take(ImuInput{1, imu});
-    recorder.take(ImuInput{2, imu});
+      recorder.take(OdometryInput{SourceId{0}, sample});
+    recorder.take(ImuInput{SourceId{1}, imu});
+    recorder.take(ImuInput{SourceId{2}, imu});
     recorder.take(datagram);
     recorder.take(Silence{now});
-    recorder.take(OutsideVerdict{0, false});
+    recorder.take(OutsideVerdict{SourceId{0}, false});
     for (int look = 0; look < 500 && recorder.status().recorded < 3; ++look)
       std::this_thread::sleep_for(milliseconds{10});
     EXPECT_EQ(recorder.status().recorded, 3U);
@@ -156,7 +156,7 @@ TEST(Recorder, WhatTheDiskIsTooSlowForIsDroppedAndCounted) {
   const test::TemporaryFolder folder;
   Recorder recorder(folder / "record", recorded_config());
   constexpr std::uint64_t kInputs = 4 * Recorder::kMaxUnwritten;
-  const ImuInput imu{1, {}};
+  const ImuInput imu{SourceId{1}, {}};
   const auto begin = std::chrono::steady_clock::now();
   for (std::uint64_t i = 0; i < kInputs; ++i)
     recorder.take(imu);

@@ -143,7 +143,7 @@ TEST_P(Peers, AreHeardInOrderWithEveryFigure) {
   for (const ImuInput& imu : imus) {
     const int i = number_of(imu.sample.angular_velocity_radps.z());
     const test::Said said(i);
-    EXPECT_EQ(imu.source, 1U);
+    EXPECT_EQ(imu.source, SourceId{1});
     EXPECT_EQ(imu.sample.stamp, to_stamp({said.sec, said.nanosec}));
     EXPECT_EQ(imu.sample.specific_force_mps2.z(), 9.81);
     EXPECT_GT(i, last);
@@ -151,11 +151,11 @@ TEST_P(Peers, AreHeardInOrderWithEveryFigure) {
   }
   for (const OdometryInput& odometry : inbox_.all<OdometryInput>()) {
     const test::Said said(number_of(odometry.sample.T_source_base.translation.x()));
-    EXPECT_EQ(odometry.source, 0U);
+    EXPECT_EQ(odometry.source, SourceId{0});
     EXPECT_EQ(odometry.sample.stamp, to_stamp({said.sec, said.nanosec}));
     EXPECT_NEAR(odometry.sample.covariance_scale, 1.0, 1e-9);
   }
-  EXPECT_EQ(inbox_.all<OutsideVerdict>().front().source, 0U);
+  EXPECT_EQ(inbox_.all<OutsideVerdict>().front().source, SourceId{0});
   const RosLink::Status status = link.status();
   EXPECT_TRUE(status.connected);
   EXPECT_EQ(status.sources[1].writers, 1U);

@@ -150,7 +150,7 @@ TEST(SweepRecord, TellsWhatEachSourceWasToTheSweep) {
   daemon::ProcessedSweep sweep;
   sweep.raw_returns = 1000;
   sweep.usable_sources = 0b0111;
-  sweep.estimate.prior = {.rotation = 2, .translation = 0};
+  sweep.estimate.prior = {{SourceId{2}, SourceId{0}}};
   sweep.estimate.pose_covariance.diagonal() << 0.01, 0.02, 0.06, 9.0, 9.0, 9.0;
   const SweepRecord record = record_of(sweep);
   EXPECT_EQ(record.sources[0], SourceHealth::used);

@@ -154,9 +154,9 @@ void deal_lidars(const Bag& bag, const std::string& bag_name, const Config& conf
 }
 
 void deal_sources(const Bag& bag, const std::string& bag_name, const Config& config,
-                  const std::function<bool(std::size_t)>& has_file, SourceKind kind, BagTopics& chosen) {
+                  const std::function<bool(SourceId)>& has_file, SourceKind kind, BagTopics& chosen) {
   const std::vector<MotionSource>& sources = config.motion_sources;
-  const auto is_wanted = [&](std::size_t i) { return sources[i].kind == kind && !has_file(i); };
+  const auto is_wanted = [&](std::size_t i) { return sources[i].kind == kind && !has_file(SourceId{i}); };
   Dealer dealer(bag.topics(), type_of(kind));
   std::vector<Index*> nameless;
   for (std::size_t i = 0; i < sources.size(); ++i) {
@@ -201,7 +201,7 @@ std::string describe(const Bag& bag, const std::string& bag_name, const Config& 
 } // namespace
 
 BagTopics BagTopics::choose(const Bag& bag, const std::string& bag_name, const Config& config,
-                            const std::function<bool(std::size_t)>& has_file) {
+                            const std::function<bool(SourceId)>& has_file) {
   BagTopics chosen;
   deal_lidars(bag, bag_name, config, chosen);
   chosen.of_source.resize(config.motion_sources.size());

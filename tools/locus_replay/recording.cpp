@@ -56,7 +56,7 @@ Recording::Recording(std::unique_ptr<DatagramSource> source, std::vector<MotionR
   if (!options.faults.empty())
     faults_.emplace(options.faults, capture_start_, options.seed);
   for (MotionRecording& recording : motion) {
-    const std::string& name = config.motion_sources[recording.source].name;
+    const std::string& name = config.motion_sources[index_of(recording.source)].name;
     const bool has_faults = std::ranges::find(options.faults, name, &Fault::name) != options.faults.end();
     if (has_faults)
       std::visit([&](auto& samples) { samples = with_faults(samples.drain(), options, name, capture_start_); },

@@ -44,8 +44,8 @@ ordered_json sources(const FinishedRun& run) {
   ordered_json sources = ordered_json::object();
   for (std::size_t i = 0; i < run.config.motion_sources.size(); ++i) {
     ordered_json& source = sources[run.config.motion_sources[i].name];
-    source = to_json(run.ingest.sources().counters(i), run.figures.sums().used_sweeps[i]);
-    if (const std::string_view verdict = run.ingest.sources().verdict(i); !verdict.empty())
+    source = to_json(run.ingest.sources().counters(SourceId{i}), run.figures.sums().used_sweeps[i]);
+    if (const std::string_view verdict = run.ingest.sources().verdict(SourceId{i}); !verdict.empty())
       source["verdict"] = verdict;
   }
   return sources;
@@ -59,7 +59,7 @@ std::string_view reason_of(const HealthEvent& event) {
 }
 
 /// When a source was lost and why, and when it came back.
-std::string readable_health(const FinishedRun& run, std::size_t source) {
+std::string readable_health(const FinishedRun& run, SourceId source) {
   constexpr std::size_t kTold = 4; ///< a source that flaps is not worth a page
   std::string text;
   std::size_t told = 0;
@@ -176,9 +176,9 @@ std::string readable(const FinishedRun& run) {
   text += fmt::format("sweeps     {} seen: {} processed, {} dropped, {} failed\n", run.sweeps.seen,
                       run.sweeps.processed, run.sweeps.dropped, run.sweeps.failed);
   for (std::size_t i = 0; i < run.config.motion_sources.size(); ++i) {
-    if (const auto received = run.ingest.sources().counters(i).received; received > 0)
+    if (const auto received = run.ingest.sources().counters(SourceId{i}).received; received > 0)
       text += fmt::format("{:10} {} samples, used for {} sweeps{}\n", run.config.motion_sources[i].name, received,
-                          run.figures.sums().used_sweeps[i], readable_health(run, i));
+                          run.figures.sums().used_sweeps[i], readable_health(run, SourceId{i}));
   }
   text += fmt::format("path       {:.2f} m, ends at {:.3f} {:.3f} {:.3f} m\n", run.figures.path_m(), end_m.x(),
                       end_m.y(), end_m.z());

@@ -129,7 +129,8 @@ TEST(Odometry, NeedsNoSourceInARoom) {
   const sim::Trajectory trajectory(sim::room_course(kLaps, 1.0), sim::room_start());
   const Outcome result = drive_through(sim::room(), trajectory, robot_with_lidar_alone(), kLaps);
   EXPECT_LT(result.worst_error_m, 0.10);
-  EXPECT_EQ(result.estimates.back().prior.rotation, PriorSource::kConstantVelocity);
+  EXPECT_FALSE(result.estimates.back().prior.rotation);
+  EXPECT_EQ(result.estimates.back().prior.otherwise, NoSourcePrior::constant_velocity);
   expect_sound(result.estimates);
 }
 
@@ -183,7 +184,7 @@ TEST(Odometry, TenSecondsWithoutLidarAreBridgedByWheelOdometry) {
     dead_reckoning += e.state == TrackingState::dead_reckoning ? 1 : 0;
     if (in_the_dark) {
       EXPECT_EQ(e.state, TrackingState::dead_reckoning);
-      EXPECT_EQ(e.prior.translation, 0);
+      EXPECT_EQ(e.prior.translation, SourceId{0});
       EXPECT_FALSE(e.keyframe);
     }
   }
@@ -456,11 +457,11 @@ TEST(Odometry, SourcesInTheQueueAreUsedWhileTheyLast) {
   const Outcome result = drive_through(sim::room(), trajectory, setup, seconds{10});
   for (const OdometryEstimate& e : result.estimates) {
     if (e.stamp < silent && e.stamp > trajectory.start() + milliseconds{300}) {
-      EXPECT_EQ(e.prior.translation, 0);
-      EXPECT_EQ(e.prior.rotation, 1);
+      EXPECT_EQ(e.prior.translation, SourceId{0});
+      EXPECT_EQ(e.prior.rotation, SourceId{1});
     } else if (e.stamp > silent + milliseconds{300}) {
-      EXPECT_EQ(e.prior.translation, PriorSource::kConstantVelocity);
-      EXPECT_EQ(e.prior.rotation, 1);
+      EXPECT_FALSE(e.prior.translation);
+      EXPECT_EQ(e.prior.rotation, SourceId{1});
     }
   }
   EXPECT_LT(result.worst_error_m, 0.05);
