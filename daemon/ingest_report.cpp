@@ -36,11 +36,11 @@ void IngestReport::read(const Ingest& ingest) {
     lidars[i] = Lidar::of(ingest.lidars().lidars()[i]);
   }
   for (std::size_t i = 0; i < ingest.sources().size(); ++i) {
-    const SourceId source{i};
-    sources[i] = {.counters = ingest.sources().counters(source),
-                  .healthy = ingest.sources().healthy(source),
-                  .last_heard = ingest.sources().last_heard(source),
-                  .verdict = ingest.sources().verdict(source)};
+    const HealthMonitor& health = ingest.sources().health(SourceId{i});
+    sources[i] = {.counters = health.counters(),
+                  .healthy = health.healthy(),
+                  .last_heard = health.last_heard(),
+                  .verdict = health.verdict()};
   }
   sweeps = ingest.sweeps().counters();
 }

@@ -62,7 +62,7 @@ void MotionSources::follow_health(SourceId source) {
 SourceChoice MotionSources::choose(Stamp now) const {
   const auto track_of = [this](SourceId source) -> const MotionTrack& { return sources_[index_of(source)].track; };
   return choose_sources([&](SourceId source) { return track_of(source).kind(); }, sources_.size(), fusion_,
-                        [&](SourceId source) { return healthy(source) && track_of(source).is_live(now); });
+                        [&](SourceId source) { return health(source).healthy() && track_of(source).is_live(now); });
 }
 
 std::optional<Pose> MotionSources::motion(const SourceChoice& choice, Stamp from, Stamp to) const {

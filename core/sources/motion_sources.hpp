@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
-#include <string_view>
 #include <vector>
 
 #include "core/base/options.hpp"
@@ -52,13 +51,7 @@ class MotionSources {
   /// What all of them say of (from, to]: poses at its end, and the specific force meanwhile.
   [[nodiscard]] SensedMotion sensed_in(Stamp from, Stamp to) const;
 
-  [[nodiscard]] bool healthy(SourceId source) const { return sources_[index_of(source)].health.healthy(); }
-  /// What is wrong with a source as a whole, in words for the user; empty if nothing is.
-  [[nodiscard]] std::string_view verdict(SourceId source) const { return sources_[index_of(source)].health.verdict(); }
-  [[nodiscard]] Stamp last_heard(SourceId source) const { return sources_[index_of(source)].health.last_heard(); }
-  [[nodiscard]] const SourceCounters& counters(SourceId source) const {
-    return sources_[index_of(source)].health.counters();
-  }
+  [[nodiscard]] const HealthMonitor& health(SourceId source) const { return sources_[index_of(source)].health; }
   [[nodiscard]] std::size_t size() const { return sources_.size(); }
 
  private:

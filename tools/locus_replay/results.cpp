@@ -53,9 +53,9 @@ std::vector<std::string> source_verdicts(const Config& config, const MotionSourc
   std::vector<std::string> lines;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     const std::string& name = config.motion_sources[i].name;
-    const bool is_doubted =
-        !sources.healthy(SourceId{i}) && sources.counters(SourceId{i}).rejected_as(HealthReason::self_check) > 0;
-    if (const std::string_view verdict = sources.verdict(SourceId{i}); !verdict.empty())
+    const HealthMonitor& health = sources.health(SourceId{i});
+    const bool is_doubted = !health.healthy() && health.counters().rejected_as(HealthReason::self_check) > 0;
+    if (const std::string_view verdict = health.verdict(); !verdict.empty())
       lines.push_back(fmt::format("motion source {} {}", name, verdict));
     else if (is_doubted)
       lines.push_back(

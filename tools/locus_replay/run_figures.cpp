@@ -44,8 +44,9 @@ ordered_json sources(const FinishedRun& run) {
   ordered_json sources = ordered_json::object();
   for (std::size_t i = 0; i < run.config.motion_sources.size(); ++i) {
     ordered_json& source = sources[run.config.motion_sources[i].name];
-    source = to_json(run.ingest.sources().counters(SourceId{i}), run.figures.sums().used_sweeps[i]);
-    if (const std::string_view verdict = run.ingest.sources().verdict(SourceId{i}); !verdict.empty())
+    const HealthMonitor& health = run.ingest.sources().health(SourceId{i});
+    source = to_json(health.counters(), run.figures.sums().used_sweeps[i]);
+    if (const std::string_view verdict = health.verdict(); !verdict.empty())
       source["verdict"] = verdict;
   }
   return sources;
@@ -176,7 +177,7 @@ std::string readable(const FinishedRun& run) {
   text += fmt::format("sweeps     {} seen: {} processed, {} dropped, {} failed\n", run.sweeps.seen,
                       run.sweeps.processed, run.sweeps.dropped, run.sweeps.failed);
   for (std::size_t i = 0; i < run.config.motion_sources.size(); ++i) {
-    if (const auto received = run.ingest.sources().counters(SourceId{i}).received; received > 0)
+    if (const auto received = run.ingest.sources().health(SourceId{i}).counters().received; received > 0)
       text += fmt::format("{:10} {} samples, used for {} sweeps{}\n", run.config.motion_sources[i].name, received,
                           run.figures.sums().used_sweeps[i], readable_health(run, SourceId{i}));
   }
