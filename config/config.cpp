@@ -58,8 +58,8 @@ void check_names(Problems& problems, const Config& config) {
   };
   for (std::size_t i = 0; i < config.lidars.size(); ++i)
     check(item("lidars", i, "name"), config.lidars[i].name);
-  for (std::size_t i = 0; i < config.odometry.motion_sources.size(); ++i)
-    check(item("motion_sources", i, "name"), config.odometry.motion_sources[i].name);
+  for (std::size_t i = 0; i < config.motion_sources.size(); ++i)
+    check(item("motion_sources", i, "name"), config.motion_sources[i].name);
 }
 
 void check_lidars(Problems& problems, const std::vector<LidarOptions>& lidars) {
@@ -79,11 +79,15 @@ void check_lidars(Problems& problems, const std::vector<LidarOptions>& lidars) {
 }
 
 void check_sources(Problems& problems, const Config& config) {
-  problems.require(config.odometry.motion_sources.size() <= kMaxSources, "motion_sources",
+  problems.require(config.motion_sources.size() <= kMaxSources, "motion_sources",
                    "there may be " + std::to_string(kMaxSources) + " at most");
-  for (std::size_t i = 0; i < config.source_topics.size(); ++i) {
-    require_topic_or_empty(problems, item("motion_sources", i, "topic"), config.source_topics[i].topic);
-    require_topic_or_empty(problems, item("motion_sources", i, "health_topic"), config.source_topics[i].health_topic);
+  for (std::size_t i = 0; i < config.motion_sources.size(); ++i) {
+    const MotionSource& source = config.motion_sources[i];
+    require_topic_or_empty(problems, item("motion_sources", i, "topic"), source.topic);
+    require_topic_or_empty(problems, item("motion_sources", i, "health_topic"), source.health_topic);
+    problems.require(source.kind == SourceKind::imu || source.T_base_source == Pose{},
+                     item("motion_sources", i, "T_base_source"),
+                     "belongs to kind imu alone, an odometry source already reports the pose of the base");
   }
 }
 
@@ -96,10 +100,10 @@ void check_types_of_topics(Problems& problems, const Config& config) {
         first == type, key,
         fmt::format("'{}' cannot carry {} here and {} elsewhere; give each a topic of its own", topic, type, first));
   };
-  for (std::size_t i = 0; i < config.source_topics.size() && i < config.odometry.motion_sources.size(); ++i) {
-    const bool is_imu = config.odometry.motion_sources[i].kind == SourceKind::imu;
-    check(item("motion_sources", i, "topic"), config.source_topics[i].topic, is_imu ? "Imu" : "Odometry");
-    check(item("motion_sources", i, "health_topic"), config.source_topics[i].health_topic, "Bool");
+  for (std::size_t i = 0; i < config.motion_sources.size(); ++i) {
+    const MotionSource& source = config.motion_sources[i];
+    check(item("motion_sources", i, "topic"), source.topic, source.kind == SourceKind::imu ? "Imu" : "Odometry");
+    check(item("motion_sources", i, "health_topic"), source.health_topic, "Bool");
   }
   check("dds.flat_ground_topic", config.dds.flat_ground_topic, "Bool");
 }
@@ -123,7 +127,7 @@ void check_dds(Problems& problems, const DdsOptions& dds) {
 
 /// A name of a source is that of its file.
 void check_record(Problems& problems, const Config& config) {
-  const std::vector<MotionSourceOptions>& sources = config.odometry.motion_sources;
+  const std::vector<MotionSource>& sources = config.motion_sources;
   for (std::size_t i = 0; i < sources.size() && !config.record.folder.empty(); ++i)
     problems.require(sources[i].kind == SourceKind::imu || (sources[i].name != "gt" && sources[i].name != "imu"),
                      item("motion_sources", i, "name"),
@@ -132,12 +136,6 @@ void check_record(Problems& problems, const Config& config) {
 }
 
 } // namespace
-
-OdometryOptions Config::default_odometry() {
-  OdometryOptions odometry;
-  odometry.motion_sources = {{"wio", SourceKind::odometry, {}}, {"imu", SourceKind::imu, {}}};
-  return odometry;
-}
 
 std::optional<std::string> Config::problem() const {
   Problems problems;

@@ -11,12 +11,12 @@
 
 namespace locus {
 
-/// Where the samples of one motion source come from.
-struct SourceTopics {
+/// A motion source, and where its samples come from.
+struct MotionSource : MotionSourceOptions {
   std::string topic;        ///< sensor_msgs/Imu or nav_msgs/Odometry by the source's kind; empty: not from DDS
   std::string health_topic; ///< std_msgs/Bool, false is unhealthy; empty: none
 
-  bool operator==(const SourceTopics&) const = default;
+  bool operator==(const MotionSource&) const = default;
 };
 
 /// What the threads of the daemon ask of the operating system.
@@ -58,10 +58,10 @@ struct Config {
   static constexpr std::size_t kMaxLidars = 16;
 
   std::vector<LidarOptions> lidars{LidarOptions{}}; ///< the first one gives the sweep its period
+  std::vector<MotionSource> motion_sources{{{"wio", SourceKind::odometry, {}}, "/wheel_odometry", ""},
+                                           {{"imu", SourceKind::imu, {}}, "/imu/data", ""}}; ///< highest priority first
   SweepOptions sweep;
-  OdometryOptions odometry = default_odometry();
-  std::vector<SourceTopics> source_topics{{"/wheel_odometry", ""},
-                                          {"/imu/data", ""}}; ///< of odometry.motion_sources[i]
+  OdometryOptions odometry;
   RealtimeOptions realtime;
   DdsOptions dds;
   RecordOptions record;
@@ -69,12 +69,14 @@ struct Config {
   /// As problem() of every module, and what only shows when all are seen together: names and ports used twice.
   [[nodiscard]] std::optional<std::string> problem() const;
 
+  /// What the core is told of the motion sources.
+  [[nodiscard]] std::vector<MotionSourceOptions> source_options() const {
+    return {motion_sources.begin(), motion_sources.end()};
+  }
+
   /// Has all of it computed by the instructions of one set.
   void use(Isa isa);
   bool operator==(const Config&) const = default;
-
- private:
-  static OdometryOptions default_odometry();
 };
 
 } // namespace locus

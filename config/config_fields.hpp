@@ -26,12 +26,6 @@ struct Ipv4 {
   std::uint32_t host_order = 0;
 };
 
-/// A motion source as the file has it, in one item.
-struct MotionSource {
-  MotionSourceOptions options;
-  SourceTopics topics;
-};
-
 template <class Section> void fields(Section& section, Pose& T) {
   // A nanodegree is less than rounding makes of an angle on its way through a rotation: 30 stays 30.
   Eigen::Vector3d rpy_deg = (to_rpy_rad(T.rotation) / kRadPerDeg).unaryExpr([](double angle_deg) {
@@ -60,11 +54,11 @@ template <class Section> void fields(Section& section, LidarOptions& options) {
 }
 
 template <class Section> void fields(Section& section, MotionSource& source) {
-  section.key("name", source.options.name);
-  section.key("kind", source.options.kind);
-  section.key("topic", source.topics.topic);
-  section.key("health_topic", source.topics.health_topic);
-  section.key("T_base_source", source.options.T_base_source);
+  section.key("name", source.name);
+  section.key("kind", source.kind);
+  section.key("topic", source.topic);
+  section.key("health_topic", source.health_topic);
+  section.key("T_base_source", source.T_base_source);
 }
 
 template <class Section> void fields(Section& section, BodyBoxOptions& options) {
@@ -170,23 +164,13 @@ template <class Section> void fields(Section& section, RecordOptions& options) {
 }
 
 template <class Section> void fields(Section& section, Config& config) {
-  std::vector<MotionSource> sources;
-  for (std::size_t i = 0; i < config.odometry.motion_sources.size(); ++i)
-    sources.push_back({config.odometry.motion_sources[i],
-                       i < config.source_topics.size() ? config.source_topics[i] : SourceTopics{}});
   section.key("lidars", config.lidars);
-  section.key("motion_sources", sources);
+  section.key("motion_sources", config.motion_sources);
   fields(section, config.sweep);
   fields(section, config.odometry);
   section.key("realtime", config.realtime);
   section.key("dds", config.dds);
   section.key("record", config.record);
-  config.odometry.motion_sources.clear();
-  config.source_topics.clear();
-  for (MotionSource& source : sources) {
-    config.odometry.motion_sources.push_back(std::move(source.options));
-    config.source_topics.push_back(std::move(source.topics));
-  }
 }
 
 } // namespace locus

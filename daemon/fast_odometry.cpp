@@ -41,7 +41,7 @@ Matrix6 carried_covariance(const FastSample& from, const Pose& T_odom_now, doubl
 
 } // namespace
 
-std::optional<FastSample> FastOdometry::carry(const MotionSources& sources, std::size_t source, Stamp arrival) const {
+std::optional<FastSample> FastOdometry::carry(const MotionSources& sources, SourceId source, Stamp arrival) const {
   const SourceChoice choice = sources.choose(arrival);
   const std::optional<Stamp> newest = sources.newest(source);
   if (!estimate_ || choice.rotation != source || !newest || *newest <= estimate_->stamp)

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
 #include <optional>
 
 #include "core/odometry/odometry_estimate.hpp"
@@ -26,7 +25,7 @@ class FastOdometry {
   void take(const FastSample& estimate) { estimate_ = estimate; }
 
   /// After a sample of `source`; nothing for other sources, and while none is healthy or nothing has been estimated.
-  [[nodiscard]] std::optional<FastSample> carry(const MotionSources& sources, std::size_t source, Stamp arrival) const;
+  [[nodiscard]] std::optional<FastSample> carry(const MotionSources& sources, SourceId source, Stamp arrival) const;
 
  private:
   std::optional<FastSample> estimate_;

@@ -39,11 +39,13 @@ void IngestReport::read(const Ingest& ingest) {
   for (std::size_t i = 0; i < ingest.lidars().lidars().size(); ++i) {
     lidars[i] = Lidar::of(ingest.lidars().lidars()[i]);
   }
-  for (std::size_t i = 0; i < ingest.sources().size(); ++i)
-    sources[i] = {.counters = ingest.sources().counters(i),
-                  .healthy = ingest.sources().healthy(i),
-                  .last_heard = ingest.sources().last_heard(i),
-                  .verdict = ingest.sources().verdict(i)};
+  for (std::size_t i = 0; i < ingest.sources().size(); ++i) {
+    const HealthMonitor& health = ingest.sources().health(SourceId{i});
+    sources[i] = {.counters = health.counters(),
+                  .healthy = health.healthy(),
+                  .last_heard = health.last_heard(),
+                  .verdict = health.verdict()};
+  }
   sweeps = ingest.sweeps().counters();
 }
 
@@ -103,10 +105,10 @@ void SweepTally::take(const ProcessedSweep& sweep) {
   sums_.scan_to_scan_iterations += estimate.scan_to_scan.iterations;
   sums_.scan_to_submap_iterations += estimate.scan_to_submap.iterations;
   const PriorSource& prior = estimate.prior;
-  if (prior.rotation >= 0)
-    ++sums_.used_sweeps[static_cast<std::size_t>(prior.rotation)];
-  if (prior.translation >= 0 && prior.translation != prior.rotation)
-    ++sums_.used_sweeps[static_cast<std::size_t>(prior.translation)];
+  if (prior.rotation)
+    ++sums_.used_sweeps[index_of(*prior.rotation)];
+  if (prior.translation && prior.translation != prior.rotation)
+    ++sums_.used_sweeps[index_of(*prior.translation)];
   for (std::size_t i = 0; i < kStages; ++i)
     sums_.stages[i] += sweep.stages_took[i];
   if (sums_.last)

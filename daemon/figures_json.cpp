@@ -182,8 +182,8 @@ ordered_json to_json(const Figures& figures) {
                     {"failed", counters.failed}};
   json.update(sweeps_json(figures.sweeps));
   json["sources"] = ordered_json::object();
-  for (std::size_t i = 0; i < config.odometry.motion_sources.size(); ++i)
-    json["sources"][config.odometry.motion_sources[i].name] = source_json(figures, i);
+  for (std::size_t i = 0; i < config.motion_sources.size(); ++i)
+    json["sources"][config.motion_sources[i].name] = source_json(figures, i);
   if (figures.live)
     json.update(live_json(figures, *figures.live));
   return json;

@@ -85,7 +85,7 @@ std::string lidars_text(const Figures& figures) {
 }
 
 std::string sources_text(const Figures& figures) {
-  const std::vector<MotionSourceOptions>& sources = figures.config.odometry.motion_sources;
+  const std::vector<MotionSource>& sources = figures.config.motion_sources;
   if (sources.empty())
     return "";
   std::string text = fmt::format("\n{:<12}{:<12}{:>12}{:>12}{:>12}{:>10}{:>9}\n", "source", "health", "samples",

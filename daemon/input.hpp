@@ -11,6 +11,7 @@
 
 #include <poll.h>
 
+#include "core/base/source_id.hpp"
 #include "core/sources/motion_sample.hpp"
 #include "daemon/threads.hpp"
 #include "drivers/net/datagram.hpp"
@@ -23,19 +24,19 @@ class LidarRouter;
 
 namespace locus::daemon {
 
-/// A sample of the motion source with this index in the configuration, whose kind it must fit.
+/// A sample of a motion source, whose kind it must fit.
 struct ImuInput {
-  std::size_t source;
+  SourceId source;
   ImuSample sample;
 };
 struct OdometryInput {
-  std::size_t source;
+  SourceId source;
   OdometrySample sample;
 };
 
 /// Somebody outside says whether this motion source is healthy (its health_topic).
 struct OutsideVerdict {
-  std::size_t source;
+  SourceId source;
   bool healthy;
 };
 

@@ -165,7 +165,7 @@ std::string cannot_be_written(const std::filesystem::path& file) {
 std::vector<std::optional<std::string>> sample_files(const Config& config) {
   std::vector<std::optional<std::string>> files;
   bool has_imu = false;
-  for (const MotionSourceOptions& source : config.odometry.motion_sources) {
+  for (const MotionSourceOptions& source : config.motion_sources) {
     if (source.kind == SourceKind::odometry)
       files.emplace_back(source.name + ".tum");
     else
@@ -207,9 +207,8 @@ bool PieceWriter::write(const OdometryInput& input) {
                to_line({sample.stamp, sample.T_source_base}));
 }
 
-bool PieceWriter::write(std::size_t source, Stamp stamp, Stamp arrival, double covariance_scale,
-                        const std::string& line) {
-  SourceFiles& files = sources_[source];
+bool PieceWriter::write(SourceId source, Stamp stamp, Stamp arrival, double covariance_scale, const std::string& line) {
+  SourceFiles& files = sources_[index_of(source)];
   if (files.samples.path.empty() || !is_sensible(stamp) || !is_sensible(arrival))
     return false;
   append(files.samples, line);
@@ -269,7 +268,7 @@ void Recorder::take(const Input& input) noexcept {
     StoredDatagram stored{*datagram, std::min(datagram->payload.size(), StoredDatagram::kMaxBytes)};
     std::copy_n(datagram->payload.begin(), stored.bytes, stored.payload.begin());
     taken = waiting_->push(stored);
-  } else if (const auto* imu = std::get_if<ImuInput>(&input); imu != nullptr && has_file_[imu->source]) {
+  } else if (const auto* imu = std::get_if<ImuInput>(&input); imu != nullptr && has_file_[index_of(imu->source)]) {
     taken = waiting_->push(*imu);
   } else if (const auto* odometry = std::get_if<OdometryInput>(&input)) {
     taken = waiting_->push(*odometry);

@@ -110,7 +110,7 @@ class PieceWriter {
   };
 
   PieceWriter(PcapWriter pcap, const std::filesystem::path& folder, const Config& config);
-  bool write(std::size_t source, Stamp stamp, Stamp arrival, double covariance_scale, const std::string& line);
+  bool write(SourceId source, Stamp stamp, Stamp arrival, double covariance_scale, const std::string& line);
   void append(TextFile& file, const std::string& text);
 
   PcapWriter pcap_;

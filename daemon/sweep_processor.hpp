@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "config/config.hpp"
 #include "core/odometry/odometry.hpp"
 #include "daemon/machine_time.hpp"
 
@@ -43,8 +44,8 @@ struct ProcessedSweep {
 /// Odometry with its costs measured; what the daemon's odometry thread and the replay in one thread share. One owner.
 class SweepProcessor {
  public:
-  explicit SweepProcessor(const OdometryOptions& options, const std::optional<StartPoint>& start = {})
-      : odometry_(options, &stages_) {
+  explicit SweepProcessor(const Config& config, const std::optional<StartPoint>& start = {})
+      : odometry_(config.odometry, config.source_options(), &stages_) {
     if (start)
       odometry_.begin_at(start->T_odom_base, start->map_odom);
   }

@@ -88,13 +88,11 @@ std::optional<PacketError> LidarInput::take_data(const Datagram& datagram) {
     return PacketError::duplicate;
   if (const auto error = decoder_.decode(datagram.payload, packet_))
     return error;
-  const Duration time_of_hour = velodyne::time_of_hour(datagram.payload);
-  const Duration stamp_delay = velodyne::spec(*decoder_.model(), decoder_.pace()).stamp_delay;
-  const auto reading = clock_.read(time_of_hour, packet_.duration - stamp_delay, datagram.receive_stamp);
+  const auto reading = clock_.read(decoder_.time_of_hour(), packet_.duration, datagram.receive_stamp);
   counters_.clock_steps = clock_.steps();
   if (!reading)
     return PacketError::time;
-  packet_.stamp = reading->stamp - stamp_delay;
+  packet_.stamp = reading->stamp;
   packet_is_ready_ = true;
   count(*reading);
   remember(datagram);
@@ -119,10 +117,8 @@ void LidarInput::refuse_sender(const Datagram& datagram) {
 
 bool LidarInput::is_duplicate(std::span<const std::byte> payload) const {
   const auto end = recent_.begin() + static_cast<std::ptrdiff_t>(std::min(remembered_, kRemembered));
-  return std::any_of(recent_.begin(), end, [&](const Payload& seen) {
-    return velodyne::time_of_hour(seen) == velodyne::time_of_hour(payload) &&
-           std::memcmp(seen.data(), payload.data(), seen.size()) == 0;
-  });
+  return std::any_of(recent_.begin(), end,
+                     [&](const Payload& seen) { return std::memcmp(seen.data(), payload.data(), seen.size()) == 0; });
 }
 
 /// Share by which the speed may differ over a gap: the motor's own, or what the azimuths of a packet, in hundredths of

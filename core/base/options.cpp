@@ -35,10 +35,6 @@ std::optional<std::string> OdometryOptions::problem() const {
   problems.require_range("map.keyframe_deg", map.keyframe_deg, 1.0, 180.0);
   problems.require_range<std::size_t>("map.max_bytes", map.max_bytes, 1'000'000, 100'000'000'000);
   problems.require_range("threads", threads, 1, 256);
-  for (std::size_t i = 0; i < motion_sources.size(); ++i)
-    problems.require(motion_sources[i].kind == SourceKind::imu || motion_sources[i].T_base_source == Pose{},
-                     "motion_sources." + std::to_string(i) + ".T_base_source",
-                     "belongs to kind imu alone, an odometry source already reports the pose of the base");
   return problems.result();
 }
 

@@ -103,9 +103,8 @@ constexpr auto names_of(NoSourcePrior) { return std::to_array<std::string_view>(
 enum class FlatGround { off, on, automatic };
 constexpr auto names_of(FlatGround) { return std::to_array<std::string_view>({"off", "on", "auto"}); }
 
-/// Everything Odometry wants to know.
+/// Everything Odometry wants to know, but for the motion sources.
 struct OdometryOptions {
-  std::vector<MotionSourceOptions> motion_sources; ///< highest priority first
   Fusion fusion = Fusion::combined;
   NoSourcePrior no_source_prior = NoSourcePrior::constant_velocity;
   ScanToScanMode scan_to_scan_mode = ScanToScanMode::automatic; ///< key scan_to_scan.mode

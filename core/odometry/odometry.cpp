@@ -74,9 +74,10 @@ bool fits_better(const Registration& one, const Registration& other) {
 
 } // namespace
 
-Odometry::Odometry(const OdometryOptions& options, StageClock* clock)
+Odometry::Odometry(const OdometryOptions& options, const std::vector<MotionSourceOptions>& sources, StageClock* clock)
     : options_(options), clock_(clock), gicp_(options.threads, options.isa), flat_ground_(options.flat_ground),
-      map_(options.map.max_bytes, options.isa), last_scan_map_(kLastScanBytes, options.isa), sensors_(options) {}
+      map_(options.map.max_bytes, options.isa), last_scan_map_(kLastScanBytes, options.isa),
+      sensors_(options, sources) {}
 
 OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested& stop) {
   prepare_next();
@@ -184,7 +185,7 @@ std::optional<Vector6> Odometry::kept_twist(const Sweep& sweep) const {
 /// true: as a prior, a gyro is too sure for them to say so later. The loser makes the winner less sure.
 MotionPrior Odometry::settle_dispute(const Sweep& sweep, const MotionPrior& prior, const Gicp::StopRequested& stop) {
   source_is_refuted_ = false;
-  if (prior.source.rotation < 0 || !had_sight(sweep) || sweep.points.size() < kMinPoints)
+  if (!prior.source.rotation || !had_sight(sweep) || sweep.points.size() < kMinPoints)
     return prior;
   const MotionPrior rival = sensors_.integrate(sweep, kept_twist(sweep), prior.source.rotation);
   const Eigen::Vector3d dispute = difference(prior.T_last_now, rival.T_last_now).tail<3>();
@@ -237,7 +238,7 @@ Vector6 Odometry::twist_in(const Sweep& sweep, const Pose& T_last_now) const {
 
 bool Odometry::needs_scan_to_scan(const MotionPrior& prior) const {
   return options_.scan_to_scan_mode == ScanToScanMode::always ||
-         (options_.scan_to_scan_mode == ScanToScanMode::automatic && prior.source.translation < 0);
+         (options_.scan_to_scan_mode == ScanToScanMode::automatic && !prior.source.translation);
 }
 
 Registration Odometry::match_scan(const MotionPrior& prior, const Pose& T_start, bool wide,
@@ -323,7 +324,7 @@ bool Odometry::trusts(const Registration& registration, const Pose& T_last_now, 
 /// not.
 bool Odometry::is_outvoted(const Sweep& sweep, const Registration& registration, const Pose& T_last_now,
                            const MotionPrior& prior) const {
-  if (prior.source.translation < 0 || !had_sight(sweep) || !misses_most(registration))
+  if (!prior.source.translation || !had_sight(sweep) || !misses_most(registration))
     return false;
   const Vector6 deviation = difference(T_last_now, prior.T_last_now).cwiseAbs();
   return (deviation.array() > kLoneDeviation_sigma * variance_against_submap().cwiseSqrt().array()).any();
@@ -355,7 +356,7 @@ void Odometry::choose_keyframe(OdometryEstimate& estimate) {
   const bool moved =
       T_keyframe_base.translation.norm() > options_.map.keyframe_m || turned_deg > options_.map.keyframe_deg;
   const bool takes_in = !estimate.failed && (processed_ == 0 || (moved && !misses_most(estimate.scan_to_submap)));
-  const bool carried = estimate.prior.translation >= 0 && was_seen_lately(estimate.stamp) && !is_map_in_doubt();
+  const bool carried = estimate.prior.translation && was_seen_lately(estimate.stamp) && !is_map_in_doubt();
   const bool restarts = refused_in_a_row_ >= kRefusalsToRestart && !carried && scan_.size() >= kMinPoints;
   if (!takes_in && !restarts)
     return;

@@ -31,7 +31,9 @@ namespace locus {
 /// were processed and on nothing else. One owner.
 class Odometry {
  public:
-  explicit Odometry(const OdometryOptions& options, StageClock* clock = nullptr);
+  /// `sources` in the order of their priority, as MotionSources has them.
+  explicit Odometry(const OdometryOptions& options, const std::vector<MotionSourceOptions>& sources = {},
+                    StageClock* clock = nullptr);
 
   /// Before the first sweep: where it is to be, instead of level at the origin. With surfaces that were seen there
   /// before (odom frame) it is registered with them; where it does not fit it begins level at the origin all the same.

@@ -4,20 +4,19 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/base/options.hpp"
 #include "core/base/pose.hpp"
 #include "core/base/stamp.hpp"
 #include "core/map/registration.hpp"
+#include "core/sources/sensed_motion.hpp"
 
 namespace locus {
 
 enum class TrackingState : std::uint8_t { tracking, degenerate, dead_reckoning, standstill };
 
 /// Where the start of a registration came from.
-struct PriorSource {
-  static constexpr int kConstantVelocity = -1;
-  static constexpr int kIdentity = -2;
-  int rotation = kIdentity;    ///< index of a motion source, or one of the above
-  int translation = kIdentity; ///< the same
+struct PriorSource : SourceChoice {
+  NoSourcePrior otherwise = NoSourcePrior::identity; ///< in place of what no source said
 };
 
 /// What one sweep says about the robot, with all that is needed to distrust it.

@@ -29,15 +29,15 @@ constexpr int kTaught_sweeps = 20;
 
 } // namespace
 
-SensorIntegration::SensorIntegration(const OdometryOptions& options)
-    : sources_(options.motion_sources), fusion_(options.fusion), no_source_prior_(options.no_source_prior),
+SensorIntegration::SensorIntegration(const OdometryOptions& options, const std::vector<MotionSourceOptions>& sources)
+    : sources_(sources), fusion_(options.fusion), no_source_prior_(options.no_source_prior),
       constant_velocity_statistics_(kConstantVelocity), gyro_biases_(sources_.size()), gyro_scales_(sources_.size()) {
   for (const MotionSourceOptions& source : sources_)
     statistics_.emplace_back(source.kind == SourceKind::imu ? kInertialUnit : kOdometrySource);
 }
 
 MotionPrior SensorIntegration::integrate(const Sweep& sweep, const std::optional<Vector6>& twist_base,
-                                         int without) const {
+                                         std::optional<SourceId> without) const {
   MotionPrior prior;
   const double elapsed = elapsed_s(sweep);
   const double periods = last_period_ > Duration::zero() ? std::max(1.0, elapsed / to_seconds(last_period_)) : 1.0;
@@ -46,56 +46,56 @@ MotionPrior SensorIntegration::integrate(const Sweep& sweep, const std::optional
     prior.T_last_kept = se3_exp(elapsed * *twist_base);
   if (keeps_velocity)
     prior.T_last_now = prior.T_last_kept;
-  prior.source.rotation = prior.source.translation =
-      keeps_velocity ? PriorSource::kConstantVelocity : PriorSource::kIdentity;
   prior.blind = !twist_base;
   prior.variance = prior.blind ? kUnknownMotion.cwiseAbs2().eval() : constant_velocity_statistics_.variance(periods);
   prior.bias = prior.variance.cwiseSqrt(); // who goes on as before errs more the longer it does
 
-  const auto kind_of = [this](std::size_t i) { return sources_[i].kind; };
-  const auto usable = [&](std::size_t i) {
-    return static_cast<int>(i) != without && sweep.motion.sources[i].usable && last_sources_[i].usable &&
-           step(sweep, i);
+  const auto kind_of = [this](SourceId source) { return sources_[index_of(source)].kind; };
+  const auto usable = [&](SourceId source) {
+    return source != without && sweep.motion.sources[index_of(source)].usable &&
+           last_sources_[index_of(source)].usable && step(sweep, source);
   };
   const SourceChoice choice = choose_sources(kind_of, sources_.size(), fusion_, usable);
+  prior.source = {choice, keeps_velocity ? NoSourcePrior::constant_velocity : NoSourcePrior::identity};
   if (choice.rotation) {
+    const std::size_t i = index_of(*choice.rotation);
     prior.T_last_now.rotation = step(sweep, *choice.rotation)->rotation;
-    prior.variance.tail<3>() = statistics_[*choice.rotation].variance(periods).tail<3>();
-    if (kind_of(*choice.rotation) == SourceKind::imu)
-      prior.variance.tail<3>() += gyro_scales_[*choice.rotation].variance(so3_log(prior.T_last_now.rotation));
-    prior.bias.tail<3>() = statistics_[*choice.rotation].bias(periods).tail<3>();
-    prior.source.rotation = static_cast<int>(*choice.rotation);
+    prior.variance.tail<3>() = statistics_[i].variance(periods).tail<3>();
+    if (sources_[i].kind == SourceKind::imu)
+      prior.variance.tail<3>() += gyro_scales_[i].variance(so3_log(prior.T_last_now.rotation));
+    prior.bias.tail<3>() = statistics_[i].bias(periods).tail<3>();
   }
   if (choice.translation) {
+    const std::size_t i = index_of(*choice.translation);
     prior.T_last_now.translation = step(sweep, *choice.translation)->translation;
-    prior.variance.head<3>() = statistics_[*choice.translation].variance(periods).head<3>();
-    prior.bias.head<3>() = statistics_[*choice.translation].bias(periods).head<3>();
-    prior.source.translation = static_cast<int>(*choice.translation);
+    prior.variance.head<3>() = statistics_[i].variance(periods).head<3>();
+    prior.bias.head<3>() = statistics_[i].bias(periods).head<3>();
     prior.blind = false;
   }
   return prior;
 }
 
 /// T_last_now as one source saw it, less what is known of its error; nothing where it does not know.
-std::optional<Pose> SensorIntegration::step(const Sweep& sweep, std::size_t source) const {
-  const SourcePose& last = last_sources_[source];
-  const SourcePose& now = sweep.motion.sources[source];
+std::optional<Pose> SensorIntegration::step(const Sweep& sweep, SourceId source) const {
+  const SourcePose& last = last_sources_[index_of(source)];
+  const SourcePose& now = sweep.motion.sources[index_of(source)];
   if (!last.known || !now.known || last.epoch != now.epoch)
     return std::nullopt;
   Pose T_last_now = last.T_source_base.inverse() * now.T_source_base;
-  if (sources_[source].kind == SourceKind::imu)
-    T_last_now.rotation = T_last_now.rotation * so3_exp(-gyro_biases_[source].turn_rad(sweep.end - last_stamp_));
+  if (sources_[index_of(source)].kind == SourceKind::imu)
+    T_last_now.rotation =
+        T_last_now.rotation * so3_exp(-gyro_biases_[index_of(source)].turn_rad(sweep.end - last_stamp_));
   return T_last_now;
 }
 
-std::optional<Pose> SensorIntegration::healthy_step(const Sweep& sweep, std::size_t source) const {
-  return sweep.motion.sources[source].usable ? step(sweep, source) : std::nullopt;
+std::optional<Pose> SensorIntegration::healthy_step(const Sweep& sweep, SourceId source) const {
+  return sweep.motion.sources[index_of(source)].usable ? step(sweep, source) : std::nullopt;
 }
 
 bool SensorIntegration::saw_motion(const Sweep& sweep) const {
   const double elapsed = elapsed_s(sweep);
   for (std::size_t i = 0; i < sources_.size(); ++i) {
-    const std::optional<Pose> T_last_now = healthy_step(sweep, i);
+    const std::optional<Pose> T_last_now = healthy_step(sweep, SourceId{i});
     if (T_last_now && (T_last_now->translation.norm() > kRest_mps * elapsed ||
                        angle_rad(T_last_now->rotation) > kRest_radps * elapsed))
       return true;
@@ -111,7 +111,7 @@ std::array<LidarOpinion, kMaxSources> SensorIntegration::judge(const Sweep& swee
   judged_sweeps_ = std::min(judged_sweeps_ + 1, kTaught_sweeps);
   Matrix6 information = axes.rows_of(found.information);
   for (std::size_t i = 0; i < sources_.size(); ++i) {
-    const std::optional<Pose> T_last_predicted = step(sweep, i);
+    const std::optional<Pose> T_last_predicted = step(sweep, SourceId{i});
     if (!T_last_predicted)
       continue;
     const bool imu = sources_[i].kind == SourceKind::imu;
@@ -131,7 +131,7 @@ std::array<LidarOpinion, kMaxSources> SensorIntegration::judge(const Sweep& swee
   }
   if (found.stands)
     return opinions;
-  if (prior.source.translation >= 0) { // a robot that drove gently may yet turn sharply: lidar will see that it does
+  if (prior.source.translation) { // a robot that drove gently may yet turn sharply: lidar will see that it does
     information.setZero();
     information.diagonal().head<3>() = prior.variance.head<3>().cwiseInverse();
   }
@@ -143,7 +143,7 @@ void SensorIntegration::judge_blind(const Sweep& sweep) {
   if (judged_sweeps_ >= kTaught_sweeps)
     return;
   const auto turn = [&](std::size_t i) -> std::optional<Eigen::Vector3d> {
-    const std::optional<Pose> T_last_now = healthy_step(sweep, i);
+    const std::optional<Pose> T_last_now = healthy_step(sweep, SourceId{i});
     return T_last_now ? std::optional{so3_log(T_last_now->rotation)} : std::nullopt;
   };
   std::optional<Eigen::Vector3d> true_turn_rad;

@@ -39,14 +39,12 @@ struct SeenMotion {
 /// each is to be believed: that is learned from what lidar finds. One owner.
 class SensorIntegration {
  public:
-  static constexpr int kNone = -1;
-
-  explicit SensorIntegration(const OdometryOptions& options);
+  SensorIntegration(const OdometryOptions& options, const std::vector<MotionSourceOptions>& sources);
 
   /// The prior from the best healthy sources but `without`. What none of them says goes on with `twist_base` (m/s,
   /// rad/s), the velocity in the last sweep; nothing: not even that is known.
   [[nodiscard]] MotionPrior integrate(const Sweep& sweep, const std::optional<Vector6>& twist_base,
-                                      int without = kNone) const;
+                                      std::optional<SourceId> without = {}) const;
 
   /// Whether any healthy source says that the robot moved since the last processed sweep.
   [[nodiscard]] bool saw_motion(const Sweep& sweep) const;
@@ -67,8 +65,8 @@ class SensorIntegration {
   [[nodiscard]] double elapsed_s(const Sweep& sweep) const { return to_seconds(sweep.end - last_stamp_); }
 
  private:
-  [[nodiscard]] std::optional<Pose> step(const Sweep& sweep, std::size_t source) const;
-  [[nodiscard]] std::optional<Pose> healthy_step(const Sweep& sweep, std::size_t source) const;
+  [[nodiscard]] std::optional<Pose> step(const Sweep& sweep, SourceId source) const;
+  [[nodiscard]] std::optional<Pose> healthy_step(const Sweep& sweep, SourceId source) const;
 
   std::vector<MotionSourceOptions> sources_;
   Fusion fusion_;

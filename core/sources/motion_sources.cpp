@@ -8,8 +8,8 @@ namespace locus {
 MotionSources::MotionSources(const std::vector<MotionSourceOptions>& options, Fusion fusion, HealthSink health_sink)
     : fusion_(fusion), health_sink_(std::move(health_sink)), sources_(options.begin(), options.end()) {}
 
-template <class Sample> void MotionSources::take(std::size_t source, Sample sample) {
-  Source& from = sources_[source];
+template <class Sample> void MotionSources::take(SourceId source, Sample sample) {
+  Source& from = sources_[index_of(source)];
   tell_time(sample.arrival);
   const std::optional<Stamp> stamp = from.health.judge(sample);
   follow_health(source);
@@ -18,14 +18,14 @@ template <class Sample> void MotionSources::take(std::size_t source, Sample samp
   sample.stamp = *stamp;
   from.track.add(sample);
 }
-template void MotionSources::take(std::size_t, ImuSample);
-template void MotionSources::take(std::size_t, OdometrySample);
+template void MotionSources::take(SourceId, ImuSample);
+template void MotionSources::take(SourceId, OdometrySample);
 
 void MotionSources::advance(Stamp now) {
   tell_time(now);
   for (std::size_t i = 0; i < sources_.size(); ++i) {
     sources_[i].health.advance(now_);
-    follow_health(i);
+    follow_health(SourceId{i});
   }
 }
 
@@ -38,17 +38,17 @@ void MotionSources::tell_time(Stamp now) {
 void MotionSources::hear(const RegistrationFeedback& feedback) {
   for (std::size_t i = 0; i < sources_.size(); ++i) {
     sources_[i].health.hear(feedback.opinions[i], feedback, now_);
-    follow_health(i);
+    follow_health(SourceId{i});
   }
 }
 
-void MotionSources::set_outside_verdict(std::size_t source, bool healthy) {
-  sources_[source].health.set_outside_verdict(healthy, now_);
+void MotionSources::set_outside_verdict(SourceId source, bool healthy) {
+  sources_[index_of(source)].health.set_outside_verdict(healthy, now_);
   follow_health(source);
 }
 
-void MotionSources::follow_health(std::size_t source) {
-  Source& of = sources_[source];
+void MotionSources::follow_health(SourceId source) {
+  Source& of = sources_[index_of(source)];
   if (of.health.epoch() != of.epoch) {
     of.epoch = of.health.epoch();
     of.track.clear();
@@ -60,14 +60,15 @@ void MotionSources::follow_health(std::size_t source) {
 }
 
 SourceChoice MotionSources::choose(Stamp now) const {
-  return choose_sources([this](std::size_t i) { return sources_[i].track.kind(); }, sources_.size(), fusion_,
-                        [&](std::size_t i) { return healthy(i) && sources_[i].track.is_live(now); });
+  const auto track_of = [this](SourceId source) -> const MotionTrack& { return sources_[index_of(source)].track; };
+  return choose_sources([&](SourceId source) { return track_of(source).kind(); }, sources_.size(), fusion_,
+                        [&](SourceId source) { return health(source).healthy() && track_of(source).is_live(now); });
 }
 
 std::optional<Pose> MotionSources::motion(const SourceChoice& choice, Stamp from, Stamp to) const {
-  const auto step = [&](std::size_t source) -> std::optional<Pose> {
-    const std::optional<Pose> T_source_from = sources_[source].track.at(from);
-    const std::optional<Pose> T_source_to = sources_[source].track.at(to);
+  const auto step = [&](SourceId source) -> std::optional<Pose> {
+    const std::optional<Pose> T_source_from = sources_[index_of(source)].track.at(from);
+    const std::optional<Pose> T_source_to = sources_[index_of(source)].track.at(to);
     if (!T_source_from || !T_source_to)
       return std::nullopt;
     return T_source_from->inverse() * *T_source_to;
@@ -87,14 +88,14 @@ std::optional<Pose> MotionSources::motion(const SourceChoice& choice, Stamp from
 SensedMotion MotionSources::sensed_in(Stamp from, Stamp to) const {
   SensedMotion motion;
   for (std::size_t i = 0; i < sources_.size(); ++i) {
-    const MotionTrack& track = sources_[i].track;
+    const auto& [health, track, epoch] = sources_[i];
     const std::optional<Pose> T_source_base = track.has_sample_in(from, to) ? track.at(to) : std::nullopt;
     if (!T_source_base)
       continue;
-    motion.sources[i] = {true, healthy(i), sources_[i].epoch, *T_source_base};
-    if (healthy(i) && sources_[i].health.trusts_accelerometer() && !motion.specific_force_base_mps2)
+    motion.sources[i] = {true, health.healthy(), epoch, *T_source_base};
+    if (health.healthy() && health.trusts_accelerometer() && !motion.specific_force_base_mps2)
       motion.specific_force_base_mps2 = track.mean_specific_force_mps2(from, to);
-    if (healthy(i) && !motion.up_base)
+    if (health.healthy() && !motion.up_base)
       motion.up_base = track.up_base(from, to);
   }
   return motion;

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
-#include <string_view>
 #include <vector>
 
 #include "core/base/options.hpp"
@@ -13,18 +12,6 @@
 #include "core/sources/sensed_motion.hpp"
 
 namespace locus {
-
-/// Which sources stand for the motion of the base; nothing where none is healthy.
-struct SourceChoice {
-  std::optional<std::size_t> rotation;
-  std::optional<std::size_t> translation;
-
-  [[nodiscard]] Uncorrected uncorrected() const {
-    if (translation)
-      return Uncorrected::nothing;
-    return rotation ? Uncorrected::translation : Uncorrected::all;
-  }
-};
 
 /// All motion sources of the robot in a static priority queue, each with its health (paper II-B.1, health monitoring
 /// and priority queue).
@@ -38,9 +25,9 @@ class MotionSources {
 
   MotionSources(const std::vector<MotionSourceOptions>& options, Fusion fusion, HealthSink health_sink = {});
 
-  /// `source` is the index in the configuration; its kind must fit the sample.
-  void add(std::size_t source, const ImuSample& sample) { take(source, sample); }
-  void add(std::size_t source, const OdometrySample& sample) { take(source, sample); }
+  /// The kind of the source must fit the sample.
+  void add(SourceId source, const ImuSample& sample) { take(source, sample); }
+  void add(SourceId source, const OdometrySample& sample) { take(source, sample); }
 
   /// Tells the time, in stamps of arrival: a silence is noticed.
   void advance(Stamp now);
@@ -49,7 +36,7 @@ class MotionSources {
   void hear(const RegistrationFeedback& feedback);
 
   /// What somebody else says of a source, until the next word (health_topic).
-  void set_outside_verdict(std::size_t source, bool healthy);
+  void set_outside_verdict(SourceId source, bool healthy);
 
   /// The healthy ones whose tracks reach `now` and go on doing so: with two samples in the time for which tracks are
   /// extrapolated. A slower or silent source would correct a sweep with a standstill; that is left to Odometry.
@@ -59,16 +46,12 @@ class MotionSources {
   [[nodiscard]] std::optional<Pose> motion(const SourceChoice& choice, Stamp from, Stamp to) const;
 
   /// Up to when the motion of a source is known without extrapolation; nothing while it is not.
-  [[nodiscard]] std::optional<Stamp> newest(std::size_t source) const { return sources_[source].track.newest(); }
+  [[nodiscard]] std::optional<Stamp> newest(SourceId source) const { return sources_[index_of(source)].track.newest(); }
 
   /// What all of them say of (from, to]: poses at its end, and the specific force meanwhile.
   [[nodiscard]] SensedMotion sensed_in(Stamp from, Stamp to) const;
 
-  [[nodiscard]] bool healthy(std::size_t source) const { return sources_[source].health.healthy(); }
-  /// What is wrong with a source as a whole, in words for the user; empty if nothing is.
-  [[nodiscard]] std::string_view verdict(std::size_t source) const { return sources_[source].health.verdict(); }
-  [[nodiscard]] Stamp last_heard(std::size_t source) const { return sources_[source].health.last_heard(); }
-  [[nodiscard]] const SourceCounters& counters(std::size_t source) const { return sources_[source].health.counters(); }
+  [[nodiscard]] const HealthMonitor& health(SourceId source) const { return sources_[index_of(source)].health; }
   [[nodiscard]] std::size_t size() const { return sources_.size(); }
 
  private:
@@ -80,9 +63,9 @@ class MotionSources {
     std::uint32_t epoch = 0; ///< that the track belongs to
   };
 
-  template <class Sample> void take(std::size_t source, Sample sample);
+  template <class Sample> void take(SourceId source, Sample sample);
   void tell_time(Stamp now);
-  void follow_health(std::size_t source);
+  void follow_health(SourceId source);
 
   Fusion fusion_;
   HealthSink health_sink_;
@@ -90,22 +73,23 @@ class MotionSources {
   Stamp now_; ///< of the latest arrival heard of
 };
 
-/// Picks from sources in priority order those that `usable(index)` allows.
+/// Picks from `count` sources in priority order those that `usable(SourceId)` allows.
 template <class Kinds, class Usable>
 SourceChoice choose_sources(const Kinds& kind_of, std::size_t count, Fusion fusion, const Usable& usable) {
   SourceChoice choice;
   for (std::size_t i = 0; i < count; ++i) {
-    if (!usable(i))
+    const SourceId source{i};
+    if (!usable(source))
       continue;
     if (fusion == Fusion::queue) {
-      choice.rotation = i;
-      if (kind_of(i) == SourceKind::odometry)
-        choice.translation = i;
+      choice.rotation = source;
+      if (kind_of(source) == SourceKind::odometry)
+        choice.translation = source;
       return choice;
     }
-    std::optional<std::size_t>& place = kind_of(i) == SourceKind::imu ? choice.rotation : choice.translation;
+    std::optional<SourceId>& place = kind_of(source) == SourceKind::imu ? choice.rotation : choice.translation;
     if (!place)
-      place = i;
+      place = source;
   }
   if (!choice.rotation)
     choice.rotation = choice.translation;

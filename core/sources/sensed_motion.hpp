@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/base/pose.hpp"
+#include "core/base/source_id.hpp"
 
 namespace locus {
 
@@ -14,6 +15,18 @@ inline constexpr std::size_t kMaxSources = 8; ///< motion sources of a robot, at
 
 /// The part of the robot's motion during a sweep that no motion source could take out of its points.
 enum class Uncorrected : std::uint8_t { nothing, translation, all };
+
+/// Which sources stand for the motion of the base; nothing where none is healthy.
+struct SourceChoice {
+  std::optional<SourceId> rotation;
+  std::optional<SourceId> translation;
+
+  [[nodiscard]] Uncorrected uncorrected() const {
+    if (translation)
+      return Uncorrected::nothing;
+    return rotation ? Uncorrected::translation : Uncorrected::all;
+  }
+};
 
 /// Where one motion source saw the base at the end of a sweep.
 struct SourcePose {

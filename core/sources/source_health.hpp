@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "core/base/names.hpp"
+#include "core/base/source_id.hpp"
 #include "core/base/stamp.hpp"
 
 namespace locus {
@@ -44,8 +45,8 @@ struct SourceCounters {
 
 /// A motion source has lost its health or regained it.
 struct HealthEvent {
-  std::size_t source = 0; ///< index in the configuration
-  Stamp stamp;            ///< when it was found out, in stamps of arrival
+  SourceId source{};
+  Stamp stamp; ///< when it was found out, in stamps of arrival
   bool healthy = false;
   HealthReason reason = HealthReason::stale; ///< why it was lost
   std::string_view verdict;                  ///< of HealthMonitor, where a self-check is the reason

@@ -23,20 +23,20 @@ constexpr Duration kLongestPause = std::chrono::seconds{15};
 /// What exists while there is a network.
 struct RosLink::Session {
   struct ImuSource {
-    std::size_t source;
+    SourceId source;
     DdsReader<ros::Imu> reader;
     Admission admission;
     std::uint64_t received = 0;
   };
   struct OdometrySource {
-    std::size_t source;
+    SourceId source;
     DdsReader<ros::Odometry> reader;
     UsualCovariance usual;
     Admission admission;
     std::uint64_t received = 0;
   };
   struct HealthTopic {
-    std::size_t source;
+    SourceId source;
     DdsReader<ros::Bool> reader;
     Admission admission;
   };
@@ -68,16 +68,19 @@ struct RosLink::Session {
       dds_set_status_mask(reader, DDS_DATA_AVAILABLE_STATUS);
       dds_waitset_attach(waitset.handle(), reader, 0);
     };
-    for (std::size_t i = 0; i < config.source_topics.size(); ++i) {
-      const auto& [topic, health_topic] = config.source_topics[i];
-      if (!topic.empty() && config.odometry.motion_sources[i].kind == SourceKind::imu)
-        wake_by(imus.emplace_back(ImuSource{i, {node, topic, TopicQos::sensor_in()}, {}}).reader.handle());
-      else if (!topic.empty())
+    for (std::size_t i = 0; i < config.motion_sources.size(); ++i) {
+      const MotionSource& source = config.motion_sources[i];
+      if (!source.topic.empty() && source.kind == SourceKind::imu)
         wake_by(
-            odometries.emplace_back(OdometrySource{i, {node, topic, TopicQos::sensor_in()}, {}, {}}).reader.handle());
-      if (!health_topic.empty())
+            imus.emplace_back(ImuSource{SourceId{i}, {node, source.topic, TopicQos::sensor_in()}, {}}).reader.handle());
+      else if (!source.topic.empty())
         wake_by(
-            health_topics.emplace_back(HealthTopic{i, {node, health_topic, TopicQos::standard()}, {}}).reader.handle());
+            odometries.emplace_back(OdometrySource{SourceId{i}, {node, source.topic, TopicQos::sensor_in()}, {}, {}})
+                .reader.handle());
+      if (!source.health_topic.empty())
+        wake_by(
+            health_topics.emplace_back(HealthTopic{SourceId{i}, {node, source.health_topic, TopicQos::standard()}, {}})
+                .reader.handle());
     }
     if (!config.dds.flat_ground_topic.empty())
       wake_by(flat_ground.emplace(FlatGroundTopic{{node, config.dds.flat_ground_topic, TopicQos::standard()}, {}})
@@ -100,7 +103,7 @@ struct RosLink::Session {
 
 RosLink::RosLink(const Config& config, Sink sink)
     : config_(config), frames_{config.dds.frame_odom, config.dds.frame_base}, sink_(std::move(sink)) {
-  status_.sources.resize(config.source_topics.size());
+  status_.sources.resize(config.motion_sources.size());
   thread_ = std::thread([this] { run(); });
   pthread_setname_np(thread_.native_handle(), "dds");
 }
@@ -182,14 +185,14 @@ void RosLink::look_after_sources(Session& session) {
   const auto tell = [this](auto& sources) {
     for (auto& from : sources) {
       from.admission.look_after(from.reader);
-      status_.sources[from.source] = {from.reader.writers(), from.received, from.admission.refused(), 0};
+      status_.sources[index_of(from.source)] = {from.reader.writers(), from.received, from.admission.refused(), 0};
     }
   };
   tell(session.imus);
   tell(session.odometries);
   for (auto& from : session.health_topics) {
     from.admission.look_after(from.reader);
-    status_.sources[from.source].health_refused = from.admission.refused();
+    status_.sources[index_of(from.source)].health_refused = from.admission.refused();
   }
   if (auto& from = session.flat_ground) {
     from->admission.look_after(from->reader);

@@ -95,7 +95,7 @@ InputSource& Session::begin_recording() {
   for (std::size_t i = 0; i < files.size(); ++i)
     if (!files[i])
       log_.warn(fmt::format("motion source {}: is not recorded, for a recording holds one IMU; the first one is",
-                            config_.odometry.motion_sources[i].name));
+                            config_.motion_sources[i].name));
   recorder_ = std::make_unique<Recorder>(record_folder(config_.record.folder), config_);
   return recording_input_.emplace(input_, *recorder_);
 }
@@ -250,7 +250,7 @@ std::string why_lost(const HealthEvent& event) {
 } // namespace
 
 void Session::tell(const HealthEvent& event) {
-  const std::string& name = config_.odometry.motion_sources[event.source].name;
+  const std::string& name = config_.motion_sources[index_of(event.source)].name;
   if (event.healthy)
     log_.info(fmt::format("motion source {} is back", name), {{"LOCUS_SOURCE", name}});
   else

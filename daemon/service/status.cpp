@@ -86,8 +86,8 @@ std::vector<Diagnostic> diagnostics(const Figures& figures) {
     values["packets"] = json["packets"][options.name];
     all.push_back(lidar_diagnostic(options, figures.ingest.lidars[i], values));
   }
-  for (std::size_t i = 0; i < figures.config.odometry.motion_sources.size(); ++i) {
-    const std::string& name = figures.config.odometry.motion_sources[i].name;
+  for (std::size_t i = 0; i < figures.config.motion_sources.size(); ++i) {
+    const std::string& name = figures.config.motion_sources[i].name;
     const IngestReport::Source& source = figures.ingest.sources[i];
     all.push_back(diagnostic(source.healthy ? Level::ok : Level::warning, ": source " + name,
                              std::string{health_of(source)}, json["sources"][name]));
@@ -134,8 +134,8 @@ void Watch::look_at_link(const LinkFigures& link) {
 void Watch::look_at_sources(const LinkFigures& link) {
   const Config& config = session_.config();
   for (std::size_t i = 0; i < link.sources.size(); ++i) {
-    const std::string& name = config.odometry.motion_sources[i].name;
-    const std::string& topic = config.source_topics[i].topic;
+    const std::string& name = config.motion_sources[i].name;
+    const std::string& topic = config.motion_sources[i].topic;
     if (topic.empty() || link.sources[i].received > 0 || !unheard_.insert(name).second)
       continue;
     const std::string found =
@@ -208,7 +208,7 @@ std::string Watch::why_silent(const Lidar& lidar, const LidarOptions& options, c
 
 /// What a check has found wrong with a source that goes on being used in part. Of one that is lost, its loss tells.
 void Watch::look_at_verdicts(const IngestReport& ingest) {
-  const auto& sources = session_.config().odometry.motion_sources;
+  const auto& sources = session_.config().motion_sources;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     const std::string_view verdict = ingest.sources[i].healthy ? ingest.sources[i].verdict : std::string_view{};
     if (!verdict.empty() && verdict != verdicts_[i])
@@ -257,9 +257,9 @@ void Watch::look_at_intruders(const LinkFigures& link) {
                 {{"LOCUS_SOURCE", source}});
   };
   for (std::size_t i = 0; i < link.sources.size(); ++i) {
-    const std::string& name = config.odometry.motion_sources[i].name;
-    tell(link.sources[i].refused, config.source_topics[i].topic, name);
-    tell(link.sources[i].health_refused, config.source_topics[i].health_topic, name);
+    const MotionSource& source = config.motion_sources[i];
+    tell(link.sources[i].refused, source.topic, source.name);
+    tell(link.sources[i].health_refused, source.health_topic, source.name);
   }
   tell(link.flat_ground_refused, config.dds.flat_ground_topic, "");
 }

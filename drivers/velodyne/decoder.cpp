@@ -14,6 +14,7 @@ namespace locus::velodyne {
 namespace {
 
 constexpr double kRadPerCdeg = std::numbers::pi / 18000.0;
+constexpr Duration kHour = std::chrono::hours{1};
 
 /// Three times the fastest setting of any model, 1200 rpm: a first packet of a VLP-16 taken for one of an HDL-32E,
 /// whose columns are shorter, seems to turn 2.4 times as fast and must not be refused for it.
@@ -47,20 +48,16 @@ std::string to_string(const UnknownPackets& unknown) {
                      unknown.return_mode, unknown.packets);
 }
 
-Duration time_of_hour(std::span<const std::byte> payload) {
-  return std::chrono::microseconds{read_u32(payload.data() + kTimeOffset)};
-}
-
 std::optional<PacketError> Decoder::decode(std::span<const std::byte> payload, LidarPacket& packet) {
   if (payload.size() != kDataPacketBytes)
     return PacketError::length;
   const auto bytes = payload.first<kDataPacketBytes>();
-  const Duration stamp = time_of_hour(payload);
+  const Duration stamp = std::chrono::microseconds{read_u32(payload.data() + kTimeOffset)};
   if (const auto error = recognise(bytes, stamp))
     return error;
   if (const auto error = check_blocks(bytes))
     return error;
-  if (stamp >= std::chrono::hours{1})
+  if (stamp >= kHour)
     return PacketError::time;
   if (!measure_turns(bytes, stamp))
     return PacketError::azimuth;
@@ -73,6 +70,7 @@ std::optional<PacketError> Decoder::decode(std::span<const std::byte> payload, L
     for (std::size_t firing = 0; firing < layout_.banks * kChannels; firing += FiringGroup::kLasers)
       read_firing_groups(bytes, column, firing, packet);
   }
+  time_of_hour_ = (stamp + kHour - spec(*model_, pace_).stamp_delay) % kHour;
   packet.duration = duration_;
   packet.first_azimuth_cdeg = azimuth_cdeg_.front();
   return std::nullopt;
@@ -84,7 +82,8 @@ double Decoder::rotation_rate_rpm() const {
   return 60.0 * static_cast<double>(mean_turn_cdeg_) / kCdegPerTurn / to_seconds(column_duration_);
 }
 
-std::optional<PacketError> Decoder::recognise(Packet packet, Duration time_of_hour) {
+std::optional<PacketError> Decoder::recognise(Packet packet, Duration stamp) {
+  const auto spacing = last_recognised_ ? std::optional{stamp - *last_recognised_} : std::nullopt;
   const auto mode = options_.return_mode
                         ? options_.return_mode
                         : return_mode_from_byte(std::to_integer<std::uint8_t>(packet[kReturnModeOffset]));
@@ -92,11 +91,12 @@ std::optional<PacketError> Decoder::recognise(Packet packet, Duration time_of_ho
     return refuse_unknown(packet);
   recognised_ = model_from_product_id(std::to_integer<std::uint8_t>(packet[kProductIdOffset]));
   if (recognised_)
-    recognised_ = recognition_.recognise(*recognised_, *mode, time_of_hour, packet);
+    recognised_ = recognition_.recognise(*recognised_, *mode, spacing, packet);
   const auto model = options_.model ? options_.model : recognised_;
   if (!model)
     return refuse_unknown(packet);
-  const Pace pace = pace_recognition_.recognise(*model, *mode, time_of_hour);
+  last_recognised_ = stamp;
+  const Pace pace = pace_recognition_.recognise(*model, *mode, spacing);
   if (model == model_ && mode == mode_ && pace == pace_)
     return std::nullopt;
   const Calibration& own = spec(*model).calibration;
@@ -125,7 +125,7 @@ void Decoder::prepare(Model model, ReturnMode mode, Pace pace, const Calibration
   layout_ = packet_layout(model, mode);
   column_duration_ = spec(model, pace).column_duration;
   distance_resolution_m_ = static_cast<float>(calibration.distance_resolution_m);
-  last_time_of_hour_.reset();
+  last_stamp_.reset();
   mean_turn_cdeg_ = 0.0F;
 
   const std::span<const Firing> firings = spec(model, pace).firings();
@@ -159,7 +159,7 @@ std::optional<PacketError> Decoder::check_blocks(Packet packet) const {
 }
 
 /// Sets azimuth, turn and time of every column. Fails when most turns are impossible.
-bool Decoder::measure_turns(Packet packet, Duration time_of_hour) {
+bool Decoder::measure_turns(Packet packet, Duration stamp) {
   const double max_turn_cdeg = kMaxTurnCdegPerNs * static_cast<double>(column_duration_.count());
   const std::size_t columns = layout_.columns;
   std::array<bool, kBlocks> is_possible{};
@@ -181,7 +181,7 @@ bool Decoder::measure_turns(Packet packet, Duration time_of_hour) {
   if (columns > 1)
     mean_turn_cdeg_ = static_cast<float>(sum_cdeg) / static_cast<float>(possible);
   else
-    measure_turn_since_last_packet(time_of_hour, max_turn_cdeg);
+    measure_turn_since_last_packet(stamp, max_turn_cdeg);
 
   const bool turns =
       static_cast<double>(mean_turn_cdeg_) >= kMinTurnCdegPerNs * static_cast<double>(column_duration_.count());
@@ -197,14 +197,14 @@ bool Decoder::measure_turns(Packet packet, Duration time_of_hour) {
   return true;
 }
 
-void Decoder::measure_turn_since_last_packet(Duration time_of_hour, double max_turn_cdeg) {
-  if (last_time_of_hour_ && time_of_hour > *last_time_of_hour_ && time_of_hour - *last_time_of_hour_ < kMaxTurnGap) {
+void Decoder::measure_turn_since_last_packet(Duration stamp, double max_turn_cdeg) {
+  if (last_stamp_ && stamp > *last_stamp_ && stamp - *last_stamp_ < kMaxTurnGap) {
     const double turn_cdeg = clockwise_turn(last_azimuth_cdeg_, azimuth_cdeg_.front()) *
-                             (to_seconds(column_duration_) / to_seconds(time_of_hour - *last_time_of_hour_));
+                             (to_seconds(column_duration_) / to_seconds(stamp - *last_stamp_));
     if (turn_cdeg <= max_turn_cdeg)
       mean_turn_cdeg_ = static_cast<float>(turn_cdeg);
   }
-  last_time_of_hour_ = time_of_hour;
+  last_stamp_ = stamp;
   last_azimuth_cdeg_ = azimuth_cdeg_.front();
 }
 

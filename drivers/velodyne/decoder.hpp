@@ -66,6 +66,9 @@ class Decoder {
   /// any.
   [[nodiscard]] std::optional<UnknownPackets> unknown_packets() const;
 
+  /// Of the last good packet: when its first firing was, past the hour of the lidar's clock. 0 <= it < 1 h.
+  [[nodiscard]] Duration time_of_hour() const { return time_of_hour_; }
+
   /// Of the last good packet, from the turn of its columns.
   [[nodiscard]] double rotation_rate_rpm() const;
 
@@ -90,12 +93,12 @@ class Decoder {
   };
   using Distances = FiringGroup::PerLaser<std::int32_t>; ///< as wide as all else about them
 
-  std::optional<PacketError> recognise(Packet packet, Duration time_of_hour);
+  std::optional<PacketError> recognise(Packet packet, Duration stamp);
   PacketError refuse_unknown(Packet packet);
   void prepare(Model model, ReturnMode mode, Pace pace, const Calibration& calibration);
   [[nodiscard]] std::optional<PacketError> check_blocks(Packet packet) const;
-  bool measure_turns(Packet packet, Duration time_of_hour);
-  void measure_turn_since_last_packet(Duration time_of_hour, double max_turn_cdeg);
+  bool measure_turns(Packet packet, Duration stamp);
+  void measure_turn_since_last_packet(Duration stamp, double max_turn_cdeg);
   [[nodiscard]] Aim take_aim(std::size_t column, std::size_t first_firing) const;
   void read_firing_groups(Packet packet, std::size_t column, std::size_t first_firing, LidarPacket& out) const;
   void place(const Distances& distances, const Distances& previous, const Aim& aim, std::size_t column,
@@ -104,6 +107,7 @@ class Decoder {
   DecoderOptions options_;
   ModelRecognition recognition_;
   PaceRecognition pace_recognition_;
+  std::optional<Duration> last_recognised_; ///< stamp of the packet before, good or not
   std::optional<Model> recognised_;
   std::array<UnknownPackets, 256> unknown_{}; ///< by product id
   std::optional<Model> model_;
@@ -118,13 +122,10 @@ class Decoder {
   std::array<float, kBlocks> turn_cdeg_{};            ///< from each column to the next
   std::array<std::int32_t, kBlocks> column_offset_ns_{};
   float cos_column_ = 1.0F, sin_column_ = 0.0F; ///< of the azimuth of the column at hand
-  Duration duration_{};
+  Duration duration_{}, time_of_hour_{};
   float mean_turn_cdeg_ = 0.0F;
-  std::optional<Duration> last_time_of_hour_;
+  std::optional<Duration> last_stamp_; ///< of the packet that last_azimuth_cdeg_ is of
   std::uint16_t last_azimuth_cdeg_ = 0;
 };
-
-/// Time past the hour that a data packet names, not checked. Precondition: the payload has kDataPacketBytes.
-Duration time_of_hour(std::span<const std::byte> payload);
 
 } // namespace locus::velodyne

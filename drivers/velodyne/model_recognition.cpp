@@ -52,32 +52,28 @@ bool fires_sixteen_lasers_twice(std::span<const std::byte, kDataPacketBytes> pac
 
 } // namespace
 
-Model ModelRecognition::recognise(Model claimed, ReturnMode mode, Duration time_of_hour,
+Model ModelRecognition::recognise(Model claimed, ReturnMode mode, std::optional<Duration> spacing,
                                   std::span<const std::byte, kDataPacketBytes> packet) {
   if (claimed != claimed_)
     verdict_.reset();
   claimed_ = claimed;
-  if (last_time_of_hour_)
-    if (const auto told = model_of_spacing(claimed, mode, time_of_hour - *last_time_of_hour_))
-      verdict_ = told;
-  last_time_of_hour_ = time_of_hour;
+  if (const auto told = spacing ? model_of_spacing(claimed, mode, *spacing) : std::nullopt)
+    verdict_ = told;
   if (!verdict_)
     verdict_ = claimed == Model::hdl32e && fires_sixteen_lasers_twice(packet) ? Model::vlp16 : claimed;
   return *verdict_;
 }
 
-Pace PaceRecognition::recognise(Model model, ReturnMode mode, Duration time_of_hour) {
-  const Duration spacing = last_time_of_hour_ ? time_of_hour - *last_time_of_hour_ : Duration{};
-  last_time_of_hour_ = time_of_hour;
+Pace PaceRecognition::recognise(Model model, ReturnMode mode, std::optional<Duration> spacing) {
   if (!has_two_paces(model))
     return pace_ = Pace::first;
   const Duration first = packet_duration(model, mode, Pace::first);
   const Duration slower = packet_duration(model, mode, Pace::slower);
-  if (spacing < first - kStampNoise || spacing > slower + kStampNoise) {
+  if (!spacing || *spacing < first - kStampNoise || *spacing > slower + kStampNoise) {
     beyond_middle_ = {};
     return pace_;
   }
-  beyond_middle_ += spacing - (first + slower) / 2;
+  beyond_middle_ += *spacing - (first + slower) / 2;
   if (std::chrono::abs(beyond_middle_) > kStampNoise) {
     pace_ = beyond_middle_ > Duration{} ? Pace::slower : Pace::first;
     beyond_middle_ = {};

@@ -20,11 +20,11 @@ namespace locus::velodyne {
 /// One owner.
 class ModelRecognition {
  public:
-  Model recognise(Model claimed, ReturnMode mode, Duration time_of_hour,
+  /// `spacing`: since the packet before, by the lidar's clock; nothing for the first packet.
+  Model recognise(Model claimed, ReturnMode mode, std::optional<Duration> spacing,
                   std::span<const std::byte, kDataPacketBytes> packet);
 
  private:
-  std::optional<Duration> last_time_of_hour_;
   Model claimed_{};
   std::optional<Model> verdict_; ///< on claimed_
 };
@@ -35,10 +35,10 @@ class ModelRecognition {
 /// one pace, it is the first. One owner.
 class PaceRecognition {
  public:
-  Pace recognise(Model model, ReturnMode mode, Duration time_of_hour);
+  /// `spacing` as ModelRecognition has it.
+  Pace recognise(Model model, ReturnMode mode, std::optional<Duration> spacing);
 
  private:
-  std::optional<Duration> last_time_of_hour_;
   Duration beyond_middle_{}; ///< of the spacings added up
   Pace pace_ = Pace::first;
 };

@@ -23,7 +23,7 @@ Config load_shipped(const std::string& name) {
 
 std::vector<std::string> source_names(const Config& config) {
   std::vector<std::string> names;
-  for (const MotionSourceOptions& source : config.odometry.motion_sources)
+  for (const MotionSourceOptions& source : config.motion_sources)
     names.push_back(source.name);
   return names;
 }
@@ -32,8 +32,7 @@ std::vector<std::string> source_names(const Config& config) {
 Config without_robot(Config config) {
   const Config defaults;
   config.lidars = defaults.lidars;
-  config.odometry.motion_sources = defaults.odometry.motion_sources;
-  config.source_topics = defaults.source_topics;
+  config.motion_sources = defaults.motion_sources;
   return config;
 }
 
@@ -88,7 +87,7 @@ TEST(ShippedFiles, PaperHuskyIsTableFour) {
   const Config husky = load_shipped("paper-husky.yaml");
   EXPECT_EQ(without_robot(husky), paper);
   EXPECT_EQ(husky.lidars, load_shipped("husky.yaml").lidars);
-  EXPECT_EQ(husky.odometry.motion_sources, load_shipped("husky.yaml").odometry.motion_sources);
+  EXPECT_EQ(husky.motion_sources, load_shipped("husky.yaml").motion_sources);
 }
 
 TEST(ShippedFiles, PaperSpotIsTableFour) {
@@ -100,7 +99,7 @@ TEST(ShippedFiles, PaperSpotIsTableFour) {
   const Config spot = load_shipped("paper-spot.yaml");
   EXPECT_EQ(without_robot(spot), paper);
   EXPECT_EQ(spot.lidars, load_shipped("spot.yaml").lidars);
-  EXPECT_EQ(spot.odometry.motion_sources, load_shipped("spot.yaml").odometry.motion_sources);
+  EXPECT_EQ(spot.motion_sources, load_shipped("spot.yaml").motion_sources);
 }
 
 } // namespace

@@ -24,7 +24,6 @@ std::vector<MotionSourceOptions> RobotSetup::motion_sources() const {
 
 OdometryOptions RobotSetup::odometry() const {
   OdometryOptions options;
-  options.motion_sources = motion_sources();
   options.fusion = fusion;
   options.threads = 1;
   return options;
@@ -69,11 +68,11 @@ SweepBuilder::Counters drive(const sim::Scene& scene, const sim::Trajectory& tra
       break;
     for (; setup.wheels && next_wheels.stamp <= arrival; next_wheels = wheels.next())
       if (!setup.is_silent(0, next_wheels.stamp))
-        builder.sources().add(0, next_wheels);
+        builder.sources().add(SourceId{0}, next_wheels);
     for (; setup.imu && next_imu.stamp <= arrival; next_imu = imu.next()) {
       next_imu.angular_velocity_radps.z() += setup.gyro_error_radps(next_imu.stamp);
       if (!setup.is_silent(imu_index, next_imu.stamp))
-        builder.sources().add(imu_index, next_imu);
+        builder.sources().add(SourceId{imu_index}, next_imu);
     }
     builder.advance(arrival);
     if (!setup.is_lost(static_cast<std::size_t>(std::distance(lidars.begin(), next)), arrival))

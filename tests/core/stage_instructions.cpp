@@ -66,7 +66,7 @@ int main(int argc, char** argv) {
   options.threads = 1;
   options.map.keyframe_m = 0.25; // some of so short a drive
   test::SweepsOfRecording sweeps(recording, sweep_options, &counter);
-  Odometry odometry(options, &counter);
+  Odometry odometry(options, {}, &counter);
   int sweeps_seen = 0;
   while (const Sweep* sweep = sweeps.next()) {
     odometry.process(*sweep);

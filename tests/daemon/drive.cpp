@@ -45,10 +45,10 @@ Drive::Drive() {
   }
   sim::SyntheticOdometry wheels(trajectory, 50.0);
   for (OdometrySample sample = wheels.next(); sample.arrival < end; sample = wheels.next())
-    inputs_.emplace_back(OdometryInput{0, sample});
+    inputs_.emplace_back(OdometryInput{SourceId{0}, sample});
   sim::SyntheticImu imu(trajectory, 200.0);
   for (ImuSample sample = imu.next(); sample.arrival < end; sample = imu.next())
-    inputs_.emplace_back(ImuInput{1, sample});
+    inputs_.emplace_back(ImuInput{SourceId{1}, sample});
   std::stable_sort(inputs_.begin(), inputs_.end(),
                    [](const Input& a, const Input& b) { return arrival_of(a, {}) < arrival_of(b, {}); });
 }
@@ -60,7 +60,7 @@ Input DriveInput::next(Duration) {
 
 std::vector<ProcessedSweep> process_in_one_thread(const Config& config) {
   std::vector<ProcessedSweep> processed;
-  SweepProcessor processor(config.odometry);
+  SweepProcessor processor(config);
   const auto process = [&](Ingest& ingest, const Sweep& sweep) {
     processed.push_back(processor.process(sweep, {MachineTime::now(), {}}));
     ingest.take(processor.odometry().feedback());

@@ -34,9 +34,9 @@ class ArcDrive {
     for (Duration t{}; t <= std::max(gyro_until, wheels_until); t += milliseconds{5}) {
       const double t_s = to_seconds(t);
       if (t <= wheels_until && t % milliseconds{20} == Duration{})
-        sources_.add(0, OdometrySample{at(t), at(t), se3_exp(t_s * twist_base), 1.0});
+        sources_.add(SourceId{0}, OdometrySample{at(t), at(t), se3_exp(t_s * twist_base), 1.0});
       if (t <= gyro_until) // never twice the same: it would count as frozen
-        sources_.add(1, ImuSample{at(t), at(t), twist_base.tail<3>(), {1e-6 * t_s, 0, 9.81}, {}});
+        sources_.add(SourceId{1}, ImuSample{at(t), at(t), twist_base.tail<3>(), {1e-6 * t_s, 0, 9.81}, {}});
     }
   }
 
@@ -52,7 +52,7 @@ class ArcDrive {
   [[nodiscard]] FastSample carried(const FastSample& estimate, Duration now) const {
     FastOdometry fast;
     fast.take(estimate);
-    const std::optional<FastSample> sample = fast.carry(sources_, 1, at(now));
+    const std::optional<FastSample> sample = fast.carry(sources_, SourceId{1}, at(now));
     EXPECT_TRUE(sample);
     return sample.value_or(FastSample{});
   }
@@ -131,9 +131,9 @@ TEST(FastOdometry, UncertainTwistMovesThePoseAsAnotherTwistWould) {
 TEST(FastOdometry, NothingBeforeTheFirstEstimateAndForOtherSources) {
   const MotionSources none({{"imu", SourceKind::imu, {}}}, Fusion::combined);
   FastOdometry fast;
-  EXPECT_FALSE(fast.carry(none, 0, at(milliseconds{1}))) << "no estimate";
+  EXPECT_FALSE(fast.carry(none, SourceId{0}, at(milliseconds{1}))) << "no estimate";
   fast.take(FastSample{});
-  EXPECT_FALSE(fast.carry(none, 0, at(milliseconds{1}))) << "no sample";
+  EXPECT_FALSE(fast.carry(none, SourceId{0}, at(milliseconds{1}))) << "no sample";
 }
 
 } // namespace

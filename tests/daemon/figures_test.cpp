@@ -53,7 +53,7 @@ TEST(Figures, ServiceHasTheKeysOfARunAndMore) {
   const Config config = Config{};
   Figures figures{.config = config};
   const auto of_a_run = to_json(figures).flatten();
-  figures.live.emplace().link.sources.resize(config.odometry.motion_sources.size());
+  figures.live.emplace().link.sources.resize(config.motion_sources.size());
   const auto live = to_json(figures).flatten();
   for (const auto& [key, value] : of_a_run.items())
     EXPECT_TRUE(live.contains(key)) << key;

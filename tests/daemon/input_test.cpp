@@ -33,7 +33,7 @@ std::vector<UdpSocket> two_sockets() {
 Stamp now() { return Stamp{read_clock(CLOCK_REALTIME)}; }
 
 ImuInput imu_at(Stamp arrival) {
-  ImuInput input{1, {}};
+  ImuInput input{SourceId{1}, {}};
   input.sample.arrival = arrival;
   return input;
 }

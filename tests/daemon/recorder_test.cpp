@@ -227,8 +227,7 @@ TEST(Recorder, AbsurdSamplesAreReadAgainOrLeftOut) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const Stamp now = stamp_from_ns(1'700'000'000'000'000'000);
   Config config = recorded_config();
-  config.odometry.motion_sources.push_back({"second", SourceKind::imu, {}});
-  config.source_topics.push_back({});
+  config.motion_sources.push_back({{"second", SourceKind::imu, {}}, "", ""});
   ImuSample imu{now, now, {kNan, 1, 2}, {1e300, -1e-300, 0}, {}};
   OdometrySample good{now, now + Duration{1}, Pose{}, std::numeric_limits<double>::infinity()};
   OdometrySample no_rotation = good, before_1951 = good;
@@ -243,12 +242,12 @@ TEST(Recorder, AbsurdSamplesAreReadAgainOrLeftOut) {
   {
     RunningRecorder recorder(folder / "record", config);
     for (const OdometrySample& sample : {no_rotation, good, before_1951})
-      recorder.take(OdometryInput{0, sample});
-    recorder.take(ImuInput{1, imu});
-    recorder.take(ImuInput{2, imu});
+      recorder.take(OdometryInput{SourceId{0}, sample});
+    recorder.take(ImuInput{SourceId{1}, imu});
+    recorder.take(ImuInput{SourceId{2}, imu});
     recorder.take(datagram);
     recorder.take(Silence{now});
-    recorder.take(OutsideVerdict{0, false});
+    recorder.take(OutsideVerdict{SourceId{0}, false});
     for (int look = 0; look < 500 && recorder.status().recorded < 3; ++look)
       std::this_thread::sleep_for(milliseconds{10});
     EXPECT_EQ(recorder.status().recorded, 3U);
@@ -270,7 +269,7 @@ TEST(Recorder, WhatTheDiskIsTooSlowForIsDroppedAndCounted) {
   const test::TemporaryFolder folder;
   RunningRecorder recorder(folder / "record", recorded_config());
   constexpr std::uint64_t kInputs = 4 * Recorder::kMaxUnwritten;
-  const ImuInput imu{1, {}};
+  const ImuInput imu{SourceId{1}, {}};
   const auto begin = std::chrono::steady_clock::now();
   for (std::uint64_t i = 0; i < kInputs; ++i)
     recorder.take(imu);

@@ -66,7 +66,7 @@ Config config_in(const test::DdsDomain& domain) {
   config.dds.prefix = "/robot_7/locus";
   config.dds.publish_tf = config.dds.publish_cloud = config.dds.publish_map = true;
   config.dds.flat_ground_topic = "/flat_ground";
-  config.source_topics[0].health_topic = "/wheel_health";
+  config.motion_sources[0].health_topic = "/wheel_health";
   return config;
 }
 
@@ -143,7 +143,7 @@ TEST_P(Peers, AreHeardInOrderWithEveryFigure) {
   for (const ImuInput& imu : imus) {
     const int i = number_of(imu.sample.angular_velocity_radps.z());
     const test::Said said(i);
-    EXPECT_EQ(imu.source, 1U);
+    EXPECT_EQ(imu.source, SourceId{1});
     EXPECT_EQ(imu.sample.stamp, to_stamp({said.sec, said.nanosec}));
     EXPECT_EQ(imu.sample.specific_force_mps2.z(), 9.81);
     EXPECT_GT(i, last);
@@ -151,11 +151,11 @@ TEST_P(Peers, AreHeardInOrderWithEveryFigure) {
   }
   for (const OdometryInput& odometry : inbox_.all<OdometryInput>()) {
     const test::Said said(number_of(odometry.sample.T_source_base.translation.x()));
-    EXPECT_EQ(odometry.source, 0U);
+    EXPECT_EQ(odometry.source, SourceId{0});
     EXPECT_EQ(odometry.sample.stamp, to_stamp({said.sec, said.nanosec}));
     EXPECT_NEAR(odometry.sample.covariance_scale, 1.0, 1e-9);
   }
-  EXPECT_EQ(inbox_.all<OutsideVerdict>().front().source, 0U);
+  EXPECT_EQ(inbox_.all<OutsideVerdict>().front().source, SourceId{0});
   const LinkFigures status = link.status();
   EXPECT_TRUE(status.connected);
   EXPECT_EQ(status.sources[1].writers, 1U);
@@ -252,8 +252,7 @@ TEST(RosLink, WithoutItsInterfaceGoesOnTryingAndSaysWhichOne) {
 TEST(RosLink, WithNothingToHearSleeps) {
   const test::DdsDomain domain;
   Config config = config_in(domain);
-  config.odometry.motion_sources.clear();
-  config.source_topics.clear();
+  config.motion_sources.clear();
   const RosLink link(config, [](const RosInput&) {});
   EXPECT_TRUE(eventually([&] { return link.status().connected; }));
   const std::uint64_t before = link.progress();

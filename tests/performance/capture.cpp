@@ -25,8 +25,7 @@ Capture::Capture(std::string name, SimulatedRobot& robot) : name_(std::move(name
 Config Capture::config_of_lidar_alone() const {
   Config config = config_;
   config.odometry.threads = 1;
-  config.odometry.motion_sources.clear();
-  config.source_topics.clear();
+  config.motion_sources.clear();
   return config;
 }
 

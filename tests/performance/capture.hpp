@@ -26,7 +26,7 @@ class Capture {
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] const std::vector<daemon::Input>& inputs() const { return inputs_; }
-  [[nodiscard]] bool has_motion_sources() const { return !config_.odometry.motion_sources.empty(); }
+  [[nodiscard]] bool has_motion_sources() const { return !config_.motion_sources.empty(); }
 
   /// One thread, all motion sources.
   [[nodiscard]] const Config& config() const { return config_; }

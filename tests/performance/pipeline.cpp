@@ -20,7 +20,7 @@ LidarRouter open_lidars(const Config& config) {
 } // namespace
 
 Pipeline::Pipeline(const Config& config)
-    : hears_motion_(!config.odometry.motion_sources.empty()), processor_(config.odometry),
+    : hears_motion_(!config.motion_sources.empty()), processor_(config),
       ingest_(config, open_lidars(config), [this](Sweep& sweep, const daemon::SweepCut& cut) { process(sweep, cut); }) {
 }
 

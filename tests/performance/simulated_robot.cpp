@@ -8,7 +8,7 @@ namespace locus::performance {
 
 namespace {
 
-constexpr std::size_t kWheels = 0, kImu = 1; ///< among the motion sources of the default configuration
+constexpr SourceId kWheels{0}, kImu{1}; ///< among the motion sources of the default configuration
 
 } // namespace
 
@@ -34,7 +34,7 @@ Config SimulatedRobot::config() const {
     options.port = lidar.options.port;
     options.T_base_lidar = lidar.options.T_base_lidar;
   }
-  config.odometry.motion_sources[kImu].T_base_source = robot_.sensors.imu->T_base_imu;
+  config.motion_sources[index_of(kImu)].T_base_source = robot_.sensors.imu->T_base_imu;
   config.odometry.threads = 1;
   return config;
 }

@@ -150,7 +150,7 @@ TEST(SweepRecord, TellsWhatEachSourceWasToTheSweep) {
   daemon::ProcessedSweep sweep;
   sweep.raw_returns = 1000;
   sweep.usable_sources = 0b0111;
-  sweep.estimate.prior = {.rotation = 2, .translation = 0};
+  sweep.estimate.prior = {{SourceId{2}, SourceId{0}}};
   sweep.estimate.pose_covariance.diagonal() << 0.01, 0.02, 0.06, 9.0, 9.0, 9.0;
   const SweepRecord record = record_of(sweep);
   EXPECT_EQ(record.sources[0], SourceHealth::used);
@@ -203,7 +203,7 @@ TEST(Report, HoldsSummaryConfigurationAndTheTruthInTheFrameOfTheEstimate) {
   EXPECT_NEAR(shown["truth"]["x"].front().get<double>(), run.sweeps.front().T_odom_base.translation.x(), 0.02);
   EXPECT_NEAR(shown["truth"]["y"].back().get<double>(), run.sweeps.back().T_odom_base.translation.y(), 0.02);
   EXPECT_EQ(shown["error_boxes"].size(), 6U);
-  EXPECT_EQ(shown["health"].size(), 1 + run.config.odometry.motion_sources.size());
+  EXPECT_EQ(shown["health"].size(), 1 + run.config.motion_sources.size());
   EXPECT_EQ(shown["stages"].size(), kStages);
 }
 

@@ -23,7 +23,7 @@ int main(int argc, char** argv) {
   locus::tools::write_report(folder / "hour.html", hour.report());
 
   SampleRun hostile = SampleRun::of(std::chrono::minutes{1}, kHostile);
-  hostile.config.odometry.motion_sources.front().name = kHostile;
+  hostile.config.motion_sources.front().name = kHostile;
   hostile.summary["sources"][kHostile] = hostile.summary["sources"]["wio"];
   hostile.summary["sources"][kHostile]["verdict"] = "turns the other way";
   locus::tools::write_report(folder / "hostile.html", hostile.report());

@@ -147,8 +147,8 @@ SampleRun SampleRun::of(std::chrono::seconds length, const std::string& capture)
   run.accuracy = trajectory_accuracy(estimates, run.truth);
   run.map = town(length < std::chrono::minutes{10} ? 3 : 10);
   run.summary = summary_of(capture, length_s, run.sweeps.size());
-  for (std::size_t i = 0; i < run.config.odometry.motion_sources.size(); ++i)
-    run.summary["sources"][run.config.odometry.motion_sources[i].name] = source_summary(i == 0 ? 7 : 0);
+  for (std::size_t i = 0; i < run.config.motion_sources.size(); ++i)
+    run.summary["sources"][run.config.motion_sources[i].name] = source_summary(i == 0 ? 7 : 0);
   run.summary["rpe_10m_percent"] = 0.04;
   run.summary["end_drift_m"] = 0.036;
   return run;
@@ -157,8 +157,7 @@ SampleRun SampleRun::of(std::chrono::seconds length, const std::string& capture)
 SampleRun SampleRun::bare() {
   SampleRun run;
   run.capture_start = kBegin;
-  run.config.odometry.motion_sources.clear();
-  run.config.source_topics.clear();
+  run.config.motion_sources.clear();
   for (const double t_s : {0.0, 0.1, 0.2})
     run.sweeps.push_back(sweep_at(t_s));
   run.path_m = 0.26;

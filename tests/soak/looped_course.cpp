@@ -32,7 +32,7 @@ std::vector<tools::MotionRecording> read_motion(const ClosedCourse& course, cons
 
 LoopedCourse::LoopedCourse(ClosedCourse course, const Config& config, std::uint64_t lap)
     : course_(std::move(course)), config_(config), offset_(static_cast<Duration::rep>(lap) * course_.lap),
-      T_begin_end_(config.odometry.motion_sources.size()), T_source_lap_(T_begin_end_.size()) {
+      T_begin_end_(config.motion_sources.size()), T_source_lap_(T_begin_end_.size()) {
   learn_wheels();
   for (std::uint64_t before = 0; before < lap; ++before)
     for (std::size_t source = 0; source < T_begin_end_.size(); ++source)
@@ -50,7 +50,7 @@ void LoopedCourse::learn_wheels() {
       continue;
     start_ = samples->front()->stamp;
     for (; samples->front() != nullptr && samples->front()->stamp < start_ + course_.lap; samples->pop())
-      T_begin_end_[motion.source] = samples->front()->T_source_base;
+      T_begin_end_[index_of(motion.source)] = samples->front()->T_source_base;
   }
 }
 
@@ -118,7 +118,7 @@ daemon::Input LoopedCourse::carry_forward(const daemon::Input& input) {
   } else if (auto* odometry = std::get_if<daemon::OdometryInput>(&carried)) {
     odometry->sample.stamp += offset_;
     odometry->sample.arrival += offset_;
-    odometry->sample.T_source_base = T_source_lap_[odometry->source] * odometry->sample.T_source_base;
+    odometry->sample.T_source_base = T_source_lap_[index_of(odometry->source)] * odometry->sample.T_source_base;
   } else if (auto* silence = std::get_if<daemon::Silence>(&carried)) {
     silence->now += offset_;
   }
@@ -129,9 +129,9 @@ void LoopedCourse::count(const daemon::Input& input) {
   if (std::holds_alternative<Datagram>(input))
     ++given_.datagrams;
   else if (const auto* imu = std::get_if<daemon::ImuInput>(&input))
-    ++given_.samples[imu->source];
+    ++given_.samples[index_of(imu->source)];
   else if (const auto* odometry = std::get_if<daemon::OdometryInput>(&input))
-    ++given_.samples[odometry->source];
+    ++given_.samples[index_of(odometry->source)];
 }
 
 } // namespace locus::soak

@@ -37,7 +37,7 @@ std::set<std::string> imus_of(const path& recording) {
       config = *std::move(loaded);
   }
   std::set<std::string> names;
-  for (const MotionSourceOptions& source : config.odometry.motion_sources) {
+  for (const MotionSourceOptions& source : config.motion_sources) {
     if (source.kind == SourceKind::imu)
       names.insert(source.name);
   }

@@ -13,14 +13,15 @@ namespace ros = daemon::ros;
 MotionPublisher::MotionPublisher(const Config& config)
     : node_(value_or_fail(daemon::DdsNode::open(config.dds), ExitStatus::failed)), frame_odom_(config.dds.frame_odom),
       frame_base_(config.dds.frame_base) {
-  for (std::size_t i = 0; i < config.source_topics.size(); ++i) {
-    const std::string& topic = topics_.emplace_back(config.source_topics[i].topic);
-    if (topic.empty())
+  for (const MotionSource& source : config.motion_sources) {
+    const SourceId id{topics_.size()};
+    topics_.push_back(source.topic);
+    if (source.topic.empty())
       continue;
-    if (config.odometry.motion_sources[i].kind == SourceKind::imu)
-      imus_.emplace(i, DdsWriter<ros::Imu>(node_, topic, TopicQos::sensor_out()));
+    if (source.kind == SourceKind::imu)
+      imus_.emplace(id, DdsWriter<ros::Imu>(node_, source.topic, TopicQos::sensor_out()));
     else
-      odometries_.emplace(i, DdsWriter<ros::Odometry>(node_, topic, TopicQos::standard()));
+      odometries_.emplace(id, DdsWriter<ros::Odometry>(node_, source.topic, TopicQos::standard()));
   }
 }
 
@@ -56,10 +57,10 @@ std::vector<std::string> MotionPublisher::unheard() const {
   std::vector<std::string> topics;
   for (const auto& [source, writer] : imus_)
     if (!writer.has_readers())
-      topics.push_back(topics_[source]);
+      topics.push_back(topics_[index_of(source)]);
   for (const auto& [source, writer] : odometries_)
     if (!writer.has_readers())
-      topics.push_back(topics_[source]);
+      topics.push_back(topics_[index_of(source)]);
   return topics;
 }
 

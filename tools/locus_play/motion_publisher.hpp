@@ -31,8 +31,8 @@ class MotionPublisher {
   daemon::DdsNode node_;
   std::string frame_odom_, frame_base_;
   std::vector<std::string> topics_; ///< by source
-  std::map<std::size_t, daemon::DdsWriter<daemon::ros::Imu>> imus_;
-  std::map<std::size_t, daemon::DdsWriter<daemon::ros::Odometry>> odometries_;
+  std::map<SourceId, daemon::DdsWriter<daemon::ros::Imu>> imus_;
+  std::map<SourceId, daemon::DdsWriter<daemon::ros::Odometry>> odometries_;
   std::uint64_t refused_ = 0;
 };
 

@@ -57,13 +57,13 @@ void StreamRecording::begin(Stamp start) {
   const std::uint64_t seed = config_.sweep.seed;
   lidar_faults_.emplace(faults_, start, seed);
   bool has_imu = false; // the first one has the file
-  for (std::size_t i = 0; i < config_.odometry.motion_sources.size(); ++i) {
-    const MotionSourceOptions& source = config_.odometry.motion_sources[i];
+  for (std::size_t i = 0; i < config_.motion_sources.size(); ++i) {
+    const MotionSourceOptions& source = config_.motion_sources[i];
     if (source.kind == SourceKind::odometry)
       sources_.emplace(source.name + ".tum",
-                       Source{i, SampleFaults<OdometrySample>(faults_, source.name, start, seed)});
+                       Source{SourceId{i}, SampleFaults<OdometrySample>(faults_, source.name, start, seed)});
     else if (!std::exchange(has_imu, true))
-      sources_.emplace("imu.csv", Source{i, SampleFaults<ImuSample>(faults_, source.name, start, seed)});
+      sources_.emplace("imu.csv", Source{SourceId{i}, SampleFaults<ImuSample>(faults_, source.name, start, seed)});
   }
 }
 
@@ -84,7 +84,7 @@ template <class Sample> void StreamRecording::take(const sim::StreamText& text, 
   }
   for (Sample& sample : *samples) {
     sample.arrival = arrival;
-    std::get<SampleFaults<Sample>>(source.faults).pass(sample, [&](const Sample& s) { keep(source.index, s); });
+    std::get<SampleFaults<Sample>>(source.faults).pass(sample, [&](const Sample& s) { keep(source.id, s); });
   }
 }
 
@@ -92,11 +92,11 @@ void StreamRecording::keep(const Datagram& datagram) {
   waiting_.emplace(datagram.receive_stamp, OwnedInput{datagram, {datagram.payload.begin(), datagram.payload.end()}});
 }
 
-void StreamRecording::keep(std::size_t source, const ImuSample& sample) {
+void StreamRecording::keep(SourceId source, const ImuSample& sample) {
   waiting_.emplace(sample.arrival, OwnedInput{daemon::ImuInput{source, sample}, {}});
 }
 
-void StreamRecording::keep(std::size_t source, const OdometrySample& sample) {
+void StreamRecording::keep(SourceId source, const OdometrySample& sample) {
   waiting_.emplace(sample.arrival, OwnedInput{daemon::OdometryInput{source, sample}, {}});
 }
 
@@ -109,7 +109,7 @@ void StreamRecording::end() {
     Source& source = entry.second;
     std::visit(
         [&]<class Sample>(SampleFaults<Sample>& faults) {
-          faults.finish([&](const Sample& sample) { keep(source.index, sample); });
+          faults.finish([&](const Sample& sample) { keep(source.id, sample); });
         },
         source.faults);
   }

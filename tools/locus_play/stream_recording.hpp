@@ -62,7 +62,7 @@ class StreamRecording : public daemon::InputSource {
     std::vector<std::byte> payload;
   };
   struct Source {
-    std::size_t index; ///< in the configuration
+    SourceId id;
     std::variant<SampleFaults<ImuSample>, SampleFaults<OdometrySample>> faults;
   };
 
@@ -71,8 +71,8 @@ class StreamRecording : public daemon::InputSource {
   void take(const sim::StreamText& text, Stamp arrival);
   template <class Sample> void take(const sim::StreamText& text, Stamp arrival, Source& source);
   void keep(const Datagram& datagram);
-  void keep(std::size_t source, const ImuSample& sample);
-  void keep(std::size_t source, const OdometrySample& sample);
+  void keep(SourceId source, const ImuSample& sample);
+  void keep(SourceId source, const OdometrySample& sample);
   void end();
 
   CaptureStream& stream_;

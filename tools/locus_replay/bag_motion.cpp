@@ -21,7 +21,7 @@ Stamp arrival_of(Stamp stamp, Stamp recorded) {
 /// Gathers the samples of one topic.
 class MotionTopic {
  public:
-  MotionTopic(std::size_t source, std::size_t topic, BagTopic name)
+  MotionTopic(SourceId source, std::size_t topic, BagTopic name)
       : source_(source), topic_(topic), name_(std::move(name)) {}
 
   [[nodiscard]] std::size_t topic() const { return topic_; }
@@ -70,7 +70,8 @@ class MotionTopic {
     return MotionSamples<Sample>(std::move(samples));
   }
 
-  std::size_t source_, topic_;
+  SourceId source_;
+  std::size_t topic_;
   BagTopic name_;
   std::vector<ImuSample> imu_;
   std::vector<OdometrySample> odometry_;
@@ -84,9 +85,9 @@ std::vector<MotionRecording> read_bag_motion(Bag& bag, const std::filesystem::pa
                                              const std::vector<std::optional<std::size_t>>& topic_of_source,
                                              std::vector<std::string>& warnings) {
   std::vector<MotionTopic> motion;
-  for (std::size_t source = 0; source < topic_of_source.size(); ++source) {
-    if (const auto topic = topic_of_source[source])
-      motion.emplace_back(source, *topic, bag.topics()[*topic]);
+  for (std::size_t i = 0; i < topic_of_source.size(); ++i) {
+    if (const auto topic = topic_of_source[i])
+      motion.emplace_back(SourceId{i}, *topic, bag.topics()[*topic]);
   }
   while (const BagMessage* message = motion.empty() ? nullptr : bag.next()) {
     const auto found = std::ranges::find(motion, message->topic, &MotionTopic::topic);

@@ -116,10 +116,10 @@ std::vector<Index*> places_of(std::vector<Index>& places) {
 }
 
 /// A topic that is none of the defaults is meant.
-bool is_named(const SourceTopics& topics) {
+bool is_named(const std::string& topic) {
   static const Config kDefaults;
-  return !topics.topic.empty() && std::ranges::none_of(kDefaults.source_topics, [&](const SourceTopics& defaults) {
-    return is_same_topic(defaults.topic, topics.topic);
+  return !topic.empty() && std::ranges::none_of(kDefaults.motion_sources, [&](const MotionSource& source) {
+    return is_same_topic(source.topic, topic);
   });
 }
 
@@ -154,17 +154,16 @@ void deal_lidars(const Bag& bag, const std::string& bag_name, const Config& conf
 }
 
 void deal_sources(const Bag& bag, const std::string& bag_name, const Config& config,
-                  const std::function<bool(std::size_t)>& has_file, SourceKind kind, BagTopics& chosen) {
-  const std::vector<MotionSourceOptions>& sources = config.odometry.motion_sources;
-  const auto is_wanted = [&](std::size_t i) { return sources[i].kind == kind && !has_file(i); };
+                  const std::function<bool(SourceId)>& has_file, SourceKind kind, BagTopics& chosen) {
+  const std::vector<MotionSource>& sources = config.motion_sources;
+  const auto is_wanted = [&](std::size_t i) { return sources[i].kind == kind && !has_file(SourceId{i}); };
   Dealer dealer(bag.topics(), type_of(kind));
   std::vector<Index*> nameless;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     if (!is_wanted(i))
       continue;
-    dealer.deal(chosen.of_source[i],
-                [&](const std::string& topic) { return is_same_topic(topic, config.source_topics[i].topic); });
-    if (!is_named(config.source_topics[i]))
+    dealer.deal(chosen.of_source[i], [&](const std::string& topic) { return is_same_topic(topic, sources[i].topic); });
+    if (!is_named(sources[i].topic))
       nameless.push_back(&chosen.of_source[i]);
   }
   dealer.finish(nameless);
@@ -172,7 +171,7 @@ void deal_sources(const Bag& bag, const std::string& bag_name, const Config& con
     if (is_wanted(i) && !chosen.of_source[i] && dealer.left() > 0)
       chosen.doubts.push_back(fmt::format("{}: motion source {}: nothing on {}, and it is not clear whether it is "
                                           "one of {}; name it with --set motion_sources.{}.topic=TOPIC",
-                                          bag_name, sources[i].name, config.source_topics[i].topic, dealer.names_left(),
+                                          bag_name, sources[i].name, sources[i].topic, dealer.names_left(),
                                           sources[i].name));
   }
 }
@@ -189,7 +188,7 @@ std::string describe(const Bag& bag, const std::string& bag_name, const Config& 
   for (std::size_t i = 0; i < chosen.of_lidar.size(); ++i)
     take("lidar " + config.lidars[i].name, chosen.of_lidar[i]);
   for (std::size_t i = 0; i < chosen.of_source.size(); ++i)
-    take(config.odometry.motion_sources[i].name, chosen.of_source[i]);
+    take(config.motion_sources[i].name, chosen.of_source[i]);
   for (std::size_t i = 0; i < bag.topics().size(); ++i) {
     const BagTopic& topic = bag.topics()[i];
     if (!is_taken[i] && (topic.type == kVelodyneScanType || topic.type == kImuType || topic.type == kOdometryType))
@@ -202,10 +201,10 @@ std::string describe(const Bag& bag, const std::string& bag_name, const Config& 
 } // namespace
 
 BagTopics BagTopics::choose(const Bag& bag, const std::string& bag_name, const Config& config,
-                            const std::function<bool(std::size_t)>& has_file) {
+                            const std::function<bool(SourceId)>& has_file) {
   BagTopics chosen;
   deal_lidars(bag, bag_name, config, chosen);
-  chosen.of_source.resize(config.odometry.motion_sources.size());
+  chosen.of_source.resize(config.motion_sources.size());
   for (const SourceKind kind : {SourceKind::imu, SourceKind::odometry})
     deal_sources(bag, bag_name, config, has_file, kind, chosen);
   chosen.taken = describe(bag, bag_name, config, chosen);

@@ -9,6 +9,7 @@
 
 #include "bags/bag.hpp"
 #include "config/config.hpp"
+#include "core/base/source_id.hpp"
 
 namespace locus::tools {
 
@@ -25,7 +26,7 @@ struct BagTopics {
 
   /// `has_file`: of a motion source that the bag need not speak for. Throws Failure if there is nothing for any lidar.
   static BagTopics choose(const Bag& bag, const std::string& bag_name, const Config& config,
-                          const std::function<bool(std::size_t)>& has_file);
+                          const std::function<bool(SourceId)>& has_file);
 };
 
 } // namespace locus::tools

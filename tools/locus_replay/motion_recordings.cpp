@@ -36,11 +36,12 @@ std::vector<MotionFile> motion_files(const Arguments& arguments, const CaptureFo
 }
 
 /// The source that a file speaks for: the first one of kind imu, or the odometry of this name.
-std::optional<std::size_t> source_of(const MotionFile& file, const std::vector<MotionSourceOptions>& sources) {
+std::optional<SourceId> source_of(const MotionFile& file, const std::vector<MotionSource>& sources) {
   const auto found = std::ranges::find_if(sources, [&](const MotionSourceOptions& source) {
     return source.kind == file.kind && (file.kind == SourceKind::imu || source.name == file.name);
   });
-  return found == sources.end() ? std::nullopt : std::optional<std::size_t>(found - sources.begin());
+  return found == sources.end() ? std::nullopt
+                                : std::optional{SourceId{static_cast<std::size_t>(found - sources.begin())}};
 }
 
 std::string without_source(const MotionFile& file) {
@@ -60,13 +61,13 @@ std::string without_file(const MotionSourceOptions& source) {
 }
 
 template <class Sample>
-MotionRecording read_as(const MotionFile& file, std::size_t source, std::vector<std::string>& warnings) {
+MotionRecording read_as(const MotionFile& file, SourceId source, std::vector<std::string>& warnings) {
   auto samples = value_or_fail(MotionSamples<Sample>::open(file.files), ExitStatus::failed);
   std::ranges::copy(samples.breaks(), std::back_inserter(warnings));
   return {source, file.files.front(), std::move(samples)};
 }
 
-MotionRecording read(const MotionFile& file, std::size_t source, std::vector<std::string>& warnings) {
+MotionRecording read(const MotionFile& file, SourceId source, std::vector<std::string>& warnings) {
   return file.kind == SourceKind::imu ? read_as<ImuSample>(file, source, warnings)
                                       : read_as<OdometrySample>(file, source, warnings);
 }
@@ -75,13 +76,13 @@ MotionRecording read(const MotionFile& file, std::size_t source, std::vector<std
 
 std::vector<MotionRecording> read_motion(const Arguments& arguments, const CaptureFolder& folder, const Config& config,
                                          bool config_is_users_own, std::vector<std::string>& warnings) {
-  const std::vector<MotionSourceOptions>& sources = config.odometry.motion_sources;
+  const std::vector<MotionSource>& sources = config.motion_sources;
   std::vector<MotionRecording> recordings;
-  const auto is_read = [&](std::size_t source) {
+  const auto is_read = [&](SourceId source) {
     return std::ranges::any_of(recordings, [&](const MotionRecording& r) { return r.source == source; });
   };
   for (const MotionFile& file : motion_files(arguments, folder)) {
-    const std::optional<std::size_t> source = source_of(file, sources);
+    const std::optional<SourceId> source = source_of(file, sources);
     if (source && is_read(*source))
       throw Failure(ExitStatus::wrong_usage, fmt::format("{}: a second file for motion source {}; keep one",
                                                          file.files.front().string(), file.name));
@@ -92,9 +93,9 @@ std::vector<MotionRecording> read_motion(const Arguments& arguments, const Captu
     else
       warnings.push_back(without_source(file) + "; left out");
   }
-  for (std::size_t source = 0; config_is_users_own && source < sources.size(); ++source) {
-    if (!is_read(source))
-      warnings.push_back(without_file(sources[source]));
+  for (std::size_t i = 0; config_is_users_own && i < sources.size(); ++i) {
+    if (!is_read(SourceId{i}))
+      warnings.push_back(without_file(sources[i]));
   }
   return recordings;
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "config/config.hpp"
+#include "core/base/source_id.hpp"
 #include "core/sources/motion_sample.hpp"
 #include "drivers/files/capture_folder.hpp"
 #include "drivers/files/motion_files.hpp"
@@ -18,7 +19,7 @@ namespace locus::tools {
 
 /// What one motion source said, in the order of arrival.
 struct MotionRecording {
-  std::size_t source; ///< index in the configuration
+  SourceId source;
   std::filesystem::path file;
   std::variant<MotionSamples<ImuSample>, MotionSamples<OdometrySample>> samples;
 };

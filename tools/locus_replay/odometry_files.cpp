@@ -25,7 +25,7 @@ std::string csv_header() {
 
 } // namespace
 
-OdometryFiles::OdometryFiles(const std::filesystem::path& folder, const std::vector<MotionSourceOptions>& sources)
+OdometryFiles::OdometryFiles(const std::filesystem::path& folder, const std::vector<MotionSource>& sources)
     : tum_(folder / "odometry.tum"), csv_(folder / "odometry.csv") {
   for (const MotionSourceOptions& source : sources)
     source_names_.push_back(source.name);
@@ -34,10 +34,10 @@ OdometryFiles::OdometryFiles(const std::filesystem::path& folder, const std::vec
 
 /// What the rotation came from and what the translation, once if it is the same.
 std::string OdometryFiles::name_of(const PriorSource& prior) const {
-  const auto name = [this](int source) -> std::string {
-    if (source >= 0)
-      return source_names_[static_cast<std::size_t>(source)];
-    return source == PriorSource::kConstantVelocity ? "constant_velocity" : "identity";
+  const auto name = [&](std::optional<SourceId> source) -> std::string {
+    if (source)
+      return source_names_[index_of(*source)];
+    return prior.otherwise == NoSourcePrior::constant_velocity ? "constant_velocity" : "identity";
   };
   return prior.rotation == prior.translation ? name(prior.rotation)
                                              : name(prior.rotation) + '+' + name(prior.translation);

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/base/options.hpp"
+#include "config/config.hpp"
 #include "core/odometry/odometry_estimate.hpp"
 #include "locus_replay/output_file.hpp"
 
@@ -15,7 +15,7 @@ namespace locus::tools {
 /// back the same bits. Throws Failure.
 class OdometryFiles {
  public:
-  OdometryFiles(const std::filesystem::path& folder, const std::vector<MotionSourceOptions>& sources);
+  OdometryFiles(const std::filesystem::path& folder, const std::vector<MotionSource>& sources);
 
   void write(const OdometryEstimate& estimate);
   void close();

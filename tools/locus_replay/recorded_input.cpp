@@ -24,17 +24,16 @@ RecordedInput open_bag_input(const Arguments& arguments, const std::filesystem::
                              bool config_is_users_own, std::vector<std::string>& warnings) {
   std::unique_ptr<Bag> bag = value_or_fail(open_bag(file), ExitStatus::failed);
   std::vector<MotionRecording> motion = read_motion(arguments, {}, config, false, warnings);
-  const auto has_file = [&](std::size_t source) {
+  const auto has_file = [&](SourceId source) {
     return std::ranges::find(motion, source, &MotionRecording::source) != motion.end();
   };
   const BagTopics topics = BagTopics::choose(*bag, file.string(), config, has_file);
   std::ranges::copy(topics.doubts, std::back_inserter(warnings));
   std::ranges::move(read_bag_motion(*bag, file, topics.of_source, warnings), std::back_inserter(motion));
-  for (std::size_t source = 0; config_is_users_own && topics.doubts.empty() && source < topics.of_source.size();
-       ++source) {
-    if (!has_file(source))
+  for (std::size_t i = 0; config_is_users_own && topics.doubts.empty() && i < topics.of_source.size(); ++i) {
+    if (!has_file(SourceId{i}))
       warnings.push_back(fmt::format("{}: motion source {}: never heard from, nothing of its kind in the bag",
-                                     file.string(), config.odometry.motion_sources[source].name));
+                                     file.string(), config.motion_sources[i].name));
   }
   return {
       std::make_unique<BagPackets>(std::move(bag), file, config, topics.of_lidar), std::move(motion), topics.taken, {}};
@@ -55,9 +54,9 @@ RecordedInput open_drive_input(const Arguments& arguments, const std::filesystem
     drive.truth.clear();
   for (const StampedPose& pose : drive.truth)
     input.truth.push_back({pose.stamp, pose.T_source_base * config.lidars.front().T_base_lidar.inverse()});
-  const std::vector<MotionSourceOptions>& sources = config.odometry.motion_sources;
+  const std::vector<MotionSource>& sources = config.motion_sources;
   const auto imu = std::ranges::find(sources, SourceKind::imu, &MotionSourceOptions::kind);
-  const auto source = static_cast<std::size_t>(imu - sources.begin());
+  const SourceId source{static_cast<std::size_t>(imu - sources.begin())};
   const bool takes_oxts = !drive.imu.empty() && imu != sources.end() &&
                           std::ranges::find(input.motion, source, &MotionRecording::source) == input.motion.end();
   if (takes_oxts)

@@ -38,7 +38,7 @@ void check_faults(const std::vector<Fault>& faults, const Config& config) {
     targets.push_back({lidar.name, FaultTarget::Kind::lidar});
     targets.push_back({lidar.name + std::string{Fault::kPositionPackets}, FaultTarget::Kind::position_packets});
   }
-  for (const MotionSourceOptions& source : config.odometry.motion_sources)
+  for (const MotionSourceOptions& source : config.motion_sources)
     targets.push_back(
         {source.name, source.kind == SourceKind::imu ? FaultTarget::Kind::imu : FaultTarget::Kind::odometry});
   for (const Fault& fault : faults) {
@@ -56,7 +56,7 @@ Recording::Recording(std::unique_ptr<DatagramSource> source, std::vector<MotionR
   if (!options.faults.empty())
     faults_.emplace(options.faults, capture_start_, options.seed);
   for (MotionRecording& recording : motion) {
-    const std::string& name = config.odometry.motion_sources[recording.source].name;
+    const std::string& name = config.motion_sources[index_of(recording.source)].name;
     const bool has_faults = std::ranges::find(options.faults, name, &Fault::name) != options.faults.end();
     if (has_faults)
       std::visit([&](auto& samples) { samples = with_faults(samples.drain(), options, name, capture_start_); },

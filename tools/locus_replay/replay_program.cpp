@@ -58,8 +58,7 @@ Config configuration_of(const CaptureFolder& folder) {
   for (const char* const name : {"kio", "vio"}) {
     if (std::ranges::find(folder.odometry, name, &CaptureFolder::Source::name) == folder.odometry.end())
       continue;
-    config.odometry.motion_sources.insert(config.odometry.motion_sources.begin(), {name, SourceKind::odometry, {}});
-    config.source_topics.insert(config.source_topics.begin(), SourceTopics{});
+    config.motion_sources.insert(config.motion_sources.begin(), {{name, SourceKind::odometry, {}}, "", ""});
   }
   return config;
 }
@@ -154,7 +153,7 @@ CaptureFolder find_files(const std::filesystem::path& capture) {
 void replay(const Config& config, LidarRouter lidars, Recording& recording, Results& results, const SweepStage& stage,
             const EstimateObserver& observer) {
   daemon::SweepCounters counters;
-  daemon::SweepProcessor processor(config.odometry);
+  daemon::SweepProcessor processor(config);
   const auto process = [&](daemon::Ingest& ingest, Sweep& sweep, const daemon::SweepCut& cut) {
     if (stage)
       stage(sweep);

@@ -91,7 +91,7 @@ ordered_json sweep_band(const Report& report, const TimeAxis& time, const std::s
 ordered_json health_bands(const Report& report, const TimeAxis& time) {
   ordered_json bands =
       ordered_json::array({sweep_band(report, time, "lidar", [](const SweepRecord& sweep) { return sweep.lidars; })});
-  const std::vector<MotionSourceOptions>& sources = report.config.odometry.motion_sources;
+  const std::vector<MotionSource>& sources = report.config.motion_sources;
   for (std::size_t i = 0; i < sources.size(); ++i)
     bands.push_back(
         sweep_band(report, time, sources[i].name, [i](const SweepRecord& sweep) { return sweep.sources.at(i); }));

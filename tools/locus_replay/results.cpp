@@ -52,9 +52,10 @@ void warn(const std::vector<std::string>& lines) {
 std::vector<std::string> source_verdicts(const Config& config, const MotionSources& sources) {
   std::vector<std::string> lines;
   for (std::size_t i = 0; i < sources.size(); ++i) {
-    const std::string& name = config.odometry.motion_sources[i].name;
-    const bool is_doubted = !sources.healthy(i) && sources.counters(i).rejected_as(HealthReason::self_check) > 0;
-    if (const std::string_view verdict = sources.verdict(i); !verdict.empty())
+    const std::string& name = config.motion_sources[i].name;
+    const HealthMonitor& health = sources.health(SourceId{i});
+    const bool is_doubted = !health.healthy() && health.counters().rejected_as(HealthReason::self_check) > 0;
+    if (const std::string_view verdict = health.verdict(); !verdict.empty())
       lines.push_back(fmt::format("motion source {} {}", name, verdict));
     else if (is_doubted)
       lines.push_back(
@@ -71,8 +72,7 @@ std::vector<std::string> source_verdicts(const Config& config, const MotionSourc
 Results::Results(const Arguments& arguments, const Config& config, const Recording& recording, Truth truth,
                  const daemon::MachineTime& begin)
     : arguments_(arguments), config_(config), recording_(recording), begin_(begin),
-      odometry_(made(arguments.output), config.odometry.motion_sources), truth_(std::move(truth)),
-      progress_(!arguments.quiet) {}
+      odometry_(made(arguments.output), config.motion_sources), truth_(std::move(truth)), progress_(!arguments.quiet) {}
 
 void Results::take(const daemon::ProcessedSweep& sweep) {
   odometry_.write(sweep.estimate);

@@ -21,7 +21,7 @@ std::string_view reason_of(const HealthEvent& event) {
 }
 
 /// When a source was lost and why, and when it came back.
-std::string readable_health(const FinishedRun& run, std::size_t source) {
+std::string readable_health(const FinishedRun& run, SourceId source) {
   constexpr std::size_t kTold = 4; ///< a source that flaps is not worth a page
   std::string text;
   std::size_t told = 0;
@@ -104,11 +104,11 @@ std::string readable(const FinishedRun& run) {
   const daemon::SweepCounters& counters = figures.counters;
   text += fmt::format("sweeps     {} seen: {} processed, {} dropped, {} failed\n", counters.seen, counters.processed,
                       counters.dropped, counters.failed);
-  const std::vector<MotionSourceOptions>& sources = figures.config.odometry.motion_sources;
+  const std::vector<MotionSource>& sources = figures.config.motion_sources;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     if (const auto received = figures.ingest.sources[i].counters.received; received > 0)
       text += fmt::format("{:10} {} samples, used for {} sweeps{}\n", sources[i].name, received, sweeps.used_sweeps[i],
-                          readable_health(run, i));
+                          readable_health(run, SourceId{i}));
   }
   const Eigen::Vector3d end_m = sweeps.last.value_or(OdometryEstimate{}).T_odom_base.translation;
   text += fmt::format("path       {:.2f} m, ends at {:.3f} {:.3f} {:.3f} m\n", sweeps.path_m, end_m.x(), end_m.y(),

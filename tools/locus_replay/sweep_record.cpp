@@ -27,9 +27,9 @@ SweepRecord record_of(const daemon::ProcessedSweep& sweep) {
                      .lidars = health_of_lidars(sweep)};
   for (std::size_t i = 0; i < record.sources.size(); ++i)
     record.sources[i] = sweep.usable_sources[i] ? SourceHealth::healthy : SourceHealth::lost;
-  for (const int used : {estimate.prior.rotation, estimate.prior.translation}) {
-    if (used >= 0)
-      record.sources[static_cast<std::size_t>(used)] = SourceHealth::used;
+  for (const std::optional<SourceId> used : {estimate.prior.rotation, estimate.prior.translation}) {
+    if (used)
+      record.sources[index_of(*used)] = SourceHealth::used;
   }
   return record;
 }

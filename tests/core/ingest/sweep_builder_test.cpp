@@ -406,11 +406,11 @@ class SweepsOfAMovingRobot : public testing::Test {
     Stamp next_sample = kStart - milliseconds{100};
     while (lidar.next() < kStart + seconds{1}) {
       for (; with_wheels && next_sample <= lidar.next() + kPacket; next_sample += milliseconds{5})
-        built.builder.sources().add(
-            0, OdometrySample{next_sample,
-                              next_sample,
-                              {Eigen::Quaterniond::Identity(), {0, kSpeed_mps * to_seconds(next_sample - kStart), 0}},
-                              1.0});
+        built.builder.sources().add(SourceId{0}, OdometrySample{next_sample,
+                                                                next_sample,
+                                                                {Eigen::Quaterniond::Identity(),
+                                                                 {0, kSpeed_mps * to_seconds(next_sample - kStart), 0}},
+                                                                1.0});
       built.add(lidar.packet());
     }
     return built.sweeps;

@@ -58,7 +58,7 @@ struct Outcome {
 
 Outcome drive_through(const sim::Scene& scene, const sim::Trajectory& trajectory, const RobotSetup& setup,
                       Duration duration) {
-  Odometry odometry(setup.odometry());
+  Odometry odometry(setup.odometry(), setup.motion_sources());
   Outcome result;
   drive(scene, trajectory, setup, duration, [&](const Sweep& sweep) {
     const OdometryEstimate& estimate = result.estimates.emplace_back(odometry.process(sweep));
@@ -129,7 +129,8 @@ TEST(Odometry, NeedsNoSourceInARoom) {
   const sim::Trajectory trajectory(sim::room_course(kLaps, 1.0), sim::room_start());
   const Outcome result = drive_through(sim::room(), trajectory, robot_with_lidar_alone(), kLaps);
   EXPECT_LT(result.worst_error_m, 0.10);
-  EXPECT_EQ(result.estimates.back().prior.rotation, PriorSource::kConstantVelocity);
+  EXPECT_FALSE(result.estimates.back().prior.rotation);
+  EXPECT_EQ(result.estimates.back().prior.otherwise, NoSourcePrior::constant_velocity);
   expect_sound(result.estimates);
 }
 
@@ -151,7 +152,7 @@ TEST(Odometry, SameBitsForAnyNumberOfThreadsAndOnEveryRun) {
     const auto poses = [&](int threads, bool prepares = false) {
       OdometryOptions options = setup.odometry();
       options.threads = threads;
-      Odometry odometry(options);
+      Odometry odometry(options, setup.motion_sources());
       std::vector<Pose> result;
       for (const Sweep& sweep : sweeps) {
         result.push_back(odometry.process(sweep).T_odom_base);
@@ -183,7 +184,7 @@ TEST(Odometry, TenSecondsWithoutLidarAreBridgedByWheelOdometry) {
     dead_reckoning += e.state == TrackingState::dead_reckoning ? 1 : 0;
     if (in_the_dark) {
       EXPECT_EQ(e.state, TrackingState::dead_reckoning);
-      EXPECT_EQ(e.prior.translation, 0);
+      EXPECT_EQ(e.prior.translation, SourceId{0});
       EXPECT_FALSE(e.keyframe);
     }
   }
@@ -238,7 +239,7 @@ TEST(Odometry, WhatSeesNothingAnyMoreAndHasStoppedStaysThere) {
     setup.lidars[0].range_noise_m = 0.03;
     const Stamp dark = trajectory.start() + milliseconds{6600 + into_the_turn_ms};
     setup.is_lost = [=](std::size_t, Stamp stamp) { return stamp >= dark; };
-    Odometry odometry(setup.odometry());
+    Odometry odometry(setup.odometry(), setup.motion_sources());
     Pose last_seen;
     OdometryEstimate last;
     for (const Sweep& sweep : sweeps_of(street, trajectory, setup, seconds{15})) {
@@ -256,7 +257,7 @@ TEST(Odometry, WhatSeesNothingAnyMoreAndDroveComesToRest) {
   RobotSetup setup;
   const Stamp dark = trajectory.start() + seconds{10};
   setup.is_lost = [=](std::size_t, Stamp stamp) { return stamp >= dark; };
-  Odometry odometry(setup.odometry());
+  Odometry odometry(setup.odometry(), setup.motion_sources());
   double gone_m = 0, after_a_second_m = 0;
   for (const Sweep& sweep : sweeps_of(sim::street(200), trajectory, setup, seconds{25})) {
     const OdometryEstimate estimate = odometry.process(sweep);
@@ -312,7 +313,7 @@ class OdometryUnderWay : public testing::Test {
   }
 
   RobotSetup setup_ = robot_with_wheels_and_imu();
-  Odometry odometry_{setup_.odometry()};
+  Odometry odometry_{setup_.odometry(), setup_.motion_sources()};
   std::vector<Sweep> sweeps_;
   OdometryEstimate last_;
 };
@@ -411,7 +412,7 @@ TEST(Odometry, TheMapTakesASweepAfterAMetreOrThirtyDegrees) {
 TEST(Odometry, ARobotThatStandsIsHeldAndAddsNothingToTheMap) {
   const sim::Trajectory trajectory(sim::Course{}.stand(seconds{10}));
   const RobotSetup setup = robot_with_lidar_alone();
-  Odometry odometry(setup.odometry());
+  Odometry odometry(setup.odometry(), setup.motion_sources());
   std::vector<std::size_t> sizes;
   std::vector<OdometryEstimate> estimates;
   drive(sim::room(), trajectory, setup, seconds{10}, [&](const Sweep& sweep) {
@@ -456,11 +457,11 @@ TEST(Odometry, SourcesInTheQueueAreUsedWhileTheyLast) {
   const Outcome result = drive_through(sim::room(), trajectory, setup, seconds{10});
   for (const OdometryEstimate& e : result.estimates) {
     if (e.stamp < silent && e.stamp > trajectory.start() + milliseconds{300}) {
-      EXPECT_EQ(e.prior.translation, 0);
-      EXPECT_EQ(e.prior.rotation, 1);
+      EXPECT_EQ(e.prior.translation, SourceId{0});
+      EXPECT_EQ(e.prior.rotation, SourceId{1});
     } else if (e.stamp > silent + milliseconds{300}) {
-      EXPECT_EQ(e.prior.translation, PriorSource::kConstantVelocity);
-      EXPECT_EQ(e.prior.rotation, 1);
+      EXPECT_FALSE(e.prior.translation);
+      EXPECT_EQ(e.prior.rotation, SourceId{1});
     }
   }
   EXPECT_LT(result.worst_error_m, 0.05);

@@ -38,7 +38,8 @@ class Restarts {
     robot.wheels = sim::OdometryFaults{.scale_error = 0.005};
     robot.imu = sim::ImuFaults{.gyro_noise_radps = 0.002};
     options_ = robot.odometry();
-    Odometry odometry(options_);
+    sources_ = robot.motion_sources();
+    Odometry odometry(options_, sources_);
     int sweeps = 0;
     drive(scene, trajectory, robot, duration, [&](const Sweep& sweep) {
       const bool restarts = ++sweeps % 30 == 0;
@@ -72,13 +73,14 @@ class Restarts {
   }
 
   [[nodiscard]] std::optional<Pose> find(const Sweep& sweep, const Pose& T_odom_expected, const Legacy& legacy) const {
-    Odometry odometry(options_);
+    Odometry odometry(options_, sources_);
     odometry.begin_at(T_odom_expected, legacy.map_odom);
     const OdometryEstimate estimate = odometry.process(sweep);
     return odometry.resumed() ? std::optional{estimate.T_odom_base} : std::nullopt;
   }
 
   OdometryOptions options_;
+  std::vector<MotionSourceOptions> sources_;
   std::vector<Legacy> legacies_;
 };
 

@@ -8,15 +8,11 @@
 namespace locus {
 namespace {
 
-constexpr int kGyro = 0, kWheelOdometry = 1;
+constexpr SourceId kGyro{0}, kWheelOdometry{1};
 constexpr Duration kPerSweep = std::chrono::milliseconds{100};
 
-OdometryOptions with_imu_and_wheels() {
-  OdometryOptions options;
-  options.motion_sources = {{.name = "imu", .kind = SourceKind::imu, .T_base_source = {}},
-                            {.name = "wheels", .kind = SourceKind::odometry, .T_base_source = {}}};
-  return options;
-}
+const MotionSourceOptions kGyroOptions{.name = "imu", .kind = SourceKind::imu, .T_base_source = {}};
+const MotionSourceOptions kWheelOdometryOptions{.name = "wheels", .kind = SourceKind::odometry, .T_base_source = {}};
 
 Vector6 twist(double forward_mps, double yaw_radps) {
   return (Vector6{} << forward_mps, 0, 0, 0, 0, yaw_radps).finished();
@@ -45,8 +41,8 @@ class Sources {
   }
 
  private:
-  void add(int source, const Pose& T_last_now) {
-    SourcePose& at = sweep_.motion.sources[static_cast<std::size_t>(source)];
+  void add(SourceId source, const Pose& T_last_now) {
+    SourcePose& at = sweep_.motion.sources[index_of(source)];
     at.known = at.usable = true;
     at.T_source_base = at.T_source_base * T_last_now;
   }
@@ -57,7 +53,8 @@ class Sources {
 class SensorIntegrationTest : public testing::Test {
  protected:
   /// After a first sweep.
-  explicit SensorIntegrationTest(const OdometryOptions& options = with_imu_and_wheels()) : sensors(options) {
+  explicit SensorIntegrationTest(const OdometryOptions& options = {})
+      : sensors(options, {kGyroOptions, kWheelOdometryOptions}) {
     sensors.remember(sources.next({}, {}));
   }
 
@@ -82,39 +79,39 @@ TEST_F(SensorIntegrationTest, WithoutTheGyroTheWheelsDoBoth) {
 
 TEST_F(SensorIntegrationTest, WhatNobodySaysGoesOnAsBefore) {
   Sweep sweep = sources.next(motion(0, 0.5), motion(1, 0.3));
-  sweep.motion.sources[kWheelOdometry].usable = false;
+  sweep.motion.sources[index_of(kWheelOdometry)].usable = false;
   const MotionPrior prior = sensors.integrate(sweep, twist(2, 0));
   EXPECT_NEAR(prior.T_last_now.translation.x(), 0.2, 1e-9);
   EXPECT_NEAR(yaw_radps(prior), 0.5, 1e-9);
-  EXPECT_EQ(prior.source.translation, PriorSource::kConstantVelocity);
+  EXPECT_FALSE(prior.source.translation);
+  EXPECT_EQ(prior.source.otherwise, NoSourcePrior::constant_velocity);
   EXPECT_FALSE(prior.blind);
   EXPECT_TRUE(sensors.integrate(sweep, std::nullopt).blind) << "not even a velocity is known";
 }
 
 TEST_F(SensorIntegrationTest, ASourceThatCameBackIsNotComparedWithWhatItWasBefore) {
   Sweep sweep = sources.next(motion(0, 0.5), motion(1, 0.3));
-  ++sweep.motion.sources[kGyro].epoch;
+  ++sweep.motion.sources[index_of(kGyro)].epoch;
   EXPECT_EQ(sensors.integrate(sweep, std::nullopt).source.rotation, kWheelOdometry);
 }
 
 TEST(SensorIntegration, AQueueTakesAllFromTheFirst) {
-  OdometryOptions options = with_imu_and_wheels();
+  OdometryOptions options;
   options.fusion = Fusion::queue;
-  std::swap(options.motion_sources[0], options.motion_sources[1]);
-  SensorIntegration sensors(options);
+  SensorIntegration sensors(options, {kWheelOdometryOptions, kGyroOptions});
   Sources sources;
   sensors.remember(sources.next({}, {}));
   const MotionPrior prior = sensors.integrate(sources.next(motion(1, 0.3), motion(0, 0.5)), std::nullopt);
-  EXPECT_EQ(prior.source.rotation, 0);
-  EXPECT_EQ(prior.source.translation, 0);
+  EXPECT_EQ(prior.source.rotation, SourceId{0});
+  EXPECT_EQ(prior.source.translation, SourceId{0});
   EXPECT_NEAR(yaw_radps(prior), 0.3, 1e-9);
 }
 
 TEST_F(SensorIntegrationTest, LidarContradictsWhoIsFarOff) {
   const Sweep sweep = sources.next(motion(0, 0.3), motion(5, 0.3));
   const auto opinions = sensors.judge(sweep, sensors.integrate(sweep, std::nullopt), seen(motion(1, 0.3)), {});
-  EXPECT_EQ(opinions[kGyro], LidarOpinion::agrees);
-  EXPECT_EQ(opinions[kWheelOdometry], LidarOpinion::disagrees);
+  EXPECT_EQ(opinions[index_of(kGyro)], LidarOpinion::agrees);
+  EXPECT_EQ(opinions[index_of(kWheelOdometry)], LidarOpinion::disagrees);
   EXPECT_EQ(opinions[2], LidarOpinion::none) << "there is no third";
 }
 

@@ -41,7 +41,7 @@ TEST(Soak, FifteenKilometresTakeNoMoreMemoryThanOne) {
   const sim::Scene scene = sim::street(15'000);
   const sim::Trajectory trajectory(sim::Course{}.change_speed(15.0, Duration::zero()).straight(15'000));
   const RobotSetup setup = robot();
-  Odometry odometry(setup.odometry());
+  Odometry odometry(setup.odometry(), setup.motion_sources());
   std::size_t sweeps = 0, failed = 0, settled_bytes = 0, peak_bytes = 0;
   double driven_m = 0.0;
   Pose T_odom_last;
@@ -69,7 +69,7 @@ TEST(Soak, AThousandSweepsAtAStandAddNothingToTheMapAndMoveNothing) {
   const sim::Trajectory trajectory(sim::Course{}.stand(seconds{101}));
   const sim::Scene scene = sim::street(100);
   const RobotSetup setup = robot();
-  Odometry odometry(setup.odometry());
+  Odometry odometry(setup.odometry(), setup.motion_sources());
   std::vector<std::size_t> sizes;
   double farthest_m = 0.0, farthest_rad = 0.0;
   drive(scene, trajectory, setup, seconds{101}, [&](const Sweep& sweep) {

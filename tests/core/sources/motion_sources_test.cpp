@@ -21,11 +21,12 @@ class MotionSourcesTest : public testing::Test {
       const Stamp stamp = at_ms(ms);
       const double t_s = 1e-3 * ms;
       if (source == 0)
-        sources.add(0, OdometrySample{stamp, stamp, {Eigen::Quaterniond::Identity(), {t_s, 0, 0}}, 1.0});
+        sources.add(SourceId{0}, OdometrySample{stamp, stamp, {Eigen::Quaterniond::Identity(), {t_s, 0, 0}}, 1.0});
       else if (source == 1)
-        sources.add(1, ImuSample{stamp, stamp, {0, 0, 1.0}, {1e-6 * ms, 0, 9.81}, {}}); // never twice the same
+        sources.add(SourceId{1},
+                    ImuSample{stamp, stamp, {0, 0, 1.0}, {1e-6 * ms, 0, 9.81}, {}}); // never twice the same
       else
-        sources.add(2, OdometrySample{stamp, stamp, {so3_exp({0, 0, 2 * t_s}), {2 * t_s, 0, 0}}, 1.0});
+        sources.add(SourceId{2}, OdometrySample{stamp, stamp, {so3_exp({0, 0, 2 * t_s}), {2 * t_s, 0, 0}}, 1.0});
     }
   }
 };
@@ -35,8 +36,8 @@ TEST_F(MotionSourcesTest, CombinedTakesRotationFromTheGyroAndTranslationFromTheO
   for (const std::size_t source : {0U, 1U, 2U})
     feed(sources, source, 0, 1000);
   const SourceChoice choice = sources.choose(at_ms(1000));
-  EXPECT_EQ(choice.rotation, 1U);
-  EXPECT_EQ(choice.translation, 0U);
+  EXPECT_EQ(choice.rotation, SourceId{1});
+  EXPECT_EQ(choice.translation, SourceId{0});
   EXPECT_EQ(choice.uncorrected(), Uncorrected::nothing);
   const auto T = sources.motion(choice, at_ms(400), at_ms(500));
   ASSERT_TRUE(T);
@@ -49,19 +50,19 @@ TEST_F(MotionSourcesTest, QueueTakesAllFromTheFirstHealthyOne) {
   for (const std::size_t source : {0U, 1U, 2U})
     feed(sources, source, 0, 1000);
   const SourceChoice choice = sources.choose(at_ms(1000));
-  EXPECT_EQ(choice.rotation, 0U);
-  EXPECT_EQ(choice.translation, 0U);
+  EXPECT_EQ(choice.rotation, SourceId{0});
+  EXPECT_EQ(choice.translation, SourceId{0});
   EXPECT_NEAR(so3_log(sources.motion(choice, at_ms(400), at_ms(500))->rotation).z(), 0.0, 1e-12);
 }
 
 TEST_F(MotionSourcesTest, AnInertialSourceFirstInTheQueueLeavesTheTranslationOpen) {
   MotionSources sources({kWheelsImuVisual[1], kWheelsImuVisual[0]}, Fusion::queue);
   for (const int ms : {0, 10}) {
-    sources.add(0, ImuSample{at_ms(ms), at_ms(ms), {0, 0, 1.0}, {1e-6 * ms, 0, 9.81}, {}});
-    sources.add(1, OdometrySample{at_ms(ms), at_ms(ms), {}, 1.0});
+    sources.add(SourceId{0}, ImuSample{at_ms(ms), at_ms(ms), {0, 0, 1.0}, {1e-6 * ms, 0, 9.81}, {}});
+    sources.add(SourceId{1}, OdometrySample{at_ms(ms), at_ms(ms), {}, 1.0});
   }
   const SourceChoice choice = sources.choose(at_ms(20));
-  EXPECT_EQ(choice.rotation, 0U);
+  EXPECT_EQ(choice.rotation, SourceId{0});
   EXPECT_FALSE(choice.translation);
   EXPECT_EQ(choice.uncorrected(), Uncorrected::translation);
 }
@@ -71,8 +72,8 @@ TEST_F(MotionSourcesTest, ASilentSourceIsNotChosen) {
   feed(sources, 0, 0, 1000);
   feed(sources, 2, 0, 2500);
   const Stamp silent_since = at_ms(1000);
-  EXPECT_EQ(sources.choose(silent_since + MotionTrack::kMaxExtrapolation).translation, 0U);
-  EXPECT_EQ(sources.choose(silent_since + MotionTrack::kMaxExtrapolation + milliseconds{1}).translation, 2U);
+  EXPECT_EQ(sources.choose(silent_since + MotionTrack::kMaxExtrapolation).translation, SourceId{0});
+  EXPECT_EQ(sources.choose(silent_since + MotionTrack::kMaxExtrapolation + milliseconds{1}).translation, SourceId{2});
 }
 
 // Its track stands between one sample's extrapolation and the next sample: half of a sweep would count as standing
@@ -80,7 +81,8 @@ TEST_F(MotionSourcesTest, ASilentSourceIsNotChosen) {
 TEST_F(MotionSourcesTest, ASourceSlowerThanTracksAreExtrapolatedIsNotChosen) {
   MotionSources sources(kWheelsImuVisual, Fusion::queue);
   for (int ms = 0; ms <= 1000; ms += 100)
-    sources.add(0, OdometrySample{at_ms(ms), at_ms(ms), {Eigen::Quaterniond::Identity(), {1e-3 * ms, 0, 0}}, 1.0});
+    sources.add(SourceId{0},
+                OdometrySample{at_ms(ms), at_ms(ms), {Eigen::Quaterniond::Identity(), {1e-3 * ms, 0, 0}}, 1.0});
   EXPECT_FALSE(sources.choose(at_ms(1000)).translation);
 }
 
@@ -125,8 +127,8 @@ TEST_F(MotionSourcesTest, SensesThePoseOfEverySourceThatSpokeDuringTheSweep) {
 TEST_F(MotionSourcesTest, WhoeverLosesHealthIsKnownToTheSweepButNotUsable) {
   MotionSources sources(kWheelsImuVisual, Fusion::combined);
   feed(sources, 0, 0, 1000);
-  sources.set_outside_verdict(0, false);
-  sources.set_outside_verdict(0, true);
+  sources.set_outside_verdict(SourceId{0}, false);
+  sources.set_outside_verdict(SourceId{0}, true);
   feed(sources, 0, 1020, 1100); // on probation
   const SensedMotion motion = sources.sensed_in(at_ms(1000), at_ms(1100));
   EXPECT_TRUE(motion.sources[0].known);
@@ -146,30 +148,31 @@ TEST_F(MotionSourcesTest, EachChangeOfHealthIsToldOnceWithItsSource) {
       feed(sources, 0, ms, ms);
   }
   ASSERT_EQ(events.size(), 1U);
-  EXPECT_EQ(events[0].source, 2U);
+  EXPECT_EQ(events[0].source, SourceId{2});
   EXPECT_EQ(events[0].stamp, at_ms(1070));
   EXPECT_FALSE(events[0].healthy);
   feed(sources, 2, 1520, 2540);
   ASSERT_EQ(events.size(), 2U);
-  EXPECT_EQ(events[1].source, 2U);
+  EXPECT_EQ(events[1].source, SourceId{2});
   EXPECT_TRUE(events[1].healthy);
 }
 
-/// It cost them as long as it was set back: their samples were older than the last ones.
-TEST_F(MotionSourcesTest, AClockOfTheHostThatIsSetBackCostsThemTwoSeconds) {
-  MotionSources sources(kWheelsImuVisual, Fusion::combined);
-  const int an_hour_ago = -3'600'000;
-  for (const int from_ms : {0, an_hour_ago}) {
-    for (int ms = from_ms; ms <= from_ms + 2000; ms += 20) {
-      feed(sources, 0, ms, ms);
-      feed(sources, 1, ms, ms);
-      sources.advance(at_ms(ms));
+/// Set back, it cost them as long as that: their samples were older than the last ones.
+TEST_F(MotionSourcesTest, AClockOfTheHostThatIsSetCostsThemTwoSeconds) {
+  for (const int step_ms : {-3'600'000, 3'600'000}) {
+    MotionSources sources(kWheelsImuVisual, Fusion::combined);
+    for (const int from_ms : {0, step_ms}) {
+      for (int ms = from_ms; ms <= from_ms + 2000; ms += 20) {
+        feed(sources, 0, ms, ms);
+        feed(sources, 1, ms, ms);
+        sources.advance(at_ms(ms));
+      }
     }
+    const SourceChoice choice = sources.choose(at_ms(step_ms + 2000));
+    EXPECT_EQ(choice.rotation, SourceId{1}) << step_ms;
+    EXPECT_EQ(choice.translation, SourceId{0}) << step_ms;
+    EXPECT_TRUE(sources.motion(choice, at_ms(step_ms + 1900), at_ms(step_ms + 2000))) << step_ms;
   }
-  const SourceChoice choice = sources.choose(at_ms(an_hour_ago + 2000));
-  EXPECT_EQ(choice.rotation, 1U);
-  EXPECT_EQ(choice.translation, 0U);
-  EXPECT_TRUE(sources.motion(choice, at_ms(an_hour_ago + 1900), at_ms(an_hour_ago + 2000)));
 }
 
 TEST_F(MotionSourcesTest, WhatTheSelfCheckFoundIsToldInWords) {
@@ -185,14 +188,14 @@ TEST_F(MotionSourcesTest, WhatTheSelfCheckFoundIsToldInWords) {
   }
   ASSERT_EQ(events.size(), 2U);
   for (const HealthEvent& event : events) {
-    EXPECT_EQ(event.source, 1U);
+    EXPECT_EQ(event.source, SourceId{1});
     EXPECT_FALSE(event.healthy);
     EXPECT_EQ(event.reason, HealthReason::self_check);
   }
   EXPECT_NE(events.front().verdict.find("until"), std::string_view::npos) << "set aside";
   EXPECT_NE(events.back().verdict.find("other way"), std::string_view::npos) << "refused";
-  EXPECT_EQ(sources.verdict(1), events.back().verdict);
-  EXPECT_EQ(sources.counters(1).health_changes, 1U);
+  EXPECT_EQ(sources.health(SourceId{1}).verdict(), events.back().verdict);
+  EXPECT_EQ(sources.health(SourceId{1}).counters().health_changes, 1U);
 }
 
 } // namespace

@@ -104,6 +104,20 @@ TEST(VelodyneDecoder, AzimuthIsInterpolatedAtAnySpeedAndThroughTheWrap) {
   }
 }
 
+TEST(VelodyneDecoder, TimeOfHourIsThatOfTheFirstFiringWhateverInstantTheStampNames) {
+  constexpr Duration kHour = std::chrono::hours{1};
+  for (const Model model : kModels) {
+    const Duration delay = spec(model).stamp_delay;
+    Decoder decoder({.model = model});
+    LidarPacket packet;
+    for (const std::uint32_t stamp_us : {0U, 1'000'000U}) {
+      ASSERT_EQ(decoder.decode(VelodyneTestPacket(model, ReturnMode::strongest, stamp_us).payload(), packet),
+                std::nullopt);
+      EXPECT_EQ(decoder.time_of_hour(), (kHour + std::chrono::microseconds{stamp_us} - delay) % kHour);
+    }
+  }
+}
+
 TEST(VelodyneDecoder, SpeedIsThatOfThePacketsColumns) {
   Decoder decoder;
   LidarPacket packet;
