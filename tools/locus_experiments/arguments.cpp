@@ -108,7 +108,7 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
              "  locus-experiments --fault-matrix --duration 120 -o matrix\n"
              "  locus-experiments --harsh --seeds 1 -o harsh\n"
              "  locus-experiments --harsh --only plant/real --duration 40 --seeds 1 -o small\n"
-             "  locus-experiments --faults --compare before/results.json -o faults\n"
+             "  locus-experiments --faults --duration 120 --compare before/results.json -o faults\n"
              "  locus-experiments --accuracy -o accuracy recordings/");
   if (!tools::parse_command_line(app, argc, argv))
     return std::nullopt;
