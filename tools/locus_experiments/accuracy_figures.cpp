@@ -5,8 +5,6 @@
 #include <fstream>
 #include <string_view>
 
-#include <fmt/format.h>
-
 #include "accuracy/trajectory_accuracy.hpp"
 #include "config/config_yaml.hpp"
 #include "drivers/files/capture_folder.hpp"
@@ -14,6 +12,7 @@
 #include "drivers/velodyne/position_packet.hpp"
 #include "kitti/kitti_drive.hpp"
 #include "locus_experiments/measurement.hpp"
+#include "locus_experiments/odometry_rows.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/quantiles.hpp"
 
@@ -89,6 +88,14 @@ ordered_json to_json(const WayDrift& drift) {
   return json;
 }
 
+/// How many sweeps were in which state.
+ordered_json states_in(const std::vector<OdometryRow>& rows) {
+  ordered_json states = ordered_json::object();
+  for (const OdometryRow& row : rows)
+    states[row.state] = states.value(row.state, 0) + 1;
+  return states;
+}
+
 } // namespace
 
 std::string readable(const std::string& said, const std::string& name, const path& recording) {
@@ -108,10 +115,10 @@ ordered_json recording_figures(const std::string& name, const path& folder, cons
   figures["sources"] = heard;
   figures["imus"] = imus_among(heard, recording);
   figures["receiver"] = receiver_speed(recording);
-  const auto trajectory = value_or_fail(read_trajectory(folder / "odometry.tum"), ExitStatus::failed);
-  figures["states"] = states_in(folder / "odometry.csv");
-  figures["claims"] = claims_of(trajectory);
-  if (const auto drift = way_drift(trajectory, truth_of(recording)))
+  const OdometryRows odometry = read_odometry(folder);
+  figures["states"] = states_in(odometry.rows);
+  figures["claims"] = claims_of(odometry.estimates);
+  if (const auto drift = way_drift(odometry.estimates, truth_of(recording)))
     figures["way"] = to_json(*drift);
   figures["warnings"] = warnings_in(folder / "log", name, recording);
   return figures;
@@ -138,20 +145,6 @@ ordered_json claims_of(const std::vector<StampedPose>& trajectory) {
           {"most_turned_deg", most_turned_deg},
           {"speed_mps", speeds.empty() ? ordered_json(nullptr)
                                        : ordered_json{{"median", quantiles.median()}, {"max", quantiles.at(1)}}}};
-}
-
-ordered_json states_in(const std::filesystem::path& odometry_csv) {
-  std::ifstream stream{odometry_csv};
-  ordered_json states = ordered_json::object();
-  std::string line;
-  if (!std::getline(stream, line)) // header
-    throw Failure(ExitStatus::failed, fmt::format("{}: is missing or empty; run again", odometry_csv.string()));
-  while (std::getline(stream, line)) {
-    const std::size_t begin = std::min(line.find(','), line.size() - 1) + 1;
-    const std::string state = line.substr(begin, line.find(',', begin) - begin);
-    states[state] = states.value(state, 0) + 1;
-  }
-  return states;
 }
 
 ordered_json receiver_speed(const std::filesystem::path& recording) {

@@ -27,9 +27,6 @@ std::string readable(const std::string& said, const std::string& name, const std
 /// pose to pose (null with fewer than two).
 nlohmann::ordered_json claims_of(const std::vector<StampedPose>& trajectory);
 
-/// How many sweeps were in which state, of a run's odometry.csv. Throws tools::Failure.
-nlohmann::ordered_json states_in(const std::filesystem::path& odometry_csv);
-
 /// {"fixes", "min_mps", "median_mps", "max_mps"} by the satellite receiver at the lidar, whose sentences stand in the
 /// position packets of a capture or capture folder; null where there is none, none has a fix, or it tells no speed.
 nlohmann::ordered_json receiver_speed(const std::filesystem::path& recording);

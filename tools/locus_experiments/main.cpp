@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // locus-experiments: the evaluation of the LOCUS paper in one page.
 #include <algorithm>
-#include <exception>
 #include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
-#include <system_error>
 
 #include <fmt/format.h>
 
+#include "command_line.hpp"
 #include "locus_experiments/accuracy_page.hpp"
 #include "locus_experiments/arguments.hpp"
 #include "locus_experiments/compare.hpp"
@@ -18,22 +17,14 @@
 #include "locus_experiments/plan.hpp"
 #include "locus_experiments/results.hpp"
 #include "locus_replay/failure.hpp"
+#include "locus_replay/output_file.hpp"
 #include "locus_replay/replay_program.hpp"
-#include "locus_replay/say.hpp"
 
 namespace locus::experiments {
 namespace {
 
 using tools::ExitStatus;
 using tools::Failure;
-
-void make_folder(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error)
-    throw Failure(ExitStatus::failed, fmt::format("{}: the folder cannot be made ({}); choose another with -o",
-                                                  folder.string(), error.message()));
-}
 
 /// What results say before any run is done.
 Results what_is_asked(const Arguments& arguments) {
@@ -80,7 +71,7 @@ void run(const Arguments& arguments) {
     before.emplace(arguments.compare);
   if (before) // an hour before it would be of use
     before->check_is_of(what_is_asked(arguments));
-  make_folder(arguments.output);
+  tools::make_folder(arguments.output);
   const Results results = arguments.accuracy ? accuracy_of(arguments) : experiment(arguments);
   const std::filesystem::path page = write_results(arguments.output, results);
   if (!arguments.quiet)
@@ -99,23 +90,12 @@ void run(const Arguments& arguments) {
 
 int main(int argc, char** argv) {
   using namespace locus::experiments;
-  const auto say = [](const char* what) { locus::tools::say("locus-experiments", what); };
   if (argc > 1 && argv[1] == kLoamReplay)
     return locus::tools::replay_program(argc - 1, argv + 1, keep_loam_features);
-  try {
-    if (argc > 1 && argv[1] == kRowCommand) {
+  return locus::tools::exit_status_of("locus-experiments", [&] {
+    if (argc > 1 && argv[1] == kRowCommand)
       write_row(std::span(argv, static_cast<std::size_t>(argc)).subspan(2));
-      return static_cast<int>(ExitStatus::done);
-    }
-    if (const std::optional<Arguments> arguments = parse_arguments(argc, argv))
+    else if (const std::optional<Arguments> arguments = parse_arguments(argc, argv))
       run(*arguments);
-    locus::tools::flush_standard_output();
-    return static_cast<int>(ExitStatus::done);
-  } catch (const Failure& failure) {
-    say(failure.what());
-    return static_cast<int>(failure.status());
-  } catch (const std::exception& error) {
-    say(error.what());
-    return static_cast<int>(ExitStatus::failed);
-  }
+  });
 }
