@@ -117,7 +117,6 @@ TEST(AccuracyPage, OfNothingThatCanBeReplayedIsAFailure) {
 TEST(AccuracyPage, WrongUsageIsExplainedInOneLine) {
   for (const std::vector<std::string>& arguments : {std::vector<std::string>{"--accuracy", "-o", "/tmp/x"},
                                                     {"--accuracy", "--faults", "-o", "/tmp/x"},
-                                                    {"--accuracy", "--shard", "1/2", "-o", "/tmp/x", "/tmp"},
                                                     {"--simulated", "-o", "/tmp/x"}}) {
     const ProgramRun run = run_program(LOCUS_EXPERIMENTS, arguments);
     EXPECT_EQ(run.status, 2) << run.err;

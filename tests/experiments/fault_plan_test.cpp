@@ -70,24 +70,5 @@ TEST(FaultPlan, FaultsBeginAtHalfTime) {
   EXPECT_NE(std::ranges::find(slip.simulation, "60-65"), slip.simulation.end());
 }
 
-TEST(FaultPlan, ShardsShareOutTheCoursesEachWithAllItsRuns) {
-  const Plan whole = make_plan(fault_arguments());
-  std::set<std::string> courses;
-  std::size_t runs = 0;
-  for (std::size_t i = 0; i < 4; ++i) {
-    Arguments part = fault_arguments();
-    part.shard = {i, 4};
-    const Plan plan = make_plan(part);
-    for (const Course& course : plan.courses) {
-      EXPECT_TRUE(courses.insert(course.name).second) << course.name << " is simulated twice";
-      EXPECT_EQ(std::ranges::count(plan.runs, course.name, &Run::course),
-                std::ranges::count(whole.runs, course.name, &Run::course));
-    }
-    runs += plan.runs.size();
-  }
-  EXPECT_EQ(courses.size(), whole.courses.size());
-  EXPECT_EQ(runs, whole.runs.size());
-}
-
 } // namespace
 } // namespace locus::experiments

@@ -116,23 +116,5 @@ TEST(HarshPlan, RefusesWhatNamesNoCourseAndCoursesShorterThanADrive) {
   EXPECT_THROW(make_plan(brief), tools::Failure);
 }
 
-TEST(HarshPlan, ShardsDriveEachCourseOnce) {
-  const Plan whole = make_plan(harsh_arguments());
-  std::multiset<std::string> courses, all;
-  for (const Course& course : whole.courses)
-    all.insert(course.name);
-  std::size_t runs = 0;
-  for (std::size_t index = 0; index < 3; ++index) {
-    Arguments arguments = harsh_arguments();
-    arguments.shard = {index, 3};
-    const Plan part = make_plan(arguments);
-    runs += part.runs.size();
-    for (const Course& course : part.courses)
-      courses.insert(course.name);
-  }
-  EXPECT_EQ(courses, all);
-  EXPECT_EQ(runs, whole.runs.size());
-}
-
 } // namespace
 } // namespace locus::experiments

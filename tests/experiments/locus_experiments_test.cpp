@@ -3,8 +3,10 @@
 #include <chrono>
 #include <csignal>
 #include <fstream>
+#include <map>
 #include <set>
 #include <thread>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -21,49 +23,81 @@ ProgramRun experiments(const std::vector<std::string>& arguments) { return run_p
 
 json results_in(const std::filesystem::path& folder) { return json::parse(read_text(folder / "results.json")); }
 
-std::set<std::string> runs_in(const json& results) {
-  std::set<std::string> ids;
-  for (const json& run : results["runs"]) {
-    EXPECT_FALSE(run.contains("failed")) << run["failed"];
-    ids.insert(run["course"].get<std::string>() + '/' + run["configuration"].get<std::string>());
+/// When a run began and ended, ms, as Ninja notes it: by COURSE/CONFIGURATION.
+std::map<std::string, std::pair<int, int>> times_in(const std::filesystem::path& folder) {
+  std::map<std::string, std::pair<int, int>> times;
+  std::ifstream log{folder / ".ninja_log"};
+  std::string line;
+  std::getline(log, line); // its version
+  int begin_ms = 0, end_ms = 0;
+  for (std::string modified, file, hash; log >> begin_ms >> end_ms >> modified;) {
+    std::getline(log >> std::ws, file, '\t');
+    std::getline(log, hash);
+    if (file.ends_with("/row.json"))
+      times[std::filesystem::path(file).parent_path().lexically_relative(folder / "runs")] = {begin_ms, end_ms};
   }
-  return ids;
+  return times;
 }
 
-TEST(LocusExperiments, TwoShardsOfAFleetsRecordingsMakeOnePage) {
+TEST(LocusExperiments, AFleetsRecordingsMakeOnePage) {
   const TemporaryFolder folder;
-  const std::string robot = folder / "1/courses/robot", one = folder / "1", two = folder / "2", all = folder / "all";
-  std::filesystem::create_directories(folder / "1/courses");
+  const std::filesystem::path out = folder / "out", robot = folder / "robot's $1";
+  std::filesystem::create_directories(out / "courses/mine");
+  std::filesystem::create_directories(folder / "empty");
   std::filesystem::copy(room_drive(), robot);
-  for (const auto& [shard, output] : {std::pair{"1/2", one}, std::pair{"2/2", two}}) {
-    const ProgramRun run = experiments({"--shard", shard, "--pace", "10", "-o", output, robot});
-    ASSERT_EQ(run.status, 0) << run.err;
-  }
-  const std::set<std::string> first = runs_in(results_in(one)), second = runs_in(results_in(two));
-  EXPECT_EQ(first.size(), 2U);
-  EXPECT_EQ(second.size(), 2U);
+  const ProgramRun run = experiments({"--pace", "10", "--jobs", "2", "-o", out, folder / "empty", robot});
+  EXPECT_EQ(run.status, 1) << "one is empty";
+  EXPECT_TRUE(std::filesystem::exists(robot / "lidar.pcap"));
+  EXPECT_TRUE(std::filesystem::exists(out / "courses/mine"));
+  for (const char* line : {"[1/8] run ", "[8/8] run ", "] run robot's $1/paper\n", "results in "})
+    EXPECT_NE(run.out.find(line), std::string::npos) << run.out;
+  const std::vector<std::string> failures = lines_of(run.err);
+  ASSERT_EQ(failures.size(), 4U) << run.err;
+  EXPECT_EQ(failures[0].rfind("locus-experiments: empty/locusd: locus-replay: ", 0), 0U) << failures[0];
 
-  EXPECT_TRUE(std::filesystem::exists(robot + "/lidar.pcap"));
-  const ProgramRun part = experiments({"--merge", two, "-o", all});
-  EXPECT_EQ(part.status, 1);
-  EXPECT_NE(part.err.find("2 of the 4 runs"), std::string::npos) << part.err;
-
-  std::filesystem::create_directories(std::filesystem::path(all) / "courses/mine");
-  const ProgramRun merging = experiments({"--merge", one, two, "-o", all});
-  EXPECT_TRUE(std::filesystem::exists(std::filesystem::path(all) / "courses/mine"));
-  ASSERT_EQ(merging.status, 0) << merging.err;
-  const json merged = results_in(all);
-  EXPECT_EQ(runs_in(merged),
-            (std::set<std::string>{"robot/locusd", "robot/paper", "robot/pace_1cpu", "robot/pace_2cpu"}));
-  for (const json& run : merged["runs"]) {
-    const bool paced = run["configuration"].get<std::string>().starts_with("pace");
-    EXPECT_LT(run["summary"]["ape_m"]["max"].get<double>(), 0.1) << run["configuration"];
-    EXPECT_EQ(run.contains("position_error"), !paced);
-    EXPECT_GT(run["summary"]["wall_s"].get<double>(), paced ? 7.5 : 0.0) << "at the pace of the recording, if at any";
+  std::set<std::string> configurations;
+  const json results = results_in(out);
+  for (const json& each : results["runs"]) {
+    const auto configuration = each["configuration"].get<std::string>();
+    const bool paced = configuration.starts_with("pace");
+    ASSERT_EQ(each.contains("failed"), each["course"] == "empty") << each;
+    if (each.contains("failed"))
+      continue;
+    configurations.insert(configuration);
+    EXPECT_LT(each["summary"]["ape_m"]["max"].get<double>(), 0.1) << configuration;
+    EXPECT_EQ(each.contains("position_error"), !paced);
+    EXPECT_GT(each["summary"]["wall_s"].get<double>(), paced ? 7.5 : 0.0) << "at the pace of the recording, if at any";
   }
-  const std::string page = read_text(std::filesystem::path(all) / "experiments.html");
+  EXPECT_EQ(configurations, (std::set<std::string>{"locusd", "paper", "pace_1cpu", "pace_2cpu"}));
+  const std::string page = read_text(out / "experiments.html");
   EXPECT_NE(page.find("\"configuration\":\"pace_2cpu\""), std::string::npos);
   EXPECT_EQ(page.find("@DATA@"), std::string::npos);
+
+  const auto times = times_in(out);
+  EXPECT_EQ(times.size(), 8U);
+  for (const auto& [paced, when] : times) {
+    for (const auto& [other, when_other] : times) {
+      const bool other_is_paced = other.find("pace_") != std::string::npos;
+      if (paced.find("pace_") != std::string::npos && paced != other) {
+        EXPECT_TRUE(when_other.second <= when.first || (other_is_paced && when_other.first >= when.second))
+            << paced << " is neither alone nor last beside " << other;
+      }
+    }
+  }
+  const std::string described = read_text(out / "build.ninja");
+  EXPECT_NE(described.find("= taskset --cpu-list "), std::string::npos) << described;
+  EXPECT_NE(described.find("\n  cpus = 2\n"), std::string::npos) << described;
+}
+
+/// As srun would.
+TEST(LocusExperiments, ALauncherStartsWhateverTakesLong) {
+  const TemporaryFolder folder;
+  std::filesystem::copy(room_drive(), folder / "robot");
+  const ProgramRun run = experiments({"--accuracy", "--quiet", "-o", folder / "out", folder / "robot", "--launcher",
+                                      "sh -c 'echo $cpus >> " + (folder / "launched").string() + "; exec \"$$@\"' --"});
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_EQ(run.out, "");
+  EXPECT_EQ(read_text(folder / "launched"), "1\n1\n1\n");
 }
 
 TEST(LocusExperiments, LoamFeaturesReplaceTheFilters) {
@@ -78,19 +112,53 @@ TEST(LocusExperiments, LoamFeaturesReplaceTheFilters) {
   EXPECT_LT(summary["ape_m"]["max"].get<double>(), 0.1);
 }
 
-TEST(LocusExperiments, ARunThatFailsIsNamedAndTheOthersGoOn) {
+TEST(LocusExperiments, ACourseThatCannotBeSimulatedIsTheReasonOfItsRuns) {
   const TemporaryFolder folder;
-  const std::string empty = folder / "empty", robot = folder / "robot";
-  std::filesystem::create_directories(empty);
-  std::filesystem::copy(room_drive(), robot);
-  const ProgramRun run = experiments({"--shard", "1/4", "--quiet", "-o", folder / "out", empty, robot});
+  const ProgramRun run =
+      experiments({"--fault-matrix", "--quiet", "--duration", "10", "-o", folder / "out", "--launcher", "false"});
   EXPECT_EQ(run.status, 1);
-  EXPECT_EQ(lines_of(run.err).size(), 1U) << run.err;
-  EXPECT_NE(run.err.find("empty/locusd: "), std::string::npos) << run.err;
-  const json results = results_in(folder / "out");
-  ASSERT_EQ(results["runs"].size(), 2U);
-  EXPECT_TRUE(results["runs"][0].contains("failed"));
-  EXPECT_FALSE(results["runs"][1].contains("failed"));
+  EXPECT_NE(run.err.find("urban_1/none: failed without a word"), std::string::npos) << run.err;
+  EXPECT_TRUE(std::filesystem::exists(folder / "out/matrix.md"));
+}
+
+TEST(LocusExperiments, ARunThatIsKilledIsNamed) {
+  const TemporaryFolder folder;
+  std::filesystem::copy(room_drive(), folder / "robot");
+  const ProgramRun run =
+      experiments({"--quiet", "-o", folder / "out", folder / "robot", "--launcher", "sh -c 'kill -SEGV $$$$' --"});
+  EXPECT_EQ(run.status, 1);
+  EXPECT_NE(run.err.find("robot/paper: ended by signal 11"), std::string::npos) << run.err;
+}
+
+TEST(LocusExperiments, KilledAndStartedAgainItGoesOnWhereItWas) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "fleet");
+  for (const char* name : {"one", "three", "two's"})
+    std::filesystem::copy(room_drive(), folder / "fleet" / name);
+  const std::vector<std::string> arguments{"--accuracy", "--jobs", "1", "-o", folder / "out", folder / "fleet"};
+  std::vector<std::string> command = arguments;
+  command.insert(command.begin(), LOCUS_EXPERIMENTS);
+  Child first(command);
+  ASSERT_TRUE(first.wait_for_line("[1/3] ", std::chrono::seconds{60})) << testing::PrintToString(first.lines());
+  first.signal(SIGKILL);
+  ASSERT_EQ(first.wait_for_exit(std::chrono::seconds{10}), 128 + SIGKILL);
+  EXPECT_FALSE(std::filesystem::exists(folder / "out/results.json"));
+  const auto before = times_in(folder / "out");
+  EXPECT_GE(before.size(), 1U);
+
+  const ProgramRun second = experiments(arguments);
+  ASSERT_EQ(second.status, 0) << second.err;
+  EXPECT_EQ(second.out.find("/3] "), std::string::npos) << "begins anew: " << second.out;
+  EXPECT_EQ(results_in(folder / "out")["recordings"].size(), 3U);
+  const auto after = times_in(folder / "out");
+  EXPECT_EQ(after.size(), 9U);
+  for (const auto& [run, when] : before)
+    EXPECT_EQ(after.at(run), when) << run;
+
+  const ProgramRun third = experiments(arguments);
+  EXPECT_EQ(third.status, 0) << third.err;
+  EXPECT_EQ(third.out.find("[1/"), std::string::npos) << "does something again: " << third.out;
+  EXPECT_EQ(times_in(folder / "out"), after);
 }
 
 bool some_program_runs_with(const std::string& word) {
@@ -99,8 +167,7 @@ bool some_program_runs_with(const std::string& word) {
   });
 }
 
-/// They may be gigabytes.
-TEST(LocusExperiments, InterruptedItLeavesNoCoursesAndNoProgramBehind) {
+TEST(LocusExperiments, InterruptedItLeavesNoProgramBehind) {
   const TemporaryFolder folder;
   const std::filesystem::path courses = folder / "out/courses";
   Child run({LOCUS_EXPERIMENTS, "--duration", "36000", "--quiet", "-o", folder / "out"});
@@ -108,23 +175,18 @@ TEST(LocusExperiments, InterruptedItLeavesNoCoursesAndNoProgramBehind) {
     std::this_thread::sleep_for(std::chrono::milliseconds{50});
   run.signal(SIGHUP);
   EXPECT_EQ(run.wait_for_exit(std::chrono::seconds{10}), 128 + SIGHUP) << testing::PrintToString(run.lines());
-  EXPECT_FALSE(std::filesystem::exists(courses));
+  for (int i = 0; i < 200 && some_program_runs_with(courses.string()); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds{50});
   EXPECT_FALSE(some_program_runs_with(courses.string())) << "it simulates still";
 }
 
 TEST(LocusExperiments, WrongUsageIsExplainedInOneLine) {
-  for (const std::vector<std::string>& arguments : {std::vector<std::string>{},
-                                                    {"-o", "/tmp/x", "--shard", "3/2"},
-                                                    {"-o", "/tmp/x", "--jobs", "0"},
-                                                    {"-o", "/tmp/x", "--shard", "1/2", "--merge", "/tmp/y"},
-                                                    {"-o", "/tmp/x", "--frobnicate"}}) {
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{}, {"-o", "/tmp/x", "--jobs", "0"}, {"-o", "/tmp/x", "--frobnicate"}}) {
     const ProgramRun run = experiments(arguments);
     EXPECT_EQ(run.status, 2) << run.err;
     EXPECT_EQ(lines_of(run.err).size(), 1U) << run.err;
   }
-  const ProgramRun merging = experiments({"--merge", "/nowhere", "-o", TemporaryFolder() / "out"});
-  EXPECT_EQ(merging.status, 1);
-  EXPECT_NE(merging.err.find("/nowhere/results.json: no results"), std::string::npos) << merging.err;
 }
 
 TEST(LocusExperiments, WhatCannotBeComparedWithIsRefusedBeforeAnythingRuns) {

@@ -24,15 +24,6 @@ std::set<std::string> ids(const Plan& plan) {
   return ids;
 }
 
-TEST(Shard, IsItsPlaceAndTheirNumber) {
-  const std::optional<Shard> shard = Shard::parse("2/8");
-  ASSERT_TRUE(shard);
-  EXPECT_EQ(shard->index, 1U);
-  EXPECT_EQ(shard->count, 8U);
-  for (const char* text : {"", "2", "0/2", "3/2", "1/0", "a/b", "1/2x", "-1/2", "1/ 2"})
-    EXPECT_FALSE(Shard::parse(text)) << text;
-}
-
 TEST(Plan, HasEveryRunOfThePapersTables) {
   const std::set<std::string> all = ids(make_plan(arguments()));
   for (const std::string course : {"alpha", "beta", "safety_research"}) {
@@ -59,29 +50,6 @@ TEST(Plan, LoamFeaturesAreTakenInOneRunFromTheUncutSweep) {
   EXPECT_FALSE(config->sweep.segment_filter.enabled);
   EXPECT_FALSE(config->sweep.voxel_filter.enabled);
   EXPECT_FALSE(config->sweep.random_filter.enabled);
-}
-
-TEST(Plan, ShardsShareOutEveryRunOnce) {
-  const std::set<std::string> all = ids(make_plan(arguments()));
-  std::set<std::string> shared;
-  for (std::size_t i = 0; i < 3; ++i) {
-    Arguments part = arguments();
-    part.shard = {i, 3};
-    const Plan plan = make_plan(part);
-    for (const std::string& id : ids(plan))
-      EXPECT_TRUE(shared.insert(id).second) << id;
-    for (const auto& run : plan.runs)
-      EXPECT_NE(std::ranges::find(plan.courses, run.course, &Course::name), plan.courses.end());
-  }
-  EXPECT_EQ(shared, all);
-}
-
-TEST(Plan, AShardMakesOnlyTheCoursesThatItNeeds) {
-  Arguments part = arguments();
-  part.shard = {0, 1000};
-  const Plan plan = make_plan(part);
-  EXPECT_EQ(plan.runs.size(), 1U);
-  EXPECT_EQ(plan.courses.size(), 1U);
 }
 
 TEST(Plan, RecordingsTakeThePlaceOfTheCourses) {

@@ -20,7 +20,7 @@ mkdir -p "$build/found"
 
 for target in "${targets[@]}"; do
   found=$build/found/$target
-  afl-fuzz -i tests/fuzz/corpus/"$target" -o "$found" -V "$seconds" -m none -t 10000 -- "$build/bin/fuzz_$target" \
+  afl-fuzz -i "$build/tests/fuzz/corpus/$target" -o "$found" -V "$seconds" -m none -t 10000 -- "$build/bin/fuzz_$target" \
     &> "$build/$target.log" || { echo "$target: AFL++ did not run, see $build/$target.log" >&2 && exit 1; }
   stat() { sed -n "s/^$1 *: *//p" "$found/default/fuzzer_stats"; }
   last_find=$(stat last_find) started=$(stat start_time) # both of the clock; 0: none

@@ -14,7 +14,7 @@ cmake --preset fuzz -B "$build" --log-level=WARNING \
   -DCMAKE_CXX_FLAGS="-fsanitize=fuzzer-no-link,address -fprofile-instr-generate -fcoverage-mapping" > /dev/null
 cmake --build "$build" --target "fuzz_$target" > /dev/null
 tests/fuzz/seeds.py "$build/seeds"
-seeds=("tests/fuzz/corpus/$target" "$build/seeds/$target" "$@")
+seeds=("$build/tests/fuzz/corpus/$target" "$build/seeds/$target" "$@")
 [[ ! -d tests/fuzz/mended/$target ]] || seeds+=("tests/fuzz/mended/$target")
 LLVM_PROFILE_FILE=$counts.profraw "$build/bin/fuzz_$target" -runs=0 "${seeds[@]}" &> "$counts.log"
 llvm-profdata merge -o "$counts.profdata" "$counts.profraw"

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # run.sh MINUTES [TARGET]...: fuzzes each target (all of them, if none is named), one after the other, until so many
-# minutes of CPU found no new way through the code, and leaves in corpus/TARGET/ the fewest inputs that reach all that any
-# input reached. It begins with that and with what seeds.py makes, and called again goes on with what was found. afl.sh does
+# minutes of CPU found no new way through the code, and leaves in corpus/TARGET.tar.xz the fewest inputs that reach all that
+# any input reached. It begins with that and with what seeds.py makes, and called again goes on with what was found. afl.sh does
 # the same with AFL++; coverage.sh tells what is reached.
 #
 # An input that breaks something is kept in build/fuzz/broken/, the reason in build/fuzz/log/TARGET:
@@ -29,7 +29,7 @@ export ASAN_OPTIONS=malloc_context_size=0
 last() { grep -aoP "$1" "$log" | tail -n 1; }
 
 for target in "${targets[@]}"; do
-  corpus=tests/fuzz/corpus/$target found=$build/found/$target merged=$build/merged/$target log=$build/log/$target
+  corpus=$build/tests/fuzz/corpus/$target found=$build/found/$target merged=$build/merged/$target log=$build/log/$target
   mkdir -p "$corpus" "$found"
   seeds=("$corpus" "$build/seeds/$target")
   [[ ! -d tests/fuzz/mended/$target ]] || seeds+=("tests/fuzz/mended/$target")
@@ -52,5 +52,6 @@ for target in "${targets[@]}"; do
 
   rm -rf "$merged" && mkdir -p "$merged"
   "${fuzzer[@]}" -set_cover_merge=1 -use_counters=0 -max_len=8192 "$merged" "$corpus" "$build/seeds/$target" "$found" &>> "$log"
-  rm -f "$corpus"/* && cp "$merged"/* "$corpus"
+  tar --sort=name --owner=0 --group=0 --numeric-owner --mtime=@0 -cJf "tests/fuzz/corpus/$target.tar.xz" \
+    -C "$merged" .
 done

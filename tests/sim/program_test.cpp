@@ -222,7 +222,8 @@ TEST(LocusSim, VehicleThatIsNamedAndHasNoRoomIsAWarningOfOneLine) {
 TEST(LocusSim, FolderThatCannotBeMadeIsAFailure) {
   const ProgramRun run = run_program(LOCUS_SIM, husky_in("corridor", "/dev/null/folder"));
   EXPECT_EQ(run.status, 1);
-  EXPECT_EQ(run.err, "locus-sim: /dev/null/folder: no folder can be made there (Not a directory); choose another\n");
+  EXPECT_EQ(run.err,
+            "locus-sim: /dev/null/folder: the folder cannot be made (Not a directory); choose another with -o\n");
 }
 
 /// Not after an hour of driving.

@@ -15,8 +15,8 @@
 
 namespace locus {
 
-/// A cloud of points in a PLY or PCD file, walked through in blocks, so that it may be larger than memory; the
-/// libraries that read these formats hold the whole of it.
+/// A cloud of points in a PLY or PCD file, walked through in blocks, so that it may be larger than memory; why not by
+/// PCL: docs/decisions/027-maps-without-pcl-io.md.
 ///
 /// Of a PLY it reads the element vertex, which must come first; of PCD all but binary_compressed. Any thread.
 class PointCloudFile {

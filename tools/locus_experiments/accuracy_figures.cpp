@@ -3,14 +3,16 @@
 
 #include <algorithm>
 #include <fstream>
-#include <string>
+#include <string_view>
 
-#include <fmt/format.h>
-
+#include "accuracy/trajectory_accuracy.hpp"
+#include "config/config_yaml.hpp"
 #include "drivers/files/capture_folder.hpp"
 #include "drivers/files/capture_sequence.hpp"
 #include "drivers/velodyne/position_packet.hpp"
 #include "kitti/kitti_drive.hpp"
+#include "locus_experiments/measurement.hpp"
+#include "locus_experiments/odometry_rows.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/quantiles.hpp"
 
@@ -18,6 +20,7 @@ namespace locus::experiments {
 namespace {
 
 using nlohmann::ordered_json;
+using std::filesystem::path;
 using tools::ExitStatus;
 using tools::Failure;
 using tools::Quantiles;
@@ -39,7 +42,87 @@ std::vector<double> speeds_of_fixes_mps(DatagramSource& capture) {
   return speeds;
 }
 
+/// Those of kind imu among the sources of these names, by the configuration that locus-replay takes.
+std::vector<std::string> imus_among(std::vector<std::string> names, const path& recording) {
+  Config config;
+  if (const auto folder = CaptureFolder::find(recording); folder && !folder->first_config().empty()) {
+    if (auto loaded = load_config(folder->first_config()))
+      config = *std::move(loaded);
+  }
+  const auto is_imu = [&](const std::string& name) {
+    return std::ranges::any_of(config.odometry.motion_sources, [&](const MotionSourceOptions& source) {
+      return source.name == name && source.kind == SourceKind::imu;
+    });
+  };
+  std::erase_if(names, [&](const std::string& name) { return !is_imu(name); });
+  return names;
+}
+
+/// Of a run that is over.
+std::vector<std::string> heard_in(const ordered_json& summary) {
+  std::vector<std::string> names;
+  for (const auto& [name, source] : summary.at("sources").items()) {
+    if (source.at("received") > 0)
+      names.push_back(name);
+  }
+  return names;
+}
+
+std::vector<std::string> warnings_in(const path& log, const std::string& name, const path& recording) {
+  constexpr std::string_view kWarning = "locus-replay: warning: ";
+  std::ifstream stream{log};
+  std::vector<std::string> warnings;
+  for (std::string line; std::getline(stream, line);) {
+    if (line.starts_with(kWarning))
+      warnings.push_back(readable(line.substr(kWarning.size()), name, recording));
+  }
+  return warnings;
+}
+
+ordered_json to_json(const WayDrift& drift) {
+  ordered_json json{{"way_m", drift.way_m}, {"percent", nullptr}, {"deg_per_100m", nullptr}};
+  if (drift.percent) {
+    json["percent"] = *drift.percent;
+    json["deg_per_100m"] = *drift.deg_per_100m;
+  }
+  return json;
+}
+
+/// How many sweeps were in which state.
+ordered_json states_in(const std::vector<OdometryRow>& rows) {
+  ordered_json states = ordered_json::object();
+  for (const OdometryRow& row : rows)
+    states[row.state] = states.value(row.state, 0) + 1;
+  return states;
+}
+
 } // namespace
+
+std::string readable(const std::string& said, const std::string& name, const path& recording) {
+  constexpr std::string_view kProgram = "locus-replay: ";
+  std::string line = said.starts_with(kProgram) ? said.substr(kProgram.size()) : said;
+  const std::string where = recording.string();
+  for (std::size_t at = 0; (at = line.find(where, at)) != std::string::npos; at += name.size())
+    line.replace(at, where.size(), name);
+  return line.starts_with(name + ": ") ? line.substr(name.size() + 2) : line;
+}
+
+ordered_json recording_figures(const std::string& name, const path& folder, const path& recording) {
+  ordered_json figures{{"summary", read_json(folder / "summary.json")}};
+  if (figures.at("summary").at("sweeps").at("seen") == 0)
+    throw Failure(ExitStatus::failed, "it holds no whole turn of a lidar");
+  const std::vector<std::string> heard = heard_in(figures.at("summary"));
+  figures["sources"] = heard;
+  figures["imus"] = imus_among(heard, recording);
+  figures["receiver"] = receiver_speed(recording);
+  const OdometryRows odometry = read_odometry(folder);
+  figures["states"] = states_in(odometry.rows);
+  figures["claims"] = claims_of(odometry.estimates);
+  if (const auto drift = way_drift(odometry.estimates, truth_of(recording)))
+    figures["way"] = to_json(*drift);
+  figures["warnings"] = warnings_in(folder / "log", name, recording);
+  return figures;
+}
 
 ordered_json claims_of(const std::vector<StampedPose>& trajectory) {
   constexpr Duration kAtFirst = std::chrono::milliseconds{500};
@@ -62,20 +145,6 @@ ordered_json claims_of(const std::vector<StampedPose>& trajectory) {
           {"most_turned_deg", most_turned_deg},
           {"speed_mps", speeds.empty() ? ordered_json(nullptr)
                                        : ordered_json{{"median", quantiles.median()}, {"max", quantiles.at(1)}}}};
-}
-
-ordered_json states_in(const std::filesystem::path& odometry_csv) {
-  std::ifstream stream{odometry_csv};
-  ordered_json states = ordered_json::object();
-  std::string line;
-  if (!std::getline(stream, line)) // header
-    throw Failure(ExitStatus::failed, fmt::format("{}: is missing or empty; run again", odometry_csv.string()));
-  while (std::getline(stream, line)) {
-    const std::size_t begin = std::min(line.find(','), line.size() - 1) + 1;
-    const std::string state = line.substr(begin, line.find(',', begin) - begin);
-    states[state] = states.value(state, 0) + 1;
-  }
-  return states;
 }
 
 ordered_json receiver_speed(const std::filesystem::path& recording) {

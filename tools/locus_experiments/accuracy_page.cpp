@@ -2,206 +2,123 @@
 #include "locus_experiments/accuracy_page.hpp"
 
 #include <algorithm>
-#include <exception>
-#include <fstream>
 #include <iterator>
-#include <set>
-#include <string_view>
-#include <system_error>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
-#include "accuracy/trajectory_accuracy.hpp"
-#include "config/config_yaml.hpp"
-#include "drivers/files/capture_folder.hpp"
 #include "locus_experiments/accuracy_figures.hpp"
-#include "locus_experiments/child_process.hpp"
-#include "locus_experiments/conductor.hpp"
+#include "locus_experiments/job_control.hpp"
 #include "locus_experiments/measurement.hpp"
+#include "locus_experiments/plan.hpp"
+#include "locus_experiments/recordings.hpp"
 #include "locus_replay/failure.hpp"
 
 namespace locus::experiments {
 namespace {
 
 using Names = std::vector<std::string>;
-using std::filesystem::path;
 
-/// How much faster than the drive the simulation goes, roughly: for the progress bar.
-constexpr double kSimulationSpeed = 5;
+/// Of a run: whatever sources there are.
+constexpr const char* kAllSources = "all";
 
-/// Of kind imu, by the configuration that locus-replay takes.
-std::set<std::string> imus_of(const path& recording) {
-  Config config;
-  if (const auto folder = CaptureFolder::find(recording); folder && !folder->first_config().empty()) {
-    if (auto loaded = load_config(folder->first_config()))
-      config = *std::move(loaded);
+/// The drives of --simulated: in a plant, in a mine and, walking, in the plant.
+std::vector<Course> drives_of(const Arguments& arguments) {
+  if (!arguments.simulated)
+    return {};
+  const auto drive = [&](const std::string& name, const char* world, const char* robot) {
+    Course course = simulated_course(arguments, name, {"--world", world, "--robot", robot}, 1);
+    course.name = "simulated/" + name; // a recording may have the same
+    return course;
+  };
+  return {drive("husky-plant", "urban", "husky"), drive("husky-mine", "tunnel", "husky"),
+          drive("spot-plant", "urban", "spot")};
+}
+
+/// A run in which of the sources that are heard only these say something.
+Run run_with(const Names& sources, const Names& heard, const std::string& course, const char* configuration) {
+  Run run{course, configuration, {}};
+  run.shows_recording = true;
+  for (const std::string& source : heard) {
+    if (std::ranges::find(sources, source) == sources.end())
+      run.options.insert(run.options.end(), {"--fail", source + ":lost@0"});
   }
-  std::set<std::string> names;
-  for (const MotionSourceOptions& source : config.motion_sources) {
-    if (source.kind == SourceKind::imu)
-      names.insert(source.name);
-  }
-  return names;
-}
-
-/// Of a run that is over.
-Names heard_in(const Results& run) {
-  Names names;
-  for (const auto& [name, source] : run.at("summary").at("sources").items()) {
-    if (source.at("received") > 0)
-      names.push_back(name);
-  }
-  return names;
-}
-
-std::string replaced(std::string text, const std::string& what, const std::string& by) {
-  for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += by.size())
-    text.replace(at, what.size(), by);
-  return text;
-}
-
-/// As a line for a page: of the recording, with neither the program nor where on this machine it lies.
-std::string readable(const std::string& said, const FoundRecording& recording) {
-  constexpr std::string_view kProgram = "locus-replay: ";
-  std::string line = said.starts_with(kProgram) ? said.substr(kProgram.size()) : said;
-  line = replaced(line, recording.where.string(), recording.name);
-  return line.starts_with(recording.name + ": ") ? line.substr(recording.name.size() + 2) : line;
-}
-
-Names warnings_in(const path& log, const FoundRecording& recording) {
-  constexpr std::string_view kWarning = "locus-replay: warning: ";
-  std::ifstream stream{log};
-  Names warnings;
-  for (std::string line; std::getline(stream, line);) {
-    if (line.starts_with(kWarning))
-      warnings.push_back(readable(line.substr(kWarning.size()), recording));
-  }
-  return warnings;
-}
-
-Results to_json(const WayDrift& drift) {
-  Results json{{"way_m", drift.way_m}, {"percent", nullptr}, {"deg_per_100m", nullptr}};
-  if (drift.percent) {
-    json["percent"] = *drift.percent;
-    json["deg_per_100m"] = *drift.deg_per_100m;
-  }
-  return json;
-}
-
-/// What the files say that a run has left.
-Results figures_of(const FoundRecording& recording, const path& folder) {
-  Results run{{"summary", read_json(folder / "summary.json")}};
-  if (run.at("summary").at("sweeps").at("seen") == 0)
-    return {{"failed", "it holds no whole turn of a lidar"}};
-  const auto trajectory = tools::value_or_fail(read_trajectory(folder / "odometry.tum"), tools::ExitStatus::failed);
-  run["states"] = states_in(folder / "odometry.csv");
-  run["claims"] = claims_of(trajectory);
-  if (const auto drift = way_drift(trajectory, truth_of(recording.where)))
-    run["way"] = to_json(*drift);
-  run["warnings"] = warnings_in(folder / "log", recording);
   return run;
 }
 
-/// One run, in which the sources that are `silent` say nothing.
-Results replayed(const std::string& replay, const FoundRecording& recording, const Names& silent, const path& folder) {
-  try {
-    std::filesystem::create_directories(folder);
-    Names command{replay, "--quiet", "--threads", "1", "-o", folder.string()};
-    for (const std::string& source : silent)
-      command.insert(command.end(), {"--fail", source + ":lost@0"});
-    command.push_back(recording.where.string());
-    const auto problem = run_program(command, folder / "log");
-    return problem ? Results{{"failed", readable(*problem, recording)}} : figures_of(recording, folder);
-  } catch (const std::exception& error) {
-    return {{"failed", readable(error.what(), recording)}};
-  }
-}
-
-/// All runs on a recording.
-Results runs_on(const std::string& replay, const FoundRecording& recording, const path& folder) {
-  Results runs = Results::array();
-  const auto add = [&](const Names& sources, const Names& silent, const char* name) {
-    runs.push_back({{"sources", sources}});
-    runs.back().update(replayed(replay, recording, silent, folder / name));
-  };
-  add({}, {}, "all");
-  if (runs.back().contains("failed"))
-    return runs;
-  const Names heard = heard_in(runs.back());
-  runs.back()["sources"] = heard;
-  const std::set<std::string> imus = imus_of(recording.where);
-  Names inertial = heard, others = heard;
-  std::erase_if(inertial, [&](const std::string& name) { return !imus.contains(name); });
-  std::erase_if(others, [&](const std::string& name) { return imus.contains(name); });
-  if (!inertial.empty() && !others.empty())
-    add(inertial, others, "imu");
+/// What else there is to do with a recording: with its IMU and with lidar alone, as far as these are not the same.
+std::vector<Run> further_runs(const Results& row) {
+  const std::string course = row.at("course");
+  const Names heard = row.value("sources", Names{}), inertial = row.value("imus", Names{});
+  std::vector<Run> runs;
+  if (!inertial.empty() && inertial.size() < heard.size())
+    runs.push_back(run_with(inertial, heard, course, "imu"));
   if (!heard.empty())
-    add({}, heard, "alone");
+    runs.push_back(run_with({}, heard, course, "alone"));
   return runs;
 }
 
-Task task_of_recording(const Arguments& arguments, const FoundRecording& recording, const Programs& programs,
-                       Results& entry) {
-  entry = {{"recording", recording.name}};
-  return {"looked at " + recording.name, 1, false, [=, &arguments, &entry] {
-            entry["receiver"] = receiver_speed(recording.where);
-            entry["runs"] = runs_on(programs.replay, recording, arguments.output / "runs" / recording.name);
-          }};
+/// A row of Ninja's as a run of the page.
+Results shown(Results row, const std::string& name, const std::filesystem::path& recording) {
+  if (row.contains("failed"))
+    return {{"sources", Names{}}, {"failed", readable(row.at("failed"), name, recording)}};
+  for (const char* const key : {"course", "configuration", "imus", "receiver"})
+    row.erase(key);
+  return row;
 }
 
-Task task_of_drive(const Arguments& arguments, const Course& drive, const Programs& programs, Results& entry) {
-  entry = {{"recording", drive.name}, {"simulation", drive.simulation}};
-  return {"simulated and replayed " + drive.name, arguments.duration_s / kSimulationSpeed, false,
-          [=, &arguments, &entry] {
-            std::vector<std::string> command{programs.sim};
-            command.insert(command.end(), drive.simulation.begin(), drive.simulation.end());
-            command.insert(command.end(), {"-o", drive.folder.string()});
-            std::error_code ignored;
-            std::filesystem::create_directories(drive.folder.parent_path(), ignored);
-            if (const auto problem = run_program(command, drive.folder.string() + ".log"))
-              entry["runs"] = {{{"sources", Results::array()}, {"failed", *problem}}};
-            else
-              entry["runs"] = runs_on(programs.replay, {drive.name, drive.folder},
-                                      arguments.output / "runs" / "simulated" / drive.name);
-            if (!arguments.keep_captures)
-              std::filesystem::remove_all(drive.folder, ignored);
-          }};
+/// An entry of the page by the rows of its runs, that of all sources first.
+Results entry_of(const Course& course, const Results& rows) {
+  const std::string name = course.simulation.empty() ? course.name : course.folder.filename().string();
+  Results entry{{"recording", name}};
+  if (!course.simulation.empty())
+    entry["simulation"] = course.simulation;
+  entry["receiver"] = nullptr;
+  entry["runs"] = Results::array();
+  for (const Results& row : rows) {
+    if (row.at("course") != course.name)
+      continue;
+    if (row.at("configuration") == kAllSources)
+      entry["receiver"] = row.value("receiver", Results{});
+    entry["runs"].push_back(shown(row, name, course.folder));
+  }
+  return entry;
 }
 
 } // namespace
 
-std::vector<Course> drives_of_accuracy(const Arguments& arguments) {
-  if (!arguments.simulated)
-    return {};
-  const auto drive = [&](const std::string& name, const char* world, const char* robot) {
-    return Course{
-        name,
-        arguments.output / "courses" / name,
-        {"--world", world, "--robot", robot, "--seed", "1", "--duration", std::to_string(arguments.duration_s)}};
-  };
-  std::vector<Course> drives{drive("husky-plant", "urban", "husky"), drive("husky-mine", "tunnel", "husky"),
-                             drive("spot-plant", "urban", "spot")};
-  for (Course& course : drives)
-    std::ranges::copy(realism_of(arguments), std::back_inserter(course.simulation));
-  return drives;
-}
-
-Results accuracy_of(const Arguments& arguments, const std::vector<FoundRecording>& recordings,
-                    const std::vector<Course>& drives, const Programs& programs) {
-  std::vector<Results> entries(recordings.size() + drives.size());
-  std::vector<Task> tasks;
-  tasks.reserve(entries.size());
-  auto entry = entries.begin();
-  for (const FoundRecording& recording : recordings)
-    tasks.push_back(task_of_recording(arguments, recording, programs, *entry++));
-  for (const Course& drive : drives)
-    tasks.push_back(task_of_drive(arguments, drive, programs, *entry++));
-  conduct(tasks, arguments.jobs, arguments.quiet);
-  Results results{{"version", LOCUS_VERSION},   {"machine", machine_name()},          {"jobs", arguments.jobs},
-                  {"simulated", drives.size()}, {"duration_s", arguments.duration_s}, {"places", Results::array()},
-                  {"recordings", entries}};
-  for (const path& place : arguments.recordings)
+Results accuracy_of(const Arguments& arguments) {
+  Plan plan;
+  for (const FoundRecording& recording : find_recordings(arguments.recordings, arguments.output))
+    plan.courses.push_back({recording.name, recording.where, {}});
+  const std::size_t recordings = plan.courses.size();
+  std::ranges::move(drives_of(arguments), std::back_inserter(plan.courses));
+  if (plan.courses.empty())
+    throw tools::Failure(tools::ExitStatus::failed,
+                         fmt::format("{}: no recording, at any depth; looked for {}",
+                                     fmt::join(Names(arguments.recordings.begin(), arguments.recordings.end()), ", "),
+                                     kKindsOfRecordings));
+  for (const Course& course : plan.courses)
+    plan.runs.push_back(run_with({}, {}, course.name, kAllSources));
+  Arguments first = arguments; // the courses are driven on again
+  first.keep_captures = true;
+  for (const Results& row : carry_out(plan, first))
+    std::ranges::move(further_runs(row), std::back_inserter(plan.runs));
+  const Results rows = carry_out(plan, arguments);
+  Results results{{"version", LOCUS_VERSION},
+                  {"machine", machine_name()},
+                  {"jobs", arguments.jobs},
+                  {"simulated", plan.courses.size() - recordings},
+                  {"duration_s", arguments.duration_s},
+                  {"places", Results::array()},
+                  {"recordings", Results::array()}};
+  for (const std::filesystem::path& place : arguments.recordings)
     results["places"].push_back(std::filesystem::absolute(place / "").parent_path().filename().string());
+  for (const Course& course : plan.courses)
+    results["recordings"].push_back(entry_of(course, rows));
   return results;
 }
 

@@ -2,7 +2,6 @@
 #include "locus_experiments/arguments.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <thread>
 
 #include <CLI/CLI.hpp>
@@ -18,23 +17,9 @@ namespace locus::experiments {
 using tools::ExitStatus;
 using tools::Failure;
 
-std::optional<Shard> Shard::parse(const std::string& text) {
-  Shard shard{0, 0};
-  const char* const end = text.data() + text.size();
-  const auto [slash, error] = std::from_chars(text.data(), end, shard.index);
-  if (error != std::errc{} || slash == end || *slash != '/')
-    return std::nullopt;
-  const auto [stop, second_error] = std::from_chars(slash + 1, end, shard.count);
-  if (second_error != std::errc{} || stop != end || shard.index < 1 || shard.index > shard.count)
-    return std::nullopt;
-  --shard.index;
-  return shard;
-}
-
 std::optional<Arguments> parse_arguments(int argc, char** argv) {
   Arguments arguments;
   arguments.jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  std::string shard = "1/1";
 
   CLI::App app{
       "The evaluation of the LOCUS paper, on simulated courses or on recordings of yours: one page of figures.",
@@ -43,8 +28,10 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
       app.add_option("RECORDING", arguments.recordings,
                      "Capture folders to run on; without any, the courses of the paper are simulated. With "
                      "--accuracy: files and folders to search");
-  app.add_option("-o,--output", arguments.output,
-                 "Folder for experiments.html, results.json and the runs; made if need be")
+  app.add_option(
+         "-o,--output", arguments.output,
+         "Folder for experiments.html, results.json and the runs; made if need be. What is done in it already is "
+         "not done again")
       ->required()
       ->type_name("DIR");
   auto* duration =
@@ -103,13 +90,10 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
       ->type_name("N")
       ->capture_default_str()
       ->check(CLI::Range(1, 1024));
-  auto* shard_option = app.add_option("--shard", shard, "Does only the I-th of N parts, for --merge")
-                           ->type_name("I/N")
-                           ->excludes(accuracy);
-  app.add_option("--merge", arguments.merge, "Makes one page of the output folders of all parts, and runs nothing")
-      ->type_name("DIR...")
-      ->excludes(shard_option)
-      ->excludes(accuracy);
+  app.add_option("--launcher", arguments.launcher,
+                 "Put before each simulation and run, for example srun with its options; $cpus is how many processors "
+                 "the run takes")
+      ->type_name("COMMAND");
   app.add_option("--compare", arguments.compare,
                  "Results of an earlier run of the same rows: which are better, which worse; compare.md")
       ->type_name("BEFORE.json")
@@ -119,23 +103,17 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   app.set_version_flag("--version", "locus-experiments " LOCUS_VERSION);
   app.footer("Examples:\n"
              "  locus-experiments -o experiments\n"
-             "  locus-experiments --shard 1/2 -o part1 & locus-experiments --shard 2/2 -o part2; wait\n"
-             "  locus-experiments --merge part1 part2 -o experiments\n"
              "  locus-experiments -o fleet robot1/ robot2/ robot3/\n"
              "  locus-experiments --faults --duration 120 -o faults\n"
              "  locus-experiments --fault-matrix --duration 120 -o matrix\n"
              "  locus-experiments --harsh --seeds 1 -o harsh\n"
              "  locus-experiments --harsh --only plant/real --duration 40 --seeds 1 -o small\n"
-             "  locus-experiments --merge faults --compare before/results.json -o compared\n"
+             "  locus-experiments --faults --duration 120 --compare before/results.json -o faults\n"
              "  locus-experiments --accuracy -o accuracy recordings/");
   if (!tools::parse_command_line(app, argc, argv))
     return std::nullopt;
   if (arguments.harsh && duration->empty())
     arguments.duration_s = kHarshCourse_s;
-  const std::optional<Shard> parsed = Shard::parse(shard);
-  if (!parsed)
-    throw Failure(ExitStatus::wrong_usage, fmt::format("--shard {}: must be I/N with I from 1 to N, as in 2/8", shard));
-  arguments.shard = *parsed;
   if (arguments.accuracy && arguments.recordings.empty() && !arguments.simulated)
     throw Failure(ExitStatus::wrong_usage, "--accuracy: name folders with recordings, or --simulated");
   return arguments;

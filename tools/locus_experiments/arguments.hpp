@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -9,21 +8,10 @@
 
 namespace locus::experiments {
 
-/// One part of the runs, for one of several machines.
-struct Shard {
-  std::size_t index = 0; ///< 0..count-1
-  std::size_t count = 1;
-
-  /// "2/8" is the second of eight. Nothing if it is no such thing.
-  static std::optional<Shard> parse(const std::string& text);
-  [[nodiscard]] bool has(std::size_t run) const { return run % count == index; }
-};
-
 /// What the user asked for.
 struct Arguments {
   std::filesystem::path output;
   std::vector<std::filesystem::path> recordings; ///< capture folders; empty: the paper's courses, simulated
-  std::vector<std::filesystem::path> merge;      ///< folders of finished shards; empty: run
   std::filesystem::path compare;                 ///< results.json to compare the rows with; empty: none
   int duration_s = 300;                          ///< of a simulated course
   std::string realism = "real";                  ///< of simulated courses, as locus-sim has it
@@ -37,7 +25,7 @@ struct Arguments {
   bool simulated = false;                        ///< and a few simulated drives beside them
   int honesty_runs = 100;                        ///< for its line on the covariances
   int jobs = 1;
-  Shard shard;
+  std::string launcher = {}; ///< what starts the simulations and runs, in the words of a shell; empty: they themselves
   bool keep_captures = false;
   bool quiet = false;
 };

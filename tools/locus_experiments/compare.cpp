@@ -192,7 +192,7 @@ void ResultsBefore::check_is_of(const Results& after) const {
   const ComparedTable* const table = table_of(after);
   if (table == nullptr)
     throw Failure(ExitStatus::failed, "--compare: the paper's experiments have no rows to compare; run --faults, "
-                                      "--fault-matrix or --harsh, or merge results of theirs");
+                                      "--fault-matrix or --harsh");
   if (table_ != table)
     throw Failure(ExitStatus::failed, fmt::format("{}: holds no results of the same experiment ({}); name a "
                                                   "results.json of its own",

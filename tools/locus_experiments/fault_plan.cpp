@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <iterator>
 
 #include <fmt/format.h>
 
@@ -168,29 +167,26 @@ Run run_of(const FaultCase& fault_case, int seed, int duration_s) {
   return run;
 }
 
-Course simulated(const Arguments& arguments, const std::string& name, const CourseKind& kind, int seed,
-                 int duration_s) {
-  Course course{name, arguments.output / "courses" / name, kind.simulation};
-  course.simulation.insert(course.simulation.end(),
-                           {"--seed", std::to_string(seed), "--duration", std::to_string(duration_s)});
-  std::ranges::copy(realism_of(arguments), std::back_inserter(course.simulation));
+Course simulated(const Arguments& arguments, const std::string& name, const CourseKind& kind, int seed) {
+  Course course = simulated_course(arguments, name, kind.simulation, seed);
   if (kind.name == kSlipCourse) {
-    const Interval slip = interval_of(Lasting::five_seconds, duration_s);
+    const Interval slip = interval_of(Lasting::five_seconds, arguments.duration_s);
     course.simulation.insert(course.simulation.end(), {"--slip", fmt::format("{}-{}", slip.from_s, slip.until_s)});
   }
   return course;
 }
 
 /// Of seeds that no other course has.
-void add_honesty_runs(Plan& plan, const Arguments& arguments) {
-  constexpr int kDuration_s = 60, kFirstSeed = 101;
+void add_honesty_runs(Plan& plan, Arguments arguments) {
+  constexpr int kFirstSeed = 101;
+  arguments.duration_s = 60;
   static const std::array<CourseKind, 4> kKinds{{{"", "", {"--world", "urban", "--robot", "husky"}},
                                                  {"", "", {"--world", "tunnel", "--robot", "husky"}},
                                                  {"", "", {"--world", "urban", "--robot", "spot"}},
                                                  {"", "", {"--world", "tunnel", "--robot", "spot"}}}};
   for (int i = 0; i < arguments.honesty_runs; ++i) {
     const CourseKind& kind = kKinds[static_cast<std::size_t>(i) % kKinds.size()];
-    plan.courses.push_back(simulated(arguments, honesty_course(i), kind, kFirstSeed + i, kDuration_s));
+    plan.courses.push_back(simulated(arguments, honesty_course(i), kind, kFirstSeed + i));
     plan.runs.push_back({honesty_course(i), kNoFault, {}});
   }
 }
@@ -219,8 +215,8 @@ const std::vector<FaultCase>& fault_cases() {
 
 std::string describe_course(const std::string& kind) { return kind_of(kind).words; }
 
-Course simulated_course(const Arguments& arguments, const std::string& kind, int seed) {
-  return simulated(arguments, fault_course(kind, seed), kind_of(kind), seed, arguments.duration_s);
+Course course_of_kind(const Arguments& arguments, const std::string& kind, int seed) {
+  return simulated(arguments, fault_course(kind, seed), kind_of(kind), seed);
 }
 
 std::string fault_course(const std::string& kind, int seed) { return fmt::format("{}_{}", kind, seed); }
@@ -233,7 +229,7 @@ Plan plan_of_faults(const Arguments& arguments) {
   Plan plan;
   for (int seed = 1; seed <= arguments.seeds; ++seed) {
     for (const CourseKind& kind : course_kinds())
-      plan.courses.push_back(simulated_course(arguments, kind.name, seed));
+      plan.courses.push_back(course_of_kind(arguments, kind.name, seed));
     for (const FaultCase& fault_case : fault_cases())
       plan.runs.push_back(run_of(fault_case, seed, arguments.duration_s));
   }

@@ -52,7 +52,7 @@ const std::vector<FaultCase>& fault_cases();
 std::string describe_course(const std::string& kind);
 
 /// A course of this kind, of the length that is asked for.
-Course simulated_course(const Arguments& arguments, const std::string& kind, int seed);
+Course course_of_kind(const Arguments& arguments, const std::string& kind, int seed);
 
 /// Name of a course: one kind, one seed.
 std::string fault_course(const std::string& kind, int seed);

@@ -220,8 +220,6 @@ std::string fault_table(const Results& results) {
                   realism_of(results), results.at("duration_s").get<int>(), faults.at("seeds").get<int>(),
                   faults.at("consistency_runs").get<int>(), results.at("version").get<std::string>(),
                   machines_of(results.at("runs")), hold, rows.size());
-  if (const std::size_t done = results.at("runs").size(), planned = results.value("planned", done); done < planned)
-    text += fmt::format("A shard: {} of {} runs.\n\n", done, planned);
   text += "| fault | robot, place | error without, mm | with, mm | asked | found | holds | sweeps lost, failed | "
           "health | worst sigma | NEES |\n|---|---|---:|---:|---|---|---|---|---|---:|---:|\n";
   for (const Results& row : rows)

@@ -223,8 +223,6 @@ std::string harsh_table(const Results& results) {
                   only.empty() ? "" : fmt::format(" --only \"{}\"", only), results.at("duration_s").get<int>(),
                   harsh.at("seeds").get<int>(), results.at("version").get<std::string>(),
                   machines_of(results.at("runs")), hold, rows.size());
-  if (const std::size_t done = results.at("runs").size(), planned = results.value("planned", done); done < planned)
-    text += fmt::format("A shard: {} of {} runs.\n\n", done, planned);
   text +=
       "| course | imperfection | sensors | drives, from a stand | mean error, mm | worst, mm | worst sigma | NEES | "
       "claims, has m/s | lost, said | holds | said |\n|---|---|---|---|---:|---:|---:|---:|---|---|---|---|\n";

@@ -116,7 +116,7 @@ std::vector<MatrixCell> matrix_cells(int duration_s) {
 
 Plan plan_of_matrix(const Arguments& arguments) {
   Plan plan;
-  plan.courses.push_back(simulated_course(arguments, kMatrixCourse, 1));
+  plan.courses.push_back(course_of_kind(arguments, kMatrixCourse, 1));
   plan.runs.push_back({matrix_course(), kNoFault, {}});
   for (const MatrixCell& cell : matrix_cells(arguments.duration_s)) {
     if (cell.faults.empty())

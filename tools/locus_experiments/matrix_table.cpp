@@ -100,7 +100,7 @@ Results ended(const MatrixCell& cell, const Results& run) {
           {"broken", broken}};
 }
 
-/// Nothing where the run that it takes is not among these: it is another shard's.
+/// Nothing where the run that it takes is not among these.
 std::optional<Results> judged(const MatrixCell& cell, const RunsById& runs) {
   Results head{{"input", cell.input}, {"fault", cell.what}, {"from_start", cell.from_start}};
   if (!cell.impossible.empty()) {

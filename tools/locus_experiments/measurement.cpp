@@ -11,9 +11,10 @@
 
 #include "accuracy/trajectory_accuracy.hpp"
 #include "drivers/files/capture_folder.hpp"
-#include "locus_experiments/child_process.hpp"
+#include "locus_experiments/accuracy_figures.hpp"
 #include "locus_experiments/fault_figures.hpp"
 #include "locus_experiments/harsh_figures.hpp"
+#include "locus_experiments/job_control.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/quantiles.hpp"
 
@@ -84,19 +85,18 @@ std::string machine_name() {
   return fmt::format("{}, {} cores", model, usable_cpus().size());
 }
 
-ordered_json measurement(const Run& run, const std::filesystem::path& folder, const Course& course) {
-  ordered_json result{{"course", run.course},
-                      {"configuration", run.configuration},
-                      {"options", run.options},
-                      {"machine", machine_name()},
-                      {"summary", read_json(folder / "summary.json")}};
-  const CaptureFolder capture = value_or_fail(CaptureFolder::find(course.folder), ExitStatus::failed);
+ordered_json measurement(const Run& run, const std::filesystem::path& folder, const std::filesystem::path& capture) {
+  if (run.shows_recording)
+    return recording_figures(run.course, folder, capture);
+  ordered_json result{
+      {"options", run.options}, {"machine", machine_name()}, {"summary", read_json(folder / "summary.json")}};
+  const CaptureFolder files = value_or_fail(CaptureFolder::find(capture), ExitStatus::failed);
   if (run.mounting_rad)
-    result["harsh"] = harsh_figures(folder, capture, result["summary"], *run.mounting_rad);
-  else if (!capture.ground_truth.empty() && run.paced_cpus == 0)
-    add_errors(folder / "odometry.tum", capture.ground_truth, result);
+    result["harsh"] = harsh_figures(folder, files, result["summary"], *run.mounting_rad);
+  else if (!files.ground_truth.empty() && run.paced_cpus == 0)
+    add_errors(folder / "odometry.tum", files.ground_truth, result);
   if (run.watched)
-    result["fault"] = fault_figures(*run.watched, folder, capture);
+    result["fault"] = fault_figures(*run.watched, folder, files);
   return result;
 }
 

@@ -11,10 +11,11 @@
 
 namespace locus::experiments {
 
-/// What a run says of itself and how far it was from the truth, as it stands in results.json: its summary.json, the
-/// position error over time (at most a few hundred points) and its quantiles, and when it fell silent. Throws
-/// tools::Failure where the run has not left its files.
-nlohmann::ordered_json measurement(const Run& run, const std::filesystem::path& folder, const Course& course);
+/// What a run on a capture says of itself and how far it was from the truth, as it stands in results.json: its
+/// summary.json, the position error over time (at most a few hundred points) and its quantiles, and when it fell
+/// silent; of recordings recording_figures(). Throws tools::Failure where the run has not left its files in `folder`.
+nlohmann::ordered_json measurement(const Run& run, const std::filesystem::path& folder,
+                                   const std::filesystem::path& capture);
 
 /// A file that a run has left. Throws tools::Failure where it is missing or something else.
 nlohmann::ordered_json read_json(const std::filesystem::path& file);

@@ -2,7 +2,6 @@
 #include "locus_experiments/plan.hpp"
 
 #include <algorithm>
-#include <array>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -34,15 +33,6 @@ Options paper_with(const Options& settings) {
 Options with(Options options, const Options& more) {
   options.insert(options.end(), more.begin(), more.end());
   return options;
-}
-
-Course simulated(const Arguments& arguments, const std::string& name, const std::string& world,
-                 const std::string& robot, int seed) {
-  const std::string lidars = robot == "husky" ? "2" : "1";
-  return {name, arguments.output / "courses" / name,
-          with({"--world", world, "--robot", robot, "--lidars", lidars, "--seed", std::to_string(seed), "--duration",
-                std::to_string(arguments.duration_s)},
-               realism_of(arguments))};
 }
 
 /// Table II, and what it takes for Table III. The paper has no flat ground in the tunnel.
@@ -92,10 +82,16 @@ void add_pace(Plan& plan, const std::string& course, int pace_s) {
 
 Plan plan_of_paper(const Arguments& arguments) {
   Plan plan;
-  plan.courses = {simulated(arguments, "alpha", "urban", "husky", 1), simulated(arguments, "beta", "urban", "husky", 2),
-                  simulated(arguments, "safety_research", "tunnel", "husky", 1),
-                  simulated(arguments, "spot_alpha", "urban", "spot", 1),
-                  simulated(arguments, "spot_beta", "urban", "spot", 2)};
+  const auto add_course = [&](const char* name, const char* world, const char* robot, int seed) {
+    const char* const lidars = std::string_view{robot} == "husky" ? "2" : "1";
+    plan.courses.push_back(
+        simulated_course(arguments, name, {"--world", world, "--robot", robot, "--lidars", lidars}, seed));
+  };
+  add_course("alpha", "urban", "husky", 1);
+  add_course("beta", "urban", "husky", 2);
+  add_course("safety_research", "tunnel", "husky", 1);
+  add_course("spot_alpha", "urban", "spot", 1);
+  add_course("spot_beta", "urban", "spot", 2);
   add_accuracy(plan, "alpha", true);
   add_accuracy(plan, "beta", true);
   add_accuracy(plan, "safety_research", false);
@@ -144,29 +140,21 @@ const std::vector<std::string>& paper_settings() {
   return settings;
 }
 
-std::vector<std::string> realism_of(const Arguments& arguments) { return {"--realism", arguments.realism}; }
+Course simulated_course(const Arguments& arguments, const std::string& name, Options simulation, int seed) {
+  for (const std::string& word : {std::string("--seed"), std::to_string(seed), std::string("--duration"),
+                                  std::to_string(arguments.duration_s), std::string("--realism"), arguments.realism})
+    simulation.push_back(word);
+  return {name, arguments.output / "courses" / name, std::move(simulation)};
+}
 
 Plan make_plan(const Arguments& arguments) {
-  Plan plan = arguments.faults               ? plan_of_faults(arguments)
-              : arguments.fault_matrix       ? plan_of_matrix(arguments)
-              : arguments.harsh              ? plan_of_harsh(arguments)
-              : arguments.recordings.empty() ? plan_of_paper(arguments)
-                                             : plan_of_recordings(arguments);
-  plan.size = plan.runs.size();
-  for (std::size_t place = 0; place < plan.size; ++place)
-    plan.runs[place].place = place;
-  const auto course_of = [&](const Run& run) { return std::ranges::find(plan.courses, run.course, &Course::name); };
-  if (arguments.faults || arguments.harsh) { // to simulate a course takes longer than its runs
-    std::size_t index = 0;
-    std::erase_if(plan.courses, [&](const Course&) { return !arguments.shard.has(index++); });
-    std::erase_if(plan.runs, [&](const Run& run) { return course_of(run) == plan.courses.end(); });
-    return plan;
-  }
-  std::erase_if(plan.runs, [&](const Run& run) { return !arguments.shard.has(run.place); });
-  std::erase_if(plan.courses, [&](const Course& course) {
-    return std::ranges::none_of(plan.runs, [&](const Run& run) { return run.course == course.name; });
-  });
-  return plan;
+  if (arguments.faults)
+    return plan_of_faults(arguments);
+  if (arguments.fault_matrix)
+    return plan_of_matrix(arguments);
+  if (arguments.harsh)
+    return plan_of_harsh(arguments);
+  return arguments.recordings.empty() ? plan_of_paper(arguments) : plan_of_recordings(arguments);
 }
 
 } // namespace locus::experiments

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -31,31 +30,30 @@ struct Run {
   std::vector<std::string> options;     ///< of locus-replay
   int paced_cpus = 0;                   ///< at the pace of the recording on so many processors; 0: as fast as can be
   bool loam_features = false;           ///< LOAM's points in place of the filters
-  std::size_t place = 0;                ///< among all runs of the plan, whichever shard does them
   std::optional<Interval> watched = {}; ///< what happens there is measured for the table of faults
   /// A drive of the harsh table: by how much its lidars are turned against what config.yaml says. What such a drive
   /// wrote is not kept.
   std::optional<double> mounting_rad = {};
-  std::string refusal = {}; ///< what locus-replay has to say instead of running; empty: it has to run
+  std::string refusal = {};     ///< what locus-replay has to say instead of running; empty: it has to run
+  bool shows_recording = false; ///< of the page of recordings: measured is what recording_figures() says
 
   [[nodiscard]] std::string id() const { return course + '/' + configuration; }
 };
 
-/// Options of locus-sim that every simulated course of an experiment shares: how realistic the world is.
-std::vector<std::string> realism_of(const Arguments& arguments);
-
 struct Plan {
   std::vector<Course> courses;
   std::vector<Run> runs;
-  std::size_t size = 0; ///< runs of all shards
 };
+
+/// A course of the output folder that locus-sim makes with these options, as long and as realistic as the user wants.
+Course simulated_course(const Arguments& arguments, const std::string& name, std::vector<std::string> simulation,
+                        int seed);
 
 /// Settings of the paper's Section II and Table IV as --set options: what paper-husky.yaml says beyond husky.yaml.
 const std::vector<std::string>& paper_settings();
 
 /// The harsh courses, the faults, or their matrix, or the paper's experiments, or as much of them as a recording
-/// allows; of these the part of one shard: of faults and harsh courses every N-th course with all its runs, else every
-/// N-th run with the courses that they need.
+/// allows.
 Plan make_plan(const Arguments& arguments);
 
 } // namespace locus::experiments

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <fstream>
-#include <set>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -27,10 +26,6 @@ using tools::ExitStatus;
 using tools::Failure;
 
 constexpr const char* kFileName = "results.json";
-
-std::string id_of(const Results& run) {
-  return run.at("course").get<std::string>() + '/' + run.at("configuration").get<std::string>();
-}
 
 const Results* find(const Results& runs, const std::string& course, std::string_view configuration) {
   const auto found = std::ranges::find_if(runs, [&](const Results& run) {
@@ -64,40 +59,6 @@ Results read_results(const std::filesystem::path& file) {
                                                   "folder that it was given with -o",
                                                   file.string()));
   return results;
-}
-
-Results merged(const std::vector<std::filesystem::path>& folders) {
-  Results all;
-  std::set<std::string> seen;
-  for (const std::filesystem::path& folder : folders) {
-    Results part = read_results(folder / kFileName);
-    if (all.is_null()) {
-      all = part;
-      all["runs"] = Results::array();
-    }
-    for (const char* key : {"/version", "/simulated", "/duration_s", "/realism", "/planned", "/faults/seeds",
-                            "/faults/consistency_runs", "/harsh/seeds", "/harsh/only"}) {
-      const Results::json_pointer pointer(key);
-      if (all.value(pointer, Results{}) != part.value(pointer, Results{}))
-        throw Failure(ExitStatus::failed,
-                      fmt::format("{}: its {} differs from that of {}; merge the shards of one experiment",
-                                  (folder / kFileName).string(), pointer.back(),
-                                  (folders.front() / kFileName).string()));
-    }
-    for (const Results& run : part.at("runs")) {
-      if (!seen.insert(id_of(run)).second)
-        throw Failure(ExitStatus::failed, fmt::format("{}: {} is in another folder too; name each shard once",
-                                                      (folder / kFileName).string(), id_of(run)));
-      all["runs"].push_back(run);
-    }
-  }
-  if (const std::size_t planned = all.value("planned", std::size_t{0}); seen.size() < planned)
-    throw Failure(ExitStatus::failed, fmt::format("{} of the {} runs are in these folders; name those of all shards",
-                                                  seen.size(), planned));
-  auto& runs = all["runs"].get_ref<Results::array_t&>(); // in the order that one machine would have done them in
-  std::ranges::stable_sort(runs, {}, [](const Results& run) { return run.value("place", std::size_t{0}); });
-  judge(all);
-  return all;
 }
 
 void judge_robustness(Results& results) {

@@ -21,10 +21,6 @@ using Results = nlohmann::ordered_json;
 /// Reads a results.json. Throws tools::Failure.
 Results read_results(const std::filesystem::path& file);
 
-/// Puts the runs of several shards together. Throws tools::Failure where a folder holds no results, where two hold the
-/// same run, or where they do not belong together.
-Results merged(const std::vector<std::filesystem::path>& folders);
-
 /// Table III from the runs: what each failure did, beside the run of the same course without it.
 ///
 /// The paper's words are taken as: Stops, no odometry in the last second; Errors, the largest position error has grown

@@ -2,7 +2,6 @@
 // locus-play: a capture folder, or a stream, to the wire, as a robot would send it.
 #include <algorithm>
 #include <ctime>
-#include <exception>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -14,6 +13,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "command_line.hpp"
 #include "config/config_yaml.hpp"
 #include "daemon/input.hpp"
 #include "daemon/machine_time.hpp"
@@ -159,16 +159,8 @@ void run(const PlayArguments& arguments) {
 
 int main(int argc, char** argv) {
   using namespace locus::tools;
-  try {
+  return exit_status_of("locus-play", [&] {
     if (const std::optional<PlayArguments> arguments = parse_play_arguments(argc, argv))
       run(*arguments);
-    flush_standard_output();
-    return static_cast<int>(ExitStatus::done);
-  } catch (const Failure& failure) {
-    say("locus-play", failure.what());
-    return static_cast<int>(failure.status());
-  } catch (const std::exception& error) { // out of memory or threads
-    say("locus-play", error.what());
-    return static_cast<int>(ExitStatus::failed);
-  }
+  });
 }

@@ -15,6 +15,15 @@
 
 namespace locus::tools {
 
+/// A folder for output, and those above it; whether or not it is there already. Throws Failure.
+inline void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error)
+    throw Failure(ExitStatus::failed, fmt::format("{}: the folder cannot be made ({}); choose another with -o",
+                                                  folder.string(), error.message()));
+}
+
 /// A file that was written in full when close() returns. Throws Failure.
 class OutputFile {
  public:

@@ -2,9 +2,7 @@
 #include "locus_replay/replay_program.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <cstdlib>
-#include <exception>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -15,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "bags/bag.hpp"
+#include "command_line.hpp"
 #include "config/config_yaml.hpp"
 #include "daemon/ingest.hpp"
 #include "daemon/input.hpp"
@@ -33,8 +32,6 @@ namespace locus::tools {
 namespace {
 
 using daemon::MachineTime;
-
-void say(const std::string& lines) { tools::say("locus-replay", lines); }
 
 Config config_or_fail(Expected<Config, ConfigErrors> config) {
   if (!config)
@@ -211,7 +208,7 @@ void run(const Arguments& arguments, const SweepStage& stage, const EstimateObse
     warnings.push_back(*changed);
   RecordedInput input = open_input(arguments, folder, config, !config_file.empty(), warnings);
   for (const std::string& warning : warnings)
-    say("warning: " + warning);
+    say("locus-replay", "warning: " + warning);
   if (!input.taken.empty() && !arguments.quiet)
     fmt::print("{}\n", input.taken);
 
@@ -228,18 +225,10 @@ void run(const Arguments& arguments, const SweepStage& stage, const EstimateObse
 } // namespace
 
 int replay_program(int argc, char** argv, const SweepStage& stage, const EstimateObserver& observer) {
-  try {
+  return exit_status_of("locus-replay", [&] {
     if (const std::optional<Arguments> arguments = parse_arguments(argc, argv))
       run(*arguments, stage, observer);
-    flush_standard_output();
-    return static_cast<int>(ExitStatus::done);
-  } catch (const Failure& failure) {
-    say(failure.what());
-    return static_cast<int>(failure.status());
-  } catch (const std::exception& error) { // out of memory or threads
-    say(error.what());
-    return static_cast<int>(ExitStatus::failed);
-  }
+  });
 }
 
 } // namespace locus::tools

@@ -34,11 +34,7 @@ void remove_results(const std::filesystem::path& folder, bool summary_too) {
 }
 
 const std::filesystem::path& made(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error)
-    throw Failure(ExitStatus::failed, fmt::format("{}: the folder cannot be made ({}); choose another with -o",
-                                                  folder.string(), error.message()));
+  make_folder(folder);
   remove_results(folder, true);
   return folder;
 }

@@ -3,20 +3,15 @@
 
 #include <system_error>
 
-#include <fmt/format.h>
-
 namespace locus::sim {
 namespace {
 
 std::filesystem::path made(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error)
-    throw tools::Failure(tools::ExitStatus::failed, fmt::format("{}: no folder can be made there ({}); choose another",
-                                                                folder.string(), error.message()));
+  tools::make_folder(folder);
+  std::error_code ignored;
   for (const char* const source : {"imu", "wio", "vio", "kio"}) // of another robot, which this one may not have
     for (const char* const ending : {".csv", ".tum", ".meta.csv"})
-      std::filesystem::remove(folder / (source + std::string(ending)), error);
+      std::filesystem::remove(folder / (source + std::string(ending)), ignored);
   return folder;
 }
 

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // locus-sim: a synthetic robot with exact truth to a capture folder.
-#include <cstdio>
-#include <exception>
 #include <optional>
 
 #include <fmt/format.h>
 
+#include "command_line.hpp"
 #include "daemon/machine_time.hpp"
-#include "locus_replay/failure.hpp"
 #include "locus_replay/output_file.hpp"
 #include "locus_replay/progress_bar.hpp"
 #include "locus_replay/say.hpp"
@@ -63,16 +61,8 @@ void run(const SimArguments& arguments) {
 
 int main(int argc, char** argv) {
   using namespace locus::tools;
-  try {
+  return exit_status_of("locus-sim", [&] {
     if (const std::optional<SimArguments> arguments = parse_sim_arguments(argc, argv))
       run(*arguments);
-    flush_standard_output();
-    return static_cast<int>(ExitStatus::done);
-  } catch (const Failure& failure) {
-    fmt::print(stderr, "locus-sim: {}\n", failure.what());
-    return static_cast<int>(failure.status());
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "locus-sim: {}\n", error.what());
-    return static_cast<int>(ExitStatus::failed);
-  }
+  });
 }

@@ -2,7 +2,6 @@
 // locusctl: talks to a running locusd.
 #include <chrono>
 #include <cstring>
-#include <exception>
 #include <functional>
 #include <span>
 #include <string>
@@ -15,7 +14,6 @@
 #include "core/base/options.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/map_file.hpp"
-#include "locus_replay/say.hpp"
 #include "locusctl/screen.hpp"
 #include "locusctl/sensors.hpp"
 #include "locusctl/service_client.hpp"
@@ -126,17 +124,9 @@ std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
 
 int main(int argc, char** argv) {
   using namespace locus::tools;
-  try {
+  return exit_status_of("locusctl", [&] {
     CtlArguments arguments;
     if (const std::function<void()> action = parse(argc, argv, arguments))
       action();
-    flush_standard_output();
-    return static_cast<int>(ExitStatus::done);
-  } catch (const Failure& failure) {
-    say("locusctl", failure.what());
-    return static_cast<int>(failure.status());
-  } catch (const std::exception& error) {
-    say("locusctl", error.what());
-    return static_cast<int>(ExitStatus::failed);
-  }
+  });
 }
