@@ -50,7 +50,7 @@ std::vector<std::string> imus_among(std::vector<std::string> names, const path& 
       config = *std::move(loaded);
   }
   const auto is_imu = [&](const std::string& name) {
-    return std::ranges::any_of(config.odometry.motion_sources, [&](const MotionSourceOptions& source) {
+    return std::ranges::any_of(config.motion_sources, [&](const MotionSourceOptions& source) {
       return source.name == name && source.kind == SourceKind::imu;
     });
   };
