@@ -86,8 +86,8 @@ std::optional<std::string> short_sweep(const SweepOptions& options, const std::s
   if (sweep_ms >= kAlmost * turn_ms)
     return std::nullopt;
   return fmt::format(
-      "lidar {}: turns in {:.0f} ms, so a sweep of {:.0f} ms sees a part of what is around, each another "
-      "one; set sweep_period_ms: auto",
+      "lidar {}: one revolution takes {:.0f} ms, so each sweep of {:.0f} ms covers only a different part of the scene; "
+      "set sweep_period_ms: auto",
       lidar, turn_ms, sweep_ms);
 }
 

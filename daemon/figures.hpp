@@ -17,15 +17,6 @@
 #include "daemon/recorder.hpp"
 #include "daemon/sweep_processor.hpp"
 
-namespace locus {
-
-/// The words of odometry.csv and the status.
-constexpr auto names_of(TrackingState) {
-  return std::to_array<std::string_view>({"tracking", "degenerate", "dead_reckoning", "standstill"});
-}
-
-} // namespace locus
-
 namespace locus::daemon {
 
 /// What the ingest has counted so far, as a copy that other threads may read. Plain memory.

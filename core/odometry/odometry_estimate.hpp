@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 
+#include "core/base/names.hpp"
 #include "core/base/options.hpp"
 #include "core/base/pose.hpp"
 #include "core/base/stamp.hpp"
@@ -13,6 +16,10 @@
 namespace locus {
 
 enum class TrackingState : std::uint8_t { tracking, degenerate, dead_reckoning, standstill };
+/// The words of odometry.csv and the status.
+constexpr auto names_of(TrackingState) {
+  return std::to_array<std::string_view>({"tracking", "degenerate", "dead_reckoning", "standstill"});
+}
 
 /// Where the start of a registration came from.
 struct PriorSource : SourceChoice {

@@ -155,6 +155,8 @@ template <class Message> class DdsReader {
 /// sends. What a second writer sends, however much, is counted and comes no further. One owner.
 class Admission {
  public:
+  static constexpr std::int64_t kMaxRateKhz = 10; ///< more than any sensor sends
+
   /// Whether the sample of `writer` that came at `now` is taken; else it is counted.
   bool admits(dds_instance_handle_t writer, Stamp now) {
     if (writer != writer_ && now - last_heard_ < kSilence)
@@ -178,7 +180,7 @@ class Admission {
  private:
   static constexpr Duration kSilence = std::chrono::seconds{2}; ///< longer than the period of any source
   static constexpr Duration kWindow = std::chrono::milliseconds{100};
-  static constexpr std::uint32_t kMostInWindow = 1000; ///< 10 kHz
+  static constexpr std::int64_t kMostInWindow = kMaxRateKhz * (kWindow / std::chrono::milliseconds{1});
 
   bool refuse() {
     ++refused_;
@@ -187,7 +189,7 @@ class Admission {
 
   dds_instance_handle_t writer_ = 0;
   Stamp last_heard_, window_began_;
-  std::uint32_t in_window_ = 0;
+  std::int64_t in_window_ = 0;
   std::uint64_t refused_ = 0;
 };
 

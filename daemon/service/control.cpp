@@ -62,7 +62,7 @@ Expected<ControlRequest, std::string> parse_control_request(std::string_view mes
       return ControlRequest{Reload{}};
     return fmt::format("unknown command {}; use locusctl of the same version", command);
   } catch (const nlohmann::json::exception&) {
-    return std::string{"no request, or it lacks something; use locusctl of the same version"};
+    return std::string{"invalid or incomplete request; use locusctl of the same version"};
   }
 }
 
@@ -182,7 +182,7 @@ Expected<ControlServer, std::string> ControlServer::open(const std::filesystem::
     return failed("set RUNTIME_DIRECTORY to a folder that may be written");
   constexpr mode_t kEverybody = 0666; // who may do what is told by who asks
   if (chmod(path.c_str(), kEverybody) != 0 || listen(listener.number(), kMaxClients) != 0)
-    return failed("it cannot be listened to");
+    return failed("cannot listen on it");
   return ControlServer{std::move(listener), std::move(handler)};
 }
 

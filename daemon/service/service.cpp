@@ -106,7 +106,7 @@ std::optional<SavedState> Service::recent_state() {
   }
   const Duration age = Stamp{read_clock(CLOCK_REALTIME)} - state->last.stamp;
   if (age < Duration::zero()) {
-    log_.info("a fresh start: the saved state is of the future, for the clock was set back");
+    log_.info("a fresh start: the saved state is newer than the clock; the clock was set back");
     return std::nullopt;
   }
   if (age > kOldest) {
@@ -172,7 +172,7 @@ std::optional<std::string> Service::go_on_with(const Config& config) {
   if (!problem)
     return std::nullopt;
   if (const auto old_problem = begin(old, state)) {
-    *problem += "; nor does the old configuration work any more, the service ends: " + *old_problem;
+    *problem += "; the old configuration fails as well; the service stops: " + *old_problem;
     keep_state(state);
   } else {
     session_->set_flat_ground(mode);

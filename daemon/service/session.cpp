@@ -229,7 +229,7 @@ void Session::tell(TrackingState state) {
     log_.warn("dead reckoning: no sweep can be registered; look whether the lidars send (locusctl status)",
               {{"LOCUS_STATE", name}});
   else if (state == TrackingState::degenerate)
-    log_.warn("degenerate: the lidars do not see along every axis here, motion sources carry the others",
+    log_.warn("degenerate: the surroundings do not constrain every axis; motion sources determine the rest",
               {{"LOCUS_STATE", name}});
   else
     log_.info(name, {{"LOCUS_STATE", name}});

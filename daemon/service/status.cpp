@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <systemd/sd-daemon.h>
 
+#include "daemon/dds/dds_node.hpp"
 #include "daemon/machine_time.hpp"
 #include "daemon/service/machine.hpp"
 #include "drivers/net/datagram.hpp"
@@ -140,8 +141,7 @@ void Watch::look_at_sources(const LinkFigures& link) {
       continue;
     const std::string found =
         link.sources[i].writers == 0
-            ? fmt::format("nobody is seen that publishes {}; DDS listens on interface {} in domain {}, to change with "
-                          "dds.interface and dds.domain",
+            ? fmt::format("no publisher found for {}; DDS uses interface {}, domain {} (dds.interface, dds.domain)",
                           topic, config.dds.interface, config.dds.domain)
             : fmt::format("{} of DDS on interface {} has {} publishers, but none has sent anything", topic,
                           config.dds.interface, link.sources[i].writers);
@@ -196,9 +196,9 @@ std::string Watch::why_silent(const Lidar& lidar, const LidarOptions& options, c
                        dotted(*now.refused_ip), options.source_ip ? "configured is" : "the lidar was",
                        dotted(*now.source_ip), options.name);
   if (packets.data + packets.position == packets.received)
-    return fmt::format("its position packets come, so it is on and sends the others elsewhere: locusctl sensors tells "
-                       "to which port, for lidars.{}.port",
-                       options.name);
+    return fmt::format(
+        "only its position packets arrive; find its data port with locusctl sensors and set lidars.{}.port",
+        options.name);
   const std::string unknown =
       now.unknown_packets ? fmt::format(" ({})", velodyne::to_string(*now.unknown_packets)) : "";
   return fmt::format("what comes is refused, for the reasons that locusctl status counts{}: is it a Velodyne, and "
@@ -251,10 +251,11 @@ void Watch::look_at_intruders(const LinkFigures& link) {
   const Config& config = session_.config();
   const auto tell = [this](std::uint64_t refused, const std::string& topic, const std::string& source) {
     if (refused > 0 && intruded_.insert(topic).second)
-      log_.warn(fmt::format("{}messages on {} are refused, for another publishes there, too, or more come than any "
-                            "sensor sends; give each publisher a topic of its own",
-                            source.empty() ? "" : "motion source " + source + ": ", topic),
-                {{"LOCUS_SOURCE", source}});
+      log_.warn(
+          fmt::format("{}messages on {} are refused: a second publisher, or more than {} kHz; give each publisher its "
+                      "own topic",
+                      source.empty() ? "" : "motion source " + source + ": ", topic, Admission::kMaxRateKhz),
+          {{"LOCUS_SOURCE", source}});
   };
   for (std::size_t i = 0; i < link.sources.size(); ++i) {
     const MotionSource& source = config.motion_sources[i];

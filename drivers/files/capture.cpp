@@ -25,24 +25,25 @@ constexpr std::string_view kRecordOne = "record one with: tcpdump -s 0 -w lidar.
 struct Signature {
   std::string_view start;
   std::string_view what;
-  std::string_view what_to_do; ///< a command "unpack it with" stands before the name of the file
+  std::string_view unpacker =
+      {}; ///< a command that unpacks it from standard input to standard output; empty: none does
 };
 
 /// What people hand over in place of a capture.
 constexpr std::array kForeignFiles{
-    Signature{"\x89PNG", "a PNG image", kRecordOne},
-    Signature{"\xFF\xD8\xFF", "a JPEG image", kRecordOne},
-    Signature{"\x1F\x8B", "a gzip-compressed file", "unpack it with: gunzip -k"},
+    Signature{"\x89PNG", "a PNG image"},
+    Signature{"\xFF\xD8\xFF", "a JPEG image"},
+    Signature{"\x1F\x8B", "a gzip-compressed file", "gzip -dc"},
     Signature{"\xFD"
               "7zXZ",
-              "an xz-compressed file", "unpack it with: unxz -k"},
-    Signature{"BZh", "a bzip2-compressed file", "unpack it with: bunzip2 -k"},
-    Signature{"\x28\xB5\x2F\xFD", "a zstd-compressed file", "unpack it with: unzstd"},
-    Signature{"PK\x03\x04", "a zip archive", "unpack it with: unzip"},
-    Signature{"#ROSBAG", "a ROS 1 bag", kRecordOne},
-    Signature{"SQLite format 3", "an SQLite database (a ROS 2 bag?)", kRecordOne},
-    Signature{"\x89MCAP", "an MCAP file", kRecordOne},
-    Signature{"# .PCD", "a point cloud", kRecordOne},
+              "an xz-compressed file", "xz -dc"},
+    Signature{"BZh", "a bzip2-compressed file", "bzip2 -dc"},
+    Signature{"\x28\xB5\x2F\xFD", "a zstd-compressed file", "zstd -dc"},
+    Signature{"PK\x03\x04", "a zip archive", "funzip"},
+    Signature{"#ROSBAG", "a ROS 1 bag"},
+    Signature{"SQLite format 3", "an SQLite database (a ROS 2 bag?)"},
+    Signature{"\x89MCAP", "an MCAP file"},
+    Signature{"# .PCD", "a point cloud"},
 };
 
 constexpr std::array<std::string_view, 6> kCaptureMagics{"\xD4\xC3\xB2\xA1", "\xA1\xB2\xC3\xD4", "\x4D\x3C\xB2\xA1",
@@ -64,13 +65,14 @@ std::string foreign_file(std::FILE* file, const std::filesystem::path& name, std
   }
   const auto is_plain = [](unsigned char c) { return std::isprint(c) != 0 || std::isspace(c) != 0; };
   const bool is_text = std::all_of(start.begin(), start.end(), is_plain);
-  Signature found{"", is_text ? "a text file" : "unknown binary data", kRecordOne};
+  Signature found{"", is_text ? "a text file" : "unknown binary data"};
   for (const Signature& signature : kForeignFiles) {
     found = starts_with(signature.start) ? signature : found;
   }
-  const bool is_packed = found.what_to_do.starts_with("unpack");
-  return fmt::format("{}, not a pcap or pcapng capture; {}{}", found.what, found.what_to_do,
-                     is_packed ? " " + name.string() : "");
+  return fmt::format("{}, not a pcap or pcapng capture; {}", found.what,
+                     found.unpacker.empty()
+                         ? kRecordOne
+                         : fmt::format("unpack it with: {0} <{1} >{1}.unpacked", found.unpacker, name.string()));
 }
 
 std::string link_type_name(int link_type) {

@@ -103,7 +103,7 @@ Expected<UdpSocket, std::string> UdpSocket::open(std::uint16_t port) {
   address.sin_port = htons(port);
   address.sin_addr.s_addr = htonl(INADDR_ANY);
   if (bind(opened.descriptor_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
-    return because("cannot be listened to", port);
+    return because("cannot bind", port);
   if (auto problem = opened.prepare())
     return *problem;
   return opened;
@@ -134,7 +134,7 @@ std::optional<std::string> UdpSocket::prepare() {
     set(descriptor_, SOL_SOCKET, SO_RCVBUF, kWantedBufferBytes);
   buffer_bytes_ = granted_buffer_bytes(descriptor_);
   if (!set(descriptor_, SOL_SOCKET, SO_TIMESTAMPNS, 1))
-    return because("no stamps of arrival", port_);
+    return because("no receive timestamps", port_);
   set(descriptor_, SOL_SOCKET, SO_DETACH_FILTER, 0); // of one that systemd holds and that had another owner before
   count_drops();                                     // as many as it had with that owner
   kernel_drops_ = 0;

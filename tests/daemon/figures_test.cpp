@@ -12,11 +12,11 @@ namespace {
 using std::chrono::milliseconds;
 
 /// The one of a drive along x, a metre a sweep, that took so long; its rotation is that of source 1.
-ProcessedSweep sweep(int number, Duration wall) {
+ProcessedSweep sweep(unsigned number, Duration wall) {
   ProcessedSweep done;
   done.estimate.T_odom_base.translation.x() = number;
   done.estimate.twist_base[0] = 10.0;
-  done.estimate.prior = {.rotation = 1, .translation = number % 2};
+  done.estimate.prior = {{.rotation = SourceId{1}, .translation = SourceId{number % 2U}}};
   done.raw_returns = 100;
   done.took.wall = wall;
   done.stages_took[0] = milliseconds{2};
@@ -25,7 +25,7 @@ ProcessedSweep sweep(int number, Duration wall) {
 
 TEST(SweepTally, SumsAreOfAllSweepsAndDistributionsOfTheLast) {
   SweepTally tally(100);
-  for (int i = 0; i < 200; ++i)
+  for (unsigned i = 0; i < 200; ++i)
     tally.take(sweep(i, milliseconds{i}));
   const SweepFigures figures = tally.figures();
   EXPECT_EQ(figures.sweeps, 200U);

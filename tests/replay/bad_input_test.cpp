@@ -159,13 +159,13 @@ TEST_F(BadCapture, ThatRunsBackwardsIsSaidWithTheProgramThatSortsIt) {
 
 TEST_F(BadCapture, CompressedFilesAreNamedWithTheCommandThatUnpacksThem) {
   const std::string rest = " and so on and so on and so on and so on";
-  expect_error(replay("\x1F\x8B\x08" + rest), 1, {"a gzip-compressed file", "gunzip -k ", "/bad.pcap"});
+  expect_error(replay("\x1F\x8B\x08" + rest), 1, {"a gzip-compressed file", "gzip -dc <", "/bad.pcap.unpacked"});
   expect_error(replay("\xFD"
                       "7zXZ" +
                       rest),
-               1, {"an xz-compressed file", "unxz -k ", "/bad.pcap"});
-  expect_error(replay("\x28\xB5\x2F\xFD" + rest), 1, {"a zstd-compressed file", "unzstd ", "/bad.pcap"});
-  expect_error(replay("BZh91AY&SY" + rest), 1, {"a bzip2-compressed file", "bunzip2 -k ", "/bad.pcap"});
+               1, {"an xz-compressed file", "xz -dc <", "/bad.pcap.unpacked"});
+  expect_error(replay("\x28\xB5\x2F\xFD" + rest), 1, {"a zstd-compressed file", "zstd -dc <", "/bad.pcap.unpacked"});
+  expect_error(replay("BZh91AY&SY" + rest), 1, {"a bzip2-compressed file", "bzip2 -dc <", "/bad.pcap.unpacked"});
 }
 
 TEST_F(BadCapture, OfAnotherMakersLidarIsSaidWithTheMaker) {

@@ -100,8 +100,9 @@ TEST(Warnings, PacketsOfAnUnknownModelAreNamedByTheirProductId) {
 
 /// Half a turn sees what the half before did not: each second sweep fails.
 TEST(Warnings, SweepThatIsShorterThanATurn) {
-  expect_warning({"--set", "sweep_period_ms=50", "--duration", "2", room_drive().string()},
-                 {"lidar front: turns in 100 ms, so a sweep of 50 ms sees a part", "sweep_period_ms: auto"});
+  expect_warning(
+      {"--set", "sweep_period_ms=50", "--duration", "2", room_drive().string()},
+      {"lidar front: one revolution takes 100 ms, so each sweep of 50 ms covers only", "sweep_period_ms: auto"});
 }
 
 TEST(Warnings, MotionOfAnotherTimeNamesBothSpans) {

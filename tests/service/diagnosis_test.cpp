@@ -28,8 +28,7 @@ class Diagnosis : public RobotNetwork {};
 TEST_F(Diagnosis, SensorsThatAreNotHeardAreNamedWithTheInterfaceOfDds) {
   Child daemon(undisturbed(locusd(config())));
   EXPECT_TRUE(daemon.wait_for_line("motion source wio: not heard", seconds{7}));
-  EXPECT_TRUE(daemon.wait_for_line("nobody is seen that publishes /wheel_odometry; DDS listens on interface lo",
-                                   milliseconds{10}));
+  EXPECT_TRUE(daemon.wait_for_line("no publisher found for /wheel_odometry; DDS uses interface lo", milliseconds{10}));
   EXPECT_TRUE(daemon.wait_for_line("lidar front: no data packet on UDP port 2368", seconds{1}));
   EXPECT_EQ(status()["state"], "waiting");
   Child play(undisturbed({LOCUS_PLAY, capture().string()})); // switched on at last
@@ -130,10 +129,9 @@ TEST_F(Diagnosis, LidarOnAnotherPortIsToldByItsPositionPackets) {
   const std::filesystem::path wrong = lidar_with("port: 2390");
   Child daemon(undisturbed(locusd(wrong)));
   const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
-  EXPECT_TRUE(
-      daemon.wait_for_line("lidar front: no data packet on UDP port 2390 for 5 s; its position packets come, so "
-                           "it is on and sends the others elsewhere: locusctl sensors tells to which port",
-                           seconds{8}))
+  EXPECT_TRUE(daemon.wait_for_line("lidar front: no data packet on UDP port 2390 for 5 s; only its position packets "
+                                   "arrive; find its data port with locusctl sensors and set lidars.front.port",
+                                   seconds{8}))
       << testing::PrintToString(daemon.lines());
 }
 
@@ -190,7 +188,8 @@ TEST_F(Diagnosis, SweepsThatAreShorterThanATurnAreSaidOnce) {
   Child daemon(undisturbed(locusd(config("sweep_period_ms: 50\n"))));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
   const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
-  EXPECT_TRUE(daemon.wait_for_line("lidar front: turns in 100 ms, so a sweep of 50 ms sees a part", seconds{10}));
+  EXPECT_TRUE(daemon.wait_for_line("lidar front: one revolution takes 100 ms, so each sweep of 50 ms covers only",
+                                   seconds{10}));
   std::this_thread::sleep_for(seconds{1});
   const auto lines = daemon.lines();
   EXPECT_EQ(std::ranges::count_if(lines, [](const std::string& line) { return contains(line, "turns in 100 ms"); }), 1);

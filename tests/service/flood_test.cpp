@@ -176,7 +176,7 @@ TEST_F(FloodOfDds, BesideTheSensorsChangesNothingButACounter) {
     EXPECT_EQ(source["writers"], 2) << "what has another type is none";
     record((std::string(name) + "_refused").c_str(), source["refused"].get<double>());
   }
-  EXPECT_TRUE(daemon.wait_for_line("another publishes there", {}));
+  EXPECT_TRUE(daemon.wait_for_line("a second publisher", {}));
   EXPECT_GT(after["dropped"]["flat_ground_messages"], 100);
   EXPECT_FALSE(daemon.wait_for_line("flat ground is on", {})) << "as the flood says";
   EXPECT_LT(worst_distance_m(replay.trajectory(), heard(listener), shift_of(play)), 0.05);

@@ -7,7 +7,6 @@
 
 #include <fmt/format.h>
 
-#include "daemon/figures.hpp"
 #include "drivers/files/motion_files.hpp"
 
 namespace locus::tools {

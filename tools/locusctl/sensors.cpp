@@ -41,7 +41,7 @@ class Wire {
         sockets_.push_back(std::move(*socket));
     if (sockets_.empty())
       throw Failure(ExitStatus::failed,
-                    "the wire may not be looked at, and the ports of lidars are taken; run as root");
+                    "no permission to capture packets, and the lidar ports are in use; run as root");
   }
   ~Wire() {
     if (raw_ >= 0)
