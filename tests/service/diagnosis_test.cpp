@@ -192,7 +192,9 @@ TEST_F(Diagnosis, SweepsThatAreShorterThanATurnAreSaidOnce) {
                                    seconds{10}));
   std::this_thread::sleep_for(seconds{1});
   const auto lines = daemon.lines();
-  EXPECT_EQ(std::ranges::count_if(lines, [](const std::string& line) { return contains(line, "turns in 100 ms"); }), 1);
+  EXPECT_EQ(std::ranges::count_if(
+                lines, [](const std::string& line) { return contains(line, "one revolution takes 100 ms"); }),
+            1);
 }
 
 /// Without the right to go beyond what the kernel allows to all, as systemd starts it.
