@@ -262,7 +262,7 @@ Figures Session::figures() const {
   Figures figures{.config = config_, .spent = MachineTime::now() - started_};
   figures.duration = figures.spent.wall;
   figures.counters = pipeline_->counters();
-  Figures::Live& live = figures.live.emplace();
+  Figures::Live& live = *(figures.live = Figures::Live{});
   live.flat_ground = flat_ground();
   live.kernel_drops = input_.kernel_drops();
   live.filtered = input_.filtered();

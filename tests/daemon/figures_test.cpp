@@ -53,7 +53,8 @@ TEST(Figures, ServiceHasTheKeysOfARunAndMore) {
   const Config config = Config{};
   Figures figures{.config = config};
   const auto of_a_run = to_json(figures).flatten();
-  figures.live.emplace().link.sources.resize(config.motion_sources.size());
+  figures.live = Figures::Live{};
+  figures.live->link.sources.resize(config.motion_sources.size());
   const auto live = to_json(figures).flatten();
   for (const auto& [key, value] : of_a_run.items())
     EXPECT_TRUE(live.contains(key)) << key;
@@ -67,7 +68,7 @@ TEST(Figures, ServiceHasTheKeysOfARunAndMore) {
 TEST(Figures, TextOfAServiceThatHasHeardNothingSaysSo) {
   const Config config = Config{};
   Figures figures{.config = config};
-  figures.live.emplace();
+  figures.live = Figures::Live{};
   const std::string text = to_text(figures);
   for (const char* words : {"   waiting   ", "last never", "pose        none yet", "unheard", "never heard", "always"})
     EXPECT_NE(text.find(words), std::string::npos) << words << '\n' << text;
