@@ -2,6 +2,7 @@
 #include "core/odometry/sensor_integration.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/sources/motion_sources.hpp"
 
@@ -29,8 +30,8 @@ constexpr int kTaught_sweeps = 20;
 
 } // namespace
 
-SensorIntegration::SensorIntegration(const OdometryOptions& options, const std::vector<MotionSourceOptions>& sources)
-    : sources_(sources), fusion_(options.fusion), no_source_prior_(options.no_source_prior),
+SensorIntegration::SensorIntegration(const OdometryOptions& options, std::vector<MotionSourceOptions> sources)
+    : sources_(std::move(sources)), fusion_(options.fusion), no_source_prior_(options.no_source_prior),
       constant_velocity_statistics_(kConstantVelocity), gyro_biases_(sources_.size()), gyro_scales_(sources_.size()) {
   for (const MotionSourceOptions& source : sources_)
     statistics_.emplace_back(source.kind == SourceKind::imu ? kInertialUnit : kOdometrySource);

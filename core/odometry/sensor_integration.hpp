@@ -39,7 +39,7 @@ struct SeenMotion {
 /// each is to be believed: that is learned from what lidar finds. One owner.
 class SensorIntegration {
  public:
-  SensorIntegration(const OdometryOptions& options, const std::vector<MotionSourceOptions>& sources);
+  SensorIntegration(const OdometryOptions& options, std::vector<MotionSourceOptions> sources);
 
   /// The prior from the best healthy sources but `without`. What none of them says goes on with `twist_base` (m/s,
   /// rad/s), the velocity in the last sweep; nothing: not even that is known.
