@@ -71,7 +71,8 @@ Diagnostic lidar_diagnostic(const LidarOptions& options, const IngestReport::Lid
 
 } // namespace
 
-/// The values are those of the JSON, so a figure that is added there is here, too.
+/// The values are those of the JSON: all of each lidar and source, of DDS and recording; of the rest those that
+/// odometry_diagnostic() lists.
 std::vector<Diagnostic> diagnostics(const Figures& figures) {
   const ordered_json json = to_json(figures);
   std::vector<Diagnostic> all{odometry_diagnostic(figures, json),
