@@ -117,7 +117,7 @@ TEST(LocusExperiments, ACourseThatCannotBeSimulatedIsTheReasonOfItsRuns) {
   const ProgramRun run =
       experiments({"--fault-matrix", "--quiet", "--duration", "10", "-o", folder / "out", "--launcher", "false"});
   EXPECT_EQ(run.status, 1);
-  EXPECT_NE(run.err.find("urban_1/none: failed without a word"), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("urban_1/none: failed without an error message"), std::string::npos) << run.err;
   EXPECT_TRUE(std::filesystem::exists(folder / "out/matrix.md"));
 }
 

@@ -117,7 +117,7 @@ Results judged(const FaultCase& fault_case, const Pairs& pairs) {
           {"nees_10m", median_nees(pairs)}};
 }
 
-/// Nothing where none of its runs is among these: they are another shard's.
+/// Nothing where none of its runs is among these.
 std::optional<Results> row_of(const FaultCase& fault_case, const RunsById& runs, int seeds) {
   Pairs pairs;
   std::vector<std::string> failed;

@@ -120,7 +120,7 @@ Drives drives_of(const HarshCase& harsh_case, Sensors sensors, const RunsById& r
   return drives;
 }
 
-/// Nothing where none of its runs is among these: they are another shard's.
+/// Nothing where none of its runs is among these.
 std::optional<Results> row_of(const HarshCase& harsh_case, Sensors sensors, const RunsById& runs, int seeds) {
   int failed = 0;
   const Drives drives = drives_of(harsh_case, sensors, runs, seeds, failed);

@@ -258,7 +258,7 @@ std::optional<std::string> problem_of(int status, const path& log) {
   const std::string said = last_line_of(log);
   if (status > 128)
     return fmt::format("ended by signal {}", status - 128);
-  return said.empty() ? "failed without a word" : said;
+  return said.empty() ? "failed without an error message" : said;
 }
 
 std::optional<std::string> problem_of(const Course& course, const Places& places) {
