@@ -67,7 +67,7 @@ struct SweepOptions {
   bool operator==(const SweepOptions&) const = default;
 };
 
-enum class ScanToScanMode { always, automatic, off }; ///< automatic: only without a healthy six-axis prior
+enum class ScanToScanMode { always, automatic, off }; ///< automatic: at the start, where nothing predicts the motion
 constexpr auto names_of(ScanToScanMode) { return std::to_array<std::string_view>({"always", "auto", "off"}); }
 
 struct RegistrationOptions {

@@ -8,49 +8,15 @@ namespace locus {
 
 namespace {
 
-constexpr std::size_t kAtATime = 64; ///< points; their figures stay in the fastest cache
-using PerPointAtATime = std::array<float, kAtATime>;
-
-struct Vectors {
-  PerPointAtATime x{}, y{}, z{};
-  void set(std::size_t i, const Eigen::Vector3f& v) {
-    x[i] = v.x();
-    y[i] = v.y();
-    z[i] = v.z();
-  }
-  [[nodiscard]] Eigen::Vector3f operator[](std::size_t i) const { return {x[i], y[i], z[i]}; }
-};
-
-/// exp(-age twist) v as its power series, Horner's way: v - age (w x (v - age/2 (w x (v - ...) + u)) + u) for a
-/// velocity u and a turn rate w. Beyond the sixth term, half a radian moves a point a hundred metres away by a tenth of
-/// a millimetre.
-[[gnu::always_inline]] inline Vectors moved_back(const Vectors& v, const PerPointAtATime& age_s,
-                                                 const Eigen::Vector3f& u, const Eigen::Vector3f& w) {
-  constexpr int kTerms = 6;
-  const float ux = u.x(), uy = u.y(), uz = u.z(), wx = w.x(), wy = w.y(), wz = w.z();
-  Vectors moved;
-  for (std::size_t i = 0; i < kAtATime; ++i) {
-    float x = v.x[i], y = v.y[i], z = v.z[i];
-    for (int term = kTerms; term > 0; --term) {
-      const float share_s = age_s[i] / static_cast<float>(term);
-      const float dx = wy * z - wz * y + ux, dy = wz * x - wx * z + uy, dz = wx * y - wy * x + uz;
-      x = v.x[i] - share_s * dx;
-      y = v.y[i] - share_s * dy;
-      z = v.z[i] - share_s * dz;
-    }
-    moved.x[i] = x;
-    moved.y[i] = y;
-    moved.z[i] = z;
-  }
-  return moved;
-}
-
 /// What turns the old correction into the new one, at a place of the path; linear from one to the next.
 struct Correction {
   float age_s;
   Eigen::Matrix3f R;
   Eigen::Vector3f t;
 };
+Correction correction(double age_s, const Pose& T_true_corrected) {
+  return {static_cast<float>(age_s), T_true_corrected.R().cast<float>(), T_true_corrected.translation.cast<float>()};
+}
 using Corrections = std::array<Correction, CorrectedPath::kMaxPlaces>;
 
 /// Precondition: there are some, from the oldest on.
@@ -63,7 +29,24 @@ Correction at_age(std::span<const Correction> corrections, float age_s) {
   return {age_s, before.R + fraction * (after->R - before.R), before.t + fraction * (after->t - before.t)};
 }
 
+void apply(std::span<const Correction> corrections, std::span<const SweepPoint> points,
+           std::vector<SurfacePoint>& scan) {
+  scan.clear();
+  for (const SweepPoint& point : points) {
+    const auto [age_s, R, t] = at_age(corrections, point.age_s);
+    scan.push_back({R * point.position_base_m + t, R * point.normal_base});
+  }
+}
+
 } // namespace
+
+Vector6 corrected_twist(const Sweep& sweep) {
+  const CorrectedPath& path = sweep.path;
+  if (path.count < 2)
+    return Vector6::Zero();
+  const CorrectedPath::Place &first = path.places[0], &last = path.places[path.count - 1];
+  return se3_log(first.T_start_base.inverse() * last.T_start_base) / to_seconds(last.stamp - first.stamp);
+}
 
 void correct_anew(const Sweep& sweep, const Vector6& twist_base, std::vector<SurfacePoint>& scan) {
   Corrections corrections;
@@ -71,46 +54,23 @@ void correct_anew(const Sweep& sweep, const Vector6& twist_base, std::vector<Sur
     const CorrectedPath::Place& place = sweep.path.places[i];
     const double age_s = to_seconds(sweep.end - place.stamp);
     const Pose T_base_end = place.T_start_base.inverse() * sweep.path.places[sweep.path.count - 1].T_start_base;
-    const Pose T_true_corrected = se3_exp(-age_s * twist_base) * T_base_end;
-    corrections[i] = {static_cast<float>(age_s), T_true_corrected.R().cast<float>(),
-                      T_true_corrected.translation.cast<float>()};
+    corrections[i] = correction(age_s, se3_exp(-age_s * twist_base) * T_base_end);
   }
-  const std::span known = std::span(corrections).first(sweep.path.count);
-  scan.clear();
-  for (const SweepPoint& point : sweep.points) {
-    const auto [age_s, R, t] = known.empty() ? Correction{0, Eigen::Matrix3f::Identity(), Eigen::Vector3f::Zero()}
-                                             : at_age(known, point.age_s);
-    scan.push_back({R * point.position_base_m + t, R * point.normal_base});
-  }
+  if (sweep.path.count == 0)
+    return correct_all(sweep, twist_base, scan);
+  apply(std::span(corrections).first(sweep.path.count), sweep.points, scan);
 }
 
-void correct_all(std::span<const SweepPoint> points, const Vector6& twist_base, Isa isa,
-                 std::vector<SurfacePoint>& scan) {
-  scan.clear();
-  if (twist_base.isZero()) {
-    for (const SweepPoint& point : points)
-      scan.push_back({point.position_base_m, point.normal_base});
-    return;
+void correct_all(const Sweep& sweep, const Vector6& twist_base, std::vector<SurfacePoint>& scan) {
+  constexpr std::size_t kPlaces = 17;
+  const Vector6 corrected = corrected_twist(sweep);
+  const double oldest_s = to_seconds(sweep.end - sweep.start);
+  Corrections corrections;
+  for (std::size_t i = 0; i < kPlaces; ++i) {
+    const double age_s = oldest_s * (1.0 - static_cast<double>(i) / (kPlaces - 1));
+    corrections[i] = correction(age_s, se3_exp(-age_s * twist_base) * se3_exp(age_s * corrected));
   }
-  const Eigen::Vector3f velocity_mps = twist_base.head<3>().cast<float>();
-  const Eigen::Vector3f turn_radps = twist_base.tail<3>().cast<float>();
-  Vectors positions, normals;
-  PerPointAtATime age_s{};
-  while (!points.empty()) {
-    const std::span<const SweepPoint> some = points.first(std::min(kAtATime, points.size()));
-    for (std::size_t i = 0; i < some.size(); ++i) {
-      positions.set(i, some[i].position_base_m);
-      normals.set(i, some[i].normal_base);
-      age_s[i] = some[i].age_s;
-    }
-    run_as(isa, [&] {
-      positions = moved_back(positions, age_s, velocity_mps, turn_radps);
-      normals = moved_back(normals, age_s, Eigen::Vector3f::Zero(), turn_radps);
-    });
-    for (std::size_t i = 0; i < some.size(); ++i)
-      scan.push_back({positions[i], normals[i]});
-    points = points.subspan(some.size());
-  }
+  apply(std::span(corrections).first(kPlaces), sweep.points, scan);
 }
 
 } // namespace locus

@@ -230,18 +230,4 @@ void find(const GicpPass& pass, const SourceBlock& source, MatchBlock& matches, 
     find_here(pass, points, source.count, matches, isa);
 }
 
-void straighten(const WeakDirections& weak, MatchBlock& matches) {
-  constexpr float kNormalError = 0.1F; ///< three standard deviations of a normal from a handful of returns
-  for (const Eigen::Vector3f& along : std::span(weak.unit).first(weak.count)) {
-    for (std::size_t i = 0; i < kGicpBlock; ++i) {
-      const float leans =
-          matches.normal_x[i] * along.x() + matches.normal_y[i] * along.y() + matches.normal_z[i] * along.z();
-      const float taken = std::abs(leans) < kNormalError ? leans : 0.0F;
-      matches.normal_x[i] -= taken * along.x();
-      matches.normal_y[i] -= taken * along.y();
-      matches.normal_z[i] -= taken * along.z();
-    }
-  }
-}
-
 } // namespace locus

@@ -8,11 +8,10 @@
 
 #include "core/base/isa.hpp"
 #include "core/base/pose.hpp"
+#include "core/map/registration.hpp"
 #include "core/map/surface_map.hpp"
 
 namespace locus {
-
-inline constexpr std::size_t kGicpBlock = 256; ///< points that are summed up together, whatever the number of threads
 
 /// One figure of each point of a block: one array per figure makes loops over points vector instructions.
 using PerPoint = std::array<float, kGicpBlock>;
@@ -50,11 +49,8 @@ enum class LookUp {
   around, ///< the nearest plane of the 27 voxels around it, coarse or else fine
 };
 
-/// Directions along which hardly any surface stands in the way, as along a corridor.
-struct WeakDirections {
-  std::array<Eigen::Vector3f, 2> unit{};
-  std::size_t count = 0;
-};
+/// Three directions at right angles.
+using Axes = std::array<std::array<float, 3>, 3>;
 
 /// Transform in single precision.
 struct Affine {
@@ -71,6 +67,7 @@ struct GicpPass {
   bool takes_shapeless;        ///< voxels without a plane serve, too
   double max_correspondence_m; ///< across the plane
   double width2;               ///< of Geman-McClure, squared standard deviations
+  Axes axes{};                 ///< of the surfaces around, from the least to the most seen
 
   /// From the source to the target about origin_m.
   [[nodiscard]] Affine T_origin_source() const {
@@ -81,9 +78,5 @@ struct GicpPass {
 /// Finds the correspondences of the points as the pass says, which is not to keep them. Pure but for `matches`; any
 /// thread.
 void find(const GicpPass& pass, const SourceBlock& source, MatchBlock& matches, Isa isa);
-
-/// Takes correspondences that lean along a weak direction by no more than the error of a normal as not leaning there.
-/// They would tie the robot to where the scan lines fell.
-void straighten(const WeakDirections& weak, MatchBlock& matches);
 
 } // namespace locus

@@ -2,6 +2,7 @@
 #include "core/map/gicp_kernel.hpp"
 
 #include <array>
+#include <cmath>
 
 namespace locus {
 
@@ -14,7 +15,9 @@ enum Term : std::size_t {
   kHrr = kHtr + 9, ///< rotation with rotation: xx xy xz yy yz zz
   kBt = kHrr + 6,
   kBr = kBt + 3,
-  kError = kBr + 3,
+  kSeen = kBr + 3,    ///< along the axes of the pass and about those of the target
+  kSides = kSeen + 6, ///< the same
+  kError = kSides + 6,
   kWeight,
   kInliers,
   kPlanes,
@@ -28,14 +31,13 @@ using Terms = std::array<std::array<float, kChunk>, kTerms>;
 using Lanes = std::array<float, kLanes>;
 using Sums = std::array<Lanes, kTerms>;
 
-/// The terms of all points from `begin`: residual d = R p + t - mean, J = [I, -(R p)x] for a turn about the target's
-/// axes.
-///
-/// The information M = (C_target + C_source)^-1 of two surfaces with normals n and m: the sum of the covariances is
-/// alpha I - u n n' - v m m', inverted after Woodbury to (I + n e' + m f') / alpha. A side without a normal is a ball,
-/// its u or v zero.
+/// The terms of all points from `begin`. The residual of a plane is r = n' (R p + t - mean), its gradient to the pose
+/// g = (n, R p x n). Normals are noisy, and a sum of g g' would take their noise for surfaces that stand in every way:
+/// along a corridor the robot would be tied to where the scan lines fell. The normal m that the point knows of its own
+/// errs independently of n, so a sum of m n' has no such part: the method of instrumental variables (Reiersol 1941). A
+/// shapeless correspondence is a ball.
 [[gnu::always_inline]] inline void take_terms(const Affine& T, const SourceBlock& source, const MatchBlock& match,
-                                              float width2, std::size_t begin, Terms& terms) {
+                                              const Axes& axes, float width2, std::size_t begin, Terms& terms) {
   const auto [R, t] = T;
   const float r00 = R(0, 0), r01 = R(0, 1), r02 = R(0, 2), r10 = R(1, 0), r11 = R(1, 1), r12 = R(1, 2), r20 = R(2, 0),
               r21 = R(2, 1), r22 = R(2, 2), tx = t.x(), ty = t.y(), tz = t.z();
@@ -46,75 +48,78 @@ using Sums = std::array<Lanes, kTerms>;
     const float y = r10 * px + r11 * py + r12 * pz;
     const float z = r20 * px + r21 * py + r22 * pz;
     const float sx = source.normal_x[i], sy = source.normal_y[i], sz = source.normal_z[i];
-    const float mx = r00 * sx + r01 * sy + r02 * sz;
-    const float my = r10 * sx + r11 * sy + r12 * sz;
-    const float mz = r20 * sx + r21 * sy + r22 * sz;
+    const float ox = r00 * sx + r01 * sy + r02 * sz;
+    const float oy = r10 * sx + r11 * sy + r12 * sz;
+    const float oz = r20 * sx + r21 * sy + r22 * sz;
     const float nx = match.normal_x[i], ny = match.normal_y[i], nz = match.normal_z[i];
     const float dx = x + tx - match.x_m[i];
     const float dy = y + ty - match.y_m[i];
     const float dz = z + tz - match.z_m[i];
 
-    const float u = match.along_m2[i] - match.across_m2[i];
-    const float v = source.along_m2[i] - kPointVariance_m2;
-    const float share = 1.0F / (match.along_m2[i] + source.along_m2[i]); // 1 / alpha
+    const float knows = ox * ox + oy * oy + oz * oz > 0.5F ? 1.0F : 0.0F;
+    const float own = nx * ox + ny * oy + nz * oz < 0.0F ? -knows : knows;
+    const float rest = 1.0F - knows;
+    const float mx = own * ox + rest * nx, my = own * oy + rest * ny, mz = own * oz + rest * nz;
     const float cx = ny * mz - nz * my, cy = nz * mx - nx * mz, cz = nx * my - ny * mx;
-    const float uv = u * v * share;
-    const float s = 1.0F / (match.across_m2[i] + kPointVariance_m2 + uv * (cx * cx + cy * cy + cz * cz));
-    const float nn = s * (u - uv);
-    const float mm = s * (v - uv);
-    const float nm = s * uv * (nx * mx + ny * my + nz * mz);
-    const float ex = nn * nx + nm * mx, ey = nn * ny + nm * my, ez = nn * nz + nm * mz;
-    const float fx = nm * nx + mm * mx, fy = nm * ny + mm * my, fz = nm * nz + mm * mz;
+    const float reach = source.along_m2[i] - kPointVariance_m2;
+    const float s = 1.0F / (match.across_m2[i] + kPointVariance_m2 + reach * (cx * cx + cy * cy + cz * cz));
+    const float planar = nx * nx + ny * ny + nz * nz > 0.5F ? match.found[i] : 0.0F;
+    const float ball = match.found[i] - planar;
 
-    const float ed = ex * dx + ey * dy + ez * dz;
-    const float fd = fx * dx + fy * dy + fz * dz;
-    const float gx = share * (dx + nx * ed + mx * fd); // M d
-    const float gy = share * (dy + ny * ed + my * fd);
-    const float gz = share * (dz + nz * ed + mz * fd);
-    const float r2 = dx * gx + dy * gy + dz * gz;
+    const float r = nx * dx + ny * dy + nz * dz;
+    const float r2 = s * (planar * r * r + ball * (dx * dx + dy * dy + dz * dz));
     const float root = width2 / (width2 + r2);
-    const float w = match.found[i] * root * root; // Geman-McClure
-    const float ws = w * share;
-    const float xx = ws * (1.0F + nx * ex + mx * fx), xy = ws * (nx * ey + mx * fy), xz = ws * (nx * ez + mx * fz);
-    const float yy = ws * (1.0F + ny * ey + my * fy), yz = ws * (ny * ez + my * fz);
-    const float zz = ws * (1.0F + nz * ez + mz * fz);
+    const float w = s * root * root; // Geman-McClure
+    const float wp = planar * w, wb = ball * w;
 
-    // w M [R p]x, negated
-    const float ax = y * xz - z * xy, ay = z * xx - x * xz, az = x * xy - y * xx;
-    const float bx = y * yz - z * yy, by = z * xy - x * yz, bz = x * yy - y * xy;
-    const float hx = y * zz - z * yz, hy = z * xz - x * zz, hz = x * yz - y * xz;
-
-    terms[kHtt + 0][k] = xx;
-    terms[kHtt + 1][k] = xy;
-    terms[kHtt + 2][k] = xz;
-    terms[kHtt + 3][k] = yy;
-    terms[kHtt + 4][k] = yz;
-    terms[kHtt + 5][k] = zz;
-    terms[kHtr + 0][k] = ax;
-    terms[kHtr + 1][k] = ay;
-    terms[kHtr + 2][k] = az;
-    terms[kHtr + 3][k] = bx;
-    terms[kHtr + 4][k] = by;
-    terms[kHtr + 5][k] = bz;
-    terms[kHtr + 6][k] = hx;
-    terms[kHtr + 7][k] = hy;
-    terms[kHtr + 8][k] = hz;
-    terms[kHrr + 0][k] = y * hx - z * bx;
-    terms[kHrr + 1][k] = y * hy - z * by;
-    terms[kHrr + 2][k] = y * hz - z * bz;
-    terms[kHrr + 3][k] = z * ay - x * hy;
-    terms[kHrr + 4][k] = z * az - x * hz;
-    terms[kHrr + 5][k] = x * bz - y * az;
-    terms[kBt + 0][k] = w * gx;
-    terms[kBt + 1][k] = w * gy;
-    terms[kBt + 2][k] = w * gz;
-    terms[kBr + 0][k] = w * (y * gz - z * gy);
-    terms[kBr + 1][k] = w * (z * gx - x * gz);
-    terms[kBr + 2][k] = w * (x * gy - y * gx);
-    terms[kError][k] = w * r2;
-    terms[kWeight][k] = w;
+    const float gx = y * nz - z * ny, gy = z * nx - x * nz, gz = x * ny - y * nx; // x times n
+    const float ax = wp * nx, ay = wp * ny, az = wp * nz;
+    terms[kHtt + 0][k] = ax * nx + wb;
+    terms[kHtt + 1][k] = ax * ny;
+    terms[kHtt + 2][k] = ax * nz;
+    terms[kHtt + 3][k] = ay * ny + wb;
+    terms[kHtt + 4][k] = ay * nz;
+    terms[kHtt + 5][k] = az * nz + wb;
+    terms[kHtr + 0][k] = ax * gx;
+    terms[kHtr + 1][k] = ax * gy + wb * z;
+    terms[kHtr + 2][k] = ax * gz - wb * y;
+    terms[kHtr + 3][k] = ay * gx - wb * z;
+    terms[kHtr + 4][k] = ay * gy;
+    terms[kHtr + 5][k] = ay * gz + wb * x;
+    terms[kHtr + 6][k] = az * gx + wb * y;
+    terms[kHtr + 7][k] = az * gy - wb * x;
+    terms[kHtr + 8][k] = az * gz;
+    const float tx_ = wp * gx, ty_ = wp * gy, tz_ = wp * gz;
+    terms[kHrr + 0][k] = tx_ * gx + wb * (y * y + z * z);
+    terms[kHrr + 1][k] = tx_ * gy - wb * x * y;
+    terms[kHrr + 2][k] = tx_ * gz - wb * x * z;
+    terms[kHrr + 3][k] = ty_ * gy + wb * (z * z + x * x);
+    terms[kHrr + 4][k] = ty_ * gz - wb * y * z;
+    terms[kHrr + 5][k] = tz_ * gz + wb * (x * x + y * y);
+    terms[kBt + 0][k] = ax * r + wb * dx;
+    terms[kBt + 1][k] = ay * r + wb * dy;
+    terms[kBt + 2][k] = az * r + wb * dz;
+    terms[kBr + 0][k] = tx_ * r + wb * (y * dz - z * dy);
+    terms[kBr + 1][k] = ty_ * r + wb * (z * dx - x * dz);
+    terms[kBr + 2][k] = tz_ * r + wb * (x * dy - y * dx);
+    const float hx = y * mz - z * my, hy = z * mx - x * mz, hz = x * my - y * mx;
+    for (std::size_t side = 0; side < 3; ++side) {
+      const float along_m = mx * axes[side][0] + my * axes[side][1] + mz * axes[side][2];
+      const float along_n = nx * axes[side][0] + ny * axes[side][1] + nz * axes[side][2];
+      terms[kSeen + side][k] = wp * along_m * along_n + wb;
+      terms[kSides + side][k] = wp * std::abs(along_m);
+    }
+    terms[kSeen + 3][k] = wp * gx * hx + wb * (y * y + z * z);
+    terms[kSeen + 4][k] = wp * gy * hy + wb * (z * z + x * x);
+    terms[kSeen + 5][k] = wp * gz * hz + wb * (x * x + y * y);
+    terms[kSides + 3][k] = wp * std::abs(hx);
+    terms[kSides + 4][k] = wp * std::abs(hy);
+    terms[kSides + 5][k] = wp * std::abs(hz);
+    const float weight = match.found[i] * root * root;
+    terms[kError][k] = weight * r2;
+    terms[kWeight][k] = weight;
     terms[kInliers][k] = r2 < width2 ? match.found[i] : 0.0F;
-    terms[kPlanes][k] = nx * nx + ny * ny + nz * nz > 0.5F ? match.found[i] : 0.0F;
+    terms[kPlanes][k] = planar;
   }
 }
 
@@ -126,10 +131,10 @@ using Sums = std::array<Lanes, kTerms>;
 }
 
 [[gnu::always_inline]] inline void sum_block(const Affine& T, const SourceBlock& source, const MatchBlock& matches,
-                                             float width2, Sums& sums) {
+                                             const Axes& axes, float width2, Sums& sums) {
   Terms terms;
   for (std::size_t begin = 0; begin < kGicpBlock; begin += kChunk) {
-    take_terms(T, source, matches, width2, begin, terms);
+    take_terms(T, source, matches, axes, width2, begin, terms);
     add_up(terms, sums);
   }
 }
@@ -163,6 +168,10 @@ NormalEquations equations_of(const Sums& sums) {
   result.H = matrix_of(sums);
   for (int i = 0; i < 6; ++i)
     result.b[i] = total(sums[kBt + static_cast<std::size_t>(i)]);
+  for (int axis = 0; axis < 6; ++axis) {
+    result.seen[axis] = total(sums[kSeen + static_cast<std::size_t>(axis)]);
+    result.sides[axis] = total(sums[kSides + static_cast<std::size_t>(axis)]);
+  }
   result.error = total(sums[kError]);
   result.weight = total(sums[kWeight]);
   result.inliers = static_cast<std::size_t>(total(sums[kInliers]));
@@ -218,7 +227,7 @@ NormalEquations equations_of(const Sums& sums) {
 NormalEquations linearise(const GicpPass& pass, const SourceBlock& source, const MatchBlock& matches, Isa isa) {
   Sums sums{};
   const Affine T = pass.T_origin_source();
-  run_as(isa, [&] { sum_block(T, source, matches, static_cast<float>(pass.width2), sums); });
+  run_as(isa, [&] { sum_block(T, source, matches, pass.axes, static_cast<float>(pass.width2), sums); });
   return equations_of(sums);
 }
 

@@ -13,6 +13,9 @@ namespace locus {
 struct NormalEquations {
   Matrix6 H = Matrix6::Zero();
   Vector6 b = Vector6::Zero();
+  /// Along the axes of the pass and about those of the target: the information without what only noise of the normals
+  /// makes of it, and what an error of a metre that all points have in common, each to the worse side, adds to b.
+  Vector6 seen = Vector6::Zero(), sides = Vector6::Zero();
   double error = 0.0;
   double weight = 0.0;
   std::size_t planes = 0; ///< points whose correspondence is a plane
@@ -21,6 +24,8 @@ struct NormalEquations {
   void operator+=(const NormalEquations& other) {
     H += other.H;
     b += other.b;
+    seen += other.seen;
+    sides += other.sides;
     error += other.error;
     weight += other.weight;
     planes += other.planes;

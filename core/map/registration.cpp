@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/map/registration.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <vector>
 
 #include "core/map/gicp_kernel.hpp"
@@ -29,33 +31,90 @@ constexpr double kWidthStart = 12.0;
 constexpr double kWidthEnd = 3.5;
 constexpr double kNarrowing = 0.25;
 
+/// Points of one voxel, one arc, one object are not independent: what all say together is that part of what they seem
+/// to say, and less where they fit worse than their surfaces tell, which differs twentyfold between scenes.
+constexpr double kIndependent = 0.06;
+constexpr double kBestFit = 0.3; ///< mean squared Mahalanobis distance
+
+/// The products of as many normals that err independently come to that much by chance, in standard deviations; it is
+/// no information (the estimator of James and Stein). It is not claimed, though the registration follows it: what
+/// little a sweep tells is better than nothing.
+constexpr double kByChance_sigma = 2.0;
+constexpr double kNothing = 1e-9; ///< of information
+
+/// An error that a sweep has in common: of the calibration, of the angle at which surfaces are hit, of what the map has
+/// taken in of both. It is considered (Schmidt), not estimated. Where a few surfaces stand across, it costs little;
+/// along a corridor, of which a thousand leaning normals tell, it leaves nothing.
+constexpr double kCommonError_m = 0.001;
+
 constexpr double kConvergedTranslation_m = 1e-3;
 constexpr double kConvergedRotation_rad = 1e-4;
 constexpr int kStepsPerLookUp = 2; ///< Gauss-Newton steps on the same correspondences
 
-/// Where fewer than this share of the normals points, there is next to nothing to hold on to.
-constexpr double kFewNormals = 0.01;
-
-WeakDirections weak_directions(const Normals& normals) {
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
-  axes.computeDirect(normals.squares / std::max(normals.points, 1.0));
-  WeakDirections weak;
-  for (int axis = 0; axis < 2 && axes.eigenvalues()[axis] < kFewNormals; ++axis)
-    weak.unit[weak.count++] = axes.eigenvectors().col(axis).cast<float>();
-  return weak;
+Axes axes_of(const Normals& normals) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.computeDirect(normals.squares / std::max(normals.points, 1.0));
+  Axes axes;
+  for (std::size_t axis = 0; axis < axes.size(); ++axis)
+    Eigen::Vector3f::Map(axes[axis].data()) = solver.eigenvectors().col(static_cast<Eigen::Index>(axis)).cast<float>();
+  return axes;
 }
 
-/// What the gradients of the points count for. A handful of points is not a hundredth of a crowd: along a weak
-/// direction there are no others to be checked against, and what is wrong with them comes again with every sweep.
-Matrix6 belief(const WeakDirections& weak, const Normals& normals) {
-  Matrix6 belief = Matrix6::Identity();
-  for (const Eigen::Vector3f& unit : std::span(weak.unit).first(weak.count)) {
-    const Eigen::Vector3d along = unit.cast<double>();
-    const double share = along.dot(normals.squares * along) / std::max(normals.points, 1.0);
-    belief.topLeftCorner<3, 3>() -= std::max(0.0, 1.0 - share / kFewNormals) * along * along.transpose();
+constexpr double square(double x) { return x * x; }
+
+/// What a matrix does to the pose, in the target's axes, it does to the twist in those of the base.
+Matrix12 pose_and_twist(const Matrix6& of_pose, const Matrix6& R_target_base) {
+  Matrix12 both = Matrix12::Zero();
+  both.topLeftCorner<6, 6>() = of_pose;
+  both.bottomRightCorner<6, 6>() = R_target_base.transpose() * of_pose * R_target_base;
+  return both;
+}
+
+/// Normal equations of pose and twist.
+struct ElasticEquations {
+  Matrix12 H = Matrix12::Zero(); ///< once complete, of the equations to be solved: not symmetric
+  Matrix12 information;
+  Vector12 b = Vector12::Zero();
+  NormalEquations of_pose;
+
+  /// Those of a block of points that are `age_s` old.
+  void add(const NormalEquations& block, double age_s, const Matrix6& R_target_base) {
+    of_pose += block;
+    if (age_s == 0.0)
+      return;
+    const Matrix6 across = -age_s * block.H * R_target_base;
+    H.topRightCorner<6, 6>() += across;
+    H.bottomRightCorner<6, 6>() -= age_s * R_target_base.transpose() * across;
+    b.tail<6>() -= age_s * R_target_base.transpose() * block.b;
   }
-  return belief;
-}
+  void complete(const Axes& axes, const Matrix6& R_target_base) {
+    H.topLeftCorner<6, 6>() = of_pose.H;
+    H.bottomLeftCorner<6, 6>() = H.topRightCorner<6, 6>().transpose();
+    b.head<6>() = of_pose.b;
+    Matrix6 solved = Matrix6::Zero(), claimed = Matrix6::Zero(); // square roots of what is left of the information
+    const double independent = std::max(1.0, kIndependent * of_pose.weight);
+    for (int side = 0; side < 6; ++side) {
+      Vector6 axis = Vector6::Unit(side);
+      if (side < 3)
+        axis.head<3>() = Eigen::Vector3f(axes[static_cast<std::size_t>(side)].data()).cast<double>();
+      const double all = std::max(axis.dot(of_pose.H * axis), kNothing);
+      const double seen = std::clamp(of_pose.seen[side], kNothing, all);
+      const double sure = std::max(kNothing, seen - square(kByChance_sigma * all) / independent / seen); // James, Stein
+      const double common = square(kCommonError_m * of_pose.sides[side]);
+      solved += seen / std::sqrt(all * (seen + common)) * axis * axis.transpose();
+      claimed += sure / std::sqrt(all * (sure + common)) * axis * axis.transpose();
+    }
+    const Matrix12 of_both = pose_and_twist(solved, R_target_base),
+                   sure_of_both = pose_and_twist(claimed, R_target_base);
+    information = sure_of_both * H * sure_of_both;
+    H = (of_both * of_both * H).eval();
+    b = (of_both * of_both * b).eval();
+    const double honest = kIndependent / std::max(kBestFit, of_pose.error / std::max(of_pose.weight, 1.0));
+    information *= honest;
+    H *= honest;
+    b *= honest;
+  }
+};
 
 } // namespace
 
@@ -73,34 +132,46 @@ struct Gicp::Workers {
     arena.execute([&] { tbb::parallel_for(std::size_t{0}, blocks.size(), body, tbb::simple_partitioner{}); });
   }
 
-  void take(std::span<const SurfacePoint> source) {
+  void take(const ElasticScan& source) {
     blocks.clear();
-    for (std::size_t begin = 0; begin < source.size(); begin += kGicpBlock)
-      blocks.emplace_back(source.subspan(begin, std::min(kGicpBlock, source.size() - begin)));
+    for (std::size_t begin = 0; begin < source.points.size(); begin += kGicpBlock)
+      blocks.emplace_back(source.points.subspan(begin, std::min(kGicpBlock, source.points.size() - begin)));
     matches.resize(std::max(matches.size(), blocks.size()));
     partial.resize(std::max(partial.size(), blocks.size()));
+    age_s.assign(blocks.size(), 0.0);
+    std::copy(source.block_age_s.begin(), source.block_age_s.end(), age_s.begin());
+    twist_of_scan = source.twist_base;
+  }
+
+  /// Where the frame of a block lies in the target for a base that moved with `twist_base`.
+  [[nodiscard]] Pose place(std::size_t block, const Pose& T_target_source, const Vector6& twist_base) const {
+    if (age_s[block] == 0.0)
+      return T_target_source;
+    return T_target_source * se3_exp(-age_s[block] * twist_base) * se3_exp(age_s[block] * twist_of_scan);
   }
 
   /// One pass over all points, block by block in a fixed order of summation.
-  NormalEquations run(const GicpPass& pass) {
-    if (pass.look_up != LookUp::keep)
-      look_up(pass);
-    for_each_block([&](std::size_t block) { partial[block] = linearise(pass, blocks[block], matches[block], isa); });
-    NormalEquations total;
+  ElasticEquations run(GicpPass pass, const Vector6& twist_base) {
+    const auto of = [&](std::size_t block) {
+      GicpPass of_block = pass;
+      of_block.T_target_source = place(block, pass.T_target_source, twist_base);
+      return of_block;
+    };
+    if (pass.look_up != LookUp::keep) {
+      for_each_block([&](std::size_t block) { find(of(block), blocks[block], matches[block], isa); });
+      axes = axes_of(normals());
+    }
+    pass.axes = axes;
+    for_each_block([&](std::size_t block) {
+      const GicpPass of_block = of(block);
+      partial[block] = linearise(of_block, blocks[block], matches[block], isa);
+    });
+    const Matrix6 R_target_base = turn_both(pass.T_target_source.rotation);
+    ElasticEquations total;
     for (std::size_t block = 0; block < blocks.size(); ++block)
-      total += partial[block];
-    total.H = believed * total.H * believed;
-    total.b = believed * total.b;
+      total.add(partial[block], age_s[block], R_target_base);
+    total.complete(pass.axes, R_target_base);
     return total;
-  }
-
-  void look_up(const GicpPass& pass) {
-    for_each_block([&](std::size_t block) { find(pass, blocks[block], matches[block], isa); });
-    const WeakDirections weak = weak_directions(normals());
-    for (std::size_t block = 0; block < blocks.size() && weak.count > 0; ++block)
-      straighten(weak, matches[block]);
-    straightened = weak.count > 0;
-    believed = straightened ? belief(weak, normals()) : Matrix6::Identity();
   }
 
   [[nodiscard]] Normals normals() const {
@@ -124,8 +195,9 @@ struct Gicp::Workers {
   std::vector<SourceBlock> blocks;
   std::vector<MatchBlock> matches;
   std::vector<NormalEquations> partial;
-  bool straightened = false; ///< the matches
-  Matrix6 believed = Matrix6::Identity();
+  std::vector<double> age_s; ///< of the blocks
+  Axes axes{};
+  Vector6 twist_of_scan = Vector6::Zero();
 };
 
 Gicp::Gicp(int threads, Isa isa) : workers_(std::make_unique<Workers>(threads, isa)) {}
@@ -133,32 +205,40 @@ Gicp::~Gicp() = default;
 
 namespace {
 
-/// Gauss-Newton step from T, in (translation, turn about the target's axes).
-Vector6 solve(const NormalEquations& points, const Pose& T, const PosePrior& prior) {
-  Vector6 from_prior;
-  from_prior << T.translation - prior.T_target_source.translation,
-      so3_log(T.rotation * prior.T_target_source.rotation.conjugate());
-  const Matrix6 H = points.H + prior.information + kDamping * Matrix6::Identity();
-  return -H.ldlt().solve(points.b + prior.information * from_prior);
+/// Gauss-Newton step from where the registration stands.
+Vector12 solve(const ElasticEquations& points, const Registration& at, const MotionBelief& prior) {
+  Vector12 from_prior;
+  from_prior << difference(at.T_target_source, prior.T_target_source), at.twist_base - prior.twist_base;
+  Matrix12 H = points.H + prior.information;
+  H.diagonal().array() += kDamping;
+  return -H.partialPivLu().solve(points.b + prior.information * from_prior);
 }
 
-void describe(const NormalEquations& points, Registration& result) {
-  result.inliers = points.inliers;
-  result.mean_error = points.error / points.weight;
-  result.information = points.H;
+void describe(const ElasticEquations& points, Registration& result) {
+  result.inliers = points.of_pose.inliers;
+  result.mean_error = points.of_pose.error / points.of_pose.weight;
+  result.information = points.information;
 }
 
-bool is_small(const Vector6& step) {
-  return step.head<3>().norm() < kConvergedTranslation_m && step.tail<3>().norm() < kConvergedRotation_rad;
+bool is_small(const Vector12& step) {
+  return step.head<3>().norm() < kConvergedTranslation_m && step.segment<3>(3).norm() < kConvergedRotation_rad;
+}
+
+void move(const Vector12& step, Registration& result) {
+  const Pose& T = result.T_target_source;
+  result.T_target_source = {(so3_exp(step.segment<3>(3)) * T.rotation).normalized(), T.translation + step.head<3>()};
+  result.twist_base += step.tail<6>();
+  ++result.iterations;
 }
 
 } // namespace
 
-Registration Gicp::align(std::span<const SurfacePoint> source, const SurfaceMap& target, const Pose& T_start,
-                         const PosePrior& prior, const RegistrationOptions& options, bool wide,
+Registration Gicp::align(const ElasticScan& source, const SurfaceMap& target, const Pose& T_start,
+                         const MotionBelief& prior, const RegistrationOptions& options, bool wide,
                          const StopRequested& stop) {
   Registration result;
   result.T_target_source = T_start;
+  result.twist_base = source.twist_base;
   if (!T_start.finite() || !target.reaches(T_start.translation))
     return result;
   workers_->take(source);
@@ -166,27 +246,28 @@ Registration Gicp::align(std::span<const SurfacePoint> source, const SurfaceMap&
   bool few_planes = false;
   bool can_follow = false;
   while (result.iterations < options.max_iterations && (result.iterations == 0 || !stop())) {
-    const Pose& T = result.T_target_source;
     const bool looks_up = result.iterations % kStepsPerLookUp == 0;
     if (looks_up && result.iterations > 0)
       width = std::max(kNarrowing * width, kWidthEnd);
     const LookUp anew = wide && width > kWidthStart ? LookUp::around : can_follow ? LookUp::follow : LookUp::here;
-    const NormalEquations points = workers_->run({target, T, T_start.translation, looks_up ? anew : LookUp::keep,
-                                                  few_planes, options.max_correspondence_m, width * width});
-    if (!(points.weight > 0.0))
+    const ElasticEquations points =
+        workers_->run({target, result.T_target_source, T_start.translation, looks_up ? anew : LookUp::keep, few_planes,
+                       options.max_correspondence_m, width * width},
+                      result.twist_base);
+    if (!(points.of_pose.weight > 0.0))
       break;
     if (looks_up)
-      can_follow = anew != LookUp::around && !workers_->straightened;
-    if (!few_planes && static_cast<double>(points.planes) < kFewPlanes * static_cast<double>(source.size())) {
+      can_follow = anew != LookUp::around;
+    if (!few_planes &&
+        static_cast<double>(points.of_pose.planes) < kFewPlanes * static_cast<double>(source.points.size())) {
       few_planes = true;
       can_follow = false;
     }
-    const Vector6 step = solve(points, T, prior);
+    const Vector12 step = solve(points, result, prior);
     if (!step.allFinite())
       break;
     describe(points, result);
-    result.T_target_source = {(so3_exp(step.tail<3>()) * T.rotation).normalized(), T.translation + step.head<3>()};
-    ++result.iterations;
+    move(step, result);
     result.converged = looks_up && width <= kWidthEnd && is_small(step);
     if (result.converged)
       break;

@@ -27,7 +27,9 @@ Eigen::Vector3d level_rpy_rad(const Eigen::Vector3d& up_base) {
 void Gravity::observe(const Eigen::Quaterniond& R_last_now, const Sweep& sweep) {
   if (up_base_)
     up_base_ = R_last_now.conjugate() * *up_base_;
-  const auto& force = sweep.motion.specific_force_base_mps2;
+  std::optional<Eigen::Vector3d> force;
+  if (sweep.motion.specific_force)
+    force = sweep.motion.specific_force->mean_base_mps2();
   measured_ = sweep.motion.up_base || (force && std::abs(force->norm() - kGravity_mps2) < kTolerance_mps2);
   if (!measured_)
     return;

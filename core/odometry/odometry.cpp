@@ -2,10 +2,13 @@
 #include "core/odometry/odometry.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include "core/ingest/deskew.hpp"
 #include "core/odometry/relocation.hpp"
+#include "core/sources/motion_sources.hpp"
 
 namespace locus {
 
@@ -16,370 +19,44 @@ constexpr std::size_t kMinPoints = 30; ///< fewer say nothing reliable about six
 /// Least share of the points that must find a correspondence for a registration to be believed.
 constexpr double kMinInlierShare = 0.1;
 
-/// A registration that contradicts the prior by more than this many standard deviations, and by more than the least, is
-/// refused.
-constexpr double kMaxDeviation_sigma = 8.0;
-constexpr double kAlwaysAllowed_m = 0.5;
-constexpr double kAlwaysAllowed_rad = 0.1;
-
-/// A source of the rotation is put to the vote if, about any axis, it turns otherwise than the robot would without it
-/// by more than this many standard deviations of that and by more than the least, or by more than kAlwaysAllowed_rad.
-constexpr double kDispute_sigma = 6.0;
-constexpr double kLeastDispute_rad = 0.02;
-
-/// No place changes so fast that from one sweep to the next less than this part of the usual correspondences is left:
-/// the air is full of dust, or the lidar measures otherwise than before. Such a sweep is not for the map, and may
-/// contradict the motion sources by no more than this. (The worst of honest drives is 0.78; in dust, 2.2 sigma.)
-constexpr double kLeastOfUsual = 0.5;
+/// What misses most of the usual correspondences may contradict the motion sources by no more than this.
 constexpr double kLoneDeviation_sigma = 3.0;
-constexpr double kMemoryOfUsual_sweeps = 10.0;
 
-/// A lidar that falls silent leaves a last sweep that is hardly begun. A sweep of so few points, as part of the usual,
-/// tells a place but no velocity: what noise there is in it would carry the robot away for as long as nothing is seen.
-constexpr double kFragment = 1.0 / 3.0;
-
-/// A robot of which nothing is seen is taken to go on as it did for so long, and to come to rest then.
-constexpr Duration kGoesOn = std::chrono::seconds{1};
-constexpr double kComesToRest_s = 1.0;
-
-/// After so many refusals in a row the submap is behind us, and the map goes on from the prediction. Where wheels or
-/// legs carry the estimate it waits, for so long since lidar last placed the robot: what is measured wrong must not get
-/// into the map.
-constexpr int kRefusalsToRestart = 10;
-constexpr Duration kLately = std::chrono::seconds{5};
-
-/// Of what was not foreseen of the motion in a sweep, how much shows in where it comes to lie, how far a turn shifts
-/// it, for what it sees stands to one side, and how much of that goes on in the next.
-constexpr double kAskew = 0.4;
-constexpr double kArm_m = 2.0;
-constexpr double kShakesOn = 0.7;
-
-/// A prior that is less sure than this looks for correspondences all around each point.
+/// A belief that is less sure than this looks for correspondences all around each point.
 constexpr double kWide_m = 0.3;
 
+/// A twist that the points were not corrected for bends a block of them: so much of it and they are corrected anew.
+constexpr double kBends_mps = 0.3, kBends_radps = 0.05;
+
+/// A hypothesis that assumes less than another may fit so much worse than that; that the robot still stands, less: a
+/// robot that pulls away would be held back.
+constexpr double kAsGood = 0.99, kAsGoodAtRest = 0.998;
+
+/// What a robot that comes to rest is slower than, for how long.
+const Vector6 kSlow = along_each_axis(0.05, 2.0);
+constexpr double kSlowDoubt = 4.0;
+constexpr Duration kSlowFor = std::chrono::milliseconds{500};
+constexpr double kRest_sigma = 3.0;
+
+/// Of a robot of which nothing is known.
+const Vector6 kUnknownTwist = along_each_axis(10.0, 100.0);
 constexpr int kStartRounds = 8;        ///< at the most, until motion and correction of the first two sweeps agree:
 constexpr double kStartAgrees = 0.002; ///< metres, radians
 
 /// Room for the 16 000 voxels of a large sweep, and small enough for the second cache.
 constexpr std::size_t kLastScanBytes = 2'500'000;
 
-/// Of two registrations of the same points. A point without a correspondence counts as one that is three sigma off.
-bool fits_better(const Registration& one, const Registration& other) {
-  constexpr double kMissing = 9.0;
-  const auto gain = [](const Registration& fit) {
-    return static_cast<double>(fit.inliers) * (kMissing - fit.mean_error);
-  };
-  return gain(one) > gain(other);
-}
+constexpr std::size_t kAgeBins = 64;
 
-} // namespace
+const std::bitset<kMaxSources> kAllSources = std::bitset<kMaxSources>{}.set();
 
-Odometry::Odometry(const OdometryOptions& options, const std::vector<MotionSourceOptions>& sources, StageClock* clock)
-    : options_(options), clock_(clock), gicp_(options.threads, options.isa), flat_ground_(options.flat_ground),
-      map_(options.map.max_bytes, options.isa), last_scan_map_(kLastScanBytes, options.isa),
-      sensors_(options, sources) {}
-
-OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested& stop) {
-  prepare_next();
-  if (processed_ == 0)
-    return begin(sweep);
-  const MotionPrior prior = settle_dispute(sweep, sensors_.integrate(sweep, kept_twist(sweep)), stop);
-  lacks_prior_ = needs_scan_to_scan(prior);
-  gravity_.observe(prior.T_last_now.rotation, sweep);
-  flat_ground_.observe(sweep.end, gravity_.up_base());
-  Pose T_last_now = prior.T_last_now;
-  correct_motion(sweep, T_last_now);
-
-  OdometryEstimate estimate;
-  estimate.scan_to_scan = match_scan(prior, T_last_now, prior.blind, stop);
-  if (trusts(estimate.scan_to_scan, estimate.scan_to_scan.T_target_source, prior.T_last_now, prior.variance)) {
-    if (prior.blind)
-      begin_again(sweep, prior, estimate.scan_to_scan, stop);
-    const Matrix6 R = turn_both(T_odom_last_.rotation);
-    T_last_now = flatten(estimate.scan_to_scan.T_target_source, R * estimate.scan_to_scan.information * R.transpose());
-    correct_motion(sweep, T_last_now);
-  }
-  estimate.scan_to_scan.T_target_source = T_last_now; // also where it was not trusted
-  const PoseUncertainty before = uncertainty_;
-  predict(prior);
-  estimate.scan_to_submap = match_submap(prior, T_last_now, stop);
-  const Pose T_last_submap = T_odom_last_.inverse() * estimate.scan_to_submap.T_target_source;
-  estimate.failed = !trusts(estimate.scan_to_submap, T_last_submap, prior.T_last_now, variance_against_submap()) ||
-                    is_outvoted(sweep, estimate.scan_to_submap, T_last_submap, prior);
-  estimate.T_odom_base = T_odom_last_ * (estimate.failed ? flatten(T_last_now, Matrix6::Zero())
-                                                         : flatten(T_last_submap, estimate.scan_to_submap.information));
-  hold_still(sweep, estimate);
-  if (estimate.state == TrackingState::standstill)
-    uncertainty_ = before; // standing adds nothing
-  finish(sweep, prior, estimate);
-  return estimate;
-}
-
-void Odometry::prepare_next() {
-  if (keyframe_observability_) {
-    const StageScope scope(clock_, Stage::map);
-    const double fresh = map_.insert(last_scan_, T_odom_last_);
-    uncertainty_.keep(share_of_map(fresh, *keyframe_observability_));
-    keyframe_observability_.reset();
-  }
-  if (lacks_prior_ && !last_scan_mapped_) // most likely the next one will, too
-    map_last_scan(last_registered_);
-}
-
-/// The target of scan-to-scan: the first so many points of the last sweep.
-void Odometry::map_last_scan(std::size_t points) {
-  const StageScope scope(clock_, Stage::scan_to_scan);
-  last_scan_map_.clear();
-  last_scan_map_.insert(std::span(last_scan_).first(points), Pose{});
-  last_scan_mapped_ = true;
-}
-
-void Odometry::begin_at(const Pose& T_odom_base, std::span<const SurfacePoint> map_odom) {
-  T_odom_start_ = T_odom_base;
-  knows_start_ = !map_odom.empty();
-  map_.insert(map_odom, Pose{});
-}
-
-/// The world begins at the first sweep: where it is told to, or at its origin, without yaw, level if gravity is known.
-OdometryEstimate Odometry::begin(const Sweep& sweep) {
-  correct_all(sweep.points, Vector6::Zero(), options_.isa, scan_);
-  registered_ = sweep.registered;
-  gravity_.observe(Eigen::Quaterniond::Identity(), sweep);
-  if (T_odom_start_)
-    T_odom_last_ = *T_odom_start_;
-  if (knows_start_ && scan_.size() >= kMinPoints) {
-    const StageScope scope(clock_, Stage::scan_to_submap);
-    const std::optional<Pose> T_odom_found =
-        relocate(gicp_, registered(), map_, *T_odom_start_, options_.scan_to_submap);
-    resumed_ = T_odom_found.has_value();
-    knows_start_ = false;
-    T_odom_last_ = T_odom_found.value_or(Pose{});
-    if (!resumed_) {
-      T_odom_start_.reset();
-      map_.clear();
-    }
-  }
-  if (const auto up_base = gravity_.up_base(); up_base && !T_odom_start_)
-    T_odom_last_.rotation = from_rpy_rad(level_rpy_rad(*up_base));
-  if (sweep.uncorrected != Uncorrected::nothing && !resumed_)
-    first_ = sweep;
-  OdometryEstimate estimate;
-  estimate.T_odom_base = T_odom_last_;
-  estimate.failed = scan_.size() < kMinPoints;
-  finish(sweep, MotionPrior{}, estimate);
-  if (estimate.failed)
-    processed_ = 0; // nothing was seen yet: the next sweep is the first
-  return estimate;
-}
-
-/// The velocity in the last sweep, as far as it may have lasted; nothing where there was no motion to tell it from.
-std::optional<Vector6> Odometry::kept_twist(const Sweep& sweep) const {
-  if (processed_ < 2)
-    return std::nullopt;
-  if (sweep.end - last_seen_ <= kGoesOn)
-    return twist_base_;
-  return twist_base_ * std::exp(-std::max(0.0, sensors_.elapsed_s(sweep)) / kComesToRest_s);
-}
-
-/// Where the source of the rotation turns quite otherwise than the robot would without it, the surfaces say which is
-/// true: as a prior, a gyro is too sure for them to say so later. The loser makes the winner less sure.
-MotionPrior Odometry::settle_dispute(const Sweep& sweep, const MotionPrior& prior, const Gicp::StopRequested& stop) {
-  source_is_refuted_ = false;
-  if (!prior.source.rotation || !had_sight(sweep) || sweep.points.size() < kMinPoints)
-    return prior;
-  const MotionPrior rival = sensors_.integrate(sweep, kept_twist(sweep), prior.source.rotation);
-  const Eigen::Vector3d dispute = difference(prior.T_last_now, rival.T_last_now).tail<3>();
-  const Eigen::Vector3d usual =
-      (kDispute_sigma * rival.variance.tail<3>().cwiseSqrt()).cwiseMax(kLeastDispute_rad).cwiseMin(kAlwaysAllowed_rad);
-  if ((dispute.array().abs() < usual.array()).all())
-    return prior;
-  const Registration with_source = attempt(sweep, prior.T_last_now, stop);
-  source_is_refuted_ = true;
-  const Registration without_source = attempt(sweep, rival.T_last_now, stop);
-  MotionPrior accepted = rival;
-  if (!fits_better(without_source, with_source)) {
-    accepted = prior;
-    source_is_refuted_ = false;
-  }
-  accepted.variance.tail<3>() += dispute.cwiseAbs2();
-  return accepted;
-}
-
-/// Lays the sweep into the submap from where T_last_now takes it, with nothing to hold it there.
-Registration Odometry::attempt(const Sweep& sweep, const Pose& T_last_now, const Gicp::StopRequested& stop) {
-  correct_motion(sweep, T_last_now);
-  const StageScope scope(clock_, Stage::scan_to_submap);
-  const Pose T_start = T_odom_last_ * T_last_now;
-  return gicp_.align(registered(), map_, T_start, {.T_target_source = T_start}, options_.scan_to_submap, true, stop);
-}
-
-/// Takes out of the points what no motion source could, with the twist that T_last_now means.
-void Odometry::correct_motion(const Sweep& sweep, const Pose& T_last_now) {
-  correct(sweep, twist_in(sweep, T_last_now), scan_);
-  registered_ = sweep.registered;
-}
-
-void Odometry::correct(const Sweep& sweep, const Vector6& twist_base, std::vector<SurfacePoint>& scan) const {
-  if (source_is_refuted_)
-    return correct_anew(sweep, twist_base, scan);
-  Vector6 uncorrected = twist_base;
-  if (sweep.uncorrected == Uncorrected::nothing)
-    uncorrected.setZero();
-  if (sweep.uncorrected == Uncorrected::translation)
-    uncorrected.tail<3>().setZero();
-  correct_all(sweep.points, uncorrected, options_.isa, scan);
-}
-
-/// The twist that takes the base from the last sweep to this one; zero where no time has passed.
-Vector6 Odometry::twist_in(const Sweep& sweep, const Pose& T_last_now) const {
-  const double elapsed_s = sensors_.elapsed_s(sweep);
-  return elapsed_s > 0.0 ? (se3_log(T_last_now) / elapsed_s).eval() : Vector6::Zero();
-}
-
-bool Odometry::needs_scan_to_scan(const MotionPrior& prior) const {
-  return options_.scan_to_scan_mode == ScanToScanMode::always ||
-         (options_.scan_to_scan_mode == ScanToScanMode::automatic && !prior.source.translation);
-}
-
-Registration Odometry::match_scan(const MotionPrior& prior, const Pose& T_start, bool wide,
-                                  const Gicp::StopRequested& stop) {
-  Registration none;
-  none.T_target_source = T_start;
-  if (!needs_scan_to_scan(prior) || scan_.size() < kMinPoints)
-    return none;
-  if (!last_scan_mapped_) // once the motion is roughly known, the points that are registered make map enough
-    map_last_scan(prior.blind ? last_scan_.size() : last_registered_);
-  const StageScope scope(clock_, Stage::scan_to_scan);
-  const PosePrior pose_prior{prior.T_last_now, prior.variance.cwiseInverse().asDiagonal()};
-  return gicp_.align(registered(), last_scan_map_, T_start, pose_prior, options_.scan_to_scan, wide, stop);
-}
-
-/// The first two sweeps came without any idea of the motion. What was found between them corrects both, so it can be
-/// found better; then the map begins anew with the first one corrected.
-void Odometry::begin_again(const Sweep& sweep, const MotionPrior& prior, Registration& found,
-                           const Gicp::StopRequested& stop) {
-  if (first_.points.empty())
-    return;
-  for (int round = 0; round < kStartRounds; ++round) {
-    const Pose T_last_now = found.T_target_source;
-    correct(first_, twist_in(sweep, T_last_now), last_scan_);
-    last_scan_mapped_ = false;
-    correct_motion(sweep, T_last_now);
-    found = match_scan(prior, T_last_now, true, stop);
-    if (difference(found.T_target_source, T_last_now).cwiseAbs().maxCoeff() < kStartAgrees)
-      break;
-  }
-  first_ = {};
-  map_.clear();
-  map_.insert(last_scan_, T_odom_last_);
-}
-
-Registration Odometry::match_submap(const MotionPrior& prior, const Pose& T_last_now, const Gicp::StopRequested& stop) {
-  const StageScope scope(clock_, Stage::scan_to_submap);
-  const Pose T_start = T_odom_last_ * T_last_now;
-  Registration none;
-  none.T_target_source = T_start;
-  if (scan_.size() < kMinPoints)
-    return none;
-  const PosePrior pose_prior{T_odom_last_ * prior.T_last_now, uncertainty_.against_submap().inverse()};
-  const bool wide = variance_against_submap().head<3>().maxCoeff() > kWide_m * kWide_m;
-  return gicp_.align(registered(), map_, T_start, pose_prior, options_.scan_to_submap, wide, stop);
-}
-
-/// What is known before the sweep is compared with the submap.
-void Odometry::predict(const MotionPrior& prior) {
-  uncertainty_.predict(T_odom_last_.rotation * prior.T_last_now.translation, covariance_of(prior),
-                       turn_both(T_odom_last_.rotation).cwiseAbs() * prior.bias);
-}
-
-/// Of a prior, odom axes.
-Matrix6 Odometry::covariance_of(const MotionPrior& prior) const {
-  const Matrix6 R = turn_both(T_odom_last_.rotation);
-  return R * prior.variance.asDiagonal() * R.transpose();
-}
-
-/// Of the prediction, along the axes of the base at the last sweep.
-Vector6 Odometry::variance_against_submap() const {
-  const Matrix6 R = turn_both(T_odom_last_.rotation);
-  return (R.transpose() * uncertainty_.against_submap() * R).diagonal();
-}
-
-Pose Odometry::flatten(const Pose& T_last_now, const Matrix6& information_odom) const {
-  if (!flat_ground_.holds())
-    return T_last_now;
-  return T_odom_last_.inverse() * flat_ground_.flatten(T_odom_last_, T_odom_last_ * T_last_now, information_odom);
-}
-
-bool Odometry::trusts(const Registration& registration, const Pose& T_last_now, const Pose& T_last_predicted,
-                      const Vector6& variance) const {
-  if (registration.iterations == 0 || !T_last_now.finite() || share_of_inliers(registration) < kMinInlierShare)
-    return false;
-  Vector6 allowed;
-  allowed << Eigen::Vector3d::Constant(kAlwaysAllowed_m), Eigen::Vector3d::Constant(kAlwaysAllowed_rad);
-  allowed = allowed.cwiseMax(kMaxDeviation_sigma * variance.cwiseSqrt());
-  return (difference(T_last_now, T_last_predicted).cwiseAbs().array() <= allowed.array()).all();
-}
-
-/// Whether the motion sources know better than what is left of the correspondences. After a time without lidar they do
-/// not.
-bool Odometry::is_outvoted(const Sweep& sweep, const Registration& registration, const Pose& T_last_now,
-                           const MotionPrior& prior) const {
-  if (!prior.source.translation || !had_sight(sweep) || !misses_most(registration))
-    return false;
-  const Vector6 deviation = difference(T_last_now, prior.T_last_now).cwiseAbs();
-  return (deviation.array() > kLoneDeviation_sigma * variance_against_submap().cwiseSqrt().array()).any();
-}
-
-bool Odometry::was_seen_lately(Stamp now) const { return std::chrono::abs(now - last_seen_) < kLately; }
-
-/// Whether the last sweep says where this one may be looked for: placed, or refused in the midst of those that were.
-bool Odometry::had_sight(const Sweep& sweep) const {
-  return !adrift_ || (refused_in_a_row_ > 0 && was_seen_lately(sweep.end));
-}
-
-bool Odometry::misses_most(const Registration& registration) const {
-  return share_of_inliers(registration) < kLeastOfUsual * usual_share_;
-}
-
-bool Odometry::is_fragment(const Sweep& sweep) const {
-  return static_cast<double>(sweep.points.size()) < kFragment * usual_points_;
-}
-
-double Odometry::share_of_inliers(const Registration& registration) const {
-  return static_cast<double>(registration.inliers) / static_cast<double>(registered_);
-}
-
-/// A sweep that the map is to take in.
-void Odometry::choose_keyframe(OdometryEstimate& estimate) {
-  const Pose T_keyframe_base = T_odom_keyframe_.inverse() * estimate.T_odom_base;
-  const double turned_deg = angle_rad(T_keyframe_base.rotation) / kRadPerDeg;
-  const bool moved =
-      T_keyframe_base.translation.norm() > options_.map.keyframe_m || turned_deg > options_.map.keyframe_deg;
-  const bool takes_in = !estimate.failed && (processed_ == 0 || (moved && !misses_most(estimate.scan_to_submap)));
-  const bool carried = estimate.prior.translation && was_seen_lately(estimate.stamp) && !is_map_in_doubt();
-  const bool restarts = refused_in_a_row_ >= kRefusalsToRestart && !carried && scan_.size() >= kMinPoints;
-  if (!takes_in && !restarts)
-    return;
-  if (restarts && is_map_in_doubt()) {
-    map_.clear();
-    fitted_ = 1;
-  }
-  estimate.T_odom_base.rotation =
-      (so3_exp(tilt_keeper_.take_correction_rad()) * estimate.T_odom_base.rotation).normalized();
-  keyframe_observability_ = estimate.scan_to_submap.observability;
-  T_odom_keyframe_ = estimate.T_odom_base;
-  refused_in_a_row_ = 0;
-  estimate.keyframe = true;
-}
-
-/// Whether as many sweeps contradict the map as ever fitted: it was begun wrong, and there is nothing in it to go on
-/// from. What the service left behind has been confirmed.
-bool Odometry::is_map_in_doubt() const { return !resumed_ && refused_in_a_row_ >= fitted_; }
+/// So many lengths of a sweep after the last one, sweeps were dropped in between.
+constexpr double kDropped = 1.5;
 
 /// Of what sweeps to come are laid against, the part that a sweep makes up. If a share s of it is new, then 2/s - 1
 /// sweeps are in sight at a time, and a step of the mean over so many shifts it by 2s/(1 + s) of a step in the end.
 /// Along axes that no surface constrains nothing old holds it back.
-Matrix6 Odometry::share_of_map(double fresh, const Matrix6& observability) {
+Matrix6 share_of_map(double fresh, const Matrix6& observability) {
   const Matrix6 all = Matrix6::Identity();
   const Matrix6 seen = observability / SeenAxes::kWeakBelow;
   const Matrix6 unseen = (seen * seen + all).inverse();
@@ -387,113 +64,429 @@ Matrix6 Odometry::share_of_map(double fresh, const Matrix6& observability) {
   return share * all + (1.0 - share) * unseen;
 }
 
-/// Where the robot stands the estimate stays where it was.
-void Odometry::hold_still(const Sweep& sweep, OdometryEstimate& estimate) {
-  if (estimate.failed)
-    return standstill_.lose_sight();
-  const Pose& T_odom_seen = is_fragment(sweep) ? T_odom_last_ : estimate.T_odom_base;
-  const std::optional<Pose> T_odom_held = standstill_.observe(sweep.end, T_odom_seen, sensors_.saw_motion(sweep));
-  if (!T_odom_held)
+} // namespace
+
+Odometry::Odometry(const OdometryOptions& options, const std::vector<MotionSourceOptions>& sources, StageClock* clock)
+    : options_(options), sources_(sources), clock_(clock), gicp_(options.threads, options.isa),
+      flat_ground_(options.flat_ground), map_(options.map.max_bytes, options.isa),
+      last_scan_map_(kLastScanBytes, options.isa), map_policy_(options.map), filter_(sources) {}
+
+void Odometry::begin_at(const Pose& T_odom_base, std::span<const SurfacePoint> map_odom) {
+  T_odom_start_ = T_odom_base;
+  map_.insert(map_odom, Pose{});
+}
+
+OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested& stop) {
+  prepare_next();
+  if (!begun_)
+    return begin(sweep);
+  if (first_)
+    find_start(sweep, stop);
+  Hypothesis best = choose(sweep, stop);
+  const Pose T_odom_last = filter_.pose();
+  filter_ = best.filter;
+  OdometryEstimate estimate;
+  estimate.scan_to_scan = best.scan_to_scan;
+  estimate.scan_to_submap = best.fit;
+  static_cast<SourceChoice&>(estimate.prior) = best.choice;
+  estimate.prior.otherwise = options_.no_source_prior;
+  estimate.failed = !best.placed;
+  if (estimate.failed) {
+    estimate.state = TrackingState::dead_reckoning;
+  } else if (best.rests) {
+    estimate.state = TrackingState::standstill;
+  } else {
+    filter_.see(best.fit.T_target_source, best.fit.twist_base, best.fit.information);
+  }
+  if (!estimate.failed)
+    filter_.learn();
+  if (!estimate.failed)
+    lidar_health_.learn(best.fit, aged_.size(), steps_.elapsed_s(sweep));
+  stands_ = best.rests;
+  correct(sweep, filter_.twist_base(), best.rests ? kAllSources : best.without);
+  if (flat_ground_.holds())
+    filter_.put(flat_ground_.flatten(T_odom_last, filter_.pose(),
+                                     estimate.failed ? Matrix6::Zero().eval()
+                                                     : best.fit.information.topLeftCorner<6, 6>().eval()));
+  finish(sweep, estimate);
+  return estimate;
+}
+
+void Odometry::prepare_next() {
+  if (scan_is_next_target_) {
+    const StageScope scope(clock_, Stage::scan_to_scan);
+    last_scan_map_.clear();
+    last_scan_map_.insert(scan_, filter_.pose());
+    scan_is_next_target_ = false;
+    has_last_scan_ = true;
+  }
+  if (!keyframe_observability_)
     return;
-  estimate.T_odom_base = *T_odom_held;
-  estimate.state = TrackingState::standstill;
+  const StageScope scope(clock_, Stage::map);
+  const double fresh = map_.insert(scan_, filter_.pose());
+  filter_.keep(share_of_map(fresh, *keyframe_observability_));
+  keyframe_observability_.reset();
 }
 
-/// What a registered sweep says of itself, of its prior and of the motion sources.
-void Odometry::settle(const Sweep& sweep, const MotionPrior& prior, OdometryEstimate& estimate) {
-  const Pose T_last_now = T_odom_last_.inverse() * estimate.T_odom_base;
-  const double share = share_of_inliers(estimate.scan_to_submap);
-  usual_share_ = processed_ == 1 ? share : usual_share_ + (share - usual_share_) / kMemoryOfUsual_sweeps;
-  const bool tells_no_velocity = adrift_ || is_fragment(sweep); // the way back to the submap is no motion of the robot
-  const auto points = static_cast<double>(sweep.points.size());
-  usual_points_ = processed_ == 1 ? points : usual_points_ + (points - usual_points_) / kMemoryOfUsual_sweeps;
-  uncertainty_.see(estimate.scan_to_submap.information);
-  observe(estimate);
-  if (tells_no_velocity)
-    return move_on(prior.T_last_now, uncertainty_.against_submap(), estimate);
-  const Matrix6 R = turn_both(T_odom_last_.rotation.conjugate());
-  feedback_.opinions = sensors_.judge(sweep, prior,
-                                      {.T_last_now = T_last_now,
-                                       .information = R * estimate.scan_to_submap.information * R.transpose(),
-                                       .stands = estimate.state == TrackingState::standstill},
-                                      seen_axes_);
-  const Pose T_last_moved = motion(T_last_now, estimate.scan_to_scan.T_target_source);
-  move_on(T_last_moved, uncertainty_.against_submap(), estimate);
-  bend(difference(T_last_moved, prior.T_last_now));
-  feedback_.twist_base = seen_axes_.part_of(twist_base_);
-  feedback_.sees = seen_axes_.each();
+/// The world begins at the first sweep: where it is told to, or at its origin, without yaw, level if gravity is known.
+OdometryEstimate Odometry::begin(const Sweep& sweep) {
+  OdometryEstimate estimate;
+  correct_all(sweep, corrected_twist(sweep), scan_);
+  gravity_.observe(Eigen::Quaterniond::Identity(), sweep);
+  Pose T_odom_base = T_odom_start_.value_or(Pose{});
+  if (map_.fine().size() > 0 && sweep.points.size() >= kMinPoints) {
+    const StageScope scope(clock_, Stage::scan_to_submap);
+    const std::optional<Pose> T_odom_found =
+        relocate(gicp_, std::span(scan_).first(sweep.registered), map_, *T_odom_start_, options_.scan_to_submap);
+    resumed_ = T_odom_found.has_value();
+    T_odom_base = T_odom_found.value_or(Pose{});
+    if (resumed_) {
+      map_policy_.resume();
+    } else {
+      T_odom_start_.reset();
+      map_.clear();
+    }
+  }
+  if (const auto up_base = gravity_.up_base(); up_base && !T_odom_start_)
+    T_odom_base.rotation = from_rpy_rad(level_rpy_rad(*up_base));
+  filter_.begin(T_odom_base, Vector6::Zero(), kUnknownTwist);
+  estimate.failed = scan_.size() < kMinPoints;
+  if (estimate.failed) { // nothing was seen yet: the next sweep is the first
+    estimate.state = TrackingState::dead_reckoning;
+  } else {
+    begun_ = true;
+    map_policy_.begin(sweep.end, T_odom_base);
+    first_ = sweep;
+    estimate.keyframe = true;
+    keyframe_observability_ = Matrix6::Zero();
+  }
+  estimate.stamp = sweep.end;
+  estimate.T_odom_base = T_odom_base;
+  estimate.points = sweep.registered;
+  steps_.remember(sweep);
+  return estimate;
 }
 
-/// T_last_now as far as it is a motion of the robot. Along axes that lidar hardly sees the place in the submap may be
-/// off by much, and a few points may pull it far: there the motion is that from sweep to sweep.
-Pose Odometry::motion(const Pose& T_last_now, const Pose& T_last_seen) const {
-  const Vector6 corrected = seen_axes_.part_of(difference(T_last_now, T_last_seen));
-  return {so3_exp(corrected.tail<3>()) * T_last_seen.rotation, T_last_seen.translation + corrected.head<3>()};
+/// The first sweep came without any idea of the motion. What is found between it and the second corrects both, so it
+/// can be found better; then the map begins anew with the first one corrected. A source that is wrong bends both.
+void Odometry::find_start(const Sweep& sweep, const Gicp::StopRequested& stop) {
+  const Sweep first = *std::exchange(first_, std::nullopt);
+  if (resumed_ || sweep.points.size() < kMinPoints || steps_.elapsed_s(sweep) <= 0.0 ||
+      options_.scan_to_scan_mode == ScanToScanMode::off)
+    return;
+  const StageScope scope(clock_, Stage::scan_to_scan);
+  Start start = start_without({}, first, sweep, stop);
+  if (choose_among(sweep, {}).rotation && !stop())
+    if (Start free = start_without(kAllSources, first, sweep, stop); fit_of(free.fit) > fit_of(start.fit) / kAsGood)
+      start = free;
+  const Pose T_odom_first = filter_.pose();
+  lidar_health_.learn(start.fit, sweep.registered, steps_.elapsed_s(sweep));
+  stands_ = start.rests;
+  filter_.begin(T_odom_first, start.twist_base, stands_ ? along_each_axis(0.1, 1.0) : along_each_axis(1.0, 10.0));
+  correct(first, start.twist_base, start.without);
+  map_.clear();
+  map_.insert(scan_, T_odom_first);
 }
 
-/// A sweep that was corrected for another motion than the robot's is bent, and lies askew. A robot that shakes or whose
-/// wheels slip does so for a while.
-void Odometry::bend(const Vector6& surprise) {
-  Vector6 bent = surprise.cwiseAbs();
-  bent.head<3>().array() += kArm_m * surprise.tail<3>().norm();
-  askew_variance_ = (kAskew * bent).cwiseAbs2().cwiseMax(kShakesOn * askew_variance_);
-  const Matrix6 R = turn_both(T_odom_last_.rotation);
-  uncertainty_.predict(Eigen::Vector3d::Zero(), R * askew_variance_.asDiagonal() * R.transpose(), Vector6::Zero());
+/// The motion between the first two sweeps, if their points are corrected as some sources would not have it.
+Odometry::Start Odometry::start_without(std::bitset<kMaxSources> without, const Sweep& first, const Sweep& sweep,
+                                        const Gicp::StopRequested& stop) {
+  const MotionFilter unknown = assume(sweep, without, false).filter;
+  const Pose T_odom_first = filter_.pose();
+  MotionBelief prior = unknown.belief();
+  prior.information.setZero(); // the pose alone is looked for
+  prior.information.topLeftCorner<6, 6>() = unknown.covariance().topLeftCorner<6, 6>().inverse();
+  const auto match = [&](const Vector6& twist, std::bitset<kMaxSources> unused, const Pose& T_start,
+                         const MotionBelief& belief, int iterations) {
+    correct(first, twist, unused);
+    last_scan_map_.clear();
+    last_scan_map_.insert(scan_, T_odom_first);
+    correct(sweep, twist, unused);
+    const ElasticScan rigid{.points = std::span(scan_).first(sweep.registered), .block_age_s = {}, .twist_base = twist};
+    RegistrationOptions options = options_.scan_to_scan;
+    options.max_iterations = std::min(options.max_iterations, iterations);
+    return gicp_.align(rigid, last_scan_map_, T_start, belief, options, iterations > 4, stop);
+  };
+  const Registration rest = match(Vector6::Zero(), kAllSources, T_odom_first,
+                                  {T_odom_first, Vector6::Zero(), 1e12 * Matrix12::Identity()}, 4);
+  Start start{.without = without, .rests = false, .twist_base = unknown.twist_base(), .fit = {}};
+  Pose T_odom_base = unknown.pose();
+  for (int round = 0; round < kStartRounds; ++round) {
+    start.fit = match(start.twist_base, without, T_odom_base, prior, options_.scan_to_scan.max_iterations);
+    const Pose T_before = std::exchange(T_odom_base, start.fit.T_target_source);
+    start.twist_base = se3_log(T_odom_first.inverse() * T_odom_base) / steps_.elapsed_s(sweep);
+    if (difference(T_odom_base, T_before).cwiseAbs().maxCoeff() < kStartAgrees || stop())
+      break;
+  }
+  if (fit_of(rest) > kAsGood * fit_of(start.fit))
+    start = {.without = kAllSources, .rests = true, .twist_base = Vector6::Zero(), .fit = rest};
+  return start;
 }
 
-/// Which axes of the base the lidar sees, and whether they are enough.
-void Odometry::observe(OdometryEstimate& estimate) {
+/// Of the sources that can be used.
+SourceChoice Odometry::choose_among(const Sweep& sweep, std::bitset<kMaxSources> without) const {
+  return choose_sources([this](SourceId source) { return sources_[index_of(source)].kind; }, sources_.size(),
+                        options_.fusion,
+                        [&](SourceId source) { return !without[index_of(source)] && steps_.is_usable(sweep, source); });
+}
+
+/// By how much the base moves otherwise during the sweep than on the mean since the last one, as far as sources tell:
+/// nothing, unless sweeps were dropped in between.
+Vector6 Odometry::unlike_mean(const Sweep& sweep) const {
+  Vector6 difference = Vector6::Zero();
+  if (steps_.elapsed_s(sweep) < kDropped * to_seconds(sweep.end - sweep.start))
+    return difference;
+  const Vector6 during_sweep = corrected_twist(sweep);
+  const auto [rotation, translation] = choose_among(sweep, {});
+  if (translation)
+    difference.head<3>() = (during_sweep - *steps_.twist_base(sweep, *translation)).head<3>();
+  if (rotation)
+    difference.tail<3>() = (during_sweep - *steps_.twist_base(sweep, *rotation)).tail<3>();
+  return difference;
+}
+
+/// What the filter makes of the sources, before a look at the points.
+Odometry::Hypothesis Odometry::assume(const Sweep& sweep, std::bitset<kMaxSources> without, bool rests) const {
+  Hypothesis hypothesis{.without = without,
+                        .rests = rests,
+                        .placed = false,
+                        .choice = {},
+                        .filter = filter_,
+                        .scan_to_scan = {},
+                        .fit = {}};
+  hypothesis.choice = choose_among(sweep, without);
+  const auto& [rotation, translation] = hypothesis.choice;
+  const bool free = without.all();
+  MotionFilter& filter = hypothesis.filter;
+  filter.predict(std::max(steps_.elapsed_s(sweep), 1e-6), to_seconds(sweep.end - sweep.start),
+                 free ? std::nullopt : sweep.motion.specific_force,
+                 {.translation = free || translation, .rotation = free || rotation});
+  if (rotation)
+    filter.measure(*rotation, *steps_.twist_base(sweep, *rotation),
+                   {.translation = translation == rotation, .rotation = true});
+  if (translation && translation != rotation)
+    filter.measure(*translation, *steps_.twist_base(sweep, *translation), {.translation = true, .rotation = false});
+  if (rests)
+    filter.rest();
+  if (!rotation && !translation && options_.no_source_prior == NoSourcePrior::identity)
+    filter.expect_rest();
+  filter.move();
+  return hypothesis;
+}
+
+/// Where the sweep lies beside the last one, from where the hypothesis has it. That is where the search in the submap
+/// begins and no measurement: the submap holds the last sweep, too.
+void Odometry::match_last(const Sweep& sweep, const MotionBelief& belief, Hypothesis& hypothesis,
+                          const Gicp::StopRequested& stop) {
+  const StageScope scope(clock_, Stage::scan_to_scan);
+  const Registration found = gicp_.align(by_age(sweep, belief.twist_base), last_scan_map_, belief.T_target_source,
+                                         belief, options_.scan_to_scan, false, stop);
+  if (found.converged)
+    hypothesis.fit.T_target_source = found.T_target_source;
+  hypothesis.scan_to_scan = found;
+  hypothesis.scan_to_scan.T_target_source = filter_.pose().inverse() * found.T_target_source;
+}
+
+/// Lays the sweep into the submap, from where the hypothesis has it.
+void Odometry::register_with(const Sweep& sweep, Hypothesis& hypothesis, const Gicp::StopRequested& stop) {
+  MotionBelief belief = hypothesis.filter.belief();
+  RegistrationOptions options = options_.scan_to_submap;
+  if (hypothesis.rests) {
+    belief.T_target_source = filter_.pose();
+    belief.twist_base.setZero();
+    belief.information = 1e12 * Matrix12::Identity();
+    options.max_iterations = 4;
+  }
+  hypothesis.fit = {};
+  hypothesis.fit.T_target_source = belief.T_target_source;
+  hypothesis.fit.twist_base = belief.twist_base;
+  correct(sweep, belief.twist_base, hypothesis.rests ? kAllSources : hypothesis.without);
+  if (sweep.points.size() < kMinPoints)
+    return;
+  if (has_last_scan_ && !hypothesis.rests)
+    match_last(sweep, belief, hypothesis, stop);
+  const StageScope scope(clock_, Stage::scan_to_submap);
+  const bool wide =
+      !hypothesis.rests && hypothesis.filter.covariance().diagonal().head<3>().maxCoeff() > kWide_m * kWide_m;
+  const Pose T_start = hypothesis.fit.T_target_source;
+  hypothesis.fit = gicp_.align(by_age(sweep, belief.twist_base), map_, T_start, belief, options, wide, stop);
+  const Vector6 bent = (hypothesis.fit.twist_base - belief.twist_base).cwiseAbs();
+  const bool bends = bent.head<3>().maxCoeff() >= kBends_mps || bent.tail<3>().maxCoeff() >= kBends_radps;
+  if (!bends || stop())
+    return;
+  const int before = hypothesis.fit.iterations;
+  correct(sweep, hypothesis.fit.twist_base, hypothesis.without);
+  hypothesis.fit = gicp_.align(by_age(sweep, hypothesis.fit.twist_base), map_, hypothesis.fit.T_target_source, belief,
+                               options, false, stop);
+  hypothesis.fit.iterations += before;
+}
+
+/// Of what may be true, what fits the surfaces best; of what fits as well, what believes the sources, and rest.
+Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopRequested& stop) {
+  const auto attempt = [&](std::bitset<kMaxSources> without, bool rests) {
+    Hypothesis hypothesis = assume(sweep, without, rests);
+    register_with(sweep, hypothesis, stop);
+    return hypothesis;
+  };
+  Hypothesis best = attempt({}, false);
+  gravity_.observe(filter_.pose().rotation.conjugate() * best.filter.pose().rotation, sweep);
+  flat_ground_.observe(sweep.end, gravity_.up_base());
+  if (sweep.points.size() < kMinPoints)
+    return best;
+  Hypothesis first = best;
+  const auto contradicted = worst_source(sweep, best);
+  const bool in_doubt = contradicted || (lidar_health_.is_unusual(best.fit, aged_.size()) && best.choice.rotation);
+  if (in_doubt && !stop()) { // what was cut short fits badly for that alone
+    std::bitset<kMaxSources> without = best.without;
+    without.set(contradicted.value_or(index_of(*best.choice.rotation)));
+    if (Hypothesis other = attempt(without, false);
+        fit_of(other.fit) > kAsGood * fit_of(best.fit) &&
+        (contradicted || !lidar_health_.is_unusual(other.fit, aged_.size())))
+      best = other;
+    if (lidar_health_.is_unusual(best.fit, aged_.size()))
+      if (Hypothesis free = attempt(kAllSources, false); fit_of(free.fit) > fit_of(best.fit) / kAsGood)
+        best = free;
+  }
+  const Vector6 twist = best.filter.twist_base();
+  const Vector6 sigma = best.filter.covariance().diagonal().tail<6>().cwiseSqrt();
+  const bool may_rest = (twist.array().abs() < kRest_sigma * sigma.array() + 1e-3).all();
+  MotionFilter after = best.filter;
+  after.see(best.fit.T_target_source, best.fit.twist_base, best.fit.information);
+  const Vector6 doubt = after.covariance().diagonal().tail<6>().cwiseSqrt();
+  const bool slow = (best.fit.twist_base.array().abs() < kSlow.array()).all() &&
+                    (doubt.array() < kSlowDoubt * kSlow.array()).all(); // who does not see does not see that it stands
+  if (!slow)
+    slow_since_ = sweep.end;
+  if (may_rest && (stands_ || sweep.end - slow_since_ >= kSlowFor)) {
+    if (Hypothesis rest = attempt(best.without, true); fit_of(rest.fit) > kAsGoodAtRest * fit_of(best.fit)) {
+      rest.filter.put(filter_.pose());
+      best = rest;
+    }
+  }
+  if (!best.rests && !is_placed(sweep, best.fit, first))
+    return first; // what carries on unseen is what the sources say
+  best.placed = true;
+  return best;
+}
+
+/// Takes out of the points what they were not corrected for, of a base that moved with `twist_base` since the last
+/// sweep, on the mean.
+void Odometry::correct(const Sweep& sweep, const Vector6& twist_base, std::bitset<kMaxSources> without) {
+  if (without.any())
+    correct_anew(sweep, twist_base, scan_);
+  else
+    correct_all(sweep, twist_base + unlike_mean(sweep), scan_);
+}
+
+/// The registered points of scan_ in the order of their age.
+ElasticScan Odometry::by_age(const Sweep& sweep, const Vector6& twist_base) {
+  const auto count = static_cast<std::size_t>(sweep.registered);
+  const double oldest_s = std::max(1e-9, to_seconds(sweep.end - sweep.start));
+  const auto bin = [&](std::size_t i) {
+    const double share = static_cast<double>(sweep.points[i].age_s) / oldest_s;
+    return static_cast<std::size_t>(std::clamp(share, 0.0, 0.999) * kAgeBins);
+  };
+  std::array<std::size_t, kAgeBins + 1> begins{};
+  for (std::size_t i = 0; i < count; ++i)
+    ++begins[bin(i) + 1];
+  for (std::size_t b = 0; b < kAgeBins; ++b)
+    begins[b + 1] += begins[b];
+  aged_.resize(count);
+  block_age_s_.assign((count + kGicpBlock - 1) / kGicpBlock, 0.0F);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t place = begins[bin(i)]++;
+    aged_[place] = scan_[i];
+    block_age_s_[place / kGicpBlock] += sweep.points[i].age_s;
+  }
+  for (std::size_t b = 0; b < block_age_s_.size(); ++b)
+    block_age_s_[b] /= static_cast<float>(std::min(kGicpBlock, count - b * kGicpBlock));
+  return {.points = aged_, .block_age_s = block_age_s_, .twist_base = twist_base};
+}
+
+/// The source that contradicts what all others say most, if any does.
+std::optional<std::size_t> Odometry::worst_source(const Sweep& sweep, const Hypothesis& hypothesis) const {
+  MotionFilter after = hypothesis.filter;
+  after.see(hypothesis.fit.T_target_source, hypothesis.fit.twist_base, hypothesis.fit.information);
+  std::optional<std::size_t> worst;
+  double most = 0.0;
+  for (const auto& source : {hypothesis.choice.rotation, hypothesis.choice.translation}) {
+    if (!source)
+      continue;
+    const Innovation found = after.innovation(*source, *steps_.twist_base(sweep, *source));
+    if (opinion_on(found, steps_.elapsed_s(sweep)) != LidarOpinion::disagrees)
+      continue;
+    const double ratio = found.ratio();
+    if (ratio > most) {
+      most = ratio;
+      worst = index_of(*source);
+    }
+  }
+  return worst;
+}
+
+/// Whether a registration is believed. What misses most of what is usually seen gives way to motion sources that say
+/// otherwise, as `all_sources` has them, unless nothing was seen for a while.
+bool Odometry::is_placed(const Sweep& sweep, const Registration& fit, const Hypothesis& all_sources) const {
+  if (fit.iterations == 0 || !fit.T_target_source.finite() ||
+      static_cast<double>(fit.inliers) < kMinInlierShare * static_cast<double>(aged_.size()))
+    return false;
+  const bool had_sight = saw_ || (map_policy_.is_refused() && map_policy_.was_placed_lately(sweep.end));
+  if (!all_sources.choice.translation || !had_sight || !lidar_health_.misses_most(fit, aged_.size()))
+    return true;
+  const Vector6 deviation = difference(fit.T_target_source, all_sources.filter.pose()).cwiseAbs();
+  const Vector6 sigma = all_sources.filter.covariance().diagonal().head<6>().cwiseSqrt();
+  return (deviation.array() <= kLoneDeviation_sigma * sigma.array()).all();
+}
+
+/// What a placed sweep says of what lidar sees and of the motion sources.
+void Odometry::report(const Sweep& sweep, OdometryEstimate& estimate) {
   const Matrix6 R = turn_both(estimate.T_odom_base.rotation);
   estimate.observability = seen_axes_.observe(R.transpose() * estimate.scan_to_submap.observability * R);
   if (!seen_axes_.all() && estimate.state == TrackingState::tracking)
     estimate.state = TrackingState::degenerate;
-}
-
-/// The twist that T_last_now means, with its covariance.
-void Odometry::move_on(const Pose& T_last_now, const Matrix6& covariance_odom, OdometryEstimate& estimate) {
-  const double elapsed_s = to_seconds(estimate.stamp - sensors_.last_stamp());
-  if (elapsed_s > 0.0) {
-    twist_base_ = se3_log(T_last_now) / elapsed_s;
-    const Matrix6 R = turn_both(estimate.T_odom_base.rotation.conjugate());
-    estimate.twist_covariance = 2.0 / (elapsed_s * elapsed_s) * R * covariance_odom * R.transpose();
-  }
-  estimate.twist_base = twist_base_;
+  if (!saw_)
+    return; // the way back to the submap is no motion of the robot
+  for (std::size_t i = 0; i < sources_.size(); ++i)
+    if (const auto twist_base = steps_.twist_base(sweep, SourceId{i}))
+      feedback_.opinions[i] = opinion_on(filter_.innovation(SourceId{i}, *twist_base), steps_.elapsed_s(sweep));
+  feedback_.twist_base = seen_axes_.part_of(filter_.twist_base());
+  feedback_.sees = seen_axes_.each();
 }
 
 /// Fills in what the estimate says beside its pose, and remembers the sweep as the last.
-void Odometry::finish(const Sweep& sweep, const MotionPrior& prior, OdometryEstimate& estimate) {
+void Odometry::finish(const Sweep& sweep, OdometryEstimate& estimate) {
   estimate.stamp = sweep.end;
-  estimate.points = registered_;
-  estimate.prior = prior.source;
+  estimate.points = sweep.registered;
+  estimate.T_odom_base = filter_.pose();
+  feedback_ = {.from = steps_.last(), .to = sweep.end, .opinions = {}, .twist_base = Vector6::Zero(), .sees = {}};
   if (!estimate.failed)
-    refused_in_a_row_ = 0;
-  else if (scan_.size() >= kMinPoints)
-    ++refused_in_a_row_;
-  feedback_ = {
-      .from = sensors_.last_stamp(), .to = sweep.end, .opinions = {}, .twist_base = Vector6::Zero(), .sees = {}};
-  if (estimate.failed)
-    estimate.state = TrackingState::dead_reckoning;
-  if (processed_ > 0 && estimate.failed) {
-    sensors_.judge_blind(sweep);
-    move_on(T_odom_last_.inverse() * estimate.T_odom_base, covariance_of(prior), estimate);
-  } else if (processed_ > 0) {
-    settle(sweep, prior, estimate);
-  }
-  estimate.pose_covariance = uncertainty_.since_start();
-  adrift_ = estimate.failed;
-  if (!estimate.failed) {
-    last_seen_ = sweep.end;
-    ++fitted_;
-  }
+    report(sweep, estimate);
+  saw_ = !estimate.failed;
+  scan_is_next_target_ = saw_ && options_.scan_to_scan_mode == ScanToScanMode::always;
   tilt_keeper_.observe(estimate.T_odom_base.rotation, gravity_.up_base());
-
-  choose_keyframe(estimate);
-  ++processed_;
-  T_odom_last_ = estimate.T_odom_base;
-  sensors_.remember(sweep);
-  std::swap(last_scan_, scan_);
-  last_registered_ = registered_;
-  last_scan_mapped_ = false;
+  const MapPolicy::Verdict verdict =
+      map_policy_.judge({.stamp = sweep.end,
+                         .T_odom_base = estimate.T_odom_base,
+                         .placed = !estimate.failed,
+                         .has_points = scan_.size() >= kMinPoints,
+                         .misses_most = lidar_health_.misses_most(estimate.scan_to_submap, aged_.size()),
+                         .carried = estimate.prior.translation.has_value()});
+  if (verdict == MapPolicy::Verdict::begins_anew)
+    map_.clear();
+  if (verdict != MapPolicy::Verdict::waits) {
+    estimate.keyframe = true;
+    keyframe_observability_ = estimate.scan_to_submap.observability;
+    filter_.put({(so3_exp(tilt_keeper_.take_correction_rad()) * estimate.T_odom_base.rotation).normalized(),
+                 estimate.T_odom_base.translation});
+    estimate.T_odom_base = filter_.pose();
+  }
+  estimate.twist_base = filter_.twist_base();
+  estimate.twist_covariance = filter_.covariance().bottomRightCorner<6, 6>();
+  estimate.pose_covariance = filter_.pose_covariance_since_start();
+  for (std::size_t i = 0; i < sources_.size(); ++i)
+    if (!sweep.motion.sources[i].usable)
+      filter_.forget(SourceId{i}); // what comes back may come back as another
+  steps_.remember(sweep);
 }
 
 } // namespace locus

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <bitset>
 #include <cstddef>
-#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -14,21 +14,22 @@
 #include "core/map/surface_map.hpp"
 #include "core/odometry/flat_ground.hpp"
 #include "core/odometry/gravity.hpp"
+#include "core/odometry/lidar_health.hpp"
+#include "core/odometry/map_policy.hpp"
+#include "core/odometry/motion_filter.hpp"
 #include "core/odometry/odometry_estimate.hpp"
-#include "core/odometry/pose_uncertainty.hpp"
 #include "core/odometry/seen_axes.hpp"
-#include "core/odometry/sensor_integration.hpp"
-#include "core/odometry/standstill.hpp"
+#include "core/odometry/sensed_steps.hpp"
 #include "core/sources/registration_feedback.hpp"
 
 namespace locus {
 
 /// The scan matching unit of LOCUS (paper II-B): sweeps in, odometry out.
 ///
-/// Each sweep is registered with the one before (equation 1) and with the submap (equation 2), starting from what the
-/// motion sources say. The prior is not only the start: it takes part in the registration with the weight it has proved
-/// to deserve, so an axis that the points do not see falls back to it by itself. The result depends on the sweeps that
-/// were processed and on nothing else. One owner.
+/// The filter predicts the motion, the motion sources measure it, and the sweep is registered with the submap (equation
+/// 2) from there: pose and twist together, against what is known of both. Where sources and surfaces do not fit, other
+/// hypotheses are tried (without a source, free, at rest), and what fits the surfaces best is taken. The result depends
+/// on the sweeps that were processed and on nothing else. One owner.
 class Odometry {
  public:
   /// `sources` in the order of their priority, as MotionSources has them.
@@ -47,8 +48,8 @@ class Odometry {
   OdometryEstimate process(
       const Sweep& sweep, const Gicp::StopRequested& stop = [] { return false; });
 
-  /// What the next sweep needs of the last one: the map takes in a keyframe, and scan-to-scan gets its target. For when
-  /// the estimate is on its way; what is not done here, process() does before it begins. The results are the same.
+  /// What the next sweep needs of the last one: the map takes in a keyframe. For when the estimate is on its way; what
+  /// is not done here, process() does before it begins. The results are the same.
   void prepare_next();
 
   /// What the sweep processed last says of the motion sources, for their health.
@@ -58,85 +59,72 @@ class Odometry {
   [[nodiscard]] const SurfaceMap& map() const { return map_; }
 
   /// The points of the sweep processed last, fully corrected: base frame at its end, in the order of Sweep::points.
-  [[nodiscard]] std::span<const SurfacePoint> scan() const { return last_scan_; }
+  [[nodiscard]] std::span<const SurfacePoint> scan() const { return scan_; }
 
   /// From the next sweep on.
   void set_flat_ground(FlatGround mode) { flat_ground_ = FlatGroundAssumption(mode); }
 
  private:
+  /// What may be true of a sweep, and what the surfaces say of it.
+  struct Hypothesis {
+    std::bitset<kMaxSources> without; ///< sources that are not believed
+    bool rests = false;
+    bool placed = false; ///< what the surfaces say is believed
+    SourceChoice choice;
+    MotionFilter filter; ///< before it sees
+    Registration scan_to_scan, fit;
+  };
+
+  /// What may be true of the first two sweeps.
+  struct Start {
+    std::bitset<kMaxSources> without;
+    bool rests = false;
+    Vector6 twist_base = Vector6::Zero();
+    Registration fit;
+  };
+
   OdometryEstimate begin(const Sweep& sweep);
-  [[nodiscard]] std::optional<Vector6> kept_twist(const Sweep& sweep) const;
-  MotionPrior settle_dispute(const Sweep& sweep, const MotionPrior& prior, const Gicp::StopRequested& stop);
-  Registration attempt(const Sweep& sweep, const Pose& T_last_now, const Gicp::StopRequested& stop);
-  void correct_motion(const Sweep& sweep, const Pose& T_last_now);
-  [[nodiscard]] Vector6 twist_in(const Sweep& sweep, const Pose& T_last_now) const;
-  void correct(const Sweep& sweep, const Vector6& twist_base, std::vector<SurfacePoint>& scan) const;
-  Registration match_scan(const MotionPrior& prior, const Pose& T_start, bool wide, const Gicp::StopRequested& stop);
-  Registration match_submap(const MotionPrior& prior, const Pose& T_last_now, const Gicp::StopRequested& stop);
-  void begin_again(const Sweep& sweep, const MotionPrior& prior, Registration& found, const Gicp::StopRequested& stop);
-  [[nodiscard]] Pose flatten(const Pose& T_last_now, const Matrix6& information_odom) const;
-  void predict(const MotionPrior& prior);
-  [[nodiscard]] Matrix6 covariance_of(const MotionPrior& prior) const;
-  [[nodiscard]] Vector6 variance_against_submap() const;
-  [[nodiscard]] bool trusts(const Registration& registration, const Pose& T_last_now, const Pose& T_last_predicted,
-                            const Vector6& variance) const;
-  [[nodiscard]] bool is_outvoted(const Sweep& sweep, const Registration& registration, const Pose& T_last_now,
-                                 const MotionPrior& prior) const;
-  [[nodiscard]] bool was_seen_lately(Stamp now) const;
-  [[nodiscard]] bool had_sight(const Sweep& sweep) const;
-  [[nodiscard]] bool is_fragment(const Sweep& sweep) const;
-  [[nodiscard]] bool misses_most(const Registration& registration) const;
-  [[nodiscard]] double share_of_inliers(const Registration& registration) const;
-  [[nodiscard]] std::span<const SurfacePoint> registered() const { return std::span(scan_).first(registered_); }
-  [[nodiscard]] bool needs_scan_to_scan(const MotionPrior& prior) const;
-  void map_last_scan(std::size_t points);
-  [[nodiscard]] bool is_map_in_doubt() const;
-  void choose_keyframe(OdometryEstimate& estimate);
-  static Matrix6 share_of_map(double fresh, const Matrix6& observability);
-  void hold_still(const Sweep& sweep, OdometryEstimate& estimate);
-  void settle(const Sweep& sweep, const MotionPrior& prior, OdometryEstimate& estimate);
-  [[nodiscard]] Pose motion(const Pose& T_last_now, const Pose& T_last_seen) const;
-  void bend(const Vector6& surprise);
-  void observe(OdometryEstimate& estimate);
-  void move_on(const Pose& T_last_now, const Matrix6& covariance_odom, OdometryEstimate& estimate);
-  void finish(const Sweep& sweep, const MotionPrior& prior, OdometryEstimate& estimate);
+  void find_start(const Sweep& sweep, const Gicp::StopRequested& stop);
+  [[nodiscard]] Start start_without(std::bitset<kMaxSources> without, const Sweep& first, const Sweep& sweep,
+                                    const Gicp::StopRequested& stop);
+  [[nodiscard]] SourceChoice choose_among(const Sweep& sweep, std::bitset<kMaxSources> without) const;
+  [[nodiscard]] Vector6 unlike_mean(const Sweep& sweep) const;
+  [[nodiscard]] Hypothesis assume(const Sweep& sweep, std::bitset<kMaxSources> without, bool rests) const;
+  void match_last(const Sweep& sweep, const MotionBelief& belief, Hypothesis& hypothesis,
+                  const Gicp::StopRequested& stop);
+  void register_with(const Sweep& sweep, Hypothesis& hypothesis, const Gicp::StopRequested& stop);
+  Hypothesis choose(const Sweep& sweep, const Gicp::StopRequested& stop);
+  void correct(const Sweep& sweep, const Vector6& twist_base, std::bitset<kMaxSources> without);
+  [[nodiscard]] ElasticScan by_age(const Sweep& sweep, const Vector6& twist_base);
+  [[nodiscard]] std::optional<std::size_t> worst_source(const Sweep& sweep, const Hypothesis& hypothesis) const;
+  [[nodiscard]] bool is_placed(const Sweep& sweep, const Registration& fit, const Hypothesis& all_sources) const;
+  void report(const Sweep& sweep, OdometryEstimate& estimate);
+  void finish(const Sweep& sweep, OdometryEstimate& estimate);
 
   OdometryOptions options_;
+  std::vector<MotionSourceOptions> sources_;
   StageClock* clock_;
   Gicp gicp_;
   Gravity gravity_;
   TiltKeeper tilt_keeper_;
   FlatGroundAssumption flat_ground_;
   SurfaceMap map_;
-  SurfaceMap last_scan_map_;       ///< the last processed sweep alone, the target of scan-to-scan
-  bool last_scan_mapped_ = false;  ///< last_scan_map_ is up to date
-  std::vector<SurfacePoint> scan_; ///< the sweep at hand, fully corrected
-  std::size_t registered_ = 0;     ///< the first so many points of scan_ are registered
-  std::vector<SurfacePoint> last_scan_;
-  std::size_t last_registered_ = 0;
-  SensorIntegration sensors_;
-
-  std::uint64_t processed_ = 0;
-  std::optional<Pose> T_odom_start_; ///< where to begin
-  Sweep first_; ///< as it came, while no velocity was known to correct it with; else without points
-  Pose T_odom_last_;
-  Vector6 twist_base_ = Vector6::Zero();
-  Pose T_odom_keyframe_;
-  std::optional<Matrix6> keyframe_observability_; ///< of the last sweep, if the map is still to take it in
-  PoseUncertainty uncertainty_;
-  Vector6 askew_variance_ = Vector6::Zero(); ///< of the last sweep, base axes
-  Standstill standstill_;
-  double usual_share_ = 0.0;  ///< of the registered points that find a correspondence
-  double usual_points_ = 0.0; ///< of a sweep
-  Stamp last_seen_;           ///< of the last sweep that lidar placed
-  int refused_in_a_row_ = 0;  ///< sweeps with points
-  std::int64_t fitted_ = 0;   ///< sweeps, since the map was begun
-  bool lacks_prior_ = false;  ///< the last sweep had to be registered with the one before it
-  bool adrift_ = false;       ///< the last sweep was a prediction
-  bool knows_start_ = false;  ///< the map holds what was seen at T_odom_start_
-  bool resumed_ = false;
-  bool source_is_refuted_ = false; ///< that of the rotation of the sweep at hand, which came corrected for it
+  SurfaceMap last_scan_map_; ///< target of scan-to-scan
+  MapPolicy map_policy_;
+  LidarHealth lidar_health_;
   SeenAxes seen_axes_;
+  SensedSteps steps_;
+  MotionFilter filter_;
+  std::vector<SurfacePoint> scan_;                ///< the sweep at hand, fully corrected
+  std::vector<SurfacePoint> aged_;                ///< what is registered of it, by age
+  std::vector<float> block_age_s_;                ///< of aged_
+  std::optional<Sweep> first_;                    ///< while no motion is known
+  std::optional<Pose> T_odom_start_;              ///< where to begin
+  std::optional<Matrix6> keyframe_observability_; ///< of the last sweep, if the map is still to take it in
+  bool begun_ = false, resumed_ = false, stands_ = false, saw_ = false;
+  bool scan_is_next_target_ = false; ///< scan-to-scan is to take in the last sweep
+  bool has_last_scan_ = false;       ///< it has taken in one
+  Stamp slow_since_;
   RegistrationFeedback feedback_;
 };
 

@@ -15,13 +15,14 @@ constexpr double kAround_m = 2.0;
 /// One standard deviation, of the robot at each of the places.
 const Vector6 kSigma = along_each_axis(0.5, 5.0);
 
-constexpr double kLeast = 0.2; ///< share of the points of the sweep
+/// Share of the points of the sweep that is known: less is a coincidence, as the next bend of a tunnel offers.
+constexpr double kLeast = 0.5;
 
-/// What is asked for against the next best place: clearly more where half of the sweep and less is known, hardly less
-/// where four fifths are.
+/// What is asked for against the next best place: clearly more where half of the sweep is known, hardly less where four
+/// fifths are.
 double least_ratio(double share) {
-  constexpr double kHalf = 0.5, kMost = 0.8, kClearlyMore = 1.3, kHardlyLess = 0.9;
-  return std::lerp(kClearlyMore, kHardlyLess, std::clamp((share - kHalf) / (kMost - kHalf), 0.0, 1.0));
+  constexpr double kMost = 0.8, kClearlyMore = 1.3, kHardlyLess = 0.9;
+  return std::lerp(kClearlyMore, kHardlyLess, std::clamp((share - kLeast) / (kMost - kLeast), 0.0, 1.0));
 }
 
 /// The expected place and those around it.
@@ -39,12 +40,13 @@ std::array<Pose, 9> places_around(const Pose& T_map_expected) {
 
 std::optional<Pose> relocate(Gicp& gicp, std::span<const SurfacePoint> scan_base, const SurfaceMap& map,
                              const Pose& T_map_expected, const RegistrationOptions& options) {
-  const Matrix6 information = kSigma.cwiseAbs2().cwiseInverse().asDiagonal();
+  MotionBelief prior;
+  prior.information.topLeftCorner<6, 6>() = kSigma.cwiseAbs2().cwiseInverse().asDiagonal();
   std::optional<Pose> T_map_here;
   double here = 0.0, elsewhere = 0.0; // share of the points with a correspondence
   for (const Pose& T_start : places_around(T_map_expected)) {
-    const Registration found =
-        gicp.align(scan_base, map, T_start, {T_start, information}, options, true, [] { return false; });
+    prior.T_target_source = T_start;
+    const Registration found = gicp.align({scan_base}, map, T_start, prior, options, true, [] { return false; });
     const double share = static_cast<double>(found.inliers) / static_cast<double>(scan_base.size());
     const double moved_m = (found.T_target_source.translation - T_map_expected.translation).norm();
     if (!(moved_m < kFarthest_m)) {

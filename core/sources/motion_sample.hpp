@@ -20,6 +20,15 @@ struct ImuSample {
       attitude; ///< R_world_imu, gravity-aligned world of arbitrary heading, where the unit has one
 };
 
+/// Specific force during a sweep, in the base frame: what the velocity changes by between the means of two sweeps is
+/// what is felt in the later part of the first and in the earlier part of the second.
+struct SpecificForce {
+  Eigen::Vector3d early_base_mps2 = Eigen::Vector3d::Zero(); ///< mean, each sample by its share of the time to the end
+  Eigen::Vector3d late_base_mps2 = Eigen::Vector3d::Zero();  ///< mean, each sample by its share of the time since start
+
+  [[nodiscard]] Eigen::Vector3d mean_base_mps2() const { return 0.5 * (early_base_mps2 + late_base_mps2); }
+};
+
 /// One pose of an odometry source (wheel, visual, kinematic).
 struct OdometrySample {
   Stamp stamp;

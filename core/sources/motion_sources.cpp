@@ -93,8 +93,8 @@ SensedMotion MotionSources::sensed_in(Stamp from, Stamp to) const {
     if (!T_source_base)
       continue;
     motion.sources[i] = {true, health.healthy(), epoch, *T_source_base};
-    if (health.healthy() && health.trusts_accelerometer() && !motion.specific_force_base_mps2)
-      motion.specific_force_base_mps2 = track.mean_specific_force_mps2(from, to);
+    if (health.healthy() && health.trusts_accelerometer() && !motion.specific_force)
+      motion.specific_force = track.specific_force(from, to);
     if (health.healthy() && !motion.up_base)
       motion.up_base = track.up_base(from, to);
   }

@@ -96,16 +96,21 @@ std::optional<Eigen::Vector3d> MotionTrack::up_base(Stamp from, Stamp to) const 
   return sum.normalized();
 }
 
-std::optional<Eigen::Vector3d> MotionTrack::mean_specific_force_mps2(Stamp from, Stamp to) const {
+std::optional<SpecificForce> MotionTrack::specific_force(Stamp from, Stamp to) const {
   if (kind_ != SourceKind::imu || !has_sample_in(from, to))
     return std::nullopt;
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  double count = 0.0;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero(), sum_by_time = Eigen::Vector3d::Zero();
+  double count = 0.0, time_s = 0.0;
   for (std::size_t age = age_at(to); age < size_ && from_newest(age).stamp > from; ++age) {
-    sum += from_newest(age).specific_force_base_mps2;
+    const Node& sample = from_newest(age);
+    const double since_s = to_seconds(sample.stamp - from);
+    sum += sample.specific_force_base_mps2;
+    sum_by_time += since_s * sample.specific_force_base_mps2;
     count += 1.0;
+    time_s += since_s;
   }
-  return sum / count;
+  const Eigen::Vector3d late = sum_by_time / time_s;
+  return SpecificForce{.early_base_mps2 = 2.0 * sum / count - late, .late_base_mps2 = late};
 }
 
 } // namespace locus

@@ -48,8 +48,8 @@ class MotionTrack {
   /// Whether the newest sample is at most kMaxExtrapolation old, and came as soon after the one before.
   [[nodiscard]] bool is_live(Stamp now) const;
 
-  /// Mean specific force in the base frame over the samples in (from, to]; nothing for odometry or without samples.
-  [[nodiscard]] std::optional<Eigen::Vector3d> mean_specific_force_mps2(Stamp from, Stamp to) const;
+  /// Over the samples in (from, to]; nothing for odometry or without samples.
+  [[nodiscard]] std::optional<SpecificForce> specific_force(Stamp from, Stamp to) const;
 
   /// Unit vector in the base frame, from the mean attitude of the samples in (from, to]; nothing where one has none.
   [[nodiscard]] std::optional<Eigen::Vector3d> up_base(Stamp from, Stamp to) const;

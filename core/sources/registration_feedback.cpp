@@ -11,16 +11,20 @@ const Vector6 kHonestError = along_each_axis(0.01, 0.2);
 
 } // namespace
 
-LidarOpinion opinion_on(const Vector6& error, const Matrix6& lidar_information) {
+double Innovation::ratio() const {
+  return (variance.array() > 0.0).select(value.array().square() / variance.array(), 0.0).maxCoeff();
+}
+
+LidarOpinion opinion_on(const Innovation& innovation, double elapsed_s) {
   constexpr double kMaxChiSquare = 38.0; ///< exceeded once in a million by six honest axes
   double chi_square = 0.0;
   bool sees = false;
   for (int axis = 0; axis < 6; ++axis) {
-    const double variance = kHonestError[axis] * kHonestError[axis];
-    if (lidar_information(axis, axis) * variance < 1.0)
+    const double honest = kHonestError[axis] * kHonestError[axis] / (elapsed_s * elapsed_s) + innovation.known[axis];
+    if (innovation.variance[axis] == 0.0 || innovation.others[axis] > honest)
       continue;
     sees = true;
-    chi_square += error[axis] * error[axis] / (variance + 1.0 / lidar_information(axis, axis));
+    chi_square += innovation.value[axis] * innovation.value[axis] / (honest + innovation.others[axis]);
   }
   if (!sees)
     return LidarOpinion::none;

@@ -13,9 +13,18 @@ namespace locus {
 /// What lidar says about the motion that a source reported from one sweep to the next.
 enum class LidarOpinion : std::uint8_t { none, agrees, disagrees };
 
-/// Chi-square test of what a source is off by from one sweep to the next (metres and radians), over the axes that lidar
-/// sees: those which it knows better than an honest source does.
-LidarOpinion opinion_on(const Vector6& error, const Matrix6& lidar_information);
+/// What a motion source says and what all others say, compared.
+struct Innovation {
+  Vector6 value = Vector6::Zero();    ///< m/s and rad/s, the source's less that of the others; base axes
+  Vector6 variance = Vector6::Zero(); ///< that it should have; zero along axes of which the source says nothing
+  Vector6 others = Vector6::Zero();   ///< the part of it that is not the source's
+  Vector6 known = Vector6::Zero();    ///< the part that an honest source of its kind has while it moves like that
+
+  [[nodiscard]] double ratio() const; ///< largest square in units of its variance
+};
+
+/// Chi-square test over the axes that are known without the source better than an honest source knows them.
+LidarOpinion opinion_on(const Innovation& innovation, double elapsed_s);
 
 /// What a registered sweep tells the health monitors. Nothing else of the result goes back to the sensors' side, so
 /// that a sweep never depends on when the one before it was registered, but for which sources are trusted.

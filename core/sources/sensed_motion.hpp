@@ -8,6 +8,7 @@
 
 #include "core/base/pose.hpp"
 #include "core/base/source_id.hpp"
+#include "core/sources/motion_sample.hpp"
 
 namespace locus {
 
@@ -39,9 +40,8 @@ struct SourcePose {
 /// What all motion sources say of a sweep.
 struct SensedMotion {
   std::array<SourcePose, kMaxSources> sources; ///< by index in the configuration
-  std::optional<Eigen::Vector3d>
-      specific_force_base_mps2;           ///< mean over the sweep, from the first usable inertial source
-  std::optional<Eigen::Vector3d> up_base; ///< unit vector, from that source's attitude where it has one
+  std::optional<SpecificForce> specific_force; ///< during the sweep, from the first usable inertial source
+  std::optional<Eigen::Vector3d> up_base;      ///< unit vector, from that source's attitude where it has one
 };
 
 } // namespace locus

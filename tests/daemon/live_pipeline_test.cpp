@@ -53,6 +53,30 @@ class MeteredInput : public test::HeldInput {
   std::atomic<std::uint64_t> wanted_{0}, resting_at_{0};
 };
 
+/// Gives the drive out patiently until the motion of its start is known, which takes as long as dozens of sweeps; then
+/// at a pace.
+class PacedAfterStart : public InputSource {
+ public:
+  PacedAfterStart(InputSource& drive, double speed) : patient_(drive), paced_(drive, speed) {}
+
+  void wait_for(const LivePipeline* pipeline) {
+    patient_.wait_for(pipeline);
+    pipeline_.store(pipeline);
+  }
+
+  Input next(Duration timeout) override {
+    constexpr std::uint64_t kStartsAt = 3;
+    const LivePipeline* pipeline = pipeline_.load();
+    const bool started = pipeline != nullptr && pipeline->counters().processed >= kStartsAt;
+    return started ? paced_.next(timeout) : patient_.next(timeout);
+  }
+
+ private:
+  test::PatientInput patient_;
+  PacedInput paced_; ///< its clock begins with the first input that it gives out
+  std::atomic<const LivePipeline*> pipeline_{nullptr};
+};
+
 /// A robot that is switched off.
 class SilentInput : public InputSource {
  public:
@@ -130,11 +154,12 @@ TEST(LivePipeline, OverloadDropsSweepsAndNeverMakesEstimatesOlder) {
   const std::vector<ProcessedSweep> alone = process_in_one_thread(config);
   const Duration registration = median_wall(alone.begin(), alone.end());
   DriveInput drive;
-  PacedInput input(drive, 3.0 * to_seconds(milliseconds{100}) / to_seconds(registration));
+  PacedAfterStart input(drive, 3.0 * to_seconds(milliseconds{100}) / to_seconds(registration));
   std::vector<std::uint64_t> seen; // when the odometry had time again
   LivePipeline pipeline(config, open_lidars(config), input, {.speed = kNoHurry, .after_estimate = [&](const auto&...) {
                                                                seen.push_back(pipeline.counters().seen);
                                                              }});
+  input.wait_for(&pipeline);
   const std::vector<ProcessedSweep> fetched = fetch_all(pipeline);
   pipeline.stop();
 

@@ -98,7 +98,7 @@ Registration align(Gicp& gicp, const PlacedSweep& sweep, const SurfaceMap& map) 
   constexpr double kOff_m = 0.02;
   Pose T_start = sweep.T_odom_base;
   T_start.translation.x() += kOff_m;
-  return gicp.align(std::span(sweep.scan).first(sweep.registered), map, T_start, {T_start, Matrix6::Zero()},
+  return gicp.align({std::span(sweep.scan).first(sweep.registered)}, map, T_start, {T_start},
                     OdometryOptions{}.scan_to_submap, false, [] { return false; });
 }
 

@@ -50,14 +50,13 @@ def stage_row(f, name, stage, prior, floor, pcl=None):
 
 
 def stages(f):
-    """Of the plant; scan-to-scan is needed with lidar alone only."""
-    name, alone, aided = "plant", "pipeline/plant/lidar", "pipeline/plant/wheels_gyro"
+    """Of the plant; scan-to-scan runs at the start alone."""
+    name, aided = "plant", "pipeline/plant/wheels_gyro"
     packets, points, one_pass = (f.cpu_ms(f"floor_{kind}/{name}") for kind in ("packets", "points", "pass"))
     rows = [
         stage_row(f, name, "decode", "wheels_gyro", packets),
         stage_row(f, name, "correct+filter", "wheels_gyro", packets + points, f"pcl_voxel_grid/{name}"),
         stage_row(f, name, "covariance", "wheels_gyro", points, f"pcl_normals/{name}"),
-        stage_row(f, name, "scan_to_scan", "lidar", one_pass * f.counter(alone, "scan_to_scan_iterations")),
         stage_row(f, name, "scan_to_submap", "wheels_gyro", one_pass * f.counter(aided, "scan_to_submap_iterations")),
         stage_row(f, name, "map", "wheels_gyro", points * f.counter(aided, "keyframes")),
     ]

@@ -51,7 +51,7 @@ std::size_t disagreements_without_blame(const Replay& replay) {
 
 /// Every stamp is right but those of the IMU. Simulated once for all tests of a process.
 const SimulatedDrive& late_imu() {
-  static const SimulatedDrive drive("urban", "husky", 80, {"--halts", "12", "--imu-late-ms", "40"}, 2);
+  static const SimulatedDrive drive("urban", "husky", 80, {"--halts", "12", "--imu-late-ms", "100"}, 2);
   return drive;
 }
 

@@ -105,8 +105,7 @@ Outcome align_ours(const View& target, const View& source, const Pose& truth) {
   Gicp gicp(1);
   Outcome outcome;
   for (const Pose& start : starts_around(truth))
-    outcome.add(gicp.align(source.surfaces, map, start, {start, Matrix6::Zero()}, {kMaxIterations, 1.0}, true,
-                           [] { return false; })
+    outcome.add(gicp.align({source.surfaces}, map, start, {start}, {kMaxIterations, 1.0}, true, [] { return false; })
                     .T_target_source,
                 truth);
   return outcome;

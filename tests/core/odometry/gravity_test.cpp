@@ -17,8 +17,9 @@ const Eigen::Vector3d kUp = Eigen::Vector3d::UnitZ();
 Sweep sweep_with(const Eigen::Vector3d& rpy_deg, const Eigen::Vector3d& acceleration_base_mps2 = {0, 0, 0}) {
   Sweep sweep;
   sweep.end = sweep.start + kPeriod;
-  sweep.motion.specific_force_base_mps2 =
+  const Eigen::Vector3d force =
       from_rpy_rad(rpy_deg * kRadPerDeg).conjugate() * (9.80665 * kUp) + acceleration_base_mps2;
+  sweep.motion.specific_force = SpecificForce{force, force};
   return sweep;
 }
 

@@ -116,12 +116,12 @@ TEST_F(MotionSourcesTest, SensesThePoseOfEverySourceThatSpokeDuringTheSweep) {
   EXPECT_FALSE(motion.sources[3].usable) << "there is no such source";
   EXPECT_NEAR(motion.sources[0].T_source_base.translation.x(), 1.0, 1e-12);
   EXPECT_NEAR(so3_log(motion.sources[1].T_source_base.rotation).z(), 1.0, 1e-6);
-  ASSERT_TRUE(motion.specific_force_base_mps2);
-  EXPECT_NEAR(motion.specific_force_base_mps2->z(), 9.81, 1e-12);
+  ASSERT_TRUE(motion.specific_force);
+  EXPECT_NEAR(motion.specific_force->mean_base_mps2().z(), 9.81, 1e-12);
 
   const SensedMotion silence = sources.sensed_in(at_ms(2000), at_ms(2100));
   EXPECT_FALSE(silence.sources[0].usable);
-  EXPECT_FALSE(silence.specific_force_base_mps2);
+  EXPECT_FALSE(silence.specific_force);
 }
 
 TEST_F(MotionSourcesTest, WhoeverLosesHealthIsKnownToTheSweepButNotUsable) {

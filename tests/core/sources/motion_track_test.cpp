@@ -110,9 +110,30 @@ TEST(MotionTrack, TheGyroIsIntegratedInTheFrameOfTheBase) {
   const Pose T = track.at(at_ms(0))->inverse() * *track.at(at_ms(500));
   EXPECT_LT((so3_log(T.rotation) - Eigen::Vector3d{0, 0, 1.0}).norm(), 1e-9);
   EXPECT_EQ(T.translation.norm(), 0.0) << "an inertial source turns, it does not move";
-  const auto force = track.mean_specific_force_mps2(at_ms(100), at_ms(200));
+  const auto force = track.specific_force(at_ms(100), at_ms(200));
   ASSERT_TRUE(force);
-  EXPECT_LT((*force - Eigen::Vector3d{0, 0, 9.81}).norm(), 1e-9);
+  EXPECT_LT((force->early_base_mps2 - Eigen::Vector3d{0, 0, 9.81}).norm(), 1e-9);
+  EXPECT_LT((force->late_base_mps2 - Eigen::Vector3d{0, 0, 9.81}).norm(), 1e-9);
+}
+
+TEST(MotionTrack, OfAForceThatGrowsALaterPartIsFeltLate) {
+  MotionTrack track = imu_track();
+  for (int ms = 0; ms <= 200; ++ms)
+    track.add(imu(at_ms(ms), {0, 0, 0}, {1e-2 * ms, 0, 9.81}));
+  const auto force = track.specific_force(at_ms(100), at_ms(200));
+  ASSERT_TRUE(force);
+  EXPECT_NEAR(force->mean_base_mps2().x(), 1.5, 0.01);
+  EXPECT_NEAR(force->late_base_mps2.x(), 1.0 + 2.0 / 3.0, 0.01) << "mean of a ramp, weighted by the time";
+  EXPECT_NEAR(force->early_base_mps2.x(), 1.0 + 1.0 / 3.0, 0.01);
+}
+
+TEST(MotionTrack, AForceThatIsFeltOnceIsFeltEarlyAndLate) {
+  MotionTrack track = imu_track();
+  track.add(imu(at_ms(200), {0, 0, 0}, {1.0, 0, 9.81}));
+  const auto force = track.specific_force(at_ms(100), at_ms(200));
+  ASSERT_TRUE(force);
+  EXPECT_EQ(force->early_base_mps2, force->late_base_mps2);
+  EXPECT_EQ(force->late_base_mps2.x(), 1.0);
 }
 
 TEST(MotionTrack, AnAttitudeSaysWhichWayIsUpInTheBaseFrame) {
@@ -153,7 +174,7 @@ TEST(MotionTrack, KnowsWhetherASampleLiesInAWindow) {
 TEST(MotionTrack, OdometryHasNoSpecificForce) {
   MotionTrack track = odometry_track();
   track.add(odometry(at_ms(0), 0.0));
-  EXPECT_FALSE(track.mean_specific_force_mps2(at_ms(-10), at_ms(10)));
+  EXPECT_FALSE(track.specific_force(at_ms(-10), at_ms(10)));
 }
 
 } // namespace

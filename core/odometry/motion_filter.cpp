@@ -1,0 +1,390 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/odometry/motion_filter.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "core/sources/motion_sample.hpp"
+
+namespace locus {
+
+namespace {
+
+/// Where the parts of the state begin.
+enum : int {
+  kPosition = 0,
+  kTurn = 3,
+  kVelocity = 6,
+  kRate = 9,
+  kAccelerometer = 12,
+  kGravity = 15,
+  kMap = 18,
+  kOfSources = MotionFilter::kCommonStates
+};
+
+constexpr double square(double x) { return x * x; }
+Vector6 squares(double translation, double rotation) {
+  return (Vector6() << Eigen::Vector3d::Constant(square(translation)), Eigen::Vector3d::Constant(square(rotation)))
+      .finished();
+}
+
+/// None goes on for long sideways or upwards, rolls or pitches on. Ahead and in yaw a robot goes on as it did, but what
+/// is told of neither for a second is taken to come to rest.
+const Vector6 kFades_s = (Vector6() << 0.6, 0.3, 0.3, 0.3, 0.3, 0.6).finished();
+constexpr double kGoesOn_s = 1.0;
+constexpr double kTold = 0.5; ///< of the variance of a prediction: what is left of it when somebody tells
+
+/// How its motion changes: standard deviations of the twist after a second.
+const Vector6 kProcess = squares(0.7, 0.7);
+/// What any robot is able to, one standard deviation: m/s^2 and rad/s^2.
+const Vector6 kAble = squares(5.0, 20.0);
+
+/// Noise of the sources, until it is learned, and the least: of the way and the turn after a second.
+const Vector6 kOdometryNoise = squares(0.02, 0.01), kLeastOdometryNoise = squares(0.006, 0.001);
+const Vector6 kGyroNoise = squares(1.0, 0.006), kLeastGyroNoise = squares(1.0, 0.001);
+constexpr double kForceNoise = square(0.02); ///< of the velocity after a second of specific force
+
+/// Errors that are no noise: in proportion, and of stamps that are late while the motion changes.
+constexpr double kProportion = 0.01;
+constexpr double kLateForce_s = 0.03;
+constexpr double kLever_m = 0.1; ///< where a sensor sits is not quite known, or what it speaks of is not the base
+constexpr double kLateOdometry_s = 0.02, kLateGyro_s = 0.003;
+
+/// What the slow states may be, and how they walk, per square root of a second.
+constexpr double kAccelerometerBias = 0.1, kAccelerometerWalk = 0.002;
+constexpr double kGravityError = 0.2, kGravityWalk = 0.001;
+constexpr double kGyroBias = 0.02, kGyroWalk = 1e-4;
+constexpr double kScale = 0.02, kScaleWalk = 1e-4;
+
+/// Student's t: wheels slip and visual odometry jumps more often than a Gaussian allows.
+constexpr double kDegreesOfFreedom = 4.0;
+
+constexpr double kLearns_s = 5.0;   ///< time constant of what is learned
+constexpr double kHeard_s = 0.5;    ///< what the expectation counts for
+constexpr double kMostSigmas = 3.0; ///< an innovation teaches no more than that
+
+const Vector6 kFirst = squares(0.003, 3e-4); ///< what the first sweep of the map may lie askew
+const Vector6 kFloor = squares(0.001, 1e-4); ///< of the pose against the submap: surfaces are no better known
+
+Eigen::Vector3d slip(const Eigen::Vector3d& rate, const Eigen::Vector3d& velocity) { return rate.cross(velocity); }
+
+} // namespace
+
+MotionFilter::MotionFilter(const std::vector<MotionSourceOptions>& sources) : count_(sources.size()) {
+  for (std::size_t i = 0; i < count_; ++i) {
+    sources_[i].kind = sources[i].kind;
+    sources_[i].state = states_;
+    states_ += sources[i].kind == SourceKind::imu ? 3 : 2;
+  }
+  x_ = State::Zero(states_);
+  P_ = Covariance::Zero(states_, states_);
+  P_.diagonal().segment<3>(kAccelerometer).setConstant(square(kAccelerometerBias));
+  P_.diagonal().segment<3>(kGravity).setConstant(square(kGravityError));
+  for (std::size_t i = 0; i < count_; ++i)
+    forget(SourceId{i});
+}
+
+void MotionFilter::begin(const Pose& T_odom_base, const Vector6& twist_base, const Vector6& twist_sigma) {
+  T_odom_base_ = T_odom_base;
+  twist_base_ = twist_base;
+  P_.topRows<kAccelerometer>().setZero();
+  P_.leftCols<kAccelerometer>().setZero();
+  P_.diagonal().segment<6>(kVelocity) = twist_sigma.cwiseAbs2();
+  P_.middleRows<6>(kMap).setZero();
+  P_.middleCols<6>(kMap).setZero();
+  P_.diagonal().head<6>() = kFloor;
+  P_.diagonal().segment<6>(kMap) = kFirst;
+  elapsed_s_ = 0.0;
+}
+
+void MotionFilter::forget(SourceId source) {
+  Source& of = sources_[index_of(source)];
+  const bool gyro = of.kind == SourceKind::imu;
+  const int count = gyro ? 3 : 2;
+  P_.middleRows(of.state, count).setZero();
+  P_.middleCols(of.state, count).setZero();
+  P_.diagonal().segment(of.state, count).setConstant(square(gyro ? kGyroBias : kScale));
+  x_.segment(of.state, count).setZero();
+  of.noise_per_s = gyro ? kGyroNoise : kOdometryNoise;
+  of.learned_s.setZero();
+  of.last_twist.reset();
+}
+
+void MotionFilter::predict(double elapsed_s, double period_s, const std::optional<SpecificForce>& force,
+                           Measured measured) {
+  const double step_s = elapsed_s_ > 0.0 ? 0.5 * (elapsed_s + elapsed_s_) : elapsed_s; // between means of two sweeps
+  Vector6 step_variance, predicted;
+  const Eigen::Vector3d velocity = twist_base_.head<3>(), rate = twist_base_.tail<3>();
+  const Eigen::Matrix3d R_base_odom = T_odom_base_.R().transpose();
+  const Eigen::Vector3d up = Eigen::Vector3d{0.0, 0.0, kGravity_mps2} + x_.segment<3>(kGravity);
+  Covariance F = Covariance::Identity(states_, states_);
+  for (int axis = 0; axis < 6; ++axis) {
+    const bool translation = axis < 3;
+    const bool open = translation ? measured.translation && !force : measured.rotation;
+    const bool lasts = axis == 0 || axis == 5;
+    const bool told = P_(kVelocity + axis, kVelocity + axis) < kTold * predicted_variance_[axis];
+    untold_s_[axis] = told ? 0.0 : untold_s_[axis] + elapsed_s;
+    const bool goes_on = open || (lasts && untold_s_[axis] < kGoesOn_s);
+    const double kept = goes_on ? 1.0 : std::exp(-step_s / kFades_s[axis]);
+    const int row = kVelocity + axis;
+    step_variance[axis] =
+        open ? kAble[axis] * square(step_s) : kProcess[axis] * step_s + square(twist_base_[axis]) * kept * (1.0 - kept);
+    predicted[axis] = kept * twist_base_[axis];
+    F(row, row) = lasts ? 1.0 : kept; // the mean fades, the doubt does not
+  }
+  Covariance bends = Covariance::Identity(states_, states_); // a way that turns otherwise than thought
+  if (force) {
+    const Eigen::Vector3d last = last_force_ ? last_force_->late_base_mps2 : force->early_base_mps2;
+    const Eigen::Vector3d between = 0.5 * (last + force->early_base_mps2);
+    const Eigen::Vector3d force_change =
+        force->mean_base_mps2() - (last_force_ ? *last_force_ : *force).mean_base_mps2();
+    const double lever = square(kLever_m) * (rate - last_rate_).squaredNorm();
+    const Eigen::Vector3d mean_rate = 0.5 * (rate + predicted.tail<3>());
+    const Eigen::Vector3d change =
+        between - x_.segment<3>(kAccelerometer) - R_base_odom * up - slip(mean_rate, velocity); // m/s^2, base axes
+    const Eigen::Matrix3d of_turn = -R_base_odom * skew(up);
+    const double unfelt_s = std::max(0.0, std::max(step_s, elapsed_s) - period_s);
+    for (int axis = 0; axis < 3; ++axis) {
+      const int row = kVelocity + axis;
+      const double felt =
+          kForceNoise * step_s + square(kLateForce_s * force_change[axis]) + lever + kAble[axis] * square(unfelt_s);
+      const double share = step_variance[axis] / (step_variance[axis] + felt); // of the specific force
+      const double by = share * step_s;
+      predicted[axis] = (1.0 - share) * predicted[axis] + share * twist_base_[axis] + by * change[axis];
+      F(row, row) = (1.0 - share) * F(row, row) + share;
+      F(row, kAccelerometer + axis) = -by;
+      F.block<1, 3>(row, kGravity) = -by * R_base_odom.row(axis);
+      F.block<1, 3>(row, kTurn) = by * of_turn.row(axis);
+      F.block<1, 3>(row, kVelocity) -= by * skew(mean_rate).row(axis);
+      F.block<1, 3>(row, kRate) += 0.5 * by * skew(velocity).row(axis);
+      bends.block<1, 3>(row, kRate) = 0.5 * by * skew(velocity).row(axis);
+      step_variance[axis] *= 1.0 - share;
+    }
+  }
+  last_force_ = force;
+  last_rate_ = rate;
+  P_ = F * P_ * F.transpose();
+  P_.diagonal().segment<6>(kVelocity) += step_variance;
+  P_ = (bends * P_ * bends.transpose()).eval();
+  P_.diagonal().segment<3>(kAccelerometer).array() += square(kAccelerometerWalk) * elapsed_s;
+  P_.diagonal().segment<3>(kGravity).array() += square(kGravityWalk) * elapsed_s;
+  for (Source& source : std::span(sources_).first(count_)) {
+    const bool gyro = source.kind == SourceKind::imu;
+    P_.diagonal().segment(source.state, gyro ? 3 : 2).array() += square(gyro ? kGyroWalk : kScaleWalk) * elapsed_s;
+    source.used = false;
+  }
+  twist_base_ = predicted;
+  predicted_variance_ = P_.diagonal().segment<6>(kVelocity);
+  elapsed_s_ = elapsed_s;
+}
+
+void MotionFilter::expect_rest() {
+  P_.diagonal().segment<6>(kVelocity) += twist_base_.cwiseAbs2();
+  twist_base_.setZero();
+}
+
+void MotionFilter::move() {
+  const Pose T_odom_last = T_odom_base_;
+  T_odom_base_ = T_odom_last * se3_exp(elapsed_s_ * twist_base_);
+  Covariance F = Covariance::Identity(states_, states_);
+  F.topLeftCorner<6, 6>() = transport(T_odom_base_.translation - T_odom_last.translation);
+  F.block<6, 6>(kMap, kMap) = F.topLeftCorner<6, 6>();
+  const Matrix6 R = turn_both(T_odom_last.rotation * so3_exp(0.5 * elapsed_s_ * twist_base_.tail<3>()));
+  F.block<6, 6>(kPosition, kVelocity) = elapsed_s_ * R;
+  F.block<3, 3>(kPosition, kRate) = -0.5 * square(elapsed_s_) * R.topLeftCorner<3, 3>() * skew(twist_base_.head<3>());
+  // Of the second order: how far a way bends that is turned and driven otherwise than thought.
+  const double rate = P_.diagonal().segment<3>(kRate).maxCoeff(),
+               speed = P_.diagonal().segment<3>(kVelocity).maxCoeff();
+  const double bends =
+      0.5 * square(square(elapsed_s_) * elapsed_s_ / 3.0 * rate) * twist_base_.head<3>().squaredNorm() +
+      square(0.5 * square(elapsed_s_)) * rate * speed;
+  P_ = F * P_ * F.transpose();
+  P_.diagonal().segment<3>(kPosition).array() += bends;
+}
+
+/// What a source should read along an axis of the twist: an odometry by its scale more, a gyro by its bias.
+MotionFilter::Row MotionFilter::row(const Source& source, int axis) const {
+  Row row{State::Zero(states_), twist_base_[axis]};
+  row.h[kVelocity + axis] = 1.0;
+  if (source.kind == SourceKind::imu) {
+    const int bias = source.state + axis - 3;
+    row.h[bias] = 1.0;
+    row.expected += x_[bias];
+  } else if (axis == 0 || axis == 5) {
+    const int scale = source.state + (axis == 0 ? 0 : 1);
+    row.h[kVelocity + axis] += x_[scale];
+    row.h[scale] = twist_base_[axis];
+    row.expected *= 1.0 + x_[scale];
+  }
+  return row;
+}
+
+Vector6 MotionFilter::known_variance(const Source& source, const Vector6& twist_base) const {
+  const double late_s = source.kind == SourceKind::imu ? kLateGyro_s : kLateOdometry_s;
+  const Vector6 able = elapsed_s_ * kAble.cwiseSqrt(); // no robot changes its motion faster
+  const Vector6 change = (twist_base - source.last_twist.value_or(twist_base)).cwiseMin(able).cwiseMax(-able);
+  Vector6 variance = (kProportion * twist_base).cwiseAbs2() + (late_s / elapsed_s_ * change).cwiseAbs2();
+  variance.head<3>().array() += square(kLever_m) * twist_base.tail<3>().squaredNorm();
+  return variance;
+}
+
+void MotionFilter::measure(SourceId id, const Vector6& twist_base, Measured what) {
+  Source& source = sources_[index_of(id)];
+  source.known_variance = known_variance(source, twist_base);
+  source.twist_base = twist_base;
+  source.variance.setZero();
+  source.used = true;
+  for (int axis = what.translation ? 0 : 3; axis < (what.rotation ? 6 : 3); ++axis) {
+    const auto [h, expected] = row(source, axis);
+    double variance = source.noise_per_s[axis] / elapsed_s_ + source.known_variance[axis];
+    const double surprise = twist_base[axis] - expected;
+    const double ratio = square(surprise) / (variance + h.dot(P_ * h));
+    variance *= std::max(1.0, (kDegreesOfFreedom + ratio) / (kDegreesOfFreedom + 1.0));
+    source.variance[axis] = variance;
+    const double before = twist_base_[axis];
+    update(h, surprise, variance);
+    if (source.kind == SourceKind::odometry && (axis == 0 || axis == 5))
+      turn_scale(source.state + (axis == 0 ? 0 : 1), axis, twist_base_[axis] - before);
+  }
+}
+
+/// What a source cannot tell apart, its scale and the twist, lies elsewhere once the twist has changed: the covariance
+/// turns with it, or the next reading of the same source tells them apart.
+void MotionFilter::turn_scale(int scale, int axis, double change) {
+  Covariance turned = Covariance::Identity(states_, states_);
+  turned(kVelocity + axis, scale) = -change / (1.0 + x_[scale]);
+  P_ = (turned * P_ * turned.transpose()).eval();
+}
+
+void MotionFilter::rest() {
+  const Vector6 sigma2 = squares(1e-3, 1e-4);
+  for (int axis = 0; axis < 6; ++axis) {
+    State h = State::Zero(states_);
+    h[kVelocity + axis] = 1.0;
+    update(h, -twist_base_[axis], sigma2[axis]);
+  }
+}
+
+void MotionFilter::update(const State& h, double surprise, double variance) {
+  const State Ph = P_ * h;
+  const double innovation_variance = h.dot(Ph) + variance;
+  lower(Ph, innovation_variance);
+  correct(Ph / innovation_variance * surprise);
+}
+
+/// By what a measurement told. The error of the map is considered and not corrected (Schmidt).
+void MotionFilter::lower(const State& Ph, double innovation_variance) {
+  const Matrix6 P_map = P_.block<6, 6>(kMap, kMap);
+  P_ -= Ph * Ph.transpose() / innovation_variance;
+  P_ = (0.5 * (P_ + P_.transpose())).eval();
+  P_.block<6, 6>(kMap, kMap) = P_map;
+}
+
+void MotionFilter::correct(const State& error) {
+  T_odom_base_ = {(so3_exp(error.segment<3>(kTurn)) * T_odom_base_.rotation).normalized(),
+                  T_odom_base_.translation + error.segment<3>(kPosition)};
+  twist_base_ += error.segment<6>(kVelocity);
+  x_.tail(states_ - kAccelerometer) += error.tail(states_ - kAccelerometer);
+  x_.segment<6>(kMap).setZero();
+}
+
+MotionBelief MotionFilter::belief() const { return {T_odom_base_, twist_base_, covariance().inverse()}; }
+
+void MotionFilter::see(const Pose& T_odom_base, const Vector6& twist_base, const Matrix12& information) {
+  const Matrix12 P = covariance();
+  Vector12 moved;
+  moved << difference(T_odom_base, T_odom_base_), twist_base - twist_base_;
+  State error = P_.leftCols<12>() * P.inverse() * moved;
+  error.head<12>().setZero();
+  correct(error);
+  // One direction after the other: what was as good as unknown must not leave its rounding behind.
+  const Eigen::SelfAdjointEigenSolver<Matrix12> seen(information);
+  for (int i = 0; i < 12; ++i) {
+    if (seen.eigenvalues()[i] <= 0.0)
+      continue;
+    const auto direction = seen.eigenvectors().col(i);
+    const State Ph = P_.leftCols<12>() * direction;
+    lower(Ph, Ph.head<12>().dot(direction) + 1.0 / seen.eigenvalues()[i]);
+  }
+  keep_floor();
+  T_odom_base_ = T_odom_base;
+  twist_base_ = twist_base;
+}
+
+void MotionFilter::keep_floor() { P_.diagonal().head<6>() = P_.diagonal().head<6>().cwiseMax(kFloor); }
+
+Innovation MotionFilter::innovation(SourceId id, const Vector6& twist_base) const {
+  const Source& source = sources_[index_of(id)];
+  const Vector6 known = source.used ? source.known_variance : known_variance(source, twist_base);
+  Innovation found;
+  for (int axis = source.kind == SourceKind::imu ? 3 : 0; axis < 6; ++axis) {
+    const auto [h, expected] = row(source, axis);
+    const double after = h.dot(P_ * h);
+    const double noise = source.noise_per_s[axis] / elapsed_s_ + known[axis];
+    const double error = twist_base[axis] - expected;
+    const bool used = source.used && source.variance[axis] > 0.0;
+    const double left = used ? std::max(1e-3, 1.0 - after / source.variance[axis]) : 1.0; // of the others' information
+    found.value[axis] = error / left;
+    found.known[axis] = known[axis];
+    found.others[axis] = after / left;
+    found.variance[axis] = noise + found.others[axis];
+  }
+  return found;
+}
+
+void MotionFilter::learn() {
+  for (Source& source : std::span(sources_).first(count_))
+    if (source.used)
+      learn_source(source);
+}
+
+namespace {
+
+/// Moves a variance towards what an innovation says of it. `others`: variance of what all others say.
+void learn_variance(double& variance, double& learned_s, double innovation, double known, double others, double per,
+                    double elapsed_s, double least) {
+  const double expected = variance * per + known;
+  const double weight = square(expected / (expected + others)); // how much of the innovation is its own
+  const double most = square(kMostSigmas) * (expected + others);
+  const double found = (std::min(square(innovation), most) - others - known) / per;
+  learned_s = std::min(learned_s + weight * elapsed_s, kLearns_s);
+  variance += weight * elapsed_s / (kHeard_s + learned_s) * (found - variance);
+  variance = std::max(variance, least);
+}
+
+} // namespace
+
+void MotionFilter::learn_source(Source& source) {
+  const Innovation found = innovation(SourceId{static_cast<std::size_t>(&source - sources_.data())}, source.twist_base);
+  const Vector6& least = source.kind == SourceKind::imu ? kLeastGyroNoise : kLeastOdometryNoise;
+  for (int axis = 0; axis < 6; ++axis) {
+    const bool felt = axis < 3 && last_force_;
+    const bool told = felt || found.others[axis] < kTold * predicted_variance_[axis];
+    if (source.variance[axis] == 0.0 || !told)
+      continue; // what nothing else tells teaches nothing
+    learn_variance(source.noise_per_s[axis], source.learned_s[axis], found.value[axis], source.known_variance[axis],
+                   found.others[axis], 1.0 / elapsed_s_, elapsed_s_, least[axis]);
+  }
+  source.last_twist = source.twist_base;
+}
+
+void MotionFilter::keep(const Matrix6& share) {
+  Covariance kept = Covariance::Identity(states_, states_);
+  kept.topLeftCorner<6, 6>() -= share;
+  kept.block<6, 6>(kMap, kPosition) = share;
+  P_ = (kept * P_ * kept.transpose()).eval();
+  keep_floor();
+}
+
+Matrix6 MotionFilter::pose_covariance_since_start() const {
+  const Matrix6 both = P_.block<6, 6>(kMap, kPosition);
+  return P_.topLeftCorner<6, 6>() + P_.block<6, 6>(kMap, kMap) + both + both.transpose();
+}
+
+void MotionFilter::put(const Pose& T_odom_base) { T_odom_base_ = T_odom_base; }
+
+} // namespace locus

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/base/options.hpp"
+#include "core/base/pose.hpp"
+#include "core/map/registration.hpp"
+#include "core/sources/motion_sample.hpp"
+#include "core/sources/registration_feedback.hpp"
+#include "core/sources/sensed_motion.hpp"
+
+namespace locus {
+
+/// The state of the robot and of its sensors with one covariance: an error-state Kalman filter on the manifold.
+///
+/// State: pose at the end of the sweep (odom frame) against the submap, twist during it (base frame, mean), bias of the
+/// accelerometer, gravity, what the map is off since the start (considered), for each gyro a bias, for each odometry a
+/// scale of the way ahead and one of the yaw. A sweep is predict(), measure() for each source or rest(), move(), see()
+/// with what lidar found, and learn(). Noise of the sources is learned from the innovations that each leaves when it is
+/// left out (variance components): what nothing else tells teaches nothing. All of it is per second, so that the rate
+/// of the sweeps does not matter. A value: copies are hypotheses. Fixed size. One owner.
+class MotionFilter {
+ public:
+  static constexpr int kCommonStates = 24; ///< before those of the sources
+  static constexpr int kMaxStates = kCommonStates + 3 * static_cast<int>(kMaxSources);
+  using State = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxStates, 1>;
+  using Covariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxStates, kMaxStates>;
+
+  /// Which axes of the twist a source measures. Those of the process are put aside for it: a robot may brake harder
+  /// than it ever did.
+  struct Measured {
+    bool translation = false, rotation = false;
+  };
+
+  explicit MotionFilter(const std::vector<MotionSourceOptions>& sources);
+
+  /// Begins at a pose with a twist of which only `twist_sigma` (standard deviations) is known.
+  void begin(const Pose& T_odom_base, const Vector6& twist_base, const Vector6& twist_sigma);
+
+  /// The twist during a sweep of `period_s` whose end is `elapsed_s` after that of the last. `force`: where it is
+  /// felt.
+  void predict(double elapsed_s, double period_s, const std::optional<SpecificForce>& force, Measured measured);
+
+  /// Takes the robot to stand, as far as anything else is not told (paper II-B.2).
+  void expect_rest();
+
+  /// A source says that the base moved with a twist (mean, base axes) since the end of the last sweep.
+  void measure(SourceId id, const Vector6& twist_base, Measured what);
+  /// The robot stands.
+  void rest();
+  /// The pose moves with the twist, to the end of the sweep.
+  void move();
+
+  /// Lidar has placed the robot, with information that the points alone give.
+  void see(const Pose& T_odom_base, const Vector6& twist_base, const Matrix12& information);
+
+  /// Compares each source that was measured with all others, and learns its noise.
+  void learn();
+
+  /// Of any source, whether it was measured or not. After see().
+  [[nodiscard]] Innovation innovation(SourceId id, const Vector6& twist_base) const;
+
+  /// The map has taken the sweep as it was placed: `share` of its error, along each axis, is now the map's.
+  void keep(const Matrix6& share);
+  /// Places the robot elsewhere without any news of how sure that is.
+  void put(const Pose& T_odom_base);
+  /// What comes back may come back as another.
+  void forget(SourceId source);
+
+  [[nodiscard]] const Pose& pose() const { return T_odom_base_; }
+  [[nodiscard]] const Vector6& twist_base() const { return twist_base_; }
+  /// What pose and twist are believed to be.
+  [[nodiscard]] MotionBelief belief() const;
+  [[nodiscard]] Matrix12 covariance() const { return P_.topLeftCorner<12, 12>(); } ///< pose against the submap
+  [[nodiscard]] Matrix6 pose_covariance_since_start() const;
+  [[nodiscard]] const State& state() const { return x_; } ///< behind the twist, for tests
+  [[nodiscard]] int state_of(SourceId source) const { return sources_[index_of(source)].state; }
+
+ private:
+  struct Source {
+    SourceKind kind = SourceKind::odometry;
+    int state = 0;       ///< first of its own
+    Vector6 noise_per_s; ///< variance of the twist times seconds
+    Vector6 learned_s = Vector6::Zero();
+    std::optional<Vector6> last_twist;
+    bool used = false; ///< in the sweep at hand
+    Vector6 twist_base = Vector6::Zero();
+    Vector6 variance = Vector6::Zero();       ///< that it was used with; zero along axes that were not
+    Vector6 known_variance = Vector6::Zero(); ///< the part of it that is not learned
+  };
+
+  struct Row { ///< of a measurement of one axis
+    State h;
+    double expected;
+  };
+  [[nodiscard]] Row row(const Source& source, int axis) const;
+  [[nodiscard]] Vector6 known_variance(const Source& source, const Vector6& twist_base) const;
+  void update(const State& h, double surprise, double variance);
+  void correct(const State& error);
+  void lower(const State& Ph, double innovation_variance);
+  void turn_scale(int scale, int axis, double change);
+  void learn_source(Source& source);
+  void keep_floor();
+
+  std::array<Source, kMaxSources> sources_;
+  std::size_t count_; ///< of sources
+  int states_ = kCommonStates;
+  Pose T_odom_base_;
+  Vector6 twist_base_ = Vector6::Zero();
+  State x_; ///< all that is neither pose nor twist; zero there
+  Covariance P_;
+  double elapsed_s_ = 0.0; ///< between the ends of the last two sweeps
+  std::optional<SpecificForce> last_force_;
+  Vector6 predicted_variance_ = Vector6::Zero(); ///< of the twist
+  Vector6 untold_s_ = Vector6::Zero();           ///< for how long nobody has told of an axis of the twist
+  Eigen::Vector3d last_rate_ = Eigen::Vector3d::Zero();
+};
+
+} // namespace locus

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "core/base/pose.hpp"
+#include "core/base/stamp.hpp"
+#include "core/ingest/sweep.hpp"
+
+namespace locus {
+
+/// What each motion source says of the way from one processed sweep to the next, however many were dropped in between
+/// (paper II-B.1). One owner.
+class SensedSteps {
+ public:
+  /// `sweep` has been processed: it is the last one now.
+  void remember(const Sweep& sweep) {
+    last_ = sweep.end;
+    sources_ = sweep.motion.sources;
+  }
+
+  [[nodiscard]] Stamp last() const { return last_; } ///< end of the last sweep
+  [[nodiscard]] double elapsed_s(const Sweep& sweep) const { return to_seconds(sweep.end - last_); }
+
+  /// The mean twist of the base; nothing where the source does not know it.
+  [[nodiscard]] std::optional<Vector6> twist_base(const Sweep& sweep, SourceId source) const {
+    const SourcePose& last = sources_[index_of(source)];
+    const SourcePose& now = sweep.motion.sources[index_of(source)];
+    if (!last.known || !now.known || last.epoch != now.epoch || elapsed_s(sweep) <= 0.0)
+      return std::nullopt;
+    return se3_log(last.T_source_base.inverse() * now.T_source_base) / elapsed_s(sweep);
+  }
+  /// Whether it is healthy, too, and was.
+  [[nodiscard]] bool is_usable(const Sweep& sweep, SourceId source) const {
+    return sources_[index_of(source)].usable && sweep.motion.sources[index_of(source)].usable &&
+           twist_base(sweep, source);
+  }
+
+ private:
+  Stamp last_;
+  std::array<SourcePose, kMaxSources> sources_;
+};
+
+} // namespace locus

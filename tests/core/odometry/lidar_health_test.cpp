@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/odometry/lidar_health.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace locus {
+namespace {
+
+constexpr std::size_t kRegistered = 1000;
+constexpr double kPeriod_s = 0.1;
+
+Registration fit(std::size_t inliers, double mean_error = 1.0) {
+  Registration registration;
+  registration.inliers = inliers;
+  registration.mean_error = mean_error;
+  return registration;
+}
+
+/// Of a lidar that for two seconds saw what it always sees.
+LidarHealth used_to(const Registration& registration, double period_s = kPeriod_s) {
+  LidarHealth health;
+  for (int i = 0; i < static_cast<int>(2.0 / period_s); ++i)
+    health.learn(registration, kRegistered, period_s);
+  return health;
+}
+
+TEST(FitOf, MoreAndNearerPointsFitBetter) {
+  EXPECT_GT(fit_of(fit(900)), fit_of(fit(800)));
+  EXPECT_GT(fit_of(fit(900, 1.0)), fit_of(fit(900, 2.0)));
+  EXPECT_EQ(fit_of(fit(0)), 0.0);
+}
+
+TEST(FitOf, APointThreeSigmaOffIsWorthNoMoreThanOneWithoutCorrespondence) {
+  EXPECT_EQ(fit_of(fit(500, 9.0)), fit_of(fit(0)));
+  // Half of 1000 points at 1 and half at 9 are as good as 500 at 1 and 500 that found nothing.
+  EXPECT_DOUBLE_EQ(fit_of(fit(1000, 5.0)), fit_of(fit(500, 1.0)));
+}
+
+TEST(LidarHealth, KnowsNothingUnusualBeforeTheFirstSweep) {
+  const LidarHealth health;
+  EXPECT_FALSE(health.misses_most(fit(0), kRegistered));
+  EXPECT_FALSE(health.is_unusual(fit(0), kRegistered));
+}
+
+TEST(LidarHealth, TheFirstSweepIsTheUsualAtOnce) {
+  LidarHealth health;
+  health.learn(fit(900), kRegistered, kPeriod_s);
+  EXPECT_TRUE(health.misses_most(fit(449), kRegistered));
+  EXPECT_FALSE(health.misses_most(fit(451), kRegistered));
+}
+
+TEST(LidarHealth, MissesMostBelowHalfOfTheUsualShare) {
+  const LidarHealth health = used_to(fit(600));
+  EXPECT_TRUE(health.misses_most(fit(299), kRegistered));
+  EXPECT_FALSE(health.misses_most(fit(301), kRegistered));
+  EXPECT_FALSE(health.misses_most(fit(31), kRegistered / 10)) << "a share, whatever the number of points";
+}
+
+TEST(LidarHealth, AFitIsUnusualThatIsWorseByASeventh) {
+  const LidarHealth health = used_to(fit(800, 1.0));
+  EXPECT_FALSE(health.is_unusual(fit(800, 1.0), kRegistered));
+  EXPECT_TRUE(health.is_unusual(fit(679, 1.0), kRegistered)) << "fewer";
+  EXPECT_FALSE(health.is_unusual(fit(681, 1.0), kRegistered));
+  EXPECT_TRUE(health.is_unusual(fit(800, 2.21), kRegistered)) << "farther off";
+  EXPECT_FALSE(health.is_unusual(fit(800, 2.19), kRegistered));
+  EXPECT_FALSE(health.is_unusual(fit(80, 1.0), kRegistered / 10));
+}
+
+TEST(LidarHealth, AnotherPlaceIsUsualAfterSecondsAtAnyRate) {
+  for (const double period_s : {0.2, 0.1, 0.05}) {
+    LidarHealth health = used_to(fit(1000), period_s);
+    EXPECT_TRUE(health.misses_most(fit(400), kRegistered));
+    for (int i = 0; i < static_cast<int>(std::lround(1.0 / period_s)); ++i)
+      health.learn(fit(400), kRegistered, period_s);
+    EXPECT_FALSE(health.misses_most(fit(400), kRegistered));
+    const double left = std::exp(-1.0), usual = 400 + 600 * left;
+    EXPECT_FALSE(health.misses_most(fit(static_cast<std::size_t>(0.5 * usual) + 1), kRegistered)) << period_s;
+    const double least_left = std::pow(0.8, 5), least = 400 + 600 * least_left;
+    EXPECT_TRUE(health.misses_most(fit(static_cast<std::size_t>(0.5 * least) - 1), kRegistered)) << period_s;
+  }
+}
+
+TEST(LidarHealth, ASweepOfNoPointsIsNoDivisionByNothing) {
+  LidarHealth health;
+  health.learn(fit(0), 0, 0.0);
+  health.learn(fit(0), 0, kPeriod_s);
+  EXPECT_FALSE(health.misses_most(fit(0), 0));
+  EXPECT_FALSE(health.is_unusual(fit(0), 0));
+  health = used_to(fit(800));
+  EXPECT_TRUE(health.misses_most(fit(0), 0));
+}
+
+} // namespace
+} // namespace locus

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/odometry/map_policy.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <utility>
+
+namespace locus {
+namespace {
+
+using std::chrono::milliseconds;
+using Verdict = MapPolicy::Verdict;
+
+constexpr Duration kEverySweep = milliseconds{100};
+constexpr int kPatience = 10; ///< refusals in a row until the map goes on from the prediction
+const MapOptions kMapOptions{.keyframe_m = 1.0, .keyframe_deg = 30.0};
+
+Stamp end_of(int sweep) { return stamp_from_ns(1'000'000'000) + sweep * kEverySweep; }
+Pose ahead(double x_m, double yaw_deg = 0.0) { return {from_rpy_rad({0, 0, yaw_deg * kRadPerDeg}), {x_m, 0, 0}}; }
+
+MapPolicy::Outcome placed(int sweep, const Pose& T_odom_base = {}) {
+  return {.stamp = end_of(sweep), .T_odom_base = T_odom_base, .placed = true, .has_points = true};
+}
+MapPolicy::Outcome refused(int sweep, const Pose& T_odom_base = {}) {
+  return {.stamp = end_of(sweep), .T_odom_base = T_odom_base, .placed = false, .has_points = true};
+}
+MapPolicy::Outcome carried(MapPolicy::Outcome outcome) {
+  outcome.carried = true;
+  return outcome;
+}
+
+/// A map that was begun at the origin by sweep 0 and fitted those up to `last`.
+MapPolicy policy_begun(int last = 0) {
+  MapPolicy policy(kMapOptions);
+  policy.begin(end_of(0), Pose{});
+  for (int i = 1; i <= last; ++i)
+    EXPECT_EQ(policy.judge(placed(i)), Verdict::waits) << "it stands";
+  return policy;
+}
+
+/// What becomes of the map in each of the sweeps up to that at which it no longer waits, or to the last.
+std::pair<int, Verdict> first_that_waits_no_longer(MapPolicy& policy, int from, int to, bool are_carried) {
+  for (int i = from; i <= to; ++i)
+    if (const Verdict verdict = policy.judge(are_carried ? carried(refused(i)) : refused(i)); verdict != Verdict::waits)
+      return {i, verdict};
+  return {to, Verdict::waits};
+}
+
+TEST(MapPolicy, TakesInASweepAfterEveryMetreOrThirtyDegrees) {
+  MapPolicy policy = policy_begun();
+  EXPECT_EQ(policy.judge(placed(1, ahead(0.99))), Verdict::waits);
+  EXPECT_EQ(policy.judge(placed(2, ahead(1.01))), Verdict::takes_in);
+  EXPECT_EQ(policy.judge(placed(3, ahead(2.0))), Verdict::waits) << "counted from the last that was taken in";
+  EXPECT_EQ(policy.judge(placed(4, ahead(2.0, 29.9))), Verdict::waits);
+  EXPECT_EQ(policy.judge(placed(5, ahead(2.0, 30.1))), Verdict::takes_in);
+  EXPECT_EQ(policy.judge(placed(6, ahead(2.0, 0.2))), Verdict::waits);
+  EXPECT_EQ(policy.judge(placed(7, ahead(2.0, 0.0))), Verdict::takes_in) << "back again";
+}
+
+TEST(MapPolicy, TakesInNothingThatMissesMostOfWhatIsUsual) {
+  MapPolicy policy = policy_begun();
+  MapPolicy::Outcome dusty = placed(1, ahead(5.0));
+  dusty.misses_most = true;
+  EXPECT_EQ(policy.judge(dusty), Verdict::waits);
+  EXPECT_EQ(policy.judge(placed(2, ahead(5.0))), Verdict::takes_in);
+}
+
+TEST(MapPolicy, TakesInNothingThatLidarDidNotPlace) {
+  MapPolicy policy = policy_begun();
+  EXPECT_EQ(policy.judge(refused(1, ahead(5.0))), Verdict::waits) << "one sweep against one";
+  EXPECT_TRUE(policy.is_refused());
+  EXPECT_EQ(policy.judge(placed(2)), Verdict::waits);
+  EXPECT_FALSE(policy.is_refused());
+}
+
+TEST(MapPolicy, GoesOnFromThePredictionAfterTenRefusalsInARow) {
+  MapPolicy policy = policy_begun(50);
+  const auto [sweep, verdict] = first_that_waits_no_longer(policy, 51, 100, false);
+  EXPECT_EQ(sweep, 50 + kPatience);
+  EXPECT_EQ(verdict, Verdict::takes_in);
+  EXPECT_FALSE(policy.is_refused()) << "it counts anew";
+}
+
+TEST(MapPolicy, OneThatIsPlacedEndsTheRow) {
+  MapPolicy policy = policy_begun(50);
+  EXPECT_EQ(first_that_waits_no_longer(policy, 51, 59, false).second, Verdict::waits);
+  EXPECT_EQ(policy.judge(placed(60)), Verdict::waits);
+  EXPECT_EQ(first_that_waits_no_longer(policy, 61, 69, false).second, Verdict::waits);
+}
+
+TEST(MapPolicy, SweepsWithoutPointsSayNothingAgainstTheMap) {
+  MapPolicy policy = policy_begun();
+  for (int i = 1; i < 100; ++i) {
+    MapPolicy::Outcome empty = refused(i, ahead(0.5 * i));
+    empty.has_points = false;
+    EXPECT_EQ(policy.judge(empty), Verdict::waits) << i;
+    EXPECT_FALSE(policy.is_refused());
+  }
+}
+
+TEST(MapPolicy, WaitsFiveSecondsWhereAnOdometryCarries) {
+  MapPolicy policy = policy_begun(100);
+  const auto [sweep, verdict] = first_that_waits_no_longer(policy, 101, 200, true);
+  EXPECT_EQ(sweep, 150) << "fifty sweeps since the last that was placed";
+  EXPECT_EQ(verdict, Verdict::takes_in);
+}
+
+TEST(MapPolicy, BeginsAnewWhereAsManySweepsContradictTheMapAsFittedIt) {
+  for (const bool are_carried : {false, true}) {
+    MapPolicy policy = policy_begun();
+    const auto [sweep, verdict] = first_that_waits_no_longer(policy, 1, 100, are_carried);
+    EXPECT_EQ(sweep, kPatience) << are_carried;
+    EXPECT_EQ(verdict, Verdict::begins_anew) << "carried or not: " << are_carried;
+    const auto [again, same] = first_that_waits_no_longer(policy, sweep + 1, 100, false);
+    EXPECT_EQ(again, 2 * kPatience) << "the new one is in doubt as well";
+    EXPECT_EQ(same, Verdict::begins_anew);
+  }
+}
+
+TEST(MapPolicy, AMapIsNoLongerInDoubtOnceItFittedMoreOften) {
+  MapPolicy policy = policy_begun(kPatience); // eleven with the first
+  EXPECT_EQ(first_that_waits_no_longer(policy, kPatience + 1, 100, false).second, Verdict::takes_in);
+  MapPolicy doubtful = policy_begun(kPatience - 1);
+  EXPECT_EQ(first_that_waits_no_longer(doubtful, kPatience, 100, false).second, Verdict::begins_anew);
+}
+
+TEST(MapPolicy, AMapOfAnotherRunIsNeverThrownAway) {
+  MapPolicy policy(kMapOptions);
+  policy.resume();
+  policy.begin(end_of(0), Pose{});
+  EXPECT_EQ(first_that_waits_no_longer(policy, 1, 100, false), std::pair(kPatience, Verdict::takes_in));
+}
+
+TEST(MapPolicy, KnowsWhetherASweepWasPlacedInTheLastFiveSeconds) {
+  const MapPolicy policy = policy_begun();
+  EXPECT_TRUE(policy.was_placed_lately(end_of(49)));
+  EXPECT_FALSE(policy.was_placed_lately(end_of(50)));
+  EXPECT_TRUE(policy_begun(10).was_placed_lately(end_of(59)));
+}
+
+} // namespace
+} // namespace locus

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/odometry/sensed_steps.hpp"
+
+#include <gtest/gtest.h>
+
+namespace locus {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr SourceId kSource{1}, kOther{0};
+const Vector6 kTwist = (Vector6() << 1.0, 0.1, -0.05, 0.02, -0.03, 0.4).finished();
+const Pose kBegin{so3_exp({0.1, 0.2, 0.3}), {4, 5, 6}}; ///< in the source's own frame
+
+/// The source has moved with kTwist for so long.
+Sweep sweep_at(Duration elapsed) {
+  Sweep sweep;
+  sweep.end = stamp_from_ns(1'000'000'000) + elapsed;
+  sweep.motion.sources[index_of(kSource)] = {
+      .known = true, .usable = true, .epoch = 3, .T_source_base = kBegin * se3_exp(to_seconds(elapsed) * kTwist)};
+  return sweep;
+}
+SensedSteps begun() {
+  SensedSteps steps;
+  steps.remember(sweep_at(milliseconds{0}));
+  return steps;
+}
+
+TEST(SensedSteps, AreMeanTwistsHoweverManySweepsWereDropped) {
+  const SensedSteps steps = begun();
+  for (const int elapsed_ms : {50, 100, 1000}) {
+    const Sweep sweep = sweep_at(milliseconds{elapsed_ms});
+    EXPECT_DOUBLE_EQ(steps.elapsed_s(sweep), 1e-3 * elapsed_ms);
+    const auto twist_base = steps.twist_base(sweep, kSource);
+    ASSERT_TRUE(twist_base);
+    EXPECT_LT((*twist_base - kTwist).norm(), 1e-9) << elapsed_ms;
+    EXPECT_TRUE(steps.is_usable(sweep, kSource));
+  }
+}
+
+TEST(SensedSteps, CountFromTheLastThatWasRemembered) {
+  SensedSteps steps = begun();
+  const Sweep second = sweep_at(milliseconds{100});
+  steps.remember(second);
+  EXPECT_EQ(steps.last(), second.end);
+  EXPECT_DOUBLE_EQ(steps.elapsed_s(sweep_at(milliseconds{250})), 0.15);
+  EXPECT_LT((*steps.twist_base(sweep_at(milliseconds{250}), kSource) - kTwist).norm(), 1e-9);
+}
+
+TEST(SensedSteps, AreNothingWhereTheSourceWasNotHeard) {
+  const SensedSteps steps = begun();
+  Sweep sweep = sweep_at(milliseconds{100});
+  EXPECT_FALSE(steps.twist_base(sweep, kOther)) << "never";
+  sweep.motion.sources[index_of(kSource)].known = false;
+  EXPECT_FALSE(steps.twist_base(sweep, kSource)) << "not now";
+  EXPECT_FALSE(steps.is_usable(sweep, kSource));
+  SensedSteps silent;
+  silent.remember(sweep);
+  EXPECT_FALSE(silent.twist_base(sweep_at(milliseconds{200}), kSource)) << "not then";
+}
+
+TEST(SensedSteps, AreNothingAcrossEpochs) {
+  Sweep sweep = sweep_at(milliseconds{100});
+  ++sweep.motion.sources[index_of(kSource)].epoch;
+  EXPECT_FALSE(begun().twist_base(sweep, kSource));
+  EXPECT_FALSE(begun().is_usable(sweep, kSource));
+}
+
+TEST(SensedSteps, AreNothingInNoTime) {
+  EXPECT_FALSE(begun().twist_base(sweep_at(milliseconds{0}), kSource));
+  EXPECT_FALSE(begun().twist_base(sweep_at(milliseconds{-100}), kSource)) << "nor backwards";
+}
+
+TEST(SensedSteps, OfASickSourceAreKnownButNotUsed) {
+  Sweep sick = sweep_at(milliseconds{100});
+  sick.motion.sources[index_of(kSource)].usable = false;
+  EXPECT_TRUE(begun().twist_base(sick, kSource));
+  EXPECT_FALSE(begun().is_usable(sick, kSource));
+  SensedSteps steps;
+  steps.remember(sick);
+  EXPECT_TRUE(steps.twist_base(sweep_at(milliseconds{200}), kSource));
+  EXPECT_FALSE(steps.is_usable(sweep_at(milliseconds{200}), kSource)) << "it has only just recovered";
+}
+
+} // namespace
+} // namespace locus
