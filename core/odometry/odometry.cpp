@@ -19,6 +19,10 @@ constexpr std::size_t kMinPoints = 30; ///< fewer say nothing reliable about six
 /// Least share of the points that must find a correspondence for a registration to be believed.
 constexpr double kMinInlierShare = 0.1;
 
+/// Of the points of the second sweep, those that the first must have seen, too, if the motion between them is to be
+/// found: honest starts have 0.45 and more, two halves of a turn 0.1 to 0.17.
+constexpr double kMinOverlap = 0.3;
+
 /// What misses most of the usual correspondences may contradict the motion sources by no more than this.
 constexpr double kLoneDeviation_sigma = 3.0;
 
@@ -179,6 +183,8 @@ void Odometry::find_start(const Sweep& sweep, const Gicp::StopRequested& stop) {
   if (choose_among(sweep, {}).rotation && !stop())
     if (Start free = start_without(kAllSources, first, sweep, stop); fit_of(free.fit) > fit_of(start.fit) / kAsGood)
       start = free;
+  if (static_cast<double>(start.fit.inliers) < kMinOverlap * static_cast<double>(sweep.registered))
+    return;
   const Pose T_odom_first = filter_.pose();
   lidar_health_.learn(start.fit, sweep.registered, steps_.elapsed_s(sweep));
   stands_ = start.rests;
