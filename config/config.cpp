@@ -88,6 +88,8 @@ void check_sources(Problems& problems, const Config& config) {
     problems.require(source.kind == SourceKind::imu || source.T_base_source == Pose{},
                      item("motion_sources", i, "T_base_source"),
                      "belongs to kind imu alone, an odometry source already reports the pose of the base");
+    problems.require(source.kind == SourceKind::imu || source.use_acceleration == UseAcceleration::automatic,
+                     item("motion_sources", i, "use_acceleration"), "belongs to kind imu alone");
   }
 }
 

@@ -58,6 +58,7 @@ template <class Section> void fields(Section& section, MotionSource& source) {
   section.key("kind", source.kind);
   section.key("topic", source.topic);
   section.key("health_topic", source.health_topic);
+  section.key("use_acceleration", source.use_acceleration);
   section.key("T_base_source", source.T_base_source);
 }
 
@@ -125,10 +126,16 @@ template <class Section> void fields(Section& section, ScanToScan& options) {
   fields(section, options.registration);
 }
 
+template <class Section> void fields(Section& section, MotionLimits& limits) {
+  section.key("max_speed_mps", limits.max_speed_mps);
+  section.key("max_acceleration_mps2", limits.max_acceleration_mps2);
+}
+
 template <class Section> void fields(Section& section, OdometryOptions& options) {
   ScanToScan scan_to_scan{options.scan_to_scan_mode, options.scan_to_scan};
   section.key("fusion", options.fusion);
   section.key("no_source_prior", options.no_source_prior);
+  section.key("motion", options.motion);
   section.key("scan_to_scan", scan_to_scan);
   section.key("scan_to_submap", options.scan_to_submap);
   section.key("map", options.map);

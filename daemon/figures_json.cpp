@@ -77,6 +77,14 @@ ordered_json lidar_json(const Figures& figures, std::size_t i) {
   return json;
 }
 
+/// m/s and rad/s along x, y, z and about them, base axes.
+ordered_json innovation_json(const SourceReport& report) {
+  const Vector6 sd = report.innovation.variance.cwiseSqrt();
+  return {{"value", std::vector<double>(report.innovation.value.begin(), report.innovation.value.end())},
+          {"sd", std::vector<double>(sd.begin(), sd.end())},
+          {"test_ratio", rounded(report.innovation.ratio())}};
+}
+
 ordered_json source_json(const Figures& figures, std::size_t i) {
   constexpr std::size_t kAlwaysTold = 7; ///< reasons; the others are rare, and told where they occur
   const IngestReport::Source& source = figures.ingest.sources[i];
@@ -86,6 +94,11 @@ ordered_json source_json(const Figures& figures, std::size_t i) {
                     {"health_changes", source.counters.health_changes}};
   if (figures.live || !source.verdict.empty())
     json["verdict"] = source.verdict;
+  if (figures.live && figures.sweeps.last) {
+    const SourceReport& report = figures.sweeps.last->sources[i];
+    json["innovation"] = innovation_json(report);
+    json["last_used_ms_ago"] = ms_since(report.last_used);
+  }
   if (figures.live)
     json.update({{"health", health_of(source)},
                  {"heard_ms_ago", ms_since(source.last_heard)},

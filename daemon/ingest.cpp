@@ -41,7 +41,9 @@ Ingest::Ingest(const Config& config, LidarRouter lidars, Sink sink, MotionSource
     : sink_(std::move(sink)), lidars_(std::move(lidars)),
       sweeps_(
           config.sweep, mounts(config.lidars),
-          MotionSources(config.source_options(), config.odometry.fusion, std::move(health_sink)), max_returns(config),
+          MotionSources(config.source_options(), config.odometry.fusion, config.odometry.motion,
+                        std::move(health_sink)),
+          max_returns(config),
           [this](Sweep& sweep) {
             const StageStopwatch::Pause pause(stages_);
             sink_(sweep, {cut_watch_.cut_began(), stages_.lap()});

@@ -29,6 +29,8 @@ std::optional<std::string> SweepOptions::problem() const {
 
 std::optional<std::string> OdometryOptions::problem() const {
   Problems problems;
+  problems.require_range("motion.max_speed_mps", motion.max_speed_mps, 0.1, 1000.0);
+  problems.require_range("motion.max_acceleration_mps2", motion.max_acceleration_mps2, 0.1, 1000.0);
   check(problems, "scan_to_scan", scan_to_scan);
   check(problems, "scan_to_submap", scan_to_submap);
   problems.require_range("map.keyframe_m", map.keyframe_m, 0.01, 100.0);

@@ -88,10 +88,14 @@ struct MapOptions {
 enum class SourceKind { imu, odometry }; ///< imu gives rotation only, odometry all six axes
 constexpr auto names_of(SourceKind) { return std::to_array<std::string_view>({"imu", "odometry"}); }
 
+enum class UseAcceleration { automatic, off }; ///< automatic: while the accelerometer reads as one should
+constexpr auto names_of(UseAcceleration) { return std::to_array<std::string_view>({"auto", "off"}); }
+
 struct MotionSourceOptions {
   std::string name;
   SourceKind kind = SourceKind::odometry;
-  Pose T_base_source; ///< imu: where the sensor sits and how it is turned
+  Pose T_base_source;                                            ///< imu: where the sensor sits and how it is turned
+  UseAcceleration use_acceleration = UseAcceleration::automatic; ///< of an imu
 
   bool operator==(const MotionSourceOptions&) const = default;
 };
@@ -103,10 +107,19 @@ constexpr auto names_of(NoSourcePrior) { return std::to_array<std::string_view>(
 enum class FlatGround { off, on, automatic };
 constexpr auto names_of(FlatGround) { return std::to_array<std::string_view>({"off", "on", "auto"}); }
 
+/// What the robot is able to. No estimate and no motion source is believed beyond it.
+struct MotionLimits {
+  double max_speed_mps = 10.0;
+  double max_acceleration_mps2 = 10.0;
+
+  bool operator==(const MotionLimits&) const = default;
+};
+
 /// Everything Odometry wants to know, but for the motion sources.
 struct OdometryOptions {
   Fusion fusion = Fusion::combined;
   NoSourcePrior no_source_prior = NoSourcePrior::constant_velocity;
+  MotionLimits motion;
   ScanToScanMode scan_to_scan_mode = ScanToScanMode::automatic; ///< key scan_to_scan.mode
   RegistrationOptions scan_to_scan{20, 1.0};
   RegistrationOptions scan_to_submap{20, 0.5};

@@ -40,8 +40,8 @@ constexpr double kTold = 0.5; ///< of the variance of a prediction: what is left
 
 /// How its motion changes: standard deviations of the twist after a second.
 const Vector6 kProcess = squares(0.7, 0.7);
-/// What any robot is able to, one standard deviation: m/s^2 and rad/s^2.
-const Vector6 kAble = squares(5.0, 20.0);
+constexpr double kAbleToTurn_radps2 = 20.0; ///< one standard deviation
+constexpr double kSoftLimit = 0.2;          ///< of a speed, in proportion: what lidar sees clearly goes beyond
 
 /// Noise of the sources, until it is learned, and the least: of the way and the turn after a second.
 const Vector6 kOdometryNoise = squares(0.02, 0.01), kLeastOdometryNoise = squares(0.006, 0.001);
@@ -58,7 +58,8 @@ constexpr double kLateOdometry_s = 0.02, kLateGyro_s = 0.003;
 constexpr double kAccelerometerBias = 0.1, kAccelerometerWalk = 0.002;
 constexpr double kGravityError = 0.2, kGravityWalk = 0.001;
 constexpr double kGyroBias = 0.02, kGyroWalk = 1e-4;
-constexpr double kScale = 0.02, kScaleWalk = 1e-4;
+constexpr double kScale = 0.02, kScaleWalk = 3e-4;
+constexpr double kDirection_rad = 0.01; ///< in which an odometry goes when it goes ahead
 
 /// Student's t: wheels slip and visual odometry jumps more often than a Gaussian allows.
 constexpr double kDegreesOfFreedom = 4.0;
@@ -67,6 +68,9 @@ constexpr double kLearns_s = 5.0;   ///< time constant of what is learned
 constexpr double kHeard_s = 0.5;    ///< what the expectation counts for
 constexpr double kMostSigmas = 3.0; ///< an innovation teaches no more than that
 
+/// How the lidar sits otherwise than thought, before anything calibrates it.
+const Vector6 kMounting = squares(0.005, 0.002);
+
 const Vector6 kFirst = squares(0.003, 3e-4); ///< what the first sweep of the map may lie askew
 const Vector6 kFloor = squares(0.001, 1e-4); ///< of the pose against the submap: surfaces are no better known
 
@@ -74,11 +78,12 @@ Eigen::Vector3d slip(const Eigen::Vector3d& rate, const Eigen::Vector3d& velocit
 
 } // namespace
 
-MotionFilter::MotionFilter(const std::vector<MotionSourceOptions>& sources) : count_(sources.size()) {
+MotionFilter::MotionFilter(const std::vector<MotionSourceOptions>& sources, const MotionLimits& limits)
+    : limits_(limits), able_(squares(0.5 * limits.max_acceleration_mps2, kAbleToTurn_radps2)), count_(sources.size()) {
   for (std::size_t i = 0; i < count_; ++i) {
     sources_[i].kind = sources[i].kind;
     sources_[i].state = states_;
-    states_ += sources[i].kind == SourceKind::imu ? 3 : 2;
+    states_ += sources[i].kind == SourceKind::imu ? 3 : 4;
   }
   x_ = State::Zero(states_);
   P_ = Covariance::Zero(states_, states_);
@@ -89,7 +94,7 @@ MotionFilter::MotionFilter(const std::vector<MotionSourceOptions>& sources) : co
 }
 
 void MotionFilter::begin(const Pose& T_odom_base, const Vector6& twist_base, const Vector6& twist_sigma) {
-  T_odom_base_ = T_odom_base;
+  T_odom_start_ = T_odom_base_ = T_odom_base;
   twist_base_ = twist_base;
   P_.topRows<kAccelerometer>().setZero();
   P_.leftCols<kAccelerometer>().setZero();
@@ -104,10 +109,12 @@ void MotionFilter::begin(const Pose& T_odom_base, const Vector6& twist_base, con
 void MotionFilter::forget(SourceId source) {
   Source& of = sources_[index_of(source)];
   const bool gyro = of.kind == SourceKind::imu;
-  const int count = gyro ? 3 : 2;
+  const int count = gyro ? 3 : 4;
   P_.middleRows(of.state, count).setZero();
   P_.middleCols(of.state, count).setZero();
   P_.diagonal().segment(of.state, count).setConstant(square(gyro ? kGyroBias : kScale));
+  if (!gyro)
+    P_.diagonal().segment<2>(of.state + 2).setConstant(square(kDirection_rad));
   x_.segment(of.state, count).setZero();
   of.noise_per_s = gyro ? kGyroNoise : kOdometryNoise;
   of.learned_s.setZero();
@@ -132,7 +139,7 @@ void MotionFilter::predict(double elapsed_s, double period_s, const std::optiona
     const double kept = goes_on ? 1.0 : std::exp(-step_s / kFades_s[axis]);
     const int row = kVelocity + axis;
     step_variance[axis] =
-        open ? kAble[axis] * square(step_s) : kProcess[axis] * step_s + square(twist_base_[axis]) * kept * (1.0 - kept);
+        open ? able_[axis] * square(step_s) : kProcess[axis] * step_s + square(twist_base_[axis]) * kept * (1.0 - kept);
     predicted[axis] = kept * twist_base_[axis];
     F(row, row) = lasts ? 1.0 : kept; // the mean fades, the doubt does not
   }
@@ -151,7 +158,7 @@ void MotionFilter::predict(double elapsed_s, double period_s, const std::optiona
     for (int axis = 0; axis < 3; ++axis) {
       const int row = kVelocity + axis;
       const double felt =
-          kForceNoise * step_s + square(kLateForce_s * force_change[axis]) + lever + kAble[axis] * square(unfelt_s);
+          kForceNoise * step_s + square(kLateForce_s * force_change[axis]) + lever + able_[axis] * square(unfelt_s);
       const double share = step_variance[axis] / (step_variance[axis] + felt); // of the specific force
       const double by = share * step_s;
       predicted[axis] = (1.0 - share) * predicted[axis] + share * twist_base_[axis] + by * change[axis];
@@ -174,7 +181,7 @@ void MotionFilter::predict(double elapsed_s, double period_s, const std::optiona
   P_.diagonal().segment<3>(kGravity).array() += square(kGravityWalk) * elapsed_s;
   for (Source& source : std::span(sources_).first(count_)) {
     const bool gyro = source.kind == SourceKind::imu;
-    P_.diagonal().segment(source.state, gyro ? 3 : 2).array() += square(gyro ? kGyroWalk : kScaleWalk) * elapsed_s;
+    P_.diagonal().segment(source.state, gyro ? 3 : 4).array() += square(gyro ? kGyroWalk : kScaleWalk) * elapsed_s;
     source.used = false;
   }
   twist_base_ = predicted;
@@ -187,7 +194,18 @@ void MotionFilter::expect_rest() {
   twist_base_.setZero();
 }
 
+/// A speed that the robot is not able to is taken down, the less the better it is known.
+void MotionFilter::limit_speed() {
+  const double speed_mps = twist_base_.head<3>().norm();
+  if (speed_mps <= limits_.max_speed_mps)
+    return;
+  State h = State::Zero(states_);
+  h.segment<3>(kVelocity) = twist_base_.head<3>() / speed_mps;
+  update(h, limits_.max_speed_mps - speed_mps, square(kSoftLimit * limits_.max_speed_mps));
+}
+
 void MotionFilter::move() {
+  limit_speed();
   const Pose T_odom_last = T_odom_base_;
   T_odom_base_ = T_odom_last * se3_exp(elapsed_s_ * twist_base_);
   Covariance F = Covariance::Identity(states_, states_);
@@ -219,13 +237,18 @@ MotionFilter::Row MotionFilter::row(const Source& source, int axis) const {
     row.h[kVelocity + axis] += x_[scale];
     row.h[scale] = twist_base_[axis];
     row.expected *= 1.0 + x_[scale];
+  } else if (axis < 3) {
+    const int turned = source.state + 1 + axis;
+    row.h[turned] = twist_base_[0];
+    row.h[kVelocity] += x_[turned];
+    row.expected += x_[turned] * twist_base_[0];
   }
   return row;
 }
 
 Vector6 MotionFilter::known_variance(const Source& source, const Vector6& twist_base) const {
   const double late_s = source.kind == SourceKind::imu ? kLateGyro_s : kLateOdometry_s;
-  const Vector6 able = elapsed_s_ * kAble.cwiseSqrt(); // no robot changes its motion faster
+  const Vector6 able = elapsed_s_ * able_.cwiseSqrt(); // no robot changes its motion faster
   const Vector6 change = (twist_base - source.last_twist.value_or(twist_base)).cwiseMin(able).cwiseMax(-able);
   Vector6 variance = (kProportion * twist_base).cwiseAbs2() + (late_s / elapsed_s_ * change).cwiseAbs2();
   variance.head<3>().array() += square(kLever_m) * twist_base.tail<3>().squaredNorm();
@@ -313,6 +336,7 @@ void MotionFilter::see(const Pose& T_odom_base, const Vector6& twist_base, const
   keep_floor();
   T_odom_base_ = T_odom_base;
   twist_base_ = twist_base;
+  limit_speed();
 }
 
 void MotionFilter::keep_floor() { P_.diagonal().head<6>() = P_.diagonal().head<6>().cwiseMax(kFloor); }
@@ -382,7 +406,16 @@ void MotionFilter::keep(const Matrix6& share) {
 
 Matrix6 MotionFilter::pose_covariance_since_start() const {
   const Matrix6 both = P_.block<6, 6>(kMap, kPosition);
-  return P_.topLeftCorner<6, 6>() + P_.block<6, 6>(kMap, kMap) + both + both.transpose();
+  return P_.topLeftCorner<6, 6>() + P_.block<6, 6>(kMap, kMap) + both + both.transpose() + of_mounting();
+}
+
+/// A lidar that sits otherwise than thought sees the way of another body: in the end, what the first pose is off less
+/// what the last is. Considered.
+Matrix6 MotionFilter::of_mounting() const {
+  const Matrix6 error =
+      transport(T_odom_base_.translation - T_odom_start_.translation) * turn_both(T_odom_start_.rotation) -
+      turn_both(T_odom_base_.rotation);
+  return error * kMounting.asDiagonal() * error.transpose();
 }
 
 void MotionFilter::put(const Pose& T_odom_base) { T_odom_base_ = T_odom_base; }

@@ -20,14 +20,15 @@ namespace locus {
 ///
 /// State: pose at the end of the sweep (odom frame) against the submap, twist during it (base frame, mean), bias of the
 /// accelerometer, gravity, what the map is off since the start (considered), for each gyro a bias, for each odometry a
-/// scale of the way ahead and one of the yaw. A sweep is predict(), measure() for each source or rest(), move(), see()
-/// with what lidar found, and learn(). Noise of the sources is learned from the innovations that each leaves when it is
-/// left out (variance components): what nothing else tells teaches nothing. All of it is per second, so that the rate
-/// of the sweeps does not matter. A value: copies are hypotheses. Fixed size. One owner.
+/// scale of the way ahead and one of the yaw, and where it goes when it goes ahead (to the left, upwards). A sweep is
+/// predict(), measure() for each source or rest(), move(), see() with what lidar found, and learn(). Noise of the
+/// sources is learned from the innovations that each leaves when it is left out (variance components): what nothing
+/// else tells teaches nothing. All of it is per second, so that the rate of the sweeps does not matter. A value: copies
+/// are hypotheses. Fixed size. One owner.
 class MotionFilter {
  public:
   static constexpr int kCommonStates = 24; ///< before those of the sources
-  static constexpr int kMaxStates = kCommonStates + 3 * static_cast<int>(kMaxSources);
+  static constexpr int kMaxStates = kCommonStates + 4 * static_cast<int>(kMaxSources);
   using State = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxStates, 1>;
   using Covariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxStates, kMaxStates>;
 
@@ -37,7 +38,7 @@ class MotionFilter {
     bool translation = false, rotation = false;
   };
 
-  explicit MotionFilter(const std::vector<MotionSourceOptions>& sources);
+  explicit MotionFilter(const std::vector<MotionSourceOptions>& sources, const MotionLimits& limits = {});
 
   /// Begins at a pose with a twist of which only `twist_sigma` (standard deviations) is known.
   void begin(const Pose& T_odom_base, const Vector6& twist_base, const Vector6& twist_sigma);
@@ -105,12 +106,16 @@ class MotionFilter {
   void lower(const State& Ph, double innovation_variance);
   void turn_scale(int scale, int axis, double change);
   void learn_source(Source& source);
+  [[nodiscard]] Matrix6 of_mounting() const;
+  void limit_speed();
   void keep_floor();
 
+  MotionLimits limits_;
+  Vector6 able_; ///< what the robot is able to, one standard deviation: m/s^2 and rad/s^2, squared
   std::array<Source, kMaxSources> sources_;
   std::size_t count_; ///< of sources
   int states_ = kCommonStates;
-  Pose T_odom_base_;
+  Pose T_odom_start_, T_odom_base_;
   Vector6 twist_base_ = Vector6::Zero();
   State x_; ///< all that is neither pose nor twist; zero there
   Covariance P_;

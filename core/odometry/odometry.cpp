@@ -42,8 +42,7 @@ constexpr double kSlowDoubt = 4.0;
 constexpr Duration kSlowFor = std::chrono::milliseconds{500};
 constexpr double kRest_sigma = 3.0;
 
-/// Of a robot of which nothing is known.
-const Vector6 kUnknownTwist = along_each_axis(10.0, 100.0);
+constexpr double kUnknownRate_radps = 100.0; ///< of a robot of which nothing is known
 constexpr int kStartRounds = 8;        ///< at the most, until motion and correction of the first two sweeps agree:
 constexpr double kStartAgrees = 0.002; ///< metres, radians
 
@@ -73,7 +72,7 @@ Matrix6 share_of_map(double fresh, const Matrix6& observability) {
 Odometry::Odometry(const OdometryOptions& options, const std::vector<MotionSourceOptions>& sources, StageClock* clock)
     : options_(options), sources_(sources), clock_(clock), gicp_(options.threads, options.isa),
       flat_ground_(options.flat_ground), map_(options.map.max_bytes, options.isa),
-      last_scan_map_(kLastScanBytes, options.isa), map_policy_(options.map), filter_(sources) {}
+      last_scan_map_(kLastScanBytes, options.isa), map_policy_(options.map), filter_(sources, options.motion) {}
 
 void Odometry::begin_at(const Pose& T_odom_base, std::span<const SurfacePoint> map_odom) {
   T_odom_start_ = T_odom_base;
@@ -153,7 +152,7 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
   }
   if (const auto up_base = gravity_.up_base(); up_base && !T_odom_start_)
     T_odom_base.rotation = from_rpy_rad(level_rpy_rad(*up_base));
-  filter_.begin(T_odom_base, Vector6::Zero(), kUnknownTwist);
+  filter_.begin(T_odom_base, Vector6::Zero(), along_each_axis(options_.motion.max_speed_mps, kUnknownRate_radps));
   estimate.failed = scan_.size() < kMinPoints;
   if (estimate.failed) { // nothing was seen yet: the next sweep is the first
     estimate.state = TrackingState::dead_reckoning;
@@ -453,8 +452,10 @@ void Odometry::report(const Sweep& sweep, OdometryEstimate& estimate) {
   if (!saw_)
     return; // the way back to the submap is no motion of the robot
   for (std::size_t i = 0; i < sources_.size(); ++i)
-    if (const auto twist_base = steps_.twist_base(sweep, SourceId{i}))
-      feedback_.opinions[i] = opinion_on(filter_.innovation(SourceId{i}, *twist_base), steps_.elapsed_s(sweep));
+    if (const auto twist_base = steps_.twist_base(sweep, SourceId{i})) {
+      source_reports_[i].innovation = filter_.innovation(SourceId{i}, *twist_base);
+      feedback_.opinions[i] = opinion_on(source_reports_[i].innovation, steps_.elapsed_s(sweep));
+    }
   feedback_.twist_base = seen_axes_.part_of(filter_.twist_base());
   feedback_.sees = seen_axes_.each();
 }
@@ -467,6 +468,10 @@ void Odometry::finish(const Sweep& sweep, OdometryEstimate& estimate) {
   feedback_ = {.from = steps_.last(), .to = sweep.end, .opinions = {}, .twist_base = Vector6::Zero(), .sees = {}};
   if (!estimate.failed)
     report(sweep, estimate);
+  for (const auto& source : {estimate.prior.rotation, estimate.prior.translation})
+    if (source)
+      source_reports_[index_of(*source)].last_used = sweep.end;
+  estimate.sources = source_reports_;
   saw_ = !estimate.failed;
   scan_is_next_target_ = saw_ && options_.scan_to_scan_mode == ScanToScanMode::always;
   tilt_keeper_.observe(estimate.T_odom_base.rotation, gravity_.up_base());

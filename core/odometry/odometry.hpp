@@ -126,6 +126,7 @@ class Odometry {
   bool has_last_scan_ = false;       ///< it has taken in one
   Stamp slow_since_;
   RegistrationFeedback feedback_;
+  std::array<SourceReport, kMaxSources> source_reports_{};
 };
 
 } // namespace locus

@@ -11,6 +11,7 @@
 #include "core/base/pose.hpp"
 #include "core/base/stamp.hpp"
 #include "core/map/registration.hpp"
+#include "core/sources/registration_feedback.hpp"
 #include "core/sources/sensed_motion.hpp"
 
 namespace locus {
@@ -26,6 +27,12 @@ struct PriorSource : SourceChoice {
   NoSourcePrior otherwise = NoSourcePrior::identity; ///< in place of what no source said
 };
 
+/// How a motion source compares with all the rest.
+struct SourceReport {
+  Innovation innovation; ///< of the last sweep that both told of; its variances are zero before that
+  Stamp last_used;       ///< end of the last sweep whose prior came from it; Stamp{}: never
+};
+
 /// What one sweep says about the robot, with all that is needed to distrust it.
 struct OdometryEstimate {
   Stamp stamp;                                ///< end of the sweep
@@ -39,11 +46,12 @@ struct OdometryEstimate {
   Vector6 observability = Vector6::Zero();
   TrackingState state = TrackingState::tracking;
   PriorSource prior;
-  Registration scan_to_scan;   ///< paper equation 1; zero iterations where it did not run
-  Registration scan_to_submap; ///< paper equation 2
-  std::size_t points = 0;      ///< that were registered
-  bool failed = false;         ///< the registration was refused: the pose is the prediction
-  bool keyframe = false;       ///< the map took this sweep
+  std::array<SourceReport, kMaxSources> sources{}; ///< by index
+  Registration scan_to_scan;                       ///< paper equation 1; zero iterations where it did not run
+  Registration scan_to_submap;                     ///< paper equation 2
+  std::size_t points = 0;                          ///< that were registered
+  bool failed = false;                             ///< the registration was refused: the pose is the prediction
+  bool keyframe = false;                           ///< the map took this sweep
 };
 
 } // namespace locus

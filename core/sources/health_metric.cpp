@@ -189,6 +189,33 @@ class PoseJump : public HealthMetric {
   Vector6 twist_ = Vector6::Zero();
 };
 
+/// A speed that the robot is not able to.
+class ImpossibleSpeed : public HealthMetric {
+ public:
+  explicit ImpossibleSpeed(double max_mps) : max_mps_(max_mps) {}
+
+  std::optional<HealthReason> judge(const SourceReading& reading) override {
+    constexpr double kNoise_m = 0.05;
+    if (!last_)
+      return std::nullopt;
+    const double way_m = (reading.odometry->T_source_base.translation - last_->translation).norm();
+    return reason_if(way_m > kNoise_m + max_mps_ * to_seconds(reading.stamp - last_stamp_), HealthReason::speed);
+  }
+  void accept(const SourceReading& reading) override {
+    constexpr Duration kBaseline = std::chrono::milliseconds{100};
+    if (last_ && reading.stamp - last_stamp_ < kBaseline)
+      return;
+    last_ = reading.odometry->T_source_base;
+    last_stamp_ = reading.stamp;
+  }
+  void forget() override { last_.reset(); }
+
+ private:
+  double max_mps_;
+  std::optional<Pose> last_;
+  Stamp last_stamp_;
+};
+
 /// Lidar saw another motion several sweeps in a row.
 class LidarDisagrees : public HealthMetric {
  public:
@@ -206,7 +233,8 @@ class LidarDisagrees : public HealthMetric {
 
 } // namespace
 
-std::vector<std::unique_ptr<HealthMetric>> health_metrics(const MotionSourceOptions& source) {
+std::vector<std::unique_ptr<HealthMetric>> health_metrics(const MotionSourceOptions& source,
+                                                          const MotionLimits& limits) {
   std::vector<std::unique_ptr<HealthMetric>> metrics;
   metrics.push_back(std::make_unique<NotANumber>()); // first, so that the others need not think of it
   metrics.push_back(std::make_unique<Late>());
@@ -219,6 +247,7 @@ std::vector<std::unique_ptr<HealthMetric>> health_metrics(const MotionSourceOpti
     metrics.push_back(std::make_unique<Uncertain>());
     metrics.push_back(std::make_unique<FrozenOdometry>());
     metrics.push_back(std::make_unique<PoseJump>());
+    metrics.push_back(std::make_unique<ImpossibleSpeed>(limits.max_speed_mps));
   }
   metrics.push_back(std::make_unique<LidarDisagrees>());
   return metrics;

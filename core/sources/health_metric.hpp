@@ -49,6 +49,7 @@ class HealthMetric {
 };
 
 /// All metrics for a source, in the order in which they are asked.
-std::vector<std::unique_ptr<HealthMetric>> health_metrics(const MotionSourceOptions& source);
+std::vector<std::unique_ptr<HealthMetric>> health_metrics(const MotionSourceOptions& source,
+                                                          const MotionLimits& limits);
 
 } // namespace locus

@@ -29,7 +29,8 @@ class HealthMonitor {
   static constexpr Duration kShortestTimeout = std::chrono::milliseconds{50};
   static constexpr Duration kLongestTimeout = std::chrono::seconds{1}; ///< the paper's rate of 1 Hz
 
-  explicit HealthMonitor(const MotionSourceOptions& source) : metrics_(health_metrics(source)) {}
+  explicit HealthMonitor(const MotionSourceOptions& source, const MotionLimits& limits = {})
+      : metrics_(health_metrics(source, limits)) {}
 
   /// The instant of the measurement if the sample may be used; nothing if it is left out.
   std::optional<Stamp> judge(const ImuSample& sample);

@@ -23,7 +23,8 @@ class MotionSources {
   /// Told of each change of health once, in the thread that calls.
   using HealthSink = std::function<void(const HealthEvent&)>;
 
-  MotionSources(const std::vector<MotionSourceOptions>& options, Fusion fusion, HealthSink health_sink = {});
+  MotionSources(const std::vector<MotionSourceOptions>& options, Fusion fusion, const MotionLimits& limits = {},
+                HealthSink health_sink = {});
 
   /// The kind of the source must fit the sample.
   void add(SourceId source, const ImuSample& sample) { take(source, sample); }
@@ -56,10 +57,12 @@ class MotionSources {
 
  private:
   struct Source {
-    explicit Source(const MotionSourceOptions& options) : health(options), track(options) {}
+    Source(const MotionSourceOptions& options, const MotionLimits& limits)
+        : health(options, limits), track(options), use_acceleration(options.use_acceleration) {}
 
     HealthMonitor health;
     MotionTrack track;
+    UseAcceleration use_acceleration;
     std::uint32_t epoch = 0; ///< that the track belongs to
   };
 

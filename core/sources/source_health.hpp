@@ -22,13 +22,19 @@ enum class HealthReason : std::uint8_t {
   covariance,   ///< much less certain than usual, as the source itself says
   disagreement, ///< it and lidar saw different motions: who is right is not known
   outside,      ///< somebody else says so
-  self_check    ///< ImuSelfCheck has refused it
+  self_check,   ///< ImuSelfCheck has refused it
+  speed         ///< a speed that the robot is not able to, see MotionLimits
 };
 constexpr auto names_of(HealthReason) {
-  return std::to_array<std::string_view>(
-      {"stale", "jump", "nan", "frozen", "out_of_order", "covariance", "disagreement", "outside", "self_check"});
+  return std::to_array<std::string_view>({"stale", "jump", "nan", "frozen", "out_of_order", "covariance",
+                                          "disagreement", "outside", "self_check", "speed"});
 }
 inline constexpr std::size_t kHealthReasonCount = names_of(HealthReason{}).size();
+
+/// Of a source that is lost for HealthReason::speed, in words for the user.
+inline constexpr std::string_view kTooFast = "claims a higher speed than motion.max_speed_mps, and is not used while "
+                                             "it does (set that to what the robot is able "
+                                             "to, or look at the unit of the source)";
 
 /// What became of the samples of one motion source.
 struct SourceCounters {

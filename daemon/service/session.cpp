@@ -244,6 +244,8 @@ std::string why_lost(const HealthEvent& event) {
   if (event.reason == HealthReason::disagreement)
     return "and lidar disagree on how the robot moves; it is not used until they agree (possible causes: its slip, "
            "scale or stamps, an IMU whose stamps are late, or lidar that follows what moves around the robot)";
+  if (event.reason == HealthReason::speed)
+    return std::string(kTooFast);
   return fmt::format("is lost ({})", to_string(event.reason));
 }
 

@@ -19,8 +19,8 @@ const std::string kAllChanged = R"(
 lidars:
   - {name: top, model: HDL-32E, port: 2400, source_ip: 192.168.1.201, multicast_ip: 239.1.2.3, time: sensor, calibration: "a, b}: #\n", T_base_lidar: {xyz_m: [0.1, -2e-07, 3], rpy_deg: [1, 30, -179.5]}}
 motion_sources:
-  - {name: vio, kind: odometry, topic: /vio, health_topic: /vio/health, T_base_source: {xyz_m: [0, 0, 0], rpy_deg: [0, 0, 0]}}
-  - {name: gyro, kind: imu, topic: /gyro, health_topic: /gyro_2, T_base_source: {xyz_m: [0.3333333333333333, 1, 2], rpy_deg: [90, 0, 45]}}
+  - {name: vio, kind: odometry, topic: /vio, health_topic: /vio/health, use_acceleration: auto, T_base_source: {xyz_m: [0, 0, 0], rpy_deg: [0, 0, 0]}}
+  - {name: gyro, kind: imu, topic: /gyro, health_topic: /gyro_2, use_acceleration: off, T_base_source: {xyz_m: [0.3333333333333333, 1, 2], rpy_deg: [90, 0, 45]}}
 sweep_period_ms: 66.666667
 motion_correction: false
 range_m: [0.1, 77.7]
@@ -31,6 +31,7 @@ random_filter: {enabled: true, keep: 0.7}
 seed: 18446744073709551615
 fusion: queue
 no_source_prior: identity
+motion: {max_speed_mps: 40, max_acceleration_mps2: 12.5}
 scan_to_scan: {mode: off, max_iterations: 7, max_correspondence_m: 1.5}
 scan_to_submap: {max_iterations: 8, max_correspondence_m: 0.6}
 map: {keyframe_m: 2, keyframe_deg: 31, max_bytes: 123456789}
@@ -93,13 +94,14 @@ TEST(ConfigYaml, EveryKeyAloneChangesItselfAndNothingElse) {
   const Config base = valid(parse_config(kBase, "base"));
   const auto base_leaves = test::leaves_of(print_config(base));
   const auto changed_leaves = test::leaves_of(kAllChanged);
-  const std::string no_correction =
-      "motion_sources.0.T_base_source"; // the one place that kAllChanged has to leave alone
+  const auto is_of_an_imu = [](const std::string& path) {
+    return path.ends_with("use_acceleration") || path.find("T_base_source") != std::string::npos;
+  };
   for (const auto& [path, value] : base_leaves) {
-    if (path.starts_with(no_correction))
-      continue;
-    const bool of_second_source = path.starts_with("motion_sources.1.T_base_source");
-    const Config start = of_second_source ? with(base, {"motion_sources.1.kind=imu"}) : base;
+    if (path.starts_with("motion_sources.0.") && is_of_an_imu(path))
+      continue; // kAllChanged has an odometry there
+    const bool needs_an_imu = path.starts_with("motion_sources.1.") && is_of_an_imu(path);
+    const Config start = needs_an_imu ? with(base, {"motion_sources.1.kind=imu"}) : base;
     const Config one_changed = with(start, {path + '=' + changed_leaves.at(path)});
     auto expected = test::leaves_of(print_config(start));
     EXPECT_NE(expected.at(path), changed_leaves.at(path)) << path;

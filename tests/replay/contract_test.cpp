@@ -52,13 +52,38 @@ TEST(LocusReplay, OneRowForEverySweepInBothTables) {
   const std::set<std::string> states{"tracking", "degenerate", "dead_reckoning", "standstill"};
   for (std::size_t i = 0; i < trajectory.size(); ++i) {
     const std::vector<std::string>& row = table[i + 1];
-    ASSERT_EQ(row.size(), 5U + 36U);
+    ASSERT_EQ(row.size(), 5U + 36U + 2U * 14U);
     EXPECT_EQ(row[0], std::to_string(to_ns(trajectory[i].stamp)));
     EXPECT_TRUE(states.contains(row[1])) << row[1];
     EXPECT_EQ(row[2], i == 0 ? "identity" : "imu+wio");
     for (std::size_t axis = 0; axis < 6; ++axis)
       EXPECT_GE(std::stod(row[5 + 7 * axis]), 0.0) << "variances of row " << i;
     EXPECT_NEAR(trajectory[i].T_source_base.rotation.norm(), 1.0, 1e-9);
+  }
+}
+
+TEST(LocusReplay, EachSourceIsComparedWithAllElse) {
+  const Replay replay({"--fail", "wio:lost@4", room_drive().string()});
+  const auto table = replay.table();
+  const auto column = [&](const std::string& name) {
+    const auto found = std::ranges::find(table.front(), name);
+    EXPECT_NE(found, table.front().end()) << name;
+    return static_cast<std::size_t>(found - table.front().begin());
+  };
+  for (const char* const source : {"wio", "imu"}) {
+    const std::string name = source;
+    const std::size_t x = column(name + "_innovation_x"), sd_x = column(name + "_sd_x"),
+                      sd_yaw = column(name + "_sd_yaw"), ratio = column(name + "_test_ratio"),
+                      used = column(name + "_last_used_ns");
+    EXPECT_EQ(table[1][used], "0") << "the first sweep has no prior";
+    const std::vector<std::string>& amid = table[31];
+    EXPECT_EQ(std::stod(amid[sd_x]) > 0.0, name == "wio") << "an imu tells of no translation";
+    EXPECT_LT(std::abs(std::stod(amid[x])), 0.1);
+    EXPECT_GT(std::stod(amid[sd_yaw]), 1e-4);
+    EXPECT_GT(std::stod(amid[ratio]), 0.0);
+    EXPECT_LT(std::stod(amid[ratio]), 25.0) << "of an honest source";
+    EXPECT_EQ(amid[used], amid[0]);
+    EXPECT_EQ(table.back()[used] == table.back()[0], name == "imu") << "the wheels are lost by then";
   }
 }
 

@@ -101,8 +101,8 @@ TEST(Warnings, PacketsOfAnUnknownModelAreNamedByTheirProductId) {
 /// Half a turn sees what the half before did not. No source is blamed for that, and the motion sources carry it over.
 TEST(Warnings, SweepThatIsShorterThanATurn) {
   const std::vector<std::string> halves = {"--set", "sweep_period_ms=50", "--duration", "6", room_drive().string()};
-  expect_warning(
-      halves, {"lidar front: one revolution takes 100 ms, so each sweep of 50 ms covers only", "sweep_period_ms: auto"});
+  expect_warning(halves, {"lidar front: one revolution takes 100 ms, so each sweep of 50 ms covers only",
+                          "sweep_period_ms: auto"});
   EXPECT_LT(Replay(halves).summary()["ape_m"]["max"], 0.01);
 }
 

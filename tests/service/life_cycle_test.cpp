@@ -333,6 +333,10 @@ TEST_F(LifeCycle, ControlShowsSavesResetsAndSwitches) {
   EXPECT_NEAR(status["rate_hz"].get<double>(), 10, 1);
   EXPECT_EQ(status["lidars"]["front"]["model"], "VLP-16");
   EXPECT_EQ(status["sources"]["imu"]["health"], "healthy");
+  EXPECT_EQ(status["sources"]["wio"]["innovation"]["value"].size(), 6U);
+  EXPECT_GT(status["sources"]["wio"]["innovation"]["sd"][0].get<double>(), 0.0);
+  EXPECT_GT(status["sources"]["wio"]["innovation"]["test_ratio"].get<double>(), 0.0);
+  EXPECT_LT(status["sources"]["wio"]["last_used_ms_ago"].get<double>(), 1000.0);
   EXPECT_EQ(status["observability"].size(), 6U);
   EXPECT_EQ(status["covariance"].size(), 36U);
 

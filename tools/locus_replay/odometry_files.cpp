@@ -28,7 +28,14 @@ OdometryFiles::OdometryFiles(const std::filesystem::path& folder, const std::vec
     : tum_(folder / "odometry.tum"), csv_(folder / "odometry.csv") {
   for (const MotionSourceOptions& source : sources)
     source_names_.push_back(source.name);
-  csv_.print("{}\n", csv_header());
+  csv_.print("{}", csv_header());
+  for (const std::string& name : source_names_) {
+    for (const std::string_view figure : {"innovation", "sd"})
+      for (const std::string_view axis : {"x", "y", "z", "roll", "pitch", "yaw"})
+        csv_.print(",{}_{}_{}", name, figure, axis);
+    csv_.print(",{}_test_ratio,{}_last_used_ns", name, name);
+  }
+  csv_.print("\n");
 }
 
 /// What the rotation came from and what the translation, once if it is the same.
@@ -50,6 +57,14 @@ void OdometryFiles::write(const OdometryEstimate& estimate) {
   for (int row = 0; row < 6; ++row) {
     for (int column = 0; column < 6; ++column)
       csv_.print(",{}", estimate.pose_covariance(row, column));
+  }
+  for (std::size_t i = 0; i < source_names_.size(); ++i) {
+    const auto& [innovation, last_used] = estimate.sources[i];
+    for (const double value : innovation.value)
+      csv_.print(",{}", value);
+    for (const double variance : innovation.variance)
+      csv_.print(",{}", std::sqrt(variance));
+    csv_.print(",{},{}", innovation.ratio(), to_ns(last_used));
   }
   csv_.print("\n");
 }

@@ -49,9 +49,14 @@ Isa isa_or_fail(const std::string& name) {
   return *isa;
 }
 
-/// Without a configuration the files of a folder tell which sources there were. Those of a walking robot go first.
-Config configuration_of(const CaptureFolder& folder) {
+constexpr double kFastestCar_mps = 60.0;
+
+/// Without a configuration the files of a folder tell which sources there were, those of a walking robot first, and
+/// whether it was a car.
+Config configuration_of(const CaptureFolder& folder, const std::filesystem::path& capture) {
   Config config;
+  if (KittiDrive::is(capture))
+    config.odometry.motion.max_speed_mps = kFastestCar_mps;
   for (const char* const name : {"kio", "vio"}) {
     if (std::ranges::find(folder.odometry, name, &CaptureFolder::Source::name) == folder.odometry.end())
       continue;
@@ -60,10 +65,9 @@ Config configuration_of(const CaptureFolder& folder) {
   return config;
 }
 
-Config configuration(const std::filesystem::path& file, const CaptureFolder& folder,
-                     const std::vector<std::string>& overrides) {
-  Config config = file.empty() ? configuration_of(folder) : config_or_fail(load_config(file));
-  config = config_or_fail(override_config(config, overrides));
+Config configuration(const std::filesystem::path& file, const CaptureFolder& folder, const Arguments& arguments) {
+  Config config = file.empty() ? configuration_of(folder, arguments.capture) : config_or_fail(load_config(file));
+  config = config_or_fail(override_config(config, arguments.overrides));
   if (const char* const isa = std::getenv("LOCUS_ISA"))
     config.use(isa_or_fail(isa));
   return config;
@@ -199,7 +203,7 @@ void run(const Arguments& arguments, const SweepStage& stage, const EstimateObse
   check_output(arguments.output);
   check_inputs_outlive_the_run(arguments);
   const std::filesystem::path config_file = arguments.config.empty() ? folder.first_config() : arguments.config;
-  const Config config = configuration(config_file, folder, arguments.overrides);
+  const Config config = configuration(config_file, folder, arguments);
   check_faults(arguments.faults, config);
   LidarRouter lidars = value_or_fail(LidarRouter::open(config.lidars), ExitStatus::wrong_usage);
 

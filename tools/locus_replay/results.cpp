@@ -53,6 +53,8 @@ std::vector<std::string> source_verdicts(const Config& config, const MotionSourc
     const bool is_doubted = !health.healthy() && health.counters().rejected_as(HealthReason::self_check) > 0;
     if (const std::string_view verdict = health.verdict(); !verdict.empty())
       lines.push_back(fmt::format("motion source {} {}", name, verdict));
+    else if (health.counters().rejected_as(HealthReason::speed) > 0)
+      lines.push_back(fmt::format("motion source {} {}", name, kTooFast));
     else if (is_doubted)
       lines.push_back(
           fmt::format("motion source {} and lidar disagreed on how the robot turns, and it was not yet used again at "

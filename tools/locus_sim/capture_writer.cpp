@@ -117,6 +117,8 @@ std::string configuration(const RobotOptions& robot) {
   if (robot.imu)
     text += fmt::format("  - {{name: imu, kind: imu, topic: /imu/data, T_base_source: {}}}\n",
                         yaml(robot.imu->T_base_believed.value_or(robot.imu->T_base_imu)));
+  if (robot.max_speed_mps)
+    text += fmt::format("motion: {{max_speed_mps: {}}}\n", *robot.max_speed_mps);
   if (robot.body_box)
     text += fmt::format("body_box: {{enabled: true, min_m: {}, max_m: {}}}\n", yaml(robot.body_box->min_m),
                         yaml(robot.body_box->max_m));

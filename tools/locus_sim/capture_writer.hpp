@@ -42,13 +42,14 @@ struct RobotOptions {
   std::vector<NamedOdometry> odometry{{}};      ///< the best first
   std::uint64_t seed = 1;                       ///< of IMU and odometry; lidars have their own
   std::optional<Bounds> body_box{};             ///< base frame, of which config.yaml says that it holds the robot
+  std::optional<double> max_speed_mps{};        ///< that config.yaml allows; nothing: the default
 };
 
 /// Drives a robot through a scene for `duration` and hands over, in the order of arrival, what its sensors saw: the
 /// datagrams of its lidars, imu.csv, NAME.tum of each odometry source, the true poses as gt.tum (100 Hz); first of all
-/// a config.yaml that names the sensors, and the box of the robot's body where there is one, and overrides nothing
-/// else. `seen` takes note of every surface point that an echo comes from; `progress` is told what share of the
-/// duration is done. What the sink throws passes through.
+/// a config.yaml that names the sensors, and the box of the robot's body and its speed where there are any, and
+/// overrides nothing else. `seen` takes note of every surface point that an echo comes from; `progress` is told what
+/// share of the duration is done. What the sink throws passes through.
 void write_capture(
     CaptureSink& sink, const Scene& scene, const Trajectory& trajectory, Duration duration, const RobotOptions& robot,
     SeenSpace* seen = nullptr, const std::function<void(double done)>& progress = [](double) {});

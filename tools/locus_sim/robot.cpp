@@ -196,6 +196,7 @@ Robot make_car(const SensorChoice& choice, std::uint64_t seed) {
                    .sudden_share = 0.15,
                    .halts = {.share = 0.03},
                    .cornering_mps2 = 2.5};
+  robot.sensors.max_speed_mps = 40;
   robot.ride.base_height_m = 0.3;
   robot.ride.oscillations = {{1.3, {0, 0, 0.008}, kRadPerDeg * Eigen::Vector3d{0.25, 0.2, 0}, 0.4},    // on its springs
                              {11.5, {0, 0, 0.0005}, kRadPerDeg * Eigen::Vector3d{0.03, 0.04, 0}, 1.1}, // wheels

@@ -64,6 +64,7 @@ class Robot {
   struct Sensors {
     Vector6 wheels = kUsualWheels, gyro = kUsualGyro; ///< standard deviation of way and turn after a second
     double scale = 0.0;                               ///< of the way ahead
+    double to_the_left = 0.0, upwards = 0.0;          ///< of the way ahead, too
     Eigen::Vector3d bias_radps = Eigen::Vector3d::Zero();
     double force_mps = 0.02; ///< of the speed after a second
     Eigen::Vector3d force_bias_mps2 = Eigen::Vector3d::Zero();
@@ -97,7 +98,7 @@ class Robot {
 
   Vector6 wheels() {
     Vector6 said = noisy(twist_, sensors_.wheels / std::sqrt(elapsed_s_));
-    said[kX] += sensors_.scale * twist_[kX];
+    said.head<3>() += twist_[kX] * Eigen::Vector3d{sensors_.scale, sensors_.to_the_left, sensors_.upwards};
     return said;
   }
   Vector6 gyro() {
@@ -287,6 +288,20 @@ TEST(MotionFilter, FindsTheScaleOfWheelsWhereLidarSeesAllAxes) {
     const double way_sigma = kUsualWheels[kX] * std::sqrt(kTime_s);
     EXPECT_NEAR(filter.state()[filter.state_of(kWheelSource)], kScale, kSigmas * way_sigma / (kSpeed_mps * kTime_s))
         << rate_hz << " Hz";
+  }
+}
+
+/// As on a robot whose odometry is half a degree askew: what carries it on where lidar is gone is the way it goes.
+TEST(MotionFilter, FindsWhereAnOdometryGoesWhenItGoesAhead) {
+  constexpr double kTime_s = 60.0, kSpeed_mps = 1.5, kToTheLeft = 0.015, kUpwards = -0.01;
+  for (const double rate_hz : kRates_hz) {
+    Robot robot(straight(kSpeed_mps), {.to_the_left = kToTheLeft, .upwards = kUpwards}, 1);
+    MotionFilter filter = begun_with(robot, straight(kSpeed_mps));
+    sweep_for(kTime_s, filter, robot, 1.0 / rate_hz, {.lidar = usual_lidar(1.0 / rate_hz)});
+    const Eigen::Vector2d found = filter.state().segment<2>(filter.state_of(kWheelSource) + 2);
+    const double sigma = kUsualWheels[kX] * std::sqrt(kTime_s) / (kSpeed_mps * kTime_s);
+    EXPECT_NEAR(found.x(), kToTheLeft, kSigmas * sigma) << rate_hz << " Hz";
+    EXPECT_NEAR(found.y(), kUpwards, kSigmas * sigma) << rate_hz << " Hz";
   }
 }
 
@@ -611,6 +626,47 @@ TEST(MotionFilter, SinceTheStartItIsNeverSurerThanAgainstTheMap) {
     EXPECT_GT(more(kX, kX), last) << "the map drifts";
     last = more(kX, kX);
   }
+}
+
+/// Two milliradians and five millimetres.
+TEST(MotionFilter, ALidarThatSitsOtherwiseThanThoughtSeesTheWayOfAnotherBody) {
+  MotionFilter filter = begun(Vector6::Zero());
+  const Matrix6 at_start = filter.pose_covariance_since_start();
+  const auto sigma_at = [&](const Pose& pose) {
+    filter.put(pose);
+    return (filter.pose_covariance_since_start() - at_start).diagonal().cwiseMax(0.0).cwiseSqrt().eval();
+  };
+  EXPECT_TRUE(sigma_at(Pose{}).isZero(1e-9));
+  const Vector6 straight_on = sigma_at({Eigen::Quaterniond::Identity(), {10, 0, 0}});
+  EXPECT_TRUE(straight_on.isApprox(twist_of(0, 0.02, 0.02, 0, 0, 0), 1e-6)) << straight_on.transpose();
+  const Vector6 turned_round = sigma_at({so3_exp({0, 0, 180 * kRadPerDeg}), {0, 0, 0}});
+  EXPECT_TRUE(turned_round.isApprox(twist_of(0.01, 0.01, 0, 0.004, 0.004, 0), 1e-6)) << turned_round.transpose();
+}
+
+// --- What the robot is able to -------------------------------------------------------------------------------------
+
+double speed_after_a_move(const MotionLimits& limits, double sigma_mps) {
+  MotionFilter filter(wheels_and_gyro(), limits);
+  filter.begin(Pose{}, twist_of(14, 0, 0, 0, 0, 0), along_each_axis(sigma_mps, 1.0));
+  filter.predict(1e-3, 1e-3, std::nullopt, kNothing);
+  filter.move();
+  return filter.twist_base().head<3>().norm();
+}
+
+TEST(MotionFilter, AHigherSpeedThanTheRobotIsAbleToIsBelievedOnlyWhereItIsKnown) {
+  EXPECT_LT(speed_after_a_move({}, 10.0), 10.5);
+  EXPECT_GT(speed_after_a_move({}, 0.05), 13.9);
+  EXPECT_DOUBLE_EQ(speed_after_a_move({.max_speed_mps = 40.0}, 10.0), 14.0);
+}
+
+TEST(MotionFilter, ARobotThatIsAbleToMoreIsBelievedToDoMore) {
+  const auto doubt_mps = [](const MotionLimits& limits) {
+    MotionFilter filter(wheels_and_gyro(), limits);
+    filter.begin(Pose{}, Vector6::Zero(), Vector6::Zero());
+    filter.predict(0.1, 0.1, std::nullopt, kTranslation);
+    return std::sqrt(filter.covariance()(6 + kX, 6 + kX));
+  };
+  EXPECT_NEAR(doubt_mps({.max_acceleration_mps2 = 30.0}), 3.0 * doubt_mps({}), 1e-9);
 }
 
 TEST(MotionFilter, PutMovesThePoseAndNothingElse) {

@@ -285,6 +285,23 @@ TEST_F(WheelsTest, ASingleSampleInTheWrongPlaceCostsNothing) {
   EXPECT_EQ(left_out(HealthReason::jump), 1U);
 }
 
+TEST_F(WheelsTest, ThatClaimMoreThanTheRobotIsAbleToAreLostUntilTheyDoNot) {
+  double ahead_m = 0.0, more_mps = 0.0;
+  const auto speed_up = [&](double by_mps2) {
+    return [&, by_mps2](OdometrySample& sample) { // on the 1 m/s
+      more_mps = std::max(0.0, more_mps + by_mps2 * to_seconds(kPeriod));
+      sample.T_source_base.translation.x() += ahead_m += more_mps * to_seconds(kPeriod);
+    };
+  };
+  run(milliseconds{4400}, speed_up(2.0)); // 9.8 m/s
+  EXPECT_TRUE(monitor_.healthy());
+  begin_fault();
+  run(seconds{1}, speed_up(2.0)); // 11.8
+  expect_lost(HealthReason::speed, milliseconds{500});
+  run(seconds{3}, speed_up(-2.0)); // 5.8
+  EXPECT_TRUE(monitor_.healthy());
+}
+
 TEST_F(WheelsTest, ATurnThatNoRobotMakesIsAJump) {
   OdometrySample turned = next();
   turned.T_source_base.rotation = so3_exp({0, 0, 0.3});

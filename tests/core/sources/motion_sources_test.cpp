@@ -124,6 +124,16 @@ TEST_F(MotionSourcesTest, SensesThePoseOfEverySourceThatSpokeDuringTheSweep) {
   EXPECT_FALSE(silence.specific_force);
 }
 
+TEST_F(MotionSourcesTest, AnAccelerometerThatIsNotWantedIsNotUsedAndItsGyroIs) {
+  std::vector<MotionSourceOptions> options = kWheelsImuVisual;
+  options[1].use_acceleration = UseAcceleration::off;
+  MotionSources sources(options, Fusion::queue);
+  feed(sources, 1, 0, 1000);
+  const SensedMotion motion = sources.sensed_in(at_ms(900), at_ms(1000));
+  EXPECT_TRUE(motion.sources[1].usable);
+  EXPECT_FALSE(motion.specific_force);
+}
+
 TEST_F(MotionSourcesTest, WhoeverLosesHealthIsKnownToTheSweepButNotUsable) {
   MotionSources sources(kWheelsImuVisual, Fusion::combined);
   feed(sources, 0, 0, 1000);
@@ -139,7 +149,8 @@ TEST_F(MotionSourcesTest, WhoeverLosesHealthIsKnownToTheSweepButNotUsable) {
 
 TEST_F(MotionSourcesTest, EachChangeOfHealthIsToldOnceWithItsSource) {
   std::vector<HealthEvent> events;
-  MotionSources sources(kWheelsImuVisual, Fusion::combined, [&](const HealthEvent& event) { events.push_back(event); });
+  MotionSources sources(kWheelsImuVisual, Fusion::combined, {},
+                        [&](const HealthEvent& event) { events.push_back(event); });
   feed(sources, 0, 0, 1000);
   feed(sources, 2, 0, 1000);
   for (int ms = 1000; ms <= 1500; ms += 10) {
@@ -177,7 +188,8 @@ TEST_F(MotionSourcesTest, AClockOfTheHostThatIsSetCostsThemTwoSeconds) {
 
 TEST_F(MotionSourcesTest, WhatTheSelfCheckFoundIsToldInWords) {
   std::vector<HealthEvent> events;
-  MotionSources sources(kWheelsImuVisual, Fusion::combined, [&](const HealthEvent& event) { events.push_back(event); });
+  MotionSources sources(kWheelsImuVisual, Fusion::combined, {},
+                        [&](const HealthEvent& event) { events.push_back(event); });
   for (int ms = 0; ms < 2000; ms += 100) {
     feed(sources, 1, ms, ms + 80);
     RegistrationFeedback seen{
