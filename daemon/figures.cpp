@@ -77,6 +77,15 @@ std::optional<std::string> unknown_model(const LidarOptions& options, const Inge
                      options.name, velodyne::to_string(*lidar.unknown_packets), options.port);
 }
 
+std::optional<std::string> too_fast(const MotionLimits& limits, double largest_speed_mps) {
+  constexpr double kClearly = 1.05;
+  if (largest_speed_mps <= kClearly * limits.max_speed_mps)
+    return std::nullopt;
+  return fmt::format("estimates claim up to {:.1f} m/s, and motion.max_speed_mps is {:g}: set it to what the robot is "
+                     "able to, or do not rely on them",
+                     largest_speed_mps, limits.max_speed_mps);
+}
+
 std::optional<std::string> short_sweep(const SweepOptions& options, const std::string& lidar,
                                        double rotation_rate_rpm) {
   constexpr double kAlmost = 0.95, kMsPerMinute = 60e3;

@@ -62,6 +62,9 @@ std::optional<std::string> unknown_model(const LidarOptions& options, const Inge
 /// What the owner of a lidar should know of sweeps that are shorter than its turn; nothing where they are not.
 std::optional<std::string> short_sweep(const SweepOptions& options, const std::string& lidar, double rotation_rate_rpm);
 
+/// That estimates are faster than the robot is said to be able to; nothing while they are not.
+std::optional<std::string> too_fast(const MotionLimits& limits, double largest_speed_mps);
+
 /// Of a distribution.
 struct Percentiles {
   double p50 = 0, p90 = 0, p99 = 0, max = 0;

@@ -82,7 +82,7 @@ ordered_json innovation_json(const SourceReport& report) {
   const Vector6 sd = report.innovation.variance.cwiseSqrt();
   return {{"value", std::vector<double>(report.innovation.value.begin(), report.innovation.value.end())},
           {"sd", std::vector<double>(sd.begin(), sd.end())},
-          {"test_ratio", rounded(report.innovation.ratio())}};
+          {"test_ratio", rounded(report.test_ratio)}};
 }
 
 ordered_json source_json(const Figures& figures, std::size_t i) {

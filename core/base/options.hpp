@@ -107,7 +107,8 @@ constexpr auto names_of(NoSourcePrior) { return std::to_array<std::string_view>(
 enum class FlatGround { off, on, automatic };
 constexpr auto names_of(FlatGround) { return std::to_array<std::string_view>({"off", "on", "auto"}); }
 
-/// What the robot is able to. No estimate and no motion source is believed beyond it.
+/// What the robot is able to. A motion source that claims a higher speed is refused, and none is predicted; by the
+/// acceleration sources may change the motion from sweep to sweep, and wheels that stop harder are frozen.
 struct MotionLimits {
   double max_speed_mps = 10.0;
   double max_acceleration_mps2 = 10.0;

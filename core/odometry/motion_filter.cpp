@@ -41,7 +41,7 @@ constexpr double kTold = 0.5; ///< of the variance of a prediction: what is left
 /// How its motion changes: standard deviations of the twist after a second.
 const Vector6 kProcess = squares(0.7, 0.7);
 constexpr double kAbleToTurn_radps2 = 20.0; ///< one standard deviation
-constexpr double kSoftLimit = 0.2;          ///< of a speed, in proportion: what lidar sees clearly goes beyond
+constexpr double kKnownSpeed = 0.5;         ///< a speed that is known so well, in parts of the limit, may be above it
 
 /// Noise of the sources, until it is learned, and the least: of the way and the turn after a second.
 const Vector6 kOdometryNoise = squares(0.02, 0.01), kLeastOdometryNoise = squares(0.006, 0.001);
@@ -194,14 +194,18 @@ void MotionFilter::expect_rest() {
   twist_base_.setZero();
 }
 
-/// A speed that the robot is not able to is taken down, the less the better it is known.
+/// A speed that the robot is not able to is not expected, unless it is known. By how much it is taken down is doubt:
+/// what lidar sees goes beyond.
 void MotionFilter::limit_speed() {
   const double speed_mps = twist_base_.head<3>().norm();
-  if (speed_mps <= limits_.max_speed_mps)
+  const double excess_mps = speed_mps - limits_.max_speed_mps;
+  if (excess_mps <= 0.0)
     return;
-  State h = State::Zero(states_);
-  h.segment<3>(kVelocity) = twist_base_.head<3>() / speed_mps;
-  update(h, limits_.max_speed_mps - speed_mps, square(kSoftLimit * limits_.max_speed_mps));
+  const Eigen::Vector3d ahead = twist_base_.head<3>() / speed_mps;
+  const double doubt = ahead.dot(P_.block<3, 3>(kVelocity, kVelocity) * ahead);
+  const Eigen::Vector3d taken = doubt / (doubt + square(kKnownSpeed * limits_.max_speed_mps)) * excess_mps * ahead;
+  twist_base_.head<3>() -= taken;
+  P_.block<3, 3>(kVelocity, kVelocity) += taken * taken.transpose();
 }
 
 void MotionFilter::move() {
@@ -336,7 +340,6 @@ void MotionFilter::see(const Pose& T_odom_base, const Vector6& twist_base, const
   keep_floor();
   T_odom_base_ = T_odom_base;
   twist_base_ = twist_base;
-  limit_speed();
 }
 
 void MotionFilter::keep_floor() { P_.diagonal().head<6>() = P_.diagonal().head<6>().cwiseMax(kFloor); }

@@ -453,8 +453,10 @@ void Odometry::report(const Sweep& sweep, OdometryEstimate& estimate) {
     return; // the way back to the submap is no motion of the robot
   for (std::size_t i = 0; i < sources_.size(); ++i)
     if (const auto twist_base = steps_.twist_base(sweep, SourceId{i})) {
-      source_reports_[i].innovation = filter_.innovation(SourceId{i}, *twist_base);
-      feedback_.opinions[i] = opinion_on(source_reports_[i].innovation, steps_.elapsed_s(sweep));
+      const Innovation innovation = filter_.innovation(SourceId{i}, *twist_base);
+      source_reports_[i].innovation = innovation;
+      source_reports_[i].test_ratio = test_ratio(innovation, steps_.elapsed_s(sweep)).value_or(0.0);
+      feedback_.opinions[i] = opinion_on(innovation, steps_.elapsed_s(sweep));
     }
   feedback_.twist_base = seen_axes_.part_of(filter_.twist_base());
   feedback_.sees = seen_axes_.each();

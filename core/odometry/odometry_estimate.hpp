@@ -30,6 +30,7 @@ struct PriorSource : SourceChoice {
 /// How a motion source compares with all the rest.
 struct SourceReport {
   Innovation innovation; ///< of the last sweep that both told of; its variances are zero before that
+  double test_ratio = 0; ///< of it; zero where nothing could be compared
   Stamp last_used;       ///< end of the last sweep whose prior came from it; Stamp{}: never
 };
 

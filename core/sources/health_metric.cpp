@@ -17,15 +17,18 @@ std::optional<HealthReason> reason_if(bool wrong, HealthReason reason) {
 /// What is farther than any robot or sensor goes is a number no more than NaN is: sums of it would never be again.
 class NotANumber : public HealthMetric {
  public:
+  explicit NotANumber(UseAcceleration use_acceleration) : use_acceleration_(use_acceleration) {}
+
   std::optional<HealthReason> judge(const SourceReading& reading) override {
     return reason_if(!(reading.imu != nullptr ? is_number(*reading.imu) : is_number(*reading.odometry)),
                      HealthReason::nan);
   }
 
  private:
-  static bool is_number(const ImuSample& sample) {
+  [[nodiscard]] bool is_number(const ImuSample& sample) const {
     constexpr double kMost = 1e5; ///< deg/s and milli-g are heard too, for ImuSelfCheck to name them
-    return is_within(kMost, sample.angular_velocity_radps) && is_within(kMost, sample.specific_force_mps2) &&
+    return is_within(kMost, sample.angular_velocity_radps) &&
+           (use_acceleration_ == UseAcceleration::off || is_within(kMost, sample.specific_force_mps2)) &&
            (!sample.attitude || sample.attitude->coeffs().allFinite());
   }
   static bool is_number(const OdometrySample& sample) {
@@ -35,6 +38,8 @@ class NotANumber : public HealthMetric {
            sample.T_source_base.rotation.norm() > kLeastNorm;
   }
   static bool is_within(double most, const Eigen::Vector3d& v) { return (v.array().abs() <= most).all(); }
+
+  UseAcceleration use_acceleration_;
 };
 
 class OutOfOrder : public HealthMetric {
@@ -86,6 +91,8 @@ class FrozenImu : public HealthMetric {
 /// stops like that, or if lidar goes on seeing the robot move.
 class FrozenOdometry : public HealthMetric {
  public:
+  explicit FrozenOdometry(double hardest_mps2) : hardest_mps2_(hardest_mps2) {}
+
   std::optional<HealthReason> judge(const SourceReading& reading) override {
     if (!last_ || reading.odometry->T_source_base != *last_) {
       frozen_ = false;
@@ -130,12 +137,13 @@ class FrozenOdometry : public HealthMetric {
   }
 
   [[nodiscard]] bool cannot_stop_within(Duration duration) const {
-    constexpr double kHardest_mps2 = 10.0, kHardest_radps2 = 20.0;
+    constexpr double kHardest_radps2 = 20.0;
     const double duration_s = to_seconds(duration);
-    return twist_.head<3>().norm() > kHardest_mps2 * duration_s ||
+    return twist_.head<3>().norm() > hardest_mps2_ * duration_s ||
            twist_.tail<3>().norm() > kHardest_radps2 * duration_s;
   }
 
+  double hardest_mps2_;
   std::optional<Pose> last_; ///< that differed from the one before
   Stamp changed_at_;
   Vector6 twist_ = Vector6::Zero(); ///< until then
@@ -195,14 +203,15 @@ class ImpossibleSpeed : public HealthMetric {
   explicit ImpossibleSpeed(double max_mps) : max_mps_(max_mps) {}
 
   std::optional<HealthReason> judge(const SourceReading& reading) override {
-    constexpr double kNoise_m = 0.05;
+    constexpr double kNoise_m = 0.05, kJitter_s = 0.03; ///< of positions and stamps
     if (!last_)
       return std::nullopt;
     const double way_m = (reading.odometry->T_source_base.translation - last_->translation).norm();
-    return reason_if(way_m > kNoise_m + max_mps_ * to_seconds(reading.stamp - last_stamp_), HealthReason::speed);
+    const double time_s = kJitter_s + to_seconds(reading.stamp - last_stamp_);
+    return reason_if(way_m > kNoise_m + max_mps_ * time_s, HealthReason::speed);
   }
   void accept(const SourceReading& reading) override {
-    constexpr Duration kBaseline = std::chrono::milliseconds{100};
+    constexpr Duration kBaseline = std::chrono::milliseconds{500};
     if (last_ && reading.stamp - last_stamp_ < kBaseline)
       return;
     last_ = reading.odometry->T_source_base;
@@ -236,16 +245,18 @@ class LidarDisagrees : public HealthMetric {
 std::vector<std::unique_ptr<HealthMetric>> health_metrics(const MotionSourceOptions& source,
                                                           const MotionLimits& limits) {
   std::vector<std::unique_ptr<HealthMetric>> metrics;
-  metrics.push_back(std::make_unique<NotANumber>()); // first, so that the others need not think of it
+  metrics.push_back(
+      std::make_unique<NotANumber>(source.use_acceleration)); // first, so that the others need not think of it
   metrics.push_back(std::make_unique<Late>());
   metrics.push_back(std::make_unique<OutOfOrder>());
   if (source.kind == SourceKind::imu) {
     metrics.push_back(std::make_unique<FrozenImu>());
-    metrics.push_back(std::make_unique<ImuSelfCheck>(source.T_base_source)); // must see turn rates in deg/s
+    metrics.push_back(
+        std::make_unique<ImuSelfCheck>(source.T_base_source, source.use_acceleration)); // must see turn rates in deg/s
     metrics.push_back(std::make_unique<ImpossibleTurnRate>());
   } else {
     metrics.push_back(std::make_unique<Uncertain>());
-    metrics.push_back(std::make_unique<FrozenOdometry>());
+    metrics.push_back(std::make_unique<FrozenOdometry>(limits.max_acceleration_mps2));
     metrics.push_back(std::make_unique<PoseJump>());
     metrics.push_back(std::make_unique<ImpossibleSpeed>(limits.max_speed_mps));
   }

@@ -34,7 +34,8 @@ bool is_about(double value, double expected, double tolerance) {
 
 } // namespace
 
-ImuSelfCheck::ImuSelfCheck(const Pose& T_base_imu) : R_base_imu_(T_base_imu.rotation) {
+ImuSelfCheck::ImuSelfCheck(const Pose& T_base_imu, UseAcceleration use_acceleration)
+    : R_base_imu_(T_base_imu.rotation), use_acceleration_(use_acceleration) {
   static_cast<void>(words(Difference::any, 0, false)); // they take memory: not while packets come
 }
 
@@ -42,7 +43,8 @@ std::optional<HealthReason> ImuSelfCheck::judge(const SourceReading& reading) {
   if (refused_)
     return HealthReason::self_check;
   follow_turns(R_base_imu_ * reading.imu->angular_velocity_radps, reading.stamp);
-  weigh(R_base_imu_ * reading.imu->specific_force_mps2, reading.stamp);
+  if (use_acceleration_ == UseAcceleration::automatic)
+    weigh(R_base_imu_ * reading.imu->specific_force_mps2, reading.stamp);
   return refused_ || set_aside_ ? std::optional{HealthReason::self_check} : std::nullopt;
 }
 

@@ -25,7 +25,7 @@ namespace locus {
 /// owner.
 class ImuSelfCheck : public HealthMetric {
  public:
-  explicit ImuSelfCheck(const Pose& T_base_imu);
+  ImuSelfCheck(const Pose& T_base_imu, UseAcceleration use_acceleration);
 
   std::optional<HealthReason> judge(const SourceReading& reading) override;
   void accept(const SourceReading& reading) override;
@@ -33,7 +33,9 @@ class ImuSelfCheck : public HealthMetric {
   void forget() override;
 
   [[nodiscard]] std::string_view verdict() const override;
-  [[nodiscard]] bool trusts_accelerometer() const override { return trusts_accelerometer_; }
+  [[nodiscard]] bool trusts_accelerometer() const override {
+    return trusts_accelerometer_ && use_acceleration_ == UseAcceleration::automatic;
+  }
 
  private:
   /// What gyro and lidar are seen to differ in.
@@ -71,6 +73,7 @@ class ImuSelfCheck : public HealthMetric {
   [[nodiscard]] static std::string_view words(Difference difference, std::size_t axis, bool for_good);
 
   Eigen::Quaterniond R_base_imu_;
+  UseAcceleration use_acceleration_;
   std::string_view verdict_, set_aside_verdict_;
   bool refused_ = false;
   bool trusts_accelerometer_ = true;

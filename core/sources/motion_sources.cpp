@@ -93,13 +93,12 @@ std::optional<Pose> MotionSources::motion(const SourceChoice& choice, Stamp from
 SensedMotion MotionSources::sensed_in(Stamp from, Stamp to) const {
   SensedMotion motion;
   for (std::size_t i = 0; i < sources_.size(); ++i) {
-    const auto& [health, track, use_acceleration, epoch] = sources_[i];
+    const auto& [health, track, epoch] = sources_[i];
     const std::optional<Pose> T_source_base = track.has_sample_in(from, to) ? track.at(to) : std::nullopt;
     if (!T_source_base)
       continue;
     motion.sources[i] = {true, health.healthy(), epoch, *T_source_base};
-    if (health.healthy() && health.trusts_accelerometer() && use_acceleration == UseAcceleration::automatic &&
-        !motion.specific_force)
+    if (health.healthy() && health.trusts_accelerometer() && !motion.specific_force)
       motion.specific_force = track.specific_force(from, to);
     if (health.healthy() && !motion.up_base)
       motion.up_base = track.up_base(from, to);

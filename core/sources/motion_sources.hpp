@@ -57,12 +57,10 @@ class MotionSources {
 
  private:
   struct Source {
-    Source(const MotionSourceOptions& options, const MotionLimits& limits)
-        : health(options, limits), track(options), use_acceleration(options.use_acceleration) {}
+    Source(const MotionSourceOptions& options, const MotionLimits& limits) : health(options, limits), track(options) {}
 
     HealthMonitor health;
     MotionTrack track;
-    UseAcceleration use_acceleration;
     std::uint32_t epoch = 0; ///< that the track belongs to
   };
 

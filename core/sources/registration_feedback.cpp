@@ -15,20 +15,24 @@ double Innovation::ratio() const {
   return (variance.array() > 0.0).select(value.array().square() / variance.array(), 0.0).maxCoeff();
 }
 
-LidarOpinion opinion_on(const Innovation& innovation, double elapsed_s) {
-  constexpr double kMaxChiSquare = 38.0; ///< exceeded once in a million by six honest axes
-  double chi_square = 0.0;
-  bool sees = false;
+std::optional<double> test_ratio(const Innovation& innovation, double elapsed_s) {
+  constexpr double kGate = 38.0; ///< exceeded once in a million by six honest axes
+  std::optional<double> ratio;
   for (int axis = 0; axis < 6; ++axis) {
     const double honest = kHonestError[axis] * kHonestError[axis] / (elapsed_s * elapsed_s) + innovation.known[axis];
     if (innovation.variance[axis] == 0.0 || innovation.others[axis] > honest)
       continue;
-    sees = true;
-    chi_square += innovation.value[axis] * innovation.value[axis] / (honest + innovation.others[axis]);
+    const double squared = innovation.value[axis] * innovation.value[axis] / (honest + innovation.others[axis]);
+    ratio = ratio.value_or(0.0) + squared / kGate;
   }
-  if (!sees)
+  return ratio;
+}
+
+LidarOpinion opinion_on(const Innovation& innovation, double elapsed_s) {
+  const std::optional<double> ratio = test_ratio(innovation, elapsed_s);
+  if (!ratio)
     return LidarOpinion::none;
-  return chi_square > kMaxChiSquare ? LidarOpinion::disagrees : LidarOpinion::agrees;
+  return *ratio > 1.0 ? LidarOpinion::disagrees : LidarOpinion::agrees;
 }
 
 } // namespace locus

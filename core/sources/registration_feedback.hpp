@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "core/base/pose.hpp"
 #include "core/base/stamp.hpp"
@@ -23,7 +24,9 @@ struct Innovation {
   [[nodiscard]] double ratio() const; ///< largest square in units of its variance
 };
 
-/// Chi-square test over the axes that are known without the source better than an honest source knows them.
+/// Normalised innovation squared in units of the gate, over the axes that are known without the source better than an
+/// honest source knows them; nothing where there are none. Above one the source is contradicted.
+std::optional<double> test_ratio(const Innovation& innovation, double elapsed_s);
 LidarOpinion opinion_on(const Innovation& innovation, double elapsed_s);
 
 /// What a registered sweep tells the health monitors. Nothing else of the result goes back to the sensors' side, so

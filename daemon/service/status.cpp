@@ -113,6 +113,7 @@ void Watch::look(const Figures& figures) {
     look_at_sources(live.link);
   look_at_lidars(figures);
   look_at_verdicts(figures.ingest);
+  look_at_speed(figures.sweeps.largest_speed_mps);
   look_at_load(figures.counters);
   look_at_drops(live);
   if (live.recording)
@@ -215,6 +216,13 @@ void Watch::look_at_verdicts(const IngestReport& ingest) {
     if (!verdict.empty() && verdict != verdicts_[i])
       log_.warn(fmt::format("motion source {} {}", sources[i].name, verdict), {{"LOCUS_SOURCE", sources[i].name}});
     verdicts_[i] = verdict;
+  }
+}
+
+void Watch::look_at_speed(double largest_mps) {
+  if (const auto warning = too_fast(session_.config().odometry.motion, largest_mps); warning && !told_speed_) {
+    log_.warn(*warning);
+    told_speed_ = true;
   }
 }
 

@@ -42,6 +42,7 @@ class Watch {
   void look_at_sources(const LinkFigures& link);
   void look_at_lidars(const Figures& figures);
   void look_at_verdicts(const IngestReport& ingest);
+  void look_at_speed(double largest_mps);
   void look_at_load(const SweepCounters& counters);
   void look_at_drops(const Figures::Live& live);
   void look_at_intruders(const LinkFigures& link);
@@ -62,6 +63,7 @@ class Watch {
   bool was_connected_ = false;
   std::uint64_t told_attempts_ = 0;
   std::array<Lidar, Config::kMaxLidars> lidars_;
+  bool told_speed_ = false;
   std::array<std::string_view, kMaxSources> verdicts_; ///< as they were told
   std::set<std::string> unheard_;                      ///< sources that were told of
   std::set<std::string> intruded_;                     ///< topics that were told of

@@ -59,12 +59,12 @@ void OdometryFiles::write(const OdometryEstimate& estimate) {
       csv_.print(",{}", estimate.pose_covariance(row, column));
   }
   for (std::size_t i = 0; i < source_names_.size(); ++i) {
-    const auto& [innovation, last_used] = estimate.sources[i];
+    const auto& [innovation, test_ratio, last_used] = estimate.sources[i];
     for (const double value : innovation.value)
       csv_.print(",{}", value);
     for (const double variance : innovation.variance)
       csv_.print(",{}", std::sqrt(variance));
-    csv_.print(",{},{}", innovation.ratio(), to_ns(last_used));
+    csv_.print(",{},{}", test_ratio, to_ns(last_used));
   }
   csv_.print("\n");
 }

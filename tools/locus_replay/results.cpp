@@ -44,6 +44,8 @@ void warn(const std::vector<std::string>& lines) {
     tools::say("locus-replay", "warning: " + line);
 }
 
+constexpr std::uint64_t kMany = 10; ///< one of so many samples
+
 /// What is wrong with motion sources altogether, a line each.
 std::vector<std::string> source_verdicts(const Config& config, const MotionSources& sources) {
   std::vector<std::string> lines;
@@ -53,7 +55,7 @@ std::vector<std::string> source_verdicts(const Config& config, const MotionSourc
     const bool is_doubted = !health.healthy() && health.counters().rejected_as(HealthReason::self_check) > 0;
     if (const std::string_view verdict = health.verdict(); !verdict.empty())
       lines.push_back(fmt::format("motion source {} {}", name, verdict));
-    else if (health.counters().rejected_as(HealthReason::speed) > 0)
+    else if (kMany * health.counters().rejected_as(HealthReason::speed) > health.counters().received)
       lines.push_back(fmt::format("motion source {} {}", name, kTooFast));
     else if (is_doubted)
       lines.push_back(
@@ -117,6 +119,8 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
                       arguments_.capture.string())});
   warn(lidar_warnings(recording_, ingest.lidars(), config_.sweep));
   warn(source_verdicts(config_, ingest.sources()));
+  if (const auto warning = daemon::too_fast(config_.odometry.motion, figures.sweeps.largest_speed_mps))
+    warn({*warning});
   warn(accuracy.warnings);
   if (!arguments_.quiet)
     fmt::print("{}results    {}\n", readable(run), arguments_.output.string());

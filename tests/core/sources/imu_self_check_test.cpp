@@ -56,7 +56,7 @@ class ImuSelfCheckTest : public testing::Test {
 };
 
 TEST_F(ImuSelfCheckTest, AGoodUnitPasses) {
-  ImuSelfCheck check(Pose{});
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   drive(check, seconds{5}, [](ImuSample&) {});
   EXPECT_FALSE(refused_);
   EXPECT_EQ(check.verdict(), "");
@@ -69,7 +69,7 @@ TEST_F(ImuSelfCheckTest, AUnitOnItsSidePassesIfTheConfigurationSaysSo) {
     sample.angular_velocity_radps = T_base_imu.rotation.conjugate() * sample.angular_velocity_radps;
     sample.specific_force_mps2 = T_base_imu.rotation.conjugate() * sample.specific_force_mps2;
   };
-  ImuSelfCheck configured(T_base_imu), unconfigured(Pose{});
+  ImuSelfCheck configured(T_base_imu, UseAcceleration::automatic), unconfigured(Pose{}, UseAcceleration::automatic);
   drive(configured, seconds{5}, turned);
   EXPECT_EQ(configured.verdict(), "");
   drive(unconfigured, seconds{5}, turned);
@@ -78,7 +78,7 @@ TEST_F(ImuSelfCheckTest, AUnitOnItsSidePassesIfTheConfigurationSaysSo) {
 }
 
 TEST_F(ImuSelfCheckTest, AccelerationsInGAreNotUsedButTheGyroIs) {
-  ImuSelfCheck check(Pose{});
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   drive(check, seconds{5}, [](ImuSample& sample) { sample.specific_force_mps2 /= 9.81; });
   EXPECT_FALSE(refused_);
   EXPECT_FALSE(check.trusts_accelerometer());
@@ -86,28 +86,28 @@ TEST_F(ImuSelfCheckTest, AccelerationsInGAreNotUsedButTheGyroIs) {
 }
 
 TEST_F(ImuSelfCheckTest, AccelerationsThatAreNoGravityAreNotUsed) {
-  ImuSelfCheck check(Pose{});
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   drive(check, seconds{5}, [](ImuSample& sample) { sample.specific_force_mps2 *= 2.0; });
   EXPECT_FALSE(refused_);
   EXPECT_FALSE(check.trusts_accelerometer());
 }
 
 TEST_F(ImuSelfCheckTest, AGyroInDegreesIsRefusedByName) {
-  ImuSelfCheck check(Pose{});
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   drive(check, seconds{5}, [](ImuSample& sample) { sample.angular_velocity_radps /= kRadPerDeg; });
   EXPECT_TRUE(refused_);
   EXPECT_NE(check.verdict().find("deg/s"), std::string_view::npos);
 }
 
 TEST_F(ImuSelfCheckTest, AGyroThatTurnsTheOtherWayIsRefused) {
-  ImuSelfCheck check(Pose{});
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   drive(check, seconds{5}, [](ImuSample& sample) { sample.angular_velocity_radps *= -1.0; });
   EXPECT_TRUE(refused_);
   EXPECT_NE(check.verdict().find("other way"), std::string_view::npos);
 }
 
 TEST_F(ImuSelfCheckTest, AGoodGyroIsUsedFromItsFirstTurnOn) {
-  ImuSelfCheck check(Pose{});
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   for (int i = 0; i < 20; ++i) {
     turn(check, 1, {0, 0, 2.0}, {0, 0, 2.1});
     ASSERT_FALSE(refused_);
@@ -115,7 +115,7 @@ TEST_F(ImuSelfCheckTest, AGoodGyroIsUsedFromItsFirstTurnOn) {
 }
 
 TEST_F(ImuSelfCheckTest, AGyroThatLidarContradictsIsSetAsideAfterTwoSweepsThoughItIsRightAboutOtherAxes) {
-  ImuSelfCheck check(Pose{});
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   turn(check, 12, {0.1, 0.2, 0.0}, {0.1, 0.2, 0.0});
   turn(check, 1, {0.1, 0.2, 0.1}, {0.1, 0.2, -0.1});
   EXPECT_FALSE(refused_) << "one sweep may be wrong";
@@ -128,7 +128,7 @@ TEST_F(ImuSelfCheckTest, AGyroThatLidarContradictsIsSetAsideAfterTwoSweepsThough
 }
 
 TEST_F(ImuSelfCheckTest, AGyroThatWasSetAsideIsUsedAgainWhenLidarAgrees) {
-  ImuSelfCheck check(Pose{});
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   stand(check);
   turn(check, 2, {0, 0.3, 0}, {0, -0.1, 0});
   EXPECT_TRUE(refused_);
@@ -140,7 +140,7 @@ TEST_F(ImuSelfCheckTest, AGyroThatWasSetAsideIsUsedAgainWhenLidarAgrees) {
 }
 
 TEST_F(ImuSelfCheckTest, AGyroIsTriedAgainWhereLidarSeesNothingClearWithoutItButNotForEver) {
-  ImuSelfCheck check(Pose{});
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   stand(check);
   for (int round = 0; round < 3; ++round) {
     turn(check, 2, {0, 0.3, 0}, {0, -0.1, 0});
@@ -159,7 +159,7 @@ TEST_F(ImuSelfCheckTest, AGyroIsTriedAgainWhereLidarSeesNothingClearWithoutItBut
 
 /// A robot stands, and lidar follows the people who walk around it: the gyro was said to be mounted wrongly.
 TEST_F(ImuSelfCheckTest, AGyroThatStandsStillWhileLidarTurnsIsNotCalledWrong) {
-  ImuSelfCheck check(Pose{});
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   stand(check);
   for (int round = 0; round < 3; ++round) {
     turn(check, 2, {0, 0, 1e-3}, {0, 0, -0.2});
@@ -175,7 +175,7 @@ TEST_F(ImuSelfCheckTest, AGyroThatStandsStillWhileLidarTurnsIsNotCalledWrong) {
 
 /// Nobody uses it in the second after a loss.
 TEST_F(ImuSelfCheckTest, WhatLidarSeesAloneAfterALossSpeaksAgainstNoGyro) {
-  ImuSelfCheck check(Pose{});
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   stand(check);
   check.forget();
   now_ += milliseconds{200};
@@ -187,14 +187,14 @@ TEST_F(ImuSelfCheckTest, WhatLidarSeesAloneAfterALossSpeaksAgainstNoGyro) {
 }
 
 TEST_F(ImuSelfCheckTest, WhatLidarDoesNotSeeSpeaksAgainstNoGyro) {
-  ImuSelfCheck check(Pose{});
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   sees_ = {true, true, true, true, true, false};
   turn(check, 30, {0, 0, 1.0}, {0, 0, 0});
   EXPECT_FALSE(refused_);
 }
 
 TEST_F(ImuSelfCheckTest, WhatComesBackIsCheckedAnew) {
-  ImuSelfCheck check(Pose{});
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   turn(check, 15, {0, 0, 1.0}, {0, 0, 1.0});
   check.forget();
   now_ += seconds{2};
@@ -203,7 +203,7 @@ TEST_F(ImuSelfCheckTest, WhatComesBackIsCheckedAnew) {
 }
 
 TEST_F(ImuSelfCheckTest, SamplesOutOfOrderDoNotHinderIt) {
-  ImuSelfCheck check(Pose{});
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   int count = 0;
   drive(check, seconds{5}, [&](ImuSample& sample) {
     sample.angular_velocity_radps *= -1.0;
@@ -216,7 +216,7 @@ TEST_F(ImuSelfCheckTest, SamplesOutOfOrderDoNotHinderIt) {
 }
 
 TEST_F(ImuSelfCheckTest, AGyroThatDoesNotTurnWithTheRobotIsRefused) {
-  ImuSelfCheck check(Pose{});
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   drive(check, seconds{5}, [](ImuSample& sample) { sample.angular_velocity_radps = {0.5, 0, 0.01}; });
   EXPECT_TRUE(refused_);
 }

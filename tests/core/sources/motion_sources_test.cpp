@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/sources/motion_sources.hpp"
 
+#include <limits>
+
 #include <gtest/gtest.h>
 
 #include "core/stamps.hpp"
@@ -132,6 +134,13 @@ TEST_F(MotionSourcesTest, AnAccelerometerThatIsNotWantedIsNotUsedAndItsGyroIs) {
   const SensedMotion motion = sources.sensed_in(at_ms(900), at_ms(1000));
   EXPECT_TRUE(motion.sources[1].usable);
   EXPECT_FALSE(motion.specific_force);
+
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  MotionSources broken(options, Fusion::queue);
+  for (int ms = 0; ms <= 3000; ms += 5)
+    broken.add(SourceId{1}, ImuSample{at_ms(ms), at_ms(ms), Eigen::Vector3d::Zero(), {nan, 0, -300}, std::nullopt});
+  EXPECT_TRUE(broken.health(SourceId{1}).healthy());
+  EXPECT_EQ(broken.health(SourceId{1}).verdict(), "");
 }
 
 TEST_F(MotionSourcesTest, WhoeverLosesHealthIsKnownToTheSweepButNotUsable) {
