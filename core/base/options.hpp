@@ -88,7 +88,7 @@ struct MapOptions {
 enum class SourceKind { imu, odometry }; ///< imu gives rotation only, odometry all six axes
 constexpr auto names_of(SourceKind) { return std::to_array<std::string_view>({"imu", "odometry"}); }
 
-enum class UseAcceleration { automatic, off }; ///< automatic: while the accelerometer reads as one should
+enum class UseAcceleration { automatic, off }; ///< automatic: unless it does not match gravity
 constexpr auto names_of(UseAcceleration) { return std::to_array<std::string_view>({"auto", "off"}); }
 
 struct MotionSourceOptions {
@@ -107,8 +107,9 @@ constexpr auto names_of(NoSourcePrior) { return std::to_array<std::string_view>(
 enum class FlatGround { off, on, automatic };
 constexpr auto names_of(FlatGround) { return std::to_array<std::string_view>({"off", "on", "auto"}); }
 
-/// What the robot is able to. A motion source that claims a higher speed is refused, and none is predicted; by the
-/// acceleration sources may change the motion from sweep to sweep, and wheels that stop harder are frozen.
+/// What the robot is able to. A motion source that claims a higher speed is refused, and where the speed is in doubt
+/// none is predicted. Twice the standard deviation of how sources may change the speed from sweep to sweep is the
+/// acceleration, and an odometry that stops harder is frozen.
 struct MotionLimits {
   double max_speed_mps = 10.0;
   double max_acceleration_mps2 = 10.0;

@@ -53,7 +53,8 @@ struct Registration {
 /// Generalised ICP (Segal 2009; paper equations 1 and 2): aligns points that have surface covariances with a map of
 /// surfaces.
 ///
-/// Minimises the sum of robust d' (C_target + R C_source R')^-1 d by Gauss-Newton over the pose at the end of the sweep
+/// Minimises the sum of robust d' (C_target + R C_source R')^-1 d, a plane being known along its normal alone, by
+/// Gauss-Newton over the pose at the end of the sweep
 /// and the twist during it. A point of age a moves with the twist by -a times what it moves with the pose; a block of
 /// points has one age. One pass over the points finds the correspondences and sums the normal equations. The sums are
 /// taken over fixed blocks of points in a fixed order: same input, same bits, for any number of threads. One owner.

@@ -74,6 +74,9 @@ const Vector6 kMounting = squares(0.005, 0.002);
 const Vector6 kFirst = squares(0.003, 3e-4); ///< what the first sweep of the map may lie askew
 const Vector6 kFloor = squares(0.001, 1e-4); ///< of the pose against the submap: surfaces are no better known
 
+/// How many states a source has of its own: three biases, or two scales and two directions.
+int states_of(SourceKind kind) { return kind == SourceKind::imu ? 3 : 4; }
+
 Eigen::Vector3d slip(const Eigen::Vector3d& rate, const Eigen::Vector3d& velocity) { return rate.cross(velocity); }
 
 } // namespace
@@ -83,7 +86,7 @@ MotionFilter::MotionFilter(const std::vector<MotionSourceOptions>& sources, cons
   for (std::size_t i = 0; i < count_; ++i) {
     sources_[i].kind = sources[i].kind;
     sources_[i].state = states_;
-    states_ += sources[i].kind == SourceKind::imu ? 3 : 4;
+    states_ += states_of(sources[i].kind);
   }
   x_ = State::Zero(states_);
   P_ = Covariance::Zero(states_, states_);
@@ -109,7 +112,7 @@ void MotionFilter::begin(const Pose& T_odom_base, const Vector6& twist_base, con
 void MotionFilter::forget(SourceId source) {
   Source& of = sources_[index_of(source)];
   const bool gyro = of.kind == SourceKind::imu;
-  const int count = gyro ? 3 : 4;
+  const int count = states_of(of.kind);
   P_.middleRows(of.state, count).setZero();
   P_.middleCols(of.state, count).setZero();
   P_.diagonal().segment(of.state, count).setConstant(square(gyro ? kGyroBias : kScale));
@@ -181,7 +184,8 @@ void MotionFilter::predict(double elapsed_s, double period_s, const std::optiona
   P_.diagonal().segment<3>(kGravity).array() += square(kGravityWalk) * elapsed_s;
   for (Source& source : std::span(sources_).first(count_)) {
     const bool gyro = source.kind == SourceKind::imu;
-    P_.diagonal().segment(source.state, gyro ? 3 : 4).array() += square(gyro ? kGyroWalk : kScaleWalk) * elapsed_s;
+    P_.diagonal().segment(source.state, states_of(source.kind)).array() +=
+        square(gyro ? kGyroWalk : kScaleWalk) * elapsed_s;
     source.used = false;
   }
   twist_base_ = predicted;

@@ -49,8 +49,6 @@ constexpr double kStartAgrees = 0.002; ///< metres, radians
 /// Room for the 16 000 voxels of a large sweep, and small enough for the second cache.
 constexpr std::size_t kLastScanBytes = 2'500'000;
 
-constexpr std::size_t kAgeBins = 64;
-
 const std::bitset<kMaxSources> kAllSources = std::bitset<kMaxSources>{}.set();
 
 /// So many lengths of a sweep after the last one, sweeps were dropped in between.
@@ -284,8 +282,8 @@ Odometry::Hypothesis Odometry::assume(const Sweep& sweep, std::bitset<kMaxSource
 void Odometry::match_last(const Sweep& sweep, const MotionBelief& belief, Hypothesis& hypothesis,
                           const Gicp::StopRequested& stop) {
   const StageScope scope(clock_, Stage::scan_to_scan);
-  const Registration found = gicp_.align(by_age(sweep, belief.twist_base), last_scan_map_, belief.T_target_source,
-                                         belief, options_.scan_to_scan, false, stop);
+  const Registration found = gicp_.align(aged_.sort(sweep, scan_, belief.twist_base), last_scan_map_,
+                                         belief.T_target_source, belief, options_.scan_to_scan, false, stop);
   if (found.converged)
     hypothesis.fit.T_target_source = found.T_target_source;
   hypothesis.scan_to_scan = found;
@@ -314,15 +312,15 @@ void Odometry::register_with(const Sweep& sweep, Hypothesis& hypothesis, const G
   const bool wide =
       !hypothesis.rests && hypothesis.filter.covariance().diagonal().head<3>().maxCoeff() > kWide_m * kWide_m;
   const Pose T_start = hypothesis.fit.T_target_source;
-  hypothesis.fit = gicp_.align(by_age(sweep, belief.twist_base), map_, T_start, belief, options, wide, stop);
+  hypothesis.fit = gicp_.align(aged_.sort(sweep, scan_, belief.twist_base), map_, T_start, belief, options, wide, stop);
   const Vector6 bent = (hypothesis.fit.twist_base - belief.twist_base).cwiseAbs();
   const bool bends = bent.head<3>().maxCoeff() >= kBends_mps || bent.tail<3>().maxCoeff() >= kBends_radps;
   if (!bends || stop())
     return;
   const int before = hypothesis.fit.iterations;
   correct(sweep, hypothesis.fit.twist_base, hypothesis.without);
-  hypothesis.fit = gicp_.align(by_age(sweep, hypothesis.fit.twist_base), map_, hypothesis.fit.T_target_source, belief,
-                               options, false, stop);
+  hypothesis.fit = gicp_.align(aged_.sort(sweep, scan_, hypothesis.fit.twist_base), map_,
+                               hypothesis.fit.T_target_source, belief, options, false, stop);
   hypothesis.fit.iterations += before;
 }
 
@@ -383,44 +381,17 @@ void Odometry::correct(const Sweep& sweep, const Vector6& twist_base, std::bitse
     correct_all(sweep, twist_base + unlike_mean(sweep), scan_);
 }
 
-/// The registered points of scan_ in the order of their age.
-ElasticScan Odometry::by_age(const Sweep& sweep, const Vector6& twist_base) {
-  const auto count = static_cast<std::size_t>(sweep.registered);
-  const double oldest_s = std::max(1e-9, to_seconds(sweep.end - sweep.start));
-  const auto bin = [&](std::size_t i) {
-    const double share = static_cast<double>(sweep.points[i].age_s) / oldest_s;
-    return static_cast<std::size_t>(std::clamp(share, 0.0, 0.999) * kAgeBins);
-  };
-  std::array<std::size_t, kAgeBins + 1> begins{};
-  for (std::size_t i = 0; i < count; ++i)
-    ++begins[bin(i) + 1];
-  for (std::size_t b = 0; b < kAgeBins; ++b)
-    begins[b + 1] += begins[b];
-  aged_.resize(count);
-  block_age_s_.assign((count + kGicpBlock - 1) / kGicpBlock, 0.0F);
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t place = begins[bin(i)]++;
-    aged_[place] = scan_[i];
-    block_age_s_[place / kGicpBlock] += sweep.points[i].age_s;
-  }
-  for (std::size_t b = 0; b < block_age_s_.size(); ++b)
-    block_age_s_[b] /= static_cast<float>(std::min(kGicpBlock, count - b * kGicpBlock));
-  return {.points = aged_, .block_age_s = block_age_s_, .twist_base = twist_base};
-}
-
 /// The source that contradicts what all others say most, if any does.
 std::optional<std::size_t> Odometry::worst_source(const Sweep& sweep, const Hypothesis& hypothesis) const {
   MotionFilter after = hypothesis.filter;
   after.see(hypothesis.fit.T_target_source, hypothesis.fit.twist_base, hypothesis.fit.information);
   std::optional<std::size_t> worst;
-  double most = 0.0;
+  double most = 1.0; // from there on it is contradicted
   for (const auto& source : {hypothesis.choice.rotation, hypothesis.choice.translation}) {
     if (!source)
       continue;
     const Innovation found = after.innovation(*source, *steps_.twist_base(sweep, *source));
-    if (opinion_on(found, steps_.elapsed_s(sweep)) != LidarOpinion::disagrees)
-      continue;
-    const double ratio = found.ratio();
+    const double ratio = test_ratio(found, steps_.elapsed_s(sweep)).value_or(0.0);
     if (ratio > most) {
       most = ratio;
       worst = index_of(*source);

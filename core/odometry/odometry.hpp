@@ -12,6 +12,7 @@
 #include "core/ingest/sweep.hpp"
 #include "core/map/registration.hpp"
 #include "core/map/surface_map.hpp"
+#include "core/odometry/aged_scan.hpp"
 #include "core/odometry/flat_ground.hpp"
 #include "core/odometry/gravity.hpp"
 #include "core/odometry/lidar_health.hpp"
@@ -95,7 +96,6 @@ class Odometry {
   void register_with(const Sweep& sweep, Hypothesis& hypothesis, const Gicp::StopRequested& stop);
   Hypothesis choose(const Sweep& sweep, const Gicp::StopRequested& stop);
   void correct(const Sweep& sweep, const Vector6& twist_base, std::bitset<kMaxSources> without);
-  [[nodiscard]] ElasticScan by_age(const Sweep& sweep, const Vector6& twist_base);
   [[nodiscard]] std::optional<std::size_t> worst_source(const Sweep& sweep, const Hypothesis& hypothesis) const;
   [[nodiscard]] bool is_placed(const Sweep& sweep, const Registration& fit, const Hypothesis& all_sources) const;
   void report(const Sweep& sweep, OdometryEstimate& estimate);
@@ -116,8 +116,7 @@ class Odometry {
   SensedSteps steps_;
   MotionFilter filter_;
   std::vector<SurfacePoint> scan_;                ///< the sweep at hand, fully corrected
-  std::vector<SurfacePoint> aged_;                ///< what is registered of it, by age
-  std::vector<float> block_age_s_;                ///< of aged_
+  AgedScan aged_;                                 ///< what is registered of it
   std::optional<Sweep> first_;                    ///< while no motion is known
   std::optional<Pose> T_odom_start_;              ///< where to begin
   std::optional<Matrix6> keyframe_observability_; ///< of the last sweep, if the map is still to take it in

@@ -11,10 +11,6 @@ const Vector6 kHonestError = along_each_axis(0.01, 0.2);
 
 } // namespace
 
-double Innovation::ratio() const {
-  return (variance.array() > 0.0).select(value.array().square() / variance.array(), 0.0).maxCoeff();
-}
-
 std::optional<double> test_ratio(const Innovation& innovation, double elapsed_s) {
   constexpr double kGate = 38.0; ///< exceeded once in a million by six honest axes
   std::optional<double> ratio;

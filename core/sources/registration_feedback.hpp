@@ -20,8 +20,6 @@ struct Innovation {
   Vector6 variance = Vector6::Zero(); ///< that it should have; zero along axes of which the source says nothing
   Vector6 others = Vector6::Zero();   ///< the part of it that is not the source's
   Vector6 known = Vector6::Zero();    ///< the part that an honest source of its kind has while it moves like that
-
-  [[nodiscard]] double ratio() const; ///< largest square in units of its variance
 };
 
 /// Normalised innovation squared in units of the gate, over the axes that are known without the source better than an

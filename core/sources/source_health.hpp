@@ -32,9 +32,9 @@ constexpr auto names_of(HealthReason) {
 inline constexpr std::size_t kHealthReasonCount = names_of(HealthReason{}).size();
 
 /// Of a source that is lost for HealthReason::speed, in words for the user.
-inline constexpr std::string_view kTooFast = "claims a higher speed than motion.max_speed_mps, and is not used while "
-                                             "it does (set that to what the robot is able "
-                                             "to, or look at the unit of the source)";
+inline constexpr std::string_view kTooFast =
+    "claims a higher speed than motion.max_speed_mps, and is not used while it does "
+    "(set that to what the robot is able to, or look at the unit of the source)";
 
 /// What became of the samples of one motion source.
 struct SourceCounters {

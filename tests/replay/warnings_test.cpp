@@ -106,6 +106,17 @@ TEST(Warnings, SweepThatIsShorterThanATurn) {
   EXPECT_LT(Replay(halves).summary()["ape_m"]["max"], 0.01);
 }
 
+/// The room is driven at up to 1 m/s. What lidar sees stands all the same.
+TEST(Warnings, RobotThatIsFasterThanItIsSaidToBe) {
+  const Replay replay({"--set", "motion.max_speed_mps=0.3", room_drive().string()});
+  const std::vector<std::string> lines = lines_of(replay.run().err);
+  ASSERT_EQ(lines.size(), 2U) << replay.run().err;
+  EXPECT_NE(lines[0].find("motion source wio claims a higher speed than motion.max_speed_mps"), std::string::npos);
+  EXPECT_NE(lines[1].find("estimates claim up to "), std::string::npos) << lines[1];
+  EXPECT_NE(lines[1].find("motion.max_speed_mps is 0.3"), std::string::npos) << lines[1];
+  EXPECT_LT(replay.summary()["ape_m"]["max"], 0.02);
+}
+
 TEST(Warnings, MotionOfAnotherTimeNamesBothSpans) {
   const TemporaryFolder folder;
   std::ofstream(folder / "wio.tum") << "10 0 0 0 0 0 0 1\n12.5 0 0 0 0 0 0 1\n";

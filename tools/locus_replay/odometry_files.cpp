@@ -12,12 +12,18 @@
 namespace locus::tools {
 namespace {
 
-std::string csv_header() {
+std::string csv_header(const std::vector<std::string>& sources) {
   constexpr std::array<std::string_view, 6> kAxes{"x", "y", "z", "roll", "pitch", "yaw"};
   std::string header = "t_ns,state,source,iterations,inliers";
   for (const std::string_view row : kAxes) {
     for (const std::string_view column : kAxes)
       header += fmt::format(",cov_{}_{}", row, column);
+  }
+  for (const std::string& source : sources) {
+    for (const std::string_view figure : {"innovation", "sd"})
+      for (const std::string_view axis : kAxes)
+        header += fmt::format(",{}_{}_{}", source, figure, axis);
+    header += fmt::format(",{0}_test_ratio,{0}_last_used_ns", source);
   }
   return header;
 }
@@ -28,14 +34,7 @@ OdometryFiles::OdometryFiles(const std::filesystem::path& folder, const std::vec
     : tum_(folder / "odometry.tum"), csv_(folder / "odometry.csv") {
   for (const MotionSourceOptions& source : sources)
     source_names_.push_back(source.name);
-  csv_.print("{}", csv_header());
-  for (const std::string& name : source_names_) {
-    for (const std::string_view figure : {"innovation", "sd"})
-      for (const std::string_view axis : {"x", "y", "z", "roll", "pitch", "yaw"})
-        csv_.print(",{}_{}_{}", name, figure, axis);
-    csv_.print(",{}_test_ratio,{}_last_used_ns", name, name);
-  }
-  csv_.print("\n");
+  csv_.print("{}\n", csv_header(source_names_));
 }
 
 /// What the rotation came from and what the translation, once if it is the same.

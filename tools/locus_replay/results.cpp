@@ -44,18 +44,17 @@ void warn(const std::vector<std::string>& lines) {
     tools::say("locus-replay", "warning: " + line);
 }
 
-constexpr std::uint64_t kMany = 10; ///< one of so many samples
-
 /// What is wrong with motion sources altogether, a line each.
 std::vector<std::string> source_verdicts(const Config& config, const MotionSources& sources) {
   std::vector<std::string> lines;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     const std::string& name = config.motion_sources[i].name;
     const HealthMonitor& health = sources.health(SourceId{i});
+    const bool is_too_fast = 10 * health.counters().rejected_as(HealthReason::speed) > health.counters().received;
     const bool is_doubted = !health.healthy() && health.counters().rejected_as(HealthReason::self_check) > 0;
     if (const std::string_view verdict = health.verdict(); !verdict.empty())
       lines.push_back(fmt::format("motion source {} {}", name, verdict));
-    else if (kMany * health.counters().rejected_as(HealthReason::speed) > health.counters().received)
+    else if (is_too_fast)
       lines.push_back(fmt::format("motion source {} {}", name, kTooFast));
     else if (is_doubted)
       lines.push_back(

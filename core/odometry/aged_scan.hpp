@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "core/base/pose.hpp"
+#include "core/base/surface_point.hpp"
+#include "core/ingest/sweep.hpp"
+#include "core/map/registration.hpp"
+
+namespace locus {
+
+/// The registered points of a sweep in the order of their age, as the elastic registration takes them: a block of
+/// points has one age. Keeps its memory. One owner.
+class AgedScan {
+ public:
+  /// `scan_base` are the points of the sweep, in its order, corrected for `twist_base` (m/s, rad/s) to its end. What is
+  /// returned refers to this object.
+  ElasticScan sort(const Sweep& sweep, std::span<const SurfacePoint> scan_base, const Vector6& twist_base);
+
+  [[nodiscard]] std::size_t size() const { return points_base_.size(); } ///< of the last one
+
+ private:
+  std::vector<SurfacePoint> points_base_;
+  std::vector<float> block_age_s_;
+};
+
+} // namespace locus
