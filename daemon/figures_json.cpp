@@ -120,6 +120,7 @@ ordered_json estimate_json(const SweepFigures& sweeps) {
     covariance.push_back(last.pose_covariance(i / 6, i % 6));
   return {{"rate_hz", rounded(sweeps.rate_hz)},
           {"state", to_string(last.state)},
+          {"beginning", last.beginning ? ordered_json(to_string(*last.beginning)) : ordered_json()},
           {"age_ms", ms_since(last.stamp)},
           {"t_ns", to_ns(last.stamp)},
           {"pose", {{"xyz_m", {p.x(), p.y(), p.z()}}, {"rpy_deg", {rpy_deg.x(), rpy_deg.y(), rpy_deg.z()}}}},

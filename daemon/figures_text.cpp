@@ -43,6 +43,8 @@ std::string pose_text(const std::optional<OdometryEstimate>& last) {
   text += "lidar sees ";
   for (std::size_t i = 0; i < kAxes.size(); ++i)
     text += fmt::format(" {} {}", kAxes[i], bar(last->observability[static_cast<Eigen::Index>(i)]));
+  if (last->beginning)
+    text += fmt::format("\nbeginning   {}", to_string(*last->beginning));
   return text + '\n';
 }
 

@@ -27,7 +27,7 @@ struct SweepCounters {
 
 /// Where to begin, see Odometry::begin_at().
 struct StartPoint {
-  Pose T_odom_base;
+  Whereabouts last;
   std::vector<SurfacePoint> map_odom;
 };
 
@@ -47,7 +47,7 @@ class SweepProcessor {
   explicit SweepProcessor(const Config& config, const std::optional<StartPoint>& start = {})
       : odometry_(config.odometry, config.source_options(), &stages_) {
     if (start)
-      odometry_.begin_at(start->T_odom_base, start->map_odom);
+      odometry_.begin_at(start->last, start->map_odom);
   }
   SweepProcessor(const SweepProcessor&) = delete;
   SweepProcessor& operator=(const SweepProcessor&) = delete;

@@ -96,7 +96,8 @@ MotionFilter::MotionFilter(const std::vector<MotionSourceOptions>& sources, cons
     forget(SourceId{i});
 }
 
-void MotionFilter::begin(const Pose& T_odom_base, const Vector6& twist_base, const Vector6& twist_sigma) {
+void MotionFilter::begin(const Pose& T_odom_base, const Vector6& twist_base, const Vector6& twist_sigma,
+                         const Matrix6& map_covariance) {
   T_odom_start_ = T_odom_base_ = T_odom_base;
   twist_base_ = twist_base;
   P_.topRows<kAccelerometer>().setZero();
@@ -105,7 +106,8 @@ void MotionFilter::begin(const Pose& T_odom_base, const Vector6& twist_base, con
   P_.middleRows<6>(kMap).setZero();
   P_.middleCols<6>(kMap).setZero();
   P_.diagonal().head<6>() = kFloor;
-  P_.diagonal().segment<6>(kMap) = kFirst;
+  P_.block<6, 6>(kMap, kMap) = map_covariance;
+  P_.diagonal().segment<6>(kMap) += kFirst;
   elapsed_s_ = 0.0;
 }
 

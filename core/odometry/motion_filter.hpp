@@ -40,8 +40,10 @@ class MotionFilter {
 
   explicit MotionFilter(const std::vector<MotionSourceOptions>& sources, const MotionLimits& limits = {});
 
-  /// Begins at a pose with a twist of which only `twist_sigma` (standard deviations) is known.
-  void begin(const Pose& T_odom_base, const Vector6& twist_base, const Vector6& twist_sigma);
+  /// Begins at a pose with a twist of which only `twist_sigma` (standard deviations) is known. `map_covariance`: of the
+  /// map that another run has left, since its start.
+  void begin(const Pose& T_odom_base, const Vector6& twist_base, const Vector6& twist_sigma,
+             const Matrix6& map_covariance = Matrix6::Zero());
 
   /// The twist during a sweep of `period_s` whose end is `elapsed_s` after that of the last. `force`: where it is
   /// felt.

@@ -72,14 +72,14 @@ Odometry::Odometry(const OdometryOptions& options, const std::vector<MotionSourc
       flat_ground_(options.flat_ground), map_(options.map.max_bytes, options.isa),
       last_scan_map_(kLastScanBytes, options.isa), map_policy_(options.map), filter_(sources, options.motion) {}
 
-void Odometry::begin_at(const Pose& T_odom_base, std::span<const SurfacePoint> map_odom) {
-  T_odom_start_ = T_odom_base;
+void Odometry::begin_at(const Whereabouts& last, std::span<const SurfacePoint> map_odom) {
+  start_ = last;
   map_.insert(map_odom, Pose{});
 }
 
 OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested& stop) {
   prepare_next();
-  if (!begun_)
+  if (!beginning_)
     return begin(sweep);
   if (first_)
     find_start(sweep, stop);
@@ -129,50 +129,71 @@ void Odometry::prepare_next() {
   keyframe_observability_.reset();
 }
 
-/// The world begins at the first sweep: where it is told to, or at its origin, without yaw, level if gravity is known.
+/// The world begins at the first sweep: where another run has ended, or at its origin, without yaw, level if gravity is
+/// known.
 OdometryEstimate Odometry::begin(const Sweep& sweep) {
   OdometryEstimate estimate;
   correct_all(sweep, corrected_twist(sweep), scan_);
   gravity_.observe(Eigen::Quaterniond::Identity(), sweep);
-  Pose T_odom_base = T_odom_start_.value_or(Pose{});
-  if (map_.fine().size() > 0 && sweep.points.size() >= kMinPoints) {
-    const StageScope scope(clock_, Stage::scan_to_submap);
-    const std::optional<Pose> T_odom_found =
-        relocate(gicp_, std::span(scan_).first(sweep.registered), map_, *T_odom_start_, options_.scan_to_submap);
-    resumed_ = T_odom_found.has_value();
-    T_odom_base = T_odom_found.value_or(Pose{});
-    if (resumed_) {
-      map_policy_.resume();
-    } else {
-      T_odom_start_.reset();
-      map_.clear();
-    }
-  }
-  if (const auto up_base = gravity_.up_base(); up_base && !T_odom_start_)
-    T_odom_base.rotation = from_rpy_rad(level_rpy_rad(*up_base));
-  filter_.begin(T_odom_base, Vector6::Zero(), along_each_axis(options_.motion.max_speed_mps, kUnknownRate_radps));
-  estimate.failed = scan_.size() < kMinPoints;
-  if (estimate.failed) { // nothing was seen yet: the next sweep is the first
+  estimate.failed = scan_.size() < kMinPoints || (map_.fine().size() > 0 && !find_again(sweep));
+  Whereabouts here;
+  if (start_)
+    here = estimate.failed ? start_->moved_to(start_->places(sweep.end, sweep.motion).front()) : *start_;
+  else if (const auto up_base = gravity_.up_base())
+    here.T_odom_base.rotation = from_rpy_rad(level_rpy_rad(*up_base));
+  filter_.begin(here.T_odom_base, Vector6::Zero(), along_each_axis(options_.motion.max_speed_mps, kUnknownRate_radps),
+                here.pose_covariance);
+  if (estimate.failed) { // the next sweep is the first
     estimate.state = TrackingState::dead_reckoning;
   } else {
-    begun_ = true;
-    map_policy_.begin(sweep.end, T_odom_base);
+    if (!beginning_)
+      beginning_ = start_ ? Beginning::told : Beginning::origin;
+    map_policy_.begin(sweep.end, here.T_odom_base);
     first_ = sweep;
     estimate.keyframe = true;
     keyframe_observability_ = Matrix6::Zero();
   }
   estimate.stamp = sweep.end;
-  estimate.T_odom_base = T_odom_base;
+  estimate.beginning = beginning_;
+  estimate.T_odom_base = here.T_odom_base;
+  estimate.pose_covariance = filter_.pose_covariance_since_start();
   estimate.points = sweep.registered;
   steps_.remember(sweep);
   return estimate;
+}
+
+/// Looks for the robot in the map that another run has left. Where it is not found the map is given up, and it begins
+/// where an odometry says, or at the origin. False while it is too early to say.
+bool Odometry::find_again(const Sweep& sweep) {
+  constexpr Duration kPatience = std::chrono::seconds{1}; ///< publishers find each other faster
+  waits_since_ = waits_since_.value_or(sweep.end);
+  if (start_->awaits(sweep.motion) && sweep.end - *waits_since_ < kPatience)
+    return false;
+  const StageScope scope(clock_, Stage::scan_to_submap);
+  const std::vector<Place> places = start_->places(sweep.end, sweep.motion);
+  if (const auto found =
+          relocate(gicp_, std::span(scan_).first(sweep.registered), map_, places, options_.scan_to_submap)) {
+    beginning_ = Beginning::map;
+    start_ = start_->moved_to(*found);
+    map_policy_.resume();
+    return true;
+  }
+  map_.clear();
+  const double way_m = difference(places.front().T_odom_base, start_->T_odom_base).head<3>().norm();
+  if (places.front().told && way_m <= options_.motion.max_speed_mps * to_seconds(sweep.end - start_->stamp)) {
+    beginning_ = Beginning::odometry;
+    start_ = start_->moved_to(places.front());
+  } else {
+    start_.reset();
+  }
+  return true;
 }
 
 /// The first sweep came without any idea of the motion. What is found between it and the second corrects both, so it
 /// can be found better; then the map begins anew with the first one corrected. A source that is wrong bends both.
 void Odometry::find_start(const Sweep& sweep, const Gicp::StopRequested& stop) {
   const Sweep first = *std::exchange(first_, std::nullopt);
-  if (resumed_ || sweep.points.size() < kMinPoints || steps_.elapsed_s(sweep) <= 0.0 ||
+  if (beginning_ == Beginning::map || sweep.points.size() < kMinPoints || steps_.elapsed_s(sweep) <= 0.0 ||
       options_.scan_to_scan_mode == ScanToScanMode::off)
     return;
   const StageScope scope(clock_, Stage::scan_to_scan);
@@ -436,6 +457,7 @@ void Odometry::report(const Sweep& sweep, OdometryEstimate& estimate) {
 /// Fills in what the estimate says beside its pose, and remembers the sweep as the last.
 void Odometry::finish(const Sweep& sweep, OdometryEstimate& estimate) {
   estimate.stamp = sweep.end;
+  estimate.beginning = beginning_;
   estimate.points = sweep.registered;
   estimate.T_odom_base = filter_.pose();
   feedback_ = {.from = steps_.last(), .to = sweep.end, .opinions = {}, .twist_base = Vector6::Zero(), .sees = {}};
@@ -444,6 +466,11 @@ void Odometry::finish(const Sweep& sweep, OdometryEstimate& estimate) {
   for (const auto& source : {estimate.prior.rotation, estimate.prior.translation})
     if (source)
       source_reports_[index_of(*source)].last_used = sweep.end;
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    const SourcePose& seen = sweep.motion.sources[i];
+    source_reports_[i].T_source_base =
+        seen.usable && sources_[i].kind == SourceKind::odometry ? std::optional{seen.T_source_base} : std::nullopt;
+  }
   estimate.sources = source_reports_;
   saw_ = !estimate.failed;
   scan_is_next_target_ = saw_ && options_.scan_to_scan_mode == ScanToScanMode::always;

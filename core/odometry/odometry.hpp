@@ -19,6 +19,7 @@
 #include "core/odometry/map_policy.hpp"
 #include "core/odometry/motion_filter.hpp"
 #include "core/odometry/odometry_estimate.hpp"
+#include "core/odometry/relocation.hpp"
 #include "core/odometry/seen_axes.hpp"
 #include "core/odometry/sensed_steps.hpp"
 #include "core/sources/registration_feedback.hpp"
@@ -37,12 +38,11 @@ class Odometry {
   explicit Odometry(const OdometryOptions& options, const std::vector<MotionSourceOptions>& sources = {},
                     StageClock* clock = nullptr);
 
-  /// Before the first sweep: where it is to be, instead of level at the origin. With surfaces that were seen there
-  /// before (odom frame) it is registered with them; where it does not fit it begins level at the origin all the same.
-  void begin_at(const Pose& T_odom_base, std::span<const SurfacePoint> map_odom = {});
-
-  /// Whether the first sweep was found in the surfaces that it was to begin with.
-  [[nodiscard]] bool resumed() const { return resumed_; }
+  /// Before the first sweep: where the robot was, instead of level at the origin. With surfaces that were seen there
+  /// (odom frame) it is looked for among them, which waits a second at the most for an odometry that can tell how far
+  /// it has come since; where it is not found it begins where such an odometry says, or level at the origin all the
+  /// same.
+  void begin_at(const Whereabouts& last, std::span<const SurfacePoint> map_odom = {});
 
   /// The estimate for the end of the sweep. Never fails: a sweep that cannot be registered yields the prediction,
   /// flagged. `stop` ends a registration early, but for the one that finds where to go on.
@@ -85,6 +85,7 @@ class Odometry {
   };
 
   OdometryEstimate begin(const Sweep& sweep);
+  bool find_again(const Sweep& sweep);
   void find_start(const Sweep& sweep, const Gicp::StopRequested& stop);
   [[nodiscard]] Start start_without(std::bitset<kMaxSources> without, const Sweep& first, const Sweep& sweep,
                                     const Gicp::StopRequested& stop);
@@ -118,9 +119,11 @@ class Odometry {
   std::vector<SurfacePoint> scan_;                ///< the sweep at hand, fully corrected
   AgedScan aged_;                                 ///< what is registered of it
   std::optional<Sweep> first_;                    ///< while no motion is known
-  std::optional<Pose> T_odom_start_;              ///< where to begin
+  std::optional<Whereabouts> start_;              ///< where to begin
+  std::optional<Stamp> waits_since_;              ///< for an odometry that can tell where that is
   std::optional<Matrix6> keyframe_observability_; ///< of the last sweep, if the map is still to take it in
-  bool begun_ = false, resumed_ = false, stands_ = false, saw_ = false;
+  std::optional<Beginning> beginning_;
+  bool stands_ = false, saw_ = false;
   bool scan_is_next_target_ = false; ///< scan-to-scan is to take in the last sweep
   bool has_last_scan_ = false;       ///< it has taken in one
   Stamp slow_since_;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 
 #include "core/base/names.hpp"
@@ -22,6 +23,11 @@ constexpr auto names_of(TrackingState) {
   return std::to_array<std::string_view>({"tracking", "degenerate", "dead_reckoning", "standstill"});
 }
 
+/// Where the first pose of a run is from: level at the origin, as begin_at() was told, as an odometry says that bridges
+/// the time since the run before, or found in the map of that.
+enum class Beginning : std::uint8_t { origin, told, odometry, map };
+constexpr auto names_of(Beginning) { return std::to_array<std::string_view>({"origin", "told", "odometry", "map"}); }
+
 /// Where the start of a registration came from.
 struct PriorSource : SourceChoice {
   NoSourcePrior otherwise = NoSourcePrior::identity; ///< in place of what no source said
@@ -32,6 +38,8 @@ struct SourceReport {
   Innovation innovation; ///< of the last sweep that both told of; its variances are zero before that
   double test_ratio = 0; ///< of it; zero where nothing could be compared
   Stamp last_used;       ///< end of the last sweep whose prior came from it; Stamp{}: never
+  std::optional<Pose>
+      T_source_base; ///< where a healthy odometry saw the base at the end of the sweep, in its own frame
 };
 
 /// What one sweep says about the robot, with all that is needed to distrust it.
@@ -46,6 +54,7 @@ struct OdometryEstimate {
   /// other axes could be mistaken for is taken out.
   Vector6 observability = Vector6::Zero();
   TrackingState state = TrackingState::tracking;
+  std::optional<Beginning> beginning; ///< of the run; nothing before its first sweep
   PriorSource prior;
   std::array<SourceReport, kMaxSources> sources{}; ///< by index
   Registration scan_to_scan;                       ///< paper equation 1; zero iterations where it did not run

@@ -12,53 +12,131 @@ namespace {
 constexpr double kFarthest_m = 0.5;
 constexpr double kAround_m = 2.0;
 
-/// One standard deviation, of the robot at each of the places.
+/// One standard deviation of a robot about a place.
 const Vector6 kSigma = along_each_axis(0.5, 5.0);
 
-/// Share of the points of the sweep that is known: less is a coincidence, as the next bend of a tunnel offers.
-constexpr double kLeast = 0.5;
+/// Share of the points of the sweep that is known: less is a coincidence, as the next bend of a tunnel offers. What
+/// lies where an odometry says, that close, is none.
+constexpr double kLeast = 0.5, kLeastVouched = 0.2;
+constexpr double kVouched_m = 0.1;
 
 /// What is asked for against the next best place: clearly more where half of the sweep is known, hardly less where four
 /// fifths are.
+constexpr double kClearlyMore = 1.3, kHardlyLess = 0.9;
 double least_ratio(double share) {
-  constexpr double kMost = 0.8, kClearlyMore = 1.3, kHardlyLess = 0.9;
+  constexpr double kMost = 0.8;
   return std::lerp(kClearlyMore, kHardlyLess, std::clamp((share - kLeast) / (kMost - kLeast), 0.0, 1.0));
 }
 
-/// The expected place and those around it.
-std::array<Pose, 9> places_around(const Pose& T_map_expected) {
-  std::array<Pose, 9> places;
-  for (int place = 0; place < 9; ++place) {
-    const int ahead = place / 3 - 1, aside = place % 3 - 1;
-    const Pose T_expected_place{Eigen::Quaterniond::Identity(), {ahead * kAround_m, aside * kAround_m, 0}};
-    places[static_cast<std::size_t>(place)] = T_map_expected * T_expected_place;
+/// A place is taken for a likelier one if it fits so much better.
+constexpr double kClearlyBetter = 1.1;
+
+/// Beside a place, on every side.
+std::array<Pose, 8> places_around(const Pose& T_odom_place) {
+  std::array<Pose, 8> places;
+  for (int i = 0; i < 8; ++i) {
+    const int cell = i < 4 ? i : i + 1, ahead = cell / 3 - 1, aside = cell % 3 - 1;
+    places[static_cast<std::size_t>(i)] =
+        T_odom_place * Pose{Eigen::Quaterniond::Identity(), {ahead * kAround_m, aside * kAround_m, 0}};
   }
   return places;
 }
 
+bool is_within(double distance_m, const Pose& T_odom_a, const Pose& T_odom_b) {
+  return (T_odom_a.translation - T_odom_b.translation).norm() < distance_m; // false for NaN
+}
+
 } // namespace
 
-std::optional<Pose> relocate(Gicp& gicp, std::span<const SurfacePoint> scan_base, const SurfaceMap& map,
-                             const Pose& T_map_expected, const RegistrationOptions& options) {
+Whereabouts Whereabouts::followed_by(const OdometryEstimate& estimate) const {
+  constexpr double kTwistMemory_s = 0.3;
+  const double elapsed_s = to_seconds(estimate.stamp - stamp);
+  const double share = elapsed_s > 0.0 ? 1.0 - std::exp(-elapsed_s / kTwistMemory_s) : 1.0;
+  constexpr double kUnsure = 0.1; ///< m/s and rad/s, one standard deviation: of such a twist one half is taken
+  const Vector6 unsureness = estimate.twist_covariance.diagonal() / (kUnsure * kUnsure);
+  const Vector6 news = share * (estimate.twist_base - twist_base).array() / (1.0 + unsureness.array());
+  Whereabouts next{estimate.stamp, estimate.T_odom_base, estimate.pose_covariance, twist_base + news};
+  std::ranges::transform(estimate.sources, next.T_source_base.begin(), &SourceReport::T_source_base);
+  return next;
+}
+
+Pose Whereabouts::carried_to(Stamp now) const {
+  constexpr Duration kMoment = std::chrono::seconds{2};
+  return T_odom_base * se3_exp(to_seconds(std::clamp(now - stamp, Duration::zero(), kMoment)) * twist_base);
+}
+
+bool Whereabouts::awaits(const SensedMotion& sensed) const {
+  bool awaits = false;
+  for (std::size_t i = 0; i < kMaxSources; ++i)
+    if (T_source_base[i]) {
+      if (sensed.sources[i].known)
+        return false;
+      awaits = true;
+    }
+  return awaits;
+}
+
+std::vector<Place> Whereabouts::places(Stamp now, const SensedMotion& sensed) const {
+  constexpr double kApart_m = 0.6, kTurnLever_m = 2.0; // so that one of them is near wherever it came to rest
+  constexpr double kMost = 16;
+  std::vector<Place> places;
+  const auto add = [&](const Pose& place) {
+    const Vector6 sigma = kSigma + difference(place, T_odom_base).cwiseAbs();
+    places.push_back({place, sigma.cwiseAbs2().asDiagonal(), false});
+  };
+  for (std::size_t i = 0; i < kMaxSources; ++i)
+    if (T_source_base[i] && sensed.sources[i].known)
+      places.push_back({T_odom_base * T_source_base[i]->inverse() * sensed.sources[i].T_source_base,
+                        kSigma.cwiseAbs2().asDiagonal(), true});
+  add(carried_to(now));
+  const double elapsed_s = std::max(0.0, to_seconds(now - stamp));
+  const double apart_s =
+      kApart_m / std::max(1e-3, twist_base.head<3>().norm() + kTurnLever_m * twist_base.tail<3>().norm());
+  for (double place = 0; place < std::min(kMost, elapsed_s / apart_s); ++place)
+    add(T_odom_base * se3_exp(place * apart_s * twist_base));
+  return places;
+}
+
+Whereabouts Whereabouts::moved_to(const Place& place) const {
+  return {.stamp = stamp, .T_odom_base = place.T_odom_base, .pose_covariance = pose_covariance + place.covariance};
+}
+
+std::optional<Place> relocate(Gicp& gicp, std::span<const SurfacePoint> scan_base, const SurfaceMap& map_odom,
+                              std::span<const Place> expected, const RegistrationOptions& options) {
+  struct Found {
+    double share = 0.0; ///< of the points, with a correspondence
+    Registration fit{};
+    Matrix6 covariance = Matrix6::Zero(); ///< of the place
+    bool vouched = false;
+  };
   MotionBelief prior;
   prior.information.topLeftCorner<6, 6>() = kSigma.cwiseAbs2().cwiseInverse().asDiagonal();
-  std::optional<Pose> T_map_here;
-  double here = 0.0, elsewhere = 0.0; // share of the points with a correspondence
-  for (const Pose& T_start : places_around(T_map_expected)) {
-    prior.T_target_source = T_start;
-    const Registration found = gicp.align({scan_base}, map, T_start, prior, options, true, [] { return false; });
-    const double share = static_cast<double>(found.inliers) / static_cast<double>(scan_base.size());
-    const double moved_m = (found.T_target_source.translation - T_map_expected.translation).norm();
-    if (!(moved_m < kFarthest_m)) {
-      elsewhere = std::max(elsewhere, share);
-    } else if (share > here) {
-      here = share;
-      T_map_here = found.T_target_source;
-    }
+  const auto lay = [&](const Place& place) {
+    prior.T_target_source = place.T_odom_base;
+    const Registration fit =
+        gicp.align({scan_base}, map_odom, place.T_odom_base, prior, options, true, [] { return false; });
+    return Found{static_cast<double>(fit.inliers) / static_cast<double>(scan_base.size()), fit, place.covariance,
+                 place.told && is_within(kVouched_m, fit.T_target_source, place.T_odom_base)};
+  };
+  std::vector<Found> all;
+  Found here;
+  for (const Place& place : expected) {
+    all.push_back(lay(place));
+    if (is_within(kFarthest_m, all.back().fit.T_target_source, place.T_odom_base) &&
+        all.back().share > kClearlyBetter * here.share)
+      here = all.back();
   }
-  if (here < kLeast || here < least_ratio(here) * elsewhere)
+  if (here.share < (here.vouched ? kLeastVouched : kLeast))
     return std::nullopt;
-  return T_map_here;
+  for (const Pose& T_odom_beside : places_around(here.fit.T_target_source))
+    all.push_back(lay({T_odom_beside, Matrix6::Zero()}));
+  const double least = here.vouched ? kHardlyLess : least_ratio(here.share);
+  for (const Found& other : all)
+    if (!is_within(kFarthest_m, other.fit.T_target_source, here.fit.T_target_source) &&
+        here.share < least * other.share)
+      return std::nullopt;
+  const Matrix6 information = here.covariance.inverse() + here.fit.information.topLeftCorner<6, 6>();
+  return Place{here.fit.T_target_source, information.inverse()};
 }
 
 } // namespace locus

@@ -1,23 +1,63 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "core/base/options.hpp"
+#include "core/base/pose.hpp"
+#include "core/base/stamp.hpp"
 #include "core/map/registration.hpp"
 #include "core/map/surface_map.hpp"
+#include "core/odometry/odometry_estimate.hpp"
 
 namespace locus {
 
-/// Where a sweep lies in a map that another run has left behind: within half a metre of where it is expected, or
-/// nowhere.
+/// Where a robot may be.
+struct Place {
+  Pose T_odom_base;
+  Matrix6 covariance; ///< against the map that another run has left, odom axes
+  bool told = false;  ///< by an odometry
+};
+
+/// Where a run of the odometry ended, for another to go on from. A value.
+struct Whereabouts {
+  Stamp stamp; ///< end of its last sweep
+  Pose T_odom_base;
+  Matrix6 pose_covariance = Matrix6::Zero(); ///< as OdometryEstimate has it
+  Vector6 twist_base = Vector6::Zero();      ///< mean over the last sweeps
+  /// As each healthy odometry saw the base then. Whoever sends it has not been restarted, so its frame bridges the gap.
+  std::array<std::optional<Pose>, kMaxSources> T_source_base{};
+
+  /// After the next estimate. Its twist alone is not to be relied on, the less the less sure it is: where a source that
+  /// was wrong is lost, the next sweep lies askew to those before.
+  [[nodiscard]] Whereabouts followed_by(const OdometryEstimate& estimate) const;
+
+  /// Where it is at `now` if it goes on as before, which for more than a moment it does not.
+  [[nodiscard]] Pose carried_to(Stamp now) const;
+
+  /// Whether an odometry is yet to be heard that could tell where the robot is.
+  [[nodiscard]] bool awaits(const SensedMotion& sensed) const;
+
+  /// Where the robot may be at `now`, the likeliest first: as the odometries say, carried on, and wherever on its way
+  /// it may have come to rest.
+  [[nodiscard]] std::vector<Place> places(Stamp now, const SensedMotion& sensed) const;
+
+  /// At one of them, as far as anybody knows then.
+  [[nodiscard]] Whereabouts moved_to(const Place& place) const;
+};
+
+/// Where a sweep lies in a map that another run has left behind: within half a metre of one of the places `expected`,
+/// the likeliest first, or nowhere. An odometry that it agrees with to a decimetre vouches for a place.
 ///
 /// How much of a sweep finds a correspondence is a matter of the place: nine tenths in a tunnel, half where much is far
-/// or hidden. So it is compared with what it finds two metres away on every side. The less of the place is known, the
-/// clearer it must fit better than those around; one of which most is known may be a corridor, which looks the same two
-/// metres on, and need only fit hardly less. Any thread, one at a time for a Gicp.
-std::optional<Pose> relocate(Gicp& gicp, std::span<const SurfacePoint> scan_base, const SurfaceMap& map,
-                             const Pose& T_map_expected, const RegistrationOptions& options);
+/// or hidden. So it is compared with what it finds two metres away on every side, and at the other places. The less of
+/// the place is known, the clearer it must fit better, unless an odometry vouches for it; one of which most is known
+/// may be a corridor, which looks the same two metres on, and need only fit hardly less. Of places that fit alike the
+/// likelier is taken. Any thread, one at a time for a Gicp.
+std::optional<Place> relocate(Gicp& gicp, std::span<const SurfacePoint> scan_base, const SurfaceMap& map_odom,
+                              std::span<const Place> expected, const RegistrationOptions& options);
 
 } // namespace locus

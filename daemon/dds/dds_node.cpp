@@ -41,7 +41,7 @@ Qos make_qos(TopicQos wanted) {
   dds_qset_reliability(qos.get(), wanted.reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT,
                        DDS_MSECS(100));
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, wanted.depth);
-  dds_qset_durability(qos.get(), DDS_DURABILITY_VOLATILE);
+  dds_qset_durability(qos.get(), wanted.latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   dds_qset_data_representation(qos.get(), 1, &kXcdr1);
   dds_qset_writer_data_lifecycle(qos.get(), false);
   return qos;

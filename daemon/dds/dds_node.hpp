@@ -41,9 +41,11 @@ class DdsEntity {
 struct TopicQos {
   bool reliable = true;
   int depth = 10;
+  bool latched = false; ///< who comes later hears the last message, too
 
   static constexpr TopicQos standard() { return {true, 10}; }   ///< odometry, diagnostics, commands
   static constexpr TopicQos transform() { return {true, 100}; } ///< tf
+  static constexpr TopicQos latch() { return {true, 1, true}; } ///< what stays true
   static constexpr TopicQos sensor_out() { return {false, 5}; } ///< clouds
   static constexpr TopicQos sensor_in() {
     return {false, 100};

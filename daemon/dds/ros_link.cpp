@@ -51,6 +51,7 @@ struct RosLink::Session {
     odometry_fast = {node, dds.prefix + "/odometry_fast", TopicQos::standard()};
     state = {node, dds.prefix + "/state", TopicQos::standard()};
     diagnostics = {node, "/diagnostics", TopicQos::standard()};
+    beginning = {node, dds.prefix + "/beginning", TopicQos::latch()};
     if (dds.publish_tf)
       tf.emplace(node, "/tf", TopicQos::transform());
     if (dds.publish_cloud)
@@ -90,7 +91,7 @@ struct RosLink::Session {
   DdsNode node; ///< outlives all that is made from it
   DdsWriter<ros::Odometry> odometry, odometry_fast;
   DdsWriter<ros::UInt8> state;
-  DdsWriter<ros::DiagnosticArray> diagnostics;
+  DdsWriter<ros::DiagnosticArray> diagnostics, beginning;
   std::optional<DdsWriter<ros::TFMessage>> tf;
   std::optional<DdsWriter<ros::PointCloud2>> cloud, map;
   DdsEntity no_topic; ///< is never triggered; without anything to wait for a waitset does not wait at all
@@ -230,6 +231,11 @@ bool RosLink::publish_map(std::span<const CloudMessage::Point> points, Stamp sta
 bool RosLink::publish(const DiagnosticsMessage& diagnostics) {
   Session* const to = session();
   return to != nullptr && to->diagnostics.write(diagnostics.message());
+}
+
+bool RosLink::publish_beginning(const DiagnosticsMessage& beginning) {
+  Session* const to = session();
+  return to != nullptr && to->beginning.write(beginning.message());
 }
 
 LinkFigures RosLink::status() const {

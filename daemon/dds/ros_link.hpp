@@ -47,6 +47,7 @@ class RosLink {
   bool publish_cloud(std::span<const CloudMessage::Point> points, Stamp stamp); ///< base frame
   bool publish_map(std::span<const CloudMessage::Point> points, Stamp stamp);   ///< odom frame
   bool publish(const DiagnosticsMessage& diagnostics);
+  bool publish_beginning(const DiagnosticsMessage& beginning); ///< who comes later hears it, too
 
   /// Any thread.
   [[nodiscard]] LinkFigures status() const;

@@ -15,6 +15,7 @@
 #include <system_error>
 #include <type_traits>
 
+#include <Eigen/Eigenvalues>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
@@ -25,19 +26,24 @@ namespace {
 
 constexpr double kInSight_m = 60.0;
 
-constexpr std::array<char, 8> kMagic{'l', 'o', 'c', 'u', 's', 'd', ' ', '2'};
+constexpr std::array<char, 8> kMagic{'l', 'o', 'c', 'u', 's', 'd', ' ', '3'};
+
+constexpr std::string_view kAnyVersion = "locusd ";
 
 /// What the file begins with, as the machine holds it: it is read where it was written.
 struct Head {
   std::array<char, 8> magic;
   std::int64_t stamp_ns;
   std::array<double, 7> xyz_xyzw;
+  std::array<double, 36> covariance;
   std::array<double, 6> twist;
-  std::uint64_t checksum; ///< of what stands above
+  std::array<std::array<double, 7>, kMaxSources> sources_xyz_xyzw; ///< all zero: nothing
+  std::uint64_t checksum;                                          ///< of what stands above
 };
 
 /// What follows, and is followed by the points.
 struct Body {
+  std::uint64_t sources;
   std::int32_t flat_ground;
   std::uint32_t points;
   std::uint64_t checksum; ///< of what stands above, and of the points
@@ -72,19 +78,31 @@ bool write_all(int descriptor, std::string_view bytes) {
   return true;
 }
 
+std::array<double, 7> to_numbers(const Pose& pose) {
+  const auto& p = pose.translation;
+  const auto& q = pose.rotation;
+  return {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
+}
+
+Pose to_pose(const std::array<double, 7>& v) {
+  return {Eigen::Quaterniond(v[6], v[3], v[4], v[5]).normalized(), {v[0], v[1], v[2]}};
+}
+
 Head head_of(const Whereabouts& last) {
-  Head head{kMagic, to_ns(last.stamp), {}, {}, 0};
-  const auto& p = last.T_odom_base.translation;
-  const auto& q = last.T_odom_base.rotation;
-  head.xyz_xyzw = {p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()};
+  Head head{kMagic, to_ns(last.stamp), to_numbers(last.T_odom_base), {}, {}, {}, 0};
+  Eigen::Map<Matrix6>(head.covariance.data()) = last.pose_covariance;
   Eigen::Map<Vector6>(head.twist.data()) = last.twist_base;
+  for (std::size_t i = 0; i < kMaxSources; ++i)
+    if (last.T_source_base[i])
+      head.sources_xyz_xyzw[i] = to_numbers(*last.T_source_base[i]);
   head.checksum = checksum_of(head);
   return head;
 }
 
 std::string to_bytes(const SavedState& state) {
   const Head head = head_of(state.last);
-  Body body{static_cast<std::int32_t>(state.flat_ground), static_cast<std::uint32_t>(state.map_odom.size()), 0};
+  Body body{state.sources, static_cast<std::int32_t>(state.flat_ground),
+            static_cast<std::uint32_t>(state.map_odom.size()), 0};
   const auto points = std::as_bytes(std::span(state.map_odom));
   const std::string_view text{reinterpret_cast<const char*>(points.data()), points.size()};
   body.checksum = checksum_of(body, text);
@@ -94,10 +112,16 @@ std::string to_bytes(const SavedState& state) {
 /// Whether a robot can go on from there: what another hand wrote may hold anything.
 bool makes_sense(const SavedState& state) {
   constexpr double kFarthest_m = 1e8; // geocentric coordinates are within it
+  constexpr double kRounding = 1e-6;
   if (state.last.stamp < Stamp{})
     return false;
-  const auto [rotation, translation] = state.last.carried_to(Stamp::max());
-  return rotation.norm() > 0.5 && translation.norm() < kFarthest_m && // false for NaN
+  const auto is_sound = [](const Pose& pose) {
+    return pose.rotation.norm() > 0.5 && pose.translation.norm() < kFarthest_m; // false for NaN
+  };
+  const Matrix6& covariance = state.last.pose_covariance;
+  return is_sound(state.last.carried_to(Stamp::max())) && covariance.norm() < kFarthest_m &&
+         (covariance.selfadjointView<Eigen::Lower>().eigenvalues().array() > -kRounding).all() &&
+         std::ranges::all_of(state.last.T_source_base, [&](const auto& pose) { return !pose || is_sound(*pose); }) &&
          std::ranges::all_of(state.map_odom, [](const SurfacePoint& point) {
            return point.position_m.cast<double>().norm() < kFarthest_m && point.normal.allFinite();
          });
@@ -117,9 +141,13 @@ std::optional<SavedState> from_bytes(std::string_view bytes) {
       body.flat_ground > static_cast<std::int32_t>(FlatGround::automatic))
     return std::nullopt;
   SavedState state;
-  const auto& v = head.xyz_xyzw;
   state.last.stamp = stamp_from_ns(head.stamp_ns);
-  state.last.T_odom_base = {Eigen::Quaterniond(v[6], v[3], v[4], v[5]).normalized(), {v[0], v[1], v[2]}};
+  state.last.T_odom_base = to_pose(head.xyz_xyzw);
+  state.last.pose_covariance = Eigen::Map<const Matrix6>(head.covariance.data()).selfadjointView<Eigen::Lower>();
+  for (std::size_t i = 0; i < kMaxSources; ++i)
+    if (const auto& seen = head.sources_xyz_xyzw[i]; seen != decltype(seen){})
+      state.last.T_source_base[i] = to_pose(seen);
+  state.sources = body.sources;
   state.last.twist_base = Eigen::Map<const Vector6>(head.twist.data());
   state.flat_ground = static_cast<FlatGround>(body.flat_ground);
   state.map_odom.resize(body.points);
@@ -130,19 +158,11 @@ std::optional<SavedState> from_bytes(std::string_view bytes) {
 
 } // namespace
 
-Whereabouts Whereabouts::followed_by(const OdometryEstimate& estimate) const {
-  constexpr double kMemory_s = 0.3;
-  const double elapsed_s = to_seconds(estimate.stamp - stamp);
-  const double share = elapsed_s > 0.0 ? 1.0 - std::exp(-elapsed_s / kMemory_s) : 1.0;
-  constexpr double kUnsure = 0.1; ///< m/s and rad/s, one standard deviation: of such a twist one half is taken
-  const Vector6 unsureness = estimate.twist_covariance.diagonal() / (kUnsure * kUnsure);
-  const Vector6 news = share * (estimate.twist_base - twist_base).array() / (1.0 + unsureness.array());
-  return {estimate.stamp, estimate.T_odom_base, twist_base + news};
-}
-
-Pose Whereabouts::carried_to(Stamp now) const {
-  constexpr Duration kMoment = std::chrono::seconds{2};
-  return T_odom_base * se3_exp(to_seconds(std::clamp(now - stamp, Duration::zero(), kMoment)) * twist_base);
+std::uint64_t id_of(std::span<const MotionSource> sources) {
+  std::uint64_t id = checksum_of("");
+  for (const MotionSource& source : sources)
+    id = checksum_of(fmt::format("{} {} {}\n", source.name, to_string(source.kind), source.topic), id);
+  return id;
 }
 
 void read_map(const Odometry& odometry, const Pose& T_odom_base, std::vector<SurfacePoint>& map_odom) {
@@ -170,6 +190,8 @@ Expected<SavedState, std::string> load_state(const std::filesystem::path& file) 
   if (!stream)
     return fmt::format("{}: there is none", file.string());
   const std::string bytes{std::istreambuf_iterator<char>{stream}, {}};
+  if (bytes.starts_with(kAnyVersion) && !bytes.starts_with(std::string_view{kMagic.data(), kMagic.size()}))
+    return fmt::format("{}: was written by another version", file.string());
   std::optional<SavedState> state = from_bytes(bytes);
   if (!state)
     return fmt::format("{}: is cut short or damaged", file.string());
@@ -213,8 +235,10 @@ void StateKeeper::begin_anew(const std::optional<SavedState>& start) {
 }
 
 void StateKeeper::take(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground) {
+  if (!estimate.beginning) // what was saved is still true
+    return;
   now_ = now_.value_or(Whereabouts{}).followed_by(estimate);
-  if (!file_ || (!saved_ && estimate.failed))
+  if (!file_)
     return;
   if (!estimate.failed && is_due()) {
     saved_ = now_;
@@ -222,6 +246,7 @@ void StateKeeper::take(const Odometry& odometry, const OdometryEstimate& estimat
     due.number = ++number_;
     due.state.last = *now_;
     due.state.flat_ground = flat_ground;
+    due.state.sources = sources_;
     read_map(odometry, now_->T_odom_base, due.state.map_odom);
     static_cast<void>(states_.publish()); // an older one that was not written yet is worth nothing any more
   }

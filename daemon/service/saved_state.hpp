@@ -4,9 +4,11 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "config/config.hpp"
 #include "core/base/expected.hpp"
 #include "core/odometry/odometry.hpp"
 #include "daemon/sweep_processor.hpp"
@@ -14,26 +16,16 @@
 
 namespace locus::daemon {
 
-/// Where the robot was last, and how it moved.
-struct Whereabouts {
-  Stamp stamp; ///< of the estimate
-  Pose T_odom_base;
-  Vector6 twist_base = Vector6::Zero(); ///< mean over the last sweeps
-
-  /// After the next estimate. Its twist alone is not to be relied on, the less the less sure it is: where a source that
-  /// was wrong is lost, the next sweep lies askew to those before.
-  [[nodiscard]] Whereabouts followed_by(const OdometryEstimate& estimate) const;
-
-  /// Where it is at `now` if it goes on as before, which for more than a moment it does not.
-  [[nodiscard]] Pose carried_to(Stamp now) const;
-};
-
 /// What a service must know to go on where another one ended: where the robot is, and what is to be seen from there.
 struct SavedState {
   Whereabouts last;
   FlatGround flat_ground = FlatGround::off;
   std::vector<SurfacePoint> map_odom;
+  std::uint64_t sources = 0; ///< id_of() those that `last` speaks of
 };
+
+/// Tells one list of motion sources from another, in which a source may stand at another place.
+std::uint64_t id_of(std::span<const MotionSource> sources);
 
 /// The map as it is after an estimate: the surfaces within sight of where the robot is.
 void read_map(const Odometry& odometry, const Pose& T_odom_base, std::vector<SurfacePoint>& map_odom);
@@ -59,8 +51,8 @@ class StateKeeper {
   using Complain = std::function<void(const std::string&)>;
 
   /// Without a file it does nothing.
-  StateKeeper(std::optional<std::filesystem::path> file, Complain complain)
-      : file_(std::move(file)), complain_(std::move(complain)) {}
+  StateKeeper(std::optional<std::filesystem::path> file, std::span<const MotionSource> sources, Complain complain)
+      : file_(std::move(file)), sources_(id_of(sources)), complain_(std::move(complain)) {}
 
   /// Producer, one thread: after every estimate.
   void take(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground);
@@ -89,6 +81,7 @@ class StateKeeper {
   [[nodiscard]] bool is_due() const;
 
   std::optional<std::filesystem::path> file_;
+  std::uint64_t sources_;
   Complain complain_;
   LatestSlot<Due> states_;
   LatestSlot<Update> whereabouts_;

@@ -50,9 +50,12 @@ Session::Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket
     : config_(config), log_(log), started_(MachineTime::now()), input_(std::move(sockets)),
       flat_ground_(state ? state->flat_ground : config.odometry.flat_ground),
       link_(config, [this](const RosInput& input) { receive(input); }), clouds_(config.dds, link_),
-      start_(std::move(state)), state_(state_path(), [this](const std::string& problem) { log_.error(problem); }) {
+      start_(std::move(state)),
+      state_(state_path(), config.motion_sources, [this](const std::string& problem) { log_.error(problem); }) {
   // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): stands after its like
-  tells_resumed_ = start_.has_value() && !start_->map_odom.empty(); // without a map it begins where it was told to
+  if (start_ && start_->sources != id_of(config_.motion_sources))
+    start_->last.T_source_base = {};
+  has_past_ = start_.has_value() && !start_->map_odom.empty();
   begin(std::move(lidars));
 }
 
@@ -61,7 +64,7 @@ Session::~Session() { end(); }
 void Session::begin(LidarRouter lidars) {
   LiveOptions options;
   if (start_)
-    options.start = {start_->last.carried_to(Stamp{read_clock(CLOCK_REALTIME)}), start_->map_odom};
+    options.start = {start_->last, start_->map_odom};
   options.on_thread_start = [this] {
     if (const auto problem = raise_priority(config_.realtime.priority))
       log_.warn(*problem);
@@ -110,10 +113,8 @@ void Session::end() {
 
 /// In the odometry thread, when the estimate has left.
 void Session::after(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
-  if (!estimate.failed) { // a first sweep of a few points does not say yet
+  if (estimate.beginning)
     start_.reset();
-    resumed_.store(odometry.resumed() ? Resumed::yes : Resumed::no, std::memory_order_relaxed);
-  }
   clouds_.take(sweep, odometry, estimate);
   state_.take(odometry, estimate, flat_ground());
   const std::uint64_t wanted = map_wanted_.load(std::memory_order_relaxed);
@@ -139,7 +140,7 @@ std::optional<std::string> Session::reset(std::optional<Pose> T_odom_base) {
   if (T_odom_base)
     start_ = {{Stamp{read_clock(CLOCK_REALTIME)}, *T_odom_base}, flat_ground(), {}};
   state_.begin_anew(start_);
-  tells_resumed_ = false;
+  has_past_ = announced_ = false;
   begin(std::move(*lidars));
   log_.info("odometry begins anew, as it was told to");
   return std::nullopt;
@@ -152,7 +153,7 @@ std::optional<SavedState> Session::stop() {
       start_->flat_ground = flat_ground();
     return std::move(start_);
   }
-  SavedState state{*state_.now(), flat_ground(), {}};
+  SavedState state{*state_.now(), flat_ground(), {}, id_of(config_.motion_sources)};
   read_map(pipeline_->processor().odometry(), state.last.T_odom_base, state.map_odom);
   return state;
 }
@@ -210,17 +211,43 @@ void Session::publish(const ProcessedSweep& done) {
     told_.sweeps.take(done);
     told_.unpublished += is_published ? 0 : 1;
   }
+  if (done.estimate.beginning && !announced_)
+    announce(done.estimate);
+  if (announcement_ && link_.publish_beginning(DiagnosticsMessage({*announcement_}, done.estimate.stamp)))
+    announcement_.reset();
   tell(done.estimate.state);
 }
 
+/// A frame that begins anew is no surprise to who knows it.
+void Session::announce(const OdometryEstimate& estimate) {
+  announced_ = true;
+  const Beginning from = *estimate.beginning;
+  const bool is_lost = has_past_ && from != Beginning::map;
+  const std::string text = from == Beginning::map    ? "resumed where the service ended"
+                           : from == Beginning::told ? "begins where it was told to"
+                           : from == Beginning::odometry
+                               ? "resumed where an odometry says that the robot is; the first "
+                                 "sweep does not fit the saved state"
+                           : is_lost ? "a fresh start: the first sweep does not fit the saved state"
+                                     : "begins at the origin";
+  if (is_lost)
+    log_.warn(text);
+  else if (has_past_)
+    log_.info(text);
+  const Eigen::Vector3d& p = estimate.T_odom_base.translation;
+  announcement_ = {is_lost ? Diagnostic::Level::warning : Diagnostic::Level::ok,
+                   "locusd: beginning",
+                   text,
+                   {{"from", std::string{to_string(from)}},
+                    {"frame", config_.dds.frame_odom},
+                    {"t_ns", fmt::format("{}", to_ns(estimate.stamp))},
+                    {"x_m", fmt::format("{}", p.x())},
+                    {"y_m", fmt::format("{}", p.y())},
+                    {"z_m", fmt::format("{}", p.z())},
+                    {"yaw_deg", fmt::format("{}", to_rpy_rad(estimate.T_odom_base.rotation).z() / kRadPerDeg)}}};
+}
+
 void Session::tell(TrackingState state) {
-  if (const Resumed resumed = resumed_.load(std::memory_order_relaxed); tells_resumed_ && resumed != Resumed::unknown) {
-    tells_resumed_ = false;
-    if (resumed == Resumed::yes)
-      log_.info("resumed where the service ended");
-    else
-      log_.warn("a fresh start: the first sweep does not fit the saved state");
-  }
   if (told_state_ == state)
     return;
   told_state_ = state;

@@ -74,6 +74,7 @@ class Session {
   void take(FlatGroundWord word);
   void publish();
   void publish(const ProcessedSweep& done);
+  void announce(const OdometryEstimate& estimate);
   void tell(TrackingState state);
   void tell(const HealthEvent& event);
 
@@ -94,9 +95,9 @@ class Session {
   std::optional<RecordingInput> recording_input_;
   std::unique_ptr<LivePipeline> pipeline_;
   std::mutex pipeline_mutex_; ///< of those who change pipeline_ and the thread of the link
-  enum class Resumed : std::uint8_t { unknown, yes, no };
-  std::atomic<Resumed> resumed_{Resumed::unknown};
-  bool tells_resumed_ = false; ///< of the publisher
+  bool has_past_ = false;     ///< a map that another run has left
+  bool announced_ = false;
+  std::optional<Diagnostic> announcement_; ///< that DDS has not taken yet
   struct Map {
     std::uint64_t request = 0;
     std::vector<SurfacePoint> points;

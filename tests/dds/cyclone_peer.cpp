@@ -26,6 +26,13 @@ void say(const ros::Odometry& m, const char* topic) {
        m.child_frame_id_, m.pose_.covariance_[35], m.twist_.twist_.angular_.z_, realtime_ns());
 }
 
+void say(const ros::DiagnosticArray& m, const char* topic) {
+  for (std::uint32_t i = 0; i < m.status_._length; ++i) {
+    const ros::DiagnosticStatus& status = m.status_._buffer[i];
+    tell("{} {} {} {}", topic, status.level_, status.values_._length, status.name_);
+  }
+}
+
 void listen(const DdsNode& node, const std::string& prefix) {
   DdsReader<ros::Odometry> odometry{node, prefix + "/odometry", TopicQos::standard()};
   DdsReader<ros::Odometry> fast{node, prefix + "/odometry_fast", TopicQos::standard()};
@@ -34,6 +41,7 @@ void listen(const DdsNode& node, const std::string& prefix) {
   DdsReader<ros::PointCloud2> cloud{node, prefix + "/cloud", TopicQos::sensor_in()};
   DdsReader<ros::PointCloud2> map{node, prefix + "/map", TopicQos::sensor_in()};
   DdsReader<ros::DiagnosticArray> diagnostics{node, "/diagnostics", TopicQos::standard()};
+  DdsReader<ros::DiagnosticArray> beginning{node, prefix + "/beginning", TopicQos::latch()};
   const auto say_cloud = [](const ros::PointCloud2& m, const char* topic) {
     tell("{} {} {} {} {} {}", topic, m.width_, m.point_step_, m.data_._length, m.fields_._length, m.header_.frame_id_);
   };
@@ -49,12 +57,8 @@ void listen(const DdsNode& node, const std::string& prefix) {
     });
     cloud.take([&](const ros::PointCloud2& m) { say_cloud(m, "cloud"); });
     map.take([&](const ros::PointCloud2& m) { say_cloud(m, "map"); });
-    diagnostics.take([](const ros::DiagnosticArray& m) {
-      for (std::uint32_t i = 0; i < m.status_._length; ++i) {
-        const ros::DiagnosticStatus& status = m.status_._buffer[i];
-        tell("diagnostics {} {} {}", status.level_, status.values_._length, status.name_);
-      }
-    });
+    diagnostics.take([](const ros::DiagnosticArray& m) { say(m, "diagnostics"); });
+    beginning.take([](const ros::DiagnosticArray& m) { say(m, "beginning"); });
     std::this_thread::sleep_for(std::chrono::microseconds{200});
   }
 }

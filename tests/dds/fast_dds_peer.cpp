@@ -2,6 +2,7 @@
 // A participant made with Fast DDS, ROS 2's default: fast_dds_peer DOMAIN listen|talk PREFIX [ADDRESS].
 // On the loopback interface, or on that of ADDRESS. See peer_words.hpp.
 #include <cstdlib>
+#include <deque>
 #include <memory>
 #include <stdexcept>
 
@@ -78,14 +79,16 @@ template <class Message> class Listener : public dds::DataReaderListener {
 };
 
 template <class Message>
-void listen(dds::DomainParticipant& participant, const std::string& topic, const char* word, bool reliable = true) {
-  static Listener<Message> listener{word};
+void listen(dds::DomainParticipant& participant, const std::string& topic, const char* word, bool reliable = true,
+            bool latched = false) {
+  static std::deque<Listener<Message>> listeners;
   dds::DataReaderQos qos;
   qos.reliability().kind = reliable ? dds::RELIABLE_RELIABILITY_QOS : dds::BEST_EFFORT_RELIABILITY_QOS;
+  qos.durability().kind = latched ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
   qos.history().depth = 100;
   qos.endpoint().history_memory_policy = kAsNeeded;
   participant.create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT)
-      ->create_datareader(topic_of<Message>(participant, topic), qos, &listener);
+      ->create_datareader(topic_of<Message>(participant, topic), qos, &listeners.emplace_back(word));
 }
 
 template <class Message>
@@ -132,6 +135,7 @@ void run(int argc, char** argv) {
   listen<FastTransforms>(participant, "/tf", "tf");
   listen<FastCloud>(participant, prefix + "/cloud", "cloud", false);
   listen<FastDiagnostics>(participant, "/diagnostics", "diagnostics");
+  listen<FastDiagnostics>(participant, prefix + "/beginning", "beginning", true, true);
   while (stdin_is_open())
     std::this_thread::sleep_for(std::chrono::milliseconds{20});
 }

@@ -128,6 +128,17 @@ TEST_P(Peers, HearOdometryStateTransformCloudAndDiagnostics) {
   EXPECT_EQ(listener.lines_of("diagnostics").back(), "2 1 locusd");
 }
 
+TEST_P(Peers, WhoComeLaterHearHowItBeganOnce) {
+  RosLink link(config_, inbox_.sink());
+  ASSERT_TRUE(eventually([&] {
+    return link.publish_beginning(DiagnosticsMessage(
+        {{Diagnostic::Level::warning, "locusd: beginning", "", {{"from", "map"}}}}, stamp_from_ns(1)));
+  }));
+  const test::Child listener(peer("listen"));
+  EXPECT_TRUE(eventually([&] { return !listener.lines_of("beginning").empty(); }));
+  EXPECT_EQ(listener.lines_of("beginning"), std::vector<std::string>{"1 1 locusd: beginning"});
+}
+
 TEST_P(Peers, AreHeardInOrderWithEveryFigure) {
   RosLink link(config_, inbox_.sink());
   test::Child talker(peer("talk"));

@@ -10,7 +10,7 @@
 namespace locus {
 namespace {
 
-constexpr std::size_t kHeadBytes = 128, kBodyBytes = 16, kChecksumBytes = 8;
+constexpr std::size_t kHeadBytes = 864, kBodyBytes = 24, kChecksumBytes = 8;
 
 std::uint64_t fnv_1a(std::span<const std::uint8_t> bytes, std::uint64_t hash) {
   for (const std::uint8_t byte : bytes)

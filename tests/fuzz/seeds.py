@@ -204,9 +204,12 @@ write("point_cloud", "pcd_ascii", PCD.format("ascii") + "1 2 3 4 5 6\n7 8 9 10 1
 write("point_cloud", "pcd_binary", PCD.format("binary").encode() + struct.pack("<ffdIII", 1, 2, 3, 4, 5, 6) * 2)
 
 # The state of the service; checksums are made right by the target.
-head = b"locusd 2" + struct.pack("<q13dQ", 1_700_000_000_000_000_000, 1, 2, 3, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0.1, 0)
+POSE = (1, 2, 3, 0, 0, 0, 1)
+COVARIANCE_OF_ONE = [float(i % 7 == 0) for i in range(36)]
+head = b"locusd 3" + struct.pack("<q7d36d6d56dQ", 1_700_000_000_000_000_000, *POSE, *COVARIANCE_OF_ONE, 1, 0, 0, 0, 0, 0.1,
+                                 *POSE, *([0] * 49), 0)
 for points in (0, 3):
-    write("saved_state", f"points_{points}", head + struct.pack("<iIQ", 1, points, 0) + struct.pack("<6f", 1, 2, 3, 0, 0, 1) * points)
+    write("saved_state", f"points_{points}", head + struct.pack("<QiIQ", 7, 1, points, 0) + struct.pack("<6f", 1, 2, 3, 0, 0, 1) * points)
 
 # Messages: what each step brings with it is in the target.
 ODOMETRY, STAMP, ARRIVAL, ROTATION, VECTORS, COVARIANCE, OUTSIDE = 1, 2, 4, 8, 16, 32, 64

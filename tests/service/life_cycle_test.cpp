@@ -285,11 +285,45 @@ TEST_F(LifeCycle, StoppedAndKilledInMidDriveItGoesOnWhereTheRobotIs) {
   EXPECT_LT(error_m, 0.1);
 }
 
+/// As when a watchdog has to end it: five seconds later the robot is elsewhere, and its wheels alone know where.
+TEST_F(LifeCycle, StalledForSixSecondsInMidDriveItGoesOnWhereTheWheelsSay) {
+  const std::filesystem::path drive = plant(), file = drive / "config.yaml";
+  auto daemon = std::make_unique<Child>(undisturbed(locusd(file)));
+  Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
+  ASSERT_TRUE(daemon->wait_for_line("DDS is up", seconds{10}));
+  Child play(undisturbed({LOCUS_PLAY, drive.string()}));
+  ASSERT_TRUE(daemon->wait_for_line("tracking", seconds{10}));
+  std::this_thread::sleep_for(seconds{3});
+  daemon->signal(SIGSTOP);
+  std::this_thread::sleep_for(seconds{6});
+  daemon->signal(SIGKILL);
+  ASSERT_TRUE(daemon->wait_for_exit(seconds{1}));
+  daemon = std::make_unique<Child>(undisturbed(locusd(file)));
+  EXPECT_TRUE(daemon->wait_for_line("resumed where the service ended", seconds{5}))
+      << testing::PrintToString(daemon->lines());
+  EXPECT_EQ(status()["beginning"], "map");
+  ASSERT_EQ(play.wait_for_exit(seconds{30}), 0);
+  EXPECT_EQ(listener.lines_of("beginning"),
+            (std::vector<std::string>{"0 7 locusd: beginning", "0 7 locusd: beginning"}));
+
+  const Replay replay({"--quiet", drive.string()});
+  const double error_m = worst_distance_m(replay.trajectory(), heard(listener), shift_of(play));
+  RecordProperty("worst_um", static_cast<int>(1e6 * error_m));
+  EXPECT_LT(error_m, 0.1);
+}
+
 TEST_F(LifeCycle, DamagedStateIsAFreshStart) {
   std::ofstream{file("state")} << "half of a sta";
   Child daemon(undisturbed(locusd(config())));
   EXPECT_TRUE(
       daemon.wait_for_line("a fresh start: " + file("state").string() + ": is cut short or damaged", seconds{3}));
+}
+
+TEST_F(LifeCycle, StateOfAnotherVersionIsAFreshStart) {
+  std::ofstream{file("state")} << "locusd 2 and so on";
+  Child daemon(undisturbed(locusd(config())));
+  EXPECT_TRUE(daemon.wait_for_line("a fresh start: " + file("state").string() + ": was written by another version",
+                                   seconds{3}));
 }
 
 TEST_F(LifeCycle, StateOfAnotherTimeIsAFreshStart) {

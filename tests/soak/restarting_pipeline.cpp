@@ -36,13 +36,13 @@ void RestartingPipeline::begin(Stamp now) {
   daemon::LiveOptions options;
   options.speed = kNoHurry;
   if (auto state = read_state(state_file_, now))
-    options.start = {state->last.carried_to(now), std::move(state->map_odom)};
+    options.start = {state->last, std::move(state->map_odom)};
   options.after_estimate = [this](const Sweep&, const Odometry& odometry, const OdometryEstimate& estimate) {
-    resumed_.store(odometry.resumed(), std::memory_order_relaxed);
+    resumed_.store(estimate.beginning == Beginning::map, std::memory_order_relaxed);
     keeper_->take(odometry, estimate, FlatGround::off);
   };
   resumed_.store(false, std::memory_order_relaxed);
-  keeper_.emplace(state_file_, [](const std::string& problem) { tools::say("soak", problem); });
+  keeper_.emplace(state_file_, config_.motion_sources, [](const std::string& problem) { tools::say("soak", problem); });
   disk_.emplace("disk", std::chrono::milliseconds{10}, [this](bool /*last*/) { keeper_->write(); });
   pipeline_.emplace(config_, tools::value_or_fail(LidarRouter::open(config_.lidars), tools::ExitStatus::failed), input_,
                     std::move(options));
@@ -57,7 +57,7 @@ void RestartingPipeline::end(End how) {
   daemon::IngestReport report;
   report.read(pipeline_->ingest());
   before_ = with(report);
-  const std::optional<daemon::Whereabouts> last = keeper_->now();
+  const std::optional<Whereabouts> last = keeper_->now();
   if (how == End::crash && last)
     wait_for_disk(*last);
   disk_.reset();
@@ -72,7 +72,7 @@ void RestartingPipeline::end(End how) {
 }
 
 /// Who drives a day in minutes outruns the disk, by seconds of stamps when it is busy. A robot does not.
-void RestartingPipeline::wait_for_disk(const daemon::Whereabouts& last) const {
+void RestartingPipeline::wait_for_disk(const Whereabouts& last) const {
   constexpr Duration kPatience = std::chrono::seconds{10};
   const Duration give_up = daemon::read_clock(CLOCK_MONOTONIC) + kPatience;
   while (daemon::read_clock(CLOCK_MONOTONIC) < give_up) {

@@ -58,12 +58,12 @@ void OdometryFiles::write(const OdometryEstimate& estimate) {
       csv_.print(",{}", estimate.pose_covariance(row, column));
   }
   for (std::size_t i = 0; i < source_names_.size(); ++i) {
-    const auto& [innovation, test_ratio, last_used] = estimate.sources[i];
-    for (const double value : innovation.value)
+    const SourceReport& report = estimate.sources[i];
+    for (const double value : report.innovation.value)
       csv_.print(",{}", value);
-    for (const double variance : innovation.variance)
+    for (const double variance : report.innovation.variance)
       csv_.print(",{}", std::sqrt(variance));
-    csv_.print(",{},{}", test_ratio, to_ns(last_used));
+    csv_.print(",{},{}", report.test_ratio, to_ns(report.last_used));
   }
   csv_.print("\n");
 }

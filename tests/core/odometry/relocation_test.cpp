@@ -3,7 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
+#include <deque>
 #include <optional>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "core/odometry/odometry.hpp"
@@ -15,6 +20,7 @@
 namespace locus::test {
 namespace {
 
+using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 /// What one odometry leaves to the next.
@@ -29,14 +35,19 @@ Legacy legacy_of(const Odometry& odometry, const Pose& T_odom_base) {
   return legacy;
 }
 
+RobotSetup robot_of_restarts() {
+  RobotSetup robot;
+  robot.lidars.front().range_noise_m = 0.02;
+  robot.wheels = sim::OdometryFaults{.scale_error = 0.005};
+  robot.imu = sim::ImuFaults{.gyro_noise_radps = 0.002};
+  return robot;
+}
+
 /// A robot whose odometry ends every three seconds, and begins anew with the next sweep.
 class Restarts {
  public:
   Restarts(const sim::Scene& scene, const sim::Trajectory& trajectory, Duration duration) {
-    RobotSetup robot;
-    robot.lidars.front().range_noise_m = 0.02;
-    robot.wheels = sim::OdometryFaults{.scale_error = 0.005};
-    robot.imu = sim::ImuFaults{.gyro_noise_radps = 0.002};
+    const RobotSetup robot = robot_of_restarts();
     options_ = robot.odometry();
     sources_ = robot.motion_sources();
     Odometry odometry(options_, sources_);
@@ -74,15 +85,56 @@ class Restarts {
 
   [[nodiscard]] std::optional<Pose> find(const Sweep& sweep, const Pose& T_odom_expected, const Legacy& legacy) const {
     Odometry odometry(options_, sources_);
-    odometry.begin_at(T_odom_expected, legacy.map_odom);
+    odometry.begin_at({.stamp = sweep.end, .T_odom_base = T_odom_expected}, legacy.map_odom);
     const OdometryEstimate estimate = odometry.process(sweep);
-    return odometry.resumed() ? std::optional{estimate.T_odom_base} : std::nullopt;
+    return estimate.beginning == Beginning::map ? std::optional{estimate.T_odom_base} : std::nullopt;
   }
 
   OdometryOptions options_;
   std::vector<MotionSourceOptions> sources_;
   std::vector<Legacy> legacies_;
 };
+
+/// How a robot goes on that drove unseen for a while.
+struct Gaps {
+  int all = 0;
+  int found = 0, bridged = 0; ///< in the map, or where the wheels say, and there it is: to 50 mm and 2 % of its way
+  int elsewhere = 0;          ///< in the map, and it is not there
+};
+
+/// Every second the odometry ends, and another begins after `gap`.
+Gaps drive_with_gaps(const sim::Scene& scene, const sim::Trajectory& trajectory, Duration gap, bool by_wheels) {
+  const RobotSetup robot = robot_of_restarts();
+  Odometry odometry(robot.odometry(), robot.motion_sources());
+  Whereabouts now;
+  std::deque<std::pair<Whereabouts, std::vector<SurfacePoint>>> ended;
+  Gaps gaps;
+  int sweeps = 0;
+  drive(scene, trajectory, robot, seconds{26}, [&](const Sweep& sweep) {
+    const OdometryEstimate estimate = odometry.process(sweep);
+    odometry.prepare_next();
+    now = now.followed_by(estimate);
+    if (++sweeps % 10 == 0)
+      ended.emplace_back(now, legacy_of(odometry, now.T_odom_base).map_odom);
+    if (ended.empty() || sweep.end - ended.front().first.stamp < gap)
+      return;
+    auto [last, map] = ended.front();
+    ended.pop_front();
+    if (!by_wheels)
+      last.T_source_base = {};
+    Odometry next(robot.odometry(), robot.motion_sources());
+    next.begin_at(last, map);
+    const OdometryEstimate begun = next.process(sweep);
+    const double way_m = (estimate.T_odom_base.translation - last.T_odom_base.translation).norm();
+    const double off_m = (begun.T_odom_base.translation - estimate.T_odom_base.translation).norm();
+    const bool is_there = off_m < 0.05 + 0.02 * way_m;
+    ++gaps.all;
+    gaps.found += begun.beginning == Beginning::map && is_there ? 1 : 0;
+    gaps.bridged += begun.beginning == Beginning::odometry && is_there ? 1 : 0;
+    gaps.elsewhere += begun.beginning == Beginning::map && !is_there ? 1 : 0;
+  });
+  return gaps;
+}
 
 /// Half of what the lidar sees there is far, hidden a moment ago, or moves.
 TEST(Relocation, InAPlantTheRobotIsFoundWhereItIsAndNowhereElse) {
@@ -115,6 +167,84 @@ TEST(Relocation, InABareCorridorTheRobotIsFoundWhereItIsAndNotBesideIt) {
   ASSERT_EQ(restarts.all(), 10U);
   EXPECT_EQ(restarts.found, 10);
   EXPECT_EQ(restarts.found_aside, 0);
+}
+
+/// The watchdog takes six seconds to end a service that hangs, and the robot drives on.
+TEST(Relocation, WheelsBridgeSixSecondsInAPlantATunnelAndABareCorridor) {
+  const sim::World plant = sim::make_urban(1);
+  sim::Dice dice(1);
+  const sim::PlannedCourse planned = plan_course(plant.roads, {1.0, 0.8, 0.5, 1.0, 0.1}, seconds{29}, dice);
+  const sim::Trajectory through_plant(planned.course, planned.start);
+  const sim::Trajectory weaving(sim::weaving_course(seconds{29}, 1.0, 0.3, 12.0), sim::weaving_start(5, 0.3, 12.0));
+  for (const Gaps& gaps : {drive_with_gaps(plant.scene, through_plant, seconds{6}, true),
+                           drive_with_gaps(sim::tunnel(60), weaving, seconds{6}, true),
+                           drive_with_gaps(sim::corridor(60, sim::Walls::bare), weaving, seconds{6}, true)}) {
+    EXPECT_GE(gaps.all, 19);
+    EXPECT_EQ(gaps.found + gaps.bridged, gaps.all);
+    EXPECT_EQ(gaps.elsewhere, 0);
+  }
+}
+
+TEST(Relocation, WithoutWheelsASecondIsBridgedAndSixAreAFreshStart) {
+  const sim::Trajectory weaving(sim::weaving_course(seconds{29}, 1.0, 0.3, 12.0), sim::weaving_start(5, 0.3, 12.0));
+  const sim::Scene tunnel = sim::tunnel(60);
+  const Gaps second = drive_with_gaps(tunnel, weaving, seconds{1}, false);
+  EXPECT_GE(second.found, second.all - 1);
+  EXPECT_EQ(second.elsewhere, 0);
+  EXPECT_EQ(drive_with_gaps(tunnel, weaving, seconds{6}, false).elsewhere, 0);
+}
+
+/// The first two seconds of a robot that drives through a tunnel, and where another run has ended that knows it not.
+class AnotherPlace : public testing::Test {
+ protected:
+  [[nodiscard]] std::vector<OdometryEstimate> go_on_from(const Whereabouts& last,
+                                                         Duration wheels_are_silent_for = {}) const {
+    RobotSetup robot = robot_of_restarts();
+    robot.is_silent = [&](std::size_t source, Stamp now) {
+      return source == 0 && now < trajectory_.start() + wheels_are_silent_for;
+    };
+    Odometry odometry(robot.odometry(), robot.motion_sources());
+    odometry.begin_at(last, wall_);
+    std::vector<OdometryEstimate> estimates;
+    drive(sim::tunnel(60), trajectory_, robot, seconds{2},
+          [&](const Sweep& sweep) { estimates.push_back(odometry.process(sweep)); });
+    return estimates;
+  }
+
+  sim::Trajectory trajectory_{sim::weaving_course(seconds{5}, 1.0, 0.3, 12.0), sim::weaving_start(5, 0.3, 12.0)};
+  std::vector<SurfacePoint> wall_ = std::vector<SurfacePoint>(100, {{40, 0, 0}, {1, 0, 0}});
+  Whereabouts last_{.stamp = trajectory_.start() - seconds{3},
+                    .T_odom_base = {Eigen::Quaterniond::Identity(), {7, 0, 0}}};
+};
+
+TEST_F(AnotherPlace, WheelsSayWhereTheRobotIsAllTheSame) {
+  last_.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {-2, 0, 0}}; // they begin at their origin
+  const OdometryEstimate first = go_on_from(last_).front();
+  EXPECT_EQ(first.beginning, Beginning::odometry);
+  EXPECT_NEAR(first.T_odom_base.translation.x(), 9, 0.2);
+  EXPECT_GT(first.pose_covariance(0, 0), 0.2) << "nothing confirms it";
+}
+
+TEST_F(AnotherPlace, WheelsThatWouldHaveFlownThereWereRestarted) {
+  last_.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {-200, 0, 0}};
+  const OdometryEstimate first = go_on_from(last_).front();
+  EXPECT_EQ(first.beginning, Beginning::origin);
+  EXPECT_EQ(first.T_odom_base.translation.norm(), 0);
+}
+
+TEST_F(AnotherPlace, WheelsAreWaitedForASecondAtTheMost) {
+  last_.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {-2, 0, 0}};
+  for (const auto& [silent_for, waits_at_least, from] :
+       {std::tuple{milliseconds{500}, 3, Beginning::odometry}, std::tuple{milliseconds{5000}, 9, Beginning::origin}}) {
+    const std::vector<OdometryEstimate> estimates = go_on_from(last_, silent_for);
+    const auto begun = std::ranges::find_if(estimates, [](const auto& e) { return e.beginning.has_value(); });
+    ASSERT_NE(begun, estimates.end());
+    EXPECT_GE(begun - estimates.begin(), waits_at_least);
+    EXPECT_LE(begun - estimates.begin(), waits_at_least + 3);
+    EXPECT_EQ(begun->beginning, from);
+    EXPECT_EQ(estimates.front().state, TrackingState::dead_reckoning);
+    EXPECT_EQ(estimates.front().T_odom_base.translation.x(), 7) << "meanwhile it is where it was";
+  }
 }
 
 } // namespace
