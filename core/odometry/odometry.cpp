@@ -137,8 +137,10 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
   gravity_.observe(Eigen::Quaterniond::Identity(), sweep);
   estimate.failed = scan_.size() < kMinPoints || (map_.fine().size() > 0 && !find_again(sweep));
   Whereabouts here;
-  if (start_)
-    here = estimate.failed ? start_->moved_to(start_->places(sweep.end, sweep.motion).front()) : *start_;
+  if (start_ && estimate.failed)
+    here = start_->moved_to(start_->places(sweep.end, sweep.motion, options_.motion.max_speed_mps).front());
+  else if (start_)
+    here = *start_;
   else if (const auto up_base = gravity_.up_base())
     here.T_odom_base.rotation = from_rpy_rad(level_rpy_rad(*up_base));
   filter_.begin(here.T_odom_base, Vector6::Zero(), along_each_axis(options_.motion.max_speed_mps, kUnknownRate_radps),
@@ -156,6 +158,7 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
   estimate.stamp = sweep.end;
   estimate.beginning = beginning_;
   estimate.T_odom_base = here.T_odom_base;
+  estimate.twist_covariance = filter_.covariance().bottomRightCorner<6, 6>();
   estimate.pose_covariance = filter_.pose_covariance_since_start();
   estimate.points = sweep.registered;
   steps_.remember(sweep);
@@ -167,20 +170,20 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
 bool Odometry::find_again(const Sweep& sweep) {
   constexpr Duration kPatience = std::chrono::seconds{1}; ///< publishers find each other faster
   waits_since_ = waits_since_.value_or(sweep.end);
-  if (start_->awaits(sweep.motion) && sweep.end - *waits_since_ < kPatience)
-    return false;
+  const bool waits = start_->awaits(sweep.motion) && std::chrono::abs(sweep.end - *waits_since_) < kPatience;
   const StageScope scope(clock_, Stage::scan_to_submap);
-  const std::vector<Place> places = start_->places(sweep.end, sweep.motion);
+  const std::vector<Place> places = start_->places(sweep.end, sweep.motion, options_.motion.max_speed_mps);
   if (const auto found =
-          relocate(gicp_, std::span(scan_).first(sweep.registered), map_, places, options_.scan_to_submap)) {
+          relocate(gicp_, std::span(scan_).first(sweep.registered), map_, places, options_.scan_to_submap, waits)) {
     beginning_ = Beginning::map;
     start_ = start_->moved_to(*found);
     map_policy_.resume();
     return true;
   }
+  if (waits)
+    return false;
   map_.clear();
-  const double way_m = difference(places.front().T_odom_base, start_->T_odom_base).head<3>().norm();
-  if (places.front().told && way_m <= options_.motion.max_speed_mps * to_seconds(sweep.end - start_->stamp)) {
+  if (places.front().told) {
     beginning_ = Beginning::odometry;
     start_ = start_->moved_to(places.front());
   } else {
@@ -206,7 +209,8 @@ void Odometry::find_start(const Sweep& sweep, const Gicp::StopRequested& stop) {
   const Pose T_odom_first = filter_.pose();
   lidar_health_.learn(start.fit, sweep.registered, steps_.elapsed_s(sweep));
   stands_ = start.rests;
-  filter_.begin(T_odom_first, start.twist_base, stands_ ? along_each_axis(0.1, 1.0) : along_each_axis(1.0, 10.0));
+  filter_.begin(T_odom_first, start.twist_base, stands_ ? along_each_axis(0.1, 1.0) : along_each_axis(1.0, 10.0),
+                start_ ? start_->pose_covariance : Matrix6::Zero());
   correct(first, start.twist_base, start.without);
   map_.clear();
   map_.insert(scan_, T_odom_first);

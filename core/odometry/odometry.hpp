@@ -39,9 +39,9 @@ class Odometry {
                     StageClock* clock = nullptr);
 
   /// Before the first sweep: where the robot was, instead of level at the origin. With surfaces that were seen there
-  /// (odom frame) it is looked for among them, which waits a second at the most for an odometry that can tell how far
-  /// it has come since; where it is not found it begins where such an odometry says, or level at the origin all the
-  /// same.
+  /// (odom frame) it is looked for among them. Where they leave a doubt that waits a second at the most for an odometry
+  /// that can tell how far it has come since; where it is not found it begins where such an odometry says, or level at
+  /// the origin all the same.
   void begin_at(const Whereabouts& last, std::span<const SurfacePoint> map_odom = {});
 
   /// The estimate for the end of the sweep. Never fails: a sweep that cannot be registered yields the prediction,

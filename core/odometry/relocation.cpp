@@ -42,6 +42,12 @@ std::array<Pose, 8> places_around(const Pose& T_odom_place) {
   return places;
 }
 
+/// Whether the surfaces alone tell where it is, along each axis. Where they do not it lies wherever it was laid.
+bool is_pinned(const Registration& fit) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(fit.information.topLeftCorner<3, 3>());
+  return axes.eigenvalues().minCoeff() > 1.0 / (kVouched_m * kVouched_m);
+}
+
 bool is_within(double distance_m, const Pose& T_odom_a, const Pose& T_odom_b) {
   return (T_odom_a.translation - T_odom_b.translation).norm() < distance_m; // false for NaN
 }
@@ -69,31 +75,41 @@ bool Whereabouts::awaits(const SensedMotion& sensed) const {
   bool awaits = false;
   for (std::size_t i = 0; i < kMaxSources; ++i)
     if (T_source_base[i]) {
-      if (sensed.sources[i].known)
+      if (sensed.sources[i].usable)
         return false;
       awaits = true;
     }
   return awaits;
 }
 
-std::vector<Place> Whereabouts::places(Stamp now, const SensedMotion& sensed) const {
+std::vector<Pose> Whereabouts::way(Stamp now) const {
   constexpr double kApart_m = 0.6, kTurnLever_m = 2.0; // so that one of them is near wherever it came to rest
-  constexpr double kMost = 16;
-  std::vector<Place> places;
-  const auto add = [&](const Pose& place) {
-    const Vector6 sigma = kSigma + difference(place, T_odom_base).cwiseAbs();
-    places.push_back({place, sigma.cwiseAbs2().asDiagonal(), false});
-  };
-  for (std::size_t i = 0; i < kMaxSources; ++i)
-    if (T_source_base[i] && sensed.sources[i].known)
-      places.push_back({T_odom_base * T_source_base[i]->inverse() * sensed.sources[i].T_source_base,
-                        kSigma.cwiseAbs2().asDiagonal(), true});
-  add(carried_to(now));
+  constexpr int kMost = 16;
   const double elapsed_s = std::max(0.0, to_seconds(now - stamp));
   const double apart_s =
       kApart_m / std::max(1e-3, twist_base.head<3>().norm() + kTurnLever_m * twist_base.tail<3>().norm());
-  for (double place = 0; place < std::min(kMost, elapsed_s / apart_s); ++place)
-    add(T_odom_base * se3_exp(place * apart_s * twist_base));
+  std::vector<Pose> way{carried_to(now)};
+  for (int i = 0; i < kMost && i * apart_s < elapsed_s; ++i)
+    way.push_back(T_odom_base * se3_exp(i * apart_s * twist_base));
+  return way;
+}
+
+std::vector<Place> Whereabouts::places(Stamp now, const SensedMotion& sensed, double max_speed_mps) const {
+  const std::vector<Pose> unseen = way(now);
+  std::vector<Place> places;
+  const auto add = [&](const Pose& place, const Pose& expected, bool told) {
+    const Vector6 sigma = kSigma + difference(place, expected).cwiseAbs();
+    places.push_back({place, sigma.cwiseAbs2().asDiagonal(), told});
+  };
+  for (std::size_t i = 0; i < kMaxSources; ++i)
+    if (T_source_base[i] && sensed.sources[i].usable) {
+      const Pose place = T_odom_base * T_source_base[i]->inverse() * sensed.sources[i].T_source_base;
+      const auto way_m = [&](const Pose& from) { return (place.translation - from.translation).norm(); };
+      if (way_m(T_odom_base) <= max_speed_mps * to_seconds(now - stamp))
+        add(place, *std::ranges::min_element(unseen, {}, way_m), true);
+    }
+  for (const Pose& place : unseen)
+    add(place, T_odom_base, false);
   return places;
 }
 
@@ -102,7 +118,7 @@ Whereabouts Whereabouts::moved_to(const Place& place) const {
 }
 
 std::optional<Place> relocate(Gicp& gicp, std::span<const SurfacePoint> scan_base, const SurfaceMap& map_odom,
-                              std::span<const Place> expected, const RegistrationOptions& options) {
+                              std::span<const Place> expected, const RegistrationOptions& options, bool beyond_doubt) {
   struct Found {
     double share = 0.0; ///< of the points, with a correspondence
     Registration fit{};
@@ -116,7 +132,7 @@ std::optional<Place> relocate(Gicp& gicp, std::span<const SurfacePoint> scan_bas
     const Registration fit =
         gicp.align({scan_base}, map_odom, place.T_odom_base, prior, options, true, [] { return false; });
     return Found{static_cast<double>(fit.inliers) / static_cast<double>(scan_base.size()), fit, place.covariance,
-                 place.told && is_within(kVouched_m, fit.T_target_source, place.T_odom_base)};
+                 place.told && is_within(kVouched_m, fit.T_target_source, place.T_odom_base) && is_pinned(fit)};
   };
   std::vector<Found> all;
   Found here;
@@ -130,7 +146,7 @@ std::optional<Place> relocate(Gicp& gicp, std::span<const SurfacePoint> scan_bas
     return std::nullopt;
   for (const Pose& T_odom_beside : places_around(here.fit.T_target_source))
     all.push_back(lay({T_odom_beside, Matrix6::Zero()}));
-  const double least = here.vouched ? kHardlyLess : least_ratio(here.share);
+  const double least = here.vouched ? kHardlyLess : beyond_doubt ? kClearlyMore : least_ratio(here.share);
   for (const Found& other : all)
     if (!is_within(kFarthest_m, other.fit.T_target_source, here.fit.T_target_source) &&
         here.share < least * other.share)

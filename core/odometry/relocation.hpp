@@ -41,23 +41,29 @@ struct Whereabouts {
   /// Whether an odometry is yet to be heard that could tell where the robot is.
   [[nodiscard]] bool awaits(const SensedMotion& sensed) const;
 
-  /// Where the robot may be at `now`, the likeliest first: as the odometries say, carried on, and wherever on its way
-  /// it may have come to rest.
-  [[nodiscard]] std::vector<Place> places(Stamp now, const SensedMotion& sensed) const;
+  /// Where it may be at `now` without a word of an odometry: carried on, and wherever on its way it may have come to
+  /// rest.
+  [[nodiscard]] std::vector<Pose> way(Stamp now) const;
+
+  /// Where it may be at `now`, the likeliest first: as the odometries say that it may have reached, and on its way. The
+  /// farther an odometry says that it left its way, the less sure that is: whoever sends it may have been restarted.
+  [[nodiscard]] std::vector<Place> places(Stamp now, const SensedMotion& sensed, double max_speed_mps) const;
 
   /// At one of them, as far as anybody knows then.
   [[nodiscard]] Whereabouts moved_to(const Place& place) const;
 };
 
 /// Where a sweep lies in a map that another run has left behind: within half a metre of one of the places `expected`,
-/// the likeliest first, or nowhere. An odometry that it agrees with to a decimetre vouches for a place.
+/// the likeliest first, or nowhere. An odometry vouches for a place where surfaces that tell of every axis agree with
+/// it to a decimetre.
 ///
 /// How much of a sweep finds a correspondence is a matter of the place: nine tenths in a tunnel, half where much is far
 /// or hidden. So it is compared with what it finds two metres away on every side, and at the other places. The less of
 /// the place is known, the clearer it must fit better, unless an odometry vouches for it; one of which most is known
 /// may be a corridor, which looks the same two metres on, and need only fit hardly less. Of places that fit alike the
-/// likelier is taken. Any thread, one at a time for a Gicp.
+/// likelier is taken. `beyond_doubt`: it must fit clearly better however much is known. Any thread, one at a time for a
+/// Gicp.
 std::optional<Place> relocate(Gicp& gicp, std::span<const SurfacePoint> scan_base, const SurfaceMap& map_odom,
-                              std::span<const Place> expected, const RegistrationOptions& options);
+                              std::span<const Place> expected, const RegistrationOptions& options, bool beyond_doubt);
 
 } // namespace locus

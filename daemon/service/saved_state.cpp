@@ -118,9 +118,10 @@ bool makes_sense(const SavedState& state) {
   const auto is_sound = [](const Pose& pose) {
     return pose.rotation.norm() > 0.5 && pose.translation.norm() < kFarthest_m; // false for NaN
   };
-  const Matrix6& covariance = state.last.pose_covariance;
-  return is_sound(state.last.carried_to(Stamp::max())) && covariance.norm() < kFarthest_m &&
-         (covariance.selfadjointView<Eigen::Lower>().eigenvalues().array() > -kRounding).all() &&
+  const Matrix6& covariance = state.last.pose_covariance; // after minutes of dead reckoning it may be of any size
+  const double size = covariance.norm();
+  return is_sound(state.last.carried_to(Stamp::max())) && std::isfinite(size) &&
+         (covariance.selfadjointView<Eigen::Lower>().eigenvalues().array() > -kRounding * (1.0 + size)).all() &&
          std::ranges::all_of(state.last.T_source_base, [&](const auto& pose) { return !pose || is_sound(*pose); }) &&
          std::ranges::all_of(state.map_odom, [](const SurfacePoint& point) {
            return point.position_m.cast<double>().norm() < kFarthest_m && point.normal.allFinite();

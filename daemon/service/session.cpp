@@ -141,6 +141,7 @@ std::optional<std::string> Session::reset(std::optional<Pose> T_odom_base) {
     start_ = {{Stamp{read_clock(CLOCK_REALTIME)}, *T_odom_base}, flat_ground(), {}};
   state_.begin_anew(start_);
   has_past_ = announced_ = false;
+  announcement_.reset();
   begin(std::move(*lidars));
   log_.info("odometry begins anew, as it was told to");
   return std::nullopt;

@@ -104,7 +104,7 @@ TEST_F(Recording, ReplayIsWhatTheServiceComputed) {
   const Replay replay({"--quiet", file("record").string()});
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
   EXPECT_EQ(replay.run().err, "");
-  const json packets_of_replay = replay.summary()["packets"];
+  const nlohmann::json packets_of_replay = replay.summary()["packets"];
   EXPECT_EQ(packets_of_replay.size(), 3U) << "two lidars and the total";
   for (const auto& [name, packets] : packets_of_replay.items())
     EXPECT_EQ(packets["data"], status["packets"][name]["data"]) << name;

@@ -126,6 +126,17 @@ TEST_F(Keeper, SweepThatLiesAskewCarriesNobodyAway) {
   EXPECT_LT(keeper_.now()->carried_to(later).translation.norm(), 0.5) << "and of one that is not";
 }
 
+TEST_F(Keeper, MinutesOfDeadReckoningAreNoDamage) {
+  SavedState state;
+  state.last.pose_covariance = Vector6(1e12, 1e12, 1e12, 1, 1, 1).asDiagonal();
+  state.last.pose_covariance(0, 1) = state.last.pose_covariance(1, 0) = 1e12 * (1 + 1e-9); // as rounding leaves it
+  ASSERT_FALSE(write_state(file_, state));
+  ASSERT_TRUE(load_state(file_));
+  state.last.pose_covariance(0, 1) = state.last.pose_covariance(1, 0) = 2e12;
+  ASSERT_FALSE(write_state(file_, state));
+  EXPECT_FALSE(load_state(file_)) << "no covariance is like that";
+}
+
 TEST_F(Keeper, EveryDamagedByteIsNoticed) {
   SavedState state;
   state.last.T_source_base[1] = Pose{};

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <deque>
 #include <optional>
 #include <tuple>
@@ -219,10 +220,12 @@ class AnotherPlace : public testing::Test {
 
 TEST_F(AnotherPlace, WheelsSayWhereTheRobotIsAllTheSame) {
   last_.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {-2, 0, 0}}; // they begin at their origin
-  const OdometryEstimate first = go_on_from(last_).front();
-  EXPECT_EQ(first.beginning, Beginning::odometry);
-  EXPECT_NEAR(first.T_odom_base.translation.x(), 9, 0.2);
-  EXPECT_GT(first.pose_covariance(0, 0), 0.2) << "nothing confirms it";
+  const std::vector<OdometryEstimate> estimates = go_on_from(last_);
+  EXPECT_EQ(estimates.front().beginning, Beginning::odometry);
+  EXPECT_NEAR(estimates.front().T_odom_base.translation.x(), 9, 0.2);
+  for (const OdometryEstimate& estimate : estimates)
+    EXPECT_GT(estimate.pose_covariance(0, 0), 2.0 * 2.0) << "nothing confirms it, and the robot had been at rest";
+  EXPECT_GT(estimates.front().twist_covariance(0, 0), 1.0) << "nobody has seen it move yet";
 }
 
 TEST_F(AnotherPlace, WheelsThatWouldHaveFlownThereWereRestarted) {
@@ -230,6 +233,58 @@ TEST_F(AnotherPlace, WheelsThatWouldHaveFlownThereWereRestarted) {
   const OdometryEstimate first = go_on_from(last_).front();
   EXPECT_EQ(first.beginning, Beginning::origin);
   EXPECT_EQ(first.T_odom_base.translation.norm(), 0);
+}
+
+TEST_F(AnotherPlace, OneOfTwoOdometriesThatWasRestartedIsPassedOver) {
+  last_.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {-200, 0, 0}};
+  last_.T_source_base[2] = Pose{Eigen::Quaterniond::Identity(), {-2, 0, 0}};
+  SensedMotion sensed;
+  sensed.sources[0].usable = sensed.sources[2].usable = true;
+  const std::vector<Place> places = last_.places(last_.stamp + seconds{3}, sensed, 10);
+  EXPECT_TRUE(places.front().told);
+  EXPECT_NEAR(places.front().T_odom_base.translation.x(), 9, 1e-9);
+  EXPECT_FALSE(places[1].told);
+}
+
+TEST_F(AnotherPlace, OdometryThatIsNotHealthyIsAwaited) {
+  SensedMotion sensed;
+  EXPECT_FALSE(last_.awaits(sensed)) << "there was none";
+  last_.T_source_base[0] = Pose{};
+  sensed.sources[0].known = true;
+  EXPECT_TRUE(last_.awaits(sensed));
+  sensed.sources[0].usable = true;
+  EXPECT_FALSE(last_.awaits(sensed));
+}
+
+/// Their driver begins at an origin that is no farther away than the robot may have come.
+TEST(Relocation, InABareCorridorTheSigmaHoldsWhatRestartedWheelsGetWrong) {
+  const sim::Trajectory weaving(sim::weaving_course(seconds{15}, 1.0, 0.3, 12.0), sim::weaving_start(5, 0.3, 12.0));
+  const RobotSetup robot = robot_of_restarts();
+  Odometry odometry(robot.odometry(), robot.motion_sources());
+  std::optional<Odometry> next;
+  Whereabouts last;
+  double worst_sigma = 0;
+  int begun = 0;
+  drive(sim::corridor(60, sim::Walls::bare), weaving, robot, seconds{12}, [&](const Sweep& sweep) {
+    const OdometryEstimate truth = odometry.process(sweep);
+    odometry.prepare_next();
+    if (to_seconds(sweep.end - weaving.start()) < 8) {
+      last = last.followed_by(truth);
+    } else {
+      if (!next) {
+        last.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {2.5, 0, 0}} * *last.T_source_base[0];
+        last.stamp -= seconds{3}; // more than that is within what a robot is able to
+        next.emplace(robot.odometry(), robot.motion_sources());
+        next->begin_at(last, legacy_of(odometry, last.T_odom_base).map_odom);
+      }
+      const OdometryEstimate estimate = next->process(sweep);
+      begun += estimate.beginning ? 1 : 0;
+      const Vector6 error = difference(estimate.T_odom_base, truth.T_odom_base);
+      worst_sigma = std::max(worst_sigma, std::abs(error.x()) / std::sqrt(estimate.pose_covariance(0, 0)));
+    }
+  });
+  EXPECT_GT(begun, 30);
+  EXPECT_LT(worst_sigma, 3);
 }
 
 TEST_F(AnotherPlace, WheelsAreWaitedForASecondAtTheMost) {
