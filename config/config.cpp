@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <filesystem>
 #include <map>
 #include <set>
 #include <string_view>
@@ -134,6 +135,9 @@ void check_record(Problems& problems, const Config& config) {
     problems.require(sources[i].kind == SourceKind::imu || (sources[i].name != "gt" && sources[i].name != "imu"),
                      item("motion_sources", i, "name"),
                      fmt::format("{}.tum has another meaning in a recording; rename the source", sources[i].name));
+  const std::filesystem::path folder = config.record.folder;
+  problems.require(std::ranges::find(folder, "..") == folder.end(), "record.folder",
+                   "must not lead out of the folder it lies in; write the whole path, without '..'");
   problems.require_range<std::uint64_t>("record.max_bytes", config.record.max_bytes, 10'000'000, 1'000'000'000'000'000);
 }
 
@@ -141,6 +145,8 @@ void check_record(Problems& problems, const Config& config) {
 
 std::optional<std::string> Config::problem() const {
   Problems problems;
+  problems.require(version == kVersion, "version",
+                   fmt::format("this locusd reads version {}; look for what has changed in its manual", kVersion));
   check_names(problems, *this);
   check_lidars(problems, lidars);
   check_sources(problems, *this);

@@ -56,7 +56,10 @@ struct RecordOptions {
 /// All that can be set: the options of every module, as one file describes them. Any thread may read it.
 struct Config {
   static constexpr std::size_t kMaxLidars = 16;
+  static constexpr int kVersion = 1;
 
+  int version = kVersion; ///< of the keys and what they mean
+  bool defaults = false;  ///< a service may run without a word about its lidars
   std::vector<LidarOptions> lidars{LidarOptions{}}; ///< the first one gives the sweep its period
   std::vector<MotionSource> motion_sources{{{"wio", SourceKind::odometry, {}}, "/wheel_odometry", ""},
                                            {{"imu", SourceKind::imu, {}}, "/imu/data", ""}}; ///< highest priority first

@@ -171,6 +171,8 @@ template <class Section> void fields(Section& section, RecordOptions& options) {
 }
 
 template <class Section> void fields(Section& section, Config& config) {
+  section.key("version", config.version);
+  section.key("defaults", config.defaults);
   section.key("lidars", config.lidars);
   section.key("motion_sources", config.motion_sources);
   fields(section, config.sweep);

@@ -339,6 +339,19 @@ std::optional<Mistake> second_document(const std::string& yaml) {
                      : "a second YAML document begins; keep one, and begin every top-level key in the first column"};
 }
 
+Expected<std::string, ConfigErrors> text_of(const std::filesystem::path& file) {
+  constexpr std::streamsize kMaxBytes = 1 << 20;
+  std::string text(kMaxBytes + 1, '\0');
+  std::ifstream stream{file, std::ios::binary};
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (stream.bad() || (stream.gcount() == 0 && !stream.eof()))
+    return ConfigErrors{error_line(file.string(), "cannot be read; give a YAML file that exists and may be read")};
+  if (stream.gcount() > kMaxBytes)
+    return ConfigErrors{error_line(file.string(), "is longer than 1 MiB; this is no configuration")};
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  return text;
+}
+
 } // namespace
 
 Expected<Config, ConfigErrors> parse_config(const std::string& yaml, const std::string& origin) {
@@ -368,16 +381,20 @@ Expected<Config, ConfigErrors> parse_config(const std::string& yaml, const std::
 }
 
 Expected<Config, ConfigErrors> load_config(const std::filesystem::path& file) {
-  constexpr std::streamsize kMaxBytes = 1 << 20;
-  std::string text(kMaxBytes + 1, '\0');
-  std::ifstream stream{file, std::ios::binary};
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (stream.bad() || (stream.gcount() == 0 && !stream.eof()))
-    return ConfigErrors{error_line(file.string(), "cannot be read; give a YAML file that exists and may be read")};
-  if (stream.gcount() > kMaxBytes)
-    return ConfigErrors{error_line(file.string(), "is longer than 1 MiB; this is no configuration")};
-  text.resize(static_cast<std::size_t>(stream.gcount()));
-  return parse_config(text, file.string());
+  const auto text = text_of(file);
+  return text ? parse_config(*text, file.string()) : text.error();
+}
+
+Expected<Config, ConfigErrors> load_service_config(const std::filesystem::path& file) {
+  const auto text = text_of(file);
+  if (!text)
+    return text.error();
+  Expected<Config, ConfigErrors> config = parse_config(*text, file.string());
+  if (config && !config->defaults && !YAML::Load(*text)["lidars"])
+    return ConfigErrors{error_line(at_line(file.string(), 1),
+                                   "names no lidar; if it is not cut short, name those of the robot (lidars:), or write "
+                                   "'defaults: true' for one VLP-16 in the middle of the robot")};
+  return config;
 }
 
 Expected<Config, ConfigErrors> override_config(const Config& config, std::span<const std::string> assignments) {

@@ -16,6 +16,7 @@ constexpr Duration kMaxLate = std::chrono::seconds{1}; ///< behind it: no networ
 constexpr int kMaxReplaySpeed = 10; ///< sensor time per time of reception, where only `sensor` counts
 constexpr int kMaxLiveSpeed = 2;    ///< the same, of packets that no network holds up
 constexpr int kProofOfStep = 5;
+constexpr Duration kSilence = std::chrono::minutes{1}; ///< a lidar was off, or the host's clock was set
 
 constexpr Duration kEnvelopeSpan = milliseconds{500};
 constexpr Duration kSettling = std::chrono::seconds{1};
@@ -37,6 +38,8 @@ Duration nearest_hour(Duration time, Duration target) {
 } // namespace
 
 std::optional<SensorClock::Reading> SensorClock::read(Duration time_of_hour, Duration until_sent, Stamp receive) {
+  if (anchored_ && receive - latest_receive_ > kSilence)
+    anchored_ = false;
   const Duration sensor_time = anchored_ ? unwrap(time_of_hour, receive) : time_of_hour;
   if (!anchored_ || !follows(sensor_time, until_sent, receive)) {
     const bool late = mode_ != LidarTime::sensor && lateness(sensor_time, until_sent, receive) > kMaxLate;

@@ -24,7 +24,9 @@ namespace locus {
 /// A time that does not follow from the ones before is refused. When five in a row follow from each other instead, the
 /// clock was set: a step, counted, and time goes on from there. Packets that come late must come at the pace of a clock
 /// for that, not all at once from where a network held them up. A drift that the envelope cannot be followed at (error
-/// beyond 5 ms) is a step too. Time of hour wraps every hour, unnoticed. Reads no clock, allocates nothing. One owner.
+/// beyond 5 ms) is a step too. After a minute of silence it begins anew: what a lidar that was off did not send is not
+/// lost, and a host's clock that was set by a whole hour looks the same. Time of hour wraps every hour, unnoticed. Reads
+/// no clock, allocates nothing. One owner.
 class SensorClock {
  public:
   /// One packet's place in time.

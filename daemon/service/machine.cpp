@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <map>
 #include <utility>
 
@@ -58,7 +59,7 @@ Expected<std::vector<UdpSocket>, std::string> open_lidar_sockets(const Config& c
           fmt::format("systemd listens to UDP port {}, but no lidar of the configuration sends there", socket->port()));
   }
   for (const auto& [port, needed] : ports) {
-    auto socket = UdpSocket::open(port);
+    auto socket = needed ? UdpSocket::open(port) : UdpSocket::open_beside_others(port);
     if (socket)
       sockets.push_back(std::move(*socket));
     else if (needed)
@@ -119,6 +120,18 @@ std::optional<std::string> raise_priority(int fifo_priority) {
   if (fifo_priority == 0 || sched_setscheduler(0, SCHED_FIFO, &wanted) == 0)
     return std::nullopt;
   return refused("realtime.priority", "grant it as /usr/share/doc/locusd/examples/realtime.conf does");
+}
+
+std::string scheduling() {
+  sched_param parameters{};
+  if (sched_getscheduler(0) == SCHED_FIFO && sched_getparam(0, &parameters) == 0)
+    return fmt::format("real-time priority {}", parameters.sched_priority);
+  std::string text = fmt::format("ordinary scheduling, nice {}", getpriority(PRIO_PROCESS, 0));
+  std::string group, weight;
+  std::getline(std::ifstream{"/proc/self/cgroup"}, group);
+  if (group.starts_with("0::") && std::getline(std::ifstream{"/sys/fs/cgroup" + group.substr(3) + "/cpu.weight"}, weight))
+    text += ", CPU weight " + weight;
+  return text;
 }
 
 void take_least_priority() {

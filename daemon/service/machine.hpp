@@ -33,6 +33,9 @@ std::optional<std::string> keep_to_cpus(const std::vector<int>& cpus);
 /// Of the calling thread, and of those that it will make: TBB's helpers have the priority of the thread they help.
 std::optional<std::string> raise_priority(int fifo_priority);
 
+/// What is in force of it, and of what the service's unit gives, for the calling thread. For a line of the log.
+std::string scheduling();
+
 /// Of the calling thread: it waits for all others.
 void take_least_priority();
 

@@ -43,7 +43,7 @@ int open_signals() {
 Expected<Config, ConfigErrors> read_config(const std::filesystem::path& file) {
   Expected<Config, ConfigErrors> config = Config{};
   if (!file.empty())
-    config = load_config(file);
+    config = load_service_config(file);
   if (!config)
     return config;
   if (const auto lidars = LidarRouter::open(config->lidars); !lidars)

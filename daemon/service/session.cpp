@@ -68,6 +68,8 @@ void Session::begin(LidarRouter lidars) {
   options.on_thread_start = [this] {
     if (const auto problem = raise_priority(config_.realtime.priority))
       log_.warn(*problem);
+    if (!scheduling_told_.exchange(true))
+      log_.info("runs with " + scheduling());
   };
   options.after_estimate = [this](const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
     after(sweep, odometry, estimate);

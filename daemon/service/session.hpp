@@ -97,6 +97,7 @@ class Session {
   std::mutex pipeline_mutex_; ///< of those who change pipeline_ and the thread of the link
   bool has_past_ = false;     ///< a map that another run has left
   bool announced_ = false;
+  std::atomic<bool> scheduling_told_ = false;
   std::optional<Diagnostic> announcement_; ///< that DDS has not taken yet
   struct Map {
     std::uint64_t request = 0;

@@ -30,6 +30,10 @@ class UdpSocket {
   /// Listens to `port` on every interface. Fails with one line for the user.
   static Expected<UdpSocket, std::string> open(std::uint16_t port);
 
+  /// As open(), beside sockets of other programs of the same user that do so, too. Each of them gets what is broadcast;
+  /// what is sent to this host alone one of them gets.
+  static Expected<UdpSocket, std::string> open_beside_others(std::uint16_t port);
+
   /// Takes over a socket that somebody else has bound, e.g. systemd. Fails with one line for the user.
   static Expected<UdpSocket, std::string> adopt(int descriptor);
 
@@ -61,6 +65,7 @@ class UdpSocket {
   struct Batch;
 
   explicit UdpSocket(int descriptor);
+  static Expected<UdpSocket, std::string> open(std::uint16_t port, bool beside_others);
   std::optional<std::string> prepare();
   void count_drops();
 

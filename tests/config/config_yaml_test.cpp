@@ -14,8 +14,10 @@
 namespace locus {
 namespace {
 
-/// Every key with another value than it has in kBase.
+/// Every key with another value than it has in kBase, but for the version, of which there is one.
 const std::string kAllChanged = R"(
+version: 1
+defaults: true
 lidars:
   - {name: top, model: HDL-32E, port: 2400, source_ip: 192.168.1.201, multicast_ip: 239.1.2.3, time: sensor, calibration: "a, b}: #\n", T_base_lidar: {xyz_m: [0.1, -2e-07, 3], rpy_deg: [1, 30, -179.5]}}
 motion_sources:
@@ -98,7 +100,7 @@ TEST(ConfigYaml, EveryKeyAloneChangesItselfAndNothingElse) {
     return path.ends_with("use_acceleration") || path.find("T_base_source") != std::string::npos;
   };
   for (const auto& [path, value] : base_leaves) {
-    if (path.starts_with("motion_sources.0.") && is_of_an_imu(path))
+    if (path == "version" || (path.starts_with("motion_sources.0.") && is_of_an_imu(path)))
       continue; // kAllChanged has an odometry there
     const bool needs_an_imu = path.starts_with("motion_sources.1.") && is_of_an_imu(path);
     const Config start = needs_an_imu ? with(base, {"motion_sources.1.kind=imu"}) : base;
@@ -332,6 +334,34 @@ TEST(ConfigYaml, FileThatCannotBeReadIsNamed) {
 TEST(ConfigYaml, FileGivesWhatItsTextGives) {
   const test::TemporaryFile file{"robot.yaml", test::bytes_of(kAllChanged)};
   EXPECT_EQ(valid(load_config(file.path())), valid(parse_config(kAllChanged, "")));
+}
+
+TEST(ConfigYaml, FileForTheServiceNamesALidarOrSaysThatItNeedNot) {
+  const auto errors_of_file = [](const std::string& text) {
+    return errors_of(load_service_config(test::TemporaryFile{"robot.yaml", test::bytes_of(text)}.path()));
+  };
+  for (const char* text : {"", "# locusd.yaml\n", "version: 1\n", "dds: {interface: eth0}\n", "defaults: false\n"}) {
+    const ConfigErrors errors = errors_of_file(text);
+    ASSERT_EQ(errors.size(), 1U) << text;
+    EXPECT_NE(errors[0].find("robot.yaml:1: names no lidar"), std::string::npos) << errors[0];
+  }
+  EXPECT_EQ(errors_of_file("lidars: [{}]\n"), ConfigErrors{});
+  EXPECT_EQ(errors_of_file("defaults: true\n"), ConfigErrors{});
+  EXPECT_EQ(errors_of_file(kAllChanged), ConfigErrors{});
+  EXPECT_NE(errors_of_file("threads: 0\n").at(0).find("threads"), std::string::npos) << "what is wrong comes first";
+  EXPECT_FALSE(load_service_config("/nowhere/robot.yaml"));
+}
+
+TEST(ConfigYaml, AnotherVersionIsRefused) {
+  ASSERT_EQ(errors_in("version: 2\n").size(), 1U);
+  EXPECT_TRUE(errors_in("version: 2\n")[0].starts_with("robot.yaml:1: version: this locusd reads version 1"));
+}
+
+TEST(ConfigYaml, RecordingDoesNotLeaveItsFolder) {
+  for (const char* folder : {"../../etc", "runs/../../etc", "..", "/var/lib/../etc"})
+    EXPECT_EQ(errors_in(std::string{"record: {folder: "} + folder + "}\n").size(), 1U) << folder;
+  for (const char* folder : {"record", "/data/drives", "a..b", "runs/today"})
+    EXPECT_EQ(errors_in(std::string{"record: {folder: "} + folder + "}\n").size(), 0U) << folder;
 }
 
 TEST(ConfigOverride, ListItemsAreFoundByNameAndByIndex) {

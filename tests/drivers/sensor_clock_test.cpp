@@ -115,6 +115,25 @@ TEST(SensorClock, FewHoursOfSilenceAreNoStep) {
   EXPECT_EQ(clock.steps(), 0U);
 }
 
+/// To a lidar's clock that is an hour of silence, of which nothing tells how many packets would have come.
+TEST(SensorClock, HostsClockThatIsSetByAnHourIsNoGap) {
+  for (const LidarTime mode : {LidarTime::receive, LidarTime::sensor}) {
+    for (const Duration step : {Duration{hours{1}}, Duration{-hours{1}}}) {
+      SensorClock clock{mode};
+      Link link;
+      for (int i = 0; i < 1000; ++i)
+        link.send(clock);
+      link.now += step;
+      Duration most{};
+      for (int i = 0; i < 10; ++i, link.now += kPacket)
+        if (const auto reading = clock.read(link.time_of_hour(), kPacket, link.now + kPacket))
+          most = std::max(most, reading->continuous ? reading->advance : Duration{});
+      EXPECT_LE(most, 10 * kPacket) << to_seconds(step);
+      EXPECT_LE(clock.steps(), 1U);
+    }
+  }
+}
+
 TEST(SensorClock, SensorTimeIsTakenAsTrueWithTheHourOfReception) {
   SensorClock clock{LidarTime::sensor};
   Link link{.sensor_ahead = milliseconds{368}};

@@ -25,6 +25,8 @@ class UdpSender {
     EXPECT_EQ(bind(socket_, reinterpret_cast<const sockaddr*>(&from), sizeof(from)), 0);
     in_addr loopback{htonl(INADDR_LOOPBACK)};
     setsockopt(socket_, IPPROTO_IP, IP_MULTICAST_IF, &loopback, sizeof(loopback));
+    const int allowed = 1;
+    setsockopt(socket_, SOL_SOCKET, SO_BROADCAST, &allowed, sizeof(allowed));
   }
   ~UdpSender() { close(socket_); }
   UdpSender(const UdpSender&) = delete;

@@ -96,6 +96,19 @@ TEST(UdpSocket, PortThatIsTakenIsSaid) {
   EXPECT_NE(second.error().find("another program listens there"), std::string::npos) << second.error();
 }
 
+/// As two instances of the service hear the position packets of lidars that broadcast.
+TEST(UdpSocket, OfTwoBesideEachOtherEachHearsABroadcast) {
+  constexpr std::uint32_t kEverybody = 0x7FFF'FFFF; // 127.255.255.255
+  auto first = UdpSocket::open_beside_others(0);
+  ASSERT_TRUE(first) << first.error();
+  auto second = UdpSocket::open_beside_others(first->port());
+  ASSERT_TRUE(second) << second.error();
+  EXPECT_FALSE(UdpSocket::open(first->port())) << "who wants it alone is not let in";
+  UdpSender().send(first->port(), test::bytes_of("to everybody"), kEverybody);
+  EXPECT_EQ(first->receive().size(), 1U);
+  EXPECT_EQ(second->receive().size(), 1U);
+}
+
 TEST(UdpSocket, TakesOverWhatIsBoundToBothFamilies) {
   const int both = ::socket(AF_INET6, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   sockaddr_in6 any{};

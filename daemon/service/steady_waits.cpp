@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cyclone DDS 0.10 waits until a time of the wall clock. Where that is set back by an hour each such wait takes an hour
+// longer, and with it all that DDS does by itself: heartbeats, discovery, what our own thread waits for. (Later versions
+// wait on the monotonic clock; this file goes when Debian has one.) So the process has this function in place of the C
+// library's: it waits for as long as was meant when the wait began.
+#include <algorithm>
+#include <ctime>
+
+#include <pthread.h>
+
+#include "daemon/machine_time.hpp"
+
+#if defined(__has_feature)
+#if __has_feature(thread_sanitizer)
+#define LOCUS_WAITS_ARE_WATCHED // by a function of the sanitizer's, in the same place
+#endif
+#endif
+
+#ifndef LOCUS_WAITS_ARE_WATCHED
+
+/// Of the two clocks that a wait may be for it is the nearer one; libraries differ.
+extern "C" int pthread_cond_timedwait(pthread_cond_t* condition, pthread_mutex_t* mutex, const timespec* until) {
+  using namespace locus;
+  constexpr std::time_t kNever = 5'000'000'000; // in 2128; in nanoseconds it fits
+  const Duration end = std::chrono::seconds{std::min(until->tv_sec, kNever)} + Duration{until->tv_nsec};
+  const Duration steady_now = daemon::read_clock(CLOCK_MONOTONIC), wall_now = daemon::read_clock(CLOCK_REALTIME);
+  const Duration by_wall = end - wall_now, by_steady = end - steady_now;
+  const bool is_wall = std::chrono::abs(by_wall) < std::chrono::abs(by_steady);
+  const timespec steady_end = daemon::to_timespec(steady_now + (is_wall ? by_wall : by_steady));
+  return pthread_cond_clockwait(condition, mutex, CLOCK_MONOTONIC, &steady_end);
+}
+
+#endif
