@@ -391,9 +391,10 @@ Expected<Config, ConfigErrors> load_service_config(const std::filesystem::path& 
     return text.error();
   Expected<Config, ConfigErrors> config = parse_config(*text, file.string());
   if (config && !config->defaults && !YAML::Load(*text)["lidars"])
-    return ConfigErrors{error_line(at_line(file.string(), 1),
-                                   "names no lidar; if it is not cut short, name those of the robot (lidars:), or write "
-                                   "'defaults: true' for one VLP-16 in the middle of the robot")};
+    return ConfigErrors{
+        error_line(at_line(file.string(), 1),
+                   "names no lidar; if it is not cut short, name those of the robot (lidars:), or write "
+                   "'defaults: true' for one VLP-16 in the middle of the robot")};
   return config;
 }
 

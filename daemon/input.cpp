@@ -15,7 +15,7 @@ namespace locus::daemon {
 
 namespace {
 
-/// An input that is later than this is none that was held up: the clock was set back.
+/// An input that is later than this is none that was held up: the clock was set back before anybody looked.
 constexpr Duration kMostLate = std::chrono::milliseconds{50};
 
 /// A verdict has no time of its own: it counts at once.
@@ -27,11 +27,12 @@ Stamp arrival_of(const LiveInput::Motion& motion) {
   return Stamp::min();
 }
 
-void set_arrival(LiveInput::Motion& motion, Stamp arrival) {
+/// Nothing happens to a verdict.
+void with_sample_of(LiveInput::Motion& motion, const auto& change) {
   if (auto* imu = std::get_if<ImuInput>(&motion))
-    imu->sample.arrival = arrival;
+    change(imu->sample);
   else if (auto* odometry = std::get_if<OdometryInput>(&motion))
-    odometry->sample.arrival = arrival;
+    change(odometry->sample);
 }
 
 } // namespace
@@ -54,14 +55,26 @@ void LiveInput::push(const Motion& motion) noexcept {
 
 /// Motion that is there already still waits for a look at the sockets: an older datagram may lie there.
 Input LiveInput::next(Duration timeout) {
+  time_.look();
   if (!next_motion_)
-    next_motion_ = motion_.pop();
-  const Stamp asked{read_clock(CLOCK_REALTIME)}; // before the look: what comes after it is not older
+    next_motion_ = take_motion();
+  const Stamp asked =
+      time_.steady(Stamp{read_clock(CLOCK_REALTIME)}); // before the look: what comes after it is not older
   if (std::ranges::all_of(waiting_, [](const auto& datagrams) { return datagrams.empty(); }))
     receive(next_motion_ ? Duration::zero() : timeout);
   if (auto input = take_earliest())
     return *input;
   return Silence{in_order(asked)};
+}
+
+std::optional<LiveInput::Motion> LiveInput::take_motion() {
+  std::optional<Motion> motion = motion_.pop();
+  if (motion)
+    with_sample_of(*motion, [this](auto& sample) {
+      sample.arrival = time_.steady(sample.arrival);
+      sample.stamp = time_.steady(sample.stamp, sample.arrival);
+    });
+  return motion;
 }
 
 /// What this thread gives out now: after what it gave out before, unless the clock was set back.
@@ -79,6 +92,7 @@ void LiveInput::expect(const LidarRouter& lidars) {
 void LiveInput::receive(Duration timeout) {
   const timespec wait = to_timespec(timeout);
   ppoll(poll_.data(), poll_.size(), &wait, nullptr);
+  time_.look();
   std::uint64_t drops = 0, filtered = 0;
   for (std::size_t i = 0; i < sockets_.size(); ++i) {
     if (poll_[i].revents != 0) {
@@ -98,25 +112,28 @@ void LiveInput::receive(Duration timeout) {
 
 std::optional<Input> LiveInput::take_earliest() {
   if (!next_motion_)
-    next_motion_ = motion_.pop();
+    next_motion_ = take_motion();
   Stamp earliest = next_motion_ ? arrival_of(*next_motion_) : Stamp::max();
   std::span<const Datagram>* from = nullptr;
   for (auto& waiting : waiting_) {
-    if (waiting.empty() || waiting.front().receive_stamp >= earliest)
+    if (waiting.empty())
       continue;
-    earliest = waiting.front().receive_stamp;
+    const Stamp arrival = time_.steady(waiting.front().receive_stamp);
+    if (arrival >= earliest)
+      continue;
+    earliest = arrival;
     from = &waiting;
   }
   if (from != nullptr) {
     Datagram datagram = from->front();
     *from = from->subspan(1);
-    datagram.receive_stamp = in_order(datagram.receive_stamp);
+    datagram.receive_stamp = in_order(earliest);
+    datagram.clock_set_by = time_.wall(Stamp{}) - Stamp{};
     return datagram;
   }
   if (!next_motion_)
     return std::nullopt;
-  if (!std::holds_alternative<OutsideVerdict>(*next_motion_))
-    set_arrival(*next_motion_, in_order(earliest));
+  with_sample_of(*next_motion_, [&](auto& sample) { sample.arrival = in_order(earliest); });
   Input input = std::visit([](const auto& motion) { return Input{motion}; }, *next_motion_);
   next_motion_.reset();
   return input;

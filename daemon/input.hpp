@@ -13,6 +13,7 @@
 
 #include "core/base/source_id.hpp"
 #include "core/sources/motion_sample.hpp"
+#include "daemon/steady_time.hpp"
 #include "daemon/threads.hpp"
 #include "drivers/net/datagram.hpp"
 #include "drivers/net/flood_guard.hpp"
@@ -81,7 +82,7 @@ class InputSource {
 ///
 /// An input that reaches this thread when a later one has been given out arrives after it, by a nanosecond: a sample
 /// that another thread was slow to hand over, a datagram of another socket. So inputs come in the order of their
-/// arrivals, and a recording of them is played in the same order.
+/// arrivals, and a recording of them is played in the same order. All stamps are given out in SteadyTime.
 ///
 /// One thread is the consumer, the ingest; one is the producer of motion, that of the DDS readers, for which one ring
 /// for all sources keeps their order.
@@ -106,8 +107,11 @@ class LiveInput : public InputSource {
   [[nodiscard]] std::uint64_t filtered() const { return filtered_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::uint64_t motion_drops() const { return motion_drops_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::span<const UdpSocket> sockets() const { return sockets_; } ///< not to be received from
+  /// Any thread: as the clock on the wall has it.
+  [[nodiscard]] Stamp wall(Stamp steady) const { return time_.wall(steady); }
 
  private:
+  [[nodiscard]] std::optional<Motion> take_motion();
   [[nodiscard]] std::optional<Input> take_earliest();
   void receive(Duration timeout);
   [[nodiscard]] Stamp in_order(Stamp arrival);
@@ -119,6 +123,7 @@ class LiveInput : public InputSource {
   int motion_is_there_;                            ///< eventfd: poll() waits for both
   SpscRing<Motion, kMaxUnread> motion_;
   std::optional<Motion> next_motion_;
+  SteadyTime time_;
   Stamp latest_; ///< arrival given out
   std::atomic<std::uint64_t> kernel_drops_{0}, filtered_{0}, motion_drops_{0};
 };

@@ -88,7 +88,8 @@ std::optional<PacketError> LidarInput::take_data(const Datagram& datagram) {
     return PacketError::duplicate;
   if (const auto error = decoder_.decode(datagram.payload, packet_))
     return error;
-  const auto reading = clock_.read(decoder_.time_of_hour(), packet_.duration, datagram.receive_stamp);
+  const auto reading =
+      clock_.read(decoder_.time_of_hour(), packet_.duration, datagram.receive_stamp, datagram.clock_set_by);
   counters_.clock_steps = clock_.steps();
   if (!reading)
     return PacketError::time;

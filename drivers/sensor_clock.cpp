@@ -37,7 +37,9 @@ Duration nearest_hour(Duration time, Duration target) {
 
 } // namespace
 
-std::optional<SensorClock::Reading> SensorClock::read(Duration time_of_hour, Duration until_sent, Stamp receive) {
+std::optional<SensorClock::Reading> SensorClock::read(Duration time_of_hour, Duration until_sent, Stamp receive,
+                                                      Duration set_by) {
+  set_by_ = set_by;
   if (anchored_ && receive - latest_receive_ > kSilence)
     anchored_ = false;
   const Duration sensor_time = anchored_ ? unwrap(time_of_hour, receive) : time_of_hour;
@@ -132,7 +134,7 @@ void SensorClock::believe_sensor(Duration sensor_time, Stamp receive) {
   if (mode_ != LidarTime::automatic || !synchronised_ || knows_utc_)
     return;
   const Duration by_reception = sensor_time + offset_;
-  const Duration by_sensor = nearest_hour(sensor_time, by_reception);
+  const Duration by_sensor = nearest_hour(sensor_time, by_reception + set_by_) - set_by_;
   if (std::chrono::abs(by_sensor - by_reception) > kMaxUtcError)
     return;
   knows_utc_ = true;
@@ -141,8 +143,9 @@ void SensorClock::believe_sensor(Duration sensor_time, Stamp receive) {
 }
 
 Stamp SensorClock::stamp(Duration sensor_time, Stamp receive) const {
-  return Stamp{mode_ == LidarTime::sensor ? nearest_hour(sensor_time, receive.time_since_epoch())
-                                          : sensor_time + offset_};
+  if (mode_ != LidarTime::sensor)
+    return Stamp{sensor_time + offset_};
+  return Stamp{nearest_hour(sensor_time, receive.time_since_epoch() + set_by_) - set_by_};
 }
 
 } // namespace locus

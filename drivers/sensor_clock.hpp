@@ -25,8 +25,11 @@ namespace locus {
 /// clock was set: a step, counted, and time goes on from there. Packets that come late must come at the pace of a clock
 /// for that, not all at once from where a network held them up. A drift that the envelope cannot be followed at (error
 /// beyond 5 ms) is a step too. After a minute of silence it begins anew: what a lidar that was off did not send is not
-/// lost, and a host's clock that was set by a whole hour looks the same. Time of hour wraps every hour, unnoticed. Reads
-/// no clock, allocates nothing. One owner.
+/// lost, and a host's clock that was set by a whole hour looks the same. Time of hour wraps every hour, unnoticed.
+/// Reads no clock, allocates nothing. One owner.
+///
+/// Where the host's clock has been set, stamps stay in the time before (`set_by`); a lidar on UTC is compared with that
+/// clock as it is by now.
 class SensorClock {
  public:
   /// One packet's place in time.
@@ -39,8 +42,8 @@ class SensorClock {
   explicit SensorClock(LidarTime mode) : mode_(mode) {}
 
   /// Takes the stamps of one data packet, which is sent `until_sent` after the instant that its time of hour names;
-  /// nothing if its time is refused. Precondition: 0 <= time_of_hour < 1 h.
-  std::optional<Reading> read(Duration time_of_hour, Duration until_sent, Stamp receive);
+  /// nothing if its time is refused. `set_by`: as Datagram::clock_set_by has it. Precondition: 0 <= time_of_hour < 1 h.
+  std::optional<Reading> read(Duration time_of_hour, Duration until_sent, Stamp receive, Duration set_by = {});
 
   /// Whether the lidar's clock is on UTC, as its position packets say.
   void set_synchronised(bool synchronised) {
@@ -72,6 +75,7 @@ class SensorClock {
   bool knows_utc_ = false; ///< automatic: offset_ is that of the lidar's own time
   Stamp agreed_at_;        ///< when reception last said the same
   std::uint64_t steps_ = 0;
+  Duration set_by_{}; ///< of the host's clock, since the time of the stamps began
 
   bool anchored_ = false;
   Duration latest_{};    ///< latest sensor time: time of hour at the anchor, counted on from there

@@ -129,7 +129,8 @@ std::string scheduling() {
   std::string text = fmt::format("ordinary scheduling, nice {}", getpriority(PRIO_PROCESS, 0));
   std::string group, weight;
   std::getline(std::ifstream{"/proc/self/cgroup"}, group);
-  if (group.starts_with("0::") && std::getline(std::ifstream{"/sys/fs/cgroup" + group.substr(3) + "/cpu.weight"}, weight))
+  if (group.starts_with("0::") &&
+      std::getline(std::ifstream{"/sys/fs/cgroup" + group.substr(3) + "/cpu.weight"}, weight))
     text += ", CPU weight " + weight;
   return text;
 }

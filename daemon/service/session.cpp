@@ -113,8 +113,19 @@ void Session::end() {
   disk_.reset();
 }
 
+/// With what it tells of times as everybody else on this host tells them.
+OdometryEstimate Session::on_the_wall(const OdometryEstimate& estimate) const {
+  OdometryEstimate told = estimate;
+  told.stamp = input_.wall(estimate.stamp);
+  for (SourceReport& source : told.sources)
+    if (source.last_used != Stamp{})
+      source.last_used = input_.wall(source.last_used);
+  return told;
+}
+
 /// In the odometry thread, when the estimate has left.
-void Session::after(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
+void Session::after(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& steady_estimate) {
+  const OdometryEstimate estimate = on_the_wall(steady_estimate);
   if (estimate.beginning)
     start_.reset();
   clouds_.take(sweep, odometry, estimate);
@@ -194,17 +205,38 @@ void Session::set_flat_ground(FlatGround mode) {
 void Session::publish() {
   while (!stopping_.load(std::memory_order_relaxed)) {
     publisher_progress_.fetch_add(1, std::memory_order_relaxed);
-    if (const auto done = pipeline_->next(std::chrono::milliseconds{50}))
+    tell_of_clock();
+    if (auto done = pipeline_->next(std::chrono::milliseconds{50})) {
+      done->estimate = on_the_wall(done->estimate);
       publish(*done);
-    while (const auto sample = pipeline_->next_fast())
+    }
+    while (auto sample = pipeline_->next_fast()) {
+      sample->stamp = input_.wall(sample->stamp);
       link_.publish_fast(report_of(*sample));
+    }
     while (const auto event = pipeline_->next_health_event())
       tell(*event);
-    if (const IngestReport* report = pipeline_->next_report()) {
-      const std::scoped_lock lock(told_mutex_);
-      told_.ingest = *report;
-    }
+    if (const IngestReport* report = pipeline_->next_report())
+      hear(*report);
   }
+}
+
+void Session::hear(const IngestReport& report) {
+  const std::scoped_lock lock(told_mutex_);
+  told_.ingest = report;
+  const auto tell = [this](Stamp& heard) { heard = heard == Stamp{} ? heard : input_.wall(heard); };
+  for (IngestReport::Lidar& lidar : told_.ingest.lidars)
+    tell(lidar.last_heard);
+  for (IngestReport::Source& source : told_.ingest.sources)
+    tell(source.last_heard);
+}
+
+void Session::tell_of_clock() {
+  const Duration set_by = input_.wall(Stamp{}) - Stamp{};
+  if (const Duration change = set_by - std::exchange(told_clock_set_by_, set_by); change != Duration::zero())
+    log_.info(fmt::format("the clock of this computer was set by {:+.3f} s; the odometry goes on, and its stamps follow "
+                          "the clock",
+                          to_seconds(change)));
 }
 
 void Session::publish(const ProcessedSweep& done) {

@@ -74,6 +74,9 @@ class Session {
   void take(FlatGroundWord word);
   void publish();
   void publish(const ProcessedSweep& done);
+  [[nodiscard]] OdometryEstimate on_the_wall(const OdometryEstimate& estimate) const;
+  void hear(const IngestReport& report);
+  void tell_of_clock();
   void announce(const OdometryEstimate& estimate);
   void tell(TrackingState state);
   void tell(const HealthEvent& event);
@@ -111,6 +114,7 @@ class Session {
   std::optional<SavedState> start_; ///< what it began with, until the first estimate
   StateKeeper state_;
   std::optional<TrackingState> told_state_;
+  Duration told_clock_set_by_{};
   std::atomic<std::uint64_t> publisher_progress_{0};
   std::atomic<bool> stopping_{false};
   std::thread publisher_;

@@ -24,6 +24,8 @@ struct Datagram {
   bool truncated = false; ///< longer on the wire than what was kept
   /// What decoding it gives, where a recording holds no bytes but returns: the payload is then empty. Lives as long.
   const LidarPacket* decoded = nullptr;
+  /// By how much the clock of this host has been set since the time began that receive_stamp is in.
+  Duration clock_set_by{};
 };
 
 /// "192.168.1.201" of an address in host byte order.

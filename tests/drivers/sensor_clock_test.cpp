@@ -134,6 +134,27 @@ TEST(SensorClock, HostsClockThatIsSetByAnHourIsNoGap) {
   }
 }
 
+/// A robot without a battery for its clock, which runs for minutes before it hears of the time of day. On the wall its
+/// lidar is then right, and what was measured before and after is one time.
+TEST(SensorClock, HostsClockThatIsSetRightMakesALidarOnUtcBelieved) {
+  constexpr Duration kHostIsSlow = seconds{600};
+  for (const LidarTime mode : {LidarTime::sensor, LidarTime::automatic}) {
+    SensorClock clock{mode};
+    clock.set_synchronised(true);
+    Link link{.sensor_ahead = kHostIsSlow};
+    for (int i = 0; i < 3000; ++i)
+      link.send(clock, milliseconds{3});
+    std::optional<Duration> error;
+    for (int i = 0; i < 20; ++i, link.now += kPacket)
+      if (const auto reading =
+              clock.read(link.time_of_hour(), kPacket, link.now + kPacket + milliseconds{3}, kHostIsSlow))
+        error = reading->stamp - link.now;
+    ASSERT_TRUE(error);
+    EXPECT_LE(std::chrono::abs(*error), microseconds{1}) << "not by the delay of its way";
+    EXPECT_EQ(clock.steps(), 0U);
+  }
+}
+
 TEST(SensorClock, SensorTimeIsTakenAsTrueWithTheHourOfReception) {
   SensorClock clock{LidarTime::sensor};
   Link link{.sensor_ahead = milliseconds{368}};

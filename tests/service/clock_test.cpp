@@ -5,6 +5,7 @@
 #include <fstream>
 #include <thread>
 
+#include "service/notify_socket.hpp"
 #include "service/robot_network.hpp"
 #include "service/undisturbed.hpp"
 
@@ -24,6 +25,15 @@ class HostClock : public RobotNetwork {
         reinterpret_cast<const char*>(&ns), sizeof(ns)); // NOLINT(bugprone-narrowing-conversions)
   }
 
+  /// The service, with this clock.
+  [[nodiscard]] std::vector<std::string> locusd_with_clock(const std::filesystem::path& config) const {
+    std::ofstream{file("clock"), std::ios::binary} << std::string(sizeof(std::int64_t), '\0');
+    std::vector<std::string> command = locusd(config);
+    command.insert(command.begin(), {"/usr/bin/env", std::string{"LD_PRELOAD="} + STEPPED_CLOCK_LIBRARY,
+                                     "STEPPED_CLOCK=" + file("clock").string()});
+    return undisturbed(command);
+  }
+
   /// Whether both peers go on hearing estimates.
   static bool is_heard(const Child& cyclone, const Child& fast_dds) {
     const auto hears = [](const Child& peer) {
@@ -38,34 +48,44 @@ class HostClock : public RobotNetwork {
 };
 
 TEST_F(HostClock, ThatIsSetBackForwardAndToAndFroLeavesEveryListenerItsOdometry) {
-  std::ofstream{file("clock"), std::ios::binary} << std::string(sizeof(std::int64_t), '\0');
   const std::filesystem::path drive = plant();
-  std::vector<std::string> command{"/usr/bin/env", std::string{"LD_PRELOAD="} + STEPPED_CLOCK_LIBRARY,
-                                   "STEPPED_CLOCK=" + file("clock").string()};
-  for (const std::string& word : locusd(drive / "config.yaml"))
-    command.push_back(word);
-  Child daemon(undisturbed(command));
+  Child daemon(locusd_with_clock(drive / "config.yaml"));
   const Child cyclone(undisturbed({CYCLONE_PEER, "0", "listen", "/locus"}));
   const Child fast_dds(undisturbed({FAST_DDS_PEER, "0", "listen", "/locus"}));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
   Child play(undisturbed({LOCUS_PLAY, drive.string()}));
   ASSERT_TRUE(is_heard(cyclone, fast_dds));
-  for (const Duration offset : {Duration{-hours{1}}, Duration{hours{1}}, Duration{milliseconds{-700}}, Duration{}}) {
+  // Whom a participant does not hear of for ten seconds it takes to be gone.
+  for (const auto& [offset, lasts] : {std::pair{-hours{1}, seconds{12}}, {hours{1}, seconds{1}}}) {
     set(offset);
-    std::this_thread::sleep_for(seconds{1});
-    EXPECT_TRUE(is_heard(cyclone, fast_dds)) << to_seconds(offset) << " s off";
+    std::this_thread::sleep_for(lasts);
+    EXPECT_TRUE(is_heard(cyclone, fast_dds)) << offset.count() << " h off";
     const nlohmann::json status = this->status();
-    EXPECT_EQ(status["packets"]["total"]["lost"], 0) << to_seconds(offset) << " s off";
+    EXPECT_EQ(status["packets"]["total"]["lost"], 0) << offset.count() << " h off";
   }
+  EXPECT_FALSE(daemon.wait_for_line("is lost", milliseconds{10})) << testing::PrintToString(daemon.lines());
   ASSERT_EQ(play.wait_for_exit(seconds{60}), 0);
   const Replay replay({"--quiet", drive.string()});
   const Pose there = replay.trajectory().back().T_source_base;
   for (const Child* peer : {&cyclone, &fast_dds}) {
     const Pose heard_last = heard(*peer).back().T_odom_base;
-    EXPECT_LT((heard_last.translation - there.translation).norm(), 0.3);
+    EXPECT_LT((heard_last.translation - there.translation).norm(), 0.05);
   }
+  EXPECT_TRUE(daemon.wait_for_line("the clock of this computer was set by -3600.000 s", milliseconds{10}));
   daemon.signal(SIGTERM);
   EXPECT_EQ(daemon.wait_for_exit(seconds{1}), 0) << testing::PrintToString(daemon.lines());
+}
+
+/// Where no message wakes who waits for one.
+TEST_F(HostClock, ThatIsSetBackWhileNothingComesLeavesTheWatchdogFed) {
+  NotifySocket systemd(file("notify"));
+  setenv("WATCHDOG_USEC", "600000", 1); // NOLINT(concurrency-mt-unsafe)
+  Child daemon(locusd_with_clock(config()));
+  unsetenv("WATCHDOG_USEC"); // NOLINT(concurrency-mt-unsafe)
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  set(-hours{1});
+  for (int i = 0; i < 20; ++i)
+    EXPECT_TRUE(systemd.hears("WATCHDOG=1", seconds{1})) << i;
 }
 
 } // namespace

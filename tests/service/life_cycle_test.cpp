@@ -8,12 +8,11 @@
 #include <thread>
 
 #include <sys/mount.h>
-#include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include "daemon/machine_time.hpp"
 #include "daemon/service/saved_state.hpp"
+#include "service/notify_socket.hpp"
 #include "service/robot_network.hpp"
 #include "service/undisturbed.hpp"
 #include "support/errors.hpp"
@@ -24,41 +23,6 @@ namespace {
 using nlohmann::json;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
-
-/// What systemd would hear of the service.
-class NotifySocket {
- public:
-  explicit NotifySocket(const std::filesystem::path& path) : socket_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    path.native().copy(address.sun_path, sizeof(address.sun_path) - 1);
-    EXPECT_EQ(bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
-    const timeval patience{0, 100'000};
-    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
-    setenv("NOTIFY_SOCKET", path.c_str(), 1); // NOLINT(concurrency-mt-unsafe): before the program is started
-  }
-  ~NotifySocket() {
-    unsetenv("NOTIFY_SOCKET"); // NOLINT(concurrency-mt-unsafe)
-    close(socket_);
-  }
-  NotifySocket(const NotifySocket&) = delete;
-  NotifySocket& operator=(const NotifySocket&) = delete;
-
-  /// Whether a message with this word comes in time; all that come are counted.
-  bool hears(const std::string& word, Duration timeout) {
-    const auto give_up = std::chrono::steady_clock::now() + timeout;
-    while (std::chrono::steady_clock::now() < give_up) {
-      std::array<char, 4096> text{};
-      const ssize_t size = recv(socket_, text.data(), text.size(), 0);
-      if (size > 0 && std::string(text.data(), static_cast<std::size_t>(size)).find(word) != std::string::npos)
-        return true;
-    }
-    return false;
-  }
-
- private:
-  int socket_;
-};
 
 class LifeCycle : public RobotNetwork {
  protected:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// To be preloaded: the wall clock of a program, as the file STEPPED_CLOCK has it, which holds by how many nanoseconds it
-// is off. All that a program can see of it is off by as much: the time, the stamps of datagrams, and waits until a time
-// of that clock, which in the kernel follow a clock that is set, too.
+// To be preloaded: the wall clock of a program, as the file STEPPED_CLOCK has it, which holds by how many nanoseconds
+// it is off. All that a program can see of it is off by as much: the time, the stamps of datagrams, and waits until a
+// time of that clock, which in the kernel follow a clock that is set, too.
 #include <cerrno>
 #include <cstdint>
 #include <cstdlib>
