@@ -136,7 +136,7 @@ void check_record(Problems& problems, const Config& config) {
                      item("motion_sources", i, "name"),
                      fmt::format("{}.tum has another meaning in a recording; rename the source", sources[i].name));
   const std::filesystem::path folder = config.record.folder;
-  problems.require(std::ranges::find(folder, "..") == folder.end(), "record.folder",
+  problems.require(std::find(folder.begin(), folder.end(), "..") == folder.end(), "record.folder",
                    "must not lead out of the folder it lies in; write the whole path, without '..'");
   problems.require_range<std::uint64_t>("record.max_bytes", config.record.max_bytes, 10'000'000, 1'000'000'000'000'000);
 }

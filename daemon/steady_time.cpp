@@ -17,7 +17,7 @@ constexpr Duration kSameClock = std::chrono::seconds{10}; ///< no sender's stamp
 constexpr Duration kInterrupted = std::chrono::milliseconds{1}; ///< readings so far apart do not belong together
 
 Stamp nearest(std::initializer_list<Stamp> stamps, Stamp to) {
-  return std::ranges::min(stamps, {}, [to](Stamp stamp) { return std::chrono::abs(stamp - to); });
+  return std::min(stamps, [to](Stamp a, Stamp b) { return std::chrono::abs(a - to) < std::chrono::abs(b - to); });
 }
 
 } // namespace

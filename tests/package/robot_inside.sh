@@ -141,6 +141,7 @@ process=$(systemctl show -P MainPID locusd@second)
 dpkg-reconfigure locusd
 [ "$(systemctl show -P MainPID locusd@second)" != "$process" ]
 wait_for 5 locusctl --instance second status >/dev/null
+if journalctl --no-pager -u locusd@second | grep "without position packets"; then false; fi # the port is shared
 
 step "DDS Security works in the sandbox, with a key that the service alone may read"
 cp -r enclaves/locusd /etc/locusd/enclave
