@@ -137,7 +137,7 @@ void check_record(Problems& problems, const Config& config) {
                      fmt::format("{}.tum has another meaning in a recording; rename the source", sources[i].name));
   const std::filesystem::path folder = config.record.folder;
   problems.require(std::find(folder.begin(), folder.end(), "..") == folder.end(), "record.folder",
-                   "must not lead out of the folder it lies in; write the whole path, without '..'");
+                   "must not contain '..'; write the whole path");
   problems.require_range<std::uint64_t>("record.max_bytes", config.record.max_bytes, 10'000'000, 1'000'000'000'000'000);
 }
 
@@ -146,7 +146,7 @@ void check_record(Problems& problems, const Config& config) {
 std::optional<std::string> Config::problem() const {
   Problems problems;
   problems.require(version == kVersion, "version",
-                   fmt::format("this locusd reads version {}; look for what has changed in its manual", kVersion));
+                   fmt::format("this locusd reads version {}; see locusd.yaml(5)", kVersion));
   check_names(problems, *this);
   check_lidars(problems, lidars);
   check_sources(problems, *this);

@@ -393,7 +393,7 @@ Expected<Config, ConfigErrors> load_service_config(const std::filesystem::path& 
   if (config && !config->defaults && !YAML::Load(*text)["lidars"])
     return ConfigErrors{
         error_line(at_line(file.string(), 1),
-                   "names no lidar; if it is not cut short, name those of the robot (lidars:), or write "
+                   "names no lidar (is the file cut short?); name those of the robot under lidars:, or write "
                    "'defaults: true' for one VLP-16 in the middle of the robot")};
   return config;
 }

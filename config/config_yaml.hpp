@@ -19,8 +19,8 @@ using ConfigErrors = std::vector<std::string>;
 /// only.
 Expected<Config, ConfigErrors> load_config(const std::filesystem::path& file);
 
-/// As load_config, for a robot to run on: a file that names no lidar, as one that is empty or cut short, is an error
-/// unless it says `defaults: true`.
+/// As load_config, for a robot to run on: a file that names no lidar, as one that is empty or ends before that, is an
+/// error unless it says `defaults: true`.
 Expected<Config, ConfigErrors> load_service_config(const std::filesystem::path& file);
 
 /// As load_config, from text; `origin` stands for the file's name in errors.

@@ -30,9 +30,9 @@ Stamp arrival_of(const LiveInput::Motion& motion) {
 /// Nothing happens to a verdict.
 void with_sample_of(LiveInput::Motion& motion, const auto& change) {
   if (auto* imu = std::get_if<ImuInput>(&motion))
-    change(imu->sample);
+    change(imu->source, imu->sample);
   else if (auto* odometry = std::get_if<OdometryInput>(&motion))
-    change(odometry->sample);
+    change(odometry->source, odometry->sample);
 }
 
 } // namespace
@@ -55,11 +55,11 @@ void LiveInput::push(const Motion& motion) noexcept {
 
 /// Motion that is there already still waits for a look at the sockets: an older datagram may lie there.
 Input LiveInput::next(Duration timeout) {
-  time_.look();
   if (!next_motion_)
     next_motion_ = take_motion();
-  const Stamp asked =
-      time_.steady(Stamp{read_clock(CLOCK_REALTIME)}); // before the look: what comes after it is not older
+  const Stamp wall{read_clock(CLOCK_REALTIME)}; // before the sockets: what comes after it is not older
+  time_.look();
+  const Stamp asked = time_.steady(wall);
   if (std::ranges::all_of(waiting_, [](const auto& datagrams) { return datagrams.empty(); }))
     receive(next_motion_ ? Duration::zero() : timeout);
   if (auto input = take_earliest())
@@ -69,11 +69,13 @@ Input LiveInput::next(Duration timeout) {
 
 std::optional<LiveInput::Motion> LiveInput::take_motion() {
   std::optional<Motion> motion = motion_.pop();
-  if (motion)
-    with_sample_of(*motion, [this](auto& sample) {
-      sample.arrival = time_.steady(sample.arrival);
-      sample.stamp = time_.steady(sample.stamp, sample.arrival);
-    });
+  if (!motion)
+    return motion;
+  time_.look();
+  with_sample_of(*motion, [this](SourceId source, auto& sample) {
+    sample.arrival = time_.steady(sample.arrival);
+    sample.stamp = time_.steady(sample.stamp, sample.arrival, senders_[index_of(source)]);
+  });
   return motion;
 }
 
@@ -92,7 +94,6 @@ void LiveInput::expect(const LidarRouter& lidars) {
 void LiveInput::receive(Duration timeout) {
   const timespec wait = to_timespec(timeout);
   ppoll(poll_.data(), poll_.size(), &wait, nullptr);
-  time_.look();
   std::uint64_t drops = 0, filtered = 0;
   for (std::size_t i = 0; i < sockets_.size(); ++i) {
     if (poll_[i].revents != 0) {
@@ -102,6 +103,7 @@ void LiveInput::receive(Duration timeout) {
     drops += sockets_[i].kernel_drops();
     filtered += sockets_[i].filtered();
   }
+  time_.look();
   kernel_drops_.store(drops, std::memory_order_relaxed);
   filtered_.store(filtered, std::memory_order_relaxed);
   if (poll_.back().revents != 0) {
@@ -128,12 +130,12 @@ std::optional<Input> LiveInput::take_earliest() {
     Datagram datagram = from->front();
     *from = from->subspan(1);
     datagram.receive_stamp = in_order(earliest);
-    datagram.clock_set_by = time_.wall(Stamp{}) - Stamp{};
+    datagram.clock_set_by = time_.set_by();
     return datagram;
   }
   if (!next_motion_)
     return std::nullopt;
-  with_sample_of(*next_motion_, [&](auto& sample) { sample.arrival = in_order(earliest); });
+  with_sample_of(*next_motion_, [&](SourceId, auto& sample) { sample.arrival = in_order(earliest); });
   Input input = std::visit([](const auto& motion) { return Input{motion}; }, *next_motion_);
   next_motion_.reset();
   return input;

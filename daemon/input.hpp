@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -13,6 +14,7 @@
 
 #include "core/base/source_id.hpp"
 #include "core/sources/motion_sample.hpp"
+#include "core/sources/sensed_motion.hpp"
 #include "daemon/steady_time.hpp"
 #include "daemon/threads.hpp"
 #include "drivers/net/datagram.hpp"
@@ -107,8 +109,8 @@ class LiveInput : public InputSource {
   [[nodiscard]] std::uint64_t filtered() const { return filtered_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::uint64_t motion_drops() const { return motion_drops_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::span<const UdpSocket> sockets() const { return sockets_; } ///< not to be received from
-  /// Any thread: as the clock on the wall has it.
-  [[nodiscard]] Stamp wall(Stamp steady) const { return time_.wall(steady); }
+  /// Any thread: what is given out, as the clock on the wall has it.
+  [[nodiscard]] const SteadyTime& time() const { return time_; }
 
  private:
   [[nodiscard]] std::optional<Motion> take_motion();
@@ -124,6 +126,7 @@ class LiveInput : public InputSource {
   SpscRing<Motion, kMaxUnread> motion_;
   std::optional<Motion> next_motion_;
   SteadyTime time_;
+  std::array<SteadyTime::Sender, kMaxSources> senders_;
   Stamp latest_; ///< arrival given out
   std::atomic<std::uint64_t> kernel_drops_{0}, filtered_{0}, motion_drops_{0};
 };

@@ -1,54 +1,66 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/steady_time.hpp"
 
-#include <algorithm>
-#include <array>
-#include <ctime>
-#include <initializer_list>
-
-#include "daemon/machine_time.hpp"
-
 namespace locus::daemon {
 
 namespace {
 
-constexpr Duration kSlew = std::chrono::milliseconds{5};  ///< two readings of clocks that nobody has set agree to it
-constexpr Duration kSameClock = std::chrono::seconds{10}; ///< no sender's stamp is older
-constexpr Duration kInterrupted = std::chrono::milliseconds{1}; ///< readings so far apart do not belong together
-
-Stamp nearest(std::initializer_list<Stamp> stamps, Stamp to) {
-  return std::min(stamps, [to](Stamp a, Stamp b) { return std::chrono::abs(a - to) < std::chrono::abs(b - to); });
-}
+constexpr Duration kSlew = std::chrono::milliseconds{5}; ///< two offsets of a clock that nobody has set agree to it
+constexpr Duration kOnItsWay = std::chrono::seconds{2};  ///< a stamp from before the clock was set, at the most
+constexpr Duration kUndisturbed = std::chrono::microseconds{20}; ///< between two readings that belong together
 
 } // namespace
 
-SteadyTime::SteadyTime() : offset_(read_clock(CLOCK_REALTIME) - read_clock(CLOCK_BOOTTIME)) {}
+SteadyTime::SteadyTime(Clock clock) : clock_(clock), offset_(read_offset().wall_ahead) {}
+
+/// Of the wall clock against the time since the host was booted. Who sets it may well interrupt whoever reads it.
+SteadyTime::Offset SteadyTime::read_offset() const {
+  constexpr int kTries = 20;
+  for (int i = 1;; ++i) {
+    const Duration before = clock_(CLOCK_BOOTTIME);
+    const Duration wall = clock_(CLOCK_REALTIME);
+    if (const Duration after = clock_(CLOCK_BOOTTIME); after - before < kUndisturbed || i == kTries)
+      return {after, wall - after};
+  }
+}
+
+Stamp SteadyTime::now() const { return Stamp{clock_(CLOCK_BOOTTIME) + offset_ - set_by_}; }
 
 void SteadyTime::look() {
-  const Duration before = read_clock(CLOCK_BOOTTIME), wall = read_clock(CLOCK_REALTIME);
-  if (read_clock(CLOCK_BOOTTIME) - before > kInterrupted)
-    return;
-  const Duration change = wall - before - offset_;
+  const auto [boot, wall_ahead] = read_offset();
+  const Duration change = wall_ahead - offset_;
   if (std::chrono::abs(change) < kSlew)
     return;
+  set_at_ = Stamp{boot + offset_ - set_by_};
   offset_ += change;
   set_by_before_ = set_by_;
   set_by_ += change;
   set_by_ns_.store(set_by_.count(), std::memory_order_relaxed);
 }
 
+/// Read by the clock as it is now, a stamp from before a step forward lies before that step; one from before a step
+/// back lies in the future.
 Stamp SteadyTime::steady(Stamp wall) const {
-  if (set_by_ == set_by_before_)
-    return wall;
-  const Stamp now{read_clock(CLOCK_BOOTTIME) + offset_ - set_by_};
-  return nearest({wall - set_by_, wall - set_by_before_}, now);
+  const Stamp after = wall - set_by_, before = wall - set_by_before_;
+  if (set_by_ == set_by_before_ || now() - set_at_ > kOnItsWay)
+    return after;
+  const Stamp latest = now() + kSlew;
+  return (after < set_at_ && before < latest) || after > latest ? before : after;
 }
 
-Stamp SteadyTime::steady(Stamp stamp, Stamp arrival) const {
-  if (set_by_ == set_by_before_)
-    return stamp;
-  const Stamp by_host = nearest({stamp, stamp - set_by_, stamp - set_by_before_}, arrival);
-  return std::chrono::abs(by_host - arrival) < kSameClock ? by_host : stamp;
+Stamp SteadyTime::steady(Stamp stamp, Stamp arrival, Sender& sender) const {
+  Stamp steady = stamp - sender.shift;
+  if (const Duration news = set_by_ - sender.set_by; news != Duration::zero()) {
+    const auto unlike = [&](Stamp read) { return std::chrono::abs(arrival - read - sender.lag); };
+    const bool is_host = unlike(steady - news) < unlike(steady);
+    steady -= is_host ? news : Duration::zero();
+    if (now() - set_at_ > kOnItsWay) { // until then it may be on its way, from before
+      sender.shift += is_host ? news : Duration::zero();
+      sender.set_by = set_by_;
+    }
+  }
+  sender.lag = arrival - steady;
+  return steady;
 }
 
 } // namespace locus::daemon

@@ -2,6 +2,7 @@
 #include "drivers/sensor_clock.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace locus {
 
@@ -39,8 +40,11 @@ Duration nearest_hour(Duration time, Duration target) {
 
 std::optional<SensorClock::Reading> SensorClock::read(Duration time_of_hour, Duration until_sent, Stamp receive,
                                                       Duration set_by) {
-  set_by_ = set_by;
-  if (anchored_ && receive - latest_receive_ > kSilence)
+  if (std::exchange(set_by_, set_by) != set_by) {
+    knows_utc_ = false;
+    anchored_ = anchored_ && mode_ != LidarTime::sensor;
+  }
+  if (receive - std::exchange(last_receive_, receive) > kSilence)
     anchored_ = false;
   const Duration sensor_time = anchored_ ? unwrap(time_of_hour, receive) : time_of_hour;
   if (!anchored_ || !follows(sensor_time, until_sent, receive)) {

@@ -28,8 +28,8 @@ namespace locus {
 /// lost, and a host's clock that was set by a whole hour looks the same. Time of hour wraps every hour, unnoticed.
 /// Reads no clock, allocates nothing. One owner.
 ///
-/// Where the host's clock has been set, stamps stay in the time before (`set_by`); a lidar on UTC is compared with that
-/// clock as it is by now.
+/// Where the host's clock has been set, stamps stay in the time before (`set_by`), and a lidar on UTC is compared anew
+/// with that clock as it is by now; with `sensor` that is another zero, and time goes on from there.
 class SensorClock {
  public:
   /// One packet's place in time.
@@ -75,7 +75,8 @@ class SensorClock {
   bool knows_utc_ = false; ///< automatic: offset_ is that of the lidar's own time
   Stamp agreed_at_;        ///< when reception last said the same
   std::uint64_t steps_ = 0;
-  Duration set_by_{}; ///< of the host's clock, since the time of the stamps began
+  Duration set_by_{};  ///< of the host's clock, since the time of the stamps began
+  Stamp last_receive_; ///< of any packet
 
   bool anchored_ = false;
   Duration latest_{};    ///< latest sensor time: time of hour at the anchor, counted on from there

@@ -170,9 +170,10 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
 bool Odometry::find_again(const Sweep& sweep) {
   constexpr Duration kPatience = std::chrono::seconds{1}; ///< publishers find each other faster
   waits_since_ = waits_since_.value_or(sweep.end);
-  const bool waits = start_->awaits(sweep.motion) && std::chrono::abs(sweep.end - *waits_since_) < kPatience;
   const StageScope scope(clock_, Stage::scan_to_submap);
   const std::vector<Place> places = start_->places(sweep.end, sweep.motion, options_.motion.max_speed_mps);
+  const bool waits =
+      !places.front().told && start_->awaits(sweep.motion) && std::chrono::abs(sweep.end - *waits_since_) < kPatience;
   if (const auto found =
           relocate(gicp_, std::span(scan_).first(sweep.registered), map_, places, options_.scan_to_submap, waits)) {
     beginning_ = Beginning::map;

@@ -72,14 +72,10 @@ Pose Whereabouts::carried_to(Stamp now) const {
 }
 
 bool Whereabouts::awaits(const SensedMotion& sensed) const {
-  bool awaits = false;
   for (std::size_t i = 0; i < kMaxSources; ++i)
-    if (T_source_base[i]) {
-      if (sensed.sources[i].usable)
-        return false;
-      awaits = true;
-    }
-  return awaits;
+    if (T_source_base[i] && !sensed.sources[i].usable)
+      return true;
+  return false;
 }
 
 std::vector<Pose> Whereabouts::way(Stamp now) const {
@@ -105,7 +101,7 @@ std::vector<Place> Whereabouts::places(Stamp now, const SensedMotion& sensed, do
     if (T_source_base[i] && sensed.sources[i].usable) {
       const Pose place = T_odom_base * T_source_base[i]->inverse() * sensed.sources[i].T_source_base;
       const auto way_m = [&](const Pose& from) { return (place.translation - from.translation).norm(); };
-      if (way_m(T_odom_base) <= max_speed_mps * to_seconds(now - stamp))
+      if (way_m(T_odom_base) <= kFarthest_m + max_speed_mps * std::max(0.0, to_seconds(now - stamp)))
         add(place, *std::ranges::min_element(unseen, {}, way_m), true);
     }
   for (const Pose& place : unseen)

@@ -38,7 +38,7 @@ struct Whereabouts {
   /// Where it is at `now` if it goes on as before, which for more than a moment it does not.
   [[nodiscard]] Pose carried_to(Stamp now) const;
 
-  /// Whether an odometry is yet to be heard that could tell where the robot is.
+  /// Whether an odometry that was healthy is yet to be so again.
   [[nodiscard]] bool awaits(const SensedMotion& sensed) const;
 
   /// Where it may be at `now` without a word of an odometry: carried on, and wherever on its way it may have come to

@@ -159,8 +159,8 @@ class Admission {
  public:
   static constexpr std::int64_t kMaxRateKhz = 10; ///< more than any sensor sends
 
-  /// Whether the sample of `writer` that came at `now` is taken; else it is counted.
-  bool admits(dds_instance_handle_t writer, Stamp now) {
+  /// Whether the sample of `writer` that came at `now` (CLOCK_MONOTONIC) is taken; else it is counted.
+  bool admits(dds_instance_handle_t writer, Duration now) {
     if (writer != writer_ && now - last_heard_ < kSilence)
       return refuse();
     writer_ = writer;
@@ -190,7 +190,7 @@ class Admission {
   }
 
   dds_instance_handle_t writer_ = 0;
-  Stamp last_heard_, window_began_;
+  Duration last_heard_{}, window_began_{};
   std::int64_t in_window_ = 0;
   std::uint64_t refused_ = 0;
 };

@@ -157,26 +157,27 @@ std::unique_ptr<RosLink::Session> RosLink::connect() {
 
 void RosLink::receive(Session& session) {
   const Stamp arrival{read_clock(CLOCK_REALTIME)};
+  const Duration now = read_clock(CLOCK_MONOTONIC);
   for (auto& from : session.imus)
     from.reader.take([&](const ros::Imu& message, dds_instance_handle_t writer) {
       ++from.received;
-      if (from.admission.admits(writer, arrival))
+      if (from.admission.admits(writer, now))
         sink_(ImuInput{from.source, to_sample(message, arrival)});
     });
   for (auto& from : session.odometries)
     from.reader.take([&](const ros::Odometry& message, dds_instance_handle_t writer) {
       ++from.received;
-      if (from.admission.admits(writer, arrival))
+      if (from.admission.admits(writer, now))
         sink_(OdometryInput{from.source, to_sample(message, arrival, from.usual)});
     });
   for (auto& from : session.health_topics)
     from.reader.take([&](const ros::Bool& message, dds_instance_handle_t writer) {
-      if (from.admission.admits(writer, arrival))
+      if (from.admission.admits(writer, now))
         sink_(OutsideVerdict{from.source, message.data_});
     });
   if (auto& from = session.flat_ground)
     from->reader.take([&](const ros::Bool& message, dds_instance_handle_t writer) {
-      if (from->admission.admits(writer, arrival))
+      if (from->admission.admits(writer, now))
         sink_(FlatGroundWord{message.data_});
     });
 }

@@ -116,10 +116,10 @@ void Session::end() {
 /// With what it tells of times as everybody else on this host tells them.
 OdometryEstimate Session::on_the_wall(const OdometryEstimate& estimate) const {
   OdometryEstimate told = estimate;
-  told.stamp = input_.wall(estimate.stamp);
+  told.stamp = input_.time().wall(estimate.stamp);
   for (SourceReport& source : told.sources)
     if (source.last_used != Stamp{})
-      source.last_used = input_.wall(source.last_used);
+      source.last_used = input_.time().wall(source.last_used);
   return told;
 }
 
@@ -206,51 +206,43 @@ void Session::publish() {
   while (!stopping_.load(std::memory_order_relaxed)) {
     publisher_progress_.fetch_add(1, std::memory_order_relaxed);
     tell_of_clock();
-    if (auto done = pipeline_->next(std::chrono::milliseconds{50})) {
-      done->estimate = on_the_wall(done->estimate);
+    if (const auto done = pipeline_->next(std::chrono::milliseconds{50}))
       publish(*done);
-    }
     while (auto sample = pipeline_->next_fast()) {
-      sample->stamp = input_.wall(sample->stamp);
+      sample->stamp = input_.time().wall(sample->stamp);
       link_.publish_fast(report_of(*sample));
     }
     while (const auto event = pipeline_->next_health_event())
       tell(*event);
-    if (const IngestReport* report = pipeline_->next_report())
-      hear(*report);
+    if (const IngestReport* report = pipeline_->next_report()) {
+      const std::scoped_lock lock(told_mutex_);
+      told_.ingest = *report;
+    }
   }
 }
 
-void Session::hear(const IngestReport& report) {
-  const std::scoped_lock lock(told_mutex_);
-  told_.ingest = report;
-  const auto tell = [this](Stamp& heard) { heard = heard == Stamp{} ? heard : input_.wall(heard); };
-  for (IngestReport::Lidar& lidar : told_.ingest.lidars)
-    tell(lidar.last_heard);
-  for (IngestReport::Source& source : told_.ingest.sources)
-    tell(source.last_heard);
-}
-
 void Session::tell_of_clock() {
-  const Duration set_by = input_.wall(Stamp{}) - Stamp{};
+  const Duration set_by = input_.time().set_by();
   if (const Duration change = set_by - std::exchange(told_clock_set_by_, set_by); change != Duration::zero())
-    log_.info(fmt::format("the clock of this computer was set by {:+.3f} s; the odometry goes on, and its stamps follow "
-                          "the clock",
-                          to_seconds(change)));
+    log_.info(
+        fmt::format("the clock of this computer was set by {:+.3f} s; the odometry goes on, and its stamps follow "
+                    "the clock",
+                    to_seconds(change)));
 }
 
 void Session::publish(const ProcessedSweep& done) {
-  const bool is_published = link_.publish(report_of(done.estimate), done.estimate.state);
+  const OdometryEstimate estimate = on_the_wall(done.estimate);
+  const bool is_published = link_.publish(report_of(estimate), estimate.state);
   {
     const std::scoped_lock lock(told_mutex_);
     told_.sweeps.take(done);
     told_.unpublished += is_published ? 0 : 1;
   }
-  if (done.estimate.beginning && !announced_)
-    announce(done.estimate);
-  if (announcement_ && link_.publish_beginning(DiagnosticsMessage({*announcement_}, done.estimate.stamp)))
+  if (estimate.beginning && !announced_)
+    announce(estimate);
+  if (announcement_ && link_.publish_beginning(DiagnosticsMessage({*announcement_}, estimate.stamp)))
     announcement_.reset();
-  tell(done.estimate.state);
+  tell(estimate.state);
 }
 
 /// A frame that begins anew is no surprise to who knows it.
@@ -341,6 +333,14 @@ Figures Session::figures() const {
   figures.ingest = told_.ingest;
   figures.sweeps = told_.sweeps.figures();
   live.unpublished = told_.unpublished;
+  if (figures.sweeps.last)
+    figures.sweeps.last = on_the_wall(*figures.sweeps.last);
+  const auto put_on_the_wall = [this](auto& sensors) {
+    for (auto& sensor : sensors)
+      sensor.last_heard = sensor.last_heard == Stamp{} ? Stamp{} : input_.time().wall(sensor.last_heard);
+  };
+  put_on_the_wall(figures.ingest.lidars);
+  put_on_the_wall(figures.ingest.sources);
   return figures;
 }
 

@@ -75,7 +75,6 @@ class Session {
   void publish();
   void publish(const ProcessedSweep& done);
   [[nodiscard]] OdometryEstimate on_the_wall(const OdometryEstimate& estimate) const;
-  void hear(const IngestReport& report);
   void tell_of_clock();
   void announce(const OdometryEstimate& estimate);
   void tell(TrackingState state);

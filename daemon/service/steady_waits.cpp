@@ -4,13 +4,15 @@
 // versions wait on the monotonic clock; this file goes when Debian has one.) So the process has this function in place
 // of the C library's: it waits for as long as was meant when the wait began.
 #include <algorithm>
+#include <cerrno>
+#include <chrono>
 #include <ctime>
 
 #include <pthread.h>
 
 #include "daemon/machine_time.hpp"
 
-#if defined(__has_feature)
+#ifdef __has_feature
 #if __has_feature(thread_sanitizer)
 #define LOCUS_WAITS_ARE_WATCHED // by a function of the sanitizer's, in the same place
 #endif
@@ -22,11 +24,13 @@
 extern "C" int pthread_cond_timedwait(pthread_cond_t* condition, pthread_mutex_t* mutex, const timespec* until) {
   using namespace locus;
   constexpr std::time_t kNever = 5'000'000'000; // in 2128; in nanoseconds it fits
-  const Duration end = std::chrono::seconds{std::min(until->tv_sec, kNever)} + Duration{until->tv_nsec};
-  const Duration steady_now = daemon::read_clock(CLOCK_MONOTONIC), wall_now = daemon::read_clock(CLOCK_REALTIME);
-  const Duration by_wall = end - wall_now, by_steady = end - steady_now;
-  const bool is_wall = std::chrono::abs(by_wall) < std::chrono::abs(by_steady);
-  const timespec steady_end = daemon::to_timespec(steady_now + (is_wall ? by_wall : by_steady));
+  if (until->tv_nsec < 0 || until->tv_nsec >= 1'000'000'000)
+    return EINVAL;
+  const Duration end = std::chrono::seconds{std::clamp(until->tv_sec, -kNever, kNever)} + Duration{until->tv_nsec};
+  const Duration steady_now = daemon::read_clock(CLOCK_MONOTONIC);
+  const Duration by_wall = end - daemon::read_clock(CLOCK_REALTIME), by_steady = end - steady_now;
+  const Duration left = std::chrono::abs(by_wall) < std::chrono::abs(by_steady) ? by_wall : by_steady;
+  const timespec steady_end = daemon::to_timespec(steady_now + std::max(left, Duration::zero()));
   return pthread_cond_clockwait(condition, mutex, CLOCK_MONOTONIC, &steady_end);
 }
 

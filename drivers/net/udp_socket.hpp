@@ -30,8 +30,8 @@ class UdpSocket {
   /// Listens to `port` on every interface. Fails with one line for the user.
   static Expected<UdpSocket, std::string> open(std::uint16_t port);
 
-  /// As open(), beside sockets of other programs of the same user that do so, too. Each of them gets what is broadcast;
-  /// what is sent to this host alone one of them gets.
+  /// As open(), shared (SO_REUSEPORT) with other sockets of the same user that ask for it, too. Each of them gets what
+  /// is broadcast; what is sent to this host alone one of them gets.
   static Expected<UdpSocket, std::string> open_beside_others(std::uint16_t port);
 
   /// Takes over a socket that somebody else has bound, e.g. systemd. Fails with one line for the user.

@@ -354,7 +354,7 @@ TEST(ConfigYaml, FileForTheServiceNamesALidarOrSaysThatItNeedNot) {
 
 TEST(ConfigYaml, AnotherVersionIsRefused) {
   ASSERT_EQ(errors_in("version: 2\n").size(), 1U);
-  EXPECT_TRUE(errors_in("version: 2\n")[0].starts_with("robot.yaml:1: version: this locusd reads version 1"));
+  EXPECT_TRUE(errors_in("version: 2\n")[0].starts_with("robot.yaml:1: version: this locusd reads version 1; see"));
 }
 
 TEST(ConfigYaml, RecordingDoesNotLeaveItsFolder) {

@@ -246,6 +246,14 @@ TEST_F(AnotherPlace, OneOfTwoOdometriesThatWasRestartedIsPassedOver) {
   EXPECT_FALSE(places[1].told);
 }
 
+TEST_F(AnotherPlace, AnotherOdometryIsAwaitedWhereOneWasRestarted) {
+  last_.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {-200, 0, 0}};
+  last_.T_source_base[2] = Pose{};
+  const std::vector<OdometryEstimate> estimates = go_on_from(last_);
+  EXPECT_FALSE(estimates[5].beginning);
+  EXPECT_EQ(estimates.back().beginning, Beginning::origin) << "it never comes";
+}
+
 TEST_F(AnotherPlace, OdometryThatIsNotHealthyIsAwaited) {
   SensedMotion sensed;
   EXPECT_FALSE(last_.awaits(sensed)) << "there was none";
