@@ -21,6 +21,7 @@
 #ifndef LOCUS_WAITS_ARE_WATCHED
 
 /// Of the two clocks that a wait may be for it is the nearer one; libraries differ.
+// The header has reserved names. NOLINTNEXTLINE(readability-inconsistent-declaration-parameter-name)
 extern "C" int pthread_cond_timedwait(pthread_cond_t* condition, pthread_mutex_t* mutex, const timespec* until) {
   using namespace locus;
   constexpr std::time_t kNever = 5'000'000'000; // in 2128; in nanoseconds it fits
