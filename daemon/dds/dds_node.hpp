@@ -46,7 +46,8 @@ struct TopicQos {
   static constexpr TopicQos standard() { return {true, 10}; }   ///< odometry, diagnostics, commands
   static constexpr TopicQos transform() { return {true, 100}; } ///< tf
   static constexpr TopicQos latch() { return {true, 1, true}; } ///< what stays true
-  static constexpr TopicQos sensor_out() { return {false, 5}; } ///< clouds
+  static constexpr TopicQos cloud() { return {true, 5}; }       ///< rviz2 asks for it; who does not is served, too
+  static constexpr TopicQos sensor_out() { return {false, 5}; } ///< as drivers of sensors send
   static constexpr TopicQos sensor_in() {
     return {false, 100};
   } ///< best effort readers accept every writer; the depth

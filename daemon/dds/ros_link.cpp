@@ -55,9 +55,9 @@ struct RosLink::Session {
     if (dds.publish_tf)
       tf.emplace(node, "/tf", TopicQos::transform());
     if (dds.publish_cloud)
-      cloud.emplace(node, dds.prefix + "/cloud", TopicQos::sensor_out());
+      cloud.emplace(node, dds.prefix + "/cloud", TopicQos::cloud());
     if (dds.publish_map)
-      map.emplace(node, dds.prefix + "/map", TopicQos::sensor_out());
+      map.emplace(node, dds.prefix + "/map", TopicQos::latch());
     listen(config);
   }
 

@@ -38,8 +38,8 @@ void listen(const DdsNode& node, const std::string& prefix) {
   DdsReader<ros::Odometry> fast{node, prefix + "/odometry_fast", TopicQos::standard()};
   DdsReader<ros::UInt8> state{node, prefix + "/state", TopicQos::standard()};
   DdsReader<ros::TFMessage> tf{node, "/tf", TopicQos::transform()};
-  DdsReader<ros::PointCloud2> cloud{node, prefix + "/cloud", TopicQos::sensor_in()};
-  DdsReader<ros::PointCloud2> map{node, prefix + "/map", TopicQos::sensor_in()};
+  DdsReader<ros::PointCloud2> cloud{node, prefix + "/cloud", TopicQos::standard()}; // as rviz2 asks for it
+  DdsReader<ros::PointCloud2> map{node, prefix + "/map", TopicQos::latch()};
   DdsReader<ros::DiagnosticArray> diagnostics{node, "/diagnostics", TopicQos::standard()};
   DdsReader<ros::DiagnosticArray> beginning{node, prefix + "/beginning", TopicQos::latch()};
   const auto say_cloud = [](const ros::PointCloud2& m, const char* topic) {

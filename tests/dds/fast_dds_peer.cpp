@@ -134,6 +134,7 @@ void run(int argc, char** argv) {
   listen<FastUInt8>(participant, prefix + "/state", "state");
   listen<FastTransforms>(participant, "/tf", "tf");
   listen<FastCloud>(participant, prefix + "/cloud", "cloud", false);
+  listen<FastCloud>(participant, prefix + "/map", "map", true, true);
   listen<FastDiagnostics>(participant, "/diagnostics", "diagnostics");
   listen<FastDiagnostics>(participant, prefix + "/beginning", "beginning", true, true);
   while (stdin_is_open())

@@ -128,14 +128,18 @@ TEST_P(Peers, HearOdometryStateTransformCloudAndDiagnostics) {
   EXPECT_EQ(listener.lines_of("diagnostics").back(), "2 1 locusd");
 }
 
-TEST_P(Peers, WhoComeLaterHearHowItBeganOnce) {
+TEST_P(Peers, WhoComeLaterHearHowItBeganAndTheMapOnce) {
+  const std::vector<CloudMessage::Point> points(100, {1, 2, 3, 0, 0, 0, 0});
   RosLink link(config_, inbox_.sink());
   ASSERT_TRUE(eventually([&] {
     return link.publish_beginning(DiagnosticsMessage(
         {{Diagnostic::Level::warning, "locusd: beginning", "", {{"from", "map"}}}}, stamp_from_ns(1)));
   }));
+  link.publish_map(points, stamp_from_ns(1));
   const test::Child listener(peer("listen"));
-  EXPECT_TRUE(eventually([&] { return !listener.lines_of("beginning").empty(); }));
+  EXPECT_TRUE(
+      eventually([&] { return !listener.lines_of("beginning").empty() && !listener.lines_of("map").empty(); }));
+  EXPECT_EQ(listener.lines_of("map").size(), 1U);
   EXPECT_EQ(listener.lines_of("beginning"), std::vector<std::string>{"1 1 locusd: beginning"});
 }
 
