@@ -137,8 +137,7 @@ TEST_P(Peers, WhoComeLaterHearHowItBeganAndTheMapOnce) {
   }));
   link.publish_map(points, stamp_from_ns(1));
   const test::Child listener(peer("listen"));
-  EXPECT_TRUE(
-      eventually([&] { return !listener.lines_of("beginning").empty() && !listener.lines_of("map").empty(); }));
+  EXPECT_TRUE(eventually([&] { return !listener.lines_of("beginning").empty() && !listener.lines_of("map").empty(); }));
   EXPECT_EQ(listener.lines_of("map").size(), 1U);
   EXPECT_EQ(listener.lines_of("beginning"), std::vector<std::string>{"1 1 locusd: beginning"});
 }
