@@ -38,14 +38,15 @@ void SteadyTime::look() {
   set_by_ns_.store(set_by_.count(), std::memory_order_relaxed);
 }
 
-/// Read by the clock as it is now, a stamp from before a step forward lies before that step; one from before a step
-/// back lies in the future.
+/// Read by the clock as it is now, a stamp from before a step forward lies before that step, which was noticed a moment
+/// after it; one from before a step back lies in the future.
 Stamp SteadyTime::steady(Stamp wall) const {
   const Stamp after = wall - set_by_, before = wall - set_by_before_;
   if (set_by_ == set_by_before_ || now() - set_at_ > kOnItsWay)
     return after;
   const Stamp latest = now() + kSlew;
-  return (after < set_at_ && before < latest) || after > latest ? before : after;
+  const bool is_forward = set_by_ > set_by_before_;
+  return (is_forward && after < set_at_ && before < latest) || after > latest ? before : after;
 }
 
 Stamp SteadyTime::steady(Stamp stamp, Stamp arrival, Sender& sender) const {

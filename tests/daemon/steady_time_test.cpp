@@ -94,6 +94,20 @@ TEST_F(Steady, ArrivalFromBeforeTheStepThatIsReadAfterItIsOfItsTime) {
   }
 }
 
+TEST_F(Steady, ArrivalBetweenTheStepAndTheLookThatNoticesItIsOfItsTime) {
+  for (const Duration step :
+       {Duration{milliseconds{20}}, Duration{-milliseconds{20}}, Duration{hours{1}}, Duration{-hours{1}}}) {
+    SetUp();
+    SteadyTime time(host_clock);
+    wall_ahead += step;
+    since_boot += milliseconds{1};
+    const Stamp made{since_boot + wall_ahead};
+    since_boot += milliseconds{1};
+    time.look();
+    EXPECT_EQ(time.steady(made), kBoot + seconds{100} + milliseconds{1}) << to_seconds(step);
+  }
+}
+
 TEST_F(Steady, ClockThatIsSlewedIsNotSet) {
   SteadyTime time(host_clock);
   for (int i = 0; i < 1000; ++i) {
