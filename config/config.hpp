@@ -58,8 +58,8 @@ struct Config {
   static constexpr std::size_t kMaxLidars = 16;
   static constexpr int kVersion = 1;
 
-  int version = kVersion;                           ///< of the keys and what they mean
-  bool defaults = false;                            ///< a service may run without a word about its lidars
+  int version = kVersion;                           ///< of the file format
+  bool defaults = false;                            ///< a file for the service may leave out its lidars
   std::vector<LidarOptions> lidars{LidarOptions{}}; ///< the first one gives the sweep its period
   std::vector<MotionSource> motion_sources{{{"wio", SourceKind::odometry, {}}, "/wheel_odometry", ""},
                                            {{"imu", SourceKind::imu, {}}, "/imu/data", ""}}; ///< highest priority first

@@ -48,7 +48,6 @@ class SteadyTime {
   [[nodiscard]] Stamp now() const;
 
   Clock clock_;
-
   Duration offset_;                     ///< of the wall clock, against the time since the host was booted
   Duration set_by_{}, set_by_before_{}; ///< since the start in all, and before the last time
   Stamp set_at_;                        ///< that was the last time

@@ -17,7 +17,7 @@ constexpr Duration kMaxLate = std::chrono::seconds{1}; ///< behind it: no networ
 constexpr int kMaxReplaySpeed = 10; ///< sensor time per time of reception, where only `sensor` counts
 constexpr int kMaxLiveSpeed = 2;    ///< the same, of packets that no network holds up
 constexpr int kProofOfStep = 5;
-constexpr Duration kSilence = std::chrono::minutes{1}; ///< a lidar was off, or the host's clock was set
+constexpr Duration kSilence = std::chrono::minutes{1}; ///< of a lidar that was off
 
 constexpr Duration kEnvelopeSpan = milliseconds{500};
 constexpr Duration kSettling = std::chrono::seconds{1};

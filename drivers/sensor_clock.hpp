@@ -25,8 +25,7 @@ namespace locus {
 /// clock was set: a step, counted, and time goes on from there. Packets that come late must come at the pace of a clock
 /// for that, not all at once from where a network held them up. A drift that the envelope cannot be followed at (error
 /// beyond 5 ms) is a step too. After a minute of silence it begins anew: what a lidar that was off did not send is not
-/// lost, and a host's clock that was set by a whole hour looks the same. Time of hour wraps every hour, unnoticed.
-/// Reads no clock, allocates nothing. One owner.
+/// lost. Time of hour wraps every hour, unnoticed. Reads no clock, allocates nothing. One owner.
 ///
 /// Where the host's clock has been set, stamps stay in the time before (`set_by`), and a lidar on UTC is compared anew
 /// with that clock as it is by now; with `sensor` that is another zero, and time goes on from there.

@@ -2,7 +2,7 @@
 // Cyclone DDS 0.10 waits until a time of the wall clock. Where that is set back by an hour each such wait takes an hour
 // longer, and with it all that DDS does by itself: heartbeats, discovery, what our own thread waits for. (Later
 // versions wait on the monotonic clock; this file goes when Debian has one.) So the process has this function in place
-// of the C library's: it waits for as long as was meant when the wait began.
+// of the C library's: it waits for as long as is left when the wait begins.
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
