@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/clouds/cloud_doubt.hpp"
+
+#include <fmt/format.h>
+
+namespace locus {
+
+namespace {
+
+/// What becomes of points without times.
+std::string_view fallback(PointTiming timing) {
+  return timing == PointTiming::azimuth ? "their times are told from their azimuths"
+                                        : "they count as seen at one instant, so a robot that moves makes them a "
+                                          "distorted world";
+}
+
+} // namespace
+
+std::string explain(CloudDoubt doubt, PointTiming timing) {
+  switch (doubt) {
+  case CloudDoubt::no_times:
+    return fmt::format("its points have no field of times (time, t, timestamp, time_stamp, offset_time), so {}; have "
+                       "the lidar's driver publish points with times",
+                       fallback(timing));
+  case CloudDoubt::equal_times:
+    return fmt::format("its points all have the same time, so {}; have the lidar's driver publish the times of points, "
+                       "not those of packets or clouds",
+                       fallback(timing));
+  case CloudDoubt::disorder:
+    return fmt::format("the times of its points go up and down along a ring, so {}; take the topic of the driver, not "
+                       "one that a filter has made of it",
+                       fallback(timing));
+  case CloudDoubt::no_unit:
+    return fmt::format(
+        "the times of its points span no turn of a lidar in s, ms, us or ns (0.5 to 250 ms), so {}; look "
+        "which unit the driver writes, and whether its clouds are of one turn",
+        fallback(timing));
+  case CloudDoubt::stamp_at_end:
+    return "its clouds arrive before their last point by their stamps: the header's stamp is taken for that of the "
+           "last "
+           "point, not of the first; set the driver to stamp the first point";
+  case CloudDoubt::tai:
+    return "its stamps are 37 s ahead of this computer's clock: they are TAI, as PTP has it, not UTC; they are put "
+           "where they arrive; give ptp4l and phc2sys the offset to UTC (37 s)";
+  case CloudDoubt::ahead:
+    return "its stamps are in the future by this computer's clock, so they are put where they arrive; synchronise the "
+           "lidar's clock with it (PTP), or have the driver stamp by the computer's clock";
+  case CloudDoubt::behind:
+    return "its stamps are of another clock than this computer's, so they are put where they arrive; synchronise the "
+           "lidar's clock with it (PTP), or have the driver stamp by the computer's clock";
+  }
+  return "";
+}
+
+} // namespace locus

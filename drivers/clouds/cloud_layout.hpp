@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+
+#include "core/base/expected.hpp"
+#include "drivers/clouds/cloud_counters.hpp"
+#include "drivers/clouds/cloud_view.hpp"
+
+namespace locus {
+
+/// Where the figures of a point lie in its record. Fields are known by their names, whatever driver wrote them:
+///
+/// | driver | ring | time |
+/// |---|---|---|
+/// | velodyne_pointcloud | ring: uint16 | time: float32, s to the header's stamp, before it or after it |
+/// | ouster-ros | ring: uint8 or uint16 | t: uint32, ns since the header's stamp |
+/// | Hesai, RoboSense | ring: uint16 | timestamp: float64, s since 1970 |
+/// | nebula | channel: uint16 | time_stamp: uint32, ns since the header's stamp |
+/// | livox_ros_driver | line: uint8 | timestamp: float64, ns since 1970; offset_time: uint32, ns |
+///
+/// What their numbers mean is told from the numbers, see PointTimes.
+struct CloudLayout {
+  using Type = CloudView::Type;
+  struct Column {
+    std::uint32_t offset = 0;
+    Type type{};
+    bool operator==(const Column&) const = default;
+  };
+
+  Column x, y, z;
+  std::optional<Column> intensity, ring, time;
+  bool row_is_ring = false; ///< organised: each row is a laser, and no field says which
+
+  bool operator==(const CloudLayout&) const = default;
+};
+
+/// The layout of a message, or why it cannot be used; then nothing of it is to be read. Any thread.
+Expected<CloudLayout, CloudError> layout_of(const CloudView& message);
+
+/// The most points that a message may have: twice those of the largest lidar in dual return mode today.
+inline constexpr std::size_t kMaxCloudPoints = std::size_t{1} << 20;
+
+inline std::size_t points_of(const CloudView& message) { return std::size_t{message.height} * message.width; }
+
+/// Calls `take(value)` with the number of each point in one column, in the order of the message. Precondition:
+/// layout_of has a layout, of which this is a column.
+template <class Take> void for_each_in(const CloudView& message, CloudLayout::Column column, const Take& take) {
+  const auto read_as = [&]<class Number>(Number value) {
+    if (message.width == 0)
+      return;
+    for (std::size_t row = 0; row < message.height; ++row) {
+      const std::byte* at = message.data.data() + row * message.row_step + column.offset;
+      for (std::size_t i = 0; i < message.width; ++i, at += message.point_step) {
+        std::memcpy(&value, at, sizeof(value));
+        take(value);
+      }
+    }
+  };
+  using Type = CloudView::Type;
+  switch (column.type) {
+  case Type::int8:
+    return read_as(std::int8_t{});
+  case Type::uint8:
+    return read_as(std::uint8_t{});
+  case Type::int16:
+    return read_as(std::int16_t{});
+  case Type::uint16:
+    return read_as(std::uint16_t{});
+  case Type::int32:
+    return read_as(std::int32_t{});
+  case Type::uint32:
+    return read_as(std::uint32_t{});
+  case Type::float32:
+    return read_as(float{});
+  case Type::float64:
+    return read_as(double{});
+  }
+}
+
+} // namespace locus

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/clouds/point_times.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace locus {
+
+namespace {
+
+constexpr Duration kSameClock = std::chrono::seconds{1};
+
+/// Whether the numbers go up and down along the rings.
+bool is_disordered(std::span<const double> times, std::span<const std::uint8_t> rings) {
+  constexpr std::size_t kOneIn = 10;
+  std::array<double, 256> last;
+  last.fill(std::nan(""));
+  std::size_t up = 0, down = 0;
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    double& before = last[rings[i]];
+    up += times[i] > before ? 1U : 0U;
+    down += times[i] < before ? 1U : 0U;
+    before = times[i];
+  }
+  return kOneIn * std::min(up, down) > times.size();
+}
+
+/// In which the points take as long as a turn does. What is too long in the unit before has at least a part of it in
+/// the finest one, and what is too short in the coarsest one is not longer in any other.
+std::optional<double> guess_unit_s(double span) {
+  struct Unit {
+    double unit_s;
+    Duration shortest;
+  };
+  constexpr Duration kFiring = std::chrono::microseconds{10};
+  constexpr std::array kUnits{Unit{1.0, kFiring}, Unit{1e-3, kShortestCloud}, Unit{1e-6, kShortestCloud},
+                              Unit{1e-9, kLongestCloud / 1000}};
+  const auto fits = [span](const Unit& unit) {
+    const double span_s = span * unit.unit_s;
+    return span_s >= to_seconds(unit.shortest) && span_s <= to_seconds(kLongestCloud);
+  };
+  const auto found = std::ranges::find_if(kUnits, fits);
+  return found == kUnits.end() ? std::nullopt : std::optional{found->unit_s};
+}
+
+} // namespace
+
+PointTimes PointTimes::in_unit(double unit_s, double first, double last) {
+  constexpr double kFarFromHeader_s = 60;
+  return {unit_s, std::max(std::abs(first), std::abs(last)) * unit_s > kFarFromHeader_s, first, last};
+}
+
+bool PointTimes::is_short_enough() const { return (last - first) * unit_s <= to_seconds(kLongestCloud); }
+
+Stamp PointTimes::begin(Stamp header, Stamp arrival) const {
+  constexpr double kMost_ns = 9e18;
+  if (!of_a_clock)
+    return header + between(0, first);
+  const double ns = first * (unit_s * 1e9);
+  if (!(std::abs(ns) < kMost_ns))
+    return header;
+  const Stamp own = stamp_from_ns(std::llround(ns));
+  const auto is_near = [ns](Stamp other) {
+    return std::abs(ns - static_cast<double>(to_ns(other))) < static_cast<double>(kSameClock.count());
+  };
+  return is_near(header) || is_near(arrival) ? own : header;
+}
+
+Expected<PointTimes, CloudDoubt> understand(std::span<const double> times, std::span<const std::uint8_t> rings,
+                                            std::optional<double> known_unit_s) {
+  const auto [first, last] = std::ranges::minmax(times);
+  if (!(last > first))
+    return CloudDoubt::equal_times;
+  const bool fits_known = known_unit_s && PointTimes::in_unit(*known_unit_s, first, last).is_short_enough();
+  const std::optional<double> unit_s = fits_known ? known_unit_s : guess_unit_s(last - first);
+  if (!unit_s)
+    return CloudDoubt::no_unit;
+  if (is_disordered(times, rings))
+    return CloudDoubt::disorder;
+  return PointTimes::in_unit(*unit_s, first, last);
+}
+
+} // namespace locus

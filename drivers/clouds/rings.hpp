@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "core/base/names.hpp"
+#include "core/ingest/lidar_packet.hpp"
+
+namespace locus {
+
+/// Where the rings of points are known from: a field of the message, the rows of an organised cloud, the elevations at
+/// which the points lie, or equal bands of elevation where they lie everywhere.
+enum class RingsFrom : std::uint8_t { field, rows, elevation, bands };
+constexpr auto names_of(RingsFrom) { return std::to_array<std::string_view>({"field", "rows", "elevation", "bands"}); }
+
+/// Tells the laser of each point of a cloud, and which laser is how high. One owner; allocates nothing, throws nothing.
+class Rings {
+ public:
+  static constexpr std::size_t kMax = LidarPacket::kMaxLasers;
+
+  /// Positions of returns, all finite and none at the origin.
+  struct Positions {
+    std::span<const float> x_m, y_m, z_m;
+  };
+
+  /// Writes the laser of each point, 0 .. kMax - 1, to `lasers`. `told`: what field or row says; empty where neither
+  /// does. Numbers that no laser can have count as not told.
+  void tell(Positions points, std::span<const float> told, RingsFrom told_by, std::vector<std::uint8_t>& lasers);
+
+  /// The number of a laser counted upwards, by the mean elevations that it was seen at. 0 is the lowest.
+  [[nodiscard]] std::uint8_t ring_of(std::size_t laser) const { return ring_of_[laser]; }
+  [[nodiscard]] RingsFrom from() const { return from_; }
+
+ private:
+  static constexpr double kBin_rad = 0.0017; ///< a tenth of a degree
+  static constexpr std::size_t kBins = 1850; ///< from straight down to straight up
+
+  void find_lines(Positions points);
+  void rank(Positions points, std::span<const std::uint8_t> lasers);
+
+  RingsFrom from_ = RingsFrom::field;
+  bool lines_known_ = false;
+  std::array<std::uint8_t, kBins> laser_of_bin_{};
+  std::array<std::uint32_t, kBins> histogram_{};
+  std::array<double, kMax> elevation_sum_rad_{};
+  std::array<std::uint64_t, kMax> seen_{};
+  std::array<std::uint8_t, kMax> ring_of_{};
+};
+
+} // namespace locus

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <numbers>
+#include <vector>
+
+/// What a lidar of 128 rings sees of a room from where it stands, as a driver publishes it: 130 048 points, each of 22
+/// bytes, with `time` in seconds since the header's stamp.
+namespace locus::test::room_cloud {
+
+struct Field {
+  const char* name;
+  std::uint32_t offset;
+  std::uint8_t type; ///< as sensor_msgs/PointField counts
+};
+inline constexpr std::array kFields{Field{"x", 0, 7},          Field{"y", 4, 7},     Field{"z", 8, 7},
+                                    Field{"intensity", 12, 7}, Field{"ring", 16, 4}, Field{"time", 18, 7}};
+inline constexpr std::uint32_t kColumns = 1016, kRings = 128, kPoints = kColumns * kRings, kStep = 22;
+
+/// 8 x 6 m, floor 1 m below and ceiling 3 m above the lidar, which is a metre off the middle.
+inline std::vector<std::uint8_t> points() {
+  std::vector<std::uint8_t> bytes(std::size_t{kPoints} * kStep);
+  std::uint8_t* at = bytes.data();
+  for (std::uint32_t column = 0; column < kColumns; ++column) {
+    const double share = static_cast<double>(column) / kColumns, azimuth = -2 * std::numbers::pi * share;
+    for (std::uint16_t ring = 0; ring < kRings; ++ring, at += kStep) {
+      const double elevation = (static_cast<double>(ring) - 64) * 0.35 * std::numbers::pi / 180;
+      const std::array ray{std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
+                           std::sin(elevation)};
+      constexpr std::array kLow{-3.0, -3.0, -1.0}, kHigh{5.0, 3.0, 3.0};
+      double range_m = 1e9;
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        if (std::abs(ray[axis]) > 1e-9)
+          range_m = std::min(range_m, (ray[axis] > 0 ? kHigh[axis] : kLow[axis]) / ray[axis]);
+      const std::array<float, 4> xyzi{static_cast<float>(ray[0] * range_m), static_cast<float>(ray[1] * range_m),
+                                      static_cast<float>(ray[2] * range_m), 50};
+      const auto time_s = static_cast<float>(0.1 * share);
+      std::memcpy(at, xyzi.data(), sizeof(xyzi));
+      std::memcpy(at + 16, &ring, sizeof(ring));
+      std::memcpy(at + 18, &time_s, sizeof(time_s));
+    }
+  }
+  return bytes;
+}
+
+} // namespace locus::test::room_cloud
