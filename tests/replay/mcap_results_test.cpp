@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: Apache-2.0
+// What --mcap writes, read back: by the reader of bags, and record by record.
+#include <fstream>
+#include <map>
+
+#include <gtest/gtest.h>
+
+#include "bag_writer.hpp"
+#include "bags/bag.hpp"
+#include "bags/mcap_record.hpp"
+#include "bags/messages.hpp"
+#include "bags/ros_definitions.hpp"
+#include "dds/fast_dds_types.hpp"
+#include "mcap_text.hpp"
+#include "replay_run.hpp"
+#include "support/errors.hpp"
+#include "support/test_drives.hpp"
+
+namespace locus::test {
+namespace {
+
+using tools::McapOp;
+using tools::McapRecord;
+/// As another implementation of DDS reads it.
+template <class Message> Message read_by_fast_cdr(std::span<const std::byte> data) {
+  std::string bytes(reinterpret_cast<const char*>(data.data()), data.size());
+  eprosima::fastcdr::FastBuffer buffer(bytes.data(), bytes.size());
+  eprosima::fastcdr::Cdr cdr(buffer, eprosima::fastcdr::Cdr::DEFAULT_ENDIAN, eprosima::fastcdr::Cdr::DDS_CDR);
+  cdr.read_encapsulation();
+  FastStream<true> stream(cdr);
+  Message message;
+  stream(message);
+  EXPECT_EQ(cdr.getSerializedDataLength(), bytes.size());
+  return message;
+}
+
+class McapResults : public testing::Test {
+ protected:
+  McapResults() : replay_({"--mcap", file_, room_drive()}), bytes_(read_text(file_)) {
+    EXPECT_EQ(replay_.run().status, 0) << replay_.run().err;
+  }
+
+  [[nodiscard]] std::span<const std::byte> bytes(std::uint64_t begin, std::uint64_t size) const {
+    return std::as_bytes(std::span{bytes_}).subspan(begin, size);
+  }
+  [[nodiscard]] McapRecord record_at(std::uint64_t begin) const {
+    std::span<const std::byte> rest = bytes(begin, bytes_.size() - begin);
+    return tools::take_mcap_record(rest).value();
+  }
+
+  TemporaryFolder folder_;
+  std::string file_ = folder_ / "out.mcap";
+  Replay replay_;
+  std::string bytes_;
+};
+
+TEST_F(McapResults, HoldsTheOdometryOfEverySweep) {
+  const auto bag = tools::open_bag(file_);
+  ASSERT_TRUE(bag) << bag.error();
+  const std::vector<StampedPose> trajectory = replay_.trajectory();
+  std::map<std::string, std::size_t> count;
+  while (const tools::BagMessage* message = (*bag)->next()) {
+    const tools::BagTopic& topic = (*bag)->topics().at(message->topic);
+    const std::size_t k = count[topic.name + " " + topic.type]++;
+    if (topic.type != "nav_msgs/Odometry")
+      continue;
+    const auto odometry = tools::read_odometry({message->data, topic.serialisation});
+    ASSERT_TRUE(odometry);
+    ASSERT_LT(k, trajectory.size());
+    EXPECT_NEAR(to_seconds(message->recorded - trajectory[k].stamp), 0, 1e-6) << "the file of poses has microseconds";
+    EXPECT_NEAR(odometry->pose_.pose_.position_.x_, trajectory[k].T_source_base.translation.x(), 1e-6);
+    EXPECT_NEAR(odometry->pose_.pose_.orientation_.z_, trajectory[k].T_source_base.rotation.z(), 1e-6);
+    EXPECT_GT(odometry->pose_.covariance_[0], 0);
+  }
+  EXPECT_TRUE((*bag)->warnings().empty());
+  EXPECT_GT(trajectory.size(), 70U);
+  EXPECT_EQ(count["/locus/odometry nav_msgs/Odometry"], trajectory.size());
+  EXPECT_EQ(count["/tf tf2_msgs/TFMessage"], trajectory.size());
+  EXPECT_EQ(count["/locus/cloud sensor_msgs/PointCloud2"], trajectory.size());
+  const double duration_s = to_seconds(trajectory.back().stamp - trajectory.front().stamp);
+  EXPECT_NEAR(static_cast<double>(count["/diagnostics diagnostic_msgs/DiagnosticArray"]), duration_s, 2);
+  EXPECT_EQ(count.size(), 4U);
+}
+
+TEST_F(McapResults, IsWhatOtherProgramsTakeForMessagesOfRos) {
+  const auto bag = tools::open_bag(file_);
+  ASSERT_TRUE(bag) << bag.error();
+  std::size_t points = 0, statuses = 0, transforms = 0;
+  while (const tools::BagMessage* message = (*bag)->next()) {
+    const std::string& type = (*bag)->topics().at(message->topic).type;
+    if (type == "tf2_msgs/TFMessage") {
+      const auto tf = read_by_fast_cdr<FastTransforms>(message->data);
+      ASSERT_EQ(tf.transforms.size(), 1U);
+      EXPECT_EQ(tf.transforms[0].header.frame_id, "odom");
+      EXPECT_EQ(tf.transforms[0].child_frame_id, "base_link");
+      ++transforms;
+    } else if (type == "sensor_msgs/PointCloud2") {
+      const auto cloud = read_by_fast_cdr<FastCloud>(message->data);
+      EXPECT_EQ(cloud.header.frame_id, "base_link");
+      EXPECT_EQ(cloud.data.size(), std::size_t{cloud.width} * cloud.point_step);
+      points += cloud.width;
+    } else if (type == "diagnostic_msgs/DiagnosticArray") {
+      const auto diagnostics = read_by_fast_cdr<FastDiagnostics>(message->data);
+      ASSERT_GE(diagnostics.statuses.size(), 4U) << "odometry, lidar, imu, wheels";
+      EXPECT_EQ(diagnostics.statuses[0].name, "locusd");
+      EXPECT_EQ(diagnostics.statuses[1].name, "locusd: lidar front");
+      EXPECT_EQ(diagnostics.statuses[1].message, "heard");
+      ++statuses;
+    }
+  }
+  EXPECT_GT(points, 10'000U);
+  EXPECT_GT(statuses, 5U);
+  EXPECT_GT(transforms, 70U);
+}
+
+/// Players that go by the index find each message, and the checksums are right.
+TEST_F(McapResults, IndexLeadsToEachMessage) {
+  constexpr std::size_t kEnd = tools::kMcapFooterBytes + tools::kMcapMagic.size();
+  const auto footer = tools::McapFooter::read(record_at(bytes_.size() - kEnd));
+  ASSERT_TRUE(footer);
+  EXPECT_EQ(footer->summary_crc,
+            tools::mcap_crc(bytes(footer->summary_start, bytes_.size() - kEnd + 9 + 16 - footer->summary_start)));
+  std::map<McapOp, int> records;
+  std::uint64_t indexed = 0, messages = 0;
+  std::span<const std::byte> rest = bytes(footer->summary_start, footer->summary_offset_start - footer->summary_start);
+  while (const auto record = tools::take_mcap_record(rest)) {
+    ++records[record->op];
+    MessageReader fields = record->fields();
+    if (record->op == McapOp::statistics)
+      messages = fields.number<std::uint64_t>();
+    if (record->op != McapOp::chunk_index)
+      continue;
+    const auto first_ns = fields.number<std::uint64_t>(), last_ns = fields.number<std::uint64_t>();
+    const auto begin = fields.number<std::uint64_t>(), length = fields.number<std::uint64_t>();
+    MessageReader indices(fields.sequence(), Serialisation::ros1);
+    const auto indices_length = fields.number<std::uint64_t>();
+    const McapRecord chunk = record_at(begin);
+    ASSERT_EQ(chunk.op, McapOp::chunk);
+    EXPECT_EQ(tools::kMcapRecordHead + chunk.content.size(), length);
+    std::vector<std::byte> room;
+    const tools::McapChunkRecords unpacked = tools::unpack_mcap_chunk(chunk, room);
+    EXPECT_EQ(unpacked.problem, "");
+    std::uint64_t indices_seen = 0;
+    for (auto channel = indices.number<std::uint16_t>(); indices.whole(); channel = indices.number<std::uint16_t>()) {
+      const McapRecord index = record_at(indices.number<std::uint64_t>());
+      ASSERT_EQ(index.op, McapOp::message_index);
+      indices_seen += tools::kMcapRecordHead + index.content.size();
+      MessageReader entries = index.fields();
+      EXPECT_EQ(entries.number<std::uint16_t>(), channel);
+      MessageReader times(entries.sequence(), Serialisation::ros1);
+      for (auto ns = times.number<std::uint64_t>(); times.whole(); ns = times.number<std::uint64_t>()) {
+        EXPECT_TRUE(ns >= first_ns && ns <= last_ns);
+        std::span<const std::byte> at = unpacked.bytes.subspan(times.number<std::uint64_t>());
+        const McapRecord message = tools::take_mcap_record(at).value();
+        MessageReader of_message = message.fields();
+        EXPECT_EQ(message.op, McapOp::message);
+        EXPECT_EQ(of_message.number<std::uint16_t>(), channel);
+        of_message.number<std::uint32_t>(); // sequence number
+        EXPECT_EQ(of_message.number<std::uint64_t>(), ns);
+        ++indexed;
+      }
+    }
+    EXPECT_EQ(indices_seen, indices_length);
+  }
+  EXPECT_TRUE(rest.empty());
+  EXPECT_EQ(records[McapOp::schema], 4);
+  EXPECT_EQ(records[McapOp::channel], 4);
+  EXPECT_EQ(records[McapOp::statistics], 1);
+  EXPECT_GT(records[McapOp::chunk_index], 3);
+  EXPECT_EQ(indexed, messages);
+  EXPECT_GT(messages, 200U);
+}
+
+TEST(McapDefinitions, HoldAllThatIsInAMessageOnce) {
+  const std::string text = tools::ros2_definition("nav_msgs/msg/Odometry");
+  EXPECT_TRUE(text.starts_with("std_msgs/Header header\nstring child_frame_id\n")) << text;
+  for (const char* const name :
+       {"builtin_interfaces/Time", "std_msgs/Header", "geometry_msgs/Point", "geometry_msgs/Quaternion",
+        "geometry_msgs/Vector3", "geometry_msgs/Pose", "geometry_msgs/PoseWithCovariance", "geometry_msgs/Twist",
+        "geometry_msgs/TwistWithCovariance"}) {
+    const std::string head = std::string(80, '=') + "\nMSG: " + name + "\n";
+    const std::size_t found = text.find(head);
+    ASSERT_NE(found, std::string::npos) << name;
+    EXPECT_EQ(text.find(head, found + 1), std::string::npos) << name;
+  }
+  EXPECT_EQ(text.find("PointField"), std::string::npos);
+}
+
+TEST(McapOption, WritesOverNoInputAndTellsWhatItCannotWrite) {
+  const TemporaryFolder folder;
+  const std::string capture = folder / "drive.pcap";
+  std::filesystem::copy_file(room_drive() / "lidar.pcap", capture);
+  const auto refusal = [&](const std::string& file, int status) {
+    const ProgramRun run = run_program(LOCUS_REPLAY, {"-o", folder / "out", "--mcap", file, capture});
+    EXPECT_EQ(run.status, status);
+    EXPECT_EQ(lines_of(run.err).size(), 1U) << run.err;
+    return run.err;
+  };
+  EXPECT_TRUE(contains(refusal(capture, 2), "choose another file with --mcap"));
+  EXPECT_EQ(std::filesystem::file_size(capture), std::filesystem::file_size(room_drive() / "lidar.pcap"));
+  EXPECT_TRUE(contains(refusal("/nowhere/out.mcap", 1), "/nowhere/out.mcap: cannot be written"));
+  EXPECT_TRUE(contains(refusal("/dev/full", 1), "/dev/full: cannot be written"));
+  EXPECT_LT(lines_of(read_text(folder / "out/odometry.csv")).size(), 70U) << "it is said before the end of the run";
+  EXPECT_EQ(
+      run_program(LOCUS_REPLAY, {"-o", folder / "out", "--realtime", "--mcap", folder / "a.mcap", capture}).status, 2);
+}
+
+/// Of a run that is refused before it writes anything.
+std::string refusal_of(const std::vector<std::string>& arguments) {
+  const ProgramRun run = run_program(LOCUS_REPLAY, arguments);
+  EXPECT_EQ(run.status, 2) << run.err;
+  EXPECT_EQ(lines_of(run.err).size(), 1U) << run.err;
+  return run.err;
+}
+
+TEST(McapOption, LeavesTheFolderOfABagAsItIs) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "drive");
+  const std::string part = folder / "drive/drive_0.mcap", link = folder / "link.mcap";
+  const std::string bytes = mcap_file(messages_of(room_drive(), RosVersion::ros2), RosVersion::ros2);
+  std::ofstream{part, std::ios::binary} << bytes;
+  std::filesystem::create_symlink(part, link);
+  for (const std::string& file : {part, (folder / "drive/new.mcap").string()})
+    EXPECT_TRUE(contains(refusal_of({"-o", folder / "out", "--mcap", file, folder / "drive/"}),
+                         file == part ? "choose another file with --mcap" : "choose a file in another folder"));
+  EXPECT_TRUE(contains(refusal_of({"-o", folder / "out", "--mcap", link, folder / "drive"}), "drive_0.mcap: the run"));
+  EXPECT_TRUE(read_text(part) == bytes);
+  EXPECT_FALSE(std::filesystem::exists(folder / "drive/new.mcap"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+}
+
+TEST(McapOption, LeavesEveryFileOfACaptureFolderAsItIs) {
+  const TemporaryFolder folder;
+  const std::filesystem::path drive = folder / "drive";
+  std::filesystem::copy(room_drive(), drive);
+  for (const auto& file : std::filesystem::directory_iterator(drive)) {
+    const std::string bytes = read_text(file.path());
+    const std::string link = folder / "link";
+    std::filesystem::create_hard_link(file.path(), link);
+    for (const std::string& name : {link, file.path().string()})
+      EXPECT_TRUE(contains(refusal_of({"-o", folder / "out", "--mcap", name, drive}), "the run would write its own"));
+    EXPECT_TRUE(read_text(file.path()) == bytes) << file.path();
+    std::filesystem::remove(link);
+  }
+  EXPECT_TRUE(contains(refusal_of({"-o", folder / "out", "--mcap", drive / "new.mcap", drive}), "lies in"));
+}
+
+TEST(McapOption, IsNoResultOfTheSameRun) {
+  const TemporaryFolder folder;
+  for (const char* const name : {"odometry.csv", "summary.json", "../out/map.pcd"})
+    EXPECT_TRUE(contains(refusal_of({"-o", folder / "out", "--mcap", folder / "out" / name, room_drive()}),
+                         "the run writes its "))
+        << name;
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+}
+
+} // namespace
+} // namespace locus::test

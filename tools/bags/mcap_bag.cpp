@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bags/mcap_bag.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "bags/decompression.hpp"
+
+namespace locus::tools {
+
+McapBag::McapBag(const std::filesystem::path& file, std::string name)
+    : name_(std::move(name)), stream_(file, std::ios::binary) {
+  std::error_code ignored;
+  size_ = std::filesystem::file_size(file, ignored);
+}
+
+Expected<std::unique_ptr<Bag>, std::string> McapBag::open(const std::filesystem::path& file, std::string name) {
+  std::unique_ptr<McapBag> bag(new McapBag(file, std::move(name)));
+  if (const std::optional<std::string> problem = bag->stream_ ? bag->read_magic() : why_unreadable(file))
+    return fmt::format("{}: {}", bag->name_, *problem);
+  bag->is_closed_ = bag->read_footer().has_value();
+  if (!bag->read_topics_from_summary()) {
+    bag->rewind();
+    while (bag->next() != nullptr) {
+    }
+    if (bag->topics().empty() && !bag->warnings().empty())
+      return bag->warnings().front();
+  }
+  bag->rewind();
+  return std::unique_ptr<Bag>(std::move(bag));
+}
+
+std::optional<std::string> McapBag::read_magic() {
+  std::array<char, kMcapMagic.size()> start{};
+  const bool is_there = read_at(0, std::as_writable_bytes(std::span{start}));
+  if (is_there && std::string_view(start.data(), start.size()) == kMcapMagic)
+    return std::nullopt;
+  if (is_there && std::string_view(start.data(), start.size()).starts_with("\x89MCAP"))
+    return "MCAP of another version than 0; record again with a current rosbag2";
+  return "not an MCAP file: it does not begin as one; copy or record it again";
+}
+
+/// The last record; nothing where the recorder has not come to write it.
+std::optional<McapFooter> McapBag::read_footer() {
+  std::array<std::byte, kMcapFooterBytes + kMcapMagic.size()> end{};
+  if (size_ < kMcapMagic.size() + end.size() || !read_at(size_ - end.size(), end))
+    return std::nullopt;
+  std::span<const std::byte> bytes(end);
+  const std::optional<McapRecord> record = take_mcap_record(bytes);
+  const std::string_view magic(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  return record && magic == kMcapMagic ? McapFooter::read(*record) : std::nullopt;
+}
+
+/// False if there is no whole one that names all channels.
+bool McapBag::read_topics_from_summary() {
+  constexpr std::size_t kBehindCrc = sizeof(std::uint32_t);
+  const std::optional<McapFooter> footer = read_footer();
+  const std::uint64_t end = size_ - kMcapMagic.size();
+  if (!footer || footer->summary_start < kMcapMagic.size() || footer->summary_start >= end - kMcapFooterBytes ||
+      end - footer->summary_start > kMaxBlockBytes)
+    return false;
+  record_.resize(end - footer->summary_start);
+  if (!read_at(footer->summary_start, record_))
+    return false;
+  std::span<const std::byte> bytes(record_);
+  if (footer->summary_crc != 0 && mcap_crc(bytes.first(bytes.size() - kBehindCrc)) != footer->summary_crc)
+    return false;
+  return take_summary(bytes.first(bytes.size() - kMcapFooterBytes));
+}
+
+/// False if it lacks a channel, or the schema of one: writers may leave either out.
+bool McapBag::take_summary(std::span<const std::byte> summary) {
+  std::vector<McapRecord> channels;
+  std::optional<std::uint32_t> count;
+  while (const std::optional<McapRecord> record = take_mcap_record(summary)) {
+    MessageReader fields = record->fields();
+    if (record->op == McapOp::schema)
+      take_schema(*record);
+    else if (record->op == McapOp::channel)
+      channels.push_back(*record);
+    else if (record->op == McapOp::statistics && !fields.bytes(sizeof(std::uint64_t) + sizeof(std::uint16_t)).empty())
+      count = fields.number<std::uint32_t>();
+  }
+  const auto is_whole = [&](const McapRecord& record) {
+    const std::optional<McapChannel> channel = McapChannel::read(record);
+    return channel && (channel->schema == 0 || schemas_.contains(channel->schema));
+  };
+  if (count != channels.size() || !std::ranges::all_of(channels, is_whole)) {
+    schemas_.clear();
+    return false;
+  }
+  for (const McapRecord& channel : channels)
+    take_channel(channel);
+  return true;
+}
+
+bool McapBag::read_at(std::uint64_t place, std::span<std::byte> bytes) {
+  stream_.clear();
+  stream_.seekg(static_cast<std::streamoff>(place));
+  stream_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  return stream_.good();
+}
+
+/// A folder may hold many files, of which one is read at a time.
+void McapBag::free_memory() {
+  left_ = {};
+  for (std::vector<std::byte>* const room : {&record_, &chunk_})
+    std::vector<std::byte>().swap(*room);
+}
+
+void McapBag::rewind() {
+  free_memory();
+  stream_.clear();
+  stream_.seekg(static_cast<std::streamoff>(kMcapMagic.size()));
+  at_ = kMcapMagic.size();
+  is_over_ = false;
+  timeless_ = left_out_ = 0;
+  first_left_out_.clear();
+  break_.clear();
+}
+
+const BagMessage* McapBag::next() {
+  while (const std::optional<McapRecord> record = next_record()) {
+    if (take(*record))
+      return &message_;
+  }
+  free_memory();
+  return nullptr;
+}
+
+/// Of the chunk at hand, else of the file; nothing at the end and at a break.
+std::optional<McapRecord> McapBag::next_record() {
+  if (left_.empty())
+    return read_record();
+  const std::optional<McapRecord> record = take_mcap_record(left_);
+  if (record && record->op != McapOp::chunk)
+    return record;
+  left_ = {};
+  leave_out("the records in it are damaged");
+  return next_record();
+}
+
+/// The next record of the file that is of use.
+std::optional<McapRecord> McapBag::read_record() {
+  while (!is_over_ && at_ < size_) {
+    place_ = at_;
+    std::array<std::byte, kMcapRecordHead> head{};
+    stream_.read(reinterpret_cast<char*>(head.data()), head.size());
+    MessageReader fields(head, Serialisation::ros1);
+    const auto op = static_cast<McapOp>(fields.number<std::uint8_t>());
+    const auto length = fields.number<std::uint64_t>();
+    const std::uint64_t left = size_ - at_;
+    if (!stream_ || op == McapOp::none || left < head.size() || length > left - head.size())
+      return break_off();
+    at_ += head.size() + length;
+    is_over_ = op == McapOp::data_end || op == McapOp::footer;
+    const bool is_of_use =
+        op == McapOp::schema || op == McapOp::channel || op == McapOp::message || op == McapOp::chunk;
+    const bool fits = length <= kMaxBlockBytes;
+    if (is_of_use && !fits)
+      leave_out(fmt::format("it has {} bytes, more than {}", length, kMaxBlockBytes));
+    record_.resize(is_of_use && fits ? length : 0);
+    if (record_.empty())
+      stream_.seekg(static_cast<std::streamoff>(length), std::ios::cur);
+    else if (stream_.read(reinterpret_cast<char*>(record_.data()), static_cast<std::streamsize>(length)))
+      return McapRecord{op, record_};
+    if (!stream_)
+      return break_off();
+  }
+  return std::nullopt;
+}
+
+/// Whether a message came of it.
+bool McapBag::take(const McapRecord& record) {
+  if (record.op == McapOp::schema)
+    take_schema(record);
+  else if (record.op == McapOp::channel)
+    take_channel(record);
+  else if (record.op == McapOp::chunk)
+    take_chunk(record);
+  return record.op == McapOp::message && take_message(record);
+}
+
+void McapBag::take_schema(const McapRecord& record) {
+  if (std::optional<McapSchema> schema = McapSchema::read(record))
+    schemas_[schema->id] = schema->name.substr(0, kMaxNameBytes + 1); // too long still, then
+}
+
+void McapBag::take_channel(const McapRecord& record) {
+  const std::optional<McapChannel> channel = McapChannel::read(record);
+  if (!channel)
+    return;
+  const auto schema = schemas_.find(channel->schema);
+  std::string type = schema != schemas_.end() ? ros1_type(schema->second) : "no schema";
+  if (channel->encoding != "cdr" && channel->encoding != "ros1")
+    type += " as " + channel->encoding;
+  declare(channel->id, {channel->topic, type, channel->encoding == "ros1" ? Serialisation::ros1 : Serialisation::cdr});
+}
+
+void McapBag::take_chunk(const McapRecord& record) {
+  McapChunkRecords records = unpack_mcap_chunk(record, chunk_);
+  left_ = records.bytes;
+  if (!records.problem.empty())
+    leave_out(records.problem);
+}
+
+/// False for one of no channel, or without a time.
+bool McapBag::take_message(const McapRecord& record) {
+  MessageReader fields = record.fields();
+  const std::optional<std::size_t> topic = topic_of(fields.number<std::uint16_t>());
+  fields.number<std::uint32_t>(); // sequence number
+  const auto recorded_ns = fields.number<std::uint64_t>();
+  fields.number<std::uint64_t>(); // time of publication
+  const bool has_time = recorded_ns <= static_cast<std::uint64_t>(kMaxBagTime_ns);
+  timeless_ += has_time ? 0U : 1U;
+  if (!fields.whole() || !topic || !has_time)
+    return false;
+  message_ = {*topic, stamp_from_ns(static_cast<std::int64_t>(recorded_ns)), fields.rest()};
+  return true;
+}
+
+std::nullopt_t McapBag::break_off() {
+  is_over_ = true;
+  break_ = fmt::format("{}: byte {}: the file ends in mid-record, or is damaged; what lies before it is used", name_,
+                       place_);
+  return std::nullopt;
+}
+
+void McapBag::leave_out(const std::string& why) {
+  if (left_out_++ == 0)
+    first_left_out_ = fmt::format("byte {}: {}", place_, why);
+}
+
+std::vector<std::string> McapBag::warnings() const {
+  std::vector<std::string> lines;
+  if (!break_.empty())
+    lines.push_back(break_);
+  else if (!is_closed_)
+    lines.push_back(
+        fmt::format("{}: was not closed by its recorder and has no index; all {} bytes are used, but the end "
+                    "may be missing; mcap recover makes it whole for other programs",
+                    name_, size_));
+  if (left_out_ > 0)
+    lines.push_back(fmt::format("{}: {} chunks or records cannot be read and were left out, the first at {}; "
+                                "copy or record it again",
+                                name_, left_out_, first_left_out_));
+  if (timeless_ > 0)
+    lines.push_back(timeless_messages(name_, timeless_));
+  tell_of_bounds(name_, lines);
+  return lines;
+}
+
+double McapBag::progress() const { return static_cast<double>(at_) / static_cast<double>(size_); }
+
+} // namespace locus::tools

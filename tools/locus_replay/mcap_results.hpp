@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "bags/mcap_writer.hpp"
+#include "config/config.hpp"
+#include "daemon/dds/ros_messages.hpp"
+#include "daemon/figures.hpp"
+#include "daemon/ingest.hpp"
+#include "daemon/sweep_processor.hpp"
+
+namespace locus::tools {
+
+/// What the service would have published of a run, in one MCAP file for Foxglove and rosbag2: odometry, tf and
+/// corrected cloud of each sweep, and diagnostics once a second of the recording. Topics and frames are those of the
+/// configuration. One owner.
+class McapResults {
+ public:
+  /// `config` must outlive this. Throws Failure, as does close().
+  McapResults(const std::filesystem::path& file, const Config& config);
+
+  /// Right after the sweep was processed.
+  void take(const Sweep& sweep, const Odometry& odometry, const daemon::ProcessedSweep& done);
+  /// Diagnostics, if it is time for them.
+  void take(const daemon::Ingest& ingest, const daemon::SweepCounters& counters);
+  void close() { writer_.close(); }
+
+ private:
+  template <class Message> std::uint16_t add(const std::string& topic);
+  template <class Message> void write(std::uint16_t channel, const Message& message);
+
+  const Config& config_;
+  daemon::FrameNames frames_;
+  McapWriter writer_;
+  std::uint16_t odometry_, tf_, cloud_, diagnostics_;
+  Stamp now_, diagnosed_; ///< end of the latest sweep; that of the latest diagnostics
+  daemon::SweepTally tally_;
+  daemon::CloudMessage cloud_message_;
+  std::vector<daemon::CloudMessage::Point> points_;
+  std::vector<std::byte> serialised_;
+};
+
+} // namespace locus::tools
