@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "config/config.hpp"
+#include "daemon/figures.hpp"
+#include "daemon/inline_pipeline.hpp"
+#include "daemon/machine_time.hpp"
+#include "liblocus/liblocus.hpp"
+
+namespace locus::library {
+
+/// What Odometry and Replay of the library have in common: inputs in, estimates as users see them out. One owner.
+class Engine {
+ public:
+  /// `lidars` opened from config.lidars.
+  Engine(Config config, LidarRouter lidars);
+  Engine(const Engine&) = delete;
+  Engine& operator=(const Engine&) = delete;
+
+  void take(const daemon::Input& input) { pipeline_.take(input); }
+
+  /// Estimates that nobody has fetched yet, the oldest first.
+  [[nodiscard]] std::deque<liblocus::Estimate>& completed() { return completed_; }
+
+  [[nodiscard]] const Config& config() const { return config_; }
+  [[nodiscard]] const daemon::Ingest& ingest() const { return pipeline_.ingest(); }
+  [[nodiscard]] std::vector<liblocus::Surface> scan() const;
+  [[nodiscard]] std::vector<liblocus::Surface> map() const;
+  /// So far; the engine must outlive them.
+  [[nodiscard]] daemon::Figures figures() const;
+
+ private:
+  void take(const daemon::ProcessedSweep& done);
+
+  Config config_;
+  std::vector<std::string> source_names_;
+  daemon::MachineTime begin_ = daemon::MachineTime::now();
+  daemon::SweepTally tally_;
+  std::deque<liblocus::Estimate> completed_;
+  daemon::InlinePipeline pipeline_;
+};
+
+/// The figures as JSON for the user.
+std::string to_json_text(const daemon::Figures& figures);
+
+/// Does the work, and says why it could not as liblocus::Error.
+void in_words_of_the_library(const std::function<void()>& work);
+
+} // namespace locus::library
