@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+// Drives of a robot on legs whose inertial unit is stamped early or mounted askew: what lidar sees tells, and the drive
+// goes as well as with a sound one.
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
+
+#include "simulated_drive.hpp"
+
+namespace locus::test {
+namespace {
+
+using nlohmann::json;
+
+const SimulatedDrive& walk() {
+  static const SimulatedDrive drive("urban", "spot", 30, {}, 7705, "real");
+  return drive;
+}
+
+/// Lidar and the inertial unit alone.
+Replay replay_of_walk(std::vector<std::string> arguments = {}) {
+  arguments.insert(arguments.end(), {"--fail", "vio:lost@0", "--fail", "kio:lost@0"});
+  return walk().replay(std::move(arguments));
+}
+
+json learned_of_imu(const Replay& replay) { return replay.summary()["sources"]["imu"]["learned"]; }
+
+std::string earlier(const std::string& line, Duration by) {
+  const std::size_t comma = line.find(',');
+  return line.front() == '#' ? line
+                             : std::to_string(std::stoll(line.substr(0, comma)) - by.count()) + line.substr(comma);
+}
+
+TEST(WrongImuCalibration, OfASoundUnitNothingIsSaid) {
+  const Replay replay = replay_of_walk();
+  EXPECT_EQ(replay.run().err.find("motion source imu"), std::string::npos) << replay.run().err;
+  const json learned = learned_of_imu(replay);
+  EXPECT_LT(std::abs(learned["late_ms"]["value"].get<double>()), 10.0) << learned;
+  EXPECT_LT(learned["late_ms"]["sd"], 1.0) << learned;
+}
+
+TEST(WrongImuCalibration, StampsOfAnImuThatAreEarlyAreTakenLaterAndToldOf) {
+  constexpr std::chrono::milliseconds kEarly{45};
+  const Replay sound = replay_of_walk();
+  const TemporaryFolder folder;
+  std::ifstream from(walk().capture() + "/imu.csv");
+  std::ofstream to(folder / "imu.csv");
+  for (std::string line; std::getline(from, line);)
+    to << earlier(line, kEarly) << '\n';
+  to.close();
+  const Replay early = replay_of_walk({"--imu", folder / "imu.csv"});
+  EXPECT_NE(early.run().err.find("ms earlier than lidar does"), std::string::npos) << early.run().err;
+  const double late_ms = learned_of_imu(early)["late_ms"]["value"],
+               sound_ms = learned_of_imu(sound)["late_ms"]["value"];
+  EXPECT_NEAR(late_ms, sound_ms - 45.0, 2.0);
+  EXPECT_LT(ape_mean_m(early), 1.2 * ape_mean_m(sound) + 0.002);
+}
+
+TEST(WrongImuCalibration, MountingOfAnImuThatIsWrongByDegreesIsToldOf) {
+  const double sound_m = ape_mean_m(replay_of_walk());
+  for (const auto& [rpy_deg, words] : std::vector<std::pair<std::string, std::string>>{
+           {"[5,0,0]", "degrees about x (roll)"}, {"[0,5,0]", "degrees about y (pitch)"}}) {
+    const Replay askew = replay_of_walk({"--set", "motion_sources.imu.T_base_source.rpy_deg=" + rpy_deg});
+    EXPECT_NE(askew.run().err.find(words), std::string::npos) << askew.run().err;
+    EXPECT_LT(ape_mean_m(askew), 1.2 * sound_m + 0.002) << words;
+  }
+}
+
+/// The robot drives as if nothing were calibrated, and what it would be is told.
+TEST(WrongImuCalibration, WhatIsOnlyReportedChangesNothing) {
+  const auto replay = [](const std::string& mode) {
+    return replay_of_walk({"--set", "motion_sources.imu.T_base_source.rpy_deg=[5,0,0]", "--set",
+                           "motion_sources.imu.calibration=" + mode});
+  };
+  const Replay off = replay("off"), reported = replay("report"), used = replay("auto");
+  EXPECT_EQ(read_text(reported.file("odometry.csv")), read_text(off.file("odometry.csv")));
+  EXPECT_NE(read_text(used.file("odometry.csv")), read_text(off.file("odometry.csv")));
+  EXPECT_FALSE(off.summary()["sources"]["imu"].contains("learned"));
+  EXPECT_EQ(off.run().err.find("degrees about x (roll)"), std::string::npos);
+  EXPECT_NE(reported.run().err.find("degrees about x (roll)"), std::string::npos) << reported.run().err;
+  const json mounting = learned_of_imu(reported)["mounting_deg"];
+  EXPECT_LT(mounting["value"][0], -3.0) << "gross, which a map that was made of it does not change";
+  EXPECT_LT(std::abs(mounting["value"][1].get<double>()), 3.0);
+}
+
+/// The calibration that a recording tells, of a unit that is stamped so late that nobody believes it, or before its
+/// motion, and sits askew, against that of the unit as it is.
+TEST(WrongImuCalibration, OfARecordingIsFoundAndWritten) {
+  const TemporaryFolder folder;
+  const auto late_by = [&](std::chrono::milliseconds late) {
+    std::string file = folder / std::to_string(late.count());
+    std::ifstream from(walk().capture() + "/imu.csv");
+    std::ofstream to(file);
+    for (std::string line; std::getline(from, line);)
+      to << earlier(line, -late) << '\n';
+    return file;
+  };
+  const auto found_in = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"--calibrate", folder / "found.yaml"});
+    const Replay replay = walk().replay(arguments);
+    EXPECT_EQ(replay.run().status, 0) << replay.run().err;
+    for (const YAML::Node& source : YAML::LoadFile(folder / "found.yaml")["motion_sources"])
+      if (source["name"].as<std::string>() == "imu")
+        return source;
+    return YAML::Node{};
+  };
+  const YAML::Node sound = found_in({});
+  for (const int late_ms : {100, -45}) {
+    const YAML::Node found = found_in({"--imu", late_by(std::chrono::milliseconds{late_ms}), "--set",
+                                       "motion_sources.imu.T_base_source.rpy_deg=[5,-5,0]"});
+    EXPECT_NEAR(found["late_ms"].as<double>(0.0), sound["late_ms"].as<double>(0.0) + late_ms, 1.0);
+    for (int axis = 0; axis < 2; ++axis) {
+      const auto rpy_deg = [&](const YAML::Node& imu) {
+        return imu["T_base_source"] ? imu["T_base_source"]["rpy_deg"][axis].as<double>() : 0.0;
+      };
+      EXPECT_NEAR(rpy_deg(found), rpy_deg(sound), 0.3) << axis;
+    }
+  }
+}
+
+} // namespace
+} // namespace locus::test

@@ -1,0 +1,14 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# fetch_promtool.sh FILE: promtool of Debian's package prometheus, without the server that an installation would start.
+# Fetched once; fails where there is no network.
+set -euo pipefail
+[ ! -x "$1" ] || exit 0
+work=$(mktemp -d -t locusd-promtool.XXXXXX)
+trap 'rm -rf "$work"' EXIT
+chmod 755 "$work"
+cd "$work"
+apt-get --quiet download prometheus || { apt-get --quiet update && apt-get --quiet download prometheus; }
+dpkg-deb --fsys-tarfile prometheus_*.deb | tar --extract ./usr/bin/promtool
+mv usr/bin/promtool "$1.$$"
+mv "$1.$$" "$1"

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_replay/calibrate.hpp"
+
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <limits>
+#include <utility>
+#include <variant>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "daemon/calibration.hpp"
+#include "daemon/inline_pipeline.hpp"
+#include "locus_replay/output_file.hpp"
+#include "locus_replay/progress_bar.hpp"
+
+namespace locus::tools {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr int kPasses = 4;
+constexpr double kMostLate_ms = 250.0; ///< that may be configured
+
+/// What a gyro said, and what the estimates say, by which both are compared.
+struct Rates {
+  struct Gyro {
+    Stamp stamp;
+    Eigen::Vector3d radps;
+  };
+  struct Estimated { ///< the mean during a sweep
+    Stamp start, end;
+    Eigen::Vector3d radps;
+  };
+  std::array<std::vector<Gyro>, kMaxSources> gyros; ///< by source, in the order of their stamps
+  std::vector<Estimated> estimated;
+};
+
+struct Pass {
+  LearnedSources learned; ///< when each was last heard
+  Rates rates;
+};
+
+using ProgressObserver = std::function<void(double done)>;
+
+/// Plays each source earlier by what is configured, as if its driver stamped and sent samples in time.
+Pass replay(const Arguments& arguments, Config config, ChosenRecording chosen, const ProgressObserver& show) {
+  std::vector<Duration> earlier;
+  for (MotionSource& source : config.motion_sources)
+    earlier.push_back(from_seconds(1e-3 * std::exchange(source.late_ms, 0.0)));
+  OpenRecording open = open_recording(arguments, chosen, earlier);
+  Pass pass;
+  daemon::InlinePipeline pipeline(
+      config, std::move(open.lidars), [&](const Sweep& sweep, const daemon::ProcessedSweep& done) {
+        for (std::size_t i = 0; i < pass.learned.size(); ++i)
+          if (done.estimate.sources[i].learned)
+            pass.learned[i] = done.estimate.sources[i].learned;
+        show(open.recording->progress());
+        if (!done.estimate.failed)
+          pass.rates.estimated.push_back({sweep.start, sweep.end, done.estimate.twist_base.tail<3>()});
+      });
+  for (bool goes_on = true; goes_on;) {
+    const daemon::Input input = open.recording->next(Duration::zero());
+    pipeline.take(input);
+    goes_on = !std::holds_alternative<daemon::EndOfInput>(input);
+    const auto* const imu = std::get_if<daemon::ImuInput>(&input);
+    if (imu == nullptr || !imu->sample.angular_velocity_radps.allFinite())
+      continue;
+    auto& gyro = pass.rates.gyros[index_of(imu->source)];
+    if (gyro.empty() || gyro.back().stamp < imu->sample.stamp)
+      gyro.push_back({imu->sample.stamp, imu->sample.angular_velocity_radps});
+  }
+  return pass;
+}
+
+/// How badly the best turn and the best bias make what a gyro says `late` after each sweep of what was estimated:
+/// the share of the variance that is left (Wahba's problem). Nothing where it tells too little.
+std::optional<double> misfit(const std::vector<Rates::Gyro>& gyro, const std::vector<Rates::Estimated>& estimated,
+                             Duration late) {
+  constexpr std::size_t kFewest = 50;
+  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> both;
+  auto next = gyro.begin();
+  for (const Rates::Estimated& sweep : estimated) {
+    const auto first = std::lower_bound(next, gyro.end(), sweep.start + late,
+                                        [](const Rates::Gyro& sample, Stamp stamp) { return sample.stamp < stamp; });
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    auto end = first;
+    for (; end != gyro.end() && end->stamp < sweep.end + late; ++end)
+      sum += end->radps;
+    next = first;
+    if (end != first && end != gyro.end())
+      both.emplace_back(sum / static_cast<double>(end - first), sweep.radps);
+  }
+  if (both.size() < kFewest)
+    return std::nullopt;
+  Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero(), mean_estimated = Eigen::Vector3d::Zero();
+  for (const auto& [said, seen] : both) {
+    mean_gyro += said / static_cast<double>(both.size());
+    mean_estimated += seen / static_cast<double>(both.size());
+  }
+  Eigen::Matrix3d correlation = Eigen::Matrix3d::Zero();
+  double variance = 0.0;
+  for (const auto& [said, seen] : both) {
+    correlation += (said - mean_gyro) * (seen - mean_estimated).transpose();
+    variance += (said - mean_gyro).squaredNorm() + (seen - mean_estimated).squaredNorm();
+  }
+  const Eigen::Matrix3d squared = correlation.transpose() * correlation; // its eigenvalues: of the singular values
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> singular(squared, Eigen::EigenvaluesOnly);
+  return 1.0 - 2.0 * singular.eigenvalues().cwiseMax(0.0).cwiseSqrt().sum() / variance;
+}
+
+/// By how much a gyro is late that is so late that nobody believes it. The filter finds the rest.
+double coarse_lateness_ms(const std::vector<Rates::Gyro>& gyro, const std::vector<Rates::Estimated>& estimated) {
+  constexpr Duration kMost = from_seconds(1e-3 * kMostLate_ms), kStep = milliseconds{10};
+  constexpr double kPlainly = 0.5; ///< of the misfit as it is configured
+  const std::optional<double> as_configured = misfit(gyro, estimated, {});
+  double best = std::numeric_limits<double>::infinity();
+  Duration late{};
+  for (Duration tried = -kMost; tried <= kMost; tried += kStep)
+    if (const auto found = misfit(gyro, estimated, tried); found && *found < best) {
+      best = *found;
+      late = tried;
+    }
+  return as_configured && best < kPlainly * *as_configured ? 1e3 * to_seconds(late) : 0.0;
+}
+
+/// What was learned by a configuration, as if by another, in which the source sits otherwise, and stamps otherwise.
+LearnedSource seen_from(const MotionSource& configured, const MotionSource& used, LearnedSource learned) {
+  if (configured.kind == SourceKind::imu) {
+    auto turn_rad = learned.states.segment<3>(LearnedSource::kMounting);
+    turn_rad = so3_log(so3_exp(turn_rad) * used.T_base_source.rotation * configured.T_base_source.rotation.conjugate());
+    learned.states[LearnedSource::kLate] += 1e-3 * used.late_ms;
+  }
+  return learned;
+}
+
+} // namespace
+
+CalibratedDrive calibrate_by_drive(const Arguments& arguments, const ChosenRecording& chosen) {
+  CalibratedDrive drive{chosen.config, {}};
+  ProgressBar progress(!arguments.quiet);
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const Pass played =
+        replay(arguments, drive.config, chosen, [&](double done) { progress.show((pass + done) / kPasses); });
+    for (std::size_t i = 0; i < drive.config.motion_sources.size(); ++i) {
+      MotionSource& source = drive.config.motion_sources[i];
+      if (source.calibration == Calibration::off || source.of_lidar) // whose packets are not played earlier
+        continue;
+      if (played.learned[i])
+        drive.learned[i] = seen_from(chosen.config.motion_sources[i], source, *played.learned[i]);
+      const bool is_sure = source.calibration_sigma.late_ms == 0.0;
+      const double coarse_ms =
+          pass == 0 && !is_sure ? coarse_lateness_ms(played.rates.gyros[i], played.rates.estimated) : 0.0;
+      if (coarse_ms == 0.0 && played.learned[i]) {
+        MotionSource in_time = source;
+        in_time.late_ms = 0.0;
+        MotionSourceOptions better = daemon::calibrated(in_time, *played.learned[i]);
+        better.late_ms += source.late_ms;
+        static_cast<MotionSourceOptions&>(source) = std::move(better);
+      } else {
+        source.late_ms = std::clamp(source.late_ms + coarse_ms, -kMostLate_ms, kMostLate_ms);
+      }
+    }
+  }
+  return drive;
+}
+
+void write_calibration(OutputFile& file, const std::vector<MotionSource>& configured, const LearnedSources& learned) {
+  nlohmann::ordered_json sources = nlohmann::ordered_json::object();
+  for (std::size_t i = 0; i < configured.size(); ++i)
+    if (learned[i] && configured[i].calibration != Calibration::off)
+      sources[configured[i].name]["learned"] = daemon::learned_json(configured[i], *learned[i], true);
+  file.print("{}", daemon::calibration_yaml(sources));
+  file.close();
+}
+
+} // namespace locus::tools

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locusctl/fetch_command.hpp"
+
+#include <cerrno>
+#include <fstream>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "fetch/fetch.hpp"
+#include "locus_replay/failure.hpp"
+#include "locusctl/lidar_entry.hpp"
+
+namespace locus::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Who reads the file meanwhile reads the one before, or all of this one.
+void write_whole(const fs::path& file, const std::string& text) {
+  const fs::path beside = file.string() + ".new";
+  std::error_code error;
+  if (!(std::ofstream{beside, std::ios::binary} << text).flush())
+    error = {errno, std::generic_category()};
+  else
+    fs::rename(beside, file, error);
+  if (!error)
+    return;
+  std::error_code ignored;
+  fs::remove(beside, ignored);
+  throw Failure(ExitStatus::failed, fmt::format("{}: cannot be written ({}); name another file with -o, or be root",
+                                                file.string(), error.message()));
+}
+
+struct Description {
+  std::string what, keys; ///< for the user; for the configuration
+  std::string_view suffix;
+};
+
+Description describe(const ouster::Metadata& metadata) {
+  return {fmt::format("metadata of an {}, serial number {}, {}x{}", name_of(metadata), metadata.serial_number,
+                      metadata.columns_per_frame, metadata.frames_per_s),
+          "model: Ouster, metadata: ", ".json"};
+}
+
+Description describe(const hesai::Calibration& angles) {
+  return {fmt::format("angles of the {} lasers of a Hesai", angles.laser_count), "model: auto, calibration: ", ".csv"};
+}
+
+} // namespace
+
+std::string fetch(const std::string& address, fs::path file) {
+  const SensorFile fetched = value_or_fail(fetch_sensor_file(address), ExitStatus::failed);
+  const Description its = std::visit([](const auto& content) { return describe(content); }, fetched.content);
+  if (file.empty())
+    file = address + std::string{its.suffix};
+  if (file.extension() != its.suffix)
+    throw Failure(ExitStatus::wrong_usage,
+                  fmt::format("{}: its name must end in {}, by which it is known", file.string(), its.suffix));
+  write_whole(file, fetched.text);
+  const std::string path = fs::absolute(file).lexically_normal().string();
+  return fmt::format("{}: {}\n\nlidars:\n{}", path, its.what, lidar_entry("lidar1", its.keys + path));
+}
+
+} // namespace locus::tools
