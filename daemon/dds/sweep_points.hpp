@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/base/surface_point.hpp"
+#include "core/ingest/sweep.hpp"
+#include "daemon/dds/ros_messages.hpp"
+
+namespace locus::daemon {
+
+/// Replaces `out` by the points of a sweep where they lay at its end, base frame: `placed`, in the order of `points`.
+void sweep_points(std::span<const SweepPoint> points, std::span<const SurfacePoint> placed,
+                  std::vector<CloudMessage::Point>& out);
+
+} // namespace locus::daemon

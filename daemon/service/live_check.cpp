@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/service/live_check.hpp"
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include <fmt/format.h>
+
+#include "daemon/dds/dds_node.hpp"
+#include "daemon/machine_time.hpp"
+#include "daemon/service/machine.hpp"
+#include "drivers/lidar_survey.hpp"
+#include "drivers/net/wire_tap.hpp"
+
+namespace locus::daemon {
+namespace {
+
+/// The topic of a motion source or of a lidar's clouds, which anybody may publish.
+struct HeardTopic {
+  std::string whose; ///< "imu NAME"
+  std::string name;
+  std::optional<DdsReader<ros::Imu>> imu{};
+  std::optional<DdsReader<ros::Odometry>> odometry{};
+  std::optional<DdsReader<ros::PointCloud2>> clouds{};
+  std::uint64_t messages = 0;
+  std::uint32_t writers = 0;
+
+  void take() {
+    const auto count = [this](const auto&) { ++messages; };
+    if (imu) {
+      imu->take(count);
+      writers = std::max(writers, imu->writers());
+    }
+    if (odometry) {
+      odometry->take(count);
+      writers = std::max(writers, odometry->writers());
+    }
+    if (clouds) {
+      clouds->take_serialised([this](const auto&, auto) { ++messages; });
+      writers = std::max(writers, clouds->writers());
+    }
+  }
+};
+
+std::vector<HeardTopic> subscribe(const DdsNode& node, const Config& config) {
+  std::vector<HeardTopic> topics;
+  for (const LidarOptions& lidar : config.lidars) {
+    if (lidar.gives_clouds())
+      topics.emplace_back(HeardTopic{"lidar " + lidar.name, lidar.topic})
+          .clouds.emplace(node, lidar.topic, TopicQos::cloud_count());
+  }
+  for (const MotionSource& source : config.motion_sources) {
+    if (source.topic.empty())
+      continue;
+    HeardTopic& topic =
+        topics.emplace_back(HeardTopic{fmt::format("{} {}", to_string(source.kind), source.name), source.topic});
+    if (source.kind == SourceKind::imu)
+      topic.imu.emplace(node, source.topic, TopicQos::sensor_in());
+    else
+      topic.odometry.emplace(node, source.topic, TopicQos::sensor_in());
+  }
+  return topics;
+}
+
+bool is_for(const HeardLidar& lidar, const LidarOptions& options) {
+  return !options.gives_clouds() && lidar.port == options.port &&
+         (!options.source_ip || lidar.ip == *options.source_ip);
+}
+
+/// Those that no entry of the configuration takes.
+std::string strangers(const Config& config, const std::vector<HeardLidar>& heard) {
+  std::string text;
+  for (const HeardLidar& lidar : heard)
+    if (lidar.is_known() &&
+        std::ranges::none_of(config.lidars, [&](const auto& options) { return is_for(lidar, options); }))
+      text += fmt::format("{}{} sends to port {}", text.empty() ? "" : ", ", lidar.name(), lidar.port);
+  return text;
+}
+
+/// For a lidar of which nothing comes.
+std::string advice(const LidarOptions& options, const Config& config, const std::vector<HeardLidar>& heard,
+                   bool hears_all) {
+  if (const std::string others = strangers(config, heard); !others.empty())
+    return fmt::format("{}; if it is that one, set port and source_ip in the entry of {}", others, options.name);
+  return hears_all ? "look at power, cable and the address it sends to"
+                   : "other ports were not listened to: run as root to hear all lidars, or locusctl sensors";
+}
+
+void compare(const LidarOptions& options, const Config& config, const std::vector<HeardLidar>& heard, bool hears_all,
+             LiveCheck& check) {
+  std::vector<const HeardLidar*> mine;
+  for (const HeardLidar& lidar : heard)
+    if (is_for(lidar, options))
+      mine.push_back(&lidar);
+  const std::string& name = options.name;
+  if (mine.empty()) {
+    check.differs.push_back(fmt::format("lidar {}: nothing comes to port {}{}; {}", name, options.port,
+                                        options.source_ip ? " from " + dotted(*options.source_ip) : "",
+                                        advice(options, config, heard, hears_all)));
+    return;
+  }
+  const HeardLidar& lidar = *mine.front();
+  if (mine.size() > 1)
+    check.differs.push_back(fmt::format("lidar {}: {} and {} send to its port {}; tell them apart by source_ip, each "
+                                        "with an entry of its own",
+                                        name, lidar.name(), mine[1]->name(), options.port));
+  else if (!lidar.is_known())
+    check.differs.push_back(fmt::format("lidar {}: what comes to port {} is not read: {}", name, options.port,
+                                        lidar.unknown_packets ? to_string(*lidar.unknown_packets) : "no lidar packet"));
+  else if (lidar.ouster.has_value() != options.is_ouster())
+    check.differs.push_back(fmt::format("lidar {}: is configured as one of {}, but {} sends to port {}; set model{} in "
+                                        "its entry",
+                                        name,
+                                        options.is_ouster()         ? "Ouster"
+                                        : options.is_hesai()        ? "Hesai"
+                                        : options.is_of_any_maker() ? "Velodyne or Hesai"
+                                                                    : "Velodyne",
+                                        lidar.name(), options.port, options.is_ouster() ? "" : " and metadata"));
+  else if (!lidar.ouster && !options.is_of_any_maker() && options.is_hesai() != lidar.clock.has_value())
+    check.differs.push_back(
+        fmt::format("lidar {}: its calibration is of another maker than {}, which sends to port {}; "
+                    "set model to auto in its entry, and calibration to the file of that sensor",
+                    name, lidar.name(), options.port));
+  else if (!lidar.ouster && !configured_model(options).empty() && configured_model(options) != lidar.model)
+    check.differs.push_back(
+        fmt::format("lidar {}: is configured as {}, and its packets say {}; set model to auto in its entry", name,
+                    configured_model(options), lidar.model));
+  else if (!lidar.ouster && options.time == LidarTime::sensor && !lidar.is_synchronised())
+    check.differs.push_back(fmt::format("lidar {}: time: sensor, but it tells {}; connect a GPS receiver or set "
+                                        "time to auto in its entry",
+                                        name, lidar.clock_state()));
+  else
+    check.agrees.push_back(fmt::format("lidar {}: {} to port {}, {:.0f} packets/s, {}", name, lidar.name(),
+                                       options.port, lidar.packets_per_s, lidar.clock_state()));
+}
+
+/// The type in which somebody publishes the topic, whether or not it is the right one; empty if nobody does.
+std::string published_type(const DdsNode& node, const std::string& topic) {
+  const DdsEntity reader{dds_create_reader(node.participant(), DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr)};
+  std::string type;
+  constexpr std::uint32_t kMost = 1024;
+  std::vector<void*> samples(kMost);
+  std::vector<dds_sample_info_t> infos(kMost);
+  const dds_return_t count = dds_read(reader.handle(), samples.data(), infos.data(), kMost, kMost);
+  for (std::size_t i = 0; count > 0 && i < static_cast<std::size_t>(count); ++i)
+    if (const auto* writer = static_cast<const dds_builtintopic_endpoint_t*>(samples[i]);
+        infos[i].valid_data && "rt" + topic == writer->topic_name)
+      type = writer->type_name;
+  if (count > 0)
+    dds_return_loan(reader.handle(), samples.data(), count);
+  return type;
+}
+
+void compare(const HeardTopic& topic, const DdsNode& node, const DdsOptions& dds, Duration duration, LiveCheck& check) {
+  const std::string about = fmt::format("{}: topic {}: ", topic.whose, topic.name);
+  const std::string type = topic.writers == 0 ? published_type(node, topic.name) : "";
+  if (!type.empty())
+    check.differs.push_back(
+        fmt::format("{}is published as {}; set {}another topic", about, type, topic.clouds ? "" : "its kind, or "));
+  else if (topic.writers == 0)
+    check.differs.push_back(fmt::format("{}nobody publishes it in domain {} on {}; look at the name of the topic, and "
+                                        "at ROS_DOMAIN_ID and interface of its node",
+                                        about, dds.domain, dds.interface));
+  else if (topic.messages == 0)
+    check.differs.push_back(fmt::format("{}its publisher sends nothing", about));
+  else if (topic.writers > 1)
+    check.differs.push_back(fmt::format("{}{} nodes publish it, and only the first is used", about, topic.writers));
+  else
+    check.agrees.push_back(
+        fmt::format("{}{:.0f} messages/s", about, static_cast<double>(topic.messages) / to_seconds(duration)));
+}
+
+} // namespace
+
+Expected<LiveCheck, std::string> check_live(const Config& config, Duration duration) {
+  constexpr Duration kRound = std::chrono::milliseconds{100}; // what readers keep outlasts it
+  std::vector<std::uint16_t> ports;
+  for (const auto& [port, needed] : lidar_ports(config))
+    ports.push_back(port);
+  auto wire = WireTap::open(ports);
+  if (!wire)
+    return wire.error();
+  const auto member = UdpSocket::open(0); // of the groups that lidars send to: what is for them comes then
+  if (member)
+    join_multicast(config, std::span(&*member, 1));
+  LiveCheck check;
+  auto node = DdsNode::open(config.dds);
+  std::vector<HeardTopic> topics;
+  if (node)
+    topics = subscribe(*node, config);
+  else
+    check.differs.push_back(node.error());
+
+  LidarSurvey survey;
+  for (Duration listened{}; listened < duration; listened += kRound) {
+    wire->listen(kRound, [&](const Datagram& datagram) { survey.take(datagram); });
+    for (HeardTopic& topic : topics)
+      topic.take();
+  }
+  const std::vector<HeardLidar> heard = survey.lidars();
+  for (const LidarOptions& lidar : config.lidars)
+    if (!lidar.gives_clouds())
+      compare(lidar, config, heard, wire->hears_all(), check);
+  if (const std::string others = strangers(config, heard); !others.empty() && check.differs.empty())
+    check.agrees.push_back(fmt::format("not configured: {}", others));
+  for (const HeardTopic& topic : topics)
+    compare(topic, *node, config.dds, duration, check);
+  return check;
+}
+
+} // namespace locus::daemon

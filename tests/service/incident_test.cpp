@@ -1,0 +1,452 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the service keeps of an incident, and what locus-replay makes of it.
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <sched.h>
+#include <sys/mount.h>
+
+#include <fmt/format.h>
+
+#include "daemon/incidents.hpp"
+#include "daemon/machine_time.hpp"
+#include "drivers/files/capture_folder.hpp"
+#include "drivers/velodyne/model.hpp"
+#include "service/robot_network.hpp"
+#include "service/undisturbed.hpp"
+#include "support/errors.hpp"
+#include "support/udp_sender.hpp"
+
+namespace locus::test {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using std::filesystem::path;
+
+std::vector<path> folders_in(const path& folder) {
+  std::vector<path> found;
+  std::error_code none;
+  for (std::filesystem::directory_iterator entry{folder, none}, end; !none && entry != end; entry.increment(none))
+    found.push_back(entry->path());
+  std::ranges::sort(found);
+  return found;
+}
+
+std::uint64_t bytes_in(const path& folder) {
+  std::uint64_t bytes = 0;
+  std::error_code vanished;
+  for (std::filesystem::recursive_directory_iterator entry{folder, vanished}, end; !vanished && entry != end;
+       entry.increment(vanished))
+    bytes += entry->is_regular_file(vanished) ? entry->file_size(vanished) : 0;
+  return bytes;
+}
+
+class Incident : public RobotNetwork {
+ protected:
+  /// With a folder of its own for what is to survive a crash, on another disk as it is on a robot, where that can be.
+  void SetUp() override {
+    RobotNetwork::SetUp();
+    if (IsSkipped() || HasFatalFailure())
+      return;
+    if (unshare(CLONE_NEWNS) != 0 || mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0)
+      GTEST_SKIP() << "no mounts of one's own: run as root, or allow user namespaces";
+    std::filesystem::create_directory(file("run"));
+    ASSERT_EQ(mount("run", file("run").c_str(), "tmpfs", 0, "size=400m"), 0);
+    setenv("RUNTIME_DIRECTORY", file("run").c_str(), 1); // NOLINT(concurrency-mt-unsafe)
+  }
+  void TearDown() override {
+    daemon_.reset();
+    umount2(file("run").c_str(), MNT_DETACH);
+  }
+
+  [[nodiscard]] ProgramRun ask(std::vector<std::string> words) const {
+    words.insert(words.begin(), {"--socket", file("run/control").string()});
+    return run_program(LOCUSCTL, words);
+  }
+  [[nodiscard]] nlohmann::json incidents_of_status() const {
+    const ProgramRun run = ask({"status", "--json"});
+    EXPECT_EQ(run.status, 0) << run.err;
+    return nlohmann::json::parse(run.out, nullptr, false)["incidents"];
+  }
+  [[nodiscard]] bool comes(const std::function<bool(const nlohmann::json&)>& holds, Duration timeout) const {
+    const auto end = std::chrono::steady_clock::now() + timeout;
+    for (; std::chrono::steady_clock::now() < end; std::this_thread::sleep_for(milliseconds{100}))
+      if (holds(incidents_of_status()))
+        return true;
+    return false;
+  }
+
+  [[nodiscard]] path with(const std::string& record) const {
+    path config = file("locusd.yaml");
+    std::ofstream{config} << read_text(plant() / "config.yaml") << "record: {" << record << "}\n";
+    return config;
+  }
+
+  void start(const std::string& record) {
+    daemon_.emplace(undisturbed(locusd(with(record))));
+    listener_.emplace(undisturbed({CYCLONE_PEER, "0", "listen", "/locus"}));
+    ASSERT_TRUE(daemon_->wait_for_line("DDS is up", seconds{10}));
+    std::this_thread::sleep_for(seconds{2}); // the listener is found
+    play_.emplace(undisturbed({LOCUS_PLAY, plant().string()}));
+    ASSERT_TRUE(daemon_->wait_for_line("tracking", seconds{10}));
+  }
+
+  /// At least so many poses of the replay are those that were heard, once both begin at the same one. A replay that
+  /// begins in mid-drive cuts its sweeps elsewhere: between two that were heard, a tenth of a second apart, the robot
+  /// drives straight on.
+  static void expect_same_estimates(const Replay& replay, const std::vector<HeardPose>& live, std::size_t poses) {
+    std::optional<Pose> T_live_replay;
+    Eigen::Vector3d last = Eigen::Vector3d::Zero();
+    std::size_t compared = 0;
+    double way_m = 0, worst_m = 0;
+    for (const StampedPose& pose : replay.trajectory()) {
+      const auto after = std::ranges::lower_bound(live, pose.stamp, {}, &HeardPose::stamp);
+      if (after == live.begin() || after == live.end())
+        continue;
+      const HeardPose& before = *std::prev(after);
+      const Duration gap = after->stamp - before.stamp;
+      if (gap > milliseconds{150})
+        continue;
+      const Pose T_odom_base =
+          interpolate(before.T_odom_base, after->T_odom_base, to_seconds(pose.stamp - before.stamp) / to_seconds(gap));
+      if (!T_live_replay) {
+        T_live_replay = T_odom_base * pose.T_source_base.inverse();
+        last = T_odom_base.translation;
+      }
+      way_m += (T_odom_base.translation - last).norm();
+      last = T_odom_base.translation;
+      const double error_m = ((*T_live_replay * pose.T_source_base).translation - last).norm();
+      EXPECT_LT(error_m, 0.02 + 0.005 * way_m) << "after " << way_m << " m";
+      worst_m = std::max(worst_m, error_m);
+      ++compared;
+    }
+    EXPECT_GE(compared, poses) << "of " << live.size() << " that were heard";
+    EXPECT_GT(way_m, 1.0) << "it drives";
+    RecordProperty("way_m_of_" + std::to_string(compared), std::to_string(way_m));
+    RecordProperty("worst_mm_of_" + std::to_string(compared), std::to_string(1e3 * worst_m));
+  }
+
+  std::optional<Child> daemon_, listener_, play_;
+};
+
+TEST_F(Incident, AskedForReplaysToTheSameEstimate) {
+  for (const std::string& record : {std::string{"keep_s: 8"}, std::string{"keep_s: 8, folder: record"}}) {
+    ASSERT_NO_FATAL_FAILURE(start(record));
+    std::this_thread::sleep_for(seconds{14});
+    const ProgramRun kept = ask({"record", "--keep", "8s"});
+    ASSERT_EQ(kept.status, 0) << kept.err;
+    const path folder = kept.out.substr(0, kept.out.find('\n'));
+    EXPECT_EQ(folder.parent_path(), file("incidents"));
+    EXPECT_TRUE(folder.string().ends_with("Z_asked")) << folder;
+    EXPECT_EQ(incidents_of_status()["last"], folder.string());
+    EXPECT_TRUE(contains(ask({"status"}).out, "incident    " + folder.filename().string()));
+    EXPECT_EQ(runs_in(file("run/input-ring")).size(), record == "keep_s: 8" ? 1U : 0U) << "nothing is written twice";
+    const nlohmann::json why = nlohmann::json::parse(read_text(folder / "why.json"));
+    EXPECT_EQ(why["why"], "asked");
+    EXPECT_EQ(why["status"]["state"], "tracking");
+    EXPECT_TRUE(why["status"].contains("pose"));
+    EXPECT_FALSE(why["version"].get<std::string>().empty());
+    ASSERT_TRUE(play_->wait_for_exit(seconds{30}));
+    std::this_thread::sleep_for(milliseconds{500});
+    daemon_->signal(SIGTERM);
+    ASSERT_EQ(daemon_->wait_for_exit(seconds{5}), 0);
+    EXPECT_FALSE(std::filesystem::exists(file("run/input-ring")));
+    const Replay replay({"--quiet", folder.string()});
+    ASSERT_EQ(replay.run().status, 0) << replay.run().err;
+    expect_same_estimates(replay, heard(*listener_), 70);
+    EXPECT_LT(replay.trajectory().size(), 180U) << "the last of it, not all";
+    std::filesystem::remove(file("state"));
+  }
+}
+
+/// What others have in the runtime folder stays, and what a service that ends has of its own goes alone.
+TEST_F(Incident, SecondServiceOnTheSameFolderTouchesNothing) {
+  for (const char* mine : {"run/ring/mine", "run/incident/mine", "run/input-ring/mine"})
+    std::filesystem::create_directories(file(mine));
+  std::ofstream{file("run/run")} << "mine";
+  ASSERT_NO_FATAL_FAILURE(start("keep_s: 10"));
+  std::this_thread::sleep_for(seconds{2});
+  const std::vector<path> runs = runs_in(file("run/input-ring"));
+  ASSERT_EQ(runs.size(), 1U);
+  const std::string mark = read_text(file("run/input-ring/run"));
+  EXPECT_EQ(mark, runs.front().string());
+  {
+    Child second(locusd(lidar_with("port: 2390")));
+    EXPECT_TRUE(second.wait_for_line("and no incidents are kept: another service answers there", seconds{10}));
+    EXPECT_TRUE(second.wait_for_line("DDS is up", seconds{10})) << testing::PrintToString(second.lines());
+    second.signal(SIGTERM);
+    EXPECT_EQ(second.wait_for_exit(seconds{5}), 0);
+  }
+  EXPECT_EQ(runs_in(file("run/input-ring")), runs);
+  EXPECT_EQ(read_text(file("run/input-ring/run")), mark);
+  EXPECT_TRUE(folders_in(file("incidents")).empty());
+  EXPECT_EQ(ask({"record", "--keep", "10s"}).status, 0);
+  static_cast<void>(with("keep_s: 0"));
+  ASSERT_EQ(ask({"reload"}).status, 0);
+  std::this_thread::sleep_for(seconds{1});
+  EXPECT_EQ(folders_in(file("run/input-ring")), std::vector<path>{file("run/input-ring/mine")}) << "no memory is held";
+  daemon_->signal(SIGTERM);
+  ASSERT_EQ(daemon_->wait_for_exit(seconds{5}), 0);
+  for (const char* mine : {"run/ring/mine", "run/incident/mine", "run/input-ring/mine", "run/run"})
+    EXPECT_TRUE(std::filesystem::exists(file(mine))) << mine;
+}
+
+/// Neither a disk nor a crumb of memory holds the input; a folder of recordings does.
+TEST_F(Incident, NeedsATmpfsThatIsLargeEnough) {
+  const auto expect_none = [this](const char* why) {
+    daemon_.emplace(undisturbed(locusd(with("keep_s: 10"))));
+    ASSERT_TRUE(daemon_->wait_for_line(why, seconds{10})) << testing::PrintToString(daemon_->lines());
+    ASSERT_TRUE(daemon_->wait_for_line("DDS is up", seconds{10}));
+    play_.emplace(undisturbed({LOCUS_PLAY, plant().string()}));
+    ASSERT_TRUE(daemon_->wait_for_line("tracking", seconds{10}));
+    EXPECT_FALSE(std::filesystem::exists(file("run/input-ring")));
+    const ProgramRun kept = ask({"record", "--keep", "10s"});
+    EXPECT_EQ(kept.status, 1);
+    EXPECT_TRUE(contains(kept.err, "a tmpfs as RUNTIME_DIRECTORY, or record.folder")) << kept.err;
+    static_cast<void>(with("keep_s: 10, folder: record"));
+    ASSERT_EQ(ask({"reload"}).status, 0);
+    std::this_thread::sleep_for(seconds{2});
+    EXPECT_EQ(ask({"record", "--keep", "10s"}).status, 0);
+    play_.reset();
+    daemon_.reset();
+    std::filesystem::remove(file("state"));
+  };
+  umount2(file("run").c_str(), MNT_DETACH);
+  ASSERT_EQ(mount("run", file("run").c_str(), "ramfs", 0, nullptr), 0);
+  ASSERT_NO_FATAL_FAILURE(expect_none("run: is no tmpfs, so no input is held there for incidents; mount a tmpfs"));
+  umount2(file("run").c_str(), MNT_DETACH);
+  ASSERT_EQ(mount("run", file("run").c_str(), "tmpfs", 0, "size=30m"), 0);
+  ASSERT_NO_FATAL_FAILURE(expect_none("run: is too small, so no input is held there for incidents; mount a tmpfs"));
+}
+
+/// The crash is one while the robot drives; what it left becomes an incident, and of the next crash nothing: too soon.
+TEST_F(Incident, CrashIsOneAndAStopIsNone) {
+  ASSERT_NO_FATAL_FAILURE(start("keep_s: 10"));
+  std::this_thread::sleep_for(seconds{6});
+  daemon_->signal(SIGKILL);
+  ASSERT_TRUE(daemon_->wait_for_exit(seconds{5}));
+  const std::vector<HeardPose> live = heard(*listener_);
+  daemon_.emplace(undisturbed(locusd(with("keep_s: 10"))));
+  ASSERT_TRUE(daemon_->wait_for_line("the last input is kept in", seconds{10}))
+      << testing::PrintToString(daemon_->lines());
+  const std::vector<path> kept = folders_in(file("incidents"));
+  ASSERT_EQ(kept.size(), 1U);
+  EXPECT_TRUE(kept[0].string().ends_with("Z_restart")) << kept[0];
+  const nlohmann::json why = nlohmann::json::parse(read_text(kept[0] / "why.json"));
+  EXPECT_EQ(why["why"], "restart");
+  EXPECT_EQ(why["pose"]["xyz_m"].size(), 3U) << "where the robot was";
+  const Replay replay({"--quiet", kept[0].string()});
+  ASSERT_EQ(replay.run().status, 0) << replay.run().err;
+  expect_same_estimates(replay, live, 45);
+
+  daemon_->signal(SIGKILL);
+  ASSERT_TRUE(daemon_->wait_for_exit(seconds{5}));
+  daemon_.emplace(undisturbed(locusd(with("keep_s: 10"))));
+  ASSERT_TRUE(daemon_->wait_for_line("DDS is up", seconds{10}));
+  EXPECT_TRUE(comes([](const auto& incidents) { return incidents["suppressed"] == 1; }, seconds{5}));
+  daemon_->signal(SIGTERM);
+  ASSERT_EQ(daemon_->wait_for_exit(seconds{5}), 0);
+  daemon_.emplace(locusd(with("keep_s: 10")));
+  ASSERT_TRUE(daemon_->wait_for_line("DDS is up", seconds{10}));
+  EXPECT_EQ(incidents_of_status()["suppressed"], 0);
+  EXPECT_EQ(folders_in(file("incidents")).size(), 1U);
+}
+
+/// The plug of the lidar is pulled, and the wheels go on.
+TEST_F(Incident, LossOfTrackingIsOneByItself) {
+  const path robot = file("robot");
+  const ProgramRun sim = run_program(LOCUS_SIM, {"--world", "urban", "--robot", "husky", "--duration", "12", "--seed",
+                                                 "3", "--realism", "clean", "-o", robot.string()});
+  ASSERT_EQ(sim.status, 0) << sim.err;
+  daemon_.emplace(undisturbed(locusd(with("keep_s: 10"))));
+  ASSERT_TRUE(daemon_->wait_for_line("DDS is up", seconds{10}));
+  play_.emplace(undisturbed({LOCUS_PLAY, "--fail", "all-lidars:lost@5-12", robot.string()}));
+  ASSERT_TRUE(daemon_->wait_for_line("the last input is kept in", seconds{20}))
+      << testing::PrintToString(daemon_->lines());
+  const std::vector<path> kept = folders_in(file("incidents"));
+  ASSERT_EQ(kept.size(), 1U);
+  EXPECT_TRUE(kept[0].string().ends_with("Z_tracking_lost")) << kept[0];
+  EXPECT_EQ(nlohmann::json::parse(read_text(kept[0] / "why.json"))["status"]["state"], "dead_reckoning");
+  const Replay replay({"--quiet", kept[0].string()});
+  EXPECT_EQ(replay.run().status, 0) << replay.run().err;
+  EXPECT_GT(replay.trajectory().size(), 30U);
+}
+
+TEST_F(Incident, WhatCannotBeKeptIsSaid) {
+  daemon_.emplace(locusd(with("keep_s: 10")));
+  ASSERT_TRUE(daemon_->wait_for_line("DDS is up", seconds{10}));
+  const ProgramRun nothing = ask({"record", "--keep", "10s"});
+  EXPECT_EQ(nothing.status, 1);
+  EXPECT_TRUE(contains(nothing.err, "no input has come")) << nothing.err;
+  EXPECT_EQ(incidents_of_status()["problem"], "") << "what was refused is no fault of the service";
+  const ProgramRun more = ask({"record", "--keep", "11s"});
+  EXPECT_EQ(more.status, 2);
+  EXPECT_TRUE(contains(more.err, "no more than 10s can be kept; see record.keep_s")) << more.err;
+  for (const char* wrong : {"", "x", "10m", "nan", "-1", "1e9", "0"})
+    EXPECT_EQ(ask({"record", "--keep", wrong}).status, 2) << wrong;
+  EXPECT_TRUE(contains(ask({"record", "--keep", "nan"}).err, "--keep nan: must be seconds, e.g. 60s"));
+  EXPECT_EQ(ask({"record"}).status, 2);
+  static_cast<void>(with("keep_s: 0"));
+  ASSERT_EQ(ask({"reload"}).status, 0);
+  const ProgramRun off = ask({"record", "--keep", "1s"});
+  EXPECT_EQ(off.status, 1);
+  EXPECT_TRUE(contains(off.err, "set record.keep_s")) << off.err;
+}
+
+TEST_F(Incident, DiskThatIsFullOrAFolderThatCannotBeMadeIsSaidAndTheOdometryGoesOn) {
+  std::filesystem::create_directory(file("incidents"));
+  ASSERT_EQ(mount("incidents", file("incidents").c_str(), "tmpfs", 0, "size=3m"), 0);
+  const path older = file("incidents/2026-01-01T00-00-00.000Z_asked");
+  std::filesystem::create_directory(older);
+  ASSERT_NO_FATAL_FAILURE(start("keep_s: 10"));
+  std::this_thread::sleep_for(seconds{4});
+  const ProgramRun full = ask({"record", "--keep", "10s"});
+  EXPECT_EQ(full.status, 1);
+  EXPECT_TRUE(contains(full.err, "MB are free on the disk")) << full.err;
+  EXPECT_EQ(folders_in(file("incidents")), std::vector<path>{older}) << "nothing is left of it, nor given for it";
+  EXPECT_TRUE(folders_in(file("run/input-ring/.incident.part")).empty());
+  umount2(file("incidents").c_str(), MNT_DETACH);
+  std::filesystem::remove(file("incidents"));
+  std::ofstream{file("incidents")} << "a file";
+  const ProgramRun no_folder = ask({"record", "--keep", "10s"});
+  EXPECT_EQ(no_folder.status, 1);
+  EXPECT_TRUE(contains(no_folder.err, "incidents: the incident cannot be kept (Not a directory)")) << no_folder.err;
+  EXPECT_TRUE(daemon_->wait_for_line("(Not a directory); let locusd write there", seconds{5}));
+  std::filesystem::remove(file("incidents"));
+  EXPECT_EQ(ask({"record", "--keep", "10s"}).status, 0) << "as soon as it can be";
+  EXPECT_EQ(folders_in(file("incidents")).size(), 1U);
+}
+
+/// Ten times the packets of a lidar, from somebody else: the bound of memory holds, and what is kept has less time.
+TEST_F(Incident, FloodFillsNoMoreThanItsBound) {
+  constexpr std::uint64_t kBytes = 10'000'000;
+  ASSERT_NO_FATAL_FAILURE(start(fmt::format("keep_s: 60, keep_bytes: {}", kBytes)));
+  const UdpSender pest(0x7F000002);
+  const std::vector<std::byte> packet(velodyne::kDataPacketBytes);
+  std::uint64_t most = 0;
+  for (int i = 0; i < 600; ++i) {
+    for (int k = 0; k < 75; ++k)
+      pest.send(2368, packet);
+    if (i % 20 == 0)
+      most = std::max(most, bytes_in(file("run/input-ring")));
+    std::this_thread::sleep_for(milliseconds{10});
+  }
+  EXPECT_LE(most, kBytes);
+  EXPECT_GT(most, kBytes / 2);
+  EXPECT_EQ(ask({"record", "--keep", "60s"}).status, 0);
+  EXPECT_LE(bytes_in(file("incidents")), kBytes + 100'000);
+
+  const Child asks({LOCUSCTL, "--socket", file("run/control").string(), "record", "--keep", "60s"});
+  std::this_thread::sleep_for(milliseconds{200}); // it is being copied
+  static_cast<void>(with("keep_s: 0"));
+  ASSERT_EQ(ask({"reload"}).status, 0);
+  const auto is_complete = [](const path& incident) { return std::filesystem::exists(incident / "why.json"); };
+  for (int i = 0; i < 50 && std::ranges::count_if(folders_in(file("incidents")), is_complete) < 2; ++i)
+    std::this_thread::sleep_for(milliseconds{100});
+  EXPECT_EQ(std::ranges::count_if(folders_in(file("incidents")), is_complete), 2)
+      << "what was begun is brought to its end";
+  const auto said = [&](const char* words) { return asks.wait_for_line(words, seconds{2}); };
+  EXPECT_TRUE(said("Z_asked")) << testing::PrintToString(asks.lines());
+  for (int i = 0; i < 20 && !folders_in(file("run/input-ring")).empty(); ++i)
+    std::this_thread::sleep_for(milliseconds{100});
+  EXPECT_TRUE(folders_in(file("run/input-ring")).empty()) << "no memory is held for what is off";
+}
+
+/// Requests come one after another; the folder holds no more than it may.
+TEST(IncidentFolder, OldestGoesFirst) {
+  const TemporaryFolder folder;
+  const path piece = folder / "record/000001_2026-11-22T08-12-05Z/000001";
+  std::filesystem::create_directories(piece);
+  std::ofstream{piece / "lidar.pcap"} << std::string(1'000'000, 'x');
+  daemon::Incidents incidents(folder / "incidents");
+  incidents.set_max_bytes(3'500'000);
+  const auto keep = [&](int second) {
+    const auto where = incidents.ask(
+        {daemon::IncidentCause::asked, seconds{60}, Stamp{seconds{1'800'000'000 + second}}, "{}", {piece}});
+    EXPECT_TRUE(where);
+    EXPECT_FALSE(incidents.ask({})) << "one at a time";
+    incidents.work(nullptr);
+    incidents.work(nullptr);
+    EXPECT_EQ(incidents.status().refusal, "");
+    EXPECT_EQ(incidents.status().last, *where);
+    return *where;
+  };
+  std::vector<path> all;
+  for (int second = 0; second < 5; ++second)
+    all.push_back(keep(second));
+  EXPECT_EQ(folders_in(folder / "incidents"), std::vector<path>(all.begin() + 2, all.end()));
+  EXPECT_TRUE(std::filesystem::exists(all.back() / "000001/lidar.pcap"));
+  incidents.set_max_bytes(900'000);
+  ASSERT_TRUE(incidents.ask({daemon::IncidentCause::asked, seconds{60}, Stamp{seconds{1'900'000'000}}, "{}", {piece}}));
+  incidents.work(nullptr);
+  EXPECT_TRUE(contains(incidents.status().refusal, "it has 1 MB, and 0 may be used); raise record.incidents_bytes"))
+      << incidents.status().refusal;
+  EXPECT_EQ(folders_in(folder / "incidents").size(), 3U) << "none is given for nothing";
+}
+
+/// What nobody asked for comes once within five minutes, whoever of the processes kept the last.
+TEST(IncidentFolder, WhatComesTooSoonIsCounted) {
+  const TemporaryFolder folder;
+  const path piece = folder / "record/000001_2026-11-22T08-12-05Z/000001";
+  std::filesystem::create_directories(piece);
+  std::ofstream{piece / "lidar.pcap"} << "x";
+  const auto request = [&](Duration later) {
+    return daemon::Incidents::Request{daemon::IncidentCause::contradiction,
+                                      seconds{60},
+                                      Stamp{daemon::read_clock(CLOCK_REALTIME)} + later,
+                                      "{}",
+                                      {piece}};
+  };
+  for (int process = 0; process < 2; ++process) {
+    daemon::Incidents incidents(folder / "incidents");
+    incidents.set_max_bytes(10'000'000);
+    for (const seconds later : {seconds{0}, seconds{299}, seconds{305 + process}}) {
+      incidents.raise(request(later));
+      incidents.work(nullptr);
+      incidents.work(nullptr);
+    }
+    EXPECT_EQ(incidents.status().suppressed, process == 0 ? 1U : 2U);
+    EXPECT_EQ(incidents.status().problem, "");
+  }
+}
+
+/// As when the clock was set back by a year.
+TEST(IncidentFolder, OneOfTheFutureHidesNoneOfToday) {
+  const TemporaryFolder folder;
+  const path piece = folder / "record/000001_2026-11-22T08-12-05Z/000001";
+  std::filesystem::create_directories(piece);
+  std::ofstream{piece / "lidar.pcap"} << "x";
+  const auto file_now = std::filesystem::file_time_type::clock::now();
+  for (const auto& [name, age] : {std::pair{"2026-11-22T08-12-05.123Z_restart", Duration{seconds{10}}},
+                                  std::pair{"2027-11-22T08-12-05.123Z_restart", Duration{-std::chrono::hours{8760}}}}) {
+    std::filesystem::create_directories(folder / "incidents" / name);
+    std::filesystem::last_write_time(folder / "incidents" / name, file_now - age);
+  }
+  for (const char* part : {"notes.part", "2026-11-22T08-12-05.123Z_restart.part"})
+    std::filesystem::create_directories(folder / "incidents" / part);
+  daemon::Incidents incidents(folder / "incidents");
+  incidents.set_max_bytes(10'000'000);
+  EXPECT_EQ(folders_in(folder / "incidents").size(), 3U) << "what was not completed is gone, and that alone";
+  const auto request = [&](daemon::IncidentCause cause) {
+    return daemon::Incidents::Request{cause, seconds{60}, Stamp{daemon::read_clock(CLOCK_REALTIME)}, "{}", {piece}};
+  };
+  EXPECT_FALSE(incidents.raise(request(daemon::IncidentCause::restart)));
+  EXPECT_TRUE(incidents.ask(request(daemon::IncidentCause::asked)));
+  EXPECT_FALSE(incidents.raise(request(daemon::IncidentCause::tracking_lost))) << "another one is on its way";
+  incidents.work(nullptr);
+  incidents.work(nullptr);
+  EXPECT_TRUE(incidents.raise(request(daemon::IncidentCause::tracking_lost)))
+      << "it was not kept, so this is the first";
+  EXPECT_EQ(incidents.status().suppressed, 2U);
+}
+
+} // namespace
+} // namespace locus::test

@@ -1,0 +1,479 @@
+// SPDX-License-Identifier: Apache-2.0
+// Metrics as Prometheus gets them, and who else calls there.
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <regex>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
+#include <yaml-cpp/yaml.h>
+
+#include "daemon/descriptor.hpp"
+#include "daemon/machine_time.hpp"
+#include "daemon/service/metrics_server.hpp"
+#include "drivers/net/socket_address.hpp"
+#include "service/open_metrics.hpp"
+#include "service/robot_network.hpp"
+#include "service/undisturbed.hpp"
+#include "support/errors.hpp"
+
+namespace locus::test {
+namespace {
+
+using daemon::Descriptor;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr const char* kAddress = "127.0.0.1:9464";
+constexpr std::string_view kScrape = "GET /metrics HTTP/1.1\r\nHost: robot\r\n\r\n";
+
+Descriptor connect_to(const std::string& address) {
+  const auto parsed = parse_socket_address(address);
+  Descriptor client{::socket(parsed->storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC, 0)};
+  const timeval patience{8, 0};
+  setsockopt(client.number(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+  if (connect(client.number(), reinterpret_cast<const sockaddr*>(&parsed->storage), parsed->size) != 0)
+    return Descriptor{};
+  return client;
+}
+
+void say(const Descriptor& client, std::string_view words) {
+  static_cast<void>(::send(client.number(), words.data(), words.size(), MSG_NOSIGNAL));
+}
+
+/// Until the other side hangs up.
+std::string hear(const Descriptor& client) {
+  std::string all;
+  std::array<char, 4096> bytes{};
+  for (ssize_t size = 0; (size = recv(client.number(), bytes.data(), bytes.size(), 0)) > 0;)
+    all.append(bytes.data(), static_cast<std::size_t>(size));
+  return all;
+}
+
+std::string ask_for(std::string_view request, const std::string& address = kAddress) {
+  const Descriptor client = connect_to(address);
+  say(client, request);
+  return hear(client);
+}
+
+std::string body_of(const std::string& answer) {
+  const std::size_t end = answer.find("\r\n\r\n");
+  return end == std::string::npos ? "" : answer.substr(end + 4);
+}
+
+/// By the network of whoever runs the tests, for that of a test is its own.
+ProgramRun fetch_promtool() {
+  return run_program("/usr/bin/nsenter", {fmt::format("--net=/proc/{}/ns/net", getppid()), FETCH_PROMTOOL, PROMTOOL});
+}
+
+class Metrics : public RobotNetwork {
+ protected:
+  [[nodiscard]] std::filesystem::path listening(const std::string& address = kAddress) const {
+    return config(fmt::format("metrics: {{listen: '{}'}}\n", address));
+  }
+
+  static OpenMetrics scrape(const std::string& address = kAddress) {
+    const std::string answer = ask_for(kScrape, address);
+    EXPECT_TRUE(answer.starts_with("HTTP/1.1 200 OK\r\n")) << answer.substr(0, 200);
+    return OpenMetrics::parse(body_of(answer));
+  }
+
+  /// A robot that has driven, with metrics.
+  void drive() {
+    daemon_.emplace(undisturbed(locusd(listening())));
+    ASSERT_TRUE(daemon_->wait_for_line("DDS is up", seconds{10}));
+    play_.emplace(undisturbed({LOCUS_PLAY, capture().string()}));
+    ASSERT_TRUE(daemon_->wait_for_line("tracking", seconds{10}));
+  }
+
+  std::optional<Child> daemon_, play_;
+};
+
+TEST_F(Metrics, AreWhatTheStatusTells) {
+  ASSERT_NO_FATAL_FAILURE(drive());
+  ASSERT_EQ(play_->wait_for_exit(seconds{60}), 0);
+  std::this_thread::sleep_for(milliseconds{500});
+  const nlohmann::json before = this->status();
+  const OpenMetrics metrics = scrape();
+  const nlohmann::json status = this->status();
+  EXPECT_EQ(metrics.mistakes, std::vector<std::string>{});
+  EXPECT_EQ(metrics.value("locusd_build_info", {{"version", status["version"]}}), 1);
+  for (const char* what : {"seen", "processed", "dropped", "failed"}) { // windows without lidar go on
+    EXPECT_GE(metrics.value(fmt::format("locusd_sweeps_{}_total", what)), before["sweeps"][what]) << what;
+    EXPECT_LE(metrics.value(fmt::format("locusd_sweeps_{}_total", what)), status["sweeps"][what]) << what;
+  }
+  EXPECT_GT(metrics.value("locusd_sweeps_processed_total"), 50);
+  const nlohmann::json& packets = status["packets"]["front"];
+  for (const char* what : {"received", "data", "position", "lost", "reordered"})
+    EXPECT_EQ(metrics.value(fmt::format("locusd_packets_{}_total", what), {{"lidar", "front"}}), packets[what]) << what;
+  for (const auto& [reason, count] : packets["rejected"].items())
+    EXPECT_EQ(metrics.value("locusd_packets_rejected_total", {{"lidar", "front"}, {"reason", reason}}), count);
+  for (const auto& [name, source] : status["sources"].items()) {
+    EXPECT_EQ(metrics.value("locusd_source_samples_received_total", {{"source", name}}), source["received"]);
+    EXPECT_EQ(metrics.value("locusd_source_sweeps_used_total", {{"source", name}}), source["used_sweeps"]);
+    EXPECT_NEAR(metrics.value("locusd_source_test_ratio", {{"source", name}}), source["innovation"]["test_ratio"],
+                1e-4);
+    for (const auto& [reason, count] : source["rejected"].items())
+      EXPECT_GE(metrics.value("locusd_source_samples_rejected_total", {{"source", name}, {"reason", reason}}), 0);
+    EXPECT_EQ(metrics.value("locusd_source_velocity_innovation_meters_per_second", {{"source", name}, {"axis", "y"}}),
+              source["innovation"]["value"][1]);
+    EXPECT_EQ(
+        metrics.value("locusd_source_turn_innovation_sigma_radians_per_second", {{"source", name}, {"axis", "yaw"}}),
+        source["innovation"]["sd"][5]);
+  }
+  EXPECT_NEAR(metrics.value("locusd_position_sigma_meters", {{"axis", "z"}}),
+              std::sqrt(status["covariance"][14].get<double>()), 0.1);
+  EXPECT_EQ(metrics.value("locusd_dds_connected"), 1);
+  EXPECT_EQ(metrics.value("locusd_beginning_info", {{"from", status["beginning"]}}), 1);
+  EXPECT_EQ(metrics.value("locusd_flat_ground", {{"locusd_flat_ground", status["flat_ground"]}}), 1);
+  double states = 0;
+  for (const auto& [labels, is_it] : metrics.samples.at("locusd_state"))
+    states += is_it;
+  EXPECT_EQ(states, 1);
+}
+
+/// While nothing changes, each value at its place.
+TEST_F(Metrics, OfTheMachineAreTrueAndTheHistogramIsOfAllSweeps) {
+  ASSERT_NO_FATAL_FAILURE(drive());
+  ASSERT_EQ(play_->wait_for_exit(seconds{60}), 0);
+  const OpenMetrics metrics = scrape();
+  const nlohmann::json status = this->status();
+  const double count = metrics.value("locusd_sweep_process_seconds_count");
+  EXPECT_NEAR(count, status["sweeps"]["processed"].get<double>() + status["sweeps"]["failed"].get<double>(), 3);
+  EXPECT_EQ(metrics.samples.at("locusd_sweep_process_seconds_bucket").size(), 10U);
+  const double mean_ms = 1e3 * metrics.value("locusd_sweep_process_seconds_sum") / count;
+  EXPECT_GT(mean_ms, 0.5 * status["process_ms"]["p50"].get<double>());
+  EXPECT_LT(mean_ms, 1.01 * status["process_ms"]["max"].get<double>()) << "of fewer than 600 sweeps";
+  for (const auto& [labels, up_to] : metrics.samples.at("locusd_sweep_process_seconds_bucket")) {
+    if (labels.at("le") != "+Inf" && 1e3 * std::stod(labels.at("le")) < status["process_ms"]["p50"].get<double>()) {
+      EXPECT_LE(up_to, 0.5 * count + 3) << labels.at("le");
+    }
+  }
+  const double now_s = to_seconds(daemon::read_clock(CLOCK_REALTIME));
+  EXPECT_NEAR(metrics.value("process_start_time_seconds"), now_s - status["duration_s"].get<double>(), 2.0);
+  EXPECT_NEAR(metrics.value("process_cpu_seconds_total"), status["cpu_s"].get<double>(), 1.0);
+  EXPECT_LE(metrics.value("process_resident_memory_bytes"), 1.05e6 * status["peak_rss_mb"].get<double>());
+  const std::filesystem::path files = fmt::format("/proc/{}/fd", daemon_->pid());
+  const auto open = std::distance(std::filesystem::directory_iterator{files}, {});
+  EXPECT_NEAR(metrics.value("process_open_fds"), static_cast<double>(open), 3.0);
+}
+
+/// What promtool reads is the text before OpenMetrics, which has neither infos nor state sets, and whose counters have
+/// their suffix in the name of the family; the samples are the same.
+TEST_F(Metrics, PleasePromtool) {
+  if (const ProgramRun fetched = fetch_promtool(); fetched.status != 0)
+    GTEST_SKIP() << "no promtool: " << fetched.err;
+  ASSERT_NO_FATAL_FAILURE(drive());
+  std::string text = body_of(ask_for(kScrape));
+  text = std::regex_replace(text, std::regex{"# UNIT [^\n]*\n|# EOF\n"}, "");
+  text = std::regex_replace(text, std::regex{"# TYPE (\\w+) counter\n# HELP \\w+"},
+                            "# TYPE $1_total counter\n# HELP $1_total");
+  text =
+      std::regex_replace(text, std::regex{"# TYPE (\\w+) info\n# HELP \\w+"}, "# TYPE $1_info gauge\n# HELP $1_info");
+  text = std::regex_replace(text, std::regex{" stateset\n"}, " gauge\n");
+  std::ofstream{file("metrics.txt")} << text;
+  const ProgramRun check =
+      run_program("/bin/sh", {"-c", PROMTOOL " check metrics < " + file("metrics.txt").string() + " 2>&1"});
+  EXPECT_EQ(check.status, 0) << check.out;
+  EXPECT_EQ(check.out, "");
+}
+
+TEST_F(Metrics, AreToldBeforeAnySensorIsHeard) {
+  const Child daemon(locusd(listening()));
+  ASSERT_TRUE(daemon.wait_for_line("metrics are told at 127.0.0.1:9464", seconds{10}));
+  const OpenMetrics metrics = scrape();
+  EXPECT_EQ(metrics.mistakes, std::vector<std::string>{});
+  EXPECT_EQ(metrics.value("locusd_state", {{"locusd_state", "waiting"}}), 1);
+  EXPECT_EQ(metrics.value("locusd_sweep_process_seconds_count"), 0);
+  EXPECT_EQ(metrics.value("locusd_source_health", {{"source", "imu"}, {"locusd_source_health", "never heard"}}), 1);
+}
+
+TEST_F(Metrics, EachAddressIsListenedToAsItSays) {
+  for (const std::string& address : {std::string{"[::1]:9464"}, file("metrics").string()}) {
+    Child daemon(locusd(listening(address)));
+    ASSERT_TRUE(daemon.wait_for_line("metrics are told at", seconds{10})) << testing::PrintToString(daemon.lines());
+    EXPECT_EQ(scrape(address).mistakes, std::vector<std::string>{}) << address;
+    daemon.signal(SIGTERM);
+    ASSERT_EQ(daemon.wait_for_exit(seconds{5}), 0);
+  }
+  EXPECT_FALSE(std::filesystem::exists(file("metrics")));
+}
+
+TEST_F(Metrics, SocketOfOneThatCrashedIsTakenOverAndAFileIsNot) {
+  for (const int end : {SIGKILL, SIGTERM}) {
+    Child daemon(locusd(listening(file("metrics").string())));
+    ASSERT_TRUE(daemon.wait_for_line("metrics are told at", seconds{10})) << testing::PrintToString(daemon.lines());
+    daemon.signal(end);
+    ASSERT_TRUE(daemon.wait_for_exit(seconds{5}));
+  }
+  std::ofstream{file("metrics")} << "of somebody";
+  const Child daemon(locusd(listening(file("metrics").string())));
+  EXPECT_TRUE(daemon.wait_for_line("the service runs without metrics", seconds{10}));
+  EXPECT_EQ(read_text(file("metrics")), "of somebody");
+}
+
+TEST_F(Metrics, WrongAddressesAreRefusedWithWhatToWrite) {
+  for (const char* address : {"9464", "localhost:9464", "127.0.0.1", "127.0.0.1:0", "127.0.0.1:65536", "::1:9464",
+                              "[::1]", "unix:/run/x", "run/x", "/run/", "127.0.0.1:94 64", "0x7f.1:80", ":9464"}) {
+    const ProgramRun run = run_program(LOCUSD, {"--config", listening(address).string(), "--check-config"});
+    EXPECT_EQ(run.status, 2) << address;
+    EXPECT_TRUE(contains(run.err, "metrics.listen")) << address << run.err;
+    EXPECT_TRUE(contains(run.err, "write IPv4:PORT as 127.0.0.1:9464")) << address << run.err;
+  }
+  const std::string longest = "/" + std::string(106, 'a');
+  EXPECT_TRUE(parse_socket_address(longest));
+  EXPECT_FALSE(parse_socket_address(longest + 'a'));
+}
+
+TEST_F(Metrics, PortThatIsTakenIsSaidAndTheServiceRunsOn) {
+  const auto taken = daemon::MetricsServer::open(kAddress, [] { return std::string{}; });
+  ASSERT_TRUE(taken) << taken.error();
+  const Child daemon(locusd(listening()));
+  EXPECT_TRUE(daemon.wait_for_line("metrics.listen 127.0.0.1:9464: Address already in use; the service runs without",
+                                   seconds{10}))
+      << testing::PrintToString(daemon.lines());
+  EXPECT_EQ(status()["state"], "waiting");
+}
+
+TEST_F(Metrics, SocketOfAnotherKindIsNotTakenOver) {
+  const Child daemon(locusd(listening(control().string())));
+  EXPECT_TRUE(daemon.wait_for_line("control: Address already in use; the service runs without metrics", seconds{10}))
+      << testing::PrintToString(daemon.lines());
+  EXPECT_EQ(status()["state"], "waiting");
+}
+
+/// Who calls while no descriptor is left, is not heard; the main thread does not spin for that.
+TEST_F(Metrics, NoDescriptorLeftCostsNoProcessor) {
+  const Child daemon(locusd(listening()));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  rlimit before{}, none{};
+  ASSERT_EQ(prlimit(daemon.pid(), RLIMIT_NOFILE, nullptr, &before), 0);
+  while (std::filesystem::exists(fmt::format("/proc/{}/fd/{}", daemon.pid(), none.rlim_cur)))
+    ++none.rlim_cur; // the next one that would be given
+  none.rlim_max = before.rlim_max;
+  ASSERT_EQ(prlimit(daemon.pid(), RLIMIT_NOFILE, &none, nullptr), 0);
+  const Descriptor metrics = connect_to(kAddress);
+  const Child caller({LOCUSCTL, "--socket", control().string(), "status"});
+  const auto spent = [&] {
+    clockid_t clock{};
+    clock_getcpuclockid(daemon.pid(), &clock);
+    return daemon::read_clock(clock);
+  };
+  std::this_thread::sleep_for(milliseconds{500});
+  const Duration at_first = spent();
+  std::this_thread::sleep_for(seconds{2});
+  EXPECT_LT(to_seconds(spent() - at_first), 0.5) << "of two seconds";
+  ASSERT_EQ(prlimit(daemon.pid(), RLIMIT_NOFILE, &before, nullptr), 0);
+  EXPECT_EQ(scrape().mistakes, std::vector<std::string>{}) << testing::PrintToString(daemon.lines());
+}
+
+TEST_F(Metrics, ReloadTurnsThemOnAndOff) {
+  const Child daemon(locusd(config()));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  for (int turn = 0; turn < 2; ++turn) {
+    EXPECT_LT(connect_to(kAddress).number(), 0);
+    static_cast<void>(listening());
+    ASSERT_EQ(ctl({"reload"}).status, 0);
+    EXPECT_EQ(scrape().mistakes, std::vector<std::string>{});
+    ASSERT_EQ(ctl({"reload"}).status, 0);
+    EXPECT_EQ(scrape().mistakes, std::vector<std::string>{}) << "it stays";
+    static_cast<void>(config());
+    ASSERT_EQ(ctl({"reload"}).status, 0);
+  }
+  EXPECT_LT(connect_to(kAddress).number(), 0);
+}
+
+TEST_F(Metrics, OtherRequestsAreAnsweredWithWhatIsWrong) {
+  const Child daemon(locusd(listening()));
+  ASSERT_TRUE(daemon.wait_for_line("metrics are told", seconds{10}));
+  const auto first_line = [](std::string_view request) {
+    const std::string answer = ask_for(request);
+    return answer.substr(0, answer.find("\r\n"));
+  };
+  const std::string ok = "HTTP/1.1 200 OK", bad = "HTTP/1.1 400 Bad Request", none = "HTTP/1.1 404 Not Found",
+                    not_allowed = "HTTP/1.1 405 Method Not Allowed";
+  EXPECT_EQ(first_line(kScrape), ok);
+  EXPECT_EQ(first_line("GET /metrics?x=1 HTTP/1.0\r\n\r\n"), ok);
+  const std::string head = ask_for("HEAD /metrics HTTP/1.1\r\n\r\n");
+  EXPECT_TRUE(head.starts_with(ok) && head.ends_with("\r\n\r\n")) << head;
+  EXPECT_NE(head.find("Content-Length: "), std::string::npos) << head;
+  EXPECT_EQ(head.find("# TYPE"), std::string::npos) << head;
+  EXPECT_EQ(first_line("GET / HTTP/1.1\r\n\r\n"), none);
+  EXPECT_EQ(first_line("GET /metrics/../../etc/passwd HTTP/1.1\r\n\r\n"), none);
+  EXPECT_EQ(first_line("POST /metrics HTTP/1.1\r\n\r\n"), not_allowed);
+  EXPECT_EQ(first_line("GET /metrics\r\n\r\n"), bad);
+  EXPECT_EQ(first_line("GET /metrics HTTP/2\r\n\r\n"), bad);
+  EXPECT_EQ(first_line("\r\n\r\n"), bad);
+  EXPECT_EQ(first_line(std::string(9, '\0') + "\xff\xfe \r\n\r\n"), bad);
+  EXPECT_EQ(first_line(std::string(4097, 'A')), bad);
+  EXPECT_EQ(first_line("GET /metrics HTTP/1.1\r\nCookie: " + std::string(4096, 'A')), bad);
+  EXPECT_EQ(ask_for(kScrape).substr(0, 120).find("Content-Type: application/openmetrics-text; version=1.0.0; "
+                                                 "charset=utf-8\r\n"),
+            ok.size() + 2);
+}
+
+/// One that comes letter by letter is served, as long as it takes no more than its time.
+TEST_F(Metrics, WhoIsSlowOrSilentHoldsNobodyUp) {
+  const Child daemon(locusd(listening()));
+  ASSERT_TRUE(daemon.wait_for_line("metrics are told", seconds{10}));
+  std::vector<Descriptor> silent;
+  for (int i = 0; i < 100; ++i) {
+    silent.push_back(connect_to(kAddress));
+    ASSERT_GE(silent.back().number(), 0) << i;
+    say(silent.back(), "GET /metr");
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(scrape().mistakes, std::vector<std::string>{});
+  EXPECT_EQ(status()["state"], "waiting");
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, seconds{4}) << "the patience with one client is five";
+
+  const Descriptor deaf = connect_to(kAddress);
+  for (int i = 0; i < 100; ++i) // more than it is asked for: what it does not read fills no memory
+    say(deaf, kScrape);
+  const Descriptor slow = connect_to(kAddress);
+  for (const char letter : kScrape) {
+    say(slow, {&letter, 1});
+    std::this_thread::sleep_for(milliseconds{10});
+  }
+  EXPECT_TRUE(hear(slow).ends_with("# EOF\n"));
+
+  const Descriptor loris = connect_to(kAddress);
+  const auto loris_began = std::chrono::steady_clock::now();
+  EXPECT_EQ(hear(loris), "");
+  const auto stayed = std::chrono::steady_clock::now() - loris_began;
+  EXPECT_GT(stayed, seconds{4});
+  EXPECT_LT(stayed, seconds{7});
+}
+
+/// The reader of these tests does see what is wrong.
+TEST(OpenMetricsReader, ForgivesNothing) {
+  const std::string good = "# TYPE a counter\n# HELP a b\na_total{x=\"1\"} 1\n# EOF\n";
+  EXPECT_EQ(OpenMetrics::parse(good).mistakes, std::vector<std::string>{});
+  const auto with = [&](const std::string& part, const std::string& other) {
+    std::string text = good;
+    return text.replace(text.find(part), part.size(), other);
+  };
+  for (const std::string& bad : {with("# EOF\n", ""),
+                                 with("# EOF\n", "# EOF\n\n"),
+                                 with("a_total", "a"),
+                                 with("a_total", "b_total"),
+                                 with(" 1\n", " -1\n"),
+                                 with(" 1\n", " NaN\n"),
+                                 with(" 1\n", " nan\n"),
+                                 with(" 1\n", "\n"),
+                                 with("counter", "info"),
+                                 with("counter", "stateset"),
+                                 with("counter", "histogram"),
+                                 with("counter", "counts"),
+                                 with("# HELP a b\n", ""),
+                                 with("# HELP", "# UNIT"),
+                                 with("x=\"1\"", "x=\"1\","),
+                                 with("x=\"1\"", "x=1"),
+                                 with("x=\"1\"", "x=\"1\",x=\"2\""),
+                                 with("# EOF", "a_total{x=\"1\"} 1\n# EOF"),
+                                 with("# EOF", "# HELP a b\n# EOF"),
+                                 with("# EOF", "# TYPE b gauge\n# EOF"),
+                                 std::string{}})
+    EXPECT_NE(OpenMetrics::parse(bad).mistakes.size(), 0U) << bad;
+}
+
+/// The rules and the dashboard that are installed name what there is.
+class Examples : public Metrics {
+ protected:
+  static std::string example(const std::string& name) { return std::string{EXAMPLES} + "/" + name; }
+
+  /// Of all expressions, each metric that they name.
+  static void expect_known(const OpenMetrics& metrics, std::string expression) {
+    const std::string whole = expression;
+    std::smatch found;
+    for (const std::regex selector{R"((\w+)\{([^}]*)\})"}; std::regex_search(expression, found, selector);) {
+      const std::string name = found[1], inside = found[2];
+      expect_labels(metrics, name, inside, whole);
+      expression = found.prefix().str() + name + found.suffix().str();
+    }
+    expression = std::regex_replace(expression, std::regex{R"(\[[^\]]*\]| *\b(by|without) *\([^)]*\) *)"}, "");
+    const std::regex word{R"([A-Za-z_:]\w*(?![\w(]))"};
+    int count = 0;
+    for (std::sregex_iterator name{expression.begin(), expression.end(), word}, end; name != end; ++name) {
+      if (name->str() == "or" || name->str() == "and" || name->str() == "e")
+        continue;
+      ++count;
+      EXPECT_TRUE(name->str() == "up" || metrics.samples.contains(name->str())) << name->str() << " in " << whole;
+    }
+    EXPECT_GT(count, 0) << whole;
+  }
+
+  static void expect_labels(const OpenMetrics& metrics, const std::string& name, const std::string& inside,
+                            const std::string& whole) {
+    const std::regex matcher{R"re((\w+)(=|=~)"([^"]*)")re"};
+    for (std::sregex_iterator label{inside.begin(), inside.end(), matcher}, end; label != end; ++label) {
+      const std::string key = (*label)[1], text = (*label)[3];
+      if (key == "instance" || key == "job" || name == "up")
+        continue;
+      const auto family = metrics.samples.find(name);
+      ASSERT_NE(family, metrics.samples.end()) << whole;
+      EXPECT_TRUE(std::ranges::any_of(
+          family->second,
+          [&](const auto& sample) { return sample.first.contains(key) && sample.first.at(key) == text; }))
+          << key << '=' << text << " in " << whole;
+    }
+  }
+
+  /// With a recording, so that all there can be is there.
+  OpenMetrics all_metrics() {
+    daemon_.emplace(undisturbed(locusd(config(
+        fmt::format("metrics: {{listen: '{}'}}\nrecord: {{folder: record, max_bytes: 100000000}}\n", kAddress)))));
+    EXPECT_TRUE(daemon_->wait_for_line("DDS is up", seconds{10}));
+    play_.emplace(undisturbed({LOCUS_PLAY, capture().string()}));
+    EXPECT_TRUE(daemon_->wait_for_line("tracking", seconds{10}));
+    std::this_thread::sleep_for(seconds{1});
+    return scrape();
+  }
+};
+
+TEST_F(Examples, NameMetricsAndLabelsThatThereAre) {
+  const OpenMetrics metrics = all_metrics();
+  EXPECT_EQ(metrics.mistakes, std::vector<std::string>{});
+  int rules = 0, targets = 0;
+  for (const auto& group : YAML::LoadFile(example("prometheus-alerts.yaml"))["groups"])
+    for (const auto& rule : group["rules"]) {
+      ++rules;
+      expect_known(metrics, rule["expr"].as<std::string>());
+    }
+  const nlohmann::json dashboard = nlohmann::json::parse(read_text(example("grafana-dashboard.json")));
+  for (const auto& panel : dashboard["panels"])
+    for (const auto& target : panel["targets"]) {
+      ++targets;
+      expect_known(metrics, target["expr"]);
+    }
+  EXPECT_GE(rules, 10);
+  EXPECT_GE(targets, 15);
+  EXPECT_TRUE(metrics.samples.contains("locusd_build_info")) << "the dashboard finds the robots by it";
+}
+
+TEST_F(Examples, AlertsFireWhenTheyShould) {
+  if (const ProgramRun fetched = fetch_promtool(); fetched.status != 0)
+    GTEST_SKIP() << "no promtool: " << fetched.err;
+  std::filesystem::copy_file(example("prometheus-alerts.yaml"), file("prometheus-alerts.yaml"));
+  std::filesystem::copy_file(ALERTS_TEST, file("alerts_test.yaml"));
+  const ProgramRun check = run_program(PROMTOOL, {"check", "rules", file("prometheus-alerts.yaml")});
+  EXPECT_EQ(check.status, 0) << check.out << check.err;
+  const ProgramRun test = run_program(PROMTOOL, {"test", "rules", file("alerts_test.yaml")});
+  EXPECT_EQ(test.status, 0) << test.out << test.err;
+}
+
+} // namespace
+} // namespace locus::test

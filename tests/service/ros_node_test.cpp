@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// The service among the nodes of ROS 2, as two kinds of DDS hear of it.
+#include <algorithm>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "service/robot_network.hpp"
+
+namespace locus::test {
+namespace {
+
+using std::chrono::seconds;
+
+class RosNodeOfService : public RobotNetwork {};
+
+/// Whether the last node that the peer heard of, to the end, has this name and claims so many endpoints to publish
+/// with.
+bool hears_node(const Child& peer, const std::string& node, std::ptrdiff_t writers) {
+  const auto begins_with = [](const char* word) {
+    return [word](const std::string& line) { return line.starts_with(word); };
+  };
+  return peer.wait_until(seconds{20}, [&](const std::vector<std::string>& lines) {
+    const auto begins = std::find_if(lines.rbegin(), lines.rend(), begins_with("node "));
+    return begins != lines.rend() && begins->starts_with("node " + node + " ") &&
+           std::any_of(begins.base(), lines.end(), begins_with("node_end ")) &&
+           std::count_if(begins.base(), lines.end(), begins_with("node_writer ")) == writers;
+  });
+}
+
+/// What a reload adds is claimed, too.
+TEST_F(RosNodeOfService, HasTheNameOfTheInstanceAndAllThatItPublishes) {
+  const std::filesystem::path runtime = file("locusd@left");
+  setenv("RUNTIME_DIRECTORY", runtime.c_str(), 1); // NOLINT(concurrency-mt-unsafe)
+  const Child cyclone({CYCLONE_PEER, "0", "iron", "/locus"}), fast_dds({FAST_DDS_PEER, "0", "iron", "/locus"});
+  const Child daemon(locusd(config()));
+  constexpr std::ptrdiff_t kAlways = 5; // odometry, odometry_fast, state, beginning, diagnostics
+  for (const Child* peer : {&cyclone, &fast_dds})
+    EXPECT_TRUE(hears_node(*peer, "/ locusd_left", kAlways)) << testing::PrintToString(peer->lines());
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10})) << testing::PrintToString(daemon.lines());
+  static_cast<void>(config("dds: {publish_tf: true, publish_map: true, prefix: /robot_7/locus}\n"));
+  const ProgramRun reload = run_program(LOCUSCTL, {"--socket", (runtime / "control").string(), "reload"});
+  ASSERT_EQ(reload.status, 0) << reload.err;
+  for (const Child* peer : {&cyclone, &fast_dds})
+    EXPECT_TRUE(hears_node(*peer, "/robot_7 locusd_left", kAlways + 2)) << testing::PrintToString(peer->lines());
+}
+
+TEST_F(RosNodeOfService, ThatIsTheOnlyOneIsLocusdInTheLayoutThatIsConfigured) {
+  const Child cyclone({CYCLONE_PEER, "0", "humble", "/locus"}), fast_dds({FAST_DDS_PEER, "0", "humble", "/locus"});
+  const Child daemon(locusd(config("dds: {ros_graph: humble}\n")));
+  for (const Child* peer : {&cyclone, &fast_dds})
+    EXPECT_TRUE(hears_node(*peer, "/ locusd", 5)) << testing::PrintToString(peer->lines());
+}
+
+} // namespace
+} // namespace locus::test
