@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+// locus-play --clock: what a node with use_sim_time hears of a recording that is played.
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <sstream>
+#include <thread>
+
+#include "drivers/files/capture.hpp"
+#include "drivers/files/pcap_writer.hpp"
+#include "service/robot_network.hpp"
+#include "service/undisturbed.hpp"
+
+namespace locus::test {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+/// A line of the peer that begins with a stamp.
+struct HeardStamp {
+  Stamp stamp, heard;
+};
+
+Stamp stamp_in(std::istringstream& row) {
+  std::int64_t sec = 0, nanosec = 0;
+  char dot = 0;
+  row >> sec >> dot >> nanosec;
+  return stamp_from_ns(sec * 1'000'000'000 + nanosec);
+}
+
+std::vector<HeardStamp> stamps_of(const Child& peer, const std::string& topic) {
+  std::vector<HeardStamp> all;
+  for (const std::string& line : peer.lines_of(topic)) {
+    std::istringstream row(line);
+    const Stamp stamp = stamp_in(row);
+    std::int64_t heard_ns = 0;
+    row >> heard_ns;
+    all.push_back({stamp, stamp_from_ns(heard_ns)});
+  }
+  return all;
+}
+
+/// Of a robot's clock, whatever it shows: it is told a hundred times a second, goes so fast, and never back.
+void expect_clock_goes(const std::vector<HeardStamp>& clock, double speed) {
+  ASSERT_GT(clock.size(), 100U);
+  for (std::size_t i = 1; i < clock.size(); ++i)
+    EXPECT_GT(clock[i].stamp, clock[i - 1].stamp);
+  const double heard_s = to_seconds(clock.back().heard - clock.front().heard);
+  EXPECT_NEAR(to_seconds(clock.back().stamp - clock.front().stamp) / heard_s, speed, 0.05 * speed);
+  EXPECT_LT(static_cast<double>(clock.size()), 100 * heard_s + 2);
+  EXPECT_GT(static_cast<double>(clock.size()), 70 * heard_s) << "a busy machine sleeps longer than it is told to";
+}
+
+/// How far stamps are ahead of the clock as their listener has it, the worst but one in a hundred.
+double ahead_s(const std::vector<HeardStamp>& heard, const std::vector<HeardStamp>& clock) {
+  std::vector<double> all;
+  for (const HeardStamp& one : heard) {
+    const auto later = std::ranges::upper_bound(clock, one.heard, {}, &HeardStamp::heard);
+    if (later != clock.begin())
+      all.push_back(to_seconds(one.stamp - std::prev(later)->stamp));
+  }
+  EXPECT_GT(all.size(), 100U);
+  std::ranges::sort(all);
+  return all.empty() ? 0 : all[all.size() * 99 / 100];
+}
+
+class SimTime : public RobotNetwork {};
+
+TEST_F(SimTime, AtTwiceTheSpeedIsThatOfSensorsAndOfTheOdometry) {
+  constexpr double kSpeed = 2.0, kStep_s = kSpeed * 0.01;
+  const Child daemon(undisturbed(locusd(lidar_with("time: sensor"))));
+  const Child peer(undisturbed({FAST_DDS_PEER, "0", "listen", "/locus"}));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  std::this_thread::sleep_for(seconds{2}); // the listener finds the daemon
+  Child play(undisturbed({LOCUS_PLAY, "--clock", "--speed", "2", capture().string()}));
+  ASSERT_EQ(play.wait_for_exit(seconds{60}), 0) << testing::PrintToString(play.lines());
+  std::this_thread::sleep_for(milliseconds{500});
+
+  const std::vector<HeardStamp> clock = stamps_of(peer, "clock"), imu = stamps_of(peer, "imu");
+  expect_clock_goes(clock, kSpeed);
+  EXPECT_LT(ahead_s(imu, clock), 2 * kStep_s);
+  std::vector<HeardStamp> odometry;
+  for (const HeardPose& pose : heard(peer))
+    odometry.push_back({pose.stamp, pose.heard});
+  EXPECT_LT(ahead_s(odometry, clock), 2 * kStep_s);
+  for (const HeardStamp& one : odometry)
+    EXPECT_TRUE(clock.front().stamp < one.stamp && one.stamp < clock.back().stamp) << "of the same time";
+}
+
+TEST_F(SimTime, WithKeptStampsIsThatOfTheRecording) {
+  auto recording = Capture::open(capture() / "lidar.pcap");
+  ASSERT_TRUE(recording);
+  Stamp first = Stamp::max(), last{};
+  while (const Datagram* const datagram = recording->next()) {
+    first = std::min(first, datagram->receive_stamp);
+    last = datagram->receive_stamp;
+  }
+  const Child peer(undisturbed({FAST_DDS_PEER, "0", "listen", "/locus"}));
+  std::this_thread::sleep_for(seconds{1});
+  Child play(undisturbed({LOCUS_PLAY, "--clock", "--keep-stamps", "--speed", "4", capture().string()}));
+  ASSERT_EQ(play.wait_for_exit(seconds{60}), 0) << testing::PrintToString(play.lines());
+  std::this_thread::sleep_for(milliseconds{500});
+  const std::vector<HeardStamp> clock = stamps_of(peer, "clock"), imu = stamps_of(peer, "imu");
+  expect_clock_goes(clock, 4.0);
+  EXPECT_LT(ahead_s(imu, clock), 2 * 4.0 * 0.01);
+  ASSERT_FALSE(clock.empty() || imu.empty());
+  EXPECT_LE(clock.back().stamp, last);
+  EXPECT_GT(clock.back().stamp, last - milliseconds{200});
+  EXPECT_GE(clock.front().stamp, first - seconds{1}) << "motion is played from a second ahead of the first datagram";
+  EXPECT_LT(clock.front().stamp, first + seconds{1});
+}
+
+/// The second half of a capture, then the first.
+TEST_F(SimTime, DoesNotGoBackWithARecordingThatDoes) {
+  constexpr Duration kHalf = seconds{10};
+  std::filesystem::create_directory(file("turned"));
+  {
+    auto writer = PcapWriter::open(file("turned/lidar.pcap"));
+    ASSERT_TRUE(writer);
+    for (const bool second_half : {true, false}) {
+      auto recording = Capture::open(capture() / "lidar.pcap");
+      ASSERT_TRUE(recording);
+      std::optional<Stamp> first;
+      while (const Datagram* const datagram = recording->next())
+        if (first = first.value_or(datagram->receive_stamp); (datagram->receive_stamp - *first > kHalf) == second_half)
+          writer->write(*datagram);
+    }
+  }
+  const Child peer(undisturbed({FAST_DDS_PEER, "0", "listen", "/locus"}));
+  std::this_thread::sleep_for(seconds{1});
+  Child play(undisturbed({LOCUS_PLAY, "--clock", "--keep-stamps", "--speed", "4", file("turned").string()}));
+  ASSERT_EQ(play.wait_for_exit(seconds{60}), 0) << testing::PrintToString(play.lines());
+  std::this_thread::sleep_for(milliseconds{500});
+  const std::vector<HeardStamp> clock = stamps_of(peer, "clock");
+  ASSERT_GT(clock.size(), 100U);
+  for (std::size_t i = 1; i < clock.size(); ++i)
+    EXPECT_GT(clock[i].stamp, clock[i - 1].stamp);
+}
+
+TEST_F(SimTime, IsNotToldUnlessItIsAskedFor) {
+  const Child peer(undisturbed({FAST_DDS_PEER, "0", "listen", "/locus"}));
+  std::this_thread::sleep_for(seconds{1});
+  Child play(undisturbed({LOCUS_PLAY, "--speed", "10", capture().string()}));
+  ASSERT_EQ(play.wait_for_exit(seconds{60}), 0) << testing::PrintToString(play.lines());
+  EXPECT_FALSE(stamps_of(peer, "imu").empty());
+  EXPECT_TRUE(stamps_of(peer, "clock").empty());
+}
+
+} // namespace
+} // namespace locus::test
