@@ -13,6 +13,7 @@
 
 #include "core/base/problems.hpp"
 #include "core/ingest/sweep.hpp"
+#include "drivers/net/socket_address.hpp"
 
 namespace locus {
 namespace {
@@ -63,20 +64,71 @@ void check_names(Problems& problems, const Config& config) {
     check(item("motion_sources", i, "name"), config.motion_sources[i].name);
 }
 
+/// Clouds have been made of packets by somebody else, whom nothing here tells how.
+void check_clouds(Problems& problems, const std::vector<LidarOptions>& lidars, std::size_t i) {
+  static const LidarOptions kDefaults;
+  const LidarOptions& lidar = lidars[i];
+  require_topic_or_empty(problems, item("lidars", i, "topic"), lidar.topic);
+  if (!lidar.gives_clouds()) {
+    problems.require(lidar.point_times == kDefaults.point_times, item("lidars", i, "point_times"),
+                     "belongs to clouds; name their topic, or leave it out");
+    return;
+  }
+  const auto require_default = [&](const char* key, bool is_default) {
+    problems.require(is_default, item("lidars", i, key),
+                     fmt::format("belongs to packets, and topic {} to clouds; leave out one of the two", lidar.topic));
+  };
+  require_default("model", !lidar.model && !lidar.hesai);
+  require_default("port", lidar.port == kDefaults.port || lidar.port == 0);
+  require_default("source_ip", lidar.source_ip == kDefaults.source_ip);
+  require_default("multicast_ip", lidar.multicast_ip == kDefaults.multicast_ip);
+  require_default("time", lidar.time == kDefaults.time);
+  require_default("calibration", lidar.calibration == kDefaults.calibration);
+  require_default("metadata", lidar.metadata == kDefaults.metadata);
+  const auto end = lidars.begin() + static_cast<std::ptrdiff_t>(i);
+  problems.require(
+      std::find_if(lidars.begin(), end, [&](const LidarOptions& other) { return other.topic == lidar.topic; }) == end,
+      item("lidars", i, "topic"), "is another lidar's too; give each its own");
+}
+
 void check_lidars(Problems& problems, const std::vector<LidarOptions>& lidars) {
-  problems.require(!lidars.empty() && lidars.size() <= Config::kMaxLidars, "lidars", "there must be 1 to 16 of them");
+  problems.require(!lidars.empty() && lidars.size() <= kMaxLidars, "lidars", "there must be 1 to 16 of them");
   for (std::size_t i = 0; i < lidars.size(); ++i) {
-    problems.require(lidars[i].port != 0, item("lidars", i, "port"), "0 is outside 1 .. 65535");
+    check_clouds(problems, lidars, i);
+    problems.require(lidars[i].port != 0 || lidars[i].is_ouster(), item("lidars", i, "port"),
+                     "0 is outside 1 .. 65535");
     problems.require(lidars[i].multicast_ip.value_or(kFirstMulticastIp) >> 28 == kFirstMulticastIp >> 28,
                      item("lidars", i, "multicast_ip"), "must be within 224.0.0.0 .. 239.255.255.255, or none");
-    const bool heard_twice = std::any_of(lidars.begin(), lidars.begin() + static_cast<std::ptrdiff_t>(i),
-                                         [&lidar = lidars[i]](const LidarOptions& other) {
-                                           return other.port == lidar.port && (!other.source_ip || !lidar.source_ip ||
-                                                                               *other.source_ip == *lidar.source_ip);
-                                         });
+    problems.require((!lidars[i].model && !lidars[i].hesai) || lidars[i].metadata.empty(),
+                     item("lidars", i, "metadata"), "belongs to model Ouster, or auto");
+    const bool heard_twice =
+        std::any_of(lidars.begin(), lidars.begin() + static_cast<std::ptrdiff_t>(i),
+                    [&lidar = lidars[i]](const LidarOptions& other) {
+                      return !other.gives_clouds() && !lidar.gives_clouds() && other.port == lidar.port &&
+                             lidar.port != 0 &&
+                             (!other.source_ip || !lidar.source_ip || *other.source_ip == *lidar.source_ip);
+                    });
     problems.require(!heard_twice, item("lidars", i, "port"),
                      "is another lidar's too; give each its own port, or each its own source_ip");
   }
+}
+
+void check_calibration(Problems& problems, std::size_t i, const MotionSource& source) {
+  const bool imu = source.kind == SourceKind::imu;
+  const auto check = [&](const char* key, double value, double lowest, double highest, bool belongs, const char* kind) {
+    const std::string name = item("motion_sources", i, key);
+    problems.require_range(name, value, lowest, highest);
+    problems.require(belongs, name, fmt::format("belongs to kind {} alone", kind));
+  };
+  check("late_ms", source.late_ms, -250.0, 250.0, true, "");
+  check("scale", source.scale, 0.5, 2.0, !imu || source.scale == 1.0, "odometry");
+  check("yaw_scale", source.yaw_scale, 0.5, 2.0, !imu || source.yaw_scale == 1.0, "odometry");
+  const CalibrationSigma& sigma = source.calibration_sigma;
+  check("calibration_sigma.late_ms", sigma.late_ms.value_or(0.0), 0.0, 250.0, imu || !sigma.late_ms, "imu");
+  check("calibration_sigma.mounting_deg", sigma.mounting_deg.value_or(0.0), 0.0, 45.0, imu || !sigma.mounting_deg,
+        "imu");
+  check("calibration_sigma.scale", sigma.scale.value_or(0.0), 0.0, 0.5, !imu || !sigma.scale, "odometry");
+  check("calibration_sigma.yaw_scale", sigma.yaw_scale.value_or(0.0), 0.0, 0.5, !imu || !sigma.yaw_scale, "odometry");
 }
 
 void check_sources(Problems& problems, const Config& config) {
@@ -91,6 +143,7 @@ void check_sources(Problems& problems, const Config& config) {
                      "belongs to kind imu alone, an odometry source already reports the pose of the base");
     problems.require(source.kind == SourceKind::imu || source.use_acceleration == UseAcceleration::automatic,
                      item("motion_sources", i, "use_acceleration"), "belongs to kind imu alone");
+    check_calibration(problems, i, source);
   }
 }
 
@@ -108,6 +161,8 @@ void check_types_of_topics(Problems& problems, const Config& config) {
     check(item("motion_sources", i, "topic"), source.topic, source.kind == SourceKind::imu ? "Imu" : "Odometry");
     check(item("motion_sources", i, "health_topic"), source.health_topic, "Bool");
   }
+  for (std::size_t i = 0; i < config.lidars.size(); ++i)
+    check(item("lidars", i, "topic"), config.lidars[i].topic, "PointCloud2");
   check("dds.flat_ground_topic", config.dds.flat_ground_topic, "Bool");
 }
 
@@ -138,7 +193,22 @@ void check_record(Problems& problems, const Config& config) {
   const std::filesystem::path folder = config.record.folder;
   problems.require(std::find(folder.begin(), folder.end(), "..") == folder.end(), "record.folder",
                    "must not contain '..'; write the whole path");
-  problems.require_range<std::uint64_t>("record.max_bytes", config.record.max_bytes, 10'000'000, 1'000'000'000'000'000);
+  constexpr std::uint64_t kLeast = RecordOptions::kLeastBytes, kMost = 1'000'000'000'000'000;
+  problems.require_range<std::uint64_t>("record.max_bytes", config.record.max_bytes, kLeast, kMost);
+  const double keep_s = config.record.keep_s;
+  problems.require(keep_s == 0.0 || (keep_s >= 1.0 && keep_s <= 600.0), "record.keep_s",
+                   "must be 1 .. 600, or 0 where no incidents are to be kept");
+  problems.require_range<std::uint64_t>("record.keep_bytes", config.record.keep_bytes, kLeast, 100'000'000'000);
+  problems.require_range<std::uint64_t>("record.incidents_bytes", config.record.incidents_bytes, kLeast, kMost);
+  problems.require(config.record.incidents_bytes >= config.record.keep_bytes, "record.incidents_bytes",
+                   "must not be less than record.keep_bytes, for one incident may have as much");
+}
+
+void check_metrics(Problems& problems, const MetricsOptions& metrics) {
+  problems.require(metrics.listen.empty() || parse_socket_address(metrics.listen).has_value(), "metrics.listen",
+                   fmt::format("'{}' is no address to listen on; write IPv4:PORT as 127.0.0.1:9464, [IPv6]:PORT as "
+                               "[::1]:9464, or the absolute path of a Unix socket, of 107 bytes at most",
+                               metrics.listen));
 }
 
 } // namespace
@@ -156,6 +226,7 @@ std::optional<std::string> Config::problem() const {
   check_realtime(problems, realtime);
   check_dds(problems, dds);
   check_record(problems, *this);
+  check_metrics(problems, metrics);
   return problems.result();
 }
 

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "config/config.hpp"
+#include "drivers/hesai/model.hpp"
 #include "drivers/velodyne/model.hpp"
 
 /// The one place where a key is spelled. fields() shows a section each key of a struct with its field; a reader fills
@@ -14,10 +15,16 @@
 /// otherwise than the struct does, fields() converts before the key and back after it.
 namespace locus {
 
-/// The other enumerations have their words beside them.
-inline auto names_of(velodyne::Model) {
-  std::array<std::string_view, velodyne::kModels.size()> names;
+/// Words for what packets are of: Velodyne's models in their order, then Hesai's, then the maker whose metadata tells
+/// the model. The other enumerations have their words beside them.
+enum class ModelWord : std::uint8_t {};
+inline constexpr std::size_t kFirstOfHesai = velodyne::kModels.size();
+inline constexpr ModelWord kOusterWord{kFirstOfHesai + hesai::kModels};
+inline auto names_of(ModelWord) {
+  std::array<std::string_view, kFirstOfHesai + hesai::kModels + 1> names;
   std::ranges::transform(velodyne::kModels, names.begin(), [](velodyne::Model model) { return to_string(model); });
+  std::ranges::copy(names_of(hesai::Model{}), names.begin() + kFirstOfHesai);
+  names.back() = "Ouster";
   return names;
 }
 
@@ -40,17 +47,43 @@ template <class Section> void fields(Section& section, LidarOptions& options) {
   const auto from_number = [](std::optional<std::uint32_t> ip) { return ip ? std::optional{Ipv4{*ip}} : std::nullopt; };
   std::optional<Ipv4> source_ip = from_number(options.source_ip);
   std::optional<Ipv4> multicast_ip = from_number(options.multicast_ip);
+  std::optional<ModelWord> model;
+  if (options.ouster)
+    model = kOusterWord;
+  else if (options.hesai)
+    model = static_cast<ModelWord>(kFirstOfHesai + static_cast<std::size_t>(*options.hesai));
+  else if (options.model)
+    model = static_cast<ModelWord>(*options.model);
   section.key("name", options.name);
-  section.key_or("model", options.model, "auto");
+  section.key_or("model", model, "auto");
   section.key("port", options.port);
   section.key_or("source_ip", source_ip, "any");
   section.key_or("multicast_ip", multicast_ip, "none");
   section.key("time", options.time);
   section.key("calibration", options.calibration);
+  section.key("topic", options.topic);
+  section.key("point_times", options.point_times);
+  section.key("metadata", options.metadata);
   section.key("T_base_lidar", options.T_base_lidar);
   const auto to_number = [](std::optional<Ipv4> ip) { return ip ? std::optional{ip->host_order} : std::nullopt; };
+  options.ouster = model == kOusterWord;
+  options.model.reset();
+  options.hesai.reset();
+  if (model && static_cast<std::size_t>(*model) < kFirstOfHesai)
+    options.model = static_cast<velodyne::Model>(*model);
+  else if (model && !options.ouster)
+    options.hesai = static_cast<hesai::Model>(static_cast<std::size_t>(*model) - kFirstOfHesai);
+  if (options.is_ouster() && !section.has("port"))
+    options.port = 0;
   options.source_ip = to_number(source_ip);
   options.multicast_ip = to_number(multicast_ip);
+}
+
+template <class Section> void fields(Section& section, CalibrationSigma& sigma) {
+  section.key_or("late_ms", sigma.late_ms, "auto");
+  section.key_or("mounting_deg", sigma.mounting_deg, "auto");
+  section.key_or("scale", sigma.scale, "auto");
+  section.key_or("yaw_scale", sigma.yaw_scale, "auto");
 }
 
 template <class Section> void fields(Section& section, MotionSource& source) {
@@ -60,6 +93,11 @@ template <class Section> void fields(Section& section, MotionSource& source) {
   section.key("health_topic", source.health_topic);
   section.key("use_acceleration", source.use_acceleration);
   section.key("T_base_source", source.T_base_source);
+  section.key("late_ms", source.late_ms);
+  section.key("scale", source.scale);
+  section.key("yaw_scale", source.yaw_scale);
+  section.key("calibration", source.calibration);
+  section.key("calibration_sigma", source.calibration_sigma);
 }
 
 template <class Section> void fields(Section& section, BodyBoxOptions& options) {
@@ -163,11 +201,19 @@ template <class Section> void fields(Section& section, DdsOptions& options) {
   section.key("flat_ground_topic", options.flat_ground_topic);
   section.key("security", options.security);
   section.key("type_hashes", options.type_hashes);
+  section.key("ros_graph", options.ros_graph);
 }
 
 template <class Section> void fields(Section& section, RecordOptions& options) {
   section.key("folder", options.folder);
   section.key("max_bytes", options.max_bytes);
+  section.key("keep_s", options.keep_s);
+  section.key("keep_bytes", options.keep_bytes);
+  section.key("incidents_bytes", options.incidents_bytes);
+}
+
+template <class Section> void fields(Section& section, MetricsOptions& options) {
+  section.key("listen", options.listen);
 }
 
 template <class Section> void fields(Section& section, Config& config) {
@@ -180,6 +226,7 @@ template <class Section> void fields(Section& section, Config& config) {
   section.key("realtime", config.realtime);
   section.key("dds", config.dds);
   section.key("record", config.record);
+  section.key("metrics", config.metrics);
 }
 
 } // namespace locus

@@ -119,6 +119,8 @@ class SectionReader {
     key(name, word);
   }
 
+  [[nodiscard]] bool has(std::string_view name) const { return entries_.contains(name); }
+
   void blame_unknown_keys() {
     for (const auto& [name, entry] : entries_) {
       if (std::find(known_.begin(), known_.end(), name) == known_.end())
@@ -176,6 +178,7 @@ class SectionWriter {
     OptionalWord<T> word{value, word_for_none};
     key(name, word);
   }
+  [[nodiscard]] static bool has(std::string_view /*name*/) { return true; }
   [[nodiscard]] YAML::Node node() const { return node_; }
 
   template <class T> static YAML::Node write(T& value) {

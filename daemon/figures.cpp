@@ -21,23 +21,39 @@ constexpr std::uint64_t kNextToNothing = 100;
 } // namespace
 
 IngestReport::Lidar IngestReport::Lidar::of(const LidarInput& lidar) {
-  const velodyne::Decoder& decoder = lidar.decoder();
   return {.packets = lidar.counters(),
-          .model = decoder.model(),
-          .return_mode = decoder.return_mode(),
-          .rotation_rate_rpm = decoder.model() ? decoder.rotation_rate_rpm() : 0.0,
+          .model = lidar.model(),
+          .return_mode = lidar.return_mode(),
+          .rotation_rate_rpm = lidar.rotation_rate_rpm(),
           .source_ip = lidar.source_ip(),
           .refused_ip = lidar.refused_ip(),
           .strangers = lidar.strangers(),
-          .unknown_packets = decoder.unknown_packets(),
+          .unknown_packets = lidar.unknown_packets(),
           .last_heard = lidar.last_heard(),
-          .pps = lidar.position() ? lidar.position()->pps : velodyne::PpsState::absent};
+          .unknown_last_heard = lidar.unknown_last_heard(),
+          .pps = lidar.clock_state(),
+          .tells_date = lidar.tells_date(),
+          .packets_of_other_mode = lidar.ouster() != nullptr && lidar.ouster()->is_in_other_mode()
+                                       ? lidar.ouster()->packets_of_other_start()
+                                       : 0};
+}
+
+void IngestReport::Lidar::add(const CloudDecoder& decoder) {
+  clouds = Clouds{.counters = decoder.counters(),
+                  .doubts = decoder.doubts(),
+                  .last_doubted = decoder.last_doubted(),
+                  .timing = decoder.timing(),
+                  .rings = decoder.rings(),
+                  .period = decoder.period()};
+  last_heard = decoder.last_heard();
 }
 
 void IngestReport::read(const Ingest& ingest) {
   total = ingest.lidars().total();
   for (std::size_t i = 0; i < ingest.lidars().lidars().size(); ++i) {
     lidars[i] = Lidar::of(ingest.lidars().lidars()[i]);
+    if (const CloudDecoder* clouds = ingest.clouds_of(i))
+      lidars[i].add(*clouds);
   }
   for (std::size_t i = 0; i < ingest.sources().size(); ++i) {
     const HealthMonitor& health = ingest.sources().health(SourceId{i});
@@ -72,9 +88,33 @@ std::optional<std::string> shared_port(const LidarOptions& options, const Ingest
 std::optional<std::string> unknown_model(const LidarOptions& options, const IngestReport::Lidar& lidar) {
   if (!lidar.unknown_packets || lidar.unknown_packets->packets * kNextToNothing <= lidar.packets.data)
     return std::nullopt;
+  if (lidar.unknown_packets->is_readable)
+    return fmt::format(
+        "lidar {0}: refused {1}, which is not what lidars.{0} is configured as; set its model to auto, and "
+        "calibration, if any, to the file of that sensor",
+        options.name, to_string(*lidar.unknown_packets));
   return fmt::format("lidar {0}: refused {1}, no model that can be read; if another device sends to port {2}, set "
                      "lidars.{0}.source_ip to that of the lidar",
-                     options.name, velodyne::to_string(*lidar.unknown_packets), options.port);
+                     options.name, to_string(*lidar.unknown_packets), options.port);
+}
+
+std::vector<std::string> cloud_doubts(const LidarOptions& options, const IngestReport::Lidar& lidar) {
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; lidar.clouds && i < kCloudDoubts; ++i) {
+    if (lidar.clouds->doubts[i])
+      lines.push_back(
+          fmt::format("lidar {}: {}", options.name, explain(static_cast<CloudDoubt>(i), lidar.clouds->timing)));
+  }
+  return lines;
+}
+
+std::optional<std::string> stale_metadata(const LidarOptions& options, const IngestReport::Lidar& lidar) {
+  if (lidar.packets_of_other_mode == 0)
+    return std::nullopt;
+  return fmt::format("lidar {}: refused the last {} packets: the sensor was started anew since {} was fetched, and is "
+                     "not in the mode that this tells of; fetch it again: locusctl fetch {} -o {}",
+                     options.name, lidar.packets_of_other_mode, options.metadata,
+                     lidar.source_ip ? dotted(*lidar.source_ip) : "SENSOR", options.metadata);
 }
 
 std::optional<std::string> too_fast(const MotionLimits& limits, double largest_speed_mps) {
@@ -100,6 +140,12 @@ std::optional<std::string> short_sweep(const SweepOptions& options, const std::s
       lidar, turn_ms, sweep_ms);
 }
 
+void LatencyHistogram::take(double took_s) {
+  const auto bound = std::ranges::lower_bound(kBounds_s, took_s);
+  ++counts[static_cast<std::size_t>(bound - kBounds_s.begin())];
+  sum_s += took_s;
+}
+
 void SweepTally::take(const ProcessedSweep& sweep) {
   const OdometryEstimate& estimate = sweep.estimate;
   const Timing timing{read_clock(CLOCK_MONOTONIC), static_cast<float>(1e3 * to_seconds(sweep.took.wall)),
@@ -109,6 +155,7 @@ void SweepTally::take(const ProcessedSweep& sweep) {
   else
     timings_[sums_.sweeps % window_] = timing;
   ++sums_.sweeps;
+  sums_.process.take(to_seconds(sweep.took.wall));
   sums_.raw_points += static_cast<double>(sweep.raw_returns);
   sums_.filtered_points += static_cast<double>(estimate.points);
   sums_.scan_to_scan_iterations += estimate.scan_to_scan.iterations;
@@ -172,8 +219,26 @@ std::string_view health_of(const IngestReport::Source& source) {
   return source.healthy ? "healthy" : source.counters.received == 0 ? "never heard" : "lost";
 }
 
+/// Who sent to its port a while ago does not do so any more, and what was wrong with its clouds then is mended.
 std::string problem_of(const LidarOptions& options, const IngestReport::Lidar& lidar) {
-  return shared_port(options, lidar).value_or(unknown_model(options, lidar).value_or(""));
+  constexpr Duration kLately = std::chrono::seconds{5};
+  IngestReport::Lidar now = lidar;
+  if (lidar.clouds) {
+    for (std::size_t i = 0; i < kCloudDoubts; ++i)
+      if (lidar.last_heard - lidar.clouds->last_doubted[i] > kLately)
+        now.clouds->doubts.reset(i);
+    const std::vector<std::string> doubts = cloud_doubts(options, now);
+    return doubts.empty() ? "" : doubts.front();
+  }
+  for (LidarInput::Stranger& stranger : now.strangers)
+    if (lidar.last_heard - stranger.last_heard > kLately)
+      stranger = {};
+  if (lidar.last_heard - lidar.unknown_last_heard > kLately)
+    now.unknown_packets.reset();
+  for (const auto& problem : {shared_port(options, now), unknown_model(options, now), stale_metadata(options, now)})
+    if (problem)
+      return *problem;
+  return "";
 }
 
 double rounded(double value) { return std::round(value * 1e4) / 1e4; }

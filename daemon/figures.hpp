@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -13,6 +14,7 @@
 
 #include "config/config.hpp"
 #include "core/ingest/sweep.hpp"
+#include "daemon/incidents.hpp"
 #include "daemon/ingest.hpp"
 #include "daemon/recorder.hpp"
 #include "daemon/sweep_processor.hpp"
@@ -21,19 +23,36 @@ namespace locus::daemon {
 
 /// What the ingest has counted so far, as a copy that other threads may read. Plain memory.
 struct IngestReport {
+  /// Of a lidar that gives clouds: as CloudDecoder has them.
+  struct Clouds {
+    CloudCounters counters;
+    CloudDoubts doubts;
+    std::array<Stamp, kCloudDoubts> last_doubted{};
+    PointTiming timing{};
+    RingsFrom rings{};
+    Duration period{};
+  };
   struct Lidar {
     PacketCounters packets;
-    std::optional<velodyne::Model> model;
-    std::optional<velodyne::ReturnMode> return_mode;
+    std::optional<Clouds> clouds{};      ///< of one that gives these
+    std::string_view model, return_mode; ///< as LidarInput has them; empty before the first good packet
     double rotation_rate_rpm = 0.0;
-    std::optional<std::uint32_t> source_ip;                  ///< host byte order
-    std::optional<std::uint32_t> refused_ip;                 ///< LidarInput::refused_ip()
-    LidarInput::Strangers strangers;                         ///< LidarInput::strangers()
-    std::optional<velodyne::UnknownPackets> unknown_packets; ///< velodyne::Decoder::unknown_packets()
-    Stamp last_heard;                                        ///< LidarInput::last_heard()
-    velodyne::PpsState pps = velodyne::PpsState::absent;
+    std::optional<std::uint32_t> source_ip;        ///< host byte order
+    std::optional<std::uint32_t> refused_ip;       ///< LidarInput::refused_ip()
+    LidarInput::Strangers strangers;               ///< LidarInput::strangers()
+    std::optional<UnknownPackets> unknown_packets; ///< LidarInput::unknown_packets()
+    Stamp last_heard;                              ///< LidarInput::last_heard()
+    Stamp unknown_last_heard;                      ///< LidarInput::unknown_last_heard()
+    std::string_view pps = "absent";               ///< LidarInput::clock_state()
+    bool tells_date = false;                       ///< LidarInput::tells_date()
+    std::uint64_t packets_of_other_mode = 0; ///< ouster::Decoder::packets_of_other_start() where is_in_other_mode()
 
     static Lidar of(const LidarInput& lidar);
+    void add(const CloudDecoder& decoder);
+
+    /// Data packets or clouds.
+    [[nodiscard]] std::uint64_t used() const { return clouds ? clouds->counters.used : packets.data; }
+    [[nodiscard]] std::uint64_t received() const { return clouds ? clouds->counters.received : packets.received; }
   };
   struct Source {
     SourceCounters counters;
@@ -43,12 +62,16 @@ struct IngestReport {
   };
 
   PacketCounters total;
-  std::array<Lidar, Config::kMaxLidars> lidars; ///< by index
-  std::array<Source, kMaxSources> sources;      ///< by index
+  std::array<Lidar, kMaxLidars> lidars;    ///< by index
+  std::array<Source, kMaxSources> sources; ///< by index
   SweepBuilder::Counters sweeps;
 
   /// Called by the ingest thread.
   void read(const Ingest& ingest);
+  /// Whether any lidar has brought anything of use.
+  [[nodiscard]] bool has_lidar_data() const {
+    return std::ranges::any_of(lidars, [](const Lidar& lidar) { return lidar.used() > 0; });
+  }
 };
 
 /// That somebody else, who may be a second lidar, sends to the port of a lidar whose address is not configured: who,
@@ -59,15 +82,36 @@ std::optional<std::string> shared_port(const LidarOptions& options, const Ingest
 /// there are next to none.
 std::optional<std::string> unknown_model(const LidarOptions& options, const IngestReport::Lidar& lidar);
 
+/// What is wrong with the times in a lidar's clouds, a line each.
+std::vector<std::string> cloud_doubts(const LidarOptions& options, const IngestReport::Lidar& lidar);
+
+/// That an Ouster was started anew since its metadata was fetched, and for turns now does not turn as that says, so
+/// that its packets are refused; nothing where they are not.
+std::optional<std::string> stale_metadata(const LidarOptions& options, const IngestReport::Lidar& lidar);
+
 /// What the owner of a lidar should know of sweeps that are shorter than its turn; nothing where they are not.
 std::optional<std::string> short_sweep(const SweepOptions& options, const std::string& lidar, double rotation_rate_rpm);
 
 /// That estimates are faster than the robot is said to be able to; nothing while they are not.
 std::optional<std::string> too_fast(const MotionLimits& limits, double largest_speed_mps);
 
+/// Of a pose, a twist or an observability, by index.
+inline constexpr std::array<std::string_view, 6> kAxes{"x", "y", "z", "roll", "pitch", "yaw"};
+
 /// Of a distribution.
 struct Percentiles {
   double p50 = 0, p90 = 0, p99 = 0, max = 0;
+};
+
+/// How long the sweeps took, each of them counted for good.
+struct LatencyHistogram {
+  /// Upper bounds. They are chosen for deadlines of one revolution, 50 to 200 ms, and what a sweep takes, from 1 ms.
+  static constexpr std::array<double, 9> kBounds_s{0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5};
+
+  std::array<std::uint64_t, kBounds_s.size() + 1> counts{}; ///< by the bound; the last is of those beyond all
+  double sum_s = 0;
+
+  void take(double took_s);
 };
 
 /// What is told of the sweeps that were processed: sums since the start, and distributions of the last ones.
@@ -81,6 +125,7 @@ struct SweepFigures {
   double largest_speed_mps = 0; ///< that any estimate claims
   std::optional<OdometryEstimate> last;
   Duration last_at{}; ///< CLOCK_MONOTONIC when it was taken
+  LatencyHistogram process;
   Percentiles process_ms, process_cpu_ms;
   double rate_hz = 0; ///< over the last few seconds: zero once no more come
 };
@@ -119,11 +164,12 @@ struct LinkFigures {
     std::uint64_t health_refused = 0; ///< of its health topic, the same
   };
   std::vector<Source> sources;           ///< by the index of the configuration
+  std::vector<Source> lidars;            ///< the same, of those that give clouds
   std::uint64_t flat_ground_refused = 0; ///< of its topic, the same
 };
 
 /// All figures of a run or of a running service. What users see of them is made here: summary.json, the status as JSON
-/// and as text; /diagnostics takes its values from the JSON.
+/// and as text, metrics; /diagnostics takes its values from the JSON.
 struct Figures {
   const Config& config;
   std::string capture{}; ///< as the user named it, or the folder that a service records to; empty: none
@@ -137,10 +183,12 @@ struct Figures {
   struct Live {
     FlatGround flat_ground = FlatGround::off;
     std::uint64_t kernel_drops = 0, filtered = 0, motion_drops = 0; ///< see LiveInput
+    std::array<std::uint64_t, kMaxLidars> cloud_drops{};            ///< see LiveInput; by lidar
     std::uint64_t unfetched = 0;                                    ///< see LivePipeline
     std::uint64_t unpublished = 0;                                  ///< estimates that DDS did not take
     LinkFigures link;
     std::optional<Recorder::Status> recording;
+    std::optional<Incidents::Status> incidents; ///< where any are kept
   };
   std::optional<Live> live{};
 };
@@ -162,6 +210,9 @@ nlohmann::ordered_json to_json(const Figures& figures);
 
 /// The status of a service for human eyes: fits 80 x 24 with three lidars and four motion sources. Precondition: live.
 std::string to_text(const Figures& figures);
+
+/// The same figures for Prometheus, as text of OpenMetrics 1.0. Precondition: live.
+std::string to_open_metrics(const Figures& figures);
 
 /// Of this process since it began, in megabytes.
 double peak_rss_mb();

@@ -7,6 +7,7 @@
 
 #include "config/config_yaml.hpp"
 #include "core/base/pose.hpp"
+#include "daemon/calibration.hpp"
 #include "daemon/figures.hpp"
 #include "drivers/net/datagram.hpp"
 
@@ -52,27 +53,66 @@ ordered_json packets_json(const PacketCounters& counters) {
 
 ordered_json all_packets_json(const Figures& figures) {
   ordered_json json{{"total", packets_json(figures.ingest.total)}};
-  for (std::size_t i = 0; i < figures.config.lidars.size(); ++i)
-    json[figures.config.lidars[i].name] = packets_json(figures.ingest.lidars[i].packets);
+  for (std::size_t i = 0; i < figures.config.lidars.size(); ++i) {
+    if (!figures.config.lidars[i].gives_clouds())
+      json[figures.config.lidars[i].name] = packets_json(figures.ingest.lidars[i].packets);
+  }
   if (figures.live)
     json["kernel_drops"] = figures.live->kernel_drops;
   return json;
 }
 
-/// As what its packets are read, null before the first good one; of a service, how it is heard, too.
-ordered_json lidar_json(const Figures& figures, std::size_t i) {
-  const auto name = [](auto value) { return velodyne::to_string(value); };
+ordered_json clouds_json(const IngestReport::Clouds& clouds) {
+  std::vector<std::string> doubts;
+  for (std::size_t i = 0; i < kCloudDoubts; ++i) {
+    if (clouds.doubts[i])
+      doubts.emplace_back(to_string(static_cast<CloudDoubt>(i)));
+  }
+  const CloudCounters& counters = clouds.counters;
+  return {{"received", counters.received},
+          {"used", counters.used},
+          {"reordered", counters.reordered},
+          {"clock_steps", counters.clock_steps},
+          {"refused", counts_json<CloudError>(counters.refused)},
+          {"points", counters.points},
+          {"nan", counters.nan},
+          {"origin", counters.origin},
+          {"untimed", counters.untimed},
+          {"rate_hz", rounded(1.0 / to_seconds(clouds.period))},
+          {"times", to_string(clouds.timing)},
+          {"rings", to_string(clouds.rings)},
+          {"doubts", doubts}};
+}
+
+/// Of a lidar that gives clouds: how these come, and, of a service, when the last one did.
+ordered_json cloud_lidar_json(const Figures& figures, std::size_t i) {
   const LidarOptions& options = figures.config.lidars[i];
   const IngestReport::Lidar& lidar = figures.ingest.lidars[i];
-  ordered_json json{{"model", text_or_null(lidar.model, name)},
-                    {"return_mode", text_or_null(lidar.return_mode, name)},
+  ordered_json json{{"topic", options.topic}, {"clouds", clouds_json(lidar.clouds.value_or(IngestReport::Clouds{}))}};
+  if (!figures.live)
+    return json;
+  json["clouds"]["dropped"] = figures.live->cloud_drops[i];
+  json.update({{"writers", figures.live->link.lidars[i].writers},
+               {"refused", figures.live->link.lidars[i].refused},
+               {"heard_ms_ago", ms_since(lidar.last_heard)},
+               {"problem", problem_of(options, lidar)}});
+  return json;
+}
+
+/// As what its packets are read, null before the first good one; of a service, how it is heard, too.
+ordered_json lidar_json(const Figures& figures, std::size_t i) {
+  const auto text = [](std::string_view word) { return word.empty() ? ordered_json(nullptr) : ordered_json(word); };
+  const LidarOptions& options = figures.config.lidars[i];
+  const IngestReport::Lidar& lidar = figures.ingest.lidars[i];
+  ordered_json json{{"model", text(lidar.model)},
+                    {"return_mode", text(lidar.return_mode)},
                     {"rpm", rounded(lidar.rotation_rate_rpm)}};
   if (figures.live)
     json.update({{"port", options.port},
                  {"source_ip", text_or_null(lidar.source_ip, dotted)},
                  {"refused_ip", text_or_null(lidar.refused_ip, dotted)},
                  {"heard_ms_ago", ms_since(lidar.last_heard)},
-                 {"pps", to_string(lidar.pps)},
+                 {"pps", lidar.pps},
                  {"problem", problem_of(options, lidar)}});
   return json;
 }
@@ -94,6 +134,9 @@ ordered_json source_json(const Figures& figures, std::size_t i) {
                     {"health_changes", source.counters.health_changes}};
   if (figures.live || !source.verdict.empty())
     json["verdict"] = source.verdict;
+  const MotionSource& options = figures.config.motion_sources[i];
+  if (figures.sweeps.last && figures.sweeps.last->sources[i].learned && options.calibration != Calibration::off)
+    json["learned"] = learned_json(options, *figures.sweeps.last->sources[i].learned);
   if (figures.live && figures.sweeps.last) {
     const SourceReport& report = figures.sweeps.last->sources[i];
     json["innovation"] = innovation_json(report);
@@ -163,6 +206,11 @@ ordered_json live_json(const Figures& figures, const Figures::Live& live) {
         {"run", recording->run.string()},  {"mb", rounded(1e-6 * static_cast<double>(recording->bytes))},
         {"recorded", recording->recorded}, {"dropped", recording->dropped},
         {"unfit", recording->unfit},       {"problem", recording->problem}};
+  if (const auto& incidents = live.incidents)
+    json["incidents"] = {{"last", incidents->last.string()}, {"writing", incidents->writing.string()},
+                         {"kept", incidents->kept},          {"suppressed", incidents->suppressed},
+                         {"dropped", incidents->dropped},    {"problem", incidents->problem},
+                         {"refusal", incidents->refusal}};
   json["dds"] = {{"connected", live.link.connected},
                  {"domain", figures.config.dds.domain},
                  {"interface", figures.config.dds.interface},
@@ -189,7 +237,8 @@ ordered_json to_json(const Figures& figures) {
     json.update(estimate_json(figures.sweeps));
   json["packets"] = all_packets_json(figures);
   for (std::size_t i = 0; i < config.lidars.size(); ++i)
-    json["lidars"][config.lidars[i].name] = lidar_json(figures, i);
+    json["lidars"][config.lidars[i].name] =
+        config.lidars[i].gives_clouds() ? cloud_lidar_json(figures, i) : lidar_json(figures, i);
   json["sweeps"] = {{"seen", counters.seen},
                     {"processed", counters.processed},
                     {"dropped", counters.dropped},

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "core/base/pose.hpp"
+#include "daemon/calibration.hpp"
 #include "daemon/figures.hpp"
 #include "drivers/net/datagram.hpp"
 
@@ -39,7 +40,6 @@ std::string pose_text(const std::optional<OdometryEstimate>& last) {
                                  "attitude    {:9.2f} {:9.2f} {:9.2f} deg   +- {:.2f} {:.2f} {:.2f}\n",
                                  p[0], p[1], p[2], sigma(0, 1), sigma(1, 1), sigma(2, 1), a[0], a[1], a[2],
                                  sigma(3, 1 / kRadPerDeg), sigma(4, 1 / kRadPerDeg), sigma(5, 1 / kRadPerDeg));
-  static constexpr std::array<std::string_view, 6> kAxes{"x", "y", "z", "roll", "pitch", "yaw"};
   text += "lidar sees ";
   for (std::size_t i = 0; i < kAxes.size(); ++i)
     text += fmt::format(" {} {}", kAxes[i], bar(last->observability[static_cast<Eigen::Index>(i)]));
@@ -66,17 +66,36 @@ std::string silence_text(Stamp last_heard) {
   return silence_s < 1000 ? fmt::format("{:.1f} s", silence_s) : fmt::format("{:.1f} h", silence_s / 3600);
 }
 
+/// In the columns of packets.
+std::string clouds_text(const LidarOptions& options, const IngestReport::Lidar& lidar, std::uint64_t drops) {
+  const IngestReport::Clouds& clouds = *lidar.clouds;
+  const CloudCounters& counters = clouds.counters;
+  std::string text =
+      fmt::format("{:<9.8}{:<12}{:>5.0f}{:>10}{:>8}{:>9}{:>9}{:>8}\n", options.name,
+                  counters.used > 0 ? "clouds" : "unheard", 60 / to_seconds(clouds.period), counters.used, drops,
+                  sum(counters.refused), counters.reordered, silence_text(lidar.last_heard));
+  if (const std::string refused = reasons<CloudError>(counters.refused); !refused.empty())
+    text += fmt::format("{:<9}refused: {}\n", "", refused);
+  if (const std::string problem = problem_of(options, lidar); !problem.empty())
+    text += fmt::format("{:<9}{}\n", "", problem);
+  return text;
+}
+
 std::string lidars_text(const Figures& figures) {
   std::string text = fmt::format("\n{:<9}{:<12}{:>5}{:>10}{:>8}{:>9}{:>9}{:>8} {}\n", "lidar", "model", "rpm",
                                  "packets", "lost", "refused", "disorder", "silent", "pps");
   for (std::size_t i = 0; i < figures.config.lidars.size(); ++i) {
     const LidarOptions& options = figures.config.lidars[i];
     const IngestReport::Lidar& lidar = figures.ingest.lidars[i];
+    if (lidar.clouds) {
+      text += clouds_text(options, lidar, figures.live->cloud_drops[i]);
+      continue;
+    }
     const PacketCounters& packets = lidar.packets;
-    text += fmt::format("{:<9.8}{:<12}{:>5.0f}{:>10}{:>8}{:>9}{:>9}{:>8} {:.8}\n", options.name,
-                        lidar.model ? velodyne::to_string(*lidar.model) : "unheard", lidar.rotation_rate_rpm,
-                        packets.data, packets.lost, sum(packets.rejected), packets.reordered,
-                        silence_text(lidar.last_heard), to_string(lidar.pps));
+    text +=
+        fmt::format("{:<9.8}{:<12}{:>5.0f}{:>10}{:>8}{:>9}{:>9}{:>8} {:.8}\n", options.name,
+                    lidar.model.empty() ? "unheard" : lidar.model, lidar.rotation_rate_rpm, packets.data, packets.lost,
+                    sum(packets.rejected), packets.reordered, silence_text(lidar.last_heard), lidar.pps);
     if (const std::string refused = reasons<PacketError>(packets.rejected); !refused.empty())
       text += fmt::format("{:<9}refused: {}{}\n", "", refused,
                           lidar.refused_ip ? "; the last sender: " + dotted(*lidar.refused_ip) : "");
@@ -102,6 +121,8 @@ std::string sources_text(const Figures& figures) {
       text += fmt::format("{:<12}refused: {}\n", "", refused);
     if (!source.verdict.empty())
       text += fmt::format("{:<12}{}\n", "", source.verdict);
+    if (const std::string doubt = calibration_doubt(figures, i); !doubt.empty())
+      text += fmt::format("{:<12}{}\n", "", doubt);
   }
   return text;
 }
@@ -114,6 +135,16 @@ std::string recording_text(const std::optional<Recorder::Status>& recording) {
                      : recording->run.empty()    ? "nothing yet"
                                                  : recording->run.string(),
                      1e-6 * static_cast<double>(recording->bytes), recording->recorded, recording->dropped);
+}
+
+std::string incidents_text(const std::optional<Incidents::Status>& incidents) {
+  if (!incidents || (incidents->last.empty() && incidents->suppressed == 0 && incidents->problem.empty()))
+    return "";
+  return fmt::format("incident    {}{}\n",
+                     !incidents->problem.empty() ? "none: " + incidents->problem
+                     : incidents->last.empty()   ? "none kept"
+                                                 : incidents->last.filename().string(),
+                     incidents->suppressed > 0 ? fmt::format("   {} more too soon", incidents->suppressed) : "");
 }
 
 } // namespace
@@ -142,7 +173,8 @@ std::string to_text(const Figures& figures) {
   text +=
       fmt::format("dds         {}, domain {}, interface {}\n", live.link.connected ? "up" : "not up, is tried again",
                   figures.config.dds.domain, figures.config.dds.interface);
-  return text + recording_text(live.recording) + pose_text(sweeps.last) + lidars_text(figures) + sources_text(figures);
+  return text + recording_text(live.recording) + incidents_text(live.incidents) + pose_text(sweeps.last) +
+         lidars_text(figures) + sources_text(figures);
 }
 
 } // namespace locus::daemon

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <utility>
-#include <vector>
 
 #include "core/ingest/ring_segments.hpp"
 #include "drivers/velodyne/model.hpp"
@@ -22,12 +21,53 @@ std::vector<Pose> mounts(const std::vector<LidarOptions>& lidars) {
   return T_base_lidar;
 }
 
+std::vector<std::unique_ptr<CloudDecoder>> cloud_decoders(const std::vector<LidarOptions>& lidars) {
+  std::vector<std::unique_ptr<CloudDecoder>> decoders;
+  for (std::size_t i = 0; i < lidars.size(); ++i)
+    decoders.push_back(lidars[i].gives_clouds()
+                           ? std::make_unique<CloudDecoder>(static_cast<std::uint8_t>(i), lidars[i].point_times)
+                           : nullptr);
+  return decoders;
+}
+
+std::vector<std::optional<SourceId>> imus(const Config& config) {
+  std::vector<std::optional<SourceId>> sources;
+  for (const LidarOptions& lidar : config.lidars) {
+    std::optional<SourceId>& source = sources.emplace_back();
+    for (std::size_t i = 0; i < config.motion_sources.size(); ++i)
+      if (config.motion_sources[i].of_lidar && config.motion_sources[i].name == lidar.name + "_imu")
+        source = SourceId{i};
+  }
+  return sources;
+}
+
+/// Of an OT128 in high resolution three quarters of the channels fire in a column.
+std::size_t hesai_firings(hesai::Model model, Duration period) {
+  const hesai::ModelSpec& spec = hesai::spec(model);
+  std::size_t firings = 0;
+  for (std::size_t i = 0; i < spec.sequences.size(); ++i) {
+    const bool in_part = i > 0 && spec.sequence_from == hesai::SequenceFrom::operational_state;
+    const auto columns = static_cast<std::size_t>(period / spec.sequences[i].column_duration) + 1;
+    firings = std::max(firings, columns * (in_part ? spec.layout.channels * 3 / 4 : spec.layout.channels));
+  }
+  return firings;
+}
+
 /// In dual return mode, with an echo for every firing. A lidar that is yet to be recognised may be the largest; memory
 /// that it then does not need is asked for, but never touched.
 std::size_t max_returns(const Config& config) {
   const Duration period = std::max(kLongestTurn, config.sweep.sweep_period.value_or(kLongestTurn));
   std::size_t returns = 0;
   for (const LidarOptions& lidar : config.lidars) {
+    if (lidar.is_ouster()) {
+      constexpr std::size_t kColumnsPerSecond = 20480; // of 2048x10, 1024x20
+      returns += 2 * LidarPacket::kMaxLasers * static_cast<std::size_t>(kColumnsPerSecond * to_seconds(period) + 1);
+      continue;
+    }
+    if (lidar.hesai) {
+      returns += 2 * hesai_firings(*lidar.hesai, period);
+      continue;
+    }
     const velodyne::ModelSpec& spec = velodyne::spec(lidar.model.value_or(velodyne::Model::vls128));
     const auto columns = static_cast<std::size_t>(period / spec.column_duration) + 1;
     returns += 2 * columns * spec.firings().size();
@@ -38,17 +78,17 @@ std::size_t max_returns(const Config& config) {
 } // namespace
 
 Ingest::Ingest(const Config& config, LidarRouter lidars, Sink sink, MotionSources::HealthSink health_sink)
-    : sink_(std::move(sink)), lidars_(std::move(lidars)),
-      sweeps_(
-          config.sweep, mounts(config.lidars),
-          MotionSources(config.source_options(), config.odometry.fusion, config.odometry.motion,
-                        std::move(health_sink)),
-          max_returns(config),
-          [this](Sweep& sweep) {
-            const StageStopwatch::Pause pause(stages_);
-            sink_(sweep, {cut_watch_.cut_began(), stages_.lap()});
-          },
-          &cut_watch_) {}
+    : sink_(std::move(sink)), lidars_(std::move(lidars)), imu_of_lidar_(imus(config)),
+      clouds_(cloud_decoders(config.lidars)), sweeps_(
+                                                  config.sweep, mounts(config.lidars),
+                                                  MotionSources(config.source_options(), config.odometry.fusion,
+                                                                config.odometry.motion, std::move(health_sink)),
+                                                  max_returns(config),
+                                                  [this](Sweep& sweep) {
+                                                    const StageStopwatch::Pause pause(stages_);
+                                                    sink_(sweep, {cut_watch_.cut_began(), stages_.lap()});
+                                                  },
+                                                  &cut_watch_) {}
 
 void Ingest::take(const Datagram& datagram) {
   sweeps_.advance(datagram.receive_stamp);
@@ -59,6 +99,28 @@ void Ingest::take(const Datagram& datagram) {
   }
   if (packet != nullptr)
     sweeps_.add(*packet, datagram.receive_stamp);
+  const LidarRouter::Imu imu = lidars_.imu();
+  for (const ImuSample& sample : imu.samples)
+    if (const auto source = imu_of_lidar_[imu.lidar])
+      sweeps_.sources().add(*source, sample);
+}
+
+void Ingest::take(const CloudInput& cloud) {
+  sweeps_.advance(cloud.arrival);
+  CloudDecoder& decoder = *clouds_[cloud.lidar];
+  const auto next = [&] {
+    const StageScope scope(&stages_, Stage::decode);
+    return decoder.next();
+  };
+  {
+    const StageScope scope(&stages_, Stage::decode);
+    if (cloud.message == nullptr)
+      decoder.refuse(cloud.error);
+    if (cloud.message == nullptr || decoder.begin(*cloud.message, cloud.arrival))
+      return;
+  }
+  while (const LidarPacket* packet = next())
+    sweeps_.add(*packet, cloud.arrival);
 }
 
 template <class MotionInput> void Ingest::take_motion(const MotionInput& input) {

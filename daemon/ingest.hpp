@@ -3,11 +3,15 @@
 
 #include <cstddef>
 #include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
 
 #include "config/config.hpp"
 #include "core/ingest/sweep_builder.hpp"
 #include "daemon/input.hpp"
 #include "daemon/machine_time.hpp"
+#include "drivers/clouds/cloud_decoder.hpp"
 #include "drivers/lidar_input.hpp"
 
 namespace locus::daemon {
@@ -32,6 +36,7 @@ class Ingest {
     std::visit([this](const auto& what) { take(what); }, input);
   }
   void take(const Datagram& datagram);
+  void take(const CloudInput& cloud);
   void take(const ImuInput& imu) { take_motion(imu); }
   void take(const OdometryInput& odometry) { take_motion(odometry); }
   void take(const OutsideVerdict& verdict) { sweeps_.sources().set_outside_verdict(verdict.source, verdict.healthy); }
@@ -43,6 +48,8 @@ class Ingest {
 
   /// The counters behind these belong to the thread that calls take().
   [[nodiscard]] const LidarRouter& lidars() const { return lidars_; }
+  /// Of the lidar of this index; nullptr for one that sends packets.
+  [[nodiscard]] const CloudDecoder* clouds_of(std::size_t lidar) const { return clouds_[lidar].get(); }
   [[nodiscard]] const MotionSources& sources() const { return sweeps_.sources(); }
   [[nodiscard]] const SweepBuilder& sweeps() const { return sweeps_; }
   [[nodiscard]] const StageStopwatch& stages() const { return stages_; }
@@ -70,6 +77,8 @@ class Ingest {
   StageStopwatch stages_;
   CutWatch cut_watch_{stages_};
   LidarRouter lidars_;
+  std::vector<std::optional<SourceId>> imu_of_lidar_; ///< by lidar; nothing where it brings none along
+  std::vector<std::unique_ptr<CloudDecoder>> clouds_; ///< by lidar; nullptr for one that sends packets
   SweepBuilder sweeps_;
 };
 

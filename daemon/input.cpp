@@ -37,12 +37,14 @@ void with_sample_of(LiveInput::Motion& motion, const auto& change) {
 
 } // namespace
 
-LiveInput::LiveInput(std::vector<UdpSocket> sockets)
+LiveInput::LiveInput(std::vector<UdpSocket> sockets, const std::vector<bool>& gives_clouds)
     : sockets_(std::move(sockets)), guards_(sockets_.size()), waiting_(sockets_.size()),
       motion_is_there_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
   for (const UdpSocket& socket : sockets_)
     poll_.push_back({socket.descriptor(), POLLIN, 0});
   poll_.push_back({motion_is_there_, POLLIN, 0});
+  for (const bool gives : gives_clouds)
+    clouds_.push_back(gives ? std::make_unique<Clouds>() : nullptr);
 }
 
 LiveInput::~LiveInput() { close(motion_is_there_); }
@@ -53,6 +55,23 @@ void LiveInput::push(const Motion& motion) noexcept {
   eventfd_write(motion_is_there_, 1);
 }
 
+void LiveInput::push_cloud(std::uint8_t lidar) noexcept {
+  if (clouds_[lidar]->slot.publish())
+    clouds_[lidar]->drops.fetch_add(1, std::memory_order_relaxed);
+  eventfd_write(motion_is_there_, 1);
+}
+
+/// Whether any waits.
+bool LiveInput::look_for_clouds() {
+  bool any = false;
+  for (const auto& clouds : clouds_) {
+    if (clouds && clouds->waiting == nullptr)
+      clouds->waiting = clouds->slot.take();
+    any = any || (clouds && clouds->waiting != nullptr);
+  }
+  return any;
+}
+
 /// Motion that is there already still waits for a look at the sockets: an older datagram may lie there.
 Input LiveInput::next(Duration timeout) {
   if (!next_motion_)
@@ -61,7 +80,7 @@ Input LiveInput::next(Duration timeout) {
   time_.look();
   const Stamp asked = time_.steady(wall);
   if (std::ranges::all_of(waiting_, [](const auto& datagrams) { return datagrams.empty(); }))
-    receive(next_motion_ ? Duration::zero() : timeout);
+    receive(next_motion_ || look_for_clouds() ? Duration::zero() : timeout);
   if (auto input = take_earliest())
     return *input;
   return Silence{in_order(asked)};
@@ -93,12 +112,15 @@ void LiveInput::expect(const LidarRouter& lidars) {
 /// Waits until something is there, at most for `timeout`.
 void LiveInput::receive(Duration timeout) {
   const timespec wait = to_timespec(timeout);
-  ppoll(poll_.data(), poll_.size(), &wait, nullptr);
+  const bool is_silent = ppoll(poll_.data(), poll_.size(), &wait, nullptr) == 0;
   std::uint64_t drops = 0, filtered = 0;
   for (std::size_t i = 0; i < sockets_.size(); ++i) {
     if (poll_[i].revents != 0) {
       waiting_[i] = sockets_[i].receive();
       guards_[i].look_at(waiting_[i], sockets_[i]);
+    } else if (is_silent) {
+      sockets_[i].count_drops(); // what was dropped wakes nobody
+      guards_[i].hear_nothing(Stamp{read_clock(CLOCK_REALTIME)}, sockets_[i]);
     }
     drops += sockets_[i].kernel_drops();
     filtered += sockets_[i].filtered();
@@ -116,6 +138,17 @@ std::optional<Input> LiveInput::take_earliest() {
   if (!next_motion_)
     next_motion_ = take_motion();
   Stamp earliest = next_motion_ ? arrival_of(*next_motion_) : Stamp::max();
+  std::optional<std::size_t> lidar; ///< of the earliest, where that is a cloud
+  look_for_clouds();
+  for (std::size_t i = 0; i < clouds_.size(); ++i) {
+    if (!clouds_[i] || clouds_[i]->waiting == nullptr)
+      continue;
+    const Stamp arrival = time_.steady(clouds_[i]->waiting->arrival);
+    if (arrival >= earliest)
+      continue;
+    earliest = arrival;
+    lidar = i;
+  }
   std::span<const Datagram>* from = nullptr;
   for (auto& waiting : waiting_) {
     if (waiting.empty())
@@ -133,12 +166,28 @@ std::optional<Input> LiveInput::take_earliest() {
     datagram.clock_set_by = time_.set_by();
     return datagram;
   }
+  if (lidar)
+    return give_cloud(*lidar, in_order(earliest));
   if (!next_motion_)
     return std::nullopt;
   with_sample_of(*next_motion_, [&](SourceId, auto& sample) { sample.arrival = in_order(earliest); });
   Input input = std::visit([](const auto& motion) { return Input{motion}; }, *next_motion_);
   next_motion_.reset();
   return input;
+}
+
+Input LiveInput::give_cloud(std::size_t lidar, Stamp arrival) {
+  Clouds& clouds = *clouds_[lidar];
+  const CloudBytes& cloud = *std::exchange(clouds.waiting, nullptr);
+  const auto index = static_cast<std::uint8_t>(lidar);
+  if (cloud.too_large)
+    return CloudInput{index, nullptr, arrival, CloudError::too_large};
+  const auto message = read_cloud({cloud.bytes, Serialisation::cdr}, kPointCloudType);
+  if (!message)
+    return CloudInput{index, nullptr, arrival, CloudError::cut};
+  cloud_ = *message;
+  cloud_.ahead = cloud_.stamp - time_.steady(cloud_.stamp, arrival, clouds.sender);
+  return CloudInput{index, &cloud_, arrival, {}};
 }
 
 void PacedInput::read_ahead() {

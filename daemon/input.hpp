@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <variant>
@@ -17,6 +18,8 @@
 #include "core/sources/sensed_motion.hpp"
 #include "daemon/steady_time.hpp"
 #include "daemon/threads.hpp"
+#include "drivers/clouds/cloud_counters.hpp"
+#include "drivers/clouds/cloud_view.hpp"
 #include "drivers/net/datagram.hpp"
 #include "drivers/net/flood_guard.hpp"
 #include "drivers/net/udp_socket.hpp"
@@ -37,6 +40,24 @@ struct OdometryInput {
   OdometrySample sample;
 };
 
+/// A cloud of the lidar of this index. The message lives as long as a datagram's payload; nullptr for one that cannot
+/// be read, and then why.
+struct CloudInput {
+  std::uint8_t lidar;
+  const CloudView* message;
+  Stamp arrival;
+  CloudError error{};
+};
+
+/// A serialised sensor_msgs/PointCloud2, encapsulation included, on its way to the ingest.
+struct CloudBytes {
+  static constexpr std::size_t kMost = 64'000'000; ///< longer ones are refused
+
+  Stamp arrival;
+  bool too_large = false; ///< and there are no bytes
+  std::vector<std::byte> bytes;
+};
+
 /// Somebody outside says whether this motion source is healthy (its health_topic).
 struct OutsideVerdict {
   SourceId source;
@@ -52,12 +73,14 @@ struct Silence {
 struct EndOfInput {};
 
 /// All that can reach the ingest.
-using Input = std::variant<Silence, Datagram, ImuInput, OdometryInput, OutsideVerdict, EndOfInput>;
+using Input = std::variant<Silence, Datagram, CloudInput, ImuInput, OdometryInput, OutsideVerdict, EndOfInput>;
 
 /// When it arrived; `otherwise` for what does not tell.
 inline Stamp arrival_of(const Input& input, Stamp otherwise) {
   if (const auto* datagram = std::get_if<Datagram>(&input))
     return datagram->receive_stamp;
+  if (const auto* cloud = std::get_if<CloudInput>(&input))
+    return cloud->arrival;
   if (const auto* imu = std::get_if<ImuInput>(&input))
     return imu->sample.arrival;
   if (const auto* odometry = std::get_if<OdometryInput>(&input))
@@ -80,20 +103,22 @@ class InputSource {
   virtual void expect(const LidarRouter& /*lidars*/) {}
 };
 
-/// What comes in at this moment: datagrams from all sockets, and what another thread hands over of the motion sources.
+/// What comes in at this moment: datagrams from all sockets, and what another thread hands over of the motion sources
+/// and of the lidars that give clouds.
 ///
 /// An input that reaches this thread when a later one has been given out arrives after it, by a nanosecond: a sample
 /// that another thread was slow to hand over, a datagram of another socket. So inputs come in the order of their
 /// arrivals, and a recording of them is played in the same order. All stamps are given out in SteadyTime.
 ///
-/// One thread is the consumer, the ingest; one is the producer of motion, that of the DDS readers, for which one ring
-/// for all sources keeps their order.
+/// One thread is the consumer, the ingest; one is the producer of motion and clouds, that of the DDS readers, for which
+/// one ring for all sources keeps their order.
 class LiveInput : public InputSource {
  public:
   using Motion = std::variant<ImuInput, OdometryInput, OutsideVerdict>;
   static constexpr std::size_t kMaxUnread = 1024;
 
-  explicit LiveInput(std::vector<UdpSocket> sockets);
+  /// `gives_clouds`: of each lidar by its index.
+  explicit LiveInput(std::vector<UdpSocket> sockets, const std::vector<bool>& gives_clouds = {});
   ~LiveInput() override;
   LiveInput(const LiveInput&) = delete;
   LiveInput& operator=(const LiveInput&) = delete;
@@ -104,16 +129,35 @@ class LiveInput : public InputSource {
   /// Producer: lost and counted when the consumer is far behind.
   void push(const Motion& motion) noexcept;
 
+  /// Producer: where the next cloud of a lidar is to be written, over an older one, for its memory; then handed over.
+  /// One that is not taken before the next is there is lost and counted. Precondition: the lidar gives clouds.
+  [[nodiscard]] CloudBytes& next_cloud(std::uint8_t lidar) noexcept { return clouds_[lidar]->slot.back(); }
+  void push_cloud(std::uint8_t lidar) noexcept;
+
   /// Any thread. Of all sockets; see UdpSocket.
   [[nodiscard]] std::uint64_t kernel_drops() const { return kernel_drops_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::uint64_t filtered() const { return filtered_.load(std::memory_order_relaxed); }
+  /// 0 for a lidar that gives no clouds.
+  [[nodiscard]] std::uint64_t cloud_drops(std::size_t lidar) const {
+    return clouds_[lidar] ? clouds_[lidar]->drops.load(std::memory_order_relaxed) : 0;
+  }
   [[nodiscard]] std::uint64_t motion_drops() const { return motion_drops_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::span<const UdpSocket> sockets() const { return sockets_; } ///< not to be received from
   /// Any thread: what is given out, as the clock on the wall has it.
   [[nodiscard]] const SteadyTime& time() const { return time_; }
 
  private:
+  /// Of one lidar that gives clouds.
+  struct Clouds {
+    LatestSlot<CloudBytes> slot;
+    std::atomic<std::uint64_t> drops{0};
+    const CloudBytes* waiting = nullptr; ///< taken from the slot, not given out yet
+    SteadyTime::Sender sender;
+  };
+
   [[nodiscard]] std::optional<Motion> take_motion();
+  bool look_for_clouds();
+  [[nodiscard]] Input give_cloud(std::size_t lidar, Stamp arrival);
   [[nodiscard]] std::optional<Input> take_earliest();
   void receive(Duration timeout);
   [[nodiscard]] Stamp in_order(Stamp arrival);
@@ -122,7 +166,9 @@ class LiveInput : public InputSource {
   std::vector<FloodGuard> guards_;                 ///< by socket
   std::vector<std::span<const Datagram>> waiting_; ///< by socket: received and not given out yet
   std::vector<pollfd> poll_;                       ///< the sockets, then motion_is_there_
-  int motion_is_there_;                            ///< eventfd: poll() waits for both
+  int motion_is_there_;                            ///< eventfd, for clouds too: poll() waits for both
+  std::vector<std::unique_ptr<Clouds>> clouds_;    ///< by lidar; nullptr for one that sends packets
+  CloudView cloud_;                                ///< given out last
   SpscRing<Motion, kMaxUnread> motion_;
   std::optional<Motion> next_motion_;
   SteadyTime time_;

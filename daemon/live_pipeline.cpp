@@ -28,7 +28,7 @@ LivePipeline::LivePipeline(const Config& config, LidarRouter lidars, InputSource
             if (!health_events_.push(event))
               unfetched_.fetch_add(1, std::memory_order_relaxed);
           }),
-      processor_(config, options_.start), flat_ground_(config.odometry.flat_ground),
+      processor_(config, options_.start, options_.recalled), flat_ground_(config.odometry.flat_ground),
       ingest_thread_([this] { run_ingest(); }), odometry_thread_([this] { run_odometry(); }) {
   pthread_setname_np(ingest_thread_.native_handle(), "ingest");
   pthread_setname_np(odometry_thread_.native_handle(), "odometry");

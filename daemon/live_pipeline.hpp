@@ -23,7 +23,8 @@ namespace locus::daemon {
 /// How the live threads are set up, beside their configuration.
 struct LiveOptions {
   double speed = 1.0; ///< by how much the stamps of the input run faster than the clock on the wall; 1 if it is live
-  std::optional<StartPoint> start{};             ///< nothing: level at the origin
+  std::optional<StartPoint> start{}; ///< nothing: level at the origin
+  Recalled recalled{};
   std::function<void()> on_thread_start = [] {}; ///< in each of the threads, e.g. to set its priority
   /// In the odometry thread, after the estimate has left: for clouds, maps and what is to be saved.
   std::function<void(const Sweep&, const Odometry&, const OdometryEstimate&)> after_estimate{};

@@ -89,8 +89,8 @@ class StageStopwatch : public StageClock {
 
 /// What goes with a sweep from where it was cut to where it is processed, to tell what it costs.
 struct SweepCut {
-  MachineTime began;      ///< when the work on the cut began
-  StageTimes ingest_took; ///< since the cut before
+  MachineTime began;        ///< when the work on the cut began
+  StageTimes ingest_took{}; ///< since the cut before
 };
 
 } // namespace locus::daemon

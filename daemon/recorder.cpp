@@ -40,13 +40,14 @@ std::uint64_t bytes_on_disk(const path& folder) {
 }
 
 std::string cannot(const char* what, const path& where, const std::error_code& error) {
-  return fmt::format("{}: {} ({}); let locusd write there, see record.folder in locusd.yaml(5)", where.string(), what,
-                     error.message());
+  return fmt::format("{}: {} ({}); let locusd write there, see RECORDING and INCIDENTS in locusd(8)", where.string(),
+                     what, error.message());
 }
 
 } // namespace
 
-CaptureRing::CaptureRing(path folder, std::uint64_t max_bytes) : folder_(std::move(folder)), max_bytes_(max_bytes) {}
+CaptureRing::CaptureRing(path folder, std::uint64_t max_bytes, Duration keep)
+    : folder_(std::move(folder)), max_bytes_(max_bytes), keep_(keep) {}
 
 std::uint64_t CaptureRing::piece_bytes() const { return max_bytes_ / kPieces - kBlocksOfPiece * kBlockBytes; }
 
@@ -73,7 +74,7 @@ std::optional<std::string> CaptureRing::look() {
   for (const path& run : runs_in(folder_)) {
     last_run_ = number_of(run);
     for (const path& piece : pieces_in(run)) {
-      pieces_.push_back({piece, bytes_on_disk(piece)});
+      pieces_.push_back({piece, bytes_on_disk(piece), read_clock(CLOCK_MONOTONIC)});
       bytes_ += pieces_.back().bytes;
     }
   }
@@ -83,6 +84,9 @@ std::optional<std::string> CaptureRing::look() {
 
 std::optional<std::string> CaptureRing::make_room() {
   const std::uint64_t piece = max_bytes_ / kPieces;
+  while (!pieces_.empty() && pieces_.front().ended < read_clock(CLOCK_MONOTONIC) - keep_)
+    if (auto problem = remove_oldest())
+      return problem;
   for (;;) {
     std::error_code error;
     const std::uint64_t free = std::filesystem::space(folder_, error).available;
@@ -91,7 +95,7 @@ std::optional<std::string> CaptureRing::make_room() {
     if (bytes_ + piece <= max_bytes_ && free >= 2 * piece)
       return std::nullopt;
     if (free + bytes_ < 2 * piece)
-      return fmt::format("{}: {} MB free on the disk, and {} are wanted; free some, or lower record.max_bytes",
+      return fmt::format("{}: {} MB free on the disk, and {} are wanted; free some, or lower its bound in record",
                          folder_.string(), free / 1'000'000, 2 * piece / 1'000'000);
     if (auto problem = remove_oldest())
       return problem;
@@ -133,12 +137,20 @@ Expected<path, std::string> CaptureRing::make_piece(Stamp now) {
   if (error)
     return cannot("cannot be made", piece_, error);
   if (!is_new)
-    return fmt::format("{}: is there already; give each locusd a record.folder of its own", piece_.string());
+    return fmt::format("{}: is there already; give each locusd folders of its own", piece_.string());
   return piece_;
 }
 
+std::vector<path> CaptureRing::last_pieces(Duration keep) const {
+  std::vector<path> last;
+  for (const Piece& piece : pieces_)
+    if (piece.folder.parent_path() == run_ && piece.ended >= read_clock(CLOCK_MONOTONIC) - keep)
+      last.push_back(piece.folder);
+  return last;
+}
+
 void CaptureRing::end_piece() {
-  pieces_.push_back({piece_, bytes_on_disk(piece_)});
+  pieces_.push_back({piece_, bytes_on_disk(piece_), read_clock(CLOCK_MONOTONIC)});
   bytes_ += pieces_.back().bytes;
 }
 
@@ -160,13 +172,26 @@ std::string cannot_be_written(const std::filesystem::path& file) {
                      std::generic_category().message(errno));
 }
 
+/// A copy of what an Ouster's packets cannot be read without. Where the original has gone meanwhile, it is missing.
+std::optional<std::string> keep_metadata(const LidarOptions& lidar, const path& folder) {
+  std::error_code error;
+  if (!lidar.is_ouster() || !std::filesystem::exists(lidar.metadata, error))
+    return std::nullopt;
+  const path copy = folder / metadata_file(lidar.name);
+  std::filesystem::copy_file(lidar.metadata, copy, std::filesystem::copy_options::overwrite_existing, error);
+  return error ? std::optional{cannot("cannot be written", copy, error)} : std::nullopt;
+}
+
 } // namespace
 
 std::vector<std::optional<std::string>> sample_files(const Config& config) {
   std::vector<std::optional<std::string>> files;
   bool has_imu = false;
-  for (const MotionSourceOptions& source : config.motion_sources) {
-    if (source.kind == SourceKind::odometry)
+  for (const MotionSource& source : config.motion_sources) {
+    const bool would_be_anothers = source.kind == SourceKind::odometry && (source.name == "gt" || source.name == "imu");
+    if (would_be_anothers || source.of_lidar) // what comes in a lidar's packets is recorded with them
+      files.emplace_back(std::nullopt);
+    else if (source.kind == SourceKind::odometry)
       files.emplace_back(source.name + ".tum");
     else
       files.push_back(std::exchange(has_imu, true) ? std::nullopt : std::optional<std::string>{"imu.csv"});
@@ -180,6 +205,9 @@ Expected<PieceWriter, std::string> PieceWriter::open(const std::filesystem::path
     return pcap.error();
   PieceWriter writer(std::move(*pcap), folder, config);
   writer.append(writer.config_, print_config(config));
+  for (const LidarOptions& lidar : config.lidars)
+    if (auto problem = keep_metadata(lidar, folder))
+      return *problem;
   if (auto problem = writer.flush(false))
     return *problem;
   return writer;
@@ -255,8 +283,8 @@ constexpr Duration kTryAgainAfter = std::chrono::seconds{10};
 
 } // namespace
 
-Recorder::Recorder(const std::filesystem::path& folder, Config config)
-    : config_(std::move(config)), disk_(folder, config_.record.max_bytes) {
+Recorder::Recorder(const std::filesystem::path& folder, Config config, RecordingBounds bounds)
+    : config_(std::move(config)), disk_(folder, bounds.max_bytes, bounds.keep), piece_for_(bounds.piece) {
   const auto files = sample_files(config_);
   for (std::size_t i = 0; i < files.size(); ++i)
     has_file_[i] = files[i].has_value();
@@ -265,16 +293,31 @@ Recorder::Recorder(const std::filesystem::path& folder, Config config)
 void Recorder::take(const Input& input) noexcept {
   bool taken = true;
   if (const auto* datagram = std::get_if<Datagram>(&input)) {
-    StoredDatagram stored{*datagram, std::min(datagram->payload.size(), StoredDatagram::kMaxBytes)};
-    std::copy_n(datagram->payload.begin(), stored.bytes, stored.payload.begin());
-    taken = waiting_->push(stored);
+    taken = store(*datagram);
   } else if (const auto* imu = std::get_if<ImuInput>(&input); imu != nullptr && has_file_[index_of(imu->source)]) {
     taken = waiting_->push(*imu);
-  } else if (const auto* odometry = std::get_if<OdometryInput>(&input)) {
+  } else if (const auto* odometry = std::get_if<OdometryInput>(&input);
+             odometry != nullptr && has_file_[index_of(odometry->source)]) {
     taken = waiting_->push(*odometry);
   }
   if (!taken)
     overflowed_.fetch_add(1, std::memory_order_relaxed);
+}
+
+/// All parts of it, or none.
+bool Recorder::store(const Datagram& datagram) noexcept {
+  constexpr std::size_t kMost = DatagramPart::kMaxBytes;
+  std::span<const std::byte> rest = datagram.payload;
+  if (waiting_->free_places() < std::max<std::size_t>(1, (rest.size() + kMost - 1) / kMost))
+    return false;
+  do {
+    DatagramPart part{datagram, std::min(rest.size(), kMost), rest.size() <= kMost};
+    std::copy_n(rest.begin(), part.bytes, part.payload.begin());
+    rest = rest.subspan(part.bytes);
+    if (!waiting_->push(part))
+      return false;
+  } while (!rest.empty());
+  return true;
 }
 
 Recorder::Status Recorder::status() const {
@@ -300,26 +343,41 @@ void Recorder::write(bool last_round) {
   tell();
 }
 
+/// Parts wait for the last of their datagram.
 void Recorder::write(const Entry& entry) {
+  if (const auto* part = std::get_if<DatagramPart>(&entry)) {
+    parts_.insert(parts_.end(), part->payload.begin(),
+                  part->payload.begin() + static_cast<std::ptrdiff_t>(part->bytes));
+    if (!part->is_last)
+      return;
+  }
   if (!piece_ && !begin_piece(Stamp{read_clock(CLOCK_REALTIME)})) {
     ++dropped_;
+    parts_.clear();
     return;
   }
-  const bool written = std::visit(
-      [this](const auto& input) {
-        if constexpr (std::is_same_v<std::decay_t<decltype(input)>, StoredDatagram>) {
-          Datagram datagram = input.datagram;
-          datagram.payload = {input.payload.data(), input.bytes};
-          piece_->write(datagram);
-          return true;
-        } else {
-          return piece_->write(input);
-        }
-      },
-      entry);
-  ++(written ? unflushed_ : unfit_);
-  if (piece_->bytes() >= disk_.piece_bytes())
+  ++(write_to_piece(entry) ? unflushed_ : unfit_);
+  if (piece_->bytes() >= disk_.piece_bytes() || read_clock(CLOCK_MONOTONIC) - piece_began_ >= piece_for_)
     end_piece();
+}
+
+bool Recorder::write_to_piece(const Entry& entry) {
+  if (const auto* imu = std::get_if<ImuInput>(&entry))
+    return piece_->write(*imu);
+  if (const auto* odometry = std::get_if<OdometryInput>(&entry))
+    return piece_->write(*odometry);
+  Datagram datagram = std::get<DatagramPart>(entry).datagram;
+  datagram.payload = parts_;
+  piece_->write(datagram);
+  parts_.clear();
+  return true;
+}
+
+std::vector<std::filesystem::path> Recorder::end_pieces(Duration keep) {
+  write(false);
+  if (piece_)
+    end_piece();
+  return disk_.last_pieces(keep);
 }
 
 bool Recorder::begin_piece(Stamp now) {
@@ -340,7 +398,7 @@ bool Recorder::begin_piece(Stamp now) {
   }
   piece_.emplace(std::move(*piece));
   flushed_ = 0;
-  synced_ = read_clock(CLOCK_MONOTONIC);
+  piece_began_ = synced_ = read_clock(CLOCK_MONOTONIC);
   return true;
 }
 

@@ -27,6 +27,15 @@
 
 namespace locus::daemon {
 
+/// How much of a recording stays.
+struct RecordingBounds {
+  std::uint64_t max_bytes;   ///< of the folder
+  Duration piece = kForEver; ///< at most, from the first input to the last
+  Duration keep = kForEver;  ///< pieces that ended longer ago are removed with the next one
+
+  static constexpr Duration kForEver = std::chrono::hours{24 * 365 * 100};
+};
+
 /// Recordings on a disk of which they may have so much: FOLDER/RUN/PIECE, each piece a capture folder.
 ///
 /// A run is named by a number, one more than that of the last, and the time of its first input, e.g.
@@ -36,7 +45,7 @@ namespace locus::daemon {
 class CaptureRing {
  public:
   /// Looks at the disk with the first piece.
-  CaptureRing(std::filesystem::path folder, std::uint64_t max_bytes);
+  CaptureRing(std::filesystem::path folder, std::uint64_t max_bytes, Duration keep = RecordingBounds::kForEver);
 
   /// What is sure to stand in the way of a piece, in one line for the user. Makes nothing.
   [[nodiscard]] std::optional<std::string> obstacle() const;
@@ -49,6 +58,8 @@ class CaptureRing {
 
   /// What the files of a piece may hold together.
   [[nodiscard]] std::uint64_t piece_bytes() const;
+  /// Of the run, in order, those that ended within so much time.
+  [[nodiscard]] std::vector<std::filesystem::path> last_pieces(Duration keep) const;
   /// On the disk, without the piece that is begun.
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
   /// Folder of the run; empty before the first piece.
@@ -58,6 +69,7 @@ class CaptureRing {
   struct Piece {
     std::filesystem::path folder;
     std::uint64_t bytes;
+    Duration ended; ///< CLOCK_MONOTONIC; of one that was there before, when it was found
   };
 
   std::optional<std::string> look();
@@ -67,6 +79,7 @@ class CaptureRing {
 
   std::filesystem::path folder_;
   std::uint64_t max_bytes_;
+  Duration keep_;
   bool looked_ = false;
   std::deque<Piece> pieces_; ///< the oldest first
   std::uint64_t bytes_ = 0;  ///< of pieces_
@@ -128,7 +141,7 @@ class PieceWriter {
 /// last round of that thread, a power cut the last few seconds.
 class Recorder {
  public:
-  /// 20 MB: twenty seconds of a VLP-16.
+  /// 20 MB: twenty seconds of a VLP-16, two of an Ouster with 128 beams at low data rate.
   static constexpr std::size_t kMaxUnwritten = 16384;
 
   struct Status {
@@ -141,7 +154,7 @@ class Recorder {
   };
 
   /// Begins a run with the first input.
-  Recorder(const std::filesystem::path& folder, Config config);
+  Recorder(const std::filesystem::path& folder, Config config, RecordingBounds bounds);
 
   /// Producer: datagrams and motion samples; other inputs are none of a sensor's. Takes no lock, allocates nothing.
   void take(const Input& input) noexcept;
@@ -150,21 +163,28 @@ class Recorder {
   /// it: the system has it all.
   void write(bool last_round);
 
+  /// Thread of the disk: writes what was taken and ends the piece, whatever it has. The pieces of this run that hold
+  /// the last so much of it.
+  std::vector<std::filesystem::path> end_pieces(Duration keep);
+
   /// Any thread but the producer's.
   [[nodiscard]] Status status() const;
 
  private:
-  /// Of a longer one, which is no packet of a lidar, so much is kept that this can still be told.
-  struct StoredDatagram {
+  /// One of a Velodyne is whole; the packets of other lidars, and what is no lidar's, come in several parts.
+  struct DatagramPart {
     static constexpr std::size_t kMaxBytes = velodyne::kDataPacketBytes + 2;
 
     Datagram datagram; ///< without payload
     std::size_t bytes = 0;
+    bool is_last = true;
     std::array<std::byte, kMaxBytes> payload{};
   };
-  using Entry = std::variant<ImuInput, OdometryInput, StoredDatagram>;
+  using Entry = std::variant<ImuInput, OdometryInput, DatagramPart>;
 
+  [[nodiscard]] bool store(const Datagram& datagram) noexcept;
   void write(const Entry& entry);
+  [[nodiscard]] bool write_to_piece(const Entry& entry);
   bool begin_piece(Stamp now);
   void end_piece();
   void flush(bool to_disk);
@@ -176,11 +196,13 @@ class Recorder {
   std::unique_ptr<Waiting> waiting_ = std::make_unique<Waiting>(); ///< larger than a stack
   std::atomic<std::uint64_t> overflowed_{0};                       ///< inputs that the ring in memory had no room for
 
-  CaptureRing disk_; ///< this and the next are of the thread of the disk
+  CaptureRing disk_;                   ///< this and the next are of the thread of the disk
+  Duration piece_for_, piece_began_{}; ///< at most; CLOCK_MONOTONIC
   bool has_begun_ = false, is_last_round_ = false;
   std::optional<PieceWriter> piece_;
-  std::uint64_t unflushed_ = 0; ///< inputs that the piece may still lose
-  std::uint64_t flushed_ = 0;   ///< inputs in the piece
+  std::vector<std::byte> parts_; ///< of a datagram, before its last one
+  std::uint64_t unflushed_ = 0;  ///< inputs that the piece may still lose
+  std::uint64_t flushed_ = 0;    ///< inputs in the piece
   std::uint64_t recorded_ = 0, dropped_ = 0, unfit_ = 0;
   std::string problem_;
   Duration try_again_{}, synced_{}; ///< CLOCK_MONOTONIC

@@ -31,6 +31,12 @@ struct StartPoint {
   std::vector<SurfacePoint> map_odom;
 };
 
+/// What another run has learned of the motion sources, see Odometry::recall().
+struct Recalled {
+  LearnedSources learned{};
+  double elapsed_s = 0.0;
+};
+
 /// The estimate for one sweep, with what it took.
 struct ProcessedSweep {
   OdometryEstimate estimate;
@@ -38,14 +44,16 @@ struct ProcessedSweep {
   std::size_t raw_returns = 0;
   std::bitset<kMaxSources> usable_sources; ///< SourcePose::usable, by the index of the source
   MachineTime took;                        ///< from the cut of the sweep to the estimate
-  StageTimes stages_took; ///< those of the ingest included, and what was prepared for it since the sweep before
+  StageTimes stages_took{}; ///< those of the ingest included, and what was prepared for it since the sweep before
 };
 
 /// Odometry with its costs measured; what the daemon's odometry thread and the replay in one thread share. One owner.
 class SweepProcessor {
  public:
-  explicit SweepProcessor(const Config& config, const std::optional<StartPoint>& start = {})
+  explicit SweepProcessor(const Config& config, const std::optional<StartPoint>& start = {},
+                          const Recalled& recalled = {})
       : odometry_(config.odometry, config.source_options(), &stages_) {
+    odometry_.recall(recalled.learned, recalled.elapsed_s);
     if (start)
       odometry_.begin_at(start->last, start->map_odom);
   }

@@ -41,6 +41,12 @@ template <class T, std::size_t N> class SpscRing {
     return true;
   }
 
+  /// Producer: how many values push() will take at least.
+  [[nodiscard]] std::size_t free_places() const noexcept {
+    return N -
+           static_cast<std::size_t>(pushed_.load(std::memory_order_relaxed) - popped_.load(std::memory_order_acquire));
+  }
+
   /// Consumer: the oldest value, or nothing.
   [[nodiscard]] std::optional<T> pop() noexcept {
     const std::uint64_t popped = popped_.load(std::memory_order_relaxed);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "drivers/hesai/calibration.hpp"
 #include "drivers/velodyne/calibration.hpp"
 
 namespace locus {
@@ -16,42 +17,146 @@ constexpr Duration kLongestGapToldByAzimuth = std::chrono::seconds{1};
 constexpr double kAzimuthToleranceCdeg = 100.0;
 constexpr double kSpeedTolerance = 0.02; ///< by which the motor's speed may change over a gap
 
-} // namespace
-
-Expected<LidarInput, std::string> LidarInput::open(LidarOptions options, std::uint8_t index) {
+Expected<hesai::Decoder, std::string> hesai_decoder(const LidarOptions& options) {
+  hesai::DecoderOptions known{options.hesai, std::nullopt, options.isa};
   if (options.calibration.empty())
-    return LidarInput{std::move(options), index, std::nullopt};
-  auto calibration = velodyne::read_calibration(options.calibration);
-  const std::string key = "lidars." + options.name + ".calibration: ";
-  if (!calibration)
-    return key + calibration.error();
-  if (options.model && calibration->laser_count != velodyne::spec(*options.model).calibration.laser_count)
-    return key + options.calibration + ": " + std::to_string(calibration->laser_count) +
-           " lasers, but the lidar is a " + std::string{to_string(*options.model)};
-  return LidarInput{std::move(options), index, *calibration};
+    return hesai::Decoder{known};
+  const auto read = hesai::read_calibration(options.calibration);
+  if (!read)
+    return read.error();
+  if (options.hesai && read->laser_count != hesai::spec(*options.hesai).layout.channels)
+    return options.calibration + ": " + std::to_string(read->laser_count) + " lasers, but the lidar is a " +
+           std::string{to_string(*options.hesai)};
+  known.calibration = *read;
+  return hesai::Decoder{known};
 }
 
-LidarInput::LidarInput(LidarOptions options, std::uint8_t index, std::optional<velodyne::Calibration> calibration)
-    : options_(std::move(options)), decoder_({options_.model, std::nullopt, calibration, options_.isa}),
-      clock_(options_.time) {
+/// How many packets were sent between two of these numbers. None where the lidar has begun to count anew.
+std::uint64_t sent_between(std::uint32_t before, std::uint32_t now) {
+  constexpr std::uint32_t kMostMissing = 1'000'000; // three minutes of the fastest
+  const std::uint32_t missing = now - before - 1;
+  return missing <= kMostMissing ? missing : 0;
+}
+
+} // namespace
+
+std::string_view configured_model(const LidarOptions& options) {
+  if (options.hesai)
+    return to_string(*options.hesai);
+  return options.model ? velodyne::to_string(*options.model) : std::string_view{};
+}
+
+Expected<LidarInput, std::string> LidarInput::open(LidarOptions options, std::uint8_t index) {
+  static_cast<void>(hesai::spec(hesai::Model{})); // makes the tables, that no packet need to
+  auto decoder = decoder_for(options);
+  if (!decoder)
+    return decoder.error();
+  return LidarInput{std::move(options), index, std::move(*decoder)};
+}
+
+Expected<LidarInput::Decoder, std::string> LidarInput::decoder_for(const LidarOptions& options) {
+  const std::string key = "lidars." + options.name + '.';
+  if (options.is_ouster()) {
+    const auto metadata = ouster::read_metadata(options.metadata);
+    if (!metadata)
+      return key + "metadata: " + metadata.error();
+    return Decoder{ouster::Decoder{*metadata, options.isa}};
+  }
+  if (options.is_hesai()) {
+    const auto decoder = hesai_decoder(options);
+    return decoder ? Expected<Decoder, std::string>{Decoder{*decoder}} : key + "calibration: " + decoder.error();
+  }
+  std::optional<velodyne::Calibration> calibration;
+  if (!options.calibration.empty()) {
+    const auto read = velodyne::read_calibration(options.calibration);
+    if (!read)
+      return key + "calibration: " + read.error();
+    if (options.model && read->laser_count != velodyne::spec(*options.model).calibration.laser_count)
+      return key + "calibration: " + options.calibration + ": " + std::to_string(read->laser_count) +
+             " lasers, but the lidar is a " + std::string{to_string(*options.model)};
+    calibration = *read;
+  }
+  return Decoder{velodyne::Decoder{{options.model, std::nullopt, calibration, options.isa}}};
+}
+
+LidarInput::LidarInput(LidarOptions options, std::uint8_t index, Decoder decoder)
+    : options_(std::move(options)), decoder_(std::move(decoder)), clock_(options_.time) {
   packet_.lidar = index;
+  if (const ouster::Decoder* const sensor = ouster())
+    options_.imu_port = sensor->metadata().imu_port;
 }
 
 const LidarPacket* LidarInput::receive(const Datagram& datagram) {
-  packet_is_ready_ = false;
+  ready_ = nullptr;
+  imu_count_ = 0;
   ++counters_.received;
-  if (const auto error = take(datagram))
+  if (const auto error = take(datagram)) {
     ++counters_[*error];
-  return packet_is_ready_ ? &packet_ : nullptr;
+    if (*error == PacketError::model)
+      unknown_last_heard_ = datagram.receive_stamp;
+  }
+  return ready_;
 }
 
 bool LidarInput::listens_to(std::uint16_t port) const {
   constexpr int kPositionPortDistance = kDefaultPositionPort - kDefaultDataPort;
+  if (options_.gives_clouds())
+    return false;
+  if (options_.is_ouster())
+    return port == options_.port || port == options_.imu_port;
+  if (options_.is_hesai())
+    return port == options_.port;
   return port == options_.port || port == kDefaultPositionPort || port == options_.port + kPositionPortDistance;
+}
+
+PacketLengths LidarInput::packet_lengths() const {
+  PacketLengths lengths;
+  const auto add = [&](std::size_t bytes) { lengths.storage[lengths.count++] = bytes; };
+  const auto add_hesai = [&](hesai::Model model) {
+    for (const std::size_t bytes : hesai::spec(model).lengths)
+      if (bytes > 0)
+        add(bytes);
+  };
+  const auto add_all_hesai = [&] {
+    for (std::size_t i = 0; i < hesai::kModels; ++i)
+      add_hesai(static_cast<hesai::Model>(i));
+  };
+  if (const ouster::Decoder* const sensor = ouster()) {
+    add(sensor->format().packet_bytes);
+    lengths.data = lengths.count;
+    add(ouster::imu_packet_layout(sensor->metadata()).bytes);
+    return lengths;
+  }
+  if (const hesai::Decoder* const sensor = hesai()) {
+    if (sensor->packet_bytes() > 0)
+      add(sensor->packet_bytes());
+    else if (options_.hesai)
+      add_hesai(*options_.hesai);
+    else
+      add_all_hesai();
+    lengths.data = lengths.count;
+    return lengths;
+  }
+  add(velodyne::kDataPacketBytes);
+  if (options_.is_of_any_maker() && counters_.data == 0)
+    add_all_hesai();
+  lengths.data = lengths.count;
+  add(velodyne::kPositionPacketBytes);
+  return lengths;
 }
 
 std::optional<std::uint32_t> LidarInput::source_ip() const {
   return options_.source_ip ? options_.source_ip : learnt_ip_;
+}
+
+/// Takes the lidar for one of the maker whose packet this looks like, unless one was read a moment ago.
+void LidarInput::follow_maker(const Datagram& datagram) {
+  if (!options_.is_of_any_maker() || (counters_.data > 0 && datagram.receive_stamp - last_heard_ <= kSenderTimeout))
+    return;
+  if (hesai() != nullptr && datagram.payload.size() == velodyne::kDataPacketBytes)
+    decoder_.emplace<velodyne::Decoder>(velodyne::DecoderOptions{.isa = options_.isa});
+  else if (const auto looks = hesai::look_at(datagram.payload); looks && hesai() == nullptr)
+    decoder_.emplace<hesai::Decoder>(hesai::DecoderOptions{.isa = options_.isa});
 }
 
 std::optional<PacketError> LidarInput::take(const Datagram& datagram) {
@@ -63,8 +168,19 @@ std::optional<PacketError> LidarInput::take(const Datagram& datagram) {
     refuse_sender(datagram);
     return PacketError::sender;
   }
-  if (datagram.payload.size() == velodyne::kDataPacketBytes)
+  follow_maker(datagram);
+  if (is_data_packet(datagram))
     return take_data(datagram);
+  if (ouster() != nullptr)
+    return take_imu(datagram);
+  if (const auto looks = hesai::look_at(datagram.payload)) {
+    refuse_hesai(*looks);
+    return PacketError::model;
+  }
+  return hesai() == nullptr ? take_position(datagram) : PacketError::length;
+}
+
+std::optional<PacketError> LidarInput::take_position(const Datagram& datagram) {
   if (datagram.payload.size() != velodyne::kPositionPacketBytes)
     return PacketError::length;
   position_ = velodyne::parse_position_packet(datagram.payload.first<velodyne::kPositionPacketBytes>());
@@ -73,12 +189,32 @@ std::optional<PacketError> LidarInput::take(const Datagram& datagram) {
   return std::nullopt;
 }
 
+/// A measurement is placed by what the columns have told of the sensor's clock; before the first of these it has no
+/// place. Columns take up to 16 ms longer to be sent (in recordings), so it may come before its time; that it arrives
+/// then keeps it from being taken for one of another clock.
+std::optional<PacketError> LidarInput::take_imu(const Datagram& datagram) {
+  ouster::ImuMeasurements measurements;
+  if (const auto error = ouster::read_imu_packet(ouster()->metadata(), datagram.payload, measurements))
+    return error;
+  for (const ouster::ImuMeasurement& one : measurements.all())
+    if (const auto stamp = clock_.stamp_of(locus::time_of_hour(one.time, time_scale_), datagram.receive_stamp))
+      imu_samples_[imu_count_++] = {.stamp = *stamp,
+                                    .arrival = std::max(datagram.receive_stamp, *stamp),
+                                    .angular_velocity_radps = one.angular_velocity_radps,
+                                    .specific_force_mps2 = one.specific_force_mps2,
+                                    .attitude = std::nullopt};
+  ++counters_.position;
+  return std::nullopt;
+}
+
 /// Its stamp is that of the recording: there is no sensor's clock to reckon it from.
 std::optional<PacketError> LidarInput::take_decoded(const Datagram& datagram) {
-  const std::uint8_t index = packet_.lidar;
-  packet_ = *datagram.decoded;
-  packet_.lidar = index;
-  packet_is_ready_ = true;
+  ready_ = datagram.decoded;
+  if (const std::uint8_t index = packet_.lidar; ready_->lidar != index) {
+    packet_ = *ready_;
+    packet_.lidar = index;
+    ready_ = &packet_;
+  }
   ++counters_.data;
   return std::nullopt;
 }
@@ -86,18 +222,113 @@ std::optional<PacketError> LidarInput::take_decoded(const Datagram& datagram) {
 std::optional<PacketError> LidarInput::take_data(const Datagram& datagram) {
   if (is_duplicate(datagram.payload))
     return PacketError::duplicate;
-  if (const auto error = decoder_.decode(datagram.payload, packet_))
+  if (const auto error = decode(datagram))
     return error;
-  const auto reading =
-      clock_.read(decoder_.time_of_hour(), packet_.duration, datagram.receive_stamp, datagram.clock_set_by);
+  const auto reading = clock_.read(time_of_hour(), packet_.duration, datagram.receive_stamp, datagram.clock_set_by);
   counters_.clock_steps = clock_.steps();
   if (!reading)
     return PacketError::time;
   packet_.stamp = reading->stamp;
-  packet_is_ready_ = true;
+  ready_ = &packet_;
   count(*reading);
   remember(datagram);
   return std::nullopt;
+}
+
+std::optional<PacketError> LidarInput::decode(const Datagram& datagram) {
+  if (auto* const velodyne = std::get_if<velodyne::Decoder>(&decoder_))
+    return velodyne->decode(datagram.payload, packet_);
+  const Stamp host_now = datagram.receive_stamp + datagram.clock_set_by;
+  if (auto* const hesai = std::get_if<hesai::Decoder>(&decoder_)) {
+    if (const auto error = decode_hesai(*hesai, datagram))
+      return error;
+    time_scale_ = scale_of(false, hesai->time(), host_now);
+  } else {
+    auto& sensor = std::get<ouster::Decoder>(decoder_);
+    if (const auto error = sensor.decode(datagram.payload, packet_))
+      return error;
+    const bool is_set_to_ptp = sensor.metadata().timestamp_mode == ouster::TimestampMode::ptp_1588;
+    time_scale_ = scale_of(is_set_to_ptp, sensor.time(), host_now);
+  }
+  clock_.set_synchronised(time_scale_ != TimeScale::free_running);
+  return std::nullopt;
+}
+
+std::optional<PacketError> LidarInput::decode_hesai(hesai::Decoder& decoder, const Datagram& datagram) {
+  const auto error = decoder.decode(datagram.payload, packet_);
+  if (error == PacketError::model && decoder.recognised())
+    refuse_hesai(*decoder.recognised());
+  return error;
+}
+
+void LidarInput::refuse_hesai(const hesai::Looks& looks) {
+  unknown_hesai_.hesai = looks.name;
+  unknown_hesai_.is_readable = looks.model.has_value();
+  ++unknown_hesai_.packets;
+}
+
+/// Of the last good packet.
+Duration LidarInput::time_of_hour() const {
+  if (const ouster::Decoder* const sensor = ouster())
+    return locus::time_of_hour(sensor->time(), time_scale_);
+  if (const hesai::Decoder* const sensor = hesai())
+    return locus::time_of_hour(sensor->time(), time_scale_);
+  return velodyne()->time_of_hour();
+}
+
+/// By its looks.
+bool LidarInput::is_data_packet(const Datagram& datagram) const {
+  if (const ouster::Decoder* const sensor = ouster())
+    return datagram.payload.size() == sensor->format().packet_bytes;
+  if (hesai() != nullptr)
+    return hesai::look_at(datagram.payload).has_value();
+  return datagram.payload.size() == velodyne::kDataPacketBytes;
+}
+
+std::string_view LidarInput::model() const {
+  if (const ouster::Decoder* const sensor = ouster())
+    return counters_.data > 0 ? ouster::name_of(sensor->metadata()) : std::string_view{};
+  if (const hesai::Decoder* const sensor = hesai())
+    return sensor->model() ? to_string(*sensor->model()) : std::string_view{};
+  const auto model = velodyne()->model();
+  return model ? velodyne::to_string(*model) : std::string_view{};
+}
+
+std::string_view LidarInput::return_mode() const {
+  if (const ouster::Decoder* const sensor = ouster())
+    return counters_.data == 0 ? "" : sensor->format().profile.echoes > 1 ? "dual" : "strongest";
+  if (const hesai::Decoder* const sensor = hesai())
+    return sensor->return_mode() ? to_string(*sensor->return_mode()) : std::string_view{};
+  const auto mode = velodyne()->return_mode();
+  return mode ? velodyne::to_string(*mode) : std::string_view{};
+}
+
+std::string_view LidarInput::recognised_model() const {
+  if (const hesai::Decoder* const sensor = hesai())
+    return sensor->recognised() ? sensor->recognised()->name : std::string_view{};
+  const auto model = velodyne() != nullptr ? velodyne()->recognised_model() : std::nullopt;
+  return model ? velodyne::to_string(*model) : unknown_hesai_.hesai;
+}
+
+std::string_view LidarInput::clock_state() const {
+  if (tells_date())
+    return counters_.data > 0 ? to_string(time_scale_) : "absent";
+  return to_string(position_ ? position_->pps : velodyne::PpsState::absent);
+}
+
+double LidarInput::rotation_rate_rpm() const {
+  if (const ouster::Decoder* const sensor = ouster())
+    return sensor->rotation_rate_rpm();
+  if (const hesai::Decoder* const sensor = hesai())
+    return sensor->rotation_rate_rpm();
+  return velodyne()->model() ? velodyne()->rotation_rate_rpm() : 0.0;
+}
+
+std::optional<UnknownPackets> LidarInput::unknown_packets() const {
+  const auto unknown = velodyne() != nullptr ? velodyne()->unknown_packets() : std::nullopt;
+  if (unknown && unknown->packets > unknown_hesai_.packets)
+    return UnknownPackets{*unknown};
+  return unknown_hesai_.packets > 0 ? std::optional{unknown_hesai_} : std::nullopt;
 }
 
 bool LidarInput::is_sender(const Datagram& datagram) const {
@@ -107,45 +338,64 @@ bool LidarInput::is_sender(const Datagram& datagram) const {
 }
 
 void LidarInput::refuse_sender(const Datagram& datagram) {
-  if (datagram.payload.size() != velodyne::kDataPacketBytes)
+  const bool is_of_another_maker =
+      options_.is_of_any_maker() &&
+      (datagram.payload.size() == velodyne::kDataPacketBytes || hesai::look_at(datagram.payload));
+  if (!is_data_packet(datagram) && !is_of_another_maker)
     return;
   refused_ip_ = datagram.source_ip;
   const auto known = std::ranges::find_if(
       strangers_, [&](const Stranger& stranger) { return stranger.packets == 0 || stranger.ip == datagram.source_ip; });
   if (known != strangers_.end())
-    *known = {datagram.source_ip, known->packets + 1};
+    *known = {datagram.source_ip, known->packets + 1, datagram.receive_stamp};
 }
 
 bool LidarInput::is_duplicate(std::span<const std::byte> payload) const {
   const auto end = recent_.begin() + static_cast<std::ptrdiff_t>(std::min(remembered_, kRemembered));
+  const std::size_t bytes = std::min(payload.size(), velodyne::kDataPacketBytes);
   return std::any_of(recent_.begin(), end,
-                     [&](const Payload& seen) { return std::memcmp(seen.data(), payload.data(), seen.size()) == 0; });
+                     [&](const Payload& seen) { return std::memcmp(seen.data(), payload.data(), bytes) == 0; });
 }
 
-/// Share by which the speed may differ over a gap: the motor's own, or what the azimuths of a packet, in hundredths of
-/// a degree, tell it to. The VLS-128 turns by 0.4 degrees between the first and the last column of a packet, or less.
-double LidarInput::speed_tolerance() const {
-  constexpr double kRoundingCdeg = 1.5;
-  const velodyne::Model model = *decoder_.model();
-  const auto columns = velodyne::packet_layout(model, *decoder_.return_mode()).columns;
-  const double turned_s = to_seconds(velodyne::spec(model, decoder_.pace()).column_duration) *
-                          static_cast<double>(std::max<std::size_t>(columns - 1, 1));
-  const double turned_cdeg = decoder_.rotation_rate_rpm() / 60.0 * velodyne::kCdegPerTurn * turned_s;
-  return std::max(kSpeedTolerance, kRoundingCdeg / std::max(turned_cdeg, kRoundingCdeg));
+/// From the first to the last column of the last good packet.
+double LidarInput::turn_of_packet_cdeg() const {
+  double turned_s = 0.0;
+  if (const velodyne::Decoder* const decoder = velodyne()) {
+    const auto columns = velodyne::packet_layout(*decoder->model(), *decoder->return_mode()).columns;
+    turned_s = to_seconds(velodyne::spec(*decoder->model(), decoder->pace()).column_duration) *
+               static_cast<double>(std::max<std::size_t>(columns - 1, 1));
+  } else {
+    turned_s = to_seconds(nominal_duration());
+  }
+  return rotation_rate_rpm() / 60.0 * velodyne::kCdegPerTurn * turned_s;
 }
 
-/// Packets that should lie between the latest one and this one, and do not.
+/// From a packet to the next, of a Velodyne or a Hesai.
+Duration LidarInput::nominal_duration() const {
+  if (const hesai::Decoder* const sensor = hesai())
+    return sensor->nominal_duration();
+  const velodyne::Decoder& decoder = *velodyne();
+  return velodyne::packet_duration(*decoder.model(), *decoder.return_mode(), decoder.pace());
+}
+
+/// Packets that should lie between the latest one and this one, and do not. The speed may differ over a gap by what the
+/// motor does, or by what the azimuths of a packet, in hundredths of a degree, tell it to: the VLS-128 turns by 0.4
+/// degrees between the first and the last column of a packet, or less.
 std::uint64_t LidarInput::missing_before(const SensorClock::Reading& reading) const {
-  const Duration nominal = velodyne::packet_duration(*decoder_.model(), *decoder_.return_mode(), decoder_.pace());
-  const auto missing = std::llround(to_seconds(reading.advance - last_duration_) / to_seconds(nominal));
+  constexpr double kRoundingCdeg = 1.5;
+  if (const ouster::Decoder* const sensor = ouster())
+    return sensor->packets_between(last_first_column_, reading.advance);
+  if (const hesai::Decoder* const sensor = hesai(); sensor != nullptr && sensor->number())
+    return sent_between(last_number_, *sensor->number());
+  const auto missing = std::llround(to_seconds(reading.advance - last_duration_) / to_seconds(nominal_duration()));
   if (missing <= 0)
     return 0;
   if (reading.advance <= kLongestGapToldByAzimuth) {
-    const double expected_cdeg =
-        decoder_.rotation_rate_rpm() / 60.0 * velodyne::kCdegPerTurn * to_seconds(reading.advance);
+    const double expected_cdeg = rotation_rate_rpm() / 60.0 * velodyne::kCdegPerTurn * to_seconds(reading.advance);
     const double turned_cdeg = packet_.first_azimuth_cdeg - last_azimuth_cdeg_;
     const double error_cdeg = std::remainder(turned_cdeg - expected_cdeg, velodyne::kCdegPerTurn);
-    if (std::abs(error_cdeg) > kAzimuthToleranceCdeg + speed_tolerance() * expected_cdeg)
+    const double tolerance = std::max(kSpeedTolerance, kRoundingCdeg / std::max(turn_of_packet_cdeg(), kRoundingCdeg));
+    if (std::abs(error_cdeg) > kAzimuthToleranceCdeg + tolerance * expected_cdeg)
       return 0;
   }
   return static_cast<std::uint64_t>(missing);
@@ -161,13 +411,16 @@ void LidarInput::count(const SensorClock::Reading& reading) {
   if (reading.continuous)
     counters_.lost += missing_before(reading);
   last_azimuth_cdeg_ = packet_.first_azimuth_cdeg;
+  last_first_column_ = ouster() != nullptr ? ouster()->first_column() : 0;
+  last_number_ = hesai() != nullptr ? hesai()->number().value_or(0) : 0;
   last_duration_ = packet_.duration;
 }
 
 void LidarInput::remember(const Datagram& datagram) {
   learnt_ip_ = datagram.source_ip;
   last_heard_ = datagram.receive_stamp;
-  std::copy(datagram.payload.begin(), datagram.payload.end(), recent_[remembered_ % kRemembered].begin());
+  std::memcpy(recent_[remembered_ % kRemembered].data(), datagram.payload.data(),
+              std::min(datagram.payload.size(), velodyne::kDataPacketBytes));
   ++remembered_;
 }
 
@@ -184,8 +437,11 @@ Expected<LidarRouter, std::string> LidarRouter::open(const std::vector<LidarOpti
 }
 
 const LidarPacket* LidarRouter::receive(const Datagram& datagram) {
-  if (LidarInput* lidar = find(datagram))
+  if (LidarInput* lidar = find(datagram)) {
+    latest_ = static_cast<std::size_t>(lidar - lidars_.data());
     return lidar->receive(datagram);
+  }
+  latest_.reset();
   ++foreign_.received;
   ++foreign_[PacketError::sender];
   return nullptr;
@@ -205,23 +461,37 @@ LidarInput* LidarRouter::find(const Datagram& datagram) {
   return found;
 }
 
-std::string_view LidarRouter::configured_for(const Datagram& datagram) const {
+LidarRouter::Origin LidarRouter::configured_for(const Datagram& datagram) const {
   const auto found = std::ranges::find_if(lidars_, [&](const LidarInput& lidar) {
     return lidar.listens_to(datagram.destination_port) &&
            lidar.options().source_ip.value_or(datagram.source_ip) == datagram.source_ip;
   });
-  return found == lidars_.end() ? std::string_view{} : found->options().name;
+  if (found == lidars_.end())
+    return {};
+  return {found->options().name, found->ouster() != nullptr ? &found->ouster()->metadata() : nullptr};
+}
+
+void LidarRouter::Senders::add_lengths(std::span<const std::size_t> more) {
+  for (const std::size_t bytes : more)
+    if (std::ranges::find(all_lengths(), bytes) == all_lengths().end() && length_count < kMaxLengths)
+      lengths[length_count++] = bytes;
 }
 
 LidarRouter::Senders LidarRouter::senders_to(std::uint16_t port) const {
   Senders senders;
+  std::size_t lidars = 0;
   for (const LidarInput& lidar : lidars_) {
-    if (!lidar.listens_to(port))
+    if (lidars == Senders::kMax || !lidar.listens_to(port))
       continue;
-    if (!lidar.source_ip() || senders.count == Senders::kMax)
-      return {};
-    senders.ips[senders.count++] = *lidar.source_ip();
+    if (lidars++ == 0)
+      senders.length_count = 0;
+    const PacketLengths lengths = lidar.packet_lengths();
+    senders.add_lengths(lengths.all());
+    if (lidar.source_ip())
+      senders.ips[senders.count++] = *lidar.source_ip();
   }
+  if (senders.count < lidars)
+    senders.count = 0;
   return senders;
 }
 

@@ -12,18 +12,20 @@ namespace locus {
 
 /// Why a datagram was not turned into data. Each has its counter in PacketCounters::rejected.
 enum class PacketError : std::uint8_t {
-  length,    ///< neither a data nor a position packet
-  flag,      ///< a block that does not open as the model's blocks do
-  model,     ///< unknown product id or return mode, or a calibration file for another number of lasers
+  length,    ///< of no packet that the lidar sends
+  flag,      ///< a block that does not open as the model's blocks do; of an Ouster, nothing measured or another type
+  model,     ///< unknown product id or return mode, a calibration file for another number of lasers, or a metadata file
+             ///< from before the sensor was started anew
   sender,    ///< not from a lidar that was asked for
   azimuth,   ///< beyond 360 degrees, or a turn that no motor makes
   time,      ///< an impossible time of hour, or one far from where the sensor's clock should be
   duplicate, ///< a packet that was already there
   truncated, ///< part of the payload is missing
+  checksum,  ///< that of the packet is wrong
 };
 constexpr auto names_of(PacketError) {
   return std::to_array<std::string_view>(
-      {"length", "flag", "model", "sender", "azimuth", "time", "duplicate", "truncated"});
+      {"length", "flag", "model", "sender", "azimuth", "time", "duplicate", "truncated", "checksum"});
 }
 inline constexpr std::size_t kPacketErrorCount = names_of(PacketError{}).size();
 

@@ -146,6 +146,14 @@ void SensorClock::believe_sensor(Duration sensor_time, Stamp receive) {
   offset_ = by_sensor - sensor_time;
 }
 
+std::optional<Stamp> SensorClock::stamp_of(Duration time_of_hour, Stamp receive) const {
+  constexpr Duration kFarthest = std::chrono::seconds{1};
+  const Duration sensor_time = anchored_ ? nearest_hour(time_of_hour, latest_) : Duration{};
+  if (!anchored_ || std::chrono::abs(sensor_time - latest_) > kFarthest)
+    return std::nullopt;
+  return stamp(sensor_time, receive);
+}
+
 Stamp SensorClock::stamp(Duration sensor_time, Stamp receive) const {
   if (mode_ != LidarTime::sensor)
     return Stamp{sensor_time + offset_};

@@ -44,7 +44,11 @@ class SensorClock {
   /// nothing if its time is refused. `set_by`: as Datagram::clock_set_by has it. Precondition: 0 <= time_of_hour < 1 h.
   std::optional<Reading> read(Duration time_of_hour, Duration until_sent, Stamp receive, Duration set_by = {});
 
-  /// Whether the lidar's clock is on UTC, as its position packets say.
+  /// The stamp of another instant of the same clock, e.g. that of a lidar's inertial unit. Nothing before the first
+  /// packet, and for what is not of the second around the latest one.
+  [[nodiscard]] std::optional<Stamp> stamp_of(Duration time_of_hour, Stamp receive) const;
+
+  /// Whether the lidar's clock is on UTC, as its packets say.
   void set_synchronised(bool synchronised) {
     synchronised_ = synchronised;
     knows_utc_ = knows_utc_ && synchronised;

@@ -1,26 +1,38 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# build-deb.sh [--arch ARCH] [FOLDER]: builds the packages locusd and locus-tools from the files that git tracks, as they
-# are in the work tree, and lays them into FOLDER (build/deb). Installs what is missing to build, as root or with sudo; for
-# another ARCH than this machine's (arm64) not here but in a tree of its own, as root. Runs no tests.
+# build-deb.sh [--suite SUITE] [--arch ARCH] [FOLDER]: builds the packages of packaging/debian/control from the files that
+# git tracks, as they are in the work tree, and lays them into FOLDER (build/deb). Installs what is missing to build, as root or
+# with sudo; for another release of Debian (bookworm, trixie) or another ARCH than this machine's (amd64, arm64) not here but
+# in a tree of its own, as root. Runs no tests.
 set -euo pipefail
 source=$(realpath "$(dirname "$0")/..")
+source "$source/packaging/releases.sh"
 work=$(mktemp -d -t locusd-deb.XXXXXX)
 trap 'rm -rf "$work"' EXIT
 
-arch=$(dpkg --print-architecture)
+fail() { echo "build-deb.sh: $1" >&2; exit 2; }
+here_suite=$(. /etc/os-release && echo "${VERSION_CODENAME:-}") here_arch=$(dpkg --print-architecture)
+suite=$here_suite arch=$here_arch
+while [[ ${1:-} == --* ]]; do
+  [ -n "${2:-}" ] || fail "$1: of what? E.g. --suite trixie --arch arm64"
+  case $1 in
+    --suite) suite=$2 ;;
+    --arch) arch=$2 ;;
+    *) fail "$1: no such option; there are --suite and --arch" ;;
+  esac
+  shift 2
+done
+[[ $arch =~ ^(amd64|arm64)$ ]] || fail "packages are for amd64 and arm64, not for '$arch'"
+[ -n "${release_of[${suite:-none}]:-}" ] ||
+  fail "packages are for Debian ${!release_of[*]}, not for '$suite'; name one by --suite, or look at packaging/Containerfile"
+
 profiles=nocheck
 in_tree=()
-if [ "${1:-}" = --arch ]; then
-  [ -n "${2:-}" ] || { echo "build-deb.sh: --arch: of which processor? E.g. --arch arm64" >&2; exit 2; }
-  if [ "$2" != "$arch" ]; then
-    arch=$2
-    profiles="cross nocheck"
-    in_tree=("$source/packaging/cross-tree.sh" "$arch" "$work")
-  fi
-  shift 2
-fi
-result=$(realpath -m "${1:-$source/build/deb}")
+[ "$arch" = "$here_arch" ] || profiles="cross nocheck"
+[ "$suite $arch" = "$here_suite $here_arch" ] || in_tree=("$source/packaging/build-tree.sh" "$suite" "$arch" "$work")
+folder=deb
+[ ${#in_tree[@]} -eq 0 ] || folder=deb-$suite-$arch
+result=$(realpath -m "${1:-$source/build/$folder}")
 
 tree=$work/locusd
 mkdir -p "$tree" "$result"
@@ -37,13 +49,16 @@ log=$result/build.log
 progress() { if [ -t 1 ]; then grep --line-buffered -oP '^\[\d+/\d+\]' | tr '\n' '\r'; else cat >/dev/null; fi; }
 
 cd "$tree"
+export LANG=C.UTF-8 # everywhere, for ccache asks for it
 export DEB_BUILD_OPTIONS=${DEB_BUILD_OPTIONS-"parallel=$(nproc)"}" nocheck" DEB_BUILD_PROFILES=$profiles
 "${in_tree[@]}" packaging/install-build-deps.sh "$arch"
 mv packaging/debian debian
+sed -i "1s/) [a-z]*;/$(suffix_of "$suite")) $suite;/" debian/changelog
 if ! "${in_tree[@]}" dpkg-buildpackage --host-arch "$arch" --build=binary --no-sign 2>&1 | tee "$log" | progress; then
   tail -n 40 "$log" >&2
   echo "build-deb.sh: dpkg-buildpackage failed; the end of $log stands above" >&2
   exit 1
 fi
+rm -f "$result"/{locusd,locus-tools,liblocus0,liblocus-dev,python3-locus}{,-dbgsym}_*.deb "$result"/locusd_*.{buildinfo,changes} # of another version
 mv "$work"/*.deb "$work"/*.buildinfo "$work"/*.changes "$result"
 ls "$result"/*_"$arch".deb

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# sbom.sh PACKAGE TREE BUILD: what the programs of a package consist of, as SPDX 2.3, to stdout. TREE holds them as they
+# sbom.sh PACKAGE TREE BUILD: what the programs, or the library, of a package consist of, as SPDX 2.3, to stdout. TREE holds them as they
 # are installed, BUILD is the folder of ninja that they were linked in. Everything is read from what was really built:
 #   DYNAMIC_LINK              package of a library that a program names as needed
 #   RUNTIME_DEPENDENCY_OF     package of a library that only such libraries need
@@ -12,7 +12,7 @@ export LC_ALL=C.UTF-8
 package=$1 tree=$(realpath "$2") build=$(realpath "$3")
 arch=$(dpkg-architecture -q DEB_HOST_ARCH) triplet=$(dpkg-architecture -q DEB_HOST_MULTIARCH)
 version=$(dpkg-parsechangelog -S Version)
-programs=("$tree"/usr/bin/*)
+mapfile -t programs < <(find "$tree"/usr -path "*/usr/bin/*" -o -type f -name "*.so*" | sort)
 
 needed() { readelf --dynamic "$@" | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p' | sort -u; }
 path_of() { # LIBRARY, as the loader finds it
@@ -50,10 +50,11 @@ libraries() {
 # What ninja makes of what, order alone aside: "FILE..." of the files on standard input.
 made_of() { (cd "$build" && xargs --no-run-if-empty ninja -t query) | awk '/^  input:/ {on = 1; next} /^  outputs:/ {on = 0}
   on && $1 != "||" {print $NF}'; }
-symbols() { awk '/^File:/ {file = $2} $5 == "GLOBAL" && $7 != "UND" {print $8, file}'; } # "SYMBOL FILE"
+# "SYMBOL FILE". A shared library has made its insides LOCAL.
+symbols() { awk -v binding="$1" '/^File:/ {file = $2} $5 ~ binding && $7 != "UND" {print $8, file}'; }
 candidates() { # objects, those of static libraries included
   local wave
-  wave=$(for program in "${programs[@]}"; do echo "bin/$(basename "$program")"; done)
+  wave=$(cd "$build" && for program in "${programs[@]}"; do ls -d {bin,lib}/"$(basename "$program")" 2>/dev/null || true; done)
   while [ -n "$wave" ]; do
     wave=$(made_of <<<"$wave" | sort -u)
     grep '\.o$' <<<"$wave" || true
@@ -61,8 +62,10 @@ candidates() { # objects, those of static libraries included
   done | sort -u
 }
 linked() { # those of them that went into a program, to tell by what they define
-  (cd "$build" && awk 'FNR == NR {linked[$1]; next} $1 in linked {print $2}' <(readelf --syms --wide "${programs[@]}" | symbols) \
-    <(candidates | xargs readelf --syms --wide | symbols)) | sort -u
+  local binding=GLOBAL
+  [[ ${programs[0]} != *.so* ]] || binding='GLOBAL|LOCAL'
+  (cd "$build" && awk 'FNR == NR {linked[$1]; next} $1 in linked {print $2}' <(readelf --syms --wide "${programs[@]}" | symbols "$binding") \
+    <(candidates | xargs readelf --syms --wide | symbols GLOBAL)) | sort -u
 }
 headers() {
   linked | (cd "$build" && xargs --no-run-if-empty ninja -t deps) | grep -oE '/usr/include/.*' | sort -u | related BUILD_DEPENDENCY_OF

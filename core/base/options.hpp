@@ -18,6 +18,8 @@
 
 namespace locus {
 
+inline constexpr std::size_t kMaxLidars = 16; ///< of a robot, at most
+
 /// What can be set about the algorithm, module by module. A field is named as its key in the YAML file, the unit in its
 /// name, and an enumeration has the words of the file beside it. problem() says what is wrong, one line "key: reason"
 /// for each key that is, and nothing when all is well.
@@ -61,7 +63,8 @@ struct SweepOptions {
   VoxelFilterOptions voxel_filter;
   RandomFilterOptions random_filter;
   std::uint64_t seed = 1;
-  Isa isa = best_isa(); ///< no key: a result of the machine, or of the environment variable LOCUS_ISA
+  Isa isa = best_isa();       ///< no key: a result of the machine, or of the environment variable LOCUS_ISA
+  bool keeps_returns = false; ///< no key: Sweep::returns is filled, for a replay that writes them
 
   [[nodiscard]] std::optional<std::string> problem() const;
   bool operator==(const SweepOptions&) const = default;
@@ -91,11 +94,27 @@ constexpr auto names_of(SourceKind) { return std::to_array<std::string_view>({"i
 enum class UseAcceleration { automatic, off }; ///< automatic: unless it does not match gravity
 constexpr auto names_of(UseAcceleration) { return std::to_array<std::string_view>({"auto", "off"}); }
 
+/// What becomes of what a drive tells of stamps, mounting and scales: it is used, is said alone, or is not asked for.
+enum class Calibration { automatic, report, off };
+constexpr auto names_of(Calibration) { return std::to_array<std::string_view>({"auto", "report", "off"}); }
+
+/// How well the user knows what is configured, one standard deviation; nothing: as of an ordinary robot.
+struct CalibrationSigma {
+  std::optional<double> late_ms{}, mounting_deg{}; ///< of an imu
+  std::optional<double> scale{}, yaw_scale{};      ///< of an odometry
+
+  bool operator==(const CalibrationSigma&) const = default;
+};
+
 struct MotionSourceOptions {
   std::string name;
   SourceKind kind = SourceKind::odometry;
   Pose T_base_source;                                            ///< imu: where the sensor sits and how it is turned
   UseAcceleration use_acceleration = UseAcceleration::automatic; ///< of an imu
+  double late_ms = 0.0;                                          ///< its stamps, after the motion they tell of
+  double scale = 1.0, yaw_scale = 1.0; ///< odometry: what it reports of a metre ahead, and of a radian of yaw
+  Calibration calibration = Calibration::automatic;
+  CalibrationSigma calibration_sigma{};
 
   bool operator==(const MotionSourceOptions&) const = default;
 };

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "core/base/stamp.hpp"
@@ -40,14 +41,21 @@ struct FiringGroup {
 /// The returns of one data packet, in the order in which they were fired. Plain memory, reused from packet to packet:
 /// decoding allocates nothing.
 struct LidarPacket {
-  static constexpr std::size_t kMaxFiringGroups = 24; ///< 12 blocks of 32 channels, whatever the model
+  static constexpr std::size_t kMaxFiringGroups = 256; ///< 16 columns of 128 lasers with two returns each
   static constexpr std::size_t kMaxReturns = kMaxFiringGroups * FiringGroup::kLasers;
   static constexpr std::size_t kMaxLasers = 128;
+
+  /// What came as a whole and is given out in slices: from its first firing to behind its last one.
+  struct Cloud {
+    Stamp begin, end;
+    bool ends_here = false; ///< with this slice
+  };
 
   std::uint8_t lidar = 0;               ///< index in the configuration
   Stamp stamp;                          ///< of the first firing
   Duration duration{};                  ///< from the first firing to the one after the last
   std::uint16_t first_azimuth_cdeg = 0; ///< of the first firing, whether or not it has returns
+  std::optional<Cloud> cloud;           ///< that it is a slice of; nothing for one that was sent when it was fired
   std::size_t count = 0;                ///< of the firing groups
   std::array<FiringGroup, kMaxFiringGroups> storage;
 

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/base/options.hpp"
 #include "core/base/pose.hpp"
 #include "core/base/stamp.hpp"
 #include "core/sources/sensed_motion.hpp"
@@ -20,6 +21,15 @@ struct SweepPoint {
   float age_s;                     ///< from its firing to the end of the sweep
   float intensity;
   std::uint16_t scan_line; ///< lidar index * 256 + ring
+};
+
+/// Which lidar has seen it, by index.
+inline std::uint8_t lidar_of(const SweepPoint& point) { return static_cast<std::uint8_t>(point.scan_line >> 8U); }
+
+/// Where the lidars sit on the robot, by index.
+struct LidarPlaces {
+  std::array<Eigen::Vector3f, kMaxLidars> base_m; ///< of the first `count`
+  std::size_t count = 0;
 };
 
 /// Where the base was while a sweep came in, from where it was at its start, as its points were corrected for: at
@@ -48,8 +58,11 @@ struct Sweep {
   CorrectedPath path;
   std::size_t raw_returns = 0; ///< returns that came in
   SensedMotion motion;
+  LidarPlaces lidars;
   std::vector<SweepPoint> points;
   std::size_t registered = 0; ///< the first so many points, spread evenly, are registered; the rest only serves the map
+  /// Where SweepOptions::keeps_returns, each return that counts by itself, as fired, whatever the filters made of it.
+  std::vector<SweepPoint> returns;
 };
 
 } // namespace locus

@@ -68,8 +68,9 @@ Duration RevolutionTimer::period() const {
 
 SweepBuilder::SweepBuilder(const SweepOptions& options, std::vector<Pose> T_base_lidar, MotionSources sources,
                            std::size_t max_returns, Sink sink, StageClock* clock)
-    : options_(options), T_base_lidar_(std::move(T_base_lidar)), sources_(std::move(sources)), sink_(std::move(sink)),
-      clock_(clock), max_returns_(max_returns),
+    : options_(options), T_base_lidar_(std::move(T_base_lidar)),
+      may_follow_clouds_(T_base_lidar_.size() == 1 && !options.sweep_period), sources_(std::move(sources)),
+      sink_(std::move(sink)), clock_(clock), max_returns_(max_returns),
       segments_(T_base_lidar_.size(), options.segment_filter.points, options.isa),
       normals_(RingSegments::kMaxSegments, options.isa),
       voxel_filter_(options.voxel_filter, options.voxel_filter.enabled ? max_returns : 0),
@@ -77,7 +78,7 @@ SweepBuilder::SweepBuilder(const SweepOptions& options, std::vector<Pose> T_base
   const std::size_t points =
       options.segment_filter.enabled ? kReturnsPerSegmentPoint * options.segment_filter.points : max_returns;
   sweep_.points.reserve(std::min(points, max_returns));
-  if (!options.segment_filter.enabled)
+  if (keeps_singly())
     raw_.reserve(max_returns);
 }
 
@@ -86,7 +87,8 @@ Duration SweepBuilder::period() const { return options_.sweep_period.value_or(re
 void SweepBuilder::add(const LidarPacket& packet, Stamp arrival) {
   const StageScope scope(clock_, Stage::correct);
   revolution_.observe(packet);
-  lag_ = std::max(Duration::zero(), arrival - packet.stamp);
+  const bool follows = packet.cloud && may_follow_clouds_;
+  lag_ = std::max(Duration::zero(), arrival - (packet.cloud ? packet.cloud->begin : packet.stamp));
   const bool late = window_ && packet.stamp < window_->start - kMaxLateness;
   if (late) {
     ++counters_.late_packets;
@@ -101,19 +103,39 @@ void SweepBuilder::add(const LidarPacket& packet, Stamp arrival) {
     ++counters_.restarts;
   }
   if (!window_)
-    open(packet.stamp);
-  else if (sweep_.sequence == 0)
+    open(packet.cloud ? std::min(packet.stamp, packet.cloud->begin) : packet.stamp);
+  else if (sweep_.sequence == 0 && !follows)
     window_->end = window_->start + period(); // the first window still learns how long a revolution is
 
-  while (packet.stamp >= window_->end)
+  // A cloud of one instant has its firings at its end, and may come a little late: it is its begin that ends the
+  // window.
+  const Stamp first = follows ? std::min(packet.stamp, packet.cloud->begin) : packet.stamp;
+  while (first >= window_->end)
     close();
+  if (follows)
+    end_with(*packet.cloud);
   const Stamp after = packet.stamp + packet.duration;
   append(packet, packet.stamp, std::min(after, window_->end));
   if (after > window_->end) {
     const Stamp cut = window_->end;
     close();
     append(packet, cut, after);
+  } else if (follows && packet.cloud->ends_here && after == window_->end) {
+    close();
   }
+}
+
+/// Has the window end where the cloud at hand does. One in whose place no cloud came ends before that.
+void SweepBuilder::end_with(const LidarPacket::Cloud& cloud) {
+  constexpr double kAlmost = 0.9;
+  if (to_seconds(cloud.begin - window_->start) > kAlmost * to_seconds(period())) {
+    window_->end = std::min(window_->end, cloud.begin);
+    close();
+  }
+  // Clouds that are too short for a sweep each make one together.
+  if (cloud.end > window_->start)
+    window_->end =
+        cloud.end - window_->start < kMinPeriod ? std::max(window_->end, cloud.end + Duration{1}) : cloud.end;
 }
 
 void SweepBuilder::advance(Stamp now) {
@@ -236,11 +258,13 @@ void SweepBuilder::append(const LidarPacket& packet, Stamp from, Stamp to) {
     if (options_.body_box.enabled)
       leave_out_body(T_base_lidar_[packet.lidar], group, counts);
     counters_.overflowed_points += segments_.add(packet.lidar, group, counts);
-    if (!options_.segment_filter.enabled)
+    if (keeps_singly())
       keep_singly(packet.lidar, group, counts, motion);
   }
   window_->last_firing = std::max(window_->last_firing, to);
 }
+
+bool SweepBuilder::keeps_singly() const { return !options_.segment_filter.enabled || options_.keeps_returns; }
 
 /// Keeps the returns themselves; their segments only give them normals.
 void SweepBuilder::keep_singly(std::size_t lidar, const FiringGroup& group, const RingSegments::Mask& counts,
@@ -268,17 +292,8 @@ void SweepBuilder::reduce(float duration_s) {
     const StageScope scope(clock_, Stage::covariance);
     normals_.estimate(sweep_.points);
   }
-  if (!options_.segment_filter.enabled) {
-    for (RawPoint& raw : raw_) {
-      if (const std::uint32_t place = segments_.place_of(raw.segment); place != RingSegments::kNone)
-        raw.point.normal_base = sweep_.points[place].normal_base;
-      raw.point.age_s = duration_s - raw.point.age_s;
-    }
-    sweep_.points.clear();
-    for (const RawPoint& raw : raw_)
-      sweep_.points.push_back(raw.point);
-    raw_.clear();
-  }
+  if (keeps_singly())
+    take_singly(duration_s);
   if (options_.voxel_filter.enabled)
     voxel_filter_.apply(sweep_.points);
   if (options_.random_filter.enabled)
@@ -286,6 +301,22 @@ void SweepBuilder::reduce(float duration_s) {
   sweep_.registered = sweep_.points.size();
   if (options_.segment_filter.enabled && sweep_.points.size() > options_.segment_filter.points)
     choose_registered();
+}
+
+/// The returns that were kept singly, with the normals of their segments.
+void SweepBuilder::take_singly(float duration_s) {
+  for (RawPoint& raw : raw_) {
+    if (const std::uint32_t place = segments_.place_of(raw.segment); place != RingSegments::kNone)
+      raw.point.normal_base = sweep_.points[place].normal_base;
+    raw.point.age_s = duration_s - raw.point.age_s;
+  }
+  std::vector<SweepPoint>& taken = options_.segment_filter.enabled ? sweep_.returns : sweep_.points;
+  taken.clear();
+  for (const RawPoint& raw : raw_)
+    taken.push_back(raw.point);
+  raw_.clear();
+  if (options_.keeps_returns && !options_.segment_filter.enabled)
+    sweep_.returns = sweep_.points;
 }
 
 /// Moves as many points to the front as are wanted, evenly chosen along the scan lines.
@@ -313,9 +344,11 @@ void SweepBuilder::move_to_end() {
   const Pose T_end_start = T_start_end.inverse();
   const Eigen::Matrix3f R = T_end_start.R().cast<float>();
   const Eigen::Vector3f t = T_end_start.translation.cast<float>();
-  for (SweepPoint& point : sweep_.points) {
-    point.position_base_m = R * point.position_base_m + t;
-    point.normal_base = R * point.normal_base;
+  for (std::vector<SweepPoint>* const points : {&sweep_.points, &sweep_.returns}) {
+    for (SweepPoint& point : *points) {
+      point.position_base_m = R * point.position_base_m + t;
+      point.normal_base = R * point.normal_base;
+    }
   }
 }
 
@@ -324,6 +357,9 @@ void SweepBuilder::close() {
   sweep_.start = window_->start;
   sweep_.end = window_->end;
   sweep_.uncorrected = window_->uncorrected;
+  sweep_.lidars.count = std::min(T_base_lidar_.size(), kMaxLidars);
+  for (std::size_t i = 0; i < sweep_.lidars.count; ++i)
+    sweep_.lidars.base_m[i] = T_base_lidar_[i].translation.cast<float>();
   reduce(static_cast<float>(to_seconds(sweep_.end - sweep_.start)));
   move_to_end();
   sweep_.motion = sources_.sensed_in(sweep_.start, sweep_.end);

@@ -34,10 +34,11 @@ class RevolutionTimer {
 /// Turns packets into sweeps: motion correction, merger and filters (paper II-A), done while the sweep is still coming
 /// in.
 ///
-/// A sweep is a window of time over all lidars, so they need no phase lock and a dead one is simply not there. Each
-/// packet is moved to where the base was at the start of the window, with one linear map per packet; at the cut the
-/// whole is moved to its end. What no motion source could correct keeps its time of firing, for Odometry to correct.
-/// Memory is fixed after the first sweeps. One owner.
+/// A sweep is a window of time over all lidars, so they need no phase lock and a dead one is simply not there. Where
+/// the only lidar gives whole clouds and no period is set, a window ends with each cloud, for nothing more comes until
+/// the next. Each packet is moved to where the base was at the start of the window, with one linear map per packet; at
+/// the cut the whole is moved to its end. What no motion source could correct keeps its time of firing, for Odometry to
+/// correct. Memory is fixed after the first sweeps. One owner.
 class SweepBuilder {
  public:
   /// Takes a finished sweep; may swap its points for another vector of the same use.
@@ -88,9 +89,11 @@ class SweepBuilder {
   };
 
   void open(Stamp start);
+  void end_with(const LidarPacket::Cloud& cloud);
   void close();
   void append(const LidarPacket& packet, Stamp from, Stamp to);
   void reduce(float duration_s);
+  void take_singly(float duration_s);
   void choose_registered();
   void move_to_end();
   [[nodiscard]] Pose T_start_base(Stamp stamp);
@@ -100,11 +103,13 @@ class SweepBuilder {
   [[nodiscard]] Duration period() const;
   [[nodiscard]] PacketMotion motion_of(const LidarPacket& packet);
   void leave_out_body(const Pose& T_base_lidar, const FiringGroup& group, RingSegments::Mask& counts) const;
+  [[nodiscard]] bool keeps_singly() const;
   void keep_singly(std::size_t lidar, const FiringGroup& group, const RingSegments::Mask& counts,
                    const PacketMotion& motion);
 
   SweepOptions options_;
   std::vector<Pose> T_base_lidar_;
+  bool may_follow_clouds_; ///< one lidar, and no period is set
   MotionSources sources_;
   Sink sink_;
   StageClock* clock_;
@@ -116,7 +121,7 @@ class SweepBuilder {
   RandomFilter random_filter_;
   std::optional<Window> window_;
   Vector6 last_twist_base_ = Vector6::Zero(); ///< over the last window, after its sources
-  std::vector<RawPoint> raw_;                 ///< only where segments are not the points themselves
+  std::vector<RawPoint> raw_;                 ///< only where returns are kept singly
   Sweep sweep_;
   std::vector<SweepPoint> unregistered_;
   Duration lag_{}; ///< of arrival behind firing, as last seen

@@ -35,6 +35,7 @@ constexpr double kNarrowing = 0.25;
 /// to say, and less where they fit worse than their surfaces tell, which differs twentyfold between scenes.
 constexpr double kIndependent = 0.06;
 constexpr double kBestFit = 0.3; ///< mean squared Mahalanobis distance
+double honest_share(double mean_error) { return kIndependent / std::max(kBestFit, mean_error); }
 
 /// The products of as many normals that err independently come to that much by chance, in standard deviations; it is
 /// no information (the estimator of James and Stein). It is not claimed, though the registration follows it: what
@@ -109,7 +110,7 @@ struct ElasticEquations {
     information = sure_of_both * H * sure_of_both;
     H = (of_both * of_both * H).eval();
     b = (of_both * of_both * b).eval();
-    const double honest = kIndependent / std::max(kBestFit, of_pose.error / std::max(of_pose.weight, 1.0));
+    const double honest = honest_share(of_pose.error / std::max(of_pose.weight, 1.0));
     information *= honest;
     H *= honest;
     b *= honest;
@@ -232,6 +233,16 @@ void move(const Vector12& step, Registration& result) {
 }
 
 } // namespace
+
+double fit_of(const Registration& registration) {
+  constexpr double kMissing = 9.0;
+  return static_cast<double>(registration.inliers) * (kMissing - registration.mean_error);
+}
+
+double evidence(const Registration& one, const Registration& other) {
+  const double gained = fit_of(one) - fit_of(other);
+  return gained * honest_share((gained > 0.0 ? one : other).mean_error);
+}
 
 Registration Gicp::align(const ElasticScan& source, const SurfaceMap& target, const Pose& T_start,
                          const MotionBelief& prior, const RegistrationOptions& options, bool wide,

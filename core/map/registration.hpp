@@ -50,6 +50,14 @@ struct Registration {
   Matrix6 observability = Matrix6::Zero();
 };
 
+/// How well a registration fits: the points with a correspondence, each worth the more the nearer it lies. One without
+/// counts as one that is three standard deviations off. Of registrations of the same points the larger is the better.
+double fit_of(const Registration& registration);
+
+/// Twice the logarithm of how much likelier the surfaces find `one` than `other`, of the same points, as far as these
+/// are independent.
+double evidence(const Registration& one, const Registration& other);
+
 /// Generalised ICP (Segal 2009; paper equations 1 and 2): aligns points that have surface covariances with a map of
 /// surfaces.
 ///

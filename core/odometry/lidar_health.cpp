@@ -17,11 +17,6 @@ double share(std::size_t part, std::size_t all) {
 
 } // namespace
 
-double fit_of(const Registration& registration) {
-  constexpr double kMissing = 9.0;
-  return static_cast<double>(registration.inliers) * (kMissing - registration.mean_error);
-}
-
 void LidarHealth::learn(const Registration& registration, std::size_t registered, double elapsed_s) {
   learned_s_ = std::min(learned_s_ + elapsed_s, kMemory_s);
   const double weight = std::min(1.0, elapsed_s / std::max(learned_s_, 1e-9));

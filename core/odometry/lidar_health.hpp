@@ -7,10 +7,6 @@
 
 namespace locus {
 
-/// How well a registration fits: the points with a correspondence, each worth the more the nearer it lies. One without
-/// counts as one that is three standard deviations off. Of registrations of the same points the larger is the better.
-double fit_of(const Registration& registration);
-
 /// Tells from what is usual at this place whether lidar still sees what it saw: the share of the points that find a
 /// correspondence, and how well they fit. One owner.
 class LidarHealth {

@@ -59,36 +59,87 @@ constexpr double kAccelerometerBias = 0.1, kAccelerometerWalk = 0.002;
 constexpr double kGravityError = 0.2, kGravityWalk = 0.001;
 constexpr double kGyroBias = 0.02, kGyroWalk = 1e-4;
 constexpr double kScale = 0.02, kScaleWalk = 3e-4;
-constexpr double kDirection_rad = 0.01; ///< in which an odometry goes when it goes ahead
+constexpr double kDirection_rad = 0.01;                       ///< in which an odometry goes when it goes ahead
+constexpr double kSlip_mps = 0.003, kSlipLasts_s = 1.0;       ///< of an odometry, ahead
+constexpr double kLate_s = 0.015, kLateWalk = 1e-5;           ///< the stamps of a gyro
+constexpr double kMounting_rad = 0.015, kMountingWalk = 1e-5; ///< of a gyro, otherwise than configured
 
-/// Student's t: wheels slip and visual odometry jumps more often than a Gaussian allows.
+/// A turn that its own noise would explain tells nothing of how late a gyro is, or how it is mounted.
+constexpr double kPlain_sigma = 2.0;
+
+/// Student's t: wheels slip and visual odometry jumps more often than a Gaussian allows. A surprise of the way ahead is
+/// either over with the sweep, or a slip begins: one error for as long as it lasts.
 constexpr double kDegreesOfFreedom = 4.0;
+constexpr double kSlips_per_s = 0.1; ///< that begin: the odds of the two are those and the likelihood of no slip
 
 constexpr double kLearns_s = 5.0;   ///< time constant of what is learned
 constexpr double kHeard_s = 0.5;    ///< what the expectation counts for
 constexpr double kMostSigmas = 3.0; ///< an innovation teaches no more than that
 
 /// How the lidar sits otherwise than thought, before anything calibrates it.
-const Vector6 kMounting = squares(0.005, 0.002);
+const Vector6 kMountingOfLidar = squares(0.005, 0.002);
 
 const Vector6 kFirst = squares(0.003, 3e-4); ///< what the first sweep of the map may lie askew
 const Vector6 kFloor = squares(0.001, 1e-4); ///< of the pose against the submap: surfaces are no better known
 
-/// How many states a source has of its own: three biases, or two scales and two directions.
-int states_of(SourceKind kind) { return kind == SourceKind::imu ? 3 : 4; }
+/// How many states a source has of its own: three biases, its lateness and a turn of its mounting, or two scales and
+/// two directions.
+int states_of(SourceKind kind) { return kind == SourceKind::imu ? 7 : 4; }
+
+/// How they walk, per square root of a second.
+LearnedSource::States walk_of(SourceKind kind) {
+  if (kind == SourceKind::imu)
+    return {kGyroWalk, kGyroWalk, kGyroWalk, kLateWalk, kMountingWalk, kMountingWalk, kMountingWalk};
+  return {kScaleWalk, kScaleWalk, kScaleWalk, kScaleWalk, 0.0, 0.0, 0.0};
+}
 
 Eigen::Vector3d slip(const Eigen::Vector3d& rate, const Eigen::Vector3d& velocity) { return rate.cross(velocity); }
 
 } // namespace
 
+LearnedSource as_configured(const MotionSourceOptions& source) {
+  const CalibrationSigma& told = source.calibration_sigma;
+  LearnedSource known;
+  LearnedSource::States sigma;
+  if (source.kind == SourceKind::imu) {
+    const double late = told.late_ms ? 1e-3 * *told.late_ms : kLate_s;
+    const double mounting = told.mounting_deg ? kRadPerDeg * *told.mounting_deg : kMounting_rad;
+    known.states[LearnedSource::kLate] = 1e-3 * source.late_ms;
+    sigma << kGyroBias, kGyroBias, kGyroBias, late, mounting, mounting, mounting;
+  } else {
+    known.states.head<2>() << source.scale - 1.0, source.yaw_scale - 1.0;
+    sigma << told.scale.value_or(kScale), told.yaw_scale.value_or(kScale), kDirection_rad, kDirection_rad, 0, 0, 0;
+  }
+  known.covariance.diagonal() = sigma.cwiseAbs2();
+  known.noise_per_s = source.kind == SourceKind::imu ? kGyroNoise : kOdometryNoise;
+  return known;
+}
+
+Pose LearnedSource::without_scale(const Pose& way) const { return {way.rotation, way.translation / (1.0 + states[0])}; }
+
 MotionFilter::MotionFilter(const std::vector<MotionSourceOptions>& sources, const MotionLimits& limits)
     : limits_(limits), able_(squares(0.5 * limits.max_acceleration_mps2, kAbleToTurn_radps2)), count_(sources.size()) {
   for (std::size_t i = 0; i < count_; ++i) {
-    sources_[i].kind = sources[i].kind;
-    sources_[i].state = states_;
-    states_ += states_of(sources[i].kind);
+    Source& source = sources_[i];
+    source.kind = sources[i].kind;
+    source.state = states_;
+    source.states = states_of(source.kind);
+    const LearnedSource known = as_configured(sources[i]);
+    source.first = known.states;
+    source.first_variance = known.covariance.diagonal();
+    if (sources[i].calibration != Calibration::automatic) // of a gyro the bias is left, which is never configured
+      source.first_variance
+          .tail(LearnedSource::kMostStates - (source.kind == SourceKind::imu ? LearnedSource::kLate : 0))
+          .setZero();
+    source.fades_per_s = (source.first_variance.array() > 0.0)
+                             .select(0.5 * walk_of(source.kind).cwiseAbs2().cwiseQuotient(source.first_variance), 0.0);
+    states_ += source.states;
+    if (source.kind == SourceKind::odometry)
+      source.slip = states_++;
   }
   x_ = State::Zero(states_);
+  for (const Source& source : std::span(sources_).first(count_))
+    x_.segment(source.state, source.states) = source.first.head(source.states);
   P_ = Covariance::Zero(states_, states_);
   P_.diagonal().segment<3>(kAccelerometer).setConstant(square(kAccelerometerBias));
   P_.diagonal().segment<3>(kGravity).setConstant(square(kGravityError));
@@ -114,16 +165,54 @@ void MotionFilter::begin(const Pose& T_odom_base, const Vector6& twist_base, con
 void MotionFilter::forget(SourceId source) {
   Source& of = sources_[index_of(source)];
   const bool gyro = of.kind == SourceKind::imu;
-  const int count = states_of(of.kind);
-  P_.middleRows(of.state, count).setZero();
-  P_.middleCols(of.state, count).setZero();
-  P_.diagonal().segment(of.state, count).setConstant(square(gyro ? kGyroBias : kScale));
-  if (!gyro)
-    P_.diagonal().segment<2>(of.state + 2).setConstant(square(kDirection_rad));
-  x_.segment(of.state, count).setZero();
+  P_.middleRows(of.state, of.states).setZero();
+  P_.middleCols(of.state, of.states).setZero();
+  P_.diagonal().segment(of.state, of.states) = of.first_variance.head(of.states);
+  if (of.slip)
+    wander(*of.slip, 0.0, square(kSlip_mps), 0.0);
+  const int changed = gyro ? LearnedSource::kLate : of.states; // a gyro is as late as it was, and sits as it sat
+  x_.segment(of.state, changed) = of.first.head(changed);
   of.noise_per_s = gyro ? kGyroNoise : kOdometryNoise;
   of.learned_s.setZero();
   of.last_twist.reset();
+}
+
+void MotionFilter::recall(SourceId source, const LearnedSource& learned, double elapsed_s) {
+  forget(source);
+  Source& of = sources_[index_of(source)];
+  of.noise_per_s = learned.noise_per_s;
+  for (int i = 0; i < of.states; ++i) {
+    if (of.first_variance[i] == 0.0)
+      continue; // the user knows better
+    x_[of.state + i] = learned.states[i];
+    for (int j = 0; j < of.states; ++j)
+      P_(of.state + i, of.state + j) = of.first_variance[j] == 0.0 ? 0.0 : learned.covariance(i, j);
+  }
+  age(of, elapsed_s);
+}
+
+/// What was learned of a source is forgotten in time, and nobody is ever less sure of it than the configuration.
+void MotionFilter::age(const Source& source, double elapsed_s) {
+  for (int i = 0; i < source.states; ++i)
+    wander(source.state + i, source.first[i], source.first_variance[i], std::exp(-source.fades_per_s[i] * elapsed_s));
+  if (source.slip)
+    wander(*source.slip, 0.0, square(kSlip_mps), std::exp(-elapsed_s / kSlipLasts_s));
+}
+
+/// A state that wanders about a mean (Ornstein and Uhlenbeck).
+void MotionFilter::wander(int state, double mean, double variance, double kept) {
+  x_[state] = mean + kept * (x_[state] - mean);
+  P_.row(state) *= kept;
+  P_.col(state) *= kept;
+  P_(state, state) += (1.0 - square(kept)) * variance;
+}
+
+LearnedSource MotionFilter::learned(SourceId source) const {
+  const Source& of = sources_[index_of(source)];
+  LearnedSource learned{.noise_per_s = of.noise_per_s};
+  learned.states.head(of.states) = x_.segment(of.state, of.states);
+  learned.covariance.topLeftCorner(of.states, of.states) = P_.block(of.state, of.state, of.states, of.states);
+  return learned;
 }
 
 void MotionFilter::predict(double elapsed_s, double period_s, const std::optional<SpecificForce>& force,
@@ -133,7 +222,7 @@ void MotionFilter::predict(double elapsed_s, double period_s, const std::optiona
   const Eigen::Vector3d velocity = twist_base_.head<3>(), rate = twist_base_.tail<3>();
   const Eigen::Matrix3d R_base_odom = T_odom_base_.R().transpose();
   const Eigen::Vector3d up = Eigen::Vector3d{0.0, 0.0, kGravity_mps2} + x_.segment<3>(kGravity);
-  Covariance F = Covariance::Identity(states_, states_);
+  Common F = Common::Identity();
   for (int axis = 0; axis < 6; ++axis) {
     const bool translation = axis < 3;
     const bool open = translation ? measured.translation && !force : measured.rotation;
@@ -148,7 +237,7 @@ void MotionFilter::predict(double elapsed_s, double period_s, const std::optiona
     predicted[axis] = kept * twist_base_[axis];
     F(row, row) = lasts ? 1.0 : kept; // the mean fades, the doubt does not
   }
-  Covariance bends = Covariance::Identity(states_, states_); // a way that turns otherwise than thought
+  Common bends = Common::Identity(); // a way that turns otherwise than thought
   if (force) {
     const Eigen::Vector3d last = last_force_ ? last_force_->late_base_mps2 : force->early_base_mps2;
     const Eigen::Vector3d between = 0.5 * (last + force->early_base_mps2);
@@ -179,15 +268,13 @@ void MotionFilter::predict(double elapsed_s, double period_s, const std::optiona
   }
   last_force_ = force;
   last_rate_ = rate;
-  P_ = F * P_ * F.transpose();
+  propagate(F);
   P_.diagonal().segment<6>(kVelocity) += step_variance;
-  P_ = (bends * P_ * bends.transpose()).eval();
+  propagate(bends);
   P_.diagonal().segment<3>(kAccelerometer).array() += square(kAccelerometerWalk) * elapsed_s;
   P_.diagonal().segment<3>(kGravity).array() += square(kGravityWalk) * elapsed_s;
   for (Source& source : std::span(sources_).first(count_)) {
-    const bool gyro = source.kind == SourceKind::imu;
-    P_.diagonal().segment(source.state, states_of(source.kind)).array() +=
-        square(gyro ? kGyroWalk : kScaleWalk) * elapsed_s;
+    age(source, elapsed_s);
     source.used = false;
   }
   twist_base_ = predicted;
@@ -218,7 +305,7 @@ void MotionFilter::move() {
   limit_speed();
   const Pose T_odom_last = T_odom_base_;
   T_odom_base_ = T_odom_last * se3_exp(elapsed_s_ * twist_base_);
-  Covariance F = Covariance::Identity(states_, states_);
+  Common F = Common::Identity();
   F.topLeftCorner<6, 6>() = transport(T_odom_base_.translation - T_odom_last.translation);
   F.block<6, 6>(kMap, kMap) = F.topLeftCorner<6, 6>();
   const Matrix6 R = turn_both(T_odom_last.rotation * so3_exp(0.5 * elapsed_s_ * twist_base_.tail<3>()));
@@ -230,23 +317,45 @@ void MotionFilter::move() {
   const double bends =
       0.5 * square(square(elapsed_s_) * elapsed_s_ / 3.0 * rate) * twist_base_.head<3>().squaredNorm() +
       square(0.5 * square(elapsed_s_)) * rate * speed;
-  P_ = F * P_ * F.transpose();
+  propagate(F);
   P_.diagonal().segment<3>(kPosition).array() += bends;
 }
 
-/// What a source should read along an axis of the twist: an odometry by its scale more, a gyro by its bias.
-MotionFilter::Row MotionFilter::row(const Source& source, int axis) const {
+/// The common states change; those of the sources stay, and what they have in common with them changes along.
+void MotionFilter::propagate(const Common& F) {
+  const int own = states_ - kCommonStates;
+  P_.topLeftCorner<kCommonStates, kCommonStates>() =
+      (F * P_.topLeftCorner<kCommonStates, kCommonStates>() * F.transpose()).eval();
+  P_.topRightCorner(kCommonStates, own) = (F * P_.topRightCorner(kCommonStates, own)).eval();
+  P_.bottomLeftCorner(own, kCommonStates) = P_.topRightCorner(kCommonStates, own).transpose();
+}
+
+/// What a source should read along an axis of the twist: an odometry by its scale more, a gyro by its bias, by what the
+/// rate has changed since it was as it says, and by what it takes from the other axes.
+MotionFilter::Row MotionFilter::row(const Source& source, const SensedTwist& sensed, int axis) const {
   Row row{State::Zero(states_), twist_base_[axis]};
   row.h[kVelocity + axis] = 1.0;
   if (source.kind == SourceKind::imu) {
-    const int bias = source.state + axis - 3;
+    const int bias = source.state + axis - 3, late = source.state + LearnedSource::kLate,
+              mounting = source.state + LearnedSource::kMounting;
+    const double change = sensed.change_per_s[axis], noise = square(kPlain_sigma) * source.noise_per_s[axis];
+    const Eigen::Vector3d rate = sensed.mean.tail<3>();
     row.h[bias] = 1.0;
-    row.expected += x_[bias];
+    if (square(change) > 2.0 * noise / (to_seconds(SourcePose::kMoment) * square(elapsed_s_)))
+      row.h[late] = -change;
+    if (rate.squaredNorm() > noise / elapsed_s_)
+      row.h.segment<3>(mounting) = skew(rate).row(axis - 3);
+    row.expected += sensed.brought_forward[axis];
+    row.expected += x_[bias] - x_[late] * change + rate.cross(x_.segment<3>(mounting))[axis - 3];
   } else if (axis == 0 || axis == 5) {
     const int scale = source.state + (axis == 0 ? 0 : 1);
     row.h[kVelocity + axis] += x_[scale];
     row.h[scale] = twist_base_[axis];
-    row.expected *= 1.0 + x_[scale];
+    row.expected += x_[scale] * twist_base_[axis];
+    if (axis == 0) {
+      row.h[*source.slip] = 1.0;
+      row.expected += x_[*source.slip];
+    }
   } else if (axis < 3) {
     const int turned = source.state + 1 + axis;
     row.h[turned] = twist_base_[0];
@@ -265,19 +374,29 @@ Vector6 MotionFilter::known_variance(const Source& source, const Vector6& twist_
   return variance;
 }
 
-void MotionFilter::measure(SourceId id, const Vector6& twist_base, Measured what) {
+void MotionFilter::measure(SourceId id, const SensedTwist& sensed, Measured what) {
   Source& source = sources_[index_of(id)];
+  const Vector6& twist_base = sensed.mean;
   source.known_variance = known_variance(source, twist_base);
-  source.twist_base = twist_base;
+  source.sensed = sensed;
   source.variance.setZero();
   source.used = true;
   for (int axis = what.translation ? 0 : 3; axis < (what.rotation ? 6 : 3); ++axis) {
-    const auto [h, expected] = row(source, axis);
+    const auto [h, expected] = row(source, sensed, axis);
     double variance = source.noise_per_s[axis] / elapsed_s_ + source.known_variance[axis];
     const double surprise = twist_base[axis] - expected;
     const double ratio = square(surprise) / (variance + h.dot(P_ * h));
-    variance *= std::max(1.0, (kDegreesOfFreedom + ratio) / (kDegreesOfFreedom + 1.0));
-    source.variance[axis] = variance;
+    const double peak = variance * std::max(0.0, (ratio - 1.0) / (kDegreesOfFreedom + 1.0));
+    if (axis == 0 && source.slip) {
+      double& slip = P_(*source.slip, *source.slip);
+      const double begins = 1.0 / (1.0 + std::exp(-0.5 * ratio) / (kSlips_per_s * elapsed_s_));
+      slip += begins * peak;
+      variance += (1.0 - begins) * peak;
+      source.variance[axis] = variance + slip;
+    } else {
+      variance += peak;
+      source.variance[axis] = variance;
+    }
     const double before = twist_base_[axis];
     update(h, surprise, variance);
     if (source.kind == SourceKind::odometry && (axis == 0 || axis == 5))
@@ -288,9 +407,9 @@ void MotionFilter::measure(SourceId id, const Vector6& twist_base, Measured what
 /// What a source cannot tell apart, its scale and the twist, lies elsewhere once the twist has changed: the covariance
 /// turns with it, or the next reading of the same source tells them apart.
 void MotionFilter::turn_scale(int scale, int axis, double change) {
-  Covariance turned = Covariance::Identity(states_, states_);
-  turned(kVelocity + axis, scale) = -change / (1.0 + x_[scale]);
-  P_ = (turned * P_ * turned.transpose()).eval();
+  const double turned = -change / (1.0 + x_[scale]);
+  P_.row(kVelocity + axis) += turned * P_.row(scale);
+  P_.col(kVelocity + axis) += turned * P_.col(scale);
 }
 
 void MotionFilter::rest() {
@@ -302,19 +421,29 @@ void MotionFilter::rest() {
   }
 }
 
+/// What a gyro differs by from what was predicted tells nothing of the gyro: how late and how askew it is, lidar says.
 void MotionFilter::update(const State& h, double surprise, double variance) {
   const State Ph = P_ * h;
   const double innovation_variance = h.dot(Ph) + variance;
-  lower(Ph, innovation_variance);
-  correct(Ph / innovation_variance * surprise);
+  State considered = of_map(Ph);
+  for (const Source& source : std::span(sources_).first(count_))
+    if (source.kind == SourceKind::imu)
+      considered.segment<4>(source.state + LearnedSource::kLate) = Ph.segment<4>(source.state + LearnedSource::kLate);
+  lower(Ph, considered, innovation_variance);
+  correct((Ph - considered) / innovation_variance * surprise);
 }
 
-/// By what a measurement told. The error of the map is considered and not corrected (Schmidt).
-void MotionFilter::lower(const State& Ph, double innovation_variance) {
-  const Matrix6 P_map = P_.block<6, 6>(kMap, kMap);
-  P_ -= Ph * Ph.transpose() / innovation_variance;
+MotionFilter::State MotionFilter::of_map(const State& Ph) {
+  State map = State::Zero(Ph.size());
+  map.segment<6>(kMap) = Ph.segment<6>(kMap);
+  return map;
+}
+
+/// By what a measurement told. The part of Ph that is considered and not corrected (Schmidt), the error of the map
+/// always, stays as uncertain as it was.
+void MotionFilter::lower(const State& Ph, const State& considered, double innovation_variance) {
+  P_ -= (Ph * Ph.transpose() - considered * considered.transpose()) / innovation_variance;
   P_ = (0.5 * (P_ + P_.transpose())).eval();
-  P_.block<6, 6>(kMap, kMap) = P_map;
 }
 
 void MotionFilter::correct(const State& error) {
@@ -341,7 +470,7 @@ void MotionFilter::see(const Pose& T_odom_base, const Vector6& twist_base, const
       continue;
     const auto direction = seen.eigenvectors().col(i);
     const State Ph = P_.leftCols<12>() * direction;
-    lower(Ph, Ph.head<12>().dot(direction) + 1.0 / seen.eigenvalues()[i]);
+    lower(Ph, of_map(Ph), Ph.head<12>().dot(direction) + 1.0 / seen.eigenvalues()[i]);
   }
   keep_floor();
   T_odom_base_ = T_odom_base;
@@ -350,12 +479,17 @@ void MotionFilter::see(const Pose& T_odom_base, const Vector6& twist_base, const
 
 void MotionFilter::keep_floor() { P_.diagonal().head<6>() = P_.diagonal().head<6>().cwiseMax(kFloor); }
 
-Innovation MotionFilter::innovation(SourceId id, const Vector6& twist_base) const {
+Innovation MotionFilter::innovation(SourceId id, const SensedTwist& sensed) const {
   const Source& source = sources_[index_of(id)];
+  const Vector6& twist_base = sensed.mean;
   const Vector6 known = source.used ? source.known_variance : known_variance(source, twist_base);
   Innovation found;
   for (int axis = source.kind == SourceKind::imu ? 3 : 0; axis < 6; ++axis) {
-    const auto [h, expected] = row(source, axis);
+    auto [h, expected] = row(source, sensed, axis);
+    if (axis == 0) { // a slip is what is wrong with it
+      h[*source.slip] = 0.0;
+      expected -= x_[*source.slip];
+    }
     const double after = h.dot(P_ * h);
     const double noise = source.noise_per_s[axis] / elapsed_s_ + known[axis];
     const double error = twist_base[axis] - expected;
@@ -392,7 +526,7 @@ void learn_variance(double& variance, double& learned_s, double innovation, doub
 } // namespace
 
 void MotionFilter::learn_source(Source& source) {
-  const Innovation found = innovation(SourceId{static_cast<std::size_t>(&source - sources_.data())}, source.twist_base);
+  const Innovation found = innovation(SourceId{static_cast<std::size_t>(&source - sources_.data())}, source.sensed);
   const Vector6& least = source.kind == SourceKind::imu ? kLeastGyroNoise : kLeastOdometryNoise;
   for (int axis = 0; axis < 6; ++axis) {
     const bool felt = axis < 3 && last_force_;
@@ -402,14 +536,14 @@ void MotionFilter::learn_source(Source& source) {
     learn_variance(source.noise_per_s[axis], source.learned_s[axis], found.value[axis], source.known_variance[axis],
                    found.others[axis], 1.0 / elapsed_s_, elapsed_s_, least[axis]);
   }
-  source.last_twist = source.twist_base;
+  source.last_twist = source.sensed.mean;
 }
 
 void MotionFilter::keep(const Matrix6& share) {
-  Covariance kept = Covariance::Identity(states_, states_);
+  Common kept = Common::Identity();
   kept.topLeftCorner<6, 6>() -= share;
   kept.block<6, 6>(kMap, kPosition) = share;
-  P_ = (kept * P_ * kept.transpose()).eval();
+  propagate(kept);
   keep_floor();
 }
 
@@ -424,7 +558,7 @@ Matrix6 MotionFilter::of_mounting() const {
   const Matrix6 error =
       transport(T_odom_base_.translation - T_odom_start_.translation) * turn_both(T_odom_start_.rotation) -
       turn_both(T_odom_base_.rotation);
-  return error * kMounting.asDiagonal() * error.transpose();
+  return error * kMountingOfLidar.asDiagonal() * error.transpose();
 }
 
 void MotionFilter::put(const Pose& T_odom_base) { T_odom_base_ = T_odom_base; }

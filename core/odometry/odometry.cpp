@@ -6,7 +6,6 @@
 #include <cmath>
 #include <utility>
 
-#include "core/ingest/deskew.hpp"
 #include "core/odometry/relocation.hpp"
 #include "core/sources/motion_sources.hpp"
 
@@ -14,14 +13,8 @@ namespace locus {
 
 namespace {
 
-constexpr std::size_t kMinPoints = 30; ///< fewer say nothing reliable about six axes
-
 /// Least share of the points that must find a correspondence for a registration to be believed.
 constexpr double kMinInlierShare = 0.1;
-
-/// Of the points of the second sweep, those that the first must have seen, too, if the motion between them is to be
-/// found: honest starts have 0.45 and more, two halves of a turn 0.1 to 0.17.
-constexpr double kMinOverlap = 0.3;
 
 /// What misses most of the usual correspondences may contradict the motion sources by no more than this.
 constexpr double kLoneDeviation_sigma = 3.0;
@@ -32,24 +25,20 @@ constexpr double kWide_m = 0.3;
 /// A twist that the points were not corrected for bends a block of them: so much of it and they are corrected anew.
 constexpr double kBends_mps = 0.3, kBends_radps = 0.05;
 
-/// A hypothesis that assumes less than another may fit so much worse than that; that the robot still stands, less: a
-/// robot that pulls away would be held back.
-constexpr double kAsGood = 0.99, kAsGoodAtRest = 0.998;
+/// That the robot still stands may fit so much worse than another hypothesis, no more: a robot that pulls away would be
+/// held back.
+constexpr double kAsGoodAtRest = 0.998;
 
-/// What a robot that comes to rest is slower than, for how long.
-const Vector6 kSlow = along_each_axis(0.05, 2.0);
+/// A robot that comes to rest is slow for so long, and known to be.
 constexpr double kSlowDoubt = 4.0;
 constexpr Duration kSlowFor = std::chrono::milliseconds{500};
 constexpr double kRest_sigma = 3.0;
 
-constexpr double kUnknownRate_radps = 100.0; ///< of a robot of which nothing is known
-constexpr int kStartRounds = 8;        ///< at the most, until motion and correction of the first two sweeps agree:
-constexpr double kStartAgrees = 0.002; ///< metres, radians
-
 /// Room for the 16 000 voxels of a large sweep, and small enough for the second cache.
 constexpr std::size_t kLastScanBytes = 2'500'000;
 
-const std::bitset<kMaxSources> kAllSources = std::bitset<kMaxSources>{}.set();
+/// A gyro that is known to be later than what was taken out of its stamps; none is by more.
+constexpr double kPlainlyLate_sigma = 3.0, kPlainlyLate_s = 0.001, kMostLate_s = 0.25;
 
 /// So many lengths of a sweep after the last one, sweeps were dropped in between.
 constexpr double kDropped = 1.5;
@@ -70,11 +59,31 @@ Matrix6 share_of_map(double fresh, const Matrix6& observability) {
 Odometry::Odometry(const OdometryOptions& options, const std::vector<MotionSourceOptions>& sources, StageClock* clock)
     : options_(options), sources_(sources), clock_(clock), gicp_(options.threads, options.isa),
       flat_ground_(options.flat_ground), map_(options.map.max_bytes, options.isa),
-      last_scan_map_(kLastScanBytes, options.isa), map_policy_(options.map), filter_(sources, options.motion) {}
+      last_scan_map_(kLastScanBytes, options.isa), map_policy_(options.map), filter_(sources, options.motion) {
+  std::vector<MotionSourceOptions> observed = sources;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    feedback_.late[i] = MotionTrack::taken_out(1e-3 * sources[i].late_ms);
+    if (sources[i].calibration == Calibration::report)
+      observed[i].calibration = Calibration::automatic;
+  }
+  if (observed != sources)
+    observer_.emplace(observed, options.motion);
+}
 
 void Odometry::begin_at(const Whereabouts& last, std::span<const SurfacePoint> map_odom) {
   start_ = last;
   map_.insert(map_odom, Pose{});
+}
+
+void Odometry::recall(const LearnedSources& learned, double elapsed_s) {
+  for (std::size_t i = 0; i < sources_.size(); ++i)
+    if (learned[i]) {
+      filter_.recall(SourceId{i}, *learned[i], elapsed_s);
+      if (observer_)
+        observer_->recall(SourceId{i}, *learned[i], elapsed_s);
+      learned_since_[i] = learned[i]->since;
+      recalled_.set(i);
+    }
 }
 
 OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested& stop) {
@@ -99,10 +108,12 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
   } else {
     filter_.see(best.fit.T_target_source, best.fit.twist_base, best.fit.information);
   }
-  if (!estimate.failed)
+  if (!estimate.failed) {
     filter_.learn();
-  if (!estimate.failed)
     lidar_health_.learn(best.fit, aged_.size(), steps_.elapsed_s(sweep));
+  }
+  if (observer_)
+    observe(sweep, best);
   stands_ = best.rests;
   correct(sweep, filter_.twist_base(), best.rests ? kAllSources : best.without);
   if (flat_ground_.holds())
@@ -124,132 +135,12 @@ void Odometry::prepare_next() {
   if (!keyframe_observability_)
     return;
   const StageScope scope(clock_, Stage::map);
-  const double fresh = map_.insert(scan_, filter_.pose());
-  filter_.keep(share_of_map(fresh, *keyframe_observability_));
+  const double fresh = map_.insert(free_space_.leave_out_moving(scan_, filter_.pose()), filter_.pose());
+  const Matrix6 share = share_of_map(fresh, *keyframe_observability_);
+  filter_.keep(share);
+  if (observer_)
+    observer_->keep(share);
   keyframe_observability_.reset();
-}
-
-/// The world begins at the first sweep: where another run has ended, or at its origin, without yaw, level if gravity is
-/// known.
-OdometryEstimate Odometry::begin(const Sweep& sweep) {
-  OdometryEstimate estimate;
-  correct_all(sweep, corrected_twist(sweep), scan_);
-  gravity_.observe(Eigen::Quaterniond::Identity(), sweep);
-  estimate.failed = scan_.size() < kMinPoints || (map_.fine().size() > 0 && !find_again(sweep));
-  Whereabouts here;
-  if (start_ && estimate.failed)
-    here = start_->moved_to(start_->places(sweep.end, sweep.motion, options_.motion.max_speed_mps).front());
-  else if (start_)
-    here = *start_;
-  else if (const auto up_base = gravity_.up_base())
-    here.T_odom_base.rotation = from_rpy_rad(level_rpy_rad(*up_base));
-  filter_.begin(here.T_odom_base, Vector6::Zero(), along_each_axis(options_.motion.max_speed_mps, kUnknownRate_radps),
-                here.pose_covariance);
-  if (estimate.failed) { // the next sweep is the first
-    estimate.state = TrackingState::dead_reckoning;
-  } else {
-    if (!beginning_)
-      beginning_ = start_ ? Beginning::told : Beginning::origin;
-    map_policy_.begin(sweep.end, here.T_odom_base);
-    first_ = sweep;
-    estimate.keyframe = true;
-    keyframe_observability_ = Matrix6::Zero();
-  }
-  estimate.stamp = sweep.end;
-  estimate.beginning = beginning_;
-  estimate.T_odom_base = here.T_odom_base;
-  estimate.twist_covariance = filter_.covariance().bottomRightCorner<6, 6>();
-  estimate.pose_covariance = filter_.pose_covariance_since_start();
-  estimate.points = sweep.registered;
-  steps_.remember(sweep);
-  return estimate;
-}
-
-/// Looks for the robot in the map that another run has left. Where it is not found the map is given up, and it begins
-/// where an odometry says, or at the origin. False while it is too early to say.
-bool Odometry::find_again(const Sweep& sweep) {
-  constexpr Duration kPatience = std::chrono::seconds{1}; ///< publishers find each other faster
-  waits_since_ = waits_since_.value_or(sweep.end);
-  const StageScope scope(clock_, Stage::scan_to_submap);
-  const std::vector<Place> places = start_->places(sweep.end, sweep.motion, options_.motion.max_speed_mps);
-  const bool waits =
-      !places.front().told && start_->awaits(sweep.motion) && std::chrono::abs(sweep.end - *waits_since_) < kPatience;
-  if (const auto found =
-          relocate(gicp_, std::span(scan_).first(sweep.registered), map_, places, options_.scan_to_submap, waits)) {
-    beginning_ = Beginning::map;
-    start_ = start_->moved_to(*found);
-    map_policy_.resume();
-    return true;
-  }
-  if (waits)
-    return false;
-  map_.clear();
-  if (places.front().told) {
-    beginning_ = Beginning::odometry;
-    start_ = start_->moved_to(places.front());
-  } else {
-    start_.reset();
-  }
-  return true;
-}
-
-/// The first sweep came without any idea of the motion. What is found between it and the second corrects both, so it
-/// can be found better; then the map begins anew with the first one corrected. A source that is wrong bends both.
-void Odometry::find_start(const Sweep& sweep, const Gicp::StopRequested& stop) {
-  const Sweep first = *std::exchange(first_, std::nullopt);
-  if (beginning_ == Beginning::map || sweep.points.size() < kMinPoints || steps_.elapsed_s(sweep) <= 0.0 ||
-      options_.scan_to_scan_mode == ScanToScanMode::off)
-    return;
-  const StageScope scope(clock_, Stage::scan_to_scan);
-  Start start = start_without({}, first, sweep, stop);
-  if (choose_among(sweep, {}).rotation && !stop())
-    if (Start free = start_without(kAllSources, first, sweep, stop); fit_of(free.fit) > fit_of(start.fit) / kAsGood)
-      start = free;
-  if (static_cast<double>(start.fit.inliers) < kMinOverlap * static_cast<double>(sweep.registered))
-    return;
-  const Pose T_odom_first = filter_.pose();
-  lidar_health_.learn(start.fit, sweep.registered, steps_.elapsed_s(sweep));
-  stands_ = start.rests;
-  filter_.begin(T_odom_first, start.twist_base, stands_ ? along_each_axis(0.1, 1.0) : along_each_axis(1.0, 10.0),
-                start_ ? start_->pose_covariance : Matrix6::Zero());
-  correct(first, start.twist_base, start.without);
-  map_.clear();
-  map_.insert(scan_, T_odom_first);
-}
-
-/// The motion between the first two sweeps, if their points are corrected as some sources would not have it.
-Odometry::Start Odometry::start_without(std::bitset<kMaxSources> without, const Sweep& first, const Sweep& sweep,
-                                        const Gicp::StopRequested& stop) {
-  const MotionFilter unknown = assume(sweep, without, false).filter;
-  const Pose T_odom_first = filter_.pose();
-  MotionBelief prior = unknown.belief();
-  prior.information.setZero(); // the pose alone is looked for
-  prior.information.topLeftCorner<6, 6>() = unknown.covariance().topLeftCorner<6, 6>().inverse();
-  const auto match = [&](const Vector6& twist, std::bitset<kMaxSources> unused, const Pose& T_start,
-                         const MotionBelief& belief, int iterations) {
-    correct(first, twist, unused);
-    last_scan_map_.clear();
-    last_scan_map_.insert(scan_, T_odom_first);
-    correct(sweep, twist, unused);
-    const ElasticScan rigid{.points = std::span(scan_).first(sweep.registered), .block_age_s = {}, .twist_base = twist};
-    RegistrationOptions options = options_.scan_to_scan;
-    options.max_iterations = std::min(options.max_iterations, iterations);
-    return gicp_.align(rigid, last_scan_map_, T_start, belief, options, iterations > 4, stop);
-  };
-  const Registration rest = match(Vector6::Zero(), kAllSources, T_odom_first,
-                                  {T_odom_first, Vector6::Zero(), 1e12 * Matrix12::Identity()}, 4);
-  Start start{.without = without, .rests = false, .twist_base = unknown.twist_base(), .fit = {}};
-  Pose T_odom_base = unknown.pose();
-  for (int round = 0; round < kStartRounds; ++round) {
-    start.fit = match(start.twist_base, without, T_odom_base, prior, options_.scan_to_scan.max_iterations);
-    const Pose T_before = std::exchange(T_odom_base, start.fit.T_target_source);
-    start.twist_base = se3_log(T_odom_first.inverse() * T_odom_base) / steps_.elapsed_s(sweep);
-    if (difference(T_odom_base, T_before).cwiseAbs().maxCoeff() < kStartAgrees || stop())
-      break;
-  }
-  if (fit_of(rest) > kAsGood * fit_of(start.fit))
-    start = {.without = kAllSources, .rests = true, .twist_base = Vector6::Zero(), .fit = rest};
-  return start;
 }
 
 /// Of the sources that can be used.
@@ -268,9 +159,9 @@ Vector6 Odometry::unlike_mean(const Sweep& sweep) const {
   const Vector6 during_sweep = corrected_twist(sweep);
   const auto [rotation, translation] = choose_among(sweep, {});
   if (translation)
-    difference.head<3>() = (during_sweep - *steps_.twist_base(sweep, *translation)).head<3>();
+    difference.head<3>() = (during_sweep - steps_.twist_base(sweep, *translation)->mean).head<3>();
   if (rotation)
-    difference.tail<3>() = (during_sweep - *steps_.twist_base(sweep, *rotation)).tail<3>();
+    difference.tail<3>() = (during_sweep - steps_.twist_base(sweep, *rotation)->mean).tail<3>();
   return difference;
 }
 
@@ -284,9 +175,14 @@ Odometry::Hypothesis Odometry::assume(const Sweep& sweep, std::bitset<kMaxSource
                         .scan_to_scan = {},
                         .fit = {}};
   hypothesis.choice = choose_among(sweep, without);
+  tell(hypothesis.filter, sweep, hypothesis);
+  return hypothesis;
+}
+
+/// A filter hears of a sweep all but what lidar says.
+void Odometry::tell(MotionFilter& filter, const Sweep& sweep, const Hypothesis& hypothesis) const {
   const auto& [rotation, translation] = hypothesis.choice;
-  const bool free = without.all();
-  MotionFilter& filter = hypothesis.filter;
+  const bool free = hypothesis.without.all();
   filter.predict(std::max(steps_.elapsed_s(sweep), 1e-6), to_seconds(sweep.end - sweep.start),
                  free ? std::nullopt : sweep.motion.specific_force,
                  {.translation = free || translation, .rotation = free || rotation});
@@ -295,12 +191,32 @@ Odometry::Hypothesis Odometry::assume(const Sweep& sweep, std::bitset<kMaxSource
                    {.translation = translation == rotation, .rotation = true});
   if (translation && translation != rotation)
     filter.measure(*translation, *steps_.twist_base(sweep, *translation), {.translation = true, .rotation = false});
-  if (rests)
+  if (hypothesis.rests)
     filter.rest();
   if (!rotation && !translation && options_.no_source_prior == NoSourcePrior::identity)
     filter.expect_rest();
   filter.move();
-  return hypothesis;
+}
+
+/// What sources would be taken for that are only reported on: nothing of it is used. The fit is what the points say and
+/// what the filter expected; the observer makes one of the points and of what it expects itself.
+void Odometry::observe(const Sweep& sweep, const Hypothesis& best) {
+  tell(*observer_, sweep, best);
+  if (best.placed && !best.rests) {
+    const Registration& fit = best.fit;
+    const auto expected = [&](const MotionFilter& filter) {
+      Vector12 off_fit;
+      off_fit << difference(filter.pose(), fit.T_target_source), filter.twist_base() - fit.twist_base;
+      return Vector12{filter.covariance().inverse() * off_fit};
+    };
+    const Matrix12 known = observer_->covariance().inverse() + fit.information;
+    const Vector12 off_fit = known.ldlt().solve(expected(*observer_) - expected(best.filter));
+    observer_->see({(so3_exp(off_fit.segment<3>(3)) * fit.T_target_source.rotation).normalized(),
+                    fit.T_target_source.translation + off_fit.head<3>()},
+                   fit.twist_base + off_fit.tail<6>(), fit.information);
+  }
+  if (best.placed)
+    observer_->learn();
 }
 
 /// Where the sweep lies beside the last one, from where the hypothesis has it. That is where the search in the submap
@@ -350,7 +266,15 @@ void Odometry::register_with(const Sweep& sweep, Hypothesis& hypothesis, const G
   hypothesis.fit.iterations += before;
 }
 
-/// Of what may be true, what fits the surfaces best; of what fits as well, what believes the sources, and rest.
+/// Twice the logarithm of the odds that all are right of whom the choice is and who feels the force.
+double Odometry::all_are_right(const Sweep& sweep, const SourceChoice& choice) {
+  const int sources = int{choice.rotation.has_value()} +
+                      int{choice.translation.has_value() && choice.translation != choice.rotation} +
+                      int{sweep.motion.specific_force.has_value()};
+  return kSourceIsRight * sources;
+}
+
+/// Of what may be true, what is likeliest by what the surfaces say and by the odds that sources are right.
 Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopRequested& stop) {
   const auto attempt = [&](std::bitset<kMaxSources> without, bool rests) {
     Hypothesis hypothesis = assume(sweep, without, rests);
@@ -363,18 +287,24 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
   if (sweep.points.size() < kMinPoints)
     return best;
   Hypothesis first = best;
-  const auto contradicted = worst_source(sweep, best);
-  const bool in_doubt = contradicted || (lidar_health_.is_unusual(best.fit, aged_.size()) && best.choice.rotation);
-  if (in_doubt && !stop()) { // what was cut short fits badly for that alone
+  const auto contradiction = worst_source(sweep, best);
+  const bool unusual = lidar_health_.is_unusual(best.fit, aged_.size());
+  std::optional<Registration> lidar_alone; // set where it would place the robot elsewhere and is not believed
+
+  if ((contradiction || (unusual && best.choice.rotation)) && !stop()) { // what was cut short fits badly for that alone
     std::bitset<kMaxSources> without = best.without;
-    without.set(contradicted.value_or(index_of(*best.choice.rotation)));
-    if (Hypothesis other = attempt(without, false);
-        fit_of(other.fit) > kAsGood * fit_of(best.fit) &&
-        (contradicted || !lidar_health_.is_unusual(other.fit, aged_.size())))
+    without.set(contradiction ? contradiction->source : index_of(*best.choice.rotation));
+    const double against = contradiction ? kInnovationGate * contradiction->test_ratio : 0.0;
+    if (Hypothesis other = attempt(without, false); evidence(other.fit, best.fit) + against > kSourceIsRight)
       best = other;
-    if (lidar_health_.is_unusual(best.fit, aged_.size()))
-      if (Hypothesis free = attempt(kAllSources, false); fit_of(free.fit) > fit_of(best.fit) / kAsGood)
+    if (lidar_health_.is_unusual(best.fit, aged_.size())) {
+      Hypothesis free = attempt(kAllSources, false);
+      const double gained = evidence(free.fit, best.fit);
+      if (gained > all_are_right(sweep, best.choice))
         best = free;
+      else if (gained > 0.0)
+        lidar_alone = free.fit;
+    }
   }
   const Vector6 twist = best.filter.twist_base();
   const Vector6 sigma = best.filter.covariance().diagonal().tail<6>().cwiseSqrt();
@@ -392,7 +322,7 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
       best = rest;
     }
   }
-  if (!best.rests && !is_placed(sweep, best.fit, first))
+  if (!best.rests && !is_placed(sweep, lidar_alone.value_or(best.fit), first))
     return first; // what carries on unseen is what the sources say
   best.placed = true;
   return best;
@@ -401,27 +331,27 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
 /// Takes out of the points what they were not corrected for, of a base that moved with `twist_base` since the last
 /// sweep, on the mean.
 void Odometry::correct(const Sweep& sweep, const Vector6& twist_base, std::bitset<kMaxSources> without) {
-  if (without.any())
-    correct_anew(sweep, twist_base, scan_);
-  else
-    correct_all(sweep, twist_base + unlike_mean(sweep), scan_);
+  move_points(sweep, without.any() ? SweepCorrection::anew(sweep, twist_base)
+                                   : SweepCorrection::all(sweep, twist_base + unlike_mean(sweep)));
+}
+
+void Odometry::move_points(const Sweep& sweep, const SweepCorrection& correction) {
+  correction_ = correction;
+  correction_.apply(sweep.points, scan_);
 }
 
 /// The source that contradicts what all others say most, if any does.
-std::optional<std::size_t> Odometry::worst_source(const Sweep& sweep, const Hypothesis& hypothesis) const {
+std::optional<Odometry::Contradiction> Odometry::worst_source(const Sweep& sweep, const Hypothesis& hypothesis) const {
   MotionFilter after = hypothesis.filter;
   after.see(hypothesis.fit.T_target_source, hypothesis.fit.twist_base, hypothesis.fit.information);
-  std::optional<std::size_t> worst;
-  double most = 1.0; // from there on it is contradicted
+  std::optional<Contradiction> worst;
   for (const auto& source : {hypothesis.choice.rotation, hypothesis.choice.translation}) {
     if (!source)
       continue;
     const Innovation found = after.innovation(*source, *steps_.twist_base(sweep, *source));
     const double ratio = test_ratio(found, steps_.elapsed_s(sweep)).value_or(0.0);
-    if (ratio > most) {
-      most = ratio;
-      worst = index_of(*source);
-    }
+    if (ratio > (worst ? worst->test_ratio : 1.0))
+      worst = {index_of(*source), ratio};
   }
   return worst;
 }
@@ -459,24 +389,63 @@ void Odometry::report(const Sweep& sweep, OdometryEstimate& estimate) {
   feedback_.sees = seen_axes_.each();
 }
 
+/// What is known of the stamps of a gyro is taken out of them where its samples come in.
+void Odometry::follow_lateness(const Learned& late_s, Duration& taken_out) {
+  if (std::abs(late_s.mean - to_seconds(taken_out)) > std::max(kPlainlyLate_sigma * late_s.sigma, kPlainlyLate_s))
+    taken_out = MotionTrack::taken_out(std::clamp(late_s.mean, -kMostLate_s, kMostLate_s));
+}
+
+void Odometry::forget(SourceId source) {
+  filter_.forget(source);
+  if (observer_)
+    observer_->forget(source);
+  if (sources_[index_of(source)].kind == SourceKind::odometry)
+    learned_since_[index_of(source)] = Stamp{};
+}
+
+/// Where each source saw the base, and what is known of it. What was learned of one that has gone is forgotten.
+void Odometry::report_sources(const Sweep& sweep, OdometryEstimate& estimate) {
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    const SourcePose& sensed = sweep.motion.sources[i];
+    SourceReport& report = source_reports_[i];
+    if (sensed.usable)
+      recalled_.reset(i);
+    else if (!recalled_[i])
+      forget(SourceId{i}); // what comes back may come back as another
+    report.T_source_base =
+        sensed.known && sources_[i].kind == SourceKind::odometry ? std::optional{sensed.T_source_base} : std::nullopt;
+    report.doubted = !sensed.usable;
+    report.learned.reset();
+    if (!sensed.usable && !recalled_[i])
+      continue;
+    if (sources_[i].kind == SourceKind::imu)
+      follow_lateness(filter_.learned(SourceId{i}).lateness_s(), feedback_.late[i]);
+    const bool only_reported = sources_[i].calibration == Calibration::report;
+    report.learned = (only_reported ? *observer_ : filter_).learned(SourceId{i});
+    if (learned_since_[i] == Stamp{})
+      learned_since_[i] = sweep.end;
+    report.learned->since = learned_since_[i];
+  }
+  estimate.sources = source_reports_;
+}
+
 /// Fills in what the estimate says beside its pose, and remembers the sweep as the last.
 void Odometry::finish(const Sweep& sweep, OdometryEstimate& estimate) {
   estimate.stamp = sweep.end;
   estimate.beginning = beginning_;
   estimate.points = sweep.registered;
   estimate.T_odom_base = filter_.pose();
-  feedback_ = {.from = steps_.last(), .to = sweep.end, .opinions = {}, .twist_base = Vector6::Zero(), .sees = {}};
+  feedback_ = {.from = steps_.last(),
+               .to = sweep.end,
+               .opinions = {},
+               .twist_base = Vector6::Zero(),
+               .sees = {},
+               .late = feedback_.late};
   if (!estimate.failed)
     report(sweep, estimate);
   for (const auto& source : {estimate.prior.rotation, estimate.prior.translation})
     if (source)
       source_reports_[index_of(*source)].last_used = sweep.end;
-  for (std::size_t i = 0; i < sources_.size(); ++i) {
-    const SourcePose& seen = sweep.motion.sources[i];
-    source_reports_[i].T_source_base =
-        seen.usable && sources_[i].kind == SourceKind::odometry ? std::optional{seen.T_source_base} : std::nullopt;
-  }
-  estimate.sources = source_reports_;
   saw_ = !estimate.failed;
   scan_is_next_target_ = saw_ && options_.scan_to_scan_mode == ScanToScanMode::always;
   tilt_keeper_.observe(estimate.T_odom_base.rotation, gravity_.up_base());
@@ -490,6 +459,9 @@ void Odometry::finish(const Sweep& sweep, OdometryEstimate& estimate) {
   if (verdict == MapPolicy::Verdict::begins_anew)
     map_.clear();
   if (verdict != MapPolicy::Verdict::waits) {
+    if (estimate.failed)
+      free_space_.forget();
+    free_space_.expect(sweep);
     estimate.keyframe = true;
     keyframe_observability_ = estimate.scan_to_submap.observability;
     filter_.put({(so3_exp(tilt_keeper_.take_correction_rad()) * estimate.T_odom_base.rotation).normalized(),
@@ -499,9 +471,9 @@ void Odometry::finish(const Sweep& sweep, OdometryEstimate& estimate) {
   estimate.twist_base = filter_.twist_base();
   estimate.twist_covariance = filter_.covariance().bottomRightCorner<6, 6>();
   estimate.pose_covariance = filter_.pose_covariance_since_start();
-  for (std::size_t i = 0; i < sources_.size(); ++i)
-    if (!sweep.motion.sources[i].usable)
-      filter_.forget(SourceId{i}); // what comes back may come back as another
+  if (observer_)
+    observer_->put(filter_.pose());
+  report_sources(sweep, estimate);
   steps_.remember(sweep);
 }
 

@@ -12,6 +12,7 @@
 #include "core/base/pose.hpp"
 #include "core/base/stamp.hpp"
 #include "core/map/registration.hpp"
+#include "core/odometry/motion_filter.hpp"
 #include "core/sources/registration_feedback.hpp"
 #include "core/sources/sensed_motion.hpp"
 
@@ -35,11 +36,12 @@ struct PriorSource : SourceChoice {
 
 /// How a motion source compares with all the rest.
 struct SourceReport {
-  Innovation innovation; ///< of the last sweep that both told of; its variances are zero before that
-  double test_ratio = 0; ///< of it; zero where nothing could be compared
-  Stamp last_used;       ///< end of the last sweep whose prior came from it; Stamp{}: never
-  std::optional<Pose>
-      T_source_base; ///< where a healthy odometry saw the base at the end of the sweep, in its own frame
+  Innovation innovation;                ///< of the last sweep that both told of; its variances are zero before that
+  double test_ratio = 0;                ///< of it; zero where nothing could be compared
+  Stamp last_used;                      ///< end of the last sweep whose prior came from it; Stamp{}: never
+  std::optional<Pose> T_source_base;    ///< where an odometry saw the base at the end of the sweep, in its own frame
+  bool doubted = false;                 ///< it was not healthy then
+  std::optional<LearnedSource> learned; ///< of it by the end of the sweep, by this run or one before
 };
 
 /// What one sweep says about the robot, with all that is needed to distrust it.

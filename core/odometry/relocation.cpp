@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/odometry/relocation.hpp"
 
+#include <Eigen/Eigenvalues>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,10 +17,14 @@ constexpr double kAround_m = 2.0;
 /// One standard deviation of a robot about a place.
 const Vector6 kSigma = along_each_axis(0.5, 5.0);
 
+/// The same where a healthy odometry says so: what the surfaces leave open stays as it says. Wheels are wrong by some
+/// hundredths of the way.
+Vector6 vouched_sigma(double way_m) { return along_each_axis(std::min(0.05 + 0.04 * way_m, 0.5), 2.0); }
+
 /// Share of the points of the sweep that is known: less is a coincidence, as the next bend of a tunnel offers. What
 /// lies where an odometry says, that close, is none.
-constexpr double kLeast = 0.5, kLeastVouched = 0.2;
-constexpr double kVouched_m = 0.1;
+constexpr double kLeast = 0.5, kLeastConfirmed = 0.2;
+constexpr double kConfirms_m = 0.1;
 
 /// What is asked for against the next best place: clearly more where half of the sweep is known, hardly less where four
 /// fifths are.
@@ -27,6 +33,9 @@ double least_ratio(double share) {
   constexpr double kMost = 0.8;
   return std::lerp(kClearlyMore, kHardlyLess, std::clamp((share - kLeast) / (kMost - kLeast), 0.0, 1.0));
 }
+
+/// Of places in a row, so that one of them is near wherever it came to rest.
+constexpr double kApart_m = 0.6;
 
 /// A place is taken for a likelier one if it fits so much better.
 constexpr double kClearlyBetter = 1.1;
@@ -45,7 +54,7 @@ std::array<Pose, 8> places_around(const Pose& T_odom_place) {
 /// Whether the surfaces alone tell where it is, along each axis. Where they do not it lies wherever it was laid.
 bool is_pinned(const Registration& fit) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(fit.information.topLeftCorner<3, 3>());
-  return axes.eigenvalues().minCoeff() > 1.0 / (kVouched_m * kVouched_m);
+  return axes.eigenvalues().minCoeff() > 1.0 / (kConfirms_m * kConfirms_m);
 }
 
 bool is_within(double distance_m, const Pose& T_odom_a, const Pose& T_odom_b) {
@@ -62,7 +71,11 @@ Whereabouts Whereabouts::followed_by(const OdometryEstimate& estimate) const {
   const Vector6 unsureness = estimate.twist_covariance.diagonal() / (kUnsure * kUnsure);
   const Vector6 news = share * (estimate.twist_base - twist_base).array() / (1.0 + unsureness.array());
   Whereabouts next{estimate.stamp, estimate.T_odom_base, estimate.pose_covariance, twist_base + news};
-  std::ranges::transform(estimate.sources, next.T_source_base.begin(), &SourceReport::T_source_base);
+  for (std::size_t i = 0; i < kMaxSources; ++i) {
+    next.T_source_base[i] = estimate.sources[i].T_source_base;
+    next.doubted[i] = estimate.sources[i].doubted;
+    next.learned[i] = estimate.sources[i].learned ? estimate.sources[i].learned : learned[i];
+  }
   return next;
 }
 
@@ -78,8 +91,10 @@ bool Whereabouts::awaits(const SensedMotion& sensed) const {
   return false;
 }
 
+bool Whereabouts::stood() const { return (twist_base.array().abs() < kSlow.array()).all(); }
+
 std::vector<Pose> Whereabouts::way(Stamp now) const {
-  constexpr double kApart_m = 0.6, kTurnLever_m = 2.0; // so that one of them is near wherever it came to rest
+  constexpr double kTurnLever_m = 2.0;
   constexpr int kMost = 16;
   const double elapsed_s = std::max(0.0, to_seconds(now - stamp));
   const double apart_s =
@@ -93,19 +108,33 @@ std::vector<Pose> Whereabouts::way(Stamp now) const {
 std::vector<Place> Whereabouts::places(Stamp now, const SensedMotion& sensed, double max_speed_mps) const {
   const std::vector<Pose> unseen = way(now);
   std::vector<Place> places;
-  const auto add = [&](const Pose& place, const Pose& expected, bool told) {
+  const auto add = [&](const Pose& place, const Pose& expected, bool told, bool vouched) {
     const Vector6 sigma = kSigma + difference(place, expected).cwiseAbs();
-    places.push_back({place, sigma.cwiseAbs2().asDiagonal(), told});
+    const double way_m = (place.translation - T_odom_base.translation).norm();
+    places.push_back({place, vouched ? vouched_sigma(way_m) : kSigma, sigma.cwiseAbs2().asDiagonal(), told, vouched});
   };
-  for (std::size_t i = 0; i < kMaxSources; ++i)
-    if (T_source_base[i] && sensed.sources[i].usable) {
-      const Pose place = T_odom_base * T_source_base[i]->inverse() * sensed.sources[i].T_source_base;
-      const auto way_m = [&](const Pose& from) { return (place.translation - from.translation).norm(); };
-      if (way_m(T_odom_base) <= kFarthest_m + max_speed_mps * std::max(0.0, to_seconds(now - stamp)))
-        add(place, *std::ranges::min_element(unseen, {}, way_m), true);
-    }
+  const auto add_told = [&](std::size_t i) {
+    const Pose T_then_now = T_source_base[i]->inverse() * sensed.sources[i].T_source_base;
+    const Pose place = T_odom_base * (learned[i] ? learned[i]->without_scale(T_then_now) : T_then_now);
+    const auto way_m = [&](const Pose& from) { return (place.translation - from.translation).norm(); };
+    if (way_m(T_odom_base) > kFarthest_m + max_speed_mps * std::max(0.0, to_seconds(now - stamp)))
+      return;
+    const auto [nearest, farthest] = std::ranges::minmax_element(unseen, {}, way_m);
+    add(place, doubted[i] ? *farthest : *nearest, true, !doubted[i]);
+    const Eigen::Vector3d ahead = (place.translation - T_odom_base.translation).stableNormalized();
+    for (const int k : {-1, 1, -2, 2, -3, 3})
+      if (doubted[i])
+        add({place.rotation, place.translation + k * kApart_m * ahead}, *farthest, false, false);
+  };
+  for (const bool doubtful : {false, true}) {
+    for (std::size_t i = 0; i < kMaxSources; ++i)
+      if (T_source_base[i] && sensed.sources[i].usable && doubted[i] == doubtful)
+        add_told(i);
+    if (!doubtful && stood())
+      places.push_back({T_odom_base, vouched_sigma(0.0), kSigma.cwiseAbs2().asDiagonal()});
+  }
   for (const Pose& place : unseen)
-    add(place, T_odom_base, false);
+    add(place, T_odom_base, false, false);
   return places;
 }
 
@@ -113,22 +142,25 @@ Whereabouts Whereabouts::moved_to(const Place& place) const {
   return {.stamp = stamp, .T_odom_base = place.T_odom_base, .pose_covariance = pose_covariance + place.covariance};
 }
 
-std::optional<Place> relocate(Gicp& gicp, std::span<const SurfacePoint> scan_base, const SurfaceMap& map_odom,
-                              std::span<const Place> expected, const RegistrationOptions& options, bool beyond_doubt) {
+std::optional<Relocated> relocate(Gicp& gicp, std::span<const SurfacePoint> scan_base, const SurfaceMap& map_odom,
+                                  std::span<const Place> expected, const RegistrationOptions& options,
+                                  bool beyond_doubt) {
   struct Found {
     double share = 0.0; ///< of the points, with a correspondence
     Registration fit{};
     Matrix6 covariance = Matrix6::Zero(); ///< of the place
-    bool vouched = false;
+    bool vouched = false;                 ///< of the place
+    bool confirmed = false;               ///< where an odometry says, and the surfaces tell of every axis
   };
   MotionBelief prior;
-  prior.information.topLeftCorner<6, 6>() = kSigma.cwiseAbs2().cwiseInverse().asDiagonal();
   const auto lay = [&](const Place& place) {
+    prior.information.topLeftCorner<6, 6>() = place.sigma.cwiseAbs2().cwiseInverse().asDiagonal();
     prior.T_target_source = place.T_odom_base;
     const Registration fit =
         gicp.align({scan_base}, map_odom, place.T_odom_base, prior, options, true, [] { return false; });
     return Found{static_cast<double>(fit.inliers) / static_cast<double>(scan_base.size()), fit, place.covariance,
-                 place.told && is_within(kVouched_m, fit.T_target_source, place.T_odom_base) && is_pinned(fit)};
+                 place.vouched,
+                 place.told && is_within(kConfirms_m, fit.T_target_source, place.T_odom_base) && is_pinned(fit)};
   };
   std::vector<Found> all;
   Found here;
@@ -138,17 +170,19 @@ std::optional<Place> relocate(Gicp& gicp, std::span<const SurfacePoint> scan_bas
         all.back().share > kClearlyBetter * here.share)
       here = all.back();
   }
-  if (here.share < (here.vouched ? kLeastVouched : kLeast))
+  if (here.share < (here.confirmed ? kLeastConfirmed : kLeast))
     return std::nullopt;
   for (const Pose& T_odom_beside : places_around(here.fit.T_target_source))
-    all.push_back(lay({T_odom_beside, Matrix6::Zero()}));
-  const double least = here.vouched ? kHardlyLess : beyond_doubt ? kClearlyMore : least_ratio(here.share);
+    all.push_back(lay({T_odom_beside, kSigma, Matrix6::Zero()}));
+  const double least = here.vouched || here.confirmed ? kHardlyLess
+                       : beyond_doubt                 ? kClearlyMore
+                                                      : least_ratio(here.share);
   for (const Found& other : all)
     if (!is_within(kFarthest_m, other.fit.T_target_source, here.fit.T_target_source) &&
         here.share < least * other.share)
       return std::nullopt;
   const Matrix6 information = here.covariance.inverse() + here.fit.information.topLeftCorner<6, 6>();
-  return Place{here.fit.T_target_source, information.inverse()};
+  return Relocated{{here.fit.T_target_source, kSigma, information.inverse()}, here.fit};
 }
 
 } // namespace locus

@@ -24,12 +24,16 @@ class SensedSteps {
   [[nodiscard]] double elapsed_s(const Sweep& sweep) const { return to_seconds(sweep.end - last_); }
 
   /// The mean twist of the base; nothing where the source does not know it.
-  [[nodiscard]] std::optional<Vector6> twist_base(const Sweep& sweep, SourceId source) const {
+  [[nodiscard]] std::optional<SensedTwist> twist_base(const Sweep& sweep, SourceId source) const {
     const SourcePose& last = sources_[index_of(source)];
     const SourcePose& now = sweep.motion.sources[index_of(source)];
     if (!last.known || !now.known || last.epoch != now.epoch || elapsed_s(sweep) <= 0.0)
       return std::nullopt;
-    return se3_log(last.T_source_base.inverse() * now.T_source_base) / elapsed_s(sweep);
+    SensedTwist sensed(se3_log(last.T_source_base.inverse() * now.T_source_base) / elapsed_s(sweep));
+    sensed.change_per_s = (now.twist_base - last.twist_base) / elapsed_s(sweep);
+    sensed.brought_forward =
+        (to_seconds(now.late) * now.twist_base - to_seconds(last.late) * last.twist_base) / elapsed_s(sweep);
+    return sensed;
   }
   /// Whether it is healthy, too, and was.
   [[nodiscard]] bool is_usable(const Sweep& sweep, SourceId source) const {

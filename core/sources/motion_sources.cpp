@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/sources/motion_sources.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace locus {
@@ -42,7 +43,11 @@ void MotionSources::tell_time(Stamp now) {
 
 void MotionSources::hear(const RegistrationFeedback& feedback) {
   for (std::size_t i = 0; i < sources_.size(); ++i) {
-    sources_[i].health.hear(feedback.opinions[i], feedback, now_);
+    sources_[i].track.set_late(feedback.late[i]);
+    RegistrationFeedback in_its_stamps = feedback;
+    in_its_stamps.from += feedback.late[i];
+    in_its_stamps.to += feedback.late[i];
+    sources_[i].health.hear(feedback.opinions[i], in_its_stamps, now_);
     follow_health(SourceId{i});
   }
 }
@@ -97,7 +102,10 @@ SensedMotion MotionSources::sensed_in(Stamp from, Stamp to) const {
     const std::optional<Pose> T_source_base = track.has_sample_in(from, to) ? track.at(to) : std::nullopt;
     if (!T_source_base)
       continue;
-    motion.sources[i] = {true, health.healthy(), epoch, *T_source_base};
+    const Stamp before = std::max(from, to - SourcePose::kMoment);
+    const Pose T_before_to = track.at(before).value_or(*T_source_base).inverse() * *T_source_base;
+    motion.sources[i] = {
+        true, health.healthy(), epoch, *T_source_base, se3_log(T_before_to) / to_seconds(to - before), track.late()};
     if (health.healthy() && health.trusts_accelerometer() && !motion.specific_force)
       motion.specific_force = track.specific_force(from, to);
     if (health.healthy() && !motion.up_base)

@@ -6,7 +6,13 @@
 namespace locus {
 
 MotionTrack::MotionTrack(const MotionSourceOptions& options)
-    : kind_(options.kind), T_base_source_(options.T_base_source), nodes_(kCapacity) {}
+    : kind_(options.kind), late_(taken_out(1e-3 * options.late_ms)), T_base_source_(options.T_base_source),
+      nodes_(kCapacity) {}
+
+Duration MotionTrack::taken_out(double late_s) {
+  constexpr double kMostLate_s = 0.015;
+  return from_seconds(std::min(late_s, kMostLate_s));
+}
 
 void MotionTrack::add(const ImuSample& sample) {
   const Eigen::Vector3d angular_velocity_base = T_base_source_.rotation * sample.angular_velocity_radps;
@@ -51,6 +57,7 @@ std::size_t MotionTrack::age_at(Stamp stamp) const {
 }
 
 std::optional<Pose> MotionTrack::at(Stamp stamp) const {
+  stamp += late_;
   const std::size_t age = age_at(stamp);
   if (age == size_ || stamp > from_newest(0).stamp + kMaxExtrapolation)
     return std::nullopt;
@@ -75,18 +82,20 @@ Pose MotionTrack::between(const Node& before, const Node& after, Stamp stamp) {
 }
 
 bool MotionTrack::has_sample_in(Stamp from, Stamp to) const {
-  const std::size_t age = age_at(to);
-  return age < size_ && from_newest(age).stamp > from;
+  const std::size_t age = age_at(to + late_);
+  return age < size_ && from_newest(age).stamp > from + late_;
 }
 
 bool MotionTrack::is_live(Stamp now) const {
-  return size_ > 1 && now <= from_newest(0).stamp + kMaxExtrapolation &&
+  return size_ > 1 && now + late_ <= from_newest(0).stamp + kMaxExtrapolation &&
          from_newest(0).stamp <= from_newest(1).stamp + kMaxExtrapolation;
 }
 
 std::optional<Eigen::Vector3d> MotionTrack::up_base(Stamp from, Stamp to) const {
   if (!has_sample_in(from, to))
     return std::nullopt;
+  from += late_;
+  to += late_;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t age = age_at(to); age < size_ && from_newest(age).stamp > from; ++age) {
     if (!from_newest(age).up_base)
@@ -99,6 +108,8 @@ std::optional<Eigen::Vector3d> MotionTrack::up_base(Stamp from, Stamp to) const 
 std::optional<SpecificForce> MotionTrack::specific_force(Stamp from, Stamp to) const {
   if (kind_ != SourceKind::imu || !has_sample_in(from, to))
     return std::nullopt;
+  from += late_;
+  to += late_;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero(), sum_by_time = Eigen::Vector3d::Zero();
   double count = 0.0, time_s = 0.0;
   for (std::size_t age = age_at(to); age < size_ && from_newest(age).stamp > from; ++age) {

@@ -31,6 +31,13 @@ class MotionTrack {
   void add(const ImuSample& sample);
   void add(const OdometrySample& sample);
 
+  /// Samples are stamped so much later than the motion that they tell of: what is asked for is told as of then.
+  void set_late(Duration late) { late_ = late; }
+  /// The part of a lateness that is worth it. What is told later than it may well be extrapolated is not there yet when
+  /// a point is corrected.
+  [[nodiscard]] static Duration taken_out(double late_s);
+  [[nodiscard]] Duration late() const { return late_; }
+
   /// Forgets all samples: what comes next does not follow from them.
   void clear() { size_ = 0; }
 
@@ -42,7 +49,7 @@ class MotionTrack {
 
   /// Of the newest sample; nothing while there is none.
   [[nodiscard]] std::optional<Stamp> newest() const {
-    return size_ > 0 ? std::optional{from_newest(0).stamp} : std::nullopt;
+    return size_ > 0 ? std::optional{from_newest(0).stamp - late_} : std::nullopt;
   }
 
   /// Whether the newest sample is at most kMaxExtrapolation old, and came as soon after the one before.
@@ -72,6 +79,7 @@ class MotionTrack {
   [[nodiscard]] std::size_t age_at(Stamp stamp) const;
 
   SourceKind kind_;
+  Duration late_{};
   Pose T_base_source_;
   Eigen::Vector3d last_angular_velocity_base_radps_ = Eigen::Vector3d::Zero();
   std::vector<Node> nodes_; ///< ring

@@ -12,14 +12,13 @@ const Vector6 kHonestError = along_each_axis(0.01, 0.2);
 } // namespace
 
 std::optional<double> test_ratio(const Innovation& innovation, double elapsed_s) {
-  constexpr double kGate = 38.0; ///< exceeded once in a million by six honest axes
   std::optional<double> ratio;
   for (int axis = 0; axis < 6; ++axis) {
     const double honest = kHonestError[axis] * kHonestError[axis] / (elapsed_s * elapsed_s) + innovation.known[axis];
     if (innovation.variance[axis] == 0.0 || innovation.others[axis] > honest)
       continue;
     const double squared = innovation.value[axis] * innovation.value[axis] / (honest + innovation.others[axis]);
-    ratio = ratio.value_or(0.0) + squared / kGate;
+    ratio = ratio.value_or(0.0) + squared / kInnovationGate;
   }
   return ratio;
 }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "core/base/pose.hpp"
 #include "core/base/source_id.hpp"
@@ -35,6 +36,19 @@ struct SourcePose {
   bool usable = false;     ///< known, and healthy
   std::uint32_t epoch = 0; ///< HealthMonitor::epoch; poses of different epochs have nothing to do with each other
   Pose T_source_base;      ///< an inertial source gives rotation only
+  Vector6 twist_base = Vector6::Zero(); ///< in the last kMoment of the sweep
+  Duration late{};                      ///< taken out of its stamps
+
+  static constexpr Duration kMoment = std::chrono::milliseconds{50};
+};
+
+/// The mean twist of the base from the end of one sweep to that of another, as a source has it (base axes).
+struct SensedTwist {
+  Vector6 mean = Vector6::Zero();
+  Vector6 change_per_s = Vector6::Zero();    ///< from one end to the other
+  Vector6 brought_forward = Vector6::Zero(); ///< the part of the mean that is due to what was taken out of the stamps
+
+  SensedTwist(Vector6 twist_base) : mean(std::move(twist_base)) {}
 };
 
 /// What all motion sources say of a sweep.

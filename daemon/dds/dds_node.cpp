@@ -24,12 +24,14 @@ using Qos = std::unique_ptr<dds_qos_t, QosDeleter>;
 
 /// On the loopback interface nobody but local processes listens; multicast serves to find those who come later, for lo
 /// does not claim to have it. A writer that goes waits no
-/// longer than that for readers far behind, for the service stops within a second. Shared memory stays off: without its
+/// longer than that for readers far behind, for the service stops within a second. A cloud of a few megabytes comes at
+/// once, and of best effort none of its fragments comes again. Shared memory stays off: without its
 /// broker a participant waits for it for ever.
 std::string cyclone_configuration(const std::string& interface) {
   const bool loopback = interface == "lo";
   return fmt::format("<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"{}\"{}/></Interfaces>{}"
-                     "</General><Internal><WriterLingerDuration>50 ms</WriterLingerDuration></Internal></Domain>"
+                     "</General><Internal><WriterLingerDuration>50 ms</WriterLingerDuration>"
+                     "<SocketReceiveBufferSize max=\"8 MB\"/></Internal></Domain>"
                      "</CycloneDDS>",
                      interface, loopback ? " multicast=\"true\"" : "",
                      loopback ? "<AllowMulticast>spdp</AllowMulticast>" : "");
@@ -146,9 +148,9 @@ Expected<DdsNode, std::string> DdsNode::open(const DdsOptions& options) {
 DdsEntity DdsNode::create_endpoint(const ros::Type& type, const std::string& topic, TopicQos wanted,
                                    CreateEndpoint create) const {
   const Qos qos = make_qos(wanted);
-  const dds_entity_t handle =
-      dds_create_topic(participant(), type.descriptor, ("rt" + topic).c_str(), qos.get(), nullptr);
-  if (type_hashes_)
+  const std::string dds_topic = topic.starts_with('/') ? "rt" + topic : topic;
+  const dds_entity_t handle = dds_create_topic(participant(), type.descriptor, dds_topic.c_str(), qos.get(), nullptr);
+  if (type_hashes_ && !type.hash.empty())
     set_user_data(qos.get(), fmt::format("typehash=RIHS01_{};", type.hash));
   DdsEntity endpoint{create(participant(), handle, qos.get(), nullptr)};
   if (handle > 0)

@@ -5,11 +5,13 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
 
 #include <dds/dds.h>
+#include <dds/ddsi/ddsi_serdata.h>
 
 #include "config/config.hpp"
 #include "core/base/expected.hpp"
@@ -47,7 +49,10 @@ struct TopicQos {
   static constexpr TopicQos transform() { return {true, 100}; } ///< tf
   static constexpr TopicQos latch() { return {true, 1, true}; } ///< what stays true
   static constexpr TopicQos cloud() { return {true, 5}; }       ///< rviz2 asks for it; who does not is served, too
+  static constexpr TopicQos clock() { return {false, 1}; }      ///< the latest is the only one that counts
   static constexpr TopicQos sensor_out() { return {false, 5}; } ///< as drivers of sensors send
+  static constexpr TopicQos cloud_in() { return {false, 1}; } ///< of any writer; the newest is the only one that counts
+  static constexpr TopicQos cloud_count() { return {false, 20}; } ///< of any writer, none of them lost
   static constexpr TopicQos sensor_in() {
     return {false, 100};
   } ///< best effort readers accept every writer; the depth
@@ -64,7 +69,8 @@ class DdsNode {
   /// Fails with one line for the user, at once, e.g. while the interface does not exist. To be tried again then.
   static Expected<DdsNode, std::string> open(const DdsOptions& options);
 
-  /// Of a topic as ROS 2 spells it, "/locus/odometry". Handles below zero are errors of DDS.
+  /// Of a topic as ROS 2 spells it, "/locus/odometry"; a name without a slash is one of DDS alone. Handles below zero
+  /// are errors of DDS.
   template <class Message> [[nodiscard]] DdsEntity create_writer(const std::string& topic, TopicQos qos) const {
     return create_endpoint(ros::type_of<Message>(), topic, qos, &dds_create_writer);
   }
@@ -107,6 +113,18 @@ template <class Message> class DdsWriter {
   DdsEntity writer_;
 };
 
+/// A message as it was sent, encapsulation included. Owns nothing.
+class SerialisedSample {
+ public:
+  explicit SerialisedSample(const ddsi_serdata* sample) : sample_(sample) {}
+  [[nodiscard]] std::size_t size() const { return ddsi_serdata_size(sample_); }
+  /// Precondition: there is room for all of it.
+  void copy_to(std::span<std::byte> bytes) const { ddsi_serdata_to_ser(sample_, 0, size(), bytes.data()); }
+
+ private:
+  const ddsi_serdata* sample_;
+};
+
 /// Receives messages of one topic. One owner.
 template <class Message> class DdsReader {
  public:
@@ -127,6 +145,22 @@ template <class Message> class DdsReader {
           hand_out(use, *static_cast<const Message*>(samples[i]), infos[i].publication_handle);
       if (count > 0)
         dds_return_loan(reader_.handle(), samples.data(), count);
+    }
+  }
+
+  /// As take(), with its writer, of messages as they were sent.
+  template <class Use> void take_serialised(const Use& use) {
+    constexpr std::uint32_t kBatch = 8, kMostBatches = 4;
+    dds_return_t count = kBatch;
+    for (std::uint32_t batch = 0; batch < kMostBatches && count == kBatch; ++batch) {
+      std::array<ddsi_serdata*, kBatch> samples{};
+      std::array<dds_sample_info_t, kBatch> infos{};
+      count = dds_takecdr(reader_.handle(), samples.data(), kBatch, infos.data(), DDS_ANY_STATE);
+      for (std::size_t i = 0; count > 0 && i < static_cast<std::size_t>(count); ++i) {
+        if (infos[i].valid_data)
+          use(SerialisedSample(samples[i]), infos[i].publication_handle);
+        ddsi_serdata_unref(samples[i]);
+      }
     }
   }
 

@@ -35,6 +35,12 @@ struct RosLink::Session {
     Admission admission;
     std::uint64_t received = 0;
   };
+  struct CloudLidar {
+    std::uint8_t lidar;
+    DdsReader<ros::PointCloud2> reader;
+    Admission admission;
+    std::uint64_t received = 0;
+  };
   struct HealthTopic {
     SourceId source;
     DdsReader<ros::Bool> reader;
@@ -45,7 +51,7 @@ struct RosLink::Session {
     Admission admission;
   };
 
-  Session(DdsNode node_, const Config& config) : node(std::move(node_)) {
+  Session(DdsNode node_, const Config& config, const RosNode& named) : node(std::move(node_)) {
     const DdsOptions& dds = config.dds;
     odometry = {node, dds.prefix + "/odometry", TopicQos::standard()};
     odometry_fast = {node, dds.prefix + "/odometry_fast", TopicQos::standard()};
@@ -59,6 +65,7 @@ struct RosLink::Session {
     if (dds.publish_map)
       map.emplace(node, dds.prefix + "/map", TopicQos::latch());
     listen(config);
+    graph = announce(named, node, dds.ros_graph);
   }
 
   void listen(const Config& config) {
@@ -69,6 +76,13 @@ struct RosLink::Session {
       dds_set_status_mask(reader, DDS_DATA_AVAILABLE_STATUS);
       dds_waitset_attach(waitset.handle(), reader, 0);
     };
+    for (std::size_t i = 0; i < config.lidars.size(); ++i) {
+      if (config.lidars[i].gives_clouds())
+        wake_by(cloud_lidars
+                    .emplace_back(CloudLidar{
+                        static_cast<std::uint8_t>(i), {node, config.lidars[i].topic, TopicQos::cloud_in()}, {}})
+                    .reader.handle());
+    }
     for (std::size_t i = 0; i < config.motion_sources.size(); ++i) {
       const MotionSource& source = config.motion_sources[i];
       if (!source.topic.empty() && source.kind == SourceKind::imu)
@@ -98,13 +112,17 @@ struct RosLink::Session {
   DdsEntity waitset;
   std::vector<ImuSource> imus;
   std::vector<OdometrySource> odometries;
+  std::vector<CloudLidar> cloud_lidars;
   std::vector<HealthTopic> health_topics;
   std::optional<FlatGroundTopic> flat_ground;
+  DdsEntity graph;
 };
 
-RosLink::RosLink(const Config& config, Sink sink)
-    : config_(config), frames_{config.dds.frame_odom, config.dds.frame_base}, sink_(std::move(sink)) {
+RosLink::RosLink(const Config& config, Sink sink, std::string_view instance, RosCloudSink cloud_sink)
+    : config_(config), frames_{config.dds.frame_odom, config.dds.frame_base},
+      named_(ros_node(config.dds.prefix, instance)), sink_(std::move(sink)), cloud_sink_(std::move(cloud_sink)) {
   status_.sources.resize(config.motion_sources.size());
+  status_.lidars.resize(config.lidars.size());
   thread_ = std::thread([this] { run(); });
   pthread_setname_np(thread_.native_handle(), "dds");
 }
@@ -147,7 +165,7 @@ std::unique_ptr<RosLink::Session> RosLink::connect() {
     ++status_.attempts;
     status_.connected = node.has_value();
     if (node)
-      return std::make_unique<Session>(std::move(*node), config_);
+      return std::make_unique<Session>(std::move(*node), config_, named_);
     status_.problem = node.error();
     next_attempt = read_clock(CLOCK_MONOTONIC) + pause;
     pause = std::min(2 * pause, kLongestPause);
@@ -170,6 +188,12 @@ void RosLink::receive(Session& session) {
       if (from.admission.admits(writer, now))
         sink_(OdometryInput{from.source, to_sample(message, arrival, from.usual)});
     });
+  for (auto& from : session.cloud_lidars)
+    from.reader.take_serialised([&](const SerialisedSample& cloud, dds_instance_handle_t writer) {
+      ++from.received;
+      if (from.admission.admits(writer, now)) // may have come while the samples above were handled
+        cloud_sink_(from.lidar, Stamp{read_clock(CLOCK_REALTIME)}, cloud);
+    });
   for (auto& from : session.health_topics)
     from.reader.take([&](const ros::Bool& message, dds_instance_handle_t writer) {
       if (from.admission.admits(writer, now))
@@ -190,6 +214,10 @@ void RosLink::look_after_sources(Session& session) {
       status_.sources[index_of(from.source)] = {from.reader.writers(), from.received, from.admission.refused(), 0};
     }
   };
+  for (auto& from : session.cloud_lidars) {
+    from.admission.look_after(from.reader);
+    status_.lidars[from.lidar] = {from.reader.writers(), from.received, from.admission.refused(), 0};
+  }
   tell(session.imus);
   tell(session.odometries);
   for (auto& from : session.health_topics) {

@@ -8,11 +8,14 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <variant>
 #include <vector>
 
 #include "config/config.hpp"
+#include "daemon/dds/dds_node.hpp"
+#include "daemon/dds/ros_graph.hpp"
 #include "daemon/dds/ros_messages.hpp"
 #include "daemon/figures.hpp"
 #include "daemon/input.hpp"
@@ -24,8 +27,11 @@ struct FlatGroundWord {
   bool flat;
 };
 
-/// All that comes in by DDS.
+/// All that comes in by DDS, but clouds.
 using RosInput = std::variant<ImuInput, OdometryInput, OutsideVerdict, FlatGroundWord>;
+
+/// Takes a cloud of the lidar of this index.
+using RosCloudSink = std::function<void(std::uint8_t lidar, Stamp arrival, const SerialisedSample& cloud)>;
 
 /// The robot's network in ROS 2's words: the configured topics in, odometry and what goes with it out.
 ///
@@ -35,8 +41,9 @@ class RosLink {
  public:
   using Sink = std::function<void(const RosInput&)>;
 
-  /// Begins at once and does not wait.
-  RosLink(const Config& config, Sink sink);
+  /// Begins at once and does not wait. `instance`: of the service, empty if it is the only one. `cloud_sink`: needed
+  /// where a lidar of the configuration gives clouds.
+  RosLink(const Config& config, Sink sink, std::string_view instance = {}, RosCloudSink cloud_sink = {});
   ~RosLink();
   RosLink(const RosLink&) = delete;
   RosLink& operator=(const RosLink&) = delete;
@@ -65,7 +72,9 @@ class RosLink {
 
   Config config_;
   FrameNames frames_;
+  RosNode named_;
   Sink sink_;
+  RosCloudSink cloud_sink_;
   CloudMessage cloud_, map_;
   std::unique_ptr<Session> session_;         ///< made by the thread of the link
   std::atomic<Session*> connected_{nullptr}; ///< the same once it is complete

@@ -65,6 +65,10 @@ OdometrySample to_sample(const ros::Odometry& message, Stamp arrival, UsualCovar
           usual.scale(std::span<const double, 36>(message.twist_.covariance_))};
 }
 
+OdometryReport report_of(const OdometryEstimate& e) {
+  return {e.stamp, e.T_odom_base, e.pose_covariance, e.twist_base, e.twist_covariance};
+}
+
 ros::Time to_ros(Stamp stamp) {
   const auto seconds = std::chrono::floor<std::chrono::seconds>(stamp.time_since_epoch());
   return {static_cast<std::int32_t>(seconds.count()),

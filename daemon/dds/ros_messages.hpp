@@ -52,6 +52,8 @@ struct OdometryReport {
   Matrix6 twist_covariance = Matrix6::Zero();
 };
 
+OdometryReport report_of(const OdometryEstimate& estimate);
+
 ros::Time to_ros(Stamp stamp);
 ros::Odometry to_ros(const OdometryReport& report, const FrameNames& frames);
 ros::TransformStamped to_ros_transform(Stamp stamp, const Pose& T_odom_base, const FrameNames& frames);

@@ -25,9 +25,12 @@ using PointCloud2 = sensor_msgs_msg_dds__PointCloud2_;
 using KeyValue = diagnostic_msgs_msg_dds__KeyValue_;
 using DiagnosticStatus = diagnostic_msgs_msg_dds__DiagnosticStatus_;
 using DiagnosticArray = diagnostic_msgs_msg_dds__DiagnosticArray_;
+using Clock = rosgraph_msgs_msg_dds__Clock_;
+using ParticipantEntitiesInfo = rmw_dds_common_msg_dds__ParticipantEntitiesInfo_;
+using HumbleParticipantEntitiesInfo = rmw_dds_common_humble_dds__ParticipantEntitiesInfo_;
 
-/// What DDS and ROS 2 know a type of message by. The hash is ROS 2's own over the description of the type (REP 2011);
-/// from Iron on it is expected in the user data of every endpoint.
+/// What DDS and ROS 2 know a type of message by. The hash is ROS 2's own over the description of the type (REP 2016);
+/// from Iron on it is expected in the user data of every endpoint. A type that ended with Humble has none.
 struct Type {
   const dds_topic_descriptor_t* descriptor;
   std::string_view hash;
@@ -55,6 +58,21 @@ template <> inline Type type_of<PointCloud2>() {
 template <> inline Type type_of<DiagnosticArray>() {
   return {&diagnostic_msgs_msg_dds__DiagnosticArray__desc,
           "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"};
+}
+template <> inline Type type_of<Clock>() {
+  return {&rosgraph_msgs_msg_dds__Clock__desc, "692f7a66e93a3c83e71765d033b60349ba68023a8c689a79e48078bcb5c58564"};
+}
+template <> inline Type type_of<ParticipantEntitiesInfo>() {
+  return {&rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc,
+          "91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"};
+}
+template <> inline Type type_of<HumbleParticipantEntitiesInfo>() {
+  static const dds_topic_descriptor_t descriptor = [] {
+    dds_topic_descriptor_t same_name = rmw_dds_common_humble_dds__ParticipantEntitiesInfo__desc;
+    same_name.m_typename = rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc.m_typename;
+    return same_name;
+  }();
+  return {&descriptor, ""};
 }
 
 } // namespace locus::daemon::ros

@@ -1,26 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/service/cloud_publisher.hpp"
 
-#include <algorithm>
 #include <utility>
+
+#include "daemon/dds/sweep_points.hpp"
 
 namespace locus::daemon {
 
 namespace {
 
 constexpr Duration kMapPeriod = std::chrono::seconds{5};
-
-void sweep_points(const Sweep& sweep, const Odometry& odometry, std::vector<CloudMessage::Point>& out) {
-  out.clear();
-  const std::size_t count = std::min(sweep.points.size(), odometry.scan().size());
-  for (std::size_t i = 0; i < count; ++i) {
-    const Eigen::Vector3f& p = odometry.scan()[i].position_m;
-    const SweepPoint& point = sweep.points[i];
-    out.push_back({p.x(), p.y(), p.z(), point.intensity, -point.age_s,
-                   static_cast<std::uint16_t>(point.scan_line % 256),
-                   static_cast<std::uint16_t>(point.scan_line / 256)});
-  }
-}
 
 /// The coarse surfaces: some ten thousand of a map that fills its memory.
 void map_points(const SurfaceGrid& grid, std::vector<CloudMessage::Point>& out) {
@@ -41,7 +30,7 @@ CloudPublisher::CloudPublisher(DdsOptions options, RosLink& link) : options_(std
 
 void CloudPublisher::take(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
   if (options_.publish_cloud) {
-    sweep_points(sweep, odometry, sweep_.back().points);
+    sweep_points(sweep.points, odometry.scan(), sweep_.back().points);
     sweep_.back().stamp = estimate.stamp;
     static_cast<void>(sweep_.publish());
   }

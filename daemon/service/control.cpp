@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
+#include <system_error>
 
 #include <fmt/format.h>
 #include <grp.h>
@@ -19,6 +20,7 @@
 #include <unistd.h>
 
 #include "daemon/machine_time.hpp"
+#include "daemon/service/unix_socket.hpp"
 
 namespace locus::daemon {
 
@@ -44,6 +46,13 @@ Parsed parse_reset(const nlohmann::json& request) {
   return ControlRequest{Reset{Pose{from_rpy_rad(Eigen::Vector3d{v[3], v[4], v[5]} * kRadPerDeg), {v[0], v[1], v[2]}}}};
 }
 
+Parsed parse_record(const nlohmann::json& request) {
+  const double keep_s = request.at("keep_s").get<double>();
+  if (!(keep_s >= 1.0 && keep_s <= 600.0))
+    return std::string{"what to keep must be 1s to 600s"};
+  return ControlRequest{KeepIncident{keep_s}};
+}
+
 } // namespace
 
 Expected<ControlRequest, std::string> parse_control_request(std::string_view message) {
@@ -58,6 +67,8 @@ Expected<ControlRequest, std::string> parse_control_request(std::string_view mes
       return parse_flat_ground(request);
     if (command == "reset")
       return parse_reset(request);
+    if (command == "record")
+      return parse_record(request);
     if (command == "reload")
       return ControlRequest{Reload{}};
     return fmt::format("unknown command {}; use locusctl of the same version", command);
@@ -139,28 +150,24 @@ bool send(int client, const ControlServer::Answer& answer) {
   return sendmsg(client, &message, MSG_DONTWAIT | MSG_NOSIGNAL) >= 0;
 }
 
-/// Whether a service lives behind a socket.
-bool answers(const sockaddr_un& address) {
-  const Descriptor client{::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)};
-  return connect(client.number(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0 || errno == EAGAIN;
+std::filesystem::path runtime_folder() {
+  const char* const folder = std::getenv("RUNTIME_DIRECTORY"); // NOLINT(concurrency-mt-unsafe): nobody sets it
+  return folder != nullptr ? folder : "/run/locusd";
 }
 
 } // namespace
 
-Descriptor::~Descriptor() {
-  if (number_ >= 0)
-    close(number_);
-}
+std::filesystem::path control_path() { return runtime_folder() / "control"; }
 
-std::filesystem::path control_path() {
-  const char* const folder = std::getenv("RUNTIME_DIRECTORY"); // NOLINT(concurrency-mt-unsafe): nobody sets it
-  return std::filesystem::path(folder != nullptr ? folder : "/run/locusd") / "control";
+std::string instance_name() {
+  const std::string unit = runtime_folder().filename();
+  return unit.starts_with("locusd@") ? unit.substr(std::strlen("locusd@")) : "";
 }
 
 Expected<ControlServer, std::string> ControlServer::open(const std::filesystem::path& path, Handler handler) {
   const auto failed = [&](const char* what) {
-    return fmt::format("{}: {}; locusctl will not reach this service: {}", path.string(), std::strerror(errno),
-                       what); // NOLINT(concurrency-mt-unsafe)
+    return fmt::format("{}: {}; locusctl will not reach this service, and no incidents are kept: {}", path.string(),
+                       std::generic_category().message(errno), what);
   };
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
@@ -169,17 +176,15 @@ Expected<ControlServer, std::string> ControlServer::open(const std::filesystem::
     return failed("set RUNTIME_DIRECTORY to a shorter path");
   }
   path.native().copy(address.sun_path, sizeof(address.sun_path) - 1);
-  if (answers(address))
-    return fmt::format(
-        "{}: another service answers there; locusctl will not reach this one: set RUNTIME_DIRECTORY to a "
-        "folder of its own",
-        path.string());
   std::error_code ignored;
   std::filesystem::create_directories(path.parent_path(), ignored);
-  unlink(path.c_str()); // left behind by one that crashed
+  remove_if_left_behind(path, SOCK_SEQPACKET);
   Descriptor listener{::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)};
   if (bind(listener.number(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
-    return failed("set RUNTIME_DIRECTORY to a folder that may be written");
+    return failed(
+        errno == EADDRINUSE
+            ? "another service answers there, or it is no socket; set RUNTIME_DIRECTORY to a folder of its own"
+            : "set RUNTIME_DIRECTORY to a folder that may be written");
   constexpr mode_t kEverybody = 0666; // who may do what is told by who asks
   if (chmod(path.c_str(), kEverybody) != 0 || listen(listener.number(), kMaxClients) != 0)
     return failed("cannot listen on it");
@@ -204,7 +209,7 @@ bool ControlServer::accept_waiting() {
   for (std::size_t i = 0; i < kMaxClients; ++i) {
     Descriptor client{accept4(listener_.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC)};
     if (client.number() < 0)
-      return i > 0;
+      return i > 0 || accept_has_failed();
     if (clients_.size() == kMaxClients && may_command(client.number()))
       drop_a_stranger();
     if (clients_.size() < kMaxClients)

@@ -19,7 +19,7 @@
 #include "core/base/expected.hpp"
 #include "core/base/options.hpp"
 #include "core/base/pose.hpp"
-#include "daemon/service/log.hpp"
+#include "daemon/descriptor.hpp"
 
 namespace locus::daemon {
 
@@ -35,29 +35,17 @@ struct Reset {
   std::optional<Pose> T_odom_base; ///< where the odometry begins anew; nothing: at the origin
 };
 struct Reload {};
-using ControlRequest = std::variant<ShowStatus, SaveMap, SetFlatGround, Reset, Reload>;
+struct KeepIncident {
+  double keep_s; ///< of what came last
+};
+using ControlRequest = std::variant<ShowStatus, SaveMap, SetFlatGround, Reset, Reload, KeepIncident>;
 
 /// Of the bytes of one message, which may be anything: {"command": "save-map" | "reload"}, {"command": "status"} with
 /// "text": true for an answer {"text": "..."}, {"command": "flat-ground", "mode": "on" | "off" | "auto"}, {"command":
+/// "record", "keep_s": 60} for an answer {"folder": "..."} where the status tells what becomes of it, {"command":
 /// "reset"} with "pose": [x, y, z, roll, pitch, yaw] in metres and degrees if need be. Fails with one line for the
 /// user. Any thread.
 Expected<ControlRequest, std::string> parse_control_request(std::string_view message);
-
-/// A file descriptor, closed at the end of its life.
-class Descriptor {
- public:
-  explicit Descriptor(int number = -1) : number_(number) {}
-  ~Descriptor();
-  Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
-  Descriptor& operator=(Descriptor&& other) noexcept {
-    std::swap(number_, other.number_);
-    return *this;
-  }
-  [[nodiscard]] int number() const { return number_; }
-
- private:
-  int number_;
-};
 
 /// Where locusctl reaches the service: a Unix socket on which each message is one request or one answer, in JSON.
 ///
@@ -81,7 +69,7 @@ class ControlServer {
   static constexpr std::size_t kMaxClients = 16;
   static constexpr Duration kLongestAnswer = std::chrono::seconds{3};
 
-  /// Fails with one line for the user.
+  /// Fails with one line for the user, also where another service answers: who has the socket owns its folder.
   static Expected<ControlServer, std::string> open(const std::filesystem::path& path, Handler handler);
 
   void add_to(std::vector<pollfd>& poll) const;
@@ -112,5 +100,7 @@ class ControlServer {
 
 /// $RUNTIME_DIRECTORY/control as systemd sets it, else /run/locusd/control.
 std::filesystem::path control_path();
+/// NAME of the service locusd@NAME, by the same variable; empty if it is no instance.
+std::string instance_name();
 
 } // namespace locus::daemon

@@ -19,18 +19,32 @@
 
 namespace locus::daemon {
 
-namespace {
-
-/// With whether the service is of no use without it: position packets tell the time, and are missed by nobody else.
-std::map<std::uint16_t, bool> ports_of(const Config& config) {
+std::map<std::uint16_t, bool> lidar_ports(const Config& config) {
   constexpr int kDistance = kDefaultPositionPort - kDefaultDataPort;
-  std::map<std::uint16_t, bool> ports{{kDefaultPositionPort, false}};
+  std::map<std::uint16_t, bool> ports;
   for (const LidarOptions& lidar : config.lidars) {
+    if (lidar.gives_clouds())
+      continue;
     ports[lidar.port] = true;
+    if (lidar.is_ouster()) {
+      if (lidar.imu_port != 0)
+        ports.try_emplace(lidar.imu_port, false);
+      continue;
+    }
+    if (lidar.is_hesai())
+      continue;
+    ports.try_emplace(kDefaultPositionPort, false);
     if (lidar.port + kDistance <= UINT16_MAX)
       ports.try_emplace(static_cast<std::uint16_t>(lidar.port + kDistance), false);
   }
   return ports;
+}
+
+namespace {
+
+bool is_imu_port(const Config& config, std::uint16_t port) {
+  return std::ranges::any_of(config.lidars,
+                             [=](const LidarOptions& lidar) { return lidar.is_ouster() && lidar.imu_port == port; });
 }
 
 } // namespace
@@ -47,7 +61,7 @@ std::vector<int> inherited_sockets() {
 Expected<std::vector<UdpSocket>, std::string> open_lidar_sockets(const Config& config, std::span<const int> inherited,
                                                                  Log& log) {
   std::vector<UdpSocket> sockets;
-  std::map<std::uint16_t, bool> ports = ports_of(config);
+  std::map<std::uint16_t, bool> ports = lidar_ports(config);
   for (const int descriptor : inherited) {
     auto socket = UdpSocket::adopt(fcntl(descriptor, F_DUPFD_CLOEXEC, 0));
     if (!socket)
@@ -65,10 +79,14 @@ Expected<std::vector<UdpSocket>, std::string> open_lidar_sockets(const Config& c
     else if (needed)
       return socket.error();
     else
-      log.warn(socket.error() + "; without position packets the time of lidars is that of their arrival");
+      log.warn(socket.error() + (is_imu_port(config, port)
+                                     ? "; the inertial unit of the lidar is not heard"
+                                     : "; without position packets the time of lidars is that of their arrival"));
   }
-  const int least = std::ranges::min_element(sockets, {}, &UdpSocket::buffer_bytes)->buffer_bytes();
-  if (least < UdpSocket::kWantedBufferBytes)
+  const auto smallest = std::ranges::min_element(sockets, {}, &UdpSocket::buffer_bytes);
+  if (smallest == sockets.end()) // all lidars give clouds
+    return sockets;
+  if (const int least = smallest->buffer_bytes(); least < UdpSocket::kWantedBufferBytes)
     log.warn(
         fmt::format("the kernel gives lidar sockets {} bytes of the {} asked for: packets will be lost under load; "
                     "sysctl net.core.rmem_max={}",

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -15,6 +17,10 @@ namespace locus::daemon {
 /// Descriptors that systemd has opened for this process (socket activation); empty without. They stay its own: sockets
 /// are made from copies.
 std::vector<int> inherited_sockets();
+
+/// The ports that lidars send to, each with whether the service is of no use without it: position packets tell the
+/// time, and are missed by nobody else.
+std::map<std::uint16_t, bool> lidar_ports(const Config& config);
 
 /// A socket for every port that lidars send to: their data and their position packets. Those inherited come first, the
 /// others are opened. Fails with one line for the user.

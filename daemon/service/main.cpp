@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // locusd: lidar packets and motion samples in, odometry out, until it is told to stop.
+#include <chrono>
 #include <cstdio>
 #include <exception>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include "config/config_yaml.hpp"
 #include "config/mistyped.hpp"
+#include "daemon/service/live_check.hpp"
 #include "daemon/service/log.hpp"
 #include "daemon/service/service.hpp"
 
@@ -19,19 +21,37 @@ constexpr int kDone = 0, kFailed = 1, kWrongUsage = 2;
 struct Arguments {
   std::string config;
   bool check_config = false;
+  bool live = false;
   bool print_config = false;
 };
 
 void describe(CLI::App& app, Arguments& arguments) {
   app.add_option("-c,--config", arguments.config, "Configuration file; without one every key has its default")
       ->type_name("FILE");
-  app.add_flag("--check-config", arguments.check_config, "Only says what is wrong with the configuration");
+  CLI::Option* const check =
+      app.add_flag("--check-config", arguments.check_config, "Only says what is wrong with the configuration");
+  app.add_flag("--live", arguments.live, "With --check-config: compares it with what is on the wire, too")
+      ->needs(check);
   app.add_flag("--print-config", arguments.print_config, "Only prints the configuration in force, every key");
   app.set_version_flag("--version", "locusd " LOCUS_VERSION);
   app.footer("Signals: SIGHUP reloads the configuration, SIGTERM stops.\n"
              "Exit status: 0 stopped as told, 1 failed while running, 2 wrong usage or configuration.\n"
-             "Example:\n"
-             "  locusd --config /etc/locusd/locusd.yaml");
+             "Examples:\n"
+             "  locusd --config /etc/locusd/locusd.yaml\n"
+             "  locusd --config robot.yaml --check-config --live");
+}
+
+int compare_with_wire(const locus::Config& config) {
+  const auto check = locus::daemon::check_live(config, std::chrono::seconds{3});
+  if (!check) {
+    fmt::print(stderr, "locusd: {}\n", check.error());
+    return kFailed;
+  }
+  for (const std::string& line : check->agrees)
+    fmt::print("{}\n", line);
+  for (const std::string& line : check->differs)
+    fmt::print(stderr, "locusd: {}\n", line);
+  return check->differs.empty() ? kDone : kFailed;
 }
 
 int run(const Arguments& arguments) {
@@ -43,12 +63,13 @@ int run(const Arguments& arguments) {
   }
   if (arguments.print_config)
     fmt::print("{}", locus::print_config(*config));
+  const int compared = arguments.live ? compare_with_wire(*config) : kDone;
   if (std::fflush(stdout) != 0) {
     fmt::print(stderr, "locusd: standard output cannot be written; check free space\n");
     return kFailed;
   }
   if (arguments.print_config || arguments.check_config)
-    return kDone;
+    return compared;
   locus::daemon::Log log;
   locus::daemon::Service service(arguments.config, log);
   return service.run(*config);

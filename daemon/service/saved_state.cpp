@@ -26,7 +26,9 @@ namespace {
 
 constexpr double kInSight_m = 60.0;
 
-constexpr std::array<char, 8> kMagic{'l', 'o', 'c', 'u', 's', 'd', ' ', '3'};
+constexpr std::array<char, 8> kMagic{'l', 'o', 'c', 'u', 's', 'd', ' ', '7'};
+
+using LearnedNumbers = std::array<double, 6 + LearnedSource::kMostStates*(LearnedSource::kMostStates + 1)>;
 
 constexpr std::string_view kAnyVersion = "locusd ";
 
@@ -38,12 +40,15 @@ struct Head {
   std::array<double, 36> covariance;
   std::array<double, 6> twist;
   std::array<std::array<double, 7>, kMaxSources> sources_xyz_xyzw; ///< all zero: nothing
-  std::uint64_t checksum;                                          ///< of what stands above
+  std::array<LearnedNumbers, kMaxSources> learned;                 ///< noise, states, covariance; no noise: nothing
+  std::array<std::int64_t, kMaxSources> learned_since_ns;
+  std::uint64_t doubted;  ///< a bit each
+  std::uint64_t checksum; ///< of what stands above
 };
 
 /// What follows, and is followed by the points.
 struct Body {
-  std::uint64_t sources;
+  SourceIds sources;
   std::int32_t flat_ground;
   std::uint32_t points;
   std::uint64_t checksum; ///< of what stands above, and of the points
@@ -88,13 +93,32 @@ Pose to_pose(const std::array<double, 7>& v) {
   return {Eigen::Quaterniond(v[6], v[3], v[4], v[5]).normalized(), {v[0], v[1], v[2]}};
 }
 
+LearnedNumbers to_numbers(const LearnedSource& learned) {
+  LearnedNumbers numbers;
+  Eigen::Map<Vector6>{numbers.data()} = learned.noise_per_s;
+  Eigen::Map<LearnedSource::States>{&numbers[6]} = learned.states;
+  Eigen::Map<LearnedSource::Covariance>{&numbers[6 + LearnedSource::kMostStates]} = learned.covariance;
+  return numbers;
+}
+
+LearnedSource to_learned(const LearnedNumbers& numbers) {
+  return {.noise_per_s = Eigen::Map<const Vector6>{numbers.data()},
+          .states = Eigen::Map<const LearnedSource::States>{&numbers[6]},
+          .covariance = Eigen::Map<const LearnedSource::Covariance>{&numbers[6 + LearnedSource::kMostStates]}
+                            .selfadjointView<Eigen::Lower>()};
+}
+
 Head head_of(const Whereabouts& last) {
-  Head head{kMagic, to_ns(last.stamp), to_numbers(last.T_odom_base), {}, {}, {}, 0};
+  Head head{kMagic, to_ns(last.stamp), to_numbers(last.T_odom_base), {}, {}, {}, {}, {}, last.doubted.to_ullong(), 0};
   Eigen::Map<Matrix6>(head.covariance.data()) = last.pose_covariance;
   Eigen::Map<Vector6>(head.twist.data()) = last.twist_base;
-  for (std::size_t i = 0; i < kMaxSources; ++i)
+  for (std::size_t i = 0; i < kMaxSources; ++i) {
     if (last.T_source_base[i])
       head.sources_xyz_xyzw[i] = to_numbers(*last.T_source_base[i]);
+    if (last.learned[i])
+      head.learned[i] = to_numbers(*last.learned[i]);
+    head.learned_since_ns[i] = last.learned[i] ? to_ns(last.learned[i]->since) : 0;
+  }
   head.checksum = checksum_of(head);
   return head;
 }
@@ -109,19 +133,30 @@ std::string to_bytes(const SavedState& state) {
   return std::string{bytes_of(head)}.append(bytes_of(body)).append(text);
 }
 
+/// After minutes of dead reckoning it may be of any size.
+template <class Matrix> bool is_covariance(const Matrix& matrix) {
+  constexpr double kRounding = 1e-6;
+  const double size = matrix.norm();
+  return std::isfinite(size) &&
+         (matrix.template selfadjointView<Eigen::Lower>().eigenvalues().array() > -kRounding * (1.0 + size)).all();
+}
+
+/// What was learned of a source that is broken is not for another run.
+bool makes_sense(const LearnedSource& learned) {
+  constexpr double kLeast = -0.9, kMost = 1.5; // rad/s of a bias, s, rad, and what scales are above one
+  return (learned.noise_per_s.array() > 0.0).all() && learned.noise_per_s.allFinite() &&
+         (learned.states.array() > kLeast && learned.states.array() < kMost).all() && is_covariance(learned.covariance);
+}
+
 /// Whether a robot can go on from there: what another hand wrote may hold anything.
 bool makes_sense(const SavedState& state) {
   constexpr double kFarthest_m = 1e8; // geocentric coordinates are within it
-  constexpr double kRounding = 1e-6;
   if (state.last.stamp < Stamp{})
     return false;
   const auto is_sound = [](const Pose& pose) {
     return pose.rotation.norm() > 0.5 && pose.translation.norm() < kFarthest_m; // false for NaN
   };
-  const Matrix6& covariance = state.last.pose_covariance; // after minutes of dead reckoning it may be of any size
-  const double size = covariance.norm();
-  return is_sound(state.last.carried_to(Stamp::max())) && std::isfinite(size) &&
-         (covariance.selfadjointView<Eigen::Lower>().eigenvalues().array() > -kRounding * (1.0 + size)).all() &&
+  return is_sound(state.last.carried_to(Stamp::max())) && is_covariance(state.last.pose_covariance) &&
          std::ranges::all_of(state.last.T_source_base, [&](const auto& pose) { return !pose || is_sound(*pose); }) &&
          std::ranges::all_of(state.map_odom, [](const SurfacePoint& point) {
            return point.position_m.cast<double>().norm() < kFarthest_m && point.normal.allFinite();
@@ -145,9 +180,13 @@ std::optional<SavedState> from_bytes(std::string_view bytes) {
   state.last.stamp = stamp_from_ns(head.stamp_ns);
   state.last.T_odom_base = to_pose(head.xyz_xyzw);
   state.last.pose_covariance = Eigen::Map<const Matrix6>(head.covariance.data()).selfadjointView<Eigen::Lower>();
-  for (std::size_t i = 0; i < kMaxSources; ++i)
+  for (std::size_t i = 0; i < kMaxSources; ++i) {
     if (const auto& seen = head.sources_xyz_xyzw[i]; seen != decltype(seen){})
       state.last.T_source_base[i] = to_pose(seen);
+    if (const LearnedSource learned = to_learned(head.learned[i]); makes_sense(learned))
+      state.last.learned[i].emplace(learned).since = stamp_from_ns(head.learned_since_ns[i]);
+  }
+  state.last.doubted = head.doubted;
   state.sources = body.sources;
   state.last.twist_base = Eigen::Map<const Vector6>(head.twist.data());
   state.flat_ground = static_cast<FlatGround>(body.flat_ground);
@@ -159,11 +198,27 @@ std::optional<SavedState> from_bytes(std::string_view bytes) {
 
 } // namespace
 
-std::uint64_t id_of(std::span<const MotionSource> sources) {
-  std::uint64_t id = checksum_of("");
-  for (const MotionSource& source : sources)
-    id = checksum_of(fmt::format("{} {} {}\n", source.name, to_string(source.kind), source.topic), id);
-  return id;
+SourceIds ids_of(std::span<const MotionSource> sources) {
+  SourceIds ids{.list = checksum_of("")};
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    const MotionSource& source = sources[i];
+    ids.list = checksum_of(fmt::format("{} {} {}\n", source.name, to_string(source.kind), source.topic), ids.list);
+    const Eigen::Quaterniond& q = source.T_base_source.rotation;
+    const CalibrationSigma& sigma = source.calibration_sigma;
+    ids.configured[i] = checksum_of(
+        fmt::format("{} {} {} {} {} {} {} {} {} {} {} {}", source.late_ms, source.scale, source.yaw_scale, q.w(), q.x(),
+                    q.y(), q.z(), to_string(source.calibration), sigma.late_ms.value_or(-1.0),
+                    sigma.mounting_deg.value_or(-1.0), sigma.scale.value_or(-1.0), sigma.yaw_scale.value_or(-1.0)));
+  }
+  return ids;
+}
+
+void SavedState::forget_changed(const SourceIds& now) {
+  if (sources.list != now.list)
+    last.forget_sources();
+  for (std::size_t i = 0; i < kMaxSources; ++i)
+    if (sources.configured[i] != now.configured[i])
+      last.learned[i].reset();
 }
 
 void read_map(const Odometry& odometry, const Pose& T_odom_base, std::vector<SurfacePoint>& map_odom) {

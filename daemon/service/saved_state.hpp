@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -16,16 +18,27 @@
 
 namespace locus::daemon {
 
+/// Tells one list of motion sources from another, in which a source may stand at another place.
+struct SourceIds {
+  std::uint64_t list = 0;                              ///< of names, kinds and topics, in their order
+  std::array<std::uint64_t, kMaxSources> configured{}; ///< of each: what is configured of its calibration
+
+  bool operator==(const SourceIds&) const = default;
+};
+SourceIds ids_of(std::span<const MotionSource> sources);
+
 /// What a service must know to go on where another one ended: where the robot is, and what is to be seen from there.
 struct SavedState {
   Whereabouts last;
   FlatGround flat_ground = FlatGround::off;
   std::vector<SurfacePoint> map_odom;
-  std::uint64_t sources = 0; ///< id_of() those that `last` speaks of
-};
+  SourceIds sources{};   ///< of those that `last` speaks of
+  bool is_recent = true; ///< the robot is still there; otherwise nothing is to be gone on from but what was learned
 
-/// Tells one list of motion sources from another, in which a source may stand at another place.
-std::uint64_t id_of(std::span<const MotionSource> sources);
+  /// Forgets what it says of sources that are now others, and what was learned of those that are now configured
+  /// otherwise.
+  void forget_changed(const SourceIds& now);
+};
 
 /// The map as it is after an estimate: the surfaces within sight of where the robot is.
 void read_map(const Odometry& odometry, const Pose& T_odom_base, std::vector<SurfacePoint>& map_odom);
@@ -52,7 +65,7 @@ class StateKeeper {
 
   /// Without a file it does nothing.
   StateKeeper(std::optional<std::filesystem::path> file, std::span<const MotionSource> sources, Complain complain)
-      : file_(std::move(file)), sources_(id_of(sources)), complain_(std::move(complain)) {}
+      : file_(std::move(file)), sources_(ids_of(sources)), complain_(std::move(complain)) {}
 
   /// Producer, one thread: after every estimate.
   void take(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground);
@@ -81,7 +94,7 @@ class StateKeeper {
   [[nodiscard]] bool is_due() const;
 
   std::optional<std::filesystem::path> file_;
-  std::uint64_t sources_;
+  SourceIds sources_;
   Complain complain_;
   LatestSlot<Due> states_;
   LatestSlot<Update> whereabouts_;

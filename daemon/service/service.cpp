@@ -15,9 +15,12 @@
 #include <unistd.h>
 
 #include "config/config_yaml.hpp"
+#include "config/lidar_metadata.hpp"
 #include "daemon/dds/dds_node.hpp"
+#include "daemon/dds/diagnostics.hpp"
 #include "daemon/machine_time.hpp"
 #include "daemon/service/machine.hpp"
+#include "daemon/service/run_mark.hpp"
 #include "drivers/lidar_input.hpp"
 
 namespace locus::daemon {
@@ -48,7 +51,7 @@ Expected<Config, ConfigErrors> read_config(const std::filesystem::path& file) {
     return config;
   if (const auto lidars = LidarRouter::open(config->lidars); !lidars)
     return ConfigErrors{lidars.error()};
-  return config;
+  return with_lidar_metadata(std::move(*config));
 }
 
 Service::Service(std::filesystem::path config_file, Log& log)
@@ -61,24 +64,29 @@ Service::Service(std::filesystem::path config_file, Log& log)
 Service::~Service() { close(signals_); }
 
 int Service::run(const Config& config) {
-  if (const auto problem = begin(config, recent_state())) {
+  open_control();
+  if (const auto file = state_path(); file && control_)
+    incidents_.emplace(file->parent_path() / "incidents");
+  std::optional<SavedState> state = recent_state();
+  keep_what_was_left(config, state);
+  if (const auto problem = begin(config, std::move(state))) {
     log_.error(*problem);
+    finish_incident(); // nobody will know of it again
     return 1;
   }
-  auto control = ControlServer::open(control_path(), [this](const ControlRequest& request) { return answer(request); });
-  if (control)
-    control_ = std::move(*control);
-  else
-    log_.warn(control.error());
   sd_notify(0, "READY=1");
   for (bool wanted = true; wanted && session_;) {
     std::vector<pollfd> wait{{signals_, POLLIN, 0}};
     if (control_)
       control_->add_to(wait);
+    if (metrics_)
+      metrics_->add_to(wait);
     const timespec tick = to_timespec(kTick);
     ppoll(wait.data(), wait.size(), &tick, nullptr);
     wanted = take_signal();
-    if (wanted && control_ && control_->serve())
+    const bool was_asked = wanted && control_ && control_->serve();
+    const bool was_scraped = wanted && session_ && metrics_ && metrics_->serve();
+    if (was_asked || was_scraped)
       std::this_thread::sleep_for(kAfterAnswers);
     look_after();
   }
@@ -86,11 +94,23 @@ int Service::run(const Config& config) {
   if (!session_)
     return 1;
   watch_.reset();
-  const std::optional<SavedState> state = session_->stop();
+  const std::optional<SavedState> last = session_->stop();
   session_.reset(); // with who else writes states
-  keep_state(state);
+  keep_state(last);
+  finish_incident();
+  if (control_)
+    remove_mark_and_ring();
   log_.info("stopped");
   return 0;
+}
+
+/// Before all else in its folder is touched: who has the socket owns it.
+void Service::open_control() {
+  auto control = ControlServer::open(control_path(), [this](const ControlRequest& request) { return answer(request); });
+  if (control)
+    control_ = std::move(*control);
+  else
+    log_.warn(control.error());
 }
 
 /// What another service left behind, if it can still be true.
@@ -105,15 +125,12 @@ std::optional<SavedState> Service::recent_state() {
     return std::nullopt;
   }
   const Duration age = Stamp{read_clock(CLOCK_REALTIME)} - state->last.stamp;
-  if (age < Duration::zero()) {
+  state->is_recent = age >= Duration::zero() && age <= kOldest;
+  if (age < Duration::zero())
     log_.info("a fresh start: the saved state is newer than the clock; the clock was set back");
-    return std::nullopt;
-  }
-  if (age > kOldest) {
+  if (age > kOldest)
     log_.info(fmt::format("a fresh start: the saved state is {:.0f} s old, more than {:.0f} s", to_seconds(age),
                           to_seconds(kOldest)));
-    return std::nullopt;
-  }
   return std::move(*state);
 }
 
@@ -125,6 +142,29 @@ void Service::keep_state(const std::optional<SavedState>& state) {
     log_.error(*problem);
 }
 
+/// A clean end leaves no mark.
+void Service::keep_what_was_left(const Config& config, const std::optional<SavedState>& state) {
+  if (!incidents_)
+    return;
+  std::error_code ignored;
+  for (const auto& folder : {ring_folder(), record_folder(config.record.folder)})
+    std::filesystem::remove_all(snapshot_in(folder), ignored); // on its way to the disk when the run ended
+  const auto run = take_marked_run();
+  if (!run || config.record.keep_s == 0)
+    return;
+  const Duration keep = from_seconds(config.record.keep_s);
+  const Stamp now{read_clock(CLOCK_REALTIME)};
+  std::vector<std::filesystem::path> pieces = last_pieces(*run, keep);
+  if (pieces.empty())
+    return;
+  const auto pose = state && state->is_recent ? std::optional{state->last.T_odom_base} : std::nullopt;
+  if (!incidents_->raise({IncidentCause::restart, keep, now, restart_report(now, *run, pose), std::move(pieces)}))
+    log_.warn(
+        fmt::format("the run before crashed less than five minutes after another: no incident is kept of it; what "
+                    "it received is in {} until this service stops",
+                    run->string()));
+}
+
 std::optional<std::string> Service::begin(const Config& config, std::optional<SavedState> state) {
   watch_.reset();
   session_.reset();
@@ -132,13 +172,32 @@ std::optional<std::string> Service::begin(const Config& config, std::optional<Sa
     log_.warn(*problem);
   if (const auto problem = lock_memory(config.realtime.lock_memory))
     log_.warn(*problem);
-  auto session = Session::start(config, inherited_, std::move(state), log_);
+  if (incidents_)
+    incidents_->set_max_bytes(config.record.incidents_bytes);
+  Incidents* const incidents = incidents_ ? &*incidents_ : nullptr;
+  auto session = Session::start(config, inherited_, std::move(state), incidents, log_);
   if (!session)
     return session.error();
   session_ = std::move(*session);
   map_asked_.reset();
   watch_.emplace(*session_, log_);
+  listen_for_metrics(config.metrics.listen);
   return std::nullopt;
+}
+
+/// A reload tries again what failed.
+void Service::listen_for_metrics(const std::string& address) {
+  if (metrics_ && address == metrics_address_)
+    return;
+  metrics_.reset();
+  metrics_address_ = address;
+  if (address.empty())
+    return;
+  auto server = MetricsServer::open(address, [this] { return to_open_metrics(session_->figures()); });
+  if (!server)
+    return log_.warn(server.error());
+  metrics_ = std::move(*server);
+  log_.info(fmt::format("metrics are told at {}", address));
 }
 
 ControlServer::Answer Service::reload() {
@@ -220,6 +279,47 @@ std::optional<ControlServer::Answer> Service::answer(const Reset& request) {
 
 std::optional<ControlServer::Answer> Service::answer(Reload /*request*/) { return reload(); }
 
+std::optional<ControlServer::Answer> Service::answer(KeepIncident request) {
+  using Answer = ControlServer::Answer;
+  const Figures figures = session_->figures();
+  if (!figures.live->incidents)
+    return Answer::refusal(
+        "incidents are not kept; set record.keep_s, and without systemd STATE_DIRECTORY and a tmpfs as "
+        "RUNTIME_DIRECTORY, or record.folder");
+  if (request.keep_s > figures.config.record.keep_s)
+    return Answer::wrong_usage(
+        fmt::format("no more than {:g}s can be kept; see record.keep_s", figures.config.record.keep_s));
+  const Stamp now{read_clock(CLOCK_REALTIME)};
+  const auto folder = incidents_->ask(
+      {IncidentCause::asked, from_seconds(request.keep_s), now, incident_report(IncidentCause::asked, now, figures)});
+  if (!folder)
+    return Answer::refusal(folder.error());
+  return Answer{{{"folder", folder->string()}}, {}};
+}
+
+/// What is on its way to the disk gets there, unless that is too slow.
+void Service::finish_incident() {
+  constexpr Duration kPatience = std::chrono::seconds{2};
+  const Duration end = read_clock(CLOCK_MONOTONIC) + kPatience;
+  while (incidents_ && !incidents_->status().writing.empty() && read_clock(CLOCK_MONOTONIC) < end)
+    incidents_->work(nullptr);
+}
+
+void Service::look_for_incidents(const Figures& figures) {
+  const auto cause = incident_watch_.look(figures);
+  const Stamp now{read_clock(CLOCK_REALTIME)};
+  if (cause)
+    incidents_->raise({*cause, from_seconds(figures.config.record.keep_s), now, incident_report(*cause, now, figures)});
+  const Incidents::Status& incidents = *figures.live->incidents;
+  if (!incidents.problem.empty() && incidents.problem != told_incidents_.problem)
+    log_.error(fmt::format("{}; the odometry goes on", incidents.problem));
+  if (!incidents.refusal.empty() && incidents.refusal != told_incidents_.refusal)
+    log_.warn(incidents.refusal);
+  if (incidents.kept != told_incidents_.kept)
+    log_.say(Severity::notice, fmt::format("the last input is kept in {}", incidents.last.string()));
+  told_incidents_ = incidents;
+}
+
 /// The points of the map as they lie in memory. Nothing until the odometry thread has brought them. One that comes
 /// after nobody waits for it any more is of another time.
 std::optional<ControlServer::Answer> Service::answer(SaveMap /*request*/) {
@@ -241,6 +341,8 @@ void Service::look_after() {
     return;
   const Figures figures = session_->figures();
   watch_->look(figures);
+  if (figures.live->incidents)
+    look_for_incidents(figures);
   watchdog_.look(*session_);
   const auto& last = figures.sweeps.last;
   const std::optional<TrackingState> state = last ? std::optional{last->state} : std::nullopt;
@@ -250,7 +352,8 @@ void Service::look_after() {
   told_state_ = state;
   told_ = now;
   sd_notify(0, fmt::format("STATUS={}", status_line(figures)).c_str());
-  session_->link().publish(DiagnosticsMessage(diagnostics(figures), Stamp{read_clock(CLOCK_REALTIME)}));
+  const Stamp stamp{read_clock(CLOCK_REALTIME)};
+  session_->link().publish(DiagnosticsMessage(diagnostics(figures, stamp), stamp));
 }
 
 } // namespace locus::daemon

@@ -9,7 +9,9 @@
 
 #include "config/config_yaml.hpp"
 #include "daemon/service/control.hpp"
+#include "daemon/service/incident_watch.hpp"
 #include "daemon/service/log.hpp"
+#include "daemon/service/metrics_server.hpp"
 #include "daemon/service/session.hpp"
 #include "daemon/service/status.hpp"
 
@@ -30,28 +32,39 @@ class Service {
   int run(const Config& config);
 
  private:
+  void open_control();
   /// What failed, if anything did: there is no session then.
   std::optional<std::string> begin(const Config& config, std::optional<SavedState> state);
   [[nodiscard]] std::optional<SavedState> recent_state();
   void keep_state(const std::optional<SavedState>& state);
+  void keep_what_was_left(const Config& config, const std::optional<SavedState>& state);
+  void finish_incident();
+  void look_for_incidents(const Figures& figures);
   std::optional<ControlServer::Answer> answer(const ControlRequest& request);
   std::optional<ControlServer::Answer> answer(ShowStatus request);
   std::optional<ControlServer::Answer> answer(SaveMap request);
   std::optional<ControlServer::Answer> answer(SetFlatGround request);
   std::optional<ControlServer::Answer> answer(const Reset& request);
   std::optional<ControlServer::Answer> answer(Reload request);
+  std::optional<ControlServer::Answer> answer(KeepIncident request);
   /// Takes the configuration file again; a bad one leaves the old configuration in force, and that is said.
   ControlServer::Answer reload();
   std::optional<std::string> go_on_with(const Config& config);
+  void listen_for_metrics(const std::string& address);
   void look_after();
   bool take_signal();
 
   std::filesystem::path config_file_;
   Log& log_;
   std::vector<int> inherited_;
-  int signals_; ///< signalfd
+  int signals_;                        ///< signalfd
+  std::optional<Incidents> incidents_; ///< where there is a state directory to keep them in
+  IncidentWatch incident_watch_;
+  Incidents::Status told_incidents_;
   std::unique_ptr<Session> session_;
   std::optional<ControlServer> control_;
+  std::unique_ptr<MetricsServer> metrics_;
+  std::string metrics_address_;       ///< where it was last tried to listen
   std::optional<Duration> map_asked_; ///< when the session was; nothing: no answer is waited for
   std::optional<Watch> watch_;
   Watchdog watchdog_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/service/session.hpp"
 
+#include <algorithm>
 #include <array>
 #include <string_view>
 #include <utility>
@@ -10,6 +11,7 @@
 #include <pthread.h>
 
 #include "daemon/machine_time.hpp"
+#include "daemon/service/control.hpp"
 #include "daemon/service/machine.hpp"
 
 namespace locus::daemon {
@@ -18,44 +20,53 @@ namespace {
 
 constexpr Duration kDiskRound = std::chrono::milliseconds{100}; ///< between two looks for what is to be written
 
-OdometryReport report_of(const OdometryEstimate& e) {
-  return {e.stamp, e.T_odom_base, e.pose_covariance, e.twist_base, e.twist_covariance};
-}
-
 OdometryReport report_of(const FastSample& s) {
   return {s.stamp, s.T_odom_base, s.pose_covariance, s.twist_base, s.twist_covariance};
 }
 
-/// Without a state directory a relative one lies where the service was started.
+std::vector<bool> which_give_clouds(const std::vector<LidarOptions>& lidars) {
+  std::vector<bool> which(lidars.size());
+  std::transform(lidars.begin(), lidars.end(), which.begin(), [](const auto& lidar) { return lidar.gives_clouds(); });
+  return which;
+}
+
+} // namespace
+
 std::filesystem::path record_folder(const std::filesystem::path& folder) {
   const auto state = state_path();
   return state ? state->parent_path() / folder : folder;
 }
 
-} // namespace
-
 Expected<std::unique_ptr<Session>, std::string> Session::start(const Config& config, std::span<const int> inherited,
-                                                               std::optional<SavedState> state, Log& log) {
+                                                               std::optional<SavedState> state, Incidents* incidents,
+                                                               Log& log) {
   auto lidars = LidarRouter::open(config.lidars);
   if (!lidars)
     return lidars.error();
   auto sockets = open_lidar_sockets(config, inherited, log);
   if (!sockets)
     return sockets.error();
-  return std::unique_ptr<Session>(new Session(config, std::move(*lidars), std::move(*sockets), std::move(state), log));
+  return std::unique_ptr<Session>(
+      new Session(config, std::move(*lidars), std::move(*sockets), std::move(state), incidents, log));
 }
 
 Session::Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket> sockets,
-                 std::optional<SavedState> state, Log& log)
-    : config_(config), log_(log), started_(MachineTime::now()), input_(std::move(sockets)),
-      flat_ground_(state ? state->flat_ground : config.odometry.flat_ground),
-      link_(config, [this](const RosInput& input) { receive(input); }), clouds_(config.dds, link_),
-      start_(std::move(state)),
+                 std::optional<SavedState> state, Incidents* incidents, Log& log)
+    : config_(config), log_(log), started_(MachineTime::now()),
+      input_(std::move(sockets), which_give_clouds(config.lidars)),
+      flat_ground_(state && state->is_recent ? state->flat_ground : config.odometry.flat_ground), incidents_(incidents),
+      link_(
+          config, [this](const RosInput& input) { receive(input); }, instance_name(),
+          [this](std::uint8_t lidar, Stamp arrival, const SerialisedSample& cloud) { receive(lidar, arrival, cloud); }),
+      clouds_(config.dds, link_), start_(std::move(state)),
       state_(state_path(), config.motion_sources, [this](const std::string& problem) { log_.error(problem); }) {
+  if (start_) {
+    start_->forget_changed(ids_of(config_.motion_sources));
+    const Duration age = Stamp{read_clock(CLOCK_REALTIME)} - start_->last.stamp;
+    recalled_ = {start_->last.learned, std::max(0.0, to_seconds(age))};
+  }
   // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): stands after its like
-  if (start_ && start_->sources != id_of(config_.motion_sources))
-    start_->last.T_source_base = {};
-  has_past_ = start_.has_value() && !start_->map_odom.empty();
+  has_past_ = start_ && start_->is_recent && !start_->map_odom.empty();
   begin(std::move(lidars));
 }
 
@@ -63,8 +74,9 @@ Session::~Session() { end(); }
 
 void Session::begin(LidarRouter lidars) {
   LiveOptions options;
-  if (start_)
+  if (start_ && start_->is_recent)
     options.start = {start_->last, start_->map_odom};
+  options.recalled = recalled_;
   options.on_thread_start = [this] {
     if (const auto problem = raise_priority(config_.realtime.priority))
       log_.warn(*problem);
@@ -76,13 +88,7 @@ void Session::begin(LidarRouter lidars) {
   };
   InputSource& input = begin_recording();
   disk_.emplace(
-      "disk", kDiskRound,
-      [this](bool last) {
-        state_.write();
-        if (recorder_)
-          recorder_->write(last);
-      },
-      [] { take_least_priority(); });
+      "disk", kDiskRound, [this](bool last) { write_to_disk(last); }, [] { take_least_priority(); });
   const std::scoped_lock lock(pipeline_mutex_);
   pipeline_ = std::make_unique<LivePipeline>(config_, std::move(lidars), input, std::move(options));
   pipeline_->set_flat_ground(flat_ground());
@@ -91,18 +97,58 @@ void Session::begin(LidarRouter lidars) {
   pthread_setname_np(publisher_.native_handle(), "publisher");
 }
 
-/// A run is what one life of the odometry has taken: its replay gives the same poses.
+/// A run is what one life of the odometry has taken: its replay gives the same poses. What is recorded to a folder need
+/// not be held in memory for incidents.
 InputSource& Session::begin_recording() {
-  if (config_.record.folder.empty())
-    return input_;
   recorder_.reset(); // of the life before, whose pipeline is at rest
+  holds_ring_ = ring_is_looked_at_ = false;
+  const RecordOptions& options = config_.record;
+  const Duration keep = incidents_ != nullptr ? from_seconds(options.keep_s) : Duration{};
+  if (options.folder.empty() && keep == Duration{})
+    return input_;
+  if (options.folder.empty()) {
+    const auto bounds = ring_bounds(options.keep_bytes, keep);
+    if (!bounds) {
+      log_.warn(bounds.error());
+      return input_;
+    }
+    holds_ring_ = true;
+    return record_to(ring_folder(), *bounds);
+  }
   const auto files = sample_files(config_);
   for (std::size_t i = 0; i < files.size(); ++i)
-    if (!files[i])
+    if (!files[i] && !config_.motion_sources[i].of_lidar)
       log_.warn(fmt::format("motion source {}: is not recorded, for a recording holds one IMU; the first one is",
                             config_.motion_sources[i].name));
-  recorder_ = std::make_unique<Recorder>(record_folder(config_.record.folder), config_);
+  return record_to(record_folder(options.folder),
+                   {options.max_bytes, keep == Duration{} ? RecordingBounds::kForEver : keep});
+}
+
+InputSource& Session::record_to(const std::filesystem::path& folder, const RecordingBounds& bounds) {
+  recorder_ = std::make_unique<Recorder>(folder, config_, bounds);
   return recording_input_.emplace(input_, *recorder_);
+}
+
+bool Session::keeps_incidents() const {
+  return incidents_ != nullptr && recorder_ != nullptr && config_.record.keep_s > 0;
+}
+
+/// In the thread of the disk. What an incident links is complete, and still there. A ring that is held no more goes
+/// once an incident has what it wants of it.
+void Session::write_to_disk(bool last_round) {
+  state_.write();
+  if (incidents_ != nullptr) {
+    incidents_->work(recorder_.get());
+    if (!holds_ring_ && !ring_is_looked_at_ && incidents_->status().writing.empty()) {
+      remove_mark_and_ring();
+      ring_is_looked_at_ = true;
+    }
+  }
+  if (!recorder_)
+    return;
+  recorder_->write(last_round);
+  if (keeps_incidents() && (holds_ring_ || ring_is_looked_at_))
+    mark_run(recorder_->status().run);
 }
 
 void Session::end() {
@@ -117,9 +163,12 @@ void Session::end() {
 OdometryEstimate Session::on_the_wall(const OdometryEstimate& estimate) const {
   OdometryEstimate told = estimate;
   told.stamp = input_.time().wall(estimate.stamp);
-  for (SourceReport& source : told.sources)
+  for (SourceReport& source : told.sources) {
     if (source.last_used != Stamp{})
       source.last_used = input_.time().wall(source.last_used);
+    if (source.learned)
+      source.learned->since = input_.time().wall(source.learned->since);
+  }
   return told;
 }
 
@@ -150,6 +199,8 @@ std::optional<std::string> Session::reset(std::optional<Pose> T_odom_base) {
     return lidars.error();
   end();
   start_.reset();
+  if (state_.now())
+    recalled_ = {state_.now()->learned, 0.0};
   if (T_odom_base)
     start_ = {{Stamp{read_clock(CLOCK_REALTIME)}, *T_odom_base}, flat_ground(), {}};
   state_.begin_anew(start_);
@@ -167,7 +218,7 @@ std::optional<SavedState> Session::stop() {
       start_->flat_ground = flat_ground();
     return std::move(start_);
   }
-  SavedState state{*state_.now(), flat_ground(), {}, id_of(config_.motion_sources)};
+  SavedState state{*state_.now(), flat_ground(), {}, ids_of(config_.motion_sources)};
   read_map(pipeline_->processor().odometry(), state.last.T_odom_base, state.map_odom);
   return state;
 }
@@ -181,6 +232,17 @@ void Session::receive(const RosInput& input) {
     input_.push(*odometry);
   else
     input_.push(std::get<OutsideVerdict>(input));
+}
+
+/// Memory is bought until the largest cloud has come.
+void Session::receive(std::uint8_t lidar, Stamp arrival, const SerialisedSample& cloud) {
+  CloudBytes& next = input_.next_cloud(lidar);
+  next.arrival = arrival;
+  next.too_large = cloud.size() > CloudBytes::kMost;
+  next.bytes.resize(next.too_large ? 0 : cloud.size());
+  if (!next.too_large)
+    cloud.copy_to(next.bytes);
+  input_.push_cloud(lidar);
 }
 
 /// At most one change a second: a topic that flutters does not flutter the odometry.
@@ -323,11 +385,20 @@ Figures Session::figures() const {
   live.kernel_drops = input_.kernel_drops();
   live.filtered = input_.filtered();
   live.motion_drops = input_.motion_drops();
+  for (std::size_t i = 0; i < config_.lidars.size(); ++i)
+    live.cloud_drops[i] = input_.cloud_drops(i);
   live.unfetched = pipeline_->unfetched();
   live.link = link_.status();
-  if (recorder_) {
+  if (keeps_incidents())
+    live.incidents = incidents_->status();
+  if (recorder_ && !config_.record.folder.empty()) {
     live.recording = recorder_->status();
     figures.capture = live.recording->run.string();
+  } else if (recorder_) {
+    const Recorder::Status ring = recorder_->status();
+    live.incidents->dropped = ring.dropped;
+    if (live.incidents->problem.empty())
+      live.incidents->problem = ring.problem;
   }
   const std::scoped_lock lock(told_mutex_);
   figures.ingest = told_.ingest;
@@ -335,11 +406,16 @@ Figures Session::figures() const {
   live.unpublished = told_.unpublished;
   if (figures.sweeps.last)
     figures.sweeps.last = on_the_wall(*figures.sweeps.last);
-  const auto put_on_the_wall = [this](auto& sensors) {
+  const auto wall = [this](Stamp steady) { return steady == Stamp{} ? Stamp{} : input_.time().wall(steady); };
+  const auto put_on_the_wall = [&](auto& sensors) {
     for (auto& sensor : sensors)
-      sensor.last_heard = sensor.last_heard == Stamp{} ? Stamp{} : input_.time().wall(sensor.last_heard);
+      sensor.last_heard = wall(sensor.last_heard);
   };
   put_on_the_wall(figures.ingest.lidars);
+  for (IngestReport::Lidar& lidar : figures.ingest.lidars) {
+    put_on_the_wall(lidar.strangers);
+    lidar.unknown_last_heard = wall(lidar.unknown_last_heard);
+  }
   put_on_the_wall(figures.ingest.sources);
   return figures;
 }

@@ -15,22 +15,29 @@
 #include "core/base/expected.hpp"
 #include "daemon/dds/ros_link.hpp"
 #include "daemon/figures.hpp"
+#include "daemon/incidents.hpp"
 #include "daemon/input.hpp"
 #include "daemon/live_pipeline.hpp"
 #include "daemon/recorder.hpp"
 #include "daemon/service/cloud_publisher.hpp"
 #include "daemon/service/log.hpp"
+#include "daemon/service/run_mark.hpp"
 #include "daemon/service/saved_state.hpp"
 
 namespace locus::daemon {
+
+/// Where record.folder lies: a relative one in the state directory, or without one where the service was started.
+std::filesystem::path record_folder(const std::filesystem::path& folder);
 
 /// The service as one configuration makes it: sockets, DDS, the live threads, the publisher. A reload ends one and
 /// begins another.
 class Session {
  public:
   /// Opens what there is and starts all threads. Fails with one line for the user.
+  /// Incidents, where there is a folder to keep them in, must outlive it.
   static Expected<std::unique_ptr<Session>, std::string> start(const Config& config, std::span<const int> inherited,
-                                                               std::optional<SavedState> state, Log& log);
+                                                               std::optional<SavedState> state, Incidents* incidents,
+                                                               Log& log);
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -65,12 +72,17 @@ class Session {
 
  private:
   Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket> sockets, std::optional<SavedState> state,
-          Log& log);
+          Incidents* incidents, Log& log);
   void begin(LidarRouter lidars);
   InputSource& begin_recording();
+  InputSource& record_to(const std::filesystem::path& folder, const RecordingBounds& bounds);
+  /// Those to come: the input is held that they need.
+  [[nodiscard]] bool keeps_incidents() const;
+  void write_to_disk(bool last_round);
   void end();
   void after(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate);
   void receive(const RosInput& input);
+  void receive(std::uint8_t lidar, Stamp arrival, const SerialisedSample& cloud);
   void take(FlatGroundWord word);
   void publish();
   void publish(const ProcessedSweep& done);
@@ -93,6 +105,9 @@ class Session {
   LiveInput input_;
   std::atomic<FlatGround> flat_ground_;
   Duration flat_ground_changed_{};     ///< of the thread of the link
+  Incidents* incidents_;               ///< null: there is no folder for any
+  bool holds_ring_ = false;            ///< the recording is that for incidents alone
+  bool ring_is_looked_at_ = false;     ///< what an earlier session or process has left of it; of the thread of the disk
   std::unique_ptr<Recorder> recorder_; ///< of one run, where there is to be any
   std::optional<RecordingInput> recording_input_;
   std::unique_ptr<LivePipeline> pipeline_;
@@ -111,6 +126,7 @@ class Session {
   RosLink link_;
   CloudPublisher clouds_;
   std::optional<SavedState> start_; ///< what it began with, until the first estimate
+  Recalled recalled_;               ///< of the run before, or of the time before a reset
   StateKeeper state_;
   std::optional<TrackingState> told_state_;
   Duration told_clock_set_by_{};

@@ -8,99 +8,20 @@
 #include <fmt/format.h>
 #include <systemd/sd-daemon.h>
 
+#include "daemon/calibration.hpp"
 #include "daemon/dds/dds_node.hpp"
+#include "daemon/dds/diagnostics.hpp"
 #include "daemon/machine_time.hpp"
 #include "daemon/service/machine.hpp"
 #include "drivers/net/datagram.hpp"
 
 namespace locus::daemon {
 
-using nlohmann::ordered_json;
-
-namespace {
-
-using Level = Diagnostic::Level;
-
-/// Estimates and packets older than this say nothing about now.
-constexpr Duration kStale = std::chrono::seconds{2};
-
-/// "a.b.c": "1" of everything below `json`, as diagnostics have it.
-void flatten(const ordered_json& json, const std::string& prefix,
-             std::vector<std::pair<std::string, std::string>>& out) {
-  for (const auto& [key, value] : json.items()) {
-    if (value.is_object())
-      flatten(value, prefix + key + '.', out);
-    else
-      out.emplace_back(prefix + key, value.is_string() ? value.get<std::string>() : value.dump());
-  }
-}
-
-Diagnostic diagnostic(Level level, const std::string& name, const std::string& message, const ordered_json& values) {
-  Diagnostic diagnostic{level, "locusd" + name, message, {}};
-  flatten(values, "", diagnostic.values);
-  return diagnostic;
-}
-
-Diagnostic odometry_diagnostic(const Figures& figures, const ordered_json& json) {
-  ordered_json values;
-  for (const char* key : {"rate_hz", "sweeps", "process_ms", "process_cpu_ms", "stage_ms", "points", "iterations_mean",
-                          "dropped", "restarts", "flat_ground", "cpu_s", "peak_rss_mb"})
-    values[key] = json[key];
-  const std::optional<OdometryEstimate>& last = figures.sweeps.last;
-  if (!last || time_since(last->stamp).value_or(Duration::max()) >= kStale)
-    return diagnostic(Level::stale, "", "no lidar data; look whether the lidars send", values);
-  const bool is_well = last->state == TrackingState::tracking || last->state == TrackingState::standstill;
-  return diagnostic(is_well ? Level::ok : Level::warning, "", std::string{to_string(last->state)}, values);
-}
-
-Diagnostic lidar_diagnostic(const LidarOptions& options, const IngestReport::Lidar& lidar, const ordered_json& values) {
-  const std::optional<Duration> silence = lidar.packets.data > 0 ? time_since(lidar.last_heard) : std::nullopt;
-  const bool is_silent = silence && *silence > kStale;
-  const std::string problem = problem_of(options, lidar);
-  return diagnostic(!silence           ? Level::error
-                    : is_silent        ? Level::stale
-                    : !problem.empty() ? Level::warning
-                                       : Level::ok,
-                    ": lidar " + options.name,
-                    !problem.empty() ? problem
-                    : !silence       ? "never heard; look at its cable, address and port"
-                    : is_silent      ? "silent; look at its cable and power"
-                                     : "heard",
-                    values);
-}
-
-} // namespace
-
-/// The values are those of the JSON: all of each lidar and source, of DDS and recording; of the rest those that
-/// odometry_diagnostic() lists.
-std::vector<Diagnostic> diagnostics(const Figures& figures) {
-  const ordered_json json = to_json(figures);
-  std::vector<Diagnostic> all{odometry_diagnostic(figures, json),
-                              diagnostic(Level::ok, ": dds", "connected", json["dds"])};
-  if (const auto& recording = figures.live->recording) {
-    const bool is_well = recording->problem.empty();
-    all.push_back(diagnostic(is_well ? Level::ok : Level::warning, ": recording",
-                             is_well ? "recording" : recording->problem, json["recording"]));
-  }
-  for (std::size_t i = 0; i < figures.config.lidars.size(); ++i) {
-    const LidarOptions& options = figures.config.lidars[i];
-    ordered_json values = json["lidars"][options.name];
-    values["packets"] = json["packets"][options.name];
-    all.push_back(lidar_diagnostic(options, figures.ingest.lidars[i], values));
-  }
-  for (std::size_t i = 0; i < figures.config.motion_sources.size(); ++i) {
-    const std::string& name = figures.config.motion_sources[i].name;
-    const IngestReport::Source& source = figures.ingest.sources[i];
-    all.push_back(diagnostic(source.healthy ? Level::ok : Level::warning, ": source " + name,
-                             std::string{health_of(source)}, json["sources"][name]));
-  }
-  return all;
-}
-
 std::string status_line(const Figures& figures) {
   const SweepFigures& sweeps = figures.sweeps;
   if (!sweeps.last || read_clock(CLOCK_MONOTONIC) - sweeps.last_at > kStale)
-    return figures.ingest.total.received == 0 ? "Waiting for the first lidar packet" : "Waiting for lidar data";
+    return figures.ingest.total.received == 0 && !figures.ingest.has_lidar_data() ? "Waiting for the first lidar packet"
+                                                                                  : "Waiting for lidar data";
   return fmt::format("{}, {:.1f} Hz, {:.1f} ms a sweep, {} dropped", to_string(sweeps.last->state), sweeps.rate_hz,
                      sweeps.process_ms.p50, figures.counters.dropped);
 }
@@ -113,6 +34,7 @@ void Watch::look(const Figures& figures) {
     look_at_sources(live.link);
   look_at_lidars(figures);
   look_at_verdicts(figures.ingest);
+  look_at_calibration(figures);
   look_at_speed(figures.sweeps.largest_speed_mps);
   look_at_load(figures.counters);
   look_at_drops(live);
@@ -158,18 +80,19 @@ void Watch::look_at_lidars(const Figures& figures) {
   const std::vector<LidarOptions>& lidars = figures.config.lidars;
   const Duration now = read_clock(CLOCK_MONOTONIC);
   for (std::size_t i = 0; i < lidars.size(); ++i) {
-    const PacketCounters& packets = ingest.lidars[i].packets;
+    const std::uint64_t used = ingest.lidars[i].used();
     Lidar& lidar = lidars_[i];
-    const bool heard = packets.data > lidar.data;
-    if (packets.data != lidar.data || lidar.heard == Duration::zero()) { // fewer: the counters began anew
+    const bool heard = used > lidar.data;
+    if (used != lidar.data || lidar.heard == Duration::zero()) { // fewer: the counters began anew
       if (heard && !lidar.told.empty())
         log_.info(fmt::format("lidar {}: heard", lidars[i].name), {{"LOCUS_LIDAR", lidars[i].name}});
-      lidar = {.data = packets.data,
-               .received = packets.received,
+      lidar = {.data = used,
+               .received = ingest.lidars[i].received(),
                .heard = now,
                .told = {},
                .short_sweep_told = lidar.short_sweep_told,
-               .shared_port_told = lidar.shared_port_told};
+               .shared_port_told = lidar.shared_port_told,
+               .doubts_told = lidar.doubts_told};
     }
     const auto warning = short_sweep(figures.config.sweep, lidars[i].name, ingest.lidars[i].rotation_rate_rpm);
     if (warning && !std::exchange(lidar.short_sweep_told, true))
@@ -177,20 +100,39 @@ void Watch::look_at_lidars(const Figures& figures) {
     const auto shared = figures.duration > kPatience ? shared_port(lidars[i], ingest.lidars[i]) : std::nullopt;
     if (shared && !std::exchange(lidar.shared_port_told, true))
       log_.warn(*shared, {{"LOCUS_LIDAR", lidars[i].name}});
+    look_at_doubts(lidar, lidars[i], ingest.lidars[i]);
     if (now - lidar.heard < kPatience)
       continue;
     const std::string why = why_silent(lidar, lidars[i], ingest.lidars[i]);
     if (why == lidar.told)
       continue;
     lidar.told = why;
-    log_.warn(fmt::format("lidar {}: no data packet on UDP port {} for {} s; {}", lidars[i].name, lidars[i].port,
+    const std::string what = lidars[i].gives_clouds() ? fmt::format("cloud on topic {}", lidars[i].topic)
+                                                      : fmt::format("data packet on UDP port {}", lidars[i].port);
+    log_.warn(fmt::format("lidar {}: no {} for {} s; {}", lidars[i].name, what,
                           std::chrono::duration_cast<std::chrono::seconds>(now - lidar.heard).count(), why),
               {{"LOCUS_LIDAR", lidars[i].name}});
   }
 }
 
+/// Each once.
+void Watch::look_at_doubts(Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now) {
+  const CloudDoubts doubts = now.clouds ? now.clouds->doubts : CloudDoubts{};
+  if ((doubts & ~lidar.doubts_told).none())
+    return;
+  IngestReport::Lidar untold = now;
+  untold.clouds->doubts &= ~lidar.doubts_told;
+  lidar.doubts_told |= doubts;
+  for (const std::string& line : cloud_doubts(options, untold))
+    log_.warn(line, {{"LOCUS_LIDAR", options.name}});
+}
+
 std::string Watch::why_silent(const Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now) {
   const PacketCounters& packets = now.packets;
+  if (now.clouds)
+    return now.received() == lidar.received
+               ? "look whether its driver runs and publishes it in this domain, and whether DDS may use that interface"
+               : "what comes is refused, for the reasons that locusctl status counts";
   if (packets.received == lidar.received)
     return "look at its power and cable, and where it sends to (locusctl sensors)";
   if (packets[PacketError::sender] > 0 && now.refused_ip && now.source_ip)
@@ -201,10 +143,15 @@ std::string Watch::why_silent(const Lidar& lidar, const LidarOptions& options, c
     return fmt::format(
         "only its position packets arrive; find its data port with locusctl sensors and set lidars.{}.port",
         options.name);
-  const std::string unknown =
-      now.unknown_packets ? fmt::format(" ({})", velodyne::to_string(*now.unknown_packets)) : "";
-  return fmt::format("what comes is refused, for the reasons that locusctl status counts{}: is it a Velodyne, and "
-                     "lidars.{}.model the right one?",
+  const std::string unknown = now.unknown_packets ? fmt::format(" ({})", to_string(*now.unknown_packets)) : "";
+  if (options.is_ouster())
+    return stale_metadata(options, now)
+        .value_or(
+            fmt::format("what comes is refused, for the reasons that locusctl status counts: is {} the metadata of "
+                        "this sensor, as it is set now? locusctl fetch SENSOR fetches it",
+                        options.metadata));
+  return fmt::format("what comes is refused, for the reasons that locusctl status counts{}: is it a lidar "
+                     "whose packets can be read, and lidars.{}.model the right one?",
                      unknown, options.name);
 }
 
@@ -216,6 +163,18 @@ void Watch::look_at_verdicts(const IngestReport& ingest) {
     if (!verdict.empty() && verdict != verdicts_[i])
       log_.warn(fmt::format("motion source {} {}", sources[i].name, verdict), {{"LOCUS_SOURCE", sources[i].name}});
     verdicts_[i] = verdict;
+  }
+}
+
+void Watch::look_at_calibration(const Figures& figures) {
+  const auto& sources = session_.config().motion_sources;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    if (askew_[i])
+      continue;
+    if (const std::string doubt = calibration_doubt(figures, i); !doubt.empty()) {
+      log_.warn(fmt::format("motion source {} {}", sources[i].name, doubt), {{"LOCUS_SOURCE", sources[i].name}});
+      askew_.set(i);
+    }
   }
 }
 

@@ -2,24 +2,20 @@
 #pragma once
 
 #include <array>
+#include <bitset>
 #include <cstdint>
 #include <optional>
 #include <set>
 #include <string>
 #include <string_view>
-#include <vector>
 
-#include "daemon/dds/ros_messages.hpp"
 #include "daemon/figures.hpp"
 #include "daemon/service/log.hpp"
 #include "daemon/service/session.hpp"
 
-/// What a running service tells of its figures beside to_json() and to_text(): to who administers it, to the robot's
-/// network, and to systemd. Figures are live ones.
+/// What a running service tells of its figures beside to_json(), to_text() and diagnostics(): to who administers it,
+/// and to systemd. Figures are live ones.
 namespace locus::daemon {
-
-/// For /diagnostics: one line for the odometry, DDS, each lidar and each motion source, every counter in it.
-std::vector<Diagnostic> diagnostics(const Figures& figures);
 
 /// In one line of plain words, for systemctl status.
 std::string status_line(const Figures& figures);
@@ -42,6 +38,7 @@ class Watch {
   void look_at_sources(const LinkFigures& link);
   void look_at_lidars(const Figures& figures);
   void look_at_verdicts(const IngestReport& ingest);
+  void look_at_calibration(const Figures& figures);
   void look_at_speed(double largest_mps);
   void look_at_load(const SweepCounters& counters);
   void look_at_drops(const Figures::Live& live);
@@ -55,16 +52,19 @@ class Watch {
     std::string told;                     ///< why it is silent, as it was told; empty: it is not
     bool short_sweep_told = false;
     bool shared_port_told = false;
+    CloudDoubts doubts_told{};
   };
+  void look_at_doubts(Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now);
   static std::string why_silent(const Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now);
 
   Session& session_;
   Log& log_;
   bool was_connected_ = false;
   std::uint64_t told_attempts_ = 0;
-  std::array<Lidar, Config::kMaxLidars> lidars_;
+  std::array<Lidar, kMaxLidars> lidars_;
   bool told_speed_ = false;
   std::array<std::string_view, kMaxSources> verdicts_; ///< as they were told
+  std::bitset<kMaxSources> askew_;                     ///< of whose calibration was told
   std::set<std::string> unheard_;                      ///< sources that were told of
   std::set<std::string> intruded_;                     ///< topics that were told of
   std::uint64_t kernel_drops_ = 0, filtered_ = 0, sweep_drops_ = 0;

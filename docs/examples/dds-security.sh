@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # dds-security.sh FOLDER DOMAIN: certificates, governance and permissions (DDS Security) for a robot with locusd, in that
 # DDS domain, valid for two years. Makes in FOLDER an enclave, as ROS 2 lays them out, for each who takes part:
-#   locusd   publishes odometry, state, clouds, /tf, /diagnostics; hears the inputs. For dds.security in locusd.yaml
+#   locusd   publishes odometry, state, clouds, /tf, /diagnostics, itself as a node; hears the inputs. For dds.security in
+#            locusd.yaml
 #   sensors  publishes the inputs, hears nothing
 #   viewer   hears everything, publishes nothing
 # FOLDER/ca holds the key that vouches for them all: take it off the robot. INPUTS in the environment names the topics
@@ -20,7 +21,7 @@ cd "$folder"
 
 new_key() { openssl genpkey -quiet -algorithm EC -pkeyopt ec_paramgen_curve:P-256 -out "$1"; }
 sign() { openssl smime -sign -text -in "$1" -out "$2" -signer ca/cert.pem -inkey ca/key.pem; }
-topics() { for topic; do echo "          <topic>rt$topic</topic>"; done; }
+topics() { for topic; do echo "          <topic>$topic</topic>" | sed 's,>/,>rt/,'; done; } # as ROS 2 calls them in DDS
 allow() { # publish|subscribe TOPIC...
   way=$1
   shift
@@ -89,7 +90,7 @@ XML
 }
 
 # shellcheck disable=SC2086 # a list of topics
-enclave locusd "$(allow publish '/locus/*' /tf /diagnostics; allow subscribe $inputs)"
+enclave locusd "$(allow publish '/locus/*' /tf /diagnostics ros_discovery_info; allow subscribe $inputs)"
 # shellcheck disable=SC2086
 enclave sensors "$(allow publish $inputs)"
-enclave viewer "$(allow subscribe '/*')"
+enclave viewer "$(allow subscribe '/*' ros_discovery_info)"

@@ -6,6 +6,7 @@
 #include <cctype>
 #include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <optional>
 #include <string_view>
 #include <system_error>
@@ -17,8 +18,6 @@
 
 namespace locus {
 namespace {
-
-using FilePointer = std::unique_ptr<std::FILE, decltype([](std::FILE* file) { std::fclose(file); })>;
 
 constexpr std::string_view kRecordOne = "record one with: tcpdump -s 0 -w lidar.pcap udp";
 
@@ -50,12 +49,7 @@ constexpr std::array<std::string_view, 6> kCaptureMagics{"\xD4\xC3\xB2\xA1", "\x
                                                          "\xA1\xB2\x3C\x4D", "\x0A\x0D\x0D\x0A", "\x34\xCD\xB2\xA1"};
 
 /// What a file is that libpcap cannot read, judged by its first bytes; libpcap's own words where it is a capture.
-std::string foreign_file(std::FILE* file, const std::filesystem::path& name, std::string_view libpcap_says) {
-  if (std::fseek(file, 0, SEEK_SET) != 0) { // a pipe
-    return fmt::format("not a pcap or pcapng capture ({})", libpcap_says);
-  }
-  std::array<char, 64> buffer{};
-  const std::string_view start{buffer.data(), std::fread(buffer.data(), 1, buffer.size(), file)};
+std::string foreign_file(std::string_view start, const std::filesystem::path& name, std::string_view libpcap_says) {
   const auto starts_with = [&](std::string_view magic) { return start.substr(0, magic.size()) == magic; };
   if (start.empty()) {
     return fmt::format("the file is empty (0 bytes); {}", kRecordOne);
@@ -111,33 +105,88 @@ std::optional<Stamp> stamp_of(const pcap_pkthdr& header) {
 
 } // namespace
 
+/// What libpcap reads from as from a file: a stream whose first bytes have been looked at.
+struct Capture::Feed {
+  explicit Feed(std::unique_ptr<ByteStream> from) : stream(std::move(from)) {
+    std::size_t more = 1;
+    for (; more > 0 && start_size < start.size(); start_size += more)
+      more = stream->read(std::as_writable_bytes(std::span{start}.subspan(start_size)));
+  }
+
+  /// A file that owns the feed and closes with it; nullptr, and errno, where there is no memory.
+  static std::FILE* open(std::unique_ptr<Feed> feed) {
+    constexpr std::size_t kBufferBytes = 1 << 16;
+    std::FILE* const file = fopencookie(feed.get(), "rb", {read, nullptr, seek, close});
+    if (file != nullptr) {
+      static_cast<void>(feed.release());
+      std::setvbuf(file, nullptr, _IOFBF, kBufferBytes);
+    }
+    return file;
+  }
+
+  static ssize_t read(void* cookie, char* out, std::size_t size) {
+    auto& feed = *static_cast<Feed*>(cookie);
+    std::size_t count = 0;
+    if (feed.at < feed.start_size) {
+      count = std::min(size, feed.start_size - feed.at);
+      std::memcpy(out, feed.start.data() + feed.at, count);
+    } else {
+      count = feed.stream->read(std::as_writable_bytes(std::span{out, size}));
+    }
+    feed.at += count;
+    return static_cast<ssize_t>(count);
+  }
+  /// Tells the place and goes to no other.
+  static int seek(void* cookie, off64_t* offset, int whence) {
+    if (whence != SEEK_CUR || *offset != 0) {
+      errno = ESPIPE;
+      return -1;
+    }
+    *offset = static_cast<off64_t>(static_cast<Feed*>(cookie)->at);
+    return 0;
+  }
+  static int close(void* cookie) {
+    delete static_cast<Feed*>(cookie);
+    return 0;
+  }
+
+  std::unique_ptr<ByteStream> stream;
+  std::array<char, 64> start{};
+  std::size_t start_size = 0;
+  std::uint64_t at = 0; ///< bytes given out
+};
+
 void Capture::Closer::operator()(pcap* handle) const { pcap_close(handle); }
 
-Capture::Capture(std::filesystem::path file, pcap* handle, std::uint64_t bytes_total)
-    : file_(std::move(file)), pcap_(handle), bytes_total_(bytes_total) {}
+Capture::Capture(std::filesystem::path file, pcap* handle, const ByteStream& stream)
+    : file_(std::move(file)), pcap_(handle), stream_(&stream) {}
 
 Expected<Capture, std::string> Capture::open(const std::filesystem::path& file) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) {
-    return fmt::format("{}: a folder, not a capture; name the pcap file in it", file.string());
-  }
-  FilePointer stream{file == "-" ? stdin : std::fopen(file.c_str(), "rb")};
-  if (!stream) {
-    return fmt::format("{}: {}; check the path", file.string(), std::generic_category().message(errno));
+  Expected<std::unique_ptr<ByteStream>, std::string> stream = open_stream(file);
+  return stream ? open(std::move(*stream), file) : stream.error();
+}
+
+Expected<Capture, std::string> Capture::open(std::unique_ptr<ByteStream> stream, const std::filesystem::path& name) {
+  auto feed = std::make_unique<Feed>(std::move(stream));
+  const ByteStream& bytes = *feed->stream;
+  const std::string start(feed->start.data(), feed->start_size);
+  std::FILE* const opened = Feed::open(std::move(feed));
+  if (opened == nullptr) {
+    return fmt::format("{}: {}", name.string(), std::generic_category().message(errno));
   }
   std::array<char, PCAP_ERRBUF_SIZE> reason{};
-  pcap_t* handle = pcap_fopen_offline_with_tstamp_precision(stream.get(), PCAP_TSTAMP_PRECISION_NANO, reason.data());
+  pcap_t* handle = pcap_fopen_offline_with_tstamp_precision(opened, PCAP_TSTAMP_PRECISION_NANO, reason.data());
   if (handle == nullptr) {
-    return fmt::format("{}: {}", file.string(), foreign_file(stream.get(), file, reason.data()));
+    std::string problem = bytes.problem();
+    std::fclose(opened);
+    return fmt::format("{}: {}", name.string(),
+                       problem.empty() ? foreign_file(start, name, reason.data()) : std::move(problem));
   }
-  static_cast<void>(stream.release()); // pcap_close() closes it
-  const std::uintmax_t bytes_total =
-      std::filesystem::is_regular_file(file, ignored) ? std::filesystem::file_size(file, ignored) : 0;
-  Capture capture{file, handle, bytes_total};
+  Capture capture{name, handle, bytes}; // pcap_close() closes the file
   if (const int link_type = pcap_datalink(handle); !link_type_supported(link_type)) {
     return fmt::format("{}: link type {} is not supported; record on the network card that the lidar is plugged into "
                        "(Ethernet, VLAN, Linux cooked, loopback and raw IP are read)",
-                       file.string(), link_type_name(link_type));
+                       name.string(), link_type_name(link_type));
   }
   return capture;
 }
@@ -156,7 +205,12 @@ const Datagram* Capture::next() {
     }
     ++stats_.frames;
     const std::span<const std::byte> frame{reinterpret_cast<const std::byte*>(data), header->caplen};
-    const Expected<Datagram, FrameError> datagram = udp_datagram(pcap_datalink(pcap_.get()), frame, header->len);
+    Expected<Datagram, FrameError> datagram = udp_datagram(pcap_datalink(pcap_.get()), frame, header->len);
+    if (!datagram && datagram.error() == FrameError::fragment) {
+      if (const auto joined = fragments_.take(pcap_datalink(pcap_.get()), frame)) {
+        datagram = *joined;
+      }
+    }
     const std::optional<Stamp> stamp = stamp_of(*header);
     if (!datagram || !stamp) {
       count(datagram ? FrameError::malformed : datagram.error(), stats_);
@@ -181,10 +235,11 @@ void Capture::note_break() {
     return;
   }
   const bool cut = std::feof(pcap_file(pcap_.get())) != 0;
-  const std::string place = bytes_total_ > 0 ? fmt::format("byte {}: ", bytes_read()) : ""; // a pipe counts none
-  break_ = fmt::format("{}: {}{} ({}); the {} frames before it are used{}", file_.string(), place,
-                       cut ? "the capture ends in mid-packet" : "the capture is damaged", why, stats_.frames,
-                       cut ? "" : ", what follows is not");
+  const std::string problem = stream_->problem(); // then it, and not the capture, ended too soon
+  break_ =
+      fmt::format("{}: byte {}: {} ({}); the {} frames before it are used{}", file_.string(),
+                  ftello(pcap_file(pcap_.get())), cut ? "the capture ends in mid-packet" : "the capture is damaged",
+                  problem.empty() ? why : problem, stats_.frames, cut ? "" : ", what follows is not");
 }
 
 std::string Capture::why_none() const {
@@ -196,16 +251,17 @@ std::vector<std::string> Capture::warnings() const {
   std::vector<std::string> lines;
   if (!break_.empty()) {
     lines.push_back(break_);
+  } else if (std::string problem = stream_->problem(); !problem.empty()) {
+    lines.push_back(fmt::format("{}: {}; the {} frames before it are used", file_.string(), problem, stats_.frames));
   }
   const auto warn = [&](std::uint64_t count, std::string_view what) {
     if (count > 0) {
       lines.push_back(fmt::format("{}: {} {}", file_.string(), count, what));
     }
   };
-  warn(stats_.fragments,
-       "IP fragments refused: a lidar's packets fit one Ethernet frame, so something on the way (tunnel, "
-       "router, Wi-Fi bridge) has a smaller MTU; set it to 1500 or record next to the lidar (an Ouster's do not fit: "
-       "it is not decoded)");
+  warn(stats_.fragments - fragments_.joined(),
+       "IP fragments without the others of their packet; record next to the lidar, with: tcpdump -s 0 udp (a filter by "
+       "port keeps back all but the first of each)");
   warn(stats_.truncated, "datagrams cut by the capture's snap length; record again with: tcpdump -s 0");
   warn(stats_.malformed, "frames with contradictory lengths, headers cut short or absurd times left out; "
                          "record again if the lidar's packets are among them");
@@ -213,12 +269,6 @@ std::vector<std::string> Capture::warnings() const {
   return lines;
 }
 
-double Capture::progress() const {
-  return bytes_total_ > 0 ? static_cast<double>(bytes_read()) / static_cast<double>(bytes_total_) : 0.0;
-}
-
-std::uint64_t Capture::bytes_read() const {
-  return static_cast<std::uint64_t>(std::max<off_t>(0, ftello(pcap_file(pcap_.get()))));
-}
+double Capture::progress() const { return stream_->progress(); }
 
 } // namespace locus

@@ -2,6 +2,7 @@
 #include "drivers/files/capture_folder.hpp"
 
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <iterator>
 #include <optional>
@@ -15,6 +16,40 @@ namespace locus {
 namespace {
 
 using std::filesystem::path;
+
+constexpr std::array<const char*, 2> kCaptures{".pcap", ".pcapng"};
+constexpr std::array<const char*, 5> kPackings{"", ".gz", ".xz", ".zst", ".zstd"};
+
+/// The name without what says that it is packed.
+path unpacked_name(const path& file) {
+  const bool is_packed = file.has_extension() && std::ranges::find(kPackings, file.extension()) != kPackings.end();
+  return is_packed ? path{file}.replace_extension() : file;
+}
+
+/// `name`, packed or not, where there is one.
+std::optional<path> packed_or_not(const path& name) {
+  std::error_code ignored;
+  for (const char* const packing : kPackings) {
+    const path file = name.string() + packing;
+    if (std::filesystem::exists(file, ignored)) {
+      return file;
+    }
+  }
+  return std::nullopt;
+}
+
+/// The file and the parts that follow it.
+std::vector<path> parts_of(const path& first) {
+  std::vector<path> parts{first};
+  std::optional<path> next = first;
+  for (int number = 1; next && is_named_as_capture(first); ++number) {
+    next = packed_or_not(unpacked_name(first).string() + std::to_string(number));
+    if (next) {
+      parts.push_back(*next);
+    }
+  }
+  return parts;
+}
 
 /// folder/name, or empty where there is no such file.
 path existing(const path& folder, const char* name) {
@@ -70,13 +105,13 @@ Expected<CaptureFolder, std::string> folder_of(const path& where) {
   if (!files) {
     return files.error();
   }
-  const path pcap = existing(where, "lidar.pcap");
-  const path pcapng = existing(where, "lidar.pcapng");
-  if (!pcap.empty() && !pcapng.empty()) {
-    return fmt::format("{}: holds both lidar.pcap and lidar.pcapng; remove or rename one", where.string());
+  const std::vector<path> captures = captures_in(where);
+  if (captures.size() > 1) {
+    return fmt::format("{}: holds both {} and {}; remove or rename one", where.string(),
+                       captures[0].filename().string(), captures[1].filename().string());
   }
   CaptureFolder found;
-  found.lidar = {pcap.empty() ? pcapng : pcap};
+  found.lidar = parts_of(captures.front());
   found.imu = all_existing(where, "imu.csv");
   found.ground_truth = existing(where, "gt.tum");
   found.map_truth = existing(where, "gt_map.ply");
@@ -110,9 +145,7 @@ std::string text_of(const path& file) {
   return {std::istreambuf_iterator<char>{stream}, {}};
 }
 
-bool has_capture(const path& where) {
-  return !existing(where, "lidar.pcap").empty() || !existing(where, "lidar.pcapng").empty();
-}
+bool has_capture(const path& where) { return !captures_in(where).empty(); }
 
 /// The capture folders that `where` is or holds.
 std::vector<path> capture_folders_in(const path& where) {
@@ -142,6 +175,24 @@ std::vector<path> folders_named(const path& where, const std::regex& name) {
 
 } // namespace
 
+bool is_named_as_capture(const path& file) {
+  return std::ranges::find(kCaptures, unpacked_name(file).extension()) != kCaptures.end();
+}
+
+std::vector<path> captures_in(const path& folder) {
+  std::vector<path> found;
+  for (const char* const capture : kCaptures) {
+    for (const char* const packing : kPackings) {
+      if (path file = existing(folder, fmt::format("lidar{}{}", capture, packing).c_str()); !file.empty()) {
+        found.push_back(std::move(file));
+      }
+    }
+  }
+  return found;
+}
+
+std::string metadata_file(const std::string& lidar) { return lidar + ".json"; }
+
 std::vector<path> runs_in(const path& folder) {
   static const std::regex kRun{R"(\d{6,9}_\d{4}-\d\d-\d\dT\d\d-\d\d-\d\dZ)"};
   return folders_named(folder, kRun);
@@ -156,12 +207,12 @@ int number_of(const path& folder) { return std::stoi(folder.filename().string())
 
 Expected<CaptureFolder, std::string> CaptureFolder::find(const path& where) {
   std::error_code error;
-  if (!std::filesystem::exists(where, error)) {
+  if (where != "-" && !std::filesystem::exists(where, error)) {
     return fmt::format("{}: no such file or folder; check the path", where.string());
   }
-  if (!std::filesystem::is_directory(where, error)) {
+  if (where == "-" || !std::filesystem::is_directory(where, error)) {
     CaptureFolder found;
-    found.lidar = {where};
+    found.lidar = parts_of(where);
     return found;
   }
   if (const auto files = entries_of(where); !files) {

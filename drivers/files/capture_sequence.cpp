@@ -7,8 +7,8 @@
 
 namespace locus {
 
-Expected<CaptureSequence, std::string> CaptureSequence::open(std::vector<std::filesystem::path> files) {
-  CaptureSequence sequence(std::move(files));
+Expected<CaptureSequence, std::string> CaptureSequence::open(std::vector<std::filesystem::path> files, Opener opener) {
+  CaptureSequence sequence(std::move(files), std::move(opener));
   if (!sequence.open_next())
     return sequence.warnings_.front();
   return sequence;
@@ -17,7 +17,7 @@ Expected<CaptureSequence, std::string> CaptureSequence::open(std::vector<std::fi
 /// False when no file is left that can be opened.
 bool CaptureSequence::open_next() {
   while (next_file_ < files_.size()) {
-    Expected<Capture, std::string> next = Capture::open(files_[next_file_++]);
+    Expected<Capture, std::string> next = opener_(files_[next_file_++]);
     if (!next) {
       warnings_.push_back(next.error());
       continue;

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,9 +18,13 @@ namespace locus {
 /// switched off when it was begun, is left out with a warning. One owner.
 class CaptureSequence : public DatagramSource {
  public:
-  /// At least one file; of one that stands alone, what Capture::open() says. Fails with one line for the user when none
-  /// of them can be opened.
-  static Expected<CaptureSequence, std::string> open(std::vector<std::filesystem::path> files);
+  using Opener = std::function<Expected<Capture, std::string>(const std::filesystem::path&)>;
+
+  /// At least one file; of one that stands alone, what `opener` says. Fails with one line for the user when none of
+  /// them can be opened.
+  static Expected<CaptureSequence, std::string> open(
+      std::vector<std::filesystem::path> files,
+      Opener opener = [](const std::filesystem::path& file) { return Capture::open(file); });
 
   const Datagram* next() override;
   [[nodiscard]] std::uint64_t datagrams() const override { return before_ + capture_->datagrams(); }
@@ -28,10 +33,12 @@ class CaptureSequence : public DatagramSource {
   [[nodiscard]] double progress() const override;
 
  private:
-  explicit CaptureSequence(std::vector<std::filesystem::path> files) : files_(std::move(files)) {}
+  CaptureSequence(std::vector<std::filesystem::path> files, Opener opener)
+      : files_(std::move(files)), opener_(std::move(opener)) {}
   bool open_next();
 
   std::vector<std::filesystem::path> files_;
+  Opener opener_;
   std::size_t next_file_ = 0;
   std::optional<Capture> capture_;    ///< of the file before next_file_
   std::uint64_t before_ = 0;          ///< datagrams of the captures before

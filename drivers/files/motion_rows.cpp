@@ -32,9 +32,9 @@ std::optional<Stamp> parse_ns(std::string_view text) {
   return parse(text, ns) && is_sensible(stamp_from_ns(ns)) ? std::optional{stamp_from_ns(ns)} : std::nullopt;
 }
 
-/// Decimal seconds, rounded to nanoseconds without a detour over double, whose steps are 200 ns at today's dates. Takes
-/// an exponent too: NumPy writes 1.403636579763555527e+09.
-std::optional<Stamp> parse_seconds(std::string_view text) {
+} // namespace
+
+std::optional<Stamp> parse_time(std::string_view text, int unit_exponent) {
   constexpr int kMaxExponent = 18;
   const std::size_t exponent_at = std::min(text.find_first_of("eE"), text.size());
   int exponent = 0;
@@ -51,7 +51,7 @@ std::optional<Stamp> parse_seconds(std::string_view text) {
   if (digits.empty() || digits.find_first_not_of("0123456789") != std::string::npos) {
     return std::nullopt;
   }
-  const int digits_of_ns = static_cast<int>(point) + exponent + 9;
+  const int digits_of_ns = static_cast<int>(point) + exponent + unit_exponent + 9;
   if (digits_of_ns <= 0) {
     return Stamp{};
   }
@@ -66,8 +66,12 @@ std::optional<Stamp> parse_seconds(std::string_view text) {
   return stamp_from_ns(negative ? -ns : ns);
 }
 
-/// A rotation, NaN included. Nothing when the four numbers are none, which tells columns in another order from a
-/// quaternion rounded by the writer.
+namespace {
+
+std::optional<Stamp> parse_seconds(std::string_view text) { return parse_time(text, 0); }
+
+} // namespace
+
 std::optional<Eigen::Quaterniond> unit_quaternion(double w, double x, double y, double z) {
   constexpr double kTolerance = 0.05;
   constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
@@ -77,8 +81,6 @@ std::optional<Eigen::Quaterniond> unit_quaternion(double w, double x, double y, 
   }
   return std::abs(q.squaredNorm() - 1.0) < kRounding ? q : q.normalized(); // every digit of one that was recorded
 }
-
-} // namespace
 
 std::string_view trimmed(std::string_view text) {
   constexpr std::string_view kBlanks = " \t\r";

@@ -30,6 +30,14 @@ struct Meta {
   double covariance_scale = 1.0;
 };
 
+/// A decimal number of units of 10^unit_exponent seconds since 1970, rounded to nanoseconds without a detour over
+/// double, whose steps are 200 ns at today's dates. Takes an exponent too: NumPy writes 1.403636579763555527e+09.
+std::optional<Stamp> parse_time(std::string_view text, int unit_exponent);
+
+/// A rotation, NaN included; one of unit length up to rounding keeps its bits. Nothing when the four numbers are none,
+/// which tells columns in another order from a quaternion rounded by the writer.
+std::optional<Eigen::Quaterniond> unit_quaternion(double w, double x, double y, double z);
+
 Problem parse_imu(Fields fields, ImuSample& sample);
 Problem parse_odometry(Fields fields, OdometrySample& sample);
 Problem parse_meta(Fields fields, Meta& meta);

@@ -89,13 +89,35 @@ Expected<ByteSpan, FrameError> ip_packet(int link_type, ByteSpan frame) {
   }
 }
 
+constexpr std::size_t kMinIpHeaderBytes = 20;
+constexpr std::uint8_t kUdp = 17;
+constexpr std::uint16_t kMoreFragments = 0x2000, kFragmentOffset = 0x1FFF;
+
+/// The datagram in what stands behind an IP header and has `ip_payload_bytes` by that. `cut_bytes` of it were on the
+/// wire, but not captured.
+Expected<Datagram, FrameError> datagram_in_udp(ByteSpan udp, std::size_t ip_payload_bytes, std::size_t cut_bytes,
+                                               std::uint32_t source_ip) {
+  constexpr std::size_t kUdpHeaderBytes = 8;
+  if (udp.size() < kUdpHeaderBytes) {
+    return FrameError::malformed;
+  }
+  const std::size_t udp_bytes = big_endian_16(udp, 4);
+  // The IP length alone may claim too much: a VLP-16 of 2014 puts that of its data packets in its position packets.
+  if (udp_bytes < kUdpHeaderBytes || udp_bytes > std::min(ip_payload_bytes, udp.size() + cut_bytes)) {
+    return FrameError::malformed;
+  }
+  const std::size_t kept_bytes = std::min(udp_bytes, udp.size());
+  Datagram datagram;
+  datagram.payload = udp.subspan(kUdpHeaderBytes, kept_bytes - kUdpHeaderBytes);
+  datagram.source_ip = source_ip;
+  datagram.source_port = big_endian_16(udp, 0);
+  datagram.destination_port = big_endian_16(udp, 2);
+  datagram.truncated = kept_bytes < udp_bytes;
+  return datagram;
+}
+
 /// `cut_bytes` of the packet were on the wire, but not captured.
 Expected<Datagram, FrameError> datagram_in(ByteSpan packet, std::size_t cut_bytes) {
-  constexpr std::size_t kMinIpHeaderBytes = 20;
-  constexpr std::size_t kUdpHeaderBytes = 8;
-  constexpr std::uint8_t kUdp = 17;
-  constexpr std::uint16_t kMoreFragmentsOrOffset = 0x3FFF;
-
   if (!packet.empty() && byte_at(packet, 0) >> 4 == 6) {
     return FrameError::ipv6;
   }
@@ -107,29 +129,17 @@ Expected<Datagram, FrameError> datagram_in(ByteSpan packet, std::size_t cut_byte
   if (ip_header_bytes < kMinIpHeaderBytes || ip_bytes < ip_header_bytes) {
     return FrameError::malformed;
   }
-  if ((big_endian_16(packet, 6) & kMoreFragmentsOrOffset) != 0) {
+  if ((big_endian_16(packet, 6) & (kMoreFragments | kFragmentOffset)) != 0) {
     return FrameError::fragment;
   }
   if (byte_at(packet, 9) != kUdp) {
     return FrameError::not_udp;
   }
-  if (packet.size() < ip_header_bytes + kUdpHeaderBytes) {
+  if (packet.size() < ip_header_bytes) {
     return FrameError::malformed;
   }
-  const ByteSpan udp = packet.subspan(ip_header_bytes);
-  const std::size_t udp_bytes = big_endian_16(udp, 4);
-  // The IP length alone may claim too much: a VLP-16 of 2014 puts that of its data packets in its position packets.
-  if (udp_bytes < kUdpHeaderBytes || udp_bytes > std::min(ip_bytes - ip_header_bytes, udp.size() + cut_bytes)) {
-    return FrameError::malformed;
-  }
-  const std::size_t kept_bytes = std::min(udp_bytes, udp.size());
-  Datagram datagram;
-  datagram.payload = udp.subspan(kUdpHeaderBytes, kept_bytes - kUdpHeaderBytes);
-  datagram.source_ip = big_endian_32(packet, 12);
-  datagram.source_port = big_endian_16(udp, 0);
-  datagram.destination_port = big_endian_16(udp, 2);
-  datagram.truncated = kept_bytes < udp_bytes;
-  return datagram;
+  return datagram_in_udp(packet.subspan(ip_header_bytes), ip_bytes - ip_header_bytes, cut_bytes,
+                         big_endian_32(packet, 12));
 }
 
 } // namespace
@@ -155,6 +165,75 @@ Expected<Datagram, FrameError> udp_datagram(int link_type, std::span<const std::
     return packet.error();
   }
   return datagram_in(*packet, wire_bytes - std::min(wire_bytes, frame.size()));
+}
+
+std::optional<Datagram> IpFragments::take(int link_type, std::span<const std::byte> frame) {
+  const Expected<ByteSpan, FrameError> found = ip_packet(link_type, frame);
+  if (!found) {
+    return std::nullopt;
+  }
+  const ByteSpan packet = *found;
+  if (const auto whole = datagram_in(packet, 0); whole || whole.error() != FrameError::fragment) {
+    return std::nullopt;
+  }
+  const std::size_t header_bytes = (byte_at(packet, 0) & 0xFu) * std::size_t{4};
+  const std::size_t bytes = big_endian_16(packet, 2) - header_bytes;
+  const std::uint16_t flags = big_endian_16(packet, 6);
+  const std::size_t begin = (flags & kFragmentOffset) * kUnit;
+  const bool is_last = (flags & kMoreFragments) == 0;
+  const bool fits = byte_at(packet, 9) == kUdp && bytes > 0 && packet.size() >= header_bytes + bytes &&
+                    begin + bytes <= kMaxPayload && (is_last || bytes % kUnit == 0);
+  if (!fits) {
+    return std::nullopt;
+  }
+  const Name name{big_endian_32(packet, 12), big_endian_32(packet, 16), big_endian_16(packet, 4)};
+  return add(place_of(name), packet.subspan(header_bytes, bytes), begin, is_last);
+}
+
+/// The packet of this name, or a new one where one was that is free, or has waited longest for more.
+IpFragments::Packet& IpFragments::place_of(const Name& name) {
+  for (Packet& packet : *packets_) {
+    if (packet.fragments > 0 && packet.name == name) {
+      return packet;
+    }
+  }
+  Packet& place = *std::ranges::min_element(
+      *packets_, {}, [](const Packet& packet) { return packet.fragments > 0 ? packet.latest : std::uint64_t{0}; });
+  place.name = name;
+  place.fragments = 0;
+  return place;
+}
+
+/// A part that is there already is of a later packet, whose number is the same.
+std::optional<Datagram> IpFragments::add(Packet& packet, ByteSpan fragment, std::size_t begin, bool is_last) {
+  const std::size_t first = begin / kUnit, behind = (begin + fragment.size() + kUnit - 1) / kUnit;
+  bool is_new = packet.fragments == 0;
+  for (std::size_t unit = first; unit < behind && !is_new; ++unit) {
+    is_new = packet.units[unit];
+  }
+  if (is_new) {
+    packet.fragments = packet.bytes = 0;
+    packet.bytes_total.reset();
+    packet.units.reset();
+  }
+  for (std::size_t unit = first; unit < behind; ++unit) {
+    packet.units.set(unit);
+  }
+  std::ranges::copy(fragment, packet.payload.begin() + static_cast<std::ptrdiff_t>(begin));
+  packet.bytes += fragment.size();
+  packet.latest = ++taken_;
+  ++packet.fragments;
+  if (is_last) {
+    packet.bytes_total = begin + fragment.size();
+  }
+  if (packet.bytes != packet.bytes_total) {
+    return std::nullopt;
+  }
+  const auto datagram =
+      datagram_in_udp(ByteSpan{packet.payload}.first(packet.bytes), packet.bytes, 0, packet.name.source_ip);
+  joined_ += datagram ? packet.fragments - 1 : 0;
+  packet.fragments = 0;
+  return datagram ? std::optional{*datagram} : std::nullopt;
 }
 
 } // namespace locus

@@ -11,7 +11,11 @@
 
 namespace locus {
 
+struct CloudView;
 struct LidarPacket;
+
+/// What is longer is no packet of a lidar: an Ouster with 128 beams and two returns sends 33 024 bytes.
+inline constexpr std::size_t kLongestPayload = 36'864;
 
 /// One UDP datagram as it came from a socket or a capture. Addresses and ports are in host byte order. Owns nothing:
 /// the payload lives until its source is asked for the next one.
@@ -24,6 +28,9 @@ struct Datagram {
   bool truncated = false; ///< longer on the wire than what was kept
   /// What decoding it gives, where a recording holds no bytes but returns: the payload is then empty. Lives as long.
   const LidarPacket* decoded = nullptr;
+  /// A message with a whole cloud in place of bytes, and the index of its lidar in the configuration. Lives as long.
+  const CloudView* cloud = nullptr;
+  std::uint8_t lidar = 0;
   /// By how much the clock of this host has been set since the time began that receive_stamp is in.
   Duration clock_set_by{};
 };

@@ -29,13 +29,13 @@ class Program {
   void add(std::uint16_t code, std::uint8_t if_true, std::uint8_t if_false, std::uint32_t value) {
     steps_[count_++] = {code, if_true, if_false, value};
   }
-  std::array<sock_filter, 16 + LidarRouter::Senders::kMax> steps_{};
+  std::array<sock_filter, 16 + LidarRouter::Senders::kMax + LidarRouter::Senders::kMaxLengths> steps_{};
   std::size_t count_ = 0;
 };
 
 /// Lets pass what comes from these senders, if any are named, with the length of a lidar's packet, and one in kSample
 /// of all else.
-Program lidars_and_samples(std::span<const std::uint32_t> senders) {
+Program lidars_and_samples(std::span<const std::uint32_t> senders, std::span<const std::size_t> lengths) {
   constexpr std::size_t kSampleSteps = 4; ///< before the last step, which lets pass
   constexpr std::uint32_t kHeader = 8;    // bytes of UDP's, where the offsets begin
   constexpr int kLengthInHeader = 4, kSourceInIpHeader = SKF_NET_OFF + 12;
@@ -43,8 +43,9 @@ Program lidars_and_samples(std::span<const std::uint32_t> senders) {
   const std::size_t if_length_fits = senders.empty() ? kSampleSteps : 0;
   Program program;
   program.load(BPF_H, kLengthInHeader);
-  program.skip(kHeader + velodyne::kDataPacketBytes, 1 + if_length_fits, 0);
-  program.skip(kHeader + velodyne::kPositionPacketBytes, if_length_fits, sender_steps);
+  for (std::size_t left = lengths.size(); left > 0; --left)
+    program.skip(kHeader + static_cast<std::uint32_t>(lengths[lengths.size() - left]), left - 1 + if_length_fits,
+                 left == 1 ? sender_steps : 0);
   if (!senders.empty())
     program.load(BPF_W, kSourceInIpHeader);
   for (std::size_t left = senders.size(); left > 0; --left)
@@ -62,19 +63,16 @@ Program lidars_and_samples(std::span<const std::uint32_t> senders) {
 void FloodGuard::look_at(std::span<const Datagram> datagrams, UdpSocket& socket) {
   if (datagrams.empty())
     return;
-  if (const Stamp now = datagrams.back().receive_stamp;
-      std::chrono::abs(now - second_began_) > std::chrono::seconds{1}) {
-    if (guards_ && foreign_ < kFlood) {
-      guards_ = false;
-      socket.filter({});
-    }
-    second_began_ = now;
-    foreign_ = 0;
-  }
+  begin_second(datagrams.back().receive_stamp, socket);
   const auto foreign = std::ranges::count_if(datagrams, [this](const Datagram& one) { return is_foreign(one); });
   foreign_ += static_cast<std::uint64_t>(foreign) * (guards_ ? kSample : 1);
   if (!guards_ && foreign_ > kFlood)
     guard(socket);
+}
+
+void FloodGuard::hear_nothing(Stamp now, UdpSocket& socket) {
+  if (guards_)
+    begin_second(now, socket);
 }
 
 void FloodGuard::expect(const LidarRouter::Senders& senders, UdpSocket& socket) {
@@ -85,12 +83,26 @@ void FloodGuard::expect(const LidarRouter::Senders& senders, UdpSocket& socket) 
     guard(socket);
 }
 
-void FloodGuard::guard(UdpSocket& socket) { guards_ = socket.filter(lidars_and_samples(senders_.all()).steps()); }
+void FloodGuard::guard(UdpSocket& socket) {
+  guards_ = socket.filter(lidars_and_samples(senders_.all(), senders_.all_lengths()).steps());
+}
+
+/// If the last one is over.
+void FloodGuard::begin_second(Stamp now, UdpSocket& socket) {
+  if (std::chrono::abs(now - second_began_) <= std::chrono::seconds{1})
+    return;
+  if (guards_ && foreign_ < kFlood) {
+    guards_ = false;
+    socket.filter({});
+  }
+  second_began_ = now;
+  foreign_ = 0;
+}
 
 bool FloodGuard::is_foreign(const Datagram& datagram) const {
-  const std::size_t length = datagram.payload.size();
   const auto known = senders_.all();
-  return (length != velodyne::kDataPacketBytes && length != velodyne::kPositionPacketBytes) ||
+  const auto lengths = senders_.all_lengths();
+  return std::ranges::find(lengths, datagram.payload.size()) == lengths.end() ||
          (!known.empty() && std::ranges::find(known, datagram.source_ip) == known.end());
 }
 

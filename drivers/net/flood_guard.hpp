@@ -25,12 +25,16 @@ class FloodGuard {
   /// To be told of what the socket has received, before it receives more.
   void look_at(std::span<const Datagram> datagrams, UdpSocket& socket);
 
+  /// To be told by the wall clock that the socket has nothing: a flood that has ended sends no sample to tell it by.
+  void hear_nothing(Stamp now, UdpSocket& socket);
+
   /// Who the lidars of the port are by now.
   void expect(const LidarRouter::Senders& senders, UdpSocket& socket);
 
  private:
   [[nodiscard]] bool is_foreign(const Datagram& datagram) const;
   void guard(UdpSocket& socket);
+  void begin_second(Stamp now, UdpSocket& socket);
 
   LidarRouter::Senders senders_;
   bool guards_ = false;

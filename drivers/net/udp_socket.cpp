@@ -18,8 +18,6 @@
 namespace locus {
 namespace {
 
-constexpr std::size_t kMaxPayloadBytes = 2048; ///< what is longer is no packet of a lidar
-
 std::string because(const char* what, std::uint16_t port) {
   const int error = errno;
   const char* const advice = error == EADDRINUSE ? "; another program listens there, end it or change the port"
@@ -66,7 +64,7 @@ int granted_buffer_bytes(int descriptor) {
 struct UdpSocket::Batch {
   using Control = std::array<std::byte, CMSG_SPACE(sizeof(timespec))>;
 
-  std::array<std::array<std::byte, kMaxPayloadBytes>, kBatch> payloads;
+  std::array<std::array<std::byte, kLongestPayload>, kBatch> payloads;
   alignas(cmsghdr) std::array<Control, kBatch> controls;
   std::array<sockaddr_storage, kBatch> senders{};
   std::array<iovec, kBatch> vectors{};

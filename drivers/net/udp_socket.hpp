@@ -51,12 +51,14 @@ class UdpSocket {
 
   /// What has come, at most kBatch, in order; valid until the next call. Does not wait.
   std::span<const Datagram> receive();
+  /// Brings kernel_drops() and filtered() up to now; receive() does that, too.
+  void count_drops();
 
   [[nodiscard]] int descriptor() const { return descriptor_; }
   [[nodiscard]] std::uint16_t port() const { return port_; }
   /// What the kernel gave of kWantedBufferBytes. It holds as much again for its own book-keeping.
   [[nodiscard]] int buffer_bytes() const { return buffer_bytes_; }
-  /// Datagrams that the kernel threw away, because the buffer was full. Known by the next receive().
+  /// Datagrams that the kernel threw away, because the buffer was full, as count_drops() found them.
   [[nodiscard]] std::uint64_t kernel_drops() const { return kernel_drops_; }
   /// Those that it threw away while there was a filter; what it had no room for then is among them.
   [[nodiscard]] std::uint64_t filtered() const { return filtered_; }
@@ -67,7 +69,6 @@ class UdpSocket {
   explicit UdpSocket(int descriptor);
   static Expected<UdpSocket, std::string> open(std::uint16_t port, bool beside_others);
   std::optional<std::string> prepare();
-  void count_drops();
 
   int descriptor_;
   std::uint16_t port_ = 0;

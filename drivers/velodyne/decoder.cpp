@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "drivers/velodyne/wire.hpp"
+#include "drivers/wire.hpp"
 
 namespace locus::velodyne {
 
@@ -65,8 +65,8 @@ std::optional<PacketError> Decoder::decode(std::span<const std::byte> payload, L
   packet.count = 0;
   for (std::size_t column = 0; column < layout_.columns; ++column) {
     const double azimuth_rad = kRadPerCdeg * azimuth_cdeg_[column];
-    cos_column_ = static_cast<float>(std::cos(azimuth_rad));
-    sin_column_ = static_cast<float>(std::sin(azimuth_rad));
+    column_azimuth_ = {static_cast<float>(std::cos(azimuth_rad)), static_cast<float>(std::sin(azimuth_rad)),
+                       static_cast<float>(kRadPerCdeg) * turn_cdeg_[column]};
     for (std::size_t firing = 0; firing < layout_.banks * kChannels; firing += FiringGroup::kLasers)
       read_firing_groups(bytes, column, firing, packet);
   }
@@ -133,10 +133,7 @@ void Decoder::prepare(Model model, ReturnMode mode, Pace pace, const Calibration
     const Laser& laser = calibration.storage[firings[i].laser];
     firings_.share_of_column[i] =
         static_cast<float>(firings[i].offset_ns) / static_cast<float>(column_duration_.count());
-    firings_.cos_azimuth_offset[i] = static_cast<float>(std::cos(laser.azimuth_offset_rad));
-    firings_.sin_azimuth_offset[i] = static_cast<float>(std::sin(laser.azimuth_offset_rad));
-    firings_.cos_elevation[i] = static_cast<float>(std::cos(laser.elevation_rad));
-    firings_.sin_elevation[i] = static_cast<float>(std::sin(laser.elevation_rad));
+    firings_.point(i, laser.elevation_rad, laser.azimuth_offset_rad);
     firings_.range_offset_m[i] = static_cast<float>(laser.range_offset_m);
     firings_.radial_offset_m[i] = static_cast<float>(laser.radial_offset_m);
     firings_.lateral_offset_m[i] = static_cast<float>(laser.lateral_offset_m);
@@ -208,30 +205,13 @@ void Decoder::measure_turn_since_last_packet(Duration stamp, double max_turn_cde
   last_azimuth_cdeg_ = azimuth_cdeg_.front();
 }
 
-/// Turns the column's azimuth by each firing's share of the turn (first, a small angle) and by its laser's offset.
-[[gnu::always_inline]] inline Decoder::Aim Decoder::take_aim(std::size_t column, std::size_t first_firing) const {
-  Aim aim;
-  const float turn_rad = static_cast<float>(kRadPerCdeg) * turn_cdeg_[column];
-  for (std::size_t k = 0; k < FiringGroup::kLasers; ++k) {
-    const std::size_t i = first_firing + k;
-    const float angle = firings_.share_of_column[i] * turn_rad;
-    const float cos_angle = 1.0F - 0.5F * angle * angle; // at most 1.6 deg: the next terms are below 3e-8
-    const float sin_angle = angle - angle * angle * angle / 6.0F;
-    const float cos_firing = cos_column_ * cos_angle - sin_column_ * sin_angle;
-    const float sin_firing = sin_column_ * cos_angle + cos_column_ * sin_angle;
-    aim.cos_azimuth[k] = cos_firing * firings_.cos_azimuth_offset[i] - sin_firing * firings_.sin_azimuth_offset[i];
-    aim.sin_azimuth[k] = sin_firing * firings_.cos_azimuth_offset[i] + cos_firing * firings_.sin_azimuth_offset[i];
-  }
-  return aim;
-}
-
 /// Appends what sixteen firings of a column brought, in dual return mode one firing group for each echo. A second echo
 /// at the distance of the first is none.
 void Decoder::read_firing_groups(Packet packet, std::size_t column, std::size_t first_firing, LidarPacket& out) const {
   const std::size_t bank = first_firing / kChannels;
   const std::byte* block = block_at(packet, column * layout_.blocks_per_column() + bank * layout_.returns);
   Aim aim;
-  run_as(options_.isa, [&] { aim = take_aim(column, first_firing); });
+  run_as(options_.isa, [&] { aim = aim_at(firings_, column_azimuth_, first_firing); });
   Distances previous{}; // 0 is no return: nothing is lost when the first echo equals it
   for (std::size_t echo = 0; echo < layout_.returns; ++echo) {
     FiringGroup& group = out.storage[out.count++];

@@ -12,6 +12,7 @@
 #include "core/base/stamp.hpp"
 #include "core/ingest/lidar_packet.hpp"
 #include "drivers/packet_counters.hpp"
+#include "drivers/spinning.hpp"
 #include "drivers/velodyne/model.hpp"
 #include "drivers/velodyne/model_recognition.hpp"
 
@@ -74,22 +75,10 @@ class Decoder {
 
  private:
   using Packet = std::span<const std::byte, kDataPacketBytes>;
-  template <class T> using PerFiring = std::array<T, kMaxLasers>;
-
-  /// Everything about a firing that does not change from packet to packet, one array per figure so that loops over the
-  /// firings become vector instructions.
-  struct Firings {
-    PerFiring<float> share_of_column; ///< of the column's duration that has passed before it
-    PerFiring<float> cos_azimuth_offset, sin_azimuth_offset;
-    PerFiring<float> cos_elevation, sin_elevation;
+  /// Adds what only a calibration file of a unit may have.
+  struct Firings : SpinningBeams {
     PerFiring<float> range_offset_m, radial_offset_m, lateral_offset_m, vertical_offset_m;
-    PerFiring<std::int32_t> offset_ns;
-    PerFiring<std::uint8_t> ring, laser;
-  };
-
-  /// Where the lasers of a firing group point when they fire.
-  struct Aim {
-    FiringGroup::PerLaser<float> cos_azimuth, sin_azimuth;
+    PerFiring<std::uint8_t> laser;
   };
   using Distances = FiringGroup::PerLaser<std::int32_t>; ///< as wide as all else about them
 
@@ -99,7 +88,6 @@ class Decoder {
   [[nodiscard]] std::optional<PacketError> check_blocks(Packet packet) const;
   bool measure_turns(Packet packet, Duration stamp);
   void measure_turn_since_last_packet(Duration stamp, double max_turn_cdeg);
-  [[nodiscard]] Aim take_aim(std::size_t column, std::size_t first_firing) const;
   void read_firing_groups(Packet packet, std::size_t column, std::size_t first_firing, LidarPacket& out) const;
   void place(const Distances& distances, const Distances& previous, const Aim& aim, std::size_t column,
              std::size_t first_firing, FiringGroup& group) const;
@@ -121,7 +109,7 @@ class Decoder {
   std::array<std::uint16_t, kBlocks> azimuth_cdeg_{}; ///< per column
   std::array<float, kBlocks> turn_cdeg_{};            ///< from each column to the next
   std::array<std::int32_t, kBlocks> column_offset_ns_{};
-  float cos_column_ = 1.0F, sin_column_ = 0.0F; ///< of the azimuth of the column at hand
+  ColumnAzimuth column_azimuth_; ///< of the column at hand
   Duration duration_{}, time_of_hour_{};
   float mean_turn_cdeg_ = 0.0F;
   std::optional<Duration> last_stamp_; ///< of the packet that last_azimuth_cdeg_ is of

@@ -2,9 +2,9 @@
 #include "drivers/velodyne/model.hpp"
 
 #include <algorithm>
-#include <numeric>
 
 #include "core/base/pose.hpp"
+#include "drivers/spinning.hpp"
 
 namespace locus::velodyne {
 
@@ -134,16 +134,7 @@ ModelSpec vls128(Pace pace) {
 
 } // namespace
 
-void Calibration::assign_rings() {
-  std::array<std::uint8_t, kMaxLasers> upwards;
-  const auto end = upwards.begin() + static_cast<std::ptrdiff_t>(laser_count);
-  std::iota(upwards.begin(), end, std::uint8_t{0});
-  std::stable_sort(upwards.begin(), end, [this](std::uint8_t a, std::uint8_t b) {
-    return storage[a].elevation_rad < storage[b].elevation_rad;
-  });
-  for (std::size_t ring = 0; ring < laser_count; ++ring)
-    storage[upwards[ring]].ring = static_cast<std::uint8_t>(ring);
-}
+void Calibration::assign_rings() { number_rings(std::span{storage}.first(laser_count)); }
 
 const ModelSpec& spec(Model model, Pace pace) {
   static const ModelSpec slower_vls128 = vls128(Pace::slower);

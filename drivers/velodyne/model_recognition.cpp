@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "drivers/velodyne/wire.hpp"
+#include "drivers/wire.hpp"
 
 namespace locus::velodyne {
 

@@ -6,7 +6,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "drivers/velodyne/wire.hpp"
+#include "drivers/wire.hpp"
 
 namespace locus::velodyne {
 

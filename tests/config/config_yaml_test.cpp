@@ -4,10 +4,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <random>
 
+#include <fmt/format.h>
+
+#include "drivers/hesai/model.hpp"
+#include "drivers/velodyne/model.hpp"
 #include "support/temporary_file.hpp"
 #include "yaml_tree.hpp"
 
@@ -19,10 +24,11 @@ const std::string kAllChanged = R"(
 version: 1
 defaults: true
 lidars:
-  - {name: top, model: HDL-32E, port: 2400, source_ip: 192.168.1.201, multicast_ip: 239.1.2.3, time: sensor, calibration: "a, b}: #\n", T_base_lidar: {xyz_m: [0.1, -2e-07, 3], rpy_deg: [1, 30, -179.5]}}
+  - {name: top, model: Ouster, port: 2400, source_ip: 192.168.1.201, multicast_ip: 239.1.2.3, time: sensor, calibration: "a, b}: #\n", topic: "", point_times: auto, metadata: top.json, T_base_lidar: {xyz_m: [0.1, -2e-07, 3], rpy_deg: [1, 30, -179.5]}}
+  - {name: roof, model: auto, port: 2368, source_ip: any, multicast_ip: none, time: auto, calibration: "", topic: /points, point_times: none, metadata: "", T_base_lidar: {xyz_m: [3, 2, 1], rpy_deg: [3, 2, 1]}}
 motion_sources:
-  - {name: vio, kind: odometry, topic: /vio, health_topic: /vio/health, use_acceleration: auto, T_base_source: {xyz_m: [0, 0, 0], rpy_deg: [0, 0, 0]}}
-  - {name: gyro, kind: imu, topic: /gyro, health_topic: /gyro_2, use_acceleration: off, T_base_source: {xyz_m: [0.3333333333333333, 1, 2], rpy_deg: [90, 0, 45]}}
+  - {name: vio, kind: odometry, topic: /vio, health_topic: /vio/health, use_acceleration: auto, T_base_source: {xyz_m: [0, 0, 0], rpy_deg: [0, 0, 0]}, late_ms: 12.5, scale: 1.05, yaw_scale: 0.9, calibration: report, calibration_sigma: {late_ms: auto, mounting_deg: auto, scale: 0.05, yaw_scale: 0}}
+  - {name: gyro, kind: imu, topic: /gyro, health_topic: /gyro_2, use_acceleration: off, T_base_source: {xyz_m: [0.3333333333333333, 1, 2], rpy_deg: [90, 0, 45]}, late_ms: -40, scale: 1, yaw_scale: 1, calibration: off, calibration_sigma: {late_ms: 0, mounting_deg: 2, scale: auto, yaw_scale: auto}}
 sweep_period_ms: 66.666667
 motion_correction: false
 range_m: [0.1, 77.7]
@@ -40,12 +46,16 @@ map: {keyframe_m: 2, keyframe_deg: 31, max_bytes: 123456789}
 flat_ground: on
 threads: 3
 realtime: {priority: 50, cpus: [2, 3], lock_memory: true}
-dds: {domain: 7, interface: eth1, prefix: /robot/locus, frame_odom: odom_2, frame_base: base, publish_tf: true, publish_cloud: true, publish_map: true, flat_ground_topic: /flat, security: /etc/enclave, type_hashes: false}
-record: {folder: /data/drives, max_bytes: 98765432}
+dds: {domain: 7, interface: eth1, prefix: /robot/locus, frame_odom: odom_2, frame_base: base, publish_tf: true, publish_cloud: true, publish_map: true, flat_ground_topic: /flat, security: /etc/enclave, type_hashes: false, ros_graph: humble}
+record: {folder: /data/drives, max_bytes: 98765432, keep_s: 30.5, keep_bytes: 87654321, incidents_bytes: 876543210}
+metrics: {listen: "[::1]:9465"}
 )";
 
 /// The defaults, but such that each value of kAllChanged fits among them alone.
 const std::string kBase = R"(
+lidars:
+  - {name: front}
+  - {name: rear, topic: /rear/points}
 motion_sources:
   - {name: a, kind: imu}
   - {name: b, kind: odometry}
@@ -97,13 +107,30 @@ TEST(ConfigYaml, EveryKeyAloneChangesItselfAndNothingElse) {
   const auto base_leaves = test::leaves_of(print_config(base));
   const auto changed_leaves = test::leaves_of(kAllChanged);
   const auto is_of_an_imu = [](const std::string& path) {
-    return path.ends_with("use_acceleration") || path.find("T_base_source") != std::string::npos;
+    return path.ends_with("use_acceleration") || path.ends_with("sigma.late_ms") || path.ends_with("mounting_deg") ||
+           path.find("T_base_source") != std::string::npos;
+  };
+  const auto is_of_an_odometry = [](const std::string& path) { return path.ends_with("scale"); };
+  const auto is_of_clouds = [](const std::string& path) {
+    return path.ends_with(".topic") || path.ends_with(".point_times");
+  };
+  const auto is_of_packets = [](const std::string& path) {
+    return std::ranges::any_of(
+        std::array{".model", ".port", ".source_ip", ".multicast_ip", ".time", ".calibration", ".metadata"},
+        [&](const char* key) { return path.ends_with(key); });
   };
   for (const auto& [path, value] : base_leaves) {
+    if ((path.starts_with("lidars.0.") && is_of_clouds(path)) || (path.starts_with("lidars.1.") && is_of_packets(path)))
+      continue; // the first sends packets, the second gives clouds
     if (path == "version" || (path.starts_with("motion_sources.0.") && is_of_an_imu(path)))
       continue; // kAllChanged has an odometry there
+    if (path.starts_with("motion_sources.1.") && is_of_an_odometry(path))
+      continue; // and an imu there
     const bool needs_an_imu = path.starts_with("motion_sources.1.") && is_of_an_imu(path);
-    const Config start = needs_an_imu ? with(base, {"motion_sources.1.kind=imu"}) : base;
+    const bool needs_an_odometry = path.starts_with("motion_sources.0.") && is_of_an_odometry(path);
+    const Config start = needs_an_imu        ? with(base, {"motion_sources.1.kind=imu"})
+                         : needs_an_odometry ? with(base, {"motion_sources.0.kind=odometry"})
+                                             : base;
     const Config one_changed = with(start, {path + '=' + changed_leaves.at(path)});
     auto expected = test::leaves_of(print_config(start));
     EXPECT_NE(expected.at(path), changed_leaves.at(path)) << path;
@@ -112,6 +139,28 @@ TEST(ConfigYaml, EveryKeyAloneChangesItselfAndNothingElse) {
     EXPECT_NE(one_changed, start) << path;
     EXPECT_NE(config_sha256(one_changed), config_sha256(start)) << path;
   }
+}
+
+TEST(ConfigYaml, LidarHasPacketsOrClouds) {
+  EXPECT_TRUE(errors_in("lidars: [{name: a, topic: /points, point_times: azimuth}, {name: b}, {name: c, topic: /c}]\n")
+                  .empty());
+  const std::array<std::pair<const char*, const char*>, 6> packet_keys{{{"model", "VLP-16"},
+                                                                        {"port", "2400"},
+                                                                        {"source_ip", "10.0.0.1"},
+                                                                        {"multicast_ip", "239.1.2.3"},
+                                                                        {"time", "sensor"},
+                                                                        {"calibration", "a.yaml"}}};
+  for (const auto& [key, value] : packet_keys)
+    EXPECT_EQ(
+        errors_in(fmt::format("lidars: [{{name: a, topic: /points, {}: {}}}]\n", key, value)),
+        ConfigErrors{fmt::format("robot.yaml:1: lidars.0.{}: belongs to packets, and topic /points to clouds; leave "
+                                 "out one of the two",
+                                 key)});
+  EXPECT_NE(errors_in("lidars: [{point_times: none}]\n").at(0).find("name their topic"), std::string::npos);
+  EXPECT_NE(errors_in("lidars: [{topic: points}]\n").at(0).find("is no topic"), std::string::npos);
+  EXPECT_NE(errors_in("lidars: [{name: a, topic: /p}, {name: b, topic: /p}]\n").at(0).find("another lidar's"),
+            std::string::npos);
+  EXPECT_NE(errors_in("lidars: [{topic: /imu/data}]\n").at(0).find("cannot carry PointCloud2"), std::string::npos);
 }
 
 TEST(ConfigYaml, AnglesReadBackToANanodegreeAlsoWhereYawAndRollAreOne) {
@@ -160,6 +209,25 @@ TEST(ConfigYaml, AllMistakesAreReportedInTheOrderOfTheirLines) {
             }));
 }
 
+TEST(ConfigYaml, ModelIsThatOfItsWordWhoeverMakesIt) {
+  for (std::size_t i = 0; i < hesai::kModels; ++i) {
+    const auto model = static_cast<hesai::Model>(i);
+    const std::string word = "model: " + std::string{to_string(model)};
+    const Config config = valid(parse_config("lidars: [{name: front, " + word + "}]", "robot.yaml"));
+    EXPECT_EQ(config.lidars[0].hesai, model);
+    EXPECT_EQ(config.lidars[0].model, std::nullopt);
+    EXPECT_TRUE(config.lidars[0].is_hesai());
+    EXPECT_NE(print_config(config).find(word), std::string::npos) << word;
+    EXPECT_EQ(valid(parse_config(print_config(config), "robot.yaml")), config);
+  }
+  const Config velodyne = valid(parse_config("lidars: [{name: front, model: VLS-128}]", "robot.yaml"));
+  EXPECT_EQ(velodyne.lidars[0].model, velodyne::Model::vls128);
+  EXPECT_FALSE(velodyne.lidars[0].is_hesai());
+  const Config any = valid(parse_config("lidars: [{name: front, calibration: a.csv}]", "robot.yaml"));
+  EXPECT_TRUE(any.lidars[0].is_hesai()) << "such files are Hesai's";
+  EXPECT_FALSE(any.lidars[0].is_of_any_maker());
+}
+
 struct BadValue {
   std::string assignment;
   std::string reason;
@@ -177,7 +245,8 @@ TEST(ConfigYaml, EveryKindOfBadValueIsRefusedWithItsKeyAndReason) {
       {"lidars.front.port=65536", "is outside 0 .. 65535"},
       {"lidars.front.name=2nd", "is no name"},
       {"lidars.front.name=total", "is taken"},
-      {"lidars.front.model=VLP-17", "must be VLP-16 | Puck-Hi-Res | VLP-32C | HDL-32E | VLS-128, or auto"},
+      {"lidars.front.model=VLP-17", "must be VLP-16 | Puck-Hi-Res | VLP-32C | HDL-32E | VLS-128 | Pandar40P | Pandar64 "
+                                    "| QT64 | XT16 | XT32 | XT32M | QT128 | OT128 | Ouster, or auto"},
       {"lidars.front.source_ip=192.168.1.256", "must be an address"},
       {"lidars.front.multicast_ip=192.168.1.201", "must be within 224.0.0.0"},
       {"lidars.front.time=gps", "must be auto | sensor | receive"},
@@ -191,6 +260,17 @@ TEST(ConfigYaml, EveryKindOfBadValueIsRefusedWithItsKeyAndReason) {
       {"motion_sources.imu.health_topic=/imu/", "is no topic"},
       {"motion_sources.wio.T_base_source.xyz_m=[1, 0, 0]", "belongs to kind imu alone"},
       {"motion_sources.wio.use_acceleration=off", "belongs to kind imu alone"},
+      {"motion_sources.wio.late_ms=251", "is outside -250 .. 250"},
+      {"motion_sources.imu.late_ms=.nan", "must be a finite number"},
+      {"motion_sources.wio.scale=0", "is outside 0.5 .. 2"},
+      {"motion_sources.imu.scale=1.1", "belongs to kind odometry alone"},
+      {"motion_sources.imu.yaw_scale=0.9", "belongs to kind odometry alone"},
+      {"motion_sources.imu.calibration=maybe", "must be auto | report | off"},
+      {"motion_sources.imu.calibration_sigma.late_ms=-1", "is outside 0 .. 250"},
+      {"motion_sources.imu.calibration_sigma.mounting_deg=46", "is outside 0 .. 45"},
+      {"motion_sources.wio.calibration_sigma.scale=0.6", "is outside 0 .. 0.5"},
+      {"motion_sources.wio.calibration_sigma.mounting_deg=1", "belongs to kind imu alone"},
+      {"motion_sources.imu.calibration_sigma.scale=0.01", "belongs to kind odometry alone"},
       {"motion.max_speed_mps=0", "is outside 0.1 .. 1000"},
       {"motion.max_acceleration_mps2=.nan", "must be a finite number"},
       {"motion_correction=perhaps", "must be true or false"},
@@ -362,6 +442,11 @@ TEST(ConfigYaml, RecordingDoesNotLeaveItsFolder) {
     EXPECT_EQ(errors_in(std::string{"record: {folder: "} + folder + "}\n").size(), 1U) << folder;
   for (const char* folder : {"record", "/data/drives", "a..b", "runs/today"})
     EXPECT_EQ(errors_in(std::string{"record: {folder: "} + folder + "}\n").size(), 0U) << folder;
+  for (const char* right : {"keep_s: 0", "keep_s: 1", "keep_s: 600", "keep_bytes: 20000000, incidents_bytes: 20000000"})
+    EXPECT_EQ(errors_in(std::string{"record: {"} + right + "}\n").size(), 0U) << right;
+  for (const char* wrong :
+       {"keep_s: 0.5", "keep_s: -1", "keep_s: 601", "keep_s: .nan", "keep_bytes: 20000000, incidents_bytes: 19999999"})
+    EXPECT_EQ(errors_in(std::string{"record: {"} + wrong + "}\n").size(), 1U) << wrong;
 }
 
 TEST(ConfigOverride, ListItemsAreFoundByNameAndByIndex) {

@@ -31,7 +31,8 @@ OdometryOptions RobotSetup::odometry() const {
 
 PacketStream::PacketStream(const sim::Scene& scene, const sim::Trajectory& trajectory,
                            const sim::SyntheticLidarOptions& options, std::uint8_t index)
-    : lidar_(scene, trajectory, options), decoder_({.model = options.model, .return_mode = options.return_mode}) {
+    : lidar_(scene, trajectory, options),
+      decoder_({.model = std::get<velodyne::Model>(options.model), .return_mode = options.return_mode}) {
   packet_.lidar = index;
   advance();
 }

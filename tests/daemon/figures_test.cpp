@@ -65,6 +65,39 @@ TEST(Figures, ServiceHasTheKeysOfARunAndMore) {
   }
 }
 
+/// PTP that is mended is no problem any more.
+TEST(Figures, DoubtOfCloudsIsAProblemForAsLongAsTheyGiveRiseToIt) {
+  LidarOptions options;
+  options.topic = "/points";
+  const Stamp now = stamp_from_ns(1'700'000'000'000'000'000);
+  IngestReport::Lidar lidar;
+  lidar.last_heard = now;
+  lidar.clouds = IngestReport::Clouds{};
+  constexpr auto kTai = static_cast<std::size_t>(CloudDoubt::tai),
+                 kEqual = static_cast<std::size_t>(CloudDoubt::equal_times);
+  lidar.clouds->doubts.set(kTai);
+  lidar.clouds->last_doubted[kTai] = now - milliseconds{100};
+  EXPECT_NE(problem_of(options, lidar).find("37 s ahead"), std::string::npos);
+  lidar.clouds->last_doubted[kTai] = now - milliseconds{6000};
+  EXPECT_EQ(problem_of(options, lidar), "");
+  lidar.clouds->doubts.set(kEqual);
+  lidar.clouds->last_doubted[kEqual] = now;
+  EXPECT_NE(problem_of(options, lidar).find("all have the same time"), std::string::npos);
+  EXPECT_EQ(cloud_doubts(options, lidar).size(), 2U) << "of all that was met";
+}
+
+TEST(Figures, MetadataIsStaleWhileTheSensorIsInAnotherMode) {
+  LidarOptions options;
+  options.metadata = "front.json";
+  IngestReport::Lidar lidar;
+  lidar.packets.data = 100'000;
+  EXPECT_EQ(problem_of(options, lidar), "");
+  lidar.packets_of_other_mode = 129;
+  const std::string problem = problem_of(options, lidar);
+  EXPECT_NE(problem.find("refused the last 129 packets"), std::string::npos) << problem;
+  EXPECT_NE(problem.find("locusctl fetch SENSOR -o front.json"), std::string::npos) << problem;
+}
+
 TEST(Figures, TextOfAServiceThatHasHeardNothingSaysSo) {
   const Config config = Config{};
   Figures figures{.config = config};

@@ -6,6 +6,9 @@
 #include <chrono>
 #include <cstddef>
 #include <ctime>
+#include <optional>
+#include <span>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -124,6 +127,29 @@ TEST(LiveInput, MotionThatNobodyFetchesIsCounted) {
   EXPECT_EQ(input.motion_drops(), 7U);
 }
 
+/// A flood that ends, or that drowns in a full buffer, leaves nothing behind that would wake the thread.
+TEST(LiveInput, WhatTheKernelKeptOutIsCountedThoughNothingComesAfterIt) {
+  LiveInput input(two_sockets());
+  const test::UdpSender sender;
+  const std::vector<std::byte> foreign(700);
+  std::uint64_t sent = 0, received = 0;
+  const auto flood = [&](std::uint64_t datagrams) {
+    for (std::uint64_t i = 0; i < datagrams; ++i, ++sent)
+      sender.send(input.sockets()[0].port(), foreign);
+    while (!std::holds_alternative<Silence>(input.next(milliseconds{10})))
+      ++received;
+  };
+  const auto accounted = [&] { return received + input.filtered() + input.kernel_drops(); };
+  while (sent <= FloodGuard::kFlood)
+    flood(100);
+  EXPECT_EQ(accounted(), sent);
+  for (int round = 0; round < 20; ++round) {
+    flood(10);
+    EXPECT_EQ(accounted(), sent) << round;
+  }
+  EXPECT_GT(input.filtered(), 100U) << "the guard stands";
+}
+
 TEST(LiveInput, AllocatesNothing) {
   if (!allocations())
     GTEST_SKIP() << "a sanitizer is in the way of counting";
@@ -140,6 +166,153 @@ TEST(LiveInput, AllocatesNothing) {
   }
   EXPECT_EQ(allocations(), before);
   EXPECT_EQ(taken, 2000);
+}
+
+/// A sensor_msgs/PointCloud2 of one point, as it is serialised.
+std::vector<std::byte> cloud_message(Stamp stamp) {
+  std::vector<std::byte> bytes(4);
+  bytes[1] = std::byte{1}; // little-endian CDR
+  const auto put = [&](std::uint32_t number) {
+    bytes.resize((bytes.size() + 3) / 4 * 4);
+    for (std::size_t i = 0; i < 4; ++i)
+      bytes.push_back(static_cast<std::byte>(number >> (8 * i)));
+  };
+  const auto put_text = [&](const std::string& text) {
+    put(static_cast<std::uint32_t>(text.size() + 1));
+    for (const char c : text)
+      bytes.push_back(static_cast<std::byte>(c));
+    bytes.push_back(std::byte{0});
+  };
+  put(static_cast<std::uint32_t>(to_ns(stamp) / 1'000'000'000));
+  put(static_cast<std::uint32_t>(to_ns(stamp) % 1'000'000'000));
+  put_text("lidar");
+  put(1); // height, width, fields
+  put(1);
+  put(3);
+  for (std::uint32_t axis = 0; axis < 3; ++axis) {
+    put_text(std::string(1, static_cast<char>('x' + axis)));
+    put(4 * axis);
+    bytes.push_back(static_cast<std::byte>(CloudView::Type::float32));
+    put(1);
+  }
+  bytes.push_back(std::byte{0});                                 // little-endian
+  for (const std::uint32_t number : {12U, 12U, 12U, 1U, 2U, 3U}) // steps, bytes, a point
+    put(number);
+  bytes.push_back(std::byte{1}); // dense
+  return bytes;
+}
+
+/// An input whose only lidar gives clouds, with a socket of another.
+class CloudsOfALiveInput : public testing::Test {
+ protected:
+  void hand_over(Stamp arrival, std::span<const std::byte> message) {
+    CloudBytes& next = input_.next_cloud(0);
+    next.arrival = arrival;
+    next.too_large = false;
+    next.bytes.assign(message.begin(), message.end());
+    input_.push_cloud(0);
+  }
+
+  LiveInput input_{two_sockets(), {true, false}};
+  test::UdpSender sender_;
+};
+
+TEST_F(CloudsOfALiveInput, ComeInTheOrderOfArrivalWithDatagramsAndMotion) {
+  const test::KernelStamps stamps;
+  const std::uint16_t port = input_.sockets()[0].port();
+  sender_.send(port, test::bytes_of("a"));
+  std::this_thread::sleep_for(milliseconds{1});
+  const Stamp cloud = now();
+  const Stamp motion = cloud + Duration{1000};
+  std::this_thread::sleep_for(milliseconds{1});
+  sender_.send(port, test::bytes_of("b"));
+  input_.push(imu_at(motion));
+  hand_over(cloud, cloud_message(cloud - milliseconds{100}));
+
+  std::vector<std::string> order;
+  Stamp last{};
+  for (int i = 0; i < 4; ++i) {
+    const Input next = input_.next(milliseconds{100});
+    const auto* given = std::get_if<CloudInput>(&next);
+    order.emplace_back(given != nullptr                         ? "cloud"
+                       : std::holds_alternative<ImuInput>(next) ? "motion"
+                       : std::holds_alternative<Datagram>(next) ? "datagram"
+                                                                : "silence");
+    EXPECT_GT(arrival_of(next, {}), last) << i;
+    last = arrival_of(next, {});
+    if (given == nullptr)
+      continue;
+    ASSERT_NE(given->message, nullptr);
+    EXPECT_EQ(given->lidar, 0);
+    EXPECT_EQ(given->arrival, cloud);
+    EXPECT_EQ(given->message->stamp - given->message->ahead, cloud - milliseconds{100});
+    EXPECT_EQ(given->message->fields().size(), 3U);
+    EXPECT_EQ(given->message->data.size(), 12U);
+  }
+  EXPECT_EQ(order, (std::vector<std::string>{"datagram", "cloud", "motion", "datagram"}));
+  EXPECT_TRUE(std::holds_alternative<Silence>(input_.next(milliseconds{1})));
+}
+
+TEST_F(CloudsOfALiveInput, WakeTheWaitingThread) {
+  std::thread reader([&] {
+    std::this_thread::sleep_for(milliseconds{50});
+    hand_over(now(), cloud_message(now()));
+  });
+  const Duration begin = read_clock(CLOCK_MONOTONIC);
+  EXPECT_TRUE(std::holds_alternative<CloudInput>(input_.next(seconds{10})));
+  EXPECT_LT(read_clock(CLOCK_MONOTONIC) - begin, seconds{5});
+  reader.join();
+}
+
+TEST_F(CloudsOfALiveInput, ThatNobodyFetchesAreCountedAndTheNewestIsKept) {
+  const Stamp first = now();
+  for (int i = 0; i < 5; ++i)
+    hand_over(first + milliseconds{i}, cloud_message(first + milliseconds{i}));
+  EXPECT_EQ(input_.cloud_drops(0), 4U);
+  EXPECT_EQ(input_.cloud_drops(1), 0U) << "it gives none";
+  const Input next = input_.next(milliseconds{100});
+  ASSERT_TRUE(std::holds_alternative<CloudInput>(next));
+  EXPECT_EQ(std::get<CloudInput>(next).arrival, first + milliseconds{4});
+  EXPECT_TRUE(std::holds_alternative<Silence>(input_.next(milliseconds{1})));
+}
+
+TEST_F(CloudsOfALiveInput, ThatCannotBeReadSayWhy) {
+  const auto error = [&] {
+    const Input next = input_.next(milliseconds{100});
+    const auto* cloud = std::get_if<CloudInput>(&next);
+    return cloud != nullptr && cloud->message == nullptr ? std::optional{cloud->error} : std::nullopt;
+  };
+  const std::vector<std::byte> whole = cloud_message(now());
+  for (std::size_t size = 0; size + 1 < whole.size(); ++size) { // whether it is dense is not read
+    hand_over(now(), std::span(whole).first(size));
+    EXPECT_EQ(error(), CloudError::cut) << size;
+  }
+  CloudBytes& large = input_.next_cloud(0);
+  large.arrival = now();
+  large.too_large = true;
+  large.bytes.clear();
+  input_.push_cloud(0);
+  EXPECT_EQ(error(), CloudError::too_large);
+  hand_over(now(), whole);
+  EXPECT_TRUE(std::holds_alternative<CloudInput>(input_.next(milliseconds{100})));
+}
+
+TEST_F(CloudsOfALiveInput, AllocateNothingOnceTheLargestHasCome) {
+  if (!allocations())
+    GTEST_SKIP() << "a sanitizer is in the way of counting";
+  const std::vector<std::byte> message = cloud_message(now());
+  const auto play = [&] {
+    int taken = 0;
+    for (int i = 0; i < 100; ++i) {
+      hand_over(now(), message);
+      taken += std::holds_alternative<CloudInput>(input_.next(milliseconds{1})) ? 1 : 0;
+    }
+    return taken;
+  };
+  EXPECT_EQ(play(), 100);
+  const auto before = allocations();
+  EXPECT_EQ(play(), 100);
+  EXPECT_EQ(allocations(), before);
 }
 
 constexpr Stamp kStart = stamp_from_ns(1'700'000'000'000'000'000);

@@ -169,7 +169,7 @@ struct RunningRecorder : Recorder {
 
 /// All of it, told at the pace of a disk that keeps up.
 void record(const std::filesystem::path& folder, const Config& config, std::span<const Input> inputs) {
-  RunningRecorder recorder(folder, config);
+  RunningRecorder recorder(folder, config, {config.record.max_bytes});
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     recorder.take(inputs[i]);
     if (i % 2000 == 1999)
@@ -240,7 +240,7 @@ TEST(Recorder, AbsurdSamplesAreReadAgainOrLeftOut) {
 
   const test::TemporaryFolder folder;
   {
-    RunningRecorder recorder(folder / "record", config);
+    RunningRecorder recorder(folder / "record", config, {config.record.max_bytes});
     for (const OdometrySample& sample : {no_rotation, good, before_1951})
       recorder.take(OdometryInput{SourceId{0}, sample});
     recorder.take(ImuInput{SourceId{1}, imu});
@@ -267,7 +267,7 @@ TEST(Recorder, AbsurdSamplesAreReadAgainOrLeftOut) {
 
 TEST(Recorder, WhatTheDiskIsTooSlowForIsDroppedAndCounted) {
   const test::TemporaryFolder folder;
-  RunningRecorder recorder(folder / "record", recorded_config());
+  RunningRecorder recorder(folder / "record", recorded_config(), {recorded_config().record.max_bytes});
   constexpr std::uint64_t kInputs = 4 * Recorder::kMaxUnwritten;
   const ImuInput imu{SourceId{1}, {}};
   const auto begin = std::chrono::steady_clock::now();
@@ -283,6 +283,28 @@ TEST(Recorder, WhatTheDiskIsTooSlowForIsDroppedAndCounted) {
   EXPECT_GE(recorder.status().recorded, Recorder::kMaxUnwritten);
 }
 
+/// An Ouster's packets are longer than a place of the ring, and are recorded whole, in order and all the same.
+TEST(Recorder, LongDatagramsAreRecordedWhole) {
+  const test::TemporaryFolder folder;
+  std::vector<std::vector<std::byte>> sent;
+  for (const std::size_t bytes : {0U, 1U, 1208U, 1209U, 2416U, 8448U, 33'024U, 48U}) {
+    std::vector<std::byte>& payload = sent.emplace_back(bytes);
+    for (std::size_t i = 0; i < bytes; ++i)
+      payload[i] = static_cast<std::byte>(i * 7 + i / 256 + bytes);
+  }
+  {
+    RunningRecorder recorder(folder / "record", recorded_config(), {recorded_config().record.max_bytes});
+    Datagram datagram;
+    datagram.receive_stamp = stamp_from_ns(1'700'000'000'000'000'000);
+    for (const auto& payload : sent) {
+      datagram.payload = payload;
+      datagram.receive_stamp += milliseconds{1};
+      recorder.take(datagram);
+    }
+  }
+  EXPECT_EQ(read(folder / "record").payloads, sent);
+}
+
 /// Who keeps floods out is to know the lidars whether or not all is recorded.
 TEST(Recorder, TellsTheSourceOfTheLidars) {
   struct Source : InputSource {
@@ -291,7 +313,7 @@ TEST(Recorder, TellsTheSourceOfTheLidars) {
     void expect(const LidarRouter& lidars) override { told = &lidars; }
   } source;
   const test::TemporaryFolder folder;
-  Recorder recorder(folder / "record", recorded_config());
+  Recorder recorder(folder / "record", recorded_config(), {recorded_config().record.max_bytes});
   const auto lidars = LidarRouter::open(recorded_config().lidars);
   ASSERT_TRUE(lidars);
   RecordingInput(source, recorder).expect(*lidars);
@@ -301,7 +323,7 @@ TEST(Recorder, TellsTheSourceOfTheLidars) {
 TEST(Recorder, NothingIsMadeBeforeTheFirstInput) {
   const test::TemporaryFolder folder;
   {
-    const RunningRecorder recorder(folder / "record", recorded_config());
+    const RunningRecorder recorder(folder / "record", recorded_config(), {recorded_config().record.max_bytes});
     std::this_thread::sleep_for(milliseconds{250});
   }
   EXPECT_FALSE(std::filesystem::exists(folder / "record"));
@@ -314,7 +336,7 @@ TEST(Recorder, TakingAllocatesNothing) {
   const test::TemporaryFolder folder;
   std::ofstream{folder / "plain"} << "a file";
   Drive::instance();
-  RunningRecorder recorder(folder / "plain/record", recorded_config());
+  RunningRecorder recorder(folder / "plain/record", recorded_config(), {recorded_config().record.max_bytes});
   recorder.take(Drive::instance().inputs().front());
   while (recorder.status().problem.empty())
     std::this_thread::sleep_for(milliseconds{10});

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// A participant made with Cyclone DDS: cyclone_peer DOMAIN listen|talk|command|flood|mistype PREFIX. See
-// peer_words.hpp.
+// A participant made with Cyclone DDS: cyclone_peer DOMAIN listen|talk|iron|humble|command|flood|mistype|clouds PREFIX;
+// iron and humble hear what nodes tell of themselves, and what DDS does. See peer_words.hpp.
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <limits>
 #include <stdexcept>
+#include <string_view>
 
 #include "daemon/dds/dds_node.hpp"
 #include "daemon/dds/ros_messages.hpp"
 #include "dds/peer_words.hpp"
+#include "dds/room_cloud.hpp"
 
 namespace locus::test {
 namespace {
@@ -60,6 +63,53 @@ void listen(const DdsNode& node, const std::string& prefix) {
     diagnostics.take([](const ros::DiagnosticArray& m) { say(m, "diagnostics"); });
     beginning.take([](const ros::DiagnosticArray& m) { say(m, "beginning"); });
     std::this_thread::sleep_for(std::chrono::microseconds{200});
+  }
+}
+
+/// Says which endpoints others have: of a topic that is built in.
+void say_endpoints(dds_entity_t participant, dds_entity_t builtin, const char* kind) {
+  dds_guid_t own{};
+  dds_get_guid(participant, &own);
+  std::array<void*, 32> samples{};
+  std::array<dds_sample_info_t, 32> infos{};
+  const dds_return_t count = dds_take(builtin, samples.data(), infos.data(), samples.size(), samples.size());
+  for (std::size_t i = 0; count > 0 && i < static_cast<std::size_t>(count); ++i) {
+    const auto* endpoint = static_cast<const dds_builtintopic_endpoint_t*>(samples[i]);
+    if (!infos[i].valid_data || std::ranges::equal(endpoint->participant_key.v, own.v))
+      continue;
+    void* user_data = nullptr;
+    std::size_t size = 0;
+    dds_qget_userdata(endpoint->qos, &user_data, &size);
+    tell("{} {} {} {} {}", kind, hex(endpoint->key.v), endpoint->topic_name, endpoint->type_name,
+         std::string_view(static_cast<const char*>(user_data), size));
+    dds_free(user_data);
+  }
+  if (count > 0)
+    dds_return_loan(builtin, samples.data(), count);
+}
+
+template <class Info> void hear_nodes(const DdsNode& node) {
+  const dds_entity_t participant = node.participant();
+  const daemon::DdsEntity readers{dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION, nullptr, nullptr)};
+  const daemon::DdsEntity writers{dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr)};
+  DdsReader<Info> infos{node, "ros_discovery_info", TopicQos::latch()};
+  const auto say_gids = [](const char* word, const auto& gids) {
+    for (std::uint32_t i = 0; i < gids._length; ++i)
+      tell("{} {}", word, hex(gids._buffer[i].data_));
+  };
+  while (stdin_is_open()) {
+    say_endpoints(participant, readers.handle(), "reader");
+    say_endpoints(participant, writers.handle(), "writer");
+    infos.take([&](const Info& info) {
+      for (std::uint32_t i = 0; i < info.node_entities_info_seq_._length; ++i) {
+        const auto& one = info.node_entities_info_seq_._buffer[i];
+        tell("node {} {} {}", one.node_namespace_, one.node_name_, hex(info.gid_.data_));
+        say_gids("node_reader", one.reader_gid_seq_);
+        say_gids("node_writer", one.writer_gid_seq_);
+        tell("node_end {}", one.node_name_);
+      }
+    });
+    std::this_thread::sleep_for(std::chrono::milliseconds{10});
   }
 }
 
@@ -130,6 +180,33 @@ void flood(const DdsNode& node) {
   tell("flooded {}", sent);
 }
 
+/// A room ten times a second, as drivers of lidars send it.
+void talk_of_clouds(const DdsNode& node) {
+  const DdsWriter<ros::PointCloud2> clouds{node, "/points", TopicQos::sensor_out()};
+  std::vector<std::uint8_t> data = room_cloud::points();
+  std::string frame = "lidar";
+  std::vector<std::string> names;
+  for (const room_cloud::Field& field : room_cloud::kFields)
+    names.emplace_back(field.name);
+  std::vector<ros::PointField> fields;
+  for (std::size_t i = 0; i < names.size(); ++i)
+    fields.push_back({names[i].data(), room_cloud::kFields[i].offset, room_cloud::kFields[i].type, 1});
+  talk_of_turns([&](std::int32_t sec, std::uint32_t nanosec) {
+    ros::PointCloud2 cloud{};
+    cloud.header_ = {{sec, nanosec}, frame.data()};
+    cloud.height_ = 1;
+    cloud.width_ = room_cloud::kPoints;
+    cloud.fields_ = {static_cast<std::uint32_t>(fields.size()), static_cast<std::uint32_t>(fields.size()),
+                     fields.data(), false};
+    cloud.point_step_ = room_cloud::kStep;
+    cloud.row_step_ = room_cloud::kStep * room_cloud::kPoints;
+    cloud.data_ = {static_cast<std::uint32_t>(data.size()), static_cast<std::uint32_t>(data.size()), data.data(),
+                   false};
+    if (!clouds.write(cloud))
+      throw std::runtime_error("DDS did not take a cloud");
+  });
+}
+
 /// The names of topics that exist, with a type that they have not.
 void mistype(const DdsNode& node) {
   const DdsWriter<ros::UInt8> imus{node, "/imu/data", {false, 5}}, odometries{node, "/wheel_odometry", {false, 5}};
@@ -142,7 +219,7 @@ void mistype(const DdsNode& node) {
 void run(int argc, char** argv) {
   if (argc < 4 || argc > 6)
     throw std::runtime_error(
-        "usage: cyclone_peer DOMAIN listen|talk|command|flood|mistype PREFIX [INTERFACE [ENCLAVE]]");
+        "usage: cyclone_peer DOMAIN listen|talk|iron|humble|command|flood|mistype|clouds PREFIX [INTERFACE [ENCLAVE]]");
   DdsOptions options;
   options.domain = std::atoi(argv[1]); // NOLINT
   if (argc >= 5)
@@ -155,12 +232,18 @@ void run(int argc, char** argv) {
   const std::string role = argv[2];
   if (role == "talk")
     talk(*node);
+  else if (role == "iron")
+    hear_nodes<ros::ParticipantEntitiesInfo>(*node);
+  else if (role == "humble")
+    hear_nodes<ros::HumbleParticipantEntitiesInfo>(*node);
   else if (role == "command")
     command(*node);
   else if (role == "flood")
     flood(*node);
   else if (role == "mistype")
     mistype(*node);
+  else if (role == "clouds")
+    talk_of_clouds(*node);
   else
     listen(*node, argv[3]);
 }

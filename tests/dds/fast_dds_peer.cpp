@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A participant made with Fast DDS, ROS 2's default: fast_dds_peer DOMAIN listen|talk PREFIX [ADDRESS].
-// On the loopback interface, or on that of ADDRESS. See peer_words.hpp.
+// A participant made with Fast DDS, ROS 2's default: fast_dds_peer DOMAIN listen|talk|iron|humble|clouds PREFIX
+// [ADDRESS]; iron and humble hear what nodes tell of themselves, and what DDS does. On the loopback interface, or on
+// that of ADDRESS. See peer_words.hpp.
 #include <cstdlib>
 #include <deque>
 #include <memory>
@@ -8,6 +9,7 @@
 
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/domain/DomainParticipantListener.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
@@ -15,10 +17,13 @@
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
+#include <fastdds/rtps/reader/ReaderDiscoveryInfo.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastdds/rtps/writer/WriterDiscoveryInfo.h>
 
 #include "dds/fast_dds_types.hpp"
 #include "dds/peer_words.hpp"
+#include "dds/room_cloud.hpp"
 
 namespace locus::test {
 namespace {
@@ -27,13 +32,39 @@ namespace dds = eprosima::fastdds::dds;
 
 constexpr auto kAsNeeded = eprosima::fastrtps::rtps::DYNAMIC_RESERVE_MEMORY_MODE; ///< and not as a message may need
 
-dds::DomainParticipant* join(std::uint32_t domain, const std::string& address) {
+/// Says which endpoints others have.
+class Discovery : public dds::DomainParticipantListener {
+ public:
+  void on_subscriber_discovery(dds::DomainParticipant* own,
+                               eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& reader) override {
+    say("reader", *own, reader.info);
+  }
+  void on_publisher_discovery(dds::DomainParticipant* own,
+                              eprosima::fastrtps::rtps::WriterDiscoveryInfo&& writer) override {
+    say("writer", *own, writer.info);
+  }
+
+ private:
+  template <class Endpoint>
+  static void say(const char* kind, const dds::DomainParticipant& own, const Endpoint& endpoint) {
+    const auto& guid = endpoint.guid();
+    if (guid.guidPrefix == own.guid().guidPrefix)
+      return;
+    const auto& user_data = endpoint.m_qos.m_userData.data_vec();
+    tell("{} {}{} {} {} {}", kind, hex(guid.guidPrefix.value), hex(guid.entityId.value),
+         endpoint.topicName().to_string(), endpoint.typeName().to_string(),
+         std::string(user_data.begin(), user_data.end()));
+  }
+};
+
+dds::DomainParticipant* join(std::uint32_t domain, const std::string& address, dds::DomainParticipantListener* hears) {
   auto wire = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
   wire->interfaceWhiteList.push_back(address);
   dds::DomainParticipantQos qos;
   qos.transport().use_builtin_transports = false;
   qos.transport().user_transports.push_back(wire);
-  dds::DomainParticipant* participant = dds::DomainParticipantFactory::get_instance()->create_participant(domain, qos);
+  dds::DomainParticipant* participant =
+      dds::DomainParticipantFactory::get_instance()->create_participant(domain, qos, hears, dds::StatusMask::none());
   if (participant == nullptr)
     throw std::runtime_error("no participant");
   return participant;
@@ -41,7 +72,7 @@ dds::DomainParticipant* join(std::uint32_t domain, const std::string& address) {
 
 template <class Message> dds::Topic* topic_of(dds::DomainParticipant& participant, const std::string& name) {
   dds::TypeSupport(new FastType<Message>).register_type(&participant); // NOLINT: TypeSupport owns it
-  return participant.create_topic("rt" + name, Message::kName, dds::TOPIC_QOS_DEFAULT);
+  return participant.create_topic(name.front() == '/' ? "rt" + name : name, Message::kName, dds::TOPIC_QOS_DEFAULT);
 }
 
 void say(const FastOdometry& m, const char* topic) {
@@ -49,6 +80,9 @@ void say(const FastOdometry& m, const char* topic) {
   tell("{} {}.{:09} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {:.9f} {} {} {:.9g} {:.9g} {}", topic, m.header.sec,
        m.header.nanosec, p[0], p[1], p[2], p[3], p[4], p[5], p[6], m.header.frame_id, m.child_frame_id,
        m.pose_covariance[35], m.twist[5], realtime_ns());
+}
+void say(const FastImu& m, const char* topic) {
+  tell("{} {}.{:09} {}", topic, m.header.sec, m.header.nanosec, realtime_ns());
 }
 void say(const FastUInt8& m, const char* topic) { tell("{} {}", topic, m.data); }
 void say(const FastTransforms& m, const char* topic) {
@@ -61,6 +95,18 @@ void say(const FastCloud& m, const char* topic) {
 void say(const FastDiagnostics& m, const char* topic) {
   for (const FastDiagnosticStatus& status : m.statuses)
     tell("{} {} {} {}", topic, status.level, status.values.size(), status.name);
+}
+
+void say(const FastClock& m, const char* topic) { tell("{} {}.{:09} {}", topic, m.sec, m.nanosec, realtime_ns()); }
+template <std::size_t kGidBytes> void say(const FastParticipantEntities<kGidBytes>& m, const char* topic) {
+  for (const FastNode<kGidBytes>& node : m.nodes) {
+    tell("{} {} {} {}", topic, node.name_space, node.name, hex(m.gid.data));
+    for (const auto& gid : node.readers)
+      tell("{}_reader {}", topic, hex(gid.data));
+    for (const auto& gid : node.writers)
+      tell("{}_writer {}", topic, hex(gid.data));
+    tell("{}_end {}", topic, node.name);
+  }
 }
 
 template <class Message> class Listener : public dds::DataReaderListener {
@@ -122,14 +168,32 @@ void talk(dds::DomainParticipant& participant) {
   });
 }
 
-void run(int argc, char** argv) {
-  if (argc != 4 && argc != 5)
-    throw std::runtime_error("usage: fast_dds_peer DOMAIN listen|talk PREFIX [ADDRESS]");
-  const auto domain = static_cast<std::uint32_t>(std::atoi(argv[1])); // NOLINT
-  dds::DomainParticipant& participant = *join(domain, argc == 5 ? argv[4] : "127.0.0.1");
-  const std::string prefix = argv[3];
-  if (std::string(argv[2]) == "talk")
-    return talk(participant);
+/// A room ten times a second, reliably: what does not fit a datagram is for its own thread to send.
+void talk_of_clouds(dds::DomainParticipant& participant) {
+  dds::DataWriterQos qos;
+  qos.reliability().kind = dds::RELIABLE_RELIABILITY_QOS;
+  qos.publish_mode().kind = dds::ASYNCHRONOUS_PUBLISH_MODE;
+  qos.history().depth = 1;
+  qos.endpoint().history_memory_policy = kAsNeeded;
+  dds::DataWriter* const clouds = participant.create_publisher(dds::PUBLISHER_QOS_DEFAULT)
+                                      ->create_datawriter(topic_of<FastCloud>(participant, "/points"), qos);
+  FastCloud cloud;
+  cloud.header.frame_id = "lidar";
+  cloud.height = 1;
+  cloud.width = room_cloud::kPoints;
+  for (const room_cloud::Field& field : room_cloud::kFields)
+    cloud.point_fields.push_back({field.name, field.offset, field.type, 1});
+  cloud.point_step = room_cloud::kStep;
+  cloud.row_step = room_cloud::kStep * room_cloud::kPoints;
+  cloud.data = room_cloud::points();
+  talk_of_turns([&](std::int32_t sec, std::uint32_t nanosec) {
+    cloud.header.sec = sec;
+    cloud.header.nanosec = nanosec;
+    clouds->write(&cloud);
+  });
+}
+
+void hear_all(dds::DomainParticipant& participant, const std::string& prefix) {
   listen<FastOdometry>(participant, prefix + "/odometry", "odometry");
   listen<FastUInt8>(participant, prefix + "/state", "state");
   listen<FastTransforms>(participant, "/tf", "tf");
@@ -137,6 +201,29 @@ void run(int argc, char** argv) {
   listen<FastCloud>(participant, prefix + "/map", "map", true, true);
   listen<FastDiagnostics>(participant, "/diagnostics", "diagnostics");
   listen<FastDiagnostics>(participant, prefix + "/beginning", "beginning", true, true);
+  listen<FastClock>(participant, "/clock", "clock", false);
+  listen<FastImu>(participant, "/imu/data", "imu", false);
+}
+
+void run(int argc, char** argv) {
+  if (argc != 4 && argc != 5)
+    throw std::runtime_error("usage: fast_dds_peer DOMAIN listen|talk|iron|humble|clouds PREFIX [ADDRESS]");
+  static Discovery discovery;
+  const auto domain = static_cast<std::uint32_t>(std::atoi(argv[1])); // NOLINT
+  const std::string role = argv[2];
+  const bool sees_graph = role == "iron" || role == "humble";
+  dds::DomainParticipant& participant =
+      *join(domain, argc == 5 ? argv[4] : "127.0.0.1", sees_graph ? &discovery : nullptr);
+  if (role == "talk")
+    return talk(participant);
+  if (role == "clouds")
+    return talk_of_clouds(participant);
+  if (role == "iron")
+    listen<FastParticipantEntities<16>>(participant, "ros_discovery_info", "node", true, true);
+  else if (role == "humble")
+    listen<FastParticipantEntities<24>>(participant, "ros_discovery_info", "node", true, true);
+  else
+    hear_all(participant, argv[3]);
   while (stdin_is_open())
     std::this_thread::sleep_for(std::chrono::milliseconds{20});
 }

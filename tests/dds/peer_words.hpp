@@ -29,6 +29,8 @@ template <class... Values> void tell(fmt::format_string<Values...> format, Value
   std::fflush(stdout);
 }
 
+template <class Bytes> std::string hex(const Bytes& bytes) { return fmt::format("{:02x}", fmt::join(bytes, "")); }
+
 inline bool stdin_is_open() {
   pollfd input{STDIN_FILENO, POLLIN, 0};
   if (poll(&input, 1, 0) <= 0)
@@ -54,6 +56,20 @@ template <class Say> void talk_on(const Say& say) {
     say(i);
     std::this_thread::sleep_for(std::chrono::milliseconds{10});
   }
+}
+
+/// Calls `say(sec, nanosec)` ten times a second until stdin is closed, with the time a tenth of a second ago, and says
+/// in the end how often that was.
+template <class Say> void talk_of_turns(const Say& say) {
+  constexpr std::int64_t kSecond_ns = 1'000'000'000, kTurn_ns = kSecond_ns / 10;
+  int said = 0;
+  for (std::int64_t due_ns = realtime_ns(); stdin_is_open(); due_ns += kTurn_ns) {
+    std::this_thread::sleep_for(std::chrono::nanoseconds{due_ns - realtime_ns()});
+    const std::int64_t begin_ns = realtime_ns() - kTurn_ns;
+    say(static_cast<std::int32_t>(begin_ns / kSecond_ns), static_cast<std::uint32_t>(begin_ns % kSecond_ns));
+    ++said;
+  }
+  tell("said {}", said);
 }
 
 } // namespace locus::test

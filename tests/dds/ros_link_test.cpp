@@ -7,6 +7,7 @@
 #include <fstream>
 #include <functional>
 #include <mutex>
+#include <set>
 #include <sstream>
 #include <string>
 #include <thread>
@@ -68,6 +69,50 @@ Config config_in(const test::DdsDomain& domain) {
   config.dds.flat_ground_topic = "/flat_ground";
   config.motion_sources[0].health_topic = "/wheel_health";
   return config;
+}
+
+/// A topic with a writer and a reader of clouds, in one process.
+struct CloudTopic {
+  explicit CloudTopic(TopicQos qos)
+      : node(std::move(*DdsNode::open(config_in(domain).dds))), writer(node, "/points", qos),
+        reader(node, "/points", qos) {}
+
+  void write() { ASSERT_TRUE(writer.write(message.make({}, Stamp{}, frame))); }
+
+  test::DdsDomain domain;
+  DdsNode node;
+  DdsWriter<ros::PointCloud2> writer;
+  DdsReader<ros::PointCloud2> reader;
+  CloudMessage message;
+  std::string frame = "lidar";
+};
+
+TEST(CloudTopic, CountsAllThatCameBetweenTwoLooks) {
+  for (const auto& [qos, counted] : {std::pair{TopicQos::cloud_count(), 12}, {TopicQos::cloud_in(), 1}}) {
+    CloudTopic topic(qos);
+    ASSERT_TRUE(eventually([&] { return topic.writer.has_readers(); }));
+    for (int i = 0; i < 12; ++i)
+      topic.write();
+    int clouds = 0;
+    topic.reader.take_serialised([&](const auto&, auto) { ++clouds; });
+    EXPECT_EQ(clouds, counted);
+  }
+}
+
+/// However fast more comes, here while each is handed out.
+TEST(CloudTopic, TakingComesToAnEnd) {
+  constexpr int kGiveUp = 1000;
+  for (const TopicQos qos : {TopicQos::cloud_count(), TopicQos::cloud_in()}) {
+    CloudTopic topic(qos);
+    ASSERT_TRUE(eventually([&] { return topic.writer.has_readers(); }));
+    topic.write();
+    int clouds = 0;
+    topic.reader.take_serialised([&](const auto&, auto) {
+      if (++clouds < kGiveUp)
+        topic.write();
+    });
+    EXPECT_LE(clouds, 32);
+  }
 }
 
 OdometryReport report(int i) {
@@ -174,6 +219,69 @@ TEST_P(Peers, AreHeardInOrderWithEveryFigure) {
   EXPECT_TRUE(status.connected);
   EXPECT_EQ(status.sources[1].writers, 1U);
   EXPECT_GE(inbox_.all<ImuInput>().size(), status.sources[1].received);
+}
+
+/// What a peer heard of one participant: which endpoints DDS says it has, and which its node claims.
+struct HeardNode {
+  std::string name;
+  std::multiset<std::string> readers, writers, node_readers, node_writers;
+};
+
+/// Nothing yet, if no node was told of.
+HeardNode heard_node(const test::Child& peer) {
+  HeardNode heard;
+  if (peer.lines_of("node_end").empty() || peer.lines_of("node").empty())
+    return heard;
+  const std::string node = peer.lines_of("node").back();
+  const std::size_t gid = node.rfind(' ') + 1;
+  heard.name = node.substr(0, gid - 1);
+  constexpr std::size_t kPrefix = 24; // digits, of the GUIDs of a participant's endpoints
+  const auto endpoints = [&](const char* kind) {
+    std::multiset<std::string> found;
+    for (const std::string& line : peer.lines_of(kind))
+      if (line.starts_with(node.substr(gid, kPrefix)) && line.find(" ros_discovery_info ") == std::string::npos)
+        found.insert(line.substr(0, line.find(' ')) + node.substr(gid + 32)); // the gid of Humble ends in zeros
+    return found;
+  };
+  const auto claimed = [&](const char* kind) {
+    const std::vector<std::string> lines = peer.lines_of(kind);
+    return std::multiset<std::string>(lines.begin(), lines.end());
+  };
+  return {heard.name, endpoints("reader"), endpoints("writer"), claimed("node_reader"), claimed("node_writer")};
+}
+
+/// With both layouts, by who is there before the node and by who comes later.
+TEST_P(Peers, SeeOneNodeWhoseEndpointsAreThoseOfItsParticipant) {
+  for (const auto& [graph, word] : {std::pair{RosGraph::iron, "iron"}, std::pair{RosGraph::humble, "humble"}}) {
+    config_.dds.ros_graph = graph;
+    const test::Child early(peer(word));
+    std::this_thread::sleep_for(seconds{1});
+    const RosLink link(config_, inbox_.sink(), "left-arm");
+    ASSERT_TRUE(eventually([&] { return link.status().connected; }));
+    const test::Child late(peer(word));
+    for (const test::Child* one : {&early, &late}) {
+      constexpr std::size_t kReaders = 4, kWriters = 8;
+      EXPECT_TRUE(eventually([&] {
+        const HeardNode heard = heard_node(*one);
+        return heard.readers.size() >= kReaders && heard.writers.size() >= kWriters && !heard.node_writers.empty();
+      })) << testing::PrintToString(one->lines());
+      const HeardNode heard = heard_node(*one);
+      EXPECT_EQ(heard.name, "/robot_7 locusd_left_x2darm");
+      EXPECT_EQ(heard.node_readers, heard.readers);
+      EXPECT_EQ(heard.node_writers, heard.writers);
+      EXPECT_EQ(heard.readers.size(), kReaders);
+      EXPECT_EQ(heard.writers.size(), kWriters);
+    }
+  }
+}
+
+TEST_P(Peers, SeeNoNodeWhereItIsOff) {
+  config_.dds.ros_graph = RosGraph::off;
+  const RosLink link(config_, inbox_.sink());
+  const test::Child listener(peer("iron"));
+  ASSERT_TRUE(eventually([&] { return listener.lines_of("writer").size() >= 8; }));
+  std::this_thread::sleep_for(milliseconds{500});
+  EXPECT_TRUE(listener.lines_of("node").empty()) << testing::PrintToString(listener.lines());
 }
 
 INSTANTIATE_TEST_SUITE_P(Dds, Peers, testing::Values(CYCLONE_PEER, FAST_DDS_PEER), [](const auto& peer) {

@@ -24,10 +24,11 @@ std::optional<OtherMaker> maker_of(std::size_t bytes, std::uint16_t port = 2368,
   return other_maker(datagram);
 }
 
-TEST(OtherMaker, HesaiIsToldByItsPreamble) {
+TEST(OtherMaker, HesaiOfAModelThatCannotBeReadIsToldByItsPreamble) {
   EXPECT_EQ(maker_of(568, 2368, 0xEE, 0xFF), OtherMaker::hesai);
   EXPECT_EQ(maker_of(1080, 10110, 0xEE, 0xFF), OtherMaker::hesai);
-  EXPECT_EQ(maker_of(1262, 2368, 0xFF, 0xEE), OtherMaker::hesai) << "Pandar40P: no preamble";
+  EXPECT_EQ(maker_of(1256, 2368, 0xFF, 0xEE), OtherMaker::hesai) << "Pandar40: no preamble";
+  EXPECT_FALSE(maker_of(1262, 2368, 0xFF, 0xEE)) << "Pandar40P: it is read";
 }
 
 TEST(OtherMaker, OusterIsToldByItsPortsAndLengths) {

@@ -4,13 +4,22 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include <gtest/gtest.h>
 
+#include "drivers/hesai/decoder.hpp"
+#include "drivers/hesai_test_packet.hpp"
+#include "drivers/ouster/decoder.hpp"
+#include "drivers/ouster/imu_packet.hpp"
+#include "drivers/ouster_test_packet.hpp"
 #include "drivers/velodyne/model.hpp"
 #include "drivers/velodyne/position_packet.hpp"
-#include "drivers/velodyne/wire.hpp"
+#include "drivers/wire.hpp"
+#include "locus_sim/ouster_packet.hpp"
 
 namespace locus {
 namespace {
@@ -210,7 +219,7 @@ class Recording {
     datagram.payload = payload;
     datagram.destination_port = port;
     datagram.receive_stamp = kStart + since_start;
-    injector.pass(lidar, datagram, emit);
+    injector.pass({lidar}, datagram, emit);
   }
 };
 
@@ -251,6 +260,43 @@ TEST(DatagramFaults, PositionPacketsFailAlone) {
   EXPECT_EQ(recording.numbers(8308), (std::vector{0, 1, 2, 3, 4, 4, 4, 4, 4, 4}));
 }
 
+/// Of an Ouster named "top", ten a second for two seconds: turning at the number's degrees per second about z.
+std::vector<ouster::ImuMeasurement> readings_with(std::initializer_list<std::string_view> faults) {
+  DatagramFaults injector{faults_of(faults), kStart, 1};
+  const ouster::Metadata metadata;
+  std::vector<ouster::ImuMeasurement> readings;
+  const auto keep = [&](const Datagram& datagram) {
+    ouster::ImuMeasurements found;
+    if (!ouster::read_imu_packet(metadata, datagram.payload, found))
+      readings.push_back(found.storage.front());
+  };
+  for (int i = 0; i < 20; ++i) {
+    const auto payload =
+        sim::ouster_imu_packet(static_cast<std::uint64_t>(i) * 100'000'000, {0, 0, 1}, {0, 0, static_cast<float>(i)});
+    injector.pass({"top", &metadata},
+                  {.payload = payload, .destination_port = 7503, .receive_stamp = kStart + i * 100ms}, keep);
+  }
+  injector.finish(keep);
+  return readings;
+}
+
+double rate_dps(const ouster::ImuMeasurement& reading) { return reading.angular_velocity_radps.z() / kRadPerDeg; }
+
+TEST(DatagramFaults, InertialUnitOfALidarFailsAsAnyOtherAndWithIt) {
+  EXPECT_EQ(readings_with({"top_imu:lost@0.5-1"}).size(), 15U);
+  EXPECT_EQ(readings_with({"top:lost@0.5-1"}).size(), 15U);
+  EXPECT_EQ(readings_with({"top_imu:nan@0.5-1"}).size(), 15U); // what is not finite is no reading
+  EXPECT_NEAR(rate_dps(readings_with({"top_imu:frozen@0.5-1"})[7]), 4, 1e-4);
+  EXPECT_NEAR(rate_dps(readings_with({"top_imu:jump=2@0.5-1"})[7]), 7 + 2 / kRadPerDeg, 1e-4);
+  EXPECT_EQ(readings_with({"top_imu:clock-step=60@0.5-1"})[7].time, 60s + 700ms);
+}
+
+/// In metres they are none of a gyro; and the clock of its columns is another matter.
+TEST(DatagramFaults, JumpAndClockStepOfALidarAreNoneOfItsInertialUnit) {
+  EXPECT_NEAR(rate_dps(readings_with({"top:jump=2@0.5-1"})[7]), 7, 1e-4);
+  EXPECT_EQ(readings_with({"top:clock-step=60@0.5-1"})[7].time, 700ms);
+}
+
 /// A data packet of a VLP-16 with one return, in its last firing.
 std::vector<std::byte> with_one_return(std::uint16_t raw_range) {
   std::vector<std::byte> payload(velodyne::kDataPacketBytes);
@@ -266,7 +312,7 @@ std::vector<std::byte> after(std::initializer_list<std::string_view> faults, con
   datagram.payload = payload;
   datagram.receive_stamp = kStart;
   std::vector<std::byte> arrived;
-  injector.pass("front", datagram, [&](const Datagram& d) { arrived.assign(d.payload.begin(), d.payload.end()); });
+  injector.pass({"front"}, datagram, [&](const Datagram& d) { arrived.assign(d.payload.begin(), d.payload.end()); });
   return arrived;
 }
 
@@ -275,6 +321,49 @@ TEST(DatagramFaults, JumpLengthensTheRangesThatThereAre) {
   EXPECT_EQ(after({"front:jump=-3@0"}, with_one_return(1000)), with_one_return(1)) << "and still is a return";
   EXPECT_EQ(after({"front:jump=1e6@0"}, with_one_return(1000)), with_one_return(65535));
   EXPECT_EQ(after({"front:jump=2@0"}, with_one_return(0)), with_one_return(0));
+}
+
+/// The shortest range and the time that a packet of an Ouster or a Hesai tells after these faults, as its decoder reads
+/// it; nothing of one that it refuses.
+template <class Decoder>
+std::optional<std::pair<float, Duration>> read_after(std::initializer_list<std::string_view> faults,
+                                                     const ouster::Metadata* metadata, Decoder decoder,
+                                                     std::span<const std::byte> payload) {
+  DatagramFaults injector{faults_of(faults), kStart, 1};
+  std::optional<std::pair<float, Duration>> found;
+  injector.pass({"front", metadata}, {.payload = payload, .receive_stamp = kStart}, [&](const Datagram& datagram) {
+    LidarPacket packet;
+    if (decoder.decode(datagram.payload, packet))
+      return;
+    float shortest_m = std::numeric_limits<float>::max();
+    for (const FiringGroup& group : packet.firing_groups())
+      for (const float range_m : group.range_m)
+        shortest_m = range_m > 0.0F ? std::min(shortest_m, range_m) : shortest_m;
+    found = {shortest_m, decoder.time()};
+  });
+  return found;
+}
+
+TEST(DatagramFaults, JumpAndClockStepBefallALidarOfAnyMaker) {
+  const auto metadata = test::ouster_metadata();
+  test::OusterTestPacket columns{metadata, 0, 5'000'000'000};
+  columns.set_return(3, 7, 20'000);
+  columns.seal();
+  const auto ouster = [&](std::initializer_list<std::string_view> faults) {
+    return read_after(faults, &metadata, ouster::Decoder{metadata}, columns.payload());
+  };
+  EXPECT_EQ(ouster({"front:jump=-2@0"}), std::pair(18.0F, Duration{5s}));
+  EXPECT_EQ(ouster({"all-lidars:clock-step=60@0"}), std::pair(20.0F, Duration{65s}));
+
+  test::HesaiTestPacket blocks{hesai::Model::qt128, 0x37};
+  blocks.set_return(0, 7, 2'500);
+  blocks.seal();
+  const auto hesai = [&](std::initializer_list<std::string_view> faults) {
+    return read_after(faults, nullptr, hesai::Decoder{}, blocks.payload());
+  };
+  const Duration time = hesai({})->second;
+  EXPECT_EQ(hesai({"front:jump=-2@0"}), std::pair(8.0F, time));
+  EXPECT_EQ(hesai({"front:clock-step=-90@0"}), std::pair(10.0F, time - 90s));
 }
 
 TEST(DatagramFaults, CorruptPacketsAreRandomFromSomeByteOnAndTheSameOnEveryRun) {
@@ -352,7 +441,7 @@ TEST(DatagramFaults, DatagramsOfNobodyPass) {
   int emitted = 0;
   Datagram foreign;
   foreign.receive_stamp = kStart;
-  injector.pass("", foreign, [&](const Datagram&) { ++emitted; });
+  injector.pass({}, foreign, [&](const Datagram&) { ++emitted; });
   EXPECT_EQ(emitted, 1);
 }
 

@@ -7,8 +7,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace locus;
   fuzz::FuzzBytes bytes(data, size);
   const auto kind = bytes.take<std::uint8_t>();
-  const auto serialisation = kind % 2 == 0 ? tools::Serialisation::ros1 : tools::Serialisation::cdr;
-  const tools::MessageReader reader(bytes.rest(), serialisation);
+  const auto serialisation = kind % 2 == 0 ? Serialisation::ros1 : Serialisation::cdr;
+  const MessageReader reader(bytes.rest(), serialisation);
   switch (kind / 2) {
   case 0:
     tools::read_imu(reader);
@@ -17,8 +17,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     tools::read_odometry(reader);
     break;
   default:
-    if (const auto scan = tools::read_velodyne_scan(reader))
-      fuzz::demand(scan->packets.size() * velodyne::kDataPacketBytes <= size);
+    const tools::PacketType& type = tools::packet_types()[(kind / 2U - 2U) % tools::packet_types().size()];
+    if (const auto packets = type.read != nullptr ? type.read(reader) : std::nullopt)
+      fuzz::demand(packets->packets.size() * 8 + packets->bytes.size() <= size); // each behind its stamp
   }
   return 0;
 }

@@ -10,7 +10,7 @@
 #include "drivers/net/datagram.hpp"
 #include "drivers/velodyne/model.hpp"
 #include "drivers/velodyne/position_packet.hpp"
-#include "drivers/velodyne/wire.hpp"
+#include "drivers/wire.hpp"
 #include "fuzz/fuzz_bytes.hpp"
 
 namespace locus::fuzz {

@@ -4,6 +4,10 @@
 key of the configuration and each number of a motion file set to what makes no sense, and what coverage.sh showed to be missing."""
 import bz2
 import ctypes
+import gzip
+import json
+import lzma
+import math
 import pathlib
 import re
 import struct
@@ -72,6 +76,57 @@ standing = bytearray(data_packet(0x22, 0x37, 1, 0))
 standing[7 * 100 + 2] = 1
 write("data_packets", "standing", b"\0" + struct.pack("<BH", NEW, 1327) + standing)
 write("data_packets", "length", b"\0" + struct.pack("<BHH", OTHER_LENGTH, 1205, 0) + turns)
+
+# Packets of an Ouster of each kind: kind, then step, columns that passed, number of changed bytes (place, value).
+ANY_BYTES, UNSEALED, IMU, LATER = 1, 4, 8, 16
+for kind in range(8):
+    packets = b"".join(struct.pack("<BHB", LATER, 16, 0) for _ in range(6))
+    changed = struct.pack("<BHBHBHB", LATER, 16, 2, 40, 0, 500, 255)
+    turn = struct.pack("<BHB", LATER, 1008, 1) + struct.pack("<HB", 4, 9)
+    imu = bytes([IMU]) + struct.pack("<QQQ6f", 1, 2, 3, 0, 0, 1, 1, 2, 3)
+    write("ouster_packets", f"stream_{kind}", bytes([kind]) + packets + changed + packets)
+    write("ouster_packets", f"turns_{kind}", bytes([kind]) + turn * 4)
+    write("ouster_packets", f"imu_{kind}", bytes([kind]) + imu * 3)
+    write("ouster_packets", f"any_{kind}", bytes([kind, ANY_BYTES | UNSEALED]) + bytes(range(256)) * 20)
+
+# Packets of a Hesai of each model, told or configured: step, microseconds that passed, return mode, azimuth, speed, firing
+# sequence, number of changed bytes (place, value).
+OTHER_MODEL = 8
+for model in range(8):
+    for mode in range(4):
+        packets = b"".join(struct.pack("<BHBHbBB", LATER, 200, mode, 72 * i, 60, i % 2, 0) for i in range(4))
+        backwards = b"".join(struct.pack("<BHBHbBB", LATER, 200, mode, 9000 - 72 * i, -60, i % 2, 0) for i in range(4))
+        changed = struct.pack("<BHBHbBBHBHB", LATER, 200, mode, 0, 60, 0, 2, 400, 255, 1060, 9)
+        for told in (0, 1):
+            write("hesai_packets", f"stream_{model}_{mode}_{told}", bytes([model, told]) + packets + changed + packets)
+        write("hesai_packets", f"backwards_{model}_{mode}", bytes([model, 1]) + backwards + changed)
+    for length in (0, 11, 13, 568, 839, 1095, 1127, 1262):
+        write("hesai_packets", f"length_{model}_{length}", bytes([model, 1]) + struct.pack("<BBHbBBH", OTHER_LENGTH, 1, 0, 60, 0, 0, length))
+    other = struct.pack("<BBBHbBB", OTHER_MODEL, (model + 1) % 8, 1, 0, 60, 0, 0)
+    write("hesai_packets", f"other_{model}", bytes([model, 1]) + packets + other + packets)
+    write("hesai_packets", f"any_{model}", bytes([model, 0]) + struct.pack("<BBHbB", ANY_BYTES | UNSEALED, 1, 0, 60, 0) + bytes(range(256)) * 8)
+
+# Metadata in both forms, each key left out and absurd.
+OUSTER = {
+    "sensor_info": {"prod_line": "OS-1-16", "prod_sn": "122201000998", "initialization_id": 7109750},
+    "config_params": {"lidar_mode": "1024x10", "timestamp_mode": "TIME_FROM_PTP_1588", "udp_port_lidar": 7502, "udp_port_imu": 7503},
+    "beam_intrinsics": {"beam_altitude_angles": [16 - 2 * i for i in range(16)], "beam_azimuth_angles": [1.5] * 16,
+                        "lidar_origin_to_beam_origin_mm": 15.806, "beam_to_lidar_transform": [1, 0, 0, 15.806, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]},
+    "imu_intrinsics": {"imu_to_sensor_transform": [1, 0, 0, 6.253, 0, 1, 0, -11.775, 0, 0, 1, 7.645, 0, 0, 0, 1]},
+    "lidar_intrinsics": {"lidar_to_sensor_transform": [-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 36.18, 0, 0, 0, 1]},
+    "lidar_data_format": {"pixels_per_column": 16, "columns_per_packet": 16, "columns_per_frame": 1024, "column_window": [0, 1023],
+                          "udp_profile_lidar": "RNG15_RFL8_NIR8", "udp_profile_imu": "ACCEL32_GYRO32_NMEA", "header_type": "FUSA"},
+    "imu_data_format": {"imu_measurements_per_packet": 8},
+    "calibration_status": {},
+}
+flat = {key: value for section in OUSTER.values() for key, value in section.items()} | {"data_format": OUSTER["lidar_data_format"]}
+write("ouster_metadata", "nested", json.dumps(OUSTER))
+write("ouster_metadata", "flat", json.dumps(flat))
+for section, keys in OUSTER.items():
+    write("ouster_metadata", f"without_{section}", json.dumps({name: value for name, value in OUSTER.items() if name != section}))
+    for key in keys:
+        for index, odd in enumerate((None, -1, 1e300, 0.5, "", "RNG19_RFL8_SIG16_NIR16_DUAL", [], [1, 2], [0] * 16, {})):
+            write("ouster_metadata", f"odd_{section}_{key}_{index}", json.dumps(OUSTER | {section: keys | {key: odd}}))
 
 write("position_packets", "packet", position_tail())
 write("position_packets", "sentence", position_tail()[8:])
@@ -164,6 +219,11 @@ write("config", "anchors", "lidars: &a\n  - {name: front, model: VLP-16}\nmotion
 lasers = "\n".join(f"- {{dist_correction: 0.0, horiz_offset_correction: 0.01, laser_id: {i}, rot_correction: 0.0, "
                    f"two_pt_correction_available: false, vert_correction: {0.01 * i - 0.02}, vert_offset_correction: 0.0}}"
                    for i in range(4))
+angles = "Laser id,Elevation,Azimuth\n" + "".join(f"{i + 1},{14.5 - i},{-1.042 + i}\n" for i in range(4))
+for name, content in (("hesai", angles), ("hesai_version", "EEFF,1,1\r\n" + angles.replace("Laser id", "Channel").replace("\n", "\r\n")),
+                      ("hesai_hash", "\ufeff" + angles + "0123456789abcdef,,\n"), ("hesai_twice", angles + "1,0,0\n"), ("hesai_missing", angles + "9,0,0\n"),
+                      ("hesai_odd", angles + "5,nan,1e999\n6,,\n")):
+    write("calibration", name, content)
 write("calibration", "short", f"num_lasers: 4\ndistance_resolution: 0.002\nlasers:\n{lasers}\n")
 
 imu = "#t_ns,wx,wy,wz,ax,ay,az\n" + "".join(f"{1_700_000_000_000_000_000 + i * 5_000_000},0.0{i},0,0,0,0,9.8{i}\n" for i in range(8))
@@ -201,13 +261,15 @@ for form, order in (("binary_little_endian", "<"), ("binary_big_endian", ">")):
 write("point_cloud", "ascii", PLY.format("ascii", "float", "double", "float32") + "1 2 3 4\n-1e3 nan .5 5\n")
 PCD = "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z h\nSIZE 4 4 8 4\nTYPE F F F U\nCOUNT 1 1 1 3\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\nDATA {}\n"
 write("point_cloud", "pcd_ascii", PCD.format("ascii") + "1 2 3 4 5 6\n7 8 9 10 11 12\n")
+packed = b"\x1f" + bytes(range(32)) + b"\xe0\x0f\x00"  # a byte is repeated 24 times
+write("point_cloud", "pcd_compressed", PCD.format("binary_compressed").encode() + struct.pack("<II", len(packed), 56) + packed)
 write("point_cloud", "pcd_binary", PCD.format("binary").encode() + struct.pack("<ffdIII", 1, 2, 3, 4, 5, 6) * 2)
 
 # The state of the service; checksums are made right by the target.
 POSE = (1, 2, 3, 0, 0, 0, 1)
 COVARIANCE_OF_ONE = [float(i % 7 == 0) for i in range(36)]
-head = b"locusd 3" + struct.pack("<q7d36d6d56dQ", 1_700_000_000_000_000_000, *POSE, *COVARIANCE_OF_ONE, 1, 0, 0, 0, 0, 0.1,
-                                 *POSE, *([0] * 49), 0)
+head = b"locusd 4" + struct.pack("<q7d36d6d56dQQ", 1_700_000_000_000_000_000, *POSE, *COVARIANCE_OF_ONE, 1, 0, 0, 0, 0, 0.1,
+                                 *POSE, *([0] * 49), 1, 0)
 for points in (0, 3):
     write("saved_state", f"points_{points}", head + struct.pack("<QiIQ", 7, 1, points, 0) + struct.pack("<6f", 1, 2, 3, 0, 0, 1) * points)
 
@@ -266,13 +328,21 @@ for name, request in (("status", '{"command": "status"}'), ("map", '{"command":"
 
 STAMP_AND_FRAME = struct.pack("<II", 1_700_000_000, 5) + text(b"base")
 BODIES = [struct.pack("<37d", *range(37)), text(b"odom") + struct.pack("<85d", *range(85)),
-          struct.pack("<III", 1, 1_700_000_000, 7) + data_packet(0x22, 0x37, 1, 110592)]
+          struct.pack("<III", 1, 1_700_000_000, 7) + data_packet(0x22, 0x37, 1, 110592),
+          struct.pack("<IIII", 1, 1_700_000_000, 7, 40) + bytes(range(40))]
 ros1 = [struct.pack("<I", 1) + STAMP_AND_FRAME + body for body in BODIES]
 cdr_head = struct.pack("<4BIII5s3x", 0, 1, 0, 0, 1_700_000_000, 5, 5, b"base")
-cdr = [cdr_head + bytes(4) + BODIES[0], cdr_head + struct.pack("<I5s3x", 5, b"odom") + BODIES[1][8:], cdr_head + BODIES[2]]
-for kind in range(3):
+cdr = [cdr_head + bytes(4) + BODIES[0], cdr_head + struct.pack("<I5s3x", 5, b"odom") + BODIES[1][8:], cdr_head + BODIES[2], cdr_head + BODIES[3]]
+for kind in range(4):
     write("bag_messages", f"ros1_{kind}", bytes([2 * kind]) + ros1[kind])
     write("bag_messages", f"cdr_{kind}", bytes([2 * kind + 1]) + cdr[kind])
+pandar = struct.pack("<III", 1, 1_700_000_000, 7) + bytes(range(250)) * 6 + struct.pack("<I", 1262)
+frame = struct.pack("<IIII", 1, 1_700_000_000, 7, 40) + bytes(range(40)) + struct.pack("<I", 40)
+for kind, body in ((8, pandar), (9, frame)):
+    write("bag_messages", f"ros1_{kind}", bytes([2 * (kind - 2)]) + struct.pack("<I", 1) + STAMP_AND_FRAME + body)
+    write("bag_messages", f"cdr_{kind}", bytes([2 * (kind - 2) + 1]) + cdr_head + body)
+bare = struct.pack("<II", 1, 1) + STAMP_AND_FRAME + frame[4:]
+write("bag_messages", "ros1_bare", bytes([14]) + bare)
 topics = connection(0, b"/imu", b"sensor_msgs/Imu") + connection(1, b"/scan", b"velodyne_msgs/VelodyneScan")
 messages = b"".join(record(2, ros1[kind], conn=struct.pack("<I", number), time=struct.pack("<II", 1_700_000_001, 9))
                     for number, kind in ((0, 0), (0, 0), (1, 2)))
@@ -293,3 +363,140 @@ for name, part in (("no_time", record(2, ros1[0], conn=bytes(4))), ("no_connecti
     write("bags", f"{name}_outside", bag + part)
 write("bags", "no_head", b"#ROSBAG V2.0\n" + record(5, topics, compression=b"none", size=struct.pack("<I", len(topics))))
 write("bags", "other_version", b"#ROSBAG V1.2\n")
+
+# MCAP, from behind the magic on. Checksums are left out (zero), or mutations would end there.
+MCAP_MAGIC = b"\x89MCAP0\r\n"
+
+
+def zstd(data):
+    library = ctypes.CDLL("libzstd.so.1")
+    library.ZSTD_compress.restype = ctypes.c_size_t
+    out = ctypes.create_string_buffer(len(data) + 1000)
+    return out.raw[:library.ZSTD_compress(out, ctypes.c_size_t(len(out)), data, ctypes.c_size_t(len(data)), 1)]
+
+
+def mcap(op, content):
+    return struct.pack("<BQ", op, len(content)) + content
+
+
+def mcap_schema(number, name, encoding=b"ros2msg"):
+    return mcap(3, struct.pack("<H", number) + text(name) + text(encoding) + text(b"float64 x"))
+
+
+def mcap_channel(number, schema, topic, encoding=b"cdr"):
+    return mcap(4, struct.pack("<HH", number, schema) + text(topic) + text(encoding) + text(text(b"a") + text(b"b")))
+
+
+def mcap_message(channel, ns, data):
+    return mcap(5, struct.pack("<HIQQ", channel, 0, ns, ns) + data)
+
+
+def mcap_chunk(records, compression=b"", size=None, packed=None):
+    packed = records if packed is None else packed
+    return mcap(6, struct.pack("<QQQI", 0, 9, len(records) if size is None else size, 0) + text(compression) + struct.pack("<Q", len(packed)) + packed)
+
+
+def mcap_end(before, summary=b""):
+    end = mcap(15, bytes(4))
+    return end + summary + mcap(2, struct.pack("<QQI", len(MCAP_MAGIC + before + end) if summary else 0, 0, 0)) + MCAP_MAGIC
+
+
+mcap_head = mcap(1, text(b"ros2") + text(b"seeds"))
+declared = mcap_schema(1, b"sensor_msgs/msg/Imu") + mcap_channel(1, 1, b"/imu") + mcap_channel(2, 0, b"/text", b"json")
+declared += mcap_schema(3, b"velodyne_msgs/VelodyneScan", b"ros1msg") + mcap_channel(3, 3, b"/scan", b"ros1")
+spoken = mcap_message(1, 1_700_000_000_000_000_000, b"imu") + mcap_message(3, 5, b"scan") + mcap_message(2, 7, b"{}")
+figures = mcap(11, struct.pack("<QHIIIIQQ", 3, 2, 3, 0, 0, 1, 5, 7) + text(b""))
+for name, chunk in (("bare", declared + spoken), ("plain", mcap_chunk(declared + spoken)),
+                    ("lz4", mcap_chunk(declared + spoken, b"lz4", packed=lz4(declared + spoken))),
+                    ("zstd", mcap_chunk(declared + spoken, b"zstd", packed=zstd(declared + spoken)))):
+    body = mcap_head + chunk
+    write("mcap", f"{name}_open", body)
+    write("mcap", f"{name}_closed", body + mcap_end(body))
+    write("mcap", f"{name}_summary", body + mcap_end(body, declared + figures))
+    write("mcap", f"{name}_cut", body[:-9])
+for name, part in (("longer", mcap_chunk(spoken, b"lz4", 9999, lz4(spoken))), ("shorter", mcap_chunk(spoken, b"zstd", 9, zstd(spoken))),
+                   ("other", mcap_chunk(spoken, b"brotli")), ("nested", mcap_chunk(mcap_chunk(spoken))), ("absurd", mcap_chunk(spoken, b"zstd", 1 << 62)),
+                   ("unknown_channel", mcap_message(9, 5, b"?")), ("late", mcap_message(1, (1 << 64) - 1, b"late")), ("zeros", bytes(40)),
+                   ("again", mcap_channel(1, 3, b"/other", b"ros1") + spoken), ("attachment", mcap(9, bytes(50)) + spoken),
+                   ("packed_message", mcap_message(1, 5, zstd(b"packed and packed and packed"))), ("packed_wrongly", mcap_message(1, 5, b"\x28\xb5\x2f\xfd\x60\xff\xff\xff"))):
+    write("mcap", name, mcap_head + declared + part + mcap_end(b""))
+write("mcap", "summary_too_far", mcap_head + declared + mcap(15, bytes(4)) + mcap(2, struct.pack("<QQI", 1 << 60, 0, 0)) + MCAP_MAGIC)
+
+for name, packed in (("gzip", gzip.compress(b"packed and packed and packed")), ("xz", lzma.compress(b"packed and packed and packed")),
+                     ("zstd", zstd(b"packed and packed and packed"))):
+    for length in (0, 255):
+        write("unpacking", f"{name}_{length}", bytes([length]) + packed)
+    write("unpacking", f"{name}_twice", b"\x20" + packed + packed)
+    write("unpacking", f"{name}_cut", b"\x20" + packed[:-5])
+    write("unpacking", f"{name}_padded", b"\x20" + packed + bytes(9))
+write("unpacking", "plain", b"\x03not packed")
+
+
+# Clouds: fields (name, offset, type) of a point, its step, and what makes one of column, ring, time in s.
+class Cdr:
+    def __init__(self, aligned):
+        self.out, self.aligned = b"", aligned
+
+    def put(self, layout, *values):
+        for letter, value in zip(layout, values):
+            size = struct.calcsize("<" + letter)
+            if self.aligned:
+                self.out += bytes(-len(self.out) % size)
+            self.out += struct.pack("<" + letter, value)
+
+    def text(self, content):
+        content += b"\0" if self.aligned else b""
+        self.put("I", len(content))
+        self.out += content
+
+
+def cloud_message(aligned, index, fields, step, make_point, rows=1):
+    columns, rings = 16, 16
+    cdr = Cdr(aligned)
+    if not aligned:
+        cdr.put("I", index)
+    cdr.put("II", 1_700_000_000, index * 100_000_000)
+    cdr.text(b"lidar")
+    points = b""
+    for column in range(columns):
+        for ring in range(rings):
+            azimuth, elevation = 3.1 - 6.2 * column / columns, 0.03 * ring - 0.2
+            xyz = 5 * math.cos(azimuth), 5 * math.sin(azimuth), 5 * math.tan(elevation)
+            points += make_point(*xyz, ring, 0.1 * column / columns).ljust(step, b"\0")
+    if fields is None:
+        cdr.put("Q", 1_700_000_000_000_000_000)
+        cdr.put("IBBBBI", columns * rings, 0, 0, 0, 0, columns * rings)
+        return (bytes([0, 1, 0, 0]) if aligned else b"") + cdr.out + points
+    cdr.put("II", rows, columns * rings // rows)
+    cdr.put("I", len(fields))
+    for name, offset, kind in fields:
+        cdr.text(name)
+        cdr.put("IBI", offset, kind, 1)
+    cdr.put("BIII", 0, step, step * columns * rings // rows, len(points))
+    cdr.out += points + b"\1"
+    return (bytes([0, 1, 0, 0]) if aligned else b"") + cdr.out
+
+
+XYZ = [(b"x", 0, 7), (b"y", 4, 7), (b"z", 8, 7), (b"intensity", 12, 7)]
+EPOCH_S = 1_700_000_000
+CLOUDS = {
+    "velodyne": (XYZ + [(b"ring", 16, 4), (b"time", 18, 7)], 22, lambda x, y, z, r, t: struct.pack("<4fHf", x, y, z, 9, r, t - 0.1), 1),
+    "ouster": (XYZ + [(b"t", 16, 6), (b"ring", 20, 2)], 24, lambda x, y, z, r, t: struct.pack("<4fIB", x, y, z, 9, int(t * 1e9), 15 - r), 16),
+    "hesai": (XYZ + [(b"timestamp", 16, 8), (b"ring", 24, 4)], 26, lambda x, y, z, r, t: struct.pack("<4fdH", x, y, z, 9, EPOCH_S + t, r), 1),
+    "livox": (XYZ + [(b"line", 16, 2), (b"timestamp", 18, 8)], 26, lambda x, y, z, r, t: struct.pack("<4fBBd", x, y, z, 9, r % 6, 0, EPOCH_S * 1e9 + t * 1e9), 1),
+    "bare": (XYZ, 16, lambda x, y, z, r, t: struct.pack("<4f", x, y, z, 9), 1),
+    "rows": (XYZ, 16, lambda x, y, z, r, t: struct.pack("<4f", x, y, z, 9), 8),
+    "equal": (XYZ + [(b"time", 16, 7)], 20, lambda x, y, z, r, t: struct.pack("<5f", x, y, z, 9, 0), 1),
+}
+for name, (fields, step, make_point, rows) in CLOUDS.items():
+    for aligned in (False, True):
+        for times in range(3):
+            stream = bytes([int(aligned) + 4 * times])
+            for index in range(3):
+                message = cloud_message(aligned, index, fields, step, make_point, rows)
+                stream += struct.pack("<BH", 104 if index == 0 else 100, len(message)) + message
+            write("cloud_messages", f"{name}_{'cdr' if aligned else 'ros1'}_{times}", stream)
+for aligned in (False, True):
+    message = cloud_message(aligned, 0, None, 20 if aligned else 19,
+                            lambda x, y, z, r, t: struct.pack("<I3f3B", int(t * 1e9), x, y, z, 9, 16, r % 6))
+    write("cloud_messages", f"custom_{int(aligned)}", bytes([2 + int(aligned), 104]) + struct.pack("<H", len(message)) + message)

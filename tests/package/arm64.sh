@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# arm64.sh SOURCE BIN: the packages for arm64 are built on another processor, and what is in them runs: under QEMU a drive is
-# replayed as the programs of BIN replay it here.
+# arm64.sh SOURCE BIN SUITE: the packages of the release SUITE for arm64 are built on another processor, and what is in them
+# runs: under QEMU a drive is replayed as the programs of BIN replay it here.
 set -euo pipefail
 here=$(dirname "$(realpath "$0")")
-source=$(realpath "$1") bin=$(realpath "$2")
+source=$(realpath "$1") bin=$(realpath "$2") suite=$3
 source "$here/base_tree.sh"
 probe
 [ "$(dpkg --print-architecture)" != arm64 ] || skip "this is an arm64; the other tests are about it"
@@ -12,7 +12,7 @@ probe
 work=$(mktemp -d -t locusd-arm64.XXXXXX)
 trap 'rm -rf "$work"' EXIT
 cd "$work"
-in_tree() { "$source/packaging/cross-tree.sh" arm64 "$work" "$@"; }
+in_tree() { "$source/packaging/build-tree.sh" "$suite" arm64 "$work" "$@"; }
 in_tree true || skip "there is no Debian to build for arm64 in, see above"
 in_tree /usr/aarch64-linux-gnu/lib/ld-linux-aarch64.so.1 --version >/dev/null ||
   skip "programs of arm64 cannot be run: that needs Linux 6.7 or, outside, the package qemu-user-static"
@@ -20,7 +20,7 @@ cp -r "$source/packaging" .
 DEB_BUILD_PROFILES="cross nocheck" in_tree packaging/install-build-deps.sh arm64 >log 2>&1 ||
   { tail log; skip "the libraries of arm64 could not be installed; is there a network?"; }
 
-"$source/packaging/build-deb.sh" --arch arm64 "$work/deb"
+"$source/packaging/build-deb.sh" --suite "$suite" --arch arm64 "$work/deb"
 "$here/contents.sh" "$source" "$work/deb"
 for package in locusd locus-tools; do
   dpkg-deb -x "$work/deb/$package"_*_arm64.deb "$work/root"
@@ -49,7 +49,7 @@ paste -d ' ' "$work"/{here,arm64-1}/odometry.tum | awk '
   apart(2, 4) > worst_m { worst_m = apart(2, 4) }
   2 * apart(5, 8) > worst_rad { worst_rad = 2 * apart(5, 8) }
   END {
-    printf "arm64: %d poses, %d at other times, at most %.2f mm and %.3f mrad apart\n", NR, others, 1e3 * worst_m,
+    printf "%d poses, %d at other times, at most %.2f mm and %.3f mrad apart\n", NR, others, 1e3 * worst_m,
       1e3 * worst_rad
     exit !(NR >= 98 && !others && worst_m < 3e-3 && worst_rad < 1e-3)
   }'

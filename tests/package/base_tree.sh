@@ -3,7 +3,7 @@
 
 # skip WHY: ctest shows the test as skipped.
 skip() {
-  echo "SKIPPED: $*"
+  echo "SKIPPED: $*" >&2
   exit 77
 }
 
@@ -23,20 +23,30 @@ probe() {
   unshare --net ip link add locus-probe type veth || skip "there are no network namespaces with veth"
 }
 
-# base_tree FOLDER: the path of a bootable Debian with what the packages in FOLDER depend on, and ss for the test. Made
-# once for each such list of packages.
+# suite_of FOLDER: the release of Debian that the packages there are for.
+suite_of() { sed -n 's/^Distribution: //p' "$1"/*.changes; }
+
+# depends_of DEB...: names of the packages that these ask for, a line each, but for those that they are themselves.
+depends_of() {
+  for deb in "$@"; do
+    dpkg-deb -f "$deb" Pre-Depends Depends | sed 's/^[^:]*: //; s/ *([^)]*)//g; s/:any//g; s/ *|[^,]*//g'
+  done | tr ', ' '\n\n' | grep -vxE 'liblocus0|liblocus-dev|python3-locus|' | sort -u
+}
+# library_depends FOLDER: what the packages of the library there, and of Python, depend on.
+library_depends() { depends_of "$1"/{liblocus0,liblocus-dev,python3-locus}_*.deb; }
+
+# base_tree FOLDER [PACKAGE...]: the path of a bootable Debian, of their release, with what the packages in FOLDER depend
+# on, ss for the test, and PACKAGE. Made once for each such list of packages.
 base_tree() {
-  local cache=${XDG_CACHE_HOME:-/var/cache}/locusd-tests packages tree
-  packages=$(for deb in "$1"/locus{d,-tools}_*.deb; do
-    dpkg-deb -f "$deb" Pre-Depends Depends | sed 's/^[^:]*: //; s/ *([^)]*)//g; s/ *|[^,]*//g'
-    echo
-  done | tr ', ' '\n\n' | sort -u | xargs)
-  tree=$cache/bookworm-$(sha256sum <<<"$packages" | head -c 12)
+  local cache=${XDG_CACHE_HOME:-/var/cache}/locusd-tests suite packages tree
+  suite=$(suite_of "$1")
+  packages=$({ depends_of "$1"/locus{d,-tools}_*.deb; printf '%s\n' "${@:2}"; } | sort -u | xargs)
+  tree=$cache/$suite-$(sha256sum <<<"$packages" | head -c 12)
   if [ ! -d "$tree" ]; then
     mkdir -p "$cache"
-    mmdebstrap --quiet --variant=minbase --include="systemd-sysv dbus iproute2 $packages" bookworm "$tree.$$" >&2 ||
-      { rm -rf "$tree.$$"; skip "mmdebstrap could not make a Debian system; is there a network?"; }
-    mv "$tree.$$" "$tree"
+    mmdebstrap --quiet --variant=minbase --include="systemd-sysv dbus iproute2 $packages" "$suite" "$tree.$$" >&2 ||
+      { rm -rf "$tree.$$"; skip "mmdebstrap could not make a Debian $suite; is there a network?"; }
+    mv -T "$tree.$$" "$tree"
   fi
   echo "$tree"
 }

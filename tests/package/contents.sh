@@ -1,19 +1,21 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# contents.sh SOURCE FOLDER: the packages there have the version of the sources, ask for little, and know nothing of the
-# folder that they were built in.
+# contents.sh SOURCE FOLDER: the packages there have the version of the sources and of their release of Debian, ask for
+# little, and know nothing of the folder that they were built in.
 set -euo pipefail
 source=$1 folder=$2
 status=0
 complain() { echo "$*"; status=1; }
-version=$(grep -oP '^project\(locusd VERSION \K[0-9.]+' "$source/CMakeLists.txt")
-for package in locusd locus-tools; do
+source "$source/packaging/releases.sh"
+source "$source/tests/package/base_tree.sh"
+version=$(grep -oP '^project\(locusd VERSION \K[0-9.]+' "$source/CMakeLists.txt")$(suffix_of "$(suite_of "$folder")")
+for package in locusd locus-tools liblocus0 liblocus-dev python3-locus; do
   deb=$(echo "$folder/${package}"_*.deb)
   [ "$(dpkg-deb -f "$deb" Version)" = "$version" ] ||
-    complain "$deb: is not of version $version, as CMakeLists.txt says; look at packaging/debian/changelog"
+    complain "$deb: is not of version $version, as CMakeLists.txt and its release say; look at packaging/debian/changelog"
   depends=$(dpkg-deb -f "$deb" Depends)
   ! grep -qE 'vtk|pcl-io|boost|ros' <<<"$depends" || complain "$deb: drags in a lot: $depends"
-  [ $package != locusd ] || ! grep -q pcl <<<"$depends" || complain "$deb: needs PCL: $depends"
+  [ $package = locus-tools ] || ! grep -q pcl <<<"$depends" || complain "$deb: needs PCL: $depends"
   ! dpkg-deb --fsys-tarfile "$deb" | grep -aE 'locusd-deb\.' >/dev/null ||
     complain "$deb: names the folder that it was built in"
 done

@@ -62,12 +62,27 @@ buffer_is() { # at least so many bytes; the kernel holds twice what it gives
 }
 buffer_is $((8 << 20)) || says -10min "sysctl net.core.rmem_max=$((8 << 20))"
 
-step "it drives, and stands"
 touch waits_for_drive
-wait_for 20 status_is tracking
+step "an upgrade on the way keeps what was edited, brings what was not, and goes on where it was"
 wait_for 30 status_is standstill # at the start
 wait_for 30 status_is tracking
-wait_for 30 status_is standstill
+since=$(now)
+process=$(systemctl show -P MainPID locusd)
+date +%s.%N >upgrade
+install_package "$(echo locusd_*.deb)"
+date +%s.%N >>upgrade
+cmp robot.yaml /etc/locusd/locusd.yaml
+[ -e /etc/locusd/locusd.yaml.dpkg-dist ]
+if grep -q "previous version" /etc/locusd/spot.yaml; then false; fi
+wait_for 10 alive "$process"
+[ "$(dpkg-query -W -f '${Version}' locusd)" != 0.0.1 ]
+goes_on "$since"
+locusctl status --json | grep '^ "beginning": "map"' >/dev/null
+status_is tracking # and not yet where it stands
+
+step "it stands where it went, and its wheels spin"
+spins() { status_is standstill && locusctl status | grep -E "^wio +lost" >/dev/null; }
+wait_for 30 spins # what begins to spin while nobody looks is believed
 locusctl status
 locusctl save-map /tmp/map.pcd
 [ -s /tmp/map.pcd ]
@@ -77,16 +92,14 @@ step "what it receives is recorded where the unit lets it write"
 compgen -G "/var/lib/locusd/record/000001_*/000001/lidar.pcap" >/dev/null
 [ "$(stat -c %U /var/lib/locusd/record)" = locusd ]
 
-step "the upgrade keeps what was edited, brings what was not, and goes on where it was"
-since=$(now)
-process=$(systemctl show -P MainPID locusd)
-install_package "$(echo locusd_*.deb)"
-cmp robot.yaml /etc/locusd/locusd.yaml
-[ -e /etc/locusd/locusd.yaml.dpkg-dist ]
-if grep -q "previous version" /etc/locusd/spot.yaml; then false; fi
-wait_for 10 alive "$process"
-[ "$(dpkg-query -W -f '${Version}' locusd)" != 0.0.1 ]
-goes_on "$since"
+step "the unit lets it keep an incident, and tell metrics"
+keeps() { incident=$(locusctl record --keep 10s); }
+wait_for 10 keeps # one by itself may be on its way
+[ -s "$incident/why.json" ] && [ "$(dirname "$incident")" = /var/lib/locusd/incidents ]
+exec 3<>/dev/tcp/127.0.0.1/9464
+printf 'GET /metrics HTTP/1.1\r\n\r\n' >&3
+grep '^locusd_incidents_kept_total [1-9]' <&3 >/dev/null
+exec 3>&-
 
 step "a thread that hangs is a watchdog's kill and a restart; the odometry goes on where it was"
 since=$(now)
@@ -95,8 +108,14 @@ process=$(systemctl show -P MainPID locusd)
 wait_for 20 says "$since" "Watchdog timeout"
 wait_for 10 alive "$process"
 goes_on "$since"
+is_noticed() { # unless another one was kept a moment before
+  compgen -G "/var/lib/locusd/incidents/*_restart/why.json" >/dev/null ||
+    locusctl status --json | grep -E '"suppressed": [1-9]' >/dev/null
+}
+wait_for 10 is_noticed
 
 step "so does a crash"
+wait_for 20 spins
 since=$(now)
 process=$(systemctl show -P MainPID locusd)
 kill -SEGV "$process"

@@ -8,7 +8,7 @@ work=$(mktemp -d)
 trap 'rm -r "$work"' EXIT
 status=0
 complain() { echo "$*"; status=1; }
-for package in locusd locus-tools; do
+for package in locusd locus-tools liblocus0; do
   deb=$(echo "$folder/${package}"_*.deb)
   dpkg-deb -x "$deb" "$work/$package"
   sbom=$work/$package/usr/share/doc/$package/$package.spdx.json
@@ -17,11 +17,12 @@ for package in locusd locus-tools; do
       all(.relationships[]; [.spdxElementId, .relatedSpdxElement] - $ids == []))' "$sbom" >/dev/null ||
     complain "$sbom: is no SPDX 2.3, or its relations lead nowhere"
   jq -r '.packages[].comment // "" | split(" ")[]' "$sbom" | sort >"$work/named"
-  readelf --dynamic "$work/$package"/usr/bin/* | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p' | sort -u >"$work/needed"
+  find "$work/$package/usr" -type f \( -path '*/usr/bin/*' -o -name '*.so*' \) -print0 | xargs -0 readelf --dynamic |
+    sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p' | sort -u >"$work/needed"
   [ -s "$work/needed" ] || complain "$deb: its programs need no library; is this test out of date?"
   missing=$(comm -23 "$work/needed" "$work/named")
   [ -z "$missing" ] || complain "$sbom: lacks" "$missing"
-  for library in $(dpkg-deb -f "$deb" Depends | grep -oP 'lib[a-z0-9.+-]+(?= \(>=)'); do
+  for library in $(dpkg-deb -f "$deb" Depends | grep -oP '(?<![a-z0-9.+-])z?lib[a-z0-9.+-]+(?= \(>=)'); do
     least=$(dpkg-deb -f "$deb" Depends | grep -oP "(?<![a-z0-9.+-])\Q$library\E \(>= \K[^)]*")
     version=$(jq -r --arg name "$library" '.packages[] | select(.name == $name).versionInfo' "$sbom")
     dpkg --compare-versions "${version:-0~}" ge "$least" || complain "$sbom: $library is '$version', needed is $least"

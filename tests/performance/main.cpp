@@ -122,6 +122,8 @@ int main(int argc, char** argv) {
     add_floors(effort, *capture);
   }
   add_decoders(effort);
+  add_hesai_decoders(effort);
+  add_ouster_decoders(effort);
   add_scaling(effort);
 
   Medians medians;

@@ -30,7 +30,7 @@ Config SimulatedRobot::config() const {
   for (const sim::NamedLidar& lidar : robot_.sensors.lidars) {
     LidarOptions& options = config.lidars.emplace_back();
     options.name = lidar.name;
-    options.model = lidar.options.model;
+    options.model = std::get<velodyne::Model>(lidar.options.model);
     options.port = lidar.options.port;
     options.T_base_lidar = lidar.options.T_base_lidar;
   }

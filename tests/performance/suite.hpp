@@ -41,6 +41,8 @@ void add_pipelines(const Effort& effort, const Capture& capture);
 void add_pcl(const Effort& effort, const Capture& capture);
 void add_floors(const Effort& effort, const Capture& capture);
 void add_decoders(const Effort& effort);
+void add_hesai_decoders(const Effort& effort);
+void add_ouster_decoders(const Effort& effort);
 void add_scaling(const Effort& effort);
 
 } // namespace locus::performance

@@ -27,9 +27,61 @@ struct FastPacket {
   template <class Stream> void fields(Stream& s) { s(sec)(nanosec)(data); }
 };
 
-struct FastScan {
+struct FastNebulaPacket {
+  std::int32_t sec = 0;
+  std::uint32_t nanosec = 0;
+  std::vector<std::uint8_t> data{};
+  template <class Stream> void fields(Stream& s) { s(sec)(nanosec)(data); }
+};
+
+struct FastPandarPacket {
+  std::int32_t sec = 0;
+  std::uint32_t nanosec = 0;
+  std::array<std::uint8_t, 1500> data{};
+  std::uint32_t size = 0;
+  template <class Stream> void fields(Stream& s) { s(sec)(nanosec)(data)(size); }
+};
+
+struct FastHesaiPacket {
+  std::int32_t sec = 0;
+  std::uint32_t nanosec = 0;
+  std::vector<std::uint8_t> data{};
+  std::uint32_t size = 0;
+  template <class Stream> void fields(Stream& s) { s(sec)(nanosec)(data)(size); }
+};
+
+struct FastHesaiPacketWithHeader {
   FastHeader header;
-  std::vector<FastPacket> packets;
+  FastHesaiPacket packet;
+  template <class Stream> void fields(Stream& s) { s(header)(packet); }
+};
+
+struct FastFrameWithoutHeader {
+  std::vector<FastHesaiPacketWithHeader> packets;
+  template <class Stream> void fields(Stream& s) { s(packets); }
+};
+
+/// livox_ros_driver2/CustomMsg
+struct FastLivoxPoint {
+  std::uint32_t offset_time = 0;
+  float x = 0, y = 0, z = 0;
+  std::uint8_t reflectivity = 0, tag = 0, line = 0;
+  template <class Stream> void fields(Stream& s) { s(offset_time)(x)(y)(z)(reflectivity)(tag)(line); }
+};
+
+struct FastLivoxCloud {
+  FastHeader header;
+  std::uint64_t timebase = 0;
+  std::uint32_t point_num = 0;
+  std::uint8_t lidar_id = 0;
+  std::array<std::uint8_t, 3> reserved{};
+  std::vector<FastLivoxPoint> points;
+  template <class Stream> void fields(Stream& s) { s(header)(timebase)(point_num)(lidar_id)(reserved)(points); }
+};
+
+template <class Packet> struct FastScan {
+  FastHeader header;
+  std::vector<Packet> packets;
   template <class Stream> void fields(Stream& s) { s(header)(packets); }
 };
 
@@ -46,16 +98,11 @@ class Ros1Stream {
     return *this;
   }
   template <class T, std::size_t n> Ros1Stream& operator()(std::array<T, n>& values) {
-    for (T& value : values)
-      (*this)(value);
-    return *this;
+    return append(std::span<T>{values});
   }
   template <class T> Ros1Stream& operator()(std::vector<T>& values) {
     auto count = static_cast<std::uint32_t>(values.size());
-    (*this)(count);
-    for (T& value : values)
-      (*this)(value);
-    return *this;
+    return (*this)(count).append(std::span<T>{values});
   }
   Ros1Stream& operator()(std::string& text) {
     auto count = static_cast<std::uint32_t>(text.size());
@@ -71,6 +118,15 @@ class Ros1Stream {
   }
 
  private:
+  template <class T> Ros1Stream& append(std::span<T> values) {
+    if constexpr (std::is_arithmetic_v<T>)
+      out_.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
+    else
+      for (T& value : values)
+        (*this)(value);
+    return *this;
+  }
+
   std::string& out_;
 };
 
@@ -79,14 +135,16 @@ std::vector<std::byte> to_bytes(std::string_view text) {
   return {bytes.begin(), bytes.end()};
 }
 
-template <class Message> std::vector<std::byte> serialised(Message message, RosVersion ros) {
+template <class Message>
+std::vector<std::byte> serialised(Message message, RosVersion ros, std::size_t most_bytes = 1 << 20) {
   if (ros == RosVersion::ros1) {
     std::string out;
     Ros1Stream stream(out);
     stream(message);
     return to_bytes(out);
   }
-  std::string out(1 << 20, '\0');
+  static std::string out; // kept, for a megabyte for each sample of an IMU would take longer than all else
+  out.resize(std::max(out.size(), most_bytes));
   eprosima::fastcdr::FastBuffer buffer(out.data(), out.size());
   eprosima::fastcdr::Cdr cdr(buffer, eprosima::fastcdr::Cdr::LITTLE_ENDIANNESS, eprosima::fastcdr::Cdr::DDS_CDR);
   cdr.serialize_encapsulation();
@@ -156,7 +214,7 @@ std::vector<std::byte> odometry_message(const OdometrySample& sample, RosVersion
 }
 
 std::vector<std::byte> scan_message(std::span<const ReceivedPacket> packets, RosVersion ros) {
-  FastScan scan{header_at(packets.empty() ? Stamp{} : packets.back().stamp, "velodyne"), {}};
+  FastScan<FastPacket> scan{header_at(packets.empty() ? Stamp{} : packets.back().stamp, "velodyne"), {}};
   for (const ReceivedPacket& packet : packets) {
     FastPacket& fast = scan.packets.emplace_back();
     fast.sec = seconds_of(packet.stamp);
@@ -164,6 +222,77 @@ std::vector<std::byte> scan_message(std::span<const ReceivedPacket> packets, Ros
     std::memcpy(fast.data.data(), packet.payload.data(), fast.data.size());
   }
   return serialised(scan, ros);
+}
+
+std::vector<std::byte> nebula_message(std::span<const ReceivedPacket> packets, RosVersion ros) {
+  FastScan<FastNebulaPacket> scan{header_at(packets.empty() ? Stamp{} : packets.back().stamp, "velodyne"), {}};
+  for (const ReceivedPacket& packet : packets) {
+    const auto* const begin = reinterpret_cast<const std::uint8_t*>(packet.payload.data());
+    scan.packets.push_back(
+        {seconds_of(packet.stamp), nanoseconds_of(packet.stamp), {begin, begin + packet.payload.size()}});
+  }
+  return serialised(scan, ros);
+}
+
+std::vector<std::byte> pandar_message(std::span<const ReceivedPacket> packets, RosVersion ros) {
+  FastScan<FastPandarPacket> scan{header_at(packets.empty() ? Stamp{} : packets.back().stamp, "hesai"), {}};
+  for (const ReceivedPacket& packet : packets) {
+    FastPandarPacket& one = scan.packets.emplace_back();
+    one.sec = seconds_of(packet.stamp);
+    one.nanosec = nanoseconds_of(packet.stamp);
+    one.size = static_cast<std::uint32_t>(packet.payload.size());
+    std::memcpy(one.data.data(), packet.payload.data(), packet.payload.size());
+  }
+  return serialised(scan, ros);
+}
+
+std::vector<std::byte> hesai_message(std::span<const ReceivedPacket> packets, RosVersion ros, HesaiHeaders headers) {
+  const FastHeader header = header_at(packets.empty() ? Stamp{} : packets.back().stamp, "hesai");
+  FastScan<FastHesaiPacket> frame{header, {}};
+  FastFrameWithoutHeader bare;
+  for (const ReceivedPacket& packet : packets) {
+    const auto* const begin = reinterpret_cast<const std::uint8_t*>(packet.payload.data());
+    frame.packets.push_back({seconds_of(packet.stamp),
+                             nanoseconds_of(packet.stamp),
+                             {begin, begin + packet.payload.size()},
+                             static_cast<std::uint32_t>(packet.payload.size())});
+    bare.packets.push_back({header, frame.packets.back()});
+  }
+  return headers == HesaiHeaders::of_frame ? serialised(frame, ros) : serialised(bare, ros);
+}
+
+std::string type_of(const OwnCloud& cloud) {
+  return std::string{cloud.fields.front().name == "offset_time" ? "livox_ros_driver2/CustomMsg" : kPointCloudType};
+}
+
+std::vector<std::byte> cloud_message(const OwnCloud& cloud, RosVersion ros) {
+  const std::size_t most_bytes = cloud.data.size() + 100'000;
+  if (is_livox_type(type_of(cloud))) {
+    FastLivoxCloud livox{
+        header_at(cloud.stamp, cloud.frame), static_cast<std::uint64_t>(to_ns(cloud.stamp)), cloud.width, 0, {}, {}};
+    for (std::size_t i = 0; i < cloud.width; ++i)
+      livox.points.push_back({cloud.get<std::uint32_t>(i, "offset_time"), cloud.get<float>(i, "x"),
+                              cloud.get<float>(i, "y"), cloud.get<float>(i, "z"),
+                              cloud.get<std::uint8_t>(i, "reflectivity"), 16, cloud.get<std::uint8_t>(i, "line")});
+    return serialised(livox, ros, most_bytes);
+  }
+  FastCloud fast{header_at(cloud.stamp, cloud.frame), cloud.height, cloud.width, {}, false, cloud.point_step,
+                 cloud.width * cloud.point_step,      {},           true};
+  for (const OwnCloud::Field& field : cloud.fields)
+    fast.point_fields.push_back({field.name, field.offset, static_cast<std::uint8_t>(field.type), 1});
+  fast.data.resize(cloud.data.size());
+  std::memcpy(fast.data.data(), cloud.data.data(), cloud.data.size());
+  return serialised(fast, ros, most_bytes);
+}
+
+std::vector<std::byte> transform_message(const std::string& parent, const std::string& child, const Pose& T,
+                                         RosVersion ros) {
+  const Eigen::Vector3d& p = T.translation;
+  const Eigen::Quaterniond& q = T.rotation;
+  FastTransforms transforms;
+  transforms.transforms.push_back(
+      {header_at(Stamp{}, parent), child, {{p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()}}});
+  return serialised(transforms, ros);
 }
 
 std::string ros1_bag(std::span<const RecordedMessage> messages, BagEnd end) {
@@ -233,13 +362,14 @@ void write_db3(const std::filesystem::path& file, std::span<const RecordedMessag
   run("COMMIT");
 }
 
-std::vector<RecordedMessage> messages_of(const std::filesystem::path& capture_folder, RosVersion ros) {
+std::vector<RecordedMessage> messages_of(const std::filesystem::path& capture_folder, RosVersion ros,
+                                         decltype(scan_message)& packet_message) {
   constexpr std::size_t kPacketsInTurn = 76;
   std::vector<RecordedMessage> messages;
   std::map<std::uint16_t, std::vector<ReceivedPacket>> turns;
   const auto finish = [&](std::uint16_t port, std::vector<ReceivedPacket>& turn) {
     messages.push_back({"/" + std::to_string(port) + "/velodyne_packets", "velodyne_msgs/VelodyneScan",
-                        turn.back().stamp, scan_message(turn, ros)});
+                        turn.back().stamp, packet_message(turn, ros)});
     turn.clear();
   };
   auto capture = Capture::open(capture_folder / "lidar.pcap");
@@ -261,6 +391,17 @@ std::vector<RecordedMessage> messages_of(const std::filesystem::path& capture_fo
   auto wio = MotionSamples<OdometrySample>::open(capture_folder / "wio.tum");
   for (const OdometrySample& sample : wio->drain())
     messages.push_back({"/wheel_odometry", "nav_msgs/Odometry", sample.arrival, odometry_message(sample, ros)});
+  std::ranges::stable_sort(messages, {}, &RecordedMessage::recorded);
+  return messages;
+}
+
+std::vector<RecordedMessage> messages_of(const std::filesystem::path& capture_folder, std::span<const OwnCloud> clouds,
+                                         std::span<const Stamp> ends, RosVersion ros) {
+  constexpr Duration kWay = std::chrono::milliseconds{4};
+  std::vector<RecordedMessage> messages = messages_of(capture_folder, ros);
+  std::erase_if(messages, [](const RecordedMessage& message) { return message.topic.ends_with("packets"); });
+  for (std::size_t i = 0; i < clouds.size(); ++i)
+    messages.push_back({"/points", type_of(clouds[i]), ends[i] + kWay, cloud_message(clouds[i], ros)});
   std::ranges::stable_sort(messages, {}, &RecordedMessage::recorded);
   return messages;
 }

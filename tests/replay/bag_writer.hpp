@@ -9,6 +9,7 @@
 
 #include "core/sources/motion_sample.hpp"
 #include "drivers/net/datagram.hpp"
+#include "support/clouds.hpp"
 
 namespace locus::test {
 
@@ -30,6 +31,21 @@ struct ReceivedPacket {
 std::vector<std::byte> imu_message(const ImuSample& sample, RosVersion ros);
 std::vector<std::byte> odometry_message(const OdometrySample& sample, RosVersion ros);
 std::vector<std::byte> scan_message(std::span<const ReceivedPacket> packets, RosVersion ros);
+std::vector<std::byte> nebula_message(std::span<const ReceivedPacket> packets, RosVersion ros);
+std::vector<std::byte> pandar_message(std::span<const ReceivedPacket> packets, RosVersion ros);
+
+/// What has a header in hesai_ros_driver/UdpFrame, depending on the release.
+enum class HesaiHeaders { of_frame, of_packets };
+std::vector<std::byte> hesai_message(std::span<const ReceivedPacket> packets, RosVersion ros,
+                                     HesaiHeaders headers = HesaiHeaders::of_frame);
+
+/// sensor_msgs/PointCloud2, or Livox' own message of one that has its fields.
+std::vector<std::byte> cloud_message(const OwnCloud& cloud, RosVersion ros);
+std::string type_of(const OwnCloud& cloud);
+
+/// tf2_msgs/TFMessage of one transform.
+std::vector<std::byte> transform_message(const std::string& parent, const std::string& child,
+                                         const Pose& T_parent_child, RosVersion ros);
 
 /// How a ROS 1 bag ends.
 enum class BagEnd { indexed, without_index };
@@ -43,6 +59,11 @@ void write_db3(const std::filesystem::path& file, std::span<const RecordedMessag
 
 /// What a bag of a capture folder would hold: the data packets to each port on a topic, those of a turn in one message,
 /// on `/PORT/velodyne_packets`; imu.csv on /imu/data and wio.tum on /wheel_odometry.
-std::vector<RecordedMessage> messages_of(const std::filesystem::path& capture_folder, RosVersion ros);
+std::vector<RecordedMessage> messages_of(const std::filesystem::path& capture_folder, RosVersion ros,
+                                         decltype(scan_message)& packet_message = scan_message);
+
+/// The same with clouds on /points in place of packets, each recorded 4 ms after its last point.
+std::vector<RecordedMessage> messages_of(const std::filesystem::path& capture_folder, std::span<const OwnCloud> clouds,
+                                         std::span<const Stamp> ends, RosVersion ros);
 
 } // namespace locus::test

@@ -8,12 +8,14 @@
 #include <numeric>
 
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 
 #include "bag_writer.hpp"
 #include "bags/bag.hpp"
 #include "bags/messages.hpp"
 #include "bags/ros1_record.hpp"
 #include "daemon/dds/ros_messages.hpp"
+#include "mcap_text.hpp"
 #include "replay_run.hpp"
 #include "support/errors.hpp"
 #include "support/test_drives.hpp"
@@ -25,10 +27,13 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using namespace std::string_literals;
 
+template <RosVersion ros> const std::vector<RecordedMessage>& room_messages() {
+  static const std::vector<RecordedMessage> messages = messages_of(room_drive(), ros);
+  return messages;
+}
+
 const std::vector<RecordedMessage>& room_messages(RosVersion ros) {
-  static const std::vector<RecordedMessage> ros1 = messages_of(room_drive(), RosVersion::ros1),
-                                            ros2 = messages_of(room_drive(), RosVersion::ros2);
-  return ros == RosVersion::ros1 ? ros1 : ros2;
+  return ros == RosVersion::ros1 ? room_messages<RosVersion::ros1>() : room_messages<RosVersion::ros2>();
 }
 
 void write_text(const std::filesystem::path& file, const std::string& text) {
@@ -244,7 +249,7 @@ TEST_P(BagOfRosbag, IsReadFieldByField) {
   std::array<std::int64_t, 3> seen{};
   while (const tools::BagMessage* message = (*bag)->next()) {
     const tools::BagTopic& topic = (*bag)->topics()[message->topic];
-    const tools::MessageReader reader(message->data, tools::Serialisation::ros1);
+    const MessageReader reader(message->data, Serialisation::ros1);
     const std::int64_t since_start_ns = to_ns(message->recorded) - 1'700'000'000'000'000'000;
     if (topic.type == tools::kImuType) {
       const std::int64_t k = seen[0]++;
@@ -263,12 +268,12 @@ TEST_P(BagOfRosbag, IsReadFieldByField) {
       EXPECT_EQ(odometry.pose_.pose_.position_.z_, 0.25);
       EXPECT_EQ(odometry.pose_.pose_.orientation_.z_, 1.0);
       EXPECT_EQ(odometry.twist_.covariance_[0], 0.5);
-    } else if (topic.type == tools::kVelodyneScanType) {
+    } else if (const tools::PacketType* type = tools::packet_type(topic.type)) {
       const std::int64_t k = seen[2]++;
-      const auto scan = tools::read_velodyne_scan(reader).value();
+      const auto scan = type->read(reader).value();
       ASSERT_EQ(scan.packets.size(), 2U);
       EXPECT_EQ(to_ns(scan.packets[1].stamp), 1'700'000'000'001'327'000 + 100'000'000 * k);
-      EXPECT_EQ(scan.packets[1].payload.back(), std::byte{2});
+      EXPECT_EQ(scan.payload(scan.packets[1]).back(), std::byte{2});
     }
   }
   EXPECT_EQ(seen, (std::array<std::int64_t, 3>{3, 3, 3}));
@@ -287,10 +292,11 @@ void expect_damage_is_borne(const std::string& bytes, const std::string& name, i
     int read = 0;
     while (const tools::BagMessage* message = bag ? (*bag)->next() : nullptr) {
       ++read;
-      const tools::MessageReader reader(message->data, (*bag)->serialisation());
+      const MessageReader reader(message->data, (*bag)->topics()[message->topic].serialisation);
       static_cast<void>(tools::read_imu(reader));
       static_cast<void>(tools::read_odometry(reader));
-      static_cast<void>(tools::read_velodyne_scan(reader));
+      for (const tools::PacketType& type : tools::packet_types())
+        static_cast<void>(type.read != nullptr && type.read(reader));
     }
     EXPECT_LE(read, messages) << "byte " << at;
   }
@@ -369,7 +375,7 @@ TEST_F(BadBag, WrongMagic) {
   expect_refused("a.bag", "hello, I am a text", {"not a ROS 1 bag"});
   expect_refused("a.db3", "hello, I am a text", {"not a ROS 2 bag"});
   expect_refused("a.bag", "#ROSBAG V1.2\nand so on", {"format", "rosbag"});
-  expect_refused("a.mcap", "\x89MCAP0\r\n", {"MCAP", "ros2 bag convert"});
+  expect_refused("a.mcap", "hello, I am a text", {"not a ROS 2 bag"});
 }
 
 TEST_F(BadBag, HeaderWithAbsurdLengths) {
@@ -380,20 +386,73 @@ TEST_F(BadBag, HeaderWithAbsurdLengths) {
 
 TEST_F(BadBag, DatabaseOfSomethingElse) {
   write_db3(folder_ / "a.db3", {}, "cdr");
-  expect_refused("a.db3", {"no velodyne_msgs/VelodyneScan in it, but no topics"});
+  expect_refused("a.db3", {"hesai_ros_driver/UdpFrame in it, but no topics"});
   std::string bytes = read_text(folder_ / "a.db3");
   for (std::size_t i = 100; i < bytes.size(); ++i)
     bytes[i] = static_cast<char>(bytes[i] + 1);
   expect_refused("b.db3", bytes, {"not a ROS 2 bag, or damaged"});
 }
 
-TEST_F(BadBag, CompressedOrOtherwiseSerialisedRos2Bag) {
-  RecordedMessage message = room_messages(RosVersion::ros2).front();
-  write_db3(folder_ / "flat.db3", std::vector{message}, "flatbuffers");
+/// A view may have rows without end.
+TEST_F(BadBag, DatabaseWhoseTablesAreNone) {
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open((folder_ / "a.db3").c_str(), &database), SQLITE_OK);
+  EXPECT_EQ(sqlite3_exec(database,
+                         "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT);"
+                         "INSERT INTO topics VALUES (1, '/imu', 'sensor_msgs/msg/Imu', 'cdr');"
+                         "CREATE VIEW messages AS WITH RECURSIVE row(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM row) "
+                         "SELECT n AS id, 2 AS topic_id, n AS timestamp, x'00' AS data FROM row;",
+                         nullptr, nullptr, nullptr),
+            SQLITE_OK);
+  sqlite3_close(database);
+  expect_refused("a.db3", {"not a ROS 2 bag, or damaged"});
+}
+
+TEST_F(BadBag, OfMoreFilesThanMayBeOpenIsNotCalledAnotherThing) {
+  std::filesystem::create_directories(folder_ / "drive");
+  const std::span<const RecordedMessage> messages = room_messages(RosVersion::ros2);
+  constexpr std::size_t kFiles = 40;
+  for (std::size_t i = 0; i < kFiles; ++i) {
+    const std::size_t begin = i * messages.size() / kFiles, end = (i + 1) * messages.size() / kFiles;
+    write_text(folder_ / ("drive/drive_" + std::to_string(i) + ".mcap"),
+               mcap_file(messages.subspan(begin, end - begin), RosVersion::ros2));
+  }
+  const auto replay_with = [&](const std::string& limit) {
+    return run_program("/bin/sh", {"-c", limit + " && exec " + LOCUS_REPLAY + " --quiet -o " +
+                                             (folder_ / "out").string() + " " + (folder_ / "drive").string()});
+  };
+  const ProgramRun none_left = replay_with("ulimit -n 30");
+  EXPECT_EQ(none_left.status, 1);
+  EXPECT_EQ(lines_of(none_left.err).size(), 1U) << none_left.err;
+  expect_line(none_left.err, {".mcap: cannot be read (Too many open files); allow more with: ulimit -n"});
+  const ProgramRun asks = replay_with("ulimit -Sn 30");
+  EXPECT_EQ(asks.status, 0) << asks.err;
+}
+
+TEST_F(BadBag, TopicWithAnAbsurdNameIsLeftOut) {
+  std::vector<RecordedMessage> messages(2, room_messages(RosVersion::ros2).front());
+  messages.front().topic = "/" + std::string(4096, 'x');
+  write_text(folder_ / "a.bag", ros1_bag(messages));
+  write_db3(folder_ / "a.db3", messages);
+  for (const char* const name : {"a.bag", "a.db3"}) {
+    const auto bag = tools::open_bag(folder_ / name);
+    ASSERT_TRUE(bag) << bag.error();
+    int seen = 0;
+    while (const tools::BagMessage* message = (*bag)->next()) {
+      EXPECT_EQ((*bag)->topics().at(message->topic).name, messages.back().topic);
+      ++seen;
+    }
+    EXPECT_EQ(seen, 1);
+    ASSERT_EQ((*bag)->warnings().size(), 1U);
+    expect_line((*bag)->warnings().front(), {name, "more than 4096 bytes"});
+  }
+}
+
+TEST_F(BadBag, OtherwiseSerialisedRos2Bag) {
+  write_db3(folder_ / "odd.db3", std::vector{room_messages(RosVersion::ros2).front()}, "a\nb\x1B");
+  expect_refused("odd.db3", {"\"a?b?\""});
+  write_db3(folder_ / "flat.db3", std::vector{room_messages(RosVersion::ros2).front()}, "flatbuffers");
   expect_refused("flat.db3", {"flatbuffers"});
-  message.data = {std::byte{0x28}, std::byte{0xB5}, std::byte{0x2F}, std::byte{0xFD}, std::byte{}};
-  write_db3(folder_ / "a.db3", std::vector{message});
-  expect_refused("a.db3", {"zstd", "ros2 bag convert"});
 }
 
 TEST_F(BadBag, Ros2FolderThatIsNotWhole) {
@@ -403,30 +462,76 @@ TEST_F(BadBag, Ros2FolderThatIsNotWhole) {
   };
   metadata("  relative_file_paths: [drive_0.db3]\n");
   expect_refused("drive", {"drive_0.db3", "no such file"});
-  metadata("  relative_file_paths: [drive_0.db3.zstd]\n  compression_format: zstd\n");
-  expect_refused("drive", {"compressed with zstd", "ros2 bag convert"});
-  metadata("  storage_identifier: mcap\n  relative_file_paths: [drive_0.mcap]\n");
-  expect_refused("drive", {"mcap", "ros2 bag convert"});
+  metadata("  storage_identifier: my_own\n  relative_file_paths: [drive_0.own]\n");
+  expect_refused("drive", {"storage my_own is not read", "ros2 bag convert"});
   metadata("  relative_file_paths: 7\n");
   expect_refused("drive", {"metadata.yaml", "ros2 bag reindex"});
   metadata("  {{{\n");
   expect_refused("drive", {"metadata.yaml", "ros2 bag reindex"});
-  for (const auto& [file, start] :
-       {std::pair{"drive_0.mcap", "\x89MCAP0\r\n"}, {"drive_0.db3.zstd", "\x28\xB5\x2F\xFD"}}) {
+  for (const auto& [file, start, said] : {std::tuple{"drive_0.mcap", "\x89MCAP0\r\n", "was not closed"},
+                                          {"drive_0.db3.zstd", "\x28\xB5\x2F\xFD", "not a ROS 2 bag"}}) {
     std::filesystem::remove_all(folder_ / "drive");
     std::filesystem::create_directories(folder_ / "drive");
     write_text(folder_ / "drive" / file, start);
-    expect_refused("drive", {"ros2 bag convert"});
+    expect_refused("drive", {file, said});
   }
 }
 
 TEST_F(BadBag, WithoutLidarSaysWhatIsInIt) {
   std::vector<RecordedMessage> messages = room_messages(RosVersion::ros1);
   std::erase_if(messages, [](const RecordedMessage& m) { return m.topic.ends_with("packets"); });
-  messages.push_back({"/points_raw", "sensor_msgs/PointCloud2", messages.back().recorded, {}});
-  expect_refused(
-      "a.bag", ros1_bag(messages),
-      {"no velodyne_msgs/VelodyneScan", "/imu/data (sensor_msgs/Imu)", "/points_raw (sensor_msgs/PointCloud2)"});
+  messages.push_back({"/image_raw", "sensor_msgs/Image", messages.back().recorded, {}});
+  expect_refused("a.bag", ros1_bag(messages),
+                 {"no velodyne_msgs/VelodyneScan", "/imu/data (sensor_msgs/Imu)", "/image_raw (sensor_msgs/Image)"});
+}
+
+TEST_F(BadBag, OfALidarThatIsNotDecodedNamesItsMaker) {
+  const Stamp now = room_messages(RosVersion::ros1).front().recorded;
+  for (const auto& [type, maker] :
+       {std::pair{"ouster_ros/PacketMsg", "Ouster"}, {"ouster_sensor_msgs/PacketMsg", "Ouster"}})
+    expect_refused("a.bag", ros1_bag(std::vector{RecordedMessage{"/packets", type, now, {}}}),
+                   {"/packets ("s + type + ") is of a lidar of " + maker + ", whose packets are not read from bags"});
+}
+
+/// As the drivers of Nebula record, those of a Velodyne among them.
+TEST(Bags, NebulaPacketsGiveTheBitsOfAVelodyneScan) {
+  const TemporaryFolder folder;
+  for (const RosVersion ros : {RosVersion::ros1, RosVersion::ros2}) {
+    std::vector<RecordedMessage> messages = room_messages(ros), nebula = messages_of(room_drive(), ros, nebula_message);
+    ASSERT_EQ(nebula.size(), messages.size());
+    for (RecordedMessage& message : nebula) {
+      if (message.type == "velodyne_msgs/VelodyneScan")
+        message.type = "nebula_msgs/NebulaPackets";
+    }
+    write_text(folder / "scans.mcap", mcap_file(messages, ros));
+    write_text(folder / "nebula.mcap", mcap_file(nebula, ros));
+    const Replay scans = replay_room(folder / "scans.mcap"), packets = replay_room(folder / "nebula.mcap");
+    EXPECT_EQ(packets.run().err, "");
+    EXPECT_EQ(read_text(packets.file("odometry.csv")), read_text(scans.file("odometry.csv")));
+  }
+}
+
+/// Packets in the messages of Hesai's drivers, of which the newest begins with a header as older ones do not.
+TEST(BagMessages, OfHesaisDriversGiveTheirPackets) {
+  for (const RosVersion ros : {RosVersion::ros1, RosVersion::ros2}) {
+    std::vector<ReceivedPacket> packets;
+    for (const std::size_t size : {1262U, 568U, 1U})
+      packets.push_back({stamp_from_ns(static_cast<std::int64_t>(1'700'000'000'000'000'000 + size)),
+                         std::vector<std::byte>(size, std::byte{static_cast<unsigned char>(size)})});
+    for (const auto& [type, message] :
+         {std::pair{"pandar_msgs/PandarScan", pandar_message(packets, ros)},
+          std::pair{"hesai_ros_driver/UdpFrame", hesai_message(packets, ros)},
+          std::pair{"hesai_ros_driver/UdpFrame", hesai_message(packets, ros, HesaiHeaders::of_packets)}}) {
+      const auto read =
+          tools::packet_type(type)->read({message, ros == RosVersion::ros1 ? Serialisation::ros1 : Serialisation::cdr});
+      ASSERT_TRUE(read) << type;
+      ASSERT_EQ(read->packets.size(), packets.size()) << type;
+      for (std::size_t i = 0; i < packets.size(); ++i) {
+        EXPECT_EQ(read->packets[i].stamp, packets[i].stamp);
+        EXPECT_TRUE(std::ranges::equal(read->payload(read->packets[i]), packets[i].payload));
+      }
+    }
+  }
 }
 
 TEST_F(BadBag, ScansThatAreCutShort) {
@@ -436,7 +541,7 @@ TEST_F(BadBag, ScansThatAreCutShort) {
   write_text(folder_ / "a.bag", ros1_bag(messages));
   const ProgramRun run = run_program(LOCUS_REPLAY, {"-o", folder_ / "out", folder_ / "a.bag"});
   EXPECT_EQ(run.status, 1);
-  expect_line(run.err, {"1 of 1 messages", "cut short", "no whole packet in 1 messages"});
+  expect_line(run.err, {"1 of 1 messages", "cut short", "no whole packet or cloud in 1 messages"});
 }
 
 TEST(BagChunk, WithNothingToDecompressIsDamaged) {
@@ -452,23 +557,31 @@ TEST(BagChunk, WithNothingToDecompressIsDamaged) {
 /// What a message claims is never believed beyond its end.
 TEST(BagMessages, AbsurdCountsAndEveryCutAreNoMessage) {
   for (const RosVersion ros : {RosVersion::ros1, RosVersion::ros2}) {
-    const auto serialisation = ros == RosVersion::ros1 ? tools::Serialisation::ros1 : tools::Serialisation::cdr;
+    const auto serialisation = ros == RosVersion::ros1 ? Serialisation::ros1 : Serialisation::cdr;
     const ReceivedPacket packet{stamp_from_ns(5), std::vector<std::byte>(1206)};
-    const std::vector<std::byte> scan = scan_message({&packet, 1}, ros), imu = imu_message({}, ros),
-                                 odometry = odometry_message({}, ros);
-    ASSERT_TRUE(tools::read_velodyne_scan({scan, serialisation}));
+    const std::vector<std::byte> imu = imu_message({}, ros), odometry = odometry_message({}, ros);
     ASSERT_TRUE(tools::read_imu({imu, serialisation}));
     ASSERT_TRUE(tools::read_odometry({odometry, serialisation}));
-    for (std::size_t length = 0; length < scan.size(); ++length)
-      EXPECT_FALSE(tools::read_velodyne_scan({std::span(scan).first(length), serialisation})) << length;
     for (std::size_t length = 0; length < imu.size(); ++length)
       EXPECT_FALSE(tools::read_imu({std::span(imu).first(length), serialisation})) << length;
     for (std::size_t length = 0; length < odometry.size(); ++length)
       EXPECT_FALSE(tools::read_odometry({std::span(odometry).first(length), serialisation})) << length;
-    for (std::size_t at = 0; at + 4 < scan.size() - packet.payload.size(); ++at) {
-      std::vector<std::byte> absurd = scan;
-      std::fill_n(absurd.begin() + static_cast<std::ptrdiff_t>(at), 4, std::byte{0xFF});
-      static_cast<void>(tools::read_velodyne_scan({absurd, serialisation}));
+    for (const auto& message : {std::pair{"velodyne_msgs/VelodyneScan", scan_message({&packet, 1}, ros)},
+                                std::pair{"nebula_msgs/NebulaPackets", nebula_message({&packet, 1}, ros)},
+                                std::pair{"pandar_msgs/PandarScan", pandar_message({&packet, 1}, ros)},
+                                std::pair{"hesai_ros_driver/UdpFrame", hesai_message({&packet, 1}, ros)}}) {
+      const std::vector<std::byte>& scan = message.second;
+      const auto read = [&](std::span<const std::byte> data) {
+        return tools::packet_type(message.first)->read({data, serialisation});
+      };
+      ASSERT_TRUE(read(scan));
+      for (std::size_t length = 0; length < scan.size(); ++length)
+        EXPECT_FALSE(read(std::span(scan).first(length))) << length;
+      for (std::size_t at = 0; at + 4 < scan.size() - packet.payload.size(); ++at) {
+        std::vector<std::byte> absurd = scan;
+        std::fill_n(absurd.begin() + static_cast<std::ptrdiff_t>(at), 4, std::byte{0xFF});
+        static_cast<void>(read(absurd));
+      }
     }
   }
 }

@@ -135,13 +135,14 @@ TEST(LocusReplay, SummaryHasTheKeysOfTheContract) {
   EXPECT_EQ(keys(summary["packets"]["front"]),
             (std::set<std::string>{"received", "data", "position", "lost", "reordered", "clock_steps", "rejected"}));
   EXPECT_EQ(keys(summary["packets"]["front"]["rejected"]),
-            (std::set<std::string>{"length", "flag", "model", "sender", "azimuth", "time", "duplicate", "truncated"}));
+            (std::set<std::string>{"length", "flag", "model", "sender", "azimuth", "time", "duplicate", "truncated",
+                                   "checksum"}));
   EXPECT_EQ(summary["lidars"]["front"]["model"], "VLP-16");
   EXPECT_EQ(summary["lidars"]["front"]["return_mode"], "strongest");
   EXPECT_NEAR(summary["lidars"]["front"]["rpm"].get<double>(), 600, 5);
   EXPECT_EQ(keys(summary["sources"]), (std::set<std::string>{"wio", "imu"}));
   EXPECT_EQ(keys(summary["sources"]["imu"]),
-            (std::set<std::string>{"received", "used_sweeps", "rejected", "health_changes"}));
+            (std::set<std::string>{"received", "used_sweeps", "rejected", "health_changes", "learned"}));
   EXPECT_EQ(keys(summary["sources"]["imu"]["rejected"]),
             (std::set<std::string>{"stale", "jump", "nan", "frozen", "out_of_order", "covariance", "disagreement"}));
 

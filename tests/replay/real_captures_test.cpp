@@ -2,9 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <string>
+#include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "drivers/files/capture.hpp"
@@ -165,15 +169,110 @@ TEST_F(RealCapture, StandingVls128InABag) {
   EXPECT_EQ(packets["data"].get<int>() + packets["lost"].get<int>(), 2193) << "all that was lost is counted";
 }
 
-TEST_F(RealCapture, OfOusterAndHesaiAreRefusedByTheirNames) {
-  const ProgramRun ouster = Replay({(test_data() / "ouster/OS-1-32-G_v2.1.1_1024x10.pcap").string()}).run();
+/// No option: the metadata is the only one beside the capture whose sensor sent these packets.
+TEST_F(RealCapture, MovingOusterIsReadWithTheMetadataThatFitsIt) {
+  const Replay moving({(test_data() / "ouster/OS-1-128_v2.3.0_1024x10_lb_n3.pcap").string()});
+  ASSERT_EQ(moving.run().status, 0) << moving.run().err;
+  EXPECT_NE(
+      moving.run().out.find("OS-1-128_v2.3.0_1024x10.json: the metadata of lidar front, OS1-128 with serial number "
+                            "122201000998; its packets go to port 7502"),
+      std::string::npos)
+      << moving.run().out;
+  const nlohmann::json summary = moving.summary();
+  EXPECT_EQ(summary["packets"]["front"]["data"], 192);
+  EXPECT_EQ(summary["packets"]["front"]["position"], 30);
+  EXPECT_EQ(summary["packets"]["front"]["lost"], 0);
+  EXPECT_EQ(summary["lidars"]["front"]["model"], "OS1-128");
+  EXPECT_NEAR(summary["lidars"]["front"]["rpm"].get<double>(), 600, 5);
+  EXPECT_EQ(summary["sources"]["front_imu"]["received"], 30);
+  EXPECT_EQ(summary["sources"]["front_imu"]["rejected"]["out_of_order"], 0) << "its clock is that of the columns";
+  EXPECT_EQ(moving.trajectory().size(), 3U);
+}
+
+/// Three turns of an OS1-128 on a car, beside a pose of its sensor frame for each by the maker's own odometry. That
+/// does not undo the motion within the first turns, so a pose is where the sensor was in the middle of a turn: ahead
+/// then, as the car was. It gains 3.7 m/s^2 by its own accelerometer, so other instants would differ by 4 cm. Sweeps
+/// that begin in the middle of a turn end there.
+TEST_F(RealCapture, MovingOusterIsWhereItsMakerSaysItWas) {
+  std::vector<Pose> truth;
+  std::ifstream kitti{test_data() / "ouster/OS-1-128_v2.3.0_1024x10_lb_n3_poses_kitti.txt"};
+  const auto read = [&](double& value) { return static_cast<bool>(kitti >> value); };
+  for (std::array<double, 12> rows{}; std::ranges::all_of(rows, read);) {
+    const Eigen::Matrix<double, 3, 4> T = Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>{rows.data()};
+    truth.push_back({Eigen::Quaterniond{Eigen::Matrix3d{T.leftCols<3>()}}.normalized(), T.col(3)});
+  }
+  ASSERT_EQ(truth.size(), 3U);
+  const Replay moving({"--start", "0.05", (test_data() / "ouster/OS-1-128_v2.3.0_1024x10_lb_n3.pcap").string()});
+  ASSERT_EQ(moving.run().status, 0) << moving.run().err;
+  const std::vector<StampedPose> middles = moving.trajectory();
+  ASSERT_GE(middles.size(), 2U);
+  const Pose moved = middles[0].T_source_base.inverse() * middles[1].T_source_base;
+  const Pose by_maker = truth[1].inverse() * truth[2];
+  EXPECT_LT((moved.translation - by_maker.translation).norm(), 0.02);
+  EXPECT_LT(angle_rad(moved.rotation.conjugate() * by_maker.rotation), 0.2 * kRadPerDeg);
+}
+
+TEST_F(RealCapture, OustersAreReadWithTheMetadataBesideThem) {
+  for (const auto& [name, model, mode] :
+       {std::tuple{"OS-0-128-U1_v2.3.0_1024x10", "OS0-128", "strongest"},
+        std::tuple{"OS-0-32-U1_v2.2.0_1024x10", "OS0-32", "dual"},
+        std::tuple{"OS-1-32-G_v2.1.1_1024x10", "OS1-32", "strongest"},
+        std::tuple{"OS-1-128_767798045_1024x10_20230712_120049", "OS1-128", "dual"},
+        std::tuple{"crc_test", "OS0-128", "strongest"}, std::tuple{"windowed_frame1", "OS0-128", "strongest"}}) {
+    const Replay standing({(test_data() / "ouster" / (std::string{name} + ".pcap")).string()});
+    if (std::string_view{name}.find("767798045") != std::string_view::npos) { // too short for a sweep
+      EXPECT_NE(standing.run().out.find("OS1-128"), std::string::npos) << standing.run().err;
+      continue;
+    }
+    ASSERT_EQ(standing.run().status, 0) << name << standing.run().err;
+    EXPECT_EQ(standing.summary()["lidars"]["front"]["model"], model);
+    EXPECT_EQ(standing.summary()["lidars"]["front"]["return_mode"], mode);
+    EXPECT_EQ(standing.summary()["packets"]["front"]["lost"], 0) << name;
+  }
+}
+
+TEST_F(RealCapture, OfOusterWithTheMetadataOfAnotherSaysSo) {
+  const std::filesystem::path capture = test_data() / "ouster/OS-1-32-G_v2.1.1_1024x10.pcap";
+  for (const auto& [name, reason] :
+       {std::pair{"OS-0-32-U1_v2.2.0_1024x10", "length 64"}, {"OS-1-128_v2.3.0_1024x10", "length 64"}}) {
+    const std::string metadata = (test_data() / "ouster" / (std::string{name} + ".json")).string();
+    const Replay replay({"--set", "lidars.0.metadata=" + metadata, "--set", "lidars.0.port=7502", capture.string()});
+    EXPECT_EQ(replay.run().status, 1);
+    EXPECT_NE(replay.run().err.find(std::string{"64 datagrams to port 7502 of lidar front, rejected: "} + reason),
+              std::string::npos)
+        << replay.run().err;
+    EXPECT_NE(replay.run().err.find("is " + metadata + " the metadata of this sensor, as it was set then?"),
+              std::string::npos);
+  }
+}
+
+TEST_F(RealCapture, OfOusterWithoutMetadataIsRefusedByItsName) {
+  const TemporaryFolder alone;
+  std::filesystem::copy_file(test_data() / "ouster/OS-1-32-G_v2.1.1_1024x10.pcap", alone / "drive.pcap");
+  const ProgramRun ouster = Replay({(alone / "drive.pcap").string()}).run();
   EXPECT_EQ(ouster.status, 1);
   EXPECT_NE(ouster.err.find("64 packets look like those of a lidar of Ouster"), std::string::npos) << ouster.err;
-  for (const char* const model : {"40p", "qt128", "xt16", "xt32", "xt32m"}) {
-    const ProgramRun hesai = Replay({(test_data() / "hesai" / model).string()}).run();
-    EXPECT_EQ(hesai.status, 1);
-    EXPECT_NE(hesai.err.find("/pandar_packets (pandar_msgs/PandarScan) is of a lidar of Hesai"), std::string::npos)
-        << hesai.err;
+  EXPECT_NE(ouster.err.find("locusctl fetch SENSOR -o drive.json"), std::string::npos) << ouster.err;
+}
+
+/// Without any configuration.
+TEST_F(RealCapture, BagsOfHesaiAreReadAsWhatTheyAre) {
+  struct Recorded {
+    const char *folder, *model;
+    std::uint64_t packets, lost; ///< those that their numbers say are missing
+  };
+  for (const Recorded& recorded :
+       {Recorded{"40p", "Pandar40P", 1439, 0}, Recorded{"xt16", "XT16", 1626, 0}, Recorded{"xt32", "XT32", 2000, 0},
+        Recorded{"xt32m", "XT32M", 1815, 852}, Recorded{"qt128", "QT128", 1800, 0}}) {
+    const Replay replay({(test_data() / "hesai" / recorded.folder).string()});
+    ASSERT_EQ(replay.run().status, 0) << replay.run().err;
+    const nlohmann::json summary = replay.summary(), packets = summary["packets"]["total"];
+    EXPECT_EQ(summary["lidars"]["front"]["model"], recorded.model);
+    EXPECT_EQ(summary["lidars"]["front"]["return_mode"], "dual");
+    EXPECT_EQ(packets["received"], recorded.packets) << recorded.folder;
+    EXPECT_EQ(packets["data"], recorded.packets) << recorded.folder;
+    EXPECT_EQ(packets["lost"], recorded.lost) << recorded.folder;
+    EXPECT_EQ(summary["sweeps"]["failed"], 0) << recorded.folder;
   }
 }
 

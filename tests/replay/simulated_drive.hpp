@@ -11,15 +11,15 @@
 
 namespace locus::test {
 
-/// What locus-sim makes of a clean drive, in a folder that is gone after the test.
+/// What locus-sim makes of a drive, in a folder that is gone after the test.
 class SimulatedDrive {
  public:
   SimulatedDrive(const std::string& world, const std::string& robot, int duration_s,
-                 const std::vector<std::string>& more = {}, int seed = 1) {
+                 const std::vector<std::string>& more = {}, int seed = 1, const std::string& realism = "clean") {
     std::vector<std::string> arguments{"--world",    world,
                                        "--robot",    robot,
                                        "--duration", std::to_string(duration_s),
-                                       "--realism",  "clean",
+                                       "--realism",  realism,
                                        "--seed",     std::to_string(seed),
                                        "-o",         capture()};
     arguments.insert(arguments.end(), more.begin(), more.end());

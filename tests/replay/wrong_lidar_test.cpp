@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Drives with a lidar that is wrong: wheels and gyro know better, and carry.
+// Drives with a lidar that is wrong, or sees little but what moves: wheels and gyro know better, and carry.
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include "simulated_drive.hpp"
@@ -35,6 +37,16 @@ TEST(WrongLidar, ThatMeasuresTooFarAtTheStartBeginsAnew) {
     const Replay replay = drive.replay(a_second_in_five("top:jump=2", from_s, 60.0));
     EXPECT_GE(replay.summary()["sweeps"]["failed"], 60);
     EXPECT_LT(ape_mean_m(replay), 0.04);
+  }
+}
+
+/// A truck goes by within a metre, at 11 s.
+TEST(PassingVehicle, TakesNobodyAlong) {
+  const SimulatedDrive drive("tunnel", "husky", 60, {"--model", "HDL-32E"}, 7101, "real");
+  for (const std::vector<std::string>& lost : std::vector<std::vector<std::string>>{
+           {}, {"--fail", "wio:lost@0"}, {"--fail", "wio:lost@0", "--fail", "imu:lost@0"}}) {
+    SCOPED_TRACE(fmt::format("{}", fmt::join(lost, " ")));
+    EXPECT_LT(drive.replay(lost).summary()["ape_m"]["max"], 0.1);
   }
 }
 

@@ -99,7 +99,8 @@ ordered_json summary_of(const std::string& capture, double duration_s, std::size
                                {"azimuth", 0},
                                {"time", 0},
                                {"duplicate", 0},
-                               {"truncated", 0}}}};
+                               {"truncated", 0},
+                               {"checksum", 0}}}};
   const ordered_json percentiles{{"p50", 2.1}, {"p90", 2.9}, {"p99", 3.4}, {"max", 8.8}};
   return {{"version", "0.0.0"},
           {"capture", capture},

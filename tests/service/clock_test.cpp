@@ -8,6 +8,7 @@
 #include "service/notify_socket.hpp"
 #include "service/robot_network.hpp"
 #include "service/undisturbed.hpp"
+#include "support/simulated_clock.hpp"
 
 namespace locus::test {
 namespace {
@@ -27,10 +28,10 @@ class HostClock : public RobotNetwork {
 
   /// The service, with this clock.
   [[nodiscard]] std::vector<std::string> locusd_with_clock(const std::filesystem::path& config) const {
-    std::ofstream{file("clock"), std::ios::binary} << std::string(sizeof(std::int64_t), '\0');
+    std::ofstream{file("clock"), std::ios::binary} << std::string(sizeof(SimulatedTime), '\0');
     std::vector<std::string> command = locusd(config);
-    command.insert(command.begin(), {"/usr/bin/env", std::string{"LD_PRELOAD="} + STEPPED_CLOCK_LIBRARY,
-                                     "STEPPED_CLOCK=" + file("clock").string()});
+    command.insert(command.begin(), {"/usr/bin/env", std::string{"LD_PRELOAD="} + SIMULATED_CLOCK_LIBRARY,
+                                     "SIMULATED_CLOCK=" + file("clock").string()});
     return undisturbed(command);
   }
 

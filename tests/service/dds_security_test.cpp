@@ -62,6 +62,28 @@ TEST_F(DdsSecurity, WhoHasNoCredentialsNeitherHearsNorIsHeard) {
       << testing::PrintToString(sensors.lines());
 }
 
+TEST_F(DdsSecurity, ViewerSeesTheNode) {
+  const std::filesystem::path ours = enclaves("ours");
+  Child daemon(undisturbed(locusd(secured(ours / "locusd"))));
+  const Child viewer(peer("iron", ours / "viewer"));
+  EXPECT_TRUE(viewer.wait_for_line("node / locusd ", seconds{20})) << testing::PrintToString(viewer.lines());
+}
+
+/// Of an enclave that was made before there was a node to be seen.
+TEST_F(DdsSecurity, WithoutPermissionForItsNodeAllElseGoesOn) {
+  const std::filesystem::path old = file("old.sh");
+  std::string script = read_text(DDS_SECURITY);
+  const std::string node = "/diagnostics ros_discovery_info";
+  ASSERT_NE(script.find(node), std::string::npos);
+  std::ofstream{old} << script.replace(script.find(node), node.size(), "/diagnostics");
+  const ProgramRun made = run_program("/bin/sh", {old.string(), file("old").string(), "0"});
+  ASSERT_EQ(made.status, 0) << made.err;
+  const Child daemon(undisturbed(locusd(secured(file("old") / "locusd"))));
+  EXPECT_TRUE(daemon.wait_for_line("DDS is up", seconds{10})) << testing::PrintToString(daemon.lines());
+  const Child viewer(peer("listen", file("old") / "viewer"));
+  EXPECT_TRUE(viewer.wait_for_line("diagnostics ", seconds{20})) << testing::PrintToString(viewer.lines());
+}
+
 TEST_F(DdsSecurity, FileThatIsMissingIsNamedAndWaitedFor) {
   const std::filesystem::path ours = enclaves("ours"), key = ours / "locusd" / "key.pem";
   std::filesystem::rename(key, file("key.pem"));

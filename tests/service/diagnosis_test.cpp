@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <regex>
 #include <thread>
 
 #include <fmt/format.h>
@@ -57,7 +58,7 @@ TEST_F(Diagnosis, SecondLidarOnThePortIsNamedWithTheConfigurationOfBoth) {
   ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
   const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
   ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
-  const std::jthread second([](const std::stop_token& stop) {
+  std::jthread second([](const std::stop_token& stop) {
     const UdpSender lidar(INADDR_LOOPBACK + 1);
     const std::vector<std::byte> packet(velodyne::kDataPacketBytes);
     while (!stop.stop_requested()) {
@@ -75,6 +76,10 @@ TEST_F(Diagnosis, SecondLidarOnThePortIsNamedWithTheConfigurationOfBoth) {
                          "{name: front_2, port: 2368, source_ip: 127.0.0.2}]"),
             std::string::npos)
       << problem;
+  second = {};
+  EXPECT_TRUE(
+      status_comes([](const nlohmann::json& status) { return status["lidars"]["front"]["problem"] == ""; }, seconds{8}))
+      << "it sends no more";
 }
 
 /// Sends data packets as a VLP-16 does, but for their product id, until it is gone.
@@ -105,7 +110,8 @@ TEST_F(Diagnosis, UnknownProductIdIsSaidByTheServiceAndByLocusctlSensors) {
                            "and return mode 0x37 in ",
                            seconds{10}))
       << testing::PrintToString(daemon.lines());
-  EXPECT_TRUE(daemon.wait_for_line("is it a Velodyne, and lidars.front.model the right one?", milliseconds{10}));
+  EXPECT_TRUE(daemon.wait_for_line("is it a lidar whose packets can be read, and lidars.front.model the right one?",
+                                   milliseconds{10}));
   const ProgramRun alone = ctl({"sensors"});
   EXPECT_EQ(alone.status, 1);
   EXPECT_TRUE(contains(alone.err, "127.0.0.1       2368   not read: product id 0x31 and return mode 0x37 in "))
@@ -125,6 +131,24 @@ TEST_F(Diagnosis, UnknownProductIdBesideALidarIsToldOnALineOfItsOwn) {
   EXPECT_TRUE(contains(both.out, "model: VLP-16, port: 2368, T_base_lidar")) << both.out;
 }
 
+/// From the address of the lidar, so that its model alone tells it from one.
+TEST_F(Diagnosis, UnknownProductIdIsNoProblemOfALidarAnyMoreOnceItIsGone) {
+  Child daemon(undisturbed(locusd(lidar_with("model: auto"))));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+  ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+  const auto problem_has = [](const std::string& part) {
+    return [part](const nlohmann::json& status) {
+      return contains(status["lidars"]["front"]["problem"].get<std::string>(), part);
+    };
+  };
+  std::jthread device = unknown_device(capture(), std::byte{0x31});
+  EXPECT_TRUE(status_comes(problem_has("refused product id 0x31"), seconds{3}));
+  device = {};
+  EXPECT_TRUE(status_comes([](const nlohmann::json& status) { return status["lidars"]["front"]["problem"] == ""; },
+                           seconds{8}));
+}
+
 TEST_F(Diagnosis, LidarOnAnotherPortIsToldByItsPositionPackets) {
   const std::filesystem::path wrong = lidar_with("port: 2390");
   Child daemon(undisturbed(locusd(wrong)));
@@ -133,6 +157,50 @@ TEST_F(Diagnosis, LidarOnAnotherPortIsToldByItsPositionPackets) {
                                    "arrive; find its data port with locusctl sensors and set lidars.front.port",
                                    seconds{8}))
       << testing::PrintToString(daemon.lines());
+}
+
+/// Beside a service that listens to the same.
+TEST_F(Diagnosis, ConfigurationIsComparedWithTheWire) {
+  const auto compare = [](const std::filesystem::path& with) {
+    return run_program(LOCUSD, {"--config", with.string(), "--check-config", "--live"});
+  };
+  const ProgramRun silent = compare(config());
+  EXPECT_EQ(silent.status, 1);
+  EXPECT_TRUE(contains(silent.err, "locusd: lidar front: nothing comes to port 2368; look at power, cable"))
+      << silent.err;
+  EXPECT_TRUE(
+      contains(silent.err, "locusd: odometry wio: topic /wheel_odometry: nobody publishes it in domain 0 on lo"))
+      << silent.err;
+
+  Child daemon(undisturbed(locusd(config())));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+  ASSERT_TRUE(daemon.wait_for_line("tracking", seconds{10}));
+  const ProgramRun same = compare(config());
+  EXPECT_EQ(same.status, 0) << same.err;
+  const std::regex of_lidar{R"(lidar front: VLP-16 at 127\.0\.0\.1 to port 2368, (\d+) packets/s)"};
+  std::smatch rate;
+  ASSERT_TRUE(std::regex_search(same.out, rate, of_lidar)) << same.out;
+  EXPECT_NEAR(std::stod(rate[1]), 754, 38) << "a twentieth: on a busy machine packets of a second come in less";
+  EXPECT_TRUE(contains(same.out, "imu imu: topic /imu/data: ")) << same.out;
+  EXPECT_TRUE(contains(same.out, "odometry wio: topic /wheel_odometry: ")) << same.out;
+
+  const ProgramRun port = compare(lidar_with("port: 2390"));
+  EXPECT_EQ(port.status, 1);
+  EXPECT_TRUE(contains(port.err,
+                       "lidar front: nothing comes to port 2390; VLP-16 at 127.0.0.1 sends to port 2368; if it "
+                       "is that one, set port and source_ip in the entry of front"))
+      << port.err;
+  const ProgramRun model = compare(lidar_with("model: HDL-32E"));
+  EXPECT_EQ(model.status, 1);
+  EXPECT_TRUE(contains(model.err, "is configured as HDL-32E, and its packets say VLP-16")) << model.err;
+  std::ofstream{file("kind.yaml")} << std::regex_replace(read_text(config()), std::regex{"kind: odometry"},
+                                                         "kind: imu");
+  const ProgramRun kind = compare(file("kind.yaml"));
+  EXPECT_EQ(kind.status, 1);
+  EXPECT_TRUE(contains(kind.err, "imu wio: topic /wheel_odometry: is published as nav_msgs::msg::dds_::Odometry_"))
+      << kind.err;
+  EXPECT_EQ(status()["packets"]["total"]["lost"], 0) << "the service was disturbed";
 }
 
 TEST_F(Diagnosis, AccelerationsInGAreNamed) {
@@ -172,6 +240,11 @@ TEST_F(Diagnosis, WheelsAndLidarThatDisagreeAreSaidWithAllPossibleCauses) {
       "the next best one is used",
       seconds{20}))
       << testing::PrintToString(daemon.lines());
+  EXPECT_TRUE(daemon.wait_for_line("Z_contradiction", seconds{10})) << "the input before it is kept";
+  const nlohmann::json incidents = status()["incidents"];
+  EXPECT_EQ(incidents["kept"], 1);
+  EXPECT_LE(incidents["suppressed"], 1) << "samples that are refused one after another are one contradiction";
+  EXPECT_EQ(incidents["dropped"], 0);
 }
 
 TEST_F(Diagnosis, SweepsThatAreDroppedAreSaidWithTheReason) {

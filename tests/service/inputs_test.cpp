@@ -3,9 +3,12 @@
 #include <array>
 #include <chrono>
 #include <csignal>
+#include <cstdint>
+#include <map>
 #include <random>
 #include <thread>
 
+#include "daemon/service/machine.hpp"
 #include "service/robot_network.hpp"
 #include "support/udp_sender.hpp"
 
@@ -15,6 +18,21 @@ namespace {
 using nlohmann::json;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
+
+TEST(LidarPorts, AreThoseOfTheMakers) {
+  using Ports = std::map<std::uint16_t, bool>;
+  Config config;
+  EXPECT_EQ(daemon::lidar_ports(config), (Ports{{2368, true}, {8308, false}}));
+  LidarOptions& lidar = config.lidars.front();
+  lidar.port = 2400;
+  EXPECT_EQ(daemon::lidar_ports(config), (Ports{{2400, true}, {8308, false}, {8340, false}}));
+  lidar.ouster = true;
+  lidar.port = 7502;
+  lidar.imu_port = 7503;
+  EXPECT_EQ(daemon::lidar_ports(config), (Ports{{7502, true}, {7503, false}})) << "it sends no position packets";
+  lidar.topic = "/points";
+  EXPECT_EQ(daemon::lidar_ports(config), Ports{});
+}
 
 class Inputs : public RobotNetwork {};
 

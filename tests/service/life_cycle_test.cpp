@@ -10,6 +10,7 @@
 #include <sys/mount.h>
 #include <unistd.h>
 
+#include "config/config_yaml.hpp"
 #include "daemon/machine_time.hpp"
 #include "daemon/service/saved_state.hpp"
 #include "service/notify_socket.hpp"
@@ -78,7 +79,9 @@ TEST_F(LifeCycle, SecondServiceLeavesTheSocketOfTheFirstAlone) {
   ASSERT_TRUE(first.wait_for_line("DDS is up", seconds{10}));
   {
     const Child second(locusd(lidar_with("port: 2390")));
-    EXPECT_TRUE(second.wait_for_line("control: another service answers there", seconds{10}))
+    EXPECT_TRUE(second.wait_for_line("control: Address already in use; locusctl will not reach this service, and no "
+                                     "incidents are kept: another service",
+                                     seconds{10}))
         << testing::PrintToString(second.lines());
   }
   EXPECT_EQ(status()["lidars"]["front"]["port"], 2368);
@@ -197,7 +200,7 @@ TEST_F(LifeCycle, PortThatIsTakenEndsItWithStatusOne) {
 /// The cable of the lidar is pulled for 12 s: odometry goes on at its pace, dead-reckoned, and finds back.
 TEST_F(LifeCycle, CablePullIsBridgedByDeadReckoning) {
   Child daemon(undisturbed(locusd(config())));
-  Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
+  Child listener(undisturbed({CYCLONE_PEER, "0", "listen", "/locus"}));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
   play_to_end({"--fail", "all-lidars:lost@4-16"});
   EXPECT_TRUE(daemon.wait_for_line("dead reckoning", milliseconds{10}));
@@ -229,7 +232,7 @@ TEST_F(LifeCycle, DamagedStateIsAFreshStart) {
 }
 
 TEST_F(LifeCycle, StateOfAnotherVersionIsAFreshStart) {
-  std::ofstream{file("state")} << "locusd 2 and so on";
+  std::ofstream{file("state")} << "locusd 3 and so on";
   Child daemon(undisturbed(locusd(config())));
   EXPECT_TRUE(daemon.wait_for_line("a fresh start: " + file("state").string() + ": was written by another version",
                                    seconds{3}));
@@ -242,6 +245,31 @@ TEST_F(LifeCycle, StateOfAnotherTimeIsAFreshStart) {
   Child daemon(undisturbed(locusd(config())));
   EXPECT_TRUE(daemon.wait_for_line("a fresh start: the saved state is", seconds{3}))
       << testing::PrintToString(daemon.lines());
+}
+
+/// The robot may be elsewhere the next day, and is the same robot.
+TEST_F(LifeCycle, WhatWasLearnedOfTheSourcesOutlivesAnotherTime) {
+  const Config configured = *parse_config(read_text(config()), "config");
+  daemon::SavedState old;
+  old.last.stamp = Stamp{daemon::read_clock(CLOCK_REALTIME)} - std::chrono::hours{24};
+  old.last.T_odom_base.translation.x() = 100.0;
+  old.flat_ground = FlatGround::on;
+  old.sources = daemon::ids_of(configured.motion_sources);
+  for (std::size_t i = 0; i < configured.motion_sources.size(); ++i) {
+    LearnedSource& learned = old.last.learned[i].emplace(as_configured(configured.motion_sources[i]));
+    if (configured.motion_sources[i].kind == SourceKind::imu)
+      learned.states[LearnedSource::kMounting + 2] = 0.02;
+  }
+  ASSERT_FALSE(daemon::write_state(file("state"), old));
+  Child daemon(undisturbed(locusd(config())));
+  ASSERT_TRUE(daemon.wait_for_line("a fresh start: the saved state is", seconds{3}));
+  ASSERT_EQ(ctl({"reload"}).status, 0) << "before anything is known of the robot";
+  Child play(undisturbed({LOCUS_PLAY, capture().string()}));
+  ASSERT_TRUE(status_comes([](const json& s) { return s["sweeps"]["processed"].get<int>() > 2; }, seconds{15}));
+  const json status = this->status();
+  EXPECT_LT(status["pose"]["xyz_m"][0].get<double>(), 10.0);
+  EXPECT_EQ(status["flat_ground"], "off");
+  EXPECT_GT(status["sources"]["imu"]["learned"]["mounting_deg"]["value"][2].get<double>(), 0.5);
 }
 
 TEST_F(LifeCycle, FullDiskCostsTheStateAndNothingElse) {
@@ -291,6 +319,13 @@ TEST_F(LifeCycle, ControlShowsSavesResetsAndSwitches) {
   EXPECT_EQ(ctl({"flat-ground", "on"}).status, 0);
   EXPECT_EQ(this->status()["flat_ground"], "on");
   EXPECT_EQ(ctl({"flat-ground", "perhaps"}).status, 2);
+
+  const ProgramRun calibration = ctl({"calibration"});
+  EXPECT_EQ(calibration.status, 0) << calibration.err;
+  for (const char* const figure : {"late_ms", "mounting_deg z (yaw)", "yaw_scale", "since 20"})
+    EXPECT_NE(calibration.out.find(figure), std::string::npos) << calibration.out;
+  EXPECT_EQ(ctl({"calibration", "--yaml"}).out.find("error"), std::string::npos);
+  EXPECT_EQ(this->status()["sources"]["imu"]["learned"]["late_ms"]["configured"], 0.0);
 
   EXPECT_EQ(ctl({"save-map", file("map.pcd").string()}).status, 0);
   EXPECT_NE(read_text(file("map.pcd")).find("FIELDS x y z"), std::string::npos);

@@ -39,12 +39,12 @@ void RobotNetwork::SetUp() {
   if (unshare(CLONE_NEWNET) != 0 && unshare(CLONE_NEWUSER | CLONE_NEWNET) != 0)
     GTEST_SKIP() << "no network namespace of one's own: run as root, or allow user namespaces";
   ASSERT_TRUE(bring_up("lo"));
-  setenv("RUNTIME_DIRECTORY", folder_.path().c_str(), 1); // NOLINT(concurrency-mt-unsafe): nobody else yet
-  setenv("STATE_DIRECTORY", folder_.path().c_str(), 1);   // NOLINT(concurrency-mt-unsafe)
+  setenv("RUNTIME_DIRECTORY", runtime_.path().c_str(), 1); // NOLINT(concurrency-mt-unsafe): nobody else yet
+  setenv("STATE_DIRECTORY", folder_.path().c_str(), 1);    // NOLINT(concurrency-mt-unsafe)
 }
 
 ProgramRun RobotNetwork::ctl(std::vector<std::string> words) const {
-  words.insert(words.begin(), {"--socket", file("control").string()});
+  words.insert(words.begin(), {"--socket", control().string()});
   return run_program(LOCUSCTL, words);
 }
 

@@ -28,6 +28,8 @@ class RobotNetwork : public testing::Test {
   static std::filesystem::path plant();
 
   [[nodiscard]] std::filesystem::path file(const std::string& name) const { return folder_ / name; }
+  /// Socket of the service, in a runtime folder on a tmpfs as it is on a robot.
+  [[nodiscard]] std::filesystem::path control() const { return runtime_ / "control"; }
   /// Of the capture, with more lines of YAML.
   [[nodiscard]] std::filesystem::path config(const std::string& more = "") const;
   /// Of the capture, with another value of a key of the lidar.
@@ -37,13 +39,13 @@ class RobotNetwork : public testing::Test {
     return {LOCUSD, "--config", config.string()};
   }
 
-  /// What locusctl says; its control socket and its state lie in the folder of the test.
+  /// What locusctl says; the state of the service lies in the folder of the test.
   [[nodiscard]] ProgramRun ctl(std::vector<std::string> words) const;
   [[nodiscard]] nlohmann::json status() const;
   bool status_comes(const std::function<bool(const nlohmann::json&)>& holds, Duration timeout) const;
 
  private:
-  TemporaryFolder folder_;
+  TemporaryFolder folder_, runtime_{"/dev/shm"};
 };
 
 /// How many packets a capture holds.

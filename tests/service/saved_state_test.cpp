@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <fstream>
+#include <functional>
 #include <thread>
 
 #include "replay/replay_run.hpp"
@@ -126,6 +127,21 @@ TEST_F(Keeper, SweepThatLiesAskewCarriesNobodyAway) {
   EXPECT_LT(keeper_.now()->carried_to(later).translation.norm(), 0.5) << "and of one that is not";
 }
 
+/// Drivers are stopped before the service is.
+TEST_F(Keeper, WhatWasLearnedOfASourceOutlivesItsSilence) {
+  OdometryEstimate estimate;
+  estimate.stamp = stamp_from_ns(1);
+  estimate.beginning = Beginning::origin;
+  estimate.sources[1].learned.emplace().states[LearnedSource::kLate] = 0.02;
+  keeper_.take(odometry_, estimate, FlatGround::off);
+  estimate.stamp += milliseconds{100};
+  estimate.sources[1].learned.reset();
+  keeper_.take(odometry_, estimate, FlatGround::off);
+  ASSERT_TRUE(keeper_.now() && keeper_.now()->learned[1]);
+  EXPECT_EQ(keeper_.now()->learned[1]->lateness_s().mean, 0.02);
+  EXPECT_FALSE(keeper_.now()->learned[0]);
+}
+
 TEST_F(Keeper, MinutesOfDeadReckoningAreNoDamage) {
   SavedState state;
   state.last.pose_covariance = Vector6(1e12, 1e12, 1e12, 1, 1, 1).asDiagonal();
@@ -137,9 +153,74 @@ TEST_F(Keeper, MinutesOfDeadReckoningAreNoDamage) {
   EXPECT_FALSE(load_state(file_)) << "no covariance is like that";
 }
 
+TEST_F(Keeper, WhatWasLearnedOfASourceGoesOn) {
+  SavedState state;
+  LearnedSource& learned = state.last.learned[1].emplace();
+  learned.noise_per_s = Vector6::LinSpaced(0.1, 0.6);
+  learned.states = {0.1, 0.02, 0.003, 0.0004, 0.05, -0.06, 0.07};
+  learned.covariance.diagonal().setLinSpaced(1e-4, 7e-4);
+  ASSERT_FALSE(write_state(file_, state));
+  const auto read = load_state(file_);
+  ASSERT_TRUE(read);
+  EXPECT_FALSE(read->last.learned[0]);
+  ASSERT_TRUE(read->last.learned[1]);
+  EXPECT_EQ(read->last.learned[1]->noise_per_s, learned.noise_per_s);
+  EXPECT_EQ(read->last.learned[1]->states, learned.states);
+  EXPECT_EQ(read->last.learned[1]->covariance, learned.covariance);
+  learned.covariance(0, 0) = -1e-4;
+  ASSERT_FALSE(write_state(file_, state));
+  EXPECT_FALSE(load_state(file_)->last.learned[1]) << "no covariance is like that";
+  learned.covariance(0, 0) = 1e-4;
+  learned.noise_per_s[3] = 0.0;
+  ASSERT_FALSE(write_state(file_, state));
+  EXPECT_FALSE(load_state(file_)->last.learned[1]) << "nothing is without noise";
+  learned.noise_per_s[3] = 0.1;
+  learned.states[0] = -1.0;
+  ASSERT_FALSE(write_state(file_, state));
+  EXPECT_FALSE(load_state(file_)->last.learned[1]) << "no wheels report nothing of their way";
+}
+
+/// What was learned corrects what was configured, and goes with it.
+TEST_F(Keeper, WhatWasLearnedOfASourceGoesWhereItIsConfiguredOtherwise) {
+  std::vector<MotionSource> sources(2);
+  sources[0].name = "wio";
+  sources[1].name = "imu";
+  sources[1].kind = SourceKind::imu;
+  SavedState state;
+  state.sources = ids_of(sources);
+  for (std::size_t i = 0; i < 2; ++i) {
+    state.last.T_source_base[i] = Pose{};
+    state.last.learned[i].emplace().since = stamp_from_ns(7);
+    state.last.learned[i]->noise_per_s.setOnes();
+  }
+  ASSERT_FALSE(write_state(file_, state));
+  auto same = load_state(file_);
+  ASSERT_TRUE(same);
+  EXPECT_EQ(same->sources, state.sources);
+  same->forget_changed(ids_of(sources));
+  ASSERT_TRUE(same->last.learned[0] && same->last.learned[1]);
+  EXPECT_EQ(same->last.learned[1]->since, stamp_from_ns(7));
+
+  const auto left_after = [&](const std::function<void(MotionSource&)>& change) {
+    std::vector<MotionSource> changed = sources;
+    change(changed[1]);
+    SavedState left = state;
+    left.forget_changed(ids_of(changed));
+    EXPECT_EQ(left.last.learned[0].has_value(), changed[1].name == "imu") << "the other one";
+    return left.last.learned[1].has_value();
+  };
+  EXPECT_FALSE(left_after([](MotionSource& imu) { imu.late_ms = 5; }));
+  EXPECT_FALSE(left_after([](MotionSource& imu) { imu.T_base_source.rotation = from_rpy_rad({0, 0.01, 0}); }));
+  EXPECT_FALSE(left_after([](MotionSource& imu) { imu.name = "gyro"; }));
+  EXPECT_FALSE(left_after([](MotionSource& imu) { imu.calibration = Calibration::off; }));
+  EXPECT_FALSE(left_after([](MotionSource& imu) { imu.calibration_sigma.mounting_deg = 0.0; }));
+  EXPECT_TRUE(left_after([](MotionSource& imu) { imu.health_topic = "/health"; }));
+}
+
 TEST_F(Keeper, EveryDamagedByteIsNoticed) {
   SavedState state;
   state.last.T_source_base[1] = Pose{};
+  state.last.doubted.set(1);
   state.map_odom.resize(3, {Eigen::Vector3f::Ones(), Eigen::Vector3f::UnitZ()});
   ASSERT_FALSE(write_state(file_, state));
   ASSERT_TRUE(load_state(file_));

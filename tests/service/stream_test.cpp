@@ -69,7 +69,8 @@ TEST_F(Stream, SimulatedRobotDrivesTheServiceWithoutAFile) {
 TEST_F(Stream, CaptureFileIsSentWithoutConfigurationAndMotion) {
   const ProgramRun run = play("head -c 300000 " + (capture() / "lidar.pcap").string());
   EXPECT_EQ(run.status, 0) << run.err;
-  EXPECT_NE(run.err.find("locus-play: warning: -: the capture ends in mid-packet"), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("locus-play: warning: -: byte 300000: the capture ends in mid-packet"), std::string::npos)
+      << run.err;
   EXPECT_NE(run.out.find(" packets sent"), std::string::npos) << run.out;
 }
 
@@ -80,8 +81,8 @@ TEST_F(Stream, WhatIsNoneIsAnErrorOfOneLine) {
     EXPECT_EQ(lines_of(run.err).size(), 1U) << run.err;
     EXPECT_NE(run.err.find(said), std::string::npos) << run.err;
   };
-  expect_refused("true", 1, "locus-play: -: not a pcap or pcapng capture");
-  expect_refused("yes", 1, "locus-play: -: not a pcap or pcapng capture");
+  expect_refused("true", 1, "locus-play: -: the file is empty (0 bytes)");
+  expect_refused("yes", 1, "locus-play: -: a text file, not a pcap or pcapng capture");
   expect_refused(LOCUS_SIM + std::string(kDrive) + "- | sed 's/kind: odometry/kind: odometer/'", 2, "-: config.yaml:");
 }
 

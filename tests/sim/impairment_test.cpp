@@ -97,7 +97,7 @@ Corner seen_of_corner(const NamedLidar& named) {
   const Scene scene = Corner::scene();
   const Trajectory trajectory(Course{}.stand(seconds{2}));
   SyntheticLidar lidar(scene, trajectory, named.options);
-  velodyne::Decoder decoder({.model = named.options.model});
+  velodyne::Decoder decoder({.model = std::get<velodyne::Model>(named.options.model)});
   const auto packet = std::make_unique<LidarPacket>();
   Corner seen;
   for (int i = 0; i < 753; ++i) {

@@ -35,7 +35,7 @@ Scene panel_before_wall(double gap_m, std::uint8_t panel = 50, std::uint8_t wall
 std::vector<Eigen::Vector3d> points_m(const Scene& scene, const SyntheticLidarOptions& options) {
   const Trajectory trajectory = standing();
   SyntheticLidar lidar(scene, trajectory, options);
-  velodyne::Decoder decoder({.model = options.model});
+  velodyne::Decoder decoder({.model = std::get<velodyne::Model>(options.model)});
   const auto packet = std::make_unique<LidarPacket>();
   std::vector<Eigen::Vector3d> all;
   for (int i = 0; i < 1130; ++i) {
@@ -137,7 +137,7 @@ TEST(LidarBeam, DualReturnsTellBothSurfacesOfAnEdge) {
 std::vector<std::vector<double>> ranges_by_laser(const Scene& scene, const SyntheticLidarOptions& options) {
   const Trajectory trajectory = standing();
   SyntheticLidar lidar(scene, trajectory, options);
-  const velodyne::ModelSpec& spec = velodyne::spec(options.model);
+  const velodyne::ModelSpec& spec = velodyne::spec(std::get<velodyne::Model>(options.model));
   std::vector<std::vector<double>> all(spec.calibration.laser_count);
   for (int i = 0; i < 75; ++i) {
     const Datagram datagram = lidar.next();
@@ -196,7 +196,7 @@ TEST(LidarErrors, EachLaserPointsAboveOrBelowWhereItsTableSays) {
 /// How much farther than without, of the laser one degree above the level, looking along x.
 double farther_m(const Scene& scene, const SyntheticLidarOptions& options) {
   const auto first_m = [&](const SyntheticLidarOptions& asked) {
-    const auto lasers = velodyne::spec(asked.model).calibration.lasers();
+    const auto lasers = velodyne::spec(std::get<velodyne::Model>(asked.model)).calibration.lasers();
     const auto level = std::find_if(lasers.begin(), lasers.end(), [](const velodyne::Laser& laser) {
       return std::abs(laser.elevation_rad - kRadPerDeg) < 1e-6;
     });

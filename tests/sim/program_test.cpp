@@ -62,6 +62,39 @@ TEST(LocusSim, FolderReplays) {
   EXPECT_LT(summary["ape_m"]["max"], 0.2);
 }
 
+struct OtherLidar {
+  std::string model, robot, imu; ///< the name of the source
+};
+
+class LocusSimWith : public testing::TestWithParam<OtherLidar> {};
+
+INSTANTIATE_TEST_SUITE_P(OtherMakers, LocusSimWith,
+                         testing::Values(OtherLidar{"OS1-32", "husky", "top_imu"},
+                                         OtherLidar{"OS1-32", "handheld", "top_imu"}, // and no odometry at all
+                                         OtherLidar{"XT32", "husky", "imu"}),
+                         [](const auto& test) { return test.param.robot + "_" + test.param.model.substr(0, 3); });
+
+/// As exactly as a Velodyne's.
+TEST_P(LocusSimWith, FolderReplays) {
+  const TemporaryFolder folder;
+  const std::string capture = folder / "capture";
+  const ProgramRun run = run_program(LOCUS_SIM, {"--world", "stairs", "--robot", GetParam().robot, "--duration", "12",
+                                                 "--model", GetParam().model, "--realism", "clean", "-o", capture});
+  ASSERT_EQ(run.status, 0) << run.err;
+  const Replay replay({capture});
+  ASSERT_EQ(replay.run().status, 0) << replay.run().err;
+  EXPECT_EQ(replay.run().err, "");
+  const nlohmann::json summary = replay.summary();
+  EXPECT_EQ(summary["lidars"]["top"]["model"], GetParam().model);
+  EXPECT_EQ(summary["packets"]["total"]["lost"], 0);
+  for (const auto& [reason, packets] : summary["packets"]["total"]["rejected"].items())
+    EXPECT_EQ(packets, 0) << reason;
+  EXPECT_EQ(summary["packets"]["total"]["clock_steps"], 0);
+  EXPECT_EQ(summary["sweeps"]["processed"], summary["sweeps"]["seen"]);
+  EXPECT_GT(summary["sources"][GetParam().imu]["used_sweeps"], 0);
+  EXPECT_LT(summary["ape_m"]["max"], 0.2);
+}
+
 TEST(LocusSim, PositionPacketsTellTheTimeOfTheirArrival) {
   const TemporaryFolder folder;
   ASSERT_EQ(run_program(LOCUS_SIM, husky_in("corridor", folder / "c", {"--realism", "clean"})).status, 0);
@@ -194,6 +227,9 @@ TEST(LocusSim, WrongOptionsAreAnErrorOfOneLineThatNamesThem) {
   expect_refused({"--wrld", "urban", "-o", x}, "no option --wrld; the nearest is --world");
   expect_refused(husky_in("urban", x, {"--lidars", "4"}), "4");
   expect_refused(husky_in("urban", x, {"--model", "VLS-128"}), "VLS-128");
+  expect_refused(husky_in("urban", x, {"--model", "OS1-64"}), "VLP-16,VLP-32C,HDL-32E,OS1-32,OS1-128,XT32");
+  expect_refused(husky_in("urban", x, {"--model", "XT32", "--return", "dual"}), "--return dual");
+  expect_refused(husky_in("urban", "-", {"--model", "OS1-32"}), "-o -");
   expect_refused(husky_in("urban", x, {"--dust", "nan"}), "dust");
   expect_refused(husky_in("urban", x, {"--dust", "1.5"}), "dust");
   expect_refused(husky_in("urban", x, {"--realism", "cosy"}), "cosy");

@@ -49,14 +49,16 @@ TEST_P(EveryWorld, WithoutNoiseEveryReturnLiesOnASurface) {
   SyntheticLidarOptions options = drive.robot.sensors.lidars.front().options;
   options.sends_position_packets = false;
   SyntheticLidar lidar(drive.world.scene, drive.trajectory, options);
-  velodyne::Decoder decoder({.model = options.model});
+  velodyne::Decoder decoder({.model = std::get<velodyne::Model>(options.model)});
   const auto packet = std::make_unique<LidarPacket>();
-  const double half_step_m = velodyne::spec(options.model).calibration.distance_resolution_m / 2;
+  const double half_step_m =
+      velodyne::spec(std::get<velodyne::Model>(options.model)).calibration.distance_resolution_m / 2;
   std::size_t returns = 0;
   for (Datagram datagram = lidar.next(); datagram.receive_stamp < drive.trajectory.start() + seconds{6};
        datagram = lidar.next()) {
     ASSERT_FALSE(decoder.decode(datagram.payload, *packet));
-    const Stamp sent = datagram.receive_stamp - velodyne::packet_duration(options.model, options.return_mode);
+    const Stamp sent = datagram.receive_stamp -
+                       velodyne::packet_duration(std::get<velodyne::Model>(options.model), options.return_mode);
     const std::vector<LidarReturn> echoes = test::returns_of(*packet);
     for (std::size_t i = returns % 29; i < echoes.size();
          i += 29, ++returns) { // not all: it takes time to look them up

@@ -7,7 +7,7 @@
 
 #include "drivers/files/capture_folder.hpp"
 #include "drivers/files/capture_sequence.hpp"
-#include "faults/fault_injection.hpp"
+#include "drivers/packet_edit.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/motion_recordings.hpp"
 #include "locus_replay/recording.hpp"
@@ -109,7 +109,7 @@ daemon::Input LoopedCourse::carry_forward(const daemon::Input& input) {
   daemon::Input carried = input;
   if (auto* datagram = std::get_if<Datagram>(&carried)) {
     payload_.assign(datagram->payload.begin(), datagram->payload.end());
-    step_sensor_clock(payload_, offset_);
+    shift_clock(payload_, nullptr, offset_);
     datagram->payload = payload_;
     datagram->receive_stamp += offset_;
   } else if (auto* imu = std::get_if<daemon::ImuInput>(&carried)) {

@@ -14,8 +14,8 @@ namespace locus::test {
 /// A folder that is gone after the test.
 class TemporaryFolder {
  public:
-  TemporaryFolder() {
-    std::string name = testing::TempDir() + "/locus-test-XXXXXX";
+  explicit TemporaryFolder(const std::string& parent = testing::TempDir()) {
+    std::string name = parent + "/locus-test-XXXXXX";
     if (::mkdtemp(name.data()) == nullptr)
       throw std::runtime_error("no temporary folder " + name);
     path_ = name;

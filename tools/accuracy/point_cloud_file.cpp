@@ -15,6 +15,8 @@
 
 #include <fmt/format.h>
 
+#include "accuracy/pcd_header.hpp"
+
 namespace locus {
 namespace {
 

@@ -4,12 +4,13 @@
 #include <algorithm>
 #include <charconv>
 #include <map>
-#include <sstream>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
+
+#include "accuracy/pcd_header.hpp"
 
 namespace locus {
 namespace {
@@ -19,14 +20,6 @@ using Encoding = PointCloudLayout::Encoding;
 using Problem = std::optional<std::string>;
 
 constexpr std::string_view kNotACloud = "neither a PLY nor a PCD file; export the map as one of them";
-
-Words words_of(const std::string& line) {
-  std::istringstream stream{line};
-  Words words;
-  for (std::string word; stream >> word;)
-    words.push_back(word);
-  return words;
-}
 
 template <class Number> bool parse(const std::string& text, Number& number) {
   const char* const end = text.data() + text.size();
@@ -120,92 +113,53 @@ class PlyHeader {
   int elements_ = 0;
 };
 
-class PcdHeader {
- public:
-  LayoutBuilder builder;
-
-  /// Takes a line in; `ended` at the last of the header.
-  Problem take(const Words& words, bool& ended) {
-    if (words.empty() || words[0].starts_with('#'))
-      return std::nullopt;
-    const std::string& key = words[0];
-    const Words values{words.begin() + 1, words.end()};
-    if (key == "DATA" && values.size() == 1) {
-      ended = true;
-      return finish(values[0]);
-    }
-    if (key == "POINTS" && (values.size() != 1 || !parse(values[0], builder.layout.points)))
-      return "POINTS is no number; export the map again";
-    if (key == "VERSION" || key == "WIDTH" || key == "HEIGHT" || key == "VIEWPOINT" || key == "POINTS")
-      return std::nullopt;
-    if (key == "FIELDS" || key == "SIZE" || key == "TYPE" || key == "COUNT") {
-      lines_[key] = values;
-      return std::nullopt;
-    }
-    return "not a line of a PCD header; export the map again";
-  }
-
- private:
-  Problem finish(const std::string& encoding) {
-    if (encoding != "ascii" && encoding != "binary")
-      return fmt::format("DATA {} cannot be read in parts; convert the map to DATA binary", encoding);
-    builder.layout.encoding = encoding == "ascii" ? Encoding::text : Encoding::little_endian;
-    const Words& names = lines_["FIELDS"];
-    lines_.try_emplace("COUNT", names.size(), "1");
-    for (const char* key : {"SIZE", "TYPE", "COUNT"}) {
-      if (lines_[key].size() != names.size())
-        return fmt::format("{} does not have as many values as FIELDS; export the map again", key);
-    }
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      constexpr std::size_t kMost = 100'000; // of numbers in a field, a histogram for example
-      std::size_t bytes = 0, count = 0;
-      if (!parse(lines_["SIZE"][i], bytes) || !parse(lines_["COUNT"][i], count) || bytes > 8 || count > kMost)
-        return fmt::format("SIZE or COUNT of {} is no sensible number; export the map again", names[i]);
-      if (Problem problem = builder.add(names[i], bytes, lines_["TYPE"][i] == "F", count))
-        return problem;
-    }
-    return builder.missing();
-  }
-
-  std::map<std::string, Words> lines_;
-};
-
-template <class Header> Expected<PointCloudLayout, std::string> read_header(std::istream& stream, Words first) {
-  Header header;
+Expected<PointCloudLayout, std::string> read_ply_header(std::istream& stream) {
+  PlyHeader header;
   bool ended = false;
-  std::uint64_t number = 1;
-  for (Words words = std::move(first); true; ++number) {
-    if (Problem problem = header.take(words, ended))
+  std::uint64_t number = 2; // the first one is known
+  for (; true; ++number) {
+    const std::optional<std::string> line = read_short_line(stream);
+    if (!line)
+      return fmt::format("{}: the header does not end; export the map again", number);
+    if (Problem problem = header.take(words_of(*line), ended))
       return fmt::format("{}: {}", number, *problem);
     if (ended)
       break;
-    const std::optional<std::string> line = read_short_line(stream);
-    if (!line)
-      return fmt::format("{}: the header does not end; export the map again", number + 1);
-    words = words_of(*line);
   }
   header.builder.layout.header_lines = number;
   return header.builder.layout;
 }
 
-} // namespace
-
-std::optional<std::string> read_short_line(std::istream& stream) {
-  constexpr std::size_t kLongest = 4096;
-  std::string line(kLongest, '\0');
-  if (!stream.getline(line.data(), kLongest))
-    return std::nullopt;
-  line.resize(std::string_view{line.c_str()}.size());
-  return line;
+Expected<PointCloudLayout, std::string> read_pcd_header(std::istream& stream) {
+  const Expected<PcdHeader, std::string> header = PcdHeader::read(stream);
+  if (!header)
+    return header.error();
+  if (header->data == PcdHeader::Data::binary_compressed)
+    return fmt::format("{}: DATA binary_compressed cannot be read in parts; convert the map to DATA binary",
+                       header->lines);
+  LayoutBuilder builder;
+  builder.layout.points = header->points;
+  builder.layout.header_lines = header->lines;
+  builder.layout.encoding = header->data == PcdHeader::Data::ascii ? Encoding::text : Encoding::little_endian;
+  for (const PcdHeader::Field& field : header->fields) {
+    if (const Problem problem = builder.add(field.name, field.bytes, field.type == 'F', field.count))
+      return fmt::format("{}: {}", header->lines, *problem);
+  }
+  if (const Problem problem = builder.missing())
+    return fmt::format("{}: {}", header->lines, *problem);
+  return builder.layout;
 }
 
+} // namespace
+
 Expected<PointCloudLayout, std::string> PointCloudLayout::read(std::istream& stream) {
-  Words first = words_of(read_short_line(stream).value_or(""));
-  if (!first.empty() && first[0] == "ply")
-    return read_header<PlyHeader>(stream, std::move(first));
-  if (!first.empty() && (first[0] == "VERSION" || (first.size() > 1 && first[0] == "#" && first[1] == ".PCD")))
-    return read_header<PcdHeader>(stream, std::move(first));
-  return fmt::format("1: {}", kNotACloud);
+  const std::string first = read_short_line(stream).value_or("");
+  if (const Words words = words_of(first); !words.empty() && words[0] == "ply")
+    return read_ply_header(stream);
+  if (!PcdHeader::begins_with(first))
+    return fmt::format("1: {}", kNotACloud);
+  stream.seekg(0);
+  return read_pcd_header(stream);
 }
 
 } // namespace locus

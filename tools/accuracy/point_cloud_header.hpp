@@ -5,15 +5,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <istream>
-#include <optional>
 #include <string>
 
 #include "core/base/expected.hpp"
 
 namespace locus {
-
-/// Reads a line without its end; nothing after the last, or where it is longer than any in a cloud, as in binary data.
-std::optional<std::string> read_short_line(std::istream& stream);
 
 /// Where in a PLY or PCD file the coordinates of the points lie.
 struct PointCloudLayout {

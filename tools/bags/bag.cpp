@@ -3,9 +3,15 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <fstream>
 #include <string_view>
 #include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
 
 #include "bags/ros1_bag.hpp"
 #include "bags/ros2_bag.hpp"
@@ -23,12 +29,67 @@ bool is_ros1_bag(const std::filesystem::path& file) {
 
 } // namespace
 
-std::size_t Bag::topic_index(const std::string& name, const std::string& type) {
-  const auto found = std::ranges::find_if(topics_, [&](const BagTopic& t) { return t.name == name && t.type == type; });
-  if (found != topics_.end())
-    return static_cast<std::size_t>(found - topics_.begin());
-  topics_.push_back({name, type});
+std::optional<std::size_t> Bag::index_of(BagTopic topic) {
+  if (const auto known = indices_.find(topic); known != indices_.end())
+    return known->second;
+  if (topics_.size() == kMaxTopics || topic.name.size() > kMaxNameBytes || topic.type.size() > kMaxNameBytes) {
+    is_beyond_bounds_ = true;
+    return std::nullopt;
+  }
+  topics_.push_back(topic);
+  indices_.emplace(std::move(topic), topics_.size() - 1);
   return topics_.size() - 1;
+}
+
+void Bag::declare(std::int64_t number, BagTopic topic) {
+  const bool has_room = declared_.size() < kMaxTopics || declared_.contains(number);
+  is_beyond_bounds_ = is_beyond_bounds_ || !has_room;
+  const std::optional<std::size_t> index = has_room ? index_of(std::move(topic)) : std::nullopt;
+  if (index)
+    declared_[number] = *index;
+  else
+    declared_.erase(number);
+}
+
+std::optional<std::size_t> Bag::topic_of(std::int64_t number) const {
+  const auto found = declared_.find(number);
+  return found != declared_.end() ? std::optional(found->second) : std::nullopt;
+}
+
+void Bag::tell_of_bounds(const std::string& file, std::vector<std::string>& lines) const {
+  if (is_beyond_bounds_)
+    lines.push_back(fmt::format("{}: topics beyond the {}th, or with a name or type of more than {} bytes, are left "
+                                "out; copy or record it again",
+                                file, kMaxTopics, kMaxNameBytes));
+}
+
+std::string ros1_type(std::string type) {
+  if (const std::size_t middle = type.find("/msg/"); middle != std::string::npos)
+    type.erase(middle, 4);
+  return type;
+}
+
+std::string printable(std::string_view text) {
+  constexpr std::size_t kShown = 20;
+  std::string shown{text.substr(0, kShown)};
+  std::ranges::replace_if(
+      shown, [](char c) { return c < ' ' || c > '~'; }, '?');
+  return shown;
+}
+
+std::optional<std::string> why_unreadable(const std::filesystem::path& file) {
+  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (descriptor >= 0) {
+    close(descriptor);
+    return std::nullopt;
+  }
+  return fmt::format("cannot be read ({}); {}", std::generic_category().message(errno),
+                     errno == EMFILE ? "allow more with: ulimit -n 65536" : "check its permissions");
+}
+
+std::string timeless_messages(const std::string& file, std::uint64_t count) {
+  return fmt::format("{}: {} messages with an absurd time of reception left out; record again if it matters", file,
+                     count);
 }
 
 bool looks_like_bag(const std::filesystem::path& where) {

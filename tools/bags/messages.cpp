@@ -2,9 +2,12 @@
 #include "bags/messages.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
+#include <utility>
 
 #include "daemon/dds/ros_messages.hpp"
+#include "drivers/velodyne/model.hpp"
 
 namespace locus::tools {
 namespace {
@@ -20,7 +23,7 @@ ros::Header read_header(MessageReader& reader) {
   if (reader.serialisation() == Serialisation::ros1)
     reader.number<std::uint32_t>(); // the sequence number, which ROS 2 has dropped
   const ros::Time stamp = read_time(reader);
-  reader.skip_text();
+  reader.text();
   return {stamp, nullptr};
 }
 
@@ -34,6 +37,59 @@ ros::Quaternion read_quaternion(MessageReader& reader) {
   std::array<double, 4> q{};
   reader.numbers(q);
   return {q[0], q[1], q[2], q[3]};
+}
+
+/// A header, and packets behind their stamps, each as `payload` reads it.
+template <class Payload> std::optional<LidarPackets> read_packets(MessageReader reader, const Payload& payload) {
+  read_header(reader);
+  LidarPackets packets;
+  for (auto left = reader.number<std::uint32_t>(); left > 0 && reader.whole(); --left) {
+    const Stamp stamp = daemon::to_stamp(read_time(reader));
+    packets.add(stamp, payload(reader));
+  }
+  return reader.whole() ? std::optional(std::move(packets)) : std::nullopt;
+}
+
+std::optional<LidarPackets> read_velodyne_scan(MessageReader reader) {
+  return read_packets(reader, [](MessageReader& r) { return r.bytes(velodyne::kDataPacketBytes); });
+}
+
+std::optional<LidarPackets> read_nebula_packets(MessageReader reader) {
+  return read_packets(reader, [](MessageReader& r) { return r.sequence(); });
+}
+
+/// An array as long as an Ethernet frame, and how much of it is the packet.
+std::optional<LidarPackets> read_pandar_scan(MessageReader reader) {
+  constexpr std::size_t kArrayBytes = 1500;
+  return read_packets(reader, [](MessageReader& r) {
+    const std::span<const std::byte> all = r.bytes(kArrayBytes);
+    return all.first(std::min<std::size_t>(r.number<std::uint32_t>(), all.size()));
+  });
+}
+
+/// Releases of Hesai's driver differ in whether the frame begins with a header, and each of its packets too. The packet
+/// is followed by its size, by which the right reading is told; a frame without packets is none.
+std::optional<LidarPackets> read_hesai_frame(MessageReader message) {
+  for (const bool has_header : {true, false}) {
+    for (const bool has_packet_headers : {false, true}) {
+      MessageReader reader = message;
+      if (has_header)
+        read_header(reader);
+      LidarPackets packets;
+      auto left = reader.number<std::uint32_t>();
+      for (bool fits = true; left > 0 && reader.whole() && fits; left -= fits ? 1U : 0U) {
+        if (has_packet_headers)
+          read_header(reader);
+        const Stamp stamp = daemon::to_stamp(read_time(reader));
+        const std::span<const std::byte> payload = reader.sequence();
+        fits = reader.number<std::uint32_t>() == payload.size() && !payload.empty();
+        packets.add(stamp, payload);
+      }
+      if (left == 0 && !packets.packets.empty() && reader.whole() && reader.rest().empty())
+        return packets;
+    }
+  }
+  return std::nullopt;
 }
 
 } // namespace
@@ -55,7 +111,7 @@ std::optional<ros::Imu> read_imu(MessageReader reader) {
 std::optional<ros::Odometry> read_odometry(MessageReader reader) {
   ros::Odometry odometry{};
   odometry.header_ = read_header(reader);
-  reader.skip_text(); // the child's frame
+  reader.text(); // the child's frame
   const ros::Vector3 position = read_vector(reader);
   odometry.pose_.pose_ = {{position.x_, position.y_, position.z_}, read_quaternion(reader)};
   reader.numbers(odometry.pose_.covariance_);
@@ -65,15 +121,29 @@ std::optional<ros::Odometry> read_odometry(MessageReader reader) {
   return reader.whole() ? std::optional(odometry) : std::nullopt;
 }
 
-std::optional<VelodyneScan> read_velodyne_scan(MessageReader reader) {
-  read_header(reader);
-  VelodyneScan scan;
-  for (auto left = reader.number<std::uint32_t>(); left > 0 && reader.whole(); --left) {
-    VelodyneScan::Packet packet{daemon::to_stamp(read_time(reader)), {}};
-    std::ranges::copy(reader.bytes(packet.payload.size()), packet.payload.begin());
-    scan.packets.push_back(packet);
-  }
-  return reader.whole() ? std::optional(std::move(scan)) : std::nullopt;
+void LidarPackets::add(Stamp stamp, std::span<const std::byte> payload) {
+  packets.push_back({stamp, bytes.size(), payload.size()});
+  bytes.insert(bytes.end(), payload.begin(), payload.end());
+}
+
+std::span<const PacketType> packet_types() {
+  static constexpr std::array kTypes{PacketType{"velodyne_msgs/VelodyneScan", "Velodyne", read_velodyne_scan},
+                                     PacketType{"nebula_msgs/NebulaPackets", "", read_nebula_packets},
+                                     PacketType{"ouster_ros/PacketMsg", "Ouster", nullptr},
+                                     PacketType{"ouster_sensor_msgs/PacketMsg", "Ouster", nullptr},
+                                     PacketType{"pandar_msgs/PandarScan", "Hesai", read_pandar_scan},
+                                     PacketType{"hesai_ros_driver/UdpFrame", "Hesai", read_hesai_frame}};
+  return kTypes;
+}
+
+const PacketType* packet_type(std::string_view name) {
+  const auto found = std::ranges::find(packet_types(), name, &PacketType::name);
+  return found != packet_types().end() ? &*found : nullptr;
+}
+
+bool are_packets_decoded(std::string_view type_name) {
+  const PacketType* const type = packet_type(type_name);
+  return type != nullptr && type->read != nullptr;
 }
 
 } // namespace locus::tools

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "bags/decompression.hpp"
+
 namespace locus::tools {
 namespace {
 
@@ -34,7 +36,7 @@ Expected<std::unique_ptr<Bag>, std::string> Ros1Bag::open(const std::filesystem:
 /// The magic and the header of the bag. What is wrong with them, or nothing.
 std::optional<std::string> Ros1Bag::read_start() {
   if (!stream_)
-    return "cannot be read; check its permissions";
+    return why_unreadable(file_).value_or("cannot be read");
   if (size_ == 0)
     return "the file is empty (0 bytes); record with: rosbag record /velodyne_packets /imu/data";
   std::array<char, kMagic.size()> start{};
@@ -116,7 +118,7 @@ std::optional<BagRecord> Ros1Bag::read_record() {
 std::optional<std::uint32_t> Ros1Bag::read_length() {
   std::uint32_t length = 0;
   stream_.read(reinterpret_cast<char*>(&length), sizeof(length));
-  if (!stream_ || length > kMaxBlockBytes || length > size_ - at_ - sizeof(length))
+  if (!stream_ || length > kMaxBlockBytes || sizeof(length) + length > size_ - at_)
     return std::nullopt;
   at_ += sizeof(length) + length;
   return length;
@@ -143,8 +145,8 @@ void Ros1Bag::take_chunk(const BagRecord& chunk) {
 
 void Ros1Bag::take_connection(const BagRecord& connection) {
   if (const auto id = connection.fields.number<std::uint32_t>("conn"))
-    topic_of_[*id] =
-        topic_index(std::string(connection.fields.text("topic")), std::string(BagFields(connection.data).text("type")));
+    declare(*id, {std::string(connection.fields.text("topic")), std::string(BagFields(connection.data).text("type")),
+                  Serialisation::ros1});
 }
 
 /// False for one of no connection.
@@ -154,10 +156,10 @@ bool Ros1Bag::take_message(const BagRecord& message) {
   };
   const auto connection = message.fields.number<std::uint32_t>("conn");
   const auto time = message.fields.number<Time>("time");
-  const auto topic = connection ? topic_of_.find(*connection) : topic_of_.end();
-  if (topic == topic_of_.end() || !time)
+  const std::optional<std::size_t> topic = connection ? topic_of(*connection) : std::nullopt;
+  if (!topic || !time)
     return false;
-  message_ = {topic->second, Stamp{std::chrono::seconds{time->seconds} + Duration{time->nanoseconds}}, message.data};
+  message_ = {*topic, Stamp{std::chrono::seconds{time->seconds} + Duration{time->nanoseconds}}, message.data};
   return true;
 }
 
@@ -166,14 +168,16 @@ void Ros1Bag::break_off(const std::string& why) {
 }
 
 std::vector<std::string> Ros1Bag::warnings() const {
+  std::vector<std::string> lines;
   if (!break_.empty())
-    return {break_};
-  if (index_ == 0)
-    return {
+    lines.push_back(break_);
+  else if (index_ == 0)
+    lines.push_back(
         fmt::format("{}: was not closed by its recorder and has no index; all {} bytes are used, but the end may be "
                     "missing; rosbag reindex makes it whole for other programs",
-                    file_.string(), size_)};
-  return {};
+                    file_.string(), size_));
+  tell_of_bounds(file_.string(), lines);
+  return lines;
 }
 
 double Ros1Bag::progress() const { return static_cast<double>(at_) / static_cast<double>(size_); }

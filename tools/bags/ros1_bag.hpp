@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <fstream>
-#include <map>
 #include <optional>
 #include <string>
 
@@ -22,7 +21,6 @@ class Ros1Bag : public Bag {
   /// Fails with one line for the user.
   static Expected<std::unique_ptr<Bag>, std::string> open(const std::filesystem::path& file);
 
-  [[nodiscard]] Serialisation serialisation() const override { return Serialisation::ros1; }
   const BagMessage* next() override;
   void rewind() override;
   [[nodiscard]] std::vector<std::string> warnings() const override;
@@ -51,9 +49,8 @@ class Ros1Bag : public Bag {
   std::uint64_t index_ = 0;        ///< where it begins; 0: the recorder has not come to write it
   std::uint64_t at_ = 0;           ///< how far the file has been read
   std::vector<std::byte> header_, data_;
-  std::vector<std::byte> chunk_;                  ///< uncompressed
-  std::span<const std::byte> left_;               ///< of it
-  std::map<std::uint32_t, std::size_t> topic_of_; ///< by connection
+  std::vector<std::byte> chunk_;    ///< uncompressed
+  std::span<const std::byte> left_; ///< of it
   BagMessage message_{};
   std::string break_; ///< where and why reading stopped before the end; empty while all is well
 };

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bags/ros1_record.hpp"
 
-#include <memory>
-
-#include <bzlib.h>
 #include <fmt/format.h>
-#include <lz4frame.h>
+
+#include "bags/bag.hpp"
+#include "bags/decompression.hpp"
 
 namespace locus::tools {
 namespace {
@@ -23,32 +22,6 @@ std::optional<Bytes> take_block(Bytes& bytes) {
   const Bytes block = bytes.subspan(sizeof(length), length);
   bytes = bytes.subspan(sizeof(length) + length);
   return block;
-}
-
-bool decompress_bzip2(Bytes in, std::span<std::byte> out) {
-  const auto* begin = reinterpret_cast<const char*>(in.data());
-  std::vector<char> source(begin, begin + in.size()); // bzip2 knows no const
-  auto size = static_cast<unsigned>(out.size());
-  return BZ2_bzBuffToBuffDecompress(reinterpret_cast<char*>(out.data()), &size, source.data(),
-                                    static_cast<unsigned>(source.size()), 0, 0) == BZ_OK &&
-         size == out.size();
-}
-
-bool decompress_lz4(Bytes in, std::span<std::byte> out) {
-  LZ4F_dctx* made = nullptr;
-  if (LZ4F_isError(LZ4F_createDecompressionContext(&made, LZ4F_VERSION)) != 0)
-    return false;
-  const std::unique_ptr<LZ4F_dctx, decltype([](LZ4F_dctx* c) { LZ4F_freeDecompressionContext(c); })> context(made);
-  std::size_t hint = 1;
-  while (hint != 0 && !in.empty()) {
-    std::size_t read = in.size(), written = out.size();
-    hint = LZ4F_decompress(context.get(), out.data(), &written, in.data(), &read, nullptr);
-    if (LZ4F_isError(hint) != 0 || (read == 0 && written == 0))
-      return false;
-    in = in.subspan(read);
-    out = out.subspan(written);
-  }
-  return hint == 0 && out.empty();
 }
 
 } // namespace
@@ -91,7 +64,7 @@ std::optional<std::string> decompress_chunk(const BagRecord& chunk, std::vector<
   } else if (compression == "bz2") {
     good = decompress_bzip2(chunk.data, out);
   } else {
-    return fmt::format("a chunk compressed by \"{}\"; none, lz4 and bz2 are read", compression.substr(0, 20));
+    return fmt::format("a chunk compressed by \"{}\"; none, lz4 and bz2 are read", printable(compression));
   }
   return good ? std::nullopt : std::optional<std::string>("a chunk is damaged");
 }

@@ -13,9 +13,6 @@
 /// What the file of a ROS 1 bag (format 2.0) is made of.
 namespace locus::tools {
 
-/// What is longer is damaged: recorders make chunks of 768 kB unless they are told otherwise.
-inline constexpr std::uint32_t kMaxBlockBytes = 1U << 28U;
-
 enum class BagOp : std::uint8_t { message = 2, bag_header = 3, index = 4, chunk = 5, chunk_info = 6, connection = 7 };
 
 /// The fields of a header, `name=value` each behind its length.

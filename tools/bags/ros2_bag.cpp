@@ -4,14 +4,20 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
+#include <iterator>
 #include <optional>
 #include <string_view>
 #include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
-#include <sqlite3.h>
 #include <yaml-cpp/yaml.h>
+#include <zstd.h>
+
+#include "bags/decompression.hpp"
+#include "bags/mcap_bag.hpp"
+#include "bags/sqlite_bag.hpp"
+#include "unpacking/unpacked_copy.hpp"
 
 namespace locus::tools {
 namespace {
@@ -20,7 +26,8 @@ using std::filesystem::path;
 
 constexpr const char* kMetadata = "metadata.yaml";
 constexpr std::string_view kMcap = "\x89MCAP", kSqlite = "SQLite format 3", kZstd = "\x28\xB5\x2F\xFD";
-constexpr std::string_view kConvert = "convert it to storage sqlite3 without compression with: ros2 bag convert";
+constexpr std::array<std::string_view, 2> kStorages{".db3", ".mcap"};
+constexpr std::array<std::string_view, 3> kPackings{"", ".zstd", ".zst"};
 
 bool starts_with(const path& file, std::string_view magic) {
   std::string start(magic.size(), '\0');
@@ -28,16 +35,31 @@ bool starts_with(const path& file, std::string_view magic) {
   return start == magic;
 }
 
-/// Those that can be read and those that are refused by name.
+/// Whether a file that begins so is one that is read.
+bool begins_a_bag(std::string_view start) { return start.starts_with(kSqlite) || start.starts_with(kMcap); }
+
+bool has_name_of_bag(const path& file) {
+  const std::string name = file.filename().string();
+  return std::ranges::any_of(kStorages, [&](std::string_view storage) {
+    return std::ranges::any_of(
+        kPackings, [&](std::string_view packing) { return name.ends_with(fmt::format("{}{}", storage, packing)); });
+  });
+}
+
+/// In the order of the numbers that rosbag2 puts at the end of their names. Players leave a file unpacked beside the
+/// packed one.
 std::vector<path> bag_files_in(const path& folder) {
   std::vector<path> files;
   std::error_code error;
   for (std::filesystem::directory_iterator entry{folder, error}, end; !error && entry != end; entry.increment(error)) {
-    const std::string name = entry->path().filename().string();
-    if (name.ends_with(".db3") || name.ends_with(".mcap") || name.ends_with(".db3.zstd"))
+    if (has_name_of_bag(entry->path()))
       files.push_back(entry->path());
   }
-  std::ranges::sort(files);
+  std::ranges::sort(files, {}, [](const path& file) { return std::pair(file.native().size(), file); });
+  std::erase_if(files, [&](const path& file) {
+    return file.extension() != ".db3" && file.extension() != ".mcap" &&
+           std::ranges::find(files, path(file).replace_extension()) != files.end();
+  });
   return files;
 }
 
@@ -51,10 +73,13 @@ Expected<std::vector<path>, std::string> files_of(const path& folder) {
     const YAML::Node bag = YAML::LoadFile(metadata.string())["rosbag2_bagfile_information"];
     const auto storage = bag["storage_identifier"].as<std::string>("");
     const auto compression = bag["compression_format"].as<std::string>("");
-    if (!storage.empty() && storage != "sqlite3") // where it is not named, the files themselves tell
-      return fmt::format("{}: storage {} is not read; {}", folder.string(), storage, kConvert);
-    if (!compression.empty())
-      return fmt::format("{}: compressed with {}, which is not read; {}", folder.string(), compression, kConvert);
+    if (!storage.empty() && storage != "sqlite3" &&
+        storage != "mcap") // where it is not named, the files themselves tell
+      return fmt::format("{}: storage {} is not read; convert it to mcap with: ros2 bag convert", folder.string(),
+                         storage);
+    if (!compression.empty() && compression != "zstd")
+      return fmt::format("{}: compressed with {}, which is not read; convert it to zstd with: ros2 bag convert",
+                         folder.string(), compression);
     std::vector<path> files;
     for (const auto& file : bag["relative_file_paths"].as<std::vector<std::string>>())
       files.push_back(folder / path(file).filename()); // some versions put the name of the folder before it
@@ -65,37 +90,6 @@ Expected<std::vector<path>, std::string> files_of(const path& folder) {
   }
 }
 
-/// Nothing is written beside a bag that nobody is writing to; SQLite would, of one that keeps a write-ahead log.
-std::string uri_of(const path& file) {
-  std::string uri = "file:";
-  for (const char c : std::filesystem::absolute(file).string()) {
-    const bool has_meaning = c == '%' || c == '?' || c == '#';
-    uri += has_meaning ? fmt::format("%{:02X}", c) : std::string(1, c);
-  }
-  const auto has = [&](const char* ending) {
-    std::error_code ignored;
-    return std::filesystem::exists(file.string() + ending, ignored);
-  };
-  return uri + (has("-wal") || has("-journal") ? "" : "?immutable=1");
-}
-
-/// ROS 2 puts /msg between package and name.
-std::string ros1_type(std::string type) {
-  if (const std::size_t middle = type.find("/msg/"); middle != std::string::npos)
-    type.erase(middle, 4);
-  return type;
-}
-
-std::string text_of(sqlite3_stmt* row, int column) {
-  const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(row, column));
-  return text != nullptr ? text : "";
-}
-
-std::span<const std::byte> bytes_of(sqlite3_stmt* row, int column) {
-  const auto* data = static_cast<const std::byte*>(sqlite3_column_blob(row, column));
-  return {data, data != nullptr ? static_cast<std::size_t>(sqlite3_column_bytes(row, column)) : 0};
-}
-
 } // namespace
 
 bool is_ros2_bag_folder(const path& folder) {
@@ -104,15 +98,12 @@ bool is_ros2_bag_folder(const path& folder) {
 }
 
 bool is_ros2_bag_file(const path& file) {
-  return file.extension() == ".db3" || file.extension() == ".mcap" || file.string().ends_with(".db3.zstd") ||
-         starts_with(file, kSqlite) || starts_with(file, kMcap);
+  return has_name_of_bag(file) || starts_with(file, kSqlite) || starts_with(file, kMcap);
 }
-
-void Ros2Bag::Closer::operator()(sqlite3* database) const { sqlite3_close(database); }
-void Ros2Bag::Closer::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
 
 Expected<std::unique_ptr<Bag>, std::string> Ros2Bag::open(const path& where) {
   auto bag = std::make_unique<Ros2Bag>();
+  bag->name_ = where.string();
   std::vector<path> files{where};
   if (std::filesystem::is_directory(where)) {
     Expected<std::vector<path>, std::string> found = files_of(where);
@@ -124,133 +115,117 @@ Expected<std::unique_ptr<Bag>, std::string> Ros2Bag::open(const path& where) {
     return fmt::format("{}: {} names no file; make it again with: ros2 bag reindex", where.string(), kMetadata);
   for (const path& file : files) {
     if (const std::optional<std::string> problem = bag->add(file))
-      return fmt::format("{}: {}", file.string(), *problem);
+      return *problem;
   }
-  bag->rewind();
   return std::unique_ptr<Bag>(std::move(bag));
 }
 
 /// Opens one more file. What is wrong with it, or nothing.
 std::optional<std::string> Ros2Bag::add(const path& file) {
+  const auto refuse = [&](std::string_view why) { return fmt::format("{}: {}", file.string(), why); };
   std::error_code ignored;
   if (!std::filesystem::is_regular_file(file, ignored))
-    return "no such file; copy the whole bag, or name one of its files";
+    return refuse("no such file; copy the whole bag, or name one of its files");
   if (std::filesystem::file_size(file, ignored) == 0)
-    return "the file is empty (0 bytes); record with: ros2 bag record -s sqlite3 /velodyne_packets /imu/data";
-  if (starts_with(file, kMcap) || file.extension() == ".mcap")
-    return fmt::format("an MCAP bag, which is not read; {}", kConvert);
-  if (starts_with(file, kZstd))
-    return fmt::format("compressed with zstd, which is not read; {}", kConvert);
-  if (!starts_with(file, kSqlite))
-    return "not a ROS 2 bag: no SQLite database; copy or record it again";
-  sqlite3* opened = nullptr; // what is wrong shows in the first query
-  sqlite3_open_v2(uri_of(file).c_str(), &opened, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
-  files_.push_back({file, Database(opened), {}, 0});
-  sqlite3_limit(opened, SQLITE_LIMIT_LENGTH, 1 << 28);                            // no message is so long
-  sqlite3_exec(opened, "PRAGMA writable_schema = ON", nullptr, nullptr, nullptr); // else a file that is cut is refused
-  return read_topics(files_.back());
+    return refuse("the file is empty (0 bytes); record with: ros2 bag record /velodyne_packets /imu/data");
+  if (const std::optional<std::string> why = why_unreadable(file))
+    return refuse(*why);
+  if (!starts_with(file, kZstd))
+    return add(file, file);
+  Expected<UnpackedCopy, std::string> copy = UnpackedCopy::make(file, begins_a_bag);
+  if (!copy)
+    return refuse(copy.error());
+  if (!copy->problem().empty())
+    breaks_.push_back(refuse(copy->problem() + "; what lies before it is used"));
+  if (!starts_with(copy->path(), kSqlite))
+    return add(file, copy->path());
+  const Expected<path, std::string> named = copy->give_name(); // SQLite opens none without
+  return named ? add(file, *named) : refuse(named.error());
 }
 
-Ros2Bag::Statement Ros2Bag::prepare(const File& file, const char* sql) {
-  sqlite3_stmt* prepared = nullptr;
-  sqlite3_prepare_v2(file.database.get(), sql, -1, &prepared, nullptr); // nullptr shows as SQLITE_MISUSE in each step
-  return Statement(prepared);
-}
-
-std::optional<std::string> Ros2Bag::read_topics(File& file) {
-  const auto why = [&] {
-    return fmt::format("not a ROS 2 bag, or damaged ({}); copy or record it again",
-                       sqlite3_errmsg(file.database.get()));
-  };
-  const Statement topics = prepare(file, "SELECT id, name, type, serialization_format FROM topics ORDER BY id");
-  while (sqlite3_step(topics.get()) == SQLITE_ROW) {
-    if (const std::string format = text_of(topics.get(), 3); format != "cdr" && !format.empty()) // early rosbag2: empty
-      return fmt::format("its messages are serialised as \"{}\", not cdr; {}", format.substr(0, 20), kConvert);
-    file.topic_of[sqlite3_column_int64(topics.get(), 0)] =
-        topic_index(text_of(topics.get(), 1), ros1_type(text_of(topics.get(), 2)));
-  }
-  if (sqlite3_errcode(file.database.get()) != SQLITE_DONE)
-    return why();
-  const Statement last = prepare(file, "SELECT max(id) FROM messages");
-  if (sqlite3_step(last.get()) == SQLITE_ROW)
-    file.rows = sqlite3_column_double(last.get(), 0);
-  const Statement first = prepare(file, "SELECT data FROM messages ORDER BY id LIMIT 1");
-  if (const int status = sqlite3_step(first.get()); status != SQLITE_ROW && status != SQLITE_DONE)
-    return why();
-  const std::span<const std::byte> data = bytes_of(first.get(), 0);
-  if (std::string_view(reinterpret_cast<const char*>(data.data()), data.size()).starts_with(kZstd))
-    return fmt::format("its messages are compressed with zstd, which is not read; {}", kConvert);
+/// The same, of one that lies unpacked at `readable`.
+std::optional<std::string> Ros2Bag::add(const path& file, const path& readable) {
+  const bool is_mcap = starts_with(readable, kMcap);
+  if (!is_mcap && !starts_with(readable, kSqlite))
+    return fmt::format("{}: not a ROS 2 bag: neither an SQLite database nor MCAP; copy or record it again",
+                       file.string());
+  Expected<std::unique_ptr<Bag>, std::string> opened =
+      is_mcap ? McapBag::open(readable, file.string()) : SqliteBag::open(readable, file.string());
+  if (!opened)
+    return opened.error();
+  files_.push_back({std::move(*opened), {}});
+  learn_topics(files_.back());
   return std::nullopt;
 }
 
+/// Those that it has told by now.
+void Ros2Bag::learn_topics(File& file) {
+  for (std::size_t i = file.topic_of.size(); i < file.bag->topics().size(); ++i) {
+    const BagTopic& topic = file.bag->topics()[i];
+    file.topic_of.push_back(index_of(topic));
+  }
+}
+
 void Ros2Bag::rewind() {
-  rows_.reset();
+  for (File& file : files_)
+    file.bag->rewind();
   current_ = 0;
-  row_ = 0;
-  timeless_ = 0;
-  break_.clear();
+  damaged_ = 0;
 }
 
 const BagMessage* Ros2Bag::next() {
-  constexpr std::int64_t kMaxNs = 4'000'000'000'000'000'000; // so that differences of stamps cannot overflow
-  while (read_row()) {
-    const File& file = files_[current_];
-    const auto topic = file.topic_of.find(sqlite3_column_int64(rows_.get(), 0));
-    const std::int64_t ns = sqlite3_column_int64(rows_.get(), 1);
-    const bool has_time = ns >= 0 && ns <= kMaxNs;
-    timeless_ += has_time ? 0U : 1U;
-    if (topic == file.topic_of.end() || !has_time)
+  while (const BagMessage* message = next_packed()) {
+    const std::optional<std::size_t> topic = files_[current_].topic_of[message->topic];
+    if (!topic)
       continue;
-    message_ = {topic->second, stamp_from_ns(ns), bytes_of(rows_.get(), 2)};
-    return &message_;
+    message_ = {*topic, message->recorded, message->data};
+    const std::string_view data(reinterpret_cast<const char*>(message->data.data()), message->data.size());
+    const bool is_packed = data.starts_with(kZstd) && topics()[message_.topic].serialisation == Serialisation::cdr;
+    if (!is_packed || unpack()) // CDR itself begins with a zero
+      return &message_;
+    ++damaged_;
   }
   return nullptr;
 }
 
-/// Steps to the next row of the current file, or of the next one; false after the last.
-bool Ros2Bag::read_row() {
-  while (current_ < files_.size()) {
-    const File& file = files_[current_];
-    if (!rows_) // as players read it; without the index that rosbag2 makes they would be sorted with all their data
-      rows_ = prepare(file, "SELECT topic_id, timestamp, data FROM messages INDEXED BY timestamp_idx ORDER BY "
-                            "timestamp, id");
-    if (!rows_)
-      rows_ = prepare(file, "SELECT topic_id, timestamp, data FROM messages ORDER BY id");
-    const int status = sqlite3_step(rows_.get());
-    if (status == SQLITE_ROW) {
-      ++row_;
-      return true;
+/// As it lies in its file.
+const BagMessage* Ros2Bag::next_packed() {
+  for (; current_ < files_.size(); ++current_) {
+    if (const BagMessage* message = files_[current_].bag->next()) {
+      learn_topics(files_[current_]);
+      return message;
     }
-    if (status != SQLITE_DONE)
-      break_off(file);
-    rows_.reset();
-    row_ = 0;
-    ++current_;
   }
-  return false;
+  return nullptr;
 }
 
-void Ros2Bag::break_off(const File& file) {
-  break_ = fmt::format("{}: message {}: the database breaks off or is damaged ({}); what lies before it is used",
-                       file.path.string(), row_ + 1, sqlite3_errmsg(file.database.get()));
+/// The data of message_; false where they are damaged.
+bool Ros2Bag::unpack() {
+  const auto size = ZSTD_getFrameContentSize(message_.data.data(), message_.data.size()); // an error is no size, either
+  if (size > kMaxBlockBytes)
+    return false;
+  unpacked_.resize(size);
+  const bool is_whole = decompress_zstd(message_.data, unpacked_);
+  message_.data = unpacked_;
+  return is_whole;
 }
 
 std::vector<std::string> Ros2Bag::warnings() const {
-  std::vector<std::string> lines;
-  if (!break_.empty())
-    lines.push_back(break_);
-  if (timeless_ > 0)
-    lines.push_back(fmt::format("{}: {} messages with an absurd time of reception left out; record again if it matters",
-                                files_.front().path.string(), timeless_));
+  std::vector<std::string> lines = breaks_;
+  for (const File& file : files_)
+    std::ranges::move(file.bag->warnings(), std::back_inserter(lines));
+  if (damaged_ > 0)
+    lines.push_back(fmt::format("{}: {} messages are compressed with zstd and damaged, and were left out; copy or "
+                                "record it again",
+                                name_, damaged_));
+  tell_of_bounds(name_, lines);
   return lines;
 }
 
 double Ros2Bag::progress() const {
   if (current_ == files_.size())
     return 1;
-  const double rows = files_[current_].rows;
-  const double of_file = rows > 0 ? std::min(1.0, static_cast<double>(row_) / rows) : 0;
-  return (static_cast<double>(current_) + of_file) / static_cast<double>(files_.size());
+  return (static_cast<double>(current_) + files_[current_].bag->progress()) / static_cast<double>(files_.size());
 }
 
 } // namespace locus::tools

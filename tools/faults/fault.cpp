@@ -134,7 +134,8 @@ bool parse_window(std::string_view text, Fault& fault) {
 
 bool Fault::strikes_lidar(std::string_view lidar) const {
   return name == kAllLidars || name == lidar ||
-         (lidar.starts_with(name) && lidar.substr(name.size()) == kPositionPackets);
+         (lidar.starts_with(name) &&
+          (lidar.substr(name.size()) == kPositionPackets || lidar.substr(name.size()) == kInertialUnit));
 }
 
 std::string_view to_string(FaultKind kind) { return traits_of(kind).name; }
@@ -209,8 +210,10 @@ FaultPlan::Verdict FaultPlan::judge(std::string_view sensor, bool is_lidar, Stam
   for (Entry& entry : entries_) {
     const Fault& fault = entry.fault;
     const bool meant = is_lidar ? fault.strikes_lidar(sensor) : fault.name == sensor;
+    const bool of_columns_alone = fault.name != sensor && sensor.ends_with(Fault::kInertialUnit) &&
+                                  (fault.kind == FaultKind::jump || fault.kind == FaultKind::clock_step);
     const bool begun = fault.from == Duration::zero() || since_start >= fault.from;
-    if (!meant || !begun || since_start >= fault.until) {
+    if (!meant || of_columns_alone || !begun || since_start >= fault.until) {
       continue;
     }
     const auto drawn = [&] { return static_cast<double>(entry.random() >> 11) * 0x1p-53 * 100.0 < fault.value; };

@@ -22,7 +22,7 @@ enum class FaultKind : std::uint8_t {
   nan,         ///< all readings are NaN
   late,        ///< everything arrives `value` seconds late (0.2)
   covariance,  ///< the reported covariance is `value` times larger (10)
-  clock_step,  ///< the sensor's own clock is off by `value` seconds (60); a lidar's wraps at the hour
+  clock_step,  ///< the sensor's own clock is off by `value` seconds (60); a Velodyne's wraps at the hour
   packet_loss, ///< `value` percent of the messages are lost (10)
   reorder,     ///< `value` percent of the messages are overtaken by the next one of the same sensor (10)
   duplicate,   ///< `value` percent of the messages arrive twice (10)
@@ -38,6 +38,7 @@ std::string_view to_string(FaultKind kind);
 struct Fault {
   static constexpr std::string_view kAllLidars = "all-lidars";
   static constexpr std::string_view kPositionPackets = ".position"; ///< after a lidar's name: these alone
+  static constexpr std::string_view kInertialUnit = "_imu";         ///< the same, of an Ouster: the motion source
 
   std::string name; ///< of a lidar or motion source, or kAllLidars
   FaultKind kind = FaultKind::lost;
@@ -45,7 +46,7 @@ struct Fault {
   Duration from{};                  ///< after the start of the capture; 0: from the first message of all on
   Duration until = Duration::max(); ///< the first instant at which all is well again
 
-  /// Whether it befalls the lidar of this name, or, with kPositionPackets behind it, its position packets.
+  /// Whether it befalls the lidar of this name, or, with kPositionPackets or kInertialUnit behind it, such packets.
   [[nodiscard]] bool strikes_lidar(std::string_view lidar) const;
 
   /// Fails with one line for the user: what is wrong with the text, what is accepted.

@@ -3,15 +3,14 @@
 
 #include <algorithm>
 #include <bit>
-#include <chrono>
-#include <cmath>
 #include <limits>
 #include <random>
 #include <utility>
 
-#include "drivers/velodyne/model.hpp"
+#include "drivers/ouster/imu_packet.hpp"
+#include "drivers/ouster/packet_edit.hpp"
+#include "drivers/packet_edit.hpp"
 #include "drivers/velodyne/position_packet.hpp"
-#include "drivers/velodyne/wire.hpp"
 
 namespace locus {
 namespace {
@@ -66,56 +65,6 @@ void distort_reading(const FaultPlan::Verdict& verdict, OdometrySample& sample) 
   }
 }
 
-/// Where a packet holds the sensor's clock, microseconds past the hour; nullptr for a packet without.
-std::byte* sensor_clock_in(std::span<std::byte> payload) {
-  switch (payload.size()) {
-  case velodyne::kDataPacketBytes:
-    return payload.data() + velodyne::kTimeOffset;
-  case velodyne::kPositionPacketBytes:
-    return payload.data() + velodyne::kTimeOfHourOffset;
-  default:
-    return nullptr;
-  }
-}
-
-} // namespace
-
-void step_sensor_clock(std::span<std::byte> payload, Duration step) {
-  using std::chrono::microseconds;
-  constexpr microseconds kHour = std::chrono::hours{1};
-  std::byte* const clock = sensor_clock_in(payload);
-  if (clock == nullptr || step == Duration::zero()) {
-    return;
-  }
-  const microseconds stepped = microseconds{read_u32(clock)} + std::chrono::duration_cast<microseconds>(step);
-  const auto time_of_hour_us = static_cast<std::uint32_t>(((stepped % kHour + kHour) % kHour).count());
-  for (unsigned i = 0; i < 4; ++i) {
-    clock[i] = static_cast<std::byte>(time_of_hour_us >> 8 * i);
-  }
-}
-
-namespace {
-
-/// Of a data packet whose product id is known; where there was no return there still is none.
-void lengthen_ranges(std::vector<std::byte>& payload, double more_m) {
-  const auto model =
-      velodyne::model_from_product_id(std::to_integer<std::uint8_t>(payload[velodyne::kProductIdOffset]));
-  if (more_m == 0.0 || !model) {
-    return;
-  }
-  const double more = more_m / velodyne::spec(*model).calibration.distance_resolution_m;
-  for (std::size_t i = 0; i < velodyne::kBlocks * velodyne::kChannels; ++i) {
-    std::byte* const range = payload.data() + i / velodyne::kChannels * velodyne::kBlockBytes +
-                             velodyne::kBlockHeaderBytes + i % velodyne::kChannels * velodyne::kChannelBytes;
-    if (const std::uint16_t raw = read_u16(range); raw != 0) {
-      constexpr double kLongest = std::numeric_limits<std::uint16_t>::max();
-      const auto longer = static_cast<std::uint16_t>(std::clamp(std::round(raw + more), 1.0, kLongest));
-      range[0] = static_cast<std::byte>(longer);
-      range[1] = static_cast<std::byte>(longer >> 8);
-    }
-  }
-}
-
 /// From a random byte on.
 void corrupt_payload(std::uint64_t seed, std::vector<std::byte>& payload) {
   if (payload.empty()) {
@@ -126,20 +75,35 @@ void corrupt_payload(std::uint64_t seed, std::vector<std::byte>& payload) {
   std::generate(from, payload.end(), [&] { return static_cast<std::byte>(random()); });
 }
 
-void distort_packet(const FaultPlan::Verdict& verdict, std::vector<std::byte>& payload) {
-  step_sensor_clock(payload, verdict.clock_step);
-  if (payload.size() == velodyne::kDataPacketBytes) {
-    lengthen_ranges(payload, verdict.jump);
+void distort_packet(const FaultPlan::Verdict& verdict, const ouster::Metadata* ouster, bool inertial,
+                    std::vector<std::byte>& payload) {
+  if (verdict.clock_step != Duration::zero()) {
+    shift_clock(payload, ouster, verdict.clock_step);
+  }
+  if (verdict.jump != 0.0 && inertial) {
+    ouster::add_turn(*ouster, payload, verdict.jump);
+  } else if (verdict.jump != 0.0) {
+    lengthen_ranges(payload, ouster, verdict.jump);
+  }
+  if (verdict.nan && inertial) {
+    ouster::make_nan(*ouster, payload);
   }
   if (verdict.corruption) {
     corrupt_payload(*verdict.corruption, payload);
   }
 }
 
-/// Name of the messages that a lidar's datagram is one of: its position packets are messages of their own.
-std::string stream_of(std::string_view lidar, const Datagram& datagram) {
-  std::string stream{lidar};
-  if (datagram.payload.size() == velodyne::kPositionPacketBytes) {
+bool is_inertial(const LidarRouter::Origin& origin, const Datagram& datagram) {
+  return origin.metadata != nullptr && datagram.payload.size() == ouster::imu_packet_layout(*origin.metadata).bytes;
+}
+
+/// Name of the messages that a lidar's datagram is one of: its position packets are messages of their own, and so are
+/// the readings of an inertial unit in it.
+std::string stream_of(const LidarRouter::Origin& origin, const Datagram& datagram) {
+  std::string stream{origin.lidar};
+  if (is_inertial(origin, datagram)) {
+    stream += Fault::kInertialUnit;
+  } else if (origin.metadata == nullptr && datagram.payload.size() == velodyne::kPositionPacketBytes) {
     stream += Fault::kPositionPackets;
   }
   return stream;
@@ -208,14 +172,14 @@ void DatagramFaults::Copy::emit_to(const Emit& emit) const {
   emit(complete);
 }
 
-void DatagramFaults::pass(std::string_view lidar, const Datagram& datagram, const Emit& emit) {
+void DatagramFaults::pass(const LidarRouter::Origin& origin, const Datagram& datagram, const Emit& emit) {
   const Stamp now = datagram.receive_stamp;
   emit_delayed(now, emit);
-  if (lidar.empty()) {
+  if (origin.lidar.empty()) {
     emit(datagram);
     return;
   }
-  const std::string name = stream_of(lidar, datagram);
+  const std::string name = stream_of(origin, datagram);
   const FaultPlan::Verdict verdict = plan_.judge(name, true, now);
   Stream& stream = streams_[name];
   if (!verdict.frozen || stream.healthy.empty()) {
@@ -232,7 +196,7 @@ void DatagramFaults::pass(std::string_view lidar, const Datagram& datagram, cons
   if (verdict.frozen) {
     copy.payload = stream.healthy;
   }
-  distort_packet(verdict, copy.payload);
+  distort_packet(verdict, origin.metadata, is_inertial(origin, datagram), copy.payload);
   copy.datagram.receive_stamp += verdict.delay;
   if (verdict.overtaken && !stream.overtaken) {
     stream.overtaken = std::move(copy);

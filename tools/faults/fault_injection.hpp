@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/sources/motion_sample.hpp"
+#include "drivers/lidar_input.hpp"
 #include "drivers/net/datagram.hpp"
 #include "faults/fault.hpp"
 
@@ -46,14 +47,12 @@ template <class Sample>
 void inject_faults(std::span<const Fault> faults, const std::string& source, Stamp capture_start, std::uint64_t seed,
                    std::vector<Sample>& samples);
 
-/// Sets the sensor's own clock forward in a data or position packet; other payloads stay as they are. It shows minutes
-/// and seconds alone, so an hour makes no difference. The sentence of the GPS in a position packet keeps its time.
-void step_sensor_clock(std::span<std::byte> payload, Duration step);
-
 /// Applies the faults meant for lidars to the datagrams of a capture as they stream by. The receive stamp of a datagram
 /// that is late or overtaken moves along; what is held back comes out in the order of arrival. The position packets of
-/// a lidar are a stream of their own: its faults strike them too, but one packet repeats or overtakes its like only.
-/// One owner.
+/// a lidar are a stream of their own: its faults strike them too, but one packet repeats or overtakes its like only. So
+/// are an Ouster's packets with the readings of its inertial unit, the motion source NAME_imu; a lidar's jump is one of
+/// its ranges, and its clock step one of its columns. Where a packet has a checksum, it is right for what a jump or a
+/// clock step has made of it. One owner.
 class DatagramFaults {
  public:
   /// Takes a datagram, valid only during the call.
@@ -63,9 +62,8 @@ class DatagramFaults {
   DatagramFaults(std::span<const Fault> faults, Stamp capture_start, std::uint64_t seed)
       : plan_(faults, capture_start, seed) {}
 
-  /// Emits what is due by the time of this datagram, then what becomes of it. `lidar` is the name of the lidar that it
-  /// comes from, empty for none.
-  void pass(std::string_view lidar, const Datagram& datagram, const Emit& emit);
+  /// Emits what is due by the time of this datagram, then what becomes of it.
+  void pass(const LidarRouter::Origin& origin, const Datagram& datagram, const Emit& emit);
 
   /// Emits what is still held back. The capture is over.
   void finish(const Emit& emit);

@@ -11,8 +11,10 @@ namespace locus::tools {
 
 bool KittiSweep::begin(std::span<const KittiPoint> points, Stamp start, Stamp end) {
   column_ = kColumns;
-  if (!find_rings(points))
+  const std::optional<std::size_t> rings = find_returns(points, returns_);
+  if (!rings)
     return false;
+  rings_ = *rings;
   start_ = start;
   end_ = end;
   cells_.assign(kColumns * kRings, 0);
@@ -27,10 +29,10 @@ bool KittiSweep::begin(std::span<const KittiPoint> points, Stamp start, Stamp en
 
 /// A new ring begins where the azimuth falls back. The few points at its beginning that the offset of a laser puts
 /// before the front are no ring of their own.
-bool KittiSweep::find_rings(std::span<const KittiPoint> points) {
+std::optional<std::size_t> find_returns(std::span<const KittiPoint> points, std::vector<KittiReturn>& returns) {
   constexpr double kTurn = 2.0 * std::numbers::pi, kFallsBack = 0.1, kLeastOfRing = 0.1;
-  constexpr std::size_t kMaxFalls = 4 * kRings;
-  returns_.clear();
+  constexpr std::size_t kMaxFalls = 4 * kKittiRings;
+  returns.clear();
   std::size_t ring = 0, falls = 0;
   double last = 0, first_of_ring = 0;
   for (const KittiPoint& point : points) {
@@ -39,19 +41,18 @@ bool KittiSweep::find_rings(std::span<const KittiPoint> points) {
       continue;
     const double clockwise = std::atan2(-static_cast<double>(point.y_m), static_cast<double>(point.x_m)); // 0 in front
     const double azimuth = clockwise > 0 ? kTurn - clockwise : -clockwise;
-    if (returns_.empty())
+    if (returns.empty())
       first_of_ring = azimuth;
-    if (!returns_.empty() && azimuth < last - kFallsBack) {
+    if (!returns.empty() && azimuth < last - kFallsBack) {
       ++falls;
       if (last - first_of_ring > kLeastOfRing)
         ++ring;
       first_of_ring = azimuth;
     }
     last = azimuth;
-    returns_.push_back({point, 0.5 + clockwise / kTurn, ring});
+    returns.push_back({point, 0.5 + clockwise / kTurn, ring});
   }
-  rings_ = ring + 1;
-  return rings_ <= kRings && falls <= kMaxFalls;
+  return ring < kKittiRings && falls <= kMaxFalls ? std::optional{ring + 1} : std::nullopt;
 }
 
 const LidarPacket* KittiSweep::next() {

@@ -15,6 +15,7 @@
 #include "locus_experiments/odometry_rows.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/quantiles.hpp"
+#include "unpacking/unpacking_stream.hpp"
 
 namespace locus::experiments {
 namespace {
@@ -151,7 +152,7 @@ ordered_json receiver_speed(const std::filesystem::path& recording) {
   const auto folder = CaptureFolder::find(recording);
   if (!folder)
     return nullptr;
-  auto capture = CaptureSequence::open(folder->lidar);
+  auto capture = CaptureSequence::open(folder->lidar, tools::open_capture);
   if (!capture)
     return nullptr;
   const std::vector<double> speeds = speeds_of_fixes_mps(*capture);

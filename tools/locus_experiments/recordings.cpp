@@ -11,6 +11,7 @@
 #include "drivers/files/capture_folder.hpp"
 #include "kitti/kitti_drive.hpp"
 #include "locus_replay/failure.hpp"
+#include "sweep_folder/sweep_folder.hpp"
 
 namespace locus::experiments {
 namespace {
@@ -24,13 +25,11 @@ bool is_folder(const path& where) {
 
 /// A capture folder with a mistake in it is one, too: locus-replay says which.
 bool is_recording(const path& where) {
-  std::error_code ignored;
-  if (tools::KittiDrive::is(where) || tools::looks_like_bag(where))
+  if (tools::KittiDrive::is(where) || tools::looks_like_bag(where) || tools::SweepFolder::is(where))
     return true;
   if (!is_folder(where))
-    return where.extension() == ".pcap" || where.extension() == ".pcapng";
-  return std::filesystem::exists(where / "lidar.pcap", ignored) ||
-         std::filesystem::exists(where / "lidar.pcapng", ignored) || CaptureFolder::find(where);
+    return is_named_as_capture(where);
+  return !captures_in(where).empty() || CaptureFolder::find(where);
 }
 
 std::vector<path> entries_of(const path& folder) {

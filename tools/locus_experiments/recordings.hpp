@@ -15,7 +15,7 @@ struct FoundRecording {
 
 /// What to look for, for a user who has none of it.
 inline constexpr const char* kKindsOfRecordings =
-    "*.pcap, *.pcapng, folders with lidar.pcap, bags of ROS 1 (*.bag) or ROS 2 (*.db3), drives of KITTI "
+    "*.pcap, *.pcapng, folders with lidar.pcap, bags of ROS 1 (*.bag) or ROS 2 (*.mcap, *.db3), drives of KITTI "
     "(velodyne_points/data)";
 
 /// All recordings in these folders, at any depth, in the order of their names. A place may be a recording itself. What

@@ -36,6 +36,7 @@ std::optional<PlayArguments> parse_play_arguments(int argc, char** argv) {
       ->check(CLI::Range(0, 232));
   app.add_flag("--keep-stamps", arguments.keep_stamps,
                "Leaves all stamps as recorded, instead of making the first now");
+  app.add_flag("--clock", arguments.clock, "Publishes the time of what is sent on /clock, for nodes with use_sim_time");
   app.add_option("--fail", faults, "Injects a fault, as locus-replay does, e.g. front:lost@10-20; may be repeated")
       ->type_name("SPEC")
       ->allow_extra_args(false);

@@ -19,6 +19,7 @@ struct PlayArguments {
   std::optional<std::string> interface; ///< of DDS; nothing: that of the folder's configuration
   std::optional<int> domain;            ///< the same
   bool keep_stamps = false;
+  bool clock = false; ///< for nodes with use_sim_time
   bool quiet = false;
   std::vector<Fault> faults;
 };

@@ -15,6 +15,7 @@
 
 #include "command_line.hpp"
 #include "config/config_yaml.hpp"
+#include "config/lidar_metadata.hpp"
 #include "daemon/input.hpp"
 #include "daemon/machine_time.hpp"
 #include "drivers/files/capture_sequence.hpp"
@@ -24,9 +25,11 @@
 #include "locus_play/stream_recording.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/motion_recordings.hpp"
+#include "locus_replay/ouster_metadata.hpp"
 #include "locus_replay/progress_bar.hpp"
 #include "locus_replay/recording.hpp"
 #include "locus_replay/say.hpp"
+#include "unpacking/unpacking_stream.hpp"
 
 namespace locus::tools {
 namespace {
@@ -51,7 +54,8 @@ Recording open_recording(const PlayArguments& arguments, const CaptureFolder& fo
   std::vector<MotionRecording> motion = read_motion({}, folder, config, !folder.config.empty(), warnings);
   for (const std::string& warning : warnings)
     warn(warning);
-  return {std::make_unique<CaptureSequence>(value_or_fail(CaptureSequence::open(folder.lidar), ExitStatus::failed)),
+  return {std::make_unique<CaptureSequence>(
+              value_or_fail(CaptureSequence::open(folder.lidar, open_capture), ExitStatus::failed)),
           std::move(motion),
           config,
           value_or_fail(LidarRouter::open(config.lidars), ExitStatus::wrong_usage),
@@ -69,27 +73,31 @@ void wait_for_listeners(const MotionPublisher& motion, const DdsOptions& dds) {
 }
 
 /// Sends all there is, each at its time. The first input is sent now: what separates its arrival from that is what all
-/// stamps are shifted by, in whole microseconds as the lidars count.
+/// stamps are shifted by, in whole microseconds as the lidars count. The clock shows the arrival of what is sent next,
+/// so no stamp of a sensor is ahead of it by more than it goes in its period.
 void send_all(const PlayArguments& arguments, daemon::InputSource& recording, PacketSender& packets,
               MotionPublisher& motion, const std::function<double()>& progress) {
   daemon::PacedInput paced(recording, arguments.speed);
   ProgressBar bar(!arguments.quiet);
   std::optional<Duration> shift;
-  const auto shift_from = [&](Stamp arrival) {
+  const auto shift_at = [&](Stamp arrival) {
     if (!shift) {
       const Duration now = daemon::read_clock(CLOCK_REALTIME) - arrival.time_since_epoch();
       shift = arguments.keep_stamps ? Duration::zero() : std::chrono::floor<std::chrono::microseconds>(now);
     }
+    motion.tell_time(arrival + *shift);
     return *shift;
   };
   for (bool more = true; more;) {
-    const daemon::Input input = paced.next(std::chrono::milliseconds{100});
+    const daemon::Input input = paced.next(MotionPublisher::kClockPeriod);
     if (const auto* datagram = std::get_if<Datagram>(&input))
-      packets.send(*datagram, shift_from(datagram->receive_stamp));
+      packets.send(*datagram, shift_at(datagram->receive_stamp));
     else if (const auto* imu = std::get_if<daemon::ImuInput>(&input))
-      motion.publish(*imu, shift_from(imu->sample.arrival));
+      motion.publish(*imu, shift_at(imu->sample.arrival));
     else if (const auto* odometry = std::get_if<daemon::OdometryInput>(&input))
-      motion.publish(*odometry, shift_from(odometry->sample.arrival));
+      motion.publish(*odometry, shift_at(odometry->sample.arrival));
+    else if (const auto* silence = std::get_if<daemon::Silence>(&input); silence != nullptr && shift)
+      motion.tell_time(silence->now + *shift);
     more = !std::holds_alternative<daemon::EndOfInput>(input);
     bar.show(progress());
   }
@@ -100,8 +108,9 @@ void send_all(const PlayArguments& arguments, daemon::InputSource& recording, Pa
 
 void play(const PlayArguments& arguments, const Config& config, daemon::InputSource& recording,
           const DatagramSource& source, const std::function<double()>& progress) {
-  PacketSender packets(arguments.to, arguments.interface.value_or(config.dds.interface));
-  MotionPublisher motion(config);
+  PacketSender packets(arguments.to, arguments.interface.value_or(config.dds.interface),
+                       value_or_fail(LidarRouter::open(config.lidars), ExitStatus::wrong_usage));
+  MotionPublisher motion(config, arguments.clock);
   wait_for_listeners(motion, config.dds);
   send_all(arguments, recording, packets, motion, progress);
   for (const std::string& warning : source.warnings())
@@ -124,6 +133,8 @@ void play_folder(const PlayArguments& arguments) {
   Config config;
   if (!folder.config.empty())
     config = value_or_refuse(load_config(folder.first_config()));
+  use_recorded_metadata(folder, config);
+  config = value_or_refuse(with_lidar_metadata(std::move(config)));
   if (const auto changed = folder.changed_config())
     warn(*changed);
   config = with_options(std::move(config), arguments);
@@ -135,7 +146,7 @@ void play_folder(const PlayArguments& arguments) {
 void play_stream(const PlayArguments& arguments) {
   if (arguments.capture == "-" && isatty(STDIN_FILENO) == 1)
     throw Failure(ExitStatus::wrong_usage, "-: standard input is a terminal; try: locus-sim ... -o - | locus-play -");
-  CaptureStream stream(value_or_fail(Capture::open(arguments.capture), ExitStatus::failed));
+  CaptureStream stream(value_or_fail(open_capture(arguments.capture), ExitStatus::failed));
   const Config config = with_options(
       value_or_refuse(parse_config(stream.config(), arguments.capture.string() + ": config.yaml")), arguments);
   StreamRecording recording(stream, config, value_or_fail(LidarRouter::open(config.lidars), ExitStatus::wrong_usage),

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "locus_play/motion_publisher.hpp"
 
+#include <ctime>
+
 #include "daemon/dds/ros_messages.hpp"
+#include "daemon/machine_time.hpp"
 #include "locus_replay/failure.hpp"
 
 namespace locus::tools {
@@ -10,7 +13,7 @@ using daemon::DdsWriter;
 using daemon::TopicQos;
 namespace ros = daemon::ros;
 
-MotionPublisher::MotionPublisher(const Config& config)
+MotionPublisher::MotionPublisher(const Config& config, bool clock)
     : node_(value_or_fail(daemon::DdsNode::open(config.dds), ExitStatus::failed)), frame_odom_(config.dds.frame_odom),
       frame_base_(config.dds.frame_base) {
   for (const MotionSource& source : config.motion_sources) {
@@ -23,6 +26,8 @@ MotionPublisher::MotionPublisher(const Config& config)
     else
       odometries_.emplace(id, DdsWriter<ros::Odometry>(node_, source.topic, TopicQos::standard()));
   }
+  if (clock)
+    clock_.emplace(node_, "/clock", TopicQos::clock());
 }
 
 void MotionPublisher::publish(const daemon::ImuInput& input, Duration shift) {
@@ -53,8 +58,19 @@ void MotionPublisher::publish(const daemon::OdometryInput& input, Duration shift
   refused_ += writer->second.write(daemon::to_ros(report, frames)) ? 0U : 1U;
 }
 
+void MotionPublisher::tell_time(Stamp now) {
+  const Duration monotonic = daemon::read_clock(CLOCK_MONOTONIC);
+  if (!clock_ || monotonic < clock_due_ || now <= clock_shows_)
+    return;
+  refused_ += clock_->write({daemon::to_ros(now)}) ? 0U : 1U;
+  clock_shows_ = now;
+  clock_due_ = monotonic + kClockPeriod;
+}
+
 std::vector<std::string> MotionPublisher::unheard() const {
   std::vector<std::string> topics;
+  if (clock_ && !clock_->has_readers())
+    topics.emplace_back("/clock");
   for (const auto& [source, writer] : imus_)
     if (!writer.has_readers())
       topics.push_back(topics_[index_of(source)]);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "locus_play/packet_sender.hpp"
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <utility>
@@ -13,9 +12,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "drivers/velodyne/model.hpp"
-#include "drivers/velodyne/position_packet.hpp"
-#include "drivers/velodyne/wire.hpp"
+#include "drivers/packet_edit.hpp"
 #include "locus_replay/failure.hpp"
 
 namespace locus::tools {
@@ -29,29 +26,10 @@ sockaddr_in address(std::uint32_t ip, std::uint16_t port) {
   return address;
 }
 
-/// Where a packet of this length has its time of hour; nothing for others.
-std::size_t time_offset(std::size_t bytes) {
-  if (bytes == velodyne::kDataPacketBytes)
-    return velodyne::kTimeOffset;
-  return bytes == velodyne::kPositionPacketBytes ? velodyne::kTimeOfHourOffset : 0;
-}
-
-void shift_clock(std::span<std::byte> packet, Duration shift) {
-  constexpr std::int64_t kHour_us = 3'600'000'000;
-  const std::size_t offset = time_offset(packet.size());
-  if (offset == 0)
-    return;
-  const std::int64_t now_us = read_u32(packet.data() + offset);
-  if (now_us >= kHour_us)
-    return; // no time at all; the receiver is to see that
-  const std::int64_t shifted_us = ((now_us + shift.count() / 1000) % kHour_us + kHour_us) % kHour_us;
-  for (std::size_t i = 0; i < 4; ++i)
-    packet[offset + i] = static_cast<std::byte>(shifted_us >> 8 * i & 0xFF);
-}
-
 } // namespace
 
-PacketSender::PacketSender(const std::string& to, std::string interface) : interface_(std::move(interface)) {
+PacketSender::PacketSender(const std::string& to, std::string interface, LidarRouter lidars)
+    : interface_(std::move(interface)), lidars_(std::move(lidars)) {
   in_addr parsed{};
   inet_pton(AF_INET, to.c_str(), &parsed);
   to_ = ntohl(parsed.s_addr);
@@ -81,11 +59,10 @@ int PacketSender::socket_for(std::uint32_t source_ip) {
 }
 
 void PacketSender::send(const Datagram& datagram, Duration shift) {
-  const std::size_t size = std::min(datagram.payload.size(), buffer_.size());
-  std::copy_n(datagram.payload.begin(), size, buffer_.begin());
-  shift_clock({buffer_.data(), size}, shift);
+  packet_.assign(datagram.payload.begin(), datagram.payload.end());
+  shift_clock(packet_, lidars_.configured_for(datagram).metadata, shift);
   const sockaddr_in to = address(to_, datagram.destination_port);
-  const ssize_t sent = sendto(socket_for(datagram.source_ip), buffer_.data(), size, 0,
+  const ssize_t sent = sendto(socket_for(datagram.source_ip), packet_.data(), packet_.size(), 0,
                               reinterpret_cast<const sockaddr*>(&to), sizeof(to));
   if (sent < 0 && errno != ECONNREFUSED) // nobody listens yet; a lidar does not mind
     throw Failure(ExitStatus::failed, fmt::format("packets cannot be sent: {}; choose another address with --to",

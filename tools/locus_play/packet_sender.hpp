@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <string>
+#include <vector>
 
+#include "drivers/lidar_input.hpp"
 #include "drivers/net/datagram.hpp"
 
 namespace locus::tools {
@@ -15,13 +16,13 @@ namespace locus::tools {
 /// far as this host has them. One owner.
 class PacketSender {
  public:
-  /// `interface`: that multicast leaves by; empty: as routed. Throws Failure.
-  PacketSender(const std::string& to, std::string interface);
+  /// `interface`: that multicast leaves by; empty: as routed. `lidars`: to tell an Ouster's packets by. Throws Failure.
+  PacketSender(const std::string& to, std::string interface, LidarRouter lidars);
   ~PacketSender();
   PacketSender(const PacketSender&) = delete;
   PacketSender& operator=(const PacketSender&) = delete;
 
-  /// The clocks in data and position packets are moved by `shift`. Throws Failure.
+  /// The clock of the lidar in the packet is moved by `shift`. Throws Failure.
   void send(const Datagram& datagram, Duration shift);
 
   [[nodiscard]] std::uint64_t sent() const { return sent_; }
@@ -34,7 +35,8 @@ class PacketSender {
   std::uint32_t to_; ///< host byte order
   std::string interface_;
   std::map<std::uint32_t, int> sockets_; ///< by the address recorded
-  std::array<std::byte, 2048> buffer_{};
+  LidarRouter lidars_;                   ///< never receives anything
+  std::vector<std::byte> packet_;        ///< at hand
   std::uint64_t sent_ = 0;
   bool changed_sender_ = false;
 };

@@ -11,8 +11,6 @@
 namespace locus::tools {
 namespace {
 
-constexpr double kLongest_s = 1e8; ///< three years
-
 Arguments::OdometryFile parse_odometry(const std::string& text) {
   const std::size_t equals = text.find('=');
   if (equals == 0 || equals == std::string::npos || equals + 1 == text.size())
@@ -29,11 +27,15 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   int threads = 0;
   double start_s = 0, duration_s = 0;
   std::string speed; // a flag with a number takes whole ones
+  constexpr auto formats = names_of(CloudFormat{});
+  std::string format{formats.front()};
 
   CLI::App app{"Recorded lidar packets in; odometry, map and figures out.", "locus-replay"};
-  app.add_option("CAPTURE", arguments.capture,
-                 "A pcap or pcapng file; a ROS 1 bag; a ROS 2 bag, its folder or a .db3 file; a drive of KITTI's "
-                 "raw data; or a folder with lidar.pcap and any of imu.csv, NAME.tum, config.yaml, gt.tum, gt_map.ply")
+  app.add_option(
+         "CAPTURE", arguments.capture,
+         "A pcap or pcapng file, packed or not, - for standard input; a ROS 1 bag; MCAP; a ROS 2 bag, its folder "
+         "or a .db3 file; a drive of KITTI's raw data or odometry benchmark; a folder of sweeps (.pcd, .bin) with "
+         "times; or a folder with lidar.pcap and any of imu.csv, NAME.tum, config.yaml, gt.tum, gt_map.ply")
       ->required();
   app.add_option("-o,--output", arguments.output,
                  "Folder for odometry.tum, odometry.csv, map.pcd, report.html and summary.json; made if need be")
@@ -54,6 +56,25 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   app.add_option("--map-truth", arguments.map_truth,
                  "True map to measure the map by, PLY or PCD; default: the folder's gt_map.ply")
       ->type_name("FILE");
+  auto* mcap =
+      app.add_option("--mcap", arguments.mcap,
+                     "Also writes odometry, tf, corrected clouds and diagnostics as messages of ROS 2 into FILE, "
+                     "for Foxglove and rosbag2")
+          ->type_name("FILE");
+  auto* sweeps =
+      app.add_option("--sweeps", arguments.sweeps,
+                     "Also writes all returns of each sweep, corrected for motion, as files into DIR, a new or empty "
+                     "folder, with times.txt and poses.txt")
+          ->type_name("DIR");
+  auto* calibrate =
+      app.add_option("--calibrate", arguments.calibrate,
+                     "Replays several times, finds how late the stamps of an IMU are, how it is turned and the scales "
+                     "of wheels, goes on with that and writes it into FILE, YAML for the configuration")
+          ->type_name("FILE");
+  app.add_option("--sweeps-format", format, "Of these files: pcd, ply or bin (KITTI's); default: pcd")
+      ->type_name("FORMAT")
+      ->check(CLI::IsMember(std::vector<std::string>(formats.begin(), formats.end())))
+      ->needs(sweeps);
   app.add_option("--start", start_s, "Leaves out what arrived earlier, seconds from the start of the capture")
       ->type_name("S")
       ->check(number_between(0, kLongest_s));
@@ -72,7 +93,10 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   auto* realtime = app.add_flag("--realtime{1}", speed,
                                 "At the pace of the recording, or SPEED times it (--realtime=SPEED), through the "
                                 "threads of the service: sweeps that come too fast are dropped")
-                       ->check(number_between(0.01, 1000));
+                       ->check(number_between(0.01, 1000))
+                       ->excludes(mcap)
+                       ->excludes(sweeps)
+                       ->excludes(calibrate);
   app.add_flag(
       "--kitti-as-published", arguments.kitti_as_published,
       "Leaves the points of a drive of KITTI as they are; default: their vertical angles are too small by 0.205 "
@@ -87,12 +111,15 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   if (!parse_command_line(app, argc, argv))
     return std::nullopt;
 
+  if (!arguments.calibrate.empty() && arguments.capture == "-")
+    throw Failure(ExitStatus::wrong_usage, "--calibrate: standard input cannot be read several times; name a file");
   for (const std::string& text : odometry)
     arguments.odometry.push_back(parse_odometry(text));
   for (const std::string& text : faults)
     arguments.faults.push_back(value_or_fail(Fault::parse(text), ExitStatus::wrong_usage));
   if (threads_option->count() > 0)
     arguments.overrides.push_back(fmt::format("threads={}", threads));
+  arguments.sweeps_format = *from_string<CloudFormat>(format);
   arguments.start = from_seconds(start_s);
   if (duration->count() > 0)
     arguments.duration = from_seconds(duration_s);

@@ -8,8 +8,11 @@
 
 #include "core/base/stamp.hpp"
 #include "faults/fault.hpp"
+#include "locus_replay/cloud_files.hpp"
 
 namespace locus::tools {
+
+inline constexpr double kLongest_s = 1e8; ///< that a recording may last: three years
 
 /// What the user asked for.
 struct Arguments {
@@ -26,6 +29,10 @@ struct Arguments {
   std::vector<OdometryFile> odometry;
   std::filesystem::path ground_truth; ///< empty: that of the capture folder
   std::filesystem::path map_truth;    ///< the same
+  std::filesystem::path mcap;         ///< to be written; empty: none
+  std::filesystem::path calibrate;    ///< the same
+  std::filesystem::path sweeps;       ///< folder to be filled; empty: none
+  CloudFormat sweeps_format = CloudFormat::pcd;
   Duration start{};
   std::optional<Duration> duration;
   std::vector<Fault> faults;

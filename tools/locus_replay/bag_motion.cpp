@@ -21,8 +21,8 @@ Stamp arrival_of(Stamp stamp, Stamp recorded) {
 /// Gathers the samples of one topic.
 class MotionTopic {
  public:
-  MotionTopic(SourceId source, std::size_t topic, BagTopic name)
-      : source_(source), topic_(topic), name_(std::move(name)) {}
+  MotionTopic(SourceId source, std::size_t topic, BagTopic name, bool beside_packets)
+      : source_(source), topic_(topic), name_(std::move(name)), beside_packets_(beside_packets) {}
 
   [[nodiscard]] std::size_t topic() const { return topic_; }
 
@@ -61,7 +61,7 @@ class MotionTopic {
     }
     Sample sample = convert(*read);
     sample.stamp = stamp_or(message.recorded, sample.stamp);
-    sample.arrival = arrival_of(sample.stamp, message.recorded);
+    sample.arrival = beside_packets_ ? arrival_of(sample.stamp, message.recorded) : message.recorded;
     samples.push_back(std::move(sample));
   }
 
@@ -73,6 +73,7 @@ class MotionTopic {
   SourceId source_;
   std::size_t topic_;
   BagTopic name_;
+  bool beside_packets_;
   std::vector<ImuSample> imu_;
   std::vector<OdometrySample> odometry_;
   daemon::UsualCovariance usual_;
@@ -83,16 +84,16 @@ class MotionTopic {
 
 std::vector<MotionRecording> read_bag_motion(Bag& bag, const std::filesystem::path& file,
                                              const std::vector<std::optional<std::size_t>>& topic_of_source,
-                                             std::vector<std::string>& warnings) {
+                                             bool beside_packets, std::vector<std::string>& warnings) {
   std::vector<MotionTopic> motion;
   for (std::size_t i = 0; i < topic_of_source.size(); ++i) {
     if (const auto topic = topic_of_source[i])
-      motion.emplace_back(SourceId{i}, *topic, bag.topics()[*topic]);
+      motion.emplace_back(SourceId{i}, *topic, bag.topics()[*topic], beside_packets);
   }
   while (const BagMessage* message = motion.empty() ? nullptr : bag.next()) {
     const auto found = std::ranges::find(motion, message->topic, &MotionTopic::topic);
     if (found != motion.end())
-      found->take(*message, {message->data, bag.serialisation()});
+      found->take(*message, {message->data, bag.topics()[message->topic].serialisation});
   }
   bag.rewind();
   std::vector<MotionRecording> recordings;

@@ -2,6 +2,8 @@
 #include "locus_replay/bag_packets.hpp"
 
 #include <algorithm>
+#include <set>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -10,6 +12,7 @@ namespace locus::tools {
 namespace {
 
 constexpr Duration kAhead = std::chrono::milliseconds{500};
+constexpr std::size_t kWithEach = 100; ///< bytes of memory that go with a packet or cloud: many may be empty
 
 } // namespace
 
@@ -17,8 +20,11 @@ BagPackets::BagPackets(std::unique_ptr<Bag> bag, std::filesystem::path file, con
                        const std::vector<std::optional<std::size_t>>& topic_of_lidar)
     : bag_(std::move(bag)), file_(std::move(file)) {
   for (std::size_t i = 0; i < topic_of_lidar.size(); ++i) {
-    if (topic_of_lidar[i])
-      lidars_.push_back({*topic_of_lidar[i], config.lidars[i].port, config.lidars[i].source_ip.value_or(0)});
+    if (const auto topic = topic_of_lidar[i]) {
+      const std::string& type = bag_->topics()[*topic].type;
+      lidars_.push_back({static_cast<std::uint8_t>(i), *topic, type, packet_type(type), config.lidars[i].port,
+                         config.lidars[i].source_ip.value_or(0)});
+    }
   }
 }
 
@@ -27,21 +33,39 @@ const Datagram* BagPackets::next() {
   const auto earliest = std::ranges::min_element(scans_, {}, &Scan::stamp);
   if (earliest == scans_.end())
     return nullptr;
-  packet_ = earliest->packets[earliest->next++];
-  datagram_ = {packet_.payload,       earliest->lidar->ip, earliest->lidar->port,
-               earliest->lidar->port, packet_.stamp,       false};
-  if (earliest->next == earliest->packets.size())
+  if (earliest->is_cloud())
+    give_cloud(*earliest);
+  else
+    give_packet(*earliest);
+  waiting_ -= bytes_.size() + kWithEach;
+  if (++earliest->next >= earliest->packets.packets.size())
     scans_.erase(earliest);
-  --waiting_;
   ++datagrams_;
   return &datagram_;
 }
 
+void BagPackets::give_packet(const Scan& scan) {
+  const auto payload = scan.packets.payload(scan.packet());
+  bytes_.assign(payload.begin(), payload.end());
+  datagram_ = {bytes_, scan.lidar->ip, scan.lidar->port, scan.lidar->port, scan.stamp(), false};
+}
+
+void BagPackets::give_cloud(Scan& scan) {
+  bytes_ = std::move(scan.cloud);
+  const Serialisation serialisation = bag_->topics()[scan.lidar->topic].serialisation;
+  cloud_ = read_cloud({bytes_, serialisation}, scan.lidar->type).value_or(CloudView{});
+  datagram_ = {};
+  datagram_.receive_stamp = scan.recorded;
+  datagram_.cloud = &cloud_;
+  datagram_.lidar = scan.lidar->index;
+}
+
 void BagPackets::read_ahead() {
-  constexpr std::size_t kMaxWaiting = 30'000; // what sixteen lidars send in that time, and 40 MB
+  constexpr std::size_t kMaxWaiting = 40'000'000; // bytes: the packets of sixteen lidars in that time
+  constexpr std::size_t kMaxScans = 10'000;       // the earliest of all is looked for with each packet
   const auto is_ahead = [&] {
-    return !scans_.empty() &&
-           (std::chrono::abs(newest_ - scans_.front().recorded) >= kAhead || waiting_ >= kMaxWaiting);
+    return !scans_.empty() && (std::chrono::abs(newest_ - scans_.front().recorded) >= kAhead ||
+                               waiting_ >= kMaxWaiting || scans_.size() >= kMaxScans);
   };
   while (!bag_is_over_ && !is_ahead()) {
     const BagMessage* message = bag_->next();
@@ -58,20 +82,37 @@ void BagPackets::take(const BagMessage& message) {
   if (lidar == lidars_.end())
     return;
   ++messages_;
-  std::optional<VelodyneScan> scan = read_velodyne_scan({message.data, bag_->serialisation()});
-  malformed_ += scan ? 0U : 1U;
-  if (!scan || scan->packets.empty())
+  if (lidar->packets == nullptr)
+    take_cloud(message, *lidar);
+  else
+    take_packets(message, *lidar);
+}
+
+void BagPackets::take_cloud(const BagMessage& message, const Lidar& lidar) {
+  if (!read_cloud({message.data, bag_->topics()[message.topic].serialisation}, lidar.type)) {
+    ++malformed_;
     return;
-  for (VelodyneScan::Packet& packet : scan->packets)
+  }
+  waiting_ += message.data.size() + kWithEach;
+  scans_.push_back({&lidar, message.recorded, {}, {message.data.begin(), message.data.end()}});
+}
+
+void BagPackets::take_packets(const BagMessage& message, const Lidar& lidar) {
+  const Serialisation serialisation = bag_->topics()[message.topic].serialisation;
+  std::optional<LidarPackets> packets = lidar.packets->read({message.data, serialisation});
+  malformed_ += packets ? 0U : 1U;
+  if (!packets || packets->packets.empty())
+    return;
+  for (LidarPackets::Packet& packet : packets->packets)
     packet.stamp = stamp_or(message.recorded, packet.stamp);
-  waiting_ += scan->packets.size();
-  scans_.push_back({&*lidar, message.recorded, std::move(scan->packets)});
+  waiting_ += packets->bytes.size() + kWithEach * packets->packets.size();
+  scans_.push_back({&lidar, message.recorded, *std::move(packets), {}});
 }
 
 std::string BagPackets::why_none() const {
-  return fmt::format("no whole packet in {} messages of type {}; record the topic of the lidar's driver, mostly "
-                     "/velodyne_packets",
-                     messages_, kVelodyneScanType);
+  return fmt::format("no whole packet or cloud in {} messages of type {}; record the topic of the lidar's driver, "
+                     "mostly /velodyne_packets",
+                     messages_, types());
 }
 
 std::vector<std::string> BagPackets::warnings() const {
@@ -79,14 +120,23 @@ std::vector<std::string> BagPackets::warnings() const {
   if (misplaced_ > 0)
     lines.push_back(fmt::format("{}: the time of reception goes back {} times from one message to the next: the "
                                 "recorder's clock was set, or the bag is not in order, and what was made of it is "
-                                "wrong; sort it with: rosbag filter BAG SORTED_BAG True",
+                                "wrong; sort it with: rosbag filter BAG SORTED_BAG True, or mcap sort BAG -o "
+                                "SORTED_BAG",
                                 file_.string(), misplaced_));
   if (malformed_ > 0)
     lines.push_back(
         fmt::format("{}: {} of {} messages of type {} are cut short, or not serialised as little-endian, and "
                     "were left out; record again if it matters",
-                    file_.string(), malformed_, messages_, kVelodyneScanType));
+                    file_.string(), malformed_, messages_, types()));
   return lines;
+}
+
+/// Of the messages of all lidars.
+std::string BagPackets::types() const {
+  std::set<std::string_view> types;
+  for (const Lidar& lidar : lidars_)
+    types.insert(lidar.type);
+  return fmt::format("{}", fmt::join(types, ", "));
 }
 
 } // namespace locus::tools

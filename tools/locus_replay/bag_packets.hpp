@@ -13,12 +13,13 @@
 #include "bags/bag.hpp"
 #include "bags/messages.hpp"
 #include "config/config.hpp"
+#include "drivers/clouds/cloud_view.hpp"
 #include "drivers/net/datagram.hpp"
 
 namespace locus::tools {
 
 /// The packets in a bag as the datagrams that they were: to the port and from the address that the configuration has
-/// for their lidar, received when the driver says.
+/// for their lidar, received when the driver says. Clouds are received when the recorder says.
 ///
 /// A message holds the packets of a whole turn. So that those of several lidars come in the order of their reception,
 /// messages are read half a second ahead. One owner.
@@ -36,30 +37,42 @@ class BagPackets : public DatagramSource {
 
  private:
   struct Lidar {
+    std::uint8_t index;
     std::size_t topic;
+    std::string type;          ///< of its messages
+    const PacketType* packets; ///< the same; nullptr: clouds
     std::uint16_t port;
     std::uint32_t ip;
   };
   struct Scan {
     const Lidar* lidar;
     Stamp recorded;
-    std::vector<VelodyneScan::Packet> packets;
-    std::size_t next = 0; ///< to be given out; before the end
+    LidarPackets packets;
+    std::vector<std::byte> cloud; ///< in place of packets: the message
+    std::size_t next = 0;         ///< to be given out; before the end
 
-    [[nodiscard]] Stamp stamp() const { return packets[next].stamp; }
+    [[nodiscard]] bool is_cloud() const { return packets.packets.empty(); }
+    [[nodiscard]] const LidarPackets::Packet& packet() const { return packets.packets[next]; }
+    [[nodiscard]] Stamp stamp() const { return is_cloud() ? recorded : packet().stamp; }
   };
 
   void read_ahead();
   void take(const BagMessage& message);
+  void take_packets(const BagMessage& message, const Lidar& lidar);
+  void take_cloud(const BagMessage& message, const Lidar& lidar);
+  void give_packet(const Scan& scan);
+  void give_cloud(Scan& scan);
+  [[nodiscard]] std::string types() const;
 
   std::unique_ptr<Bag> bag_;
   std::filesystem::path file_;
   std::vector<Lidar> lidars_;
   std::deque<Scan> scans_;  ///< read, not given out yet; as they lie in the bag
-  std::size_t waiting_ = 0; ///< packets of them
+  std::size_t waiting_ = 0; ///< bytes of memory that they take
   Stamp newest_;            ///< when the latest message was recorded
   bool bag_is_over_ = false;
-  VelodyneScan::Packet packet_{};
+  std::vector<std::byte> bytes_; ///< of what is given out
+  CloudView cloud_;
   Datagram datagram_;
   std::uint64_t datagrams_ = 0, messages_ = 0, malformed_ = 0;
   std::uint64_t misplaced_ = 0; ///< messages that were received well before the one that lies before them

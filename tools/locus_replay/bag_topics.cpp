@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "bags/messages.hpp"
+#include "drivers/clouds/cloud_view.hpp"
 #include "locus_replay/failure.hpp"
 
 namespace locus::tools {
@@ -22,12 +23,14 @@ using Index = std::optional<std::size_t>;
 
 std::string_view type_of(SourceKind kind) { return kind == SourceKind::imu ? kImuType : kOdometryType; }
 
-/// Deals the topics of one type out to those that want one.
+bool is_of_lidar(const BagTopic& topic) { return are_packets_decoded(topic.type); }
+
+/// Deals the topics of one kind out to those that want one.
 class Dealer {
  public:
-  Dealer(const Topics& topics, std::string_view type) : topics_(topics) {
+  template <class IsOfKind> Dealer(const Topics& topics, const IsOfKind& is_of_kind) : topics_(topics) {
     for (std::size_t i = 0; i < topics.size(); ++i) {
-      if (topics[i].type == type)
+      if (is_of_kind(topics[i]))
         left_.push_back(i);
     }
   }
@@ -91,28 +94,24 @@ std::string all_of(const Topics& topics) {
 }
 
 /// Which topics hold packets of lidars that are not decoded; empty without any.
-std::string other_makers(const Topics& topics) {
-  struct Package {
-    std::string_view name, maker;
-  };
-  constexpr std::array kPackages{Package{"pandar_msgs/", "Hesai"}, Package{"hesai_ros_driver/", "Hesai"},
-                                 Package{"ouster_ros/", "Ouster"}, Package{"ouster_sensor_msgs/", "Ouster"}};
+std::string not_decoded(const Topics& topics) {
   std::vector<std::string> found;
   for (const BagTopic& topic : topics) {
-    const auto package =
-        std::ranges::find_if(kPackages, [&](const Package& p) { return topic.type.starts_with(p.name); });
-    if (package != kPackages.end())
-      found.push_back(fmt::format("{} ({}) is of a lidar of {}", topic.name, topic.type, package->maker));
+    if (const PacketType* const type = packet_type(topic.type))
+      found.push_back(fmt::format("{} ({}) is of a lidar of {}, whose packets are not read from bags", topic.name,
+                                  topic.type, type->maker));
   }
   return fmt::format("{}", fmt::join(found, ", "));
 }
 
-std::vector<Index*> places_of(std::vector<Index>& places) {
-  std::vector<Index*> all;
-  all.reserve(places.size());
-  for (Index& place : places)
-    all.push_back(&place);
-  return all;
+/// The types that are.
+std::string decoded_types() {
+  std::vector<std::string_view> names;
+  for (const PacketType& type : packet_types()) {
+    if (type.read != nullptr)
+      names.push_back(type.name);
+  }
+  return fmt::format("{}", fmt::join(names, ", "));
 }
 
 /// A topic that is none of the defaults is meant.
@@ -123,41 +122,97 @@ bool is_named(const std::string& topic) {
   });
 }
 
-void deal_lidars(const Bag& bag, const std::string& bag_name, const Config& config, BagTopics& chosen) {
-  Dealer dealer(bag.topics(), kVelodyneScanType);
-  if (dealer.left() == 0) {
-    const std::string others = other_makers(bag.topics());
-    throw Failure(ExitStatus::failed,
-                  others.empty()
-                      ? fmt::format("{}: no {} in it, but {}; record the lidar's packets, mostly on /velodyne_packets",
-                                    bag_name, kVelodyneScanType, all_of(bag.topics()))
-                      : fmt::format("{}: {}; only Velodyne's packets ({}) are decoded, so record those of one",
-                                    bag_name, others, kVelodyneScanType));
+/// To the lidars that give clouds.
+void deal_clouds(const Bag& bag, const std::string& bag_name, const Config& config, BagTopics& chosen) {
+  const Topics& topics = bag.topics();
+  for (std::size_t i = 0; i < config.lidars.size(); ++i) {
+    const std::string& topic = config.lidars[i].topic;
+    if (topic.empty())
+      continue;
+    const auto found = std::ranges::find_if(
+        topics, [&](const BagTopic& t) { return is_same_topic(t.name, topic) && is_cloud_type(t.type); });
+    if (found != topics.end())
+      chosen.of_lidar[i] = static_cast<std::size_t>(found - topics.begin());
+    else
+      chosen.doubts.push_back(fmt::format("{}: lidar {}: no clouds on {}, but {}; name its topic with --set "
+                                          "lidars.{}.topic=TOPIC",
+                                          bag_name, config.lidars[i].name, topic, all_of(topics), i));
   }
-  chosen.of_lidar.resize(config.lidars.size());
+}
+
+/// How to take the clouds in a bag without packets; empty without any.
+std::string clouds_instead(const Topics& topics) {
+  const auto cloud = std::ranges::find_if(topics, [](const BagTopic& topic) { return is_cloud_type(topic.type); });
+  return cloud == topics.end() ? ""
+                               : fmt::format("{} ({}) has clouds of a lidar; take them with --set lidars.0.topic={}",
+                                             cloud->name, cloud->type, cloud->name);
+}
+
+Index first_of_packets(const Config& config) {
+  const auto found = std::ranges::find_if(config.lidars, [](const LidarOptions& l) { return !l.gives_clouds(); });
+  return found == config.lidars.end() ? std::nullopt
+                                      : std::optional{static_cast<std::size_t>(found - config.lidars.begin())};
+}
+
+[[noreturn]] void fail_without_packets(const Topics& topics, const std::string& bag_name) {
+  if (const std::string instead = clouds_instead(topics); !instead.empty())
+    throw Failure(ExitStatus::failed, fmt::format("{}: no {} in it, but {}", bag_name, decoded_types(), instead));
+  const std::string others = not_decoded(topics);
+  throw Failure(ExitStatus::failed,
+                others.empty()
+                    ? fmt::format("{}: no {} in it, but {}; record the lidar's packets, mostly on /velodyne_packets",
+                                  bag_name, decoded_types(), all_of(topics))
+                    : fmt::format("{}: {}; only those of Velodyne are ({}), so record those of one", bag_name, others,
+                                  decoded_types()));
+}
+
+/// To the lidars that send packets, `first` of them the first.
+void deal_packets(Dealer& dealer, const std::string& bag_name, const Config& config, std::size_t first,
+                  BagTopics& chosen) {
+  std::vector<Index*> places;
+  for (std::size_t i = 0; i < config.lidars.size(); ++i) {
+    if (!config.lidars[i].gives_clouds())
+      places.push_back(&chosen.of_lidar[i]);
+  }
   for (const auto is_in : {&is_segment, &is_part}) {
-    for (const std::size_t i : longest_name_first(config.lidars))
-      dealer.deal(chosen.of_lidar[i], [&](const std::string& topic) { return is_in(config.lidars[i].name, topic); });
+    for (const std::size_t i : longest_name_first(config.lidars)) {
+      if (!config.lidars[i].gives_clouds())
+        dealer.deal(chosen.of_lidar[i], [&](const std::string& topic) { return is_in(config.lidars[i].name, topic); });
+    }
   }
-  dealer.finish(places_of(chosen.of_lidar));
+  dealer.finish(places);
   if (std::ranges::none_of(chosen.of_lidar, [](const Index& topic) { return topic.has_value(); }))
     throw Failure(ExitStatus::wrong_usage,
                   fmt::format("{}: it is not clear which of {} is lidar {}; give it a name that is part of one with "
-                              "--set lidars.0.name=NAME",
-                              bag_name, dealer.names_left(), config.lidars.front().name));
+                              "--set lidars.{}.name=NAME",
+                              bag_name, dealer.names_left(), config.lidars[first].name, first));
   for (std::size_t i = 0; i < config.lidars.size(); ++i) {
-    if (!chosen.of_lidar[i] && dealer.left() > 0)
+    if (!chosen.of_lidar[i] && !config.lidars[i].gives_clouds() && dealer.left() > 0)
       chosen.doubts.push_back(fmt::format("{}: lidar {}: it is not clear whether it is one of {}; give it a name that "
                                           "is part of one with --set lidars.{}.name=NAME",
                                           bag_name, config.lidars[i].name, dealer.names_left(), i));
   }
 }
 
+void deal_lidars(const Bag& bag, const std::string& bag_name, const Config& config, BagTopics& chosen) {
+  chosen.of_lidar.resize(config.lidars.size());
+  deal_clouds(bag, bag_name, config, chosen);
+  const bool has_clouds = std::ranges::any_of(chosen.of_lidar, [](const Index& topic) { return topic.has_value(); });
+  const Index first = first_of_packets(config);
+  if (!first && !has_clouds)
+    throw Failure(ExitStatus::wrong_usage, chosen.doubts.front());
+  Dealer dealer(bag.topics(), is_of_lidar);
+  if (dealer.left() == 0 && !has_clouds)
+    fail_without_packets(bag.topics(), bag_name);
+  if (first && dealer.left() > 0)
+    deal_packets(dealer, bag_name, config, *first, chosen);
+}
+
 void deal_sources(const Bag& bag, const std::string& bag_name, const Config& config,
                   const std::function<bool(SourceId)>& has_file, SourceKind kind, BagTopics& chosen) {
   const std::vector<MotionSource>& sources = config.motion_sources;
   const auto is_wanted = [&](std::size_t i) { return sources[i].kind == kind && !has_file(SourceId{i}); };
-  Dealer dealer(bag.topics(), type_of(kind));
+  Dealer dealer(bag.topics(), [kind](const BagTopic& topic) { return topic.type == type_of(kind); });
   std::vector<Index*> nameless;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     if (!is_wanted(i))
@@ -191,7 +246,8 @@ std::string describe(const Bag& bag, const std::string& bag_name, const Config& 
     take(config.motion_sources[i].name, chosen.of_source[i]);
   for (std::size_t i = 0; i < bag.topics().size(); ++i) {
     const BagTopic& topic = bag.topics()[i];
-    if (!is_taken[i] && (topic.type == kVelodyneScanType || topic.type == kImuType || topic.type == kOdometryType))
+    if (!is_taken[i] &&
+        (is_of_lidar(topic) || is_cloud_type(topic.type) || topic.type == kImuType || topic.type == kOdometryType))
       left_out.push_back(topic.name);
   }
   return fmt::format("{}: {}{}{}", bag_name, fmt::join(taken, ", "),

@@ -15,8 +15,9 @@ namespace locus::tools {
 
 /// Which topics of a bag speak for the lidars and the motion sources of a configuration: indices in Bag::topics().
 ///
-/// A lidar's is the one of velodyne_msgs/VelodyneScan that has the lidar's name in it, as a part between slashes sooner
-/// than within one; a motion source's the one that the configuration names. Where one lidar is left without, and one
+/// A lidar of clouds has the topic that the configuration names. A lidar of packets (PacketType) has the one with its
+/// name in it, as a part between slashes sooner than within one; a motion source the one that the configuration names.
+/// Where one lidar is left without, and one
 /// topic, they are taken for each other, and likewise of the motion sources of a kind whose topics are the defaults.
 struct BagTopics {
   std::vector<std::optional<std::size_t>> of_lidar;  ///< by index in the configuration

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "locus_replay/lidar_doubts.hpp"
-#include "daemon/figures.hpp"
 #include "drivers/net/datagram.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include <fmt/format.h>
@@ -21,10 +22,19 @@ std::string rejections(const PacketCounters& counters) {
   return fmt::format("{}", fmt::join(reasons, ", "));
 }
 
+std::string refusals(const CloudCounters& counters) {
+  std::vector<std::string> reasons;
+  for (std::size_t i = 0; i < kCloudErrors; ++i) {
+    if (counters.refused[i] > 0)
+      reasons.push_back(fmt::format("{} {}", to_string(static_cast<CloudError>(i)), counters.refused[i]));
+  }
+  return fmt::format("{}", fmt::join(reasons, ", "));
+}
+
 /// Of what model the packets say that they are, where it is unknown.
 std::string unknown_model(const LidarInput& lidar) {
-  const auto unknown = lidar.decoder().unknown_packets();
-  return unknown ? fmt::format(" ({})", velodyne::to_string(*unknown)) : "";
+  const auto unknown = lidar.unknown_packets();
+  return unknown ? fmt::format(" ({})", to_string(*unknown)) : "";
 }
 
 bool is_configured(const LidarRouter& lidars, std::uint16_t port) {
@@ -32,9 +42,11 @@ bool is_configured(const LidarRouter& lidars, std::uint16_t port) {
 }
 
 /// The model that the packets of a lidar speak of, where it is another than the configured one.
-std::optional<velodyne::Model> other_model(const LidarInput& lidar) {
-  const auto recognised = lidar.decoder().recognised_model();
-  return lidar.options().model && recognised != lidar.options().model ? recognised : std::nullopt;
+std::optional<std::string_view> other_model(const LidarInput& lidar) {
+  const std::string_view recognised = lidar.recognised_model();
+  const bool is_other = !configured_model(lidar.options()).empty() && !recognised.empty() &&
+                        recognised != configured_model(lidar.options());
+  return is_other ? std::optional{recognised} : std::nullopt;
 }
 
 /// The faults that can keep every packet of a lidar back, as --fail has them.
@@ -55,7 +67,49 @@ bool lost_by_request(const LidarInput& lidar, const Recording& recording) {
          std::ranges::any_of(recording.traffic(), listens);
 }
 
+std::uint64_t of_length(const PortTraffic& traffic, std::size_t bytes) {
+  const auto found = traffic.by_length.find(bytes);
+  return found == traffic.by_length.end() ? 0 : found->second;
+}
+
+/// The lengths that data packets of the lidars have.
+std::set<std::size_t> data_packet_lengths(const LidarRouter& lidars) {
+  std::set<std::size_t> lengths;
+  for (const LidarInput& lidar : lidars.lidars())
+    if (!lidar.options().gives_clouds()) {
+      const PacketLengths of_lidar = lidar.packet_lengths();
+      lengths.insert(of_lidar.of_data().begin(), of_lidar.of_data().end());
+    }
+  return lengths;
+}
+
+/// Those that could be data packets of a lidar by their length.
+std::uint64_t data_packet_sized(const PortTraffic& traffic, const std::set<std::size_t>& lengths) {
+  std::uint64_t datagrams = 0;
+  for (const std::size_t length : lengths)
+    datagrams += of_length(traffic, length);
+  return datagrams;
+}
+
+/// Whether datagrams came to an Ouster, and none fitted its metadata. A configured address that they do not come from
+/// is another matter.
+bool fits_no_packet(const LidarInput& lidar) {
+  const PacketCounters& counters = lidar.counters();
+  return lidar.options().is_ouster() && counters.data == 0 && !rejections(counters).empty() &&
+         !(lidar.options().source_ip && counters[PacketError::sender] > 0);
+}
+
+std::string metadata_of_another(const LidarInput& lidar) {
+  const PacketCounters& counters = lidar.counters();
+  return fmt::format("{} datagrams to port {} of lidar {}, rejected: {}; is {} the metadata of this sensor, as it was "
+                     "set then?",
+                     counters.received - counters.position, lidar.options().port, lidar.options().name,
+                     rejections(counters), lidar.options().metadata);
+}
+
 std::string not_heard(const LidarInput& lidar, const Recording& recording, const LidarRouter& lidars) {
+  if (fits_no_packet(lidar))
+    return metadata_of_another(lidar);
   const LidarOptions& options = lidar.options();
   std::string line = fmt::format("lidar {}: no valid data packet to port {}", options.name, options.port);
   if (options.source_ip)
@@ -63,16 +117,22 @@ std::string not_heard(const LidarInput& lidar, const Recording& recording, const
   if (const std::string rejected = rejections(lidar.counters()); !rejected.empty())
     return fmt::format("{}, rejected: {}{}; check its address and model", line, rejected, unknown_model(lidar));
   for (const auto& [port, traffic] : recording.traffic()) {
-    if (traffic.data_packet_sized > 0 && !is_configured(lidars, port))
+    const PacketLengths lengths = lidar.packet_lengths();
+    const std::uint64_t packets = data_packet_sized(traffic, {lengths.of_data().begin(), lengths.of_data().end()});
+    if (packets > 0 && !is_configured(lidars, port))
       return fmt::format("{}; {} packets went to port {}: if they are its own, use --set lidars.{}.port={}", line,
-                         traffic.data_packet_sized, port, options.name, port);
+                         packets, port, options.name, port);
   }
   return line + "; check its port and address, or take it out of the configuration";
 }
 
 /// Whose packets these are, where most that could be a lidar's look like another maker's.
-std::string other_makers(const std::map<std::uint16_t, PortTraffic>& traffic) {
+std::string other_makers(const std::map<std::uint16_t, PortTraffic>& traffic, const LidarRouter& lidars) {
+  const bool has_ouster =
+      std::ranges::any_of(lidars.lidars(), [](const auto& one) { return one.options().is_ouster(); });
   for (const OtherMaker maker : {OtherMaker::hesai, OtherMaker::ouster}) {
+    if (maker == OtherMaker::ouster && has_ouster)
+      continue;
     const auto packets_of = [&](const auto& entry) {
       return entry.second.of_other_maker[static_cast<std::size_t>(maker)];
     };
@@ -80,12 +140,19 @@ std::string other_makers(const std::map<std::uint16_t, PortTraffic>& traffic) {
     std::uint64_t packets = 0, velodyne = 0;
     for (const auto& entry : traffic) {
       packets += packets_of(entry);
-      velodyne += entry.second.data_packet_sized;
+      velodyne += of_length(entry.second, velodyne::kDataPacketBytes);
     }
+    if (packets > velodyne && maker == OtherMaker::ouster)
+      return fmt::format(
+          "{} packets look like those of a lidar of Ouster (most go to port {}, the last of them with {} "
+          "bytes), and its metadata is not beside the capture; fetch it, as it was set then: locusctl "
+          "fetch SENSOR -o drive.json for a drive.pcap, or name it: --set "
+          "lidars.0.metadata=FILE --set lidars.0.port={}",
+          packets, port, busiest.bytes, port);
     if (packets > velodyne)
-      return fmt::format("{} packets look like those of a lidar of {} (most go to port {}, the last of them with {} "
-                         "bytes); only Velodyne's are decoded, so record one of those",
-                         packets, to_string(maker), port, busiest.bytes);
+      return fmt::format("{} packets look like those of a Hesai {} (most go to port {}, the last of them with {} "
+                         "bytes), which are not read; record clouds of its driver, or another lidar",
+                         packets, busiest.hesai, port, busiest.bytes);
   }
   return "";
 }
@@ -103,53 +170,100 @@ std::string why_no_data(const Recording& recording, const LidarRouter& lidars) {
   const std::map<std::uint16_t, PortTraffic>& traffic = recording.traffic();
   if (traffic.empty())
     return without_datagrams(recording.source());
-  if (std::string maker = other_makers(traffic); !maker.empty())
+  if (std::string maker = other_makers(traffic, lidars); !maker.empty())
     return maker;
-  const auto& [port, busiest] = *std::ranges::max_element(
-      traffic, {}, [](const auto& entry) { return std::pair(entry.second.data_packet_sized, entry.second.datagrams); });
+  if (const auto refused = std::ranges::find_if(lidars.lidars(), fits_no_packet); refused != lidars.lidars().end())
+    return metadata_of_another(*refused);
+  const std::set<std::size_t> lengths = data_packet_lengths(lidars);
+  const auto& [port, busiest] = *std::ranges::max_element(traffic, {}, [&](const auto& entry) {
+    return std::pair(data_packet_sized(entry.second, lengths), entry.second.datagrams);
+  });
+  const std::uint64_t packets = data_packet_sized(busiest, lengths);
   const LidarOptions& first = lidars.lidars().front().options();
-  if (busiest.data_packet_sized == 0)
-    return fmt::format("none of its UDP datagrams has the size of a data packet, 1206 bytes; most ({}) go to port {}; "
+  const auto of_other_model = [&, port = port](std::uint64_t datagrams) {
+    const auto model = other_model(lidars.lidars().front());
+    return model ? fmt::format("{} packets to port {}, those of a {}, configured {}; use --set lidars.0.model=auto",
+                               datagrams, port, *model, configured_model(first))
+                 : "";
+  };
+  if (std::string other = of_other_model(busiest.datagrams); packets == 0 && !other.empty())
+    return other;
+  if (packets == 0)
+    return fmt::format("none of its UDP datagrams has the size of a data packet, {} bytes; most ({}) go to port {}; "
                        "record the lidar's data port",
-                       busiest.datagrams, port);
+                       fmt::join(lengths, " or "), busiest.datagrams, port);
   if (!is_configured(lidars, port))
-    return fmt::format("{} packets to port {}, configured {}; use --set lidars.0.port={}", busiest.data_packet_sized,
-                       port, first.port, port);
+    return fmt::format("{} packets to port {}, configured {}; use --set lidars.0.port={}", packets, port, first.port,
+                       port);
   const LidarInput& lidar =
       *std::ranges::find_if(lidars.lidars(), [port = port](const LidarInput& l) { return l.listens_to(port); });
   if (lost_by_request(lidar, recording))
     return fmt::format("--fail {} keeps all {} packets to port {} back; let some through, for example with @10-20",
-                       fmt::join(losses_of(lidar, recording), " and "), busiest.data_packet_sized, port);
+                       fmt::join(losses_of(lidar, recording), " and "), packets, port);
   const PacketCounters total = lidars.total();
   if (first.source_ip && total[PacketError::sender] > 0)
-    return fmt::format("{} packets to port {} come from {}, configured {}; use --set lidars.0.source_ip={}",
-                       busiest.data_packet_sized, port, dotted(busiest.source_ip), dotted(*first.source_ip),
-                       dotted(busiest.source_ip));
-  if (const auto model = other_model(lidars.lidars().front()))
-    return fmt::format("{} packets to port {}, those of a {}, configured {}; use --set lidars.0.model=auto",
-                       busiest.data_packet_sized, port, to_string(*model), to_string(*first.model));
-  return fmt::format("{} packets to port {}, rejected: {}{}; is it a Velodyne, and lidars.0.model the right one?",
-                     busiest.data_packet_sized, port, rejections(total), unknown_model(lidar));
+    return fmt::format("{} packets to port {} come from {}, configured {}; use --set lidars.0.source_ip={}", packets,
+                       port, dotted(busiest.source_ip), dotted(*first.source_ip), dotted(busiest.source_ip));
+  if (std::string other = of_other_model(packets); !other.empty())
+    return other;
+  return fmt::format("{} packets to port {}, rejected: {}{}; is it a lidar whose packets can be read, and "
+                     "lidars.0.model the right one?",
+                     packets, port, rejections(total), unknown_model(lidar));
+}
+
+std::string why_no_clouds(const daemon::Figures& figures) {
+  std::vector<std::string> lines;
+  for (std::size_t i = 0; i < figures.config.lidars.size(); ++i) {
+    const auto& clouds = figures.ingest.lidars[i].clouds;
+    if (clouds && clouds->counters.received > 0)
+      lines.push_back(fmt::format("{} clouds on {}, refused: {}; take another topic, or look at what its driver "
+                                  "publishes",
+                                  clouds->counters.received, figures.config.lidars[i].topic,
+                                  refusals(clouds->counters)));
+  }
+  return fmt::format("{}", fmt::join(lines, "; "));
+}
+
+std::vector<std::string> cloud_warnings(const daemon::Figures& figures) {
+  std::vector<std::string> warnings;
+  for (std::size_t i = 0; i < figures.config.lidars.size(); ++i) {
+    const LidarOptions& options = figures.config.lidars[i];
+    const daemon::IngestReport::Lidar& lidar = figures.ingest.lidars[i];
+    if (!lidar.clouds)
+      continue;
+    const CloudCounters& counters = lidar.clouds->counters;
+    if (counters.received == 0)
+      warnings.push_back(fmt::format("lidar {}: no cloud on {}; name its topic, or take it out of the configuration",
+                                     options.name, options.topic));
+    else if (counters.used < counters.received)
+      warnings.push_back(fmt::format("lidar {}: {} of {} clouds on {} refused: {}", options.name,
+                                     counters.received - counters.used, counters.received, options.topic,
+                                     refusals(counters)));
+    std::ranges::move(daemon::cloud_doubts(options, lidar), std::back_inserter(warnings));
+  }
+  return warnings;
 }
 
 std::vector<std::string> lidar_warnings(const Recording& recording, const LidarRouter& lidars,
                                         const SweepOptions& sweeps) {
   std::vector<std::string> warnings;
   for (const LidarInput& lidar : lidars.lidars()) {
+    if (lidar.options().gives_clouds())
+      continue;
     if (lidar.counters().data == 0 && !lost_by_request(lidar, recording))
       warnings.push_back(not_heard(lidar, recording, lidars));
     if (const auto model = other_model(lidar))
       warnings.push_back(fmt::format("lidar {0}: configured as {1}, but its packets are those of a {2}, and read as a "
                                      "{1}'s they make a wrong world; use --set lidars.{0}.model=auto",
-                                     lidar.options().name, to_string(*lidar.options().model), to_string(*model)));
+                                     lidar.options().name, configured_model(lidar.options()), *model));
     const auto report = daemon::IngestReport::Lidar::of(lidar);
     if (auto warning = report.packets.data > 0 ? daemon::unknown_model(lidar.options(), report) : std::nullopt)
       warnings.push_back(std::move(*warning));
     if (auto warning = daemon::shared_port(lidar.options(), report))
       warnings.push_back(std::move(*warning));
-    if (auto warning = lidar.decoder().model()
-                           ? daemon::short_sweep(sweeps, lidar.options().name, lidar.decoder().rotation_rate_rpm())
-                           : std::nullopt)
+    if (auto warning = daemon::stale_metadata(lidar.options(), report))
+      warnings.push_back(std::move(*warning));
+    if (auto warning = daemon::short_sweep(sweeps, lidar.options().name, report.rotation_rate_rpm))
       warnings.push_back(std::move(*warning));
   }
   return warnings;

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/figures.hpp"
 #include "drivers/lidar_input.hpp"
 #include "locus_replay/recording.hpp"
 
@@ -16,5 +17,11 @@ std::string why_no_data(const Recording& recording, const LidarRouter& lidars);
 /// was not heard though others were, one whose packets are another model's, one that turns more slowly than sweeps end.
 std::vector<std::string> lidar_warnings(const Recording& recording, const LidarRouter& lidars,
                                         const SweepOptions& sweeps);
+
+/// Why no cloud was used though some came; empty where none came, or some were used.
+std::string why_no_clouds(const daemon::Figures& figures);
+
+/// What is wrong with the clouds of each lidar, a line each.
+std::vector<std::string> cloud_warnings(const daemon::Figures& figures);
 
 } // namespace locus::tools

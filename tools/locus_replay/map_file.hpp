@@ -8,8 +8,7 @@
 
 namespace locus::tools {
 
-/// Writes the surfaces of a map as a binary PCD. By hand, for this is all of PCD that is needed and libpcl-io brings
-/// VTK. Throws Failure.
+/// Writes the surfaces of a map as a binary PCD. Throws Failure.
 void write_map(const std::filesystem::path& path, std::span<const SurfacePoint> points);
 
 } // namespace locus::tools

@@ -37,8 +37,8 @@ std::vector<MotionFile> motion_files(const Arguments& arguments, const CaptureFo
 
 /// The source that a file speaks for: the first one of kind imu, or the odometry of this name.
 std::optional<SourceId> source_of(const MotionFile& file, const std::vector<MotionSource>& sources) {
-  const auto found = std::ranges::find_if(sources, [&](const MotionSourceOptions& source) {
-    return source.kind == file.kind && (file.kind == SourceKind::imu || source.name == file.name);
+  const auto found = std::ranges::find_if(sources, [&](const MotionSource& source) {
+    return source.kind == file.kind && !source.of_lidar && (file.kind == SourceKind::imu || source.name == file.name);
   });
   return found == sources.end() ? std::nullopt
                                 : std::optional{SourceId{static_cast<std::size_t>(found - sources.begin())}};
@@ -94,7 +94,7 @@ std::vector<MotionRecording> read_motion(const Arguments& arguments, const Captu
       warnings.push_back(without_source(file) + "; left out");
   }
   for (std::size_t i = 0; config_is_users_own && i < sources.size(); ++i) {
-    if (!is_read(SourceId{i}))
+    if (!is_read(SourceId{i}) && !sources[i].of_lidar)
       warnings.push_back(without_file(sources[i]));
   }
   return recordings;

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "drivers/files/motion_files.hpp"
+#include "locus_replay/prior_name.hpp"
 
 namespace locus::tools {
 namespace {
@@ -37,21 +38,10 @@ OdometryFiles::OdometryFiles(const std::filesystem::path& folder, const std::vec
   csv_.print("{}\n", csv_header(source_names_));
 }
 
-/// What the rotation came from and what the translation, once if it is the same.
-std::string OdometryFiles::name_of(const PriorSource& prior) const {
-  const auto name = [&](std::optional<SourceId> source) -> std::string {
-    if (source)
-      return source_names_[index_of(*source)];
-    return prior.otherwise == NoSourcePrior::constant_velocity ? "constant_velocity" : "identity";
-  };
-  return prior.rotation == prior.translation ? name(prior.rotation)
-                                             : name(prior.rotation) + '+' + name(prior.translation);
-}
-
 void OdometryFiles::write(const OdometryEstimate& estimate) {
   const std::int64_t ns = to_ns(estimate.stamp);
   tum_.print("{}", to_line({estimate.stamp, estimate.T_odom_base}));
-  csv_.print("{},{},{},{},{}", ns, to_string(estimate.state), name_of(estimate.prior),
+  csv_.print("{},{},{},{},{}", ns, to_string(estimate.state), name_of(estimate.prior, source_names_),
              estimate.scan_to_submap.iterations, estimate.scan_to_submap.inliers);
   for (int row = 0; row < 6; ++row) {
     for (int column = 0; column < 6; ++column)

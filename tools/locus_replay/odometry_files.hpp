@@ -21,8 +21,6 @@ class OdometryFiles {
   void close();
 
  private:
-  [[nodiscard]] std::string name_of(const PriorSource& prior) const;
-
   std::vector<std::string> source_names_;
   OutputFile tum_;
   OutputFile csv_;

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <span>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -15,13 +16,14 @@
 
 namespace locus::tools {
 
-/// A folder for output, and those above it; whether or not it is there already. Throws Failure.
-inline void make_folder(const std::filesystem::path& folder) {
+/// A folder for output, and those above it; whether or not it is there already. `option`: that it was named with.
+/// Throws Failure.
+inline void make_folder(const std::filesystem::path& folder, std::string_view option = "-o") {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error)
-    throw Failure(ExitStatus::failed, fmt::format("{}: the folder cannot be made ({}); choose another with -o",
-                                                  folder.string(), error.message()));
+    throw Failure(ExitStatus::failed, fmt::format("{}: the folder cannot be made ({}); choose another with {}",
+                                                  folder.string(), error.message(), option));
 }
 
 /// A file that was written in full when close() returns. Throws Failure.
@@ -32,8 +34,10 @@ class OutputFile {
   template <class... Values> void print(fmt::format_string<Values...> format, Values&&... values) {
     fmt::print(stream_, format, std::forward<Values>(values)...);
   }
+  /// Throws where an earlier write failed already.
   void write(std::span<const std::byte> bytes) {
     stream_.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    check();
   }
   /// What is written next replaces what was written first.
   void rewind() { stream_.seekp(0); }
@@ -41,6 +45,7 @@ class OutputFile {
     stream_.close();
     check();
   }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
  private:
   void check() const {

@@ -16,6 +16,9 @@
 #include "locus_replay/bag_topics.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/kitti_packets.hpp"
+#include "locus_replay/sweep_clouds.hpp"
+#include "sweep_folder/sweep_folder.hpp"
+#include "unpacking/unpacking_stream.hpp"
 
 namespace locus::tools {
 namespace {
@@ -29,9 +32,11 @@ RecordedInput open_bag_input(const Arguments& arguments, const std::filesystem::
   };
   const BagTopics topics = BagTopics::choose(*bag, file.string(), config, has_file);
   std::ranges::copy(topics.doubts, std::back_inserter(warnings));
-  std::ranges::move(read_bag_motion(*bag, file, topics.of_source, warnings), std::back_inserter(motion));
+  const bool has_packets =
+      std::ranges::any_of(config.lidars, [](const LidarOptions& lidar) { return !lidar.gives_clouds(); });
+  std::ranges::move(read_bag_motion(*bag, file, topics.of_source, has_packets, warnings), std::back_inserter(motion));
   for (std::size_t i = 0; config_is_users_own && topics.doubts.empty() && i < topics.of_source.size(); ++i) {
-    if (!has_file(SourceId{i}))
+    if (!has_file(SourceId{i}) && !config.motion_sources[i].of_lidar)
       warnings.push_back(fmt::format("{}: motion source {}: never heard from, nothing of its kind in the bag",
                                      file.string(), config.motion_sources[i].name));
   }
@@ -71,26 +76,65 @@ RecordedInput open_drive_input(const Arguments& arguments, const std::filesystem
   return input;
 }
 
+RecordedInput open_sweeps_input(const Arguments& arguments, const CaptureFolder& folder, const Config& config,
+                                bool config_is_users_own, std::vector<std::string>& warnings) {
+  SweepFolder sweeps = value_or_fail(SweepFolder::open(arguments.capture), ExitStatus::failed);
+  RecordedInput input{nullptr, read_motion(arguments, folder, config, config_is_users_own, warnings), "", {}};
+  const LidarOptions& lidar = config.lidars.front();
+  if (!arguments.ground_truth.empty())
+    sweeps.truth.clear();
+  for (const StampedPose& pose : sweeps.truth)
+    input.truth.push_back(
+        {pose.stamp, sweeps.is_kitti ? pose.T_source_base * lidar.T_base_lidar.inverse() : pose.T_source_base});
+  const double raised_deg = raised_by_deg(arguments).value_or(0);
+  input.taken =
+      fmt::format("{}: {} is lidar {}", arguments.capture.string(), sweeps.folder.filename().string(), lidar.name);
+  for (const MotionRecording& motion : input.motion)
+    input.taken += fmt::format(", {} is {}", motion.file.string(), config.motion_sources[index_of(motion.source)].name);
+  if (!input.truth.empty())
+    input.taken += sweeps.is_kitti ? ", the poses of KITTI are the truth" : ", the estimated states are the truth";
+  if (lidar.point_times == PointTimesFrom::none)
+    input.taken += "; the points of a sweep are taken as of one instant";
+  if (raised_deg > 0)
+    input.taken += fmt::format("; {} degrees are added to their vertical angles", raised_deg);
+  input.lidars = std::make_unique<SweepClouds>(std::move(sweeps), raised_deg);
+  return input;
+}
+
 } // namespace
 
+bool gives_sweeps(const std::filesystem::path& capture) {
+  return SweepFolder::is(capture) && !KittiDrive::is(capture) && !CaptureFolder::find(capture);
+}
+
 std::optional<double> raised_by_deg(const Arguments& arguments) {
-  if (!KittiDrive::is(arguments.capture))
+  const bool is_odometry = gives_sweeps(arguments.capture) && SweepFolder::is_kitti_odometry(arguments.capture);
+  if (!KittiDrive::is(arguments.capture) && !is_odometry)
     return std::nullopt;
-  return arguments.kitti_as_published ? 0 : kKittiVerticalAngle_deg;
+  const bool is_published_so =
+      arguments.kitti_as_published || (is_odometry && !SweepFolder::is_of_hdl64(arguments.capture));
+  return is_published_so ? 0 : kKittiVerticalAngle_deg;
 }
 
 RecordedInput open_input(const Arguments& arguments, const CaptureFolder& folder, const Config& config,
                          bool config_is_users_own, std::vector<std::string>& warnings) {
-  if (arguments.kitti_as_published && !KittiDrive::is(folder.lidar.front()))
+  if (arguments.kitti_as_published && !raised_by_deg(arguments))
     throw Failure(ExitStatus::wrong_usage, fmt::format("--kitti-as-published: {} is no drive of KITTI; leave it out",
                                                        folder.lidar.front().string()));
   if (looks_like_bag(folder.lidar.front()))
     return open_bag_input(arguments, folder.lidar.front(), config, config_is_users_own, warnings);
   if (KittiDrive::is(folder.lidar.front()))
     return open_drive_input(arguments, folder.lidar.front(), config, warnings);
-  auto capture =
-      std::make_unique<CaptureSequence>(value_or_fail(CaptureSequence::open(folder.lidar), ExitStatus::failed));
-  return {std::move(capture), read_motion(arguments, folder, config, config_is_users_own, warnings), "", {}};
+  if (gives_sweeps(arguments.capture))
+    return open_sweeps_input(arguments, folder, config, config_is_users_own, warnings);
+  auto capture = std::make_unique<CaptureSequence>(
+      value_or_fail(CaptureSequence::open(folder.lidar, open_capture), ExitStatus::failed));
+  const bool has_parts = folder.lidar.size() > 1 && folder.lidar.front() == arguments.capture;
+  std::string taken = has_parts ? fmt::format("{}: and the parts behind it, up to {}", arguments.capture.string(),
+                                              folder.lidar.back().filename().string())
+                                : "";
+  return {
+      std::move(capture), read_motion(arguments, folder, config, config_is_users_own, warnings), std::move(taken), {}};
 }
 
 } // namespace locus::tools

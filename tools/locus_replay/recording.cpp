@@ -35,6 +35,13 @@ using daemon::Silence;
 void check_faults(const std::vector<Fault>& faults, const Config& config) {
   std::vector<FaultTarget> targets;
   for (const LidarOptions& lidar : config.lidars) {
+    for (const Fault& fault : faults) {
+      if (lidar.gives_clouds() && fault.strikes_lidar(lidar.name))
+        throw Failure(ExitStatus::wrong_usage,
+                      fmt::format("--fail {}: lidar {} gives clouds, and only packets are made to fail; fail a motion "
+                                  "source",
+                                  fault.name, lidar.name));
+    }
     targets.push_back({lidar.name, FaultTarget::Kind::lidar});
     targets.push_back({lidar.name + std::string{Fault::kPositionPackets}, FaultTarget::Kind::position_packets});
   }
@@ -61,16 +68,26 @@ Recording::Recording(std::unique_ptr<DatagramSource> source, std::vector<MotionR
     if (has_faults)
       std::visit([&](auto& samples) { samples = with_faults(samples.drain(), options, name, capture_start_); },
                  recording.samples);
-    motion_.push_back({std::move(recording), has_faults});
+    const std::size_t index = index_of(recording.source);
+    motion_.push_back(
+        {std::move(recording), has_faults, index < options.earlier.size() ? options.earlier[index] : Duration{}});
     MotionCursor& cursor = motion_.back();
     while (cursor.arrival() < begin_ - kMotionAhead)
       cursor.take();
   }
 }
 
+/// No sample comes before it is measured, as far as one clock tells both.
 Stamp Recording::MotionCursor::arrival() const {
   return std::visit(
-      [](const auto& samples) { return samples.front() != nullptr ? samples.front()->arrival : Stamp::max(); },
+      [&](const auto& samples) {
+        const auto* const next = samples.front();
+        if (next == nullptr)
+          return Stamp::max();
+        const Stamp in_time = next->arrival - std::max(earlier, Duration{});
+        const bool one_clock = std::chrono::abs(next->arrival - next->stamp) < std::chrono::seconds{1};
+        return earlier != Duration{} && one_clock ? std::max(in_time, next->stamp - earlier) : in_time;
+      },
       recording.samples);
 }
 
@@ -79,7 +96,9 @@ std::optional<TimeSpan> Recording::MotionCursor::arrivals() const {
 }
 
 Input Recording::MotionCursor::take() {
-  const auto input_of = [&](const auto& sample) -> Input {
+  const auto input_of = [&](auto sample) -> Input {
+    sample.arrival = arrival();
+    sample.stamp -= earlier;
     if constexpr (std::is_same_v<std::decay_t<decltype(sample)>, ImuSample>)
       return daemon::ImuInput{recording.source, sample};
     else
@@ -128,6 +147,9 @@ Recording::Pending Recording::fetch() {
     const Datagram* datagram = read();
     if (datagram != nullptr) {
       note(*datagram);
+      if (datagram->cloud != nullptr)
+        return {daemon::CloudInput{datagram->lidar, datagram->cloud, datagram->receive_stamp, {}},
+                datagram->receive_stamp};
       if (!faults_)
         return {*datagram, datagram->receive_stamp};
       faults_->pass(lidars_.configured_for(*datagram), *datagram, keep);
@@ -150,17 +172,24 @@ void Recording::note(const Datagram& datagram) {
   first_ = started_ ? std::min(first_, now) : now;
   last_ = started_ ? std::max(last_, now) : now;
   started_ = true;
-  PortTraffic& traffic = traffic_[datagram.destination_port];
-  ++traffic.datagrams;
-  traffic.data_packet_sized += datagram.payload.size() == velodyne::kDataPacketBytes ? 1U : 0U;
-  traffic.source_ip = datagram.source_ip;
-  traffic.bytes = datagram.payload.size();
-  if (const std::optional<OtherMaker> maker = other_maker(datagram))
-    ++traffic.of_other_maker[static_cast<std::size_t>(*maker)];
+  if (datagram.cloud == nullptr)
+    note_traffic(datagram);
   if (play_for_)
     progress_.store(to_seconds(now - begin_) / to_seconds(*play_for_), std::memory_order_relaxed);
   else
     progress_.store(source_->progress(), std::memory_order_relaxed);
+}
+
+void Recording::note_traffic(const Datagram& datagram) {
+  PortTraffic& traffic = traffic_[datagram.destination_port];
+  ++traffic.datagrams;
+  ++traffic.by_length[datagram.payload.size()];
+  traffic.source_ip = datagram.source_ip;
+  traffic.bytes = datagram.payload.size();
+  if (const std::optional<OtherMaker> maker = other_maker(datagram))
+    ++traffic.of_other_maker[static_cast<std::size_t>(*maker)];
+  if (const auto looks = hesai::look_at(datagram.payload); looks && !looks->model)
+    traffic.hesai = looks->name;
 }
 
 std::optional<std::string> Recording::runs_backwards() const {

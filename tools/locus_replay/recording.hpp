@@ -27,6 +27,7 @@ struct PlayOptions {
   std::optional<Duration> duration; ///< nothing: to the last datagram
   std::vector<Fault> faults;        ///< fault_problem() finds nothing
   std::uint64_t seed = 1;           ///< of the faults
+  std::vector<Duration> earlier{};  ///< for how long before its time each motion source is played; none: as it came
 };
 
 /// Throws Failure for a fault that none of the sensors can have.
@@ -35,8 +36,9 @@ void check_faults(const std::vector<Fault>& faults, const Config& config);
 /// The datagrams that went to one UDP port.
 struct PortTraffic {
   std::uint64_t datagrams = 0;
-  std::uint64_t data_packet_sized = 0;
+  std::map<std::size_t, std::uint64_t> by_length;           ///< of them, by their bytes
   std::array<std::uint64_t, kOtherMakers> of_other_maker{}; ///< by what they look like
+  std::string_view hesai;                                   ///< of the latest one of Hesai among these: its model
   std::size_t bytes = 0;                                    ///< of the latest
   std::uint32_t source_ip = 0;                              ///< of the latest
 };
@@ -82,6 +84,7 @@ class Recording : public daemon::InputSource {
   struct MotionCursor {
     MotionRecording recording;
     bool has_faults; ///< injected
+    Duration earlier{};
 
     [[nodiscard]] Stamp arrival() const; ///< of the next sample; Stamp::max() after the last
     [[nodiscard]] std::optional<TimeSpan> arrivals() const;
@@ -90,6 +93,7 @@ class Recording : public daemon::InputSource {
 
   const Datagram* read();
   void note(const Datagram& datagram);
+  void note_traffic(const Datagram& datagram);
   Pending fetch();
 
   std::unique_ptr<DatagramSource> source_;

@@ -3,7 +3,6 @@
 
 #include <optional>
 #include <string>
-#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -11,13 +10,13 @@
 #include <fmt/format.h>
 
 #include "locus_replay/failure.hpp"
-#include "locus_replay/lidar_doubts.hpp"
 #include "locus_replay/map_file.hpp"
 #include "locus_replay/output_file.hpp"
 #include "locus_replay/recorded_input.hpp"
 #include "locus_replay/report.hpp"
 #include "locus_replay/report_map.hpp"
 #include "locus_replay/say.hpp"
+#include "locus_replay/verdicts.hpp"
 
 namespace locus::tools {
 namespace {
@@ -44,28 +43,6 @@ void warn(const std::vector<std::string>& lines) {
     tools::say("locus-replay", "warning: " + line);
 }
 
-/// What is wrong with motion sources altogether, a line each.
-std::vector<std::string> source_verdicts(const Config& config, const MotionSources& sources) {
-  std::vector<std::string> lines;
-  for (std::size_t i = 0; i < sources.size(); ++i) {
-    const std::string& name = config.motion_sources[i].name;
-    const HealthMonitor& health = sources.health(SourceId{i});
-    const bool is_too_fast = 10 * health.counters().rejected_as(HealthReason::speed) > health.counters().received;
-    const bool is_doubted = !health.healthy() && health.counters().rejected_as(HealthReason::self_check) > 0;
-    if (const std::string_view verdict = health.verdict(); !verdict.empty())
-      lines.push_back(fmt::format("motion source {} {}", name, verdict));
-    else if (is_too_fast)
-      lines.push_back(fmt::format("motion source {} {}", name, kTooFast));
-    else if (is_doubted)
-      lines.push_back(
-          fmt::format("motion source {} and lidar disagreed on how the robot turns, and it was not yet used again at "
-                      "the end (possible causes: T_base_source, the unit (rad/s) or the stamps of the gyro, or lidar "
-                      "that follows what moves around the robot)",
-                      name));
-  }
-  return lines;
-}
-
 } // namespace
 
 Results::Results(const Arguments& arguments, const Config& config, const Recording& recording, Truth truth,
@@ -86,7 +63,6 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
   const daemon::MachineTime spent = daemon::MachineTime::now() - begin_;
   progress_.wipe();
   odometry_.close();
-  const bool has_data = ingest.lidars().total().data > 0;
   std::vector<SurfacePoint> map;
   read_planes(processor.odometry().map().fine(), map);
   const Accuracy accuracy = sweeps.seen > 0 ? truth_.compare(map, !arguments_.quiet) : Accuracy{};
@@ -100,26 +76,16 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
   const FinishedRun run{figures, health_events_, recording_.capture_start(), accuracy};
   const nlohmann::ordered_json summary = write_summary(run);
   warn(recording_.warnings());
-  const std::optional<std::string> backwards = recording_.runs_backwards();
-  if (!has_data || backwards) {
+  const PlayedRecording played{arguments_.capture, config_, recording_, ingest, figures};
+  if (const std::optional<std::string> why = why_no_result(played)) {
     remove_results(arguments_.output, false);
-    if (backwards)
-      throw Failure(ExitStatus::failed, fmt::format("{}: {}", arguments_.capture.string(), *backwards));
-    throw Failure(ExitStatus::failed, fmt::format("{}: no valid data packet: {}", arguments_.capture.string(),
-                                                  why_no_data(recording_, ingest.lidars())));
+    throw Failure(ExitStatus::failed, *why);
   }
   write_map(arguments_.output / "map.pcd", map);
   write_report(arguments_.output / "report.html",
                {summary, config_, recording_.capture_start(), figures.sweeps.path_m, sweeps_,
                 visible_surfaces(processor.odometry().map()), truth_.trajectory(), accuracy.trajectory});
-  if (sweeps.seen == 0)
-    warn({fmt::format("{}: there is lidar data and no whole sweep, which takes 0.05 to 0.2 s; look at --start and "
-                      "--duration",
-                      arguments_.capture.string())});
-  warn(lidar_warnings(recording_, ingest.lidars(), config_.sweep));
-  warn(source_verdicts(config_, ingest.sources()));
-  if (const auto warning = daemon::too_fast(config_.odometry.motion, figures.sweeps.largest_speed_mps))
-    warn({*warning});
+  warn(warnings_about(played));
   warn(accuracy.warnings);
   if (!arguments_.quiet)
     fmt::print("{}results    {}\n", readable(run), arguments_.output.string());

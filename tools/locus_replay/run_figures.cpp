@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "locus_replay/run_figures.hpp"
 
+#include <algorithm>
 #include <numeric>
 #include <string_view>
 
@@ -97,9 +98,17 @@ std::string readable(const FinishedRun& run) {
                                  to_seconds(figures.duration), packets.data, packets.position, packets.lost, rejected);
   for (std::size_t i = 0; i < figures.config.lidars.size(); ++i) {
     const daemon::IngestReport::Lidar& lidar = figures.ingest.lidars[i];
-    if (lidar.model)
-      text += fmt::format("{:10} {}, {} returns, {:.0f} rpm\n", figures.config.lidars[i].name, to_string(*lidar.model),
-                          to_string(*lidar.return_mode), lidar.rotation_rate_rpm);
+    if (!lidar.model.empty())
+      text += fmt::format("{:10} {}, {} returns, {:.0f} rpm{}\n", figures.config.lidars[i].name, lidar.model,
+                          lidar.return_mode, lidar.rotation_rate_rpm,
+                          lidar.tells_date ? fmt::format(", clock {}", lidar.pps) : "");
+    if (const auto& clouds = lidar.clouds)
+      text += fmt::format("{:10} {} clouds of {} used, {:.1f} a second, {:.0f} points each; times: {}, rings: {}\n",
+                          figures.config.lidars[i].name, clouds->counters.used, clouds->counters.received,
+                          1.0 / to_seconds(clouds->period),
+                          static_cast<double>(clouds->counters.points) /
+                              static_cast<double>(std::max<std::uint64_t>(clouds->counters.used, 1)),
+                          to_string(clouds->timing), to_string(clouds->rings));
   }
   const daemon::SweepCounters& counters = figures.counters;
   text += fmt::format("sweeps     {} seen: {} processed, {} dropped, {} failed\n", counters.seen, counters.processed,

@@ -76,6 +76,20 @@ void add_imperfection(CLI::App& app, const sim::NamedImperfection& one, std::opt
         ""));
 }
 
+void check_model(const SimArguments& arguments, const sim::NamedLidarModel& lidar) {
+  if (arguments.sensors.return_mode == velodyne::ReturnMode::dual &&
+      !std::holds_alternative<velodyne::Model>(lidar.model))
+    throw Failure(ExitStatus::wrong_usage,
+                  fmt::format("--return dual: a simulated {} reports one echo; leave it out, or choose a Velodyne with "
+                              "--model",
+                              lidar.name));
+  if (arguments.output == "-" && is_ouster(lidar.model))
+    throw Failure(ExitStatus::wrong_usage,
+                  fmt::format("-o -: a stream has no place for the metadata of an {}; write a folder with -o DIR, and "
+                              "play that",
+                              lidar.name));
+}
+
 } // namespace
 
 std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
@@ -99,8 +113,7 @@ std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
   app.add_option("--lidars", arguments.sensors.lidars, "1: level, 2: and one pitched forward, 3: and one backward")
       ->type_name("N")
       ->check(CLI::Range(1, 3));
-  app.add_option("--model", model, "Of all lidars; default VLP-16")
-      ->check(CLI::IsMember({"VLP-16", "VLP-32C", "HDL-32E"}));
+  app.add_option("--model", model, "Of all lidars; default VLP-16")->check(CLI::IsMember(names_of(sim::kLidarModels)));
   app.add_option("--return", return_mode, "Echoes that they report; default strongest")
       ->check(CLI::IsMember({"strongest", "dual"}));
   auto* realism_option =
@@ -128,12 +141,14 @@ std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
     add_imperfection(app, sim::kImperfections[i], sizes[i]);
   app.set_version_flag("--version", "locus-sim " LOCUS_VERSION);
   app.footer(
-      "Writes lidar.pcap, imu.csv, one NAME.tum per odometry source, gt.tum, gt_map.ply and config.yaml. The same\n"
-      "options give the same bytes.\n\n"
+      "Writes lidar.pcap, imu.csv, one NAME.tum per odometry source, gt.tum, gt_map.ply and config.yaml; of an OS1\n"
+      "its metadata, NAME.json, and its inertial unit's packets in place of imu.csv. The same options give the same\n"
+      "bytes.\n\n"
       "Examples:\n"
       "  locus-sim --world urban --robot husky --duration 60 --seed 1 -o plant\n"
       "  locus-sim --world tunnel --robot spot --duration 300 --seed 7 --slip 20-25 --dust 0.02 -o mine\n"
       "  locus-sim --world corridor --robot husky --duration 60 --realism clean --people 4 -o crowd\n"
+      "  locus-sim --world stairs --robot handheld --duration 60 --model OS1-32 -o climb\n"
       "  locus-replay -o out plant\n"
       "  locus-sim --world urban --robot husky --duration 600 -o - | locus-play -");
   if (!parse_command_line(app, argc, argv))
@@ -144,8 +159,10 @@ std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
   arguments.duration = from_seconds(duration_s);
   arguments.names_vehicle = app.count("--vehicle-s-per-min") > 0;
   arguments.slips = parse_slips(slips, duration_s);
-  arguments.sensors.model = *velodyne::model_from_string(model);
+  const auto lidar = by_name(sim::kLidarModels, model);
+  arguments.sensors.model = lidar.model;
   arguments.sensors.return_mode = return_mode == "dual" ? velodyne::ReturnMode::dual : velodyne::ReturnMode::strongest;
+  check_model(arguments, lidar);
   arguments.sensors.noise = !no_noise;
   arguments.sensors.imperfections = sim::imperfections_of(no_noise ? sim::Realism::clean : realism_from(realism));
   for (std::size_t i = 0; i < sizes.size(); ++i)

@@ -5,10 +5,14 @@
 
 #include <algorithm>
 #include <utility>
+#include <variant>
 
+#include "drivers/files/capture_folder.hpp"
 #include "drivers/files/motion_files.hpp"
 #include "drivers/net/datagram.hpp"
 #include "locus_sim/folder_sink.hpp"
+#include "locus_sim/ouster_imu.hpp"
+#include "locus_sim/ouster_sensor.hpp"
 
 namespace locus::sim {
 namespace {
@@ -61,21 +65,24 @@ std::vector<LineSource> line_sources(const Trajectory& trajectory, const RobotOp
   return sources;
 }
 
-/// All lidars as one stream of datagrams, in the order in which they arrive. One owner.
+/// All lidars, and what they bring along, as one stream of datagrams, in the order in which they arrive. One owner.
 class Lidars {
  public:
   Lidars(const Scene& scene, const Trajectory& trajectory, const std::vector<NamedLidar>& lidars, SeenSpace* seen) {
-    for (const NamedLidar& lidar : lidars)
-      lidars_.emplace_back(scene, trajectory, lidar.options, seen);
-    for (SyntheticLidar& lidar : lidars_)
-      waiting_.push_back(lidar.next());
+    for (const NamedLidar& lidar : lidars) {
+      senders_.emplace_back(SyntheticLidar(scene, trajectory, lidar.options, seen));
+      if (lidar.imu)
+        senders_.emplace_back(OusterImu(trajectory, lidar.options, *lidar.imu));
+    }
+    for (Sender& sender : senders_)
+      waiting_.push_back(next_of(sender));
   }
 
   /// Of the next to come; there is always one.
   [[nodiscard]] const Datagram& front() const { return waiting_[earliest()]; }
   void pop() {
     const std::size_t index = earliest();
-    waiting_[index] = lidars_[index].next();
+    waiting_[index] = next_of(senders_[index]);
   }
 
  private:
@@ -86,7 +93,12 @@ class Lidars {
     return static_cast<std::size_t>(found - waiting_.begin());
   }
 
-  std::vector<SyntheticLidar> lidars_;
+  using Sender = std::variant<SyntheticLidar, OusterImu>;
+  static Datagram next_of(Sender& sender) {
+    return std::visit([](auto& its) { return its.next(); }, sender);
+  }
+
+  std::vector<Sender> senders_;
   std::vector<Datagram> waiting_;
 };
 
@@ -99,6 +111,15 @@ std::string yaml(const Pose& pose) {
   return fmt::format("{{xyz_m: {}, rpy_deg: {}}}", yaml(pose.translation), yaml(rpy_deg));
 }
 
+/// And of an Ouster where its metadata lies.
+std::string model_of(const NamedLidar& lidar) {
+  if (is_ouster(lidar.options.model))
+    return "Ouster, metadata: " + metadata_file(lidar.name);
+  const auto* const hesai = std::get_if<hesai::Model>(&lidar.options.model);
+  return std::string(hesai != nullptr ? to_string(*hesai)
+                                      : velodyne::to_string(std::get<velodyne::Model>(lidar.options.model)));
+}
+
 std::string configuration(const RobotOptions& robot) {
   std::string text = "lidars:\n";
   for (const NamedLidar& lidar : robot.lidars) {
@@ -106,10 +127,9 @@ std::string configuration(const RobotOptions& robot) {
     const bool shares_port = std::count_if(robot.lidars.begin(), robot.lidars.end(), [&](const NamedLidar& other) {
                                return other.options.port == options.port;
                              }) > 1;
-    text +=
-        fmt::format("  - {{name: {}, model: {}, port: {}{}, T_base_lidar: {}}}\n", lidar.name, to_string(options.model),
-                    options.port, shares_port ? ", source_ip: " + dotted(options.source_ip) : "",
-                    yaml(lidar.T_base_believed.value_or(options.T_base_lidar)));
+    text += fmt::format("  - {{name: {}, model: {}, port: {}{}, T_base_lidar: {}}}\n", lidar.name, model_of(lidar),
+                        options.port, shares_port ? ", source_ip: " + dotted(options.source_ip) : "",
+                        yaml(lidar.T_base_believed.value_or(options.T_base_lidar)));
   }
   text += fmt::format("motion_sources:{}\n", robot.odometry.empty() && !robot.imu ? " []" : "");
   for (const NamedOdometry& odometry : robot.odometry)
@@ -131,6 +151,9 @@ void write_capture(CaptureSink& sink, const Scene& scene, const Trajectory& traj
                    const RobotOptions& robot, SeenSpace* seen, const std::function<void(double)>& progress) {
   const Stamp start = trajectory.start(), end = start + duration;
   sink.text("config.yaml", start, configuration(robot));
+  for (const NamedLidar& lidar : robot.lidars)
+    if (is_ouster(lidar.options.model))
+      sink.text(metadata_file(lidar.name), start, OusterSensor(lidar.options, start).metadata_text());
   if (robot.imu)
     sink.text("imu.csv", start, "#t_ns,wx,wy,wz,ax,ay,az,qw,qx,qy,qz\n");
   std::vector<LineSource> texts = line_sources(trajectory, robot);

@@ -20,6 +20,7 @@ struct NamedLidar {
   std::string name = "front";
   SyntheticLidarOptions options;
   std::optional<Pose> T_base_believed{}; ///< what config.yaml says of its place; nothing: the truth
+  std::optional<ImuFaults> imu{};        ///< of an Ouster's own unit
 };
 
 struct MountedImu {
@@ -48,8 +49,9 @@ struct RobotOptions {
 /// Drives a robot through a scene for `duration` and hands over, in the order of arrival, what its sensors saw: the
 /// datagrams of its lidars, imu.csv, NAME.tum of each odometry source, the true poses as gt.tum (100 Hz); first of all
 /// a config.yaml that names the sensors, and the box of the robot's body and its speed where there are any, and
-/// overrides nothing else. `seen` takes note of every surface point that an echo comes from; `progress` is told what
-/// share of the duration is done. What the sink throws passes through.
+/// overrides nothing else, and the metadata of each Ouster, NAME.json as in a recording of locusd. `seen` takes note of
+/// every surface point that an echo comes from; `progress` is told what share of the duration is done. What the sink
+/// throws passes through.
 void write_capture(
     CaptureSink& sink, const Scene& scene, const Trajectory& trajectory, Duration duration, const RobotOptions& robot,
     SeenSpace* seen = nullptr, const std::function<void(double done)>& progress = [](double) {});

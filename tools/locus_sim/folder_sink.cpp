@@ -3,6 +3,8 @@
 
 #include <system_error>
 
+#include "drivers/files/capture_folder.hpp"
+
 namespace locus::sim {
 namespace {
 
@@ -12,6 +14,8 @@ std::filesystem::path made(const std::filesystem::path& folder) {
   for (const char* const source : {"imu", "wio", "vio", "kio"}) // of another robot, which this one may not have
     for (const char* const ending : {".csv", ".tum", ".meta.csv"})
       std::filesystem::remove(folder / (source + std::string(ending)), ignored);
+  for (const char* const lidar : {"top", "front", "rear"})
+    std::filesystem::remove(folder / metadata_file(lidar), ignored);
   return folder;
 }
 

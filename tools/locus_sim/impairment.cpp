@@ -34,24 +34,7 @@ StampFaults stamp_faults(double late_ms, double jitter_ms) {
   return {.late = from_seconds(1e-3 * late_ms), .jitter_s = 1e-3 * jitter_ms};
 }
 
-void impair(NamedLidar& lidar, const Imperfections& all, std::uint64_t seed) {
-  SyntheticLidarOptions& options = lidar.options;
-  displace(options.T_base_lidar, lidar.T_base_believed, all, seed_for(seed, "mounting"));
-  options.beam_rad = 1e-3 * all.beam_mrad;
-  options.laser_bias_m = 1e-3 * all.laser_bias_mm;
-  options.incidence_bias_m = 1e-3 * all.incidence_bias_mm;
-  options.intensity_bias_m = 1e-3 * all.intensity_bias_mm;
-  options.laser_elevation_rad = kRadPerDeg * all.laser_elevation_deg;
-  if (all.lidar_drift_ppm > 0) {
-    options.drift = 1e-6 * all.lidar_drift_ppm;
-    options.pps_locked = false;
-    options.clock_offset = -from_seconds(Dice(seed_for(seed, "switched on")).between(0, 3600)); // no GPS ever set it
-  }
-}
-
-void impair(MountedImu& imu, const Imperfections& all, std::uint64_t seed) {
-  displace(imu.T_base_imu, imu.T_base_believed, all, seed_for(seed, "mounting"));
-  ImuFaults& faults = imu.faults;
+void impair(ImuFaults& faults, const Imperfections& all, std::uint64_t seed) {
   faults.stamps = stamp_faults(all.imu_late_ms, all.imu_jitter_ms);
   Dice scale(seed_for(seed, "gyro scale"));
   for (double& error : faults.gyro_axis_scale_error)
@@ -64,6 +47,28 @@ void impair(MountedImu& imu, const Imperfections& all, std::uint64_t seed) {
   faults.gyro_g_sensitivity_sm = kRadPerDeg * all.g_sensitivity_dps / kGravity_mps2 *
                                  so3_exp(turned.between(0, std::numbers::pi) * axis).toRotationMatrix();
   faults.vibration_mps2 = std::hypot(faults.vibration_mps2, all.vibration_mps2);
+}
+
+void impair(NamedLidar& lidar, const Imperfections& all, std::uint64_t seed) {
+  SyntheticLidarOptions& options = lidar.options;
+  displace(options.T_base_lidar, lidar.T_base_believed, all, seed_for(seed, "mounting"));
+  options.beam_rad = 1e-3 * all.beam_mrad;
+  options.laser_bias_m = 1e-3 * all.laser_bias_mm;
+  options.incidence_bias_m = 1e-3 * all.incidence_bias_mm;
+  options.intensity_bias_m = 1e-3 * all.intensity_bias_mm;
+  options.laser_elevation_rad = kRadPerDeg * all.laser_elevation_deg;
+  if (lidar.imu)
+    impair(*lidar.imu, all, seed_for(seed, "imu"));
+  if (all.lidar_drift_ppm > 0) {
+    options.drift = 1e-6 * all.lidar_drift_ppm;
+    options.pps_locked = false;
+    options.clock_offset = -from_seconds(Dice(seed_for(seed, "switched on")).between(0, 3600)); // no GPS ever set it
+  }
+}
+
+void impair(MountedImu& imu, const Imperfections& all, std::uint64_t seed) {
+  displace(imu.T_base_imu, imu.T_base_believed, all, seed_for(seed, "mounting"));
+  impair(imu.faults, all, seed);
 }
 
 void impair(NamedOdometry& odometry, const Imperfections& all, std::uint64_t seed) {

@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "drivers/ouster/metadata.hpp"
 #include "locus_sim/dice.hpp"
 #include "locus_sim/impairment.hpp"
 
@@ -20,6 +21,12 @@ struct Mounting {
 
 Pose pose_of(const Mounting& mounting) { return {from_rpy_rad(kRadPerDeg * mounting.rpy_deg), mounting.xyz_m}; }
 
+/// A VLS-128, which is for benchmarks alone, sees no farther there than a VLP-16.
+double max_range_m(const LidarModel& model) {
+  const auto* const named = std::ranges::find(kLidarModels, model, &NamedLidarModel::model);
+  return named == kLidarModels.end() ? kLidarModels.front().max_range_m : named->max_range_m;
+}
+
 /// Lidars of one model, each turning a little faster or slower than it should and with a phase of its own.
 std::vector<NamedLidar> lidars(std::span<const Mounting> mountings, const SensorChoice& choice, Dice& dice) {
   std::vector<NamedLidar> all;
@@ -32,9 +39,13 @@ std::vector<NamedLidar> lidars(std::span<const Mounting> mountings, const Sensor
     options.first_azimuth_deg = dice.between(0, 360);
     options.T_base_lidar = pose_of(mounting);
     options.port = static_cast<std::uint16_t>(options.port + index);
+    if (is_ouster(choice.model)) {
+      options.port = static_cast<std::uint16_t>(ouster::kDefaultLidarPort + 2 * index);
+      options.imu_port = static_cast<std::uint16_t>(options.port + 1);
+    }
     options.source_ip += index;
-    options.max_range_m = choice.model == velodyne::Model::vlp32c ? 200 : 100;
-    options.sends_position_packets = true;
+    options.max_range_m = max_range_m(choice.model);
+    options.sends_position_packets = std::holds_alternative<velodyne::Model>(choice.model);
     options.dust = choice.dust;
     if (choice.noise) {
       options.range_noise_m = 0.01;
@@ -71,6 +82,17 @@ ImuFaults imu_faults(Dice& dice, double vibration_mps2) {
           .heading_rad = dice.between(-std::numbers::pi, std::numbers::pi)};
 }
 
+/// On the robot; or in its lidars, where these bring their own.
+void fit_imu(Robot& robot, const SensorChoice& choice, double vibration_mps2, const Pose& T_base_imu, Dice& dice) {
+  const auto faults = [&] { return choice.noise ? imu_faults(dice, vibration_mps2) : ImuFaults{}; };
+  robot.sensors.imu.reset();
+  if (!is_ouster(choice.model))
+    robot.sensors.imu = MountedImu{faults(), T_base_imu};
+  else
+    for (NamedLidar& lidar : robot.sensors.lidars)
+      lidar.imu = faults();
+}
+
 /// Every so often the wrist turns, up to 4 rad/s fast, mostly to the side.
 std::vector<Flick> flicks(double per_min, Duration duration, Dice& dice) {
   constexpr double kPeak_radps = 4, kPeakOfMean = 1.875;
@@ -104,10 +126,9 @@ Robot make_husky(const SensorChoice& choice, std::uint64_t seed) {
       {9.7, {0, 0, 0.0004}, kRadPerDeg * Eigen::Vector3d{0.05, 0.1, 0}, 1.1},                  // tyre lugs
       {17.3, {0.0001, 0.0001, 0.00015}, kRadPerDeg * Eigen::Vector3d{0.04, 0.05, 0.01}, 2.0}}; // drive train
   robot.sensors.lidars = lidars(kLidars, choice, dice);
-  robot.sensors.imu = MountedImu{.faults = {}, .T_base_imu = {Eigen::Quaterniond::Identity(), {0, 0, 0.3}}};
+  fit_imu(robot, choice, 0.4, {Eigen::Quaterniond::Identity(), {0, 0, 0.3}}, dice);
   OdometryFaults wheels{.spinning_mps = robot.agility.cruise_mps}; // spinning wheels are no fault of a sensor
   if (choice.noise) {
-    robot.sensors.imu->faults = imu_faults(dice, 0.4);
     wheels.scale_error = about(dice, 0.015);
     wheels.noise_m_per_sqrt_m = 0.006;
     wheels.noise_rad_per_sqrt_m = 0.002;
@@ -135,10 +156,9 @@ Robot make_spot(const SensorChoice& choice, std::uint64_t seed) {
       {4.0, {0.004, 0, 0.006}, kRadPerDeg * Eigen::Vector3d{0.2, 0.8, 0}, 1.7},       // its two steps
       {13.0, {0, 0, 0.0002}, kRadPerDeg * Eigen::Vector3d{0.04, 0.06, 0}, 0.9}};      // feet touching down
   robot.sensors.lidars = lidars(kLidars, choice, dice);
-  robot.sensors.imu = MountedImu{};
+  fit_imu(robot, choice, 0.6, {}, dice);
   OdometryFaults vision{}, legs{.spinning_mps = robot.agility.cruise_mps};
   if (choice.noise) {
-    robot.sensors.imu->faults = imu_faults(dice, 0.6);
     vision.scale_error = about(dice, 0.01);
     vision.noise_m_per_sqrt_m = 0.008;
     vision.noise_rad_per_sqrt_m = 0.002;
@@ -175,9 +195,7 @@ Robot make_handheld(const SensorChoice& choice, std::uint64_t seed) {
       {0.95, {0.01, 0.02, 0.005}, kRadPerDeg * Eigen::Vector3d{1.5, 1, 2}, 1}, // the stride
       {1.9, {0.01, 0, 0.02}, kRadPerDeg * Eigen::Vector3d{0.3, 1, 0.3}, 1.7}}; // its two steps
   robot.sensors.lidars = lidars(kLidars, choice, dice);
-  robot.sensors.imu = MountedImu{};
-  if (choice.noise)
-    robot.sensors.imu->faults = imu_faults(dice, 0.2);
+  fit_imu(robot, choice, 0.2, {}, dice);
   robot.sensors.odometry = {};
   robot.sensors.seed = seed;
   robot.reach_m = 0.25;
@@ -202,10 +220,9 @@ Robot make_car(const SensorChoice& choice, std::uint64_t seed) {
                              {11.5, {0, 0, 0.0005}, kRadPerDeg * Eigen::Vector3d{0.03, 0.04, 0}, 1.1}, // wheels
                              {28, {0.0001, 0.0001, 0.0001}, kRadPerDeg * Eigen::Vector3d{0.01, 0.02, 0}, 2}}; // engine
   robot.sensors.lidars = lidars(kLidars, choice, dice);
-  robot.sensors.imu = MountedImu{.faults = {}, .T_base_imu = {Eigen::Quaterniond::Identity(), {0, 0, 0.2}}};
+  fit_imu(robot, choice, 0.5, {Eigen::Quaterniond::Identity(), {0, 0, 0.2}}, dice);
   OdometryFaults wheels{.spinning_mps = 1};
   if (choice.noise) {
-    robot.sensors.imu->faults = imu_faults(dice, 0.5);
     wheels.scale_error = about(dice, 0.01);
     wheels.noise_m_per_sqrt_m = 0.005;
     wheels.noise_rad_per_sqrt_m = 0.0007;

@@ -15,7 +15,7 @@ namespace locus::sim {
 /// What the user may choose about the sensors.
 struct SensorChoice {
   int lidars = 1; ///< 1..3
-  velodyne::Model model = velodyne::Model::vlp16;
+  LidarModel model = velodyne::Model::vlp16;
   velodyne::ReturnMode return_mode = velodyne::ReturnMode::strongest;
   bool noise = true; ///< false: every sensor is perfect
   double dust = 0;   ///< share of the pulses that meet dust

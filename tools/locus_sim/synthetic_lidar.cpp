@@ -23,7 +23,7 @@ constexpr int kDataPacketsPerPosition = 5;
 
 // A Gaussian beam is narrowed down to five rays that have its moments up to the fifth (Gauss-Hermite): the middle, and
 // four at the square root of three of its standard deviations. The divergence, to 1/e^2 of its brightness, is four.
-constexpr double kMiddleWeight = 1.0 / 3, kSideWeight = 1.0 / 6;
+constexpr double kSideWeight = 1.0 / 6;
 const double kSideAt = std::sqrt(3.0) / 4; // of the divergence
 constexpr double kNarrowness = 0.5;     // of the beam from top to bottom: 1.5 mrad of 3.0, VLP-16 user manual 63-9243
 constexpr double kPartingStep_m = 0.03; // smaller steps are lost in the noise
@@ -53,6 +53,12 @@ std::string gprmc(Stamp stamp, bool valid_fix) {
                                        fmt::gmtime(second), valid_fix ? 'A' : 'V');
   const auto checksum = std::accumulate(body.begin(), body.end(), 0, [](int sum, char c) { return sum ^ c; });
   return fmt::format("${}*{:02X}\r\n", body, checksum);
+}
+
+std::unique_ptr<PacketWriter> writer_for(const SyntheticLidarOptions& options, Stamp start) {
+  if (is_ouster(options.model))
+    return ouster_writer(options, start);
+  return std::holds_alternative<hesai::Model>(options.model) ? hesai_writer(options) : velodyne_writer(options);
 }
 
 } // namespace
@@ -131,29 +137,35 @@ class SyntheticLidar::Footprint {
 
 SyntheticLidar::SyntheticLidar(const Scene& scene, const Trajectory& trajectory, const SyntheticLidarOptions& options,
                                SeenSpace* seen)
-    : scene_(scene), trajectory_(trajectory), options_(options), spec_(velodyne::spec(options.model)),
-      layout_(velodyne::packet_layout(options.model, options.return_mode)), dice_(options.seed), seen_(seen),
-      packet_begin_(trajectory.start()), data_packets_until_position_(kDataPacketsPerPosition) {
-  const double rotor_rate_radps = options.rpm / 60 * kTurn_rad;
+    : scene_(scene), trajectory_(trajectory), options_(options), writer_(writer_for(options, trajectory.start())),
+      pattern_(writer_->pattern()),
+      T_base_rotor_(pattern_.T_lidar_rotor ? options.T_base_lidar * *pattern_.T_lidar_rotor : options.T_base_lidar),
+      dice_(options.seed), seen_(seen), packet_begin_(trajectory.start()),
+      data_packets_until_position_(kDataPacketsPerPosition) {
+  aim(options);
+  if (options_.beam_rad > 0) {
+    look_ahead(packet_begin_);
+    look_ahead(packet_begin_ + pattern_.column_duration);
+    before_ = now_;
+  }
+}
+
+void SyntheticLidar::aim(const SyntheticLidarOptions& options) {
+  const double rotor_rate_radps = pattern_.rpm / 60 * kTurn_rad;
   QuickDice laser_dice(seed_for(options.seed, "lasers"));
   std::vector<double> elevations_rad, biases_m;
-  for (const velodyne::Laser& laser : spec_.calibration.lasers()) {
+  for (const FiringPattern::Laser& laser : pattern_.lasers) {
     elevations_rad.push_back(laser.elevation_rad + options.laser_elevation_rad * laser_dice.normal());
     biases_m.push_back(options.laser_bias_m * laser_dice.normal());
   }
-  for (const velodyne::Firing& firing : spec_.firings()) {
-    const velodyne::Laser& laser = spec_.calibration.lasers()[firing.laser];
-    const double azimuth_rad = rotor_rate_radps * 1e-9 * firing.offset_ns + laser.azimuth_offset_rad;
-    const double elevation_rad = elevations_rad[firing.laser], level = std::cos(elevation_rad);
+  for (const auto& [index, after] : pattern_.firings) {
+    const FiringPattern::Laser& laser = pattern_.lasers[index];
+    const double azimuth_rad = rotor_rate_radps * 1e-9 * static_cast<double>(after.count()) + laser.azimuth_offset_rad;
+    const double elevation_rad = elevations_rad[index], level = std::cos(elevation_rad);
     aims_.push_back({{level * std::cos(azimuth_rad), -level * std::sin(azimuth_rad), std::sin(elevation_rad)},
-                     laser.vertical_offset_m,
-                     Duration{firing.offset_ns},
-                     biases_m[firing.laser]});
-  }
-  if (options_.beam_rad > 0) {
-    look_ahead(packet_begin_);
-    look_ahead(packet_begin_ + spec_.column_duration);
-    before_ = now_;
+                     laser.origin_z_m,
+                     after,
+                     biases_m[index]});
   }
 }
 
@@ -164,9 +176,11 @@ Datagram SyntheticLidar::next() {
     return datagram(position_, kPositionPort);
   }
   --data_packets_until_position_;
-  fill_data_packet();
-  packet_begin_ += velodyne::packet_duration(options_.model, options_.return_mode);
-  return datagram(data_, options_.port);
+  for (std::size_t column = 0; column < pattern_.columns; ++column)
+    fire_column(column);
+  const std::span<const std::byte> payload = writer_->finish(packet_begin_);
+  packet_begin_ += static_cast<Duration::rep>(pattern_.columns) * pattern_.column_duration;
+  return datagram(payload, options_.port);
 }
 
 Datagram SyntheticLidar::datagram(std::span<const std::byte> payload, std::uint16_t port) {
@@ -186,57 +200,22 @@ Stamp SyntheticLidar::arrival() {
   return last_arrival_;
 }
 
-void SyntheticLidar::fill_data_packet() {
-  for (std::size_t column = 0; column < layout_.columns; ++column)
-    fill_column(column);
-  put(data_, velodyne::kTimeOffset, microseconds_past_hour(packet_begin_ + spec_.stamp_delay), 4);
-  data_[velodyne::kReturnModeOffset] = static_cast<std::byte>(options_.return_mode);
-  data_[velodyne::kProductIdOffset] = static_cast<std::byte>(spec_.product_id);
-}
-
-void SyntheticLidar::fill_column(std::size_t column) {
-  const Stamp own_time = packet_begin_ + static_cast<Duration::rep>(column) * spec_.column_duration;
+void SyntheticLidar::fire_column(std::size_t column) {
+  const Stamp own_time = packet_begin_ + static_cast<Duration::rep>(column) * pattern_.column_duration;
   const Stamp fired = true_time(own_time);
-  put_block_headers(column, fired);
+  writer_->begin_column(column, own_time, rotor_azimuth_rad(fired));
   const bool is_line = options_.beam_rad <= 0;
   const Mount mount = is_line ? mount_at(fired) : now_.mount;
-  const std::size_t first_block = column * layout_.blocks_per_column();
-  for (std::size_t i = 0; i < aims_.size(); ++i) {
-    const std::size_t block = first_block + i / velodyne::kChannels * layout_.returns;
-    const Echoes echoes = is_line ? fire_line(mount, aims_[i]) : fire_beam(i);
-    if (layout_.returns == 2) {
-      put_echo(block, i % velodyne::kChannels, echoes.last);
-      put_echo(block + 1, i % velodyne::kChannels, echoes.strongest);
-    } else {
-      const bool wants_last = options_.return_mode == velodyne::ReturnMode::last;
-      put_echo(block, i % velodyne::kChannels, wants_last ? echoes.last : echoes.strongest);
-    }
-  }
+  for (std::size_t i = 0; i < aims_.size(); ++i)
+    writer_->put(column, i, is_line ? fire_line(mount, aims_[i]) : fire_beam(i));
   ++columns_fired_;
   if (!is_line)
-    look_ahead(own_time + 2 * spec_.column_duration);
-}
-
-void SyntheticLidar::put_block_headers(std::size_t column, Stamp fired) {
-  const double azimuth_cdeg = rotor_azimuth_rad(fired) * velodyne::kCdegPerTurn / kTurn_rad;
-  const auto reported = static_cast<std::uint32_t>(std::lround(azimuth_cdeg)) % velodyne::kCdegPerTurn;
-  for (std::size_t i = 0; i < layout_.blocks_per_column(); ++i) {
-    const std::size_t offset = (column * layout_.blocks_per_column() + i) * velodyne::kBlockBytes;
-    put(data_, offset, velodyne::kBankFlags[i / layout_.returns], 2);
-    put(data_, offset + 2, reported, 2);
-  }
-}
-
-void SyntheticLidar::put_echo(std::size_t block, std::size_t channel, const Echo& echo) {
-  const std::size_t offset =
-      block * velodyne::kBlockBytes + velodyne::kBlockHeaderBytes + channel * velodyne::kChannelBytes;
-  put(data_, offset, echo.ticks, 2);
-  put(data_, offset + 2, echo.intensity, 1);
+    look_ahead(own_time + 2 * pattern_.column_duration);
 }
 
 SyntheticLidar::Mount SyntheticLidar::mount_at(Stamp fired) const {
   const BaseMotion base = trajectory_.at(fired);
-  const Pose T_world_lidar = base.T_world_base * options_.T_base_lidar;
+  const Pose T_world_lidar = base.T_world_base * T_base_rotor_;
   Mount mount{.fired = fired,
               .R_world_lidar = T_world_lidar.R(),
               .R_world_rotor = {},
@@ -254,7 +233,8 @@ SyntheticLidar::Mount SyntheticLidar::mount_at(Stamp fired) const {
 std::optional<SyntheticLidar::Sight> SyntheticLidar::look(const Mount& mount, const Aim& aim,
                                                           const Eigen::Vector3d& aimed) const {
   const double since_s = to_seconds(aim.after);
-  const Ray ray{mount.position_m + since_s * mount.velocity_mps + aim.origin_z_m * mount.R_world_lidar.col(2),
+  const Ray ray{mount.position_m + since_s * mount.velocity_mps + aim.origin_z_m * mount.R_world_lidar.col(2) +
+                    pattern_.origin_radius_m * mount.R_world_rotor.col(0),
                 aimed + since_s * mount.angular_velocity_radps.cross(aimed)};
   std::optional<Sight> sight;
   if (const auto hit = scene_.cast(ray, options_.max_range_m, mount.fired + aim.after, aim.met))
@@ -267,7 +247,9 @@ std::optional<SyntheticLidar::Sight> SyntheticLidar::look(const Mount& mount, co
 /// They turn with the lidar.
 void SyntheticLidar::consider_own_parts(const Mount& mount, const Aim& aim, const Eigen::Vector3d& aimed,
                                         std::optional<Sight>& sight) const {
-  const Ray ray{options_.T_base_lidar * Eigen::Vector3d{0, 0, aim.origin_z_m}, mount.R_base_world * aimed};
+  const Ray ray{T_base_rotor_ * Eigen::Vector3d{0, 0, aim.origin_z_m} +
+                    pattern_.origin_radius_m * (mount.R_base_world * mount.R_world_rotor.col(0)),
+                mount.R_base_world * aimed};
   for (const Surface& part : options_.own_parts) {
     const double range_m = std::visit([&](const auto& shape) { return shape.range_m(ray); }, part.shape);
     if (range_m >= (sight ? sight->hit.range_m : options_.max_range_m))
@@ -278,7 +260,7 @@ void SyntheticLidar::consider_own_parts(const Mount& mount, const Aim& aim, cons
   }
 }
 
-SyntheticLidar::Echoes SyntheticLidar::fire_line(const Mount& mount, Aim& aim) {
+Echoes SyntheticLidar::fire_line(const Mount& mount, Aim& aim) {
   const Eigen::Vector3d aimed = mount.R_world_rotor * aim.direction;
   const auto center = look(mount, aim, aimed);
   aim.met = center ? center->hit.surface : nullptr;
@@ -312,7 +294,7 @@ void SyntheticLidar::look_ahead(Stamp own_time) {
   }
 }
 
-SyntheticLidar::Echoes SyntheticLidar::fire_beam(std::size_t index) {
+Echoes SyntheticLidar::fire_beam(std::size_t index) {
   const Aim& aim = aims_[index];
   Footprint beam = footprint(index);
   beam.merge();
@@ -373,7 +355,7 @@ bool SyntheticLidar::is_parted_along_turn(std::size_t index) const {
 }
 
 /// Nothing where the pulse meets none, or only behind what threw it back.
-std::optional<SyntheticLidar::Echo> SyntheticLidar::meet_dust(const Echo& nearest) {
+std::optional<Echo> SyntheticLidar::meet_dust(const Echo& nearest) {
   if (options_.dust <= 0 || dice_.uniform() >= options_.dust)
     return std::nullopt;
   const Echo grain = measure_dust();
@@ -382,7 +364,7 @@ std::optional<SyntheticLidar::Echo> SyntheticLidar::meet_dust(const Echo& neares
   return grain;
 }
 
-SyntheticLidar::Echo SyntheticLidar::measure(const Aim& aim, const std::optional<Sight>& sight) {
+Echo SyntheticLidar::measure(const Aim& aim, const std::optional<Sight>& sight) {
   if (!sight || (options_.dropout > 0 && dice_.uniform() < options_.dropout))
     return {};
   const Hit& hit = sight->hit;
@@ -395,14 +377,14 @@ SyntheticLidar::Echo SyntheticLidar::measure(const Aim& aim, const std::optional
     noise_m *= 1 + 1 / strength;
     brightness *= 0.5 * (1 + hit.cos_incidence) * (0.9 + 0.2 * dice_.uniform()); // not quite calibrated away
   }
-  const double wrong_m = hit.range_m + aim.bias_m + bias_of_surface_m(hit);
+  const double wrong_m = hit.range_m + pattern_.origin_radius_m + aim.bias_m + bias_of_surface_m(hit);
   const double range_m = noise_m > 0 ? wrong_m + noise_m * dice_.normal() : wrong_m;
-  const double ticks = std::round(range_m / spec_.calibration.distance_resolution_m);
-  if (range_m < options_.min_range_m || ticks > 65'535)
+  const double ticks = std::round(range_m / pattern_.resolution_m);
+  if (range_m < options_.min_range_m || ticks > pattern_.most_ticks)
     return {};
   if (seen_ != nullptr && !sight->is_own_part && !hit.apparent)
     seen_->mark(hit.point_m);
-  return {static_cast<std::uint16_t>(ticks), static_cast<std::uint8_t>(std::clamp(brightness, 1.0, 255.0))};
+  return {static_cast<std::uint32_t>(ticks), static_cast<std::uint8_t>(std::clamp(brightness, 1.0, 255.0))};
 }
 
 /// Constant for what it meets. On a slant the pulse is stretched over the depth of its footprint, range times tangent;
@@ -427,11 +409,11 @@ bool SyntheticLidar::is_lost(double strength) {
   return strength < kNever && dice_.uniform() * (kNever - kAlways) > strength - kAlways;
 }
 
-SyntheticLidar::Echo SyntheticLidar::measure_dust() {
+Echo SyntheticLidar::measure_dust() {
   constexpr double kMeanWay_m = 2.5;
   const double range_m = options_.min_range_m - kMeanWay_m * std::log1p(-dice_.uniform());
-  const double ticks = std::min(65'535.0, std::round(range_m / spec_.calibration.distance_resolution_m));
-  return {static_cast<std::uint16_t>(ticks), static_cast<std::uint8_t>(1 + 8 * dice_.uniform())};
+  const double ticks = std::min(static_cast<double>(pattern_.most_ticks), std::round(range_m / pattern_.resolution_m));
+  return {static_cast<std::uint32_t>(ticks), static_cast<std::uint8_t>(1 + 8 * dice_.uniform())};
 }
 
 /// When the clock shows what it was meant to show in a drive without drift: it also times the firings. Within a column
@@ -443,18 +425,17 @@ Stamp SyntheticLidar::true_time(Stamp own_time) const {
 
 /// 0 .. 2 pi, clockwise seen from above.
 double SyntheticLidar::rotor_azimuth_rad(Stamp stamp) const {
-  const double turns = to_seconds(stamp - trajectory_.start()) * options_.rpm / 60 + options_.first_azimuth_deg / 360;
+  const double turns = to_seconds(stamp - trajectory_.start()) * pattern_.rpm / 60 + pattern_.first_azimuth_deg / 360;
   return (turns - std::floor(turns)) * kTurn_rad;
 }
 
-std::uint32_t SyntheticLidar::microseconds_past_hour(Stamp stamp) const {
-  const auto shown = (stamp + options_.clock_offset).time_since_epoch();
+std::uint32_t microseconds_past_hour(Stamp shown) {
   return static_cast<std::uint32_t>(
-      std::chrono::floor<std::chrono::microseconds>(shown % std::chrono::hours{1}).count());
+      std::chrono::floor<std::chrono::microseconds>(shown.time_since_epoch() % std::chrono::hours{1}).count());
 }
 
 void SyntheticLidar::fill_position_packet() {
-  put(position_, kPositionTimeOffset, microseconds_past_hour(packet_begin_), 4);
+  put(position_, kPositionTimeOffset, microseconds_past_hour(packet_begin_ + options_.clock_offset), 4);
   position_[kPpsOffset] = options_.pps_locked ? kPpsLocked : kPpsAbsent;
   const std::string sentence = gprmc(packet_begin_ + options_.clock_offset, options_.pps_locked);
   std::memcpy(position_.data() + kNmeaOffset, sentence.data(), sentence.size());

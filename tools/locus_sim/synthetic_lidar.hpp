@@ -4,13 +4,15 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/base/pose.hpp"
 #include "drivers/net/datagram.hpp"
-#include "drivers/velodyne/model.hpp"
+#include "locus_sim/lidar_model.hpp"
+#include "locus_sim/packet_writer.hpp"
 #include "locus_sim/quick_dice.hpp"
 #include "locus_sim/scene.hpp"
 #include "locus_sim/seen_space.hpp"
@@ -29,12 +31,13 @@ inline constexpr double kSlantRange_m = 10, kSlant_deg = 75;
 
 /// A lidar, how it is mounted and what is wrong with it; as it stands, a perfect one that stands level in the base.
 struct SyntheticLidarOptions {
-  velodyne::Model model = velodyne::Model::vlp16;
-  velodyne::ReturnMode return_mode = velodyne::ReturnMode::strongest;
+  LidarModel model = velodyne::Model::vlp16;
+  velodyne::ReturnMode return_mode = velodyne::ReturnMode::strongest; ///< of another than a Velodyne always that
   double rpm = 600;
   double first_azimuth_deg = 0; ///< when the trajectory starts
   Pose T_base_lidar{};
   std::uint16_t port = 2368;                   ///< that data packets are sent to
+  std::uint16_t imu_port = 0;                  ///< of an Ouster, that readings of its inertial unit are sent to
   std::uint32_t source_ip = 0xC0A8'01C9;       ///< 192.168.1.201
   double min_range_m = 0.4, max_range_m = 100; ///< no return beyond
   double range_noise_m = 0;                    ///< standard deviation, of strong echoes where they fade
@@ -43,7 +46,7 @@ struct SyntheticLidarOptions {
   double dust = 0;         ///< share of the pulses that meet a grain of dust within a few metres, 0..1
   Duration latency{};      ///< mean of what the network takes; 0: packets arrive when their last firing is over
   Duration clock_offset{}; ///< what its clock is ahead of true time
-  bool sends_position_packets = false; ///< one after every fifth data packet
+  bool sends_position_packets = false; ///< of a Velodyne: one after every fifth data packet
   bool pps_locked = true;              ///< and a valid fix, in its position packets
   double drift = 0;                    ///< share by which its clock, and all that the clock times, runs fast
   double beam_rad = 0;                 ///< full divergence along the turn, across it half as much; 0: a line
@@ -55,8 +58,11 @@ struct SyntheticLidarOptions {
   std::uint64_t seed = 1;
 };
 
-/// A Velodyne on a moving robot: makes the datagrams that the sensor would send, firing by firing. Every ray leaves
-/// from where the laser is at its own time, under the azimuth that the rotor has at that time. One owner.
+/// By a Velodyne's clock that shows this. 0 <= it < 1 h.
+std::uint32_t microseconds_past_hour(Stamp shown);
+
+/// A lidar on a moving robot: makes the datagrams that the sensor would send, firing by firing. Every ray leaves from
+/// where the laser is at its own time, under the azimuth that the rotor has at that time. One owner.
 class SyntheticLidar {
  public:
   /// Scene and trajectory must outlive it. The same arguments give the same bytes.
@@ -68,11 +74,13 @@ class SyntheticLidar {
   /// robot stands.
   Datagram next();
 
+  [[nodiscard]] const FiringPattern& pattern() const { return pattern_; }
+
  private:
   struct Aim { ///< of a firing, in the frame of the lidar, as if its column had azimuth 0
     Eigen::Vector3d direction;
     double origin_z_m;
-    Duration after;               ///< the column's first firing
+    Duration after;               ///< the instant of the column
     double bias_m = 0;            ///< of its laser's ranges
     const Surface* met = nullptr; ///< by the ray of the column before
     bool near_edge = false;       ///< the beam of the column before was parted from top to bottom
@@ -80,13 +88,6 @@ class SyntheticLidar {
   struct Sight { ///< of one ray
     Hit hit;
     bool is_own_part = false;
-  };
-  struct Echo {
-    std::uint16_t ticks = 0; ///< of the model's distance resolution; 0: none
-    std::uint8_t intensity = 0;
-  };
-  struct Echoes {
-    Echo last, strongest;
   };
   /// Where the lidar is, how it moves and how far its rotor has turned while one column is fired.
   struct Mount {
@@ -96,7 +97,7 @@ class SyntheticLidar {
     Eigen::Matrix3d R_base_world;
     Eigen::Vector3d position_m;
     Eigen::Vector3d velocity_mps;
-    Eigen::Vector3d angular_velocity_radps; ///< all in world frame, at the first firing of the column
+    Eigen::Vector3d angular_velocity_radps; ///< all in world frame, at the instant of the column
   };
   struct Column {
     Mount mount;
@@ -104,10 +105,8 @@ class SyntheticLidar {
   };
   class Footprint;
 
-  void fill_data_packet();
-  void fill_column(std::size_t column);
-  void put_block_headers(std::size_t column, Stamp fired);
-  void put_echo(std::size_t block, std::size_t channel, const Echo& echo);
+  void aim(const SyntheticLidarOptions& options);
+  void fire_column(std::size_t column);
   [[nodiscard]] Mount mount_at(Stamp fired) const;
   [[nodiscard]] std::optional<Sight> look(const Mount& mount, const Aim& aim, const Eigen::Vector3d& aimed) const;
   void consider_own_parts(const Mount& mount, const Aim& aim, const Eigen::Vector3d& aimed,
@@ -124,7 +123,6 @@ class SyntheticLidar {
   bool is_lost(double strength);
   [[nodiscard]] Stamp true_time(Stamp own_time) const;
   [[nodiscard]] double rotor_azimuth_rad(Stamp stamp) const;
-  [[nodiscard]] std::uint32_t microseconds_past_hour(Stamp stamp) const;
   void fill_position_packet();
   [[nodiscard]] Datagram datagram(std::span<const std::byte> payload, std::uint16_t port);
   Stamp arrival();
@@ -132,18 +130,18 @@ class SyntheticLidar {
   const Scene& scene_;
   const Trajectory& trajectory_;
   SyntheticLidarOptions options_;
-  const velodyne::ModelSpec& spec_;
-  velodyne::PacketLayout layout_;
+  std::unique_ptr<PacketWriter> writer_;
+  const FiringPattern& pattern_; ///< of the writer
+  Pose T_base_rotor_;
   std::vector<Aim> aims_;       ///< of the firings of a column
   Column before_, now_, ahead_; ///< of a beam that is no line
   std::size_t columns_fired_ = 0;
   QuickDice dice_;
 
   SeenSpace* seen_;
-  Stamp packet_begin_; ///< first firing of the data packet to come, by the lidar's clock
+  Stamp packet_begin_; ///< first column of the data packet to come, by the lidar's clock
   Stamp last_arrival_;
   int data_packets_until_position_;
-  std::array<std::byte, velodyne::kDataPacketBytes> data_{};
   std::array<std::byte, kPositionPacketBytes> position_{};
 };
 

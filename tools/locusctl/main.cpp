@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // locusctl: talks to a running locusd.
+#include <charconv>
 #include <chrono>
+#include <cmath>
 #include <cstring>
 #include <functional>
 #include <span>
 #include <string>
+#include <string_view>
+#include <system_error>
+#include <thread>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -12,8 +17,10 @@
 
 #include "command_line.hpp"
 #include "core/base/options.hpp"
+#include "daemon/calibration.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/map_file.hpp"
+#include "locusctl/fetch_command.hpp"
 #include "locusctl/screen.hpp"
 #include "locusctl/sensors.hpp"
 #include "locusctl/service_client.hpp"
@@ -24,9 +31,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct CtlArguments {
-  std::string instance, socket, mode, file;
+  std::string instance, socket, mode, address, file, keep;
   std::vector<double> pose;
-  bool json = false, watch = false;
+  bool json = false, watch = false, yaml = false;
 
   [[nodiscard]] std::filesystem::path control() const {
     if (!socket.empty())
@@ -73,6 +80,37 @@ void reset(const CtlArguments& arguments) {
   ask(arguments.control(), request);
 }
 
+/// What the service has learned of its motion sources, or the configuration that says so.
+void calibration(const CtlArguments& arguments) {
+  const Json sources = ask(arguments.control(), {{"command", "status"}}).json.value("sources", Json::object());
+  fmt::print("{}", arguments.yaml ? daemon::calibration_yaml(sources) : daemon::calibration_text(sources));
+}
+
+/// Answered while the disk still writes: waits until it has.
+void record(const CtlArguments& arguments) {
+  double keep_s = 0;
+  const char* const end = arguments.keep.data() + arguments.keep.size();
+  const auto [stopped, error] = std::from_chars(arguments.keep.data(), end, keep_s);
+  if (const std::string_view unit{stopped, end};
+      error != std::errc{} || !std::isfinite(keep_s) || (unit != "s" && !unit.empty()))
+    throw Failure(ExitStatus::wrong_usage, fmt::format("--keep {}: must be seconds, e.g. 60s", arguments.keep));
+  const Json answer = ask(arguments.control(), {{"command", "record"}, {"keep_s", keep_s}}).json;
+  const std::string folder = answer.value("folder", "");
+  for (;; std::this_thread::sleep_for(std::chrono::milliseconds{200})) {
+    const Json status = ask(arguments.control(), {{"command", "status"}}).json;
+    if (!status.contains("incidents"))
+      throw Failure(ExitStatus::failed,
+                    fmt::format("{}: no incidents are kept since the service was reloaded; this one may "
+                                "come yet",
+                                folder));
+    const Json& incidents = status["incidents"];
+    if (incidents.value("last", "") == folder)
+      return fmt::print("{}\n", folder);
+    if (incidents.value("writing", "") != folder)
+      throw Failure(ExitStatus::failed, incidents.value("refusal", "the incident is not kept"));
+  }
+}
+
 /// What is to be done, once the words are understood; nothing where help or version were asked for.
 std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
   std::function<void()> action;
@@ -82,11 +120,13 @@ std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
   app.add_option("--instance", arguments.instance, "Of the service, as in locusd@NAME")->type_name("NAME");
   app.add_option("--socket", arguments.socket, "Of the service, where it is not in /run")->type_name("PATH");
   app.set_version_flag("--version", "locusctl " LOCUS_VERSION);
-  app.footer("All but status and sensors are for root and members of group locusd.\n"
+  app.footer("All but status, calibration, sensors and fetch are for root and members of group locusd.\n"
              "Examples:\n"
              "  locusctl status --watch\n"
              "  locusctl reset --pose 1,2,0,0,0,90\n"
-             "  locusctl save-map map.pcd");
+             "  locusctl save-map map.pcd\n"
+             "  locusctl record --keep 60s\n"
+             "  locusctl calibration --yaml");
   CLI::App* const show = app.add_subcommand("status", "What the service does and has counted");
   show->add_flag("--json", arguments.json, "For programs");
   show->add_flag("--watch", arguments.watch, "Goes on until q or Ctrl-C");
@@ -99,6 +139,9 @@ std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
   flat->callback([&] {
     action = [&] { ask(arguments.control(), {{"command", "flat-ground"}, {"mode", arguments.mode}}); };
   });
+  CLI::App* const learned = app.add_subcommand("calibration", "What drives have told of stamps, mountings and wheels");
+  learned->add_flag("--yaml", arguments.yaml, "What is known better than it is configured, to be pasted there");
+  learned->callback([&] { action = [&] { calibration(arguments); }; });
   CLI::App* const save = app.add_subcommand("save-map", "Writes the map as PCD");
   save->add_option("FILE", arguments.file)->required();
   save->callback([&] { action = [&] { save_map(arguments); }; });
@@ -111,9 +154,17 @@ std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
   app.add_subcommand("reload", "Reads the configuration again")->callback([&] {
     action = [&] { ask(arguments.control(), {{"command", "reload"}}); };
   });
+  CLI::App* const keep = app.add_subcommand("record", "Keeps the last input as an incident, for locus-replay");
+  keep->add_option("--keep", arguments.keep, "How much of it, e.g. 60s")->required()->type_name("SECONDS");
+  keep->callback([&] { action = [&] { record(arguments); }; });
   app.add_subcommand("sensors", "Finds the lidars on the wire; needs no service")->callback([&] {
     action = [] { fmt::print("{}", find_sensors(std::chrono::seconds{2})); };
   });
+  CLI::App* const from_lidar =
+      app.add_subcommand("fetch", "Fetches an Ouster's metadata or a Hesai's angles from the lidar; needs no service");
+  from_lidar->add_option("ADDRESS", arguments.address, "Of the lidar, e.g. 192.168.1.201")->required();
+  from_lidar->add_option("-o,--output", arguments.file, "Default: ADDRESS.json or ADDRESS.csv")->type_name("FILE");
+  from_lidar->callback([&] { action = [&] { fmt::print("{}", fetch(arguments.address, arguments.file)); }; });
   if (!parse_command_line(app, argc, argv))
     return {};
   return action;

@@ -1,148 +1,74 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "locusctl/sensors.hpp"
 
+#include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
-#include <ctime>
 #include <map>
-#include <memory>
-#include <optional>
-#include <utility>
 #include <vector>
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
-#include <net/ethernet.h>
-#include <netpacket/packet.h>
-#include <pcap/dlt.h>
-#include <poll.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
-#include "daemon/machine_time.hpp"
-#include "drivers/files/udp_frame.hpp"
 #include "drivers/lidar_input.hpp"
-#include "drivers/net/datagram.hpp"
-#include "drivers/net/udp_socket.hpp"
+#include "drivers/lidar_survey.hpp"
+#include "drivers/net/wire_tap.hpp"
 #include "locus_replay/failure.hpp"
+#include "locusctl/lidar_entry.hpp"
 
 namespace locus::tools {
 namespace {
 
-/// Where datagrams are overheard. One owner.
-class Wire {
- public:
-  Wire() : raw_(::socket(AF_PACKET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, htons(ETH_P_IP))) {
-    if (raw_ >= 0)
-      return;
-    for (const std::uint16_t port : {kDefaultDataPort, kDefaultPositionPort})
-      if (auto socket = UdpSocket::open(port))
-        sockets_.push_back(std::move(*socket));
-    if (sockets_.empty())
-      throw Failure(ExitStatus::failed,
-                    "no permission to capture packets, and the lidar ports are in use; run as root");
-  }
-  ~Wire() {
-    if (raw_ >= 0)
-      close(raw_);
-  }
-  Wire(const Wire&) = delete;
-  Wire& operator=(const Wire&) = delete;
+std::string describe(const HeardLidar& lidar) {
+  const std::string model = lidar.ouster ? fmt::format("Ouster-{}", lidar.beams) : std::string{lidar.model};
+  std::string mode{lidar.return_mode};
+  if (lidar.columns_per_turn > 0)
+    mode = fmt::format("{}x{:.0f}", lidar.columns_per_turn, lidar.rotation_rate_rpm / 60.0);
+  std::string text =
+      fmt::format("{:<16}{:<7}{:<12}{:>5.0f} rpm  {:<10}{:>7.0f} packets/s  {}", dotted(lidar.ip), lidar.port, model,
+                  lidar.rotation_rate_rpm, mode, lidar.packets_per_s, lidar.clock_state());
+  if (lidar.ouster.value_or(0) > 0)
+    text += fmt::format("  serial number {}", *lidar.ouster);
+  return text + "\n";
+}
 
-  template <class Take> void listen(Duration timeout, const Take& take) {
-    std::vector<pollfd> poll;
-    if (raw_ >= 0)
-      poll.push_back({raw_, POLLIN, 0});
-    for (const UdpSocket& socket : sockets_)
-      poll.push_back({socket.descriptor(), POLLIN, 0});
-    const timespec wait = daemon::to_timespec(timeout);
-    ppoll(poll.data(), poll.size(), &wait, nullptr);
-    for (UdpSocket& socket : sockets_)
-      for (const Datagram& datagram : socket.receive())
-        take(datagram);
-    while (raw_ >= 0) {
-      sockaddr_ll from{};
-      socklen_t size = sizeof(from);
-      const ssize_t bytes =
-          recvfrom(raw_, frame_.data(), frame_.size(), MSG_TRUNC, reinterpret_cast<sockaddr*>(&from), &size);
-      if (bytes <= 0)
-        return;
-      if (from.sll_pkttype == PACKET_OUTGOING)
-        continue; // seen again as it comes in, on the loopback interface
-      const auto length = static_cast<std::size_t>(bytes);
-      if (auto datagram = udp_datagram(DLT_RAW, {frame_.data(), std::min(length, frame_.size())}, length)) {
-        datagram->receive_stamp = Stamp{daemon::read_clock(CLOCK_REALTIME)};
-        take(*datagram);
-      }
-    }
-  }
-
- private:
-  int raw_;
-  std::vector<UdpSocket> sockets_; ///< only where raw_ is not permitted
-  std::array<std::byte, 4096> frame_{};
-};
-
-/// What was heard from one address on one port.
-struct Heard {
-  velodyne::Decoder decoder;
-  LidarPacket packet;
-  std::uint64_t data = 0, refused = 0;
-  Stamp first, last;
-};
-
-using Key = std::pair<std::uint32_t, std::uint16_t>; ///< address and port
-
-std::string describe(const Key& key, const Heard& heard, std::optional<velodyne::PositionPacket> position) {
-  const double seconds = std::max(1e-3, to_seconds(heard.last - heard.first));
-  return fmt::format("{:<16}{:<7}{:<12}{:>5.0f} rpm  {:<10}{:>7.0f} packets/s  PPS {}\n", dotted(key.first), key.second,
-                     velodyne::to_string(*heard.decoder.model()), heard.decoder.rotation_rate_rpm(),
-                     velodyne::to_string(*heard.decoder.return_mode()), static_cast<double>(heard.data - 1) / seconds,
-                     position ? to_string(position->pps) : "unknown");
+/// An entry of the configuration for it, and what fetches the file that only the sensor has: an Ouster is not read
+/// without.
+std::string entry(const HeardLidar& lidar, int number, bool shares_port) {
+  const std::string name = fmt::format("lidar{}", number), ip = dotted(lidar.ip);
+  const std::string file = fmt::format("/etc/locusd/{}{}", name, lidar.ouster ? ".json" : ".csv");
+  const std::string model = lidar.ouster ? "Ouster, metadata: " + file : std::string{lidar.model};
+  std::string yaml = lidar_entry(
+      name, fmt::format("model: {}, port: {}{}", model, lidar.port, shares_port ? ", source_ip: " + ip : ""));
+  if (lidar.ouster)
+    yaml += fmt::format("    # locusctl fetch {} -o {}\n", ip, file);
+  else if (lidar.clock) // a Hesai
+    yaml += fmt::format("    # calibration: {1} has its own angles, after: locusctl fetch {0} -o {1}\n", ip, file);
+  return yaml;
 }
 
 } // namespace
 
 std::string find_sensors(Duration duration) {
-  Wire wire;
-  std::map<Key, std::unique_ptr<Heard>> lidars;
-  std::map<std::uint32_t, velodyne::PositionPacket> positions;
-  const auto take = [&](const Datagram& datagram) {
-    if (datagram.payload.size() == velodyne::kPositionPacketBytes)
-      positions[datagram.source_ip] =
-          velodyne::parse_position_packet(datagram.payload.first<velodyne::kPositionPacketBytes>());
-    if (datagram.payload.size() != velodyne::kDataPacketBytes)
-      return;
-    auto& heard = lidars[{datagram.source_ip, datagram.destination_port}];
-    if (!heard)
-      heard = std::make_unique<Heard>();
-    if (heard->decoder.decode(datagram.payload, heard->packet)) {
-      ++heard->refused;
-      return;
-    }
-    heard->first = heard->data++ == 0 ? datagram.receive_stamp : heard->first;
-    heard->last = datagram.receive_stamp;
-  };
-  const Duration end = daemon::read_clock(CLOCK_MONOTONIC) + duration;
-  for (Duration now{}; (now = daemon::read_clock(CLOCK_MONOTONIC)) < end;)
-    wire.listen(end - now, take);
+  constexpr std::array kUsualPorts{kDefaultDataPort, kDefaultPositionPort, ouster::kDefaultLidarPort};
+  auto wire = WireTap::open(kUsualPorts);
+  if (!wire)
+    throw Failure(ExitStatus::failed, wire.error());
+  LidarSurvey survey;
+  wire->listen(duration, [&](const Datagram& datagram) { survey.take(datagram); });
 
-  std::string text, refused, yaml;
+  const std::vector<HeardLidar> lidars = survey.lidars();
   std::map<std::uint16_t, int> on_port;
-  for (const auto& [key, heard] : lidars)
-    on_port[key.second] += heard->data > 0 ? 1 : 0;
-  for (const auto& [key, heard] : lidars) {
-    if (const auto unknown = heard->decoder.unknown_packets())
-      refused += fmt::format("{:<16}{:<7}not read: {}\n", dotted(key.first), key.second, to_string(*unknown));
-    if (heard->data == 0)
+  for (const HeardLidar& lidar : lidars)
+    on_port[lidar.port] += lidar.is_known() ? 1 : 0;
+  std::string text, refused, yaml;
+  int known = 0;
+  for (const HeardLidar& lidar : lidars) {
+    if (lidar.unknown_packets)
+      refused +=
+          fmt::format("{:<16}{:<7}not read: {}\n", dotted(lidar.ip), lidar.port, to_string(*lidar.unknown_packets));
+    if (!lidar.is_known())
       continue;
-    const auto position = positions.find(key.first);
-    text += describe(key, *heard, position != positions.end() ? std::optional{position->second} : std::nullopt);
-    yaml += fmt::format("  - {{name: lidar{}, model: {}, port: {}{}, T_base_lidar: {{xyz_m: [0, 0, 0], rpy_deg: [0, 0, "
-                        "0]}}}}\n",
-                        1 + std::count(yaml.begin(), yaml.end(), '\n'), velodyne::to_string(*heard->decoder.model()),
-                        key.second, on_port[key.second] > 1 ? ", source_ip: " + dotted(key.first) : "");
+    text += describe(lidar);
+    yaml += entry(lidar, ++known, on_port[lidar.port] > 1);
   }
   if (text.empty())
     throw Failure(ExitStatus::failed,

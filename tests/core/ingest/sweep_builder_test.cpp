@@ -335,6 +335,64 @@ TEST(SweepBuilder, TheLastWindowCountsWhenItIsLongerThanHalfAPeriod) {
   }
 }
 
+/// Of clouds that came at one instant each, their ends told in `ends`; a number of returns each that says which it is.
+class CloudsOfOneInstant {
+ public:
+  static constexpr std::size_t kReturns = 6000; ///< more than a packet holds
+
+  explicit CloudsOfOneInstant(Duration period) : period_(period) {}
+
+  /// The time is told every 10 ms until the cloud arrives.
+  void play(Built& built, Stamp end) {
+    constexpr Duration kWay = milliseconds{4};
+    for (Stamp now = ends_.empty() ? end : ends_.back() + kWay; now < end + kWay; now += milliseconds{10})
+      built.builder.advance(now);
+    ends_.push_back(end);
+    for (std::size_t left = kReturns / FiringGroup::kLasers; left > 0;) {
+      LidarPacket packet;
+      packet.count = std::min(left, LidarPacket::kMaxFiringGroups);
+      left -= packet.count;
+      packet.cloud = {end - period_, end, left == 0};
+      packet.stamp = end - Duration{1};
+      packet.duration = Duration{1};
+      packet.first_azimuth_cdeg = 35'999;
+      for (std::size_t i = 0; i < packet.count; ++i) {
+        packet.storage[i] = {};
+        packet.storage[i].range_m.fill(5.0F);
+        packet.storage[i].x_m.fill(5.0F);
+      }
+      built.builder.add(packet, end + kWay);
+    }
+  }
+  [[nodiscard]] const std::vector<Stamp>& ends() const { return ends_; }
+
+ private:
+  Duration period_;
+  std::vector<Stamp> ends_;
+};
+
+void expect_a_sweep_of_each(const std::vector<Stamp>& clouds, const std::vector<Sweep>& sweeps) {
+  ASSERT_EQ(sweeps.size(), clouds.size());
+  for (std::size_t i = 0; i < sweeps.size(); ++i) {
+    EXPECT_EQ(sweeps[i].raw_returns, CloudsOfOneInstant::kReturns) << i;
+    EXPECT_EQ(sweeps[i].end, clouds[i]) << i;
+    EXPECT_EQ(sweeps[i].start, i == 0 ? sweeps[i].start : clouds[i - 1]) << i;
+  }
+}
+
+TEST(SweepBuilder, EachCloudOfOneInstantIsASweep) {
+  for (const double rate_hz : {5.0, 9.9, 10.0, 10.1, 20.0}) {
+    for (const Duration jitter : {Duration{}, Duration{300'000}, Duration{3'000'000}}) {
+      SCOPED_TRACE(testing::Message() << rate_hz << " Hz, to " << jitter.count() << " ns");
+      CloudsOfOneInstant clouds(from_seconds(1 / rate_hz));
+      Built built;
+      for (int k = 1; k <= 40; ++k)
+        clouds.play(built, kStart + from_seconds(k / rate_hz) + jitter * (k * 7 % 5 - 2) / 2);
+      expect_a_sweep_of_each(clouds.ends(), built.sweeps);
+    }
+  }
+}
+
 TEST(SweepBuilder, ReturnsOutsideTheRangeAreDropped) {
   SweepOptions options = keep_all();
   options.min_range_m = 1.0;

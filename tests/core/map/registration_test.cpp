@@ -200,5 +200,43 @@ TEST(Gicp, TheInformationTellsTheErrorsThatAreMade) {
   EXPECT_GT(squared / dimensions, 0.1 * 0.06 / 0.3);
 }
 
+Registration fitting(std::size_t inliers, double mean_error = 1.0) {
+  Registration registration;
+  registration.inliers = inliers;
+  registration.mean_error = mean_error;
+  return registration;
+}
+
+TEST(FitOf, MoreAndNearerPointsFitBetter) {
+  EXPECT_GT(fit_of(fitting(900)), fit_of(fitting(800)));
+  EXPECT_GT(fit_of(fitting(900, 1.0)), fit_of(fitting(900, 2.0)));
+  EXPECT_EQ(fit_of(fitting(0)), 0.0);
+}
+
+TEST(FitOf, APointThreeSigmaOffIsWorthNoMoreThanOneWithoutCorrespondence) {
+  EXPECT_EQ(fit_of(fitting(500, 9.0)), fit_of(fitting(0)));
+  // Half of 1000 points at 1 and half at 9 are as good as 500 at 1 and 500 that found nothing.
+  EXPECT_DOUBLE_EQ(fit_of(fitting(1000, 5.0)), fit_of(fitting(500, 1.0)));
+}
+
+TEST(Evidence, IsForWhatFitsBetterAndAgainstTheOther) {
+  EXPECT_GT(evidence(fitting(900), fitting(800)), 0.0);
+  EXPECT_DOUBLE_EQ(evidence(fitting(900), fitting(800)), -evidence(fitting(800), fitting(900)));
+  EXPECT_EQ(evidence(fitting(900), fitting(900)), 0.0);
+}
+
+TEST(Evidence, CountsAPointAsTheInformationOfTheRegistrationDoes) {
+  // A hundred points more, 8 each, of which 0.06 are independent.
+  EXPECT_NEAR(evidence(fitting(900, 1.0), fitting(800, 1.0)), 0.06 * 100.0 * 8.0, 1e-9);
+  // Surfaces that are fitted as well as any.
+  EXPECT_NEAR(evidence(fitting(900, 0.3), fitting(900, 0.4)), 0.06 / 0.3 * 900.0 * 0.1, 1e-9);
+  EXPECT_NEAR(evidence(fitting(900, 0.1), fitting(900, 0.2)), 0.06 / 0.3 * 900.0 * 0.1, 1e-9);
+}
+
+TEST(Evidence, WhereTheSceneFitsBadlyADifferenceSaysLess) {
+  EXPECT_NEAR(evidence(fitting(900, 3.0), fitting(900, 3.5)), evidence(fitting(900, 1.0), fitting(900, 1.5)) / 3.0,
+              1e-9);
+}
+
 } // namespace
 } // namespace locus

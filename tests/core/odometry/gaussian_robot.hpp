@@ -63,8 +63,11 @@ class GaussianRobot {
     Vector6 wheels = kUsualWheels, gyro = kUsualGyro; ///< standard deviation of way and turn after a second
     double scale = 0.0;                               ///< of the way ahead
     double to_the_left = 0.0, upwards = 0.0;          ///< of the way ahead, too
+    std::function<double(double t_s)> slip_mps{};     ///< what the wheels run faster than they roll
     Eigen::Vector3d bias_radps = Eigen::Vector3d::Zero();
-    double force_mps = 0.02; ///< of the speed after a second
+    double late_s = 0.0;                                    ///< of the gyro's stamps
+    Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero(); ///< of the gyro, otherwise than thought
+    double force_mps = 0.02;                                ///< of the speed after a second
     Eigen::Vector3d force_bias_mps2 = Eigen::Vector3d::Zero();
   };
 
@@ -97,12 +100,23 @@ class GaussianRobot {
   Vector6 wheels() {
     Vector6 said = noisy(twist_, sensors_.wheels / std::sqrt(elapsed_s_));
     said.head<3>() += twist_[kX] * Eigen::Vector3d{sensors_.scale, sensors_.to_the_left, sensors_.upwards};
+    said[kX] += sensors_.slip_mps ? sensors_.slip_mps(t_s_ - 0.5 * elapsed_s_) : 0.0;
     return said;
   }
-  Vector6 gyro() {
-    Vector6 said = noisy(twist_, sensors_.gyro / std::sqrt(elapsed_s_));
-    said.head<3>().setZero();
-    said.tail<3>() += sensors_.bias_radps;
+  /// `taken_out_s` of its lateness is taken out of the stamps.
+  SensedTwist gyro(double taken_out_s = 0.0) {
+    const Eigen::Quaterniond askew = so3_exp(-sensors_.mounting_rad);
+    const double late_s = sensors_.late_s - taken_out_s, moment_s = to_seconds(SourcePose::kMoment);
+    const auto at_end = [&](double end_s) {
+      return noisy(mean_of_motion(end_s - moment_s, end_s), sensors_.gyro / std::sqrt(moment_s));
+    };
+    const Vector6 began = at_end(t_s_ - elapsed_s_ - late_s), ended = at_end(t_s_ - late_s);
+    const Vector6 mean = late_s == 0.0 ? twist_ : mean_of_motion(t_s_ - elapsed_s_ - late_s, t_s_ - late_s);
+    SensedTwist said(noisy(mean, sensors_.gyro / std::sqrt(elapsed_s_)));
+    said.mean.head<3>().setZero();
+    said.mean.tail<3>() = askew * said.mean.tail<3>() + sensors_.bias_radps;
+    said.change_per_s.tail<3>() = askew * (ended - began).tail<3>() / elapsed_s_;
+    said.brought_forward = taken_out_s * said.change_per_s;
     return said;
   }
   SpecificForce force() {
@@ -120,6 +134,13 @@ class GaussianRobot {
   }
 
  private:
+  [[nodiscard]] Vector6 mean_of_motion(double from_s, double to_s) const {
+    constexpr int kParts = 20;
+    Vector6 sum = Vector6::Zero();
+    for (int i = 0; i < kParts; ++i)
+      sum += motion_(from_s + (i + 0.5) / kParts * (to_s - from_s));
+    return sum / kParts;
+  }
   Vector6 noisy(Vector6 value, const Vector6& sigma) {
     for (int i = 0; i < 6; ++i)
       value[i] += sigma[i] * normal_(random_);

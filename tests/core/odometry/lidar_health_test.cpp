@@ -26,18 +26,6 @@ LidarHealth used_to(const Registration& registration, double period_s = kPeriod_
   return health;
 }
 
-TEST(FitOf, MoreAndNearerPointsFitBetter) {
-  EXPECT_GT(fit_of(fit(900)), fit_of(fit(800)));
-  EXPECT_GT(fit_of(fit(900, 1.0)), fit_of(fit(900, 2.0)));
-  EXPECT_EQ(fit_of(fit(0)), 0.0);
-}
-
-TEST(FitOf, APointThreeSigmaOffIsWorthNoMoreThanOneWithoutCorrespondence) {
-  EXPECT_EQ(fit_of(fit(500, 9.0)), fit_of(fit(0)));
-  // Half of 1000 points at 1 and half at 9 are as good as 500 at 1 and 500 that found nothing.
-  EXPECT_DOUBLE_EQ(fit_of(fit(1000, 5.0)), fit_of(fit(500, 1.0)));
-}
-
 TEST(LidarHealth, KnowsNothingUnusualBeforeTheFirstSweep) {
   const LidarHealth health;
   EXPECT_FALSE(health.misses_most(fit(0), kRegistered));

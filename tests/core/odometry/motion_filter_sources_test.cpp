@@ -4,9 +4,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "core/odometry/gaussian_robot.hpp"
 
@@ -149,6 +152,173 @@ TEST(MotionFilter, ForgetsBiasScaleAndNoiseOfASourceThatMayComeBackAsAnother) {
       EXPECT_NEAR(noise_of(filter, source, robot.twist(), 0.1)[axis], usual[axis] * usual[axis], 1e-12) << axis;
 }
 
+/// It turns about all axes, as fast as a robot on legs does.
+Vector6 swaying(double t) {
+  return twist_of(1.0, 0, 0, 0.5 * std::sin(3.0 * t), 0.4 * std::sin(2.3 * t), 0.6 * std::sin(1.1 * t));
+}
+
+LearnedSource learned_of_gyro(const Motion& motion, const GaussianRobot::Sensors& sensors, unsigned seed,
+                              double time_s = 60.0) {
+  GaussianRobot robot(motion, sensors, seed);
+  MotionFilter filter = begun_with(robot, motion);
+  sweep_for(time_s, filter, robot, 0.1, {.wheels = false, .lidar = usual_lidar(0.1)});
+  return filter.learned(kGyroSource);
+}
+
+/// As an estimator does, what is known is taken out of the stamps.
+TEST(MotionFilter, FindsHowLateAGyroIs) {
+  for (const double late_s : {-0.1, -0.04, 0.0, 0.01, 0.04, 0.1})
+    for (unsigned seed = 1; seed <= 5; ++seed) {
+      GaussianRobot robot(swaying, {.late_s = late_s}, seed);
+      MotionFilter filter = begun_with(robot, swaying);
+      Learned found = filter.learned(kGyroSource).lateness_s();
+      for (int i = 0; i < 600; ++i) {
+        robot.move(0.1);
+        filter.predict(0.1, 0.1, std::nullopt, kRotation);
+        filter.measure(kGyroSource, robot.gyro(found.sigma < 0.005 ? found.mean : 0.0), kRotation);
+        filter.move();
+        see(filter, robot, usual_lidar(0.1));
+        filter.learn();
+        found = filter.learned(kGyroSource).lateness_s();
+      }
+      const bool is_linear = std::abs(late_s) < 0.1; // not over a whole sweep: it gets there, and slower than it thinks
+      EXPECT_NEAR(found.mean, late_s, is_linear ? kSigmas * found.sigma : 0.015) << "seed " << seed;
+      EXPECT_LT(found.sigma, 0.002);
+    }
+}
+
+TEST(MotionFilter, FindsHowAGyroIsMounted) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    const Eigen::Vector3d mounting_rad = kRadPerDeg * Eigen::Vector3d{5.0, -4.0, 3.0};
+    const LearnedSource found = learned_of_gyro(swaying, {.mounting_rad = mounting_rad}, seed);
+    for (int axis = 0; axis < 3; ++axis) {
+      EXPECT_NEAR(found.mounting_rad(axis).mean, mounting_rad[axis], 0.3 * kRadPerDeg) << "seed " << seed;
+      EXPECT_LT(found.mounting_rad(axis).sigma, 0.3 * kRadPerDeg);
+    }
+  }
+}
+
+/// What a motion does not tell is not moved, by more than was thought possible before.
+TEST(MotionFilter, ADriveStraightAheadTellsNothingOfHowAGyroIsMountedAndHowLateItIs) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const LearnedSource found =
+        learned_of_gyro(straight(1.5), {.late_s = 0.04, .mounting_rad = {0.05, 0.05, 0.05}}, seed, 300.0);
+    EXPECT_LT(std::abs(found.lateness_s().mean), 0.03) << "seed " << seed;
+    for (int axis = 0; axis < 3; ++axis)
+      EXPECT_LT(std::abs(found.mounting_rad(axis).mean), 0.03) << "seed " << seed;
+  }
+}
+
+TEST(MotionFilter, WhatWasTakenOutOfTheStampsOfAGyroChangesNothingOfWhatIsKnown) {
+  GaussianRobot robot(swaying, {.late_s = 0.04}, 1);
+  MotionFilter filter = begun_with(robot, swaying);
+  sweep_for(60.0, filter, robot, 0.1, {.wheels = false, .lidar = usual_lidar(0.1)});
+  robot.move(0.1);
+  const SensedTwist raw = robot.gyro();
+  SensedTwist brought_forward = raw;
+  brought_forward.brought_forward = 0.04 * raw.change_per_s;
+  brought_forward.mean += brought_forward.brought_forward;
+  filter.predict(0.1, 0.1, std::nullopt, kRotation);
+  const Innovation one = filter.innovation(kGyroSource, raw), other = filter.innovation(kGyroSource, brought_forward);
+  EXPECT_GT(brought_forward.brought_forward.norm(), 0.01);
+  EXPECT_LT((one.value - other.value).norm(), 0.01 * brought_forward.brought_forward.norm()) << "of the mounting";
+}
+
+std::vector<MotionSourceOptions> wheels_and_gyro_with(const std::function<void(MotionSourceOptions&)>& change) {
+  std::vector<MotionSourceOptions> sources = wheels_and_gyro();
+  std::ranges::for_each(sources, change);
+  return sources;
+}
+
+LearnedSource learned_of_gyro_as(const std::vector<MotionSourceOptions>& sources) {
+  GaussianRobot robot(swaying, {.late_s = 0.04, .mounting_rad = {0.05, 0.05, 0.05}}, 1);
+  MotionFilter filter(sources);
+  filter.begin(Pose{}, swaying(robot.t_s()), along_each_axis(0.05, 1.0));
+  sweep_for(60.0, filter, robot, 0.1, {.lidar = usual_lidar(0.1)});
+  return filter.learned(kGyroSource);
+}
+
+TEST(MotionFilter, WhatIsNotToBeCalibratedStaysAsConfigured) {
+  for (const Calibration mode : {Calibration::off, Calibration::report}) {
+    const LearnedSource fixed = learned_of_gyro_as(wheels_and_gyro_with([&](MotionSourceOptions& source) {
+      source.late_ms = 30.0;
+      source.calibration = mode;
+    }));
+    EXPECT_EQ(fixed.lateness_s().mean, 0.03);
+    EXPECT_EQ(fixed.lateness_s().sigma, 0.0);
+    EXPECT_EQ(fixed.mounting_rad(0).mean, 0.0);
+    EXPECT_GT(fixed.states.head<3>().norm(), 0.0) << "of the bias nothing is configured";
+  }
+}
+
+/// What the user is sure of is left to them, figure by figure.
+TEST(MotionFilter, WhatTheUserIsSureOfIsNotMoved) {
+  const LearnedSource found = learned_of_gyro_as(wheels_and_gyro_with([](MotionSourceOptions& source) {
+    if (source.kind == SourceKind::imu)
+      source.calibration_sigma.mounting_deg = 0.0;
+  }));
+  EXPECT_EQ(found.mounting_rad(1).mean, 0.0);
+  EXPECT_GT(found.lateness_s().mean, 0.02);
+}
+
+TEST(MotionFilter, WhatAnotherRunLearnedIsAsSureAsTheTimeSinceAllows) {
+  MotionFilter filter(wheels_and_gyro());
+  LearnedSource learned = as_configured(wheels_and_gyro()[1]);
+  const double before = learned.mounting_rad(0).sigma;
+  learned.states[LearnedSource::kMounting] = 0.05;
+  learned.covariance *= 1e-4;
+  filter.recall(kGyroSource, learned, 0.0);
+  EXPECT_EQ(filter.learned(kGyroSource).mounting_rad(0).mean, 0.05);
+  EXPECT_NEAR(filter.learned(kGyroSource).mounting_rad(0).sigma, 0.01 * before, 1e-9);
+  filter.recall(kGyroSource, learned, 86400.0);
+  EXPECT_NEAR(filter.learned(kGyroSource).mounting_rad(0).mean, 0.05, 0.002);
+  EXPECT_GT(filter.learned(kGyroSource).mounting_rad(0).sigma, 0.1 * before);
+  filter.recall(kGyroSource, learned, 1e9);
+  EXPECT_NEAR(filter.learned(kGyroSource).mounting_rad(0).mean, 0.0, 1e-9) << "as configured";
+  EXPECT_NEAR(filter.learned(kGyroSource).mounting_rad(0).sigma, before, 1e-9) << "no worse than configured";
+}
+
+TEST(MotionFilter, ASourceThatComesBackIsAsLateAsItWas) {
+  GaussianRobot robot(swaying, {.late_s = 0.04}, 1);
+  MotionFilter filter = begun_with(robot, swaying);
+  sweep_for(60.0, filter, robot, 0.1, {.wheels = false, .lidar = usual_lidar(0.1)});
+  const LearnedSource before = filter.learned(kGyroSource);
+  filter.forget(kGyroSource);
+  const LearnedSource after = filter.learned(kGyroSource);
+  EXPECT_EQ(after.lateness_s().mean, before.lateness_s().mean);
+  EXPECT_EQ(after.mounting_rad(2).mean, before.mounting_rad(2).mean);
+  EXPECT_GT(after.lateness_s().sigma, 10.0 * before.lateness_s().sigma) << "and it may have changed";
+}
+
+/// By how much a second of spinning wheels has taken a robot ahead of itself, at the most.
+double dragged_m(double rate_hz, unsigned seed, const Matrix12& lidar) {
+  const auto spin = [](double t_s) { return t_s > 20.0 && t_s < 21.0 ? 0.6 : 0.0; };
+  GaussianRobot sound(straight(1.0), {}, seed), spinning(straight(1.0), {.slip_mps = spin}, seed);
+  MotionFilter as_it_is = begun_with(sound, straight(1.0)), told = begun_with(spinning, straight(1.0));
+  double most_m = 0.0;
+  while (sound.t_s() < 24.0) {
+    sweep(as_it_is, sound, 1.0 / rate_hz, {.force = true, .lidar = lidar});
+    sweep(told, spinning, 1.0 / rate_hz, {.force = true, .lidar = lidar});
+    most_m = std::max(most_m, told.pose().translation.x() - as_it_is.pose().translation.x());
+  }
+  return most_m;
+}
+
+/// In a field lidar knows the way to a decimetre, and the accelerometer feels nothing.
+TEST(MotionFilter, WheelsThatSpinAreWrongOnceHoweverManySweepsTheySpin) {
+  std::vector<double> mean_m;
+  for (const double rate_hz : kRates_hz) {
+    Matrix12 lidar = usual_lidar(1.0 / rate_hz);
+    lidar(kX, kX) /= 400.0;
+    lidar(6 + kX, 6 + kX) = 0.0;
+    mean_m.push_back(0.0);
+    for (unsigned seed = 1; seed <= 20; ++seed)
+      mean_m.back() += dragged_m(rate_hz, seed, lidar) / 20.0;
+    EXPECT_LT(mean_m.back(), 0.1) << rate_hz << " Hz, of 0.6 m";
+  }
+  EXPECT_LT(mean_m.back(), 1.5 * mean_m.front()) << kRates_hz.back() / kRates_hz.front() << " times the sweeps";
+}
+
 // --- What it says of sources --------------------------------------------------------------------------------------
 
 /// Squared innovation over its variance, mean over the second half of 20 drives of 20 s. What is not measured all the
@@ -164,7 +334,7 @@ Vector6 mean_ratio(double rate_hz, SourceId source, bool all_the_time) {
       const bool counts = i >= static_cast<int>(10 * rate_hz), measured = all_the_time || !counts;
       robot.move(elapsed_s);
       filter.predict(elapsed_s, elapsed_s, std::nullopt, measured ? kAll : kNothing);
-      const Vector6 said = source == kGyroSource ? robot.gyro() : robot.wheels();
+      const SensedTwist said = source == kGyroSource ? robot.gyro() : SensedTwist(robot.wheels());
       if (measured)
         filter.measure(source, said, source == kGyroSource ? kRotation : kAll);
       filter.move();

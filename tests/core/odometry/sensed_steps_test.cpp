@@ -33,7 +33,7 @@ TEST(SensedSteps, AreMeanTwistsHoweverManySweepsWereDropped) {
     EXPECT_DOUBLE_EQ(steps.elapsed_s(sweep), 1e-3 * elapsed_ms);
     const auto twist_base = steps.twist_base(sweep, kSource);
     ASSERT_TRUE(twist_base);
-    EXPECT_LT((*twist_base - kTwist).norm(), 1e-9) << elapsed_ms;
+    EXPECT_LT((twist_base->mean - kTwist).norm(), 1e-9) << elapsed_ms;
     EXPECT_TRUE(steps.is_usable(sweep, kSource));
   }
 }
@@ -44,7 +44,23 @@ TEST(SensedSteps, CountFromTheLastThatWasRemembered) {
   steps.remember(second);
   EXPECT_EQ(steps.last(), second.end);
   EXPECT_DOUBLE_EQ(steps.elapsed_s(sweep_at(milliseconds{250})), 0.15);
-  EXPECT_LT((*steps.twist_base(sweep_at(milliseconds{250}), kSource) - kTwist).norm(), 1e-9);
+  EXPECT_LT((steps.twist_base(sweep_at(milliseconds{250}), kSource)->mean - kTwist).norm(), 1e-9);
+}
+
+TEST(SensedSteps, TellHowTheTwistChangesAndWhatIsDueToStampsThatWereCorrected) {
+  Sweep first = sweep_at(milliseconds{0}), second = sweep_at(milliseconds{100});
+  SourcePose& began = first.motion.sources[index_of(kSource)];
+  SourcePose& ended = second.motion.sources[index_of(kSource)];
+  began.twist_base = kTwist;
+  ended.twist_base = 3.0 * kTwist;
+  began.late = milliseconds{10};
+  ended.late = milliseconds{40};
+  SensedSteps steps;
+  steps.remember(first);
+  const auto sensed = steps.twist_base(second, kSource);
+  ASSERT_TRUE(sensed);
+  EXPECT_LT((sensed->change_per_s - 20.0 * kTwist).norm(), 1e-9);
+  EXPECT_LT((sensed->brought_forward - (0.04 * 3.0 - 0.01) / 0.1 * kTwist).norm(), 1e-9);
 }
 
 TEST(SensedSteps, AreNothingWhereTheSourceWasNotHeard) {

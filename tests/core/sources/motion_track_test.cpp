@@ -72,6 +72,23 @@ TEST(MotionTrack, ExtrapolatesForFiftyMillisecondsAndNoFarther) {
   EXPECT_FALSE(track.at(at_ms(151)));
 }
 
+TEST(MotionTrack, OfALateSourceIsToldAsOfTheMotion) {
+  MotionTrack track = imu_track();
+  for (int i = 0; i <= 20; ++i)
+    track.add(imu(at_ms(10 * i), {0, 0, 0.1 * i}, {0.01 * i, 0, 9.81}));
+  const Pose before = *track.at(at_ms(100));
+  const SpecificForce force = *track.specific_force(at_ms(50), at_ms(100));
+  track.set_late(milliseconds{40});
+  EXPECT_EQ(track.at(at_ms(60)), before);
+  EXPECT_EQ(track.specific_force(at_ms(10), at_ms(60))->mean_base_mps2(), force.mean_base_mps2());
+  EXPECT_EQ(track.newest(), at_ms(160));
+  EXPECT_TRUE(track.is_live(at_ms(210)));
+  EXPECT_FALSE(track.is_live(at_ms(211)));
+  EXPECT_TRUE(track.has_sample_in(at_ms(150), at_ms(160)));
+  EXPECT_FALSE(track.has_sample_in(at_ms(160), at_ms(200)));
+  EXPECT_FALSE(track.at(at_ms(211)));
+}
+
 TEST(MotionTrack, ASingleSampleStands) {
   MotionTrack track = odometry_track();
   track.add(odometry(at_ms(0), 7.0));

@@ -256,6 +256,27 @@ TEST_F(CaptureFolders, FileStandsForItself) {
   EXPECT_EQ(found->lidar, std::vector{folder_ / "drive.pcap"});
 }
 
+TEST_F(CaptureFolders, PartsFollowTheCaptureThatIsNamed) {
+  for (const char* const name : {"drive.pcap", "drive.pcap1", "drive.pcap2.gz", "drive.pcap4", "drive.pcapng", "drive",
+                                 "drive1", "lidar.pcap.xz", "lidar.pcap1.xz", "a.pcap0", "a.pcap1"})
+    add(name);
+  const auto found = [&](const char* name) {
+    std::vector<std::string> names;
+    const auto recording = CaptureFolder::find(folder_ / name);
+    for (const auto& file : recording->lidar)
+      names.push_back(file.filename());
+    return names;
+  };
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(found("drive.pcap"), (Names{"drive.pcap", "drive.pcap1", "drive.pcap2.gz"})) << "the next is missing";
+  EXPECT_EQ(found("drive.pcap1"), Names{"drive.pcap1"});
+  EXPECT_EQ(found("drive.pcapng"), Names{"drive.pcapng"});
+  EXPECT_EQ(found("drive"), Names{"drive"});
+  EXPECT_EQ(found("a.pcap0"), Names{"a.pcap0"});
+  EXPECT_EQ(found(""), (Names{"lidar.pcap.xz", "lidar.pcap1.xz"})) << "those of the folder";
+  EXPECT_EQ(CaptureFolder::find("-")->lidar, std::vector<std::filesystem::path>{"-"});
+}
+
 TEST_F(CaptureFolders, PiecesAreOneRecordingInTheOrderOfTheirNumbers) {
   for (const char* piece : {"000001_2026-11-22T08-12-05Z/000009", "000001_2026-11-22T08-12-05Z/000010",
                             "000002_2026-11-22T09-00-00Z/000001", "000002_2026-11-22T09-00-00Z/000002", "notes"})

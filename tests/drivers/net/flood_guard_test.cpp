@@ -110,6 +110,16 @@ TEST_F(Guarded, EndOfTheFloodOpensTheSocketAgain) {
   EXPECT_EQ(passing(700), 1000U);
 }
 
+/// Whoever sends a few datagrams later is no flood any more, and is not told to be one.
+TEST_F(Guarded, EndOfTheFloodIsSeenWhereNobodySends) {
+  look_at(FloodGuard::kFlood + 1, 700, kStranger);
+  guard_.hear_nothing(now_ += milliseconds{900}, socket_);
+  EXPECT_LT(passing(700), 30U) << "the second is not over";
+  for (int second = 0; second < 2; ++second) // what the last one counted ends with the first
+    guard_.hear_nothing(now_ += milliseconds{1100}, socket_);
+  EXPECT_EQ(passing(700), 1000U);
+}
+
 TEST_F(Guarded, SocketThatIsTakenOverHasNoFilterOfAnotherOwner) {
   look_at(FloodGuard::kFlood + 1, 700, kStranger);
   ASSERT_LT(passing(700), 30U);

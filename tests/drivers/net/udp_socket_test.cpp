@@ -58,7 +58,7 @@ TEST(UdpSocket, GivesPayloadSenderPortAndTheKernelsStamp) {
 
 TEST(UdpSocket, LongDatagramIsCutAndSaysSo) {
   UdpSocket socket = open_any();
-  UdpSender().send(socket.port(), std::vector<std::byte>(5000));
+  UdpSender().send(socket.port(), std::vector<std::byte>(kLongestPayload + 1));
   const auto datagrams = socket.receive();
   ASSERT_EQ(datagrams.size(), 1U);
   EXPECT_TRUE(datagrams[0].truncated);

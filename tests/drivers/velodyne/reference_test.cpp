@@ -15,7 +15,7 @@
 #include "drivers/lidar_input.hpp"
 #include "drivers/reference_data.hpp"
 #include "drivers/velodyne/decoder.hpp"
-#include "drivers/velodyne/wire.hpp"
+#include "drivers/wire.hpp"
 #include "support/returns.hpp"
 #include "support/test_data.hpp"
 

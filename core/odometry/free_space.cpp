@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "core/odometry/free_space.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <iterator>
+
+namespace locus {
+
+namespace {
+
+/// After so long a robot that stood knows nothing of what has come to stand there.
+constexpr Duration kRecent = std::chrono::seconds{10};
+
+/// What is nearer by a fine voxel of the map, and by what an error of direction makes of a range, is before the rest.
+constexpr float kBefore_m = 0.5F, kBeforeShare = 0.05F;
+
+/// So many of a direction and its eight neighbours must have seen something, all of it farther away.
+constexpr int kEnough = 3;
+
+} // namespace
+
+void FreeSpace::expect(const Sweep& sweep) {
+  stamp_ = sweep.end;
+  lidars_ = sweep.lidars;
+  for (Keyframe& keyframe : last_)
+    keyframe.views.resize(lidars_.count); // of the first sweep alone does something, as what follows
+  lidar_of_.reserve(sweep.points.capacity());
+  standing_.reserve(sweep.points.capacity());
+  lidar_of_.clear();
+  for (const SweepPoint& point : sweep.points)
+    lidar_of_.push_back(lidar_of(point));
+}
+
+std::span<const SurfacePoint> FreeSpace::leave_out_moving(std::span<const SurfacePoint> scan_base,
+                                                          const Pose& T_odom_base) {
+  const Eigen::Matrix3f R_odom_base = T_odom_base.R().cast<float>();
+  const Eigen::Vector3f t_odom_base = T_odom_base.translation.cast<float>();
+  standing_.clear();
+  std::ranges::copy_if(scan_base, std::back_inserter(standing_), [&](const SurfacePoint& point) {
+    return !is_free(R_odom_base * point.position_m + t_odom_base);
+  });
+  see(scan_base, T_odom_base);
+  return standing_;
+}
+
+bool FreeSpace::is_free(const Eigen::Vector3f& point_odom_m) const {
+  for (std::size_t i = 0; i < std::min(keyframes_, kKeyframes); ++i)
+    if (std::chrono::abs(stamp_ - last_[i].stamp) < kRecent &&
+        std::ranges::any_of(last_[i].views, [&](const View& view) { return sees_through(view, point_odom_m); }))
+      return true;
+  return false;
+}
+
+bool FreeSpace::sees_through(const View& view, const Eigen::Vector3f& point_odom_m) {
+  const Eigen::Vector3f direction = view.R_view_odom * (point_odom_m - view.lidar_odom_m);
+  const float range_m = direction.norm();
+  const float behind_m = range_m + kBefore_m + kBeforeShare * range_m;
+  const Cell at = cell_of(direction, range_m);
+  int seen = 0;
+  for (int row = std::max(at.row - 1, 0); row <= std::min(at.row + 1, kRows - 1); ++row)
+    for (int side = -1; side <= 1; ++side) {
+      const int column = (at.column + side + kColumns) % kColumns;
+      const float nearest_m = view.nearest_m[static_cast<std::size_t>(row * kColumns + column)];
+      if (nearest_m == 0.0F)
+        continue;
+      if (nearest_m < behind_m)
+        return false;
+      ++seen;
+    }
+  return seen >= kEnough;
+}
+
+/// Without the cost of an angle: columns divide a diamond around the origin in place of a circle, rows the sine.
+FreeSpace::Cell FreeSpace::cell_of(const Eigen::Vector3f& direction, float range_m) {
+  constexpr float kTiny_m = 1e-6F; ///< no direction at all is some direction
+  const float x = direction.x(), y = direction.y();
+  const float along = y / (std::abs(x) + std::abs(y) + kTiny_m);
+  const float around = x < 0.0F ? 2.0F - along : along + (along < 0.0F ? 4.0F : 0.0F); // of four
+  const float up = direction.z() / (range_m + kTiny_m) + 1.0F;                         // of two
+  return {std::clamp(static_cast<int>(around * (static_cast<float>(kColumns) / 4.0F)), 0, kColumns - 1),
+          std::clamp(static_cast<int>(up * (static_cast<float>(kRows) / 2.0F)), 0, kRows - 1)};
+}
+
+void FreeSpace::see(std::span<const SurfacePoint> scan_base, const Pose& T_odom_base) {
+  Keyframe& keyframe = last_[keyframes_++ % kKeyframes];
+  keyframe.stamp = stamp_;
+  for (std::size_t i = 0; i < lidars_.count; ++i) {
+    View& view = keyframe.views[i];
+    view.lidar_odom_m = (T_odom_base * lidars_.base_m[i].cast<double>()).cast<float>();
+    view.R_view_odom = T_odom_base.R().transpose().cast<float>();
+    view.nearest_m.fill(0.0F);
+  }
+  for (std::size_t i = 0; i < scan_base.size(); ++i) {
+    const std::size_t lidar = lidar_of_[i];
+    if (lidar >= lidars_.count)
+      continue;
+    const Eigen::Vector3f direction = scan_base[i].position_m - lidars_.base_m[lidar];
+    const float range_m = direction.norm();
+    const Cell at = cell_of(direction, range_m);
+    float& nearest_m = keyframe.views[lidar].nearest_m[static_cast<std::size_t>(at.row * kColumns + at.column)];
+    nearest_m = nearest_m == 0.0F ? range_m : std::min(nearest_m, range_m);
+  }
+}
+
+} // namespace locus

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+// How an odometry begins: its first two sweeps.
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "core/odometry/odometry.hpp"
+
+namespace locus {
+
+namespace {
+
+/// Of the points of the second sweep, those that the first must have seen, too, if the motion between them is to be
+/// found: honest starts have 0.45 and more, two halves of a turn 0.1 to 0.17.
+constexpr double kMinOverlap = 0.3;
+
+constexpr double kUnknownRate_radps = 100.0; ///< of a robot of which nothing is known
+constexpr int kRounds = 8;        ///< at the most, until motion and correction of the first two sweeps agree:
+constexpr double kAgrees = 0.002; ///< metres, radians
+
+} // namespace
+
+/// The world begins at the first sweep: where another run has ended, or at its origin, without yaw, level if gravity is
+/// known.
+OdometryEstimate Odometry::begin(const Sweep& sweep) {
+  OdometryEstimate estimate;
+  move_points(sweep, SweepCorrection::all(sweep, corrected_twist(sweep)));
+  gravity_.observe(Eigen::Quaterniond::Identity(), sweep);
+  estimate.failed = scan_.size() < kMinPoints || (map_.fine().size() > 0 && !find_again(sweep));
+  Whereabouts here;
+  if (start_ && estimate.failed)
+    here = start_->moved_to(start_->places(sweep.end, sweep.motion, options_.motion.max_speed_mps).front());
+  else if (start_)
+    here = *start_;
+  else if (const auto up_base = gravity_.up_base())
+    here.T_odom_base.rotation = from_rpy_rad(level_rpy_rad(*up_base));
+  const Vector6 unknown = along_each_axis(options_.motion.max_speed_mps, kUnknownRate_radps);
+  filter_.begin(here.T_odom_base, Vector6::Zero(), unknown, here.pose_covariance);
+  if (observer_)
+    observer_->begin(here.T_odom_base, Vector6::Zero(), unknown, here.pose_covariance);
+  if (estimate.failed) { // the next sweep is the first
+    estimate.state = TrackingState::dead_reckoning;
+  } else {
+    if (!beginning_)
+      beginning_ = start_ ? Beginning::told : Beginning::origin;
+    map_policy_.begin(sweep.end, here.T_odom_base);
+    first_ = sweep;
+    estimate.keyframe = true;
+    if (!run_before_) {
+      free_space_.expect(sweep);
+      keyframe_observability_ = Matrix6::Zero();
+    }
+  }
+  estimate.stamp = sweep.end;
+  estimate.beginning = beginning_;
+  estimate.T_odom_base = here.T_odom_base;
+  estimate.twist_covariance = filter_.covariance().bottomRightCorner<6, 6>();
+  estimate.pose_covariance = filter_.pose_covariance_since_start();
+  estimate.points = sweep.registered;
+  report_sources(sweep, estimate);
+  steps_.remember(sweep);
+  return estimate;
+}
+
+/// Looks for the robot in the map that another run has left. Where it is not found the map is given up, and it begins
+/// where an odometry says, or at the origin. False while it is too early to say.
+bool Odometry::find_again(const Sweep& sweep) {
+  constexpr Duration kPatience = std::chrono::seconds{1}; ///< publishers find each other faster
+  waits_since_ = waits_since_.value_or(sweep.end);
+  const StageScope scope(clock_, Stage::scan_to_submap);
+  const std::vector<Place> places = start_->places(sweep.end, sweep.motion, options_.motion.max_speed_mps);
+  const bool waits = !places.front().vouched && start_->awaits(sweep.motion) &&
+                     std::chrono::abs(sweep.end - *waits_since_) < kPatience;
+  if (const auto found =
+          relocate(gicp_, std::span(scan_).first(sweep.registered), map_, places, options_.scan_to_submap, waits)) {
+    beginning_ = Beginning::map;
+    run_before_ = std::exchange(start_, start_->moved_to(found->place));
+    map_policy_.resume();
+    return true;
+  }
+  if (waits)
+    return false;
+  map_.clear();
+  if (const auto told = std::ranges::find_if(places, &Place::told); told != places.end()) {
+    beginning_ = Beginning::odometry;
+    start_ = start_->moved_to(*told);
+  } else {
+    start_.reset();
+  }
+  return true;
+}
+
+/// The first sweep came without any idea of the motion. What is found between it and the second corrects both, so it
+/// can be found better; then the map begins with the first one corrected. A source that is wrong bends both, and says
+/// that the robot is elsewhere in a map that another run has left.
+void Odometry::find_start(const Sweep& sweep, const Gicp::StopRequested& stop) {
+  const Sweep first = *std::exchange(first_, std::nullopt);
+  const auto start = find_first_motion(first, sweep, stop);
+  if (start) {
+    stands_ = start->rests;
+    begin_filter(filter_.pose(), *start);
+    correct(first, start->twist_base, start->without);
+  } else if (run_before_) {
+    move_points(first, SweepCorrection::all(first, corrected_twist(first)));
+  }
+  if (start && run_before_) {
+    if (!stop()) // what was cut short fits badly for that alone
+      find_once_more(first, sweep, *start);
+  } else if (start) {
+    lidar_health_.learn(start->fit, sweep.registered, steps_.elapsed_s(sweep));
+    map_.clear();
+  }
+  free_space_.forget(); // the first sweep was not corrected for any motion
+  if (start || run_before_) {
+    free_space_.expect(first);
+    map_.insert(free_space_.leave_out_moving(scan_, filter_.pose()), filter_.pose());
+  }
+  run_before_.reset();
+}
+
+void Odometry::begin_filter(const Pose& T_odom_first, const Start& start) {
+  const Vector6 sigma = start.rests ? along_each_axis(0.1, 1.0) : along_each_axis(1.0, 10.0);
+  const Matrix6 of_map = start_ ? start_->pose_covariance : Matrix6::Zero();
+  filter_.begin(T_odom_first, start.twist_base, sigma, of_map);
+  if (observer_)
+    observer_->begin(T_odom_first, start.twist_base, sigma, of_map);
+}
+
+/// The motion between the first two sweeps, as far as they see the same.
+std::optional<Odometry::Start> Odometry::find_first_motion(const Sweep& first, const Sweep& sweep,
+                                                           const Gicp::StopRequested& stop) {
+  if (sweep.points.size() < kMinPoints || steps_.elapsed_s(sweep) <= 0.0 ||
+      options_.scan_to_scan_mode == ScanToScanMode::off)
+    return std::nullopt;
+  const StageScope scope(clock_, Stage::scan_to_scan);
+  Start start = start_without({}, first, sweep, stop);
+  if (const SourceChoice choice = choose_among(sweep, {}); choice.rotation && !stop())
+    if (Start free = start_without(kAllSources, first, sweep, stop);
+        evidence(free.fit, start.fit) > all_are_right(sweep, choice))
+      start = free;
+  if (static_cast<double>(start.fit.inliers) < kMinOverlap * static_cast<double>(sweep.registered))
+    return std::nullopt;
+  return start;
+}
+
+/// The first sweep, now that it is corrected for what the first two say. An odometry that they contradict is in doubt:
+/// where it says that the robot is, it need not be.
+void Odometry::find_once_more(const Sweep& first, const Sweep& sweep, const Start& start) {
+  const StageScope scope(clock_, Stage::scan_to_submap);
+  MotionFilter lidar_alone = assume(sweep, kAllSources, false).filter;
+  lidar_alone.see(start.fit.T_target_source, start.twist_base, start.fit.information);
+  for (std::size_t i = 0; i < sources_.size(); ++i)
+    if (const auto twist_base = steps_.twist_base(sweep, SourceId{i})) {
+      const auto ratio = test_ratio(lidar_alone.innovation(SourceId{i}, *twist_base), steps_.elapsed_s(sweep));
+      run_before_->doubted[i] = run_before_->doubted[i] || ratio.value_or(0.0) > 1.0;
+    }
+  const auto found = relocate(gicp_, std::span(scan_).first(first.registered), map_,
+                              run_before_->places(first.end, first.motion, options_.motion.max_speed_mps),
+                              options_.scan_to_submap, false);
+  if (!found)
+    return;
+  start_ = run_before_->moved_to(found->place);
+  begin_filter(start_->T_odom_base, start);
+  lidar_health_.learn(found->fit, first.registered, steps_.elapsed_s(sweep));
+}
+
+/// The motion between the first two sweeps, if their points are corrected as some sources would not have it.
+Odometry::Start Odometry::start_without(std::bitset<kMaxSources> without, const Sweep& first, const Sweep& sweep,
+                                        const Gicp::StopRequested& stop) {
+  const MotionFilter unknown = assume(sweep, without, false).filter;
+  const Pose T_odom_first = filter_.pose();
+  MotionBelief prior = unknown.belief();
+  prior.information.setZero(); // the pose alone is looked for
+  prior.information.topLeftCorner<6, 6>() = unknown.covariance().topLeftCorner<6, 6>().inverse();
+  const auto match = [&](const Vector6& twist, std::bitset<kMaxSources> unused, const Pose& T_start,
+                         const MotionBelief& belief, int iterations) {
+    correct(first, twist, unused);
+    last_scan_map_.clear();
+    last_scan_map_.insert(scan_, T_odom_first);
+    correct(sweep, twist, unused);
+    const ElasticScan rigid{.points = std::span(scan_).first(sweep.registered), .block_age_s = {}, .twist_base = twist};
+    RegistrationOptions options = options_.scan_to_scan;
+    options.max_iterations = std::min(options.max_iterations, iterations);
+    return gicp_.align(rigid, last_scan_map_, T_start, belief, options, iterations > 4, stop);
+  };
+  const Registration rest = match(Vector6::Zero(), kAllSources, T_odom_first,
+                                  {T_odom_first, Vector6::Zero(), 1e12 * Matrix12::Identity()}, 4);
+  Start start{.without = without, .rests = false, .twist_base = unknown.twist_base(), .fit = {}};
+  Pose T_odom_base = unknown.pose();
+  for (int round = 0; round < kRounds; ++round) {
+    start.fit = match(start.twist_base, without, T_odom_base, prior, options_.scan_to_scan.max_iterations);
+    const Pose T_before = std::exchange(T_odom_base, start.fit.T_target_source);
+    start.twist_base = se3_log(T_odom_first.inverse() * T_odom_base) / steps_.elapsed_s(sweep);
+    if (difference(T_odom_base, T_before).cwiseAbs().maxCoeff() < kAgrees || stop())
+      break;
+  }
+  if (evidence(rest, start.fit) > -kBeginsAtRest)
+    start = {.without = kAllSources, .rests = true, .twist_base = Vector6::Zero(), .fit = rest};
+  return start;
+}
+
+} // namespace locus

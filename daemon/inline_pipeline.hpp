@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <utility>
+
+#include "config/config.hpp"
+#include "daemon/ingest.hpp"
+#include "daemon/input.hpp"
+#include "daemon/sweep_processor.hpp"
+
+namespace locus::daemon {
+
+/// Ingest and odometry in the thread of the caller: take() returns once the sweeps that the input completed are
+/// processed. What locus-replay and liblocus share; the service has the same objects in threads of their own
+/// (LivePipeline). The same inputs give the same bits. One owner.
+class InlinePipeline {
+ public:
+  /// Changes a sweep between its cut and the odometry; for experiments.
+  using Stage = std::function<void(Sweep& sweep)>;
+  /// Takes each sweep once all is done with it, and may ask the pipeline meanwhile.
+  using Sink = std::function<void(const Sweep& sweep, const ProcessedSweep& done)>;
+
+  /// `lidars` opened from config.lidars.
+  InlinePipeline(const Config& config, LidarRouter lidars, Sink sink, MotionSources::HealthSink health_sink = {},
+                 Stage stage = {})
+      : stage_(std::move(stage)), sink_(std::move(sink)), processor_(config),
+        ingest_(
+            config, std::move(lidars), [this](Sweep& sweep, const SweepCut& cut) { process(sweep, cut); },
+            std::move(health_sink)) {}
+  InlinePipeline(const InlinePipeline&) = delete;
+  InlinePipeline& operator=(const InlinePipeline&) = delete;
+
+  void take(const Input& input) { ingest_.take(input); }
+
+  [[nodiscard]] const Ingest& ingest() const { return ingest_; }
+  [[nodiscard]] const SweepProcessor& processor() const { return processor_; }
+  [[nodiscard]] const SweepCounters& counters() const { return counters_; }
+
+ private:
+  void process(Sweep& sweep, const SweepCut& cut) {
+    if (stage_)
+      stage_(sweep);
+    const ProcessedSweep done = processor_.process(sweep, cut);
+    processor_.prepare_next();
+    ingest_.take(processor_.odometry().feedback());
+    ++counters_.seen;
+    ++(done.estimate.failed ? counters_.failed : counters_.processed);
+    sink_(sweep, done);
+  }
+
+  Stage stage_;
+  Sink sink_;
+  SweepCounters counters_;
+  SweepProcessor processor_;
+  Ingest ingest_;
+};
+
+} // namespace locus::daemon

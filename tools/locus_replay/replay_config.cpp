@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_replay/replay_config.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "bags/bag.hpp"
+#include "config/config_yaml.hpp"
+#include "config/lidar_metadata.hpp"
+#include "kitti/kitti_drive.hpp"
+#include "locus_replay/bag_cloud_lidar.hpp"
+#include "locus_replay/failure.hpp"
+#include "locus_replay/recorded_input.hpp"
+#include "sweep_folder/sweep_folder.hpp"
+
+namespace locus::tools {
+namespace {
+
+Config config_or_fail(Expected<Config, ConfigErrors> config) {
+  if (!config)
+    throw Failure(ExitStatus::wrong_usage, fmt::format("{}", fmt::join(config.error(), "\n")));
+  return *config;
+}
+
+Isa isa_or_fail(const std::string& name) {
+  const std::optional<Isa> isa = from_string<Isa>(name);
+  if (!isa || !is_supported(*isa))
+    throw Failure(ExitStatus::wrong_usage,
+                  fmt::format("LOCUS_ISA={}: {}; unset it, or choose one of {} that this processor has", name,
+                              isa ? "this processor cannot run it" : "no such instruction set",
+                              fmt::join(names_of(Isa{}), ", ")));
+  return *isa;
+}
+
+/// By the metadata of its lidars, and the instructions that the user asks for.
+Config completed(Config config) {
+  config = config_or_fail(with_lidar_metadata(std::move(config)));
+  if (const char* const isa = std::getenv("LOCUS_ISA")) // NOLINT(concurrency-mt-unsafe): nobody sets it
+    config.use(isa_or_fail(isa));
+  return config;
+}
+
+constexpr double kFastestCar_mps = 60.0;
+
+/// Without a configuration the files of a folder tell which sources there were, those of a walking robot first, and
+/// whether it was a car. `lines` for the user are about a bag that has clouds alone.
+Config configuration_of(const CaptureFolder& folder, const std::filesystem::path& capture,
+                        std::vector<std::string>& lines) {
+  Config config;
+  if (looks_like_bag(capture))
+    take_clouds_of(capture, config, lines);
+  if (KittiDrive::is(capture) || SweepFolder::is_kitti_odometry(capture))
+    config.odometry.motion.max_speed_mps = kFastestCar_mps;
+  for (const char* const name : {"kio", "vio"}) {
+    if (std::ranges::find(folder.odometry, name, &CaptureFolder::Source::name) == folder.odometry.end())
+      continue;
+    config.motion_sources.insert(config.motion_sources.begin(), {{name, SourceKind::odometry, {}}, "", ""});
+  }
+  return config;
+}
+
+/// The first lidar takes the sweeps of a folder, whatever is configured of its packets.
+void take_sweeps(const std::filesystem::path& capture, Config& config) {
+  LidarOptions& lidar = config.lidars.front();
+  if (!lidar.gives_clouds()) {
+    LidarOptions takes;
+    takes.name = lidar.name;
+    takes.topic = "/sweeps";
+    takes.T_base_lidar = lidar.T_base_lidar;
+    takes.isa = lidar.isa;
+    lidar = std::move(takes);
+  }
+  if (SweepFolder::is_kitti_odometry(capture) && lidar.point_times == PointTimesFrom::automatic)
+    lidar.point_times = PointTimesFrom::none;
+}
+
+} // namespace
+
+Config read_configuration(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
+  Config config;
+  if (!file.empty())
+    config = config_or_fail(load_config(file));
+  return completed(config_or_fail(override_config(config, overrides)));
+}
+
+Config configuration_for(const FoundRecording& found, const std::filesystem::path& file, const Arguments& arguments,
+                         std::vector<std::string>& lines, FoundMetadata& metadata) {
+  Config config =
+      file.empty() ? configuration_of(found.files, found.capture, lines) : config_or_fail(load_config(file));
+  if (arguments.config.empty())
+    use_recorded_metadata(found.files, config);
+  if (gives_sweeps(found.capture))
+    take_sweeps(found.capture, config);
+  config = config_or_fail(override_config(config, arguments.overrides));
+  if (file.empty())
+    metadata = find_metadata(found.files, config);
+  config = completed(std::move(config));
+  config.sweep.keeps_returns = !arguments.sweeps.empty();
+  return config;
+}
+
+} // namespace locus::tools

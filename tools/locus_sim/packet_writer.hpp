@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/base/pose.hpp"
+#include "core/base/stamp.hpp"
+
+namespace locus::sim {
+
+struct SyntheticLidarOptions;
+
+/// Where the lasers of a lidar point and when they fire, from the tables (or the metadata) that its decoder reads
+/// packets by. A packet has columns: firings that share one reported azimuth.
+struct FiringPattern {
+  struct Laser {
+    double elevation_rad;
+    double azimuth_offset_rad; ///< clockwise seen from above
+    double origin_z_m;
+  };
+  struct Firing {
+    std::size_t laser;
+    Duration after; ///< the instant of its column's azimuth
+  };
+
+  std::vector<Laser> lasers;
+  std::vector<Firing> firings; ///< of a column, in the order of the packet's channels
+  std::size_t columns;         ///< of a packet
+  Duration column_duration;    ///< from one to the next, by the lidar's clock
+  double rpm;
+  double first_azimuth_deg; ///< of the first column
+  double resolution_m;
+  std::uint32_t most_ticks;
+  double origin_radius_m = 0; ///< of the circle that beams begin on, in the direction of the column; ranges count from
+                              ///< its centre
+  std::optional<Pose> T_lidar_rotor{}; ///< from the frame in which azimuths count to the lidar's; nothing: they are one
+};
+
+struct Echo {
+  std::uint32_t ticks = 0; ///< of the pattern's resolution; 0: none
+  std::uint8_t intensity = 0;
+};
+struct Echoes {
+  Echo last, strongest;
+};
+
+/// Writes data packets as one kind of lidar sends them. For each: its columns one after the other, each with an echo or
+/// none of every firing, then finish(). One owner.
+class PacketWriter {
+ public:
+  explicit PacketWriter(FiringPattern pattern) : pattern_(std::move(pattern)) {}
+  PacketWriter(const PacketWriter&) = delete;
+  PacketWriter& operator=(const PacketWriter&) = delete;
+  virtual ~PacketWriter() = default;
+
+  [[nodiscard]] const FiringPattern& pattern() const { return pattern_; }
+
+  /// `own_time`: by the lidar's clock, before SyntheticLidarOptions::clock_offset; azimuth 0 .. 2 pi, clockwise.
+  virtual void begin_column(std::size_t column, Stamp own_time, double azimuth_rad) = 0;
+  virtual void put(std::size_t column, std::size_t firing, const Echoes& echoes) = 0;
+  /// The payload, valid until the next packet begins. `begin`: own time of its first column.
+  virtual std::span<const std::byte> finish(Stamp begin) = 0;
+
+ private:
+  FiringPattern pattern_;
+};
+
+std::unique_ptr<PacketWriter> velodyne_writer(const SyntheticLidarOptions& options);
+/// Single return: whatever the options say, the strongest.
+std::unique_ptr<PacketWriter> hesai_writer(const SyntheticLidarOptions& options);
+/// The same. The sensor's clock starts some time before `start`.
+std::unique_ptr<PacketWriter> ouster_writer(const SyntheticLidarOptions& options, Stamp start);
+
+} // namespace locus::sim
