@@ -13,6 +13,7 @@ namespace {
 
 constexpr Duration kWeighFor = std::chrono::seconds{1};
 constexpr double kGravityTolerance = 0.15; ///< of the whole: a robot may be driving off
+constexpr double kEarlyTolerance = 0.3;    ///< of the mean so far, before that: a few samples of a robot that shakes
 constexpr double kMaxTilt_deg = 60.0;      ///< no robot begins on a steeper slope
 
 /// Lesser turns in a sweep are noise to lidar.
@@ -59,6 +60,15 @@ void ImuSelfCheck::weigh(const Eigen::Vector3d& specific_force_base_mps2, Stamp 
   forces_ += 1.0;
   if (stamp - *first_ >= kWeighFor)
     weigh_gravity();
+}
+
+bool ImuSelfCheck::trusts_accelerometer() const {
+  return use_acceleration_ == UseAcceleration::automatic && trusts_accelerometer_ && (weighed_ || may_be_gravity());
+}
+
+/// The mean of the forces so far. Without a sample there is no reason for trust.
+bool ImuSelfCheck::may_be_gravity() const {
+  return forces_ > 0.0 && is_about(force_sum_mps2_.norm() / forces_, kGravity_mps2, kEarlyTolerance);
 }
 
 void ImuSelfCheck::follow_turns(const Eigen::Vector3d& turn_rate_base_radps, Stamp stamp) {

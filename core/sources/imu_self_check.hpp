@@ -33,9 +33,8 @@ class ImuSelfCheck : public HealthMetric {
   void forget() override;
 
   [[nodiscard]] std::string_view verdict() const override;
-  [[nodiscard]] bool trusts_accelerometer() const override {
-    return trusts_accelerometer_ && use_acceleration_ == UseAcceleration::automatic;
-  }
+  /// Until gravity is weighed, only while the mean so far may be gravity: forces in another unit are a free fall.
+  [[nodiscard]] bool trusts_accelerometer() const override;
 
  private:
   /// What gyro and lidar are seen to differ in.
@@ -60,6 +59,7 @@ class ImuSelfCheck : public HealthMetric {
 
   void weigh(const Eigen::Vector3d& specific_force_base_mps2, Stamp stamp);
   void weigh_gravity();
+  [[nodiscard]] bool may_be_gravity() const;
   void follow_turns(const Eigen::Vector3d& turn_rate_base_radps, Stamp stamp);
   [[nodiscard]] const Turned& remembered(std::size_t age) const;
   [[nodiscard]] bool remembers(Stamp stamp) const;

@@ -85,6 +85,30 @@ TEST_F(ImuSelfCheckTest, AccelerationsInGAreNotUsedButTheGyroIs) {
   EXPECT_NE(check.verdict().find("in g"), std::string_view::npos);
 }
 
+/// They were used until gravity was weighed: a second of free fall at the start of a drive.
+TEST_F(ImuSelfCheckTest, AccelerationsInGAreNotTrustedBeforeGravityIsWeighed) {
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
+  EXPECT_FALSE(check.trusts_accelerometer()) << "nothing is known of it";
+  for (int i = 0; i < 10; ++i) {
+    drive(check, milliseconds{90}, [](ImuSample& sample) { sample.specific_force_mps2 /= 9.81; });
+    EXPECT_FALSE(check.trusts_accelerometer());
+  }
+}
+
+TEST_F(ImuSelfCheckTest, AnAccelerometerThatFeelsGravityIsTrustedFromItsFirstSampleOn) {
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
+  drive(check, milliseconds{5}, [](ImuSample&) {});
+  EXPECT_TRUE(check.trusts_accelerometer());
+}
+
+TEST_F(ImuSelfCheckTest, AFirstSampleOfZerosIsOutweighedWithinTenSamples) {
+  ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
+  drive(check, milliseconds{5}, [](ImuSample& sample) { sample.specific_force_mps2.setZero(); });
+  EXPECT_FALSE(check.trusts_accelerometer());
+  drive(check, milliseconds{45}, [](ImuSample&) {});
+  EXPECT_TRUE(check.trusts_accelerometer());
+}
+
 TEST_F(ImuSelfCheckTest, AccelerationsThatAreNoGravityAreNotUsed) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   drive(check, seconds{5}, [](ImuSample& sample) { sample.specific_force_mps2 *= 2.0; });
