@@ -395,6 +395,17 @@ void Odometry::follow_lateness(const Learned& late_s, Duration& taken_out) {
     taken_out = MotionTrack::taken_out(std::clamp(late_s.mean, -kMostLate_s, kMostLate_s));
 }
 
+/// Forgets what was learned of a source that was lost and comes back, perhaps as another. A sweep without a sample of
+/// it is no loss: its scale and its bias are those of before.
+void Odometry::follow_epoch(SourceId source, const SourcePose& sensed) {
+  std::optional<std::uint32_t>& epoch = epochs_[index_of(source)];
+  if (!sensed.known || epoch == sensed.epoch)
+    return;
+  if (epoch && !recalled_[index_of(source)])
+    forget(source);
+  epoch = sensed.epoch;
+}
+
 void Odometry::forget(SourceId source) {
   filter_.forget(source);
   if (observer_)
@@ -403,15 +414,14 @@ void Odometry::forget(SourceId source) {
     learned_since_[index_of(source)] = Stamp{};
 }
 
-/// Where each source saw the base, and what is known of it. What was learned of one that has gone is forgotten.
+/// Where each source saw the base, and what is known of it.
 void Odometry::report_sources(const Sweep& sweep, OdometryEstimate& estimate) {
   for (std::size_t i = 0; i < sources_.size(); ++i) {
     const SourcePose& sensed = sweep.motion.sources[i];
     SourceReport& report = source_reports_[i];
+    follow_epoch(SourceId{i}, sensed);
     if (sensed.usable)
       recalled_.reset(i);
-    else if (!recalled_[i])
-      forget(SourceId{i}); // what comes back may come back as another
     report.T_source_base =
         sensed.known && sources_[i].kind == SourceKind::odometry ? std::optional{sensed.T_source_base} : std::nullopt;
     report.doubted = !sensed.usable;

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <bitset>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -122,6 +124,7 @@ class Odometry {
   Hypothesis choose(const Sweep& sweep, const Gicp::StopRequested& stop);
   void tell(MotionFilter& filter, const Sweep& sweep, const Hypothesis& hypothesis) const;
   void observe(const Sweep& sweep, const Hypothesis& best);
+  void follow_epoch(SourceId source, const SourcePose& sensed);
   void forget(SourceId source);
   void correct(const Sweep& sweep, const Vector6& twist_base, std::bitset<kMaxSources> without);
   void move_points(const Sweep& sweep, const SweepCorrection& correction);
@@ -153,6 +156,7 @@ class Odometry {
   AgedScan aged_;                        ///< what is registered of it
   std::optional<Sweep> first_;           ///< while no motion is known
   std::bitset<kMaxSources> recalled_;    ///< sources known from another run, and not heard yet
+  std::array<std::optional<std::uint32_t>, kMaxSources> epochs_; ///< of each source, when it was heard last
   std::array<Stamp, kMaxSources> learned_since_{};
   std::optional<Whereabouts> start_;              ///< where to begin
   std::optional<Whereabouts> run_before_;         ///< where it ended, if the first sweep was found in its map

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <functional>
 #include <numbers>
 #include <random>
 #include <span>
@@ -504,6 +505,40 @@ TEST(Odometry, AnAcceleratingRobotIsNotLevelledByWhatIsNotGravity) {
   std::vector<Sweep> sweeps = sweeps_of(sim::room(), trajectory, RobotSetup{}, milliseconds{250});
   sweeps.front().motion.specific_force = SpecificForce{{6.0, 0, 9.80665}, {6.0, 0, 9.80665}};
   EXPECT_EQ(Odometry(OdometryOptions{}).process(sweeps.front()).T_odom_base, Pose{});
+}
+
+/// Standard deviation of the scale of the wheels after each sweep of ten seconds in a room.
+std::vector<double> sigma_of_scale(const std::function<void(std::size_t sweep, SourcePose& wheels)>& change) {
+  const sim::Trajectory trajectory(sim::room_course(seconds{10}, 1.0), sim::room_start());
+  const RobotSetup setup = robot_with_wheels_and_imu();
+  Odometry odometry(setup.odometry(), setup.motion_sources());
+  std::vector<double> sigma;
+  drive(sim::room(), trajectory, setup, seconds{10}, [&](Sweep sweep) {
+    change(sigma.size(), sweep.motion.sources[0]);
+    const OdometryEstimate estimate = odometry.process(sweep);
+    sigma.push_back(estimate.sources[0].learned ? estimate.sources[0].learned->scale().sigma : 0.0);
+  });
+  return sigma;
+}
+
+/// A hiccup of 60 ms, or a busy processor: all that was learned of the wheels was forgotten.
+TEST(Odometry, ASweepWithoutASampleOfASourceIsNoReasonToForgetIt) {
+  const std::vector<double> sigma = sigma_of_scale([](std::size_t sweep, SourcePose& wheels) {
+    if (sweep == 60)
+      wheels = SourcePose{};
+  });
+  EXPECT_LT(sigma[59], 0.5 * sigma[2]);
+  EXPECT_LT(sigma[61], 1.1 * sigma[59]);
+}
+
+TEST(Odometry, ASourceThatWasLostAndComesBackIsLearnedAnew) {
+  const std::vector<double> sigma = sigma_of_scale([](std::size_t sweep, SourcePose& wheels) {
+    if (sweep >= 60 && sweep < 70)
+      wheels = SourcePose{};
+    if (sweep >= 70)
+      ++wheels.epoch;
+  });
+  EXPECT_GT(sigma[70], 2.0 * sigma[59]);
 }
 
 TEST(Odometry, SourcesInTheQueueAreUsedWhileTheyLast) {
