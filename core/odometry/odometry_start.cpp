@@ -14,7 +14,7 @@ namespace {
 /// found: honest starts have 0.45 and more, two halves of a turn 0.1 to 0.17.
 constexpr double kMinOverlap = 0.3;
 
-constexpr double kUnknownRate_radps = 100.0; ///< of a robot of which nothing is known
+constexpr double kUnknownRate_radps = 10.0; ///< of a robot of which nothing is known: a flick of a hand
 constexpr int kRounds = 8;        ///< at the most, until motion and correction of the first two sweeps agree:
 constexpr double kAgrees = 0.002; ///< metres, radians
 
@@ -34,7 +34,7 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
     here = *start_;
   else if (const auto up_base = gravity_.up_base())
     here.T_odom_base.rotation = from_rpy_rad(level_rpy_rad(*up_base));
-  const Vector6 unknown = along_each_axis(options_.motion.max_speed_mps, kUnknownRate_radps);
+  const Vector6 unknown = along_each_axis(options_.motion.max_speed_mps, kUnknownRate_radps / kRadPerDeg);
   filter_.begin(here.T_odom_base, Vector6::Zero(), unknown, here.pose_covariance);
   if (observer_)
     observer_->begin(here.T_odom_base, Vector6::Zero(), unknown, here.pose_covariance);

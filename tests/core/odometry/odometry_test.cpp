@@ -507,6 +507,13 @@ TEST(Odometry, AnAcceleratingRobotIsNotLevelledByWhatIsNotGravity) {
   EXPECT_EQ(Odometry(OdometryOptions{}).process(sweeps.front()).T_odom_base, Pose{});
 }
 
+/// Its standard deviation was 100 degrees a second, meant as 100 rad/s: a flick of a hand was two of them.
+TEST(Odometry, BeforeItsSecondSweepATurnOfFourRadiansPerSecondIsNothingUnusual) {
+  const sim::Trajectory trajectory(sim::room_course(seconds{1}, 1.0), sim::room_start());
+  const Outcome result = drive_through(sim::room(), trajectory, robot_with_lidar_alone(), seconds{1});
+  EXPECT_GT(std::sqrt(result.estimates.front().twist_covariance(5, 5)), 8.0);
+}
+
 /// Standard deviation of the scale of the wheels after each sweep of ten seconds in a room.
 std::vector<double> sigma_of_scale(const std::function<void(std::size_t sweep, SourcePose& wheels)>& change) {
   const sim::Trajectory trajectory(sim::room_course(seconds{10}, 1.0), sim::room_start());
