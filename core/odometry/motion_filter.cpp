@@ -22,7 +22,8 @@ enum : int {
   kRate = 9,
   kAccelerometer = 12,
   kGravity = 15,
-  kMap = 18,
+  kLever = 18,
+  kMap = 21,
   kOfSources = MotionFilter::kCommonStates
 };
 
@@ -50,8 +51,8 @@ constexpr double kForceNoise = square(0.02); ///< of the velocity after a second
 
 /// Errors that are no noise: in proportion, and of stamps that are late while the motion changes.
 constexpr double kProportion = 0.01;
-constexpr double kLateForce_s = 0.03;
-constexpr double kLever_m = 0.1; ///< where a sensor sits is not quite known, or what it speaks of is not the base
+constexpr double kLever_m = 0.1;       ///< where a sensor sits is not quite known, or what it speaks of is not the base
+constexpr double kLeverBends_m = 0.02; ///< of the accelerometer: no robot is rigid
 constexpr double kLateOdometry_s = 0.02, kLateGyro_s = 0.003;
 
 /// What the slow states may be, and how they walk, per square root of a second.
@@ -122,6 +123,7 @@ MotionFilter::MotionFilter(const std::vector<MotionSourceOptions>& sources, cons
   for (std::size_t i = 0; i < count_; ++i) {
     Source& source = sources_[i];
     source.kind = sources[i].kind;
+    source.lever_m = sources[i].T_base_source.translation;
     source.state = states_;
     source.states = states_of(source.kind);
     const LearnedSource known = as_configured(sources[i]);
@@ -143,6 +145,7 @@ MotionFilter::MotionFilter(const std::vector<MotionSourceOptions>& sources, cons
   P_ = Covariance::Zero(states_, states_);
   P_.diagonal().segment<3>(kAccelerometer).setConstant(square(kAccelerometerBias));
   P_.diagonal().segment<3>(kGravity).setConstant(square(kGravityError));
+  P_.diagonal().segment<3>(kLever).setConstant(square(kLever_m));
   for (std::size_t i = 0; i < count_; ++i)
     forget(SourceId{i});
 }
@@ -216,70 +219,93 @@ LearnedSource MotionFilter::learned(SourceId source) const {
 }
 
 void MotionFilter::predict(double elapsed_s, double period_s, const std::optional<SpecificForce>& force,
-                           Measured measured) {
+                           Measured measured, const std::optional<Eigen::Vector3d>& sensed_rate) {
   const double step_s = elapsed_s_ > 0.0 ? 0.5 * (elapsed_s + elapsed_s_) : elapsed_s; // between means of two sweeps
-  Vector6 step_variance, predicted;
-  const Eigen::Vector3d velocity = twist_base_.head<3>(), rate = twist_base_.tail<3>();
-  const Eigen::Matrix3d R_base_odom = T_odom_base_.R().transpose();
-  const Eigen::Vector3d up = Eigen::Vector3d{0.0, 0.0, kGravity_mps2} + x_.segment<3>(kGravity);
-  Common F = Common::Identity();
-  for (int axis = 0; axis < 6; ++axis) {
-    const bool translation = axis < 3;
-    const bool open = translation ? measured.translation && !force : measured.rotation;
-    const bool lasts = axis == 0 || axis == 5;
-    const bool told = P_(kVelocity + axis, kVelocity + axis) < kTold * predicted_variance_[axis];
-    untold_s_[axis] = told ? 0.0 : untold_s_[axis] + elapsed_s;
-    const bool goes_on = open || (lasts && untold_s_[axis] < kGoesOn_s);
-    const double kept = goes_on ? 1.0 : std::exp(-step_s / kFades_s[axis]);
-    const int row = kVelocity + axis;
-    step_variance[axis] =
-        open ? able_[axis] * square(step_s) : kProcess[axis] * step_s + square(twist_base_[axis]) * kept * (1.0 - kept);
-    predicted[axis] = kept * twist_base_[axis];
-    F(row, row) = lasts ? 1.0 : kept; // the mean fades, the doubt does not
-  }
-  Common bends = Common::Identity(); // a way that turns otherwise than thought
-  if (force) {
-    const Eigen::Vector3d last = last_force_ ? last_force_->late_base_mps2 : force->early_base_mps2;
-    const Eigen::Vector3d between = 0.5 * (last + force->early_base_mps2);
-    const Eigen::Vector3d force_change =
-        force->mean_base_mps2() - (last_force_ ? *last_force_ : *force).mean_base_mps2();
-    const double lever = square(kLever_m) * (rate - last_rate_).squaredNorm();
-    const Eigen::Vector3d mean_rate = 0.5 * (rate + predicted.tail<3>());
-    const Eigen::Vector3d change =
-        between - x_.segment<3>(kAccelerometer) - R_base_odom * up - slip(mean_rate, velocity); // m/s^2, base axes
-    const Eigen::Matrix3d of_turn = -R_base_odom * skew(up);
-    const double unfelt_s = std::max(0.0, std::max(step_s, elapsed_s) - period_s);
-    for (int axis = 0; axis < 3; ++axis) {
-      const int row = kVelocity + axis;
-      const double felt =
-          kForceNoise * step_s + square(kLateForce_s * force_change[axis]) + lever + able_[axis] * square(unfelt_s);
-      const double share = step_variance[axis] / (step_variance[axis] + felt); // of the specific force
-      const double by = share * step_s;
-      predicted[axis] = (1.0 - share) * predicted[axis] + share * twist_base_[axis] + by * change[axis];
-      F(row, row) = (1.0 - share) * F(row, row) + share;
-      F(row, kAccelerometer + axis) = -by;
-      F.block<1, 3>(row, kGravity) = -by * R_base_odom.row(axis);
-      F.block<1, 3>(row, kTurn) = by * of_turn.row(axis);
-      F.block<1, 3>(row, kVelocity) -= by * skew(mean_rate).row(axis);
-      F.block<1, 3>(row, kRate) += 0.5 * by * skew(velocity).row(axis);
-      bends.block<1, 3>(row, kRate) = 0.5 * by * skew(velocity).row(axis);
-      step_variance[axis] *= 1.0 - share;
-    }
-  }
+  const double unfelt_s = std::max(0.0, std::max(step_s, elapsed_s) - period_s);
+  TwistStep step = decay(elapsed_s, step_s, unfelt_s, force.has_value(), measured);
+  if (force)
+    integrate(*force, std::min(step_s, period_s), sensed_rate.value_or(step.mean.tail<3>()), step);
+  propagate(step.F);
+  P_.diagonal().segment<6>(kVelocity) += step.variance;
+  propagate(step.of_new_rate);
+  if (force)
+    couple_lateness(*force);
   last_force_ = force;
-  last_rate_ = rate;
-  propagate(F);
-  P_.diagonal().segment<6>(kVelocity) += step_variance;
-  propagate(bends);
   P_.diagonal().segment<3>(kAccelerometer).array() += square(kAccelerometerWalk) * elapsed_s;
   P_.diagonal().segment<3>(kGravity).array() += square(kGravityWalk) * elapsed_s;
   for (Source& source : std::span(sources_).first(count_)) {
     age(source, elapsed_s);
     source.used = false;
   }
-  twist_base_ = predicted;
+  twist_base_ = step.mean;
   predicted_variance_ = P_.diagonal().segment<6>(kVelocity);
   elapsed_s_ = elapsed_s;
+}
+
+/// Process model without a force: axes that nobody measures come to rest. With a force the velocity does so only while
+/// it is not felt.
+MotionFilter::TwistStep MotionFilter::decay(double elapsed_s, double step_s, double unfelt_s, bool felt,
+                                            Measured measured) {
+  TwistStep step;
+  for (int axis = 0; axis < 6; ++axis) {
+    const bool integrated = axis < 3 && felt;
+    const double decays_s = integrated ? unfelt_s : step_s;
+    const bool open = integrated || (axis < 3 ? measured.translation : measured.rotation);
+    const bool lasts = axis == 0 || axis == 5;
+    const int row = kVelocity + axis;
+    const bool told = P_(row, row) < kTold * predicted_variance_[axis];
+    untold_s_[axis] = told ? 0.0 : untold_s_[axis] + elapsed_s;
+    const bool goes_on = (open && !integrated) || (lasts && untold_s_[axis] < kGoesOn_s);
+    const double kept = goes_on ? 1.0 : std::exp(-decays_s / kFades_s[axis]);
+    step.mean[axis] = kept * twist_base_[axis];
+    step.variance[axis] = open ? able_[axis] * square(decays_s)
+                               : kProcess[axis] * decays_s + square(twist_base_[axis]) * kept * (1.0 - kept);
+    step.F(row, row) = lasts ? 1.0 : kept; // the mean decays, the doubt does not
+  }
+  return step;
+}
+
+/// Integrates the specific force. Stamps that are late and a lever arm are no noise: what they add to the velocity
+/// telescopes, so they are states.
+void MotionFilter::integrate(const SpecificForce& force, double felt_s, const Eigen::Vector3d& new_rate,
+                             TwistStep& step) const {
+  const Source& source = sources_[index_of(force.source)];
+  const Eigen::Vector3d velocity = twist_base_.head<3>(), rate = twist_base_.tail<3>();
+  const Eigen::Vector3d rate_change = step.mean.tail<3>() - rate, mean_rate = rate + 0.5 * rate_change;
+  const Eigen::Vector3d lever_m = source.lever_m + x_.segment<3>(kLever);
+  const Eigen::Matrix3d R_base_odom = T_odom_base_.R().transpose();
+  const Eigen::Vector3d up = Eigen::Vector3d{0.0, 0.0, kGravity_mps2} + x_.segment<3>(kGravity);
+  const Eigen::Vector3d last = last_force_ ? last_force_->late_base_mps2 : force.early_base_mps2;
+  const Eigen::Vector3d acceleration = 0.5 * (last + force.early_base_mps2) - x_.segment<3>(kAccelerometer) -
+                                       R_base_odom * up - slip(mean_rate, velocity) -
+                                       slip(mean_rate, slip(mean_rate, lever_m)); // m/s^2, base axes
+  const Eigen::Vector3d change = force_change(force);
+  const double late_s = x_[source.state + LearnedSource::kLate] - to_seconds(force.late);
+  step.mean.head<3>() += felt_s * acceleration + late_s * change - rate_change.cross(lever_m);
+  step.variance.head<3>() +=
+      felt_s * (force.noise_per_s.array() + kForceNoise).matrix() + square(kLateGyro_s) * change.cwiseAbs2();
+  step.variance.head<3>().array() += square(kLeverBends_m) * (new_rate - rate).squaredNorm();
+  const Eigen::Matrix3d of_rate = 0.5 * felt_s * skew(velocity), of_rate_change = skew(lever_m);
+  step.F.block<3, 3>(kVelocity, kTurn) = -felt_s * R_base_odom * skew(up);
+  step.F.block<3, 3>(kVelocity, kVelocity) -= felt_s * skew(mean_rate);
+  step.F.block<3, 3>(kVelocity, kRate) = of_rate - of_rate_change;
+  step.of_new_rate.block<3, 3>(kVelocity, kRate) = of_rate + of_rate_change;
+  step.F.block<3, 3>(kVelocity, kAccelerometer).diagonal().setConstant(-felt_s);
+  step.F.block<3, 3>(kVelocity, kGravity) = -felt_s * R_base_odom;
+  step.F.block<3, 3>(kVelocity, kLever) = -skew(new_rate - rate) - felt_s * skew(mean_rate) * skew(mean_rate);
+}
+
+/// Of the mean of the force, between the last two sweeps.
+Eigen::Vector3d MotionFilter::force_change(const SpecificForce& force) const {
+  return force.mean_base_mps2() - last_force_.value_or(force).mean_base_mps2();
+}
+
+/// The velocity errs by the lateness of the force times what the force has changed by.
+void MotionFilter::couple_lateness(const SpecificForce& force) {
+  const int late = sources_[index_of(force.source)].state + LearnedSource::kLate;
+  const Eigen::Vector3d change = force_change(force);
+  P_.middleRows<3>(kVelocity) += (change * P_.row(late)).eval();
+  P_.middleCols<3>(kVelocity) += (P_.col(late) * change.transpose()).eval();
 }
 
 void MotionFilter::expect_rest() {

@@ -62,7 +62,8 @@ using LearnedSources = std::array<std::optional<LearnedSource>, kMaxSources>;
 /// The state of the robot and of its sensors with one covariance: an error-state Kalman filter on the manifold.
 ///
 /// State: pose at the end of the sweep (odom frame) against the submap, twist during it (base frame, mean), bias of the
-/// accelerometer, gravity, what the map is off since the start (considered), for each gyro a bias, how late its samples
+/// accelerometer, gravity, lever arm of the accelerometer, what the map is off since the start (considered), for each
+/// gyro a bias, how late its samples
 /// are stamped and by how much it is mounted askew, for each odometry a scale of the way ahead and one of the yaw, and
 /// where it goes when it goes ahead (to the left, upwards), and how fast it slips. A sweep is predict(), measure() for
 /// each source or rest(), move(), see() with what lidar found, and learn(). Noise of the sources is learned from the
@@ -71,7 +72,7 @@ using LearnedSources = std::array<std::optional<LearnedSource>, kMaxSources>;
 /// owner.
 class MotionFilter {
  public:
-  static constexpr int kCommonStates = 24; ///< before those of the sources
+  static constexpr int kCommonStates = 27; ///< before those of the sources
   static constexpr int kMaxStates = kCommonStates + (LearnedSource::kMostStates + 1) * static_cast<int>(kMaxSources);
   using State = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxStates, 1>;
   using Common = Eigen::Matrix<double, kCommonStates, kCommonStates>;
@@ -91,8 +92,9 @@ class MotionFilter {
              const Matrix6& map_covariance = Matrix6::Zero());
 
   /// The twist during a sweep of `period_s` whose end is `elapsed_s` after that of the last. `force`: where it is
-  /// felt.
-  void predict(double elapsed_s, double period_s, const std::optional<SpecificForce>& force, Measured measured);
+  /// felt. `sensed_rate`: what its gyro reads (mean since the last sweep), to linearise about; measure() uses it.
+  void predict(double elapsed_s, double period_s, const std::optional<SpecificForce>& force, Measured measured,
+               const std::optional<Eigen::Vector3d>& sensed_rate = std::nullopt);
 
   /// Takes the robot to stand, as far as anything else is not told (paper II-B.2).
   void expect_rest();
@@ -136,11 +138,12 @@ class MotionFilter {
  private:
   struct Source {
     SourceKind kind = SourceKind::odometry;
-    int state = 0, states = 0;                   ///< first of its own, and how many
-    LearnedSource::States first, first_variance; ///< of these: as configured
-    LearnedSource::States fades_per_s;           ///< how quickly they come back to it
-    std::optional<int> slip;                     ///< of an odometry, its state: of the moment, not learned
-    Vector6 noise_per_s;                         ///< variance of the twist times seconds
+    Eigen::Vector3d lever_m = Eigen::Vector3d::Zero(); ///< from the base to it, as configured
+    int state = 0, states = 0;                         ///< first of its own, and how many
+    LearnedSource::States first, first_variance;       ///< of these: as configured
+    LearnedSource::States fades_per_s;                 ///< how quickly they come back to it
+    std::optional<int> slip;                           ///< of an odometry, its state: of the moment, not learned
+    Vector6 noise_per_s;                               ///< variance of the twist times seconds
     Vector6 learned_s = Vector6::Zero();
     std::optional<Vector6> last_twist;
     bool used = false; ///< in the sweep at hand
@@ -148,6 +151,17 @@ class MotionFilter {
     Vector6 variance = Vector6::Zero();       ///< that it was used with; zero along axes that were not
     Vector6 known_variance = Vector6::Zero(); ///< the part of it that is not learned
   };
+
+  /// Prediction of the twist: its mean, Jacobians with respect to the common states before the noise is added and to
+  /// the new rate afterwards, and the variance of the noise.
+  struct TwistStep {
+    Vector6 mean, variance;
+    Common F = Common::Identity(), of_new_rate = Common::Identity();
+  };
+  [[nodiscard]] TwistStep decay(double elapsed_s, double step_s, double unfelt_s, bool felt, Measured measured);
+  void integrate(const SpecificForce& force, double felt_s, const Eigen::Vector3d& new_rate, TwistStep& step) const;
+  void couple_lateness(const SpecificForce& force);
+  [[nodiscard]] Eigen::Vector3d force_change(const SpecificForce& force) const;
 
   struct Row { ///< of a measurement of one axis
     State h;
@@ -181,7 +195,6 @@ class MotionFilter {
   std::optional<SpecificForce> last_force_;
   Vector6 predicted_variance_ = Vector6::Zero(); ///< of the twist
   Vector6 untold_s_ = Vector6::Zero();           ///< for how long nobody has told of an axis of the twist
-  Eigen::Vector3d last_rate_ = Eigen::Vector3d::Zero();
 };
 
 } // namespace locus

@@ -183,9 +183,13 @@ Odometry::Hypothesis Odometry::assume(const Sweep& sweep, std::bitset<kMaxSource
 void Odometry::tell(MotionFilter& filter, const Sweep& sweep, const Hypothesis& hypothesis) const {
   const auto& [rotation, translation] = hypothesis.choice;
   const bool free = hypothesis.without.all();
-  filter.predict(std::max(steps_.elapsed_s(sweep), 1e-6), to_seconds(sweep.end - sweep.start),
-                 free ? std::nullopt : sweep.motion.specific_force,
-                 {.translation = free || translation, .rotation = free || rotation});
+  const std::optional<SpecificForce> force = free ? std::nullopt : sweep.motion.specific_force;
+  std::optional<Eigen::Vector3d> sensed_rate;
+  if (force)
+    if (const auto sensed = steps_.twist_base(sweep, force->source))
+      sensed_rate = sensed->mean.tail<3>();
+  filter.predict(std::max(steps_.elapsed_s(sweep), 1e-6), to_seconds(sweep.end - sweep.start), force,
+                 {.translation = free || translation, .rotation = free || rotation}, sensed_rate);
   if (rotation)
     filter.measure(*rotation, *steps_.twist_base(sweep, *rotation),
                    {.translation = translation == rotation, .rotation = true});

@@ -15,8 +15,8 @@ namespace {
 constexpr double kMinOverlap = 0.3;
 
 constexpr double kUnknownRate_radps = 10.0; ///< of a robot of which nothing is known: a flick of a hand
-constexpr int kRounds = 8;        ///< at the most, until motion and correction of the first two sweeps agree:
-constexpr double kAgrees = 0.002; ///< metres, radians
+constexpr int kRounds = 8;                  ///< at the most, until motion and correction of the first two sweeps agree:
+constexpr double kAgrees = 0.002;           ///< metres, radians
 
 } // namespace
 

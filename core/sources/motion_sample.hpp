@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "core/base/pose.hpp"
+#include "core/base/source_id.hpp"
 #include "core/base/stamp.hpp"
 
 namespace locus {
@@ -25,6 +26,9 @@ struct ImuSample {
 struct SpecificForce {
   Eigen::Vector3d early_base_mps2 = Eigen::Vector3d::Zero(); ///< mean, each sample by its share of the time to the end
   Eigen::Vector3d late_base_mps2 = Eigen::Vector3d::Zero();  ///< mean, each sample by its share of the time since start
+  Eigen::Vector3d noise_per_s = Eigen::Vector3d::Zero();     ///< variance that its integral gains in a second
+  SourceId source{};                                         ///< that feels it
+  Duration late{};                                           ///< taken out of its stamps
 
   [[nodiscard]] Eigen::Vector3d mean_base_mps2() const { return 0.5 * (early_base_mps2 + late_base_mps2); }
 };

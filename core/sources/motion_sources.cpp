@@ -106,8 +106,11 @@ SensedMotion MotionSources::sensed_in(Stamp from, Stamp to) const {
     const Pose T_before_to = track.at(before).value_or(*T_source_base).inverse() * *T_source_base;
     motion.sources[i] = {
         true, health.healthy(), epoch, *T_source_base, se3_log(T_before_to) / to_seconds(to - before), track.late()};
-    if (health.healthy() && health.trusts_accelerometer() && !motion.specific_force)
+    if (health.healthy() && health.trusts_accelerometer() && !motion.specific_force) {
       motion.specific_force = track.specific_force(from, to);
+      if (motion.specific_force)
+        motion.specific_force->source = SourceId{i};
+    }
     if (health.healthy() && !motion.up_base)
       motion.up_base = track.up_base(from, to);
   }

@@ -110,18 +110,55 @@ std::optional<SpecificForce> MotionTrack::specific_force(Stamp from, Stamp to) c
     return std::nullopt;
   from += late_;
   to += late_;
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero(), sum_by_time = Eigen::Vector3d::Zero();
-  double count = 0.0, time_s = 0.0;
-  for (std::size_t age = age_at(to); age < size_ && from_newest(age).stamp > from; ++age) {
-    const Node& sample = from_newest(age);
-    const double since_s = to_seconds(sample.stamp - from);
-    sum += sample.specific_force_base_mps2;
-    sum_by_time += since_s * sample.specific_force_base_mps2;
-    count += 1.0;
-    time_s += since_s;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero(), sum_by_time = Eigen::Vector3d::Zero(); // integrals
+  Eigen::Vector3d end = force_at(to);
+  double end_s = to_seconds(to - from);
+  const double all_s = end_s;
+  for (std::size_t age = age_at(to); end_s > 0.0; ++age) {
+    const bool inside = age < size_ && from_newest(age).stamp > from;
+    const Eigen::Vector3d begin = inside ? from_newest(age).specific_force_base_mps2 : force_at(from);
+    const double begin_s = inside ? to_seconds(from_newest(age).stamp - from) : 0.0;
+    sum += 0.5 * (end_s - begin_s) * (begin + end);
+    sum_by_time += (end_s - begin_s) / 6.0 * (begin_s * (2.0 * begin + end) + end_s * (begin + 2.0 * end));
+    end = begin;
+    end_s = begin_s;
   }
-  const Eigen::Vector3d late = sum_by_time / time_s;
-  return SpecificForce{.early_base_mps2 = 2.0 * sum / count - late, .late_base_mps2 = late};
+  const Eigen::Vector3d late = 2.0 / (all_s * all_s) * sum_by_time;
+  return SpecificForce{.early_base_mps2 = 2.0 / all_s * sum - late,
+                       .late_base_mps2 = late,
+                       .noise_per_s = force_noise_per_s(to),
+                       .late = late_};
+}
+
+/// On the line between two samples; beyond the first and the last, as they are.
+Eigen::Vector3d MotionTrack::force_at(Stamp stamp) const {
+  const std::size_t age = age_at(stamp);
+  if (age == size_)
+    return from_newest(size_ - 1).specific_force_base_mps2;
+  const Node& before = from_newest(age);
+  if (age == 0)
+    return before.specific_force_base_mps2;
+  const Node& after = from_newest(age - 1);
+  const double fraction = to_seconds(stamp - before.stamp) / to_seconds(after.stamp - before.stamp);
+  return before.specific_force_base_mps2 +
+         fraction * (after.specific_force_base_mps2 - before.specific_force_base_mps2);
+}
+
+/// From the second differences of the samples of a while, which are six times their variance: vibration, and what a
+/// slow unit misses between its samples. A steady change has none.
+Eigen::Vector3d MotionTrack::force_noise_per_s(Stamp to) const {
+  Eigen::Vector3d squares = Eigen::Vector3d::Zero();
+  const std::size_t newest = age_at(to);
+  std::size_t age = newest;
+  for (; age + 2 < size_ && from_newest(age + 2).stamp > to - kNoiseWindow; ++age)
+    squares += (from_newest(age).specific_force_base_mps2 - 2.0 * from_newest(age + 1).specific_force_base_mps2 +
+                from_newest(age + 2).specific_force_base_mps2)
+                   .cwiseAbs2();
+  const double count = static_cast<double>(age - newest);
+  if (count == 0.0)
+    return Eigen::Vector3d::Zero();
+  const double spacing_s = to_seconds(from_newest(newest).stamp - from_newest(age + 1).stamp) / (count + 1.0);
+  return spacing_s / (6.0 * count) * squares;
 }
 
 } // namespace locus

@@ -55,7 +55,7 @@ class MotionTrack {
   /// Whether the newest sample is at most kMaxExtrapolation old, and came as soon after the one before.
   [[nodiscard]] bool is_live(Stamp now) const;
 
-  /// Over the samples in (from, to]; nothing for odometry or without samples.
+  /// Over exactly (from, to], on the line between the samples; nothing for odometry or without a sample in there.
   [[nodiscard]] std::optional<SpecificForce> specific_force(Stamp from, Stamp to) const;
 
   /// Unit vector in the base frame, from the mean attitude of the samples in (from, to]; nothing where one has none.
@@ -71,6 +71,10 @@ class MotionTrack {
     std::optional<Eigen::Vector3d> up_base;
   };
 
+  static constexpr Duration kNoiseWindow = std::chrono::milliseconds{300}; ///< of forces, whose noise is measured
+
+  [[nodiscard]] Eigen::Vector3d force_at(Stamp stamp) const;
+  [[nodiscard]] Eigen::Vector3d force_noise_per_s(Stamp to) const;
   [[nodiscard]] Pose extrapolated(Stamp stamp) const;
   [[nodiscard]] static Pose between(const Node& before, const Node& after, Stamp stamp);
   void push(const Node& node);

@@ -69,6 +69,7 @@ class GaussianRobot {
     Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero(); ///< of the gyro, otherwise than thought
     double force_mps = 0.02;                                ///< of the speed after a second
     Eigen::Vector3d force_bias_mps2 = Eigen::Vector3d::Zero();
+    Eigen::Vector3d lever_m = Eigen::Vector3d::Zero(); ///< from the base to the accelerometer
   };
 
   GaussianRobot(Motion motion, Sensors sensors, unsigned seed)
@@ -85,7 +86,9 @@ class GaussianRobot {
       const Vector6 twist = motion_(t);
       const Vector6 rate = (motion_(t + 0.5 * part_s) - motion_(t - 0.5 * part_s)) / part_s;
       const Eigen::Quaterniond R_odom_base = T_odom_base_.rotation * so3_exp(0.5 * part_s * twist.tail<3>());
-      const Eigen::Vector3d inertial = rate.head<3>() + twist.tail<3>().cross(twist.head<3>());
+      const Eigen::Vector3d of_lever =
+          rate.tail<3>().cross(sensors_.lever_m) + twist.tail<3>().cross(twist.tail<3>().cross(sensors_.lever_m));
+      const Eigen::Vector3d inertial = rate.head<3>() + twist.tail<3>().cross(twist.head<3>()) + of_lever;
       force_ += (inertial + R_odom_base.conjugate() * (kGravity_mps2 * Eigen::Vector3d::UnitZ())) / kParts;
       T_odom_base_ = T_odom_base_ * se3_exp(part_s * twist);
     }
@@ -122,7 +125,7 @@ class GaussianRobot {
   SpecificForce force() {
     const Vector6 sigma = along_each_axis(sensors_.force_mps, 0.0) / std::sqrt(elapsed_s_);
     const Eigen::Vector3d mean = force_ + sensors_.force_bias_mps2 + noisy(Vector6::Zero(), sigma).head<3>();
-    return {mean, mean};
+    return {.early_base_mps2 = mean, .late_base_mps2 = mean, .source = kGyroSource};
   }
   /// The truth with the noise of what lidar knows.
   Vector12 seen_beside(const MotionBelief& belief, const Matrix12& information) {
@@ -245,7 +248,7 @@ inline Vector6 noise_of(const MotionFilter& filter, SourceId source, const Vecto
 inline bool is_sound(const Matrix12& covariance) {
   const double most = std::max(1.0, covariance.cwiseAbs().maxCoeff());
   return covariance.allFinite() && (covariance - covariance.transpose()).cwiseAbs().maxCoeff() <= 1e-12 * most &&
-         Eigen::SelfAdjointEigenSolver<Matrix12>(covariance).eigenvalues()[0] > -1e-9;
+         Eigen::SelfAdjointEigenSolver<Matrix12>(covariance).eigenvalues()[0] > -std::max(1e-9, 1e-14 * most);
 }
 
 } // namespace locus::test

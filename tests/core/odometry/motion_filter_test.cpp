@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <random>
 #include <tuple>
@@ -70,6 +71,25 @@ TEST(MotionFilter, WheelsOfSomeScaleInATunnelAreWithinTheirDoubt) {
   MotionFilter filter = begun_with(robot, straight(kSpeed_mps));
   sweep_for(kTime_s, filter, robot, 0.1, {.lidar = blind_ahead(usual_lidar(0.1))});
   EXPECT_LT(std::abs(error_of(filter, robot)[kX]), kSigmas * std::sqrt(filter.pose_covariance_since_start()(kX, kX)));
+}
+
+/// A gait: twice a second it speeds up, slows down and pitches.
+Vector6 walking(double t) {
+  const double phase = 4.0 * std::numbers::pi * t;
+  return twist_of(1.0 + 0.2 * std::sin(phase), 0, 0, 0, 0.5 * std::cos(phase), 0);
+}
+
+/// The more the force changed, the less of it was integrated, so braking counted more than speeding up: the estimate
+/// stood still while the robot walked on.
+TEST(MotionFilter, AWalkingRobotThatNothingTellsOfItsWayKeepsItsSpeed) {
+  constexpr double kPeriod_s = 0.05, kTime_s = 3.0;
+  GaussianRobot robot(walking, {.lever_m = {0.1, 0.0, 0.3}}, 1);
+  MotionFilter filter = begun_with(robot, walking);
+  const Sensing lidar{.wheels = false, .force = true, .lidar = usual_lidar(kPeriod_s)};
+  sweep_for(20.0, filter, robot, kPeriod_s, lidar);
+  sweep_for(kTime_s, filter, robot, kPeriod_s, {.wheels = false, .force = true, .lidar = blind_ahead(*lidar.lidar)});
+  EXPECT_LT(std::abs(error_of(filter, robot)[kX]), 0.05 * kTime_s);
+  EXPECT_LT(std::abs(error_of(filter, robot)[kX]), kSigmas * sigma_of(filter, kX));
 }
 
 Vector6 speeding_up_from_the_fifth_second(double t) {

@@ -149,8 +149,30 @@ TEST(MotionTrack, AForceThatIsFeltOnceIsFeltEarlyAndLate) {
   track.add(imu(at_ms(200), {0, 0, 0}, {1.0, 0, 9.81}));
   const auto force = track.specific_force(at_ms(100), at_ms(200));
   ASSERT_TRUE(force);
-  EXPECT_EQ(force->early_base_mps2, force->late_base_mps2);
-  EXPECT_EQ(force->late_base_mps2.x(), 1.0);
+  EXPECT_TRUE(force->early_base_mps2.isApprox(force->late_base_mps2, 1e-12));
+  EXPECT_NEAR(force->late_base_mps2.x(), 1.0, 1e-12);
+}
+
+/// The mean over the samples inside was that of another time, off by half a period.
+TEST(MotionTrack, TheForceOfASlowUnitIsIntegratedOverExactlyTheSweep) {
+  MotionTrack track = imu_track();
+  for (int ms = 30; ms <= 330; ms += 50)
+    track.add(imu(at_ms(ms), {0, 0, 0}, {0.01 * ms, 0, 9.81}));
+  const auto force = track.specific_force(at_ms(100), at_ms(200));
+  ASSERT_TRUE(force);
+  EXPECT_NEAR(force->mean_base_mps2().x(), 1.5, 1e-9);
+  EXPECT_NEAR(force->late_base_mps2.x(), 1.0 + 2.0 / 3.0, 1e-9);
+  EXPECT_LT(force->noise_per_s.norm(), 1e-9) << "a steady change is no noise";
+}
+
+TEST(MotionTrack, TheNoiseOfAForceIsMeasured) {
+  MotionTrack track = imu_track();
+  for (int i = 0; i <= 100; ++i) // 1.5 m/s^2 up and down at 100 Hz, of which the second differences are 6 m/s^2
+    track.add(imu(at_ms(10 * i), {0, 0, 0}, {i % 2 == 0 ? 1.5 : -1.5, 0, 9.81}));
+  const auto force = track.specific_force(at_ms(900), at_ms(1000));
+  ASSERT_TRUE(force);
+  EXPECT_NEAR(force->noise_per_s.x(), 0.01 * 36.0 / 6.0, 1e-9);
+  EXPECT_LT(force->noise_per_s.tail<2>().norm(), 1e-12);
 }
 
 TEST(MotionTrack, AnAttitudeSaysWhichWayIsUpInTheBaseFrame) {
