@@ -39,7 +39,7 @@ void with_sample_of(LiveInput::Motion& motion, const auto& change) {
 
 LiveInput::LiveInput(std::vector<UdpSocket> sockets, const std::vector<bool>& gives_clouds)
     : sockets_(std::move(sockets)), guards_(sockets_.size()), waiting_(sockets_.size()),
-      motion_is_there_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+      received_until_(sockets_.size(), Stamp::min()), motion_is_there_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
   for (const UdpSocket& socket : sockets_)
     poll_.push_back({socket.descriptor(), POLLIN, 0});
   poll_.push_back({motion_is_there_, POLLIN, 0});
@@ -72,16 +72,19 @@ bool LiveInput::look_for_clouds() {
   return any;
 }
 
-/// Motion that is there already still waits for a look at the sockets: an older datagram may lie there.
 Input LiveInput::next(Duration timeout) {
   if (!next_motion_)
     next_motion_ = take_motion();
-  const Stamp wall{read_clock(CLOCK_REALTIME)}; // before the sockets: what comes after it is not older
   time_.look();
-  const Stamp asked = time_.steady(wall);
+  Stamp asked;
   if (std::ranges::all_of(waiting_, [](const auto& datagrams) { return datagrams.empty(); }))
-    receive(next_motion_ || look_for_clouds() ? Duration::zero() : timeout);
-  if (auto input = take_earliest())
+    asked = receive(next_motion_ || look_for_clouds() ? Duration::zero() : timeout);
+  Earliest from = earliest();
+  if (may_hold_earlier(from.arrival)) {
+    receive(Duration::zero());
+    from = earliest();
+  }
+  if (auto input = take(from))
     return *input;
   return Silence{in_order(asked)};
 }
@@ -109,13 +112,27 @@ void LiveInput::expect(const LidarRouter& lidars) {
     guards_[i].expect(lidars.senders_to(sockets_[i].port()), sockets_[i]);
 }
 
-/// Waits until something is there, at most for `timeout`.
-void LiveInput::receive(Duration timeout) {
+/// Whether a socket that nothing is left of may hold more, of before this; Stamp::max() if there is nothing to be
+/// later.
+bool LiveInput::may_hold_earlier(Stamp arrival) const {
+  for (std::size_t i = 0; arrival < Stamp::max() && i < sockets_.size(); ++i)
+    if (waiting_[i].empty() && received_until_[i] < arrival)
+      return true;
+  return false;
+}
+
+/// Waits until something is there, at most for `timeout`; then asks each socket that nothing is left of. When it began:
+/// what comes after it is not older.
+Stamp LiveInput::receive(Duration timeout) {
+  const Stamp wall{read_clock(CLOCK_REALTIME)};
+  time_.look();
+  const Stamp asked = time_.steady(wall);
   const timespec wait = to_timespec(timeout);
-  const bool is_silent = ppoll(poll_.data(), poll_.size(), &wait, nullptr) == 0;
+  const bool has_datagrams = std::ranges::any_of(waiting_, [](const auto& datagrams) { return !datagrams.empty(); });
+  const bool is_silent = ppoll(poll_.data(), poll_.size(), &wait, nullptr) == 0 && !has_datagrams;
   std::uint64_t drops = 0, filtered = 0;
   for (std::size_t i = 0; i < sockets_.size(); ++i) {
-    if (poll_[i].revents != 0) {
+    if (poll_[i].revents != 0 && waiting_[i].empty()) {
       waiting_[i] = sockets_[i].receive();
       guards_[i].look_at(waiting_[i], sockets_[i]);
     } else if (is_silent) {
@@ -126,51 +143,60 @@ void LiveInput::receive(Duration timeout) {
     filtered += sockets_[i].filtered();
   }
   time_.look();
+  Stamp seen_until = asked; // the first of a socket was there already when all were looked at
+  for (const auto& datagrams : waiting_)
+    if (!datagrams.empty())
+      seen_until = std::max(seen_until, time_.steady(datagrams.front().receive_stamp));
+  for (std::size_t i = 0; i < sockets_.size(); ++i)
+    received_until_[i] = waiting_[i].empty() ? seen_until : time_.steady(waiting_[i].back().receive_stamp);
   kernel_drops_.store(drops, std::memory_order_relaxed);
   filtered_.store(filtered, std::memory_order_relaxed);
   if (poll_.back().revents != 0) {
     eventfd_t notifications = 0;
     eventfd_read(motion_is_there_, &notifications);
   }
+  return asked;
 }
 
-std::optional<Input> LiveInput::take_earliest() {
+/// Of what is at hand.
+LiveInput::Earliest LiveInput::earliest() {
   if (!next_motion_)
     next_motion_ = take_motion();
-  Stamp earliest = next_motion_ ? arrival_of(*next_motion_) : Stamp::max();
-  std::optional<std::size_t> lidar; ///< of the earliest, where that is a cloud
+  Earliest found;
+  if (next_motion_)
+    found.arrival = arrival_of(*next_motion_);
   look_for_clouds();
   for (std::size_t i = 0; i < clouds_.size(); ++i) {
     if (!clouds_[i] || clouds_[i]->waiting == nullptr)
       continue;
     const Stamp arrival = time_.steady(clouds_[i]->waiting->arrival);
-    if (arrival >= earliest)
-      continue;
-    earliest = arrival;
-    lidar = i;
+    if (arrival < found.arrival)
+      found = {arrival, std::nullopt, i};
   }
-  std::span<const Datagram>* from = nullptr;
-  for (auto& waiting : waiting_) {
-    if (waiting.empty())
+  for (std::size_t i = 0; i < waiting_.size(); ++i) {
+    if (waiting_[i].empty())
       continue;
-    const Stamp arrival = time_.steady(waiting.front().receive_stamp);
-    if (arrival >= earliest)
-      continue;
-    earliest = arrival;
-    from = &waiting;
+    const Stamp arrival = time_.steady(waiting_[i].front().receive_stamp);
+    if (arrival < found.arrival)
+      found = {arrival, i, std::nullopt};
   }
-  if (from != nullptr) {
-    Datagram datagram = from->front();
-    *from = from->subspan(1);
-    datagram.receive_stamp = in_order(earliest);
+  return found;
+}
+
+std::optional<Input> LiveInput::take(const Earliest& from) {
+  if (from.socket) {
+    std::span<const Datagram>& waiting = waiting_[*from.socket];
+    Datagram datagram = waiting.front();
+    waiting = waiting.subspan(1);
+    datagram.receive_stamp = in_order(from.arrival);
     datagram.clock_set_by = time_.set_by();
     return datagram;
   }
-  if (lidar)
-    return give_cloud(*lidar, in_order(earliest));
+  if (from.lidar)
+    return give_cloud(*from.lidar, in_order(from.arrival));
   if (!next_motion_)
     return std::nullopt;
-  with_sample_of(*next_motion_, [&](SourceId, auto& sample) { sample.arrival = in_order(earliest); });
+  with_sample_of(*next_motion_, [&](SourceId, auto& sample) { sample.arrival = in_order(from.arrival); });
   Input input = std::visit([](const auto& motion) { return Input{motion}; }, *next_motion_);
   next_motion_.reset();
   return input;
@@ -190,12 +216,15 @@ Input LiveInput::give_cloud(std::size_t lidar, Stamp arrival) {
   return CloudInput{index, &cloud_, arrival, {}};
 }
 
+const PacedInput::Clock PacedInput::kOfTheHost{[] { return read_clock(CLOCK_MONOTONIC); },
+                                               [](Duration time) { std::this_thread::sleep_for(time); }};
+
 void PacedInput::read_ahead() {
   held_ = Held{recording_.next(Duration::zero()), {}};
   held_->arrival = arrival_of(held_->input, last_arrival_);
   if (!started_ || std::chrono::abs(held_->arrival - last_arrival_) > kMaxPause) {
     anchor_arrival_ = held_->arrival;
-    anchor_clock_ = read_clock(CLOCK_MONOTONIC);
+    anchor_clock_ = clock_.now();
     started_ = true;
   }
   last_arrival_ = held_->arrival;
@@ -205,11 +234,11 @@ Input PacedInput::next(Duration timeout) {
   if (!held_)
     read_ahead();
   const Duration due = anchor_clock_ + from_seconds(to_seconds(held_->arrival - anchor_arrival_) / speed_);
-  const Duration remaining = due - read_clock(CLOCK_MONOTONIC);
+  const Duration remaining = due - clock_.now();
   if (remaining > Duration::zero())
-    std::this_thread::sleep_for(std::min(remaining, timeout));
+    clock_.sleep_for(std::min(remaining, timeout));
   if (remaining > timeout) {
-    const Duration since_anchor = read_clock(CLOCK_MONOTONIC) - anchor_clock_;
+    const Duration since_anchor = clock_.now() - anchor_clock_;
     return Silence{std::min(held_->arrival, anchor_arrival_ + from_seconds(speed_ * to_seconds(since_anchor)))};
   }
   Input input = held_->input;

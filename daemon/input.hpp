@@ -106,9 +106,11 @@ class InputSource {
 /// What comes in at this moment: datagrams from all sockets, and what another thread hands over of the motion sources
 /// and of the lidars that give clouds.
 ///
-/// An input that reaches this thread when a later one has been given out arrives after it, by a nanosecond: a sample
-/// that another thread was slow to hand over, a datagram of another socket. So inputs come in the order of their
-/// arrivals, and a recording of them is played in the same order. All stamps are given out in SteadyTime.
+/// Nothing is given out before every socket was looked at that may hold what came earlier, however long nobody looked:
+/// sockets hand out so many datagrams at a time. An input that reaches this thread when a later one has been given out
+/// arrives after it, by a nanosecond: a sample that another thread was slow to hand over, a datagram that the kernel
+/// was. So inputs come in the order of their arrivals, and a recording of them is played in the same order. All stamps
+/// are given out in SteadyTime.
 ///
 /// One thread is the consumer, the ingest; one is the producer of motion and clouds, that of the DDS readers, for which
 /// one ring for all sources keeps their order.
@@ -155,16 +157,25 @@ class LiveInput : public InputSource {
     SteadyTime::Sender sender;
   };
 
+  /// Where the next input is; motion, if it is neither of these, or nothing.
+  struct Earliest {
+    Stamp arrival = Stamp::max();
+    std::optional<std::size_t> socket{}, lidar{};
+  };
+
   [[nodiscard]] std::optional<Motion> take_motion();
   bool look_for_clouds();
   [[nodiscard]] Input give_cloud(std::size_t lidar, Stamp arrival);
-  [[nodiscard]] std::optional<Input> take_earliest();
-  void receive(Duration timeout);
+  [[nodiscard]] Earliest earliest();
+  [[nodiscard]] std::optional<Input> take(const Earliest& from);
+  Stamp receive(Duration timeout);
+  [[nodiscard]] bool may_hold_earlier(Stamp arrival) const;
   [[nodiscard]] Stamp in_order(Stamp arrival);
 
   std::vector<UdpSocket> sockets_;
   std::vector<FloodGuard> guards_;                 ///< by socket
   std::vector<std::span<const Datagram>> waiting_; ///< by socket: received and not given out yet
+  std::vector<Stamp> received_until_;              ///< by socket: what is still in it arrived later
   std::vector<pollfd> poll_;                       ///< the sockets, then motion_is_there_
   int motion_is_there_;                            ///< eventfd, for clouds too: poll() waits for both
   std::vector<std::unique_ptr<Clouds>> clouds_;    ///< by lidar; nullptr for one that sends packets
@@ -183,8 +194,16 @@ class PacedInput : public InputSource {
   /// A step in the stamps of arrival that is longer than this is no pause but another clock, and is not waited for.
   static constexpr Duration kMaxPause = std::chrono::seconds{10};
 
+  /// CLOCK_MONOTONIC and the sleep of this thread, or others in tests.
+  struct Clock {
+    Duration (*now)();
+    void (*sleep_for)(Duration);
+  };
+  static const Clock kOfTheHost;
+
   /// `recording` must outlive this; where it is silent, that is for a time it knows. Precondition: speed > 0.
-  PacedInput(InputSource& recording, double speed) : recording_(recording), speed_(speed) {}
+  PacedInput(InputSource& recording, double speed, Clock clock = kOfTheHost)
+      : recording_(recording), speed_(speed), clock_(clock) {}
 
   Input next(Duration timeout) override;
 
@@ -198,11 +217,12 @@ class PacedInput : public InputSource {
 
   InputSource& recording_;
   double speed_;
+  Clock clock_;
   std::optional<Held> held_;
   bool started_ = false;
   Stamp last_arrival_;
   Stamp anchor_arrival_;    ///< this arrival ...
-  Duration anchor_clock_{}; ///< ... is due when CLOCK_MONOTONIC shows this
+  Duration anchor_clock_{}; ///< ... is due when the clock shows this
 };
 
 } // namespace locus::daemon
