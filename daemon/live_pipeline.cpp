@@ -120,7 +120,6 @@ void LivePipeline::process(const CutSweep& taken) {
   const ProcessedSweep done = processor_.process(taken.sweep, taken.cut, [this, deadline] {
     return stopping_.load(std::memory_order_relaxed) || read_clock(CLOCK_MONOTONIC) > deadline;
   });
-  (done.estimate.failed ? failed_ : processed_).fetch_add(1, std::memory_order_relaxed);
   // Never full: one goes in for each sweep handed over, and the ingest empties the ring when it hands over the next.
   static_cast<void>(feedback_.push(processor_.odometry().feedback()));
   const OdometryEstimate& estimate = done.estimate;
@@ -128,6 +127,7 @@ void LivePipeline::process(const CutSweep& taken) {
                                    estimate.twist_covariance})); // never full: emptied with every input
   if (!estimates_.push(done))
     unfetched_.fetch_add(1, std::memory_order_relaxed);
+  (estimate.failed ? failed_ : processed_).fetch_add(1, std::memory_order_release); // all of it is there to be taken
   estimate_is_there_.notify();
   processor_.prepare_next();
   if (options_.after_estimate)
@@ -145,7 +145,7 @@ std::optional<ProcessedSweep> LivePipeline::next(Duration timeout) {
 bool LivePipeline::finished() const { return odometry_ended_.load(std::memory_order_acquire) && estimates_.empty(); }
 
 SweepCounters LivePipeline::counters() const {
-  const auto read = [](const Counter& counter) { return counter.load(std::memory_order_relaxed); };
+  const auto read = [](const Counter& counter) { return counter.load(std::memory_order_acquire); };
   return {read(seen_), read(processed_), read(dropped_), read(failed_)};
 }
 

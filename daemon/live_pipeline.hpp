@@ -81,7 +81,8 @@ class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it kee
     return {ingest_progress_.load(std::memory_order_relaxed), odometry_progress_.load(std::memory_order_relaxed)};
   }
 
-  /// Any thread.
+  /// Any thread. Of a sweep that counts as processed or failed, the estimate is there to be fetched, and the ingest has
+  /// its feedback with the next.
   [[nodiscard]] SweepCounters counters() const;
   /// Estimates and changes of health that nobody fetched in time.
   [[nodiscard]] std::uint64_t unfetched() const { return unfetched_.load(std::memory_order_relaxed); }

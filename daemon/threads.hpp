@@ -119,7 +119,8 @@ template <class T> class LatestSlot {
 ///
 /// The semaphore of the C library: notify() is one atomic addition and, if somebody sleeps, one futex call. That of the
 /// standard library will not do: its timed wait in libstdc++ polls with pauses that grow to 64 ms. A notification is a
-/// hint to look again; one that comes before the wait is not lost. Any thread may notify, one waits.
+/// hint to look again; one that comes before the wait is not lost, and many together are one. Any thread may notify,
+/// one waits.
 class Wakeup {
  public:
   Wakeup();
@@ -129,7 +130,7 @@ class Wakeup {
 
   void notify() noexcept;
 
-  /// Returns after a notification that no earlier wait has used, or after `timeout`.
+  /// Returns after a notification that no earlier wait has used, or after `timeout`. Uses all that have come.
   void wait_for(Duration timeout) noexcept;
 
  private:

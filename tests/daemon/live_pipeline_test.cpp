@@ -16,13 +16,13 @@
 #include "daemon/drive.hpp"
 #include "daemon/input.hpp"
 #include "support/held_input.hpp"
+#include "support/patience.hpp"
 
 namespace locus::daemon {
 namespace {
 
 using std::chrono::microseconds;
 using std::chrono::milliseconds;
-using std::chrono::seconds;
 
 /// So slow a world that no registration is ended by its deadline.
 constexpr double kNoHurry = 1e-3;
@@ -36,7 +36,8 @@ class MeteredInput : public test::HeldInput {
   void hand_over(const LivePipeline& pipeline, std::uint64_t sweeps) {
     wanted_.store(sweeps);
     pipeline_.store(&pipeline);
-    while (resting_at_.load() < sweeps)
+    const Duration give_up = read_clock(CLOCK_MONOTONIC) + test::patience();
+    while (resting_at_.load() < sweeps && read_clock(CLOCK_MONOTONIC) < give_up)
       std::this_thread::sleep_for(microseconds{100});
   }
 
@@ -86,20 +87,25 @@ class SilentInput : public InputSource {
   }
 };
 
-std::vector<ProcessedSweep> fetch_all(LivePipeline& pipeline) {
-  std::vector<ProcessedSweep> fetched;
-  while (!pipeline.finished())
+/// Nothing once the pipeline has finished, or at the end of the test's patience.
+std::optional<ProcessedSweep> next_estimate(LivePipeline& pipeline) {
+  const Duration give_up = read_clock(CLOCK_MONOTONIC) + test::patience();
+  while (!pipeline.finished() && read_clock(CLOCK_MONOTONIC) < give_up)
     if (const auto done = pipeline.next(milliseconds{100}))
-      fetched.push_back(*done);
-  return fetched;
+      return done;
+  return std::nullopt;
 }
 
-/// Sequence of the next estimate.
 std::optional<std::uint64_t> next_sequence(LivePipeline& pipeline) {
-  for (const Duration give_up = read_clock(CLOCK_MONOTONIC) + seconds{60}; read_clock(CLOCK_MONOTONIC) < give_up;)
-    if (const auto done = pipeline.next(milliseconds{100}))
-      return done->sequence;
-  return std::nullopt;
+  const auto done = next_estimate(pipeline);
+  return done ? std::optional{done->sequence} : std::nullopt;
+}
+
+std::vector<ProcessedSweep> fetch_all(LivePipeline& pipeline) {
+  std::vector<ProcessedSweep> fetched;
+  while (const auto done = next_estimate(pipeline))
+    fetched.push_back(*done);
+  return fetched;
 }
 
 void expect_adds_up(const SweepCounters& counters) {
@@ -112,12 +118,6 @@ Duration median_wall(std::vector<ProcessedSweep>::const_iterator begin,
   std::transform(begin, end, std::back_inserter(walls), [](const ProcessedSweep& done) { return done.took.wall; });
   std::nth_element(walls.begin(), walls.begin() + static_cast<std::ptrdiff_t>(walls.size() / 2), walls.end());
   return walls[walls.size() / 2];
-}
-
-Duration time_to_stop(LivePipeline& pipeline) {
-  const Duration begin = read_clock(CLOCK_MONOTONIC);
-  pipeline.stop();
-  return read_clock(CLOCK_MONOTONIC) - begin;
 }
 
 TEST(LivePipeline, GivesTheBitsOfOneThreadWhenNothingIsDropped) {
@@ -217,6 +217,24 @@ TEST(LivePipeline, QueueIsBackWithTheFirstSweepAfterAnOverload) {
   EXPECT_EQ(pipeline.counters().seen, seen);
 }
 
+/// Who waits for the counter, as every input does that is held until a sweep is processed, need not wait any longer.
+TEST(LivePipeline, EstimateOfASweepThatCountsAsProcessedIsThere) {
+  const Config config = Drive::config();
+  DriveInput drive;
+  test::PatientInput input(drive);
+  LivePipeline pipeline(config, open_lidars(config), input, {.speed = kNoHurry});
+  input.wait_for(&pipeline);
+  const Duration give_up = read_clock(CLOCK_MONOTONIC) + test::patience();
+  std::uint64_t fetched = 0, missing = 0;
+  while (!pipeline.finished() && read_clock(CLOCK_MONOTONIC) < give_up) {
+    const SweepCounters counters = pipeline.counters();
+    for (; fetched < counters.processed + counters.failed; ++fetched)
+      missing += pipeline.next(Duration::zero()) ? 0U : 1U;
+  }
+  EXPECT_EQ(missing, 0U);
+  EXPECT_EQ(fetched, Drive::kSweeps);
+}
+
 /// What the deadline is for: a registration that is too slow for its sweeps is cut short, and few are dropped.
 TEST(LivePipeline, RegistrationEndsAnIterationAfterItsDeadline) {
   constexpr double kImpossible = 1e9; // every deadline has passed before the registration begins
@@ -237,7 +255,7 @@ TEST(LivePipeline, ConsumerThatFetchesNothingLosesEstimatesAndDelaysNobody) {
   test::PatientInput input(drive);
   LivePipeline pipeline(config, open_lidars(config), input, {.speed = kNoHurry});
   input.wait_for(&pipeline);
-  const Duration give_up = read_clock(CLOCK_MONOTONIC) + seconds{60};
+  const Duration give_up = read_clock(CLOCK_MONOTONIC) + test::patience();
   while (pipeline.counters().seen < Drive::kSweeps - 1 && read_clock(CLOCK_MONOTONIC) < give_up)
     std::this_thread::sleep_for(milliseconds{1});
   pipeline.stop();
@@ -249,34 +267,39 @@ TEST(LivePipeline, ConsumerThatFetchesNothingLosesEstimatesAndDelaysNobody) {
   EXPECT_EQ(fetch_all(pipeline).size(), LivePipeline::kMaxUnfetched);
 }
 
-TEST(LivePipeline, StopsWithinASecondInSilence) {
+TEST(LivePipeline, StopsInSilence) {
   SilentInput input;
   const Config config = Drive::config();
   LivePipeline pipeline(config, open_lidars(config), input);
-  std::this_thread::sleep_for(milliseconds{20});
-  EXPECT_LT(time_to_stop(pipeline), seconds{1});
+  const auto begun = pipeline.progress();
+  const Duration give_up = read_clock(CLOCK_MONOTONIC) + test::patience();
+  while (pipeline.progress().ingest < begun.ingest + 3 && read_clock(CLOCK_MONOTONIC) < give_up)
+    std::this_thread::sleep_for(milliseconds{1});
+  pipeline.stop();
   EXPECT_TRUE(pipeline.finished());
   EXPECT_EQ(pipeline.counters(), SweepCounters{});
 }
 
-TEST(LivePipeline, StopsWithinASecondInMidDriveAndAccountsForWhatItHasSeen) {
+TEST(LivePipeline, StopsInMidDriveAndAccountsForWhatItHasSeen) {
+  constexpr std::uint64_t kSeen = Drive::kSweeps / 2;
   DriveInput drive;
-  PacedInput input(drive, 4.0);
+  MeteredInput input(drive);
   const Config config = Drive::config();
-  LivePipeline pipeline(config, open_lidars(config), input, {.speed = 4.0});
-  while (!pipeline.next(milliseconds{100})) {
-  }
-  EXPECT_LT(time_to_stop(pipeline), seconds{1});
+  LivePipeline pipeline(config, open_lidars(config), input, {.speed = kNoHurry});
+  input.hand_over(pipeline, kSeen);
+  EXPECT_TRUE(next_sequence(pipeline));
+  pipeline.stop();
   expect_adds_up(pipeline.counters());
-  EXPECT_LT(pipeline.counters().seen, Drive::kSweeps);
+  EXPECT_EQ(pipeline.counters().seen, kSeen);
 }
 
-/// Both threads and the consumer together.
+/// Both threads and the consumer together. A helper thread of the registration would begin to work when it finds time.
 TEST(LivePipeline, AllocatesNothingOnceWarm) {
   if (!allocations())
     GTEST_SKIP() << "a sanitizer is in the way of counting";
   constexpr std::uint64_t kWarm = 40;
-  const Config config = Drive::config();
+  Config config = Drive::config();
+  config.odometry.threads = 1;
   DriveInput drive;
   test::PatientInput input(drive);
   Drive::instance();
@@ -284,9 +307,8 @@ TEST(LivePipeline, AllocatesNothingOnceWarm) {
   input.wait_for(&pipeline);
   std::optional<std::uint64_t> before;
   std::optional<std::uint64_t> after;
-  while (!pipeline.finished())
-    if (const auto done = pipeline.next(milliseconds{100}))
-      (done->sequence <= kWarm ? before : after) = allocations();
+  while (const auto done = next_estimate(pipeline))
+    (done->sequence <= kWarm ? before : after) = allocations();
   ASSERT_TRUE(before && after);
   EXPECT_EQ(*after - *before, 0U);
 }

@@ -8,6 +8,7 @@
 #include "daemon/machine_time.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/say.hpp"
+#include "support/patience.hpp"
 
 namespace locus::soak {
 
@@ -75,8 +76,7 @@ void RestartingPipeline::end(End how) {
 
 /// Who drives a day in minutes outruns the disk, by seconds of stamps when it is busy. A robot does not.
 void RestartingPipeline::wait_for_disk(const Whereabouts& last) const {
-  constexpr Duration kPatience = std::chrono::seconds{10};
-  const Duration give_up = daemon::read_clock(CLOCK_MONOTONIC) + kPatience;
+  const Duration give_up = daemon::read_clock(CLOCK_MONOTONIC) + test::patience();
   while (daemon::read_clock(CLOCK_MONOTONIC) < give_up) {
     const auto written = daemon::load_state(state_file_);
     if (written && written->last.stamp == last.stamp)
