@@ -26,15 +26,17 @@ namespace {
 
 constexpr double kInSight_m = 60.0;
 
-constexpr std::array<char, 8> kMagic{'l', 'o', 'c', 'u', 's', 'd', ' ', '7'};
+constexpr std::array<char, 8> kMagic{'l', 'o', 'c', 'u', 's', 'd', ' ', '8'};
 
 using LearnedNumbers = std::array<double, 6 + LearnedSource::kMostStates*(LearnedSource::kMostStates + 1)>;
 
 constexpr std::string_view kAnyVersion = "locusd ";
 
-/// What the file begins with, as the machine holds it: it is read where it was written.
+/// What the file begins with, twice, as the machine holds it: it is read where it was written. The older one of the two
+/// is written over in place, so that one is whole whenever that ends; of two the newer counts.
 struct Head {
   std::array<char, 8> magic;
+  std::uint64_t number; ///< grows from one to the next
   std::int64_t stamp_ns;
   std::array<double, 7> xyz_xyzw;
   std::array<double, 36> covariance;
@@ -46,7 +48,9 @@ struct Head {
   std::uint64_t checksum; ///< of what stands above
 };
 
-/// What follows, and is followed by the points.
+constexpr std::size_t kHeads = 2;
+
+/// What follows them, and is followed by the points.
 struct Body {
   SourceIds sources;
   std::int32_t flat_ground;
@@ -73,14 +77,24 @@ std::uint64_t checksum_of(const Body& body, std::string_view points) {
 }
 
 /// A disk that is full takes part of what is written, and says why only when it is asked for the rest.
-bool write_all(int descriptor, std::string_view bytes) {
+bool write_all(int descriptor, std::string_view bytes, std::size_t offset = 0) {
   while (!bytes.empty()) {
-    const ssize_t written = write(descriptor, bytes.data(), bytes.size());
+    const ssize_t written = pwrite(descriptor, bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (written < 0 && errno != EINTR)
       return false;
     bytes.remove_prefix(static_cast<std::size_t>(std::max<ssize_t>(written, 0)));
+    offset += static_cast<std::size_t>(std::max<ssize_t>(written, 0));
   }
   return true;
+}
+
+/// A file that was renamed in it stays so after a power cut. Where a file system cannot say so, none is worse off.
+void sync_folder(const std::filesystem::path& folder) {
+  const int descriptor = open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0)
+    return;
+  fsync(descriptor);
+  close(descriptor);
 }
 
 std::array<double, 7> to_numbers(const Pose& pose) {
@@ -108,8 +122,18 @@ LearnedSource to_learned(const LearnedNumbers& numbers) {
                             .selfadjointView<Eigen::Lower>()};
 }
 
-Head head_of(const Whereabouts& last) {
-  Head head{kMagic, to_ns(last.stamp), to_numbers(last.T_odom_base), {}, {}, {}, {}, {}, last.doubted.to_ullong(), 0};
+Head head_of(const Whereabouts& last, std::uint64_t number) {
+  Head head{.magic = kMagic,
+            .number = number,
+            .stamp_ns = to_ns(last.stamp),
+            .xyz_xyzw = to_numbers(last.T_odom_base),
+            .covariance = {},
+            .twist = {},
+            .sources_xyz_xyzw = {},
+            .learned = {},
+            .learned_since_ns = {},
+            .doubted = last.doubted.to_ullong(),
+            .checksum = 0};
   Eigen::Map<Matrix6>(head.covariance.data()) = last.pose_covariance;
   Eigen::Map<Vector6>(head.twist.data()) = last.twist_base;
   for (std::size_t i = 0; i < kMaxSources; ++i) {
@@ -124,13 +148,33 @@ Head head_of(const Whereabouts& last) {
 }
 
 std::string to_bytes(const SavedState& state) {
-  const Head head = head_of(state.last);
   Body body{state.sources, static_cast<std::int32_t>(state.flat_ground),
             static_cast<std::uint32_t>(state.map_odom.size()), 0};
   const auto points = std::as_bytes(std::span(state.map_odom));
   const std::string_view text{reinterpret_cast<const char*>(points.data()), points.size()};
   body.checksum = checksum_of(body, text);
-  return std::string{bytes_of(head)}.append(bytes_of(body)).append(text);
+  std::string bytes;
+  for (std::uint64_t number = 0; number < kHeads; ++number)
+    bytes += bytes_of(head_of(state.last, number));
+  return bytes.append(bytes_of(body)).append(text);
+}
+
+/// A head of the file, and the place of the other one.
+struct NewestHead {
+  Head head;
+  std::size_t offset_of_older;
+};
+
+/// Of those that are whole, if any is. `bytes` begins as the file does.
+std::optional<NewestHead> newest_head(std::string_view bytes) {
+  std::optional<NewestHead> newest;
+  for (std::size_t place = 0; place < kHeads && bytes.size() >= (place + 1) * sizeof(Head); ++place) {
+    Head head{};
+    std::memcpy(&head, bytes.data() + place * sizeof(Head), sizeof(Head));
+    if (head.magic == kMagic && head.checksum == checksum_of(head) && (!newest || head.number > newest->head.number))
+      newest = {head, (kHeads - 1 - place) * sizeof(Head)};
+  }
+  return newest;
 }
 
 /// After minutes of dead reckoning it may be of any size.
@@ -165,16 +209,16 @@ bool makes_sense(const SavedState& state) {
 
 /// Nothing if it is cut short or damaged.
 std::optional<SavedState> from_bytes(std::string_view bytes) {
-  Head head{};
-  Body body{};
-  if (bytes.size() < sizeof(head) + sizeof(body))
+  constexpr std::size_t kBodyAt = kHeads * sizeof(Head), kPointsAt = kBodyAt + sizeof(Body);
+  const std::optional<NewestHead> newest = newest_head(bytes);
+  if (!newest || bytes.size() < kPointsAt)
     return std::nullopt;
-  std::memcpy(&head, bytes.data(), sizeof(head));
-  std::memcpy(&body, bytes.data() + sizeof(head), sizeof(body));
-  const std::string_view points = bytes.substr(sizeof(head) + sizeof(body));
-  if (head.magic != kMagic || head.checksum != checksum_of(head) || body.checksum != checksum_of(body, points) ||
-      points.size() != body.points * sizeof(SurfacePoint) || body.flat_ground < 0 ||
-      body.flat_ground > static_cast<std::int32_t>(FlatGround::automatic))
+  const Head& head = newest->head;
+  Body body{};
+  std::memcpy(&body, bytes.data() + kBodyAt, sizeof(body));
+  const std::string_view points = bytes.substr(kPointsAt);
+  if (body.checksum != checksum_of(body, points) || points.size() != body.points * sizeof(SurfacePoint) ||
+      body.flat_ground < 0 || body.flat_ground > static_cast<std::int32_t>(FlatGround::automatic))
     return std::nullopt;
   SavedState state;
   state.last.stamp = stamp_from_ns(head.stamp_ns);
@@ -233,8 +277,10 @@ std::optional<std::string> write_state(const std::filesystem::path& file, const 
   const int error = errno;
   if (descriptor >= 0)
     close(descriptor);
-  if (written && rename(beside.c_str(), file.c_str()) == 0)
+  if (written && rename(beside.c_str(), file.c_str()) == 0) {
+    sync_folder(file.parent_path());
     return std::nullopt;
+  }
   const std::string why = std::strerror(written ? errno : error); // NOLINT(concurrency-mt-unsafe)
   unlink(beside.c_str());
   return fmt::format("{}: the state cannot be saved ({}); after a restart the odometry begins anew", file.string(),
@@ -255,11 +301,14 @@ Expected<SavedState, std::string> load_state(const std::filesystem::path& file) 
 }
 
 void update_whereabouts(const std::filesystem::path& file, const Whereabouts& last) {
-  const Head head = head_of(last);
-  const int descriptor = open(file.c_str(), O_WRONLY | O_CLOEXEC);
+  const int descriptor = open(file.c_str(), O_RDWR | O_CLOEXEC);
   if (descriptor < 0)
     return;
-  static_cast<void>(write_all(descriptor, bytes_of(head)));
+  std::array<char, kHeads * sizeof(Head)> heads{};
+  const ssize_t read = pread(descriptor, heads.data(), heads.size(), 0);
+  const std::string_view bytes{heads.data(), static_cast<std::size_t>(std::max<ssize_t>(read, 0))};
+  if (const auto newest = newest_head(bytes))
+    static_cast<void>(write_all(descriptor, bytes_of(head_of(last, newest->head.number + 1)), newest->offset_of_older));
   close(descriptor);
 }
 

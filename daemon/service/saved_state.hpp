@@ -48,8 +48,9 @@ void read_map(const Odometry& odometry, const Pose& T_odom_base, std::vector<Sur
 std::optional<std::string> write_state(const std::filesystem::path& file, const SavedState& state);
 Expected<SavedState, std::string> load_state(const std::filesystem::path& file);
 
-/// In a file that holds the map of the same odom frame. It is for a crash of the service, not of the machine: it does
-/// not wait for the disk, and whether it fails shows with the next state.
+/// In a file that holds the map of the same odom frame; while it is written, what it said before still counts. It does
+/// not wait for the disk: a crash of the machine may cost the last ones, but never the map. Whether it fails shows with
+/// the next state.
 void update_whereabouts(const std::filesystem::path& file, const Whereabouts& last);
 
 /// $STATE_DIRECTORY/state as systemd sets it; nothing without, and then no state is kept.

@@ -51,7 +51,7 @@ for target in "${targets[@]}"; do
   done
 
   rm -rf "$merged" && mkdir -p "$merged"
-  "${fuzzer[@]}" -set_cover_merge=1 -use_counters=0 -max_len=8192 "$merged" "$corpus" "$build/seeds/$target" "$found" &>> "$log"
+  "${fuzzer[@]}" -set_cover_merge=1 -use_counters=0 -max_len=16384 "$merged" "$corpus" "$build/seeds/$target" "$found" &>> "$log"
   tar --sort=name --owner=0 --group=0 --numeric-owner --mtime=@0 -cJf "tests/fuzz/corpus/$target.tar.xz" \
     -C "$merged" .
 done

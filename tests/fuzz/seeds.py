@@ -268,10 +268,13 @@ write("point_cloud", "pcd_binary", PCD.format("binary").encode() + struct.pack("
 # The state of the service; checksums are made right by the target.
 POSE = (1, 2, 3, 0, 0, 0, 1)
 COVARIANCE_OF_ONE = [float(i % 7 == 0) for i in range(36)]
-head = b"locusd 4" + struct.pack("<q7d36d6d56dQQ", 1_700_000_000_000_000_000, *POSE, *COVARIANCE_OF_ONE, 1, 0, 0, 0, 0, 0.1,
-                                 *POSE, *([0] * 49), 1, 0)
+LEARNED = [0.1] * 6 + [0.0] * 7 + [1e-4 * (i % 8 == 0) for i in range(49)]
+heads = b"".join(b"locusd 8" + struct.pack("<Qq7d36d6d56d496d8qQQ", number, 1_700_000_000_000_000_000, *POSE, *COVARIANCE_OF_ONE,
+                                           1, 0, 0, 0, 0, 0.1, *POSE, *([0] * 49), *LEARNED, *([0] * 434), *([0] * 8), 1, 0)
+                 for number in (0, 1))
 for points in (0, 3):
-    write("saved_state", f"points_{points}", head + struct.pack("<QiIQ", 7, 1, points, 0) + struct.pack("<6f", 1, 2, 3, 0, 0, 1) * points)
+    write("saved_state", f"points_{points}",
+          heads + struct.pack("<Q8QiIQ", 7, *range(8), 1, points, 0) + struct.pack("<6f", 1, 2, 3, 0, 0, 1) * points)
 
 # Messages: what each step brings with it is in the target.
 ODOMETRY, STAMP, ARRIVAL, ROTATION, VECTORS, COVARIANCE, OUTSIDE = 1, 2, 4, 8, 16, 32, 64

@@ -6,9 +6,10 @@
 #include <chrono>
 #include <fstream>
 #include <functional>
-#include <thread>
+#include <optional>
 
 #include "replay/replay_run.hpp"
+#include "support/patience.hpp"
 
 namespace locus::daemon {
 namespace {
@@ -30,34 +31,22 @@ class Keeper : public testing::Test {
     keeper_.take(odometry_, estimate, mode);
   }
 
-  /// Whether the file comes to say so.
-  [[nodiscard]] bool says(double x_m, FlatGround mode) const {
-    for (int look = 0; look < 500; ++look) {
-      if (const auto state = load_state(file_);
-          state && state->last.T_odom_base.translation.x() == x_m && state->flat_ground == mode)
-        return true;
-      std::this_thread::sleep_for(milliseconds{10});
-    }
-    return false;
+  /// Whether the file says so, once what was taken is written.
+  [[nodiscard]] bool says(double x_m, FlatGround mode) {
+    keeper_.write();
+    const auto state = load_state(file_);
+    return state && state->last.T_odom_base.translation.x() == x_m && state->flat_ground == mode;
   }
 
-  /// As a reset does it.
-  void begin_anew(const std::optional<SavedState>& start) {
-    disk_.reset();
-    keeper_.begin_anew(start);
-    disk_.emplace("disk", milliseconds{20}, write_);
-  }
-
-  Worker::Round write_ = [this](bool /*last*/) { keeper_.write(); };
   test::TemporaryFolder folder_;
   std::filesystem::path file_ = folder_ / "state";
   Odometry odometry_{OdometryOptions{}};
   StateKeeper keeper_{file_, {}, [](const std::string& problem) { ADD_FAILURE() << problem; }};
-  std::optional<Worker> disk_{std::in_place, "disk", milliseconds{20}, write_};
 };
 
 TEST_F(Keeper, WritesTheMapEveryThirtySecondsOrTenMetresAndTheWhereaboutsAlways) {
   take(seconds{0}, 0, FlatGround::off, false);
+  keeper_.write();
   EXPECT_FALSE(std::filesystem::exists(file_)) << "nothing was seen yet";
   take(seconds{1}, 1, FlatGround::off);
   EXPECT_TRUE(says(1, FlatGround::off));
@@ -69,7 +58,7 @@ TEST_F(Keeper, WritesTheMapEveryThirtySecondsOrTenMetresAndTheWhereaboutsAlways)
   EXPECT_TRUE(says(12, FlatGround::on));
   take(seconds{34}, 12.5, FlatGround::automatic);
   EXPECT_TRUE(says(12.5, FlatGround::automatic)) << "thirty seconds later";
-  begin_anew(std::nullopt);
+  keeper_.begin_anew(std::nullopt);
   take(seconds{35}, 0, FlatGround::off);
   EXPECT_TRUE(says(0, FlatGround::off)) << "at once";
 }
@@ -78,15 +67,32 @@ TEST_F(Keeper, WhatWasIsForgottenAtAResetAndThePoseThatIsToldKept) {
   take(seconds{0}, 3, FlatGround::off);
   ASSERT_TRUE(says(3, FlatGround::off));
   const SavedState told{{Stamp{}, Pose{Eigen::Quaterniond::Identity(), {7, 0, 0}}}, FlatGround::on, {}};
-  begin_anew(told);
+  keeper_.begin_anew(told);
   EXPECT_FALSE(keeper_.now());
   EXPECT_EQ(load_state(file_)->last.T_odom_base.translation.x(), 7) << "at once";
-  take(seconds{1}, 8, FlatGround::off);
-  begin_anew(std::nullopt); // whether or not that was written yet
-  std::this_thread::sleep_for(milliseconds{100});
-  EXPECT_FALSE(std::filesystem::exists(file_));
+  for (const bool was_written : {false, true}) {
+    take(seconds{1}, 8, FlatGround::off);
+    if (was_written)
+      keeper_.write();
+    keeper_.begin_anew(std::nullopt);
+    keeper_.write();
+    EXPECT_FALSE(std::filesystem::exists(file_)) << was_written;
+  }
   take(seconds{2}, 9, FlatGround::off);
   EXPECT_TRUE(says(9, FlatGround::off));
+}
+
+TEST_F(Keeper, WritesFromAnotherThreadWhileItIsTold) {
+  Worker disk("disk", milliseconds{1}, [this](bool /*last*/) { keeper_.write(); });
+  constexpr int kSweeps = 200;
+  for (int sweep = 0; sweep <= kSweeps; ++sweep)
+    take(milliseconds{100 * sweep}, sweep, FlatGround::off);
+  const auto give_up = std::chrono::steady_clock::now() + test::patience();
+  std::optional<double> x_m;
+  while (x_m != kSweeps && std::chrono::steady_clock::now() < give_up)
+    if (const auto state = load_state(file_))
+      x_m = state->last.T_odom_base.translation.x();
+  EXPECT_EQ(x_m, kSweeps);
 }
 
 TEST_F(Keeper, ClockThatIsSetBackPutsNothingOff) {
@@ -218,20 +224,60 @@ TEST_F(Keeper, WhatWasLearnedOfASourceGoesWhereItIsConfiguredOtherwise) {
 }
 
 TEST_F(Keeper, EveryDamagedByteIsNoticed) {
+  const test::TemporaryFolder memory{"/dev/shm"}; // no disk is waited for thousands of times
+  const std::filesystem::path file = memory / "state";
   SavedState state;
   state.last.T_source_base[1] = Pose{};
   state.last.doubted.set(1);
   state.map_odom.resize(3, {Eigen::Vector3f::Ones(), Eigen::Vector3f::UnitZ()});
-  ASSERT_FALSE(write_state(file_, state));
-  ASSERT_TRUE(load_state(file_));
-  const std::string whole = test::read_text(file_);
+  ASSERT_FALSE(write_state(file, state));
+  state.last.T_odom_base.translation.x() = 5;
+  update_whereabouts(file, state.last);
+  ASSERT_TRUE(load_state(file));
+  const std::string whole = test::read_text(file);
+  std::size_t refused = 0;
   for (std::size_t i = 0; i < whole.size(); ++i) {
     std::string damaged = whole;
     damaged[i] = static_cast<char>(damaged[i] ^ 4);
-    std::ofstream{file_} << damaged;
-    EXPECT_FALSE(load_state(file_)) << i;
-    std::ofstream{file_} << whole.substr(0, i);
-    EXPECT_FALSE(load_state(file_)) << i;
+    std::ofstream{file} << damaged;
+    const auto left = load_state(file);
+    refused += left ? 0U : 1U;
+    if (left) { // by the other of two whereabouts
+      EXPECT_EQ(left->last.T_source_base[1]->translation, Eigen::Vector3d::Zero()) << i;
+      EXPECT_TRUE(left->last.T_odom_base.translation.x() == 0 || left->last.T_odom_base.translation.x() == 5) << i;
+      EXPECT_EQ(left->map_odom.size(), 3U) << i;
+    }
+    std::ofstream{file} << whole.substr(0, i);
+    EXPECT_FALSE(load_state(file)) << i;
+  }
+  EXPECT_GT(refused, 3 * sizeof(SurfacePoint)) << "all of the map";
+}
+
+/// Power goes while the whereabouts are written: so many bytes are new.
+TEST_F(Keeper, WhereaboutsThatWereCutShortCostNoMap) {
+  const test::TemporaryFolder memory{"/dev/shm"};
+  const std::filesystem::path file = memory / "state";
+  SavedState state;
+  state.map_odom.resize(3, {Eigen::Vector3f::Ones(), Eigen::Vector3f::UnitZ()});
+  ASSERT_FALSE(write_state(file, state));
+  const auto x_m = [&]() -> std::optional<double> {
+    const auto loaded = load_state(file);
+    return loaded && loaded->map_odom.size() == 3 ? std::optional{loaded->last.T_odom_base.translation.x()}
+                                                  : std::nullopt;
+  };
+  for (int sweep = 1; sweep <= 3; ++sweep) {
+    const std::string before = test::read_text(file);
+    state.last.T_odom_base.translation.x() = sweep;
+    update_whereabouts(file, state.last);
+    ASSERT_EQ(x_m(), sweep);
+    const std::string after = test::read_text(file);
+    ASSERT_EQ(after.size(), before.size());
+    for (std::size_t written = 0; written < after.size(); written += 13) {
+      std::ofstream{file} << after.substr(0, written) + before.substr(written);
+      const auto found = x_m();
+      EXPECT_TRUE(found == sweep - 1 || found == sweep) << written << " bytes of sweep " << sweep;
+    }
+    std::ofstream{file} << after;
   }
 }
 
