@@ -13,11 +13,11 @@ constexpr bool is_sampled(std::size_t stage) {
   return stage == static_cast<std::size_t>(Stage::decode) || stage == static_cast<std::size_t>(Stage::correct);
 }
 
-Duration cheapest_reading() {
+Duration cheapest_reading(StageStopwatch::Clock clock) {
   Duration cheapest = Duration::max();
-  Duration last = read_clock(CLOCK_THREAD_CPUTIME_ID);
+  Duration last = clock(CLOCK_THREAD_CPUTIME_ID);
   for (int i = 0; i < 100; ++i) {
-    const Duration now = read_clock(CLOCK_THREAD_CPUTIME_ID);
+    const Duration now = clock(CLOCK_THREAD_CPUTIME_ID);
     cheapest = std::min(cheapest, now - last);
     last = now;
   }
@@ -26,7 +26,7 @@ Duration cheapest_reading() {
 
 } // namespace
 
-StageStopwatch::StageStopwatch() : reading_cost_(cheapest_reading()) {}
+StageStopwatch::StageStopwatch(Clock clock) : clock_(clock), reading_cost_(cheapest_reading(clock)) {}
 
 void StageStopwatch::enter(std::size_t stage) {
   assert(depth_ < kMaxDepth);
@@ -45,7 +45,7 @@ void StageStopwatch::leave() {
 
 /// To an untimed stage nothing is charged: the visit that was timed in its place speaks for it.
 void StageStopwatch::charge_innermost() {
-  const Duration now = read_clock(CLOCK_THREAD_CPUTIME_ID);
+  const Duration now = clock_(CLOCK_THREAD_CPUTIME_ID);
   if (depth_ > 0 && open_[depth_ - 1].timed)
     totals_[open_[depth_ - 1].stage] += now - mark_ - reading_cost_;
   mark_ = now;

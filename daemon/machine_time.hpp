@@ -45,7 +45,8 @@ class StageStopwatch : public StageClock {
  public:
   static constexpr std::uint64_t kSampling = 13; ///< a prime, for packets come in rhythm with the revolution
 
-  StageStopwatch();
+  using Clock = Duration (*)(clockid_t); ///< read_clock(), or another in tests
+  explicit StageStopwatch(Clock clock = [](clockid_t id) { return read_clock(id); });
 
   void enter(Stage stage) override { enter(static_cast<std::size_t>(stage)); }
   void leave() override;
@@ -78,6 +79,7 @@ class StageStopwatch : public StageClock {
   void enter(std::size_t stage);
   void charge_innermost();
 
+  Clock clock_;
   Duration reading_cost_{};
   Duration mark_{}; ///< up to here everything is charged
   std::array<Duration, kStages + 1> totals_{};

@@ -11,8 +11,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "daemon/machine_time.hpp"
-
 namespace locus::daemon {
 
 using nlohmann::ordered_json;
@@ -53,7 +51,7 @@ std::string text_of(const ordered_json& json) {
 std::optional<IncidentCause> IncidentWatch::look(const Figures& figures) {
   const std::uint64_t before = std::exchange(contradictions_, contradictions(figures.ingest));
   const std::optional<OdometryEstimate>& last = figures.sweeps.last;
-  const Duration now = read_clock(CLOCK_MONOTONIC);
+  const Duration now = clock_(CLOCK_MONOTONIC);
   if (!last || last->state != TrackingState::dead_reckoning) {
     has_tracked_ = last.has_value();
     lost_since_.reset();

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <ctime>
 #include <optional>
 #include <string>
 
 #include "core/base/pose.hpp"
 #include "daemon/figures.hpp"
 #include "daemon/incidents.hpp"
+#include "daemon/machine_time.hpp"
 
 namespace locus::daemon {
 
@@ -19,10 +21,14 @@ class IncidentWatch {
   static constexpr Duration kLostFor = std::chrono::seconds{1}; ///< a sweep that fails alone is none
   static constexpr Duration kQuiet = std::chrono::seconds{10};  ///< after which a contradiction is another one
 
+  using Clock = Duration (*)(clockid_t); ///< read_clock(), or another in tests
+  explicit IncidentWatch(Clock clock = [](clockid_t id) { return read_clock(id); }) : clock_(clock) {}
+
   /// A few times a second. Each time it begins, once.
   std::optional<IncidentCause> look(const Figures& figures);
 
  private:
+  Clock clock_;
   bool has_tracked_ = false;
   std::optional<Duration> lost_since_;   ///< CLOCK_MONOTONIC
   std::uint64_t contradictions_ = 0;     ///< counted so far

@@ -15,8 +15,6 @@
 #define SD_JOURNAL_SUPPRESS_LOCATION // the caller's is meant
 #include <systemd/sd-journal.h>
 
-#include "daemon/machine_time.hpp"
-
 namespace locus::daemon {
 
 namespace {
@@ -31,7 +29,7 @@ bool stderr_is_journal() {
 
 } // namespace
 
-Log::Log(Duration interval) : interval_(interval), to_journal_(stderr_is_journal()) {}
+Log::Log(Clock clock) : clock_(clock), to_journal_(stderr_is_journal()) {}
 
 void Log::say(Severity severity, const std::string& message, Fields fields, const CodePlace& where) {
   std::uint64_t silenced = 0;
@@ -45,9 +43,9 @@ void Log::say(Severity severity, const std::string& message, Fields fields, cons
 
 bool Log::may_speak(const CodePlace& where, std::uint64_t& silenced_before) {
   const std::scoped_lock lock(mutex_);
-  const Duration now = read_clock(CLOCK_MONOTONIC);
+  const Duration now = clock_(CLOCK_MONOTONIC);
   Site& site = sites_[{where.file, where.line}];
-  if (site.said == 0 || now - site.since > interval_) {
+  if (site.said == 0 || now - site.since > kInterval) {
     silenced_before = site.silenced;
     site = {now, 0, 0};
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <ctime>
 #include <initializer_list>
 #include <map>
 #include <mutex>
@@ -10,6 +11,7 @@
 #include <utility>
 
 #include "core/base/stamp.hpp"
+#include "daemon/machine_time.hpp"
 
 namespace locus::daemon {
 
@@ -32,14 +34,17 @@ struct CodePlace {
 /// of text to stderr.
 ///
 /// Each message says what happened and, unless all is well, what to do. A place in the program that says more than
-/// kBurst messages within an interval is silenced until the interval is over, and then tells how many were left out.
+/// kBurst messages within kInterval is silenced until that is over, and then tells how many were left out.
 /// Any thread but those of the packet path.
 class Log {
  public:
   using Fields = std::initializer_list<std::pair<std::string_view, std::string>>; ///< names in capitals: LOCUS_SOURCE
   static constexpr int kBurst = 5;
 
-  explicit Log(Duration interval = std::chrono::seconds{10});
+  static constexpr Duration kInterval = std::chrono::seconds{10};
+
+  using Clock = Duration (*)(clockid_t); ///< read_clock(), or another in tests
+  explicit Log(Clock clock = [](clockid_t id) { return read_clock(id); });
 
   void say(Severity severity, const std::string& message, Fields fields = {},
            const CodePlace& where = CodePlace::current());
@@ -63,7 +68,7 @@ class Log {
   [[nodiscard]] bool may_speak(const CodePlace& where, std::uint64_t& silenced_before);
   void write(Severity severity, const std::string& message, Fields fields, const CodePlace& where) const;
 
-  Duration interval_;
+  Clock clock_;
   bool to_journal_;
   std::mutex mutex_;
   std::map<std::pair<std::string_view, std::uint32_t>, Site> sites_; ///< by file and line

@@ -12,7 +12,6 @@
 #include <sys/socket.h>
 #include <sys/stat.h>
 
-#include "daemon/machine_time.hpp"
 #include "daemon/service/unix_socket.hpp"
 #include "drivers/net/socket_address.hpp"
 
@@ -67,8 +66,8 @@ std::string http_answer(std::string_view request, const std::function<std::strin
   return answer;
 }
 
-Expected<std::unique_ptr<MetricsServer>, std::string> MetricsServer::open(const std::string& listen,
-                                                                          std::function<std::string()> metrics) {
+Expected<std::unique_ptr<MetricsServer>, std::string>
+MetricsServer::open(const std::string& listen, std::function<std::string()> metrics, Clock clock) {
   const auto failed = [&](int error) {
     return fmt::format("metrics.listen {}: {}; the service runs without metrics: set another address, and reload",
                        listen, std::generic_category().message(error));
@@ -86,7 +85,7 @@ Expected<std::unique_ptr<MetricsServer>, std::string> MetricsServer::open(const 
   constexpr mode_t kEverybody = 0666; // as they may ask for the status
   if ((!path.empty() && chmod(path.c_str(), kEverybody) != 0) || ::listen(listener.number(), kMaxClients) != 0)
     return failed(errno);
-  return std::unique_ptr<MetricsServer>(new MetricsServer(std::move(listener), path, std::move(metrics)));
+  return std::unique_ptr<MetricsServer>(new MetricsServer(std::move(listener), path, std::move(metrics), clock));
 }
 
 MetricsServer::~MetricsServer() {
@@ -109,7 +108,7 @@ bool MetricsServer::serve() {
     Descriptor socket{accept4(listener_.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC)};
     if (socket.number() < 0)
       return i > 0 || gone > 0 || accept_has_failed();
-    Client client{std::move(socket), read_clock(CLOCK_MONOTONIC), {}, {}};
+    Client client{std::move(socket), clock_(CLOCK_MONOTONIC), {}, {}};
     if (!serve(client))
       continue;
     if (clients_.size() == kMaxClients)
@@ -120,7 +119,7 @@ bool MetricsServer::serve() {
 }
 
 bool MetricsServer::serve(Client& client) {
-  if (read_clock(CLOCK_MONOTONIC) - client.came > kPatience)
+  if (clock_(CLOCK_MONOTONIC) - client.came > kPatience)
     return false;
   if (client.answer.empty() && !read_request(client))
     return false;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <ctime>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -14,6 +15,7 @@
 #include "core/base/expected.hpp"
 #include "core/base/stamp.hpp"
 #include "daemon/descriptor.hpp"
+#include "daemon/machine_time.hpp"
 
 namespace locus::daemon {
 
@@ -30,10 +32,12 @@ class MetricsServer {
   static constexpr std::size_t kMaxClients = 16, kMaxRequestBytes = 4096;
   static constexpr Duration kPatience = std::chrono::seconds{5};
 
+  using Clock = Duration (*)(clockid_t); ///< read_clock(), or another in tests
   /// `listen` as parse_socket_address() takes it; the port is closed and the socket's file removed with the object.
   /// Fails with one line for the user.
-  static Expected<std::unique_ptr<MetricsServer>, std::string> open(const std::string& listen,
-                                                                    std::function<std::string()> metrics);
+  static Expected<std::unique_ptr<MetricsServer>, std::string> open(
+      const std::string& listen, std::function<std::string()> metrics,
+      Clock clock = [](clockid_t id) { return read_clock(id); });
   ~MetricsServer();
   MetricsServer(const MetricsServer&) = delete;
   MetricsServer& operator=(const MetricsServer&) = delete;
@@ -49,8 +53,8 @@ class MetricsServer {
     std::string request, answer; ///< so far; what is left
   };
 
-  MetricsServer(Descriptor listener, std::filesystem::path path, std::function<std::string()> metrics)
-      : listener_(std::move(listener)), path_(std::move(path)), metrics_(std::move(metrics)) {}
+  MetricsServer(Descriptor listener, std::filesystem::path path, std::function<std::string()> metrics, Clock clock)
+      : listener_(std::move(listener)), path_(std::move(path)), metrics_(std::move(metrics)), clock_(clock) {}
   /// Whether the client stays.
   bool serve(Client& client);
   bool read_request(Client& client);
@@ -59,6 +63,7 @@ class MetricsServer {
   Descriptor listener_;
   std::filesystem::path path_; ///< of a Unix socket; else empty
   std::function<std::string()> metrics_;
+  Clock clock_;
   std::string round_; ///< the metrics, once somebody has asked in this round
   std::vector<Client> clients_;
 };

@@ -180,7 +180,7 @@ std::optional<std::string> Service::begin(const Config& config, std::optional<Sa
     return session.error();
   session_ = std::move(*session);
   map_asked_.reset();
-  watch_.emplace(*session_, log_);
+  watch_.emplace(session_->config(), session_->input().sockets(), log_);
   listen_for_metrics(config.metrics.listen);
   return std::nullopt;
 }

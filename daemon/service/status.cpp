@@ -40,16 +40,15 @@ void Watch::look(const Figures& figures) {
   look_at_drops(live);
   if (live.recording)
     look_at_recording(*live.recording);
-  if (const Duration now = read_clock(CLOCK_MONOTONIC); now - joined_ > kPatience) {
-    join_multicast(session_.config(), session_.input().sockets());
+  if (const Duration now = clock_(CLOCK_MONOTONIC); now - joined_ > kPatience) {
+    join_multicast(config_, sockets_);
     joined_ = now;
   }
 }
 
 void Watch::look_at_link(const LinkFigures& link) {
   if (link.connected && !was_connected_)
-    log_.info(fmt::format("DDS is up: domain {} on interface {}", session_.config().dds.domain,
-                          session_.config().dds.interface));
+    log_.info(fmt::format("DDS is up: domain {} on interface {}", config_.dds.domain, config_.dds.interface));
   else if (!link.connected && link.attempts != told_attempts_)
     log_.warn(fmt::format("{}; trying again", link.problem), {{"LOCUS_ATTEMPT", std::to_string(link.attempts)}});
   was_connected_ = link.connected;
@@ -57,18 +56,17 @@ void Watch::look_at_link(const LinkFigures& link) {
 }
 
 void Watch::look_at_sources(const LinkFigures& link) {
-  const Config& config = session_.config();
   for (std::size_t i = 0; i < link.sources.size(); ++i) {
-    const std::string& name = config.motion_sources[i].name;
-    const std::string& topic = config.motion_sources[i].topic;
+    const std::string& name = config_.motion_sources[i].name;
+    const std::string& topic = config_.motion_sources[i].topic;
     if (topic.empty() || link.sources[i].received > 0 || !unheard_.insert(name).second)
       continue;
     const std::string found =
         link.sources[i].writers == 0
             ? fmt::format("no publisher found for {}; DDS uses interface {}, domain {} (dds.interface, dds.domain)",
-                          topic, config.dds.interface, config.dds.domain)
+                          topic, config_.dds.interface, config_.dds.domain)
             : fmt::format("{} of DDS on interface {} has {} publishers, but none has sent anything", topic,
-                          config.dds.interface, link.sources[i].writers);
+                          config_.dds.interface, link.sources[i].writers);
     log_.warn(fmt::format("motion source {}: not heard since the start, {} s ago: {}", name,
                           kPatience.count() / 1'000'000'000, found),
               {{"LOCUS_SOURCE", name}});
@@ -78,7 +76,7 @@ void Watch::look_at_sources(const LinkFigures& link) {
 void Watch::look_at_lidars(const Figures& figures) {
   const IngestReport& ingest = figures.ingest;
   const std::vector<LidarOptions>& lidars = figures.config.lidars;
-  const Duration now = read_clock(CLOCK_MONOTONIC);
+  const Duration now = clock_(CLOCK_MONOTONIC);
   for (std::size_t i = 0; i < lidars.size(); ++i) {
     const std::uint64_t used = ingest.lidars[i].used();
     Lidar& lidar = lidars_[i];
@@ -157,7 +155,7 @@ std::string Watch::why_silent(const Lidar& lidar, const LidarOptions& options, c
 
 /// What a check has found wrong with a source that goes on being used in part. Of one that is lost, its loss tells.
 void Watch::look_at_verdicts(const IngestReport& ingest) {
-  const auto& sources = session_.config().motion_sources;
+  const auto& sources = config_.motion_sources;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     const std::string_view verdict = ingest.sources[i].healthy ? ingest.sources[i].verdict : std::string_view{};
     if (!verdict.empty() && verdict != verdicts_[i])
@@ -167,7 +165,7 @@ void Watch::look_at_verdicts(const IngestReport& ingest) {
 }
 
 void Watch::look_at_calibration(const Figures& figures) {
-  const auto& sources = session_.config().motion_sources;
+  const auto& sources = config_.motion_sources;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     if (askew_[i])
       continue;
@@ -179,14 +177,14 @@ void Watch::look_at_calibration(const Figures& figures) {
 }
 
 void Watch::look_at_speed(double largest_mps) {
-  if (const auto warning = too_fast(session_.config().odometry.motion, largest_mps); warning && !told_speed_) {
+  if (const auto warning = too_fast(config_.odometry.motion, largest_mps); warning && !told_speed_) {
     log_.warn(*warning);
     told_speed_ = true;
   }
 }
 
 void Watch::look_at_load(const SweepCounters& counters) {
-  const Duration now = read_clock(CLOCK_MONOTONIC);
+  const Duration now = clock_(CLOCK_MONOTONIC);
   if (now - weighed_ < kPatience)
     return;
   weighed_ = now;
@@ -216,7 +214,6 @@ void Watch::look_at_drops(const Figures::Live& live) {
 }
 
 void Watch::look_at_intruders(const LinkFigures& link) {
-  const Config& config = session_.config();
   const auto tell = [this](std::uint64_t refused, const std::string& topic, const std::string& source) {
     if (refused > 0 && intruded_.insert(topic).second)
       log_.warn(
@@ -226,11 +223,11 @@ void Watch::look_at_intruders(const LinkFigures& link) {
           {{"LOCUS_SOURCE", source}});
   };
   for (std::size_t i = 0; i < link.sources.size(); ++i) {
-    const MotionSource& source = config.motion_sources[i];
+    const MotionSource& source = config_.motion_sources[i];
     tell(link.sources[i].refused, source.topic, source.name);
     tell(link.sources[i].health_refused, source.health_topic, source.name);
   }
-  tell(link.flat_ground_refused, config.dds.flat_ground_topic, "");
+  tell(link.flat_ground_refused, config_.dds.flat_ground_topic, "");
 }
 
 /// What is dropped while the disk takes nothing goes without saying.

@@ -4,14 +4,19 @@
 #include <array>
 #include <bitset>
 #include <cstdint>
+#include <ctime>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 
+#include "config/config.hpp"
 #include "daemon/figures.hpp"
+#include "daemon/machine_time.hpp"
 #include "daemon/service/log.hpp"
 #include "daemon/service/session.hpp"
+#include "drivers/net/udp_socket.hpp"
 
 /// What a running service tells of its figures beside to_json(), to_text() and diagnostics(): to who administers it,
 /// and to systemd. Figures are live ones.
@@ -28,7 +33,12 @@ class Watch {
   /// Silence of a sensor that should have spoken by then.
   static constexpr Duration kPatience = std::chrono::seconds{5};
 
-  Watch(Session& session, Log& log) : session_(session), log_(log) {}
+  using Clock = Duration (*)(clockid_t); ///< read_clock(), or another in tests
+  /// Of a session: what it is configured as, and the sockets of its lidars.
+  Watch(
+      const Config& config, std::span<const UdpSocket> sockets, Log& log,
+      Clock clock = [](clockid_t id) { return read_clock(id); })
+      : config_(config), sockets_(sockets), log_(log), clock_(clock) {}
 
   /// At the figures of that session.
   void look(const Figures& figures);
@@ -57,8 +67,10 @@ class Watch {
   void look_at_doubts(Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now);
   static std::string why_silent(const Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now);
 
-  Session& session_;
+  const Config& config_;
+  std::span<const UdpSocket> sockets_;
   Log& log_;
+  Clock clock_;
   bool was_connected_ = false;
   std::uint64_t told_attempts_ = 0;
   std::array<Lidar, kMaxLidars> lidars_;
