@@ -16,6 +16,7 @@
 #include "drivers/ouster/decoder.hpp"
 #include "locus_sim/ouster_packet.hpp"
 #include "locus_sim/ouster_sensor.hpp"
+#include "support/patience.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace locus::tools {
@@ -34,7 +35,7 @@ class Listener {
     bind(socket_, reinterpret_cast<const sockaddr*>(&own), size);
     getsockname(socket_, reinterpret_cast<sockaddr*>(&own), &size);
     port_ = ntohs(own.sin_port);
-    const timeval patience{10, 0};
+    const timeval patience{test::patience() / 1s, 0};
     setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
   }
   ~Listener() { close(socket_); }

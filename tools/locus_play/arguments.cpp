@@ -40,6 +40,11 @@ std::optional<PlayArguments> parse_play_arguments(int argc, char** argv) {
   app.add_option("--fail", faults, "Injects a fault, as locus-replay does, e.g. front:lost@10-20; may be repeated")
       ->type_name("SPEC")
       ->allow_extra_args(false);
+  app.add_option(
+         "--lockstep", arguments.lockstep,
+         "Waits until the service of this control socket has processed each sweep before it sends more, so that "
+         "a computer that is too slow or busy loses none")
+      ->type_name("SOCKET");
   app.add_flag("--quiet", arguments.quiet, "Prints warnings and errors alone");
   app.set_version_flag("--version", "locus-play " LOCUS_VERSION);
   app.footer("Examples:\n"

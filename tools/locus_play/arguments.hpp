@@ -19,7 +19,8 @@ struct PlayArguments {
   std::optional<std::string> interface; ///< of DDS; nothing: that of the folder's configuration
   std::optional<int> domain;            ///< the same
   bool keep_stamps = false;
-  bool clock = false; ///< for nodes with use_sim_time
+  bool clock = false;             ///< for nodes with use_sim_time
+  std::filesystem::path lockstep; ///< control socket of the service that is waited for; empty: none is
   bool quiet = false;
   std::vector<Fault> faults;
 };

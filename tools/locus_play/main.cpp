@@ -20,6 +20,7 @@
 #include "daemon/machine_time.hpp"
 #include "drivers/files/capture_sequence.hpp"
 #include "locus_play/arguments.hpp"
+#include "locus_play/lockstep.hpp"
 #include "locus_play/motion_publisher.hpp"
 #include "locus_play/packet_sender.hpp"
 #include "locus_play/stream_recording.hpp"
@@ -72,12 +73,25 @@ void wait_for_listeners(const MotionPublisher& motion, const DdsOptions& dds) {
                      dds.domain, dds.interface));
 }
 
+/// A host's clock that is set, or led in a test, takes the pace along.
+const daemon::PacedInput::Clock kWallClock{[] { return daemon::read_clock(CLOCK_REALTIME); },
+                                           [](Duration time) { std::this_thread::sleep_for(time); }};
+
+std::vector<std::string> names_on_topics(const Config& config) {
+  std::vector<std::string> names;
+  for (const MotionSource& source : config.motion_sources)
+    if (!source.topic.empty())
+      names.push_back(source.name);
+  return names;
+}
+
 /// Sends all there is, each at its time. The first input is sent now: what separates its arrival from that is what all
 /// stamps are shifted by, in whole microseconds as the lidars count. The clock shows the arrival of what is sent next,
 /// so no stamp of a sensor is ahead of it by more than it goes in its period.
 void send_all(const PlayArguments& arguments, daemon::InputSource& recording, PacketSender& packets,
-              MotionPublisher& motion, const std::function<double()>& progress) {
-  daemon::PacedInput paced(recording, arguments.speed);
+              MotionPublisher& motion, Lockstep* lockstep, const std::function<double()>& progress) {
+  daemon::PacedInput paced(recording, arguments.speed,
+                           lockstep != nullptr ? kWallClock : daemon::PacedInput::kOfTheHost);
   ProgressBar bar(!arguments.quiet);
   std::optional<Duration> shift;
   const auto shift_at = [&](Stamp arrival) {
@@ -86,6 +100,8 @@ void send_all(const PlayArguments& arguments, daemon::InputSource& recording, Pa
       shift = arguments.keep_stamps ? Duration::zero() : std::chrono::floor<std::chrono::microseconds>(now);
     }
     motion.tell_time(arrival + *shift);
+    if (lockstep != nullptr)
+      lockstep->follow(arrival);
     return *shift;
   };
   for (bool more = true; more;) {
@@ -111,8 +127,12 @@ void play(const PlayArguments& arguments, const Config& config, daemon::InputSou
   PacketSender packets(arguments.to, arguments.interface.value_or(config.dds.interface),
                        value_or_fail(LidarRouter::open(config.lidars), ExitStatus::wrong_usage));
   MotionPublisher motion(config, arguments.clock);
-  wait_for_listeners(motion, config.dds);
-  send_all(arguments, recording, packets, motion, progress);
+  std::optional<Lockstep> lockstep;
+  if (arguments.lockstep.empty())
+    wait_for_listeners(motion, config.dds);
+  else
+    lockstep.emplace(arguments.lockstep).wait_for_writers(names_on_topics(config));
+  send_all(arguments, recording, packets, motion, lockstep ? &*lockstep : nullptr, progress);
   for (const std::string& warning : source.warnings())
     warn(warning);
   if (motion.refused() > 0)

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <string>
 
@@ -31,13 +32,13 @@ std::string remedy(const std::filesystem::path& socket, int error) {
 
 class Connection {
  public:
-  explicit Connection(const std::filesystem::path& path)
+  Connection(const std::filesystem::path& path, std::chrono::seconds patience)
       : socket_(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0)) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     path.native().copy(address.sun_path, sizeof(address.sun_path) - 1);
-    const timeval patience{5, 0};
-    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+    const timeval timeout{patience.count(), 0};
+    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof(timeout));
     if (connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
       throw Failure(ExitStatus::failed,
                     fmt::format("{}: no service answers ({}); {}", path.string(), std::strerror(errno), // NOLINT
@@ -89,7 +90,8 @@ std::vector<std::byte> read_all(int descriptor) {
 } // namespace
 
 ServiceAnswer ask(const std::filesystem::path& socket, const nlohmann::ordered_json& request) {
-  const Connection connection(socket);
+  const bool waits_for_no_disk = request.value("command", "") == "status";
+  const Connection connection(socket, waits_for_no_disk ? std::chrono::seconds{5} : std::chrono::seconds{30});
   connection.send(request.dump());
   const auto [text, descriptor] = connection.receive();
   ServiceAnswer answer{nlohmann::ordered_json::parse(text, nullptr, false), {}};

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+// To be preloaded into the service and into the player that leads it (LEADS_CLOCK in its environment), with the file
+// LED_CLOCK in common (led_clock.hpp). From the player's first look at the wall clock to its end their time stands
+// still but for the player's sleeps: each of them is over at once, and adds its length to the time once the service is
+// done with all that was sent before. So datagrams and samples arrive, by the clock of the service, when the recording
+// has them, and nothing is late, however busy the computer is. What really takes time, such as timeouts, takes as long
+// as ever; the DDS library goes by the system's clocks, but for the wall clock.
+#include "support/led_clock.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <string_view>
+
+#include <dlfcn.h>
+#include <fcntl.h>
+#include <link.h>
+#include <poll.h>
+#include <pthread.h>
+#include <semaphore.h>
+#include <sys/eventfd.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <time.h>
+#include <unistd.h>
+
+namespace {
+
+using locus::test::LedTime;
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+
+template <class Function> Function* next(const char* name) {
+  return reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));
+}
+
+std::int64_t ns_of(const timespec& time) { return time.tv_sec * kSecond + time.tv_nsec; }
+timespec to_timespec(std::int64_t ns) { return {ns / kSecond, ns % kSecond}; }
+
+std::int64_t system_ns(clockid_t clock) {
+  static auto* const kNext = next<int(clockid_t, timespec*)>("clock_gettime");
+  timespec time{};
+  kNext(clock, &time);
+  return ns_of(time);
+}
+
+/// Where a program or library lies in memory.
+struct Range {
+  std::uintptr_t begin = 0, end = 0;
+  [[nodiscard]] bool holds(const void* address) const {
+    const auto at = reinterpret_cast<std::uintptr_t>(address);
+    return at >= begin && at < end;
+  }
+};
+Range program_range, dds_range;
+
+int note_range(dl_phdr_info* info, std::size_t /*size*/, void* first) {
+  Range range{~std::uintptr_t{0}, 0};
+  for (int i = 0; i < info->dlpi_phnum; ++i) {
+    const ElfW(Phdr)& part = info->dlpi_phdr[i];
+    if (part.p_type != PT_LOAD)
+      continue;
+    range.begin = std::min<std::uintptr_t>(range.begin, info->dlpi_addr + part.p_vaddr);
+    range.end = std::max<std::uintptr_t>(range.end, info->dlpi_addr + part.p_vaddr + part.p_memsz);
+  }
+  if (*static_cast<bool*>(first))
+    program_range = range;
+  else if (std::string_view(info->dlpi_name).find("libddsc") != std::string_view::npos)
+    dds_range = range;
+  *static_cast<bool*>(first) = false;
+  return 0;
+}
+
+bool leads = false;
+LedTime nobodys_time;
+LedTime* led = &nobodys_time;
+
+__attribute__((constructor)) void begin() {
+  bool first = true;
+  dl_iterate_phdr(note_range, &first);
+  const char* const name = std::getenv("LED_CLOCK"); // NOLINT(concurrency-mt-unsafe)
+  const int file = name != nullptr ? open(name, O_RDWR | O_CLOEXEC) : -1;
+  if (file < 0)
+    return;
+  void* const page = mmap(nullptr, sizeof(LedTime), PROT_READ | PROT_WRITE, MAP_SHARED, file, 0);
+  close(file);
+  if (page == MAP_FAILED)
+    return;
+  led = static_cast<LedTime*>(page);
+  leads = std::getenv("LEADS_CLOCK") != nullptr; // NOLINT(concurrency-mt-unsafe)
+}
+
+bool is_wall(clockid_t clock) { return clock == CLOCK_REALTIME || clock == CLOCK_REALTIME_COARSE; }
+bool is_monotonic(clockid_t clock) {
+  return clock == CLOCK_MONOTONIC || clock == CLOCK_MONOTONIC_COARSE || clock == CLOCK_MONOTONIC_RAW;
+}
+
+std::int64_t led_ns(clockid_t clock) {
+  if (led->is_led.load(std::memory_order_acquire) == 0)
+    return system_ns(clock) + led->offset_ns.load(std::memory_order_relaxed);
+  const std::int64_t began = is_wall(clock) ? led->wall_ns : is_monotonic(clock) ? led->monotonic_ns : led->boot_ns;
+  return began + led->added_ns.load(std::memory_order_relaxed);
+}
+
+// Of the player.
+
+std::uint64_t sent_datagrams = 0, sent_motion = 0; ///< including what the service had got before
+
+void take_over() {
+  led->wall_ns = system_ns(CLOCK_REALTIME);
+  led->monotonic_ns = system_ns(CLOCK_MONOTONIC);
+  led->boot_ns = system_ns(CLOCK_BOOTTIME);
+  sent_datagrams = led->datagrams.load();
+  sent_motion = led->motion.load();
+  led->added_ns.store(0);
+  led->is_led.store(1, std::memory_order_release);
+}
+
+void wait_for_the_service() {
+  static auto* const kSleep = next<int(const timespec*, timespec*)>("nanosleep");
+  constexpr timespec kLook{0, 20'000};
+  while (led->datagrams.load(std::memory_order_acquire) < sent_datagrams ||
+         led->motion.load(std::memory_order_acquire) < sent_motion)
+    kSleep(&kLook, nullptr);
+}
+
+/// From here on time goes on by itself.
+__attribute__((destructor)) void end() {
+  if (!leads || led->is_led.load() == 0)
+    return;
+  wait_for_the_service();
+  led->offset_ns.store(led_ns(CLOCK_MONOTONIC) - system_ns(CLOCK_MONOTONIC));
+  led->is_led.store(0, std::memory_order_release);
+}
+
+// Of the ingest thread of the service.
+
+std::uint64_t received_datagrams = 0;
+std::atomic<std::uint64_t> pushed_motion{0}; ///< any thread
+std::uint64_t seen_motion = 0;               ///< pushed before the last wait was over
+
+bool is_ingest() {
+  thread_local bool is = false;
+  std::array<char, 16> name{};
+  if (!is && pthread_getname_np(pthread_self(), name.data(), name.size()) == 0)
+    is = std::string_view(name.data()) == "ingest";
+  return is;
+}
+
+} // namespace
+
+extern "C" {
+
+int clock_gettime(clockid_t clock, timespec* time) noexcept {
+  const void* const caller = __builtin_return_address(0);
+  if (leads && is_wall(clock) && program_range.holds(caller) && led->is_led.load() == 0)
+    take_over();
+  const bool goes_by_system =
+      !is_wall(clock) && (dds_range.holds(caller) || (!is_monotonic(clock) && clock != CLOCK_BOOTTIME));
+  *time = to_timespec(goes_by_system ? system_ns(clock) : led_ns(clock));
+  return 0;
+}
+
+/// A sleep of the player's own.
+int nanosleep(const timespec* duration, timespec* left) {
+  static auto* const kNext = next<int(const timespec*, timespec*)>("nanosleep");
+  if (!leads || led->is_led.load() == 0 || !program_range.holds(__builtin_return_address(0)))
+    return kNext(duration, left);
+  wait_for_the_service();
+  led->added_ns.fetch_add(ns_of(*duration));
+  return 0;
+}
+
+ssize_t sendto(int socket, const void* bytes, size_t size, int flags, const sockaddr* to, socklen_t to_size) {
+  static auto* const kNext = next<ssize_t(int, const void*, size_t, int, const sockaddr*, socklen_t)>("sendto");
+  const ssize_t sent = kNext(socket, bytes, size, flags, to, to_size);
+  sent_datagrams += leads && sent >= 0 && program_range.holds(__builtin_return_address(0)) ? 1U : 0U;
+  return sent;
+}
+
+/// Of Cyclone DDS.
+std::int32_t dds_write(std::int32_t writer, const void* data) {
+  static auto* const kNext = next<std::int32_t(std::int32_t, const void*)>("dds_write");
+  const std::int32_t result = kNext(writer, data);
+  sent_motion += leads && result == 0 ? 1U : 0U;
+  return result;
+}
+
+int recvmmsg(int socket, mmsghdr* messages, unsigned count, int flags, timespec* timeout) {
+  static auto* const kNext = next<int(int, mmsghdr*, unsigned, int, timespec*)>("recvmmsg");
+  const int received = kNext(socket, messages, count, flags, timeout);
+  received_datagrams += static_cast<std::uint64_t>(std::max(received, 0));
+  const bool is_led = led->is_led.load(std::memory_order_acquire) != 0;
+  for (int i = 0; i < received; ++i)
+    for (cmsghdr* c = CMSG_FIRSTHDR(&messages[i].msg_hdr); c != nullptr; c = CMSG_NXTHDR(&messages[i].msg_hdr, c))
+      if (c->cmsg_level == SOL_SOCKET && c->cmsg_type == SCM_TIMESTAMPNS) {
+        timespec stamp{};
+        std::memcpy(&stamp, CMSG_DATA(c), sizeof(stamp));
+        stamp = to_timespec(is_led ? led_ns(CLOCK_REALTIME) : ns_of(stamp) + led->offset_ns.load());
+        std::memcpy(CMSG_DATA(c), &stamp, sizeof(stamp));
+      }
+  return received;
+}
+
+int eventfd_write(int descriptor, eventfd_t value) {
+  static auto* const kNext = next<int(int, eventfd_t)>("eventfd_write");
+  ++pushed_motion;
+  return kNext(descriptor, value);
+}
+
+/// The ingest thread waits for more only when it is done with all that it knew of when it began to look.
+int ppoll(pollfd* descriptors, nfds_t count, const timespec* timeout, const sigset_t* signals) {
+  static auto* const kNext = next<int(pollfd*, nfds_t, const timespec*, const sigset_t*)>("ppoll");
+  if (!is_ingest())
+    return kNext(descriptors, count, timeout, signals);
+  if (timeout == nullptr || ns_of(*timeout) > 0) {
+    led->datagrams.store(received_datagrams, std::memory_order_release);
+    led->motion.store(seen_motion, std::memory_order_release);
+  }
+  const int result = kNext(descriptors, count, timeout, signals);
+  seen_motion = pushed_motion.load();
+  return result;
+}
+
+int sem_clockwait(sem_t* semaphore, clockid_t clock, const timespec* until) {
+  static auto* const kNext = next<int(sem_t*, clockid_t, const timespec*)>("sem_clockwait");
+  const timespec end = to_timespec(system_ns(CLOCK_MONOTONIC) + ns_of(*until) - led_ns(clock));
+  return kNext(semaphore, CLOCK_MONOTONIC, &end);
+}
+
+int pthread_cond_clockwait(pthread_cond_t* condition, pthread_mutex_t* mutex, clockid_t clock, const timespec* until) {
+  static auto* const kNext =
+      next<int(pthread_cond_t*, pthread_mutex_t*, clockid_t, const timespec*)>("pthread_cond_clockwait");
+  const timespec end = to_timespec(system_ns(CLOCK_MONOTONIC) + ns_of(*until) - led_ns(clock));
+  return kNext(condition, mutex, CLOCK_MONOTONIC, &end);
+}
+
+int pthread_cond_timedwait(pthread_cond_t* condition, pthread_mutex_t* mutex, const timespec* until) {
+  return pthread_cond_clockwait(condition, mutex, CLOCK_REALTIME, until);
+}
+
+} // extern "C"

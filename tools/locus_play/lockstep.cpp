@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locus_play/lockstep.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "locus_replay/failure.hpp"
+#include "locusctl/service_client.hpp"
+
+namespace locus::tools {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Sweeps of 20 Hz and less, the fastest rotation of a lidar, end at least so far apart.
+constexpr Duration kBetweenLooks = std::chrono::milliseconds{40};
+constexpr std::chrono::seconds kLongestWait{60};
+
+/// The service itself makes who asks again wait.
+template <class Holds> bool comes_true(const std::filesystem::path& socket, const Holds& holds) {
+  const auto give_up = std::chrono::steady_clock::now() + kLongestWait;
+  while (!holds(ask(socket, {{"command", "status"}}).json))
+    if (std::chrono::steady_clock::now() > give_up)
+      return false;
+  return true;
+}
+
+} // namespace
+
+void Lockstep::wait_for_writers(const std::vector<std::string>& sources) const {
+  const auto is_known = [](const Json& status, const std::string& name) {
+    const auto source = status["sources"].find(name);
+    return source == status["sources"].end() || source->value("writers", 0) > 0;
+  };
+  if (!comes_true(socket_, [&](const Json& status) {
+        return std::ranges::all_of(sources, [&](const std::string& name) { return is_known(status, name); });
+      }))
+    throw Failure(ExitStatus::failed, fmt::format("{}: its service does not hear all of {}; look at dds.interface and "
+                                                  "dds.domain",
+                                                  socket_.string(), fmt::join(sources, ", ")));
+}
+
+void Lockstep::follow(Stamp now) {
+  if (asked_ != Stamp::min() && std::chrono::abs(now - asked_) < kBetweenLooks)
+    return;
+  asked_ = now;
+  const auto is_at_rest = [](const Json& status) {
+    const Json& sweeps = status["sweeps"];
+    const auto count = [&](const char* what) { return sweeps[what].get<std::int64_t>(); };
+    return count("seen") == count("processed") + count("failed") + count("dropped");
+  };
+  if (!comes_true(socket_, is_at_rest))
+    throw Failure(ExitStatus::failed, fmt::format("{}: its service processes no sweep any more", socket_.string()));
+}
+
+} // namespace locus::tools
