@@ -1,31 +1,34 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# test.sh [--all]: installs what is missing, builds everything, runs the tests that find a mistake in ordinary work. With
-# --all every test: under the address and undefined-behaviour sanitizers with clang-tidy, those of the live threads under
-# the thread sanitizer, packages and long drives. Ends with the summary of ctest, and with its exit status.
+# test.sh [--all | --timing]: installs what is missing, builds everything and runs tests. Ends with the summary of ctest,
+# and with its exit status.
+#   (nothing)  every test of seconds whose result depends on its inputs alone, however busy the machine is: the gate of a
+#              change. Where it passes on a clean tree the commit is written to build/tested.
+#   --all      these, and again under the address, undefined-behaviour and thread sanitizers, with clang-tidy, packages,
+#              browsers and long drives: before a release.
+#   --timing   what is measured in real time: latency, throughput, losslessness. One test at a time; keep the machine idle.
 set -euo pipefail
 cd "$(dirname "$0")"
 case $#$* in
-  0) presets=(dev) tests=quick ;;
-  1--all) presets=(asan tsan dev) tests=dev ;;
-  *) echo "test.sh: wrong arguments: $*; usage: ./test.sh [--all]" >&2 && exit 2 ;;
+  0) presets=(quick) ;;
+  1--all) presets=(asan tsan dev) ;;
+  1--timing) presets=(timing) ;;
+  *) echo "test.sh: wrong arguments: $*; usage: ./test.sh [--all | --timing]" >&2 && exit 2 ;;
 esac
 
-# Whether all that failed in this build is live: such a test may be held up by whoever else is on the host of CI's machine.
-only_live_tests_failed() {
-  local failed=$1/Testing/Temporary/LastTestsFailed.log live
-  live=$(ctest --test-dir "$1" -N -L threads | sed -n 's/.*Test *#[0-9]*: //p')
-  [ -z "$(comm -23 <(cut -d: -f2- "$failed" | sort) <(sort <<<"$live"))" ]
-}
-
+rm -f build/tested
 packaging/install-build-deps.sh
+export CCACHE_BASEDIR=$PWD # a clone at any place finds the objects of another
 for preset in "${presets[@]}"; do
-  cmake --preset "$preset" --log-level=WARNING
-  cmake --build --preset "$preset"
-  build=build/$preset
-  [ "$preset" = dev ] && preset=$tests
-  ctest --preset "$preset" --parallel "$(nproc)" || {
-    status=$?
-    [ -n "${CI:-}" ] && only_live_tests_failed "$build" && ctest --preset "$preset" --rerun-failed || exit $status
-  }
+  build=$preset parallel=$(nproc)
+  case $preset in
+    quick) build=dev ;;
+    timing) build=dev parallel=1 ;;
+  esac
+  cmake --preset "$build" --log-level=WARNING
+  cmake --build --preset "$build"
+  ctest --preset "$preset" --parallel "$parallel"
 done
+if [ "${presets[*]}" != timing ] && [ -z "$(git status --porcelain 2>&1)" ]; then
+  git rev-parse HEAD >build/tested
+fi

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // A participant made with Cyclone DDS: cyclone_peer DOMAIN listen|talk|iron|humble|command|flood|mistype|clouds PREFIX;
-// iron and humble hear what nodes tell of themselves, and what DDS does. See peer_words.hpp.
+// iron and humble hear what nodes tell of themselves, and what DDS does. A listener says `matched TOPIC` once it knows
+// a writer. See peer_words.hpp.
 #include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <limits>
+#include <set>
 #include <stdexcept>
 #include <string_view>
 
@@ -48,7 +50,24 @@ void listen(const DdsNode& node, const std::string& prefix) {
   const auto say_cloud = [](const ros::PointCloud2& m, const char* topic) {
     tell("{} {} {} {} {} {}", topic, m.width_, m.point_step_, m.data_._length, m.fields_._length, m.header_.frame_id_);
   };
-  while (stdin_is_open()) {
+  std::set<std::string_view> matched;
+  const auto tell_matched = [&](const auto& reader, std::string_view topic) {
+    if (reader.writers() > 0 && matched.insert(topic).second)
+      tell("matched {}", topic);
+  };
+  tell("listens");
+  constexpr int kRoundsOfALook = 50;
+  for (int round = 0; stdin_is_open(); ++round) {
+    if (round % kRoundsOfALook == 0) {
+      tell_matched(odometry, "odometry");
+      tell_matched(fast, "odometry_fast");
+      tell_matched(state, "state");
+      tell_matched(tf, "tf");
+      tell_matched(cloud, "cloud");
+      tell_matched(map, "map");
+      tell_matched(diagnostics, "diagnostics");
+      tell_matched(beginning, "beginning");
+    }
     odometry.take([](const ros::Odometry& m) { say(m, "odometry"); });
     fast.take([](const ros::Odometry& m) { say(m, "odometry_fast"); });
     state.take([](const ros::UInt8& m) { tell("state {}", m.data_); });

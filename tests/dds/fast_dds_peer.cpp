@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A participant made with Fast DDS, ROS 2's default: fast_dds_peer DOMAIN listen|talk|iron|humble|clouds PREFIX
 // [ADDRESS]; iron and humble hear what nodes tell of themselves, and what DDS does. On the loopback interface, or on
-// that of ADDRESS. See peer_words.hpp.
+// that of ADDRESS. A listener says `matched TOPIC` once it knows a writer. See peer_words.hpp.
+#include <atomic>
 #include <cstdlib>
 #include <deque>
 #include <memory>
@@ -119,9 +120,14 @@ template <class Message> class Listener : public dds::DataReaderListener {
       if (info.valid_data)
         say(message, word_.c_str());
   }
+  void on_subscription_matched(dds::DataReader* /*reader*/, const dds::SubscriptionMatchedStatus& status) override {
+    if (status.current_count > 0 && !matched_.exchange(true))
+      tell("matched {}", word_);
+  }
 
  private:
   std::string word_;
+  std::atomic<bool> matched_{false};
 };
 
 template <class Message>
@@ -203,6 +209,7 @@ void hear_all(dds::DomainParticipant& participant, const std::string& prefix) {
   listen<FastDiagnostics>(participant, prefix + "/beginning", "beginning", true, true);
   listen<FastClock>(participant, "/clock", "clock", false);
   listen<FastImu>(participant, "/imu/data", "imu", false);
+  tell("listens");
 }
 
 void run(int argc, char** argv) {

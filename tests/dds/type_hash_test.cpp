@@ -165,7 +165,7 @@ class SeenTypes : public testing::TestWithParam<const char*> {
       };
       return static_cast<std::size_t>(std::ranges::count_if(lines, is_endpoint)) >= endpoints;
     };
-    ASSERT_TRUE(peer_.wait_until(std::chrono::seconds{20}, seen)) << testing::PrintToString(peer_.lines());
+    ASSERT_TRUE(peer_.wait_until(seen)) << testing::PrintToString(peer_.lines());
     std::set<std::string> found;
     for (const char* kind : {"reader", "writer"})
       for (const std::string& line : peer_.lines_of(kind)) {

@@ -45,7 +45,7 @@ TEST(FaultsOnCourses, EveryRowOfTheTableHoldsForAMinute) {
   std::size_t most = 0;
   while (!run.wait_for_exit(milliseconds{100}))
     most = std::max(most, courses_in(folder / "out/courses"));
-  ASSERT_EQ(run.wait_for_exit({}), 0) << testing::PrintToString(run.lines());
+  ASSERT_EQ(run.wait_for_exit(), 0) << testing::PrintToString(run.lines());
   EXPECT_LE(most, 3U) << "a course is gone when all have driven on it";
   const json faults = json::parse(read_text(folder / "out/results.json"))["faults"];
   EXPECT_EQ(faults["rows"].size(), 59U);

@@ -321,7 +321,6 @@ TEST(LocusReplay, RealtimeMayBeSlowedDown) {
   const Replay replay({"--realtime=0.5", "--duration", "1", room_drive().string()});
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
   EXPECT_GT(replay.summary()["wall_s"], 1.7);
-  EXPECT_LT(replay.summary()["wall_s"], 8);
 }
 
 TEST(LocusReplay, LidarsAreToldWithWhatTheirPacketsAreReadAs) {

@@ -3,9 +3,23 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <filesystem>
+#include <optional>
 #include <string>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/un.h>
+#include <unistd.h>
 
 #include "support/errors.hpp"
+#include "support/temporary_folder.hpp"
 
 namespace locus::daemon {
 namespace {
@@ -63,6 +77,97 @@ TEST(ControlRequest, PoseIsOneThatARobotCanHave) {
     EXPECT_TRUE(contains(error_of(parse_control_request(R"({"command": "reset", "pose": )" + std::string(pose) + "}")),
                          "the pose must lie within 500000 m and 360 degrees"))
         << pose;
+}
+
+/// A server that a test calls, and those who call there.
+class ControlOnCall : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_EQ(chmod(path_.parent_path().c_str(), 0755), 0);
+    auto server = ControlServer::open(path_, [this](const ControlRequest&) {
+      ++handled_;
+      return ControlServer::Answer::done();
+    });
+    ASSERT_TRUE(server) << server.error();
+    server_.emplace(std::move(*server));
+  }
+
+  [[nodiscard]] Descriptor connected() const {
+    Descriptor client{::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)};
+    sockaddr_un address{AF_UNIX, {}};
+    path_.native().copy(address.sun_path, sizeof(address.sun_path) - 1);
+    EXPECT_EQ(connect(client.number(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
+    return client;
+  }
+  [[nodiscard]] Descriptor connected_stranger() const {
+    Descriptor client;
+    std::thread([&] {
+      constexpr int kNobody = 65534;
+      syscall(SYS_setgroups, 0, nullptr); // of this thread alone
+      syscall(SYS_setresuid, kNobody, kNobody, kNobody);
+      client = connected();
+    }).join();
+    return client;
+  }
+
+  static void say(const Descriptor& client, std::string_view request) {
+    EXPECT_EQ(::send(client.number(), request.data(), request.size(), MSG_NOSIGNAL),
+              static_cast<ssize_t>(request.size()));
+  }
+  /// What it was answered, and was not told yet; empty where the server has hung up.
+  static std::optional<std::string> answer(const Descriptor& client) {
+    std::array<char, 4096> text{};
+    const ssize_t size = recv(client.number(), text.data(), text.size(), MSG_DONTWAIT);
+    return size < 0 ? std::nullopt : std::optional{std::string(text.data(), static_cast<std::size_t>(size))};
+  }
+
+  test::TemporaryFolder folder_;
+  std::filesystem::path path_ = folder_ / "control";
+  int handled_ = 0;
+  std::optional<ControlServer> server_;
+};
+
+/// Whoever calls serve() pauses after it: however much they ask, so many answers are all that they cost.
+TEST_F(ControlOnCall, AnswersEachOfSixteenOnceARound) {
+  std::vector<Descriptor> clients;
+  for (std::size_t i = 0; i < ControlServer::kMaxClients; ++i) {
+    clients.push_back(connected());
+    EXPECT_TRUE(server_->serve());
+  }
+  EXPECT_FALSE(server_->serve()) << "nobody has asked";
+  for (const Descriptor& client : clients)
+    for (int i = 0; i < 3; ++i)
+      say(client, R"({"command": "status"})");
+  for (int round = 1; round <= 3; ++round) {
+    EXPECT_TRUE(server_->serve());
+    EXPECT_EQ(handled_, round * static_cast<int>(ControlServer::kMaxClients));
+  }
+  EXPECT_FALSE(server_->serve());
+  const Descriptor one_more = connected();
+  EXPECT_TRUE(server_->serve());
+  EXPECT_TRUE(contains(answer(one_more).value_or(""), "too many clients"));
+}
+
+TEST_F(ControlOnCall, HasRoomForWhoMayCommandAmongAnyNumberOfStrangers) {
+  if (geteuid() != 0)
+    GTEST_SKIP() << "no second user to be: run as root";
+  std::vector<Descriptor> strangers;
+  for (std::size_t i = 0; i < ControlServer::kMaxClients; ++i) {
+    strangers.push_back(connected_stranger());
+    EXPECT_TRUE(server_->serve());
+  }
+  say(strangers.back(), R"({"command": "reset"})");
+  EXPECT_TRUE(server_->serve());
+  EXPECT_TRUE(contains(answer(strangers.back()).value_or(""), "not permitted"));
+  const Descriptor one_more = connected_stranger();
+  EXPECT_TRUE(server_->serve());
+  EXPECT_TRUE(contains(answer(one_more).value_or(""), "too many clients"));
+  const Descriptor ours = connected();
+  say(ours, R"({"command": "reset"})");
+  EXPECT_TRUE(server_->serve());
+  EXPECT_EQ(handled_, 1);
+  EXPECT_TRUE(contains(answer(ours).value_or(""), "done"));
+  EXPECT_EQ(answer(strangers.front()), "") << "the one that came first";
 }
 
 } // namespace

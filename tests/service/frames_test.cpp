@@ -2,6 +2,7 @@
 // REP 103 and REP 105: what a drive of the real service looks like to a listener, against the truth of the simulation.
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <optional>
 #include <set>
@@ -14,7 +15,6 @@
 #include "daemon/dds/dds_node.hpp"
 #include "daemon/dds/ros_messages.hpp"
 #include "service/robot_network.hpp"
-#include "service/undisturbed.hpp"
 
 namespace locus::test {
 namespace {
@@ -57,7 +57,16 @@ class Listener {
       : odometry_reader_(node, "/locus/odometry", TopicQos::standard()),
         fast_reader_(node, "/locus/odometry_fast", TopicQos::standard()),
         tf_reader_(node, "/tf", TopicQos::transform()), cloud_reader_(node, "/locus/cloud", TopicQos::standard()),
+        diagnostics_reader_(node, "/diagnostics", TopicQos::standard()),
         thread_([this](const std::stop_token& stop) { hear(stop); }) {}
+
+  /// Whether it hears all of it from now on: the service learns of readers in the order of their making.
+  bool hears_the_service() {
+    return comes_true([this] {
+      return odometry_reader_.writers() > 0 && fast_reader_.writers() > 0 && tf_reader_.writers() > 0 &&
+             cloud_reader_.writers() > 0 && diagnosed_;
+    });
+  }
 
   void end() {
     thread_.request_stop();
@@ -100,6 +109,7 @@ class Listener {
           tf.push_back(frames_of(m.transforms_._buffer[i]));
       });
       cloud_reader_.take([this](const ros::PointCloud2& m) { clouds.push_back(cloud_of(m)); });
+      diagnostics_reader_.take([this](const ros::DiagnosticArray& /*m*/) { diagnosed_ = true; });
       std::this_thread::sleep_for(milliseconds{2});
     }
   }
@@ -107,6 +117,8 @@ class Listener {
   DdsReader<ros::Odometry> odometry_reader_, fast_reader_;
   DdsReader<ros::TFMessage> tf_reader_;
   DdsReader<ros::PointCloud2> cloud_reader_;
+  DdsReader<ros::DiagnosticArray> diagnostics_reader_;
+  std::atomic<bool> diagnosed_{false};
   std::jthread thread_; ///< hears as long as it runs
 };
 
@@ -259,14 +271,14 @@ void expect_clouds_in_the_room(const std::vector<HeardCloud>& clouds, const std:
 
 TEST_F(Frames, OfADriveAreThoseOfRep103AndRep105) {
   const Truth truth(capture() / "gt.tum");
-  const Child daemon(undisturbed(locusd(config("dds: {publish_tf: true, publish_cloud: true}\n"))));
-  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
+  const Child daemon(led_locusd(config("dds: {publish_tf: true, publish_cloud: true}\n")));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   const auto node = DdsNode::open({});
   ASSERT_TRUE(node) << node.error();
   Listener listener(*node);
-  std::this_thread::sleep_for(seconds{2}); // they find each other
-  Child play(undisturbed({LOCUS_PLAY, capture().string()}));
-  ASSERT_EQ(play.wait_for_exit(seconds{60}), 0) << testing::PrintToString(play.lines());
+  ASSERT_TRUE(listener.hears_the_service());
+  Child play(leading_play({capture().string()}));
+  ASSERT_EQ(play.wait_for_exit(seconds{200}), 0) << testing::PrintToString(play.lines());
   std::this_thread::sleep_for(milliseconds{500});
   listener.end();
 

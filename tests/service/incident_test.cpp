@@ -5,6 +5,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <optional>
 #include <string>
 #include <thread>
@@ -17,10 +18,10 @@
 
 #include "daemon/incidents.hpp"
 #include "daemon/machine_time.hpp"
+#include "daemon/service/incident_watch.hpp"
 #include "drivers/files/capture_folder.hpp"
 #include "drivers/velodyne/model.hpp"
 #include "service/robot_network.hpp"
-#include "service/undisturbed.hpp"
 #include "support/errors.hpp"
 #include "support/udp_sender.hpp"
 
@@ -51,13 +52,15 @@ std::uint64_t bytes_in(const path& folder) {
 
 class Incident : public RobotNetwork {
  protected:
-  /// With a folder of its own for what is to survive a crash, on another disk as it is on a robot, where that can be.
+  /// With a folder of its own for what is to survive a crash, on another disk than the state as it is on a robot. Both
+  /// are in memory: how long a disk takes is no matter of these tests.
   void SetUp() override {
     RobotNetwork::SetUp();
     if (IsSkipped() || HasFatalFailure())
       return;
     if (unshare(CLONE_NEWNS) != 0 || mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0)
       GTEST_SKIP() << "no mounts of one's own: run as root, or allow user namespaces";
+    ASSERT_EQ(mount("state", file("").c_str(), "tmpfs", 0, "size=64g"), 0); // of which next to nothing is used
     std::filesystem::create_directory(file("run"));
     ASSERT_EQ(mount("run", file("run").c_str(), "tmpfs", 0, "size=400m"), 0);
     setenv("RUNTIME_DIRECTORY", file("run").c_str(), 1); // NOLINT(concurrency-mt-unsafe)
@@ -65,23 +68,29 @@ class Incident : public RobotNetwork {
   void TearDown() override {
     daemon_.reset();
     umount2(file("run").c_str(), MNT_DETACH);
+    umount2(file("").c_str(), MNT_DETACH);
   }
 
   [[nodiscard]] ProgramRun ask(std::vector<std::string> words) const {
     words.insert(words.begin(), {"--socket", file("run/control").string()});
     return run_program(LOCUSCTL, words);
   }
+  void reload() const {
+    const ProgramRun run = ask({"reload"});
+    ASSERT_EQ(run.status, 0) << run.err;
+  }
   [[nodiscard]] nlohmann::json incidents_of_status() const {
     const ProgramRun run = ask({"status", "--json"});
     EXPECT_EQ(run.status, 0) << run.err;
     return nlohmann::json::parse(run.out, nullptr, false)["incidents"];
   }
-  [[nodiscard]] bool comes(const std::function<bool(const nlohmann::json&)>& holds, Duration timeout) const {
-    const auto end = std::chrono::steady_clock::now() + timeout;
-    for (; std::chrono::steady_clock::now() < end; std::this_thread::sleep_for(milliseconds{100}))
-      if (holds(incidents_of_status()))
-        return true;
-    return false;
+  /// Whether the lidar comes to have sent this part of the drive.
+  [[nodiscard]] bool has_driven(double part) const {
+    const double wanted = part * static_cast<double>(datagrams_in(plant() / "lidar.pcap"));
+    return comes_true([&] {
+      const auto status = nlohmann::json::parse(ask({"status", "--json"}).out, nullptr, false);
+      return status.is_object() && status["packets"]["total"]["received"].get<double>() >= wanted;
+    });
   }
 
   [[nodiscard]] path with(const std::string& record) const {
@@ -91,12 +100,12 @@ class Incident : public RobotNetwork {
   }
 
   void start(const std::string& record) {
-    daemon_.emplace(undisturbed(locusd(with(record))));
-    listener_.emplace(undisturbed({CYCLONE_PEER, "0", "listen", "/locus"}));
-    ASSERT_TRUE(daemon_->wait_for_line("DDS is up", seconds{10}));
-    std::this_thread::sleep_for(seconds{2}); // the listener is found
-    play_.emplace(undisturbed({LOCUS_PLAY, plant().string()}));
-    ASSERT_TRUE(daemon_->wait_for_line("tracking", seconds{10}));
+    daemon_.emplace(locusd(with(record)));
+    listener_.emplace(std::vector<std::string>{CYCLONE_PEER, "0", "listen", "/locus"});
+    ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
+    ASSERT_TRUE(hears_the_service(*listener_));
+    play_.emplace(std::vector<std::string>{LOCUS_PLAY, plant().string()});
+    ASSERT_TRUE(daemon_->wait_for_line("tracking"));
   }
 
   /// At least so many poses of the replay are those that were heard, once both begin at the same one. A replay that
@@ -134,13 +143,10 @@ class Incident : public RobotNetwork {
     RecordProperty("worst_mm_of_" + std::to_string(compared), std::to_string(1e3 * worst_m));
   }
 
-  std::optional<Child> daemon_, listener_, play_;
-};
-
-TEST_F(Incident, AskedForReplaysToTheSameEstimate) {
-  for (const std::string& record : {std::string{"keep_s: 8"}, std::string{"keep_s: 8, folder: record"}}) {
+  /// Asks in mid-drive, and replays what was kept once the drive has ended.
+  void keep_and_replay(const std::string& record, const std::function<void(const Replay&)>& judge) {
     ASSERT_NO_FATAL_FAILURE(start(record));
-    std::this_thread::sleep_for(seconds{14});
+    ASSERT_TRUE(has_driven(0.7));
     const ProgramRun kept = ask({"record", "--keep", "8s"});
     ASSERT_EQ(kept.status, 0) << kept.err;
     const path folder = kept.out.substr(0, kept.out.find('\n'));
@@ -151,20 +157,55 @@ TEST_F(Incident, AskedForReplaysToTheSameEstimate) {
     EXPECT_EQ(runs_in(file("run/input-ring")).size(), record == "keep_s: 8" ? 1U : 0U) << "nothing is written twice";
     const nlohmann::json why = nlohmann::json::parse(read_text(folder / "why.json"));
     EXPECT_EQ(why["why"], "asked");
-    EXPECT_EQ(why["status"]["state"], "tracking");
+    EXPECT_TRUE(why["status"].contains("state"));
     EXPECT_TRUE(why["status"].contains("pose"));
     EXPECT_FALSE(why["version"].get<std::string>().empty());
-    ASSERT_TRUE(play_->wait_for_exit(seconds{30}));
-    std::this_thread::sleep_for(milliseconds{500});
+    ASSERT_TRUE(play_->wait_for_exit());
     daemon_->signal(SIGTERM);
-    ASSERT_EQ(daemon_->wait_for_exit(seconds{5}), 0);
+    ASSERT_EQ(daemon_->wait_for_exit(), 0);
     EXPECT_FALSE(std::filesystem::exists(file("run/input-ring")));
     const Replay replay({"--quiet", folder.string()});
     ASSERT_EQ(replay.run().status, 0) << replay.run().err;
-    expect_same_estimates(replay, heard(*listener_), 70);
-    EXPECT_LT(replay.trajectory().size(), 180U) << "the last of it, not all";
+    judge(replay);
     std::filesystem::remove(file("state"));
   }
+
+  /// Kills the service in mid-drive, and starts it again, and replays what was kept of it.
+  void crash_and_replay(const std::function<void(const Replay&, const std::vector<HeardPose>&)>& judge) {
+    ASSERT_NO_FATAL_FAILURE(start("keep_s: 10"));
+    ASSERT_TRUE(has_driven(0.3));
+    daemon_->signal(SIGKILL);
+    ASSERT_TRUE(daemon_->wait_for_exit());
+    const std::vector<HeardPose> live = heard(*listener_);
+    daemon_.emplace(locusd(with("keep_s: 10")));
+    ASSERT_TRUE(daemon_->wait_for_line("the last input is kept in")) << testing::PrintToString(daemon_->lines());
+    const std::vector<path> kept = folders_in(file("incidents"));
+    ASSERT_EQ(kept.size(), 1U);
+    EXPECT_TRUE(kept[0].string().ends_with("Z_restart")) << kept[0];
+    const nlohmann::json why = nlohmann::json::parse(read_text(kept[0] / "why.json"));
+    EXPECT_EQ(why["why"], "restart");
+    EXPECT_EQ(why["pose"]["xyz_m"].size(), 3U) << "where the robot was";
+    const Replay replay({"--quiet", kept[0].string()});
+    ASSERT_EQ(replay.run().status, 0) << replay.run().err;
+    judge(replay, live);
+  }
+
+  std::optional<Child> daemon_, listener_, play_;
+};
+
+TEST_F(Incident, AskedForIsTheLastInput) {
+  for (const char* record : {"keep_s: 8", "keep_s: 8, folder: record"})
+    ASSERT_NO_FATAL_FAILURE(keep_and_replay(record, [](const Replay& replay) {
+      EXPECT_GT(replay.trajectory().size(), 50U);
+      EXPECT_LT(replay.trajectory().size(), 180U) << "the last of it, not all";
+    }));
+}
+
+/// Where the machine is fast enough for the service to drop no sweep.
+TEST_F(Incident, AskedForReplaysToTheSameEstimate) {
+  for (const char* record : {"keep_s: 8", "keep_s: 8, folder: record"})
+    ASSERT_NO_FATAL_FAILURE(keep_and_replay(
+        record, [this](const Replay& replay) { expect_same_estimates(replay, heard(*listener_), 70); }));
 }
 
 /// What others have in the runtime folder stays, and what a service that ends has of its own goes alone.
@@ -173,28 +214,29 @@ TEST_F(Incident, SecondServiceOnTheSameFolderTouchesNothing) {
     std::filesystem::create_directories(file(mine));
   std::ofstream{file("run/run")} << "mine";
   ASSERT_NO_FATAL_FAILURE(start("keep_s: 10"));
-  std::this_thread::sleep_for(seconds{2});
+  ASSERT_TRUE(comes_true([this] { return std::filesystem::exists(file("run/input-ring/run")); }));
   const std::vector<path> runs = runs_in(file("run/input-ring"));
   ASSERT_EQ(runs.size(), 1U);
   const std::string mark = read_text(file("run/input-ring/run"));
   EXPECT_EQ(mark, runs.front().string());
   {
     Child second(locusd(lidar_with("port: 2390")));
-    EXPECT_TRUE(second.wait_for_line("and no incidents are kept: another service answers there", seconds{10}));
-    EXPECT_TRUE(second.wait_for_line("DDS is up", seconds{10})) << testing::PrintToString(second.lines());
+    EXPECT_TRUE(second.wait_for_line("and no incidents are kept: another service answers there"));
+    EXPECT_TRUE(second.wait_for_line("DDS is up")) << testing::PrintToString(second.lines());
     second.signal(SIGTERM);
-    EXPECT_EQ(second.wait_for_exit(seconds{5}), 0);
+    EXPECT_EQ(second.wait_for_exit(), 0);
   }
   EXPECT_EQ(runs_in(file("run/input-ring")), runs);
   EXPECT_EQ(read_text(file("run/input-ring/run")), mark);
   EXPECT_TRUE(folders_in(file("incidents")).empty());
   EXPECT_EQ(ask({"record", "--keep", "10s"}).status, 0);
   static_cast<void>(with("keep_s: 0"));
-  ASSERT_EQ(ask({"reload"}).status, 0);
-  std::this_thread::sleep_for(seconds{1});
-  EXPECT_EQ(folders_in(file("run/input-ring")), std::vector<path>{file("run/input-ring/mine")}) << "no memory is held";
+  ASSERT_NO_FATAL_FAILURE(reload());
+  EXPECT_TRUE(comes_true([this] {
+    return folders_in(file("run/input-ring")) == std::vector<path>{file("run/input-ring/mine")};
+  })) << "no memory is held";
   daemon_->signal(SIGTERM);
-  ASSERT_EQ(daemon_->wait_for_exit(seconds{5}), 0);
+  ASSERT_EQ(daemon_->wait_for_exit(), 0);
   for (const char* mine : {"run/ring/mine", "run/incident/mine", "run/input-ring/mine", "run/run"})
     EXPECT_TRUE(std::filesystem::exists(file(mine))) << mine;
 }
@@ -202,19 +244,18 @@ TEST_F(Incident, SecondServiceOnTheSameFolderTouchesNothing) {
 /// Neither a disk nor a crumb of memory holds the input; a folder of recordings does.
 TEST_F(Incident, NeedsATmpfsThatIsLargeEnough) {
   const auto expect_none = [this](const char* why) {
-    daemon_.emplace(undisturbed(locusd(with("keep_s: 10"))));
-    ASSERT_TRUE(daemon_->wait_for_line(why, seconds{10})) << testing::PrintToString(daemon_->lines());
-    ASSERT_TRUE(daemon_->wait_for_line("DDS is up", seconds{10}));
-    play_.emplace(undisturbed({LOCUS_PLAY, plant().string()}));
-    ASSERT_TRUE(daemon_->wait_for_line("tracking", seconds{10}));
+    daemon_.emplace(locusd(with("keep_s: 10")));
+    ASSERT_TRUE(daemon_->wait_for_line(why)) << testing::PrintToString(daemon_->lines());
+    ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
+    play_.emplace(endlessly(plant()));
+    ASSERT_TRUE(daemon_->wait_for_line("tracking"));
     EXPECT_FALSE(std::filesystem::exists(file("run/input-ring")));
     const ProgramRun kept = ask({"record", "--keep", "10s"});
     EXPECT_EQ(kept.status, 1);
     EXPECT_TRUE(contains(kept.err, "a tmpfs as RUNTIME_DIRECTORY, or record.folder")) << kept.err;
     static_cast<void>(with("keep_s: 10, folder: record"));
-    ASSERT_EQ(ask({"reload"}).status, 0);
-    std::this_thread::sleep_for(seconds{2});
-    EXPECT_EQ(ask({"record", "--keep", "10s"}).status, 0);
+    ASSERT_NO_FATAL_FAILURE(reload());
+    EXPECT_TRUE(comes_true([this] { return ask({"record", "--keep", "10s"}).status == 0; }));
     play_.reset();
     daemon_.reset();
     std::filesystem::remove(file("state"));
@@ -229,35 +270,25 @@ TEST_F(Incident, NeedsATmpfsThatIsLargeEnough) {
 
 /// The crash is one while the robot drives; what it left becomes an incident, and of the next crash nothing: too soon.
 TEST_F(Incident, CrashIsOneAndAStopIsNone) {
-  ASSERT_NO_FATAL_FAILURE(start("keep_s: 10"));
-  std::this_thread::sleep_for(seconds{6});
+  ASSERT_NO_FATAL_FAILURE(
+      crash_and_replay([](const Replay& replay, const auto& /*live*/) { EXPECT_GT(replay.trajectory().size(), 30U); }));
   daemon_->signal(SIGKILL);
-  ASSERT_TRUE(daemon_->wait_for_exit(seconds{5}));
-  const std::vector<HeardPose> live = heard(*listener_);
-  daemon_.emplace(undisturbed(locusd(with("keep_s: 10"))));
-  ASSERT_TRUE(daemon_->wait_for_line("the last input is kept in", seconds{10}))
-      << testing::PrintToString(daemon_->lines());
-  const std::vector<path> kept = folders_in(file("incidents"));
-  ASSERT_EQ(kept.size(), 1U);
-  EXPECT_TRUE(kept[0].string().ends_with("Z_restart")) << kept[0];
-  const nlohmann::json why = nlohmann::json::parse(read_text(kept[0] / "why.json"));
-  EXPECT_EQ(why["why"], "restart");
-  EXPECT_EQ(why["pose"]["xyz_m"].size(), 3U) << "where the robot was";
-  const Replay replay({"--quiet", kept[0].string()});
-  ASSERT_EQ(replay.run().status, 0) << replay.run().err;
-  expect_same_estimates(replay, live, 45);
-
-  daemon_->signal(SIGKILL);
-  ASSERT_TRUE(daemon_->wait_for_exit(seconds{5}));
-  daemon_.emplace(undisturbed(locusd(with("keep_s: 10"))));
-  ASSERT_TRUE(daemon_->wait_for_line("DDS is up", seconds{10}));
-  EXPECT_TRUE(comes([](const auto& incidents) { return incidents["suppressed"] == 1; }, seconds{5}));
-  daemon_->signal(SIGTERM);
-  ASSERT_EQ(daemon_->wait_for_exit(seconds{5}), 0);
+  ASSERT_TRUE(daemon_->wait_for_exit());
   daemon_.emplace(locusd(with("keep_s: 10")));
-  ASSERT_TRUE(daemon_->wait_for_line("DDS is up", seconds{10}));
+  ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
+  EXPECT_TRUE(comes_true([this] { return incidents_of_status()["suppressed"] == 1; }));
+  daemon_->signal(SIGTERM);
+  ASSERT_EQ(daemon_->wait_for_exit(), 0);
+  daemon_.emplace(locusd(with("keep_s: 10")));
+  ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
   EXPECT_EQ(incidents_of_status()["suppressed"], 0);
   EXPECT_EQ(folders_in(file("incidents")).size(), 1U);
+}
+
+/// Where the machine is fast enough for the service to drop no sweep.
+TEST_F(Incident, CrashReplaysToTheSameEstimate) {
+  ASSERT_NO_FATAL_FAILURE(crash_and_replay(
+      [](const Replay& replay, const std::vector<HeardPose>& live) { expect_same_estimates(replay, live, 45); }));
 }
 
 /// The plug of the lidar is pulled, and the wheels go on.
@@ -266,11 +297,10 @@ TEST_F(Incident, LossOfTrackingIsOneByItself) {
   const ProgramRun sim = run_program(LOCUS_SIM, {"--world", "urban", "--robot", "husky", "--duration", "12", "--seed",
                                                  "3", "--realism", "clean", "-o", robot.string()});
   ASSERT_EQ(sim.status, 0) << sim.err;
-  daemon_.emplace(undisturbed(locusd(with("keep_s: 10"))));
-  ASSERT_TRUE(daemon_->wait_for_line("DDS is up", seconds{10}));
-  play_.emplace(undisturbed({LOCUS_PLAY, "--fail", "all-lidars:lost@5-12", robot.string()}));
-  ASSERT_TRUE(daemon_->wait_for_line("the last input is kept in", seconds{20}))
-      << testing::PrintToString(daemon_->lines());
+  daemon_.emplace(locusd(with("keep_s: 10")));
+  ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
+  play_.emplace(std::vector<std::string>{LOCUS_PLAY, "--fail", "all-lidars:lost@5-12", robot.string()});
+  ASSERT_TRUE(daemon_->wait_for_line("the last input is kept in")) << testing::PrintToString(daemon_->lines());
   const std::vector<path> kept = folders_in(file("incidents"));
   ASSERT_EQ(kept.size(), 1U);
   EXPECT_TRUE(kept[0].string().ends_with("Z_tracking_lost")) << kept[0];
@@ -282,7 +312,7 @@ TEST_F(Incident, LossOfTrackingIsOneByItself) {
 
 TEST_F(Incident, WhatCannotBeKeptIsSaid) {
   daemon_.emplace(locusd(with("keep_s: 10")));
-  ASSERT_TRUE(daemon_->wait_for_line("DDS is up", seconds{10}));
+  ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
   const ProgramRun nothing = ask({"record", "--keep", "10s"});
   EXPECT_EQ(nothing.status, 1);
   EXPECT_TRUE(contains(nothing.err, "no input has come")) << nothing.err;
@@ -295,7 +325,7 @@ TEST_F(Incident, WhatCannotBeKeptIsSaid) {
   EXPECT_TRUE(contains(ask({"record", "--keep", "nan"}).err, "--keep nan: must be seconds, e.g. 60s"));
   EXPECT_EQ(ask({"record"}).status, 2);
   static_cast<void>(with("keep_s: 0"));
-  ASSERT_EQ(ask({"reload"}).status, 0);
+  ASSERT_NO_FATAL_FAILURE(reload());
   const ProgramRun off = ask({"record", "--keep", "1s"});
   EXPECT_EQ(off.status, 1);
   EXPECT_TRUE(contains(off.err, "set record.keep_s")) << off.err;
@@ -307,7 +337,7 @@ TEST_F(Incident, DiskThatIsFullOrAFolderThatCannotBeMadeIsSaidAndTheOdometryGoes
   const path older = file("incidents/2026-01-01T00-00-00.000Z_asked");
   std::filesystem::create_directory(older);
   ASSERT_NO_FATAL_FAILURE(start("keep_s: 10"));
-  std::this_thread::sleep_for(seconds{4});
+  ASSERT_TRUE(has_driven(0.2));
   const ProgramRun full = ask({"record", "--keep", "10s"});
   EXPECT_EQ(full.status, 1);
   EXPECT_TRUE(contains(full.err, "MB are free on the disk")) << full.err;
@@ -319,7 +349,7 @@ TEST_F(Incident, DiskThatIsFullOrAFolderThatCannotBeMadeIsSaidAndTheOdometryGoes
   const ProgramRun no_folder = ask({"record", "--keep", "10s"});
   EXPECT_EQ(no_folder.status, 1);
   EXPECT_TRUE(contains(no_folder.err, "incidents: the incident cannot be kept (Not a directory)")) << no_folder.err;
-  EXPECT_TRUE(daemon_->wait_for_line("(Not a directory); let locusd write there", seconds{5}));
+  EXPECT_TRUE(daemon_->wait_for_line("(Not a directory); let locusd write there"));
   std::filesystem::remove(file("incidents"));
   EXPECT_EQ(ask({"record", "--keep", "10s"}).status, 0) << "as soon as it can be";
   EXPECT_EQ(folders_in(file("incidents")).size(), 1U);
@@ -332,7 +362,8 @@ TEST_F(Incident, FloodFillsNoMoreThanItsBound) {
   const UdpSender pest(0x7F000002);
   const std::vector<std::byte> packet(velodyne::kDataPacketBytes);
   std::uint64_t most = 0;
-  for (int i = 0; i < 600; ++i) {
+  const auto give_up = std::chrono::steady_clock::now() + patience();
+  for (int i = 0; i < 600 || (most < kBytes / 2 && std::chrono::steady_clock::now() < give_up); ++i) {
     for (int k = 0; k < 75; ++k)
       pest.send(2368, packet);
     if (i % 20 == 0)
@@ -340,24 +371,22 @@ TEST_F(Incident, FloodFillsNoMoreThanItsBound) {
     std::this_thread::sleep_for(milliseconds{10});
   }
   EXPECT_LE(most, kBytes);
-  EXPECT_GT(most, kBytes / 2);
+  EXPECT_GE(most, kBytes / 2);
   EXPECT_EQ(ask({"record", "--keep", "60s"}).status, 0);
   EXPECT_LE(bytes_in(file("incidents")), kBytes + 100'000);
 
   const Child asks({LOCUSCTL, "--socket", file("run/control").string(), "record", "--keep", "60s"});
-  std::this_thread::sleep_for(milliseconds{200}); // it is being copied
-  static_cast<void>(with("keep_s: 0"));
-  ASSERT_EQ(ask({"reload"}).status, 0);
+  const auto begun = std::chrono::steady_clock::now();
+  while (folders_in(file("incidents")).size() < 2 && std::chrono::steady_clock::now() - begun < patience())
+    std::this_thread::sleep_for(milliseconds{1});
+  static_cast<void>(with("keep_s: 0")); // as it is being copied
+  ASSERT_NO_FATAL_FAILURE(reload());
   const auto is_complete = [](const path& incident) { return std::filesystem::exists(incident / "why.json"); };
-  for (int i = 0; i < 50 && std::ranges::count_if(folders_in(file("incidents")), is_complete) < 2; ++i)
-    std::this_thread::sleep_for(milliseconds{100});
-  EXPECT_EQ(std::ranges::count_if(folders_in(file("incidents")), is_complete), 2)
+  EXPECT_TRUE(comes_true([&] { return std::ranges::count_if(folders_in(file("incidents")), is_complete) == 2; }))
       << "what was begun is brought to its end";
-  const auto said = [&](const char* words) { return asks.wait_for_line(words, seconds{2}); };
-  EXPECT_TRUE(said("Z_asked")) << testing::PrintToString(asks.lines());
-  for (int i = 0; i < 20 && !folders_in(file("run/input-ring")).empty(); ++i)
-    std::this_thread::sleep_for(milliseconds{100});
-  EXPECT_TRUE(folders_in(file("run/input-ring")).empty()) << "no memory is held for what is off";
+  EXPECT_TRUE(asks.wait_for_line("Z_asked")) << testing::PrintToString(asks.lines());
+  EXPECT_TRUE(comes_true([this] { return folders_in(file("run/input-ring")).empty(); }))
+      << "no memory is held for what is off";
 }
 
 /// Requests come one after another; the folder holds no more than it may.
@@ -398,17 +427,17 @@ TEST(IncidentFolder, WhatComesTooSoonIsCounted) {
   const path piece = folder / "record/000001_2026-11-22T08-12-05Z/000001";
   std::filesystem::create_directories(piece);
   std::ofstream{piece / "lidar.pcap"} << "x";
+  const auto file_now = std::filesystem::file_time_type::clock::now();
+  const Stamp now{std::chrono::file_clock::to_sys(file_now).time_since_epoch()};
   const auto request = [&](Duration later) {
-    return daemon::Incidents::Request{daemon::IncidentCause::contradiction,
-                                      seconds{60},
-                                      Stamp{daemon::read_clock(CLOCK_REALTIME)} + later,
-                                      "{}",
-                                      {piece}};
+    return daemon::Incidents::Request{daemon::IncidentCause::contradiction, seconds{60}, now + later, "{}", {piece}};
   };
   for (int process = 0; process < 2; ++process) {
+    for (const path& kept : folders_in(folder / "incidents"))
+      std::filesystem::last_write_time(kept, file_now);
     daemon::Incidents incidents(folder / "incidents");
     incidents.set_max_bytes(10'000'000);
-    for (const seconds later : {seconds{0}, seconds{299}, seconds{305 + process}}) {
+    for (const seconds later : {seconds{0}, seconds{299}, seconds{300 + process}}) {
       incidents.raise(request(later));
       incidents.work(nullptr);
       incidents.work(nullptr);
@@ -446,6 +475,55 @@ TEST(IncidentFolder, OneOfTheFutureHidesNoneOfToday) {
   EXPECT_TRUE(incidents.raise(request(daemon::IncidentCause::tracking_lost)))
       << "it was not kept, so this is the first";
   EXPECT_EQ(incidents.status().suppressed, 2U);
+}
+
+/// Figures as a service has them, in a time that passes only where a test says so.
+class NoticedIncidents : public testing::Test {
+ protected:
+  std::optional<daemon::IncidentCause> look_after(Duration while_nothing_changes) {
+    now_ += while_nothing_changes;
+    return watch_.look(figures_);
+  }
+  void estimate(TrackingState state) { figures_.sweeps.last.emplace().state = state; }
+  void refuse(HealthReason reason) {
+    ++figures_.ingest.sources.front().counters.rejected[static_cast<std::size_t>(reason)];
+  }
+
+  static inline Duration now_ = std::chrono::hours{1};
+  Config config_;
+  daemon::Figures figures_{config_};
+  daemon::IncidentWatch watch_{[](clockid_t /*clock*/) { return now_; }};
+};
+
+/// A contradiction goes on for as long as samples are refused one after another.
+TEST_F(NoticedIncidents, AreOneContradictionUntilNoneWasSeenForTenSeconds) {
+  EXPECT_FALSE(look_after(seconds{1}));
+  refuse(HealthReason::disagreement);
+  EXPECT_EQ(look_after(seconds{1}), daemon::IncidentCause::contradiction);
+  for (int i = 0; i < 5; ++i) {
+    refuse(i % 2 == 0 ? HealthReason::self_check : HealthReason::disagreement);
+    EXPECT_FALSE(look_after(daemon::IncidentWatch::kQuiet - Duration{1}));
+  }
+  EXPECT_FALSE(look_after(daemon::IncidentWatch::kQuiet));
+  refuse(HealthReason::disagreement);
+  EXPECT_EQ(look_after(Duration{1}), daemon::IncidentCause::contradiction);
+  refuse(HealthReason::stale);
+  EXPECT_FALSE(look_after(std::chrono::hours{1})) << "who is silent contradicts nobody";
+}
+
+TEST_F(NoticedIncidents, AreOneLossAfterASecondOfDeadReckoning) {
+  estimate(TrackingState::dead_reckoning);
+  EXPECT_FALSE(look_after(seconds{1}));
+  EXPECT_FALSE(look_after(std::chrono::hours{1})) << "it has not tracked yet";
+  for (int turn = 0; turn < 2; ++turn) {
+    estimate(TrackingState::tracking);
+    EXPECT_FALSE(look_after(seconds{1}));
+    estimate(TrackingState::dead_reckoning);
+    EXPECT_FALSE(look_after(seconds{1}));
+    EXPECT_FALSE(look_after(daemon::IncidentWatch::kLostFor - Duration{1}));
+    EXPECT_EQ(look_after(Duration{1}), daemon::IncidentCause::tracking_lost);
+    EXPECT_FALSE(look_after(std::chrono::hours{1})) << "once";
+  }
 }
 
 } // namespace

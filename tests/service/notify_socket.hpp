@@ -12,7 +12,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include "core/base/stamp.hpp"
+#include "support/patience.hpp"
 
 namespace locus::test {
 
@@ -24,8 +24,8 @@ class NotifySocket {
     address.sun_family = AF_UNIX;
     path.native().copy(address.sun_path, sizeof(address.sun_path) - 1);
     EXPECT_EQ(bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
-    const timeval patience{0, 100'000};
-    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+    const timeval poll{0, 100'000};
+    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &poll, sizeof(poll));
     setenv("NOTIFY_SOCKET", path.c_str(), 1); // NOLINT(concurrency-mt-unsafe): before the program is started
   }
   ~NotifySocket() {
@@ -35,9 +35,9 @@ class NotifySocket {
   NotifySocket(const NotifySocket&) = delete;
   NotifySocket& operator=(const NotifySocket&) = delete;
 
-  /// Whether a message with this word comes in time; all that come are counted.
-  bool hears(const std::string& word, Duration timeout) {
-    const auto give_up = std::chrono::steady_clock::now() + timeout;
+  /// Whether a message with this word comes; all that came before are read.
+  bool hears(const std::string& word, Duration within = patience()) {
+    const auto give_up = std::chrono::steady_clock::now() + within;
     while (std::chrono::steady_clock::now() < give_up) {
       std::array<char, 4096> text{};
       const ssize_t size = recv(socket_, text.data(), text.size(), 0);

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "service/robot_network.hpp"
-#include "service/undisturbed.hpp"
 
 namespace locus::test {
 namespace {
@@ -24,22 +23,21 @@ class Restart : public RobotNetwork {
       return;
     start();
     listener_.emplace(std::vector<std::string>{CYCLONE_PEER, "0", "listen", "/locus"});
-    ASSERT_TRUE(daemon_->wait_for_line("DDS is up", seconds{10}));
-    play_.emplace(undisturbed({LOCUS_PLAY, plant().string()}));
-    ASSERT_TRUE(daemon_->wait_for_line("tracking", seconds{10}));
+    ASSERT_TRUE(hears_the_service(*listener_));
+    play_.emplace(std::vector<std::string>{LOCUS_PLAY, plant().string()});
+    ASSERT_TRUE(daemon_->wait_for_line("tracking"));
   }
 
-  void start() { daemon_.emplace(undisturbed(locusd(plant() / "config.yaml"))); }
+  void start() { daemon_.emplace(locusd(plant() / "config.yaml")); }
 
   void expect_to_resume() {
     start();
-    EXPECT_TRUE(daemon_->wait_for_line("resumed where the service ended", seconds{5}))
-        << testing::PrintToString(daemon_->lines());
+    EXPECT_TRUE(daemon_->wait_for_line("resumed where the service ended")) << testing::PrintToString(daemon_->lines());
   }
 
   /// Once the drive is over, against its replay.
   void expect_all_poses_true() {
-    ASSERT_EQ(play_->wait_for_exit(seconds{30}), 0);
+    ASSERT_EQ(play_->wait_for_exit(), 0);
     const Replay replay({"--quiet", plant().string()});
     const double error_m = worst_distance_m(replay.trajectory(), heard(*listener_), shift_of(*play_));
     RecordProperty("worst_um", static_cast<int>(1e6 * error_m));
@@ -54,7 +52,7 @@ TEST_F(Restart, StoppedAndKilledInMidDriveItGoesOnWhereTheRobotIs) {
   for (const int end : {SIGTERM, SIGKILL}) {
     std::this_thread::sleep_for(seconds{4});
     daemon_->signal(end);
-    ASSERT_TRUE(daemon_->wait_for_exit(seconds{1}));
+    ASSERT_TRUE(daemon_->wait_for_exit());
     std::this_thread::sleep_for(milliseconds{500}); // as RestartSec= has it
     expect_to_resume();
   }
@@ -68,7 +66,7 @@ TEST_F(Restart, StalledForSixSecondsInMidDriveItGoesOnWhereTheWheelsSay) {
   daemon_->signal(SIGSTOP);
   std::this_thread::sleep_for(seconds{6});
   daemon_->signal(SIGKILL);
-  ASSERT_TRUE(daemon_->wait_for_exit(seconds{1}));
+  ASSERT_TRUE(daemon_->wait_for_exit());
   expect_to_resume();
   EXPECT_EQ(status()["beginning"], "map");
   expect_all_poses_true();

@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include "drivers/files/capture.hpp"
+#include "support/led_clock.hpp"
 #include "support/test_drives.hpp"
 
 namespace locus::test {
@@ -54,14 +55,27 @@ nlohmann::json RobotNetwork::status() const {
   return nlohmann::json::parse(run.out, nullptr, false);
 }
 
-bool RobotNetwork::status_comes(const std::function<bool(const nlohmann::json&)>& holds, Duration timeout) const {
-  const auto give_up = std::chrono::steady_clock::now() + timeout;
-  while (std::chrono::steady_clock::now() < give_up) {
-    if (holds(status()))
-      return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds{100});
-  }
-  return false;
+bool RobotNetwork::status_comes(const std::function<bool(const nlohmann::json&)>& holds) const {
+  return comes_true([&] { return holds(status()); });
+}
+
+nlohmann::json RobotNetwork::status_when(const std::function<bool(const nlohmann::json&)>& holds) const {
+  nlohmann::json last;
+  const bool came = comes_true([&] { return holds(last = status()); });
+  EXPECT_TRUE(came) << last;
+  return last;
+}
+
+bool RobotNetwork::add_interfaces() {
+  const auto run = [](const char* command) {
+    return std::system(command) == 0;
+  }; // NOLINT(concurrency-mt-unsafe, cert-env33-c)
+  return run("ip link add robot0 type veth peer name robot1") && run("ip addr add 10.7.0.1/24 dev robot0") &&
+         run("ip link set robot1 up") && run("ip link set robot0 up");
+}
+
+std::vector<std::string> RobotNetwork::endlessly(const std::filesystem::path& drive) {
+  return {"/bin/sh", "-c", "while setpriv --pdeathsig KILL " LOCUS_PLAY " --quiet " + drive.string() + "; do :; done"};
 }
 
 std::filesystem::path RobotNetwork::capture() { return long_room_drive(); }
@@ -83,6 +97,52 @@ std::filesystem::path RobotNetwork::lidar_with(const std::string& key_and_value)
     text.replace(text.find(name), name.size(), name + ", " + key_and_value);
   std::ofstream{file("wrong.yaml")} << text;
   return file("wrong.yaml");
+}
+
+std::vector<std::string> RobotNetwork::led_locusd(const std::filesystem::path& config) const {
+  std::ofstream{file("led_clock"), std::ios::binary} << std::string(sizeof(LedTime), '\0');
+  return {"/usr/bin/env",
+          std::string{"LD_PRELOAD="} + LED_CLOCK_LIBRARY,
+          "LED_CLOCK=" + file("led_clock").string(),
+          LOCUSD,
+          "--config",
+          config.string()};
+}
+
+std::vector<std::string> RobotNetwork::leading_play(std::vector<std::string> options) const {
+  std::vector<std::string> command{"/usr/bin/env",
+                                   std::string{"LD_PRELOAD="} + LED_CLOCK_LIBRARY,
+                                   "LED_CLOCK=" + file("led_clock").string(),
+                                   "LEADS_CLOCK=1",
+                                   LOCUS_PLAY,
+                                   "--lockstep",
+                                   control().string()};
+  command.insert(command.end(), options.begin(), options.end());
+  return command;
+}
+
+bool comes_true(const std::function<bool()>& holds) {
+  const auto give_up = std::chrono::steady_clock::now() + patience();
+  while (std::chrono::steady_clock::now() < give_up) {
+    if (holds())
+      return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds{100});
+  }
+  return false;
+}
+
+bool hears_the_service(const Child& peer) {
+  return peer.wait_for_line("matched odometry") && peer.wait_for_line("diagnostics ");
+}
+
+int first_processor() {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  EXPECT_EQ(sched_getaffinity(0, sizeof(set), &set), 0);
+  std::size_t processor = 0;
+  while (processor < CPU_SETSIZE && !CPU_ISSET(processor, &set))
+    ++processor;
+  return static_cast<int>(processor);
 }
 
 std::uint64_t datagrams_in(const std::filesystem::path& file) {

@@ -35,6 +35,17 @@ class RobotNetwork : public testing::Test {
   /// Of the capture, with another value of a key of the lidar.
   [[nodiscard]] std::filesystem::path lidar_with(const std::string& key_and_value) const;
 
+  /// A pair of interfaces robot0 and robot1 that are up, robot0 at 10.7.0.1. Nothing where this kernel has none.
+  [[nodiscard]] static bool add_interfaces();
+
+  /// Command that plays a drive again and again, for tests that must not run into its end.
+  [[nodiscard]] static std::vector<std::string> endlessly(const std::filesystem::path& drive);
+
+  /// Commands of a service and of a player that leads its time (support/led_clock.hpp): the service hears each input
+  /// when the recording has it, drops none, and ends no registration early, however busy the computer is.
+  [[nodiscard]] std::vector<std::string> led_locusd(const std::filesystem::path& config) const;
+  [[nodiscard]] std::vector<std::string> leading_play(std::vector<std::string> options) const;
+
   [[nodiscard]] static std::vector<std::string> locusd(const std::filesystem::path& config) {
     return {LOCUSD, "--config", config.string()};
   }
@@ -42,11 +53,23 @@ class RobotNetwork : public testing::Test {
   /// What locusctl says; the state of the service lies in the folder of the test.
   [[nodiscard]] ProgramRun ctl(std::vector<std::string> words) const;
   [[nodiscard]] nlohmann::json status() const;
-  bool status_comes(const std::function<bool(const nlohmann::json&)>& holds, Duration timeout) const;
+  /// The first status of which it holds; else a discarded one, and a failure of the test.
+  nlohmann::json status_when(const std::function<bool(const nlohmann::json&)>& holds) const;
+  bool status_comes(const std::function<bool(const nlohmann::json&)>& holds) const;
 
  private:
   TemporaryFolder folder_, runtime_{"/dev/shm"};
 };
+
+/// Whether it comes true before the test's patience ends.
+bool comes_true(const std::function<bool()>& holds);
+
+/// Whether a peer that listens hears all estimates from now on: it knows the writer, and the service, which learns of a
+/// peer's readers in the order of their making, knows a reader that was made after that of the estimates.
+bool hears_the_service(const Child& peer);
+
+/// The first processor that this process may run on.
+int first_processor();
 
 /// How many packets a capture holds.
 std::uint64_t datagrams_in(const std::filesystem::path& file);

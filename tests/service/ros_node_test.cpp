@@ -10,8 +10,6 @@
 namespace locus::test {
 namespace {
 
-using std::chrono::seconds;
-
 class RosNodeOfService : public RobotNetwork {};
 
 /// Whether the last node that the peer heard of, to the end, has this name and claims so many endpoints to publish
@@ -20,7 +18,7 @@ bool hears_node(const Child& peer, const std::string& node, std::ptrdiff_t write
   const auto begins_with = [](const char* word) {
     return [word](const std::string& line) { return line.starts_with(word); };
   };
-  return peer.wait_until(seconds{20}, [&](const std::vector<std::string>& lines) {
+  return peer.wait_until([&](const std::vector<std::string>& lines) {
     const auto begins = std::find_if(lines.rbegin(), lines.rend(), begins_with("node "));
     return begins != lines.rend() && begins->starts_with("node " + node + " ") &&
            std::any_of(begins.base(), lines.end(), begins_with("node_end ")) &&
@@ -37,7 +35,7 @@ TEST_F(RosNodeOfService, HasTheNameOfTheInstanceAndAllThatItPublishes) {
   constexpr std::ptrdiff_t kAlways = 5; // odometry, odometry_fast, state, beginning, diagnostics
   for (const Child* peer : {&cyclone, &fast_dds})
     EXPECT_TRUE(hears_node(*peer, "/ locusd_left", kAlways)) << testing::PrintToString(peer->lines());
-  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10})) << testing::PrintToString(daemon.lines());
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up")) << testing::PrintToString(daemon.lines());
   static_cast<void>(config("dds: {publish_tf: true, publish_map: true, prefix: /robot_7/locus}\n"));
   const ProgramRun reload = run_program(LOCUSCTL, {"--socket", (runtime / "control").string(), "reload"});
   ASSERT_EQ(reload.status, 0) << reload.err;

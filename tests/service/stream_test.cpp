@@ -3,7 +3,6 @@
 #include "drivers/net/udp_socket.hpp"
 #include "locus_sim/stream_text.hpp"
 #include "service/robot_network.hpp"
-#include "service/undisturbed.hpp"
 
 namespace locus::test {
 namespace {
@@ -44,16 +43,18 @@ TEST_F(Stream, SimulatedRobotDrivesTheServiceWithoutAFile) {
   const std::filesystem::path folder = recorded(file("plant"));
   auto discard = UdpSocket::open(sim::kTextPort);
   ASSERT_TRUE(discard) << discard.error();
-  Child daemon(undisturbed(locusd(folder / "config.yaml")));
-  ASSERT_TRUE(daemon.wait_for_line("DDS is up", seconds{10}));
-  Child robot(undisturbed(shell(LOCUS_SIM + std::string(kDrive) + "- | " LOCUS_PLAY " --fail wio:lost@4-8 -")));
-  ASSERT_EQ(robot.wait_for_exit(seconds{120}), 0) << testing::PrintToString(robot.lines());
-  std::this_thread::sleep_for(milliseconds{500});
+  Child daemon(led_locusd(folder / "config.yaml"));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
+  std::string play;
+  for (const std::string& word : leading_play({"--fail", "wio:lost@4-8", "-"}))
+    play += " " + word;
+  Child robot(shell(LOCUS_SIM + std::string(kDrive) + "- |" + play));
+  ASSERT_EQ(robot.wait_for_exit(seconds{200}), 0) << testing::PrintToString(robot.lines());
 
-  EXPECT_TRUE(robot.wait_for_line(std::to_string(datagrams_in(folder / "lidar.pcap")) + " packets sent", {}))
+  EXPECT_TRUE(robot.has_line(std::to_string(datagrams_in(folder / "lidar.pcap")) + " packets sent"))
       << testing::PrintToString(robot.lines());
   EXPECT_EQ(texts_on_the_wire(*discard), 0U);
-  const json status = this->status();
+  const json status = status_when([](const json& s) { return s["lidars"].front()["heard_ms_ago"] > 500; });
   EXPECT_EQ(status["packets"]["total"]["lost"], 0);
   EXPECT_GE(status["sweeps"]["processed"], 98);
   EXPECT_NEAR(status["sources"]["wio"]["received"].get<int>(), 6 * 50, 5) << "lost for four of ten seconds";

@@ -46,7 +46,7 @@ Terminal::Terminal(std::vector<std::string> command) {
 Terminal::~Terminal() {
   if (!status_)
     kill(pid_, SIGKILL);
-  wait_for_exit(std::chrono::seconds{10});
+  wait_for_exit();
   close(slave_);
   close(master_);
 }
@@ -56,8 +56,8 @@ void Terminal::type(std::string_view keys) const {
     throw std::runtime_error("the terminal takes no keys");
 }
 
-bool Terminal::wait_until(Duration timeout, const std::function<bool()>& holds) {
-  const auto give_up = std::chrono::steady_clock::now() + timeout;
+bool Terminal::wait_until(const std::function<bool()>& holds) {
+  const auto give_up = std::chrono::steady_clock::now() + patience();
   while (!holds()) {
     if (std::chrono::steady_clock::now() > give_up)
       return false;
@@ -66,14 +66,14 @@ bool Terminal::wait_until(Duration timeout, const std::function<bool()>& holds) 
   return true;
 }
 
-bool Terminal::shows(const std::string& text, Duration timeout) {
-  return wait_until(timeout, [&] {
+bool Terminal::shows(const std::string& text) {
+  return wait_until([&] {
     return std::ranges::any_of(rows_, [&](const std::string& row) { return row.find(text) != std::string::npos; });
   });
 }
 
-std::optional<int> Terminal::wait_for_exit(Duration timeout) {
-  wait_until(timeout, [&] {
+std::optional<int> Terminal::wait_for_exit() {
+  wait_until([&] {
     int status = 0;
     if (!status_ && waitpid(pid_, &status, WNOHANG) == pid_)
       status_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);

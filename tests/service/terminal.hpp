@@ -11,7 +11,7 @@
 #include <sys/types.h>
 #include <termios.h>
 
-#include "core/base/stamp.hpp"
+#include "support/patience.hpp"
 
 namespace locus::test {
 
@@ -28,10 +28,10 @@ class Terminal {
 
   void type(std::string_view keys) const;
 
-  /// Whether this comes true of the rows within `timeout`.
-  bool wait_until(Duration timeout, const std::function<bool()>& holds);
-  bool shows(const std::string& text, Duration timeout);
-  std::optional<int> wait_for_exit(Duration timeout);
+  /// Whether this comes true of the rows before the test's patience ends.
+  bool wait_until(const std::function<bool()>& holds);
+  bool shows(const std::string& text);
+  std::optional<int> wait_for_exit();
 
   [[nodiscard]] bool on_page_of_its_own() const { return on_page_of_its_own_; }
   [[nodiscard]] bool cursor_is_shown() const { return cursor_is_shown_; }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <csignal>
 #include <set>
 #include <string>
@@ -20,7 +21,6 @@ namespace {
 
 using std::chrono::hours;
 using std::chrono::milliseconds;
-using std::chrono::minutes;
 using std::chrono::seconds;
 
 /// Inputs up to the next rest.
@@ -72,27 +72,32 @@ TEST(LoopedCourse, LapsJoinWithoutAGapAcrossTheEndOfTheHour) {
   EXPECT_EQ(counters.clock_steps, 0U);
 }
 
-/// Six laps, with restarts on the last three, in two processes.
+/// Six laps, with restarts on the last three, in two processes; of a day of which the first is interrupted, at once.
 TEST(SoakProgram, GoesOnWhereItWasInterruptedAndAllBoundsHold) {
   const test::TemporaryFolder folder;
-  const std::vector<std::string> command{SOAK, "--hours", "0.05", "--piece-minutes", "0.5", folder.path().string()};
-  test::Child interrupted(command);
-  ASSERT_TRUE(interrupted.wait_for_line("hour", minutes{5}));
+  const auto soak_for = [&](double hours_long) {
+    return std::vector<std::string>{
+        SOAK, "--hours", std::to_string(hours_long), "--piece-minutes", "0.5", folder.path().string()};
+  };
+  const auto driven = [&] { return read_pieces(folder / "pieces.jsonl"); };
+  test::Child interrupted(soak_for(24.0));
+  ASSERT_TRUE(interrupted.wait_for_line("hour"));
   interrupted.signal(SIGINT);
-  ASSERT_EQ(interrupted.wait_for_exit(minutes{5}), 0);
-  const std::size_t driven = read_pieces(folder / "pieces.jsonl").size();
-  ASSERT_GE(driven, 1U);
-  ASSERT_LT(driven, 6U);
+  ASSERT_EQ(interrupted.wait_for_exit(), 0);
+  const std::size_t before = driven().size();
+  ASSERT_GE(before, 1U);
 
-  test::Child resumed(command);
-  ASSERT_EQ(resumed.wait_for_exit(minutes{5}), 0);
-  EXPECT_TRUE(resumed.wait_for_line("All bounds hold", seconds{1}));
-  const std::vector<Piece> pieces = read_pieces(folder / "pieces.jsonl");
-  ASSERT_EQ(pieces.size(), 6U);
+  const std::size_t laps = std::max<std::size_t>(2 * before, 6);
+  test::Child resumed(soak_for((static_cast<double>(laps) - 0.5) * driven().front().lap_s / 3600.0));
+  ASSERT_TRUE(resumed.wait_until([&](const auto& /*lines*/) { return driven().size() >= laps; }));
+  ASSERT_EQ(resumed.wait_for_exit(), 0) << testing::PrintToString(resumed.lines());
+  EXPECT_TRUE(resumed.has_line("All bounds hold"));
+  const std::vector<Piece> pieces = driven();
+  ASSERT_EQ(pieces.size(), laps);
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     EXPECT_NEAR(pieces[i].hour, static_cast<double>(i + 1) * pieces[i].lap_s / 3600.0, 1e-6);
-    EXPECT_EQ(pieces[i].process_ns == pieces.front().process_ns, i < driven);
-    EXPECT_EQ(pieces[i].restarts, i < 3 ? 0 : 1);
+    EXPECT_EQ(pieces[i].process_ns == pieces.front().process_ns, i < before);
+    EXPECT_EQ(pieces[i].restarts, i < laps / 2 ? 0 : 1);
     EXPECT_EQ(pieces[i].resumed, pieces[i].restarts);
   }
 }

@@ -78,7 +78,7 @@ std::optional<int> Child::wait_for_exit(Duration timeout) {
   }
   if (status_) { // what it said last may still be on its way; a process of its own may hold the pipe for longer
     std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, std::chrono::seconds{1}, [&] { return all_read_; });
+    changed_.wait_for(lock, std::chrono::seconds{5}, [&] { return all_read_; });
   }
   return status_;
 }
@@ -114,13 +114,17 @@ std::vector<std::string> Child::lines_of(const std::string& word) const {
   return found;
 }
 
-bool Child::wait_until(Duration timeout, const std::function<bool(const std::vector<std::string>&)>& holds) const {
-  std::unique_lock lock(mutex_);
-  return changed_.wait_for(lock, timeout, [&] { return holds(lines_); });
+bool Child::has_line(const std::string& part) const {
+  return std::ranges::any_of(lines(), [&](const std::string& line) { return line.find(part) != std::string::npos; });
 }
 
-bool Child::wait_for_line(const std::string& part, Duration timeout) const {
-  return wait_until(timeout, [&](const std::vector<std::string>& lines) {
+bool Child::wait_until(const std::function<bool(const std::vector<std::string>&)>& holds) const {
+  std::unique_lock lock(mutex_);
+  return changed_.wait_for(lock, patience(), [&] { return holds(lines_); });
+}
+
+bool Child::wait_for_line(const std::string& part) const {
+  return wait_until([&](const std::vector<std::string>& lines) {
     return std::ranges::any_of(lines, [&](const std::string& line) { return line.find(part) != std::string::npos; });
   });
 }

@@ -11,7 +11,7 @@
 
 #include <sys/types.h>
 
-#include "core/base/stamp.hpp"
+#include "support/patience.hpp"
 
 namespace locus::test {
 
@@ -27,17 +27,18 @@ class Child {
   void close_stdin();
   void signal(int number) const;
 
-  /// Exit status, 128 + signal if one ended it; nothing while it still runs after `timeout`. Of one that
-  /// ended all lines are heard.
-  std::optional<int> wait_for_exit(Duration timeout);
+  /// Exit status, 128 + signal if one ended it; nothing while it still runs at the end of the test's patience. All
+  /// lines of a program that ended are read.
+  std::optional<int> wait_for_exit(Duration timeout = patience());
 
   /// So far.
   [[nodiscard]] std::vector<std::string> lines() const;
   /// Those that begin with this word and a space, without it.
   [[nodiscard]] std::vector<std::string> lines_of(const std::string& word) const;
-  /// Whether it comes true of the lines within `timeout`.
-  bool wait_until(Duration timeout, const std::function<bool(const std::vector<std::string>&)>& holds) const;
-  bool wait_for_line(const std::string& part, Duration timeout) const;
+  [[nodiscard]] bool has_line(const std::string& part) const;
+  /// Whether it comes true of the lines before the test's patience ends.
+  bool wait_until(const std::function<bool(const std::vector<std::string>&)>& holds) const;
+  bool wait_for_line(const std::string& part) const;
 
   [[nodiscard]] pid_t pid() const { return pid_; }
 

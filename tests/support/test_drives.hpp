@@ -32,11 +32,9 @@ inline void write_room_drive(const std::filesystem::path& folder, Duration durat
 
 /// Drives that are written as the tests are built (CMakeLists.txt), and are to be read alone: eight and twenty seconds
 /// around the room, twenty of a husky of locus-sim through the plant, and four around the room in KITTI's format.
-inline std::filesystem::path room_drive() { return LOCUS_TEST_DRIVES "/room"; }
-inline std::filesystem::path long_room_drive() { return LOCUS_TEST_DRIVES "/long_room"; }
-inline std::filesystem::path plant_drive() { return LOCUS_TEST_DRIVES "/plant"; }
-inline std::filesystem::path kitti_room_drive() {
-  return LOCUS_TEST_DRIVES "/kitti_room/2023_11_14_drive_0001_extract";
-}
+std::filesystem::path room_drive();
+std::filesystem::path long_room_drive();
+std::filesystem::path plant_drive();
+std::filesystem::path kitti_room_drive();
 
 } // namespace locus::test
