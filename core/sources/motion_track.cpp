@@ -11,7 +11,7 @@ MotionTrack::MotionTrack(const MotionSourceOptions& options)
 
 Duration MotionTrack::taken_out(double late_s) {
   constexpr double kMostLate_s = 0.015;
-  return from_seconds(std::min(late_s, kMostLate_s));
+  return from_seconds(std::min(kMostLate_s, late_s));
 }
 
 void MotionTrack::add(const ImuSample& sample) {
