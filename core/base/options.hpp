@@ -126,9 +126,9 @@ constexpr auto names_of(NoSourcePrior) { return std::to_array<std::string_view>(
 enum class FlatGround { off, on, automatic };
 constexpr auto names_of(FlatGround) { return std::to_array<std::string_view>({"off", "on", "auto"}); }
 
-/// Limits of the robot's motion. A motion source that reports a higher speed is rejected, and an uncertain prediction
-/// does not exceed it. The acceleration is two standard deviations of the change in speed that sources may report from
-/// sweep to sweep; an odometry that stops harder is frozen.
+/// Limits of the robot's motion. A motion source that reports a higher speed is rejected; a predicted excess is reduced
+/// the more, the less certain it is. The acceleration is two standard deviations of the change in speed that sources
+/// may report from sweep to sweep; an odometry that stops harder is frozen.
 struct MotionLimits {
   double max_speed_mps = 10.0;
   double max_acceleration_mps2 = 10.0;
