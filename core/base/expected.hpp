@@ -6,7 +6,7 @@
 
 namespace locus {
 
-/// Value, or the reason why there is none. For failures that are part of normal operation (an unknown packet, an
+/// Value, or the reason why there is none. Used for failures that are part of normal operation (an unknown packet, an
 /// unreadable file): the caller must check before using the value. Holds exactly one of the two.
 template <class T, class Error> class Expected {
  public:

@@ -15,7 +15,7 @@ inline constexpr double kRadPerDeg = std::numbers::pi / 180;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-/// Rigid transform. A variable T_a_b takes a point of frame b to frame a: p_a = T_a_b * p_b.
+/// Rigid transform. A variable T_a_b transforms a point from frame b to frame a: p_a = T_a_b * p_b.
 struct Pose {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero(); ///< metres

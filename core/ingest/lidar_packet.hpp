@@ -54,7 +54,7 @@ struct LidarPacket {
   Stamp stamp;                          ///< of the first firing
   Duration duration{};                  ///< from the first firing to the one after the last
   std::uint16_t first_azimuth_cdeg = 0; ///< of the first firing, even if it has no returns
-  std::optional<Cloud> cloud;           ///< that this packet is a slice of; nothing for a packet sent when fired
+  std::optional<Cloud> cloud;           ///< cloud of which this is a slice; nothing for a packet sent when fired
   std::size_t count = 0;                ///< number of firing groups
   std::array<FiringGroup, kMaxFiringGroups> storage;
 

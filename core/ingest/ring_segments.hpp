@@ -74,7 +74,7 @@ class RingSegments {
   struct Lidar {
     PacketMotion motion;
     std::int32_t packet = 0;    ///< counted from 1 in each sweep
-    std::size_t banks_used = 0; ///< by this lidar so far
+    std::size_t banks_used = 0; ///< number of banks with returns so far
     std::array<Bank, LidarPacket::kMaxLasers / FiringGroup::kLasers> storage;
     std::span<Bank> banks() { return std::span(storage).first(banks_used); }
   };

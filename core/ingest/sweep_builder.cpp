@@ -217,7 +217,7 @@ void SweepBuilder::leave_out_body(const Pose& T_base_lidar, const FiringGroup& g
   }
 }
 
-/// Returns the motion within a packet, taken as linear: a transform and its rate.
+/// Returns the motion within a packet, approximated as linear: a transform and its rate.
 PacketMotion SweepBuilder::motion_of(const LidarPacket& packet) {
   const Pose& T_base_lidar = T_base_lidar_[packet.lidar];
   const Pose T_start_begin = T_start_base(packet.stamp);

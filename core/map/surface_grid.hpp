@@ -15,7 +15,7 @@
 namespace locus {
 
 /// Variance of one point across its surface: ranging noise of the supported lidars (2 to 3 cm), averaged over the ten
-/// and more returns of an arc. Walls show 6 mm, with real and with synthetic lidars.
+/// and more returns of an arc. On walls 6 mm are measured, with real and with synthetic lidars.
 inline constexpr float kPointVariance_m2 = 0.01F * 0.01F;
 
 /// Index of a voxel: 21 bits per axis, so 1000 km at half a metre.

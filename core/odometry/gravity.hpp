@@ -34,7 +34,7 @@ class TiltKeeper {
  public:
   void observe(const Eigen::Quaterniond& R_odom_base, const std::optional<Eigen::Vector3d>& up_base);
 
-  /// Returns the rotation about the odom axes to apply to the next keyframe, and takes it as applied.
+  /// Returns the rotation about the odom axes to apply to the next keyframe, and counts it as applied.
   Eigen::Vector3d take_correction_rad();
 
  private:

@@ -193,7 +193,7 @@ class PoseJump : public HealthMetric {
  private:
   std::optional<Pose> last_;
   Stamp last_stamp_;
-  bool moving_ = false; ///< twist_ is known
+  bool moving_ = false; ///< twist_ is valid
   Vector6 twist_ = Vector6::Zero();
 };
 

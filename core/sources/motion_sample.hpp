@@ -27,7 +27,7 @@ struct SpecificForce {
   Eigen::Vector3d early_base_mps2 = Eigen::Vector3d::Zero(); ///< mean, weighted by the time to the end of the sweep
   Eigen::Vector3d late_base_mps2 = Eigen::Vector3d::Zero(); ///< mean, weighted by the time since the start of the sweep
   Eigen::Vector3d noise_per_s = Eigen::Vector3d::Zero();    ///< variance that its integral gains per second
-  SourceId source{};                                        ///< that measured it
+  SourceId source{};                                        ///< source that measured it
   Duration late{};                                          ///< stamp delay that has been removed
 
   [[nodiscard]] Eigen::Vector3d mean_base_mps2() const { return 0.5 * (early_base_mps2 + late_base_mps2); }

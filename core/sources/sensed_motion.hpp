@@ -45,7 +45,7 @@ struct SourcePose {
 /// Mean twist of the base between the ends of two sweeps, measured by one source (base axes).
 struct SensedTwist {
   Vector6 mean = Vector6::Zero();
-  Vector6 change_per_s = Vector6::Zero();    ///< from one end to the other
+  Vector6 change_per_s = Vector6::Zero();    ///< rate of change from one end to the other
   Vector6 brought_forward = Vector6::Zero(); ///< part of the mean that is due to the removed stamp delay
 
   SensedTwist(Vector6 twist_base) : mean(std::move(twist_base)) {}
