@@ -6,8 +6,8 @@
 
 namespace locus {
 
-/// A value, or the reason why there is none. For failures that are part of normal life (a foreign packet, an unreadable
-/// file): the caller must look before it takes the value. Holds exactly one of the two.
+/// Value, or the reason why there is none. Used for failures that are part of normal operation (an unknown packet, an
+/// unreadable file): the caller must check before using the value. Holds exactly one of the two.
 template <class T, class Error> class Expected {
  public:
   Expected(T value) : state_(std::in_place_index<0>, std::move(value)) {}     // NOLINT(google-explicit-constructor)

@@ -9,16 +9,16 @@
 
 namespace locus {
 
-/// Instruction sets that the hot kernels are built for. Results are the same bits for one of them, not between them.
+/// Instruction sets that the hot kernels are built for. Results are bit-identical within one set, not between sets.
 enum class Isa : std::uint8_t { baseline, avx2, avx512 };
 
-/// The words of the environment variable LOCUS_ISA.
+/// Values of the environment variable LOCUS_ISA.
 constexpr auto names_of(Isa) { return std::to_array<std::string_view>({"baseline", "avx2", "avx512"}); }
 
-/// The best one that this processor has.
+/// Returns the best set that this processor supports.
 Isa best_isa();
 
-/// Whether this processor can run it.
+/// Returns whether this processor supports `isa`.
 bool is_supported(Isa isa);
 
 #if defined(__x86_64__)
@@ -29,8 +29,8 @@ template <class Body>
 }
 #endif
 
-/// Runs `body` in the instructions of a set that the processor has: one source, compiled for each. That holds for what
-/// is inlined, so no type changes its layout; a body is a loop or two over plain arrays.
+/// Runs `body` compiled for an instruction set that the processor supports: one source, compiled for each set. Only
+/// inlined code is affected, so no type changes its layout; a body is a loop or two over plain arrays.
 template <class Body> void run_as(Isa isa, const Body& body) {
 #if defined(__x86_64__)
   if (isa == Isa::avx512)

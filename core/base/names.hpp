@@ -8,8 +8,8 @@
 
 namespace locus {
 
-/// An enumeration whose values count from zero and which has a names_of(E) beside it: an array of the names of its
-/// values, in their order. These are the words that users read and write.
+/// Enumeration whose values count from zero, with an array of their names in that order, names_of(E), beside it. Users
+/// read and write these names.
 template <class E>
 concept Named = requires(E value) {
   names_of(value)[0];
@@ -19,7 +19,7 @@ template <Named E> constexpr std::string_view to_string(E value) {
   return names_of(value)[static_cast<std::size_t>(value)];
 }
 
-/// The value of that name; nothing where there is none.
+/// Returns the value of that name, or nothing if there is none.
 template <Named E> constexpr std::optional<E> from_string(std::string_view name) {
   const auto names = names_of(E{});
   for (std::size_t i = 0; i < names.size(); ++i) {

@@ -7,10 +7,10 @@ namespace locus {
 
 namespace {
 
-/// Below this angle the closed forms lose their digits and the series are exact to double precision.
+/// Angle below which the closed forms lose digits and the series are exact to double precision.
 constexpr double kSmallAngleRad = 1e-4;
 
-/// V of SE(3): the translation of exp(v, w) is V(w) * v.
+/// Matrix V of SE(3): the translation of exp(v, w) is V(w) * v.
 Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& w) {
   const double angle2 = w.squaredNorm();
   const double angle = std::sqrt(angle2);
@@ -108,10 +108,10 @@ Eigen::Quaterniond from_rpy_rad(const Eigen::Vector3d& rpy_rad) {
 }
 
 Eigen::Vector3d to_rpy_rad(const Eigen::Quaterniond& rotation) {
-  constexpr double kGimbalLock = 1e-9; // cosine of the pitch below which the yaw is lost in rounding
+  constexpr double kGimbalLock = 1e-9; // cosine of the pitch below which rounding makes the yaw meaningless
   const Eigen::Matrix3d R = rotation.toRotationMatrix();
   const double yaw = std::hypot(R(0, 0), R(1, 0)) < kGimbalLock ? 0.0 : std::atan2(R(1, 0), R(0, 0));
-  // What is left when the yaw is taken back is Ry(pitch) Rx(roll): exact for any yaw, so also next to the lock.
+  // Ry(pitch) Rx(roll) remains when the yaw is removed: exact for any yaw, and therefore also close to gimbal lock.
   const Eigen::Matrix3d R_pitch_roll = Eigen::AngleAxisd(-yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix() * R;
   return {std::atan2(-R_pitch_roll(1, 2), R_pitch_roll(1, 1)), std::atan2(-R_pitch_roll(2, 0), R_pitch_roll(0, 0)),
           yaw};

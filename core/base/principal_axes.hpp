@@ -5,25 +5,25 @@
 
 namespace locus {
 
-/// Symmetric 3x3 matrix, its upper half.
+/// Symmetric 3x3 matrix, upper triangle.
 template <class Real> struct Symmetric3 { Real xx, xy, xz, yy, yz, zz; };
 
-/// How points scatter about their mean: variances along the principal axes, and the axis of the least one.
+/// Scatter of points about their mean: variances along the principal axes, and the axis of the least variance.
 template <class Real> struct PrincipalAxes {
   Real least, middle, greatest;
   Real x, y,
-      z; ///< unit axis of the least variance, or zero for points that all lie in one place; its sign means nothing
+      z; ///< unit axis of the least variance, or zero if all points coincide; its sign is arbitrary
 };
 
-/// Eigenvalues of a positive semi-definite matrix and the eigenvector of the least.
+/// Computes the eigenvalues of a positive semi-definite matrix and the eigenvector of the least.
 ///
-/// Newton's method on the characteristic polynomial climbs from zero towards the least root and never beyond. Where
-/// the least variance is a tenth of the middle one, as for points on a plane, four steps leave an error of a millionth;
-/// where both are alike they leave a tenth, still far from a plane. Without branches and trigonometric functions: a
-/// loop over many matrices becomes vector instructions. Any thread.
+/// Newton's method on the characteristic polynomial approaches the least root from zero without overshoot. If the least
+/// variance is a tenth of the middle one, as for points on a plane, four steps leave an error of one millionth; if both
+/// are equal they leave a tenth, still far from a plane. Has no branches and no trigonometric functions, so a loop over
+/// many matrices is vectorised. Any thread.
 template <class Real> [[gnu::always_inline]] inline PrincipalAxes<Real> principal_axes(const Symmetric3<Real>& m) {
   constexpr int kSteps = 4;
-  constexpr Real kTiny = Real(1e-30); // instead of a division by zero
+  constexpr Real kTiny = Real(1e-30); // avoids a division by zero
   const Real trace = m.xx + m.yy + m.zz;
   const Real minors = m.yy * m.zz - m.yz * m.yz + m.xx * m.zz - m.xz * m.xz + m.xx * m.yy - m.xy * m.xy;
   const Real determinant =
@@ -34,13 +34,13 @@ template <class Real> [[gnu::always_inline]] inline PrincipalAxes<Real> principa
     const Real value = ((trace - least) * least - minors) * least + determinant;
     const Real slope = (3 * least - 2 * trace) * least + minors;
     const Real next = least + (value > 0 ? value : Real(0)) / (slope > kTiny ? slope : kTiny);
-    least = next < mean ? next : mean; // where rounding is all there is, as on a line
+    least = next < mean ? next : mean; // rounding dominates, e.g. for points on a line
   }
   const Real sum = trace - least;
   const Real discriminant = sum * sum - 4 * (minors - least * sum);
   const Real middle = Real(0.5) * (sum - std::sqrt(discriminant > 0 ? discriminant : Real(0)));
 
-  // The axis is orthogonal to all columns of what is left: the longest of their cross products is the most precise.
+  // The axis is orthogonal to all columns of the remainder: the longest of their cross products is the most precise.
   const Real a = m.xx - least, b = m.yy - least, c = m.zz - least;
   const Real x1 = m.xy * m.yz - m.xz * b, y1 = m.xz * m.xy - a * m.yz, z1 = a * b - m.xy * m.xy;
   const Real x2 = b * c - m.yz * m.yz, y2 = m.yz * m.xz - m.xy * c, z2 = m.xy * m.yz - b * m.xz;

@@ -10,18 +10,18 @@
 
 namespace locus {
 
-/// Gathers what is wrong with a set of options, one line "key: reason" for each key.
+/// Collects the problems of a set of options, one line "key: reason" for each key.
 class Problems {
  public:
   void require(bool holds, std::string_view key, std::string_view reason) {
     if (holds)
       return;
     std::string line = std::string{key}.append(": ").append(reason);
-    std::replace(line.begin(), line.end(), '\n', ' '); // a reason may quote anything
+    std::replace(line.begin(), line.end(), '\n', ' '); // a reason may quote any text
     add(line);
   }
 
-  /// Not-a-number is outside every range.
+  /// NaN is outside every range.
   template <class T> void require_range(std::string_view key, T value, T lowest, T highest) {
     require(value >= lowest && value <= highest, key,
             shortest(value) + " is outside " + shortest(lowest) + " .. " + shortest(highest));

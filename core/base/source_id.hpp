@@ -5,8 +5,8 @@
 
 namespace locus {
 
-/// A motion source: its place in the configuration, from 0, the first of the highest priority. Where there may be none,
-/// it is a std::optional<SourceId>.
+/// Motion source: its index in the configuration, from 0 in order of falling priority. A std::optional<SourceId> where
+/// there may be none.
 enum class SourceId : std::size_t {};
 
 constexpr std::size_t index_of(SourceId source) { return static_cast<std::size_t>(source); }

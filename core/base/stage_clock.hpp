@@ -10,7 +10,7 @@
 
 namespace locus {
 
-/// The stages whose cost is reported.
+/// Stages whose cost is reported.
 enum class Stage : std::uint8_t { decode, correct, filter, covariance, scan_to_scan, scan_to_submap, map };
 constexpr auto names_of(Stage) {
   return std::to_array<std::string_view>(
@@ -18,15 +18,15 @@ constexpr auto names_of(Stage) {
 }
 inline constexpr std::size_t kStages = names_of(Stage{}).size();
 
-/// Told when a stage begins and ends. The core has no clock of its own; who wants timing brings one.
+/// Interface notified when a stage begins and ends. The core reads no clock; a caller that wants timing supplies one.
 class StageClock {
  public:
   virtual ~StageClock() = default;
   virtual void enter(Stage stage) = 0;
-  virtual void leave() = 0; ///< the innermost stage entered
+  virtual void leave() = 0; ///< ends the innermost stage
 };
 
-/// Marks a stage for the life of the object; does nothing without a clock.
+/// Marks a stage for the lifetime of the object; does nothing without a clock.
 class StageScope {
  public:
   StageScope(StageClock* clock, Stage stage) : clock_(clock) {

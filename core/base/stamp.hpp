@@ -8,8 +8,8 @@ namespace locus {
 
 using Duration = std::chrono::nanoseconds;
 
-/// The robot's time line. It has no now(): the core is told the time with every measurement and never asks for it, so a
-/// replay and a live run of the same data are the same computation.
+/// The robot's time line. It has no now(): the core receives the time with every measurement and never reads a clock,
+/// so a replay and a live run of the same data are the same computation.
 struct RobotTime {
   using duration = Duration;
   using rep = Duration::rep;
@@ -21,7 +21,8 @@ struct RobotTime {
 /// Instant of a measurement: nanoseconds since the Unix epoch.
 using Stamp = RobotTime::time_point;
 
-/// What a file may claim, the years 1951 to 2096: the difference between two differences of such times fits a Duration.
+/// Range of stamps accepted from files, the years 1951 to 2096: a difference of two differences of stamps fits a
+/// Duration.
 inline constexpr Stamp kEarliestStamp{std::chrono::seconds{-600'000'000}};
 inline constexpr Stamp kLatestStamp{std::chrono::seconds{4'000'000'000}};
 

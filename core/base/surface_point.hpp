@@ -5,10 +5,10 @@
 
 namespace locus {
 
-/// A point with what is known of the surface under it.
+/// Point with the normal of the surface it lies on.
 struct SurfacePoint {
   Eigen::Vector3f position_m;
-  Eigen::Vector3f normal; ///< unit, or zero where there is none to be trusted
+  Eigen::Vector3f normal; ///< unit, or zero if there is no reliable one
 };
 
 } // namespace locus

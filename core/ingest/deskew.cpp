@@ -43,7 +43,7 @@ void SweepCorrection::add(double age_s, const Pose& T_true_corrected) {
                        T_true_corrected.translation.cast<float>()};
 }
 
-/// Precondition: there are places.
+/// Precondition: places_ is not empty.
 SweepCorrection::Place SweepCorrection::at_age(float age_s) const {
   const std::span<const Place> places{places_.data(), count_};
   const auto after = std::ranges::find_if(places, [=](const Place& place) { return place.age_s <= age_s; });

@@ -12,25 +12,24 @@
 
 namespace locus {
 
-/// The mean twist that the points of a sweep came corrected for; zero where they did not.
+/// Returns the mean twist (m/s, rad/s) that the points of a sweep were corrected for; zero if they were not.
 Vector6 corrected_twist(const Sweep& sweep);
 
-/// Moves points of one sweep from where they came corrected to, to where they lay at its end. To be applied, it
-/// comes from all() or anew(). Any thread.
+/// Second de-skew of one sweep: moves its points from their positions as received to their positions at the end of the
+/// sweep. Created by all() or anew(). Any thread.
 class SweepCorrection {
  public:
-  /// For a base that moved with `twist_base` (m/s, rad/s) on the mean, and as the points were corrected for beside it.
+  /// De-skews for a base with mean twist `twist_base` (m/s, rad/s); variations in the earlier correction are retained.
   static SweepCorrection all(const Sweep& sweep, const Vector6& twist_base);
 
-  /// The same whatever motion the points were corrected for, which is taken out of them again: for a source that is not
-  /// believed after all.
+  /// De-skews for a constant `twist_base` and undoes the earlier correction: for a source that turned out to be wrong.
   static SweepCorrection anew(const Sweep& sweep, const Vector6& twist_base);
 
-  /// Replaces `scan` by the points moved, in their order.
+  /// Replaces `scan` by the moved points, in the same order.
   void apply(std::span<const SweepPoint> points, std::vector<SurfacePoint>& scan) const;
 
  private:
-  /// What turns the old correction into the new one; linear from one place of the path to the next.
+  /// Transform from the earlier correction to the new one; linear in age between two places.
   struct Place {
     float age_s;
     Eigen::Matrix3f R;
@@ -40,7 +39,7 @@ class SweepCorrection {
   void add(double age_s, const Pose& T_true_corrected);
   [[nodiscard]] Place at_age(float age_s) const;
 
-  std::array<Place, CorrectedPath::kMaxPlaces> places_; ///< from the oldest on
+  std::array<Place, CorrectedPath::kMaxPlaces> places_; ///< oldest first
   std::size_t count_ = 0;
 };
 

@@ -9,7 +9,7 @@ namespace locus {
 
 namespace {
 
-/// 21 bits an axis around the base; a sweep reaches no farther than that many voxels.
+/// Returns a key with 21 bits per axis around the base; a sweep reaches no farther than that many voxels.
 std::uint64_t voxel_key(const Eigen::Vector3f& position_m, double leaf_m) {
   std::uint64_t key = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -48,7 +48,7 @@ void VoxelFilter::apply(std::vector<SweepPoint>& points) {
     mean.position_base_m *= share;
     mean.age_s *= share;
     mean.intensity *= share;
-    mean.normal_base.normalize(); // leaves zero as it is
+    mean.normal_base.normalize(); // a zero vector stays zero
     keyed_[means_.size()] = keyed_[begin];
     means_.push_back(mean);
     begin = end;

@@ -11,8 +11,8 @@
 
 namespace locus {
 
-/// Replaces the points of each voxel by their mean (paper II-A, 3D voxel grid). The order of the survivors is that of
-/// their voxels' first points, so it depends on the sweep alone. One owner.
+/// Replaces the points of each voxel by their mean (paper II-A, 3D voxel grid). The means are in the order of the first
+/// points of their voxels, so the result depends on the sweep alone. One owner.
 class VoxelFilter {
  public:
   VoxelFilter(const VoxelFilterOptions& options, std::size_t max_points);
@@ -28,9 +28,9 @@ class VoxelFilter {
   std::vector<SweepPoint> means_;
 };
 
-/// Keeps a share of the points, each as likely as any other, in their order (paper II-A: random downsampling after
-/// Vitter 1984; here by selection sampling, which keeps exactly the share asked for). Seeded: same points, same choice.
-/// One owner.
+/// Retains a random share of the points, each with equal probability, in their order (paper II-A: random downsampling
+/// after Vitter 1984; here selection sampling, which retains exactly the requested share). Seeded: same points, same
+/// selection. One owner.
 class RandomFilter {
  public:
   RandomFilter(const RandomFilterOptions& options, std::uint64_t seed) : keep_(options.keep), random_(seed) {}

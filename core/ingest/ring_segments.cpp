@@ -9,8 +9,8 @@ namespace locus {
 
 namespace {
 
-/// A segment whose centroid lies farther than this from the middle of its ends goes round a corner; it lies on no
-/// surface.
+/// Largest distance of a segment's centroid from the midpoint of its ends. A segment beyond it goes round a corner and
+/// lies on no surface.
 constexpr float kMaxBend_m = 0.04F;
 
 constexpr std::size_t kLinesPerLidar = 256;
@@ -18,11 +18,11 @@ constexpr float kFirstLeaf_m = 0.1F;
 constexpr float kMinLeaf_m = 0.05F;
 constexpr float kMaxLeaf_m = 0.4F;
 
-/// A step in range larger than this between neighbouring returns is another surface.
+/// Largest step in range between neighbouring returns of one surface.
 constexpr float kRangeJump_m = 0.1F;
 constexpr float kRangeJumpPerRange = 0.02F;
 
-/// Of a mask, one bit each.
+/// Packs a mask into one bit per laser.
 std::uint32_t bits_of(const RingSegments::Mask& mask) {
   std::uint32_t bits = 0;
   for (std::size_t k = 0; k < mask.size(); ++k)
@@ -30,7 +30,7 @@ std::uint32_t bits_of(const RingSegments::Mask& mask) {
   return bits;
 }
 
-/// Calls `visit` with the place of each bit that is set.
+/// Calls `visit` with the index of each set bit.
 template <class Visit> void for_each_set(std::uint32_t bits, const Visit& visit) {
   for (; bits != 0; bits &= bits - 1)
     visit(static_cast<std::size_t>(std::countr_zero(bits)));
@@ -57,7 +57,7 @@ void RingSegments::begin_packet(std::size_t lidar, const PacketMotion& motion) {
   }
 }
 
-/// Where a return that counts does not go on with the open segment of its laser.
+/// Marks the selected returns that do not continue the open segment of their laser.
 [[gnu::always_inline]] inline RingSegments::Mask RingSegments::beginnings_in(const Bank& bank, const FiringGroup& group,
                                                                              const Mask& counts) const {
   Mask begins;
@@ -100,8 +100,8 @@ std::size_t RingSegments::add(std::size_t lidar, const FiringGroup& group, const
   return refused;
 }
 
-/// Takes in the returns that `takes` names; those that `begins` names are the first of their segments. Sums instead of
-/// choices, and copies of what is read: else the loop becomes no vector instructions.
+/// Adds the returns selected by `takes`; those in `begins` are the first of their segments. Sums instead of branches,
+/// and inputs by value: otherwise the loop is not vectorised.
 [[gnu::always_inline]] inline void RingSegments::Bank::take(FiringGroup group, Mask begins, Mask takes, float stamp_s,
                                                             std::int32_t packet) {
   PerLaser<float> intensity;
@@ -135,7 +135,7 @@ std::uint32_t RingSegments::latest(std::size_t lidar, std::size_t laser) const {
 
 std::uint32_t RingSegments::open() { return opened_ < kMaxSegments ? opened_++ : kNone; }
 
-/// Leaves out a segment that goes round a corner.
+/// Closes a segment; drops it if it goes round a corner.
 void RingSegments::close(std::size_t lidar, Bank& bank, std::size_t laser) {
   const std::size_t k = laser;
   const float share = 1.0F / bank.count[k];

@@ -11,24 +11,25 @@ namespace locus {
 
 namespace {
 
-/// Neighbours farther than this share of the range lie on another surface, or too far away to speak for this one.
+/// Largest distance of a neighbour, as a share of the range; a farther one lies on another surface or is not
+/// representative.
 constexpr float kMaxDistancePerRange = 0.15F;
 constexpr float kMinReach_m = 0.6F;
 
 constexpr float kMaxRoughnessOfScan_m = 0.04F;      ///< across the plane, one standard deviation
-constexpr float kMinMiddleToGreatestOfScan = 0.02F; ///< below this they lie on one line
+constexpr float kMinMiddleToGreatestOfScan = 0.02F; ///< below this the points lie on one line
 constexpr float kMaxLeastToMiddle = 0.1F;
-constexpr float kMinNeighbours = 5.0F; ///< itself counted
+constexpr float kMinNeighbours = 5.0F; ///< including the point itself
 
-constexpr std::size_t kBatch = 64; ///< points at a time: their moments stay in the fastest cache
+constexpr std::size_t kBatch = 64; ///< points per batch: their moments stay in the fastest cache
 using Batch = std::array<float, kBatch>;
 
-/// Sums over a point's neighbours, from the point.
+/// Sums over a point's neighbours, relative to the point.
 struct Moments {
   Batch count, x, y, z, xx, xy, xz, yy, yz, zz;
 };
 
-/// Points of a batch, and the squared distance within which their neighbours speak for them.
+/// Points of a batch, and the squared distance up to which their neighbours are used.
 struct BatchPoints {
   Batch x, y, z, reach2;
 };
@@ -45,7 +46,7 @@ struct BatchPoints {
   return p;
 }
 
-/// Adds one neighbour of each point; one in the same place as the point is none.
+/// Adds one neighbour of each point; one that coincides with the point is ignored.
 [[gnu::always_inline]] inline void add_neighbour(const BatchPoints& p, const float* x_m, const float* y_m,
                                                  const float* z_m, const std::int32_t* neighbour, Moments& moments) {
   for (std::size_t i = 0; i < kBatch; ++i) {
@@ -68,7 +69,7 @@ struct BatchPoints {
   }
 }
 
-/// Unit normals towards the lidar's side of planes through the points of the moments, or zero.
+/// Computes unit normals, facing the lidar, of planes through the points of the moments; zero if unreliable.
 [[gnu::always_inline]] inline void normals_of(const Moments& moments, const BatchPoints& p, Batch& nx, Batch& ny,
                                               Batch& nz) {
   for (std::size_t i = 0; i < kBatch; ++i) {
@@ -113,7 +114,7 @@ void ScanNormals::find_neighbours(const std::vector<SweepPoint>& points, std::si
   const auto [id, begin, end] = lines_[line];
   struct Beside {
     std::size_t begin, end;
-    std::size_t nearest; ///< in time, which follows the point at hand
+    std::size_t nearest; ///< in time to the current point; advances with it
   };
   std::array<Beside, 2> beside{};
   if (line > 0 && lines_[line - 1].id + 1 == id)
@@ -142,7 +143,7 @@ void ScanNormals::find_neighbours(const std::vector<SweepPoint>& points, std::si
   }
 }
 
-/// For the points from `begin` on, as many as a batch holds; those beyond the last one are padding.
+/// Fits planes to one batch of points from `begin` on; entries beyond the last point are padding.
 void ScanNormals::fit_planes(std::vector<SweepPoint>& points, std::size_t begin) const {
   Batch nx, ny, nz;
   run_as(isa_, [&] {

@@ -11,16 +11,17 @@
 
 namespace locus {
 
-/// Gives the points of a sweep the normals of their surfaces.
+/// Estimates the surface normals of the points of a sweep.
 ///
-/// The order of firing names the neighbours, so nothing is searched: before and after on the same scan line, and the
-/// nearest three on the lines above and below, which the lidar fires within the same fraction of a millisecond. A plane
-/// through them is trusted when they spread in two directions and little across; else the normal stays zero. One owner.
+/// The order of firing determines the neighbours, so there is no search: the previous and the next point on the same
+/// scan line, and the nearest three on the lines above and below, which are fired within the same fraction of a
+/// millisecond. A plane through them is accepted if they spread in two directions and little across it; otherwise the
+/// normal stays zero. One owner.
 class ScanNormals {
  public:
   explicit ScanNormals(std::size_t max_points, Isa isa = best_isa());
 
-  /// `points` sorted by scan line, within it by time (that is, by falling age). Writes normal_base, nothing else.
+  /// Writes normal_base and nothing else. `points` must be sorted by scan line, then by time (that is, by falling age).
   void estimate(std::vector<SweepPoint>& points);
 
  private:
@@ -35,9 +36,10 @@ class ScanNormals {
 
   Isa isa_;
   std::vector<Line> lines_;
-  /// Places of the first neighbour of all points, of the second and so on; its own place where a point has fewer.
+  /// Indices of the first neighbours of all points, of the second ones and so on; a point with fewer is its own
+  /// neighbour.
   std::array<std::vector<std::int32_t>, kMostNeighbours> neighbours_;
-  std::vector<float> x_, y_, z_; ///< of the points
+  std::vector<float> x_, y_, z_; ///< coordinates of the points
 };
 
 } // namespace locus

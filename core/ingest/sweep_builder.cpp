@@ -14,22 +14,23 @@ constexpr Duration kMinPeriod = std::chrono::milliseconds{40}; ///< 1500 rpm
 constexpr Duration kMaxPeriod = std::chrono::milliseconds{250};
 constexpr Duration kDefaultPeriod = std::chrono::milliseconds{100};
 
-/// A gap longer than this is a jump of the clock or a new start, not a run of empty windows.
+/// Longest gap that counts as a run of empty windows; a longer one is a clock step or a restart.
 constexpr Duration kMaxPause = std::chrono::seconds{60};
 
-/// So many late packets in a row, and for so long: what a network held up comes late, too, but then all at once.
+/// Number of consecutive late packets, and their time span, that cause a restart: packets delayed by a network are
+/// late, too, but arrive all at once.
 constexpr std::uint64_t kLatePacketsToRestart = 500;
 constexpr Duration kLateToRestart = std::chrono::milliseconds{500};
 
-constexpr std::size_t kReturnsPerSegmentPoint = 4; ///< room for what the leaf has not learned yet
+constexpr std::size_t kReturnsPerSegmentPoint = 4; ///< headroom until the leaf has adapted
 
-/// Of one firing group: -1 for a return fired in [first_ns, last_ns) and within range, 0 for all others. Counts those
-/// fired.
+/// Selects the returns of a firing group: -1 for one fired in [first_ns, last_ns) and within range, else 0. Adds the
+/// number fired in that time to `fired`.
 RingSegments::Mask select(const FiringGroup& group, std::int32_t first_ns, std::int32_t last_ns, float min_range_m,
                           float max_range_m, std::size_t& fired) {
   RingSegments::Mask counts;
   std::int32_t number = 0;
-  // Masks instead of conditions: with branches the compiler makes no vector instructions of this loop.
+  // Masks instead of conditions: with branches the compiler does not vectorise the loop.
   for (std::size_t k = 0; k < FiringGroup::kLasers; ++k) {
     const float range_m = group.range_m[k];
     const std::int32_t offset_ns = group.offset_ns[k];
@@ -45,7 +46,7 @@ RingSegments::Mask select(const FiringGroup& group, std::int32_t first_ns, std::
 
 void RevolutionTimer::observe(const LidarPacket& packet) {
   constexpr double kMaxStep_s = 0.02;
-  constexpr double kForget = 0.995; ///< a memory of a few sweeps
+  constexpr double kForget = 0.995; ///< memory of a few sweeps
   if (lidar_ && packet.lidar > *lidar_)
     return;
   const bool follows = lidar_ == packet.lidar;
@@ -105,10 +106,9 @@ void SweepBuilder::add(const LidarPacket& packet, Stamp arrival) {
   if (!window_)
     open(packet.cloud ? std::min(packet.stamp, packet.cloud->begin) : packet.stamp);
   else if (sweep_.sequence == 0 && !follows)
-    window_->end = window_->start + period(); // the first window still learns how long a revolution is
+    window_->end = window_->start + period(); // the revolution time is still being learned
 
-  // A cloud of one instant has its firings at its end, and may come a little late: it is its begin that ends the
-  // window.
+  // A cloud of a single instant has its firings at its end and may arrive a little late: its begin ends the window.
   const Stamp first = follows ? std::min(packet.stamp, packet.cloud->begin) : packet.stamp;
   while (first >= window_->end)
     close();
@@ -125,14 +125,15 @@ void SweepBuilder::add(const LidarPacket& packet, Stamp arrival) {
   }
 }
 
-/// Has the window end where the cloud at hand does. One in whose place no cloud came ends before that.
+/// Ends the window at the end of the current cloud. If a cloud is missing, its window ends where the current cloud
+/// begins.
 void SweepBuilder::end_with(const LidarPacket::Cloud& cloud) {
   constexpr double kAlmost = 0.9;
   if (to_seconds(cloud.begin - window_->start) > kAlmost * to_seconds(period())) {
     window_->end = std::min(window_->end, cloud.begin);
     close();
   }
-  // Clouds that are too short for a sweep each make one together.
+  // Clouds that are too short for one sweep each are merged.
   if (cloud.end > window_->start)
     window_->end =
         cloud.end - window_->start < kMinPeriod ? std::max(window_->end, cloud.end + Duration{1}) : cloud.end;
@@ -169,7 +170,7 @@ Pose SweepBuilder::T_start_base(Stamp stamp) {
     hand_over(stamp);
     T_start_base = follow_sources(stamp);
   }
-  if (!T_start_base) // a packet from before a track begins
+  if (!T_start_base) // the packet is older than a track
     return window_->T_start_placed;
   if (stamp > window_->placed) {
     window_->placed = stamp;
@@ -178,8 +179,8 @@ Pose SweepBuilder::T_start_base(Stamp stamp) {
   return *T_start_base;
 }
 
-/// Where the base was after the sources of the window; nothing where one of them has fallen silent. Whatever none of
-/// them tells, but one did when the window began, goes on as it went.
+/// Returns the base pose according to the sources of the window; nothing if one of them has gone silent. Motion that a
+/// source measured when the window began, and none measures now, continues with the last twist.
 std::optional<Pose> SweepBuilder::follow_sources(Stamp stamp) const {
   const SourceChoice& choice = window_->choice;
   std::optional<Pose> T_anchor_base = sources_.motion(choice, window_->anchor, stamp);
@@ -195,14 +196,14 @@ std::optional<Pose> SweepBuilder::follow_sources(Stamp stamp) const {
   return window_->T_start_anchor * *T_anchor_base;
 }
 
-/// A source has fallen silent in mid-sweep: the next best one takes over where it was last heard.
+/// Switches to the next best sources when one has gone silent in mid-sweep, from the last known pose on.
 void SweepBuilder::hand_over(Stamp now) {
   window_->anchor = window_->placed;
   window_->T_start_anchor = window_->T_start_placed;
   window_->choice = sources_.choose(now);
 }
 
-/// Leaves out the returns that hit the robot itself.
+/// Deselects the returns that hit the robot itself.
 void SweepBuilder::leave_out_body(const Pose& T_base_lidar, const FiringGroup& group,
                                   RingSegments::Mask& counts) const {
   const BodyBoxOptions& box = options_.body_box;
@@ -216,7 +217,7 @@ void SweepBuilder::leave_out_body(const Pose& T_base_lidar, const FiringGroup& g
   }
 }
 
-/// Within the packet the motion is taken as linear: a transform and its rate.
+/// Returns the motion within a packet, approximated as linear: a transform and its rate.
 PacketMotion SweepBuilder::motion_of(const LidarPacket& packet) {
   const Pose& T_base_lidar = T_base_lidar_[packet.lidar];
   const Pose T_start_begin = T_start_base(packet.stamp);
@@ -230,22 +231,22 @@ PacketMotion SweepBuilder::motion_of(const LidarPacket& packet) {
           static_cast<float>(to_seconds(packet.stamp - window_->start))};
 }
 
-/// Remembers the way of the base in even steps.
+/// Records the path of the base in even steps.
 void SweepBuilder::note_place(Stamp stamp, const Pose& T_start_base) {
   CorrectedPath& path = sweep_.path;
-  constexpr std::size_t kSteps = CorrectedPath::kMaxPlaces - 1; // and the end
+  constexpr std::size_t kSteps = CorrectedPath::kMaxPlaces - 1; // the last place is for the end
   const bool soon = path.count > 0 &&
                     stamp < path.places[path.count - 1].stamp + (window_->end - window_->start) / Duration::rep{kSteps};
   if (options_.motion_correction && !soon && path.count < kSteps)
     path.places[path.count++] = {stamp, T_start_base};
 }
 
-/// Takes in the returns fired in [from, to).
+/// Adds the returns fired in [from, to).
 void SweepBuilder::append(const LidarPacket& packet, Stamp from, Stamp to) {
   const PacketMotion motion = motion_of(packet);
   segments_.begin_packet(packet.lidar, motion);
   constexpr std::int32_t kAhead = std::numeric_limits<std::int32_t>::min();
-  // The first part takes what was fired ahead of the stamp, too.
+  // The first part includes returns fired ahead of the stamp.
   const std::int32_t first_ns =
       from == packet.stamp ? kAhead : static_cast<std::int32_t>((from - packet.stamp).count());
   const auto last_ns = static_cast<std::int32_t>((to - packet.stamp).count());
@@ -266,7 +267,7 @@ void SweepBuilder::append(const LidarPacket& packet, Stamp from, Stamp to) {
 
 bool SweepBuilder::keeps_singly() const { return !options_.segment_filter.enabled || options_.keeps_returns; }
 
-/// Keeps the returns themselves; their segments only give them normals.
+/// Stores the individual returns; their segments only provide normals.
 void SweepBuilder::keep_singly(std::size_t lidar, const FiringGroup& group, const RingSegments::Mask& counts,
                                const PacketMotion& motion) {
   for (std::size_t k = 0; k < FiringGroup::kLasers; ++k) {
@@ -285,7 +286,7 @@ void SweepBuilder::keep_singly(std::size_t lidar, const FiringGroup& group, cons
   }
 }
 
-/// The filters over the sweep, and the normals, which are found on the segments whatever becomes of these.
+/// Applies the filters to the sweep. Normals are estimated on the segments, before any other filter.
 void SweepBuilder::reduce(float duration_s) {
   segments_.finish(duration_s, sweep_.points);
   {
@@ -303,7 +304,7 @@ void SweepBuilder::reduce(float duration_s) {
     choose_registered();
 }
 
-/// The returns that were kept singly, with the normals of their segments.
+/// Copies the individually stored returns to the sweep, with the normals of their segments.
 void SweepBuilder::take_singly(float duration_s) {
   for (RawPoint& raw : raw_) {
     if (const std::uint32_t place = segments_.place_of(raw.segment); place != RingSegments::kNone)
@@ -319,7 +320,7 @@ void SweepBuilder::take_singly(float duration_s) {
     sweep_.returns = sweep_.points;
 }
 
-/// Moves as many points to the front as are wanted, evenly chosen along the scan lines.
+/// Moves the requested number of points to the front, evenly selected along the scan lines.
 void SweepBuilder::choose_registered() {
   const std::size_t wanted = options_.segment_filter.points;
   const std::size_t total = sweep_.points.size();

@@ -17,56 +17,56 @@
 
 namespace locus {
 
-/// Measures the time of one revolution from stamps and azimuths of the packets, at any speed of rotation. One owner.
+/// Measures the revolution time from stamps and azimuths of the packets, at any speed of rotation. One owner.
 class RevolutionTimer {
  public:
   void observe(const LidarPacket& packet);
   [[nodiscard]] Duration period() const;
 
  private:
-  std::optional<std::uint8_t> lidar_; ///< the first one heard of lowest index
+  std::optional<std::uint8_t> lidar_; ///< received lidar of lowest index
   Stamp last_stamp_;
   std::uint16_t last_azimuth_cdeg_ = 0;
   double azimuth_sum_cdeg_ = 0.0;
   double time_sum_s_ = 0.0;
 };
 
-/// Turns packets into sweeps: motion correction, merger and filters (paper II-A), done while the sweep is still coming
-/// in.
+/// Turns packets into sweeps: motion correction, merging and filters (paper II-A), done while the sweep is still
+/// arriving.
 ///
-/// A sweep is a window of time over all lidars, so they need no phase lock and a dead one is simply not there. Where
-/// the only lidar gives whole clouds and no period is set, a window ends with each cloud, for nothing more comes until
-/// the next. Each packet is moved to where the base was at the start of the window, with one linear map per packet; at
-/// the cut the whole is moved to its end. What no motion source could correct keeps its time of firing, for Odometry to
-/// correct. Memory is fixed after the first sweeps. One owner.
+/// A sweep is a time window over all lidars, so they need no phase lock and a failed one is simply missing. If the only
+/// lidar sends whole clouds and no period is configured, a window ends with each cloud, since nothing more arrives
+/// before the next. Each packet is transformed to the base at the start of the window, with one linear map per packet;
+/// at the cut all points are transformed to its end. Motion that no source measured is left to Odometry to correct, by
+/// the age of the points. Memory is fixed after the first sweeps. One owner.
 class SweepBuilder {
  public:
-  /// Takes a finished sweep; may swap its points for another vector of the same use.
+  /// Receives a finished sweep; may swap its point vectors for others, to reuse memory.
   using Sink = std::function<void(Sweep&)>;
 
   struct Counters {
-    std::uint64_t late_packets = 0;      ///< older than the window by more than kMaxLateness: left out
-    std::uint64_t restarts = 0;          ///< time had jumped; the windows began anew
-    std::uint64_t overflowed_points = 0; ///< more than fit into memory: left out
+    std::uint64_t late_packets = 0;      ///< dropped: older than the window by more than kMaxLateness
+    std::uint64_t restarts = 0;          ///< time jumped and the windows were restarted
+    std::uint64_t overflowed_points = 0; ///< dropped for lack of memory
   };
 
-  static constexpr Duration kGrace = std::chrono::milliseconds{2}; ///< after the nominal end, when no packet comes
+  static constexpr Duration kGrace = std::chrono::milliseconds{2}; ///< after the nominal end, if no packet arrives
   static constexpr Duration kMaxLateness = std::chrono::milliseconds{50};
 
-  /// `T_base_lidar` by lidar index; `max_returns` in one sweep of all lidars.
+  /// `T_base_lidar` is indexed by lidar; `max_returns` is the most in one sweep of all lidars.
   SweepBuilder(const SweepOptions& options, std::vector<Pose> T_base_lidar, MotionSources sources,
                std::size_t max_returns, Sink sink, StageClock* clock = nullptr);
 
   [[nodiscard]] MotionSources& sources() { return sources_; }
   [[nodiscard]] const MotionSources& sources() const { return sources_; }
 
-  /// `arrival` is when the packet reached this computer.
+  /// Adds a packet; `arrival` is when it reached this computer.
   void add(const LidarPacket& packet, Stamp arrival);
 
-  /// Tells the time, in stamps of arrival: closes windows that have ended without a packet to close them.
+  /// Sets the time, in stamps of arrival: closes windows that have ended without a packet to close them.
   void advance(Stamp now);
 
-  /// The input has ended: the last partial window counts if it is longer than half a period.
+  /// Ends the input: the last partial window is passed on if it is longer than half a period.
   void finish();
 
   [[nodiscard]] const Counters& counters() const { return counters_; }
@@ -76,11 +76,11 @@ class SweepBuilder {
     Window(Stamp start_, Stamp end_) : start(start_), end(end_), last_firing(start_), anchor(start_), placed(start_) {}
     Stamp start, end;
     Uncorrected uncorrected = Uncorrected::all; ///< decided at the start
-    SourceChoice choice;                        ///< of those that go on being healthy
+    SourceChoice choice;                        ///< of sources that are still healthy
     Stamp last_firing;
-    Stamp anchor; ///< since when the sources of the choice have been followed
+    Stamp anchor; ///< start of the motion measured by the sources of the choice
     Pose T_start_anchor;
-    Stamp placed; ///< the latest instant whose pose is known
+    Stamp placed; ///< latest instant with a known pose
     Pose T_start_placed;
   };
   struct RawPoint {
@@ -109,7 +109,7 @@ class SweepBuilder {
 
   SweepOptions options_;
   std::vector<Pose> T_base_lidar_;
-  bool may_follow_clouds_; ///< one lidar, and no period is set
+  bool may_follow_clouds_; ///< one lidar, and no period configured
   MotionSources sources_;
   Sink sink_;
   StageClock* clock_;
@@ -120,13 +120,13 @@ class SweepBuilder {
   VoxelFilter voxel_filter_;
   RandomFilter random_filter_;
   std::optional<Window> window_;
-  Vector6 last_twist_base_ = Vector6::Zero(); ///< over the last window, after its sources
-  std::vector<RawPoint> raw_;                 ///< only where returns are kept singly
+  Vector6 last_twist_base_ = Vector6::Zero(); ///< over the last window, from its sources
+  std::vector<RawPoint> raw_;                 ///< used only if individual returns are stored
   Sweep sweep_;
   std::vector<SweepPoint> unregistered_;
-  Duration lag_{}; ///< of arrival behind firing, as last seen
+  Duration lag_{}; ///< latest delay of arrival after firing
   std::uint64_t consecutive_late_ = 0;
-  Stamp late_since_; ///< arrival of the first of them
+  Stamp late_since_; ///< arrival of the first of these
   Counters counters_;
 };
 

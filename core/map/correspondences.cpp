@@ -8,26 +8,26 @@ namespace locus {
 
 namespace {
 
-/// A surface of the target says nothing along itself: a variance there that is large against every residual (Segal's 1
-/// to epsilon).
+/// Variance of a target surface along itself: large against every residual, so it constrains nothing in that direction
+/// (Segal's 1 to epsilon).
 constexpr float kAlongVariance_m2 = 100.0F;
 
-/// A point of the source reaches no farther along its surface than the arc it stands for. Were it as wide as the
-/// target, a normal wrong by one degree would cost the point its weight, and the few luckiest normals would decide.
+/// Variance of a source point along its surface: that of the arc which it represents. If it were that of the target, a
+/// normal wrong by one degree would cost the point its weight, and the few luckiest normals would decide.
 constexpr float kAlongSourceVariance_m2 = 0.1F * 0.1F;
 
-/// Points farther than this from the origin have no correspondence: no lidar sees so far, and single precision counts
-/// there in tenths of a millimetre.
+/// Largest distance from the origin of a point with a correspondence: beyond the range of any lidar, and the resolution
+/// of single precision there is a tenth of a millimetre.
 constexpr float kMaxDistance_m = 1000.0F;
 
-/// Stands in for a point that is not a number: it would spoil the sums even with no weight.
+/// Substitute for a non-finite point, which would spoil the sums even with zero weight.
 const SurfacePoint kOutOfReach{Eigen::Vector3f::Constant(1e6F * kMaxDistance_m), Eigen::Vector3f::Zero()};
 
 bool serves(const Surface* surface, bool takes_shapeless) {
   return surface != nullptr && (surface->planar() || (takes_shapeless && surface->shapeless()));
 }
 
-/// Where the voxels of a grid lie, in single precision, from the origin of the pass.
+/// Centres of the voxels of a grid relative to the origin of the pass, in single precision.
 class Centres {
  public:
   Centres(const SurfaceGrid& grid, const Eigen::Vector3d& origin_m)
@@ -66,7 +66,7 @@ void put_none(std::size_t i, MatchBlock& matches) {
   matches.found[i] = 0.0F;
 }
 
-/// Where the points of a block lie in the target, from the origin.
+/// Points of a block in the target, relative to the origin.
 struct Placed {
   PerPoint x_m, y_m, z_m;
   [[nodiscard]] Eigen::Vector3f operator[](std::size_t i) const { return {x_m[i], y_m[i], z_m[i]}; }
@@ -85,7 +85,7 @@ struct Placed {
 
 using Places = std::array<std::uint32_t, kGicpBlock>;
 
-/// SurfaceGrid::index_of for all points of a block, in single precision; points out of reach go anywhere.
+/// Computes SurfaceGrid::index_of for all points of a block, in single precision; arbitrary for points out of reach.
 [[gnu::always_inline]] inline void index_all(const SurfaceGrid& grid, const Eigen::Vector3d& origin_m,
                                              const Placed& points, Cells& cells) {
   constexpr float kMost = 2.0F * kMaxDistance_m / static_cast<float>(SurfaceMap::kFineLeaf_m);
@@ -107,7 +107,8 @@ using Places = std::array<std::uint32_t, kGicpBlock>;
 
 bool is_near(const Eigen::Vector3f& point) { return (point.array().abs() < kMaxDistance_m).all(); }
 
-/// Lists the points that are to be looked up and gives back how many they are. To the others belongs what is there.
+/// Lists the points to be looked up and returns their number. The others retain their match, or have none if out of
+/// reach.
 std::size_t list_open(const GicpPass& pass, const Placed& points, std::size_t count, const Cells& fine,
                       MatchBlock& matches, Places& open) {
   std::size_t listed = 0;
@@ -122,8 +123,8 @@ std::size_t list_open(const GicpPass& pass, const Placed& points, std::size_t co
   return listed;
 }
 
-/// Gives the listed points the surfaces of the voxels around them, as far as those serve. Lists those that are left,
-/// and gives back how many they are.
+/// Assigns the surfaces of their voxels to the listed points, if usable. Lists the remaining points and returns their
+/// number.
 template <class VoxelOf>
 std::size_t find_in(const GicpPass& pass, const SurfaceGrid& grid, const VoxelOf& voxel_of, const Placed& points,
                     std::size_t count, Places& open, MatchBlock& matches) {
@@ -149,11 +150,11 @@ std::size_t find_in(const GicpPass& pass, const SurfaceGrid& grid, const VoxelOf
   return left;
 }
 
-/// The plane of the voxel around each point, in the fine grid if it has one, else in the coarse one.
+/// Finds the plane of the voxel around each point, in the fine grid or else in the coarse one.
 void find_here(const GicpPass& pass, const Placed& points, std::size_t count, MatchBlock& matches, Isa isa) {
   Cells fine;
   run_as(isa, [&] { index_all(pass.target.fine(), pass.origin_m, points, fine); });
-  Places open; // of points still without a correspondence
+  Places open; // points still without a correspondence
   count = list_open(pass, points, count, fine, matches, open);
   matches.fine = fine;
   const auto in_fine = [&](std::uint32_t i) { return fine[i]; };
@@ -164,7 +165,7 @@ void find_here(const GicpPass& pass, const Placed& points, std::size_t count, Ma
     put_none(i, matches);
 }
 
-/// Puts the one of the 27 voxels around the point whose mean is nearest, at most a voxel away, if there is one.
+/// Assigns the surface with the nearest mean in the 27 voxels around the point, at most a voxel away; false if none.
 bool find_around(const GicpPass& pass, const SurfaceGrid& grid, const Eigen::Vector3f& point, std::size_t i,
                  MatchBlock& matches) {
   const Centres centres(grid, pass.origin_m);
@@ -190,8 +191,8 @@ bool find_around(const GicpPass& pass, const SurfaceGrid& grid, const Eigen::Vec
   return nearest != nullptr;
 }
 
-/// Near each point: in the coarse grid if there is one within reach, else in the fine one. From afar the nearest of the
-/// small voxels is rarely the right one.
+/// Finds the nearest surface around each point: in the coarse grid if it has one within reach, or else in the fine one.
+/// From afar the nearest of the small voxels is rarely the right one.
 void find_around(const GicpPass& pass, const Placed& points, std::size_t count, MatchBlock& matches) {
   for (std::size_t i = 0; i < count; ++i) {
     const bool found = is_near(points[i]) && (find_around(pass, pass.target.coarse(), points[i], i, matches) ||

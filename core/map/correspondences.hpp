@@ -13,43 +13,43 @@
 
 namespace locus {
 
-/// One figure of each point of a block: one array per figure makes loops over points vector instructions.
+/// One quantity of each point of a block: one array per quantity allows loops over points to be vectorised.
 using PerPoint = std::array<float, kGicpBlock>;
 
-/// Points of a sweep, from the origin of their own frame. Places beyond the last point of the sweep hold zeros.
+/// Points of a sweep, relative to the origin of their own frame. Entries beyond the last point are zero.
 struct SourceBlock {
   PerPoint x_m{}, y_m{}, z_m{};
-  PerPoint normal_x{}, normal_y{}, normal_z{}; ///< zero where there is none to be trusted
-  PerPoint along_m2{}; ///< variance along the surface; that of the point itself without a normal
+  PerPoint normal_x{}, normal_y{}, normal_z{}; ///< zero if unreliable
+  PerPoint along_m2{}; ///< variance along the surface; without a normal, that of the point itself
   std::size_t count = 0;
 
   explicit SourceBlock(std::span<const SurfacePoint> points);
 };
 
-/// Voxels that the points of a block fall into.
+/// Voxels that contain the points of a block.
 struct Cells {
   std::array<std::int32_t, kGicpBlock> x, y, z;
   [[nodiscard]] VoxelIndex operator[](std::size_t i) const { return {x[i], y[i], z[i]}; }
 };
 
-/// Their correspondences: planes of the target, or Gaussians of shapeless voxels.
+/// Correspondences of a block: planes of the target, or Gaussians of voxels without a plane (shapeless).
 struct MatchBlock {
-  PerPoint x_m, y_m, z_m;                ///< mean, from GicpPass::origin_m
+  PerPoint x_m, y_m, z_m;                ///< mean, relative to GicpPass::origin_m
   PerPoint normal_x, normal_y, normal_z; ///< zero for a shapeless one
   PerPoint across_m2, along_m2;          ///< variances; equal for a shapeless one
   PerPoint found;                        ///< 1, or 0 where there is no correspondence
-  Cells fine;                            ///< where they were looked up
+  Cells fine;                            ///< voxels in which they were looked up
 };
 
-/// How correspondences come about in a pass.
+/// Strategy for finding correspondences in a pass.
 enum class LookUp {
-  keep,   ///< those of the pass before
-  follow, ///< those of the pass before where the point is still in its voxel, else as `here`
-  here,   ///< the plane of the voxel around the point, fine or else coarse
-  around, ///< the nearest plane of the 27 voxels around it, coarse or else fine
+  keep,   ///< those of the previous pass
+  follow, ///< those of the previous pass if the point is still in its voxel, else as `here`
+  here,   ///< plane of the voxel around the point, fine or else coarse
+  around, ///< nearest plane of the 27 voxels around it, coarse or else fine
 };
 
-/// Three directions at right angles.
+/// Three orthogonal directions.
 using Axes = std::array<std::array<float, 3>, 3>;
 
 /// Transform in single precision.
@@ -58,25 +58,25 @@ struct Affine {
   Eigen::Vector3f t;
 };
 
-/// One pass over some of the points: finds their correspondences and sums the normal equations at T_target_source.
+/// Pass over some of the points: finds their correspondences and sums the normal equations at T_target_source.
 struct GicpPass {
   const SurfaceMap& target;
   Pose T_target_source;
-  Eigen::Vector3d origin_m; ///< in the target, near the source: single precision counts from here
+  Eigen::Vector3d origin_m; ///< in the target, near the source: origin of the single-precision coordinates
   LookUp look_up;
-  bool takes_shapeless;        ///< voxels without a plane serve, too
-  double max_correspondence_m; ///< across the plane
-  double width2;               ///< of Geman-McClure, squared standard deviations
-  Axes axes{};                 ///< of the surfaces around, from the least to the most seen
+  bool takes_shapeless;        ///< voxels without a plane are used, too
+  double max_correspondence_m; ///< gate, across the plane
+  double width2;               ///< of the Geman-McClure kernel, in squared standard deviations
+  Axes axes{};                 ///< of the surrounding surfaces, from the least to the best observed
 
-  /// From the source to the target about origin_m.
+  /// Returns the transform from the source to the target, relative to origin_m.
   [[nodiscard]] Affine T_origin_source() const {
     return {T_target_source.R().cast<float>(), (T_target_source.translation - origin_m).cast<float>()};
   }
 };
 
-/// Finds the correspondences of the points as the pass says, which is not to keep them. Pure but for `matches`; any
-/// thread.
+/// Finds the correspondences of the points by the strategy of the pass, which must not be LookUp::keep. Writes to
+/// `matches` only; any thread.
 void find(const GicpPass& pass, const SourceBlock& source, MatchBlock& matches, Isa isa);
 
 } // namespace locus

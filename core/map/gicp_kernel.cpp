@@ -8,7 +8,7 @@ namespace locus {
 
 namespace {
 
-/// What a point adds to the normal equations, in the order in which they are summed up.
+/// Terms that a point adds to the normal equations, in the order of summation.
 enum Term : std::size_t {
   kHtt = 0,        ///< translation with translation: xx xy xz yy yz zz
   kHtr = kHtt + 6, ///< translation with rotation, row by row
@@ -16,7 +16,7 @@ enum Term : std::size_t {
   kBt = kHrr + 6,
   kBr = kBt + 3,
   kSeen = kBr + 3,    ///< along the axes of the pass and about those of the target
-  kSides = kSeen + 6, ///< the same
+  kSides = kSeen + 6, ///< likewise
   kError = kSides + 6,
   kWeight,
   kInliers,
@@ -24,18 +24,18 @@ enum Term : std::size_t {
   kTerms
 };
 
-/// So many points at a time: their terms stay in the fastest cache.
+/// Points per chunk: their terms stay in the fastest cache.
 constexpr std::size_t kChunk = 64;
 constexpr std::size_t kLanes = 16;
 using Terms = std::array<std::array<float, kChunk>, kTerms>;
 using Lanes = std::array<float, kLanes>;
 using Sums = std::array<Lanes, kTerms>;
 
-/// The terms of all points from `begin`. The residual of a plane is r = n' (R p + t - mean), its gradient to the pose
-/// g = (n, R p x n). Normals are noisy, and a sum of g g' would take their noise for surfaces that stand in every way:
-/// along a corridor the robot would be tied to where the scan lines fell. The normal m that the point knows of its own
-/// errs independently of n, so a sum of m n' has no such part: the method of instrumental variables (Reiersol 1941). A
-/// shapeless correspondence is a ball.
+/// Computes the terms of a chunk of points from `begin`. The residual of a plane is r = n' (R p + t - mean), its
+/// gradient with respect to the pose g = (n, R p x n). Normals are noisy, and a sum of g g' mistakes their noise for
+/// surfaces of every orientation: along a corridor it would tie the robot to where the scan lines fell. The errors of
+/// the source point's own normal m are independent of n, so a sum of m n' (kSeen) has no such part: the method of
+/// instrumental variables (Reiersol 1941). A shapeless correspondence is a ball.
 [[gnu::always_inline]] inline void take_terms(const Affine& T, const SourceBlock& source, const MatchBlock& match,
                                               const Axes& axes, float width2, std::size_t begin, Terms& terms) {
   const auto [R, t] = T;
@@ -139,7 +139,7 @@ using Sums = std::array<Lanes, kTerms>;
   }
 }
 
-/// Halves added to halves: vector instructions, where additions one after the other would wait for each other.
+/// Adds halves to halves: vectorised, whereas successive additions would wait for each other.
 double total(Lanes lanes) {
   for (std::size_t half = kLanes / 2; half > 0; half /= 2)
     for (std::size_t lane = 0; lane < half; ++lane)
@@ -179,8 +179,8 @@ NormalEquations equations_of(const Sums& sums) {
   return result;
 }
 
-/// Terms of an H whose information is that of unit normals; a shapeless correspondence has a third of it along each
-/// axis.
+/// Sums the terms of an H that has the information of unit normals; a shapeless correspondence has a third of it along
+/// each axis.
 [[gnu::always_inline]] inline Sums sum_gradients(const Eigen::Matrix3f& R, const SourceBlock& source,
                                                  const MatchBlock& match) {
   const float r00 = R(0, 0), r01 = R(0, 1), r02 = R(0, 2), r10 = R(1, 0), r11 = R(1, 1), r12 = R(1, 2), r20 = R(2, 0),

@@ -13,8 +13,9 @@ namespace locus {
 struct NormalEquations {
   Matrix6 H = Matrix6::Zero();
   Vector6 b = Vector6::Zero();
-  /// Along the axes of the pass and about those of the target: the information without what only noise of the normals
-  /// makes of it, and what an error of a metre that all points have in common, each to the worse side, adds to b.
+  /// Values along the axes of the pass and about those of the target: `seen` is the information without the part that
+  /// noise of the normals alone produces, `sides` what an error of one metre common to all points, each with the worse
+  /// sign, adds to b.
   Vector6 seen = Vector6::Zero(), sides = Vector6::Zero();
   double error = 0.0;
   double weight = 0.0;
@@ -33,10 +34,10 @@ struct NormalEquations {
   }
 };
 
-/// Sums up the normal equations. Pure; any thread. The result depends on the instruction set in its last digits.
+/// Sums the normal equations. Pure; any thread. The last digits depend on the instruction set.
 NormalEquations linearise(const GicpPass& pass, const SourceBlock& source, const MatchBlock& matches, Isa isa);
 
-/// How many of the points of a block have a correspondence, and which way it faces; a shapeless one counts as a third
+/// Number of points of a block with a correspondence, and the scatter of its normals; a shapeless one counts as a third
 /// of a plane along each axis.
 struct Normals {
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero(); ///< sum of n n'
@@ -49,8 +50,9 @@ struct Normals {
 };
 Normals normals_of(const MatchBlock& matches, Isa isa);
 
-/// Sum over the points of a block of (n, R p x n) with itself: how distances to the correspondences change with the
-/// pose. Of unit normals, so it tells where surfaces stand and not how well they are known. Counts as normals_of().
+/// Sums (n, R p x n) (n, R p x n)' over the points of a block: gradients of the distances to the correspondences with
+/// respect to the pose. Normals have unit length, so the sum measures where surfaces are, not how well they are known.
+/// Shapeless correspondences count as in normals_of().
 Matrix6 gradients_of(const Eigen::Matrix3d& R_target_source, const SourceBlock& source, const MatchBlock& matches,
                      Isa isa);
 

@@ -12,43 +12,43 @@ namespace locus {
 
 namespace {
 
-/// A point stands for a disc, or for a ball where its normal is not known; the radius as a share of the voxel.
+/// Radius of the disc that a point represents, or of the ball if its normal is unknown, as a share of the voxel.
 constexpr float kDiscRadiusInLeaves = 0.5F;
 
-/// Points on a plane spread in two directions, by an absolute and by a relative measure (one scan line spreads in one
-/// only), and little across them. With discs around them they always spread, so there the test across may be milder.
+/// Criteria for a plane: its points spread in two directions, by an absolute and by a relative measure (one scan line
+/// spreads in one only), and little across it. Discs around the points always spread, so their limit across is milder.
 constexpr float kMinSpreadInLeaves = 0.15F;
 constexpr float kMinMiddleToGreatest = 0.05F;
 constexpr float kMaxAcrossToMiddle = 0.05F;
 constexpr float kMaxAcrossToMiddleOfDiscs = 0.15F;
 constexpr float kMaxRoughness_m = 0.15F;
 
-/// Enough to be judged by where they lie alone.
+/// Least number of points that are judged by their positions alone.
 constexpr float kEnoughPoints = 4.0F;
 
 /// Least share of the points' own normals that must agree with the plane: where wall and floor meet, a few points of
-/// the one tilt the plane through the many of the other, and the tilt drags the map along with the scan lines.
+/// one tilt the plane through the many of the other, and the tilt drags the map along with the scan lines.
 constexpr float kMinAgreement = 0.8F;
 
-/// Older points fade once a voxel has seen this many, so a long stay does not freeze it.
+/// Number of points in a voxel above which older ones fade, so that a long stay does not freeze it.
 constexpr float kMaxCount = 400.0F;
 
 constexpr std::size_t kEvictionAttempts = 64;
 
-/// Voxels that are looked for at a time: their waits for memory overlap.
+/// Voxels looked up at a time: their memory latencies overlap.
 constexpr std::size_t kAtOnce = 64;
 
 using PerVoxel = std::array<float, kAtOnce>;
 using Symmetric = Symmetric3<float>;
 
-/// What is known of the points of some voxels, and the surfaces that follow from it.
+/// Sums over the points of some voxels, and the resulting surfaces.
 struct Fits {
   PerVoxel count, x, y, z, xx, xy, xz, yy, yz, zz; ///< sums over the points
   PerVoxel nxx, nxy, nxz, nyy, nyz, nzz;
   PerVoxel mean_x, mean_y, mean_z, normal_x, normal_y, normal_z, variance_m2, strewn_m2;
 };
 
-/// -1 for a plane, else 0; masks instead of conditions, which would be branches.
+/// Returns -1 for a plane, else 0; masks, since conditions would be branches.
 [[gnu::always_inline]] inline std::int32_t is_plane(const PrincipalAxes<float>& axes, float min_spread_m2,
                                                     float max_across_to_middle, float agreement, float normals) {
   return -(axes.middle > min_spread_m2) & -(axes.middle > kMinMiddleToGreatest * axes.greatest) &
@@ -56,7 +56,7 @@ struct Fits {
          -(agreement >= kMinAgreement * normals);
 }
 
-/// v' m v
+/// Returns v' m v.
 [[gnu::always_inline]] inline float quadratic(const Symmetric& m, float x, float y, float z) {
   return m.xx * x * x + m.yy * y * y + m.zz * z * z + 2.0F * (m.xy * x * y + m.xz * x * z + m.yz * y * z);
 }
@@ -64,14 +64,14 @@ struct Fits {
 [[gnu::always_inline]] inline void fit_all(Fits& voxels, float leaf_m) {
   const float min_spread_m2 = kMinSpreadInLeaves * kMinSpreadInLeaves * leaf_m * leaf_m;
   const float along_m2 = kDiscRadiusInLeaves * kDiscRadiusInLeaves * leaf_m * leaf_m;
-  Fits f = voxels; // what is written is not what is read: vector instructions
+  Fits f = voxels; // output apart from input: vectorised
   for (std::size_t i = 0; i < kAtOnce; ++i) {
     const float share = 1.0F / voxels.count[i];
     const float x = share * voxels.x[i], y = share * voxels.y[i], z = share * voxels.z[i];
     const Symmetric scatter{share * voxels.xx[i] - x * x, share * voxels.xy[i] - x * y, share * voxels.xz[i] - x * z,
                             share * voxels.yy[i] - y * y, share * voxels.yz[i] - y * z, share * voxels.zz[i] - z * z};
     const Symmetric normals{voxels.nxx[i], voxels.nxy[i], voxels.nxz[i], voxels.nyy[i], voxels.nyz[i], voxels.nzz[i]};
-    const float known = normals.xx + normals.yy + normals.zz; // as many as there are: they are of unit length
+    const float known = normals.xx + normals.yy + normals.zz; // their number: they have unit length
     const float disc = share * (kPointVariance_m2 - along_m2);
     const PrincipalAxes<float> points = principal_axes<float>(scatter);
     const PrincipalAxes<float> discs =
@@ -98,7 +98,7 @@ struct Fits {
   voxels = f;
 }
 
-/// std::floor is a call where the baseline has no instruction for it.
+/// Replaces std::floor, which is a function call where the baseline has no instruction for it.
 std::int32_t floor_of(double v) {
   const auto truncated = static_cast<std::int32_t>(v);
   return truncated - (v < truncated ? 1 : 0);
@@ -191,7 +191,7 @@ std::uint32_t SurfaceGrid::take_slot() {
   if (used_ < capacity())
     return static_cast<std::uint32_t>(used_++);
   if (2 * touched_.size() > capacity())
-    refresh(); // touched voxels cannot be evicted, and there must be some that can
+    refresh(); // touched voxels cannot be evicted, so some must become untouched
   const double radius2 = protected_radius_m_ * protected_radius_m_;
   const auto is_near = [&] { return (centre(hand_) - protected_centre_m_).squaredNorm() < radius2; };
   for (std::size_t attempt = 0; attempt < kEvictionAttempts && is_near(); ++attempt)
@@ -205,7 +205,8 @@ std::uint32_t SurfaceGrid::take_slot() {
   return static_cast<std::uint32_t>(slot);
 }
 
-/// Linear probing without tombstones: entries behind the gap move up as long as that brings them nearer to their home.
+/// Erases an entry. Linear probing without tombstones: entries behind the gap move up if that brings them closer to
+/// home.
 void SurfaceGrid::erase_entry(VoxelIndex index) {
   const std::size_t mask = entries_.size() - 1;
   std::size_t gap = home_of(index);
@@ -221,14 +222,14 @@ void SurfaceGrid::erase_entry(VoxelIndex index) {
   entries_[gap] = Entry{};
 }
 
-/// Where points fall: voxels, and offsets from their centres.
+/// Voxels of points, and offsets from the voxel centres.
 struct SurfaceGrid::Places {
   std::array<std::int32_t, Points::kMost> cell_x, cell_y, cell_z;
   std::array<float, Points::kMost> x_m, y_m, z_m;
   std::array<std::uint64_t, Points::kMost> hash;
 };
 
-/// What is out of reach goes anywhere.
+/// Finds the voxels of points; arbitrary for points out of reach.
 void SurfaceGrid::place(const Points& points, Places& places) const {
   const auto along = [leaf_m = leaf_m_](const auto& points_m, auto& cell, auto& offset_m) {
     const double per_m = 1.0 / leaf_m;
@@ -289,7 +290,7 @@ void SurfaceGrid::add(const Points& points, const Places& places, std::size_t i,
     moments.sums[sum] += of_point[sum];
 }
 
-/// At most kAtOnce of them.
+/// Fits the surfaces of at most kAtOnce voxels.
 void SurfaceGrid::fit(std::span<const std::uint32_t> slots) {
   Fits fits{};
   fits.count.fill(1.0F);
@@ -328,8 +329,8 @@ void SurfaceGrid::refresh() {
   touched_.clear();
 }
 
-/// Every entry lies behind its voxel's home with no gap between, so emptying from each home to the next gap empties
-/// all.
+/// Empties the table from each voxel's home to the next gap, which reaches all entries: each lies behind the home of
+/// its voxel with no gap between.
 void SurfaceGrid::clear() {
   const std::size_t mask = entries_.size() - 1;
   for (std::size_t slot = 0; slot < used_; ++slot) {

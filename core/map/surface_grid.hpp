@@ -14,22 +14,22 @@
 
 namespace locus {
 
-/// Variance of one point across its surface: ranging noise of the lidars this is for (2 to 3 cm), averaged over the ten
-/// and more returns of an arc. On walls 6 mm are seen, of real lidars and of synthetic ones.
+/// Variance of one point across its surface: ranging noise of the supported lidars (2 to 3 cm), averaged over the ten
+/// and more returns of an arc. On walls 6 mm are measured, with real and with synthetic lidars.
 inline constexpr float kPointVariance_m2 = 0.01F * 0.01F;
 
-/// Index of a voxel: 21 bits an axis, so 1000 km at half a metre.
+/// Index of a voxel: 21 bits per axis, so 1000 km at half a metre.
 struct VoxelIndex {
   std::int32_t x, y, z;
   friend bool operator==(const VoxelIndex&, const VoxelIndex&) = default;
 };
 
-/// What registration reads of a voxel: the plane through its points, or how widely they are strewn.
+/// Part of a voxel that registration reads: the plane through its points, or their scatter.
 struct Surface {
-  Eigen::Vector3f mean_m = Eigen::Vector3f::Zero(); ///< from the centre of the voxel
+  Eigen::Vector3f mean_m = Eigen::Vector3f::Zero(); ///< relative to the centre of the voxel
   Eigen::Vector3f normal = Eigen::Vector3f::Zero(); ///< unit
-  float variance_m2 = -1.0F;                        ///< along the normal; negative: the points lie on no plane
-  float strewn_m2 = -1.0F; ///< mean variance of the points about their mean; negative: too few to tell
+  float variance_m2 = -1.0F;                        ///< along the normal; negative: no plane
+  float strewn_m2 = -1.0F; ///< mean variance of the points about their mean; negative: too few points
   [[nodiscard]] bool planar() const { return variance_m2 > 0.0F; }
   [[nodiscard]] bool shapeless() const { return !planar() && strewn_m2 > 0.0F; }
 };
@@ -37,15 +37,15 @@ struct Surface {
 /// Running Gaussians of points in cubic voxels, found by hashing.
 ///
 /// Only planes are read from it. Along a plane the points of a sweep lie where the scan lines happen to fall, a pattern
-/// that moves with the lidar: whatever else were read from a voxel would follow the robot. A voxel with enough points
-/// is judged by how they lie. One with fewer takes into account what each point knows of its surface: the moment match
-/// of discs, so a single point that knows its normal makes a plane. Voxels live in a pool of fixed size; when it is
-/// full the oldest one far from the robot gives way. Nothing walks the whole map. One writer or many readers.
+/// that moves with the lidar: anything else read from a voxel would follow the robot. A voxel with enough points is
+/// judged by their positions. One with fewer also uses the normals of the points: moment matching of discs, so a single
+/// point with a normal makes a plane. Voxels are stored in a pool of fixed size; when it is full, the oldest one far
+/// from the robot is evicted. Neither insertion nor look-up walks the whole map. One writer or many readers.
 class SurfaceGrid {
  public:
   SurfaceGrid(double leaf_m, std::size_t max_bytes, Isa isa = best_isa());
 
-  /// Points and the unit normals of their surfaces, or zero: as many as are taken in at a time.
+  /// Points with the unit normals of their surfaces, or zero: one batch for insert().
   struct Points {
     static constexpr std::size_t kMost = 64;
     std::array<double, kMost> x_m{}, y_m{}, z_m{};
@@ -54,39 +54,39 @@ class SurfaceGrid {
     [[nodiscard]] Eigen::Vector3d position_m(std::size_t i) const { return {x_m[i], y_m[i], z_m[i]}; }
   };
 
-  /// Takes in points. Call refresh() before the surfaces are read again. Points out of reach are left out. Returns how
-  /// many fell into voxels that were empty at the last refresh().
+  /// Inserts points; those out of reach are dropped. Call refresh() before reading surfaces again. Returns the number
+  /// of points in voxels that were empty at the last refresh().
   std::size_t insert(const Points& points);
-  /// Brings the surfaces of the voxels up to date that were written to since the last call.
+  /// Updates the surfaces of the voxels that were written to since the last call.
   void refresh();
   void clear();
-  /// Voxels nearer than `radius_m` to `centre_m` are spared from eviction while there are others.
+  /// Protects voxels nearer than `radius_m` to `centre_m` from eviction while there are others.
   void protect(const Eigen::Vector3d& centre_m, double radius_m);
 
-  /// Whether a point is finite and within 2^20 voxels of the origin: 500 km at half a metre.
+  /// Returns whether a point is finite and within 2^20 voxels of the origin: 500 km at half a metre.
   [[nodiscard]] bool reaches(const Eigen::Vector3d& point_m) const {
     return (point_m.array().abs() < kMaxIndex * leaf_m_).all();
   }
 
-  /// Precondition: reaches(point). The voxel whose centre, a multiple of the leaf, is nearest: the floor at height zero
-  /// does not lie between two of them.
+  /// Returns the voxel with the nearest centre; centres are multiples of the leaf, so the floor at height zero does not
+  /// lie between two voxels. Precondition: reaches(point).
   [[nodiscard]] VoxelIndex index_of(const Eigen::Vector3d& point_m) const;
   [[nodiscard]] Eigen::Vector3d centre_of(VoxelIndex index) const;
-  /// Nothing where no point has fallen.
+  /// Returns the surface of a voxel, or nullptr if it contains no point.
   [[nodiscard]] const Surface* find(VoxelIndex index) const;
-  /// The same for many at once, of equal number: their waits for memory overlap.
+  /// Finds many at once; both spans have the same size. The memory latencies overlap.
   void find(std::span<const VoxelIndex> indices, std::span<const Surface*> surfaces) const;
 
   [[nodiscard]] double leaf_m() const { return leaf_m_; }
   [[nodiscard]] std::size_t size() const { return used_; }
   [[nodiscard]] std::size_t capacity() const { return voxels_.size(); }
   [[nodiscard]] std::uint64_t evicted() const { return evicted_; }
-  /// Shows `use` each surface with its mean, in no order that means anything.
+  /// Calls `use` with the mean and the surface of each voxel, in arbitrary order.
   template <class Use> void for_each(const Use& use) const {
     for (std::size_t slot = 0; slot < used_; ++slot)
       use(Eigen::Vector3d{centre(slot) + surface(slot).mean_m.cast<double>()}, surface(slot));
   }
-  /// Slots 0..size()-1, in no order that means anything.
+  /// Slots are 0..size()-1, in arbitrary order.
   [[nodiscard]] const Surface& surface(std::size_t slot) const { return voxels_[slot].surface; }
   [[nodiscard]] Eigen::Vector3d centre(std::size_t slot) const { return centre_of(voxels_[slot].index); }
 
@@ -94,7 +94,7 @@ class SurfaceGrid {
   static constexpr double kMaxIndex = 1 << 20;
   static constexpr std::uint32_t kEmpty = 0xFFFFFFFFU;
   struct Entry {
-    std::uint32_t tag = 0; ///< upper half of the hash: most foreign voxels are told apart without a look at the pool
+    std::uint32_t tag = 0; ///< upper half of the hash: tells most other voxels apart without an access to the pool
     std::uint32_t slot = kEmpty;
   };
   struct Voxel {
@@ -118,7 +118,7 @@ class SurfaceGrid {
     kNxz,
     kNyy,
     kNyz,
-    kNzz, ///< of the normals of those points that have one
+    kNzz, ///< of the normals of points that have one
     kSums
   };
   struct Moments { ///< apart from Voxel, which is read far more often
@@ -150,7 +150,7 @@ class SurfaceGrid {
   double protected_radius_m_ = 0.0;
 };
 
-/// The planes of a grid, in place of what `planes` holds: all, or those nearer than `radius_m` to `centre_m`.
+/// Replaces `planes` by the planes of a grid: all, or those nearer than `radius_m` to `centre_m`.
 void read_planes(const SurfaceGrid& grid, std::vector<SurfacePoint>& planes,
                  const Eigen::Vector3d& centre_m = Eigen::Vector3d::Zero(),
                  double radius_m = std::numeric_limits<double>::infinity());

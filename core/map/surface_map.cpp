@@ -8,15 +8,16 @@ namespace locus {
 
 namespace {
 
-/// The coarse grid needs about a ninth of the voxels of the fine one where both see surfaces.
+/// Divisor of the memory for the coarse grid: it needs about a ninth of the voxels of the fine one for the same
+/// surfaces.
 constexpr std::size_t kCoarseShare = 8;
 
-/// Registration looks no farther than the lidars see.
+/// Radius of the submap: registration reaches no farther than the lidars.
 constexpr double kSubmapRadius_m = 100.0;
 
 template <class Real> using Figures = std::array<Real, SurfaceGrid::Points::kMost>;
 
-/// (x, y, z) becomes R (x, y, z) + t.
+/// Transforms (x, y, z) to R (x, y, z) + t.
 template <class Real>
 [[gnu::always_inline]] inline void move(const Eigen::Matrix<Real, 3, 3>& R, const Eigen::Matrix<Real, 3, 1>& t,
                                         Figures<Real>& x, Figures<Real>& y, Figures<Real>& z) {

@@ -13,9 +13,9 @@
 
 namespace locus {
 
-/// The map as surfaces in voxels of two sizes: the fine one for accuracy, the coarse one for reach and for sparse
-/// places. Serves as the global map whose neighbourhood of the robot is the submap (paper II-B.3) and, holding one
-/// sweep, as the target of scan-to-scan. Memory is bounded and fixed at construction. One writer or many readers.
+/// Map of surfaces in voxels of two sizes: fine ones for accuracy, coarse ones for reach and for sparse surroundings.
+/// Serves as the global map, of which the part around the robot is the submap (paper II-B.3), and, with a single sweep,
+/// as the target of scan-to-scan. Memory is bounded and fixed at construction. One writer or many readers.
 class SurfaceMap {
  public:
   static constexpr double kFineLeaf_m = 0.5;
@@ -24,14 +24,14 @@ class SurfaceMap {
 
   explicit SurfaceMap(std::size_t max_bytes, Isa isa = best_isa());
 
-  /// Takes in a sweep seen from T_map_base. Returns the share of its points that fell where nothing was.
+  /// Inserts a sweep at T_map_base. Returns the share of its points that fell into empty voxels.
   double insert(std::span<const SurfacePoint> points_base, const Pose& T_map_base);
   void clear();
 
-  /// Whether a point can be looked up: finite, and no farther than voxels can be counted.
+  /// Returns whether a point can be looked up: finite, and within the range of voxel indices.
   [[nodiscard]] bool reaches(const Eigen::Vector3d& point_m) const { return fine_.reaches(point_m); }
 
-  /// The coarse voxel that a fine one lies in.
+  /// Returns the coarse voxel that contains a fine one.
   [[nodiscard]] static VoxelIndex coarse_of(VoxelIndex fine) {
     const auto cell = [](std::int32_t i) {
       const std::int32_t moved = i + kFinePerCoarse / 2;

@@ -7,7 +7,7 @@
 namespace locus {
 
 ElasticScan AgedScan::sort(const Sweep& sweep, std::span<const SurfacePoint> scan_base, const Vector6& twist_base) {
-  constexpr std::size_t kBins = 64; // of a sweep: a millisecond or two
+  constexpr std::size_t kBins = 64; // per sweep: one or two milliseconds each
   const auto count = static_cast<std::size_t>(sweep.registered);
   const double oldest_s = std::max(1e-9, to_seconds(sweep.end - sweep.start));
   const auto bin = [&](std::size_t i) {

@@ -12,15 +12,15 @@
 
 namespace locus {
 
-/// The registered points of a sweep in the order of their age, as the elastic registration takes them: a block of
-/// points has one age. Keeps its memory. One owner.
+/// Registered points of a sweep sorted by age, as input to the elastic registration: a block of points has one age.
+/// Reuses its memory. One owner.
 class AgedScan {
  public:
-  /// `scan_base` are the points of the sweep, in its order, corrected for `twist_base` (m/s, rad/s) to its end. What is
-  /// returned refers to this object.
+  /// Sorts `scan_base`: the points of the sweep, in its order, de-skewed for `twist_base` (m/s, rad/s) to its end. The
+  /// result refers to this object.
   ElasticScan sort(const Sweep& sweep, std::span<const SurfacePoint> scan_base, const Vector6& twist_base);
 
-  [[nodiscard]] std::size_t size() const { return points_base_.size(); } ///< of the last one
+  [[nodiscard]] std::size_t size() const { return points_base_.size(); } ///< of the last result
 
  private:
   std::vector<SurfacePoint> points_base_;

@@ -10,9 +10,9 @@ namespace locus {
 namespace {
 
 constexpr double kLevel_rad = 0.03;                       ///< 1.7 degrees
-constexpr Duration kLongEnough = std::chrono::seconds{2}; ///< level all along, before the ground counts as flat
+constexpr Duration kLongEnough = std::chrono::seconds{2}; ///< continuously level, before the ground counts as flat
 
-/// What the ground leaves open while the base seems level, one standard deviation.
+/// Deviation from flat ground while the base appears level, one standard deviation.
 constexpr double kRipple_m = 0.005; ///< from sweep to sweep
 constexpr double kTilt_rad = 0.5 * kLevel_rad;
 

@@ -9,22 +9,21 @@
 
 namespace locus {
 
-/// The flat ground assumption (paper II-C): no motion up or down, no roll, no pitch, in the gravity-aligned odometry
-/// frame.
+/// Flat ground assumption (paper II-C): no vertical motion, no roll and no pitch in the gravity-aligned odometry frame.
 ///
-/// Known from context (on), or found (automatic): the inertial sensor has seen the base level for long enough. It ends
-/// at once when the base is level no more. What is known is taken at its word. What was found only to the accuracy of
-/// that sensor gives way to lidar along the axes that it sees better. One owner.
+/// Known from context (on), or detected (automatic): the inertial sensor has measured a level base for long enough. It
+/// ends as soon as the base is no longer level. The known assumption holds exactly. The detected one is only as
+/// accurate as that sensor and yields to lidar along the axes that lidar observes better. One owner.
 class FlatGroundAssumption {
  public:
   explicit FlatGroundAssumption(FlatGround mode) : mode_(mode) {}
 
-  /// Looks at which way is up during a sweep, where that is known.
+  /// Processes the up direction measured in a sweep, if there is one.
   void observe(Stamp stamp, const std::optional<Eigen::Vector3d>& up_base);
 
   [[nodiscard]] bool holds() const { return mode_ == FlatGround::on || (mode_ == FlatGround::automatic && found_); }
 
-  /// T_odom_base, known with `information` (odom axes), as it is on the plane of T_odom_last. Precondition: holds().
+  /// Projects T_odom_base, known with `information` (odom axes), onto the plane of T_odom_last. Precondition: holds().
   [[nodiscard]] Pose flatten(const Pose& T_odom_last, const Pose& T_odom_base, const Matrix6& information) const;
 
  private:

@@ -10,13 +10,14 @@ namespace locus {
 
 namespace {
 
-/// After so long a robot that stood knows nothing of what has come to stand there.
+/// Longest validity of free space: while a robot stands, anything may move into it.
 constexpr Duration kRecent = std::chrono::seconds{10};
 
-/// What is nearer by a fine voxel of the map, and by what an error of direction makes of a range, is before the rest.
+/// Margin by which a point must be nearer than the returns behind it: a fine voxel of the map, and the effect of an
+/// error of direction on the range.
 constexpr float kBefore_m = 0.5F, kBeforeShare = 0.05F;
 
-/// So many of a direction and its eight neighbours must have seen something, all of it farther away.
+/// Least number of returns in a direction and its eight neighbours, all of them farther away, for free space.
 constexpr int kEnough = 3;
 
 } // namespace
@@ -25,7 +26,7 @@ void FreeSpace::expect(const Sweep& sweep) {
   stamp_ = sweep.end;
   lidars_ = sweep.lidars;
   for (Keyframe& keyframe : last_)
-    keyframe.views.resize(lidars_.count); // of the first sweep alone does something, as what follows
+    keyframe.views.resize(lidars_.count); // allocates at the first sweep only, as below
   lidar_of_.reserve(sweep.points.capacity());
   standing_.reserve(sweep.points.capacity());
   lidar_of_.clear();
@@ -72,9 +73,10 @@ bool FreeSpace::sees_through(const View& view, const Eigen::Vector3f& point_odom
   return seen >= kEnough;
 }
 
-/// Without the cost of an angle: columns divide a diamond around the origin in place of a circle, rows the sine.
+/// Returns the cell without computing angles: columns divide a diamond around the origin instead of a circle, rows the
+/// sine.
 FreeSpace::Cell FreeSpace::cell_of(const Eigen::Vector3f& direction, float range_m) {
-  constexpr float kTiny_m = 1e-6F; ///< no direction at all is some direction
+  constexpr float kTiny_m = 1e-6F; ///< guards against a zero direction
   const float x = direction.x(), y = direction.y();
   const float along = y / (std::abs(x) + std::abs(y) + kTiny_m);
   const float around = x < 0.0F ? 2.0F - along : along + (along < 0.0F ? 4.0F : 0.0F); // of four

@@ -14,33 +14,33 @@
 
 namespace locus {
 
-/// The space that the lidars saw through in the last keyframes. What stands there now has come since: a person, a
-/// vehicle. It is not for the map, for a robot that finds its place by what moves moves with it. What has come to stay
-/// is taken in some keyframes later.
+/// Space that the lidars saw through in the last keyframes. An object there has arrived since: a person, a vehicle. It
+/// must not enter the map, because a robot that is registered to moving objects moves with them. An object that stays
+/// is inserted some keyframes later.
 ///
 /// Visibility in range images, as in Pomerleau, Krüsi, Colas, Furgale, Siegwart, "Long-term 3D map maintenance in
-/// dynamic environments", ICRA 2014. Keeps its memory. One owner.
+/// dynamic environments", ICRA 2014. Reuses its memory. One owner.
 class FreeSpace {
  public:
-  /// A sweep will be a keyframe: remembers which lidar sees each of its points, and from where. Cheap.
+  /// Prepares for a keyframe: stores which lidar measured each point of the sweep, and from where. Cheap.
   void expect(const Sweep& sweep);
 
-  /// The points of the expected sweep (base frame, in its order) that do not stand in free space; they lie in this
-  /// object. Then the sweep has seen through what is before its points, too.
+  /// Returns the points of the expected sweep (base frame, in its order) that are not in free space; they are stored in
+  /// this object. Then adds the space in front of the points to the free space.
   std::span<const SurfacePoint> leave_out_moving(std::span<const SurfacePoint> scan_base, const Pose& T_odom_base);
 
-  /// Where the robot was is not known any more, and so neither is what it saw through.
+  /// Drops all free space, when the pose relative to it has been lost.
   void forget() { keyframes_ = 0; }
 
  private:
   static constexpr std::size_t kKeyframes = 5;
-  static constexpr int kColumns = 180, kRows = 60; ///< of about two degrees, as far as lidars look up and down
+  static constexpr int kColumns = 180, kRows = 60; ///< about two degrees each at the elevations of lidars
 
-  /// What one lidar has seen of one keyframe, by direction; axes of the base.
+  /// Nearest returns of one lidar in one keyframe, by direction in base axes.
   struct View {
     Eigen::Vector3f lidar_odom_m;
     Eigen::Matrix3f R_view_odom;
-    std::array<float, static_cast<std::size_t>(kColumns* kRows)> nearest_m; ///< zero: nothing
+    std::array<float, static_cast<std::size_t>(kColumns* kRows)> nearest_m; ///< zero: no return
   };
   struct Keyframe {
     Stamp stamp;
@@ -56,7 +56,7 @@ class FreeSpace {
   void see(std::span<const SurfacePoint> scan_base, const Pose& T_odom_base);
 
   std::array<Keyframe, kKeyframes> last_;
-  std::size_t keyframes_ = 0; ///< since it forgot
+  std::size_t keyframes_ = 0; ///< since forget()
   Stamp stamp_;
   LidarPlaces lidars_;
   std::vector<std::uint8_t> lidar_of_; ///< by point

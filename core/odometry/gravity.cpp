@@ -11,12 +11,12 @@ namespace locus {
 namespace {
 
 constexpr double kTolerance_mps2 = 0.5;
-constexpr double kSettles_s = 3.0; ///< longer than a robot accelerates at a stretch
+constexpr double kSettles_s = 3.0; ///< longer than a robot accelerates continuously
 
 constexpr double kMemoryOfTilt_sweeps = 200.0;
-constexpr double kOutlier_rad = 5.0 * kRadPerDeg;      ///< no drift of the odometry, but a blow
-constexpr double kNotWorthIt_rad = 1.0 * kRadPerDeg;   ///< a common accelerometer is off by as much
-constexpr double kPerKeyframe_rad = 0.02 * kRadPerDeg; ///< 3 mm in 10 m: less than the map's own noise
+constexpr double kOutlier_rad = 5.0 * kRadPerDeg;      ///< an impact, not drift of the odometry
+constexpr double kNotWorthIt_rad = 1.0 * kRadPerDeg;   ///< typical error of an accelerometer
+constexpr double kPerKeyframe_rad = 0.02 * kRadPerDeg; ///< 3 mm in 10 m: less than the noise of the map
 
 } // namespace
 

@@ -8,7 +8,7 @@ namespace locus {
 namespace {
 
 constexpr double kMemory_s = 1.0;
-constexpr double kLeastOfUsual = 0.5; ///< the worst of honest drives is 0.78
+constexpr double kLeastOfUsual = 0.5; ///< the lowest in good drives is 0.78
 constexpr double kUnusualFit = 0.85;
 
 double share(std::size_t part, std::size_t all) {

@@ -7,22 +7,22 @@
 
 namespace locus {
 
-/// Tells from what is usual at this place whether lidar still sees what it saw: the share of the points that find a
-/// correspondence, and how well they fit. One owner.
+/// Compares the share of points with a correspondence, and how well they fit, with the values of the last second, to
+/// detect dust or a fault of the lidar. One owner.
 class LidarHealth {
  public:
-  /// Lidar placed a sweep of `registered` points, `elapsed_s` after the last.
+  /// Learns from an accepted registration of `registered` points, `elapsed_s` after the last one.
   void learn(const Registration& registration, std::size_t registered, double elapsed_s);
 
-  /// Fewer correspondences than half of the usual: the air is full of dust, or the lidar measures otherwise. No place
-  /// changes so fast. Such a sweep is not for the map.
+  /// Returns whether there are fewer correspondences than half of the usual: dust or a lidar fault, since surroundings
+  /// do not change that fast. Such a sweep must not enter the map.
   [[nodiscard]] bool misses_most(const Registration& registration, std::size_t registered) const;
 
-  /// It fits worse than sweeps do: what it was corrected for and begun from may be wrong.
+  /// Returns whether the fit is worse than usual: the de-skew or the prior may be wrong.
   [[nodiscard]] bool is_unusual(const Registration& registration, std::size_t registered) const;
 
  private:
-  double share_ = 0.0, fit_ = 0.0; ///< usual
+  double share_ = 0.0, fit_ = 0.0; ///< usual values
   double learned_s_ = 0.0;
 };
 

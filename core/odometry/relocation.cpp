@@ -14,33 +14,33 @@ namespace {
 constexpr double kFarthest_m = 0.5;
 constexpr double kAround_m = 2.0;
 
-/// One standard deviation of a robot about a place.
+/// Uncertainty of the robot about a candidate pose, one standard deviation.
 const Vector6 kSigma = along_each_axis(0.5, 5.0);
 
-/// The same where a healthy odometry says so: what the surfaces leave open stays as it says. Wheels are wrong by some
-/// hundredths of the way.
+/// Returns the same for a candidate from a healthy odometry, whose pose holds along directions that the surfaces
+/// leave open. The error of wheels is some hundredths of the distance.
 Vector6 vouched_sigma(double way_m) { return along_each_axis(std::min(0.05 + 0.04 * way_m, 0.5), 2.0); }
 
-/// Share of the points of the sweep that is known: less is a coincidence, as the next bend of a tunnel offers. What
-/// lies where an odometry says, that close, is none.
+/// Least share of points with a correspondence: less is a coincidence, as in the next bend of a tunnel. Lower if the
+/// pose is within kConfirms_m of that of an odometry, which is no coincidence.
 constexpr double kLeast = 0.5, kLeastConfirmed = 0.2;
 constexpr double kConfirms_m = 0.1;
 
-/// What is asked for against the next best place: clearly more where half of the sweep is known, hardly less where four
-/// fifths are.
+/// Least ratio of the share to that of the next best pose: clearly more if half of the points have a correspondence,
+/// hardly less if four fifths have one.
 constexpr double kClearlyMore = 1.3, kHardlyLess = 0.9;
 double least_ratio(double share) {
   constexpr double kMost = 0.8;
   return std::lerp(kClearlyMore, kHardlyLess, std::clamp((share - kLeast) / (kMost - kLeast), 0.0, 1.0));
 }
 
-/// Of places in a row, so that one of them is near wherever it came to rest.
+/// Distance between successive candidates, so that one of them is near wherever the robot came to rest.
 constexpr double kApart_m = 0.6;
 
-/// A place is taken for a likelier one if it fits so much better.
+/// Ratio by which a candidate must fit better than a likelier one to be preferred.
 constexpr double kClearlyBetter = 1.1;
 
-/// Beside a place, on every side.
+/// Returns the eight poses around a pose, kAround_m apart.
 std::array<Pose, 8> places_around(const Pose& T_odom_place) {
   std::array<Pose, 8> places;
   for (int i = 0; i < 8; ++i) {
@@ -51,7 +51,8 @@ std::array<Pose, 8> places_around(const Pose& T_odom_place) {
   return places;
 }
 
-/// Whether the surfaces alone tell where it is, along each axis. Where they do not it lies wherever it was laid.
+/// Returns whether the surfaces alone determine the position along each axis. If not, it stays where the search
+/// started.
 bool is_pinned(const Registration& fit) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(fit.information.topLeftCorner<3, 3>());
   return axes.eigenvalues().minCoeff() > 1.0 / (kConfirms_m * kConfirms_m);
@@ -67,7 +68,7 @@ Whereabouts Whereabouts::followed_by(const OdometryEstimate& estimate) const {
   constexpr double kTwistMemory_s = 0.3;
   const double elapsed_s = to_seconds(estimate.stamp - stamp);
   const double share = elapsed_s > 0.0 ? 1.0 - std::exp(-elapsed_s / kTwistMemory_s) : 1.0;
-  constexpr double kUnsure = 0.1; ///< m/s and rad/s, one standard deviation: of such a twist one half is taken
+  constexpr double kUnsure = 0.1; ///< m/s and rad/s, one standard deviation that halves the weight of a twist
   const Vector6 unsureness = estimate.twist_covariance.diagonal() / (kUnsure * kUnsure);
   const Vector6 news = share * (estimate.twist_base - twist_base).array() / (1.0 + unsureness.array());
   Whereabouts next{estimate.stamp, estimate.T_odom_base, estimate.pose_covariance, twist_base + news};
@@ -148,9 +149,9 @@ std::optional<Relocated> relocate(Gicp& gicp, std::span<const SurfacePoint> scan
   struct Found {
     double share = 0.0; ///< of the points, with a correspondence
     Registration fit{};
-    Matrix6 covariance = Matrix6::Zero(); ///< of the place
-    bool vouched = false;                 ///< of the place
-    bool confirmed = false;               ///< where an odometry says, and the surfaces tell of every axis
+    Matrix6 covariance = Matrix6::Zero(); ///< of the candidate
+    bool vouched = false;                 ///< of the candidate
+    bool confirmed = false;               ///< by an odometry, and the surfaces determine every axis
   };
   MotionBelief prior;
   const auto lay = [&](const Place& place) {

@@ -16,80 +16,79 @@
 
 namespace locus {
 
-/// What a robot that comes to rest is slower than: m/s and rad/s.
+/// Twist below which a robot counts as at rest: m/s and rad/s.
 inline const Vector6 kSlow = along_each_axis(0.05, 2.0);
 
-/// Where a robot may be.
+/// Candidate pose of the robot.
 struct Place {
   Pose T_odom_base;
-  Vector6 sigma;        ///< to look for it with: one standard deviation, m and rad
-  Matrix6 covariance;   ///< against the map that another run has left, odom axes
-  bool told = false;    ///< by an odometry
-  bool vouched = false; ///< by one that was healthy
+  Vector6 sigma;        ///< of the search: one standard deviation, m and rad
+  Matrix6 covariance;   ///< relative to the map of the earlier run, odom axes
+  bool told = false;    ///< from an odometry
+  bool vouched = false; ///< from one that was healthy
 };
 
-/// Where a run of the odometry ended, for another to go on from. A value.
+/// State at the end of a run of the odometry, from which another run resumes. A value.
 struct Whereabouts {
   Stamp stamp; ///< end of its last sweep
   Pose T_odom_base;
-  Matrix6 pose_covariance = Matrix6::Zero(); ///< as OdometryEstimate has it
+  Matrix6 pose_covariance = Matrix6::Zero(); ///< as in OdometryEstimate
   Vector6 twist_base = Vector6::Zero();      ///< mean over the last sweeps
-  /// As each odometry saw the base then. Whoever sends it has not been restarted, so its frame bridges the gap.
+  /// Pose of the base from each odometry at that time. Its frame bridges the gap unless the source was restarted.
   std::array<std::optional<Pose>, kMaxSources> T_source_base{};
-  std::bitset<kMaxSources> doubted{}; ///< those that were not healthy: their wheels may have spun on
-  LearnedSources learned{};           ///< of each when it was last heard
+  std::bitset<kMaxSources> doubted{}; ///< odometries that were not healthy: wheels may have kept spinning
+  LearnedSources learned{};           ///< of each source when last received
 
-  /// After the next estimate. Its twist alone is not to be relied on, the less the less sure it is: where a source that
-  /// was wrong is lost, the next sweep lies askew to those before.
+  /// Returns the state after the next estimate. The twist is low-pass filtered (0.3 s) and weighted by its covariance:
+  /// when a faulty source is lost, the next sweep is offset from those before.
   [[nodiscard]] Whereabouts followed_by(const OdometryEstimate& estimate) const;
 
-  /// Those that it speaks of are not those of the next run.
+  /// Drops the data of the motion sources, when those of the next run are different ones.
   void forget_sources() {
     T_source_base = {};
     learned = {};
     doubted.reset();
   }
 
-  /// Where it is at `now` if it goes on as before, which for more than a moment it does not.
+  /// Returns the pose at `now` at constant twist, which is assumed for 2 s at most.
   [[nodiscard]] Pose carried_to(Stamp now) const;
 
-  /// Whether an odometry that was heard then is yet to be heard again.
+  /// Returns whether an odometry that was received then has not been received again yet.
   [[nodiscard]] bool awaits(const SensedMotion& sensed) const;
 
-  /// Whether it was at rest: then it may stand there still.
+  /// Returns whether the robot was at rest, so that it may still be there.
   [[nodiscard]] bool stood() const;
 
-  /// Where it may be at `now` without a word of an odometry: carried on, and wherever on its way it may have come to
-  /// rest.
+  /// Returns the candidate poses at `now` without odometry: constant velocity, and stops along that path.
   [[nodiscard]] std::vector<Pose> way(Stamp now) const;
 
-  /// Where it may be at `now`, the likeliest first: as the odometries say that it may have reached, and on its way. The
-  /// farther an odometry says that it left its way, the less sure that is: whoever sends it may have been restarted. Of
-  /// one that was in doubt nothing near what it says is sure. Who stood may stand there still, to the centimetres of a
-  /// vouched place.
+  /// Returns the candidate poses at `now`, the likeliest first: those of the odometries, if reachable, and along the
+  /// path without odometry. The farther an odometry is from that path the less certain its pose, since the source may
+  /// have been restarted. A source that was in doubt is less certain still and adds candidates ahead of and behind its
+  /// pose. A robot that was at rest may still be there, to the centimetres of a pose from a healthy odometry.
   [[nodiscard]] std::vector<Place> places(Stamp now, const SensedMotion& sensed, double max_speed_mps) const;
 
-  /// At one of them, as far as anybody knows then.
+  /// Returns the state at a candidate; its twist and sources are left unset.
   [[nodiscard]] Whereabouts moved_to(const Place& place) const;
 };
 
-/// A place at which a sweep was found, and how it fits there.
+/// Candidate at which a sweep was found, and its registration.
 struct Relocated {
   Place place;
   Registration fit;
 };
 
-/// Where a sweep lies in a map that another run has left behind: within half a metre of one of the places `expected`,
-/// the likeliest first, or nowhere. A healthy odometry vouches for its place: the sweep is looked for as near to it as
-/// such an odometry is exact, and a place that fits hardly better does not count against it. Surfaces that tell of
-/// every axis confirm it.
+/// Relocalises a sweep in the map of an earlier run: within half a metre of one of the candidates `expected`, the
+/// likeliest first. Returns nothing if it is not found or the result is ambiguous. A healthy odometry vouches for its
+/// candidate: the search there is as narrow as such an odometry is accurate, and another pose that fits hardly better
+/// does not rule it out. Surfaces that determine every axis confirm it.
 ///
-/// How much of a sweep finds a correspondence is a matter of the place: nine tenths in a tunnel, half where much is far
-/// or hidden. So it is compared with what it finds two metres away on every side, and at the other places. The less of
-/// the place is known, the clearer it must fit better, unless an odometry vouches for it; one of which most is known
-/// may be a corridor, which looks the same two metres on, and need only fit hardly less. Of places that fit alike the
-/// likelier is taken. `beyond_doubt`: it must fit clearly better however much is known. Any thread, one at a time for a
-/// Gicp.
+/// The share of points with a correspondence depends on the surroundings: nine tenths in a tunnel, half where much is
+/// far away or hidden. It is therefore compared with the share two metres away on every side and at the other
+/// candidates. The smaller the share, the more clearly it must exceed theirs, unless an odometry vouches for the
+/// candidate; a large share may be that of a corridor, which looks the same two metres on, and need only be hardly
+/// less. Among equal fits the likelier candidate is chosen. `beyond_doubt`: the share must be clearly larger in any
+/// case. Any thread, one at a time for a Gicp.
 std::optional<Relocated> relocate(Gicp& gicp, std::span<const SurfacePoint> scan_base, const SurfaceMap& map_odom,
                                   std::span<const Place> expected, const RegistrationOptions& options,
                                   bool beyond_doubt);

@@ -7,7 +7,7 @@
 namespace locus {
 
 Vector6 SeenAxes::observe(const Matrix6& observability_base) {
-  constexpr double kSolvable = 1e-6; ///< keeps an axis of which nothing is seen solvable
+  constexpr double kSolvable = 1e-6; ///< makes an unobserved axis invertible
   const Matrix6 solvable = observability_base + kSolvable * Matrix6::Identity();
   Vector6 observability = solvable.inverse().diagonal().cwiseInverse().cwiseMin(1.0);
   for (std::size_t axis = 0; axis < seen_.size(); ++axis)

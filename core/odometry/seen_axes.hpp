@@ -7,22 +7,23 @@
 
 namespace locus {
 
-/// Which axes of the base the lidar sees: with hysteresis, from what the surfaces around allow to be seen. All of them
-/// before the first look. One owner.
+/// Axes of the base that lidar observes: with hysteresis, from the observability that the surroundings allow. All of
+/// them initially. One owner.
 class SeenAxes {
  public:
-  static constexpr double kWeakBelow = 0.01; ///< observability of an axis that is hardly seen from now on
-  static constexpr double kSeenFrom = 0.02;  ///< and of one that is seen again
+  static constexpr double kWeakBelow = 0.01; ///< observability below which an axis becomes weakly observed
+  static constexpr double kSeenFrom = 0.02;  ///< observability from which it is observed again
 
-  /// Takes in Registration::observability, base axes. Gives back OdometryEstimate::observability.
+  /// Updates the axes from Registration::observability, base axes. Returns OdometryEstimate::observability.
   Vector6 observe(const Matrix6& observability_base);
 
   [[nodiscard]] const std::array<bool, 6>& each() const { return seen_; }
   [[nodiscard]] bool all() const;
 
-  /// `along_base` without what is along axes that are hardly seen.
+  /// Returns `along_base` with the weakly observed axes set to zero.
   [[nodiscard]] Vector6 part_of(Vector6 along_base) const;
-  /// Information (base axes) of the axes that are seen: the little that is said of the others is said by these.
+  /// Returns the information (base axes) in the rows of observed axes, which include what little there is of the
+  /// others.
   [[nodiscard]] Matrix6 rows_of(Matrix6 information_base) const;
 
  private:

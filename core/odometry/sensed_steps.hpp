@@ -10,11 +10,11 @@
 
 namespace locus {
 
-/// What each motion source says of the way from one processed sweep to the next, however many were dropped in between
+/// Motion from one processed sweep to the next as measured by each source, however many sweeps were dropped in between
 /// (paper II-B.1). One owner.
 class SensedSteps {
  public:
-  /// `sweep` has been processed: it is the last one now.
+  /// Stores the processed `sweep` as the last one.
   void remember(const Sweep& sweep) {
     last_ = sweep.end;
     sources_ = sweep.motion.sources;
@@ -23,7 +23,7 @@ class SensedSteps {
   [[nodiscard]] Stamp last() const { return last_; } ///< end of the last sweep
   [[nodiscard]] double elapsed_s(const Sweep& sweep) const { return to_seconds(sweep.end - last_); }
 
-  /// The mean twist of the base; nothing where the source does not know it.
+  /// Returns the mean twist of the base since the last sweep; nothing if the source did not measure it.
   [[nodiscard]] std::optional<SensedTwist> twist_base(const Sweep& sweep, SourceId source) const {
     const SourcePose& last = sources_[index_of(source)];
     const SourcePose& now = sweep.motion.sources[index_of(source)];
@@ -35,7 +35,7 @@ class SensedSteps {
         (to_seconds(now.late) * now.twist_base - to_seconds(last.late) * last.twist_base) / elapsed_s(sweep);
     return sensed;
   }
-  /// Whether it is healthy, too, and was.
+  /// Returns whether there is such a twist and the source was healthy at both ends.
   [[nodiscard]] bool is_usable(const Sweep& sweep, SourceId source) const {
     return sources_[index_of(source)].usable && sweep.motion.sources[index_of(source)].usable &&
            twist_base(sweep, source);

@@ -14,7 +14,7 @@ std::optional<HealthReason> reason_if(bool wrong, HealthReason reason) {
   return wrong ? std::optional{reason} : std::nullopt;
 }
 
-/// What is farther than any robot or sensor goes is a number no more than NaN is: sums of it would never be again.
+/// Rejects NaN and values beyond the reach of any robot or sensor: sums would never recover from either.
 class NotANumber : public HealthMetric {
  public:
   explicit NotANumber(UseAcceleration use_acceleration) : use_acceleration_(use_acceleration) {}
@@ -26,14 +26,14 @@ class NotANumber : public HealthMetric {
 
  private:
   [[nodiscard]] bool is_number(const ImuSample& sample) const {
-    constexpr double kMost = 1e5; ///< deg/s and milli-g are heard too, for ImuSelfCheck to name them
+    constexpr double kMost = 1e5; ///< deg/s and milli-g pass, for ImuSelfCheck to identify them
     return is_within(kMost, sample.angular_velocity_radps) &&
            (use_acceleration_ == UseAcceleration::off || is_within(kMost, sample.specific_force_mps2)) &&
            (!sample.attitude || sample.attitude->coeffs().allFinite());
   }
   static bool is_number(const OdometrySample& sample) {
     constexpr double kFarthest_m = 1e8; ///< geocentric coordinates are within it
-    constexpr double kLeastNorm = 0.5;  ///< of a quaternion that still says something
+    constexpr double kLeastNorm = 0.5;  ///< of a usable quaternion
     return is_within(kFarthest_m, sample.T_source_base.translation) && sample.T_source_base.finite() &&
            sample.T_source_base.rotation.norm() > kLeastNorm;
   }
@@ -54,7 +54,7 @@ class OutOfOrder : public HealthMetric {
   std::optional<Stamp> newest_;
 };
 
-/// A sample that comes later than tracks are extrapolated is of little use to the sweep it was made in.
+/// Rejects late samples: one beyond the limit of extrapolation is of little use to its sweep.
 class Late : public HealthMetric {
  public:
   std::optional<HealthReason> judge(const SourceReading& reading) override {
@@ -71,8 +71,8 @@ class Uncertain : public HealthMetric {
   }
 };
 
-/// Tells a unit that hangs from a robot that stands. Readings of a living inertial unit are never the same to the last
-/// bit, unless it is made without noise, and then it reads no turn at rest.
+/// Distinguishes a frozen unit from a robot at rest. Readings of a live inertial unit are never identical to the last
+/// bit, unless it has no noise, and then its turn rate at rest is zero.
 class FrozenImu : public HealthMetric {
  public:
   std::optional<HealthReason> judge(const SourceReading& reading) override {
@@ -87,8 +87,8 @@ class FrozenImu : public HealthMetric {
   std::optional<ImuSample> last_;
 };
 
-/// An odometry repeats its pose while the robot stands. It hangs if it was moving fast the sample before, for no robot
-/// stops like that, or if lidar goes on seeing the robot move.
+/// Detects a frozen odometry. An odometry repeats its pose while the robot stands; it is frozen if it was moving fast
+/// at the previous sample, since no robot stops like that, or if lidar continues to observe motion.
 class FrozenOdometry : public HealthMetric {
  public:
   explicit FrozenOdometry(double hardest_mps2) : hardest_mps2_(hardest_mps2) {}
@@ -100,7 +100,7 @@ class FrozenOdometry : public HealthMetric {
       lidar_sees_way_.setZero();
       return std::nullopt;
     }
-    if (reading.stamp < changed_at_) { // a clock was set back: how long it has stood is not known
+    if (reading.stamp < changed_at_) { // a clock was set back: time at rest unknown
       changed_at_ = reading.stamp;
       twist_.setZero();
     }
@@ -119,7 +119,7 @@ class FrozenOdometry : public HealthMetric {
   }
 
   std::optional<HealthReason> hear(LidarOpinion, const RegistrationFeedback& feedback) override {
-    if (feedback.from < changed_at_) // heard of late: it moved then
+    if (feedback.from < changed_at_) // outdated: it was still moving then
       return std::nullopt;
     lidar_sees_twist_ = feedback.twist_base;
     lidar_sees_way_ += to_seconds(feedback.to - feedback.from) * feedback.twist_base;
@@ -127,7 +127,7 @@ class FrozenOdometry : public HealthMetric {
   }
 
  private:
-  /// Moving, and farther than a wrong gyro shakes a sweep or two.
+  /// Returns whether lidar observes motion, farther than a wrong gyro shakes a sweep or two.
   [[nodiscard]] bool lidar_sees_it_move() const {
     constexpr double kMoves_mps = 0.2, kTurns_radps = 0.2, kFor_s = 0.3;
     return (lidar_sees_twist_.head<3>().norm() > kMoves_mps &&
@@ -144,25 +144,25 @@ class FrozenOdometry : public HealthMetric {
   }
 
   double hardest_mps2_;
-  std::optional<Pose> last_; ///< that differed from the one before
+  std::optional<Pose> last_; ///< latest pose that differed from the previous one
   Stamp changed_at_;
-  Vector6 twist_ = Vector6::Zero(); ///< until then
+  Vector6 twist_ = Vector6::Zero(); ///< before changed_at_
   bool frozen_ = false;
   Vector6 lidar_sees_twist_ = Vector6::Zero();
   Vector6 lidar_sees_way_ = Vector6::Zero(); ///< m and rad, since the last change
 };
 
-/// A turn rate that no robot has.
+/// Rejects a turn rate that no robot has.
 class ImpossibleTurnRate : public HealthMetric {
  public:
   std::optional<HealthReason> judge(const SourceReading& reading) override {
-    constexpr double kMax_radps = 12.0; ///< two turns a second; what a gyro in deg/s soon goes beyond
+    constexpr double kMax_radps = 12.0; ///< two turns a second; a gyro in deg/s soon exceeds it
     return reason_if(reading.imu->angular_velocity_radps.norm() > kMax_radps, HealthReason::jump);
   }
 };
 
-/// A pose that does not follow from the last ones: to be there the robot would have had to change its speed or its turn
-/// rate at once by more than any can.
+/// Rejects a pose that is not continuous with the last ones: reaching it would require an impossible change of speed or
+/// turn rate.
 class PoseJump : public HealthMetric {
  public:
   std::optional<HealthReason> judge(const SourceReading& reading) override {
@@ -177,7 +177,7 @@ class PoseJump : public HealthMetric {
                              std::max(kAlwaysAllowed_rad, kMaxChange_radps * step_s),
                      HealthReason::jump);
   }
-  /// A velocity is told by samples that lie apart; those between them are compared with what it foretells.
+  /// Updates the velocity from samples far enough apart; those between them are compared with its prediction.
   void accept(const SourceReading& reading) override {
     if (last_ && reading.stamp - last_stamp_ < MotionTrack::kShortestBaseline)
       return;
@@ -193,11 +193,11 @@ class PoseJump : public HealthMetric {
  private:
   std::optional<Pose> last_;
   Stamp last_stamp_;
-  bool moving_ = false; ///< twist_ is known
+  bool moving_ = false; ///< twist_ is valid
   Vector6 twist_ = Vector6::Zero();
 };
 
-/// A speed that the robot is not able to.
+/// Rejects a speed above the robot's limit.
 class ImpossibleSpeed : public HealthMetric {
  public:
   explicit ImpossibleSpeed(double max_mps) : max_mps_(max_mps) {}
@@ -225,7 +225,7 @@ class ImpossibleSpeed : public HealthMetric {
   Stamp last_stamp_;
 };
 
-/// Lidar saw another motion several sweeps in a row.
+/// Rejects a source whose motion differs from lidar's in several consecutive sweeps.
 class LidarDisagrees : public HealthMetric {
  public:
   std::optional<HealthReason> hear(LidarOpinion opinion, const RegistrationFeedback&) override {
@@ -246,13 +246,13 @@ std::vector<std::unique_ptr<HealthMetric>> health_metrics(const MotionSourceOpti
                                                           const MotionLimits& limits) {
   std::vector<std::unique_ptr<HealthMetric>> metrics;
   metrics.push_back(
-      std::make_unique<NotANumber>(source.use_acceleration)); // first, so that the others need not think of it
+      std::make_unique<NotANumber>(source.use_acceleration)); // first, so that the others need not check for it
   metrics.push_back(std::make_unique<Late>());
   metrics.push_back(std::make_unique<OutOfOrder>());
   if (source.kind == SourceKind::imu) {
     metrics.push_back(std::make_unique<FrozenImu>());
     metrics.push_back(
-        std::make_unique<ImuSelfCheck>(source.T_base_source, source.use_acceleration)); // must see turn rates in deg/s
+        std::make_unique<ImuSelfCheck>(source.T_base_source, source.use_acceleration)); // must get turn rates in deg/s
     metrics.push_back(std::make_unique<ImpossibleTurnRate>());
   } else {
     metrics.push_back(std::make_unique<Uncertain>());

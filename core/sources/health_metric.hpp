@@ -13,7 +13,7 @@
 
 namespace locus {
 
-/// A sample of a motion source as health metrics see it: stamped by the host's clock, of one kind or the other.
+/// Sample of a motion source, as input to health metrics: stamped by the host's clock, of one kind or the other.
 struct SourceReading {
   Stamp stamp;
   Stamp arrival;
@@ -21,34 +21,34 @@ struct SourceReading {
   const OdometrySample* odometry = nullptr;
 };
 
-/// One way to tell that a motion source is not to be trusted (paper II-B.1). To add another, derive it and name it in
-/// health_metrics(). A metric knows the samples and what lidar says, and no clock. One owner.
+/// Criterion for distrusting a motion source (paper II-B.1). To add another, derive from it and list it in
+/// health_metrics(). A metric receives the samples and lidar's opinion, and reads no clock. One owner.
 class HealthMetric {
  public:
   virtual ~HealthMetric() = default;
 
-  /// Why this sample must be left out; nothing if there is no reason.
+  /// Returns the reason to reject a sample; nothing if there is none.
   virtual std::optional<HealthReason> judge(const SourceReading&) { return std::nullopt; }
 
-  /// No metric has objected to the sample: later ones follow from it.
+  /// Accepts a sample that no metric has rejected: a reference for later ones.
   virtual void accept(const SourceReading&) {}
 
-  /// Why the source must not be used any longer, after `opinion` of lidar on it; nothing if there is no reason.
+  /// Returns the reason to stop using the source, given lidar's `opinion` on it; nothing if there is none.
   virtual std::optional<HealthReason> hear(LidarOpinion /*opinion*/, const RegistrationFeedback&) {
     return std::nullopt;
   }
 
-  /// What the metric has found out about the source as a whole, in words for the user; empty if nothing is wrong.
+  /// Returns the finding about the source as a whole, in words for the user; empty if nothing is wrong.
   [[nodiscard]] virtual std::string_view verdict() const { return {}; }
 
-  /// Whether the specific force of an inertial source may be used.
+  /// Returns whether the specific force of an inertial source may be used.
   [[nodiscard]] virtual bool trusts_accelerometer() const { return true; }
 
-  /// The source has lost its health: what comes next need not follow from what came before.
+  /// Handles a loss of health: later samples need not be continuous with earlier ones.
   virtual void forget() {}
 };
 
-/// All metrics for a source, in the order in which they are asked.
+/// Returns all metrics for a source, in the order of their calls.
 std::vector<std::unique_ptr<HealthMetric>> health_metrics(const MotionSourceOptions& source,
                                                           const MotionLimits& limits);
 

@@ -30,7 +30,7 @@ std::optional<Stamp> HealthMonitor::judge(SourceReading reading) {
   ++counters_.received;
   const std::optional<Stamp> stamp = clock_.on_host_clock(reading.stamp, reading.arrival);
   if (clock_.steps() != counters_.clock_steps)
-    lose(HealthReason::out_of_order, reading.arrival); // how long the step took nobody knows
+    lose(HealthReason::out_of_order, reading.arrival); // the duration of the step is unknown
   counters_.clock_steps = clock_.steps();
   if (!stamp)
     return leave_out(HealthReason::out_of_order);
@@ -98,7 +98,7 @@ void HealthMonitor::lose(HealthReason reason, Stamp now) {
   if (state_ == State::healthy) {
     lost_for_ = reason;
     change(false, reason, now);
-  } else if (reason == HealthReason::self_check) { // news of a lost one, too: it may be for good
+  } else if (reason == HealthReason::self_check) { // also if already lost: it may be permanent
     event_ = HealthEvent{.stamp = now, .healthy = false, .reason = reason, .verdict = verdict()};
   }
   state_ = State::lost;
@@ -134,8 +134,9 @@ Duration HealthMonitor::timeout() const {
   return std::clamp(from_seconds(kPeriodsOfSilence * period_s_), kShortestTimeout, kLongestTimeout);
 }
 
-/// Steps beyond the timeout count too, or a source that has slowed down for good would be silent for ever; but a long
-/// silence counts no more than a short one, and a step back, after a clock was set, says nothing.
+/// Learns the period of the source. Steps beyond the timeout count, too, or a source that has slowed down for good
+/// would be silent for ever; but a long silence counts no more than a short one, and a step back, after a clock was
+/// set, is ignored.
 void HealthMonitor::learn_period(Duration step) {
   if (step <= Duration{})
     return;

@@ -16,13 +16,13 @@
 
 namespace locus {
 
-/// Decides sample by sample whether one motion source is to be trusted (paper II-B.1, health monitoring).
+/// Decides sample by sample whether one motion source is trusted (paper II-B.1, health monitoring).
 ///
-/// A sample to which a metric objects is left out and counted. Without a good one for timeout() the source loses its
-/// health, for the reason of the last objection or, if nothing came at all, as stale: so one bad sample costs nothing,
-/// and a long row of them no more than silence does. Good samples for kProbation give the health back, so a flapping
-/// sensor does not flap the odometry. Knows the time from the samples and from advance() alone, in stamps of arrival.
-/// One owner.
+/// A sample that a metric rejects is dropped and counted. Without a good one for timeout() the source loses its health,
+/// for the reason of the last rejection or, if nothing arrived, as stale: a single bad sample costs nothing, and a long
+/// run of them no more than silence does. Good samples for kProbation restore the health, so a flapping sensor does not
+/// flap the odometry. Reads no clock: the time comes from the samples and from advance(), in stamps of arrival. One
+/// owner.
 class HealthMonitor {
  public:
   static constexpr Duration kProbation = std::chrono::seconds{1};
@@ -32,30 +32,31 @@ class HealthMonitor {
   explicit HealthMonitor(const MotionSourceOptions& source, const MotionLimits& limits = {})
       : metrics_(health_metrics(source, limits)) {}
 
-  /// The instant of the measurement if the sample may be used; nothing if it is left out.
+  /// Return the instant of the measurement if the sample is accepted; nothing if it is rejected.
   std::optional<Stamp> judge(const ImuSample& sample);
   std::optional<Stamp> judge(const OdometrySample& sample);
 
-  /// Nothing has come until `now`.
+  /// Sets the time: nothing has arrived until `now`.
   void advance(Stamp now);
 
-  /// What lidar saw in the meantime, and says of this source.
+  /// Processes lidar's feedback on this source.
   void hear(LidarOpinion opinion, const RegistrationFeedback& feedback, Stamp now);
 
-  /// Health as judged elsewhere, until the next word.
+  /// Sets the external verdict on the health, valid until the next one.
   void set_outside_verdict(bool healthy, Stamp now);
 
   [[nodiscard]] bool healthy() const { return state_ == State::healthy; }
-  /// Counts losses of health. Samples of two epochs are not to be compared: what lies between was not watched.
+  /// Returns the number of losses of health. Samples of two epochs are not comparable: the time between was not
+  /// monitored.
   [[nodiscard]] std::uint32_t epoch() const { return epoch_; }
-  /// Silence that costs the source its health: three of its own periods.
+  /// Returns the silence that costs the source its health: three of its own periods.
   [[nodiscard]] Duration timeout() const;
-  /// What is wrong with the source as a whole, in words for the user; empty if nothing is.
+  /// Returns the finding about the source as a whole, in words for the user; empty if nothing is wrong.
   [[nodiscard]] std::string_view verdict() const;
   [[nodiscard]] bool trusts_accelerometer() const;
-  /// When the last good sample arrived; Stamp{} before the first.
+  /// Returns the arrival of the last good sample; Stamp{} before the first.
   [[nodiscard]] Stamp last_heard() const { return last_arrival_; }
-  /// The latest change since the last call; HealthEvent::source is left to the caller.
+  /// Returns the latest change since the last call; the caller sets HealthEvent::source.
   std::optional<HealthEvent> take_event();
   [[nodiscard]] const SourceCounters& counters() const { return counters_; }
 
@@ -74,7 +75,7 @@ class HealthMonitor {
   State state_ = State::unheard;
   std::uint32_t epoch_ = 0;
   bool outside_objects_ = false;
-  std::optional<HealthReason> objection_; ///< the last one since the last good sample
+  std::optional<HealthReason> objection_; ///< latest rejection since the last good sample
   HealthReason lost_for_ = HealthReason::stale;
   Stamp last_stamp_, last_arrival_; ///< of the last good sample
   Stamp probation_since_;

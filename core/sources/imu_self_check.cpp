@@ -12,22 +12,22 @@ namespace locus {
 namespace {
 
 constexpr Duration kWeighFor = std::chrono::seconds{1};
-constexpr double kGravityTolerance = 0.15; ///< of the whole: a robot may be driving off
-constexpr double kEarlyTolerance = 0.3;    ///< of the mean so far, before that: a few samples of a robot that shakes
-constexpr double kMaxTilt_deg = 60.0;      ///< no robot begins on a steeper slope
+constexpr double kGravityTolerance = 0.15; ///< relative; the robot may be accelerating
+constexpr double kEarlyTolerance = 0.3;    ///< relative, of the mean until then: a few samples of a shaking robot
+constexpr double kMaxTilt_deg = 60.0;      ///< no robot starts on a steeper slope
 
-/// Lesser turns in a sweep are noise to lidar.
+/// Largest turn in a sweep that may be noise of lidar.
 constexpr double kTurns_rad = 0.4 * kRadPerDeg;
-/// Turning sweeps to set a gyro aside, to use it again, and to judge it.
+/// Number of turning sweeps to quarantine a gyro, to use it again, and to judge it.
 constexpr int kSweepsToDoubt = 2, kSweepsToConfirm = 3, kSweepsToJudge = 10;
-constexpr int kRounds = 3; ///< of being set aside, until it is refused though nothing is clear
+constexpr int kRounds = 3; ///< quarantines until it is rejected although the cause is unclear
 
 constexpr double kLikeness = 0.7;
-constexpr double kScaleTolerance = 0.5; ///< a sweep that nobody corrects is bent
+constexpr double kScaleTolerance = 0.5; ///< sweeps without motion correction are distorted
 constexpr double kDegPerRad = 1.0 / kRadPerDeg;
 
-constexpr Duration kMaxGap = std::chrono::milliseconds{100};   ///< across which a gyro can be followed
-constexpr Duration kResolution = std::chrono::milliseconds{5}; ///< of what is remembered of its turns
+constexpr Duration kMaxGap = std::chrono::milliseconds{100};   ///< across which the gyro is integrated
+constexpr Duration kResolution = std::chrono::milliseconds{5}; ///< of the stored turns
 
 bool is_about(double value, double expected, double tolerance) {
   return std::abs(value - expected) < tolerance * expected;
@@ -37,7 +37,7 @@ bool is_about(double value, double expected, double tolerance) {
 
 ImuSelfCheck::ImuSelfCheck(const Pose& T_base_imu, UseAcceleration use_acceleration)
     : R_base_imu_(T_base_imu.rotation), use_acceleration_(use_acceleration) {
-  static_cast<void>(words(Difference::any, 0, false)); // they take memory: not while packets come
+  static_cast<void>(words(Difference::any, 0, false)); // allocates the texts now, not while packets arrive
 }
 
 std::optional<HealthReason> ImuSelfCheck::judge(const SourceReading& reading) {
@@ -66,7 +66,7 @@ bool ImuSelfCheck::trusts_accelerometer() const {
   return use_acceleration_ == UseAcceleration::automatic && trusts_accelerometer_ && (weighed_ || may_be_gravity());
 }
 
-/// The mean of the forces so far. Without a sample there is no reason for trust.
+/// Judges by the mean of the forces so far. Without a sample the result is false.
 bool ImuSelfCheck::may_be_gravity() const {
   return forces_ > 0.0 && is_about(force_sum_mps2_.norm() / forces_, kGravity_mps2, kEarlyTolerance);
 }
@@ -95,7 +95,7 @@ bool ImuSelfCheck::remembers(Stamp stamp) const {
   return known_ > 1 && stamp >= remembered(known_ - 1).stamp && stamp < remembered(0).stamp + kMaxGap;
 }
 
-/// Interpolated; of what is not remembered, the nearest that is. Precondition: something is.
+/// Interpolates; outside the stored range, returns the nearest angle. Precondition: something is stored.
 Eigen::Vector3d ImuSelfCheck::angle_rad_at(Stamp stamp) const {
   std::size_t age = 0;
   while (age + 1 < known_ && remembered(age).stamp > stamp)
@@ -131,8 +131,8 @@ void ImuSelfCheck::accept(const SourceReading& reading) {
     back_since_ = reading.stamp;
 }
 
-/// Who has come back is not used at once. Until then lidar is alone, and what it sees of a robot that turns is bent:
-/// that proves nothing against a gyro that nobody has doubted.
+/// Returns whether the unit is on probation. Meanwhile lidar runs without gyro de-skew, and its sweeps are distorted
+/// while the robot turns: no evidence against a gyro that was not in doubt.
 bool ImuSelfCheck::is_yet_to_be_used(const RegistrationFeedback& feedback) const {
   return !set_aside_ && back_since_ && feedback.from < *back_since_ + HealthMonitor::kProbation;
 }
@@ -166,7 +166,7 @@ void ImuSelfCheck::Turns::add(double gyro_rad, double lidar_rad) {
 
 double ImuSelfCheck::Turns::likeness() const { return gyro_lidar / std::sqrt(gyro_gyro * lidar_lidar); }
 
-/// Its own turns are what a gyro is told from: of one that reports none, nothing is known but that.
+/// Classifies the difference. A gyro that hardly reports turns gives no further evidence.
 ImuSelfCheck::Difference ImuSelfCheck::Turns::difference() const {
   if (gyro_gyro < sweeps * kTurns_rad * kTurns_rad)
     return Difference::gyro_still;
@@ -175,7 +175,7 @@ ImuSelfCheck::Difference ImuSelfCheck::Turns::difference() const {
   return has_scale(kDegPerRad) ? Difference::degrees : Difference::any;
 }
 
-/// All noise is taken for that of lidar.
+/// Returns whether the gyro reports `scale` times the turns of lidar. All noise is attributed to lidar.
 bool ImuSelfCheck::Turns::has_scale(double scale) const {
   return likeness() > kLikeness && std::abs(gyro_gyro / gyro_lidar - scale) < kScaleTolerance * scale;
 }
@@ -197,7 +197,8 @@ void ImuSelfCheck::review() {
   }
 }
 
-/// Refuses the unit, or tries it once more where nothing is clear: lidar may not see what a gait does without it.
+/// Rejects the unit, or gives it another try if the cause is unclear: without it lidar may not follow the turns of a
+/// gait.
 void ImuSelfCheck::conclude() {
   for (std::size_t axis = 0; axis < turns_.size(); ++axis) {
     const Turns& turns = turns_[axis];
@@ -211,14 +212,14 @@ void ImuSelfCheck::conclude() {
   turns_ = {};
 }
 
-/// The first about which gyro and lidar do not agree. Precondition: there is one with so many turning sweeps.
+/// Returns the first axis on which gyro and lidar disagree. Precondition: there is one with `sweeps` turning sweeps.
 std::size_t ImuSelfCheck::contradicted_axis(int sweeps) const {
   const auto found =
       std::ranges::find_if(turns_, [=](const Turns& turns) { return turns.sweeps >= sweeps && !turns.agree(); });
   return static_cast<std::size_t>(found - turns_.begin());
 }
 
-/// Text that lives for ever.
+/// Returns a text of static lifetime.
 std::string_view ImuSelfCheck::words(Difference difference, std::size_t axis, bool for_good) {
   struct Finding {
     const char* seen;
@@ -249,7 +250,7 @@ std::string_view ImuSelfCheck::words(Difference difference, std::size_t axis, bo
   return all[static_cast<std::size_t>(difference)][axis][for_good ? 1 : 0];
 }
 
-/// What comes back is checked as at the start.
+/// Restarts the check: a source that comes back is checked as at the start.
 void ImuSelfCheck::forget() {
   if (refused_)
     return;

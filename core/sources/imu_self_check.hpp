@@ -11,18 +11,17 @@
 
 namespace locus {
 
-/// Check of an inertial unit when it starts, and when it comes back: are its units those of the contract, does gravity
-/// point down where the configuration says that down is, does its gyro turn as lidar sees the robot turn?
+/// Checks an inertial unit when it starts and when it comes back: its units are those of the contract, gravity points
+/// down as configured, and its gyro agrees with lidar.
 ///
-/// A gyro is used at once. About each axis of the base on its own, for on legs the turns of a gait would drown a yaw of
-/// the wrong sign, its first turns are compared with what lidar sees. Once they differ it is set aside, for while it is
-/// used it bends the sweeps; what lidar sees without it decides whether it is used again or refused. While the robot
-/// goes straight nothing is proven and nothing bent.
+/// A gyro is used at once. Its first turns are compared with lidar's, about each axis of the base separately, since on
+/// legged robots the turns of the gait would mask a yaw of the wrong sign. A gyro that disagrees is quarantined,
+/// because it would distort the sweeps; lidar without it decides whether it is used again or rejected. While the robot
+/// goes straight nothing is proven and nothing is distorted.
 ///
-/// A unit whose accelerations are of another unit is downgraded: they are not used. One that goes on turning otherwise
-/// than lidar sees is refused for good. What was observed stands in verdict(), in plain words, with what may be the
-/// cause: who of the two is right is not known, for people who walk around a robot that stands mislead lidar. One
-/// owner.
+/// Accelerations in a wrong unit are not used, the gyro still is. A unit that continues to disagree with lidar is
+/// rejected until a restart. verdict() describes the observation in plain words, with possible causes: it is not known
+/// which of the two is right, since people who walk around a standing robot mislead lidar. One owner.
 class ImuSelfCheck : public HealthMetric {
  public:
   ImuSelfCheck(const Pose& T_base_imu, UseAcceleration use_acceleration);
@@ -33,19 +32,20 @@ class ImuSelfCheck : public HealthMetric {
   void forget() override;
 
   [[nodiscard]] std::string_view verdict() const override;
-  /// Until gravity is weighed, only while the mean so far may be gravity: forces in another unit are a free fall.
+  /// Returns false, until gravity has been weighed, if the mean so far cannot be gravity: forces in another unit look
+  /// like free fall.
   [[nodiscard]] bool trusts_accelerometer() const override;
 
  private:
-  /// What gyro and lidar are seen to differ in.
+  /// Observed difference between gyro and lidar.
   enum class Difference : std::uint8_t { any, gyro_still, opposite, degrees };
 
-  /// How far the gyro had turned when; lidar speaks of what was a few sweeps ago.
+  /// Integrated angle of the gyro at an instant; lidar's feedback refers to a few sweeps ago.
   struct Turned {
     Stamp stamp;
     Eigen::Vector3d angle_rad; ///< base axes
   };
-  /// What gyro and lidar saw of the turns about one axis.
+  /// Turns about one axis, measured by gyro and lidar.
   struct Turns {
     double lidar_lidar = 0.0, gyro_lidar = 0.0, gyro_gyro = 0.0; ///< sums of products
     int sweeps = 0;
@@ -88,10 +88,10 @@ class ImuSelfCheck : public HealthMetric {
   Eigen::Vector3d angle_rad_ = Eigen::Vector3d::Zero();
   std::optional<Stamp> last_;
   bool was_lost_ = false;
-  std::optional<Stamp> back_since_; ///< after it was lost
+  std::optional<Stamp> back_since_; ///< after a loss of health
   std::array<Turns, 3> turns_;      ///< by axis of the base
   bool set_aside_ = false;
-  int rounds_ = 0; ///< of being set aside without a result
+  int rounds_ = 0; ///< quarantines without a result
 };
 
 } // namespace locus

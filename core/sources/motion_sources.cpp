@@ -35,7 +35,7 @@ void MotionSources::advance(Stamp now) {
   }
 }
 
-/// Inputs may come a little out of order. What lies further back is told by a clock that was set.
+/// Updates the time. Inputs may be slightly out of order; a larger step back means that the clock was set.
 void MotionSources::tell_time(Stamp now) {
   if (now > now_ || now < now_ - HealthMonitor::kLongestTimeout)
     now_ = now;

@@ -16,40 +16,41 @@ namespace locus {
 /// All motion sources of the robot in a static priority queue, each with its health (paper II-B.1, health monitoring
 /// and priority queue).
 ///
-/// With Fusion::combined the best inertial source gives the rotation and the best odometry the translation; with
-/// Fusion::queue the first healthy one in the queue gives all it has. One owner.
+/// With Fusion::combined the best inertial source provides the rotation and the best odometry the translation; with
+/// Fusion::queue the first healthy source in the queue provides all that it measures. One owner.
 class MotionSources {
  public:
-  /// Told of each change of health once, in the thread that calls.
+  /// Receives each change of health once, in the calling thread.
   using HealthSink = std::function<void(const HealthEvent&)>;
 
   MotionSources(const std::vector<MotionSourceOptions>& options, Fusion fusion, const MotionLimits& limits = {},
                 HealthSink health_sink = {});
 
-  /// The kind of the source must fit the sample.
+  /// Add a sample; its type must fit the kind of the source.
   void add(SourceId source, const ImuSample& sample) { take(source, sample); }
   void add(SourceId source, const OdometrySample& sample) { take(source, sample); }
 
-  /// Tells the time, in stamps of arrival: a silence is noticed.
+  /// Sets the time, in stamps of arrival, so that silence is detected.
   void advance(Stamp now);
 
-  /// What lidar says of the sources.
+  /// Passes lidar's feedback on to the sources.
   void hear(const RegistrationFeedback& feedback);
 
-  /// What somebody else says of a source, until the next word (health_topic).
+  /// Sets the external verdict on a source, valid until the next one (health_topic).
   void set_outside_verdict(SourceId source, bool healthy);
 
-  /// The healthy ones whose tracks reach `now` and go on doing so: with two samples in the time for which tracks are
-  /// extrapolated. A slower or silent source would correct a sweep with a standstill; that is left to Odometry.
+  /// Chooses the healthy sources whose tracks reach `now` and will continue to: the interval between the latest two
+  /// samples is within the limit of extrapolation. A slower or silent source would correct a sweep with zero motion;
+  /// that is left to Odometry.
   [[nodiscard]] SourceChoice choose(Stamp now) const;
 
-  /// T_from_to of the base after the chosen sources; nothing where a track does not reach one of the instants.
+  /// Returns T_from_to of the base, measured by the chosen sources; nothing if a track does not cover both instants.
   [[nodiscard]] std::optional<Pose> motion(const SourceChoice& choice, Stamp from, Stamp to) const;
 
-  /// Up to when the motion of a source is known without extrapolation; nothing while it is not.
+  /// Returns the latest instant for which the motion of a source is known without extrapolation; nothing if unknown.
   [[nodiscard]] std::optional<Stamp> newest(SourceId source) const { return sources_[index_of(source)].track.newest(); }
 
-  /// What all of them say of (from, to]: poses at its end, and the specific force meanwhile.
+  /// Returns the measurements of all sources in (from, to]: poses at its end, and the specific force during it.
   [[nodiscard]] SensedMotion sensed_in(Stamp from, Stamp to) const;
 
   [[nodiscard]] const HealthMonitor& health(SourceId source) const { return sources_[index_of(source)].health; }
@@ -61,7 +62,7 @@ class MotionSources {
 
     HealthMonitor health;
     MotionTrack track;
-    std::uint32_t epoch = 0; ///< that the track belongs to
+    std::uint32_t epoch = 0; ///< of the samples in the track
   };
 
   template <class Sample> void take(SourceId source, Sample sample);
@@ -71,10 +72,10 @@ class MotionSources {
   Fusion fusion_;
   HealthSink health_sink_;
   std::vector<Source> sources_;
-  Stamp now_; ///< of the latest arrival heard of
+  Stamp now_; ///< latest arrival
 };
 
-/// Picks from `count` sources in priority order those that `usable(SourceId)` allows.
+/// Chooses from `count` sources, in priority order, those that `usable(SourceId)` allows.
 template <class Kinds, class Usable>
 SourceChoice choose_sources(const Kinds& kind_of, std::size_t count, Fusion fusion, const Usable& usable) {
   SourceChoice choice;

@@ -75,7 +75,7 @@ Pose MotionTrack::extrapolated(Stamp stamp) const {
   return age < size_ ? between(from_newest(age), newest, stamp) : newest.T_source_base;
 }
 
-/// On the line through two nodes, or beyond.
+/// Interpolates or extrapolates on the line through two nodes.
 Pose MotionTrack::between(const Node& before, const Node& after, Stamp stamp) {
   const double fraction = to_seconds(stamp - before.stamp) / to_seconds(after.stamp - before.stamp);
   return interpolate(before.T_source_base, after.T_source_base, fraction);
@@ -130,7 +130,7 @@ std::optional<SpecificForce> MotionTrack::specific_force(Stamp from, Stamp to) c
                        .late = late_};
 }
 
-/// On the line between two samples; beyond the first and the last, as they are.
+/// Interpolates between two samples; before the first and after the last, returns that sample.
 Eigen::Vector3d MotionTrack::force_at(Stamp stamp) const {
   const std::size_t age = age_at(stamp);
   if (age == size_)
@@ -144,8 +144,8 @@ Eigen::Vector3d MotionTrack::force_at(Stamp stamp) const {
          fraction * (after.specific_force_base_mps2 - before.specific_force_base_mps2);
 }
 
-/// From the second differences of the samples of a while, which are six times their variance: vibration, and what a
-/// slow unit misses between its samples. A steady change has none.
+/// Estimates the noise from the second differences of recent samples, whose variance is six times that of the samples:
+/// vibration, and what a slow unit misses between its samples. A steady change contributes nothing.
 Eigen::Vector3d MotionTrack::force_noise_per_s(Stamp to) const {
   Eigen::Vector3d squares = Eigen::Vector3d::Zero();
   const std::size_t newest = age_at(to);

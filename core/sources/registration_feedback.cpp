@@ -5,8 +5,9 @@ namespace locus {
 
 namespace {
 
-/// What a source may be off by in a sweep before lidar objects, one standard deviation. Above what a healthy one is off
-/// by on bad ground, well below spinning wheels: a prior that is merely poor has its weight for that.
+/// Error in a sweep that a source is allowed before lidar disagrees, one standard deviation. Larger than the error of a
+/// healthy source on bad ground, much smaller than that of spinning wheels: a prior that is merely poor has a low
+/// weight.
 const Vector6 kHonestError = along_each_axis(0.01, 0.2);
 
 } // namespace

@@ -13,12 +13,12 @@
 
 namespace locus {
 
-inline constexpr std::size_t kMaxSources = 8; ///< motion sources of a robot, at most
+inline constexpr std::size_t kMaxSources = 8; ///< motion sources per robot, at most
 
-/// The part of the robot's motion during a sweep that no motion source could take out of its points.
+/// Part of the robot's motion during a sweep that no motion source corrected.
 enum class Uncorrected : std::uint8_t { nothing, translation, all };
 
-/// Which sources stand for the motion of the base; nothing where none is healthy.
+/// Sources that determine the motion of the base; nothing where none is healthy.
 struct SourceChoice {
   std::optional<SourceId> rotation;
   std::optional<SourceId> translation;
@@ -30,32 +30,32 @@ struct SourceChoice {
   }
 };
 
-/// Where one motion source saw the base at the end of a sweep.
+/// Pose of the base at the end of a sweep, measured by one motion source.
 struct SourcePose {
-  bool known = false;      ///< with a sample inside the sweep
-  bool usable = false;     ///< known, and healthy
-  std::uint32_t epoch = 0; ///< HealthMonitor::epoch; poses of different epochs have nothing to do with each other
-  Pose T_source_base;      ///< an inertial source gives rotation only
-  Vector6 twist_base = Vector6::Zero(); ///< in the last kMoment of the sweep
-  Duration late{};                      ///< taken out of its stamps
+  bool known = false;                   ///< there is a sample inside the sweep
+  bool usable = false;                  ///< known, and the source is healthy
+  std::uint32_t epoch = 0;              ///< HealthMonitor::epoch; poses of different epochs are not comparable
+  Pose T_source_base;                   ///< an inertial source gives rotation only
+  Vector6 twist_base = Vector6::Zero(); ///< mean over the last kMoment of the sweep
+  Duration late{};                      ///< stamp delay that has been removed
 
   static constexpr Duration kMoment = std::chrono::milliseconds{50};
 };
 
-/// The mean twist of the base from the end of one sweep to that of another, as a source has it (base axes).
+/// Mean twist of the base between the ends of two sweeps, measured by one source (base axes).
 struct SensedTwist {
   Vector6 mean = Vector6::Zero();
-  Vector6 change_per_s = Vector6::Zero();    ///< from one end to the other
-  Vector6 brought_forward = Vector6::Zero(); ///< the part of the mean that is due to what was taken out of the stamps
+  Vector6 change_per_s = Vector6::Zero();    ///< rate of change from one end to the other
+  Vector6 brought_forward = Vector6::Zero(); ///< part of the mean that is due to the removed stamp delay
 
   SensedTwist(Vector6 twist_base) : mean(std::move(twist_base)) {}
 };
 
-/// What all motion sources say of a sweep.
+/// Measurements of all motion sources for a sweep.
 struct SensedMotion {
   std::array<SourcePose, kMaxSources> sources; ///< by index in the configuration
   std::optional<SpecificForce> specific_force; ///< during the sweep, from the first usable inertial source
-  std::optional<Eigen::Vector3d> up_base;      ///< unit vector, from that source's attitude where it has one
+  std::optional<Eigen::Vector3d> up_base;      ///< unit vector, from the first healthy source with an attitude
 };
 
 } // namespace locus

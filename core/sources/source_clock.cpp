@@ -8,7 +8,7 @@ namespace locus {
 
 namespace {
 
-/// Offsets of samples in a row that differ by less than this agree.
+/// Largest difference between the offsets of consecutive samples that agree.
 constexpr Duration kAgreement = std::chrono::milliseconds{50};
 
 bool credible(Duration latency) { return latency >= -SourceClock::kMaxAhead && latency <= SourceClock::kMaxLatency; }
@@ -28,7 +28,7 @@ std::optional<Stamp> SourceClock::on_host_clock(Stamp stamp, Stamp arrival) {
   const Duration ahead = stamp - arrival;
   const bool agrees = suspects_ > 0 && std::chrono::abs(ahead - suspect_) < kAgreement;
   suspects_ = agrees ? suspects_ + 1 : 1;
-  suspect_ = agrees ? std::max(suspect_, ahead) : ahead; // the sample that took the shortest way knows best
+  suspect_ = agrees ? std::max(suspect_, ahead) : ahead; // the sample with the least latency is the best
   if (suspects_ < kSamplesToLearn)
     return std::nullopt;
   const bool at_its_word = credible(-suspect_);
@@ -44,7 +44,7 @@ std::optional<Stamp> SourceClock::on_host_clock(Stamp stamp, Stamp arrival) {
   return stamp - offset_;
 }
 
-/// The first window says how long samples take.
+/// Restarts the drift estimation: the first window determines the usual latency.
 void SourceClock::begin_anew(Stamp arrival, Duration latency) {
   window_began_ = arrival;
   least_latency_ = least_in_window_ = latency;

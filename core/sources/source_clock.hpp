@@ -8,27 +8,27 @@
 
 namespace locus {
 
-/// Puts the stamps of a motion source on the host's clock.
+/// Converts the stamps of a motion source to the host's clock.
 ///
-/// A source whose samples arrive within a second of their stamps is taken at its word. Any other has a clock of its
-/// own: its stamps are held back until a few samples in a row agree how far off it is, then that is taken out of them.
-/// So a clock that steps costs a few samples, not the source. A clock that runs a little faster or slower is followed:
-/// the sample of a while that took the shortest way is to have taken as long as that of the first. One owner.
+/// Stamps of a source whose samples arrive within a second of them are accepted unchanged. Any other source has a clock
+/// of its own: its samples are dropped until a few consecutive ones agree on its offset, which is then removed. So a
+/// clock step costs a few samples, not the source. Drift is compensated: the least latency of each window is assumed to
+/// equal that of the first window. One owner.
 class SourceClock {
  public:
   static constexpr Duration kMaxLatency = std::chrono::seconds{1};
-  static constexpr Duration kMaxAhead = std::chrono::milliseconds{10}; ///< of its arrival, by rounding and jitter
+  static constexpr Duration kMaxAhead = std::chrono::milliseconds{10}; ///< of the arrival, by rounding and jitter
   static constexpr int kSamplesToLearn = 5;
   static constexpr Duration kWindow = std::chrono::seconds{20};
-  static constexpr Duration kLeastDrift = std::chrono::milliseconds{5}; ///< in the windows since the last correction
-  static constexpr Duration kMostDrift = std::chrono::milliseconds{15}; ///< more is a delay
+  static constexpr Duration kLeastDrift = std::chrono::milliseconds{5}; ///< smaller drift accumulates over windows
+  static constexpr Duration kMostDrift = std::chrono::milliseconds{15}; ///< more is a delay, not drift
 
-  /// The instant of the measurement; nothing while the clock is in doubt.
+  /// Returns the instant of the measurement; nothing while the offset is uncertain.
   std::optional<Stamp> on_host_clock(Stamp stamp, Stamp arrival);
 
-  /// How far the source's clock is ahead of the host's.
+  /// Returns how far the source's clock is ahead of the host's.
   [[nodiscard]] Duration offset() const { return offset_; }
-  /// Since the clock was first known.
+  /// Returns the number of clock steps since the offset was first known.
   [[nodiscard]] std::uint64_t steps() const { return steps_; }
 
  private:
@@ -37,11 +37,11 @@ class SourceClock {
 
   bool known_ = false;
   Duration offset_{};
-  Duration least_latency_{}; ///< on the present offset, of the first window
+  Duration least_latency_{}; ///< with the present offset, in the first window
   Stamp window_began_;
   Duration least_in_window_{};
   bool first_window_ = true;
-  Duration suspect_{}; ///< offset without latency, after the samples held back
+  Duration suspect_{}; ///< offset without latency, from the dropped samples
   int suspects_ = 0;
   std::uint64_t steps_ = 0;
 };

@@ -12,18 +12,18 @@
 
 namespace locus {
 
-/// What can be wrong with a motion source.
+/// Reasons why a sample is rejected or a motion source loses its health.
 enum class HealthReason : std::uint8_t {
-  stale,        ///< silent for too long, or a sample that came too late
-  jump,         ///< a motion that no robot can make
-  nan,          ///< not a number, or one beyond all sense
-  frozen,       ///< the same reading again, though the robot moves
-  out_of_order, ///< a stamp that does not follow from the ones before
-  covariance,   ///< much less certain than usual, as the source itself says
-  disagreement, ///< it and lidar saw different motions: who is right is not known
-  outside,      ///< somebody else says so
-  self_check,   ///< ImuSelfCheck has refused it
-  speed         ///< a speed that the robot is not able to, see MotionLimits
+  stale,        ///< silent for too long, or a sample that arrived too late
+  jump,         ///< a motion that is physically impossible
+  nan,          ///< not a number, or an implausibly large one
+  frozen,       ///< a repeated reading although the robot moves
+  out_of_order, ///< a stamp that is not consistent with the previous ones
+  covariance,   ///< reported covariance much larger than usual
+  disagreement, ///< motion differs from lidar's; either may be wrong
+  outside,      ///< rejected by an external monitor
+  self_check,   ///< rejected by ImuSelfCheck
+  speed         ///< a speed beyond MotionLimits
 };
 constexpr auto names_of(HealthReason) {
   return std::to_array<std::string_view>({"stale", "jump", "nan", "frozen", "out_of_order", "covariance",
@@ -31,31 +31,31 @@ constexpr auto names_of(HealthReason) {
 }
 inline constexpr std::size_t kHealthReasonCount = names_of(HealthReason{}).size();
 
-/// Of a source that is lost for HealthReason::speed, in words for the user.
+/// Verdict on a source that is lost for HealthReason::speed, for the user.
 inline constexpr std::string_view kTooFast =
     "claims a higher speed than motion.max_speed_mps, and is not used while it does "
     "(set that to what the robot is able to, or look at the unit of the source)";
 
-/// What became of the samples of one motion source.
+/// Counters of the samples of one motion source.
 struct SourceCounters {
   std::uint64_t received = 0; ///< samples
-  /// Samples left out, by reason, and once each the silences and disagreements that cost the source its health.
+  /// Rejected samples by reason; a silence or a disagreement that costs the source its health counts once.
   std::array<std::uint64_t, kHealthReasonCount> rejected{};
-  std::uint64_t health_changes = 0; ///< lost and regained
-  std::uint64_t clock_steps = 0;    ///< of the source's clock against the host's
+  std::uint64_t health_changes = 0; ///< losses and recoveries
+  std::uint64_t clock_steps = 0;    ///< of the source's clock relative to the host's
 
   [[nodiscard]] std::uint64_t rejected_as(HealthReason reason) const {
     return rejected[static_cast<std::size_t>(reason)];
   }
 };
 
-/// A motion source has lost its health or regained it.
+/// Loss or recovery of a motion source's health.
 struct HealthEvent {
   SourceId source{};
-  Stamp stamp; ///< when it was found out, in stamps of arrival
+  Stamp stamp; ///< time of detection, in stamps of arrival
   bool healthy = false;
-  HealthReason reason = HealthReason::stale; ///< why it was lost
-  std::string_view verdict;                  ///< of HealthMonitor, where a self-check is the reason
+  HealthReason reason = HealthReason::stale; ///< of the loss
+  std::string_view verdict;                  ///< of HealthMonitor, if the reason is a self-check
 };
 
 } // namespace locus
