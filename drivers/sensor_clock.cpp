@@ -25,8 +25,7 @@ constexpr double kSettlingSlew = 0.05;
 constexpr double kMaxDrift = 500e-6;
 constexpr Duration kMaxOffsetError = milliseconds{5};
 constexpr Duration kMaxUtcError = milliseconds{20};
-constexpr Duration kLongestDelay =
-    std::chrono::seconds{30}; ///< longest delay of all packets of a lidar whose time is correct
+constexpr Duration kLongestDelay = std::chrono::seconds{30}; ///< longest delay of all packets of a lidar on UTC
 
 /// Returns `time` plus the number of whole hours that brings it closest to `target`.
 Duration nearest_hour(Duration time, Duration target) {

@@ -19,8 +19,7 @@ namespace locus {
 struct SpinningBeams {
   template <class T> using PerFiring = std::array<T, LidarPacket::kMaxLasers>;
 
-  PerFiring<float>
-      share_of_column; ///< time from the column's azimuth to the firing, as a share of the column's duration
+  PerFiring<float> share_of_column; ///< time from the column's azimuth to the firing / duration of the column
   PerFiring<float> cos_azimuth_offset, sin_azimuth_offset;
   PerFiring<float> cos_elevation, sin_elevation;
   PerFiring<std::int32_t> offset_ns;
