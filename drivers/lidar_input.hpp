@@ -28,8 +28,8 @@
 
 namespace locus {
 
-/// Default UDP ports of a Velodyne. Position packets are accepted on 8308 and at the same distance from a configured
-/// data port.
+/// Default UDP ports of a Velodyne. Position packets are accepted on 8308 and at the same offset from a configured data
+/// port.
 inline constexpr std::uint16_t kDefaultDataPort = 2368;
 inline constexpr std::uint16_t kDefaultPositionPort = 8308;
 
@@ -113,7 +113,7 @@ class LidarInput {
   [[nodiscard]] std::string_view return_mode() const;
   /// Model that its packets report, if they do, whether or not they are decoded as that model.
   [[nodiscard]] std::string_view recognised_model() const;
-  /// PpsState of a Velodyne; TimeScale of the clock of a lidar whose packets carry the date.
+  /// State of the lidar's clock: PpsState of a Velodyne, TimeScale of a lidar whose packets carry the date.
   [[nodiscard]] std::string_view clock_state() const;
   [[nodiscard]] bool tells_date() const { return velodyne() == nullptr; }
   /// Rotation rate of the last good packet; 0 before the first.
@@ -158,7 +158,7 @@ class LidarInput {
   const LidarPacket* ready_ = nullptr; ///< decoded from the current datagram
   PacketCounters counters_;
   std::optional<velodyne::PositionPacket> position_;
-  TimeScale time_scale_ = TimeScale::free_running; ///< for packets that carry the date
+  TimeScale time_scale_ = TimeScale::free_running; ///< only for packets that carry the date
   UnknownPackets unknown_hesai_;                   ///< the latest packets rejected for their model
   std::array<ImuSample, ouster::ImuMeasurements::kMost> imu_samples_;
   std::size_t imu_count_ = 0;

@@ -40,7 +40,7 @@ struct LidarOptions {
   LidarTime time = LidarTime::automatic;
   std::string calibration; ///< file with the laser angles of this unit; empty: built-in table of the model
   std::string metadata;    ///< an Ouster's metadata file, see ouster::read_metadata(); empty for other makers
-  std::string topic;       ///< of clouds that another program makes from its packets; empty: it sends packets
+  std::string topic;       ///< topic of clouds made from its packets elsewhere; empty: packets are received
   PointTimesFrom point_times = PointTimesFrom::automatic; ///< source of the point times of these clouds
   Pose T_base_lidar;
   std::uint16_t imu_port = 0; ///< no key: from an Ouster's metadata; 0: no IMU

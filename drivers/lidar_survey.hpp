@@ -29,7 +29,7 @@ struct HeardLidar {
   std::string_view model;              ///< Velodyne or Hesai; empty: no packet could be decoded
   std::optional<std::uint64_t> ouster; ///< serial number of an Ouster, 0 if its packets carry none
   std::size_t beams = 0;               ///< Ouster only
-  std::size_t columns_per_turn = 0;    ///< Ouster only; 0 if less than two turns were received
+  std::size_t columns_per_turn = 0;    ///< Ouster only; 0 until two starts of a turn were received
   std::string_view return_mode;        ///< only if `model` is known
   double rotation_rate_rpm = 0, packets_per_s = 0;
   std::optional<velodyne::PpsState> pps; ///< Velodyne only; empty: no position packet was received
@@ -65,12 +65,12 @@ class LidarSurvey {
       std::uint16_t frame_id;
       Duration begin;
     };
-    std::optional<std::uint16_t> frame_id; ///< of the latest packet
+    std::optional<std::uint16_t> frame_id; ///< frame ID of the latest packet
     std::optional<Turn> first, last;       ///< turns whose first packet was received
     Duration column{};                     ///< time from one column to the next
 
     void take(const ouster::PacketFormat& format, std::span<const std::byte> packet);
-    [[nodiscard]] double turns_per_s() const; ///< 0 until the starts of three turns were received
+    [[nodiscard]] double turns_per_s() const; ///< 0 until two starts of a turn were received
     [[nodiscard]] std::size_t columns_per_turn() const;
   };
   struct Sender {
@@ -89,8 +89,8 @@ class LidarSurvey {
     void read_ouster(const ouster::PacketFormat& format, const Datagram& datagram);
   };
 
-  std::map<std::pair<std::uint32_t, std::uint16_t>, std::unique_ptr<Sender>> senders_; ///< by address and port
-  std::map<std::uint32_t, velodyne::PpsState> pps_;                                    ///< by address
+  std::map<std::pair<std::uint32_t, std::uint16_t>, std::unique_ptr<Sender>> senders_; ///< keyed by address and port
+  std::map<std::uint32_t, velodyne::PpsState> pps_;                                    ///< keyed by address
 };
 
 } // namespace locus

@@ -77,7 +77,7 @@ class SensorClock {
   LidarTime mode_;
   bool synchronised_ = false;
   bool knows_utc_ = false; ///< automatic mode: offset_ comes from the lidar's own UTC time
-  Stamp agreed_at_;        ///< when reception last confirmed that time
+  Stamp agreed_at_;        ///< latest reception that confirmed that time
   std::uint64_t steps_ = 0;
   Duration set_by_{};  ///< total step of the host's clock since the first stamp
   Stamp last_receive_; ///< reception of the latest packet, accepted or not

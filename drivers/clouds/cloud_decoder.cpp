@@ -242,9 +242,9 @@ bool CloudDecoder::time_by_azimuth() {
 }
 
 /// Decides whether the header's stamp is that of the first or of the last point. A cloud cannot arrive before its last
-/// point: if counting from the header's stamp implies that, but the stamp itself precedes the arrival, the stamp is the
-/// last point's. The first cloud decides alone; a change needs kEvidence contrary clouds in a row, and changing back to
-/// the first point needs as many as confirmed the last point.
+/// point: if the stamp, taken as the first point's, puts the last point after the arrival, although the stamp itself
+/// precedes the arrival, it is the last point's. The first cloud decides alone; a change needs kEvidence contrary
+/// clouds in a row, and a change back to the first point as many as confirmed the last point.
 Stamp CloudDecoder::stamped_at_begin(Stamp begin, Stamp header, Stamp arrival) {
   constexpr int kEvidence = 5;
   const Duration length{*std::ranges::max_element(points_.offset_ns)};

@@ -95,14 +95,14 @@ class CloudDecoder {
   std::optional<CloudLayout> layout_;  ///< layout of the previous cloud
   std::optional<PointTimes> times_;    ///< latest interpretation in that layout
   std::uint64_t unit_votes_ = 0;       ///< clouds whose span in its unit is a turn, minus those with too short a span
-  StampedAt stamped_at_;               ///< in that layout
+  StampedAt stamped_at_;               ///< evidence in that layout
   SourceClock clock_;
   PointTiming timing_ = PointTiming::field;
 
   LidarPacket::Cloud cloud_; ///< current cloud
   std::size_t next_ = 1;     ///< index into points_.order
   LidarPacket packet_;
-  std::array<FiringGroup*, LidarPacket::kMaxLasers / FiringGroup::kLasers> open_{}; ///< by bank, current packet
+  std::array<FiringGroup*, LidarPacket::kMaxLasers / FiringGroup::kLasers> open_{}; ///< indexed by bank, current packet
 
   Duration period_ = std::chrono::milliseconds{100};
   bool period_is_known_ = false;

@@ -16,13 +16,13 @@ namespace locus {
 ///
 /// | driver | ring | time |
 /// |---|---|---|
-/// | velodyne_pointcloud | ring: uint16 | time: float32, s to the header's stamp, before it or after it |
+/// | velodyne_pointcloud | ring: uint16 | time: float32, s relative to the header's stamp, of either sign |
 /// | ouster-ros | ring: uint8 or uint16 | t: uint32, ns since the header's stamp |
 /// | Hesai, RoboSense | ring: uint16 | timestamp: float64, s since 1970 |
 /// | nebula | channel: uint16 | time_stamp: uint32, ns since the header's stamp |
 /// | livox_ros_driver | line: uint8 | timestamp: float64, ns since 1970; offset_time: uint32, ns |
 ///
-/// Interpretation of the time numbers: see PointTimes.
+/// Units and epochs of the times are inferred from their values, see PointTimes.
 struct CloudLayout {
   using Type = CloudView::Type;
   struct Column {
@@ -47,7 +47,7 @@ inline constexpr std::size_t kMaxCloudPoints = std::size_t{1} << 20;
 
 inline std::size_t points_of(const CloudView& message) { return std::size_t{message.height} * message.width; }
 
-/// Calls `take(value)` with each point's number in one column, in the order of the message. Precondition: `column`
+/// Calls `take(value)` with each point's value in one column, in the order of the message. Precondition: `column`
 /// belongs to the layout that layout_of() returned for this message.
 template <class Take> void for_each_in(const CloudView& message, CloudLayout::Column column, const Take& take) {
   const auto read_as = [&]<class Number>(Number value) {

@@ -30,7 +30,7 @@ class Rings {
   };
 
   /// Writes the laser of each point, 0 .. kMax - 1, to `lasers`. `told`: ring from the field or row; empty if there is
-  /// neither. Values out of range are ignored.
+  /// neither. All are ignored if any is out of range.
   void tell(Positions points, std::span<const float> told, RingsFrom told_by, std::vector<std::uint8_t>& lasers);
 
   /// Ring of a laser, ordered by mean observed elevation; 0 is the lowest.

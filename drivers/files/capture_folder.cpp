@@ -57,7 +57,7 @@ path existing(const path& folder, const char* name) {
   return std::filesystem::exists(folder / name, ignored) ? folder / name : path{};
 }
 
-/// Returns the same as a list.
+/// Returns existing() as a list.
 std::vector<path> all_existing(const path& folder, const char* name) {
   const path file = existing(folder, name);
   return file.empty() ? std::vector<path>{} : std::vector<path>{file};
@@ -123,7 +123,7 @@ Expected<CaptureFolder, std::string> folder_of(const path& where) {
   return found;
 }
 
-/// Appends a piece to the recording. Ground truth covers the whole run; the one of the last piece is used.
+/// Appends a piece to the recording. Ground truth, which only one piece contains, is taken from the last piece.
 void append(CaptureFolder& recording, CaptureFolder piece) {
   recording.ground_truth = std::move(piece.ground_truth);
   recording.map_truth = std::move(piece.map_truth);

@@ -41,7 +41,7 @@ struct CaptureFolder {
 /// Returns true if the file is named like a capture: .pcap or .pcapng, optionally followed by .gz, .xz, .zst or .zstd.
 bool is_named_as_capture(const std::filesystem::path& file);
 
-/// Lists the captures in `folder` whose name starts with "lidar."; more than one is a contradiction.
+/// Lists the captures named "lidar" in `folder`; more than one is a contradiction.
 std::vector<std::filesystem::path> captures_in(const std::filesystem::path& folder);
 
 /// Returns the name of an Ouster's metadata file, derived from the name of the lidar.

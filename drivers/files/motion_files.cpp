@@ -210,7 +210,8 @@ template <class Sample> class MotionSamples<Sample>::Rows {
     }
   }
 
-  /// Ends a file. If both files were cut off, one is shorter; its missing rows are reported, not an error.
+  /// Ends a file. A file and its meta file that were not fully written differ in length; that is reported, not an
+  /// error.
   void end_file() {
     note(*samples_);
     Meta row;
@@ -238,7 +239,7 @@ template <class Sample> class MotionSamples<Sample>::Rows {
   std::size_t next_file_ = 0;
   std::optional<RowReader<Sample>> samples_; ///< empty between two files
   std::optional<RowReader<Meta>> meta_;
-  std::optional<Stamp> latest_; ///< of the samples of this file
+  std::optional<Stamp> latest_; ///< latest sample of this file
   bool in_step_ = true;
   Problem problem_;
   std::vector<std::string> breaks_;

@@ -78,7 +78,7 @@ template <class Sample> Expected<std::vector<Sample>, std::string> parse_samples
 /// Pose of the base at one instant.
 struct StampedPose {
   Stamp stamp;
-  Pose T_source_base; ///< in the frame of the motion source
+  Pose T_source_base; ///< frame of the motion source
 };
 
 /// Formats one line of such a file including the line feed, with `decimals` decimals for each number; without them,

@@ -34,7 +34,8 @@ struct UdpAddresses {
   std::uint16_t destination_port = 2368;
 };
 
-/// IPv4 packet around a UDP datagram, without checksums. `ip_options` must be a multiple of four bytes.
+/// Wraps a UDP payload in an IPv4 packet without checksums. The length of `ip_options` must be a multiple of four
+/// bytes.
 Bytes ipv4_udp(const UdpAddresses& addresses, std::span<const std::byte> payload,
                std::span<const std::byte> ip_options = {});
 

@@ -101,8 +101,8 @@ Expected<Datagram, FrameError> datagram_in_udp(ByteSpan udp, std::size_t ip_payl
     return FrameError::malformed;
   }
   const std::size_t udp_bytes = big_endian_16(udp, 4);
-  // A VLP-16 of 2014 puts the IP length of its data packets into its position packets, so that length alone is no
-  // limit.
+  // A VLP-16 of 2014 puts the IP length of its data packets into its position packets, so that length alone is
+  // unreliable.
   if (udp_bytes < kUdpHeaderBytes || udp_bytes > std::min(ip_payload_bytes, udp.size() + cut_bytes)) {
     return FrameError::malformed;
   }

@@ -43,7 +43,7 @@ class IpFragments {
   /// next call.
   std::optional<Datagram> take(int link_type, std::span<const std::byte> frame);
 
-  /// Number of fragments so far that were completed to a datagram by another one.
+  /// Number of fragments joined to datagrams so far, excluding the one that completes each datagram.
   [[nodiscard]] std::uint64_t joined() const { return joined_; }
 
  private:

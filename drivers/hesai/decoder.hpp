@@ -85,7 +85,7 @@ class Decoder {
     std::size_t count = 0;
     std::array<std::uint16_t, kMaxBlocks> azimuth_cdeg{};
     std::array<std::int32_t, kMaxBlocks> offset_ns{}; ///< from the first azimuth's instant to this one's
-    Duration duration{};                              ///< of all columns
+    Duration duration{};                              ///< duration of all columns
   };
 
   std::optional<PacketError> read_heading(Packet packet, Heading& heading) const;
@@ -102,9 +102,9 @@ class Decoder {
   std::optional<Looks> recognised_;
   std::optional<Model> model_;
   std::optional<ReturnMode> mode_;
-  std::array<SpinningBeams, 2> beams_{}; ///< by firing sequence
+  std::array<SpinningBeams, 2> beams_{}; ///< indexed by firing sequence
   std::array<std::int32_t, 2> first_firing_ns_{};
-  std::size_t sequence_ = 0; ///< of the first column of the last good packet
+  std::size_t sequence_ = 0; ///< sequence of the first column of the last good packet
   std::int32_t least_distance_ = 1;
   float distance_unit_m_ = 0.0F;
 

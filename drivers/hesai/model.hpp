@@ -47,7 +47,7 @@ struct Calibration {
 struct FiringSequence {
   Duration column_duration{}; ///< from one column to the next
   std::array<std::int32_t, kMaxChannels> offset_ns{};
-  std::uint8_t silent_banks = 0; ///< one bit per sixteen channels, none of which fires: skipped if all zero
+  std::uint8_t silent_banks = 0; ///< bit mask of banks of sixteen channels that do not fire; skipped if all zero
 };
 
 /// Source of the sequence of a block, of at most two.
@@ -119,8 +119,8 @@ struct Looks {
 /// those of a Pandar40 have no header, but each block starts with FF EE.
 std::optional<Looks> look_at(std::span<const std::byte> payload);
 
-/// Returns true if a packet has the layout of a model, according to its header or the flags of its blocks. Does not
-/// check optional parts of the length.
+/// Returns true if a packet has the layout of a model, by its header or, if there is none, by its first block flag and
+/// its length. The length of packets with a header is checked by parts_of().
 bool has_layout_of(Model model, std::span<const std::byte> payload);
 
 } // namespace locus::hesai

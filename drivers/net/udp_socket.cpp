@@ -139,7 +139,7 @@ std::optional<std::string> UdpSocket::prepare() {
   if (!set(descriptor_, SOL_SOCKET, SO_TIMESTAMPNS, 1))
     return because("no receive timestamps", port_);
   set(descriptor_, SOL_SOCKET, SO_DETACH_FILTER, 0); // left by the previous owner of a socket that systemd holds
-  count_drops();                                     // consumes the drops of the previous owner
+  count_drops();                                     // discards the drops counted for the previous owner
   kernel_drops_ = 0;
   return std::nullopt;
 }

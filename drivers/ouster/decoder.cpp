@@ -19,10 +19,10 @@ constexpr float kMPerMm = 1e-3F;
 /// Limit for the time span of a packet. 16 columns of the slowest mode, 512 columns at 10 Hz, take 3 ms.
 constexpr Duration kLongestPacket = std::chrono::milliseconds{100};
 
-/// Tolerance of a measurement ID against the elapsed time, as the divisor of a turn.
+/// Divisor of a turn that gives the tolerance of a measurement ID against the elapsed time.
 constexpr std::size_t kTurnTolerance = 32;
 
-/// Tolerance of the column spacing against the mode, as the divisor of the spacing.
+/// Divisor of the column spacing of the mode that gives its tolerance.
 constexpr std::int64_t kSpacingTolerance = 10;
 
 } // namespace

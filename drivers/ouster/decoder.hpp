@@ -58,7 +58,7 @@ class Decoder {
   [[nodiscard]] bool has_checksums() const { return has_checksums_; }
   /// Packets rejected since the last good one because the sensor was restarted after its metadata was written.
   [[nodiscard]] std::uint64_t packets_of_other_start() const { return packets_of_other_start_; }
-  /// Returns true if these are so many turns that the sensor must be in another mode.
+  /// Returns true if these span so many turns that the sensor must be in another mode.
   [[nodiscard]] bool is_in_other_mode() const { return packets_of_other_start_ > 2 * packets_per_turn_; }
 
   [[nodiscard]] const PacketFormat& format() const { return format_; }
@@ -117,7 +117,7 @@ class Decoder {
   float beam_origin_radius_m_, beam_origin_height_m_;
   float beam_origin_m_; ///< distance of the beam origin from the lidar frame's centre; included in ranges
   Beams beams_{};
-  std::vector<Turn> encoder_; ///< by measurement ID
+  std::vector<Turn> encoder_; ///< indexed by measurement ID
   std::array<std::array<float, 3>, 3> R_sensor_lidar_{};
   std::array<float, 3> t_sensor_lidar_{};
   int azimuth_zero_cdeg_; ///< azimuth of measurement ID 0, clockwise from the sensor's x axis

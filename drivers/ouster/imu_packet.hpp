@@ -17,7 +17,7 @@ namespace locus::ouster {
 
 /// Measurement of the sensor's IMU in the IMU frame; Metadata::T_sensor_imu transforms it to the sensor frame.
 struct ImuMeasurement {
-  Duration time; ///< of the gyro sample, in the clock that also stamps the columns; >= 0
+  Duration time; ///< time of the gyro sample, in the clock that also stamps the columns; >= 0
   Eigen::Vector3d angular_velocity_radps;
   Eigen::Vector3d specific_force_mps2;
 };
@@ -33,7 +33,7 @@ struct ImuMeasurements {
 /// Offsets in an IMU packet in bytes, and the units of its values: times in ns of 8 bytes, numbers of 4 bytes.
 struct ImuPacketLayout {
   std::size_t bytes;                ///< length of the packet
-  std::size_t first, stride, count; ///< measurements: offset, distance, number
+  std::size_t first, stride, count; ///< measurements: first offset, stride, number
   std::size_t time, force, rate;    ///< offsets in a measurement: gyro time, and two vectors of three numbers
   double force_unit_mps2, rate_unit_radps;
 };

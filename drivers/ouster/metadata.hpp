@@ -66,7 +66,7 @@ struct Metadata {
   }
 };
 
-/// Returns the product's name, e.g. "OS1-128"; "Ouster" if missing in the file. The text has static lifetime.
+/// Returns the product's name, e.g. "OS1-128"; "Ouster" if it is unknown. The text has static lifetime.
 std::string_view name_of(const Metadata& metadata);
 
 /// Reads metadata written by http://SENSOR/api/v1/sensor/metadata or an older client of the maker, for firmware 1.12

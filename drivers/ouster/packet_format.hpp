@@ -32,7 +32,7 @@ struct EchoField {
 /// Description of a profile. Layouts: Ouster, "Firmware User Manual", "Lidar data packet format", and the tables of the
 /// maker's SDK (github.com/ouster-lidar/ouster-sdk, parsing.cpp).
 struct ProfileSpec {
-  std::string_view name; ///< as in the metadata
+  std::string_view name; ///< name in the metadata
   std::size_t pixel_bytes;
   unsigned range_bits;
   unsigned range_shift; ///< range unit is 2^range_shift mm

@@ -29,7 +29,7 @@ struct DecoderOptions {
 /// Description of packets of an unknown model or in an unknown return mode.
 struct UnknownPackets {
   std::uint8_t product_id = 0;  ///< most frequent unknown ID
-  std::uint8_t return_mode = 0; ///< of the latest packet with that ID
+  std::uint8_t return_mode = 0; ///< return mode of the latest packet with that ID
   std::uint64_t packets = 0;    ///< number of packets with that ID
 };
 
@@ -79,7 +79,7 @@ class Decoder {
     PerFiring<float> range_offset_m, radial_offset_m, lateral_offset_m, vertical_offset_m;
     PerFiring<std::uint8_t> laser;
   };
-  using Distances = FiringGroup::PerLaser<std::int32_t>; ///< as wide as the other data, to vectorise
+  using Distances = FiringGroup::PerLaser<std::int32_t>; ///< same width as the other data, to vectorise
 
   std::optional<PacketError> recognise(Packet packet, Duration stamp);
   PacketError refuse_unknown(Packet packet);
@@ -96,7 +96,7 @@ class Decoder {
   PaceRecognition pace_recognition_;
   std::optional<Duration> last_recognised_; ///< stamp of the previous packet, good or not
   std::optional<Model> recognised_;
-  std::array<UnknownPackets, 256> unknown_{}; ///< by product ID
+  std::array<UnknownPackets, 256> unknown_{}; ///< indexed by product ID
   std::optional<Model> model_;
   std::optional<ReturnMode> mode_;
   Pace pace_ = Pace::first;
@@ -105,7 +105,7 @@ class Decoder {
   float distance_resolution_m_ = 0.0F;
   Firings firings_{};
 
-  std::array<std::uint16_t, kBlocks> azimuth_cdeg_{}; ///< by column
+  std::array<std::uint16_t, kBlocks> azimuth_cdeg_{}; ///< indexed by column
   std::array<float, kBlocks> turn_cdeg_{};            ///< from each column to the next
   std::array<std::int32_t, kBlocks> column_offset_ns_{};
   ColumnAzimuth column_azimuth_; ///< current column

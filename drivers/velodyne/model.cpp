@@ -115,8 +115,9 @@ ModelSpec hdl32e() {
 /// one group every 2.665 us and one column every 53.3 us.
 ///
 /// Firmware 5.2.3.0 and later fires one group every 2.89 us: Rev. 4 of the manual, as quoted by the decoder
-/// github.com/valgur/velodyne_decoder (packet_decoder.cpp); three of these are the 8.7 us. The column duration is then
-/// measured: 165.83 us per packet of three columns, mean of 2192 packets, in the recording of a unit of April 2020.
+/// github.com/valgur/velodyne_decoder (packet_decoder.cpp); three of these are the 8.7 us. The column duration at this
+/// pace was measured: 165.83 us per packet of three columns, mean of 2192 packets, in the recording of a unit of April
+/// 2020.
 ModelSpec vls128(Pace pace) {
   const bool slower = pace == Pace::slower;
   const std::size_t slot_ns = slower ? 2'890 : 2'665;

@@ -77,7 +77,7 @@ struct Firing {
 /// is one block of 32 firings, or four blocks (banks) with 128 lasers; in dual return mode each block is doubled, the
 /// last return before the strongest.
 struct ModelSpec {
-  std::string_view name;    ///< as in the configuration file
+  std::string_view name;    ///< name in the configuration file
   std::uint8_t product_id;  ///< second factory byte
   std::size_t banks;        ///< blocks of 32 firings per column
   Duration column_duration; ///< from a column's first firing to that of the next

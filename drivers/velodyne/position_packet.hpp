@@ -47,8 +47,8 @@ struct PositionPacket {
   [[nodiscard]] bool is_synchronised() const { return pps == PpsState::locked && rmc && rmc->valid; }
 };
 
-/// Parses a position packet from any bytes of the right length; its content may be empty. Sensors without the PPS byte
-/// (early HDL-32E) leave it 0.
+/// Parses a position packet from any bytes of the right length; its content may be meaningless. Sensors without the PPS
+/// byte (early HDL-32E) leave it 0.
 PositionPacket parse_position_packet(std::span<const std::byte, kPositionPacketBytes> payload);
 
 } // namespace locus::velodyne
