@@ -15,7 +15,7 @@ namespace {
 constexpr Duration kSenderTimeout = std::chrono::seconds{1};
 constexpr Duration kLongestGapToldByAzimuth = std::chrono::seconds{1};
 constexpr double kAzimuthToleranceCdeg = 100.0;
-constexpr double kSpeedTolerance = 0.02; ///< by which the motor's speed may change over a gap
+constexpr double kSpeedTolerance = 0.02; ///< relative change of the motor's speed over a gap
 
 Expected<hesai::Decoder, std::string> hesai_decoder(const LidarOptions& options) {
   hesai::DecoderOptions known{options.hesai, std::nullopt, options.isa};
@@ -31,9 +31,9 @@ Expected<hesai::Decoder, std::string> hesai_decoder(const LidarOptions& options)
   return hesai::Decoder{known};
 }
 
-/// How many packets were sent between two of these numbers. None where the lidar has begun to count anew.
+/// Returns the number of packets missing between two sequence numbers; 0 if the lidar has restarted its count.
 std::uint64_t sent_between(std::uint32_t before, std::uint32_t now) {
-  constexpr std::uint32_t kMostMissing = 1'000'000; // three minutes of the fastest
+  constexpr std::uint32_t kMostMissing = 1'000'000; // three minutes of the fastest lidar
   const std::uint32_t missing = now - before - 1;
   return missing <= kMostMissing ? missing : 0;
 }
@@ -47,7 +47,7 @@ std::string_view configured_model(const LidarOptions& options) {
 }
 
 Expected<LidarInput, std::string> LidarInput::open(LidarOptions options, std::uint8_t index) {
-  static_cast<void>(hesai::spec(hesai::Model{})); // makes the tables, that no packet need to
+  static_cast<void>(hesai::spec(hesai::Model{})); // builds the tables now, not with the first packet
   auto decoder = decoder_for(options);
   if (!decoder)
     return decoder.error();
@@ -149,7 +149,7 @@ std::optional<std::uint32_t> LidarInput::source_ip() const {
   return options_.source_ip ? options_.source_ip : learnt_ip_;
 }
 
-/// Takes the lidar for one of the maker whose packet this looks like, unless one was read a moment ago.
+/// Switches to the decoder of the maker that this packet belongs to, unless a packet was decoded within the timeout.
 void LidarInput::follow_maker(const Datagram& datagram) {
   if (!options_.is_of_any_maker() || (counters_.data > 0 && datagram.receive_stamp - last_heard_ <= kSenderTimeout))
     return;
@@ -189,9 +189,9 @@ std::optional<PacketError> LidarInput::take_position(const Datagram& datagram) {
   return std::nullopt;
 }
 
-/// A measurement is placed by what the columns have told of the sensor's clock; before the first of these it has no
-/// place. Columns take up to 16 ms longer to be sent (in recordings), so it may come before its time; that it arrives
-/// then keeps it from being taken for one of another clock.
+/// Stamps IMU samples with the sensor's clock as estimated from the column packets; samples before the first column
+/// packet are dropped. Column packets are sent up to 16 ms later than IMU packets (in recordings), so a stamp may lie
+/// after its reception; `arrival` is clamped to it, otherwise the sample would be taken for one of another clock.
 std::optional<PacketError> LidarInput::take_imu(const Datagram& datagram) {
   ouster::ImuMeasurements measurements;
   if (const auto error = ouster::read_imu_packet(ouster()->metadata(), datagram.payload, measurements))
@@ -207,7 +207,7 @@ std::optional<PacketError> LidarInput::take_imu(const Datagram& datagram) {
   return std::nullopt;
 }
 
-/// Its stamp is that of the recording: there is no sensor's clock to reckon it from.
+/// Keeps the stamp of the recording: a decoded packet carries no sensor time.
 std::optional<PacketError> LidarInput::take_decoded(const Datagram& datagram) {
   ready_ = datagram.decoded;
   if (const std::uint8_t index = packet_.lidar; ready_->lidar != index) {
@@ -267,7 +267,7 @@ void LidarInput::refuse_hesai(const hesai::Looks& looks) {
   ++unknown_hesai_.packets;
 }
 
-/// Of the last good packet.
+/// Time of hour of the last good packet.
 Duration LidarInput::time_of_hour() const {
   if (const ouster::Decoder* const sensor = ouster())
     return locus::time_of_hour(sensor->time(), time_scale_);
@@ -276,7 +276,7 @@ Duration LidarInput::time_of_hour() const {
   return velodyne()->time_of_hour();
 }
 
-/// By its looks.
+/// Recognises data packets by length or content.
 bool LidarInput::is_data_packet(const Datagram& datagram) const {
   if (const ouster::Decoder* const sensor = ouster())
     return datagram.payload.size() == sensor->format().packet_bytes;
@@ -357,7 +357,7 @@ bool LidarInput::is_duplicate(std::span<const std::byte> payload) const {
                      [&](const Payload& seen) { return std::memcmp(seen.data(), payload.data(), bytes) == 0; });
 }
 
-/// From the first to the last column of the last good packet.
+/// Rotation from the first to the last column of the last good packet, hundredths of a degree.
 double LidarInput::turn_of_packet_cdeg() const {
   double turned_s = 0.0;
   if (const velodyne::Decoder* const decoder = velodyne()) {
@@ -370,7 +370,7 @@ double LidarInput::turn_of_packet_cdeg() const {
   return rotation_rate_rpm() / 60.0 * velodyne::kCdegPerTurn * turned_s;
 }
 
-/// From a packet to the next, of a Velodyne or a Hesai.
+/// Time from one packet to the next, Velodyne or Hesai.
 Duration LidarInput::nominal_duration() const {
   if (const hesai::Decoder* const sensor = hesai())
     return sensor->nominal_duration();
@@ -378,9 +378,9 @@ Duration LidarInput::nominal_duration() const {
   return velodyne::packet_duration(*decoder.model(), *decoder.return_mode(), decoder.pace());
 }
 
-/// Packets that should lie between the latest one and this one, and do not. The speed may differ over a gap by what the
-/// motor does, or by what the azimuths of a packet, in hundredths of a degree, tell it to: the VLS-128 turns by 0.4
-/// degrees between the first and the last column of a packet, or less.
+/// Returns the number of packets missing between the latest one and this one. The tolerance covers the motor's speed
+/// change over a gap and the azimuth resolution of 0.01 degrees: the VLS-128 turns by 0.4 degrees or less between the
+/// first and the last column of a packet.
 std::uint64_t LidarInput::missing_before(const SensorClock::Reading& reading) const {
   constexpr double kRoundingCdeg = 1.5;
   if (const ouster::Decoder* const sensor = ouster())
@@ -447,7 +447,8 @@ const LidarPacket* LidarRouter::receive(const Datagram& datagram) {
   return nullptr;
 }
 
-/// The lidar of this address, else one on this port that has no address yet, else one on this port (which will refuse).
+/// Finds the lidar with this address, else one on this port without an address, else one on this port (which rejects
+/// the datagram).
 LidarInput* LidarRouter::find(const Datagram& datagram) {
   LidarInput* found = nullptr;
   for (LidarInput& lidar : lidars_) {

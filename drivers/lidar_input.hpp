@@ -28,15 +28,16 @@
 
 namespace locus {
 
-/// Position packets go to this port, or to the one as far from the data port as this is from the default one.
+/// Default UDP ports of a Velodyne. Position packets are accepted on 8308 and at the same offset from a configured data
+/// port.
 inline constexpr std::uint16_t kDefaultDataPort = 2368;
 inline constexpr std::uint16_t kDefaultPositionPort = 8308;
 
-/// The name of the model that the configuration says a lidar is; empty where it says none, and for an Ouster.
+/// Returns the name of the configured model; empty if none is configured, and for an Ouster.
 std::string_view configured_model(const LidarOptions& options);
 
-/// Lengths of what a lidar sends: those of its data packets, then others. The spans are of what is here, so there are
-/// none of a temporary.
+/// Lengths of a lidar's packets in bytes: data packets first, then the others. The spans refer to this object, so calls
+/// on temporaries are deleted.
 struct PacketLengths {
   std::array<std::size_t, 24> storage{};
   std::size_t data = 0, count = 0;
@@ -47,84 +48,84 @@ struct PacketLengths {
   void of_data() && = delete;
 };
 
-/// One lidar: datagrams in, packets of returns with stamps of the host's clock out, every datagram counted.
+/// One lidar: turns datagrams into packets of returns, stamped in the host's clock. Counts every datagram.
 ///
-/// - Sender: without a configured address, the first one that sends a good data packet is the lidar; another takes its
-///   place only after a second of silence.
-/// - A packet that was overtaken by another (up to 100 ms) is counted as reordered and given out like any other: its
-/// stamp
-///   lies before that of the packet given out last. It is no longer counted as lost.
-/// - Lost are the packets missing where their numbers leave a gap, or, without numbers, where the stamps do and the
-/// azimuth, for gaps up to one second, leaves the same.
-/// - A lidar of which nothing tells the maker is of that of the first packets that can be read.
-/// - An Ouster also sends the readings of its inertial unit, which are counted as position packets are.
+/// - Sender: without a configured address, the first sender of a good data packet becomes the lidar; another sender
+///   replaces it only after one second of silence.
+/// - Reordering: a packet overtaken by up to 100 ms is counted as reordered and returned as usual; its stamp precedes
+///   that of the packet before it. It is no longer counted as lost.
+/// - Loss: counted from gaps in the packet numbers. Without numbers, it is counted from gaps in the stamps, confirmed
+///   by the azimuth for gaps of up to one second.
+/// - Maker: if not configured, the maker of the first readable packets.
+/// - Ouster: IMU packets are counted as position packets.
 ///
-/// One owner. Allocates nothing, throws nothing after open().
+/// Single owner, not thread-safe. After open(), allocates nothing and throws nothing.
 class LidarInput {
  public:
-  /// Reads the file of angles, if there is one, and an Ouster's metadata. Fails with one line for the user.
+  /// Reads the calibration file, if there is one, and an Ouster's metadata. Fails with one line for the user.
   static Expected<LidarInput, std::string> open(LidarOptions options, std::uint8_t index);
 
-  /// Takes a datagram; the packet it makes, valid until the next call, or nullptr if it makes none.
+  /// Processes a datagram. Returns the packet decoded from it, valid until the next call, or nullptr if there is none.
   const LidarPacket* receive(const Datagram& datagram);
 
-  /// What the datagram told of the lidar's inertial unit, in that one's frame; of most datagrams, nothing.
+  /// Returns the IMU samples of the latest datagram in the IMU's frame; empty for most datagrams.
   [[nodiscard]] std::span<const ImuSample> imu_samples() const { return {imu_samples_.data(), imu_count_}; }
 
-  /// Whether datagrams to this port can be for this lidar; none is for one that gives clouds.
+  /// Returns true if this lidar accepts datagrams on `port`; always false for a lidar that provides clouds.
   [[nodiscard]] bool listens_to(std::uint16_t port) const;
 
-  /// Lengths of what it sends, or may send while its model is yet to be told.
+  /// Returns the lengths of its packets; of all candidate models while the model is unknown.
   [[nodiscard]] PacketLengths packet_lengths() const;
 
-  /// Address of the lidar: configured, or learnt from its data packets.
+  /// Address of the lidar, host byte order: configured, or learnt from its data packets.
   [[nodiscard]] std::optional<std::uint32_t> source_ip() const;
 
-  /// Who sent the last packet of a lidar that was refused for its sender.
+  /// Source address of the last data packet rejected because of its sender.
   [[nodiscard]] std::optional<std::uint32_t> refused_ip() const { return refused_ip_; }
 
-  /// Somebody else who sends data packets to this lidar's port.
+  /// Another sender of data packets to this lidar's port.
   struct Stranger {
     std::uint32_t ip = 0;      ///< host byte order
-    std::uint64_t packets = 0; ///< that were refused for it
-    Stamp last_heard;          ///< arrival of the last of them
+    std::uint64_t packets = 0; ///< rejected packets from this sender
+    Stamp last_heard;          ///< arrival of the latest of them
   };
   static constexpr std::size_t kMaxStrangers = 4;
   using Strangers = std::array<Stranger, kMaxStrangers>;
 
-  /// The first few, in the order in which they were heard; those without packets are none.
+  /// The first kMaxStrangers other senders, in order of arrival; entries with zero packets are unused.
   [[nodiscard]] const Strangers& strangers() const { return strangers_; }
 
-  /// When the last packet that was taken arrived; Stamp{} before the first.
+  /// Arrival of the latest accepted packet; Stamp{} before the first.
   [[nodiscard]] Stamp last_heard() const { return last_heard_; }
-  /// The same of those that were refused for their model, see unknown_packets().
+  /// Arrival of the latest packet rejected for its model, see unknown_packets().
   [[nodiscard]] Stamp unknown_last_heard() const { return unknown_last_heard_; }
 
   [[nodiscard]] const LidarOptions& options() const { return options_; }
   [[nodiscard]] const PacketCounters& counters() const { return counters_; }
-  /// nullptr for a lidar of another maker; so the next.
+  /// Returns the decoder, or nullptr for a lidar of another maker. The same applies to the next two.
   [[nodiscard]] const velodyne::Decoder* velodyne() const { return std::get_if<velodyne::Decoder>(&decoder_); }
   [[nodiscard]] const ouster::Decoder* ouster() const { return std::get_if<ouster::Decoder>(&decoder_); }
   [[nodiscard]] const hesai::Decoder* hesai() const { return std::get_if<hesai::Decoder>(&decoder_); }
 
-  /// As what its packets are read; empty before the first good one. The texts live for ever; so the next two.
+  /// Model as which its packets are decoded; empty before the first good packet. The text has static lifetime, as in
+  /// the next two.
   [[nodiscard]] std::string_view model() const;
   [[nodiscard]] std::string_view return_mode() const;
-  /// What its packets say that they come from, as far as that is told, whether or not they are read as that.
+  /// Model that its packets report, if they do, whether or not they are decoded as that model.
   [[nodiscard]] std::string_view recognised_model() const;
-  /// Of a Velodyne, its PpsState; of lidars whose packets tell the date, the TimeScale of their clocks.
+  /// State of the lidar's clock: PpsState of a Velodyne, TimeScale of a lidar whose packets carry the date.
   [[nodiscard]] std::string_view clock_state() const;
   [[nodiscard]] bool tells_date() const { return velodyne() == nullptr; }
-  /// Of the last good packet; 0 before the first.
+  /// Rotation rate of the last good packet; 0 before the first.
   [[nodiscard]] double rotation_rate_rpm() const;
-  /// Of packets of no model that can be read; of an Ouster, nothing.
+  /// Packets that cannot be decoded because their model is unknown or differs; empty for an Ouster.
   [[nodiscard]] std::optional<UnknownPackets> unknown_packets() const;
-  /// The latest position packet.
+  /// Latest position packet.
   [[nodiscard]] const std::optional<velodyne::PositionPacket>& position() const { return position_; }
 
  private:
   using Decoder = std::variant<velodyne::Decoder, ouster::Decoder, hesai::Decoder>;
-  /// What tells packets apart: all of a Velodyne's, the beginning of longer ones.
+  /// Bytes that identify a packet for duplicate detection: all of a Velodyne packet, the beginning of longer ones.
   using Payload = std::array<std::byte, velodyne::kDataPacketBytes>;
 
   LidarInput(LidarOptions options, std::uint8_t index, Decoder decoder);
@@ -154,39 +155,40 @@ class LidarInput {
   Decoder decoder_;
   SensorClock clock_;
   LidarPacket packet_;
-  const LidarPacket* ready_ = nullptr; ///< made of the datagram at hand
+  const LidarPacket* ready_ = nullptr; ///< decoded from the current datagram
   PacketCounters counters_;
   std::optional<velodyne::PositionPacket> position_;
-  TimeScale time_scale_ = TimeScale::free_running; ///< of packets that tell the date
-  UnknownPackets unknown_hesai_;                   ///< the latest that was refused for its model
+  TimeScale time_scale_ = TimeScale::free_running; ///< only for packets that carry the date
+  UnknownPackets unknown_hesai_;                   ///< the latest packets rejected for their model
   std::array<ImuSample, ouster::ImuMeasurements::kMost> imu_samples_;
   std::size_t imu_count_ = 0;
 
   std::optional<std::uint32_t> learnt_ip_, refused_ip_;
   Strangers strangers_{};
   Stamp last_heard_, unknown_last_heard_;
-  std::uint16_t last_azimuth_cdeg_ = 0; ///< of the first firing of the latest packet
-  std::size_t last_first_column_ = 0;   ///< of the same, of an Ouster
-  std::uint32_t last_number_ = 0;       ///< of the same, of a Hesai
-  Duration last_duration_{};            ///< of that packet
+  std::uint16_t last_azimuth_cdeg_ = 0; ///< first firing of the latest packet
+  std::size_t last_first_column_ = 0;   ///< first column of the latest packet; Ouster only
+  std::uint32_t last_number_ = 0;       ///< sequence number of the latest packet; Hesai only
+  Duration last_duration_{};            ///< duration of the latest packet
 
   static constexpr std::size_t kRemembered = 8;
-  std::array<Payload, kRemembered> recent_{}; ///< for telling duplicates
+  std::array<Payload, kRemembered> recent_{}; ///< latest packets, for duplicate detection
   std::size_t remembered_ = 0;
 };
 
-/// Several lidars: each datagram to the one it comes from, told by destination port and source address. One owner.
+/// Routes each datagram to its lidar, by destination port and source address. Single owner, not thread-safe.
 class LidarRouter {
  public:
-  /// Fails with one line for the user.
+  /// Opens all lidars. Fails with one line for the user.
   static Expected<LidarRouter, std::string> open(const std::vector<LidarOptions>& options);
 
-  /// Takes a datagram; the packet it makes (LidarPacket::lidar says whose), valid until the next call, or nullptr.
+  /// Processes a datagram. Returns the packet decoded from it (LidarPacket::lidar is the index of the lidar), valid
+  /// until the next call, or nullptr if there is none.
   const LidarPacket* receive(const Datagram& datagram);
 
   [[nodiscard]] const std::vector<LidarInput>& lidars() const { return lidars_; }
 
-  /// What the datagram told of a lidar's inertial unit, see LidarInput::imu_samples().
+  /// IMU samples of the latest datagram, see LidarInput::imu_samples().
   struct Imu {
     std::uint8_t lidar = 0; ///< index
     std::span<const ImuSample> samples;
@@ -195,15 +197,15 @@ class LidarRouter {
     return latest_ ? Imu{static_cast<std::uint8_t>(*latest_), lidars_[*latest_].imu_samples()} : Imu{};
   }
 
-  /// The lidar that a datagram comes from by the configuration alone, whether or not it has made itself known.
+  /// Lidar to which the configuration alone assigns a datagram, whether or not that lidar has sent anything yet.
   struct Origin {
-    std::string_view lidar;                     ///< its name; empty for none
-    const ouster::Metadata* metadata = nullptr; ///< of an Ouster
+    std::string_view lidar;                     ///< name of the lidar; empty if none matches
+    const ouster::Metadata* metadata = nullptr; ///< Ouster only, otherwise nullptr
   };
-  /// What it refers to lives as long as the router.
+  /// Finds the configured lidar of a datagram. The result refers to data that lives as long as the router.
   [[nodiscard]] Origin configured_for(const Datagram& datagram) const;
 
-  /// Addresses, host byte order, none: anybody may be one; and the lengths of what lidars send.
+  /// Addresses of senders, host byte order (empty: any sender is possible), and the lengths of lidar packets in bytes.
   struct Senders {
     static constexpr std::size_t kMax = 16;
     std::array<std::uint32_t, kMax> ips{};
@@ -219,10 +221,11 @@ class LidarRouter {
     bool operator==(const Senders&) const = default;
   };
 
-  /// Of the lidars that may send to this port; none while one of them has no address, configured or learnt.
+  /// Returns the senders of the lidars that listen to `port`; without addresses while one of these lidars has none,
+  /// configured or learnt.
   [[nodiscard]] Senders senders_to(std::uint16_t port) const;
 
-  /// Of all lidars, and of the datagrams that are for none of them (rejected as sender).
+  /// Sum over all lidars and over the datagrams that match none of them (rejected as sender).
   [[nodiscard]] PacketCounters total() const;
 
  private:
@@ -230,7 +233,7 @@ class LidarRouter {
   LidarInput* find(const Datagram& datagram);
 
   std::vector<LidarInput> lidars_;
-  std::optional<std::size_t> latest_; ///< that the last datagram came from; nothing for a foreign one
+  std::optional<std::size_t> latest_; ///< index of the lidar that sent the last datagram; empty if none matched
   PacketCounters foreign_;
 };
 

@@ -7,8 +7,8 @@
 
 namespace locus {
 
-/// A range as a packet counts it, longer by `more` counts but within what the packet can hold: a return stays one, and
-/// 0, which is none, stays none.
+/// Lengthens a raw range by `more` counts, clamped to [1, longest] so that a return remains a return. Leaves 0 (no
+/// return) unchanged.
 inline std::uint32_t longer_range(std::uint32_t counts, double more, std::uint32_t longest) {
   return counts == 0
              ? 0

@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::array<std::uint16_t, 2> kOusterPorts{7502, 7503};
 
-/// 16 columns: the legacy profile has 20 bytes a column and 12 a pixel; the others have 64 bytes a packet, 12 a column,
-/// and 4 (RNG15), 12 (RNG19) or 16 (two returns) a pixel.
+/// Recognises packets of 16 columns: the legacy profile has 20 bytes per column and 12 per pixel; the others have 64
+/// bytes per packet, 12 per column, and 4 (RNG15), 12 (RNG19) or 16 (two returns) per pixel.
 bool is_ouster_length(std::size_t bytes) {
   constexpr std::size_t kColumns = 16;
   return std::ranges::any_of(std::array<std::size_t, 4>{16, 32, 64, 128}, [&](std::size_t pixels) {

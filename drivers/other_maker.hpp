@@ -9,17 +9,17 @@
 
 namespace locus {
 
-/// Makers of lidars whose packets cannot be read, at least not by themselves, so that who recorded one learns it.
+/// Makers of lidars whose packets cannot be decoded, or not without metadata; reported to the user who recorded them.
 enum class OtherMaker : std::uint8_t { hesai, ouster };
 inline constexpr std::size_t kOtherMakers = 2;
 
 std::string_view to_string(OtherMaker maker);
 
-/// Whose packet a datagram is by its looks; nothing for those that can be read and for whatever looks like no lidar's.
+/// Recognises a packet that cannot be decoded by itself. Empty for decodable packets and for those of no known lidar.
 ///
-/// - Hesai: looks like a packet of a model that cannot be read, see hesai::look_at().
-/// - Ouster: goes to one of its ports, 7502 and 7503, or has the length that its "Sensor data packet format" gives for
-///   16 columns of 16 to 128 pixels in one of the profiles (the lidar's columns may go to any port).
+/// - Hesai: matches a model that is not supported, see hesai::look_at().
+/// - Ouster: is sent to port 7502 or 7503, or has the length that Ouster's "Sensor data packet format" gives for 16
+///   columns of 16 to 128 pixels in one of the profiles (column packets may go to any port).
 std::optional<OtherMaker> other_maker(const Datagram& datagram);
 
 } // namespace locus

@@ -9,17 +9,17 @@
 
 namespace locus {
 
-/// Changes of a packet, as if its lidar had measured or stamped otherwise: for faults that are injected, and for
-/// recordings that are played at another time. `ouster` is the metadata of an Ouster, nullptr for a lidar of another
-/// maker, whose packets are told by their looks. A packet of no lidar stays as it is. Checksums that were right are
-/// right again. Any thread.
+/// Edits packets as if the lidar had measured or stamped differently: for fault injection, and for playing recordings
+/// at another time. `ouster` is the metadata of an Ouster, or nullptr for a lidar of another maker, whose packets are
+/// recognised by their content. Packets of no known lidar are left unchanged. Correct checksums are updated.
+/// Thread-safe.
 
-/// Sets the lidar's own clock forward, in a packet of any kind: that of a Velodyne shows minutes and seconds alone, so
-/// an hour makes no difference, and the sentence of the GPS in its position packet keeps its time; an Ouster's shows
-/// nanoseconds since whenever; a Hesai's shows date and microseconds. None shows anything before its zero.
+/// Advances the lidar's clock in a packet of any kind. A Velodyne's clock holds only minutes and seconds, so a whole
+/// hour has no effect, and the GPS sentence in its position packet keeps its time; an Ouster's holds nanoseconds since
+/// an arbitrary epoch; a Hesai's holds date and microseconds. No clock goes below its zero.
 void shift_clock(std::span<std::byte> packet, const ouster::Metadata* ouster, Duration shift);
 
-/// Of a data packet, as far as it has room for the longer range; where there was no return there still is none.
+/// Lengthens the ranges of a data packet by `more_m`, up to the largest that its fields can hold. Adds no returns.
 void lengthen_ranges(std::span<std::byte> packet, const ouster::Metadata* ouster, double more_m);
 
 } // namespace locus

@@ -11,13 +11,13 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr Duration kHour = std::chrono::hours{1};
-constexpr Duration kReorderWindow = milliseconds{100}; ///< a packet later than this has not just been overtaken
+constexpr Duration kReorderWindow = milliseconds{100}; ///< greatest lateness of an overtaken packet
 constexpr Duration kMaxEarly = milliseconds{20};       ///< ahead of the envelope
-constexpr Duration kMaxLate = std::chrono::seconds{1}; ///< behind it: no network holds packets for longer
-constexpr int kMaxReplaySpeed = 10; ///< sensor time per time of reception, where only `sensor` counts
-constexpr int kMaxLiveSpeed = 2;    ///< the same, of packets that no network holds up
+constexpr Duration kMaxLate = std::chrono::seconds{1}; ///< behind the envelope; no network delays packets for longer
+constexpr int kMaxReplaySpeed = 10;                    ///< sensor time per reception time, mode `sensor` only
+constexpr int kMaxLiveSpeed = 2;                       ///< same, for packets that no network delayed
 constexpr int kProofOfStep = 5;
-constexpr Duration kSilence = std::chrono::minutes{1}; ///< of a lidar that was off
+constexpr Duration kSilence = std::chrono::minutes{1}; ///< shortest silence of a lidar that was off
 
 constexpr Duration kEnvelopeSpan = milliseconds{500};
 constexpr Duration kSettling = std::chrono::seconds{1};
@@ -25,9 +25,9 @@ constexpr double kSettlingSlew = 0.05;
 constexpr double kMaxDrift = 500e-6;
 constexpr Duration kMaxOffsetError = milliseconds{5};
 constexpr Duration kMaxUtcError = milliseconds{20};
-constexpr Duration kLongestDelay = std::chrono::seconds{30}; ///< of all packets of a lidar whose time is true
+constexpr Duration kLongestDelay = std::chrono::seconds{30}; ///< longest delay of all packets of a lidar on UTC
 
-/// Of all times that differ from `time` by whole hours, the one closest to `target`.
+/// Returns `time` plus the number of whole hours that brings it closest to `target`.
 Duration nearest_hour(Duration time, Duration target) {
   const Duration half = kHour / 2;
   Duration beyond = (target - time + half) % kHour;
@@ -97,8 +97,8 @@ Duration SensorClock::lateness(Duration sensor_time, Duration until_sent, Stamp 
   return receive.time_since_epoch() - until_sent - offset_ - sensor_time;
 }
 
-/// Whether the refused times, this one included, tell the same story often enough to be believed. Late packets that a
-/// network held up and sends all at once tell one, too, but faster than a clock runs.
+/// Returns true if the rejected times, including this one, have been consistent with each other often enough. Late
+/// packets sent in a burst after congestion are consistent too, but faster than a clock runs.
 bool SensorClock::proves_step(Duration time_of_hour, Stamp receive, bool late) {
   const Duration advance = nearest_hour(time_of_hour - suspect_time_of_hour_, Duration{});
   const bool goes_on = suspects_ > 0 && advance > Duration{} && advance <= kReorderWindow;
@@ -111,7 +111,7 @@ bool SensorClock::proves_step(Duration time_of_hour, Stamp receive, bool late) {
   return suspects_ == kProofOfStep && !(late && suspects_ahead_ > Duration{});
 }
 
-/// Moves the offset towards the envelope, unless it is known better. Precondition: sensor_time > latest_.
+/// Moves the offset towards the envelope, unless it comes from UTC. Precondition: sensor_time > latest_.
 void SensorClock::track(Duration sensor_time, Duration until_sent, Stamp receive) {
   const Duration delay = receive.time_since_epoch() - until_sent - sensor_time;
   envelope_.minimum = std::min(envelope_.minimum, delay);
@@ -133,7 +133,7 @@ void SensorClock::track(Duration sensor_time, Duration until_sent, Stamp receive
   offset_ += std::clamp(envelope_.lowest() - offset_, -most, most);
 }
 
-/// From here on the offset is whole hours, where the lidar's clock and the host's are both on UTC.
+/// Switches to an offset of whole hours if the lidar's and the host's clock are both on UTC.
 void SensorClock::believe_sensor(Duration sensor_time, Stamp receive) {
   if (mode_ != LidarTime::automatic || !synchronised_ || knows_utc_)
     return;

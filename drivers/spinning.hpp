@@ -11,16 +11,15 @@
 
 #include "core/ingest/lidar_packet.hpp"
 
-/// What all lidars have in common whose lasers turn about an axis and whose packets tell one azimuth for a column of
-/// firings: Velodyne's and Hesai's.
+/// Common parts of spinning lidars whose packets give one azimuth per column of firings: Velodyne and Hesai.
 namespace locus {
 
-/// Everything about where the lasers of a column point that does not change from packet to packet, by firing; one array
-/// per figure so that loops over the firings become vector instructions.
+/// Constant geometry of the lasers of a column, by firing. One array per quantity, so that loops over the firings
+/// vectorise.
 struct SpinningBeams {
   template <class T> using PerFiring = std::array<T, LidarPacket::kMaxLasers>;
 
-  PerFiring<float> share_of_column; ///< of the column's duration from the instant of its azimuth to the firing
+  PerFiring<float> share_of_column; ///< time from the column's azimuth to the firing / duration of the column
   PerFiring<float> cos_azimuth_offset, sin_azimuth_offset;
   PerFiring<float> cos_elevation, sin_elevation;
   PerFiring<std::int32_t> offset_ns;
@@ -34,18 +33,18 @@ struct SpinningBeams {
   }
 };
 
-/// Where the lasers of a firing group point when they fire, clockwise from azimuth 0.
+/// Directions of the lasers of a firing group at their firing times, clockwise from azimuth 0.
 struct Aim {
   FiringGroup::PerLaser<float> cos_azimuth, sin_azimuth;
 };
 
-/// The azimuth of a column, clockwise.
+/// Azimuth of a column, clockwise.
 struct ColumnAzimuth {
   float cos = 1.0F, sin = 0.0F;
-  float turn_rad = 0.0F; ///< while the column lasts
+  float turn_rad = 0.0F; ///< rotation during the column
 };
 
-/// Turns the column's azimuth by each firing's share of the turn (first, a small angle) and by its laser's offset.
+/// Rotates the column's azimuth by each firing's share of the turn (first, a small angle) and by its laser's offset.
 [[gnu::always_inline]] inline Aim aim_at(const SpinningBeams& beams, const ColumnAzimuth& column,
                                          std::size_t first_firing) {
   Aim aim;
@@ -62,7 +61,7 @@ struct ColumnAzimuth {
   return aim;
 }
 
-/// Numbers lasers by their elevation: 0 is the lowest. Of equal ones the first comes first.
+/// Numbers lasers by elevation; ring 0 is the lowest. Equal elevations keep their order.
 template <class Laser> void number_rings(std::span<Laser> lasers) {
   std::array<std::uint8_t, LidarPacket::kMaxLasers> upwards;
   const auto end = upwards.begin() + static_cast<std::ptrdiff_t>(lasers.size());

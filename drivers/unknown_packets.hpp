@@ -8,13 +8,13 @@
 
 namespace locus {
 
-/// What packets of no model that can be read say of themselves.
+/// Description of packets that cannot be decoded.
 struct UnknownPackets : velodyne::UnknownPackets {
-  std::string_view hesai{}; ///< the maker's name of the model; empty: they are of a Velodyne. Lives for ever
-  bool is_readable = false; ///< the model is, but the lidar is configured as another, or sends in a mode of no manual
+  std::string_view hesai{}; ///< the maker's name of the model, static lifetime; empty: Velodyne packets
+  bool is_readable = false; ///< supported model, but the lidar is configured as another, or its mode is undocumented
 };
 
-/// "product id 0x31 and return mode 0x37 in 120 packets", "a Hesai AT128 in 120 packets".
+/// Returns for example "product id 0x31 and return mode 0x37 in 120 packets" or "a Hesai AT128 in 120 packets".
 std::string to_string(const UnknownPackets& unknown);
 
 } // namespace locus

@@ -12,17 +12,17 @@ namespace locus {
 
 namespace {
 
-constexpr Duration kLongestSlice = std::chrono::microseconds{1330}; ///< a packet of the VLP-16
+constexpr Duration kLongestSlice = std::chrono::microseconds{1330}; ///< duration of a VLP-16 packet
 constexpr std::size_t kBuckets = std::size_t{1} << 16;
 constexpr double kTurn_rad = 2 * std::numbers::pi;
 constexpr double kCdegPerTurn = 36000;
 
-/// Fewer points than these tell nothing about their times.
+/// Least number of points from which the time unit can be estimated.
 constexpr std::size_t kFewPoints = 100;
 
 double azimuth_rad(float x_m, float y_m) { return std::atan2(static_cast<double>(y_m), static_cast<double>(x_m)); }
 
-/// Of the number of points and of some of their bytes, evenly chosen. Precondition: the layout is sound.
+/// Hashes (FNV-1a) the number of points and evenly spaced samples of their bytes. Precondition: the layout is valid.
 std::uint64_t digest_of(const CloudView& message) {
   constexpr std::uint64_t kFnvBasis = 0xcbf29ce484222325, kFnvPrime = 0x100000001b3;
   constexpr std::size_t kWords = 256;
@@ -123,7 +123,7 @@ void CloudDecoder::read(const CloudView& message, const CloudLayout& layout) {
     points_.ring.insert(points_.ring.end(), message.width, static_cast<float>(row));
 }
 
-/// Leaves the returns alone, and counts the others.
+/// Removes points that are not returns, and counts them.
 CloudDecoder::Counted CloudDecoder::keep_returns() {
   Counted counted{.points = points_.x_m.size()};
   const auto is_finite = [](auto... values) { return (std::isfinite(values) && ...); };
@@ -147,7 +147,7 @@ CloudDecoder::Counted CloudDecoder::keep_returns() {
   return counted;
 }
 
-/// Writes the offset of each return, and gives back the stamp that they count from, by the clock of the message.
+/// Computes the offset of each return. Returns the stamp of offset 0, in the clock of the message.
 Stamp CloudDecoder::time_points(const CloudView& message, const CloudLayout& layout, Stamp arrival) {
   const std::size_t count = points_.x_m.size();
   rings_.tell({points_.x_m, points_.y_m, points_.z_m}, points_.ring,
@@ -169,11 +169,11 @@ Stamp CloudDecoder::time_points(const CloudView& message, const CloudLayout& lay
   return header;
 }
 
-/// Whether the message's own times are sound.
+/// Interprets the message's point times. Returns true if they are valid.
 bool CloudDecoder::understand_times(bool has_times, Stamp arrival) {
   if (!has_times)
     doubt(CloudDoubt::no_times, arrival);
-  const bool are_few = points_.time.size() < kFewPoints; // too few to tell a unit from
+  const bool are_few = points_.time.size() < kFewPoints; // too few to estimate the unit
   if (!has_times || points_.time.empty() || (!times_ && are_few))
     return false;
   if (are_few) {
@@ -201,15 +201,15 @@ bool CloudDecoder::understand_times(bool has_times, Stamp arrival) {
   return true;
 }
 
-/// The turn that each return has made since the first one, along its ring; in which direction is told from most. False
-/// for what does not turn.
+/// Computes the time of each return from the rotation along its ring since the first return; the direction of rotation
+/// is that of most steps. Returns false if the points do not rotate.
 bool CloudDecoder::time_by_azimuth() {
   constexpr double kStep_rad = 0.1, kBeforeFirst_rad = -0.4;
   constexpr std::size_t kNineTenths = 10;
   const std::size_t count = points_.x_m.size();
   std::array<double, Rings::kMax> last_rad;
   last_rad.fill(std::nan(""));
-  std::size_t forward = 0, backward = 0; // counter-clockwise, clockwise
+  std::size_t forward = 0, backward = 0; // number of counter-clockwise and clockwise steps
   for (std::size_t i = 0; i < count; ++i) {
     const double azimuth = azimuth_rad(points_.x_m[i], points_.y_m[i]);
     const double step = std::remainder(azimuth - std::exchange(last_rad[points_.laser[i]], azimuth), kTurn_rad);
@@ -241,9 +241,10 @@ bool CloudDecoder::time_by_azimuth() {
   return true;
 }
 
-/// A cloud cannot arrive before its last point. Where it would, and its header's stamp would not, that stamp is taken
-/// for the last point's. The first cloud is taken as it comes; after it a single one proves nothing, but some in a row
-/// do, and as many lead back.
+/// Decides whether the header's stamp is that of the first or of the last point. A cloud cannot arrive before its last
+/// point: if the stamp, taken as the first point's, puts the last point after the arrival, although the stamp itself
+/// precedes the arrival, it is the last point's. The first cloud decides alone; a change needs kEvidence contrary
+/// clouds in a row, and a change back to the first point as many as confirmed the last point.
 Stamp CloudDecoder::stamped_at_begin(Stamp begin, Stamp header, Stamp arrival) {
   constexpr int kEvidence = 5;
   const Duration length{*std::ranges::max_element(points_.offset_ns)};
@@ -288,13 +289,13 @@ void CloudDecoder::measure_period() {
   const Duration since = last_begin_ ? cloud_.begin - *last_begin_ : Duration{};
   if (last_begin_ && since <= Duration{})
     ++counters_.reordered;
-  else if (since > kShortest && since < kLongestCloud) // more is a lost one
+  else if (since > kShortest && since < kLongestCloud) // a longer interval means a lost cloud
     period_ = period_is_known_ ? period_ + (std::min(since, period_ * 3 / 2) - period_) / kMemory : since;
   period_is_known_ = period_is_known_ || (since > kShortest && since < kLongestCloud);
   last_begin_ = cloud_.begin;
 }
 
-/// By counting: to a part in 65536 of the cloud, within it in the order of the message.
+/// Sorts by time with a counting sort: resolution 1/65536 of the cloud, stable within a bucket.
 void CloudDecoder::sort_by_time() {
   const std::size_t count = points_.offset_ns.size();
   const auto length_ns = static_cast<std::uint64_t>((cloud_.end - cloud_.begin).count());
@@ -339,7 +340,7 @@ const LidarPacket* CloudDecoder::next() {
   return &packet_;
 }
 
-/// The group that a laser's next return goes to; nullptr where the packet is full.
+/// Returns the group for the next return of a laser; nullptr if the packet is full.
 FiringGroup* CloudDecoder::group_for(std::size_t laser) {
   FiringGroup*& group = open_[laser / FiringGroup::kLasers];
   if (group != nullptr && group->range_m[laser % FiringGroup::kLasers] == 0.0F)

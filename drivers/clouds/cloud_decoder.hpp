@@ -18,36 +18,36 @@
 
 namespace locus {
 
-/// Turns the clouds of one lidar into packets, as if it had sent them: slices of a millisecond or so, in the order of
-/// time, each return at the place of its ring.
+/// Converts the clouds of one lidar to packets, as if it had sent them: slices of about a millisecond in time order,
+/// with each return in the slot of its laser.
 ///
-/// Times of points are told as PointTimes and PointTimesFrom have it; stamps are put on the host's clock as those of a
-/// motion source are (SourceClock). A cloud without a single return is a cloud. Memory is asked for at construction and
-/// touched as clouds need it. Allocates nothing after that, throws nothing. One owner.
+/// Point times are interpreted according to PointTimes and PointTimesFrom; stamps are converted to the host's clock as
+/// those of a motion source (SourceClock). A cloud without returns is valid. Memory is reserved at construction, and
+/// touched as clouds need it; after that, allocates nothing and throws nothing. Single owner, not thread-safe.
 class CloudDecoder {
  public:
   explicit CloudDecoder(std::uint8_t lidar, PointTimesFrom times = PointTimesFrom::automatic);
 
-  /// Begins with the packets of a cloud, of which nothing is needed after this; why not, if it is refused. `arrival`:
-  /// when it reached this computer.
+  /// Starts decoding a cloud; `message` is not used after the call. `arrival`: reception on this computer. Returns the
+  /// reason if the cloud is rejected.
   std::optional<CloudError> begin(const CloudView& message, Stamp arrival);
-  /// Counts what came and could not be read.
+  /// Counts a received cloud as rejected and returns `error`.
   CloudError refuse(CloudError error);
 
-  /// The next packet, valid until the next call; nullptr after the last of the cloud.
+  /// Returns the next packet, valid until the next call; nullptr after the last packet of the cloud.
   const LidarPacket* next();
 
   [[nodiscard]] const CloudCounters& counters() const { return counters_; }
-  /// All that was met so far.
+  /// Problems found in any cloud so far.
   [[nodiscard]] CloudDoubts doubts() const { return doubts_; }
-  /// By doubt: when the last cloud arrived that gave rise to it; Stamp{} before the first.
+  /// Arrival of the latest cloud with each problem; Stamp{} before the first.
   [[nodiscard]] const std::array<Stamp, kCloudDoubts>& last_doubted() const { return last_doubted_; }
-  /// Of the latest cloud.
+  /// Time source of the points of the latest cloud.
   [[nodiscard]] PointTiming timing() const { return timing_; }
   [[nodiscard]] RingsFrom rings() const { return rings_.from(); }
-  /// Between the begins of two clouds; 100 ms before the second.
+  /// Smoothed time from the start of one cloud to the next; 100 ms before the second cloud.
   [[nodiscard]] Duration period() const { return period_; }
-  /// When the last cloud that was used arrived; Stamp{} before the first.
+  /// Arrival of the latest accepted cloud; Stamp{} before the first.
   [[nodiscard]] Stamp last_heard() const { return last_heard_; }
 
  private:
@@ -72,42 +72,42 @@ class CloudDecoder {
   FiringGroup* group_for(std::size_t laser);
   void put(std::size_t point, FiringGroup& group, std::int32_t begin_ns) const;
 
-  /// One array per figure, in the order of the message; after keep_returns() of the returns alone.
+  /// Point data, one array per quantity in the order of the message; only returns after keep_returns().
   struct Points {
     std::vector<float> x_m, y_m, z_m, intensity, ring;
-    std::vector<double> time; ///< as the message has them
+    std::vector<double> time; ///< raw numbers of the message
     std::vector<std::uint8_t> laser;
-    std::vector<std::int32_t> offset_ns; ///< from the begin of the cloud
-    std::vector<std::uint32_t> order;    ///< by time
+    std::vector<std::int32_t> offset_ns; ///< from the start of the cloud
+    std::vector<std::uint32_t> order;    ///< indices sorted by time
   };
 
-  /// What the header's stamp is that of: the first point, or the last one.
+  /// Point that the header's stamp refers to: the first or the last one.
   struct StampedAt {
     bool known = false, end = false;
-    int confirming = 0; ///< clouds that say so, up to those it takes
-    int contrary = 0;   ///< clouds in a row that say otherwise
+    int confirming = 0; ///< clouds that confirm it, up to the evidence required
+    int contrary = 0;   ///< consecutive clouds that contradict it
   };
 
   PointTimesFrom times_from_;
   Points points_;
   Rings rings_;
-  std::vector<std::uint32_t> buckets_; ///< of time, for sorting
-  std::optional<CloudLayout> layout_;  ///< of the cloud before
-  std::optional<PointTimes> times_;    ///< as understood last, in that layout
-  std::uint64_t unit_votes_ = 0;       ///< clouds in which its unit made a turn, less those it made too short for one
-  StampedAt stamped_at_;               ///< in that layout
+  std::vector<std::uint32_t> buckets_; ///< counts for the time sort
+  std::optional<CloudLayout> layout_;  ///< layout of the previous cloud
+  std::optional<PointTimes> times_;    ///< latest interpretation in that layout
+  std::uint64_t unit_votes_ = 0;       ///< clouds whose span in its unit is a turn, minus those with too short a span
+  StampedAt stamped_at_;               ///< evidence in that layout
   SourceClock clock_;
   PointTiming timing_ = PointTiming::field;
 
-  LidarPacket::Cloud cloud_; ///< the one at hand
-  std::size_t next_ = 1;     ///< place in points_.order
+  LidarPacket::Cloud cloud_; ///< current cloud
+  std::size_t next_ = 1;     ///< index into points_.order
   LidarPacket packet_;
-  std::array<FiringGroup*, LidarPacket::kMaxLasers / FiringGroup::kLasers> open_{}; ///< by bank, of the packet at hand
+  std::array<FiringGroup*, LidarPacket::kMaxLasers / FiringGroup::kLasers> open_{}; ///< indexed by bank, current packet
 
   Duration period_ = std::chrono::milliseconds{100};
   bool period_is_known_ = false;
   std::optional<Stamp> last_begin_;
-  std::optional<Stamp> last_stamp_; ///< of the header
+  std::optional<Stamp> last_stamp_; ///< header stamp
   std::uint64_t last_digest_ = 0;
   Stamp last_heard_;
   CloudCounters counters_;

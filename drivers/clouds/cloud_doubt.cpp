@@ -7,7 +7,7 @@ namespace locus {
 
 namespace {
 
-/// What becomes of points without times.
+/// Describes the substitute for missing point times.
 std::string_view fallback(PointTiming timing) {
   return timing == PointTiming::azimuth ? "their times are told from their azimuths"
                                         : "they count as seen at one instant, so a robot that moves makes them a "

@@ -12,23 +12,23 @@
 
 namespace locus {
 
-/// Where the times of points come from (key: point_times). `automatic` (key: auto): the message's own field where it is
-/// sound, else azimuth for what turns, else none. `azimuth`: the share of the turn since the first point. `none`: all
-/// points are of one instant, that of the header.
+/// Source of point times (key: point_times). `automatic` (key: auto): the message's own field if it is valid, otherwise
+/// azimuth if the points rotate, otherwise none. `azimuth`: the rotation since the first point. `none`: all points at
+/// the instant of the header's stamp.
 enum class PointTimesFrom : std::uint8_t { automatic, azimuth, none };
 constexpr auto names_of(PointTimesFrom) { return std::to_array<std::string_view>({"auto", "azimuth", "none"}); }
 
-/// What is wrong with the times in the clouds of a lidar. The first four leave points without times of their own, the
-/// others put all of them elsewhere.
+/// Problem with the times in a lidar's clouds. With the first four, the points' own times are not used; the others
+/// shift the whole cloud in time.
 enum class CloudDoubt : std::uint8_t {
-  no_times,     ///< no field of them
-  equal_times,  ///< all the same
-  disorder,     ///< up and down along a ring
-  no_unit,      ///< in no unit those of a turn
-  stamp_at_end, ///< the header's stamp is that of the last point, and the times count from it as if of the first
+  no_times,     ///< no time field
+  equal_times,  ///< all times equal
+  disorder,     ///< times not monotonic along a ring
+  no_unit,      ///< no unit makes the span that of a turn
+  stamp_at_end, ///< the header's stamp is the last point's, but the times count as if from the first
   tai,          ///< stamps are 37 s ahead: TAI, not UTC
   ahead,        ///< stamps are ahead of the host's clock
-  behind,       ///< stamps are behind it
+  behind,       ///< stamps are behind the host's clock
 };
 constexpr auto names_of(CloudDoubt) {
   return std::to_array<std::string_view>(
@@ -37,11 +37,11 @@ constexpr auto names_of(CloudDoubt) {
 inline constexpr std::size_t kCloudDoubts = names_of(CloudDoubt{}).size();
 using CloudDoubts = std::bitset<kCloudDoubts>;
 
-/// Where the times of the points of the latest cloud came from.
+/// Source of the point times of the latest cloud.
 enum class PointTiming : std::uint8_t { field, azimuth, instant };
 constexpr auto names_of(PointTiming) { return std::to_array<std::string_view>({"field", "azimuth", "instant"}); }
 
-/// One line for the user: what is wrong, what is done about it, and what to do.
+/// Returns one line for the user: the problem, its consequence, and the remedy.
 std::string explain(CloudDoubt doubt, PointTiming timing);
 
 } // namespace locus

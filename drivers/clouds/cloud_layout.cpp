@@ -14,7 +14,7 @@ namespace {
 using Type = CloudView::Type;
 using Column = CloudLayout::Column;
 
-/// 0 for what is no type.
+/// Size of a number in bytes; 0 for an invalid type.
 std::size_t bytes_of(Type type) {
   constexpr std::array<std::size_t, 9> kBytes{0, 1, 1, 2, 2, 4, 4, 4, 8};
   const auto index = static_cast<std::size_t>(type);
@@ -23,7 +23,7 @@ std::size_t bytes_of(Type type) {
 
 bool is_real(Column column) { return column.type == Type::float32 || column.type == Type::float64; }
 
-/// The field of the first of these names that is there and can be read.
+/// Finds the first of these names that exists as a valid field.
 std::optional<Column> find(const CloudView& message, std::span<const std::string_view> names) {
   for (const std::string_view name : names) {
     const auto field = std::ranges::find(message.fields(), name, &CloudView::Field::name);
@@ -41,7 +41,7 @@ std::optional<Column> coordinate(const CloudView& message, std::string_view name
   return column && is_real(*column) ? column : std::nullopt;
 }
 
-/// Whether every point that is claimed lies within the bytes; the last one need not be padded to its step.
+/// Returns true if all points lie within the data; the last one need not be padded to its step.
 bool is_whole(const CloudView& message, const CloudLayout& layout) {
   if (points_of(message) == 0)
     return true;

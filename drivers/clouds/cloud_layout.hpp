@@ -12,17 +12,17 @@
 
 namespace locus {
 
-/// Where the figures of a point lie in its record. Fields are known by their names, whatever driver wrote them:
+/// Layout of a point record. Fields are identified by name, whatever the driver:
 ///
 /// | driver | ring | time |
 /// |---|---|---|
-/// | velodyne_pointcloud | ring: uint16 | time: float32, s to the header's stamp, before it or after it |
+/// | velodyne_pointcloud | ring: uint16 | time: float32, s relative to the header's stamp, of either sign |
 /// | ouster-ros | ring: uint8 or uint16 | t: uint32, ns since the header's stamp |
 /// | Hesai, RoboSense | ring: uint16 | timestamp: float64, s since 1970 |
 /// | nebula | channel: uint16 | time_stamp: uint32, ns since the header's stamp |
 /// | livox_ros_driver | line: uint8 | timestamp: float64, ns since 1970; offset_time: uint32, ns |
 ///
-/// What their numbers mean is told from the numbers, see PointTimes.
+/// Units and epochs of the times are inferred from their values, see PointTimes.
 struct CloudLayout {
   using Type = CloudView::Type;
   struct Column {
@@ -33,21 +33,22 @@ struct CloudLayout {
 
   Column x, y, z;
   std::optional<Column> intensity, ring, time;
-  bool row_is_ring = false; ///< organised: each row is a laser, and no field says which
+  bool row_is_ring = false; ///< organised cloud: each row is a laser, and there is no ring field
 
   bool operator==(const CloudLayout&) const = default;
 };
 
-/// The layout of a message, or why it cannot be used; then nothing of it is to be read. Any thread.
+/// Determines the layout of a message. Fails with the reason for rejection; the message must then not be read.
+/// Thread-safe.
 Expected<CloudLayout, CloudError> layout_of(const CloudView& message);
 
-/// The most points that a message may have: twice those of the largest lidar in dual return mode today.
+/// Limit for the points of a message: twice the largest lidar of today in dual return mode.
 inline constexpr std::size_t kMaxCloudPoints = std::size_t{1} << 20;
 
 inline std::size_t points_of(const CloudView& message) { return std::size_t{message.height} * message.width; }
 
-/// Calls `take(value)` with the number of each point in one column, in the order of the message. Precondition:
-/// layout_of has a layout, of which this is a column.
+/// Calls `take(value)` with each point's value in one column, in the order of the message. Precondition: `column`
+/// belongs to the layout that layout_of() returned for this message.
 template <class Take> void for_each_in(const CloudView& message, CloudLayout::Column column, const Take& take) {
   const auto read_as = [&]<class Number>(Number value) {
     if (message.width == 0)

@@ -9,7 +9,7 @@ using Type = CloudView::Type;
 
 void read_header(MessageReader& reader, CloudView& cloud) {
   if (reader.serialisation() == Serialisation::ros1)
-    reader.number<std::uint32_t>(); // the sequence number, which ROS 2 has dropped
+    reader.number<std::uint32_t>(); // sequence number, absent in ROS 2
   const auto seconds = reader.number<std::int32_t>();
   const auto nanoseconds = reader.number<std::uint32_t>();
   cloud.stamp = Stamp{std::chrono::seconds{seconds} + std::chrono::nanoseconds{nanoseconds}};
@@ -22,7 +22,7 @@ void read_fields(MessageReader& reader, CloudView& cloud) {
     field.name = reader.text();
     field.offset = reader.number<std::uint32_t>();
     field.type = static_cast<Type>(reader.number<std::uint8_t>());
-    reader.number<std::uint32_t>(); // how many: of a vector the first is taken
+    reader.number<std::uint32_t>(); // element count; only the first element of a vector is used
     if (cloud.field_count < CloudView::kMaxFields)
       cloud.storage[cloud.field_count++] = field;
   }
@@ -41,14 +41,14 @@ CloudView read_point_cloud(MessageReader& reader) {
   return cloud;
 }
 
-/// Livox' own message: its points are records as well, of 19 bytes, which CDR aligns to 20.
+/// Reads Livox' CustomMsg: records of 19 bytes, aligned to 20 by CDR.
 CloudView read_livox_cloud(MessageReader& reader) {
   constexpr std::uint32_t kRecord_bytes = 19, kAligned_bytes = 20;
   CloudView cloud;
   read_header(reader, cloud);
-  reader.number<std::uint64_t>(); // the time of the first point, which is the header's
+  reader.number<std::uint64_t>(); // time of the first point, equal to the header's stamp
   const auto points = reader.number<std::uint32_t>();
-  reader.bytes(4); // number of the lidar, three reserved
+  reader.bytes(4); // lidar number and three reserved bytes
   const auto count = reader.number<std::uint32_t>();
   cloud.height = 1;
   cloud.width = count;
@@ -62,7 +62,7 @@ CloudView read_livox_cloud(MessageReader& reader) {
                     {"line", 18, Type::uint8}}};
   cloud.field_count = 7;
   const std::size_t bytes =
-      count == 0 ? 0 : std::size_t{count - 1} * cloud.point_step + kRecord_bytes; // none is aligned behind the last
+      count == 0 ? 0 : std::size_t{count - 1} * cloud.point_step + kRecord_bytes; // no padding after the last record
   cloud.data = reader.bytes(points == count ? bytes : SIZE_MAX);
   return cloud;
 }

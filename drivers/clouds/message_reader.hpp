@@ -11,12 +11,11 @@
 
 namespace locus {
 
-/// How ROS writes messages: ROS 1's way, everything packed, or CDR behind its four bytes of encapsulation,
-/// every number aligned to its size. Numbers are little-endian in both.
+/// Serialisation of ROS messages: packed (ROS 1), or CDR after a four-byte encapsulation header, with numbers aligned
+/// to their size. Little-endian in both.
 enum class Serialisation { ros1, cdr };
 
-/// Takes the fields of a message off its bytes, one after the other. Beyond their end everything is 0 and whole() is
-/// false. Owns nothing.
+/// Reads the fields of a message in sequence. Past the end, returns zeros and sets whole() to false. Non-owning.
 class MessageReader {
  public:
   MessageReader() = default;
@@ -34,25 +33,25 @@ class MessageReader {
     for (double& value : out)
       value = number<double>();
   }
-  /// Empty where there are not so many left.
+  /// Returns the next `count` bytes; empty if fewer are left.
   std::span<const std::byte> bytes(std::size_t count);
-  /// A sequence of bytes behind its length.
+  /// Returns a length-prefixed byte sequence.
   std::span<const std::byte> sequence() { return bytes(number<std::uint32_t>()); }
   std::span<const std::byte> rest() { return bytes(data_.size() - at_); }
   std::string_view text() {
     const std::span<const std::byte> taken = sequence();
     const std::string_view all{reinterpret_cast<const char*>(taken.data()), taken.size()};
-    return all.substr(0, all.find('\0')); // CDR counts the zero at its end
+    return all.substr(0, all.find('\0')); // CDR includes the terminating zero
   }
 
   [[nodiscard]] Serialisation serialisation() const { return serialisation_; }
-  /// Whether all that was asked for was there.
+  /// Returns true if no read went past the end.
   [[nodiscard]] bool whole() const { return whole_; }
 
  private:
   void align(std::size_t size);
 
-  std::span<const std::byte> data_; ///< what CDR aligns from its beginning
+  std::span<const std::byte> data_; ///< CDR alignment is relative to its start
   std::size_t at_ = 0;
   Serialisation serialisation_ = Serialisation::ros1;
   bool whole_ = true;

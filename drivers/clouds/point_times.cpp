@@ -11,7 +11,7 @@ namespace {
 
 constexpr Duration kSameClock = std::chrono::seconds{1};
 
-/// Whether the numbers go up and down along the rings.
+/// Returns true if the times are not monotonic along the rings.
 bool is_disordered(std::span<const double> times, std::span<const std::uint8_t> rings) {
   constexpr std::size_t kOneIn = 10;
   std::array<double, 256> last;
@@ -26,8 +26,9 @@ bool is_disordered(std::span<const double> times, std::span<const std::uint8_t> 
   return kOneIn * std::min(up, down) > times.size();
 }
 
-/// In which the points take as long as a turn does. What is too long in the unit before has at least a part of it in
-/// the finest one, and what is too short in the coarsest one is not longer in any other.
+/// Finds the unit in which the points span a turn, coarsest first. The lower limit for seconds is one firing, because a
+/// finer unit would make the span even shorter; for nanoseconds it is kLongestCloud / 1000, because a shorter span fits
+/// microseconds.
 std::optional<double> guess_unit_s(double span) {
   struct Unit {
     double unit_s;

@@ -11,16 +11,16 @@
 
 namespace locus {
 
-/// The longest and shortest that the points of a cloud may take: a turn at 4 Hz, one packet.
+/// Limits for the time span of a cloud: a turn at 4 Hz, one packet.
 inline constexpr Duration kLongestCloud = std::chrono::milliseconds{250};
 inline constexpr Duration kShortestCloud = std::chrono::microseconds{500};
 
-/// What the numbers in the time field of a cloud mean.
+/// Interpretation of the numbers in a cloud's time field.
 ///
-/// The unit is that of s, ms, us and ns in which the points take as long as a lidar's turn does: between the shortest
-/// and the longest turn are fewer than three decades, so no two fit. A unit that is known from other clouds of the
-/// lidar stays, for a cloud with few columns is shorter, unless it makes this one longer than any. Numbers within a
-/// minute of 0 count from the header's stamp, before it if they are negative; others are times of a clock.
+/// The unit is the one of s, ms, us and ns in which the span of the points is that of a lidar's turn. It is unique,
+/// since the shortest and the longest turn differ by fewer than three decades. A unit known from other clouds of the
+/// lidar is retained, since a cloud with few columns spans less, unless it makes the span too long. Numbers within a
+/// minute of 0 are relative to the header's stamp (negative: before it); others are absolute times of a clock.
 struct PointTimes {
   double unit_s = 1.0;
   bool of_a_clock = false;
@@ -28,22 +28,22 @@ struct PointTimes {
 
   static PointTimes in_unit(double unit_s, double first, double last);
 
-  /// Whether the points take no longer than those of a cloud may.
+  /// Returns true if the span does not exceed kLongestCloud.
   [[nodiscard]] bool is_short_enough() const;
 
-  /// Between two numbers.
+  /// Time between two numbers.
   [[nodiscard]] Duration between(double from, double to) const { return from_seconds((to - from) * unit_s); }
 
-  /// The instant of the first point. The clock of the points is believed where it is the header's or, within a second,
-  /// that of arrival; else the header's stamp is that of the first point.
+  /// Returns the instant of the first point. Absolute point times are trusted if they agree within a second with the
+  /// header's stamp or the arrival; otherwise the header's stamp is used for the first point.
   [[nodiscard]] Stamp begin(Stamp header, Stamp arrival) const;
 };
 
-/// The numbers of a cloud, in the order of its points, and the rings of these (all 0 where there are none).
-/// Precondition: all are finite, both spans as long. Fails with the reason why they are no times.
+/// Interprets the times of a cloud in the order of its points, with their rings (all 0 if unknown). Precondition: all
+/// times are finite, both spans have the same length.
 ///
-/// They are not where they are all the same, where no unit makes a turn of them, and where along a ring they go up and
-/// down: as many as one step in ten both ways.
+/// Fails with the reason if the times are invalid: all equal, no unit that makes the span a turn, or not monotonic
+/// along a ring (more than one step in ten each way).
 Expected<PointTimes, CloudDoubt> understand(std::span<const double> times, std::span<const std::uint8_t> rings,
                                             std::optional<double> known_unit_s = std::nullopt);
 

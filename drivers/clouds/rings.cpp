@@ -37,8 +37,8 @@ void Rings::tell(Positions points, std::span<const float> told, RingsFrom told_b
   rank(points, lasers);
 }
 
-/// Elevations that many points have, with few between them, are those of lasers; each bin belongs to the nearest. Where
-/// there are none, or too many, the elevations that were seen are divided evenly.
+/// Finds the lasers' elevations as peaks of the histogram, with few points between them; each bin belongs to the
+/// nearest peak. Without peaks, or with too many, divides the observed elevation range into equal bands.
 void Rings::find_lines(Positions points) {
   constexpr std::size_t kFewestPoints = 1000, kFewestLines = 4, kBands = 32, kOneIn = 64;
   const std::size_t count = points.x_m.size();
@@ -88,7 +88,8 @@ void Rings::find_lines(Positions points) {
   }
 }
 
-/// Until every laser has been seen that ever is: elevations in the frame of a lidar do not change.
+/// Orders the lasers by mean elevation. Recomputed only while new lasers appear, since elevations in the lidar's frame
+/// are constant.
 void Rings::rank(Positions points, std::span<const std::uint8_t> lasers) {
   bool is_new = false;
   for (const std::uint8_t laser : lasers)

@@ -13,32 +13,33 @@
 
 namespace locus {
 
-/// Where the rings of points are known from: a field of the message, the rows of an organised cloud, the elevations at
-/// which the points lie, or equal bands of elevation where they lie everywhere.
+/// Source of the rings: a field of the message, the rows of an organised cloud, peaks in the elevations of the points,
+/// or equal bands of elevation if there are no peaks.
 enum class RingsFrom : std::uint8_t { field, rows, elevation, bands };
 constexpr auto names_of(RingsFrom) { return std::to_array<std::string_view>({"field", "rows", "elevation", "bands"}); }
 
-/// Tells the laser of each point of a cloud, and which laser is how high. One owner; allocates nothing, throws nothing.
+/// Assigns a laser to each point of a cloud, and orders the lasers by elevation. Single owner, not thread-safe;
+/// allocates nothing, throws nothing.
 class Rings {
  public:
   static constexpr std::size_t kMax = LidarPacket::kMaxLasers;
 
-  /// Positions of returns, all finite and none at the origin.
+  /// Positions of returns, lidar frame, m; all finite and not at the origin.
   struct Positions {
     std::span<const float> x_m, y_m, z_m;
   };
 
-  /// Writes the laser of each point, 0 .. kMax - 1, to `lasers`. `told`: what field or row says; empty where neither
-  /// does. Numbers that no laser can have count as not told.
+  /// Writes the laser of each point, 0 .. kMax - 1, to `lasers`. `told`: ring from the field or row; empty if there is
+  /// neither. All are ignored if any is out of range.
   void tell(Positions points, std::span<const float> told, RingsFrom told_by, std::vector<std::uint8_t>& lasers);
 
-  /// The number of a laser counted upwards, by the mean elevations that it was seen at. 0 is the lowest.
+  /// Ring of a laser, ordered by mean observed elevation; 0 is the lowest.
   [[nodiscard]] std::uint8_t ring_of(std::size_t laser) const { return ring_of_[laser]; }
   [[nodiscard]] RingsFrom from() const { return from_; }
 
  private:
   static constexpr double kBin_rad = 0.0017; ///< a tenth of a degree
-  static constexpr std::size_t kBins = 1850; ///< from straight down to straight up
+  static constexpr std::size_t kBins = 1850; ///< from nadir to zenith
 
   void find_lines(Positions points);
   void rank(Positions points, std::span<const std::uint8_t> lasers);

@@ -39,7 +39,7 @@ class FileStream : public ByteStream {
 
  private:
   int descriptor_;
-  std::uint64_t size_; ///< 0 where it is not known
+  std::uint64_t size_; ///< 0 if unknown
   std::uint64_t at_ = 0;
   std::string problem_;
 };

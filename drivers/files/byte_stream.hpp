@@ -11,22 +11,22 @@
 
 namespace locus {
 
-/// The bytes of a file or pipe from front to back, unpacked on the way if need be. One owner.
+/// Sequential bytes of a file or pipe, decompressed if necessary. Single owner, not thread-safe.
 class ByteStream {
  public:
   virtual ~ByteStream() = default;
 
-  /// Fills `out` from its front with what is there by now, waiting for one byte at least, and says how far; 0 at the
+  /// Reads available bytes into the front of `out`; blocks until there is at least one. Returns their number; 0 at the
   /// end.
   virtual std::size_t read(std::span<std::byte> out) = 0;
-  /// Why the bytes ended before the end of the file, for the user; empty while all is well.
+  /// Explains to the user why the bytes ended before the end of the file; empty if there was no problem.
   [[nodiscard]] virtual std::string problem() const = 0;
-  /// Share of the file that has been read, 0..1; 0 where its length is not known (a pipe).
+  /// Share of the file that has been read, 0..1; 0 if its length is unknown (a pipe).
   [[nodiscard]] virtual double progress() const = 0;
 };
 
-/// The bytes as they are; "-" is standard input. Fails with one line for the user when there is no such file, or it is
-/// a folder.
+/// Opens a file without decompression; "-" is standard input. Fails with one line for the user if there is no such file
+/// or it is a folder.
 Expected<std::unique_ptr<ByteStream>, std::string> open_stream(const std::filesystem::path& file);
 
 } // namespace locus

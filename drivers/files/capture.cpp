@@ -24,11 +24,10 @@ constexpr std::string_view kRecordOne = "record one with: tcpdump -s 0 -w lidar.
 struct Signature {
   std::string_view start;
   std::string_view what;
-  std::string_view unpacker =
-      {}; ///< a command that unpacks it from standard input to standard output; empty: none does
+  std::string_view unpacker = {}; ///< command that decompresses from standard input to standard output, if any
 };
 
-/// What people hand over in place of a capture.
+/// File types commonly given instead of a capture.
 constexpr std::array kForeignFiles{
     Signature{"\x89PNG", "a PNG image"},
     Signature{"\xFF\xD8\xFF", "a JPEG image"},
@@ -48,7 +47,7 @@ constexpr std::array kForeignFiles{
 constexpr std::array<std::string_view, 6> kCaptureMagics{"\xD4\xC3\xB2\xA1", "\xA1\xB2\xC3\xD4", "\x4D\x3C\xB2\xA1",
                                                          "\xA1\xB2\x3C\x4D", "\x0A\x0D\x0D\x0A", "\x34\xCD\xB2\xA1"};
 
-/// What a file is that libpcap cannot read, judged by its first bytes; libpcap's own words where it is a capture.
+/// Describes a file that libpcap cannot read, judged by its first bytes; quotes libpcap's message if it is a capture.
 std::string foreign_file(std::string_view start, const std::filesystem::path& name, std::string_view libpcap_says) {
   const auto starts_with = [&](std::string_view magic) { return start.substr(0, magic.size()) == magic; };
   if (start.empty()) {
@@ -94,18 +93,18 @@ void count(FrameError error, Capture::Stats& stats) {
   }
 }
 
-/// Empty when the time is none to reckon with: a pcapng file may claim any 64-bit number of seconds.
+/// Returns the stamp; empty if it is out of range: a pcapng file may claim any 64-bit number of seconds.
 std::optional<Stamp> stamp_of(const pcap_pkthdr& header) {
   constexpr std::int64_t kMaxSeconds = kLatestStamp.time_since_epoch() / std::chrono::seconds{1};
   if (header.ts.tv_sec < 0 || header.ts.tv_sec >= kMaxSeconds) {
     return std::nullopt;
   }
-  return stamp_from_ns(header.ts.tv_sec * 1'000'000'000 + header.ts.tv_usec); // nanoseconds, as asked for in open()
+  return stamp_from_ns(header.ts.tv_sec * 1'000'000'000 + header.ts.tv_usec); // nanoseconds, as requested in open()
 }
 
 } // namespace
 
-/// What libpcap reads from as from a file: a stream whose first bytes have been looked at.
+/// Adapts a stream whose first bytes were already read to the FILE that libpcap requires.
 struct Capture::Feed {
   explicit Feed(std::unique_ptr<ByteStream> from) : stream(std::move(from)) {
     std::size_t more = 1;
@@ -113,7 +112,7 @@ struct Capture::Feed {
       more = stream->read(std::as_writable_bytes(std::span{start}.subspan(start_size)));
   }
 
-  /// A file that owns the feed and closes with it; nullptr, and errno, where there is no memory.
+  /// Opens a FILE that owns the feed. Returns nullptr and sets errno if memory is exhausted.
   static std::FILE* open(std::unique_ptr<Feed> feed) {
     constexpr std::size_t kBufferBytes = 1 << 16;
     std::FILE* const file = fopencookie(feed.get(), "rb", {read, nullptr, seek, close});
@@ -136,7 +135,7 @@ struct Capture::Feed {
     feed.at += count;
     return static_cast<ssize_t>(count);
   }
-  /// Tells the place and goes to no other.
+  /// Reports the current offset; no other seek is supported.
   static int seek(void* cookie, off64_t* offset, int whence) {
     if (whence != SEEK_CUR || *offset != 0) {
       errno = ESPIPE;
@@ -153,7 +152,7 @@ struct Capture::Feed {
   std::unique_ptr<ByteStream> stream;
   std::array<char, 64> start{};
   std::size_t start_size = 0;
-  std::uint64_t at = 0; ///< bytes given out
+  std::uint64_t at = 0; ///< bytes read so far
 };
 
 void Capture::Closer::operator()(pcap* handle) const { pcap_close(handle); }
@@ -196,7 +195,7 @@ const Datagram* Capture::next() {
     pcap_pkthdr* header = nullptr;
     const u_char* data = nullptr;
     const int status = pcap_next_ex(pcap_.get(), &header, &data);
-    if (status == PCAP_ERROR_BREAK) { // the regular end
+    if (status == PCAP_ERROR_BREAK) { // regular end
       return nullptr;
     }
     if (status != 1) {
@@ -225,7 +224,8 @@ const Datagram* Capture::next() {
   return nullptr;
 }
 
-/// libpcap reports a file that is cut and one that is damaged alike; only the stream knows whether its end was reached.
+/// Records why reading stopped. libpcap reports truncation and damage alike; only the stream knows whether its end was
+/// reached.
 void Capture::note_break() {
   const std::string_view why = pcap_geterr(pcap_.get());
   if (why.find("different from") != std::string_view::npos) {
@@ -235,7 +235,7 @@ void Capture::note_break() {
     return;
   }
   const bool cut = std::feof(pcap_file(pcap_.get())) != 0;
-  const std::string problem = stream_->problem(); // then it, and not the capture, ended too soon
+  const std::string problem = stream_->problem(); // not empty: the stream, not the capture, ended early
   break_ =
       fmt::format("{}: byte {}: {} ({}); the {} frames before it are used{}", file_.string(),
                   ftello(pcap_file(pcap_.get())), cut ? "the capture ends in mid-packet" : "the capture is damaged",

@@ -16,29 +16,29 @@ struct pcap;
 
 namespace locus {
 
-/// Reads the UDP datagrams of a recorded capture, pcap or pcapng, in the order in which they were recorded.
+/// Reads the UDP datagrams of a capture file, pcap or pcapng, in recorded order.
 ///
-/// Link types: Ethernet with any VLAN tags, Linux cooked (SLL, SLL2), loopback, raw IP. Whatever is not a whole IPv4
-/// UDP datagram, or completes one, is counted and skipped. A file that breaks off is read up to the break, and
-/// warnings() says where that is. One owner. Allocates nothing from packet to packet.
+/// Link types: Ethernet with any VLAN tags, Linux cooked (SLL, SLL2), loopback, raw IP. Frames that neither hold nor
+/// complete an IPv4 UDP datagram are counted and skipped. A truncated or damaged file is read up to that point, and
+/// warnings() reports it. Single owner, not thread-safe. Allocates nothing per packet.
 class Capture : public DatagramSource {
  public:
-  /// What became of the frames so far: frames = datagrams + not_ip + ipv6 + fragments + not_udp + malformed.
+  /// Counters of the frames so far: frames = datagrams + not_ip + ipv6 + fragments + not_udp + malformed.
   struct Stats {
     std::uint64_t frames = 0;
     std::uint64_t datagrams = 0;
-    std::uint64_t truncated = 0; ///< datagrams with part of the payload missing, because of the capture's snap length
+    std::uint64_t truncated = 0; ///< datagrams with an incomplete payload, because of the capture's snap length
     std::uint64_t not_ip = 0;
     std::uint64_t ipv6 = 0;
-    std::uint64_t fragments = 0; ///< that complete no datagram
+    std::uint64_t fragments = 0; ///< fragments that complete no datagram
     std::uint64_t not_udp = 0;
-    std::uint64_t malformed = 0; ///< lengths that contradict each other, headers cut short, a time beyond the year 2096
+    std::uint64_t malformed = 0; ///< contradictory lengths, truncated headers, or a time beyond the year 2096
   };
 
-  /// "-" is standard input. Fails with one line for the user when the file cannot be read, is not a capture or has a
-  /// foreign link type.
+  /// Opens a capture; "-" is standard input. Fails with one line for the user if the file cannot be read, is not a
+  /// capture or has an unsupported link type.
   static Expected<Capture, std::string> open(const std::filesystem::path& file);
-  /// The same of a stream; `name` is what messages call it.
+  /// Opens a stream in the same way; `name` stands for it in messages.
   static Expected<Capture, std::string> open(std::unique_ptr<ByteStream> stream, const std::filesystem::path& name);
 
   const Datagram* next() override;
@@ -61,11 +61,11 @@ class Capture : public DatagramSource {
 
   std::filesystem::path file_;
   std::unique_ptr<pcap, Closer> pcap_;
-  const ByteStream* stream_; ///< what pcap_ reads from and owns
+  const ByteStream* stream_; ///< source of pcap_, which owns it
   IpFragments fragments_;
   Datagram datagram_;
   Stats stats_;
-  std::string break_; ///< where and why reading stopped before the end; empty while all is well
+  std::string break_; ///< where and why reading stopped early; empty if it did not
 };
 
 } // namespace locus

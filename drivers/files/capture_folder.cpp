@@ -20,13 +20,13 @@ using std::filesystem::path;
 constexpr std::array<const char*, 2> kCaptures{".pcap", ".pcapng"};
 constexpr std::array<const char*, 5> kPackings{"", ".gz", ".xz", ".zst", ".zstd"};
 
-/// The name without what says that it is packed.
+/// Removes the extension of the compression from a name.
 path unpacked_name(const path& file) {
   const bool is_packed = file.has_extension() && std::ranges::find(kPackings, file.extension()) != kPackings.end();
   return is_packed ? path{file}.replace_extension() : file;
 }
 
-/// `name`, packed or not, where there is one.
+/// Finds the file `name`, compressed or not.
 std::optional<path> packed_or_not(const path& name) {
   std::error_code ignored;
   for (const char* const packing : kPackings) {
@@ -38,7 +38,7 @@ std::optional<path> packed_or_not(const path& name) {
   return std::nullopt;
 }
 
-/// The file and the parts that follow it.
+/// Lists the file and its continuation parts.
 std::vector<path> parts_of(const path& first) {
   std::vector<path> parts{first};
   std::optional<path> next = first;
@@ -51,13 +51,13 @@ std::vector<path> parts_of(const path& first) {
   return parts;
 }
 
-/// folder/name, or empty where there is no such file.
+/// Returns folder/name if it exists, otherwise an empty path.
 path existing(const path& folder, const char* name) {
   std::error_code ignored;
   return std::filesystem::exists(folder / name, ignored) ? folder / name : path{};
 }
 
-/// The same as a list.
+/// Returns existing() as a list.
 std::vector<path> all_existing(const path& folder, const char* name) {
   const path file = existing(folder, name);
   return file.empty() ? std::vector<path>{} : std::vector<path>{file};
@@ -73,10 +73,10 @@ std::vector<CaptureFolder::Source> odometry_in(const std::vector<path>& files) {
   return sources;
 }
 
-/// A NAME.meta.csv without its source would be ignored in silence.
+/// Finds a NAME.meta.csv without its source, which would otherwise be ignored silently.
 std::optional<std::string> stray_meta_in(const std::vector<path>& files) {
   for (const path& file : files) {
-    const path source = path{file}.replace_extension().replace_extension(); // without .meta.csv
+    const path source = path{file}.replace_extension().replace_extension(); // removes .meta.csv
     const bool stray = file.string().ends_with(".meta.csv") && !std::filesystem::exists(source.string() + ".tum") &&
                        !std::filesystem::exists(source.string() + ".csv");
     if (stray) {
@@ -96,7 +96,7 @@ Expected<std::vector<path>, std::string> entries_of(const path& where) {
   if (error) {
     return fmt::format("{}: {}; check its permissions", where.string(), error.message());
   }
-  std::ranges::sort(files); // folders list in any order
+  std::ranges::sort(files); // directory order is unspecified
   return files;
 }
 
@@ -123,7 +123,7 @@ Expected<CaptureFolder, std::string> folder_of(const path& where) {
   return found;
 }
 
-/// Whatever lies in one piece alone, the truth, is that of the last.
+/// Appends a piece to the recording. Ground truth, which only one piece contains, is taken from the last piece.
 void append(CaptureFolder& recording, CaptureFolder piece) {
   recording.ground_truth = std::move(piece.ground_truth);
   recording.map_truth = std::move(piece.map_truth);
@@ -147,7 +147,7 @@ std::string text_of(const path& file) {
 
 bool has_capture(const path& where) { return !captures_in(where).empty(); }
 
-/// The capture folders that `where` is or holds.
+/// Lists the capture folders: `where` itself or those in it.
 std::vector<path> capture_folders_in(const path& where) {
   if (has_capture(where)) {
     return {where};
@@ -156,7 +156,7 @@ std::vector<path> capture_folders_in(const path& where) {
   for (const path& run : runs_in(where)) {
     std::ranges::move(pieces_in(run), std::back_inserter(folders));
   }
-  std::erase_if(folders, [](const path& piece) { return !has_capture(piece); }); // it had just been begun
+  std::erase_if(folders, [](const path& piece) { return !has_capture(piece); }); // piece was just started
   return folders;
 }
 

@@ -14,7 +14,7 @@ Expected<CaptureSequence, std::string> CaptureSequence::open(std::vector<std::fi
   return sequence;
 }
 
-/// False when no file is left that can be opened.
+/// Opens the next file that can be opened. Returns false if there is none.
 bool CaptureSequence::open_next() {
   while (next_file_ < files_.size()) {
     Expected<Capture, std::string> next = opener_(files_[next_file_++]);

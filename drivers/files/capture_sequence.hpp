@@ -14,14 +14,14 @@
 
 namespace locus {
 
-/// Captures one after the other: the pieces of one recording. One that cannot be opened, because the computer was
-/// switched off when it was begun, is left out with a warning. One owner.
+/// Plays several captures in sequence: the pieces of one recording. A piece that cannot be opened, because power was
+/// lost when it was started, is skipped with a warning. Single owner, not thread-safe.
 class CaptureSequence : public DatagramSource {
  public:
   using Opener = std::function<Expected<Capture, std::string>(const std::filesystem::path&)>;
 
-  /// At least one file; of one that stands alone, what `opener` says. Fails with one line for the user when none of
-  /// them can be opened.
+  /// Opens the first readable file; requires at least one file. Fails with one line for the user, from `opener`, if
+  /// none can be opened.
   static Expected<CaptureSequence, std::string> open(
       std::vector<std::filesystem::path> files,
       Opener opener = [](const std::filesystem::path& file) { return Capture::open(file); });
@@ -40,9 +40,9 @@ class CaptureSequence : public DatagramSource {
   std::vector<std::filesystem::path> files_;
   Opener opener_;
   std::size_t next_file_ = 0;
-  std::optional<Capture> capture_;    ///< of the file before next_file_
-  std::uint64_t before_ = 0;          ///< datagrams of the captures before
-  std::vector<std::string> warnings_; ///< of the captures before, and of those that could not be opened
+  std::optional<Capture> capture_;    ///< capture of the file before next_file_
+  std::uint64_t before_ = 0;          ///< datagrams of the previous captures
+  std::vector<std::string> warnings_; ///< warnings of the previous captures and of files that could not be opened
 };
 
 } // namespace locus

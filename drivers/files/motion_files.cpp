@@ -36,7 +36,7 @@ template <class Row> Expected<std::vector<Row>, std::string> all_rows(RowReader<
   return rows;
 }
 
-/// Gives each row of a meta file to the sample of its stamp. Stamps may repeat, in both files the same way, and may
+/// Assigns each row of a meta file to the sample with its stamp. Stamps may repeat, equally in both files, and may
 /// differ by less than a microsecond, the rounding of a trajectory written with six decimals.
 template <class Sample>
 Problem apply_meta(const std::filesystem::path& file, std::vector<Sample>& samples, std::vector<Meta> rows) {
@@ -55,7 +55,7 @@ Problem apply_meta(const std::filesystem::path& file, std::vector<Sample>& sampl
   return std::nullopt;
 }
 
-/// How the table of a kind of sample is written.
+/// Format of the table of a sample type.
 template <class Sample> struct Table;
 template <> struct Table<ImuSample> {
   static constexpr char kSeparator = ',';
@@ -90,7 +90,7 @@ template <class Sample> Expected<std::vector<Sample>, std::string> read_samples(
   return samples;
 }
 
-/// With as few digits as tell a number from its neighbours, unless so many decimals are asked for.
+/// Appends a number with `decimals` decimals, or with the fewest digits that preserve its value.
 void append_number(std::string& line, double number, std::optional<int> decimals) {
   if (decimals) {
     fmt::format_to(std::back_inserter(line), "{:.{}f}", number, *decimals);
@@ -117,7 +117,7 @@ std::string to_line(const ImuSample& sample, std::optional<int> decimals) {
   return line + '\n';
 }
 
-/// Integer arithmetic keeps the stamp to the nanosecond.
+/// Formats one pose. Integer arithmetic preserves the nanoseconds of the stamp.
 std::string to_line(const StampedPose& pose, std::optional<int> decimals) {
   const std::int64_t ns = to_ns(pose.stamp);
   const Eigen::Vector3d& p = pose.T_source_base.translation;
@@ -133,7 +133,7 @@ std::string to_line(const StampedPose& pose, std::optional<int> decimals) {
 
 Expected<std::vector<StampedPose>, std::string> read_trajectory(const std::filesystem::path& file) {
   RowReader<OdometrySample> reader = open_table<OdometrySample>(file);
-  constexpr double kFarthest_m = 1e8; // geocentric coordinates are within it, and their squares are numbers
+  constexpr double kFarthest_m = 1e8; // covers geocentric coordinates; squares stay finite
   std::vector<StampedPose> poses;
   for (OdometrySample sample; reader.next(sample);) {
     if (!sample.T_source_base.finite()) {
@@ -151,7 +151,7 @@ Expected<std::vector<StampedPose>, std::string> read_trajectory(const std::files
   if (poses.empty()) {
     return fmt::format("{}: holds no pose; expected lines of t x y z qx qy qz qw", file.string());
   }
-  poses.shrink_to_fit(); // an hour at 100 Hz fills 30 MB as it is
+  poses.shrink_to_fit(); // an hour at 100 Hz still takes 30 MB
   return poses;
 }
 
@@ -164,12 +164,12 @@ template <class Sample> Expected<std::vector<Sample>, std::string> parse_samples
 template Expected<std::vector<ImuSample>, std::string> parse_samples(std::string, std::string);
 template Expected<std::vector<OdometrySample>, std::string> parse_samples(std::string, std::string);
 
-/// The rows of all files as they stand, each with its row of the meta file beside it.
+/// Rows of all files in file order, each combined with its row of the meta file.
 template <class Sample> class MotionSamples<Sample>::Rows {
  public:
   explicit Rows(std::vector<std::filesystem::path> files) : files_(std::move(files)) {}
 
-  /// False at the end, and where there is a problem or a meta file is of another order.
+  /// Returns false at the end, on a problem, and if a meta file has another order.
   bool next(Sample& sample) {
     while (!problem_ && in_step_ && (samples_ || next_file_ < files_.size())) {
       if (!samples_) {
@@ -186,7 +186,7 @@ template <class Sample> class MotionSamples<Sample>::Rows {
   }
 
   [[nodiscard]] const Problem& problem() const { return problem_; }
-  /// Whether every row of a meta file belongs to the sample that stands in the same place.
+  /// Returns true while every row of a meta file matches the sample at the same position.
   [[nodiscard]] bool in_step() const { return in_step_; }
   [[nodiscard]] const std::vector<std::string>& breaks() const { return breaks_; }
 
@@ -210,7 +210,8 @@ template <class Sample> class MotionSamples<Sample>::Rows {
     }
   }
 
-  /// Of two files that were not written to their ends, one is shorter.
+  /// Ends a file. A file and its meta file that were not fully written differ in length; that is reported, not an
+  /// error.
   void end_file() {
     note(*samples_);
     Meta row;
@@ -236,9 +237,9 @@ template <class Sample> class MotionSamples<Sample>::Rows {
 
   std::vector<std::filesystem::path> files_;
   std::size_t next_file_ = 0;
-  std::optional<RowReader<Sample>> samples_; ///< nothing between two files
+  std::optional<RowReader<Sample>> samples_; ///< empty between two files
   std::optional<RowReader<Meta>> meta_;
-  std::optional<Stamp> latest_; ///< of the samples of this file
+  std::optional<Stamp> latest_; ///< latest sample of this file
   bool in_step_ = true;
   Problem problem_;
   std::vector<std::string> breaks_;

@@ -15,7 +15,7 @@ constexpr std::size_t kMaxFields = FieldSplitter::kMaxFields;
 
 template <class Number> bool parse(std::string_view text, Number& number) {
   const char* end = text.data() + text.size();
-  const char* begin = text.data() + (text.starts_with('+') ? 1 : 0); // from_chars takes no plus sign
+  const char* begin = text.data() + (text.starts_with('+') ? 1 : 0); // from_chars does not accept a plus sign
   const auto [stop, error] = std::from_chars(begin, end, number);
   return error == std::errc{} && stop == end;
 }
@@ -26,7 +26,7 @@ bool parse_all(Fields fields, std::span<double> numbers) {
 
 bool is_sensible(Stamp stamp) { return stamp > kEarliestStamp && stamp < kLatestStamp; }
 
-/// A whole number of nanoseconds.
+/// Parses an integer number of nanoseconds.
 std::optional<Stamp> parse_ns(std::string_view text) {
   std::int64_t ns = 0;
   return parse(text, ns) && is_sensible(stamp_from_ns(ns)) ? std::optional{stamp_from_ns(ns)} : std::nullopt;
@@ -79,7 +79,7 @@ std::optional<Eigen::Quaterniond> unit_quaternion(double w, double x, double y, 
   if (std::abs(q.norm() - 1.0) > kTolerance) {
     return std::nullopt;
   }
-  return std::abs(q.squaredNorm() - 1.0) < kRounding ? q : q.normalized(); // every digit of one that was recorded
+  return std::abs(q.squaredNorm() - 1.0) < kRounding ? q : q.normalized(); // preserves the digits of a recorded one
 }
 
 std::string_view trimmed(std::string_view text) {

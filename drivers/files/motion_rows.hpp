@@ -17,39 +17,39 @@
 
 #include "core/sources/motion_sample.hpp"
 
-/// The rows of recorded motion, text by text; for motion_files.cpp.
+/// Row parsers of recorded motion; internal to motion_files.cpp.
 namespace locus {
 
 using Fields = std::span<const std::string_view>;
-using Problem = std::optional<std::string>; ///< what is wrong with a line, and what to do
+using Problem = std::optional<std::string>; ///< what is wrong with a line, and what to do; empty if nothing
 
-/// What a meta file says of a sample.
+/// Row of a meta file.
 struct Meta {
   Stamp stamp;
   Stamp arrival;
   double covariance_scale = 1.0;
 };
 
-/// A decimal number of units of 10^unit_exponent seconds since 1970, rounded to nanoseconds without a detour over
-/// double, whose steps are 200 ns at today's dates. Takes an exponent too: NumPy writes 1.403636579763555527e+09.
+/// Parses a decimal number in units of 10^unit_exponent seconds since 1970, rounded to nanoseconds. Avoids double,
+/// whose resolution is 200 ns at today's dates. Accepts an exponent: NumPy writes 1.403636579763555527e+09.
 std::optional<Stamp> parse_time(std::string_view text, int unit_exponent);
 
-/// A rotation, NaN included; one of unit length up to rounding keeps its bits. Nothing when the four numbers are none,
-/// which tells columns in another order from a quaternion rounded by the writer.
+/// Returns a rotation, NaN included; bits are preserved if the length is 1 up to rounding. Empty if the length deviates
+/// by more than 5 %, which distinguishes columns in another order from rounding by the writer.
 std::optional<Eigen::Quaterniond> unit_quaternion(double w, double x, double y, double z);
 
 Problem parse_imu(Fields fields, ImuSample& sample);
 Problem parse_odometry(Fields fields, OdometrySample& sample);
 Problem parse_meta(Fields fields, Meta& meta);
 
-/// Without the blanks around it.
+/// Removes surrounding blanks.
 std::string_view trimmed(std::string_view text);
 
-/// A first line in which nothing is a number.
+/// Returns true if no field is a number, as in a header line.
 bool is_header(Fields fields);
 
-/// Splits at commas, or at runs of blanks for the separator ' '. A line with more fields than fit is returned with one
-/// more than kMaxFields, which no format has.
+/// Splits a line at commas, or at runs of blanks for the separator ' '. A line with too many fields yields kMaxFields +
+/// 1 fields, which no format has.
 class FieldSplitter {
  public:
   static constexpr std::size_t kMaxFields = 11;
@@ -74,7 +74,7 @@ class FieldSplitter {
   std::array<std::string_view, kMaxFields + 1> fields_;
 };
 
-/// The rows of a table, one after the other. Blank lines, comments and a header line are none.
+/// Reads the rows of a table in sequence. Skips blank lines, comments and a header line.
 template <class Row> class RowReader {
  public:
   RowReader(const std::filesystem::path& file, char separator, Problem (*parse_row)(Fields, Row&))
@@ -84,11 +84,11 @@ template <class Row> class RowReader {
     }
   }
 
-  /// Of any lines; `name` stands for them in problems.
+  /// Reads from any stream; `name` stands for it in errors.
   RowReader(std::unique_ptr<std::istream> stream, std::string name, char separator, Problem (*parse_row)(Fields, Row&))
       : stream_(std::move(stream)), name_(std::move(name)), split_(separator), parse_row_(parse_row) {}
 
-  /// False at the end, and where there is a problem.
+  /// Returns false at the end and on a problem.
   bool next(Row& row) {
     while (!problem_ && std::getline(*stream_, buffer_)) {
       ++line_;
@@ -109,10 +109,10 @@ template <class Row> class RowReader {
     return false;
   }
 
-  /// Puts the place of the latest row before what is wrong with it.
+  /// Records a problem, prefixed with the position of the latest row.
   void report(const std::string& problem) { problem_ = fmt::format("{}:{}: {}", name_, line_, problem); }
   [[nodiscard]] const Problem& problem() const { return problem_; }
-  /// Whether the problem is that of a last line that was not written to its end.
+  /// Returns true if the problem is in an incomplete last line.
   [[nodiscard]] bool breaks_off() const { return problem_ && stream_->eof(); }
 
  private:

@@ -88,7 +88,7 @@ void PcapWriter::write(const Datagram& datagram) {
 void PcapWriter::write_frame(Stamp stamp, std::span<const std::byte> frame, std::size_t snap_length) {
   pcap_pkthdr header{};
   header.ts.tv_sec = to_ns(stamp) / 1'000'000'000;
-  header.ts.tv_usec = to_ns(stamp) % 1'000'000'000; // nanoseconds, by the precision of this file
+  header.ts.tv_usec = to_ns(stamp) % 1'000'000'000; // nanoseconds, because of the file's precision
   header.len = static_cast<bpf_u_int32>(frame.size());
   header.caplen = static_cast<bpf_u_int32>(std::min(frame.size(), snap_length));
   const std::span<const std::byte> kept = frame.first(header.caplen);

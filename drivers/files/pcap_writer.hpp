@@ -34,38 +34,40 @@ struct UdpAddresses {
   std::uint16_t destination_port = 2368;
 };
 
-/// IPv4 packet around a UDP datagram, without checksums. `ip_options` must be a multiple of four bytes.
+/// Wraps a UDP payload in an IPv4 packet without checksums. The length of `ip_options` must be a multiple of four
+/// bytes.
 Bytes ipv4_udp(const UdpAddresses& addresses, std::span<const std::byte> payload,
                std::span<const std::byte> ip_options = {});
 
-/// Ethernet frame around a packet; `tags` is whatever stands between the addresses and the EtherType, for example a
-/// VLAN tag of four bytes.
+/// Wraps a packet in an Ethernet frame; `tags` are inserted between the addresses and the EtherType, for example a VLAN
+/// tag of four bytes.
 Bytes ethernet(std::span<const std::byte> packet, std::uint16_t ether_type = 0x0800,
                std::span<const std::byte> tags = {});
 
-/// Writes capture files: nanosecond pcap. The file is complete once the writer is gone. One owner.
+/// Writes capture files: pcap with nanosecond stamps. The file is complete after destruction. Single owner, not
+/// thread-safe.
 class PcapWriter {
  public:
-  static constexpr int kEthernet = 1; ///< the link type
+  static constexpr int kEthernet = 1; ///< link type
   static constexpr std::size_t kHeaderBytes = 24;
 
-  /// "-" is standard output. A file that is there is overwritten. Fails with one line for the user.
+  /// Opens a file for writing; "-" is standard output. Overwrites an existing file. Fails with one line for the user.
   static Expected<PcapWriter, std::string> open(const std::filesystem::path& file, int link_type = kEthernet);
 
-  /// A UDP datagram in IPv4 in Ethernet; only for a writer of that link type. What of this and the next two does not
-  /// reach the file, flush() tells.
+  /// Writes a UDP datagram in IPv4 in Ethernet; requires link type kEthernet. Errors of this and the next two functions
+  /// are reported by flush().
   void write(Stamp stamp, const UdpAddresses& addresses, std::span<const std::byte> payload);
 
-  /// As it was sent: to everyone.
+  /// Writes a datagram with the broadcast address as its destination.
   void write(const Datagram& datagram);
 
-  /// Any bytes as one captured frame, of which only the first `snap_length` are kept.
+  /// Writes any bytes as one captured frame, truncated to `snap_length`.
   void write_frame(Stamp stamp, std::span<const std::byte> frame, std::size_t snap_length = 65535);
 
-  /// Hands all over to the system. One line for the user unless everything so far has reached the file.
+  /// Flushes to the operating system. Returns one line for the user if any write so far has failed.
   std::optional<std::string> flush();
 
-  /// Of the file so far.
+  /// Size of the file so far.
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
   [[nodiscard]] int descriptor() const;
 

@@ -21,11 +21,10 @@ std::uint32_t big_endian_32(ByteSpan bytes, std::size_t at) {
 }
 
 bool is_vlan_tag(std::uint16_t ether_type) {
-  return ether_type == 0x8100 || ether_type == 0x88A8 ||
-         ether_type == 0x9100; // 802.1Q, 802.1ad, QinQ before the standard
+  return ether_type == 0x8100 || ether_type == 0x88A8 || ether_type == 0x9100; // 802.1Q, 802.1ad, pre-standard QinQ
 }
 
-/// The IP packet behind a link header of `header_bytes` with an EtherType at `type_at`.
+/// Returns the IP packet after a link header of `header_bytes` with an EtherType at `type_at`.
 Expected<ByteSpan, FrameError> behind_ether_type(ByteSpan frame, std::size_t header_bytes, std::size_t type_at) {
   constexpr std::size_t kVlanTagBytes = 4;
   if (frame.size() < header_bytes) {
@@ -50,8 +49,8 @@ Expected<ByteSpan, FrameError> behind_ether_type(ByteSpan frame, std::size_t hea
   }
 }
 
-/// The IP packet behind a BSD loopback header: an address family in the byte order of the capturing computer, and for
-/// IPv6 a different number on every system.
+/// Returns the IP packet after a BSD loopback header: an address family in the byte order of the capturing computer,
+/// with an OS-specific number for IPv6.
 Expected<ByteSpan, FrameError> behind_loopback(ByteSpan frame) {
   constexpr std::size_t kHeaderBytes = 4;
   if (frame.size() < kHeaderBytes) {
@@ -93,8 +92,8 @@ constexpr std::size_t kMinIpHeaderBytes = 20;
 constexpr std::uint8_t kUdp = 17;
 constexpr std::uint16_t kMoreFragments = 0x2000, kFragmentOffset = 0x1FFF;
 
-/// The datagram in what stands behind an IP header and has `ip_payload_bytes` by that. `cut_bytes` of it were on the
-/// wire, but not captured.
+/// Parses the UDP datagram after an IP header that gives `ip_payload_bytes` for it. `cut_bytes` of it were on the wire
+/// but not captured.
 Expected<Datagram, FrameError> datagram_in_udp(ByteSpan udp, std::size_t ip_payload_bytes, std::size_t cut_bytes,
                                                std::uint32_t source_ip) {
   constexpr std::size_t kUdpHeaderBytes = 8;
@@ -102,7 +101,8 @@ Expected<Datagram, FrameError> datagram_in_udp(ByteSpan udp, std::size_t ip_payl
     return FrameError::malformed;
   }
   const std::size_t udp_bytes = big_endian_16(udp, 4);
-  // The IP length alone may claim too much: a VLP-16 of 2014 puts that of its data packets in its position packets.
+  // A VLP-16 of 2014 puts the IP length of its data packets into its position packets, so that length alone is
+  // unreliable.
   if (udp_bytes < kUdpHeaderBytes || udp_bytes > std::min(ip_payload_bytes, udp.size() + cut_bytes)) {
     return FrameError::malformed;
   }
@@ -116,7 +116,7 @@ Expected<Datagram, FrameError> datagram_in_udp(ByteSpan udp, std::size_t ip_payl
   return datagram;
 }
 
-/// `cut_bytes` of the packet were on the wire, but not captured.
+/// Parses an IP packet. `cut_bytes` of it were on the wire but not captured.
 Expected<Datagram, FrameError> datagram_in(ByteSpan packet, std::size_t cut_bytes) {
   if (!packet.empty() && byte_at(packet, 0) >> 4 == 6) {
     return FrameError::ipv6;
@@ -190,7 +190,7 @@ std::optional<Datagram> IpFragments::take(int link_type, std::span<const std::by
   return add(place_of(name), packet.subspan(header_bytes, bytes), begin, is_last);
 }
 
-/// The packet of this name, or a new one where one was that is free, or has waited longest for more.
+/// Returns the slot of this packet; if there is none, resets a free slot or the one that has waited longest.
 IpFragments::Packet& IpFragments::place_of(const Name& name) {
   for (Packet& packet : *packets_) {
     if (packet.fragments > 0 && packet.name == name) {
@@ -204,7 +204,8 @@ IpFragments::Packet& IpFragments::place_of(const Name& name) {
   return place;
 }
 
-/// A part that is there already is of a later packet, whose number is the same.
+/// Adds a fragment. A part received before belongs to a later packet with the same identification, so the slot
+/// restarts.
 std::optional<Datagram> IpFragments::add(Packet& packet, ByteSpan fragment, std::size_t begin, bool is_last) {
   const std::size_t first = begin / kUnit, behind = (begin + fragment.size() + kUnit - 1) / kUnit;
   bool is_new = packet.fragments == 0;

@@ -17,12 +17,12 @@ namespace locus::hesai {
 
 namespace {
 
-constexpr std::size_t kLongestFile = 100'000; ///< bytes; 128 lasers are a twentieth
+constexpr std::size_t kLongestFile = 100'000; ///< bytes; 20 times the file of 128 lasers
 constexpr double kSteepestDeg = 90.0, kFarthestDeg = 180.0;
 
 using Fields = std::array<std::string_view, 3>;
 
-/// The first three of a line, without the blanks around them; nothing where there are fewer.
+/// Returns the first three fields of a line without surrounding blanks; empty if there are fewer.
 std::optional<Fields> fields_of(std::string_view line) {
   Fields fields;
   for (std::string_view& field : fields) {
@@ -55,10 +55,10 @@ bool is_head(const Fields& fields) {
   return (fields[0] == "Laser id" || fields[0] == "Channel") && fields[1] == "Elevation" && fields[2] == "Azimuth";
 }
 
-/// Its lines one by one.
+/// Parser of the lines of a calibration file.
 class Reader {
  public:
-  /// What is wrong with a line; nothing where it is well.
+  /// Parses a line. Returns an error, or nothing if the line is valid.
   std::optional<std::string> take(std::string_view line) {
     const auto fields = fields_of(line);
     if (!has_head_) {
@@ -83,7 +83,7 @@ class Reader {
     return std::nullopt;
   }
 
-  /// After the last line.
+  /// Completes the calibration after the last line.
   Expected<Calibration, std::string> finish() {
     if (!has_head_ || seen_.none())
       return std::string{"no lasers in it; give the angle correction file of the lidar"};
@@ -96,7 +96,7 @@ class Reader {
   }
 
  private:
-  /// An empty line, or the hash behind all lasers.
+  /// Parses an empty line, or the hash after all lasers.
   std::optional<std::string> take_other(std::string_view line) {
     if (line.find_first_not_of(" \t\r,") == std::string_view::npos)
       return std::nullopt;
@@ -116,7 +116,7 @@ class Reader {
 Expected<Calibration, std::string> parse_calibration(std::string_view text, std::string_view name) {
   if (text.size() > kLongestFile)
     return fmt::format("{}: too long for the angles of 128 lasers; give the angle correction file of the lidar", name);
-  constexpr std::string_view kMark = "\xEF\xBB\xBF"; // of UTF-8
+  constexpr std::string_view kMark = "\xEF\xBB\xBF"; // UTF-8 byte order mark
   text.remove_prefix(text.starts_with(kMark) ? kMark.size() : 0);
   Reader reader;
   for (int line = 1; !text.empty(); ++line) {

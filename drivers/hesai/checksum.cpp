@@ -15,7 +15,7 @@ constexpr std::uint32_t kPolynomial = 0x04C1'1DB7;
 
 constexpr std::uint32_t times_x(std::uint32_t value) { return value << 1 ^ ((value >> 31) != 0 ? kPolynomial : 0); }
 
-/// So many bytes are taken at once: a table for each says what it does to the checksum from where it stands.
+/// Number of bytes processed at once, with one table for the contribution of each position (slicing).
 constexpr std::size_t kSlices = 16;
 using Tables = std::array<std::array<std::uint32_t, 256>, kSlices>;
 
@@ -38,7 +38,7 @@ constexpr Tables make_tables() {
 
 constexpr Tables kTables = make_tables();
 
-/// Goes on from a checksum.
+/// Continues a checksum over further bytes.
 std::uint32_t go_on(std::uint32_t crc, std::span<const std::byte> bytes) {
   for (; bytes.size() >= kSlices; bytes = bytes.subspan(kSlices)) {
     std::uint32_t next = 0;
@@ -55,7 +55,7 @@ std::uint32_t go_on(std::uint32_t crc, std::span<const std::byte> bytes) {
 
 #if defined(__x86_64__)
 
-/// x^exponent modulo the polynomial.
+/// Returns x^exponent modulo the polynomial.
 constexpr std::uint32_t power(int exponent) {
   std::uint32_t value = 1;
   for (; exponent > 0; --exponent)
@@ -63,7 +63,7 @@ constexpr std::uint32_t power(int exponent) {
   return value;
 }
 
-constexpr std::size_t kLaneBytes = 16, kLanes = 4; ///< that are folded at once
+constexpr std::size_t kLaneBytes = 16, kLanes = 4; ///< folded in parallel
 constexpr std::size_t kBlockBytes = kLanes * kLaneBytes;
 
 struct Lane {
@@ -72,20 +72,20 @@ struct Lane {
 
 [[gnu::target("pclmul,ssse3")]] inline Lane operator^(Lane a, Lane b) { return {_mm_xor_si128(a.bits, b.bits)}; }
 
-/// The first byte is the highest. The other way round it is stored.
+/// Reverses the bytes of a lane: the first byte in memory is the most significant one.
 [[gnu::target("pclmul,ssse3")]] inline __m128i reversed(__m128i bytes) {
   return _mm_shuffle_epi8(bytes, _mm_set_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15));
 }
 
-/// What this lane is worth so many bits further on, where it is added to what stands there.
+/// Multiplies a lane by x^kBits modulo the polynomial, to be added to the lane kBits further on.
 template <int kBits> [[gnu::target("pclmul,ssse3")]] inline Lane moved_ahead(Lane lane) {
   constexpr std::uint64_t kOfHigh = power(kBits + 64), kOfLow = power(kBits);
   const __m128i factors = _mm_set_epi64x(static_cast<long long>(kOfHigh), static_cast<long long>(kOfLow));
   return Lane{_mm_clmulepi64_si128(lane.bits, factors, 0x11)} ^ Lane { _mm_clmulepi64_si128(lane.bits, factors, 0x00) };
 }
 
-/// Takes all whole lanes in, and leaves what is behind them. (V. Gopal et al., Fast CRC computation for generic
-/// polynomials using PCLMULQDQ, Intel, 2009.) Precondition: there is a block.
+/// Folds all whole lanes and leaves the remaining bytes in `bytes`. (V. Gopal et al., Fast CRC computation for generic
+/// polynomials using PCLMULQDQ, Intel, 2009.) Precondition: at least kBlockBytes.
 [[gnu::target("pclmul,ssse3")]] std::uint32_t fold(std::uint32_t crc, std::span<const std::byte>& bytes) {
   const auto load = [&](std::size_t lane) {
     return Lane{reversed(_mm_loadu_si128(reinterpret_cast<const __m128i*>(bytes.data() + kLaneBytes * lane)))};

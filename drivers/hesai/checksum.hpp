@@ -7,8 +7,9 @@
 
 namespace locus::hesai {
 
-/// The CRC that packets with functional safety carry: polynomial 04C11DB7, from the highest bit on, begun with ones and
-/// not inverted at the end (CRC-32/MPEG-2). The manuals name none; it is the one that all packets of a recording have.
+/// Computes the CRC of packets with functional safety: polynomial 04C11DB7, most significant bit first, initial value
+/// all ones, no final inversion (CRC-32/MPEG-2). The manuals do not name the variant; it matches all packets of a
+/// recording.
 std::uint32_t crc32(std::span<const std::byte> bytes);
 
 } // namespace locus::hesai

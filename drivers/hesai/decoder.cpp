@@ -16,26 +16,26 @@ namespace {
 constexpr double kRadPerCdeg = std::numbers::pi / 18000.0;
 constexpr double kCdegPerSecondAtOneRpm = kCdegPerTurn / 60.0;
 
-/// Three times the fastest setting of any model, 1200 rpm.
+/// Limit for the motor speed: three times the fastest setting of any model, 1200 rpm.
 constexpr double kMaxRpm = 3600.0;
 
-/// Half the slowest setting of any model, 300 rpm. Of a motor that hardly turns no time can be told from its turn.
+/// Least motor speed from which time can be derived: half the slowest setting of any model, 300 rpm.
 constexpr double kMinRpm = 150.0;
 
-/// Longest time over which two packets tell in which direction the lidar turns: at 1200 rpm 36 degrees.
+/// Longest time between two packets for measuring the direction of rotation: 36 degrees at 1200 rpm.
 constexpr Duration kMaxGap = std::chrono::milliseconds{5};
 
-/// From one azimuth to another the short way round, clockwise.
+/// Returns the shorter turn between two azimuths, clockwise positive.
 int turn_between(std::uint16_t from_cdeg, std::uint16_t to_cdeg) {
   const int turn = (int{to_cdeg} - int{from_cdeg} + kCdegPerTurn) % kCdegPerTurn;
   return turn > kCdegPerTurn / 2 ? turn - kCdegPerTurn : turn;
 }
 
-/// Cosine and sine of the azimuths of columns, one after the other: what lies near the one before is reckoned from it.
+/// Cosine and sine of successive column azimuths; a small step is computed from the previous azimuth.
 class ColumnDirection {
  public:
   void turn_to(std::uint16_t azimuth_cdeg) {
-    constexpr int kNear_cdeg = 200; // the first terms that are left out are below 1e-10
+    constexpr int kNear_cdeg = 200; // the omitted terms are below 1e-10
     const int turn_cdeg = turn_between(azimuth_cdeg_, azimuth_cdeg);
     azimuth_cdeg_ = azimuth_cdeg;
     if (!is_known_ || std::abs(turn_cdeg) > kNear_cdeg) {
@@ -60,9 +60,9 @@ class ColumnDirection {
   double cos_ = 1.0, sin_ = 0.0;
 };
 
-constexpr FiringGroup::PerLaser<std::int32_t> kNone{}; ///< 0 is no return: nothing is lost when another equals it
+constexpr FiringGroup::PerLaser<std::int32_t> kNone{}; ///< 0 is no return, so a return equal to it loses nothing
 
-/// Whether sixteen channels tell of nothing in any block of a column.
+/// Returns true if sixteen channels are zero in all blocks of a column.
 bool is_empty(const std::byte* bank, const PacketLayout& layout, std::size_t returns) {
   std::uint64_t any = 0;
   for (std::size_t echo = 0; echo < returns; ++echo, bank += layout.block())
@@ -75,14 +75,14 @@ template <std::size_t kStep>
 void read_channels(const std::byte* at, std::size_t count, FiringGroup::PerLaser<std::int32_t>& distances,
                    FiringGroup::PerLaser<std::uint8_t>& intensity) {
   if (count == FiringGroup::kLasers)
-    count = FiringGroup::kLasers; // a constant makes another loop
+    count = FiringGroup::kLasers; // compile-time constant: lets the compiler specialise the loop
   for (std::size_t k = 0; k < count; ++k) {
     distances[k] = read_u16(at + k * kStep);
     intensity[k] = std::to_integer<std::uint8_t>(at[k * kStep + 2]);
   }
 }
 
-/// Channels of so many bytes.
+/// Reads channels of `bytes` bytes each.
 void read_channels(const std::byte* at, std::size_t bytes, std::size_t count,
                    FiringGroup::PerLaser<std::int32_t>& distances, FiringGroup::PerLaser<std::uint8_t>& intensity) {
   if (bytes == 4)
@@ -172,7 +172,7 @@ std::optional<PacketError> Decoder::read_heading(Packet packet, Heading& heading
                                                                       : std::nullopt;
 }
 
-/// Sets azimuth and time of every column. Fails where one is beyond the circle, and when most turns are impossible.
+/// Computes azimuth and time of every column. Fails if an azimuth exceeds the circle or most turns are impossible.
 std::optional<PacketError> Decoder::find_columns(Packet packet, const Heading& heading) {
   const ModelSpec& its = *heading.spec;
   const std::size_t returns = returns_of(heading.mode);
@@ -204,7 +204,7 @@ std::optional<PacketError> Decoder::find_columns(Packet packet, const Heading& h
     }
   }
   const int impossible = static_cast<int>(found.count) - 1 - possible;
-  // Of two columns alone, the checksum has to vouch for the azimuths.
+  // A packet of two columns has only one turn, so a correct checksum is required to trust the azimuths.
   const bool has_blind_sector =
       impossible == 1 && heading.motor_rpm >= kMinRpm && (possible > 0 || heading.has_right_sums);
   if (impossible > possible && !has_blind_sector)
@@ -224,7 +224,7 @@ std::optional<PacketError> Decoder::find_columns(Packet packet, const Heading& h
   return std::nullopt;
 }
 
-/// Of packets of a single column: in which direction the lidar turned since the one before.
+/// Updates the direction of rotation from successive packets, if they have a single column.
 void Decoder::measure_direction(Duration time) {
   const std::uint16_t azimuth_cdeg = columns_.azimuth_cdeg[columns_.count - 1];
   if (columns_.count == 1 && last_time_ && time > *last_time_ && time - *last_time_ < kMaxGap) {
@@ -271,7 +271,7 @@ std::size_t Decoder::sequence_of(Packet packet, const Heading& heading, std::siz
   return 0;
 }
 
-/// Appends the firing groups of a column, of sixteen channels one for each return.
+/// Appends the firing groups of a column: for each sixteen channels, one group for each return.
 void Decoder::read_column(Packet packet, const Heading& heading, std::size_t column, const ColumnAzimuth& azimuth,
                           LidarPacket& out) const {
   const PacketLayout& layout = heading.spec->layout;
@@ -303,8 +303,8 @@ void Decoder::read_column(Packet packet, const Heading& heading, std::size_t col
   }
 }
 
-/// Where the returns of a firing group are. Those at a distance that another of the same pulse has are none. Works on a
-/// copy: where what is written could be what is read, loops do not become vector instructions.
+/// Computes the positions of a firing group. A return at the same distance as another one of the pulse is discarded.
+/// Works on a local copy, because possible aliasing of input and output would prevent vectorisation.
 [[gnu::always_inline]] inline void Decoder::place(const Distances& distances, const Distances& another,
                                                   const Distances& one_more, const SpinningBeams& beams, const Aim& aim,
                                                   std::size_t first_channel, FiringGroup& group) const {

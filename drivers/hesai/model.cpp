@@ -7,8 +7,8 @@
 #include "drivers/spinning.hpp"
 #include "drivers/wire.hpp"
 
-// Layouts, firing times and angles: Hesai's user manuals (section 3, "Data structure"; appendices "Channel
-// distribution" and "Absolute time and laser firing time") and, where the stored manuals lack a page, its SDK
+// Sources of layouts, firing times and angles: Hesai's user manuals (section 3, "Data structure"; appendices "Channel
+// distribution" and "Absolute time and laser firing time") and, where the available manuals lack a page, its SDK
 // (github.com/HesaiTechnology/HesaiLidar_SDK_2.0: udp_protocol_*.h, correction/firetime_correction) and nebula
 // (github.com/tier4/nebula: decoders/pandar_*.hpp, calibration), which quote them.
 namespace locus::hesai {
@@ -30,7 +30,7 @@ Calibration calibration(std::size_t channels, const Degrees& elevation_deg, cons
   return result;
 }
 
-/// The angles that the manual has as design values: equally spaced, all on the azimuth.
+/// Builds the design angles of the manual: equally spaced elevations, no azimuth offsets.
 Calibration fan(std::size_t channels, double uppermost_deg, double step_deg) {
   Degrees elevation_deg{};
   for (std::size_t i = 0; i < channels; ++i)
@@ -38,7 +38,7 @@ Calibration fan(std::size_t channels, double uppermost_deg, double step_deg) {
   return calibration(channels, elevation_deg, {});
 }
 
-/// Channels that fire `Offset(i)` nanoseconds after the azimuth's instant.
+/// Builds a sequence whose channels fire `offset_ns(i)` nanoseconds after the azimuth's instant.
 template <class Offset>
 FiringSequence sequence(nanoseconds column_duration, Offset offset_ns, std::uint8_t silent_banks = 0) {
   FiringSequence result{column_duration, {}, silent_banks};
@@ -53,7 +53,7 @@ std::array<FiringSequence, 2> only(const FiringSequence& sequence) { return {seq
 
 constexpr TailLayout kPandarTail{.return_mode = 14, .motor_speed = 8, .date = 16, .time = 10, .bytes = 22};
 
-/// The lasers fire ahead of the instant that a block's azimuth is of, its end.
+/// Pandar40P: the azimuth is that of the end of a block, so the lasers fire before it.
 ModelSpec pandar40p() {
   constexpr std::array kAheadNs{42'220, 28'470, 16'040, 3'620,  45'490, 31'740, 47'460, 54'670, 20'620, 33'710,
                                 40'910, 8'190,  20'620, 27'160, 50'730, 8'190,  14'740, 36'980, 45'490, 52'700,
@@ -112,7 +112,7 @@ ModelSpec pandar64() {
 
 constexpr TailLayout kXtTail{.return_mode = 10, .motor_speed = 11, .date = 13, .time = 19, .bytes = 24};
 
-/// A round of firing begins 5.632 us after its trigger, the first laser 0.368 us later.
+/// XT series: a firing round starts 5.632 us after its trigger, the first laser 0.368 us later.
 ModelSpec xt(std::size_t channels, std::size_t blocks, std::size_t bytes, float least_range_m, std::size_t at_once,
              std::int32_t step_ns, const Calibration& angles) {
   const auto firing = [=](std::size_t i) { return 6'000 + step_ns * static_cast<std::int32_t>(i % at_once); };
@@ -129,8 +129,8 @@ ModelSpec xt(std::size_t channels, std::size_t blocks, std::size_t bytes, float 
 
 // QT64 --------------------------------------------------------------------------------------------------------------
 
-/// Two eights of channels, 2.06 us from laser to laser; between eights there is a pause. The manual counts these times
-/// from 10 us before the instant of the azimuth, as the maker's SDK does.
+/// QT64: groups of eight channels, 2.06 us from laser to laser, with a pause between groups. The manual counts these
+/// times from 10 us before the azimuth's instant, as does the maker's SDK.
 ModelSpec qt64() {
   constexpr TailLayout kTail{.return_mode = 16, .motor_speed = 10, .date = 18, .time = 12, .bytes = 24};
   constexpr std::array kFirstOfEightNs{2'310, 19'160, 36'610, 53'450, 70'900, 87'750, 105'200, 122'050};
@@ -163,7 +163,8 @@ ModelSpec qt64() {
 
 constexpr TailLayout kLongTail{.return_mode = 12, .motor_speed = 13, .date = 15, .time = 21, .bytes = 26};
 
-/// Channels 65 to 128 fire in both sequences, 1 to 32 in the second alone and 33 to 64 in the first.
+/// Firing times of the first sequence. Channels 65 to 128 fire in both sequences, 1 to 32 only in the second and 33 to
+/// 64 only in the first.
 constexpr std::array kQt128FirstNs{
     27'656,  53'000, 2'312,  78'344, 81'512, 5'480,  56'168, 30'824, 33'992, 59'336, 8'648,  84'680, 87'848, 11'816,
     62'504,  37'160, 40'328, 65'672, 14'984, 91'016, 94'184, 18'152, 68'840, 43'496, 46'664, 72'008, 21'320, 97'352,
@@ -198,7 +199,7 @@ ModelSpec qt128() {
       -6.602, -6.66,  -6.721, -6.785, -6.854, -6.928, -7.006, -7.09,  -7.18,  -7.277, -7.38,  -7.492, -7.612,
       -7.743, -7.885, -8.04,  -8.209, -8.396, -8.603, -8.833, -9.091, -9.384, -9.72,  -10.108};
   const auto first = [&](std::size_t i) { return kQt128FirstNs[(i < 32 ? i + 32 : i) - 32]; };
-  const auto second = [&](std::size_t i) { return first(i ^ 34U); }; // halves and pairs have changed places
+  const auto second = [&](std::size_t i) { return first(i ^ 34U); }; // halves and pairs are swapped
   constexpr nanoseconds kColumn{111'110};
   return {{3, 2},
           {12, 2, 4, 128, 2, true, kLongTail},
@@ -211,8 +212,8 @@ ModelSpec qt128() {
           calibration(128, kElevationDeg, kAzimuthDeg)};
 }
 
-/// Firing times as nebula has them from an early manual; the table in the maker's newer SDK differs by up to 24 us, and
-/// there is no recording to tell which is right.
+/// OT128: firing times from nebula, which quotes an early manual. The table in the maker's newer SDK differs by up to
+/// 24 us, and no recording is available to decide which is correct.
 ModelSpec ot128() {
   constexpr std::array kFiringNs{
       49'758, 43'224, 36'690, 30'156, 21'980, 15'446, 8'912,  2'378,  49'758, 43'224, 36'690, 30'156, 2'378,
@@ -262,8 +263,8 @@ ModelSpec ot128() {
           calibration(128, kElevationDeg, kAzimuthDeg)};
 }
 
-constexpr std::size_t kOldPandar40Bytes = 1256; ///< and four more with a sequence number
-constexpr std::byte kFirstStatusOfOt128{128};   ///< version of the status, by which the maker's SDK tells it
+constexpr std::size_t kOldPandar40Bytes = 1256; ///< plus four with a sequence number
+constexpr std::byte kFirstStatusOfOt128{128};   ///< status version by which the maker's SDK identifies it
 
 const std::array<ModelSpec, kModels>& all_specs() {
   static const std::array<ModelSpec, kModels> specs{pandar40p(),
@@ -291,7 +292,7 @@ bool has_layout_of(const ModelSpec& its, std::span<const std::byte> payload) {
          (layout.header == 8 || (number(2) == its.version[0] && number(3) == its.version[1]));
 }
 
-/// What else opens with EE FF, by the version of its protocol.
+/// Unsupported models whose packets start with EE FF, by protocol version.
 struct Unread {
   unsigned major, minor;
   std::string_view name;

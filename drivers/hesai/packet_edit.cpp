@@ -11,7 +11,8 @@ namespace locus::hesai {
 
 namespace {
 
-/// Calls `change` with what a packet is, and makes its checksums right if they were. False for one of no model.
+/// Calls `change` with the layout and the tail of a packet, then updates its checksums if they were correct. Returns
+/// false if the model is not supported.
 template <class Change> bool edit(std::span<std::byte> packet, Change&& change) {
   const auto looks = look_at(packet);
   if (!looks || !looks->model)

@@ -8,10 +8,10 @@
 
 namespace locus::hesai {
 
-/// See locus::shift_clock(). False for a packet that is none of a model that can be read. A date that is none stays.
+/// Implements locus::shift_clock(). Returns false if the model is not supported. Leaves an invalid date unchanged.
 bool shift_clock(std::span<std::byte> packet, Duration shift);
 
-/// See locus::lengthen_ranges(). False as above.
+/// Implements locus::lengthen_ranges(). Returns false as above.
 bool lengthen_ranges(std::span<std::byte> packet, double more_m);
 
 } // namespace locus::hesai

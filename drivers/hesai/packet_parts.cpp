@@ -16,13 +16,13 @@ namespace {
 constexpr std::size_t kNumberBytes = 4, kSumBytes = 4;
 constexpr std::size_t kSafetyBytes = 17, kImuBytes = 22, kSignatureBytes = 32;
 
-/// Bits of the flags, the last byte of a header of 12.
+/// Flag bits in the last byte of a 12-byte header.
 constexpr std::size_t kFlagsAt = 11;
 constexpr unsigned kHasNumber = 0x01, kHasImu = 0x02, kHasSafety = 0x04, kHasSignature = 0x08, kHasConfidence = 0x10;
 
-/// A date has six bytes: year, month, day, hour, minute, second; or, where the first two are 0, seconds since 1970, the
-/// highest byte first. The year counts from 1900 or, with some models and firmware, from 2000, where an unlocked clock
-/// may begin: below 70 it is of this century.
+/// Date of six bytes: year, month, day, hour, minute, second; or, if the first two are 0, seconds since 1970, most
+/// significant byte first. The year counts from 1900 or, with some models and firmware, from 2000, where an unlocked
+/// clock may start: values below 70 are in this century.
 constexpr std::size_t kDateBytes = 6;
 constexpr unsigned kFirstOf1900 = 70;
 
@@ -66,7 +66,7 @@ void write_date(std::byte* date, std::chrono::seconds since_1970) {
   std::ranges::transform(fields, date, [](std::int64_t field) { return static_cast<std::byte>(field); });
 }
 
-/// As they should be.
+/// Expected checksums.
 struct Sums {
   std::uint32_t blocks, tail;
 };
@@ -116,7 +116,7 @@ unsigned distance_unit_mm(const PacketLayout& layout, std::span<const std::byte>
 }
 
 std::optional<Duration> read_time(const std::byte* tail, const TailLayout& layout) {
-  constexpr std::uint32_t kSecond_us = 1'000'000; // which is written now and then
+  constexpr std::uint32_t kSecond_us = 1'000'000; // inclusive: it occurs occasionally
   const auto seconds = read_date(tail + layout.date);
   const std::uint32_t us = read_u32(tail + layout.time);
   if (!seconds || us > kSecond_us || *seconds < std::chrono::seconds{1} ||

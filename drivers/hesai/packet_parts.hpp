@@ -10,27 +10,28 @@
 
 namespace locus::hesai {
 
-/// Where in a packet stands what its flags and its length tell of, in bytes.
+/// Offsets in bytes of the packet parts that depend on flags and length.
 struct PacketParts {
-  std::size_t tail; ///< begins here
-  bool has_number;  ///< behind the tail
-  std::size_t end;  ///< of the tail and what belongs to it; there a checksum of it may follow
+  std::size_t tail; ///< start of the tail
+  bool has_number;  ///< a sequence number follows the tail
+  std::size_t end;  ///< end of the tail and its optional fields; a CRC may follow
 };
 
-/// Nothing where the length is not what the packet's flags call for. Precondition: has_layout_of() the model.
+/// Locates the parts; empty if the length does not match the flags. Precondition: has_layout_of() the model.
 std::optional<PacketParts> parts_of(const ModelSpec& spec, std::span<const std::byte> packet);
 
-/// Of the blocks, and of the tail. Precondition, of this and the next: the layout has checksums, the parts are its own.
+/// Checks the CRCs of the blocks and of the tail. Precondition, as for seal(): the layout has checksums and the parts
+/// belong to the packet.
 bool has_right_checksums(const ModelSpec& spec, const PacketParts& parts, std::span<const std::byte> packet);
-/// Makes them right.
+/// Updates both CRCs.
 void seal(const ModelSpec& spec, const PacketParts& parts, std::span<std::byte> packet);
 
-/// Of which a range is so many; 0 where a packet says nonsense. Precondition: it has the layout.
+/// Returns the unit of the ranges; 0 if the packet gives none. Precondition: the packet has the layout.
 unsigned distance_unit_mm(const PacketLayout& layout, std::span<const std::byte> packet);
 
-/// The instant that a packet's time names, since 1970; nothing for a date that is none.
+/// Returns the packet's time since 1970; empty for an invalid date.
 std::optional<Duration> read_time(const std::byte* tail, const TailLayout& layout);
-/// Writes it in microseconds, in the form in which the packet has it. Nothing is before 1970.
+/// Writes a time with microsecond resolution in the packet's date format. Clamped to 1970.
 void write_time(std::byte* tail, const TailLayout& layout, Duration time);
 
 } // namespace locus::hesai

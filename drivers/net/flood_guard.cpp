@@ -10,14 +10,14 @@ namespace locus {
 
 namespace {
 
-/// A program of the kernel's own small machine, written in order.
+/// Classic BPF program, assembled in order.
 class Program {
  public:
   void load(std::uint16_t size, int offset) {
     add(static_cast<std::uint16_t>(BPF_LD | size | BPF_ABS), 0, 0, static_cast<std::uint32_t>(offset));
   }
   void keep_bits(std::uint32_t mask) { add(BPF_ALU | BPF_AND | BPF_K, 0, 0, mask); }
-  /// Skips so many steps if what is loaded is `value`, else so many.
+  /// Skips `if_equal` instructions if the loaded value equals `value`, otherwise `if_not`.
   void skip(std::uint32_t value, std::size_t if_equal, std::size_t if_not) {
     add(BPF_JMP | BPF_JEQ | BPF_K, static_cast<std::uint8_t>(if_equal), static_cast<std::uint8_t>(if_not), value);
   }
@@ -33,11 +33,11 @@ class Program {
   std::size_t count_ = 0;
 };
 
-/// Lets pass what comes from these senders, if any are named, with the length of a lidar's packet, and one in kSample
-/// of all else.
+/// Builds a filter that passes datagrams from `senders` (from any if empty) with the length of a lidar packet, and one
+/// in kSample of all others.
 Program lidars_and_samples(std::span<const std::uint32_t> senders, std::span<const std::size_t> lengths) {
-  constexpr std::size_t kSampleSteps = 4; ///< before the last step, which lets pass
-  constexpr std::uint32_t kHeader = 8;    // bytes of UDP's, where the offsets begin
+  constexpr std::size_t kSampleSteps = 4; ///< before the last instruction, which passes
+  constexpr std::uint32_t kHeader = 8;    // size of the UDP header in bytes; offsets start there
   constexpr int kLengthInHeader = 4, kSourceInIpHeader = SKF_NET_OFF + 12;
   const std::size_t sender_steps = senders.empty() ? 0 : 1 + senders.size();
   const std::size_t if_length_fits = senders.empty() ? kSampleSteps : 0;
@@ -87,7 +87,7 @@ void FloodGuard::guard(UdpSocket& socket) {
   guards_ = socket.filter(lidars_and_samples(senders_.all(), senders_.all_lengths()).steps());
 }
 
-/// If the last one is over.
+/// Starts the next second if the current one is over.
 void FloodGuard::begin_second(Stamp now, UdpSocket& socket) {
   if (std::chrono::abs(now - second_began_) <= std::chrono::seconds{1})
     return;

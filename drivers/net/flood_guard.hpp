@@ -10,25 +10,26 @@
 
 namespace locus {
 
-/// Keeps a flood out of a socket's buffer, where it would take the place of the lidars' packets.
+/// Keeps a flood of foreign datagrams from displacing lidar packets in a socket's buffer.
 ///
-/// A datagram that is no lidar's by its length or its sender is handed over and counted with its reason like any other,
-/// up to kFlood of them in a second. Beyond that the kernel drops them before they take room, all but one in kSample,
-/// by which the end of the flood, and a lidar under a new address, are told. A sender is foreign only while every lidar
-/// of the port has an address, configured or learnt. What has the length and the address of a lidar is never dropped
-/// here. Time is that of arrival. One owner. Allocates nothing.
+/// Datagrams with a foreign length or sender are received and counted like any others, up to kFlood per second. Beyond
+/// that, the kernel drops them before they occupy the buffer, except one in kSample, which reveals the end of the flood
+/// and a lidar with a new address. A sender is foreign only if every lidar of the port has an address, configured or
+/// learnt. Datagrams with the length and the address of a lidar are never dropped here. Time is arrival time. Single
+/// owner, not thread-safe. Allocates nothing.
 class FloodGuard {
  public:
-  static constexpr std::uint64_t kFlood = 5000; ///< a second; four lidars that nobody configured send less
-  static constexpr std::uint32_t kSample = 256; ///< a power of two
+  static constexpr std::uint64_t kFlood = 5000; ///< per second; four lidars that are not configured send less
+  static constexpr std::uint32_t kSample = 256; ///< power of two
 
-  /// To be told of what the socket has received, before it receives more.
+  /// Processes the datagrams that the socket received; called before the next receive.
   void look_at(std::span<const Datagram> datagrams, UdpSocket& socket);
 
-  /// To be told by the wall clock that the socket has nothing: a flood that has ended sends no sample to tell it by.
+  /// Advances time when the socket received nothing; `now` is wall time. Needed because a flood that has ended sends no
+  /// samples.
   void hear_nothing(Stamp now, UdpSocket& socket);
 
-  /// Who the lidars of the port are by now.
+  /// Updates the known lidars of the port.
   void expect(const LidarRouter::Senders& senders, UdpSocket& socket);
 
  private:
@@ -39,7 +40,7 @@ class FloodGuard {
   LidarRouter::Senders senders_;
   bool guards_ = false;
   Stamp second_began_;
-  std::uint64_t foreign_ = 0; ///< since then, those that the samples stand for included
+  std::uint64_t foreign_ = 0; ///< foreign datagrams since then, scaled by kSample while filtering
 };
 
 } // namespace locus

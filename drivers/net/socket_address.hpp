@@ -8,14 +8,14 @@
 
 namespace locus {
 
-/// Where a stream socket listens, as bind() takes it.
+/// Listening address of a stream socket, as passed to bind().
 struct SocketAddress {
   sockaddr_storage storage{};
   socklen_t size = 0;
 };
 
-/// From 127.0.0.1:9464, [::1]:9464 or the absolute path of a Unix socket; nothing for any other text. Numbers alone: a
-/// name would have to be asked for. Any thread.
+/// Parses 127.0.0.1:9464, [::1]:9464 or the absolute path of a Unix socket; empty for any other text. Numeric addresses
+/// only, since names would need a lookup. Thread-safe.
 std::optional<SocketAddress> parse_socket_address(std::string_view text);
 
 } // namespace locus

@@ -27,8 +27,8 @@ std::string because(const char* what, std::uint16_t port) {
                      advice); // NOLINT(concurrency-mt-unsafe)
 }
 
-/// Lidars speak IPv4; a socket of both families, as systemd makes them, sees their addresses mapped. Who speaks IPv6
-/// has none.
+/// Returns the sender's IPv4 address in host byte order; 0 for IPv6. A dual-stack socket, as systemd creates it,
+/// reports IPv4 senders as mapped addresses.
 std::uint32_t ip_of(const sockaddr_storage& address) {
   std::uint32_t ip = 0;
   if (address.ss_family == AF_INET)
@@ -50,7 +50,7 @@ bool set(int descriptor, int level, int option, int value) {
   return setsockopt(descriptor, level, option, &value, sizeof(value)) == 0;
 }
 
-/// As it is asked for: the kernel doubles that for its book-keeping, and reports the double (socket(7)).
+/// Returns the buffer size as requested: the kernel doubles it for its book-keeping and reports the double (socket(7)).
 int granted_buffer_bytes(int descriptor) {
   int doubled = 0;
   socklen_t size = sizeof(doubled);
@@ -60,7 +60,7 @@ int granted_buffer_bytes(int descriptor) {
 
 } // namespace
 
-/// What recvmmsg() fills, laid out once.
+/// Buffers for recvmmsg(), set up once.
 struct UdpSocket::Batch {
   using Control = std::array<std::byte, CMSG_SPACE(sizeof(timespec))>;
 
@@ -118,14 +118,14 @@ Expected<UdpSocket, std::string> UdpSocket::adopt(int descriptor) {
   socklen_t size = sizeof(type);
   if (getsockopt(descriptor, SOL_SOCKET, SO_TYPE, &type, &size) != 0 || type != SOCK_DGRAM)
     return fmt::format("descriptor {} is no UDP socket; write ListenDatagram= in the socket unit", descriptor);
-  set(descriptor, SOL_SOCKET, SO_REUSEADDR, 0); // systemd's, by which any account might bind the port and take packets
+  set(descriptor, SOL_SOCKET, SO_REUSEADDR, 0); // set by systemd; lets any account bind the port and steal packets
   if (auto problem = adopted.prepare())
     return *problem;
   return adopted;
 }
 
-/// SO_RCVBUFFORCE needs a privilege; without it the kernel gives as much as net.core.rmem_max allows. A socket of
-/// systemd's may have more already (ReceiveBuffer=), which is not to be taken from it.
+/// Requests the buffer size. SO_RCVBUFFORCE needs a privilege; without it the kernel limits the size to
+/// net.core.rmem_max. Keeps a larger buffer that systemd configured (ReceiveBuffer=).
 std::optional<std::string> UdpSocket::prepare() {
   sockaddr_storage address{};
   socklen_t size = sizeof(address);
@@ -138,8 +138,8 @@ std::optional<std::string> UdpSocket::prepare() {
   buffer_bytes_ = granted_buffer_bytes(descriptor_);
   if (!set(descriptor_, SOL_SOCKET, SO_TIMESTAMPNS, 1))
     return because("no receive timestamps", port_);
-  set(descriptor_, SOL_SOCKET, SO_DETACH_FILTER, 0); // of one that systemd holds and that had another owner before
-  count_drops();                                     // as many as it had with that owner
+  set(descriptor_, SOL_SOCKET, SO_DETACH_FILTER, 0); // left by the previous owner of a socket that systemd holds
+  count_drops();                                     // discards the drops counted for the previous owner
   kernel_drops_ = 0;
   return std::nullopt;
 }
@@ -153,7 +153,8 @@ bool UdpSocket::filter(std::span<sock_filter> program) {
   return done;
 }
 
-/// The kernel has one count, in 32 bits, for what found no room and what a filter rejected.
+/// Adds new drops to the matching counter. The kernel has one 32-bit count for both buffer overflows and filter
+/// rejections.
 void UdpSocket::count_drops() {
   std::array<std::uint32_t, SK_MEMINFO_VARS> figures{};
   socklen_t size = sizeof(figures);
@@ -178,7 +179,7 @@ bool UdpSocket::join(std::uint32_t group_host_order) const {
     request.imr_multiaddr.s_addr = htonl(group_host_order);
     request.imr_ifindex = static_cast<int>(if_nametoindex(each->ifa_name));
     joined |= setsockopt(descriptor_, IPPROTO_IP, IP_ADD_MEMBERSHIP, &request, sizeof(request)) == 0 ||
-              errno == EADDRINUSE; // has long been joined
+              errno == EADDRINUSE; // already joined
   }
   freeifaddrs(interfaces);
   return joined;

@@ -17,50 +17,50 @@
 
 namespace locus {
 
-/// A UDP port that lidars send to, whether to this host, by broadcast or by multicast.
+/// UDP port that receives lidar packets by unicast, broadcast or multicast.
 ///
-/// The kernel stamps each datagram when it comes, and counts those that it had no room for. One owner. Allocates
-/// nothing, throws nothing after it was opened.
+/// The kernel stamps each datagram on arrival and counts those dropped because the buffer was full. Single owner, not
+/// thread-safe. After it was opened, allocates nothing and throws nothing.
 class UdpSocket {
  public:
-  /// Asked of the kernel: half a second of a VLS-128 in dual return mode.
+  /// Requested receive buffer: half a second of a VLS-128 in dual return mode.
   static constexpr int kWantedBufferBytes = 8 << 20;
   static constexpr std::size_t kBatch = 32;
 
-  /// Listens to `port` on every interface. Fails with one line for the user.
+  /// Binds `port` on all interfaces. Fails with one line for the user.
   static Expected<UdpSocket, std::string> open(std::uint16_t port);
 
-  /// As open(), shared (SO_REUSEPORT) with other sockets of the same user that ask for it, too. Each of them gets what
-  /// is broadcast; what is sent to this host alone one of them gets.
+  /// Opens a port shared (SO_REUSEPORT) with other sockets of the same user that also request it. Each receives
+  /// broadcasts; a unicast datagram is delivered to only one of them.
   static Expected<UdpSocket, std::string> open_beside_others(std::uint16_t port);
 
-  /// Takes over a socket that somebody else has bound, e.g. systemd. Fails with one line for the user.
+  /// Takes ownership of a socket bound by another process, e.g. systemd. Fails with one line for the user.
   static Expected<UdpSocket, std::string> adopt(int descriptor);
 
   ~UdpSocket();
   UdpSocket(UdpSocket&& other) noexcept;
   UdpSocket& operator=(UdpSocket&&) = delete;
 
-  /// Joins a multicast group on every interface that has multicast, to be repeated as interfaces come up. Whether any
-  /// has. Any thread.
+  /// Joins a multicast group on all multicast interfaces; call again as interfaces come up. Returns true if any
+  /// interface is joined. Thread-safe.
   bool join(std::uint32_t group_host_order) const; // NOLINT(modernize-use-nodiscard)
 
-  /// Has the kernel drop datagrams before they take room, as a program of socket filters says; none: no more. Whether
-  /// it took the program. A socket that was adopted is without one.
+  /// Attaches a socket filter, so that the kernel drops datagrams before they occupy the buffer; an empty program
+  /// removes it. Returns true on success. adopt() removes any existing filter.
   bool filter(std::span<sock_filter> program);
 
-  /// What has come, at most kBatch, in order; valid until the next call. Does not wait.
+  /// Returns the pending datagrams, at most kBatch, in order; valid until the next call. Does not block.
   std::span<const Datagram> receive();
-  /// Brings kernel_drops() and filtered() up to now; receive() does that, too.
+  /// Updates kernel_drops() and filtered(); receive() calls it too.
   void count_drops();
 
   [[nodiscard]] int descriptor() const { return descriptor_; }
   [[nodiscard]] std::uint16_t port() const { return port_; }
-  /// What the kernel gave of kWantedBufferBytes. It holds as much again for its own book-keeping.
+  /// Part of kWantedBufferBytes that the kernel granted. The kernel adds as much again for its own book-keeping.
   [[nodiscard]] int buffer_bytes() const { return buffer_bytes_; }
-  /// Datagrams that the kernel threw away, because the buffer was full, as count_drops() found them.
+  /// Number of datagrams dropped by the kernel because the buffer was full, as of the latest count_drops().
   [[nodiscard]] std::uint64_t kernel_drops() const { return kernel_drops_; }
-  /// Those that it threw away while there was a filter; what it had no room for then is among them.
+  /// Number of datagrams dropped while a filter was attached, including those dropped for a full buffer.
   [[nodiscard]] std::uint64_t filtered() const { return filtered_; }
 
  private:
@@ -75,7 +75,7 @@ class UdpSocket {
   int buffer_bytes_ = 0;
   std::uint64_t kernel_drops_ = 0, filtered_ = 0;
   bool has_filter_ = false;
-  std::uint32_t last_drops_ = 0; ///< as the kernel counts, in 32 bits
+  std::uint32_t last_drops_ = 0; ///< raw 32-bit counter of the kernel
   std::unique_ptr<Batch> batch_;
 };
 

@@ -58,7 +58,7 @@ void WireTap::wait(Duration timeout) const {
   ::poll(poll.data(), poll.size(), static_cast<int>(std::min<std::int64_t>(ms, 100)));
 }
 
-/// What is there, and not what keeps coming meanwhile: the time of listen() is kept in any flood.
+/// Reads the pending frames, at most kBatch, so that listen() ends on time even in a flood.
 void WireTap::take_frames(const Take& take) {
   constexpr int kBatch = 1024;
   for (int taken = 0; frames_ >= 0 && taken < kBatch; ++taken) {
@@ -69,7 +69,7 @@ void WireTap::take_frames(const Take& take) {
     if (bytes <= 0)
       return;
     if (from.sll_pkttype == PACKET_OUTGOING)
-      continue; // seen again as it comes in, on the loopback interface
+      continue; // received again on the loopback interface
     const auto length = static_cast<std::size_t>(bytes);
     const std::span<const std::byte> frame{frame_.data(), std::min(length, frame_.size())};
     std::optional<Datagram> datagram;

@@ -16,23 +16,24 @@
 
 namespace locus {
 
-/// Overhears the UDP datagrams that reach this computer, whoever they are for. One owner.
+/// Captures the UDP datagrams that reach this computer, whatever their destination. Single owner, not thread-safe.
 class WireTap {
  public:
   using Take = std::function<void(const Datagram&)>;
 
-  /// Reads the frames of all interfaces where that is permitted (CAP_NET_RAW), so a service that listens is not
-  /// disturbed; elsewhere it listens to those of `ports` that are free. Fails with one line for the user.
+  /// Captures frames on all interfaces if permitted (CAP_NET_RAW), without disturbing a service that uses the ports;
+  /// otherwise binds those of `ports` that are free. Fails with one line for the user.
   static Expected<WireTap, std::string> open(std::span<const std::uint16_t> ports);
 
   ~WireTap();
   WireTap(WireTap&& other) noexcept;
   WireTap& operator=(WireTap&&) = delete;
 
-  /// Whether what is for other ports is heard, too.
+  /// Returns true if datagrams to all ports are captured.
   [[nodiscard]] bool hears_all() const { return frames_ >= 0; }
 
-  /// Hands out what comes in this time, stamped by the clock of this computer; a datagram is valid during the call.
+  /// Passes received datagrams to `take` for `duration`, stamped by this computer's clock; a datagram is valid during
+  /// the call.
   void listen(Duration duration, const Take& take);
 
  private:
@@ -40,7 +41,7 @@ class WireTap {
   void wait(Duration timeout) const;
   void take_frames(const Take& take);
 
-  int frames_; ///< packet socket; -1 where it is not permitted
+  int frames_; ///< packet socket; -1 if not permitted
   std::vector<UdpSocket> sockets_;
   IpFragments fragments_;
   std::array<std::byte, 65536> frame_{};

@@ -16,7 +16,7 @@ namespace {
 constexpr std::uint64_t kPolynomial = 0xC96C'5795'D787'0F42;
 constexpr std::size_t kChecksumBytes = 8;
 
-/// So many bytes are taken at once: a table for each says what it does to the checksum from where it stands.
+/// Number of bytes processed at once, with one table for the contribution of each position (slicing).
 constexpr std::size_t kSlices = 16;
 using Tables = std::array<std::array<std::uint64_t, 256>, kSlices>;
 
@@ -39,7 +39,7 @@ constexpr Tables make_tables() {
 
 constexpr Tables kTables = make_tables();
 
-/// What eight bytes do that `behind` bytes follow.
+/// Returns the contribution of eight bytes that are followed by `behind` bytes.
 std::uint64_t take_eight(std::uint64_t bytes, std::size_t behind) {
   std::uint64_t crc = 0;
   for (std::size_t i = 0; i < 8; ++i)
@@ -49,7 +49,7 @@ std::uint64_t take_eight(std::uint64_t bytes, std::size_t behind) {
 
 #if defined(__x86_64__)
 
-/// x^exponent modulo the polynomial; the highest bit is x^0, as in the checksum.
+/// Returns x^exponent modulo the polynomial; the highest bit is x^0, as in the checksum.
 constexpr std::uint64_t power(int exponent) {
   std::uint64_t value = std::uint64_t{1} << 63;
   for (; exponent > 0; --exponent)
@@ -57,7 +57,7 @@ constexpr std::uint64_t power(int exponent) {
   return value;
 }
 
-constexpr std::size_t kLaneBytes = 16, kLanes = 4; ///< that are folded at once
+constexpr std::size_t kLaneBytes = 16, kLanes = 4; ///< folded in parallel
 constexpr std::size_t kBlockBytes = kLanes * kLaneBytes;
 
 struct Lane {
@@ -66,16 +66,16 @@ struct Lane {
 
 [[gnu::target("pclmul,sse4.1")]] inline Lane operator^(Lane a, Lane b) { return {_mm_xor_si128(a.bits, b.bits)}; }
 
-/// What this lane is worth so many bits further on, where it is added to what stands there. A product of two factors
-/// with their bits in this order is too high by one power, so the other factor is one lower.
+/// Multiplies a lane by x^kBits modulo the polynomial, to be added to the lane kBits further on. In this bit order a
+/// carry-less product is too high by one power of x, so the factors are one power lower.
 template <int kBits> [[gnu::target("pclmul,sse4.1")]] inline Lane moved_ahead(Lane lane) {
   constexpr std::uint64_t kOfFirst = power(kBits + 63), kOfSecond = power(kBits - 1);
   const __m128i factors = _mm_set_epi64x(static_cast<long long>(kOfSecond), static_cast<long long>(kOfFirst));
   return Lane{_mm_clmulepi64_si128(lane.bits, factors, 0x00)} ^ Lane { _mm_clmulepi64_si128(lane.bits, factors, 0x11) };
 }
 
-/// Takes all whole lanes in, and leaves what is behind them. (V. Gopal et al., Fast CRC computation for generic
-/// polynomials using PCLMULQDQ, Intel, 2009.) Precondition: there is a block.
+/// Folds all whole lanes and leaves the remaining bytes in `bytes`. (V. Gopal et al., Fast CRC computation for generic
+/// polynomials using PCLMULQDQ, Intel, 2009.) Precondition: at least kBlockBytes.
 [[gnu::target("pclmul,sse4.1")]] std::uint64_t fold(std::uint64_t crc, std::span<const std::byte>& bytes) {
   const auto load = [&](std::size_t lane) {
     return Lane{_mm_loadu_si128(reinterpret_cast<const __m128i*>(bytes.data() + kLaneBytes * lane))};

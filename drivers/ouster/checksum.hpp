@@ -7,13 +7,14 @@
 
 namespace locus::ouster {
 
-/// CRC-64 with the polynomial of ECMA-182, reflected, as the last 8 bytes of a packet hold it of all before them.
+/// Computes CRC-64 with the ECMA-182 polynomial, reflected, which the last 8 bytes of a packet hold for the bytes
+/// before.
 std::uint64_t crc64(std::span<const std::byte> bytes);
 
-/// Whether the last 8 bytes are the checksum of the others. Firmware before 2.5 fills them with a constant, as do the
-/// profiles for functional safety. Precondition: at least 8 bytes.
+/// Returns true if the last 8 bytes are the checksum of the others. Firmware before 2.5 fills them with a constant, as
+/// do the functional-safety profiles. Precondition: at least 8 bytes.
 bool has_right_checksum(std::span<const std::byte> packet);
-/// Makes it right. The same precondition.
+/// Updates the checksum. Same precondition.
 void seal(std::span<std::byte> packet);
 
 } // namespace locus::ouster

@@ -16,13 +16,13 @@ namespace {
 constexpr int kFullTurn_cdeg = 36000;
 constexpr float kMPerMm = 1e-3F;
 
-/// What 16 columns of the slowest mode take, 512 of them at 10 Hz, is 3 ms.
+/// Limit for the time span of a packet. 16 columns of the slowest mode, 512 columns at 10 Hz, take 3 ms.
 constexpr Duration kLongestPacket = std::chrono::milliseconds{100};
 
-/// Share of a turn by which a measurement id may differ from what the time since an earlier one says.
+/// Divisor of a turn that gives the tolerance of a measurement ID against the elapsed time.
 constexpr std::size_t kTurnTolerance = 32;
 
-/// Share by which columns may follow each other faster or slower than the mode has them.
+/// Divisor of the column spacing of the mode that gives its tolerance.
 constexpr std::int64_t kSpacingTolerance = 10;
 
 } // namespace
@@ -52,7 +52,7 @@ Decoder::Decoder(const Metadata& metadata, Isa isa)
   azimuth_zero_cdeg_ = static_cast<int>(std::lround(zero_cdeg)) + kFullTurn_cdeg;
 }
 
-/// Directions and rings. The uppermost beam comes first; pixels of a first-generation sensor that no laser belongs to
+/// Computes directions and rings of the beams. The uppermost beam is first; unused pixels of a first-generation sensor
 /// all have the angle 0.
 void Decoder::aim_beams() {
   const std::size_t pixels = metadata_.pixels_per_column;
@@ -86,7 +86,7 @@ std::optional<PacketError> Decoder::decode(std::span<const std::byte> payload, L
     return PacketError::checksum;
   if (const auto error = find_columns(payload)) {
     if (error == PacketError::azimuth && header.init_id == other_start_.init_id)
-      other_start_ = {}; // a turn with ids that the known mode does not have shows nothing of it
+      other_start_ = {}; // measurement IDs beyond the known mode: discard the evidence
     return error;
   }
   if (!turns_as_known(header)) {
@@ -119,7 +119,7 @@ double Decoder::rotation_rate_rpm() const {
   return 60.0 * turned / static_cast<double>(metadata_.columns_per_frame) / to_seconds(spanned_);
 }
 
-/// Finds the valid columns, and says what does not follow from the first of them.
+/// Finds the valid columns. Fails if a column is inconsistent with the first of them.
 std::optional<PacketError> Decoder::find_columns(Packet payload) {
   column_count_ = 0;
   columns_missing_ = 0;
@@ -154,8 +154,8 @@ std::optional<PacketError> Decoder::find_columns(Packet payload) {
   return column_count_ == 0 ? std::optional{PacketError::flag} : std::nullopt;
 }
 
-/// Whether the packet is of the start of the sensor that is known, or of one that turns like it: its columns follow
-/// each other as fast, and from one turn to the next the measurement ids went on as the time did.
+/// Returns true if the packet comes from the known start of the sensor, or from one in the same mode: equal column
+/// spacing, and measurement IDs that advance with time from one turn to the next.
 bool Decoder::turns_as_known(const PacketFormat::Header& header) {
   if (header.init_id == 0 || metadata_.init_id == 0 || header.init_id == metadata_.init_id)
     return true;
@@ -165,7 +165,7 @@ bool Decoder::turns_as_known(const PacketFormat::Header& header) {
   const auto next_frame = static_cast<std::uint16_t>(before.frame_id + 1);
   if (before.init_id != header.init_id || frame_id != next_frame || !is_spaced_as_known())
     return false;
-  // The time is not taken modulo a turn: of a mode with twice the columns, half a turn would be missing unseen.
+  // Time is not reduced modulo a turn: with twice the columns per turn, a missing half turn would go unnoticed.
   const auto turn = static_cast<std::int64_t>(metadata_.columns_per_frame);
   const auto turned = static_cast<std::int64_t>(columns_between(before.first_column, other_start_.first_column));
   const std::int64_t passed = (other_start_.time - before.time) / column_duration_;
@@ -175,8 +175,7 @@ bool Decoder::turns_as_known(const PacketFormat::Header& header) {
   return true;
 }
 
-/// Whether the columns of the packet at hand follow each other as fast as the mode has them. A single one does not
-/// tell.
+/// Returns true if the columns of the current packet have the spacing of the mode; false for a single column.
 bool Decoder::is_spaced_as_known() const {
   const Column& last = columns_[column_count_ - 1];
   const std::size_t steps = columns_between(columns_.front().measurement_id, last.measurement_id);
@@ -184,12 +183,12 @@ bool Decoder::is_spaced_as_known() const {
   return steps > 0 && kSpacingTolerance * std::abs(last.offset_ns - expected_ns) <= expected_ns;
 }
 
-/// From one measurement id forward to another; less than a turn.
+/// Number of columns from one measurement ID forward to another, modulo a turn.
 std::size_t Decoder::columns_between(std::size_t from, std::size_t to) const {
   return (to + metadata_.columns_per_frame - from) % metadata_.columns_per_frame;
 }
 
-/// Of so many packets of a turn that follow one, those that have a column in the window.
+/// Counts the packets with a column in the window among the `packets` that follow `packet` in a turn.
 std::uint64_t Decoder::sent_after(std::size_t packet, std::size_t packets) const {
   const std::size_t columns = format_.columns_per_packet, turn = metadata_.columns_per_frame / columns;
   std::uint64_t sent = 0;
@@ -234,14 +233,14 @@ bool Decoder::is_in_window(std::size_t id) const {
   return pose;
 }
 
-/// Appends the firing groups of a column. A second return at the range of the first is none.
+/// Appends the firing groups of a column. A second return at the range of the first is discarded.
 [[gnu::always_inline]] inline void Decoder::read_column(const Column& column, LidarPacket& out) const {
   const ColumnPose pose = pose_of(column.measurement_id);
   const ProfileSpec& profile = format_.profile;
   const std::byte* pixel = format_.pixels_of(column.at);
   const std::uint32_t mask = (1U << profile.range_bits) - 1;
   for (std::size_t first = 0; first < format_.pixels_per_column; first += FiringGroup::kLasers) {
-    Ranges previous_mm{}; // 0 is no return: nothing is lost when the first return equals it
+    Ranges previous_mm{}; // 0 is no return, so a first return equal to it loses nothing
     for (std::size_t echo = 0; echo < profile.echoes; ++echo) {
       const auto [range_at, reflectivity_at] = profile.echo_fields[echo];
       FiringGroup& group = out.storage[out.count++];
@@ -260,8 +259,8 @@ bool Decoder::is_in_window(std::size_t id) const {
   }
 }
 
-/// Everything about a firing group that follows from its ranges. Works on a copy: where what is written could be what
-/// is read, loops do not become vector instructions.
+/// Computes the firing group from its ranges. Works on a local copy, because possible aliasing of input and output
+/// would prevent vectorisation.
 [[gnu::always_inline]] inline void Decoder::place(const Ranges& ranges_mm, const Ranges& previous_mm,
                                                   const ColumnPose& pose, std::size_t first_pixel,
                                                   FiringGroup& group) const {

@@ -16,50 +16,49 @@
 
 namespace locus::ouster {
 
-/// Turns lidar packets of the sensor that a Metadata is of into returns in its sensor frame.
+/// Decodes the lidar packets of one sensor, described by its Metadata, into returns in the sensor frame.
 ///
-/// All pixels of a column share its time and its encoder angle, which follows from its measurement id (the encoder of
-/// legacy packets says the same: 88 ticks a column of 1024). Sixteen pixels make a firing group, in dual profiles one
-/// for each return, the strongest first. Columns that their status calls invalid are left out: what lies outside the
-/// window that is sent, and what the sensor did not measure.
+/// All pixels of a column share its time and its encoder angle, which follows from its measurement ID (consistent with
+/// the encoder of legacy packets: 88 ticks per column of 1024). Sixteen pixels form a firing group; dual profiles have
+/// one group for each return, the strongest first. Columns with an invalid status are skipped: those outside the
+/// transmitted window, and those that the sensor did not measure.
 ///
-/// A packet is held to the sensor's serial number, where it and the metadata have one. One of another start of the
-/// sensor than the metadata is of may come in another mode: such packets are refused (model) until a turn has shown
-/// that the measurement ids count as the metadata says, and as fast. A sensor whose checksum has been right once is
-/// held to it from then on; older firmware fills its place with anything.
+/// Packets with another serial number are rejected if both packet and metadata have one. After a restart, the sensor
+/// may be in another mode than its metadata: packets are then rejected (model) until a turn has shown that measurement
+/// IDs and their rate match the metadata. Once the checksum of a sensor has been correct, packets with a wrong one are
+/// rejected; older firmware writes arbitrary bytes there.
 ///
-/// One owner. Allocates nothing, throws nothing after construction. A packet that is refused leaves the decoder as it
-/// was, but for what it knows of other starts of the sensor.
+/// Single owner, not thread-safe. Allocates nothing and throws nothing after construction. A rejected packet leaves the
+/// decoder unchanged, except for its knowledge of restarts.
 class Decoder {
  public:
   explicit Decoder(const Metadata& metadata, Isa isa = best_isa());
 
-  /// Fills everything of `packet` but lidar and stamp, or says why not and leaves `packet` undefined: length (not of a
-  /// lidar packet of this sensor), flag (of another type, or no column is valid), sender (another serial number),
-  /// checksum, model (see above), azimuth (measurement ids that are none or do not follow each other), time (columns
-  /// that do not follow each other).
+  /// Fills all of `packet` except `lidar` and `stamp`. Returns the reason for rejection, if any; `packet` is then
+  /// undefined: length (no lidar packet of this sensor), flag (another packet type, or no valid column), sender
+  /// (another serial number), checksum, model (see above), azimuth (measurement IDs out of range or not consecutive),
+  /// time (column times out of range or not increasing).
   std::optional<PacketError> decode(std::span<const std::byte> payload, LidarPacket& packet);
 
-  /// Of the last good packet: when its first valid column was, by the sensor's clock, whatever that counts from. >= 0.
+  /// Time of the first valid column of the last good packet, in the sensor's clock with its arbitrary epoch. >= 0.
   [[nodiscard]] Duration time() const { return time_; }
-  /// Of the last good packet: the measurement ids of its first and its last valid column.
+  /// Measurement IDs of the first and the last valid column of the last good packet.
   [[nodiscard]] std::size_t first_column() const { return first_column_; }
   [[nodiscard]] std::size_t last_column() const { return last_column_; }
 
-  /// Of the last good packet, from the times of its columns.
+  /// Rotation rate of the last good packet, from the times of its columns.
   [[nodiscard]] double rotation_rate_rpm() const;
 
-  /// How many packets lie between one whose first column had this id and the last good one, `advance` later, that the
-  /// sensor sends; none where the ids and the time do not tell of the same gap.
+  /// Returns the number of packets sent between one whose first column had this ID and the last good one, `advance`
+  /// later; 0 if IDs and time disagree.
   [[nodiscard]] std::uint64_t packets_between(std::size_t first_column_before, Duration advance) const;
 
-  /// Left out so far, within the window that is sent.
+  /// Invalid columns skipped so far within the transmitted window.
   [[nodiscard]] std::uint64_t invalid_columns() const { return invalid_columns_; }
   [[nodiscard]] bool has_checksums() const { return has_checksums_; }
-  /// Packets since the last good one that were refused because the sensor has been started anew since its metadata was
-  /// written.
+  /// Packets rejected since the last good one because the sensor was restarted after its metadata was written.
   [[nodiscard]] std::uint64_t packets_of_other_start() const { return packets_of_other_start_; }
-  /// Whether these are so many turns that the sensor must be in another mode.
+  /// Returns true if these span so many turns that the sensor must be in another mode.
   [[nodiscard]] bool is_in_other_mode() const { return packets_of_other_start_ > 2 * packets_per_turn_; }
 
   [[nodiscard]] const PacketFormat& format() const { return format_; }
@@ -73,7 +72,7 @@ class Decoder {
   template <class T> using PerPixel = std::array<T, kMaxPixels>;
   using Ranges = FiringGroup::PerLaser<std::int32_t>;
 
-  /// Where the beams point in the frame of their column, which is the lidar frame turned by the encoder angle.
+  /// Beam directions in the frame of their column: the lidar frame rotated by the encoder angle.
   struct Beams {
     PerPixel<float> x, y, z;
     PerPixel<std::uint8_t> ring;
@@ -81,7 +80,7 @@ class Decoder {
   struct Turn {
     float cos = 1.0F, sin = 0.0F;
   };
-  /// From the frame of a column to the sensor's.
+  /// Transform from the frame of a column to the sensor frame.
   struct ColumnPose {
     std::array<std::array<float, 3>, 3> R;
     std::array<float, 3> t;
@@ -91,7 +90,7 @@ class Decoder {
     std::size_t measurement_id;
     std::int32_t offset_ns;
   };
-  /// A packet of another start of the sensor.
+  /// Packet from another start of the sensor.
   struct OtherStart {
     std::uint32_t init_id = 0;
     std::uint16_t frame_id = 0;
@@ -116,23 +115,23 @@ class Decoder {
   Isa isa_;
   Duration column_duration_;
   float beam_origin_radius_m_, beam_origin_height_m_;
-  float beam_origin_m_; ///< from the centre of the lidar frame: so much of a range lies before the beam's origin
+  float beam_origin_m_; ///< distance of the beam origin from the lidar frame's centre; included in ranges
   Beams beams_{};
-  std::vector<Turn> encoder_; ///< by measurement id
+  std::vector<Turn> encoder_; ///< indexed by measurement ID
   std::array<std::array<float, 3>, 3> R_sensor_lidar_{};
   std::array<float, 3> t_sensor_lidar_{};
-  int azimuth_zero_cdeg_; ///< of measurement id 0, clockwise from the sensor's x axis
+  int azimuth_zero_cdeg_; ///< azimuth of measurement ID 0, clockwise from the sensor's x axis
 
-  std::array<Column, kMaxColumns> columns_{}; ///< of the packet at hand: the valid ones
+  std::array<Column, kMaxColumns> columns_{}; ///< valid columns of the current packet
   std::size_t column_count_ = 0;
-  std::uint64_t columns_missing_ = 0; ///< of them in the window
+  std::uint64_t columns_missing_ = 0; ///< its invalid columns in the window
   Duration time_of_packet_{};
 
   Duration time_{};
   std::size_t first_column_ = 0, last_column_ = 0;
-  Duration spanned_{}; ///< from the first of them to the last
+  Duration spanned_{}; ///< time from the first to the last column
   std::uint64_t invalid_columns_ = 0, packets_of_other_start_ = 0;
-  std::uint64_t packets_per_turn_; ///< that it sends
+  std::uint64_t packets_per_turn_; ///< packets that the sensor sends per turn
   bool has_checksums_ = false;
   OtherStart other_start_;
 };

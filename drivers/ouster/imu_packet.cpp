@@ -12,10 +12,10 @@ namespace {
 
 constexpr double kStandardGravity_mps2 = 9.80665;
 
-/// After the header: the time and the words of the latest NMEA sentence, then the measurements.
+/// Layout after the header: time and text of the latest NMEA sentence, then the measurements.
 constexpr std::size_t kNmeaBytes = 100, kMeasurementBytes = 36, kStatusAt = 10;
 
-/// Times of the packet, of the accelerometer and of the gyro, then g and degrees per second.
+/// Legacy layout: times of the packet, of the accelerometer and of the gyro, then values in g and degrees per second.
 constexpr ImuPacketLayout kLegacy{.bytes = 48,
                                   .first = 0,
                                   .stride = 48,
@@ -71,7 +71,7 @@ std::optional<PacketError> read_imu_packet(const Metadata& metadata, std::span<c
   const std::byte* at = payload.data() + layout.first;
   for (std::size_t i = 0; i < layout.count; ++i, at += layout.stride) {
     if (metadata.standard_imu_packets && (read_u16(at + kStatusAt) & 1U) == 0)
-      continue; // the sensor calls it invalid
+      continue; // marked invalid by the sensor
     const std::uint64_t time_ns = read_u64(at + layout.time);
     if (time_ns > static_cast<std::uint64_t>(to_ns(kLatestStamp)))
       return PacketError::time;

@@ -15,9 +15,9 @@
 
 namespace locus::ouster {
 
-/// One measurement of the sensor's inertial unit, in its own frame: Metadata::T_sensor_imu leads to the sensor's.
+/// Measurement of the sensor's IMU in the IMU frame; Metadata::T_sensor_imu transforms it to the sensor frame.
 struct ImuMeasurement {
-  Duration time; ///< of the gyro's reading, by the clock that also times the columns; >= 0
+  Duration time; ///< time of the gyro sample, in the clock that also stamps the columns; >= 0
   Eigen::Vector3d angular_velocity_radps;
   Eigen::Vector3d specific_force_mps2;
 };
@@ -30,21 +30,21 @@ struct ImuMeasurements {
   [[nodiscard]] std::span<const ImuMeasurement> all() const { return {storage.data(), count}; }
 };
 
-/// Places in an IMU packet, all in bytes, and the units of what stands there: times in ns of 8 bytes, and numbers of 4.
+/// Offsets in an IMU packet in bytes, and the units of its values: times in ns of 8 bytes, numbers of 4 bytes.
 struct ImuPacketLayout {
-  std::size_t bytes;                ///< of the packet
-  std::size_t first, stride, count; ///< of its measurements
-  std::size_t time, force, rate;    ///< in a measurement: of the gyro's reading, and three numbers each
+  std::size_t bytes;                ///< length of the packet
+  std::size_t first, stride, count; ///< measurements: first offset, stride, number
+  std::size_t time, force, rate;    ///< offsets in a measurement: gyro time, and two vectors of three numbers
   double force_unit_mps2, rate_unit_radps;
 };
 
-/// Of the packets that Metadata says the sensor sends.
+/// Returns the layout of the IMU packets that the sensor sends according to its metadata.
 ImuPacketLayout imu_packet_layout(const Metadata& metadata);
 
-/// Reads an IMU packet: of 48 bytes, with g and degrees per second, or one of newer firmware that opens and ends as a
-/// lidar packet does and holds several measurements in SI units. What is not finite, or what the sensor calls invalid,
-/// is left out; a packet without anything else is refused (flag), as is one of another length, type, serial number or
-/// checksum, or of an impossible time. Allocates nothing, throws nothing.
+/// Reads an IMU packet: 48 bytes in g and degrees per second, or, with newer firmware, several measurements in SI units
+/// with the header and footer of a lidar packet. Measurements that are not finite or marked invalid are skipped.
+/// Packets without valid measurements are rejected (flag), as are those with a wrong length, type, serial number or
+/// checksum, or an impossible time. Allocates nothing, throws nothing.
 std::optional<PacketError> read_imu_packet(const Metadata& metadata, std::span<const std::byte> payload,
                                            ImuMeasurements& out);
 

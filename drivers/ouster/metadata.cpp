@@ -23,16 +23,16 @@ using nlohmann::json;
 constexpr std::uintmax_t kMaxFileBytes = 10'000'000;
 constexpr double kMPerMm = 1e-3;
 
-/// The maker's defaults, of a first-generation or older sensor.
+/// Manufacturer's defaults for a sensor of the first generation or older.
 constexpr double kLidarHeightMm = 36.18;
 constexpr std::array<double, 3> kImuMm{6.253, -11.775, 7.645};
 
-/// What is wrong at which key. Does not leave this file.
+/// Error and its key. Internal to this file.
 struct Problem {
   std::string key, what;
 };
 
-/// Where sections stand in the flat form: nowhere, but for the format of the data.
+/// Section name, and its name in the flat form: empty (the root) except for the data format.
 struct Section {
   std::string_view name, flat_name;
 };
@@ -42,10 +42,10 @@ constexpr Section kSensorInfo{"sensor_info", ""}, kConfig{"config_params", ""}, 
 
 constexpr auto kNeededSections = std::to_array<std::string_view>(
     {"sensor_info", "beam_intrinsics", "imu_intrinsics", "lidar_intrinsics", "config_params"});
-/// Old firmware has the words of an error there.
+/// Sections that may be plain text: old firmware writes an error message there.
 constexpr auto kNeededKeys = std::to_array<std::string_view>({"lidar_data_format", "calibration_status"});
 
-/// The file, whichever form it has.
+/// Metadata file in either form.
 class Document {
  public:
   explicit Document(const json& root) : root_(root) {
@@ -67,7 +67,7 @@ class Document {
         throw Problem{std::string{name}, "this section is missing"};
   }
 
-  /// Nothing where the key, or its whole section, is not there.
+  /// Returns the value; nullptr if the key or its section is missing.
   [[nodiscard]] const json* find(const Section& section, std::string_view key) const {
     const json* const keys = keys_of(section);
     if (keys == nullptr)
@@ -136,7 +136,7 @@ T needed(const Document& file, const Section& section, std::string_view key, std
   return *value;
 }
 
-/// Nothing where the key is not there.
+/// Reads a list of numbers; empty if the key is missing.
 std::optional<std::vector<double>> numbers(const Document& file, const Section& section, std::string_view key,
                                            std::size_t size, std::string_view what) {
   const json* const value = file.find(section, key);
@@ -156,9 +156,9 @@ Eigen::Matrix4d matrix(const std::vector<double>& rows) {
   return Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>{rows.data()};
 }
 
-/// A matrix in mm as a pose; nothing where the key is not there.
+/// Reads a matrix in mm as a pose; empty if the key is missing.
 std::optional<Pose> pose(const Document& file, const Section& section, std::string_view key) {
-  constexpr double kTolerance = 1e-3; // the files have three digits
+  constexpr double kTolerance = 1e-3; // the files have three decimals
   const auto rows = numbers(file, section, key, 16, "a matrix of 4 by 4 is needed");
   if (!rows)
     return std::nullopt;
@@ -181,7 +181,7 @@ std::uint64_t serial_number(const Document& file) {
   return number;
 }
 
-/// "1024x10": columns a turn and turns a second.
+/// Parses for example "1024x10": columns per turn and turns per second.
 void read_mode(const Document& file, Metadata& metadata) {
   const auto mode = needed(file, kConfig, "lidar_mode", text(file, kConfig, "lidar_mode"));
   const char* const end = mode.data() + mode.size();
@@ -220,7 +220,7 @@ void read_profile(const Document& file, Metadata& metadata) {
   metadata.safety_header = text(file, kDataFormat, "header_type") == "FUSA";
 }
 
-/// Firmware before 1.14 says nothing of its data: its packets are of 64 pixels, whatever the model.
+/// Reads the data format. Firmware before 1.14 has none: its packets have 64 pixels per column, whatever the model.
 void read_data_format(const Document& file, Metadata& metadata) {
   constexpr std::size_t kMostColumns = 32;
   if (file.has(kDataFormat)) {
@@ -261,7 +261,7 @@ void read_angles(const Document& file, Metadata& metadata) {
   read("beam_azimuth_angles", metadata.azimuth_rad);
 }
 
-/// Where the maker puts the origin of the beams when the firmware does not say.
+/// Returns the manufacturer's beam origin for firmware that does not report it.
 double default_beam_origin_mm(std::string_view product_line) {
   if (product_line.starts_with("OS-0-"))
     return 27.67;
@@ -340,7 +340,7 @@ std::string_view name_of(const Metadata& metadata) {
   struct Product {
     std::string_view line, name;
   };
-  // The longer names first: each also opens with a shorter one.
+  // Longer names first, since each starts with a shorter one.
   static constexpr auto kProducts = std::to_array<Product>({
       {"OS-0-128", "OS0-128"},
       {"OS-0-64", "OS0-64"},

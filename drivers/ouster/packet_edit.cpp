@@ -16,7 +16,7 @@ namespace {
 
 using Packet = std::span<std::byte>;
 
-/// Changes a packet, and its checksum if it had the right one.
+/// Edits a packet, and updates its checksum if it was correct.
 template <class Change> void edit(Packet packet, Change&& change) {
   const bool is_sealed = packet.size() > PacketFormat::kPacketFooterBytes && has_right_checksum(packet);
   change();
@@ -37,7 +37,7 @@ template <class Change> void edit_columns(const PacketFormat& format, Packet pac
   });
 }
 
-/// Calls `change` with each measurement of a packet of the inertial unit.
+/// Calls `change` with each measurement of an IMU packet.
 template <class Change> void edit_measurements(const ImuPacketLayout& layout, Packet packet, Change&& change) {
   if (packet.size() != layout.bytes)
     return;
@@ -50,7 +50,7 @@ template <class Change> void edit_measurements(const ImuPacketLayout& layout, Pa
 void shift_time(std::byte* at, Duration shift) {
   const std::uint64_t time_ns = read_u64(at);
   if (time_ns > static_cast<std::uint64_t>(to_ns(kLatestStamp)))
-    return; // none
+    return; // invalid
   const auto shifted_ns = static_cast<std::int64_t>(time_ns) + shift.count();
   put_little_endian(at, static_cast<std::uint64_t>(std::max<std::int64_t>(shifted_ns, 0)), 8);
 }

@@ -9,16 +9,16 @@
 
 namespace locus::ouster {
 
-/// See locus::shift_clock(). In packets of columns, the valid ones, and in those of the inertial unit.
+/// Implements locus::shift_clock() for the valid columns of lidar packets, and for IMU packets.
 void shift_clock(const Metadata& metadata, std::span<std::byte> packet, Duration shift);
 
-/// See locus::lengthen_ranges().
+/// Implements locus::lengthen_ranges().
 void lengthen_ranges(const Metadata& metadata, std::span<std::byte> packet, double more_m);
 
-/// In a packet of the inertial unit: adds to its turn about z, in its own frame. Other packets stay as they are.
+/// Adds `more_radps` to the angular velocity about z of an IMU packet, IMU frame. Leaves other packets unchanged.
 void add_turn(const Metadata& metadata, std::span<std::byte> packet, double more_radps);
 
-/// The same: makes all its readings NaN.
+/// Sets all values of an IMU packet to NaN. Leaves other packets unchanged.
 void make_nan(const Metadata& metadata, std::span<std::byte> packet);
 
 } // namespace locus::ouster

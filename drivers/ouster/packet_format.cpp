@@ -13,7 +13,7 @@ constexpr std::uint32_t kInitIdMask = 0xFFFFFF;
 constexpr std::uint64_t kSerialNumberMask = 0xFF'FFFF'FFFF;
 constexpr std::uint32_t kLegacyValid = 0xFFFFFFFF;
 
-/// In the order of Profile.
+/// Profiles in the order of Profile.
 constexpr std::array<ProfileSpec, kProfiles> kSpecs{{
     {"LEGACY", 12, 20, 0, 1, {{{0, 4}}}},
     {"RNG19_RFL8_SIG16_NIR16", 12, 19, 0, 1, {{{0, 4}}}},

@@ -11,7 +11,7 @@ namespace locus::velodyne {
 
 namespace {
 
-/// What is wrong and where. Does not leave this file.
+/// Error and its position. Internal to this file.
 struct Problem {
   YAML::Mark mark;
   std::string what;
@@ -25,7 +25,7 @@ double number(const YAML::Node& laser, const char* key, double otherwise) {
     const auto value = node.as<double>();
     if (std::isfinite(value))
       return value;
-  } catch (const YAML::Exception&) { // told below, with the key
+  } catch (const YAML::Exception&) { // reported below, with the key
   }
   throw Problem{node.Mark(), std::string{key} + " must be a finite number"};
 }
@@ -44,9 +44,9 @@ std::size_t count(const YAML::Node& node, const char* key, std::size_t below) {
   return static_cast<std::size_t>(value);
 }
 
-/// The corrections of one laser in the terms of Laser. The driver's formulas shift the origin of a beam across the beam
-/// (vert_offset_correction) and to the left (horiz_offset_correction), and turn it against the azimuth
-/// (rot_correction).
+/// Converts the corrections of one laser to the fields of Laser. In the driver's formulas, vert_offset_correction
+/// shifts the origin of a beam across the beam, horiz_offset_correction shifts it to the left, and rot_correction
+/// rotates the beam against the azimuth.
 Laser read_laser(const YAML::Node& node) {
   if (const YAML::Node two_point = node["two_pt_correction_available"]; two_point && two_point.as<bool>(true))
     throw Problem{two_point.Mark(), "two-point corrections belong to an HDL-64E, which is not supported"};
@@ -61,7 +61,7 @@ Laser read_laser(const YAML::Node& node) {
 }
 
 Calibration parse(const YAML::Node& file) {
-  constexpr double kOldDriversResolutionM = 0.002; // files from before the key existed are of sensors with 2 mm
+  constexpr double kOldDriversResolutionM = 0.002; // files without the key are for sensors with 2 mm
   if (!file.IsMap() || !file["lasers"] || !file["lasers"].IsSequence())
     throw Problem{file.Mark(), "no list of lasers; a calibration file of velodyne_pointcloud is expected"};
   const YAML::Node lasers = file["lasers"];

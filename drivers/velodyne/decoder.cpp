@@ -16,14 +16,14 @@ namespace {
 constexpr double kRadPerCdeg = std::numbers::pi / 18000.0;
 constexpr Duration kHour = std::chrono::hours{1};
 
-/// Three times the fastest setting of any model, 1200 rpm: a first packet of a VLP-16 taken for one of an HDL-32E,
-/// whose columns are shorter, seems to turn 2.4 times as fast and must not be refused for it.
+/// Limit for the turn rate: three times the fastest setting of any model, 1200 rpm. A first VLP-16 packet mistaken for
+/// an HDL-32E, whose columns are shorter, seems to turn 2.4 times as fast and must not be rejected for that.
 constexpr double kMaxTurnCdegPerNs = 3.0 * 20.0 * kCdegPerTurn * 1e-9;
 
-/// Half the slowest setting of any model, 300 rpm. Of a motor that hardly turns no time can be told from its turn.
+/// Least turn rate from which time can be derived: half the slowest setting of any model, 300 rpm.
 constexpr double kMinTurnCdegPerNs = 0.5 * 5.0 * kCdegPerTurn * 1e-9;
 
-/// Longest time over which the turn of the VLS-128 is told from two packets: at 3600 rpm three fifths of a turn.
+/// Longest time between two packets for measuring the turn of the VLS-128: three fifths of a turn at 3600 rpm.
 constexpr Duration kMaxTurnGap = std::chrono::milliseconds{10};
 
 const std::byte* block_at(std::span<const std::byte, kDataPacketBytes> packet, std::size_t block) {
@@ -149,13 +149,13 @@ std::optional<PacketError> Decoder::check_blocks(Packet packet) const {
     const std::byte* block = block_at(packet, i);
     if (flag_of(block) != kBankFlags[i % layout_.blocks_per_column() / layout_.returns])
       return PacketError::flag;
-    if (azimuth_of(block) > kCdegPerTurn) // 360.00 itself is reported now and then
+    if (azimuth_of(block) > kCdegPerTurn) // 360.00 itself occurs occasionally
       return PacketError::azimuth;
   }
   return std::nullopt;
 }
 
-/// Sets azimuth, turn and time of every column. Fails when most turns are impossible.
+/// Computes azimuth, turn and time of every column. Fails if most turns are impossible.
 bool Decoder::measure_turns(Packet packet, Duration stamp) {
   const double max_turn_cdeg = kMaxTurnCdegPerNs * static_cast<double>(column_duration_.count());
   const std::size_t columns = layout_.columns;
@@ -205,14 +205,14 @@ void Decoder::measure_turn_since_last_packet(Duration stamp, double max_turn_cde
   last_azimuth_cdeg_ = azimuth_cdeg_.front();
 }
 
-/// Appends what sixteen firings of a column brought, in dual return mode one firing group for each echo. A second echo
-/// at the distance of the first is none.
+/// Appends the firing groups of sixteen firings of a column; in dual return mode, one group for each echo. A second
+/// echo at the distance of the first is not a return.
 void Decoder::read_firing_groups(Packet packet, std::size_t column, std::size_t first_firing, LidarPacket& out) const {
   const std::size_t bank = first_firing / kChannels;
   const std::byte* block = block_at(packet, column * layout_.blocks_per_column() + bank * layout_.returns);
   Aim aim;
   run_as(options_.isa, [&] { aim = aim_at(firings_, column_azimuth_, first_firing); });
-  Distances previous{}; // 0 is no return: nothing is lost when the first echo equals it
+  Distances previous{}; // 0 is no return, so a first echo equal to it loses nothing
   for (std::size_t echo = 0; echo < layout_.returns; ++echo) {
     FiringGroup& group = out.storage[out.count++];
     Distances distances;
@@ -226,8 +226,8 @@ void Decoder::read_firing_groups(Packet packet, std::size_t column, std::size_t 
   }
 }
 
-/// Everything about a firing group that follows from its distances. Works on a copy: where what is written could be
-/// what is read, loops do not become vector instructions.
+/// Computes the firing group from its distances. Works on a local copy, because possible aliasing of input and output
+/// would prevent vectorisation.
 [[gnu::always_inline]] inline void Decoder::place(const Distances& distances, const Distances& previous, const Aim& aim,
                                                   std::size_t column, std::size_t first_firing,
                                                   FiringGroup& group) const {

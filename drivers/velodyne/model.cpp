@@ -12,7 +12,7 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-// VLP-16 user manual 63-9243, table 9-1: lasers in the order of firing, vertical corrections in millimetres.
+// VLP-16 user manual 63-9243, table 9-1: lasers in firing order, vertical corrections in millimetres.
 constexpr std::array<double, 16> kVlp16ElevationDeg{-15, 1, -13, 3, -11, 5, -9, 7, -7, 9, -5, 11, -3, 13, -1, 15};
 constexpr std::array<double, 16> kVlp16VerticalMm{11.2, -0.7, 9.7, -2.2, 8.1, -3.7, 6.6, -5.1,
                                                   5.1,  -6.6, 3.7, -8.1, 2.2, -9.7, 0.7, -11.2};
@@ -30,7 +30,7 @@ constexpr std::array<double, 32> kVlp32cAzimuthDeg{1.4,  -4.2, 1.4,  -1.4, 1.4, 
                                                    -1.4, 4.2,  -1.4, 4.2,  -1.4, 1.4,  -4.2, 1.4,  -4.2, 4.2,  -1.4,
                                                    1.4,  -1.4, 1.4,  -1.4, 1.4,  -4.2, 4.2,  -1.4, 1.4,  -1.4};
 
-// HDL-32E user manual 63-9113: even lasers climb from -30.67 deg, odd ones from -9.33 deg, by 4/3 deg.
+// HDL-32E user manual 63-9113: even lasers rise from -30.67 deg, odd ones from -9.33 deg, in steps of 4/3 deg.
 constexpr std::array<double, 32> kHdl32eElevationDeg{-30.67, -9.33, -29.33, -8.00, -28.00, -6.67, -26.67, -5.33,
                                                      -25.33, -4.00, -24.00, -2.67, -22.67, -1.33, -21.33, 0.00,
                                                      -20.00, 1.33,  -18.67, 2.67,  -17.33, 4.00,  -16.00, 5.33,
@@ -47,8 +47,8 @@ constexpr std::array<double, 128> kVls128ElevationDeg{
     -4.52,   0.87,  6.08,  -3.31,  2.08,  -6.65, 1.42,   -10.346, -1.88, 3.51,    -6.06,  -0.67, 4.72,    -3.97, 2.30,
     -6.39,   -1.00, 4.39,  -5.18,  0.21,  6.98,  -3.09,  4.98,    -3.75, 1.64,    -8.352, -2.54, 2.85,    -5.84, -0.45,
     8.43,    -2.87, 2.52,  -6.17,  -1.66, 3.73,  -4.96,  0.43};
-// The same eight for every group. The manual prints them with the opposite sign; Velodyne's own viewer, the ROS driver
-// and Autoware, all tried on real units, agree on this one.
+// Azimuth offsets, the same for every group of eight. The manual prints them with the opposite sign; Velodyne's own
+// viewer, the ROS driver and Autoware, all tested on real units, agree on this one.
 constexpr std::array<double, 8> kVls128AzimuthDeg{6.354, 4.548, 2.732, 0.911, -0.911, -2.732, -4.548, -6.354};
 
 template <std::size_t Count>
@@ -62,7 +62,7 @@ Calibration calibration(const std::array<double, Count>& elevation_deg, double d
   return result;
 }
 
-/// Firings of one column, `Offset(i)` nanoseconds after its first, by the lasers in turn.
+/// Builds the firings of one column, `offset_ns(i)` nanoseconds after its first, with lasers in cyclic order.
 template <class Offset> std::array<Firing, kMaxLasers> firings(std::size_t lasers, Offset offset_ns) {
   std::array<Firing, kMaxLasers> result{};
   for (std::size_t i = 0; i < kMaxLasers; ++i)
@@ -70,7 +70,7 @@ template <class Offset> std::array<Firing, kMaxLasers> firings(std::size_t laser
   return result;
 }
 
-/// VLP-16 and Puck Hi-Res: a block holds two sequences of 16 lasers, 55.296 us apart, a laser every 2.304 us.
+/// VLP-16 and Puck Hi-Res: a block holds two sequences of 16 lasers, 55.296 us apart; one laser every 2.304 us.
 ModelSpec puck(std::string_view name, std::uint8_t product_id, const std::array<double, 16>& elevation_deg,
                const std::array<double, 16>& vertical_mm) {
   ModelSpec result{name,
@@ -85,7 +85,7 @@ ModelSpec puck(std::string_view name, std::uint8_t product_id, const std::array<
   return result;
 }
 
-/// VLP-32C: lasers in pairs, a pair every 2.304 us.
+/// VLP-32C: pairs of lasers, one pair every 2.304 us.
 ModelSpec vlp32c() {
   ModelSpec result{"VLP-32C",
                    0x28,
@@ -99,7 +99,7 @@ ModelSpec vlp32c() {
   return result;
 }
 
-/// HDL-32E: a laser every 1.152 us.
+/// HDL-32E: one laser every 1.152 us.
 ModelSpec hdl32e() {
   return {"HDL-32E",
           0x21,
@@ -110,13 +110,14 @@ ModelSpec hdl32e() {
           calibration(kHdl32eElevationDeg, 0.002)};
 }
 
-/// VLS-128: groups of eight lasers, a slot of maintenance after the eighth group and a longer pause after the
-/// sixteenth. The time in the packet is that of the fourth group, 8.7 us after the first. The manual (63-9483, chapter
-/// 9) has a group every 2.665 us and a column every 53.3 us.
+/// VLS-128: groups of eight lasers, a maintenance slot after the eighth group and a longer pause after the sixteenth.
+/// The time in the packet is that of the fourth group, 8.7 us after the first. The manual (63-9483, chapter 9) gives
+/// one group every 2.665 us and one column every 53.3 us.
 ///
-/// Since firmware 5.2.3.0 it is a group every 2.89 us: Rev. 4 of the manual, as the decoder github.com/valgur/
-/// velodyne_decoder (packet_decoder.cpp) quotes it; it is also what those 8.7 us are three of. How long a column takes
-/// then is measured: 165.83 us a packet of three, in the mean of 2192, in the recording of a unit of April 2020.
+/// Firmware 5.2.3.0 and later fires one group every 2.89 us: Rev. 4 of the manual, as quoted by the decoder
+/// github.com/valgur/velodyne_decoder (packet_decoder.cpp); three of these are the 8.7 us. The column duration at this
+/// pace was measured: 165.83 us per packet of three columns, mean of 2192 packets, in the recording of a unit of April
+/// 2020.
 ModelSpec vls128(Pace pace) {
   const bool slower = pace == Pace::slower;
   const std::size_t slot_ns = slower ? 2'890 : 2'665;

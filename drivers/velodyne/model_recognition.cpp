@@ -10,15 +10,15 @@ namespace locus::velodyne {
 
 namespace {
 
-constexpr Duration kSpacingTolerance = std::chrono::microseconds{2}; // both stamps are whole microseconds
+constexpr Duration kSpacingTolerance = std::chrono::microseconds{2}; // both stamps are integer microseconds
 constexpr int kMaxLostInARow = 3;
 
-/// Of the difference of two stamps of a VLS-128 from what the mean spacing makes of it: in a recording 2.2 us at most.
+/// Noise of a VLS-128 stamp difference relative to the mean spacing: at most 2.2 us in a recording.
 constexpr Duration kStampNoise = std::chrono::microseconds{3};
 
 bool is_close(Duration a, Duration b) { return std::chrono::abs(a - b) <= kSpacingTolerance; }
 
-/// The model that sends packets at this spacing; nothing when it fits none.
+/// Returns the model that sends packets at this spacing; empty if none does.
 std::optional<Model> model_of_spacing(Model claimed, ReturnMode mode, Duration spacing) {
   for (const Pace pace : {Pace::first, Pace::slower})
     for (int packets = 1; packets <= 1 + kMaxLostInARow; ++packets)
@@ -29,8 +29,8 @@ std::optional<Model> model_of_spacing(Model claimed, ReturnMode mode, Duration s
   return found == kModels.end() ? std::nullopt : std::optional{*found};
 }
 
-/// Whether the two halves of the blocks measure the same distances, as they do when 16 lasers fire twice. In recorded
-/// packets 60 % of the pairs within 2 % is above every HDL-32E and below nine tenths of the VLP-16.
+/// Returns true if the two halves of the blocks measure the same distances, as when 16 lasers fire twice. In recorded
+/// packets, the threshold of 60 % of the pairs within 2 % is above all HDL-32E and below nine tenths of VLP-16 packets.
 bool fires_sixteen_lasers_twice(std::span<const std::byte, kDataPacketBytes> packet) {
   constexpr std::size_t kLasers = 16;
   std::size_t pairs = 0;

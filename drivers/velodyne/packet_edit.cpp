@@ -13,7 +13,7 @@ namespace locus::velodyne {
 
 namespace {
 
-/// Where a packet has its microseconds past the hour; nullptr for another one.
+/// Returns the position of a packet's microseconds past the hour; nullptr for other packets.
 std::byte* clock_in(std::span<std::byte> packet) {
   if (packet.size() == kDataPacketBytes)
     return packet.data() + kTimeOffset;

@@ -8,10 +8,10 @@
 
 namespace locus::velodyne {
 
-/// See locus::shift_clock(). A time past the hour is none, and stays.
+/// Implements locus::shift_clock(). Leaves a time beyond the hour, which is invalid, unchanged.
 void shift_clock(std::span<std::byte> packet, Duration shift);
 
-/// See locus::lengthen_ranges(). Of a packet whose product id is known.
+/// Implements locus::lengthen_ranges() for packets with a known product ID.
 void lengthen_ranges(std::span<std::byte> packet, double more_m);
 
 } // namespace locus::velodyne

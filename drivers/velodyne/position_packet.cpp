@@ -31,7 +31,7 @@ template <class Number> std::optional<Number> parse_number(std::string_view text
   return value;
 }
 
-/// The text between $ and *, if the two digits after it are its checksum.
+/// Returns the text between $ and *, if the two digits after it are its checksum.
 std::optional<std::string_view> checked_body(std::string_view sentence) {
   const std::size_t star = sentence.find('*');
   if (!sentence.starts_with('$') || star == std::string_view::npos || star + 3 > sentence.size())
@@ -45,7 +45,7 @@ std::optional<std::string_view> checked_body(std::string_view sentence) {
   return body;
 }
 
-/// hhmmss or hhmmss.sss
+/// Parses hhmmss or hhmmss.sss.
 std::optional<Duration> parse_time_of_day(std::string_view text) {
   if (text.size() < 6)
     return std::nullopt;
@@ -57,7 +57,7 @@ std::optional<Duration> parse_time_of_day(std::string_view text) {
   return std::chrono::hours{*hours} + std::chrono::minutes{*minutes} + from_seconds(*seconds);
 }
 
-/// ddmmyy, of this century
+/// Parses ddmmyy in this century.
 std::optional<std::chrono::year_month_day> parse_date(std::string_view text) {
   if (text.size() != 6)
     return std::nullopt;

@@ -17,7 +17,7 @@ namespace locus::velodyne {
 inline constexpr std::size_t kPositionPacketBytes = 512;
 inline constexpr std::size_t kTimeOfHourOffset = 0xC6; ///< microseconds past the hour, 32 bits
 
-/// What a GPS receiver says of itself in an NMEA RMC sentence.
+/// Data of a GPS receiver from an NMEA RMC sentence.
 struct RmcSentence {
   bool valid = false; ///< status A: the receiver has a fix
   Duration time_of_day{};
@@ -26,29 +26,29 @@ struct RmcSentence {
   std::optional<double> course_deg; ///< clockwise from true north
 };
 
-/// Reads $GPRMC (or $GNRMC, of receivers with several systems). Nothing unless the checksum is there and right. Never
-/// fails on garbage.
+/// Parses $GPRMC (or $GNRMC, from multi-constellation receivers). Empty unless the checksum is present and correct.
+/// Safe for arbitrary input.
 std::optional<RmcSentence> parse_rmc(std::string_view sentence);
 
-/// Pulse per second, as the sensor sees it.
+/// State of the pulse per second, as reported by the sensor.
 enum class PpsState : std::uint8_t { absent = 0, synchronizing = 1, locked = 2, error = 3 };
 constexpr auto names_of(PpsState) {
   return std::to_array<std::string_view>({"absent", "synchronizing", "locked", "error"});
 }
 using locus::to_string;
 
-/// Position ("telemetry") packet: how well the sensor knows the time.
+/// Position ("telemetry") packet: time synchronisation of the sensor.
 struct PositionPacket {
   Duration time_of_hour{};
   PpsState pps = PpsState::absent;
   std::optional<RmcSentence> rmc;
 
-  /// The sensor's time of hour is that of UTC.
+  /// Returns true if the sensor's time of hour is UTC.
   [[nodiscard]] bool is_synchronised() const { return pps == PpsState::locked && rmc && rmc->valid; }
 };
 
-/// Any bytes of the right length are a position packet; what they say may be nothing. Sensors without the PPS byte
-/// (early HDL-32E) leave it 0.
+/// Parses a position packet from any bytes of the right length; its content may be meaningless. Sensors without the PPS
+/// byte (early HDL-32E) leave it 0.
 PositionPacket parse_position_packet(std::span<const std::byte, kPositionPacketBytes> payload);
 
 } // namespace locus::velodyne
