@@ -155,7 +155,7 @@ std::string scheduling() {
 
 void take_least_priority() {
   constexpr int kLeast = 19;
-  setpriority(PRIO_PROCESS, 0, kLeast); // of this thread alone, on Linux
+  setpriority(PRIO_PROCESS, 0, kLeast); // affects only this thread on Linux
 }
 
 } // namespace locus::daemon
