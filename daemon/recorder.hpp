@@ -163,15 +163,15 @@ class Recorder {
   /// disk.
   void write(bool last_round);
 
-  /// Thread of the disk: writes what was taken and ends the piece, whatever it has. The pieces of this run that hold
-  /// the last so much of it.
+  /// Disk thread: writes the queued inputs and ends the current piece. Returns the pieces of this run that hold its
+  /// last `keep`.
   std::vector<std::filesystem::path> end_pieces(Duration keep);
 
-  /// Any thread but the producer's.
+  /// Returns the status. Any thread except the producer's.
   [[nodiscard]] Status status() const;
 
  private:
-  /// One of a Velodyne is whole; the packets of other lidars, and what is no lidar's, come in several parts.
+  /// Part of a datagram. A Velodyne packet fits one part; other datagrams are split into several.
   struct DatagramPart {
     static constexpr std::size_t kMaxBytes = velodyne::kDataPacketBytes + 2;
 
