@@ -16,13 +16,15 @@ namespace locus::daemon {
 /// and the configured one. IMU: `late_ms`, the delay of a stamp relative to the motion that it measures, and
 /// `mounting_deg`, the rotation error of T_base_source about the x, y and z axes of the base. Odometry: `scale` and
 /// `yaw_scale`, the reported distance per metre ahead and the reported angle per radian of yaw. `calibrated` holds the
-/// configuration keys whose learned value is better known than the configured one, with that value. `too_late` marks an
-/// IMU whose delay exceeds what a live run can compensate (MotionTrack::taken_out()), unless its samples were played
-/// `in_time`: its figures are then wrong by more than their deviation, and `calibrated` is empty. Any thread.
+/// configuration keys whose learned value is better known than the configured one, with that value. Unless its samples
+/// were played `in_time`, an IMU is `too_late` if its delay exceeds what a live run can compensate
+/// (MotionTrack::taken_out()): its figures are wrong by more than their deviation, and `calibrated` is empty. Any
+/// thread.
 nlohmann::ordered_json learned_json(const MotionSourceOptions& source, const LearnedSource& learned,
                                     bool in_time = false);
 
-/// Returns the configuration of a source, updated by each figure that differs by three standard deviations. Any thread.
+/// Returns the configuration of a source, updated by each learned figure that is better known than the configured one
+/// and differs from it by three standard deviations. Any thread.
 MotionSourceOptions calibrated(const MotionSourceOptions& source, const LearnedSource& learned);
 
 /// Formats `calibrated` of all sources for a configuration file; `sources` as in summary.json. Any thread.

@@ -15,7 +15,7 @@ namespace locus::daemon {
 
 namespace {
 
-/// Ratio below which foreign packets are ignored: one in so many data packets.
+/// Number of data packets per foreign packet above which foreign packets are ignored.
 constexpr std::uint64_t kNextToNothing = 100;
 
 } // namespace

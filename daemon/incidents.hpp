@@ -66,7 +66,7 @@ class Incidents {
   Expected<std::filesystem::path, std::string> ask(Request request);
   /// Owner: requests an automatic incident, unless it is too soon. Tells whether it was accepted.
   bool raise(Request request);
-  /// Any thread.
+  /// Returns the status. Any thread.
   [[nodiscard]] Status status() const;
 
   /// Disk thread (the recorder's), periodically: starts a pending request or copies a limited amount of data.

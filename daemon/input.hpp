@@ -192,7 +192,7 @@ class PacedInput : public InputSource {
   /// Longest pause that is replayed; a longer step of the arrivals is treated as a clock change.
   static constexpr Duration kMaxPause = std::chrono::seconds{10};
 
-  /// CLOCK_MONOTONIC and the sleep of this thread, or others in tests.
+  /// Time source (CLOCK_MONOTONIC) and sleep of this thread, replaceable in tests.
   struct Clock {
     Duration (*now)();
     void (*sleep_for)(Duration);

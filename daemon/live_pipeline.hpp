@@ -38,7 +38,7 @@ struct LiveOptions {
 /// ingest allocates nothing after the first few sweeps. Every wait has a timeout.
 ///
 /// One owner, which may also be the consumer.
-class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it keeps the threads' data apart
+class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it avoids false sharing
  public:
   static constexpr std::size_t kMaxUnfetched = 64;
 
@@ -64,8 +64,8 @@ class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it kee
   /// Consumer: true once the input has ended or stop() was called, and all estimates are fetched.
   [[nodiscard]] bool finished() const;
 
-  /// Owner: stops both threads, within one registration iteration and one wait for input. All sweeps are then counted.
-  /// Idempotent.
+  /// Owner: stops both threads, within one registration iteration and one wait for input. Every sweep then counts as
+  /// processed, dropped or failed. Idempotent.
   void stop();
 
   /// Any thread: sets the mode from the next sweep on.
@@ -95,7 +95,7 @@ class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it kee
     Sweep sweep;
     SweepCut cut;
   };
-  using Counter = std::atomic<std::uint64_t>; ///< any thread may read
+  using Counter = std::atomic<std::uint64_t>; ///< readable from any thread
 
   void run_ingest();
   void run_odometry();

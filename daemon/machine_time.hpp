@@ -44,7 +44,7 @@ class StageStopwatch : public StageClock {
  public:
   static constexpr std::uint64_t kSampling = 13; ///< prime, since packets are periodic with the revolution
 
-  using Clock = Duration (*)(clockid_t); ///< read_clock(), or another in tests
+  using Clock = Duration (*)(clockid_t); ///< read_clock(), replaceable in tests
   explicit StageStopwatch(Clock clock = [](clockid_t id) { return read_clock(id); });
 
   void enter(Stage stage) override { enter(static_cast<std::size_t>(stage)); }

@@ -108,7 +108,7 @@ std::optional<std::string> CaptureRing::remove_oldest() {
   std::filesystem::remove_all(oldest.folder, error);
   if (error)
     return cannot("cannot be removed", oldest.folder, error);
-  std::filesystem::remove(oldest.folder.parent_path(), error); // if it was the last of its run
+  std::filesystem::remove(oldest.folder.parent_path(), error); // fails unless the run is empty
   bytes_ -= oldest.bytes;
   pieces_.pop_front();
   return std::nullopt;

@@ -30,7 +30,7 @@ namespace locus::daemon {
 /// Limits of a recording.
 struct RecordingBounds {
   std::uint64_t max_bytes;   ///< size of the folder
-  Duration piece = kForEver; ///< longest duration of a piece
+  Duration piece = kForEver; ///< longest duration of a piece, first to last input
   Duration keep = kForEver;  ///< age beyond which ended pieces are removed, at the start of the next one
 
   static constexpr Duration kForEver = std::chrono::hours{24 * 365 * 100};
@@ -53,7 +53,7 @@ class CaptureRing {
   Expected<std::filesystem::path, std::string> begin_piece(Stamp now);
   /// Adds the current piece to the run as complete.
   void end_piece();
-  /// Removes the current piece, which holds no data.
+  /// Removes the current piece, which holds no usable data.
   void discard_piece();
 
   /// Returns the size limit of a piece, all files together.
@@ -153,7 +153,7 @@ class Recorder {
     std::string problem;        ///< current failure; empty if there is none
   };
 
-  /// Begins a run with the first input.
+  /// Prepares a recording; the run begins with the first input.
   Recorder(const std::filesystem::path& folder, Config config, RecordingBounds bounds);
 
   /// Producer: records datagrams and motion samples, ignores other inputs. Takes no lock, allocates nothing.

@@ -15,7 +15,7 @@ namespace locus::daemon {
 /// outputs are converted to wall time. One owner, except for wall() and set_by().
 class SteadyTime {
  public:
-  using Clock = Duration (*)(clockid_t); ///< read_clock(), or another in tests
+  using Clock = Duration (*)(clockid_t); ///< read_clock(), replaceable in tests
   explicit SteadyTime(Clock clock = [](clockid_t id) { return read_clock(id); });
 
   /// Detects a step of the wall clock. To be called after stamps are obtained and before they are converted.

@@ -42,7 +42,7 @@ struct ProcessedSweep {
   OdometryEstimate estimate;
   std::uint64_t sequence = 0; ///< Sweep::sequence
   std::size_t raw_returns = 0;
-  std::bitset<kMaxSources> usable_sources; ///< SourcePose::usable, by the index of the source
+  std::bitset<kMaxSources> usable_sources; ///< SourcePose::usable, by source index
   MachineTime took;                        ///< from the cut of the sweep to the estimate
   StageTimes stages_took{};                ///< including the ingest and the preparation since the previous sweep
 };

@@ -16,7 +16,7 @@
 
 namespace locus::daemon {
 
-/// Alignment of data written by one thread and read by another, to avoid false sharing. A constant of our own, since
+/// Alignment of data shared between threads, to avoid false sharing. A fixed value, since
 /// std::hardware_destructive_interference_size may differ between compilers.
 inline constexpr std::size_t kCacheLineBytes = 64;
 
@@ -109,9 +109,9 @@ template <class T> class LatestSlot {
   static constexpr std::uint8_t kFresh = 4; ///< the middle value was published and not yet consumed
   static_assert(std::atomic<std::uint8_t>::is_always_lock_free);
 
-  alignas(kCacheLineBytes) std::uint8_t back_ = 0; ///< producer's own
+  alignas(kCacheLineBytes) std::uint8_t back_ = 0; ///< owned by the producer
   alignas(kCacheLineBytes) std::atomic<std::uint8_t> middle_{1};
-  alignas(kCacheLineBytes) std::uint8_t front_ = 2; ///< consumer's own
+  alignas(kCacheLineBytes) std::uint8_t front_ = 2; ///< owned by the consumer
   alignas(kCacheLineBytes) std::array<T, 3> buffers_{};
 };
 

@@ -15,7 +15,7 @@ namespace locus::daemon {
 namespace {
 
 constexpr Duration kMaxSleep = std::chrono::milliseconds{100}; ///< period of checks of the stop flag
-constexpr Duration kFirstPause = std::chrono::seconds{1};      ///< between two attempts to connect; doubled each time
+constexpr Duration kFirstPause = std::chrono::seconds{1}; ///< pause after the first failed attempt; doubled each time
 constexpr Duration kLongestPause = std::chrono::seconds{15};
 
 } // namespace

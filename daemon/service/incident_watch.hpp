@@ -20,7 +20,7 @@ class IncidentWatch {
   static constexpr Duration kLostFor = std::chrono::seconds{1}; ///< a single failed sweep is no incident
   static constexpr Duration kQuiet = std::chrono::seconds{10};  ///< quiet time that separates two contradictions
 
-  using Clock = Duration (*)(clockid_t); ///< read_clock(), or another in tests
+  using Clock = Duration (*)(clockid_t); ///< read_clock(), replaceable in tests
   explicit IncidentWatch(Clock clock = [](clockid_t id) { return read_clock(id); }) : clock_(clock) {}
 
   /// Checks the figures, a few times a second. Returns the cause once per incident, at its start.

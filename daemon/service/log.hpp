@@ -42,7 +42,7 @@ class Log {
 
   static constexpr Duration kInterval = std::chrono::seconds{10};
 
-  using Clock = Duration (*)(clockid_t); ///< read_clock(), or another in tests
+  using Clock = Duration (*)(clockid_t); ///< read_clock(), replaceable in tests
   explicit Log(Clock clock = [](clockid_t id) { return read_clock(id); });
 
   void say(Severity severity, const std::string& message, Fields fields = {},

@@ -84,7 +84,7 @@ Expected<std::vector<UdpSocket>, std::string> open_lidar_sockets(const Config& c
                                      : "; without position packets the time of lidars is that of their arrival"));
   }
   const auto smallest = std::ranges::min_element(sockets, {}, &UdpSocket::buffer_bytes);
-  if (smallest == sockets.end()) // all lidars give clouds
+  if (smallest == sockets.end()) // all lidars publish clouds
     return sockets;
   if (const int least = smallest->buffer_bytes(); least < UdpSocket::kWantedBufferBytes)
     log.warn(

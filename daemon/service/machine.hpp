@@ -35,7 +35,8 @@ void join_multicast(const Config& config, std::span<const UdpSocket> sockets);
 std::optional<std::string> lock_memory(bool wanted);
 std::optional<std::string> keep_to_cpus(const std::vector<int>& cpus);
 
-/// Sets the priority of the calling thread and of threads it creates: TBB's workers inherit it.
+/// Sets the SCHED_FIFO priority of the calling thread and of threads it creates, such as TBB's workers. Returns a line
+/// for the user if it was not granted.
 std::optional<std::string> raise_priority(int fifo_priority);
 
 /// Describes the scheduling policy, nice value and CPU weight in effect for the calling thread, for the log.

@@ -32,7 +32,7 @@ class MetricsServer {
   static constexpr std::size_t kMaxClients = 16, kMaxRequestBytes = 4096;
   static constexpr Duration kPatience = std::chrono::seconds{5};
 
-  using Clock = Duration (*)(clockid_t); ///< read_clock(), or another in tests
+  using Clock = Duration (*)(clockid_t); ///< read_clock(), replaceable in tests
   /// Listens on `listen`, in the syntax of parse_socket_address(). The destructor closes the port and removes the
   /// socket's file. Fails with one line for the user.
   static Expected<std::unique_ptr<MetricsServer>, std::string> open(

@@ -57,7 +57,7 @@ void update_whereabouts(const std::filesystem::path& file, const Whereabouts& la
 std::optional<std::filesystem::path> state_path();
 
 /// Saves the full state periodically and the whereabouts more often, from a thread that may block on the disk: the map
-/// is worth its cost only every kEvery_m, but the pose of a moving robot is outdated within a second.
+/// is worth its cost only every kEvery or kEvery_m, but the pose of a moving robot is outdated within a second.
 class StateKeeper {
  public:
   static constexpr Duration kEvery = std::chrono::seconds{30};

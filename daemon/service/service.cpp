@@ -71,7 +71,7 @@ int Service::run(const Config& config) {
   keep_what_was_left(config, state);
   if (const auto problem = begin(config, std::move(state))) {
     log_.error(*problem);
-    finish_incident(); // there is no later opportunity
+    finish_incident(); // lost otherwise, since the process ends here
     return 1;
   }
   sd_notify(0, "READY=1");

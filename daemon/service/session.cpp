@@ -65,7 +65,7 @@ Session::Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket
     const Duration age = Stamp{read_clock(CLOCK_REALTIME)} - start_->last.stamp;
     recalled_ = {start_->last.learned, std::max(0.0, to_seconds(age))};
   }
-  // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): stands after its like
+  // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): grouped with the use of start_
   has_past_ = start_ && start_->is_recent && !start_->map_odom.empty();
   begin(std::move(lidars));
 }

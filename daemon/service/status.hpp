@@ -33,7 +33,7 @@ class Watch {
   /// Silence of a sensor before it is reported; also the period of some checks.
   static constexpr Duration kPatience = std::chrono::seconds{5};
 
-  using Clock = Duration (*)(clockid_t); ///< read_clock(), or another in tests
+  using Clock = Duration (*)(clockid_t); ///< read_clock(), replaceable in tests
   /// Monitors a session with this configuration and these lidar sockets.
   Watch(
       const Config& config, std::span<const UdpSocket> sockets, Log& log,
