@@ -27,7 +27,7 @@ bool is_word(std::string_view text, std::string_view punctuation) {
          });
 }
 
-/// ROS 2's rule for absolute names: /word/word.
+/// Checks ROS 2's rule for absolute names: /word/word.
 bool is_topic(std::string_view text) {
   while (text.starts_with('/')) {
     text.remove_prefix(1);
@@ -50,7 +50,7 @@ std::string item(const char* list, std::size_t index, const char* key) {
   return std::string{list} + '.' + std::to_string(index) + '.' + key;
 }
 
-/// Names are keys of the figures and words of the command line: one meaning each, over lidars and sources together.
+/// Checks names, which serve as keys of figures and as command-line words: unique over lidars and sources together.
 void check_names(Problems& problems, const Config& config) {
   std::set<std::string_view> taken{"total", "all-lidars", "kernel_drops"};
   const auto check = [&](const std::string& key, std::string_view name) {
@@ -64,7 +64,7 @@ void check_names(Problems& problems, const Config& config) {
     check(item("motion_sources", i, "name"), config.motion_sources[i].name);
 }
 
-/// Clouds have been made of packets by somebody else, whom nothing here tells how.
+/// Checks lidars that publish clouds: keys about packets do not apply, since another driver has decoded them.
 void check_clouds(Problems& problems, const std::vector<LidarOptions>& lidars, std::size_t i) {
   static const LidarOptions kDefaults;
   const LidarOptions& lidar = lidars[i];
@@ -147,7 +147,7 @@ void check_sources(Problems& problems, const Config& config) {
   }
 }
 
-/// DDS hands the messages of a topic to those who expect their type, and to nobody else without a word.
+/// Checks that each topic has one type: DDS silently delivers nothing to a reader of another type.
 void check_types_of_topics(Problems& problems, const Config& config) {
   std::map<std::string_view, std::string_view> types;
   const auto check = [&](const std::string& key, std::string_view topic, std::string_view type) {
@@ -183,7 +183,7 @@ void check_dds(Problems& problems, const DdsOptions& dds) {
   require_topic_or_empty(problems, "dds.flat_ground_topic", dds.flat_ground_topic);
 }
 
-/// A name of a source is that of its file.
+/// Checks the recording, in which a source's name is also its file name.
 void check_record(Problems& problems, const Config& config) {
   const std::vector<MotionSource>& sources = config.motion_sources;
   for (std::size_t i = 0; i < sources.size() && !config.record.folder.empty(); ++i)

@@ -10,13 +10,13 @@
 #include "drivers/hesai/model.hpp"
 #include "drivers/velodyne/model.hpp"
 
-/// The one place where a key is spelled. fields() shows a section each key of a struct with its field; a reader fills
-/// the fields from YAML, a writer makes YAML of them. Both therefore know the same keys. Where the file says a thing
-/// otherwise than the struct does, fields() converts before the key and back after it.
+/// Single definition of all keys. fields() visits each key of a struct with its field; the reader fills the fields from
+/// YAML, the writer creates YAML from them, so both know the same keys. If the file and the struct represent a value
+/// differently, fields() converts before the visit and back after it.
 namespace locus {
 
-/// Words for what packets are of: Velodyne's models in their order, then Hesai's, then the maker whose metadata tells
-/// the model. The other enumerations have their words beside them.
+/// Words of the key `model`: Velodyne's models in their order, then Hesai's, then Ouster, whose metadata contains the
+/// model. Other enumerations have their words next to them.
 enum class ModelWord : std::uint8_t {};
 inline constexpr std::size_t kFirstOfHesai = velodyne::kModels.size();
 inline constexpr ModelWord kOusterWord{kFirstOfHesai + hesai::kModels};
@@ -28,13 +28,13 @@ inline auto names_of(ModelWord) {
   return names;
 }
 
-/// An address as dotted text.
+/// IPv4 address, dotted text in the file.
 struct Ipv4 {
   std::uint32_t host_order = 0;
 };
 
 template <class Section> void fields(Section& section, Pose& T) {
-  // A nanodegree is less than rounding makes of an angle on its way through a rotation: 30 stays 30.
+  // Rounding to a nanodegree hides the error of the conversion to a rotation and back: 30 stays 30.
   Eigen::Vector3d rpy_deg = (to_rpy_rad(T.rotation) / kRadPerDeg).unaryExpr([](double angle_deg) {
     return std::round(angle_deg * 1e9) / 1e9 + 0.0; // no negative zero
   });
@@ -122,7 +122,7 @@ template <class Section> void fields(Section& section, RandomFilterOptions& opti
 }
 
 template <class Section> void fields(Section& section, SweepOptions& options) {
-  constexpr double kLongestMs = 1e9; // what is beyond does not fit a Duration, and is out of range by far
+  constexpr double kLongestMs = 1e9; // clamps to the range of Duration; far outside the valid range
   std::optional<double> period_ms;
   if (options.sweep_period)
     period_ms = to_seconds(*options.sweep_period) * 1e3;
@@ -153,7 +153,7 @@ template <class Section> void fields(Section& section, MapOptions& options) {
   section.key("max_bytes", options.max_bytes);
 }
 
-/// Scan-to-scan is a registration that can be switched.
+/// Options of scan-to-scan: a registration with a mode.
 struct ScanToScan {
   ScanToScanMode mode;
   RegistrationOptions registration;

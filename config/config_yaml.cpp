@@ -20,8 +20,8 @@ namespace locus {
 namespace {
 
 struct Mistake {
-  std::string path; ///< "lidars.0.port"; empty: the file as a whole
-  int line = 0;     ///< counted from 1
+  std::string path; ///< "lidars.0.port"; empty: the whole file
+  int line = 0;     ///< starts at 1
   std::string what;
 };
 
@@ -46,21 +46,21 @@ concept HasFields = requires(T& value, AnySection& section) {
   fields(section, value);
 };
 
-/// Whether `path` is `outer` or lies below it.
+/// Tells whether `path` is `outer` or lies below it.
 bool contains(const std::string& outer, const std::string& path) { return (path + '.').starts_with(outer + '.'); }
 
-/// Whether `path` or what it lies in could not be read.
+/// Tells whether `path` or a section around it could not be read.
 bool is_blamed(const std::vector<Mistake>& unreadable, const std::string& path) {
   return std::any_of(unreadable.begin(), unreadable.end(), [&](const Mistake& m) { return contains(m.path, path); });
 }
 
-/// The key that a line of problem() is about.
+/// Returns the key of a line of problem().
 std::string path_of(const std::string& problem) { return problem.substr(0, problem.find(": ")); }
 
-/// What a tree of YAML says, read into structs, with the line of every key it holds.
+/// Reads a YAML tree into structs and stores the line of every key.
 class Reading {
  public:
-  /// Reads a section with fields() into `value`; what the tree does not name stays as it is.
+  /// Reads a section with fields() into `value`; fields without a key stay unchanged.
   template <class T> void read_section(const YAML::Node& node, const std::string& path, int line, T& value);
 
   template <class T> void read(const YAML::Node& node, const std::string& path, int line, T& value) {
@@ -83,8 +83,8 @@ class Reading {
     mistakes_.push_back({path, line, std::move(what)});
   }
 
-  /// Takes the lines of a problem() and finds where their keys stand in the file, or the nearest section around them.
-  /// What could not even be read is not blamed twice.
+  /// Maps each line of a problem() to the line of its key in the file, or of the nearest section around it. Skips keys
+  /// that could not be read, as they are already reported.
   void blame_problems(const std::optional<std::string>& problems);
 
   [[nodiscard]] std::vector<Mistake> take_mistakes() {
@@ -97,12 +97,12 @@ class Reading {
   std::vector<Mistake> mistakes_;
 };
 
-/// The section that a reader shows to fields().
+/// Section passed to fields() by the reader.
 class SectionReader {
  public:
   SectionReader(Reading& reading, const YAML::Node& node, std::string path, int line)
       : reading_(reading), path_(std::move(path)) {
-    if (!node.IsMap() && !node.IsNull()) // nothing after the colon: a section without keys
+    if (!node.IsMap() && !node.IsNull()) // null: a section without keys
       reading_.blame(path_, line, "must be a section of keys");
     else
       for (const auto& entry : node)
@@ -170,7 +170,7 @@ void Reading::blame_problems(const std::optional<std::string>& problems) {
   }
 }
 
-/// The section that a writer shows to fields().
+/// Section passed to fields() by the writer.
 class SectionWriter {
  public:
   template <class T> void key(std::string_view name, T& value) { node_.force_insert(std::string{name}, write(value)); }
@@ -214,13 +214,13 @@ std::string text_of(const Mistake& mistake) {
   return mistake.path.empty() ? mistake.what : mistake.path + ": " + mistake.what;
 }
 
-/// One --set option, and the place in the tree it came to stand at.
+/// One --set option and its path in the tree.
 struct Override {
   std::string assignment;
-  std::string path; ///< list items by index
+  std::string path; ///< with list items by index
 };
 
-/// Position of a list's item given by its index or its name.
+/// Finds a list item by its index or its name.
 std::optional<std::size_t> find_item(const YAML::Node& list, const std::string& name_or_index) {
   for (std::size_t i = 0; i < list.size(); ++i)
     if (name_or_index == std::to_string(i) || (list[i].IsMap() && list[i]["name"].as<std::string>("") == name_or_index))
@@ -228,7 +228,7 @@ std::optional<std::size_t> find_item(const YAML::Node& list, const std::string& 
   return std::nullopt;
 }
 
-/// Steps down from `node` along one part of a dotted path. Returns what is wrong, if anything.
+/// Descends from `node` along one part of a dotted path. Returns the mistake, if any.
 std::optional<std::string> descend(YAML::Node& node, std::string& path, const std::string& part) {
   if (node.IsMap()) {
     std::vector<std::string_view> keys;
@@ -251,7 +251,7 @@ std::optional<std::string> descend(YAML::Node& node, std::string& path, const st
   return path + " has no keys below it";
 }
 
-/// Puts the value of one --set option into the tree. Returns what is wrong, if anything.
+/// Stores the value of one --set option in the tree. Returns the mistake, if any.
 std::optional<std::string> assign(const YAML::Node& tree, Override& override) {
   const std::size_t equals = override.assignment.find('=');
   if (equals == std::string::npos || equals == 0)
@@ -268,7 +268,7 @@ std::optional<std::string> assign(const YAML::Node& tree, Override& override) {
   return std::nullopt;
 }
 
-/// The option that broke the rule of a key: the last one that set it, something below it or something around it.
+/// Returns the option that violates the rule of a key: the last one that set the key or a key below or around it.
 const Override& culprit(const std::vector<Override>& overrides, const std::string& path) {
   const auto related = std::find_if(overrides.rbegin(), overrides.rend(), [&](const Override& override) {
     return contains(override.path, path) || contains(path, override.path);
@@ -276,7 +276,7 @@ const Override& culprit(const std::vector<Override>& overrides, const std::strin
   return related == overrides.rend() ? overrides.back() : *related;
 }
 
-/// One line for the terminal, whatever bytes of the file are quoted in it.
+/// Formats one line for the terminal, with control characters of the file replaced.
 std::string error_line(const std::string& where, const std::string& what) {
   std::string line = where + ": " + what;
   std::replace_if(
@@ -286,7 +286,7 @@ std::string error_line(const std::string& where, const std::string& what) {
 
 std::string at_line(const std::string& file, int line) { return file + ':' + std::to_string(line); }
 
-/// What the library says of text that is not YAML, for people who never read the grammar.
+/// Translates the library's messages about invalid YAML for users who do not know the grammar.
 std::string in_plain_words(const std::string& complaint, const std::string& yaml, int line) {
   static constexpr std::string_view kIndentation = "this line is not indented like the lines it belongs to; give all "
                                                    "keys of a section, and all items of a list, the same "
@@ -309,7 +309,7 @@ std::string in_plain_words(const std::string& complaint, const std::string& yaml
   return known == kWords.end() ? "not YAML: " + complaint : std::string{known->second};
 }
 
-/// Hears where the documents of a text begin, and nothing else.
+/// Records where the documents of a text begin.
 class DocumentStart : public YAML::EventHandler {
  public:
   YAML::Mark latest;
@@ -325,8 +325,7 @@ class DocumentStart : public YAML::EventHandler {
   void OnMapEnd() override {}
 };
 
-/// What stands behind the first document. YAML::LoadAll() would read it, but of a comma in front of everything it makes
-/// empty documents for ever.
+/// Reports a second document. YAML::LoadAll() is unsuitable: a leading comma makes it create empty documents forever.
 std::optional<Mistake> second_document(const std::string& yaml) {
   std::istringstream stream{yaml};
   YAML::Parser parser{stream};

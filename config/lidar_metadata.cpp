@@ -35,7 +35,7 @@ Expected<Config, ConfigErrors> with_lidar_metadata(Config config) {
       return ConfigErrors{fmt::format("motion_sources.{}: this is the name of the inertial unit in lidar {}; give the "
                                       "source another one",
                                       name, lidar.name)};
-    if (!known->topic.empty()) { // somebody publishes its readings: of the lidar they would come a second time
+    if (!known->topic.empty()) { // published by a driver: reading the lidar's port would duplicate the samples
       lidar.imu_port = 0;
       continue;
     }

@@ -7,10 +7,10 @@
 
 namespace locus {
 
-/// Completes the configuration by what the metadata of its Ouster lidars tells: the port of one that has none, and the
-/// inertial unit that it brings along. That becomes a motion source: the last one in priority, named NAME_imu after its
-/// lidar and mounted with it. A source of kind imu that has this name already is taken for it, and keeps its place and,
-/// if it has one, its mounting; one with a topic is heard there alone. Reads the metadata; start-up only.
+/// Completes the configuration from the metadata of its Ouster lidars: a missing port and the built-in IMU. The IMU
+/// becomes the motion source NAME_imu, named after its lidar and mounted with it, with the lowest priority. An existing
+/// source of kind imu with this name is used instead and retains its priority and, if set, its mounting; if it has a
+/// topic, it is read from there only. Reads the metadata files; start-up only.
 Expected<Config, ConfigErrors> with_lidar_metadata(Config config);
 
 } // namespace locus

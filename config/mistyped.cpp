@@ -16,9 +16,9 @@ namespace locus {
 
 namespace {
 
-/// Edits (a letter more, less or other) that make b of a.
+/// Returns the Levenshtein distance of a and b.
 std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1); // row[j]: from the part of a seen so far to the first j letters of b
+  std::vector<std::size_t> row(b.size() + 1); // row[j]: distance from the processed part of a to j letters of b
   std::iota(row.begin(), row.end(), 0);
   for (const char c : a) {
     std::size_t diagonal = row[0]++;
@@ -63,7 +63,7 @@ std::vector<std::string> commands_of(const CLI::App& app) {
   return names;
 }
 
-/// Of what nobody knew, as it was typed: without the value, or without the letters that follow a single one.
+/// Returns the option in an unknown word: without its value, or only the first letter of a group of short options.
 std::string option_in(const std::string& word) {
   return word.starts_with("--") ? word.substr(0, word.find('=')) : word.substr(0, 2);
 }

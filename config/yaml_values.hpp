@@ -19,13 +19,13 @@
 
 #include "config/config_fields.hpp"
 
-/// Single values of the configuration, from YAML and to YAML. parse() leaves its target alone when the text does not
-/// fit, and says what would.
+/// Conversion of single configuration values from and to YAML. On invalid text parse() leaves its target unchanged and
+/// returns a description of valid values.
 namespace locus {
 
-using Reason = std::optional<std::string>; ///< why a value was refused; nothing: it was taken
+using Reason = std::optional<std::string>; ///< reason for rejecting a value; empty: accepted
 
-/// A field that may be without value; the file says so by a word.
+/// Optional field; a word in the file stands for no value.
 template <class T> struct OptionalWord {
   std::optional<T>& value;
   std::string_view word_for_none;
@@ -62,7 +62,7 @@ requires std::is_arithmetic_v<T> Reason parse(const YAML::Node& node, T& value) 
   return std::nullopt;
 }
 
-/// YAML 1.1 tools rewrite a plain off or on as false or true.
+/// Parses an enumerator by name. Also accepts false and true, to which YAML 1.1 tools convert a plain off and on.
 template <class E>
 requires std::is_enum_v<E> Reason parse(const YAML::Node& node, E& value) {
   const std::string word = node.IsScalar() ? node.Scalar() : "";
@@ -117,7 +117,7 @@ template <class T> Reason parse(const YAML::Node& node, OptionalWord<T>& optiona
 inline YAML::Node to_node(const std::string& value) { return YAML::Node{value}; }
 inline YAML::Node to_node(bool value) { return YAML::Node{value}; }
 
-/// The shortest text that reads back to the same bits.
+/// Formats a number as the shortest text that reads back to the same bits.
 template <class T>
 requires std::is_arithmetic_v<T> YAML::Node to_node(T value) { return YAML::Node{fmt::format("{}", value)}; }
 

@@ -22,19 +22,19 @@ using nlohmann::ordered_json;
 
 namespace {
 
-constexpr double kBetter_sigma = 3.0;  ///< than configured
-constexpr double kTold = 0.7;          ///< of the doubt is left, at most, by drives that have told of a figure
-constexpr double kHardlyLate_s = 1e-3; ///< of a lateness, what may remain once MotionTrack has taken its part out
+constexpr double kBetter_sigma = 3.0;  ///< least deviation from the configuration
+constexpr double kTold = 0.7;          ///< largest ratio of learned to configured sigma of an observed figure
+constexpr double kHardlyLate_s = 1e-3; ///< largest delay left after the compensation by MotionTrack
 constexpr double kGrossly_s = 0.03, kGrossly_rad = 3.0 * kRadPerDeg;
-constexpr double kPlain_sigma = 5.0; ///< that it is above these
-constexpr double kKnown_rad = 0.01;  ///< of a mounting that is spoken of: a worse one is what a hard drive bends
+constexpr double kPlain_sigma = 5.0; ///< least significance above these limits
+constexpr double kKnown_rad = 0.01;  ///< largest sigma of a reported mounting; hard driving biases less certain ones
 constexpr std::array<std::string_view, 3> kAxisNames{"x (roll)", "y (pitch)", "z (yaw)"};
 
 bool is_plainly_above(const Learned& figure, double limit) {
   return std::abs(figure.mean) - kPlain_sigma * figure.sigma > limit;
 }
 
-/// A figure and its configuration, in a unit and from where that begins to count.
+/// Formats a figure and its configuration in `unit`, offset by `from`.
 ordered_json figure_json(const Learned& figure, const Learned& configured, double unit, double from = 0.0) {
   return {{"value", rounded(from + figure.mean / unit)},
           {"sd", rounded(figure.sigma / unit)},
@@ -57,7 +57,7 @@ bool is_known_better(const Learned& figure, const Learned& configured) {
          figure.sigma < kTold * configured.sigma;
 }
 
-/// The keys in which two configurations of a source differ, with the values of the second.
+/// Returns the keys in which two configurations of a source differ, with the values of the second.
 ordered_json changes_json(const MotionSourceOptions& before, const MotionSourceOptions& after) {
   const auto rounded_to = [](double value, double parts) { return std::round(value * parts) / parts + 0.0; };
   ordered_json json = ordered_json::object();
@@ -81,7 +81,7 @@ ordered_json changes_json(const MotionSourceOptions& before, const MotionSourceO
 
 namespace {
 
-/// Whether its samples come when the points they are to correct have been corrected.
+/// Tells whether samples arrive after the de-skew of the points that they belong to.
 bool is_too_late(const MotionSourceOptions& source, const LearnedSource& learned) {
   const double late_s = learned.lateness_s().mean;
   return source.kind == SourceKind::imu && late_s - to_seconds(MotionTrack::taken_out(late_s)) > kHardlyLate_s;
@@ -128,7 +128,7 @@ MotionSourceOptions calibrated(const MotionSourceOptions& source, const LearnedS
 
 namespace {
 
-/// The entry of a source in the configuration, with what is known better than it is configured.
+/// Formats the configuration entry of a source, with the keys in `better`.
 std::string entry_yaml(const std::string& name, const ordered_json& learned, const ordered_json& better) {
   std::string yaml =
       fmt::format("  - name: {}\n    kind: {}\n", name, learned.contains("late_ms") ? "imu" : "odometry");
@@ -167,7 +167,7 @@ namespace {
 
 std::string text_of(double value, double sd) { return fmt::format("{:.4g} +- {:.2g}", value, sd); }
 
-/// A line of the table, of one figure of `json` or one axis of it.
+/// Formats a line of the table for the figure `json`, or for one axis of it.
 std::string line_of(std::string_view source, std::string_view figure, const ordered_json& json, bool too_late,
                     int axis = -1) {
   const auto get = [&](const char* key) {

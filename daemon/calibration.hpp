@@ -12,28 +12,30 @@
 
 namespace locus::daemon {
 
-/// What the estimator has learned of a motion source against its configuration, each figure with its standard
-/// deviation and the configured one: of an IMU `late_ms` (by how much a sample is stamped after the motion that it
-/// tells of) and `mounting_deg` (by which turn about x, y and z of the base it sits otherwise than T_base_source says);
-/// of an odometry `scale` and `yaw_scale` (what it reports of a metre ahead and of a radian of yaw). `calibrated` has
-/// the keys of the configuration, with their values, that are known better than they are configured. Unless its samples
-/// were played `in_time`, an IMU that is later than a drive can take out of its stamps (MotionTrack::taken_out()) is
-/// `too_late`: what is told of it is wrong by more than its deviation, and `calibrated` has none of it. Any thread.
+/// Returns the learned calibration of a motion source beside its configuration, each figure with its standard deviation
+/// and the configured one. IMU: `late_ms`, the delay of a stamp relative to the motion that it measures, and
+/// `mounting_deg`, the rotation error of T_base_source about the x, y and z axes of the base. Odometry: `scale` and
+/// `yaw_scale`, the reported distance per metre ahead and the reported angle per radian of yaw. `calibrated` holds the
+/// configuration keys whose learned value is better known than the configured one, with that value. Unless its samples
+/// were played `in_time`, an IMU is `too_late` if its delay exceeds what a live run can compensate
+/// (MotionTrack::taken_out()): its figures are wrong by more than their deviation, and `calibrated` is empty. Any
+/// thread.
 nlohmann::ordered_json learned_json(const MotionSourceOptions& source, const LearnedSource& learned,
                                     bool in_time = false);
 
-/// The configuration of a source with what is plainly known better, by three standard deviations, taken in. Any thread.
+/// Returns the configuration of a source, updated by each learned figure that is better known than the configured one
+/// and differs from it by three standard deviations. Any thread.
 MotionSourceOptions calibrated(const MotionSourceOptions& source, const LearnedSource& learned);
 
-/// For configuration files: `calibrated` of all sources, of `sources` as in summary.json. Any thread.
+/// Formats `calibrated` of all sources for a configuration file; `sources` as in summary.json. Any thread.
 std::string calibration_yaml(const nlohmann::ordered_json& sources);
 
-/// For people: a table of the figures of all sources. Any thread.
+/// Formats the figures of all sources as a table. Any thread.
 std::string calibration_text(const nlohmann::ordered_json& sources);
 
-/// What is plainly and grossly wrong with the stamps or the mounting of the source of this index, an IMU, to stand
-/// behind its name: what, and what to do. Which of it and lidar is wrong is not known; empty where nothing is. Any
-/// thread.
+/// Describes a significant, large error in the stamps or the mounting of the IMU with this index, and the remedy;
+/// phrased to follow the name of the source. Whether the IMU or the lidar is at fault is unknown. Empty if there is no
+/// such error. Any thread.
 std::string calibration_doubt(const Figures& figures, std::size_t source);
 
 } // namespace locus::daemon

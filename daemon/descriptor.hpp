@@ -7,7 +7,7 @@
 
 namespace locus::daemon {
 
-/// A file descriptor, closed at the end of its life.
+/// Owns a file descriptor and closes it on destruction.
 class Descriptor {
  public:
   explicit Descriptor(int number = -1) : number_(number) {}

@@ -7,10 +7,10 @@ namespace locus::daemon {
 
 namespace {
 
-/// The twist is that over so long: an odometry source of 20 Hz has two samples in it.
+/// Averaging window of the twist: two samples of a 20 Hz odometry source.
 constexpr Duration kTwistSpan = std::chrono::milliseconds{100};
 
-/// Turn rate over the last kTwistSpan, rad/s in base axes; nothing where the track is too short.
+/// Returns the turn rate over the last kTwistSpan, rad/s in base axes; empty if the track is too short.
 std::optional<Eigen::Vector3d> turn_rate(const MotionSources& sources, const SourceChoice& choice, Stamp now) {
   const std::optional<Pose> T_then_now = sources.motion({choice.rotation, {}}, now - kTwistSpan, now);
   if (!T_then_now)
@@ -18,8 +18,8 @@ std::optional<Eigen::Vector3d> turn_rate(const MotionSources& sources, const Sou
   return so3_log(T_then_now->rotation) / to_seconds(kTwistSpan);
 }
 
-/// Velocity over the kTwistSpan up to the last sample of a translation, m/s in base axes; nothing where no source tells
-/// the translation.
+/// Returns the velocity over the kTwistSpan before the last translation sample, m/s in base axes; empty without a
+/// translation source.
 std::optional<Eigen::Vector3d> velocity(const MotionSources& sources, const SourceChoice& choice, Stamp last) {
   const std::optional<Pose> T_then_now = sources.motion(choice, last - kTwistSpan, last);
   if (!choice.translation || !T_then_now)
@@ -27,9 +27,9 @@ std::optional<Eigen::Vector3d> velocity(const MotionSources& sources, const Sour
   return se3_log(*T_then_now).head<3>() / to_seconds(kTwistSpan);
 }
 
-/// The error of the pose that was carried, and that of a twist which was off all the way: its turn takes effect
-/// half-way on the mean, so that is where the twist is turned into odom axes and what its lever reaches from. Second
-/// order in the turn of a sweep: 0.1 % at 1 rad/s.
+/// Propagates the pose covariance and adds that of a constant twist error. The twist is rotated into odom axes, and its
+/// lever arm measured, at the midpoint of the path, where the error acts on average. Second order in the rotation
+/// during a sweep: 0.1 % at 1 rad/s.
 Matrix6 carried_covariance(const FastSample& from, const Pose& T_odom_now, double elapsed_s) {
   const Pose T_from_now = from.T_odom_base.inverse() * T_odom_now;
   const Pose T_odom_half = from.T_odom_base * se3_exp(0.5 * se3_log(T_from_now));

@@ -8,23 +8,24 @@
 
 namespace locus::daemon {
 
-/// Where the base is between two estimates, or after the last one.
+/// Predicted state of the base between two estimates or after the last one.
 struct FastSample {
   Stamp stamp;
   Pose T_odom_base;
-  Matrix6 pose_covariance = Matrix6::Zero();  ///< of x, y, z and turns about the odom axes
+  Matrix6 pose_covariance = Matrix6::Zero();  ///< x, y, z and rotations about the odom axes
   Vector6 twist_base = Vector6::Zero();       ///< m/s and rad/s, base frame
   Matrix6 twist_covariance = Matrix6::Zero(); ///< base frame
 };
 
-/// Carries the last estimate forward with each sample of the source that gives the rotation, the quickest of those
-/// chosen. Between the last translation that was measured and now the base moves with a constant twist: on an arc. Goes
-/// on without lidar: dead reckoning gives estimates, too. One owner, the ingest thread.
+/// Propagates the last estimate with each sample of the rotation source, the fastest of those chosen. Beyond the last
+/// measured translation the motion is an arc of constant twist. Continues without lidar, since dead reckoning gives
+/// estimates, too. One owner, the ingest thread.
 class FastOdometry {
  public:
   void take(const FastSample& estimate) { estimate_ = estimate; }
 
-  /// After a sample of `source`; nothing for other sources, and while none is healthy or nothing has been estimated.
+  /// Predicts the state after a sample of `source`. Empty for other sources, while no source is healthy, and before the
+  /// first estimate.
   [[nodiscard]] std::optional<FastSample> carry(const MotionSources& sources, SourceId source, Stamp arrival) const;
 
  private:

@@ -15,7 +15,7 @@ namespace locus::daemon {
 
 namespace {
 
-/// One packet in so many makes no lidar.
+/// Number of data packets per foreign packet above which foreign packets are ignored.
 constexpr std::uint64_t kNextToNothing = 100;
 
 } // namespace
@@ -182,7 +182,7 @@ SweepFigures SweepTally::figures() const {
   return figures;
 }
 
-/// By the nearest rank: each is one of the values.
+/// Uses the nearest-rank method: each percentile is one of the values.
 Percentiles SweepTally::percentiles(float Timing::*figure) const {
   if (timings_.empty())
     return {};
@@ -219,7 +219,7 @@ std::string_view health_of(const IngestReport::Source& source) {
   return source.healthy ? "healthy" : source.counters.received == 0 ? "never heard" : "lost";
 }
 
-/// Who sent to its port a while ago does not do so any more, and what was wrong with its clouds then is mended.
+/// Ignores foreign senders and cloud faults that were last seen more than kLately before the lidar's last data.
 std::string problem_of(const LidarOptions& options, const IngestReport::Lidar& lidar) {
   constexpr Duration kLately = std::chrono::seconds{5};
   IngestReport::Lidar now = lidar;
@@ -243,7 +243,7 @@ std::string problem_of(const LidarOptions& options, const IngestReport::Lidar& l
 
 double rounded(double value) { return std::round(value * 1e4) / 1e4; }
 
-/// Not from getrusage(): its figure survives exec, so it may be that of the program that started this one.
+/// Reads VmHWM rather than getrusage(), whose maximum survives exec and may belong to the parent program.
 double peak_rss_mb() {
   std::ifstream status{"/proc/self/status"};
   for (std::string word; status >> word;) {

@@ -21,9 +21,9 @@
 
 namespace locus::daemon {
 
-/// What the ingest has counted so far, as a copy that other threads may read. Plain memory.
+/// Snapshot of the ingest's counters for other threads. Plain memory.
 struct IngestReport {
-  /// Of a lidar that gives clouds: as CloudDecoder has them.
+  /// State of the CloudDecoder of a lidar that publishes clouds.
   struct Clouds {
     CloudCounters counters;
     CloudDoubts doubts;
@@ -34,8 +34,8 @@ struct IngestReport {
   };
   struct Lidar {
     PacketCounters packets;
-    std::optional<Clouds> clouds{};      ///< of one that gives these
-    std::string_view model, return_mode; ///< as LidarInput has them; empty before the first good packet
+    std::optional<Clouds> clouds{};      ///< empty for a lidar that sends packets
+    std::string_view model, return_mode; ///< from LidarInput; empty before the first valid packet
     double rotation_rate_rpm = 0.0;
     std::optional<std::uint32_t> source_ip;        ///< host byte order
     std::optional<std::uint32_t> refused_ip;       ///< LidarInput::refused_ip()
@@ -50,7 +50,7 @@ struct IngestReport {
     static Lidar of(const LidarInput& lidar);
     void add(const CloudDecoder& decoder);
 
-    /// Data packets or clouds.
+    /// Return counts of data packets or clouds.
     [[nodiscard]] std::uint64_t used() const { return clouds ? clouds->counters.used : packets.data; }
     [[nodiscard]] std::uint64_t received() const { return clouds ? clouds->counters.received : packets.received; }
   };
@@ -58,7 +58,7 @@ struct IngestReport {
     SourceCounters counters;
     bool healthy = false;
     Stamp last_heard;         ///< HealthMonitor::last_heard()
-    std::string_view verdict; ///< text that lives for ever; see HealthMonitor
+    std::string_view verdict; ///< text with static lifetime; see HealthMonitor
   };
 
   PacketCounters total;
@@ -66,74 +66,74 @@ struct IngestReport {
   std::array<Source, kMaxSources> sources; ///< by index
   SweepBuilder::Counters sweeps;
 
-  /// Called by the ingest thread.
+  /// Copies the counters. Ingest thread.
   void read(const Ingest& ingest);
-  /// Whether any lidar has brought anything of use.
+  /// Tells whether any lidar has sent usable data.
   [[nodiscard]] bool has_lidar_data() const {
     return std::ranges::any_of(lidars, [](const Lidar& lidar) { return lidar.used() > 0; });
   }
 };
 
-/// That somebody else, who may be a second lidar, sends to the port of a lidar whose address is not configured: who,
-/// and the configuration that tells them apart. Nothing while next to nothing is refused for it.
+/// Reports another sender, possibly a second lidar, on the port of a lidar without configured address, with a
+/// configuration that separates the two. Empty while the number of rejected packets is negligible.
 std::optional<std::string> shared_port(const LidarOptions& options, const IngestReport::Lidar& lidar);
 
-/// That packets of a model which cannot be read come to a lidar's port, and what they say of themselves. Nothing while
-/// there are next to none.
+/// Reports packets of an unsupported model on a lidar's port, with their description. Empty while their number is
+/// negligible.
 std::optional<std::string> unknown_model(const LidarOptions& options, const IngestReport::Lidar& lidar);
 
-/// What is wrong with the times in a lidar's clouds, a line each.
+/// Describes the faults in the times of a lidar's clouds, one line each.
 std::vector<std::string> cloud_doubts(const LidarOptions& options, const IngestReport::Lidar& lidar);
 
-/// That an Ouster was started anew since its metadata was fetched, and for turns now does not turn as that says, so
-/// that its packets are refused; nothing where they are not.
+/// Reports an Ouster that was restarted after its metadata was fetched and now runs in another mode, so that its
+/// packets are rejected; empty otherwise.
 std::optional<std::string> stale_metadata(const LidarOptions& options, const IngestReport::Lidar& lidar);
 
-/// What the owner of a lidar should know of sweeps that are shorter than its turn; nothing where they are not.
+/// Warns of a sweep period shorter than one revolution of the lidar; empty otherwise.
 std::optional<std::string> short_sweep(const SweepOptions& options, const std::string& lidar, double rotation_rate_rpm);
 
-/// That estimates are faster than the robot is said to be able to; nothing while they are not.
+/// Warns of estimates above the configured maximum speed; empty otherwise.
 std::optional<std::string> too_fast(const MotionLimits& limits, double largest_speed_mps);
 
-/// Of a pose, a twist or an observability, by index.
+/// Names of the axes of a pose, twist or observability, by index.
 inline constexpr std::array<std::string_view, 6> kAxes{"x", "y", "z", "roll", "pitch", "yaw"};
 
-/// Of a distribution.
+/// Percentiles of a distribution.
 struct Percentiles {
   double p50 = 0, p90 = 0, p99 = 0, max = 0;
 };
 
-/// How long the sweeps took, each of them counted for good.
+/// Cumulative histogram of the processing times of all sweeps.
 struct LatencyHistogram {
-  /// Upper bounds. They are chosen for deadlines of one revolution, 50 to 200 ms, and what a sweep takes, from 1 ms.
+  /// Upper bounds, chosen for deadlines of one revolution (50 to 200 ms) and processing times from 1 ms.
   static constexpr std::array<double, 9> kBounds_s{0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5};
 
-  std::array<std::uint64_t, kBounds_s.size() + 1> counts{}; ///< by the bound; the last is of those beyond all
+  std::array<std::uint64_t, kBounds_s.size() + 1> counts{}; ///< by bound; the last counts values above all bounds
   double sum_s = 0;
 
   void take(double took_s);
 };
 
-/// What is told of the sweeps that were processed: sums since the start, and distributions of the last ones.
+/// Statistics of the processed sweeps: sums since the start, distributions of the latest ones.
 struct SweepFigures {
   std::uint64_t sweeps = 0;
   double raw_points = 0, filtered_points = 0, scan_to_scan_iterations = 0, scan_to_submap_iterations = 0;
-  /// Those whose prior came from the source, all of it or in part.
+  /// Number of sweeps whose prior came from the source, fully or in part.
   std::array<std::uint64_t, kMaxSources> used_sweeps{};
   StageTimes stages{};
   double path_m = 0;
-  double largest_speed_mps = 0; ///< that any estimate claims
+  double largest_speed_mps = 0; ///< maximum over all estimates
   std::optional<OdometryEstimate> last;
-  Duration last_at{}; ///< CLOCK_MONOTONIC when it was taken
+  Duration last_at{}; ///< arrival of `last`, CLOCK_MONOTONIC
   LatencyHistogram process;
   Percentiles process_ms, process_cpu_ms;
-  double rate_hz = 0; ///< over the last few seconds: zero once no more come
+  double rate_hz = 0; ///< over the last five seconds; zero when estimates have stopped
 };
 
-/// Adds up SweepFigures from sweep to sweep. One owner.
+/// Accumulates SweepFigures over the sweeps. One owner.
 class SweepTally {
  public:
-  /// Distributions are those of the last `window` sweeps, of which each takes 16 bytes.
+  /// Computes distributions over the last `window` sweeps, at 16 bytes each.
   explicit SweepTally(std::size_t window) : window_(window) {}
 
   void take(const ProcessedSweep& sweep);
@@ -148,73 +148,73 @@ class SweepTally {
   [[nodiscard]] double rate_hz() const;
 
   std::size_t window_;
-  SweepFigures sums_;           ///< without distributions and rate
-  std::vector<Timing> timings_; ///< as a ring, once there are `window_`
+  SweepFigures sums_;           ///< distributions and rate are unset
+  std::vector<Timing> timings_; ///< ring buffer once it holds `window_` entries
 };
 
-/// What is told of the link to the robot's network.
+/// State and counters of the link to the robot's network.
 struct LinkFigures {
   bool connected = false;
-  std::uint64_t attempts = 0; ///< so far, the one that succeeded included
-  std::string problem;        ///< why the last one failed
+  std::uint64_t attempts = 0; ///< attempts to connect, including the successful one
+  std::string problem;        ///< reason of the last failure
   struct Source {
-    std::uint32_t writers = 0;        ///< that send its topic now
-    std::uint64_t received = 0;       ///< samples, those refused included
-    std::uint64_t refused = 0;        ///< of other writers than the first, or more than any sensor sends
-    std::uint64_t health_refused = 0; ///< of its health topic, the same
+    std::uint32_t writers = 0;        ///< current publishers of its topic
+    std::uint64_t received = 0;       ///< samples, including rejected ones
+    std::uint64_t refused = 0;        ///< samples of a second writer or above the rate limit, see Admission
+    std::uint64_t health_refused = 0; ///< the same for its health topic
   };
-  std::vector<Source> sources;           ///< by the index of the configuration
-  std::vector<Source> lidars;            ///< the same, of those that give clouds
-  std::uint64_t flat_ground_refused = 0; ///< of its topic, the same
+  std::vector<Source> sources;           ///< by index in the configuration
+  std::vector<Source> lidars;            ///< the same for lidars; set for those that publish clouds
+  std::uint64_t flat_ground_refused = 0; ///< rejected messages on the flat-ground topic
 };
 
-/// All figures of a run or of a running service. What users see of them is made here: summary.json, the status as JSON
-/// and as text, metrics; /diagnostics takes its values from the JSON.
+/// All figures of a run or of a running service. Source of every user-visible form: summary.json, the status as JSON
+/// and as text, metrics; /diagnostics uses the values of the JSON.
 struct Figures {
   const Config& config;
-  std::string capture{}; ///< as the user named it, or the folder that a service records to; empty: none
-  Duration duration{};   ///< of the recording, or since the service began
+  std::string capture{}; ///< capture as named by the user, or the recording folder of a service; empty: none
+  Duration duration{};   ///< length of the recording, or time since the start of the service
   MachineTime spent{};
   IngestReport ingest{};
   SweepCounters counters{};
   SweepFigures sweeps{};
 
-  /// What only a service has.
+  /// Figures that exist in a service only.
   struct Live {
     FlatGround flat_ground = FlatGround::off;
     std::uint64_t kernel_drops = 0, filtered = 0, motion_drops = 0; ///< see LiveInput
     std::array<std::uint64_t, kMaxLidars> cloud_drops{};            ///< see LiveInput; by lidar
     std::uint64_t unfetched = 0;                                    ///< see LivePipeline
-    std::uint64_t unpublished = 0;                                  ///< estimates that DDS did not take
+    std::uint64_t unpublished = 0;                                  ///< estimates not accepted by DDS
     LinkFigures link;
     std::optional<Recorder::Status> recording;
-    std::optional<Incidents::Status> incidents; ///< where any are kept
+    std::optional<Incidents::Status> incidents; ///< empty if incidents are not stored
   };
   std::optional<Live> live{};
 };
 
-/// Since then, by the clock of the host; nothing for never.
+/// Returns the time since `then` by the host's wall clock; empty for never (Stamp{}).
 std::optional<Duration> time_since(Stamp then);
 
-/// "healthy", "lost" or "never heard".
+/// Returns "healthy", "lost" or "never heard".
 std::string_view health_of(const IngestReport::Source& source);
 
-/// What its packets tell is wrong with a lidar, though it may be heard; empty if nothing is.
+/// Describes a current fault found in a lidar's packets or clouds; empty if there is none.
 std::string problem_of(const LidarOptions& options, const IngestReport::Lidar& lidar);
 
-/// Four digits behind the point: no figure here is known better.
+/// Rounds to four decimals, the precision of all figures here.
 double rounded(double value);
 
-/// The contents of summary.json, as far as no truth is needed; of a service the answer to locusctl status --json.
+/// Returns the contents of summary.json except those that need ground truth; also the answer to locusctl status --json.
 nlohmann::ordered_json to_json(const Figures& figures);
 
-/// The status of a service for human eyes: fits 80 x 24 with three lidars and four motion sources. Precondition: live.
+/// Formats the status of a service as text, 80 x 24 with three lidars and four motion sources. Precondition: live.
 std::string to_text(const Figures& figures);
 
-/// The same figures for Prometheus, as text of OpenMetrics 1.0. Precondition: live.
+/// Formats the figures for Prometheus, as OpenMetrics 1.0 text. Precondition: live.
 std::string to_open_metrics(const Figures& figures);
 
-/// Of this process since it began, in megabytes.
+/// Returns the peak resident memory of this process, in megabytes.
 double peak_rss_mb();
 
 } // namespace locus::daemon

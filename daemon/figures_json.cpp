@@ -26,7 +26,7 @@ ordered_json ms_since(Stamp then) {
   return since ? ordered_json(rounded(1e3 * to_seconds(*since))) : ordered_json(nullptr);
 }
 
-/// Counts by the names of `E`: of the first `always` each, of the others those that are not zero.
+/// Formats counts by the names of `E`: the first `always` in any case, the others if nonzero.
 template <class E, std::size_t kCount>
 ordered_json counts_json(const std::array<std::uint64_t, kCount>& counts, std::size_t always = kCount) {
   ordered_json json;
@@ -84,7 +84,7 @@ ordered_json clouds_json(const IngestReport::Clouds& clouds) {
           {"doubts", doubts}};
 }
 
-/// Of a lidar that gives clouds: how these come, and, of a service, when the last one did.
+/// Formats a lidar that publishes clouds: their counters and, for a service, the arrival of the last one.
 ordered_json cloud_lidar_json(const Figures& figures, std::size_t i) {
   const LidarOptions& options = figures.config.lidars[i];
   const IngestReport::Lidar& lidar = figures.ingest.lidars[i];
@@ -99,7 +99,7 @@ ordered_json cloud_lidar_json(const Figures& figures, std::size_t i) {
   return json;
 }
 
-/// As what its packets are read, null before the first good one; of a service, how it is heard, too.
+/// Formats a lidar's model and return mode, null before the first valid packet; for a service also its reception.
 ordered_json lidar_json(const Figures& figures, std::size_t i) {
   const auto text = [](std::string_view word) { return word.empty() ? ordered_json(nullptr) : ordered_json(word); };
   const LidarOptions& options = figures.config.lidars[i];
@@ -117,7 +117,7 @@ ordered_json lidar_json(const Figures& figures, std::size_t i) {
   return json;
 }
 
-/// m/s and rad/s along x, y, z and about them, base axes.
+/// Formats an innovation: m/s along and rad/s about x, y, z of the base.
 ordered_json innovation_json(const SourceReport& report) {
   const Vector6 sd = report.innovation.variance.cwiseSqrt();
   return {{"value", std::vector<double>(report.innovation.value.begin(), report.innovation.value.end())},
@@ -126,7 +126,7 @@ ordered_json innovation_json(const SourceReport& report) {
 }
 
 ordered_json source_json(const Figures& figures, std::size_t i) {
-  constexpr std::size_t kAlwaysTold = 7; ///< reasons; the others are rare, and told where they occur
+  constexpr std::size_t kAlwaysTold = 7; ///< reasons; the others are rare and listed only if they occur
   const IngestReport::Source& source = figures.ingest.sources[i];
   ordered_json json{{"received", source.counters.received},
                     {"used_sweeps", figures.sweeps.used_sweeps[i]},
@@ -171,7 +171,7 @@ ordered_json estimate_json(const SweepFigures& sweeps) {
           {"observability", std::vector<double>(last.observability.begin(), last.observability.end())}};
 }
 
-/// The means are those over all sweeps.
+/// Formats sweep statistics; means are over all sweeps.
 ordered_json sweeps_json(const SweepFigures& sweeps) {
   const auto mean = [&](double sum) {
     return rounded(sum / static_cast<double>(std::max<std::uint64_t>(1, sweeps.sweeps)));

@@ -24,7 +24,7 @@
 namespace locus::daemon {
 namespace {
 
-/// Values need no escape: what the configuration names has letters, digits, _ and - alone.
+/// Label values need no escaping: configured names consist of letters, digits, _ and -.
 using Labels = std::initializer_list<std::pair<std::string_view, std::string_view>>;
 
 std::string number(std::integral auto value) { return fmt::format("{}", value); }
@@ -37,7 +37,7 @@ std::string number(double value) {
   return fmt::format("{}", value);
 }
 
-/// The text of all metrics. The samples of a family follow its head; one without samples is left out.
+/// Builds the text of all metrics. The samples of a family follow its header; a family without samples is omitted.
 class MetricsText {
  public:
   void counter(std::string_view name, std::string_view help) { begin(name, "counter", "_total", help); }
@@ -76,7 +76,7 @@ class MetricsText {
     head_ += fmt::format("# HELP {} {}\n", name, help);
   }
 
-  /// With one more label unless it is empty.
+  /// Appends a sample; `last` is an additional label unless it is empty.
   void sample(std::string_view suffix, Labels labels, std::string_view last, std::string_view last_text,
               const std::string& value) {
     text_ += std::exchange(head_, {});
@@ -99,7 +99,7 @@ class MetricsText {
   std::string_view name_, suffix_;
 };
 
-/// The state of one thing among all that it can have.
+/// Adds a state set with the current state among all states of `E`.
 template <Named E> void add_states(MetricsText& text, Labels labels, std::string_view state) {
   for (const std::string_view name : names_of(E{}))
     text.add_state(labels, name, name == state);
@@ -181,7 +181,7 @@ void add_datagrams(MetricsText& text, const PacketCounters& total) {
     text.add({{"reason", to_string(static_cast<PacketError>(i))}}, total.rejected[i]);
 }
 
-/// Of the lidars that give clouds; without any, nothing.
+/// Adds the metrics of lidars that publish clouds; none if there is no such lidar.
 void add_clouds(MetricsText& text, const Figures& figures) {
   const std::vector<LidarOptions>& lidars = figures.config.lidars;
   if (std::ranges::none_of(lidars, [](const LidarOptions& lidar) { return lidar.gives_clouds(); }))
@@ -394,12 +394,13 @@ void add_outlets(MetricsText& text, const Figures::Live& live) {
   text.add(live.recording->unfit);
 }
 
-/// Field 22 of /proc/self/stat, on the clock of the wall; of what does not change, the first answer is the last.
+/// Returns the start of the process on the wall clock, from field 22 of /proc/self/stat. Computed once: a clock step
+/// does not change it.
 double start_time_s() {
   static const double start_s = [] {
     std::string stat;
     std::getline(std::ifstream{"/proc/self/stat"}, stat);
-    stat.erase(0, stat.rfind(')') + 2); // the name of the program may have spaces
+    stat.erase(0, stat.rfind(')') + 2); // the program name may contain spaces
     constexpr int kStateToStart = 19;
     std::istringstream fields{stat};
     std::string skipped;
@@ -420,17 +421,17 @@ std::uint64_t resident_bytes() {
   return resident * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
 }
 
-/// Nothing where /proc cannot be read.
+/// Counts the open descriptors; empty if /proc cannot be read.
 std::optional<std::size_t> open_files() {
   std::error_code error;
   std::size_t count = 0;
   for (std::filesystem::directory_iterator entry{"/proc/self/fd", error}, end; !error && entry != end;
        entry.increment(error))
     ++count;
-  return error || count == 0 ? std::nullopt : std::optional{count - 1}; // that of the folder itself
+  return error || count == 0 ? std::nullopt : std::optional{count - 1}; // excluding the folder's own
 }
 
-/// Under the names that every client library of Prometheus gives them.
+/// Adds process metrics under the standard names of the Prometheus client libraries.
 void add_process(MetricsText& text) {
   text.counter("process_cpu_seconds", "Processor time of all threads.");
   text.add(to_seconds(read_clock(CLOCK_PROCESS_CPUTIME_ID)));

@@ -48,7 +48,7 @@ std::string pose_text(const std::optional<OdometryEstimate>& last) {
   return text + '\n';
 }
 
-/// "sender 12, time 3" by the names of `E`: what was not taken, and why.
+/// Lists rejections by reason, using the names of `E`: "sender 12, time 3".
 template <class E> std::string reasons(const auto& counts) {
   std::string text;
   for (std::size_t i = 0; i < counts.size(); ++i) {
@@ -66,7 +66,7 @@ std::string silence_text(Stamp last_heard) {
   return silence_s < 1000 ? fmt::format("{:.1f} s", silence_s) : fmt::format("{:.1f} h", silence_s / 3600);
 }
 
-/// In the columns of packets.
+/// Formats a line for clouds in the columns of packets.
 std::string clouds_text(const LidarOptions& options, const IngestReport::Lidar& lidar, std::uint64_t drops) {
   const IngestReport::Clouds& clouds = *lidar.clouds;
   const CloudCounters& counters = clouds.counters;

@@ -57,7 +57,7 @@ std::uint64_t bytes_below(const path& folder) {
   return bytes;
 }
 
-/// The oldest first; with `.part`, those that are not complete.
+/// Lists the incidents, oldest first; incomplete ones if `ending` matches `.part`.
 std::vector<path> incidents_in(const path& folder, const std::string& ending = "") {
   const std::regex name{R"(\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d\.\d{3}Z_[a-z_]+)" + ending};
   std::vector<path> found;
@@ -75,7 +75,7 @@ path name_of(const path& folder, Stamp when, IncidentCause cause) {
                               ms % 1000, to_string(cause));
 }
 
-/// Each file of the pieces has a second name below `snapshot` then.
+/// Creates a hard link below `snapshot` for each file of the pieces.
 std::error_code link_all(const std::vector<path>& pieces, const path& snapshot) {
   std::error_code error;
   std::filesystem::remove_all(snapshot, error);
@@ -98,7 +98,7 @@ Stamp last_write(const path& file) {
 
 } // namespace
 
-/// The clock may have been set: of all that were kept, the one nearest to now counts.
+/// Uses the stored incident nearest to now for each cause, since the clock may have been set.
 Incidents::Incidents(path folder) : folder_(std::move(folder)) {
   std::error_code ignored;
   for (const path& part : incidents_in(folder_, R"(\.part)"))
@@ -139,7 +139,7 @@ bool Incidents::raise(Request request) {
   return true;
 }
 
-/// With the mutex locked. False while another one is being written.
+/// Accepts a request unless an incident is being written. Precondition: the mutex is locked.
 bool Incidents::take(Request request) {
   if (!status_.writing.empty())
     return false;
@@ -213,10 +213,10 @@ std::optional<std::string> Incidents::make_room(std::uint64_t bytes) const {
     const std::uint64_t free = std::filesystem::space(folder_, error).available;
     if (error)
       return not_kept(folder_, error);
-    const std::uint64_t wanted = job_->snapshot.empty() ? bytes : 2 * bytes; // as much stays free
+    const std::uint64_t wanted = job_->snapshot.empty() ? bytes : 2 * bytes; // leaves as much free
     if (older + bytes <= max_bytes && there.size() < kMost && free >= wanted)
       return std::nullopt;
-    if (there.empty() || free + older < wanted) // none is given for nothing
+    if (there.empty() || free + older < wanted) // deletes no incident in vain
       return not_kept(folder_,
                       fmt::format("{} MB are free on the disk, and {} wanted", free / 1'000'000, wanted / 1'000'000),
                       "free some, or lower record.keep_s");
@@ -227,7 +227,7 @@ std::optional<std::string> Incidents::make_room(std::uint64_t bytes) const {
   }
 }
 
-/// Of the last file first. Without waiting for the disk but where a file is complete.
+/// Copies files from the last to the first, kBytesOfARound per call. Waits for the disk only after a complete file.
 std::optional<std::string> Incidents::copy_some() {
   for (std::size_t copied = 0; copied < kBytesOfARound;) {
     if (job_->files.empty())
@@ -267,7 +267,7 @@ std::optional<std::string> Incidents::finish() {
   return std::nullopt;
 }
 
-/// With whatever is left of one that could not be kept.
+/// Ends the job, removes the remains of a failed one, and updates the status.
 void Incidents::end(const std::string& problem) {
   std::error_code ignored;
   if (job_ && !job_->snapshot.empty())

@@ -18,66 +18,67 @@
 
 namespace locus::daemon {
 
-/// Why an incident is kept: somebody asked, no sweep could be registered any more, a motion source and lidar contradict
-/// each other, or the run before did not end as it should.
+/// Reason for storing an incident: a user request, loss of tracking, a contradiction between a motion source and lidar,
+/// or an unclean end of the previous run.
 enum class IncidentCause : std::uint8_t { asked, tracking_lost, contradiction, restart };
 constexpr auto names_of(IncidentCause) {
   return std::to_array<std::string_view>({"asked", "tracking_lost", "contradiction", "restart"});
 }
 
-/// Keeps the last input before an incident: FOLDER/TIME_CAUSE, the pieces of a recording and why.json.
+/// Stores the input before an incident in FOLDER/TIME_CAUSE: pieces of a recording and why.json.
 ///
-/// The pieces are linked at once, beside the recording, so that they stay while the recording goes on; then they are
-/// renamed into the folder, or where that is on another disk copied bit by bit. What is not complete has the name
-/// `.part`. The oldest incidents are removed until the new one fits and as much stays free on the disk. One owner asks;
-/// another thread, which may be held up by the disk, works.
+/// The pieces are hard-linked at once, next to the recording, so that they survive while the recording continues; then
+/// they are renamed into the folder, or copied in steps if that is on another file system. An incomplete incident has
+/// the suffix `.part`. The oldest incidents are removed until the new one fits and its size again stays free on the
+/// disk. One owner makes requests; another thread, which may block on the disk, does the work.
 class Incidents {
  public:
-  static constexpr std::size_t kMost = 32; ///< that the folder holds
-  /// Between two of a cause, but those asked for, also over a restart: what crashes again and again fills no disk.
+  static constexpr std::size_t kMost = 32; ///< largest number of incidents in the folder
+  /// Least time between two incidents of one cause, except requested ones. Holds across restarts, so that a crash loop
+  /// does not fill the disk.
   static constexpr Duration kPause = std::chrono::minutes{5};
 
   struct Request {
     IncidentCause cause = IncidentCause::asked;
-    Duration keep{};                             ///< before now
+    Duration keep{};                             ///< length of the input to store, up to now
     Stamp when;                                  ///< CLOCK_REALTIME
     std::string report;                          ///< contents of why.json
-    std::vector<std::filesystem::path> pieces{}; ///< empty: those of the recorder
+    std::vector<std::filesystem::path> pieces{}; ///< empty: the recorder's pieces
   };
   struct Status {
-    std::filesystem::path last;    ///< complete, of this process; empty: none
-    std::filesystem::path writing; ///< empty: none
-    std::uint64_t kept = 0;        ///< by this process
-    std::uint64_t suppressed = 0;  ///< that nobody asked for and that came too soon after another
-    std::uint64_t dropped = 0;     ///< inputs that are missing in what is held for the next, see Recorder::Status
-    std::string problem;           ///< why one that nobody asked for could not be kept, and none since; else empty
-    std::string refusal;           ///< why the last one that was asked for could not be kept; empty: it could
+    std::filesystem::path last;    ///< last complete incident of this process; empty: none
+    std::filesystem::path writing; ///< incident being written; empty: none
+    std::uint64_t kept = 0;        ///< incidents stored by this process
+    std::uint64_t suppressed = 0;  ///< automatic incidents too soon after another
+    std::uint64_t dropped = 0;     ///< inputs missing in the buffer for the next incident, see Recorder::Status
+    std::string problem;           ///< failure of the last automatic incident; cleared by the next stored one
+    std::string refusal;           ///< failure of the last requested incident; empty on success
   };
 
-  /// Looks when the last one was kept; what another process has not completed is removed.
+  /// Reads the times of the last incidents and removes incomplete ones of earlier processes.
   explicit Incidents(std::filesystem::path folder);
   Incidents(const Incidents&) = delete;
   Incidents& operator=(const Incidents&) = delete;
 
-  /// Owner: of all incidents together, from the next one on.
+  /// Owner: sets the limit for all incidents together, from the next one on.
   void set_max_bytes(std::uint64_t max_bytes);
-  /// Owner: the folder where it will be; one line for the user while another one is written.
+  /// Owner: requests an incident. Returns its future folder, or one line for the user while another is being written.
   Expected<std::filesystem::path, std::string> ask(Request request);
-  /// Owner: the same for what nobody asked for, unless it is too soon. Whether it is kept.
+  /// Owner: requests an automatic incident, unless it is too soon. Tells whether it was accepted.
   bool raise(Request request);
-  /// Any thread.
+  /// Returns the status. Any thread.
   [[nodiscard]] Status status() const;
 
-  /// Thread of the disk, again and again: takes what was asked for, and copies for a moment. The recorder's thread.
+  /// Disk thread (the recorder's), periodically: starts a pending request or copies a limited amount of data.
   void work(Recorder* recorder);
 
  private:
-  /// What is on its way to the disk.
+  /// Incident being written.
   struct Job {
     Request request;
     std::filesystem::path snapshot, part, target;
-    std::vector<std::filesystem::path> files; ///< below snapshot, still to be copied
-    Descriptor in{}, out{};                   ///< of files.back()
+    std::vector<std::filesystem::path> files; ///< files still to be copied, relative to snapshot
+    Descriptor in{}, out{};                   ///< source and copy of files.back()
   };
 
   bool take(Request request);
@@ -88,20 +89,20 @@ class Incidents {
   void end(const std::string& problem);
 
   std::filesystem::path folder_;
-  std::optional<Job> job_; ///< of the thread of the disk
+  std::optional<Job> job_; ///< owned by the disk thread
 
-  mutable std::mutex mutex_; ///< of all below
+  mutable std::mutex mutex_; ///< guards all members below
   std::uint64_t max_bytes_ = 0;
   std::optional<Request> asked_;
-  bool was_asked_ = false; ///< what is being written; else it was raised
-  std::array<std::optional<Stamp>, names_of(IncidentCause{}).size()> last_raised_; ///< by the cause
+  bool was_asked_ = false; ///< the incident being written was requested; otherwise automatic
+  std::array<std::optional<Stamp>, names_of(IncidentCause{}).size()> last_raised_; ///< by cause
   Status status_;
 };
 
-/// Where the pieces that lie in a folder of runs are linked on their way: no user has such a name.
+/// Returns the temporary folder for links to the pieces of a folder of runs; its name cannot clash with a user's file.
 std::filesystem::path snapshot_in(const std::filesystem::path& folder_of_runs);
 
-/// In order, the pieces of a run which another process has left behind, that hold the last so much of it.
+/// Returns, in order, the pieces with the last `keep` of a run that another process left behind.
 std::vector<std::filesystem::path> last_pieces(const std::filesystem::path& run, Duration keep);
 
 } // namespace locus::daemon

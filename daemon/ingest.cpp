@@ -11,7 +11,7 @@ namespace locus::daemon {
 
 namespace {
 
-constexpr Duration kLongestTurn = std::chrono::milliseconds{200}; ///< at 300 rpm, the slowest that the models have
+constexpr Duration kLongestTurn = std::chrono::milliseconds{200}; ///< at 300 rpm, the lowest rate of all models
 
 std::vector<Pose> mounts(const std::vector<LidarOptions>& lidars) {
   std::vector<Pose> T_base_lidar;
@@ -41,7 +41,8 @@ std::vector<std::optional<SourceId>> imus(const Config& config) {
   return sources;
 }
 
-/// Of an OT128 in high resolution three quarters of the channels fire in a column.
+/// Returns the largest number of firings in a period. An OT128 in high resolution fires three quarters of its channels
+/// per column.
 std::size_t hesai_firings(hesai::Model model, Duration period) {
   const hesai::ModelSpec& spec = hesai::spec(model);
   std::size_t firings = 0;
@@ -53,14 +54,14 @@ std::size_t hesai_firings(hesai::Model model, Duration period) {
   return firings;
 }
 
-/// In dual return mode, with an echo for every firing. A lidar that is yet to be recognised may be the largest; memory
-/// that it then does not need is asked for, but never touched.
+/// Returns the largest number of returns in a sweep: dual return mode, an echo for every firing. Assumes the largest
+/// model while a lidar is not yet recognised; surplus memory is reserved, but never touched.
 std::size_t max_returns(const Config& config) {
   const Duration period = std::max(kLongestTurn, config.sweep.sweep_period.value_or(kLongestTurn));
   std::size_t returns = 0;
   for (const LidarOptions& lidar : config.lidars) {
     if (lidar.is_ouster()) {
-      constexpr std::size_t kColumnsPerSecond = 20480; // of 2048x10, 1024x20
+      constexpr std::size_t kColumnsPerSecond = 20480; // modes 2048x10 and 1024x20
       returns += 2 * LidarPacket::kMaxLasers * static_cast<std::size_t>(kColumnsPerSecond * to_seconds(period) + 1);
       continue;
     }

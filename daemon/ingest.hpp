@@ -16,18 +16,18 @@
 
 namespace locus::daemon {
 
-/// The way from the sensors to a sweep: bytes to returns, motion samples to tracks, both to sweeps.
+/// Builds sweeps from the inputs: decodes packets to returns, adds motion samples to tracks, combines both.
 ///
-/// The daemon's ingest thread and the replay in one thread make the same calls here. Before an input is taken its
-/// arrival tells the time, so a window that nobody closes ends before it whether or not Silence was heard in between:
-/// sweeps depend on the inputs alone. Allocates nothing once a few sweeps have been built, never throws after
-/// construction. One owner.
+/// The daemon's ingest thread and single-threaded replay make the same calls. The arrival of an input advances the time
+/// before the input is processed, so an open window closes at the same point with or without Silence in between: sweeps
+/// depend on the inputs only. Allocates nothing after the first few sweeps and never throws after construction. One
+/// owner.
 class Ingest {
  public:
-  /// Takes a finished sweep, see SweepBuilder::Sink.
+  /// Receives a finished sweep, see SweepBuilder::Sink.
   using Sink = std::function<void(Sweep& sweep, const SweepCut& cut)>;
 
-  /// `lidars` opened from config.lidars; `health_sink` is told of each change of health of a motion source.
+  /// Takes `lidars` opened from config.lidars. `health_sink` receives each change of health of a motion source.
   Ingest(const Config& config, LidarRouter lidars, Sink sink, MotionSources::HealthSink health_sink = {});
   Ingest(const Ingest&) = delete;
   Ingest& operator=(const Ingest&) = delete;
@@ -43,22 +43,22 @@ class Ingest {
   void take(const Silence& silence) { sweeps_.advance(silence.now); }
   void take(const EndOfInput&) { sweeps_.finish(); }
 
-  /// What the sweep registered last says of the motion sources; counts from the next window on.
+  /// Accepts the feedback of the last registration on the motion sources; effective from the next window on.
   void take(const RegistrationFeedback& feedback) { sweeps_.sources().hear(feedback); }
 
-  /// The counters behind these belong to the thread that calls take().
+  /// Returns the lidars; the counters of this and the following belong to the thread that calls take().
   [[nodiscard]] const LidarRouter& lidars() const { return lidars_; }
-  /// Of the lidar of this index; nullptr for one that sends packets.
+  /// Returns the decoder of the lidar with this index; nullptr for one that sends packets.
   [[nodiscard]] const CloudDecoder* clouds_of(std::size_t lidar) const { return clouds_[lidar].get(); }
   [[nodiscard]] const MotionSources& sources() const { return sweeps_.sources(); }
   [[nodiscard]] const SweepBuilder& sweeps() const { return sweeps_; }
   [[nodiscard]] const StageStopwatch& stages() const { return stages_; }
 
-  /// The most points that a sweep can have.
+  /// Returns the largest possible number of points in a sweep.
   static std::size_t max_points(const Config& config);
 
  private:
-  /// Passes stages on to the stopwatch and notes when a sweep is cut, which opens Stage::filter.
+  /// Forwards stages to the stopwatch and records the cut of a sweep, which opens Stage::filter.
   class CutWatch : public StageClock {
    public:
     explicit CutWatch(StageStopwatch& stages) : stages_(stages) {}
@@ -77,7 +77,7 @@ class Ingest {
   StageStopwatch stages_;
   CutWatch cut_watch_{stages_};
   LidarRouter lidars_;
-  std::vector<std::optional<SourceId>> imu_of_lidar_; ///< by lidar; nothing where it brings none along
+  std::vector<std::optional<SourceId>> imu_of_lidar_; ///< by lidar; empty without a built-in IMU
   std::vector<std::unique_ptr<CloudDecoder>> clouds_; ///< by lidar; nullptr for one that sends packets
   SweepBuilder sweeps_;
 };

@@ -11,17 +11,17 @@
 
 namespace locus::daemon {
 
-/// Ingest and odometry in the thread of the caller: take() returns once the sweeps that the input completed are
-/// processed. What locus-replay and liblocus share; the service has the same objects in threads of their own
-/// (LivePipeline). The same inputs give the same bits. One owner.
+/// Ingest and odometry in the caller's thread: take() returns once the sweeps completed by the input are processed.
+/// Shared by locus-replay and liblocus; the service runs the same objects in separate threads (LivePipeline). The same
+/// inputs give the same bits. One owner.
 class InlinePipeline {
  public:
   /// Changes a sweep between its cut and the odometry; for experiments.
   using Stage = std::function<void(Sweep& sweep)>;
-  /// Takes each sweep once all is done with it, and may ask the pipeline meanwhile.
+  /// Receives each sweep after processing; may query the pipeline.
   using Sink = std::function<void(const Sweep& sweep, const ProcessedSweep& done)>;
 
-  /// `lidars` opened from config.lidars.
+  /// Takes `lidars` opened from config.lidars.
   InlinePipeline(const Config& config, LidarRouter lidars, Sink sink, MotionSources::HealthSink health_sink = {},
                  Stage stage = {})
       : stage_(std::move(stage)), sink_(std::move(sink)), processor_(config),

@@ -15,10 +15,10 @@ namespace locus::daemon {
 
 namespace {
 
-/// An input that is later than this is none that was held up: the clock was set back before anybody looked.
+/// Largest delay of an out-of-order input; more is a backward clock step that was not yet detected.
 constexpr Duration kMostLate = std::chrono::milliseconds{50};
 
-/// A verdict has no time of its own: it counts at once.
+/// Returns the arrival of a sample; a health verdict has no stamp and applies at once.
 Stamp arrival_of(const LiveInput::Motion& motion) {
   if (const auto* imu = std::get_if<ImuInput>(&motion))
     return imu->sample.arrival;
@@ -27,7 +27,7 @@ Stamp arrival_of(const LiveInput::Motion& motion) {
   return Stamp::min();
 }
 
-/// Nothing happens to a verdict.
+/// Applies `change` to a sample; ignores a health verdict.
 void with_sample_of(LiveInput::Motion& motion, const auto& change) {
   if (auto* imu = std::get_if<ImuInput>(&motion))
     change(imu->source, imu->sample);
@@ -61,7 +61,7 @@ void LiveInput::push_cloud(std::uint8_t lidar) noexcept {
   eventfd_write(motion_is_there_, 1);
 }
 
-/// Whether any waits.
+/// Collects new clouds; true if any is waiting.
 bool LiveInput::look_for_clouds() {
   bool any = false;
   for (const auto& clouds : clouds_) {
@@ -101,7 +101,7 @@ std::optional<LiveInput::Motion> LiveInput::take_motion() {
   return motion;
 }
 
-/// What this thread gives out now: after what it gave out before, unless the clock was set back.
+/// Returns an arrival after that of the input returned before, unless the clock was set back.
 Stamp LiveInput::in_order(Stamp arrival) {
   const bool late = arrival <= latest_ && latest_ - arrival <= kMostLate;
   return latest_ = late ? latest_ + Duration{1} : arrival;
@@ -112,8 +112,8 @@ void LiveInput::expect(const LidarRouter& lidars) {
     guards_[i].expect(lidars.senders_to(sockets_[i].port()), sockets_[i]);
 }
 
-/// Whether a socket that nothing is left of may hold more, of before this; Stamp::max() if there is nothing to be
-/// later.
+/// Tells whether a socket without waiting datagrams may hold one earlier than `arrival`; Stamp::max() stands for no
+/// input.
 bool LiveInput::may_hold_earlier(Stamp arrival) const {
   for (std::size_t i = 0; arrival < Stamp::max() && i < sockets_.size(); ++i)
     if (waiting_[i].empty() && received_until_[i] < arrival)
@@ -121,8 +121,8 @@ bool LiveInput::may_hold_earlier(Stamp arrival) const {
   return false;
 }
 
-/// Waits until something is there, at most for `timeout`; then asks each socket that nothing is left of. When it began:
-/// what comes after it is not older.
+/// Waits for input, at most for `timeout`, then reads each socket without waiting datagrams. Returns the time at the
+/// start of the call: later input has a later arrival.
 Stamp LiveInput::receive(Duration timeout) {
   const Stamp wall{read_clock(CLOCK_REALTIME)};
   time_.look();
@@ -136,14 +136,14 @@ Stamp LiveInput::receive(Duration timeout) {
       waiting_[i] = sockets_[i].receive();
       guards_[i].look_at(waiting_[i], sockets_[i]);
     } else if (is_silent) {
-      sockets_[i].count_drops(); // what was dropped wakes nobody
+      sockets_[i].count_drops(); // a drop causes no wakeup
       guards_[i].hear_nothing(Stamp{read_clock(CLOCK_REALTIME)}, sockets_[i]);
     }
     drops += sockets_[i].kernel_drops();
     filtered += sockets_[i].filtered();
   }
   time_.look();
-  Stamp seen_until = asked; // the first of a socket was there already when all were looked at
+  Stamp seen_until = asked; // the first datagram of a socket was there when all were polled
   for (const auto& datagrams : waiting_)
     if (!datagrams.empty())
       seen_until = std::max(seen_until, time_.steady(datagrams.front().receive_stamp));
@@ -158,7 +158,7 @@ Stamp LiveInput::receive(Duration timeout) {
   return asked;
 }
 
-/// Of what is at hand.
+/// Finds the earliest input among those already received.
 LiveInput::Earliest LiveInput::earliest() {
   if (!next_motion_)
     next_motion_ = take_motion();

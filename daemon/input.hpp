@@ -30,7 +30,7 @@ class LidarRouter;
 
 namespace locus::daemon {
 
-/// A sample of a motion source, whose kind it must fit.
+/// Sample of a motion source. Precondition: it matches the kind of the source.
 struct ImuInput {
   SourceId source;
   ImuSample sample;
@@ -40,8 +40,8 @@ struct OdometryInput {
   OdometrySample sample;
 };
 
-/// A cloud of the lidar of this index. The message lives as long as a datagram's payload; nullptr for one that cannot
-/// be read, and then why.
+/// Cloud of the lidar with this index. The message lives as long as a datagram's payload; nullptr for an unreadable
+/// one, with the reason in `error`.
 struct CloudInput {
   std::uint8_t lidar;
   const CloudView* message;
@@ -49,33 +49,33 @@ struct CloudInput {
   CloudError error{};
 };
 
-/// A serialised sensor_msgs/PointCloud2, encapsulation included, on its way to the ingest.
+/// Serialised sensor_msgs/PointCloud2 with encapsulation, on its way to the ingest.
 struct CloudBytes {
-  static constexpr std::size_t kMost = 64'000'000; ///< longer ones are refused
+  static constexpr std::size_t kMost = 64'000'000; ///< longer messages are rejected
 
   Stamp arrival;
-  bool too_large = false; ///< and there are no bytes
+  bool too_large = false; ///< `bytes` is then empty
   std::vector<std::byte> bytes;
 };
 
-/// Somebody outside says whether this motion source is healthy (its health_topic).
+/// Health of a motion source as reported by an external monitor (health_topic).
 struct OutsideVerdict {
   SourceId source;
   bool healthy;
 };
 
-/// Nothing has come in until `now`, in stamps of arrival.
+/// Absence of input until `now`, in arrival time.
 struct Silence {
   Stamp now;
 };
 
-/// Nothing will ever come again; what the end of a recording says.
+/// End of a recording: no further input follows.
 struct EndOfInput {};
 
-/// All that can reach the ingest.
+/// Any input of the ingest.
 using Input = std::variant<Silence, Datagram, CloudInput, ImuInput, OdometryInput, OutsideVerdict, EndOfInput>;
 
-/// When it arrived; `otherwise` for what does not tell.
+/// Returns the arrival of an input; `otherwise` for inputs without one.
 inline Stamp arrival_of(const Input& input, Stamp otherwise) {
   if (const auto* datagram = std::get_if<Datagram>(&input))
     return datagram->receive_stamp;
@@ -90,36 +90,34 @@ inline Stamp arrival_of(const Input& input, Stamp otherwise) {
   return otherwise;
 }
 
-/// Where input comes from: sockets and DDS readers in the daemon, a recording in a replay. One owner.
+/// Source of input: sockets and DDS readers in the daemon, a recording in a replay. One owner.
 class InputSource {
  public:
   virtual ~InputSource() = default;
 
-  /// The next input in the order of arrival, valid until the next call; Silence if none came within `timeout`, with a
-  /// time not later than the arrival of the next. Allocates nothing, throws nothing. After EndOfInput it is not called.
+  /// Returns the next input in order of arrival, valid until the next call; Silence if none came within `timeout`, with
+  /// a time not later than the arrival of the next. Allocates nothing, throws nothing. Not called after EndOfInput.
   virtual Input next(Duration timeout) = 0;
 
-  /// To be told now and then of the lidars as they are known by now; for who can tell others from them.
+  /// Updates the known lidars, so that the source can filter other senders. Called periodically.
   virtual void expect(const LidarRouter& /*lidars*/) {}
 };
 
-/// What comes in at this moment: datagrams from all sockets, and what another thread hands over of the motion sources
-/// and of the lidars that give clouds.
+/// Live input: datagrams from all sockets, and motion samples and clouds handed over by the DDS thread.
 ///
-/// Nothing is given out before every socket was looked at that may hold what came earlier, however long nobody looked:
-/// sockets hand out so many datagrams at a time. An input that reaches this thread when a later one has been given out
-/// arrives after it, by a nanosecond: a sample that another thread was slow to hand over, a datagram that the kernel
-/// was. So inputs come in the order of their arrivals, and a recording of them is played in the same order. All stamps
-/// are given out in SteadyTime.
+/// Before an input is returned, every socket that may hold an earlier one is polled, however long the thread was
+/// stalled, since a socket returns a limited number of datagrams per call. An input that reaches this thread late,
+/// after a newer one was returned (delayed by the other thread or by the kernel), gets an arrival one nanosecond after
+/// it. Arrivals are therefore monotonic, and a recording replays in the same order. All stamps are in SteadyTime.
 ///
-/// One thread is the consumer, the ingest; one is the producer of motion and clouds, that of the DDS readers, for which
-/// one ring for all sources keeps their order.
+/// Consumer: the ingest thread. Producer of motion samples and clouds: the thread of the DDS readers; a single ring for
+/// all sources preserves their order.
 class LiveInput : public InputSource {
  public:
   using Motion = std::variant<ImuInput, OdometryInput, OutsideVerdict>;
   static constexpr std::size_t kMaxUnread = 1024;
 
-  /// `gives_clouds`: of each lidar by its index.
+  /// Takes the lidar sockets; `gives_clouds` is true for each lidar, by index, that publishes clouds.
   explicit LiveInput(std::vector<UdpSocket> sockets, const std::vector<bool>& gives_clouds = {});
   ~LiveInput() override;
   LiveInput(const LiveInput&) = delete;
@@ -128,36 +126,36 @@ class LiveInput : public InputSource {
   Input next(Duration timeout) override;
   void expect(const LidarRouter& lidars) override;
 
-  /// Producer: lost and counted when the consumer is far behind.
+  /// Producer: hands over a sample; drops and counts it if the ring is full.
   void push(const Motion& motion) noexcept;
 
-  /// Producer: where the next cloud of a lidar is to be written, over an older one, for its memory; then handed over.
-  /// One that is not taken before the next is there is lost and counted. Precondition: the lidar gives clouds.
+  /// Producer: returns the buffer for a lidar's next cloud, with the memory of an older one; push_cloud() hands it
+  /// over. A cloud not consumed before the next one is dropped and counted. Precondition: the lidar publishes clouds.
   [[nodiscard]] CloudBytes& next_cloud(std::uint8_t lidar) noexcept { return clouds_[lidar]->slot.back(); }
   void push_cloud(std::uint8_t lidar) noexcept;
 
-  /// Any thread. Of all sockets; see UdpSocket.
+  /// Any thread: counters over all sockets; see UdpSocket.
   [[nodiscard]] std::uint64_t kernel_drops() const { return kernel_drops_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::uint64_t filtered() const { return filtered_.load(std::memory_order_relaxed); }
-  /// 0 for a lidar that gives no clouds.
+  /// Any thread: dropped clouds; 0 for a lidar that sends packets.
   [[nodiscard]] std::uint64_t cloud_drops(std::size_t lidar) const {
     return clouds_[lidar] ? clouds_[lidar]->drops.load(std::memory_order_relaxed) : 0;
   }
   [[nodiscard]] std::uint64_t motion_drops() const { return motion_drops_.load(std::memory_order_relaxed); }
-  [[nodiscard]] std::span<const UdpSocket> sockets() const { return sockets_; } ///< not to be received from
-  /// Any thread: what is given out, as the clock on the wall has it.
+  [[nodiscard]] std::span<const UdpSocket> sockets() const { return sockets_; } ///< callers must not receive
+  /// Any thread: converts the returned stamps to the wall clock.
   [[nodiscard]] const SteadyTime& time() const { return time_; }
 
  private:
-  /// Of one lidar that gives clouds.
+  /// State of one lidar that publishes clouds.
   struct Clouds {
     LatestSlot<CloudBytes> slot;
     std::atomic<std::uint64_t> drops{0};
-    const CloudBytes* waiting = nullptr; ///< taken from the slot, not given out yet
+    const CloudBytes* waiting = nullptr; ///< taken from the slot, not yet returned
     SteadyTime::Sender sender;
   };
 
-  /// Where the next input is; motion, if it is neither of these, or nothing.
+  /// Location of the next input: a socket, a lidar's cloud, or if neither the motion sample, if any.
   struct Earliest {
     Stamp arrival = Stamp::max();
     std::optional<std::size_t> socket{}, lidar{};
@@ -174,41 +172,41 @@ class LiveInput : public InputSource {
 
   std::vector<UdpSocket> sockets_;
   std::vector<FloodGuard> guards_;                 ///< by socket
-  std::vector<std::span<const Datagram>> waiting_; ///< by socket: received and not given out yet
-  std::vector<Stamp> received_until_;              ///< by socket: what is still in it arrived later
+  std::vector<std::span<const Datagram>> waiting_; ///< by socket: received, not yet returned
+  std::vector<Stamp> received_until_;              ///< by socket: datagrams still in it arrived later
   std::vector<pollfd> poll_;                       ///< the sockets, then motion_is_there_
-  int motion_is_there_;                            ///< eventfd, for clouds too: poll() waits for both
-  std::vector<std::unique_ptr<Clouds>> clouds_;    ///< by lidar; nullptr for one that sends packets
-  CloudView cloud_;                                ///< given out last
+  int motion_is_there_;                         ///< eventfd for motion and clouds, so that poll() waits for all inputs
+  std::vector<std::unique_ptr<Clouds>> clouds_; ///< by lidar; nullptr for one that sends packets
+  CloudView cloud_;                             ///< cloud returned last
   SpscRing<Motion, kMaxUnread> motion_;
   std::optional<Motion> next_motion_;
   SteadyTime time_;
   std::array<SteadyTime::Sender, kMaxSources> senders_;
-  Stamp latest_; ///< arrival given out
+  Stamp latest_; ///< arrival of the input returned last
   std::atomic<std::uint64_t> kernel_drops_{0}, filtered_{0}, motion_drops_{0};
 };
 
-/// Gives the inputs of a recording out when they are due: as they once arrived, `speed` times as fast. One owner.
+/// Replays the inputs of a recording at their recorded pace, `speed` times as fast. One owner.
 class PacedInput : public InputSource {
  public:
-  /// A step in the stamps of arrival that is longer than this is no pause but another clock, and is not waited for.
+  /// Longest pause that is replayed; a longer step of the arrivals is treated as a clock change.
   static constexpr Duration kMaxPause = std::chrono::seconds{10};
 
-  /// CLOCK_MONOTONIC and the sleep of this thread, or others in tests.
+  /// Time source (CLOCK_MONOTONIC) and sleep of this thread, replaceable in tests.
   struct Clock {
     Duration (*now)();
     void (*sleep_for)(Duration);
   };
   static const Clock kOfTheHost;
 
-  /// `recording` must outlive this; where it is silent, that is for a time it knows. Precondition: speed > 0.
+  /// Takes a recording that outlives this and whose Silence inputs carry their time. Precondition: speed > 0.
   PacedInput(InputSource& recording, double speed, Clock clock = kOfTheHost)
       : recording_(recording), speed_(speed), clock_(clock) {}
 
   Input next(Duration timeout) override;
 
  private:
-  struct Held { ///< read from the recording, not given out yet
+  struct Held { ///< input read from the recording, not yet returned
     Input input;
     Stamp arrival;
   };
@@ -221,8 +219,8 @@ class PacedInput : public InputSource {
   std::optional<Held> held_;
   bool started_ = false;
   Stamp last_arrival_;
-  Stamp anchor_arrival_;    ///< this arrival ...
-  Duration anchor_clock_{}; ///< ... is due when the clock shows this
+  Stamp anchor_arrival_;    ///< reference arrival
+  Duration anchor_clock_{}; ///< clock reading at which anchor_arrival_ is due
 };
 
 } // namespace locus::daemon

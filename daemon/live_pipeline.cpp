@@ -12,10 +12,10 @@ namespace locus::daemon {
 
 namespace {
 
-/// How late, at most, a window is closed that no packet closes.
+/// Longest delay before a window without a closing packet is closed.
 constexpr Duration kMaxSilence = std::chrono::milliseconds{2};
 
-/// How long a thread sleeps, at most, before it looks whether it is still wanted.
+/// Longest sleep of a thread between two checks of its stop flag.
 constexpr Duration kMaxSleep = std::chrono::milliseconds{100};
 
 } // namespace
@@ -67,7 +67,7 @@ void LivePipeline::carry_forward(const Input& input) {
     sample = fast_odometry_.carry(ingest_.sources(), odometry->source, odometry->sample.arrival);
   if (!sample)
     return;
-  static_cast<void>(fast_samples_.push(*sample)); // who does not fetch them has no use for them
+  static_cast<void>(fast_samples_.push(*sample)); // dropped if not fetched
   estimate_is_there_.notify();
 }
 
@@ -81,11 +81,11 @@ void LivePipeline::report() {
   static_cast<void>(reports_.publish());
 }
 
-/// Leaves memory behind in exchange for that of the sweep.
+/// Hands over a sweep and returns spare memory in exchange for its points.
 void LivePipeline::hand_over(Sweep& sweep, const SweepCut& cut) {
   CutSweep& back = newest_sweep_.back();
   std::vector<SweepPoint> spare = std::exchange(back.sweep.points, {});
-  spare.reserve(max_points_); // does something for the first few sweeps alone
+  spare.reserve(max_points_); // allocates for the first few sweeps only
   back = {std::move(sweep), cut};
   sweep.points = std::move(spare); // NOLINT(bugprone-use-after-move): the one member that was moved away
   seen_.fetch_add(1, std::memory_order_relaxed);
@@ -120,14 +120,14 @@ void LivePipeline::process(const CutSweep& taken) {
   const ProcessedSweep done = processor_.process(taken.sweep, taken.cut, [this, deadline] {
     return stopping_.load(std::memory_order_relaxed) || read_clock(CLOCK_MONOTONIC) > deadline;
   });
-  // Never full: one goes in for each sweep handed over, and the ingest empties the ring when it hands over the next.
+  // Never full: one entry per sweep handed over, and the ingest empties the ring when it hands over the next.
   static_cast<void>(feedback_.push(processor_.odometry().feedback()));
   const OdometryEstimate& estimate = done.estimate;
   static_cast<void>(anchors_.push({estimate.stamp, estimate.T_odom_base, estimate.pose_covariance, estimate.twist_base,
                                    estimate.twist_covariance})); // never full: emptied with every input
   if (!estimates_.push(done))
     unfetched_.fetch_add(1, std::memory_order_relaxed);
-  (estimate.failed ? failed_ : processed_).fetch_add(1, std::memory_order_release); // all of it is there to be taken
+  (estimate.failed ? failed_ : processed_).fetch_add(1, std::memory_order_release); // after everything was handed over
   estimate_is_there_.notify();
   processor_.prepare_next();
   if (options_.after_estimate)

@@ -20,59 +20,58 @@
 
 namespace locus::daemon {
 
-/// How the live threads are set up, beside their configuration.
+/// Options of the live threads, in addition to the configuration.
 struct LiveOptions {
-  double speed = 1.0; ///< by how much the stamps of the input run faster than the clock on the wall; 1 if it is live
-  std::optional<StartPoint> start{}; ///< nothing: level at the origin
+  double speed = 1.0;                ///< rate of the input stamps relative to real time; 1 for live input
+  std::optional<StartPoint> start{}; ///< empty: level at the origin
   Recalled recalled{};
-  std::function<void()> on_thread_start = [] {}; ///< in each of the threads, e.g. to set its priority
-  /// In the odometry thread, after the estimate has left: for clouds, maps and what is to be saved.
+  std::function<void()> on_thread_start = [] {}; ///< called in each thread, e.g. to set its priority
+  /// Called in the odometry thread after the estimate was handed over, for clouds, maps and the saved state.
   std::function<void(const Sweep&, const Odometry&, const OdometryEstimate&)> after_estimate{};
 };
 
 /// The live threads: ingest turns inputs into sweeps, odometry turns the newest sweep into an estimate.
 ///
-/// Between the two is a LatestSlot: a sweep that was not taken when the next one is ready is dropped and counted, so
-/// under overload the estimates get fewer, never older. The registration of a sweep is ended one period after its cut.
-/// Estimates leave through a ring; who does not fetch them loses them and delays nobody. On the way from input to
-/// estimate no lock is taken and, once the first sweeps have bought the memory, the ingest allocates nothing. Every
-/// wait has a timeout.
+/// A LatestSlot connects the two: a sweep not consumed when the next is ready is dropped and counted, so overload makes
+/// estimates rarer, never older. Registration of a sweep stops one period after its cut. Estimates leave through a
+/// ring; a slow consumer loses estimates and delays no thread. The path from input to estimate takes no lock, and the
+/// ingest allocates nothing after the first few sweeps. Every wait has a timeout.
 ///
-/// One owner, who may be the consumer too.
-class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it keeps the threads' data apart
+/// One owner, which may also be the consumer.
+class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it avoids false sharing
  public:
   static constexpr std::size_t kMaxUnfetched = 64;
 
-  /// Starts both threads. `lidars` opened from config.lidars; `input` must outlive this, and is used by the ingest
-  /// thread alone.
+  /// Starts both threads. `lidars` are opened from config.lidars; `input` must outlive this and is used by the ingest
+  /// thread only.
   LivePipeline(const Config& config, LidarRouter lidars, InputSource& input, LiveOptions options = {});
   ~LivePipeline() { stop(); }
   LivePipeline(const LivePipeline&) = delete;
   LivePipeline& operator=(const LivePipeline&) = delete;
 
-  /// Consumer: the next estimate; nothing if there is none within `timeout`, or a fast sample sooner.
+  /// Consumer: returns the next estimate; empty if there is none within `timeout` or when a fast sample arrives sooner.
   std::optional<ProcessedSweep> next(Duration timeout);
 
-  /// Consumer: the next estimate carried forward; call it as long as there is one.
+  /// Consumer: returns the next fast sample; call until empty.
   std::optional<FastSample> next_fast() { return fast_samples_.pop(); }
 
-  /// Consumer: what the ingest has counted, ten times a second; nullptr when nothing new is there.
+  /// Consumer: returns the ingest's counters, ten times a second; nullptr if there is no new report.
   const IngestReport* next_report() { return reports_.take(); }
 
-  /// Consumer: the next change of health of a motion source.
+  /// Consumer: returns the next change of health of a motion source.
   std::optional<HealthEvent> next_health_event() { return health_events_.pop(); }
 
-  /// Consumer: whether all has been fetched and nothing more can come, for the input has ended or stop() was called.
+  /// Consumer: true once the input has ended or stop() was called, and all estimates are fetched.
   [[nodiscard]] bool finished() const;
 
-  /// Owner: ends both threads, within an iteration of the registration and one wait for input. What has been seen is
-  /// accounted for afterwards. May be called again.
+  /// Owner: stops both threads, within one registration iteration and one wait for input. Every sweep then counts as
+  /// processed, dropped or failed. Idempotent.
   void stop();
 
-  /// Any thread: from the next sweep on.
+  /// Any thread: sets the mode from the next sweep on.
   void set_flat_ground(FlatGround mode) { flat_ground_.store(mode, std::memory_order_relaxed); }
 
-  /// Any thread. Each number grows as long as its thread lives, whether or not sensors do.
+  /// Any thread: heartbeats of the threads; each grows while its thread runs, with or without sensor data.
   struct Progress {
     std::uint64_t ingest, odometry;
     bool operator==(const Progress&) const = default;
@@ -81,13 +80,13 @@ class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it kee
     return {ingest_progress_.load(std::memory_order_relaxed), odometry_progress_.load(std::memory_order_relaxed)};
   }
 
-  /// Any thread. Of a sweep that counts as processed or failed, the estimate is there to be fetched, and the ingest has
-  /// its feedback with the next.
+  /// Any thread: returns the counters. Once a sweep counts as processed or failed, its estimate can be fetched and its
+  /// feedback reaches the ingest with the next sweep.
   [[nodiscard]] SweepCounters counters() const;
-  /// Estimates and changes of health that nobody fetched in time.
+  /// Any thread: estimates and health changes lost because they were not fetched in time.
   [[nodiscard]] std::uint64_t unfetched() const { return unfetched_.load(std::memory_order_relaxed); }
 
-  /// Owner, after stop().
+  /// Owner, after stop(): access to the stages.
   [[nodiscard]] const Ingest& ingest() const { return ingest_; }
   [[nodiscard]] const SweepProcessor& processor() const { return processor_; }
 
@@ -96,7 +95,7 @@ class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it kee
     Sweep sweep;
     SweepCut cut;
   };
-  using Counter = std::atomic<std::uint64_t>; ///< any thread may read
+  using Counter = std::atomic<std::uint64_t>; ///< readable from any thread
 
   void run_ingest();
   void run_odometry();
@@ -116,16 +115,16 @@ class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it kee
   SpscRing<ProcessedSweep, kMaxUnfetched> estimates_;
   SpscRing<HealthEvent, kMaxUnfetched> health_events_; ///< ingest -> consumer
   SpscRing<RegistrationFeedback, 4> feedback_;         ///< odometry -> ingest
-  SpscRing<FastSample, 4> anchors_;                    ///< odometry -> ingest: what is carried forward
-  FastOdometry fast_odometry_;                         ///< of ingest
+  SpscRing<FastSample, 4> anchors_;                    ///< odometry -> ingest: estimates to propagate
+  FastOdometry fast_odometry_;                         ///< owned by the ingest
   SpscRing<FastSample, kMaxUnfetched> fast_samples_;   ///< ingest -> consumer
   LatestSlot<IngestReport> reports_;                   ///< ingest -> consumer
-  Duration reported_{};                                ///< of ingest
+  Duration reported_{};                                ///< owned by the ingest
   Wakeup estimate_is_there_;
 
-  Counter seen_{0}, dropped_{0};     ///< by ingest
-  Counter processed_{0}, failed_{0}; ///< by odometry
-  Counter unfetched_{0};             ///< by both
+  Counter seen_{0}, dropped_{0};     ///< written by ingest
+  Counter processed_{0}, failed_{0}; ///< written by odometry
+  Counter unfetched_{0};             ///< written by both
   Counter ingest_progress_{0}, odometry_progress_{0};
   std::atomic<FlatGround> flat_ground_;
   std::atomic<bool> stopping_{false};

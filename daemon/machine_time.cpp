@@ -43,7 +43,7 @@ void StageStopwatch::leave() {
   --depth_;
 }
 
-/// To an untimed stage nothing is charged: the visit that was timed in its place speaks for it.
+/// Charges the innermost stage if its visit is timed; untimed visits are extrapolated from the timed ones.
 void StageStopwatch::charge_innermost() {
   const Duration now = clock_(CLOCK_THREAD_CPUTIME_ID);
   if (depth_ > 0 && open_[depth_ - 1].timed)
@@ -60,7 +60,7 @@ Duration StageStopwatch::total(Stage stage) const {
   return from_seconds(to_seconds(timed) * static_cast<double>(visits_[index]) / static_cast<double>(timed_visits));
 }
 
-/// An extrapolated total may shrink a little: nothing was spent then.
+/// Clamps differences at zero, since an extrapolated total may decrease slightly.
 StageTimes StageStopwatch::lap() {
   StageTimes spent;
   for (std::size_t stage = 0; stage < kStages; ++stage) {

@@ -23,40 +23,39 @@ inline timespec to_timespec(Duration duration) noexcept {
   return {static_cast<time_t>(whole.count()), static_cast<long>((duration - whole).count())};
 }
 
-/// What the machine spends, as an instant or as the difference of two. It measures cost and paces threads; the time of
-/// measurements is Stamp.
+/// Wall and CPU time, as an instant or a difference. Used to measure cost and pace threads; measurements use Stamp.
 struct MachineTime {
   Duration wall{}; ///< CLOCK_MONOTONIC
-  Duration cpu{};  ///< of all threads of the process: the odometry's helpers count
+  Duration cpu{};  ///< all threads of the process, including the odometry's helpers
 
   static MachineTime now() noexcept { return {read_clock(CLOCK_MONOTONIC), read_clock(CLOCK_PROCESS_CPUTIME_ID)}; }
   friend MachineTime operator-(const MachineTime& a, const MachineTime& b) { return {a.wall - b.wall, a.cpu - b.cpu}; }
 };
 
-/// CPU time by stage.
+/// CPU time by Stage.
 using StageTimes = std::array<Duration, kStages>;
 
-/// Adds up the CPU time that its thread spends in each stage; the time of an inner stage is not charged to the outer.
+/// Accumulates the CPU time that its thread spends in each stage; an inner stage is not charged to the outer one.
 ///
-/// Reading the clock of a thread is a system call, as long as the decoding of a packet. So of the stages that every
-/// packet goes through only one visit in kSampling is timed, and counts for all; and what the reading itself costs is
-/// taken off. One owner, and a stage ends on the thread that it began on.
+/// Reading the thread clock is a system call that costs as much as decoding a packet. In the per-packet stages only one
+/// visit in kSampling is timed and extrapolated, and the cost of the reading itself is subtracted. One owner; a stage
+/// ends on the thread that it began on.
 class StageStopwatch : public StageClock {
  public:
-  static constexpr std::uint64_t kSampling = 13; ///< a prime, for packets come in rhythm with the revolution
+  static constexpr std::uint64_t kSampling = 13; ///< prime, since packets are periodic with the revolution
 
-  using Clock = Duration (*)(clockid_t); ///< read_clock(), or another in tests
+  using Clock = Duration (*)(clockid_t); ///< read_clock(), replaceable in tests
   explicit StageStopwatch(Clock clock = [](clockid_t id) { return read_clock(id); });
 
   void enter(Stage stage) override { enter(static_cast<std::size_t>(stage)); }
   void leave() override;
 
-  /// CPU time spent in `stage` so far.
+  /// Returns the CPU time spent in `stage` so far.
   [[nodiscard]] Duration total(Stage stage) const;
-  /// CPU time spent in each stage since the last call.
+  /// Returns the CPU time spent in each stage since the last call.
   StageTimes lap();
 
-  /// What is done in the life of this object belongs to none of the stages that are open.
+  /// Excludes the time during its lifetime from all open stages.
   class Pause {
    public:
     explicit Pause(StageStopwatch& stopwatch) : stopwatch_(stopwatch) { stopwatch_.enter(kOutside); }
@@ -81,7 +80,7 @@ class StageStopwatch : public StageClock {
 
   Clock clock_;
   Duration reading_cost_{};
-  Duration mark_{}; ///< up to here everything is charged
+  Duration mark_{}; ///< thread CPU time charged so far
   std::array<Duration, kStages + 1> totals_{};
   std::array<std::uint64_t, kStages + 1> visits_{};
   StageTimes totals_at_lap_{};
@@ -89,10 +88,10 @@ class StageStopwatch : public StageClock {
   std::size_t depth_ = 0;
 };
 
-/// What goes with a sweep from where it was cut to where it is processed, to tell what it costs.
+/// Cost data that accompanies a sweep from its cut to its processing.
 struct SweepCut {
-  MachineTime began;        ///< when the work on the cut began
-  StageTimes ingest_took{}; ///< since the cut before
+  MachineTime began;        ///< start of the work on the cut
+  StageTimes ingest_took{}; ///< since the previous cut
 };
 
 } // namespace locus::daemon

@@ -24,9 +24,9 @@ namespace {
 
 using std::filesystem::path;
 
-constexpr std::uint64_t kPieces = 16; ///< of the size of one that fill the folder
+constexpr std::uint64_t kPieces = 16; ///< full-size pieces per folder
 constexpr std::uint64_t kBlockBytes = 4096;
-constexpr std::uint64_t kBlocksOfPiece = 32; ///< that its folder and the ends of its files take
+constexpr std::uint64_t kBlocksOfPiece = 32; ///< overhead of a piece: its folder and partly filled blocks
 
 std::uint64_t bytes_on_disk(const path& folder) {
   std::uint64_t blocks = 1;
@@ -63,7 +63,7 @@ std::optional<std::string> CaptureRing::obstacle() const {
   return std::nullopt;
 }
 
-/// What is there by now.
+/// Lists the pieces on the disk.
 std::optional<std::string> CaptureRing::look() {
   pieces_.clear();
   bytes_ = 0;
@@ -108,13 +108,13 @@ std::optional<std::string> CaptureRing::remove_oldest() {
   std::filesystem::remove_all(oldest.folder, error);
   if (error)
     return cannot("cannot be removed", oldest.folder, error);
-  std::filesystem::remove(oldest.folder.parent_path(), error); // if it was the last of its run
+  std::filesystem::remove(oldest.folder.parent_path(), error); // fails unless the run is empty
   bytes_ -= oldest.bytes;
   pieces_.pop_front();
   return std::nullopt;
 }
 
-/// After a failure the disk is looked at again: somebody may have removed the folder.
+/// Rereads the disk after a failure, since the folder may have been removed.
 Expected<path, std::string> CaptureRing::begin_piece(Stamp now) {
   if (auto problem = looked_ ? std::nullopt : look())
     return *problem;
@@ -162,7 +162,7 @@ void CaptureRing::discard_piece() {
 
 namespace {
 
-/// What the sensors send within a round of the recorder leaves in one piece.
+/// File buffer: holds the samples of one round of the recorder, so that they are written at once.
 constexpr std::size_t kBufferBytes = 1 << 16;
 
 bool is_sensible(Stamp stamp) { return stamp > kEarliestStamp && stamp < kLatestStamp; }
@@ -172,7 +172,7 @@ std::string cannot_be_written(const std::filesystem::path& file) {
                      std::generic_category().message(errno));
 }
 
-/// A copy of what an Ouster's packets cannot be read without. Where the original has gone meanwhile, it is missing.
+/// Copies the metadata without which an Ouster's packets cannot be decoded; skipped if the original no longer exists.
 std::optional<std::string> keep_metadata(const LidarOptions& lidar, const path& folder) {
   std::error_code error;
   if (!lidar.is_ouster() || !std::filesystem::exists(lidar.metadata, error))
@@ -189,7 +189,7 @@ std::vector<std::optional<std::string>> sample_files(const Config& config) {
   bool has_imu = false;
   for (const MotionSource& source : config.motion_sources) {
     const bool would_be_anothers = source.kind == SourceKind::odometry && (source.name == "gt" || source.name == "imu");
-    if (would_be_anothers || source.of_lidar) // what comes in a lidar's packets is recorded with them
+    if (would_be_anothers || source.of_lidar) // samples in a lidar's packets are recorded with them
       files.emplace_back(std::nullopt);
     else if (source.kind == SourceKind::odometry)
       files.emplace_back(source.name + ".tum");
@@ -257,7 +257,7 @@ void PieceWriter::append(TextFile& file, const std::string& text) {
   text_bytes_ += text.size();
 }
 
-/// The samples before their meta rows: a crash in between costs the rows.
+/// Flushes the samples before their meta rows, so that a crash in between loses only rows.
 std::optional<std::string> PieceWriter::flush(bool to_disk) {
   const auto flush_text = [&](TextFile& file) {
     if (file.file && !problem_ &&
@@ -304,7 +304,7 @@ void Recorder::take(const Input& input) noexcept {
     overflowed_.fetch_add(1, std::memory_order_relaxed);
 }
 
-/// All parts of it, or none.
+/// Queues all parts of a datagram, or none.
 bool Recorder::store(const Datagram& datagram) noexcept {
   constexpr std::size_t kMost = DatagramPart::kMaxBytes;
   std::span<const std::byte> rest = datagram.payload;
@@ -327,11 +327,11 @@ Recorder::Status Recorder::status() const {
   return status;
 }
 
-/// Not more than fit the ring: what comes in meanwhile waits for the next round.
+/// Writes at most one ring capacity of inputs; later ones wait for the next round.
 void Recorder::write(bool last_round) {
   is_last_round_ = last_round;
   if (!std::exchange(has_begun_, true))
-    problem_ = disk_.obstacle().value_or(""); // before anything is lost by it
+    problem_ = disk_.obstacle().value_or(""); // reported before an input is lost
   for (std::size_t written = 0; written < kMaxUnwritten; ++written) {
     const std::optional<Entry> entry = waiting_->pop();
     if (!entry)
@@ -343,7 +343,7 @@ void Recorder::write(bool last_round) {
   tell();
 }
 
-/// Parts wait for the last of their datagram.
+/// Writes an entry; parts of a datagram are collected until its last one.
 void Recorder::write(const Entry& entry) {
   if (const auto* part = std::get_if<DatagramPart>(&entry)) {
     parts_.insert(parts_.end(), part->payload.begin(),
@@ -410,7 +410,7 @@ void Recorder::end_piece() {
   disk_.end_piece();
 }
 
-/// A piece that the disk does not take is ended where it is.
+/// Flushes the piece; on failure ends it with the data flushed so far.
 void Recorder::flush(bool to_disk) {
   const std::optional<std::string> problem = piece_->flush(to_disk && !is_last_round_);
   const std::uint64_t inputs = std::exchange(unflushed_, 0);

@@ -27,49 +27,49 @@
 
 namespace locus::daemon {
 
-/// How much of a recording stays.
+/// Limits of a recording.
 struct RecordingBounds {
-  std::uint64_t max_bytes;   ///< of the folder
-  Duration piece = kForEver; ///< at most, from the first input to the last
-  Duration keep = kForEver;  ///< pieces that ended longer ago are removed with the next one
+  std::uint64_t max_bytes;   ///< size of the folder
+  Duration piece = kForEver; ///< longest duration of a piece, first to last input
+  Duration keep = kForEver;  ///< age beyond which ended pieces are removed, at the start of the next one
 
   static constexpr Duration kForEver = std::chrono::hours{24 * 365 * 100};
 };
 
-/// Recordings on a disk of which they may have so much: FOLDER/RUN/PIECE, each piece a capture folder.
+/// Recordings on disk within a size limit: FOLDER/RUN/PIECE, each piece a capture folder.
 ///
-/// A run is named by a number, one more than that of the last, and the time of its first input, e.g.
-/// 000003_2026-11-22T08-12-05Z; its pieces are numbered. For a new piece the oldest ones of all runs are removed until
-/// it fits below the bound and as much as a piece stays free on the disk. Nothing is touched that is not named so: a
-/// run that was moved or renamed is kept. One owner, who may be held up by the disk.
+/// A run is named by its consecutive number and the time of its first input, e.g. 000003_2026-11-22T08-12-05Z; its
+/// pieces are numbered. Before a new piece the oldest pieces of all runs are removed until it fits the limit and leaves
+/// the size of a piece free on the disk. Entries with other names are never touched, so a moved or renamed run is safe.
+/// One owner; calls may block on the disk.
 class CaptureRing {
  public:
-  /// Looks at the disk with the first piece.
+  /// Accesses the disk with the first piece only.
   CaptureRing(std::filesystem::path folder, std::uint64_t max_bytes, Duration keep = RecordingBounds::kForEver);
 
-  /// What is sure to stand in the way of a piece, in one line for the user. Makes nothing.
+  /// Returns a certain obstacle to a piece, in one line for the user. Creates nothing.
   [[nodiscard]] std::optional<std::string> obstacle() const;
   /// Makes room, and a folder for the next piece. Fails with one line for the user.
   Expected<std::filesystem::path, std::string> begin_piece(Stamp now);
-  /// It is complete.
+  /// Adds the current piece to the run as complete.
   void end_piece();
-  /// It holds nothing of use.
+  /// Removes the current piece, which holds no usable data.
   void discard_piece();
 
-  /// What the files of a piece may hold together.
+  /// Returns the size limit of a piece, all files together.
   [[nodiscard]] std::uint64_t piece_bytes() const;
-  /// Of the run, in order, those that ended within so much time.
+  /// Returns, in order, the pieces of the run that ended within the last `keep`.
   [[nodiscard]] std::vector<std::filesystem::path> last_pieces(Duration keep) const;
-  /// On the disk, without the piece that is begun.
+  /// Returns the size on disk without the current piece.
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
-  /// Folder of the run; empty before the first piece.
+  /// Returns the folder of the run; empty before the first piece.
   [[nodiscard]] const std::filesystem::path& run() const { return run_; }
 
  private:
   struct Piece {
     std::filesystem::path folder;
     std::uint64_t bytes;
-    Duration ended; ///< CLOCK_MONOTONIC; of one that was there before, when it was found
+    Duration ended; ///< CLOCK_MONOTONIC; time of discovery for a piece of an earlier run
   };
 
   std::optional<std::string> look();
@@ -81,33 +81,33 @@ class CaptureRing {
   std::uint64_t max_bytes_;
   Duration keep_;
   bool looked_ = false;
-  std::deque<Piece> pieces_; ///< the oldest first
-  std::uint64_t bytes_ = 0;  ///< of pieces_
+  std::deque<Piece> pieces_; ///< oldest first
+  std::uint64_t bytes_ = 0;  ///< total size of pieces_
   int last_run_ = 0;
   std::filesystem::path run_, piece_;
   int last_piece_ = 0;
 };
 
-/// The file of a capture folder for the samples of each source, by index; none for a second IMU, which the format does
-/// not know.
+/// Returns the name of the sample file of each source in a capture folder, by index; empty for a second IMU, which the
+/// format does not support, and for other sources that are not recorded.
 std::vector<std::optional<std::string>> sample_files(const Config& config);
 
-/// Writes a capture folder: lidar.pcap, config.yaml, and for each source its samples with their arrivals. Every number
-/// is read again as it was. One owner, who may be held up by the disk.
+/// Writes a capture folder: lidar.pcap, config.yaml, and the samples of each source with their arrivals. Numbers
+/// round-trip exactly. One owner; calls may block on the disk.
 class PieceWriter {
  public:
-  /// Into an empty folder. Fails with one line for the user.
+  /// Opens the files in an empty folder. Fails with one line for the user.
   static Expected<PieceWriter, std::string> open(const std::filesystem::path& folder, const Config& config);
 
   void write(const Datagram& datagram) { pcap_.write(datagram); }
-  /// False where the format cannot hold the sample: its time is before 1951, or its rotation none.
+  /// Writes a sample; false if the format cannot hold it: a time before 1951, or a zero quaternion.
   bool write(const ImuInput& input);
   bool write(const OdometryInput& input);
 
-  /// Hands all over to the system, or to the disk itself. One line for the user unless all has reached it.
+  /// Flushes all files to the system, or to the disk. Returns one line for the user on failure.
   std::optional<std::string> flush(bool to_disk);
 
-  /// Of all files so far.
+  /// Returns the size of all files so far.
   [[nodiscard]] std::uint64_t bytes() const { return pcap_.bytes() + text_bytes_; }
 
  private:
@@ -119,7 +119,7 @@ class PieceWriter {
     std::unique_ptr<std::FILE, Closer> file{};
   };
   struct SourceFiles {
-    TextFile samples, meta; ///< without a path: of a source that is not recorded
+    TextFile samples, meta; ///< empty path: source is not recorded
   };
 
   PieceWriter(PcapWriter pcap, const std::filesystem::path& folder, const Config& config);
@@ -128,50 +128,50 @@ class PieceWriter {
 
   PcapWriter pcap_;
   TextFile config_;
-  std::vector<SourceFiles> sources_; ///< by index; opened with the first sample
+  std::vector<SourceFiles> sources_; ///< by source index; opened with the first sample
   std::uint64_t text_bytes_ = 0;
-  std::optional<std::string> problem_; ///< since the piece was begun
+  std::optional<std::string> problem_; ///< first failure of this piece
 };
 
-/// Records what comes in, for locus-replay, in a CaptureRing.
+/// Records the input for locus-replay in a CaptureRing.
 ///
-/// The producer, the ingest thread, leaves a copy of each input in a ring in memory and is never held up. Another
-/// thread takes them to the disk; what does not fit the ring meanwhile, or what the disk does not take, is dropped and
-/// counted. After a failure it is tried again with a new piece, every few seconds. A crash costs what came since the
-/// last round of that thread, a power cut the last few seconds.
+/// The producer, the ingest thread, copies each input into a ring in memory and never blocks. The disk thread writes
+/// them to files; inputs that overflow the ring or that the disk rejects are dropped and counted. After a failure it
+/// retries with a new piece every few seconds. A crash loses the input since the last round of that thread, a power cut
+/// the last few seconds.
 class Recorder {
  public:
-  /// 20 MB: twenty seconds of a VLP-16, two of an Ouster with 128 beams at low data rate.
+  /// Ring capacity, 20 MB: 20 s of a VLP-16, 2 s of an Ouster with 128 beams at low data rate.
   static constexpr std::size_t kMaxUnwritten = 16384;
 
   struct Status {
-    std::filesystem::path run;  ///< being recorded; empty before the first input
-    std::uint64_t bytes = 0;    ///< of all recordings in the folder
-    std::uint64_t recorded = 0; ///< inputs
-    std::uint64_t dropped = 0;  ///< inputs that the disk was too slow for, or did not take
+    std::filesystem::path run;  ///< current run; empty before the first input
+    std::uint64_t bytes = 0;    ///< size of all recordings in the folder
+    std::uint64_t recorded = 0; ///< inputs recorded
+    std::uint64_t dropped = 0;  ///< inputs lost because the disk was too slow or failed
     std::uint64_t unfit = 0;    ///< samples that the files cannot hold, see PieceWriter
-    std::string problem;        ///< why nothing can be recorded; empty while all is well
+    std::string problem;        ///< current failure; empty if there is none
   };
 
-  /// Begins a run with the first input.
+  /// Prepares a recording; the run begins with the first input.
   Recorder(const std::filesystem::path& folder, Config config, RecordingBounds bounds);
 
-  /// Producer: datagrams and motion samples; other inputs are none of a sensor's. Takes no lock, allocates nothing.
+  /// Producer: records datagrams and motion samples, ignores other inputs. Takes no lock, allocates nothing.
   void take(const Input& input) noexcept;
 
-  /// Thread of the disk, again and again: writes what was taken. In the last round it does not wait until the disk has
-  /// it: the system has it all.
+  /// Disk thread, periodically: writes the queued inputs. The last round flushes to the system without waiting for the
+  /// disk.
   void write(bool last_round);
 
-  /// Thread of the disk: writes what was taken and ends the piece, whatever it has. The pieces of this run that hold
-  /// the last so much of it.
+  /// Disk thread: writes the queued inputs and ends the current piece. Returns the pieces of this run that hold its
+  /// last `keep`.
   std::vector<std::filesystem::path> end_pieces(Duration keep);
 
-  /// Any thread but the producer's.
+  /// Returns the status. Any thread except the producer's.
   [[nodiscard]] Status status() const;
 
  private:
-  /// One of a Velodyne is whole; the packets of other lidars, and what is no lidar's, come in several parts.
+  /// Part of a datagram. A Velodyne packet fits one part; other datagrams are split into several.
   struct DatagramPart {
     static constexpr std::size_t kMaxBytes = velodyne::kDataPacketBytes + 2;
 
@@ -191,30 +191,30 @@ class Recorder {
   void tell();
 
   Config config_;
-  std::bitset<kMaxSources> has_file_; ///< by the index of the source
+  std::bitset<kMaxSources> has_file_; ///< by source index
   using Waiting = SpscRing<Entry, kMaxUnwritten>;
-  std::unique_ptr<Waiting> waiting_ = std::make_unique<Waiting>(); ///< larger than a stack
-  std::atomic<std::uint64_t> overflowed_{0};                       ///< inputs that the ring in memory had no room for
+  std::unique_ptr<Waiting> waiting_ = std::make_unique<Waiting>(); ///< on the heap: larger than a stack
+  std::atomic<std::uint64_t> overflowed_{0};                       ///< inputs dropped because the ring was full
 
-  CaptureRing disk_;                   ///< this and the next are of the thread of the disk
-  Duration piece_for_, piece_began_{}; ///< at most; CLOCK_MONOTONIC
+  CaptureRing disk_;                   ///< this and the following are owned by the disk thread
+  Duration piece_for_, piece_began_{}; ///< longest duration of a piece; start of this one, CLOCK_MONOTONIC
   bool has_begun_ = false, is_last_round_ = false;
   std::optional<PieceWriter> piece_;
-  std::vector<std::byte> parts_; ///< of a datagram, before its last one
-  std::uint64_t unflushed_ = 0;  ///< inputs that the piece may still lose
-  std::uint64_t flushed_ = 0;    ///< inputs in the piece
+  std::vector<std::byte> parts_; ///< parts of a datagram received so far
+  std::uint64_t unflushed_ = 0;  ///< inputs written to the piece, not yet flushed
+  std::uint64_t flushed_ = 0;    ///< inputs flushed to the piece
   std::uint64_t recorded_ = 0, dropped_ = 0, unfit_ = 0;
   std::string problem_;
   Duration try_again_{}, synced_{}; ///< CLOCK_MONOTONIC
 
-  mutable std::mutex status_mutex_; ///< never taken by the producer
+  mutable std::mutex status_mutex_; ///< never locked by the producer
   Status status_;
 };
 
-/// Inputs on their way to the ingest, a copy of each left with a recorder. One owner.
+/// Input source that passes a copy of each input to a recorder. One owner.
 class RecordingInput : public InputSource {
  public:
-  /// Both must outlive this.
+  /// Wraps `source`; both arguments must outlive this.
   RecordingInput(InputSource& source, Recorder& recorder) : source_(source), recorder_(recorder) {}
 
   Input next(Duration timeout) override {

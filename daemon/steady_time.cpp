@@ -5,15 +5,15 @@ namespace locus::daemon {
 
 namespace {
 
-constexpr Duration kSlew = std::chrono::milliseconds{5}; ///< two offsets of a clock that nobody has set agree to it
-constexpr Duration kOnItsWay = std::chrono::seconds{2};  ///< a stamp from before the clock was set, at the most
-constexpr Duration kUndisturbed = std::chrono::microseconds{20}; ///< between two readings that belong together
+constexpr Duration kSlew = std::chrono::milliseconds{5};         ///< largest offset change without a step
+constexpr Duration kOnItsWay = std::chrono::seconds{2};          ///< longest transit of a stamp made before a step
+constexpr Duration kUndisturbed = std::chrono::microseconds{20}; ///< longest gap between two simultaneous readings
 
 } // namespace
 
 SteadyTime::SteadyTime(Clock clock) : clock_(clock), offset_(read_offset().wall_ahead) {}
 
-/// Of the wall clock against the time since the host was booted. Who sets it may well interrupt whoever reads it.
+/// Reads CLOCK_REALTIME - CLOCK_BOOTTIME. Retries, since a clock step or preemption may fall between the reads.
 SteadyTime::Offset SteadyTime::read_offset() const {
   constexpr int kTries = 20;
   for (int i = 1;; ++i) {
@@ -38,8 +38,8 @@ void SteadyTime::look() {
   set_by_ns_.store(set_by_.count(), std::memory_order_relaxed);
 }
 
-/// Read by the clock as it is now, a stamp from before a step forward lies before that step, which was noticed a moment
-/// after it; one from before a step back lies in the future.
+/// Tells stamps from before the last step by their time under the current offset: they lie before the step if the clock
+/// was set forward (a step is detected shortly after it), and in the future if it was set back.
 Stamp SteadyTime::steady(Stamp wall) const {
   const Stamp after = wall - set_by_, before = wall - set_by_before_;
   if (set_by_ == set_by_before_ || now() - set_at_ > kOnItsWay)
@@ -55,7 +55,7 @@ Stamp SteadyTime::steady(Stamp stamp, Stamp arrival, Sender& sender) const {
     const auto unlike = [&](Stamp read) { return std::chrono::abs(arrival - read - sender.lag); };
     const bool is_host = unlike(steady - news) < unlike(steady);
     steady -= is_host ? news : Duration::zero();
-    if (now() - set_at_ > kOnItsWay) { // until then it may be on its way, from before
+    if (now() - set_at_ > kOnItsWay) { // until then, stamps from before the step may be in transit
       sender.shift += is_host ? news : Duration::zero();
       sender.set_by = set_by_;
     }

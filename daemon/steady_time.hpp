@@ -10,34 +10,34 @@
 
 namespace locus::daemon {
 
-/// Time as the wall clock of this host had it when the service began, and evenly from there, whoever sets that clock
-/// meanwhile: a host that hears of the time of day minutes after it was booted jumps by days, and the robot does not.
-/// All that the service measures is in it; what it tells is in the time on the wall. One owner, but for wall().
+/// Monotonic time on the wall-clock epoch of start-up (CLOCK_BOOTTIME + constant). Unaffected by clock steps such as
+/// the first NTP fix, which may come minutes after boot and amount to days. Used internally for all measurements;
+/// outputs are converted to wall time. One owner, except for wall() and set_by().
 class SteadyTime {
  public:
-  using Clock = Duration (*)(clockid_t); ///< read_clock(), or another in tests
+  using Clock = Duration (*)(clockid_t); ///< read_clock(), replaceable in tests
   explicit SteadyTime(Clock clock = [](clockid_t id) { return read_clock(id); });
 
-  /// Looks whether the clock was set: after stamps were obtained, and before they are converted.
+  /// Detects a step of the wall clock. To be called after stamps are obtained and before they are converted.
   void look();
 
-  /// Of a stamp of the wall clock that was made within the last moments, before or after the clock was set.
+  /// Converts a recent wall-clock stamp, made before or after the last step.
   [[nodiscard]] Stamp steady(Stamp wall) const;
 
-  /// What is known of who stamps its samples itself: whether by the clock of this host, or by one of its own that
-  /// nobody has set.
+  /// State of a publisher that stamps its own samples: with this host's clock, or with an independent clock that a step
+  /// does not affect.
   struct Sender {
-    Duration shift{};  ///< of its stamps to steady time
-    Duration lag{};    ///< of its last sample, from stamp to arrival
-    Duration set_by{}; ///< of the host's clock, as far as `shift` knows
+    Duration shift{};  ///< correction subtracted from its stamps
+    Duration lag{};    ///< arrival minus converted stamp of its last sample
+    Duration set_by{}; ///< total clock steps accounted for in `shift`
   };
-  /// Of the stamp of a sample that came at `arrival`. Whose clock it is shows in the lag, which no clock that is set
-  /// changes.
+  /// Converts the stamp of a sample that arrived at `arrival`. The lag identifies the clock: a step leaves it unchanged
+  /// if it is attributed to the right clock.
   [[nodiscard]] Stamp steady(Stamp stamp, Stamp arrival, Sender& sender) const;
 
-  /// As the clock on the wall has it by now. Any thread.
+  /// Converts steady time to the current wall clock. Any thread.
   [[nodiscard]] Stamp wall(Stamp steady) const { return steady + set_by(); }
-  /// Since the start in all. Any thread.
+  /// Returns the sum of all wall-clock steps since the start. Any thread.
   [[nodiscard]] Duration set_by() const { return Duration{set_by_ns_.load(std::memory_order_relaxed)}; }
 
  private:
@@ -48,9 +48,9 @@ class SteadyTime {
   [[nodiscard]] Stamp now() const;
 
   Clock clock_;
-  Duration offset_;                     ///< of the wall clock, against the time since the host was booted
-  Duration set_by_{}, set_by_before_{}; ///< since the start in all, and before the last time
-  Stamp set_at_;                        ///< that was the last time
+  Duration offset_;                     ///< CLOCK_REALTIME - CLOCK_BOOTTIME
+  Duration set_by_{}, set_by_before_{}; ///< sum of all steps since the start, including and excluding the last
+  Stamp set_at_;                        ///< detection of the last step, steady time
   std::atomic<std::int64_t> set_by_ns_{0};
 };
 

@@ -15,39 +15,39 @@
 
 namespace locus::daemon {
 
-/// What became of the sweeps: seen = processed + dropped + failed, but for those that are still on their way.
+/// Sweep counters: seen = processed + dropped + failed, except for sweeps in flight.
 struct SweepCounters {
-  std::uint64_t seen = 0;      ///< built, those without a single return included
+  std::uint64_t seen = 0;      ///< built, including sweeps without returns
   std::uint64_t processed = 0; ///< registered
-  std::uint64_t dropped = 0;   ///< a newer one was there before the odometry had time
+  std::uint64_t dropped = 0;   ///< replaced by a newer one before the odometry could process it
   std::uint64_t failed = 0;    ///< not registered; the estimate is the prediction
 
   bool operator==(const SweepCounters&) const = default;
 };
 
-/// Where to begin, see Odometry::begin_at().
+/// Initial state and map, see Odometry::begin_at().
 struct StartPoint {
   Whereabouts last;
   std::vector<SurfacePoint> map_odom;
 };
 
-/// What another run has learned of the motion sources, see Odometry::recall().
+/// Calibration of the motion sources from an earlier run, see Odometry::recall().
 struct Recalled {
   LearnedSources learned{};
   double elapsed_s = 0.0;
 };
 
-/// The estimate for one sweep, with what it took.
+/// Estimate for one sweep, with its cost.
 struct ProcessedSweep {
   OdometryEstimate estimate;
   std::uint64_t sequence = 0; ///< Sweep::sequence
   std::size_t raw_returns = 0;
-  std::bitset<kMaxSources> usable_sources; ///< SourcePose::usable, by the index of the source
+  std::bitset<kMaxSources> usable_sources; ///< SourcePose::usable, by source index
   MachineTime took;                        ///< from the cut of the sweep to the estimate
-  StageTimes stages_took{}; ///< those of the ingest included, and what was prepared for it since the sweep before
+  StageTimes stages_took{};                ///< including the ingest and the preparation since the previous sweep
 };
 
-/// Odometry with its costs measured; what the daemon's odometry thread and the replay in one thread share. One owner.
+/// Odometry with cost measurement; shared by the daemon's odometry thread and single-threaded replay. One owner.
 class SweepProcessor {
  public:
   explicit SweepProcessor(const Config& config, const std::optional<StartPoint>& start = {},
@@ -60,7 +60,7 @@ class SweepProcessor {
   SweepProcessor(const SweepProcessor&) = delete;
   SweepProcessor& operator=(const SweepProcessor&) = delete;
 
-  /// `stop` as Odometry has it.
+  /// Processes a sweep and measures its cost; `stop` as for Odometry::process().
   ProcessedSweep process(
       const Sweep& sweep, const SweepCut& cut, const Gicp::StopRequested& stop = [] { return false; }) {
     ProcessedSweep done{odometry_.process(sweep, stop), sweep.sequence, sweep.raw_returns, {}, {}, cut.ingest_took};
@@ -72,7 +72,7 @@ class SweepProcessor {
     return done;
   }
 
-  /// Once the estimate is on its way, see Odometry::prepare_next().
+  /// Prepares for the next sweep, after the estimate was published; see Odometry::prepare_next().
   void prepare_next() { odometry_.prepare_next(); }
 
   void set_flat_ground(FlatGround mode) { odometry_.set_flat_ground(mode); }

@@ -21,7 +21,7 @@ void Wakeup::wait_for(Duration timeout) noexcept {
   const timespec deadline = to_timespec(read_clock(CLOCK_MONOTONIC) + timeout);
   while (sem_clockwait(&semaphore_, CLOCK_MONOTONIC, &deadline) != 0 && errno == EINTR) {
   }
-  while (sem_trywait(&semaphore_) == 0) { // one look sees what all of them are about
+  while (sem_trywait(&semaphore_) == 0) { // one check covers all notifications
   }
 }
 

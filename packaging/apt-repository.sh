@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# apt-repository.sh [--key KEY] FOLDER DEB...: makes or updates a signed repository in FOLDER, with DEB, packages that
-# packaging/build-deb.sh built: for bookworm and trixie, amd64 and arm64. FOLDER/public is for a web server or a disk to
-# offer, the key locusd.asc included. KEY is a secret key of this account's GnuPG; without one the first call makes one
-# there, for all that follow.
+# apt-repository.sh [--key KEY] FOLDER DEB...: creates or updates a signed repository in FOLDER with the packages DEB,
+# built by packaging/build-deb.sh, for bookworm and trixie, amd64 and arm64. FOLDER/public can be served from a web server
+# or a disk and contains the key locusd.asc. KEY is a secret key in this account's GnuPG; by default the first call creates
+# one, which later calls reuse.
 set -euo pipefail
 packaging=$(dirname "$(realpath "$0")")
 fail() { echo "apt-repository.sh: $1" >&2; exit "${2:-1}"; }
@@ -22,7 +22,7 @@ for program in reprepro gpg; do
 done
 source "$packaging/releases.sh"
 
-# All is looked at before anything changes.
+# Checks all packages before any change.
 suites=()
 for deb in "$@"; do
   version=$(dpkg-deb -f "$deb" Version) || fail "$deb: is no package"
@@ -34,7 +34,7 @@ distributions=$folder/conf/distributions
 if [ -z "$key" ] && [ -e "$distributions" ]; then
   key=$(sed -n '/^SignWith: /{s///p;q}' "$distributions")
 fi
-fingerprint() { # KEY: of a secret key of this account, the first of several; empty without one
+fingerprint() { # KEY: prints the fingerprint of the first matching secret key; empty if there is none
   { gpg --batch --with-colons --list-secret-keys "$1" 2>/dev/null || true; } | awk -F: '$1 == "fpr" && !n++ {print $10}'
 }
 if [ -z "$key" ]; then

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# build-deb.sh [--suite SUITE] [--arch ARCH] [FOLDER]: builds the packages of packaging/debian/control from the files that
-# git tracks, as they are in the work tree, and lays them into FOLDER (build/deb). Installs what is missing to build, as root or
-# with sudo; for another release of Debian (bookworm, trixie) or another ARCH than this machine's (amd64, arm64) not here but
-# in a tree of its own, as root. Runs no tests.
+# build-deb.sh [--suite SUITE] [--arch ARCH] [FOLDER]: builds the packages of packaging/debian/control from the tracked
+# files of the work tree and puts them into FOLDER (build/deb). Installs missing build dependencies, as root or with sudo.
+# For another Debian release (bookworm, trixie) or another ARCH (amd64, arm64) than this machine's it builds in a separate
+# root tree, as root. Runs no tests.
 set -euo pipefail
 source=$(realpath "$(dirname "$0")/..")
 source "$source/packaging/releases.sh"
@@ -38,18 +38,18 @@ tree=$work/locusd
 mkdir -p "$tree" "$result"
 git -C "$source" ls-files -z | tar --create --directory="$source" --null --files-from=- | tar --extract --directory="$tree"
 
-# debhelper gives the build a home of its own, without the compiler's cache; the tree lies elsewhere each time.
+# debhelper sets a temporary home without the compiler cache, and the tree has another path each time.
 if command -v ccache >/dev/null; then
   CCACHE_DIR=${CCACHE_DIR:-$(ccache --get-config cache_dir)}
   export CCACHE_DIR CCACHE_BASEDIR=$tree
 fi
 
-# The steps of the compilation on a terminal, all that is said in build.log.
+# Shows the compilation steps on a terminal; the full output goes to build.log.
 log=$result/build.log
 progress() { if [ -t 1 ]; then grep --line-buffered -oP '^\[\d+/\d+\]' | tr '\n' '\r'; else cat >/dev/null; fi; }
 
 cd "$tree"
-export LANG=C.UTF-8 # everywhere, for ccache asks for it
+export LANG=C.UTF-8 # the same everywhere, since ccache hashes it
 export DEB_BUILD_OPTIONS=${DEB_BUILD_OPTIONS-"parallel=$(nproc)"}" nocheck" DEB_BUILD_PROFILES=$profiles
 "${in_tree[@]}" packaging/install-build-deps.sh "$arch"
 mv packaging/debian debian
@@ -59,6 +59,6 @@ if ! "${in_tree[@]}" dpkg-buildpackage --host-arch "$arch" --build=binary --no-s
   echo "build-deb.sh: dpkg-buildpackage failed; the end of $log stands above" >&2
   exit 1
 fi
-rm -f "$result"/{locusd,locus-tools,liblocus0,liblocus-dev,python3-locus}{,-dbgsym}_*.deb "$result"/locusd_*.{buildinfo,changes} # of another version
+rm -f "$result"/{locusd,locus-tools,liblocus0,liblocus-dev,python3-locus}{,-dbgsym}_*.deb "$result"/locusd_*.{buildinfo,changes} # packages of other versions
 mv "$work"/*.deb "$work"/*.buildinfo "$work"/*.changes "$result"
 ls "$result"/*_"$arch".deb

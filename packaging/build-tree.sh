@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# build-tree.sh SUITE ARCH FOLDER COMMAND...: runs COMMAND in a Debian of its own, the release SUITE, that builds for ARCH and
-# runs, by QEMU where it must, what was built for it. FOLDER lies there where it lies here; the current one is to be in it. A
-# tree of its own, for the libraries of another release or ARCH would drive out those of this system. It is made once and
-# cached.
+# build-tree.sh SUITE ARCH FOLDER COMMAND...: runs COMMAND in a separate Debian tree of the release SUITE, which builds for
+# ARCH and runs programs of ARCH, by QEMU if necessary. FOLDER has the same path inside; the current folder must be in it.
+# The tree is separate because the libraries of another release or ARCH would displace those of this system. It is created
+# once and cached.
 set -euo pipefail
 suite=$1 arch=$2 folder=$(realpath "$3")
 shift 3
@@ -32,8 +32,8 @@ if [ ! -d "$tree" ]; then
   mv "$tree.$$" "$tree"
 fi
 
-# Programs of ARCH are QEMU's, inside alone: since Linux 6.7 a user namespace has such a list of its own. An older kernel
-# has one for all, which Debian's qemu-user-static fills.
+# Registers QEMU for programs of ARCH, inside only: since Linux 6.7 each user namespace has its own binfmt_misc list. An
+# older kernel has one global list, which Debian's qemu-user-static fills.
 inside='
 mount -t binfmt_misc binfmt_misc /mnt 2>/dev/null && for each in /usr/lib/binfmt.d/qemu-*; do
   [ ! -e "$each" ] || cat "$each" >/mnt/register

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# install-build-deps.sh [ARCH]: installs what building and testing locusd, for ARCH, needs: the Build-Depends of
-# packaging/debian/control, less what the profiles of DEB_BUILD_PROFILES leave out. At once done when all of it is there.
-# Runs as root or with sudo, on Debian 12 or newer.
+# install-build-deps.sh [ARCH]: installs the dependencies for building and testing locusd for ARCH: the Build-Depends of
+# packaging/debian/control, except those excluded by DEB_BUILD_PROFILES. Returns at once if all are installed. Runs as
+# root or with sudo, on Debian 12 or newer.
 set -euo pipefail
 host=(${1:+-a "$1"})
 packaging=$(dirname "$(realpath "$0")")
@@ -29,5 +29,5 @@ install() {
     apt-get build-dep "${host[@]}" --yes --no-install-recommends --option DPkg::Lock::Timeout=600 "$packaging"
 }
 
-# The lists of a fresh or stale machine do not know the packages: then, and only then, fetch them.
+# Fetches the package lists only if the installation fails, as on a machine with missing or outdated lists.
 install || { "${as_root[@]}" apt-get update && install; } || fail "apt-get could not install all packages, see above."

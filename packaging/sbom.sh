@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# sbom.sh PACKAGE TREE BUILD: what the programs, or the library, of a package consist of, as SPDX 2.3, to stdout. TREE holds them as they
-# are installed, BUILD is the folder of ninja that they were linked in. Everything is read from what was really built:
-#   DYNAMIC_LINK              package of a library that a program names as needed
-#   RUNTIME_DEPENDENCY_OF     package of a library that only such libraries need
+# sbom.sh PACKAGE TREE BUILD: prints the SBOM of a package's programs or library, as SPDX 2.3. TREE is the installation
+# tree, BUILD the ninja folder in which they were linked. All entries are derived from the actual build:
+#   DYNAMIC_LINK              package of a library that a program needs directly
+#   RUNTIME_DEPENDENCY_OF     package of a library that only other libraries need
 #   BUILD_DEPENDENCY_OF       package whose headers were compiled in
 #   CONTAINS                  package whose scripts are bundled into a page
-# The same packages of Debian give the same bytes; the time is SOURCE_DATE_EPOCH.
+# Reproducible for the same Debian packages; the time is SOURCE_DATE_EPOCH.
 set -euo pipefail
 export LC_ALL=C.UTF-8
 package=$1 tree=$(realpath "$2") build=$(realpath "$3")
@@ -15,7 +15,7 @@ version=$(dpkg-parsechangelog -S Version)
 mapfile -t programs < <(find "$tree"/usr -path "*/usr/bin/*" -o -type f -name "*.so*" | sort)
 
 needed() { readelf --dynamic "$@" | sed -n 's/.*(NEEDED).*\[\(.*\)\]/\1/p' | sort -u; }
-path_of() { # LIBRARY, as the loader finds it
+path_of() { # LIBRARY: prints its path, in the loader's search order
   local folder
   for folder in {,/usr}/lib{/"$triplet",,64} "/usr/$triplet/lib"; do
     [ ! -e "$folder/$1" ] || { realpath "$folder/$1"; return; }
@@ -23,7 +23,7 @@ path_of() { # LIBRARY, as the loader finds it
   echo "sbom.sh: $1: no such library in /lib/$triplet; is its package installed?" >&2
   return 1
 }
-# Lines "PACKAGE FILE" for files that packages of Debian brought.
+# Prints "PACKAGE FILE" for files that belong to Debian packages.
 owners() { { xargs --no-run-if-empty dpkg -S 2>/dev/null || true; } | sed -E 's/^([^:,]+).*: /\1 /'; }
 related() { owners | sed "s/^\([^ ]*\) .*/$1 \1/" | sort -u; } # "RELATION PACKAGE"
 
@@ -37,7 +37,7 @@ libraries() {
       [ -z "${seen[$library]:-}" ] || continue
       seen[$library]=1
       path=$(path_of "$library")
-      # A library that was merged into /usr is known to dpkg under the path that its package has.
+      # dpkg knows a library by the path in its package, which may be without the merged /usr.
       printf '%s\n%s\n' "$path" "${path#/usr}" | owners | sed "s,^\([^ ]*\) .*,$relation \1 $library," | grep . ||
         { echo "sbom.sh: $path: of no package of Debian" >&2; return 1; }
       next+=("$path")
@@ -47,12 +47,12 @@ libraries() {
   done
 }
 
-# What ninja makes of what, order alone aside: "FILE..." of the files on standard input.
+# Prints the inputs, except order-only ones, of the ninja targets on standard input.
 made_of() { (cd "$build" && xargs --no-run-if-empty ninja -t query) | awk '/^  input:/ {on = 1; next} /^  outputs:/ {on = 0}
   on && $1 != "||" {print $NF}'; }
-# "SYMBOL FILE". A shared library has made its insides LOCAL.
+# Prints "SYMBOL FILE". A shared library has LOCAL internal symbols.
 symbols() { awk -v binding="$1" '/^File:/ {file = $2} $5 ~ binding && $7 != "UND" {print $8, file}'; }
-candidates() { # objects, those of static libraries included
+candidates() { # prints all objects, including those of static libraries
   local wave
   wave=$(cd "$build" && for program in "${programs[@]}"; do ls -d {bin,lib}/"$(basename "$program")" 2>/dev/null || true; done)
   while [ -n "$wave" ]; do
@@ -61,7 +61,7 @@ candidates() { # objects, those of static libraries included
     wave=$(grep '\.a$' <<<"$wave" | grep -v '^/' || true)
   done | sort -u
 }
-linked() { # those of them that went into a program, to tell by what they define
+linked() { # prints the objects linked into a program, identified by their symbols
   local binding=GLOBAL
   [[ ${programs[0]} != *.so* ]] || binding='GLOBAL|LOCAL'
   (cd "$build" && awk 'FNR == NR {linked[$1]; next} $1 in linked {print $2}' <(readelf --syms --wide "${programs[@]}" | symbols "$binding") \

@@ -12,7 +12,7 @@ namespace locus::daemon::ros {
 
 void serialise(const void* message, const dds_topic_descriptor_t& type, std::vector<std::byte>& out) {
   constexpr std::array kLittleEndianCdr{std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}};
-  constexpr std::uint32_t kXcdr1 = 1; // ROS 2's
+  constexpr std::uint32_t kXcdr1 = 1; // used by ROS 2
   dds_ostreamLE_t stream{};
   dds_ostreamLE_init(&stream, 0, kXcdr1);
   const std::unique_ptr<dds_ostreamLE_t, decltype([](dds_ostreamLE_t* s) { dds_ostreamLE_fini(s); })> closer(&stream);
@@ -29,7 +29,7 @@ std::string name_in_ros2(const dds_topic_descriptor_t& type) {
   std::string ros(name.substr(0, middle));
   ros += "/msg/";
   ros += name.substr(middle + kMiddle.size());
-  ros.pop_back(); // the underscore
+  ros.pop_back(); // trailing underscore
   return ros;
 }
 

@@ -22,11 +22,11 @@ struct QosDeleter {
 };
 using Qos = std::unique_ptr<dds_qos_t, QosDeleter>;
 
-/// On the loopback interface nobody but local processes listens; multicast serves to find those who come later, for lo
-/// does not claim to have it. A writer that goes waits no
-/// longer than that for readers far behind, for the service stops within a second. A cloud of a few megabytes comes at
-/// once, and of best effort none of its fragments comes again. Shared memory stays off: without its
-/// broker a participant waits for it for ever.
+/// Returns the Cyclone DDS configuration. Loopback is local to the host; its multicast, needed for discovery of later
+/// participants, must be enabled here since lo does not advertise it. The linger time bounds the wait of a closing
+/// writer for slow readers, as the service stops within a second. The receive buffer holds a cloud of a few megabytes,
+/// which arrives in a burst and whose best-effort fragments are not resent. Shared memory stays off: without its broker
+/// a participant waits forever.
 std::string cyclone_configuration(const std::string& interface) {
   const bool loopback = interface == "lo";
   return fmt::format("<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"{}\"{}/></Interfaces>{}"
@@ -62,8 +62,7 @@ constexpr std::array kEnclave{SecurityFile{"dds.sec.auth.identity_ca", "identity
                               SecurityFile{"dds.sec.access.governance", "governance.p7s"},
                               SecurityFile{"dds.sec.access.permissions", "permissions.p7s"}};
 
-/// The plugins that come with Cyclone DDS, and what they are to read, for a participant. What is wrong, if something
-/// is.
+/// Sets the security plugins of Cyclone DDS and their files for a participant. Returns the problem, if any.
 std::optional<std::string> set_security(dds_qos_t* qos, const std::string& folder) {
   for (const auto& [kind, library, suffix] : {std::array{"auth", "dds_security_auth", "authentication"},
                                               std::array{"access", "dds_security_ac", "access_control"},
@@ -97,7 +96,7 @@ std::function<void(bool, std::string_view)>& log_sink() {
   return sink;
 }
 
-/// The library hands out its lines in pieces; the one with the line feed is the last.
+/// Assembles log lines, which the library delivers in pieces that end with a line feed.
 void take_log(void*, const dds_log_data_t* data) {
   static std::mutex mutex;
   static std::string line;
@@ -132,7 +131,7 @@ Expected<DdsNode, std::string> DdsNode::open(const DdsOptions& options) {
   if (domain.handle() < 0)
     return failed("domain", domain.handle());
   const Qos qos{dds_create_qos()};
-  set_user_data(qos.get(), "enclave=/;"); // as every node of ROS 2 says
+  set_user_data(qos.get(), "enclave=/;"); // as in every ROS 2 node
   if (const auto problem = options.security.empty() ? std::nullopt : set_security(qos.get(), options.security))
     return *problem;
   DdsEntity participant{dds_create_participant(id, qos.get(), nullptr)};
@@ -154,7 +153,7 @@ DdsEntity DdsNode::create_endpoint(const ros::Type& type, const std::string& top
     set_user_data(qos.get(), fmt::format("typehash=RIHS01_{};", type.hash));
   DdsEntity endpoint{create(participant(), handle, qos.get(), nullptr)};
   if (handle > 0)
-    dds_delete(handle); // lives on as long as the endpoint does
+    dds_delete(handle); // stays alive with the endpoint
   return endpoint;
 }
 

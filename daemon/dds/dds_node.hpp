@@ -20,7 +20,7 @@
 
 namespace locus::daemon {
 
-/// A DDS entity, deleted at the end of its life with all that was made from it. One owner.
+/// Owns a DDS entity and deletes it and its children on destruction. One owner.
 class DdsEntity {
  public:
   explicit DdsEntity(dds_entity_t handle = 0) : handle_(handle) {}
@@ -39,38 +39,38 @@ class DdsEntity {
   dds_entity_t handle_;
 };
 
-/// How a topic is delivered, after ROS 2's own profiles.
+/// Quality of service of a topic, after ROS 2's own profiles.
 struct TopicQos {
   bool reliable = true;
   int depth = 10;
-  bool latched = false; ///< who comes later hears the last message, too
+  bool latched = false; ///< late subscribers receive the last message (transient local)
 
   static constexpr TopicQos standard() { return {true, 10}; }   ///< odometry, diagnostics, commands
   static constexpr TopicQos transform() { return {true, 100}; } ///< tf
-  static constexpr TopicQos latch() { return {true, 1, true}; } ///< what stays true
-  static constexpr TopicQos cloud() { return {true, 5}; }       ///< rviz2 asks for it; who does not is served, too
-  static constexpr TopicQos clock() { return {false, 1}; }      ///< the latest is the only one that counts
-  static constexpr TopicQos sensor_out() { return {false, 5}; } ///< as drivers of sensors send
-  static constexpr TopicQos cloud_in() { return {false, 1}; } ///< of any writer; the newest is the only one that counts
-  static constexpr TopicQos cloud_count() { return {false, 20}; } ///< of any writer, none of them lost
+  static constexpr TopicQos latch() { return {true, 1, true}; } ///< persistent data
+  static constexpr TopicQos cloud() { return {true, 5}; }       ///< as rviz2 requests; matches best-effort readers, too
+  static constexpr TopicQos clock() { return {false, 1}; }      ///< only the latest matters
+  static constexpr TopicQos sensor_out() { return {false, 5}; } ///< as sensor drivers publish
+  static constexpr TopicQos cloud_in() { return {false, 1}; }   ///< matches any writer; only the latest matters
+  static constexpr TopicQos cloud_count() { return {false, 20}; } ///< matches any writer; deep enough to count all
   static constexpr TopicQos sensor_in() {
     return {false, 100};
-  } ///< best effort readers accept every writer; the depth
+  } ///< best-effort readers match every writer; the depth
     ///< outlasts a stall of this process
 };
 
-/// What the DDS library itself has to say, line by line, from any of its threads. One sink in a process.
+/// Sets the sink of the DDS library's log, called line by line from any of its threads. One sink per process.
 void set_dds_log(std::function<void(bool is_error, std::string_view line)> sink);
 
-/// This process among the participants of a ROS 2 network: the domain and the interface that the configuration names,
-/// and no other. Any thread may use it.
+/// DDS participant of this process in a ROS 2 network, on the configured domain and interface only. Thread-safe.
 class DdsNode {
  public:
-  /// Fails with one line for the user, at once, e.g. while the interface does not exist. To be tried again then.
+  /// Opens the participant. Fails immediately with one line for the user, e.g. if the interface does not exist yet; the
+  /// caller may retry.
   static Expected<DdsNode, std::string> open(const DdsOptions& options);
 
-  /// Of a topic as ROS 2 spells it, "/locus/odometry"; a name without a slash is one of DDS alone. Handles below zero
-  /// are errors of DDS.
+  /// Creates an endpoint on a ROS 2 topic such as "/locus/odometry"; a name without a leading slash is a plain DDS
+  /// topic. Negative handles are DDS errors.
   template <class Message> [[nodiscard]] DdsEntity create_writer(const std::string& topic, TopicQos qos) const {
     return create_endpoint(ros::type_of<Message>(), topic, qos, &dds_create_writer);
   }
@@ -93,14 +93,14 @@ class DdsNode {
   bool type_hashes_;
 };
 
-/// Sends messages of one topic. One owner; one that is not open yet loses what it is given.
+/// Publishes messages on one topic. One owner; a default-constructed writer drops its messages.
 template <class Message> class DdsWriter {
  public:
   DdsWriter() = default;
   DdsWriter(const DdsNode& node, const std::string& topic, TopicQos qos)
       : writer_(node.create_writer<Message>(topic, qos)) {}
 
-  /// Whether DDS took it; it may not while a reliable reader is far behind.
+  /// Publishes a message; false if DDS rejects it, e.g. while a reliable reader is far behind.
   [[nodiscard]] bool write(const Message& message) const {
     return dds_write(writer_.handle(), &message) == DDS_RETCODE_OK;
   }
@@ -113,12 +113,12 @@ template <class Message> class DdsWriter {
   DdsEntity writer_;
 };
 
-/// A message as it was sent, encapsulation included. Owns nothing.
+/// Non-owning view of a serialised message, including encapsulation.
 class SerialisedSample {
  public:
   explicit SerialisedSample(const ddsi_serdata* sample) : sample_(sample) {}
   [[nodiscard]] std::size_t size() const { return ddsi_serdata_size(sample_); }
-  /// Precondition: there is room for all of it.
+  /// Copies the message. Precondition: `bytes` holds at least size() bytes.
   void copy_to(std::span<std::byte> bytes) const { ddsi_serdata_to_ser(sample_, 0, size(), bytes.data()); }
 
  private:
@@ -131,8 +131,8 @@ template <class Message> class DdsReader {
   DdsReader(const DdsNode& node, const std::string& topic, TopicQos qos)
       : reader_(node.create_reader<Message>(topic, qos)) {}
 
-  /// Hands out what has come, the oldest first, and if it is asked for the writer; valid during the call only. Comes to
-  /// an end however fast more comes.
+  /// Passes the received messages to `use`, oldest first, with their writer if it accepts one; valid during the call
+  /// only. Bounded, however fast messages arrive.
   template <class Use> void take(const Use& use) {
     constexpr std::uint32_t kBatch = 32, kMostBatches = 4;
     dds_return_t count = kBatch;
@@ -148,7 +148,7 @@ template <class Message> class DdsReader {
     }
   }
 
-  /// As take(), with its writer, of messages as they were sent.
+  /// Passes the received messages to `use` in serialised form, with their writer; otherwise as take().
   template <class Use> void take_serialised(const Use& use) {
     constexpr std::uint32_t kBatch = 8, kMostBatches = 4;
     dds_return_t count = kBatch;
@@ -168,7 +168,7 @@ template <class Message> class DdsReader {
     dds_subscription_matched_status_t status{};
     return dds_get_subscription_matched_status(reader_.handle(), &status) == DDS_RETCODE_OK ? status.current_count : 0;
   }
-  /// Of more writers than anybody has, any may be heard.
+  /// Tells whether a writer is matched; true for any writer beyond 64 matched ones.
   [[nodiscard]] bool hears(dds_instance_handle_t writer) const {
     std::array<dds_instance_handle_t, 64> all{};
     const dds_return_t count = dds_get_matched_publications(reader_.handle(), all.data(), all.size());
@@ -188,13 +188,13 @@ template <class Message> class DdsReader {
   DdsEntity reader_;
 };
 
-/// Whose samples a topic takes: of one writer, the first, until it is silent or gone, and no more than any sensor
-/// sends. What a second writer sends, however much, is counted and comes no further. One owner.
+/// Admits the samples of one writer per topic, the first until it is silent or gone, at a limited rate. Samples of
+/// other writers are counted and rejected. One owner.
 class Admission {
  public:
-  static constexpr std::int64_t kMaxRateKhz = 10; ///< more than any sensor sends
+  static constexpr std::int64_t kMaxRateKhz = 10; ///< above the rate of any sensor
 
-  /// Whether the sample of `writer` that came at `now` (CLOCK_MONOTONIC) is taken; else it is counted.
+  /// Tells whether a sample of `writer` at `now` (CLOCK_MONOTONIC) is accepted; otherwise counts it.
   bool admits(dds_instance_handle_t writer, Duration now) {
     if (writer != writer_ && now - last_heard_ < kSilence)
       return refuse();
@@ -208,7 +208,7 @@ class Admission {
   }
   [[nodiscard]] std::uint64_t refused() const { return refused_; }
 
-  /// Another writer may take over from one that `reader` hears no more.
+  /// Lets another writer take over if `reader` no longer matches the current one.
   template <class Message> void look_after(const DdsReader<Message>& reader) {
     if (!reader.hears(writer_))
       last_heard_ = {};

@@ -15,7 +15,7 @@ namespace {
 
 using Level = Diagnostic::Level;
 
-/// "a.b.c": "1" of everything below `json`, as diagnostics have it.
+/// Flattens `json` to pairs such as "a.b.c": "1" for diagnostics.
 void flatten(const ordered_json& json, const std::string& prefix,
              std::vector<std::pair<std::string, std::string>>& out) {
   for (const auto& [key, value] : json.items()) {
@@ -66,8 +66,8 @@ Diagnostic lidar_diagnostic(const LidarOptions& options, const IngestReport::Lid
 
 } // namespace
 
-/// The values are those of the JSON: all of each lidar and source, of DDS and recording; of the rest those that
-/// odometry_diagnostic() lists.
+/// Takes the values from the JSON: all of each lidar, source, DDS and recording; otherwise those listed in
+/// odometry_diagnostic().
 std::vector<Diagnostic> diagnostics(const Figures& figures, Stamp now) {
   const ordered_json json = to_json(figures);
   std::vector<Diagnostic> all{odometry_diagnostic(figures, json, now)};

@@ -9,11 +9,11 @@
 
 namespace locus::daemon {
 
-/// Estimates and packets older than this say nothing about now.
+/// Age beyond which estimates and packets are stale.
 inline constexpr Duration kStale = std::chrono::seconds{2};
 
-/// For /diagnostics: one line for the odometry, each lidar and each motion source, and of a service for DDS and the
-/// recording, with every counter in it. `now`: by the clock of the stamps.
+/// Returns the entries of /diagnostics: one for the odometry, each lidar and each motion source, and in a service for
+/// DDS and the recording, with all counters. `now` is on the clock of the stamps.
 std::vector<Diagnostic> diagnostics(const Figures& figures, Stamp now);
 
 } // namespace locus::daemon

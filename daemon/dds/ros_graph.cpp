@@ -14,7 +14,7 @@ namespace {
 
 bool is_letter_or_digit(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'); }
 
-/// That can be read back, so two are never the same.
+/// Escapes characters that are invalid in ROS 2 names. Reversible, so distinct texts stay distinct.
 std::string legal(std::string_view text) {
   std::string name;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -34,7 +34,7 @@ std::vector<dds_entity_t> children_of(dds_entity_t parent) {
   return children;
 }
 
-/// How ROS 2 identifies an entity: its GUID, followed by zeros where there is more room. Zeros alone, if it has none.
+/// Returns ROS 2's identifier of an entity: its GUID, zero-padded; all zeros without a GUID.
 template <class Gid> Gid gid_of(dds_entity_t entity) {
   Gid gid{};
   dds_guid_t guid{};
@@ -45,7 +45,7 @@ template <class Gid> Gid gid_of(dds_entity_t entity) {
 
 template <class Gid> struct Endpoints { std::vector<Gid> readers, writers; };
 
-/// Each is the child of a subscriber or publisher of the participant.
+/// Lists the readers and writers, which are children of the participant's subscribers and publishers.
 template <class Gid> Endpoints<Gid> endpoints_of(dds_entity_t participant) {
   Endpoints<Gid> all;
   for (const dds_entity_t group : children_of(participant))
@@ -63,7 +63,7 @@ template <class Sequence, class Item> void show(Sequence& sequence, std::vector<
   sequence = {count, count, items.data(), false};
 }
 
-/// The endpoint of the message itself is none of the node's, as with the nodes of ROS 2.
+/// Publishes the announcement. Its own writer is not listed as an endpoint of the node, as in ROS 2.
 template <class Info> DdsEntity tell(RosNode node, const DdsNode& from) {
   using Gid = decltype(Info::gid_);
   using Node = std::remove_pointer_t<decltype(Info{}.node_entities_info_seq_._buffer)>;

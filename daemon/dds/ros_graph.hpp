@@ -9,20 +9,20 @@
 
 namespace locus::daemon {
 
-/// A node of ROS 2, whose full name is namespace and name.
+/// ROS 2 node; its full name consists of namespace and name.
 struct RosNode {
   std::string name_space; ///< "/" or "/robot_7"
   std::string name;
 };
 
-/// The node of a service whose topics have this prefix, in the namespace that the prefix lies in: locusd, and of an
-/// instance locusd_INSTANCE, where what no name of ROS 2 may hold is written as _x and two hexadecimal digits. Two
-/// instances never have the same.
+/// Returns the node of a service whose topics have this prefix, in the parent namespace of the prefix: locusd, or
+/// locusd_INSTANCE for an instance, with characters that are invalid in ROS 2 names escaped as _x and two hexadecimal
+/// digits. Unique per instance.
 RosNode ros_node(std::string_view prefix, std::string_view instance);
 
-/// Tells ROS 2 that all endpoints which `from` has by now are those of the node, for as long as what is returned lives:
-/// `ros2 node list` and `ros2 node info` show it. To be called again when there are more. Never waits; one that DDS
-/// does not allow (DDS Security) tells nobody.
+/// Announces to ROS 2 that all current endpoints of `from` belong to the node, for the lifetime of the returned entity,
+/// so that `ros2 node list` and `ros2 node info` show it. To be called again after new endpoints. Does not wait; has no
+/// effect if DDS Security forbids it.
 DdsEntity announce(const RosNode& node, const DdsNode& from, RosGraph graph);
 
 } // namespace locus::daemon

@@ -14,13 +14,13 @@
 namespace locus::daemon {
 namespace {
 
-constexpr Duration kMaxSleep = std::chrono::milliseconds{100}; ///< before a look whether the link is still wanted
-constexpr Duration kFirstPause = std::chrono::seconds{1};      ///< between two attempts to connect; doubled each time
+constexpr Duration kMaxSleep = std::chrono::milliseconds{100}; ///< period of checks of the stop flag
+constexpr Duration kFirstPause = std::chrono::seconds{1}; ///< pause after the first failed attempt; doubled each time
 constexpr Duration kLongestPause = std::chrono::seconds{15};
 
 } // namespace
 
-/// What exists while there is a network.
+/// Endpoints that exist while there is a network.
 struct RosLink::Session {
   struct ImuSource {
     SourceId source;
@@ -102,13 +102,13 @@ struct RosLink::Session {
                   .reader.handle());
   }
 
-  DdsNode node; ///< outlives all that is made from it
+  DdsNode node; ///< first member: outlives its endpoints
   DdsWriter<ros::Odometry> odometry, odometry_fast;
   DdsWriter<ros::UInt8> state;
   DdsWriter<ros::DiagnosticArray> diagnostics, beginning;
   std::optional<DdsWriter<ros::TFMessage>> tf;
   std::optional<DdsWriter<ros::PointCloud2>> cloud, map;
-  DdsEntity no_topic; ///< is never triggered; without anything to wait for a waitset does not wait at all
+  DdsEntity no_topic; ///< never triggered; a waitset without conditions would return at once
   DdsEntity waitset;
   std::vector<ImuSource> imus;
   std::vector<OdometrySource> odometries;
@@ -150,7 +150,7 @@ void RosLink::run() {
   }
 }
 
-/// Nothing when the link is no longer wanted.
+/// Connects, with retries; returns null when the link is to stop.
 std::unique_ptr<RosLink::Session> RosLink::connect() {
   Duration pause = kFirstPause;
   Duration next_attempt{};
@@ -191,7 +191,7 @@ void RosLink::receive(Session& session) {
   for (auto& from : session.cloud_lidars)
     from.reader.take_serialised([&](const SerialisedSample& cloud, dds_instance_handle_t writer) {
       ++from.received;
-      if (from.admission.admits(writer, now)) // may have come while the samples above were handled
+      if (from.admission.admits(writer, now)) // may have arrived while the samples above were handled
         cloud_sink_(from.lidar, Stamp{read_clock(CLOCK_REALTIME)}, cloud);
     });
   for (auto& from : session.health_topics)

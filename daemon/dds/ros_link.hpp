@@ -22,43 +22,43 @@
 
 namespace locus::daemon {
 
-/// Somebody outside says whether the ground is flat (flat_ground_topic).
+/// External message whether the ground is flat (flat_ground_topic).
 struct FlatGroundWord {
   bool flat;
 };
 
-/// All that comes in by DDS, but clouds.
+/// Any input over DDS except clouds.
 using RosInput = std::variant<ImuInput, OdometryInput, OutsideVerdict, FlatGroundWord>;
 
-/// Takes a cloud of the lidar of this index.
+/// Receives a cloud of the lidar with this index.
 using RosCloudSink = std::function<void(std::uint8_t lidar, Stamp arrival, const SerialisedSample& cloud)>;
 
-/// The robot's network in ROS 2's words: the configured topics in, odometry and what goes with it out.
+/// Link to the robot's ROS 2 network: subscribes to the configured topics, publishes odometry and related messages.
 ///
-/// Comes up by itself: while there is no network it is tried again, less and less often, and what is published
-/// meanwhile is lost. Inputs are handed over in the thread of the link, stamped with their arrival.
+/// Connects in the background: without a network it retries at increasing intervals, and messages published meanwhile
+/// are dropped. Inputs are handed over in the link's thread, stamped with their arrival.
 class RosLink {
  public:
   using Sink = std::function<void(const RosInput&)>;
 
-  /// Begins at once and does not wait. `instance`: of the service, empty if it is the only one. `cloud_sink`: needed
-  /// where a lidar of the configuration gives clouds.
+  /// Starts the link's thread and does not wait. `instance` is the name of a service instance, otherwise empty.
+  /// `cloud_sink` is required if a configured lidar publishes clouds.
   RosLink(const Config& config, Sink sink, std::string_view instance = {}, RosCloudSink cloud_sink = {});
   ~RosLink();
   RosLink(const RosLink&) = delete;
   RosLink& operator=(const RosLink&) = delete;
 
-  /// Each by one thread at a time; false while there is no network, or a reader holds it up.
-  bool publish(const OdometryReport& report, TrackingState state); ///< odometry, state and, if asked for, tf
+  /// Publish a message, each function from one thread at a time; false without a network or while a reader blocks it.
+  bool publish(const OdometryReport& report, TrackingState state); ///< odometry, state and, if configured, tf
   bool publish_fast(const OdometryReport& report);
   bool publish_cloud(std::span<const CloudMessage::Point> points, Stamp stamp); ///< base frame
   bool publish_map(std::span<const CloudMessage::Point> points, Stamp stamp);   ///< odom frame
   bool publish(const DiagnosticsMessage& diagnostics);
-  bool publish_beginning(const DiagnosticsMessage& beginning); ///< who comes later hears it, too
+  bool publish_beginning(const DiagnosticsMessage& beginning); ///< latched
 
-  /// Any thread.
+  /// Returns state and counters. Any thread.
   [[nodiscard]] LinkFigures status() const;
-  /// Grows as long as the thread of the link lives, at least ten times a second.
+  /// Returns a heartbeat that grows at least ten times a second while the link's thread runs. Any thread.
   [[nodiscard]] std::uint64_t progress() const { return progress_.load(std::memory_order_relaxed); }
 
  private:
@@ -76,9 +76,9 @@ class RosLink {
   Sink sink_;
   RosCloudSink cloud_sink_;
   CloudMessage cloud_, map_;
-  std::unique_ptr<Session> session_;         ///< made by the thread of the link
-  std::atomic<Session*> connected_{nullptr}; ///< the same once it is complete
-  mutable std::mutex status_mutex_;          ///< no thread of the packet path takes it
+  std::unique_ptr<Session> session_;         ///< created by the link's thread
+  std::atomic<Session*> connected_{nullptr}; ///< session_ once it is complete
+  mutable std::mutex status_mutex_;          ///< never locked by threads of the packet path
   LinkFigures status_;
   std::atomic<std::uint64_t> progress_{0};
   std::atomic<bool> stopping_{false};

@@ -10,13 +10,13 @@
 namespace locus::daemon {
 namespace {
 
-/// The C types know no const, but DDS only reads what it is given to write.
+/// Removes const for the C types; DDS only reads the strings of a message that it writes.
 char* c_string(const std::string& text) { return const_cast<char*>(text.c_str()); } // NOLINT: see above
 
 Eigen::Quaterniond to_eigen(const ros::Quaternion& q) { return {q.w_, q.x_, q.y_, q.z_}; }
 Eigen::Vector3d to_eigen(const ros::Vector3& v) { return {v.x_, v.y_, v.z_}; }
 
-/// A rotation up to rounding; drivers without an attitude leave zeros.
+/// Tells whether a quaternion has unit norm up to rounding; drivers without an attitude send zeros.
 bool is_rotation(const Eigen::Quaterniond& q) {
   constexpr double kTolerance = 0.1;
   return std::abs(q.norm() - 1.0) < kTolerance; // false for NaN

@@ -13,22 +13,22 @@
 #include "core/sources/motion_sample.hpp"
 #include "daemon/dds/ros_types.hpp"
 
-/// Between the messages of ROS 2 and the types of the core. Nothing here touches a network.
+/// Conversion between ROS 2 messages and the types of the core, without network access.
 namespace locus::daemon {
 
-/// A message from outside may hold anything: what is no number stays none and is left to the HealthMonitor, which
-/// counts it. Any thread.
+/// Converts a stamp. These functions do not validate external messages: NaN passes through and is rejected and counted
+/// by the HealthMonitor. Any thread.
 Stamp to_stamp(const ros::Time& time);
 
-/// The attitude is taken only from a unit that has one, by the rules of REP 145: the first covariance is not -1, the
-/// quaternion is one.
+/// Converts an IMU message. The attitude is set only if the message has one by REP 145: the first orientation
+/// covariance is not -1 and the quaternion has unit norm.
 ImuSample to_sample(const ros::Imu& message, Stamp arrival);
 
-/// Says how much worse than usual an odometry source is, from the covariance that it reports of its twist. That of its
-/// pose will not do: it grows with the way that lies behind. One owner.
+/// Compares the reported twist covariance of an odometry source with its usual value. The pose covariance is
+/// unsuitable, since it grows with the distance travelled. One owner.
 class UsualCovariance {
  public:
-  /// 1 is as usual, or nothing reported; infinity is for a covariance that none can be.
+  /// Returns the ratio to the usual covariance; 1 if none is reported, infinity if it is invalid.
   double scale(std::span<const double, 36> twist_covariance);
 
  private:
@@ -38,12 +38,12 @@ class UsualCovariance {
 
 OdometrySample to_sample(const ros::Odometry& message, Stamp arrival, UsualCovariance& usual);
 
-/// As the messages name the frames. Must outlive the messages made with it.
+/// Frame names in messages. Must outlive the messages created with it.
 struct FrameNames {
   std::string odom, base;
 };
 
-/// What the odometry says of one instant, to whoever listens.
+/// Odometry output for one instant.
 struct OdometryReport {
   Stamp stamp;
   Pose T_odom_base;
@@ -57,13 +57,13 @@ OdometryReport report_of(const OdometryEstimate& estimate);
 ros::Time to_ros(Stamp stamp);
 ros::Odometry to_ros(const OdometryReport& report, const FrameNames& frames);
 ros::TransformStamped to_ros_transform(Stamp stamp, const Pose& T_odom_base, const FrameNames& frames);
-/// 0 tracking, 1 degenerate, 2 dead reckoning, 3 standstill.
+/// Converts the state: 0 tracking, 1 degenerate, 2 dead reckoning, 3 standstill.
 ros::UInt8 to_ros(TrackingState state);
 
-/// A cloud of points, with memory of its own that is used again. One owner.
+/// PointCloud2 message with reusable memory. One owner.
 ///
-/// Fields: x, y, z in metres; intensity as the lidar gave it, 0..255; time in seconds from the stamp of the cloud to
-/// the firing, zero or less; ring, with the lowest laser 0; lidar, the index in the configuration. Little-endian.
+/// Fields: x, y, z in metres; intensity as reported by the lidar, 0..255; time in seconds from the stamp of the cloud
+/// to the firing, zero or less; ring, with the lowest laser 0; lidar, the index in the configuration. Little-endian.
 class CloudMessage {
  public:
   struct Point {
@@ -78,7 +78,7 @@ class CloudMessage {
   CloudMessage(const CloudMessage&) = delete;
   CloudMessage& operator=(const CloudMessage&) = delete;
 
-  /// The message, valid until the next call. `frame` must live as long.
+  /// Returns the message, valid until the next call. `frame` must live as long.
   const ros::PointCloud2& make(std::span<const Point> points, Stamp stamp, const std::string& frame);
 
  private:
@@ -87,16 +87,16 @@ class CloudMessage {
   ros::PointCloud2 message_{};
 };
 
-/// One line of /diagnostics with its figures.
+/// Entry of /diagnostics with its values.
 struct Diagnostic {
   enum class Level : std::uint8_t { ok = 0, warning = 1, error = 2, stale = 3 };
   Level level = Level::ok;
   std::string name;    ///< "locusd: front"
-  std::string message; ///< in plain words
+  std::string message; ///< text for the user
   std::vector<std::pair<std::string, std::string>> values;
 };
 
-/// Diagnostics as a message. One owner; lives as long as the message is used.
+/// DiagnosticArray message. One owner; must outlive the use of message().
 class DiagnosticsMessage {
  public:
   DiagnosticsMessage(std::vector<Diagnostic> diagnostics, Stamp stamp);

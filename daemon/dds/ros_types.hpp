@@ -5,8 +5,7 @@
 
 #include "ros_types.h"
 
-/// The messages of ROS 2 by shorter names. They are C structs: strings and sequences are pointers that the struct does
-/// not own.
+/// Short names of the ROS 2 messages. They are C structs: strings and sequences are non-owning pointers.
 namespace locus::daemon::ros {
 
 using Time = builtin_interfaces_msg_dds__Time_;
@@ -29,8 +28,8 @@ using Clock = rosgraph_msgs_msg_dds__Clock_;
 using ParticipantEntitiesInfo = rmw_dds_common_msg_dds__ParticipantEntitiesInfo_;
 using HumbleParticipantEntitiesInfo = rmw_dds_common_humble_dds__ParticipantEntitiesInfo_;
 
-/// What DDS and ROS 2 know a type of message by. The hash is ROS 2's own over the description of the type (REP 2016);
-/// from Iron on it is expected in the user data of every endpoint. A type that ended with Humble has none.
+/// Type of a message for DDS and ROS 2. The hash is ROS 2's hash of the type description (REP 2016), expected in the
+/// user data of every endpoint from Iron on. A type that ended with Humble has none.
 struct Type {
   const dds_topic_descriptor_t* descriptor;
   std::string_view hash;

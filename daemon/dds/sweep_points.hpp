@@ -10,7 +10,7 @@
 
 namespace locus::daemon {
 
-/// Replaces `out` by the points of a sweep where they lay at its end, base frame: `placed`, in the order of `points`.
+/// Replaces `out` by the de-skewed points of a sweep, in the base frame at its end; `placed` has the order of `points`.
 void sweep_points(std::span<const SweepPoint> points, std::span<const SurfacePoint> placed,
                   std::vector<CloudMessage::Point>& out);
 

@@ -11,7 +11,7 @@ namespace {
 
 constexpr Duration kMapPeriod = std::chrono::seconds{5};
 
-/// The coarse surfaces: some ten thousand of a map that fills its memory.
+/// Collects the coarse surfaces, some ten thousand for a map of maximum size.
 void map_points(const SurfaceGrid& grid, std::vector<CloudMessage::Point>& out) {
   out.clear();
   grid.for_each([&](const Eigen::Vector3d& mean_m, const Surface& surface) {

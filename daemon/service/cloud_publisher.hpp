@@ -11,14 +11,14 @@
 
 namespace locus::daemon {
 
-/// Publishes the sweeps and the map from a thread of its own, so that they never delay the odometry: while one is on
-/// its way the next waits, and the one after replaces it.
+/// Publishes the sweeps and the map from a separate thread, so that they never delay the odometry: a waiting cloud is
+/// replaced by the next one.
 class CloudPublisher {
  public:
-  /// `link` must outlive this. Idle where the configuration asks for neither.
+  /// Starts the thread if sweeps or the map are to be published. `link` must outlive this.
   CloudPublisher(DdsOptions options, RosLink& link);
 
-  /// Producer, one thread: what is worth publishing of a sweep that was processed.
+  /// Producer, one thread: hands over the clouds of a processed sweep.
   void take(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate);
 
  private:
@@ -32,7 +32,7 @@ class CloudPublisher {
   DdsOptions options_;
   RosLink& link_;
   LatestSlot<Cloud> sweep_, map_;
-  Stamp map_published_; ///< of the producer
+  Stamp map_published_; ///< owned by the producer
   std::optional<Worker> worker_;
 };
 

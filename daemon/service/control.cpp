@@ -35,7 +35,7 @@ Parsed parse_flat_ground(const nlohmann::json& request) {
 }
 
 Parsed parse_reset(const nlohmann::json& request) {
-  constexpr double kFarthest_m = 500e3, kMost_deg = 360.0; // a map reaches as far, see SurfaceGrid::reaches()
+  constexpr double kFarthest_m = 500e3, kMost_deg = 360.0; // extent of a map, see SurfaceGrid::reaches()
   if (!request.contains("pose"))
     return ControlRequest{Reset{}};
   const auto v = request["pose"].get<std::array<double, 6>>();
@@ -90,8 +90,8 @@ std::vector<gid_t> groups_of(int client) {
   return groups;
 }
 
-/// The group of those who may command, looked up once a second at most: strangers may ask without end. For the main
-/// thread alone.
+/// Returns the group of privileged users. Looked up once a second at most, since other users may send requests at any
+/// rate. Main thread only.
 std::optional<gid_t> commanders() {
   static std::optional<gid_t> commanders;
   static Duration looked_up = -std::chrono::hours{1};
@@ -128,7 +128,7 @@ Descriptor memory_file(std::span<const std::byte> bytes) {
   return file;
 }
 
-/// Whether it left; an answer that does not fit a client's buffer is its own fault.
+/// Sends an answer without blocking; false if the client's buffer has no room for it.
 bool send(int client, const ControlServer::Answer& answer) {
   std::string text = answer.json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
   const Descriptor file = answer.bytes.empty() ? Descriptor{} : memory_file(answer.bytes);
@@ -151,7 +151,7 @@ bool send(int client, const ControlServer::Answer& answer) {
 }
 
 std::filesystem::path runtime_folder() {
-  const char* const folder = std::getenv("RUNTIME_DIRECTORY"); // NOLINT(concurrency-mt-unsafe): nobody sets it
+  const char* const folder = std::getenv("RUNTIME_DIRECTORY"); // NOLINT(concurrency-mt-unsafe): never set here
   return folder != nullptr ? folder : "/run/locusd";
 }
 
@@ -185,7 +185,7 @@ Expected<ControlServer, std::string> ControlServer::open(const std::filesystem::
         errno == EADDRINUSE
             ? "another service answers there, or it is no socket; set RUNTIME_DIRECTORY to a folder of its own"
             : "set RUNTIME_DIRECTORY to a folder that may be written");
-  constexpr mode_t kEverybody = 0666; // who may do what is told by who asks
+  constexpr mode_t kEverybody = 0666; // requests are checked by the peer's credentials
   if (chmod(path.c_str(), kEverybody) != 0 || listen(listener.number(), kMaxClients) != 0)
     return failed("cannot listen on it");
   return ControlServer{std::move(listener), std::move(handler)};
@@ -204,7 +204,7 @@ bool ControlServer::serve() {
   return called || gone > 0 || answered_ != answered_before;
 }
 
-/// At most as many as may stay, for somebody may call again and again.
+/// Accepts at most kMaxClients per call, so that repeated connects do not block the service.
 bool ControlServer::accept_waiting() {
   for (std::size_t i = 0; i < kMaxClients; ++i) {
     Descriptor client{accept4(listener_.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC)};
@@ -220,7 +220,7 @@ bool ControlServer::accept_waiting() {
   return true;
 }
 
-/// Who may only look keeps nobody out who may do more.
+/// Disconnects an unprivileged client to make room for a privileged one.
 void ControlServer::drop_a_stranger() {
   const auto stranger =
       std::ranges::find_if(clients_, [](const Client& client) { return !may_command(client.socket.number()); });

@@ -23,36 +23,35 @@
 
 namespace locus::daemon {
 
-/// What locusctl may ask for.
+/// Requests of locusctl.
 struct ShowStatus {
-  bool as_text = false; ///< for human eyes; else as JSON
+  bool as_text = false; ///< formatted text; otherwise JSON
 };
 struct SaveMap {};
 struct SetFlatGround {
   FlatGround mode;
 };
 struct Reset {
-  std::optional<Pose> T_odom_base; ///< where the odometry begins anew; nothing: at the origin
+  std::optional<Pose> T_odom_base; ///< initial pose after the reset; empty: the origin
 };
 struct Reload {};
 struct KeepIncident {
-  double keep_s; ///< of what came last
+  double keep_s; ///< length of the input to store, up to now
 };
 using ControlRequest = std::variant<ShowStatus, SaveMap, SetFlatGround, Reset, Reload, KeepIncident>;
 
-/// Of the bytes of one message, which may be anything: {"command": "save-map" | "reload"}, {"command": "status"} with
-/// "text": true for an answer {"text": "..."}, {"command": "flat-ground", "mode": "on" | "off" | "auto"}, {"command":
-/// "record", "keep_s": 60} for an answer {"folder": "..."} where the status tells what becomes of it, {"command":
-/// "reset"} with "pose": [x, y, z, roll, pitch, yaw] in metres and degrees if need be. Fails with one line for the
-/// user. Any thread.
+/// Parses one message of arbitrary bytes: {"command": "save-map" | "reload"}, {"command": "status"} with "text": true
+/// for an answer {"text": "..."}, {"command": "flat-ground", "mode": "on" | "off" | "auto"}, {"command": "record",
+/// "keep_s": 60} for an answer {"folder": "..."}, whose progress the status reports, {"command": "reset"} with an
+/// optional "pose": [x, y, z, roll, pitch, yaw] in metres and degrees. Fails with one line for the user. Any thread.
 Expected<ControlRequest, std::string> parse_control_request(std::string_view message);
 
-/// Where locusctl reaches the service: a Unix socket on which each message is one request or one answer, in JSON.
+/// Server for locusctl: a Unix socket on which each message is one JSON request or answer.
 ///
-/// An answer holds "error" if it was refused, and "wrong_usage" if what was asked for was wrong; it may bring bytes
-/// along in a memory file, so that nobody waits for a slow reader. Everybody on the machine may ask for the status; the
-/// other commands are for root, the service's own user and members of group locusd, who find room however many others
-/// are there. One owner, the main thread.
+/// An answer contains "error" if the request was refused, and "wrong_usage" if the request was invalid; it may carry
+/// bytes in a memory file, so that a slow reader does not block the service. Any local user may request the status; the
+/// other commands require root, the service's own user or group locusd, whose connections take precedence over those of
+/// other users. One owner, the main thread.
 class ControlServer {
  public:
   struct Answer {
@@ -63,18 +62,19 @@ class ControlServer {
     static Answer refusal(const std::string& why) { return {{{"error", why}}, {}}; }
     static Answer wrong_usage(const std::string& why) { return {{{"error", why}, {"wrong_usage", true}}, {}}; }
   };
-  /// Nothing: the answer is not there yet; the same request is made again at the next serve(), for a few seconds.
+  /// Callback that answers a request; empty while there is no answer yet: serve() then repeats the request for up to
+  /// kLongestAnswer.
   using Handler = std::function<std::optional<Answer>(const ControlRequest& request)>;
 
   static constexpr std::size_t kMaxClients = 16;
   static constexpr Duration kLongestAnswer = std::chrono::seconds{3};
 
-  /// Fails with one line for the user, also where another service answers: who has the socket owns its folder.
+  /// Opens the socket, whose owner also owns its folder. Fails with one line for the user, also if another service
+  /// listens on it.
   static Expected<ControlServer, std::string> open(const std::filesystem::path& path, Handler handler);
 
   void add_to(std::vector<pollfd>& poll) const;
-  /// Takes what has come, without waiting, one request of each client. Whether anybody called, hung up or was
-  /// answered.
+  /// Serves one request of each client, without waiting. True if a client connected, disconnected or was answered.
   bool serve();
 
  private:
@@ -85,10 +85,10 @@ class ControlServer {
   };
 
   ControlServer(Descriptor listener, Handler handler) : listener_(std::move(listener)), handler_(std::move(handler)) {}
-  /// Whether there was one.
+  /// Accepts waiting clients; true if there was one.
   bool accept_waiting();
   void drop_a_stranger();
-  /// Whether the client stays.
+  /// Serves a client; false if it is to be disconnected.
   bool serve(Client& client);
   [[nodiscard]] std::optional<Answer> handle(Client& client);
 
@@ -98,9 +98,9 @@ class ControlServer {
   std::uint64_t answered_ = 0;
 };
 
-/// $RUNTIME_DIRECTORY/control as systemd sets it, else /run/locusd/control.
+/// Returns $RUNTIME_DIRECTORY/control, with the variable set by systemd; by default /run/locusd/control.
 std::filesystem::path control_path();
-/// NAME of the service locusd@NAME, by the same variable; empty if it is no instance.
+/// Returns NAME of the service locusd@NAME, from the same variable; empty outside an instance.
 std::string instance_name();
 
 } // namespace locus::daemon

@@ -13,32 +13,31 @@
 
 namespace locus::daemon {
 
-/// Notices by the figures of a service what is an incident: that it is dead reckoning for kLostFor after it has
-/// tracked, because lidar is lost or registration fails; that a motion source is refused because lidar or gravity
-/// contradict it. One owner.
+/// Detects incidents from the figures of a service: dead reckoning for kLostFor after tracking, through loss of lidar
+/// or failed registration; rejection of a motion source because lidar or gravity contradicts it. One owner.
 class IncidentWatch {
  public:
-  static constexpr Duration kLostFor = std::chrono::seconds{1}; ///< a sweep that fails alone is none
-  static constexpr Duration kQuiet = std::chrono::seconds{10};  ///< after which a contradiction is another one
+  static constexpr Duration kLostFor = std::chrono::seconds{1}; ///< a single failed sweep is no incident
+  static constexpr Duration kQuiet = std::chrono::seconds{10};  ///< quiet time that separates two contradictions
 
-  using Clock = Duration (*)(clockid_t); ///< read_clock(), or another in tests
+  using Clock = Duration (*)(clockid_t); ///< read_clock(), replaceable in tests
   explicit IncidentWatch(Clock clock = [](clockid_t id) { return read_clock(id); }) : clock_(clock) {}
 
-  /// A few times a second. Each time it begins, once.
+  /// Checks the figures, a few times a second. Returns the cause once per incident, at its start.
   std::optional<IncidentCause> look(const Figures& figures);
 
  private:
   Clock clock_;
   bool has_tracked_ = false;
   std::optional<Duration> lost_since_;   ///< CLOCK_MONOTONIC
-  std::uint64_t contradictions_ = 0;     ///< counted so far
-  std::optional<Duration> contradicted_; ///< last; CLOCK_MONOTONIC
+  std::uint64_t contradictions_ = 0;     ///< count at the last check
+  std::optional<Duration> contradicted_; ///< time of the last one; CLOCK_MONOTONIC
 };
 
-/// For why.json: why, when, which program on which computer, and the status then.
+/// Returns the contents of why.json: cause, time, program version, host and the status at that time.
 std::string incident_report(IncidentCause cause, Stamp when, const Figures& figures);
 
-/// Of a run that another process has left behind, which was last there as far as is known.
+/// Returns the contents of why.json for a run that another process left behind; `T_odom_base` is its last known pose.
 std::string restart_report(Stamp when, const std::filesystem::path& run, const std::optional<Pose>& T_odom_base);
 
 } // namespace locus::daemon

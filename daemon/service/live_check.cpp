@@ -17,7 +17,7 @@
 namespace locus::daemon {
 namespace {
 
-/// The topic of a motion source or of a lidar's clouds, which anybody may publish.
+/// Subscription to the topic of a motion source or of a lidar's clouds.
 struct HeardTopic {
   std::string whose; ///< "imu NAME"
   std::string name;
@@ -69,7 +69,7 @@ bool is_for(const HeardLidar& lidar, const LidarOptions& options) {
          (!options.source_ip || lidar.ip == *options.source_ip);
 }
 
-/// Those that no entry of the configuration takes.
+/// Lists the lidars that match no entry of the configuration.
 std::string strangers(const Config& config, const std::vector<HeardLidar>& heard) {
   std::string text;
   for (const HeardLidar& lidar : heard)
@@ -79,7 +79,7 @@ std::string strangers(const Config& config, const std::vector<HeardLidar>& heard
   return text;
 }
 
-/// For a lidar of which nothing comes.
+/// Returns a remedy for a lidar without packets.
 std::string advice(const LidarOptions& options, const Config& config, const std::vector<HeardLidar>& heard,
                    bool hears_all) {
   if (const std::string others = strangers(config, heard); !others.empty())
@@ -136,7 +136,7 @@ void compare(const LidarOptions& options, const Config& config, const std::vecto
                                        options.port, lidar.packets_per_s, lidar.clock_state()));
 }
 
-/// The type in which somebody publishes the topic, whether or not it is the right one; empty if nobody does.
+/// Returns the type with which the topic is published, correct or not; empty without a publisher.
 std::string published_type(const DdsNode& node, const std::string& topic) {
   const DdsEntity reader{dds_create_reader(node.participant(), DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr)};
   std::string type;
@@ -175,14 +175,14 @@ void compare(const HeardTopic& topic, const DdsNode& node, const DdsOptions& dds
 } // namespace
 
 Expected<LiveCheck, std::string> check_live(const Config& config, Duration duration) {
-  constexpr Duration kRound = std::chrono::milliseconds{100}; // what readers keep outlasts it
+  constexpr Duration kRound = std::chrono::milliseconds{100}; // readers' history covers more
   std::vector<std::uint16_t> ports;
   for (const auto& [port, needed] : lidar_ports(config))
     ports.push_back(port);
   auto wire = WireTap::open(ports);
   if (!wire)
     return wire.error();
-  const auto member = UdpSocket::open(0); // of the groups that lidars send to: what is for them comes then
+  const auto member = UdpSocket::open(0); // joins the lidars' multicast groups, so that their packets arrive
   if (member)
     join_multicast(config, std::span(&*member, 1));
   LiveCheck check;

@@ -9,14 +9,14 @@
 
 namespace locus::daemon {
 
-/// What a configuration says beside what is on the wire: one line for the user each.
+/// Comparison of a configuration with the traffic on the network; each entry is one line for the user.
 struct LiveCheck {
   std::vector<std::string> agrees;
-  std::vector<std::string> differs; ///< what differs, and what to do
+  std::vector<std::string> differs; ///< difference and remedy
 };
 
-/// Listens for a while to whatever lidars send and to the topics of the motion sources. A service that runs is not
-/// disturbed. Fails with one line for the user where it may not listen.
+/// Listens to all lidar packets and to the configured topics for `duration`. Does not disturb a running service. Fails
+/// with one line for the user if listening is not permitted.
 Expected<LiveCheck, std::string> check_live(const Config& config, Duration duration);
 
 } // namespace locus::daemon

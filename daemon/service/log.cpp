@@ -12,14 +12,14 @@
 #include <sys/uio.h>
 #include <unistd.h>
 
-#define SD_JOURNAL_SUPPRESS_LOCATION // the caller's is meant
+#define SD_JOURNAL_SUPPRESS_LOCATION // the location passed by the caller is used
 #include <systemd/sd-journal.h>
 
 namespace locus::daemon {
 
 namespace {
 
-/// systemd names the stream that it has connected; whoever redirects stderr wants text.
+/// Tells whether stderr is the stream that systemd connected to the journal; a redirected stderr gets plain text.
 bool stderr_is_journal() {
   const char* const stream = std::getenv("JOURNAL_STREAM"); // NOLINT(concurrency-mt-unsafe): at start-up
   struct stat status {};
@@ -61,7 +61,7 @@ void Log::write(Severity severity, const std::string& message, Fields fields, co
   if (!to_journal_) {
     static constexpr std::array<std::string_view, 7> kWords{"", "", "", "error: ", "warning: ", "", ""};
     const std::string line = fmt::format("locusd: {}{}\n", kWords[static_cast<std::size_t>(severity)], message);
-    static_cast<void>(std::fputs(line.c_str(), stderr)); // a log that is full ends no service
+    static_cast<void>(std::fputs(line.c_str(), stderr)); // a full log does not stop the service
     return;
   }
   std::vector<std::string> lines{fmt::format("MESSAGE={}", message),

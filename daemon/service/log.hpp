@@ -15,10 +15,10 @@
 
 namespace locus::daemon {
 
-/// As syslog numbers them.
+/// Severities with the numbers of syslog.
 enum class Severity : std::uint8_t { error = 3, warning = 4, notice = 5, info = 6 };
 
-/// A place in the program: std::source_location, which clang has not yet.
+/// Source location: a substitute for std::source_location, which clang 14 lacks.
 struct CodePlace {
   const char* file;
   std::uint32_t line;
@@ -30,12 +30,11 @@ struct CodePlace {
   }
 };
 
-/// What the service tells those who look after it: to the journal with fields where stderr leads there, else as a line
-/// of text to stderr.
+/// Log of the service: to the journal with fields if stderr is connected to it, otherwise as lines of text to stderr.
 ///
-/// Each message says what happened and, unless all is well, what to do. A place in the program that says more than
-/// kBurst messages within kInterval is silenced until that is over, and then tells how many were left out.
-/// Any thread but those of the packet path.
+/// Each message states the event and, for a problem, the remedy. A source location that logs more than kBurst messages
+/// within kInterval is suppressed for the rest of it; its next message reports the number of suppressed ones.
+/// Any thread except those of the packet path.
 class Log {
  public:
   using Fields = std::initializer_list<std::pair<std::string_view, std::string>>; ///< names in capitals: LOCUS_SOURCE
@@ -43,7 +42,7 @@ class Log {
 
   static constexpr Duration kInterval = std::chrono::seconds{10};
 
-  using Clock = Duration (*)(clockid_t); ///< read_clock(), or another in tests
+  using Clock = Duration (*)(clockid_t); ///< read_clock(), replaceable in tests
   explicit Log(Clock clock = [](clockid_t id) { return read_clock(id); });
 
   void say(Severity severity, const std::string& message, Fields fields = {},

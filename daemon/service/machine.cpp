@@ -84,7 +84,7 @@ Expected<std::vector<UdpSocket>, std::string> open_lidar_sockets(const Config& c
                                      : "; without position packets the time of lidars is that of their arrival"));
   }
   const auto smallest = std::ranges::min_element(sockets, {}, &UdpSocket::buffer_bytes);
-  if (smallest == sockets.end()) // all lidars give clouds
+  if (smallest == sockets.end()) // all lidars publish clouds
     return sockets;
   if (const int least = smallest->buffer_bytes(); least < UdpSocket::kWantedBufferBytes)
     log.warn(
@@ -155,7 +155,7 @@ std::string scheduling() {
 
 void take_least_priority() {
   constexpr int kLeast = 19;
-  setpriority(PRIO_PROCESS, 0, kLeast); // of this thread alone, on Linux
+  setpriority(PRIO_PROCESS, 0, kLeast); // affects only this thread on Linux
 }
 
 } // namespace locus::daemon

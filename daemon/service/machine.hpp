@@ -14,35 +14,35 @@
 
 namespace locus::daemon {
 
-/// Descriptors that systemd has opened for this process (socket activation); empty without. They stay its own: sockets
-/// are made from copies.
+/// Returns the sockets passed by systemd (socket activation); empty if there are none. They stay open and are only
+/// duplicated.
 std::vector<int> inherited_sockets();
 
-/// The ports that lidars send to, each with whether the service is of no use without it: position packets tell the
-/// time, and are missed by nobody else.
+/// Returns the ports that lidars send to, each with a flag whether it is required. Ports of position packets, which
+/// only carry the time, and of built-in IMUs are optional.
 std::map<std::uint16_t, bool> lidar_ports(const Config& config);
 
-/// A socket for every port that lidars send to: their data and their position packets. Those inherited come first, the
-/// others are opened. Fails with one line for the user.
+/// Returns a socket for every port of lidar_ports(): the inherited ones first, then newly opened ones. Fails with one
+/// line for the user.
 Expected<std::vector<UdpSocket>, std::string> open_lidar_sockets(const Config& config, std::span<const int> inherited,
                                                                  Log& log);
 
-/// Joins the groups of lidars that send by multicast, on the interfaces that are up by now.
+/// Joins the multicast groups of the lidars on the interfaces that are up now.
 void join_multicast(const Config& config, std::span<const UdpSocket> sockets);
 
-/// Gives the process what RealtimeOptions ask of the operating system; to be called before the threads are made, for
-/// they inherit processors. Nothing is needed for the service to work: a line for the user for each wish that was not
-/// granted. Without a wish, what an earlier call has done is undone.
+/// Applies RealtimeOptions to the process; to be called before threads are created, which inherit the CPU affinity. All
+/// of it is optional: returns a line for the user if a request was not granted. A default value reverts earlier calls.
 std::optional<std::string> lock_memory(bool wanted);
 std::optional<std::string> keep_to_cpus(const std::vector<int>& cpus);
 
-/// Of the calling thread, and of those that it will make: TBB's helpers have the priority of the thread they help.
+/// Sets the SCHED_FIFO priority of the calling thread and of threads it creates, such as TBB's workers. Returns a line
+/// for the user if it was not granted.
 std::optional<std::string> raise_priority(int fifo_priority);
 
-/// What is in force of it, and of what the service's unit gives, for the calling thread. For a line of the log.
+/// Describes the scheduling policy, nice value and CPU weight in effect for the calling thread, for the log.
 std::string scheduling();
 
-/// Of the calling thread: it waits for all others.
+/// Sets the calling thread to the lowest priority (nice 19).
 void take_least_priority();
 
 } // namespace locus::daemon

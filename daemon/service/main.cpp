@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// locusd: lidar packets and motion samples in, odometry out, until it is told to stop.
+// locusd: computes odometry from lidar packets and motion samples until stopped.
 #include <chrono>
 #include <cstdio>
 #include <exception>
@@ -77,7 +77,7 @@ int run(const Arguments& arguments) {
 
 } // namespace
 
-int main(int argc, char** argv) { // NOLINT(bugprone-exception-escape): what throws while telling of an exception
+int main(int argc, char** argv) { // NOLINT(bugprone-exception-escape): exceptions while reporting an exception
   Arguments arguments;
   CLI::App app{"Real-time lidar odometry as a service.", "locusd"};
   describe(app, arguments);

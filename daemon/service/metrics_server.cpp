@@ -30,14 +30,14 @@ std::string http_refusal(std::string_view status, std::string_view why, std::str
   return http(status, "text/plain; charset=utf-8", more, fmt::format("{}\n", why));
 }
 
-/// Takes a word and the space behind it off the front.
+/// Removes the first word and the space after it, and returns the word.
 std::string_view take_word(std::string_view& text) {
   const std::string_view word = text.substr(0, text.find(' '));
   text.remove_prefix(std::min(text.size(), word.size() + 1));
   return word;
 }
 
-/// Binds also where the network interface is not up yet, and where connections of the run before still end.
+/// Permits binding before the network interface is up, and while connections of the previous run are closing.
 void set_options(const Descriptor& listener, int family) {
   const int yes = 1;
   setsockopt(listener.number(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
@@ -82,7 +82,7 @@ MetricsServer::open(const std::string& listen, std::function<std::string()> metr
   set_options(listener, family);
   if (bind(listener.number(), reinterpret_cast<const sockaddr*>(&address->storage), address->size) != 0)
     return failed(errno);
-  constexpr mode_t kEverybody = 0666; // as they may ask for the status
+  constexpr mode_t kEverybody = 0666; // like the status, for any local user
   if ((!path.empty() && chmod(path.c_str(), kEverybody) != 0) || ::listen(listener.number(), kMaxClients) != 0)
     return failed(errno);
   return std::unique_ptr<MetricsServer>(new MetricsServer(std::move(listener), path, std::move(metrics), clock));
@@ -100,7 +100,7 @@ void MetricsServer::add_to(std::vector<pollfd>& poll) const {
     poll.push_back({client.socket.number(), static_cast<short>(client.answer.empty() ? POLLIN : POLLOUT), 0});
 }
 
-/// Who has spoken when the connection is taken is answered at once, and pushes nobody out.
+/// Accepts clients. A request that is already there is answered at once and displaces no other client.
 bool MetricsServer::serve() {
   round_.clear();
   const std::size_t gone = std::erase_if(clients_, [this](Client& client) { return !serve(client); });
@@ -133,7 +133,7 @@ bool MetricsServer::serve(Client& client) {
   return !client.answer.empty();
 }
 
-/// Whether the client may stay; once it has said all, its answer is there.
+/// Reads from a client and sets its answer once the request is complete; false if the client is to be disconnected.
 bool MetricsServer::read_request(Client& client) {
   std::array<char, kMaxRequestBytes> bytes{};
   const ssize_t size = recv(client.socket.number(), bytes.data(), bytes.size(), MSG_DONTWAIT);

@@ -20,7 +20,7 @@ namespace {
 
 using std::filesystem::path;
 
-constexpr std::int64_t kPiecesOfKept = 6; ///< so much more than what is asked for may be kept
+constexpr std::int64_t kPiecesOfKept = 6; ///< pieces per kept duration; the excess is up to one piece
 
 path folder_of_socket() { return control_path().parent_path(); }
 
@@ -52,7 +52,7 @@ Expected<RecordingBounds, std::string> ring_bounds(std::uint64_t max_bytes, Dura
 }
 
 void mark_run(const path& run) {
-  static path marked; // by the one thread of the disk
+  static path marked; // accessed by the disk thread only
   if (run == marked)
     return;
   marked = run;

@@ -10,25 +10,26 @@
 #include "core/base/stamp.hpp"
 #include "daemon/recorder.hpp"
 
-/// What survives a crash of the service, in a folder of its own beside the control socket: the input of the last
-/// minute, and a mark that tells which run was being recorded. Both are removed at a clean end. For the service alone
-/// that owns the control socket.
+/// Data that survives a crash of the service, in a folder next to the control socket: the input of the last minute, and
+/// a mark with the run being recorded. Both are removed at a clean end. Only for the service that owns the control
+/// socket.
 namespace locus::daemon {
 
-/// Of the recording that is for incidents alone, in memory.
+/// Returns the folder of the in-memory recording for incidents.
 std::filesystem::path ring_folder();
 
-/// A quarter of the file system at most, for others need room there, too. One line for the user where none is to be
-/// held: on what is no tmpfs it would wear out a disk, and in less than RecordOptions::kLeastBytes is no sense.
+/// Returns the limits of that recording, a quarter of the file system at most, which is shared with other programs.
+/// Fails with one line for the user if the folder is not on a tmpfs, since writes would wear out a disk, or is smaller
+/// than RecordOptions::kLeastBytes.
 Expected<RecordingBounds, std::string> ring_bounds(std::uint64_t max_bytes, Duration keep);
 
-/// Thread of the disk: says that this run is being recorded; empty: none yet.
+/// Disk thread: marks this run as being recorded; empty: none yet.
 void mark_run(const std::filesystem::path& run);
 
-/// The run that another process has marked and not unmarked; once.
+/// Returns the run marked by a process that did not end cleanly, and removes the mark.
 std::optional<std::filesystem::path> take_marked_run();
 
-/// Of all processes; what is not named as they name it stays.
+/// Removes the mark and the recordings of all processes; files with other names stay.
 void remove_mark_and_ring();
 
 } // namespace locus::daemon

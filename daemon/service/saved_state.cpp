@@ -32,30 +32,30 @@ using LearnedNumbers = std::array<double, 6 + LearnedSource::kMostStates*(Learne
 
 constexpr std::string_view kAnyVersion = "locusd ";
 
-/// What the file begins with, twice, as the machine holds it: it is read where it was written. The older one of the two
-/// is written over in place, so that one is whole whenever that ends; of two the newer counts.
+/// Header of the file, stored twice, in native byte order since the file stays on one machine. An update overwrites the
+/// older copy in place, so one copy is valid at any time; of two valid copies the newer counts.
 struct Head {
   std::array<char, 8> magic;
-  std::uint64_t number; ///< grows from one to the next
+  std::uint64_t number; ///< consecutive
   std::int64_t stamp_ns;
   std::array<double, 7> xyz_xyzw;
   std::array<double, 36> covariance;
   std::array<double, 6> twist;
-  std::array<std::array<double, 7>, kMaxSources> sources_xyz_xyzw; ///< all zero: nothing
-  std::array<LearnedNumbers, kMaxSources> learned;                 ///< noise, states, covariance; no noise: nothing
+  std::array<std::array<double, 7>, kMaxSources> sources_xyz_xyzw; ///< all zero: empty
+  std::array<LearnedNumbers, kMaxSources> learned;                 ///< noise, states, covariance; zero noise: empty
   std::array<std::int64_t, kMaxSources> learned_since_ns;
-  std::uint64_t doubted;  ///< a bit each
-  std::uint64_t checksum; ///< of what stands above
+  std::uint64_t doubted;  ///< one bit per source
+  std::uint64_t checksum; ///< over all members above
 };
 
 constexpr std::size_t kHeads = 2;
 
-/// What follows them, and is followed by the points.
+/// Part of the file between the headers and the points.
 struct Body {
   SourceIds sources;
   std::int32_t flat_ground;
   std::uint32_t points;
-  std::uint64_t checksum; ///< of what stands above, and of the points
+  std::uint64_t checksum; ///< over all members above and the points
 };
 static_assert(std::has_unique_object_representations_v<Body> && sizeof(SurfacePoint) == 6 * sizeof(float));
 
@@ -63,7 +63,7 @@ template <class Block> std::string_view bytes_of(const Block& block) {
   return {reinterpret_cast<const char*>(&block), sizeof(block)};
 }
 
-/// FNV-1a: a file cut short or mixed up is to be noticed, not a forged one.
+/// Computes FNV-1a, to detect truncation or corruption, not forgery.
 std::uint64_t checksum_of(std::string_view bytes, std::uint64_t hash = 0xcbf29ce484222325U) {
   for (const char byte : bytes)
     hash = (hash ^ static_cast<unsigned char>(byte)) * 0x100000001b3U;
@@ -76,7 +76,7 @@ std::uint64_t checksum_of(const Body& body, std::string_view points) {
   return checksum_of(points, checksum_of(bytes_of(body).substr(0, offsetof(Body, checksum))));
 }
 
-/// A disk that is full takes part of what is written, and says why only when it is asked for the rest.
+/// Writes all bytes; false on error. A full disk first accepts a part and reports the error on the next call.
 bool write_all(int descriptor, std::string_view bytes, std::size_t offset = 0) {
   while (!bytes.empty()) {
     const ssize_t written = pwrite(descriptor, bytes.data(), bytes.size(), static_cast<off_t>(offset));
@@ -88,7 +88,7 @@ bool write_all(int descriptor, std::string_view bytes, std::size_t offset = 0) {
   return true;
 }
 
-/// A file that was renamed in it stays so after a power cut. Where a file system cannot say so, none is worse off.
+/// Syncs a folder, so that a rename in it survives a power cut. Ignores errors of file systems without support.
 void sync_folder(const std::filesystem::path& folder) {
   const int descriptor = open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0)
@@ -159,13 +159,13 @@ std::string to_bytes(const SavedState& state) {
   return bytes.append(bytes_of(body)).append(text);
 }
 
-/// A head of the file, and the place of the other one.
+/// Newest valid header and the offset of the other one.
 struct NewestHead {
   Head head;
   std::size_t offset_of_older;
 };
 
-/// Of those that are whole, if any is. `bytes` begins as the file does.
+/// Returns the newest valid header, if any; `bytes` is the beginning of the file.
 std::optional<NewestHead> newest_head(std::string_view bytes) {
   std::optional<NewestHead> newest;
   for (std::size_t place = 0; place < kHeads && bytes.size() >= (place + 1) * sizeof(Head); ++place) {
@@ -177,7 +177,7 @@ std::optional<NewestHead> newest_head(std::string_view bytes) {
   return newest;
 }
 
-/// After minutes of dead reckoning it may be of any size.
+/// Checks that a matrix is finite and positive semidefinite; any size is valid, as after minutes of dead reckoning.
 template <class Matrix> bool is_covariance(const Matrix& matrix) {
   constexpr double kRounding = 1e-6;
   const double size = matrix.norm();
@@ -185,14 +185,14 @@ template <class Matrix> bool is_covariance(const Matrix& matrix) {
          (matrix.template selfadjointView<Eigen::Lower>().eigenvalues().array() > -kRounding * (1.0 + size)).all();
 }
 
-/// What was learned of a source that is broken is not for another run.
+/// Checks a learned calibration for plausible values; one learned from a faulty source is discarded.
 bool makes_sense(const LearnedSource& learned) {
-  constexpr double kLeast = -0.9, kMost = 1.5; // rad/s of a bias, s, rad, and what scales are above one
+  constexpr double kLeast = -0.9, kMost = 1.5; // bias in rad/s, delay in s, mounting in rad, scale - 1
   return (learned.noise_per_s.array() > 0.0).all() && learned.noise_per_s.allFinite() &&
          (learned.states.array() > kLeast && learned.states.array() < kMost).all() && is_covariance(learned.covariance);
 }
 
-/// Whether a robot can go on from there: what another hand wrote may hold anything.
+/// Checks that a state is usable, since the file may contain arbitrary values.
 bool makes_sense(const SavedState& state) {
   constexpr double kFarthest_m = 1e8; // geocentric coordinates are within it
   if (state.last.stamp < Stamp{})
@@ -207,7 +207,7 @@ bool makes_sense(const SavedState& state) {
          });
 }
 
-/// Nothing if it is cut short or damaged.
+/// Parses a state; empty if the file is truncated or damaged.
 std::optional<SavedState> from_bytes(std::string_view bytes) {
   constexpr std::size_t kBodyAt = kHeads * sizeof(Head), kPointsAt = kBodyAt + sizeof(Body);
   const std::optional<NewestHead> newest = newest_head(bytes);
@@ -313,11 +313,11 @@ void update_whereabouts(const std::filesystem::path& file, const Whereabouts& la
 }
 
 std::optional<std::filesystem::path> state_path() {
-  const char* const folder = std::getenv("STATE_DIRECTORY"); // NOLINT(concurrency-mt-unsafe): nobody sets it
+  const char* const folder = std::getenv("STATE_DIRECTORY"); // NOLINT(concurrency-mt-unsafe): never set here
   return folder != nullptr ? std::optional{std::filesystem::path(folder) / "state"} : std::nullopt;
 }
 
-/// A clock that was set back does not put it off.
+/// Tells whether a full state is due. A clock that was set back does not delay it.
 bool StateKeeper::is_due() const {
   return !saved_ || std::chrono::abs(now_->stamp - saved_->stamp) > kEvery ||
          (now_->T_odom_base.translation - saved_->T_odom_base.translation).norm() > kEvery_m;
@@ -327,7 +327,7 @@ void StateKeeper::begin_anew(const std::optional<SavedState>& start) {
   now_.reset();
   saved_.reset();
   written_.reset();
-  static_cast<void>(states_.take()); // of the time before
+  static_cast<void>(states_.take()); // discards stale data
   static_cast<void>(whereabouts_.take());
   std::error_code error;
   if (file_ && start) {
@@ -340,7 +340,7 @@ void StateKeeper::begin_anew(const std::optional<SavedState>& start) {
 }
 
 void StateKeeper::take(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground) {
-  if (!estimate.beginning) // what was saved is still true
+  if (!estimate.beginning) // the saved state is still valid
     return;
   now_ = now_.value_or(Whereabouts{}).followed_by(estimate);
   if (!file_)
@@ -353,13 +353,13 @@ void StateKeeper::take(const Odometry& odometry, const OdometryEstimate& estimat
     due.state.flat_ground = flat_ground;
     due.state.sources = sources_;
     read_map(odometry, now_->T_odom_base, due.state.map_odom);
-    static_cast<void>(states_.publish()); // an older one that was not written yet is worth nothing any more
+    static_cast<void>(states_.publish()); // replaces an older unwritten state
   }
   whereabouts_.back() = {number_, *now_};
   static_cast<void>(whereabouts_.publish());
 }
 
-/// The whereabouts are taken first: the state that they belong to is then there, or has been written.
+/// Reads the whereabouts first: the state that they refer to is then pending or already written.
 void StateKeeper::write() {
   const Update* const update = whereabouts_.take();
   if (const Due* const due = states_.take()) {

@@ -18,67 +18,67 @@
 
 namespace locus::daemon {
 
-/// Tells one list of motion sources from another, in which a source may stand at another place.
+/// Hashes that detect a change of the list of motion sources, which may reorder them, or of their calibration.
 struct SourceIds {
-  std::uint64_t list = 0;                              ///< of names, kinds and topics, in their order
-  std::array<std::uint64_t, kMaxSources> configured{}; ///< of each: what is configured of its calibration
+  std::uint64_t list = 0;                              ///< hash of names, kinds and topics, in order
+  std::array<std::uint64_t, kMaxSources> configured{}; ///< by source: hash of its configured calibration
 
   bool operator==(const SourceIds&) const = default;
 };
 SourceIds ids_of(std::span<const MotionSource> sources);
 
-/// What a service must know to go on where another one ended: where the robot is, and what is to be seen from there.
+/// State needed to resume where another service ended: the pose of the robot and the map around it.
 struct SavedState {
   Whereabouts last;
   FlatGround flat_ground = FlatGround::off;
   std::vector<SurfacePoint> map_odom;
-  SourceIds sources{};   ///< of those that `last` speaks of
-  bool is_recent = true; ///< the robot is still there; otherwise nothing is to be gone on from but what was learned
+  SourceIds sources{};   ///< motion sources that `last` refers to
+  bool is_recent = true; ///< the pose is still valid; otherwise only the learned calibration is used
 
-  /// Forgets what it says of sources that are now others, and what was learned of those that are now configured
-  /// otherwise.
+  /// Discards the data of motion sources if their list has changed, and the learned calibration of sources whose
+  /// configuration has changed.
   void forget_changed(const SourceIds& now);
 };
 
-/// The map as it is after an estimate: the surfaces within sight of where the robot is.
+/// Copies the surfaces of the map within sight of the robot, odom frame, after an estimate.
 void read_map(const Odometry& odometry, const Pose& T_odom_base, std::vector<SurfacePoint>& map_odom);
 
-/// To a file and back, all or nothing: it is written beside the old one, which it then replaces; when read it is
-/// checked by length and checksum. Both fail with one line for the user.
+/// Writes and reads the state atomically: a new file is written next to the old one and replaces it; reading verifies
+/// the length and checksum. Both fail with one line for the user.
 std::optional<std::string> write_state(const std::filesystem::path& file, const SavedState& state);
 Expected<SavedState, std::string> load_state(const std::filesystem::path& file);
 
-/// In a file that holds the map of the same odom frame; while it is written, what it said before still counts. It does
-/// not wait for the disk: a crash of the machine may cost the last ones, but never the map. Whether it fails shows with
-/// the next state.
+/// Updates pose and sources in a file that holds the map of the same odom frame; the previous entry stays valid while
+/// this one is written. Does not sync: a crash of the machine may lose the last updates, but never the map. A failure
+/// is reported by the next write_state().
 void update_whereabouts(const std::filesystem::path& file, const Whereabouts& last);
 
-/// $STATE_DIRECTORY/state as systemd sets it; nothing without, and then no state is kept.
+/// Returns $STATE_DIRECTORY/state, with the variable set by systemd; empty without it: no state is saved then.
 std::optional<std::filesystem::path> state_path();
 
-/// Writes the state now and then, and the whereabouts as they are by then, from a thread that may wait for the disk.
-/// The map is worth its cost once in many metres; who crashed while driving is elsewhere a second later.
+/// Saves the full state periodically and the whereabouts more often, from a thread that may block on the disk: the map
+/// is worth its cost only every kEvery or kEvery_m, but the pose of a moving robot is outdated within a second.
 class StateKeeper {
  public:
   static constexpr Duration kEvery = std::chrono::seconds{30};
   static constexpr double kEvery_m = 10.0;
   using Complain = std::function<void(const std::string&)>;
 
-  /// Without a file it does nothing.
+  /// Does nothing if `file` is empty.
   StateKeeper(std::optional<std::filesystem::path> file, std::span<const MotionSource> sources, Complain complain)
       : file_(std::move(file)), sources_(ids_of(sources)), complain_(std::move(complain)) {}
 
-  /// Producer, one thread: after every estimate.
+  /// Producer, one thread: hands over the state after every estimate.
   void take(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground);
 
-  /// Producer: nothing before the first estimate.
+  /// Producer: returns the current whereabouts; empty before the first estimate.
   [[nodiscard]] const std::optional<Whereabouts>& now() const { return now_; }
 
-  /// Thread of the disk, again and again: writes what was taken last.
+  /// Disk thread, periodically: writes the latest state or whereabouts.
   void write();
 
-  /// Producer, while nobody writes: what was written is no longer true. When this returns the file says what is to be
-  /// gone on from until the next estimate, or there is none. Waits for the disk.
+  /// Producer: replaces the saved state by `start`, or removes it. Blocks on the disk; precondition: write() is not
+  /// running.
   void begin_anew(const std::optional<SavedState>& start);
 
  private:
@@ -86,7 +86,7 @@ class StateKeeper {
     std::uint64_t number = 0;
     SavedState state;
   };
-  /// Of the same odom frame as the state with that number.
+  /// Whereabouts in the odom frame of the state with this number.
   struct Update {
     std::uint64_t number = 0;
     Whereabouts last;
@@ -99,9 +99,9 @@ class StateKeeper {
   Complain complain_;
   LatestSlot<Due> states_;
   LatestSlot<Update> whereabouts_;
-  std::optional<Whereabouts> now_, saved_; ///< after the last estimate, and of the state taken last; of the producer
-  std::uint64_t number_ = 0;               ///< of the state handed over last; of the producer
-  std::optional<std::uint64_t> written_;   ///< number of the state that lies in the file; of the thread of the disk
+  std::optional<Whereabouts> now_, saved_; ///< after the last estimate; in the last state; owned by the producer
+  std::uint64_t number_ = 0;               ///< number of the last state handed over; owned by the producer
+  std::optional<std::uint64_t> written_;   ///< number of the state in the file; owned by the disk thread
 };
 
 } // namespace locus::daemon

@@ -28,10 +28,10 @@ namespace locus::daemon {
 namespace {
 
 constexpr Duration kTick = std::chrono::milliseconds{100};
-constexpr Duration kAfterAnswers = std::chrono::milliseconds{50}; ///< or who asks without end has a core of ours
+constexpr Duration kAfterAnswers = std::chrono::milliseconds{50}; ///< limits clients to 20 rounds of requests/s
 constexpr Duration kTellEvery = std::chrono::seconds{1};
 
-/// Blocked before the first thread is made, so that none of them ever takes one.
+/// Blocks the signals before the first thread is created, so that they are delivered through the descriptor only.
 int open_signals() {
   sigset_t set;
   sigemptyset(&set);
@@ -71,7 +71,7 @@ int Service::run(const Config& config) {
   keep_what_was_left(config, state);
   if (const auto problem = begin(config, std::move(state))) {
     log_.error(*problem);
-    finish_incident(); // nobody will know of it again
+    finish_incident(); // lost otherwise, since the process ends here
     return 1;
   }
   sd_notify(0, "READY=1");
@@ -95,7 +95,7 @@ int Service::run(const Config& config) {
     return 1;
   watch_.reset();
   const std::optional<SavedState> last = session_->stop();
-  session_.reset(); // with who else writes states
+  session_.reset(); // ends the other writer of states
   keep_state(last);
   finish_incident();
   if (control_)
@@ -104,7 +104,7 @@ int Service::run(const Config& config) {
   return 0;
 }
 
-/// Before all else in its folder is touched: who has the socket owns it.
+/// Opens the control socket before any other access to its folder, which belongs to the owner of the socket.
 void Service::open_control() {
   auto control = ControlServer::open(control_path(), [this](const ControlRequest& request) { return answer(request); });
   if (control)
@@ -113,7 +113,7 @@ void Service::open_control() {
     log_.warn(control.error());
 }
 
-/// What another service left behind, if it can still be true.
+/// Loads the state of an earlier service and marks whether its pose may still be valid.
 std::optional<SavedState> Service::recent_state() {
   constexpr Duration kOldest = std::chrono::seconds{60};
   const auto file = state_path();
@@ -142,13 +142,13 @@ void Service::keep_state(const std::optional<SavedState>& state) {
     log_.error(*problem);
 }
 
-/// A clean end leaves no mark.
+/// Stores the input of a crashed run as an incident; a run that ended cleanly has left no mark.
 void Service::keep_what_was_left(const Config& config, const std::optional<SavedState>& state) {
   if (!incidents_)
     return;
   std::error_code ignored;
   for (const auto& folder : {ring_folder(), record_folder(config.record.folder)})
-    std::filesystem::remove_all(snapshot_in(folder), ignored); // on its way to the disk when the run ended
+    std::filesystem::remove_all(snapshot_in(folder), ignored); // incomplete when the run ended
   const auto run = take_marked_run();
   if (!run || config.record.keep_s == 0)
     return;
@@ -168,7 +168,7 @@ void Service::keep_what_was_left(const Config& config, const std::optional<Saved
 std::optional<std::string> Service::begin(const Config& config, std::optional<SavedState> state) {
   watch_.reset();
   session_.reset();
-  if (const auto problem = keep_to_cpus(config.realtime.cpus)) // as the threads to come do
+  if (const auto problem = keep_to_cpus(config.realtime.cpus)) // inherited by the new threads
     log_.warn(*problem);
   if (const auto problem = lock_memory(config.realtime.lock_memory))
     log_.warn(*problem);
@@ -185,7 +185,7 @@ std::optional<std::string> Service::begin(const Config& config, std::optional<Sa
   return std::nullopt;
 }
 
-/// A reload tries again what failed.
+/// Starts the metrics server. A reload retries after a failure.
 void Service::listen_for_metrics(const std::string& address) {
   if (metrics_ && address == metrics_address_)
     return;
@@ -218,8 +218,8 @@ ControlServer::Answer Service::reload() {
   return answer;
 }
 
-/// The odometry goes on where it is. Where the new sockets cannot be had, with the old configuration: it had to let go
-/// of its own, for they may be the same.
+/// Restarts the session with `config` at the current pose. If that fails, restarts it with the old configuration: its
+/// sockets had to be closed first, since the new ones may be the same.
 std::optional<std::string> Service::go_on_with(const Config& config) {
   const Config old = session_->config();
   const FlatGround mode = session_->flat_ground();
@@ -239,7 +239,7 @@ std::optional<std::string> Service::go_on_with(const Config& config) {
   return problem;
 }
 
-/// Whether the service is to go on. However many ask for a reload, it is one.
+/// Handles pending signals; false if the service is to stop. Several SIGHUP cause one reload.
 bool Service::take_signal() {
   signalfd_siginfo info{};
   bool is_to_reload = false;
@@ -254,7 +254,7 @@ bool Service::take_signal() {
 }
 
 std::optional<ControlServer::Answer> Service::answer(const ControlRequest& request) {
-  if (!session_) // another client's reload has ended it
+  if (!session_) // ended by a failed reload of another client
     return ControlServer::Answer::refusal("the service ends; look at: journalctl -u locusd");
   return std::visit([this](const auto& one) { return answer(one); }, request);
 }
@@ -297,7 +297,7 @@ std::optional<ControlServer::Answer> Service::answer(KeepIncident request) {
   return Answer{{{"folder", folder->string()}}, {}};
 }
 
-/// What is on its way to the disk gets there, unless that is too slow.
+/// Completes the incident being written, within kPatience.
 void Service::finish_incident() {
   constexpr Duration kPatience = std::chrono::seconds{2};
   const Duration end = read_clock(CLOCK_MONOTONIC) + kPatience;
@@ -320,8 +320,8 @@ void Service::look_for_incidents(const Figures& figures) {
   told_incidents_ = incidents;
 }
 
-/// The points of the map as they lie in memory. Nothing until the odometry thread has brought them. One that comes
-/// after nobody waits for it any more is of another time.
+/// Returns the points of the map in their memory layout; empty until the odometry thread has delivered them. A request
+/// whose client has timed out is repeated, since its map would be stale.
 std::optional<ControlServer::Answer> Service::answer(SaveMap /*request*/) {
   const Duration now = read_clock(CLOCK_MONOTONIC);
   if (!map_asked_ || now - *map_asked_ > ControlServer::kLongestAnswer) {

@@ -17,10 +17,10 @@
 
 namespace locus::daemon {
 
-/// Without a file, every key has its default. What it names has been read, too: the calibrations of the lidars.
+/// Reads the configuration and the files that it names, to validate them. Without a file every key has its default.
 Expected<Config, ConfigErrors> read_config(const std::filesystem::path& file);
 
-/// The life of the service in the main thread: start, look after the session, reload, stop.
+/// Main loop of the service: start, supervision of the session, reload, stop. Main thread only.
 class Service {
  public:
   Service(std::filesystem::path config_file, Log& log);
@@ -28,12 +28,12 @@ class Service {
   Service(const Service&) = delete;
   Service& operator=(const Service&) = delete;
 
-  /// Until SIGTERM or SIGINT; the exit status.
+  /// Runs until SIGTERM or SIGINT; returns the exit status.
   int run(const Config& config);
 
  private:
   void open_control();
-  /// What failed, if anything did: there is no session then.
+  /// Starts a session. Returns the failure, if any; there is no session then.
   std::optional<std::string> begin(const Config& config, std::optional<SavedState> state);
   [[nodiscard]] std::optional<SavedState> recent_state();
   void keep_state(const std::optional<SavedState>& state);
@@ -47,7 +47,7 @@ class Service {
   std::optional<ControlServer::Answer> answer(const Reset& request);
   std::optional<ControlServer::Answer> answer(Reload request);
   std::optional<ControlServer::Answer> answer(KeepIncident request);
-  /// Takes the configuration file again; a bad one leaves the old configuration in force, and that is said.
+  /// Rereads the configuration file; an invalid one leaves the old configuration in effect and is reported.
   ControlServer::Answer reload();
   std::optional<std::string> go_on_with(const Config& config);
   void listen_for_metrics(const std::string& address);
@@ -58,14 +58,14 @@ class Service {
   Log& log_;
   std::vector<int> inherited_;
   int signals_;                        ///< signalfd
-  std::optional<Incidents> incidents_; ///< where there is a state directory to keep them in
+  std::optional<Incidents> incidents_; ///< empty without a state directory or control socket
   IncidentWatch incident_watch_;
   Incidents::Status told_incidents_;
   std::unique_ptr<Session> session_;
   std::optional<ControlServer> control_;
   std::unique_ptr<MetricsServer> metrics_;
-  std::string metrics_address_;       ///< where it was last tried to listen
-  std::optional<Duration> map_asked_; ///< when the session was; nothing: no answer is waited for
+  std::string metrics_address_;       ///< address of the last attempt to listen
+  std::optional<Duration> map_asked_; ///< time of the pending map request, CLOCK_MONOTONIC; empty: none
   std::optional<Watch> watch_;
   Watchdog watchdog_;
   Duration told_{};

@@ -18,7 +18,7 @@ namespace locus::daemon {
 
 namespace {
 
-constexpr Duration kDiskRound = std::chrono::milliseconds{100}; ///< between two looks for what is to be written
+constexpr Duration kDiskRound = std::chrono::milliseconds{100}; ///< period of the disk thread
 
 OdometryReport report_of(const FastSample& s) {
   return {s.stamp, s.T_odom_base, s.pose_covariance, s.twist_base, s.twist_covariance};
@@ -65,7 +65,7 @@ Session::Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket
     const Duration age = Stamp{read_clock(CLOCK_REALTIME)} - start_->last.stamp;
     recalled_ = {start_->last.learned, std::max(0.0, to_seconds(age))};
   }
-  // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): stands after its like
+  // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): grouped with the use of start_
   has_past_ = start_ && start_->is_recent && !start_->map_odom.empty();
   begin(std::move(lidars));
 }
@@ -97,10 +97,10 @@ void Session::begin(LidarRouter lidars) {
   pthread_setname_np(publisher_.native_handle(), "publisher");
 }
 
-/// A run is what one life of the odometry has taken: its replay gives the same poses. What is recorded to a folder need
-/// not be held in memory for incidents.
+/// Starts a recording. A run holds the input of the odometry from start or reset to stop, so that its replay gives the
+/// same poses. Incidents use the recording to a folder if there is one, otherwise a ring in memory.
 InputSource& Session::begin_recording() {
-  recorder_.reset(); // of the life before, whose pipeline is at rest
+  recorder_.reset(); // its pipeline is stopped
   holds_ring_ = ring_is_looked_at_ = false;
   const RecordOptions& options = config_.record;
   const Duration keep = incidents_ != nullptr ? from_seconds(options.keep_s) : Duration{};
@@ -133,8 +133,8 @@ bool Session::keeps_incidents() const {
   return incidents_ != nullptr && recorder_ != nullptr && config_.record.keep_s > 0;
 }
 
-/// In the thread of the disk. What an incident links is complete, and still there. A ring that is held no more goes
-/// once an incident has what it wants of it.
+/// Disk thread: writes states, incidents and the recording. Incidents precede the recording, so that the pieces they
+/// link are complete and not yet removed. A ring of an earlier session is removed once no incident is being written.
 void Session::write_to_disk(bool last_round) {
   state_.write();
   if (incidents_ != nullptr) {
@@ -159,7 +159,7 @@ void Session::end() {
   disk_.reset();
 }
 
-/// With what it tells of times as everybody else on this host tells them.
+/// Converts the times of an estimate from SteadyTime to the host's wall clock.
 OdometryEstimate Session::on_the_wall(const OdometryEstimate& estimate) const {
   OdometryEstimate told = estimate;
   told.stamp = input_.time().wall(estimate.stamp);
@@ -172,7 +172,7 @@ OdometryEstimate Session::on_the_wall(const OdometryEstimate& estimate) const {
   return told;
 }
 
-/// In the odometry thread, when the estimate has left.
+/// Odometry thread: hands over clouds, state and map after the estimate was handed over.
 void Session::after(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& steady_estimate) {
   const OdometryEstimate estimate = on_the_wall(steady_estimate);
   if (estimate.beginning)
@@ -234,7 +234,7 @@ void Session::receive(const RosInput& input) {
     input_.push(std::get<OutsideVerdict>(input));
 }
 
-/// Memory is bought until the largest cloud has come.
+/// Copies a cloud into the input. Allocates only for a cloud larger than all earlier ones.
 void Session::receive(std::uint8_t lidar, Stamp arrival, const SerialisedSample& cloud) {
   CloudBytes& next = input_.next_cloud(lidar);
   next.arrival = arrival;
@@ -245,7 +245,7 @@ void Session::receive(std::uint8_t lidar, Stamp arrival, const SerialisedSample&
   input_.push_cloud(lidar);
 }
 
-/// At most one change a second: a topic that flutters does not flutter the odometry.
+/// Applies a flat-ground message, at most one change a second, to suppress chatter of the topic.
 void Session::take(FlatGroundWord word) {
   constexpr Duration kLeastPause = std::chrono::seconds{1};
   const FlatGround wanted = word.flat ? FlatGround::on : FlatGround::off;
@@ -307,7 +307,7 @@ void Session::publish(const ProcessedSweep& done) {
   tell(estimate.state);
 }
 
-/// A frame that begins anew is no surprise to who knows it.
+/// Publishes and logs the origin of the odom frame, so that subscribers learn of a new frame.
 void Session::announce(const OdometryEstimate& estimate) {
   announced_ = true;
   const Beginning from = *estimate.beginning;
@@ -353,7 +353,7 @@ void Session::tell(TrackingState state) {
 
 namespace {
 
-/// Who is right when a source and lidar contradict each other is not known.
+/// Describes the loss of a motion source. In a disagreement either the source or lidar may be at fault.
 std::string why_lost(const HealthEvent& event) {
   if (!event.verdict.empty())
     return std::string(event.verdict);

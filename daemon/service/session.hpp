@@ -26,15 +26,14 @@
 
 namespace locus::daemon {
 
-/// Where record.folder lies: a relative one in the state directory, or without one where the service was started.
+/// Resolves record.folder: relative to the state directory, or without one to the working directory.
 std::filesystem::path record_folder(const std::filesystem::path& folder);
 
-/// The service as one configuration makes it: sockets, DDS, the live threads, the publisher. A reload ends one and
-/// begins another.
+/// Runtime of the service under one configuration: sockets, DDS, live threads, publisher. A reload replaces it.
 class Session {
  public:
-  /// Opens what there is and starts all threads. Fails with one line for the user.
-  /// Incidents, where there is a folder to keep them in, must outlive it.
+  /// Opens all files and sockets and starts all threads. Fails with one line for the user.
+  /// `incidents`, null without a folder for them, must outlive the session.
   static Expected<std::unique_ptr<Session>, std::string> start(const Config& config, std::span<const int> inherited,
                                                                std::optional<SavedState> state, Incidents* incidents,
                                                                Log& log);
@@ -45,25 +44,25 @@ class Session {
   [[nodiscard]] const Config& config() const { return config_; }
   [[nodiscard]] const LiveInput& input() const { return input_; }
   [[nodiscard]] RosLink& link() { return link_; }
-  /// As they are now; the session must outlive them.
+  /// Returns the current figures; the session must outlive them.
   [[nodiscard]] Figures figures() const;
 
-  /// A thread has done nothing since the last call if its number is the same.
+  /// Heartbeats of the threads; an unchanged number marks a thread that has not run since the last call.
   struct Progress {
     LivePipeline::Progress live;
     std::uint64_t publisher, dds;
   };
   [[nodiscard]] Progress progress() const;
 
-  /// Begins anew, at a pose or level at the origin, with an empty map. Says why not, where a calibration cannot be read
-  /// any more: all goes on as it was then.
+  /// Resets the odometry to a pose, or level at the origin, with an empty map. Returns the reason if a calibration can
+  /// no longer be read: the odometry then continues unchanged.
   std::optional<std::string> reset(std::optional<Pose> T_odom_base);
 
-  /// Ends the live threads for good, and tells what another session needs to go on: where the robot is, or without an
-  /// estimate what this one began with, if anything.
+  /// Stops the live threads and returns the state for another session to resume from; without an estimate, the state
+  /// that this session started with, if any.
   std::optional<SavedState> stop();
 
-  /// Asks for the surfaces of the map, which come with the next sweep. An earlier request is forgotten.
+  /// Requests the surfaces of the map, available after the next sweep. Supersedes an earlier request.
   void request_map() { map_wanted_.fetch_add(1, std::memory_order_relaxed); }
   [[nodiscard]] const std::vector<SurfacePoint>* take_map();
 
@@ -76,7 +75,7 @@ class Session {
   void begin(LidarRouter lidars);
   InputSource& begin_recording();
   InputSource& record_to(const std::filesystem::path& folder, const RecordingBounds& bounds);
-  /// Those to come: the input is held that they need.
+  /// Tells whether incidents can be stored, that is, whether their input is being recorded.
   [[nodiscard]] bool keeps_incidents() const;
   void write_to_disk(bool last_round);
   void end();
@@ -95,38 +94,38 @@ class Session {
   Config config_;
   Log& log_;
   MachineTime started_;
-  struct Told { ///< what the publisher has heard
+  struct Told { ///< figures collected by the publisher
     SweepTally sweeps{600};
     IngestReport ingest;
     std::uint64_t unpublished = 0;
   };
   Told told_;
-  mutable std::mutex told_mutex_; ///< of the publisher and those who ask for figures
+  mutable std::mutex told_mutex_; ///< guards told_
   LiveInput input_;
   std::atomic<FlatGround> flat_ground_;
-  Duration flat_ground_changed_{};     ///< of the thread of the link
-  Incidents* incidents_;               ///< null: there is no folder for any
-  bool holds_ring_ = false;            ///< the recording is that for incidents alone
-  bool ring_is_looked_at_ = false;     ///< what an earlier session or process has left of it; of the thread of the disk
-  std::unique_ptr<Recorder> recorder_; ///< of one run, where there is to be any
+  Duration flat_ground_changed_{};     ///< owned by the link's thread
+  Incidents* incidents_;               ///< null: no folder for incidents
+  bool holds_ring_ = false;            ///< the recording is in memory, for incidents only
+  bool ring_is_looked_at_ = false;     ///< remains of earlier sessions or processes are removed; disk thread
+  std::unique_ptr<Recorder> recorder_; ///< one run; null without recording
   std::optional<RecordingInput> recording_input_;
   std::unique_ptr<LivePipeline> pipeline_;
-  std::mutex pipeline_mutex_; ///< of those who change pipeline_ and the thread of the link
-  bool has_past_ = false;     ///< a map that another run has left
+  std::mutex pipeline_mutex_; ///< guards pipeline_ between its owner and the link's thread
+  bool has_past_ = false;     ///< started with the map of an earlier run
   bool announced_ = false;
   std::atomic<bool> scheduling_told_ = false;
-  std::optional<Diagnostic> announcement_; ///< that DDS has not taken yet
+  std::optional<Diagnostic> announcement_; ///< not yet accepted by DDS
   struct Map {
     std::uint64_t request = 0;
     std::vector<SurfacePoint> points;
   };
   std::atomic<std::uint64_t> map_wanted_{0}; ///< number of the last request
-  std::uint64_t map_answered_ = 0;           ///< of the odometry thread
+  std::uint64_t map_answered_ = 0;           ///< last answered request; owned by the odometry thread
   LatestSlot<Map> map_;
   RosLink link_;
   CloudPublisher clouds_;
-  std::optional<SavedState> start_; ///< what it began with, until the first estimate
-  Recalled recalled_;               ///< of the run before, or of the time before a reset
+  std::optional<SavedState> start_; ///< initial state, until the first estimate
+  Recalled recalled_;               ///< calibration learned in the previous run or before a reset
   StateKeeper state_;
   std::optional<TrackingState> told_state_;
   Duration told_clock_set_by_{};

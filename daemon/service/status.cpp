@@ -81,7 +81,7 @@ void Watch::look_at_lidars(const Figures& figures) {
     const std::uint64_t used = ingest.lidars[i].used();
     Lidar& lidar = lidars_[i];
     const bool heard = used > lidar.data;
-    if (used != lidar.data || lidar.heard == Duration::zero()) { // fewer: the counters began anew
+    if (used != lidar.data || lidar.heard == Duration::zero()) { // fewer: the counters were reset
       if (heard && !lidar.told.empty())
         log_.info(fmt::format("lidar {}: heard", lidars[i].name), {{"LOCUS_LIDAR", lidars[i].name}});
       lidar = {.data = used,
@@ -113,7 +113,7 @@ void Watch::look_at_lidars(const Figures& figures) {
   }
 }
 
-/// Each once.
+/// Logs each fault of a lidar's clouds once.
 void Watch::look_at_doubts(Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now) {
   const CloudDoubts doubts = now.clouds ? now.clouds->doubts : CloudDoubts{};
   if ((doubts & ~lidar.doubts_told).none())
@@ -153,7 +153,7 @@ std::string Watch::why_silent(const Lidar& lidar, const LidarOptions& options, c
                      unknown, options.name);
 }
 
-/// What a check has found wrong with a source that goes on being used in part. Of one that is lost, its loss tells.
+/// Logs faults of sources that remain in partial use; those of a lost source are logged with its loss.
 void Watch::look_at_verdicts(const IngestReport& ingest) {
   const auto& sources = config_.motion_sources;
   for (std::size_t i = 0; i < sources.size(); ++i) {
@@ -230,7 +230,7 @@ void Watch::look_at_intruders(const LinkFigures& link) {
   tell(link.flat_ground_refused, config_.dds.flat_ground_topic, "");
 }
 
-/// What is dropped while the disk takes nothing goes without saying.
+/// Logs changes of the recording. Drops during a disk failure are not logged separately.
 void Watch::look_at_recording(const Recorder::Status& recording) {
   const std::uint64_t dropped = recording.dropped - std::min(recording.dropped, recording_.dropped);
   if (recording_.problem.empty() && !recording.problem.empty())

@@ -18,29 +18,29 @@
 #include "daemon/service/session.hpp"
 #include "drivers/net/udp_socket.hpp"
 
-/// What a running service tells of its figures beside to_json(), to_text() and diagnostics(): to who administers it,
-/// and to systemd. Figures are live ones.
+/// Reports of a running service to its administrator and to systemd, besides to_json(), to_text() and diagnostics().
+/// Figures are live ones.
 namespace locus::daemon {
 
-/// In one line of plain words, for systemctl status.
+/// Returns the status in one line, for systemctl status.
 std::string status_line(const Figures& figures);
 
-/// Looks after a session a few times a second and tells what its owner should know: sensors that are not heard, a
-/// network that is not there, packets that the kernel threw away, a computer that is too busy, a disk that takes no
-/// recording. Tells each once per turn for the worse or the better. One owner.
+/// Monitors a session a few times a second and logs problems: silent sensors, a missing network, packets dropped by the
+/// kernel, an overloaded computer, a failing recording. Logs each once per change for the worse or the better. One
+/// owner.
 class Watch {
  public:
-  /// Silence of a sensor that should have spoken by then.
+  /// Silence of a sensor before it is reported; also the period of some checks.
   static constexpr Duration kPatience = std::chrono::seconds{5};
 
-  using Clock = Duration (*)(clockid_t); ///< read_clock(), or another in tests
-  /// Of a session: what it is configured as, and the sockets of its lidars.
+  using Clock = Duration (*)(clockid_t); ///< read_clock(), replaceable in tests
+  /// Monitors a session with this configuration and these lidar sockets.
   Watch(
       const Config& config, std::span<const UdpSocket> sockets, Log& log,
       Clock clock = [](clockid_t id) { return read_clock(id); })
       : config_(config), sockets_(sockets), log_(log), clock_(clock) {}
 
-  /// At the figures of that session.
+  /// Checks the figures of that session.
   void look(const Figures& figures);
 
  private:
@@ -55,11 +55,11 @@ class Watch {
   void look_at_intruders(const LinkFigures& link);
   void look_at_recording(const Recorder::Status& recording);
 
-  /// What was last seen of a lidar.
+  /// Last known state of a lidar.
   struct Lidar {
-    std::uint64_t data = 0, received = 0; ///< when it was last heard
-    Duration heard{};                     ///< when that was, or since when it is waited for
-    std::string told;                     ///< why it is silent, as it was told; empty: it is not
+    std::uint64_t data = 0, received = 0; ///< counters at the last usable data
+    Duration heard{};                     ///< time of the last usable data, or start of the wait for it
+    std::string told;                     ///< logged reason of its silence; empty: not silent
     bool short_sweep_told = false;
     bool shared_port_told = false;
     CloudDoubts doubts_told{};
@@ -75,24 +75,24 @@ class Watch {
   std::uint64_t told_attempts_ = 0;
   std::array<Lidar, kMaxLidars> lidars_;
   bool told_speed_ = false;
-  std::array<std::string_view, kMaxSources> verdicts_; ///< as they were told
-  std::bitset<kMaxSources> askew_;                     ///< of whose calibration was told
-  std::set<std::string> unheard_;                      ///< sources that were told of
-  std::set<std::string> intruded_;                     ///< topics that were told of
+  std::array<std::string_view, kMaxSources> verdicts_; ///< last logged verdicts
+  std::bitset<kMaxSources> askew_;                     ///< sources with a logged calibration error
+  std::set<std::string> unheard_;                      ///< sources logged as silent
+  std::set<std::string> intruded_;                     ///< topics logged for rejected messages
   std::uint64_t kernel_drops_ = 0, filtered_ = 0, sweep_drops_ = 0;
-  Recorder::Status recording_; ///< as it was told
+  Recorder::Status recording_; ///< last logged status
   Duration joined_{}, weighed_{};
 };
 
-/// Tells a hung thread from a quiet one: fed to systemd's watchdog only while all threads go on. One owner.
+/// Feeds systemd's watchdog while all threads make progress, and so detects a hung thread. One owner.
 class Watchdog {
  public:
-  /// Nothing to do unless systemd asks for it (WatchdogSec=).
+  /// Enables the watchdog if systemd requests it (WatchdogSec=).
   Watchdog();
   void look(const Session& session);
 
  private:
-  Duration period_{}; ///< zero: nobody asks
+  Duration period_{}; ///< zero: disabled
   Duration fed_{};
   std::optional<Session::Progress> last_;
 };

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cyclone DDS 0.10 waits until a time of the wall clock. Where that is set back by an hour each such wait takes an hour
-// longer, and with it all that DDS does by itself: heartbeats, discovery, what our own thread waits for. (Later
-// versions wait on the monotonic clock; this file goes when Debian has one.) So the process has this function in place
-// of the C library's: it waits for as long as is left when the wait begins.
+// Cyclone DDS 0.10 waits until a wall-clock time. If the clock is set back by an hour, each such wait takes an hour
+// longer, which stalls all DDS activity: heartbeats, discovery, and the waits of our own thread. (Later versions wait
+// on the monotonic clock; remove this file when Debian has one.) This function therefore replaces the C library's: it
+// waits for the time that remains when the wait begins.
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
@@ -14,13 +14,13 @@
 
 #ifdef __has_feature
 #if __has_feature(thread_sanitizer)
-#define LOCUS_WAITS_ARE_WATCHED // by a function of the sanitizer's, in the same place
+#define LOCUS_WAITS_ARE_WATCHED // the sanitizer interposes the same function
 #endif
 #endif
 
 #ifndef LOCUS_WAITS_ARE_WATCHED
 
-/// Of the two clocks that a wait may be for it is the nearer one; libraries differ.
+/// Waits on the monotonic clock. `until` is on the clock, wall or monotonic, to which it is nearer; libraries differ.
 // The header has reserved names. NOLINTNEXTLINE(readability-inconsistent-declaration-parameter-name)
 extern "C" int pthread_cond_timedwait(pthread_cond_t* condition, pthread_mutex_t* mutex, const timespec* until) {
   using namespace locus;

@@ -5,12 +5,12 @@
 
 namespace locus::daemon {
 
-/// Removes the file of a Unix socket of this type (SOCK_STREAM, ...) that a service which crashed has left: nobody
-/// listens there. Whatever else has the name stays, and stands in the way of bind().
+/// Removes the file of a Unix socket of this type (SOCK_STREAM, ...) without a listener, left by a crashed service. Any
+/// other file of this name stays, and bind() fails.
 void remove_if_left_behind(const std::filesystem::path& socket, int type);
 
-/// After accept() of a socket that does not wait: somebody called and could not be taken (no more descriptors, no
-/// memory), so the socket stays ready and is not to be polled at once.
+/// Tells, after accept() of a non-blocking socket, whether a connection could not be accepted (out of descriptors or
+/// memory). The socket then stays ready and must not be polled at once.
 bool accept_has_failed();
 
 } // namespace locus::daemon
