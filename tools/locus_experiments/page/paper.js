@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the paper reports of LOCUS: M. Palieri et al., "LOCUS: A Multi-Sensor Lidar-Centric Solution for High-Precision
-// Odometry and 3D Mapping in Real-Time", IEEE Robotics and Automation Letters, 2020.
+// Results of LOCUS as reported by the paper: M. Palieri et al., "LOCUS: A Multi-Sensor Lidar-Centric Solution for
+// High-Precision Odometry and 3D Mapping in Real-Time", IEEE Robotics and Automation Letters, 2020.
 
 /** Table II: absolute position error (max, mean, std) and RMSE of the map error, all in metres. */
 export const accuracy = {

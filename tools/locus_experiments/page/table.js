@@ -26,5 +26,5 @@ function cells(tr, row) {
 
 export const missing = {text: "not run", className: "note"};
 
-/** An error in metres, to a tenth of a millimetre where it is small. */
+/** Formats an error in metres, to a tenth of a millimetre if it is small. */
 export const metres = (value) => (Math.abs(value) < 0.1 ? fixed(value, 4) : figure(value));
