@@ -3,8 +3,8 @@ import {select} from "d3-selection";
 
 import {figure, fixed} from "../../locus_replay/report/format.js";
 
-/** A table of `groups`, each {name, rows}; of a row, an array of cells, the first is a heading. A cell may be
- *  {text, className}. */
+/** Builds a table of `groups`, each {name, rows}; a row is an array of cells, the first of which is a heading. A cell may
+ *  be {text, className}. */
 export function table(parent, head, groups) {
   const element = parent.append("div").attr("class", "scroll").append("table");
   element.append("thead").append("tr").selectAll("th").data(head).join("th").attr("scope", "col").text((cell) => cell);
