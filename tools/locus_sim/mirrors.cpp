@@ -18,7 +18,7 @@ constexpr double kPuddle_m = 1.6;             // scale of the noise
 constexpr double kWetDarker = 0.5;            // factor for the ground below the film (Lekner and Dorf, 1988)
 constexpr double kPane_m = 2, kSmallest_m = 1.5;
 constexpr double kStraightOn = 0.998, kGlare = 200, kDirt = 3; // within 4 degrees; mirrored and diffuse brightness
-constexpr double kDarkest = 0.5;                               // detectable brightness
+constexpr double kDarkest = 0.5;                               // lowest detectable brightness
 
 double puddle(const Noise& noise, const Eigen::Vector3d& point) {
   return noise({point.x() / kPuddle_m, point.y() / kPuddle_m, 0});
