@@ -55,7 +55,7 @@ class McapBag : public Bag {
   std::uint64_t size_ = 0;
   std::uint64_t at_ = 0;    ///< read position in the file
   std::uint64_t place_ = 0; ///< start of the latest record
-  bool is_closed_ = false;  ///< has its closing magic
+  bool is_closed_ = false;  ///< has its footer
   bool is_over_ = false;    ///< no more records
   std::vector<std::byte> record_, chunk_;
   std::span<const std::byte> left_; ///< unread part of the current chunk

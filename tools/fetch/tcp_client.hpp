@@ -25,7 +25,7 @@ class TcpClient {
   /// Sends all of the text, or returns the error.
   std::optional<std::string> send(std::string_view text);
 
-  /// Appends to `answer` until `is_whole` accepts all that was received or the peer closes; the caller distinguishes
+  /// Reads into `answer` until `is_whole` accepts all that was received or the peer closes; the caller distinguishes
   /// these. Returns the error otherwise, such as more than `most` bytes.
   std::optional<std::string> receive(std::string& answer, std::size_t most,
                                      const std::function<bool(std::string_view)>& is_whole);

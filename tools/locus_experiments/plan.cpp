@@ -35,7 +35,8 @@ Options with(Options options, const Options& more) {
   return options;
 }
 
-/// Adds the runs of Table II and the references of Table III. The paper does not assume flat ground in the tunnel.
+/// Adds the runs of Table II, which are also the references of Table III. The paper does not assume flat ground in the
+/// tunnel.
 void add_accuracy(Plan& plan, const std::string& course, bool flat) {
   plan.runs.push_back({course, "locusd", {}});
   plan.runs.push_back({course, "paper", paper_with({})});

@@ -16,7 +16,7 @@
 #include "pages/data_page.hpp"
 
 // Embedded into the program by locus_page() in CMake.
-extern "C" const char locus_experiments_page_begin[]; // NOLINT(modernize-avoid-c-arrays): the linker knows its length
+extern "C" const char locus_experiments_page_begin[]; // NOLINT(modernize-avoid-c-arrays): size set by the linker
 extern "C" const char locus_experiments_page_end[];   // NOLINT(modernize-avoid-c-arrays)
 
 namespace locus::experiments {

@@ -39,7 +39,7 @@ Isa isa_or_fail(const std::string& name) {
 /// Completes the configuration by the metadata of its lidars and the requested instruction set.
 Config completed(Config config) {
   config = config_or_fail(with_lidar_metadata(std::move(config)));
-  if (const char* const isa = std::getenv("LOCUS_ISA")) // NOLINT(concurrency-mt-unsafe): nobody sets it
+  if (const char* const isa = std::getenv("LOCUS_ISA")) // NOLINT(concurrency-mt-unsafe): never set here
     config.use(isa_or_fail(isa));
   return config;
 }

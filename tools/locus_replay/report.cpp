@@ -14,7 +14,7 @@
 #include "pages/data_page.hpp"
 
 // Embedded into the program by locus_page() in CMake.
-extern "C" const char locus_report_page_begin[]; // NOLINT(modernize-avoid-c-arrays): its length is the linker's affair
+extern "C" const char locus_report_page_begin[]; // NOLINT(modernize-avoid-c-arrays): set by the linker
 extern "C" const char locus_report_page_end[];   // NOLINT(modernize-avoid-c-arrays)
 
 namespace locus::tools {

@@ -30,7 +30,7 @@ struct PathPoint {
   Eigen::Vector3d position_m;
 };
 
-/// Returns `{t, x, y, z}` rounded to the millimetre, sampled smoothly: at most `kPathPoints`, including both ends.
+/// Returns `{t, x, y, z}` rounded to the millimetre, in steps that look smooth: at most `kPathPoints`, and both ends.
 inline constexpr std::size_t kPathPoints = 20'000;
 nlohmann::ordered_json path(std::vector<PathPoint> points);
 

@@ -36,7 +36,7 @@ class Person {
     choose_bearing(0);
     bearing_rad_ = goal_rad_;
     at_m_ = wanted_place(0);
-    yaw_rad_ = // NOLINT(cppcoreguidelines-prefer-member-initializer): the bearing has thrown the dice before
+    yaw_rad_ = // NOLINT(cppcoreguidelines-prefer-member-initializer): random draw after choose_bearing()
         dice.between(-std::numbers::pi, std::numbers::pi);
     places_.reserve(way.steps());
     note(0);

@@ -11,7 +11,7 @@ struct Jet {
   double value = 0, rate = 0, acceleration = 0;
 
   Jet() = default;
-  Jet(double value_, double rate_ = 0, double acceleration_ = 0) // NOLINT(google-explicit-constructor): a constant
+  Jet(double value_, double rate_ = 0, double acceleration_ = 0) // NOLINT(google-explicit-constructor): for constants
       : value(value_), rate(rate_), acceleration(acceleration_) {}
 
   friend Jet operator+(const Jet& a, const Jet& b) {

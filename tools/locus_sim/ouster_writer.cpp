@@ -11,8 +11,8 @@
 namespace locus::sim {
 namespace {
 
-/// Returns the firing pattern. The encoder triggers the columns, so their period follows the motor speed; the phase
-/// lock applies to one of them, the first of a packet.
+/// Returns the firing pattern. The encoder triggers the columns, so their period follows the motor speed, and the first
+/// azimuth is rounded to a column, the first of a packet.
 FiringPattern pattern_of(const SyntheticLidarOptions& options, const ouster::Metadata& metadata) {
   constexpr double kResolution_m = 1e-3;
   const auto columns = static_cast<double>(metadata.columns_per_frame);

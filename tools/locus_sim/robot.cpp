@@ -67,8 +67,8 @@ Eigen::Vector3d anywhere(Dice& dice, double reach) {
 /// Returns a random error of either sign, between half of `size` and `size`: no real sensor is perfect.
 double about(Dice& dice, double size) { return (dice.chance(0.5) ? 1 : -1) * dice.between(0.5, 1) * size; }
 
-/// Returns the errors of an industrial MEMS unit, its gyro calibrated at rest before the start; guaranteed values of
-/// the data sheet rather than typical ones.
+/// Returns the errors of an industrial MEMS unit, its gyro calibrated at rest before the start; values of the data
+/// sheet, not those of its best specimens.
 ImuFaults imu_faults(Dice& dice, double vibration_mps2) {
   return {.gyro_bias_radps = anywhere(dice, 0.0015),
           .gyro_noise_radps = 0.003,

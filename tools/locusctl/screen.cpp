@@ -53,7 +53,7 @@ Screen::~Screen() {
     tcsetattr(STDIN_FILENO, TCSAFLUSH, &*found_);
 }
 
-void Screen::show(std::string_view text) { // NOLINT(readability-convert-member-functions-to-static): on its page
+void Screen::show(std::string_view text) { // NOLINT(readability-convert-member-functions-to-static): on our page
   const Size size = size_of_terminal();
   std::string out = "\x1b[H";
   for (std::size_t row = 0; row < size.rows && !text.empty(); ++row) {

@@ -75,7 +75,7 @@ function lengthPanel(name, series) {
   return {name, unit: unit.name, series, factor: unit.perMetre};
 }
 
-/** Returns a function that formats the value at a time. */
+/** Draws a panel; returns a function that shows the value at a time. */
 function drawPanel(svg, {name, unit, series, factor, limit}, x, top) {
   const values = series.v.map((value) => value * factor);
   const largest = max(values) || 1;
