@@ -19,8 +19,7 @@
 ///
 /// Stamps are nanoseconds since 1970, lengths metres, angles radians. The frame "odom" is level and starts at the
 /// robot's first pose; "base" is the frame of the robot, x forward, z up. An object may be used by one thread at a
-/// time;
-/// objects are independent. Functions throw Error unless stated otherwise, and std::bad_alloc.
+/// time; objects are independent. Functions throw Error unless stated otherwise, and std::bad_alloc.
 namespace liblocus {
 
 /// The mistake, its location and the remedy: one line per mistake, in the words of locus-replay.

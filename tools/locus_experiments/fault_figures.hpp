@@ -16,10 +16,9 @@ namespace locus::experiments {
 /// {"length_m", "added_m", "told", "growth": {"along", "across"}, "sources": {NAME: {"added_m", "ape_mean_m"}}}.
 ///
 /// length_m: path length of the robot; added_m: error of the motion across the interval; told: share of sweeps flagged
-/// as
-/// degenerate or dead reckoning since its start; growth: factor by which the variance of the position along and across
-/// the path grows from 5 m of path to the farthest place; sources: the same errors of each motion source alone. Throws
-/// tools::Failure.
+/// as degenerate or dead reckoning since its start; growth: factor by which the variance of the position along and
+/// across the path grows from 5 m of path to the farthest place; sources: the same errors of each motion source alone.
+/// Throws tools::Failure.
 nlohmann::ordered_json fault_figures(const Interval& interval, const std::filesystem::path& run_folder,
                                      const CaptureFolder& capture);
 

@@ -13,9 +13,8 @@ namespace locus::experiments {
 ///
 /// drives: those that ran; standing: those of them that start at rest. median_m: median of their mean position errors;
 /// worst_m: largest position error of any. claimed_mps and true_mps: largest estimated and true speed. lost: drives
-/// with
-/// an error ever above kLost_m; flagged: those of them that warn after that, the last one flagged_after_s later. said:
-/// {"text", "drives"}. broken: violated criteria.
+/// with an error ever above kLost_m; flagged: those of them that warn after that, the last one flagged_after_s later.
+/// said: {"text", "drives"}. broken: violated criteria.
 void judge_harsh(Results& results);
 
 /// Formats the rows as a page in Markdown.

@@ -16,10 +16,9 @@ namespace locus::experiments {
 inline constexpr std::string_view kRowCommand = "row", kLoamReplay = "replay-with-loam-features";
 
 /// Simulates the courses and performs the runs with Ninja, as many in parallel as the user wants, and returns their
-/// rows
-/// in plan order: a measurement(), or the reason for its absence. Results of an earlier call for the same output folder
-/// are reused. A course is deleted after the last run on it, unless captures are to be kept; runs at the pace of the
-/// recording come last, one at a time.
+/// rows in plan order: a measurement(), or the reason for its absence. Results of an earlier call for the same output
+/// folder are reused. A course is deleted after the last run on it, unless captures are to be kept; runs at the pace of
+/// the recording come last, one at a time.
 ///
 /// All child processes end with this one. Throws tools::Failure if Ninja fails.
 Results carry_out(const Plan& plan, const Arguments& arguments);

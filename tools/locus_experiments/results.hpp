@@ -23,8 +23,7 @@ Results read_results(const std::filesystem::path& file);
 /// Computes Table III from the runs: the effect of each failure relative to the run of the same course without it.
 ///
 /// The paper's terms are interpreted as follows: Stops, no odometry in the last second; Errors, the largest position
-/// error
-/// grew by more than 20 cm; OK, otherwise.
+/// error grew by more than 20 cm; OK, otherwise.
 void judge_robustness(Results& results);
 
 /// Evaluates the runs by judge_robustness(), judge_faults(), judge_matrix() or judge_harsh().

@@ -16,8 +16,7 @@ namespace locus::tools {
 /// per hour at 200 Hz. Reads the whole bag and rewinds it.
 ///
 /// The arrival of a sample is its reception by the recorder. Next to packets, which have the driver's stamps, an
-/// arrival
-/// more than ten seconds from the sample's own stamp indicates another clock; then arrival = stamp.
+/// arrival more than ten seconds from the sample's own stamp indicates another clock; then arrival = stamp.
 std::vector<MotionRecording> read_bag_motion(Bag& bag, const std::filesystem::path& file,
                                              const std::vector<std::optional<std::size_t>>& topic_of_source,
                                              bool beside_packets, std::vector<std::string>& warnings);

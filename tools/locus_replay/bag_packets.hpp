@@ -19,8 +19,7 @@
 namespace locus::tools {
 
 /// Converts the packets in a bag back to datagrams: to the port and from the address configured for their lidar,
-/// received
-/// at the driver's stamp. Clouds are received at the recorder's stamp.
+/// received at the driver's stamp. Clouds are received at the recorder's stamp.
 ///
 /// A message holds the packets of a whole turn. To sort those of several lidars by reception, messages are read half a
 /// second ahead. One owner.

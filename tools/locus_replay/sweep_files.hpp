@@ -15,11 +15,9 @@
 namespace locus::tools {
 
 /// Writes all returns of each sweep, de-skewed to its end, base frame, a file each: 000000.pcd and so on, with the
-/// fields
-/// of daemon::CloudMessage; .bin is KITTI's, x y z and the intensity from 0 to 1 as float32. Line N, counted from 0, of
-/// times.txt is the stamp of sweep N in seconds, that of poses.txt T_odom_base, the upper three rows of its matrix as
-/// in
-/// KITTI.
+/// fields of daemon::CloudMessage; .bin is KITTI's, x y z and the intensity from 0 to 1 as float32. Line N, counted
+/// from 0, of times.txt is the stamp of sweep N in seconds, that of poses.txt T_odom_base, the upper three rows of its
+/// matrix as in KITTI.
 ///
 /// One sweep is in memory at a time. One owner.
 class SweepFiles {

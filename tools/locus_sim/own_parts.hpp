@@ -16,7 +16,7 @@ struct OwnParts {
 };
 
 /// Places masts, arms, rails and cables half a metre or more from a lidar, in its view. Half of them are behind it,
-/// inside the body box; the others are ahead to the left and right, outside of it, to be unexpected.
+/// inside the body box; the others are ahead to the left and right and missing from the box, as by an oversight.
 OwnParts own_parts(int count, const Eigen::Vector3d& lidar_m, Dice& dice);
 
 } // namespace locus::sim

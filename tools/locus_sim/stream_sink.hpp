@@ -12,10 +12,8 @@ namespace locus::sim {
 /// The stream is a pcap file (nanoseconds, Ethernet, IPv4, UDP), its packets in order of arrival. The lidars' datagrams
 /// are stored as in lidar.pcap. The other files of a capture folder are split: a datagram from 127.0.0.1 to 127.0.0.1,
 /// port 9, has as payload the name of the file, a line feed, and whole lines to append to it. config.yaml comes first
-/// and
-/// in one piece, its packet stamped with the start. There is no gt_map.ply: observed space is known only at the end.
-/// Any
-/// reader of pcap files can open the stream, and everything but the texts can be replayed.
+/// and in one piece, its packet stamped with the start. There is no gt_map.ply: observed space is known only at the
+/// end. Any reader of pcap files can open the stream, and everything but the texts can be replayed.
 class StreamSink : public CaptureSink {
  public:
   StreamSink();

@@ -8,10 +8,8 @@
 namespace locus::sim {
 
 /// Adds the zero level set of a function of space, as triangles of about `cell_m`, inside the bounds only. The
-/// function,
-/// evaluated in columns from bottom to top, should have a slope of about one per metre near its zero, and the right
-/// sign
-/// elsewhere: positive in air, negative in rock.
+/// function, evaluated in columns from bottom to top, should have a slope of about one per metre near its zero, and the
+/// right sign elsewhere: positive in air, negative in rock.
 ///
 /// Naive surface nets: one vertex in every cell that the surface crosses, at the mean of the crossings of its edges;
 /// one pair of triangles around every lattice edge that it crosses.

@@ -7,8 +7,7 @@
 namespace locus::tools {
 
 /// Decompresses LZF, the compression of PCD's binary_compressed, and fills `out`. Returns false if `packed` is invalid
-/// or of
-/// another length. Safe for any bytes. Any thread.
+/// or of another length. Safe for any bytes. Any thread.
 ///
 /// A byte below 32 is the length of a literal minus one, which follows. Any other is a back reference: its upper three
 /// bits are the length minus two, where 7 means that the next byte is added; its lower five bits and the next byte are
