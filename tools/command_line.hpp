@@ -10,11 +10,11 @@ class App;
 
 namespace locus::tools {
 
-/// Reads the command line of a program. False where help or version were asked for and have been printed. Throws
-/// Failure, which names an option that does not exist and the one that was probably meant.
+/// Parses the command line of a program. Returns false if help or version were requested and have been printed. Throws
+/// Failure, which names an unknown option and suggests the closest one.
 bool parse_command_line(CLI::App& app, int argc, char** argv);
 
-/// The whole of a program: does the work, says under the program's name why it could not, and gives the exit status.
+/// Runs the body of a program, reports a failure under the program's name, and returns the exit status.
 int exit_status_of(std::string_view program, const std::function<void()>& work);
 
 } // namespace locus::tools

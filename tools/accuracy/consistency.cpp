@@ -15,14 +15,14 @@ namespace {
 
 constexpr double kNoError_m = 0.01;
 
-/// Of the pose at the end as seen from the one at the beginning, odom axes: both are off, each on its own account.
+/// Returns the covariance of the end pose relative to the start pose, odom axes; their errors count as independent.
 Matrix6 covariance_between(const PosePair& begin, const PosePair& end, std::span<const Matrix6> covariances) {
   Matrix6 transport = Matrix6::Identity();
   transport.topRightCorner<3, 3>() = -skew(end.T_odom_base.translation - begin.T_odom_base.translation);
   return covariances[end.estimate] + transport * covariances[begin.estimate] * transport.transpose();
 }
 
-/// Nothing where some axis is said to be known without any doubt.
+/// Returns the squared error normalised by its covariance; nothing if the covariance of an axis is zero.
 std::optional<double> normalised_squared_error(const PosePair& begin, const PosePair& end,
                                                std::span<const Matrix6> covariances) {
   const Pose T_odom = begin.T_odom_base.inverse() * end.T_odom_base;

@@ -18,7 +18,7 @@ pcl::PointCloud<pcl::PointXYZ>::Ptr cloud_of(std::span<const Eigen::Vector3f> po
 } // namespace
 
 Pose icp(std::span<const Eigen::Vector3f> source, std::span<const Eigen::Vector3f> target, double reach_m) {
-  pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS); // it would tell the user that it found no pairs
+  pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS); // else it prints to the user that it found no pairs
   pcl::IterativeClosestPoint<pcl::PointXYZ, pcl::PointXYZ> matcher;
   matcher.setInputSource(cloud_of(source));
   matcher.setInputTarget(cloud_of(target));

@@ -9,8 +9,8 @@
 
 namespace locus {
 
-/// PCL's point-to-point ICP between two clouds that already lie roughly on each other, pairs within `reach_m`. Returns
-/// T_target_source; identity where they have nothing in common.
+/// Registers two roughly aligned clouds with PCL's point-to-point ICP; pairs within `reach_m`. Returns T_target_source;
+/// identity if the clouds do not overlap.
 Pose icp(std::span<const Eigen::Vector3f> source, std::span<const Eigen::Vector3f> target, double reach_m);
 
 } // namespace locus

@@ -15,12 +15,12 @@ namespace {
 
 using Points = std::vector<Eigen::Vector3f>;
 
-constexpr float kOutlier_m = 1.0F; ///< the contract's
+constexpr float kOutlier_m = 1.0F; ///< as in the contract
 constexpr float kFinestVoxel_m = 0.05F;
 constexpr std::size_t kMaxIcpPoints = 30'000;   ///< of the map
-constexpr std::size_t kMaxTrueVoxels = 200'000; ///< of the truth: 20 MB in all
+constexpr std::size_t kMaxTrueVoxels = 200'000; ///< of the truth: 20 MB in total
 
-/// The truth in the frame of the map, where coordinates are small enough for floats, pass after pass.
+/// Walks through the true points in the frame of the map, where coordinates are small enough for floats; repeatable.
 class TruthWalker {
  public:
   TruthWalker(const PointCloudFile& truth, Pose T_odom_truth, const std::function<void(double)>& progress)
@@ -52,7 +52,7 @@ Expected<Points, std::string> thinned_truth(TruthWalker& truth) {
   return thinned.centroids();
 }
 
-/// At most so many, evenly taken.
+/// Returns at most this many points, evenly sampled.
 Points some_of(std::span<const Eigen::Vector3f> points, std::size_t most) {
   Points some;
   const std::size_t step = points.size() / most + 1;
@@ -68,8 +68,8 @@ Points moved(std::span<const Eigen::Vector3f> points, const Pose& T) {
   return result;
 }
 
-/// From each point of the map to the nearest true one; infinite beyond a metre. Most points have one close by, where
-/// few others are to be looked at; only for the rest is it worth a wider search.
+/// Computes the distance from each point of the map to the nearest true one; infinite beyond a metre. Most points have
+/// a close neighbour, which a narrow search finds at low cost; only the rest need a wider one.
 Expected<std::vector<float>, std::string> distances_to(TruthWalker& truth, const Points& map) {
   std::vector<float> distances_m(map.size(), std::numeric_limits<float>::infinity());
   for (const float reach_m : {0.25F, kOutlier_m}) {

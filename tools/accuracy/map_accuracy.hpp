@@ -15,16 +15,16 @@
 
 namespace locus {
 
-/// How far the points of a map are from those of the true one (the map error of the paper's Table II).
+/// Distance of the points of a map from the true map (the map error of the paper's Table II).
 struct MapAccuracy {
   std::optional<double> rmse_m; ///< of the distances to the nearest true point; nothing if all are outliers
   std::size_t compared = 0;     ///< points of the map within 1 m of a true one
-  std::size_t outliers = 0;     ///< points without, left out of the error
+  std::size_t outliers = 0;     ///< points without one, excluded from the error
 };
 
-/// Fits the map to the truth by ICP, from where `T_truth_odom` puts it, then looks up every point. The truth may be
-/// larger than memory: for the ICP it is thinned, for the distances it is walked through. `progress` is told the share
-/// done, 0..1. Fails with one line for the user.
+/// Registers the map with the truth by ICP, starting at `T_truth_odom`, then measures each point. The truth may be
+/// larger than memory: it is thinned for the ICP and streamed for the distances. Calls `progress` with the share done,
+/// 0..1. Fails with one line for the user.
 Expected<MapAccuracy, std::string> map_accuracy(
     std::span<const Eigen::Vector3f> map_odom, const PointCloudFile& truth, const Pose& T_truth_odom,
     const std::function<void(double)>& progress = [](double) {});

@@ -9,7 +9,7 @@
 
 namespace locus {
 
-/// A cell is two reaches wide, so the ball around a point touches eight of them.
+/// Uses cells two reaches wide, so the ball around a point touches eight of them.
 NearestDistances::NearestDistances(std::span<const Eigen::Vector3f> points, float reach_m)
     : points_(points), reach_m_(reach_m), squared_m2_(points.size(), reach_m * reach_m) {
   std::vector<std::pair<Cell, std::uint32_t>> entries;

@@ -11,22 +11,22 @@
 
 namespace locus {
 
-/// How far each of some points is from the nearest of many more, of which one after the other passes by: exact, with
-/// memory for the few alone. One owner.
+/// Exact distances from each of a few points to the nearest of many candidates, which are streamed. Memory grows with
+/// the few only. One owner.
 class NearestDistances {
  public:
-  /// Nothing farther than `reach_m` from a point is looked at. `points` must outlive this.
+  /// Ignores candidates farther than `reach_m` from a point. `points` must outlive this.
   NearestDistances(std::span<const Eigen::Vector3f> points, float reach_m);
 
-  /// One of the many.
+  /// Adds one of the many candidates.
   void offer(const Eigen::Vector3f& candidate);
 
-  /// Of each point, in metres; infinite where nothing was within reach.
+  /// Returns the distance of each point, in metres; infinite if no candidate was within reach.
   [[nodiscard]] std::vector<float> distances_m() const;
 
  private:
   using Cell = std::uint64_t;
-  /// Points in whose reach at least a part of the cell lies.
+  /// Points whose reach overlaps the cell.
   using Members = std::span<const std::uint32_t>;
 
   [[nodiscard]] Cell cell_of(const Eigen::Vector3f& position) const;
@@ -34,9 +34,9 @@ class NearestDistances {
   std::span<const Eigen::Vector3f> points_;
   float reach_m_;
   std::vector<float> squared_m2_;
-  std::vector<std::uint32_t> members_; ///< of cell after cell
+  std::vector<std::uint32_t> members_; ///< grouped by cell
   std::unordered_map<Cell, Members> cells_;
-  std::pair<Cell, Members> latest_{~Cell{0}, {}}; ///< maps are written surface by surface: the next is mostly the same
+  std::pair<Cell, Members> latest_{~Cell{0}, {}}; ///< cache: maps are written surface by surface
 };
 
 } // namespace locus

@@ -22,12 +22,12 @@ template <class Number> bool parse_pcd(const std::string& text, Number& number) 
   return error == std::errc{} && stop == end;
 }
 
-/// Takes a header line by line.
+/// Parses a header line by line.
 class PcdHeaderLines {
  public:
   PcdHeader header;
 
-  /// `ended` at the last of the header.
+  /// Parses one line; sets `ended` at the last of the header.
   PcdProblem take(const std::string& line, bool& ended) {
     std::vector<std::string> words = words_of(line);
     if (words.empty() || words[0].starts_with('#'))
@@ -70,7 +70,7 @@ class PcdHeaderLines {
         return fmt::format("{} does not have as many values as FIELDS; export it again", key);
     }
     for (std::size_t i = 0; i < names.size(); ++i) {
-      constexpr std::size_t kMost = 100'000; // of numbers in a field, a histogram for example
+      constexpr std::size_t kMost = 100'000; // numbers in a field, such as a histogram
       PcdHeader::Field field{names[i], lines_["TYPE"][i][0], 0, 0};
       if (!parse_pcd(lines_["SIZE"][i], field.bytes) || !parse_pcd(lines_["COUNT"][i], field.count) ||
           field.bytes > 8 || field.count > kMost)

@@ -22,7 +22,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "binary coordinates are taken as they lie in the file");
 
-constexpr std::size_t kBlockBytes = 1 << 18; ///< of a file that is read at once
+constexpr std::size_t kBlockBytes = 1 << 18; ///< read at once from a file
 
 using Coordinate = PointCloudLayout::Coordinate;
 
@@ -39,7 +39,7 @@ double coordinate_at(const std::byte* record, const Coordinate& where, bool reve
                                       : real_at<double>(record + where.offset, reversed);
 }
 
-/// The coordinates in a line of text; nothing if one of them is no number.
+/// Parses the coordinates in a line of text; nothing if one of them is not a number.
 std::optional<Eigen::Vector3d> point_in(std::string_view line, const std::array<Coordinate, 3>& xyz) {
   Eigen::Vector3d point;
   int found = 0;

@@ -15,19 +15,19 @@
 
 namespace locus {
 
-/// A cloud of points in a PLY or PCD file, walked through in blocks, so that it may be larger than memory; why not by
-/// PCL: docs/decisions/027-maps-without-pcl-io.md.
+/// Point cloud in a PLY or PCD file, read in blocks, so that it may be larger than memory. For the reason not to use
+/// PCL see docs/decisions/027-maps-without-pcl-io.md.
 ///
-/// Of a PLY it reads the element vertex, which must come first; of PCD all but binary_compressed. Any thread.
+/// Reads the element vertex of a PLY, which must come first, and all PCD encodings but binary_compressed. Any thread.
 class PointCloudFile {
  public:
   using Visit = std::function<void(std::span<const Eigen::Vector3d> points)>;
 
-  /// Reads the header and sees whether the file is as long as that promises. Fails with one line for the user.
+  /// Reads the header and checks that the file is as long as the header requires. Fails with one line for the user.
   static Expected<PointCloudFile, std::string> open(const std::filesystem::path& path);
 
-  /// Shows all points to `visit`, block after block; those that are not finite are left out. Returns what is wrong with
-  /// the file, one line for the user.
+  /// Calls `visit` with all points, block by block, without those that are not finite. Returns what is wrong with the
+  /// file, one line for the user.
   [[nodiscard]] std::optional<std::string> walk(const Visit& visit) const;
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
@@ -42,7 +42,7 @@ class PointCloudFile {
 
   std::filesystem::path path_;
   PointCloudLayout layout_;
-  std::streamoff begin_; ///< of the first point
+  std::streamoff begin_; ///< position of the first point
 };
 
 } // namespace locus

@@ -27,12 +27,12 @@ template <class Number> bool parse(const std::string& text, Number& number) {
   return error == std::errc{} && stop == end;
 }
 
-/// What both headers describe, put together line by line.
+/// Builds the layout that either header describes, line by line.
 class LayoutBuilder {
  public:
   PointCloudLayout layout;
 
-  /// A property of every point, `count` numbers of `bytes` bytes each.
+  /// Adds a property of every point: `count` numbers of `bytes` bytes each.
   Problem add(const std::string& name, std::size_t bytes, bool real, std::size_t count) {
     const std::size_t axis = std::string_view{"xyz"}.find(name);
     if (name.size() == 1 && axis != std::string_view::npos) {
@@ -58,7 +58,7 @@ class PlyHeader {
  public:
   LayoutBuilder builder;
 
-  /// Takes a line in; `ended` at the last of the header.
+  /// Parses a line; sets `ended` at the last of the header.
   Problem take(const Words& words, bool& ended) {
     if (words.empty() || words[0] == "comment" || words[0] == "obj_info" || words[0] == "ply")
       return std::nullopt;
@@ -116,7 +116,7 @@ class PlyHeader {
 Expected<PointCloudLayout, std::string> read_ply_header(std::istream& stream) {
   PlyHeader header;
   bool ended = false;
-  std::uint64_t number = 2; // the first one is known
+  std::uint64_t number = 2; // line number; the first line has been read
   for (; true; ++number) {
     const std::optional<std::string> line = read_short_line(stream);
     if (!line)

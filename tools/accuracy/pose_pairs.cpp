@@ -9,7 +9,7 @@ namespace locus {
 
 namespace {
 
-/// Beyond this, an interval of the truth is a hole: twice the usual one, but a second is always bridged.
+/// Longest interval of the truth that is interpolated: twice the usual one, at least a second.
 Duration longest_interval(std::span<const StampedPose> truth) {
   std::vector<Duration> intervals;
   for (std::size_t i = 1; i < truth.size(); ++i)

@@ -10,7 +10,7 @@
 
 namespace locus {
 
-/// A cloud of any size as the centroids of its voxels, whose side doubles whenever they become too many. One owner.
+/// Voxel centroids of a cloud of any size. The voxel side doubles whenever there are too many. One owner.
 class ThinnedCloud {
  public:
   ThinnedCloud(float side_m, std::size_t max_voxels) : side_m_(side_m), max_voxels_(max_voxels) {}

@@ -14,10 +14,10 @@
 namespace locus {
 namespace {
 
-/// Points that move with the attitude of the base, and are centred on it.
+/// Points fixed to the base, centred on it: they carry its attitude into the alignment.
 const std::array<Eigen::Vector3d, 4> kAroundBase{{{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}}};
 
-/// Least squares between points that are fixed to the base (Umeyama, 1991), without a copy of them all.
+/// Aligns points fixed to the base by least squares (Umeyama, 1991), without storing them all.
 Pose aligned(std::span<const PosePair> pairs, std::span<const Eigen::Vector3d> points_base) {
   const auto for_each_point = [&](auto&& visit) {
     for (const PosePair& pair : pairs) {
@@ -52,7 +52,7 @@ StretchError error_of(std::span<const PosePair> pairs, const Stretch& stretch) {
   return {100.0 * error.translation.norm() / stretch.length_m, angle_rad(error.rotation) / kRadPerDeg};
 }
 
-/// The mean over all stretches.
+/// Returns the mean over all stretches.
 std::optional<StretchError> relative_error(std::span<const PosePair> pairs, double length_m) {
   const std::vector<Stretch> stretches = stretches_of(pairs, length_m);
   if (stretches.empty())

@@ -8,7 +8,8 @@
 
 namespace locus {
 
-/// Names the voxel of `side_m` around a position, 21 bits an axis. Beyond 2^20 voxels from the origin names repeat.
+/// Returns the key of the voxel of `side_m` around a position, 21 bits per axis. Keys repeat beyond 2^20 voxels from
+/// the origin.
 inline std::uint64_t voxel_key(const Eigen::Vector3f& position, float side_m) {
   constexpr std::uint64_t kAxis = (1U << 21U) - 1;
   const auto axis = [&](float value) {

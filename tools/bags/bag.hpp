@@ -20,81 +20,81 @@ namespace locus::tools {
 
 struct BagTopic {
   std::string name;
-  std::string type; ///< as ROS 1 writes it, for ROS 2 too: sensor_msgs/Imu
+  std::string type; ///< in ROS 1 notation, also for ROS 2: sensor_msgs/Imu
   Serialisation serialisation;
 
   auto operator<=>(const BagTopic&) const = default;
 };
 
-/// ROS' own bound on a name is far below; a damaged file may claim that it is as long as the file.
+/// Far above ROS' own limit on a name; a damaged file may claim a length up to that of the file.
 inline constexpr std::size_t kMaxNameBytes = 4096;
-/// As many as MCAP has numbers for.
+/// Limit of MCAP's channel ids.
 inline constexpr std::size_t kMaxTopics = 65535;
 
-/// Times of reception that are later are absurd: their differences could overflow.
+/// Later reception times are rejected: their differences could overflow.
 inline constexpr std::int64_t kMaxBagTime_ns = 4'000'000'000'000'000'000;
 
-/// A message as it lies in the bag. Owns nothing.
+/// Message as stored in the bag. Does not own its data.
 struct BagMessage {
   std::size_t topic; ///< index in Bag::topics()
-  Stamp recorded;    ///< when the recorder received it
+  Stamp recorded;    ///< reception time at the recorder
   std::span<const std::byte> data;
 };
 
-/// The messages that ROS recorded, in the order in which they lie in the file: that of their reception, but for bags
-/// that somebody sorted or merged. One owner.
+/// Messages recorded by ROS, in file order: the order of reception, except in bags that were sorted or merged. One
+/// owner.
 class Bag {
  public:
   virtual ~Bag() = default;
 
   [[nodiscard]] const std::vector<BagTopic>& topics() const { return topics_; }
 
-  /// The next message, valid until the next call; nullptr at the end, and where the bag breaks off. A topic that the
-  /// bag did not tell beforehand is added before its first message.
+  /// Returns the next message, valid until the next call; nullptr at the end, or where the bag is truncated. Adds a
+  /// topic that the bag did not list in advance before its first message.
   virtual const BagMessage* next() = 0;
-  /// next() begins with the first message again.
+  /// Restarts next() at the first message.
   virtual void rewind() = 0;
 
-  /// One line for the user each, about what was met so far.
+  /// Returns a line for the user per problem met so far.
   [[nodiscard]] virtual std::vector<std::string> warnings() const = 0;
-  /// Share of the messages that next() is through with, 0..1.
+  /// Share of the messages that next() has returned, 0..1.
   [[nodiscard]] virtual double progress() const = 0;
 
  protected:
-  /// The index of the topic, a new one if need be; nothing for one beyond the bounds, which is left out.
+  /// Returns the index of the topic, adding it if needed; nothing beyond the limits: the topic is dropped.
   std::optional<std::size_t> index_of(BagTopic topic);
 
-  /// What messages of this number are of from now on. Those of a topic beyond the bounds are left out.
+  /// Maps messages of this number to the topic from now on. Drops those of a topic beyond the limits.
   void declare(std::int64_t number, BagTopic topic);
   [[nodiscard]] std::optional<std::size_t> topic_of(std::int64_t number) const;
 
-  /// One line for the user, if topics were left out.
+  /// Adds one line for the user if topics were dropped.
   void tell_of_bounds(const std::string& file, std::vector<std::string>& lines) const;
 
  private:
   std::vector<BagTopic> topics_;
   std::map<BagTopic, std::size_t> indices_;
-  std::map<std::int64_t, std::size_t> declared_; ///< indices, by number
+  std::map<std::int64_t, std::size_t> declared_; ///< topic indices, by number
   bool is_beyond_bounds_ = false;
 };
 
-/// The type as ROS 1 writes it: ROS 2 puts /msg between package and name.
+/// Converts a type to ROS 1 notation: ROS 2 puts /msg between package and name.
 std::string ros1_type(std::string type);
 
-/// The beginning of what may be any bytes, for a line to the user.
+/// Returns the beginning of arbitrary bytes in printable form, for a line to the user.
 std::string printable(std::string_view text);
 
-/// Why the file cannot be opened and what to do, without its name; nothing if it can.
+/// Returns why the file cannot be opened and a remedy, without its name; nothing if it can.
 std::optional<std::string> why_unreadable(const std::filesystem::path& file);
 
-/// One line for the user about messages left out for kMaxBagTime_ns.
+/// Formats the line for the user about messages dropped for kMaxBagTime_ns.
 std::string timeless_messages(const std::string& file, std::uint64_t count);
 
-/// Whether this is for open_bag() to read or to refuse: judged by name and first bytes.
+/// Returns whether open_bag() should read or reject this, judged by name and first bytes.
 bool looks_like_bag(const std::filesystem::path& where);
 
-/// A ROS 1 bag, an MCAP file of either ROS, or a ROS 2 bag: its folder, or a .db3 file of it. Fails with one line for
-/// the user.
+/// Opens a ROS 1 bag, an MCAP file of either ROS, or a ROS 2 bag: its folder, or one of its .db3 files. Fails with one
+/// line for the user.
 Expected<std::unique_ptr<Bag>, std::string> open_bag(const std::filesystem::path& where);
 
 } // namespace locus::tools

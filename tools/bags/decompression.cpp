@@ -12,7 +12,7 @@ namespace locus::tools {
 
 bool decompress_bzip2(std::span<const std::byte> in, std::span<std::byte> out) {
   const auto* begin = reinterpret_cast<const char*>(in.data());
-  std::vector<char> source(begin, begin + in.size()); // bzip2 knows no const
+  std::vector<char> source(begin, begin + in.size()); // bzip2's API is not const-correct
   auto size = static_cast<unsigned>(out.size());
   return BZ2_bzBuffToBuffDecompress(reinterpret_cast<char*>(out.data()), &size, source.data(),
                                     static_cast<unsigned>(source.size()), 0, 0) == BZ_OK &&
@@ -37,7 +37,7 @@ bool decompress_lz4(std::span<const std::byte> in, std::span<std::byte> out) {
 }
 
 bool decompress_zstd(std::span<const std::byte> in, std::span<std::byte> out) {
-  return ZSTD_decompress(out.data(), out.size(), in.data(), in.size()) == out.size(); // an error is no size
+  return ZSTD_decompress(out.data(), out.size(), in.data(), in.size()) == out.size(); // errors are no valid size
 }
 
 } // namespace locus::tools

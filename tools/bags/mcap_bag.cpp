@@ -45,7 +45,7 @@ std::optional<std::string> McapBag::read_magic() {
   return "not an MCAP file: it does not begin as one; copy or record it again";
 }
 
-/// The last record; nothing where the recorder has not come to write it.
+/// Reads the last record; nothing if the recorder did not get to write it.
 std::optional<McapFooter> McapBag::read_footer() {
   std::array<std::byte, kMcapFooterBytes + kMcapMagic.size()> end{};
   if (size_ < kMcapMagic.size() + end.size() || !read_at(size_ - end.size(), end))
@@ -56,7 +56,7 @@ std::optional<McapFooter> McapBag::read_footer() {
   return record && magic == kMcapMagic ? McapFooter::read(*record) : std::nullopt;
 }
 
-/// False if there is no whole one that names all channels.
+/// Returns false without a complete summary that lists all channels.
 bool McapBag::read_topics_from_summary() {
   constexpr std::size_t kBehindCrc = sizeof(std::uint32_t);
   const std::optional<McapFooter> footer = read_footer();
@@ -73,7 +73,7 @@ bool McapBag::read_topics_from_summary() {
   return take_summary(bytes.first(bytes.size() - kMcapFooterBytes));
 }
 
-/// False if it lacks a channel, or the schema of one: writers may leave either out.
+/// Returns false if a channel, or the schema of one, is missing: writers may omit either.
 bool McapBag::take_summary(std::span<const std::byte> summary) {
   std::vector<McapRecord> channels;
   std::optional<std::uint32_t> count;
@@ -106,7 +106,7 @@ bool McapBag::read_at(std::uint64_t place, std::span<std::byte> bytes) {
   return stream_.good();
 }
 
-/// A folder may hold many files, of which one is read at a time.
+/// Frees the memory of this file: a folder may hold many, which are read one at a time.
 void McapBag::free_memory() {
   left_ = {};
   for (std::vector<std::byte>* const room : {&record_, &chunk_})
@@ -133,7 +133,7 @@ const BagMessage* McapBag::next() {
   return nullptr;
 }
 
-/// Of the chunk at hand, else of the file; nothing at the end and at a break.
+/// Reads from the current chunk, else from the file; nothing at the end or where the file is truncated.
 std::optional<McapRecord> McapBag::next_record() {
   if (left_.empty())
     return read_record();
@@ -145,7 +145,7 @@ std::optional<McapRecord> McapBag::next_record() {
   return next_record();
 }
 
-/// The next record of the file that is of use.
+/// Reads the next relevant record of the file.
 std::optional<McapRecord> McapBag::read_record() {
   while (!is_over_ && at_ < size_) {
     place_ = at_;
@@ -175,7 +175,7 @@ std::optional<McapRecord> McapBag::read_record() {
   return std::nullopt;
 }
 
-/// Whether a message came of it.
+/// Processes a record; returns whether it yields a message.
 bool McapBag::take(const McapRecord& record) {
   if (record.op == McapOp::schema)
     take_schema(record);
@@ -188,7 +188,7 @@ bool McapBag::take(const McapRecord& record) {
 
 void McapBag::take_schema(const McapRecord& record) {
   if (std::optional<McapSchema> schema = McapSchema::read(record))
-    schemas_[schema->id] = schema->name.substr(0, kMaxNameBytes + 1); // too long still, then
+    schemas_[schema->id] = schema->name.substr(0, kMaxNameBytes + 1); // still rejected if too long
 }
 
 void McapBag::take_channel(const McapRecord& record) {
@@ -209,13 +209,13 @@ void McapBag::take_chunk(const McapRecord& record) {
     leave_out(records.problem);
 }
 
-/// False for one of no channel, or without a time.
+/// Returns false for a message without a known channel or a valid time.
 bool McapBag::take_message(const McapRecord& record) {
   MessageReader fields = record.fields();
   const std::optional<std::size_t> topic = topic_of(fields.number<std::uint16_t>());
   fields.number<std::uint32_t>(); // sequence number
   const auto recorded_ns = fields.number<std::uint64_t>();
-  fields.number<std::uint64_t>(); // time of publication
+  fields.number<std::uint64_t>(); // publication time
   const bool has_time = recorded_ns <= static_cast<std::uint64_t>(kMaxBagTime_ns);
   timeless_ += has_time ? 0U : 1U;
   if (!fields.whole() || !topic || !has_time)

@@ -15,15 +15,15 @@
 
 namespace locus::tools {
 
-/// An MCAP file of ROS 2 or ROS 1, with plain, LZ4 or zstd chunks or without any.
+/// MCAP file of ROS 2 or ROS 1, with uncompressed, LZ4 or zstd chunks, or without chunks.
 ///
-/// Read from its beginning to its end, so that one that was never closed, or breaks off, is read as far as it goes: up
-/// to its last whole chunk. The summary at the end serves to know the topics beforehand; without it the file is read
-/// through for that. A chunk that is damaged, or larger than kMaxBlockBytes, is left out. A topic in another encoding
-/// than those of ROS has a type that says so. One chunk is in memory at a time, packed and unpacked.
+/// Reads sequentially, so that a file that was not closed or is truncated is read up to its last complete chunk.
+/// The summary at the end lists the topics in advance; without it the file is scanned for them first. Drops chunks that
+/// are damaged or larger than kMaxBlockBytes. The type of a topic in an encoding other than those of ROS states that
+/// encoding. One chunk is in memory at a time, compressed and uncompressed.
 class McapBag : public Bag {
  public:
-  /// `name`: what messages call the file. Fails with one line for the user.
+  /// Opens the file; messages call it `name`. Fails with one line for the user.
   static Expected<std::unique_ptr<Bag>, std::string> open(const std::filesystem::path& file, std::string name);
 
   const BagMessage* next() override;
@@ -53,18 +53,18 @@ class McapBag : public Bag {
   std::string name_;
   std::ifstream stream_;
   std::uint64_t size_ = 0;
-  std::uint64_t at_ = 0;    ///< how far the file has been read
-  std::uint64_t place_ = 0; ///< where the latest record begins
-  bool is_closed_ = false;  ///< it has its end
+  std::uint64_t at_ = 0;    ///< read position in the file
+  std::uint64_t place_ = 0; ///< start of the latest record
+  bool is_closed_ = false;  ///< has its footer
   bool is_over_ = false;    ///< no more records
   std::vector<std::byte> record_, chunk_;
-  std::span<const std::byte> left_; ///< of the chunk at hand
+  std::span<const std::byte> left_; ///< unread part of the current chunk
   std::map<std::uint16_t, std::string> schemas_;
   BagMessage message_{};
 
-  std::uint64_t timeless_ = 0, left_out_ = 0; ///< messages; records that cannot be read
-  std::string first_left_out_;                ///< of the records: where, and why
-  std::string break_;                         ///< where reading stopped before the end; empty while all is well
+  std::uint64_t timeless_ = 0, left_out_ = 0; ///< dropped messages; unreadable records
+  std::string first_left_out_;                ///< of the records: position and reason
+  std::string break_;                         ///< reason for stopping before the end; empty if there is none
 };
 
 } // namespace locus::tools

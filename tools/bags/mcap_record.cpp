@@ -54,7 +54,7 @@ std::uint32_t mcap_crc(std::span<const std::byte> bytes, std::uint32_t before) {
 
 McapChunkRecords unpack_mcap_chunk(const McapRecord& chunk, std::vector<std::byte>& room) {
   MessageReader fields = chunk.fields();
-  fields.bytes(2 * sizeof(std::uint64_t)); // times of its first and last message
+  fields.bytes(2 * sizeof(std::uint64_t)); // times of the first and last message
   const auto size = fields.number<std::uint64_t>();
   const auto crc = fields.number<std::uint32_t>();
   const std::string_view compression = fields.text();

@@ -11,8 +11,8 @@
 
 #include "drivers/clouds/message_reader.hpp"
 
-/// What an MCAP file is made of, after the specification (mcap.dev/spec), version 0. Its numbers and texts are written
-/// as ROS 1 writes those of messages.
+/// Records of an MCAP file, after the specification (mcap.dev/spec), version 0. Numbers and strings are encoded as in
+/// ROS 1 messages.
 namespace locus::tools {
 
 inline constexpr std::string_view kMcapMagic{"\x89MCAP0\r\n", 8}; ///< at the beginning and at the end
@@ -32,7 +32,7 @@ enum class McapOp : std::uint8_t {
   data_end = 0x0F,
 };
 
-inline constexpr std::size_t kMcapRecordHead = 9; ///< bytes: the op, and the length of what follows
+inline constexpr std::size_t kMcapRecordHead = 9; ///< bytes: opcode and length of the content
 inline constexpr std::size_t kMcapFooterBytes = kMcapRecordHead + 20;
 
 struct McapRecord {
@@ -42,7 +42,7 @@ struct McapRecord {
   [[nodiscard]] MessageReader fields() const { return {content, Serialisation::ros1}; }
 };
 
-/// Takes the first record off the bytes; nothing where they do not begin with a whole one.
+/// Removes the first record from the bytes and returns it; nothing if they do not start with a complete one.
 std::optional<McapRecord> take_mcap_record(std::span<const std::byte>& bytes);
 
 struct McapSchema {
@@ -53,27 +53,27 @@ struct McapSchema {
 };
 
 struct McapChannel {
-  std::uint16_t id = 0, schema = 0; ///< 0: it has none
+  std::uint16_t id = 0, schema = 0; ///< 0: none
   std::string topic, encoding;
 
   static std::optional<McapChannel> read(const McapRecord& record);
 };
 
 struct McapFooter {
-  std::uint64_t summary_start = 0; ///< 0: there is none
+  std::uint64_t summary_start = 0; ///< 0: none
   std::uint64_t summary_offset_start = 0;
-  std::uint32_t summary_crc = 0; ///< 0: not known, as below
+  std::uint32_t summary_crc = 0; ///< 0: unknown, as below
 
   static std::optional<McapFooter> read(const McapRecord& record);
 };
 
-/// CRC-32 as zlib's; `before` is that of the bytes before.
+/// Computes zlib's CRC-32; `before` is that of the preceding bytes.
 std::uint32_t mcap_crc(std::span<const std::byte> bytes, std::uint32_t before = 0);
 
-/// The records in a chunk, which are those of `chunk` itself or in `room`; an error says what is wrong with them.
+/// Records in a chunk, which point into `chunk` itself or into `room`, or the reason why they cannot be read.
 struct McapChunkRecords {
   std::span<const std::byte> bytes;
-  std::string problem; ///< empty while all is well
+  std::string problem; ///< empty if there is none
 };
 McapChunkRecords unpack_mcap_chunk(const McapRecord& chunk, std::vector<std::byte>& room);
 

@@ -148,7 +148,7 @@ void McapWriter::put_summary() {
   McapBytes footer;
   footer.number(at_).number(at_ + summary.size());
   summary.bytes(offsets.all());
-  McapBytes head = summary; // the checksum counts what stands before it
+  McapBytes head = summary; // the checksum covers all bytes before it
   head.number(static_cast<std::uint8_t>(McapOp::footer)).number(std::uint64_t{kMcapFooterBytes - kMcapRecordHead});
   head.bytes(footer.all());
   put(summary.all());
@@ -157,7 +157,7 @@ void McapWriter::put_summary() {
 
 void McapWriter::close() {
   finish_chunk();
-  put(McapOp::data_end, McapBytes().number(std::uint32_t{0})); // a checksum of all data is not asked for
+  put(McapOp::data_end, McapBytes().number(std::uint32_t{0})); // a checksum of all data is optional
   put_summary();
   put(std::as_bytes(std::span{kMcapMagic}));
   file_.close();

@@ -18,7 +18,7 @@
 
 namespace locus::tools {
 
-/// Puts numbers and texts into the bytes of an MCAP file, the counterpart of MessageReader.
+/// Encodes numbers and strings as bytes of an MCAP file; the counterpart of MessageReader.
 class McapBytes {
  public:
   template <class Number> McapBytes& number(Number value) {
@@ -26,7 +26,7 @@ class McapBytes {
     return bytes(std::as_bytes(std::span{&value, 1}));
   }
   McapBytes& bytes(std::span<const std::byte> more);
-  /// Behind its length, of 32 bits.
+  /// Appends the bytes, prefixed by their length in 32 bits.
   McapBytes& sequence(std::span<const std::byte> more);
   McapBytes& text(std::string_view text) { return sequence(std::as_bytes(std::span{text})); }
   McapBytes& record(McapOp op, const McapBytes& content);
@@ -39,31 +39,31 @@ class McapBytes {
   std::vector<std::byte> all_;
 };
 
-/// Writes an MCAP file of ROS 2 as rosbag2 does: zstd chunks with their indices, a summary of all, checksums. In memory
-/// are one chunk and the indices, 16 bytes a message. One owner.
+/// Writes an MCAP file of ROS 2 as rosbag2 does: zstd chunks with their indices, a summary, checksums. Memory holds one
+/// chunk and the indices, 16 bytes per message. One owner.
 class McapWriter {
  public:
-  /// Throws Failure, as do write() and close(): a disk that is full is told before hours of work are lost to it.
+  /// Throws Failure, as do write() and close(): a full disk is reported at once rather than after hours of work.
   explicit McapWriter(const std::filesystem::path& file);
 
   struct Topic {
     std::string name;
     std::string type;       ///< "nav_msgs/msg/Odometry"
     std::string definition; ///< ros2_definition()
-    std::string hash;       ///< ROS 2's, of the type: "RIHS01_...", or empty
+    std::string hash;       ///< ROS 2's type hash: "RIHS01_...", or empty
   };
-  /// At most 65535. What write() is to be told.
+  /// Adds a topic, at most 65535; returns the channel for write().
   std::uint16_t add(const Topic& topic);
-  /// A message in CDR.
+  /// Writes a message in CDR.
   void write(std::uint16_t channel, Stamp stamp, std::span<const std::byte> message);
-  /// The file is whole when it returns.
+  /// Completes the file.
   void close();
 
  private:
   struct Chunk {
     std::uint64_t first_ns = 0, last_ns = 0;
     std::uint64_t begin = 0, length = 0, indices_length = 0, packed_size = 0, size = 0;
-    std::map<std::uint16_t, std::uint64_t> index_of; ///< where the index of a channel lies
+    std::map<std::uint16_t, std::uint64_t> index_of; ///< position of the index of a channel
   };
 
   void put(McapOp op, const McapBytes& content);
@@ -74,13 +74,13 @@ class McapWriter {
   void put_summary();
 
   OutputFile file_;
-  std::uint64_t at_ = 0;                            ///< bytes of the file so far
-  McapBytes schemas_, channels_;                    ///< their records
-  std::map<std::uint16_t, std::uint64_t> messages_; ///< how many, by channel
-  McapBytes records_;                               ///< of the chunk that is begun
-  Chunk chunk_;                                     ///< the same
-  std::map<std::uint16_t, McapBytes> times_;        ///< of its messages, with where they lie in it
-  std::vector<Chunk> chunks_;                       ///< that are written
+  std::uint64_t at_ = 0;                            ///< bytes written so far
+  McapBytes schemas_, channels_;                    ///< encoded records
+  std::map<std::uint16_t, std::uint64_t> messages_; ///< message count by channel
+  McapBytes records_;                               ///< of the chunk being filled
+  Chunk chunk_;                                     ///< the chunk being filled
+  std::map<std::uint16_t, McapBytes> times_;        ///< times of its messages with their offsets in it
+  std::vector<Chunk> chunks_;                       ///< already written
   std::vector<std::byte> packed_;
 };
 

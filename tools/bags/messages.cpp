@@ -15,13 +15,13 @@ namespace {
 namespace ros = daemon::ros;
 
 ros::Time read_time(MessageReader& reader) {
-  const auto seconds = reader.number<std::int32_t>(); // unsigned in ROS 1, which makes no difference before 2038
+  const auto seconds = reader.number<std::int32_t>(); // unsigned in ROS 1; identical before 2038
   return {seconds, reader.number<std::uint32_t>()};
 }
 
 ros::Header read_header(MessageReader& reader) {
   if (reader.serialisation() == Serialisation::ros1)
-    reader.number<std::uint32_t>(); // the sequence number, which ROS 2 has dropped
+    reader.number<std::uint32_t>(); // sequence number, dropped in ROS 2
   const ros::Time stamp = read_time(reader);
   reader.text();
   return {stamp, nullptr};
@@ -39,7 +39,7 @@ ros::Quaternion read_quaternion(MessageReader& reader) {
   return {q[0], q[1], q[2], q[3]};
 }
 
-/// A header, and packets behind their stamps, each as `payload` reads it.
+/// Reads a header and stamped packets, each as `payload` reads it.
 template <class Payload> std::optional<LidarPackets> read_packets(MessageReader reader, const Payload& payload) {
   read_header(reader);
   LidarPackets packets;
@@ -58,7 +58,7 @@ std::optional<LidarPackets> read_nebula_packets(MessageReader reader) {
   return read_packets(reader, [](MessageReader& r) { return r.sequence(); });
 }
 
-/// An array as long as an Ethernet frame, and how much of it is the packet.
+/// Reads an array of the size of an Ethernet frame and the length of the packet in it.
 std::optional<LidarPackets> read_pandar_scan(MessageReader reader) {
   constexpr std::size_t kArrayBytes = 1500;
   return read_packets(reader, [](MessageReader& r) {
@@ -67,8 +67,8 @@ std::optional<LidarPackets> read_pandar_scan(MessageReader reader) {
   });
 }
 
-/// Releases of Hesai's driver differ in whether the frame begins with a header, and each of its packets too. The packet
-/// is followed by its size, by which the right reading is told; a frame without packets is none.
+/// Reads either layout: releases of Hesai's driver differ in whether the frame and each of its packets begin with a
+/// header. The packet is followed by its size, which identifies the layout; a frame without packets is rejected.
 std::optional<LidarPackets> read_hesai_frame(MessageReader message) {
   for (const bool has_header : {true, false}) {
     for (const bool has_packet_headers : {false, true}) {
@@ -111,7 +111,7 @@ std::optional<ros::Imu> read_imu(MessageReader reader) {
 std::optional<ros::Odometry> read_odometry(MessageReader reader) {
   ros::Odometry odometry{};
   odometry.header_ = read_header(reader);
-  reader.text(); // the child's frame
+  reader.text(); // child frame
   const ros::Vector3 position = read_vector(reader);
   odometry.pose_.pose_ = {{position.x_, position.y_, position.z_}, read_quaternion(reader)};
   reader.numbers(odometry.pose_.covariance_);

@@ -11,17 +11,17 @@
 #include "daemon/dds/ros_types.hpp"
 #include "drivers/clouds/message_reader.hpp"
 
-/// The messages that are of use in a bag, from their bytes. What breaks off in their midst is none.
+/// Decodes the relevant messages of a bag. Truncated messages are rejected.
 namespace locus::tools {
 
 inline constexpr std::string_view kImuType = "sensor_msgs/Imu";
 inline constexpr std::string_view kOdometryType = "nav_msgs/Odometry";
 
-/// Data packets as the lidar sent them, each with the time at which the driver received it.
+/// Data packets as sent by the lidar, each with its reception time at the driver.
 struct LidarPackets {
   struct Packet {
     Stamp stamp;
-    std::size_t begin, size; ///< in `bytes`
+    std::size_t begin, size; ///< offset and length in `bytes`
   };
   std::vector<Packet> packets;
   std::vector<std::byte> bytes;
@@ -32,24 +32,24 @@ struct LidarPackets {
   }
 };
 
-/// A type of message that holds packets of lidars.
+/// Message type that holds lidar packets.
 struct PacketType {
   std::string_view name;
-  std::string_view maker; ///< of the lidars; empty: of any
-  /// Nothing where the message breaks off; nullptr: the packets of this maker are not decoded.
+  std::string_view maker; ///< of the lidars; empty: any
+  /// Returns nothing for a truncated message; nullptr: the packets of this maker are not decoded.
   std::optional<LidarPackets> (*read)(MessageReader reader);
 };
-/// All that are known.
+/// Returns all known types.
 std::span<const PacketType> packet_types();
-/// nullptr for what holds no packets.
+/// Returns nullptr for a type without packets.
 const PacketType* packet_type(std::string_view name);
-/// Whether it holds packets, and of a lidar whose packets are decoded.
+/// Returns whether the type holds packets of a lidar that is supported.
 bool are_packets_decoded(std::string_view type_name);
 
-/// The stamp of a header or packet, or `recorded` for one that nobody has set.
+/// Returns the stamp of a header or packet, or `recorded` if it was not set.
 Stamp stamp_or(Stamp recorded, Stamp stamp);
 
-/// All but the names of the frames, which stay null.
+/// Reads everything but the frame names, which stay null.
 std::optional<daemon::ros::Imu> read_imu(MessageReader reader);
 std::optional<daemon::ros::Odometry> read_odometry(MessageReader reader);
 

@@ -33,7 +33,7 @@ Expected<std::unique_ptr<Bag>, std::string> Ros1Bag::open(const std::filesystem:
   return std::unique_ptr<Bag>(std::move(bag));
 }
 
-/// The magic and the header of the bag. What is wrong with them, or nothing.
+/// Reads the magic and the header of the bag. Returns the problem, or nothing.
 std::optional<std::string> Ros1Bag::read_start() {
   if (!stream_)
     return why_unreadable(file_).value_or("cannot be read");
@@ -57,7 +57,7 @@ std::optional<std::string> Ros1Bag::read_start() {
   return std::nullopt;
 }
 
-/// False if there is no whole one.
+/// Returns false without a complete index.
 bool Ros1Bag::read_topics_from_index() {
   if (index_ < first_record_ || index_ > size_)
     return false;
@@ -90,7 +90,7 @@ const BagMessage* Ros1Bag::next() {
   return nullptr;
 }
 
-/// Of the chunk at hand, else of the file; nothing at the end and at a break.
+/// Reads from the current chunk, else from the file; nothing at the end or where the file is truncated.
 std::optional<BagRecord> Ros1Bag::next_record() {
   if (left_.empty())
     return at_ < size_ && break_.empty() ? read_record() : std::nullopt;
@@ -114,7 +114,7 @@ std::optional<BagRecord> Ros1Bag::read_record() {
   return std::nullopt;
 }
 
-/// The length that the next block has; nothing where the file is too short for it.
+/// Reads the length of the next block; nothing if it exceeds the rest of the file.
 std::optional<std::uint32_t> Ros1Bag::read_length() {
   std::uint32_t length = 0;
   stream_.read(reinterpret_cast<char*>(&length), sizeof(length));
@@ -149,7 +149,7 @@ void Ros1Bag::take_connection(const BagRecord& connection) {
                   Serialisation::ros1});
 }
 
-/// False for one of no connection.
+/// Returns false for a message without a known connection.
 bool Ros1Bag::take_message(const BagRecord& message) {
   struct Time {
     std::uint32_t seconds, nanoseconds;

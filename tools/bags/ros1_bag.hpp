@@ -11,11 +11,10 @@
 
 namespace locus::tools {
 
-/// A bag of ROS 1, format 2.0, with plain, LZ4 or bzip2 chunks.
+/// ROS 1 bag, format 2.0, with uncompressed, LZ4 or bzip2 chunks.
 ///
-/// Read from its beginning to its end, so that one that was never closed, or breaks off, is read as far as it goes: up
-/// to its last whole chunk. The index at the end serves to know the topics beforehand; without it the bag is read
-/// through for that.
+/// Reads sequentially, so that a bag that was not closed or is truncated is read up to its last complete chunk.
+/// The index at the end lists the topics in advance; without it the bag is scanned for them first.
 class Ros1Bag : public Bag {
  public:
   /// Fails with one line for the user.
@@ -45,14 +44,14 @@ class Ros1Bag : public Bag {
   std::filesystem::path file_;
   std::ifstream stream_;
   std::uint64_t size_ = 0;
-  std::uint64_t first_record_ = 0; ///< behind the header of the bag
-  std::uint64_t index_ = 0;        ///< where it begins; 0: the recorder has not come to write it
-  std::uint64_t at_ = 0;           ///< how far the file has been read
+  std::uint64_t first_record_ = 0; ///< after the header of the bag
+  std::uint64_t index_ = 0;        ///< start of the index; 0: the recorder did not get to write it
+  std::uint64_t at_ = 0;           ///< read position in the file
   std::vector<std::byte> header_, data_;
   std::vector<std::byte> chunk_;    ///< uncompressed
-  std::span<const std::byte> left_; ///< of it
+  std::span<const std::byte> left_; ///< unread part of the chunk
   BagMessage message_{};
-  std::string break_; ///< where and why reading stopped before the end; empty while all is well
+  std::string break_; ///< position and reason of a stop before the end; empty if there is none
 };
 
 } // namespace locus::tools

@@ -11,7 +11,7 @@ namespace {
 
 using Bytes = std::span<const std::byte>;
 
-/// A length, and as many bytes behind it.
+/// Removes a length-prefixed block and returns it.
 std::optional<Bytes> take_block(Bytes& bytes) {
   std::uint32_t length = 0;
   if (bytes.size() < sizeof(length))

@@ -10,19 +10,19 @@
 #include <string_view>
 #include <vector>
 
-/// What the file of a ROS 1 bag (format 2.0) is made of.
+/// Records of a ROS 1 bag (format 2.0).
 namespace locus::tools {
 
 enum class BagOp : std::uint8_t { message = 2, bag_header = 3, index = 4, chunk = 5, chunk_info = 6, connection = 7 };
 
-/// The fields of a header, `name=value` each behind its length.
+/// Fields of a header: `name=value`, each prefixed by its length.
 class BagFields {
  public:
   explicit BagFields(std::span<const std::byte> bytes = {}) : bytes_(bytes) {}
 
-  /// Empty where there is none, or the lengths before it do not fit.
+  /// Returns empty text if the field is absent or the lengths before it are invalid.
   [[nodiscard]] std::string_view text(std::string_view name) const;
-  /// Nothing where there is none of this size.
+  /// Returns nothing if the field is absent or of another size.
   template <class Number> [[nodiscard]] std::optional<Number> number(std::string_view name) const {
     const std::string_view value = text(name);
     Number number{};
@@ -31,7 +31,7 @@ class BagFields {
     std::memcpy(&number, value.data(), sizeof(Number));
     return number;
   }
-  /// Nothing where the fields are none of a record.
+  /// Returns nothing if the fields are not those of a record.
   [[nodiscard]] std::optional<BagOp> op() const;
 
  private:
@@ -43,10 +43,10 @@ struct BagRecord {
   std::span<const std::byte> data;
 };
 
-/// Takes the first record off the bytes; nothing where they do not begin with a whole one.
+/// Removes the first record from the bytes and returns it; nothing if they do not start with a complete one.
 std::optional<BagRecord> take_record(std::span<const std::byte>& bytes);
 
-/// Brings the data of a chunk to their old size. What is wrong with them, or nothing.
+/// Decompresses the data of a chunk. Returns the problem, or nothing.
 std::optional<std::string> decompress_chunk(const BagRecord& chunk, std::vector<std::byte>& out);
 
 } // namespace locus::tools

@@ -35,7 +35,7 @@ bool starts_with(const path& file, std::string_view magic) {
   return start == magic;
 }
 
-/// Whether a file that begins so is one that is read.
+/// Returns whether a file with these first bytes is supported.
 bool begins_a_bag(std::string_view start) { return start.starts_with(kSqlite) || start.starts_with(kMcap); }
 
 bool has_name_of_bag(const path& file) {
@@ -46,8 +46,8 @@ bool has_name_of_bag(const path& file) {
   });
 }
 
-/// In the order of the numbers that rosbag2 puts at the end of their names. Players leave a file unpacked beside the
-/// packed one.
+/// Sorts by the numbers that rosbag2 appends to file names. Players leave the uncompressed file next to the compressed
+/// one.
 std::vector<path> bag_files_in(const path& folder) {
   std::vector<path> files;
   std::error_code error;
@@ -63,7 +63,7 @@ std::vector<path> bag_files_in(const path& folder) {
   return files;
 }
 
-/// The files of a folder in the order in which they were recorded, as its metadata have it, or by name.
+/// Returns the files of a folder in recording order, according to its metadata, else by name.
 Expected<std::vector<path>, std::string> files_of(const path& folder) {
   const path metadata = folder / kMetadata;
   std::error_code ignored;
@@ -74,7 +74,7 @@ Expected<std::vector<path>, std::string> files_of(const path& folder) {
     const auto storage = bag["storage_identifier"].as<std::string>("");
     const auto compression = bag["compression_format"].as<std::string>("");
     if (!storage.empty() && storage != "sqlite3" &&
-        storage != "mcap") // where it is not named, the files themselves tell
+        storage != "mcap") // if absent, the first bytes of the files determine the format
       return fmt::format("{}: storage {} is not read; convert it to mcap with: ros2 bag convert", folder.string(),
                          storage);
     if (!compression.empty() && compression != "zstd")
@@ -82,7 +82,7 @@ Expected<std::vector<path>, std::string> files_of(const path& folder) {
                          folder.string(), compression);
     std::vector<path> files;
     for (const auto& file : bag["relative_file_paths"].as<std::vector<std::string>>())
-      files.push_back(folder / path(file).filename()); // some versions put the name of the folder before it
+      files.push_back(folder / path(file).filename()); // some versions prefix the name of the folder
     return files;
   } catch (const YAML::Exception& error) {
     return fmt::format("{}:{}: not what rosbag2 writes ({}); make it again with: ros2 bag reindex", metadata.string(),
@@ -120,7 +120,7 @@ Expected<std::unique_ptr<Bag>, std::string> Ros2Bag::open(const path& where) {
   return std::unique_ptr<Bag>(std::move(bag));
 }
 
-/// Opens one more file. What is wrong with it, or nothing.
+/// Opens one more file. Returns the problem, or nothing.
 std::optional<std::string> Ros2Bag::add(const path& file) {
   const auto refuse = [&](std::string_view why) { return fmt::format("{}: {}", file.string(), why); };
   std::error_code ignored;
@@ -139,11 +139,11 @@ std::optional<std::string> Ros2Bag::add(const path& file) {
     breaks_.push_back(refuse(copy->problem() + "; what lies before it is used"));
   if (!starts_with(copy->path(), kSqlite))
     return add(file, copy->path());
-  const Expected<path, std::string> named = copy->give_name(); // SQLite opens none without
+  const Expected<path, std::string> named = copy->give_name(); // SQLite opens files by name only
   return named ? add(file, *named) : refuse(named.error());
 }
 
-/// The same, of one that lies unpacked at `readable`.
+/// Opens a file whose uncompressed copy is at `readable`.
 std::optional<std::string> Ros2Bag::add(const path& file, const path& readable) {
   const bool is_mcap = starts_with(readable, kMcap);
   if (!is_mcap && !starts_with(readable, kSqlite))
@@ -158,7 +158,7 @@ std::optional<std::string> Ros2Bag::add(const path& file, const path& readable) 
   return std::nullopt;
 }
 
-/// Those that it has told by now.
+/// Adds the topics that the file has listed so far.
 void Ros2Bag::learn_topics(File& file) {
   for (std::size_t i = file.topic_of.size(); i < file.bag->topics().size(); ++i) {
     const BagTopic& topic = file.bag->topics()[i];
@@ -181,14 +181,14 @@ const BagMessage* Ros2Bag::next() {
     message_ = {*topic, message->recorded, message->data};
     const std::string_view data(reinterpret_cast<const char*>(message->data.data()), message->data.size());
     const bool is_packed = data.starts_with(kZstd) && topics()[message_.topic].serialisation == Serialisation::cdr;
-    if (!is_packed || unpack()) // CDR itself begins with a zero
+    if (!is_packed || unpack()) // CDR itself begins with a zero byte
       return &message_;
     ++damaged_;
   }
   return nullptr;
 }
 
-/// As it lies in its file.
+/// Returns the next message as stored in its file.
 const BagMessage* Ros2Bag::next_packed() {
   for (; current_ < files_.size(); ++current_) {
     if (const BagMessage* message = files_[current_].bag->next()) {
@@ -199,9 +199,9 @@ const BagMessage* Ros2Bag::next_packed() {
   return nullptr;
 }
 
-/// The data of message_; false where they are damaged.
+/// Decompresses the data of message_; false if they are damaged.
 bool Ros2Bag::unpack() {
-  const auto size = ZSTD_getFrameContentSize(message_.data.data(), message_.data.size()); // an error is no size, either
+  const auto size = ZSTD_getFrameContentSize(message_.data.data(), message_.data.size()); // may be an error code
   if (size > kMaxBlockBytes)
     return false;
   unpacked_.resize(size);

@@ -13,16 +13,16 @@
 
 namespace locus::tools {
 
-/// A folder that rosbag2 wrote: with metadata.yaml, or with its files alone.
+/// Returns whether rosbag2 wrote this folder: with metadata.yaml, or with bag files only.
 bool is_ros2_bag_folder(const std::filesystem::path& folder);
-/// By name or first bytes: an SQLite database or MCAP, either also packed with zstd.
+/// Detects, by name or first bytes, an SQLite database or MCAP, each also compressed with zstd.
 bool is_ros2_bag_file(const std::filesystem::path& file);
 
-/// A bag of ROS 2, of one file or of several that follow each other, SQLite or MCAP, packed with zstd as a whole or
-/// each message by itself or not at all: what it is is told from its first bytes. Reads and never writes.
+/// ROS 2 bag of one or several consecutive files, SQLite or MCAP, uncompressed or compressed with zstd per file or per
+/// message; the first bytes determine the format. Never writes to the bag.
 ///
-/// A file that is packed as a whole is unpacked into a temporary one first, see UnpackedCopy. MCAP of ROS 1 is read,
-/// too.
+/// Decompresses a file that is compressed as a whole into a temporary one first, see UnpackedCopy. Also reads MCAP of
+/// ROS 1.
 class Ros2Bag : public Bag {
  public:
   /// Fails with one line for the user.
@@ -36,7 +36,7 @@ class Ros2Bag : public Bag {
  private:
   struct File {
     std::unique_ptr<Bag> bag;
-    std::vector<std::optional<std::size_t>> topic_of; ///< ours, by its own index; nothing for one that is left out
+    std::vector<std::optional<std::size_t>> topic_of; ///< our index by the file's; nothing for a dropped topic
   };
 
   std::optional<std::string> add(const std::filesystem::path& file);
@@ -46,12 +46,12 @@ class Ros2Bag : public Bag {
   bool unpack();
 
   std::vector<File> files_;
-  std::vector<std::string> breaks_; ///< a line for each packed file that is not whole
-  std::string name_;                ///< of what was opened
-  std::size_t current_ = 0;         ///< of the files
+  std::vector<std::string> breaks_; ///< a line for each compressed file that is incomplete
+  std::string name_;                ///< of the file or folder opened
+  std::size_t current_ = 0;         ///< file index
   BagMessage message_{};
-  std::vector<std::byte> unpacked_; ///< the data of message_
-  std::uint64_t damaged_ = 0;       ///< messages that could not be unpacked
+  std::vector<std::byte> unpacked_; ///< data of message_
+  std::uint64_t damaged_ = 0;       ///< messages that could not be decompressed
 };
 
 } // namespace locus::tools

@@ -8,7 +8,7 @@
 namespace locus::tools {
 namespace {
 
-/// As ROS 2 has it, without its comments.
+/// Definition as in ROS 2, without its comments.
 struct Definition {
   std::string_view name; ///< without /msg
   std::string_view fields;
@@ -44,7 +44,7 @@ constexpr std::array kDefinitions{
                "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status\n"},
 };
 
-/// Those that the fields name, each once, and those that their fields name.
+/// Adds the definitions of the fields' types, recursively, each once.
 void add_needed(std::string_view fields, std::vector<const Definition*>& needed) {
   for (const Definition& definition : kDefinitions) {
     const bool is_named = fields.find(std::string(definition.name) + ' ') != std::string_view::npos ||

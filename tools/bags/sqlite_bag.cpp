@@ -17,7 +17,8 @@ namespace {
 
 using std::filesystem::path;
 
-/// Nothing is written beside a bag that nobody is writing to; SQLite would, of one that keeps a write-ahead log.
+/// Returns a URI with which SQLite creates no files next to a bag that nobody writes to, as it would for a write-ahead
+/// log.
 std::string uri_of(const path& file) {
   std::string uri = "file:";
   for (const char c : std::filesystem::absolute(file).string()) {
@@ -48,11 +49,11 @@ void SqliteBag::Closer::operator()(sqlite3_stmt* statement) const { sqlite3_fina
 
 Expected<std::unique_ptr<Bag>, std::string> SqliteBag::open(const path& file, std::string name) {
   std::unique_ptr<SqliteBag> bag(new SqliteBag(std::move(name)));
-  sqlite3* opened = nullptr; // what is wrong shows in the first query
+  sqlite3* opened = nullptr; // errors show in the first query
   sqlite3_open_v2(uri_of(file).c_str(), &opened, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
   bag->database_.reset(opened);
-  sqlite3_limit(opened, SQLITE_LIMIT_LENGTH, kMaxBlockBytes);                     // no message is so long
-  sqlite3_exec(opened, "PRAGMA writable_schema = ON", nullptr, nullptr, nullptr); // else a file that is cut is refused
+  sqlite3_limit(opened, SQLITE_LIMIT_LENGTH, kMaxBlockBytes);                     // no message is that long
+  sqlite3_exec(opened, "PRAGMA writable_schema = ON", nullptr, nullptr, nullptr); // to read truncated files
   if (const std::optional<std::string> problem = bag->read_topics())
     return fmt::format("{}: {}", bag->name_, *problem);
   return std::unique_ptr<Bag>(std::move(bag));
@@ -60,18 +61,18 @@ Expected<std::unique_ptr<Bag>, std::string> SqliteBag::open(const path& file, st
 
 SqliteBag::Statement SqliteBag::prepare(const char* sql) {
   sqlite3_stmt* prepared = nullptr;
-  sqlite3_prepare_v2(database_.get(), sql, -1, &prepared, nullptr); // nullptr shows as SQLITE_MISUSE in each step
+  sqlite3_prepare_v2(database_.get(), sql, -1, &prepared, nullptr); // nullptr yields SQLITE_MISUSE in each step
   return Statement(prepared);
 }
 
-/// What is wrong with the database, or nothing.
+/// Reads the topics. Returns the problem, or nothing.
 std::optional<std::string> SqliteBag::read_topics() {
   const auto why = [&] {
     return fmt::format("not a ROS 2 bag, or damaged ({}); copy or record it again", sqlite3_errmsg(database_.get()));
   };
   const Statement tables =
       prepare("SELECT count(*) FROM pragma_table_list WHERE schema = 'main' AND type = 'table' AND "
-              "name IN ('topics', 'messages')"); // a view may be one that never ends
+              "name IN ('topics', 'messages')"); // a view may never end
   if (sqlite3_step(tables.get()) != SQLITE_ROW)
     return why();
   if (sqlite3_column_int(tables.get(), 0) != 2)
@@ -121,7 +122,7 @@ const BagMessage* SqliteBag::next() {
 bool SqliteBag::read_row() {
   if (is_over_)
     return false;
-  if (!rows_) // as players read it; without the index that rosbag2 makes they would be sorted with all their data
+  if (!rows_) // same order as the players'; without rosbag2's index SQLite would sort all rows including their data
     rows_ = prepare("SELECT topic_id, timestamp, data FROM messages INDEXED BY timestamp_idx ORDER BY timestamp, id");
   if (!rows_)
     rows_ = prepare("SELECT topic_id, timestamp, data FROM messages ORDER BY id");

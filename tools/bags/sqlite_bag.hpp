@@ -15,10 +15,10 @@ struct sqlite3_stmt;
 
 namespace locus::tools {
 
-/// One database of rosbag2, in the order of reception. Reads and never writes.
+/// One database of rosbag2, in the order of reception. Never writes to it.
 class SqliteBag : public Bag {
  public:
-  /// `name`: what messages call the file. Fails with one line for the user.
+  /// Opens the file; messages call it `name`. Fails with one line for the user.
   static Expected<std::unique_ptr<Bag>, std::string> open(const std::filesystem::path& file, std::string name);
 
   const BagMessage* next() override;
@@ -40,13 +40,13 @@ class SqliteBag : public Bag {
 
   std::string name_;
   std::unique_ptr<sqlite3, Closer> database_;
-  double row_count_ = 0;  ///< greatest number of a message
-  Statement rows_;        ///< declared after the database, to go before it
-  std::uint64_t row_ = 0; ///< as many are read
+  double row_count_ = 0;  ///< largest message number
+  Statement rows_;        ///< declared after the database, to be destroyed first
+  std::uint64_t row_ = 0; ///< rows read so far
   bool is_over_ = false;
   BagMessage message_{};
-  std::uint64_t timeless_ = 0; ///< messages left out
-  std::string break_;          ///< where and why reading stopped before the end; empty while all is well
+  std::uint64_t timeless_ = 0; ///< dropped messages
+  std::string break_;          ///< position and reason of a stop before the end; empty if there is none
 };
 
 } // namespace locus::tools

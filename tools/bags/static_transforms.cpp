@@ -11,7 +11,7 @@
 namespace locus::tools {
 namespace {
 
-/// tf had a slash in front, tf2 has none.
+/// Strips the leading slash of tf frame names, which tf2 dropped.
 std::string bare(std::string_view frame) { return std::string{frame.substr(frame.starts_with('/') ? 1 : 0)}; }
 
 } // namespace
@@ -20,7 +20,7 @@ void StaticTransforms::take(MessageReader reader) {
   constexpr std::size_t kMost = 1000;
   for (auto left = reader.number<std::uint32_t>(); left > 0 && reader.whole() && parents_.size() < kMost; --left) {
     if (reader.serialisation() == Serialisation::ros1)
-      reader.number<std::uint32_t>(); // the sequence number
+      reader.number<std::uint32_t>(); // sequence number
     reader.number<std::int32_t>();
     reader.number<std::uint32_t>();
     const std::string parent = bare(reader.text()), child = bare(reader.text());
@@ -36,7 +36,7 @@ void StaticTransforms::take(MessageReader reader) {
 
 std::optional<Pose> StaticTransforms::between(std::string_view to, std::string_view from) const {
   const std::string target = bare(to), source = bare(from);
-  std::map<std::string_view, Pose> T_ancestor_to; // up to where a circle repeats
+  std::map<std::string_view, Pose> T_ancestor_to; // stops where a cycle repeats
   const auto list = [&](std::string_view frame, const Pose& T) { return T_ancestor_to.try_emplace(frame, T).second; };
   climb(target, list);
   std::optional<Pose> found;
@@ -44,12 +44,12 @@ std::optional<Pose> StaticTransforms::between(std::string_view to, std::string_v
   climb(source, [&](std::string_view frame, const Pose& T_frame_from) {
     if (const auto common = T_ancestor_to.find(frame); common != T_ancestor_to.end())
       found = common->second.inverse() * T_frame_from;
-    return !found && ++steps <= parents_.size(); // a circle has no end
+    return !found && ++steps <= parents_.size(); // a cycle would never end
   });
   return found;
 }
 
-/// From the frame upwards, itself first, while `visit` says so.
+/// Visits the frame and its ancestors, itself first, while `visit` returns true.
 template <class Visit> void StaticTransforms::climb(std::string_view frame, Visit visit) const {
   Pose T_ancestor_frame;
   auto parent = parents_.find(frame);

@@ -14,13 +14,13 @@ namespace locus::tools {
 inline constexpr std::string_view kTransformsType = "tf2_msgs/TFMessage";
 inline constexpr std::string_view kStaticTopic = "/tf_static";
 
-/// How the frames of a robot lie to each other, as /tf_static has it. One owner.
+/// Fixed transforms between the frames of a robot, from /tf_static. One owner.
 class StaticTransforms {
  public:
-  /// Takes all transforms of a tf2_msgs/TFMessage, but those that are no finite poses.
+  /// Adds all transforms of a tf2_msgs/TFMessage, except those that are not finite poses.
   void take(MessageReader reader);
 
-  /// T_to_from; nothing where no transforms lead from one frame to the other.
+  /// Returns T_to_from; nothing if no chain of transforms connects the frames.
   [[nodiscard]] std::optional<Pose> between(std::string_view to, std::string_view from) const;
 
  private:
@@ -30,7 +30,7 @@ class StaticTransforms {
   };
   template <class Visit> void climb(std::string_view frame, Visit visit) const;
 
-  std::map<std::string, Parent, std::less<>> parents_; ///< by the child's name
+  std::map<std::string, Parent, std::less<>> parents_; ///< by child frame
 };
 
 } // namespace locus::tools

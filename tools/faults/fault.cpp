@@ -11,7 +11,7 @@
 namespace locus {
 namespace {
 
-/// What there is to know about a kind of fault before it happens.
+/// Static properties of a kind of fault.
 struct KindTraits {
   FaultKind kind;
   std::string_view name;
@@ -19,14 +19,14 @@ struct KindTraits {
   bool fits_position_packets;
   bool fits_odometry;
   bool fits_imu;
-  std::string_view unit; ///< of VALUE; empty for a kind that takes none
+  std::string_view unit; ///< of VALUE; empty for a kind without one
   double default_value;
   double min_value; ///< exclusive
   double max_value; ///< inclusive
 };
 
-/// A packet that is hours late, or a clock that is off by a century, tests nothing more than these bounds do. That of
-/// `late` also bounds what an injector has to hold back.
+/// Bound on delays and clock offsets: larger ones test nothing more. That of `late` also limits the data that an
+/// injector holds back.
 constexpr double kMaxDelay_s = 10.0;
 constexpr double kMaxClockStep_s = 1e8;
 constexpr double kMaxJump = 1e6;
@@ -51,7 +51,7 @@ const KindTraits& traits_of(FaultKind kind) { return *std::ranges::find(kKinds, 
 
 std::string joined(std::span<const std::string> words) { return fmt::format("{}", fmt::join(words, ", ")); }
 
-/// The kinds for which `fits` holds, as users write them.
+/// Lists the kinds that satisfy `fits`, as users write them.
 template <class Fits> std::string kinds_that(Fits&& fits) {
   std::vector<std::string> names;
   for (const KindTraits& traits : kKinds) {
@@ -90,7 +90,7 @@ std::string_view description(FaultTarget::Kind target) {
   return "";
 }
 
-/// Takes a finite number from the front of `text`.
+/// Parses a finite number at the front of `text` and removes it.
 std::optional<double> take_number(std::string_view& text) {
   double number = 0.0;
   const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), number);
@@ -107,7 +107,7 @@ std::optional<double> parse_value(const KindTraits& traits, std::string_view tex
   return acceptable ? value : std::nullopt;
 }
 
-/// `T[-T1]` into the fault.
+/// Parses `T[-T1]` into the fault.
 bool parse_window(std::string_view text, Fault& fault) {
   constexpr double kMax_s = 1e9;
   const std::optional<double> from = take_number(text);

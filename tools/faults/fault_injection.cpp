@@ -25,7 +25,7 @@ void copy_reading(const ImuSample& from, ImuSample& to) {
 
 void copy_reading(const OdometrySample& from, OdometrySample& to) { to.T_source_base = from.T_source_base; }
 
-/// Bits as they come: numbers of every size, none of them a unit quaternion, now and then infinite or NaN.
+/// Replaces the numbers by random bits: any magnitude, no unit quaternion, sometimes infinite or NaN.
 void corrupt_reading(std::uint64_t seed, std::initializer_list<std::span<double>> numbers) {
   std::mt19937_64 random{seed};
   for (const std::span<double> part : numbers) {
@@ -65,7 +65,7 @@ void distort_reading(const FaultPlan::Verdict& verdict, OdometrySample& sample) 
   }
 }
 
-/// From a random byte on.
+/// Randomises the payload from a random byte on.
 void corrupt_payload(std::uint64_t seed, std::vector<std::byte>& payload) {
   if (payload.empty()) {
     return;
@@ -97,8 +97,8 @@ bool is_inertial(const LidarRouter::Origin& origin, const Datagram& datagram) {
   return origin.metadata != nullptr && datagram.payload.size() == ouster::imu_packet_layout(*origin.metadata).bytes;
 }
 
-/// Name of the messages that a lidar's datagram is one of: its position packets are messages of their own, and so are
-/// the readings of an inertial unit in it.
+/// Returns the name of the stream that a lidar's datagram belongs to: position packets form a stream of their own, and
+/// so do packets with readings of an inertial unit.
 std::string stream_of(const LidarRouter::Origin& origin, const Datagram& datagram) {
   std::string stream{origin.lidar};
   if (is_inertial(origin, datagram)) {

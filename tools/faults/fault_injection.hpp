@@ -19,57 +19,57 @@
 
 namespace locus {
 
-/// Applies the faults meant for one motion source to its samples as they come. What is given out has the arrival that
-/// the faults leave it, and so may arrive after what is given out next. One owner.
+/// Applies the faults of one motion source to its samples as they stream. An emitted sample carries its arrival after
+/// the faults, which may be later than that of the next one emitted. One owner.
 template <class Sample> class SampleFaults {
  public:
   using Emit = std::function<void(const Sample&)>;
 
-  /// Precondition: fault_problem() finds nothing.
+  /// Precondition: fault_problem() returns nothing.
   SampleFaults(std::span<const Fault> faults, std::string source, Stamp capture_start, std::uint64_t seed)
       : plan_(faults, capture_start, seed), source_(std::move(source)) {}
 
-  /// Emits what becomes of this sample, and what it overtakes. Precondition: it arrives after those before.
+  /// Emits the result for this sample and for one that it overtakes. Precondition: samples come in order of arrival.
   void pass(Sample sample, const Emit& emit);
 
-  /// Emits what is still held back. The recording is over.
+  /// Emits what is still held back, at the end of the recording.
   void finish(const Emit& emit);
 
  private:
   FaultPlan plan_;
   std::string source_;
-  std::optional<Sample> healthy_;   ///< the latest that was not frozen
-  std::optional<Sample> overtaken_; ///< waits for the next one to pass it
+  std::optional<Sample> healthy_;   ///< latest sample that was not frozen
+  std::optional<Sample> overtaken_; ///< waits to be overtaken by the next one
 };
 
-/// The same for all samples of a recording, which stay in the order of their arrival.
+/// Applies faults to all samples of a recording; the result is sorted by arrival.
 template <class Sample>
 void inject_faults(std::span<const Fault> faults, const std::string& source, Stamp capture_start, std::uint64_t seed,
                    std::vector<Sample>& samples);
 
-/// Applies the faults meant for lidars to the datagrams of a capture as they stream by. The receive stamp of a datagram
-/// that is late or overtaken moves along; what is held back comes out in the order of arrival. The position packets of
-/// a lidar are a stream of their own: its faults strike them too, but one packet repeats or overtakes its like only. So
-/// are an Ouster's packets with the readings of its inertial unit, the motion source NAME_imu; a lidar's jump is one of
-/// its ranges, and its clock step one of its columns. Where a packet has a checksum, it is right for what a jump or a
-/// clock step has made of it. One owner.
+/// Applies the faults of lidars to the datagrams of a capture as they stream. The receive stamp of a datagram that is
+/// late or overtaken changes accordingly; datagrams held back are emitted in order of arrival. The position packets of
+/// a lidar form a stream of their own: its faults affect them too, but a packet repeats or overtakes only its like. The
+/// same holds for an Ouster's packets with readings of its inertial unit, the motion source NAME_imu; a lidar's jump
+/// offsets its ranges, and its clock step its columns. Checksums of packets are updated after a jump or a clock step.
+/// One owner.
 class DatagramFaults {
  public:
-  /// Takes a datagram, valid only during the call.
+  /// Receives a datagram, valid only during the call.
   using Emit = std::function<void(const Datagram&)>;
 
-  /// Precondition: fault_problem() finds nothing.
+  /// Precondition: fault_problem() returns nothing.
   DatagramFaults(std::span<const Fault> faults, Stamp capture_start, std::uint64_t seed)
       : plan_(faults, capture_start, seed) {}
 
-  /// Emits what is due by the time of this datagram, then what becomes of it.
+  /// Emits the datagrams due by the time of this one, then the result for it.
   void pass(const LidarRouter::Origin& origin, const Datagram& datagram, const Emit& emit);
 
-  /// Emits what is still held back. The capture is over.
+  /// Emits what is still held back, at the end of the capture.
   void finish(const Emit& emit);
 
  private:
-  /// A datagram that owns its payload; its receive stamp is that of its arrival after all faults.
+  /// Datagram that owns its payload; its receive stamp is that after all faults.
   struct Copy {
     Datagram datagram; ///< without payload
     std::vector<std::byte> payload;
@@ -77,8 +77,8 @@ class DatagramFaults {
     void emit_to(const Emit& emit) const;
   };
   struct Stream {
-    std::vector<std::byte> healthy; ///< the latest payload that was not frozen
-    std::optional<Copy> overtaken;  ///< waits for the next one to pass it
+    std::vector<std::byte> healthy; ///< latest payload that was not frozen
+    std::optional<Copy> overtaken;  ///< waits to be overtaken by the next one
   };
 
   void deliver(Copy copy, Stamp now, const Emit& emit);
@@ -86,7 +86,7 @@ class DatagramFaults {
 
   FaultPlan plan_;
   std::map<std::string, Stream, std::less<>> streams_;
-  std::multimap<Stamp, Copy> delayed_; ///< by time of arrival; at most the traffic of the longest delay
+  std::multimap<Stamp, Copy> delayed_; ///< by arrival; at most the traffic of the longest delay
 };
 
 } // namespace locus

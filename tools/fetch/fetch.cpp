@@ -20,9 +20,9 @@ namespace {
 
 using File = Expected<SensorFile, std::string>;
 
-constexpr std::size_t kMostBytes = 1'000'000; ///< forty times the longest metadata there are
+constexpr std::size_t kMostBytes = 1'000'000; ///< forty times the longest known metadata
 
-/// Breaks off, or is all there: what came of an answer that should have so many bytes.
+/// Compares the size of an answer with the expected one; returns the problem, or nothing.
 std::optional<std::string> problem_of_size(std::size_t came, std::size_t expected) {
   if (expected > kMostBytes)
     return fmt::format("claims to send {} bytes", expected);
@@ -35,11 +35,11 @@ File as_metadata(std::string text) {
   return metadata ? File{SensorFile{std::move(text), *std::move(metadata)}} : "its metadata: " + metadata.error();
 }
 
-/// What matters of the lines that open an answer of HTTP.
+/// Relevant header fields of an HTTP response.
 struct HttpHead {
   std::size_t bytes;
   int status;
-  std::optional<std::size_t> content_bytes; ///< nothing: all until the end
+  std::optional<std::size_t> content_bytes; ///< nothing: until the connection closes
 };
 
 template <class Number> std::optional<Number> leading_number(std::string_view text) {
@@ -49,7 +49,7 @@ template <class Number> std::optional<Number> leading_number(std::string_view te
   return is_one ? std::optional{number} : std::nullopt;
 }
 
-/// Nothing while it has not all come, or where it is none.
+/// Returns nothing while the header is incomplete or if it is not HTTP.
 std::optional<HttpHead> http_head(std::string_view answer) {
   constexpr std::string_view kVersion = "HTTP/1.x ", kEnd = "\r\n\r\n", kLength = "\r\ncontent-length:";
   const std::size_t end = answer.find(kEnd);
@@ -66,7 +66,7 @@ std::optional<HttpHead> http_head(std::string_view answer) {
   return head;
 }
 
-/// What an Ouster of today serves. Version 1.0, for its answers come in one piece.
+/// Requests the metadata of current firmware by HTTP. Uses version 1.0, whose responses are not chunked.
 File ask_ouster_http(TcpClient& client) {
   if (auto problem = client.send("GET /api/v1/sensor/metadata HTTP/1.0\r\nAccept: application/json\r\n\r\n"))
     return *std::move(problem);
@@ -90,8 +90,8 @@ File ask_ouster_http(TcpClient& client) {
   return as_metadata(answer.substr(head->bytes, head->content_bytes.value_or(kMostBytes)));
 }
 
-/// What firmware before 2.2 tells part by part. A part that it does not know is the words of its error, as the maker's
-/// client writes it.
+/// Requests the parts of the metadata one by one (firmware before 2.2). A part that it does not know holds the text of
+/// the error, as the maker's client writes it.
 File ask_ouster_commands(TcpClient& client) {
   constexpr auto kParts = std::to_array<std::pair<std::string_view, std::string_view>>({
       {"sensor_info", "get_sensor_info\n"},
@@ -120,9 +120,9 @@ File ask_ouster_commands(TcpClient& client) {
   return as_metadata(metadata.dump(kIndent, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
 }
 
-/// Command 5 of version 1 of the maker's protocol. Question and answer have a header of 8 bytes: 47 74, command, what
-/// became of it, length of what follows with the highest byte first. (The header of version 2, of 12 bytes, opens with
-/// 57 75; lidars that speak it alone send packets that are not read.)
+/// Sends command 5 of version 1 of the maker's protocol. Request and response have a header of 8 bytes: 47 74, command,
+/// result, length of the content in big-endian order. (The header of version 2, of 12 bytes, begins with 57 75; lidars
+/// that support only that one send packets that are not supported.)
 File ask_hesai(TcpClient& client) {
   constexpr std::size_t kHeadBytes = 8;
   constexpr std::string_view kQuestion{"\x47\x74\x05\0\0\0\0\0", kHeadBytes};
@@ -151,7 +151,7 @@ File ask_hesai(TcpClient& client) {
   return angles ? File{SensorFile{std::move(csv), *std::move(angles)}} : angles.error();
 }
 
-/// Whoever answers may be anybody: nothing of it is to move the terminal.
+/// Removes control characters: the peer is not trusted, and its text must not control the terminal.
 std::string printable(std::string_view words) {
   constexpr std::size_t kMost = 300;
   std::string text{words.substr(0, kMost)};

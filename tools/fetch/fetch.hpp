@@ -12,14 +12,14 @@
 
 namespace locus::tools {
 
-/// What only the sensor has, as it sent it and as the decoders understand it: an Ouster's metadata, or the angles of a
-/// Hesai.
+/// Data that only the sensor has, as sent by it and as the decoders accept it: an Ouster's metadata, or a Hesai's
+/// angles.
 struct SensorFile {
-  std::string text; ///< to be written as it is
+  std::string text; ///< written unchanged
   std::variant<ouster::Metadata, hesai::Calibration> content;
 };
 
-/// Where lidars answer questions, all TCP, and how long each of the three is waited for.
+/// TCP ports of the lidars' services, and the timeout for each of the three.
 struct FetchOptions {
   std::uint16_t ouster_http_port = 80;
   std::uint16_t ouster_command_port = 7501; ///< of older firmware
@@ -27,9 +27,8 @@ struct FetchOptions {
   std::chrono::milliseconds patience{5000};
 };
 
-/// Asks the lidar at a numeric address, IPv4 or IPv6, for its file; what answers tells the maker. Waits up to three
-/// times the patience, for somebody who does not answer. Fails with lines for the user: what each port said, and what
-/// to do. Any thread.
+/// Requests the file of the lidar at a numeric address, IPv4 or IPv6; the service that answers identifies the maker.
+/// Blocks for up to three timeouts. Fails with lines for the user: the result on each port, and a remedy. Any thread.
 Expected<SensorFile, std::string> fetch_sensor_file(const std::string& address, const FetchOptions& options = {});
 
 } // namespace locus::tools

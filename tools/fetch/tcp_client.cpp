@@ -64,7 +64,7 @@ std::optional<std::string> TcpClient::receive(std::string& answer, std::size_t m
   return std::nullopt;
 }
 
-/// Until one of these events, or a reason not to go on.
+/// Waits for one of these events; returns the reason if it cannot.
 std::optional<std::string> TcpClient::wait_for(short events) const {
   pollfd waiting{socket_.number(), events, 0};
   for (;;) {

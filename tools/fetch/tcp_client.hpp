@@ -14,19 +14,19 @@
 
 namespace locus::tools {
 
-/// A TCP connection to somebody who may be slow, silent or no lidar at all: every wait ends at the deadline that it was
-/// opened with. An error is the reason in words, e.g. "Connection refused". One owner.
+/// TCP connection to a peer that may be slow, silent or no lidar: every wait ends at the deadline given at
+/// construction. An error is its reason in words, e.g. "Connection refused". One owner.
 class TcpClient {
  public:
   using Deadline = std::chrono::steady_clock::time_point;
 
   static Expected<TcpClient, std::string> connect(const SocketAddress& to, Deadline deadline);
 
-  /// Sends all of it, or says why not.
+  /// Sends all of the text, or returns the error.
   std::optional<std::string> send(std::string_view text);
 
-  /// Puts into `answer` what comes until `is_whole` says so of all that came, or the other end has no more: the caller
-  /// looks which. Or says why not, such as that there would be more than `most` bytes.
+  /// Reads into `answer` until `is_whole` accepts all that was received or the peer closes; the caller distinguishes
+  /// these. Returns the error otherwise, such as more than `most` bytes.
   std::optional<std::string> receive(std::string& answer, std::size_t most,
                                      const std::function<bool(std::string_view)>& is_whole);
 
@@ -34,7 +34,7 @@ class TcpClient {
   TcpClient(daemon::Descriptor socket, Deadline deadline) : socket_(std::move(socket)), deadline_(deadline) {}
   [[nodiscard]] std::optional<std::string> wait_for(short events) const;
 
-  daemon::Descriptor socket_; ///< does not wait by itself
+  daemon::Descriptor socket_; ///< non-blocking
   Deadline deadline_;
 };
 

@@ -16,7 +16,7 @@ namespace {
 using std::filesystem::path;
 using Problem = std::optional<std::string>;
 
-/// "2011-09-26 13:02:25.964389445"
+/// Parses "2011-09-26 13:02:25.964389445".
 std::optional<Stamp> parse_time(const std::string& text) {
   int year = 0, month = 0, day = 0, hour = 0, minute = 0, length = 0;
   double second = 0;
@@ -41,7 +41,7 @@ std::optional<Stamp> parse_time(const std::string& text) {
   return Stamp{since_epoch};
 }
 
-/// By the number of the file that they belong to; where one is missing its line is blank.
+/// Reads the times by file number; the line of a missing file is blank.
 Expected<std::vector<std::optional<Stamp>>, std::string> read_times(const path& file) {
   std::ifstream stream{file};
   if (!stream)
@@ -58,7 +58,7 @@ Expected<std::vector<std::optional<Stamp>>, std::string> read_times(const path& 
   return times;
 }
 
-/// Of the file with this number in a folder of data.
+/// Returns the path of the file with this number in a data folder.
 path numbered(const path& folder, std::size_t number, const char* extension) {
   return folder / fmt::format("{:010}{}", number, extension);
 }
@@ -68,7 +68,7 @@ bool has(const path& file) {
   return std::filesystem::exists(file, ignored);
 }
 
-/// As a drive has them that was synchronised, or one that was not.
+/// Returns the points of a sweep, of a drive that is synchronised or one that is not.
 std::optional<path> points_of(const path& folder, std::size_t sweep) {
   for (const char* const extension : {".bin", ".txt"}) {
     if (const path file = numbered(folder, sweep, extension); has(file))
@@ -107,7 +107,7 @@ Problem read_sweeps(const path& folder, KittiDrive& drive) {
   return std::nullopt;
 }
 
-/// What is used of a record of the inertial unit.
+/// Used fields of an oxts record.
 struct Oxts {
   double lat_deg, lon_deg, alt_m;
   Eigen::Vector3d rpy_rad, specific_force_mps2, angular_velocity_radps;
@@ -119,7 +119,7 @@ std::optional<Oxts> read_oxts(const path& file) {
     kAcceleration = 11,
     kRate = 17,
     kNumbers = 20
-  }; // as its dataformat.txt has them
+  }; // order of the fields in dataformat.txt
   std::ifstream stream{file};
   std::array<double, kNumbers> v{};
   for (double& value : v) {
@@ -130,7 +130,7 @@ std::optional<Oxts> read_oxts(const path& file) {
       v[0], v[1], v[2], Eigen::Vector3d(&v[kAttitude]), Eigen::Vector3d(&v[kAcceleration]), Eigen::Vector3d(&v[kRate])};
 }
 
-/// Metres to the east, to the north and upwards, Mercator's at the latitude of the first.
+/// Returns metres east, north and up, by the Mercator projection at the latitude of the first record.
 Eigen::Vector3d position_of(const Oxts& oxts, double first_lat_deg) {
   constexpr double kEarth_m = 6378137.0, kRadPerDeg = std::numbers::pi / 180.0;
   const double scale_m = kEarth_m * std::cos(first_lat_deg * kRadPerDeg);
@@ -138,7 +138,7 @@ Eigen::Vector3d position_of(const Oxts& oxts, double first_lat_deg) {
           oxts.alt_m};
 }
 
-/// T_lidar_unit of the day's calibration.
+/// Reads T_lidar_unit from the calibration of the day.
 std::optional<Pose> read_calibration(const path& file) {
   std::ifstream stream{file};
   std::optional<Eigen::Matrix3d> R;
@@ -203,7 +203,7 @@ bool KittiDrive::is(const path& folder) {
 }
 
 Expected<KittiDrive, std::string> KittiDrive::open(const path& where) {
-  const path folder = std::filesystem::absolute(where / ".").lexically_normal().parent_path(); // has a parent
+  const path folder = std::filesystem::absolute(where / ".").lexically_normal().parent_path(); // ensures a parent
   KittiDrive drive;
   Problem problem = read_sweeps(folder / "velodyne_points", drive);
   if (!problem && has(folder / "oxts"))

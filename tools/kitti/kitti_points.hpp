@@ -7,25 +7,25 @@
 
 namespace locus::tools {
 
-/// As KITTI has it: in the frame of the lidar, x forward, y left, z up.
+/// Point in KITTI's convention: frame of the lidar, x forward, y left, z up.
 struct KittiPoint {
   float x_m, y_m, z_m;
   float reflectance; ///< 0..1
 };
 
-/// More than the lidar can fire in a turn.
+/// Upper bound on the points of a turn, above what the lidar can fire.
 inline constexpr std::size_t kMaxKittiPoints = 200'000;
 
-/// What KITTI's files lack in the vertical angle of every laser: their points lie lower than the lidar saw them. Found
-/// by Deschaud, "IMLS-SLAM: Scan-to-Model Matching Based on 3D Data", ICRA 2018; of this size in CT-ICP and KISS-ICP.
+/// Correction of the vertical angle of every laser: the points in KITTI's files lie too low. Found by Deschaud,
+/// "IMLS-SLAM: Scan-to-Model Matching Based on 3D Data", ICRA 2018; CT-ICP and KISS-ICP use this value.
 inline constexpr double kKittiVerticalAngle_deg = 0.205;
 
-/// Turns the ray of each point upwards in its vertical plane, about the lidar: range and azimuth stay. A point straight
-/// above or below, which has no such plane, stays where it is.
+/// Raises the ray of each point within its vertical plane through the lidar; range and azimuth stay. A point straight
+/// above or below, which has no such plane, is unchanged.
 void raise(std::vector<KittiPoint>& points, double angle_deg);
 
-/// Reads a sweep's file: of a drive that was synchronised a .bin, the points as they lie in memory; of one that was not
-/// a .txt, `x y z reflectance` in each line. False if it cannot be read, holds none, a part of one, or too many.
+/// Reads the file of a sweep: .bin, binary points, of a synchronised drive; otherwise .txt, `x y z reflectance` per
+/// line. Returns false if it cannot be read, or holds no, incomplete or too many points.
 bool read_kitti_points(const std::filesystem::path& file, std::vector<KittiPoint>& points);
 
 } // namespace locus::tools

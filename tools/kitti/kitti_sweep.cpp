@@ -27,8 +27,8 @@ bool KittiSweep::begin(std::span<const KittiPoint> points, Stamp start, Stamp en
   return true;
 }
 
-/// A new ring begins where the azimuth falls back. The few points at its beginning that the offset of a laser puts
-/// before the front are no ring of their own.
+/// Starts a new ring where the azimuth falls back. The few points at the start of a ring that a laser's azimuth offset
+/// puts before the front do not form a ring of their own.
 std::optional<std::size_t> find_returns(std::span<const KittiPoint> points, std::vector<KittiReturn>& returns) {
   constexpr double kTurn = 2.0 * std::numbers::pi, kFallsBack = 0.1, kLeastOfRing = 0.1;
   constexpr std::size_t kMaxFalls = 4 * kKittiRings;

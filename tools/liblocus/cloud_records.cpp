@@ -17,7 +17,7 @@ struct Record {
   float x_m, y_m, z_m, intensity;
   double time_s;
   std::uint16_t ring;
-  std::array<std::uint16_t, 3> zero; ///< of the padding, for clouds are compared by their bytes
+  std::array<std::uint16_t, 3> zero; ///< for the padding: clouds are compared bytewise
 };
 
 void check_length(std::string_view name, std::size_t length, std::size_t points) {

@@ -9,10 +9,10 @@
 
 namespace locus::library {
 
-/// The arrays of a cloud as the records of a message, the form that its way through the daemon begins with. One owner.
+/// Converts the arrays of a cloud to the records of a message, the daemon's input format. One owner.
 class CloudRecords {
  public:
-  /// The message, valid until the next call. Precondition: check_lengths() finds nothing.
+  /// Returns the message, valid until the next call. Precondition: check_lengths() returned.
   const CloudView& make(const liblocus::Cloud& cloud);
 
  private:
@@ -22,7 +22,7 @@ class CloudRecords {
 
 std::size_t points_of(const liblocus::Cloud& cloud);
 
-/// Throws liblocus::Error for an array that is not as long as the others ask for.
+/// Throws liblocus::Error for an array whose length does not match the others.
 void check_lengths(const liblocus::Cloud& cloud);
 
 } // namespace locus::library

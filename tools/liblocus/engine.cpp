@@ -12,7 +12,7 @@
 namespace locus::library {
 namespace {
 
-constexpr std::size_t kTalliedSweeps = 100; ///< that the distributions in the figures are of
+constexpr std::size_t kTalliedSweeps = 100; ///< window of the distributions in the figures
 
 std::vector<std::string> names_of_sources(const Config& config) {
   std::vector<std::string> names;
@@ -65,7 +65,7 @@ std::string to_json_text(const daemon::Figures& figures) {
 void in_words_of_the_library(const std::function<void()>& work) {
   try {
     work();
-  } catch (const std::runtime_error& error) { // a Failure of the tools, or an error of the file system
+  } catch (const std::runtime_error& error) { // a Failure of the tools, or a file system error
     throw liblocus::Error(error.what());
   }
 }

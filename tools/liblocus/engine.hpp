@@ -14,24 +14,24 @@
 
 namespace locus::library {
 
-/// What Odometry and Replay of the library have in common: inputs in, estimates as users see them out. One owner.
+/// Common part of the library's Odometry and Replay: inputs in, estimates in the form of the library out. One owner.
 class Engine {
  public:
-  /// `lidars` opened from config.lidars.
+  /// Expects `lidars` opened from config.lidars.
   Engine(Config config, LidarRouter lidars);
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
 
   void take(const daemon::Input& input) { pipeline_.take(input); }
 
-  /// Estimates that nobody has fetched yet, the oldest first.
+  /// Estimates not fetched yet, the oldest first.
   [[nodiscard]] std::deque<liblocus::Estimate>& completed() { return completed_; }
 
   [[nodiscard]] const Config& config() const { return config_; }
   [[nodiscard]] const daemon::Ingest& ingest() const { return pipeline_.ingest(); }
   [[nodiscard]] std::vector<liblocus::Surface> scan() const;
   [[nodiscard]] std::vector<liblocus::Surface> map() const;
-  /// So far; the engine must outlive them.
+  /// Returns the figures so far; the engine must outlive them.
   [[nodiscard]] daemon::Figures figures() const;
 
  private:
@@ -45,10 +45,10 @@ class Engine {
   daemon::InlinePipeline pipeline_;
 };
 
-/// The figures as JSON for the user.
+/// Formats the figures as JSON for the user.
 std::string to_json_text(const daemon::Figures& figures);
 
-/// Does the work, and says why it could not as liblocus::Error.
+/// Does the work; converts its errors to liblocus::Error.
 void in_words_of_the_library(const std::function<void()>& work);
 
 } // namespace locus::library

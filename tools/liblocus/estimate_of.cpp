@@ -12,7 +12,7 @@ namespace {
 
 std::array<double, 6> array_of(const Vector6& v) { return {v[0], v[1], v[2], v[3], v[4], v[5]}; }
 
-/// Row by row.
+/// Converts row by row.
 std::array<double, 36> array_of(const Matrix6& matrix) {
   std::array<double, 36> values{};
   for (int row = 0; row < 6; ++row) {
@@ -22,7 +22,7 @@ std::array<double, 36> array_of(const Matrix6& matrix) {
   return values;
 }
 
-/// The library has them in the same order.
+/// Converts by value: the library lists the states in the same order.
 liblocus::State state_of(TrackingState state) {
   using liblocus::State;
   static_assert(State{static_cast<std::uint8_t>(TrackingState::degenerate)} == State::degenerate &&

@@ -9,7 +9,7 @@
 
 namespace locus::library {
 
-/// The estimate as users of the library see it; `source_names` by index.
+/// Converts the estimate to that of the library; `source_names` by index.
 liblocus::Estimate estimate_of(const OdometryEstimate& estimate, std::span<const std::string> source_names);
 
 } // namespace locus::library

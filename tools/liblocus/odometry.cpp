@@ -16,7 +16,7 @@
 
 namespace liblocus {
 
-using namespace locus; // which all of it is made of
+using namespace locus; // the implementation
 
 Error::~Error() = default;
 
@@ -37,7 +37,7 @@ struct Odometry::Implementation {
   explicit Implementation(const Config& config)
       : engine(config, tools::value_or_fail(LidarRouter::open(config.lidars), tools::ExitStatus::wrong_usage)) {}
 
-  /// The estimates that an input completes.
+  /// Returns the estimates that an input completes.
   std::vector<Estimate> take(const daemon::Input& input) {
     if (std::exchange(finished, finished || std::holds_alternative<daemon::EndOfInput>(input)))
       throw Error("an input after finish(); make another Odometry");
@@ -54,7 +54,7 @@ struct Odometry::Implementation {
 
 namespace {
 
-/// Files may claim no other times either: the difference of two differences of these fits.
+/// Applies the same bounds as to files: the difference of two differences of these fits.
 Stamp stamp_of(std::string_view what, std::int64_t ns) {
   const Stamp stamp = stamp_from_ns(ns);
   if (stamp < kEarliestStamp || stamp > kLatestStamp)

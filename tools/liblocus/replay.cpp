@@ -13,7 +13,7 @@
 
 namespace liblocus {
 
-using namespace locus; // which all of it is made of
+using namespace locus; // the implementation
 
 namespace {
 

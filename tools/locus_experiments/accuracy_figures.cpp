@@ -27,7 +27,7 @@ using tools::Failure;
 using tools::Quantiles;
 using tools::value_or_fail;
 
-/// Speeds of all fixes, each once: a receiver speaks more seldom than the lidar repeats it.
+/// Collects the speeds of all fixes, each once: the lidar repeats a receiver's sentence several times.
 std::vector<double> speeds_of_fixes_mps(DatagramSource& capture) {
   std::vector<double> speeds;
   std::optional<Duration> last;
@@ -43,7 +43,7 @@ std::vector<double> speeds_of_fixes_mps(DatagramSource& capture) {
   return speeds;
 }
 
-/// Those of kind imu among the sources of these names, by the configuration that locus-replay takes.
+/// Filters the names of sources of kind imu, by the configuration that locus-replay uses.
 std::vector<std::string> imus_among(std::vector<std::string> names, const path& recording) {
   Config config;
   if (const auto folder = CaptureFolder::find(recording); folder && !folder->first_config().empty()) {
@@ -59,7 +59,7 @@ std::vector<std::string> imus_among(std::vector<std::string> names, const path& 
   return names;
 }
 
-/// Of a run that is over.
+/// Returns the sources that a finished run received.
 std::vector<std::string> heard_in(const ordered_json& summary) {
   std::vector<std::string> names;
   for (const auto& [name, source] : summary.at("sources").items()) {
@@ -89,7 +89,7 @@ ordered_json to_json(const WayDrift& drift) {
   return json;
 }
 
-/// How many sweeps were in which state.
+/// Counts the sweeps in each state.
 ordered_json states_in(const std::vector<OdometryRow>& rows) {
   ordered_json states = ordered_json::object();
   for (const OdometryRow& row : rows)

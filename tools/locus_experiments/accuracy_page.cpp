@@ -22,23 +22,23 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-/// Of a run: whatever sources there are.
+/// Name of a run with all available sources.
 constexpr const char* kAllSources = "all";
 
-/// The drives of --simulated: in a plant, in a mine and, walking, in the plant.
+/// Lists the drives of --simulated: in a plant, in a mine and, walking, in the plant.
 std::vector<Course> drives_of(const Arguments& arguments) {
   if (!arguments.simulated)
     return {};
   const auto drive = [&](const std::string& name, const char* world, const char* robot) {
     Course course = simulated_course(arguments, name, {"--world", world, "--robot", robot}, 1);
-    course.name = "simulated/" + name; // a recording may have the same
+    course.name = "simulated/" + name; // avoids a clash with a recording's name
     return course;
   };
   return {drive("husky-plant", "urban", "husky"), drive("husky-mine", "tunnel", "husky"),
           drive("spot-plant", "urban", "spot")};
 }
 
-/// A run in which of the sources that are heard only these say something.
+/// Returns a run with only `sources`: all others of `heard` are lost from the start.
 Run run_with(const Names& sources, const Names& heard, const std::string& course, const char* configuration) {
   Run run{course, configuration, {}};
   run.shows_recording = true;
@@ -49,7 +49,7 @@ Run run_with(const Names& sources, const Names& heard, const std::string& course
   return run;
 }
 
-/// What else there is to do with a recording: with its IMU and with lidar alone, as far as these are not the same.
+/// Lists the further runs on a recording: with its IMU and with lidar alone, where these differ from the first.
 std::vector<Run> further_runs(const Results& row) {
   const std::string course = row.at("course");
   const Names heard = row.value("sources", Names{}), inertial = row.value("imus", Names{});
@@ -61,7 +61,7 @@ std::vector<Run> further_runs(const Results& row) {
   return runs;
 }
 
-/// A row of Ninja's as a run of the page.
+/// Converts a row of Ninja's to a run of the page.
 Results shown(Results row, const std::string& name, const std::filesystem::path& recording) {
   if (row.contains("failed"))
     return {{"sources", Names{}}, {"failed", readable(row.at("failed"), name, recording)}};
@@ -70,7 +70,7 @@ Results shown(Results row, const std::string& name, const std::filesystem::path&
   return row;
 }
 
-/// An entry of the page by the rows of its runs, that of all sources first.
+/// Builds an entry of the page from the rows of its runs, the one with all sources first.
 Results entry_of(const Course& course, const Results& rows) {
   const std::string name = course.simulation.empty() ? course.name : course.folder.filename().string();
   Results entry{{"recording", name}};
@@ -103,7 +103,7 @@ Results accuracy_of(const Arguments& arguments) {
                                      kKindsOfRecordings));
   for (const Course& course : plan.courses)
     plan.runs.push_back(run_with({}, {}, course.name, kAllSources));
-  Arguments first = arguments; // the courses are driven on again
+  Arguments first = arguments; // the courses are used again
   first.keep_captures = true;
   for (const Results& row : carry_out(plan, first))
     std::ranges::move(further_runs(row), std::back_inserter(plan.runs));

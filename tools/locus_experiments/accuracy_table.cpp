@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kAllowedShare = 0.01, kAllowed_m = 0.03, kAllowedSigma = 3;
 
-/// With as many decimals as a number of that size deserves; nothing for null.
+/// Formats with decimals to suit the magnitude; empty for null.
 std::string number(const Results& value) {
   if (!value.is_number())
     return "";
@@ -23,7 +23,7 @@ std::string number(const Results& value) {
   return fmt::format("{:.{}f}", number, decimals);
 }
 
-/// With the models of its lidars, where the run has found them out.
+/// Appends the models of the lidars, if the run determined them.
 std::string name_of(const Results& row) {
   std::set<std::string> models;
   for (const Results& lidar : row.at("run").at("summary").value("lidars", Results::object())) {
@@ -46,7 +46,7 @@ std::string states_of(const Results& run) {
   return fmt::format("{}", fmt::join(states, ", "));
 }
 
-/// Sweeps seen, those that failed, states and times, as they stand in both tables.
+/// Formats sweeps received and failed, states and times, the common columns of both tables.
 std::string course_of_run(const Results& run) {
   const Results &summary = run.at("summary"), &sweeps = summary.at("sweeps");
   const auto times = [](const Results& took) {
@@ -91,7 +91,7 @@ std::string speed_by(const Results& receiver) {
                      receiver.at("max_mps").get<double>(), fixes, fixes == 1 ? "" : "es");
 }
 
-/// Of a single pose no motion can be told.
+/// Formats the motion; a single pose has none.
 std::string motion_of(const Results& claims) {
   if (claims.at("speed_mps").is_null())
     return " | | ";
@@ -115,7 +115,7 @@ std::string table_of_claims(const Results& rows) {
   return text + '\n';
 }
 
-/// All runs that `wanted` speaks of, each with what its row needs of its recording.
+/// Collects all runs that `wanted` selects, each with the data of its recording that its row needs.
 Results rows_of(const Results& results, const std::function<bool(const Results&, const Results&)>& wanted) {
   Results rows = Results::array();
   for (const Results& recording : results.at("recordings")) {
@@ -141,7 +141,7 @@ std::string failures(const Results& rows) {
   return text + '\n';
 }
 
-/// Each line once for a recording.
+/// Lists each line once per recording.
 std::string warnings(const Results& results) {
   std::string text;
   for (const Results& recording : results.at("recordings")) {

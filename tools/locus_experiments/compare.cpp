@@ -24,27 +24,27 @@ namespace {
 using tools::ExitStatus;
 using tools::Failure;
 
-/// A figure that differs by less, up or down, is the same: half of what the tables allow a fault to add.
+/// Relative difference below which figures count as equal: half of what the tables allow a fault to add.
 constexpr double kSameShare = 0.1;
 
-/// The worst first.
+/// Verdict, sorted worst first.
 enum class Change : std::uint8_t { worse, same, better };
 
 struct RowChange {
   const ComparedRow *before, *after;
   Change change;
   bool holding_changes;
-  double gain; ///< of the worst figure, or the best one where the row is better: logarithm of before to after
-  bool equal;  ///< all figures
+  double gain; ///< log(before / after) of the worst figure, or of the best one if the row is better
+  bool equal;  ///< in all figures
 };
 
-/// Positive where less came out.
+/// Returns a positive value if the figure became smaller.
 double gain_of(const FigureKind& kind, const std::optional<double>& before, const std::optional<double>& after) {
-  if (!before || !after) // a run that gave no figure is worse than any
+  if (!before || !after) // a run without a figure is worse than any
     return (after ? HUGE_VAL : 0.0) - (before ? HUGE_VAL : 0.0);
   if (std::abs(*after - *before) <= std::max(kind.negligible, kSameShare * *before))
     return 0.0;
-  const double least = std::max(kind.negligible, 1e-9); // from nothing to something is finite
+  const double least = std::max(kind.negligible, 1e-9); // keeps a change from zero finite
   return std::log((*before + least) / (*after + least));
 }
 
@@ -66,7 +66,7 @@ RowChange change_of(const std::vector<FigureKind>& kinds, const ComparedRow& bef
           held == holds && before.figures == after.figures};
 }
 
-/// Before all, rows that hold no longer; after all, those that hold anew.
+/// Sort key: rows that no longer hold come first, rows that newly hold last.
 auto place_of(const RowChange& row) {
   const int first = row.change == Change::worse && row.holding_changes ? 0 : 1;
   const int last = row.change == Change::better && row.holding_changes ? 1 : 0;
@@ -78,7 +78,7 @@ const ComparedRow* row_named(const std::vector<ComparedRow>& rows, const std::st
   return found == rows.end() ? nullptr : &*found;
 }
 
-/// Rows of both, the worst first.
+/// Compares the rows present in both, sorted worst first.
 std::vector<RowChange> changes_between(const ComparedTable& table, const std::vector<ComparedRow>& before,
                                        const std::vector<ComparedRow>& after) {
   std::vector<RowChange> changes;
@@ -123,7 +123,7 @@ std::string line_of(const std::vector<FigureKind>& kinds, const RowChange& row) 
   return line + '\n';
 }
 
-/// Those of `rows` that are not among `others`, as a sentence; empty if there is none.
+/// Lists the `rows` that are not among `others`, as a sentence; empty if there are none.
 std::string only_in(const char* when, const std::vector<ComparedRow>& rows, const std::vector<ComparedRow>& others) {
   std::vector<std::string> names;
   for (const ComparedRow& row : rows) {

@@ -10,18 +10,17 @@
 
 namespace locus::experiments {
 
-/// The results of an earlier run, for others of the same experiment to be compared with.
+/// Results of an earlier run, as the baseline of a comparison within the same experiment.
 class ResultsBefore {
  public:
   /// Reads a results.json. Throws tools::Failure.
   explicit ResultsBefore(std::filesystem::path file);
 
-  /// Throws tools::Failure where `after`, whether or not its runs are done, is not of the same experiment: other rows,
-  /// another duration, other seeds.
+  /// Throws tools::Failure if `after`, complete or not, is of another experiment: other rows, duration or seeds.
   void check_is_of(const Results& after) const;
 
-  /// A page in Markdown: each row better, worse or the same, the worst first, and the rows that only one of them has.
-  /// Throws as check_is_of() does.
+  /// Returns a page in Markdown: each row better, worse or the same, the worst first, and the rows present in only one
+  /// of the two. Throws as check_is_of() does.
   [[nodiscard]] std::string comparison_with(const Results& after) const;
 
  private:
@@ -32,7 +31,7 @@ class ResultsBefore {
   std::string origin_; ///< version and machine
 };
 
-/// Writes that page as compare.md into `folder`, and gives it. Throws tools::Failure.
+/// Writes that page as compare.md into `folder` and returns it. Throws tools::Failure.
 std::string write_comparison(const ResultsBefore& before, const Results& after, const std::filesystem::path& folder);
 
 } // namespace locus::experiments

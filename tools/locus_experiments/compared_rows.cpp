@@ -12,21 +12,20 @@
 namespace locus::experiments {
 namespace {
 
-/// Below a millimetre nobody can say that anything has changed: half of what a VLP-16 tells ranges by.
+/// Changes below a millimetre are insignificant: half of the range resolution of a VLP-16.
 constexpr FigureKind kError{"error, mm", 1e3, 1, 1e-3}, kMedianError{"median error, mm", 1e3, 1, 1e-3},
     kWorstError{"worst error, mm", 1e3, 1, 1e-3};
 constexpr FigureKind kSigma{"worst sigma", 1, 1, 0.1};
-/// A run may end one window earlier than another.
+/// Tolerates one failed sweep: a run may end one window earlier than another.
 constexpr FigureKind kLost{"sweeps lost", 1, 0, 0}, kFailed{"failed", 1, 0, 1};
 constexpr FigureKind kDrivesLost{"drives lost", 1, 0, 0}, kUnsaid{"unsaid", 1, 0, 0};
 constexpr FigureKind kTooFast{"claims too much, m/s", 1, 1, 0.1};
-/// Of the normalised squared error of six axes, 6 where the covariances say the truth: too humble is as wrong as too
-/// sure.
+/// Factor between the NEES and its ideal value of 6 (six axes): too large and too small covariances count alike.
 constexpr FigureKind kNees{"NEES, times off 6", 1, 2, 0.1};
 
 using Pointer = Results::json_pointer;
 
-/// Nothing for null and where it is absent.
+/// Returns nothing if the value is null or absent.
 std::optional<double> number_at(const Results& row, const char* pointer) {
   const Results value = row.value(Pointer(pointer), Results{});
   return value.is_number() ? std::optional(value.get<double>()) : std::nullopt;
@@ -57,7 +56,7 @@ std::vector<ComparedRow> fault_rows(const Results& results) {
   return rows;
 }
 
-/// A cell says in words what it found: its figures are those of its run.
+/// Uses the figures of the run, because a cell describes its findings in words.
 std::vector<ComparedRow> matrix_rows(const Results& results) {
   const RunsById runs = by_id(results.at("runs"));
   std::vector<ComparedRow> rows;
@@ -78,7 +77,7 @@ std::vector<ComparedRow> matrix_rows(const Results& results) {
   return rows;
 }
 
-/// By how much the first figure is above the second; nothing where either is absent.
+/// Returns by how much the first figure exceeds the second; nothing if either is absent.
 std::optional<double> excess(const Results& row, const char* figure, const char* over) {
   const auto value = number_at(row, figure), limit = number_at(row, over);
   return value && limit ? std::optional(std::max(0.0, *value - *limit)) : std::nullopt;

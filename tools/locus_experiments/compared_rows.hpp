@@ -12,30 +12,30 @@
 
 namespace locus::experiments {
 
-/// A figure of a row, of which less is better.
+/// Figure of a row; smaller is better.
 struct FigureKind {
-  std::string_view name; ///< with the unit that it is shown in
+  std::string_view name; ///< with the displayed unit
   double shown_per_unit; ///< 1000 for metres shown in mm
-  int decimals;          ///< as shown
-  double negligible;     ///< difference that counts for nothing, however large a share it is; the unit of the value
+  int decimals;          ///< displayed
+  double negligible;     ///< largest insignificant difference, whatever its ratio; in the unit of the value
 };
 
-/// One row of a table of results: what two runs of the same experiment are compared by.
+/// Row of a table of results, the unit of comparison between two runs of the same experiment.
 struct ComparedRow {
-  std::string name;                           ///< the same before and after, and of no other row
-  std::optional<bool> holds;                  ///< nothing where nothing is asked of it
+  std::string name;                           ///< stable and unique
+  std::optional<bool> holds;                  ///< nothing if the row has no criterion
   std::string broken;                         ///< why it does not hold
-  std::vector<std::optional<double>> figures; ///< in the order of the table's kinds; nothing where a run gave none
+  std::vector<std::optional<double>> figures; ///< in the order of the table's kinds; nothing if a run gave none
 };
 
-/// An experiment whose results are rows.
+/// Experiment whose results are rows.
 struct ComparedTable {
   std::string_view key; ///< of the results, as in results["faults"]
   std::vector<FigureKind> kinds;
   std::vector<ComparedRow> (*rows)(const Results& results);
 };
 
-/// The table of these results, whether or not its runs are done; nullptr where they are of an experiment without rows.
+/// Returns the table of these results, complete or not; nullptr if their experiment has no rows.
 const ComparedTable* table_of(const Results& results);
 
 } // namespace locus::experiments

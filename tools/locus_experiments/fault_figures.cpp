@@ -13,7 +13,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// In steps of a second: a robot that shakes does not get anywhere.
+/// Measures the path in steps of a second, so that shaking does not add to it.
 double driven_m(std::span<const StampedPose> truth) {
   constexpr Duration kStep = std::chrono::seconds{1};
   double sum_m = 0.0;

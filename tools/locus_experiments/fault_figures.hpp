@@ -12,18 +12,18 @@
 
 namespace locus::experiments {
 
-/// What the table of faults wants to know of a run beyond its summary:
+/// Computes the figures of the table of faults that are not in a run's summary:
 /// {"length_m", "added_m", "told", "growth": {"along", "across"}, "sources": {NAME: {"added_m", "ape_mean_m"}}}.
 ///
-/// length_m is the way that the robot goes; added_m is the error of the motion across the interval; told the share of
-/// sweeps flagged as degenerate or dead reckoning since its beginning; growth by how much the variance of the position
-/// along the way and across it has grown from 5 m of way to the farthest place; sources the same errors of the motion
-/// sources alone. Throws tools::Failure.
+/// length_m: path length of the robot; added_m: error of the motion across the interval; told: share of sweeps flagged
+/// as degenerate or dead reckoning since its start; growth: factor by which the variance of the position along and
+/// across the path grows from 5 m of path to the farthest place; sources: the same errors of each motion source alone.
+/// Throws tools::Failure.
 nlohmann::ordered_json fault_figures(const Interval& interval, const std::filesystem::path& run_folder,
                                      const CaptureFolder& capture);
 
-/// The error of the translation from the last pose before the interval to the last one in it, metres. 0 where there is
-/// none.
+/// Returns the translation error from the last pose before the interval to the last one in it, metres; 0 without such
+/// poses.
 double error_added_m(std::span<const StampedPose> estimates, std::span<const StampedPose> truth,
                      const Interval& interval);
 

@@ -13,7 +13,7 @@ using Options = std::vector<std::string>;
 
 struct CourseKind {
   std::string name, words;
-  Options simulation; ///< but for seed and duration
+  Options simulation; ///< except seed and duration
   std::string best_source = "wio";
 };
 
@@ -24,7 +24,7 @@ const std::vector<CourseKind>& course_kinds() {
       {"spot", "spot, plant", {"--world", "urban", "--robot", "spot"}, "vio"},
       {"two_lidars", "husky with two lidars, plant", {"--world", "urban", "--robot", "husky", "--lidars", "2"}},
       {"corridor", "husky, corridor of 100 m", {"--world", "corridor", "--robot", "husky"}},
-      {kSlipCourse, "husky, plant", {"--world", "urban", "--robot", "husky"}}}; // and what add_slip() adds
+      {kSlipCourse, "husky, plant", {"--world", "urban", "--robot", "husky"}}}; // plus the options of add_slip()
   return kinds;
 }
 
@@ -97,7 +97,7 @@ void add_lidar_faults(std::vector<FaultCase>& cases) {
   }
 }
 
-/// A lidar that speaks, and is not to be believed.
+/// Adds clock faults of a lidar that still sends.
 void add_lidar_clock_faults(std::vector<FaultCase>& cases) {
   const auto add = [&](const char* configuration, const char* what, const char* course, const char* fault,
                        Lasting lasting, int silent_sweeps) {
@@ -107,13 +107,13 @@ void add_lidar_clock_faults(std::vector<FaultCase>& cases) {
     cases.push_back(
         {"lidar_frozen", "lidar frozen", course, {"top:frozen"}, Lasting::five_seconds, Demand::carried, 1.5});
     add("lidar_late", "lidar late=0.2", course, "top:late=0.2", Lasting::five_seconds, 3);
-    // Minutes and seconds are all that it tells: a step of an hour is none, half an hour the longest.
+    // The sensor reports minutes and seconds only: a step of an hour is invisible, half an hour is the largest.
     add("lidar_clock-step", "lidar clock-step=1800", course, "top:clock-step=1800", Lasting::five_seconds, 0);
     add("hour_rollover", "hour ends on the lidar's clock", course, "top:clock-step=2780", Lasting::always, 0);
   }
 }
 
-/// A source that says what is not so, for five seconds.
+/// Adds motion sources that report wrong values for five seconds.
 void add_source_faults(std::vector<FaultCase>& cases) {
   const Options any{"frozen", "nan", "late=0.2", "clock-step=3600"};
   Options odometry = any;
@@ -136,7 +136,7 @@ void add_source_faults(std::vector<FaultCase>& cases) {
   add("imu", "urban", any);
 }
 
-/// While a fault lasts; of one that is always there, some seconds in the middle.
+/// Returns the interval of the fault; for a permanent one, some seconds in the middle.
 Interval interval_of(Lasting lasting, int duration_s) {
   const int half_s = duration_s / 2;
   switch (lasting) {
@@ -176,7 +176,7 @@ Course simulated(const Arguments& arguments, const std::string& name, const Cour
   return course;
 }
 
-/// Of seeds that no other course has.
+/// Uses seeds that no other course has.
 void add_honesty_runs(Plan& plan, Arguments arguments) {
   constexpr int kFirstSeed = 101;
   arguments.duration_s = 60;

@@ -20,13 +20,13 @@
 namespace locus::experiments {
 namespace {
 
-constexpr double kHonestLeast = 3, kHonestMost = 12; ///< normalised squared error of six axes
+constexpr double kHonestLeast = 3, kHonestMost = 12; ///< accepted NEES (six axes)
 
 struct Sweeps {
   std::int64_t lost = 0, failed = 0, failed_without = 0;
 };
 
-/// A run may end one window earlier than another.
+/// Counts sweeps; a run may end one window earlier than another.
 Sweeps count_sweeps(const Pairs& pairs) {
   Sweeps sum;
   for (const Pair& pair : pairs) {
@@ -39,7 +39,7 @@ Sweeps count_sweeps(const Pairs& pairs) {
   return sum;
 }
 
-/// How often the health of a source changed, seed by seed.
+/// Counts the health changes of a source, seed by seed.
 std::vector<int> health_changes(const Pairs& pairs, const std::string& source) {
   std::vector<int> changes;
   for (const Pair& pair : pairs) {
@@ -50,7 +50,7 @@ std::vector<int> health_changes(const Pairs& pairs, const std::string& source) {
   return changes;
 }
 
-/// What the table says of the health of a source, and what is wrong with that.
+/// Health of a source as shown in the table, and what is wrong with it.
 struct HealthFound {
   std::string text, broken;
 };
@@ -117,7 +117,7 @@ Results judged(const FaultCase& fault_case, const Pairs& pairs) {
           {"nees_10m", median_nees(pairs)}};
 }
 
-/// Nothing where none of its runs is among these.
+/// Returns nothing if none of its runs is among these.
 std::optional<Results> row_of(const FaultCase& fault_case, const RunsById& runs, int seeds) {
   Pairs pairs;
   std::vector<std::string> failed;
@@ -144,8 +144,8 @@ std::optional<Results> row_of(const FaultCase& fault_case, const RunsById& runs,
   return row;
 }
 
-/// {"runs", "failed", "nees_10m", "median", "p90", "holds"} of the runs for the covariances; null without any. A run
-/// that gives no figure has failed, and what fails does not hold.
+/// Computes {"runs", "failed", "nees_10m", "median", "p90", "holds"} of the runs that test the covariances; null
+/// without any. A run without a figure counts as failed, and a failure does not hold.
 Results consistency_of(const RunsById& runs, int count) {
   std::vector<double> values;
   int failed = 0;

@@ -7,15 +7,15 @@
 
 namespace locus::experiments {
 
-/// The table of faults from the runs of plan_of_faults(), into results["faults"]: "rows", one for each case that has
-/// runs, and "consistency", the mean of the normalised squared errors. A row holds if what is asked of it does, if no
-/// sweep is lost and none fails for want of anything but a lidar, and if a faulty motion source is found out and, once
-/// well, taken back; "broken" says which of these is not so.
+/// Computes the table of faults from the runs of plan_of_faults(), into results["faults"]: "rows", one for each case
+/// with runs, and "consistency", the mean NEES. A row holds if its criterion does, if no sweep is lost and none fails
+/// except for lack of a lidar, and if a faulty motion source is detected and, once recovered, used again; "broken"
+/// lists the violations.
 ///
-/// Numbers are medians over the seeds, of differences those of each seed's pair; the worst sigma is that of all seeds.
+/// Numbers are medians over the seeds, differences are taken per seed; the worst sigma is that of all seeds.
 void judge_faults(Results& results);
 
-/// results["faults"] as a text in Markdown, for faults.md.
+/// Formats results["faults"] in Markdown, for faults.md.
 std::string fault_table(const Results& results);
 
 } // namespace locus::experiments

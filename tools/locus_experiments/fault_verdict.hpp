@@ -13,12 +13,12 @@ namespace locus::experiments {
 
 using RunsById = std::map<std::string, const Results*>;
 
-/// By Run::id(). The runs must outlive it.
+/// Indexes runs by Run::id(). The runs must outlive it.
 RunsById by_id(const Results& runs);
-/// nullptr if there is no such run.
+/// Returns nullptr if there is no such run.
 const Results* find(const RunsById& runs, const std::string& course, const std::string& configuration);
 
-/// One seed: the run of a case, and the one without its fault.
+/// Runs of one seed: with and without the fault of a case.
 struct Pair {
   const Results* with;
   const Results* without;
@@ -30,26 +30,26 @@ double median(const Pairs& pairs, const Figure& figure);
 double largest(const Pairs& pairs, const Figure& figure);
 
 double with_m(const Pair& pair);    ///< mean position error
-double without_m(const Pair& pair); ///< of the run without the fault
+double without_m(const Pair& pair); ///< same, of the run without the fault
 double length_m(const Pair& pair);
 double worst_sigma(const Pair& pair);
 
-/// What was asked, what was found, what of it is not good enough.
+/// Criterion, finding and violations.
 struct Verdict {
   std::string asked, found;
   std::vector<std::string> broken;
 
-  /// `what` is broken unless `good`.
+  /// Adds `what` to the violations unless `good`.
   Verdict& expect(bool good, const char* what);
 };
 
-/// Whether a kind of course was driven as demanded; the limit is that of the demand. Precondition: there are pairs.
+/// Evaluates the demand, with its limit, for a kind of course. Precondition: there are pairs.
 Verdict judge(Demand demand, double limit, const std::string& kind_of_course, const Pairs& pairs);
 
-/// The processors that the runs were done on, for the head of a table.
+/// Lists the processors of the runs, for the head of a table.
 std::string machines_of(const Results& runs);
 
-/// How realistic the simulated courses were; results of versions that knew no realism are of clean ones.
+/// Describes the realism of the simulated courses; results without one (older versions) are of clean courses.
 std::string realism_of(const Results& results);
 
 } // namespace locus::experiments

@@ -21,7 +21,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// The largest mean speed from one sweep to the next.
+/// Returns the largest mean speed between consecutive sweeps.
 double largest_speed_mps(std::span<const PosePair> pairs) {
   double largest = 0;
   for (std::size_t i = 1; i < pairs.size(); ++i) {
@@ -40,7 +40,7 @@ bool stands_at_first(std::span<const PosePair> pairs) {
   });
 }
 
-/// When it was lost, and how long it took to say so.
+/// Adds the time of loss and the delay until it was flagged.
 void add_loss(std::span<const PosePair> pairs, std::span<const OdometryRow> rows, double mounting_rad,
               ordered_json& figures) {
   const Pose T_odom_truth = pairs.front().T_odom_base * pairs.front().T_truth_base.inverse();
@@ -74,7 +74,7 @@ std::string without_numbers(std::string_view line) {
   return text;
 }
 
-/// The warnings of its log, and which of the sources that spoke was taken out of use.
+/// Lists the warnings in the log and the received sources that were taken out of use.
 std::vector<std::string> said(const std::filesystem::path& log, const ordered_json& summary) {
   constexpr std::string_view kWarning = "locus-replay: warning: ";
   std::set<std::string> lines;

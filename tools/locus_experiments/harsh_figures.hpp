@@ -9,18 +9,17 @@
 
 namespace locus::experiments {
 
-/// From here on an estimate is lost, beside what a lidar that is mounted askew turns the way by.
+/// Error from which an estimate counts as lost, plus the path error caused by the lidar's mounting error.
 inline constexpr double kLost_m = 0.3;
 
-/// What the harsh table wants to know of a drive beyond its summary:
+/// Computes the figures of the harsh table that are not in a drive's summary:
 /// {"standing", "true_mps", "lost_after_s", "flagged_after_s", "said"}.
 ///
-/// standing: the robot did not move in the first second of the drive. true_mps: the largest speed it truly had.
-/// lost_after_s: from the start to the first estimate that is farther than kLost_m from the truth, with the first poses
-/// aligned; null if there is none. Lidars that are turned by `mounting_rad` against what the user believes see the base
-/// go so much beside where it goes: that share of the way is allowed on top. flagged_after_s: from then to the first
-/// state that warns, degenerate or dead reckoning; null if none does. said: what the user was told, a line each,
-/// numbers left out. Throws tools::Failure.
+/// standing: the robot was at rest during the first second. true_mps: its largest true speed. lost_after_s: time from
+/// the start to the first estimate with an error above kLost_m, with the first poses aligned; null if there is none. A
+/// mounting error of the lidars of `mounting_rad` rotates the path by that angle: that share of the path is allowed on
+/// top. flagged_after_s: delay until the first state that warns, degenerate or dead reckoning; null if there is none.
+/// said: messages to the user, a line each, without numbers. Throws tools::Failure.
 nlohmann::ordered_json harsh_figures(const std::filesystem::path& run_folder, const CaptureFolder& capture,
                                      const nlohmann::ordered_json& summary, double mounting_rad);
 

@@ -42,7 +42,7 @@ const std::vector<Drive>& drives() {
 struct Group {
   std::string_view name;
   std::vector<std::string_view> imperfections;
-  std::vector<std::string> courses{"plant", "corridor", "plant, spot"}; ///< on which it is tried alone
+  std::vector<std::string> courses{"plant", "corridor", "plant, spot"}; ///< used when tried alone
 };
 
 const std::vector<Group>& groups() {
@@ -55,7 +55,7 @@ const std::vector<Group>& groups() {
        {"slip-bursts-per-min", "yaw-error-percent", "gyro-scale-percent", "gyro-walk-dps", "g-sensitivity-dps",
         "vibration-mps2"}},
       {"people", {"people"}},
-      {"vehicle", {"vehicle-s-per-min"}, {"plant", "field", "road, car"}}, // in the corridor it has no room
+      {"vehicle", {"vehicle-s-per-min"}, {"plant", "field", "road, car"}}, // the corridor is too narrow
       {"steam", {"steam-per-min"}},
       {"mirrors", {"wet-floor-percent", "glass-percent"}}};
   return all;
@@ -76,7 +76,7 @@ bool is_tried(const Drive& drive, const Imperfection& imperfection) {
   return imperfection.courses.empty() || std::ranges::count(imperfection.courses, drive.name) > 0;
 }
 
-/// A name of files: without blanks and commas.
+/// Returns a file name: without blanks and commas.
 std::string file_name(std::string name) {
   std::erase(name, ',');
   std::ranges::replace(name, ' ', '_');
@@ -146,7 +146,7 @@ std::string HarshCase::course_name(int seed) const {
 }
 
 std::vector<HarshCase> harsh_cases(const std::string& only) {
-  constexpr const char* kLongestHalt_s = "12"; // at every other corner: about half of the starts find it standing
+  constexpr const char* kLongestHalt_s = "12"; // at every other corner: about half of the starts are at rest
   std::vector<HarshCase> cases;
   for (const Imperfection& imperfection : imperfections()) {
     for (const Drive& drive : drives()) {

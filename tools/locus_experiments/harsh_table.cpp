@@ -21,11 +21,11 @@ namespace {
 
 using Drives = std::vector<const Results*>;
 
-/// What is asked of a row. Whatever the course: an estimate is no farther off than four of its standard deviations,
-/// claims no speed that the robot has not, but for 1 m/s, and says within a second that it is lost.
+/// Criteria for every row: position errors within four standard deviations, no reported speed more than 1 m/s above the
+/// robot's largest, and a loss flagged within a second.
 constexpr double kMostSigmas = 4, kLeastNees = 3, kMostNees = 12, kMostTooFast_mps = 1, kFlaggedWithin_s = 1;
 
-/// Errors that are asked for with these sensors: the median over the drives of the mean, and the largest of all.
+/// Limits on the error with these sensors: the median over the drives of the mean, and the largest of all.
 struct Asked {
   double median_m, worst_m;
 };
@@ -105,7 +105,7 @@ std::vector<std::string> broken_in(const Results& row, bool accuracy_is_asked) {
   return broken;
 }
 
-/// Of all seeds and starts.
+/// Collects all seeds and starts.
 Drives drives_of(const HarshCase& harsh_case, Sensors sensors, const RunsById& runs, int seeds, int& failed) {
   Drives drives;
   for (int seed = 1; seed <= seeds; ++seed) {
@@ -120,7 +120,7 @@ Drives drives_of(const HarshCase& harsh_case, Sensors sensors, const RunsById& r
   return drives;
 }
 
-/// Nothing where none of its runs is among these.
+/// Returns nothing if none of its runs is among these.
 std::optional<Results> row_of(const HarshCase& harsh_case, Sensors sensors, const RunsById& runs, int seeds) {
   int failed = 0;
   const Drives drives = drives_of(harsh_case, sensors, runs, seeds, failed);
@@ -157,7 +157,7 @@ std::optional<Results> row_of(const HarshCase& harsh_case, Sensors sensors, cons
   return row;
 }
 
-/// Three digits, whether it is millimetres or kilometres.
+/// Formats three digits, whether millimetres or kilometres.
 std::string in_mm(double metres) { return fmt::format("{:.{}f}", 1e3 * metres, metres < 0.1 ? 1 : 0); }
 
 std::string said_in_words(const Results& said) {

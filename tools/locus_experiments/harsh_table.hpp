@@ -7,17 +7,17 @@
 
 namespace locus::experiments {
 
-/// Adds "rows" to results["harsh"], one for each course, imperfection and choice of sensors of which there are runs:
+/// Adds "rows" to results["harsh"], one for each course, imperfection and choice of sensors with runs:
 /// {"course", "imperfection", "sensors", "drives", "standing", "failed", "median_m", "worst_m", "worst_sigma",
 /// "nees_10m", "claimed_mps", "true_mps", "lost", "flagged", "flagged_after_s", "said", "broken", "holds"}.
 ///
-/// drives: those that ran, of them standing at first. median_m: of their mean position errors; worst_m: the largest
-/// position error of any. claimed_mps and true_mps: the largest speed that any estimate claims, and that the robot had.
-/// lost: drives that are ever farther than kLost_m off; flagged: those of them that warn after that, the last one
-/// flagged_after_s later. said: {"text", "drives"}. broken: what is not as asked.
+/// drives: those that ran; standing: those of them that start at rest. median_m: median of their mean position errors;
+/// worst_m: largest position error of any. claimed_mps and true_mps: largest estimated and true speed. lost: drives
+/// with an error ever above kLost_m; flagged: those of them that warn after that, the last one flagged_after_s later.
+/// said: {"text", "drives"}. broken: violated criteria.
 void judge_harsh(Results& results);
 
-/// The rows as a page in Markdown.
+/// Formats the rows as a page in Markdown.
 std::string harsh_table(const Results& results);
 
 } // namespace locus::experiments

@@ -60,7 +60,7 @@ rule leave
   description = leave $name
 )";
 
-/// A program of the same build or package as this one.
+/// Returns the path of a program of the same build or package.
 std::string sibling(const char* name) {
   const path program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / name;
   if (!std::filesystem::exists(program))
@@ -88,17 +88,17 @@ std::string shell_words(const Words& words) {
   return fmt::format("{}", fmt::join(quoted, " "));
 }
 
-/// In the value of a variable of Ninja's.
+/// Escapes the value of a Ninja variable.
 std::string ninja_value(const std::string& text) { return replaced(text, "$", "$$"); }
 
-/// Among the inputs and outputs of Ninja's.
+/// Escapes an input or output of a Ninja build statement.
 std::string ninja_path(const path& file) {
   return replaced(replaced(ninja_value(file.string()), " ", "$ "), ":", "$:");
 }
 
 std::string text_of(const json& plan) { return plan.dump(-1, ' ', false, json::error_handler_t::replace); }
 
-/// Where a course and the runs on it leave what they leave.
+/// Paths of the files of a course and its runs.
 struct Places {
   path output;
 
@@ -110,7 +110,7 @@ struct Places {
   [[nodiscard]] path left(const std::string& course) const { return runs(course) / "left"; }
 };
 
-/// The plan as Ninja reads it.
+/// Writes the plan as a Ninja file.
 class NinjaFile {
  public:
   NinjaFile(const Plan& plan, const Arguments& arguments, const Places& places)
@@ -132,7 +132,7 @@ class NinjaFile {
     file_.close();
   }
 
-  /// Whether there are as many processors as it needs.
+  /// Returns whether there are enough processors for the run.
   static bool is_possible(const Run& run) { return static_cast<std::size_t>(run.paced_cpus) <= usable_cpus().size(); }
 
  private:
@@ -145,8 +145,8 @@ class NinjaFile {
 
   void set(const char* variable, const std::string& value) { file_.print("  {} = {}\n", variable, ninja_value(value)); }
 
-  /// It is simulated when there is somebody to drive on it: only a few of them, which may be gigabytes, lie on the disk
-  /// at a time. It is gone after that, so any other run on it wants it, and all the runs, anew.
+  /// Simulates a course only when a run needs it: captures may be gigabytes, so few are on disk at a time. The capture
+  /// is deleted afterwards, so any further run on the course needs it, and repeats all its runs.
   void simulate(const Course& course) {
     std::string earlier;
     if (const auto most = static_cast<std::size_t>(arguments_.jobs) + 1; left_.size() >= most)
@@ -161,7 +161,7 @@ class NinjaFile {
     set("log", shell_word(places_.log(course.name)));
     set("program", shell_words(program));
     std::vector<Run> runs = runs_on(course);
-    std::erase_if(runs, [](const Run& run) { return run.shows_recording; }); // these follow from the course
+    std::erase_if(runs, [](const Run& run) { return run.shows_recording; }); // these depend on the course
     set("runs", text_of(runs));
     if (!course.has_true_map)
       set("after", "; rm -f " + shell_word(folder / "gt_map.ply"));
@@ -186,7 +186,7 @@ class NinjaFile {
 
   [[nodiscard]] Words replay(const Run& run, const Course& course) const {
     Words words;
-    if (run.paced_cpus > 0 && arguments_.launcher.empty()) { // else it is for that to give it processors of its own
+    if (run.paced_cpus > 0 && arguments_.launcher.empty()) { // with a launcher, that assigns the processors
       std::vector<int> cpus = usable_cpus();
       cpus.resize(static_cast<std::size_t>(run.paced_cpus));
       words = {"taskset", "--cpu-list", fmt::format("{}", fmt::join(cpus, ","))};
@@ -197,7 +197,7 @@ class NinjaFile {
       words.push_back(replay_);
     words.insert(words.end(), {"--quiet", "-o", places_.folder(run)});
     if (run.paced_cpus == 0)
-      words.insert(words.end(), {"--threads", "1"}); // the result is the same, and other runs have the other cores
+      words.insert(words.end(), {"--threads", "1"}); // same result; other runs use the other cores
     words.insert(words.end(), run.options.begin(), run.options.end());
     words.push_back(std::filesystem::absolute(course.folder));
     return words;
@@ -214,7 +214,7 @@ class NinjaFile {
     file_.print("build {}: leave{}{}\n", left, rows, is_timed ? "\n  pool = alone" : "");
     set("name", course.name);
     set("course", shell_word(std::filesystem::absolute(course.folder)));
-    if (!is_timed) // the timed runs wait for all other courses: none of these may wait for them
+    if (!is_timed) // timed runs wait for all other courses, so none of these may wait for them
       left_.push_back(' ' + left);
   }
 
@@ -225,11 +225,10 @@ class NinjaFile {
   std::string simulator_ = sibling("locus-sim"), replay_ = sibling("locus-replay"),
               self_ = sibling("locus-experiments");
   std::string untimed_;
-  Words left_; ///< courses without timed runs, as far as they are written
+  Words left_; ///< courses without timed runs written so far
 };
 
-/// One call of Ninja's per output folder at a time, which waits for what a killed one may have left running; it ends
-/// with this process.
+/// Runs Ninja, once at a time per output folder: waits for leftovers of a killed call; ends with this process.
 void run_ninja(const Places& places, const Arguments& arguments) {
   const std::string command = fmt::format("exec setpriv --pdeathsig TERM flock --no-fork {} ninja -f {} -k 0 -j {}{}",
                                           shell_word(places.output), shell_word(places.output / "build.ninja"),
@@ -251,7 +250,7 @@ std::string last_line_of(const path& file) {
   return last;
 }
 
-/// Why a program did not do its work, by the status that the shell saw and what it said last; nothing if it did.
+/// Returns why a program failed, by its shell exit status and last message; nothing if it succeeded.
 std::optional<std::string> problem_of(int status, const path& log) {
   if (status == 0)
     return std::nullopt;
@@ -269,7 +268,7 @@ std::optional<std::string> problem_of(const Course& course, const Places& places
   return problem_of(status, places.log(course.name));
 }
 
-/// A thousand drives would leave a gigabyte of maps and reports.
+/// Deletes maps and reports: a thousand drives would leave a gigabyte of them.
 void keep_figures_alone(const path& run_folder) {
   for (const char* const name : {"map.pcd", "odometry.csv", "odometry.tum", "report.html"})
     std::filesystem::remove(run_folder / name);

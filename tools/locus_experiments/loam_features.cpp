@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kSide = 5;         ///< neighbours on either side
 constexpr std::size_t kQuarters = 4;     ///< LOAM's identical subregions
-constexpr std::size_t kEdges = 20;       ///< of a quarter: ten times 2
+constexpr std::size_t kEdges = 20;       ///< per quarter: ten times 2
 constexpr std::size_t kPlanes = 40;      ///< ten times 4
 constexpr float kEdgeCurvature = 0.005F; ///< a corner of 90 degrees has 0.007, a wall with 1 cm of noise 0.001
 constexpr float kOccluded = 0.1F;        ///< step of the range between neighbours, as a share of it
@@ -55,7 +55,7 @@ class LineFeatures {
     return before > kAlongBeam * range(i) && after > kAlongBeam * range(i);
   }
 
-  /// Where the range steps, the farther side ends where the nearer one hides it, not where it ends.
+  /// Excludes the farther side of a range step, whose edge is only the shadow of the nearer surface.
   void rule_out_occluded(std::size_t i) {
     const float here = range(i), next = range(i + 1);
     if (here - next > kOccluded * here)

@@ -26,7 +26,7 @@ namespace {
 using tools::ExitStatus;
 using tools::Failure;
 
-/// What results say before any run is done.
+/// Returns the results before any run: the request.
 Results what_is_asked(const Arguments& arguments) {
   Results asked{{"version", LOCUS_VERSION},
                 {"simulated", arguments.recordings.empty()},
@@ -42,7 +42,7 @@ Results what_is_asked(const Arguments& arguments) {
   return asked;
 }
 
-/// Each failed run in a line of its own; nothing if all is well.
+/// Lists each failed run in a line of its own; empty without any.
 std::string failures_in(const Results& results) {
   std::string lines;
   for (const Results& run : results.value("runs", Results::array())) {
@@ -50,7 +50,7 @@ std::string failures_in(const Results& results) {
       lines += fmt::format("{}{}/{}: {}", lines.empty() ? "" : "\n", run.at("course").get<std::string>(),
                            run.at("configuration").get<std::string>(), run.at("failed").get<std::string>());
   }
-  const Results recordings = results.value("recordings", Results::array()); // those of --accuracy
+  const Results recordings = results.value("recordings", Results::array()); // runs of --accuracy
   const auto failed = [](const Results& recording) { return recording.at("runs").front().contains("failed"); };
   if (!recordings.empty() && std::ranges::all_of(recordings, failed))
     lines = "no recording could be replayed; accuracy.md says of each why not";
@@ -69,7 +69,7 @@ void run(const Arguments& arguments) {
   std::optional<ResultsBefore> before;
   if (!arguments.compare.empty())
     before.emplace(arguments.compare);
-  if (before) // an hour before it would be of use
+  if (before) // reports a mismatch before the hours of runs
     before->check_is_of(what_is_asked(arguments));
   tools::make_folder(arguments.output);
   const Results results = arguments.accuracy ? accuracy_of(arguments) : experiment(arguments);

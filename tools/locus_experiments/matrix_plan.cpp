@@ -47,7 +47,7 @@ Interval interval_of(const Kind& kind, bool from_start, int duration_s) {
   return {third_s, is(kind, kAbsent) ? duration_s : third_s + minute_s};
 }
 
-/// A jump that stays would be another origin of the source's frame, and right: it is there for one second in five.
+/// Builds the SPECs. A lasting jump would be a valid change of the frame's origin: it lasts one second in five.
 std::vector<std::string> specs(const std::string& input, const Kind& kind, const Interval& lasting, int duration_s) {
   const auto spec = [&](int from_s) { return fmt::format("{}:{}@{}", input, kind.fault, from_s); };
   if (!is(kind, kJumping))
@@ -59,16 +59,16 @@ std::vector<std::string> specs(const std::string& input, const Kind& kind, const
   return all;
 }
 
-/// How far a husky drives while a packet is late.
+/// Distance that a husky drives while a packet is late.
 constexpr double kWayWhileLate_m = 0.2;
 
-/// Without a lidar the motion sources carry, and their drift is what is to be expected.
+/// Sets the demand without a lidar: the motion sources bridge the gap, with their drift.
 void expect_of_lidar(const Kind& kind, MatrixCell& cell) {
   if (is(kind, kAbsent) && cell.from_start)
     cell.refusal = "no valid data packet";
   if (is(kind, kReturns) && cell.from_start) {
     cell.silent_from_s = cell.lasting.until_s;
-  } else if (is(kind, kLate)) { // its stamps are late, and so is where the robot is: by its way
+  } else if (is(kind, kLate)) { // stamps are late, so the pose lags by the distance driven
     cell.demand = Demand::accurate;
     cell.limit = kWayWhileLate_m;
   } else if (is(kind, kAbsent) || is(kind, kReturns) || is(kind, kFrozen) || is(kind, kJumping)) {
@@ -124,7 +124,7 @@ Plan plan_of_matrix(const Arguments& arguments) {
     Run run{matrix_course(), cell.configuration(), {}};
     for (const std::string& fault : cell.faults)
       run.options.insert(run.options.end(), {"--fail", fault});
-    run.watched = {std::max(1, cell.lasting.from_s), cell.lasting.until_s}; // an error is added to one that is there
+    run.watched = {std::max(1, cell.lasting.from_s), cell.lasting.until_s}; // an error adds to the existing one
     run.refusal = cell.refusal;
     plan.runs.push_back(std::move(run));
   }

@@ -18,10 +18,10 @@ namespace {
 
 using Pointer = Results::json_pointer;
 
-/// Below it nobody can say that a fault has done anything.
+/// Error change below which a fault has no measurable effect.
 constexpr double kNothing_m = 0.001;
 
-/// What of a summary speaks of an input, each with the name that it goes by in the table.
+/// Part of a summary that covers an input, each with its name in the table.
 struct Account {
   std::string name;
   Pointer pointer;
@@ -35,7 +35,7 @@ std::vector<Account> accounts_of(const std::string& input) {
 
 std::string in_words(const Results& value) { return value.is_string() ? value.get<std::string>() : value.dump(); }
 
-/// Counters of an input and the verdict on it where they differ, in words, but for what only follows from others.
+/// Lists, in words, differing counters of an input and its verdict, without those that only follow from others.
 std::vector<std::string> differences(const std::string& input, const Pair& pair) {
   constexpr std::array kOfNoNews{"processed", "used_sweeps", "seen"};
   std::vector<std::string> found;
@@ -54,7 +54,7 @@ std::vector<std::string> differences(const std::string& input, const Pair& pair)
   return found;
 }
 
-/// By its own counters, else by those of the inputs that suffer from it.
+/// Returns evidence of the fault: the input's own counters, else those of the inputs that depend on it.
 std::vector<std::string> shown_by(const MatrixCell& cell, const Pair& pair) {
   std::vector<std::string> shown = differences(cell.input, pair);
   for (const char* other : {"top", "wio", "imu"}) {
@@ -71,7 +71,7 @@ bool changes_nothing(const Pair& pair) {
   });
 }
 
-/// A run may end one window earlier than another.
+/// Returns whether sweeps are lost; a run may end one window earlier than another.
 bool loses_sweeps(const MatrixCell& cell, const Pair& pair) {
   const auto sweeps = [](const Results* run, const char* which) {
     return run->at("summary").at("sweeps").at(which).get<double>();
@@ -89,7 +89,7 @@ Results driven(const MatrixCell& cell, const Pair& pair) {
   return {{"asked", verdict.asked}, {"found", verdict.found}, {"shown", shown}, {"broken", verdict.broken}};
 }
 
-/// Of a cell whose run was refused, or ended as it should not.
+/// Judges a cell whose run was refused, or ended unexpectedly.
 Results ended(const MatrixCell& cell, const Results& run) {
   const bool refused = run.contains("refused");
   const std::string said = run.value(refused ? "refused" : "failed", "");
@@ -100,7 +100,7 @@ Results ended(const MatrixCell& cell, const Results& run) {
           {"broken", broken}};
 }
 
-/// Nothing where the run that it takes is not among these.
+/// Returns nothing if its run is not among these.
 std::optional<Results> judged(const MatrixCell& cell, const RunsById& runs) {
   Results head{{"input", cell.input}, {"fault", cell.what}, {"from_start", cell.from_start}};
   if (!cell.impossible.empty()) {

@@ -7,16 +7,16 @@
 
 namespace locus::experiments {
 
-/// The matrix of faults from the runs of plan_of_matrix(), into results["matrix"]["cells"], one for each cell that has
-/// a run or cannot be.
+/// Computes the matrix of faults from the runs of plan_of_matrix(), into results["matrix"]["cells"], one for each cell
+/// with a run and each impossible one.
 ///
-/// A cell holds if locus-replay ended with status 0 (without any lidar: 1, and said so), if no sweep is lost, if the
-/// error is as bounded as is asked, and if the fault is told: by a counter that differs from the run without fault, its
-/// own input's or that of one which suffers from it. A fault that moves neither the mean nor the largest error by a
-/// millimetre needs no counter.
+/// A cell holds if locus-replay exited with status 0 (without any lidar: with 1 and the reason), no sweep is lost, the
+/// error is within its bound, and the fault is reported: a counter of its own input, or of one that depends on it,
+/// differs from the fault-free run. A fault that changes neither the mean nor the largest error by a millimetre needs
+/// no counter.
 void judge_matrix(Results& results);
 
-/// results["matrix"] as a text in Markdown, for matrix.md: a line for each fault of each input.
+/// Formats results["matrix"] in Markdown, for matrix.md: a line for each fault of each input.
 std::string matrix_table(const Results& results);
 
 } // namespace locus::experiments

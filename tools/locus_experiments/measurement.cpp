@@ -28,10 +28,10 @@ using tools::value_or_fail;
 
 constexpr std::size_t kMaxSeriesPoints = 300;
 
-/// A tenth of a millimetre: no error here is known better, and the page stays small.
+/// Rounds to a tenth of a millimetre: no error here is more precise, and the page stays small.
 double rounded(double metres) { return std::round(metres * 1e4) / 1e4; }
 
-/// The largest error of each interval.
+/// Returns the largest error of each interval.
 ordered_json series(const TrajectoryAccuracy& accuracy) {
   const std::size_t count = accuracy.stamps.size();
   const std::size_t step = count / kMaxSeriesPoints + 1;

@@ -18,7 +18,7 @@ using tools::ExitStatus;
 using tools::Failure;
 
 constexpr std::size_t kStateColumn = 1;
-constexpr std::size_t kCovarianceColumn = 5; // of 6 x 6, row by row
+constexpr std::size_t kCovarianceColumn = 5; // 6 x 6, row by row
 
 std::vector<std::string_view> columns_of(std::string_view line) {
   std::vector<std::string_view> columns;

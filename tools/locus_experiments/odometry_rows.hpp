@@ -11,19 +11,19 @@
 
 namespace locus::experiments {
 
-/// A row of odometry.csv, as far as it is of use here.
+/// Used columns of a row of odometry.csv.
 struct OdometryRow {
   std::string state;
   Eigen::Matrix2d covariance_m2; ///< of x and y of odom
 
-  /// Whether it warns of itself.
+  /// Returns whether the estimate is flagged.
   [[nodiscard]] bool flagged() const { return state == "degenerate" || state == "dead_reckoning"; }
 };
 
-/// What a run of locus-replay left behind: each estimate with its row.
+/// Output of a run of locus-replay: each estimate with its row.
 struct OdometryRows {
   std::vector<StampedPose> estimates;
-  std::vector<OdometryRow> rows; ///< as many
+  std::vector<OdometryRow> rows; ///< one per estimate
 };
 
 /// Reads odometry.tum and odometry.csv of a run's folder. Throws tools::Failure.

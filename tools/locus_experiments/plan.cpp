@@ -35,7 +35,8 @@ Options with(Options options, const Options& more) {
   return options;
 }
 
-/// Table II, and what it takes for Table III. The paper has no flat ground in the tunnel.
+/// Adds the runs of Table II, which are also the references of Table III. The paper does not assume flat ground in the
+/// tunnel.
 void add_accuracy(Plan& plan, const std::string& course, bool flat) {
   plan.runs.push_back({course, "locusd", {}});
   plan.runs.push_back({course, "paper", paper_with({})});
@@ -45,7 +46,7 @@ void add_accuracy(Plan& plan, const std::string& course, bool flat) {
   }
 }
 
-/// Table III: failures after a third of the course, as in the paper after 1200 s of 3600 s.
+/// Adds the runs of Table III: failures after a third of the course, as in the paper after 1200 s of 3600 s.
 void add_robustness(Plan& plan, const std::string& course, int duration_s) {
   constexpr int kLidarGap_s = 10;
   const int fails_s = duration_s / 3;
@@ -57,7 +58,7 @@ void add_robustness(Plan& plan, const std::string& course, int duration_s) {
       {course, "lidar_drop", {"--fail", fmt::format("all-lidars:lost@{}-{}", fails_s, fails_s + kLidarGap_s)}});
 }
 
-/// Fig. 3. Its baseline is paper_fga and its fga_off is paper.
+/// Adds the runs of Fig. 3. Its baseline is paper_fga and its fga_off is paper.
 void add_ablation(Plan& plan, const std::string& course) {
   const Options baseline = paper_with({kFlatGround});
   const Options no_wio{"--fail", "wio:lost@0"}, no_imu{"--fail", "imu:lost@0"};
@@ -71,7 +72,7 @@ void add_ablation(Plan& plan, const std::string& course) {
   plan.runs.push_back({course, "mdc_off", paper_with({kFlatGround, "motion_correction=false"})});
 }
 
-/// Fig. 6, Table V and the load of Table II.
+/// Adds the runs of Fig. 6, Table V and the load of Table II.
 void add_pace(Plan& plan, const std::string& course, int pace_s) {
   for (const int cpus : {1, 2})
     plan.runs.push_back({course,
@@ -103,7 +104,7 @@ Plan plan_of_paper(const Arguments& arguments) {
   return plan;
 }
 
-/// By the names of their folders, counted where two have the same.
+/// Names a recording after its folder, numbered if another has the same name.
 std::string name_of(const std::filesystem::path& recording, const std::vector<Course>& others) {
   const std::filesystem::path folder = std::filesystem::absolute(recording / "").parent_path();
   std::string name = folder.filename().string();

@@ -10,15 +10,15 @@
 
 namespace locus::experiments {
 
-/// Where a robot drives.
+/// Course of a robot: a capture, recorded or simulated.
 struct Course {
   std::string name;
-  std::filesystem::path folder;        ///< the capture
-  std::vector<std::string> simulation; ///< options of locus-sim that make it; empty for a recording
-  bool has_true_map = true;            ///< false: poses alone are compared, which takes a fourth of the time
+  std::filesystem::path folder;        ///< of the capture
+  std::vector<std::string> simulation; ///< options of locus-sim that create it; empty for a recording
+  bool has_true_map = true;            ///< false: only poses are compared, in a quarter of the time
 };
 
-/// Of a recording, seconds from its start.
+/// Interval of a recording, seconds from its start.
 struct Interval {
   int from_s, until_s;
 };
@@ -26,16 +26,16 @@ struct Interval {
 /// One run of locus-replay.
 struct Run {
   std::string course;
-  std::string configuration;            ///< what it is called in the results
-  std::vector<std::string> options;     ///< of locus-replay
-  int paced_cpus = 0;                   ///< at the pace of the recording on so many processors; 0: as fast as can be
-  bool loam_features = false;           ///< LOAM's points in place of the filters
-  std::optional<Interval> watched = {}; ///< what happens there is measured for the table of faults
-  /// A drive of the harsh table: by how much its lidars are turned against what config.yaml says. What such a drive
-  /// wrote is not kept.
+  std::string configuration;        ///< name in the results
+  std::vector<std::string> options; ///< for locus-replay
+  int paced_cpus = 0;               ///< at the pace of the recording on this many processors; 0: as fast as possible
+  bool loam_features = false;       ///< LOAM's points instead of the filters
+  std::optional<Interval> watched = {}; ///< interval measured for the table of faults
+  /// Mounting error of the lidars relative to config.yaml, for a drive of the harsh table. The files of such a drive
+  /// are deleted.
   std::optional<double> mounting_rad = {};
-  std::string refusal = {};     ///< what locus-replay has to say instead of running; empty: it has to run
-  bool shows_recording = false; ///< of the page of recordings: measured is what recording_figures() says
+  std::string refusal = {};     ///< expected refusal by locus-replay; empty: it has to run
+  bool shows_recording = false; ///< for the page of recordings: measures recording_figures()
 
   [[nodiscard]] std::string id() const { return course + '/' + configuration; }
 };
@@ -45,14 +45,16 @@ struct Plan {
   std::vector<Run> runs;
 };
 
-/// A course of the output folder that locus-sim makes with these options, as long and as realistic as the user wants.
+/// Returns a course that locus-sim creates in the output folder, with these options and the user's duration and
+/// realism.
 Course simulated_course(const Arguments& arguments, const std::string& name, std::vector<std::string> simulation,
                         int seed);
 
-/// Settings of the paper's Section II and Table IV as --set options: what paper-husky.yaml says beyond husky.yaml.
+/// Returns the settings of the paper's Section II and Table IV as --set options: those of paper-husky.yaml that are not
+/// in husky.yaml.
 const std::vector<std::string>& paper_settings();
 
-/// The harsh courses, the faults, or their matrix, or the paper's experiments, or as much of them as a recording
+/// Plans the harsh courses, the faults, their matrix, or the paper's experiments, the latter as far as a recording
 /// allows.
 Plan make_plan(const Arguments& arguments);
 

@@ -23,7 +23,7 @@ bool is_folder(const path& where) {
   return std::filesystem::is_directory(where, ignored);
 }
 
-/// A capture folder with a mistake in it is one, too: locus-replay says which.
+/// Returns true for an invalid capture folder, too: locus-replay reports the mistake.
 bool is_recording(const path& where) {
   if (tools::KittiDrive::is(where) || tools::looks_like_bag(where) || tools::SweepFolder::is(where))
     return true;
@@ -37,11 +37,11 @@ std::vector<path> entries_of(const path& folder) {
   std::vector<path> entries;
   for (std::filesystem::directory_iterator entry{folder, error}, end; !error && entry != end; entry.increment(error))
     entries.push_back(entry->path());
-  std::ranges::sort(entries); // folders list in any order
+  std::ranges::sort(entries); // directory order is unspecified
   return entries;
 }
 
-/// Looks into each folder once, whichever links lead to it.
+/// Searches each folder once, even if several links lead to it.
 class Search {
  public:
   explicit Search(const path& output) { visit(output); }

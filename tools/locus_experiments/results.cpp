@@ -15,8 +15,8 @@
 #include "locus_replay/output_file.hpp"
 #include "pages/data_page.hpp"
 
-// Laid into the program by locus_page() in CMake.
-extern "C" const char locus_experiments_page_begin[]; // NOLINT(modernize-avoid-c-arrays): the linker knows its length
+// Embedded into the program by locus_page() in CMake.
+extern "C" const char locus_experiments_page_begin[]; // NOLINT(modernize-avoid-c-arrays): size set by the linker
 extern "C" const char locus_experiments_page_end[];   // NOLINT(modernize-avoid-c-arrays)
 
 namespace locus::experiments {

@@ -17,11 +17,11 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Sweeps of 20 Hz and less, the fastest rotation of a lidar, end at least so far apart.
+/// Interval between checks, shorter than a sweep at 20 Hz, the fastest rotation of a lidar.
 constexpr Duration kBetweenLooks = std::chrono::milliseconds{40};
 constexpr std::chrono::seconds kLongestWait{60};
 
-/// The service itself makes who asks again wait.
+/// Polls without a delay of its own: the service limits the rate of requests.
 template <class Holds> bool comes_true(const std::filesystem::path& socket, const Holds& holds) {
   const auto give_up = std::chrono::steady_clock::now() + kLongestWait;
   while (!holds(ask(socket, {{"command", "status"}}).json))

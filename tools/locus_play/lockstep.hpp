@@ -9,17 +9,17 @@
 
 namespace locus::tools {
 
-/// Keeps a player from running ahead of a service that cannot keep pace: it asks its control socket how far it is. One
-/// owner.
+/// Prevents a player from running ahead of a service that cannot keep pace, by polling its progress on the control
+/// socket. One owner.
 class Lockstep {
  public:
   explicit Lockstep(std::filesystem::path socket) : socket_(std::move(socket)) {}
 
-  /// Until the service knows a publisher of each of these motion sources. Throws Failure when it never does.
+  /// Waits until the service knows a publisher of each of these motion sources. Throws Failure on timeout.
   void wait_for_writers(const std::vector<std::string>& sources) const;
 
-  /// To be called before `now`, of the recording, is waited for: twice in a sweep, until each sweep that the service
-  /// has seen is processed. Throws Failure when the service is gone.
+  /// Waits until the service has processed each sweep that it received. Call twice per sweep, before waiting for `now`,
+  /// the time of the recording. Throws Failure if the service is gone.
   void follow(Stamp now);
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// locus-play: a capture folder, or a stream, to the wire, as a robot would send it.
+// locus-play: sends a capture folder, or a stream, as a robot would.
 #include <algorithm>
 #include <ctime>
 #include <filesystem>
@@ -63,7 +63,7 @@ Recording open_recording(const PlayArguments& arguments, const CaptureFolder& fo
           {.duration = {}, .faults = arguments.faults, .seed = config.sweep.seed}};
 }
 
-/// Those who run already are to hear the first sample; who does not run is not waited for.
+/// Waits for subscribers that already run, so that they receive the first sample; gives up after kPatience.
 void wait_for_listeners(const MotionPublisher& motion, const DdsOptions& dds) {
   constexpr Duration kPatience = std::chrono::seconds{3}, kLook = std::chrono::milliseconds{20};
   for (Duration waited{}; waited < kPatience && !motion.unheard().empty(); waited += kLook)
@@ -73,7 +73,7 @@ void wait_for_listeners(const MotionPublisher& motion, const DdsOptions& dds) {
                      dds.domain, dds.interface));
 }
 
-/// A host's clock that is set, or led in a test, takes the pace along.
+/// Wall clock: the pace follows steps of the host's clock, and a test may control it.
 const daemon::PacedInput::Clock kWallClock{[] { return daemon::read_clock(CLOCK_REALTIME); },
                                            [](Duration time) { std::this_thread::sleep_for(time); }};
 
@@ -85,9 +85,9 @@ std::vector<std::string> names_on_topics(const Config& config) {
   return names;
 }
 
-/// Sends all there is, each at its time. The first input is sent now: what separates its arrival from that is what all
-/// stamps are shifted by, in whole microseconds as the lidars count. The clock shows the arrival of what is sent next,
-/// so no stamp of a sensor is ahead of it by more than it goes in its period.
+/// Sends all inputs, each at its time. The first is sent now: the difference to its arrival shifts all stamps, in whole
+/// microseconds, the lidars' resolution. The clock shows the arrival of the next input, so no sensor's stamp is ahead
+/// of it by more than its period.
 void send_all(const PlayArguments& arguments, daemon::InputSource& recording, PacketSender& packets,
               MotionPublisher& motion, Lockstep* lockstep, const std::function<double()>& progress) {
   daemon::PacedInput paced(recording, arguments.speed,
@@ -162,7 +162,7 @@ void play_folder(const PlayArguments& arguments) {
   play(arguments, config, recording, recording.source(), [&] { return recording.progress(); });
 }
 
-/// A file, or standard input, whose length nobody knows.
+/// Plays a file, or standard input, of unknown length.
 void play_stream(const PlayArguments& arguments) {
   if (arguments.capture == "-" && isatty(STDIN_FILENO) == 1)
     throw Failure(ExitStatus::wrong_usage, "-: standard input is a terminal; try: locus-sim ... -o - | locus-play -");

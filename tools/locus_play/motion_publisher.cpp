@@ -41,7 +41,7 @@ void MotionPublisher::publish(const daemon::ImuInput& input, Duration shift) {
   if (const auto& q = input.sample.attitude)
     message.orientation_ = {q->x(), q->y(), q->z(), q->w()};
   else
-    message.orientation_covariance_[0] = -1; // REP 145: it has none
+    message.orientation_covariance_[0] = -1; // REP 145: not available
   message.angular_velocity_ = {w.x(), w.y(), w.z()};
   message.linear_acceleration_ = {f.x(), f.y(), f.z()};
   refused_ += writer->second.write(message) ? 0U : 1U;

@@ -13,11 +13,11 @@
 
 namespace locus::tools {
 
-/// Publishes recorded motion samples on the topics that the configuration names, as the drivers of the robot do, and
-/// the time of the recording, if there is to be a clock. One owner.
+/// Publishes recorded motion samples on the configured topics, as the drivers of the robot do, and optionally the time
+/// of the recording. One owner.
 class MotionPublisher {
  public:
-  static constexpr Duration kClockPeriod = std::chrono::milliseconds{10}; ///< of /clock, however fast its time goes
+  static constexpr Duration kClockPeriod = std::chrono::milliseconds{10}; ///< of /clock, whatever the playback speed
 
   /// Throws Failure.
   MotionPublisher(const Config& config, bool clock);
@@ -25,20 +25,20 @@ class MotionPublisher {
   void publish(const daemon::ImuInput& input, Duration shift);
   void publish(const daemon::OdometryInput& input, Duration shift);
 
-  /// To be told of every moment; publishes it when the period is over, and never one that is not later than the last.
+  /// Publishes the clock if a period has passed, and never backwards. Call with every new time.
   void tell_time(Stamp now);
 
-  /// Topics to which nobody listens.
+  /// Returns topics without subscribers.
   [[nodiscard]] std::vector<std::string> unheard() const;
-  /// Samples that DDS did not take.
+  /// Returns the number of samples rejected by DDS.
   [[nodiscard]] std::uint64_t refused() const { return refused_; }
-  /// For whatever else this process has to say or hear in the domain.
+  /// DDS node, for other publishers and readers of this process.
   [[nodiscard]] const daemon::DdsNode& node() const { return node_; }
 
  private:
   daemon::DdsNode node_;
   std::string frame_odom_, frame_base_;
-  std::vector<std::string> topics_; ///< by source
+  std::vector<std::string> topics_; ///< by source index
   std::map<SourceId, daemon::DdsWriter<daemon::ros::Imu>> imus_;
   std::map<SourceId, daemon::DdsWriter<daemon::ros::Odometry>> odometries_;
   std::optional<daemon::DdsWriter<daemon::ros::Clock>> clock_;

@@ -64,7 +64,7 @@ void PacketSender::send(const Datagram& datagram, Duration shift) {
   const sockaddr_in to = address(to_, datagram.destination_port);
   const ssize_t sent = sendto(socket_for(datagram.source_ip), packet_.data(), packet_.size(), 0,
                               reinterpret_cast<const sockaddr*>(&to), sizeof(to));
-  if (sent < 0 && errno != ECONNREFUSED) // nobody listens yet; a lidar does not mind
+  if (sent < 0 && errno != ECONNREFUSED) // no receiver yet; a lidar sends anyway
     throw Failure(ExitStatus::failed, fmt::format("packets cannot be sent: {}; choose another address with --to",
                                                   std::strerror(errno))); // NOLINT(concurrency-mt-unsafe)
   ++sent_;

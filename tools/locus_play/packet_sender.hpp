@@ -12,21 +12,22 @@
 
 namespace locus::tools {
 
-/// Sends datagrams as the lidars did that they were recorded from: to the same ports, and from the same addresses as
-/// far as this host has them. One owner.
+/// Sends datagrams as the recorded lidars did: to the same ports, and from the same addresses if this host has them.
+/// One owner.
 class PacketSender {
  public:
-  /// `interface`: that multicast leaves by; empty: as routed. `lidars`: to tell an Ouster's packets by. Throws Failure.
+  /// Opens the socket. `interface`: outgoing one for multicast; empty: as routed. `lidars`: to recognise an Ouster's
+  /// packets. Throws Failure.
   PacketSender(const std::string& to, std::string interface, LidarRouter lidars);
   ~PacketSender();
   PacketSender(const PacketSender&) = delete;
   PacketSender& operator=(const PacketSender&) = delete;
 
-  /// The clock of the lidar in the packet is moved by `shift`. Throws Failure.
+  /// Shifts the lidar's time in the packet by `shift`. Throws Failure.
   void send(const Datagram& datagram, Duration shift);
 
   [[nodiscard]] std::uint64_t sent() const { return sent_; }
-  /// Whether some left from another address than they were recorded from.
+  /// Returns whether some were sent from an address other than the recorded one.
   [[nodiscard]] bool changed_sender() const { return changed_sender_; }
 
  private:
@@ -34,9 +35,9 @@ class PacketSender {
 
   std::uint32_t to_; ///< host byte order
   std::string interface_;
-  std::map<std::uint32_t, int> sockets_; ///< by the address recorded
-  LidarRouter lidars_;                   ///< never receives anything
-  std::vector<std::byte> packet_;        ///< at hand
+  std::map<std::uint32_t, int> sockets_; ///< by recorded address
+  LidarRouter lidars_;                   ///< for look-ups only
+  std::vector<std::byte> packet_;        ///< current packet
   std::uint64_t sent_ = 0;
   bool changed_sender_ = false;
 };

@@ -56,7 +56,7 @@ void StreamRecording::read() {
 void StreamRecording::begin(Stamp start) {
   const std::uint64_t seed = config_.sweep.seed;
   lidar_faults_.emplace(faults_, start, seed);
-  bool has_imu = false; // the first one has the file
+  bool has_imu = false; // imu.csv belongs to the first one
   for (std::size_t i = 0; i < config_.motion_sources.size(); ++i) {
     const MotionSourceOptions& source = config_.motion_sources[i];
     if (source.kind == SourceKind::odometry)

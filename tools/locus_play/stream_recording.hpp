@@ -19,17 +19,17 @@
 
 namespace locus::tools {
 
-/// A capture in one file or pipe, as locus-sim -o - writes it (see sim::StreamSink); one of lidar packets alone is one,
-/// too. One owner.
+/// Capture in one file or pipe, as written by locus-sim -o - (see sim::StreamSink), or any capture of lidar packets.
+/// One owner.
 class CaptureStream {
  public:
   explicit CaptureStream(Capture capture);
   CaptureStream(const CaptureStream&) = delete;
   CaptureStream& operator=(const CaptureStream&) = delete;
 
-  /// config.yaml, where the stream begins with it; else empty.
+  /// Returns config.yaml, if the stream begins with it; else empty text.
   [[nodiscard]] const std::string& config() const { return config_; }
-  /// The next datagram behind that, valid until the next call; nullptr at the end.
+  /// Returns the next datagram, valid until the next call; nullptr at the end.
   const Datagram* next();
   [[nodiscard]] const Capture& capture() const { return capture_; }
 
@@ -39,26 +39,26 @@ class CaptureStream {
   std::string config_;
 };
 
-/// Datagrams and motion samples of a stream in the order of their arrival, faults injected, read as they are asked for.
+/// Datagrams and motion samples of a stream in order of arrival, with faults injected, read on demand.
 ///
-/// The seconds of a fault count from the first packet. What faults swallow leaves Silence behind. True poses are left
-/// out. A text that cannot be read ends the stream, and problem() says which. One owner.
+/// The seconds of a fault count from the first packet. Inputs dropped by a fault yield Silence. True poses are skipped.
+/// An unreadable text ends the stream, and problem() identifies it. One owner.
 class StreamRecording : public daemon::InputSource {
  public:
-  /// `stream` must outlive this; `lidars`: to tell whose datagram a fault strikes. Precondition: fault_problem() finds
+  /// Expects `stream` to outlive this; `lidars` identify the lidar of a datagram. Precondition: fault_problem() returns
   /// nothing.
   StreamRecording(CaptureStream& stream, const Config& config, LidarRouter lidars, std::vector<Fault> faults);
 
   daemon::Input next(Duration timeout) override;
 
-  /// Files of the stream that no motion source is configured for.
+  /// Returns the files of the stream without a motion source in the configuration.
   [[nodiscard]] const std::set<std::string>& unknown_files() const { return unknown_files_; }
-  /// A line for the user.
+  /// Returns a line for the user.
   [[nodiscard]] const std::optional<std::string>& problem() const { return problem_; }
 
  private:
   struct OwnedInput {
-    daemon::Input input; ///< a datagram without payload
+    daemon::Input input; ///< datagrams without payload
     std::vector<std::byte> payload;
   };
   struct Source {
@@ -77,11 +77,11 @@ class StreamRecording : public daemon::InputSource {
 
   CaptureStream& stream_;
   const Config& config_;
-  LidarRouter lidars_; ///< never receives anything
+  LidarRouter lidars_; ///< for look-ups only
   std::vector<Fault> faults_;
   std::optional<DatagramFaults> lidar_faults_; ///< from the first packet on
-  std::map<std::string, Source> sources_;      ///< by the file that they stand in
-  std::multimap<Stamp, OwnedInput> waiting_;   ///< read, not given out yet; by arrival
+  std::map<std::string, Source> sources_;      ///< by file name
+  std::multimap<Stamp, OwnedInput> waiting_;   ///< read but not returned yet; by arrival
   OwnedInput given_out_;
   Stamp now_; ///< arrival of the latest datagram read, Stamp::max() after the last
   std::set<std::string> unknown_files_;

@@ -26,7 +26,7 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   std::vector<std::string> odometry, faults;
   int threads = 0;
   double start_s = 0, duration_s = 0;
-  std::string speed; // a flag with a number takes whole ones
+  std::string speed; // as text: CLI11 accepts only integers for a flag with a value
   constexpr auto formats = names_of(CloudFormat{});
   std::string format{formats.front()};
 

@@ -12,9 +12,9 @@
 
 namespace locus::tools {
 
-inline constexpr double kLongest_s = 1e8; ///< that a recording may last: three years
+inline constexpr double kLongest_s = 1e8; ///< limit on the length of a recording: three years
 
-/// What the user asked for.
+/// Command line arguments.
 struct Arguments {
   struct OdometryFile {
     std::string name; ///< of the motion source
@@ -23,25 +23,25 @@ struct Arguments {
 
   std::filesystem::path capture;
   std::filesystem::path output;
-  std::filesystem::path config; ///< empty: that of the capture folder, or the defaults
+  std::filesystem::path config; ///< empty: as in the capture folder, or the defaults
   std::vector<std::string> overrides;
-  std::filesystem::path imu; ///< empty: that of the capture folder
+  std::filesystem::path imu; ///< empty: as in the capture folder
   std::vector<OdometryFile> odometry;
-  std::filesystem::path ground_truth; ///< empty: that of the capture folder
-  std::filesystem::path map_truth;    ///< the same
-  std::filesystem::path mcap;         ///< to be written; empty: none
-  std::filesystem::path calibrate;    ///< the same
-  std::filesystem::path sweeps;       ///< folder to be filled; empty: none
+  std::filesystem::path ground_truth; ///< empty: as in the capture folder
+  std::filesystem::path map_truth;    ///< empty: as in the capture folder
+  std::filesystem::path mcap;         ///< output; empty: none
+  std::filesystem::path calibrate;    ///< output; empty: none
+  std::filesystem::path sweeps;       ///< output folder; empty: none
   CloudFormat sweeps_format = CloudFormat::pcd;
   Duration start{};
   std::optional<Duration> duration;
   std::vector<Fault> faults;
   std::optional<double> realtime_speed;
-  bool kitti_as_published = false; ///< the points of a drive of KITTI stay as they are
+  bool kitti_as_published = false; ///< leaves the points of a KITTI drive uncorrected
   bool quiet = false;
 };
 
-/// Nothing where help or version were asked for and have been printed. Throws Failure.
+/// Returns nothing if help or version were requested and have been printed. Throws Failure.
 std::optional<Arguments> parse_arguments(int argc, char** argv);
 
 } // namespace locus::tools

@@ -17,17 +17,17 @@
 namespace locus::tools {
 namespace {
 
-/// What the first messages of a bag tell about its clouds.
+/// Properties of a bag's clouds, from its first messages.
 struct Clouds {
   struct Topic {
     std::size_t messages = 0, points = 0;
     std::string frame;
   };
-  std::map<std::size_t, Topic> topics; ///< by the index of the topic
+  std::map<std::size_t, Topic> topics; ///< by topic index
   StaticTransforms transforms;
 };
 
-/// Of ten seconds, or of three clouds of each topic and the transforms if these come sooner.
+/// Reads ten seconds of the bag, or less once it has three clouds of each topic and the transforms.
 Clouds look_into(Bag& bag) {
   constexpr Duration kLong = std::chrono::seconds{10};
   constexpr std::size_t kEnough = 3;

@@ -18,7 +18,7 @@ Stamp arrival_of(Stamp stamp, Stamp recorded) {
   return std::chrono::abs(recorded - stamp) > kLongestDelay ? stamp : recorded;
 }
 
-/// Gathers the samples of one topic.
+/// Collects the samples of one topic.
 class MotionTopic {
  public:
   MotionTopic(SourceId source, std::size_t topic, BagTopic name, bool beside_packets)
@@ -43,7 +43,7 @@ class MotionTopic {
     return {source_, place, in_order(std::move(odometry_))};
   }
 
-  /// What to say of messages that could not be read; empty if all could.
+  /// Returns a line about unreadable messages; empty if there are none.
   [[nodiscard]] std::string problem(const std::filesystem::path& file) const {
     return malformed_ == 0 ? ""
                            : fmt::format("{}: {} messages on {} are cut short or no {} and were left out; record again "

@@ -12,11 +12,11 @@
 
 namespace locus::tools {
 
-/// What a bag holds of the motion sources, `topic_of_source` by index in the configuration. Held in memory, 100 MB for
-/// an hour at 200 Hz. Reads the bag through and leaves it at its first message.
+/// Reads the samples of the motion sources from a bag; `topic_of_source` by configuration index. Needs 100 MB of memory
+/// per hour at 200 Hz. Reads the whole bag and rewinds it.
 ///
-/// A sample arrived when the recorder received it. Beside packets, which have the driver's stamps, that is not so where
-/// it is more than ten seconds from the sample's own stamp: its clock was another one's, and arrival = stamp.
+/// The arrival of a sample is its reception by the recorder. Next to packets, which have the driver's stamps, an
+/// arrival more than ten seconds from the sample's own stamp indicates another clock; then arrival = stamp.
 std::vector<MotionRecording> read_bag_motion(Bag& bag, const std::filesystem::path& file,
                                              const std::vector<std::optional<std::size_t>>& topic_of_source,
                                              bool beside_packets, std::vector<std::string>& warnings);

@@ -12,7 +12,7 @@ namespace locus::tools {
 namespace {
 
 constexpr Duration kAhead = std::chrono::milliseconds{500};
-constexpr std::size_t kWithEach = 100; ///< bytes of memory that go with a packet or cloud: many may be empty
+constexpr std::size_t kWithEach = 100; ///< bytes of overhead per packet or cloud: many may be empty
 
 } // namespace
 
@@ -62,7 +62,7 @@ void BagPackets::give_cloud(Scan& scan) {
 
 void BagPackets::read_ahead() {
   constexpr std::size_t kMaxWaiting = 40'000'000; // bytes: the packets of sixteen lidars in that time
-  constexpr std::size_t kMaxScans = 10'000;       // the earliest of all is looked for with each packet
+  constexpr std::size_t kMaxScans = 10'000;       // bounds the search for the earliest at each packet
   const auto is_ahead = [&] {
     return !scans_.empty() && (std::chrono::abs(newest_ - scans_.front().recorded) >= kAhead ||
                                waiting_ >= kMaxWaiting || scans_.size() >= kMaxScans);
@@ -131,7 +131,7 @@ std::vector<std::string> BagPackets::warnings() const {
   return lines;
 }
 
-/// Of the messages of all lidars.
+/// Lists the message types of all lidars.
 std::string BagPackets::types() const {
   std::set<std::string_view> types;
   for (const Lidar& lidar : lidars_)

@@ -18,14 +18,14 @@
 
 namespace locus::tools {
 
-/// The packets in a bag as the datagrams that they were: to the port and from the address that the configuration has
-/// for their lidar, received when the driver says. Clouds are received when the recorder says.
+/// Converts the packets in a bag back to datagrams: to the port and from the address configured for their lidar,
+/// received at the driver's stamp. Clouds are received at the recorder's stamp.
 ///
-/// A message holds the packets of a whole turn. So that those of several lidars come in the order of their reception,
-/// messages are read half a second ahead. One owner.
+/// A message holds the packets of a whole turn. To sort those of several lidars by reception, messages are read half a
+/// second ahead. One owner.
 class BagPackets : public DatagramSource {
  public:
-  /// `topic_of_lidar`: by index in the configuration. The bag stands at its first message.
+  /// Takes the bag at its first message. `topic_of_lidar`: by configuration index.
   BagPackets(std::unique_ptr<Bag> bag, std::filesystem::path file, const Config& config,
              const std::vector<std::optional<std::size_t>>& topic_of_lidar);
 
@@ -39,8 +39,8 @@ class BagPackets : public DatagramSource {
   struct Lidar {
     std::uint8_t index;
     std::size_t topic;
-    std::string type;          ///< of its messages
-    const PacketType* packets; ///< the same; nullptr: clouds
+    std::string type;          ///< of the messages
+    const PacketType* packets; ///< message type; nullptr: clouds
     std::uint16_t port;
     std::uint32_t ip;
   };
@@ -48,8 +48,8 @@ class BagPackets : public DatagramSource {
     const Lidar* lidar;
     Stamp recorded;
     LidarPackets packets;
-    std::vector<std::byte> cloud; ///< in place of packets: the message
-    std::size_t next = 0;         ///< to be given out; before the end
+    std::vector<std::byte> cloud; ///< message with a cloud; replaces the packets
+    std::size_t next = 0;         ///< index of the next packet, below their number
 
     [[nodiscard]] bool is_cloud() const { return packets.packets.empty(); }
     [[nodiscard]] const LidarPackets::Packet& packet() const { return packets.packets[next]; }
@@ -67,15 +67,15 @@ class BagPackets : public DatagramSource {
   std::unique_ptr<Bag> bag_;
   std::filesystem::path file_;
   std::vector<Lidar> lidars_;
-  std::deque<Scan> scans_;  ///< read, not given out yet; as they lie in the bag
-  std::size_t waiting_ = 0; ///< bytes of memory that they take
-  Stamp newest_;            ///< when the latest message was recorded
+  std::deque<Scan> scans_;  ///< read but not returned yet; in file order
+  std::size_t waiting_ = 0; ///< bytes of memory in use for them
+  Stamp newest_;            ///< recording time of the latest message
   bool bag_is_over_ = false;
-  std::vector<std::byte> bytes_; ///< of what is given out
+  std::vector<std::byte> bytes_; ///< of the datagram returned
   CloudView cloud_;
   Datagram datagram_;
   std::uint64_t datagrams_ = 0, messages_ = 0, malformed_ = 0;
-  std::uint64_t misplaced_ = 0; ///< messages that were received well before the one that lies before them
+  std::uint64_t misplaced_ = 0; ///< messages received well before the preceding one in the file
 };
 
 } // namespace locus::tools

@@ -25,7 +25,7 @@ std::string_view type_of(SourceKind kind) { return kind == SourceKind::imu ? kIm
 
 bool is_of_lidar(const BagTopic& topic) { return are_packets_decoded(topic.type); }
 
-/// Deals the topics of one kind out to those that want one.
+/// Assigns the topics of one kind to lidars or motion sources.
 class Dealer {
  public:
   template <class IsOfKind> Dealer(const Topics& topics, const IsOfKind& is_of_kind) : topics_(topics) {
@@ -35,7 +35,7 @@ class Dealer {
     }
   }
 
-  /// The only one whose name fits, if there is one and no more, to who has none.
+  /// Assigns the only topic whose name fits, if it is unique and `place` has none.
   template <class Fits> void deal(Index& place, const Fits& fits) {
     const auto is_fit = [&](std::size_t i) { return fits(topics_[i].name); };
     const auto found = std::ranges::find_if(left_, is_fit);
@@ -45,7 +45,7 @@ class Dealer {
     left_.erase(found);
   }
 
-  /// The last one to the last who has none.
+  /// Assigns the last remaining topic to the last place without one.
   void finish(const std::vector<Index*>& places) {
     std::vector<Index*> waiting;
     std::ranges::copy_if(places, std::back_inserter(waiting), [](const Index* place) { return !place->has_value(); });
@@ -66,7 +66,7 @@ class Dealer {
   std::vector<std::size_t> left_;
 };
 
-/// With and without the slash in front.
+/// Compares with or without the leading slash.
 bool is_same_topic(std::string_view a, std::string_view b) {
   const auto bare = [](std::string_view name) { return name.substr(name.starts_with('/') ? 1 : 0); };
   return !a.empty() && bare(a) == bare(b);
@@ -78,7 +78,7 @@ bool is_segment(std::string_view name, std::string_view topic) {
 
 bool is_part(std::string_view name, std::string_view topic) { return topic.find(name) != std::string_view::npos; }
 
-/// By the length of their names: a topic of front_left has front in it, too.
+/// Sorts by name length: a topic of front_left contains front, too.
 std::vector<std::size_t> longest_name_first(const std::vector<LidarOptions>& lidars) {
   std::vector<std::size_t> order(lidars.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -93,7 +93,7 @@ std::string all_of(const Topics& topics) {
   return lines.empty() ? "no topics" : fmt::format("{}", fmt::join(lines, ", "));
 }
 
-/// Which topics hold packets of lidars that are not decoded; empty without any.
+/// Lists the topics with packets of unsupported lidars; empty without any.
 std::string not_decoded(const Topics& topics) {
   std::vector<std::string> found;
   for (const BagTopic& topic : topics) {
@@ -104,7 +104,7 @@ std::string not_decoded(const Topics& topics) {
   return fmt::format("{}", fmt::join(found, ", "));
 }
 
-/// The types that are.
+/// Lists the supported types.
 std::string decoded_types() {
   std::vector<std::string_view> names;
   for (const PacketType& type : packet_types()) {
@@ -114,7 +114,7 @@ std::string decoded_types() {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
-/// A topic that is none of the defaults is meant.
+/// Returns whether the topic is not one of the defaults, that is, chosen by the user.
 bool is_named(const std::string& topic) {
   static const Config kDefaults;
   return !topic.empty() && std::ranges::none_of(kDefaults.motion_sources, [&](const MotionSource& source) {
@@ -122,7 +122,7 @@ bool is_named(const std::string& topic) {
   });
 }
 
-/// To the lidars that give clouds.
+/// Assigns cloud topics to the lidars with clouds.
 void deal_clouds(const Bag& bag, const std::string& bag_name, const Config& config, BagTopics& chosen) {
   const Topics& topics = bag.topics();
   for (std::size_t i = 0; i < config.lidars.size(); ++i) {
@@ -140,7 +140,7 @@ void deal_clouds(const Bag& bag, const std::string& bag_name, const Config& conf
   }
 }
 
-/// How to take the clouds in a bag without packets; empty without any.
+/// Describes how to use the clouds in a bag without packets; empty without any.
 std::string clouds_instead(const Topics& topics) {
   const auto cloud = std::ranges::find_if(topics, [](const BagTopic& topic) { return is_cloud_type(topic.type); });
   return cloud == topics.end() ? ""
@@ -166,7 +166,7 @@ Index first_of_packets(const Config& config) {
                                   decoded_types()));
 }
 
-/// To the lidars that send packets, `first` of them the first.
+/// Assigns packet topics to the lidars with packets, `first` of them first.
 void deal_packets(Dealer& dealer, const std::string& bag_name, const Config& config, std::size_t first,
                   BagTopics& chosen) {
   std::vector<Index*> places;

@@ -26,30 +26,30 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr int kPasses = 4;
-constexpr double kMostLate_ms = 250.0; ///< that may be configured
+constexpr double kMostLate_ms = 250.0; ///< accepted by the configuration
 
-/// What a gyro said, and what the estimates say, by which both are compared.
+/// Angular rates of the gyros and of the estimates, for comparison.
 struct Rates {
   struct Gyro {
     Stamp stamp;
     Eigen::Vector3d radps;
   };
-  struct Estimated { ///< the mean during a sweep
+  struct Estimated { ///< mean over a sweep
     Stamp start, end;
     Eigen::Vector3d radps;
   };
-  std::array<std::vector<Gyro>, kMaxSources> gyros; ///< by source, in the order of their stamps
+  std::array<std::vector<Gyro>, kMaxSources> gyros; ///< by source, sorted by stamp
   std::vector<Estimated> estimated;
 };
 
 struct Pass {
-  LearnedSources learned; ///< when each was last heard
+  LearnedSources learned; ///< with the time each was last received
   Rates rates;
 };
 
 using ProgressObserver = std::function<void(double done)>;
 
-/// Plays each source earlier by what is configured, as if its driver stamped and sent samples in time.
+/// Replays with each source advanced by its configured lateness, as if its driver stamped and sent samples in time.
 Pass replay(const Arguments& arguments, Config config, ChosenRecording chosen, const ProgressObserver& show) {
   std::vector<Duration> earlier;
   for (MotionSource& source : config.motion_sources)
@@ -79,8 +79,8 @@ Pass replay(const Arguments& arguments, Config config, ChosenRecording chosen, c
   return pass;
 }
 
-/// How badly the best turn and the best bias make what a gyro says `late` after each sweep of what was estimated:
-/// the share of the variance that is left (Wahba's problem). Nothing where it tells too little.
+/// Returns the share of variance left after the best rotation and bias align the gyro, read `late` after each sweep,
+/// with the estimates (Wahba's problem); nothing if there is too little data.
 std::optional<double> misfit(const std::vector<Rates::Gyro>& gyro, const std::vector<Rates::Estimated>& estimated,
                              Duration late) {
   constexpr std::size_t kFewest = 50;
@@ -110,15 +110,15 @@ std::optional<double> misfit(const std::vector<Rates::Gyro>& gyro, const std::ve
     correlation += (said - mean_gyro) * (seen - mean_estimated).transpose();
     variance += (said - mean_gyro).squaredNorm() + (seen - mean_estimated).squaredNorm();
   }
-  const Eigen::Matrix3d squared = correlation.transpose() * correlation; // its eigenvalues: of the singular values
+  const Eigen::Matrix3d squared = correlation.transpose() * correlation; // eigenvalues: squared singular values
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> singular(squared, Eigen::EigenvaluesOnly);
   return 1.0 - 2.0 * singular.eigenvalues().cwiseMax(0.0).cwiseSqrt().sum() / variance;
 }
 
-/// By how much a gyro is late that is so late that nobody believes it. The filter finds the rest.
+/// Searches for a lateness too large for the filter to accept the gyro. The filter estimates the rest.
 double coarse_lateness_ms(const std::vector<Rates::Gyro>& gyro, const std::vector<Rates::Estimated>& estimated) {
   constexpr Duration kMost = from_seconds(1e-3 * kMostLate_ms), kStep = milliseconds{10};
-  constexpr double kPlainly = 0.5; ///< of the misfit as it is configured
+  constexpr double kPlainly = 0.5; ///< fraction of the misfit as configured
   const std::optional<double> as_configured = misfit(gyro, estimated, {});
   double best = std::numeric_limits<double>::infinity();
   Duration late{};
@@ -130,7 +130,7 @@ double coarse_lateness_ms(const std::vector<Rates::Gyro>& gyro, const std::vecto
   return as_configured && best < kPlainly * *as_configured ? 1e3 * to_seconds(late) : 0.0;
 }
 
-/// What was learned by a configuration, as if by another, in which the source sits otherwise, and stamps otherwise.
+/// Converts calibration learned under one configuration to another with other extrinsics and lateness.
 LearnedSource seen_from(const MotionSource& configured, const MotionSource& used, LearnedSource learned) {
   if (configured.kind == SourceKind::imu) {
     auto turn_rad = learned.states.segment<3>(LearnedSource::kMounting);
@@ -150,7 +150,7 @@ CalibratedDrive calibrate_by_drive(const Arguments& arguments, const ChosenRecor
         replay(arguments, drive.config, chosen, [&](double done) { progress.show((pass + done) / kPasses); });
     for (std::size_t i = 0; i < drive.config.motion_sources.size(); ++i) {
       MotionSource& source = drive.config.motion_sources[i];
-      if (source.calibration == Calibration::off || source.of_lidar) // whose packets are not played earlier
+      if (source.calibration == Calibration::off || source.of_lidar) // its packets cannot be advanced
         continue;
       if (played.learned[i])
         drive.learned[i] = seen_from(chosen.config.motion_sources[i], source, *played.learned[i]);

@@ -11,17 +11,17 @@
 
 namespace locus::tools {
 
-/// What a drive tells of the stamps, mountings and scales of its motion sources.
+/// Estimates from a drive of the lateness, mounting and scale of its motion sources.
 struct CalibratedDrive {
-  Config config;          ///< that of the recording, with what is plainly known better taken in
-  LearnedSources learned; ///< against that of the recording
+  Config config;          ///< of the recording, updated by the significant estimates
+  LearnedSources learned; ///< relative to that of the recording
 };
 
-/// Replays a recording over and over, each time from where the last ended, with samples played as much earlier as they
-/// are late: what is small is linear. Throws Failure.
+/// Replays a recording repeatedly, each time starting from the last result, with samples advanced by their lateness:
+/// the remaining errors are small enough to be linear. Throws Failure.
 CalibratedDrive calibrate_by_drive(const Arguments& arguments, const ChosenRecording& chosen);
 
-/// What is known better than it is configured, as YAML for the configuration; closes the file. Throws Failure.
+/// Writes what was estimated better than configured, as YAML for the configuration; closes the file. Throws Failure.
 void write_calibration(OutputFile& file, const std::vector<MotionSource>& configured, const LearnedSources& learned);
 
 } // namespace locus::tools

@@ -14,7 +14,7 @@ namespace locus::tools {
 
 enum class ExitStatus { done = 0, failed = 1, wrong_usage = 2 };
 
-/// Ends the program. Each line of what() is for the user: what is wrong, where, what to do.
+/// Error that ends the program. Each line of what() is for the user: the mistake, its location, the remedy.
 class Failure : public std::runtime_error {
  public:
   Failure(ExitStatus status, const std::string& what) : std::runtime_error(what), status_(status) {}
@@ -24,7 +24,7 @@ class Failure : public std::runtime_error {
   ExitStatus status_;
 };
 
-/// What was printed is lost on a full disk: that is no success. To be called at the end.
+/// Flushes stdout; throws if output is lost, as on a full disk. Call at the end of the program.
 inline void flush_standard_output() {
   if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
     throw Failure(ExitStatus::failed, "standard output cannot be written (" + std::generic_category().message(errno) +

@@ -22,7 +22,7 @@ bool is_all_in_one(const std::filesystem::path& where) {
   return looks_like_bag(where) || KittiDrive::is(where) || SweepFolder::is(where);
 }
 
-/// What of a folder that is no recording itself, or of its folders, could be replayed.
+/// Lists what could be replayed in a folder that is not a recording itself, or in its subfolders.
 std::vector<std::filesystem::path> recordings_in(const std::filesystem::path& where) {
   constexpr int kDepth = 2;
   std::vector<std::filesystem::path> found;
@@ -49,7 +49,7 @@ std::string names_of_some(const std::vector<std::filesystem::path>& recordings) 
   return recordings.size() > kNamed ? fmt::format("{} and {} more", names, recordings.size() - kNamed) : names;
 }
 
-/// Nothing for what is no recording.
+/// Returns nothing if it is not a recording.
 std::optional<CaptureFolder> files_of(const std::filesystem::path& capture) {
   if (Expected<CaptureFolder, std::string> folder = CaptureFolder::find(capture))
     return *std::move(folder);

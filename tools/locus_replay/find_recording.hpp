@@ -8,18 +8,18 @@
 
 namespace locus::tools {
 
-/// What the user named, or the only recording in a folder that was named.
+/// Recording named by the user, or the only one in the folder named.
 struct FoundRecording {
   std::filesystem::path capture;
-  CaptureFolder files; ///< a bag, a drive of KITTI or a folder of sweeps has its points in one
-  std::string line;    ///< for the user, where it was not named itself; else empty
+  CaptureFolder files; ///< a bag, a drive of KITTI or a folder of sweeps has its points in a single path
+  std::string line;    ///< for the user, if the recording was not named itself; else empty
 };
 
-/// Looks two folders deep into one that is no recording itself: KITTI's have a day, or sequences, above the drives.
-/// Throws Failure where there is none or are several.
+/// Searches a folder that is not a recording itself two levels deep: KITTI has a day, or sequences, above the drives.
+/// Throws Failure if there is no recording or several.
 FoundRecording find_recording(const std::filesystem::path& named);
 
-/// Results in the folder of a recording would be taken for its files by the next run: throws Failure.
+/// Throws Failure for an output folder that is the folder of a recording: the next run would read the results as input.
 void check_output(const std::filesystem::path& folder);
 
 } // namespace locus::tools

@@ -13,11 +13,11 @@
 
 namespace locus::tools {
 
-/// The sweeps of a drive as packets that need no decoding, for one lidar, each received when it was fired. One sweep is
-/// in memory at a time. One owner.
+/// Sweeps of a drive as predecoded packets of one lidar, each received when it was fired. One sweep is in memory at a
+/// time. One owner.
 class KittiPackets : public DatagramSource {
  public:
-  /// The vertical angles of the points are made larger by `raised_deg`.
+  /// Raises the vertical angles of the points by `raised_deg`.
   KittiPackets(std::vector<KittiDrive::Sweep> sweeps, const LidarOptions& lidar, double raised_deg);
 
   const Datagram* next() override;
@@ -36,7 +36,7 @@ class KittiPackets : public DatagramSource {
   KittiSweep sweep_;
   Datagram datagram_;
   std::uint64_t datagrams_ = 0;
-  std::uint64_t damaged_ = 0, unordered_ = 0; ///< sweeps
+  std::uint64_t damaged_ = 0, unordered_ = 0; ///< numbers of sweeps
 };
 
 } // namespace locus::tools

@@ -31,7 +31,7 @@ std::string refusals(const CloudCounters& counters) {
   return fmt::format("{}", fmt::join(reasons, ", "));
 }
 
-/// Of what model the packets say that they are, where it is unknown.
+/// Names the model that the packets report, if it is unknown.
 std::string unknown_model(const LidarInput& lidar) {
   const auto unknown = lidar.unknown_packets();
   return unknown ? fmt::format(" ({})", to_string(*unknown)) : "";
@@ -41,7 +41,7 @@ bool is_configured(const LidarRouter& lidars, std::uint16_t port) {
   return std::ranges::any_of(lidars.lidars(), [&](const LidarInput& lidar) { return lidar.listens_to(port); });
 }
 
-/// The model that the packets of a lidar speak of, where it is another than the configured one.
+/// Returns the model that the packets of a lidar report, if it differs from the configured one.
 std::optional<std::string_view> other_model(const LidarInput& lidar) {
   const std::string_view recognised = lidar.recognised_model();
   const bool is_other = !configured_model(lidar.options()).empty() && !recognised.empty() &&
@@ -49,7 +49,7 @@ std::optional<std::string_view> other_model(const LidarInput& lidar) {
   return is_other ? std::optional{recognised} : std::nullopt;
 }
 
-/// The faults that can keep every packet of a lidar back, as --fail has them.
+/// Lists the faults of --fail that can drop every packet of a lidar.
 std::vector<std::string> losses_of(const LidarInput& lidar, const Recording& recording) {
   std::vector<std::string> losses;
   for (const Fault& fault : recording.faults()) {
@@ -60,7 +60,7 @@ std::vector<std::string> losses_of(const LidarInput& lidar, const Recording& rec
   return losses;
 }
 
-/// Packets went to its port, and none of them came to it: what --fail asked for. Position packets may be another's.
+/// Returns whether --fail dropped all packets to the lidar's port. Position packets may belong to another lidar.
 bool lost_by_request(const LidarInput& lidar, const Recording& recording) {
   const auto listens = [&](const auto& entry) { return lidar.listens_to(entry.first); };
   return lidar.counters().received == lidar.counters().position && !losses_of(lidar, recording).empty() &&
@@ -72,7 +72,7 @@ std::uint64_t of_length(const PortTraffic& traffic, std::size_t bytes) {
   return found == traffic.by_length.end() ? 0 : found->second;
 }
 
-/// The lengths that data packets of the lidars have.
+/// Returns the lengths of the lidars' data packets.
 std::set<std::size_t> data_packet_lengths(const LidarRouter& lidars) {
   std::set<std::size_t> lengths;
   for (const LidarInput& lidar : lidars.lidars())
@@ -83,7 +83,7 @@ std::set<std::size_t> data_packet_lengths(const LidarRouter& lidars) {
   return lengths;
 }
 
-/// Those that could be data packets of a lidar by their length.
+/// Counts datagrams whose length is that of a data packet.
 std::uint64_t data_packet_sized(const PortTraffic& traffic, const std::set<std::size_t>& lengths) {
   std::uint64_t datagrams = 0;
   for (const std::size_t length : lengths)
@@ -91,8 +91,8 @@ std::uint64_t data_packet_sized(const PortTraffic& traffic, const std::set<std::
   return datagrams;
 }
 
-/// Whether datagrams came to an Ouster, and none fitted its metadata. A configured address that they do not come from
-/// is another matter.
+/// Returns whether an Ouster received datagrams, none of which matched its metadata. Datagrams from an address other
+/// than the configured one are a different problem.
 bool fits_no_packet(const LidarInput& lidar) {
   const PacketCounters& counters = lidar.counters();
   return lidar.options().is_ouster() && counters.data == 0 && !rejections(counters).empty() &&
@@ -126,7 +126,7 @@ std::string not_heard(const LidarInput& lidar, const Recording& recording, const
   return line + "; check its port and address, or take it out of the configuration";
 }
 
-/// Whose packets these are, where most that could be a lidar's look like another maker's.
+/// Names the maker if most packets that could be a lidar's look like another maker's.
 std::string other_makers(const std::map<std::uint16_t, PortTraffic>& traffic, const LidarRouter& lidars) {
   const bool has_ouster =
       std::ranges::any_of(lidars.lidars(), [](const auto& one) { return one.options().is_ouster(); });

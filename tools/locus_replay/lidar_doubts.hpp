@@ -10,18 +10,18 @@
 
 namespace locus::tools {
 
-/// Why a recording held no valid data packet: what was seen in its place and what to do, one line for the user.
+/// Returns why a recording held no valid data packet: what it held instead and a remedy, one line for the user.
 std::string why_no_data(const Recording& recording, const LidarRouter& lidars);
 
-/// What about the lidars of a recording that was played is unlikely to be what the user meant, a line each: one that
-/// was not heard though others were, one whose packets are another model's, one that turns more slowly than sweeps end.
+/// Returns suspicious properties of the lidars of a replayed recording, a line each: one without packets though others
+/// have some, one whose packets are another model's, one that rotates more slowly than sweeps end.
 std::vector<std::string> lidar_warnings(const Recording& recording, const LidarRouter& lidars,
                                         const SweepOptions& sweeps);
 
-/// Why no cloud was used though some came; empty where none came, or some were used.
+/// Returns why no cloud was used though some were received; empty if none were received or some were used.
 std::string why_no_clouds(const daemon::Figures& figures);
 
-/// What is wrong with the clouds of each lidar, a line each.
+/// Returns a line about problems with the clouds of each lidar.
 std::vector<std::string> cloud_warnings(const daemon::Figures& figures);
 
 } // namespace locus::tools

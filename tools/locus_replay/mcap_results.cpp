@@ -13,7 +13,7 @@ namespace {
 
 namespace ros = daemon::ros;
 
-constexpr std::size_t kTalliedSweeps = 100; ///< that the distributions in the diagnostics are of
+constexpr std::size_t kTalliedSweeps = 100; ///< window of the distributions in the diagnostics
 
 } // namespace
 

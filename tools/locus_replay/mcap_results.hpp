@@ -16,17 +16,16 @@
 
 namespace locus::tools {
 
-/// What the service would have published of a run, in one MCAP file for Foxglove and rosbag2: odometry, tf and
-/// corrected cloud of each sweep, and diagnostics once a second of the recording. Topics and frames are those of the
-/// configuration. One owner.
+/// Writes the service's output for a run to one MCAP file for Foxglove and rosbag2: odometry, tf and de-skewed cloud of
+/// each sweep, and diagnostics once per second of the recording. Topics and frames are as configured. One owner.
 class McapResults {
  public:
   /// `config` must outlive this. Throws Failure, as does close().
   McapResults(const std::filesystem::path& file, const Config& config);
 
-  /// Right after the sweep was processed.
+  /// Writes a sweep. Call right after it was processed.
   void take(const Sweep& sweep, const Odometry& odometry, const daemon::ProcessedSweep& done);
-  /// Diagnostics, if it is time for them.
+  /// Writes diagnostics, if due.
   void take(const daemon::Ingest& ingest, const daemon::SweepCounters& counters);
   void close() { writer_.close(); }
 
@@ -38,7 +37,7 @@ class McapResults {
   daemon::FrameNames frames_;
   McapWriter writer_;
   std::uint16_t odometry_, tf_, cloud_, diagnostics_;
-  Stamp now_, diagnosed_; ///< end of the latest sweep; that of the latest diagnostics
+  Stamp now_, diagnosed_; ///< end of the latest sweep; time of the latest diagnostics
   daemon::SweepTally tally_;
   daemon::CloudMessage cloud_message_;
   std::vector<daemon::CloudMessage::Point> points_;

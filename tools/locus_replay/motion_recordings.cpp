@@ -14,7 +14,7 @@ namespace locus::tools {
 namespace {
 
 struct MotionFile {
-  std::string name; ///< of the source; of an IMU none
+  std::string name; ///< of the source; empty for an IMU
   SourceKind kind;
   std::vector<std::filesystem::path> files; ///< at least one
   bool named_by_user;
@@ -35,7 +35,7 @@ std::vector<MotionFile> motion_files(const Arguments& arguments, const CaptureFo
   return files;
 }
 
-/// The source that a file speaks for: the first one of kind imu, or the odometry of this name.
+/// Returns the source of a file: the first one of kind imu, or the odometry of this name.
 std::optional<SourceId> source_of(const MotionFile& file, const std::vector<MotionSource>& sources) {
   const auto found = std::ranges::find_if(sources, [&](const MotionSource& source) {
     return source.kind == file.kind && !source.of_lidar && (file.kind == SourceKind::imu || source.name == file.name);

@@ -17,16 +17,16 @@
 
 namespace locus::tools {
 
-/// What one motion source said, in the order of arrival.
+/// Samples of one motion source, in order of arrival.
 struct MotionRecording {
   SourceId source;
   std::filesystem::path file;
   std::variant<MotionSamples<ImuSample>, MotionSamples<OdometrySample>> samples;
 };
 
-/// Reads the motion files that the user named, and those of the folder, for the motion sources of the configuration.
-/// A file of the folder that belongs to no source is left out with a warning, and so is a source without a file, if the
-/// configuration was the user's own. Throws Failure for a file that was named and fits nothing, or cannot be read.
+/// Reads the motion files that the user named, and those of the folder, for the configured motion sources. Skips a file
+/// of the folder without a source with a warning, and so a source without a file, if the configuration is the user's
+/// own. Throws Failure for a named file that fits no source or cannot be read.
 std::vector<MotionRecording> read_motion(const Arguments& arguments, const CaptureFolder& folder, const Config& config,
                                          bool config_is_users_own, std::vector<std::string>& warnings);
 

@@ -8,7 +8,7 @@
 
 namespace locus::tools {
 
-/// Takes numbers from `low` to `high`, both included. CLI11's own ranges let NaN pass.
+/// Accepts numbers from `low` to `high`, inclusive. CLI11's own ranges accept NaN.
 inline CLI::Validator number_between(double low, double high) {
   return {[=](const std::string& text) {
             double number = 0;

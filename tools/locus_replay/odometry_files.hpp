@@ -11,8 +11,8 @@
 
 namespace locus::tools {
 
-/// Writes odometry.tum and odometry.csv, a row each for every estimate. Numbers have as many digits as it takes to give
-/// back the same bits. Throws Failure.
+/// Writes odometry.tum and odometry.csv, a row each for every estimate. Numbers have enough digits to restore the same
+/// bits. Throws Failure.
 class OdometryFiles {
  public:
   OdometryFiles(const std::filesystem::path& folder, const std::vector<MotionSource>& sources);

@@ -14,28 +14,28 @@
 
 namespace locus::tools {
 
-/// What is to be replayed and with which configuration. Nothing is open yet.
+/// Recording and configuration of a replay, before anything is opened.
 struct ChosenRecording {
   CaptureFolder files;
   Config config;
   bool config_is_users_own = false;
-  std::vector<std::string> lines;    ///< what was taken for what, for the user
+  std::vector<std::string> lines;    ///< choices made, for the user
   std::vector<std::string> warnings; ///< a line each
 };
 
-/// Finds the recording that arguments.capture names, which then names what was found, and its configuration. Throws
-/// Failure.
+/// Finds the recording that arguments.capture names, replaces the name by what was found, and finds its configuration.
+/// Throws Failure.
 ChosenRecording choose_recording(Arguments& arguments);
 
-/// A recording that is ready to be played.
+/// Recording that is ready to be played.
 struct OpenRecording {
   LidarRouter lidars;
   std::unique_ptr<Recording> recording;
-  std::vector<StampedPose> truth; ///< that the recording itself holds
+  std::vector<StampedPose> truth; ///< contained in the recording itself
 };
 
-/// Opens it with all motion that belongs to it, and adds to its lines and warnings. `earlier` as PlayOptions has it.
-/// Throws Failure.
+/// Opens the recording with all its motion, and adds to its lines and warnings. `earlier` as in PlayOptions. Throws
+/// Failure.
 OpenRecording open_recording(const Arguments& arguments, ChosenRecording& chosen, std::vector<Duration> earlier = {});
 
 } // namespace locus::tools

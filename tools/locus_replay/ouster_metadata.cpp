@@ -18,17 +18,17 @@ namespace {
 
 using std::filesystem::path;
 
-constexpr int kLookedAt = 2000;         ///< datagrams at the beginning of the capture; three seconds of an Ouster's
-constexpr std::size_t kMostFiles = 100; ///< a folder with more is no one's who looks for metadata
+constexpr int kLookedAt = 2000;         ///< datagrams at the start of the capture; three seconds of an Ouster's
+constexpr std::size_t kMostFiles = 100; ///< a folder with more is not one to search for metadata
 constexpr std::uintmax_t kMostBytes = 1'000'000;
 
-/// A file that may be the metadata of the sensor.
+/// File that may be the metadata of the sensor.
 struct Candidate {
   path file;
-  bool is_named; ///< after the capture
+  bool is_named; ///< named after the capture
   std::optional<ouster::Decoder> decoder{};
-  std::string problem{};               ///< why it is not read
-  std::optional<std::uint16_t> port{}; ///< that packets went to which it is of
+  std::string problem{};               ///< reason not to use it
+  std::optional<std::uint16_t> port{}; ///< destination of packets that match it
 };
 
 std::vector<Candidate> candidates_beside(const path& capture) {
@@ -52,7 +52,7 @@ std::vector<Candidate> candidates_beside(const path& capture) {
   return candidates;
 }
 
-/// Notes which of them packets of the capture are of. Whether any looks like an Ouster's.
+/// Marks the candidates that packets of the capture match. Returns whether any packet looks like an Ouster's.
 bool compare(const path& file, std::vector<Candidate>& candidates) {
   auto capture = Capture::open(file);
   const auto packet = std::make_unique<LidarPacket>();

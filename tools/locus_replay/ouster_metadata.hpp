@@ -9,18 +9,18 @@
 
 namespace locus::tools {
 
-/// What looking for metadata has found.
+/// Result of the search for metadata.
 struct FoundMetadata {
-  std::string taken;                 ///< which file was, for the user; empty for none
+  std::string taken;                 ///< file in use, for the user; empty if none
   std::vector<std::string> warnings; ///< a line each
 };
 
-/// Looks beside a pcap capture for the metadata of the Ouster that it is of, and makes the first lidar that one: a file
-/// named after the capture (drive.json or drive_0.json for drive.pcap), else the only .json file of which the capture
-/// holds packets. To be called for a configuration that nobody has written; one that names an Ouster is left alone.
+/// Searches next to a pcap capture for the metadata of its Ouster, and configures the first lidar accordingly: a file
+/// named after the capture (drive.json or drive_0.json for drive.pcap), else the only .json file that matches packets
+/// of the capture. For default configurations; does nothing if the configuration names an Ouster.
 FoundMetadata find_metadata(const CaptureFolder& folder, Config& config);
 
-/// Has the Ousters of a recording that locusd made read the metadata that was recorded with it.
+/// Makes the Ousters of a recording by locusd use the metadata recorded with it.
 void use_recorded_metadata(const CaptureFolder& folder, Config& config);
 
 } // namespace locus::tools

@@ -16,8 +16,7 @@
 
 namespace locus::tools {
 
-/// A folder for output, and those above it; whether or not it is there already. `option`: that it was named with.
-/// Throws Failure.
+/// Creates an output folder and its parents, if missing. `option`: the one that named it. Throws Failure.
 inline void make_folder(const std::filesystem::path& folder, std::string_view option = "-o") {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
@@ -26,7 +25,7 @@ inline void make_folder(const std::filesystem::path& folder, std::string_view op
                                                   folder.string(), error.message(), option));
 }
 
-/// A file that was written in full when close() returns. Throws Failure.
+/// Output file, complete when close() returns. Throws Failure.
 class OutputFile {
  public:
   explicit OutputFile(const std::filesystem::path& path) : path_(path), stream_(path, std::ios::binary) { check(); }
@@ -34,12 +33,12 @@ class OutputFile {
   template <class... Values> void print(fmt::format_string<Values...> format, Values&&... values) {
     fmt::print(stream_, format, std::forward<Values>(values)...);
   }
-  /// Throws where an earlier write failed already.
+  /// Throws if an earlier write failed.
   void write(std::span<const std::byte> bytes) {
     stream_.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
     check();
   }
-  /// What is written next replaces what was written first.
+  /// Returns to the start, to overwrite it.
   void rewind() { stream_.seekp(0); }
   void close() {
     stream_.close();

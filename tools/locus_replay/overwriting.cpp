@@ -21,7 +21,7 @@ namespace {
 
 using std::filesystem::path;
 
-/// That a file put into would be a part of the recording.
+/// Lists the folders in which a new file would become part of the recording.
 std::vector<path> folders_of(const path& capture, const CaptureFolder& folder) {
   std::error_code ignored;
   if (!std::filesystem::is_directory(capture, ignored))
@@ -61,7 +61,7 @@ std::vector<path> inputs_of(const Arguments& arguments, const CaptureFolder& fol
   return inputs;
 }
 
-/// Whether they are one file, or will be.
+/// Returns whether both paths are, or will be, one file.
 bool are_one(const path& a, const path& b) {
   std::error_code ignored;
   const auto whole = [&](const path& file) {
@@ -70,7 +70,7 @@ bool are_one(const path& a, const path& b) {
   return std::filesystem::equivalent(a, b, ignored) || (!a.empty() && !b.empty() && whole(a) == whole(b));
 }
 
-/// Throws where the new file or folder would be taken for a part of the recording.
+/// Throws if the new file or folder would become part of the recording.
 void check_is_apart(const std::string& option, const std::string& kind, const path& output, const Arguments& arguments,
                     const CaptureFolder& folder) {
   std::error_code ignored;
@@ -111,7 +111,7 @@ void check_file(const std::string& option, const path& file, const Arguments& ar
 void check_nothing_is_written_over(const Arguments& arguments, const CaptureFolder& folder, const Config& config) {
   struct Output {
     path file;
-    std::string choice; ///< what the user chooses it by
+    std::string choice; ///< command line option
   };
   std::vector<Output> outputs;
   for (const auto& [file, option] : {std::pair{arguments.mcap, "--mcap"}, {arguments.calibrate, "--calibrate"}})

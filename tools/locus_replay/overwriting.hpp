@@ -7,8 +7,8 @@
 
 namespace locus::tools {
 
-/// Throws Failure where the run would write over what it reads, write two results into one file, or leave one where the
-/// next run takes it for a part of the recording. Writes nothing itself.
+/// Throws Failure if the run would overwrite its input, write two results to one file, or leave one where the next run
+/// would read it as part of the recording. Writes nothing itself.
 void check_nothing_is_written_over(const Arguments& arguments, const CaptureFolder& folder, const Config& config);
 
 } // namespace locus::tools

@@ -9,7 +9,7 @@
 
 namespace locus::tools {
 
-/// What the rotation came from and what the translation, once if it is the same: "wio", "imu+wio", "identity".
+/// Names the sources of rotation and translation, once if they are the same: "wio", "imu+wio", "identity".
 inline std::string name_of(const PriorSource& prior, std::span<const std::string> source_names) {
   const auto name = [&](std::optional<SourceId> source) -> std::string {
     if (source)

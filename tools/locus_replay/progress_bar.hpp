@@ -5,8 +5,8 @@
 
 namespace locus::tools {
 
-/// A line on the terminal that shows how far a long task has come; nothing where stderr is no terminal, and nothing in
-/// the first second, by which most are done. One owner.
+/// Progress line of a long task on the terminal; silent if stderr is not a terminal, and during the first second,
+/// within which most tasks finish. One owner.
 class ProgressBar {
  public:
   explicit ProgressBar(bool wanted);
@@ -14,7 +14,7 @@ class ProgressBar {
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
-  /// `done`: 0..1. May be called as often as one likes.
+  /// Shows the share `done`, 0..1. May be called at any rate.
   void show(double done);
   void wipe();
 

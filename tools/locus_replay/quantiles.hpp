@@ -9,12 +9,12 @@
 
 namespace locus::tools {
 
-/// Quantiles of a set of values by the nearest rank: each is one of the values. Zeros where there are none.
+/// Quantiles of a set of values by the nearest-rank method: each is one of the values. Zeros for an empty set.
 class Quantiles {
  public:
   explicit Quantiles(std::vector<double> values) : sorted_(std::move(values)) { std::ranges::sort(sorted_); }
 
-  /// The smallest value that is no less than `share`, 0..1, of all.
+  /// Returns the smallest value that is no less than `share`, 0..1, of all.
   [[nodiscard]] double at(double share) const {
     if (sorted_.empty())
       return 0.0;
@@ -22,7 +22,7 @@ class Quantiles {
     return sorted_[static_cast<std::size_t>(std::max(1.0, rank)) - 1];
   }
 
-  /// Of an even number the mean of the two in the middle.
+  /// Returns the median; for an even number the mean of the two in the middle.
   [[nodiscard]] double median() const {
     if (sorted_.empty())
       return 0.0;

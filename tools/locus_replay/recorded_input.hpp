@@ -14,25 +14,25 @@
 
 namespace locus::tools {
 
-/// What is to be played, whatever the format that it was recorded in.
+/// Input to play, whatever its recorded format.
 struct RecordedInput {
   std::unique_ptr<DatagramSource> lidars;
   std::vector<MotionRecording> motion;
-  std::string taken;              ///< what was taken for what, in one line for the user; empty where it is plain
-  std::vector<StampedPose> truth; ///< of a drive or a folder of sweeps: true poses of the base
+  std::string taken;              ///< choices made, in one line for the user; empty if there were none
+  std::vector<StampedPose> truth; ///< true poses of the base, for a drive or a folder of sweeps
 };
 
-/// Opens folder.lidar, a capture, a bag, a drive of KITTI or a folder of sweeps, and all motion that belongs to it.
-/// Files that the user named take the place of a bag's topics. `config_is_users_own`: then a motion source without
-/// samples is worth a warning. Throws Failure.
+/// Opens folder.lidar, a capture, a bag, a drive of KITTI or a folder of sweeps, and all its motion. Files named by the
+/// user replace the topics of a bag. `config_is_users_own`: warns about a motion source without samples. Throws
+/// Failure.
 RecordedInput open_input(const Arguments& arguments, const CaptureFolder& folder, const Config& config,
                          bool config_is_users_own, std::vector<std::string>& warnings);
 
-/// Whether it is a folder of sweeps, and nothing that goes before one.
+/// Returns whether it is a folder of sweeps, and not of a kind with precedence.
 bool gives_sweeps(const std::filesystem::path& capture);
 
-/// By how much the vertical angles of a drive of KITTI are made larger, kKittiVerticalAngle_deg or, as the user may
-/// wish, nothing; no value for what is no such drive.
+/// Returns by how much to raise the vertical angles of a drive of KITTI: kKittiVerticalAngle_deg, or zero at the user's
+/// request; no value for another kind of recording.
 std::optional<double> raised_by_deg(const Arguments& arguments);
 
 } // namespace locus::tools

@@ -16,7 +16,7 @@ namespace locus::tools {
 
 namespace {
 
-/// Motion is played from so long before the first datagram on, so that sources are live when it comes.
+/// Lead of the motion played before the first datagram, so that sources are live when it arrives.
 constexpr Duration kMotionAhead = std::chrono::seconds{1};
 
 template <class Sample>
@@ -77,7 +77,7 @@ Recording::Recording(std::unique_ptr<DatagramSource> source, std::vector<MotionR
   }
 }
 
-/// No sample comes before it is measured, as far as one clock tells both.
+/// Keeps a sample from arriving before it is measured, if one clock determines both stamps.
 Stamp Recording::MotionCursor::arrival() const {
   return std::visit(
       [&](const auto& samples) {
@@ -124,7 +124,7 @@ Input Recording::next(Duration) {
   return input;
 }
 
-/// The next datagram of the part that is played, or nullptr for ever.
+/// Returns the next datagram of the part played, or nullptr from its end on.
 const Datagram* Recording::read() {
   while (!capture_is_over_) {
     const Datagram* datagram = head_ != nullptr ? std::exchange(head_, nullptr) : source_->next();

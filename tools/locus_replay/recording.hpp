@@ -21,59 +21,58 @@
 
 namespace locus::tools {
 
-/// Which part of a recording is played, and what is made to go wrong in it.
+/// Part of a recording to play, and the faults to inject.
 struct PlayOptions {
   Duration start{};                 ///< after the first datagram of the capture
   std::optional<Duration> duration; ///< nothing: to the last datagram
-  std::vector<Fault> faults;        ///< fault_problem() finds nothing
+  std::vector<Fault> faults;        ///< fault_problem() returns nothing for them
   std::uint64_t seed = 1;           ///< of the faults
-  std::vector<Duration> earlier{};  ///< for how long before its time each motion source is played; none: as it came
+  std::vector<Duration> earlier{};  ///< by how much each motion source is advanced; none: as recorded
 };
 
 /// Throws Failure for a fault that none of the sensors can have.
 void check_faults(const std::vector<Fault>& faults, const Config& config);
 
-/// The datagrams that went to one UDP port.
+/// Datagrams to one UDP port.
 struct PortTraffic {
   std::uint64_t datagrams = 0;
-  std::map<std::size_t, std::uint64_t> by_length;           ///< of them, by their bytes
-  std::array<std::uint64_t, kOtherMakers> of_other_maker{}; ///< by what they look like
-  std::string_view hesai;                                   ///< of the latest one of Hesai among these: its model
+  std::map<std::size_t, std::uint64_t> by_length;           ///< number of datagrams, by size in bytes
+  std::array<std::uint64_t, kOtherMakers> of_other_maker{}; ///< number of datagrams, by apparent maker
+  std::string_view hesai;                                   ///< model of the latest Hesai datagram among these
   std::size_t bytes = 0;                                    ///< of the latest
   std::uint32_t source_ip = 0;                              ///< of the latest
 };
 
-/// A recording as it once came in: datagrams and motion samples in the order of their arrival, faults injected.
+/// Recording in its original timing: datagrams and motion samples in order of arrival, with faults injected.
 ///
-/// The capture is streamed, and so are motion samples that no fault befalls. Motion is played from one second ahead of
-/// the first datagram, so that the sources are known by then, and to the last one. A datagram that a fault swallows
-/// leaves Silence behind. One owner.
+/// Streams the capture, and motion samples without faults. Motion is played from one second before the first datagram,
+/// so that the sources are known by then, up to the last one. A datagram dropped by a fault yields Silence. One owner.
 class Recording : public daemon::InputSource {
  public:
-  /// `lidars`: to tell by port and address whose datagram a fault strikes.
+  /// Opens the recording. `lidars`: identify the lidar of a datagram by port and address.
   Recording(std::unique_ptr<DatagramSource> source, std::vector<MotionRecording> motion, const Config& config,
             LidarRouter lidars, const PlayOptions& options);
 
   daemon::Input next(Duration timeout) override;
 
-  /// Share of the recording that is over, 0..1. Any thread.
+  /// Returns the share of the recording that is over, 0..1. Any thread.
   [[nodiscard]] double progress() const { return progress_.load(std::memory_order_relaxed); }
 
   [[nodiscard]] const DatagramSource& source() const { return *source_; }
   [[nodiscard]] const std::vector<Fault>& faults() const { return injected_; }
-  /// When its first datagram came: what --start and the seconds of faults count from.
+  /// Returns the arrival of the first datagram: the origin of --start and of the seconds of faults.
   [[nodiscard]] Stamp capture_start() const { return capture_start_; }
-  /// From the first to the last datagram played.
+  /// Returns the time from the first to the last datagram played.
   [[nodiscard]] Duration duration() const { return last_ - first_; }
   [[nodiscard]] const std::map<std::uint16_t, PortTraffic>& traffic() const { return traffic_; }
-  /// That more datagrams than not are older than the one before them in the file, with what helps; nothing where they
-  /// are in order, but for some that were overtaken on their way.
+  /// Returns an error, with a remedy, if most datagrams are older than the preceding one in the file; nothing if they
+  /// are in order except for some reordering by the network.
   [[nodiscard]] std::optional<std::string> runs_backwards() const;
-  /// What is wrong with the capture and with the motion played along with it, a line for the user each.
+  /// Returns problems of the capture and its motion, a line for the user each.
   [[nodiscard]] std::vector<std::string> warnings() const;
 
  private:
-  struct Pending { ///< the next input that is no motion sample
+  struct Pending { ///< next input other than a motion sample
     daemon::Input input;
     Stamp arrival;
   };
@@ -83,10 +82,10 @@ class Recording : public daemon::InputSource {
   };
   struct MotionCursor {
     MotionRecording recording;
-    bool has_faults; ///< injected
+    bool has_faults; ///< injected by this
     Duration earlier{};
 
-    [[nodiscard]] Stamp arrival() const; ///< of the next sample; Stamp::max() after the last
+    [[nodiscard]] Stamp arrival() const; ///< arrival of the next sample; Stamp::max() after the last
     [[nodiscard]] std::optional<TimeSpan> arrivals() const;
     daemon::Input take();
   };
@@ -98,19 +97,19 @@ class Recording : public daemon::InputSource {
 
   std::unique_ptr<DatagramSource> source_;
   std::vector<MotionCursor> motion_;
-  LidarRouter lidars_; ///< never receives anything
+  LidarRouter lidars_; ///< for look-ups only
   std::optional<Duration> play_for_;
-  const Datagram* head_; ///< read ahead to learn when the capture begins
+  const Datagram* head_; ///< read ahead, to find the start of the capture
   Stamp capture_start_;
-  Stamp begin_, end_; ///< of the part that is played
+  Stamp begin_, end_; ///< of the part played
   bool capture_is_over_ = false;
   std::vector<Fault> injected_;
   std::optional<DatagramFaults> faults_;
-  std::deque<OwnedDatagram> faulty_; ///< came out of the faults, not given out yet
+  std::deque<OwnedDatagram> faulty_; ///< emitted by the faults, not returned yet
   OwnedDatagram given_out_;
   std::optional<Pending> pending_;
 
-  std::uint64_t read_ = 0, backwards_ = 0; ///< datagrams of the file, and those older than the one before
+  std::uint64_t read_ = 0, backwards_ = 0; ///< datagrams of the file, and those older than the preceding one
   Stamp latest_read_;
   bool started_ = false;
   Stamp first_, last_;

@@ -36,18 +36,18 @@ Isa isa_or_fail(const std::string& name) {
   return *isa;
 }
 
-/// By the metadata of its lidars, and the instructions that the user asks for.
+/// Completes the configuration by the metadata of its lidars and the requested instruction set.
 Config completed(Config config) {
   config = config_or_fail(with_lidar_metadata(std::move(config)));
-  if (const char* const isa = std::getenv("LOCUS_ISA")) // NOLINT(concurrency-mt-unsafe): nobody sets it
+  if (const char* const isa = std::getenv("LOCUS_ISA")) // NOLINT(concurrency-mt-unsafe): never set here
     config.use(isa_or_fail(isa));
   return config;
 }
 
 constexpr double kFastestCar_mps = 60.0;
 
-/// Without a configuration the files of a folder tell which sources there were, those of a walking robot first, and
-/// whether it was a car. `lines` for the user are about a bag that has clouds alone.
+/// Derives the configuration from the files of a folder that has none: which sources there are, those of a walking
+/// robot first, and whether it was a car. `lines` for the user are about a bag with clouds only.
 Config configuration_of(const CaptureFolder& folder, const std::filesystem::path& capture,
                         std::vector<std::string>& lines) {
   Config config;
@@ -63,7 +63,7 @@ Config configuration_of(const CaptureFolder& folder, const std::filesystem::path
   return config;
 }
 
-/// The first lidar takes the sweeps of a folder, whatever is configured of its packets.
+/// Makes the first lidar read the sweeps of a folder, whatever its packet settings.
 void take_sweeps(const std::filesystem::path& capture, Config& config) {
   LidarOptions& lidar = config.lidars.front();
   if (!lidar.gives_clouds()) {

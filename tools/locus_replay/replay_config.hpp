@@ -12,12 +12,12 @@
 
 namespace locus::tools {
 
-/// The configuration of a file, or the defaults where there is none, changed by assignments as --set has them, and
-/// completed by the metadata of its lidars and LOCUS_ISA. Throws Failure.
+/// Reads the configuration file, or the defaults without one, applies assignments in the form of --set, and completes
+/// it by the metadata of its lidars and LOCUS_ISA. Throws Failure.
 Config read_configuration(const std::filesystem::path& file, const std::vector<std::string>& overrides);
 
-/// The configuration for a recording, `file` empty where neither the user nor its folder has one: then its files tell
-/// what they can. What was taken for what is said in `lines` for the user. Throws Failure.
+/// Returns the configuration for a recording; `file` is empty if neither the user nor its folder has one: then it is
+/// derived from the recording's files. Reports choices in `lines` for the user. Throws Failure.
 Config configuration_for(const FoundRecording& found, const std::filesystem::path& file, const Arguments& arguments,
                          std::vector<std::string>& lines, FoundMetadata& metadata);
 

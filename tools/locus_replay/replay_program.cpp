@@ -30,7 +30,7 @@ namespace {
 
 using daemon::MachineTime;
 
-/// What the user asks for beside the results.
+/// Optional results requested by the user.
 struct MoreResults {
   std::optional<McapResults> mcap;
   std::optional<SweepFiles> sweeps;
@@ -55,7 +55,7 @@ struct MoreResults {
   }
 };
 
-/// As fast as the machine can; the same bits on every run.
+/// Replays as fast as possible, with bit-identical results on every run.
 void replay(const Config& config, LidarRouter lidars, Recording& recording, Results& results, MoreResults more,
             const SweepStage& stage, const EstimateObserver& observer) {
   std::optional<daemon::InlinePipeline> pipeline;
@@ -78,7 +78,7 @@ void replay(const Config& config, LidarRouter lidars, Recording& recording, Resu
   results.finish(pipeline->ingest(), pipeline->processor(), pipeline->counters());
 }
 
-/// At the pace of the recording or a multiple of it, through the threads of the daemon.
+/// Replays at the pace of the recording or a multiple of it, through the threads of the daemon.
 void replay_live(const Config& config, LidarRouter lidars, Recording& recording, double speed, Results& results) {
   constexpr Duration kPatience = std::chrono::milliseconds{100};
   daemon::PacedInput paced(recording, speed);
@@ -97,7 +97,7 @@ void replay_live(const Config& config, LidarRouter lidars, Recording& recording,
   results.finish(pipeline.ingest(), pipeline.processor(), pipeline.counters());
 }
 
-/// A bag may be a folder of more files than a program may open unless it asks.
+/// Raises the limit on open files: a bag may be a folder of more files than the default.
 void allow_many_files() {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0)
@@ -113,7 +113,7 @@ void run(Arguments arguments, const SweepStage& stage, const EstimateObserver& o
   const Config& config = chosen.config;
   check_nothing_is_written_over(arguments, chosen.files, config);
   if (!arguments.calibrate.empty()) {
-    OutputFile file(arguments.calibrate); // before the minutes that it takes
+    OutputFile file(arguments.calibrate); // opened before the minutes of computing
     CalibratedDrive drive = calibrate_by_drive(arguments, chosen);
     write_calibration(file, config.motion_sources, drive.learned);
     chosen.config = std::move(drive.config);

@@ -8,14 +8,14 @@
 
 namespace locus::tools {
 
-/// What an experiment does to a sweep between its cut and the odometry, which the service does not.
+/// Hook of an experiment that modifies a sweep between its cut and the odometry; not part of the service.
 using SweepStage = std::function<void(Sweep&)>;
 
-/// What is shown each estimate as it is, sweep by sweep: the files round it and leave the twist out.
+/// Hook that receives each unrounded estimate with its twist, unlike the files.
 using EstimateObserver = std::function<void(const OdometryEstimate&)>;
 
-/// The program locus-replay, from its arguments to its exit status. A stage and an observer have no place in
-/// --realtime, which runs what the service runs.
+/// Runs locus-replay, from its arguments to its exit status. Stage and observer are not available in --realtime, which
+/// runs the service's code.
 int replay_program(int argc, char** argv, const SweepStage& stage = {}, const EstimateObserver& observer = {});
 
 } // namespace locus::tools

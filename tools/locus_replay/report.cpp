@@ -13,8 +13,8 @@
 #include "locus_replay/report_series.hpp"
 #include "pages/data_page.hpp"
 
-// Laid into the program by locus_page() in CMake.
-extern "C" const char locus_report_page_begin[]; // NOLINT(modernize-avoid-c-arrays): its length is the linker's affair
+// Embedded into the program by locus_page() in CMake.
+extern "C" const char locus_report_page_begin[]; // NOLINT(modernize-avoid-c-arrays): set by the linker
 extern "C" const char locus_report_page_end[];   // NOLINT(modernize-avoid-c-arrays)
 
 namespace locus::tools {
@@ -22,7 +22,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// Seconds since the start of the capture, as --start and --fail have them.
+/// Converts to seconds since the start of the capture, as in --start and --fail.
 class TimeAxis {
  public:
   explicit TimeAxis(const Report& report) : zero_(report.capture_start) {}
@@ -67,7 +67,7 @@ ordered_json estimated_path(const Report& report, const TimeAxis& time) {
   return path(std::move(points));
 }
 
-/// As far as the run goes, laid upon the estimate as the comparison lays it.
+/// Returns the true path during the run, aligned with the estimate as in the comparison.
 ordered_json true_path(const Report& report, const TimeAxis& time) {
   const Pose T_odom_truth = report.accuracy->T_truth_odom.inverse();
   std::vector<PathPoint> points;
@@ -98,7 +98,7 @@ ordered_json health_bands(const Report& report, const TimeAxis& time) {
   return bands;
 }
 
-/// The worse a state, the smaller, as bands have it.
+/// Maps states to the order of bands: the worse, the smaller.
 ordered_json state_band(const Report& report, const TimeAxis& time) {
   return sweep_band(report, time, "state", [](const SweepRecord& sweep) {
     switch (sweep.state) {
@@ -127,7 +127,7 @@ ordered_json box_of(const std::string& name, std::span<const double> errors_m) {
           {"mean", statistics_of(errors_m).mean}};
 }
 
-/// Of the whole run, and of each fifth of it to show whether the error grows.
+/// Returns the errors of the whole run, and of each fifth of it to show whether they grow.
 ordered_json error_boxes(const TrajectoryAccuracy& accuracy) {
   constexpr std::size_t kParts = 5;
   const std::span<const double> errors_m{accuracy.position_error_m};
@@ -140,7 +140,7 @@ ordered_json error_boxes(const TrajectoryAccuracy& accuracy) {
   return boxes;
 }
 
-/// CPU time of each stage, by the names that the summary has for them.
+/// Returns the CPU time of each stage, by its name in the summary.
 ordered_json stage_quantiles(const Report& report) {
   ordered_json stages;
   for (std::size_t stage = 0; const auto& [name, mean_ms] : report.summary.at("stage_ms").items()) {
@@ -158,7 +158,7 @@ ordered_json stage_quantiles(const Report& report) {
   return stages;
 }
 
-/// From where the first lidar saw the map, at most a few hundred places.
+/// Returns the positions of the first lidar during mapping, at most a few hundred.
 std::vector<Eigen::Vector3f> viewpoints(const Report& report) {
   constexpr std::size_t kViewpoints = 200;
   const Eigen::Vector3d lidar_base_m = report.config.lidars.front().T_base_lidar.translation;

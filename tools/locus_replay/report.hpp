@@ -15,20 +15,20 @@
 
 namespace locus::tools {
 
-/// What report.html is made of. What of it is empty is left out of the page.
+/// Contents of report.html. Empty parts are left out of the page.
 struct Report {
   const nlohmann::ordered_json& summary; ///< as in summary.json
   const Config& config;
-  Stamp capture_start; ///< which times are told from
+  Stamp capture_start; ///< origin of the displayed times
   double path_m;       ///< length of the path
   std::span<const SweepRecord> sweeps;
   std::span<const SurfacePoint> map;                 ///< odom frame; see visible_surfaces()
   std::span<const StampedPose> truth;                ///< in its own frame
-  const std::optional<TrajectoryAccuracy>& accuracy; ///< against that truth
+  const std::optional<TrajectoryAccuracy>& accuracy; ///< relative to that truth
 };
 
-/// Writes the run as one page that needs no network and no other file: figures, map and counters, with the libraries
-/// that draw them. An hour's run takes a few megabytes. Throws Failure.
+/// Writes the run as one self-contained page that needs no network: figures, map and counters, with the libraries that
+/// draw them. An hour's run takes a few megabytes. Throws Failure.
 void write_report(const std::filesystem::path& path, const Report& report);
 
 } // namespace locus::tools

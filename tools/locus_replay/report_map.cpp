@@ -45,7 +45,7 @@ Eigen::Vector3f turned_to_viewer(const SurfacePoint& surface, std::span<const Ei
   return (nearest - surface.position_m).dot(surface.normal) < 0.0F ? -surface.normal : surface.normal;
 }
 
-/// The unit sphere folded onto a square: the octahedron's lower half goes into the corners.
+/// Maps a unit normal to the octahedral square: the lower half of the octahedron is folded into the corners.
 Eigen::Vector2f octahedral(const Eigen::Vector3f& normal) {
   const float reach = normal.lpNorm<1>();
   if (!(reach > 0.0F))
@@ -72,7 +72,7 @@ void append_int8(std::vector<std::uint8_t>& bytes, float value) {
   bytes.push_back(static_cast<std::uint8_t>(static_cast<std::int8_t>(std::lround(127.0F * value))));
 }
 
-/// The plane of the coarse map that the point lies on.
+/// Returns the plane of the coarse map that contains the point.
 const Surface* coarse_plane_under(const Eigen::Vector3d& point_m, const SurfaceGrid& coarse) {
   constexpr double kOnPlane_m = 0.1;
   const VoxelIndex index = coarse.index_of(point_m);

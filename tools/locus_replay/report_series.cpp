@@ -11,15 +11,15 @@ using nlohmann::ordered_json;
 
 constexpr double kTimeResolution_s = 1e-3;
 constexpr double kPathResolution_m = 1e-3;
-constexpr double kStepsAcross = 2000; ///< of the smooth path, through its extent
+constexpr double kStepsAcross = 2000; ///< resolution of the path relative to its extent
 
-/// The nearest multiple of 1 / steps, which has as few digits as can be: a product with 1e-3 would have seventeen.
+/// Rounds to a multiple of 1 / steps, which prints with the fewest digits: a product with 1e-3 would have seventeen.
 double rounded(double value, double resolution) {
   const double steps = std::round(1.0 / resolution);
   return std::round(value * steps) / steps;
 }
 
-/// Calls `take` with each of at most `count` stretches of equal length.
+/// Calls `take` with each of at most `count` chunks of equal length.
 template <class T, class Take> void for_each_stretch(std::span<const T> samples, std::size_t count, const Take& take) {
   const std::size_t length = std::max<std::size_t>(1, (samples.size() + count - 1) / count);
   for (std::size_t begin = 0; begin < samples.size(); begin += length)

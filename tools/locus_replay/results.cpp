@@ -21,8 +21,8 @@
 namespace locus::tools {
 namespace {
 
-/// So that nothing of an earlier run is taken for the result of this one, however it ends. A link is the user's, who
-/// wants it to lead somewhere.
+/// Removes old results, so that none is mistaken for the result of this run, however it ends. Keeps links, which the
+/// user made deliberately.
 void remove_results(const std::filesystem::path& folder, bool summary_too) {
   std::error_code ignored;
   for (const char* const name : kResultFiles) {

@@ -20,23 +20,23 @@
 
 namespace locus::tools {
 
-/// What a run leaves in the output folder.
+/// Files of a run in the output folder.
 inline constexpr std::array<const char*, 5> kResultFiles{"summary.json", "odometry.tum", "odometry.csv", "map.pcd",
                                                          "report.html"};
 
-/// All that comes out of a run: the files in the output folder and the figures on the terminal. One owner.
+/// Output of a run: the files in the output folder and the figures on the terminal. One owner.
 class Results {
  public:
-  /// Makes the folder, and takes the results of an earlier run out of it. The arguments must outlive this. Throws
-  /// Failure, as do the others.
+  /// Creates the folder, and removes the results of an earlier run. The arguments must outlive this. Throws Failure, as
+  /// do the other methods.
   Results(const Arguments& arguments, const Config& config, const Recording& recording, Truth truth,
           const daemon::MachineTime& begin);
 
   void take(const daemon::ProcessedSweep& sweep);
   void take(const HealthEvent& event) { health_events_.push_back(event); }
 
-  /// After the last sweep. Warns of what in the input is unlikely to be what the user meant. Fails for a recording
-  /// without a valid data packet: summary.json, whose counters tell why, is all that it then leaves.
+  /// Writes the results after the last sweep. Warns of suspicious input. Fails for a recording without a valid data
+  /// packet: then only summary.json is written, whose counters show the reason.
   void finish(const daemon::Ingest& ingest, const daemon::SweepProcessor& processor,
               const daemon::SweepCounters& sweeps);
 

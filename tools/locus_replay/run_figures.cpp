@@ -14,16 +14,16 @@ using nlohmann::ordered_json;
 
 using daemon::rounded;
 
-/// Who is right when a source and lidar contradict each other is not known.
+/// Describes a contradiction neutrally: whether the source or lidar is right is unknown.
 std::string_view reason_of(const HealthEvent& event) {
   if (event.reason == HealthReason::disagreement)
     return "disagrees with lidar";
   return event.verdict.starts_with("and lidar disagree") ? "disagrees with lidar on turns" : to_string(event.reason);
 }
 
-/// When a source was lost and why, and when it came back.
+/// Describes when and why a source was lost, and when it recovered.
 std::string readable_health(const FinishedRun& run, SourceId source) {
-  constexpr std::size_t kTold = 4; ///< a source that flaps is not worth a page
+  constexpr std::size_t kTold = 4; ///< changes shown; a flapping source would fill a page
   std::string text;
   std::size_t told = 0;
   for (const HealthEvent& event : run.health_events) {

@@ -16,27 +16,27 @@
 
 namespace locus::tools {
 
-/// How far a run is from the truth, as far as that was given.
+/// Accuracy of a run relative to the truth, as far as given.
 struct Accuracy {
   std::optional<TrajectoryAccuracy> trajectory;
-  std::optional<Consistency> consistency; ///< of the covariances with that
+  std::optional<Consistency> consistency; ///< of the covariances with the truth
   std::optional<MapAccuracy> map;
-  std::vector<std::string> problems; ///< why one that was given could not be compared with, each a line for the user
-  std::vector<std::string> warnings; ///< likewise: what makes the comparison worthless
+  std::vector<std::string> problems; ///< why a given truth could not be used, each a line for the user
+  std::vector<std::string> warnings; ///< why the comparison is meaningless, likewise
 };
 
-/// All that a finished run is described by.
+/// Data that describe a finished run.
 struct FinishedRun {
-  const daemon::Figures& figures;             ///< the time spent is without what it took to compare with the truth
-  std::span<const HealthEvent> health_events; ///< in the order in which they happened
-  Stamp capture_start;                        ///< which times are told from, as --fail has them
+  const daemon::Figures& figures;             ///< time spent excludes the comparison with the truth
+  std::span<const HealthEvent> health_events; ///< in chronological order
+  Stamp capture_start;                        ///< origin of times, as for --fail
   const Accuracy& accuracy;
 };
 
-/// The contents of summary.json.
+/// Returns the contents of summary.json.
 nlohmann::ordered_json summary(const FinishedRun& run);
 
-/// The same for human eyes, in a few lines.
+/// Formats the summary for a terminal, in a few lines.
 std::string readable(const FinishedRun& run);
 
 } // namespace locus::tools

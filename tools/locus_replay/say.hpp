@@ -9,7 +9,7 @@
 
 namespace locus::tools {
 
-/// Errors and warnings on stderr, each line on its own, for people and for logs.
+/// Prints errors and warnings to stderr, each line with the program's name, for people and for logs.
 inline void say(std::string_view program, std::string_view lines) {
   for (std::size_t begin = 0; begin < lines.size();) {
     const std::size_t end = std::min(lines.find('\n', begin), lines.size());

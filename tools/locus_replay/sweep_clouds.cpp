@@ -18,7 +18,7 @@ const Datagram* SweepClouds::next() {
         first_problem_ = fmt::format("{}: {}", sweep.file.string(), *problem);
       continue;
     }
-    const Stamp stamp = std::max(sweep.stamp, Stamp{Duration{1}}); // 0, where KITTI begins, would be none
+    const Stamp stamp = std::max(sweep.stamp, Stamp{Duration{1}}); // KITTI starts at 0, which would mean no stamp
     cloud_ = points_.view(stamp);
     datagram_ = {};
     datagram_.receive_stamp = stamp + folder_.step;

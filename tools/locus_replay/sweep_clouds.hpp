@@ -12,11 +12,11 @@
 
 namespace locus::tools {
 
-/// The sweeps of a folder as clouds of the first lidar, each received when the next one begins. One sweep is in memory
-/// at a time. One owner.
+/// Sweeps of a folder as clouds of the first lidar, each received when the next one begins. One sweep is in memory at a
+/// time. One owner.
 class SweepClouds : public DatagramSource {
  public:
-  /// The vertical angles of the points of KITTI's lidar are made larger by `raised_deg`.
+  /// Raises the vertical angles of the points of KITTI's lidar by `raised_deg`.
   SweepClouds(SweepFolder folder, double raised_deg);
 
   const Datagram* next() override;
@@ -33,7 +33,7 @@ class SweepClouds : public DatagramSource {
   CloudView cloud_;
   Datagram datagram_;
   std::uint64_t datagrams_ = 0, damaged_ = 0;
-  std::string first_problem_; ///< of a damaged sweep, with its name
+  std::string first_problem_; ///< first problem with a sweep, with its name
 };
 
 } // namespace locus::tools

@@ -14,18 +14,18 @@
 
 namespace locus::tools {
 
-/// All returns of each sweep where they lay at its end, base frame, a file each: 000000.pcd and so on, fields as those
-/// of daemon::CloudMessage; .bin is KITTI's, x y z and the intensity from 0 to 1 as float32. Line N, counted from 0, of
-/// times.txt is the stamp of sweep N in seconds, that of poses.txt T_odom_base, the upper three rows of its matrix as
-/// KITTI writes them.
+/// Writes all returns of each sweep, de-skewed to its end, base frame, a file each: 000000.pcd and so on, with the
+/// fields of daemon::CloudMessage; .bin is KITTI's, x y z and the intensity from 0 to 1 as float32. Line N, counted
+/// from 0, of times.txt is the stamp of sweep N in seconds, that of poses.txt T_odom_base, the upper three rows of its
+/// matrix as in KITTI.
 ///
 /// One sweep is in memory at a time. One owner.
 class SweepFiles {
  public:
-  /// Makes the folder, in which there is nothing. Throws Failure, as do the others.
+  /// Creates the folder. Precondition: it is missing or empty. Throws Failure, as do the other methods.
   SweepFiles(const std::filesystem::path& folder, CloudFormat format);
 
-  /// Right after the sweep was processed, with its returns (SweepOptions::keeps_returns).
+  /// Writes a sweep with its returns (SweepOptions::keeps_returns). Call right after it was processed.
   void take(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate);
   void close();
 
@@ -37,7 +37,7 @@ class SweepFiles {
   CloudFormat format_;
   OutputFile times_, poses_;
   std::size_t sweeps_ = 0;
-  std::vector<SurfacePoint> placed_; ///< of the sweep at hand
+  std::vector<SurfacePoint> placed_; ///< of the current sweep
   std::vector<daemon::CloudMessage::Point> points_;
 };
 

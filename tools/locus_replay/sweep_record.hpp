@@ -10,23 +10,23 @@
 
 namespace locus::tools {
 
-/// What a lidar or a motion source was to a sweep.
+/// Contribution of a lidar or a motion source to a sweep.
 enum class SourceHealth : std::uint8_t {
-  lost,    ///< nothing, or nothing to be trusted, came from it
-  healthy, ///< could have been used
+  lost,    ///< no data, or none to be trusted
+  healthy, ///< usable, but not used
   used
 };
 
-/// What the report draws of one sweep: a couple of hundred bytes.
+/// Data of one sweep for the report: a couple of hundred bytes.
 struct SweepRecord {
   Stamp stamp;
   Pose T_odom_base;
-  double std_m = 0; ///< of the position, as the estimate itself states it
+  double std_m = 0; ///< of the position, as estimated
   double speed_mps = 0;
   double wall_ms = 0;
   daemon::StageTimes stages_took{};
   TrackingState state = TrackingState::tracking;
-  SourceHealth lidars = SourceHealth::used; ///< healthy: the registration was refused
+  SourceHealth lidars = SourceHealth::used; ///< healthy: the registration was rejected
   std::array<SourceHealth, kMaxSources> sources{};
 };
 

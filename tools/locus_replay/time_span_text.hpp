@@ -10,7 +10,7 @@
 
 namespace locus::tools {
 
-/// For an error or a warning, in seconds as a TUM file has them.
+/// Formats a span for an error or a warning, in seconds as in a TUM file.
 inline std::string text_of(const std::optional<TimeSpan>& span) {
   if (!span)
     return "none";

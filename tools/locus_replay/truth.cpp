@@ -17,7 +17,7 @@ Truth::Truth(const Arguments& arguments, const CaptureFolder& folder, std::vecto
   if (!trajectory_file_.empty())
     trajectory_ = value_or_fail(read_trajectory(trajectory_file_), ExitStatus::failed);
   else
-    trajectory_file_ = arguments.capture; // for what is to be said of the recorded ones
+    trajectory_file_ = arguments.capture; // named in messages about the recorded poses
   if (!map_file_.empty())
     map_ = value_or_fail(PointCloudFile::open(map_file_), ExitStatus::failed);
 }

@@ -17,19 +17,19 @@
 
 namespace locus::tools {
 
-/// The truth that the user or the folder gave, and what of a run is compared with it. One owner.
+/// Truth from the user or the folder, and the run's data to compare with it. One owner.
 class Truth {
  public:
-  /// Reads the poses and looks at the map, so that what is wrong with them is known before the run. `recorded`: the
-  /// poses where there is no file. Throws Failure.
+  /// Reads the poses and checks the map, so that mistakes are reported before the run. `recorded`: the poses if there
+  /// is no file. Throws Failure.
   Truth(const Arguments& arguments, const CaptureFolder& folder, std::vector<StampedPose> recorded);
 
   void take(const OdometryEstimate& estimate);
 
-  /// Empty if there is none.
+  /// Returns the true poses; empty if there are none.
   [[nodiscard]] std::span<const StampedPose> trajectory() const { return trajectory_; }
 
-  /// Takes its time if there is a map. Once: the covariances are given up first, 10 MB of an hour's drive.
+  /// Compares; slow with a map. May be called once: it first frees the covariances, 10 MB per hour of driving.
   [[nodiscard]] Accuracy compare(std::span<const SurfacePoint> map, bool show_progress);
 
  private:
@@ -38,8 +38,8 @@ class Truth {
   std::filesystem::path trajectory_file_, map_file_; ///< empty: none
   std::vector<StampedPose> trajectory_;
   std::optional<PointCloudFile> map_;
-  std::vector<StampedPose> estimates_; ///< with a true trajectory alone
-  std::vector<Matrix6> covariances_;   ///< of these
+  std::vector<StampedPose> estimates_; ///< only with a true trajectory
+  std::vector<Matrix6> covariances_;   ///< of the estimates
 };
 
 } // namespace locus::tools

@@ -14,7 +14,7 @@
 namespace locus::tools {
 namespace {
 
-/// What is wrong with motion sources altogether, a line each.
+/// Lists problems with the motion sources as a whole, a line each.
 std::vector<std::string> source_verdicts(const Config& config, const MotionSources& sources) {
   std::vector<std::string> lines;
   for (std::size_t i = 0; i < sources.size(); ++i) {

@@ -13,7 +13,7 @@
 
 namespace locus::tools {
 
-/// A recording that was played to its end.
+/// Recording that was played to its end.
 struct PlayedRecording {
   const std::filesystem::path& capture;
   const Config& config;
@@ -22,11 +22,11 @@ struct PlayedRecording {
   const daemon::Figures& figures; ///< of the same ingest
 };
 
-/// Why no result can be made of it, one line for the user: it runs backwards, or has no valid data packet and no cloud
-/// that can be used. Nothing where all is well.
+/// Returns why there is no result, one line for the user: the recording runs backwards, or has no valid data packet and
+/// no usable cloud. Nothing if there is one.
 std::optional<std::string> why_no_result(const PlayedRecording& played);
 
-/// What in it is unlikely to be what the user meant, a line each.
+/// Returns suspicious properties of the recording, a line each.
 std::vector<std::string> warnings_about(const PlayedRecording& played);
 
 } // namespace locus::tools

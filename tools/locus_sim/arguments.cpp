@@ -30,7 +30,7 @@ template <class Named> auto by_name(const Named& all, const std::string& name) {
   return *std::find_if(all.begin(), all.end(), [&](const auto& each) { return each.name == name; });
 }
 
-/// FROM-TO in seconds.
+/// Parses FROM-TO in seconds.
 sim::Slip parse_slip(const std::string& text, double duration_s) {
   const std::size_t dash = text.find('-');
   double from_s = 0, to_s = 0;
@@ -61,7 +61,7 @@ sim::Realism realism_from(const std::string& name) {
   return static_cast<sim::Realism>(std::ranges::find(sim::kRealismNames, name) - sim::kRealismNames.begin());
 }
 
-/// What --realism says of each holds where it is not named.
+/// Adds an imperfection's option; without it, the size of --realism applies.
 void add_imperfection(CLI::App& app, const sim::NamedImperfection& one, std::optional<double>& size) {
   const std::string text = fmt::format("{}; real {:g}, harsh {:g}", one.what, one.real, one.harsh);
   auto* option = app.add_option(fmt::format("--{}", one.name), size, text)

@@ -12,7 +12,7 @@
 
 namespace locus::tools {
 
-/// What the user asked for.
+/// Command line arguments.
 struct SimArguments {
   sim::NamedWorld world;
   sim::NamedRobot robot;
@@ -20,12 +20,12 @@ struct SimArguments {
   std::uint64_t seed = 1;
   sim::SensorChoice sensors;
   std::vector<sim::Slip> slips;
-  bool names_vehicle = false;    ///< it is not only part of a realism
-  std::optional<double> halts_s; ///< the longest, at every other corner; nothing: the robot's own
+  bool names_vehicle = false;    ///< --vehicle was given, rather than implied by --realism
+  std::optional<double> halts_s; ///< longest halt, at every other corner; nothing: the robot's default
   std::filesystem::path output;
 };
 
-/// Nothing where help or version were asked for and have been printed. Throws Failure.
+/// Returns nothing if help or version were requested and have been printed. Throws Failure.
 std::optional<SimArguments> parse_sim_arguments(int argc, char** argv);
 
 } // namespace locus::tools

@@ -9,7 +9,7 @@
 
 namespace locus::sim {
 
-/// Where a capture goes: to a folder, or down a pipe. Throws when it cannot be written. One owner.
+/// Destination of a capture: a folder or a pipe. Throws if it cannot be written. One owner.
 class CaptureSink {
  public:
   CaptureSink() = default;
@@ -19,10 +19,10 @@ class CaptureSink {
 
   virtual void datagram(const Datagram& datagram) = 0;
 
-  /// Text for one of the capture's files, by its name in a capture folder: whole lines.
+  /// Appends whole lines to one of the capture's files, by its name in a capture folder.
   virtual void text(std::string_view file, Stamp arrival, const std::string& lines) = 0;
 
-  /// Returns when all has been written.
+  /// Returns when everything has been written.
   virtual void close() = 0;
 };
 

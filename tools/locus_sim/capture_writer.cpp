@@ -25,7 +25,7 @@ struct Line {
   std::string text;
 };
 
-/// A file that grows line by line, one line ahead of what has been written.
+/// Generates a file line by line, one line ahead of the writing.
 class LineSource {
  public:
   LineSource(std::string file, std::function<Line()> make)
@@ -65,7 +65,7 @@ std::vector<LineSource> line_sources(const Trajectory& trajectory, const RobotOp
   return sources;
 }
 
-/// All lidars, and what they bring along, as one stream of datagrams, in the order in which they arrive. One owner.
+/// Merges the datagrams of all lidars and their inertial units, in order of arrival. One owner.
 class Lidars {
  public:
   Lidars(const Scene& scene, const Trajectory& trajectory, const std::vector<NamedLidar>& lidars, SeenSpace* seen) {
@@ -78,7 +78,7 @@ class Lidars {
       waiting_.push_back(next_of(sender));
   }
 
-  /// Of the next to come; there is always one.
+  /// Returns the next datagram; there is always one.
   [[nodiscard]] const Datagram& front() const { return waiting_[earliest()]; }
   void pop() {
     const std::size_t index = earliest();
@@ -111,7 +111,7 @@ std::string yaml(const Pose& pose) {
   return fmt::format("{{xyz_m: {}, rpy_deg: {}}}", yaml(pose.translation), yaml(rpy_deg));
 }
 
-/// And of an Ouster where its metadata lies.
+/// Returns the model, with the path of the metadata for an Ouster.
 std::string model_of(const NamedLidar& lidar) {
   if (is_ouster(lidar.options.model))
     return "Ouster, metadata: " + metadata_file(lidar.name);

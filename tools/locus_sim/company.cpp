@@ -12,12 +12,12 @@ namespace locus::sim {
 namespace {
 
 constexpr double kStep_s = 0.1;
-constexpr double kWalking_mps = 1.6, kFastest_mps = 1.75; // the latter to get out of the way
+constexpr double kWalking_mps = 1.6, kFastest_mps = 1.75; // the latter to make way
 constexpr double kStarting_mps2 = 3;
 constexpr double kFarthest_m = 2.5;                 // from the robot's side
-constexpr double kAbout_radps = 0.35;               // about the robot, at most
-constexpr double kOffWalls_m = 0.3, kApart_m = 0.6; // that people keep from walls, and from each other
-constexpr double kLost_m = 7;                       // who is farther away is left behind
+constexpr double kAbout_radps = 0.35;               // around the robot, at most
+constexpr double kOffWalls_m = 0.3, kApart_m = 0.6; // kept from walls, and from each other
+constexpr double kLost_m = 7;                       // farther away, a person is left behind
 constexpr double kStride_m = 1.4, kSwing_rad = 0.45;
 
 Eigen::Vector2d towards(double bearing_rad) { return {std::cos(bearing_rad), std::sin(bearing_rad)}; }
@@ -26,17 +26,17 @@ Eigen::Vector2d at_most(const Eigen::Vector2d& v, double norm) {
   return v.norm() > norm ? Eigen::Vector2d(norm / v.norm() * v) : v;
 }
 
-/// One of those about the robot, step by step.
+/// Simulates one person near the robot, step by step.
 class Person {
  public:
   Person(const Scene& scene, const Way& way, Dice& dice)
       : scene_(scene), way_(way), dice_(dice),
-        clear_m_(way.reach_m + kPersonalSpace_m + 0.03), // between two steps they come a little nearer
+        clear_m_(way.reach_m + kPersonalSpace_m + 0.03), // between two steps the distance may shrink a little
         strolls_(dice.chance(0.5)) {
     choose_bearing(0);
     bearing_rad_ = goal_rad_;
     at_m_ = wanted_place(0);
-    yaw_rad_ = // NOLINT(cppcoreguidelines-prefer-member-initializer): the bearing has thrown the dice before
+    yaw_rad_ = // NOLINT(cppcoreguidelines-prefer-member-initializer): random draw after choose_bearing()
         dice.between(-std::numbers::pi, std::numbers::pi);
     places_.reserve(way.steps());
     note(0);
@@ -62,7 +62,7 @@ class Person {
   std::vector<Place> places() && { return std::move(places_); }
 
  private:
-  /// From the robot to what stands in the way, at the height of knees or of the chest.
+  /// Returns the free distance from the robot in a direction, at knee and at chest height.
   [[nodiscard]] double free_m(std::size_t step, const Eigen::Vector2d& direction, double at_most_m) const {
     double free_m = at_most_m;
     for (const double height_m : {0.4, 1.1}) {
@@ -73,7 +73,7 @@ class Person {
     return free_m;
   }
 
-  /// Another side of the robot, where there is room.
+  /// Chooses another side of the robot, one with room.
   void choose_bearing(std::size_t step) {
     constexpr int kTries = 6;
     double best_m = -1;
@@ -85,7 +85,7 @@ class Person {
         goal_rad_ = bearing;
       }
     }
-    distance_m_ = clear_m_ + std::pow(dice_.between(0, 1), 2) * kFarthest_m; // near, most of them
+    distance_m_ = clear_m_ + std::pow(dice_.between(0, 1), 2) * kFarthest_m; // mostly near
     chosen_until_s_ = kStep_s * static_cast<double>(step) + (strolls_ ? dice_.between(3, 8) : dice_.between(8, 20));
   }
 
@@ -112,7 +112,7 @@ class Person {
       if (const double gap_m = away.norm(); gap_m > 1e-6 && gap_m < kApart_m)
         wanted += (kApart_m - gap_m) / gap_m * 3 * away;
     }
-    for (const std::size_t ahead : {5U, 10U}) { // steps: out of the robot's way before it comes
+    for (const std::size_t ahead : {5U, 10U}) { // steps: makes way before the robot comes
       const Eigen::Vector2d away = at_m_ - way_.at(step + ahead);
       if (const double gap_m = away.norm(); gap_m > 1e-6 && gap_m < clear_m_ + 0.1)
         wanted += (clear_m_ + 0.1 - gap_m) / gap_m * 3 * away;
@@ -141,7 +141,7 @@ class Person {
     return from_robot.norm() > kLost_m && !(waits_ && from_robot.dot(way_.velocity_mps(step)) > 0);
   }
 
-  /// Someone else, who stands beside the way where the robot comes later. False: there is no such place yet.
+  /// Places another person beside the path ahead of the robot. Returns false if there is no such place yet.
   bool wait_farther_on(std::size_t step) {
     constexpr double kAhead_m = 12, kAhead_s = 4;
     const double ahead_m = std::max(kAhead_m, kAhead_s * way_.velocity_mps(step).norm());
@@ -169,7 +169,7 @@ class Person {
     return true;
   }
 
-  /// Faces where he walks; who stands shifts his weight.
+  /// Records the pose: facing the walking direction; a standing person shifts their weight.
   void note(std::size_t step) {
     const double speed_mps = velocity_mps_.norm();
     constexpr double kWalks_mps = 0.25, kTurning_radps = 2.5;
@@ -191,10 +191,10 @@ class Person {
   const Scene& scene_;
   const Way& way_;
   Dice& dice_;
-  double clear_m_;         ///< from the robot's middle
-  bool strolls_;           ///< about the robot; others stay on their side of it
-  bool waits_ = false;     ///< for the robot to come
-  double bearing_rad_ = 0; ///< from the robot, of where he wants to be, as the next three
+  double clear_m_;         ///< from the robot's centre
+  bool strolls_;           ///< around the robot; others stay on their side of it
+  bool waits_ = false;     ///< until the robot comes
+  double bearing_rad_ = 0; ///< desired position relative to the robot, like the next three
   double goal_rad_ = 0;
   double distance_m_ = 1;
   double chosen_until_s_ = 0;

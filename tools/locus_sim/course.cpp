@@ -13,7 +13,7 @@
 namespace locus::sim {
 namespace {
 
-constexpr double kTurnRamp_s = 0.25; // from straight to the full rate of a turn
+constexpr double kTurnRamp_s = 0.25; // from straight to the full turn rate
 
 Course turning(double speed_mps, double angle_rad, double rate_radps) {
   return Course{}.change_speed(speed_mps, Duration::zero()).turn(angle_rad, rate_radps);
@@ -53,7 +53,7 @@ Course& Course::straight(double distance_m) {
 }
 
 Course& Course::turn(double angle_rad, double peak_rate_radps) {
-  const double largest_rate = std::abs(angle_rad) / kTurnRamp_s; // a small turn is over before the peak is reached
+  const double largest_rate = std::abs(angle_rad) / kTurnRamp_s; // a small turn ends before the peak rate
   const double rate = std::copysign(std::min(peak_rate_radps, largest_rate), angle_rad);
   const double v = speed_mps_;
   stretches_.push_back({kTurnRamp_s, v, v, 0, rate});

@@ -8,7 +8,7 @@
 
 namespace locus::sim {
 
-/// A seed of its own for each purpose, so that what is asked for beside it does not change what the dice show (FNV-1a).
+/// Derives a seed for each purpose, so that purposes do not affect each other's numbers (FNV-1a).
 inline std::uint64_t seed_for(std::uint64_t seed, std::string_view purpose) {
   std::uint64_t hash = 0xCBF2'9CE4'8422'2325U ^ (seed * 0x9E37'79B9'7F4A'7C15U);
   for (const char c : purpose)
@@ -16,7 +16,7 @@ inline std::uint64_t seed_for(std::uint64_t seed, std::string_view purpose) {
   return hash;
 }
 
-/// Uniform numbers that are the same with every standard library. One owner.
+/// Uniform random numbers, identical with every standard library. One owner.
 class Dice {
  public:
   explicit Dice(std::uint64_t seed) : engine_(seed) {}

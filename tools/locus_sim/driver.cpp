@@ -9,19 +9,19 @@
 namespace locus::sim {
 namespace {
 
-constexpr double kStanding_s = 2;             // before the start and after the end, where there is time for it
+constexpr double kStanding_s = 2;             // before the start and after the end, if time allows
 constexpr double kOnSpot_rad = 1.8;           // sharper corners are turned on the spot
-constexpr double kAside_m = 0.25;             // off the middle of a lane, at most
-constexpr double kWeave_m = 12, kWeave_s = 8; // lanes longer than both are not driven straight
+constexpr double kAside_m = 0.25;             // from the middle of a lane, at most
+constexpr double kWeave_m = 12, kWeave_s = 8; // longer lanes are not driven straight
 
-/// Walks from place to place; where there is a choice, by the lane that was used least.
+/// Walks from place to place, along the least used lane.
 class Walk {
  public:
   Walk(const Roads& roads, double cruise_mps, Dice& dice)
       : roads_(roads), straight_m_(std::max(kWeave_m, kWeave_s * cruise_mps)), dice_(dice), uses_(roads.lanes().size()),
         here_(dice.below(roads.places_m().size())), position_m_(roads.places_m()[here_]) {}
 
-  /// The next point to drive to: a place, or a point on the way there.
+  /// Returns the next point to drive to: a place, or an intermediate point.
   Eigen::Vector2d next() {
     if (on_the_way_.empty())
       choose();
@@ -65,16 +65,16 @@ class Walk {
 
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
   const Roads& roads_;
-  double straight_m_; ///< at a stretch, at most
+  double straight_m_; ///< longest straight section
   Dice& dice_;
-  std::vector<int> uses_; ///< of each lane
+  std::vector<int> uses_; ///< per lane
   std::size_t here_;
   std::size_t last_lane_ = kNone;
   Eigen::Vector2d position_m_;
-  std::vector<Eigen::Vector2d> on_the_way_; ///< the next one last
+  std::vector<Eigen::Vector2d> on_the_way_; ///< in reverse order
 };
 
-/// What is left of a leg between the turns at its ends, driven: up to cruising speed, on, down again.
+/// Drives a leg between the turns at its ends: accelerates, cruises, decelerates.
 class Leg {
  public:
   Leg(double length_m, double from_mps, double to_mps, const Agility& agility, Dice& dice) : to_mps_(to_mps) {
@@ -108,23 +108,23 @@ double duration_s(const Course& course) {
   return sum_s;
 }
 
-/// A corner, how fast it is driven and how fast it is turned in.
+/// Corner with its speed and turn rate.
 struct Corner {
   double angle_rad;
   double speed_mps, rate_radps;
 
-  /// From the turn to the corner itself.
+  /// Returns the distance from the start of the turn to the corner.
   [[nodiscard]] double kept_m() const { return speed_mps > 0 ? tangent_m(speed_mps, angle_rad, rate_radps) : 0; }
 };
 
-/// Gentle ones at speed, sharp ones slowly, the sharpest on the spot.
+/// Returns a corner for slow driving: gentle ones at speed, sharp ones slowly, the sharpest on the spot.
 Corner slow_corner(double angle_rad, const Agility& agility) {
   const double sharpness = std::abs(angle_rad);
   const double share = sharpness > kOnSpot_rad ? 0 : sharpness < 0.3 ? 0.65 : 0.4;
   return {angle_rad, share * agility.cruise_mps, agility.turn_rate_radps};
 }
 
-/// As fast as the legs before and behind it allow, of which a turn takes a part at either end.
+/// Returns a corner as fast as the legs before and behind it allow, less the parts that the turns need.
 Corner fast_corner(double angle_rad, double before_m, double behind_m, double from_mps, const Agility& agility) {
   constexpr double kSharp_rad = 1.0, kSlower = 0.9;
   Corner corner{angle_rad, std::abs(angle_rad) > kSharp_rad ? 0 : agility.cruise_mps, agility.turn_rate_radps};
@@ -139,7 +139,7 @@ Corner fast_corner(double angle_rad, double before_m, double behind_m, double fr
   return {angle_rad, 0, agility.turn_rate_radps};
 }
 
-/// The longest leg that ends at rest in time, if any is worth it.
+/// Drives the longest leg that ends at rest in time, if one is worthwhile.
 void drive_last_leg(Course& course, double longest_m, double from_mps, const Agility& agility, double left_s,
                     Dice& dice) {
   constexpr double kWorthIt_m = 0.5;

@@ -11,23 +11,23 @@ namespace locus::sim {
 namespace {
 
 constexpr double kTenth_s = 0.1;
-constexpr double kFast_mps = 3;      // a robot that a van drives beside
-constexpr double kSample_m = 0.5;    // of the way
-constexpr double kAlongside_m = 1.5; // ahead of the robot's middle, or behind it
-constexpr double kUnseen_m = 25;     // nobody sees what comes or goes as far off as this
+constexpr double kFast_mps = 3;      // robot speed above which a van accompanies it
+constexpr double kSample_m = 0.5;    // of the path
+constexpr double kAlongside_m = 1.5; // from the robot's centre, ahead or behind
+constexpr double kUnseen_m = 25;     // distance at which appearing or disappearing goes unnoticed
 
 struct Manner {
   Passer::Kind kind;
   double half_width_m, half_length_m;
-  double nearest_m, farthest_m; ///< aside
-  double behind_m;              ///< where it starts
+  double nearest_m, farthest_m; ///< lateral distance
+  double behind_m;              ///< at its start
   double catch_up_mps, acceleration_mps2;
-  double leave_mps; ///< faster than the robot; 0: it stops
+  double leave_mps; ///< relative to the robot; 0: stops instead
 };
 constexpr Manner kForklift{Passer::Kind::forklift, 0.55, 1.6, 2, 4, 6, 1, 1.2, 0};
 constexpr Manner kVan{Passer::Kind::van, 0.95, 2.5, 3, 4, 60, 5, 2.5, 5};
 
-/// The way of the robot by its length, however long it stood.
+/// Path of the robot parameterised by length, without its halts.
 class Lane {
  public:
   explicit Lane(const Way& way) : way_(way) {
@@ -48,7 +48,7 @@ class Lane {
   [[nodiscard]] double length_m() const { return kSample_m * static_cast<double>(points_m_.size() - 1); }
   [[nodiscard]] std::size_t samples() const { return points_m_.size(); }
 
-  /// Beside a sample; `aside_m` to the left.
+  /// Returns the point beside a sample; `aside_m` to the left.
   [[nodiscard]] Eigen::Vector2d beside(std::size_t i, double aside_m) const {
     const Eigen::Vector2d along = direction(i);
     return points_m_[i] + aside_m * Eigen::Vector2d{-along.y(), along.x()};
@@ -59,14 +59,14 @@ class Lane {
     const Eigen::Vector2d from = beside(i, aside_m), to = beside(std::min(i + 1, points_m_.size() - 1), aside_m);
     return from + (place - static_cast<double>(i)) * (to - from);
   }
-  /// How far the direction changes over three metres.
+  /// Returns the change of direction over three metres.
   [[nodiscard]] double bend_rad(std::size_t i) const {
     const std::size_t from = i < 3 ? 0 : i - 3, to = std::min(i + 3, points_m_.size() - 1);
     return std::abs(angle_between(direction(from), direction(to)));
   }
 
  private:
-  /// Without the swinging of a gait.
+  /// Smooths out the oscillation of a gait.
   [[nodiscard]] Eigen::Vector2d smooth(std::size_t step) const {
     constexpr std::size_t kHalf = 5;
     Eigen::Vector2d sum = Eigen::Vector2d::Zero();
@@ -81,11 +81,11 @@ class Lane {
   }
 
   const Way& way_;
-  std::vector<double> along_m_;           ///< at each step
+  std::vector<double> along_m_;           ///< for each step
   std::vector<Eigen::Vector2d> points_m_; ///< kSample_m apart
 };
 
-/// One drive alongside: where the vehicle is from the step at which it comes into being to that at which it is gone.
+/// One drive alongside: poses of the vehicle from the step at which it appears to that at which it disappears.
 struct Job {
   std::size_t from, to;
   std::vector<Place> places;
@@ -96,7 +96,7 @@ class Driver {
   Driver(const Scene& scene, const Way& way, const Manner& manner)
       : scene_(scene), way_(way), lane_(way), as_(manner) {}
 
-  /// Beside the robot from about `start` on for so many steps; nothing where that cannot be.
+  /// Plans a drive beside the robot from about `start` for `steps`; nothing if that is impossible.
   [[nodiscard]] std::optional<Job> job(std::size_t start, std::size_t steps, double aside_m,
                                        std::size_t free_from) const {
     const auto drive = along_m(start, steps);
@@ -116,7 +116,7 @@ class Driver {
   }
 
  private:
-  /// Along the lane, step by step from the start on: catches up, keeps beside the robot, and leaves. Empty: it cannot.
+  /// Returns positions along the lane per step: approaches, stays beside the robot, and leaves. Empty if impossible.
   [[nodiscard]] std::vector<double> along_m(std::size_t start, std::size_t steps) const {
     constexpr std::size_t kPatience = 300;
     const bool stops = as_.leave_mps == 0;
@@ -152,7 +152,7 @@ class Driver {
     return {way_.on_ground(here).cast<float>(), static_cast<float>(std::atan2(ahead.y(), ahead.x())), 0};
   }
 
-  /// Nothing stands between the robot's way and the far side of the vehicle's, nor on it; and both are level across.
+  /// Returns whether the area from the robot's path to the far side of the vehicle's is free and level across.
   [[nodiscard]] bool has_room(double from_m, double to_m, double aside_m) const {
     constexpr double kRoom_m = 0.3, kLevel_m = 0.25, kBend = 0.5;
     if (from_m < 0 || to_m > lane_.length_m())
@@ -181,7 +181,7 @@ class Driver {
     });
   }
 
-  /// It comes to where it waits, and goes from where it stops, when the robot cannot see it: until then it stands.
+  /// Extends the job so that the vehicle appears and disappears, at rest, out of the robot's sight.
   [[nodiscard]] bool waits_unseen(Job& job, const std::vector<double>& drive, double aside_m,
                                   std::size_t free_from) const {
     const auto waits_m = lane_.at(drive.front(), aside_m), stops_m = lane_.at(drive.back(), aside_m);
@@ -189,7 +189,7 @@ class Driver {
       --job.from;
     while (job.to < way_.steps() && !is_unseen(job.to, stops_m))
       ++job.to;
-    return job.from > free_from || free_from == 0; // when the drive begins it may be there
+    return job.from > free_from || free_from == 0; // may be there when the drive begins
   }
 
   [[nodiscard]] bool is_unseen(std::size_t step, const Eigen::Vector2d& place) const {
@@ -197,7 +197,7 @@ class Driver {
     return (robot - place).norm() > kUnseen_m || !is_open(robot, place);
   }
 
-  /// Of the robot, all the time, and of others.
+  /// Returns whether the vehicle keeps clear of the robot and of others throughout.
   [[nodiscard]] bool is_clear(const Job& job) const {
     constexpr double kGap_m = 0.3;
     for (std::size_t i = 0; i < job.places.size(); ++i) {
@@ -227,7 +227,7 @@ class Driver {
   const Manner& as_;
 };
 
-/// In this minute, at a moment and on a side that suit, for as long as asked or, where no moment suits that, for less.
+/// Finds a job in this minute, at a suitable time and side, shorter than requested if necessary.
 std::optional<Job> job_in_minute(const Driver& driver, const Manner& as, std::size_t minute, double seconds,
                                  std::size_t free_from, Dice& dice) {
   constexpr std::size_t kPerMinute = 600;

@@ -7,10 +7,11 @@
 
 namespace locus::sim {
 
-/// A vehicle that drives alongside a robot for so many seconds of each minute, 2 to 4 m to one side, at its speed: a
-/// forklift beside a slow robot, which stands beside the way until the robot is past and is left standing behind it; a
-/// van beside a fast one, which comes up from far behind and goes far ahead. Only where the way is fairly straight and
-/// has room beside it, so in narrow places for less time than asked, or never. Nothing: nowhere on this way.
+/// Simulates a vehicle that drives alongside a robot for `seconds_per_min`, 2 to 4 m to one side, at its speed: a
+/// forklift for a slow robot, which waits beside the path until the robot has passed and stops behind it; a van for a
+/// fast one, which approaches from far behind and leaves far ahead. Needs a fairly straight path with room beside it,
+/// so that in narrow places it drives for less time than requested, or never. Returns nothing if there is no room
+/// anywhere.
 std::optional<Passer> escort(const Scene& scene, const Way& way, double seconds_per_min, Dice& dice);
 
 } // namespace locus::sim

@@ -11,7 +11,7 @@ namespace locus::sim {
 namespace {
 
 constexpr double kHalfSite_m = 120;
-constexpr double kFree_m = 2; // from the middle of a track to a trunk
+constexpr double kFree_m = 2; // between the middle of a track and a trunk
 
 Roads roads() {
   Roads roads;
@@ -41,7 +41,7 @@ Jet ground_m(const Jet& x, const Jet& y) {
 
 Eigen::Vector3d on_ground(double x, double y) { return {x, y, ground_m(x, y).value}; }
 
-/// Triangles of turf; the tracks are no smoother.
+/// Builds the turf from triangles; the tracks are as rough.
 void meadow(SceneBuilder& build) {
   constexpr double kCell_m = 0.8;
   const Noise turf(1);
@@ -58,7 +58,7 @@ void meadow(SceneBuilder& build) {
   }
 }
 
-/// A trunk, a few boughs and tufts of leaves around them.
+/// Builds a trunk, a few boughs and tufts of leaves around them.
 void tree(SceneBuilder& build, Dice& dice, const Eigen::Vector3d& foot) {
   const double height = dice.between(4, 11), radius = 0.02 * height + dice.between(0, 0.1);
   build.pipe(foot, foot + Eigen::Vector3d{dice.between(-0.3, 0.3), dice.between(-0.3, 0.3), 0.8 * height}, radius, 35);

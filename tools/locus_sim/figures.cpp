@@ -6,7 +6,7 @@
 namespace locus::sim {
 namespace {
 
-/// Two limbs that hang from joints on both sides and swing against each other.
+/// Pair of limbs that hang from joints on both sides and swing in opposite phase.
 struct Limbs {
   Surface left, right;
 };
@@ -16,7 +16,7 @@ Limbs limbs(double aside_m, double up_m, double radius_m, double length_m, doubl
           {Cylinder{{0, -aside_m, up_m}, radius_m, length_m, {-s, 0, -c}}, bright}};
 }
 
-/// By the middle of its floor and its size.
+/// Returns a box, given by the centre of its floor and its size.
 Surface box(const Eigen::Vector3d& floor_m, const Eigen::Vector3d& size_m, std::uint8_t bright) {
   return {Box{floor_m + Eigen::Vector3d{0, 0, size_m.z() / 2}, size_m / 2}, bright};
 }

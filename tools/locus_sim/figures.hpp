@@ -7,15 +7,15 @@
 
 namespace locus::sim {
 
-/// What moving things look like, around an origin on the ground, facing along x.
+/// Shapes of moving things, around an origin on the ground, facing along x.
 
-/// Two legs, a trunk and a head, as someone stands; seen from all sides the same.
+/// Returns a standing person: two legs, a trunk and a head, rotationally symmetric.
 std::vector<Surface> standing_person();
 
-/// The same with arms, and legs and arms swung forward (one of each) and back by up to `swing_rad`.
+/// Returns a person with arms; legs and arms swing forward (one of each) and back by up to `swing_rad`.
 std::vector<Surface> walking_person(double swing_rad);
 
-/// Turned to the left by `yaw_rad`.
+/// Returns a forklift turned to the left by `yaw_rad`.
 std::vector<Surface> forklift(double yaw_rad);
 
 std::vector<Surface> car();

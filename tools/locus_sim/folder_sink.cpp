@@ -11,7 +11,7 @@ namespace {
 std::filesystem::path made(const std::filesystem::path& folder) {
   tools::make_folder(folder);
   std::error_code ignored;
-  for (const char* const source : {"imu", "wio", "vio", "kio"}) // of another robot, which this one may not have
+  for (const char* const source : {"imu", "wio", "vio", "kio"}) // leftovers of another robot with other sources
     for (const char* const ending : {".csv", ".tum", ".meta.csv"})
       std::filesystem::remove(folder / (source + std::string(ending)), ignored);
   for (const char* const lidar : {"top", "front", "rear"})

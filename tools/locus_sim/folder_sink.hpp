@@ -10,7 +10,7 @@
 
 namespace locus::sim {
 
-/// A capture folder: lidar.pcap and text files. Makes the folder.
+/// Capture folder: lidar.pcap and text files. Creates the folder.
 class FolderSink : public CaptureSink {
  public:
   explicit FolderSink(const std::filesystem::path& folder);

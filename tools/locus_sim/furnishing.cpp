@@ -10,9 +10,9 @@
 namespace locus::sim {
 namespace {
 
-constexpr double kSlab_m = 5, kSeam_m = 0.02; // slabs overlap by a seam, so that nobody looks through
+constexpr double kSlab_m = 5, kSeam_m = 0.02; // slabs overlap by a seam, without gaps
 constexpr double kDoorway_m = 3;
-constexpr double kFree_m = 0.9; // from the middle of a road to what stands beside it
+constexpr double kFree_m = 0.9; // between the middle of a road and objects beside it
 
 } // namespace
 
@@ -47,7 +47,7 @@ void Furnishing::wall(const Area& area, double height_m, std::uint8_t bright) {
     panel.max_m[axis] = to;
     return panel;
   };
-  std::vector<double> doors; // where a road runs through the middle of the wall
+  std::vector<double> doors; // positions of roads through the middle of the wall
   const Eigen::Vector2d middle = (area.min_m + area.max_m) / 2;
   for (const Roads::Lane& lane : roads_.lanes()) {
     const Eigen::Vector2d a = roads_.places_m()[lane.from], b = roads_.places_m()[lane.to];

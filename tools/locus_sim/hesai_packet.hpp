@@ -14,8 +14,8 @@
 
 namespace locus::sim {
 
-/// A data packet of a Hesai, made byte by byte: well-formed, turning at `rpm` (less than 0: counterclockwise), every
-/// distance 0 until it is set, of kDistanceUnit_m. One owner.
+/// Data packet of a Hesai, built byte by byte: well-formed, turning at `rpm` (negative: counterclockwise), every
+/// distance 0 until it is set, in units of kDistanceUnit_m. One owner.
 class HesaiPacket {
  public:
   static constexpr double kDistanceUnit_m = 0.004;
@@ -89,10 +89,10 @@ class HesaiPacket {
   void set_mode_flag(std::uint8_t flag) { put(tail_ + 5, flag, 1); }
   void set_operational_state(std::uint8_t state) { put(tail_ + 11, state, 1); }
   void set_byte(std::size_t at, std::uint8_t value) { put(at, value, 1); }
-  /// Of a model without checksums; seal() then is not to be called.
+  /// Omits the sequence number; for models without checksums, so do not call seal() afterwards.
   void leave_out_number() { bytes_.resize(bytes_.size() - 4); }
 
-  /// Makes the checksums right, where there are any.
+  /// Updates the checksums, if there are any.
   void seal() {
     if (!layout_.has_checksums)
       return;

@@ -7,15 +7,15 @@
 
 namespace locus::sim {
 
-/// What a ray meets.
+/// Intersection of a ray with the scene.
 struct Hit {
   Eigen::Vector3d point_m;
   double range_m;
-  double cos_incidence; ///< of the angle between ray and normal, 0..1
+  double cos_incidence; ///< angle between ray and normal, 0..1
   std::uint8_t reflectivity;
-  const Surface* surface; ///< nothing: it moves
-  Eigen::Vector3d normal; ///< to either side
-  bool apparent = false;  ///< no surface is there: steam, or what a mirror shows
+  const Surface* surface; ///< nullptr: a moving one
+  Eigen::Vector3d normal; ///< of either sign
+  bool apparent = false;  ///< no physical surface: steam, or a mirror image
 };
 
 } // namespace locus::sim

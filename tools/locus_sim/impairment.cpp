@@ -20,7 +20,7 @@ Eigen::Vector3d any_direction(Dice& dice) {
 
 double either_sign(Dice& dice) { return dice.chance(0.5) ? 1 : -1; }
 
-/// Where it was to be becomes what is believed.
+/// Keeps the nominal extrinsics as the believed ones and displaces the true ones.
 void displace(Pose& T_base_sensor, std::optional<Pose>& believed, const Imperfections& all, std::uint64_t seed) {
   if (all.mounting_deg == 0 && all.mounting_mm == 0)
     return;
@@ -41,7 +41,7 @@ void impair(ImuFaults& faults, const Imperfections& all, std::uint64_t seed) {
     error = 0.01 * all.gyro_scale_percent * either_sign(scale);
   faults.gyro_bias_walk_radps_per_sqrt_s =
       std::hypot(faults.gyro_bias_walk_radps_per_sqrt_s, kRadPerDeg * all.gyro_walk_dps);
-  // Turned anyhow: what is shown is as large for a push from any side, and in any direction.
+  // Random rotation: the error has the same magnitude for any direction of the force, and a random direction.
   Dice turned(seed_for(seed, "g-sensitivity"));
   const Eigen::Vector3d axis = any_direction(turned);
   faults.gyro_g_sensitivity_sm = kRadPerDeg * all.g_sensitivity_dps / kGravity_mps2 *
@@ -62,7 +62,7 @@ void impair(NamedLidar& lidar, const Imperfections& all, std::uint64_t seed) {
   if (all.lidar_drift_ppm > 0) {
     options.drift = 1e-6 * all.lidar_drift_ppm;
     options.pps_locked = false;
-    options.clock_offset = -from_seconds(Dice(seed_for(seed, "switched on")).between(0, 3600)); // no GPS ever set it
+    options.clock_offset = -from_seconds(Dice(seed_for(seed, "switched on")).between(0, 3600)); // never set by GPS
   }
 }
 
@@ -74,7 +74,7 @@ void impair(MountedImu& imu, const Imperfections& all, std::uint64_t seed) {
 void impair(NamedOdometry& odometry, const Imperfections& all, std::uint64_t seed) {
   OdometryFaults& faults = odometry.faults;
   faults.stamps = stamp_faults(all.odometry_late_ms, all.odometry_jitter_ms);
-  if (faults.spinning_mps == 0) // it does not reckon with wheels or feet
+  if (faults.spinning_mps == 0) // not based on wheels or feet
     return;
   faults.slip_bursts_per_min = all.slip_bursts_per_min;
   Dice sign(seed_for(seed, "yaw error"));

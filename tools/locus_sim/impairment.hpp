@@ -8,9 +8,9 @@
 
 namespace locus::sim {
 
-/// The same robot with the imperfections of its mounting, time, lidars and motion sources. The seed decides directions,
-/// signs and moments, each imperfection by itself: what one does, does not depend on the others. Without any it is the
-/// same robot, to the bit.
+/// Returns the robot with the imperfections of its mounting, time, lidars and motion sources. The seed determines
+/// directions, signs and times for each imperfection independently. Without any, the result is bit-identical to the
+/// input.
 Robot impaired(Robot robot, const Imperfections& imperfections, std::uint64_t seed);
 
 } // namespace locus::sim

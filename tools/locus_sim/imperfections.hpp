@@ -8,53 +8,52 @@
 
 namespace locus::sim {
 
-/// What a real robot has to live with and a clean simulation leaves out, each in its physical unit; as it stands,
-/// nothing. Where a direction, a sign or a moment is not given, the seed decides it. What is usual, and who says so,
-/// stands in the manual page of locus-sim.
+/// Imperfections of real robots, each in its physical unit; none by default. The seed determines directions, signs and
+/// times that are not given. The manual page of locus-sim lists usual values and their sources.
 struct Imperfections {
-  // Mounting: config.yaml holds what the user believes, the sensors are where they are.
-  double mounting_deg = 0; ///< each lidar and the IMU are turned by this
-  double mounting_mm = 0;  ///< and shifted by this
+  // Mounting: config.yaml has the nominal extrinsics, the true ones differ.
+  double mounting_deg = 0; ///< rotation of each lidar and the IMU
+  double mounting_mm = 0;  ///< and their displacement
 
   // Time.
-  double imu_late_ms = 0;      ///< the IMU's stamps are this much later than what they speak of
-  double imu_jitter_ms = 0;    ///< standard deviation of each of them
-  double odometry_late_ms = 0; ///< the same of every odometry source
+  double imu_late_ms = 0;      ///< lateness of the IMU's stamps
+  double imu_jitter_ms = 0;    ///< their standard deviation
+  double odometry_late_ms = 0; ///< same for every odometry source
   double odometry_jitter_ms = 0;
-  double lidar_drift_ppm = 0; ///< the lidars' clocks run fast by this, without GPS to hold them
+  double lidar_drift_ppm = 0; ///< the lidars' clocks run fast by this, without GPS
 
   // Ranges and directions of the lidars.
   double beam_mrad = 0;           ///< full divergence: at an edge the range lies between both surfaces (mixed pixels)
-  double laser_bias_mm = 0;       ///< standard deviation of a constant error of each laser's ranges
-  double incidence_bias_mm = 0;   ///< a surface that is met at 75 degrees seems farther by this
-  double intensity_bias_mm = 0;   ///< black seems farther than white by this
-  double laser_elevation_deg = 0; ///< standard deviation of a constant error of each laser's elevation
+  double laser_bias_mm = 0;       ///< standard deviation of each laser's constant range error
+  double incidence_bias_mm = 0;   ///< range error on a surface at 75 degrees of incidence
+  double intensity_bias_mm = 0;   ///< range error on black relative to white
+  double laser_elevation_deg = 0; ///< standard deviation of each laser's constant elevation error
   double body_parts = 0;          ///< parts of the robot that its lidars see: one inside the body box, one outside, ...
 
   // Motion sources.
-  double slip_bursts_per_min = 0; ///< wheels or feet slip for half a second or two, and report motion that was not
-  double yaw_error_percent = 0;   ///< odometry reports turns too large or too small by this
-  double gyro_scale_percent = 0;  ///< each axis of the gyro shows too much or too little
+  double slip_bursts_per_min = 0; ///< wheels or feet slip for 0.5 to 2 s, and the odometry reports false motion
+  double yaw_error_percent = 0;   ///< scale error of the turns of odometry, of either sign
+  double gyro_scale_percent = 0;  ///< scale error of each gyro axis, of either sign
   double gyro_walk_dps = 0;       ///< random walk of the gyro's bias, deg/s per square root of a second
-  double g_sensitivity_dps = 0;   ///< deg/s that the gyro shows for each g of specific force
-  double vibration_mps2 = 0;      ///< more noise of the accelerometer while the robot moves
+  double g_sensitivity_dps = 0;   ///< deg/s of gyro error per g of specific force
+  double vibration_mps2 = 0;      ///< additional noise of the accelerometer in motion
 
   // Surroundings.
-  double people = 0;            ///< who stand and walk 0.5 to 3 m from the robot, and go with it
-  double vehicle_s_per_min = 0; ///< a vehicle drives alongside, at the robot's speed, for so long
-  double steam_per_min = 0;     ///< clouds of dust or steam burst out near the way, stay for seconds and are gone
-  double wet_floor_percent = 0; ///< share of level ground that mirrors what is above it
-  double glass_percent = 0;     ///< share of upright surfaces that mirror what is before them
+  double people = 0;            ///< who stand and walk 0.5 to 3 m from the robot and accompany it
+  double vehicle_s_per_min = 0; ///< time for which a vehicle drives alongside at the robot's speed
+  double steam_per_min = 0;     ///< bursts of dust or steam near the path, lasting seconds
+  double wet_floor_percent = 0; ///< reflecting share of level ground
+  double glass_percent = 0;     ///< reflecting share of upright surfaces
 };
 
-/// An imperfection by its name on the command line, with what it amounts to on an ordinary robot and in hard use.
+/// Imperfection with its name on the command line, and its size on an ordinary robot and in hard use.
 struct NamedImperfection {
   std::string_view name;
   double Imperfections::*size;
   double real, harsh;
-  double most; ///< that is accepted
+  double most; ///< upper limit
   std::string_view unit, what;
-  bool whole = false; ///< a count
+  bool whole = false; ///< integer
 };
 
 inline constexpr std::array kImperfections{
@@ -106,10 +105,10 @@ inline constexpr std::array kImperfections{
     NamedImperfection{"glass-percent", &Imperfections::glass_percent, 2, 10, 100, "PERCENT",
                       "Share of walls that mirror"}};
 
-/// How kind a simulated world is: clean, without any imperfection; as real robots know it; or harsh.
+/// Level of realism: clean, without imperfections; as on real robots; or harsh.
 enum class Realism : std::uint8_t { clean, real, harsh };
 
-inline constexpr std::array<std::string_view, 3> kRealismNames{"clean", "real", "harsh"}; ///< by Realism
+inline constexpr std::array<std::string_view, 3> kRealismNames{"clean", "real", "harsh"}; ///< indexed by Realism
 
 Imperfections imperfections_of(Realism realism);
 

@@ -5,13 +5,13 @@
 
 namespace locus::sim {
 
-/// A function of time at one instant with its first two derivatives. Arithmetic on jets carries the derivatives along,
-/// so a motion is written down once, as a position, and its velocity and acceleration are exact.
+/// Value of a function of time with its first two derivatives. Arithmetic propagates the derivatives, so that a motion
+/// is written once, as a position, and its velocity and acceleration are exact.
 struct Jet {
   double value = 0, rate = 0, acceleration = 0;
 
   Jet() = default;
-  Jet(double value_, double rate_ = 0, double acceleration_ = 0) // NOLINT(google-explicit-constructor): a constant
+  Jet(double value_, double rate_ = 0, double acceleration_ = 0) // NOLINT(google-explicit-constructor): for constants
       : value(value_), rate(rate_), acceleration(acceleration_) {}
 
   friend Jet operator+(const Jet& a, const Jet& b) {
@@ -26,7 +26,7 @@ struct Jet {
   }
 };
 
-/// f(x) from the value and the first two derivatives of f at x.
+/// Returns f(x) from the value and the first two derivatives of f at x.
 inline Jet chain(double f, double slope, double curvature, const Jet& x) {
   return {f, slope * x.rate, curvature * x.rate * x.rate + slope * x.acceleration};
 }
@@ -43,7 +43,7 @@ inline Jet atan(const Jet& x) {
   const double slope = 1 / (1 + x.value * x.value);
   return chain(std::atan(x.value), slope, -2 * x.value * slope * slope, x);
 }
-/// x / (1 + x): from 0 at 0 towards 1.
+/// Returns x / (1 + x): from 0 at 0 towards 1.
 inline Jet saturated(const Jet& x) {
   const double rest = 1 / (1 + x.value);
   return chain(x.value * rest, rest * rest, -2 * rest * rest * rest, x);
@@ -56,7 +56,7 @@ inline double ease_slope(double u) { return 30 * u * u * (1 - u) * (1 - u); }
 inline double ease_curvature(double u) { return 60 * u * (1 - u) * (1 - 2 * u); }
 inline double ease_integral(double u) { return u * u * u * u * (2.5 + u * (-3 + u)); }
 
-/// 0 up to -rounding / 2, then rising with x, the kink at 0 rounded off.
+/// Returns 0 up to -rounding / 2, then rises with x; the kink at 0 is rounded.
 inline Jet rising(const Jet& x, double rounding) {
   const double u = x.value / rounding + 0.5;
   if (u <= 0)
@@ -64,12 +64,12 @@ inline Jet rising(const Jet& x, double rounding) {
   return u < 1 ? chain(rounding * ease_integral(u), ease(u), ease_slope(u) / rounding, x) : x;
 }
 
-/// From 0 at x = 0 to 1 at x = length along a straight line, its kinks rounded off.
+/// Rises linearly from 0 at x = 0 to 1 at x = length; the kinks are rounded.
 inline Jet ramp(const Jet& x, double length, double rounding) {
   return (1 / length) * (rising(x, rounding) - rising(x - length, rounding));
 }
 
-/// The quintic, 0 before and 1 after.
+/// Returns the quintic, 0 before and 1 after.
 inline Jet ease(const Jet& u) {
   if (u.value <= 0 || u.value >= 1)
     return {u.value <= 0 ? 0.0 : 1.0};

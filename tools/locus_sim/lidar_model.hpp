@@ -12,19 +12,19 @@
 
 namespace locus::sim {
 
-/// Ousters by the number of their beams.
+/// Ouster models by their number of beams.
 enum class OusterModel : std::uint8_t { os1_32 = 32, os1_128 = 128 };
 
-/// What a simulated lidar can be. Of Hesai's those whose packets all have one firing sequence.
+/// Models that can be simulated; of Hesai's those whose packets all have one firing sequence.
 using LidarModel = std::variant<velodyne::Model, hesai::Model, OusterModel>;
 
 inline bool is_ouster(const LidarModel& model) { return std::holds_alternative<OusterModel>(model); }
 
-/// A lidar by its name on the command line.
+/// Lidar model with its name on the command line.
 struct NamedLidarModel {
   std::string_view name;
   LidarModel model;
-  double max_range_m; ///< data sheet; a surface that throws back a tenth of the light is seen at half of it
+  double max_range_m; ///< from the data sheet; at 10 % reflectivity half of it
 };
 inline constexpr std::array kLidarModels{
     NamedLidarModel{"VLP-16", velodyne::Model::vlp16, 100},   NamedLidarModel{"VLP-32C", velodyne::Model::vlp32c, 200},

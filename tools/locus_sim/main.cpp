@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// locus-sim: a synthetic robot with exact truth to a capture folder.
+// locus-sim: writes the capture folder of a synthetic robot with exact truth.
 #include <optional>
 
 #include <fmt/format.h>
@@ -22,7 +22,7 @@ namespace {
 
 void run(const SimArguments& arguments) {
   const daemon::MachineTime begin = daemon::MachineTime::now();
-  std::optional<sim::FolderSink> folder; // tried before the hour that the drive may take
+  std::optional<sim::FolderSink> folder; // checked before the drive, which may take an hour
   std::optional<OutputFile> map;
   if (arguments.output != "-") {
     folder.emplace(arguments.output);

@@ -12,19 +12,19 @@
 namespace locus::sim {
 namespace {
 
-constexpr double kWater = 1.33, kPane = 1.52; // indices of refraction
-constexpr double kLevel = 0.993;              // cosine of 7 degrees: water runs off what is steeper
-constexpr double kPuddle_m = 1.6;             // from one bump of the noise to the next
-constexpr double kWetDarker = 0.5;            // of what is below the film (Lekner and Dorf, 1988)
+constexpr double kWater = 1.33, kPane = 1.52; // refractive indices
+constexpr double kLevel = 0.993;              // cosine of 7 degrees: water runs off steeper surfaces
+constexpr double kPuddle_m = 1.6;             // scale of the noise
+constexpr double kWetDarker = 0.5;            // factor for the ground below the film (Lekner and Dorf, 1988)
 constexpr double kPane_m = 2, kSmallest_m = 1.5;
-constexpr double kStraightOn = 0.998, kGlare = 200, kDirt = 3; // within 4 degrees; brightness of mirrored and scattered
-constexpr double kDarkest = 0.5;                               // brightness that any lidar sees
+constexpr double kStraightOn = 0.998, kGlare = 200, kDirt = 3; // within 4 degrees; mirrored and diffuse brightness
+constexpr double kDarkest = 0.5;                               // lowest detectable brightness
 
 double puddle(const Noise& noise, const Eigen::Vector3d& point) {
   return noise({point.x() / kPuddle_m, point.y() / kPuddle_m, 0});
 }
 
-/// That value of the noise above which the share of its values lies.
+/// Returns the noise value that the given share of values exceeds.
 double value_above_which(const Noise& noise, double share, std::uint64_t seed) {
   constexpr std::size_t kSamples = 20'000;
   if (share <= 0)
@@ -43,7 +43,7 @@ double value_above_which(const Noise& noise, double share, std::uint64_t seed) {
 bool is_large(const Rectangle& shape, const Eigen::Vector3d&) {
   return std::min(shape.edge_u_m.norm(), shape.edge_v_m.norm()) >= kSmallest_m;
 }
-/// Of the side with the normal.
+/// Checks the side with this normal.
 bool is_large(const Box& shape, const Eigen::Vector3d& normal) {
   const bool faces_ahead = std::abs(normal.x() * shape.cos_yaw + normal.y() * shape.sin_yaw) > 0.5;
   const double wide_m = 2 * (faces_ahead ? shape.half_size_m.y() : shape.half_size_m.x());
@@ -51,10 +51,10 @@ bool is_large(const Box& shape, const Eigen::Vector3d& normal) {
 }
 template <class Shape> bool is_large(const Shape&, const Eigen::Vector3d&) { return false; }
 
-/// What a mirror shows along a ray that meets it.
+/// Returns the mirror image along a ray that hits a mirror.
 std::optional<Hit> ghost(const Ray& ray, const Hit& mirror, const Eigen::Vector3d& normal, double max_range_m,
                          const Mirrors::Cast& cast) {
-  constexpr double kOff_m = 1e-6; // the surface, which the mirrored ray shall not meet again
+  constexpr double kOff_m = 1e-6; // off the surface, so that the mirrored ray does not hit it again
   const Eigen::Vector3d outwards = normal.dot(ray.direction) < 0 ? normal : -normal;
   const Eigen::Vector3d mirrored = ray.direction - 2 * outwards.dot(ray.direction) * outwards;
   auto shown = cast({mirror.point_m + kOff_m * outwards, mirrored}, max_range_m - mirror.range_m);
@@ -67,8 +67,8 @@ std::optional<Hit> ghost(const Ray& ray, const Hit& mirror, const Eigen::Vector3
   return shown;
 }
 
-/// Of two echoes of one pulse, whose brightness is given as if both surfaces were met straight on at one distance, the
-/// stronger, most often; nothing where even that is too weak.
+/// Chooses between two echoes of one pulse at random, in proportion to their strength; brightnesses are given for
+/// normal incidence and equal distance. Returns nothing if the chosen one is too weak.
 std::optional<Hit> stronger(const Hit& own, double own_brightness, const std::optional<Hit>& ghost, double dimmed,
                             double chance) {
   const auto strength = [](const Hit& hit, double brightness) {
@@ -89,7 +89,7 @@ std::optional<Hit> stronger(const Hit& own, double own_brightness, const std::op
 
 double mirrored_share(double cos_incidence, double index) {
   const double sine = std::sqrt(std::max(0.0, 1 - cos_incidence * cos_incidence)) / index;
-  const double cosine = std::sqrt(1 - sine * sine); // of the refracted ray
+  const double cosine = std::sqrt(1 - sine * sine); // refracted ray
   const double across = (cos_incidence - index * cosine) / (cos_incidence + index * cosine);
   const double along = (index * cos_incidence - cosine) / (index * cos_incidence + cosine);
   return (across * across + along * along) / 2;
@@ -114,16 +114,17 @@ bool Mirrors::is_glass(const Hit& hit, std::size_t surface_index) const {
   return QuickDice(seed_ + 0x9E37'79B9U * surface_index + 0xD6E8'FEB8'6659'FD93U * pane).uniform() < glass_;
 }
 
-/// Twice through the film there, twice back; and the ground below it looks darker.
+/// Computes the reflection at a water film; light crosses its surface on the way in and out, and wet ground looks
+/// darker.
 std::optional<Hit> Mirrors::on_water(const Ray& ray, const Hit& water, double max_range_m, double chance,
                                      const Cast& cast) {
   const double mirrored = mirrored_share(water.cos_incidence, kWater), through = 1 - mirrored;
-  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ(); // water lies level on rough ground too
+  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ(); // water is level on rough ground, too
   return stronger(water, kWetDarker * through * through * water.reflectivity, ghost(ray, water, up, max_range_m, cast),
                   mirrored * mirrored, chance);
 }
 
-/// Both faces of a pane mirror, and what goes through is lost. Straight on it dazzles.
+/// Computes the reflection at a pane: both faces reflect, transmitted light is lost. At normal incidence it dazzles.
 std::optional<Hit> Mirrors::on_glass(const Ray& ray, const Hit& pane, double max_range_m, double chance,
                                      const Cast& cast) {
   const double face = mirrored_share(pane.cos_incidence, kPane), mirrored = 2 * face / (1 + face);

@@ -10,18 +10,18 @@
 
 namespace locus::sim {
 
-/// Wet floor and panes of glass: what of a world throws light back as a mirror does. Immutable, any thread.
+/// Specularly reflecting surfaces of a world: wet floor and panes of glass. Immutable, any thread.
 class Mirrors {
  public:
-  /// Shares of the level ground and of upright rectangles, 0..1.
+  /// Expects shares of the level ground and of upright rectangles, 0..1.
   Mirrors(double wet, double glass, std::uint64_t seed);
 
-  /// Whether what a ray has met mirrors; `surface_index` tells surfaces apart.
+  /// Returns whether the surface hit is reflecting; `surface_index` identifies it.
   [[nodiscard]] bool is_wet(const Ray& ray, const Hit& hit) const;
   [[nodiscard]] bool is_glass(const Hit& hit, std::size_t surface_index) const;
 
-  /// What the lidar sees where its ray meets such a surface: the surface itself, what is mirrored in it (as if it lay
-  /// behind, as far along the ray as the light goes), or nothing. `cast` tells what a ray meets.
+  /// Returns the lidar's measurement on such a surface: the surface itself, its mirror image (behind it, at the full
+  /// length of the light path), or nothing. `cast` intersects a ray with the scene.
   using Cast = std::function<std::optional<Hit>(const Ray& ray, double max_range_m)>;
   [[nodiscard]] static std::optional<Hit> on_water(const Ray& ray, const Hit& water, double max_range_m, double chance,
                                                    const Cast& cast);
@@ -34,10 +34,10 @@ class Mirrors {
   double glass_;
   std::uint64_t seed_;
   Noise puddles_;
-  double wet_above_; ///< that value of the noise it is wet
+  double wet_above_; ///< noise threshold of wet ground
 };
 
-/// Share of unpolarised light that a smooth surface mirrors (Fresnel); `index` of refraction.
+/// Returns the share of unpolarised light that a smooth surface reflects (Fresnel); refractive `index`.
 double mirrored_share(double cos_incidence, double index);
 
 } // namespace locus::sim

@@ -5,7 +5,7 @@
 
 namespace locus::sim {
 
-/// Value noise: random values at the corners of a lattice, blended in between.
+/// Evaluates value noise: random values at the corners of a lattice, interpolated in between.
 double Noise::operator()(const Eigen::Vector3d& point) const {
   const Eigen::Array3d floor = point.array().floor();
   const Eigen::Array<std::int64_t, 3, 1> corner = floor.cast<std::int64_t>();
@@ -20,7 +20,7 @@ double Noise::operator()(const Eigen::Vector3d& point) const {
   return sum;
 }
 
-/// Multiplications by large odd numbers, and shifts that bring the high bits down again.
+/// Hashes by multiplication with large odd numbers, and shifts that mix the high bits down.
 double Noise::at_lattice(std::int64_t x, std::int64_t y, std::int64_t z) const {
   std::uint64_t bits = seed_;
   for (const std::int64_t coordinate : {x, y, z}) {

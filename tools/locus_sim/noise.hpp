@@ -7,7 +7,7 @@
 
 namespace locus::sim {
 
-/// Smooth random function of space, -1..1, with bumps about one metre apart: rock, turf. The same for the same seed.
+/// Smooth random function of space, -1..1, with features of about one metre: rock, turf. Deterministic in the seed.
 /// Immutable, any thread.
 class Noise {
  public:

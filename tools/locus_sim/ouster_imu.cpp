@@ -8,7 +8,7 @@ namespace locus::sim {
 namespace {
 
 constexpr double kRate_hz = 100;
-constexpr double kStandardGravity_mps2 = 9.80665; // the unit counts in it
+constexpr double kStandardGravity_mps2 = 9.80665; // unit of the sensor's readings
 
 } // namespace
 

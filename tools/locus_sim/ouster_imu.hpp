@@ -10,14 +10,14 @@
 
 namespace locus::sim {
 
-/// The inertial unit of a simulated Ouster: 100 packets a second of 48 bytes, where its metadata says that it sits, by
-/// the clock of its columns. A reading arrives at the instant of its stamp. One owner.
+/// Inertial unit of a simulated Ouster: 100 packets of 48 bytes per second, mounted as in its metadata, on the clock of
+/// its columns. A reading arrives at its stamp. One owner.
 class OusterImu {
  public:
-  /// The trajectory must outlive it. `lidar`: the options of the SyntheticLidar that it is in.
+  /// The trajectory must outlive it. `lidar`: options of the enclosing SyntheticLidar.
   OusterImu(const Trajectory& trajectory, const SyntheticLidarOptions& lidar, const ImuFaults& faults);
 
-  Datagram next(); ///< the first is of the start of the trajectory
+  Datagram next(); ///< starts at the start of the trajectory
 
  private:
   OusterSensor sensor_;

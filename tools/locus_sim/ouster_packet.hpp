@@ -15,7 +15,7 @@
 
 namespace locus::sim {
 
-/// A lidar packet of an Ouster, made byte by byte: well-formed, every range 0 until it is set. One owner.
+/// Lidar packet of an Ouster, built byte by byte: well-formed, every range 0 until it is set. One owner.
 class OusterPacket {
  public:
   static constexpr std::int64_t kColumnNs = 97'656; ///< of 1024x10
@@ -64,7 +64,7 @@ class OusterPacket {
     put(at + profile.echo_fields[echo].reflectivity_at, reflectivity, 1);
   }
   void put(std::size_t at, std::uint64_t value, std::size_t count) { put_little_endian(&bytes_[at], value, count); }
-  /// To be called after the last change.
+  /// Updates the checksum. Call after the last change.
   void seal() {
     if (!format_.legacy && !format_.safety_header)
       put(bytes_.size() - 8, ouster::crc64(payload().first(bytes_.size() - 8)), 8);
@@ -82,7 +82,7 @@ class OusterPacket {
   std::vector<std::byte> bytes_;
 };
 
-/// An IMU packet of 48 bytes.
+/// Builds an IMU packet of 48 bytes.
 inline std::vector<std::byte> ouster_imu_packet(std::uint64_t time_ns, const Eigen::Vector3f& force_g,
                                                 const Eigen::Vector3f& rate_dps) {
   std::vector<std::byte> bytes(48);

@@ -28,7 +28,7 @@ std::vector<double> altitudes_deg(std::size_t beams) {
   std::vector<double> all;
   for (std::size_t i = 0; i < beams; ++i) {
     const double share = static_cast<double>(i) / static_cast<double>(beams - 1);
-    all.push_back(std::round(100 * kUppermost_deg * (1 - 2 * share)) / 100); // the files have two digits
+    all.push_back(std::round(100 * kUppermost_deg * (1 - 2 * share)) / 100); // rounded to two digits, as in the files
   }
   return all;
 }
@@ -47,7 +47,7 @@ std::vector<int> pixel_shifts(std::size_t beams) {
   return all;
 }
 
-/// As http://SENSOR/api/v1/sensor/metadata serves it, firmware 2.5.
+/// Builds the metadata as served by http://SENSOR/api/v1/sensor/metadata, firmware 2.5.
 ordered_json metadata_of(const SyntheticLidarOptions& options, std::size_t beams) {
   constexpr std::uint64_t kFirstSerial = 122'301'000'000, kInitIds = 0xFFFFFF;
   const std::uint64_t draw = seed_for(options.seed, "serial number");

@@ -11,8 +11,8 @@
 namespace locus::sim {
 namespace {
 
-/// Columns are fired where the encoder says, so that they follow each other as fast as the motor turns, and the phase
-/// is one of them, the first of a packet.
+/// Returns the firing pattern. The encoder triggers the columns, so their period follows the motor speed, and the first
+/// azimuth is rounded to a column, the first of a packet.
 FiringPattern pattern_of(const SyntheticLidarOptions& options, const ouster::Metadata& metadata) {
   constexpr double kResolution_m = 1e-3;
   const auto columns = static_cast<double>(metadata.columns_per_frame);

@@ -9,25 +9,25 @@ namespace locus::sim {
 namespace {
 
 constexpr double kRoom_m =
-    0.1; // of the box about its parts: more than a lidar that is not quite in its place is wrong by
+    0.1; // margin of the box around the parts, larger than the position error of a lidar that is mounted inaccurately
 
 Surface tube(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double radius_m, std::uint8_t brightness) {
   return {Cylinder{from, radius_m, (to - from).norm(), (to - from).normalized()}, brightness};
 }
 
-/// `place` is at the height of the lidar.
+/// Returns a part at `place`, at the height of the lidar.
 Surface part(int index, const Eigen::Vector3d& place, Dice& dice) {
   const Eigen::Vector3d up{0, 0, 1};
   switch (index % 4) {
-  case 0: // an antenna's mast
+  case 0: // antenna mast
     return tube(place - 0.4 * up, place + 0.4 * up, dice.between(0.02, 0.04), dice.brightness(10, 60));
-  case 1: // a cable
+  case 1: // cable
     return tube(place - 0.3 * up, place + Eigen::Vector3d{dice.between(-0.1, 0.1), 0, 0.15}, dice.between(0.005, 0.01),
                 dice.brightness(5, 15));
-  case 2: // an arm
+  case 2: // arm
     return tube(place - 0.3 * up, place + Eigen::Vector3d{dice.between(-0.1, 0.1), 0, 0.1}, dice.between(0.04, 0.06),
                 dice.brightness(30, 60));
-  default: // a rail for payload
+  default: // payload rail
     return {Box{place, {dice.between(0.08, 0.15), 0.02, dice.between(0.03, 0.06)}}, dice.brightness(40, 80)};
   }
 }

@@ -9,14 +9,14 @@
 
 namespace locus::sim {
 
-/// Parts of a robot that its own lidars see, in the base frame.
+/// Parts of a robot visible to its own lidars, base frame.
 struct OwnParts {
   std::vector<Surface> surfaces;
-  std::optional<Bounds> body_box; ///< holds every other one, from the first, with some room about them, and no other
+  std::optional<Bounds> body_box; ///< contains every second part, from the first on, with a margin, and no other
 };
 
-/// Masts, arms, rails and cables half a metre and more from a lidar, where it sees them. The one half stands behind it
-/// and is what the box of the body is for; the other is to the left and right ahead, and nobody has thought of it.
+/// Places masts, arms, rails and cables half a metre or more from a lidar, in its view. Half of them are behind it,
+/// inside the body box; the others are ahead to the left and right and missing from the box, as by an oversight.
 OwnParts own_parts(int count, const Eigen::Vector3d& lidar_m, Dice& dice);
 
 } // namespace locus::sim

@@ -16,42 +16,41 @@ namespace locus::sim {
 
 struct SyntheticLidarOptions;
 
-/// Where the lasers of a lidar point and when they fire, from the tables (or the metadata) that its decoder reads
-/// packets by. A packet has columns: firings that share one reported azimuth.
+/// Directions and firing times of a lidar's lasers, from the tables (or metadata) of its decoder. A packet has columns:
+/// firings that share one reported azimuth.
 struct FiringPattern {
   struct Laser {
     double elevation_rad;
-    double azimuth_offset_rad; ///< clockwise seen from above
+    double azimuth_offset_rad; ///< clockwise viewed from above
     double origin_z_m;
   };
   struct Firing {
     std::size_t laser;
-    Duration after; ///< the instant of its column's azimuth
+    Duration after; ///< time after the column's azimuth
   };
 
   std::vector<Laser> lasers;
-  std::vector<Firing> firings; ///< of a column, in the order of the packet's channels
-  std::size_t columns;         ///< of a packet
-  Duration column_duration;    ///< from one to the next, by the lidar's clock
+  std::vector<Firing> firings; ///< per column, in the order of the packet's channels
+  std::size_t columns;         ///< per packet
+  Duration column_duration;    ///< period, by the lidar's clock
   double rpm;
-  double first_azimuth_deg; ///< of the first column
+  double first_azimuth_deg; ///< first column
   double resolution_m;
   std::uint32_t most_ticks;
-  double origin_radius_m = 0; ///< of the circle that beams begin on, in the direction of the column; ranges count from
-                              ///< its centre
-  std::optional<Pose> T_lidar_rotor{}; ///< from the frame in which azimuths count to the lidar's; nothing: they are one
+  double origin_radius_m = 0; ///< of the circle of beam origins, along the column; origin of the ranges is its centre
+  std::optional<Pose> T_lidar_rotor{}; ///< from the frame of the azimuths to the lidar's; nothing: identical
 };
 
 struct Echo {
-  std::uint32_t ticks = 0; ///< of the pattern's resolution; 0: none
+  std::uint32_t ticks = 0; ///< in units of the pattern's resolution; 0: none
   std::uint8_t intensity = 0;
 };
 struct Echoes {
   Echo last, strongest;
 };
 
-/// Writes data packets as one kind of lidar sends them. For each: its columns one after the other, each with an echo or
-/// none of every firing, then finish(). One owner.
+/// Writes data packets in the format of one kind of lidar. For each packet: its columns in order, each with the echo,
+/// if any, of every firing, then finish(). One owner.
 class PacketWriter {
  public:
   explicit PacketWriter(FiringPattern pattern) : pattern_(std::move(pattern)) {}
@@ -61,10 +60,10 @@ class PacketWriter {
 
   [[nodiscard]] const FiringPattern& pattern() const { return pattern_; }
 
-  /// `own_time`: by the lidar's clock, before SyntheticLidarOptions::clock_offset; azimuth 0 .. 2 pi, clockwise.
+  /// Expects `own_time` by the lidar's clock, before SyntheticLidarOptions::clock_offset; azimuth 0 .. 2 pi, clockwise.
   virtual void begin_column(std::size_t column, Stamp own_time, double azimuth_rad) = 0;
   virtual void put(std::size_t column, std::size_t firing, const Echoes& echoes) = 0;
-  /// The payload, valid until the next packet begins. `begin`: own time of its first column.
+  /// Returns the payload, valid until the next packet begins. `begin`: own time of its first column.
   virtual std::span<const std::byte> finish(Stamp begin) = 0;
 
  private:
@@ -72,9 +71,9 @@ class PacketWriter {
 };
 
 std::unique_ptr<PacketWriter> velodyne_writer(const SyntheticLidarOptions& options);
-/// Single return: whatever the options say, the strongest.
+/// Writes single returns, whatever the options: the strongest.
 std::unique_ptr<PacketWriter> hesai_writer(const SyntheticLidarOptions& options);
-/// The same. The sensor's clock starts some time before `start`.
+/// Writes single returns likewise. The sensor's clock starts some time before `start`.
 std::unique_ptr<PacketWriter> ouster_writer(const SyntheticLidarOptions& options, Stamp start);
 
 } // namespace locus::sim

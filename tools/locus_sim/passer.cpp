@@ -11,7 +11,7 @@
 namespace locus::sim {
 namespace {
 
-constexpr float kFarthestStep_m = 4; // 40 m/s
+constexpr float kFarthestStep_m = 4; // equals 40 m/s
 
 bool is_one_way(const Place& from, const Place& to) {
   return (to.ground_m - from.ground_m).squaredNorm() < kFarthestStep_m * kFarthestStep_m;
@@ -20,7 +20,7 @@ bool is_one_way(const Place& from, const Place& to) {
 double reach_of(Passer::Kind kind) {
   switch (kind) {
   case Passer::Kind::person:
-    return 0.75; // a leg put forward
+    return 0.75; // leg put forward
   case Passer::Kind::forklift:
     return 2;
   case Passer::Kind::car:
@@ -44,7 +44,7 @@ std::vector<Surface> rigid_parts(Passer::Kind kind) {
   return van();
 }
 
-/// The frame of something that stands upright.
+/// Frame of an upright object.
 struct Frame {
   Eigen::Vector3d origin_m;
   double c, s;
@@ -86,7 +86,7 @@ Place Track::at(Duration since) const {
   const auto share = static_cast<float>(to_seconds(since - step * kStep) / to_seconds(kStep));
   const auto between = [&](float a, float b) { return a + share * (b - a); };
   float turn = to.yaw_rad - from.yaw_rad;
-  if (closed_) // from its end to its beginning
+  if (closed_) // from its end to its start
     turn = std::remainder(turn, 6.2831853F);
   return {from.ground_m + share * (to.ground_m - from.ground_m), from.yaw_rad + share * turn,
           between(from.swing_rad, to.swing_rad)};
@@ -100,7 +100,7 @@ std::vector<Surface> Passer::parts(const Place& place) const {
   return kind_ == Kind::person ? walking_person(static_cast<double>(place.swing_rad)) : parts_;
 }
 
-/// Whether the ray comes over the circle that holds it, seen from above.
+/// Returns whether the ray passes over the enclosing circle, viewed from above.
 bool Passer::may_be_met_by(const Ray& ray, double max_range_m, Stamp stamp) const {
   const Eigen::Vector3f& ground_m = track_->near(stamp - begin_).ground_m;
   const double x = static_cast<double>(ground_m.x()) - ray.origin_m.x();

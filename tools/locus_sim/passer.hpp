@@ -12,27 +12,27 @@
 
 namespace locus::sim {
 
-/// Where something is at one instant, world frame.
+/// Pose of an object at one instant, world frame.
 struct Place {
-  Eigen::Vector3f ground_m; ///< that it stands on
-  float yaw_rad = 0;        ///< without jumps of a turn
-  float swing_rad = 0;      ///< of legs and arms: of those on the left, forward
+  Eigen::Vector3f ground_m; ///< where it stands
+  float yaw_rad = 0;        ///< continuous, without wrapping
+  float swing_rad = 0;      ///< of the left legs and arms, forward
 };
 
-/// Where something is, tenth by tenth of a second, straight on in between. Before the first it stands there, after the
-/// last one too, or it begins anew. What is farther from one step to the next than anything drives has been taken away
-/// and put elsewhere. Immutable, any thread.
+/// Motion of an object, sampled every tenth of a second and interpolated linearly. Before the first sample it stands
+/// there; after the last it stands or repeats. A step larger than any speed allows is a relocation. Immutable, any
+/// thread.
 class Track {
  public:
   static constexpr Duration kStep = std::chrono::milliseconds{100};
-  /// Where nobody ever looks: what stands here is not there.
+  /// Distance out of every sensor's range: an object here is absent.
   static constexpr float kAway_m = 1e7F;
 
   Track(std::vector<Place> places, bool closed);
 
-  /// Since its first place.
+  /// Returns the pose at a time since the first sample.
   [[nodiscard]] Place at(Duration since) const;
-  /// Not farther than reach_m() from it.
+  /// Returns a sample within reach_m() of the pose.
   [[nodiscard]] const Place& near(Duration since) const { return places_[index(since / kStep)]; }
   [[nodiscard]] double reach_m() const { return reach_m_; }
 
@@ -41,10 +41,10 @@ class Track {
 
   std::vector<Place> places_;
   bool closed_;
-  double reach_m_ = 0; ///< the longest step
+  double reach_m_ = 0; ///< longest step
 };
 
-/// People and vehicles that go where their track says. Immutable, any thread.
+/// Person or vehicle that follows a track. Immutable, any thread.
 class Passer {
  public:
   enum class Kind : std::uint8_t { person, forklift, car, van };
@@ -55,10 +55,10 @@ class Passer {
     std::uint8_t reflectivity;
   };
 
-  /// At `begin` it is at the first place of its track, which others may share.
+  /// Starts at the first sample of its track at `begin`. Tracks may be shared.
   Passer(Kind kind, std::shared_ptr<const Track> track, Stamp begin);
 
-  /// What a ray meets of it within a range, if anything.
+  /// Returns the part hit by a ray within a range, if any.
   [[nodiscard]] std::optional<Met> met_by(const Ray& ray, double max_range_m, Stamp stamp) const;
   [[nodiscard]] double distance_m(const Eigen::Vector3d& point, Stamp stamp) const;
   [[nodiscard]] Place at(Stamp stamp) const { return track_->at(stamp - begin_); }
@@ -71,8 +71,8 @@ class Passer {
   Kind kind_;
   std::shared_ptr<const Track> track_;
   Stamp begin_;
-  std::vector<Surface> parts_; ///< of what has no limbs
-  double radius_m_;            ///< of the circle on the ground that holds it, wherever it is between two places
+  std::vector<Surface> parts_; ///< for objects without limbs
+  double radius_m_;            ///< of the enclosing circle on the ground, at any interpolated pose
 };
 
 } // namespace locus::sim

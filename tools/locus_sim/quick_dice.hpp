@@ -6,17 +6,17 @@
 
 namespace locus::sim {
 
-/// Chance for every single ray, of which there are 300 000 a second: a few nanoseconds a number, and the same numbers
-/// with every standard library. SplitMix64 (Steele, Lea and Flood, 2014). One owner.
+/// Random numbers per ray, 300 000 a second: a few nanoseconds each, identical with every standard library. SplitMix64
+/// (Steele, Lea and Flood, 2014). One owner.
 class QuickDice {
  public:
   explicit QuickDice(std::uint64_t seed) : state_(seed) {}
 
-  /// 0 .. 1, 1 left out.
+  /// Returns a number in [0, 1).
   double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
 
-  /// Of mean 0 and variance 1: the heads of 64 tossed coins, and two more numbers that fill the steps between whole
-  /// ones. They fall as a normal distribution does to within a thousandth.
+  /// Returns a number of mean 0 and variance 1: heads of 64 coin tosses, plus two uniform numbers that fill the steps
+  /// between integers. The distribution is normal to within a thousandth.
   double normal() {
     constexpr double kCoins = 64, kSigma = 4.020779361; // sqrt(64 / 4 + 2 / 12)
     const int heads = std::popcount(bits());

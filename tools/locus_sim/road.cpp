@@ -12,12 +12,12 @@
 namespace locus::sim {
 namespace {
 
-// The road from above: four lanes. On the second from inside robots drive, the first and the last belong to others, who
-// drive on the right; the third is free for who overtakes.
+// Plan view of the road: four lanes. Robots use the second from inside; traffic uses the first and the last, driving on
+// the right; the third is for overtaking.
 constexpr double kLane_m = 3.5, kInnerEdge_m = 1.5 * kLane_m, kOuterEdge_m = 2.5 * kLane_m; // from the robot's lane
 constexpr std::size_t kCorners = 24;
 
-/// Round the town, to the left.
+/// Lists the corners of the loop around the town, counterclockwise.
 std::vector<Eigen::Vector2d> corners() {
   std::vector<Eigen::Vector2d> all;
   for (std::size_t i = 0; i < kCorners; ++i) {
@@ -28,7 +28,7 @@ std::vector<Eigen::Vector2d> corners() {
   return all;
 }
 
-/// The loop as drivers take it, by its length: corners rounded over as many metres as a car takes.
+/// Centre line of the loop by length, its corners rounded to the curvature of a car.
 class Loop {
  public:
   Loop() : corners_(corners()) {
@@ -38,7 +38,7 @@ class Loop {
   }
   [[nodiscard]] double length_m() const { return ends_m_.back(); }
 
-  /// `aside_m` to the left, so inwards.
+  /// Returns a point; `aside_m` to the left, that is, inwards.
   [[nodiscard]] Eigen::Vector2d at(double along_m, double aside_m) const {
     const Eigen::Vector2d along = direction(along_m);
     return rounded(along_m) + aside_m * Eigen::Vector2d{-along.y(), along.x()};
@@ -69,7 +69,7 @@ class Loop {
   }
 
   std::vector<Eigen::Vector2d> corners_;
-  std::vector<double> ends_m_; ///< of each leg; the first: 0
+  std::vector<double> ends_m_; ///< of each leg; first element: 0
 };
 
 Roads roads() {
@@ -80,7 +80,7 @@ Roads roads() {
   return roads;
 }
 
-/// Asphalt, and grass as far as a lidar sees it.
+/// Builds asphalt, and grass as far as a lidar reaches.
 void ground(SceneBuilder& build, const Roads& roads, Dice& dice) {
   constexpr double kSite_m = 440, kSlab_m = 5, kSeen_m = 45;
   for (double x = -kSite_m; x < kSite_m; x += kSlab_m) {
@@ -95,7 +95,7 @@ void ground(SceneBuilder& build, const Roads& roads, Dice& dice) {
   }
 }
 
-/// Houses of two to four storeys, with porches; no two alike.
+/// Builds houses of two to four storeys, with porches, all different.
 void houses(SceneBuilder& build, const Loop& loop, Dice& dice) {
   for (const double side : {1.0, -1.0}) {
     for (double at = 0; at < loop.length_m() - 15; at += dice.between(16, 34)) {
@@ -130,7 +130,7 @@ void parked_car(SceneBuilder& build, Dice& dice, const Eigen::Vector2d& at, doub
   build.turned_box({at.x(), at.y(), 0.9}, {0.5 * long_m, wide_m - 0.2, 0.55}, yaw_rad, 15);
 }
 
-/// Poles and trees on both sides, parked cars at the outer one, and stretches of guard rail at the inner one.
+/// Adds poles and trees on both sides, parked cars on the outer one, and stretches of guard rail on the inner one.
 void roadside(SceneBuilder& build, Furnishing& furnish, const Loop& loop, Dice& dice) {
   const auto upright = [](const Eigen::Vector2d& at) { return Eigen::Vector3d{at.x(), at.y(), 0}; };
   for (double at = 0; at < loop.length_m() - 10; at += dice.between(24, 34)) {
@@ -157,7 +157,7 @@ void roadside(SceneBuilder& build, Furnishing& furnish, const Loop& loop, Dice& 
   }
 }
 
-/// Cars and vans that go round for ever, one behind the other.
+/// Adds cars and vans that circulate, one behind the other.
 void traffic(SceneBuilder& build, const Loop& loop, Dice& dice, double aside_m, double speed_mps) {
   constexpr double kStep_s = 0.1;
   const auto steps = static_cast<std::size_t>(loop.length_m() / std::abs(speed_mps) / kStep_s);

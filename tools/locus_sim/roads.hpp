@@ -9,20 +9,20 @@
 
 namespace locus::sim {
 
-/// Where robots drive in a world: straight lanes between places, seen from above. One owner.
+/// Road network of a world: straight lanes between places, in plan view. One owner.
 class Roads {
  public:
   struct Lane {
     std::size_t from, to; ///< places; robots use it in both directions
   };
 
-  /// Lanes from each place to the next; places already known (to a millimetre) are the same place.
+  /// Adds lanes from each place to the next; places closer than a millimetre are identical.
   void add(std::initializer_list<Eigen::Vector2d> polyline_m);
 
   [[nodiscard]] const std::vector<Eigen::Vector2d>& places_m() const { return places_m_; }
   [[nodiscard]] const std::vector<Lane>& lanes() const { return lanes_; }
 
-  /// From a point to the middle of the nearest lane.
+  /// Returns the distance from a point to the middle of the nearest lane.
   [[nodiscard]] double distance_m(const Eigen::Vector2d& point) const;
 
  private:

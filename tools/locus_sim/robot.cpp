@@ -21,13 +21,13 @@ struct Mounting {
 
 Pose pose_of(const Mounting& mounting) { return {from_rpy_rad(kRadPerDeg * mounting.rpy_deg), mounting.xyz_m}; }
 
-/// A VLS-128, which is for benchmarks alone, sees no farther there than a VLP-16.
+/// Returns the range; a VLS-128, here only for benchmarks, gets that of a VLP-16.
 double max_range_m(const LidarModel& model) {
   const auto* const named = std::ranges::find(kLidarModels, model, &NamedLidarModel::model);
   return named == kLidarModels.end() ? kLidarModels.front().max_range_m : named->max_range_m;
 }
 
-/// Lidars of one model, each turning a little faster or slower than it should and with a phase of its own.
+/// Returns lidars of one model, each with a deviation in rotation rate and a random phase.
 std::vector<NamedLidar> lidars(std::span<const Mounting> mountings, const SensorChoice& choice, Dice& dice) {
   std::vector<NamedLidar> all;
   for (const Mounting& mounting : mountings.first(static_cast<std::size_t>(choice.lidars))) {
@@ -64,11 +64,11 @@ Eigen::Vector3d anywhere(Dice& dice, double reach) {
   return {x, y, z};
 }
 
-/// Either sign, between half and the whole of it: a real sensor is never perfect.
+/// Returns a random error of either sign, between half of `size` and `size`: no real sensor is perfect.
 double about(Dice& dice, double size) { return (dice.chance(0.5) ? 1 : -1) * dice.between(0.5, 1) * size; }
 
-/// An industrial MEMS unit, its gyro calibrated at rest before the start. What its data sheet says, not what its best
-/// specimen does.
+/// Returns the errors of an industrial MEMS unit, its gyro calibrated at rest before the start; values of the data
+/// sheet, not those of its best specimens.
 ImuFaults imu_faults(Dice& dice, double vibration_mps2) {
   return {.gyro_bias_radps = anywhere(dice, 0.0015),
           .gyro_noise_radps = 0.003,
@@ -82,7 +82,7 @@ ImuFaults imu_faults(Dice& dice, double vibration_mps2) {
           .heading_rad = dice.between(-std::numbers::pi, std::numbers::pi)};
 }
 
-/// On the robot; or in its lidars, where these bring their own.
+/// Mounts an IMU on the robot, or in its lidars if these have their own.
 void fit_imu(Robot& robot, const SensorChoice& choice, double vibration_mps2, const Pose& T_base_imu, Dice& dice) {
   const auto faults = [&] { return choice.noise ? imu_faults(dice, vibration_mps2) : ImuFaults{}; };
   robot.sensors.imu.reset();
@@ -93,7 +93,7 @@ void fit_imu(Robot& robot, const SensorChoice& choice, double vibration_mps2, co
       lidar.imu = faults();
 }
 
-/// Every so often the wrist turns, up to 4 rad/s fast, mostly to the side.
+/// Generates occasional rotations of the wrist, at up to 4 rad/s, mostly in yaw.
 std::vector<Flick> flicks(double per_min, Duration duration, Dice& dice) {
   constexpr double kPeak_radps = 4, kPeakOfMean = 1.875;
   std::vector<Flick> all;
@@ -127,7 +127,7 @@ Robot make_husky(const SensorChoice& choice, std::uint64_t seed) {
       {17.3, {0.0001, 0.0001, 0.00015}, kRadPerDeg * Eigen::Vector3d{0.04, 0.05, 0.01}, 2.0}}; // drive train
   robot.sensors.lidars = lidars(kLidars, choice, dice);
   fit_imu(robot, choice, 0.4, {Eigen::Quaterniond::Identity(), {0, 0, 0.3}}, dice);
-  OdometryFaults wheels{.spinning_mps = robot.agility.cruise_mps}; // spinning wheels are no fault of a sensor
+  OdometryFaults wheels{.spinning_mps = robot.agility.cruise_mps}; // wheel spin is not a sensor fault
   if (choice.noise) {
     wheels.scale_error = about(dice, 0.015);
     wheels.noise_m_per_sqrt_m = 0.006;
@@ -184,14 +184,14 @@ Robot make_handheld(const SensorChoice& choice, std::uint64_t seed) {
   Dice dice(seed);
   Robot robot;
   robot.agility = {.cruise_mps = 1.2,
-                   .turn_rate_radps = 1.6, // and what the gait adds
+                   .turn_rate_radps = 1.6, // plus that of the gait
                    .acceleration_mps2 = 0.9,
                    .sudden_mps2 = 2,
                    .sudden_share = 0.2,
                    .flicks_per_min = 4};
-  robot.ride.base_height_m = dice.between(1.25, 1.45); // and the lidar a hand above it
+  robot.ride.base_height_m = dice.between(1.25, 1.45); // plus the lidar, a hand above it
   robot.ride.oscillations = {
-      {0.45, {0.02, 0.15, 0}, kRadPerDeg * Eigen::Vector3d{3, 2, 6}, 0.2},     // the arm swings it from side to side
+      {0.45, {0.02, 0.15, 0}, kRadPerDeg * Eigen::Vector3d{3, 2, 6}, 0.2},     // the arm swings it sideways
       {0.95, {0.01, 0.02, 0.005}, kRadPerDeg * Eigen::Vector3d{1.5, 1, 2}, 1}, // the stride
       {1.9, {0.01, 0, 0.02}, kRadPerDeg * Eigen::Vector3d{0.3, 1, 0.3}, 1.7}}; // its two steps
   robot.sensors.lidars = lidars(kLidars, choice, dice);
@@ -240,7 +240,7 @@ Trajectory drive_about(const World& world, const Robot& robot, Duration duration
                        std::uint64_t seed) {
   Duration driving = duration;
   for (const Slip& slip : slips)
-    driving -= slip.to - slip.from; // the course goes on where it stood still
+    driving -= slip.to - slip.from; // the course resumes where it stopped
   Dice dice(seed + 1);
   Agility agility = robot.agility;
   agility.cruise_mps = std::min(agility.cruise_mps, world.max_speed_mps);

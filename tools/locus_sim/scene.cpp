@@ -12,13 +12,13 @@
 namespace locus::sim {
 namespace {
 
-constexpr double kFar_m = 1e30;                 // where no ray comes
-constexpr std::uint32_t kSurface = 0x8000'0000; // with the index of a surface, in place of that of a node
+constexpr double kFar_m = 1e30;                 // beyond any ray
+constexpr std::uint32_t kSurface = 0x8000'0000; // flag of a surface index, as opposed to a node index
 constexpr std::size_t kStackSize = 256;         // three more per level
-constexpr float kSlack_m = 1e-3F;               // boxes are larger by this: more than single precision can be wrong by
+constexpr float kSlack_m = 1e-3F;               // margin of boxes, above the error of single precision
 
-/// Children to be looked into, unless something nearer has been found. Two arrays: what is written as two halves and
-/// read as a whole a moment later makes the processor wait.
+/// Nodes still to visit, unless a nearer hit is found. Two arrays: reading two separately written halves as a whole
+/// would stall the processor (store forwarding).
 struct Waiting {
   std::array<std::uint32_t, kStackSize> child;
   std::array<float, kStackSize> enter_m;
@@ -29,7 +29,7 @@ Bounds bounds_of(const Surface& surface) {
 }
 
 const Bounds kOutOfReach{Eigen::Vector3d::Constant(kFar_m), Eigen::Vector3d::Constant(kFar_m)};
-const Bounds kNoBounds{Eigen::Vector3d::Constant(kNowhere), Eigen::Vector3d::Constant(-kNowhere)}; // of nothing yet
+const Bounds kNoBounds{Eigen::Vector3d::Constant(kNowhere), Eigen::Vector3d::Constant(-kNowhere)}; // empty union
 
 Bounds bounds_of(std::span<const Surface> surfaces) {
   Bounds all = surfaces.empty() ? kOutOfReach : kNoBounds;
@@ -61,7 +61,7 @@ bool passes_through(const Eigen::Array3d& origin, const Eigen::Array3d& inverse,
   return std::max(0.0, a.min(b).maxCoeff()) <= std::min(max_range_m, a.max(b).minCoeff());
 }
 
-/// Of every ray its own, whatever rays were cast before.
+/// Seeds by the ray, so that the result does not depend on earlier rays.
 QuickDice dice_of(const Ray& ray, Stamp stamp) {
   auto seed = static_cast<std::uint64_t>(stamp.time_since_epoch().count());
   for (const double coordinate : ray.direction)
@@ -81,7 +81,7 @@ Bounds Mover::bounds() const {
   return united({own.min_m + from_m, own.max_m + from_m}, {own.min_m + to_m, own.max_m + to_m});
 }
 
-/// Sorts surfaces into a tree.
+/// Sorts surfaces into a bounding volume hierarchy.
 class Scene::TreeMaker {
  public:
   TreeMaker(std::vector<Surface>& surfaces, std::vector<Node>& nodes) : surfaces_(surfaces), nodes_(nodes) {
@@ -102,7 +102,7 @@ class Scene::TreeMaker {
   }
 
  private:
-  struct Bin { // surfaces whose middles lie in one slice of a range
+  struct Bin { // surfaces with centres in one slice of a range
     Bounds box = kNoBounds;
     std::size_t count = 0;
 
@@ -112,7 +112,7 @@ class Scene::TreeMaker {
     }
     [[nodiscard]] double cost() const { return count == 0 ? 0 : static_cast<double>(count) * area_m2(box); }
   };
-  struct Cut { // surfaces with a middle below it go to one side
+  struct Cut { // surfaces with centres below it go to one side
     Eigen::Index axis = 0;
     double at_m = 0, cost = kNowhere;
   };
@@ -121,7 +121,7 @@ class Scene::TreeMaker {
     const std::size_t middle = split(begin, end);
     const std::array<std::size_t, 5> limits{begin, split(begin, middle), middle, split(middle, end), end};
     Node node;
-    node.child.fill(kSurface); // also of an empty lane, whose box is out of reach
+    node.child.fill(kSurface); // also for an empty lane, whose box is out of reach
     for (std::size_t lane = 0; lane < 4; ++lane) {
       const std::size_t from = limits[lane], to = limits[lane + 1];
       const Bounds box = bounds_over(from, to);
@@ -144,7 +144,7 @@ class Scene::TreeMaker {
     return all;
   }
 
-  /// Parts a range in two where fewest surfaces are met, the chance to meet a box being as its area.
+  /// Splits a range in two at the least expected cost; the probability to hit a box is proportional to its area.
   std::size_t split(std::size_t begin, std::size_t end) {
     if (end - begin < 2)
       return end;
@@ -157,7 +157,7 @@ class Scene::TreeMaker {
       if (cut.cost < best.cost)
         best = cut;
     }
-    if (best.cost == kNowhere) // all about one point
+    if (best.cost == kNowhere) // all centres coincide
       return begin + (end - begin) / 2;
     const auto at = [&](std::size_t place) { return order_.begin() + static_cast<std::ptrdiff_t>(place); };
     const auto middle = std::stable_partition(at(begin), at(end),
@@ -194,7 +194,7 @@ class Scene::TreeMaker {
   std::vector<Surface>& surfaces_;
   std::vector<Node>& nodes_;
   std::vector<std::uint32_t> order_;
-  std::vector<Bounds> bounds_; ///< of the surfaces as they came, as the next
+  std::vector<Bounds> bounds_; ///< in input order, like the next
   std::vector<Eigen::Vector3d> middles_m_;
 };
 
@@ -243,7 +243,7 @@ void Scene::cast_at_surfaces(const Ray& ray, Met& nearest) const {
       const auto j = static_cast<Eigen::Index>(lane);
       if (enter[j] > leave[j])
         continue;
-      std::size_t place = depth++; // the nearest on top: what it holds often hides the others
+      std::size_t place = depth++; // nearest on top: it often hides the others
       for (; place > first_child && waiting.enter_m[place - 1] < enter[j]; --place)
         put(place, waiting.child[place - 1], waiting.enter_m[place - 1]);
       put(place, node.child[lane], enter[j]);
@@ -301,7 +301,7 @@ std::optional<Hit> Scene::cast_at_solid(const Ray& ray, double max_range_m, Stam
 
 std::optional<Hit> Scene::through_steam(const Ray& ray, const std::optional<Hit>& solid, double max_range_m,
                                         Stamp stamp, QuickDice& dice) const {
-  constexpr double kDimmest = 2, kBrightest = 8; // as grains of dust
+  constexpr double kDimmest = 2, kBrightest = 8; // as for dust grains
   const auto echo_m = steam_.range_m(ray, solid ? solid->range_m : max_range_m, stamp, dice);
   if (!echo_m)
     return std::nullopt;
@@ -310,7 +310,7 @@ std::optional<Hit> Scene::through_steam(const Ray& ray, const std::optional<Hit>
              .range_m = *echo_m,
              .cos_incidence = 1,
              .reflectivity = reflectivity,
-             .surface = solid ? solid->surface : nullptr, // the next ray may pass
+             .surface = solid ? solid->surface : nullptr, // guess for the next ray, which may pass
              .normal = -ray.direction,
              .apparent = true};
 }
@@ -346,7 +346,7 @@ double Scene::distance_to_surface(const Eigen::Vector3d& point, Stamp stamp) con
   }
   for (const Passer& passer : passers_)
     nearest = std::min(nearest, passer.distance_m(point, stamp));
-  struct Near { // the squared distance to the box of a child
+  struct Near { // squared distance to the box of a child
     double squared_m2;
     std::uint32_t child;
   };
@@ -372,7 +372,7 @@ double Scene::distance_to_surface(const Eigen::Vector3d& point, Stamp stamp) con
       }
       waiting.push_back({squared_distance(box, point), node.child[lane]});
     }
-    std::sort(waiting.end() - 4, waiting.end(), // the nearest is looked at first and rules the others out
+    std::sort(waiting.end() - 4, waiting.end(), // the nearest is visited first and prunes the others
               [](const Near& a, const Near& b) { return a.squared_m2 > b.squared_m2; });
   }
   return nearest;

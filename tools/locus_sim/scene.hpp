@@ -16,19 +16,19 @@
 
 namespace locus::sim {
 
-/// Something upright that goes to and fro between two places: a person, a forklift.
+/// Upright object that moves to and fro between two places: a person, a forklift.
 struct Mover {
-  std::vector<Surface> parts;   ///< around the origin
+  std::vector<Surface> parts;   ///< relative to the origin
   Eigen::Vector3d from_m, to_m; ///< of the origin
   double period_s;              ///< there and back
-  double phase = 0;             ///< of a period, 0..1
+  double phase = 0;             ///< share of a period, 0..1
 
   [[nodiscard]] Eigen::Vector3d position_m(Stamp stamp) const;
-  [[nodiscard]] Bounds bounds() const; ///< of all it ever reaches
+  [[nodiscard]] Bounds bounds() const; ///< of all its positions
 };
 
-/// A world that can be asked, exactly, what a ray meets. Once it is furnished immutable, any thread. A tree of bounding
-/// boxes makes a ray cost the logarithm of the number of surfaces, so a street of 15 km needs no trick.
+/// World for exact ray casting. Immutable once built, any thread. A hierarchy of bounding boxes makes the cost of a ray
+/// logarithmic in the number of surfaces, even for a road of 15 km.
 class Scene {
  public:
   explicit Scene(std::vector<Surface> surfaces, std::vector<Mover> movers = {}, std::vector<Passer> passers = {});
@@ -37,25 +37,25 @@ class Scene {
   void add(Steam steam) { steam_ = std::move(steam); }
   void add(const Mirrors& mirrors) { mirrors_ = mirrors; }
 
-  /// The first surface within `max_range_m`, or nothing; or what steam and mirrors make of it. Where nothing moves, any
-  /// stamp will do. `guess`, the surface that a ray like this one has met, makes it faster.
+  /// Returns the first surface within `max_range_m`, if any, with the effects of steam and mirrors. The stamp matters
+  /// only with moving objects. `guess`, the surface hit by a similar ray, speeds it up.
   [[nodiscard]] std::optional<Hit> cast(const Ray& ray, double max_range_m, Stamp stamp = {},
                                         const Surface* guess = nullptr) const;
 
-  /// From the point to the nearest surface, seen or hidden.
+  /// Returns the distance from the point to the nearest surface, visible or not.
   [[nodiscard]] double distance_to_surface(const Eigen::Vector3d& point, Stamp stamp = {}) const;
 
-  [[nodiscard]] const std::vector<Surface>& surfaces() const { return surfaces_; } ///< all that stands still
-  [[nodiscard]] const Bounds& bounds() const { return bounds_; }                   ///< of them
+  [[nodiscard]] const std::vector<Surface>& surfaces() const { return surfaces_; } ///< static surfaces
+  [[nodiscard]] const Bounds& bounds() const { return bounds_; }                   ///< of the static surfaces
   [[nodiscard]] const std::vector<Passer>& passers() const { return passers_; }
   [[nodiscard]] const Steam& steam() const { return steam_; }
 
  private:
-  /// Four children, one per lane. Single precision finds who may be met; where, is reckoned in double precision.
+  /// Four children, one per lane. Candidates are found in single precision; hits are computed in double precision.
   struct Node {
     using Lanes = Eigen::Array4f;
     std::array<Lanes, 3> min_m, max_m;  ///< of x, y and z
-    std::array<std::uint32_t, 4> child; ///< a node, or a surface, which is marked
+    std::array<std::uint32_t, 4> child; ///< node, or surface with kSurface set
   };
   class TreeMaker;
   struct Met {
@@ -73,8 +73,8 @@ class Scene {
   void cast_at_surfaces(const Ray& ray, Met& nearest) const;
   void cast_at_movers(const Ray& ray, Stamp stamp, Met& nearest) const;
 
-  std::vector<Surface> surfaces_; ///< in the order of the tree
-  std::vector<Node> nodes_;       ///< the last one is the root
+  std::vector<Surface> surfaces_; ///< in tree order
+  std::vector<Node> nodes_;       ///< root last
   std::vector<Mover> movers_;
   std::vector<Bounds> mover_bounds_;
   std::vector<Passer> passers_;

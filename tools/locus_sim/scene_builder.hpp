@@ -10,7 +10,7 @@
 
 namespace locus::sim {
 
-/// Collects surfaces, given as an architect would: by corners and centres on the floor. One owner.
+/// Collects surfaces, specified in an architect's terms: by corners and centres on the floor. One owner.
 class SceneBuilder {
  public:
   void rectangle(const Eigen::Vector3d& corner, const Eigen::Vector3d& u, const Eigen::Vector3d& v,

@@ -8,11 +8,11 @@
 
 namespace locus::sim {
 
-/// Remembers where echoes came from, in cubes of half a metre: the true map holds what was seen, and no hidden sides.
+/// Records the origins of echoes in cubes of half a metre: the true map contains only observed space, no hidden sides.
 /// One owner.
 class SeenSpace {
  public:
-  /// What lies beyond the bounds is not remembered.
+  /// Ignores points outside the bounds.
   explicit SeenSpace(const Bounds& bounds)
       : origin_m_(bounds.min_m.array() - kCube_m),
         size_(((bounds.max_m - origin_m_) / kCube_m).array().ceil().cast<std::ptrdiff_t>() + 1),
@@ -29,7 +29,7 @@ class SeenSpace {
     return contains(cube) && seen_[index(cube)];
   }
 
-  /// Whether there is any such cube within bounds, or at their edge.
+  /// Returns whether there is any such cube within bounds, or at their edge.
   [[nodiscard]] bool reaches_into(const Bounds& bounds) const {
     const Cube first = cube_of(bounds.min_m).max(0), last = cube_of(bounds.max_m).min(size_ - 1);
     for (std::ptrdiff_t z = first.z(); z <= last.z(); ++z)

@@ -9,10 +9,10 @@
 namespace locus::sim {
 namespace {
 
-constexpr double kTouching_m = 1e-9; // a ray that starts on a surface leaves it
-constexpr double kSeam = 1e-9;       // of an edge: no ray slips through between two triangles
+constexpr double kTouching_m = 1e-9; // a ray that starts on a surface does not hit it
+constexpr double kSeam = 1e-9;       // tolerance of edges: no ray slips through between two triangles
 
-/// Smaller root of t^2 + 2 b t + c = 0 in front of the origin that `accepts`, infinity when there is none.
+/// Returns the smaller root of t^2 + 2 b t + c = 0 in front of the origin that `accepts`; infinity if there is none.
 template <class Accepts> double first_root(double b, double c, Accepts accepts) {
   const double discriminant = b * b - c;
   if (discriminant < 0)
@@ -24,7 +24,7 @@ template <class Accepts> double first_root(double b, double c, Accepts accepts) 
   return kNowhere;
 }
 
-/// Where a ray enters and leaves an axis-aligned box; it misses when enter > leave.
+/// Entry and exit of a ray through an axis-aligned box; a miss if enter > leave.
 struct Passage {
   double enter, leave;
 };
@@ -40,7 +40,7 @@ Passage passage(const Bounds& box, const Eigen::Vector3d& origin, const Eigen::V
   return through;
 }
 
-/// Finite even where the ray runs along an axis, so that no 0 * infinity arises on the face of a box.
+/// Returns finite values even for a ray along an axis, to avoid 0 * infinity on the face of a box.
 Eigen::Vector3d inverse(const Eigen::Vector3d& direction) {
   return direction.unaryExpr([](double d) { return 1.0 / (d == 0.0 ? 1e-300 : d); });
 }
@@ -99,7 +99,7 @@ double Triangle::range_m(const Ray& ray) const {
 
 Eigen::Vector3d Triangle::normal(const Eigen::Vector3d&) const { return edge_u_m.cross(edge_v_m).normalized(); }
 
-/// Over its inside, else over the nearest of its edges.
+/// Returns the distance to the inside, else to the nearest edge.
 double Triangle::distance_m(const Eigen::Vector3d& point) const {
   const Eigen::Vector3d from_corner = point - corner_m, normal_m2 = edge_u_m.cross(edge_v_m);
   const double u = from_corner.cross(edge_v_m).dot(normal_m2) / normal_m2.squaredNorm();
@@ -152,7 +152,7 @@ Bounds Box::bounds() const {
 double Cylinder::range_m(const Ray& ray) const {
   const Eigen::Vector3d from_base = ray.origin_m - base_m;
   const double along = axis.dot(ray.direction), begin = axis.dot(from_base);
-  const double a = 1 - along * along; // of the direction across the axis, squared
+  const double a = 1 - along * along; // squared component across the axis
   if (a < 1e-12)
     return kNowhere;
   const double b = (from_base.dot(ray.direction) - begin * along) / a;

@@ -9,9 +9,9 @@
 
 namespace locus::sim {
 
-inline constexpr double kNowhere = std::numeric_limits<double>::infinity(); ///< along a ray that meets nothing
+inline constexpr double kNowhere = std::numeric_limits<double>::infinity(); ///< range of a ray without hit
 
-/// A ray from a point in a direction of unit length, world frame.
+/// Ray with a direction of unit length, world frame.
 struct Ray {
   Eigen::Vector3d origin_m;
   Eigen::Vector3d direction;
@@ -22,12 +22,12 @@ struct Bounds {
   Eigen::Vector3d min_m, max_m;
 };
 
-/// The bounds of both.
+/// Returns the union of both.
 Bounds united(const Bounds& a, const Bounds& b);
 
-/// The shapes a scene is made of. Each is a surface without thickness, seen from both sides, and answers four
-/// questions: where a ray first meets it (metres along the ray, or kNowhere), its unit normal (to either
-/// side) nearest to a point on it, how far a point is from it, and its bounds.
+/// Shapes of a scene. Each is a surface without thickness, visible from both sides, that provides the range of a ray's
+/// first hit (metres along the ray, or kNowhere), the unit normal (of either sign) at the nearest point, the distance
+/// of a point, and its bounds.
 
 struct Rectangle {
   Eigen::Vector3d corner_m;
@@ -39,7 +39,7 @@ struct Rectangle {
   [[nodiscard]] Bounds bounds() const;
 };
 
-/// Upright box, turned about z. From inside it is a room.
+/// Upright box, turned about z. Viewed from inside it is a room.
 struct Box {
   Eigen::Vector3d center_m;
   Eigen::Vector3d half_size_m;
@@ -84,7 +84,7 @@ struct Sphere {
   [[nodiscard]] Bounds bounds() const;
 };
 
-/// A shape with the brightness that a lidar sees.
+/// Shape with the reflectivity measured by a lidar.
 struct Surface {
   std::variant<Rectangle, Triangle, Box, Cylinder, Sphere> shape;
   std::uint8_t reflectivity = 50;

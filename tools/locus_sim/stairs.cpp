@@ -5,12 +5,12 @@
 namespace locus::sim {
 namespace {
 
-constexpr int kSteps = 17; // of a flight
+constexpr int kSteps = 17; // per flight
 constexpr double kTread_m = 0.29, kRise_m = 0.175;
 constexpr double kFlight_m = kSteps * kTread_m, kStorey_m = kSteps * kRise_m;
 constexpr double kCorridor_m = 20, kLandingX = kFlight_m + 2.6;
 
-// The first flight climbs along x, the second one beside it climbs back.
+// The first flight climbs along x, the second one, beside it, climbs back.
 constexpr double kFirstY = -1.4, kBetweenY = 1.4, kSecondY = 1.8, kEndY = 4.6;
 constexpr double kCeiling_m = 2.7;
 
@@ -28,7 +28,7 @@ void flights(SceneBuilder& build) {
   }
 }
 
-/// A corridor with door frames at uneven distances.
+/// Builds a corridor with unevenly spaced door frames.
 void corridor(SceneBuilder& build, Furnishing& furnish, Dice& dice, const Area& area, double floor_z) {
   furnish.slabs(area, floor_z, 30);
   furnish.slabs(area, floor_z + kCeiling_m, 60);
@@ -50,7 +50,7 @@ void stairwell(SceneBuilder& build, Furnishing& furnish) {
   furnish.slabs({{kFlight_m, kFirstY}, {kLandingX, kEndY}}, kStorey_m, 40);
   build.rectangle({0, kFirstY, kCeiling_m}, {0, kBetweenY - kFirstY, 0}, {0, 0, top - kCeiling_m}, 62);
   build.rectangle({0, kBetweenY, 0}, {0, kEndY - kBetweenY, 0}, {0, 0, 2 * kStorey_m}, 62);
-  // Beyond the landing the middle storey goes on behind its doorway.
+  // Beyond the landing the middle storey continues behind its doorway.
   build.rectangle({kLandingX, kBetweenY, 0}, {0, kEndY - kBetweenY, 0}, up, 62);
   build.rectangle({kLandingX, kFirstY, 0}, {0, kBetweenY - kFirstY, 0}, {0, 0, kStorey_m}, 62);
   build.rectangle({kLandingX, kFirstY, kStorey_m + kCeiling_m}, {0, kBetweenY - kFirstY, 0},

@@ -8,7 +8,7 @@
 namespace locus::sim {
 namespace {
 
-constexpr double kThickest_per_m = 3; // one sees a metre far
+constexpr double kThickest_per_m = 3; // visibility of one metre
 constexpr Duration kSecond = std::chrono::seconds{1};
 
 double age(const Cloud& cloud, Stamp stamp) {
@@ -19,7 +19,7 @@ double age(const Cloud& cloud, Stamp stamp) {
 
 double extinction_per_m(const Cloud& cloud, Stamp stamp) { return kThickest_per_m * (1 - age(cloud, stamp)); }
 
-/// Fast at first.
+/// Returns the radius; growth is fast at first.
 double radius_m(const Cloud& cloud, Stamp stamp) {
   return cloud.first_radius_m + (cloud.last_radius_m - cloud.first_radius_m) * std::sqrt(age(cloud, stamp));
 }
@@ -39,7 +39,7 @@ Steam::Steam(std::vector<Cloud> clouds) : clouds_(std::move(clouds)) {
   }
 }
 
-/// How deep light goes before it is thrown back falls exponentially.
+/// Samples the penetration depth of light, which is exponentially distributed.
 std::optional<double> Steam::range_m(const Ray& ray, double max_range_m, Stamp stamp, QuickDice& dice) const {
   const auto second = static_cast<std::size_t>(std::max<Duration::rep>(0, (stamp - begin_) / kSecond));
   if (second >= in_second_.size() || stamp < begin_)

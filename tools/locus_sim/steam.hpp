@@ -11,7 +11,7 @@
 
 namespace locus::sim {
 
-/// A burst of steam or dust: stays where it is, grows, thins and is gone.
+/// Burst of steam or dust: stationary; it grows, thins and disappears.
 struct Cloud {
   Eigen::Vector3d center_m;
   double first_radius_m, last_radius_m;
@@ -23,7 +23,8 @@ class Steam {
  public:
   explicit Steam(std::vector<Cloud> clouds);
 
-  /// Where along a ray, within a range, light is thrown back by a cloud; nothing where it passes through them all.
+  /// Returns the distance along a ray at which a cloud scatters the light back; nothing if it passes through all of
+  /// them.
   [[nodiscard]] std::optional<double> range_m(const Ray& ray, double max_range_m, Stamp stamp, QuickDice& dice) const;
 
   [[nodiscard]] const std::vector<Cloud>& clouds() const { return clouds_; }
@@ -31,10 +32,10 @@ class Steam {
  private:
   std::vector<Cloud> clouds_;
   Stamp begin_;
-  std::vector<std::vector<std::size_t>> in_second_; ///< since the begin: which clouds there are
+  std::vector<std::vector<std::size_t>> in_second_; ///< clouds present in each second since the start
 };
 
-/// How much of the light a metre of a cloud takes, 1/m: visibility is three over it (Koschmieder).
+/// Returns the extinction coefficient of a cloud, 1/m: visibility is three over it (Koschmieder).
 double extinction_per_m(const Cloud& cloud, Stamp stamp);
 double radius_m(const Cloud& cloud, Stamp stamp);
 

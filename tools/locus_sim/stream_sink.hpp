@@ -7,13 +7,13 @@
 
 namespace locus::sim {
 
-/// A capture on standard output, for a program that plays it on as it comes (`locus-sim -o - | locus-play -`).
+/// Capture on standard output, to be played as it is produced (`locus-sim -o - | locus-play -`).
 ///
-/// The stream is a pcap file (nanoseconds, Ethernet, IPv4, UDP), its packets in the order of arrival. The datagrams of
-/// the lidars stand in it as in lidar.pcap. The other files of a capture folder come in pieces: a datagram from
-/// 127.0.0.1 to 127.0.0.1, port 9, whose payload is the name of the file, a line feed, and whole lines to be appended
-/// to it. config.yaml comes first and in one piece, its packet stamped with the start. There is no gt_map.ply: what was
-/// seen is known only at the end. Any reader of pcap files can look at it, and all but the texts can be replayed.
+/// The stream is a pcap file (nanoseconds, Ethernet, IPv4, UDP), its packets in order of arrival. The lidars' datagrams
+/// are stored as in lidar.pcap. The other files of a capture folder are split: a datagram from 127.0.0.1 to 127.0.0.1,
+/// port 9, has as payload the name of the file, a line feed, and whole lines to append to it. config.yaml comes first
+/// and in one piece, its packet stamped with the start. There is no gt_map.ply: observed space is known only at the
+/// end. Any reader of pcap files can open the stream, and everything but the texts can be replayed.
 class StreamSink : public CaptureSink {
  public:
   StreamSink();

@@ -9,17 +9,17 @@
 
 namespace locus::sim {
 
-/// Where the texts in a stream come from and go to: this host's discard port, so that nobody takes them for a lidar's.
+/// Source and destination of texts in a stream: this host's discard port, never that of a lidar.
 inline constexpr std::uint32_t kTextAddress = 0x7F00'0001;
 inline constexpr std::uint16_t kTextPort = 9;
 
-/// Whole lines to be appended to one of the files of a capture folder, as they stand in a stream (see StreamSink). Owns
-/// nothing.
+/// Whole lines to append to one of the files of a capture folder, as in a stream (see StreamSink). Does not own its
+/// data.
 struct StreamText {
   std::string_view file;
   std::string_view lines;
 
-  /// Nothing for what is no text.
+  /// Returns nothing if the datagram is not a text.
   static std::optional<StreamText> of(const Datagram& datagram) {
     if (datagram.source_ip != kTextAddress || datagram.destination_port != kTextPort)
       return std::nullopt;

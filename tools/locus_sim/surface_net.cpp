@@ -8,7 +8,7 @@
 namespace locus::sim {
 namespace {
 
-/// The function, sampled.
+/// Samples the function on a lattice.
 class Lattice {
  public:
   using Index = Eigen::Array<std::ptrdiff_t, 3, 1>;
@@ -30,7 +30,7 @@ class Lattice {
   }
   [[nodiscard]] bool crossed(const Index& a, const Index& b) const { return (at(a) > 0) != (at(b) > 0); }
 
-  /// The vertex of a cell, named by its lowest corner.
+  /// Returns the vertex of a cell, given by its lowest corner.
   [[nodiscard]] Eigen::Vector3d vertex_m(const Index& cell) const {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     int crossings = 0;

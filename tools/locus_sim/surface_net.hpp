@@ -7,12 +7,12 @@
 
 namespace locus::sim {
 
-/// Adds the surface on which a function of space is zero, as triangles about `cell_m` large. Inside the bounds alone.
-/// The function, asked for in columns from below to above, should change by about one per metre near its zero, and tell
-/// air (above zero) from rock elsewhere.
+/// Adds the zero level set of a function of space, as triangles of about `cell_m`, inside the bounds only. The
+/// function, evaluated in columns from bottom to top, should have a slope of about one per metre near its zero, and the
+/// right sign elsewhere: positive in air, negative in rock.
 ///
 /// Naive surface nets: one vertex in every cell that the surface crosses, at the mean of the crossings of its edges;
-/// one pair of triangles about every edge of the lattice that it crosses.
+/// one pair of triangles around every lattice edge that it crosses.
 void add_surface(SceneBuilder& build, const Bounds& bounds, double cell_m,
                  const std::function<double(const Eigen::Vector3d&)>& air, std::uint8_t bright);
 

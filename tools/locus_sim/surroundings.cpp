@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kPercent = 0.01;
 
-/// Bursts of 2 to 5 s, at any time, within 3 m of where the robot is about to be, from the floor to the height of a
-/// man.
+/// Generates bursts of 2 to 5 s, at random times, within 3 m of the path ahead of the robot, from the floor to the
+/// height of a person.
 std::vector<Cloud> bursts(const Way& way, double per_min, Dice& dice) {
   constexpr double kStepsPerMin = 600, kNearTheWay_m = 3;
   const double expected = per_min * static_cast<double>(way.steps()) / kStepsPerMin;
@@ -37,7 +37,7 @@ std::vector<Cloud> bursts(const Way& way, double per_min, Dice& dice) {
 
 bool surround(World& world, const Robot& robot, const Trajectory& trajectory, const Imperfections& imperfections,
               std::uint64_t seed) {
-  constexpr std::uint64_t kVehicle = 1, kPeople = 2, kSteam = 3, kMirrors = 4; // each has its own dice
+  constexpr std::uint64_t kVehicle = 1, kPeople = 2, kSteam = 3, kMirrors = 4; // independent random numbers for each
   const auto seed_of = [&](std::uint64_t purpose) { return seed + 0x5EED'0000'0000U * purpose; };
   bool has_room = true;
   const bool moves = imperfections.vehicle_s_per_min > 0 || imperfections.people > 0 || imperfections.steam_per_min > 0;

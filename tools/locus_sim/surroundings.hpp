@@ -9,9 +9,9 @@
 
 namespace locus::sim {
 
-/// Puts into a world what comes and goes about a robot on its drive, and what mirrors: people, a vehicle alongside,
-/// steam, wet floor, glass. The seed decides where and when; what is not asked for leaves the rest as it is.
-/// False: a vehicle is asked for, and nowhere on this drive is there room for one.
+/// Adds moving and reflecting things to the world around a robot's drive: people, a vehicle alongside, steam, wet
+/// floor, glass. The seed determines places and times; each is independent of the others. Returns false if a vehicle is
+/// requested but there is no room for one anywhere on this drive.
 bool surround(World& world, const Robot& robot, const Trajectory& trajectory, const Imperfections& imperfections,
               std::uint64_t seed);
 

@@ -18,21 +18,21 @@ namespace locus::sim {
 namespace {
 
 constexpr double kTurn_rad = 2 * std::numbers::pi;
-constexpr double kTellingApart_m = 1.0; // echoes nearer to each other than this are one
+constexpr double kTellingApart_m = 1.0; // closer echoes merge into one
 constexpr int kDataPacketsPerPosition = 5;
 
-// A Gaussian beam is narrowed down to five rays that have its moments up to the fifth (Gauss-Hermite): the middle, and
-// four at the square root of three of its standard deviations. The divergence, to 1/e^2 of its brightness, is four.
+// A Gaussian beam is reduced to five rays that match its moments up to the fifth (Gauss-Hermite): the centre, and four
+// at the square root of three of its standard deviations. The divergence, to 1/e^2 of its brightness, is four of them.
 constexpr double kSideWeight = 1.0 / 6;
-const double kSideAt = std::sqrt(3.0) / 4; // of the divergence
-constexpr double kNarrowness = 0.5;     // of the beam from top to bottom: 1.5 mrad of 3.0, VLP-16 user manual 63-9243
-constexpr double kPartingStep_m = 0.03; // smaller steps are lost in the noise
-constexpr std::size_t kColumnsPerGlance = 8; // an edge that lies along the turn is crossed slowly
+const double kSideAt = std::sqrt(3.0) / 4; // in units of the divergence
+constexpr double kNarrowness = 0.5; // vertical to horizontal divergence: 1.5 to 3.0 mrad, VLP-16 user manual 63-9243
+constexpr double kPartingStep_m = 0.03;      // smaller steps vanish in the noise
+constexpr std::size_t kColumnsPerGlance = 8; // an edge along the rotation is crossed slowly
 
-constexpr double kMostSlant = 3; // times the slant that kSlant_deg is at kSlantRange_m; beyond there is hardly an echo
-constexpr double kWhite = 100;   // Velodyne's scale: the brightest that does not throw the light straight back
+constexpr double kMostSlant = 3; // in units of the slant at kSlant_deg and kSlantRange_m; more gives hardly an echo
+constexpr double kWhite = 100;   // Velodyne's scale: the brightest diffuse reflector
 
-// Velodyne's data sheets: a surface that throws back a tenth of the light is seen at about half the reach.
+// Velodyne's data sheets: at 10 % reflectivity the range is about half.
 constexpr double kDark = 10, kReachOfDark = 0.5;
 
 // Position packet, VLP-16 user manual 63-9243, section 9.4.
@@ -46,7 +46,7 @@ void put(std::array<std::byte, Size>& bytes, std::size_t offset, std::uint32_t v
     bytes[offset + i] = static_cast<std::byte>(value >> (8 * i));
 }
 
-/// GPRMC: recommended minimum of a satellite receiver, with the time and date of the last whole second.
+/// Formats GPRMC: recommended minimum of a satellite receiver, with the time and date of the last whole second.
 std::string gprmc(Stamp stamp, bool valid_fix) {
   const std::time_t second = std::chrono::floor<std::chrono::seconds>(stamp).time_since_epoch().count();
   const std::string body = fmt::format("GPRMC,{0:%H%M%S},{1},4801.0000,N,01131.0000,E,000.0,000.0,{0:%d%m%y},000.0,W",
@@ -63,8 +63,8 @@ std::unique_ptr<PacketWriter> writer_for(const SyntheticLidarOptions& options, S
 
 } // namespace
 
-/// What the rays of one beam meet, as echoes: light that comes back from places too near to each other to be told apart
-/// makes one echo, in the middle of its energy (mixed pixels).
+/// Echoes of the rays of one beam: returns too close in range to be resolved merge into one echo at their
+/// energy-weighted mean (mixed pixels).
 class SyntheticLidar::Footprint {
  public:
   void add(const std::optional<Sight>& sight, double weight) {
@@ -75,7 +75,7 @@ class SyntheticLidar::Footprint {
     glimpses_[count_++] = {*sight, light, light * hit.cos_incidence / (hit.range_m * hit.range_m)};
   }
 
-  /// Sorts what was added; the nearest first.
+  /// Sorts the hits by range, nearest first, and merges unresolved ones.
   void merge() {
     std::sort(glimpses_.begin(), glimpses_.begin() + static_cast<std::ptrdiff_t>(count_),
               [](const Glimpse& a, const Glimpse& b) { return a.sight.hit.range_m < b.sight.hit.range_m; });
@@ -92,7 +92,7 @@ class SyntheticLidar::Footprint {
   [[nodiscard]] bool empty() const { return count_ == 0; }
   [[nodiscard]] const Sight& last() const { return glimpses_[count_ - 1].sight; }
   [[nodiscard]] const Sight& strongest() const { return strongest_of(count_); }
-  /// When the strongest is also the last, the sensor reports the second strongest in its place.
+  /// Returns the second strongest if the strongest is also the last, as the sensor does.
   [[nodiscard]] const Sight& strongest_beside_last() const {
     return strongest_of(std::max<std::size_t>(count_, 2) - 1);
   }
@@ -100,8 +100,8 @@ class SyntheticLidar::Footprint {
  private:
   struct Glimpse {
     Sight sight;
-    double light;  ///< that it throws back of the beam's: reflectivity times share
-    double energy; ///< that comes back, of any scale
+    double light;  ///< reflectivity times share of the beam
+    double energy; ///< received, in arbitrary units
   };
 
   [[nodiscard]] const Sight& strongest_of(std::size_t count) const {
@@ -110,7 +110,7 @@ class SyntheticLidar::Footprint {
         ->sight;
   }
 
-  /// Of one echo, at the place of the brightest.
+  /// Merges the parts of one echo, at the position of the brightest.
   static Glimpse mixed(std::span<const Glimpse> parts) {
     Glimpse all = *std::max_element(parts.begin(), parts.end(),
                                     [](const Glimpse& a, const Glimpse& b) { return a.energy < b.energy; });
@@ -191,7 +191,7 @@ Datagram SyntheticLidar::datagram(std::span<const std::byte> payload, std::uint1
           .receive_stamp = arrival()};
 }
 
-/// Packets wait for each other: none overtakes.
+/// Returns the arrival; packets queue and never overtake each other.
 Stamp SyntheticLidar::arrival() {
   const Duration delay = options_.latency > Duration::zero()
                              ? from_seconds(-to_seconds(options_.latency) * std::log1p(-dice_.uniform()))
@@ -229,7 +229,7 @@ SyntheticLidar::Mount SyntheticLidar::mount_at(Stamp fired) const {
   return mount;
 }
 
-/// The motion within a column is followed to first order: over its 0.1 ms the rest is below 1e-7 m and 1e-7 rad.
+/// Casts a ray. Motion within a column is first order: over its 0.1 ms the rest is below 1e-7 m and 1e-7 rad.
 std::optional<SyntheticLidar::Sight> SyntheticLidar::look(const Mount& mount, const Aim& aim,
                                                           const Eigen::Vector3d& aimed) const {
   const double since_s = to_seconds(aim.after);
@@ -244,7 +244,7 @@ std::optional<SyntheticLidar::Sight> SyntheticLidar::look(const Mount& mount, co
   return sight;
 }
 
-/// They turn with the lidar.
+/// Intersects the ray with the robot's own parts, which move with the lidar.
 void SyntheticLidar::consider_own_parts(const Mount& mount, const Aim& aim, const Eigen::Vector3d& aimed,
                                         std::optional<Sight>& sight) const {
   const Ray ray{T_base_rotor_ * Eigen::Vector3d{0, 0, aim.origin_z_m} +
@@ -276,12 +276,12 @@ Echoes SyntheticLidar::fire_line(const Mount& mount, Aim& aim) {
   const Echo edge_echo = measure(aim, edge);
   if (edge_echo.ticks == 0 || center_echo.ticks == 0) // one of them was lost
     return edge_echo.ticks == 0 ? Echoes{center_echo, center_echo} : Echoes{edge_echo, edge_echo};
-  // When the strongest return is also the last, the sensor reports the second strongest in its place.
+  // When the strongest return is also the last, the sensor reports the second strongest instead.
   return edge->hit.range_m > center->hit.range_m ? Echoes{edge_echo, center_echo} : Echoes{center_echo, edge_echo};
 }
 
-/// An edge that beams come to one after the other shows in the one after, so the middles of their beams are looked at
-/// one column before they are fired.
+/// Casts the centre rays of beams one column before they are fired: an edge that consecutive beams approach shows in
+/// the following one.
 void SyntheticLidar::look_ahead(Stamp own_time) {
   std::swap(before_, now_);
   std::swap(now_, ahead_);
@@ -314,8 +314,8 @@ Echoes SyntheticLidar::fire_beam(std::size_t index) {
   return echoes;
 }
 
-/// Rays are cast to the sides where the beam may be parted; elsewhere they meet what its middle meets. From top to
-/// bottom it is parted along lines that the turn follows for a while: a glance now and then finds their beginning.
+/// Casts side rays where an edge may split the beam; elsewhere they equal the centre ray. Vertical splits persist along
+/// the rotation for a while: an occasional check finds their start.
 SyntheticLidar::Footprint SyntheticLidar::footprint(std::size_t index) {
   Aim& aim = aims_[index];
   const std::optional<Sight>& center = now_.centers[index];
@@ -344,7 +344,8 @@ SyntheticLidar::Footprint SyntheticLidar::footprint(std::size_t index) {
   return beam;
 }
 
-/// On one surface, and on several that go over into each other, the ranges of three columns lie on a line, nearly.
+/// Returns whether an edge splits the beam: on one surface, or on adjoining ones, three columns' ranges are nearly
+/// collinear.
 bool SyntheticLidar::is_parted_along_turn(std::size_t index) const {
   const std::optional<Sight>&a = before_.centers[index], &b = now_.centers[index], &c = ahead_.centers[index];
   if (!a || !b || !c)
@@ -354,7 +355,7 @@ bool SyntheticLidar::is_parted_along_turn(std::size_t index) const {
   return std::abs(a->hit.range_m - 2 * b->hit.range_m + c->hit.range_m) > kPartingStep_m;
 }
 
-/// Nothing where the pulse meets none, or only behind what threw it back.
+/// Returns the echo of dust; nothing if the pulse hits none, or only behind its target.
 std::optional<Echo> SyntheticLidar::meet_dust(const Echo& nearest) {
   if (options_.dust <= 0 || dice_.uniform() >= options_.dust)
     return std::nullopt;
@@ -375,7 +376,7 @@ Echo SyntheticLidar::measure(const Aim& aim, const std::optional<Sight>& sight) 
     if (is_lost(strength))
       return {};
     noise_m *= 1 + 1 / strength;
-    brightness *= 0.5 * (1 + hit.cos_incidence) * (0.9 + 0.2 * dice_.uniform()); // not quite calibrated away
+    brightness *= 0.5 * (1 + hit.cos_incidence) * (0.9 + 0.2 * dice_.uniform()); // residual of the calibration
   }
   const double wrong_m = hit.range_m + pattern_.origin_radius_m + aim.bias_m + bias_of_surface_m(hit);
   const double range_m = noise_m > 0 ? wrong_m + noise_m * dice_.normal() : wrong_m;
@@ -387,9 +388,9 @@ Echo SyntheticLidar::measure(const Aim& aim, const std::optional<Sight>& sight) 
   return {static_cast<std::uint32_t>(ticks), static_cast<std::uint8_t>(std::clamp(brightness, 1.0, 255.0))};
 }
 
-/// Constant for what it meets. On a slant the pulse is stretched over the depth of its footprint, range times tangent;
-/// where its edge or peak is found moves with the square of a stretch that is short beside the pulse. A weak pulse is
-/// found later than a strong one (range walk).
+/// Returns the range bias, constant for a given hit. At oblique incidence the pulse is stretched over the depth of its
+/// footprint, range times tangent; its detected edge or peak shifts with the square of a stretch that is short compared
+/// with the pulse. A weak pulse is detected later than a strong one (range walk).
 double SyntheticLidar::bias_of_surface_m(const Hit& hit) const {
   double bias_m = 0;
   if (options_.incidence_bias_m > 0) {
@@ -403,7 +404,7 @@ double SyntheticLidar::bias_of_surface_m(const Hit& hit) const {
   return bias_m;
 }
 
-/// Echoes do not end at once: some a little above the threshold are lost, some a little below are not.
+/// Decides at random near the threshold: some echoes a little above it are lost, some a little below it are not.
 bool SyntheticLidar::is_lost(double strength) {
   constexpr double kNever = 1.4, kAlways = 0.8;
   return strength < kNever && dice_.uniform() * (kNever - kAlways) > strength - kAlways;
@@ -416,14 +417,14 @@ Echo SyntheticLidar::measure_dust() {
   return {static_cast<std::uint32_t>(ticks), static_cast<std::uint8_t>(1 + 8 * dice_.uniform())};
 }
 
-/// When the clock shows what it was meant to show in a drive without drift: it also times the firings. Within a column
-/// that is 5 ns, and left out.
+/// Converts a time of the lidar's clock, which also times the firings, to true time by removing the drift. Within a
+/// column that is 5 ns, and neglected.
 Stamp SyntheticLidar::true_time(Stamp own_time) const {
   const auto own_ns = static_cast<double>((own_time - trajectory_.start()).count());
   return own_time - Duration{std::llround(own_ns * options_.drift / (1 + options_.drift))};
 }
 
-/// 0 .. 2 pi, clockwise seen from above.
+/// Returns 0 .. 2 pi, clockwise viewed from above.
 double SyntheticLidar::rotor_azimuth_rad(Stamp stamp) const {
   const double turns = to_seconds(stamp - trajectory_.start()) * pattern_.rpm / 60 + pattern_.first_azimuth_deg / 360;
   return (turns - std::floor(turns)) * kTurn_rad;

@@ -22,74 +22,73 @@ namespace locus::sim {
 
 inline constexpr std::size_t kPositionPacketBytes = 512;
 
-/// In dual return mode the right edge of the beam may meet something else than its centre; it points this far beside
-/// it.
+/// Offset of the right edge of the beam, which in dual return mode may hit another surface than its centre.
 inline constexpr double kHalfBeam_rad = 0.0015;
 
-/// What the error of a slanting surface is given for.
+/// Reference incidence of SyntheticLidarOptions::incidence_bias_m.
 inline constexpr double kSlantRange_m = 10, kSlant_deg = 75;
 
-/// A lidar, how it is mounted and what is wrong with it; as it stands, a perfect one that stands level in the base.
+/// Lidar with its mounting and errors; by default a perfect one, level in the base.
 struct SyntheticLidarOptions {
   LidarModel model = velodyne::Model::vlp16;
-  velodyne::ReturnMode return_mode = velodyne::ReturnMode::strongest; ///< of another than a Velodyne always that
+  velodyne::ReturnMode return_mode = velodyne::ReturnMode::strongest; ///< always strongest for other than Velodynes
   double rpm = 600;
-  double first_azimuth_deg = 0; ///< when the trajectory starts
+  double first_azimuth_deg = 0; ///< at the start of the trajectory
   Pose T_base_lidar{};
-  std::uint16_t port = 2368;                   ///< that data packets are sent to
-  std::uint16_t imu_port = 0;                  ///< of an Ouster, that readings of its inertial unit are sent to
+  std::uint16_t port = 2368;                   ///< destination of data packets
+  std::uint16_t imu_port = 0;                  ///< destination of an Ouster's inertial readings
   std::uint32_t source_ip = 0xC0A8'01C9;       ///< 192.168.1.201
-  double min_range_m = 0.4, max_range_m = 100; ///< no return beyond
-  double range_noise_m = 0;                    ///< standard deviation, of strong echoes where they fade
-  double dropout = 0;                          ///< share of the returns that is lost, 0..1
-  bool fades = false;      ///< echoes of far, dark or slanting surfaces are weak: noisier, and lost when too weak
-  double dust = 0;         ///< share of the pulses that meet a grain of dust within a few metres, 0..1
-  Duration latency{};      ///< mean of what the network takes; 0: packets arrive when their last firing is over
-  Duration clock_offset{}; ///< what its clock is ahead of true time
-  bool sends_position_packets = false; ///< of a Velodyne: one after every fifth data packet
+  double min_range_m = 0.4, max_range_m = 100; ///< no return outside
+  double range_noise_m = 0;                    ///< standard deviation; of strong echoes if `fades`
+  double dropout = 0;                          ///< share of returns lost, 0..1
+  bool fades = false;      ///< far, dark or oblique surfaces give weak echoes: noisier, and lost when too weak
+  double dust = 0;         ///< share of pulses that hit a dust grain within a few metres, 0..1
+  Duration latency{};      ///< mean network delay; 0: packets arrive after their last firing
+  Duration clock_offset{}; ///< clock minus true time
+  bool sends_position_packets = false; ///< Velodyne only: one after every fifth data packet
   bool pps_locked = true;              ///< and a valid fix, in its position packets
-  double drift = 0;                    ///< share by which its clock, and all that the clock times, runs fast
-  double beam_rad = 0;                 ///< full divergence along the turn, across it half as much; 0: a line
-  double laser_bias_m = 0;             ///< standard deviation of a constant error of each laser's ranges
-  double laser_elevation_rad = 0;      ///< the same of its elevation; the decoder believes the table
-  double incidence_bias_m = 0;         ///< what is met at kSlant_deg and kSlantRange_m seems farther by this
-  double intensity_bias_m = 0;         ///< black seems farther than white by this
+  double drift = 0;                    ///< rate error of its clock, and of all that it times, positive if fast
+  double beam_rad = 0;                 ///< full horizontal divergence, the vertical one is half; 0: a line
+  double laser_bias_m = 0;             ///< standard deviation of each laser's constant range error
+  double laser_elevation_rad = 0;      ///< same for its elevation, unknown to the decoder
+  double incidence_bias_m = 0;         ///< range error at kSlant_deg and kSlantRange_m
+  double intensity_bias_m = 0;         ///< range error on black relative to white
   std::vector<Surface> own_parts{};    ///< of the robot, base frame
   std::uint64_t seed = 1;
 };
 
-/// By a Velodyne's clock that shows this. 0 <= it < 1 h.
+/// Converts the reading of a Velodyne's clock; 0 <= result < 1 h.
 std::uint32_t microseconds_past_hour(Stamp shown);
 
-/// A lidar on a moving robot: makes the datagrams that the sensor would send, firing by firing. Every ray leaves from
-/// where the laser is at its own time, under the azimuth that the rotor has at that time. One owner.
+/// Lidar on a moving robot: generates the sensor's datagrams, firing by firing. Every ray starts at the laser's
+/// position at its own time, at the rotor's azimuth at that time. One owner.
 class SyntheticLidar {
  public:
-  /// Scene and trajectory must outlive it. The same arguments give the same bytes.
-  /// `seen` takes note of every surface point that an echo comes from.
+  /// Scene and trajectory must outlive it. The same arguments give the same bytes. `seen` receives each surface point
+  /// that returns an echo.
   SyntheticLidar(const Scene& scene, const Trajectory& trajectory, const SyntheticLidarOptions& options,
                  SeenSpace* seen = nullptr);
 
-  /// The next data or position packet, sent when its last firing is over. There is always one: when the course ends the
+  /// Returns the next data or position packet, sent after its last firing. There is always one: after the course the
   /// robot stands.
   Datagram next();
 
   [[nodiscard]] const FiringPattern& pattern() const { return pattern_; }
 
  private:
-  struct Aim { ///< of a firing, in the frame of the lidar, as if its column had azimuth 0
+  struct Aim { ///< of a firing, frame of the lidar, for a column at azimuth 0
     Eigen::Vector3d direction;
     double origin_z_m;
-    Duration after;               ///< the instant of the column
-    double bias_m = 0;            ///< of its laser's ranges
-    const Surface* met = nullptr; ///< by the ray of the column before
-    bool near_edge = false;       ///< the beam of the column before was parted from top to bottom
+    Duration after;               ///< the column's azimuth
+    double bias_m = 0;            ///< of the laser's ranges
+    const Surface* met = nullptr; ///< by the ray of the previous column
+    bool near_edge = false;       ///< the beam of the previous column was split vertically
   };
-  struct Sight { ///< of one ray
+  struct Sight { ///< hit of one ray
     Hit hit;
     bool is_own_part = false;
   };
-  /// Where the lidar is, how it moves and how far its rotor has turned while one column is fired.
+  /// Pose and motion of the lidar and angle of its rotor while one column is fired.
   struct Mount {
     Stamp fired;
     Eigen::Matrix3d R_world_lidar;
@@ -97,11 +96,11 @@ class SyntheticLidar {
     Eigen::Matrix3d R_base_world;
     Eigen::Vector3d position_m;
     Eigen::Vector3d velocity_mps;
-    Eigen::Vector3d angular_velocity_radps; ///< all in world frame, at the instant of the column
+    Eigen::Vector3d angular_velocity_radps; ///< world frame, all of them, at the column's instant
   };
   struct Column {
     Mount mount;
-    std::vector<std::optional<Sight>> centers; ///< what the middle of each beam meets
+    std::vector<std::optional<Sight>> centers; ///< hits of the beam centres
   };
   class Footprint;
 
@@ -134,12 +133,12 @@ class SyntheticLidar {
   const FiringPattern& pattern_; ///< of the writer
   Pose T_base_rotor_;
   std::vector<Aim> aims_;       ///< of the firings of a column
-  Column before_, now_, ahead_; ///< of a beam that is no line
+  Column before_, now_, ahead_; ///< for a beam with divergence
   std::size_t columns_fired_ = 0;
   QuickDice dice_;
 
   SeenSpace* seen_;
-  Stamp packet_begin_; ///< first column of the data packet to come, by the lidar's clock
+  Stamp packet_begin_; ///< first column of the next data packet, by the lidar's clock
   Stamp last_arrival_;
   int data_packets_until_position_;
   std::array<std::byte, kPositionPacketBytes> position_{};

@@ -10,7 +10,7 @@
 namespace locus::sim {
 namespace {
 
-constexpr double kShaken_mps = 0.5; // from here on vibration is at its full
+constexpr double kShaken_mps = 0.5; // speed of full vibration
 
 } // namespace
 
@@ -34,7 +34,8 @@ Eigen::Vector3d SyntheticImu::noise(double sigma) {
   return sigma * Eigen::Vector3d{x, y, z};
 }
 
-/// Of the IMU, which the turning base swings about. The angular acceleration is that over a millisecond.
+/// Returns the acceleration of the IMU, including its lever arm. The angular acceleration is a difference over a
+/// millisecond.
 Eigen::Vector3d SyntheticImu::acceleration_world_mps2(const BaseMotion& motion) const {
   constexpr Duration kHalf = std::chrono::microseconds{500};
   const auto turning_radps = [](const BaseMotion& at) -> Eigen::Vector3d {
@@ -84,8 +85,8 @@ SlipBursts::SlipBursts(const Trajectory& trajectory, double per_min, std::uint64
     draw(trajectory.start());
 }
 
-/// They come independently of each other. Wheels spin while the robot gains speed or keeps it, and drag while it
-/// brakes.
+/// Draws the next burst, independent of the others. Wheels spin while the robot accelerates or cruises, and drag while
+/// it decelerates.
 void SlipBursts::draw(Stamp after) {
   constexpr double kShortest_s = 0.5, kLongest_s = 2, kLeast = 0.2, kMost = 1, kBraking_mps = 0.2;
   from_ = after + from_seconds(-60 / per_min_ * std::log1p(-dice_.uniform()));

@@ -10,14 +10,14 @@
 namespace locus::sim {
 namespace {
 
-constexpr double kLongestStep_s = 0.05; // three Gauss points over it are exact to 1e-12 m at 2 rad/s and 15 m/s
+constexpr double kLongestStep_s = 0.05; // three Gauss points are exact to 1e-12 m at 2 rad/s and 15 m/s
 constexpr double kHalfWheelbase_m = 0.3, kHalfTrack_m = 0.25;
-constexpr double kSlipRamp_s = 0.3; // from rolling wheels to spinning ones
+constexpr double kSlipRamp_s = 0.3; // from rolling to spinning wheels
 
-// The body swings in full where it moves faster than these.
+// Speeds from which the oscillation of the body has its full amplitude.
 constexpr double kLively_mps = 0.2, kLively_radps = 0.5;
 
-/// Two waves whose lengths have no common multiple, so that no two places feel the same.
+/// Sums two waves of incommensurable lengths, so that no two places are alike.
 Jet ripple(double amplitude, double wavelength_m, double phase, const Jet& driven_m) {
   Jet sum;
   for (const double shortening : {1.0, std::numbers::phi})
@@ -32,14 +32,14 @@ Jet squared(const Jet& x) { return x * x; }
 
 double ramp_s(const Slip& slip) { return std::min(kSlipRamp_s, to_seconds(slip.to - slip.from) / 2); }
 
-/// What of a slip has gone by: the time lost to it, and how fast it is being lost.
+/// Returns the time lost to a slip so far, and its rate.
 Jet time_lost(const Slip& slip, double since_start_s) {
   const double ramp = ramp_s(slip), middle = ramp / 2;
   return rising(Jet(since_start_s - to_seconds(slip.from) - middle, 1), ramp) -
          rising(Jet(since_start_s - to_seconds(slip.to) + middle, 1), ramp);
 }
 
-/// Position, attitude and their derivatives from those of coordinates and angles.
+/// Converts coordinates and angles with their derivatives to position, attitude and their derivatives.
 BaseMotion motion_of(const std::array<Jet, 3>& xyz_m, const Jet& roll, const Jet& pitch, const Jet& yaw) {
   const double cr = std::cos(roll.value), sr = std::sin(roll.value);
   const double cp = std::cos(pitch.value), sp = std::sin(pitch.value);
@@ -48,7 +48,7 @@ BaseMotion motion_of(const std::array<Jet, 3>& xyz_m, const Jet& roll, const Jet
   motion.T_world_base = {from_rpy_rad({roll.value, pitch.value, yaw.value}), {x.value, y.value, z.value}};
   motion.velocity_world_mps = {x.rate, y.rate, z.rate};
   motion.acceleration_world_mps2 = {x.acceleration, y.acceleration, z.acceleration};
-  // Rates of roll, pitch and yaw as seen in the base: the Euler-rate matrix of Rz(yaw) Ry(pitch) Rx(roll).
+  // Rates of roll, pitch and yaw in the base frame: the Euler-rate matrix of Rz(yaw) Ry(pitch) Rx(roll).
   motion.angular_velocity_base_radps = {roll.rate - yaw.rate * sp, pitch.rate * cr + yaw.rate * cp * sr,
                                         yaw.rate * cp * cr - pitch.rate * sr};
   return motion;
@@ -100,7 +100,7 @@ Trajectory::Planar Trajectory::planar(const Placed& placed, double since_s) {
           .yaw_jerk_radps3 = gain_radps * curvature};
 }
 
-/// Gauss-Legendre quadrature of the velocity with three points.
+/// Integrates the velocity by Gauss-Legendre quadrature with three points.
 Eigen::Vector2d Trajectory::displacement(const Placed& placed, double from_s, double to_s) {
   struct Node {
     double place, weight;

@@ -18,7 +18,7 @@ static_assert(std::endian::native == std::endian::little, "points are written as
 
 int steps(double length_m) { return std::max(1, static_cast<int>(std::ceil(length_m / kStep_m))); }
 
-/// Points of a shape, at most a step apart in both directions, for a sink.
+/// Samples points of a shape, at most a step apart in both directions, into a sink.
 template <class Sink> class Sampler {
  public:
   explicit Sampler(Sink& sink) : sink_(sink) {}
@@ -48,7 +48,7 @@ template <class Sink> class Sampler {
   }
 
  private:
-  /// Of a parallelogram as far as the shares of both edges add up to no more than `sum`.
+  /// Samples a parallelogram where the shares of both edges sum to at most `sum`.
   void patch(const Eigen::Vector3d& corner, const Eigen::Vector3d& u, const Eigen::Vector3d& v, double sum) const {
     const int along = steps(u.norm()), across = steps(v.norm());
     for (int i = 0; i <= along; ++i) {
@@ -58,7 +58,7 @@ template <class Sink> class Sampler {
         sink_(begin + static_cast<double>(j) / across * v);
     }
   }
-  /// A circle about an axis, drawn out along `way`.
+  /// Samples a circle about an axis, extruded along `way`.
   void ring(const Eigen::Vector3d& center, const Eigen::Vector3d& axis, double radius,
             const Eigen::Vector3d& way) const {
     const Eigen::Vector3d u = axis.unitOrthogonal(), v = axis.cross(u);
@@ -95,7 +95,7 @@ void write_truth_map(tools::OutputFile& file, const Scene& scene, const SeenSpac
                points);
   };
   std::size_t points = 0;
-  write_header(points); // as long as the one that replaces it when the number is known
+  write_header(points); // placeholder, overwritten when the number is known
   for_each_point(scene, seen, [&](const Eigen::Vector3d& point) {
     const Eigen::Vector3f single = point.cast<float>();
     file.write(std::as_bytes(std::span(single.data(), 3)));

@@ -7,9 +7,8 @@
 
 namespace locus::sim {
 
-/// Writes the surfaces of a scene as points in world frame, one per 3 cm or denser, as far as they lie in
-/// cubes of which something was seen: gt_map.ply, binary. What moves is not part of it. Throws Failure when it cannot
-/// write.
+/// Writes the surfaces of a scene as points in world frame, spaced 3 cm or less, within observed cubes: gt_map.ply,
+/// binary. Excludes moving objects. Throws Failure if it cannot write.
 void write_truth_map(tools::OutputFile& file, const Scene& scene, const SeenSpace& seen);
 
 } // namespace locus::sim

@@ -16,9 +16,10 @@ constexpr double kSite_m = 200, kHeight_m = 10;
 constexpr double kHalfWidth_m = 2.6, kRoof_m = 3.6;
 constexpr std::size_t kDrifts = 5;
 constexpr double kSpacing_m = 40, kMargin_m = 20;
-constexpr std::uint64_t kSite = 20; // its dice: the mine is the same for every seed
+constexpr std::uint64_t kSite = 20; // fixed: the mine is the same for every seed
 
-/// Drifts from west to east, crosscuts between them, none quite straight. A third of the crosscuts were never dug.
+/// Lays out slightly crooked drifts from west to east with crosscuts between them. A third of the crosscuts are
+/// missing.
 Roads roads() {
   Dice dice(kSite);
   Roads roads;
@@ -43,7 +44,7 @@ Roads roads() {
   return roads;
 }
 
-/// Uphill and downhill by up to one in fifteen.
+/// Returns the height of the ground, with slopes of up to one in fifteen.
 Jet ground_m(const Jet& x, const Jet& y) {
   constexpr double kTurn = 2 * std::numbers::pi;
   return 2.6 + 1.2 * sin(kTurn / 140 * x + 0.7) + 0.8 * sin(kTurn / 95 * y + 1.9) +
@@ -52,13 +53,13 @@ Jet ground_m(const Jet& x, const Jet& y) {
 
 double square(double x) { return x * x; }
 
-/// Above zero in the air of the drifts: beneath an arch that was blasted, not built, over a trodden floor.
+/// Signed function of the drifts, positive in air: under a blasted, rough arch, above a trodden floor.
 class Drifts {
  public:
   Drifts(const Roads& roads, std::uint64_t seed) : roads_(roads), rock_(seed), aside_m_(roads.distance_m(place_m_)) {}
 
   double operator()(const Eigen::Vector3d& point) {
-    if (point.head<2>() != place_m_) { // asked for from below to above, again and again at one place
+    if (point.head<2>() != place_m_) { // queried in columns, repeatedly at one place
       place_m_ = point.head<2>();
       aside_m_ = roads_.distance_m(place_m_);
     }
@@ -75,7 +76,7 @@ class Drifts {
   const Roads& roads_;
   Noise rock_;
   Eigen::Vector2d place_m_{-1, -1};
-  double aside_m_; ///< of that place
+  double aside_m_; ///< at that place
 };
 
 } // namespace

@@ -7,13 +7,13 @@
 namespace locus::sim {
 namespace {
 
-// The site from above. Turbine hall in the north, boiler hall in the south-west, stores in the south-east, corridors
+// Plan view of the site: turbine hall in the north, boiler hall in the south-west, stores in the south-east, corridors
 // between them.
 constexpr double kSite_m = 100, kTurbineHallRoof_m = 20, kBoilerHallRoof_m = 15, kStoresRoof_m = 8, kCeiling_m = 3.2;
 constexpr double kTurbineHallY = 62, kNorthCorridorY = 60, kBlocksTopY = 57, kBlocksBottomY = 43, kSouthCorridorY = 40,
                  kSouthHallsY = 38, kStoresX = 60, kBoilerHallX = 58;
 
-// Over a hump in the turbine hall, and onto the platform of the boiler hall.
+// Ramps: a hump in the turbine hall, and the platform of the boiler hall.
 constexpr double kHump_m = 1.6, kPlatform_m = 3.0;
 
 Roads roads() {
@@ -39,10 +39,10 @@ Roads roads() {
   return roads;
 }
 
-/// Ramps, their kinks rounded; and where in the hall they lie.
+/// Returns the height of the ramps, their kinks rounded, by their position in the hall.
 Jet ground_m(const Jet& x, const Jet& y) {
   constexpr double kRounding_m = 1.5;
-  const auto beyond = [](const Jet& at, double from) { return ease(at - from); }; // from there, over a metre
+  const auto beyond = [](const Jet& at, double from) { return ease(at - from); }; // over a metre from there
   const Jet hump = (ramp(x - 38, 11, kRounding_m) - ramp(x - 53, 11, kRounding_m)) * beyond(y, 91);
   const Jet on_west_ramp = 1.0 - beyond(x, 8), on_south_ramp = beyond(y, 26.5) - beyond(y, 35.5);
   const Jet platform = ramp(y - 6, 18, kRounding_m) * (1.0 - ramp(x - 13, 17, kRounding_m)) *
@@ -52,7 +52,7 @@ Jet ground_m(const Jet& x, const Jet& y) {
 
 double height_m(double x, double y) { return ground_m(x, y).value; }
 
-/// The surface of a ramp: strips across its direction of rise, and its flanks.
+/// Builds the surface of a ramp: strips across its direction of rise, and its flanks.
 void ramp(SceneBuilder& build, const Area& area, bool along_x) {
   constexpr double kStrip_m = 0.5;
   const Eigen::Index axis = along_x ? 0 : 1;
@@ -96,7 +96,7 @@ void shell(Furnishing& furnish) {
   }
 }
 
-/// Door frames, few and far between, and a cable tray: corridors have little else.
+/// Adds a few widely spaced door frames and a cable tray: corridors are nearly bare.
 void corridor(SceneBuilder& build, Furnishing& furnish, const Roads& roads, Dice& dice, double from_y, double to_y) {
   for (const double wall_y : {from_y, to_y}) {
     const double in = wall_y == from_y ? 0.12 : -0.12;
@@ -173,7 +173,7 @@ void boiler_hall(SceneBuilder& build, Furnishing& furnish, Dice& dice) {
 }
 
 void stores(SceneBuilder& build, Furnishing& furnish, Dice& dice) {
-  for (double x = 70; x < 90; x += dice.between(4.2, 5.2)) { // racks, their bays full or empty
+  for (double x = 70; x < 90; x += dice.between(4.2, 5.2)) { // racks, with full or empty bays
     for (double y = 10; y < 27; y += 2.8) {
       for (const double z : {0.1, 2.1, 4.1}) {
         build.turned_box({x, y + 1.3, z}, {1.1, 2.7, 0.06}, 0, 45);

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Who reads the file meanwhile reads the one before, or all of this one.
+/// Replaces the file atomically: concurrent readers get either version in full.
 void write_whole(const fs::path& file, const std::string& text) {
   const fs::path beside = file.string() + ".new";
   std::error_code error;

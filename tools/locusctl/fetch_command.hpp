@@ -6,8 +6,8 @@
 
 namespace locus::tools {
 
-/// Fetches what only the lidar at a numeric address has, and writes it to `file`: whole or not at all. Without a file
-/// it is named after the address and put in the current folder. Gives what was fetched, and the YAML to paste. Throws
+/// Fetches the file that only the lidar at a numeric address has, and writes it to `file` atomically; without a name,
+/// to a file in the current folder named after the address. Returns a description and the YAML to paste. Throws
 /// Failure.
 std::string fetch(const std::string& address, std::filesystem::path file);
 

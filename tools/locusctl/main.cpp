@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// locusctl: talks to a running locusd.
+// locusctl: controls a running locusd.
 #include <charconv>
 #include <chrono>
 #include <cmath>
@@ -51,7 +51,7 @@ void watch(const CtlArguments& arguments) {
   do {
     try {
       screen.show(status_text(arguments));
-    } catch (const Failure& failure) { // it may come back
+    } catch (const Failure& failure) { // the service may return
       screen.show(failure.what());
     }
   } while (!screen.wait_for_end(std::chrono::milliseconds{500}));
@@ -80,13 +80,13 @@ void reset(const CtlArguments& arguments) {
   ask(arguments.control(), request);
 }
 
-/// What the service has learned of its motion sources, or the configuration that says so.
+/// Prints the estimated calibration of the motion sources, or the configuration with it.
 void calibration(const CtlArguments& arguments) {
   const Json sources = ask(arguments.control(), {{"command", "status"}}).json.value("sources", Json::object());
   fmt::print("{}", arguments.yaml ? daemon::calibration_yaml(sources) : daemon::calibration_text(sources));
 }
 
-/// Answered while the disk still writes: waits until it has.
+/// Requests that an incident be recorded, and waits until it is written: the service answers earlier.
 void record(const CtlArguments& arguments) {
   double keep_s = 0;
   const char* const end = arguments.keep.data() + arguments.keep.size();
@@ -111,7 +111,7 @@ void record(const CtlArguments& arguments) {
   }
 }
 
-/// What is to be done, once the words are understood; nothing where help or version were asked for.
+/// Parses the arguments to an action; nothing if help or version were requested.
 std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
   std::function<void()> action;
   CLI::App app{"Talks to a running locusd.", "locusctl"};

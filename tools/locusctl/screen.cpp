@@ -40,7 +40,7 @@ Screen::Screen() {
   if (termios settings{}; tcgetattr(STDIN_FILENO, &settings) == 0) {
     found_ = settings;
     settings.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
-    settings.c_cc[VSUSP] = _POSIX_VDISABLE; // a shell in the middle of this page would be no use
+    settings.c_cc[VSUSP] = _POSIX_VDISABLE; // disables suspending: a shell prompt would be lost on this page
     tcsetattr(STDIN_FILENO, TCSANOW, &settings);
   }
   fmt::print("\x1b[?1049h\x1b[?25l");
@@ -53,7 +53,7 @@ Screen::~Screen() {
     tcsetattr(STDIN_FILENO, TCSAFLUSH, &*found_);
 }
 
-void Screen::show(std::string_view text) { // NOLINT(readability-convert-member-functions-to-static): on its page
+void Screen::show(std::string_view text) { // NOLINT(readability-convert-member-functions-to-static): on our page
   const Size size = size_of_terminal();
   std::string out = "\x1b[H";
   for (std::size_t row = 0; row < size.rows && !text.empty(); ++row) {
@@ -61,7 +61,7 @@ void Screen::show(std::string_view text) { // NOLINT(readability-convert-member-
     text.remove_prefix(std::min(text.size(), line.size() + 1));
     out += row > 0 ? "\n" : "";
     out += line.substr(0, size.columns);
-    out += line.size() < size.columns ? "\x1b[K" : ""; // it would wipe the last letter of a full line
+    out += line.size() < size.columns ? "\x1b[K" : ""; // it would erase the last character of a full line
   }
   fmt::print("{}\x1b[J", out);
   std::fflush(stdout);
@@ -74,7 +74,7 @@ bool Screen::wait_for_end(Duration timeout) {
     const timespec wait = daemon::to_timespec(end - now);
     if (ppoll(&keys, 1, &wait, nullptr) <= 0)
       continue;
-    char key = 'q'; // a terminal that is gone ends it, too
+    char key = 'q'; // also if the terminal is gone
     if (read(STDIN_FILENO, &key, 1) <= 0 || key == 'q')
       return true;
   }

@@ -10,24 +10,24 @@
 
 namespace locus::tools {
 
-/// The whole terminal, for as long as it lives: a page of its own that is drawn over and over, and keys that are not
-/// echoed. Then the terminal is as it was. One owner, one at a time.
+/// Takes over the terminal for its lifetime: alternate screen, redrawn repeatedly, without echo of keys; the destructor
+/// restores the terminal. One owner, one at a time.
 class Screen {
  public:
-  /// Throws Failure where there is no terminal.
+  /// Throws Failure without a terminal.
   Screen();
   ~Screen();
   Screen(const Screen&) = delete;
   Screen& operator=(const Screen&) = delete;
 
-  /// Over what was there, so that nothing flickers; what does not fit is left out.
+  /// Overwrites the previous text without flicker; truncates what does not fit.
   void show(std::string_view text);
 
-  /// Whether the user has had enough, by q or Ctrl-C, or the terminal is gone; waits for that.
+  /// Returns whether the user quit by q or Ctrl-C, or the terminal is gone; waits up to `timeout`.
   bool wait_for_end(Duration timeout);
 
  private:
-  std::optional<termios> found_; ///< how the keys were; nothing if they come from elsewhere
+  std::optional<termios> found_; ///< original settings; nothing if stdin is not a terminal
 };
 
 } // namespace locus::tools

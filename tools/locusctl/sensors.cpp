@@ -30,8 +30,8 @@ std::string describe(const HeardLidar& lidar) {
   return text + "\n";
 }
 
-/// An entry of the configuration for it, and what fetches the file that only the sensor has: an Ouster is not read
-/// without.
+/// Formats a configuration entry, and the command that fetches the file that only the sensor has: an Ouster requires
+/// it.
 std::string entry(const HeardLidar& lidar, int number, bool shares_port) {
   const std::string name = fmt::format("lidar{}", number), ip = dotted(lidar.ip);
   const std::string file = fmt::format("/etc/locusd/{}{}", name, lidar.ouster ? ".json" : ".csv");
@@ -40,7 +40,7 @@ std::string entry(const HeardLidar& lidar, int number, bool shares_port) {
       name, fmt::format("model: {}, port: {}{}", model, lidar.port, shares_port ? ", source_ip: " + ip : ""));
   if (lidar.ouster)
     yaml += fmt::format("    # locusctl fetch {} -o {}\n", ip, file);
-  else if (lidar.clock) // a Hesai
+  else if (lidar.clock) // Hesai
     yaml += fmt::format("    # calibration: {1} has its own angles, after: locusctl fetch {0} -o {1}\n", ip, file);
   return yaml;
 }

@@ -7,9 +7,8 @@
 
 namespace locus::tools {
 
-/// Listens to all UDP on the wire for a while and tells which lidars send, with the YAML to paste. Looks at the frames
-/// themselves where that is permitted, so a service that runs is not disturbed; else at the lidars' usual ports. Throws
-/// Failure.
+/// Listens to all UDP traffic for a while and lists the lidars that send, with the YAML to paste. Captures raw frames
+/// if permitted, so that a running service is not disturbed; else listens at the lidars' default ports. Throws Failure.
 std::string find_sensors(Duration duration);
 
 } // namespace locus::tools

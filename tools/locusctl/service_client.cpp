@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kMaxAnswerBytes = 1 << 18;
 
-/// The folder has the name of the unit, where systemd has made it.
+/// Suggests a remedy; derives the unit's name from the folder, if systemd created it.
 std::string remedy(const std::filesystem::path& socket, int error) {
   const std::filesystem::path folder = socket.parent_path();
   const std::string unit = folder.filename().string();
@@ -50,7 +50,7 @@ class Connection {
 
   void send(const std::string& text) const { ::send(socket_, text.data(), text.size(), MSG_NOSIGNAL); }
 
-  /// The text, and the descriptor that came along or -1.
+  /// Returns the text, and the descriptor received with it or -1.
   [[nodiscard]] std::pair<std::string, int> receive() const {
     std::string text(kMaxAnswerBytes, '\0');
     iovec vector{text.data(), text.size()};

@@ -9,14 +9,14 @@
 
 namespace locus::tools {
 
-/// What a running service answered.
+/// Response of a running service.
 struct ServiceAnswer {
   nlohmann::ordered_json json;
-  std::vector<std::byte> bytes; ///< that came along in a memory file
+  std::vector<std::byte> bytes; ///< received in a memory file
 };
 
-/// Asks a running service one thing; see daemon::ControlServer. Throws Failure when there is no service, it does not
-/// answer within a few seconds, or it refuses.
+/// Sends one request to a running service; see daemon::ControlServer. Throws Failure if there is no service, on a
+/// timeout of a few seconds, or if it refuses.
 ServiceAnswer ask(const std::filesystem::path& socket, const nlohmann::ordered_json& request);
 
 } // namespace locus::tools

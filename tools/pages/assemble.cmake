@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# cmake -DSOURCES=FOLDER -DSTYLES=FILES -DBUNDLE=FILE -DPAGE=FILE -P assemble.cmake: styles, licences and bundled script
-# into the page. STYLES are parted by commas.
+# cmake -DSOURCES=FOLDER -DSTYLES=FILES -DBUNDLE=FILE -DPAGE=FILE -P assemble.cmake: inserts
+# styles, licences and bundled script into the page. STYLES are separated by commas.
 string(REPLACE "," ";" STYLES ${STYLES})
 foreach(file ${STYLES})
   file(READ ${file} style)

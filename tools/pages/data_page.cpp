@@ -10,8 +10,7 @@
 namespace locus::tools {
 namespace {
 
-/// JSON that nothing in it can end the script element of: in a string "<" may be written as its number, and nowhere
-/// else does it occur.
+/// Escapes JSON so that it cannot end the script element: "<" occurs only in strings, where its code may replace it.
 std::string for_html(const nlohmann::ordered_json& json) {
   const std::string text = json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
   std::string safe;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A page as bytes of the program: in C++ it would be a literal longer than compilers must take.
+// Embeds a page as bytes: a C++ literal would exceed the length that compilers must support.
         .section .rodata
         .global LOCUS_PAGE_BEGIN
         .global LOCUS_PAGE_END

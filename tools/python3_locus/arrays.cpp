@@ -6,7 +6,7 @@
 namespace locus_python {
 namespace {
 
-/// The first `columns` numbers of each surface.
+/// Returns the first `columns` numbers of each surface.
 py::array_t<float> table_of(const std::vector<liblocus::Surface>& surfaces, std::size_t columns) {
   static_assert(sizeof(liblocus::Surface) == 6 * sizeof(float));
   py::array_t<float> table({surfaces.size(), columns});

@@ -12,22 +12,22 @@
 
 #include "liblocus.hpp"
 
-/// Between arrays of NumPy and those of the library. All of it needs the interpreter's lock.
+/// Conversions between NumPy arrays and the library's. All require the GIL.
 namespace locus_python {
 
 namespace py = pybind11;
 
-/// What comes in: any sequence of numbers, copied where it lies otherwise.
+/// Any sequence of numbers; copied unless it is contiguous and of this type.
 template <class Number> using Input = py::array_t<Number, py::array::c_style | py::array::forcecast>;
 
-/// A copy of its own.
+/// Returns a copy.
 py::array_t<double> vector_of(std::span<const double> values);
-/// The same of 36 numbers as six rows.
+/// Returns a copy of 36 numbers as six rows.
 py::array_t<double> matrix_of(std::span<const double> values);
 
-/// Rows x, y, z; (n, 3).
+/// Returns rows x, y, z; (n, 3).
 py::array_t<float> points_of(const std::vector<liblocus::Surface>& surfaces);
-/// Rows x, y, z and the normal; (n, 6).
+/// Returns rows x, y, z and the normal; (n, 6).
 py::array_t<float> surfaces_of(const std::vector<liblocus::Surface>& surfaces);
 
 /// Throws liblocus::Error for another shape.
@@ -44,7 +44,7 @@ template <class Number> std::span<const Number> span_of(const Input<Number>& inp
   return {input.data(), static_cast<std::size_t>(input.size())};
 }
 
-/// The bytes of an object that has some in a row. They stay until this is gone.
+/// Contiguous bytes of a Python object, valid for the lifetime of this.
 class Bytes {
  public:
   explicit Bytes(const py::buffer& object);

@@ -25,8 +25,7 @@ using File = std::optional<std::filesystem::path>;
 using Settings = std::vector<std::string>;
 using Text = const char*;
 
-/// An object of the library that several threads of Python may call: each waits without the interpreter's lock, and so
-/// computes.
+/// Object of the library shared by several Python threads: calls are serialised, and wait and compute without the GIL.
 template <class Object> class Shared {
  public:
   template <class... Arguments>
@@ -119,7 +118,7 @@ Estimate next(Replay& replay) {
   return *std::move(estimate);
 }
 
-/// What odometry and replay both have.
+/// Adds the methods common to Odometry and Replay.
 template <class Class> void add_views(Class& definition) {
   using Object = typename Class::type;
   definition
@@ -272,7 +271,7 @@ void define_replay(py::module_& module) {
 PYBIND11_MODULE(_native, module) {
   using namespace locus_python;
   module.doc() = "The native part of the package locus.";
-  module.attr("__name__") = "locus"; // where users find what is defined here
+  module.attr("__name__") = "locus"; // public name of the module
   py::register_exception<liblocus::Error>(module, "Error", PyExc_RuntimeError).attr("__doc__") =
       "What is wrong, where, and what to do: a line for each mistake, in the words of locus-replay.";
   define_source_estimate(module);

@@ -18,7 +18,7 @@
 namespace locus::tools {
 namespace {
 
-/// Those in the first columns; false for what is none.
+/// Parses the numbers in the first columns; false if one is invalid.
 bool read_numbers(std::string_view line, std::span<double> numbers) {
   for (double& number : numbers) {
     const std::size_t end = std::min(line.find(','), line.size());
@@ -31,7 +31,7 @@ bool read_numbers(std::string_view line, std::span<double> numbers) {
   return true;
 }
 
-/// The upper three rows of a matrix.
+/// Reads the upper three rows of a matrix.
 std::optional<Pose> read_matrix(std::istream& stream) {
   constexpr double kRounding = 1e-3;
   Eigen::Matrix<double, 3, 4, Eigen::RowMajor> rows;

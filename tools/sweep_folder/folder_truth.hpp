@@ -11,14 +11,14 @@
 
 namespace locus::tools {
 
-/// Reads EuRoC's state_groundtruth_estimate0/data.csv: nanoseconds, position in metres, quaternion w x y z, and more
-/// that is not used. Fails with one line for the user.
+/// Reads EuRoC's state_groundtruth_estimate0/data.csv: nanoseconds, position in metres, quaternion w x y z; ignores
+/// further columns. Fails with one line for the user.
 Expected<std::vector<StampedPose>, std::string> read_euroc_truth(const std::filesystem::path& file);
 
 /// Reads the true poses of a sequence of KITTI's odometry benchmark, DATA/sequences/NN: a row of DATA/poses/NN.txt for
-/// each of the stamps, T_world_camera, of camera 0. With T_camera_lidar, the row Tr of its calib.txt, they become
-/// those of the lidar in the frame of the first one. None where there is no such file. Fails with one line for the
-/// user.
+/// each of the stamps, T_world_camera, of camera 0. Converts them by T_camera_lidar, the row Tr of its calib.txt, to
+/// poses of the lidar in the frame of the first one. Returns none if the file does not exist. Fails with one line for
+/// the user.
 Expected<std::vector<StampedPose>, std::string> read_kitti_truth(const std::filesystem::path& sequence,
                                                                  std::span<const Stamp> stamps);
 

@@ -29,7 +29,7 @@ bool unpack_lzf(std::span<const std::byte> packed, std::span<std::byte> out) {
     const std::size_t back = (control & kFarMask) * kPerByte + next() + 1;
     if (back > filled || length > out.size() - filled)
       return false;
-    for (std::size_t i = 0; i < length; ++i, ++filled) // what is copied may overlap what it is copied to
+    for (std::size_t i = 0; i < length; ++i, ++filled) // source and destination may overlap
       out[filled] = out[filled - back];
   }
   return filled == out.size();

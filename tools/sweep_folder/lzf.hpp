@@ -6,12 +6,12 @@
 
 namespace locus::tools {
 
-/// Unpacks what was packed by LZF, the way of PCD's binary_compressed, and fills `out`. False where `packed` is no such
-/// thing or is of another length. Any bytes will do. Any thread.
+/// Decompresses LZF, the compression of PCD's binary_compressed, and fills `out`. Returns false if `packed` is invalid
+/// or of another length. Safe for any bytes. Any thread.
 ///
-/// A byte below 32 is followed by as many bytes and one more, which are copied. Any other refers back: its upper three
-/// bits are a length, 7 of them having the next byte added, two less than what is copied; its lower five and the next
-/// byte are how far back that lies, less one.
+/// A byte below 32 is the length of a literal minus one, which follows. Any other is a back reference: its upper three
+/// bits are the length minus two, where 7 means that the next byte is added; its lower five bits and the next byte are
+/// the distance minus one.
 bool unpack_lzf(std::span<const std::byte> packed, std::span<std::byte> out);
 
 } // namespace locus::tools

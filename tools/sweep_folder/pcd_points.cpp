@@ -26,7 +26,7 @@ using PcdField = PcdHeader::Field;
 
 static_assert(std::endian::native == std::endian::little, "a PCD has the bytes of little-endian machines");
 
-/// Of one number of a field; nothing for what a cloud cannot have.
+/// Returns the type of a field's numbers; nothing for one that a cloud cannot have.
 std::optional<Type> type_of(const PcdField& field) {
   const auto choose = [&](Type one, Type two, Type four) -> std::optional<Type> {
     switch (field.bytes) {
@@ -37,7 +37,7 @@ std::optional<Type> type_of(const PcdField& field) {
     case 4:
       return four;
     case 8:
-      return Type::float64; // as it is made
+      return Type::float64; // converted on reading
     default:
       return std::nullopt;
     }
@@ -87,7 +87,7 @@ Problem take_header(const PcdHeader& header, SweepPoints& points) {
   return std::nullopt;
 }
 
-/// Writes the number in a word; false for what is none of the type.
+/// Parses and stores a number; false if it is not one of the type.
 template <class Number> bool write_number(std::string_view word, std::byte* to) {
   Number number{};
   const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), number);
@@ -115,7 +115,7 @@ bool write_word(std::string_view word, const PcdField& field, std::byte* to) {
   return field.bytes == sizeof(double) ? write_number<double>(word, to) : write_number<float>(word, to);
 }
 
-/// A point in a line of text.
+/// Parses a point in a line of text.
 bool read_record(std::string_view line, const PcdHeader& header, std::byte* record) {
   const auto next_word = [&] {
     line.remove_prefix(std::min(line.find_first_not_of(" \t\r"), line.size()));
@@ -152,12 +152,12 @@ bool read_bytes(std::istream& stream, std::span<std::byte> bytes) {
          stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
 }
 
-/// Compressed, the numbers of all points lie field by field.
+/// Reads compressed points, which are stored field by field.
 Problem read_compressed(std::istream& stream, std::uint64_t left, const PcdHeader& header, SweepPoints& points) {
-  std::array<std::uint32_t, 2> sizes{}; // packed, unpacked
+  std::array<std::uint32_t, 2> sizes{}; // compressed, uncompressed
   if (!read_bytes(stream, std::as_writable_bytes(std::span(sizes))) || sizes[0] > left - sizeof(sizes))
     return "its compressed points break off; copy it again";
-  const std::size_t most_packed = points.data.size() + points.data.size() / 32 + 16; // where nothing repeats
+  const std::size_t most_packed = points.data.size() + points.data.size() / 32 + 16; // without any repetition
   if (sizes[1] != points.data.size() || sizes[0] > most_packed)
     return fmt::format("its compressed points are damaged, or not {} points; copy it again", header.points);
   std::vector<std::byte> packed(sizes[0]), columns(points.data.size());

@@ -39,7 +39,7 @@ bool is_named_as_sweep(const path& file) {
          (file.extension() == ".pcd" || file.extension() == ".bin");
 }
 
-/// 2 before 10, whether or not they are padded with zeros.
+/// Sorts numerically, 2 before 10, with or without zero padding.
 bool comes_before(const path& a, const path& b) {
   const auto key = [](const path& file) {
     std::string name = file.stem().string();
@@ -69,7 +69,7 @@ bool has_sweep(const path& folder) {
   return false;
 }
 
-/// That of the sweeps; empty where there is none.
+/// Returns the folder of the sweeps; empty if there is none.
 path sweeps_folder_of(const path& where) {
   for (const char* const name : {"velodyne", "lidar0/data", "lidar0"}) {
     if (is_folder(where / name))
@@ -82,7 +82,7 @@ path sweeps_folder_of(const path& where) {
   return {};
 }
 
-/// In the recording, or beside it where it is the sweeps alone.
+/// Searches the recording, and next to it if it consists of the sweeps only.
 std::optional<path> found_near(const path& where, const char* name) {
   const path whole = std::filesystem::absolute(where / "").lexically_normal().parent_path();
   const path sweeps = sweeps_folder_of(where);
@@ -94,7 +94,7 @@ std::optional<path> found_near(const path& where, const char* name) {
   return std::nullopt;
 }
 
-/// The first table of times beside the sweeps, above their folder or in the recording.
+/// Returns the first table of times next to the sweeps, above their folder or in the recording.
 std::optional<path> table_of(const path& where, const path& sweeps) {
   for (const path& folder :
        {sweeps, std::filesystem::absolute(sweeps / "").lexically_normal().parent_path().parent_path(), where}) {
@@ -106,14 +106,14 @@ std::optional<path> table_of(const path& where, const path& sweeps) {
   return std::nullopt;
 }
 
-/// The names as times, where all are: seconds have ten digits since 2001.
+/// Interprets all names as times: seconds have had ten digits since 2001.
 Expected<std::vector<TimeText>, std::string> times_in_names(const std::vector<path>& files) {
   constexpr std::size_t kDigitsOfSeconds = 10;
   std::vector<TimeText> times;
   for (const path& file : files) {
     const std::string name = file.stem().string();
     const std::size_t digits = std::min(name.find_first_not_of("0123456789"), name.size());
-    if (digits < kDigitsOfSeconds || name.starts_with('0')) // ten digits of a number from 0 on are KITTI's raw data
+    if (digits < kDigitsOfSeconds || name.starts_with('0')) // ten digits counting from 0 are KITTI's raw data
       return fmt::format(
           "{}: neither are the names of its sweeps times ({}), nor is there times.txt, timestamps.txt or "
           "data.csv; add one with a line for each sweep",
@@ -123,7 +123,7 @@ Expected<std::vector<TimeText>, std::string> times_in_names(const std::vector<pa
   return times;
 }
 
-/// The files of the rows that name one; all others in their order.
+/// Replaces the files of rows that name one; keeps the order otherwise.
 Problem match(const std::vector<TimeText>& times, const path& table, const path& folder, std::vector<path>& files) {
   if (times.size() != files.size())
     return fmt::format("{}: {} times for {} sweeps in {}; there must be one for each, copy the recording again",

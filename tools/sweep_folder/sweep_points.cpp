@@ -41,7 +41,7 @@ Problem read_bin(const std::filesystem::path& file, std::vector<KittiPoint>& poi
   return std::nullopt;
 }
 
-/// Fields one after the other.
+/// Returns consecutive fields.
 std::vector<SweepPoints::Field> floats(std::initializer_list<const char*> names) {
   std::vector<SweepPoints::Field> fields;
   for (const char* const name : names)

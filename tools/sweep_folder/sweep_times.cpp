@@ -25,7 +25,7 @@ double median(std::vector<double> numbers) {
   return *middle;
 }
 
-/// Of ten, in seconds; nothing where no unit fits. A single time tells nothing and is in seconds.
+/// Returns the unit as a power of ten of seconds; nothing if none fits. A single time counts as seconds.
 std::optional<int> unit_of(std::span<const double> numbers) {
   if (numbers.size() < 2)
     return 0;
@@ -41,7 +41,7 @@ std::optional<int> unit_of(std::span<const double> numbers) {
   return std::nullopt;
 }
 
-/// A number to tell the unit from; 0 for what is none, which is found again when it is read.
+/// Parses a number for determining the unit; 0 if invalid, which is reported when it is read.
 double roughly(const std::string& text) {
   double number = 0.0;
   std::from_chars(text.data(), text.data() + text.size(), number);

@@ -19,7 +19,7 @@ namespace {
 
 std::string folder_for_temporary_files() {
   const char* const wanted = std::getenv("TMPDIR");
-  return wanted != nullptr && *wanted != '\0' ? wanted : "/var/tmp"; // /tmp may lie in memory
+  return wanted != nullptr && *wanted != '\0' ? wanted : "/var/tmp"; // /tmp may be in memory
 }
 
 bool write_all(int descriptor, std::span<const std::byte> bytes) {
@@ -32,7 +32,7 @@ bool write_all(int descriptor, std::span<const std::byte> bytes) {
   return true;
 }
 
-/// As much as comes at once, but enough to tell what begins so; 0 at the end.
+/// Reads what is available, but at least the bytes that identify the format; 0 at the end.
 std::size_t fill(ByteStream& stream, std::span<std::byte> buffer) {
   constexpr std::size_t kStart = 60;
   std::size_t filled = 0;
@@ -73,7 +73,7 @@ UnpackedCopy::UnpackedCopy(std::string folder)
       descriptor_(open(folder_.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, S_IRUSR | S_IWUSR)) {
   if (descriptor_ >= 0)
     return;
-  std::string name = folder_ + "/locus-unpacked-XXXXXX"; // a file system that knows no files without names
+  std::string name = folder_ + "/locus-unpacked-XXXXXX"; // fallback for file systems without unnamed files
   descriptor_ = mkostemp(name.data(), O_CLOEXEC);
   if (descriptor_ >= 0)
     name_ = name;
@@ -104,7 +104,7 @@ Expected<std::filesystem::path, std::string> UnpackedCopy::give_name() {
   return std::filesystem::path(name_);
 }
 
-/// By what the system said last.
+/// Describes the last system error.
 std::string UnpackedCopy::why_not() const {
   return fmt::format("it is packed, and cannot be unpacked in {} ({}); name a folder with room for it with: export "
                      "TMPDIR=FOLDER",

@@ -10,17 +10,17 @@
 
 namespace locus::tools {
 
-/// A packed file as one that can be read at any place: a temporary file in $TMPDIR, or else /var/tmp, which need not
-/// fit into memory. It goes with this; whoever has opened it by then may read on. One owner.
+/// Compressed file made seekable: decompressed to a temporary file in $TMPDIR, or else /var/tmp, of any size. Deleted
+/// with this; files opened by then stay readable. One owner.
 class UnpackedCopy {
  public:
-  /// Whether a file that begins with these bytes, some 60 if it has so many, is of use.
+  /// Returns whether a file with these first bytes, up to about 60, is wanted.
   using IsOfUse = bool (*)(std::string_view start);
-  /// A machine whose disk is full does more harm than a bag that is not read: so many bytes stay free.
+  /// Disk space to leave free: a full disk does more harm than an unread bag.
   static constexpr std::uint64_t kStaysFree_bytes = 1'000'000'000;
 
-  /// Of a file that breaks off or is damaged, what lies before; of one that is of no use, its beginning. Fails with one
-  /// line for the user, without the file's name.
+  /// Decompresses the file: up to the damage if it is truncated or damaged; only its beginning if it is not wanted.
+  /// Fails with one line for the user, without the file's name.
   static Expected<UnpackedCopy, std::string> make(const std::filesystem::path& packed, IsOfUse is_of_use,
                                                   std::uint64_t stays_free_bytes = kStaysFree_bytes);
 
@@ -30,13 +30,13 @@ class UnpackedCopy {
   UnpackedCopy& operator=(const UnpackedCopy&) = delete;
   ~UnpackedCopy();
 
-  /// Where this process opens it. No other sees it, and nothing stays behind however the program ends, where the file
-  /// system knows files without names.
+  /// Returns the path for this process. If the file system supports unnamed files, no other process sees the file and
+  /// nothing remains however the program ends.
   [[nodiscard]] std::filesystem::path path() const;
-  /// For those who look up what the path leads to: one in the folder of temporary files, until this goes. Fails as
-  /// make() does.
+  /// Returns a name in the folder of temporary files, valid for the lifetime of this, for libraries that resolve the
+  /// path. Fails as make() does.
   Expected<std::filesystem::path, std::string> give_name();
-  /// Why it is not whole, as ByteStream::problem().
+  /// Returns why it is incomplete, as ByteStream::problem().
   [[nodiscard]] const std::string& problem() const { return problem_; }
 
  private:
@@ -45,7 +45,7 @@ class UnpackedCopy {
   [[nodiscard]] bool leaves_free(std::uint64_t bytes) const;
 
   std::string folder_;
-  int descriptor_ = -1; ///< -1: another one has it
+  int descriptor_ = -1; ///< -1: moved from
   std::string name_;    ///< empty: none
   std::string problem_;
 };

@@ -24,16 +24,16 @@ constexpr const char* kTooMuchMemory = "takes more than 256 MB of memory to unpa
 using Input = std::span<const std::byte>;
 using Output = std::span<std::byte>;
 
-/// One way of packing. One owner.
+/// Decompressor of one format. One owner.
 class Unpacker {
  public:
-  enum class State { within, between, over, damaged }; ///< between: two packed files in one; over: nothing may follow
+  enum class State { within, between, over, damaged }; ///< between: two concatenated files; over: no more may follow
 
   virtual ~Unpacker() = default;
   [[nodiscard]] virtual std::string_view name() const = 0;
-  /// Takes from the front of `in`, and fills `out` from its front; both then are what is left. `last`: nothing follows.
+  /// Consumes the front of `in` and fills the front of `out`; both then are the remainder. `last`: no input follows.
   virtual State step(Input& in, Output& out, bool last) = 0;
-  /// Why it is State::damaged, as the library says it.
+  /// Returns the library's reason for State::damaged.
   [[nodiscard]] virtual std::string_view why() const = 0;
 };
 
@@ -47,7 +47,7 @@ class GzipUnpacker : public Unpacker {
   [[nodiscard]] std::string_view name() const override { return "gzip"; }
   State step(Input& in, Output& out, bool) override {
     if (at_end_ && !in.empty() && in.front() != std::byte{0x1F})
-      return State::over; // padding, which gzip leaves out, too
+      return State::over; // padding, which gzip ignores, too
     if (at_end_ && !in.empty())
       inflateReset(&stream_);
     at_end_ = at_end_ && in.empty();
@@ -59,7 +59,7 @@ class GzipUnpacker : public Unpacker {
     in = in.last(stream_.avail_in);
     out = out.last(stream_.avail_out);
     at_end_ = status == Z_STREAM_END;
-    if (status != Z_OK && status != Z_STREAM_END && status != Z_BUF_ERROR) // the last: more is needed
+    if (status != Z_OK && status != Z_STREAM_END && status != Z_BUF_ERROR) // Z_BUF_ERROR: needs more input
       return State::damaged;
     return at_end_ ? State::between : State::within;
   }
@@ -69,7 +69,7 @@ class GzipUnpacker : public Unpacker {
 
  private:
   z_stream stream_{};
-  bool at_end_ = false; ///< of one of the files in it
+  bool at_end_ = false; ///< of one of the concatenated files
 };
 
 class XzUnpacker : public Unpacker {
@@ -105,7 +105,7 @@ class ZstdUnpacker : public Unpacker {
  public:
   [[nodiscard]] std::string_view name() const override { return "zstd"; }
   State step(Input& in, Output& out, bool) override {
-    if (in.empty() && status_ == 0) // else the next file in it is begun
+    if (in.empty() && status_ == 0) // otherwise the next concatenated file starts
       return State::between;
     ZSTD_inBuffer source{in.data(), in.size(), 0};
     ZSTD_outBuffer target{out.data(), out.size(), 0};
@@ -116,7 +116,7 @@ class ZstdUnpacker : public Unpacker {
       return State::damaged;
     return status_ == 0 ? State::between : State::within;
   }
-  [[nodiscard]] std::string_view why() const override { // the default limit of the library is 128 MB
+  [[nodiscard]] std::string_view why() const override { // the library's default limit is 128 MB
     return ZSTD_getErrorName(status_);
   }
 
@@ -140,7 +140,7 @@ class UnpackingStream : public ByteStream {
   }
 
   std::size_t read(Output out) override { return unpacker_ ? unpack(out) : pass_on(out); }
-  /// What stopped the bytes that it unpacks comes first: it makes them break off.
+  /// Returns the problem of the compressed stream first: it causes the truncation of the output.
   [[nodiscard]] std::string problem() const override {
     std::string before = packed_->problem();
     return before.empty() ? problem_ : before;
@@ -150,7 +150,7 @@ class UnpackingStream : public ByteStream {
  private:
   static constexpr std::size_t kBufferBytes = 1 << 16;
 
-  /// Behind what is left in the buffer.
+  /// Appends to the remainder in the buffer.
   void refill() {
     std::ranges::copy(left_, buffer_.begin());
     const std::size_t more = packed_->read(Output(buffer_).subspan(left_.size()));
@@ -186,10 +186,10 @@ class UnpackingStream : public ByteStream {
 
   std::unique_ptr<ByteStream> packed_;
   std::vector<std::byte> buffer_;
-  Input left_;           ///< of it
-  bool is_last_ = false; ///< nothing follows what is left
+  Input left_;           ///< unread part of buffer_
+  bool is_last_ = false; ///< no input follows left_
   bool is_over_ = false;
-  std::unique_ptr<Unpacker> unpacker_; ///< nullptr for what is not packed
+  std::unique_ptr<Unpacker> unpacker_; ///< nullptr if the stream is not compressed
   std::string problem_;
 };
 

@@ -11,11 +11,11 @@
 
 namespace locus::tools {
 
-/// What gzip, xz or zstd packed, as its first bytes tell, unpacked while it is read; anything else as it is. Several
-/// packed files in one are read one after the other. At most 256 MB of memory: what asks for more is refused.
+/// Decompresses gzip, xz or zstd, detected by the first bytes, while reading; passes anything else through.
+/// Concatenated files are read one after the other. Uses at most 256 MB of memory and fails for files that need more.
 std::unique_ptr<ByteStream> unpacked(std::unique_ptr<ByteStream> packed);
 
-/// A capture, unpacked while it is read. As Capture::open().
+/// Opens a capture, decompressed while reading. Fails as Capture::open() does.
 Expected<Capture, std::string> open_capture(const std::filesystem::path& file);
 
 } // namespace locus::tools

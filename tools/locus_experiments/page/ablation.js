@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fig. 3: what each part of LOCUS is worth.
+// Fig. 3: contribution of each part of LOCUS.
 import {max, min} from "d3-array";
 import {scaleLinear} from "d3-scale";
 import {line} from "d3-shape";
@@ -10,7 +10,7 @@ import {metreScale} from "./metres.js";
 import {find} from "./results.js";
 import {metres, missing, table} from "./table.js";
 
-/** The paper's names, and which of our runs each is. */
+/** The paper's names, with the corresponding run. */
 const kVariants = [
   {name: "baseline", run: "paper_fga", means: "all of the paper's Section II"},
   {name: "imu_int", run: "imu_int", means: "no wheel odometry, only the IMU"},
@@ -44,7 +44,7 @@ export function ablation(figure, width) {
   legend(figure, drawn.map(({name, className}) => ({name, draw: lineSample(`variant ${className}`)})));
 }
 
-/** Beside the ends of the lines, moved apart where they would cover each other. */
+/** Labels at the ends of the lines, moved apart where they would overlap. */
 function nameLines(svg, names, width) {
   names.sort((a, b) => a.at - b.at);
   names.forEach((name, i) => { if (i > 0) name.at = Math.max(name.at, names[i - 1].at + 13); });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Table II and the paper's box plots: how far each run was from the truth.
+// Table II and the paper's box plots: errors of each run relative to the truth.
 import {max, min} from "d3-array";
 import {scaleBand} from "d3-scale";
 
@@ -36,7 +36,7 @@ export function accuracyTable(section) {
 
 const kMargin = {top: 4, right: 24, bottom: 30, left: 24}, kRow = 22, kLabel = 17;
 
-/** One box a run, on a common logarithmic scale. */
+/** Draws a box per run, on a common logarithmic scale. */
 export function boxes(figure, width) {
   const rows = compared.flatMap((course) => Object.keys(configurations)
       .filter((key) => find(course, key)?.position_error)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page of locus-experiments. Each part that is drawn says so by data-drawn; one that has nothing to show is left
-// out, and one that fails says why and stops no other.
+// The page of locus-experiments. Each part sets data-drawn once drawn; one without data is left out, and one that fails
+// shows the reason without affecting the others.
 import {select} from "d3-selection";
 
 import {note, onNewWidth} from "../../locus_replay/report/drawing.js";

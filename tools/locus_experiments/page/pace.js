@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fig. 6, Table V and the load of Table II: time, dropped sweeps and cores at the pace of the recording; and Table III.
+// Fig. 6, Table V, the load of Table II (time, dropped sweeps and cores at the pace of the recording), and Table III.
 import {figure as written} from "../../locus_replay/report/format.js";
 import {paced, robustness as paperRobustness} from "./paper.js";
 import {courseName, courses, find, results} from "./results.js";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the paper reports of LOCUS: M. Palieri et al., "LOCUS: A Multi-Sensor Lidar-Centric Solution for High-Precision
-// Odometry and 3D Mapping in Real-Time", IEEE Robotics and Automation Letters, 2020.
+// Results of LOCUS as reported by the paper: M. Palieri et al., "LOCUS: A Multi-Sensor Lidar-Centric Solution for
+// High-Precision Odometry and 3D Mapping in Real-Time", IEEE Robotics and Automation Letters, 2020.
 
 /** Table II: absolute position error (max, mean, std) and RMSE of the map error, all in metres. */
 export const accuracy = {
@@ -24,8 +24,8 @@ export const accuracy = {
 /** Table III. */
 export const robustness = {wio_imu_fail: "OK", wio_fail: "OK", lidar_drop: "OK"};
 
-/** Table V, dropped scans per second in the mean of two runs on each course; and of Table II the processor cores used
- *  in the mean, which it has for Beta alone. */
+/** Table V: dropped scans per second, mean of two runs on each course; and the mean number of processor cores used, from
+ *  Table II, which lists it only for Beta. */
 export const paced = {
   alpha: {dropped: 0},
   beta: {dropped: 0, cores: 2.72},

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The results that this page shows, as locus-experiments wrote them into it.
+// Results shown by this page, as embedded by locus-experiments.
 
 export const results = JSON.parse(document.getElementById("results").textContent);
 export const runs = results.runs.filter((run) => !run.failed);
 export const failures = results.runs.filter((run) => run.failed);
 
-/** In the order in which they were run. */
+/** In run order. */
 export const courses = [...new Set(results.runs.map((run) => run.course))];
 export const find = (course, configuration) =>
     runs.find((run) => run.course === course && run.configuration === configuration);
@@ -16,7 +16,7 @@ const kCourseNames = {
 };
 export const courseName = (course) => (results.simulated && kCourseNames[course]) || course;
 
-/** What the configurations of the accuracy rows are. */
+/** Descriptions of the configurations in the accuracy rows. */
 export const configurations = {
   locusd: "locusd as it ships",
   locusd_fga: "locusd, flat ground when the IMU says so",

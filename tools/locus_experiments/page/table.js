@@ -3,8 +3,8 @@ import {select} from "d3-selection";
 
 import {figure, fixed} from "../../locus_replay/report/format.js";
 
-/** A table of `groups`, each {name, rows}; of a row, an array of cells, the first is a heading. A cell may be
- *  {text, className}. */
+/** Builds a table of `groups`, each {name, rows}; a row is an array of cells, the first of which is a heading. A cell may
+ *  be {text, className}. */
 export function table(parent, head, groups) {
   const element = parent.append("div").attr("class", "scroll").append("table");
   element.append("thead").append("tr").selectAll("th").data(head).join("th").attr("scope", "col").text((cell) => cell);
@@ -26,5 +26,5 @@ function cells(tr, row) {
 
 export const missing = {text: "not run", className: "note"};
 
-/** An error in metres, to a tenth of a millimetre where it is small. */
+/** Formats an error in metres, to a tenth of a millimetre if it is small. */
 export const metres = (value) => (Math.abs(value) < 0.1 ? fixed(value, 4) : figure(value));

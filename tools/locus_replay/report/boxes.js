@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How the position errors are spread, over the run and over each fifth of it.
+// Distribution of the position errors, over the run and over each fifth of it.
 import {max} from "d3-array";
 import {scaleBand, scaleLinear} from "d3-scale";
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the figures have in common.
+// Drawing functions common to the figures.
 import {axisBottom, axisLeft} from "d3-axis";
 import {select} from "d3-selection";
 
-/** An empty SVG of that size in the figure, in place of the one before. */
+/** Puts an empty SVG of that size into the figure, replacing its predecessor. */
 export function canvasOf(figure, width, height, description) {
   const drawing = figure.select(".drawing");
   drawing.selectAll("svg").remove();
@@ -14,11 +14,11 @@ export function canvasOf(figure, width, height, description) {
       .attr("aria-label", description);
 }
 
-/** Draws anew when the page is wider or narrower than before. */
+/** Redraws when the width of the page changes. */
 export function onNewWidth(draw) {
   let drawn_width = window.innerWidth;
   window.addEventListener("resize", () => {
-    if (window.innerWidth === drawn_width) return;  // a phone's address bar comes and goes
+    if (window.innerWidth === drawn_width) return;  // a phone's address bar changes the height only
     drawn_width = window.innerWidth;
     draw();
   });
@@ -26,7 +26,7 @@ export function onNewWidth(draw) {
 
 const withMinus = (format) => (value) => format(value).replace("-", "−");
 
-/** An axis along the bottom of a field, with a grid as tall as the field. */
+/** Draws an axis along the bottom of a field, with a grid as tall as the field. */
 export function bottomAxis(svg, scale, {y, height, ticks, format}) {
   const axis = axisBottom(scale).tickSizeInner(-height).tickSizeOuter(0).tickPadding(6);
   if (ticks) axis.tickValues(ticks);
@@ -34,14 +34,14 @@ export function bottomAxis(svg, scale, {y, height, ticks, format}) {
   svg.append("g").attr("class", "axis grid").attr("transform", `translate(0 ${y})`).call(axis);
 }
 
-/** An axis along the left of a field, with a grid as wide as the field. */
+/** Draws an axis along the left of a field, with a grid as wide as the field. */
 export function leftAxis(svg, scale, {x, width, count}) {
   const axis = axisLeft(scale).tickSizeInner(-width).tickSizeOuter(0).tickPadding(6).ticks(count).tickFormat(
       withMinus(scale.tickFormat(count)));
   svg.append("g").attr("class", "axis grid").attr("transform", `translate(${x} 0)`).call(axis);
 }
 
-/** Samples of what the figure draws, each beside its name: `draw` gets an SVG of 22 by 12. */
+/** Draws a legend: samples with their names; `draw` gets an SVG of 22 by 12. */
 export function legend(figure, entries) {
   const items = figure.select(".legend").html("").selectAll("span").data(entries).join("span");
   items.each(function({name, draw}) {
@@ -54,10 +54,10 @@ export function legend(figure, entries) {
 export const lineSample = (className) => (svg) =>
     svg.append("line").attr("class", className).attr("x1", 1).attr("x2", 21).attr("y1", 6).attr("y2", 6);
 
-/** A calm sentence in place of a figure. */
+/** Shows an unobtrusive sentence instead of a figure. */
 export function note(figure, sentence) {
   figure.select(".drawing").html("").append("p").attr("class", "note").text(sentence);
 }
 
-/** The value of a custom property of the page, for what is not drawn by style sheet. */
+/** Returns a custom CSS property of the page, for drawings outside the style sheet. */
 export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();

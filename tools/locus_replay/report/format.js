@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// How figures are written: with as many digits as mean something, and units that suit their size.
+// Formats of figures: significant digits only, with units that suit their size.
 import {format} from "d3-format";
 
 const kThinSpace = "\u202f";
 
 export const count = (value) => format(",d")(value).replace(/,/g, kThinSpace);
 
-/** A number with that many digits behind the point; zero has no sign. */
+/** Formats with that many decimals; zero has no sign. */
 export const fixed = (value, digits) => value.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
 
-/** A number with about three digits. */
+/** Formats with about three digits. */
 export function figure(value) {
   if (!Number.isFinite(value)) return "–";
   const size = Math.abs(value);
@@ -18,13 +18,13 @@ export function figure(value) {
   return fixed(value, size >= 99.95 ? 0 : size >= 9.995 ? 1 : size >= 0.9995 ? 2 : 3);
 }
 
-/** The unit in which lengths up to this one read well. */
+/** Returns the unit in which lengths up to this one read well. */
 export function lengthUnit(largest_m) {
   if (largest_m < 0.1) return {name: "mm", perMetre: 1e3};
   return largest_m < 2e4 ? {name: "m", perMetre: 1} : {name: "km", perMetre: 1e-3};
 }
 
-/** 75.2 → "1:15"; tenths for what lasts less than ten seconds. */
+/** 75.2 → "1:15"; tenths for durations below ten seconds. */
 export function clock(seconds, tenths = false) {
   const rest = seconds % 60, minutes = Math.floor(seconds / 60) % 60, hours = Math.floor(seconds / 3600);
   const two = (value) => (value < 10 ? "0" : "") + value;
@@ -40,7 +40,7 @@ export function duration(seconds) {
                           {value: clock(Math.round(seconds / 60)), unit: "h"};
 }
 
-/** Round instants in a span of time, about `wanted` of them. */
+/** Returns round instants in a span of time, about `wanted` of them. */
 export function timeTicks(begin_s, end_s, wanted) {
   const steps = [0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 43200];
   const step = steps.find((candidate) => (end_s - begin_s) / candidate <= wanted) ?? 86400;
@@ -48,5 +48,5 @@ export function timeTicks(begin_s, end_s, wanted) {
   return Array.from({length: last - first + 1}, (_, i) => (first + i) * step);
 }
 
-/** Keeps a name that somebody chose from running over what is beside it. */
+/** Shortens a user-chosen name so that it does not overlap its neighbours. */
 export const shortened = (name, length) => (name.length > length ? name.slice(0, length - 1) + "…" : name);

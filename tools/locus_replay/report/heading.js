@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the run was, and the few figures that sum it up.
+// Description of the run, and the few figures that summarise it.
 import {select} from "d3-selection";
 
 import {count, duration, figure as written, lengthUnit} from "./format.js";
@@ -58,7 +58,7 @@ function keyFigures() {
   ];
 }
 
-/** How long the way was, and how far from the truth, or else how sure the odometry is of it. */
+/** Path length, with the error against the truth or else the estimated uncertainty. */
 function wayFigures() {
   if (!run.path) return [];
   const {rpe_10m_percent, end_drift_m} = summary;

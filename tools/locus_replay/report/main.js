@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page of locus-replay's report. Figures are drawn to the width of the page and anew when that or its colours
-// change; each that is drawn says so by data-drawn, and one that fails says why and stops no other.
+// The page of locus-replay's report. Figures fit the width of the page and are redrawn when that or its colours change;
+// each sets data-drawn once drawn, and one that fails shows the reason without affecting the others.
 import {select} from "d3-selection";
 
 import {boxes} from "./boxes.js";

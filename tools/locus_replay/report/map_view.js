@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The map in space: every voxel as a tile on its surface, coloured by height, seen from the side that the robot saw.
+// 3D view of the map: every voxel as a tile on its surface, coloured by height, viewed from the robot's side.
 import {quantile} from "d3-array";
 import {interpolateCividis} from "d3-scale-chromatic";
 import {select} from "d3-selection";
@@ -15,10 +15,10 @@ import {fixed} from "./format.js";
 import {map, run} from "./run.js";
 
 const kFieldOfView_deg = 40;
-const kOverlap = 1.12;  // tiles lie at the mean of what was seen in a voxel, so some leave gaps
+const kOverlap = 1.12;  // tiles are centred on the mean of a voxel's points, so some would leave gaps
 let view = null;
 
-/** Once; later only to the width and the colours of the page. */
+/** Creates the view once; later calls only adapt it to the width and the colours of the page. */
 export function mapView(figure) {
   if (view === null) view = makeView(figure);
   if (view) view.refresh();
@@ -36,7 +36,7 @@ function makeView(figure) {
             "map.pcd beside this report opens in any viewer of point clouds.");
     return false;
   }
-  // With the buffer kept, "save image" works, and a test can look at it.
+  // A preserved buffer makes "save image" work, and lets a test inspect the picture.
   return new View(figure, new THREE.WebGLRenderer({antialias: true, alpha: true, preserveDrawingBuffer: true}));
 }
 
@@ -92,7 +92,7 @@ class View {
         });
   }
 
-  /** All of the map, from that direction, as near as it goes into the picture. */
+  /** Shows the whole map from that direction, as large as fits into the picture. */
   look(direction) {
     const centre = this.bounds.getCenter(new THREE.Vector3()), back = new THREE.Vector3(...direction).normalize();
     this.controls.target.copy(centre);
@@ -127,7 +127,7 @@ class View {
     for (const path of [this.estimate, this.truth].filter(Boolean)) path.material.resolution.set(width, height);
   }
 
-  /** After the size or the colours of the page have changed. */
+  /** Updates after a change of the page's size or colours. */
   refresh() {
     this.resize();
     this.tiles.material.uniforms.floor_tint.value.set(colour("wall"));
@@ -142,14 +142,14 @@ class View {
   }
 }
 
-/** But for the few that lie far above or below. */
+/** Bounds of the heights, without the few far above or below. */
 function heightRange() {
   const heights = Float32Array.from({length: map.count}, (_, i) => map.centres[3 * i + 2]).sort();
   const low = quantile(heights, 0.02), high = quantile(heights, 0.98);
   return {low, high: Math.max(high, low + 0.5)};
 }
 
-/** Of the path and, but for what is strewn far away, of the map. */
+/** Bounds of the path and of the map, without outliers. */
 function bounds() {
   const box = new THREE.Box3();
   for (const axis of [0, 1, 2]) {
@@ -162,7 +162,7 @@ function bounds() {
   return box;
 }
 
-/** From above a long side, the one from where more of the tiles show their faces. */
+/** Views a long side from above, the one from which more tiles show their faces. */
 function obliqueView({x, y}) {
   const along = x >= y ? [0.35, 0.8] : [0.8, 0.35];
   const directions = [[1, 1], [1, -1], [-1, 1], [-1, -1]].map(([a, b]) => [a * along[0], b * along[1], 0.75]);
@@ -187,7 +187,7 @@ const kTileShader = {
     uniform float side, low, high;
     uniform vec3 floor_tint;
     uniform sampler2D ramp;
-    attribute vec3 position, centre, facing; // position: in the square
+    attribute vec3 position, centre, facing; // position: within the square
     varying vec3 tint;
     void main() {
       vec3 level = normalize(cross(abs(facing.z) < 0.9 ? vec3(0, 0, 1) : vec3(1, 0, 0), facing));
@@ -195,7 +195,7 @@ const kTileShader = {
       vec3 corner = centre + side * (position.x * level + position.y * upright);
       float light = 0.6 + 0.4 * abs(dot(facing, normalize(cameraPosition - centre)));
       vec3 by_height = texture2D(ramp, vec2(clamp((centre.z - low) / (high - low), 0.005, 0.995), 0.5)).rgb;
-      tint = mix(light * by_height, floor_tint, 0.5 * smoothstep(0.6, 0.9, facing.z)); // floors stand back behind walls
+      tint = mix(light * by_height, floor_tint, 0.5 * smoothstep(0.6, 0.9, facing.z)); // darkens floors
       gl_Position = projectionMatrix * modelViewMatrix * vec4(corner, 1.0);
     }`,
   fragment: `
@@ -207,7 +207,7 @@ const kTileShader = {
     }`,
 };
 
-/** One square for all, and where each of its copies lies. Their backs are a veil: one looks into rooms from outside. */
+/** Draws one square in many instances. Back faces are translucent, so that rooms can be viewed from outside. */
 function makeTiles({low, high}) {
   const geometry = new THREE.InstancedBufferGeometry();
   const corners = [-0.5, -0.5, 0, 0.5, -0.5, 0, 0.5, 0.5, 0, -0.5, 0.5, 0];
@@ -228,7 +228,7 @@ function makeTiles({low, high}) {
     },
   });
   const tiles = new THREE.Mesh(geometry, material);
-  tiles.frustumCulled = false;  // their bounds are not those of the one square
+  tiles.frustumCulled = false;  // bounds of the single square do not apply
   return tiles;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The path and the truth seen from above and from the side, over the walls of the map.
+// Path and truth from above and from the side, over the walls of the map.
 import {extent, quantile} from "d3-array";
 import {scaleLinear} from "d3-scale";
 import {line} from "d3-shape";
@@ -16,11 +16,11 @@ const kMargin = {
 };
 const kAxes = ["x", "y", "z"];
 
-/** How the ground is seen: one axis of the odom frame across the page, one up. */
+/** Projections of the odom frame: one axis across the page, one up. */
 export function plan(figure, width) {
   const across = extentOfPaths("x"), up = extentOfPaths("y");
   const view = {across: withWalls("x", across, up), up: withWalls("y", up, across)};
-  const height = document.querySelector("#map .drawing").clientHeight;  // beside which it lies
+  const height = document.querySelector("#map .drawing").clientHeight;  // height of the neighbouring figure
   const field_height = height - kMargin.top - kMargin.bottom;
   draw(figure, {width, field_height, axes: ["x", "y"], view, exaggeration: 1, name: "Path from above"});
 }
@@ -46,7 +46,7 @@ function widened([low, high], by) {
   return [low - by, high + by];
 }
 
-/** Makes room for the walls around, yet no more than the path itself takes, the other way too. */
+/** Widens the axis to the surrounding walls, by at most the larger extent of the path. */
 function withWalls(axis, along, across) {
   const room = Math.max(along[1] - along[0], across[1] - across[0], 6);
   const coordinates =
@@ -59,7 +59,7 @@ function withWalls(axis, along, across) {
       0.03 * room);
 }
 
-/** Both scales, so that a metre is as long both ways but for the exaggeration, and the view in the middle. */
+/** Sets both scales equal except for the exaggeration, with the view in the middle. */
 function scales({width, field_height, view, exaggeration}) {
   const field_width = width - kMargin.left - kMargin.right;
   const middle = ([low, high]) => (low + high) / 2;
@@ -137,7 +137,7 @@ function drawCursor(svg, name, at) {
   });
 }
 
-/** Of every tile that is seen edge on, its edge. */
+/** Collects the edge of every tile that is seen edge-on. */
 function drawWalls(figure, {width, height, axes, across, up, exaggeration}) {
   const drawing = figure.select(".drawing");
   drawing.selectAll("canvas").remove();

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The run that this page shows, as locus-replay wrote it into the page (report.cpp).
+// Data of the run shown by this page, as embedded by locus-replay (report.cpp).
 
 export const run = JSON.parse(document.getElementById("run").textContent);
 export const summary = run.summary;
 
-/** Times of the sweep before the first and of the last sweep, in seconds after the start of the capture. */
+/** Start of the first sweep and end of the last, in seconds after the start of the capture. */
 export const begin_s = Math.max((run.path?.t[0] ?? 0) - (run.period_s ?? 0), 0);
 export const end_s = run.path?.t.at(-1) ?? 0;
 
@@ -23,7 +23,7 @@ function decode({tile_m, count, origin_m, step_m, data}) {
   return {tile_m, count, centres, normals};
 }
 
-/** A normal from its octahedral coordinates. */
+/** Decodes a normal from its octahedral coordinates. */
 function unfolded(u, v) {
   const z = 1 - Math.abs(u) - Math.abs(v);
   const x = z >= 0 ? u : (1 - Math.abs(v)) * (u < 0 ? -1 : 1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The figures that are read rather than seen: cost of each stage, packets, sweeps, sources, configuration.
+// Tables of the report: cost of each stage, packets, sweeps, sources, configuration.
 import {max} from "d3-array";
 import {scaleLinear} from "d3-scale";
 import {select} from "d3-selection";
@@ -10,7 +10,7 @@ import {run, summary} from "./run.js";
 
 const words = (key) => key.replace(/_/g, " ");
 
-/** Each row an array; its first cell is a heading. A cell may be {text, warning}. */
+/** Builds a table. Each row is an array whose first cell is a heading. A cell may be {text, warning}. */
 function table(parent, head, rows) {
   const element = parent.append("div").attr("class", "scroll").append("table");
   element.append("thead").append("tr").selectAll("th").data(head).join("th").attr("scope", "col").text((cell) => cell);
@@ -28,7 +28,7 @@ function table(parent, head, rows) {
   return {head: element.select("thead tr"), rows: row};
 }
 
-/** A count of what should not happen: marked where it did. */
+/** Formats a count of anomalies: marked unless zero. */
 const mishap = (value) => (value > 0 ? {text: `▲ ${count(value)}`, warning: true} : count(value));
 
 export function stages(figure) {

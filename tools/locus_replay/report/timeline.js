@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Error, deviation, speed and cost over time, and beneath them the state of the odometry and the health of its sources.
+// Error, deviation, speed and cost over time, and below them the state of the odometry and the health of its sources.
 import {max} from "d3-array";
 import {scaleLinear} from "d3-scale";
 import {select} from "d3-selection";
@@ -26,7 +26,7 @@ const kBand = {
   pitch: 22
 };
 
-const kStates = ["dead reckoning", "degenerate", "standstill", "tracking"];  // the worse, the smaller, as in report.cpp
+const kStates = ["dead reckoning", "degenerate", "standstill", "tracking"];  // worst first, as in report.cpp
 const kHealth = ["lost", "healthy, not used", "used"];
 
 export function timeline(figure, width) {
@@ -75,7 +75,7 @@ function lengthPanel(name, series) {
   return {name, unit: unit.name, series, factor: unit.perMetre};
 }
 
-/** Returns what tells the value at a time. */
+/** Draws a panel; returns a function that shows the value at a time. */
 function drawPanel(svg, {name, unit, series, factor, limit}, x, top) {
   const values = series.v.map((value) => value * factor);
   const largest = max(values) || 1;
@@ -134,7 +134,7 @@ function lastBefore(times, t) {
   return times[i] > t && i > 0 ? i - 1 : i;
 }
 
-/** What is good is full or thin; what is not is hatched, so that no colour need be seen to tell them apart. */
+/** Patterns of states: good ones are solid or thin, bad ones hatched, distinguishable without colour. */
 function paint(rect, name, top) {
   const looks = {
     "used": {fill: "var(--estimate)"},
