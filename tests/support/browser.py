@@ -19,7 +19,7 @@ for program, package in (CHROMIUM, "chromium"), (DRIVER, "chromium-driver"):
         print(f"SKIPPED: {program} is not there; install {package}", file=sys.stderr)
         sys.exit(77)
 
-# How many colours the picture on a canvas has, and which share of it is painted.
+# Number of colours in a canvas and the fraction of it that is painted.
 LOOK_AT_CANVAS = """
   const source = document.querySelector(arguments[0]), copy = document.createElement("canvas");
   copy.width = source.width; copy.height = source.height;
@@ -48,7 +48,7 @@ class Browser:
             options.add_argument(argument)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
         self.driver = webdriver.Chrome(service=webdriver.chrome.service.Service(DRIVER), options=options)
-        self.driver.set_script_timeout(120)  # software draws the first page, on whatever processor is left
+        self.driver.set_script_timeout(120)  # software rendering of the first page is slow on a busy processor
         self.set_size(width)
         self.set_dark(dark)
         self.driver.get(f"file://{page}")
