@@ -14,7 +14,7 @@ import tempfile
 import unittest
 
 sys.path.append(os.path.join(os.path.dirname(__file__), "../support"))
-from browser import Browser  # it ends the program where there is none
+from browser import Browser  # exits if there is no browser
 
 PARTS = {"accuracy", "boxes", "robustness", "ablation", "ablation-table", "pace"}
 FAILURES = ["wio_imu_fail", "wio_fail", "lidar_drop"]

@@ -30,7 +30,7 @@ def main() -> int:
         drive, results = Path(folder, "drive"), Path(folder, "results")
         simulate: list[str | Path] = [bin_folder / "locus-sim", "--world", "urban", "--robot", "husky", "--duration", "300", "--seed", "3"]
         cpu_s(*simulate, "-o", drive)
-        for truth in ("gt.tum", "gt_map.ply"):  # which the program alone would look at
+        for truth in ("gt.tum", "gt_map.ply"):  # only the program would read them
             (drive / truth).unlink()
         pairs = []
         for _ in range(PAIRS):

@@ -6,8 +6,8 @@ from xml.sax.saxutils import escape
 
 WIDTH, HEIGHT = 720, 400
 LEFT, RIGHT, BOTTOM = 70, 26, 56
-LEGEND_ROW, LETTER = 22, 7.5  # heights and widths of the writing
-COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"]  # told apart by all eyes (Okabe, Ito)
+LEGEND_ROW, LETTER = 22, 7.5  # heights and widths of the text
+COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"]  # colour-blind safe (Okabe, Ito)
 
 
 class Axis:

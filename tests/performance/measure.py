@@ -14,7 +14,7 @@ import tempfile
 import time
 from pathlib import Path
 
-sys.dont_write_bytecode = True  # nothing but the page is written beside the sources
+sys.dont_write_bytecode = True  # writes only the page beside the sources
 import page
 
 WORLDS = ["urban", "tunnel", "field", "stairs", "corridor"]
