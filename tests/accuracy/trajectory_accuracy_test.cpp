@@ -112,7 +112,7 @@ TEST(WayDrift, OfAShortWayIsNotTold) {
   EXPECT_FALSE(way_drift(straight(10), {}));
 }
 
-/// As KITTI's own tool: ten of the hundred sections of 100 m, which start at every estimate, count.
+/// Agrees with KITTI's own tool: ten of the hundred sections of 100 m, which start at every estimate, count.
 TEST(WayDrift, CountsStretchesFromEveryTenthEstimate) {
   Trajectory estimates = straight(200);
   for (std::size_t i = 0; i < estimates.size(); ++i)

@@ -89,7 +89,7 @@ TEST(LidarPort, IsThatOfTheMetadataWhereTheFileNamesNone) {
     const auto config = with_lidar_metadata(*parsed);
     EXPECT_TRUE(config) << config.error().front();
     EXPECT_EQ(*parse_config(print_config(*config), "printed"), [&] {
-      Config without_imu = *config; // not determined by keys
+      Config without_imu = *config; // has no keys
       without_imu.lidars[0].imu_port = 0;
       without_imu.motion_sources.back().of_lidar = false;
       return without_imu;

@@ -152,8 +152,8 @@ TEST(LiveInput, MotionWakesTheWaitingThread) {
   reader.join();
 }
 
-/// A recording preserves the order in which the inputs were returned. The exception is a clock that is stepped back by
-/// an hour.
+/// Late motion arrives just after the last input returned, so that a recording preserves the order. An hour late is a
+/// clock step and passes unchanged.
 TEST(LiveInput, MotionThatIsHandedOverLateArrivesAfterWhatWasGivenOut) {
   const test::KernelStamps stamps;
   LiveInput input(two_sockets());

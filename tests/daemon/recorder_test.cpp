@@ -29,7 +29,7 @@ using std::chrono::seconds;
 constexpr std::uint64_t kMaxBytes = 16'000'000;
 constexpr Stamp kNow = stamp_from_ns(1'700'000'000'000'000'000);
 
-/// In memory if there is room, because pieces are synced to disk, which may be busy.
+/// A folder in memory if there is room, because pieces are synced to disk, which may be busy.
 class QuickFolder : public test::TemporaryFolder {
  public:
   QuickFolder() : TemporaryFolder(has_room("/dev/shm") ? "/dev/shm" : testing::TempDir()) {}

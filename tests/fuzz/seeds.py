@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""seeds.py FOLDER: writes a first corpus into FOLDER/TARGET/: one well-formed input for every form that is read, each
-key of the configuration and each number of a motion file set to what makes no sense, and what coverage.sh showed to be missing."""
+"""seeds.py FOLDER: writes an initial corpus to FOLDER/TARGET/: one well-formed input per supported format, inputs with
+each key of the configuration and each number of a motion file set to nonsense, and inputs for gaps that coverage.sh showed."""
 import bz2
 import ctypes
 import gzip

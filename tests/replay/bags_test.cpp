@@ -138,7 +138,7 @@ TEST(Bags, BagOfTwoLidarsGivesTheirPacketsInTheOrderOfReception) {
     EXPECT_LT((of_bag[i].T_source_base.translation - of_capture[i].T_source_base.translation).norm(), 1e-9) << i;
 }
 
-/// As written by scripts that merge or convert. Playback is ordered by the time of reception.
+/// Order of scripts that merge or convert bags. Playback is ordered by the time of reception.
 TEST(Bags, DatabaseThatWasWrittenTopicByTopicGivesTheOdometryOfTheCapture) {
   const TemporaryFolder folder;
   std::vector<RecordedMessage> messages = room_messages(RosVersion::ros2);

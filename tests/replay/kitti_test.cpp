@@ -211,7 +211,7 @@ TEST_F(KittiReplay, WithoutInertialUnitTheLidarIsAlone) {
   EXPECT_TRUE(contains(replay.run().out, "velodyne_points is lidar front; its vertical")) << replay.run().out;
 }
 
-/// As in a synchronised drive.
+/// The rate of a synchronised drive.
 TEST_F(KittiReplay, InertialUnitAtTenHertzDoesToo) {
   for (int i = 0; i < 10 * kitti_room::kSweeps; ++i) {
     if (i % 10 != 0)

@@ -373,7 +373,7 @@ TEST_F(SmallMcap, TopicsBeyondTheBoundsAreLeftOutAndSaid) {
   expect_warning(bounded, {"topics beyond the 65535th"});
 }
 
-/// As rosbag2 splits a bag. The memory of a file is released when the next one is opened.
+/// A bag split by rosbag2. The memory of a file is released when the next one is opened.
 TEST(Mcap, FolderOfManyFilesTakesTheMemoryOfOne) {
   constexpr std::size_t kBytes = 32'000'000, kFiles = 8;
   const TemporaryFolder folder;

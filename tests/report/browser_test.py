@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""browser_test.py SAMPLE_REPORTS: what headless Chromium makes of the reports that this program writes.
+"""browser_test.py SAMPLE_REPORTS: tests the reports of this program in headless Chromium.
 
-Set LOCUS_SCREENSHOTS to a folder to see what it saw.
+Stores screenshots in the folder LOCUS_SCREENSHOTS if that is set.
 """
 import os
 import shutil

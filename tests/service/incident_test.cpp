@@ -447,7 +447,7 @@ TEST(IncidentFolder, WhatComesTooSoonIsCounted) {
   }
 }
 
-/// As after a step of the clock by minus one year.
+/// State after a step of the clock by minus one year.
 TEST(IncidentFolder, OneOfTheFutureHidesNoneOfToday) {
   const TemporaryFolder folder;
   const path piece = folder / "record/000001_2026-11-22T08-12-05Z/000001";

@@ -60,7 +60,7 @@ TEST_F(Restart, StoppedAndKilledInMidDriveItGoesOnWhereTheRobotIs) {
   EXPECT_GT(heard(*listener_).size(), 120U);
 }
 
-/// As when the watchdog ends the service: six seconds later the robot is elsewhere, and only its wheels have measured
+/// Restart by the watchdog: six seconds later the robot is elsewhere, and only its wheels have measured
 /// the motion.
 TEST_F(Restart, StalledForSixSecondsInMidDriveItGoesOnWhereTheWheelsSay) {
   std::this_thread::sleep_for(seconds{3});

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What headless Chromium makes of a page. Ends the program as skipped where it, or python3-selenium, is missing."""
+"""Drives headless Chromium. Exits as skipped if Chromium or python3-selenium is missing."""
 import os
 import shutil
 import sys
@@ -33,7 +33,7 @@ LOOK_AT_CANVAS = """
 
 
 class Browser:
-    """One page in a window of its own, closed at the end of a with statement."""
+    """A page in its own window, closed at the end of a with statement."""
 
     def __init__(self, page, width=1280, dark=False, webgl=True):
         self.profile = tempfile.mkdtemp(prefix="locus-browser-")
@@ -81,7 +81,7 @@ class Browser:
         return {part.get_attribute("id") for part in self.all("[data-drawn]")}
 
     def canvas(self, selector):
-        """Found and looked at in one go: the page puts a new canvas in the place of the old one as it likes."""
+        """Finds and inspects the canvas in one script, because the page may replace it at any time."""
         return self.run(LOOK_AT_CANVAS, selector)
 
     def complaints(self):

@@ -53,7 +53,7 @@ inline Vector6 winding(double t) {
                   0.05 * std::sin(2.0 * t), 0.05 * std::sin(1.7 * t), 0.3 * std::sin(0.5 * t));
 }
 
-/// So slow that errors in proportion to the motion are negligible.
+/// Slow motion, for which errors proportional to it are negligible.
 inline Vector6 creeping(double t) { return 0.1 * winding(t); }
 
 /// A robot with this true motion. Its sensors have Gaussian noise, bias, scale error, lateness and misalignment only.

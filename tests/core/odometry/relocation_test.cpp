@@ -422,7 +422,7 @@ TEST(Relocation, InABareCorridorTheSigmaHoldsWhatRestartedWheelsGetWrong) {
     } else {
       if (!next) {
         last.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {2.5, 0, 0}} * *last.T_source_base[0];
-        last.stamp -= seconds{3}; // beyond that the robot's motion limits allow it
+        last.stamp -= seconds{3}; // a robot can move farther in that time
         next.emplace(robot.odometry(), robot.motion_sources());
         next->begin_at(last, legacy_of(odometry, last.T_odom_base).map_odom);
       }

@@ -41,7 +41,7 @@ LidarReturn only_return(Decoder& decoder, const HesaiTestPacket& bytes) {
 
 class HesaiModel : public testing::TestWithParam<Model> {};
 
-/// By the manual: azimuth of the block, the laser's own offset, and the rotation until it fires.
+/// Direction by the manual: azimuth of the block, the laser's own offset, and the rotation until it fires.
 TEST_P(HesaiModel, EachReturnHasDirectionAndTimeOfItsOwnFiring) {
   const Model model = GetParam();
   const ModelSpec& its = spec(model);
@@ -325,7 +325,7 @@ TEST(HesaiDecoder, CalibrationIsThatOfAsManyLasers) {
   EXPECT_EQ(decoder.decode(sixteen.payload(), packet), PacketError::model);
 }
 
-/// In either direction of rotation the laser has turned beyond the block's azimuth when it fires.
+/// The laser has turned, in either direction, beyond the block's azimuth when it fires.
 TEST(HesaiDecoder, TurnsCounterclockwiseIfItsAzimuthsDo) {
   for (const auto& [model, mode] : {std::pair{Model::xt32, kStrongest}, std::pair{Model::qt128, kDual}}) {
     const ModelSpec& its = spec(model);

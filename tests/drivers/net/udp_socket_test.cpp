@@ -96,7 +96,7 @@ TEST(UdpSocket, PortThatIsTakenIsSaid) {
   EXPECT_NE(second.error().find("another program listens there"), std::string::npos) << second.error();
 }
 
-/// As two instances of the service receive the position packets of broadcasting lidars.
+/// Two instances of the service receive the position packets of broadcasting lidars like this.
 TEST(UdpSocket, OfTwoBesideEachOtherEachHearsABroadcast) {
   constexpr std::uint32_t kEverybody = 0x7FFF'FFFF; // 127.255.255.255
   auto first = UdpSocket::open_beside_others(0);
