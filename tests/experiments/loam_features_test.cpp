@@ -27,7 +27,7 @@ template <class RangeAt> Sweep turn(RangeAt&& range_at, std::uint16_t scan_line 
   return sweep;
 }
 
-/// Range to the walls of a square room of 10 m, from its center.
+/// Range to the walls of a square room of 10 m, from its centre.
 double square_room(double azimuth) { return 5 / std::max(std::abs(std::cos(azimuth)), std::abs(std::sin(azimuth))); }
 
 bool near_corner(const SweepPoint& point, float within_m) {

@@ -52,7 +52,7 @@ std::vector<std::uint32_t> scan(RingSegments& segments, std::uint16_t scan_line,
 
 double tank(double) { return 5.0; }
 
-/// Range to the walls of a square room of 8 m, from its center.
+/// Range to the walls of a square room of 8 m, from its centre.
 double square_room(double azimuth) { return 4.0 / std::max(std::abs(std::cos(azimuth)), std::abs(std::sin(azimuth))); }
 
 TEST(RingSegments, CentroidsComeByScanLineAndWithinItByTime) {
