@@ -456,7 +456,7 @@ TEST_F(MetricsOnCall, AreToldBesideAnyNumberWhoAreSilent) {
   say(asks, kScrape);
   EXPECT_TRUE(served(asks).ends_with("# EOF\n"));
   const Descriptor deaf = client();
-  for (int i = 0; i < 100; ++i) // more than allowed; unread input must not accumulate in memory
+  for (int i = 0; i < 100; ++i) // excess requests of a client that does not read must not fill memory
     say(deaf, kScrape);
   const Descriptor next = connect_to(kAddress);
   say(next, kScrape);
