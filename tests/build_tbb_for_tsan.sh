@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Debian's TBB, built so that the thread sanitizer sees into it: with the packaged one it reports races that are none, and
-# leaving out whatever touches TBB would hide those that are. Built once, in half a minute; prints its folder.
+# Builds Debian's TBB with thread sanitizer instrumentation. With the packaged library it reports false races, and
+# suppressing everything that touches TBB would hide real ones. Built once, in half a minute; prints its folder.
 set -euo pipefail
 version=$(dpkg-query -W -f '${source:Version}' libtbb-dev)
 cache=${XDG_CACHE_HOME:-~/.cache}/locusd/tbb-tsan-${version}

@@ -12,7 +12,7 @@ namespace {
 
 using std::chrono::seconds;
 
-/// A drive of a metre a second along x, as estimated with an error and as stated.
+/// A drive at 1 m/s along x, with an error and a stated covariance.
 struct Drive {
   std::vector<StampedPose> truth, estimates;
   std::vector<Matrix6> covariances;
@@ -28,7 +28,7 @@ template <class ErrorAt> Drive drive(int poses, double variance_per_metre, Error
     result.truth.push_back({stamp, T_truth});
     result.estimates.push_back({stamp, error_at(i) * T_truth});
     result.covariances.push_back(Matrix6::Identity() * (i * variance_per_metre));
-    result.covariances.back().diagonal().tail<3>() /= 1e4; // so that no turn moves what is 10 m ahead
+    result.covariances.back().diagonal().tail<3>() /= 1e4; // so that yaw errors do not matter 10 m ahead
   }
   return result;
 }
@@ -36,7 +36,7 @@ template <class ErrorAt> Drive drive(int poses, double variance_per_metre, Error
 Pose shifted(double x_m) { return {Eigen::Quaterniond::Identity(), {x_m, 0, 0}}; }
 
 TEST(Consistency, AnErrorOfOneSigmaAlongOneAxisCountsAsOne) {
-  // 10 m apart one end is off by 0.1 m, and the variances of both together are 0.01 m^2.
+  // Errors over 10 m are 0.1 m, and the sum of both variances is 0.01 m^2.
   Drive twenty = drive(21, 0.0, [](int i) { return shifted(i < 10 ? 0.0 : 0.1); });
   for (Matrix6& covariance : twenty.covariances)
     covariance.diagonal().setConstant(0.005);
@@ -72,7 +72,7 @@ TEST(Consistency, NothingIsSaidOfAStretchThatWasNotDriven) {
 }
 
 TEST(Consistency, TheWorstPositionIsFoundWhereverItIs) {
-  // After 50 m the stated deviation is 0.1 m.
+  // After 50 m the stated standard deviation is 0.1 m.
   const auto judged = drive(100, 0.0002, [](int i) { return shifted(i == 50 ? 0.4 : 0.0); }).judged();
   ASSERT_TRUE(judged);
   EXPECT_NEAR(judged->worst_sigma, 4.0, 1e-6);

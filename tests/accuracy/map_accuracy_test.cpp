@@ -15,7 +15,7 @@ using Points = std::vector<Eigen::Vector3f>;
 
 constexpr float kStep_m = 0.05F;
 
-/// The walls of a room around the origin, 4 x 3 x 2 m inside, points at the crossings of a grid; `inwards_m` off them.
+/// Points on the walls of a room around the origin, 4 x 3 x 2 m inside, on a grid; displaced by `inwards_m`.
 Points room(float inwards_m) {
   const Eigen::Vector3f half(2, 1.5F, 1);
   Points points;

@@ -15,7 +15,7 @@ using Trajectory = std::vector<StampedPose>;
 
 Pose yawed(double yaw_rad, const Eigen::Vector3d& position) { return {from_rpy_rad({0, 0, yaw_rad}), position}; }
 
-/// A pose every `interval`, `pose_at(i)`.
+/// One pose `pose_at(i)` per `interval`.
 template <class PoseAt> Trajectory drive(int poses, Duration interval, PoseAt&& pose_at) {
   Trajectory trajectory;
   for (int i = 0; i < poses; ++i)
@@ -23,12 +23,12 @@ template <class PoseAt> Trajectory drive(int poses, Duration interval, PoseAt&& 
   return trajectory;
 }
 
-/// A metre a second, straight ahead.
+/// Straight ahead at 1 m/s.
 Trajectory straight(int poses, double scale = 1.0) {
   return drive(poses, milliseconds{1000}, [&](int i) { return yawed(0, {scale * i, 0, 0}); });
 }
 
-/// Around a circle of 20 m, with hills.
+/// A circle of 20 m, with hills.
 Trajectory loop(int poses) {
   return drive(poses, milliseconds{100}, [](int i) {
     const double angle = 0.005 * i;
@@ -62,7 +62,7 @@ TEST(TrajectoryAccuracy, AnotherFrameIsNoError) {
 }
 
 TEST(TrajectoryAccuracy, PositionsAreComparedAfterAlignment) {
-  // Aside by 0.1 m, so that neither turning nor moving the line helps.
+  // Lateral errors of 0.1 m that no rotation or translation of the line reduces.
   constexpr std::array kX_m{-3.0, -1.0, 1.0, 3.0}, kAside_m{0.1, -0.1, -0.1, 0.1};
   const auto at = [&](int i) { return static_cast<std::size_t>(i); };
   const Trajectory truth = drive(4, milliseconds{100}, [&](int i) { return yawed(0, {kX_m[at(i)], 0, 0}); });
@@ -112,11 +112,11 @@ TEST(WayDrift, OfAShortWayIsNotTold) {
   EXPECT_FALSE(way_drift(straight(10), {}));
 }
 
-/// As KITTI's own tool: of a hundred stretches of 100 m that begin at every estimate, ten count.
+/// Agrees with KITTI's own tool: ten of the hundred sections of 100 m, which start at every estimate, count.
 TEST(WayDrift, CountsStretchesFromEveryTenthEstimate) {
   Trajectory estimates = straight(200);
   for (std::size_t i = 0; i < estimates.size(); ++i)
-    estimates[i].T_source_base.translation.y() = i % 10 == 0 ? 0 : 1; // ends of stretches that count are right, too
+    estimates[i].T_source_base.translation.y() = i % 10 == 0 ? 0 : 1; // the ends of counted sections are correct, too
   EXPECT_NEAR(*way_drift(estimates, straight(200))->percent, 0, 1e-9);
 }
 
@@ -172,7 +172,7 @@ TEST(TrajectoryAccuracy, WithoutCommonTimeThereIsNone) {
 
 TEST(TrajectoryAccuracy, NothingIsComparedInAHoleOfTheTruth) {
   const Trajectory estimates = drive(100, milliseconds{100}, [](int i) {
-    return yawed(0, {0.1 * i, i > 20 && i < 60 ? 3.0 : 0.0, 0}); // around an obstacle, which the truth cannot know
+    return yawed(0, {0.1 * i, i > 20 && i < 60 ? 3.0 : 0.0, 0}); // around an obstacle that the truth does not contain
   });
   Trajectory truth = drive(100, milliseconds{100}, [](int i) { return yawed(0, {0.1 * i, 0, 0}); });
   truth.erase(truth.begin() + 21, truth.begin() + 60);

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Every library that is bundled into a page stands in its licences.txt and in the copyright file of the packages.
+# Every library bundled into a page is listed in its licences.txt and in the copyright file of the packages.
 source "$(dirname "$0")/sources.sh"
 export NODE_PATH=/usr/share/nodejs:/usr/share/javascript
 work=$(mktemp -d)

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# clang_tidy.sh BUILD_FOLDER: no finding of clang-tidy in any unit that the build compiles, on all processors. The checks
-# look at the project's own code alone, see project_only.cpp.
+# clang_tidy.sh BUILD_FOLDER: clang-tidy reports nothing in any unit of the build; uses all processors. The checks are
+# limited to the project's own code, see project_only.cpp.
 build=$(realpath "$1")
 source "$(dirname "$0")/sources.sh"
 room="($(IFS='|'; echo "${rooms[*]}"))"
@@ -14,7 +14,7 @@ clang++ -std=c++17 -shared -fPIC -fno-rtti -isystem "$llvm/include" tests/checks
 printf '#!/bin/sh\nexec clang-tidy -load %q "$@"\n' "$folder/project_only.so" >"$folder/clang-tidy"
 chmod +x "$folder/clang-tidy"
 
-# What would be found is found, in a header as well.
+# Self-test: findings are reported, in headers as well.
 echo 'struct A { virtual ~A() = default; virtual void f() {} }; struct B : A { void f() {} };' >"$folder/core/finding.hpp"
 echo '#include "finding.hpp"' >"$folder/core/finding.cpp"
 cp .clang-tidy "$folder"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Every file that people write begins with the licence line (after #! where there is one).
+# Every hand-written file begins with the licence line (after #! if there is one).
 source "$(dirname "$0")/sources.sh"
 status=0
 while read -r file; do

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plugin of clang-tidy that confines its checks to the project. What headers of the system declare is nine tenths of
-// a unit, and clang-tidy walks all of it for what it would not report; versions from 22 on leave it out by themselves.
+// A clang-tidy plugin that limits its checks to the project. Declarations of system headers are nine tenths of a unit,
+// and clang-tidy traverses them without reporting anything; versions from 22 on skip them.
 #include <vector>
 
 #include <clang-tidy/ClangTidyCheck.h>
@@ -12,7 +12,7 @@ namespace {
 
 using namespace clang;
 
-/// The first node that is matched is the whole unit, before what it is made of is looked at.
+/// Restricts the traversal when the translation unit, the first node, is matched.
 class ProjectOnly : public tidy::ClangTidyCheck {
  public:
   using ClangTidyCheck::ClangTidyCheck;

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-# For the checks beside it: strict shell, the project's folder, its sources.
+# Sourced by the other checks: strict shell, project folder, list of sources.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 rooms=(core drivers config daemon tools tests)
 
-# cpp_sources [FOLDER]...: the C++ files of the rooms given, or of all.
+# cpp_sources [FOLDER]...: prints the C++ files of the given rooms, or of all.
 cpp_sources() { find "${@:-"${rooms[@]}"}" -name '*.cpp' -o -name '*.hpp' | sort; }

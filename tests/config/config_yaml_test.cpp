@@ -19,7 +19,7 @@
 namespace locus {
 namespace {
 
-/// Every key with another value than it has in kBase, but for the version, of which there is one.
+/// All keys with values different from kBase, except the version, which has only one value.
 const std::string kAllChanged = R"(
 version: 1
 defaults: true
@@ -51,7 +51,7 @@ record: {folder: /data/drives, max_bytes: 98765432, keep_s: 30.5, keep_bytes: 87
 metrics: {listen: "[::1]:9465"}
 )";
 
-/// The defaults, but such that each value of kAllChanged fits among them alone.
+/// The defaults, modified so that each value of kAllChanged alone is valid among them.
 const std::string kBase = R"(
 lidars:
   - {name: front}
@@ -121,7 +121,7 @@ TEST(ConfigYaml, EveryKeyAloneChangesItselfAndNothingElse) {
   };
   for (const auto& [path, value] : base_leaves) {
     if ((path.starts_with("lidars.0.") && is_of_clouds(path)) || (path.starts_with("lidars.1.") && is_of_packets(path)))
-      continue; // the first sends packets, the second gives clouds
+      continue; // the first sends packets, the second publishes clouds
     if (path == "version" || (path.starts_with("motion_sources.0.") && is_of_an_imu(path)))
       continue; // kAllChanged has an odometry there
     if (path.starts_with("motion_sources.1.") && is_of_an_odometry(path))
@@ -350,7 +350,7 @@ TEST(ConfigYaml, OffAndOnAreWordsWhateverYamlMakesOfThem) {
   EXPECT_EQ(valid(parse_config("scan_to_scan: {mode: false}", "")).odometry.scan_to_scan_mode, ScanToScanMode::off);
 }
 
-/// It was read as empty documents, one after the other, until the memory was full.
+/// Regression: it was read as an endless sequence of empty documents, until memory was exhausted.
 TEST(ConfigYaml, CommaInFrontOfEverythingIsAMistake) {
   EXPECT_EQ(errors_in(",lidars: []\n"),
             ConfigErrors{"robot.yaml:1: no key begins like this; remove what stands in front of it"});
@@ -367,7 +367,7 @@ TEST(ConfigYaml, WhatIsNotYamlIsRefusedWithItsLine) {
                          "the first column"});
 }
 
-/// Words of the YAML grammar tell a robot's owner nothing.
+/// Error messages must not contain terms of the YAML grammar.
 TEST(ConfigYaml, MistakesOfIndentationAreToldInPlainWords) {
   const auto said = [](const std::string& yaml, const std::string& where, const std::string& what) {
     const ConfigErrors errors = errors_in(yaml);
@@ -488,7 +488,7 @@ TEST(ConfigOverride, MistakesNameTheOptionAtFault) {
 }
 
 TEST(ConfigSha256, IsTheDigestOfThePrintedText) {
-  // A second opinion on the digest: the tool of the same name.
+  // Independent check of the digest by the tool of the same name.
   const test::TemporaryFile file{"printed.yaml", test::bytes_of(print_config(Config{}))};
   FILE* pipe = popen(("sha256sum " + file.path().string()).c_str(), "r");
   ASSERT_NE(pipe, nullptr);

@@ -11,7 +11,7 @@
 namespace locus {
 namespace {
 
-/// A sensor turned upside down and moved, with its unit 5 mm ahead of its own origin.
+/// A sensor that is upside down and displaced, with its IMU 5 mm ahead of its own origin.
 Config with_ouster(const test::TemporaryFile& file, const std::string& imu_profile = "LEGACY") {
   std::ofstream out{file.path()};
   const auto angles = [&](const char* key) {
@@ -68,7 +68,7 @@ TEST(LidarImus, KeepThePlaceThatTheyAreListedAt) {
       std::string::npos);
 }
 
-/// What somebody publishes of the unit is not heard a second time.
+/// An IMU that is published on a topic is not read a second time from packets.
 TEST(LidarImus, WithATopicAreHeardThereAlone) {
   const test::TemporaryFile file{"imu.json"};
   Config config = with_ouster(file);
@@ -89,7 +89,7 @@ TEST(LidarPort, IsThatOfTheMetadataWhereTheFileNamesNone) {
     const auto config = with_lidar_metadata(*parsed);
     EXPECT_TRUE(config) << config.error().front();
     EXPECT_EQ(*parse_config(print_config(*config), "printed"), [&] {
-      Config without_imu = *config; // keys do not tell of it
+      Config without_imu = *config; // has no keys
       without_imu.lidars[0].imu_port = 0;
       without_imu.motion_sources.back().of_lidar = false;
       return without_imu;

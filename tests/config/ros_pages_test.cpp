@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What docs/nav2.md and docs/ros2.md tell users to write into files of locusd and of others: that it parses, and that
-// it names the topics and frames which locusd has by default.
+// Configuration snippets of docs/nav2.md and docs/ros2.md for locusd and other programs: they parse, and contain the
+// default topics and frames of locusd.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -26,7 +26,7 @@ std::string page(const std::string& name) {
   return {std::istreambuf_iterator<char>{file}, {}};
 }
 
-/// The parts of a page, each with its heading.
+/// Returns the sections of a page, each with its heading.
 std::vector<std::string> sections_of(const std::string& text) {
   std::vector<std::string> sections;
   for (std::size_t at = 0, next = 0; at != std::string::npos; at = next) {
@@ -36,7 +36,7 @@ std::vector<std::string> sections_of(const std::string& text) {
   return sections;
 }
 
-/// What stands between ```LANGUAGE and ```.
+/// Returns the text between ```LANGUAGE and ```.
 std::vector<std::string> snippets_of(const std::string& text, const std::string& language) {
   std::vector<std::string> snippets;
   const std::string begin = "\n```" + language + "\n", end = "\n```\n";
@@ -47,7 +47,7 @@ std::vector<std::string> snippets_of(const std::string& text, const std::string&
   return snippets;
 }
 
-/// Calls `use(key, value)` for every value of a tree, whose key is that of its map.
+/// Calls `use(key, value)` for every value of a tree, with the key of the innermost map.
 template <class Use> void for_each_value(const YAML::Node& node, const std::string& key, const Use& use) {
   if (node.IsMap())
     for (const auto& entry : node)
@@ -58,7 +58,7 @@ template <class Use> void for_each_value(const YAML::Node& node, const std::stri
 
 bool is_of_locusd(const YAML::Node& root) { return root["dds"].IsDefined(); }
 
-/// Values of this key in a file of another program.
+/// Returns the values of this key in a file of another program.
 std::vector<std::string> values_of(const YAML::Node& root, const std::string& wanted) {
   std::vector<std::string> values;
   for_each_value(root, "", [&](const std::string& key, const YAML::Node& value) {
@@ -68,7 +68,7 @@ std::vector<std::string> values_of(const YAML::Node& root, const std::string& wa
   return values;
 }
 
-/// By the names that Nav2 and robot_localization give these settings.
+/// Default values of locusd by the names that Nav2 and robot_localization use for these settings.
 std::map<std::string, std::set<std::string>> values_by_default() {
   const DdsOptions dds;
   const std::set<std::string> odometry{dds.prefix + "/odometry"}, odom{dds.frame_odom}, base{dds.frame_base};
@@ -126,8 +126,7 @@ TEST(RosPages, LocalCostmapIsInTheOdomFrame) {
   ADD_FAILURE() << "no local costmap";
 }
 
-/// Of each section that has files for locusd and for an EKF, one of the two has the transform; where there is no EKF,
-/// it is locusd.
+/// In each section with files for locusd and an EKF exactly one publishes the transform; without an EKF it is locusd.
 TEST(RosPages, OneNodePublishesTheTransform) {
   int found = 0;
   for (const std::string& section : sections_of(page("nav2.md"))) {
@@ -143,7 +142,7 @@ TEST(RosPages, OneNodePublishesTheTransform) {
   EXPECT_EQ(found, 2);
 }
 
-/// robot_localization takes fifteen: x y z, roll pitch yaw, their rates, accelerations.
+/// robot_localization has 15 flags: x y z, roll pitch yaw, their rates, accelerations.
 TEST(RosPages, EkfFusesThePoseOnce) {
   for (const std::string& snippet : snippets_of(page("nav2.md"), "yaml")) {
     const YAML::Node ekf = YAML::Load(snippet)["ekf_filter_node"]["ros__parameters"];

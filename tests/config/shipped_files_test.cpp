@@ -28,7 +28,7 @@ std::vector<std::string> source_names(const Config& config) {
   return names;
 }
 
-/// The algorithm's options without the lidars and sources of a robot.
+/// Returns the options of the algorithm, without lidars and sources.
 Config without_robot(Config config) {
   const Config defaults;
   config.lidars = defaults.lidars;
@@ -65,7 +65,7 @@ TEST(ShippedFiles, HuskyAndSpotLeaveTheAlgorithmAsItIs) {
   EXPECT_EQ(without_robot(load_shipped("spot.yaml")), Config{});
 }
 
-/// What Section II of the paper says of both robots.
+/// Settings for both robots in Section II of the paper.
 Config paper_algorithm() {
   Config paper;
   paper.sweep.segment_filter.enabled = false;

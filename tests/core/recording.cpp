@@ -12,7 +12,7 @@ namespace locus::test {
 
 namespace {
 
-constexpr std::size_t kMaxReturnsPerSweep = 200'000; ///< a HDL-32E makes 140 000 at 300 rpm
+constexpr std::size_t kMaxReturnsPerSweep = 200'000; ///< an HDL-32E produces 140 000 at 300 rpm
 
 LidarInput open_lidar(Isa isa) {
   LidarOptions options;
@@ -71,7 +71,7 @@ SweepsOfRecording::SweepsOfRecording(const Recording& recording, const SweepOpti
           options, {Pose{}}, MotionSources({}, Fusion::combined), kMaxReturnsPerSweep,
           [this](Sweep& sweep) {
             std::swap(sweep_, sweep);
-            sweep.sequence = sweep_.sequence; // the builder's to count
+            sweep.sequence = sweep_.sequence; // counted by the builder
             ready_ = true;
           },
           clock) {}

@@ -18,7 +18,7 @@
 
 namespace locus::test {
 
-/// Data packets of one lidar, held in memory to be played again and again without the cost of making or reading them.
+/// Data packets of one lidar in memory, replayed repeatedly without the cost of simulating or reading them.
 class Recording {
  public:
   Recording(Recording&&) = default;
@@ -26,7 +26,7 @@ class Recording {
   static Recording synthetic(const sim::Scene& scene, const sim::Trajectory& trajectory,
                              const sim::SyntheticLidarOptions& lidar, Duration duration);
 
-  /// Of `velodyne/<name>.pcap` in the folder of real captures; nothing where it is absent.
+  /// Reads `velodyne/<name>.pcap` of the folder of real captures; nothing if it is absent.
   static std::optional<Recording> real(const std::string& name);
 
   [[nodiscard]] const std::vector<Datagram>& datagrams() const { return datagrams_; }
@@ -35,20 +35,20 @@ class Recording {
   Recording() = default;
   void keep(const Datagram& datagram);
 
-  std::deque<std::vector<std::byte>> payloads_; ///< never moves what it holds
+  std::deque<std::vector<std::byte>> payloads_; ///< a deque: addresses stay valid
   std::vector<Datagram> datagrams_;
 };
 
-/// A VLP-16 at 10 Hz with 2 cm of noise, driven through sim::plant() at 1 m/s.
+/// Simulates a VLP-16 at 10 Hz with 2 cm of range noise, driven through sim::plant() at 1 m/s.
 Recording plant_recording(Duration duration);
 
-/// From the datagrams of a recording to sweeps, as in the daemon: decoder, clock, builder; no motion source.
+/// Turns the datagrams of a recording into sweeps, as in the daemon: decoder, clock, builder; no motion source.
 class SweepsOfRecording {
  public:
-  /// The recording must outlive it.
+  /// `recording` must outlive this.
   SweepsOfRecording(const Recording& recording, const SweepOptions& options, StageClock* clock = nullptr);
 
-  /// The next sweep, valid until the next call; nullptr at the end.
+  /// Returns the next sweep, valid until the next call; nullptr at the end.
   Sweep* next();
 
  private:
@@ -64,10 +64,10 @@ class SweepsOfRecording {
   SweepBuilder builder_;
 };
 
-/// All sweeps of a recording.
+/// Returns all sweeps of a recording.
 std::vector<Sweep> sweeps_of(const Recording& recording, const SweepOptions& options);
 
-/// Every return on its own, as other registrations want them.
+/// Options that keep every return, as other registrations expect.
 SweepOptions every_return();
 
 } // namespace locus::test

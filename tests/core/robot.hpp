@@ -18,9 +18,9 @@
 
 namespace locus::test {
 
-inline constexpr std::size_t kMaxReturns = 100'000; ///< of one sweep; a VLP-16 makes 30 000
+inline constexpr std::size_t kMaxReturns = 100'000; ///< per sweep; a VLP-16 produces 30 000
 
-/// What a robot of the tests carries: a level VLP-16 on a mast, unless said otherwise, and no motion source.
+/// Sensors of a test robot: by default a level VLP-16 on a mast and no motion source.
 struct RobotSetup {
   std::vector<sim::SyntheticLidarOptions> lidars{on_mast()};
   std::optional<sim::OdometryFaults> wheels; ///< 50 Hz, first in the queue
@@ -37,10 +37,10 @@ struct RobotSetup {
   [[nodiscard]] OdometryOptions odometry() const;
 };
 
-/// A stream of decoded packets of one synthetic lidar, stamped with the true time. One owner.
+/// A stream of decoded packets of one synthetic lidar, stamped with the true time. Not thread-safe.
 class PacketStream {
  public:
-  /// Scene and trajectory must outlive it.
+  /// `scene` and `trajectory` must outlive this.
   PacketStream(const sim::Scene& scene, const sim::Trajectory& trajectory, const sim::SyntheticLidarOptions& options,
                std::uint8_t index);
 
@@ -54,15 +54,15 @@ class PacketStream {
   LidarPacket packet_;
 };
 
-/// Drives the robot for `duration`; `sink` gets each sweep. Gives back what the builder counted.
+/// Drives the robot for `duration` and passes each sweep to `sink`. Returns the builder's counters.
 SweepBuilder::Counters drive(const sim::Scene& scene, const sim::Trajectory& trajectory, const RobotSetup& setup,
                              Duration duration, const SweepBuilder::Sink& sink);
 
-/// All sweeps of a drive.
+/// Returns all sweeps of a drive.
 std::vector<Sweep> sweeps_of(const sim::Scene& scene, const sim::Trajectory& trajectory, const RobotSetup& setup,
                              Duration duration);
 
-/// Where the base truly is, seen from where it was at the first stamp.
+/// Returns the true pose of the base at `to` in the base frame at `from`.
 Pose true_motion(const sim::Trajectory& trajectory, Stamp from, Stamp to);
 
 } // namespace locus::test

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// stage_instructions STAGE: drives through the plant, lidar alone, and has callgrind count what that stage executes, or
-// `all` of the pipeline. stage_instructions.sh runs it and compares.
+// stage_instructions STAGE: drives through the plant with lidar alone and counts, by callgrind, the instructions of
+// that stage, or of the whole pipeline (`all`). stage_instructions.sh runs it and compares.
 #include <valgrind/callgrind.h>
 
 #include <array>
@@ -16,7 +16,7 @@ namespace {
 
 using namespace locus;
 
-/// Counts while the innermost stage is the one that is wanted.
+/// Counts while the selected stage is the innermost one.
 class InstructionCounter : public StageClock {
  public:
   explicit InstructionCounter(std::string_view wanted) : wanted_(wanted), outside_(wanted == "all") {}
@@ -30,7 +30,7 @@ class InstructionCounter : public StageClock {
     count(counts_.empty() ? outside_ : counts_.back());
   }
 
-  /// Once what only the first sweeps need is behind.
+  /// Starts counting, after the initialisation in the first sweeps.
   void start() {
     CALLGRIND_START_INSTRUMENTATION;
     started_ = true;
@@ -46,7 +46,7 @@ class InstructionCounter : public StageClock {
 
   std::string_view wanted_;
   bool outside_;
-  std::vector<bool> counts_; ///< of the stages that are open
+  std::vector<bool> counts_; ///< of the open stages
   bool started_ = false, counting_ = false;
 };
 
@@ -57,14 +57,14 @@ int main(int argc, char** argv) {
     std::fputs("usage: stage_instructions STAGE\n", stderr);
     return 2;
   }
-  constexpr int kWarmUp = 30; // it stands, and then accelerates
+  constexpr int kWarmUp = 30; // standstill and acceleration
   const test::Recording recording = test::plant_recording(std::chrono::milliseconds{4450});
   InstructionCounter counter(argv[1]);
   SweepOptions sweep_options;
   OdometryOptions options;
   sweep_options.isa = options.isa = Isa::baseline;
   options.threads = 1;
-  options.map.keyframe_m = 0.25; // some of so short a drive
+  options.map.keyframe_m = 0.25; // so that the short drive contains several
   test::SweepsOfRecording sweeps(recording, sweep_options, &counter);
   Odometry odometry(options, {}, &counter);
   int sweeps_seen = 0;

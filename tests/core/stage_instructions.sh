@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# stage_instructions.sh BIN [--accept]: what one sweep costs, in instructions, beside what it cost when that was last
-# accepted. The time that a machine takes for them varies; their number does not. Fails above +3 %.
+# stage_instructions.sh BIN [--accept]: compares the instructions per sweep with the last accepted numbers. Unlike the
+# run time, they are reproducible. Fails above +3 %.
 set -euo pipefail
 bin=$1 accept=${2:-}
 accepted=$(dirname "$(realpath "$0")")/stage_instructions.txt
 measured=$(mktemp)
 trap 'rm -f "$measured"*' EXIT
 
-for stage in all decode correct filter covariance scan_to_submap map; do # scan-to-scan runs at the start alone
+for stage in all decode correct filter covariance scan_to_submap map; do # scan-to-scan runs only at the start
   sweeps=$(valgrind --tool=callgrind --instr-atstart=no --collect-atstart=no \
     --callgrind-out-file="$measured.$stage" "$bin/stage_instructions" $stage 2>"$measured.log") || { cat "$measured.log" >&2; exit 1; }
   total=$(sed -n 's/^\(summary\|totals\): \([0-9]*\).*/\2/p' "$measured.$stage" | head -n 1)

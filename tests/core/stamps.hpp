@@ -5,7 +5,7 @@
 
 namespace locus {
 
-/// A time on a computer that started a second before.
+/// Time on a computer that booted one second earlier.
 constexpr Stamp at_ms(int ms) { return stamp_from_ns(1'000'000'000) + std::chrono::milliseconds{ms}; }
 
 } // namespace locus

@@ -8,11 +8,11 @@
 
 namespace locus::test {
 
-/// A rectangle to draw points from.
+/// A rectangle from which points are sampled.
 struct Patch {
   Eigen::Vector3d corner_m;
   Eigen::Vector3d edge_u_m, edge_v_m; ///< perpendicular
-  double share = 1.0;                 ///< of the points, beside the other patches
+  double share = 1.0;                 ///< relative number of points
 };
 
 /// Points spread evenly over flat patches, with their true normals. Deterministic.
@@ -41,7 +41,7 @@ inline std::vector<SurfacePoint> without_normals(std::vector<SurfacePoint> point
   return points;
 }
 
-/// The same points seen from a base at T_map_base.
+/// Transforms the points to the frame of a base at T_map_base.
 inline std::vector<SurfacePoint> seen_from(const Pose& T_map_base, std::vector<SurfacePoint> points_map) {
   const Pose T_base_map = T_map_base.inverse();
   for (SurfacePoint& point : points_map) {
@@ -59,7 +59,7 @@ inline std::vector<Patch> furnished_room() {
           {{2, -1, 1}, {1.5, 0, 0}, {0, 2.5, 0}, 0.3}};
 }
 
-/// Floor and two walls along x: nothing tells where along it one is.
+/// Floor and two walls along x: the position along x is unobservable.
 inline std::vector<Patch> endless_corridor() {
   return {{{-30, -1.5, 0}, {60, 0, 0}, {0, 3, 0}},
           {{-30, -1.5, 0}, {60, 0, 0}, {0, 0, 3}},

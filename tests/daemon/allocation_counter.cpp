@@ -37,7 +37,7 @@ void* counted(void* memory) {
 
 } // namespace
 
-// All other forms of new and delete come down to these by default.
+// All other forms of new and delete call these by default.
 void* operator new(std::size_t bytes) { return counted(std::malloc(bytes > 0 ? bytes : 1)); }
 void* operator new(std::size_t bytes, std::align_val_t alignment) {
   const auto step = static_cast<std::size_t>(alignment);

@@ -6,8 +6,8 @@
 
 namespace locus::daemon {
 
-/// How often this executable has asked operator new for memory so far, on all its threads; nothing in a build with
-/// a sanitizer, which has an operator new of its own.
+/// Returns the number of calls of operator new in this executable so far, on all threads; nothing in sanitizer builds,
+/// which have their own operator new.
 std::optional<std::uint64_t> allocations();
 
 } // namespace locus::daemon

@@ -13,7 +13,7 @@
 namespace locus::daemon {
 namespace {
 
-/// Of a gyro that is known well: 0.1 ms and 0.1 degrees.
+/// A precisely calibrated gyro: sigma 0.1 ms and 0.1 degrees.
 LearnedSource gyro(double late_s, const Eigen::Vector3d& mounting_deg) {
   LearnedSource learned;
   learned.states[LearnedSource::kLate] = late_s;
@@ -58,7 +58,7 @@ TEST(Calibration, WhatIsNotKnownIsNotToldOf) {
   EXPECT_EQ(calibration_doubt(Figures{.config = config}, 0), "") << "no sweep yet";
 }
 
-/// Its states are others: a scale of 4 % is no lateness.
+/// Odometry has other states: a scale error of 4 % must not be reported as lateness.
 TEST(Calibration, OfAnOdometryNothingIsToldThatItDoesNotHave) {
   EXPECT_EQ(doubt(SourceKind::odometry, gyro(0.04, {10, 0, 0})), "");
 }
@@ -104,7 +104,7 @@ TEST(Calibration, FiguresStandWithTheirDeviationsAndTheConfiguration) {
   EXPECT_DOUBLE_EQ(of_wheels["yaw_scale"]["value"], 0.98);
 }
 
-/// The turn is one of the base, on top of that which is configured.
+/// The learned rotation is in the base frame, composed with the configured one.
 TEST(Calibration, WhatIsKnownBetterTakesThePlaceOfTheConfiguration) {
   const MotionSourceOptions imu = calibrated(imu_turned({0, 0, 90}), gyro(0.034, {5, 0, 0}));
   EXPECT_DOUBLE_EQ(imu.late_ms, 34.0);
@@ -149,7 +149,7 @@ TEST(Calibration, YamlIsReadAsConfiguration) {
   EXPECT_EQ(calibration_yaml(nlohmann::ordered_json::object()), nothing) << "no source at all";
 }
 
-/// A drive corrects points before the samples of their time are there, so it does not know how late those are.
+/// A drive de-skews points before the samples of their time arrive, so it cannot estimate such a lateness.
 TEST(Calibration, WhatIsTooLateForADriveIsNotTakenFromOne) {
   const MotionSourceOptions imu = imu_turned({0, 0, 0});
   const LearnedSource late = gyro(0.017, {0, 5, 0});
@@ -175,7 +175,7 @@ TEST(Calibration, TableSaysWhatTheDriveHasNotTold) {
             "No motion source has been heard that calibrates itself.\n");
 }
 
-/// What the user knows of is no news.
+/// Values that the user has configured are not reported.
 TEST(Calibration, ConfiguredLatenessIsNotToldOfAgain) {
   Config config;
   config.motion_sources = {{imu_turned({0, 0, 0}), "", ""}};

@@ -14,16 +14,16 @@
 
 namespace locus::daemon {
 
-/// What reaches the computer of a robot that drives round the room for eight seconds, in the order of arrival: a
-/// VLP-16 at 10 Hz, wheel odometry and an IMU.
+/// Inputs of a robot's computer during eight seconds around the room, in the order of arrival: a VLP-16 at 10 Hz, wheel
+/// odometry and an IMU.
 class Drive {
  public:
   static constexpr std::size_t kSweeps = 80;
 
-  /// That of the robot.
+  /// Configuration of the robot.
   static Config config();
 
-  /// Made once, for all tests.
+  /// Created once for all tests.
   static const Drive& instance();
 
   [[nodiscard]] const std::vector<Input>& inputs() const { return inputs_; }
@@ -35,7 +35,7 @@ class Drive {
   std::vector<Input> inputs_;
 };
 
-/// Gives the inputs of the drive out as fast as they are asked for.
+/// Returns the inputs of the drive without pacing.
 class DriveInput : public InputSource {
  public:
   Input next(Duration timeout) override;
@@ -44,8 +44,7 @@ class DriveInput : public InputSource {
   std::size_t given_ = 0;
 };
 
-/// The drive through ingest and odometry in one thread: what the live threads are compared with. What was taken is the
-/// registration alone.
+/// Processes the drive in one thread, as a reference for the live threads. `took` is the registration alone.
 std::vector<ProcessedSweep> process_in_one_thread(const Config& config);
 
 LidarRouter open_lidars(const Config& config);

@@ -11,7 +11,7 @@ using std::chrono::milliseconds;
 constexpr double kTurnRate_radps = 0.7;
 constexpr double kSpeed_mps = 1.3;
 
-/// Forward and to the left, all the while.
+/// Constant motion forward and to the left.
 Vector6 turning() {
   Vector6 twist = Vector6::Zero();
   twist[0] = kSpeed_mps;
@@ -27,7 +27,7 @@ Vector6 straight_on() {
 
 Stamp at(Duration since_start) { return stamp_from_ns(0) + since_start; }
 
-/// A gyro every 5 ms and, where asked for, wheels every 20 ms; both tell what a constant twist does from time 0 on.
+/// A gyro every 5 ms and, optionally, wheels every 20 ms; both measure a constant twist from time 0 on.
 class ArcDrive {
  public:
   ArcDrive(const Vector6& twist_base, Duration gyro_until, Duration wheels_until) : twist_base_(twist_base) {
@@ -35,12 +35,12 @@ class ArcDrive {
       const double t_s = to_seconds(t);
       if (t <= wheels_until && t % milliseconds{20} == Duration{})
         sources_.add(SourceId{0}, OdometrySample{at(t), at(t), se3_exp(t_s * twist_base), 1.0});
-      if (t <= gyro_until) // never twice the same: it would count as frozen
+      if (t <= gyro_until) // no two samples are equal: repeated ones count as frozen
         sources_.add(SourceId{1}, ImuSample{at(t), at(t), twist_base.tail<3>(), {1e-6 * t_s, 0, 9.81}, {}});
     }
   }
 
-  /// Facing along +y of odom, at 1 s, on the true path but for where it started.
+  /// Estimate at 1 s, facing along +y of odom, on the true path except for its start.
   [[nodiscard]] FastSample estimate() const {
     FastSample sample;
     sample.stamp = at(milliseconds{1000});
@@ -62,7 +62,7 @@ class ArcDrive {
   MotionSources sources_{{{"wheels", SourceKind::odometry, {}}, {"imu", SourceKind::imu, {}}}, Fusion::combined};
 };
 
-/// The constant twist from the estimate on.
+/// Expects the constant twist to be extrapolated from the estimate.
 void expect_on_arc(const ArcDrive& drive, Duration now) {
   const FastSample from = drive.estimate();
   const FastSample sample = drive.carried(from, now);
@@ -74,12 +74,12 @@ void expect_on_arc(const ArcDrive& drive, Duration now) {
   EXPECT_LT((sample.twist_base - from.twist_base).norm(), 1e-9);
 }
 
-/// It went straight on while it turned: 4.5 mm beside this arc.
+/// Regression: the pose was extrapolated in a straight line, 4.5 mm off this arc.
 TEST(FastOdometry, GyroAloneCarriesTheSpeedOfTheEstimateRoundTheArc) {
   expect_on_arc(ArcDrive(turning(), milliseconds{1100}, milliseconds{-1}), milliseconds{1100});
 }
 
-/// The track of the wheels goes straight on from their last sample, here 15 ms before that of the gyro.
+/// The wheels' track is extrapolated in a straight line from their last sample, here 15 ms before that of the gyro.
 TEST(FastOdometry, BeyondTheLastSampleOfTheWheelsTheArcGoesOn) {
   expect_on_arc(ArcDrive(turning(), milliseconds{1095}, milliseconds{1080}), milliseconds{1095});
 }
@@ -92,7 +92,7 @@ TEST(FastOdometry, UncertainSpeedGrowsAlongTheHeading) {
   const ArcDrive drive(straight_on(), milliseconds{1100}, milliseconds{-1});
   FastSample from = drive.estimate();
   from.twist_covariance(0, 0) = 0.04; // forward
-  from.twist_covariance(1, 1) = 0.01; // to the left
+  from.twist_covariance(1, 1) = 0.01; // lateral
   const Matrix6 covariance = drive.carried(from, milliseconds{1100}).pose_covariance;
   EXPECT_NEAR(covariance(1, 1), 0.01 * 0.04, 1e-12) << "it heads along +y";
   EXPECT_NEAR(covariance(0, 0), 0.01 * 0.01, 1e-12);
@@ -103,14 +103,14 @@ TEST(FastOdometry, UncertainHeadingOfTheEstimateShiftsWhatLiesAhead) {
   FastSample from = drive.estimate();
   from.pose_covariance(5, 5) = 1e-4;
   const Matrix6 covariance = drive.carried(from, milliseconds{1100}).pose_covariance;
-  const double moved_m = 0.1 * kSpeed_mps; // along +y: a turn to the left takes it towards -x
+  const double moved_m = 0.1 * kSpeed_mps; // along +y: a left turn moves it towards -x
   EXPECT_NEAR(covariance(0, 0), moved_m * moved_m * 1e-4, 1e-12);
   EXPECT_NEAR(covariance(0, 5), -moved_m * 1e-4, 1e-12);
   EXPECT_NEAR(covariance(1, 1), 0.0, 1e-12);
   EXPECT_NEAR(covariance(5, 5), 1e-4, 1e-12);
 }
 
-/// Each error of the twist by itself, against what the same error does to the exact motion.
+/// Compares each twist error alone with its effect on the exact motion.
 TEST(FastOdometry, UncertainTwistMovesThePoseAsAnotherTwistWould) {
   constexpr double kError = 1e-6;
   constexpr double kElapsed_s = 0.1;

@@ -11,7 +11,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// The one of a drive along x, a metre a sweep, that took so long; its rotation is that of source 1.
+/// Sweep of a drive along x at one metre per sweep, with this processing time; its rotation is from source 1.
 ProcessedSweep sweep(unsigned number, Duration wall) {
   ProcessedSweep done;
   done.estimate.T_odom_base.translation.x() = number;
@@ -65,7 +65,7 @@ TEST(Figures, ServiceHasTheKeysOfARunAndMore) {
   }
 }
 
-/// PTP that is mended is no problem any more.
+/// The problem is cleared once PTP is repaired.
 TEST(Figures, DoubtOfCloudsIsAProblemForAsLongAsTheyGiveRiseToIt) {
   LidarOptions options;
   options.topic = "/points";

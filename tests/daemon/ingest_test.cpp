@@ -14,7 +14,7 @@
 namespace locus::daemon {
 namespace {
 
-/// Everything that is told about a sweep but its points.
+/// All properties of a sweep except its points.
 struct Summary {
   std::uint64_t sequence;
   Stamp start, end;

@@ -39,7 +39,7 @@ std::vector<UdpSocket> two_sockets() {
   return sockets;
 }
 
-/// Sends, and waits until the socket has it: on a busy machine a thread of the kernel brings it, later.
+/// Sends a datagram and waits until the socket has it: on a busy machine a kernel thread delivers it later.
 void bring(const UdpSocket& socket, std::span<const std::byte> payload, const test::UdpSender& sender) {
   const auto held = [&] {
     std::array<std::uint32_t, SK_MEMINFO_VARS> figures{};
@@ -85,8 +85,8 @@ TEST(LiveInput, GivesSocketsAndMotionInTheOrderOfArrival) {
   EXPECT_TRUE(std::holds_alternative<Silence>(input.next(milliseconds{1})));
 }
 
-/// Sockets hand out 32 datagrams at a time: those of the lidar span a short time, its position packets a long one.
-/// After a stall, time would run ahead with the one, and back with the other.
+/// Sockets return 32 datagrams at a time: those of the lidar span a short time, its position packets a long one. After
+/// a stall, unsorted batches would make time jump ahead and back.
 TEST(LiveInput, BacklogOfAStallComesInTheOrderOfArrival) {
   const test::KernelStamps stamps;
   LiveInput input(two_sockets());
@@ -152,8 +152,8 @@ TEST(LiveInput, MotionWakesTheWaitingThread) {
   reader.join();
 }
 
-/// In the order in which they were given out, a recording of the inputs gives them out again. A clock that is set back
-/// by an hour is none of this.
+/// Late motion arrives just after the last input returned, so that a recording preserves the order. An hour late is a
+/// clock step and passes unchanged.
 TEST(LiveInput, MotionThatIsHandedOverLateArrivesAfterWhatWasGivenOut) {
   const test::KernelStamps stamps;
   LiveInput input(two_sockets());
@@ -176,7 +176,7 @@ TEST(LiveInput, MotionThatNobodyFetchesIsCounted) {
   EXPECT_EQ(input.motion_drops(), 7U);
 }
 
-/// A flood that ends, or that drowns in a full buffer, leaves nothing behind that would wake the thread.
+/// After a flood, whether it ended or overflowed the buffer, no further datagram wakes the thread.
 TEST(LiveInput, WhatTheKernelKeptOutIsCountedThoughNothingComesAfterIt) {
   LiveInput input(two_sockets());
   const test::UdpSender sender;
@@ -191,7 +191,7 @@ TEST(LiveInput, WhatTheKernelKeptOutIsCountedThoughNothingComesAfterIt) {
       received += std::holds_alternative<Silence>(input.next(milliseconds{10})) ? 0U : 1U;
     EXPECT_EQ(accounted(), sent);
   };
-  for (int guarded = 0; guarded < 20 && now() < give_up;) { // the guard stands for a second after a flood
+  for (int guarded = 0; guarded < 20 && now() < give_up;) { // the filter stays for a second after a flood
     const std::uint64_t before = input.filtered();
     flood(10);
     if (input.filtered() > before)
@@ -220,7 +220,7 @@ TEST(LiveInput, AllocatesNothing) {
   EXPECT_EQ(taken, 2000);
 }
 
-/// A sensor_msgs/PointCloud2 of one point, as it is serialised.
+/// Serialises a sensor_msgs/PointCloud2 with one point.
 std::vector<std::byte> cloud_message(Stamp stamp) {
   std::vector<std::byte> bytes(4);
   bytes[1] = std::byte{1}; // little-endian CDR
@@ -248,13 +248,13 @@ std::vector<std::byte> cloud_message(Stamp stamp) {
     put(1);
   }
   bytes.push_back(std::byte{0});                                 // little-endian
-  for (const std::uint32_t number : {12U, 12U, 12U, 1U, 2U, 3U}) // steps, bytes, a point
+  for (const std::uint32_t number : {12U, 12U, 12U, 1U, 2U, 3U}) // point step, row step, data size, one point
     put(number);
   bytes.push_back(std::byte{1}); // dense
   return bytes;
 }
 
-/// An input whose only lidar gives clouds, with a socket of another.
+/// An input whose only lidar publishes clouds, with a socket of another.
 class CloudsOfALiveInput : public testing::Test {
  protected:
   void hand_over(Stamp arrival, std::span<const std::byte> message) {
@@ -331,7 +331,7 @@ TEST_F(CloudsOfALiveInput, ThatCannotBeReadSayWhy) {
     return cloud != nullptr && cloud->message == nullptr ? std::optional{cloud->error} : std::nullopt;
   };
   const std::vector<std::byte> whole = cloud_message(now());
-  for (std::size_t size = 0; size + 1 < whole.size(); ++size) { // whether it is dense is not read
+  for (std::size_t size = 0; size + 1 < whole.size(); ++size) { // the last byte, is_dense, is not read
     hand_over(now(), std::span(whole).first(size));
     EXPECT_EQ(error(), CloudError::cut) << size;
   }
@@ -365,7 +365,7 @@ TEST_F(CloudsOfALiveInput, AllocateNothingOnceTheLargestHasCome) {
 
 constexpr Stamp kStart = stamp_from_ns(1'700'000'000'000'000'000);
 
-/// Datagrams that arrive at the stamps given.
+/// Datagrams that arrive at the given stamps.
 class Recording : public InputSource {
  public:
   explicit Recording(std::vector<Stamp> arrivals) : arrivals_(std::move(arrivals)) {}
@@ -382,7 +382,7 @@ class Recording : public InputSource {
   std::size_t given_ = 0;
 };
 
-/// Time that passes when somebody sleeps, a little longer than was asked for, and in no other way.
+/// Simulated clock that advances only by sleeping, slightly longer than requested.
 class SleepingClock {
  public:
   static constexpr Duration kOversleeps = std::chrono::microseconds{100};
@@ -449,7 +449,7 @@ TEST(PacedInput, JumpOfTheClockIsNotWaitedForAndThePaceGoesOnAfterIt) {
   EXPECT_LE(end, milliseconds{60} + 2 * SleepingClock::kOversleeps);
 }
 
-/// The clock that it has unless a test gives it another.
+/// The default clock is the host's.
 TEST(PacedInput, IsPacedByTheClockOfTheHost) {
   Recording recording({kStart, kStart + milliseconds{20}});
   PacedInput paced(recording, 1.0);

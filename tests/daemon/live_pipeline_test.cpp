@@ -24,15 +24,15 @@ namespace {
 using std::chrono::microseconds;
 using std::chrono::milliseconds;
 
-/// So slow a world that no registration is ended by its deadline.
+/// Slow motion, so that no registration reaches its deadline.
 constexpr double kNoHurry = 1e-3;
 
-/// Gives the drive out up to the sweep that the test asks for.
+/// Returns the inputs of the drive up to a requested sweep.
 class MeteredInput : public test::HeldInput {
  public:
   using test::HeldInput::HeldInput;
 
-  /// Until the ingest has handed over so many sweeps in all, and rests.
+  /// Lets the ingest hand over this many sweeps in total; returns when it is at rest.
   void hand_over(const LivePipeline& pipeline, std::uint64_t sweeps) {
     wanted_.store(sweeps);
     pipeline_.store(&pipeline);
@@ -47,15 +47,15 @@ class MeteredInput : public test::HeldInput {
     const std::uint64_t seen = pipeline != nullptr ? pipeline->counters().seen : 0;
     if (seen < wanted_.load())
       return false;
-    resting_at_.store(seen); // who asks for input has handed over what it saw
+    resting_at_.store(seen); // the next call means that all previous inputs are handed over
     return true;
   }
 
   std::atomic<std::uint64_t> wanted_{0}, resting_at_{0};
 };
 
-/// Gives the drive out patiently until the motion of its start is known, which takes as long as dozens of sweeps; then
-/// at a pace.
+/// Returns the inputs patiently until the initial motion is estimated, which takes as long as dozens of sweeps; paced
+/// from then on.
 class PacedAfterStart : public InputSource {
  public:
   PacedAfterStart(InputSource& drive, double speed) : patient_(drive), paced_(drive, speed) {}
@@ -74,11 +74,11 @@ class PacedAfterStart : public InputSource {
 
  private:
   test::PatientInput patient_;
-  PacedInput paced_; ///< its clock begins with the first input that it gives out
+  PacedInput paced_; ///< its clock starts with its first input
   std::atomic<const LivePipeline*> pipeline_{nullptr};
 };
 
-/// A robot that is switched off.
+/// A robot without sensors.
 class SilentInput : public InputSource {
  public:
   Input next(Duration timeout) override {
@@ -87,7 +87,7 @@ class SilentInput : public InputSource {
   }
 };
 
-/// Nothing once the pipeline has finished, or at the end of the test's patience.
+/// Returns the next estimate; nothing once the pipeline has finished, or after the test's patience.
 std::optional<ProcessedSweep> next_estimate(LivePipeline& pipeline) {
   const Duration give_up = read_clock(CLOCK_MONOTONIC) + test::patience();
   while (!pipeline.finished() && read_clock(CLOCK_MONOTONIC) < give_up)
@@ -143,9 +143,9 @@ TEST(LivePipeline, GivesTheBitsOfOneThreadWhenNothingIsDropped) {
   EXPECT_EQ(pipeline.counters().seen, expected.size());
 }
 
-/// Sweeps come three times as fast as they can be registered: both steps of the registration, of every single return,
-/// and no deadline that would come to their help. A queue would make every estimate older than the one before; here the
-/// newest sweep wins, and the rest is counted.
+/// Sweeps arrive three times as fast as they can be registered: both registration steps, all returns, no deadline. A
+/// queue would increase the age of every estimate; instead the newest sweep is processed and the rest is counted as
+/// dropped.
 TEST(LivePipeline, OverloadDropsSweepsAndNeverMakesEstimatesOlder) {
   Config config = Drive::config();
   config.sweep.segment_filter.enabled = false;
@@ -155,7 +155,7 @@ TEST(LivePipeline, OverloadDropsSweepsAndNeverMakesEstimatesOlder) {
   const Duration registration = median_wall(alone.begin(), alone.end());
   DriveInput drive;
   PacedAfterStart input(drive, 3.0 * to_seconds(milliseconds{100}) / to_seconds(registration));
-  std::vector<std::uint64_t> seen; // when the odometry had time again
+  std::vector<std::uint64_t> seen; // sweeps seen when the odometry became idle
   LivePipeline pipeline(config, open_lidars(config), input, {.speed = kNoHurry, .after_estimate = [&](const auto&...) {
                                                                seen.push_back(pipeline.counters().seen);
                                                              }});
@@ -172,7 +172,7 @@ TEST(LivePipeline, OverloadDropsSweepsAndNeverMakesEstimatesOlder) {
   EXPECT_TRUE(std::is_sorted(fetched.begin(), fetched.end(),
                              [](const ProcessedSweep& a, const ProcessedSweep& b) { return a.sequence < b.sequence; }));
   EXPECT_EQ(fetched.back().sequence, alone.back().sequence) << "the newest sweep always is processed";
-  for (std::size_t i = 1; i < fetched.size(); ++i) // the last one seen may not quite have been handed over
+  for (std::size_t i = 1; i < fetched.size(); ++i) // the last one seen may not be handed over yet
     EXPECT_GE(fetched[i].sequence + 2, seen[i - 1]) << "older than a period when it was taken";
   const auto third = static_cast<std::ptrdiff_t>(fetched.size() / 3);
   const Duration at_first = median_wall(fetched.begin(), fetched.begin() + third);
@@ -184,8 +184,8 @@ TEST(LivePipeline, OverloadDropsSweepsAndNeverMakesEstimatesOlder) {
   EXPECT_LT(to_seconds(at_last), 3.0 * to_seconds(at_first));
 }
 
-/// The odometry is kept busy while sweeps come in. Free again it takes the newest, all others have been dropped and
-/// counted; those that come then are processed one by one.
+/// Blocks the odometry while sweeps arrive. Afterwards it processes the newest; all others are dropped and counted, and
+/// the following ones are processed one by one.
 TEST(LivePipeline, QueueIsBackWithTheFirstSweepAfterAnOverload) {
   const Config config = Drive::config();
   DriveInput drive;
@@ -217,7 +217,7 @@ TEST(LivePipeline, QueueIsBackWithTheFirstSweepAfterAnOverload) {
   EXPECT_EQ(pipeline.counters().seen, seen);
 }
 
-/// Who waits for the counter, as every input does that is held until a sweep is processed, need not wait any longer.
+/// Inputs wait for this counter until a sweep is processed; its estimate must then be available.
 TEST(LivePipeline, EstimateOfASweepThatCountsAsProcessedIsThere) {
   const Config config = Drive::config();
   DriveInput drive;
@@ -235,9 +235,9 @@ TEST(LivePipeline, EstimateOfASweepThatCountsAsProcessedIsThere) {
   EXPECT_EQ(fetched, Drive::kSweeps);
 }
 
-/// What the deadline is for: a registration that is too slow for its sweeps is cut short, and few are dropped.
+/// Purpose of the deadline: a registration that is too slow is cut short, and few sweeps are dropped.
 TEST(LivePipeline, RegistrationEndsAnIterationAfterItsDeadline) {
-  constexpr double kImpossible = 1e9; // every deadline has passed before the registration begins
+  constexpr double kImpossible = 1e9; // every deadline is over before the registration starts
   DriveInput drive;
   test::PatientInput input(drive);
   const Config config = Drive::config();
@@ -293,7 +293,7 @@ TEST(LivePipeline, StopsInMidDriveAndAccountsForWhatItHasSeen) {
   EXPECT_EQ(pipeline.counters().seen, kSeen);
 }
 
-/// Both threads and the consumer together. A helper thread of the registration would begin to work when it finds time.
+/// Covers both threads and the consumer. One registration thread: a worker would start up at an arbitrary time.
 TEST(LivePipeline, AllocatesNothingOnceWarm) {
   if (!allocations())
     GTEST_SKIP() << "a sanitizer is in the way of counting";

@@ -12,7 +12,7 @@ namespace {
 using std::chrono::microseconds;
 using std::chrono::milliseconds;
 
-/// CPU time of a thread that does nothing but work_for() and read its clock, which takes a while, too.
+/// CPU time of a thread that only runs work_for() and reads its clock, which takes time, too.
 class WorkingThread {
  public:
   static void work_for(Duration cpu) { now_ += cpu; }
@@ -85,7 +85,7 @@ TEST(StageStopwatch, VisitsThatAreNotTimedCountLikeThoseThatAre) {
   EXPECT_EQ(stopwatch.total(Stage::filter), milliseconds{20});
 }
 
-/// The clock that it has unless a test gives it another.
+/// The default clock is that of the calling thread.
 TEST(StageStopwatch, CountsTheTimeOfItsOwnThread) {
   StageStopwatch stopwatch;
   const Duration before = read_clock(CLOCK_THREAD_CPUTIME_ID);

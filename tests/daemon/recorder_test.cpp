@@ -29,7 +29,7 @@ using std::chrono::seconds;
 constexpr std::uint64_t kMaxBytes = 16'000'000;
 constexpr Stamp kNow = stamp_from_ns(1'700'000'000'000'000'000);
 
-/// In memory where there is room, for pieces are brought to the disk, which others may keep busy.
+/// A folder in memory if there is room, because pieces are synced to disk, which may be busy.
 class QuickFolder : public test::TemporaryFolder {
  public:
   QuickFolder() : TemporaryFolder(has_room("/dev/shm") ? "/dev/shm" : testing::TempDir()) {}
@@ -42,7 +42,7 @@ class QuickFolder : public test::TemporaryFolder {
   }
 };
 
-/// A piece of as many bytes as it may have.
+/// Writes a piece of the maximum size.
 std::filesystem::path fill_piece(CaptureRing& ring) {
   const auto piece = ring.begin_piece(kNow);
   EXPECT_TRUE(piece) << piece.error();
@@ -157,7 +157,7 @@ void wait_until(const std::function<bool()>& holds) {
     std::this_thread::sleep_for(milliseconds{1});
 }
 
-/// What is in a folder, in the order in which locus-replay plays it.
+/// Content of a folder in the order in which locus-replay plays it.
 struct Recorded {
   std::vector<Datagram> datagrams; ///< without payload
   std::vector<std::vector<std::byte>> payloads;
@@ -182,13 +182,13 @@ Recorded read(const std::filesystem::path& folder) {
   return recorded;
 }
 
-/// A recorder and its thread of the disk.
+/// A recorder and its disk thread.
 struct RunningRecorder : Recorder {
   using Recorder::Recorder;
   Worker disk{"disk", milliseconds{100}, [this](bool last) { write(last); }};
 };
 
-/// All of it, with a disk that keeps up.
+/// Records all inputs on a disk that is fast enough.
 void record(const std::filesystem::path& folder, const Config& config, std::span<const Input> inputs) {
   Recorder recorder(folder, config, {config.record.max_bytes});
   for (std::size_t i = 0; i < inputs.size(); ++i) {
@@ -204,7 +204,7 @@ bool is_same(const Datagram& a, const Datagram& b) {
          a.destination_port == b.destination_port;
 }
 
-/// In many pieces, that no bit is lost on the way from one to the next.
+/// Many pieces: no bit is lost between them.
 TEST(Recorder, EveryBitIsReadAgain) {
   const QuickFolder folder;
   Config config = recorded_config();
@@ -244,7 +244,7 @@ TEST(Recorder, EveryBitIsReadAgain) {
   EXPECT_EQ(odometry, recorded.odometry.size());
 }
 
-/// What a broken driver sends is no reason why all else could not be replayed.
+/// Absurd samples of a broken driver must not make the rest unreadable.
 TEST(Recorder, AbsurdSamplesAreReadAgainOrLeftOut) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const Stamp now = stamp_from_ns(1'700'000'000'000'000'000);
@@ -301,7 +301,7 @@ TEST(Recorder, WhatTheDiskIsTooSlowForIsDroppedAndCounted) {
   EXPECT_EQ(recorder.status().recorded, Recorder::kMaxUnwritten + 1) << "there is room again";
 }
 
-/// An Ouster's packets are longer than a place of the ring, and are recorded whole, in order and all the same.
+/// An Ouster's packets are longer than a slot of the ring; they are recorded whole and in order.
 TEST(Recorder, LongDatagramsAreRecordedWhole) {
   const QuickFolder folder;
   std::vector<std::vector<std::byte>> sent;
@@ -323,7 +323,7 @@ TEST(Recorder, LongDatagramsAreRecordedWhole) {
   EXPECT_EQ(read(folder / "record").payloads, sent);
 }
 
-/// Who keeps floods out is to know the lidars whether or not all is recorded.
+/// The input source needs the known lidars for its flood filter, whether or not everything is recorded.
 TEST(Recorder, TellsTheSourceOfTheLidars) {
   struct Source : InputSource {
     const LidarRouter* told = nullptr;
@@ -346,7 +346,7 @@ TEST(Recorder, NothingIsMadeBeforeTheFirstInput) {
   EXPECT_FALSE(std::filesystem::exists(folder / "record"));
 }
 
-/// The thread of the disk may; here there is none.
+/// Only the disk thread may allocate; here there is none.
 TEST(Recorder, TakingAllocatesNothing) {
   if (!allocations())
     GTEST_SKIP() << "a sanitizer is in the way of counting";

@@ -14,7 +14,7 @@ using std::chrono::hours;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-Duration since_boot, wall_ahead; ///< of the host
+Duration since_boot, wall_ahead; ///< clocks of the host
 
 Duration host_clock(clockid_t id) { return since_boot + (id == CLOCK_REALTIME ? wall_ahead : Duration::zero()); }
 
@@ -28,9 +28,9 @@ class Steady : public testing::Test {
 
 constexpr Stamp kBoot{seconds{1'700'000'000}};
 
-/// A sensor that stamps its samples some time before they arrive; how far both are off in the end, at the most.
+/// A sensor with a latency between stamp and arrival, and the largest final error of both.
 struct Case {
-  bool by_host; ///< else by a clock of its own
+  bool by_host; ///< else by its own clock
   Duration step, period, lag, jitter;
 };
 

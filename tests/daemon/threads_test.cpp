@@ -34,7 +34,7 @@ TEST(SpscRing, GivesBackInOrderAndIsEmptyThen) {
 
 TEST(SpscRing, FullRingRefusesAndKeepsWhatItHas) {
   SpscRing<int, 4> ring;
-  for (int round = 0; round < 3; ++round) { // the places wrap around
+  for (int round = 0; round < 3; ++round) { // the slots wrap around
     for (int value = 0; value < 4; ++value)
       EXPECT_TRUE(ring.push(value));
     EXPECT_FALSE(ring.push(99));
@@ -109,7 +109,7 @@ TEST(LatestSlot, TakenValueStaysWhileTheProducerGoesOn) {
   }
 }
 
-/// A value that was torn has words of two values in it.
+/// A torn value would contain words of two values.
 TEST(LatestSlot, ConsumerSeesWholeValuesInOrderAndEveryOneIsTakenOrDropped) {
   constexpr std::uint64_t kValues = 300'000;
   LatestSlot<std::array<std::uint64_t, 32>> slot;
@@ -157,7 +157,7 @@ TEST(Wakeup, NotificationBeforeTheWaitIsUsedOnce) {
   EXPECT_GE(time_of([&] { wakeup.wait_for(milliseconds{20}); }), milliseconds{20});
 }
 
-/// Who was busy while a thousand samples came looks once, not a thousand times.
+/// A thousand notifications while the consumer is busy cause one wake-up, not a thousand.
 TEST(Wakeup, NotificationsThatCameTogetherEndOneWait) {
   Wakeup wakeup;
   for (int i = 0; i < 1000; ++i)
@@ -178,7 +178,7 @@ TEST(Wakeup, AnotherThreadEndsTheWait) {
 
 constexpr Duration kLong = std::chrono::hours{1};
 
-/// Whether a condition comes true within seconds.
+/// Waits a few seconds for a condition; returns whether it holds.
 template <class Condition> bool comes_true(const Condition& condition) {
   const auto deadline = std::chrono::steady_clock::now() + test::patience();
   while (!condition() && std::chrono::steady_clock::now() < deadline)
@@ -213,7 +213,7 @@ TEST(Worker, BeginsInItsOwnThreadBeforeTheFirstRound) {
   EXPECT_NE(began.load(), std::this_thread::get_id());
 }
 
-/// What was handed over before it is told to stop is not lost.
+/// Items handed over before the stop are processed.
 TEST(Worker, DoesALastRoundWhenItIsDestroyedWithoutWaitingForThePeriod) {
   std::atomic<int> handed_over{0}, seen{0};
   std::atomic<bool> is_told{false};

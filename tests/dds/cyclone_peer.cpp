@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A participant made with Cyclone DDS: cyclone_peer DOMAIN listen|talk|iron|humble|command|flood|mistype|clouds PREFIX;
-// iron and humble hear what nodes tell of themselves, and what DDS does. A listener says `matched TOPIC` once it knows
-// a writer. See peer_words.hpp.
+// A Cyclone DDS participant: cyclone_peer DOMAIN listen|talk|iron|humble|command|flood|mistype|clouds PREFIX; iron and
+// humble print the discovery of nodes and of DDS endpoints. A listener prints `matched TOPIC` once it knows a writer.
+// See peer_words.hpp.
 #include <algorithm>
 #include <array>
 #include <cstdlib>
@@ -43,7 +43,7 @@ void listen(const DdsNode& node, const std::string& prefix) {
   DdsReader<ros::Odometry> fast{node, prefix + "/odometry_fast", TopicQos::standard()};
   DdsReader<ros::UInt8> state{node, prefix + "/state", TopicQos::standard()};
   DdsReader<ros::TFMessage> tf{node, "/tf", TopicQos::transform()};
-  DdsReader<ros::PointCloud2> cloud{node, prefix + "/cloud", TopicQos::standard()}; // as rviz2 asks for it
+  DdsReader<ros::PointCloud2> cloud{node, prefix + "/cloud", TopicQos::standard()}; // QoS as requested by rviz2
   DdsReader<ros::PointCloud2> map{node, prefix + "/map", TopicQos::latch()};
   DdsReader<ros::DiagnosticArray> diagnostics{node, "/diagnostics", TopicQos::standard()};
   DdsReader<ros::DiagnosticArray> beginning{node, prefix + "/beginning", TopicQos::latch()};
@@ -85,7 +85,7 @@ void listen(const DdsNode& node, const std::string& prefix) {
   }
 }
 
-/// Says which endpoints others have: of a topic that is built in.
+/// Prints the endpoints of other participants, from a built-in topic.
 void say_endpoints(dds_entity_t participant, dds_entity_t builtin, const char* kind) {
   dds_guid_t own{};
   dds_get_guid(participant, &own);
@@ -155,7 +155,7 @@ void talk(const DdsNode& node) {
   });
 }
 
-/// Nothing but that the ground is not flat.
+/// Publishes only that the ground is not flat.
 void command(const DdsNode& node) {
   const DdsWriter<ros::Bool> grounds{node, "/flat_ground", TopicQos::standard()};
   talk_on([&](int /*i*/) {
@@ -164,13 +164,13 @@ void command(const DdsNode& node) {
   });
 }
 
-/// What no sensor says, as fast as it goes, and says in the end how much that was.
+/// Publishes absurd samples at the maximum rate, and finally prints their number.
 void flood(const DdsNode& node) {
   const DdsWriter<ros::Imu> imus{node, "/imu/data", {false, 5}};
   const DdsWriter<ros::Odometry> odometries{node, "/wheel_odometry", {false, 5}};
-  const DdsWriter<ros::Bool> healths{node, "/wheel_health", TopicQos::standard()}; // others are not heard
+  const DdsWriter<ros::Bool> healths{node, "/wheel_health", TopicQos::standard()}; // others are not received
   const DdsWriter<ros::Bool> grounds{node, "/flat_ground", TopicQos::standard()};
-  constexpr std::uint32_t kWords = 64; ///< who waits for those who hear floods less
+  constexpr std::uint32_t kWords = 64; ///< a reliable writer that waits for its readers would slow the flood
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN(), kEndless = std::numeric_limits<double>::infinity();
   constexpr std::array kAbsurd{kNone, kEndless, -kEndless, 1e300, -1e300, 1e-300, 0.0, 1e9};
   std::string empty, large(60'000, 'x');
@@ -199,7 +199,7 @@ void flood(const DdsNode& node) {
   tell("flooded {}", sent);
 }
 
-/// A room ten times a second, as drivers of lidars send it.
+/// Publishes a room ten times a second, as lidar drivers do.
 void talk_of_clouds(const DdsNode& node) {
   const DdsWriter<ros::PointCloud2> clouds{node, "/points", TopicQos::sensor_out()};
   std::vector<std::uint8_t> data = room_cloud::points();
@@ -226,7 +226,7 @@ void talk_of_clouds(const DdsNode& node) {
   });
 }
 
-/// The names of topics that exist, with a type that they have not.
+/// Publishes existing topic names with wrong types.
 void mistype(const DdsNode& node) {
   const DdsWriter<ros::UInt8> imus{node, "/imu/data", {false, 5}}, odometries{node, "/wheel_odometry", {false, 5}};
   talk_on([&](int i) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A participant made with Fast DDS, ROS 2's default: fast_dds_peer DOMAIN listen|talk|iron|humble|clouds PREFIX
-// [ADDRESS]; iron and humble hear what nodes tell of themselves, and what DDS does. On the loopback interface, or on
-// that of ADDRESS. A listener says `matched TOPIC` once it knows a writer. See peer_words.hpp.
+// A participant of Fast DDS, ROS 2's default: fast_dds_peer DOMAIN listen|talk|iron|humble|clouds PREFIX [ADDRESS];
+// iron and humble print the discovery of nodes and of DDS endpoints. Uses the loopback interface, or that of ADDRESS. A
+// listener prints `matched TOPIC` once it knows a writer. See peer_words.hpp.
 #include <atomic>
 #include <cstdlib>
 #include <deque>
@@ -31,9 +31,9 @@ namespace {
 
 namespace dds = eprosima::fastdds::dds;
 
-constexpr auto kAsNeeded = eprosima::fastrtps::rtps::DYNAMIC_RESERVE_MEMORY_MODE; ///< and not as a message may need
+constexpr auto kAsNeeded = eprosima::fastrtps::rtps::DYNAMIC_RESERVE_MEMORY_MODE; ///< not the maximum size of the type
 
-/// Says which endpoints others have.
+/// Prints the endpoints of other participants.
 class Discovery : public dds::DomainParticipantListener {
  public:
   void on_subscriber_discovery(dds::DomainParticipant* own,
@@ -174,7 +174,7 @@ void talk(dds::DomainParticipant& participant) {
   });
 }
 
-/// A room ten times a second, reliably: what does not fit a datagram is for its own thread to send.
+/// Publishes a room ten times a second, reliably: an asynchronous thread sends messages larger than a datagram.
 void talk_of_clouds(dds::DomainParticipant& participant) {
   dds::DataWriterQos qos;
   qos.reliability().kind = dds::RELIABLE_RELIABILITY_QOS;
@@ -245,5 +245,5 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "fast_dds_peer: {}\n", error.what());
     return 1;
   }
-  std::_Exit(0); // the library takes its time to take leave
+  std::_Exit(0); // the library's shutdown is slow
 }

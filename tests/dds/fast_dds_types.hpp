@@ -11,8 +11,8 @@
 #include <fastcdr/FastBuffer.h>
 #include <fastdds/dds/topic/TopicDataType.hpp>
 
-/// ROS 2's messages for Fast DDS, written down a second time from their definitions: an encoding that shares nothing
-/// with the one under test. Each struct shows its members in their order to `fields`.
+/// ROS 2's messages for Fast DDS, written independently from their definitions, so that the encoding shares nothing
+/// with the one under test. Each struct passes its members in order to `fields`.
 namespace locus::test {
 
 struct FastHeader {
@@ -128,7 +128,7 @@ struct FastClock {
   template <class Stream> void fields(Stream& s) { s(sec)(nanosec); }
 };
 
-/// 24 bytes up to Humble, then 16.
+/// 24 bytes up to Humble, 16 from then on.
 template <std::size_t kBytes> struct FastGid {
   std::array<std::uint8_t, kBytes> data{};
   template <class Stream> void fields(Stream& s) { s(data); }
@@ -152,7 +152,7 @@ concept HasFields = requires(T& value, Stream& stream) {
   value.fields(stream);
 };
 
-/// Writes members, or reads them, with fastcdr.
+/// Writes or reads members with fastcdr.
 template <bool kReads> class FastStream {
  public:
   explicit FastStream(eprosima::fastcdr::Cdr& cdr) : cdr_(cdr) {}

@@ -13,11 +13,11 @@
 #include <poll.h>
 #include <unistd.h>
 
-/// What the peers of the tests have in common: programs of another DDS process that say on stdout, line by line, what
-/// they heard, and that live until their stdin is closed.
+/// Common parts of the test peers: programs in another process that print received messages line by line on stdout and
+/// run until their stdin is closed.
 namespace locus::test {
 
-/// CLOCK_REALTIME, the clock that stamps are on.
+/// Returns CLOCK_REALTIME, on which stamps are.
 inline std::int64_t realtime_ns() {
   timespec now{};
   clock_gettime(CLOCK_REALTIME, &now);
@@ -39,7 +39,7 @@ inline bool stdin_is_open() {
   return read(STDIN_FILENO, &byte, 1) > 0;
 }
 
-/// What a peer that talks sends: message `i` has these stamps and figures, so that the other side can tell them.
+/// Content of message `i` of a talking peer: stamp and figure identify it.
 struct Said {
   static constexpr std::int32_t kSec = 1'700'000'000;
   std::int32_t sec;
@@ -58,8 +58,8 @@ template <class Say> void talk_on(const Say& say) {
   }
 }
 
-/// Calls `say(sec, nanosec)` ten times a second until stdin is closed, with the time a tenth of a second ago, and says
-/// in the end how often that was.
+/// Calls `say(sec, nanosec)` ten times a second with the time 0.1 s ago, until stdin is closed; then prints the number
+/// of calls.
 template <class Say> void talk_of_turns(const Say& say) {
   constexpr std::int64_t kSecond_ns = 1'000'000'000, kTurn_ns = kSecond_ns / 10;
   int said = 0;

@@ -10,20 +10,20 @@
 #include <numbers>
 #include <vector>
 
-/// What a lidar of 128 rings sees of a room from where it stands, as a driver publishes it: 130 048 points, each of 22
-/// bytes, with `time` in seconds since the header's stamp.
+/// A cloud of a static lidar with 128 rings in a room, as a driver publishes it: 130 048 points of 22 bytes, with
+/// `time` in seconds since the header's stamp.
 namespace locus::test::room_cloud {
 
 struct Field {
   const char* name;
   std::uint32_t offset;
-  std::uint8_t type; ///< as sensor_msgs/PointField counts
+  std::uint8_t type; ///< numbers of sensor_msgs/PointField
 };
 inline constexpr std::array kFields{Field{"x", 0, 7},          Field{"y", 4, 7},     Field{"z", 8, 7},
                                     Field{"intensity", 12, 7}, Field{"ring", 16, 4}, Field{"time", 18, 7}};
 inline constexpr std::uint32_t kColumns = 1016, kRings = 128, kPoints = kColumns * kRings, kStep = 22;
 
-/// 8 x 6 m, floor 1 m below and ceiling 3 m above the lidar, which is a metre off the middle.
+/// 8 x 6 m, floor 1 m below and ceiling 3 m above the lidar, which is one metre off the middle.
 inline std::vector<std::uint8_t> points() {
   std::vector<std::uint8_t> bytes(std::size_t{kPoints} * kStep);
   std::uint8_t* at = bytes.data();

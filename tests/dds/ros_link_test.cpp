@@ -37,7 +37,7 @@ bool eventually(const std::function<bool()>& holds) {
   return true;
 }
 
-/// Collects what comes in.
+/// Collects received messages.
 class Inbox {
  public:
   RosLink::Sink sink() {
@@ -98,7 +98,7 @@ TEST(CloudTopic, CountsAllThatCameBetweenTwoLooks) {
   }
 }
 
-/// However fast more comes, here while each is handed out.
+/// take() terminates even if messages keep arriving, here one during each callback.
 TEST(CloudTopic, TakingComesToAnEnd) {
   constexpr int kGiveUp = 1000;
   for (const TopicQos qos : {TopicQos::cloud_count(), TopicQos::cloud_in()}) {
@@ -220,13 +220,13 @@ TEST_P(Peers, AreHeardInOrderWithEveryFigure) {
   EXPECT_EQ(inbox_.all<OutsideVerdict>().front().source, SourceId{0});
 }
 
-/// What a peer heard of one participant: which endpoints DDS says it has, and which its node claims.
+/// A participant as discovered by a peer: its DDS endpoints, and the endpoints that its node claims.
 struct HeardNode {
   std::string name;
   std::multiset<std::string> readers, writers, node_readers, node_writers;
 };
 
-/// Nothing yet, if no node was told of.
+/// Returns nothing if no node was announced.
 HeardNode heard_node(const test::Child& peer) {
   HeardNode heard;
   if (peer.lines_of("node_end").empty() || peer.lines_of("node").empty())
@@ -234,12 +234,12 @@ HeardNode heard_node(const test::Child& peer) {
   const std::string node = peer.lines_of("node").back();
   const std::size_t gid = node.rfind(' ') + 1;
   heard.name = node.substr(0, gid - 1);
-  constexpr std::size_t kPrefix = 24; // digits, of the GUIDs of a participant's endpoints
+  constexpr std::size_t kPrefix = 24; // hexadecimal digits common to the GUIDs of a participant's endpoints
   const auto endpoints = [&](const char* kind) {
     std::multiset<std::string> found;
     for (const std::string& line : peer.lines_of(kind))
       if (line.starts_with(node.substr(gid, kPrefix)) && line.find(" ros_discovery_info ") == std::string::npos)
-        found.insert(line.substr(0, line.find(' ')) + node.substr(gid + 32)); // the gid of Humble ends in zeros
+        found.insert(line.substr(0, line.find(' ')) + node.substr(gid + 32)); // the gid of Humble is padded with zeros
     return found;
   };
   const auto claimed = [&](const char* kind) {
@@ -249,7 +249,7 @@ HeardNode heard_node(const test::Child& peer) {
   return {heard.name, endpoints("reader"), endpoints("writer"), claimed("node_reader"), claimed("node_writer")};
 }
 
-/// With both layouts, by who is there before the node and by who comes later.
+/// Both message layouts; peers that start before the node, and after it.
 TEST_P(Peers, SeeOneNodeWhoseEndpointsAreThoseOfItsParticipant) {
   for (const auto& [graph, word] : {std::pair{RosGraph::iron, "iron"}, std::pair{RosGraph::humble, "humble"}}) {
     config_.dds.ros_graph = graph;
@@ -286,7 +286,7 @@ TEST_P(Peers, SeeNoNodeWhereItIsOff) {
   ASSERT_TRUE(eventually([&] { return listener.lines_of("writer").size() >= 8; }));
   link.reset();
   config_.dds.ros_graph = RosGraph::iron;
-  const RosLink other(config_, inbox_.sink(), "other"); // whose node ends the wait for one
+  const RosLink other(config_, inbox_.sink(), "other"); // its node serves as an end marker
   ASSERT_TRUE(eventually([&] { return !listener.lines_of("node_end").empty(); }));
   for (const std::string& node : listener.lines_of("node"))
     EXPECT_TRUE(node.starts_with("/robot_7 locusd_other ")) << testing::PrintToString(listener.lines());
@@ -296,7 +296,7 @@ INSTANTIATE_TEST_SUITE_P(Dds, Peers, testing::Values(CYCLONE_PEER, FAST_DDS_PEER
   return std::string(peer.param).find("fast") == std::string::npos ? "Cyclone" : "FastDds";
 });
 
-/// Two that publish a source's topic would be one that jumps: the first has it until it goes.
+/// Two publishers on a source's topic would look like one that jumps: the first owns it until it disappears.
 TEST(RosLink, TopicBelongsToTheFirstPublisherUntilItGoes) {
   const test::DdsDomain domain;
   Inbox inbox;
@@ -324,7 +324,7 @@ TEST(RosLink, TopicBelongsToTheFirstPublisherUntilItGoes) {
   EXPECT_TRUE(eventually([&] { return !is_in_order(); }));
 }
 
-/// Idle writers that nobody needs are no reason to take a topic from its owner.
+/// Idle, unused writers must not take a topic from its owner.
 TEST(RosLink, ManyWritersDoNotHideTheOwner) {
   const test::DdsDomain domain;
   DdsOptions options;
@@ -341,7 +341,7 @@ TEST(RosLink, ManyWritersDoNotHideTheOwner) {
   EXPECT_TRUE(std::ranges::all_of(all, [&](dds_instance_handle_t writer) { return reader.hears(writer); }));
 }
 
-/// A robot is told apart from another by its prefix, or by its domain. Each says where it is by a figure of its own.
+/// Robots are distinguished by prefix or by domain. Each publishes a position of its own.
 TEST(RosLink, RobotsOnOneNetworkAreToldApart) {
   const test::DdsDomain domain, other_domain;
   RosLink robot(config_in(domain), [](const RosInput&) {}), other(config_in(other_domain), [](const RosInput&) {});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The hashes of ROS 2's types (RIHS01, REP 2016), computed from the definitions of the messages as rosidl does it:
-// nothing here knows the table of the code.
+// Hashes of ROS 2's types (RIHS01, REP 2016), computed from the message definitions as rosidl does, independent of the
+// table in the code.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,8 +27,8 @@
 namespace locus::daemon {
 namespace {
 
-/// Every message that is published or subscribed, and what they are made of: the .msg files of Jazzy without comments
-/// and constants. A char of a .msg file is a uint8.
+/// All published and subscribed messages and their parts: the .msg files of Jazzy without comments and constants. A
+/// char of a .msg file is a uint8.
 const std::map<std::string, std::string> kDefinitions{
     {"builtin_interfaces/msg/Time", "int32 sec, uint32 nanosec"},
     {"std_msgs/msg/Header", "builtin_interfaces/msg/Time stamp, string frame_id"},
@@ -68,7 +68,7 @@ const std::map<std::string, std::string> kDefinitions{
     {"rmw_dds_common/msg/ParticipantEntitiesInfo",
      "rmw_dds_common/msg/Gid gid, rmw_dds_common/msg/NodeEntitiesInfo[] node_entities_info_seq"}};
 
-/// As type_description_interfaces/msg/FieldType counts; arrays are 48 and sequences 144 further on.
+/// Numbers of type_description_interfaces/msg/FieldType; arrays are offset by 48, sequences by 144.
 const std::map<std::string, int> kTypeIds{{"uint8", 3},    {"char", 3},  {"int32", 6}, {"uint32", 7},
                                           {"float64", 11}, {"bool", 15}, {"byte", 16}, {"string", 17}};
 constexpr int kNestedType = 1, kBoundedString = 21, kArray = 48, kSequence = 144;
@@ -143,13 +143,13 @@ std::string type_hash(const std::string& type) {
                                         describe(type), fmt::join(references, ", ")));
 }
 
-/// "nav_msgs::msg::dds_::Odometry_" is nav_msgs/msg/Odometry.
+/// Maps "nav_msgs::msg::dds_::Odometry_" to nav_msgs/msg/Odometry.
 std::string ros_type(const std::string& dds_type) {
   const std::size_t package = dds_type.find("::"), name = dds_type.rfind("::") + 2;
   return dds_type.substr(0, package) + "/msg/" + dds_type.substr(name, dds_type.size() - name - 1);
 }
 
-/// That ROS 2 itself prints for this type.
+/// Reference printed by ROS 2 itself for this type.
 TEST(TypeHash, OfThisTestIsThatOfRos) {
   EXPECT_EQ(type_hash("std_msgs/msg/Header"),
             "RIHS01_f49fb3ae2cf070f793645ff749683ac6b06203e41c891e17701b1cb597ce6a01");
@@ -157,7 +157,7 @@ TEST(TypeHash, OfThisTestIsThatOfRos) {
 
 class SeenTypes : public testing::TestWithParam<const char*> {
  protected:
-  /// Waits until so many endpoints were seen, each of which announces the hash of its type.
+  /// Waits for this number of endpoints, each of which must announce the hash of its type.
   void expect_hashes(std::size_t endpoints, const std::set<std::string>& types) const {
     const auto seen = [&](const std::vector<std::string>& lines) {
       const auto is_endpoint = [](const auto& line) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A Hesai at its port: what becomes of its datagrams, from one to the next.
+// Sequences of datagrams from a Hesai lidar at its port.
 #include <algorithm>
 #include <cstdint>
 #include <optional>
@@ -30,7 +30,7 @@ LidarInput opened(const LidarOptions& options = {}) {
   return std::move(*lidar);
 }
 
-/// Sends packets as the lidar does, one after the other.
+/// Sends consecutive packets as the lidar does.
 class HesaiSender {
  public:
   explicit HesaiSender(Model model, Duration clock_ahead = {}) : model_(model), clock_ahead_(clock_ahead) {}
@@ -92,7 +92,8 @@ TEST(HesaiInput, OneThatWasTakenForAVelodyneOrTheOtherWayRoundIsNot) {
   EXPECT_EQ(other.model(), "VLP-16");
 }
 
-/// One that sends to all is heard first. Its packets are of the first sender until that is silent for a second.
+/// A broadcasting lidar is received first. Packets of another sender are accepted only after the first was silent for
+/// one second.
 TEST(HesaiInput, VelodyneBesideItIsNamedAndReadOnceItIsSilent) {
   LidarInput lidar = opened();
   HesaiSender sender{Model::xt32};
@@ -100,7 +101,7 @@ TEST(HesaiInput, VelodyneBesideItIsNamedAndReadOnceItIsSilent) {
   constexpr std::uint32_t kVelodyneIp = 0xC0A801CA;
   const auto read_after = [&](Duration passed) {
     int read = 0;
-    for (int i = 0; i < 10; ++i) { // a clock that was set is believed after five
+    for (int i = 0; i < 10; ++i) { // a clock step is accepted after five packets
       const Duration time = passed + i * microseconds{1327};
       const test::VelodyneTestPacket good{velodyne::Model::vlp16, velodyne::ReturnMode::strongest,
                                           static_cast<std::uint32_t>(time / microseconds{1})};

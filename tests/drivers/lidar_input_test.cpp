@@ -21,7 +21,7 @@ constexpr std::uint32_t kLidarIp = 0xC0A801C9;
 constexpr std::uint32_t kOtherIp = 0xC0A801CA;
 constexpr double kPacketUs = 1327.104;
 
-/// The datagrams of a VLP-16 at 600 rpm, by their number; kept until the stream is gone.
+/// The datagrams of a VLP-16 at 600 rpm by number, valid for the lifetime of the stream.
 class Stream {
  public:
   explicit Stream(std::uint32_t source_ip = kLidarIp, std::uint16_t port = 2368) : ip_(source_ip), port_(port) {}
@@ -67,7 +67,7 @@ TEST(LidarInput, OthersWhoSendToItsPortAreCountedByAddress) {
   EXPECT_EQ(lidar.strangers()[0].ip, kOtherIp);
   EXPECT_EQ(lidar.strangers()[0].packets, 100U);
   EXPECT_EQ(lidar.strangers()[1].packets, 0U);
-  for (std::uint32_t ip = 1; ip < 100; ++ip) // of a flood the first few are enough
+  for (std::uint32_t ip = 1; ip < 100; ++ip) // the first few of a flood suffice
     EXPECT_EQ(lidar.receive(Stream(ip)(100)), nullptr);
   EXPECT_EQ(lidar.strangers().back().packets, 1U);
 }
@@ -95,13 +95,13 @@ TEST(LidarInput, GoodPacketsComeOutStampedAtTheirFirstFiring) {
   EXPECT_EQ(lidar.counters().lost, 0U);
 }
 
-/// As many were counted as packets of the first pace fit into the gap, or none where its length did not fit the turn.
+/// Regression: losses were counted in packets of the first pace, or not at all if the gap did not fit the rotation.
 TEST(LidarInput, LostPacketsOfAVls128AreCountedAtItsPace) {
   for (const velodyne::Pace pace : {velodyne::Pace::first, velodyne::Pace::slower}) {
     LidarInput lidar = opened();
     const double packet_us = 1e6 * to_seconds(packet_duration(Model::vls128, ReturnMode::strongest, pace));
     for (int i = 0; i < 800; ++i) {
-      if (i >= 50 && i < 650) // a whole turn: the speed that three columns tell is off by a fortieth
+      if (i >= 50 && i < 650) // a whole turn: the speed from three columns is off by 1/40
         continue;
       const double us = packet_us * i;
       VelodyneTestPacket bytes(Model::vls128, ReturnMode::strongest, static_cast<std::uint32_t>(1e9 + us),
@@ -138,7 +138,7 @@ TEST(LidarInput, GapOfStampWithoutOneOfAzimuthIsNoLoss) {
   for (int i = 0; i < 10; ++i)
     lidar.receive(stream(i));
   for (int i = 10; i < 20; ++i)
-    lidar.receive(stream(i, 15'000.0)); // the sensor's clock has gone on by 15 ms, the motor has not
+    lidar.receive(stream(i, 15'000.0)); // the sensor's clock has advanced by 15 ms, the motor has not
   EXPECT_EQ(lidar.counters().data, 20U);
   EXPECT_EQ(lidar.counters().lost, 0U);
 }

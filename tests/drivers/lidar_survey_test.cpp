@@ -15,7 +15,7 @@ using velodyne::PpsState;
 constexpr std::uint32_t kFirstIp = 0x0A000001;
 constexpr std::size_t kPpsOffset = 0xCA;
 
-/// One position packet, and one data packet that nobody can read: it makes the sender known.
+/// Feeds one position packet, and one undecodable data packet: it makes the sender known.
 void hear(LidarSurvey& survey, std::uint32_t ip, PpsState pps) {
   std::array<std::byte, velodyne::kPositionPacketBytes> position{};
   position[kPpsOffset] = static_cast<std::byte>(pps);

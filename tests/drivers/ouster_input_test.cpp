@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An Ouster at its port: what becomes of its datagrams, from one to the next.
+// Sequences of datagrams from an Ouster at its port.
 #include <algorithm>
 #include <cstdint>
 #include <fstream>
@@ -52,7 +52,7 @@ std::vector<double> degrees(const std::array<double, ouster::kMaxPixels>& angles
   return angles_deg;
 }
 
-/// As a sensor would send it.
+/// Writes the metadata as a sensor would send it.
 void write_metadata(const ouster::Metadata& metadata, const std::filesystem::path& file) {
   const nlohmann::json root{
       {"prod_line", metadata.product_line},
@@ -94,7 +94,7 @@ class OusterInput : public testing::Test {
   test::TemporaryFolder folder_;
 };
 
-/// Its datagrams by their number, 64 to a turn; each is kept until the next.
+/// Its datagrams by number, 64 per turn; each is valid until the next.
 class OusterStream {
  public:
   explicit OusterStream(const ouster::Metadata& metadata = test::ouster_metadata(), std::uint32_t ip = kOusterIp,
@@ -157,11 +157,11 @@ TEST_F(OusterInput, LostPacketsAreCountedAcrossTurns) {
   }
 }
 
-/// What lies outside the window is not sent, so it is not lost.
+/// Columns outside the window are not sent, so they are not lost.
 TEST_F(OusterInput, NothingIsLostOutsideTheWindow) {
   ouster::Metadata metadata = test::ouster_metadata();
   metadata.first_column = 912;
-  metadata.last_column = 111; // 14 packets: from 912 through 1023, and up to 111
+  metadata.last_column = 111; // 14 packets: columns 912 through 1023, and up to 111
   LidarInput lidar = opened(metadata);
   OusterStream stream(metadata);
   std::uint64_t sent = 0;
@@ -342,7 +342,7 @@ TEST_F(OusterInput, SurveyTellsItWithoutMetadata) {
   EXPECT_EQ(heard[0].name(), "Ouster 122201000998 at 169.254.92.158");
 }
 
-/// Two sensors send to one port, their inertial units too; what each sends was broken into fragments.
+/// Two sensors send to one port, lidar and IMU packets alike, all of them fragmented.
 TEST(OusterCapture, TwoSensorsOnOnePortAreToldApart) {
   const auto folder = test::test_data() / "ouster";
   if (!std::filesystem::exists(folder / "same_ports_nonlegacy.pcap"))

@@ -12,7 +12,7 @@ using OusterTestPacket = sim::OusterPacket;
 using locus::put_little_endian;
 using sim::ouster_imu_packet;
 
-/// A sensor as Ouster makes them: 32 beams from 15 degrees down to -16, four of them side by side.
+/// A typical Ouster sensor: 32 beams from 15 degrees down to -16, in groups of four side by side.
 inline ouster::Metadata ouster_metadata(ouster::Profile profile = ouster::Profile::rng19, std::size_t pixels = 32,
                                         std::size_t columns = 1024) {
   ouster::Metadata metadata;

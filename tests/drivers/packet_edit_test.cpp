@@ -31,7 +31,7 @@ using Bytes = std::vector<std::byte>;
 
 Bytes copy_of(std::span<const std::byte> payload) { return {payload.begin(), payload.end()}; }
 
-/// All ranges of a packet that are returns, in its order.
+/// Returns the valid ranges of a packet in its order.
 std::vector<float> ranges_m(const LidarPacket& packet) {
   std::vector<float> ranges;
   for (const FiringGroup& group : packet.firing_groups())
@@ -154,7 +154,7 @@ class PacketEditOfHesai : public testing::TestWithParam<std::size_t> {
  protected:
   PacketEditOfHesai() : made_(static_cast<hesai::Model>(GetParam()), 0x37) {}
 
-  /// The decoder that has read the packet as it was holds it to its checksums.
+  /// Decodes the original packet; the decoder expects valid checksums from then on.
   void begin() {
     made_.set_return(1, 5, 2'500, 77);
     made_.seal();

@@ -19,7 +19,7 @@ inline std::vector<std::byte> read_file(const std::filesystem::path& file) {
   return bytes;
 }
 
-/// The points of a binary PCD file whose fields are laid out as those of `Point`.
+/// Reads a binary PCD file whose fields have the layout of `Point`.
 template <class Point> std::vector<Point> read_binary_pcd(const std::filesystem::path& file) {
   const std::string kEndOfHeader = "DATA binary\n";
   const std::vector<std::byte> bytes = read_file(file);

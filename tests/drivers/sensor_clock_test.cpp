@@ -19,9 +19,9 @@ using std::chrono::seconds;
 constexpr Duration kPacket = nanoseconds{1'327'104};
 constexpr std::int64_t kEpoch = 1'700'000'000'000'000'000;
 
-/// A sensor whose clock runs off the host's, and the network between them.
+/// A sensor with a clock of its own, and its network.
 struct Link {
-  Duration sensor_ahead{};           ///< of the host's clock at the start
+  Duration sensor_ahead{};           ///< relative to the host's clock, at the start
   double drift = 0.0;                ///< of the sensor's clock
   Stamp now = stamp_from_ns(kEpoch); ///< true time of the next packet's first firing
   Stamp started = now;
@@ -31,7 +31,7 @@ struct Link {
     return std::chrono::floor<microseconds>(sensor % hours{1});
   }
 
-  /// Sends a packet; returns how far the stamp is from the truth.
+  /// Sends a packet; returns the error of its stamp.
   std::optional<Duration> send(SensorClock& clock, Duration delay = microseconds{100}) {
     const auto reading = clock.read(time_of_hour(), kPacket, now + kPacket + delay);
     const Stamp fired = now;
@@ -115,7 +115,7 @@ TEST(SensorClock, FewHoursOfSilenceAreNoStep) {
   EXPECT_EQ(clock.steps(), 0U);
 }
 
-/// To a lidar's clock that is an hour of silence, of which nothing tells how many packets would have come.
+/// The step looks like an hour of silence, and nothing tells how many packets were lost.
 TEST(SensorClock, HostsClockThatIsSetByAnHourIsNoGap) {
   for (const LidarTime mode : {LidarTime::receive, LidarTime::sensor}) {
     for (const Duration step : {Duration{hours{1}}, Duration{-hours{1}}}) {
@@ -134,8 +134,8 @@ TEST(SensorClock, HostsClockThatIsSetByAnHourIsNoGap) {
   }
 }
 
-/// A robot without a battery for its clock, which runs for minutes before it hears of the time of day. On the wall its
-/// lidar is then right, and what was measured before and after is one time.
+/// A robot without a clock battery gets the time of day minutes after it has booted. From then on the lidar's UTC
+/// agrees with the wall clock, while internal time is continuous.
 TEST(SensorClock, HostsClockThatIsSetRightMakesALidarOnUtcBelieved) {
   constexpr Duration kHostIsSlow = seconds{600};
   for (const LidarTime mode : {LidarTime::sensor, LidarTime::automatic}) {

@@ -12,7 +12,7 @@
 
 namespace locus::test {
 
-/// A data packet made byte by byte: well-formed, turning at `rpm`, every distance 0 until it is set.
+/// A data packet made byte by byte: well-formed, rotating at `rpm`, all distances 0 until set.
 class VelodyneTestPacket {
  public:
   VelodyneTestPacket(velodyne::Model model, velodyne::ReturnMode mode, std::uint32_t time_of_hour_us = 1'000'000,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// locus-experiments --accuracy --simulated, on drives as short as can be.
+// locus-experiments --accuracy --simulated, on drives of minimum length.
 #include <gtest/gtest.h>
 
 #include "replay/replay_run.hpp"

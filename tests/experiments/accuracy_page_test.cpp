@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// locus-experiments --accuracy from outside, on recordings of all sorts.
+// Runs locus-experiments --accuracy on various recordings.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -34,7 +34,7 @@ double length_m(const std::vector<StampedPose>& trajectory) {
   return sum_m;
 }
 
-/// A second of a lidar that stands in the room, as a capture without anything else.
+/// Writes one second of a static lidar in the room, as a capture without any other file.
 void write_standing_capture(const std::filesystem::path& file, const std::filesystem::path& scratch) {
   sim::RobotOptions robot;
   robot.lidars.front().options.T_base_lidar.translation = {0, 0, 0.75};
@@ -126,7 +126,7 @@ TEST(AccuracyPage, WrongUsageIsExplainedInOneLine) {
 
 TEST(AccuracyFigures, ClaimsAreCountedFromTheFirstPose) {
   std::vector<StampedPose> trajectory;
-  for (int i = 0; i < 11; ++i) // out for a second and back
+  for (int i = 0; i < 11; ++i) // out and back, one second each way
     trajectory.push_back(
         {stamp_from_ns(0) + i * 200ms, Pose{from_rpy_rad({0, 0, 0.1}), {5.0 - std::abs(i - 5), 3, 0}}});
   const auto claims = experiments::claims_of(trajectory);
@@ -146,7 +146,7 @@ TEST(AccuracyFigures, WithoutAReceiverNoSpeedIsMadeUp) {
   EXPECT_TRUE(experiments::receiver_speed(kitti_room_drive()).is_null());
 }
 
-/// Of the car's GPRMC sentences: 28.8 to 29.5 knots.
+/// GPRMC sentences of the car: 28.8 to 29.5 knots.
 TEST(AccuracyFigures, ReceiverOfARealCarIsHeard) {
   const std::filesystem::path capture = test_data() / "velodyne/hdl32e_moving_15mps.pcap";
   if (!std::filesystem::exists(capture))

@@ -6,7 +6,7 @@
 namespace locus::experiments {
 namespace {
 
-/// A run over 100 m in which all is well.
+/// A faultless run over 100 m.
 Results run() {
   const Results took{{"p50", 0.5}, {"p99", 2.0}};
   return {{"sources", {"wio", "imu"}},

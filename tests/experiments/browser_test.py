@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""browser_test.py SAMPLE_PAGE: what headless Chromium makes of the page that this program writes.
+"""browser_test.py SAMPLE_PAGE: tests the page of this program in headless Chromium.
 
-Set LOCUS_SCREENSHOTS to a folder to see what it saw.
+Stores screenshots in the folder LOCUS_SCREENSHOTS if that is set.
 """
 import json
 import math
@@ -14,7 +14,7 @@ import tempfile
 import unittest
 
 sys.path.append(os.path.join(os.path.dirname(__file__), "../support"))
-from browser import Browser  # it ends the program where there is none
+from browser import Browser  # exits if there is no browser
 
 PARTS = {"accuracy", "boxes", "robustness", "ablation", "ablation-table", "pace"}
 FAILURES = ["wio_imu_fail", "wio_fail", "lidar_drop"]
@@ -48,7 +48,7 @@ class Page(unittest.TestCase):
         self.addCleanup(shutil.rmtree, self.folder)
 
     def page(self, runs, simulated=True, **how):
-        """The page of these runs."""
+        """Opens the page of these runs."""
         with open(os.path.join(self.folder, "results.json"), "w", encoding="utf-8") as file:
             json.dump({"version": "1.2.3", "simulated": simulated, "duration_s": 300, "runs": runs}, file)
         subprocess.run([program, self.folder], check=True)

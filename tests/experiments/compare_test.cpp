@@ -14,7 +14,7 @@
 namespace locus::experiments {
 namespace {
 
-/// A row as judge_faults() makes it.
+/// A row in the format of judge_faults().
 Results fault_row(const std::string& configuration, double error_m, double worst_sigma = 2.0, bool holds = true) {
   return {{"fault", "a fault"},
           {"course", "urban"},
@@ -50,7 +50,7 @@ class Compare : public testing::Test {
     }
     return "";
   }
-  /// What becomes of a row by its figures alone.
+  /// Returns the verdict on a row that differs only in these figures.
   [[nodiscard]] std::string verdict(double was_m, double is_m, double was_sigma = 2.0, double is_sigma = 2.0) const {
     const std::string text = page(faults({fault_row("a", was_m, was_sigma)}), faults({fault_row("a", is_m, is_sigma)}));
     const std::size_t end = text.find(" | urban/a |");
@@ -135,7 +135,7 @@ TEST_F(Compare, TheCovariancesAreARowThatIsBestAtSix) {
   EXPECT_TRUE(contains_text(page(with_nees(8.0, 100), with_nees(8.0, 4)), "Only after, 1: covariances, 4 runs."));
 }
 
-/// One cell of the matrix and the run that it is judged by.
+/// One cell of the matrix and its reference run.
 Results matrix(double error_m) {
   MatrixCell cell;
   cell.input = "wio";
@@ -157,7 +157,7 @@ TEST_F(Compare, ACellOfTheMatrixHasTheFiguresOfItsRun) {
   EXPECT_TRUE(contains_text(text, "1 rows: 1 worse")) << text;
 }
 
-/// One row as judge_harsh() makes it.
+/// A row in the format of judge_harsh().
 Results harsh(double worst_m, int lost = 0, int flagged = 0, double claimed_mps = 1.2) {
   const Results row{
       {"course", "urban"},  {"imperfection", "late IMU"}, {"sensors", "all"}, {"median_m", 0.02}, {"worst_m", worst_m},

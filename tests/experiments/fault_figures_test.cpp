@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kSeconds = 20;
 
-/// One pose a second along x at 1 m/s, `error_m` of which is error.
+/// One pose per second along x at 1 m/s, displaced by `error_m`.
 std::vector<StampedPose> drive(const std::function<double(int)>& error_m) {
   std::vector<StampedPose> poses;
   for (int second = 0; second <= kSeconds; ++second)

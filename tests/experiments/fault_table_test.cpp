@@ -10,7 +10,7 @@
 namespace locus::experiments {
 namespace {
 
-/// A run in which all is well.
+/// A faultless run.
 Results run(const std::string& course, const std::string& configuration, double ape_m) {
   Results run{{"course", course}, {"configuration", configuration}, {"machine", "a machine"}};
   run["summary"] = {{"sweeps", {{"seen", 600}, {"processed", 600}, {"dropped", 0}, {"failed", 0}}},
@@ -29,7 +29,7 @@ Results& health_changes(Results& run, const char* source) {
   return run["summary"]["sources"][source]["health_changes"];
 }
 
-/// The one row of the table that is not of a run without faults; one seed for each pair of runs.
+/// Returns the only row of the table with a fault; one seed per pair of runs.
 Results row_of(const std::vector<Results>& runs, const std::string& course, const std::string& configuration) {
   Results results{{"version", "1"},
                   {"simulated", true},
@@ -134,7 +134,7 @@ TEST(FaultTable, ARunThatFailedIsNoRunThatHolds) {
   EXPECT_EQ(row["broken"][0], "seed 1 did not run");
 }
 
-/// The mean of those that are left would say that all is well.
+/// The mean over the remaining runs would look good.
 TEST(FaultTable, RunsForTheCovariancesThatFailAreCountedAndNothingHoldsByThem) {
   Results stood = run("honesty_2", "none", 0.1);
   stood["summary"]["covariance"]["nees_10m"] = nullptr;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The table of faults in small: every row on one seed of a minute.
+// The table of faults at reduced size: every row with one seed, for a minute.
 #include <algorithm>
 #include <filesystem>
 #include <map>
@@ -18,7 +18,7 @@ namespace {
 using nlohmann::json;
 using std::chrono::milliseconds;
 
-/// What does not hold, by course and configuration; docs/robustness.md and decision 29 tell why.
+/// Known violations by course and configuration; reasons in docs/robustness.md and decision 29.
 const std::map<std::string, std::set<std::string>> kKnown{
     {"corridor/none", {"doubt across the way grows"}},
     {"corridor/wio_imu_lost", {"more error than allowed", "farther off than its covariance says"}},
@@ -27,7 +27,7 @@ const std::map<std::string, std::set<std::string>> kKnown{
     {"tunnel/lidar_alone", {"farther off than its covariance says"}},
 };
 
-/// Without lidar the motion sources carry the sweeps, and say so.
+/// Configurations in which motion sources carry sweeps without lidar, and the estimate reports it.
 const std::set<std::string> kLidarSilent{"lidar_gap", "lidar_frozen", "lidar_late"};
 
 std::size_t courses_in(const std::filesystem::path& folder) {
@@ -61,12 +61,12 @@ TEST(FaultsOnCourses, EveryRowOfTheTableHoldsForAMinute) {
   }
   EXPECT_EQ(faults["consistency"]["runs"], 4);
   const auto nees_10m = faults["consistency"]["nees_10m"].get<double>();
-  EXPECT_NONFATAL_FAILURE(EXPECT_GE(nees_10m, 3.0), "nees_10m"); // too humble in a clean world: decision 29
+  EXPECT_NONFATAL_FAILURE(EXPECT_GE(nees_10m, 3.0), "nees_10m"); // covariance too large in a clean world: decision 29
   EXPECT_LE(nees_10m, 12.0) << "too sure";
   EXPECT_TRUE(std::filesystem::exists(folder / "out/faults.md"));
   EXPECT_FALSE(std::filesystem::exists(folder / "out/courses"));
 
-  const ProgramRun compared = run_program( // which runs nothing
+  const ProgramRun compared = run_program( // compares without running anything
       LOCUS_EXPERIMENTS, {"--faults", "--realism", "clean", "--duration", "60", "--seeds", "1", "--consistency", "4",
                           "--compare", folder / "out/results.json", "-o", folder / "out"});
   EXPECT_EQ(compared.status, 0) << compared.err;

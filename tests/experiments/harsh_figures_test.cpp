@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kSweeps = 100; // ten a second
 
-/// A drive along x whose robot stands for two seconds and goes at 1 m/s from then on.
+/// A drive along x: two seconds at rest, then 1 m/s.
 class HarshFigures : public testing::Test {
  protected:
   nlohmann::ordered_json figures(const std::function<double(double)>& error_m,
@@ -64,7 +64,7 @@ TEST_F(HarshFigures, WhatWarnedBeforeItWasLostDoesNotCount) {
   EXPECT_TRUE(figures(lost_at_6, [](double t_s) { return t_s < 5; })["flagged_after_s"].is_null());
 }
 
-/// At 1 m/s from 2 s on, 0.01 rad off the way after 4 s is 20 mm.
+/// At 1 m/s from 2 s on, a heading error of 0.01 rad amounts to 20 mm after 4 s.
 TEST_F(HarshFigures, ALidarMountedAskewTurnsTheWay) {
   const auto askew = [](double t_s) { return t_s < 3.95 ? 0.0 : 0.29 + 0.01 * (t_s - 2); };
   EXPECT_NEAR(figures(askew, never)["lost_after_s"].get<double>(), 4.0, 1e-6);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The harsh table in small: a real world, and people in a bare corridor.
+// The harsh table at reduced size: the real world, and people in a bare corridor.
 #include <string>
 
 #include <gtest/gtest.h>
@@ -11,7 +11,8 @@ namespace {
 
 using nlohmann::json;
 
-/// Every figure has to be there and to be sound; which rows hold is told in docs/robustness.md, not asked here.
+/// Expects every figure to exist and to be plausible; docs/robustness.md lists the rows that hold, which are not tested
+/// here.
 void expect_sound(const json& row) {
   EXPECT_EQ(row["failed"], 0) << row;
   EXPECT_EQ(row["drives"], 10) << row;

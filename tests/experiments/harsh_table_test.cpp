@@ -13,7 +13,7 @@ namespace {
 
 const std::string kOnly = "plant/real";
 
-/// A drive on which all is well.
+/// A faultless drive.
 Results drive(Sensors sensors, int start) {
   const HarshCase plant = harsh_cases(kOnly).front();
   Results run{{"course", plant.course_name(1)},
@@ -30,7 +30,7 @@ Results drive(Sensors sensors, int start) {
   return run;
 }
 
-/// Ten drives with all sensors, of which the fourth is made worse.
+/// Ten drives with all sensors, the fourth of which is modified.
 Results results_with(const std::function<void(Results& drive)>& make_worse) {
   Results runs = Results::array();
   for (int start = 0; start < kHarshStarts; ++start) {

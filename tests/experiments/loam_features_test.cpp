@@ -27,7 +27,7 @@ template <class RangeAt> Sweep turn(RangeAt&& range_at, std::uint16_t scan_line 
   return sweep;
 }
 
-/// Inside a square of 10 m: four walls, four corners.
+/// Range to the walls of a square room of 10 m, from its centre.
 double square_room(double azimuth) { return 5 / std::max(std::abs(std::cos(azimuth)), std::abs(std::sin(azimuth))); }
 
 bool near_corner(const SweepPoint& point, float within_m) {
@@ -54,7 +54,7 @@ TEST(LoamFeatures, ChosenPointsAreNoNeighbours) {
 }
 
 TEST(LoamFeatures, BorderOfAShadowIsNoEdge) {
-  // A pillar 2 m away hides part of a round wall at 8 m.
+  // A pillar at 2 m occludes part of a round wall at 8 m.
   const auto range_at = [](double azimuth) { return azimuth > 2 && azimuth < 2.2 ? 2.0 : 8.0; };
   Sweep sweep = turn(range_at);
   keep_loam_features(sweep);
@@ -66,7 +66,7 @@ TEST(LoamFeatures, BorderOfAShadowIsNoEdge) {
 }
 
 TEST(LoamFeatures, SurfaceAlongTheBeamGivesNone) {
-  // Between two long walls: from 8 degrees on, neighbours on a wall are more than a fortieth of their range apart.
+  // Two long parallel walls: beyond 8 degrees, adjacent points on a wall are more than 1/40 of their range apart.
   const auto range_at = [](double azimuth) { return std::min(60.0, 1 / std::max(1e-9, std::abs(std::sin(azimuth)))); };
   Sweep sweep = turn(range_at);
   keep_loam_features(sweep);

@@ -24,12 +24,12 @@ ProgramRun experiments(const std::vector<std::string>& arguments) { return run_p
 
 json results_in(const std::filesystem::path& folder) { return json::parse(read_text(folder / "results.json")); }
 
-/// When a run began and ended, ms, as Ninja notes it: by COURSE/CONFIGURATION.
+/// Returns start and end of each run in ms from Ninja's log, by COURSE/CONFIGURATION.
 std::map<std::string, std::pair<int, int>> times_in(const std::filesystem::path& folder) {
   std::map<std::string, std::pair<int, int>> times;
   std::ifstream log{folder / ".ninja_log"};
   std::string line;
-  std::getline(log, line); // its version
+  std::getline(log, line); // log version
   int begin_ms = 0, end_ms = 0;
   for (std::string modified, file, hash; log >> begin_ms >> end_ms >> modified;) {
     std::getline(log >> std::ws, file, '\t');
@@ -100,7 +100,7 @@ TEST(LocusExperiments, RunsAtAPaceAreAsAccurateAsOthers) {
     EXPECT_LT(each["summary"]["ape_m"]["max"].get<double>(), 0.1) << each["configuration"];
 }
 
-/// As srun would.
+/// A stand-in for a launcher such as srun.
 TEST(LocusExperiments, ALauncherStartsWhateverTakesLong) {
   const TemporaryFolder folder;
   std::filesystem::copy(room_drive(), folder / "robot");
@@ -141,7 +141,7 @@ TEST(LocusExperiments, ARunThatIsKilledIsNamed) {
   EXPECT_NE(run.err.find("robot/paper: ended by signal 11"), std::string::npos) << run.err;
 }
 
-/// Every run but the first waits until it is killed.
+/// Every run but the first blocks until it is killed.
 TEST(LocusExperiments, KilledAndStartedAgainItGoesOnWhereItWas) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder / "fleet");
@@ -185,7 +185,7 @@ bool some_program_runs_with(const std::string& word) {
   });
 }
 
-/// Before the test's patience ends.
+/// Waits until it holds; false after the test's patience.
 bool comes_true(const std::function<bool()>& holds) {
   const auto give_up = std::chrono::steady_clock::now() + patience();
   while (!holds() && std::chrono::steady_clock::now() < give_up)

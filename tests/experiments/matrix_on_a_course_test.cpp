@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The matrix of faults in small: every cell on a drive of ten seconds.
+// The matrix of faults at reduced size: every cell on a drive of ten seconds.
 #include <string>
 
 #include <gtest/gtest.h>

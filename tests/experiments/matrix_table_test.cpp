@@ -13,7 +13,7 @@ namespace {
 constexpr const char* kFrozen = "wio_frozen_mid";
 constexpr const char* kNoLidar = "top_absent_start";
 
-/// A run in which all is well.
+/// A faultless run.
 Results run(const std::string& configuration) {
   Results run{{"course", matrix_course()}, {"configuration", configuration}, {"machine", "a machine"}};
   const Results source{{"received", 2000}, {"rejected", {{"frozen", 0}}}, {"health_changes", 0}};
@@ -32,7 +32,7 @@ Results results_of(const std::vector<Results>& runs) {
   return results;
 }
 
-/// The one cell that was run.
+/// Returns the only cell that was run.
 Results judged(const Results& with) {
   const Results cells = results_of({run(kNoFault), with})["matrix"]["cells"];
   const auto cell = std::ranges::find_if(cells, [](const Results& each) { return each.contains("holds"); });

@@ -14,7 +14,7 @@ namespace {
 
 using std::filesystem::path;
 
-/// Looked at by their names alone.
+/// Recordings are recognised by their names alone.
 class FoundRecordings : public testing::Test {
  protected:
   void put(const std::string& name) const {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// sample-page FOLDER: the page of runs that nobody did, whose results.json lies there, for the browser to show.
+// sample-page FOLDER: writes the page of made-up runs, whose results.json is in the folder, for the browser test.
 #include <cstdlib>
 #include <filesystem>
 

@@ -40,7 +40,7 @@ std::vector<Fault> faults_of(std::initializer_list<std::string_view> texts) {
   return faults;
 }
 
-/// Ten samples a second for two seconds, moving one metre per sample.
+/// Ten samples per second for two seconds, one metre apart.
 std::vector<OdometrySample> drive() {
   std::vector<OdometrySample> samples;
   for (int i = 0; i < 20; ++i) {
@@ -158,7 +158,7 @@ TEST(InjectFaults, DuplicatesArriveTwice) {
   EXPECT_EQ(x_m(samples[7]), 6.0);
 }
 
-/// A datagram as it was emitted, with its number, which stands in its first byte.
+/// An emitted datagram and its number, which is its first byte.
 struct Arrival {
   int number;
   Stamp receive_stamp;
@@ -174,8 +174,8 @@ std::uint32_t time_of_hour_us(const Datagram& datagram) {
                                                  : velodyne::kTimeOfHourOffset));
 }
 
-/// Twenty data packets of "front", one every 10 ms, each followed after 5 ms by a position packet, both with the time
-/// since the start as the sensor's; then, with the same stamp as the latter, a data packet of "rear".
+/// Twenty data packets of "front", one every 10 ms, each followed after 5 ms by a position packet, both with the
+/// sensor's time since the start; then, with the same stamp as the latter, a data packet of "rear".
 class Recording {
  public:
   explicit Recording(std::initializer_list<std::string_view> faults) {
@@ -260,7 +260,8 @@ TEST(DatagramFaults, PositionPacketsFailAlone) {
   EXPECT_EQ(recording.numbers(8308), (std::vector{0, 1, 2, 3, 4, 4, 4, 4, 4, 4}));
 }
 
-/// Of an Ouster named "top", ten a second for two seconds: turning at the number's degrees per second about z.
+/// Returns the IMU samples of an Ouster named "top", ten per second for two seconds, with a yaw rate of the sample's
+/// number in deg/s.
 std::vector<ouster::ImuMeasurement> readings_with(std::initializer_list<std::string_view> faults) {
   DatagramFaults injector{faults_of(faults), kStart, 1};
   const ouster::Metadata metadata;
@@ -285,13 +286,13 @@ double rate_dps(const ouster::ImuMeasurement& reading) { return reading.angular_
 TEST(DatagramFaults, InertialUnitOfALidarFailsAsAnyOtherAndWithIt) {
   EXPECT_EQ(readings_with({"top_imu:lost@0.5-1"}).size(), 15U);
   EXPECT_EQ(readings_with({"top:lost@0.5-1"}).size(), 15U);
-  EXPECT_EQ(readings_with({"top_imu:nan@0.5-1"}).size(), 15U); // what is not finite is no reading
+  EXPECT_EQ(readings_with({"top_imu:nan@0.5-1"}).size(), 15U); // non-finite samples are no readings
   EXPECT_NEAR(rate_dps(readings_with({"top_imu:frozen@0.5-1"})[7]), 4, 1e-4);
   EXPECT_NEAR(rate_dps(readings_with({"top_imu:jump=2@0.5-1"})[7]), 7 + 2 / kRadPerDeg, 1e-4);
   EXPECT_EQ(readings_with({"top_imu:clock-step=60@0.5-1"})[7].time, 60s + 700ms);
 }
 
-/// In metres they are none of a gyro; and the clock of its columns is another matter.
+/// A jump in metres does not apply to a gyro, and the clock of the columns is separate.
 TEST(DatagramFaults, JumpAndClockStepOfALidarAreNoneOfItsInertialUnit) {
   EXPECT_NEAR(rate_dps(readings_with({"top:jump=2@0.5-1"})[7]), 7, 1e-4);
   EXPECT_EQ(readings_with({"top:clock-step=60@0.5-1"})[7].time, 700ms);
@@ -323,8 +324,8 @@ TEST(DatagramFaults, JumpLengthensTheRangesThatThereAre) {
   EXPECT_EQ(after({"front:jump=2@0"}, with_one_return(0)), with_one_return(0));
 }
 
-/// The shortest range and the time that a packet of an Ouster or a Hesai tells after these faults, as its decoder reads
-/// it; nothing of one that it refuses.
+/// Returns the shortest range and the time of an Ouster or Hesai packet after these faults, as decoded; nothing if the
+/// decoder rejects it.
 template <class Decoder>
 std::optional<std::pair<float, Duration>> read_after(std::initializer_list<std::string_view> faults,
                                                      const ouster::Metadata* metadata, Decoder decoder,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lidars that are asked over real sockets of this host.
+// Fetching from simulated lidars over real sockets of this host.
 #include "fetch/fetch.hpp"
 
 #include <gtest/gtest.h>
@@ -47,7 +47,7 @@ std::string http(std::string_view body, std::string_view status = "200 OK") {
                      body.size(), body);
 }
 
-/// An answer of a Hesai that says that it has so many bytes.
+/// A Hesai answer that claims this many bytes.
 std::string ptc(std::string_view body, std::size_t bytes, char code = 0) {
   std::string text{"\x47\x74\x05", 3};
   text += code;
@@ -57,13 +57,13 @@ std::string ptc(std::string_view body, std::size_t bytes, char code = 0) {
 }
 std::string ptc(std::string_view body) { return ptc(body, body.size()); }
 
-/// Says the same to everybody.
+/// Always gives the same answer.
 TcpServer::Answer always(std::string answer) {
   return [answer = std::move(answer)](const std::string&) { return answer; };
 }
 std::optional<std::string> silent(const std::string&) { return std::nullopt; }
 
-/// The three that are asked, at ports of this host.
+/// The three servers of a lidar, on ports of this host.
 struct Lidar {
   TcpPort http, commands, hesai;
 
@@ -196,7 +196,7 @@ TEST_F(Fetch, SilenceEndsWithThePatience) {
 
 TEST_F(Fetch, DropByDropEndsWithThePatienceToo) {
   patience_ = std::chrono::milliseconds{200};
-  TcpServer web(http_, always(std::string(100'000, 'x')), {.piece_bytes = 1}); // all of it takes 20 s
+  TcpServer web(http_, always(std::string(100'000, 'x')), {.piece_bytes = 1}); // 20 s for all of it
   expect_problem("no answer in time");
 }
 
@@ -231,12 +231,12 @@ TEST_F(Fetch, WhatIsNoAddressIsSaid) {
   }
 }
 
-/// The program, which asks at the ports that lidars have: of an address that is this test's own.
+/// The program, which uses the lidars' standard ports, on an address in the test's own network.
 class FetchProgram : public testing::Test {
  protected:
   FetchProgram() : address_(fmt::format("127.{}.{}.9", 1 + getpid() / 250 % 250, 1 + getpid() % 250)) {}
 
-  /// Its exit status, and what it says.
+  /// Returns its exit status and output.
   std::pair<int, std::string> run(const std::filesystem::path& file) const {
     test::Child program({LOCUSCTL, "fetch", address_, "-o", file.string()});
     const auto status = program.wait_for_exit();

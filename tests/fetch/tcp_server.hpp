@@ -20,7 +20,7 @@
 
 namespace locus::test {
 
-/// A port of this host that nobody else has: calls to it are refused until somebody listens.
+/// A reserved port of this host: connections are refused until a server listens.
 class TcpPort {
  public:
   explicit TcpPort(const std::string& address = "127.0.0.1", std::uint16_t number = 0)
@@ -49,13 +49,12 @@ class TcpPort {
   std::uint16_t number_ = 0;
 };
 
-/// Answers whoever calls, one after the other: what `answer` makes of each piece of a question is sent, nothing where
-/// it makes nothing.
+/// Serves clients one after the other: sends `answer` of each piece of a request, or nothing if that is empty.
 class TcpServer {
  public:
   using Answer = std::function<std::optional<std::string>(const std::string& question)>;
   struct Manners {
-    std::size_t piece_bytes = 1 << 20; ///< that are sent at once
+    std::size_t piece_bytes = 1 << 20; ///< bytes per send
     bool hangs_up = true;              ///< after an answer
   };
 

@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# afl.sh MINUTES [TARGET]...: as run.sh, with AFL++ (Debian's afl++) in libFuzzer's place and so many minutes of each target
-# in all. What it finds is there for run.sh to go on with; what breaks something is kept in build/afl/found/TARGET/.
+# afl.sh MINUTES [TARGET]...: as run.sh, with AFL++ (Debian's afl++) in place of libFuzzer, for this many minutes per
+# target. run.sh continues with its inputs; crashes are stored in build/afl/found/TARGET/.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 seconds=$(($1 * 60))
 shift
 targets=("$@")
 [[ ${#targets[@]} -gt 0 ]] || mapfile -t targets < <(basename -s .cpp -a tests/fuzz/*.cpp)
-# It asks for a terminal, and for a kernel that is set up for nothing but it.
+# Disables its terminal UI and its demands on the kernel configuration.
 export AFL_NO_UI=1 AFL_SKIP_CPUFREQ=1 AFL_I_DONT_CARE_ABOUT_MISSING_CRASHES=1 AFL_NO_AFFINITY=1
 
 build=$PWD/build/afl

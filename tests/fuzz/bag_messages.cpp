@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Messages as they lie in a bag: the first byte says of which type and how they are written.
+// Messages of bags: the first byte selects type and serialisation.
 #include "bags/messages.hpp"
 #include "fuzz/fuzz_bytes.hpp"
 
@@ -19,7 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   default:
     const tools::PacketType& type = tools::packet_types()[(kind / 2U - 2U) % tools::packet_types().size()];
     if (const auto packets = type.read != nullptr ? type.read(reader) : std::nullopt)
-      fuzz::demand(packets->packets.size() * 8 + packets->bytes.size() <= size); // each behind its stamp
+      fuzz::demand(packets->packets.size() * 8 + packets->bytes.size() <= size); // each after its stamp
   }
   return 0;
 }

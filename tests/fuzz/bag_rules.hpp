@@ -9,7 +9,7 @@
 
 namespace locus::fuzz {
 
-/// What holds of every bag, and of what is none.
+/// Checks the invariants of every bag, valid or not.
 inline void demand_rules_of_bags(const std::filesystem::path& path) {
   const auto bag = tools::open_bag(path);
   if (!bag) {
@@ -23,7 +23,7 @@ inline void demand_rules_of_bags(const std::filesystem::path& path) {
       demand(message->topic < (*bag)->topics().size() && (*bag)->progress() <= 1.0);
     return messages;
   };
-  const std::size_t at_first = count(), then = count(); // a topic may be told of only after its first messages
+  const std::size_t at_first = count(), then = count(); // a topic may be announced only after its first messages
   demand(at_first <= then && then == count());
 }
 

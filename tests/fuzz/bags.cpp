@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// ROS 1 bags. (Those of ROS 2 are databases, and SQLite's to read, or MCAP, which has a target of its own.)
+// ROS 1 bags. (ROS 2 bags are databases read by SQLite, or MCAP, which has its own target.)
 #include "fuzz/bag_rules.hpp"
 #include "fuzz/memory_file.hpp"
 

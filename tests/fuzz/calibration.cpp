@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Calibration files of one lidar: of a Velodyne, and of a Hesai.
+// Calibration files of one lidar: Velodyne and Hesai.
 #include <cmath>
 
 #include "drivers/hesai/calibration.hpp"

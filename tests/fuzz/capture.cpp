@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Captures, and the frames in them.
+// Captures and their frames.
 #include "drivers/files/capture.hpp"
 #include "fuzz/memory_file.hpp"
 
@@ -12,7 +12,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   while (const Datagram* const datagram = capture->next()) {
     demand(datagram->payload.size() <= size);
-    for (const std::byte byte : datagram->payload) // that each may be read
+    for (const std::byte byte : datagram->payload) // each must be readable
       demand(std::to_integer<unsigned>(byte) < 256);
   }
   const Capture::Stats& s = capture->stats();

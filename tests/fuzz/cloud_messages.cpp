@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Clouds of one lidar, as they lie in a bag or come over DDS. The first byte says of which type they are, how they are
-// written and where the times of their points are from; each cloud is the length of its message, then the message, and
-// arrives a while after the one before.
+// Clouds of one lidar, from a bag or DDS. The first byte selects type, serialisation and time field; each cloud is the
+// length of its message, then the message, and arrives a while after the previous one.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -45,7 +44,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string_view type = kind / 2 % 2 == 0 ? kPointCloudType : "livox_ros_driver2/CustomMsg";
   static const std::array kPristine{CloudDecoder{0, PointTimesFrom::automatic},
                                     CloudDecoder{0, PointTimesFrom::azimuth}, CloudDecoder{0, PointTimesFrom::none}};
-  static CloudDecoder decoder{0}; // keeps its memory, which is most of the time it would take
+  static CloudDecoder decoder{0}; // static: allocating its memory would dominate the run time
   decoder = kPristine[kind / 4 % 3];
   Stamp arrival = stamp_from_ns(1'700'000'000'000'000'000);
   std::uint64_t returns = 0;

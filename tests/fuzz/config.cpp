@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Configuration files: they are read, or something is said about them, a line for each mistake.
+// Configuration files: accepted, or rejected with one line per error.
 #include <string>
 
 #include "config/config_yaml.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What --set does, one option a line and three of them at most, for each costs as much; the outcome is printed and read
-// again, to the same.
+// Options of --set, one per line and at most three, because each costs as much; the result is printed and must parse to
+// an equal configuration.
 #include <sstream>
 #include <string>
 #include <vector>

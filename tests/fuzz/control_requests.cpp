@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What anybody on the machine may write into the control socket of the service.
+// Requests of local users to the control socket of the service.
 #include <cmath>
 #include <variant>
 

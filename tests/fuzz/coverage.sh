@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# coverage.sh TARGET [FOLDER]...: the branches of ours that the corpus of a target, what seeds.py makes and the inputs in these
-# folders take one way only, with how often each way was taken (by Debian's llvm). What cannot be otherwise is among them;
-# what could be wants a seed.
+# coverage.sh TARGET [FOLDER]...: lists the branches in our code that are taken one way only by the corpus of a target,
+# the seeds of seeds.py and the inputs in these folders, with the counts of each way (by Debian's llvm). Some cannot go
+# the other way; the others need a seed.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 target=$1

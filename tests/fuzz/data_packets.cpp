@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Datagrams to one lidar, which is of any model and has its time from anywhere.
+// Datagrams to one lidar, of any model and with any time source.
 #include <chrono>
 #include <cmath>
 #include <numeric>

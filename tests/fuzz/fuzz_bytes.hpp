@@ -12,7 +12,7 @@
 
 namespace locus::fuzz {
 
-/// What a target is fed with, taken from the front, so that a person can write a seed; zeros once it is used up.
+/// Input of a target, consumed from the front, so that seeds can be written by hand; zeros once it is exhausted.
 class FuzzBytes {
  public:
   FuzzBytes(const std::uint8_t* data, std::size_t size) : rest_(std::as_bytes(std::span{data, size})) {}
@@ -20,7 +20,7 @@ class FuzzBytes {
   [[nodiscard]] bool empty() const { return rest_.empty(); }
   [[nodiscard]] std::span<const std::byte> rest() const { return rest_; }
 
-  /// Overwrites as much of `target` as there are bytes for.
+  /// Overwrites as much of `target` as bytes are left.
   void fill(std::span<std::byte> target) {
     const std::size_t count = std::min(target.size(), rest_.size());
     std::copy_n(rest_.begin(), count, target.begin());
@@ -41,7 +41,7 @@ inline std::string_view text_of(const std::uint8_t* data, std::size_t size) {
   return {reinterpret_cast<const char*>(data), size};
 }
 
-/// What holds whatever comes in. It is no assert(), which a release would leave out.
+/// Checks an invariant. Not assert(), which release builds omit.
 inline void demand(bool holds) {
   if (!holds)
     std::abort();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Packets of a Hesai: whatever the bytes are, and well-formed ones in which some were changed.
+// Packets of a Hesai: arbitrary bytes, and well-formed packets with some bytes changed.
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -14,7 +14,7 @@ namespace {
 
 using fuzz::demand;
 
-/// Bits of the byte that opens a packet.
+/// Bits of a packet's first byte.
 enum Step : std::uint8_t { kAnyBytes = 1, kOtherLength = 2, kUnsealed = 4, kOtherModel = 8, kLater = 16 };
 
 void check(const hesai::Decoder& decoder, const LidarPacket& packet) {

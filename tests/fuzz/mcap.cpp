@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// MCAP files, from behind their magic on.
+// MCAP files, without the leading magic.
 #include "bags/mcap_record.hpp"
 #include "fuzz/bag_rules.hpp"
 #include "fuzz/memory_file.hpp"

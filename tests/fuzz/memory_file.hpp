@@ -12,7 +12,7 @@
 
 namespace locus::fuzz {
 
-/// A file that lies in memory and whose content changes from input to input. To be made once.
+/// An in-memory file whose content changes from input to input. Create once.
 class MemoryFile {
  public:
   MemoryFile() : descriptor_(memfd_create("fuzz", MFD_CLOEXEC)) { demand(descriptor_ >= 0); }
@@ -20,7 +20,7 @@ class MemoryFile {
   MemoryFile(const MemoryFile&) = delete;
   MemoryFile& operator=(const MemoryFile&) = delete;
 
-  /// The path of the file with this content.
+  /// Returns the path of the file with this content.
   [[nodiscard]] std::filesystem::path with(std::string_view content) const {
     demand(ftruncate(descriptor_, static_cast<off_t>(content.size())) == 0);
     demand(pwrite(descriptor_, content.data(), content.size(), 0) == static_cast<ssize_t>(content.size()));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tables of motion: each input is read as one of an IMU, of odometry and of true poses. Behind a line of three dashes
-// stands the meta file that goes with it. What is read is judged as a replay does.
+// Motion tables: each input is read as IMU, as odometry and as true poses. After a line of three dashes follows its
+// meta file. Samples are validated as in a replay.
 #include <cmath>
 #include <string>
 
@@ -15,7 +15,7 @@ using fuzz::demand;
 
 constexpr std::string_view kBehindTable = "---\n";
 
-/// A table and its meta file in one folder, as they are looked for.
+/// A table and its meta file in one folder, named as the reader expects.
 class Folder {
  public:
   Folder() {
@@ -27,7 +27,7 @@ class Folder {
   Folder(const Folder&) = delete;
   Folder& operator=(const Folder&) = delete;
 
-  /// The path of a table with a meta file.
+  /// Returns the path of a table with a meta file.
   [[nodiscard]] std::filesystem::path with(std::string_view table, std::string_view meta) const {
     static_cast<void>(table_.with(table));
     static_cast<void>(meta_.with(meta));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Metadata of an Ouster, and a decoder for whatever sensor they make up.
+// Metadata of an Ouster, and a decoder for the resulting sensor.
 #include <cmath>
 
 #include "drivers/ouster/decoder.hpp"

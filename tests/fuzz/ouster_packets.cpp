@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Packets of an Ouster: whatever the bytes are, and well-formed ones in which some were changed.
+// Packets of an Ouster: arbitrary bytes, and well-formed packets with some bytes changed.
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -15,7 +15,7 @@ namespace {
 
 using fuzz::demand;
 
-/// Bits of the byte that opens a packet.
+/// Bits of a packet's first byte.
 enum Step : std::uint8_t { kAnyBytes = 1, kOtherLength = 2, kUnsealed = 4, kImu = 8, kLater = 16 };
 
 std::vector<ouster::Metadata> all_kinds() {
@@ -43,7 +43,7 @@ void check(const ouster::Metadata& metadata, const LidarPacket& packet) {
   }
 }
 
-/// Changes a few bytes: each is told by its place and its new value.
+/// Changes a few bytes, each given by offset and new value.
 void change(fuzz::FuzzBytes& bytes, std::span<std::byte> payload) {
   for (std::uint8_t changes = bytes.take<std::uint8_t>() % 8; changes > 0; --changes) {
     const auto at = bytes.take<std::uint16_t>();

@@ -15,11 +15,11 @@
 
 namespace locus::fuzz {
 
-/// Datagrams of a lidar. A payload is brought along, or is the one before after some time and turn, so that a few bytes
-/// make a stream.
+/// Datagrams of a lidar. A payload is part of the input, or derived from the previous one by a step of time and
+/// rotation, so that a few bytes make a stream.
 class PacketStream {
  public:
-  /// Bits of the byte that opens a datagram.
+  /// Bits of a datagram's first byte.
   enum Step : std::uint8_t {
     kNewPayload = 1,
     kOtherLength = 2,
@@ -47,7 +47,7 @@ class PacketStream {
     return datagram_;
   }
 
-  /// As a capture tells it.
+  /// Arbitrary stamp of a capture.
   static Stamp any_stamp(FuzzBytes& bytes) {
     const auto latest_ns = static_cast<std::uint64_t>(to_ns(kLatestStamp));
     return stamp_from_ns(static_cast<std::int64_t>(bytes.take<std::uint64_t>() % latest_ns));

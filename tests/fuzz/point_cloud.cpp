@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// True maps, PLY and PCD; sweeps in PCD.
+// True maps in PLY and PCD; sweeps in PCD.
 #include "accuracy/point_cloud_file.hpp"
 #include "drivers/clouds/cloud_decoder.hpp"
 #include "fuzz/memory_file.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Position packets, and what a GPS receiver says in them. Only the part that is looked at is fed: the time of hour, the
-// state of the PPS and the sentence.
+// Position packets and their GPS sentence. Only the parts that are parsed are fuzzed: the time of hour, the state of
+// the PPS and the sentence.
 #include <array>
 #include <cmath>
 

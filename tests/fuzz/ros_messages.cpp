@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Samples as DDS hands them over, of an IMU and of an odometry, judged and followed as the ingest does. A message is
-// the one before with another part, so that a few bytes make a stream.
+// IMU and odometry samples from DDS, validated and tracked as by the ingest. A message is derived from the previous one
+// by changing a part, so that a few bytes make a stream.
 #include <chrono>
 #include <utility>
 
@@ -15,13 +15,13 @@ namespace {
 using fuzz::demand;
 using fuzz::FuzzBytes;
 
-/// Bits that open a message; another part than before.
+/// First byte of a message: the parts that change.
 enum Step : std::uint8_t {
   kOdometry = 1,
   kStamp = 2,
   kArrival = 4,
   kRotation = 8,
-  kVectors = 16, ///< position, or turn rate and specific force
+  kVectors = 16, ///< position, or angular rate and specific force
   kCovariance = 32,
   kOutside = 64,
 };
@@ -30,7 +30,7 @@ template <class... Part> void refill(FuzzBytes& bytes, Part&... parts) {
   (bytes.fill(std::as_writable_bytes(std::span{&parts, 1})), ...);
 }
 
-/// One source from its topic to its track.
+/// One source, from its topic to its track.
 struct Source {
   explicit Source(SourceKind kind) : options{.name = "fuzz", .kind = kind, .T_base_source = {}}, track(options) {}
 

@@ -1,15 +1,14 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# run.sh MINUTES [TARGET]...: fuzzes each target (all of them, if none is named), one after the other, until so many
-# minutes of CPU found no new way through the code, and leaves in corpus/TARGET.tar.xz the fewest inputs that reach all that
-# any input reached. It begins with that and with what seeds.py makes, and called again goes on with what was found. afl.sh does
-# the same with AFL++; coverage.sh tells what is reached.
+# run.sh MINUTES [TARGET]...: fuzzes each target (default: all), one after the other, until this many minutes of CPU
+# time found no new coverage, and stores the minimal corpus of equal coverage in corpus/TARGET.tar.xz. It starts with
+# that corpus and the seeds of seeds.py, and a repeated call resumes. afl.sh does the same with AFL++; coverage.sh
+# reports the coverage.
 #
-# An input that breaks something is kept in build/fuzz/broken/, the reason in build/fuzz/log/TARGET:
+# Crashing inputs are stored in build/fuzz/broken/, the reports in build/fuzz/log/TARGET:
 #   build/fuzz/bin/fuzz_TARGET FILE                                    runs it again, with the trace
-#   build/fuzz/bin/fuzz_TARGET -minimize_crash=1 -runs=100000 FILE     makes it small
-# Mend the program, write a test that tells the story, and copy the file to mended/TARGET/: from then on every run of the
-# tests feeds it.
+#   build/fuzz/bin/fuzz_TARGET -minimize_crash=1 -runs=100000 FILE     minimises it
+# Fix the program, write a regression test, and copy the file to mended/TARGET/: every run of the tests then replays it.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 asked_s=$(($1 * 60))
@@ -23,7 +22,7 @@ build=$PWD/build/fuzz
 mkdir -p "$build/log" "$build/broken"
 tests/fuzz/seeds.py "$build/seeds"
 
-# Where memory was taken is told by the run that repeats a failure; here it would cost a third of the time.
+# The run that reproduces a failure records allocation stacks; here they would cost a third of the time.
 export ASAN_OPTIONS=malloc_context_size=0
 
 last() { grep -aoP "$1" "$log" | tail -n 1; }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The saved state of the service, with checksums made right, for nothing gets past wrong ones: what is left is a file
-// that was written by another version, or by somebody else.
+// The saved state of the service, with valid checksums, because invalid ones are rejected first: simulates a file of
+// another version or program.
 #include <cstring>
 #include <vector>
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""seeds.py FOLDER: writes a first corpus into FOLDER/TARGET/: one well-formed input for every form that is read, each
-key of the configuration and each number of a motion file set to what makes no sense, and what coverage.sh showed to be missing."""
+"""seeds.py FOLDER: writes an initial corpus to FOLDER/TARGET/: one well-formed input per supported format, inputs with
+each key of the configuration and each number of a motion file set to nonsense, and inputs for gaps that coverage.sh showed."""
 import bz2
 import ctypes
 import gzip
@@ -77,7 +77,7 @@ standing[7 * 100 + 2] = 1
 write("data_packets", "standing", b"\0" + struct.pack("<BH", NEW, 1327) + standing)
 write("data_packets", "length", b"\0" + struct.pack("<BHH", OTHER_LENGTH, 1205, 0) + turns)
 
-# Packets of an Ouster of each kind: kind, then step, columns that passed, number of changed bytes (place, value).
+# Packets of an Ouster of each kind: kind, then step, columns elapsed, number of changed bytes (offset, value).
 ANY_BYTES, UNSEALED, IMU, LATER = 1, 4, 8, 16
 for kind in range(8):
     packets = b"".join(struct.pack("<BHB", LATER, 16, 0) for _ in range(6))
@@ -89,8 +89,8 @@ for kind in range(8):
     write("ouster_packets", f"imu_{kind}", bytes([kind]) + imu * 3)
     write("ouster_packets", f"any_{kind}", bytes([kind, ANY_BYTES | UNSEALED]) + bytes(range(256)) * 20)
 
-# Packets of a Hesai of each model, told or configured: step, microseconds that passed, return mode, azimuth, speed, firing
-# sequence, number of changed bytes (place, value).
+# Packets of a Hesai of each model, detected or configured: step, microseconds elapsed, return mode, azimuth, speed,
+# firing sequence, number of changed bytes (offset, value).
 OTHER_MODEL = 8
 for model in range(8):
     for mode in range(4):
@@ -106,7 +106,7 @@ for model in range(8):
     write("hesai_packets", f"other_{model}", bytes([model, 1]) + packets + other + packets)
     write("hesai_packets", f"any_{model}", bytes([model, 0]) + struct.pack("<BBHbB", ANY_BYTES | UNSEALED, 1, 0, 60, 0) + bytes(range(256)) * 8)
 
-# Metadata in both forms, each key left out and absurd.
+# Metadata in both forms, each key omitted and absurd.
 OUSTER = {
     "sensor_info": {"prod_line": "OS-1-16", "prod_sn": "122201000998", "initialization_id": 7109750},
     "config_params": {"lidar_mode": "1024x10", "timestamp_mode": "TIME_FROM_PTP_1588", "udp_port_lidar": 7502, "udp_port_imu": 7503},
@@ -171,7 +171,7 @@ write("config", "comma", ",lidars: []\n")
 ODD = ["-1", "0", "7", "1e400", ".nan", "true", "word", "[]", "[1, 2]", "[-1, 2, x]", "{}", "{x: 1}", "~", '""', "*a", "'"]
 for section in re.split(r"\n(?=\w)", re.sub(r"\s*#.*", "", (project / "config/locusd.yaml").read_text())):
     name = section.strip().split(":")[0]
-    for place in re.finditer(r"(\w+):\s+(?=(\[[^\]]*\]|\{[^{}]*\}|[^\s,}]+))", section):  # of a key, and of what it is set to
+    for place in re.finditer(r"(\w+):\s+(?=(\[[^\]]*\]|\{[^{}]*\}|[^\s,}]+))", section):  # a key and its value
         outer = {"lidars": "lidars.front", "motion_sources": "motion_sources.imu"}.get(name, name)
         if place[1] in ("xyz_m", "rpy_deg"):
             outer += ".T_base_lidar" if name == "lidars" else ".T_base_source"
@@ -179,7 +179,7 @@ for section in re.split(r"\n(?=\w)", re.sub(r"\s*#.*", "", (project / "config/lo
         for index, odd in enumerate(ODD):
             write("config", f"odd_{path}_{index}", section[:place.start(2)] + odd + section[place.end(2):] + "\n")
             write("config_values", f"odd_{path}_{index}", f"{path}={odd}")
-# Each rule of a value by itself, kept and broken.
+# Each rule of a value on its own, satisfied and violated.
 RULES = [("sweep_period_ms", "50"), ("sweep_period_ms", "5"), ("range_m", "[-1, 5]"), ("range_m", "[5, 2]"), ("range_m", "[0, 2000]"),
          ("range_m", "[1, 2, 3]"), ("range_m", "[1, inf]"), ("body_box", "{enabled: true, min_m: [1, 1, 1], max_m: [2, 2, 2]}"),
          ("body_box", "{enabled: true, min_m: [1, 1, 1], max_m: [2, 2, 0]}"), ("threads", "99999999999999999999"), ("threads", "2 "),
@@ -233,7 +233,7 @@ write("motion_files", "tum", "".join(f"1700000000.{i}00000000 {i} 0.5 -1e-3 0 0 
 write("motion_files", "numpy", "1.403636579763555527e+09 0 0 0 0 0 0.6 0.8\n.5e1\t1 2 3 0 0 0 +1\n-2. 1 2 3 0 0 0 1\n")
 write("motion_files", "meta", "1,0,0,0,0,0,9.81\n3,0,0,0,0,0,9.81\n---\nt_ns,arrival_ns,covariance_scale\n1,4,1\n3,2,7.5\n")
 write("motion_files", "meta_tum", "1e-9 0 0 0 0 0 0 1\n1e-9 1 0 0 0 0 0 1\n---\n1,2000,1\n1,1000,8\n")
-for force in (1, 5, -9.81, 0):  # a second of an accelerometer in g, of no gravity, upside down
+for force in (1, 5, -9.81, 0):  # one second of an accelerometer in g, without gravity, upside down
     lines = [f"{i * 60_000_000},0,0,0,0,0,{force}\n" for i in range(1, 20)]
     write("motion_files", f"gravity_{force}", "".join(lines))
     write("motion_files", f"other_clock_{force}", "".join(lines) + "---\n" + "".join(f"{i * 60_000_000},{(i + 5000) * 60_000_000},1\n" for i in range(1, 20)))
@@ -261,11 +261,11 @@ for form, order in (("binary_little_endian", "<"), ("binary_big_endian", ">")):
 write("point_cloud", "ascii", PLY.format("ascii", "float", "double", "float32") + "1 2 3 4\n-1e3 nan .5 5\n")
 PCD = "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z h\nSIZE 4 4 8 4\nTYPE F F F U\nCOUNT 1 1 1 3\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\nDATA {}\n"
 write("point_cloud", "pcd_ascii", PCD.format("ascii") + "1 2 3 4 5 6\n7 8 9 10 11 12\n")
-packed = b"\x1f" + bytes(range(32)) + b"\xe0\x0f\x00"  # a byte is repeated 24 times
+packed = b"\x1f" + bytes(range(32)) + b"\xe0\x0f\x00"  # one byte repeated 24 times
 write("point_cloud", "pcd_compressed", PCD.format("binary_compressed").encode() + struct.pack("<II", len(packed), 56) + packed)
 write("point_cloud", "pcd_binary", PCD.format("binary").encode() + struct.pack("<ffdIII", 1, 2, 3, 4, 5, 6) * 2)
 
-# The state of the service; checksums are made right by the target.
+# The state of the service; the target corrects the checksums.
 POSE = (1, 2, 3, 0, 0, 0, 1)
 COVARIANCE_OF_ONE = [float(i % 7 == 0) for i in range(36)]
 LEARNED = [0.1] * 6 + [0.0] * 7 + [1e-4 * (i % 8 == 0) for i in range(49)]
@@ -276,7 +276,7 @@ for points in (0, 3):
     write("saved_state", f"points_{points}",
           heads + struct.pack("<Q8QiIQ", 7, *range(8), 1, points, 0) + struct.pack("<6f", 1, 2, 3, 0, 0, 1) * points)
 
-# Messages: what each step brings with it is in the target.
+# Messages; the target documents the content of each step.
 ODOMETRY, STAMP, ARRIVAL, ROTATION, VECTORS, COVARIANCE, OUTSIDE = 1, 2, 4, 8, 16, 32, 64
 drive = struct.pack("<BHddddddd", ODOMETRY | ROTATION | VECTORS, 20000, 0, 0, 0, 1, 1, 2, 3)
 drive += b"".join(struct.pack("<BHddd", ODOMETRY | VECTORS, 20000, 1 + 0.01 * i, 2, 3) for i in range(8))
@@ -285,7 +285,7 @@ write("ros_messages", "uncertain", drive + struct.pack("<BHBd", ODOMETRY | COVAR
 turn = struct.pack("<BHddddddddddd", ROTATION | VECTORS | COVARIANCE, 5000, 0, 0, 0, 1, 0.1, 0, 0, 0, 0, 9.81, 0.1)
 turn += b"".join(struct.pack("<BHdddddd", VECTORS, 5000, 0.1 + 0.01 * i, 0, 0, 0, 0.01, 9.8) for i in range(8))
 write("ros_messages", "imu", turn)
-for force in (1, 5, -9.81, 0):  # a second of an accelerometer in g, of no gravity, upside down
+for force in (1, 5, -9.81, 0):  # one second of an accelerometer in g, without gravity, upside down
     write("ros_messages", f"gravity_{force}", struct.pack("<BH6d", VECTORS, 60000, 0, 0, 0, 0, 0, force) + struct.pack("<BH", 0, 60000) * 19)
 write("ros_messages", "no_attitude", struct.pack("<BHd", COVARIANCE, 5000, -1.0) + turn)
 for index, numbers in enumerate(((float("inf"),), (float("-inf"),), (1e308, 1e308), (0.01, 1e308, 1e308))):
@@ -299,7 +299,7 @@ write("ros_messages", "both", turn + drive + struct.pack("<BHB", ODOMETRY | OUTS
 write("ros_messages", "own_clock", b"".join(struct.pack("<BHiIdddddd", STAMP | VECTORS, 5000, 5, i * 5_000_000, i, 0, 0, 0, 0, 9.81)
                                            for i in range(9)) + struct.pack("<BHI", ARRIVAL, 1, 7))
 
-# Bags of ROS 1, and the messages in them: ROS 1's numbers lie close together, CDR's are aligned behind four bytes.
+# ROS 1 bags and their messages: ROS 1 packs its numbers, CDR aligns them after the 4-byte header.
 
 
 def text(value):
@@ -367,7 +367,7 @@ for name, part in (("no_time", record(2, ros1[0], conn=bytes(4))), ("no_connecti
 write("bags", "no_head", b"#ROSBAG V2.0\n" + record(5, topics, compression=b"none", size=struct.pack("<I", len(topics))))
 write("bags", "other_version", b"#ROSBAG V1.2\n")
 
-# MCAP, from behind the magic on. Checksums are left out (zero), or mutations would end there.
+# MCAP without the leading magic. Checksums are zero (unused), or mutations would stop there.
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 
 
@@ -435,7 +435,7 @@ for name, packed in (("gzip", gzip.compress(b"packed and packed and packed")), (
 write("unpacking", "plain", b"\x03not packed")
 
 
-# Clouds: fields (name, offset, type) of a point, its step, and what makes one of column, ring, time in s.
+# Clouds: fields (name, offset, type) of a point, its size, and a function of column, ring and time in s.
 class Cdr:
     def __init__(self, aligned):
         self.out, self.aligned = b"", aligned

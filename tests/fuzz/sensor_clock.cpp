@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The clock of a lidar, told any times of hour at any times of reception.
+// The clock of a lidar, with arbitrary times of hour and reception.
 #include "drivers/sensor_clock.hpp"
 #include "fuzz/packet_stream.hpp"
 
@@ -10,12 +10,12 @@ using std::chrono::microseconds;
 
 constexpr Duration kPacket = microseconds{1327};
 
-/// Bits that open a step.
+/// Bits of a step's first byte.
 enum Step : std::uint8_t { kAnyTimeOfHour = 1, kAnyReception = 2, kBackwards = 4, kUnsynchronised = 8 };
 
 Duration wrapped(Duration time_of_hour) { return time_of_hour % std::chrono::hours{1}; }
 
-/// Whatever came before.
+/// A working lidar must be accepted, whatever the input before.
 void demand_that_a_living_lidar_is_heard(SensorClock& clock, Duration time_of_hour, Duration received) {
   std::optional<SensorClock::Reading> reading;
   for (int packet = 1; packet <= 200; ++packet)

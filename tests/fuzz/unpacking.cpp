@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Packed files, in pieces: the first byte says how long each is.
+// Compressed files in pieces; the first byte is the length of a piece.
 #include <algorithm>
 #include <vector>
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# accept.sh [FILTER]: takes the estimates of the present code for right, those of all drives or of those whose tests the
-# filter of GoogleTest names ('*urban*'). Says of each what has changed; git diff shows the rest.
+# accept.sh [FILTER]: accepts the estimates of the present code, of all drives or of those matched by a GoogleTest
+# filter ('*urban*'). Prints what has changed in each; git diff shows the rest.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 [ -d build/dev ] || cmake --preset dev --log-level=WARNING

@@ -9,10 +9,10 @@
 
 namespace locus::test {
 
-/// The instruction set that the traces are of.
+/// Instruction set of the accepted traces.
 inline constexpr Isa kIsaOfTraces = Isa::avx2;
 
-/// Whether this build gives the bits of the traces: gcc's, of any level of optimisation, with and without assertions.
+/// True if this build reproduces the traces' bits: gcc's, at any optimisation level, with and without assertions.
 #if defined(__GNUC__) && !defined(__clang__)
 inline constexpr bool kGivesTheBitsOfTraces = true;
 #else
@@ -21,9 +21,9 @@ inline constexpr bool kGivesTheBitsOfTraces = false;
 
 std::filesystem::path trace_file(const std::string& name);
 
-/// Fails the test unless `found`, by this instruction set, is what was accepted: to the last bit by that of the traces,
-/// else within the tolerance. Where the environment variable LOCUS_ACCEPT_TRACES is set it accepts it instead, and says
-/// what has changed.
+/// Fails the test unless `found`, computed by this instruction set, equals the accepted trace: bit by bit for the
+/// traces' instruction set, else within the tolerance. If the environment variable LOCUS_ACCEPT_TRACES is set, accepts
+/// `found` instead and prints the changes.
 void expect_accepted(const std::string& name, const Trace& found, Isa isa);
 
 } // namespace locus::test

@@ -11,10 +11,10 @@ namespace locus::test {
 struct Drive {
   std::string name;
   std::string options;            ///< of locus-replay
-  bool on_other_isas_too = false; ///< compared there within the tolerance
+  bool on_other_isas_too = false; ///< compared within the tolerance
 };
 
-/// What locus-sim makes, once for all that is driven on it.
+/// A course simulated by locus-sim once for all its drives.
 struct SimulatedCourse {
   std::string name;
   std::string options; ///< of locus-sim
@@ -22,7 +22,7 @@ struct SimulatedCourse {
 };
 inline void PrintTo(const SimulatedCourse& course, std::ostream* stream) { *stream << course.options; }
 
-/// What somebody recorded, below the folder of real data.
+/// A real recording below the folder of real data.
 struct RealRecording {
   std::string name; ///< traces/real/NAME.txt
   std::string path;
@@ -32,8 +32,8 @@ inline void PrintTo(const RealRecording& recording, std::ostream* stream) { *str
 
 inline const std::string kNoSources = "--set motion_sources=[]";
 
-/// Every world and robot, one lidar and two, with motion sources and without, and every kind of fault in a clean world;
-/// some drives in the world as it is.
+/// Every world and robot, one and two lidars, with and without motion sources, and every kind of fault in a clean
+/// world; some drives with realistic imperfections.
 inline const std::vector<SimulatedCourse> kCourses{
     {"urban_husky",
      "--realism clean --world urban --robot husky --duration 30 --seed 1",
@@ -70,13 +70,13 @@ inline const std::vector<SimulatedCourse> kCourses{
     {"road_car_real", "--realism real --world road --robot car --duration 20 --seed 1", {{"all_sources", ""}}},
 };
 
-/// Those that hold more than one sweep. A trace is accepted of each that locus-replay reads.
+/// Recordings with more than one sweep. Each that locus-replay can read has an accepted trace.
 inline const std::vector<RealRecording> kRecordings{
     {"hdl32e_moving", "velodyne/hdl32e_moving_15mps.pcap", true},
     {"hdl32e_static_monterey", "velodyne/hdl32e_static_monterey.pcap", true},
     {"vlp16_static_1200rpm", "velodyne/vlp16_static_1200rpm_product21.pcap", true},
     {"vlp16_static_gps_pps", "velodyne/vlp16_static_gps_pps.pcap", true},
-    {"vls128_static", "velodyne/vls128"}, // wanders: another last bit is another estimate
+    {"vls128_static", "velodyne/vls128"}, // chaotic: a different last bit gives another estimate
     {"trial_plant", "trial/plant"},
     {"trial_people", "trial/people"},
     {"trial_corridor", "trial/corridor"},

@@ -29,7 +29,7 @@ std::vector<std::string> words_of(const std::string& options) {
   return {std::istream_iterator<std::string>{stream}, {}};
 }
 
-/// All estimates of locus-replay; nothing where it refuses the recording, and has said why.
+/// Returns all estimates of locus-replay; nothing if it rejects the recording with an error.
 std::optional<std::vector<OdometryEstimate>> replay(const std::filesystem::path& recording, const std::string& options,
                                                     Isa isa, int threads = 1) {
   const TemporaryFolder output;
@@ -47,7 +47,7 @@ std::optional<std::vector<OdometryEstimate>> replay(const std::filesystem::path&
   return status == 0 ? std::optional(std::move(estimates)) : std::nullopt;
 }
 
-/// Those that this processor has; the one of the traces first.
+/// Returns the instruction sets of this processor, that of the traces first.
 std::vector<Isa> isas(bool others_too) {
   std::vector<Isa> all;
   for (const Isa isa : {kIsaOfTraces, Isa::baseline, Isa::avx512}) {
@@ -69,7 +69,7 @@ TEST_P(Golden, DrivesGiveTheAcceptedEstimates) {
   Child sim(command);
   ASSERT_EQ(sim.wait_for_exit(std::chrono::minutes{5}), 0) << testing::PrintToString(sim.lines());
   const std::string checksum = checksum_of(folder.path());
-  std::filesystem::remove(folder / "gt_map.ply"); // how far from the truth it is, others ask
+  std::filesystem::remove(folder / "gt_map.ply"); // accuracy is not tested here
   std::filesystem::remove(folder / "gt.tum");
   for (const Drive& drive : course.drives) {
     const std::string name = course.name + '/' + drive.name;

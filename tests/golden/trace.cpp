@@ -15,7 +15,7 @@
 namespace locus::test {
 namespace {
 
-/// Six figures each: pose, twist, standard deviations.
+/// Blocks of figures in a line: pose, twist, standard deviations; six each.
 constexpr std::size_t kPosition = 0, kAngles = 3, kVelocity = 6, kTurnRate = 9, kSigma = 12;
 
 constexpr std::string_view kColumns =
@@ -79,7 +79,7 @@ std::optional<Trace::Line> parse_line(const std::string& text) {
   if (words.size() != 2 + line.numbers.size())
     return std::nullopt;
   bool good = true;
-  const auto number = [&](const std::string& word) { // of a stream, NaN would be none
+  const auto number = [&](const std::string& word) { // not a stream, which cannot parse NaN
     char* end = nullptr;
     const double value = std::strtod(word.c_str(), &end);
     good = good && *end == 0;
@@ -91,8 +91,8 @@ std::optional<Trace::Line> parse_line(const std::string& text) {
   return good ? std::optional(std::move(line)) : std::nullopt;
 }
 
-/// Of all sweeps up to three seconds of drive, of every third if there are many; else the first of each second. The
-/// last one always.
+/// Selects the sweeps shown: of drives up to three seconds all, or every third if there are many; else the first of
+/// each second. Always includes the last.
 std::vector<std::size_t> shown_of(const std::vector<OdometryEstimate>& estimates) {
   constexpr double kShort_s = 3;
   constexpr std::size_t kMany = 20;
@@ -111,7 +111,7 @@ std::vector<std::size_t> shown_of(const std::vector<OdometryEstimate>& estimates
   return shown;
 }
 
-/// How far two lines are apart, each kind of figure at its worst.
+/// Returns the differences of two lines, the maximum for each kind of figure.
 Tolerance distance(const Trace::Line& one, const Trace::Line& other) {
   const auto at = [&](std::size_t first) {
     const auto three = [&](const Trace::Line& line) {
@@ -131,7 +131,7 @@ Tolerance distance(const Trace::Line& one, const Trace::Line& other) {
   return {apart(kPosition), angle_rad(turn), apart(kVelocity), apart(kTurnRate), sigma_share};
 }
 
-/// The largest of each over all lines that both have.
+/// Returns the maximum of each difference over all common lines.
 Tolerance largest_distance(const Trace& one, const Trace& other) {
   Tolerance largest{0, 0, 0, 0, 0};
   for (std::size_t i = 0; i < std::min(one.lines.size(), other.lines.size()); ++i) {
@@ -152,7 +152,7 @@ std::string in_words(const Tolerance& largest) {
       100 * largest.sigma_share);
 }
 
-/// The first line for which they differ, by `differs`.
+/// Returns the first line for which `differs` holds.
 template <class Differs>
 std::optional<std::string> first_difference(const Trace& accepted, const Trace& found, const Differs& differs) {
   for (std::size_t i = 0; i < std::max(accepted.lines.size(), found.lines.size()); ++i) {

@@ -15,7 +15,7 @@
 
 namespace locus::test {
 
-/// Sum of bytes that differs when one bit of them does (FNV-1a, 64 bits).
+/// Checksum of bytes (FNV-1a, 64 bits).
 class Checksum {
  public:
   void add(std::string_view bytes);
@@ -29,11 +29,12 @@ class Checksum {
   std::uint64_t sum_ = 0xcbf29ce484222325U;
 };
 
-/// Of a file, or of all files of a folder with their names. Throws std::runtime_error where one cannot be read.
+/// Returns the checksum of a file, or of all files of a folder and their names. Throws std::runtime_error if one cannot
+/// be read.
 std::string checksum_of(const std::filesystem::path& recording);
 
-/// The estimates of one drive as a text that is read in a diff: a line about once a second, of a short drive more
-/// often, and a checksum of the bits of all sweeps, which tells of what no line shows.
+/// Estimates of one drive as text for diffs: about one line per second, more for a short drive, and a checksum of the
+/// bits of all sweeps, which reveals changes that no line shows.
 struct Trace {
   /// One sweep. The numbers are those of kColumns.
   struct Line {
@@ -44,25 +45,25 @@ struct Trace {
   };
 
   std::string options;   ///< of locus-sim and locus-replay, or the name of the recording
-  std::string recording; ///< checksum of what was replayed
-  std::string estimates; ///< checksum of stamp, state, pose, twist and covariance of every sweep
+  std::string recording; ///< checksum of the replayed recording
+  std::string estimates; ///< checksum of stamp, state, pose, twist and covariance of all sweeps
   std::size_t sweeps = 0;
   std::vector<Line> lines;
 
   static Trace of(const std::string& options, const std::string& recording,
                   const std::vector<OdometryEstimate>& estimates);
-  /// Nothing for what is no trace.
+  /// Returns nothing if the text is no trace.
   static std::optional<Trace> parse(const std::string& text);
   [[nodiscard]] std::string text() const;
 };
 
-/// How far the estimates of two instruction sets may be apart, which add the same numbers in another order.
+/// Tolerance between the estimates of two instruction sets, which add the same numbers in different order.
 ///
-/// They are apart by rounding errors, and by what the odometry decides by these: one more iteration, a point in another
-/// voxel. A sensor resolves none of it: a VLP-16 tells ranges by 2 mm and azimuths by 0.01 degrees. So poses may differ
-/// by half of the one and all of the other, twists by twice that in a sweep of 50 ms, which they are differences over.
-/// Standard deviations are asked to be good to a factor of 1.4 (a normalised squared error of 3 to 12 for 6); half of
-/// that is allowed.
+/// The differences are rounding errors and the decisions that depend on them: one more iteration, a point in another
+/// voxel. They are below a sensor's resolution: a VLP-16 resolves 2 mm in range and 0.01 degrees in azimuth. Poses may
+/// therefore differ by half of the former and all of the latter; twists, being differences over a sweep of 50 ms, by
+/// twice that per 50 ms. Standard deviations must be correct to a factor of 1.4 (a NEES of 3 to 12, ideal 6); half of
+/// that is allowed here.
 struct Tolerance {
   double position_m = 1e-3;
   double rotation_rad = 1.7e-4;
@@ -71,11 +72,11 @@ struct Tolerance {
   double sigma_share = 0.2;
 };
 
-/// Nothing where `found` is what was accepted to the last bit. Else what differs, for people: the first line, the
-/// largest changes.
+/// Returns nothing if `found` equals the accepted trace to the last bit; else a readable description: the first
+/// differing line, the largest changes.
 std::optional<std::string> difference(const Trace& accepted, const Trace& found);
 
-/// Nothing where they are as close as `tolerance`, line by line, in the same states.
+/// Returns nothing if all lines agree within `tolerance` and have equal states; else a description.
 std::optional<std::string> difference_beyond(const Tolerance& tolerance, const Trace& accepted, const Trace& found);
 
 } // namespace locus::test

@@ -12,7 +12,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// A robot that drives 1 m/s along x, ten sweeps a second.
+/// A robot at 1 m/s along x, with ten sweeps per second.
 std::vector<OdometryEstimate> drive(int sweeps) {
   std::vector<OdometryEstimate> estimates;
   for (int i = 0; i < sweeps; ++i) {
@@ -85,7 +85,7 @@ TEST(Trace, AnotherRecordingIsSaidToBeOne) {
   EXPECT_NE(words->find("the recording itself is another one"), std::string::npos) << *words;
 }
 
-/// A line is changed by `change`: whether that is within the tolerance.
+/// Applies `change` to a line; returns whether the result is within the tolerance.
 template <class Change> bool is_within(const Change& change) {
   std::vector<OdometryEstimate> other = drive(45);
   change(other[30]);

@@ -10,8 +10,8 @@
 
 namespace locus::test {
 
-/// The estimate as a row of odometry.csv, and as one of odometry.tum: written here once more, so that every number of
-/// the library is held against the files of the program.
+/// Formats the estimate as a row of odometry.csv and of odometry.tum. Independent of the program's code, so that every
+/// number of the library is compared with the program's files.
 inline std::string csv_row(const liblocus::Estimate& estimate) {
   std::string row = fmt::format("{},{},{},{},{}", estimate.stamp_ns, name_of(estimate.state), estimate.prior,
                                 estimate.iterations, estimate.inliers);

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# example.sh BUILD EXAMPLES RECORDING: the example in C++ builds against the library as it is installed, by what pkg-config
-# says alone, and prints what the one in Python prints.
+# example.sh BUILD EXAMPLES RECORDING: builds the C++ example against the installed library with the flags of pkg-config
+# only; its output must equal that of the Python example.
 set -euo pipefail
 build=$1 examples=$2 recording=$3
 work=$(mktemp -d)

@@ -18,7 +18,7 @@ namespace {
 
 using liblocus::Estimate;
 
-/// An input with its arrival, to be sorted by it.
+/// An input and its arrival time, the sort key.
 struct Fed {
   Stamp arrival;
   std::function<std::vector<Estimate>(liblocus::Odometry&)> give;

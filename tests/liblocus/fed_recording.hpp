@@ -9,7 +9,7 @@
 #include "core/base/stamp.hpp"
 #include "liblocus.hpp"
 
-/// Recordings read by the readers of the project and fed to the library by hand.
+/// Reads recordings with the project's readers and feeds them to the library.
 namespace locus::test {
 
 struct FedDatagram {
@@ -22,10 +22,10 @@ struct FedDatagram {
 std::vector<FedDatagram> datagrams_of(const std::vector<std::filesystem::path>& captures);
 void write_pcap(const std::vector<FedDatagram>& datagrams, const std::filesystem::path& file);
 
-/// All that the datagrams give, to the end.
+/// Feeds all datagrams and finishes; returns the estimates.
 std::vector<liblocus::Estimate> feed(liblocus::Odometry& odometry, const std::vector<FedDatagram>& datagrams);
 
-/// The same of a capture folder with its motion, in the order of arrival; a sample before a datagram of the same time.
+/// Feeds a capture folder and its motion in order of arrival; a sample precedes a datagram of the same time.
 std::vector<liblocus::Estimate> feed(liblocus::Odometry& odometry, const std::filesystem::path& folder);
 
 } // namespace locus::test

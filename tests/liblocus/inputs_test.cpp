@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What programs may feed by mistake: an error that says what to do, or a count, and never a crash.
+// Invalid inputs: each causes a helpful error or a count, never a crash.
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -22,7 +22,7 @@ using liblocus::Odometry;
 constexpr std::int64_t kNow_ns = 1'700'000'000'000'000'000;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// Throws an error whose text has all of these parts.
+/// Expects an error whose text has all of these parts.
 void expect_error(const std::function<void()>& call, const std::vector<std::string>& parts) {
   try {
     call();
@@ -99,7 +99,7 @@ TEST(LibraryInputs, CloudsOfNothingOfNaNAndOfTooMuchAreCounted) {
   for (const std::span<const float> xyz : {std::span<const float>{}, std::span(nan), std::span(most)}) {
     ns += 100'000'000;
     for (const Estimate& estimate : odometry.cloud("front", {.stamp_ns = ns, .arrival_ns = ns + 1, .xyz_m = xyz}))
-      EXPECT_EQ(estimate.points, 0U); // a cloud without a return is one of a lidar that sees nothing
+      EXPECT_EQ(estimate.points, 0U); // an empty cloud is that of a lidar without returns
   }
   const nlohmann::json clouds = figures(odometry)["lidars"]["front"]["clouds"];
   EXPECT_EQ(clouds["received"], 3);

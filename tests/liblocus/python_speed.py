@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """python_speed.py BIN: a replay by the package locus takes at most 5 % more CPU time than one by locus-replay.
 
-Medians of pairs of runs, one after the other, for what else a machine does goes up and down. The program writes its files
-meanwhile, the package imports NumPy, which takes 0.2 s: the drive is a long one.
+Medians over consecutive pairs of runs, because other load of the machine varies. The times include the program's writing of
+its files and the package's import of NumPy, which takes 0.2 s: the drive is long enough.
 """
 import os
 import statistics
@@ -17,7 +17,7 @@ SCRIPT = "import locus, sys\nfor estimate in locus.replay(sys.argv[1]): estimate
 
 
 def cpu_s(*command: str | Path) -> float:
-    """User and system time of a program."""
+    """Returns the user and system time of a program."""
     before = os.times()
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     after = os.times()
@@ -30,7 +30,7 @@ def main() -> int:
         drive, results = Path(folder, "drive"), Path(folder, "results")
         simulate: list[str | Path] = [bin_folder / "locus-sim", "--world", "urban", "--robot", "husky", "--duration", "300", "--seed", "3"]
         cpu_s(*simulate, "-o", drive)
-        for truth in ("gt.tum", "gt_map.ply"):  # which the program alone would look at
+        for truth in ("gt.tum", "gt_map.ply"):  # only the program would read them
             (drive / truth).unlink()
         pairs = []
         for _ in range(PAIRS):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""python_test.py LOCUS_REPLAY DRIVES: the package locus says what locus-replay says, to the bit, and crashes for nothing."""
+"""python_test.py LOCUS_REPLAY DRIVES: the package locus equals locus-replay bit by bit, and no input crashes it."""
 import csv
 import gc
 import json
@@ -25,7 +25,7 @@ Row = dict[str, str]
 
 
 def datagrams(pcap: Path) -> Iterator[tuple[int, bytes, int, int]]:
-    """Arrival, payload, port and sender of the datagrams in a nanosecond pcap of Ethernet without tags."""
+    """Yields arrival, payload, port and sender of the datagrams in a nanosecond pcap of Ethernet without tags."""
     data = pcap.read_bytes()
     assert struct.unpack_from("<I", data)[0] == 0xA1B23C4D
     at = 24
@@ -40,7 +40,7 @@ def datagrams(pcap: Path) -> Iterator[tuple[int, bytes, int, int]]:
 
 
 def rows(folder: Path) -> list[tuple[list[float], Row]]:
-    """Each row of odometry.tum without its time, and of odometry.csv."""
+    """Returns the rows of odometry.tum without their times, and of odometry.csv."""
     poses = [[float(word) for word in line.split()[1:]] for line in (folder / "odometry.tum").read_text().splitlines()]
     with (folder / "odometry.csv").open() as file:
         return list(zip(poses, csv.DictReader(file), strict=True))

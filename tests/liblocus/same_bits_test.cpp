@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The library says what locus-replay says, to the bit: fed packet by packet, cloud by cloud, and by recordings.
+// The library's estimates equal locus-replay's bit by bit: fed by packets, by clouds and by recordings.
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
@@ -40,7 +40,7 @@ Replay program(const path& recording, const std::vector<std::string>& overrides 
   return Replay(arguments);
 }
 
-/// Every number of every estimate.
+/// Compares every number of every estimate.
 void expect_same(const std::vector<Estimate>& estimates, const Replay& program) {
   ASSERT_EQ(program.run().status, 0) << program.run().err;
   const std::vector<std::string> poses = lines_of(read_text(program.file("odometry.tum")));
@@ -99,7 +99,7 @@ TEST(Library, ReplaysAPartAsTheProgramDoes) {
   expect_same(estimates, Replay({"--start", "3", "--duration", "2", room_drive()}));
 }
 
-/// Arrays of a cloud, kept.
+/// Owns the arrays of a cloud.
 struct Arrays {
   std::vector<float> xyz_m, intensity;
   std::vector<double> time_s;
@@ -116,9 +116,9 @@ struct Arrays {
   }
 };
 
-/// The clouds of the drive around the room, from where the robot drives on.
+/// Returns the clouds of the drive around the room without the initial standstill.
 std::vector<OwnCloud> room_clouds() {
-  constexpr std::size_t kStands = 35 * 76; // packets, of the first three seconds
+  constexpr std::size_t kStands = 35 * 76; // packets of the first three seconds
   std::vector<OwnCloud> clouds;
   for (const CloudTurn& turn : turns_of(room_drive() / "lidar.pcap", kStands))
     clouds.push_back(cloud_of(turn, CloudKind::velodyne_start));
@@ -147,7 +147,7 @@ TEST(Library, FedCloudByCloudItSaysWhatTheProgramSays) {
   expect_same(estimates, program(folder.path(), kNoSources));
 }
 
-/// Datagrams of the drive around the room, changed, given to both.
+/// Feeds modified datagrams of the drive around the room to both.
 void expect_same_of(const std::function<void(std::vector<FedDatagram>&)>& change) {
   std::vector<FedDatagram> datagrams = datagrams_of({room_drive() / "lidar.pcap"});
   change(datagrams);
@@ -183,7 +183,7 @@ TEST(Library, SoIsAClockThatIsSet) {
     expect_same_of([&](std::vector<FedDatagram>& datagrams) { datagrams = room_with_clock_set_by(step); });
 }
 
-/// A capture begins with its first datagram, and the program leaves out what is older; a library has no such beginning.
+/// The program skips datagrams older than a capture's first; the library has no such start time.
 TEST(Library, GoesOnWhenTheClockIsSetToBeforeItsFirstInput) {
   liblocus::Odometry sound({}, kNoSources), set_back({}, kNoSources);
   const std::size_t sweeps = feed(sound, room_with_clock_set_by({})).size();

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# arm64.sh SOURCE BIN SUITE: the packages of the release SUITE for arm64 are built on another processor, and what is in them
-# runs: under QEMU a drive is replayed as the programs of BIN replay it here.
+# arm64.sh SOURCE BIN SUITE: cross-builds the packages of the release SUITE for arm64 and runs their programs under
+# QEMU; a replay must agree with that of the programs of BIN.
 set -euo pipefail
 here=$(dirname "$(realpath "$0")")
 source=$(realpath "$1") bin=$(realpath "$2") suite=$3
@@ -29,9 +29,9 @@ for program in "$work"/root/usr/bin/*; do
   in_tree "$program" --version
 done
 
-# One processor gives the same bits for every number of threads. Two do not: arm64 rounds a product and its sum once, its
-# mathematical functions end in other bits, and then a point falls on the other side of a limit. That comes to tenths of a
-# millimetre; a mistake would be more than 3 mm or 1 mrad.
+# Results are bit-identical for any number of threads on one architecture, but not across architectures: arm64 uses
+# fused multiply-add and other implementations of mathematical functions, so that a point may fall on the other side of
+# a threshold. The differences are tenths of a millimetre; a real error would exceed 3 mm or 1 mrad.
 "$bin/locus-sim" --world urban --robot husky --seed 1 --duration 10 --realism clean -o "$work/drive" >/dev/null 2>&1
 "$bin/locus-replay" --quiet -o "$work/here" "$work/drive"
 for threads in 1 2; do

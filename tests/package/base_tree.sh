@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-# To be sourced. Says why a Debian system cannot be booted here, or makes one to boot.
+# To be sourced. Creates a bootable Debian system, or explains why that is impossible here.
 
-# skip WHY: ctest shows the test as skipped.
+# skip WHY: ctest reports the test as skipped.
 skip() {
   echo "SKIPPED: $*" >&2
   exit 77
 }
 
-# Whether all that the tests need can be had; what a machine may forbid is tried, not guessed.
+# Checks the prerequisites of the tests by trying them, because a machine may forbid some.
 probe() {
   [ "$(id -u)" -eq 0 ] || skip "only root can boot a Debian system in a container"
   for program in systemd-nspawn mmdebstrap ip; do
@@ -23,20 +23,20 @@ probe() {
   unshare --net ip link add locus-probe type veth || skip "there are no network namespaces with veth"
 }
 
-# suite_of FOLDER: the release of Debian that the packages there are for.
+# suite_of FOLDER: prints the Debian release of the packages there.
 suite_of() { sed -n 's/^Distribution: //p' "$1"/*.changes; }
 
-# depends_of DEB...: names of the packages that these ask for, a line each, but for those that they are themselves.
+# depends_of DEB...: prints the dependencies of these packages, one per line, except the packages themselves.
 depends_of() {
   for deb in "$@"; do
     dpkg-deb -f "$deb" Pre-Depends Depends | sed 's/^[^:]*: //; s/ *([^)]*)//g; s/:any//g; s/ *|[^,]*//g'
   done | tr ', ' '\n\n' | grep -vxE 'liblocus0|liblocus-dev|python3-locus|' | sort -u
 }
-# library_depends FOLDER: what the packages of the library there, and of Python, depend on.
+# library_depends FOLDER: prints the dependencies of the library and Python packages there.
 library_depends() { depends_of "$1"/{liblocus0,liblocus-dev,python3-locus}_*.deb; }
 
-# base_tree FOLDER [PACKAGE...]: the path of a bootable Debian, of their release, with what the packages in FOLDER depend
-# on, ss for the test, and PACKAGE. Made once for each such list of packages.
+# base_tree FOLDER [PACKAGE...]: prints the path of a bootable Debian of the packages' release, with the dependencies of
+# the packages in FOLDER, ss for the test, and PACKAGE. Created once per list of packages.
 base_tree() {
   local cache=${XDG_CACHE_HOME:-/var/cache}/locusd-tests suite packages tree
   suite=$(suite_of "$1")

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# completion.sh BIN COMPLETION: what bash offers for the programs of BIN.
+# completion.sh BIN COMPLETION: tests bash completion for the programs of BIN.
 set -euo pipefail
 export PATH=$1:$PATH
 set +u
@@ -8,7 +8,7 @@ source /usr/share/bash-completion/bash_completion
 source "$2"
 status=0
 
-# offered WORD...: what may stand for the last word.
+# offered WORD...: prints the completions of the last word.
 offered() {
   COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)) COMP_LINE="$*" COMPREPLY=()
   COMP_POINT=${#COMP_LINE}

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# container.sh SOURCE BIN: the image of packaging/Containerfile is built, and locusd runs in it as documented: neither root nor
-# with a capability, without systemd. It hears a lidar, is heard by ROS 2 and goes on where it was when the container is made
-# anew. The debian:trixie-slim that it is made from is one of mmdebstrap; no registry is asked.
+# container.sh SOURCE BIN: builds the image of packaging/Containerfile and runs locusd in it as documented: neither as
+# root nor with a capability, without systemd. It receives a lidar, is received by ROS 2, and resumes when the container
+# is recreated. Its base debian:trixie-slim is made by mmdebstrap; no registry is contacted.
 set -euo pipefail
 here=$(dirname "$(realpath "$0")")
 source=$(realpath "$1") bin=$(realpath "$2")
@@ -12,7 +12,7 @@ for program in podman crun; do
   command -v $program >/dev/null || skip "there is no $program; install podman and crun"
 done
 
-# Engines know cgroups of version 2 alone; a mount namespace without those of version 1 does for a test.
+# Container engines support cgroup v2 only; a mount namespace without cgroup v1 suffices for a test.
 [ -n "${LOCUSD_UNSHARED:-}" ] || LOCUSD_UNSHARED=1 exec unshare --mount "$0" "$@"
 if [ "$(stat --file-system --format=%T /sys/fs/cgroup)" != cgroup2fs ]; then
   umount --recursive /sys/fs/cgroup && mount -t cgroup2 none /sys/fs/cgroup || skip "there are no cgroups of version 2"
@@ -45,7 +45,7 @@ engine run --rm --pull=never --cgroups=disabled --network=host --ulimit nofile=1
   >"$work/said" 2>&1 || { tail -n 3 "$work/said"; skip "containers cannot be run here, see above"; }
 
 step() { echo "-- $*"; }
-# wait_for SECONDS COMMAND...: until it succeeds
+# wait_for SECONDS COMMAND...: waits until it succeeds.
 wait_for() {
   local end=$((SECONDS + $1))
   shift
@@ -94,11 +94,11 @@ host "$bin/locus-play" --quiet --to 127.0.0.1 --interface lo --domain 7 "$work/d
 wait_for 20 status_is "tracking|standstill"
 wait_for 20 grep -m 1 "^odometry" "$work/heard"
 engine exec locusd locusctl status
-engine exec locusd locusctl save-map /tmp/map.pcd # it may be commanded
+engine exec locusd locusctl save-map /tmp/map.pcd # the user in the container may send commands
 engine exec locusd locusctl record --keep 10s | grep "^/var/lib/locusd/incidents/"
 
 step "a container that is made anew goes on where the robot is"
-sleep 5 # what it sees is saved meanwhile
+sleep 5 # time to save its state
 engine stop --time 10 locusd >/dev/null
 [ "$(engine inspect --format '{{.State.ExitCode}}' locusd)" = 0 ]
 engine rm locusd >/dev/null

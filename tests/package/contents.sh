@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# contents.sh SOURCE FOLDER: the packages there have the version of the sources and of their release of Debian, ask for
-# little, and know nothing of the folder that they were built in.
+# contents.sh SOURCE FOLDER: the packages have the version of the sources and of their Debian release, few dependencies,
+# and no trace of their build folder.
 set -euo pipefail
 source=$1 folder=$2
 status=0

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# library.sh SOURCE BIN FOLDER: with liblocus-dev of FOLDER the example in C++ compiles in a Debian of its own, with
-# python3-locus that in Python runs there, and both print what the other prints: what the programs of BIN find here.
+# library.sh SOURCE BIN FOLDER: compiles the C++ example with liblocus-dev of FOLDER and runs the Python one with
+# python3-locus in a separate Debian; both must print the results of the programs of BIN here.
 set -euo pipefail
 here=$(dirname "$(realpath "$0")")
 source=$(realpath "$1") bin=$(realpath "$2") folder=$(realpath "$3")

@@ -1,7 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# lintian.sh FOLDER: Debian's own checks, those of the release that the packages there are for, find nothing in them, not
-# even to remark.
+# lintian.sh FOLDER: lintian of the packages' Debian release reports nothing, not even remarks.
 set -euo pipefail
 here=$(dirname "$(realpath "$0")")
 source "$here/base_tree.sh"

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# manual.sh BIN PAGE...: the pages name the options and commands that the programs of BIN name in --help, no more and no
-# fewer; that of the configuration is one, with every key at its default. None makes groff complain.
+# manual.sh BIN PAGE...: the manual pages list exactly the options and commands of --help of the programs of BIN; that
+# of the configuration is valid and has every key with its default. groff reports no error.
 set -euo pipefail
 bin=$1
 shift

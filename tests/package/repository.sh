@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# repository.sh SOURCE FOLDER: from a repository with the packages of FOLDER a robot installs locusd by apt, and takes a newer
-# version by unattended-upgrades as documented; what somebody else signed or changed is refused.
+# repository.sh SOURCE FOLDER: a robot installs locusd by apt from a repository with the packages of FOLDER, and
+# upgrades by unattended-upgrades as documented; packages with another signature or modified content are rejected.
 set -euo pipefail
 here=$(dirname "$(realpath "$0")")
 source=$(realpath "$1") folder=$(realpath "$2")
@@ -39,7 +39,7 @@ refused() { # WHY COMMAND...
   grep -E "$why" "$work/said" || { cat "$work/said"; echo "refused, but not for: $why"; exit 1; }
 }
 is_version() { [ "$(on_robot dpkg-query -W -f '${Version}' locusd)" = "$1" ]; }
-newer() { # VERSION: a package of it, with another configuration, its path
+newer() { # VERSION: prints the path of a package of it, with another configuration
   dpkg-deb -R "$folder"/locusd_*.deb "$work/$1"
   echo "# of $1" >>"$work/$1/etc/locusd/locusd.yaml"
   sed -i "s/^Version: .*/Version: $1/" "$work/$1/DEBIAN/control"

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# reproducible.sh SOURCE FOLDER: the packages built again, in another folder, are the same to the byte. The compiler's
-# cache may help: that objects do not hold the folder's name or the hour is what contents.sh and -Wdate-time see to.
+# reproducible.sh SOURCE FOLDER: a rebuild of the packages in another folder is identical to the byte. The compiler's
+# cache may be used: contents.sh and -Wdate-time ensure that objects contain neither the folder's name nor the time.
 set -euo pipefail
 work=$(mktemp -d)
 trap 'rm -r "$work"' EXIT

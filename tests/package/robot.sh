@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# robot.sh BIN FOLDER: the package locusd of FOLDER on a robot: a Debian system of its own, booted, with a lidar wire and
-# an uplink. This side is the rest of the world: it sends what the robot's sensors say and listens to what it publishes.
-# What happens on the robot stands in robot_inside.sh.
+# robot.sh BIN FOLDER: tests the package locusd of FOLDER on a robot: a separate, booted Debian system with a lidar
+# network and an uplink. This script is the rest of the world: it sends the data of the robot's sensors and receives its
+# output. robot_inside.sh runs on the robot.
 set -euo pipefail
 here=$(dirname "$(realpath "$0")")
 bin=$(realpath "$1") folder=$(realpath "$2")
@@ -10,7 +10,7 @@ source "$here/base_tree.sh"
 probe
 base=$(base_tree "$folder")
 
-renice -n -15 -p $$ >/dev/null || true # what is late is to be its own fault, not that of other programs here
+renice -n -15 -p $$ >/dev/null || true # prevents delays by other programs here
 
 work=$(mktemp -d -t locusd-robot.XXXXXX)
 net=locusd-$$
@@ -26,7 +26,7 @@ clean_up() {
 }
 trap clean_up EXIT
 
-# Two wires, as robots have them: lidars on one, ROS 2 on the other.
+# Two networks, as on real robots: one for lidars, one for ROS 2.
 ip netns add "$net-robot"
 ip netns add "$net-world"
 world() { ip netns exec "$net-world" "$@"; }
@@ -43,10 +43,10 @@ robot ip link set lo up
 wire lidar0 192.168.1.201/24 192.168.1.100/24
 wire uplink0 10.7.0.2/24 10.7.0.1/24
 
-# The robot stands, drives until 30 s have passed, then stands, and its wheels spin.
+# The robot stands, drives until 30 s have passed, then stands while its wheels spin.
 "$bin/locus-sim" --world tunnel --robot husky --seed 1 --duration 120 --halts 0.5 --slip 30-120 --realism clean -o "$work/drive" >/dev/null 2>&1
 
-# The package, one that was before it, and the script for the inside lie where both sides see them.
+# The package, an older one, and the script for the robot are in a folder visible to both sides.
 exchange=$work/exchange
 mkdir -p "$exchange" "$work"/{upper,overlay,root}
 cp "$here/robot_inside.sh" "$bin/hang_thread" "$folder"/locusd_*.deb "$exchange"
@@ -88,8 +88,8 @@ wait "$robot_process" || status=$?
 cat "$exchange/log" 2>/dev/null || cat "$work/console"
 [ $status -eq 0 ] || { echo "robot_inside.sh ended with $status"; tail "$work/played" "$work/heard"; exit 1; }
 
-# Outside, the drive was heard as it was, also through the upgrade in the middle of it: where the robot stood after 35 s, to
-# 10 cm of the way from its start. For the upgrade the odometry was missing for 1.5 s at most.
+# The output received outside is correct, also through the upgrade in mid-drive: the final position after 35 s is within
+# 10 cm relative to the start, and the upgrade interrupts the odometry for 1.5 s at most.
 awk '
   function way(x, y, z) { return sqrt(x * x + y * y + z * z) }
   FILENAME ~ /upgrade/ { upgrade[FNR] = $1; next }

@@ -1,13 +1,13 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
-# What robot.sh does on the robot: a Debian system that has just been booted, with systemd.
+# Robot side of robot.sh: runs on a freshly booted Debian system with systemd.
 set -Eeuo pipefail
 trap 'echo "FAILED in line $LINENO: $BASH_COMMAND"; systemctl status --no-pager locusd; journalctl --no-pager -u locusd | tail -n 40' ERR
 cd /exchange
 export DEBIAN_FRONTEND=noninteractive
 
 step() { echo "-- $*"; }
-# wait_for SECONDS COMMAND...: until it succeeds
+# wait_for SECONDS COMMAND...: waits until it succeeds.
 wait_for() {
   local end=$((SECONDS + $1))
   shift
@@ -22,7 +22,7 @@ status_is() { locusctl status --json | grep -E "^ \"state\": \"($1)\"" >/dev/nul
 tracks() { status_is "tracking|standstill"; }
 alive() { is active ActiveState && ! is "$1" MainPID; }
 says() { journalctl --no-pager -u locusd --since "$1" | grep "$2" >/dev/null; }
-# goes_on SINCE: where it was, and tracks again.
+# goes_on SINCE: waits until it has resumed from the saved state and tracks again.
 goes_on() {
   wait_for 20 says "$1" "resumed where the service ended"
   wait_for 20 tracks
@@ -57,7 +57,7 @@ for field in LOCUS_LIDAR LOCUS_SOURCE; do
 done
 
 step "a buffer that is smaller than asked for is said, with the setting"
-buffer_is() { # at least so many bytes; the kernel holds twice what it gives
+buffer_is() { # at least this many bytes; the kernel reports twice the requested size
   [ "$(ss --udp --listening --numeric --memory --no-header 'sport = :2368' | grep -oP '\brb\K\d+')" -ge $(($1 * 2)) ]
 }
 buffer_is $((8 << 20)) || says -10min "sysctl net.core.rmem_max=$((8 << 20))"
@@ -78,11 +78,11 @@ wait_for 10 alive "$process"
 [ "$(dpkg-query -W -f '${Version}' locusd)" != 0.0.1 ]
 goes_on "$since"
 locusctl status --json | grep '^ "beginning": "map"' >/dev/null
-status_is tracking # and not yet where it stands
+status_is tracking # not yet at its final position
 
 step "it stands where it went, and its wheels spin"
 spins() { status_is standstill && locusctl status | grep -E "^wio +lost" >/dev/null; }
-wait_for 30 spins # what begins to spin while nobody looks is believed
+wait_for 30 spins # wheels that begin to spin without lidar are trusted
 locusctl status
 locusctl save-map /tmp/map.pcd
 [ -s /tmp/map.pcd ]
@@ -94,7 +94,7 @@ compgen -G "/var/lib/locusd/record/000001_*/000001/lidar.pcap" >/dev/null
 
 step "the unit lets it keep an incident, and tell metrics"
 keeps() { incident=$(locusctl record --keep 10s); }
-wait_for 10 keeps # one by itself may be on its way
+wait_for 10 keeps # an automatic one may be in progress
 [ -s "$incident/why.json" ] && [ "$(dirname "$incident")" = /var/lib/locusd/incidents ]
 exec 3<>/dev/tcp/127.0.0.1/9464
 printf 'GET /metrics HTTP/1.1\r\n\r\n' >&3
@@ -108,7 +108,7 @@ process=$(systemctl show -P MainPID locusd)
 wait_for 20 says "$since" "Watchdog timeout"
 wait_for 10 alive "$process"
 goes_on "$since"
-is_noticed() { # unless another one was kept a moment before
+is_noticed() { # unless another one was recorded just before
   compgen -G "/var/lib/locusd/incidents/*_restart/why.json" >/dev/null ||
     locusctl status --json | grep -E '"suppressed": [1-9]' >/dev/null
 }

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# same_bits.sh BIN FOLDER: the programs of FOLDER, in a Debian of their own release, replay a drive as those of BIN do here:
-# another compiler and other libraries give the same poses and the same map, to the bit.
+# same_bits.sh BIN FOLDER: replays a drive with the programs of FOLDER, in a Debian of their own release, and with those
+# of BIN here: different compilers and libraries must give the same poses and map, to the bit.
 set -euo pipefail
 here=$(dirname "$(realpath "$0")")
 bin=$(realpath "$1") folder=$(realpath "$2")

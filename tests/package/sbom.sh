@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# sbom.sh FOLDER: each package there says what it consists of: every library that its programs need, in the version that
-# is asked for at installation or a newer one, and what was compiled in.
+# sbom.sh FOLDER: the software bill of materials of each package is complete: every library that its programs need, in
+# the required version or a newer one, and everything compiled in.
 set -euo pipefail
 folder=$1
 work=$(mktemp -d)

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# units.sh SOURCE BUILD: systemd finds nothing to say about the units, the drop-in included, and the sandbox is tight.
+# units.sh SOURCE BUILD: systemd-analyze reports nothing about the units, including the drop-in, and the sandbox is
+# strict.
 set -euo pipefail
 source=$1/systemd build=$2
 work=$(mktemp -d)
@@ -27,7 +28,7 @@ mkdir "$work/locusd.service.d"
 cp "$source/realtime.conf" "$work/locusd.service.d"
 verify
 
-# The kernel allows what the sockets ask for.
+# The kernel limit permits the buffer size that the sockets request.
 asked=$(sed -n 's/.*kWantedBufferBytes = \(.*\);.*/\1/p' "$1/drivers/net/udp_socket.hpp")
 grep -q "^net.core.rmem_max = $((asked))$" "$source/sysctl.conf" ||
   { echo "systemd/sysctl.conf: rmem_max is not kWantedBufferBytes = $asked"; status=1; }

@@ -15,13 +15,12 @@
 
 namespace locus::performance {
 
-/// What reached the computer of a robot, held in memory to be played again and again without the cost of making or
-/// reading it.
+/// Inputs of a robot's computer in memory, replayed repeatedly without the cost of simulating or reading them.
 class Capture {
  public:
-  /// Of lidar alone.
+  /// Lidar only.
   Capture(std::string name, test::Recording recording);
-  /// All that the robot sees on its drive.
+  /// All inputs of the simulated drive.
   Capture(std::string name, SimulatedRobot& robot);
 
   [[nodiscard]] const std::string& name() const { return name_; }
@@ -37,17 +36,17 @@ class Capture {
   std::string name_;
   Config config_;
   std::optional<test::Recording> recording_;
-  std::deque<std::vector<std::byte>> payloads_; ///< never moves what it holds
+  std::deque<std::vector<std::byte>> payloads_; ///< a deque: addresses stay valid
   std::vector<daemon::Input> inputs_;
 };
 
-/// Plays a capture through a pipeline. One owner.
+/// Plays a capture through a pipeline. Not thread-safe.
 class Playback {
  public:
-  /// The capture must outlive it.
+  /// `capture` must outlive this.
   Playback(const Capture& capture, const Config& config) : inputs_(capture.inputs()), pipeline_(config) {}
 
-  /// Plays until a sweep has been processed, valid until the next call; nullptr at the end of the capture.
+  /// Plays until a sweep is processed and returns it, valid until the next call; nullptr at the end of the capture.
   const daemon::ProcessedSweep* next() {
     while (played_ < inputs_.size())
       if (const daemon::ProcessedSweep* sweep = pipeline_.take(inputs_[played_++]))

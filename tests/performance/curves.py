@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Line charts as SVG: what docs/performance.md shows of how cost grows."""
+"""Line charts as SVG for the scaling section of docs/performance.md."""
 
 import math
 from xml.sax.saxutils import escape
 
 WIDTH, HEIGHT = 720, 400
 LEFT, RIGHT, BOTTOM = 70, 26, 56
-LEGEND_ROW, LETTER = 22, 7.5  # heights and widths of the writing
-COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"]  # told apart by all eyes (Okabe, Ito)
+LEGEND_ROW, LETTER = 22, 7.5  # heights and widths of the text
+COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"]  # colour-blind safe (Okabe, Ito)
 
 
 class Axis:
-    """From figures to places between two edges of the chart, with ticks at round figures."""
+    """Maps values to positions between two edges of the chart, with ticks at round numbers."""
 
     def __init__(self, values, log, edges):
         self.log, self.edges = log, edges
@@ -44,7 +44,7 @@ class Axis:
 
 
 def label(value):
-    """A round figure without needless noughts, thousands apart."""
+    """Formats a round number without trailing zeros, with k or M for large ones."""
     if value >= 1e6:
         return f"{value / 1e6:g} M"
     if value >= 1e4:
@@ -71,7 +71,7 @@ def grid(x_axis, y_axis):
 
 
 def legend(names):
-    """Rows above the chart, each as full as the names allow; and where they end."""
+    """Returns the legend above the chart, wrapped into rows, and the y coordinate of its end."""
     parts, x, y = [], LEFT, LEGEND_ROW
     for colour, name in zip(COLOURS, names):
         width = 28 + LETTER * len(name)
@@ -84,7 +84,7 @@ def legend(names):
 
 
 def chart(series, x_label, y_label, log_x=False, log_y=False):
-    """SVG of lines by name, each a list of (x, y). Linear axes begin at nought."""
+    """Returns an SVG of lines by name, each a list of (x, y). Linear axes start at zero."""
     points = [point for line in series.values() for point in line]
     x_axis = Axis([x for x, _ in points], log_x, (LEFT, WIDTH - RIGHT))
     names, top = legend(series)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a return costs to decode, beside copying its bytes.
+// Cost of decoding a return, compared with copying its bytes.
 #include <array>
 #include <cstdint>
 #include <cstring>
@@ -17,7 +17,7 @@ namespace locus::performance {
 
 namespace {
 
-/// A packet of a full scene, three quarters of the firings with a return.
+/// A packet of a dense scene: three quarters of the firings have a return.
 test::VelodyneTestPacket full_packet(velodyne::Model model, velodyne::ReturnMode mode) {
   test::VelodyneTestPacket bytes{model, mode, 1'000'000, 100};
   std::uint32_t random = 1;
@@ -38,7 +38,7 @@ std::size_t returns_of(const LidarPacket& packet) {
   return returns;
 }
 
-/// Seconds per return as a counter, and how many such lidars one core decodes.
+/// Reports seconds per return, and the number of such lidars that one core decodes.
 void report(benchmark::State& state, std::size_t returns, Duration packet_duration) {
   state.counters["s_per_return"] = benchmark::Counter(
       static_cast<double>(returns), benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
@@ -72,7 +72,7 @@ void copy(benchmark::State& state, velodyne::Model model, velodyne::ReturnMode m
   report(state, returns_of(packet), velodyne::packet_duration(model, mode));
 }
 
-/// A packet of a full scene, three quarters of the pixels with a return.
+/// A packet of a dense scene: three quarters of the pixels have a return.
 test::OusterTestPacket full_packet(const ouster::Metadata& metadata) {
   test::OusterTestPacket bytes{metadata};
   std::uint32_t random = 1;
@@ -101,8 +101,8 @@ void decode_ouster(benchmark::State& state, const ouster::Metadata& metadata) {
   report(state, returns_of(packet), packet.duration);
 }
 
-/// A packet of a full scene, three quarters of the firings with a return. Of a QT128, a quarter of the channels does
-/// not fire in a column.
+/// A packet of a dense scene: three quarters of the firings have a return. A quarter of a QT128's channels does not
+/// fire in a column.
 test::HesaiTestPacket full_packet(hesai::Model model, std::uint8_t mode) {
   test::HesaiTestPacket bytes{model, mode};
   std::uint32_t random = 1;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What measure.py found, by name: the medians of the benchmarks, the drives, the machine."""
+"""Results of measure.py by name: medians of the benchmarks, drives, machine."""
 
 UNITS_MS = {"ns": 1e-6, "us": 1e-3, "ms": 1.0, "s": 1e3}
 CAPTURES = {
@@ -42,7 +42,7 @@ class Figures:
         return self.runs[name][which] * UNITS_MS[self.runs[name]["time_unit"]]
 
     def named(self, first):
-        """The rest of the names that begin so, in the order of their figures."""
+        """Returns the names that begin with `first`, without it, in numerical order."""
         rests = [name.removeprefix(first + "/").split("/") for name in self.runs if name.startswith(first + "/")]
         return sorted(rests, key=lambda rest: [(int(word), "") if word.isdigit() else (0, word) for word in rest])
 
@@ -50,7 +50,7 @@ class Figures:
         return [name for name in CAPTURES if self.has(f"pipeline/{name}/lidar")]
 
     def line(self, first, key, figure):
-        """(x, y) for each benchmark first/X/..., `key` picks X from the rest of its name or passes it by with None."""
+        """Returns (x, y) of each benchmark first/X/...; `key` extracts X from the rest of its name, None to skip it."""
         line = []
         for rest in self.named(first):
             x = key(rest)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What no way of doing a stage can be cheaper than: its bytes are touched once; each point of a registration is looked
-// up once and summed up.
+// Lower bounds of the cost of each stage: touches each byte once; looks up each point of a registration once and
+// accumulates it.
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -54,7 +54,7 @@ void touch_points(benchmark::State& state, const SweepPoints& sweeps) {
   }
 }
 
-/// Points in arrays of one figure each, so that loops over them are vector instructions.
+/// Points as structure of arrays, so that loops over them are vectorised.
 constexpr std::size_t kBlock = 256;
 template <class T> using PerPoint = std::array<T, kBlock>;
 struct Block {
@@ -64,21 +64,21 @@ struct Cells {
   PerPoint<std::int32_t> x, y, z;
 };
 struct Planes {
-  PerPoint<float> nx, ny, nz, offset; ///< normal zero: none
+  PerPoint<float> nx, ny, nz, offset; ///< zero normal: no plane
 };
 
-/// Upper half of the 6x6 normal equations of point to plane, their right side and the squared error.
+/// Upper half of the 6x6 normal equations of point-to-plane, their right side and the squared error.
 constexpr std::size_t kSums = 21 + 6 + 1;
 constexpr std::size_t kLanes = 16;
 using Sums = std::array<std::array<float, kLanes>, kSums>;
 
-/// The registered points, from the map's origin.
+/// Transformed points, relative to the map's origin.
 struct Placed {
   Block points;
   Cells cells;
 };
 
-/// Moves the points and tells the voxel around each.
+/// Transforms the points and computes the voxel of each.
 [[gnu::always_inline]] inline Placed place(const Eigen::Matrix3f& R, const Eigen::Vector3f& t, float per_m,
                                            const Block& points) {
   const auto cell = [](float voxels) {
@@ -87,7 +87,7 @@ struct Placed {
   };
   const float r00 = R(0, 0), r01 = R(0, 1), r02 = R(0, 2), r10 = R(1, 0), r11 = R(1, 1), r12 = R(1, 2), r20 = R(2, 0),
               r21 = R(2, 1), r22 = R(2, 2), tx = t.x(), ty = t.y(), tz = t.z();
-  const Block p = points; // of its own: the compiler must know that nothing is written to it
+  const Block p = points; // a local copy rules out aliasing
   Placed placed;
   for (std::size_t i = 0; i < kBlock; ++i) {
     const float x = r00 * p.x[i] + r01 * p.y[i] + r02 * p.z[i] + tx;
@@ -147,7 +147,7 @@ void look_up(const SurfaceGrid& grid, const Cells& cells, Planes& planes) {
   total = sums;
 }
 
-/// The registered points of the last sweep of a capture, and the map that they were registered with.
+/// The registered points of the last sweep of a capture, and their registration target.
 class LastSweep {
  public:
   explicit LastSweep(const Capture& capture) : playback_(capture, capture.config()) {
@@ -164,7 +164,7 @@ class LastSweep {
     }
   }
 
-  /// Every point looked up in the fine grid and summed up.
+  /// Looks up every point in the fine grid and accumulates it.
   [[nodiscard]] Sums pass(Isa isa) const {
     const SurfaceGrid& grid = playback_.pipeline().odometry().map().fine();
     const Eigen::Matrix3f R = T_map_base_.R().cast<float>();

@@ -5,7 +5,7 @@
 
 namespace locus::performance {
 
-/// Memory that the process has allocated, in MB. Any thread.
+/// Returns the memory allocated by the process in MB. Any thread.
 inline double held_mb() {
   const struct mallinfo2 held = mallinfo2();
   return 1e-6 * static_cast<double>(held.uordblks + held.hblkhd);

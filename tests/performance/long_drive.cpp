@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// long_drive SECONDS: the husky of locus-sim drives about the plant for so long, and is simulated as it goes. Prints,
-// as JSON, what each sixtieth of it cost: CPU from the cut of a sweep to its estimate, and the memory that is held. The
-// last ten also for a second robot of locus's, which knows nothing of what was before.
+// long_drive SECONDS: simulates a drive of this length of the husky of locus-sim about the plant. Prints as JSON the
+// cost of each sixtieth: CPU time from the cut of a sweep to its estimate, and the memory allocated. The last ten are
+// also measured with a second pipeline that starts fresh.
 #include <algorithm>
 #include <cstdlib>
 #include <optional>
@@ -23,7 +23,7 @@ constexpr int kParts = 60;
 constexpr int kFreshParts = 10;
 constexpr int kLeast_s = 12; ///< two sweeps in each part
 
-/// CPU from the cut, of the sweeps since it was asked last.
+/// CPU time from the cut, for the sweeps since the previous call.
 class Costs {
  public:
   void take(const daemon::ProcessedSweep& sweep) { ms_.push_back(1e3 * to_seconds(sweep.took.cpu)); }
@@ -42,7 +42,7 @@ class Costs {
   std::vector<double> ms_;
 };
 
-/// Two pipelines on one drive: one sees all of it, the other only its end.
+/// Two pipelines on one drive: one processes all of it, the other only its end.
 class Comparison {
  public:
   Comparison(const Config& config, Stamp start, Duration duration)
@@ -68,7 +68,7 @@ class Comparison {
   void take(const daemon::ProcessedSweep& sweep) {
     if (sweep.estimate.stamp - start_ > (printed_ + 1) * part_)
       print_part();
-    if (!fresh_) // its memory is not of the long drive
+    if (!fresh_) // the fresh pipeline's memory does not count
       held_mb_ = performance::held_mb() - before_mb_;
     if (!fresh_ && printed_ == kParts - kFreshParts)
       fresh_.emplace(config_);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// locus_benchmark [--smoke] [Google Benchmark's options]: what locus costs, whole and in parts, beside PCL, beside the
-// floor and as it grows. One thread where not said otherwise; CPU time, medians of repetitions in random order.
-// tests/performance/measure.py runs it and makes docs/performance.md of what it says.
+// locus_benchmark [--smoke] [Google Benchmark's options]: cost of locus, whole and in parts, compared with PCL and with
+// lower bounds, and its scaling. One thread unless stated otherwise; CPU time, medians of repetitions in random order.
+// tests/performance/measure.py runs it and writes docs/performance.md.
 #include <map>
 #include <memory>
 #include <optional>
@@ -20,7 +20,7 @@ namespace {
 using namespace locus;
 using namespace locus::performance;
 
-/// Shows one line for each benchmark, and remembers its median.
+/// Prints one line per benchmark, and stores its median.
 class Medians : public benchmark::BenchmarkReporter {
  public:
   bool ReportContext(const Context&) override { return true; }
@@ -36,12 +36,12 @@ class Medians : public benchmark::BenchmarkReporter {
     }
   }
 
-  /// Of a benchmark that counts in milliseconds.
+  /// Median of a benchmark in milliseconds.
   [[nodiscard]] std::optional<double> cpu_ms(const std::string& name) const {
     const auto found = medians_.find(name);
     return found == medians_.end() ? std::nullopt : std::optional{found->second.GetAdjustedCPUTime()};
   }
-  /// Of its stages, all together.
+  /// Sum of its stages.
   [[nodiscard]] std::optional<double> stages_ms(const std::string& name, const std::vector<std::string>& stages) const {
     const auto found = medians_.find(name);
     if (found == medians_.end())
@@ -56,7 +56,7 @@ class Medians : public benchmark::BenchmarkReporter {
   std::map<std::string, Run> medians_;
 };
 
-/// Places that differ, each with and without motion sources, and the real captures if they are there.
+/// Different environments, each with and without motion sources, and the real captures if available.
 std::vector<std::unique_ptr<const Capture>> make_captures(const Effort& effort) {
   std::vector<std::unique_ptr<const Capture>> all;
   const auto drive = [&](const std::string& name, sim::WorldMaker world) {
@@ -94,7 +94,7 @@ void print_ratios(const std::vector<std::unique_ptr<const Capture>>& captures, c
   }
 }
 
-/// Whether the option was there; takes it out.
+/// Removes the option; returns whether it was present.
 bool take_option(std::vector<char*>& arguments, std::string_view option) {
   return std::erase_if(arguments, [&](const char* argument) { return argument == option; }) > 0;
 }
@@ -104,7 +104,7 @@ bool take_option(std::vector<char*>& arguments, std::string_view option) {
 int main(int argc, char** argv) {
   std::vector<char*> arguments(argv, argv + argc);
   const Effort effort{take_option(arguments, "--smoke")};
-  std::string interleaved = "--benchmark_enable_random_interleaving=true"; // a busy minute then spoils no one median
+  std::string interleaved = "--benchmark_enable_random_interleaving=true"; // spreads temporary load over all medians
   arguments.insert(arguments.begin() + 1, interleaved.data());
   auto count = static_cast<int>(arguments.size());
   benchmark::Initialize(&count, arguments.data());

@@ -14,14 +14,14 @@ import tempfile
 import time
 from pathlib import Path
 
-sys.dont_write_bytecode = True  # nothing but the page is written beside the sources
+sys.dont_write_bytecode = True  # writes only the page beside the sources
 import page
 
 WORLDS = ["urban", "tunnel", "field", "stairs", "corridor"]
 
 
 class Machine:
-    """What the page says of the machine, and how busy others kept it."""
+    """Description of the machine for the page, and its other load during the run."""
 
     def __init__(self):
         self.load = os.getloadavg()[0]
@@ -51,7 +51,7 @@ def run(*command, **more):
 
 
 def cpu_s(*command):
-    """CPU time of a command, with what it waited for."""
+    """Runs a command; returns its CPU time, including its children."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     run(*command)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -59,7 +59,7 @@ def cpu_s(*command):
 
 
 def drive(binaries, folder, world, lidars, seconds):
-    """One drive, simulated and replayed."""
+    """Simulates and replays one drive."""
     capture, out = folder / "capture", folder / "out"
     simulating_s = cpu_s(binaries / "locus-sim", "--world", world, "--robot", "husky", "--duration", seconds, "--seed", 1,
                          "--lidars", lidars, "--realism", "clean", "-o", capture)

@@ -11,7 +11,7 @@ import re
 import sys
 from pathlib import Path
 
-sys.dont_write_bytecode = True  # nothing but the page is written beside the sources
+sys.dont_write_bytecode = True  # writes only the page beside the sources
 import tables
 from figures import Figures
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the parts of locus are compared with, as PCL has it: one thread, its defaults.
+// PCL's counterparts of the parts of locus: one thread, PCL's defaults.
 #include <pcl/features/normal_3d.h>
 #include <pcl/filters/voxel_grid.h>
 #include <pcl/point_types.h>
@@ -20,10 +20,10 @@ namespace {
 using Cloud = pcl::PointCloud<pcl::PointXYZ>;
 using Clouds = std::vector<Cloud::Ptr>;
 
-/// A sweep costs PCL up to a fifth of a second: so many of them speak for a capture.
+/// A sweep takes PCL up to 0.2 s: this number represents a capture.
 constexpr std::size_t kMostSweeps = 16;
 
-/// The clouds of all sweeps of a capture, every return, as PCL's filter gets them.
+/// Returns the clouds of all sweeps of a capture with every return, as inputs of PCL's filter.
 Clouds clouds_of(const Capture& capture) {
   Config config = capture.config();
   config.sweep.segment_filter.enabled = false;
@@ -48,12 +48,12 @@ Cloud::Ptr downsampled(const Cloud::Ptr& cloud) {
   return result;
 }
 
-/// Which of the clouds, from all over the capture, an iteration has.
+/// Returns the index of the cloud for an iteration, spread over the capture.
 std::size_t cloud_for(std::size_t iteration, const Clouds& clouds, const benchmark::State& state) {
   return iteration * (clouds.size() - 1) / static_cast<std::size_t>(state.max_iterations);
 }
 
-/// What LOCUS as published is built on, and scan to scan alone: filter the new sweep, register it with the one before.
+/// The basis of LOCUS as published, scan-to-scan only: filters the new sweep and registers it with the previous one.
 void gicp(benchmark::State& state, const Clouds& clouds) {
   pcl::GeneralizedIterativeClosestPoint<pcl::PointXYZ, pcl::PointXYZ> gicp;
   gicp.setMaxCorrespondenceDistance(1.0);
@@ -81,7 +81,7 @@ void voxel_grid(benchmark::State& state, const Clouds& clouds) {
     benchmark::DoNotOptimize(downsampled(clouds[cloud_for(iteration++, clouds, state)]));
 }
 
-/// Of the filtered cloud, from as many neighbours as its GICP takes.
+/// Normals of the filtered cloud, with the number of neighbours that PCL's GICP uses.
 void normals(benchmark::State& state, const Clouds& clouds) {
   constexpr int kNeighbours = 20;
   pcl::NormalEstimation<pcl::PointXYZ, pcl::Normal> estimation;

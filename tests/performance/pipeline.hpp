@@ -11,22 +11,22 @@
 
 namespace locus::performance {
 
-/// The whole of locus in one thread, as the service and locus-replay run it: datagrams and samples in, estimates out.
-/// One owner.
+/// The complete pipeline in one thread, as in the service and locus-replay: datagrams and samples in, estimates out.
+/// Not thread-safe.
 class Pipeline {
  public:
-  /// Without motion sources in the configuration it passes over their samples.
+  /// Ignores motion samples if the configuration has no motion sources.
   explicit Pipeline(const Config& config);
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
 
-  /// The sweep that the input completed, valid until the next call; nullptr if none.
+  /// Returns the sweep that this input completed, valid until the next call; nullptr if none.
   const daemon::ProcessedSweep* take(const daemon::Input& input);
 
   [[nodiscard]] const Odometry& odometry() const { return processor_.odometry(); }
   /// CPU time so far.
   [[nodiscard]] daemon::StageTimes stages() const;
-  /// The points of the sweep processed last, as they were cut.
+  /// Returns the points of the last processed sweep as of its cut.
   [[nodiscard]] const std::vector<SweepPoint>& points() const { return points_; }
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The whole of locus, sweep by sweep, and what each stage has of it.
+// The complete pipeline sweep by sweep, and the share of each stage.
 #include <algorithm>
 #include <string>
 #include <vector>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How cost and memory grow: with the points of a sweep, with the lidars, with the map, with the threads.
+// Scaling of cost and memory with the points of a sweep, the lidars, the map and the threads.
 #include <array>
 #include <cmath>
 #include <memory>
@@ -31,7 +31,7 @@ void add_lidars(const Effort& effort, Captures& captures) {
   }
 }
 
-/// Of a lidar that makes enough returns for any of them.
+/// Requires a lidar with enough returns for all sizes.
 void add_points(const Effort& effort, const Capture& capture) {
   for (const std::size_t points : std::array<std::size_t, 7>{500, 1'000, 2'000, 5'000, 10'000, 20'000, 60'000}) {
     Config alone = capture.config_of_lidar_alone(), aided = capture.config();
@@ -42,7 +42,7 @@ void add_points(const Effort& effort, const Capture& capture) {
   }
 }
 
-/// A sweep that the map took in, with where it was registered.
+/// A sweep inserted into the map, and its registered pose.
 struct PlacedSweep {
   std::vector<SurfacePoint> scan;
   std::size_t registered;
@@ -61,7 +61,7 @@ std::shared_ptr<const PlacedSweeps> keyframes_of(const Capture& capture, const C
   return sweeps;
 }
 
-/// The sweeps from `begin` on, as if seen that far away.
+/// Inserts the sweeps from `begin` on, displaced by `away_m`.
 std::size_t insert_all(const PlacedSweeps& sweeps, const Eigen::Vector3d& away_m, std::size_t most_points,
                        SurfaceMap& map) {
   std::size_t points = 0;
@@ -76,8 +76,8 @@ std::size_t insert_all(const PlacedSweeps& sweeps, const Eigen::Vector3d& away_m
   return points;
 }
 
-/// Copies of the drive side by side, as far from each other as lidars see, until so many points have been taken in; the
-/// robot's own surroundings last.
+/// Inserts displaced copies of the drive, a lidar range apart, until the map has this number of points; the robot's own
+/// surroundings come last.
 std::size_t fill(const PlacedSweeps& sweeps, std::size_t wanted, SurfaceMap& map) {
   constexpr double kApart_m = 200.0;
   constexpr std::size_t kPerRow = 32;
@@ -102,7 +102,7 @@ Registration align(Gicp& gicp, const PlacedSweep& sweep, const SurfaceMap& map) 
                     OdometryOptions{}.scan_to_submap, false, [] { return false; });
 }
 
-/// Registers sweeps of the same place in turn with ever larger maps around it, and then takes them in once more.
+/// Registers sweeps of one place in turn with ever larger maps around it, and then inserts them again.
 void register_in_map(benchmark::State& state, const PlacedSweeps& sweeps, std::size_t points, std::size_t max_bytes) {
   constexpr std::size_t kInsertions = 100;
   SurfaceMap map(max_bytes);
@@ -133,7 +133,7 @@ void add_maps(const Effort& effort, const std::shared_ptr<const PlacedSweeps>& s
   }
 }
 
-/// Wall clock: the threads share the work.
+/// Wall time: the threads share the work.
 void register_with_threads(benchmark::State& state, const PlacedSweeps& sweeps, int threads) {
   SurfaceMap map(MapOptions{}.max_bytes);
   insert_all(sweeps, Eigen::Vector3d::Zero(), ~std::size_t{0}, map);
@@ -143,7 +143,7 @@ void register_with_threads(benchmark::State& state, const PlacedSweeps& sweeps, 
     benchmark::DoNotOptimize(align(gicp, sweeps[sweep++ % sweeps.size()], map));
 }
 
-/// What the machine gives: the same sum by one thread or by several.
+/// Scalability of the machine: the same sum by one thread or several.
 void spin(benchmark::State& state, int threads) {
   constexpr std::size_t kTurns = 20'000'000;
   const auto turn = [share = kTurns / static_cast<std::size_t>(threads)] {

@@ -14,14 +14,15 @@
 
 namespace locus::performance {
 
-/// The husky of locus-sim as it drives: what reaches its computer is made the moment it is asked for. One owner.
+/// The husky of locus-sim, simulated on demand: each input of its computer is generated when requested. Not
+/// thread-safe.
 class SimulatedRobot : public daemon::InputSource {
  public:
   SimulatedRobot(sim::WorldMaker make_world, const sim::SensorChoice& sensors, Duration duration);
   SimulatedRobot(const SimulatedRobot&) = delete;
   SimulatedRobot& operator=(const SimulatedRobot&) = delete;
 
-  /// Names its sensors, as the config.yaml of its capture folder would; one thread.
+  /// Returns its configuration, as in the config.yaml of a capture folder; one thread.
   [[nodiscard]] Config config() const;
 
   [[nodiscard]] Stamp start() const { return trajectory_.start(); }
@@ -40,7 +41,7 @@ class SimulatedRobot : public daemon::InputSource {
   sim::Trajectory trajectory_;
   Stamp end_;
   std::vector<Lidar> lidars_;
-  Lidar* given_ = nullptr; ///< its datagram lives until the next call
+  Lidar* given_ = nullptr; ///< its datagram is valid until the next call
   sim::SyntheticOdometry wheels_;
   sim::SyntheticImu imu_;
   OdometrySample waiting_wheels_;

@@ -12,7 +12,7 @@
 
 namespace locus::performance {
 
-/// How much is run: all that the page is made of, or a glance at everything.
+/// Amount of work: everything for the page, or a smoke test.
 struct Effort {
   bool smoke = false;
 
@@ -22,7 +22,7 @@ struct Effort {
   [[nodiscard]] std::size_t iterations(std::size_t all) const { return smoke ? std::min<std::size_t>(all, 2) : all; }
 };
 
-/// Adds a benchmark whose every repetition does the same number of iterations, so that it sees the same sweeps.
+/// Adds a benchmark with a fixed number of iterations per repetition, so that all repetitions process the same sweeps.
 template <class Body>
 benchmark::internal::Benchmark* add(const std::string& name, const Effort& effort, std::size_t iterations,
                                     const Body& body) {
@@ -33,10 +33,10 @@ benchmark::internal::Benchmark* add(const std::string& name, const Effort& effor
       ->Unit(benchmark::kMillisecond);
 }
 
-/// The whole of locus for each sweep of the capture, with where the time goes as counters.
+/// Adds the complete pipeline per sweep of the capture, with the time of each stage as counters.
 void add_pipeline(const std::string& name, const Effort& effort, const Capture& capture, const Config& config);
 
-/// What the benchmarks measure, file by file. Captures must live as long as the benchmarks run.
+/// Benchmarks, file by file. Captures must outlive the benchmarks.
 void add_pipelines(const Effort& effort, const Capture& capture);
 void add_pcl(const Effort& effort, const Capture& capture);
 void add_floors(const Effort& effort, const Capture& capture);

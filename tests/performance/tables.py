@@ -13,7 +13,7 @@ def table(head, rows):
 
 
 def ms(value):
-    """Three digits that count."""
+    """Formats milliseconds with two or three significant digits."""
     return f"{value:.3f} ms" if value < 1 else f"{value:.2f} ms" if value < 10 else f"{value:.0f} ms"
 
 
@@ -50,7 +50,7 @@ def stage_row(f, name, stage, prior, floor, pcl=None):
 
 
 def stages(f):
-    """Of the plant; scan-to-scan runs at the start alone."""
+    """Table of the stages in the plant; scan-to-scan runs only at the start."""
     name, aided = "plant", "pipeline/plant/wheels_gyro"
     packets, points, one_pass = (f.cpu_ms(f"floor_{kind}/{name}") for kind in ("packets", "points", "pass"))
     rows = [
@@ -140,7 +140,7 @@ def drives(f):
 
 
 def goals(f):
-    """Goals of the project, and what was measured."""
+    """Table of the project's goals and their measured values."""
     def after_cut(name):
         return f.counter(name, "after_cut_ms") / f.cpu_ms(name)
 
@@ -168,7 +168,7 @@ def goals(f):
 
 
 def hours(f):
-    """The first minutes, and the last beside a start among them."""
+    """Table of the first minutes, and of the last, compared with a fresh start there."""
     def row(words, lines, who, held):
         median = sorted(line[who]["p50_ms"] for line in lines)[len(lines) // 2]
         return [words, ms(median), ms(max(line[who]["p99_ms"] for line in lines)), *held]

@@ -55,7 +55,7 @@ class Listener {
   std::uint16_t port_ = 0;
 };
 
-/// Its packets are longer than an Ethernet frame, and their format is known from the metadata alone.
+/// Its packets exceed an Ethernet frame, and their format is known only from the metadata.
 TEST(PacketSender, SendsAnOustersPacketsWholeAndAtTheirNewTime) {
   const Listener listener;
   sim::SyntheticLidarOptions sensor_options;

@@ -20,7 +20,7 @@
 namespace locus::test {
 namespace {
 
-/// One line on stderr that says so, and the exit status.
+/// Expects one line on stderr with all these parts, and this exit status.
 void expect_error(const ProgramRun& run, int status, const std::vector<std::string>& said) {
   EXPECT_EQ(run.status, status) << run.err;
   const std::vector<std::string> lines = lines_of(run.err);
@@ -29,7 +29,7 @@ void expect_error(const ProgramRun& run, int status, const std::vector<std::stri
     EXPECT_NE(lines[0].find(part), std::string::npos) << "no '" << part << "' in: " << lines[0];
 }
 
-/// A folder with one file of these bytes, and a run on it.
+/// A folder with one file of given bytes, and a run on it.
 class BadCapture : public testing::Test {
  protected:
   ProgramRun replay(const std::string& content) {
@@ -142,7 +142,7 @@ TEST_F(BadCapture, TruncatedInMidPacketIsAWarningAndNoFailure) {
   EXPECT_NEAR(static_cast<double>(read_tum(folder_ / "out/odometry.tum").size()), 40, 2);
 }
 
-/// It played one packet and said that all was well.
+/// Regression: the program played one packet and reported success.
 TEST_F(BadCapture, ThatRunsBackwardsIsSaidWithTheProgramThatSortsIt) {
   constexpr std::size_t kPackets = 500;
   std::vector<std::pair<Stamp, Bytes>> packets;
@@ -155,7 +155,7 @@ TEST_F(BadCapture, ThatRunsBackwardsIsSaidWithTheProgramThatSortsIt) {
     for (const auto& [stamp, payload] : packets)
       pcap.write(stamp, UdpAddresses{}, payload);
   }
-  std::size_t older = 0; // than the one before; a position packet arrives with a data packet
+  std::size_t older = 0; // timestamps behind the predecessor's; a position packet arrives with a data packet
   for (std::size_t i = 1; i < packets.size(); ++i)
     older += packets[i].first < packets[i - 1].first ? 1U : 0U;
   const std::string counted = std::to_string(older) + " of its 500 datagrams";
@@ -193,7 +193,7 @@ TEST_F(BadCapture, OfAnotherMakersLidarIsSaidWithTheMaker) {
   expect_error(replay(), 1, {"bad.pcap", "20 packets look like those of a lidar of Ouster", "port 7502", "6464 bytes"});
 }
 
-/// A pipe can be read once, and a bag is read twice.
+/// A pipe can be read only once, but a bag is read twice.
 TEST(WrongUsage, PipeWithoutACapture) {
   const auto from = [](const std::string& program) {
     const TemporaryFolder folder;
@@ -215,13 +215,13 @@ TEST(WrongUsage, FolderAboveADriveOfKittiStandsForTheOnlyDriveInIt) {
   expect_error(Replay({empty.path().string()}).run(), 1, {"holds no lidar.pcap"});
 }
 
-/// The day's folder within one more, and other recordings beside it.
+/// A folder that contains the day's folder and other recordings.
 TEST(WrongUsage, FolderOfManyRecordingsNamesSome) {
   expect_error(Replay({kitti_room_drive().parent_path().parent_path().string()}).run(), 1,
                {"name one of them: ", kitti_room_drive(), "more"});
 }
 
-/// What there is then would be taken for a result.
+/// Stale output files would be mistaken for results.
 TEST(WrongUsage, OtherPortIsNamedWithTheOverrideThatHelpsAndNothingButTheSummaryIsLeft) {
   const TemporaryFolder folder;
   const std::string capture = room_drive().string(), out = folder / "out";

@@ -85,7 +85,7 @@ template <class Packet> struct FastScan {
   template <class Stream> void fields(Stream& s) { s(header)(packets); }
 };
 
-/// Writes members as ROS 1 does.
+/// Serialises members as ROS 1 does.
 class Ros1Stream {
  public:
   explicit Ros1Stream(std::string& out) : out_(out) {}
@@ -143,7 +143,7 @@ std::vector<std::byte> serialised(Message message, RosVersion ros, std::size_t m
     stream(message);
     return to_bytes(out);
   }
-  static std::string out; // kept, for a megabyte for each sample of an IMU would take longer than all else
+  static std::string out; // reused: allocating a megabyte per IMU sample would dominate the run time
   out.resize(std::max(out.size(), most_bytes));
   eprosima::fastcdr::FastBuffer buffer(out.data(), out.size());
   eprosima::fastcdr::Cdr cdr(buffer, eprosima::fastcdr::Cdr::LITTLE_ENDIANNESS, eprosima::fastcdr::Cdr::DDS_CDR);
@@ -182,7 +182,7 @@ std::string chunk_record(const std::string& content) {
                 content);
 }
 
-/// Padded to a length that does not depend on where the index lies.
+/// Padded to a length that is independent of the index' position.
 std::string bag_header(std::uint64_t index, std::uint32_t connections, std::uint32_t chunks) {
   return record(op(3) + field("index_pos", raw(index)) + field("conn_count", raw(connections)) +
                     field("chunk_count", raw(chunks)),

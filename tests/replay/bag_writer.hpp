@@ -15,10 +15,10 @@ namespace locus::test {
 
 enum class RosVersion { ros1, ros2 };
 
-/// Bytes as a message has them after its ROS' serialisation.
+/// Serialised message of ROS 1 or ROS 2.
 struct RecordedMessage {
   std::string topic;
-  std::string type; ///< as ROS 1 writes it
+  std::string type; ///< in ROS 1 spelling
   Stamp recorded;
   std::vector<std::byte> data;
 };
@@ -34,35 +34,35 @@ std::vector<std::byte> scan_message(std::span<const ReceivedPacket> packets, Ros
 std::vector<std::byte> nebula_message(std::span<const ReceivedPacket> packets, RosVersion ros);
 std::vector<std::byte> pandar_message(std::span<const ReceivedPacket> packets, RosVersion ros);
 
-/// What has a header in hesai_ros_driver/UdpFrame, depending on the release.
+/// Position of the header in hesai_ros_driver/UdpFrame, which depends on the release.
 enum class HesaiHeaders { of_frame, of_packets };
 std::vector<std::byte> hesai_message(std::span<const ReceivedPacket> packets, RosVersion ros,
                                      HesaiHeaders headers = HesaiHeaders::of_frame);
 
-/// sensor_msgs/PointCloud2, or Livox' own message of one that has its fields.
+/// Serialises sensor_msgs/PointCloud2, or Livox' own message for a cloud with its fields.
 std::vector<std::byte> cloud_message(const OwnCloud& cloud, RosVersion ros);
 std::string type_of(const OwnCloud& cloud);
 
-/// tf2_msgs/TFMessage of one transform.
+/// Serialises tf2_msgs/TFMessage with one transform.
 std::vector<std::byte> transform_message(const std::string& parent, const std::string& child,
                                          const Pose& T_parent_child, RosVersion ros);
 
-/// How a ROS 1 bag ends.
+/// End of a ROS 1 bag.
 enum class BagEnd { indexed, without_index };
 
-/// Plain chunks of at most ten messages, connections before their first message and in the index.
+/// Writes uncompressed chunks of at most ten messages, with connections before their first message and in the index.
 std::string ros1_bag(std::span<const RecordedMessage> messages, BagEnd end = BagEnd::indexed);
 
-/// A database as rosbag2 writes it.
+/// Writes a database as rosbag2 does.
 void write_db3(const std::filesystem::path& file, std::span<const RecordedMessage> messages,
                const std::string& serialisation = "cdr");
 
-/// What a bag of a capture folder would hold: the data packets to each port on a topic, those of a turn in one message,
-/// on `/PORT/velodyne_packets`; imu.csv on /imu/data and wio.tum on /wheel_odometry.
+/// Converts a capture folder to the messages of a bag: one message per turn with the data packets of each port, on
+/// `/PORT/velodyne_packets`; imu.csv on /imu/data and wio.tum on /wheel_odometry.
 std::vector<RecordedMessage> messages_of(const std::filesystem::path& capture_folder, RosVersion ros,
                                          decltype(scan_message)& packet_message = scan_message);
 
-/// The same with clouds on /points in place of packets, each recorded 4 ms after its last point.
+/// Same as above, with clouds on /points in place of packets, each recorded 4 ms after its last point.
 std::vector<RecordedMessage> messages_of(const std::filesystem::path& capture_folder, std::span<const OwnCloud> clouds,
                                          std::span<const Stamp> ends, RosVersion ros);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bags of ROS 1 and ROS 2 in place of a capture.
+// Replay of bags of ROS 1 and ROS 2.
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -40,13 +40,13 @@ void write_text(const std::filesystem::path& file, const std::string& text) {
   std::ofstream{file, std::ios::binary} << text;
 }
 
-/// Of the same room drive. A capture has position packets too, which a bag has not, so times are told by reception.
+/// Replays the room drive. Packets are timed by reception, because position packets are in a capture but not in a bag.
 Replay replay_room(const std::string& capture, std::vector<std::string> arguments = {}) {
   arguments.insert(arguments.end(), {"-c", room_drive() / "config.yaml", "--set", "lidars.0.time=receive", capture});
   return Replay(arguments);
 }
 
-/// But for rounding: a quaternion that was normalised is normalised once more on its way through a message.
+/// Equal up to rounding: quaternions are normalised once more in the conversion.
 void expect_same_odometry(const Replay& replay) {
   static const std::vector<StampedPose> of_capture = replay_room(room_drive()).trajectory();
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
@@ -92,7 +92,7 @@ TEST(Bags, Ros2BagGivesTheOdometryOfTheCapture) {
   expect_same_odometry(replay_room(folder / "drive_0.db3"));
 }
 
-/// Converters and early recorders leave the column empty: there was one serialisation to choose from.
+/// Converters and early recorders leave the column empty, because only one serialisation existed.
 TEST(Bags, Ros2BagThatNamesNoSerialisationIsCdr) {
   const TemporaryFolder folder;
   write_db3(folder / "drive_0.db3", room_messages(RosVersion::ros2), "");
@@ -138,7 +138,7 @@ TEST(Bags, BagOfTwoLidarsGivesTheirPacketsInTheOrderOfReception) {
     EXPECT_LT((of_bag[i].T_source_base.translation - of_capture[i].T_source_base.translation).norm(), 1e-9) << i;
 }
 
-/// As scripts leave it that merge or convert: players go by the time of reception.
+/// Order of scripts that merge or convert bags. Playback is ordered by the time of reception.
 TEST(Bags, DatabaseThatWasWrittenTopicByTopicGivesTheOdometryOfTheCapture) {
   const TemporaryFolder folder;
   std::vector<RecordedMessage> messages = room_messages(RosVersion::ros2);
@@ -157,7 +157,7 @@ TEST(Bags, Ros1BagThatIsNotInOrderIsCalledSo) {
   expect_line(replay_room(folder / "drive.bag").run().err, {"goes back 1 times", "rosbag filter"});
 }
 
-/// rosbag2 keeps a write-ahead log in some versions, which SQLite would make again to read it.
+/// Some versions of rosbag2 leave the database in WAL mode, for which SQLite would create a log on reading.
 TEST(Bags, NothingIsWrittenBesideADatabase) {
   const TemporaryFolder folder;
   const std::filesystem::path bag = folder / "bag 100% #1?", file = bag / "drive_0.db3";
@@ -240,7 +240,7 @@ TEST(Bags, FileThatTheUserNamesTakesThePlaceOfATopic) {
   expect_line(replay.run().out, {"left out: /imu/data"});
 }
 
-/// As rosbag itself wrote them with the messages' own Python code, the chunks left plain or compressed.
+/// Bags written by rosbag itself with the messages' own Python code, chunks uncompressed or compressed.
 class BagOfRosbag : public testing::TestWithParam<const char*> {};
 
 TEST_P(BagOfRosbag, IsReadFieldByField) {
@@ -281,7 +281,7 @@ TEST_P(BagOfRosbag, IsReadFieldByField) {
 }
 INSTANTIATE_TEST_SUITE_P(Compression, BagOfRosbag, testing::Values("none.bag", "lz4.bag", "bz2.bag"));
 
-/// Whatever byte of a bag is another one, reading it ends, and with no more messages than there were.
+/// Corrupts each byte of a bag: reading terminates and finds no additional messages.
 void expect_damage_is_borne(const std::string& bytes, const std::string& name, int messages) {
   const TemporaryFolder folder;
   for (std::size_t at = 0; at < bytes.size(); at += at < 6000 ? 11 : 37) {
@@ -315,7 +315,7 @@ TEST(Bags, DamageOfADatabaseNeverHangsNorCrashes) {
   expect_damage_is_borne(read_text(folder / "whole.db3"), "damaged.db3", 60);
 }
 
-/// A recorder that was killed leaves a bag without index, and often with half a chunk at its end.
+/// A killed recorder leaves a bag without index, often with a truncated chunk at its end.
 TEST(Bags, BagWithoutIndexIsReadToItsEnd) {
   const TemporaryFolder folder;
   write_text(folder / "drive.bag.active", ros1_bag(room_messages(RosVersion::ros1), BagEnd::without_index));
@@ -350,7 +350,7 @@ TEST(Bags, DatabaseThatBreaksOffIsReadUpToThere) {
 
 class BadBag : public testing::Test {
  protected:
-  /// One line on stderr that says so.
+  /// Expects one line on stderr with all these parts.
   void expect_refused(const std::string& name, const std::vector<std::string>& said) {
     const ProgramRun run = run_program(LOCUS_REPLAY, {"-o", folder_ / "out", folder_ / name});
     EXPECT_EQ(run.status, 1) << run.err;
@@ -393,7 +393,7 @@ TEST_F(BadBag, DatabaseOfSomethingElse) {
   expect_refused("b.db3", bytes, {"not a ROS 2 bag, or damaged"});
 }
 
-/// A view may have rows without end.
+/// A view can have infinitely many rows.
 TEST_F(BadBag, DatabaseWhoseTablesAreNone) {
   sqlite3* database = nullptr;
   ASSERT_EQ(sqlite3_open((folder_ / "a.db3").c_str(), &database), SQLITE_OK);
@@ -493,7 +493,7 @@ TEST_F(BadBag, OfALidarThatIsNotDecodedNamesItsMaker) {
                    {"/packets ("s + type + ") is of a lidar of " + maker + ", whose packets are not read from bags"});
 }
 
-/// As the drivers of Nebula record, those of a Velodyne among them.
+/// Messages of the Nebula drivers, including that for Velodyne.
 TEST(Bags, NebulaPacketsGiveTheBitsOfAVelodyneScan) {
   const TemporaryFolder folder;
   for (const RosVersion ros : {RosVersion::ros1, RosVersion::ros2}) {
@@ -511,7 +511,7 @@ TEST(Bags, NebulaPacketsGiveTheBitsOfAVelodyneScan) {
   }
 }
 
-/// Packets in the messages of Hesai's drivers, of which the newest begins with a header as older ones do not.
+/// Packets in the messages of Hesai's drivers; only the newest begins with a header.
 TEST(BagMessages, OfHesaisDriversGiveTheirPackets) {
   for (const RosVersion ros : {RosVersion::ros1, RosVersion::ros2}) {
     std::vector<ReceivedPacket> packets;
@@ -554,7 +554,7 @@ TEST(BagChunk, WithNothingToDecompressIsDamaged) {
   }
 }
 
-/// What a message claims is never believed beyond its end.
+/// Lengths in a message are checked against its end.
 TEST(BagMessages, AbsurdCountsAndEveryCutAreNoMessage) {
   for (const RosVersion ros : {RosVersion::ros1, RosVersion::ros2}) {
     const auto serialisation = ros == RosVersion::ros1 ? Serialisation::ros1 : Serialisation::cdr;
@@ -586,12 +586,12 @@ TEST(BagMessages, AbsurdCountsAndEveryCutAreNoMessage) {
   }
 }
 
-/// Stamps that nobody set, of another clock, and numbers that are none: what a robot's bag may hold.
+/// Stamps that are unset or of another clock, and NaN, as in bags of real robots.
 TEST(Bags, StampsOfAnotherClockAndNanAreBorne) {
   const TemporaryFolder folder;
   std::vector<RecordedMessage> messages = room_messages(RosVersion::ros1);
   for (RecordedMessage& message : messages)
-    message.recorded += std::chrono::hours{24 * 365}; // played back and recorded again, a year later
+    message.recorded += std::chrono::hours{24 * 365}; // replayed and recorded again, a year later
   write_text(folder / "again.bag", ros1_bag(messages));
   expect_same_odometry(replay_room(folder / "again.bag"));
 

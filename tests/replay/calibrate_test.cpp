@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// locus-replay --calibrate: what it writes and what it refuses. Whether that is right: imu_calibration_test.cpp.
+// Output and errors of locus-replay --calibrate. Its accuracy is tested in imu_calibration_test.cpp.
 #include <filesystem>
 #include <string>
 #include <vector>

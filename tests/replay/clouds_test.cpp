@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bags with clouds in place of packets, made of the packets of a drive as the drivers of lidars make them.
+// Bags with clouds in place of packets, made from the packets of a drive in the formats of lidar drivers.
 #include <algorithm>
 #include <fstream>
 #include <functional>
@@ -23,11 +23,12 @@ using std::chrono::seconds;
 using Type = CloudView::Type;
 using Change = std::function<void(OwnCloud&)>;
 
-/// The robot sets off in the third second. Whether it still stands is decided by micrometres, so it is watched from
-/// where it drives on; what it brings back is that of as many messages of packets less.
+/// Skips the standstill: the robot starts in the third second, and micrometres decide whether it is still at rest. The
+/// messages of packets to compare with are reduced by the same number.
 constexpr std::size_t kScansLeftOut = 35, kPacketsInScan = 76;
 
-/// Motion samples that came while a turn was fired are known when its cloud comes, and are not when its packets do.
+/// Lidar alone, for equal results: motion samples received during a turn are available when its cloud arrives, but not
+/// yet when its packets do.
 const std::string kLidarAlone = "motion_sources=[]";
 
 const std::vector<CloudTurn>& room_turns() {
@@ -44,7 +45,7 @@ void expect_parts(const std::string& text, const std::vector<std::string>& parts
     EXPECT_NE(text.find(part), std::string::npos) << "no '" << part << "' in: " << text;
 }
 
-/// The clouds of the drive around the room with its motion; `count` of them.
+/// Returns `count` clouds of the drive around the room, with its motion.
 std::vector<RecordedMessage> room_clouds(CloudKind kind, RosVersion ros, const Change& change = {},
                                          std::size_t count = SIZE_MAX) {
   std::vector<OwnCloud> clouds;
@@ -60,7 +61,7 @@ std::vector<RecordedMessage> room_clouds(CloudKind kind, RosVersion ros, const C
   return messages_of(room_drive(), clouds, ends, ros);
 }
 
-/// The trajectory of the packets, of which nothing else is known either: the lidar is the base.
+/// Trajectory from packets, also without configuration: the lidar is the base.
 const std::vector<StampedPose>& trajectory_of_packets() {
   static const std::vector<StampedPose> trajectory = [] {
     const TemporaryFolder folder;
@@ -75,7 +76,7 @@ const std::vector<StampedPose>& trajectory_of_packets() {
   return trajectory;
 }
 
-/// From the stamp of the nearest pose of the packets.
+/// Returns the offset from the stamp of the nearest pose of the packet trajectory.
 double off_packets_s(const StampedPose& pose) {
   double nearest_s = 1e9;
   for (const StampedPose& of_packets : trajectory_of_packets())
@@ -84,7 +85,7 @@ double off_packets_s(const StampedPose& pose) {
   return nearest_s;
 }
 
-/// The largest distance from the trajectory of the packets, between whose poses it is interpolated.
+/// Returns the largest distance from the packet trajectory, which is interpolated.
 double farthest_from_packets_m(const std::vector<StampedPose>& trajectory) {
   constexpr double kMost_s = 0.001; ///< a cloud ends with its last point, a sweep of packets with the turn
   const std::vector<StampedPose>& packets = trajectory_of_packets();
@@ -266,7 +267,7 @@ TEST(Clouds, FaultsAreForPackets) {
   expect_parts(replay.run().err, {"lidar front gives clouds"});
 }
 
-/// Times that are wrong, what is said of them and what they are replaced by.
+/// Wrong times, the expected warning, and the replacement.
 struct WrongTimes {
   std::string name;
   CloudKind kind;
@@ -275,7 +276,7 @@ struct WrongTimes {
   double within_m; ///< of the trajectory of the packets
 };
 
-/// The kind's time field times a factor, plus something.
+/// Applies a factor and an offset to the kind's time field.
 Change times_changed(const std::string& field, float factor, float plus_s) {
   return [=](OwnCloud& cloud) {
     for (std::size_t i = 0; i < cloud.width; ++i)
@@ -322,11 +323,11 @@ TEST_P(CloudTimes, ThatAreWrongAreNamedInTheFirstSecondAndReplaced) {
   const Replay whole({"--set", kLidarAlone, folder / "clouds.bag"});
   ASSERT_EQ(whole.run().status, 0) << whole.run().err;
   EXPECT_EQ(whole.summary()["lidars"]["front"]["clouds"]["times"], wrong.times);
-  // Stamps of another clock are late by the way of the message, and the first clouds are spent on learning that clock.
+  // Stamps of another clock are late by the message's latency, and the first clouds are used to estimate that clock.
   if (wrong.within_m <= 0.001) {
     EXPECT_LT(farthest_from_packets_m(whole.trajectory()), wrong.within_m);
   } else {
-    constexpr double kMost_s = 0.006; // the way of a message, 4 ms, and what a cloud and a turn of packets end apart
+    constexpr double kMost_s = 0.006; // latency of a message (4 ms) + difference of the ends of cloud and turn
     for (const StampedPose& pose : whole.trajectory())
       EXPECT_LT(std::abs(off_packets_s(pose)), kMost_s) << to_ns(pose.stamp);
     EXPECT_NEAR(whole.trajectory().back().T_source_base.translation.norm(),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the user is told where sensors contradict each other: that they do, and what it may be; never who is wrong.
+// Messages about contradicting sensors: they name the contradiction and its possible causes, and blame no sensor.
 #include <regex>
 #include <string>
 #include <vector>
@@ -14,7 +14,7 @@
 namespace locus::test {
 namespace {
 
-/// All that `pattern` finds in a text: its first group.
+/// Returns the first group of all matches of `pattern` in a text.
 std::vector<std::string> found_in(const std::string& text, const std::string& pattern) {
   const std::regex regex(pattern);
   std::vector<std::string> found;
@@ -23,7 +23,7 @@ std::vector<std::string> found_in(const std::string& text, const std::string& pa
   return found;
 }
 
-/// A sentence about a motion source names lidar beside it, and what else may be the cause.
+/// Expects a sentence about a motion source to name lidar as well, and other possible causes.
 void expect_blames_nobody(const std::string& sentence) {
   EXPECT_TRUE(contains(sentence, "and lidar disagree")) << sentence;
   EXPECT_TRUE(contains(sentence, "(possible causes: ")) << sentence;
@@ -33,7 +33,7 @@ void expect_blames_nobody(const std::string& sentence) {
       << sentence;
 }
 
-/// Of all that a run says; how many disagreements it tells of.
+/// Checks all messages of a run; returns the number of reported disagreements.
 std::size_t disagreements_without_blame(const Replay& replay) {
   EXPECT_EQ(replay.run().status, 0) << replay.run().err;
   const std::vector<std::string> reasons = found_in(replay.run().out, R"(lost at [0-9.]+ s \(([^)]*)\))");
@@ -49,13 +49,13 @@ std::size_t disagreements_without_blame(const Replay& replay) {
   return reasons.size();
 }
 
-/// Every stamp is right but those of the IMU. Simulated once for all tests of a process.
+/// Only the stamps of the IMU are wrong. Simulated once per test process.
 const SimulatedDrive& late_imu() {
   static const SimulatedDrive drive("urban", "husky", 80, {"--halts", "12", "--imu-late-ms", "100"}, 2);
   return drive;
 }
 
-/// Where a replay starts decides whether anybody notices.
+/// The start of the replay determines whether the error is detected.
 TEST(WrongStamps, OfAnImuAreSaidToBeNobodysFault) {
   const SimulatedDrive& drive = late_imu();
   std::size_t disagreements = disagreements_without_blame(drive.replay());
@@ -66,7 +66,7 @@ TEST(WrongStamps, OfAnImuAreSaidToBeNobodysFault) {
   EXPECT_GT(disagreements, 0U) << "else nothing was asked";
 }
 
-/// That source and lidar agree again, but for less than the second that it takes to be used.
+/// Source and lidar agree again at the end, but for less than the probation of one second.
 TEST(WrongStamps, OfAnImuThatIsYetToBeUsedAtTheEndAreToldInAWarning) {
   const SimulatedDrive& drive = late_imu();
   int told = 0;
@@ -88,7 +88,7 @@ TEST(WrongStamps, OfAnImuThatIsYetToBeUsedAtTheEndAreToldInAWarning) {
   EXPECT_GT(told, 0) << "else nothing was asked";
 }
 
-/// Wheels of which all is right but the scale are no worse than lidar, for all that is known.
+/// Only the scale of the wheels is wrong. The available data cannot tell whether wheels or lidar are right.
 TEST(Disagreement, OfWheelsAndLidarIsToldAsOne) {
   const TemporaryFolder folder;
   const std::string wheels = folder / "wheels.tum";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What becomes of a drive when a sensor fails and comes back.
+// Drives in which a sensor fails and returns.
 #include <algorithm>
 #include <cmath>
 #include <ostream>
@@ -16,7 +16,7 @@ using nlohmann::json;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// The room drive with a fault in it.
+/// Replays the room drive with a fault.
 Replay replay_with(const std::string& fault) { return Replay({room_drive().string(), "--fail", fault}); }
 
 const std::vector<StampedPose>& path_without_faults() {
@@ -24,7 +24,7 @@ const std::vector<StampedPose>& path_without_faults() {
   return path;
 }
 
-/// How far two paths of the same sweeps are apart, at most.
+/// Returns the largest distance between two paths of the same sweeps.
 double farthest_apart_m(const std::vector<StampedPose>& path, const std::vector<StampedPose>& other) {
   EXPECT_EQ(path.size(), other.size()) << "no sweep is lost";
   double farthest_m = 0.0;
@@ -33,7 +33,7 @@ double farthest_apart_m(const std::vector<StampedPose>& path, const std::vector<
   return farthest_m;
 }
 
-/// The longest way between two sweeps that the robot did not drive, by the path without faults.
+/// Returns the largest motion between two sweeps beyond that of the path without faults.
 double greatest_jump_m(const std::vector<StampedPose>& path, const std::vector<StampedPose>& without_faults) {
   double greatest_m = 0.0;
   for (std::size_t i = 1; i < std::min(path.size(), without_faults.size()); ++i) {
@@ -48,8 +48,8 @@ double greatest_jump_m(const std::vector<StampedPose>& path, const std::vector<S
 Duration after_start(const std::vector<StampedPose>& path, std::size_t row) { return path[row].stamp - path[0].stamp; }
 
 struct SourceFault {
-  std::string source, kind; ///< as --fail has them
-  std::string reason;       ///< by which it is counted
+  std::string source, kind; ///< in the syntax of --fail
+  std::string reason;       ///< counter of rejections
 };
 std::ostream& operator<<(std::ostream& out, const SourceFault& fault) {
   return out << fault.source << ' ' << fault.kind;
@@ -124,7 +124,7 @@ TEST(Faults, WithoutAnyTheHealthOfASourceNeverChanges) {
   }
 }
 
-/// By the clock that --fail goes by; the first sweep ends a tenth of a second after that begins to run.
+/// Times are relative to the same origin as those of --fail; the first sweep ends 0.1 s after it.
 TEST(Faults, WhenTheyStruckIsToldFromTheStartOfTheCapture) {
   const auto lost_at_s = [](std::vector<std::string> arguments) {
     arguments.insert(arguments.end(), {room_drive().string(), "--fail", "wio:lost@3-5"});
@@ -169,7 +169,7 @@ TEST(Faults, WithoutLidarTheMotionSourcesCarryOnFlaggedAndLidarFindsTheMapAgain)
   EXPECT_LT(variance_of_x(path.size() - 1), variance_of_x(40)) << "lidar has made up for what was gathered";
 }
 
-/// Nothing is wrong with the capture then, nor with the configuration.
+/// Neither the capture nor the configuration is to blame.
 TEST(Faults, ThatLeaveNoPacketAreNamedAsTheReason) {
   const Replay replay = replay_with("all-lidars:lost@0");
   EXPECT_EQ(replay.run().status, 1);

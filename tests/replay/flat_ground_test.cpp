@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Flat ground as the inertial unit finds it, where it is and where it is not.
+// Flat ground detection by the IMU, on flat and uneven ground.
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -19,7 +19,7 @@ std::vector<std::string> flat_ground(const std::string& mode) { return {"--set",
 
 double height_m(const StampedPose& pose) { return pose.T_source_base.translation.z(); }
 
-/// How much higher than at the start.
+/// Returns the height above the start.
 double climbed_m(const std::vector<StampedPose>& path, Stamp at) {
   const auto then = std::ranges::lower_bound(path, at, {}, &StampedPose::stamp);
   return then == path.end() ? 0.0 : height_m(*then) - height_m(path.front());
@@ -58,7 +58,7 @@ TEST(FlatGround, ByContextHoldsHeightRollAndPitch) {
   const SimulatedDrive drive("urban", "husky", 25);
   const auto path = drive.replay(flat_ground("on")).trajectory();
   ASSERT_GT(path.size(), 200U);
-  for (const StampedPose& pose : std::span(path).subspan(1)) { // the first is levelled by gravity
+  for (const StampedPose& pose : std::span(path).subspan(1)) { // gravity levels the first
     ASSERT_NEAR(height_m(pose), 0.0, 1e-6);
     ASSERT_LT(to_rpy_rad(pose.T_source_base.rotation).head<2>().cwiseAbs().maxCoeff(), 1e-3);
   }

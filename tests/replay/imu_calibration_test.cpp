@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Drives of a robot on legs whose inertial unit is stamped early or mounted askew: what lidar sees tells, and the drive
-// goes as well as with a sound one.
+// Drives of a legged robot whose IMU is stamped early or misaligned: lidar reveals the error, and the drive is as
+// accurate as with a correct IMU.
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -22,7 +22,7 @@ const SimulatedDrive& walk() {
   return drive;
 }
 
-/// Lidar and the inertial unit alone.
+/// Lidar and IMU only.
 Replay replay_of_walk(std::vector<std::string> arguments = {}) {
   arguments.insert(arguments.end(), {"--fail", "vio:lost@0", "--fail", "kio:lost@0"});
   return walk().replay(std::move(arguments));
@@ -71,7 +71,7 @@ TEST(WrongImuCalibration, MountingOfAnImuThatIsWrongByDegreesIsToldOf) {
   }
 }
 
-/// The robot drives as if nothing were calibrated, and what it would be is told.
+/// `report` estimates and reports the calibration without applying it.
 TEST(WrongImuCalibration, WhatIsOnlyReportedChangesNothing) {
   const auto replay = [](const std::string& mode) {
     return replay_of_walk({"--set", "motion_sources.imu.T_base_source.rpy_deg=[5,0,0]", "--set",
@@ -88,8 +88,8 @@ TEST(WrongImuCalibration, WhatIsOnlyReportedChangesNothing) {
   EXPECT_LT(std::abs(mounting["value"][1].get<double>()), 3.0);
 }
 
-/// The calibration that a recording tells, of a unit that is stamped so late that nobody believes it, or before its
-/// motion, and sits askew, against that of the unit as it is.
+/// Calibrates from a recording whose IMU is misaligned and stamped so late that it is rejected, or before its motion;
+/// compares with the calibration of the original IMU.
 TEST(WrongImuCalibration, OfARecordingIsFoundAndWritten) {
   const TemporaryFolder folder;
   const auto late_by = [&](std::chrono::milliseconds late) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Drives with an inertial unit that is wrong: what it says must not bend what it is compared with.
+// Drives with a faulty IMU, whose data must not distort the reference that it is compared with.
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -17,7 +17,7 @@ namespace {
 using nlohmann::json;
 using std::chrono::seconds;
 
-/// A way in which a gyro is wrong, and the words for it.
+/// A gyro fault, and its description in messages.
 struct Wrong {
   void (*gyro)(Eigen::Vector3d& turn_radps);
   std::string words;
@@ -25,7 +25,7 @@ struct Wrong {
 const Wrong kOtherWay{[](Eigen::Vector3d& turn_radps) { turn_radps.z() *= -1.0; }, "the gyro turns the other way"};
 const Wrong kDegrees{[](Eigen::Vector3d& turn_radps) { turn_radps /= kRadPerDeg; }, "deg/s"};
 
-/// The samples of the drive, wrong from a time on, before which nothing comes for a second, and without attitude.
+/// Writes the samples of the drive without attitude: faulty from `good_for` on, and missing in the second before.
 void write_wrong(const Wrong& wrong, const SimulatedDrive& drive, Duration good_for, const std::filesystem::path& to) {
   auto samples = MotionSamples<ImuSample>::open(drive.capture() + "/imu.csv");
   ASSERT_TRUE(samples) << samples.error();
@@ -54,7 +54,8 @@ Replay replay_with(const Wrong& wrong, const SimulatedDrive& drive, std::vector<
 
 double without_imu_m(const SimulatedDrive& drive) { return ape_mean_m(drive.replay({"--fail", "imu:lost@0"})); }
 
-/// The unit is refused by name, nobody else suffers, and the drive goes as well as without it.
+/// Expects the IMU to be rejected by name, no other source to be affected, and the accuracy to equal that without an
+/// IMU.
 void expect_refused(const Replay& replay, const Wrong& wrong, double without_m) {
   SCOPED_TRACE(wrong.words);
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
@@ -71,7 +72,7 @@ void expect_refused(const Replay& replay, const Wrong& wrong, double without_m) 
   }
 }
 
-/// Straight on for 20 s, a bend, and after 38 s a turn on the spot. Simulated once for all tests of a process.
+/// Straight ahead for 20 s, a curve, and after 38 s a turn on the spot. Simulated once per test process.
 const SimulatedDrive& wheels() {
   static const SimulatedDrive drive("urban", "husky", 60);
   return drive;
@@ -89,7 +90,7 @@ TEST(WrongImu, ThatWasGoodBeforeALossIsRefused) {
   expect_refused(replay_with(kOtherWay, drive, {}, seconds{8}), kOtherWay, without_imu_m(drive));
 }
 
-/// A sure gyro that is wrong all of a sudden, wherever in a sweep, must not win against wheels and surfaces.
+/// A precise gyro that suddenly fails, at any time within a sweep, must not win against wheels and surfaces.
 TEST(WrongImu, ThatJumpsNowAndThenIsOutvoted) {
   const SimulatedDrive& drive = wheels();
   const double without_m = without_imu_m(drive);
@@ -132,7 +133,7 @@ TEST(WrongImu, ThatJumpsBesideLidarAloneIsOutvoted) {
   }
 }
 
-/// The first two sweeps are made anew, without what the gyro said.
+/// The first two sweeps are registered again without the gyro.
 TEST(WrongImu, ThatJumpsFromTheStartInATurnDoesNotBendTheMap) {
   const SimulatedDrive drive("tunnel", "husky", 60);
   for (const std::string start_s : {"21", "24", "42"}) {

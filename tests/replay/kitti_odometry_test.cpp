@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sequence in the layout of KITTI's odometry benchmark.
+// Sequences in the layout of KITTI's odometry benchmark.
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -21,7 +21,7 @@ namespace {
 
 using std::filesystem::path;
 
-/// A drive around the room in the layout of KITTI's odometry benchmark: each sweep is what the lidar would see at once.
+/// A drive around the room in the layout of KITTI's odometry benchmark, with de-skewed sweeps.
 class KittiOdometry : public testing::Test {
  protected:
   static constexpr int kSweeps = 30;
@@ -49,7 +49,7 @@ class KittiOdometry : public testing::Test {
   static void write(const path& data) {
     const sim::Trajectory trajectory(sim::room_course(std::chrono::seconds{8}, 1.0), sim::room_start());
     const sim::Scene room = sim::room();
-    Eigen::Matrix3d axes; // of a camera that looks forward, in those of the lidar
+    Eigen::Matrix3d axes; // axes of a forward-looking camera in the lidar frame
     axes << 0, -1, 0, 0, 0, -1, 1, 0, 0;
     const Pose T_camera_lidar{Eigen::Quaterniond(axes), {0.01, -0.07, -0.27}};
     std::string times, poses;
@@ -110,7 +110,7 @@ TEST_F(KittiOdometry, AnglesAreMadeRightAsThoseOfRawData) {
   EXPECT_TRUE(contains(replay.run().out, "0.205 degrees are added")) << replay.run().out;
 }
 
-/// The elevation of a point that is read as a field x, y, z.
+/// Elevation of a point that is read as a field x, y, z.
 double elevation_deg(const tools::SweepPoints& points, std::size_t i) {
   std::array<float, 3> xyz{};
   std::memcpy(xyz.data(), points.data.data() + i * points.point_step, sizeof(xyz));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A drive in the format of KITTI's raw data in place of a capture.
+// Replay of a drive in the format of KITTI's raw data.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -40,7 +40,7 @@ KittiPoint point_at(double range_m, double azimuth_rad, double elevation_rad) {
   return {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()), 0.25F};
 }
 
-/// A copy that a test may spoil.
+/// A copy for tests that modify it.
 class KittiReplay : public testing::Test {
  protected:
   KittiReplay() { std::filesystem::copy(kitti_room_drive(), drive_, std::filesystem::copy_options::recursive); }
@@ -48,7 +48,7 @@ class KittiReplay : public testing::Test {
   [[nodiscard]] std::filesystem::path points(int sweep) const {
     return drive_ / fmt::format("velodyne_points/data/{:010}.txt", sweep);
   }
-  /// All points of the drive changed, and in binary.
+  /// Applies a change to all points of the drive, and stores them in binary.
   template <class Change> void rewrite_points(Change&& change) const {
     for (int sweep = 0; sweep < kitti_room::kSweeps; ++sweep) {
       std::vector<KittiPoint> all;
@@ -118,7 +118,7 @@ TEST(Kitti, PointHasTheTimeOfItsAzimuthAndTheRingOfItsPlace) {
         ++returns;
         const Eigen::Vector3d p_m = Eigen::Vector3f{r.x_m, r.y_m, r.z_m}.cast<double>();
         const double elevation_deg = std::asin(p_m.normalized().z()) * 360 / kTurn;
-        const double from_rear = 0.5 + std::atan2(-p_m.y(), p_m.x()) / kTurn; // left is a quarter, the front a half
+        const double from_rear = 0.5 + std::atan2(-p_m.y(), p_m.x()) / kTurn; // in turns: left 0.25, front 0.5
         EXPECT_NEAR(to_seconds(packet->stamp + Duration{r.offset_ns} - start), 0.1 * from_rear, 1e-6);
         EXPECT_EQ(r.ring, 2 - std::lround((2.0 - elevation_deg) / (20 * 26.8 / 63)));
         EXPECT_EQ(r.ring, group.first_laser + k);
@@ -161,7 +161,7 @@ TEST_F(KittiReplay, SweepsThatAreMissingOrDamagedAreLeftOut) {
   EXPECT_GT(replay.summary()["sweeps"]["processed"], 30);
 }
 
-/// So are drives of which KITTI lacks a few sweeps: no file, and a blank line in its place.
+/// KITTI's own drives lack some sweeps, too: no file, and a blank line in its place.
 TEST_F(KittiReplay, BlankTimesStandForSweepsThatAreMissing) {
   for (const char* const name : {"timestamps_start.txt", "timestamps_end.txt"}) {
     const std::filesystem::path file = drive_ / "velodyne_points" / name;
@@ -179,7 +179,7 @@ TEST_F(KittiReplay, BlankTimesStandForSweepsThatAreMissing) {
   EXPECT_LT(replay.summary()["ape_m"]["max"], 0.02);
 }
 
-/// A drive that was synchronised has them in binary.
+/// Synchronised drives have binary points.
 TEST_F(KittiReplay, PointsInBinaryGiveTheSameBits) {
   const Replay text({"--kitti-as-published", drive_});
   rewrite_points([](const KittiPoint&) {});
@@ -211,7 +211,7 @@ TEST_F(KittiReplay, WithoutInertialUnitTheLidarIsAlone) {
   EXPECT_TRUE(contains(replay.run().out, "velodyne_points is lidar front; its vertical")) << replay.run().out;
 }
 
-/// As in a drive that was synchronised.
+/// The rate of a synchronised drive.
 TEST_F(KittiReplay, InertialUnitAtTenHertzDoesToo) {
   for (int i = 0; i < 10 * kitti_room::kSweeps; ++i) {
     if (i % 10 != 0)
@@ -248,7 +248,7 @@ TEST(Kitti, PointsWithoutAVerticalPlaneStayWhereTheyAre) {
   EXPECT_TRUE(std::isnan(points[2].x_m));
 }
 
-/// Each point lies as much too low as KITTI's do: four metres away the floor is 14 mm too deep.
+/// Each point has KITTI's elevation error: at a distance of four metres the floor is 14 mm too low.
 TEST_F(KittiReplay, AnglesThatAreTooSmallAreMadeRight) {
   const Replay truth({"--kitti-as-published", drive_});
   rewrite_points([](KittiPoint& p) {

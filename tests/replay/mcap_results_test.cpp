@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What --mcap writes, read back: by the reader of bags, and record by record.
+// Output of --mcap, read by the bag reader and record by record.
 #include <fstream>
 #include <map>
 
@@ -21,7 +21,7 @@ namespace {
 
 using tools::McapOp;
 using tools::McapRecord;
-/// As another implementation of DDS reads it.
+/// Deserialises by another implementation of CDR.
 template <class Message> Message read_by_fast_cdr(std::span<const std::byte> data) {
   std::string bytes(reinterpret_cast<const char*>(data.data()), data.size());
   eprosima::fastcdr::FastBuffer buffer(bytes.data(), bytes.size());
@@ -113,7 +113,7 @@ TEST_F(McapResults, IsWhatOtherProgramsTakeForMessagesOfRos) {
   EXPECT_GT(transforms, 70U);
 }
 
-/// Players that go by the index find each message, and the checksums are right.
+/// The index locates each message, as players require, and the checksums are correct.
 TEST_F(McapResults, IndexLeadsToEachMessage) {
   constexpr std::size_t kEnd = tools::kMcapFooterBytes + tools::kMcapMagic.size();
   const auto footer = tools::McapFooter::read(record_at(bytes_.size() - kEnd));
@@ -205,7 +205,7 @@ TEST(McapOption, WritesOverNoInputAndTellsWhatItCannotWrite) {
       run_program(LOCUS_REPLAY, {"-o", folder / "out", "--realtime", "--mcap", folder / "a.mcap", capture}).status, 2);
 }
 
-/// Of a run that is refused before it writes anything.
+/// Runs locus-replay, which must reject the arguments before it writes anything; returns the error.
 std::string refusal_of(const std::vector<std::string>& arguments) {
   const ProgramRun run = run_program(LOCUS_REPLAY, arguments);
   EXPECT_EQ(run.status, 2) << run.err;

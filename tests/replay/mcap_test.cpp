@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// MCAP in place of a capture, and what may be wrong with it.
+// Replay of MCAP files, valid and damaged.
 #include <algorithm>
 #include <fstream>
 
@@ -84,7 +84,7 @@ TEST(Mcap, FolderOfSeveralFilesIsReadInTheOrderOfItsMetadata) {
   EXPECT_TRUE(odometry_of(folder.path()) == odometry);
 }
 
-/// Without metadata the numbers at the end of the names tell.
+/// Without metadata the numbers at the end of the file names determine the order.
 TEST(Mcap, FolderWithoutMetadataIsReadByNumbers) {
   const TemporaryFolder folder;
   const std::vector<RecordedMessage> messages = messages_of(room_drive(), RosVersion::ros2);
@@ -99,7 +99,7 @@ TEST(Mcap, FolderWithoutMetadataIsReadByNumbers) {
   EXPECT_TRUE(odometry_of(folder.path()) == odometry_of(other / "drive.mcap"));
 }
 
-/// Small files of two topics, three messages each.
+/// Small files of two topics with three messages each.
 class SmallMcap : public testing::Test {
  protected:
   struct Read {
@@ -206,7 +206,7 @@ TEST_F(SmallMcap, AnyByteMayBeAnotherOne) {
         SCOPED_TRACE(at);
         const Read borne = read(damaged);
         EXPECT_LE(borne.messages.size(), kAll.size());
-        if (body.starts_with('\6')) { // of a chunk all or nothing: its checksum tells
+        if (body.starts_with('\6')) { // chunks have a checksum: all messages or none
           EXPECT_TRUE(borne.messages.empty() || borne.messages.size() == kAll.size());
         }
       }
@@ -244,7 +244,7 @@ TEST_F(SmallMcap, ChunkThatIsNotAsLongAsItSaysIsLeftOut) {
   }
 }
 
-/// No more memory is taken than the bound on a chunk says.
+/// Memory use stays below the limit for a chunk.
 TEST_F(SmallMcap, AbsurdLengthsAreRefused) {
   const std::string good = mcap_chunk(declarations() + mcap_message(1, 1, "good"));
   for (const std::uint64_t size : {std::uint64_t{1} << 29U, std::uint64_t{1} << 62U, ~std::uint64_t{0}}) {
@@ -273,7 +273,7 @@ TEST_F(SmallMcap, UnknownCompressionIsNamed) {
                  {"compressed by \"a?b?[31m?\""});
 }
 
-/// What is left where the power failed.
+/// Tail of a file after a power failure.
 TEST_F(SmallMcap, ZerosAtTheEndAreABreak) {
   const Read zeros = read(head() + records() + std::string(5000, '\0'));
   expect_all(zeros);
@@ -320,7 +320,7 @@ TEST_F(SmallMcap, OtherEncodingsAreNamedAndOfNoUse) {
                                                         "/text no schema as json", "/imu sensor_msgs/Imu"}));
 }
 
-/// A summary that is damaged, or names not all channels, is not believed.
+/// A summary that is damaged or incomplete is ignored.
 TEST_F(SmallMcap, SummaryThatIsNotWholeIsPassedOver) {
   const std::string before = head() + records();
   for (const std::string& summary : {mcap_channel(1, 1, "/lie"), mcap_record(11, std::string(30, '\0')),
@@ -328,7 +328,7 @@ TEST_F(SmallMcap, SummaryThatIsNotWholeIsPassedOver) {
     expect_all(read(before + mcap_end(before, summary)));
 }
 
-/// Writers may be told not to repeat the schemas, and may put them behind the channels.
+/// Writers can be configured not to repeat the schemas, and may write them after the channels.
 TEST_F(SmallMcap, SummaryWithoutSchemasOrWithThemLastGivesTheTypes) {
   const std::string before = head() + mcap_chunk(records());
   const std::string schemas = mcap_schema(1, "sensor_msgs/msg/Imu") + mcap_schema(2, "nav_msgs/msg/Odometry");
@@ -340,7 +340,7 @@ TEST_F(SmallMcap, SummaryWithoutSchemasOrWithThemLastGivesTheTypes) {
   }
 }
 
-/// That it is read shows in a channel that nothing else names.
+/// The test is a channel that only the summary contains.
 TEST_F(SmallMcap, SummaryIsBelievedIfItsChecksumIsRight) {
   const std::string before = head() + mcap_chunk(records());
   const std::string summary = declarations() + mcap_channel(3, 2, "/more") + mcap_statistics(6, 3);
@@ -373,7 +373,7 @@ TEST_F(SmallMcap, TopicsBeyondTheBoundsAreLeftOutAndSaid) {
   expect_warning(bounded, {"topics beyond the 65535th"});
 }
 
-/// As rosbag2 splits a bag. What a file took is given back when the next one is begun.
+/// A bag split by rosbag2. The memory of a file is released when the next one is opened.
 TEST(Mcap, FolderOfManyFilesTakesTheMemoryOfOne) {
   constexpr std::size_t kBytes = 32'000'000, kFiles = 8;
   const TemporaryFolder folder;
@@ -398,7 +398,7 @@ TEST(Mcap, FolderOfManyFilesTakesTheMemoryOfOne) {
   EXPECT_LT(in_use(), before + kBytes) << "read";
 }
 
-/// Written by @mcap/core, the TypeScript library of the format's makers.
+/// Files written by @mcap/core, the TypeScript library of the format's authors.
 class McapOfMcapCore : public SmallMcap, public testing::WithParamInterface<const char*> {};
 
 TEST_P(McapOfMcapCore, IsReadFieldByField) {

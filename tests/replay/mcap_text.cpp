@@ -54,7 +54,7 @@ std::string mcap_channel(std::uint16_t id, std::uint16_t schema_id, const std::s
 }
 
 std::string mcap_message(std::uint16_t channel_id, std::uint64_t log_time_ns, const std::string& data) {
-  const std::uint64_t publish_time_ns = log_time_ns + 7; // whoever reads it in place of the other is found out
+  const std::uint64_t publish_time_ns = log_time_ns + 7; // differs, to detect readers that confuse them
   return mcap_record(kMessage, raw_number(channel_id) + raw_number(std::uint32_t{0}) + raw_number(log_time_ns) +
                                    raw_number(publish_time_ns) + data);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Captures and bags that are packed, in parts, or on standard input.
+// Replay of captures and bags that are compressed, split, or on standard input.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -56,7 +56,7 @@ std::string xz(const std::string& bytes) {
 std::string zstd(const std::string& bytes) { return packed(bytes, McapCompression::zstd); }
 
 struct Packing {
-  const char* name; ///< of the files
+  const char* name; ///< file name
   std::string (*pack)(const std::string&);
 };
 
@@ -66,7 +66,7 @@ class Packed : public testing::TestWithParam<Packing> {
     std::string bytes;
     std::string problem;
   };
-  /// In steps of so many bytes.
+  /// Decompresses in steps of this many bytes.
   Unpacked unpack(const std::string& bytes, std::size_t step = 1000) {
     put(folder_ / "packed", bytes);
     const auto stream = tools::unpacked(std::move(*open_stream(folder_ / "packed")));
@@ -101,7 +101,7 @@ TEST_P(Packed, BytesComeOutAsTheyWentIn) {
   }
 }
 
-/// As rotating recorders append.
+/// Concatenated files, as appended by rotating recorders.
 TEST_P(Packed, SeveralFilesInOneAreReadOneAfterTheOther) {
   const Unpacked result = unpack(pack("first, ") + pack("") + pack(some_bytes(200'000)));
   EXPECT_TRUE(result.bytes == "first, " + some_bytes(200'000));
@@ -176,7 +176,7 @@ TEST(Unpacked, WhatIsNotPackedStaysAsItIs) {
   }
 }
 
-/// What stopped the packed bytes says more than that they broke off.
+/// A read error is more informative than the resulting truncation.
 TEST(Unpacked, FileThatCannotBeReadToItsEndIsNotCalledBroken) {
   class Failing : public ByteStream {
    public:
@@ -212,11 +212,11 @@ long most_memory_of_children_kB() {
   return children.ru_maxrss; // NOLINT(cppcoreguidelines-pro-type-union-access): the C library's
 }
 
-/// 500 MB of zeros in 500 kB, a capture of frames without length: they are passed on and not kept.
+/// Decompression bomb: 500 MB of zeros in 500 kB, a capture of empty frames, is streamed and not stored.
 TEST(Unpacked, WhatUnpacksToMuchTakesLittleMemory) {
   const TemporaryFolder folder;
   const std::string zeros = gzip(std::string(5'000'000, '\0'));
-  std::string bomb = gzip(read_text(room_drive() / "lidar.pcap").substr(0, 24)); // the header
+  std::string bomb = gzip(read_text(room_drive() / "lidar.pcap").substr(0, 24)); // file header
   for (int i = 0; i < 100; ++i)
     bomb += zeros;
   put(folder / "bomb.pcap.gz", bomb);
@@ -228,7 +228,7 @@ TEST(Unpacked, WhatUnpacksToMuchTakesLittleMemory) {
   EXPECT_TRUE(contains(run.err, "no UDP datagram in 31250000 frames")) << run.err;
 }
 
-/// As tcpdump -C leaves them, packed by its -z but for the last.
+/// Parts from tcpdump -C, all but the last compressed by its -z.
 TEST(Parts, OfACaptureFollowEachOther) {
   const TemporaryFolder folder;
   const std::string capture = read_text(room_drive() / "lidar.pcap");
@@ -256,7 +256,7 @@ TEST(Parts, OfACaptureFollowEachOther) {
   EXPECT_LT(one.trajectory().size(), parts.trajectory().size() / 6) << "a part that is named stands for itself";
 }
 
-/// Of messages_of() the room.
+/// Contains messages_of() the room drive.
 class PackedBag : public testing::Test {
  protected:
   PackedBag() {
@@ -307,7 +307,7 @@ TEST_F(PackedBag, MessageByMessageGivesTheSameBits) {
   put(folder_ / "packed.mcap", mcap_file(compressed, RosVersion::ros2));
   EXPECT_TRUE(odometry_of(folder_ / "packed.mcap") == odometry_);
 
-  for (std::size_t i = 0; i < 30; ++i) // half, a third or a quarter is left
+  for (std::size_t i = 0; i < 30; ++i) // truncated to a half, a third or a quarter
     compressed[i].data.resize(compressed[i].data.size() / (i % 3 + 2));
   write_db3(folder_ / "damaged.db3", compressed);
   const Replay damaged({"-c", room_drive() / "config.yaml", folder_ / "damaged.db3"});
@@ -325,7 +325,7 @@ TEST_F(PackedBag, ThatBreaksOffIsReadUpToThere) {
   EXPECT_GT(cut.trajectory().size(), 20U);
 }
 
-/// What is no bag is not unpacked to its end, and a disk is not filled.
+/// Decompression stops early if the content is no bag, or if the disk would fill up.
 TEST(UnpackedCopy, StopsWhereItIsOfNoUseOrTheDiskIsNearlyFull) {
   const TemporaryFolder folder;
   put(folder / "zeros.zst", zstd(std::string(8'000'000, '\0')));
@@ -344,7 +344,7 @@ TEST(UnpackedCopy, StopsWhereItIsOfNoUseOrTheDiskIsNearlyFull) {
   EXPECT_EQ(std::filesystem::file_size(whole->path()), 1'000'001U);
 }
 
-/// The temporary file has no name while the program runs, and nothing of it stays.
+/// The temporary file is unlinked while the program runs, so that nothing remains.
 TEST_F(PackedBag, LeavesNothingBehind) {
   const TemporaryFolder temporary;
   put(folder_ / "drive.db3.zst", zstd(read_text(folder_ / "whole.db3")));

@@ -22,7 +22,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// Captures of real sensors, through the program as users run it: lidar alone, no configuration.
+/// Captures of real sensors, replayed as users do: lidar alone, no configuration.
 class RealCapture : public testing::Test {
  protected:
   void SetUp() override {
@@ -34,7 +34,7 @@ class RealCapture : public testing::Test {
   }
   static Replay replay(const std::string& name) { return Replay({capture_file(name).string()}); }
 
-  /// The poses up to `duration` after the first.
+  /// Expects no motion in the poses up to `duration` after the first.
   static void expect_still(const std::vector<StampedPose>& trajectory, Duration duration) {
     ASSERT_FALSE(trajectory.empty());
     double moved_m = 0, turned_deg = 0;
@@ -49,7 +49,7 @@ class RealCapture : public testing::Test {
   }
 };
 
-/// The median, over the first or the last of a time, of something that a moving lidar measures again and again.
+/// Median of repeated measurements over the first or last part of a capture.
 class MedianOverTime {
  public:
   void add(Stamp stamp, double value) { samples_.push_back({stamp, value}); }
@@ -78,7 +78,7 @@ class MedianOverTime {
   std::vector<Sample> samples_;
 };
 
-/// How far ahead of the VLP-16 of product id 0x21 the wall at its end of the room is, in the returns as they are.
+/// Measures the distance from the VLP-16 of product id 0x21 to the wall at its end of the room, from the raw returns.
 MedianOverTime distance_to_end_wall_m(const std::filesystem::path& file) {
   Expected<Capture, std::string> capture = Capture::open(file);
   Expected<LidarInput, std::string> lidar = LidarInput::open(LidarOptions{}, 0);
@@ -91,9 +91,9 @@ MedianOverTime distance_to_end_wall_m(const std::filesystem::path& file) {
   return distance_m;
 }
 
-/// The truth is 15.45 m/s: the map of the raw points is sharpest at 15.35 to 15.58 m/s, and the car gains speed from
-/// one GPS fix to the next (14.82 m/s at second 163.0 of the hour, 15.18 m/s at 164.0), which makes 15.35 to 15.53 m/s
-/// while the capture lasts (164.47 to 164.96 s). The fixes alone, 14.6 to 15.4 m/s with their tolerance, are a second
+/// The true speed is 15.45 m/s. The map of the raw points is sharpest at 15.35 to 15.58 m/s. The car accelerates
+/// between GPS fixes (14.82 m/s at second 163.0 of the hour, 15.18 m/s at 164.0), which extrapolates to 15.35 to 15.53
+/// m/s during the capture (164.47 to 164.96 s). The fixes alone, 14.6 to 15.4 m/s with their tolerance, are one second
 /// old.
 TEST_F(RealCapture, CarAtFifteenMetresPerSecond) {
   const Replay car = replay("hdl32e_moving_15mps");
@@ -114,7 +114,7 @@ TEST_F(RealCapture, CarAtFifteenMetresPerSecond) {
   EXPECT_GT(yaw_dps, -3.0);
 }
 
-/// The car pulls away after half a second.
+/// The car starts to move after half a second.
 TEST_F(RealCapture, StandingHdl32) {
   const Replay standing = replay("hdl32e_static_monterey");
   ASSERT_EQ(standing.run().status, 0) << standing.run().err;
@@ -124,7 +124,7 @@ TEST_F(RealCapture, StandingHdl32) {
   expect_still(standing.trajectory(), milliseconds{500});
 }
 
-/// This lidar is moved 0.1 m towards the end wall after one and a half seconds: the wall itself says how far.
+/// This lidar is moved 0.1 m towards the end wall after 1.5 s; the distance to the wall is the reference.
 TEST_F(RealCapture, Vlp16ThatReportsAnotherModelStandsThenMoves) {
   const Replay vlp16 = replay("vlp16_static_1200rpm_product21");
   ASSERT_EQ(vlp16.run().status, 0) << vlp16.run().err;
@@ -153,8 +153,8 @@ TEST_F(RealCapture, StandingVlp16WithGps) {
   expect_still(standing.trajectory(), milliseconds{500});
 }
 
-/// A ROS 2 bag that names no serialisation. Of its 2193 packets none is missing: each follows the one before by the
-/// packet spacing of the sensor.
+/// A ROS 2 bag without a serialisation format. None of its 2193 packets is missing: all follow at the sensor's packet
+/// spacing.
 TEST_F(RealCapture, StandingVls128InABag) {
   const Replay standing({(test_data() / "velodyne/vls128").string()});
   ASSERT_EQ(standing.run().status, 0) << standing.run().err;
@@ -169,7 +169,7 @@ TEST_F(RealCapture, StandingVls128InABag) {
   EXPECT_EQ(packets["data"].get<int>() + packets["lost"].get<int>(), 2193) << "all that was lost is counted";
 }
 
-/// No option: the metadata is the only one beside the capture whose sensor sent these packets.
+/// No option is needed: only one metadata file beside the capture is of the sensor that sent these packets.
 TEST_F(RealCapture, MovingOusterIsReadWithTheMetadataThatFitsIt) {
   const Replay moving({(test_data() / "ouster/OS-1-128_v2.3.0_1024x10_lb_n3.pcap").string()});
   ASSERT_EQ(moving.run().status, 0) << moving.run().err;
@@ -189,10 +189,10 @@ TEST_F(RealCapture, MovingOusterIsReadWithTheMetadataThatFitsIt) {
   EXPECT_EQ(moving.trajectory().size(), 3U);
 }
 
-/// Three turns of an OS1-128 on a car, beside a pose of its sensor frame for each by the maker's own odometry. That
-/// does not undo the motion within the first turns, so a pose is where the sensor was in the middle of a turn: ahead
-/// then, as the car was. It gains 3.7 m/s^2 by its own accelerometer, so other instants would differ by 4 cm. Sweeps
-/// that begin in the middle of a turn end there.
+/// Three turns of an OS1-128 on a car, with the pose of its sensor frame for each by the maker's own odometry. That
+/// odometry does not de-skew the first turns, so a pose is that of the middle of a turn, when the sensor faces forward,
+/// as the car does. Its accelerometer measures 3.7 m/s^2, so that other instants would differ by 4 cm. Sweeps that
+/// begin in the middle of a turn end there.
 TEST_F(RealCapture, MovingOusterIsWhereItsMakerSaysItWas) {
   std::vector<Pose> truth;
   std::ifstream kitti{test_data() / "ouster/OS-1-128_v2.3.0_1024x10_lb_n3_poses_kitti.txt"};
@@ -255,11 +255,11 @@ TEST_F(RealCapture, OfOusterWithoutMetadataIsRefusedByItsName) {
   EXPECT_NE(ouster.err.find("locusctl fetch SENSOR -o drive.json"), std::string::npos) << ouster.err;
 }
 
-/// Without any configuration.
+/// No configuration.
 TEST_F(RealCapture, BagsOfHesaiAreReadAsWhatTheyAre) {
   struct Recorded {
     const char *folder, *model;
-    std::uint64_t packets, lost; ///< those that their numbers say are missing
+    std::uint64_t packets, lost; ///< missing packets by sequence number
   };
   for (const Recorded& recorded :
        {Recorded{"40p", "Pandar40P", 1439, 0}, Recorded{"xt16", "XT16", 1626, 0}, Recorded{"xt32", "XT32", 2000, 0},

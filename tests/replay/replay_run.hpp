@@ -18,23 +18,23 @@ namespace locus::test {
 std::string read_text(const std::filesystem::path& file);
 std::vector<std::string> lines_of(const std::string& text);
 
-/// What is no trajectory fails the test and is empty.
+/// Reads a trajectory; fails the test and returns an empty one on error.
 std::vector<StampedPose> read_tum(const std::filesystem::path& file);
 
-/// The trajectory of a file, its way so many times as long.
+/// Writes a trajectory with its translations scaled by `factor`.
 void write_scaled_tum(const std::filesystem::path& from, double factor, const std::filesystem::path& to);
 
-/// What a run of a program left on its terminal.
+/// Exit status and terminal output of a program.
 struct ProgramRun {
-  int status = -1; ///< of exit; -1: it crashed or never ran
+  int status = -1; ///< exit status; -1: it crashed or never ran
   std::string out, err;
 };
 ProgramRun run_program(const std::string& program, const std::vector<std::string>& arguments);
 
-/// One run of the real locus-replay, with an output folder of its own.
+/// One run of the real locus-replay, with its own output folder.
 class Replay {
  public:
-  /// Everything but -o DIR.
+  /// Runs with these arguments and -o DIR.
   explicit Replay(std::vector<std::string> arguments);
 
   [[nodiscard]] const ProgramRun& run() const { return run_; }

@@ -11,7 +11,7 @@
 
 namespace locus::test {
 
-/// What locus-sim makes of a drive, in a folder that is gone after the test.
+/// A drive of locus-sim, in a folder that is removed after the test.
 class SimulatedDrive {
  public:
   SimulatedDrive(const std::string& world, const std::string& robot, int duration_s,
@@ -27,7 +27,7 @@ class SimulatedDrive {
     EXPECT_EQ(run.status, 0) << run.err;
   }
 
-  /// With more arguments than the capture.
+  /// Replays the capture with additional arguments.
   [[nodiscard]] Replay replay(std::vector<std::string> arguments = {}) const {
     arguments.push_back(capture());
     return Replay(arguments);
@@ -38,7 +38,7 @@ class SimulatedDrive {
   TemporaryFolder folder_;
 };
 
-/// Arguments of a fault that is there for a second in five.
+/// Returns arguments for a fault that lasts one second in every five.
 inline std::vector<std::string> a_second_in_five(const std::string& fault, double from_s, double to_s) {
   std::vector<std::string> arguments;
   for (double at_s = from_s; at_s < to_s; at_s += 5.0) {

@@ -11,7 +11,7 @@
 #include "replay_run.hpp"
 #include "support/errors.hpp"
 
-/// For tests of folders with a file for each sweep.
+/// Support for tests of folders with one file per sweep.
 namespace locus::test {
 
 inline void write_with_folders(const std::filesystem::path& file, const std::string& text) {
@@ -19,7 +19,7 @@ inline void write_with_folders(const std::filesystem::path& file, const std::str
   std::ofstream{file, std::ios::binary} << text;
 }
 
-/// In one line that has all of these parts.
+/// Expects rejection with one line that has all of these parts.
 inline void expect_refused(const std::filesystem::path& capture, const std::vector<std::string>& said) {
   const ProgramRun run = Replay({capture}).run();
   EXPECT_EQ(run.status, 1) << run.err;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Folders with a file of points for each sweep, such as EuRoC's.
+// Replay of folders with one point file per sweep, such as EuRoC's.
 #include <algorithm>
 #include <functional>
 #include <limits>
@@ -23,12 +23,12 @@ using std::filesystem::path;
 
 const std::string kNoSources = "motion_sources=[]";
 
-/// The clouds of the drive around the room, the robot driving from the first one on.
+/// Returns the clouds of the drive around the room without the initial standstill.
 const std::vector<OwnCloud>& room_clouds(CloudKind kind = CloudKind::velodyne_start) {
   static std::map<CloudKind, std::vector<OwnCloud>> all;
   std::vector<OwnCloud>& clouds = all[kind];
   if (clouds.empty()) {
-    constexpr std::size_t kStands = 35 * 76; // packets, of the first three seconds
+    constexpr std::size_t kStands = 35 * 76; // packets of the first three seconds
     for (const CloudTurn& turn : turns_of(room_drive() / "lidar.pcap", kStands))
       clouds.push_back(cloud_of(turn, kind));
   }
@@ -46,7 +46,7 @@ std::string bin_of(const OwnCloud& cloud) {
 
 using Write = std::function<std::string(const OwnCloud&)>;
 
-/// A folder as EuRoC's: lidar0/data/STAMP.pcd.
+/// Writes a folder in EuRoC's layout: lidar0/data/STAMP.pcd.
 void write_euroc(const path& folder, const Write& text_of, const std::string& extension = "pcd",
                  CloudKind kind = CloudKind::velodyne_start) {
   for (const OwnCloud& cloud : room_clouds(kind))
@@ -60,7 +60,7 @@ std::string in_order(const path& folder, const Write& text_of, const std::string
   return folder;
 }
 
-/// A time for each sweep, in a unit.
+/// Returns the time of each sweep in this unit.
 std::string times_in(const std::string& unit, Duration later = {}) {
   std::string text;
   for (const OwnCloud& cloud : room_clouds()) {
@@ -208,7 +208,7 @@ TEST(SweepFolder, WrongTimesAreNamedWithFileAndLine) {
   expect_refused(drive, {"data.csv:1", "there is no", "gone.pcd"});
 }
 
-/// KITTI's raw data numbers its sweeps by ten digits, as many as seconds since 1970 have.
+/// KITTI's raw data numbers its sweeps with ten digits, as many as seconds since 1970 have.
 TEST(SweepFolder, NumbersOfTenDigitsAreNoTimes) {
   const TemporaryFolder folder;
   for (std::size_t i = 0; i < 3; ++i)

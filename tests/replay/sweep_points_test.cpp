@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of one sweep: PCD in its three encodings, and what is wrong with some.
+// Files of one sweep: PCD in its three encodings, valid and damaged.
 #include <array>
 #include <bit>
 #include <cmath>
@@ -136,7 +136,7 @@ TEST(Lzf, UnpacksWhatWasPacked) {
   }
 }
 
-/// "ab", then four bytes from two back, twice as long as what lies there.
+/// "ab", then a back reference of four bytes at offset two, which overlaps its own output.
 TEST(Lzf, ReferencesMayOverlapWhatTheyMake) {
   const std::string packed{"\x01"
                            "ab"

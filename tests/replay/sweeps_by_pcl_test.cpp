@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// PCD and PLY as PCL reads and writes them, which shares no code with ours.
+// PCD and PLY against PCL's independent reader and writer.
 #include <cstring>
 #include <string>
 
@@ -38,7 +38,7 @@ TEST(SweepsByPcl, PcdAndPlyAreReadWithAllFields) {
   EXPECT_EQ(from_ply.data, from_pcd.data);
 }
 
-/// The other way round: a sweep that PCL has written in each encoding is the one that it has.
+/// The reverse direction: reads sweeps that PCL has written in each encoding.
 TEST(SweepsByPcl, WhatPclWritesIsReadToTheSameBytes) {
   const TemporaryFolder folder;
   ASSERT_EQ(Replay({"--duration", "1", "--sweeps", folder / "sweeps", room_drive()}).run().status, 0);

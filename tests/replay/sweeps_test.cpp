@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What --sweeps writes: the returns of a drive whose world and way are known.
+// Output of --sweeps for a drive with known scene and trajectory.
 #include <algorithm>
 #include <cstring>
 #include <fstream>
@@ -25,7 +25,7 @@ path sweep_file(const path& folder, std::size_t number, const std::string& exten
   return folder / fmt::format("{:06}.{}", number, extension);
 }
 
-/// Behind a header that ends in this line.
+/// Reads the points after a header that ends with this line.
 std::vector<Point> points_of(const path& file, const std::string& last_line = "DATA binary\n") {
   const std::string bytes = read_text(file);
   const std::size_t begin = bytes.find(last_line);
@@ -50,7 +50,7 @@ std::vector<Stamp> stamps_of(const path& folder) {
   return stamps;
 }
 
-/// One run over the drive around the room, with its sweeps.
+/// One run on the drive around the room, with --sweeps.
 struct SweepsOfRoom {
   explicit SweepsOfRoom(std::vector<std::string> arguments = {}) : replay(with(std::move(arguments))) {
     EXPECT_EQ(replay.run().status, 0) << replay.run().err;
@@ -67,7 +67,7 @@ struct SweepsOfRoom {
   }
 };
 
-/// Where the robot of the drive truly was, and whether it turned fast.
+/// True trajectory of the drive.
 const sim::Trajectory& trajectory() {
   static const sim::Trajectory trajectory(sim::room_course(std::chrono::seconds{8}, 1.0), sim::room_start());
   return trajectory;
@@ -75,7 +75,7 @@ const sim::Trajectory& trajectory() {
 
 bool turns_fast(Stamp stamp) { return std::abs(trajectory().at(stamp).angular_velocity_base_radps.z()) > 1.0; }
 
-/// Counts the points that lie farther than `far_m` from every surface of the room.
+/// Counts the points that are farther than `far_m` from every surface of the room.
 class FarOff {
  public:
   explicit FarOff(double far_m) : far_m_(far_m) {}
@@ -95,11 +95,11 @@ class FarOff {
   std::size_t far_ = 0, all_ = 0;
 };
 
-/// Of the points of fast turns, seen from where the robot truly was at the stamp of their sweep.
+/// Fraction of points of fast turns that are off the surfaces, transformed by the true pose at their sweep's stamp.
 double share_far_off(const path& sweeps, double far_m) {
   const std::vector<Stamp> stamps = stamps_of(sweeps);
   FarOff far(far_m);
-  for (std::size_t i = 2; i < stamps.size(); ++i) { // the wheels had not said two things yet
+  for (std::size_t i = 2; i < stamps.size(); ++i) { // the wheels have not delivered two samples yet
     if (!turns_fast(stamps[i]))
       continue;
     const std::vector<Point> points = points_of(sweep_file(sweeps, i));
@@ -109,7 +109,7 @@ double share_far_off(const path& sweeps, double far_m) {
   return far.share();
 }
 
-/// The same of the returns as the lidar measured them.
+/// Same for the raw returns, without de-skew.
 double share_far_off_as_measured(double far_m) {
   FarOff far(far_m);
   const Eigen::Vector3d mounted{0.3, 0, 0.75};
@@ -120,15 +120,15 @@ double share_far_off_as_measured(double far_m) {
   return far.share();
 }
 
-/// Ranges are off by 1 cm (sigma); gyro and wheels by less than a millimetre in a tenth of a second. At 2 rad/s walls
-/// three metres away are off by up to 0.6 m, but the floor is where it was.
+/// Range noise is 1 cm (sigma); gyro and wheels contribute less than 1 mm in 0.1 s. At 2 rad/s the skew of walls three
+/// metres away is up to 0.6 m, that of the floor is zero.
 TEST(Sweeps, PointsOfARobotThatTurnsLieOnTheWallsAndAsMeasuredDoNot) {
   constexpr double kFar_m = 0.04;
   EXPECT_LT(share_far_off(SweepsOfRoom().sweeps, kFar_m), 0.01);
   EXPECT_GT(share_far_off_as_measured(kFar_m), 0.2);
 }
 
-/// Lidar alone: what the ingest could not correct, the odometry did.
+/// Lidar alone: without motion sources the odometry itself de-skews.
 TEST(Sweeps, TheyAreCorrectedByWhatTheOdometryFoundOut) {
   EXPECT_LT(share_far_off(SweepsOfRoom({"--set", "motion_sources=[]"}).sweeps, 0.1), 0.02);
 }
@@ -200,7 +200,7 @@ TEST(Sweeps, SameBitsWithOneAndTwoThreads) {
   EXPECT_GT(files, 25U);
 }
 
-/// Filters choose what is registered, not what is written; but ranges and the robot's own body are left out of both.
+/// Filters affect registration but not the output; range limits and the self filter affect both.
 TEST(Sweeps, FiltersTakeNothingAwayButWhatIsOutOfReach) {
   const SweepsOfRoom all({"--duration", "1"}),
       voxels({"--duration", "1", "--set", "segment_filter.enabled=false", "--set", "voxel_filter.enabled=true"}),
@@ -238,7 +238,7 @@ TEST(SweepsOption, RefusesAFolderThatIsInUseAndFormatsThatAreNone) {
   EXPECT_EQ(read_text(folder / "used/thesis.txt"), "precious");
 }
 
-/// As on a full disk, a file can be no longer than 100 blocks of 512 bytes or 1 kB.
+/// Simulates a full disk: limits the file size to 100 blocks of 512 bytes or 1 kB.
 TEST(SweepsOption, SweepThatCannotBeWrittenEndsTheRun) {
   const TemporaryFolder folder;
   const ProgramRun run =

@@ -11,7 +11,7 @@ namespace {
 
 using nlohmann::json;
 
-/// A run on the packets of the room alone, without the folder's truth.
+/// Arguments of a run on the packets of the room alone, without the folder's truth.
 std::vector<std::string> with(const std::string& option, const std::filesystem::path& file) {
   return {option, file.string(), (room_drive() / "lidar.pcap").string()};
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is unlikely to be what the user meant, and used to pass in silence.
+// Warnings about likely mistakes that used to pass silently.
 #include <fstream>
 #include <functional>
 
@@ -14,7 +14,7 @@
 namespace locus::test {
 namespace {
 
-/// A run that succeeds, with one warning that says all this.
+/// Expects success, and one warning with all these parts.
 void expect_warning(const std::vector<std::string>& arguments, const std::vector<std::string>& said) {
   const Replay replay(arguments);
   EXPECT_EQ(replay.run().status, 0) << replay.run().err;
@@ -29,7 +29,7 @@ TEST(Warnings, NoneWhereAllIsWell) {
   EXPECT_EQ(Replay({"--set", "lidars.front.model=VLP-16", room_drive().string()}).run().err, "");
 }
 
-/// Read as a VLP-32C's, the packets of a VLP-16 make a smooth path through a wrong world.
+/// Decoded as a VLP-32C's, the packets of a VLP-16 yield a smooth trajectory through a wrong scene.
 TEST(Warnings, PacketsOfAnotherModelThanTheConfiguredOne) {
   expect_warning({"--set", "lidars.front.model=VLP-32C", "--duration", "2", room_drive().string()},
                  {"lidar front: configured as VLP-32C", "those of a VLP-16", "--set lidars.front.model=auto"});
@@ -45,7 +45,7 @@ TEST(Warnings, LidarThatIsNotHeardWhileAnotherIs) {
                  {"lidar rear: no valid data packet to port 2369 from 10.0.0.9", "rejected: sender"});
 }
 
-/// Each of the packets of a capture as `change` has it.
+/// Applies `change` to each packet of a capture.
 void rewrite(const std::filesystem::path& from, const std::filesystem::path& to,
              const std::function<void(UdpAddresses&, Bytes&)>& change) {
   auto capture = Capture::open(from);
@@ -58,7 +58,7 @@ void rewrite(const std::filesystem::path& from, const std::filesystem::path& to,
   }
 }
 
-/// The packets of the second lidar were refused, and nobody said so.
+/// Regression: the packets of the second lidar were rejected without a message.
 TEST(Warnings, TwoLidarsOnOnePortAreNamedWithTheConfigurationThatSeparatesThem) {
   const TemporaryFolder folder;
   write_room_drive(folder / "two", std::chrono::seconds{2}, 2);
@@ -98,7 +98,7 @@ TEST(Warnings, PacketsOfAnUnknownModelAreNamedByTheirProductId) {
   EXPECT_NE(none.run().err.find("(product id 0x63 and return mode 0x37 in "), std::string::npos) << none.run().err;
 }
 
-/// Half a turn sees what the half before did not. No source is blamed for that, and the motion sources carry it over.
+/// Consecutive half turns do not overlap. No source is blamed for that, and the motion sources bridge the gaps.
 TEST(Warnings, SweepThatIsShorterThanATurn) {
   const std::vector<std::string> halves = {"--set", "sweep_period_ms=50", "--duration", "6", room_drive().string()};
   expect_warning(halves, {"lidar front: one revolution takes 100 ms, so each sweep of 50 ms covers only",
@@ -106,7 +106,7 @@ TEST(Warnings, SweepThatIsShorterThanATurn) {
   EXPECT_LT(Replay(halves).summary()["ape_m"]["max"], 0.01);
 }
 
-/// The room is driven at up to 1 m/s. What lidar sees stands all the same.
+/// The true speed is up to 1 m/s. Lidar is still correct.
 TEST(Warnings, RobotThatIsFasterThanItIsSaidToBe) {
   const Replay replay({"--set", "motion.max_speed_mps=0.3", room_drive().string()});
   const std::vector<std::string> lines = lines_of(replay.run().err);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Drives with a lidar that is wrong, or sees little but what moves: wheels and gyro know better, and carry.
+// Drives with a faulty lidar, or one that sees mostly moving objects: wheels and gyro carry the odometry.
 #include <string>
 #include <vector>
 
@@ -28,8 +28,7 @@ TEST(WrongLidar, ThatMeasuresTooFarNowAndThenIsOutvoted) {
   }
 }
 
-/// Neither a map that was begun with walls where there are none nor one that was good before must bring down what
-/// comes after the fault.
+/// A map initialised with false walls, and one that was good before the fault, must both recover after it.
 TEST(WrongLidar, ThatMeasuresTooFarAtTheStartBeginsAnew) {
   const SimulatedDrive drive("tunnel", "husky", 60);
   for (const double from_s : {0.0, 1.3, 1.5, 2.0}) {
@@ -40,7 +39,7 @@ TEST(WrongLidar, ThatMeasuresTooFarAtTheStartBeginsAnew) {
   }
 }
 
-/// A truck goes by within a metre, at 11 s.
+/// A truck passes at a distance of less than one metre, at 11 s.
 TEST(PassingVehicle, TakesNobodyAlong) {
   const SimulatedDrive drive("tunnel", "husky", 60, {"--model", "HDL-32E"}, 7101, "real");
   for (const std::vector<std::string>& lost : std::vector<std::vector<std::string>>{
@@ -57,7 +56,7 @@ TEST(WrongLidar, OnlyDustIsBelieved) {
   EXPECT_LT(ape_mean_m(replay), 0.01);
 }
 
-/// No lidar to tell what a gyro reads at rest: wheels tell.
+/// No lidar to estimate the gyro bias: wheels do.
 TEST(WrongLidar, ThatFreezesAtItsFirstPacketLeavesWheelsAndGyro) {
   const SimulatedDrive drive("urban", "husky", 60);
   const Replay replay = drive.replay({"--fail", "top:frozen@0"});

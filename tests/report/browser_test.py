@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""browser_test.py SAMPLE_REPORTS: what headless Chromium makes of the reports that this program writes.
+"""browser_test.py SAMPLE_REPORTS: tests the reports of this program in headless Chromium.
 
-Set LOCUS_SCREENSHOTS to a folder to see what it saw.
+Stores screenshots in the folder LOCUS_SCREENSHOTS if that is set.
 """
 import os
 import shutil
@@ -12,13 +12,13 @@ import tempfile
 import unittest
 
 sys.path.append(os.path.join(os.path.dirname(__file__), "../support"))
-from browser import Browser  # it ends the program where there is none
+from browser import Browser  # exits if there is no browser
 from selenium.webdriver import ActionChains
 
 FIGURES = {"plan", "map", "side", "boxes", "timeline"}
 TABLES = {"stages", "packets", "sources", "configuration"}
 
-# Contrast of two colours after WCAG 2.
+# Contrast ratio of two colours by WCAG 2.
 CONTRAST = """
   const [names] = arguments, style = getComputedStyle(document.documentElement);
   const luminance = (name) => {

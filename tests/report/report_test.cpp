@@ -28,7 +28,7 @@ std::string written(const SampleRun& run) {
   return {std::istreambuf_iterator<char>{stream}, {}};
 }
 
-/// The run as a browser would read it: up to the first thing that ends a script element.
+/// Returns the run as a browser parses it: up to the first text that ends a script element.
 json run_in(const std::string& page) {
   const std::string begin = R"(<script type="application/json" id="run">)";
   const std::size_t first = page.find(begin) + begin.size();

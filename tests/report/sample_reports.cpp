@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// sample-reports FOLDER: reports of runs that nobody drove, for the browser to show.
+// sample-reports FOLDER: writes reports of made-up runs for the browser test.
 #include <cstdlib>
 #include <filesystem>
 
@@ -7,7 +7,7 @@
 
 namespace {
 
-/// What would break out of the page, did nobody see to it.
+/// Text that would break out of the page if it were not escaped.
 constexpr const char* kHostile = "</script><script>window.broken_out = true</script><!--<b> \xff.pcap";
 
 } // namespace

@@ -47,7 +47,7 @@ SweepRecord sweep_at(double t_s) {
   return sweep;
 }
 
-/// Houses of 20 m along streets of 10 m, a surface every half metre of their walls.
+/// Houses of 20 m along streets of 10 m, with a surface every 0.5 m of their walls.
 std::vector<SurfacePoint> town(int blocks_a_side) {
   std::vector<SurfacePoint> map;
   const auto wall = [&](const Eigen::Vector3f& corner, const Eigen::Vector3f& along, const Eigen::Vector3f& normal) {
@@ -83,7 +83,7 @@ ordered_json source_summary(int rejected) {
           {"health_changes", rejected}};
 }
 
-/// With the keys that summary.json has.
+/// A summary with the keys of summary.json.
 ordered_json summary_of(const std::string& capture, double duration_s, std::size_t sweeps) {
   const ordered_json packets{{"received", 1'000'000},
                              {"data", 900'000},

@@ -10,12 +10,12 @@
 
 namespace locus::test {
 
-/// A run that nobody drove: rounds through a town on a grid of streets, with a lidar and a source that fail on the way.
+/// A made-up run: laps through a town on a grid of streets, with temporary failures of a lidar and a source.
 struct SampleRun {
-  /// At ten sweeps a second, with truth at a hundred poses a second. From ten minutes on the town has more surfaces
-  /// than the page may show.
+  /// Ten sweeps per second, true poses at 100 Hz. From ten minutes on the town has more surfaces than the page may
+  /// show.
   static SampleRun of(std::chrono::seconds length, const std::string& capture);
-  /// A moment without truth, map or motion sources.
+  /// A short run without truth, map or motion sources.
   static SampleRun bare();
 
   [[nodiscard]] tools::Report report() const {

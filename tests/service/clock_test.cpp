@@ -16,7 +16,7 @@ using std::chrono::hours;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// The clock of the service, and of nobody else, is set while the robot drives.
+/// Steps the clock of the service alone while the robot drives.
 class HostClock : public RobotNetwork {
  protected:
   void set(Duration offset) {
@@ -25,7 +25,7 @@ class HostClock : public RobotNetwork {
         reinterpret_cast<const char*>(&ns), sizeof(ns)); // NOLINT(bugprone-narrowing-conversions)
   }
 
-  /// The service, with this clock.
+  /// Returns the command of a service with this clock.
   [[nodiscard]] std::vector<std::string> locusd_with_clock(const std::filesystem::path& config) const {
     std::ofstream{file("clock"), std::ios::binary} << std::string(sizeof(SimulatedTime), '\0');
     std::vector<std::string> command = locusd(config);
@@ -34,7 +34,7 @@ class HostClock : public RobotNetwork {
     return command;
   }
 
-  /// Whether both peers go on hearing estimates.
+  /// Returns whether both peers continue to receive estimates.
   static bool is_heard(const Child& cyclone, const Child& fast_dds) {
     const auto estimates = [](const std::vector<std::string>& lines) {
       return std::ranges::count_if(lines, [](const std::string& line) { return line.starts_with("odometry "); });
@@ -55,7 +55,7 @@ TEST_F(HostClock, ThatIsSetBackAndForwardLeavesEveryListenerItsOdometry) {
   ASSERT_TRUE(hears_the_service(cyclone) && hears_the_service(fast_dds));
   const Child play(endlessly(drive));
   ASSERT_TRUE(is_heard(cyclone, fast_dds));
-  // Whom a participant does not hear of for ten seconds it takes to be gone.
+  // A participant's lease expires after ten seconds of silence.
   for (const auto& [offset, lasts] : {std::pair{-hours{1}, seconds{12}}, {hours{1}, seconds{1}}}) {
     set(offset);
     std::this_thread::sleep_for(lasts);
@@ -66,7 +66,7 @@ TEST_F(HostClock, ThatIsSetBackAndForwardLeavesEveryListenerItsOdometry) {
   EXPECT_EQ(daemon.wait_for_exit(), 0) << testing::PrintToString(daemon.lines());
 }
 
-/// In real time: all that the sensors sent is there, and the way is that of the replay.
+/// Real time: nothing that the sensors sent is missing, and the path equals the replay's.
 TEST_F(HostClock, ThatIsSetBackAndForwardCostsNoPacketAndNoSource) {
   const std::filesystem::path drive = plant();
   Child daemon(locusd_with_clock(drive / "config.yaml"));
@@ -88,7 +88,7 @@ TEST_F(HostClock, ThatIsSetBackAndForwardCostsNoPacketAndNoSource) {
   EXPECT_LT((heard_last.translation - there.translation).norm(), 0.05);
 }
 
-/// Where no message wakes who waits for one.
+/// No traffic: no message wakes the waiting threads.
 TEST_F(HostClock, ThatIsSetBackWhileNothingComesLeavesTheWatchdogFed) {
   NotifySocket systemd(file("notify"));
   setenv("WATCHDOG_USEC", "600000", 1); // NOLINT(concurrency-mt-unsafe)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A lidar whose driver publishes clouds, live.
+// Live clouds of lidar drivers.
 #include <csignal>
 #include <fstream>
 
@@ -23,7 +23,7 @@ class LiveClouds : public RobotNetwork {
 
 class LiveCloudsOf : public LiveClouds, public testing::WithParamInterface<const char*> {};
 
-/// All that reach the service are used, none is refused, and the robot stands.
+/// Every cloud that reaches the service is used, none is rejected, and the robot stands.
 TEST_P(LiveCloudsOf, AreUsedAsTheyCome) {
   const Child daemon(locusd(written(kConfig)));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
@@ -49,7 +49,7 @@ TEST_P(LiveCloudsOf, AreUsedAsTheyCome) {
   EXPECT_EQ(clouds["times"], "field");
 }
 
-/// A measurement of the machine, too.
+/// Depends on the speed of the machine.
 TEST_P(LiveCloudsOf, AreAsManyAsWerePublished) {
   const Child daemon(locusd(written(kConfig)));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
@@ -72,7 +72,7 @@ TEST_F(LiveClouds, DriverThatIsMissingIsNamed) {
   EXPECT_TRUE(daemon.wait_for_line("lidar top: no cloud on topic /points for 5 s"));
 }
 
-/// Nothing that waits for clouds waits for ever, and whoever comes back is heard.
+/// No wait for clouds is indefinite, and a publisher that returns is received.
 TEST_F(LiveClouds, DriverThatIsRestartedIsHeardAgain) {
   Child daemon(locusd(written(kConfig)));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));

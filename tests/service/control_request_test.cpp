@@ -79,7 +79,7 @@ TEST(ControlRequest, PoseIsOneThatARobotCanHave) {
         << pose;
 }
 
-/// A server that a test calls, and those who call there.
+/// A server driven by the test, and its clients.
 class ControlOnCall : public testing::Test {
  protected:
   void SetUp() override {
@@ -103,7 +103,7 @@ class ControlOnCall : public testing::Test {
     Descriptor client;
     std::thread([&] {
       constexpr int kNobody = 65534;
-      syscall(SYS_setgroups, 0, nullptr); // of this thread alone
+      syscall(SYS_setgroups, 0, nullptr); // this thread only
       syscall(SYS_setresuid, kNobody, kNobody, kNobody);
       client = connected();
     }).join();
@@ -114,7 +114,7 @@ class ControlOnCall : public testing::Test {
     EXPECT_EQ(::send(client.number(), request.data(), request.size(), MSG_NOSIGNAL),
               static_cast<ssize_t>(request.size()));
   }
-  /// What it was answered, and was not told yet; empty where the server has hung up.
+  /// Returns the next answer, nothing if there is none yet, and an empty string if the server has hung up.
   static std::optional<std::string> answer(const Descriptor& client) {
     std::array<char, 4096> text{};
     const ssize_t size = recv(client.number(), text.data(), text.size(), MSG_DONTWAIT);
@@ -127,7 +127,7 @@ class ControlOnCall : public testing::Test {
   std::optional<ControlServer> server_;
 };
 
-/// Whoever calls serve() pauses after it: however much they ask, so many answers are all that they cost.
+/// The caller of serve() pauses after it, so that requests cost at most this many answers per round.
 TEST_F(ControlOnCall, AnswersEachOfSixteenOnceARound) {
   std::vector<Descriptor> clients;
   for (std::size_t i = 0; i < ControlServer::kMaxClients; ++i) {

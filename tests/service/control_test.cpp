@@ -38,7 +38,7 @@ class Control : public RobotNetwork {
     return {LOCUSCTL, "--socket", control().string(), "status", "--watch"};
   }
 
-  /// Of a core, what the service takes while this goes on.
+  /// Returns the CPU time of the service during `meanwhile`, as a fraction of a core.
   [[nodiscard]] double cpu_share(const std::function<void()>& meanwhile) const {
     const nlohmann::json before = status();
     meanwhile();
@@ -47,14 +47,14 @@ class Control : public RobotNetwork {
     return grown_s("cpu_s") / grown_s("duration_s");
   }
 
-  /// locusctl as somebody who is neither root nor in any group of ours.
+  /// Runs locusctl as a user that is neither root nor in the service's group.
   [[nodiscard]] ProgramRun as_stranger(std::vector<std::string> words) const {
     words.insert(words.begin(), {"--socket", control().string()});
     return as_nobody("--clear-groups", words);
   }
 
   [[nodiscard]] ProgramRun as_nobody(const std::string& groups, std::vector<std::string> words) const {
-    const std::filesystem::path locusctl = file("locusctl"); // where everybody can reach it
+    const std::filesystem::path locusctl = file("locusctl"); // executable for every user
     if (!std::filesystem::exists(locusctl))
       std::filesystem::copy_file(LOCUSCTL, locusctl);
     chmod(locusctl.parent_path().c_str(), 0755);
@@ -69,7 +69,7 @@ bool same(const termios& a, const termios& b) {
          std::memcmp(a.c_cc, b.c_cc, sizeof(a.c_cc)) == 0;
 }
 
-/// Watches until `ends` is typed; the terminal then is as it was found.
+/// Watches until `ends` is typed, and expects the terminal settings to be restored.
 void expect_watch_ends(const std::vector<std::string>& command, const std::string& ends) {
   Terminal terminal(command);
   ASSERT_TRUE(terminal.shows("sweeps"));
@@ -154,7 +154,7 @@ TEST_F(Control, StrangersMayLookAndNotTouch) {
   EXPECT_EQ(status()["flat_ground"], "off");
 }
 
-/// Somebody with a local account and nothing better to do.
+/// A hostile local client without privileges.
 class Pest {
  public:
   Pest(std::string path, bool speaks) : path_(std::move(path)), speaks_(speaks) {
@@ -170,17 +170,17 @@ class Pest {
   Pest& operator=(const Pest&) = delete;
 
   [[nodiscard]] int answers() const { return answers_; }
-  /// Connections that the service let in or lets wait.
+  /// Returns the rate of successful connections, accepted or queued.
   [[nodiscard]] double calls_per_s() const {
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin_;
     return calls_ / elapsed.count();
   }
 
  private:
-  /// Asks, if it speaks at all, on connections that it makes anew each time, and keeps a hundred that never say a word.
+  /// Opens new connections all the time and keeps the last hundred silent ones open. Sends requests if `speaks_`.
   void run() {
     constexpr int kNobody = 65534;
-    syscall(SYS_setgroups, 0, nullptr); // of this thread alone
+    syscall(SYS_setgroups, 0, nullptr); // this thread only
     syscall(SYS_setresuid, kNobody, kNobody, kNobody);
     const auto call = [&] {
       const int socket = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
@@ -196,7 +196,7 @@ class Pest {
       if (idle > 0)
         close(idle);
       idle = call();
-      if (!speaks_) { // ten thousand times a second, and does not take the processors itself
+      if (!speaks_) { // 10 000 times a second by all threads, without occupying the processors
         std::this_thread::sleep_for(std::chrono::microseconds{300});
         continue;
       }
@@ -240,8 +240,8 @@ TEST_F(Control, StrangersWhoAskWithoutEndKeepNobodyOut) {
   }
 }
 
-/// What strangers cost is measured by what the odometry costs on the same machine; how often they get in is bounded by
-/// the clock, and no machine is too slow for that.
+/// The cost of strangers is compared with that of the odometry on the same machine. Their rate is bounded by time, and
+/// holds on any machine.
 TEST_F(Control, StrangersWhoAskWithoutEndCostLittle) {
   if (geteuid() != 0)
     GTEST_SKIP() << "no second user to be: run as root";
@@ -250,7 +250,7 @@ TEST_F(Control, StrangersWhoAskWithoutEndCostLittle) {
   Child play({LOCUS_PLAY, capture().string()});
   ASSERT_TRUE(daemon.wait_for_line("tracking"));
   chmod(control().parent_path().c_str(), 0755);
-  constexpr std::chrono::seconds kWhile{3}; // three times, within the twenty seconds of the drive
+  constexpr std::chrono::seconds kWhile{3}; // measured three times within the twenty seconds of the drive
   const double alone = cpu_share([&] { std::this_thread::sleep_for(kWhile); });
   RecordProperty("cpu_share_alone", std::to_string(alone));
   for (const bool speaks : {true, false}) {
@@ -273,7 +273,7 @@ TEST_F(Control, StrangersWhoAskWithoutEndCostLittle) {
   EXPECT_EQ(after["sweeps"]["dropped"], 0);
 }
 
-/// The service is an instance with a name, and the group one that nobody else on this machine knows.
+/// The service is a named instance, and its group exists only in this test.
 TEST_F(Control, MembersOfTheGroupMayCommandAnInstanceByItsName) {
   if (unshare(CLONE_NEWNS) != 0 || mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
       mount("tmpfs", "/run", "tmpfs", 0, nullptr) != 0)
@@ -308,7 +308,7 @@ TEST_F(Control, SensorsAreFoundWithoutAServiceAndByAnybody) {
   EXPECT_NE(sensors.out.find("model: VLP-16, port: 2368"), std::string::npos) << sensors.out;
 }
 
-/// In place of a service whose disk takes longer than anybody waits for a status.
+/// A stand-in for a service whose disk is slower than the timeout of a status request.
 TEST_F(Control, WhatTheServiceMayWaitForADiskForIsWaitedForLonger) {
   std::filesystem::create_directories(control().parent_path());
   const int service = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// DDS Security as docs/examples/dds-security.sh sets it up.
+// DDS Security as set up by docs/examples/dds-security.sh.
 #include <algorithm>
 #include <cstdlib>
 #include <fstream>
@@ -29,8 +29,8 @@ class DdsSecurity : public RobotNetwork {
   }
 };
 
-/// While one who may hears the robot and is heard, one without credentials, one with those of another authority and one
-/// whose permissions do not allow it hear nothing and are not heard.
+/// A permitted participant exchanges data with the robot. Meanwhile participants without credentials, with those of
+/// another authority, or without permission neither receive nor are received.
 TEST_F(DdsSecurity, WhoHasNoCredentialsNeitherHearsNorIsHeard) {
   const std::filesystem::path ours = enclaves("ours"), theirs = enclaves("theirs");
   Child daemon(locusd(secured(ours / "locusd")));
@@ -70,7 +70,7 @@ TEST_F(DdsSecurity, ViewerSeesTheNode) {
   EXPECT_TRUE(viewer.wait_for_line("node / locusd ")) << testing::PrintToString(viewer.lines());
 }
 
-/// Of an enclave that was made before there was a node to be seen.
+/// An enclave from before the service had a ROS node: no permission for ros_discovery_info.
 TEST_F(DdsSecurity, WithoutPermissionForItsNodeAllElseGoesOn) {
   const std::filesystem::path old = file("old.sh");
   std::string script = read_text(DDS_SECURITY);

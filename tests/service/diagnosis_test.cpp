@@ -22,7 +22,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// What is wrong with the sensors, the network and the machine is said by the service itself.
+/// Diagnostics of sensors, network and machine that the service itself reports.
 class Diagnosis : public RobotNetwork {};
 
 TEST_F(Diagnosis, SensorsThatAreNotHeardAreNamedWithTheInterfaceOfDds) {
@@ -31,11 +31,11 @@ TEST_F(Diagnosis, SensorsThatAreNotHeardAreNamedWithTheInterfaceOfDds) {
   EXPECT_TRUE(daemon.wait_for_line("no publisher found for /wheel_odometry; DDS uses interface lo"));
   EXPECT_TRUE(daemon.wait_for_line("lidar front: no data packet on UDP port 2368"));
   EXPECT_EQ(status()["state"], "waiting");
-  Child play(endlessly(capture())); // switched on at last
+  Child play(endlessly(capture())); // sensors switched on
   EXPECT_TRUE(daemon.wait_for_line("tracking"));
 }
 
-/// What is said changes with what is found: at first nothing comes.
+/// The message follows the diagnosis: at first there are no packets at all.
 TEST_F(Diagnosis, LidarOfAnotherAddressIsNamedWithBoth) {
   const std::filesystem::path wrong = lidar_with("source_ip: 192.168.1.77");
   Child daemon(locusd(wrong));
@@ -50,7 +50,7 @@ TEST_F(Diagnosis, LidarOfAnotherAddressIsNamedWithBoth) {
   EXPECT_NE(shown.find("the last sender: 127.0.0.1"), std::string::npos) << shown;
 }
 
-/// Half of what came was refused, and nobody said so.
+/// Regression: half of the packets were rejected without a message.
 TEST_F(Diagnosis, SecondLidarOnThePortIsNamedWithTheConfigurationOfBoth) {
   Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
@@ -78,7 +78,7 @@ TEST_F(Diagnosis, SecondLidarOnThePortIsNamedWithTheConfigurationOfBoth) {
       << "it sends no more";
 }
 
-/// Sends data packets as a VLP-16 does, but for their product id, until it is gone.
+/// Sends data packets of a VLP-16 with another product id until it is destroyed.
 std::jthread unknown_device(const std::filesystem::path& capture, std::byte product_id,
                             std::uint32_t from_ip = INADDR_ANY) {
   std::vector<std::byte> packet;
@@ -113,7 +113,7 @@ TEST_F(Diagnosis, UnknownProductIdIsSaidByTheServiceAndByLocusctlSensors) {
   EXPECT_TRUE(contains(alone.err, "no lidar was heard")) << alone.err;
 }
 
-/// What can be read is listed for the configuration, and the other device told of beside it.
+/// Readable lidars are listed with their configuration, the unknown device on a separate line.
 TEST_F(Diagnosis, UnknownProductIdBesideALidarIsToldOnALineOfItsOwn) {
   const std::jthread device = unknown_device(capture(), std::byte{0x31}, INADDR_LOOPBACK + 1);
   const Child play(endlessly(capture()));
@@ -125,7 +125,7 @@ TEST_F(Diagnosis, UnknownProductIdBesideALidarIsToldOnALineOfItsOwn) {
   EXPECT_TRUE(contains(both.out, "model: VLP-16, port: 2368, T_base_lidar")) << both.out;
 }
 
-/// From the address of the lidar, so that its model alone tells it from one.
+/// The packets have the lidar's address; only the model differs.
 TEST_F(Diagnosis, UnknownProductIdIsNoProblemOfALidarAnyMoreOnceItIsGone) {
   Child daemon(locusd(lidar_with("model: auto")));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
@@ -153,7 +153,7 @@ TEST_F(Diagnosis, LidarOnAnotherPortIsToldByItsPositionPackets) {
 
 const std::regex kRateOfLidar{R"(lidar front: VLP-16 at 127\.0\.0\.1 to port 2368, (\d+) packets/s)"};
 
-/// Beside a service that listens to the same, and goes on.
+/// Runs beside a service that receives the same packets and is not disturbed.
 TEST_F(Diagnosis, ConfigurationIsComparedWithTheWire) {
   const auto compare = [](const std::filesystem::path& with) {
     return run_program(LOCUSD, {"--config", with.string(), "--check-config", "--live"});
@@ -196,7 +196,7 @@ TEST_F(Diagnosis, ConfigurationIsComparedWithTheWire) {
   EXPECT_TRUE(status_comes([&](const nlohmann::json& status) { return packets(status) > before; }));
 }
 
-/// A measurement of the machine, too.
+/// Depends on the speed of the machine.
 TEST_F(Diagnosis, ComparisonCountsWhatComesAndTakesNothingFromTheService) {
   const Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
@@ -232,7 +232,7 @@ TEST_F(Diagnosis, AccelerationsInGAreNamed) {
   EXPECT_NE(ctl({"status"}).out.find("as if in g"), std::string::npos);
 }
 
-/// Wheels of which nothing is wrong but the scale, and lidar: who is right is not known to the service.
+/// Only the scale of the wheels is wrong. The service cannot know whether wheels or lidar are right.
 TEST_F(Diagnosis, WheelsAndLidarThatDisagreeAreSaidWithAllPossibleCauses) {
   const std::filesystem::path drive = file("scaled");
   std::filesystem::copy(capture(), drive);
@@ -272,7 +272,7 @@ TEST_F(Diagnosis, SweepsThatAreShorterThanATurnAreSaidOnce) {
             1);
 }
 
-/// The service's watch over figures that a test makes up, in a time that passes only where the test says so.
+/// The service's monitoring with figures and time set by the test.
 class WatchedFigures : public testing::Test {
  protected:
   void SetUp() override {
@@ -280,7 +280,7 @@ class WatchedFigures : public testing::Test {
     static_cast<void>(said_after(Duration::zero()));
   }
 
-  /// What is said at a look that comes so much after the last one.
+  /// Returns the messages of a check this long after the previous one.
   std::vector<std::string> said_after(Duration time) {
     now_ += time;
     figures_.duration += time;
@@ -359,7 +359,7 @@ TEST_F(WatchedFigures, TellOfDroppedSweepsEveryFiveSeconds) {
   EXPECT_EQ(said_after(kPatience), Lines{});
 }
 
-/// Without the right to go beyond what the kernel allows to all, as systemd starts it.
+/// Without the capability to exceed the kernel's limit, as under systemd.
 TEST_F(Diagnosis, BufferThatIsSmallerThanAskedForIsSaidWithTheSettingToChange) {
   int allowed = UdpSocket::kWantedBufferBytes;
   std::ifstream("/proc/sys/net/core/rmem_max") >> allowed;

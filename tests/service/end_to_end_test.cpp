@@ -13,8 +13,8 @@ using std::chrono::seconds;
 
 class EndToEnd : public RobotNetwork {};
 
-/// Every pose of the replay was heard, and is the same to 1 cm and 0.1 degrees. Stamps differ by what the jitter of
-/// arrivals does to a clock that is set by them.
+/// Expects every pose of the replay to be received, equal to 1 cm and 0.1 degrees. Stamps differ because arrival jitter
+/// changes the estimated clock offset.
 void expect_same(const std::vector<StampedPose>& replay, const std::vector<HeardPose>& heard, Duration shift,
                  const std::string& who) {
   double worst_m = 0, worst_deg = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Somebody on the robot's networks who sends as fast as it goes.
+// Floods on the robot's networks.
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -24,8 +24,7 @@ using nlohmann::json;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// Garbage to the ports of the lidars from another address than theirs, as fast as the kernel takes it, by a thread of
-/// its own.
+/// Sends garbage to the lidar ports from another address at the maximum rate, on its own thread.
 class UdpFlood {
  public:
   UdpFlood() : thread_([this] { run(); }) {}
@@ -33,7 +32,7 @@ class UdpFlood {
   UdpFlood(const UdpFlood&) = delete;
   UdpFlood& operator=(const UdpFlood&) = delete;
 
-  /// Datagrams sent.
+  /// Stops the thread; returns the number of datagrams sent.
   std::uint64_t stop() {
     stopping_ = true;
     if (thread_.joinable())
@@ -72,7 +71,7 @@ class UdpFlood {
 
 class Flood : public RobotNetwork {
  protected:
-  /// By name: figures over the seconds of a flood.
+  /// Records a named figure of the flood.
   void record(const char* name, double value) const { RecordProperty(name, std::to_string(value)); }
 };
 
@@ -88,8 +87,7 @@ std::uint64_t sum_but_stale(json counts) {
   return sum(counts);
 }
 
-/// Every datagram is accounted for, the lidar's and the others': decoded, refused with a reason, or kept out by the
-/// kernel.
+/// Every datagram of lidar and flood is accounted for: decoded, rejected with a reason, or filtered by the kernel.
 TEST_F(Flood, OfGarbageOnTheLidarsPortsCostsNoPacketOfTheLidar) {
   Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
@@ -125,10 +123,10 @@ TEST_F(Flood, OfGarbageOnTheLidarsPortsCostsNoPacketOfTheLidar) {
   record("cpu_share", cpu_share);
 }
 
-/// The inputs by DDS belong to who had them first, and what a source says that nobody was before is judged.
+/// DDS inputs belong to their first publisher. Data of a source that had no publisher before is validated.
 class FloodOfDds : public Flood {
  protected:
-  /// Memory is measured, and the address sanitizer would keep what was freed.
+  /// Limits the quarantine of AddressSanitizer, which retains freed memory: the test measures memory.
   FloodOfDds() {
     setenv("ASAN_OPTIONS", "quarantine_size_mb=8", 1); // NOLINT(concurrency-mt-unsafe): before the programs are started
   }
@@ -145,8 +143,8 @@ class FloodOfDds : public Flood {
   }
 };
 
-/// On two cores, both of which the flood can take, a source may be silent for a moment; no sample is refused for what
-/// the flood says.
+/// The flood can occupy both cores, so that a source may be silent for a moment; none of its samples may be rejected
+/// because of the flood.
 TEST_F(FloodOfDds, BesideTheSensorsChangesNothingButACounter) {
   const Replay replay({"--quiet", capture().string()});
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
@@ -187,7 +185,7 @@ TEST_F(FloodOfDds, BesideTheSensorsChangesNothingButACounter) {
   EXPECT_EQ(after["sweeps"]["dropped"], 0);
 }
 
-/// Nobody else publishes these topics at first: then the flood is the source, and lidar carries the odometry.
+/// The flood is the first publisher of these topics and becomes the source; lidar carries the odometry.
 TEST_F(FloodOfDds, AsTheOnlySourceIsJudgedUnfitAndLidarGoesOn) {
   Child daemon(locusd(with_health_topic()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
@@ -208,7 +206,8 @@ TEST_F(FloodOfDds, AsTheOnlySourceIsJudgedUnfitAndLidarGoesOn) {
   EXPECT_LT(after["peak_rss_mb"].get<double>(), before["peak_rss_mb"].get<double>() + 50);
   record("motion_drops", after["dropped"]["motion_samples"].get<double>());
   record("cpu_share", (after["cpu_s"].get<double>() - before["cpu_s"].get<double>()) / 6);
-  // Who goes leaves the topic to the next one, who begins only now: a flood keeps newcomers from being found.
+  // An ended publisher frees the topic for the next one. The sensors start only now, because the flood would prevent
+  // their discovery.
   flood.close_stdin();
   ASSERT_EQ(flood.wait_for_exit(), 0) << testing::PrintToString(flood.lines());
   play.reset();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// REP 103 and REP 105: what a drive of the real service looks like to a listener, against the truth of the simulation.
+// REP 103 and REP 105: messages of the real service against the truth of the simulation.
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -26,7 +26,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 namespace ros = daemon::ros;
 
-/// A pose as a message tells it, in both frames that the message names.
+/// A pose as published, and both frame ids of the message.
 struct HeardFrames {
   std::string frame, child;
   Stamp stamp;
@@ -50,7 +50,7 @@ Matrix6 covariance_of(const double* row_major) {
   return Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(row_major);
 }
 
-/// What a node hears that subscribes to all of it.
+/// Subscribes to all topics of the service.
 class Listener {
  public:
   explicit Listener(const DdsNode& node)
@@ -60,7 +60,7 @@ class Listener {
         diagnostics_reader_(node, "/diagnostics", TopicQos::standard()),
         thread_([this](const std::stop_token& stop) { hear(stop); }) {}
 
-  /// Whether it hears all of it from now on: the service learns of readers in the order of their making.
+  /// Returns whether all topics are received from now on: the service discovers readers in the order of their creation.
   bool hears_the_service() {
     return comes_true([this] {
       return odometry_reader_.writers() > 0 && fast_reader_.writers() > 0 && tf_reader_.writers() > 0 &&
@@ -119,10 +119,10 @@ class Listener {
   DdsReader<ros::PointCloud2> cloud_reader_;
   DdsReader<ros::DiagnosticArray> diagnostics_reader_;
   std::atomic<bool> diagnosed_{false};
-  std::jthread thread_; ///< hears as long as it runs
+  std::jthread thread_; ///< receives until stopped
 };
 
-/// The simulated drive: laps to the left around a room, whose walls are at x = +-5 m and y = +-4 m.
+/// The simulated drive: left-hand laps around a room with walls at x = +-5 m and y = +-4 m.
 class Truth {
  public:
   explicit Truth(const std::filesystem::path& file) : poses_(read_tum(file)) {}
@@ -138,9 +138,9 @@ class Truth {
   }
 
   struct Motion {
-    Eigen::Vector3d linear, angular; ///< in the frame of the body
+    Eigen::Vector3d linear, angular; ///< body frame
   };
-  /// While it moves evenly, within a quarter of a second before this instant and a tenth after it.
+  /// Returns the motion if it is uniform from 0.25 s before this instant to 0.1 s after it.
   [[nodiscard]] std::optional<Motion> even_motion(Stamp stamp) const {
     std::optional<Motion> first;
     for (Duration offset = milliseconds{-250}; offset < milliseconds{100}; offset += milliseconds{50}) {
@@ -174,7 +174,7 @@ void expect_names_and_order(const auto& heard, const std::string& what) {
   }
 }
 
-/// Metres, radians, x forward, y left, z up, counted from where the robot began.
+/// Metres, radians, x forward, y left, z up, relative to the robot's start.
 void expect_true_poses(const std::vector<HeardOdometry>& heard, const Truth& truth, Duration shift) {
   int compared = 0;
   for (const HeardOdometry& one : heard)
@@ -187,7 +187,7 @@ void expect_true_poses(const std::vector<HeardOdometry>& heard, const Truth& tru
   EXPECT_GT(compared, 150);
 }
 
-/// REP 105: a robot of 1 m/s and 2 rad/s is a little further each tenth of a second, and never elsewhere.
+/// REP 105: the pose is continuous, within 1 m/s and 2 rad/s.
 void expect_continuous(const std::vector<HeardOdometry>& heard) {
   for (std::size_t i = 1; i < heard.size(); ++i) {
     const Pose step = heard[i - 1].pose().inverse() * heard[i].pose();
@@ -197,9 +197,9 @@ void expect_continuous(const std::vector<HeardOdometry>& heard) {
   }
 }
 
-/// The twist is in the child frame: forward is +x whichever way the robot heads, and to the left is +z.
+/// The twist is in the child frame: forward is +x at any heading, and a left turn is +z.
 void expect_true_twists(const std::vector<HeardOdometry>& heard, const Truth& truth, Duration shift) {
-  std::set<int> headings; // quarters of the circle
+  std::set<int> headings; // quadrants
   int turning = 0;
   for (const HeardOdometry& one : heard) {
     const auto motion = truth.even_motion(one.stamp - shift);
@@ -247,7 +247,7 @@ void expect_transforms_of(const std::vector<HeardOdometry>& odometry, const std:
     }
 }
 
-/// Points of the base frame lie in the room once they are moved to where the robot is.
+/// Points in the base frame lie on the room once transformed by the pose.
 void expect_clouds_in_the_room(const std::vector<HeardCloud>& clouds, const std::vector<HeardOdometry>& odometry,
                                const Truth& truth, Duration shift) {
   constexpr double kTolerance_m = 0.2;
@@ -257,7 +257,7 @@ void expect_clouds_in_the_room(const std::vector<HeardCloud>& clouds, const std:
   for (const HeardCloud& cloud : clouds) {
     EXPECT_EQ(cloud.frame, "base_link");
     const HeardOdometry* const at = same_time(odometry, cloud.stamp);
-    if (at == nullptr || !truth.at(cloud.stamp - shift)) // the lidar is off by then
+    if (at == nullptr || !truth.at(cloud.stamp - shift)) // the lidar is switched off by then
       continue;
     const Pose T_world_base = truth.start() * at->pose();
     const auto inside = std::ranges::count_if(cloud.points, [&](const Eigen::Vector3d& p) {

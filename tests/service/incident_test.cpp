@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the service keeps of an incident, and what locus-replay makes of it.
+// Incident recordings of the service, and their replay.
 #include <algorithm>
 #include <chrono>
 #include <csignal>
@@ -52,15 +52,15 @@ std::uint64_t bytes_in(const path& folder) {
 
 class Incident : public RobotNetwork {
  protected:
-  /// With a folder of its own for what is to survive a crash, on another disk than the state as it is on a robot. Both
-  /// are in memory: how long a disk takes is no matter of these tests.
+  /// Mounts separate file systems for the state and for the crash-safe input, as on a robot. Both are in memory, so
+  /// that disk latency does not matter.
   void SetUp() override {
     RobotNetwork::SetUp();
     if (IsSkipped() || HasFatalFailure())
       return;
     if (unshare(CLONE_NEWNS) != 0 || mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0)
       GTEST_SKIP() << "no mounts of one's own: run as root, or allow user namespaces";
-    ASSERT_EQ(mount("state", file("").c_str(), "tmpfs", 0, "size=64g"), 0); // of which next to nothing is used
+    ASSERT_EQ(mount("state", file("").c_str(), "tmpfs", 0, "size=64g"), 0); // sparse: almost nothing is used
     std::filesystem::create_directory(file("run"));
     ASSERT_EQ(mount("run", file("run").c_str(), "tmpfs", 0, "size=400m"), 0);
     setenv("RUNTIME_DIRECTORY", file("run").c_str(), 1); // NOLINT(concurrency-mt-unsafe)
@@ -84,7 +84,7 @@ class Incident : public RobotNetwork {
     EXPECT_EQ(run.status, 0) << run.err;
     return nlohmann::json::parse(run.out, nullptr, false)["incidents"];
   }
-  /// Whether the lidar comes to have sent this part of the drive.
+  /// Waits until the lidar has sent this fraction of the drive.
   [[nodiscard]] bool has_driven(double part) const {
     const double wanted = part * static_cast<double>(datagrams_in(plant() / "lidar.pcap"));
     return comes_true([&] {
@@ -108,9 +108,9 @@ class Incident : public RobotNetwork {
     ASSERT_TRUE(daemon_->wait_for_line("tracking"));
   }
 
-  /// At least so many poses of the replay are those that were heard, once both begin at the same one. A replay that
-  /// begins in mid-drive cuts its sweeps elsewhere: between two that were heard, a tenth of a second apart, the robot
-  /// drives straight on.
+  /// Expects at least `poses` poses of the replay to equal the live ones, after alignment of the first common pose. A
+  /// replay that starts in mid-drive cuts its sweeps at other times: live poses, 0.1 s apart, are interpolated
+  /// linearly.
   static void expect_same_estimates(const Replay& replay, const std::vector<HeardPose>& live, std::size_t poses) {
     std::optional<Pose> T_live_replay;
     Eigen::Vector3d last = Eigen::Vector3d::Zero();
@@ -143,7 +143,7 @@ class Incident : public RobotNetwork {
     RecordProperty("worst_mm_of_" + std::to_string(compared), std::to_string(1e3 * worst_m));
   }
 
-  /// Asks in mid-drive, and replays what was kept once the drive has ended.
+  /// Requests an incident in mid-drive, and replays the recording after the drive.
   void keep_and_replay(const std::string& record, const std::function<void(const Replay&)>& judge) {
     ASSERT_NO_FATAL_FAILURE(start(record));
     ASSERT_TRUE(has_driven(0.7));
@@ -170,7 +170,7 @@ class Incident : public RobotNetwork {
     std::filesystem::remove(file("state"));
   }
 
-  /// Kills the service in mid-drive, and starts it again, and replays what was kept of it.
+  /// Kills the service in mid-drive, restarts it, and replays the recording of the crashed process.
   void crash_and_replay(const std::function<void(const Replay&, const std::vector<HeardPose>&)>& judge) {
     ASSERT_NO_FATAL_FAILURE(start("keep_s: 10"));
     ASSERT_TRUE(has_driven(0.3));
@@ -201,14 +201,14 @@ TEST_F(Incident, AskedForIsTheLastInput) {
     }));
 }
 
-/// Where the machine is fast enough for the service to drop no sweep.
+/// Requires a machine on which the service drops no sweep.
 TEST_F(Incident, AskedForReplaysToTheSameEstimate) {
   for (const char* record : {"keep_s: 8", "keep_s: 8, folder: record"})
     ASSERT_NO_FATAL_FAILURE(keep_and_replay(
         record, [this](const Replay& replay) { expect_same_estimates(replay, heard(*listener_), 70); }));
 }
 
-/// What others have in the runtime folder stays, and what a service that ends has of its own goes alone.
+/// Foreign files in the runtime folder stay; a service that ends removes only its own.
 TEST_F(Incident, SecondServiceOnTheSameFolderTouchesNothing) {
   for (const char* mine : {"run/ring/mine", "run/incident/mine", "run/input-ring/mine"})
     std::filesystem::create_directories(file(mine));
@@ -241,7 +241,7 @@ TEST_F(Incident, SecondServiceOnTheSameFolderTouchesNothing) {
     EXPECT_TRUE(std::filesystem::exists(file(mine))) << mine;
 }
 
-/// Neither a disk nor a crumb of memory holds the input; a folder of recordings does.
+/// Neither a disk nor a tiny tmpfs stores the input; a recording folder does.
 TEST_F(Incident, NeedsATmpfsThatIsLargeEnough) {
   const auto expect_none = [this](const char* why) {
     daemon_.emplace(locusd(with("keep_s: 10")));
@@ -268,7 +268,7 @@ TEST_F(Incident, NeedsATmpfsThatIsLargeEnough) {
   ASSERT_NO_FATAL_FAILURE(expect_none("run: is too small, so no input is held there for incidents; mount a tmpfs"));
 }
 
-/// The crash is one while the robot drives; what it left becomes an incident, and of the next crash nothing: too soon.
+/// A crash during a drive becomes an incident; the next crash follows too soon and does not.
 TEST_F(Incident, CrashIsOneAndAStopIsNone) {
   ASSERT_NO_FATAL_FAILURE(
       crash_and_replay([](const Replay& replay, const auto& /*live*/) { EXPECT_GT(replay.trajectory().size(), 30U); }));
@@ -285,13 +285,13 @@ TEST_F(Incident, CrashIsOneAndAStopIsNone) {
   EXPECT_EQ(folders_in(file("incidents")).size(), 1U);
 }
 
-/// Where the machine is fast enough for the service to drop no sweep.
+/// Requires a machine on which the service drops no sweep.
 TEST_F(Incident, CrashReplaysToTheSameEstimate) {
   ASSERT_NO_FATAL_FAILURE(crash_and_replay(
       [](const Replay& replay, const std::vector<HeardPose>& live) { expect_same_estimates(replay, live, 45); }));
 }
 
-/// The plug of the lidar is pulled, and the wheels go on.
+/// The lidar is unplugged, and the wheels continue.
 TEST_F(Incident, LossOfTrackingIsOneByItself) {
   const path robot = file("robot");
   const ProgramRun sim = run_program(LOCUS_SIM, {"--world", "urban", "--robot", "husky", "--duration", "12", "--seed",
@@ -355,7 +355,7 @@ TEST_F(Incident, DiskThatIsFullOrAFolderThatCannotBeMadeIsSaidAndTheOdometryGoes
   EXPECT_EQ(folders_in(file("incidents")).size(), 1U);
 }
 
-/// Ten times the packets of a lidar, from somebody else: the bound of memory holds, and what is kept has less time.
+/// A flood of ten times the lidar's packet rate: the memory bound holds, and the recording covers less time.
 TEST_F(Incident, FloodFillsNoMoreThanItsBound) {
   constexpr std::uint64_t kBytes = 10'000'000;
   ASSERT_NO_FATAL_FAILURE(start(fmt::format("keep_s: 60, keep_bytes: {}", kBytes)));
@@ -379,7 +379,7 @@ TEST_F(Incident, FloodFillsNoMoreThanItsBound) {
   const auto begun = std::chrono::steady_clock::now();
   while (folders_in(file("incidents")).size() < 2 && std::chrono::steady_clock::now() - begun < patience())
     std::this_thread::sleep_for(milliseconds{1});
-  static_cast<void>(with("keep_s: 0")); // as it is being copied
+  static_cast<void>(with("keep_s: 0")); // during the copy
   ASSERT_NO_FATAL_FAILURE(reload());
   const auto is_complete = [](const path& incident) { return std::filesystem::exists(incident / "why.json"); };
   EXPECT_TRUE(comes_true([&] { return std::ranges::count_if(folders_in(file("incidents")), is_complete) == 2; }))
@@ -389,7 +389,7 @@ TEST_F(Incident, FloodFillsNoMoreThanItsBound) {
       << "no memory is held for what is off";
 }
 
-/// Requests come one after another; the folder holds no more than it may.
+/// Consecutive requests; the folder stays within its size limit.
 TEST(IncidentFolder, OldestGoesFirst) {
   const TemporaryFolder folder;
   const path piece = folder / "record/000001_2026-11-22T08-12-05Z/000001";
@@ -421,7 +421,7 @@ TEST(IncidentFolder, OldestGoesFirst) {
   EXPECT_EQ(folders_in(folder / "incidents").size(), 3U) << "none is given for nothing";
 }
 
-/// What nobody asked for comes once within five minutes, whoever of the processes kept the last.
+/// Automatic incidents are limited to one in five minutes, across processes.
 TEST(IncidentFolder, WhatComesTooSoonIsCounted) {
   const TemporaryFolder folder;
   const path piece = folder / "record/000001_2026-11-22T08-12-05Z/000001";
@@ -447,7 +447,7 @@ TEST(IncidentFolder, WhatComesTooSoonIsCounted) {
   }
 }
 
-/// As when the clock was set back by a year.
+/// State after a step of the clock by minus one year.
 TEST(IncidentFolder, OneOfTheFutureHidesNoneOfToday) {
   const TemporaryFolder folder;
   const path piece = folder / "record/000001_2026-11-22T08-12-05Z/000001";
@@ -477,7 +477,7 @@ TEST(IncidentFolder, OneOfTheFutureHidesNoneOfToday) {
   EXPECT_EQ(incidents.status().suppressed, 2U);
 }
 
-/// Figures as a service has them, in a time that passes only where a test says so.
+/// Figures and time of a service, both set by the test.
 class NoticedIncidents : public testing::Test {
  protected:
   std::optional<daemon::IncidentCause> look_after(Duration while_nothing_changes) {
@@ -495,7 +495,7 @@ class NoticedIncidents : public testing::Test {
   daemon::IncidentWatch watch_{[](clockid_t /*clock*/) { return now_; }};
 };
 
-/// A contradiction goes on for as long as samples are refused one after another.
+/// One contradiction lasts as long as samples are rejected consecutively.
 TEST_F(NoticedIncidents, AreOneContradictionUntilNoneWasSeenForTenSeconds) {
   EXPECT_FALSE(look_after(seconds{1}));
   refuse(HealthReason::disagreement);

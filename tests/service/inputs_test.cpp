@@ -47,7 +47,7 @@ TEST_F(Inputs, GarbageOnTheWireIsCountedAndHarmsNothing) {
     std::vector<std::byte> payload(sizes[random() % sizes.size()]);
     std::ranges::generate(payload, [&] { return static_cast<std::byte>(random()); });
     sender.send(i % 3 == 0 ? 8308 : 2368, payload);
-    if (i % 100 == 99) { // no more than the smallest buffer of a socket holds
+    if (i % 100 == 99) { // fits the smallest socket buffer
       ASSERT_TRUE(status_comes([&](const json& status) { return status["packets"]["total"]["received"] == i + 1; }));
     }
   }
@@ -81,7 +81,7 @@ TEST_F(Inputs, LidarThatFallsSilentIsStaleInTheDiagnostics) {
   EXPECT_TRUE(listener.wait_until(says("3 "))) << testing::PrintToString(listener.lines());
 }
 
-/// A topic that flutters a hundred times a second switches once a second at most.
+/// A topic that toggles a hundred times a second switches at most once a second.
 TEST_F(Inputs, FlatGroundIsSwitchedByItsTopicAtMostOnceASecond) {
   const Child daemon(locusd(config("flat_ground: off\ndds: {flat_ground_topic: /wheel_health}\n")));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));

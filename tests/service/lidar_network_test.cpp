@@ -18,7 +18,7 @@ namespace {
 
 using nlohmann::json;
 
-/// The lidar is a host of its own, 10.9.0.201, at the other end of a cable to 10.9.0.1.
+/// The lidar is a separate host, 10.9.0.201, connected by a cable to 10.9.0.1.
 class LidarNetwork : public RobotNetwork {
  protected:
   void SetUp() override {
@@ -63,14 +63,14 @@ class LidarNetwork : public RobotNetwork {
 
   [[nodiscard]] std::uint64_t data_packets() const { return status()["packets"]["total"]["data"].get<std::uint64_t>(); }
 
-  /// Holds once a second of what it sends has come since then, and more holds.
+  /// Waits for one more second of data packets and for `more` to hold.
   [[nodiscard]] bool comes_since(std::uint64_t before, const std::function<bool(const json&)>& more) const {
     return status_comes([&](const json& status) {
       return status["packets"]["total"]["data"].get<std::uint64_t>() > before + 750 && more(status);
     });
   }
 
-  /// A second of what it sends arrive, and nothing is missing.
+  /// Expects one second of packets to arrive without loss.
   void expect_heard(const std::string& to) const {
     const std::uint64_t before = data_packets();
     const Child lidar(play(to));
@@ -102,7 +102,7 @@ TEST_F(LidarNetwork, LidarIsHeardByBroadcastToItsNetworkAndToAll) {
   }
 }
 
-/// Of a network that is there only after the service has started.
+/// The network appears only after the service has started.
 TEST_F(LidarNetwork, LidarIsHeardByMulticastOnceItsNetworkIsThere) {
   std::string text = read_text(config());
   text.replace(text.find("{name: front,"), 13, "{name: front, multicast_ip: 239.1.2.3,");
@@ -113,7 +113,8 @@ TEST_F(LidarNetwork, LidarIsHeardByMulticastOnceItsNetworkIsThere) {
   expect_heard("239.1.2.3");
 }
 
-/// Two lidars that take turns would be one that jumps, so a new address counts once the old one has fallen silent.
+/// Alternating packets of two lidars would look like one that jumps, so a new address is accepted only after the old
+/// one is silent.
 TEST_F(LidarNetwork, LidarThatChangesItsAddressIsTakenBack) {
   lay_cable();
   const Child daemon(locusd(config()));
@@ -126,7 +127,7 @@ TEST_F(LidarNetwork, LidarThatChangesItsAddressIsTakenBack) {
   EXPECT_TRUE(comes_since(before, [](const json& s) { return s["state"] == "tracking"; }));
 }
 
-/// docs/examples/locusd.nft: another host on the lidar's cable gets nothing through, the lidar everything.
+/// docs/examples/locusd.nft: drops everything from other hosts on the lidar's cable, and nothing from the lidar.
 TEST_F(LidarNetwork, FirewallLetsTheLidarPassAndNobodyElse) {
   if (run_program("/usr/sbin/nft", {"add", "table", "inet", "probe"}).status != 0)
     GTEST_SKIP() << "this kernel has no nf_tables, or there is no nft";
@@ -159,7 +160,7 @@ TEST_F(LidarNetwork, FirewallLetsTheLidarPassAndNobodyElse) {
   EXPECT_EQ(total["data"].get<int>() + total["position"].get<int>(), total["received"].get<int>());
 }
 
-/// All that was sent meanwhile is missing, and is counted.
+/// Everything sent meanwhile is lost and counted.
 TEST_F(LidarNetwork, CableThatIsPulledAndPutBack) {
   lay_cable();
   const Child daemon(locusd(config()));

@@ -57,7 +57,7 @@ TEST_F(LifeCycle, CalibrationThatCannotBeReadIsAWrongConfiguration) {
   EXPECT_EQ(run_program(LOCUSD, {"--config", file("wrong.yaml").string()}).status, 2);
 }
 
-/// Ready does not wait for sensors, the watchdog is fed without any, a stop is told.
+/// READY does not wait for sensors, the watchdog is fed without any, and STOPPING is sent.
 TEST_F(LifeCycle, SystemdIsToldOfStartReloadStopAndThatThreadsLive) {
   NotifySocket systemd(file("notify"));
   setenv("WATCHDOG_USEC", "600000", 1); // NOLINT(concurrency-mt-unsafe)
@@ -88,7 +88,7 @@ TEST_F(LifeCycle, SecondServiceLeavesTheSocketOfTheFirstAlone) {
 }
 
 TEST_F(LifeCycle, ResetWithoutLidarOutlivesAReloadAndARestart) {
-  constexpr double kNear_m = 0.5; // of a robot that stands as it begins
+  constexpr double kNear_m = 0.5; // the robot stands at the start
   const auto starts_at_x = [] {
     const Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
     EXPECT_TRUE(hears_the_service(listener));
@@ -164,7 +164,7 @@ TEST_F(LifeCycle, NetworkOfDdsMayComeLater) {
   EXPECT_TRUE(daemon.wait_for_line("DDS is up: domain 0 on interface robot0"));
 }
 
-/// A robot whose estimates somebody hears over an interface of its own.
+/// A robot whose estimates are received over a network interface of its own.
 class NetworkOfDds : public LifeCycle {
  protected:
   void SetUp() override {
@@ -177,7 +177,7 @@ class NetworkOfDds : public LifeCycle {
     ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
     listener_.emplace(std::vector<std::string>{CYCLONE_PEER, "0", "listen", "/locus", "robot0"});
     ASSERT_TRUE(hears_the_service(*listener_));
-    play_.emplace(endlessly(capture())); // its IMU and odometry go by lo, to nobody
+    play_.emplace(endlessly(capture())); // IMU and odometry by lo, where nothing receives them
   }
 
   void expect_estimates_are_heard() const {
@@ -195,7 +195,7 @@ class NetworkOfDds : public LifeCycle {
   std::optional<Child> daemon_, listener_, play_;
 };
 
-/// Its network fails and comes back: those who listened hear it again, and the odometry went on meanwhile.
+/// After a network failure the subscribers receive again; the odometry has continued meanwhile.
 TEST_F(NetworkOfDds, MayFailForAWhile) {
   expect_estimates_are_heard();
   set_network("down");
@@ -222,7 +222,7 @@ TEST_F(LifeCycle, PortThatIsTakenEndsItWithStatusOne) {
   EXPECT_NE(second.err.find("2368"), std::string::npos) << second.err;
 }
 
-/// The cable of the lidar is pulled for 12 s: odometry goes on at its pace, dead-reckoned, and finds back.
+/// Unplugs the lidar for 12 s: the odometry continues at its rate by dead reckoning, then relocalises.
 TEST_F(LifeCycle, CablePullIsBridgedByDeadReckoning) {
   const Child daemon(led_locusd(config()));
   const Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
@@ -244,7 +244,7 @@ TEST_F(LifeCycle, CablePullIsBridgedByDeadReckoning) {
   EXPECT_LT(longest, milliseconds{250});
   std::vector<HeardPose> fast = heard(listener, "odometry_fast");
   std::erase_if(fast, [&](const HeardPose& pose) {
-    return pose.stamp < poses[50].stamp || pose.stamp > poses[150].stamp; // amid the ten seconds that are surely blind
+    return pose.stamp < poses[50].stamp || pose.stamp > poses[150].stamp; // keeps ten seconds surely without lidar
   });
   EXPECT_GT(fast.size(), 1000U) << "at the rate of the IMU, but for what the listener is too slow for";
   const std::vector<std::string> states = listener.lines_of("state");
@@ -273,7 +273,7 @@ TEST_F(LifeCycle, StateOfAnotherTimeIsAFreshStart) {
   EXPECT_TRUE(daemon.wait_for_line("a fresh start: the saved state is")) << testing::PrintToString(daemon.lines());
 }
 
-/// The robot may be elsewhere the next day, and is the same robot.
+/// The robot may have been moved overnight, but has the same sensors.
 TEST_F(LifeCycle, WhatWasLearnedOfTheSourcesOutlivesAnotherTime) {
   const Config configured = *parse_config(read_text(config()), "config");
   daemon::SavedState old;
@@ -358,7 +358,7 @@ TEST_F(LifeCycle, ControlShowsSavesResetsAndSwitches) {
 
   EXPECT_EQ(ctl({"reset", "--pose", "100,50,0,0,0,90"}).status, 0);
   const json reset = status_when([](const json& s) { return s["sweeps"]["processed"] > 5; });
-  constexpr double kRoom_m = 13; // its diagonal: the robot goes on driving
+  constexpr double kRoom_m = 13; // the room's diagonal: the robot continues to drive
   EXPECT_NEAR(reset["pose"]["xyz_m"][0].get<double>(), 100, kRoom_m);
   EXPECT_NEAR(reset["pose"]["xyz_m"][1].get<double>(), 50, kRoom_m);
 
@@ -374,8 +374,8 @@ TEST_F(LifeCycle, ControlWithoutAServiceSaysHowToStartOne) {
   EXPECT_NE(run.err.find("no service answers"), std::string::npos);
 }
 
-/// Packets come thirty times as fast as they were fired, by the sensor's own clock: 3 ms for each sweep, and it takes
-/// as long as it can.
+/// Packets arrive thirty times as fast as they were fired, by the sensor's clock: 3 ms per sweep. The configuration
+/// makes processing slow.
 TEST_F(LifeCycle, OverloadDropsAndCountsAndMakesNothingOlder) {
   std::string text = read_text(config("segment_filter: {enabled: false}\nscan_to_scan: {mode: always}\nthreads: 1\n"));
   text.replace(text.find("{name: front,"), 13, "{name: front, time: sensor,");

@@ -14,7 +14,7 @@ namespace {
 
 Duration log_time = std::chrono::hours{1};
 
-/// Of which time passes only where a test says so.
+/// Simulated time, advanced by the test only.
 Duration read_log_time(clockid_t /*clock*/) { return log_time; }
 
 TEST(Log, OnePlaceThatSaysTooMuchIsSilencedAndNoOther) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Metrics as Prometheus gets them, and who else calls there.
+// Metrics for Prometheus, and misbehaving clients.
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -58,7 +58,7 @@ void say(const Descriptor& client, std::string_view words) {
   static_cast<void>(::send(client.number(), words.data(), words.size(), MSG_NOSIGNAL));
 }
 
-/// Until the other side hangs up.
+/// Reads until the peer hangs up.
 std::string hear(const Descriptor& client) {
   std::string all;
   std::array<char, 4096> bytes{};
@@ -78,7 +78,7 @@ std::string body_of(const std::string& answer) {
   return end == std::string::npos ? "" : answer.substr(end + 4);
 }
 
-/// By the network of whoever runs the tests, for that of a test is its own.
+/// Uses the host's network, because that of the test is isolated.
 ProgramRun fetch_promtool() {
   return run_program("/usr/bin/nsenter", {fmt::format("--net=/proc/{}/ns/net", getppid()), FETCH_PROMTOOL, PROMTOOL});
 }
@@ -95,12 +95,12 @@ class Metrics : public RobotNetwork {
     return OpenMetrics::parse(body_of(answer));
   }
 
-  /// What was told between two statuses that are the same in all that comes from outside.
+  /// Metrics between two statuses with equal input counters.
   struct Told {
     nlohmann::json before, after;
     OpenMetrics metrics;
   };
-  /// Once nothing comes any more.
+  /// Scrapes once the input is at rest.
   [[nodiscard]] Told told_at_rest() const {
     const auto from_outside = [](const nlohmann::json& status) {
       nlohmann::json sources = status["sources"];
@@ -125,7 +125,7 @@ class Metrics : public RobotNetwork {
     ASSERT_EQ(run.status, 0) << run.err;
   }
 
-  /// A robot that has driven, with metrics.
+  /// Drives the robot with metrics enabled.
   void drive() {
     daemon_.emplace(locusd(listening()));
     ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
@@ -142,7 +142,7 @@ TEST_F(Metrics, AreWhatTheStatusTells) {
   const auto [before, status, metrics] = told_at_rest();
   EXPECT_EQ(metrics.mistakes, std::vector<std::string>{});
   EXPECT_EQ(metrics.value("locusd_build_info", {{"version", status["version"]}}), 1);
-  for (const char* what : {"seen", "processed", "dropped", "failed"}) { // windows without lidar go on
+  for (const char* what : {"seen", "processed", "dropped", "failed"}) { // windows without lidar are processed, too
     EXPECT_GE(metrics.value(fmt::format("locusd_sweeps_{}_total", what)), before["sweeps"][what]) << what;
     EXPECT_LE(metrics.value(fmt::format("locusd_sweeps_{}_total", what)), status["sweeps"][what]) << what;
   }
@@ -199,7 +199,7 @@ TEST_F(Metrics, OfTheMachineAreTrueAndTheHistogramIsOfAllSweeps) {
       EXPECT_LE(up_to, 0.5 * count + 3 + more) << labels.at("le");
     }
   }
-  constexpr double kCoarse_s = 2.0; // what the kernel tells of the start of a process is
+  constexpr double kCoarse_s = 2.0; // resolution of the kernel's process start time
   EXPECT_GE(metrics.value("process_start_time_seconds"), launched_s - kCoarse_s);
   EXPECT_LE(metrics.value("process_start_time_seconds"),
             to_seconds(daemon::read_clock(CLOCK_REALTIME)) - after["duration_s"].get<double>() + kCoarse_s);
@@ -212,8 +212,8 @@ TEST_F(Metrics, OfTheMachineAreTrueAndTheHistogramIsOfAllSweeps) {
   EXPECT_NEAR(metrics.value("process_open_fds"), static_cast<double>(open), 3.0);
 }
 
-/// What promtool reads is the text before OpenMetrics, which has neither infos nor state sets, and whose counters have
-/// their suffix in the name of the family; the samples are the same.
+/// promtool reads the older text format, which has neither infos nor state sets, and in which the counters' suffix is
+/// part of the family name; the samples are identical.
 TEST_F(Metrics, PleasePromtool) {
   if (const ProgramRun fetched = fetch_promtool(); fetched.status != 0)
     GTEST_SKIP() << "no promtool: " << fetched.err;
@@ -295,14 +295,14 @@ TEST_F(Metrics, SocketOfAnotherKindIsNotTakenOver) {
   EXPECT_EQ(status()["state"], "waiting");
 }
 
-/// Leaves a process none but those that it has, for a while.
+/// Exhausts the file descriptors of a process for its lifetime.
 class NoDescriptorLeft {
  public:
   explicit NoDescriptorLeft(pid_t process) : process_(process) {
     EXPECT_EQ(prlimit(process, RLIMIT_NOFILE, nullptr, &before_), 0);
     rlimit none{0, before_.rlim_max};
     while (std::filesystem::exists(fmt::format("/proc/{}/fd/{}", process, none.rlim_cur)))
-      ++none.rlim_cur; // the next one that would be given
+      ++none.rlim_cur; // the next one to be allocated
     EXPECT_EQ(prlimit(process, RLIMIT_NOFILE, &none, nullptr), 0);
   }
   ~NoDescriptorLeft() { EXPECT_EQ(prlimit(process_, RLIMIT_NOFILE, &before_, nullptr), 0); }
@@ -314,7 +314,7 @@ class NoDescriptorLeft {
   rlimit before_{};
 };
 
-/// Who calls while no descriptor is left, is not heard; the main thread does not spin for that.
+/// Clients are not served while no descriptor is left; the main thread does not spin on that.
 TEST_F(Metrics, NoDescriptorLeftCostsNoProcessor) {
   const Child daemon(locusd(listening()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
@@ -394,7 +394,7 @@ TEST_F(Metrics, WhoIsSilentHoldsNobodyUp) {
   EXPECT_EQ(hear(silent.back()), "") << "in the end it is hung up on";
 }
 
-/// A server that a test calls, in a time that passes only where the test says so.
+/// A server driven by the test, with simulated time.
 class MetricsOnCall : public RobotNetwork {
  protected:
   void SetUp() override {
@@ -407,7 +407,7 @@ class MetricsOnCall : public RobotNetwork {
     server_ = std::move(*server);
   }
 
-  /// A client that the server has taken.
+  /// Returns an accepted client.
   Descriptor client() {
     Descriptor client = connect_to(kAddress);
     EXPECT_GE(client.number(), 0);
@@ -423,7 +423,7 @@ class MetricsOnCall : public RobotNetwork {
     return true;
   }
 
-  /// What a client hears until the server hangs up.
+  /// Returns everything the server sends until it hangs up.
   std::string served(const Descriptor& client) {
     std::string all;
     EXPECT_TRUE(serve_until([&] {
@@ -456,14 +456,14 @@ TEST_F(MetricsOnCall, AreToldBesideAnyNumberWhoAreSilent) {
   say(asks, kScrape);
   EXPECT_TRUE(served(asks).ends_with("# EOF\n"));
   const Descriptor deaf = client();
-  for (int i = 0; i < 100; ++i) // more than it is asked for: what it does not read fills no memory
+  for (int i = 0; i < 100; ++i) // excess requests of a client that does not read must not fill memory
     say(deaf, kScrape);
   const Descriptor next = connect_to(kAddress);
   say(next, kScrape);
   EXPECT_TRUE(served(next).ends_with("# EOF\n"));
 }
 
-/// One that comes letter by letter is served, as long as it takes no more than its time.
+/// A request that arrives byte by byte is served if it is complete before the timeout.
 TEST_F(MetricsOnCall, AreToldToWhoIsSlow) {
   const Descriptor slow = client();
   for (const char letter : kScrape) {
@@ -484,7 +484,7 @@ TEST_F(MetricsOnCall, AreNotWaitedForWithWhoSaysNothing) {
   EXPECT_EQ(served(loris), "");
 }
 
-/// Whoever calls serve() pauses after it, and does not spin while somebody waits who cannot be let in.
+/// The caller of serve() pauses after it, and does not spin while a client waits that cannot be accepted.
 TEST_F(MetricsOnCall, AreToldLaterToWhoComesWhileNoDescriptorIsLeft) {
   const Descriptor client = connect_to(kAddress);
   say(client, kScrape);
@@ -499,7 +499,7 @@ TEST_F(MetricsOnCall, AreToldLaterToWhoComesWhileNoDescriptorIsLeft) {
   EXPECT_TRUE(served(client).ends_with("# EOF\n"));
 }
 
-/// The reader of these tests does see what is wrong.
+/// The parser of these tests detects errors.
 TEST(OpenMetricsReader, ForgivesNothing) {
   const std::string good = "# TYPE a counter\n# HELP a b\na_total{x=\"1\"} 1\n# EOF\n";
   EXPECT_EQ(OpenMetrics::parse(good).mistakes, std::vector<std::string>{});
@@ -531,12 +531,12 @@ TEST(OpenMetricsReader, ForgivesNothing) {
     EXPECT_NE(OpenMetrics::parse(bad).mistakes.size(), 0U) << bad;
 }
 
-/// The rules and the dashboard that are installed name what there is.
+/// The installed rules and dashboard refer to existing metrics.
 class Examples : public Metrics {
  protected:
   static std::string example(const std::string& name) { return std::string{EXAMPLES} + "/" + name; }
 
-  /// Of all expressions, each metric that they name.
+  /// Expects each metric named in the expression to exist.
   static void expect_known(const OpenMetrics& metrics, std::string expression) {
     const std::string whole = expression;
     std::smatch found;
@@ -573,7 +573,7 @@ class Examples : public Metrics {
     }
   }
 
-  /// With a recording, so that all there can be is there.
+  /// Scrapes with recording enabled, so that all metrics are present.
   OpenMetrics all_metrics() {
     daemon_.emplace(locusd(config(
         fmt::format("metrics: {{listen: '{}'}}\nrecord: {{folder: record, max_bytes: 100000000}}\n", kAddress))));

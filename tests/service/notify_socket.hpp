@@ -16,7 +16,7 @@
 
 namespace locus::test {
 
-/// What systemd would hear of the service.
+/// Receives the notifications of the service in place of systemd.
 class NotifySocket {
  public:
   explicit NotifySocket(const std::filesystem::path& path) : socket_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
@@ -35,7 +35,7 @@ class NotifySocket {
   NotifySocket(const NotifySocket&) = delete;
   NotifySocket& operator=(const NotifySocket&) = delete;
 
-  /// Whether a message with this word comes; all that came before are read.
+  /// Waits for a message with this word; discards all messages before it.
   bool hears(const std::string& word, Duration within = patience()) {
     const auto give_up = std::chrono::steady_clock::now() + within;
     while (std::chrono::steady_clock::now() < give_up) {

@@ -114,7 +114,7 @@ class Parser {
       blame("the count is not that of the bucket +Inf", line);
   }
 
-  /// Canonical: a point in every finite one.
+  /// Canonical form: every finite bound has a decimal point.
   void take_bucket(const std::string& le, double count, const std::string& line) {
     const double bound = le == "+Inf" ? std::numeric_limits<double>::infinity() : std::stod(le);
     if ((le != "+Inf" && le.find('.') == std::string::npos) || bound <= bound_ || count < count_)

@@ -33,7 +33,7 @@ class RealTime : public RobotNetwork {
   }
 };
 
-/// Of the threads of a process, by name: those that TBB makes for the odometry have its name, too.
+/// Returns the SCHED_FIFO priorities of a process' threads by name. TBB's workers of the odometry have its name, too.
 std::multimap<std::string, int> fifo_priorities(pid_t process) {
   std::multimap<std::string, int> priorities;
   for (const auto& task : std::filesystem::directory_iterator("/proc/" + std::to_string(process) + "/task")) {
@@ -60,7 +60,7 @@ Duration median(std::vector<Duration> values) {
 
 double milliseconds_of(Duration duration) { return 1e3 * to_seconds(duration); }
 
-/// What the operating system is asked for.
+/// Scheduling settings requested from the operating system.
 class Scheduling : public RobotNetwork {};
 
 TEST_F(Scheduling, PriorityIsThatOfIngestOdometryAndItsHelpers) {
@@ -70,7 +70,7 @@ TEST_F(Scheduling, PriorityIsThatOfIngestOdometryAndItsHelpers) {
     GTEST_SKIP() << "real-time scheduling is not permitted here";
   const Child play(endlessly(capture()));
   ASSERT_TRUE(daemon.wait_for_line("tracking"));
-  const std::size_t odometry_threads = std::thread::hardware_concurrency() > 1 ? 2 : 1; // with a helper
+  const std::size_t odometry_threads = std::thread::hardware_concurrency() > 1 ? 2 : 1; // with one worker
   std::multimap<std::string, int> priorities;
   EXPECT_TRUE(comes_true([&] {
     priorities = fifo_priorities(daemon.pid());
@@ -108,7 +108,7 @@ TEST_F(Scheduling, ReloadMovesTheThreadsToOtherProcessorsAndBack) {
   EXPECT_EQ(processors(daemon.pid()), at_first);
 }
 
-/// When the packets of the drive were fired to their ends, which is when a lidar sends them.
+/// Returns the firing times of the last returns of all packets, at which a lidar sends them.
 std::vector<Stamp> sent_packets(const std::filesystem::path& folder) {
   std::vector<Stamp> sent;
   auto capture = Capture::open(folder / "lidar.pcap");
@@ -118,8 +118,8 @@ std::vector<Stamp> sent_packets(const std::filesystem::path& folder) {
   return sent;
 }
 
-/// From the packet that closes a sweep, the first that reaches beyond it, to a subscriber's hands. Of ten stretches
-/// of the drive the middle one counts: on a machine that others use a bad second is none of ours.
+/// Latency from the packet that closes a sweep, the first beyond its end, to the subscriber. The median over ten
+/// sections of the drive counts, because other load on the machine may spoil some.
 TEST_F(RealTime, EstimateIsInTheSubscribersHandsAMomentAfterItsSweep) {
   Child daemon(locusd(config()));
   Child listener({FAST_DDS_PEER, "0", "listen", "/locus"});
@@ -127,7 +127,7 @@ TEST_F(RealTime, EstimateIsInTheSubscribersHandsAMomentAfterItsSweep) {
   Child lidar({LOCUS_PLAY, capture().string()});
   ASSERT_EQ(lidar.wait_for_exit(), 0) << testing::PrintToString(lidar.lines());
 
-  constexpr Duration kJitter = std::chrono::microseconds{100}; // of arrivals, by which the sensor's clock is set
+  constexpr Duration kJitter = std::chrono::microseconds{100}; // of arrivals; affects the sensor's clock estimate
   const std::vector<Stamp> sent = sent_packets(capture());
   const Duration shift = shift_of(lidar);
   std::vector<Duration> latencies;
@@ -171,8 +171,8 @@ TEST_F(RealTime, TwoLidarsImuAndOdometryOnOneCore) {
   EXPECT_LT(share, 0.3);
 }
 
-/// The worst of overloads: for a second and a half nothing is processed at all, while packets wait in the kernel. Two
-/// sweeps later every single one is processed again, when it is new.
+/// Worst overload: 1.5 s without any processing, while packets queue in the kernel. Two sweeps later every sweep is
+/// processed again, without delay.
 TEST_F(RealTime, StallIsForgottenTwoSweepsAfterIt) {
   Child daemon(locusd(config()));
   Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
@@ -200,7 +200,7 @@ TEST_F(RealTime, StallIsForgottenTwoSweepsAfterIt) {
   EXPECT_EQ(status["packets"]["total"]["lost"], 0);
 }
 
-/// Half of one core: what is too much is dropped and counted, what is processed is not older for it.
+/// Half of one core: excess sweeps are dropped and counted, and the processed ones are not delayed.
 TEST_F(RealTime, OneCoreSharedWithABusyLoop) {
   const std::string processor = std::to_string(first_processor());
   Child daemon(locusd(config("realtime: {cpus: [" + processor + "]}\n")));
@@ -216,8 +216,8 @@ TEST_F(RealTime, OneCoreSharedWithABusyLoop) {
       << "an estimate is not older than a period when it is there";
 }
 
-/// A loop of the same real-time priority gives the core away for others once in 100 ms, and takes it back as soon as a
-/// thread of ours waits: most sweeps are dropped, all are counted, and the one that is taken is the newest.
+/// A loop of the same real-time priority yields the core once in 100 ms, and takes it back as soon as a thread of ours
+/// blocks: most sweeps are dropped, all are counted, and the processed one is the newest.
 TEST_F(RealTime, OneCoreSharedWithABusyLoopOfTheSameRealTimePriority) {
   const std::string processor = std::to_string(first_processor());
   Child daemon(locusd(config("realtime: {priority: 2, cpus: [" + processor + "]}\nthreads: 1\n")));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the service records, and what locus-replay makes of it.
+// Recordings of the service, and their replay.
 #include <algorithm>
 #include <csignal>
 #include <fstream>
@@ -29,7 +29,7 @@ class Recording : public RobotNetwork {
     return folder;
   }
 
-  /// Of a robot, which records: to the state directory unless another folder is named.
+  /// Returns the robot's configuration with recording enabled, to the state directory unless another folder is named.
   [[nodiscard]] std::filesystem::path recording(const std::filesystem::path& robot, std::uint64_t max_bytes,
                                                 const std::string& folder = "record") const {
     std::filesystem::path path = file("recording.yaml");
@@ -58,7 +58,7 @@ class Recording : public RobotNetwork {
   }
 };
 
-/// How many of the poses that were heard the replay has, at the same nanosecond, and how far they are off at most.
+/// Number of received poses that the replay has at the same nanosecond, and their largest difference.
 struct Agreement {
   std::size_t poses = 0;
   double worst_m = 0, worst_rad = 0;
@@ -117,7 +117,7 @@ TEST_F(Recording, ReplayIsWhatTheServiceComputed) {
   EXPECT_LT(worst_distance_m(original.trajectory(), heard(listener), shift_of(play)), 0.01);
 }
 
-/// The plug is pulled in mid-drive; then the robot drives again, on a disk share for six seconds of it.
+/// Power is cut in mid-drive; then the robot drives again, with disk space for six seconds of it.
 TEST_F(Recording, OldestGoesFirstAndWhatWasKilledReplaysAsFarAsItGoes) {
   constexpr std::uint64_t kMaxBytes = 10'000'000;
   const std::filesystem::path robot = drive();
@@ -195,7 +195,7 @@ TEST_F(Recording, DiskThatIsFullIsSaidOnceAndTheOdometryGoesOn) {
   std::filesystem::remove(disk / "filler");
   EXPECT_TRUE(status_comes([](const auto& now) { return now["recording"]["problem"] == ""; }));
   const std::uint64_t left = bytes_in(disk / "record");
-  EXPECT_TRUE(comes_true([&] { return bytes_in(disk / "record") > left + 1'000'000; })); // a second
+  EXPECT_TRUE(comes_true([&] { return bytes_in(disk / "record") > left + 1'000'000; })); // about one second
   daemon.signal(SIGTERM);
   ASSERT_EQ(daemon.wait_for_exit(), 0);
   EXPECT_EQ(error_lines().size(), 1U) << testing::PrintToString(error_lines());

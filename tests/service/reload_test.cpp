@@ -55,7 +55,7 @@ TEST_F(Reload, PortThatIsTakenLeavesTheOldConfigurationInForce) {
   EXPECT_EQ(status()["flat_ground"], "auto");
 }
 
-/// Each costs more than the time to the next one.
+/// Each reload takes longer than the interval to the next.
 TEST_F(Reload, ComingTooFastHoldsUpNeitherAnswersNorTheEnd) {
   Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
@@ -75,7 +75,8 @@ TEST_F(Reload, ComingTooFastHoldsUpNeitherAnswersNorTheEnd) {
   EXPECT_EQ(daemon.wait_for_exit(), 0);
 }
 
-/// Neither the new configuration nor the old one works: systemd is to start it again, from where the robot is.
+/// Neither the new configuration nor the old one works: systemd restarts the service, which resumes from the saved
+/// pose.
 TEST_F(Reload, FailingTwiceEndsTheServiceWithItsStateSaved) {
   for (const bool by_signal : {false, true}) {
     std::ofstream calibration{this->file("unit.yaml")};

@@ -25,14 +25,14 @@ using std::chrono::seconds;
 enum class Interruption { crash, reload, stall };
 constexpr std::array<std::string_view, 3> kInterruptions{"crash", "reload", "stall"};
 
-/// By hand, with RESTARTS=36, nine seconds each: the service is interrupted so often while its robot drives with the
-/// imperfections of a real one, by crashes, reloads, and stalls that its watchdog ends. SEED says which drive, and
-/// when. Decision 30 has what it shows.
+/// Run manually with RESTARTS=36, nine seconds each: interrupts the service this often while its robot drives with
+/// realistic imperfections, by crashes, reloads, and stalls that the watchdog ends. SEED selects drive and times.
+/// Results: decision 30.
 class RestartCampaign : public RobotNetwork, public testing::WithParamInterface<std::string> {
  protected:
   struct Event {
     Interruption what;
-    Stamp began, over; ///< by the host's clock, as the stamps of the poses
+    Stamp began, over; ///< host clock, as the stamps of the poses
     std::string beginning;
   };
 
@@ -66,7 +66,7 @@ class RestartCampaign : public RobotNetwork, public testing::WithParamInterface<
   void kill_and_start() {
     daemon_->signal(SIGKILL);
     ASSERT_TRUE(daemon_->wait_for_exit());
-    std::this_thread::sleep_for(milliseconds{500}); // as RestartSec= has it
+    std::this_thread::sleep_for(milliseconds{500}); // as RestartSec=
     start();
     ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
   }
@@ -88,7 +88,7 @@ class RestartCampaign : public RobotNetwork, public testing::WithParamInterface<
     return event;
   }
 
-  /// How far the estimate moved between two stamps beyond what the robot did, and how far the robot went.
+  /// Error of the estimated motion between two stamps, and the true distance.
   struct Step {
     double error_m, way_m;
   };
@@ -119,7 +119,7 @@ class RestartCampaign : public RobotNetwork, public testing::WithParamInterface<
 TEST_P(RestartCampaign, TheRobotGoesOnWhereItIs) {
   std::mt19937 random(static_cast<std::uint32_t>(number("SEED", 4711)));
   std::vector<Event> events;
-  for (int i = 0; i < restarts_; ++i) { // of six, four crashes
+  for (int i = 0; i < restarts_; ++i) { // four of six are crashes
     constexpr std::array kOfSix{Interruption::crash, Interruption::reload, Interruption::crash,
                                 Interruption::crash, Interruption::stall,  Interruption::crash};
     std::this_thread::sleep_for(milliseconds{2000 + random() % 3000});

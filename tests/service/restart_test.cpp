@@ -14,7 +14,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// Of a service whose robot drives through a plant.
+/// A service whose robot drives through a plant.
 class Restart : public RobotNetwork {
  protected:
   void SetUp() override {
@@ -35,7 +35,7 @@ class Restart : public RobotNetwork {
     EXPECT_TRUE(daemon_->wait_for_line("resumed where the service ended")) << testing::PrintToString(daemon_->lines());
   }
 
-  /// Once the drive is over, against its replay.
+  /// After the drive, compares all poses with its replay.
   void expect_all_poses_true() {
     ASSERT_EQ(play_->wait_for_exit(), 0);
     const Replay replay({"--quiet", plant().string()});
@@ -47,20 +47,21 @@ class Restart : public RobotNetwork {
   std::optional<Child> daemon_, listener_, play_;
 };
 
-/// After a crash nothing but the whereabouts of the last sweep tells how far it came since the map was saved.
+/// After a crash only the pose of the last sweep tells how far the robot has come since the map was saved.
 TEST_F(Restart, StoppedAndKilledInMidDriveItGoesOnWhereTheRobotIs) {
   for (const int end : {SIGTERM, SIGKILL}) {
     std::this_thread::sleep_for(seconds{4});
     daemon_->signal(end);
     ASSERT_TRUE(daemon_->wait_for_exit());
-    std::this_thread::sleep_for(milliseconds{500}); // as RestartSec= has it
+    std::this_thread::sleep_for(milliseconds{500}); // as RestartSec=
     expect_to_resume();
   }
   expect_all_poses_true();
   EXPECT_GT(heard(*listener_).size(), 120U);
 }
 
-/// As when a watchdog has to end it: six seconds later the robot is elsewhere, and its wheels alone know where.
+/// Restart by the watchdog: six seconds later the robot is elsewhere, and only its wheels have measured
+/// the motion.
 TEST_F(Restart, StalledForSixSecondsInMidDriveItGoesOnWhereTheWheelsSay) {
   std::this_thread::sleep_for(seconds{3});
   daemon_->signal(SIGSTOP);

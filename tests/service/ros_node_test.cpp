@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The service among the nodes of ROS 2, as two kinds of DDS hear of it.
+// The service's node in the ROS 2 graph, as discovered by two implementations of DDS.
 #include <algorithm>
 #include <cstdlib>
 #include <string>
@@ -12,8 +12,7 @@ namespace {
 
 class RosNodeOfService : public RobotNetwork {};
 
-/// Whether the last node that the peer heard of, to the end, has this name and claims so many endpoints to publish
-/// with.
+/// Waits until the last node that the peer discovered has this name and claims this number of writers.
 bool hears_node(const Child& peer, const std::string& node, std::ptrdiff_t writers) {
   const auto begins_with = [](const char* word) {
     return [word](const std::string& line) { return line.starts_with(word); };
@@ -26,7 +25,7 @@ bool hears_node(const Child& peer, const std::string& node, std::ptrdiff_t write
   });
 }
 
-/// What a reload adds is claimed, too.
+/// Topics added by a reload are claimed, too.
 TEST_F(RosNodeOfService, HasTheNameOfTheInstanceAndAllThatItPublishes) {
   const std::filesystem::path runtime = file("locusd@left");
   setenv("RUNTIME_DIRECTORY", runtime.c_str(), 1); // NOLINT(concurrency-mt-unsafe)

@@ -17,8 +17,8 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// A keeper that is told of a robot; the mode of the ground, which is part of the state and not of the whereabouts,
-/// tells when the state was written last.
+/// A state keeper that is fed by the test. The ground mode is part of the map state and not of the whereabouts, and so
+/// tells when the map state was last written.
 class Keeper : public testing::Test {
  protected:
   void take(Duration after_start, double x_m, FlatGround mode, bool has_begun = true) {
@@ -31,7 +31,7 @@ class Keeper : public testing::Test {
     keeper_.take(odometry_, estimate, mode);
   }
 
-  /// Whether the file says so, once what was taken is written.
+  /// Writes the pending state, then returns whether the file contains these values.
   [[nodiscard]] bool says(double x_m, FlatGround mode) {
     keeper_.write();
     const auto state = load_state(file_);
@@ -133,7 +133,7 @@ TEST_F(Keeper, SweepThatLiesAskewCarriesNobodyAway) {
   EXPECT_LT(keeper_.now()->carried_to(later).translation.norm(), 0.5) << "and of one that is not";
 }
 
-/// Drivers are stopped before the service is.
+/// Drivers are stopped before the service.
 TEST_F(Keeper, WhatWasLearnedOfASourceOutlivesItsSilence) {
   OdometryEstimate estimate;
   estimate.stamp = stamp_from_ns(1);
@@ -151,7 +151,7 @@ TEST_F(Keeper, WhatWasLearnedOfASourceOutlivesItsSilence) {
 TEST_F(Keeper, MinutesOfDeadReckoningAreNoDamage) {
   SavedState state;
   state.last.pose_covariance = Vector6(1e12, 1e12, 1e12, 1, 1, 1).asDiagonal();
-  state.last.pose_covariance(0, 1) = state.last.pose_covariance(1, 0) = 1e12 * (1 + 1e-9); // as rounding leaves it
+  state.last.pose_covariance(0, 1) = state.last.pose_covariance(1, 0) = 1e12 * (1 + 1e-9); // rounding error
   ASSERT_FALSE(write_state(file_, state));
   ASSERT_TRUE(load_state(file_));
   state.last.pose_covariance(0, 1) = state.last.pose_covariance(1, 0) = 2e12;
@@ -186,7 +186,7 @@ TEST_F(Keeper, WhatWasLearnedOfASourceGoesOn) {
   EXPECT_FALSE(load_state(file_)->last.learned[1]) << "no wheels report nothing of their way";
 }
 
-/// What was learned corrects what was configured, and goes with it.
+/// Learned values are corrections of configured ones, and are discarded with them.
 TEST_F(Keeper, WhatWasLearnedOfASourceGoesWhereItIsConfiguredOtherwise) {
   std::vector<MotionSource> sources(2);
   sources[0].name = "wio";
@@ -224,7 +224,7 @@ TEST_F(Keeper, WhatWasLearnedOfASourceGoesWhereItIsConfiguredOtherwise) {
 }
 
 TEST_F(Keeper, EveryDamagedByteIsNoticed) {
-  const test::TemporaryFolder memory{"/dev/shm"}; // no disk is waited for thousands of times
+  const test::TemporaryFolder memory{"/dev/shm"}; // no disk latency, thousands of times
   const std::filesystem::path file = memory / "state";
   SavedState state;
   state.last.T_source_base[1] = Pose{};
@@ -242,7 +242,7 @@ TEST_F(Keeper, EveryDamagedByteIsNoticed) {
     std::ofstream{file} << damaged;
     const auto left = load_state(file);
     refused += left ? 0U : 1U;
-    if (left) { // by the other of two whereabouts
+    if (left) { // from the other of two copies of the whereabouts
       EXPECT_EQ(left->last.T_source_base[1]->translation, Eigen::Vector3d::Zero()) << i;
       EXPECT_TRUE(left->last.T_odom_base.translation.x() == 0 || left->last.T_odom_base.translation.x() == 5) << i;
       EXPECT_EQ(left->map_odom.size(), 3U) << i;
@@ -253,7 +253,7 @@ TEST_F(Keeper, EveryDamagedByteIsNoticed) {
   EXPECT_GT(refused, 3 * sizeof(SurfacePoint)) << "all of the map";
 }
 
-/// Power goes while the whereabouts are written: so many bytes are new.
+/// Power fails while the whereabouts are written: only this many bytes are new.
 TEST_F(Keeper, WhereaboutsThatWereCutShortCostNoMap) {
   const test::TemporaryFolder memory{"/dev/shm"};
   const std::filesystem::path file = memory / "state";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// locus-play --clock: what a node with use_sim_time hears of a recording that is played.
+// locus-play --clock: a recording played to a node with use_sim_time.
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
@@ -47,7 +47,7 @@ void expect_never_back(const std::vector<HeardStamp>& clock) {
     EXPECT_GT(clock[i].stamp, clock[i - 1].stamp);
 }
 
-/// Of a robot's clock, whatever it shows: it is told a hundred times a second, goes so fast, and never back.
+/// Expects /clock at a hundred messages a second, at this speed and never backwards, whatever its origin.
 void expect_clock_goes(const std::vector<HeardStamp>& clock, double speed) {
   expect_never_back(clock);
   const double heard_s = to_seconds(clock.back().heard - clock.front().heard);
@@ -56,7 +56,7 @@ void expect_clock_goes(const std::vector<HeardStamp>& clock, double speed) {
   EXPECT_GT(static_cast<double>(clock.size()), 70 * heard_s) << "a busy machine sleeps longer than it is told to";
 }
 
-/// How far stamps are ahead of the clock as their listener has it, the worst but one in a hundred.
+/// Returns by how much stamps are ahead of the clock as their subscriber has it (99th percentile).
 double ahead_s(const std::vector<HeardStamp>& heard, const std::vector<HeardStamp>& clock) {
   std::vector<double> all;
   for (const HeardStamp& one : heard) {
@@ -71,13 +71,13 @@ double ahead_s(const std::vector<HeardStamp>& heard, const std::vector<HeardStam
 
 class SimTime : public RobotNetwork {
  protected:
-  /// What a peer hears, who is there before the recording is played.
+  /// Plays a recording once the peer has subscribed.
   static void play(const Child& peer, std::vector<std::string> options) {
     ASSERT_TRUE(peer.wait_for_line("listens"));
     options.insert(options.begin(), LOCUS_PLAY);
     Child play(std::move(options));
     ASSERT_EQ(play.wait_for_exit(), 0) << testing::PrintToString(play.lines());
-    std::this_thread::sleep_for(milliseconds{500}); // what was sent last is still on its way
+    std::this_thread::sleep_for(milliseconds{500}); // the last messages are still in transit
   }
 
   struct Range {
@@ -135,7 +135,7 @@ TEST_F(SimTime, WithKeptStampsIsThatOfTheRecording) {
   EXPECT_LT(clock.front().stamp, first + seconds{1});
 }
 
-/// The second half of a capture, then the first.
+/// The second half of a capture, followed by the first.
 TEST_F(SimTime, DoesNotGoBackWithARecordingThatDoes) {
   constexpr Duration kHalf = seconds{10};
   std::filesystem::create_directory(file("turned"));

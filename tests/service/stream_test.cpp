@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// locus-sim -o - | locus-play -: a robot that nobody ever recorded.
+// locus-sim -o - | locus-play -: a simulated robot without a recording.
 #include "drivers/net/udp_socket.hpp"
 #include "locus_sim/stream_text.hpp"
 #include "service/robot_network.hpp"
@@ -18,20 +18,20 @@ class Stream : public RobotNetwork {
   static std::vector<std::string> shell(const std::string& command) {
     return {"/bin/bash", "-c", "set -o pipefail; " + command};
   }
-  /// What locus-play says to this on its standard input.
+  /// Runs locus-play with this standard input.
   static ProgramRun play(const std::string& from) {
     return run_program("/bin/bash", {"-c", from + " | " LOCUS_PLAY " -"});
   }
 };
 
-/// The same robot, recorded.
+/// Records the same robot.
 std::filesystem::path recorded(const std::filesystem::path& folder) {
   const ProgramRun run = run_program("/bin/sh", {"-c", LOCUS_SIM + std::string(kDrive) + folder.string()});
   EXPECT_EQ(run.status, 0) << run.err;
   return folder;
 }
 
-/// The truth among them, which no robot sends.
+/// Counts the datagrams received, among them the truth, which no robot sends.
 std::size_t texts_on_the_wire(UdpSocket& socket) {
   std::size_t count = 0;
   for (auto batch = socket.receive(); !batch.empty(); batch = socket.receive())
@@ -66,7 +66,7 @@ TEST_F(Stream, SimulatedRobotDrivesTheServiceWithoutAFile) {
               0.1);
 }
 
-/// A file of lidar packets alone is a stream, too.
+/// A file of lidar packets alone is accepted as a stream.
 TEST_F(Stream, CaptureFileIsSentWithoutConfigurationAndMotion) {
   const ProgramRun run = play("head -c 300000 " + (capture() / "lidar.pcap").string());
   EXPECT_EQ(run.status, 0) << run.err;

@@ -79,7 +79,7 @@ std::optional<int> Terminal::wait_for_exit() {
       status_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     return status_.has_value();
   });
-  read_some(std::chrono::milliseconds{10}); // its last words
+  read_some(std::chrono::milliseconds{10}); // remaining output
   return status_;
 }
 

@@ -15,8 +15,8 @@
 
 namespace locus::test {
 
-/// A terminal of 24 rows and 80 columns with one program in it, and what somebody in front of it would see. Knows as
-/// much of the language of terminals as a page that is drawn over and over needs.
+/// A terminal of 24 rows and 80 columns with one program in it, and its visible contents. Supports only the control
+/// sequences needed by a page that is redrawn in place.
 class Terminal {
  public:
   static constexpr std::size_t kRows = 24, kColumns = 80;
@@ -28,18 +28,18 @@ class Terminal {
 
   void type(std::string_view keys) const;
 
-  /// Whether this comes true of the rows before the test's patience ends.
+  /// Waits until it holds for the rows; false after the test's patience.
   bool wait_until(const std::function<bool()>& holds);
   bool shows(const std::string& text);
   std::optional<int> wait_for_exit();
 
   [[nodiscard]] bool on_page_of_its_own() const { return on_page_of_its_own_; }
   [[nodiscard]] bool cursor_is_shown() const { return cursor_is_shown_; }
-  /// Times that a page was begun at its top.
+  /// Number of times that a page was started at its top.
   [[nodiscard]] int pages() const { return pages_; }
-  /// Letters beyond the right edge and lines beyond the bottom.
+  /// Number of characters beyond the right edge and lines beyond the bottom.
   [[nodiscard]] int overflows() const { return overflows_; }
-  /// How keys are treated now, and were before the program began.
+  /// Returns the current terminal settings, to compare with those before the program started.
   [[nodiscard]] termios settings() const;
   [[nodiscard]] const termios& settings_before() const { return settings_before_; }
 
@@ -54,7 +54,7 @@ class Terminal {
   std::optional<int> status_;
   std::vector<std::string> rows_{kRows, std::string(kColumns, ' ')};
   std::size_t row_ = 0, column_ = 0;
-  std::optional<std::string> escape_; ///< what has come of a sequence
+  std::optional<std::string> escape_; ///< incomplete control sequence
   bool on_page_of_its_own_ = false, cursor_is_shown_ = true;
   int pages_ = 0, overflows_ = 0;
 };

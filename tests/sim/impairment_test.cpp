@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the imperfections do to a robot's sensors, and to what its motion sources say.
+// Effects of the imperfections on a robot's lidars and motion sources.
 #include "locus_sim/impairment.hpp"
 
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ Robot spot_with(const Imperfections& imperfections, std::uint64_t seed = 1) {
   return make_spot({.lidars = 3, .imperfections = imperfections}, seed);
 }
 
-/// Of what a robot writes, the one file.
+/// Returns the robot's configuration file.
 std::string config_of(const RobotOptions& robot) {
   struct : CaptureSink {
     void datagram(const Datagram&) override {}
@@ -80,7 +80,7 @@ TEST(Mounting, OfEachSensorAndSeedIsWrongInItsOwnDirection) {
 
 constexpr double kBelow_m = 0.5, kAhead_m = 6; // from the base to the floor and to two walls
 
-/// A floor below the base, a wall ahead of it and one to its left, and points of each.
+/// A floor below the base, a wall ahead and one to the left, and the points on each.
 struct Corner {
   static Scene scene() {
     return Scene({{Rectangle{{-kAhead_m, -kAhead_m, -kBelow_m}, {2 * kAhead_m, 0, 0}, {0, 2 * kAhead_m, 0}}},
@@ -91,9 +91,9 @@ struct Corner {
   std::vector<Eigen::Vector3d> ahead, left, floor;
 };
 
-/// What a lidar sees of the corner in ten turns, put where its user believes that it is.
+/// Returns the corner's points in ten turns, transformed by the believed extrinsics.
 Corner seen_of_corner(const NamedLidar& named) {
-  constexpr double kNear_m = 0.7, kClear_m = 1; // of the plane; and from the other two
+  constexpr double kNear_m = 0.7, kClear_m = 1; // distance to the plane; distance to the other two
   const Scene scene = Corner::scene();
   const Trajectory trajectory(Course{}.stand(seconds{2}));
   SyntheticLidar lidar(scene, trajectory, named.options);
@@ -125,7 +125,7 @@ Eigen::Vector3d mean_of(const std::vector<Eigen::Vector3d>& points) {
   return sum / static_cast<double>(points.size());
 }
 
-/// Of the plane through the points, on the side of `about`.
+/// Returns the normal of the plane through the points, on the side of `about`.
 Eigen::Vector3d normal_of(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& about) {
   const Eigen::Vector3d mean = mean_of(points);
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
@@ -272,7 +272,7 @@ Scatter scatter_of(const std::vector<double>& all_s) {
   return scatter;
 }
 
-/// How much later than every 5 ms its stamps are; what it says is of then.
+/// Returns the lateness of the stamps relative to a 5 ms grid; each sample is of its grid time.
 template <class Source> Scatter lateness(Source source, Stamp start) {
   std::vector<double> all_s;
   Stamp last = start - seconds{1};
@@ -288,7 +288,7 @@ template <class Source> Scatter lateness(Source source, Stamp start) {
 
 TEST(SourceStamps, AreLateAndScatterAndNeverRunBackwards) {
   const Trajectory trajectory(Course{}.stand(seconds{30}));
-  for (const double jitter_s : {0.0005, 0.02}) { // the larger one puts many out of order
+  for (const double jitter_s : {0.0005, 0.02}) { // the larger one disorders many stamps
     const StampFaults faults{.late = milliseconds{50}, .jitter_s = jitter_s};
     for (const Scatter scatter :
          {lateness(SyntheticImu(trajectory, 200, {.stamps = faults}), trajectory.start()),
@@ -297,13 +297,13 @@ TEST(SourceStamps, AreLateAndScatterAndNeverRunBackwards) {
         EXPECT_NEAR(scatter.mean_s, 0.05, 4 * jitter_s / std::sqrt(4000));
         EXPECT_NEAR(scatter.deviation_s, jitter_s, 0.05 * jitter_s);
       } else {
-        EXPECT_GT(scatter.mean_s, 0.05); // those that would have gone back
+        EXPECT_GT(scatter.mean_s, 0.05); // backward stamps are raised
       }
     }
   }
 }
 
-/// What is written is the motion of before.
+/// A late stamp belongs to earlier motion.
 TEST(SourceStamps, ThatAreLateStandForWhatWas) {
   const Trajectory trajectory(Course{}.change_speed(2, seconds{1}).turn(3, 2.0));
   const Duration late = milliseconds{30};
@@ -321,7 +321,7 @@ TEST(SourceStamps, ThatAreLateStandForWhatWas) {
   }
 }
 
-/// Metres that are reported for each that is driven, at 50 Hz.
+/// Returns the ratio of reported to true distance at 50 Hz.
 std::vector<double> reported_shares(const Trajectory& trajectory, double per_min, std::uint64_t seed) {
   SyntheticOdometry odometry(trajectory, 50, {.slip_bursts_per_min = per_min}, seed);
   OdometrySample last = odometry.next();
@@ -338,12 +338,12 @@ std::vector<double> reported_shares(const Trajectory& trajectory, double per_min
   return shares;
 }
 
-/// At an even speed. The bursts of ten minutes are Poisson's: the bounds are passed one time in ten thousand.
+/// At constant speed. The bursts in ten minutes are Poisson distributed: the bounds are exceeded once in ten thousand.
 TEST(SlipBursts, ReportTooMuchAsOftenAndAsLongAsAskedFor) {
   const Trajectory trajectory(Course{}.change_speed(1, milliseconds{1}).straight(600));
   int bursts = 0, run = 0;
   std::vector<double> shares = reported_shares(trajectory, 5, 3);
-  shares.resize(shares.size() - 100); // who stops dead brakes
+  shares.resize(shares.size() - 100); // braking at the end
   for (const double share : shares) {
     if (share > 1 + 1e-6) {
       EXPECT_GE(share, 1.2 - 1e-6);
@@ -367,7 +367,7 @@ TEST(SlipBursts, ReportTooLittleWhileTheRobotBrakesAndNothingWhileItStands) {
       Course{}.change_speed(10, milliseconds{1}).change_speed(0, seconds{20}).stand(seconds{20}));
   const std::vector<double> shares = reported_shares(trajectory, 60, 3);
   int dragging = 0;
-  for (std::size_t i = 300; i < 700; ++i) { // where it brakes hard enough to be called so
+  for (std::size_t i = 300; i < 700; ++i) { // hard braking
     EXPECT_LE(shares[i], 1 + 1e-6);
     EXPECT_GE(shares[i], -1e-6);
     dragging += shares[i] < 0.9;
@@ -384,7 +384,7 @@ TEST(SlipBursts, AndTurnErrorsAreOfWheelsAndFeetAlone) {
   EXPECT_NEAR(std::abs(legs.turn_error - right.sensors.odometry[1].faults.turn_error), 0.05, 1e-12);
 }
 
-/// Of one and a half turns to the left, at speed.
+/// Returns the ratio of reported to true yaw over one and a half turns to the left, at speed.
 double reported_of_true_yaw(const NamedOdometry& named) {
   const double turn_rad = 3 * std::numbers::pi;
   const Trajectory trajectory(Course{}.change_speed(0.5, seconds{1}).turn(turn_rad, 0.9).change_speed(0, seconds{1}));
@@ -413,7 +413,7 @@ TEST(TurnErrors, MakeTheReportedYawTooLargeOrTooSmallByWhatIsAskedFor) {
   EXPECT_EQ(signs.size(), 2U);
 }
 
-/// What an IMU with faults shows more than one without.
+/// Returns the difference between an IMU with faults and one without.
 ImuSample excess(const Trajectory& trajectory, const ImuFaults& faults, Duration at) {
   const auto sample_at = [&](const ImuFaults& of) {
     SyntheticImu imu(trajectory, 200, of);
@@ -458,7 +458,7 @@ TEST(Gyro, BiasWalksAwayWithTheRootOfTheTime) {
   const Trajectory trajectory(Course{}.stand(seconds{1}));
   ImuFaults faults = make_spot({.noise = false, .imperfections = {.gyro_walk_dps = 0.1}}, 1).sensors.imu->faults;
   SyntheticImu imu(trajectory, 200, faults);
-  constexpr int kRuns = 200, kSamples = 200; // of a second
+  constexpr int kRuns = 200, kSamples = 200; // samples of one second
   double sum = 0;
   Eigen::Vector3d begin = imu.next().angular_velocity_radps, now = begin;
   for (int run = 0; run < kRuns; ++run, begin = now) {

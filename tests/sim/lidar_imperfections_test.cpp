@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the imperfections of a lidar do to its points.
+// Effects of a lidar's imperfections on its points.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@ namespace {
 using std::chrono::seconds;
 using velodyne::ReturnMode;
 
-constexpr double kStep_m = 0.002; // of the ranges of a VLP-16
+constexpr double kStep_m = 0.002; // range resolution of a VLP-16
 
 Trajectory standing(Duration duration = seconds{2}) { return Trajectory(Course{}.stand(duration)); }
 
@@ -26,12 +26,12 @@ Surface upright(double x_m, double from_y_m, double to_y_m, std::uint8_t reflect
   return {Rectangle{{x_m, from_y_m, -100}, {0, to_y_m - from_y_m, 0}, {0, 0, 200}}, reflectivity};
 }
 
-/// A panel to the left, and behind it a wall across.
+/// A panel to the left, and a wall behind and across it.
 Scene panel_before_wall(double gap_m, std::uint8_t panel = 50, std::uint8_t wall = 50) {
   return Scene({upright(10, 0, 8, panel), upright(10 + gap_m, -8, 8, wall)});
 }
 
-/// That a lidar in the origin sees in 15 turns.
+/// Returns the points that a lidar at the origin measures in 15 turns.
 std::vector<Eigen::Vector3d> points_m(const Scene& scene, const SyntheticLidarOptions& options) {
   const Trajectory trajectory = standing();
   SyntheticLidar lidar(scene, trajectory, options);
@@ -65,8 +65,8 @@ double mean_between(const std::vector<double>& all, double from, double to) {
   return sum / static_cast<double>(count_between(all, from, to));
 }
 
-/// The edge is crossed 16 times a turn, each time between two columns that are 35 mm apart there; the beam's sides are
-/// 26 mm apart. And no point lies anywhere else but on or between both.
+/// The edge is crossed 16 times per turn, each time between two columns that are 35 mm apart there; the beam is 26 mm
+/// wide. No point lies anywhere but on or between both surfaces.
 TEST(LidarBeam, MixedPixelsLieBetweenBothSurfaces) {
   const Scene scene = panel_before_wall(0.6);
   const SyntheticLidarOptions line{.rpm = 597}, beam{.rpm = 597, .beam_rad = 0.003};
@@ -93,7 +93,7 @@ TEST(LidarBeam, SurfacesFartherApartThanThePulseIsLongAreNotMixed) {
   EXPECT_GT(count_between(depths, 12.98, 13.02), 1000);
 }
 
-/// The turn follows the upper edge of a panel, 1.5 mm above the middle of a beam that is 6.5 mm high there.
+/// The scan line follows the upper edge of a panel, 1.5 mm above the middle of a beam that is 6.5 mm high there.
 TEST(LidarBeam, IsWideFromTopToBottomToo) {
   const double top_m = velodyne::spec(velodyne::Model::vlp16).calibration.lasers()[1].vertical_offset_m +
                        5 * std::tan(kRadPerDeg) + 0.0015;
@@ -105,7 +105,7 @@ TEST(LidarBeam, IsWideFromTopToBottomToo) {
     });
   };
   EXPECT_EQ(mixed(0), 0);
-  EXPECT_GT(mixed(0.003), 15 * 34 / 2); // 34 columns a turn
+  EXPECT_GT(mixed(0.003), 15 * 34 / 2); // 34 columns per turn
 }
 
 TEST(LidarBeam, DualReturnsTellBothSurfacesOfAnEdge) {
@@ -133,7 +133,7 @@ TEST(LidarBeam, DualReturnsTellBothSurfacesOfAnEdge) {
   EXPECT_GT(pairs, 10 * 16 / 2);
 }
 
-/// Ranges by laser, of one packet in a room without anything in it.
+/// Returns the ranges by laser of one packet in an empty room.
 std::vector<std::vector<double>> ranges_by_laser(const Scene& scene, const SyntheticLidarOptions& options) {
   const Trajectory trajectory = standing();
   SyntheticLidar lidar(scene, trajectory, options);
@@ -156,7 +156,7 @@ double rms(const std::vector<double>& all) {
   return std::sqrt(std::inner_product(all.begin(), all.end(), all.begin(), 0.0) / static_cast<double>(all.size()));
 }
 
-// Of 32 draws of a standard deviation 1, the root mean square lies between these but for one time in ten thousand.
+// RMS bounds of 32 draws with standard deviation 1, exceeded once in ten thousand.
 constexpr double kLeastOf32 = 0.57, kMostOf32 = 1.5;
 
 TEST(LidarErrors, EachLaserHasARangeErrorOfItsOwnThatStays) {
@@ -174,7 +174,7 @@ TEST(LidarErrors, EachLaserHasARangeErrorOfItsOwnThatStays) {
   EXPECT_LT(rms(errors), kMostOf32 * 0.05);
 }
 
-/// Below the level a floor says where each beam points.
+/// The floor reveals the elevation of each beam below the horizon.
 TEST(LidarErrors, EachLaserPointsAboveOrBelowWhereItsTableSays) {
   constexpr double kHeight_m = 2, kSize_rad = 0.3 * kRadPerDeg;
   const Scene floor({{Rectangle{{-200, -200, -kHeight_m}, {400, 0, 0}, {0, 400, 0}}}});
@@ -193,7 +193,7 @@ TEST(LidarErrors, EachLaserPointsAboveOrBelowWhereItsTableSays) {
   EXPECT_LT(rms(errors), 1.7 * kSize_rad);
 }
 
-/// How much farther than without, of the laser one degree above the level, looking along x.
+/// Returns the range error along x of the laser one degree above the horizon, relative to a perfect lidar.
 double farther_m(const Scene& scene, const SyntheticLidarOptions& options) {
   const auto first_m = [&](const SyntheticLidarOptions& asked) {
     const auto lasers = velodyne::spec(std::get<velodyne::Model>(asked.model)).calibration.lasers();
@@ -205,7 +205,7 @@ double farther_m(const Scene& scene, const SyntheticLidarOptions& options) {
   return first_m(options) - first_m({});
 }
 
-/// Through (x, 0, 0), so that a ray along x meets it under that angle.
+/// A plane through (x, 0, 0) that a ray along x meets at this angle of incidence.
 Scene slanting(double x_m, double incidence_deg) {
   const double along_rad = (90 - incidence_deg) * kRadPerDeg;
   const Eigen::Vector3d along{std::cos(along_rad), std::sin(along_rad), 0};
@@ -233,7 +233,7 @@ TEST(LidarErrors, DarkSurfacesSeemFartherThanWhiteOnesAndMirrorsDoNot) {
   EXPECT_EQ(farther(255), 0);
 }
 
-/// An oscillator that is fast by a hundredth: all firings come early by it, and the packets say that they are on time.
+/// An oscillator that is 1 % fast: all firings are early by that, while the packets' stamps are nominal.
 TEST(LidarClock, RunsFastWithItsFiringsAndTheRotorDoesNot) {
   constexpr double kDrift = 0.01, kRpm = 600;
   constexpr int kPackets = 300;
@@ -261,7 +261,7 @@ TEST(LidarClock, RunsFastWithItsFiringsAndTheRotorDoesNot) {
   EXPECT_NEAR(azimuth_cdeg(datagram), turned_cdeg, 2);
 }
 
-/// The robot turns and drives; what is fixed to it stays where it is, and is no part of the world.
+/// The robot turns and drives; its own parts stay fixed in the lidar's view and are not in the map.
 TEST(LidarView, PartsOfTheRobotStandStillInItAndLeaveNoTraceInTheMap) {
   const Scene scene({{Rectangle{{-30, -30, -30}, {60, 0, 0}, {0, 60, 0}}}}); // below, out of view
   const Trajectory trajectory(Course{}.change_speed(1, seconds{1}).turn(3, 3.0), {},

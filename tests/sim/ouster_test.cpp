@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an Ouster brings along beside its columns: metadata, a clock, an inertial unit.
+// Additional outputs of an Ouster: metadata, clock, IMU.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -56,7 +56,7 @@ TEST(SimulatedOuster, ClockCountsFromTheSensorsStartAndRunsFast) {
   EXPECT_EQ(fast.shown_at_true(start + seconds{100}), fast.shown_at(start) + seconds{100} + milliseconds{10});
 }
 
-/// Turned and swung about: what the unit feels where it sits, in its own frame, at the time that it tells.
+/// Rotates and swings the sensor: the IMU measures at its own position, in its own frame, at its own stamps.
 TEST(SimulatedOuster, ImuTellsWhatItFeelsWhereItSits) {
   const Trajectory trajectory(Course{}.change_speed(1, milliseconds{200}).turn(4, 8.0), {},
                               {.height_m = 0.03, .tilt_rad = 0.03, .wavelength_m = 1});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The real locus-sim, driven from outside, and the real locus-replay on what it made.
+// Runs the real locus-sim, and the real locus-replay on its output.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -43,7 +43,7 @@ TEST(LocusSim, SameOptionsGiveTheSameBytesAndAnotherSeedOthers) {
     const std::string bytes = read_text(folder / ("a/" + file));
     EXPECT_FALSE(bytes.empty()) << file;
     EXPECT_TRUE(bytes == read_text(folder / ("b/" + file))) << file;
-    EXPECT_FALSE(bytes == read_text(folder / ("c/" + file))) << file; // the robot's parts in view are other ones too
+    EXPECT_FALSE(bytes == read_text(folder / ("c/" + file))) << file; // the robot's parts in view differ, too
   }
 }
 
@@ -63,18 +63,18 @@ TEST(LocusSim, FolderReplays) {
 }
 
 struct OtherLidar {
-  std::string model, robot, imu; ///< the name of the source
+  std::string model, robot, imu; ///< name of the source
 };
 
 class LocusSimWith : public testing::TestWithParam<OtherLidar> {};
 
 INSTANTIATE_TEST_SUITE_P(OtherMakers, LocusSimWith,
                          testing::Values(OtherLidar{"OS1-32", "husky", "top_imu"},
-                                         OtherLidar{"OS1-32", "handheld", "top_imu"}, // and no odometry at all
+                                         OtherLidar{"OS1-32", "handheld", "top_imu"}, // without odometry
                                          OtherLidar{"XT32", "husky", "imu"}),
                          [](const auto& test) { return test.param.robot + "_" + test.param.model.substr(0, 3); });
 
-/// As exactly as a Velodyne's.
+/// Same accuracy as with a Velodyne.
 TEST_P(LocusSimWith, FolderReplays) {
   const TemporaryFolder folder;
   const std::string capture = folder / "capture";
@@ -117,8 +117,7 @@ TEST(LocusSim, PositionPacketsTellTheTimeOfTheirArrival) {
   EXPECT_NEAR(seen, 12 * 753.5 / 5, 2);
 }
 
-/// With all imperfections, of which some hold stamps back. Put together again, the stream is the folder, but for the
-/// true map.
+/// All imperfections, some of which delay stamps. Reassembled, the stream equals the folder, except for the true map.
 TEST(LocusSim, StreamHoldsWhatTheFolderHolds) {
   const TemporaryFolder folder;
   ASSERT_EQ(run_program(LOCUS_SIM, husky_in("corridor", folder / "c", {"--lidars", "2"})).status, 0);
@@ -148,7 +147,7 @@ TEST(LocusSim, StreamHoldsWhatTheFolderHolds) {
     EXPECT_TRUE(text == read_text(folder / ("c/" + name))) << name;
 }
 
-/// User CPU time of all programs that have ended.
+/// Returns the user CPU time of all ended child processes.
 double children_cpu_s() {
   rusage usage{};
   getrusage(RUSAGE_CHILDREN, &usage);
@@ -163,8 +162,7 @@ double cpu_of_a_minute_s(const std::string& world, const std::string& realism) {
   return children_cpu_s() - before_s;
 }
 
-/// A tenth is asked for, and docs/performance.md has what is measured; twice that leaves room for machines where others
-/// are at work.
+/// The target is a tenth; docs/performance.md has measurements. A factor of two is left for loaded machines.
 TEST(LocusSim, TakesAFifthOfTheTimeThatItSimulatesAtMost) {
   for (const std::string world : {"urban", "tunnel"}) {
     const double took_s = cpu_of_a_minute_s(world, "clean");
@@ -173,8 +171,8 @@ TEST(LocusSim, TakesAFifthOfTheTimeThatItSimulatesAtMost) {
   }
 }
 
-/// Rays to the sides of a beam, people, mirrors. Beside a clean drive of the same run: a share of the time that is
-/// simulated would be that of one machine.
+/// Multiple rays per beam, people, mirrors. Relative to a clean drive in the same run, because a fraction of the
+/// simulated time would depend on the machine.
 TEST(LocusSim, TakesFourTimesAsLongAtMostInARealWorldAsInACleanOne) {
   for (const std::string world : {"urban", "tunnel"}) {
     const double clean_s = cpu_of_a_minute_s(world, "clean"), real_s = cpu_of_a_minute_s(world, "real");
@@ -183,7 +181,7 @@ TEST(LocusSim, TakesFourTimesAsLongAtMostInARealWorldAsInACleanOne) {
   }
 }
 
-/// The levels are what --help and the manual say of each imperfection, and real is what comes without asking.
+/// The levels are documented by --help and the manual for each imperfection; "real" is the default.
 TEST(LocusSim, LevelsOfRealismAreTheSizesOfTheirImperfections) {
   const TemporaryFolder folder;
   const auto simulate = [&](const std::string& name, const std::vector<std::string>& more) {
@@ -209,7 +207,7 @@ TEST(LocusSim, LevelsOfRealismAreTheSizesOfTheirImperfections) {
     EXPECT_TRUE(bytes("default") == bytes("real")) << file;
     EXPECT_TRUE(bytes("real_by_name") == bytes("real")) << file;
     EXPECT_TRUE(bytes("harsh_by_name") == bytes("harsh")) << file;
-    EXPECT_EQ(bytes("clean") == bytes("real"), file == "gt.tum") << file; // sensors are wrong, not the truth
+    EXPECT_EQ(bytes("clean") == bytes("real"), file == "gt.tum") << file; // affects sensors, not the truth
   }
 }
 
@@ -262,7 +260,7 @@ TEST(LocusSim, FolderThatCannotBeMadeIsAFailure) {
             "locus-sim: /dev/null/folder: the folder cannot be made (Not a directory); choose another with -o\n");
 }
 
-/// Not after an hour of driving.
+/// Detected at the start, not after an hour of driving.
 TEST(LocusSim, FileThatCannotBeWrittenIsNamedBeforeTheDrive) {
   for (const std::string name : {"lidar.pcap", "gt_map.ply"}) {
     const TemporaryFolder folder;

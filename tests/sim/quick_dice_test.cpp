@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kDraws = 1'000'000;
 
-/// Largest distance between the distribution of the sample and the one it should have.
+/// Returns the Kolmogorov distance between the sample and its nominal distribution.
 template <class Distribution> double kolmogorov(std::vector<double> sample, Distribution distribution) {
   std::sort(sample.begin(), sample.end());
   double largest = 0;

@@ -32,12 +32,12 @@ TEST(Robots, EachDrivesInEachWorldNoFasterThanIsSensibleThere) {
         const BaseMotion motion = trajectory.at(t);
         fastest_mps = std::max(fastest_mps, motion.velocity_world_mps.head<2>().norm());
         const Eigen::Vector3d middle = motion.T_world_base.translation + Eigen::Vector3d{0, 0, 0.3};
-        // On stairs the lowest robot has its middle 0.43 m above the line that it drives on, and the noses of the steps
-        // are a rise of 0.175 m above that, on a slope of 31.1 degrees; a centimetre for the ripples.
+        // On stairs the middle of the lowest robot is 0.43 m above its path, and the noses of the steps rise 0.175 m
+        // above that path, on a slope of 31.1 degrees; 1 cm allows for ripples.
         constexpr double kOnStairs_m = (0.43 - 0.175) * 0.856 - 0.01;
         ASSERT_GT(world.scene.distance_to_surface(middle, t), kOnStairs_m) << middle.transpose();
       }
-      EXPECT_LT(fastest_mps, most_mps + 0.6); // and what the swinging of a gait adds
+      EXPECT_LT(fastest_mps, most_mps + 0.6); // plus the sway of a gait
     }
   }
 }
@@ -56,7 +56,7 @@ TEST(Car, GoesAt15MetresPerSecondForFiveMinutesAsCarsDo) {
     const BaseMotion motion = trajectory.at(t);
     const Eigen::Vector2d velocity = motion.velocity_world_mps.head<2>();
     fast += velocity.norm() > 14;
-    // On an eased change of speed the peak is 1.875 times the mean of 3 m/s^2.
+    // The peak of an eased change of speed is 1.875 times its mean of 3 m/s^2.
     ASSERT_LT(motion.acceleration_world_mps2.head<2>().norm(), 1.875 * 3 + shaking_mps2);
     ASSERT_LT(velocity.norm() * std::abs(motion.angular_velocity_base_radps.z()), 3.5);
     ASSERT_GT(road.scene.distance_to_surface(motion.T_world_base.translation + Eigen::Vector3d{0, 0, 0.5}, t), 0.7);
@@ -84,12 +84,12 @@ TEST(Handheld, SwaysTurnsFastAndHasAnImuAlone) {
     ASSERT_LT(above_ground_m, 1.7);
   }
   EXPECT_GT(fastest_radps, 3.5);
-  EXPECT_LT(fastest_radps, 7); // a flick while it turns
+  EXPECT_LT(fastest_radps, 7); // a flick during a turn
   EXPECT_GT(above_two, 10);
   EXPECT_LT(above_two, 0.1 * 18'000);
 }
 
-/// Straight on, at walking pace.
+/// Straight ahead, at walking pace.
 TEST(Handheld, SwaysBy30CentimetresFromSideToSide) {
   const Trajectory trajectory(Course{}.change_speed(1.2, seconds{1}).straight(60), {}, {}, make_handheld({}, 1).ride);
   double leftmost_m = 0, rightmost_m = 0;
@@ -99,7 +99,7 @@ TEST(Handheld, SwaysBy30CentimetresFromSideToSide) {
     rightmost_m = std::min(rightmost_m, left_m);
   }
   EXPECT_GT(leftmost_m - rightmost_m, 0.3);
-  EXPECT_LT(leftmost_m - rightmost_m, 0.35); // and the stride
+  EXPECT_LT(leftmost_m - rightmost_m, 0.35); // plus the stride
 }
 
 TEST(Handheld, TurnsWithUpToTwoRadiansPerSecondAndFlicksWithFour) {

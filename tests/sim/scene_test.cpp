@@ -17,7 +17,7 @@ Eigen::Vector3d random_direction(std::mt19937_64& random) {
   return Eigen::Vector3d{x, y, z}.normalized();
 }
 
-/// Marches along the ray by the distance to the nearest surface, which can never step over one.
+/// Marches along the ray by the distance to the nearest surface, which cannot step over one.
 double marched_range_m(const Scene& scene, const Ray& ray, double max_range_m) {
   double range_m = 0;
   for (int step = 0; step < 100'000 && range_m < max_range_m; ++step) {
@@ -74,7 +74,7 @@ TEST(Scene, SurfacesAboutOnePointAreAllKept) {
   }
 }
 
-/// Two ways to the same answer: the tree of boxes with the formulae of intersection, and marching by distances.
+/// Two independent methods: the tree of boxes with intersection formulae, and marching by distances.
 class ReadyMadeScene : public testing::TestWithParam<std::pair<const char*, Scene>> {};
 
 TEST_P(ReadyMadeScene, RaysEndWhereMarchingByDistanceEnds) {
@@ -86,7 +86,7 @@ TEST_P(ReadyMadeScene, RaysEndWhereMarchingByDistanceEnds) {
     const double marched_m = marched_range_m(scene, ray, 30);
     if (!hit)
       EXPECT_GE(marched_m, 30 - 1e-6);
-    else // marching stops a little early where a ray grazes a surface
+    else // marching stops slightly early if a ray grazes a surface
       EXPECT_NEAR(hit->range_m, marched_m, 1e-3);
   }
 }

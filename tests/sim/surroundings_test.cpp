@@ -21,7 +21,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// Level, with walls far off: 240 x 80 m.
+/// Level ground with distant walls: 240 x 80 m.
 World yard() {
   SceneBuilder build;
   build.rectangle({-20, -40, 0}, {240, 0, 0}, {0, 80, 0}, 30);
@@ -32,7 +32,7 @@ World yard() {
   return {.scene = build.scene(), .roads = {}, .ground_m = {}, .terrain = {}, .max_speed_mps = 15};
 }
 
-/// At walking pace, with a wait, corners and a turn on the spot.
+/// At walking pace, with a stop, corners and a turn on the spot.
 Trajectory stroll() {
   return Trajectory(Course{}
                         .stand(seconds{8})
@@ -54,9 +54,9 @@ Trajectory straight_on(double speed_mps, double length_m) {
   return Trajectory(Course{}.change_speed(speed_mps, seconds{5}).straight(length_m));
 }
 
-/// Of the returns of a level VLP-16 on a husky, what share comes from what moves.
+/// Fraction of moving objects in the returns of a level VLP-16 on a husky.
 struct Share {
-  double of_drive = 0, largest = 0; ///< that of a single look
+  double of_drive = 0, largest = 0; ///< maximum over single sweeps
 };
 
 Share share_of_view(const World& world, const Trajectory& trajectory) {
@@ -101,8 +101,8 @@ TEST(People, HideAModeratePartOfTheViewAndInHarshUseAThird) {
   record("real_largest", real.largest);
   record("harsh", harsh.of_drive);
   record("harsh_largest", harsh.largest);
-  // Who stands as far off as he may, 3.4 m from the middle, hides with his trunk alone 6.4 degrees to either side of it
-  // together, on a third of the rings.
+  // A person at the largest distance, 3.4 m from the middle, occludes with the trunk alone a total of 6.4 degrees, on a
+  // third of the rings.
   const double one = 2 * std::asin(0.19 / 3.4) / (2 * std::numbers::pi) / 3;
   EXPECT_GT(real.of_drive, 3 * one);
   EXPECT_LT(real.of_drive, 0.25);
@@ -139,7 +139,7 @@ TEST(People, KeepClearOfTheRobotStayWithItAndNeverRun) {
 TEST(People, WaitBesideTheWayOfWhoIsFasterThanTheyAre) {
   const Trajectory trajectory = straight_on(12, 150);
   const World world = yard_with({.people = 6}, trajectory);
-  std::vector<double> passed_at_m; // along the way
+  std::vector<double> passed_at_m; // distance along the path
   for (Stamp t = trajectory.start(); t < trajectory.end(); t += milliseconds{50}) {
     const Eigen::Vector2d base = trajectory.T_world_base(t).translation.head<2>();
     for (const Passer& person : world.scene.passers()) {
@@ -150,7 +150,7 @@ TEST(People, WaitBesideTheWayOfWhoIsFasterThanTheyAre) {
     }
   }
   ASSERT_FALSE(passed_at_m.empty());
-  EXPECT_GT(passed_at_m.back(), 100); // still, when those of the start are far behind
+  EXPECT_GT(passed_at_m.back(), 100); // long after those of the start
 }
 
 TEST(Vehicle, DrivesAlongsideAtTheRobotsSpeedForSoManySecondsOfAMinute) {
@@ -166,7 +166,7 @@ TEST(Vehicle, DrivesAlongsideAtTheRobotsSpeedForSoManySecondsOfAMinute) {
       const Eigen::Vector2d at = vehicle.at(t).ground_m.head<2>().cast<double>();
       const Eigen::Vector2d later = vehicle.at(t + milliseconds{100}).ground_m.head<2>().cast<double>();
       const double aside_m = std::abs(at.y() - base.y());
-      if ((at - base).norm() < 20) { // it neither comes into being nor vanishes here
+      if ((at - base).norm() < 20) { // no vehicle appears or disappears this close
         ASSERT_LT((later - at).norm() / 0.1, 3);
         ASSERT_GT(aside_m, 1.9);
         ASSERT_LT(aside_m, 4.1);
@@ -187,7 +187,7 @@ TEST(Vehicle, KeepsOutOfANarrowCorridor) {
   EXPECT_FALSE(escort(corridor(80), way, 20, dice));
 }
 
-/// Of three courses of 80 s, as the harsh table of locus-experiments has them, on how many there is one.
+/// Returns on how many of three courses of 80 s, as in the harsh table of locus-experiments, there is a vehicle.
 int courses_with_vehicle(WorldMaker make_world, const NamedRobot& named) {
   int count = 0;
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
@@ -234,7 +234,7 @@ TEST(Steam, LetsThroughWhatItsDepthAndThinnessLeaveAndThrowsTheRestBackFromInsid
   }
   EXPECT_FALSE(scene.cast({{0, 0, 0}, {1, 0, 0}}, 100, kCloud.end)->apparent);
   EXPECT_FALSE(scene.cast({{0, 0, 0}, {1, 0, 0}}, 100, kCloud.begin - seconds{1})->apparent);
-  EXPECT_FALSE(scene.cast({{0, 3, 0}, {1, 0, 0}}, 100, kCloud.begin + seconds{1})->apparent); // past it
+  EXPECT_FALSE(scene.cast({{0, 3, 0}, {1, 0, 0}}, 100, kCloud.begin + seconds{1})->apparent); // past the cloud
 }
 
 TEST(Steam, BurstsNearTheWayForSecondsAsOftenAsAsked) {
@@ -251,7 +251,7 @@ TEST(Steam, BurstsNearTheWayForSecondsAsOftenAsAsked) {
   }
 }
 
-/// A floor of 100 x 100 m before a wall at x = 10.
+/// A floor of 100 x 100 m in front of a wall at x = 10.
 Scene hall(double wet, double glass) {
   Scene scene({{Rectangle{{-50, -50, 0}, {100, 0, 0}, {0, 100, 0}}, 40},
                {Rectangle{{10, -50, 0}, {0, 100, 0}, {0, 0, 8}}, 80}});
@@ -262,7 +262,7 @@ Scene hall(double wet, double glass) {
 TEST(Mirrors, AsMuchOfTheFloorIsWetAsAskedInPuddles) {
   for (const double share : {0.03, 0.2, 0.7}) {
     const Scene scene = hall(share, 0);
-    const auto is_wet = [&](double x, double y) { // straight down a film shows as darker ground
+    const auto is_wet = [&](double x, double y) { // looking straight down, a wet floor is darker
       return scene.cast({{x, y, 1}, {0, 0, -1}}, 5)->reflectivity < 30;
     };
     int all = 0, wet = 0, edges = 0;
@@ -273,7 +273,7 @@ TEST(Mirrors, AsMuchOfTheFloorIsWetAsAskedInPuddles) {
       }
     }
     EXPECT_NEAR(wet, share * all, 0.2 * share * all);
-    EXPECT_LT(edges, 0.2 * wet); // a step of 5 cm stays in a puddle, or out of it
+    EXPECT_LT(edges, 0.2 * wet); // steps of 5 cm rarely cross the edge of a puddle
   }
 }
 
@@ -288,7 +288,7 @@ TEST(Mirrors, WetFloorShowsTheWallUpsideDownTheMoreTheFlatterTheRay) {
       if (!hit || !hit->apparent)
         continue;
       ++count;
-      EXPECT_NEAR(hit->point_m.x(), 10, 1e-5); // its image stands on the wall, below the floor
+      EXPECT_NEAR(hit->point_m.x(), 10, 1e-5); // the mirror image of the wall, below the floor
       EXPECT_LT(hit->point_m.z(), 0);
       EXPECT_NEAR(hit->range_m, 10 / std::cos(down), 1e-5);
       EXPECT_LT(hit->reflectivity, 80);
@@ -298,7 +298,7 @@ TEST(Mirrors, WetFloorShowsTheWallUpsideDownTheMoreTheFlatterTheRay) {
   const double steep = ghosts(30), flat = ghosts(6);
   EXPECT_LT(steep, 0.05);
   EXPECT_GT(flat, 0.8);
-  EXPECT_FALSE(scene.cast({{0, 0, 0.8}, {-std::cos(0.1), 0, -std::sin(0.1)}}, 100)->apparent); // mirrors the sky
+  EXPECT_FALSE(scene.cast({{0, 0, 0.8}, {-std::cos(0.1), 0, -std::sin(0.1)}}, 100)->apparent); // reflects the sky
 }
 
 TEST(Mirrors, FresnelGivesWhatTextbooksHave) {
@@ -341,7 +341,7 @@ TEST(Mirrors, AsManyPanesAreGlassAsAsked) {
   int glass = 0, all = 0;
   for (double x = 0.5; x < 799; x += 1, ++all)
     glass += scene.cast({{x, -5, 1}, {0, 1, 0}}, 20)->reflectivity > 100;
-  EXPECT_NEAR(glass, 0.1 * all, 4 * std::sqrt(0.1 * all * 2)); // by twos: a pane is 2 m wide
+  EXPECT_NEAR(glass, 0.1 * all, 4 * std::sqrt(0.1 * all * 2)); // in pairs: a pane is 2 m wide
 }
 
 TEST(Surroundings, OfACleanWorldAreNone) {

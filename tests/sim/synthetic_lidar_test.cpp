@@ -26,8 +26,8 @@ using velodyne::ReturnMode;
 
 const Pose kTilted{from_rpy_rad({0.1, 0.3, -0.7}), {0.2, -0.1, 0.9}};
 
-/// Spins at up to 8 rad/s while it drives at 1 m/s on rough ground: four times what the robots do, so that an error of
-/// the simulator stands out from the steps of range and azimuth.
+/// Spins at up to 8 rad/s while it drives at 1 m/s on rough ground: four times the robots' rates, so that simulator
+/// errors exceed the resolution of range and azimuth.
 Trajectory lively_trajectory() {
   return Trajectory(Course{}.change_speed(1, milliseconds{200}).turn(4, 8.0), {},
                     {.height_m = 0.03, .tilt_rad = 0.03, .wavelength_m = 1});
@@ -59,7 +59,7 @@ struct Sensor {
   double packets_per_s; ///< by its manual
 };
 
-/// That of the sensor's maker.
+/// The decoder of the sensor's maker.
 class AnyDecoder {
  public:
   AnyDecoder(const SyntheticLidarOptions& options, Stamp start) {
@@ -104,9 +104,9 @@ INSTANTIATE_TEST_SUITE_P(All, EverySensor,
                                          Sensor{hesai::Model::xt32, ReturnMode::strongest, 2500.0}),
                          name_of);
 
-/// The whole chain: a return that is decoded and put where the lidar was when it was fired lies on a surface, but for
-/// the steps of range (half a step) and azimuth (0.01 degrees) and, where an edge gave two echoes, the width of the
-/// beam. One pose for the firings of a column would be 5 mm off; an Ouster's beams that began in one point, 16 mm.
+/// Full chain: a decoded return, transformed by the lidar's pose at its firing, lies on a surface, up to the resolution
+/// of range (half a step) and azimuth (0.01 degrees) and, for an edge with two echoes, the beam width. A single pose
+/// per column would cause an error of 5 mm; a common origin of an Ouster's beams, 16 mm.
 TEST_P(EverySensor, EveryReturnLiesOnASurfaceFromWhereItWasFired) {
   const auto [model, mode] = std::pair{GetParam().model, GetParam().mode};
   const Scene scene = room();
@@ -121,7 +121,7 @@ TEST_P(EverySensor, EveryReturnLiesOnASurfaceFromWhereItWasFired) {
   const double half_step_m = pattern.resolution_m / 2;
   const double aside_rad = 0.01 * kRadPerDeg + (mode == ReturnMode::dual ? kHalfBeam_rad : 0);
   std::size_t packets = 0, returns = 0;
-  ASSERT_TRUE(decoder.reads(lidar.next(), *packet)); // from one column alone the decoder cannot tell the turn
+  ASSERT_TRUE(decoder.reads(lidar.next(), *packet)); // the decoder needs two columns to measure the rotation
   for (Datagram datagram = lidar.next(); datagram.receive_stamp < trajectory.end(); datagram = lidar.next()) {
     ASSERT_TRUE(decoder.reads(datagram, *packet));
     const Stamp fired = datagram.receive_stamp - spans + to_first_firing;

@@ -30,9 +30,9 @@ Course winding() {
       .stand(seconds{1});
 }
 
-/// Compares them with differences of the pose.
+/// Compares the derivatives with finite differences of the pose.
 void expect_exact_derivatives(const Trajectory& trajectory) {
-  constexpr Duration kHalf = microseconds{50}; // short beside the time in which a slip sets in
+  constexpr Duration kHalf = microseconds{50}; // short compared with the onset of a slip
   const double interval_s = to_seconds(2 * kHalf);
   for (Stamp t = trajectory.start() + milliseconds{7}; t < trajectory.end(); t += milliseconds{23}) {
     const BaseMotion before = trajectory.at(t - kHalf), now = trajectory.at(t), after = trajectory.at(t + kHalf);

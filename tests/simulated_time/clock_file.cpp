@@ -33,11 +33,11 @@ void run_in_simulated_time(char** argv, double rate) {
   const Duration origin = system_time();
   const SimulatedTime time{0, rate, origin.count(), (system_clock(CLOCK_REALTIME) - origin).count(),
                            (system_clock(CLOCK_BOOTTIME) - origin).count()};
-  const int file = memfd_create("simulated_clock", 0); // and so open in the programs to come
+  const int file = memfd_create("simulated_clock", 0); // without O_CLOEXEC: inherited by child programs
   if (file < 0 || write(file, &time, sizeof(time)) != static_cast<ssize_t>(sizeof(time)))
     throw std::runtime_error("no file for the simulated clock");
   const std::string path = "/proc/" + std::to_string(getpid()) + "/fd/" + std::to_string(file);
-  const sched_param fifo{3}; // what else this machine does would last so many times longer
+  const sched_param fifo{3}; // real-time: delays by other processes would be multiplied by the rate
   sched_setscheduler(0, SCHED_FIFO, &fifo);
   setenv(kVariable, path.c_str(), 1);               // NOLINT(concurrency-mt-unsafe)
   setenv("LD_PRELOAD", SIMULATED_CLOCK_LIBRARY, 1); // NOLINT(concurrency-mt-unsafe)

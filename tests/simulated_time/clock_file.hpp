@@ -8,12 +8,12 @@
 
 namespace locus::test {
 
-/// Begins this program anew, with its clocks and those of all programs that it starts `rate` times as fast as the
-/// system's, unless that is done already. Then whatever it waits for or measures is in simulated time. All of them run
-/// undisturbed by other programs, where that is permitted.
+/// Restarts this program with its clocks, and those of all programs that it starts, `rate` times as fast as the
+/// system's, unless that is the case already. All its waits and measurements are then in simulated time. The programs
+/// run at real-time priority, if permitted.
 void run_in_simulated_time(char** argv, double rate);
 
-/// The simulated clock that this program has in common with those that it started. One owner.
+/// The simulated clock that this program shares with its child processes. Not thread-safe.
 class ClockFile {
  public:
   /// Precondition: run_in_simulated_time() was called.
@@ -22,17 +22,17 @@ class ClockFile {
   ClockFile(const ClockFile&) = delete;
   ClockFile& operator=(const ClockFile&) = delete;
 
-  /// Sets the wall clock of all of them, against what it is set by now.
+  /// Steps the wall clock of all these programs, relative to its present offset.
   void step(Duration by);
   [[nodiscard]] Duration set_by() const { return Duration{time_->set_by_ns}; }
   [[nodiscard]] double rate() const { return time_->rate; }
 
  private:
   void* page_ = nullptr;
-  volatile SimulatedTime* time_ = nullptr; ///< the same
+  volatile SimulatedTime* time_ = nullptr; ///< same address as page_
 };
 
-/// CLOCK_MONOTONIC of the system, whatever is preloaded.
+/// Returns the system's CLOCK_MONOTONIC, even if the simulated clock is preloaded.
 Duration system_time();
 
 } // namespace locus::test

@@ -12,7 +12,7 @@ namespace {
 
 constexpr Duration kQuiet = std::chrono::seconds{30}; ///< at the beginning and at the end
 
-/// Of how many seconds a fault may be; the logarithm is evenly distributed. Zero: of an instant.
+/// Range of a fault's duration in seconds, log-uniformly distributed. Zero: instantaneous.
 struct Span {
   double least_s, most_s;
 };
@@ -36,13 +36,14 @@ constexpr std::array<Span, kDayFaults> kSpans{{{0, 0},
 
 constexpr std::array<const char*, 6> kThreads{"locusd", "ingest", "odometry", "publisher", "dds", "disk"};
 
-/// The library's distributions may differ from one version to the next, and so would the faults of a seed.
+/// Portable random numbers: distributions of the standard library differ between versions, and so would the faults of a
+/// seed.
 class Chance {
  public:
   explicit Chance(std::uint64_t seed) : random_(seed) {}
   double share() { return static_cast<double>(random_() >> 11) * 0x1p-53; }
   std::size_t below(std::size_t count) { return random_() % count; }
-  /// Whose logarithm is evenly distributed.
+  /// Returns a log-uniformly distributed duration.
   Duration between(double least_s, double most_s) {
     return from_seconds(least_s * std::pow(most_s / least_s, share()));
   }

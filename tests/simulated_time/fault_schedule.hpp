@@ -13,24 +13,24 @@
 
 namespace locus::test {
 
-/// What can befall the service and the computer that it runs on.
+/// Faults of the service and of its computer.
 enum class DayFault : std::uint8_t {
-  clock_step,      ///< the wall clock is set
-  process_stop,    ///< the process does not run (SIGSTOP)
-  thread_hang,     ///< one of its threads does not
-  crash,           ///< SIGKILL; systemd starts it anew
-  lidar_lost,      ///< not a packet
-  imu_lost,        ///< not a sample
-  odometry_lost,   ///< not a sample
+  clock_step,      ///< the wall clock is stepped
+  process_stop,    ///< the process is stopped (SIGSTOP)
+  thread_hang,     ///< one of its threads is stopped
+  crash,           ///< SIGKILL; systemd restarts it
+  lidar_lost,      ///< no packet
+  imu_lost,        ///< no sample
+  odometry_lost,   ///< no sample
   link_down,       ///< the network interface of DDS
-  garbage,         ///< datagrams of any length and content on the ports of the lidar
-  flood,           ///< as many as a sender who goes wild sends
-  duplicates,      ///< packets that come twice
-  late,            ///< packets that others overtake
-  disk_full,       ///< the file system of state and recording
-  reload,          ///< of the same configuration
-  broken_config,   ///< reload while the file is cut short
-  second_odometry, ///< another publisher of the same topic
+  garbage,         ///< datagrams of random length and content on the lidar ports
+  flood,           ///< garbage at the maximum rate
+  duplicates,      ///< packets that arrive twice
+  late,            ///< packets that are overtaken by others
+  disk_full,       ///< the file system of state and recording is full
+  reload,          ///< with the same configuration
+  broken_config,   ///< reload while the file is truncated
+  second_odometry, ///< another publisher on the same topic
   deaf_reader      ///< a reliable reader that does not read
 };
 constexpr auto names_of(DayFault) {
@@ -43,18 +43,18 @@ inline constexpr std::size_t kDayFaults = names_of(DayFault{}).size();
 
 struct ScheduledFault {
   DayFault kind{};
-  Duration begin{}, lasts{}; ///< simulated time since the day began; those of an instant last for none
-  Duration step{};           ///< of the clock
-  std::string thread;        ///< that hangs
+  Duration begin{}, lasts{}; ///< simulated time since the start of the day; instantaneous faults last zero
+  Duration step{};           ///< step of the clock
+  std::string thread;        ///< thread that is stopped
 
   [[nodiscard]] Duration end() const { return begin + lasts; }
 };
 
 std::string to_text(const ScheduledFault& fault);
 
-/// The faults of a day in order of their beginnings: a Poisson process of `mean_pause`, each kind as likely. They may
-/// overlap, two of a kind do not. The same arguments give the same faults. None begins in the first half minute, none
-/// goes on in the last.
+/// Schedules the faults of a day in order of their beginnings: a Poisson process of `mean_pause`, all kinds equally
+/// likely. Faults of different kinds may overlap, those of one kind do not. The first and last half minute are free of
+/// faults. Equal arguments give equal faults.
 std::vector<ScheduledFault> schedule_faults(std::uint64_t seed, Duration day, Duration mean_pause);
 
 } // namespace locus::test

@@ -17,18 +17,18 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using enum DayFault;
 
-constexpr Duration kMoment = seconds{2};    ///< until an announcement is heard
-constexpr Duration kBaseline = seconds{10}; ///< over which the way is judged
-constexpr Duration kLongest = seconds{120}; ///< the same, where nothing was heard in between
-constexpr double kHealthy_m = 0.2;          ///< error of 10 s of way while the sensors are heard
-constexpr double kAfterStop_m = 0.5;        ///< where the service did not run in between
-constexpr double kWithoutLidar_m = 1.5;     ///< where wheels and IMU alone told of the way
+constexpr Duration kMoment = seconds{2};    ///< until an announcement is received
+constexpr Duration kBaseline = seconds{10}; ///< over which the motion is compared
+constexpr Duration kLongest = seconds{120}; ///< longest such interval, after a gap in the estimates
+constexpr double kHealthy_m = 0.2;          ///< motion error over 10 s while the sensors work
+constexpr double kAfterStop_m = 0.5;        ///< after a stop of the service in between
+constexpr double kWithoutLidar_m = 1.5;     ///< after motion measured by wheels and IMU only
 
 } // namespace
 
 void FrameJudge::look(Listener& listener, const ClockFile& clock) {
   for (const Listener::Beginning& beginning : listener.new_beginnings()) {
-    if (beginning.stamp == last_beginning_) // heard again, by who has lost the service and found it
+    if (beginning.stamp == last_beginning_) // received again after rediscovery of the service
       continue;
     last_beginning_ = beginning.stamp;
     ++beginnings_;
@@ -47,9 +47,9 @@ void FrameJudge::look(Listener& listener, const ClockFile& clock) {
   look_whether_heard();
 }
 
-/// Within how long after each fault it must be heard again.
+/// Expects an estimate within a fault-dependent time after each fault.
 void FrameJudge::look_whether_heard() {
-  constexpr Duration kAlways = seconds{3}; ///< a pause that nobody minds
+  constexpr Duration kAlways = seconds{3}; ///< tolerated gap
   const bool is_excused = events_.any({link_down}, seconds{25}) ||
                           events_.any({process_stop, thread_hang, crash}, seconds{15}) ||
                           events_.now() - life_began_ < seconds{15} || events_.any({lidar_lost, reload}, seconds{6});
@@ -65,7 +65,7 @@ void FrameJudge::take(const Listener::Estimate& estimate, Duration set_by, Stamp
   constexpr Duration kLatest = seconds{1};
   ++heard_;
   heard_at_ = events_.now();
-  if (events_.any({clock_step}, seconds{4})) // by which clock it was stamped is not known
+  if (events_.any({clock_step}, seconds{4})) // unknown by which clock it was stamped
     return;
   const Stamp stamp = estimate.stamp - set_by;
   const bool may_be_late = events_.any({process_stop, thread_hang, link_down, deaf_reader}, seconds{15});

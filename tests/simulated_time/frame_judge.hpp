@@ -14,15 +14,15 @@
 
 namespace locus::test {
 
-/// Judges what is published: that odometry comes, that its stamps are those of the clock on the wall, that it is where
-/// the robot is, and that no frame begins anew unannounced. One owner.
+/// Checks the published odometry: it is continuous, its stamps are those of the wall clock, its pose is true, and no
+/// frame restarts without an announcement. Not thread-safe.
 class FrameJudge {
  public:
   FrameJudge(const RobotSender& robot, Events& events) : robot_(robot), events_(events) {}
 
-  /// At what has come since the last look.
+  /// Checks the estimates received since the previous call.
   void look(Listener& listener, const ClockFile& clock);
-  /// Another life of the service has begun, or it begins its odometry anew where it is.
+  /// The service has restarted, or restarts its odometry at the current pose.
   void begin_life() { life_began_ = events_.now(); }
 
   [[nodiscard]] double worst_healthy_m() const { return worst_healthy_m_; }
@@ -32,7 +32,7 @@ class FrameJudge {
 
  private:
   struct Seen {
-    Duration at{}; ///< heard
+    Duration at{}; ///< time of reception
     Stamp steady;
     Pose T_odom_base, T_world_base;
   };
@@ -44,7 +44,7 @@ class FrameJudge {
 
   const RobotSender& robot_;
   Events& events_;
-  std::deque<Seen> waiting_; ///< whether their frame was announced will be known in a moment
+  std::deque<Seen> waiting_; ///< judged once an announcement of their frame would have arrived
   std::deque<Seen> before_;
   Duration heard_at_{}, life_began_{}, announced_ = -std::chrono::hours{1};
   Stamp last_beginning_;

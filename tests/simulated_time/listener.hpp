@@ -12,14 +12,14 @@
 
 namespace locus::test {
 
-/// A ROS 2 machine that hears what the service publishes. One owner.
+/// A ROS 2 machine that subscribes to the service's topics. Not thread-safe.
 class Listener {
  public:
   struct Estimate {
-    Stamp stamp; ///< as the clock on the wall had it
+    Stamp stamp; ///< by the wall clock
     Pose T_odom_base;
   };
-  /// A frame that begins, as /locus/beginning tells of it.
+  /// Start of a frame, as published on /locus/beginning.
   struct Beginning {
     Stamp stamp;
     std::string from;
@@ -27,7 +27,7 @@ class Listener {
 
   explicit Listener(const daemon::DdsNode& node);
 
-  /// What has come since the last call.
+  /// Returns the estimates received since the previous call.
   std::vector<Estimate> new_estimates();
   std::vector<Beginning> new_beginnings();
 

@@ -9,10 +9,10 @@
 namespace locus::test {
 namespace {
 
-constexpr Duration kSettles = std::chrono::seconds{15}; ///< after this machine was too slow
-constexpr int kMostOfAKind = 3;                         ///< findings that are told
+constexpr Duration kSettles = std::chrono::seconds{15}; ///< after an overload of this machine
+constexpr int kMostOfAKind = 3;                         ///< findings reported
 
-/// By which findings of a kind are known.
+/// Returns the key by which findings of one kind are grouped.
 std::string without_numbers(std::string text) {
   std::erase_if(text, [](unsigned char c) { return std::isdigit(c) != 0; });
   return text;

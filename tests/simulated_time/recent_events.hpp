@@ -12,8 +12,7 @@
 
 namespace locus::test {
 
-/// What has happened in a day so far, and what was found that should not have been. All times are simulated ones since
-/// it began. One owner.
+/// Events of the day so far, and the violations found. All times are simulated ones since the start. Not thread-safe.
 class Events {
  public:
   void set_now(Duration now);
@@ -22,17 +21,17 @@ class Events {
   void begin(DayFault kind);
   void end(DayFault kind);
   [[nodiscard]] bool is_on(DayFault kind) const { return of(kind).active; }
-  /// Since when it is over; zero while it lasts, very long if it never was.
+  /// Returns the time since its end; zero while it lasts, very long if it never occurred.
   [[nodiscard]] Duration since_end(DayFault kind) const;
-  /// Whether one of them lasts, or did so within the last moments.
+  /// Returns whether one of them is active, or was within this time.
   [[nodiscard]] bool any(std::initializer_list<DayFault> kinds, Duration within) const;
 
-  /// This machine was too slow: what happens within the next moments says nothing about the service.
+  /// Registers that this machine was too slow: for a while no finding counts against the service.
   void disturb(const std::string& why);
   [[nodiscard]] bool is_disturbed() const { return now_ < disturbed_until_; }
   [[nodiscard]] double disturbed_share() const { return to_seconds(disturbed_) / to_seconds(now_); }
 
-  /// What should not have been, the first few of a kind; nothing while this machine is too slow.
+  /// Registers a violation, the first few of a kind; ignored while this machine is too slow.
   void find(const std::string& what);
   [[nodiscard]] const std::vector<std::string>& findings() const { return findings_; }
 

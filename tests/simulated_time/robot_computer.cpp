@@ -25,7 +25,7 @@ void run(const std::string& command) {
     throw std::runtime_error("failed: " + command);
 }
 
-/// Known to both sides: ARP has timers of the kernel, in the system's time, for which senders would wait.
+/// Static neighbour entries on both sides: ARP uses kernel timers in system time, on which senders would wait.
 constexpr const char* kHereMac = "02:00:00:00:00:01";
 constexpr const char* kThereMac = "02:00:00:00:00:02";
 

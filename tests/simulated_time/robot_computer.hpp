@@ -13,23 +13,23 @@
 
 namespace locus::test {
 
-/// The computer of the robot: a network and file systems of this program's own. Its lidar is heard by `lo`; by the
-/// cable `dds0` it is connected to another computer, 10.9.1.2, where those live who talk DDS with it.
+/// The robot's computer: network and file systems private to this program. Lidar packets arrive by `lo`; the cable
+/// `dds0` leads to another computer, 10.9.1.2, which runs the DDS peers.
 class RobotComputer {
  public:
-  /// Throws std::runtime_error where the system does not allow that. Precondition: this is the only thread.
+  /// Throws std::runtime_error if the system does not permit it. Precondition: this is the only thread.
   RobotComputer();
   ~RobotComputer();
   RobotComputer(const RobotComputer&) = delete;
   RobotComputer& operator=(const RobotComputer&) = delete;
 
-  /// Runs this on the other computer, whose network what it opens stays in.
+  /// Runs a function in the network namespace of the other computer; sockets opened there stay in it.
   void over_there(const std::function<void()>& run) const;
-  /// The command, to be run there.
+  /// Returns a command that runs there.
   [[nodiscard]] std::vector<std::string> there(std::vector<std::string> command) const;
 
   void set_link(bool up) const;
-  /// Fills the file system of state(), or makes room again.
+  /// Fills the file system of state(), or frees it again.
   void set_disk_full(bool full) const;
 
   [[nodiscard]] std::filesystem::path state() const { return folder_ / "state"; } ///< a file system of 48 MB

@@ -23,10 +23,10 @@ namespace {
 using tools::ExitStatus;
 using tools::value_or_fail;
 
-constexpr std::uint64_t kImuEvery = 2;       ///< 100 Hz are enough, and half as dear
+constexpr std::uint64_t kImuEvery = 2;       ///< 100 Hz suffice, at half the cost
 constexpr std::uint64_t kDuplicateEvery = 5; ///< packets
 constexpr std::uint64_t kLateEvery = 20;
-constexpr Duration kNotPrepared = std::chrono::seconds{1}; ///< counts as so late
+constexpr Duration kNotPrepared = std::chrono::seconds{1}; ///< lag counted if nothing is prepared
 constexpr double kGarbageHz = 200, kFloodHz = 8000;
 
 int socket_of_a_stranger() {
@@ -74,11 +74,11 @@ std::optional<Pose> RobotSender::truth_at(Stamp steady) const {
   return interpolate(before.T_source_base, after->T_source_base, share);
 }
 
-/// A minute ahead, and when the service does not need the processor: the beginning of a lap takes a while.
+/// Prepares inputs one minute ahead, while the service does not need the processor: starting a lap takes long.
 void RobotSender::prepare() {
   constexpr std::size_t kAhead = 60'000;
   const sched_param ordinary{0};
-  sched_setscheduler(0, SCHED_OTHER, &ordinary); // of this thread alone, on Linux, as the next
+  sched_setscheduler(0, SCHED_OTHER, &ordinary); // this thread only, on Linux; so does the next
   setpriority(PRIO_PROCESS, 0, -20);
   course_.begin_lap({});
   while (!stopping_) {
@@ -105,17 +105,17 @@ std::optional<RobotSender::Prepared> RobotSender::take_prepared() {
   return next;
 }
 
-/// With what it does not come to an end of.
+/// Includes the input that is still being sent.
 Duration RobotSender::worst_lag() {
   const Duration now = daemon::read_clock(CLOCK_REALTIME) - clock_.set_by();
   const Duration unfinished = due_ns_ == 0 ? Duration{} : now - Duration{due_ns_};
   return std::max(Duration{worst_lag_ns_.exchange(0)}, unfinished);
 }
 
-/// Sensors do not share a processor with the service.
+/// Sends each input when it is due, at real-time priority: real sensors do not share a processor with the service.
 void RobotSender::run() {
   const sched_param before_all{5};
-  sched_setscheduler(0, SCHED_FIFO, &before_all); // of this thread alone, where that is permitted
+  sched_setscheduler(0, SCHED_FIFO, &before_all); // this thread only, if permitted
   while (!stopping_) {
     std::optional<Prepared> next = take_prepared();
     if (!next) {
@@ -136,7 +136,7 @@ void RobotSender::run() {
   }
 }
 
-/// Whoever stamps its samples on this host reads the clock that is set.
+/// Stamps motion samples by the host's clock, including its steps.
 void RobotSender::send(const daemon::Input& input) {
   const Duration by_host = shift_ + clock_.set_by();
   if (const auto* datagram = std::get_if<Datagram>(&input))
@@ -172,7 +172,7 @@ void RobotSender::send_late() {
   held_back_.clear();
 }
 
-/// As many as are due since the last time.
+/// Sends the garbage that is due since the previous call.
 void RobotSender::send_garbage() {
   const Duration now = daemon::read_clock(CLOCK_MONOTONIC);
   const double rate_hz = is_on(DayFault::flood) ? kFloodHz : is_on(DayFault::garbage) ? kGarbageHz : 0;

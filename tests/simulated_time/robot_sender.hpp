@@ -22,26 +22,27 @@
 
 namespace locus::test {
 
-/// The sensors of a robot that drives round a closed course, each at its simulated time, by a thread of its own: lidar
-/// by UDP to this host, IMU and wheels by DDS. The lidar's clock is its own; IMU and wheels are stamped by the clock of
-/// the host, which may be set.
+/// The sensors of a robot on a closed course. A thread sends each input at its simulated time: lidar packets by UDP to
+/// this host, IMU and wheels by DDS. The lidar has its own clock; IMU and wheels are stamped by the host's clock, which
+/// may be stepped.
 class RobotSender {
  public:
-  /// Precondition: `motion` was made for the same configuration. Both must outlive this.
+  /// Precondition: `motion` is of the same configuration. Both must outlive this.
   RobotSender(const soak::ClosedCourse& course, const Config& config, tools::MotionPublisher& motion,
               const ClockFile& clock);
   ~RobotSender();
   RobotSender(const RobotSender&) = delete;
   RobotSender& operator=(const RobotSender&) = delete;
 
-  /// What is not sent, or is sent twice or late, and what else is. Any thread.
+  /// Turns a fault of the inputs on or off. Any thread.
   void set(DayFault fault, bool is_on) { faults_[static_cast<std::size_t>(fault)] = is_on; }
 
-  /// Datagrams to the ports of the lidar, garbage included. Any thread.
+  /// Returns the number of datagrams to the lidar ports, garbage included. Any thread.
   [[nodiscard]] std::uint64_t sent() const { return sent_; }
-  /// How late the thread was at the most, since the last call: by how much this machine is too slow. One asks.
+  /// Returns the largest lag of the thread since the previous call, a measure of this machine's overload. Single
+  /// caller.
   Duration worst_lag();
-  /// Where the robot is at this instant, in time that nobody sets (the wall's, less what it was set by). Any thread.
+  /// Returns the robot's pose at this time, which is the wall clock's without its steps. Any thread.
   [[nodiscard]] std::optional<Pose> truth_at(Stamp steady) const;
 
  private:
@@ -66,12 +67,12 @@ class RobotSender {
   tools::MotionPublisher& motion_;
   tools::PacketSender packets_;
   const ClockFile& clock_;
-  Duration shift_; ///< from the course to time that nobody sets
+  Duration shift_; ///< from course time to wall time without steps
   std::array<std::atomic<bool>, kDayFaults> faults_{};
   std::atomic<std::uint64_t> sent_{0};
   std::atomic<std::int64_t> worst_lag_ns_{0}, due_ns_{0};
   std::uint64_t number_ = 0, imus_ = 0;
-  std::vector<std::byte> held_back_; ///< of the packet that is overtaken
+  std::vector<std::byte> held_back_; ///< the packet to be overtaken
   Datagram held_datagram_{};
   Duration garbage_until_{};
   int garbage_socket_;

@@ -20,7 +20,7 @@ using nlohmann::ordered_json;
 using std::chrono::seconds;
 using enum DayFault;
 
-/// What the service may say, and what must have happened lately for it to be true.
+/// A log message, and the recent faults of which one must explain it.
 struct Claim {
   std::string_view text; ///< part of the line
   std::vector<DayFault> causes;
@@ -42,7 +42,7 @@ const std::vector<Claim>& claims() {
       {"others send to its port", {garbage, flood}},
       {"what comes is refused", {garbage, flood}},
       {"packets come from 127.0.0.2", {garbage, flood}},
-      {"this computer is too busy", {process_stop, thread_hang, flood, crash, reload}}, // to find itself takes a while
+      {"this computer is too busy", {process_stop, thread_hang, flood, crash, reload}}, // relocalisation takes time
       {"and lidar disagree on how", {lidar_lost, process_stop, thread_hang, crash, reload, flood}},
       {"the kernel threw away", {process_stop, thread_hang, flood}},
       {"the ports of the lidars are flooded", {flood}},
@@ -67,9 +67,9 @@ const std::vector<Claim>& claims() {
   return kClaims;
 }
 
-/// What it may say at any time.
+/// Messages that need no explanation.
 constexpr std::array<std::string_view, 13> kAlwaysTrue{"DDS is up",
-                                                       "degenerate", // about a corner of the course
+                                                       "degenerate", // in a corner of the course
                                                        "tracking",
                                                        "standstill",
                                                        "is back",
@@ -145,7 +145,7 @@ void ServiceJudge::look_at_sums(const ordered_json& status) {
 void ServiceJudge::look_at_growth(const ordered_json& status) {
   const ordered_json now = status.flatten(), before = last_.flatten();
   for (const auto& [key, value] : now.items()) {
-    const bool may_fall = key.ends_with("/lost"); // by packets that were late only
+    const bool may_fall = key.ends_with("/lost"); // reduced when late packets arrive
     const bool is_count =
         !may_fall && (key.starts_with("/packets/") || key.starts_with("/sweeps/") || key.starts_with("/dropped/") ||
                       contains(key, "/received") || contains(key, "/rejected/") || contains(key, "/used_sweeps") ||
@@ -155,7 +155,7 @@ void ServiceJudge::look_at_growth(const ordered_json& status) {
   }
 }
 
-/// To the packet, when the lidar is silent and all that was sent has had its time.
+/// Compares sent and received datagrams exactly, once the lidar is silent and everything sent has been processed.
 void ServiceJudge::look_at_balance(const ordered_json& status, std::uint64_t sent) {
   const bool is_quiet = events_.is_on(lidar_lost) && quiet_for_ >= 3 &&
                         !events_.any({garbage, flood, late, process_stop, thread_hang}, seconds{3});
@@ -182,7 +182,7 @@ void ServiceJudge::look_at_claims(const ordered_json& status) {
     events_.find("it does not record, though there is room: " + recording.value("problem", ""));
 }
 
-/// A thread of the service that was ready to run and had no processor for so long did not wait for itself alone.
+/// Detects overload of this machine: a runnable thread of the service has waited this long for a processor.
 void ServiceJudge::look_at_delays(const SystemdStandIn::Life& life, double rate) {
   constexpr Duration kTooLong = std::chrono::milliseconds{30};
   std::error_code gone;
@@ -212,9 +212,9 @@ ServiceJudge::Weight ServiceJudge::weight_of(pid_t pid) {
 }
 
 void ServiceJudge::weigh(const SystemdStandIn::Life& life) {
-  constexpr int kMoreDescriptors = 3, kMoreThreads = 2; ///< than the first time
+  constexpr int kMoreDescriptors = 3, kMoreThreads = 2; ///< beyond the first measurement
   const Weight weight = weight_of(life.pid);
-  if (weight.threads == 0 || events_.any({link_down, disk_full}, seconds{30})) // then it has fewer
+  if (weight.threads == 0 || events_.any({link_down, disk_full}, seconds{30})) // fewer than usual
     return;
   peak_rss_mb_ = std::max(peak_rss_mb_, weight.rss_mb);
   rss_mb_.push_back(weight.rss_mb);
@@ -228,7 +228,7 @@ void ServiceJudge::weigh(const SystemdStandIn::Life& life) {
                              weight.threads, first_weight_.descriptors, first_weight_.threads));
 }
 
-/// Between the second quarter of the day and the last.
+/// Compares the peak memory of the last quarter of the day with that of the second.
 void ServiceJudge::conclude(std::uint64_t faults) {
   constexpr double kMostGrowth_mb = 16;
   constexpr std::uint64_t kMostLinesPerFault = 20, kMostLinesPerMinute = 12;

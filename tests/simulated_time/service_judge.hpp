@@ -14,28 +14,28 @@
 
 namespace locus::test {
 
-/// Judges what the service tells of itself: that its counters add up, that what was sent to it is accounted for, that
-/// it blames nobody who is sound, and that it holds no more than it needs. One owner.
+/// Checks the service's reports: its counters are consistent, all datagrams are accounted for, no healthy sensor is
+/// blamed, and its memory is bounded. Not thread-safe.
 class ServiceJudge {
  public:
   explicit ServiceJudge(Events& events) : events_(events) {}
 
-  /// Of what the service has said on stderr, and how its lives ended.
+  /// Reads the service's stderr and the exits of its processes.
   void read(const std::vector<std::string>& lines);
-  /// Its status, when so many datagrams had been sent.
+  /// Checks its status, given the number of datagrams sent so far.
   void look(const nlohmann::ordered_json& status, std::uint64_t sent);
-  /// Whether this machine, whose clock is so many times as fast, let the threads of this life run in time.
+  /// Checks whether this machine, at this clock rate, scheduled the threads of the process in time.
   void look_at_delays(const SystemdStandIn::Life& life, double rate);
-  /// What the process of this life holds.
+  /// Measures memory, descriptors and threads of the process.
   void weigh(const SystemdStandIn::Life& life);
-  /// All counters begin anew.
+  /// All counters restart at zero.
   void begin_life();
-  /// At the end of the day.
+  /// Final checks at the end of the day.
   void conclude(std::uint64_t faults);
 
   [[nodiscard]] std::uint64_t lines() const { return lines_; }
   [[nodiscard]] double peak_rss_mb() const { return peak_rss_mb_; }
-  /// How often it was verified to the packet that none was lost uncounted.
+  /// Number of exact comparisons of sent and received datagrams.
   [[nodiscard]] std::uint64_t balances() const { return balances_; }
 
  private:
@@ -53,12 +53,12 @@ class ServiceJudge {
   void look_at_claims(const nlohmann::ordered_json& status);
 
   Events& events_;
-  nlohmann::ordered_json last_;             ///< status of this life
-  int quiet_for_ = 0;                       ///< looks since the lidar fell silent
-  std::optional<std::int64_t> unaccounted_; ///< datagrams that were sent while nobody listened
+  nlohmann::ordered_json last_;             ///< status of this process
+  int quiet_for_ = 0;                       ///< checks since the lidar fell silent
+  std::optional<std::int64_t> unaccounted_; ///< datagrams sent while the service was down
   int weighed_life_ = 0;
   Weight first_weight_;
-  std::map<std::string, std::int64_t> waited_ns_; ///< for a processor, by thread of this life
+  std::map<std::string, std::int64_t> waited_ns_; ///< runqueue delay by thread of this process
   std::vector<double> rss_mb_;
   double peak_rss_mb_ = 0;
   std::uint64_t lines_ = 0, balances_ = 0;

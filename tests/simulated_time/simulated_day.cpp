@@ -26,7 +26,7 @@ using enum DayFault;
 constexpr Duration kLap = seconds{120};
 constexpr Duration kTick = milliseconds{50};
 constexpr Duration kTooLate =
-    milliseconds{25}; ///< this machine: with the period of a source, half of what makes it stale
+    milliseconds{25}; ///< lag of this machine: together with the period of a source, half of its timeout
 
 Config config_of(const soak::ClosedCourse& course) {
   auto config = load_config(course.folder / "config.yaml");
@@ -80,7 +80,7 @@ void SimulatedDay::run() {
     if (const Duration early = tick - now(); early > Duration::zero())
       std::this_thread::sleep_for(early);
     measure_lag();
-    tick = std::max(tick, now() - kTick); // what could not be looked at is not looked at late
+    tick = std::max(tick, now() - kTick); // missed checks are skipped
     events_.set_now(now());
     for (; change != changes.end() && change->at <= now(); ++change)
       change->begins ? begin(*change->fault) : end(*change->fault);
@@ -169,7 +169,7 @@ void SimulatedDay::act_on_process(const ScheduledFault& fault, bool begins) {
     hanging_ = std::make_unique<Child>(std::vector<std::string>{HANG_THREAD, std::to_string(life->pid), fault.thread});
 }
 
-/// A file that is cut short is a mistake that is told, and nothing changes.
+/// A truncated file is reported as an error and changes nothing.
 void SimulatedDay::reload_configuration(bool broken) {
   const std::filesystem::path file = computer_.file("locusd.yaml");
   const std::string text = print_config(config_);

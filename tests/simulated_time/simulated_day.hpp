@@ -26,26 +26,26 @@ struct DayOptions {
   std::uint64_t seed = 1;
   Duration lasts = std::chrono::hours{24};        ///< simulated
   Duration mean_pause = std::chrono::seconds{30}; ///< between the beginnings of two faults
-  std::filesystem::path course_folder;            ///< of the course; simulated where it is not there yet
+  std::filesystem::path course_folder;            ///< of the course; simulated if it does not exist yet
 };
 
-/// A day of the unmodified service under simulated time: its robot drives round, faults befall it as they are
-/// scheduled, and what it does is judged all the while. One owner.
+/// A day of the unmodified service in simulated time: its robot drives laps, scheduled faults occur, and the service is
+/// checked continuously. Not thread-safe.
 class SimulatedDay {
  public:
-  /// Preconditions: run_in_simulated_time() was called, this is the only thread, `computer` was made before.
+  /// Preconditions: run_in_simulated_time() was called, this is the only thread, `computer` already exists.
   SimulatedDay(const DayOptions& options, RobotComputer& computer);
   ~SimulatedDay();
 
   void run();
 
-  /// What should not have been, each with its time.
+  /// Returns all violations, each with its time.
   [[nodiscard]] const std::vector<std::string>& findings() const { return events_.findings(); }
-  /// Of the day: how much of it this machine was too slow for, so that nothing was judged.
+  /// Returns the fraction of the day in which this machine was too slow and no check counted.
   [[nodiscard]] double disturbed_share() const { return events_.disturbed_share(); }
   [[nodiscard]] std::uint64_t estimates_heard() const { return frames_->heard(); }
-  [[nodiscard]] std::uint64_t balances() const { return service_->balances(); } ///< of packets sent and accounted for
-  [[nodiscard]] int lives() const { return life_; }                             ///< of the service
+  [[nodiscard]] std::uint64_t balances() const { return service_->balances(); } ///< comparisons of packet counts
+  [[nodiscard]] int lives() const { return life_; }                             ///< processes of the service
   [[nodiscard]] std::string summary() const;
 
  private:
@@ -71,7 +71,7 @@ class SimulatedDay {
   std::unique_ptr<Child> hanging_, deaf_;
   std::unique_ptr<daemon::DdsWriter<daemon::ros::Odometry>> second_;
   Duration began_{}, system_began_{}, looked_{}, weighed_{};
-  int life_ = 0; ///< the latest
+  int life_ = 0; ///< number of the current process
   std::uint64_t faults_ = 0;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A day of the service in minutes. By hand, for hours: SIMULATED_HOURS=24 SEED=7 simulated_time_tests
+// A simulated day of the service in minutes. Longer runs by hand: SIMULATED_HOURS=24 SEED=7 simulated_time_tests
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -34,10 +34,10 @@ TEST(FaultSchedule, SameSeedGivesTheSameFaultsAndAnotherOneOthers) {
     EXPECT_NE(text(7).find(to_string(static_cast<DayFault>(kind))), std::string::npos) << kind;
 }
 
-/// The default seed has 16 of the 17 kinds of fault, a crash among them, and a silence in which packets are balanced.
+/// The default seed covers 16 of the 17 kinds of fault, including a crash, and a silence in which packets are balanced.
 TEST(SimulatedDay, ServiceOutlivesItsFaults) {
   constexpr double kMostDisturbed = 0.5;
-  constexpr double kSweeps_hz = 10, kLeastHeard = 0.3; // lidar, service and link are away for some of the day
+  constexpr double kSweeps_hz = 10, kLeastHeard = 0.3; // lidar, service and link are down for part of the day
   std::optional<RobotComputer> computer;
   try {
     computer.emplace();

@@ -65,7 +65,7 @@ void SystemdStandIn::run() {
   }
 }
 
-/// Until it ends, which it does when it does not feed the watchdog.
+/// Runs the service until it exits, or until the watchdog kills it.
 void SystemdStandIn::live(Child& service) {
   Duration fed = daemon::read_clock(CLOCK_MONOTONIC);
   while (!stopping_) {
@@ -75,7 +75,7 @@ void SystemdStandIn::live(Child& service) {
     if (now - fed > kWatchdog) {
       ++watchdog_kills_;
       fed = now;
-      service.signal(SIGKILL); // SIGABRT does not end one that is stopped
+      service.signal(SIGKILL); // SIGABRT does not end a stopped process
     }
     const std::scoped_lock lock(mutex_);
     if (const auto status = service.wait_for_exit(Duration::zero())) {

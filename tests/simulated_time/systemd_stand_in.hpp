@@ -17,11 +17,11 @@
 
 namespace locus::test {
 
-/// What systemd does for the service, after systemd/locusd.service: WatchdogSec=5, Restart=on-failure,
+/// Supervises the service as systemd does by systemd/locusd.service: WatchdogSec=5, Restart=on-failure,
 /// RestartSec=500ms. Any thread.
 class SystemdStandIn {
  public:
-  /// One life of the service.
+  /// One process of the service.
   struct Life {
     int number = 0; ///< from 1
     pid_t pid = 0;
@@ -33,12 +33,12 @@ class SystemdStandIn {
   SystemdStandIn(const SystemdStandIn&) = delete;
   SystemdStandIn& operator=(const SystemdStandIn&) = delete;
 
-  /// To the process, if there is one: whether there was.
+  /// Sends a signal to the process; false if there is none.
   bool signal(int number);
-  /// Nothing while there is none.
+  /// Returns the current process, if there is one.
   [[nodiscard]] std::optional<Life> life() const;
   [[nodiscard]] std::uint64_t watchdog_kills() const { return watchdog_kills_; }
-  /// What the service has said since the last call, in all its lives; and how each of them ended that ended: "exit N".
+  /// Returns the output of all processes since the previous call, with "exit N" for each process that ended.
   std::vector<std::string> new_lines();
 
  private:
@@ -52,7 +52,7 @@ class SystemdStandIn {
   Child* service_ = nullptr; ///< while it runs
   Life life_;
   std::vector<std::string> lines_;
-  std::size_t lines_taken_ = 0; ///< of this life
+  std::size_t lines_taken_ = 0; ///< of this process
   std::atomic<std::uint64_t> watchdog_kills_{0};
   std::atomic<bool> stopping_{false};
   std::thread thread_;

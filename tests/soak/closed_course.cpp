@@ -17,7 +17,7 @@ namespace locus::soak {
 namespace {
 
 constexpr std::uint64_t kSeed = 1;
-constexpr double kStanding = 0.1; ///< share of a lap
+constexpr double kStanding = 0.1; ///< fraction of a lap
 
 Duration whole_packets(Duration about) {
   constexpr int kOfWholeMicroseconds = 125;
@@ -52,7 +52,7 @@ ClosedCourse closed_course(const std::filesystem::path& folder, Duration about) 
   const Duration lap = whole_packets(about);
   if (std::filesystem::exists(folder))
     return {folder, lap};
-  // The last packet arrives when its firings are over and the network has had its time; the next one a packet later.
+  // The last packet arrives after its firings and the network latency, the next one a packet later.
   constexpr Duration kOnItsWay = std::chrono::milliseconds{1};
   const std::filesystem::path beside = folder.string() + ".new";
   std::filesystem::remove_all(beside);

@@ -7,18 +7,17 @@
 
 namespace locus::soak {
 
-/// A recorded drive that ends where and as it began, so that it can be driven round and round.
+/// A recorded drive with equal start and end state, so that it can be repeated seamlessly.
 struct ClosedCourse {
   std::filesystem::path folder; ///< a capture folder
   Duration lap;                 ///< whole turns of the lidar, whole packets, whole microseconds of its clock
 };
 
-/// The husky of locus-sim with all its sensors drives about the plant, turns about, drives back the same way and stands
-/// for the last tenth of the lap. What would not be at the end as it was at the beginning is left out: the ripples of
-/// the floor, which follow the way behind, and the slow wander of the IMU's bias and attitude. People and forklift
-/// jump as a lap begins.
-///
-/// Simulates it if `folder` does not hold it yet; a lap is `about` as long as asked.
+/// Simulates, unless `folder` already contains it, a lap of about the requested duration: the husky of locus-sim with
+/// all its sensors drives about the plant, turns around, drives back the same way and stands for the last tenth of the
+/// lap. Effects that would differ between end and start are disabled: the ripples of the floor, which depend on the
+/// distance travelled, and the slow drift of the IMU's bias and attitude. People and forklift jump at the start of a
+/// lap.
 ClosedCourse closed_course(const std::filesystem::path& folder, Duration about);
 
 } // namespace locus::soak

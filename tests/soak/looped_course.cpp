@@ -42,7 +42,7 @@ LoopedCourse::LoopedCourse(ClosedCourse course, const Config& config, std::uint6
 
 LoopedCourse::~LoopedCourse() = default;
 
-/// When the course begins and what odometry says of a lap, in which nothing has moved in truth.
+/// Reads the start of the course and the odometry's motion over a lap, which is closed in truth.
 void LoopedCourse::learn_wheels() {
   for (tools::MotionRecording& motion : read_motion(course_, config_)) {
     auto* samples = std::get_if<MotionSamples<OdometrySample>>(&motion.samples);
@@ -99,7 +99,7 @@ void LoopedCourse::end_lap() {
   at_rest_.store(true, std::memory_order_release);
 }
 
-/// The capture goes on until the last packet has arrived; motion is heard sooner.
+/// Datagrams belong to the lap until its last packet has arrived; motion is received sooner.
 bool LoopedCourse::is_of_next_lap(const daemon::Input& input) const {
   return !std::holds_alternative<Datagram>(input) &&
          daemon::arrival_of(input, start_) >= start_ + offset_ + course_.lap;

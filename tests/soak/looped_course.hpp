@@ -21,20 +21,20 @@ class Recording;
 
 namespace locus::soak {
 
-/// What a robot's sensors say that drives a closed course lap after lap: stamps, the lidar's clock and the wheels'
-/// odometry go on from one to the next.
+/// Sensor data of a robot that drives a closed course lap after lap, with continuous stamps, lidar clock and wheel
+/// odometry.
 ///
-/// Between the laps, and where it is told to pause, it is at rest: it says Silence until it is told to go on. One
-/// thread asks for input; whatever is for the owner, may be called while it is at rest or nobody asks.
+/// Between laps and during a pause it is at rest and returns Silence until it is resumed. One thread calls next();
+/// functions marked "owner" may be called only while it is at rest or no thread calls next().
 class LoopedCourse : public daemon::InputSource {
  public:
-  /// What was given out so far.
+  /// Inputs returned so far.
   struct Given {
     std::uint64_t datagrams = 0;
     std::array<std::uint64_t, kMaxSources> samples{}; ///< by index of the motion source
   };
 
-  /// Begins with the lap of this number, at rest.
+  /// Starts at rest, before the lap of this number.
   LoopedCourse(ClosedCourse course, const Config& config, std::uint64_t lap);
   ~LoopedCourse() override;
 
@@ -43,14 +43,14 @@ class LoopedCourse : public daemon::InputSource {
   /// Any thread.
   [[nodiscard]] bool is_at_rest() const { return at_rest_.load(std::memory_order_acquire); }
 
-  /// Owner: on the next lap, with a pause so long after its beginning; none where that is longer than the lap.
+  /// Owner: starts the next lap, with a pause after `until_pause`; none if that is longer than the lap.
   void begin_lap(const std::vector<Fault>& faults, Duration until_pause = Duration::max());
-  /// Owner: after the pause.
+  /// Owner: resumes after the pause.
   void go_on() { at_rest_.store(false, std::memory_order_release); }
-  /// Owner: so long nobody hears what the sensors say.
+  /// Owner: drops all inputs of this duration.
   void miss(Duration duration);
   [[nodiscard]] Stamp now() const { return now_; }
-  /// Owner: since the beginning, that of the lap that runs or is to be begun.
+  /// Owner: time from the first lap to the current or next one.
   [[nodiscard]] Duration offset() const { return offset_; }
   [[nodiscard]] const Given& given() const { return given_; }
 
@@ -67,8 +67,8 @@ class LoopedCourse : public daemon::InputSource {
   Duration offset_; ///< of this lap
   Stamp now_;
   Stamp pause_at_ = Stamp::max();
-  Stamp heard_from_;              ///< what arrives before is missed
-  std::vector<Pose> T_begin_end_; ///< of a lap, by index of the motion source, as odometry has it
+  Stamp heard_from_;              ///< earlier inputs are dropped
+  std::vector<Pose> T_begin_end_; ///< motion over a lap by the odometry, by index of the motion source
   std::vector<Pose> T_source_lap_;
   std::unique_ptr<tools::Recording> recording_;
   std::vector<std::byte> payload_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// soak: a day of driving, as fast as the machine can, through the live threads of the daemon.
+// soak: a day of driving through the live threads of the daemon, as fast as possible.
 #include <cmath>
 #include <csignal>
 #include <cstdint>
@@ -36,7 +36,7 @@ struct Arguments {
   std::filesystem::path folder;
 };
 
-/// Nothing where help was asked for and has been printed.
+/// Nothing if --help was requested and printed.
 std::optional<Arguments> parse_arguments(int argc, char** argv) {
   Arguments arguments;
   CLI::App app{"A robot drives round a closed course for a day, as fast as the machine can compute.", "soak"};

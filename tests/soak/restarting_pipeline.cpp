@@ -14,10 +14,10 @@ namespace locus::soak {
 
 namespace {
 
-/// So slow a world that no registration is ended by its deadline, however busy the machine.
+/// Slow motion, so that no registration reaches its deadline, however busy the machine.
 constexpr double kNoHurry = 1e-3;
 
-/// Nothing from a lap that was cut short and is driven again: that would be a state of the future.
+/// Ignores a state of an interrupted lap that is driven again: it would be of the future.
 std::optional<daemon::SavedState> read_state(const std::filesystem::path& file, Stamp now) {
   if (!std::filesystem::exists(file))
     return std::nullopt;
@@ -74,7 +74,8 @@ void RestartingPipeline::end(End how) {
   pipeline_.reset();
 }
 
-/// Who drives a day in minutes outruns the disk, by seconds of stamps when it is busy. A robot does not.
+/// Waits until the state is written. An accelerated drive outruns a busy disk by seconds of stamps; a real robot does
+/// not.
 void RestartingPipeline::wait_for_disk(const Whereabouts& last) const {
   const Duration give_up = daemon::read_clock(CLOCK_MONOTONIC) + test::patience();
   while (daemon::read_clock(CLOCK_MONOTONIC) < give_up) {
@@ -123,7 +124,7 @@ Counts RestartingPipeline::with(const daemon::IngestReport& report) const {
 Counts RestartingPipeline::counts() {
   constexpr Duration kPatience = std::chrono::seconds{2};
   const Duration give_up = daemon::read_clock(CLOCK_MONOTONIC) + kPatience;
-  static_cast<void>(pipeline_->next_report()); // that one may be older than the rest
+  static_cast<void>(pipeline_->next_report()); // may be older than the rest
   const daemon::IngestReport* report = nullptr;
   while (report == nullptr && daemon::read_clock(CLOCK_MONOTONIC) < give_up) {
     fetch(std::chrono::milliseconds{10});

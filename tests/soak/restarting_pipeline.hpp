@@ -14,34 +14,34 @@
 
 namespace locus::soak {
 
-/// The live threads and the state kept of them, ended and begun again as systemd does it with the service. One owner.
+/// The live threads and their saved state, stopped and restarted as systemd does with the service. Not thread-safe.
 class RestartingPipeline {
  public:
   using Take = std::function<void(const daemon::ProcessedSweep&)>;
 
-  /// `input` must outlive this; `take` gets every estimate.
+  /// `input` must outlive this; `take` receives every estimate.
   RestartingPipeline(Config config, daemon::InputSource& input, std::filesystem::path state_file, Take take);
   ~RestartingPipeline();
   RestartingPipeline(const RestartingPipeline&) = delete;
   RestartingPipeline& operator=(const RestartingPipeline&) = delete;
 
-  /// Goes on from the state in the file, if there is one and it is not of a time after `now`; else anew.
+  /// Resumes from the state file if there is one that is not later than `now`; else starts without a state.
   void begin(Stamp now);
 
   enum class End { orderly, crash };
-  /// In a crash what lies in the file is all that is left.
+  /// A crash leaves only the content of the file.
   void end(End how);
 
-  /// Hands on the estimates that are there, or come within `timeout`.
+  /// Passes on the available estimates, and those that arrive within `timeout`.
   void fetch(Duration timeout);
 
-  /// Whether every sweep that is there has become an estimate that was handed on.
+  /// Returns whether every sweep so far has become an estimate that was passed on.
   [[nodiscard]] bool is_idle() const;
 
-  /// Of all that was begun; what was given is not known here. While the input is at rest.
+  /// Returns the counts of all pipelines so far, without the inputs given. Call only while the input is at rest.
   Counts counts();
 
-  /// Whether the first sweep after the last begin() was found in the map of the state.
+  /// Returns whether the first sweep after the last begin() was relocalised in the saved map.
   [[nodiscard]] bool has_resumed() const { return resumed_.load(std::memory_order_relaxed); }
 
  private:
@@ -56,7 +56,7 @@ class RestartingPipeline {
   std::optional<daemon::Worker> disk_;
   std::optional<daemon::LivePipeline> pipeline_;
   std::atomic<bool> resumed_{false};
-  Counts before_; ///< of the pipelines that have ended
+  Counts before_; ///< of the stopped pipelines
   std::uint64_t fetched_ = 0;
 };
 

@@ -34,15 +34,15 @@ Config config_of(const ClosedCourse& course) {
   return *std::move(config);
 }
 
-/// Shares of the lap at which the robot drives on as before, and stands.
+/// Fractions of the lap at which the robot drives and stands, respectively.
 constexpr double kRestartDriving = 0.6, kRestartStanding = 0.92;
 
 struct FaultOfLap {
   std::string_view what;
-  double most_s; ///< how long, at most a quarter of the lap
+  double most_s; ///< longest duration; capped at a quarter of the lap
 };
 
-/// Of each lap of six; all begin when a quarter of the lap is over.
+/// Faults of each lap in a cycle of six; all start after a quarter of the lap.
 const std::array<std::vector<FaultOfLap>, 6> kFaults{
     {{},
      {{"wio:lost", 10}},
@@ -65,7 +65,7 @@ std::vector<Fault> faults_of(std::uint64_t lap, Duration lap_duration, std::stri
   return faults;
 }
 
-/// What the process holds of its own; not the files that it has mapped, nor what the allocator keeps for later.
+/// Returns the anonymous memory of the process, without mapped files and memory cached by the allocator.
 double rss_anon_mb() {
   malloc_trim(0);
   std::ifstream status("/proc/self/status");
@@ -96,7 +96,7 @@ void Soak::take(const daemon::ProcessedSweep& done) {
   latency_ms_.push_back(1e3 * to_seconds(done.took.wall));
 }
 
-/// As the service is when it is gone for a second.
+/// Restarts with one second of downtime, as the service does.
 void Soak::restart() {
   using End = RestartingPipeline::End;
   pipeline_.end(lap_ % 2 == 0 ? End::orderly : End::crash);

@@ -13,13 +13,13 @@
 
 namespace locus::soak {
 
-/// Drives lap after lap through the live threads, one piece each, and measures them. One owner.
+/// Drives lap after lap through the live threads and measures each as a piece. Not thread-safe.
 ///
-/// Each lap of six has its faults. In the first half of the day the threads live on; in the second they are restarted
-/// on each lap, in order and by a crash in turn, while the robot drives and while it stands.
+/// Faults follow a cycle of six laps. In the first half of the day the threads keep running; in the second they are
+/// restarted on each lap, cleanly and by a crash in alternation, while the robot drives and while it stands.
 class Soak {
  public:
-  /// `folder` holds the saved state; goes on after `laps_done` of `laps`. Throws tools::Failure.
+  /// `folder` holds the saved state; resumes after `laps_done` of `laps`. Throws tools::Failure.
   Soak(const ClosedCourse& course, const std::filesystem::path& folder, std::uint64_t laps_done, std::uint64_t laps);
 
   /// Drives the next lap.
@@ -27,7 +27,7 @@ class Soak {
 
  private:
   void take(const daemon::ProcessedSweep& done);
-  [[nodiscard]] Duration time_of_restart() const; ///< on this lap
+  [[nodiscard]] Duration time_of_restart() const; ///< within the lap
   void drive_to_rest();
   void restart();
   void count_and_measure(Piece& piece);
@@ -39,9 +39,9 @@ class Soak {
   std::int64_t process_ns_;
   LoopedCourse course_;
   RestartingPipeline pipeline_;
-  Duration lap_begin_{}; ///< that of the lap, in time since the first one began
+  Duration lap_begin_{}; ///< start of the lap relative to that of the first one
 
-  std::vector<StampedPose> estimates_; ///< of this lap, as if it were the first
+  std::vector<StampedPose> estimates_; ///< of this lap, with the times of the first one
   std::vector<double> cpu_ms_, latency_ms_;
 };
 

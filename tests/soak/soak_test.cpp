@@ -23,7 +23,7 @@ using std::chrono::hours;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// Inputs up to the next rest.
+/// Passes on inputs up to the next rest.
 template <class Take> void drive_lap(LoopedCourse& course, const Take& take) {
   course.begin_lap({});
   while (!course.is_at_rest())
@@ -36,7 +36,7 @@ TEST(LoopedCourse, LapsJoinWithoutAGapAcrossTheEndOfTheHour) {
   const Config config = *load_config(closed.folder / "config.yaml");
   LidarRouter lidars = *LidarRouter::open(config.lidars);
 
-  constexpr Duration kHourEnds = seconds{2800}; // the first lap begins 13 min 20 s past it
+  constexpr Duration kHourEnds = seconds{2800}; // the first lap begins 13 min 20 s past the hour
   LoopedCourse course(closed, config, static_cast<std::uint64_t>(kHourEnds / closed.lap) - 1);
   std::optional<OdometrySample> wheels;
   std::optional<ImuSample> imu;
@@ -72,7 +72,7 @@ TEST(LoopedCourse, LapsJoinWithoutAGapAcrossTheEndOfTheHour) {
   EXPECT_EQ(counters.clock_steps, 0U);
 }
 
-/// Six laps, with restarts on the last three, in two processes; of a day of which the first is interrupted, at once.
+/// Six laps in two processes, with restarts on the last three; the first process runs part of the day only.
 TEST(SoakProgram, GoesOnWhereItWasInterruptedAndAllBoundsHold) {
   const test::TemporaryFolder folder;
   const auto soak_for = [&](double hours_long) {
@@ -102,7 +102,7 @@ TEST(SoakProgram, GoesOnWhereItWasInterruptedAndAllBoundsHold) {
   }
 }
 
-/// Six pieces an hour of one process with nothing wrong.
+/// Six valid pieces per hour, of one process.
 std::vector<Piece> good_day(int day_h) {
   std::vector<Piece> pieces;
   for (int i = 1; i <= 6 * day_h; ++i) {

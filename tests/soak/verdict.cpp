@@ -64,7 +64,7 @@ std::optional<double> drift_of(std::span<const Piece> pieces, double Piece::*fig
   return tools::Quantiles(last).at(0.5) / tools::Quantiles(first).at(0.5);
 }
 
-/// What does not add up, or is not as it must be, in this piece alone.
+/// Returns the violations within this piece.
 std::vector<std::string> faults_of(const Piece& piece, const Piece& first_of_process) {
   const Counts& c = piece.counts;
   std::vector<std::string> faults;
@@ -91,12 +91,12 @@ std::vector<std::string> faults_of(const Piece& piece, const Piece& first_of_pro
   return faults;
 }
 
-/// A lidar that is not heard makes sweeps too. A restart costs those of its pause, and the one that is begun.
+/// A silent lidar produces sweeps, too. A restart loses those of its pause and the incomplete one.
 std::optional<std::string> missing_sweeps(std::span<const Piece> pieces) {
   constexpr double kOfRestart = 13.0, kOfProcess = 3.0;
   std::map<std::int64_t, double> expected, least, found;
   for (const Piece& piece : pieces) {
-    const double turns = std::round(kTurns_hz * piece.lap_s); // a lap is a whole number of them
+    const double turns = std::round(kTurns_hz * piece.lap_s); // a whole number per lap
     expected[piece.process_ns] += turns;
     least[piece.process_ns] += turns - kOfRestart * piece.restarts;
     found[piece.process_ns] = static_cast<double>(piece.counts.seen);

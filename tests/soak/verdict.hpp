@@ -10,14 +10,14 @@
 
 namespace locus::soak {
 
-/// What the pieces say together. Growth and drift need hours of stamps; before, they are not judged.
+/// Judgement over all pieces. Growth and drift need hours of stamps and are not judged before.
 struct Verdict {
-  /// Straight line through the memory of all pieces but those of the first hour of a process, which buys it. Each
-  /// process, and what it drove with restarts, may have a level of its own, but all have one slope.
+  /// Slope of a line fitted to the memory of all pieces except those of the first hour of a process, in which it
+  /// allocates. Each process, and its pieces with restarts, have their own offset; all share one slope.
   std::optional<double> growth_mb_per_hour;
-  /// Median over the pieces of the last hour to that over the first hour.
+  /// Ratio of the medians over the pieces of the last and the first hour.
   std::optional<double> cpu_drift, latency_drift;
-  std::vector<std::string> broken; ///< a line for each bound that does not hold
+  std::vector<std::string> broken; ///< one line per violated bound
 };
 Verdict judge(std::span<const Piece> pieces);
 

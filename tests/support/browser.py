@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What headless Chromium makes of a page. Ends the program as skipped where it, or python3-selenium, is missing."""
+"""Drives headless Chromium. Exits as skipped if Chromium or python3-selenium is missing."""
 import os
 import shutil
 import sys
@@ -19,7 +19,7 @@ for program, package in (CHROMIUM, "chromium"), (DRIVER, "chromium-driver"):
         print(f"SKIPPED: {program} is not there; install {package}", file=sys.stderr)
         sys.exit(77)
 
-# How many colours the picture on a canvas has, and which share of it is painted.
+# Number of colours in a canvas and the fraction of it that is painted.
 LOOK_AT_CANVAS = """
   const source = document.querySelector(arguments[0]), copy = document.createElement("canvas");
   copy.width = source.width; copy.height = source.height;
@@ -33,7 +33,7 @@ LOOK_AT_CANVAS = """
 
 
 class Browser:
-    """One page in a window of its own, closed at the end of a with statement."""
+    """A page in its own window, closed at the end of a with statement."""
 
     def __init__(self, page, width=1280, dark=False, webgl=True):
         self.profile = tempfile.mkdtemp(prefix="locus-browser-")
@@ -48,7 +48,7 @@ class Browser:
             options.add_argument(argument)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
         self.driver = webdriver.Chrome(service=webdriver.chrome.service.Service(DRIVER), options=options)
-        self.driver.set_script_timeout(120)  # software draws the first page, on whatever processor is left
+        self.driver.set_script_timeout(120)  # software rendering of the first page is slow on a busy processor
         self.set_size(width)
         self.set_dark(dark)
         self.driver.get(f"file://{page}")
@@ -81,7 +81,7 @@ class Browser:
         return {part.get_attribute("id") for part in self.all("[data-drawn]")}
 
     def canvas(self, selector):
-        """Found and looked at in one go: the page puts a new canvas in the place of the old one as it likes."""
+        """Finds and inspects the canvas in one script, because the page may replace it at any time."""
         return self.run(LOOK_AT_CANVAS, selector)
 
     def complaints(self):

@@ -76,7 +76,7 @@ std::optional<int> Child::wait_for_exit(Duration timeout) {
     else
       std::this_thread::sleep_for(std::chrono::milliseconds{2});
   }
-  if (status_) { // what it said last may still be on its way; a process of its own may hold the pipe for longer
+  if (status_) { // its last output may still be in the pipe; a grandchild may hold the pipe open for longer
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, std::chrono::seconds{5}, [&] { return all_read_; });
   }

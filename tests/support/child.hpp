@@ -15,8 +15,8 @@
 
 namespace locus::test {
 
-/// Another program that runs beside the test, whose lines (stdout and stderr as one) are heard as they come. Gone at
-/// the end of the test, whatever happens.
+/// A child process beside the test. Its lines (stdout and stderr merged) are read as they arrive. The destructor ends
+/// it.
 class Child {
  public:
   explicit Child(std::vector<std::string> command);
@@ -27,16 +27,16 @@ class Child {
   void close_stdin();
   void signal(int number) const;
 
-  /// Exit status, 128 + signal if one ended it; nothing while it still runs at the end of the test's patience. All
-  /// lines of a program that ended are read.
+  /// Returns the exit status, or 128 + signal; nothing if it still runs at the timeout. All lines of an ended program
+  /// have been read.
   std::optional<int> wait_for_exit(Duration timeout = patience());
 
-  /// So far.
+  /// Returns the lines read so far.
   [[nodiscard]] std::vector<std::string> lines() const;
-  /// Those that begin with this word and a space, without it.
+  /// Returns the lines that begin with this word and a space, without that prefix.
   [[nodiscard]] std::vector<std::string> lines_of(const std::string& word) const;
   [[nodiscard]] bool has_line(const std::string& part) const;
-  /// Whether it comes true of the lines before the test's patience ends.
+  /// Waits until the predicate holds for the lines read so far; false after the test's patience.
   bool wait_until(const std::function<bool(const std::vector<std::string>&)>& holds) const;
   bool wait_for_line(const std::string& part) const;
 

@@ -83,7 +83,7 @@ bool has(const OwnCloud& cloud, const std::string& name) {
   return std::ranges::find(cloud.fields, name, &OwnCloud::Field::name) != cloud.fields.end();
 }
 
-/// In whatever type the field has.
+/// Writes in the field's own type.
 void write(OwnCloud& cloud, std::size_t point, const std::string& name, double value) {
   if (!has(cloud, name))
     return;
@@ -119,8 +119,8 @@ void write_point(OwnCloud& cloud, std::size_t at, const FiredPoint& point, Cloud
   write(cloud, at, "timestamp", kind == CloudKind::livox_points ? static_cast<double>(to_ns(point.fired)) : epoch_s);
 }
 
-/// Rows of lasers, the highest first, and columns of firings. Where an image is to stand upright each row begins a few
-/// columns later than the one above.
+/// Writes rows of lasers, highest first, and columns of firings. In a staggered image each row begins a few columns
+/// later than the one above.
 void write_rows(OwnCloud& cloud, const CloudTurn& turn, CloudKind kind) {
   constexpr double kColumn_s = 55.296e-6;
   constexpr std::size_t kShift = 3;

@@ -21,22 +21,23 @@ struct FiredPoint {
   Stamp fired;
 };
 
-/// All returns of a tenth of a second, in the order of their firing.
+/// All returns of 0.1 s, in firing order.
 struct CloudTurn {
-  Stamp begin; ///< of the turn, whether or not anything returned then
+  Stamp begin; ///< start of the turn, even if nothing returned then
   std::vector<FiredPoint> points;
 
   [[nodiscard]] Stamp end() const { return points.empty() ? begin : points.back().fired; }
 };
 
-/// Those of the first lidar of a capture, its packets timed by reception, the first `left_out` of them left out.
+/// Returns the turns of a capture's first lidar, without its first `left_out` packets. Packets are stamped by
+/// reception.
 std::vector<CloudTurn> turns_of(const std::filesystem::path& capture, std::size_t left_out = 0);
 
-/// As the drivers of lidars write their clouds.
+/// Cloud layouts of common lidar drivers.
 enum class CloudKind {
-  velodyne,       ///< times before the header's stamp
-  velodyne_start, ///< times after it
-  ouster,         ///< rows of zeros where nothing returned
+  velodyne,       ///< times before the header stamp
+  velodyne_start, ///< times after the header stamp
+  ouster,         ///< organised; missing returns are zeros
   ouster_destaggered,
   hesai,
   robosense,
@@ -48,7 +49,7 @@ enum class CloudKind {
 inline constexpr int kCloudKinds = 10;
 std::string name_of(CloudKind kind);
 
-/// A message with its bytes.
+/// A cloud message that owns its bytes.
 struct OwnCloud {
   struct Field {
     std::string name;
@@ -61,19 +62,19 @@ struct OwnCloud {
   std::vector<Field> fields;
   std::vector<std::byte> data;
 
-  /// Valid while this is not changed.
+  /// Valid until this cloud is modified.
   [[nodiscard]] CloudView view() const;
   [[nodiscard]] const Field& field(const std::string& name) const;
-  /// Of the point at that place.
+  /// Returns the field `name` of one point.
   template <class Number> [[nodiscard]] Number get(std::size_t point, const std::string& name) const;
   template <class Number> void set(std::size_t point, const std::string& name, Number value);
 };
 
 OwnCloud cloud_of(const CloudTurn& turn, CloudKind kind);
 
-/// One more field at the end of every point, all zero.
+/// Appends a field to every point, all zero.
 void add_field(OwnCloud& cloud, const std::string& name, CloudView::Type type);
-/// Without the field; its bytes stay, as padding.
+/// Removes the field; its bytes stay as padding.
 void remove_field(OwnCloud& cloud, const std::string& name);
 
 template <class Number> Number OwnCloud::get(std::size_t point, const std::string& name) const {

@@ -10,11 +10,11 @@
 
 namespace locus::test {
 
-/// A DDS domain that no other test on this machine uses at the time, whoever runs it.
+/// A DDS domain that no other test on this machine uses at the same time, of any user.
 class DdsDomain {
  public:
   DdsDomain() {
-    constexpr int kFirst = 20, kLast = 99; // their ports lie below those that the system gives away
+    constexpr int kFirst = 20, kLast = 99; // their ports lie below the ephemeral range
     for (number_ = kFirst; number_ <= kLast; ++number_) {
       const std::string file = "/tmp/locus-test-dds-domain-" + std::to_string(number_);
       lock_ = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);

@@ -8,7 +8,7 @@
 
 namespace locus {
 
-/// What an outcome complains of, nothing of a success.
+/// Returns the error of an outcome, empty for a success.
 template <class T> std::string error_of(const Expected<T, std::string>& outcome) {
   return outcome ? "" : outcome.error();
 }

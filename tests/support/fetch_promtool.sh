@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# fetch_promtool.sh FILE: promtool of Debian's package prometheus, without the server that an installation would start.
-# Fetched once; fails where there is no network.
+# fetch_promtool.sh FILE: extracts promtool from Debian's package prometheus, without installing its server. Fetched
+# once; fails without a network.
 set -euo pipefail
 [ ! -x "$1" ] || exit 0
 work=$(mktemp -d -t locusd-promtool.XXXXXX)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// hang_thread PROCESS NAME: stops the thread of that name, and it alone, until the process ends. What a thread that
-// hangs looks like from outside, without a line in the service that could make one hang.
+// hang_thread PROCESS NAME: stops only the thread of that name until the process ends. Simulates a hanging thread
+// without a hook in the service.
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>

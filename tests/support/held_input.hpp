@@ -11,7 +11,7 @@
 
 namespace locus::test {
 
-/// Another input that waits for the pipeline now and then.
+/// Decorator of an input that waits for the pipeline now and then.
 class HeldInput : public daemon::InputSource {
  public:
   /// `input` must outlive this.
@@ -30,19 +30,19 @@ class HeldInput : public daemon::InputSource {
  protected:
   virtual bool waits() = 0;
 
-  std::atomic<const daemon::LivePipeline*> pipeline_{nullptr}; ///< until there is one, it waits
+  std::atomic<const daemon::LivePipeline*> pipeline_{nullptr}; ///< the input waits until there is one
 
  private:
   daemon::InputSource& input_;
   Stamp last_arrival_;
 };
 
-/// Gives the input out no faster than the odometry processes it, so that nothing is dropped.
+/// Feeds the input no faster than the odometry processes it, so that nothing is dropped.
 class PatientInput : public HeldInput {
  public:
   using HeldInput::HeldInput;
 
-  /// nullptr: until it is told of the next one.
+  /// nullptr: wait until the next pipeline is set.
   void wait_for(const daemon::LivePipeline* pipeline) { pipeline_.store(pipeline); }
 
  private:

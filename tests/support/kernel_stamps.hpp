@@ -13,8 +13,8 @@
 
 namespace locus::test {
 
-/// Keeps the kernel stamping datagrams as they arrive. It begins in the background once a socket asks for it, and until
-/// then stamps them when they are looked at.
+/// Keeps kernel receive timestamps enabled. The kernel enables them asynchronously after the first socket requests
+/// them; until then datagrams are stamped when they are read.
 class KernelStamps {
  public:
   KernelStamps() : socket_(open()) {

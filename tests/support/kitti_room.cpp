@@ -24,7 +24,7 @@ std::string time_text(Stamp stamp) {
                      (stamp.time_since_epoch() - whole_seconds).count());
 }
 
-/// Each point is where the lidar saw it when it was fired.
+/// Each point is in the lidar's frame at its firing time (not de-skewed).
 class RoomDrive {
  public:
   explicit RoomDrive(const std::filesystem::path& day) : day_(day), drive_(day / "2023_11_14_drive_0001_extract") {
@@ -58,7 +58,7 @@ class RoomDrive {
       ends << time_text(start + kPeriod);
       std::ofstream points{drive_ / fmt::format("velodyne_points/data/{:010}.txt", sweep)};
       for (int ring = 0; ring < kRings; ++ring) {
-        for (int column = 0; column < kColumns; ++column) { // counter-clockwise, the first few ahead of the front
+        for (int column = 0; column < kColumns; ++column) { // counter-clockwise, starting slightly ahead of the front
           const double clockwise_rad = std::remainder(-kTurn * (column - ring % 3) / kColumns, kTurn);
           const Pose T = T_world_lidar(start + from_seconds((0.5 + clockwise_rad / kTurn) * to_seconds(kPeriod)));
           const Eigen::Vector3d ray = direction(ring, clockwise_rad);

@@ -10,7 +10,7 @@
 
 #include "core/base/stamp.hpp"
 
-/// What a car with a lidar of 64 rings brings back from a drive around a room, in the format of KITTI's raw data.
+/// A simulated drive of a car with a 64-ring lidar around a room, in the format of KITTI's raw data.
 namespace locus::test::kitti_room {
 
 inline constexpr int kSweeps = 40, kRings = 64, kColumns = 720;
@@ -23,7 +23,7 @@ inline Eigen::Vector3d direction(int ring_from_top, double clockwise_rad) {
           std::sin(elevation_rad)};
 }
 
-/// The folder of the day, with its calibration, and that of the drive in it.
+/// Writes the folder of the day with its calibration, and the drive in it.
 void write_drive(const std::filesystem::path& day);
 
 } // namespace locus::test::kitti_room

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// To be preloaded into the service and into the player that leads it (LEADS_CLOCK in its environment), with the file
-// LED_CLOCK in common (led_clock.hpp). From the player's first look at the wall clock to its end their time stands
-// still but for the player's sleeps: each of them is over at once, and adds its length to the time once the service is
-// done with all that was sent before. So datagrams and samples arrive, by the clock of the service, when the recording
-// has them, and nothing is late, however busy the computer is. What really takes time, such as timeouts, takes as long
-// as ever; the DDS library goes by the system's clocks, but for the wall clock.
+// LD_PRELOAD library for the service and for the player that controls its time (LEADS_CLOCK in its environment); both
+// share the file LED_CLOCK (led_clock.hpp). Time stands still from the player's first read of the wall clock until it
+// exits. Each sleep of the player returns at once and advances the time by its length, after the service has processed
+// everything sent before. Datagrams and samples thus arrive at their recorded times by the service's clock, however
+// busy the computer is. Real waits such as timeouts take real time. The DDS library uses the system's clocks, except
+// for the wall clock.
 #include "support/led_clock.hpp"
 
 #include <algorithm>
@@ -47,7 +47,7 @@ std::int64_t system_ns(clockid_t clock) {
   return ns_of(time);
 }
 
-/// Where a program or library lies in memory.
+/// Address range of a mapped program or library.
 struct Range {
   std::uintptr_t begin = 0, end = 0;
   [[nodiscard]] bool holds(const void* address) const {
@@ -105,9 +105,9 @@ std::int64_t led_ns(clockid_t clock) {
   return began + led->added_ns.load(std::memory_order_relaxed);
 }
 
-// Of the player.
+// Player side.
 
-std::uint64_t sent_datagrams = 0, sent_motion = 0; ///< including what the service had got before
+std::uint64_t sent_datagrams = 0, sent_motion = 0; ///< includes those that the service had received before
 
 void take_over() {
   led->wall_ns = system_ns(CLOCK_REALTIME);
@@ -127,7 +127,7 @@ void wait_for_the_service() {
     kSleep(&kLook, nullptr);
 }
 
-/// From here on time goes on by itself.
+/// Lets time run on its own from here.
 __attribute__((destructor)) void end() {
   if (!leads || led->is_led.load() == 0)
     return;
@@ -136,11 +136,11 @@ __attribute__((destructor)) void end() {
   led->is_led.store(0, std::memory_order_release);
 }
 
-// Of the ingest thread of the service.
+// Ingest thread of the service.
 
 std::uint64_t received_datagrams = 0;
 std::atomic<std::uint64_t> pushed_motion{0}; ///< any thread
-std::uint64_t seen_motion = 0;               ///< pushed before the last wait was over
+std::uint64_t seen_motion = 0;               ///< pushed before the last wait ended
 
 bool is_ingest() {
   thread_local bool is = false;
@@ -164,7 +164,7 @@ int clock_gettime(clockid_t clock, timespec* time) noexcept {
   return 0;
 }
 
-/// A sleep of the player's own.
+/// Intercepts the player's sleeps.
 int nanosleep(const timespec* duration, timespec* left) {
   static auto* const kNext = next<int(const timespec*, timespec*)>("nanosleep");
   if (!leads || led->is_led.load() == 0 || !program_range.holds(__builtin_return_address(0)))
@@ -181,7 +181,7 @@ ssize_t sendto(int socket, const void* bytes, size_t size, int flags, const sock
   return sent;
 }
 
-/// Of Cyclone DDS.
+/// Intercepts Cyclone DDS.
 std::int32_t dds_write(std::int32_t writer, const void* data) {
   static auto* const kNext = next<std::int32_t(std::int32_t, const void*)>("dds_write");
   const std::int32_t result = kNext(writer, data);
@@ -211,7 +211,7 @@ int eventfd_write(int descriptor, eventfd_t value) {
   return kNext(descriptor, value);
 }
 
-/// The ingest thread waits for more only when it is done with all that it knew of when it began to look.
+/// Intercepts the ingest thread's wait, which begins only after everything that it found before is processed.
 int ppoll(pollfd* descriptors, nfds_t count, const timespec* timeout, const sigset_t* signals) {
   static auto* const kNext = next<int(pollfd*, nfds_t, const timespec*, const sigset_t*)>("ppoll");
   if (!is_ingest())

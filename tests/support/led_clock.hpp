@@ -6,14 +6,14 @@
 
 namespace locus::test {
 
-/// What the file LED_CLOCK holds, which programs have in common that have the library of led_clock.cpp preloaded: the
-/// time that a player leads, and how far the service has followed it. All zero: the time of the system.
+/// Layout of the file LED_CLOCK, shared by all programs that preload led_clock.cpp: the time set by the player, and the
+/// service's progress. All zero: system time.
 struct LedTime {
-  std::atomic<std::int32_t> is_led{0};                     ///< time stands still but for what the player adds
-  std::int64_t wall_ns = 0, monotonic_ns = 0, boot_ns = 0; ///< of the system, when it was taken over
-  std::atomic<std::int64_t> added_ns{0};                   ///< since then
-  std::atomic<std::int64_t> offset_ns{0};                  ///< of a time that is led no more to that of the system
-  std::atomic<std::uint64_t> datagrams{0}, motion{0};      ///< that the ingest of the service is done with
+  std::atomic<std::int32_t> is_led{0};                     ///< time advances only by `added_ns`
+  std::int64_t wall_ns = 0, monotonic_ns = 0, boot_ns = 0; ///< system time at takeover
+  std::atomic<std::int64_t> added_ns{0};                   ///< since takeover
+  std::atomic<std::int64_t> offset_ns{0};             ///< controlled time minus system time after the control has ended
+  std::atomic<std::uint64_t> datagrams{0}, motion{0}; ///< processed by the service's ingest
 };
 
 } // namespace locus::test

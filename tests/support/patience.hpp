@@ -8,8 +8,8 @@
 
 namespace locus::test {
 
-/// Longest wait of a test for an event that must come: 60 s, or LOCUS_TEST_PATIENCE_S. A wait ends with its event, so
-/// patience costs time only where a test fails; no wait is shorter, for none measures the machine.
+/// Returns the longest wait of a test for an event that must come: 60 s, or LOCUS_TEST_PATIENCE_S. A wait ends with its
+/// event, so that only a failing test spends it. No wait is shorter, because none measures the speed of the machine.
 inline Duration patience() {
   const char* seconds = std::getenv("LOCUS_TEST_PATIENCE_S"); // NOLINT(concurrency-mt-unsafe): nobody sets it
   return std::chrono::seconds{seconds != nullptr ? std::atoll(seconds) : 60};

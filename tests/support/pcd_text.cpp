@@ -110,7 +110,7 @@ std::string packed_by_lzf(const std::string& bytes) {
     literals.clear();
   };
   for (std::size_t i = 0; i < bytes.size();) {
-    std::size_t run = 0; // of the byte before
+    std::size_t run = 0; // of the previous byte
     while (i > 0 && run < kMostRun && i + run < bytes.size() && bytes[i + run] == bytes[i - 1])
       ++run;
     if (run < kLeastRun) {
@@ -124,7 +124,7 @@ std::string packed_by_lzf(const std::string& bytes) {
     packed += static_cast<char>(std::min<std::size_t>(length, 7) << 5U);
     if (length >= 7)
       packed += static_cast<char>(length - 7);
-    packed += '\0'; // one byte back
+    packed += '\0'; // offset: one byte back
     i += run;
   }
   flush();

@@ -7,12 +7,12 @@
 
 namespace locus::test {
 
-/// The content of a PCD file with the fields and points of a cloud, padding left out, in each encoding.
+/// Returns a PCD file with the fields and points of a cloud in each encoding, without padding.
 std::string pcd_as_text(const OwnCloud& cloud);
 std::string pcd_as_binary(const OwnCloud& cloud);
 std::string pcd_compressed(const OwnCloud& cloud);
 
-/// Packed by LZF: runs of one byte refer back, all else is copied.
+/// Compresses by LZF: runs of one byte become back references, everything else is literal.
 std::string packed_by_lzf(const std::string& bytes);
 
 } // namespace locus::test

@@ -7,7 +7,7 @@
 
 namespace locus::test {
 
-/// The returns of a packet one by one, firing group by firing group; firings without one are left out.
+/// Returns the valid returns of a packet, firing group by firing group.
 inline std::vector<LidarReturn> returns_of(const LidarPacket& packet) {
   std::vector<LidarReturn> returns;
   for (const FiringGroup& group : packet.firing_groups())

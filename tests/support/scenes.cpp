@@ -25,7 +25,7 @@ void parked_car(SceneBuilder& build, double x, double y, double yaw_rad, bool va
   build.turned_box({x, y, 0.9}, {2.3, 1.6, 0.55}, yaw_rad, bright);
 }
 
-/// Houses of one side; `facade_y` is where they stand, `outward` the sign of y away from the street.
+/// Builds the houses of one side; `facade_y` is the line of their fronts, `outward` the sign of y away from the street.
 void houses(SceneBuilder& build, Dice& dice, double from_x, double to_x, double facade_y, double outward) {
   for (double x = from_x; x < to_x;) {
     const double width = dice.between(8, 18), depth = dice.between(8, 14), setback = dice.between(0, 2.5);
@@ -41,7 +41,7 @@ void houses(SceneBuilder& build, Dice& dice, double from_x, double to_x, double 
   }
 }
 
-/// What stands on one pavement.
+/// Furnishes one pavement.
 void kerbside(SceneBuilder& build, Dice& dice, double from_x, double to_x, double side) {
   for (double x = from_x; x < to_x; x += dice.between(5.5, 14))
     parked_car(build, x, side * dice.between(4.2, 4.6), dice.between(-0.06, 0.06), dice.between(0, 1) < 0.2,
@@ -151,7 +151,7 @@ Scene plant() {
   build.turned_box({62.4, 5, 0}, {1.2, 2.5, 2.1}, 0.1, 150); // switchgear
   build.turned_box({62.3, 14, 0}, {1.0, 3.0, 2.1}, -0.15, 150);
   build.turned_box({1.0, 8, 0}, {0.9, 2.0, 2.0}, 0.05, 150);
-  for (const double y : {6.6, 13.4}) { // standing pipes
+  for (const double y : {6.6, 13.4}) { // vertical pipes
     build.cylinder({20.5, y, 0}, 0.15, 7, 170);
     build.cylinder({43.0, y, 0}, 0.2, 7, 170);
   }
@@ -161,7 +161,7 @@ Scene plant() {
 Course plant_course(Duration at_least, double speed_mps) {
   const std::vector<Eigen::Vector2d> lap{{22, 15.5}, {43, 15.5}, {52.5, 14.5}, {59, 14}, {59, 6},   {52, 5.5},
                                          {43, 4.5},  {22, 4.5},  {15, 5.2},    {4.5, 5}, {4.5, 15}, {15, 14.8}};
-  const double lap_m = 120; // a little less than it is, corners cut
+  const double lap_m = 120; // lower bound: corners are cut
   const auto laps = 1 + static_cast<int>(to_seconds(at_least) * speed_mps / lap_m);
   std::vector<Eigen::Vector2d> waypoints{{15, 14.8}};
   for (int i = 0; i < laps; ++i)
@@ -170,7 +170,7 @@ Course plant_course(Duration at_least, double speed_mps) {
 }
 
 Course room_course(Duration at_least, double speed_mps) {
-  const double lap_m = 8; // a little less than it is, corners cut
+  const double lap_m = 8; // lower bound: corners are cut
   const auto laps = 1 + static_cast<int>(to_seconds(at_least) * speed_mps / lap_m);
   std::vector<Eigen::Vector2d> waypoints{{-1.2, -1.2}};
   for (int i = 0; i < laps; ++i)

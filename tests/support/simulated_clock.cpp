@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// To be preloaded: the clocks of a program, as the file SIMULATED_CLOCK has them (simulated_clock.hpp): all of them
-// faster than the system's, and the wall clock set. All that a program can see of time follows: the clocks, the stamps
-// of datagrams, how long it waits. Waits until a time of the wall clock follow it when it is set, as in the kernel.
-// CPU time is what it is.
+// LD_PRELOAD library that replaces the clocks of a program by those of the file SIMULATED_CLOCK (simulated_clock.hpp):
+// all run faster than the system's, and the wall clock can be stepped. Clocks, datagram stamps and waits are
+// consistent. Waits until a wall-clock time follow a step, as in the kernel. CPU time is unchanged.
 #include "support/simulated_clock.hpp"
 
 #include <algorithm>
@@ -62,7 +61,7 @@ const volatile SimulatedTime& simulated() {
 
 bool is_faster() { return simulated().rate > 0; }
 
-/// How long the system takes for what takes so long in simulated time; not less.
+/// Converts a simulated duration to system time, rounded up.
 std::int64_t shortened(std::int64_t ns) {
   return is_faster() ? static_cast<std::int64_t>(std::ceil(static_cast<double>(ns) / simulated().rate)) : ns;
 }
@@ -72,7 +71,7 @@ std::int64_t from_origin(std::int64_t monotonic_ns) {
   return simulated().origin_ns + static_cast<std::int64_t>(since * simulated().rate);
 }
 
-/// How far the wall clock of the system is ahead of its CLOCK_MONOTONIC, read without an interruption if that goes.
+/// Returns the system's CLOCK_REALTIME - CLOCK_MONOTONIC, from reads without a preemption between them if possible.
 std::int64_t system_wall_ahead_ns() {
   constexpr std::int64_t kUndisturbed = 1'000;
   std::int64_t ahead = 0;
@@ -85,7 +84,7 @@ std::int64_t system_wall_ahead_ns() {
   return ahead;
 }
 
-/// Of a stamp that the kernel has given, by the wall clock.
+/// Converts a kernel stamp of the wall clock.
 timespec simulated_stamp(const timespec& stamp, std::int64_t wall_ahead_ns) {
   if (!is_faster())
     return to_timespec(ns_of(stamp) + simulated().set_by_ns);
@@ -105,8 +104,8 @@ void simulate_stamps(mmsghdr* messages, int count) {
       }
 }
 
-/// A wait until a time of this clock, in slices where that is the wall clock, for it may be set meanwhile. `wait` waits
-/// until a time of the system's CLOCK_MONOTONIC, and is over where `goes_on` does not hold of what it says.
+/// Waits until a time of `clock`; in slices for the wall clock, because it may be stepped meanwhile. `wait` waits until
+/// a system CLOCK_MONOTONIC time; its result ends the wait unless `goes_on` holds for it.
 int wait_until(clockid_t clock, const timespec& until, const auto& wait, const auto& goes_on) {
   constexpr std::int64_t kSlice = 5'000'000;
   while (true) {
@@ -121,7 +120,7 @@ int wait_until(clockid_t clock, const timespec& until, const auto& wait, const a
   }
 }
 
-/// As if every thread were one of real-time priority: the kernel's 50 us would be as many times more.
+/// Removes the timer slack, as for real-time threads: the kernel's 50 us would be scaled by the rate.
 __attribute__((constructor)) void be_punctual() { prctl(PR_SET_TIMERSLACK, 1); }
 
 } // namespace
@@ -200,7 +199,7 @@ int select(int count, fd_set* read, fd_set* write, fd_set* except, timeval* time
   return kNext(count, read, write, except, &shorter_us);
 }
 
-/// What is left of it when a signal ends it is told in the system's time; nobody asks.
+/// `left` after a signal is in system time; no caller reads it.
 int nanosleep(const timespec* duration, timespec* left) {
   static auto* const kNext = next<int(const timespec*, timespec*)>("nanosleep");
   const timespec shorter = to_timespec(shortened(ns_of(*duration)));

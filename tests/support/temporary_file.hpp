@@ -20,7 +20,7 @@ inline std::vector<std::byte> bytes_of(std::string_view text) {
   return {bytes.begin(), bytes.end()};
 }
 
-/// A file in the temporary folder that is gone after the test.
+/// A file in the temporary folder, removed by the destructor.
 class TemporaryFile {
  public:
   explicit TemporaryFile(const std::string& name)

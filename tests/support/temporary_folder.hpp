@@ -11,7 +11,7 @@
 
 namespace locus::test {
 
-/// A folder that is gone after the test.
+/// A folder removed by the destructor.
 class TemporaryFolder {
  public:
   explicit TemporaryFolder(const std::string& parent = testing::TempDir()) {

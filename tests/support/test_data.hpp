@@ -5,7 +5,7 @@
 
 namespace locus::test {
 
-/// Where the real captures lie. May not exist: a test that needs them skips with a message.
+/// Returns the folder of the real captures. It may not exist: a test that needs it skips with a message.
 std::filesystem::path test_data();
 
 } // namespace locus::test

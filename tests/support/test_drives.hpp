@@ -9,7 +9,7 @@
 
 namespace locus::test {
 
-/// What a robot with ordinary sensors (noise, bias, slip) brings back from a drive around a room.
+/// Writes a drive around a room by a robot with ordinary sensor errors (noise, bias, slip).
 inline void write_room_drive(const std::filesystem::path& folder, Duration duration, int lidars = 1,
                              double speed_mps = 1.0) {
   sim::RobotOptions robot{.lidars = {}};
@@ -30,8 +30,8 @@ inline void write_room_drive(const std::filesystem::path& folder, Duration durat
   sim::write_capture_folder(folder, sim::room(), trajectory, duration, robot);
 }
 
-/// Drives that are written as the tests are built (CMakeLists.txt), and are to be read alone: eight and twenty seconds
-/// around the room, twenty of a husky of locus-sim through the plant, and four around the room in KITTI's format.
+/// Drives written at build time (CMakeLists.txt), read-only: 8 s and 20 s around the room, 20 s of a husky of locus-sim
+/// through the plant, and 4 s around the room in KITTI's format.
 std::filesystem::path room_drive();
 std::filesystem::path long_room_drive();
 std::filesystem::path plant_drive();

@@ -14,7 +14,7 @@
 
 namespace locus::test {
 
-/// Sends datagrams by the loopback interface.
+/// Sends datagrams over the loopback interface.
 class UdpSender {
  public:
   /// `from_ip`: an address of this host, host byte order.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// write_room_drives FOLDER: the drives around a room that the tests replay, written once for all of them.
+// write_room_drives FOLDER: writes the drives around a room that the tests replay, once for all of them.
 #include <chrono>
 #include <filesystem>
 

@@ -54,7 +54,7 @@ TEST_P(PoseAtAngle, AdjointTakesATwistToTheOtherFrame) {
   EXPECT_LT(largest_difference(T * se3_exp(twist) * T.inverse(), se3_exp(seen_from_a)), 1e-12);
 }
 
-// 1e-4 is where the series take over from the closed forms.
+// The closed forms are replaced by their series below 1e-4.
 INSTANTIATE_TEST_SUITE_P(Angles, PoseAtAngle,
                          testing::Values(0.0, 1e-12, 1e-8, 0.99e-4, 1.01e-4, 1e-3, 0.5, 2.0, kPi - 1e-3, kPi - 1e-6));
 

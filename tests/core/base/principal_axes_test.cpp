@@ -14,7 +14,7 @@ namespace {
 
 using Solver = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>;
 
-/// Variances along axes that are turned at random.
+/// Returns a covariance with these variances along randomly oriented axes.
 Eigen::Matrix3d scatter(const Eigen::Vector3d& variance, unsigned seed) {
   std::mt19937 random{seed};
   std::normal_distribution<double> any;
@@ -54,7 +54,7 @@ TEST(PrincipalAxes, OfABallOrALineLookLikeNoPlane) {
   }
 }
 
-/// All but the greatest variance is what rounding leaves, of either sign.
+/// All variances but the greatest are rounding errors, of either sign.
 TEST(PrincipalAxes, OfTwoPointsAreFinite) {
   std::mt19937 random{1};
   std::uniform_real_distribution<float> within{-0.25F, 0.25F};

@@ -18,7 +18,8 @@ using std::chrono::seconds;
 
 constexpr Duration kDrive = seconds{8};
 
-/// Every return of a drive with turns at 2 rad/s, corrected with the true motion, from the end of its sweep.
+/// Returns the largest distance of a return from its surface: a drive with turns at 2 rad/s, de-skewed to the sweep's
+/// end with the true motion.
 double farthest_from_its_surface_m(const sim::Scene& scene, const sim::Trajectory& trajectory,
                                    bool motion_correction = true) {
   RobotSetup setup;
@@ -30,7 +31,7 @@ double farthest_from_its_surface_m(const sim::Scene& scene, const sim::Trajector
   std::size_t points = 0;
   drive(scene, trajectory, setup, kDrive, [&](const Sweep& sweep) {
     if (sweep.sequence < 2)
-      return; // the wheels had not said two things yet
+      return; // the wheels have not delivered two samples yet
     const Pose T_world_base = trajectory.T_world_base(sweep.end);
     for (std::size_t i = 0; i < sweep.points.size(); i += 7) { // a sample is enough
       const Eigen::Vector3d p_world = T_world_base * sweep.points[i].position_base_m.cast<double>().eval();
@@ -48,7 +49,7 @@ sim::Trajectory there_and_back(const sim::Start& start) {
       start, {.height_m = 0.02, .tilt_rad = 0.02, .wavelength_m = 4});
 }
 
-/// Sweeps of a robot that stands, whose gyro begins to turn in the middle of one.
+/// Sweeps of a robot at rest whose gyro starts to report a false rate in the middle of one.
 TEST(MotionCorrection, IsTakenBackWhereTheGyroWasWrong) {
   const sim::Trajectory trajectory(sim::Course{}.stand(seconds{2}), sim::room_start());
   RobotSetup setup;

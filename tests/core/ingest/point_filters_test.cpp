@@ -15,7 +15,7 @@ SweepPoint point(float x, float y, float z, float age_s = 0.0F, float intensity 
   return {{x, y, z}, Eigen::Vector3f::Zero(), age_s, intensity, 0};
 }
 
-/// Points that can be told by their intensity: the place that each had.
+/// Points identified by their intensity, which is their index.
 std::vector<SweepPoint> numbered_points(std::size_t count) {
   std::mt19937 random{1};
   std::uniform_real_distribution<float> coordinate{-20.0F, 20.0F};

@@ -13,9 +13,9 @@ namespace locus {
 namespace {
 
 constexpr float kSweep_s = 0.1F;
-constexpr int kReturns = 1800; ///< of a scan line
+constexpr int kReturns = 1800; ///< per scan line
 
-/// Takes in a single return of one scan line. Gives back its segment.
+/// Adds a single return of one scan line. Returns its segment.
 std::uint32_t add(RingSegments& segments, std::uint16_t scan_line, const Eigen::Vector3f& p, float range_m,
                   float time_s, float intensity) {
   const std::size_t lidar = scan_line / 256, laser = scan_line % 256, lane = laser % FiringGroup::kLasers;
@@ -36,8 +36,7 @@ std::uint32_t add(RingSegments& segments, std::uint16_t scan_line, const Eigen::
   return segment;
 }
 
-/// One scan line all around; what its laser meets is given by its range over the azimuth. Gives back the segment of
-/// each return.
+/// Adds one full revolution of a scan line; `range_m` maps azimuth to range. Returns the segment of each return.
 std::vector<std::uint32_t> scan(RingSegments& segments, std::uint16_t scan_line,
                                 const std::function<double(double)>& range_m) {
   std::vector<std::uint32_t> result;
@@ -53,7 +52,7 @@ std::vector<std::uint32_t> scan(RingSegments& segments, std::uint16_t scan_line,
 
 double tank(double) { return 5.0; }
 
-/// From the middle of a square room of 8 m.
+/// Range to the walls of a square room of 8 m, from its centre.
 double square_room(double azimuth) { return 4.0 / std::max(std::abs(std::cos(azimuth)), std::abs(std::sin(azimuth))); }
 
 TEST(RingSegments, CentroidsComeByScanLineAndWithinItByTime) {
@@ -96,7 +95,7 @@ TEST(RingSegments, AStepInRangeIsAnotherSurface) {
 }
 
 TEST(RingSegments, NoSegmentIsLongerThanTheLargestLeaf) {
-  RingSegments segments(1, 10); // few: the leaf grows as far as it may
+  RingSegments segments(1, 10); // few: the leaf grows up to its limit
   std::vector<SweepPoint> points;
   for (int sweep = 0; sweep < 10; ++sweep) {
     const auto used = scan(segments, 0, tank);

@@ -13,7 +13,7 @@
 namespace locus {
 namespace {
 
-/// A spherical scan: lines two degrees apart, points a degree apart; what each ray meets is given by its direction.
+/// A spherical scan: lines two degrees apart, points one degree apart; `range_m` maps the ray direction to its range.
 std::vector<SweepPoint> scan(int lines, const std::function<std::optional<double>(const Eigen::Vector3d&)>& range_m,
                              double noise_m = 0.0) {
   std::mt19937 random{1};

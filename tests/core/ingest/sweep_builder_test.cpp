@@ -22,9 +22,9 @@ constexpr Duration kColumn = nanoseconds{55'296};
 constexpr Duration kLaser = nanoseconds{2'304};
 constexpr int kColumns = 24;
 constexpr Duration kPacket = kColumns * kColumn;
-constexpr std::size_t kMaxReturns = 60'000; ///< two lidars at 300 rpm make no more
+constexpr std::size_t kMaxReturns = 60'000; ///< upper bound of two lidars at 300 rpm
 
-/// A lidar whose returns can be told apart: each has its number as x. Remembers when each was fired.
+/// A lidar with identifiable returns: x is the return's number. Records the firing time of each.
 class NumberedLidar {
  public:
   explicit NumberedLidar(std::uint8_t index = 0, double rpm = 600, double first_azimuth_deg = 0, Stamp start = kStart)
@@ -57,7 +57,7 @@ class NumberedLidar {
     azimuth_deg_ = std::fmod(azimuth_deg_ + 6.0 * rpm_ * to_seconds(time), 360.0);
     next_ += time;
   }
-  void jump(Duration by) { next_ += by; } ///< of its clock alone
+  void jump(Duration by) { next_ += by; } ///< steps only this lidar's clock
   void set_range_m(float range_m) { range_m_ = range_m; }
 
   [[nodiscard]] Stamp next() const { return next_; }
@@ -84,7 +84,7 @@ SweepOptions keep_all() {
   return options;
 }
 
-/// A builder whose sweeps are kept.
+/// A builder that stores its sweeps.
 class Built {
  public:
   explicit Built(const SweepOptions& options = keep_all(), std::size_t lidars = 1,
@@ -106,8 +106,9 @@ std::size_t number_of(const SweepPoint& point) {
   return static_cast<std::size_t>(std::lround(point.position_base_m.x()));
 }
 
-/// Each return once, in the window it was fired in, with the age it has at its end; windows without gaps between. A
-/// packet that comes after another lidar's has closed the window goes into the next one, up to `late`.
+/// Expects every return exactly once, in the window in which it was fired and with its age at the window's end, and
+/// windows without gaps. A packet that arrives after another lidar's packet has closed the window goes into the next
+/// one, at most `late` after the window's end.
 void expect_each_return_in_its_sweep(const std::vector<Sweep>& sweeps, const std::vector<const NumberedLidar*>& lidars,
                                      Duration late = {}) {
   std::map<std::pair<std::size_t, std::size_t>, int> times_seen; // by lidar and number
@@ -192,7 +193,7 @@ TEST(SweepBuilder, ADeadLidarIsSimplyNotThere) {
   Built built(keep_all(), 2);
   while (rear.next() < kStart + seconds{2}) {
     if (front.next() < kStart + seconds{1} && front.next() <= rear.next())
-      built.add(front.packet()); // dies after a second
+      built.add(front.packet()); // dies after one second
     else
       built.add(rear.packet());
   }
@@ -253,7 +254,7 @@ TEST(SweepBuilder, TimeThatRanBackwardsIsANewStart) {
   EXPECT_GT(built.sweeps.back().points.size(), 25'000U);
 }
 
-/// By a network that stood still, while other sensors told the time.
+/// Packets delayed by a stalled network while other sensors advanced the time.
 TEST(SweepBuilder, PacketsThatWereHeldUpAndComeAllAtOnceAreNoNewStart) {
   NumberedLidar lidar;
   Built built;
@@ -335,14 +336,14 @@ TEST(SweepBuilder, TheLastWindowCountsWhenItIsLongerThanHalfAPeriod) {
   }
 }
 
-/// Of clouds that came at one instant each, their ends told in `ends`; a number of returns each that says which it is.
+/// Clouds with a single stamp for all points. `ends_` holds their ends; a return's number identifies its cloud.
 class CloudsOfOneInstant {
  public:
-  static constexpr std::size_t kReturns = 6000; ///< more than a packet holds
+  static constexpr std::size_t kReturns = 6000; ///< more than one packet holds
 
   explicit CloudsOfOneInstant(Duration period) : period_(period) {}
 
-  /// The time is told every 10 ms until the cloud arrives.
+  /// Advances the builder every 10 ms until the cloud arrives.
   void play(Built& built, Stamp end) {
     constexpr Duration kWay = milliseconds{4};
     for (Stamp now = ends_.empty() ? end : ends_.back() + kWay; now < end + kWay; now += milliseconds{10})
@@ -450,7 +451,7 @@ TEST(SweepBuilder, ASinkMayTakeThePointsAway) {
   EXPECT_GE(sweeps, 9U);
 }
 
-/// Wheels that go 10 m/s to the left, along y, where the numbered returns all lie at zero.
+/// Wheels that report 10 m/s to the left, along y, where all numbered returns are at zero.
 class SweepsOfAMovingRobot : public testing::Test {
  protected:
   static constexpr double kSpeed_mps = 10.0;

@@ -25,11 +25,11 @@ constexpr int kStarts = 50;
 constexpr double kStartOff_m = 0.5, kStartOff_deg = 10.0;
 constexpr double kSuccess_m = 0.05, kSuccess_deg = 0.5;
 
-constexpr int kMaxIterations = 60; ///< PCL's default allows itself 200
+constexpr int kMaxIterations = 60; ///< PCL's default is 200
 
 using Cloud = pcl::PointCloud<pcl::PointXYZ>;
 
-/// One sweep, as each of the two registrations wants it.
+/// One sweep in the input formats of both registrations.
 struct View {
   std::vector<SurfacePoint> surfaces; ///< every segment of the sweep
   Cloud::Ptr cloud;
@@ -52,18 +52,18 @@ View view_of(const Recording& recording, std::size_t sweep) {
   return view;
 }
 
-/// What a lidar sees that stands there.
+/// Returns the sweep of a lidar at this pose.
 View standing_at(const sim::Scene& scene, const sim::Start& start, std::uint64_t seed) {
   constexpr Duration kFourSweeps = std::chrono::milliseconds{401};
   const sim::Trajectory trajectory(sim::Course{}.stand(kFourSweeps), start);
   sim::SyntheticLidarOptions lidar;
-  lidar.T_base_lidar.translation.z() = 0.75; // seen from the lidar: recordings know no mounting
+  lidar.T_base_lidar.translation.z() = 0.75; // relative to the lidar: recordings contain no mounting
   lidar.range_noise_m = 0.02;
   lidar.seed = seed;
   return view_of(Recording::synthetic(scene, trajectory, lidar, kFourSweeps), 2);
 }
 
-/// The start off by up to half a metre and ten degrees, any way.
+/// Returns initial poses perturbed by up to half a metre and ten degrees in any direction.
 std::vector<Pose> starts_around(const Pose& truth) {
   std::mt19937_64 random{1};
   std::normal_distribution<double> normal;
@@ -130,11 +130,11 @@ Outcome align_with_pcl(const View& target, const View& source, const Pose& truth
   return outcome;
 }
 
-/// Ours must converge at least as often and err by no more metres. `rotation_share` is how many times PCL's error of
-/// rotation ours may have: the aim is 1 and is not reached in two pairs. With the standing VLP-16 PCL's error is less
-/// than the noise allows to know: aligning the same returns of both sweeps with each other leaves 0.03 deg, and over
-/// ten pairs of that capture PCL errs by 0.069 deg (root mean square), ours by 0.029. In the plant its normals from
-/// twenty neighbours each are worth more than ours from the scan lines next to a point.
+/// Expects our registration to converge at least as often as PCL's and with no larger translation error.
+/// `rotation_share` bounds our rotation error as a multiple of PCL's: the aim is 1, missed in two pairs. With the
+/// static VLP-16 PCL's error is below the noise floor: aligning the same returns of both sweeps with each other leaves
+/// 0.03 deg, and over ten pairs of that capture the RMS errors are 0.069 deg (PCL) and 0.029 deg (ours). In the plant
+/// PCL's normals, from twenty neighbours each, are better than ours, from adjacent scan lines.
 void expect_ours_is_as_good(const View& target, const View& source, const Pose& truth, double rotation_share) {
   const Outcome ours = align_ours(target, source, truth);
   const Outcome pcl = align_with_pcl(target, source, truth);
@@ -179,7 +179,7 @@ struct RealPair {
   double rotation_share;
 };
 
-/// The car and the tripods stand at the beginning of these captures.
+/// Car and tripods are at rest at the beginning of these captures.
 class GicpVersusPclOnRealPair : public testing::TestWithParam<RealPair> {};
 
 TEST_P(GicpVersusPclOnRealPair, OfAStandingLidar) {

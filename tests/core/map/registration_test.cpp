@@ -194,8 +194,8 @@ TEST(Gicp, TheInformationTellsTheErrorsThatAreMade) {
     squared += error.dot(found.information.topLeftCorner<6, 6>() * error);
     dimensions += 6.0;
   }
-  // 1 where the information is exact. Here the points are independent, as those of a lidar are not: it takes only six
-  // hundredths of what they say, and the surfaces' own share of the variance makes it more cautious yet.
+  // 1 if the information is exact. These points are independent, while those of a lidar are not: the registration
+  // scales their information by 0.06, and the surfaces' own share of the variance makes it more cautious still.
   EXPECT_LT(squared / dimensions, 2.0 * 0.06 / 0.3);
   EXPECT_GT(squared / dimensions, 0.1 * 0.06 / 0.3);
 }
@@ -215,7 +215,7 @@ TEST(FitOf, MoreAndNearerPointsFitBetter) {
 
 TEST(FitOf, APointThreeSigmaOffIsWorthNoMoreThanOneWithoutCorrespondence) {
   EXPECT_EQ(fit_of(fitting(500, 9.0)), fit_of(fitting(0)));
-  // Half of 1000 points at 1 and half at 9 are as good as 500 at 1 and 500 that found nothing.
+  // 1000 points, half with a residual of 1 and half of 9, are as good as 500 of 1 and 500 without a correspondence.
   EXPECT_DOUBLE_EQ(fit_of(fitting(1000, 5.0)), fit_of(fitting(500, 1.0)));
 }
 
@@ -226,9 +226,9 @@ TEST(Evidence, IsForWhatFitsBetterAndAgainstTheOther) {
 }
 
 TEST(Evidence, CountsAPointAsTheInformationOfTheRegistrationDoes) {
-  // A hundred points more, 8 each, of which 0.06 are independent.
+  // A hundred points more, 8 each, of which 0.06 count as independent.
   EXPECT_NEAR(evidence(fitting(900, 1.0), fitting(800, 1.0)), 0.06 * 100.0 * 8.0, 1e-9);
-  // Surfaces that are fitted as well as any.
+  // Surfaces that fit as well as is possible.
   EXPECT_NEAR(evidence(fitting(900, 0.3), fitting(900, 0.4)), 0.06 / 0.3 * 900.0 * 0.1, 1e-9);
   EXPECT_NEAR(evidence(fitting(900, 0.1), fitting(900, 0.2)), 0.06 / 0.3 * 900.0 * 0.1, 1e-9);
 }

@@ -26,7 +26,7 @@ void insert(SurfaceGrid& grid, const Eigen::Vector3d& point_m, const Eigen::Vect
   grid.insert(points);
 }
 
-/// One point in the middle of each voxel of a line along x.
+/// Inserts one point in the middle of each voxel of a line along x.
 void insert_voxels_along_x(SurfaceGrid& grid, int from, int to) {
   for (int i = from; i < to; ++i)
     insert(grid, {kLeaf_m * i, 0, 0}, kNoNormal);

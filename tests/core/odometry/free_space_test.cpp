@@ -22,7 +22,7 @@ constexpr Duration kEveryKeyframe = std::chrono::seconds{1};
 Stamp end_of_keyframe(int keyframe) { return stamp_from_ns(1'000'000'000) + keyframe * kEveryKeyframe; }
 Pose metres_ahead(double x_m) { return {Eigen::Quaterniond::Identity(), {x_m, 0, 0}}; }
 
-/// Points of a wall around the origin of the odom frame, a quarter of a metre apart in height and a degree in azimuth.
+/// Points of a cylindrical wall around the origin of the odom frame, 0.25 m apart in height and one degree in azimuth.
 Points wall(float radius_m) {
   Points points;
   for (int degree = 0; degree < 360; ++degree)
@@ -33,7 +33,7 @@ Points wall(float radius_m) {
   return points;
 }
 
-/// The side of a vehicle that stands across the x axis.
+/// The side of a vehicle across the x axis.
 Points vehicle(float x_m) {
   Points points;
   for (float y_m = -1.0F; y_m <= 1.0F; y_m += 0.1F)
@@ -47,7 +47,7 @@ Points both(Points one, const Points& other) {
   return one;
 }
 
-/// A lidar sees no wall that a vehicle hides.
+/// Removes the points that `hiding` occludes from the lidar.
 Points seen_behind(const Points& points, const Points& hiding, const Eigen::Vector3f& lidar_m) {
   const auto is_hidden = [&](const Eigen::Vector3f& point) {
     return std::ranges::any_of(hiding, [&](const Eigen::Vector3f& near) {
@@ -66,7 +66,7 @@ struct Seen {
 
 class FreeSpaceTest : public ::testing::Test {
  protected:
-  /// What is left of a keyframe, in the odom frame.
+  /// Returns the points that are left of a keyframe, in the odom frame.
   Points take_of(std::size_t lidars, int keyframe, const Pose& T_odom_base, const std::vector<Seen>& seen) {
     Sweep sweep;
     sweep.end = end_of_keyframe(keyframe);
@@ -134,7 +134,7 @@ TEST_F(FreeSpaceTest, WhatHasComeToStayIsTakenInFiveKeyframesLater) {
 
 TEST_F(FreeSpaceTest, WhatComesIntoSightBehindSomethingStays) {
   take(0, {}, around_vehicle(4.0F, {}));
-  const Points farther = both(room_, vehicle(7.0F)); // where the vehicle at 4 m was before it
+  const Points farther = both(room_, vehicle(7.0F)); // the vehicle's position before it was at 4 m
   EXPECT_EQ(take(1, {}, farther).size(), farther.size());
 }
 

@@ -21,15 +21,15 @@ namespace locus::test {
 inline constexpr SourceId kWheelSource{0}, kGyroSource{1};
 inline constexpr int kX = 0, kYaw = 5;
 inline constexpr std::array kRates_hz{5.0, 10.0, 20.0};
-inline constexpr double kLearned = 1.5 * 1.5; ///< a variance is within that factor
-inline constexpr double kSigmas = 4.0;        ///< a Gaussian is farther off once in 16 000
+inline constexpr double kLearned = 1.5 * 1.5; ///< bound on the ratio of a learned variance to the true one
+inline constexpr double kSigmas = 4.0;        ///< a Gaussian exceeds this once in 16 000
 
 inline constexpr MotionFilter::Measured kNothing{.translation = false, .rotation = false};
 inline constexpr MotionFilter::Measured kTranslation{.translation = true, .rotation = false};
 inline constexpr MotionFilter::Measured kRotation{.translation = false, .rotation = true};
 inline constexpr MotionFilter::Measured kAll{.translation = true, .rotation = true};
 
-/// What the filter takes sources to be like before it knows them: way and turn after a second.
+/// Priors of the filter for the source noise: translation (m) and rotation (rad), standard deviation after one second.
 inline const Vector6 kUsualWheels = along_each_axis(0.02, 0.01 / kRadPerDeg);
 inline const Vector6 kUsualGyro = along_each_axis(0.0, 0.006 / kRadPerDeg);
 
@@ -53,21 +53,21 @@ inline Vector6 winding(double t) {
                   0.05 * std::sin(2.0 * t), 0.05 * std::sin(1.7 * t), 0.3 * std::sin(0.5 * t));
 }
 
-/// So slow that no error in proportion to the motion matters.
+/// Slow motion, for which errors proportional to it are negligible.
 inline Vector6 creeping(double t) { return 0.1 * winding(t); }
 
-/// A robot that truly moves like that. Its sensors err by nothing but Gaussian noise, bias and scale.
+/// A robot with this true motion. Its sensors have Gaussian noise, bias, scale error, lateness and misalignment only.
 class GaussianRobot {
  public:
   struct Sensors {
-    Vector6 wheels = kUsualWheels, gyro = kUsualGyro; ///< standard deviation of way and turn after a second
-    double scale = 0.0;                               ///< of the way ahead
-    double to_the_left = 0.0, upwards = 0.0;          ///< of the way ahead, too
-    std::function<double(double t_s)> slip_mps{};     ///< what the wheels run faster than they roll
+    Vector6 wheels = kUsualWheels, gyro = kUsualGyro; ///< standard deviation of translation and rotation after 1 s
+    double scale = 0.0;                               ///< error of the forward distance, as a ratio
+    double to_the_left = 0.0, upwards = 0.0;          ///< lateral and vertical error, as ratios of the forward distance
+    std::function<double(double t_s)> slip_mps{};     ///< wheel speed in excess of the rolling speed
     Eigen::Vector3d bias_radps = Eigen::Vector3d::Zero();
     double late_s = 0.0;                                    ///< of the gyro's stamps
-    Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero(); ///< of the gyro, otherwise than thought
-    double force_mps = 0.02;                                ///< of the speed after a second
+    Eigen::Vector3d mounting_rad = Eigen::Vector3d::Zero(); ///< misalignment of the gyro
+    double force_mps = 0.02;                                ///< standard deviation of the speed after 1 s
     Eigen::Vector3d force_bias_mps2 = Eigen::Vector3d::Zero();
     Eigen::Vector3d lever_m = Eigen::Vector3d::Zero(); ///< from the base to the accelerometer
   };
@@ -97,7 +97,7 @@ class GaussianRobot {
   }
 
   [[nodiscard]] const Pose& pose() const { return T_odom_base_; }
-  [[nodiscard]] const Vector6& twist() const { return twist_; } ///< mean since the last
+  [[nodiscard]] const Vector6& twist() const { return twist_; } ///< mean since the previous step
   [[nodiscard]] double t_s() const { return t_s_; }
 
   Vector6 wheels() {
@@ -106,7 +106,7 @@ class GaussianRobot {
     said[kX] += sensors_.slip_mps ? sensors_.slip_mps(t_s_ - 0.5 * elapsed_s_) : 0.0;
     return said;
   }
-  /// `taken_out_s` of its lateness is taken out of the stamps.
+  /// Measures the rotation; the stamps are corrected by `taken_out_s` of the lateness.
   SensedTwist gyro(double taken_out_s = 0.0) {
     const Eigen::Quaterniond askew = so3_exp(-sensors_.mounting_rad);
     const double late_s = sensors_.late_s - taken_out_s, moment_s = to_seconds(SourcePose::kMoment);
@@ -127,7 +127,7 @@ class GaussianRobot {
     const Eigen::Vector3d mean = force_ + sensors_.force_bias_mps2 + noisy(Vector6::Zero(), sigma).head<3>();
     return {.early_base_mps2 = mean, .late_base_mps2 = mean, .source = kGyroSource};
   }
-  /// The truth with the noise of what lidar knows.
+  /// Returns the true pose and twist relative to the belief, with the noise of a lidar of this information.
   Vector12 seen_beside(const MotionBelief& belief, const Matrix12& information) {
     Vector12 off;
     off << difference(T_odom_base_, belief.T_target_source), twist_ - belief.twist_base;
@@ -160,14 +160,14 @@ class GaussianRobot {
   double t_s_ = 0.0, elapsed_s_ = 0.0;
 };
 
-/// Of a lidar that knows pose and twist of its sweeps so well along each axis.
+/// Information of a lidar with these standard deviations of the pose and twist of a sweep, along each axis.
 inline Matrix12 lidar_with(const Vector6& pose_sigma, const Vector6& twist_sigma) {
   Vector12 sigma;
   sigma << pose_sigma, twist_sigma;
   return sigma.cwiseAbs2().cwiseInverse().asDiagonal();
 }
-/// The points of one sweep place it to 5 mm and 1 mrad, and their spread of ages tells the twist to three times that in
-/// the time of the sweep.
+/// Information of an ordinary lidar: its points determine the pose to 5 mm and 1 mrad, and their spread of ages
+/// determines the twist to three times that, divided by the sweep's period.
 inline Matrix12 usual_lidar(double period_s) {
   const Vector6 pose = along_each_axis(0.005, 0.001 / kRadPerDeg);
   return lidar_with(pose, 3.0 / period_s * pose);
@@ -180,7 +180,7 @@ inline Matrix12 blind_ahead(Matrix12 information) {
   return information;
 }
 
-/// As a registration does: the belief and what the points say, by their information.
+/// Updates as a registration does: fuses the belief and the points by their information.
 inline void see(MotionFilter& filter, GaussianRobot& robot, const Matrix12& information) {
   const MotionBelief belief = filter.belief();
   const Vector12 off = robot.seen_beside(belief, information);
@@ -196,7 +196,7 @@ struct Sensing {
   std::optional<Matrix12> lidar = std::nullopt;
 };
 
-/// One sweep.
+/// Simulates and processes one sweep.
 inline void sweep(MotionFilter& filter, GaussianRobot& robot, double elapsed_s, const Sensing& sensing) {
   robot.move(elapsed_s);
   filter.predict(elapsed_s, elapsed_s, sensing.force ? std::optional(robot.force()) : std::nullopt,
@@ -231,7 +231,7 @@ inline Vector12 error_of(const MotionFilter& filter, const GaussianRobot& robot)
   return error;
 }
 
-/// Normalised estimation error squared, for each dimension.
+/// Normalised estimation error squared, per dimension.
 inline double nees(const MotionFilter& filter, const GaussianRobot& robot) {
   const Vector12 error = error_of(filter, robot);
   return error.dot(filter.covariance().ldlt().solve(error)) / 12.0;
@@ -239,7 +239,8 @@ inline double nees(const MotionFilter& filter, const GaussianRobot& robot) {
 
 inline double sigma_of(const MotionFilter& filter, int axis) { return std::sqrt(filter.covariance()(axis, axis)); }
 
-/// What of an innovation's variance is the source's own noise: variance of the way or turn after a second.
+/// Returns the part of an innovation's variance that is the source's own noise: variance of translation or rotation
+/// after one second.
 inline Vector6 noise_of(const MotionFilter& filter, SourceId source, const Vector6& said, double elapsed_s) {
   const Innovation found = filter.innovation(source, said);
   return (found.variance - found.others - found.known) * elapsed_s;

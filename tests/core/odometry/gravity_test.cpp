@@ -13,7 +13,7 @@ using std::chrono::milliseconds;
 constexpr Duration kPeriod = milliseconds{100};
 const Eigen::Vector3d kUp = Eigen::Vector3d::UnitZ();
 
-/// A sweep of a base with roll and pitch that accelerates.
+/// A sweep of a base with this roll, pitch and acceleration.
 Sweep sweep_with(const Eigen::Vector3d& rpy_deg, const Eigen::Vector3d& acceleration_base_mps2 = {0, 0, 0}) {
   Sweep sweep;
   sweep.end = sweep.start + kPeriod;
@@ -38,7 +38,7 @@ TEST(Gravity, AnAccelerationOfASecondTiltsNothingMuch) {
   Gravity gravity;
   gravity.observe(kNoTurn, sweep_with({0, 0, 0}));
   for (int i = 0; i < 10; ++i)
-    gravity.observe(kNoTurn, sweep_with({0, 0, 0}, {0.8, 0, 0})); // reads like 4.7 deg
+    gravity.observe(kNoTurn, sweep_with({0, 0, 0}, {0.8, 0, 0})); // equivalent to 4.7 deg of tilt
   EXPECT_LT(tilt_deg(gravity), 1.5);
 }
 
@@ -145,10 +145,10 @@ TEST(FlatGround, FoundGivesWayToLidarWhereThatSeesBetter) {
 
 // --- Tilt -------------------------------------------------------------------------------------------------------
 
-/// A keyframe every ten sweeps; gives back the tilt that is left.
+/// Inserts a keyframe every ten sweeps. Returns the remaining tilt.
 double tilt_after(int sweeps, double tilt_rad, double up_noise_rad = 0.0) {
   TiltKeeper keeper;
-  Eigen::Quaterniond R_odom_base = from_rpy_rad({tilt_rad, 0, 0.7}); // of a base that is level in truth
+  Eigen::Quaterniond R_odom_base = from_rpy_rad({tilt_rad, 0, 0.7}); // the true base is level
   for (int i = 0; i < sweeps; ++i) {
     const double noise = i % 2 == 0 ? up_noise_rad : -up_noise_rad;
     keeper.observe(R_odom_base, from_rpy_rad({noise, 0, 0}).conjugate() * kUp);

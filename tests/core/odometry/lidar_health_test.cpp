@@ -18,7 +18,7 @@ Registration fit(std::size_t inliers, double mean_error = 1.0) {
   return registration;
 }
 
-/// Of a lidar that for two seconds saw what it always sees.
+/// A lidar health monitor after two seconds of this registration.
 LidarHealth used_to(const Registration& registration, double period_s = kPeriod_s) {
   LidarHealth health;
   for (int i = 0; i < static_cast<int>(2.0 / period_s); ++i)

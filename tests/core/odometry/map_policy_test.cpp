@@ -13,7 +13,7 @@ using std::chrono::milliseconds;
 using Verdict = MapPolicy::Verdict;
 
 constexpr Duration kEverySweep = milliseconds{100};
-constexpr int kPatience = 10; ///< refusals in a row until the map goes on from the prediction
+constexpr int kPatience = 10; ///< consecutive rejections until the map resumes from the prediction
 const MapOptions kMapOptions{.keyframe_m = 1.0, .keyframe_deg = 30.0};
 
 Stamp end_of(int sweep) { return stamp_from_ns(1'000'000'000) + sweep * kEverySweep; }
@@ -30,7 +30,7 @@ MapPolicy::Outcome carried(MapPolicy::Outcome outcome) {
   return outcome;
 }
 
-/// A map that was begun at the origin by sweep 0 and fitted those up to `last`.
+/// A map initialised at the origin by sweep 0, with accepted registrations up to sweep `last`.
 MapPolicy policy_begun(int last = 0) {
   MapPolicy policy(kMapOptions);
   policy.begin(end_of(0), Pose{});
@@ -39,7 +39,7 @@ MapPolicy policy_begun(int last = 0) {
   return policy;
 }
 
-/// What becomes of the map in each of the sweeps up to that at which it no longer waits, or to the last.
+/// Returns the first sweep at which the policy stops waiting, and its verdict; the last sweep if there is none.
 std::pair<int, Verdict> first_that_waits_no_longer(MapPolicy& policy, int from, int to, bool are_carried) {
   for (int i = from; i <= to; ++i)
     if (const Verdict verdict = policy.judge(are_carried ? carried(refused(i)) : refused(i)); verdict != Verdict::waits)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the filter finds out about the motion sources, and says of them.
+// Calibration and noise of the motion sources as the filter estimates and reports them.
 #include "core/odometry/motion_filter.hpp"
 
 #include <gtest/gtest.h>
@@ -16,9 +16,9 @@
 namespace locus::test {
 namespace {
 
-// --- What it finds out about the sensors --------------------------------------------------------------------------
+// --- Estimated errors of the sensors ------------------------------------------------------------------------------
 
-/// The turn that lidar sees in so long tells the bias as well as the gyro's own noise lets it.
+/// The rotation measured by lidar over this time determines the bias as well as the gyro's own noise allows.
 TEST(MotionFilter, FindsTheBiasOfAGyro) {
   constexpr double kTime_s = 60.0;
   const Eigen::Vector3d bias{0.01, -0.015, 0.02};
@@ -44,7 +44,7 @@ TEST(MotionFilter, FindsTheScaleOfWheelsWhereLidarSeesAllAxes) {
   }
 }
 
-/// As on a robot whose odometry is half a degree askew: what carries it on where lidar is gone is the way it goes.
+/// Odometry misaligned by half a degree: its direction of travel matters for dead reckoning without lidar.
 TEST(MotionFilter, FindsWhereAnOdometryGoesWhenItGoesAhead) {
   constexpr double kTime_s = 60.0, kSpeed_mps = 1.5, kToTheLeft = 0.015, kUpwards = -0.01;
   for (const double rate_hz : kRates_hz) {
@@ -58,7 +58,7 @@ TEST(MotionFilter, FindsWhereAnOdometryGoesWhenItGoesAhead) {
   }
 }
 
-/// Mean over half a minute of the noise that it has learned, in units of the true one. Lidar is better than the source.
+/// Mean over 30 s of the learned noise, in units of the true one. Lidar is more precise than the source.
 Vector6 learned_noise(double rate_hz, SourceId source, const GaussianRobot::Sensors& sensors) {
   const double elapsed_s = 1.0 / rate_hz;
   const Vector6 sharp = along_each_axis(0.001, 0.0002 / kRadPerDeg);
@@ -87,7 +87,7 @@ void expect_learned(SourceId source, const GaussianRobot::Sensors& sensors) {
   }
 }
 
-// The floors are 6 mm, 1 mrad for odometry, 1 mrad for a gyro.
+// The floors are 6 mm and 1 mrad for odometry, 1 mrad for a gyro.
 TEST(MotionFilter, LearnsHowBadWheelsAre) { expect_learned(kWheelSource, {.wheels = 10.0 * kUsualWheels}); }
 TEST(MotionFilter, LearnsHowGoodWheelsAre) {
   expect_learned(kWheelSource, {.wheels = along_each_axis(0.006, 0.001 / kRadPerDeg)});
@@ -97,8 +97,7 @@ TEST(MotionFilter, LearnsHowGoodAGyroIs) {
   expect_learned(kGyroSource, {.gyro = along_each_axis(0.0, 0.001 / kRadPerDeg)});
 }
 
-/// Two sources of the usual noise, of which nothing else tells how noisy they are: neither is better or worse known
-/// than before.
+/// Two sources of ordinary noise and no third measurement: neither estimate of their noise may change.
 TEST(MotionFilter, LearnsNothingOfASourceThatNothingElseCanJudge) {
   for (const double rate_hz : kRates_hz) {
     const double elapsed_s = 1.0 / rate_hz;
@@ -152,7 +151,7 @@ TEST(MotionFilter, ForgetsBiasScaleAndNoiseOfASourceThatMayComeBackAsAnother) {
       EXPECT_NEAR(noise_of(filter, source, robot.twist(), 0.1)[axis], usual[axis] * usual[axis], 1e-12) << axis;
 }
 
-/// It turns about all axes, as fast as a robot on legs does.
+/// Rotates about all axes at the rates of a legged robot.
 Vector6 swaying(double t) {
   return twist_of(1.0, 0, 0, 0.5 * std::sin(3.0 * t), 0.4 * std::sin(2.3 * t), 0.6 * std::sin(1.1 * t));
 }
@@ -165,7 +164,7 @@ LearnedSource learned_of_gyro(const Motion& motion, const GaussianRobot::Sensors
   return filter.learned(kGyroSource);
 }
 
-/// As an estimator does, what is known is taken out of the stamps.
+/// Corrects the stamps by the estimated lateness, as the estimator does.
 TEST(MotionFilter, FindsHowLateAGyroIs) {
   for (const double late_s : {-0.1, -0.04, 0.0, 0.01, 0.04, 0.1})
     for (unsigned seed = 1; seed <= 5; ++seed) {
@@ -181,7 +180,7 @@ TEST(MotionFilter, FindsHowLateAGyroIs) {
         filter.learn();
         found = filter.learned(kGyroSource).lateness_s();
       }
-      const bool is_linear = std::abs(late_s) < 0.1; // not over a whole sweep: it gets there, and slower than it thinks
+      const bool is_linear = std::abs(late_s) < 0.1; // at a whole sweep: slower than its sigma says
       EXPECT_NEAR(found.mean, late_s, is_linear ? kSigmas * found.sigma : 0.015) << "seed " << seed;
       EXPECT_LT(found.sigma, 0.002);
     }
@@ -198,7 +197,7 @@ TEST(MotionFilter, FindsHowAGyroIsMounted) {
   }
 }
 
-/// What a motion does not tell is not moved, by more than was thought possible before.
+/// Unobservable states must not move by more than their prior uncertainty.
 TEST(MotionFilter, ADriveStraightAheadTellsNothingOfHowAGyroIsMountedAndHowLateItIs) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     const LearnedSource found =
@@ -251,7 +250,7 @@ TEST(MotionFilter, WhatIsNotToBeCalibratedStaysAsConfigured) {
   }
 }
 
-/// What the user is sure of is left to them, figure by figure.
+/// Values configured as exact are not estimated, each on its own.
 TEST(MotionFilter, WhatTheUserIsSureOfIsNotMoved) {
   const LearnedSource found = learned_of_gyro_as(wheels_and_gyro_with([](MotionSourceOptions& source) {
     if (source.kind == SourceKind::imu)
@@ -290,7 +289,7 @@ TEST(MotionFilter, ASourceThatComesBackIsAsLateAsItWas) {
   EXPECT_GT(after.lateness_s().sigma, 10.0 * before.lateness_s().sigma) << "and it may have changed";
 }
 
-/// By how much a second of spinning wheels has taken a robot ahead of itself, at the most.
+/// Returns the largest forward error that one second of wheel spin causes.
 double dragged_m(double rate_hz, unsigned seed, const Matrix12& lidar) {
   const auto spin = [](double t_s) { return t_s > 20.0 && t_s < 21.0 ? 0.6 : 0.0; };
   GaussianRobot sound(straight(1.0), {}, seed), spinning(straight(1.0), {.slip_mps = spin}, seed);
@@ -304,7 +303,7 @@ double dragged_m(double rate_hz, unsigned seed, const Matrix12& lidar) {
   return most_m;
 }
 
-/// In a field lidar knows the way to a decimetre, and the accelerometer feels nothing.
+/// An open field: lidar measures the forward position to 0.1 m, and the spin causes no acceleration.
 TEST(MotionFilter, WheelsThatSpinAreWrongOnceHoweverManySweepsTheySpin) {
   std::vector<double> mean_m;
   for (const double rate_hz : kRates_hz) {
@@ -319,10 +318,10 @@ TEST(MotionFilter, WheelsThatSpinAreWrongOnceHoweverManySweepsTheySpin) {
   EXPECT_LT(mean_m.back(), 1.5 * mean_m.front()) << kRates_hz.back() / kRates_hz.front() << " times the sweeps";
 }
 
-// --- What it says of sources --------------------------------------------------------------------------------------
+// --- Reported source quality --------------------------------------------------------------------------------------
 
-/// Squared innovation over its variance, mean over the second half of 20 drives of 20 s. What is not measured all the
-/// time is in the first half, so that its bias is known.
+/// Squared innovation divided by its variance, mean over the second half of 20 drives of 20 s. A source that is not
+/// measured throughout is measured in the first half, so that its bias is known.
 Vector6 mean_ratio(double rate_hz, SourceId source, bool all_the_time) {
   Vector6 sum = Vector6::Zero();
   int count = 0;

@@ -17,8 +17,8 @@ namespace {
 
 // --- Consistency ------------------------------------------------------------------------------------------------
 
-/// Means over drives of 20 s. With white noise alone those of 2000 sweeps or more would lie within a few percent of
-/// one; the rest is for what the filter allows for and this robot does not do.
+/// Means over drives of 20 s. With white noise alone those of 2000 sweeps or more would be within a few percent of one;
+/// the margin covers effects that the filter models and this robot does not have.
 double mean_nees(double rate_hz, Sensing sensing) {
   sensing.lidar = usual_lidar(1.0 / rate_hz);
   double sum = 0.0;
@@ -50,9 +50,9 @@ TEST(MotionFilter, IsAsSureAsItIsRightWithWheelsAndGyro) { expect_consistent({})
 TEST(MotionFilter, IsAsSureAsItIsRightWithAccelerometerAndGyro) { expect_consistent({.wheels = false, .force = true}); }
 TEST(MotionFilter, IsAsSureAsItIsRightWithAllSensors) { expect_consistent({.force = true}); }
 
-// --- Where it is not told -----------------------------------------------------------------------------------------
+// --- Unobserved axes ----------------------------------------------------------------------------------------------
 
-/// What wheels say ahead is all that is known: their scale must not follow from it.
+/// Wheels are the only source along x: their own measurements must not change their scale.
 TEST(MotionFilter, WheelsInATunnelKeepTheirScale) {
   constexpr double kSpeed_mps = 1.5, kTime_s = 300.0;
   for (unsigned seed = 1; seed <= 5; ++seed) {
@@ -73,14 +73,14 @@ TEST(MotionFilter, WheelsOfSomeScaleInATunnelAreWithinTheirDoubt) {
   EXPECT_LT(std::abs(error_of(filter, robot)[kX]), kSigmas * std::sqrt(filter.pose_covariance_since_start()(kX, kX)));
 }
 
-/// A gait: twice a second it speeds up, slows down and pitches.
+/// A gait: speeds up, slows down and pitches twice a second.
 Vector6 walking(double t) {
   const double phase = 4.0 * std::numbers::pi * t;
   return twist_of(1.0 + 0.2 * std::sin(phase), 0, 0, 0, 0.5 * std::cos(phase), 0);
 }
 
-/// The more the force changed, the less of it was integrated, so braking counted more than speeding up: the estimate
-/// stood still while the robot walked on.
+/// Regression: the weight of the integrated force decreased with its change, so that braking counted more than speeding
+/// up, and the estimate stood still while the robot walked on.
 TEST(MotionFilter, AWalkingRobotThatNothingTellsOfItsWayKeepsItsSpeed) {
   constexpr double kPeriod_s = 0.05, kTime_s = 3.0;
   GaussianRobot robot(walking, {.lever_m = {0.1, 0.0, 0.3}}, 1);
@@ -96,7 +96,7 @@ Vector6 speeding_up_from_the_fifth_second(double t) {
   return twist_of(1.0 + std::clamp(t - 5.0, 0.0, 5.0), 0, 0, 0, 0, 0);
 }
 
-/// The sweeps of five seconds were lost while the robot sped up from 1 to 6 m/s; the force is that of the last sweep.
+/// Five seconds of sweeps are lost while the robot accelerates from 1 to 6 m/s; the force is that of the last sweep.
 class Gap {
  public:
   static constexpr double kGap_s = 5.0, kPeriod_s = 0.1;
@@ -157,7 +157,7 @@ TEST(MotionFilter, IsHonestInTheSweepThatFollowsAGap) {
   }
 }
 
-/// Nobody tells whether it stopped at once or went on as it did: it may have done either.
+/// Unobserved: the robot may have stopped at once or continued at its speed, and the covariance must cover both.
 TEST(MotionFilter, ARobotThatIsNotSeenComesToRestAndMayAsWellHaveGoneOn) {
   constexpr double kSpeed_mps = 1.0, kTime_s = 3.0;
   for (const double rate_hz : kRates_hz) {
@@ -192,17 +192,18 @@ TEST(MotionFilter, ARobotThatStandsHasNoTwist) {
 
 // --- The map ------------------------------------------------------------------------------------------------------
 
-/// What the map takes over of the pose's error is no longer the pose's against the map: since the start it is the same.
+/// Transferring a share of the pose error to the map reduces the covariance against the map; that since the start is
+/// unchanged.
 TEST(MotionFilter, WhatTheMapTakesOverIsNotLostSinceTheStart) {
   for (const double share : {0.0, 0.1, 0.5, 1.0}) {
     MotionFilter filter = begun(twist_of(1, 0, 0, 0, 0, 0.2));
     GaussianRobot robot(straight(1.0), {}, 1);
-    sweep_for(1.0, filter, robot, 0.1, {}); // unseen: far above the floor of the pose
+    sweep_for(1.0, filter, robot, 0.1, {}); // unobserved: far above the floor of the pose
     const Matrix6 before = filter.pose_covariance_since_start();
     const double against_map = filter.covariance()(kX, kX);
     filter.keep(share * Matrix6::Identity());
     const Matrix6 after = filter.pose_covariance_since_start();
-    const Vector6 floor = along_each_axis(0.001, 1e-4 / kRadPerDeg).cwiseAbs2(); // surfaces are no better known
+    const Vector6 floor = along_each_axis(0.001, 1e-4 / kRadPerDeg).cwiseAbs2(); // the surfaces' own uncertainty
     for (int axis = 0; axis < 6; ++axis)
       EXPECT_NEAR(after(axis, axis), before(axis, axis), 1e-9 + floor[axis]) << share << ", axis " << axis;
     EXPECT_NEAR(filter.covariance()(kX, kX), std::max(floor[kX], (1 - share) * (1 - share) * against_map), 1e-9);
@@ -223,7 +224,7 @@ TEST(MotionFilter, SinceTheStartItIsNeverSurerThanAgainstTheMap) {
   }
 }
 
-/// Two milliradians and five millimetres.
+/// Prior of the lidar extrinsics: two milliradians and five millimetres.
 TEST(MotionFilter, ALidarThatSitsOtherwiseThanThoughtSeesTheWayOfAnotherBody) {
   MotionFilter filter = begun(Vector6::Zero());
   const Matrix6 at_start = filter.pose_covariance_since_start();
@@ -238,9 +239,9 @@ TEST(MotionFilter, ALidarThatSitsOtherwiseThanThoughtSeesTheWayOfAnotherBody) {
   EXPECT_TRUE(turned_round.isApprox(twist_of(0.01, 0.01, 0, 0.004, 0.004, 0), 1e-6)) << turned_round.transpose();
 }
 
-// --- What the robot is able to -------------------------------------------------------------------------------------
+// --- Motion limits -------------------------------------------------------------------------------------------------
 
-/// What it is taken to drive a moment after it drove 14 m/s, known as well as that.
+/// Returns the predicted speed 1 ms after 14 m/s was measured with this standard deviation.
 double speed_after_a_move(const MotionLimits& limits, double sigma_mps) {
   MotionFilter filter(wheels_and_gyro(), limits);
   filter.begin(Pose{}, twist_of(14, 0, 0, 0, 0, 0), along_each_axis(sigma_mps, 1.0));
@@ -287,7 +288,7 @@ TEST(MotionFilter, PutMovesThePoseAndNothingElse) {
 
 // --- Numbers ------------------------------------------------------------------------------------------------------
 
-/// Anything in any order, as the days of a robot may bring it.
+/// Arbitrary events in arbitrary order, as in the life of a robot.
 class AnyDay {
  public:
   explicit AnyDay(unsigned seed) : robot_(winding, {}, seed), random_(seed) {}
@@ -380,7 +381,7 @@ TEST(MotionFilter, ACopyThatIsToldTheSameIsTheSameToTheBit) {
     MotionFilter unused = begun(winding(0.0));
     same_day.sweep(unused);
   }
-  // The days are at the same place now only if nothing that they do depends on the filter.
+  // Both days have the same sequence of events only if no event depends on the filter's state.
   MotionFilter copy = filter;
   for (int i = 0; i < 100; ++i) {
     day.sweep(filter);

@@ -24,7 +24,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// Wheels that slip by half a percent and veer, and a gyro with noise.
+/// Wheels with 0.5 % slip and a yaw drift, and a gyro with noise.
 RobotSetup robot_with_wheels_and_imu() {
   RobotSetup setup;
   setup.lidars.front().range_noise_m = 0.02;
@@ -39,7 +39,7 @@ RobotSetup robot_with_lidar_alone() {
   return setup;
 }
 
-/// 30 m along x, about turn at 2 rad/s, and back.
+/// 30 m along x, a half turn at 2 rad/s, and back.
 sim::Trajectory sixty_metres(const sim::Start& start) {
   sim::Course course;
   for (int way = 0; way < 2; ++way)
@@ -53,7 +53,7 @@ sim::Trajectory sixty_metres(const sim::Start& start) {
 
 struct Outcome {
   std::vector<OdometryEstimate> estimates;
-  double worst_error_m = 0.0; ///< against the truth from the first estimate on
+  double worst_error_m = 0.0; ///< against the truth, from the first estimate on
   double worst_error_deg = 0.0;
   std::size_t failed = 0;
 };
@@ -220,7 +220,7 @@ TEST(Odometry, SameBitsForAnyNumberOfThreadsAndOnEveryRun) {
   }
 }
 
-// --- When something is missing ----------------------------------------------------------------------------------
+// --- Missing data -----------------------------------------------------------------------------------------------
 
 TEST(Odometry, TenSecondsWithoutLidarAreBridgedByWheelOdometry) {
   const sim::Trajectory trajectory = sixty_metres({.position_m = {5, 0}});
@@ -273,7 +273,7 @@ TEST(Odometry, WhereNothingTellsTheWayAlongItComesToRestAndSaysHowFarItMayBeOff)
     const double off_m = std::abs(estimate.T_odom_base.translation.x() - truth.translation.x());
     EXPECT_LT(std::abs(estimate.twist_base[0]), 2.2) << "the robot drives at 2 m/s";
     beyond_m = std::max(beyond_m, off_m - 4 * std::sqrt(estimate.pose_covariance(0, 0)));
-    const bool long_lost = estimate.stamp > lost + seconds{4}; // three seconds after a second in which it went on
+    const bool long_lost = estimate.stamp > lost + seconds{4}; // 1 s at constant speed, then 3 s of decay
     creeps_mps = std::max(creeps_mps, long_lost ? std::abs(estimate.twist_base[0]) : 0.0);
     EXPECT_TRUE(!long_lost || estimate.state == TrackingState::degenerate ||
                 estimate.state == TrackingState::dead_reckoning);
@@ -342,7 +342,7 @@ TEST(Odometry, TheErrorOfABlindStretchIsTakenBackWhereTheMapIsKnown) {
       0.03);
 }
 
-/// A robot that has come a little way into a room.
+/// A robot that has driven a short distance into a room.
 class OdometryUnderWay : public testing::Test {
  protected:
   OdometryUnderWay() {
@@ -351,7 +351,7 @@ class OdometryUnderWay : public testing::Test {
       last_ = odometry_.process(sweeps_[i]);
   }
 
-  /// The sweep to come, but for its points.
+  /// Returns the next sweep, with these points.
   Sweep next_with(std::vector<SweepPoint> points) {
     Sweep sweep = sweeps_.back();
     sweep.registered = points.size();
@@ -446,7 +446,7 @@ TEST(Odometry, SweepsWithoutAPointAtTheBeginningAreWaitedOut) {
   EXPECT_GT(odometry.map().fine().size(), 0U);
 }
 
-// --- The map, the beginning -------------------------------------------------------------------------------------
+// --- Map and initialisation -------------------------------------------------------------------------------------
 
 TEST(Odometry, TheMapTakesASweepAfterAMetreOrThirtyDegrees) {
   const sim::Trajectory trajectory(sim::room_course(seconds{20}, 1.0), sim::room_start());
@@ -507,14 +507,14 @@ TEST(Odometry, AnAcceleratingRobotIsNotLevelledByWhatIsNotGravity) {
   EXPECT_EQ(Odometry(OdometryOptions{}).process(sweeps.front()).T_odom_base, Pose{});
 }
 
-/// Its standard deviation was 100 degrees a second, meant as 100 rad/s: a flick of a hand was two of them.
+/// Regression: the standard deviation was 100 deg/s instead of 100 rad/s, so that a flick of a hand was two sigma.
 TEST(Odometry, BeforeItsSecondSweepATurnOfFourRadiansPerSecondIsNothingUnusual) {
   const sim::Trajectory trajectory(sim::room_course(seconds{1}, 1.0), sim::room_start());
   const Outcome result = drive_through(sim::room(), trajectory, robot_with_lidar_alone(), seconds{1});
   EXPECT_GT(std::sqrt(result.estimates.front().twist_covariance(5, 5)), 8.0);
 }
 
-/// Standard deviation of the scale of the wheels after each sweep of ten seconds in a room.
+/// Returns the standard deviation of the wheels' scale after each sweep of ten seconds in a room.
 std::vector<double> sigma_of_scale(const std::function<void(std::size_t sweep, SourcePose& wheels)>& change) {
   const sim::Trajectory trajectory(sim::room_course(seconds{10}, 1.0), sim::room_start());
   const RobotSetup setup = robot_with_wheels_and_imu();
@@ -528,7 +528,7 @@ std::vector<double> sigma_of_scale(const std::function<void(std::size_t sweep, S
   return sigma;
 }
 
-/// A hiccup of 60 ms, or a busy processor: all that was learned of the wheels was forgotten.
+/// Regression: a gap of 60 ms, from a hiccup or a busy processor, erased everything learned about the wheels.
 TEST(Odometry, ASweepWithoutASampleOfASourceIsNoReasonToForgetIt) {
   const std::vector<double> sigma = sigma_of_scale([](std::size_t sweep, SourcePose& wheels) {
     if (sweep == 60)

@@ -75,9 +75,9 @@ TEST_F(RealSensor, ACarAtFifteenMetresPerSecondThatTurnsRight) {
   EXPECT_GT(yaw_dps, -3.0);
 }
 
-/// How far the world has come towards the lidar along x since the first sweep, without any registration: the shift that
-/// makes the histograms of x agree best. The upright structures, whatever is higher than a metre above the lidar, give
-/// the histograms their edges.
+/// Estimates how far the scene has moved towards the lidar along x since the first sweep, without registration: the
+/// shift that best aligns the histograms of x. Only points more than a metre above the lidar count, because upright
+/// structures give the histograms their edges.
 class ShiftAlongX {
  public:
   explicit ShiftAlongX(const Sweep& first) : first_(histogram_of(first)) {}
@@ -118,7 +118,7 @@ class ShiftAlongX {
   std::vector<double> first_;
 };
 
-/// The capture is said to be of a standing car. It stands for half a second and then pulls away: the raw points say so,
+/// The capture is labelled as a standing car. It stands for half a second and then pulls away: the raw points show it
 /// without any registration, and the car ends a third of a metre ahead.
 TEST_F(RealSensor, ACarThatStandsAndPullsAway) {
   LOAD_OR_SKIP(car, "hdl32e_static_monterey");
@@ -145,7 +145,7 @@ TEST_F(RealSensor, AStandingVlp16ThatReportsAnotherModel) {
   LOAD_OR_SKIP(tripod, "vlp16_static_1200rpm_product21");
   std::vector<OdometryEstimate> run = estimates(*tripod);
   EXPECT_NEAR(static_cast<double>(run.size()), 50.4, 1.0);
-  run.resize(std::min<std::size_t>(run.size(), 30)); // it stands for 1.5 s; then it is moved 0.1 m
+  run.resize(std::min<std::size_t>(run.size(), 30)); // at rest for 1.5 s, then moved by 0.1 m
   expect_still(run, 0.1);
 }
 

@@ -25,7 +25,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// What one odometry leaves to the next.
+/// State that one odometry hands over to the next.
 struct Legacy {
   Pose T_odom_base;
   std::vector<SurfacePoint> map_odom;
@@ -45,7 +45,7 @@ RobotSetup robot_of_restarts() {
   return robot;
 }
 
-/// A robot whose odometry ends every three seconds, and begins anew with the next sweep.
+/// A robot whose odometry ends every three seconds and restarts with the next sweep.
 class Restarts {
  public:
   Restarts(const sim::Scene& scene, const sim::Trajectory& trajectory, Duration duration) {
@@ -97,19 +97,20 @@ class Restarts {
   std::vector<Legacy> legacies_;
 };
 
-/// How a robot goes on that drove unseen for a while.
+/// Outcome of the restarts after gaps without odometry.
 struct Gaps {
   int all = 0;
-  int found = 0, bridged = 0; ///< in the map, or where the wheels say, and there it is: to 50 mm and 2 % of its way
-  int elsewhere = 0;          ///< in the map, and it is not there
-  double worst_sigma = 0;     ///< of those that go on
+  int found = 0, bridged = 0; ///< relocalised in the map, or bridged by the wheels, to 50 mm and 2 % of the distance
+  int elsewhere = 0;          ///< relocalised in the map at a wrong pose
+  double worst_sigma = 0;     ///< of the resumed ones
 };
 
-/// What bridges a gap. Wheels that spin as the odometry ends are in doubt then, and spin on for a moment.
-/// They report a tenth more than they went, too, which the odometry has learned, or which the next one is not told.
+/// Odometry that spans a gap. Spinning wheels (`spun`) are in doubt when the odometry ends, and continue to spin for a
+/// moment. A scale error of 10 % is learned by the first odometry and handed over (`learned`) or withheld
+/// (`not_learned`).
 enum class Wheels { none, sound, spun, learned, not_learned };
 
-/// Every second the odometry ends, and another begins after `gap`.
+/// Ends the odometry every second; another one starts after `gap`.
 Gaps drive_with_gaps(const sim::Scene& scene, const sim::Trajectory& trajectory, Duration gap, Wheels wheels) {
   RobotSetup robot = robot_of_restarts();
   if (wheels == Wheels::learned || wheels == Wheels::not_learned)
@@ -155,7 +156,7 @@ Gaps drive_with_gaps(const sim::Scene& scene, const sim::Trajectory& trajectory,
   return gaps;
 }
 
-/// Half of what the lidar sees there is far, hidden a moment ago, or moves.
+/// Half of the lidar's points there are far, newly visible or moving.
 TEST(Relocation, InAPlantTheRobotIsFoundWhereItIsAndNowhereElse) {
   const sim::World plant = sim::make_urban(1);
   sim::Dice dice(1);
@@ -178,7 +179,7 @@ TEST(Relocation, InATunnelTheRobotIsFoundWhereItIsAndNowhereElse) {
   EXPECT_EQ(restarts.found_where_it_was_long_ago, 0);
 }
 
-/// Nothing tells there how far along it is, so only what is beside it can be refused.
+/// The position along the corridor is unobservable there; only lateral errors can be rejected.
 TEST(Relocation, InABareCorridorTheRobotIsFoundWhereItIsAndNotBesideIt) {
   const sim::Course course = sim::weaving_course(seconds{34}, 1.0, 0.3, 12.0);
   const Restarts restarts(sim::corridor(60, sim::Walls::bare),
@@ -188,7 +189,7 @@ TEST(Relocation, InABareCorridorTheRobotIsFoundWhereItIsAndNotBesideIt) {
   EXPECT_EQ(restarts.found_aside, 0);
 }
 
-/// The watchdog takes six seconds to end a service that hangs, and the robot drives on.
+/// The watchdog takes six seconds to end a hanging service, while the robot drives on.
 TEST(Relocation, WheelsBridgeSixSecondsInAPlantATunnelAndABareCorridor) {
   const sim::World plant = sim::make_urban(1);
   sim::Dice dice(1);
@@ -204,7 +205,7 @@ TEST(Relocation, WheelsBridgeSixSecondsInAPlantATunnelAndABareCorridor) {
   }
 }
 
-/// As far as a tenth more is from where it is, six seconds on, a sweep is not looked for.
+/// Without the learned scale, 10 % of six seconds' travel lies outside the search range.
 TEST(Relocation, WhatWasLearnedOfWheelsIsTrueAfterTheGap) {
   const sim::Trajectory weaving(sim::weaving_course(seconds{29}, 1.0, 0.3, 12.0), sim::weaving_start(5, 0.3, 12.0));
   const Gaps learned = drive_with_gaps(sim::tunnel(60), weaving, seconds{6}, Wheels::learned);
@@ -228,8 +229,8 @@ TEST(Relocation, WheelsThatSpunAsItEndedTellWhereToLook) {
   }
 }
 
-/// How far off it is, a second after it went on, at the most: a robot drives 8 m and stands from 11 s on, its wheels
-/// spin from 12 s on. It ends before and while they do, and another begins after `gap`.
+/// Returns the largest error one second after a restart. The robot drives 8 m and stands from 11 s on; its wheels spin
+/// from 12 s on. The odometry ends before and during the spin, and another starts after `gap`.
 double worst_beside_spinning_wheels_m(const sim::Scene& scene, Duration gap) {
   sim::Course course;
   course.stand(seconds{2}).change_speed(1.0, seconds{1}).straight(7.0).change_speed(0.0, seconds{1}).stand(seconds{9});
@@ -240,7 +241,7 @@ double worst_beside_spinning_wheels_m(const sim::Scene& scene, Duration gap) {
   Odometry odometry(robot.odometry(), robot.motion_sources());
   Whereabouts now;
   std::deque<std::pair<Whereabouts, std::vector<SurfacePoint>>> ended;
-  std::deque<std::pair<Odometry, int>> others; // with the sweeps that each has seen
+  std::deque<std::pair<Odometry, int>> others; // with the number of sweeps processed by each
   int sweeps = 0, judged = 0;
   double worst_m = 0;
   drive(scene, trajectory, robot, seconds{20}, [&](const Sweep& sweep) {
@@ -267,7 +268,7 @@ double worst_beside_spinning_wheels_m(const sim::Scene& scene, Duration gap) {
   return worst_m;
 }
 
-/// They say that it has gone on by a metre each second. The first two sweeps see that it has not.
+/// The wheels report 1 m/s. The first two sweeps show that the robot is at rest.
 TEST(Relocation, WheelsThatSpinDoNotMoveARobotThatStands) {
   for (const Duration gap : {milliseconds{500}, milliseconds{5000}}) {
     EXPECT_LT(worst_beside_spinning_wheels_m(sim::tunnel(60), gap), 0.05);
@@ -284,7 +285,7 @@ TEST(Relocation, WithoutWheelsASecondIsBridgedAndSixAreAFreshStart) {
   EXPECT_EQ(drive_with_gaps(tunnel, weaving, seconds{6}, Wheels::none).elsewhere, 0);
 }
 
-/// The first two seconds of a robot that drives through a tunnel, and where another run has ended that knows it not.
+/// The first two seconds of a drive through a tunnel, and the final state of another run in a different place.
 class AnotherPlace : public testing::Test {
  protected:
   [[nodiscard]] std::vector<OdometryEstimate> go_on_from(const Whereabouts& last,
@@ -309,7 +310,7 @@ class AnotherPlace : public testing::Test {
 };
 
 TEST_F(AnotherPlace, WheelsSayWhereTheRobotIsAllTheSame) {
-  last_.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {-2, 0, 0}}; // they begin at their origin
+  last_.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {-2, 0, 0}}; // each starts at its own origin
   const std::vector<OdometryEstimate> estimates = go_on_from(last_);
   EXPECT_EQ(estimates.front().beginning, Beginning::odometry);
   EXPECT_NEAR(estimates.front().T_odom_base.translation.x(), 9, 0.2);
@@ -404,7 +405,7 @@ TEST_F(AnotherPlace, OdometryThatIsNotHealthyIsAwaited) {
   EXPECT_FALSE(last_.awaits(sensed));
 }
 
-/// Their driver begins at an origin that is no farther away than the robot may have come.
+/// The driver restarts at an origin within the robot's reach.
 TEST(Relocation, InABareCorridorTheSigmaHoldsWhatRestartedWheelsGetWrong) {
   const sim::Trajectory weaving(sim::weaving_course(seconds{15}, 1.0, 0.3, 12.0), sim::weaving_start(5, 0.3, 12.0));
   const RobotSetup robot = robot_of_restarts();
@@ -421,7 +422,7 @@ TEST(Relocation, InABareCorridorTheSigmaHoldsWhatRestartedWheelsGetWrong) {
     } else {
       if (!next) {
         last.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {2.5, 0, 0}} * *last.T_source_base[0];
-        last.stamp -= seconds{3}; // more than that is within what a robot is able to
+        last.stamp -= seconds{3}; // a robot can move farther in that time
         next.emplace(robot.odometry(), robot.motion_sources());
         next->begin_at(last, legacy_of(odometry, last.T_odom_base).map_odom);
       }

@@ -9,7 +9,7 @@ namespace {
 constexpr int kForward = 0;
 constexpr int kHeading = 5;
 
-/// Every axis well seen but one, of which the surfaces say `observability` and nothing of the others.
+/// All axes are well observed but one, which has `observability` and no correlation with the others.
 Matrix6 weak_along(int axis, double observability) {
   Matrix6 seen = 0.3 * Matrix6::Identity();
   seen(axis, axis) = observability;
@@ -34,7 +34,8 @@ TEST(SeenAxes, AnAxisIsLostBelowAHundredthAndBackFromTwoOn) {
   EXPECT_TRUE(sees_after(0.011)) << "once seen";
 }
 
-/// A wall that shows a turn and a shift only together, as one from far aside does, shows neither.
+/// A surface that constrains only a combination of rotation and translation, such as a distant wall to the side, makes
+/// neither observable.
 TEST(SeenAxes, WhatIsOnlySeenTogetherWithAnotherAxisIsNotSeen) {
   SeenAxes axes;
   Matrix6 together = weak_along(kForward, 0.3);

@@ -12,7 +12,7 @@ constexpr SourceId kSource{1}, kOther{0};
 const Vector6 kTwist = (Vector6() << 1.0, 0.1, -0.05, 0.02, -0.03, 0.4).finished();
 const Pose kBegin{so3_exp({0.1, 0.2, 0.3}), {4, 5, 6}}; ///< in the source's own frame
 
-/// The source has moved with kTwist for so long.
+/// The source has moved with kTwist for this time.
 Sweep sweep_at(Duration elapsed) {
   Sweep sweep;
   sweep.end = stamp_from_ns(1'000'000'000) + elapsed;

@@ -17,7 +17,7 @@ namespace {
 
 using std::chrono::seconds;
 
-/// Memory of this process that is really there.
+/// Returns the resident set size of this process.
 std::size_t resident_bytes() {
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);)
@@ -34,7 +34,7 @@ RobotSetup robot() {
   return setup;
 }
 
-/// Ten thousand sweeps: 1000 s at 15 m/s, more street than the map holds.
+/// Ten thousand sweeps: 1000 s at 15 m/s, more street than the map can hold.
 TEST(Soak, FifteenKilometresTakeNoMoreMemoryThanOne) {
   constexpr std::size_t kMostBytes = 200'000'000, kMostGrowth_bytes = 4'000'000;
   constexpr std::size_t kSettled = 2000; // sweeps

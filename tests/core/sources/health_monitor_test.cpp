@@ -17,7 +17,7 @@ const MotionSourceOptions kImu{.name = "imu", .kind = SourceKind::imu, .T_base_s
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// Wheels at 50 Hz that go 1 m/s, and what can become of their samples on the way to the monitor.
+/// Wheels at 50 Hz that report 1 m/s, and the faults of their samples on the way to the monitor.
 class WheelsTest : public testing::Test {
  protected:
   static constexpr Duration kPeriod = milliseconds{20};
@@ -30,7 +30,7 @@ class WheelsTest : public testing::Test {
     return {.stamp = now_, .arrival = now_, .T_source_base = {Eigen::Quaterniond::Identity(), {x_m_, 0, 0}}};
   }
 
-  /// Samples for so long, each made worse by `worse`.
+  /// Feeds samples for this long, each modified by `worse`.
   template <class Worse> void run(Duration duration, const Worse& worse) {
     for (const Stamp end = now_ + duration; now_ < end;) {
       OdometrySample sample = next();
@@ -43,7 +43,7 @@ class WheelsTest : public testing::Test {
     run(duration, [](OdometrySample&) {});
   }
 
-  /// With 2 m/s^2; if the robot stands already, it goes on standing.
+  /// Decelerates at 2 m/s^2, then stands.
   void brake_and_stand(Duration duration) {
     run(duration, [&](OdometrySample& sample) {
       x_m_ = sample.T_source_base.translation.x() = stopping_at_m_ += speed_mps_ * to_seconds(kPeriod);
@@ -51,7 +51,7 @@ class WheelsTest : public testing::Test {
     });
   }
 
-  /// Nothing comes for so long, and the time is told each millisecond.
+  /// Feeds nothing for this long and advances the time every millisecond.
   void be_silent(Duration duration) {
     for (const Stamp end = now_ + duration; now_ < end;) {
       now_ += milliseconds{1};
@@ -61,7 +61,7 @@ class WheelsTest : public testing::Test {
     }
   }
 
-  /// `sweeps` of 100 ms, of which lidar has this to say.
+  /// Feeds `sweeps` of 100 ms with this opinion of the lidar.
   void hear(LidarOpinion opinion, int sweeps, const RegistrationFeedback& feedback = {}) {
     for (int i = 0; i < sweeps; ++i) {
       run(milliseconds{100});
@@ -252,7 +252,7 @@ TEST_F(WheelsTest, ThatStandWhileLidarIsShakenAreNotFrozen) {
   EXPECT_EQ(left_out(HealthReason::frozen), 0U);
 }
 
-/// A sweep at 5 Hz is heard of when the next is there.
+/// At 5 Hz the feedback on a sweep arrives with the next sweep.
 TEST_F(WheelsTest, ThatStoppedBeforeLidarToldOfTheDriveAreNotFrozen) {
   brake_and_stand(milliseconds{520});
   RegistrationFeedback before_the_stop{now_ - milliseconds{220}, now_ - milliseconds{20}};
@@ -288,7 +288,7 @@ TEST_F(WheelsTest, ASingleSampleInTheWrongPlaceCostsNothing) {
 TEST_F(WheelsTest, ThatClaimMoreThanTheRobotIsAbleToAreLostUntilTheyDoNot) {
   double ahead_m = 0.0, more_mps = 0.0;
   const auto speed_up = [&](double by_mps2) {
-    return [&, by_mps2](OdometrySample& sample) { // on the 1 m/s
+    return [&, by_mps2](OdometrySample& sample) { // added to the 1 m/s
       more_mps = std::max(0.0, more_mps + by_mps2 * to_seconds(kPeriod));
       sample.T_source_base.translation.x() += ahead_m += more_mps * to_seconds(kPeriod);
     };
@@ -311,7 +311,7 @@ TEST_F(WheelsTest, ATurnThatNoRobotMakesIsAJump) {
 
 TEST_F(WheelsTest, RoughButHonestMotionIsNoJump) {
   int i = 0;
-  run(seconds{5}, [&](OdometrySample& sample) { // the pose is off by 15 mm and a degree, once this way, once that
+  run(seconds{5}, [&](OdometrySample& sample) { // alternating pose errors of 15 mm and one degree
     sample.T_source_base.translation.y() += ++i % 2 == 0 ? 0.015 : -0.015;
     sample.T_source_base.rotation = so3_exp({0, 0, i % 2 == 0 ? 0.017 : -0.017});
   });
@@ -339,7 +339,7 @@ TEST_F(WheelsTest, AClockThatStepsByAnHourCostsTheirHealthAndIsLearnedAnew) {
   EXPECT_EQ(monitor_.counters().clock_steps, 1U);
 }
 
-/// The step back was taken for a period of minus an hour, which no later sample made good.
+/// Regression: the step back was taken for a period of minus one hour, which no later sample corrected.
 TEST_F(WheelsTest, AClockOfTheHostThatIsSetBackDoesNotChangeTheirTimeout) {
   const Duration timeout = monitor_.timeout();
   run(seconds{4}, [](OdometrySample& sample) { sample.arrival -= hours{1}; });
@@ -467,7 +467,8 @@ TEST_F(ImuTest, NotANumberInAnyPartIsLeftOut) {
   EXPECT_EQ(monitor_.counters().rejected_as(HealthReason::nan), 2U);
 }
 
-/// It stayed in the sum of all turns, in which those of the robot were then lost, and the unit was refused for good.
+/// Regression: the reading stayed in the accumulated rotation, masked the robot's own, and the unit was rejected for
+/// good.
 TEST_F(ImuTest, OneAbsurdReadingCostsNothing) {
   now_ += milliseconds{5};
   EXPECT_FALSE(monitor_.judge(ImuSample{now_, now_, {0, 0, 1e20}, {0, 0, 9.81}, {}}));

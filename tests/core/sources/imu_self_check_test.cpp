@@ -13,7 +13,8 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// A unit at 200 Hz on a robot that sways left and right, seen by lidar every 100 ms; `wrong` tells what it reports.
+/// An IMU at 200 Hz on a robot that sways left and right, with lidar feedback every 100 ms; `wrong` modifies its
+/// samples.
 class ImuSelfCheckTest : public testing::Test {
  protected:
   template <class Wrong> void drive(ImuSelfCheck& check, Duration duration, const Wrong& wrong) {
@@ -24,7 +25,7 @@ class ImuSelfCheckTest : public testing::Test {
       refused_ = check.judge(SourceReading{.stamp = now_, .arrival = now_, .imu = &sample}).has_value();
       if (i % 20 != 19)
         continue;
-      RegistrationFeedback seen; // of the sweep before the last: a live pipeline is that late
+      RegistrationFeedback seen; // of the sweep before the last: latency of a live pipeline
       seen.to = now_ - milliseconds{100};
       seen.from = seen.to - milliseconds{100};
       seen.sees = sees_;
@@ -32,7 +33,7 @@ class ImuSelfCheckTest : public testing::Test {
       check.hear(LidarOpinion::none, seen);
     }
   }
-  /// Turns steadily for so many sweeps.
+  /// Turns steadily for this many sweeps.
   void turn(ImuSelfCheck& check, int sweeps, const Eigen::Vector3d& gyro_radps, const Eigen::Vector3d& lidar_radps) {
     for (int i = 1; i <= 20 * sweeps; ++i) {
       now_ += milliseconds{5};
@@ -85,7 +86,8 @@ TEST_F(ImuSelfCheckTest, AccelerationsInGAreNotUsedButTheGyroIs) {
   EXPECT_NE(check.verdict().find("in g"), std::string_view::npos);
 }
 
-/// They were used until gravity was weighed: a second of free fall at the start of a drive.
+/// Regression: they were used before gravity was estimated, which looked like a second of free fall at the start of a
+/// drive.
 TEST_F(ImuSelfCheckTest, AccelerationsInGAreNotTrustedBeforeGravityIsWeighed) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   EXPECT_FALSE(check.trusts_accelerometer()) << "nothing is known of it";
@@ -156,7 +158,7 @@ TEST_F(ImuSelfCheckTest, AGyroThatWasSetAsideIsUsedAgainWhenLidarAgrees) {
   stand(check);
   turn(check, 2, {0, 0.3, 0}, {0, -0.1, 0});
   EXPECT_TRUE(refused_);
-  check.forget(); // as the monitor tells it then
+  check.forget(); // as the monitor calls it at that point
   stand(check);
   turn(check, 5, {0, 0.3, 0}, {0, 0.3, 0});
   EXPECT_FALSE(refused_);
@@ -181,7 +183,7 @@ TEST_F(ImuSelfCheckTest, AGyroIsTriedAgainWhereLidarSeesNothingClearWithoutItBut
   EXPECT_EQ(check.verdict().find("wrong"), std::string_view::npos) << "who is right is not known";
 }
 
-/// A robot stands, and lidar follows the people who walk around it: the gyro was said to be mounted wrongly.
+/// Regression: the robot stands and lidar follows people who walk around it; the gyro was reported as mounted wrongly.
 TEST_F(ImuSelfCheckTest, AGyroThatStandsStillWhileLidarTurnsIsNotCalledWrong) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   stand(check);
@@ -197,7 +199,7 @@ TEST_F(ImuSelfCheckTest, AGyroThatStandsStillWhileLidarTurnsIsNotCalledWrong) {
   EXPECT_EQ(check.verdict().find("other way"), std::string_view::npos) << "two readings of noise have any sign";
 }
 
-/// Nobody uses it in the second after a loss.
+/// The gyro is unused in the second after a loss.
 TEST_F(ImuSelfCheckTest, WhatLidarSeesAloneAfterALossSpeaksAgainstNoGyro) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   stand(check);

@@ -15,7 +15,8 @@ using std::chrono::milliseconds;
 const std::vector<MotionSourceOptions> kWheelsImuVisual{
     {"wheels", SourceKind::odometry, {}}, {"imu", SourceKind::imu, {}}, {"visual", SourceKind::odometry, {}}};
 
-/// Wheels that say 1 m/s and no turn, a gyro that says 1 rad/s, a visual odometry that says 2 m/s and 2 rad/s.
+/// Wheels that report 1 m/s and no rotation, a gyro that reports 1 rad/s, visual odometry that reports 2 m/s and 2
+/// rad/s.
 class MotionSourcesTest : public testing::Test {
  protected:
   static void feed(MotionSources& sources, std::size_t source, int from_ms, int to_ms) {
@@ -26,7 +27,7 @@ class MotionSourcesTest : public testing::Test {
         sources.add(SourceId{0}, OdometrySample{stamp, stamp, {Eigen::Quaterniond::Identity(), {t_s, 0, 0}}, 1.0});
       else if (source == 1)
         sources.add(SourceId{1},
-                    ImuSample{stamp, stamp, {0, 0, 1.0}, {1e-6 * ms, 0, 9.81}, {}}); // never twice the same
+                    ImuSample{stamp, stamp, {0, 0, 1.0}, {1e-6 * ms, 0, 9.81}, {}}); // no two samples are equal
       else
         sources.add(SourceId{2}, OdometrySample{stamp, stamp, {so3_exp({0, 0, 2 * t_s}), {2 * t_s, 0, 0}}, 1.0});
     }
@@ -78,8 +79,8 @@ TEST_F(MotionSourcesTest, ASilentSourceIsNotChosen) {
   EXPECT_EQ(sources.choose(silent_since + MotionTrack::kMaxExtrapolation + milliseconds{1}).translation, SourceId{2});
 }
 
-// Its track stands between one sample's extrapolation and the next sample: half of a sweep would count as standing
-// still.
+// Its track has zero velocity between the end of a sample's extrapolation and the next sample: half of a sweep would
+// count as standstill.
 TEST_F(MotionSourcesTest, ASourceSlowerThanTracksAreExtrapolatedIsNotChosen) {
   MotionSources sources(kWheelsImuVisual, Fusion::queue);
   for (int ms = 0; ms <= 1000; ms += 100)
@@ -177,7 +178,7 @@ TEST_F(MotionSourcesTest, EachChangeOfHealthIsToldOnceWithItsSource) {
   EXPECT_TRUE(events[1].healthy);
 }
 
-/// Set back, it cost them as long as that: their samples were older than the last ones.
+/// Regression: a step back cost them as much time as the step, because their samples were older than the last ones.
 TEST_F(MotionSourcesTest, AClockOfTheHostThatIsSetCostsThemTwoSeconds) {
   for (const int step_ms : {-3'600'000, 3'600'000}) {
     MotionSources sources(kWheelsImuVisual, Fusion::combined);

@@ -42,7 +42,7 @@ TEST(MotionTrack, PosesBetweenSamplesAreInterpolated) {
   EXPECT_NEAR(so3_log(T->rotation).z(), 0.1, 1e-12);
 }
 
-/// 0.1 ms apart two poses 2 cm apart would be 200 m/s.
+/// Two poses 2 cm and 0.1 ms apart would mean 200 m/s.
 TEST(MotionTrack, StampThatIsOffByAMomentMakesNoVelocity) {
   MotionTrack track = odometry_track();
   for (int i = 0; i < 5; ++i)
@@ -153,7 +153,7 @@ TEST(MotionTrack, AForceThatIsFeltOnceIsFeltEarlyAndLate) {
   EXPECT_NEAR(force->late_base_mps2.x(), 1.0, 1e-12);
 }
 
-/// The mean over the samples inside was that of another time, off by half a period.
+/// Regression: the mean over the samples inside the sweep was shifted by half a period.
 TEST(MotionTrack, TheForceOfASlowUnitIsIntegratedOverExactlyTheSweep) {
   MotionTrack track = imu_track();
   for (int ms = 30; ms <= 330; ms += 50)
@@ -167,7 +167,7 @@ TEST(MotionTrack, TheForceOfASlowUnitIsIntegratedOverExactlyTheSweep) {
 
 TEST(MotionTrack, TheNoiseOfAForceIsMeasured) {
   MotionTrack track = imu_track();
-  for (int i = 0; i <= 100; ++i) // 1.5 m/s^2 up and down at 100 Hz, of which the second differences are 6 m/s^2
+  for (int i = 0; i <= 100; ++i) // 1.5 m/s^2 alternating at 100 Hz, with second differences of 6 m/s^2
     track.add(imu(at_ms(10 * i), {0, 0, 0}, {i % 2 == 0 ? 1.5 : -1.5, 0, 9.81}));
   const auto force = track.specific_force(at_ms(900), at_ms(1000));
   ASSERT_TRUE(force);
@@ -179,7 +179,7 @@ TEST(MotionTrack, AnAttitudeSaysWhichWayIsUpInTheBaseFrame) {
   MotionTrack track = imu_track({from_rpy_rad({0, 0, std::numbers::pi / 2}), {0, 0, 0}});
   ImuSample sample;
   sample.stamp = sample.arrival = at_ms(10);
-  sample.attitude = from_rpy_rad({0.1, 0, 1.0}); // rolls about what is the base's y axis
+  sample.attitude = from_rpy_rad({0.1, 0, 1.0}); // roll of the unit is pitch of the base
   track.add(sample);
   const auto up = track.up_base(at_ms(0), at_ms(20));
   ASSERT_TRUE(up);

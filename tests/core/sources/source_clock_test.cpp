@@ -12,7 +12,7 @@ using std::chrono::seconds;
 
 constexpr Stamp today_ms(int ms) { return stamp_from_ns(1'700'000'000'000'000'000) + milliseconds{ms}; }
 
-/// A sample every 20 ms that takes 3 ms to arrive, from a source whose clock is `ahead` of the host's.
+/// A sample every 20 ms with 3 ms of latency, from a source whose clock is `ahead` of the host's.
 std::optional<Stamp> sample(SourceClock& clock, int index, Duration ahead) {
   const Stamp measured = today_ms(20 * index);
   return clock.on_host_clock(measured + ahead, measured + milliseconds{3});
@@ -41,7 +41,7 @@ TEST(SourceClock, AStepIsLearnedFromFiveSamplesAndTakenOut) {
   }
 }
 
-/// Ten hours at 100 ppm are 3.6 s.
+/// 100 ppm over ten hours are 3.6 s.
 TEST(SourceClock, AClockThatRunsFasterOrSlowerIsFollowed) {
   for (const double rate : {100e-6, -100e-6, 20e-6, -20e-6}) {
     for (const Duration ahead : {Duration{}, Duration{hours{3}}}) {
@@ -62,7 +62,7 @@ TEST(SourceClock, AClockThatRunsFasterOrSlowerIsFollowed) {
   }
 }
 
-/// A way that becomes longer at once is a delay, and no clock.
+/// A sudden increase of the latency is a delay, not a clock step.
 TEST(SourceClock, ADelayIsNotFollowed) {
   SourceClock clock;
   for (int i = 0; i < 600; ++i) {
@@ -85,7 +85,7 @@ TEST(SourceClock, AClockThatIsSetRightAgainIsLearnedAnew) {
   EXPECT_EQ(clock.steps(), 2U);
 }
 
-/// What somebody else's samples took on their way, before the clock stepped, is no business of those that come now.
+/// Latencies of another publisher, from before a clock step, do not apply to the current samples.
 TEST(SourceClock, WhoComesBackToTheHostsClockIsTakenAtItsWord) {
   SourceClock clock;
   int i = 0;

@@ -25,7 +25,7 @@ constexpr Duration kTurn = milliseconds{100};
 constexpr Duration kWay = milliseconds{4};
 constexpr std::size_t kColumns = 1800, kRings = 16;
 
-/// A turn in a round room of 5 m, clockwise from the rear as lidars turn, rings two degrees apart.
+/// A turn in a round room of 5 m, clockwise from the rear as real lidars rotate, with rings two degrees apart.
 CloudTurn round_room(Stamp begin = kBegin) {
   CloudTurn turn{begin, {}};
   for (std::size_t column = 0; column < kColumns; ++column) {
@@ -54,7 +54,7 @@ struct Fired {
   LidarReturn what;
 };
 
-/// All returns; packets are as LidarPacket promises.
+/// Returns all returns; checks the invariants of LidarPacket.
 std::vector<Fired> drain(CloudDecoder& decoder) {
   std::vector<Fired> all;
   std::optional<LidarPacket::Cloud> cloud;
@@ -78,7 +78,7 @@ std::vector<Fired> drain(CloudDecoder& decoder) {
   return all;
 }
 
-/// Each return of the turn is there once, to a microsecond of its time and with its ring.
+/// Expects each return of the turn once, with its time to 1 us and its ring.
 void expect_all_of(const CloudTurn& turn, std::vector<Fired> fired) {
   ASSERT_EQ(fired.size(), turn.points.size());
   const auto key = [](Stamp stamp, int ring) { return std::pair{ring, stamp}; };
@@ -93,7 +93,7 @@ void expect_all_of(const CloudTurn& turn, std::vector<Fired> fired) {
   }
 }
 
-/// The first columns of a turn of a lidar with 128 lasers.
+/// Returns the first columns of a turn of a lidar with 128 lasers.
 CloudTurn many_lasers(std::size_t columns, Stamp begin = kBegin) {
   CloudTurn turn{begin, {}};
   for (std::size_t column = 0; column < columns; ++column)
@@ -107,7 +107,7 @@ CloudTurn many_lasers(std::size_t columns, Stamp begin = kBegin) {
   return turn;
 }
 
-/// Times of points since the header's stamp, in that unit.
+/// Returns a cloud with point times relative to the header's stamp, in this unit.
 OwnCloud timed_in(double unit_s, const CloudTurn& turn) {
   OwnCloud cloud = cloud_of(turn, CloudKind::bare);
   add_field(cloud, "ring", Type::uint16);
@@ -174,7 +174,7 @@ TEST(CloudDecoder, UnitIsToldFromTheNumbers) {
   }
 }
 
-/// A lidar that looks into the sky sees a few columns only: 3 of them span 194 us, 5 span 388 us.
+/// A lidar that faces the sky has a few columns only: 3 of them span 194 us, 5 span 388 us.
 TEST(CloudDecoder, FewColumnsAreInTheUnitOfTheCloudsBefore) {
   for (const double unit_s : {1.0, 1e-3, 1e-6, 1e-9}) {
     const auto tested = decoder();
@@ -188,7 +188,7 @@ TEST(CloudDecoder, FewColumnsAreInTheUnitOfTheCloudsBefore) {
   }
 }
 
-/// Shorter than a turn in the finest unit, or in the coarsest, is short and no other unit's.
+/// A span below one turn in the finest or the coarsest unit is a partial turn, not another unit.
 TEST(CloudDecoder, FewColumnsOfAFirstCloudAreNoDoubt) {
   for (const auto& [unit_s, columns] : {std::pair{1e-9, 5U}, {1e-9, 4U}, {1.0, 2U}, {1.0, 5U}}) {
     const auto tested = decoder();
@@ -200,7 +200,7 @@ TEST(CloudDecoder, FewColumnsOfAFirstCloudAreNoDoubt) {
   }
 }
 
-/// Several turns in one cloud look like one in a finer unit.
+/// Several turns in one cloud look like one turn in a finer unit.
 TEST(CloudDecoder, WrongUnitIsLeftBehind) {
   const auto tested = decoder();
   CloudTurn turns = round_room();
@@ -215,7 +215,8 @@ TEST(CloudDecoder, WrongUnitIsLeftBehind) {
   }
 }
 
-/// Plays a turn that arrives `after` its begin, stamped at its begin; when its first point is, from there.
+/// Decodes a turn that is stamped with its begin and arrives `after` it. Returns the time of its first point relative
+/// to the begin.
 std::optional<Duration> first_point(CloudDecoder& decoder, int turn, Duration after) {
   const CloudTurn room = round_room(kBegin + turn * kTurn);
   if (begin(decoder, cloud_of(room, CloudKind::velodyne_start), room.begin + after))
@@ -321,7 +322,7 @@ TEST(CloudDecoder, WhatDoesNotFitItsBytesIsRefused) {
   EXPECT_EQ(tested->counters()[CloudError::fields], 6U);
 }
 
-/// A time or a ring that cannot be read is not there; the points are.
+/// Fields of unknown type are ignored; the points are used.
 TEST(CloudDecoder, FieldOfUnknownTypeIsNone) {
   OwnCloud cloud = cloud_of(round_room(), CloudKind::velodyne_start);
   cloud.fields[5].type = Type{77};
@@ -342,7 +343,7 @@ TEST(CloudDecoder, DuplicatesAreRefusedAndLateOnesCounted) {
   EXPECT_EQ(tested->counters()[CloudError::duplicate], 1U);
 }
 
-/// A driver whose stamps stand still, or count whole seconds, sends no duplicates.
+/// Drivers whose stamps are constant or whole seconds send no duplicates.
 TEST(CloudDecoder, OtherPointsUnderTheSameStampAreNoDuplicate) {
   const auto tested = decoder();
   OwnCloud cloud = cloud_of(round_room(), CloudKind::velodyne_start);
@@ -353,7 +354,7 @@ TEST(CloudDecoder, OtherPointsUnderTheSameStampAreNoDuplicate) {
   EXPECT_EQ(begin(*tested, cloud), std::nullopt);
 }
 
-/// Too few to tell a unit from have that of the clouds before, however far from the header they count.
+/// Clouds with too few points to determine the unit use that of the clouds before, however large their times are.
 TEST(CloudDecoder, AbsurdTimesOfAFewPointsAreBorne) {
   const auto tested = decoder();
   ASSERT_EQ(begin(*tested, cloud_of(round_room(), CloudKind::velodyne_start)), std::nullopt);
@@ -369,10 +370,10 @@ TEST(CloudDecoder, AbsurdTimesOfAFewPointsAreBorne) {
   }
 }
 
-/// What gives back where it has been does not turn: the points of a cloud without times are of one instant.
+/// Azimuths that go back indicate no rotating lidar: all points of a cloud without times have its stamp.
 TEST(CloudDecoder, WhatDoesNotTurnHasNoTimesByAzimuth) {
   CloudTurn turn = round_room();
-  for (std::size_t i = 0; i < turn.points.size(); ++i) // to and fro
+  for (std::size_t i = 0; i < turn.points.size(); ++i) // back and forth
     if (i / kRings % 20 >= 10)
       turn.points[i].p_m = turn.points[i - 2 * kRings * (i / kRings % 20 - 10) - kRings].p_m;
   OwnCloud cloud = cloud_of(turn, CloudKind::velodyne_start);

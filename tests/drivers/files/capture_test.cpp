@@ -36,7 +36,7 @@ Capture opened(const std::filesystem::path& file) {
   return std::move(*capture);
 }
 
-/// The payload of the single datagram in a file of one frame, empty optional if there is none.
+/// Returns the payload of the single datagram in a file of one frame; nothing if there is none.
 std::optional<Bytes> payload_in(int link_type, const Bytes& frame) {
   const TemporaryFile file{"single.pcap"};
   { PcapWriter::open(file.path(), link_type)->write_frame(stamp_from_ns(1), frame); }
@@ -48,7 +48,7 @@ std::optional<Bytes> payload_in(int link_type, const Bytes& frame) {
   return Bytes{datagram->payload.begin(), datagram->payload.end()};
 }
 
-/// The counters after reading an Ethernet capture of one frame.
+/// Returns the counters after reading an Ethernet capture of one frame.
 Capture::Stats stats_after(const Bytes& frame) {
   const TemporaryFile file{"single.pcap"};
   { PcapWriter::open(file.path())->write_frame(stamp_from_ns(1), frame); }
@@ -64,7 +64,7 @@ Bytes with_16(Bytes bytes, std::size_t at, std::uint16_t value) {
   return bytes;
 }
 
-// Pcapng by hand: libpcap reads it, but does not write it.
+// Builds pcapng by hand: libpcap reads but does not write it.
 void append_little_endian(Bytes& bytes, std::uint64_t value, int count) {
   for (int shift = 0; shift < 8 * count; shift += 8) {
     bytes.push_back(static_cast<std::byte>(value >> shift & 0xFF));
@@ -84,7 +84,7 @@ Bytes pcapng_header(std::uint16_t link_type) {
   append_little_endian(section, 0x1A2B3C4D, 4);
   append_little_endian(section, 1, 2); // version 1.0
   append_little_endian(section, 0, 2);
-  append_little_endian(section, ~0ULL, 8); // length of the section not given
+  append_little_endian(section, ~0ULL, 8); // section length unspecified
   Bytes interface;
   append_little_endian(interface, link_type, 2);
   append_little_endian(interface, 0, 2);
@@ -185,7 +185,7 @@ TEST(Capture, IpOptionsAndEthernetPaddingAreNotPayload) {
   Bytes padded = ethernet(ipv4_udp({}, payload));
   padded.resize(60);
   EXPECT_EQ(payload_in(DLT_EN10MB, padded), payload);
-  const Bytes options(40, std::byte{1}); // as many no-operations as fit
+  const Bytes options(40, std::byte{1}); // maximum length, all no-operations
   EXPECT_EQ(payload_in(DLT_EN10MB, ethernet(ipv4_udp({}, payload, options))), payload);
 }
 
@@ -205,7 +205,7 @@ TEST(Capture, WhatIsNotAnIpv4UdpDatagramIsCountedByKind) {
   EXPECT_EQ(raw.error(), FrameError::ipv6);
 }
 
-/// The fragments of an IP packet, each with so many bytes of what stands behind the header.
+/// Splits an IP packet into fragments of this many payload bytes.
 std::vector<Bytes> fragments_of(const Bytes& packet, std::size_t bytes, std::uint16_t id) {
   constexpr std::size_t kHeader = 20;
   std::vector<Bytes> fragments;
@@ -231,13 +231,13 @@ TEST(Capture, FragmentsAreJoinedInWhateverOrderTheyCome) {
   {
     PcapWriter writer = std::move(*PcapWriter::open(file.path()));
     std::int64_t ns = 0;
-    for (const std::size_t i : {5U, 0U, 3U, 1U}) // of two packets in turns, the last one first
+    for (const std::size_t i : {5U, 0U, 3U, 1U}) // two packets interleaved, the last fragment first
       writer.write_frame(stamp_from_ns(++ns), ethernet(first[i]));
     for (const Bytes& fragment : second)
       writer.write_frame(stamp_from_ns(++ns), ethernet(fragment));
     writer.write_frame(stamp_from_ns(++ns), ethernet(first[2]));
     writer.write_frame(stamp_from_ns(++ns), ethernet(first[4]));
-    for (const Bytes& fragment : first) // the same number once more
+    for (const Bytes& fragment : first) // same identification again
       writer.write_frame(stamp_from_ns(++ns), ethernet(fragment));
   }
   Capture capture = opened(file.path());
@@ -288,8 +288,8 @@ TEST(Capture, FragmentsWithoutTheOthersAreToldWithTheRemedy) {
   {
     const Bytes packet = ipv4_udp({}, payload_of(100));
     PcapWriter writer = std::move(*PcapWriter::open(file.path()));
-    writer.write_frame(stamp_from_ns(1), ethernet(with_16(packet, 6, 0x2000))); // the first: more fragments
-    writer.write_frame(stamp_from_ns(2), ethernet(with_16(packet, 6, 0x000D))); // the last: an offset
+    writer.write_frame(stamp_from_ns(1), ethernet(with_16(packet, 6, 0x2000))); // first: more fragments
+    writer.write_frame(stamp_from_ns(2), ethernet(with_16(packet, 6, 0x000D))); // last: offset
     writer.write_frame(stamp_from_ns(3), ethernet(packet));
   }
   Capture capture = opened(file.path());
@@ -310,7 +310,7 @@ TEST(Capture, LyingLengthsAreMalformedNotRead) {
     return ethernet(lying);
   };
   EXPECT_EQ(stats_after(ip_header_words(4)).malformed, 1u);
-  EXPECT_EQ(stats_after(ip_header_words(15)).malformed, 1u); // reads a length of the payload that cannot be
+  EXPECT_EQ(stats_after(ip_header_words(15)).malformed, 1u); // implies an impossible payload length
   EXPECT_EQ(stats_after(ethernet(with_16(packet, 2, 19))).malformed, 1u);
   EXPECT_EQ(stats_after(ethernet(with_16(packet, 2, 27))).malformed, 1u);   // no room for the UDP header
   EXPECT_EQ(stats_after(ethernet(with_16(packet, 24, 109))).malformed, 1u); // UDP longer than IP
@@ -321,7 +321,7 @@ TEST(Capture, LyingLengthsAreMalformedNotRead) {
 }
 
 /// A VLP-16 of 2014 sends position packets whose IP header claims the 1234 bytes of a data packet; the UDP length is
-/// right.
+/// correct.
 TEST(Capture, IpLengthBeyondTheFrameIsForgivenWhereTheUdpLengthFits) {
   const Bytes payload = payload_of(512);
   const Bytes packet = with_16(ipv4_udp({}, payload), 2, 1234);
@@ -514,7 +514,7 @@ TEST(Capture, RandomBytesNeverCrashAndEveryFrameIsAccountedFor) {
   }
 }
 
-/// Every single-byte corruption of a good frame: never a crash, never a payload outside the frame.
+/// Every single-byte corruption of a valid frame: no crash, no payload outside the frame.
 TEST(Capture, CorruptedHeadersNeverReachBeyondTheFrame) {
   const Bytes good = ethernet(ipv4_udp({}, payload_of(50)));
   for (std::size_t at = 0; at < 14 + 20 + 8; ++at) {

@@ -40,7 +40,7 @@ Expected<std::vector<OdometrySample>, std::string> odometry_from(const std::stri
   return read<OdometrySample>(file.path());
 }
 
-/// The odometry of `text` with the meta file `meta` beside it.
+/// Reads the odometry `text` with the meta file `meta`.
 Expected<std::vector<OdometrySample>, std::string> odometry_from(const std::string& text, const std::string& meta) {
   const TemporaryFile file{"wio.tum", bytes_of(text)};
   const TemporaryFile meta_file{"wio.meta.csv", bytes_of(meta)};
@@ -78,7 +78,7 @@ TEST(MotionFiles, OdometryRowsHoldPosesWithTheRotationsRealPartLast) {
 TEST(MotionFiles, TumTimesKeepTheirNanoseconds) {
   constexpr auto kCases = std::to_array<std::pair<const char*, std::int64_t>>({
       {"1403636579.763555527", 1403636579763555527},
-      {"1.403636579763555527e+09", 1403636579763555527}, // as NumPy and evo write it
+      {"1.403636579763555527e+09", 1403636579763555527}, // format of NumPy and evo
       {"1403636579763555527E-9", 1403636579763555527},
       {"1403636579.7635555274", 1403636579763555527},
       {"1403636579.7635555275", 1403636579763555528},
@@ -167,7 +167,7 @@ TEST(MotionFiles, MetaFileGivesArrivalAndCovarianceAndItsArrivalTheOrder) {
   EXPECT_EQ((*samples)[0].covariance_scale, 7.5);
   EXPECT_EQ(to_ns((*samples)[0].arrival), 1100000500);
   EXPECT_EQ(to_ns((*samples)[0].stamp), 1100000000);
-  EXPECT_EQ((*samples)[1].T_source_base.translation.x(), 3.0); // not mentioned: arrival = stamp
+  EXPECT_EQ((*samples)[1].T_source_base.translation.x(), 3.0); // no meta row: arrival = stamp
   EXPECT_EQ((*samples)[2].T_source_base.translation.x(), 1.0);
   EXPECT_EQ(to_ns((*samples)[2].arrival), 1250000000);
 }
@@ -204,7 +204,7 @@ TEST(MotionFiles, AnHourOfImuIsReadInSeconds) {
   ASSERT_TRUE(samples) << samples.error();
   EXPECT_EQ(samples->size(), 720'000u);
   RecordProperty("seconds", std::to_string(elapsed.count()));
-  EXPECT_LT(elapsed.count(), 20.0); // 0.3 s when optimised and alone; sanitizers and neighbours slow it down
+  EXPECT_LT(elapsed.count(), 20.0); // 0.3 s when optimised and alone; sanitizers and other load slow it down
 }
 
 class CaptureFolders : public testing::Test {
@@ -345,7 +345,7 @@ TEST(MotionFiles, TrajectoryThatCannotBeMeasuredByIsRefusedWithItsLine) {
   EXPECT_TRUE(contains(error_of(trajectory_from("t x y z qx qy qz qw\n")), "gt.tum: holds no pose"));
 }
 
-/// The stamps in nanoseconds, in the order in which they come.
+/// Returns the stamps in ns, in reading order.
 std::vector<std::int64_t> stamps_of(MotionSamples<OdometrySample> samples) {
   std::vector<std::int64_t> stamps;
   for (; samples.front() != nullptr; samples.pop())
@@ -381,7 +381,7 @@ TEST(MotionSamples, AreKnownToBeGoodBeforeTheFirstIsUsed) {
   EXPECT_TRUE(contains(error_of(MotionSamples<OdometrySample>::open("/nowhere/wio.tum")), "cannot be read"));
 }
 
-/// The computer was switched off, and each file was on the disk up to another point.
+/// After a power failure each file may be truncated at a different row.
 TEST(MotionSamples, AreReadAsFarAsABrokenRecordingGoes) {
   const std::string rows = row_at("1") + row_at("2") + row_at("3");
   const std::string meta = "1000000000,1000000001,1\n2000000000,2000000002,2\n3000000000,3000000003,3\n";
@@ -429,7 +429,7 @@ TEST(MotionSamples, PiecesFollowEachOtherEachWithItsOwnMeta) {
   EXPECT_TRUE(contains(error_of(MotionSamples<OdometrySample>::open({a.path(), bad.path()})), "bad.tum:1: 2 columns"));
 }
 
-/// The clock was set back between two samples: no reason to refuse what follows, in one file or in two.
+/// A backward step of the clock between two samples must not reject the rest, in one file or across two.
 TEST(MotionSamples, PipeIsReadOnce) {
   const test::TemporaryFolder folder;
   const std::filesystem::path pipe = folder / "wio.tum";

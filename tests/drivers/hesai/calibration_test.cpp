@@ -98,7 +98,7 @@ TEST_F(HesaiCalibration, OfAnotherNumberOfLasersIsRefusedAtTheStart) {
   EXPECT_NE(taken->hesai(), nullptr) << "such a file is one of Hesai's";
 }
 
-/// The design values are near what a unit was measured to have: a wrong order of the lasers would be degrees off.
+/// The design values are close to the measured ones of a unit: a wrong order of the lasers would be degrees off.
 TEST_F(HesaiCalibration, OfRealUnitsAreNearTheBuiltInTables) {
   const auto folder = test::test_data() / "hesai/calibration";
   if (!std::filesystem::exists(folder))

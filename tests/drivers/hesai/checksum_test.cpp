@@ -10,7 +10,7 @@
 namespace locus::hesai {
 namespace {
 
-/// Bit by bit, as the definition has it.
+/// Reference implementation, bit by bit.
 std::uint32_t slowly(std::span<const std::byte> bytes) {
   std::uint32_t crc = 0xFFFF'FFFF;
   for (const std::byte byte : bytes) {
@@ -21,7 +21,7 @@ std::uint32_t slowly(std::span<const std::byte> bytes) {
   return crc;
 }
 
-/// The check value that catalogues of CRCs have for CRC-32/MPEG-2.
+/// Check value of CRC-32/MPEG-2 in catalogues of CRCs.
 TEST(HesaiChecksum, OfTheUsualDigits) {
   constexpr std::string_view kDigits = "123456789";
   EXPECT_EQ(crc32(std::as_bytes(std::span{kDigits})), 0x0376'E6E7U);

@@ -21,7 +21,7 @@ using std::chrono::seconds;
 using test::HesaiTestPacket;
 
 constexpr std::uint8_t kStrongest = 0x37, kDual = 0x39, kTriple = 0x3D;
-constexpr std::uint16_t kTenMetres = 2500; // of 4 mm
+constexpr std::uint16_t kTenMetres = 2500; // in units of 4 mm
 
 std::vector<Model> all_models() {
   std::vector<Model> models;
@@ -30,7 +30,7 @@ std::vector<Model> all_models() {
   return models;
 }
 
-/// The one return of a packet.
+/// Decodes a packet and returns its only return.
 LidarReturn only_return(Decoder& decoder, const HesaiTestPacket& bytes) {
   LidarPacket packet;
   EXPECT_EQ(decoder.decode(bytes.payload(), packet), std::nullopt);
@@ -41,7 +41,7 @@ LidarReturn only_return(Decoder& decoder, const HesaiTestPacket& bytes) {
 
 class HesaiModel : public testing::TestWithParam<Model> {};
 
-/// By the manual: azimuth of the block, the laser's own, and what the lidar turns until it fires.
+/// Direction by the manual: azimuth of the block, the laser's own offset, and the rotation until it fires.
 TEST_P(HesaiModel, EachReturnHasDirectionAndTimeOfItsOwnFiring) {
   const Model model = GetParam();
   const ModelSpec& its = spec(model);
@@ -69,7 +69,7 @@ TEST_P(HesaiModel, EachReturnHasDirectionAndTimeOfItsOwnFiring) {
     EXPECT_FLOAT_EQ(found.range_m, 10.0F);
     EXPECT_EQ(found.ring, laser.ring);
     EXPECT_EQ(found.intensity, 77);
-    // Its time is that of the block and of the channel in it, whatever the packet's first firing is.
+    // The time is that of the block and of its channel, independent of the packet's first firing.
     const Duration to_last_block =
         its.time_of_last_column ? Duration{0} : static_cast<Duration::rep>(last_block) * firings.column_duration;
     EXPECT_EQ(decoder.time() + Duration{found.offset_ns},
@@ -158,14 +158,14 @@ TEST(HesaiDecoder, TimeIsThatOfTheFirstFiring) {
     EXPECT_EQ(decoder.decode(bytes.payload(), packet), std::nullopt);
     return decoder.time() - HesaiTestPacket::kTime;
   };
-  // Pandar40P: the tenth block ends 28.58 us before the packet's time, and begins with laser 8, 54.67 us before that.
+  // Pandar40P: the tenth block ends 28.58 us before the packet's time, and begins with laser 8, 54.67 us earlier.
   EXPECT_EQ(time_of(Model::pandar40p, kStrongest), nanoseconds{-28'580 - 9 * 55'560 - 54'670});
   EXPECT_EQ(time_of(Model::pandar40p, kDual), nanoseconds{-28'580 - 4 * 55'560 - 54'670});
   // XT32: the eighth block is triggered at the packet's time, and fires 5.632 + 0.368 us later.
   EXPECT_EQ(time_of(Model::xt32, kStrongest), nanoseconds{-7 * 50'000 + 6'000});
   EXPECT_EQ(time_of(Model::xt32, kDual), nanoseconds{-3 * 50'000 + 6'000});
   EXPECT_EQ(time_of(Model::xt32m, kTriple), nanoseconds{-1 * 50'000 + 6'000});
-  // QT128: the first block begins 9 us after it, its first laser 0.6 us later.
+  // QT128: the first block begins 9 us after the packet's time, its first laser 0.6 us later.
   EXPECT_EQ(time_of(Model::qt128, kStrongest), nanoseconds{9'600});
   EXPECT_EQ(time_of(Model::qt128, kDual), nanoseconds{9'600});
 }
@@ -194,7 +194,7 @@ TEST(HesaiDecoder, ReturnAtTheDistanceOfAnotherOfItsPulseIsNone) {
 
 TEST(HesaiDecoder, WhatIsNearerThanTheModelIsSpecifiedForIsNone) {
   for (const auto& [distance, returns] : {std::pair{124, 0U}, std::pair{125, 1U}, std::pair{1, 0U}}) {
-    HesaiTestPacket bytes{Model::xt32m, kStrongest}; // from 0.5 m on
+    HesaiTestPacket bytes{Model::xt32m, kStrongest}; // minimum range 0.5 m
     bytes.set_return(0, 0, static_cast<std::uint16_t>(distance));
     Decoder decoder;
     LidarPacket packet;
@@ -220,7 +220,7 @@ TEST(HesaiDecoder, UnitOfDistanceIsThatOfTheHeader) {
 TEST(HesaiDecoder, DateIsReadInBothForms) {
   Decoder decoder;
   LidarPacket packet;
-  HesaiTestPacket bytes{Model::xt32, kStrongest, seconds{1'709'251'199}}; // the last of 29 February 2024
+  HesaiTestPacket bytes{Model::xt32, kStrongest, seconds{1'709'251'199}}; // last second of 29 February 2024
   ASSERT_EQ(decoder.decode(bytes.payload(), packet), std::nullopt);
   const Duration to_first = decoder.time() - seconds{1'709'251'199};
   bytes.set_microseconds(1'000'000);
@@ -233,7 +233,7 @@ TEST(HesaiDecoder, DateIsReadInBothForms) {
   EXPECT_EQ(decoder.time() - to_first, seconds{1'700'000'000} + microseconds{7});
 }
 
-/// Models differ in it, and firmware of the same model does.
+/// The epoch differs between models, and between firmware versions of a model.
 TEST(HesaiDecoder, YearCountsFrom1900OrFrom2000) {
   for (std::size_t i = 0; i < kModels; ++i)
     for (const int year_zero : {1900, 2000}) {
@@ -249,7 +249,7 @@ TEST(HesaiDecoder, YearCountsFrom1900OrFrom2000) {
     }
 }
 
-/// Without GPS or PTP a lidar may count from the year 2000, whose byte is 0 where years count from there.
+/// Without GPS or PTP a lidar may count from the year 2000, whose byte is 0 if years are counted from there.
 TEST(HesaiDecoder, UnlockedClockFrom2000IsRead) {
   HesaiTestPacket bytes{Model::pandar40p, kStrongest};
   for (std::size_t i = 0; i < 6; ++i)
@@ -325,7 +325,7 @@ TEST(HesaiDecoder, CalibrationIsThatOfAsManyLasers) {
   EXPECT_EQ(decoder.decode(sixteen.payload(), packet), PacketError::model);
 }
 
-/// Whichever way it turns, the azimuth that is told goes on; a return lies where the laser has gone on to.
+/// The laser has turned, in either direction, beyond the block's azimuth when it fires.
 TEST(HesaiDecoder, TurnsCounterclockwiseIfItsAzimuthsDo) {
   for (const auto& [model, mode] : {std::pair{Model::xt32, kStrongest}, std::pair{Model::qt128, kDual}}) {
     const ModelSpec& its = spec(model);
@@ -359,9 +359,9 @@ TEST(HesaiDecoder, TurnsCounterclockwiseIfItsAzimuthsDo) {
   }
 }
 
-/// Where a field of view was set, the columns behind the blind sector are so much later.
+/// With a limited field of view, the columns after the blind sector are later by its duration.
 TEST(HesaiDecoder, BlindSectorWithinAPacketTakesItsTime) {
-  HesaiTestPacket bytes{Model::xt32, kStrongest}; // 18 cdeg a column
+  HesaiTestPacket bytes{Model::xt32, kStrongest}; // 18 cdeg per column
   for (std::size_t block = 4; block < 8; ++block)
     bytes.set_azimuth(block, static_cast<std::uint16_t>(18 * (block + 500)));
   bytes.set_return(3, 0, kTenMetres);
@@ -376,7 +376,7 @@ TEST(HesaiDecoder, BlindSectorWithinAPacketTakesItsTime) {
   EXPECT_EQ(decoder.time(), HesaiTestPacket::kTime - 507 * nanoseconds{50'000} + nanoseconds{6'000});
 }
 
-/// Between two columns there is no third to tell a damaged azimuth by.
+/// Two columns leave no third to detect a damaged azimuth by.
 TEST(HesaiDecoder, OfTwoColumnsTheChecksumVouchesForABlindSectorBetweenThem) {
   for (const Model model : {Model::qt128, Model::ot128}) {
     const std::int64_t column_ns = spec(model).sequences[0].column_duration.count();
@@ -415,7 +415,7 @@ TEST(HesaiDecoder, ChecksumsCountOnceTheyHaveBeenRight) {
   }
 }
 
-/// Of the QT128, 96 of 128 channels fire in a column: 1 to 32 in every second one, 33 to 64 in the others.
+/// The QT128 fires 96 of 128 channels per column: 1 to 32 in every second one, 33 to 64 in the others.
 TEST(HesaiDecoder, SequenceOfAQt128FollowsItsModeFlag) {
   const ModelSpec& its = spec(Model::qt128);
   EXPECT_EQ(its.sequences[0].offset_ns[34], 2'312);
@@ -433,7 +433,7 @@ TEST(HesaiDecoder, SequenceOfAQt128FollowsItsModeFlag) {
   }
 }
 
-/// In high resolution an OT128 has twice the columns, and a channel fires within half the time.
+/// In high resolution an OT128 has twice the columns, and its channels fire in half the time.
 TEST(HesaiDecoder, HighResolutionOfAnOt128IsToldByItsState) {
   HesaiTestPacket bytes{Model::ot128, kStrongest, HesaiTestPacket::kTime, 0, 600.0, 1};
   bytes.set_return(1, 0, kTenMetres);

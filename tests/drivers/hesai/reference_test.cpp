@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Against what another decoder, nebula, made of recordings.
+// Comparison with the output of another decoder, nebula, on recordings.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -32,14 +32,14 @@ struct Recorded {
   std::string folder, angles;
   Model model;
   double rpm;
-  double least_range_m; ///< of the other decoder
+  double least_range_m; ///< minimum range of the other decoder
 };
 
 void PrintTo(const Recorded& recorded, std::ostream* out) { *out << recorded.folder; }
 
 std::filesystem::path hesai_data(const std::string& name) { return test::test_data() / "hesai" / name; }
 
-/// The packets of a bag, one after the other.
+/// Returns the packets of a bag in order.
 std::vector<std::vector<std::byte>> packets_of(const std::string& folder) {
   std::vector<std::vector<std::byte>> payloads;
   const auto bag = tools::open_bag(hesai_data(folder));
@@ -62,12 +62,12 @@ struct Point {
   float x, y, z;
 };
 
-/// Makes of the decoder's returns the clouds that the other one makes:
-/// - its axes are the maker's: x right, y along azimuth 0;
-/// - all lasers of a block have the block's azimuth, whatever the lidar turns until they fire;
-/// - of two returns of a pulse that are closer than 10 cm it keeps the second, which may equal the first;
-/// - returns nearer than its least range are none;
-/// - a cloud holds what lies behind azimuth 0 and up to the next time there, by the azimuth of each laser itself.
+/// Converts the decoder's returns to the clouds of the other decoder:
+/// - axes of the maker: x right, y along azimuth 0;
+/// - all lasers of a block have the block's azimuth, without the rotation until they fire;
+/// - of two returns of a pulse that are closer than 10 cm it uses the second, which may equal the first;
+/// - returns nearer than its minimum range are dropped;
+/// - a cloud spans azimuth 0 to the next azimuth 0, by the azimuth of each laser itself.
 class OtherDecoder {
  public:
   explicit OtherDecoder(const Recorded& recorded, const Calibration& calibration)
@@ -116,7 +116,7 @@ class OtherDecoder {
     take_return(second, channel);
   }
 
-  /// A second return at the range of the first is none, but its coordinates are still there.
+  /// A second return at the range of the first is dropped, but its coordinates are still stored.
   static bool is_equal_return(const LidarReturn& first, const LidarReturn& second) {
     return first.x_m == second.x_m && first.y_m == second.y_m && first.z_m == second.z_m;
   }
@@ -158,7 +158,7 @@ TEST_P(HesaiReference, EveryPointIsWhereTheOtherDecoderHasIt) {
   OtherDecoder decoder{GetParam(), *calibration};
   for (const auto& payload : packets_of(GetParam().folder))
     ASSERT_NO_FATAL_FAILURE(decoder.take(payload));
-  // One of the revolutions in the recording.
+  // A revolution of the recording.
   const auto first_is_alike = [&](const auto& entry) {
     return entry.second.size() == expected.size() && distance_m(entry.second.front(), expected.front()) < 1e-3;
   };
@@ -179,8 +179,8 @@ INSTANTIATE_TEST_SUITE_P(, HesaiReference,
                                          Recorded{"qt128", "PandarQT128.csv", Model::qt128, 600, 0.3}),
                          testing::PrintToStringParamName());
 
-/// How far the ranges of neighbouring lasers of a QT128 lie apart on sloping walls, if each has turned on by `share` of
-/// what it does until its firing. The two fire up to 76 us apart, 0.27 degrees, and are 2.5 degrees apart at most.
+/// Mean range difference of adjacent lasers of a QT128 on sloping walls, if each has turned by `share` of the rotation
+/// until its firing. The two fire up to 76 us apart, 0.27 degrees, and are 2.5 degrees apart at most.
 double mean_step_m(const std::vector<std::vector<std::byte>>& packets, const Calibration& calibration,
                    std::size_t sequence, double share) {
   constexpr double kColumnDeg = 0.8, kDegPerNs = 3.6e-6; // of packets of the same sequence, at 10 Hz
@@ -224,8 +224,8 @@ double mean_step_m(const std::vector<std::vector<std::byte>>& packets, const Cal
   return sum_m / steps;
 }
 
-/// The azimuth is that of the block, and the lasers fire later, by what the table of their sequence says: so neighbours
-/// agree better on the walls they see than if they had not turned on, turned back or turned twice as far.
+/// The azimuth is that of the block, and the lasers fire later, by the table of their sequence: adjacent lasers agree
+/// better on walls than with no rotation, the opposite one, or twice as much.
 TEST(HesaiFirings, OfAQt128LetNeighbouringLasersAgree) {
   SKIP_WITHOUT(hesai_data("qt128"));
   const auto calibration = read_calibration(hesai_data("calibration/PandarQT128.csv"));

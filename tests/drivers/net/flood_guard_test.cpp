@@ -22,7 +22,7 @@ LidarRouter::Senders senders(std::uint32_t ip) { return {{ip}, 1}; }
 
 class Guarded : public testing::Test {
  protected:
-  /// The guard is told of so many datagrams within some milliseconds, as if they had come just now.
+  /// Feeds this many datagrams, all received at the current time.
   void look_at(std::uint64_t count, std::size_t bytes, std::uint32_t ip) {
     const std::vector<std::byte> payload(bytes);
     Datagram datagram{payload, ip, 2368, socket_.port(), now_};
@@ -31,7 +31,7 @@ class Guarded : public testing::Test {
   }
   void seconds_later() { now_ += milliseconds{1500}; }
 
-  /// Of a thousand that are sent from the loopback address, so many get through.
+  /// Sends a thousand datagrams from the loopback address; returns the number received.
   std::size_t passing(std::size_t bytes) {
     const std::vector<std::byte> payload(bytes);
     std::size_t received = 0;
@@ -101,7 +101,7 @@ TEST_F(Guarded, LidarIsNoFloodHoweverFast) {
 TEST_F(Guarded, EndOfTheFloodOpensTheSocketAgain) {
   look_at(FloodGuard::kFlood + 1, 700, kStranger);
   seconds_later();
-  look_at(FloodGuard::kFlood / FloodGuard::kSample + 1, 700, kStranger); // the samples of a flood that goes on
+  look_at(FloodGuard::kFlood / FloodGuard::kSample + 1, 700, kStranger); // the samples of an ongoing flood
   seconds_later();
   look_at(1, 700, kStranger);
   EXPECT_LT(passing(700), 30U);
@@ -110,12 +110,12 @@ TEST_F(Guarded, EndOfTheFloodOpensTheSocketAgain) {
   EXPECT_EQ(passing(700), 1000U);
 }
 
-/// Whoever sends a few datagrams later is no flood any more, and is not told to be one.
+/// A few later datagrams are no flood, and must not be reported as one.
 TEST_F(Guarded, EndOfTheFloodIsSeenWhereNobodySends) {
   look_at(FloodGuard::kFlood + 1, 700, kStranger);
   guard_.hear_nothing(now_ += milliseconds{900}, socket_);
   EXPECT_LT(passing(700), 30U) << "the second is not over";
-  for (int second = 0; second < 2; ++second) // what the last one counted ends with the first
+  for (int second = 0; second < 2; ++second) // the previous count expires with the first
     guard_.hear_nothing(now_ += milliseconds{1100}, socket_);
   EXPECT_EQ(passing(700), 1000U);
 }

@@ -20,7 +20,7 @@ namespace {
 
 using test::UdpSender;
 
-constexpr std::uint16_t kAnyPort = 0; ///< the kernel chooses one that is free
+constexpr std::uint16_t kAnyPort = 0; ///< chosen by the kernel
 
 UdpSocket open_any() {
   auto socket = UdpSocket::open(kAnyPort);
@@ -74,7 +74,7 @@ TEST(UdpSocket, CountsWhatTheKernelHadNoRoomFor) {
   std::size_t received = 0;
   for (std::size_t batch = 1; batch > 0; received += batch)
     batch = socket.receive().size();
-  sender.send(socket.port(), packet); // brings the count along
+  sender.send(socket.port(), packet); // carries the drop counter
   received += socket.receive().size();
   EXPECT_GT(socket.kernel_drops(), 0U);
   EXPECT_EQ(received + socket.kernel_drops(), flood + 1);
@@ -96,7 +96,7 @@ TEST(UdpSocket, PortThatIsTakenIsSaid) {
   EXPECT_NE(second.error().find("another program listens there"), std::string::npos) << second.error();
 }
 
-/// As two instances of the service hear the position packets of lidars that broadcast.
+/// Two instances of the service receive the position packets of broadcasting lidars like this.
 TEST(UdpSocket, OfTwoBesideEachOtherEachHearsABroadcast) {
   constexpr std::uint32_t kEverybody = 0x7FFF'FFFF; // 127.255.255.255
   auto first = UdpSocket::open_beside_others(0);
@@ -139,7 +139,7 @@ TEST(UdpSocket, WhatAnOwnerBeforeHasLostIsNotItsOwn) {
   EXPECT_EQ(second->kernel_drops(), 0U);
 }
 
-/// As systemd binds the sockets of a socket unit: without more, who binds last gets what is sent.
+/// Sockets as bound by systemd for a socket unit: without an exclusive bind, the last one to bind receives everything.
 TEST(UdpSocket, PortTakenOverIsSharedWithNobody) {
   const auto bind_again = [](std::uint16_t port) {
     const int descriptor = ::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
@@ -168,7 +168,7 @@ TEST(UdpSocket, TakesOverALargerBufferAsItIs) {
   EXPECT_EQ(socket->buffer_bytes(), wanted);
 }
 
-/// Of a privileged process as much as is asked for, of others as much as is allowed to all.
+/// Privileged processes get the requested size, others at most the limit of the kernel.
 TEST(UdpSocket, KnowsWhatItsBufferHasGot) {
   int allowed = 0;
   std::ifstream("/proc/sys/net/core/rmem_max") >> allowed;

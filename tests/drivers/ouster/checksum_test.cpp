@@ -11,7 +11,7 @@ namespace {
 
 std::span<const std::byte> bytes_of(std::string_view text) { return std::as_bytes(std::span{text}); }
 
-/// Bit by bit, as the polynomial is defined.
+/// Reference implementation, bit by bit from the polynomial.
 std::uint64_t slow_crc64(std::span<const std::byte> bytes) {
   std::uint64_t crc = ~std::uint64_t{0};
   for (const std::byte byte : bytes) {

@@ -22,8 +22,8 @@ constexpr std::array<Profile, kProfiles> kAll{Profile::legacy,     Profile::rng1
                                               Profile::rng15,      Profile::rng15_dual, Profile::fusa_rng15_dual,
                                               Profile::rng15_zone, Profile::rng19_zone};
 
-/// Where the pixel of a column lies in the sensor frame, as the manual puts it: the beam begins on a circle about the
-/// lidar frame's z axis and is as long as the range without the way to that circle.
+/// Returns the position of a pixel in the sensor frame by the manual: the beam starts on a circle about the lidar
+/// frame's z axis, and its length is the range minus the radius of that circle.
 Eigen::Vector3d place_of(const Metadata& metadata, std::size_t column, std::size_t pixel, double range_m) {
   const double encoder =
       2.0 * std::numbers::pi * (1.0 - static_cast<double>(column) / static_cast<double>(metadata.columns_per_frame));
@@ -110,7 +110,7 @@ TEST(OusterDecoder, SecondReturnIsAGroupOfItsOwn) {
     bytes.set_return(3, 17, 4'000, 50);
     bytes.set_return(3, 17, 8'000, 60, 1);
     bytes.set_return(3, 18, 4'000, 70);
-    bytes.set_return(3, 18, 4'000, 80, 1); // the same again
+    bytes.set_return(3, 18, 4'000, 80, 1); // identical return
     bytes.seal();
     Decoder decoder{metadata};
     LidarPacket packet;
@@ -231,7 +231,7 @@ Metadata metadata_of(Mode mode) {
   return metadata;
 }
 
-/// A packet of a sensor that has been started anew, its columns as far apart as its mode has them.
+/// Returns a packet of a restarted sensor, with the column spacing of its mode.
 OusterTestPacket restarted(Metadata sensor, std::size_t first_column, std::uint64_t time_ns, std::uint32_t frame_id) {
   sensor.init_id = 4711;
   const auto columns_per_s = sensor.frames_per_s * static_cast<double>(sensor.columns_per_frame);
@@ -243,7 +243,7 @@ OusterTestPacket restarted(Metadata sensor, std::size_t first_column, std::uint6
   return bytes;
 }
 
-/// How many packets are refused of the first `turns` of the sensor; it sends the columns before `window`.
+/// Returns the number of rejected packets in the sensor's first `turns`; it sends the columns before `window`.
 std::size_t refused_of(const Metadata& known, const Metadata& sensor, std::size_t turns, std::size_t window) {
   Decoder decoder{known};
   LidarPacket packet;
@@ -265,7 +265,7 @@ std::size_t refused_of(const Metadata& known, const Metadata& sensor, std::size_
   return refused;
 }
 
-/// A sensor that was started anew is followed if it still is in the mode that the metadata is of, and in no other.
+/// A restarted sensor is accepted if it still is in the mode of the metadata, and only then.
 TEST(OusterDecoder, OfAnotherStartIsBelievedOnceATurnHasShownItsMode) {
   for (const Mode known : kModes) {
     for (const Mode mode : kModes) {
@@ -280,8 +280,7 @@ TEST(OusterDecoder, OfAnotherStartIsBelievedOnceATurnHasShownItsMode) {
   }
 }
 
-/// After a restart, two turns without a good packet say that the sensor is in another mode; a good one says that it is
-/// not.
+/// After a restart, two turns without a valid packet indicate another mode; a valid one rules it out.
 TEST(OusterDecoder, OfAnotherStartForTwoTurnsIsInAnotherMode) {
   const Metadata known = metadata_of({1024, 10});
   LidarPacket packet;
@@ -306,7 +305,7 @@ TEST(OusterDecoder, OfAnotherStartForTwoTurnsIsInAnotherMode) {
   EXPECT_EQ(other.packets_of_other_start(), 0U);
 }
 
-/// A clock that steps in mid-turn must not hide what that turn has shown.
+/// A clock step in mid-turn must not discard the evidence of that turn.
 TEST(OusterDecoder, TurnWithIdsOfAnotherModeShowsNothing) {
   const Metadata known = metadata_of({1024, 20}), sensor = metadata_of({2048, 10});
   constexpr std::uint64_t kStart_ns = 1'000'000'000, kPacket_ns = 16 * 48'828;

@@ -22,7 +22,7 @@ Metadata standard_metadata() {
   return metadata;
 }
 
-/// Of newer firmware: eight measurements 1.5 ms apart, turning at 0.1, 0.2, ... rad/s.
+/// Returns a packet of newer firmware: eight measurements 1.5 ms apart, with rates of 0.1, 0.2, ... rad/s.
 std::vector<std::byte> standard_packet(const Metadata& metadata) {
   std::vector<std::byte> bytes(452);
   test::put_little_endian(&bytes[0], 2, 2);

@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-/// What a sensor of recent firmware sends.
+/// Returns metadata as sent by recent firmware.
 json nested() {
   const std::vector<double> mm{-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 38.195, 0, 0, 0, 1};
   const std::vector<double> imu_mm{1, 0, 0, -2.441, 0, 1, 0, -9.725, 0, 0, 1, 7.533, 0, 0, 0, 1};
@@ -47,7 +47,7 @@ json nested() {
           {"calibration_status", {{"reflectivity", {{"valid", true}}}}}};
 }
 
-/// The same as older clients wrote it.
+/// Returns the same metadata in the format of older clients.
 json flat() {
   json root = nested();
   json result = root["beam_intrinsics"];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Against what the maker's own decoder read of its captures.
+// Comparison with the output of the maker's own decoder on its captures.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -74,15 +74,15 @@ class Md5 {
 
 struct Recorded {
   std::string name;
-  std::vector<std::pair<std::string, std::pair<std::size_t, std::size_t>>> other_fields; ///< place and width in a pixel
+  std::vector<std::pair<std::string, std::pair<std::size_t, std::size_t>>> other_fields; ///< offset, width in a pixel
 };
 
 void PrintTo(const Recorded& recorded, std::ostream* out) { *out << recorded.name; }
 
 class OusterDigest : public testing::TestWithParam<Recorded> {};
 
-/// Ranges, reflectivities and times come out of the decoder, to the bit; signal and near infrared, which it has no use
-/// for, stand where the profile is said to have them.
+/// Ranges, reflectivities and times of the decoder are equal to the bit; signal and near infrared, which it does not
+/// use, are at the offsets of the profile.
 TEST_P(OusterDigest, IsThatOfTheMakersDecoder) {
   const auto& name = GetParam().name;
   const auto& other_fields = GetParam().other_fields;
@@ -106,7 +106,7 @@ TEST_P(OusterDigest, IsThatOfTheMakersDecoder) {
           const std::size_t lane = pixel % FiringGroup::kLasers;
           const FiringGroup& found = packet.storage[group];
           const std::string which = echo == 0 ? "" : "2";
-          // A second return where the first is was left out.
+          // A second return equal to the first was dropped.
           const float first_m = packet.storage[group - echo].range_m[lane];
           const std::byte* const at =
               format.pixels_of(format.column(datagram.payload.data(), column)) + pixel * format.profile.pixel_bytes;

@@ -78,7 +78,7 @@ TEST(VelodyneDecoder, EveryFiringOfEveryModelHasItsTimeItsDirectionAndItsRing) {
 }
 
 TEST(VelodyneDecoder, AxesAreForwardLeftUp) {
-  VelodyneTestPacket bytes{Model::vlp16, ReturnMode::strongest, 0, 9'000, 0.0}; // standing rotor, looking to the right
+  VelodyneTestPacket bytes{Model::vlp16, ReturnMode::strongest, 0, 9'000, 0.0}; // rotor at rest, facing right
   bytes.set_return(0, 15, 5000);                                                // the laser at +15 degrees
   const std::vector<LidarReturn> returns = returns_in(bytes);
   ASSERT_EQ(returns.size(), 1U);
@@ -145,7 +145,7 @@ TEST(VelodyneDecoder, Vls128InDualModeTakesItsSpeedFromThePacketBefore) {
 
 TEST(VelodyneDecoder, EqualSecondReturnIsEmittedOnce) {
   VelodyneTestPacket bytes{Model::vlp16, ReturnMode::dual};
-  bytes.set_return(2, 3, 1000, 7); // both echoes the same
+  bytes.set_return(2, 3, 1000, 7); // both echoes equal
   bytes.set_return(3, 3, 1000, 7);
   bytes.set_return(4, 5, 2000, 8); // last and strongest differ
   bytes.set_return(5, 5, 1500, 9);
@@ -166,7 +166,7 @@ TEST(VelodyneDecoder, DistanceZeroIsNoReturn) {
 }
 
 TEST(VelodyneDecoder, ColumnsBehindABlindSectorAreLaterByTheColumnsItTook) {
-  // As a VLP-32C does that was set to see from 270 to 90 degrees: a packet goes on where the last one was left.
+  // A VLP-32C with a field of view from 270 to 90 degrees: the packet continues after the blind sector.
   VelodyneTestPacket bytes{Model::vlp32c, ReturnMode::strongest, 0, 9'000, 600.0};
   for (std::size_t block = 8; block < kBlocks; ++block)
     bytes.set_azimuth(block, static_cast<std::uint16_t>(27'000 + 20 * (block - 8)));
@@ -184,7 +184,7 @@ TEST(VelodyneDecoder, ColumnsBehindABlindSectorAreLaterByTheColumnsItTook) {
   EXPECT_NEAR(to_seconds(packet.duration), (27'080 - 9'000) * seconds_per_cdeg, 1e-4);
 }
 
-/// The jitter of its encoder was taken for a blind sector, at a speed at which that takes twenty seconds.
+/// Regression: encoder jitter was interpreted as a blind sector that takes twenty seconds at this speed.
 TEST(VelodyneDecoder, MotorThatStandsHasNoBlindSector) {
   VelodyneTestPacket bytes{Model::vlp16, ReturnMode::strongest, 0, 100, 0.0};
   bytes.set_azimuth(7, 101);
@@ -211,7 +211,7 @@ TEST(VelodyneDecoder, WrongFlagIsRefused) {
   }
 }
 
-/// Number `i` of a VLS-128 at 600 rpm, its stamp in whole microseconds.
+/// Packet number `i` of a VLS-128 at 600 rpm, its stamp in whole microseconds.
 VelodyneTestPacket vls128_packet(ReturnMode mode, Pace pace, int i) {
   const double us = 1e6 * to_seconds(packet_duration(Model::vls128, mode, pace)) * i;
   return {Model::vls128, mode, static_cast<std::uint32_t>(1e6 + us), static_cast<std::uint16_t>(std::lround(0.36 * us)),
@@ -233,7 +233,7 @@ TEST(VelodyneDecoder, Vls128IsReadAtThePaceOfItsPackets) {
   }
 }
 
-/// Four packets of it take as long as one of a VLP-32C.
+/// Four of its packets take as long as one of a VLP-32C.
 TEST(VelodyneDecoder, Vls128OfTheSlowerPaceThatLosesThreePacketsIsNoVlp32c) {
   Decoder decoder;
   LidarPacket packet;
@@ -276,7 +276,7 @@ TEST(VelodyneDecoder, AbsurdAzimuthsAreRefused) {
 }
 
 TEST(VelodyneDecoder, FullTurnIsZero) {
-  // HDL-32E and VLP-16 report 360.00 degrees now and then.
+  // HDL-32E and VLP-16 occasionally report 360.00 degrees.
   VelodyneTestPacket bytes{Model::hdl32e, ReturnMode::strongest, 0, 35'924, 704.0};
   bytes.set_azimuth(4, 36'000);
   bytes.set_all_returns(1000);
@@ -335,9 +335,9 @@ TEST(VelodyneDecoder, SpacingOfPacketsOverrulesTheProductIdInEitherModeAndThroug
     for (const Model truth : {Model::vlp16, Model::vlp32c, Model::hdl32e, Model::vls128}) {
       for (const Model claim : {Model::vlp16, Model::vlp32c, Model::hdl32e, Model::vls128}) {
         if ((claim == Model::vls128) != (truth == Model::vls128))
-          continue; // its flags are its own: a wrong id cannot be decoded before the spacing is known
+          continue; // has its own flags: undecodable by another model's id until the spacing is known
         if (claim == Model::vlp32c && truth == Model::vlp16)
-          continue; // exactly twice the spacing: no different from one that loses every second packet
+          continue; // exactly twice the spacing: indistinguishable from the loss of every second packet
         Decoder decoder;
         const double spacing_us = 1e6 * to_seconds(packet_duration(truth, mode));
         for (const int number : {0, 1, 2, 5, 6}) { // two are lost

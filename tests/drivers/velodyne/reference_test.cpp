@@ -36,7 +36,7 @@ std::uint16_t azimuth_of_block(std::span<const std::byte> payload, std::size_t b
   return read_u16(payload.data() + block * velodyne::kBlockBytes + 2);
 }
 
-/// Number of returns between two wraps of the block azimuth, the incomplete first and last frame included.
+/// Returns the number of returns between wraps of the block azimuth, with the incomplete first and last frame.
 std::vector<int> returns_per_frame(const std::filesystem::path& file, Decoder& decoder) {
   auto capture = Capture::open(file);
   EXPECT_TRUE(capture.has_value());
@@ -118,7 +118,7 @@ TEST(VelodyneReference, ModelIsRightFromTheFirstPacketOnWhereverACaptureBegins) 
   }
 }
 
-// --- Against the point clouds of another decoder ---------------------------------------------------------------------
+// --- Comparison with the point clouds of another decoder -------------------------------------------------------------
 
 struct Point {
   double x_m, y_m, z_m;
@@ -127,7 +127,7 @@ struct Point {
 
 double distance(const Point& a, const Point& b) { return std::hypot(a.x_m - b.x_m, a.y_m - b.y_m, a.z_m - b.z_m); }
 
-/// Returns of one revolution by what has to agree exactly: ring, distance in ticks and, where known, intensity.
+/// Index of the returns of one revolution by exactly equal values: ring, distance in ticks and, if known, intensity.
 struct Key {
   int ring, ticks, intensity;
   auto operator<=>(const Key&) const = default;
@@ -142,8 +142,8 @@ Point turned_clockwise(const LidarReturn& at, double angle_rad, double lift_m) {
   return {c * x + s * y, c * y - s * x, static_cast<double>(at.z_m) + lift_m};
 }
 
-/// Where another decoder with conventions of its own puts the return of laser `laser` that was fired in column `column`
-/// at `share` of the column's duration: its share of the turn is another, and so may be its height.
+/// Convention of another decoder for the position of a return: maps the firing time, as a share of the column's
+/// duration, to the share of the rotation that it applies; may lack the vertical offsets.
 struct Convention {
   double (*share)(std::size_t laser, double own_share, bool is_last_column);
   bool has_vertical_offsets;
@@ -151,8 +151,8 @@ struct Convention {
 
 constexpr double kBlindSectorRad = 0.5; ///< no motor turns so far from one column to the next
 
-/// Decodes packets laid end to end and cuts before the first packet past `cut_cdeg`; every point is moved from where
-/// the decoder puts it to where the convention would, by a turn that is known for each block and laser.
+/// Decodes concatenated packets and cuts before the first packet past `cut_cdeg`; rotates every point from the
+/// decoder's position to that of the convention, by the known rotation of each block and laser.
 std::vector<Revolution> decode_to_convention(const std::vector<std::byte>& packets, const Convention& convention,
                                              int cut_cdeg, bool keeps_intensity) {
   Decoder decoder;
@@ -187,7 +187,7 @@ std::vector<Revolution> decode_to_convention(const std::vector<std::byte>& packe
                                static_cast<double>(spec.column_duration.count());
       const double mean_turn = turn_rad(0, last_column) / static_cast<double>(last_column + skipped_columns);
       const double turn = column < last_column ? turn_rad(column, column + 1) : mean_turn;
-      const double own_turn = turn < kBlindSectorRad ? turn : mean_turn; // the other turns through the blind sector
+      const double own_turn = turn < kBlindSectorRad ? turn : mean_turn; // the other rotates through the blind sector
       const double moved_rad = turn * convention.share(laser, own_share, column == last_column) - own_turn * own_share;
       const double lift_m = convention.has_vertical_offsets ? 0.0 : -lasers[laser].vertical_offset_m;
       const int ticks =
@@ -204,7 +204,7 @@ struct Match {
   int matched = 0; ///< ring, distance and intensity agree, and the position within 5 mm
 };
 
-/// Looks for each expected point among the revolution's, each of which matches once.
+/// Matches each expected point with a point of the revolution, one to one.
 Match match(const std::vector<std::pair<Key, Point>>& expected, Revolution revolution) {
   Match result;
   for (const auto& [key, point] : expected) {
@@ -260,7 +260,7 @@ TEST(VelodyneReference, Vlp16DualReturnsAreThoseOfAnotherDecoderInItsConventions
   const auto expected = expected_dual_points();
   ASSERT_EQ(expected.size(), 14831U);
 
-  // The other decoder does not interpolate in the last pair of blocks and leaves the manual's vertical corrections out.
+  // The other decoder does not interpolate in the last pair of blocks and ignores the manual's vertical corrections.
   const Convention other{[](std::size_t, double own, bool is_last) { return is_last ? 0.0 : own; }, false};
   const Match in_its_conventions = best_match(expected, decode_to_convention(packets, other, 0, true));
   EXPECT_GE(in_its_conventions.matched, 0.99 * in_its_conventions.points);
@@ -286,9 +286,9 @@ TEST(VelodyneReference, Vlp32cReturnsAreThoseOfAnotherDecoderInItsConventions) {
   }
   ASSERT_EQ(expected.size(), 26216U);
 
-  constexpr int kBlindCdeg = 18000; // this sensor was set to see from 270 to 91 degrees
+  constexpr int kBlindCdeg = 18000; // field of view from 270 to 91 degrees
 
-  // The other decoder times the lasers one by one, not in pairs, and does not interpolate in the last block.
+  // The other decoder times the lasers individually, not in pairs, and does not interpolate in the last block.
   const Convention other{[](std::size_t laser, double, bool is_last) {
                            return is_last ? 0.0 : 2.304 * static_cast<double>(laser) / 55.296;
                          },
@@ -301,13 +301,13 @@ TEST(VelodyneReference, Vlp32cReturnsAreThoseOfAnotherDecoderInItsConventions) {
   EXPECT_LT(by_the_manual.matched, by_the_manual.points) << "up to half a column of firing time must show";
 }
 
-// --- The whole input: sender, clock, counters, position packets ------------------------------------------------------
+// --- Complete input: sender, clock, counters, position packets -------------------------------------------------------
 
 struct Replayed {
   PacketCounters counters;
   std::vector<velodyne::PositionPacket> positions;
   std::vector<Stamp> stamps;
-  std::vector<Duration> lateness; ///< reception after the last firing, by the stamps given out
+  std::vector<Duration> lateness; ///< reception minus the stamp of the last firing
 };
 
 Replayed replay(const std::filesystem::path& file, LidarTime time = LidarTime::automatic) {
@@ -383,7 +383,7 @@ TEST(VelodyneReference, SensorTimeIsTakenAsItIs) {
   SKIP_WITHOUT(velodyne_data("vlp16_static_gps_pps.pcap"));
   const Replayed capture = replay(velodyne_data("vlp16_static_gps_pps.pcap"), LidarTime::sensor);
   ASSERT_FALSE(capture.stamps.empty());
-  // The first packet says 1082.340595 s past the hour; it was captured on 2016-01-21 at 08:18:02 UTC.
+  // The first packet contains 1082.340595 s past the hour; it was captured on 2016-01-21 at 08:18:02 UTC.
   EXPECT_EQ(to_ns(capture.stamps.front()), (1'453'363'200 + 1082) * 1'000'000'000LL + 340'595'000);
 }
 
