@@ -82,7 +82,7 @@ struct RegistrationOptions {
 
 struct MapOptions {
   double keyframe_m = 1.0;    ///< distance between keyframes, the sweeps inserted into the map ...
-  double keyframe_deg = 30.0; ///< ... or rotation between them (paper II-B.3)
+  double keyframe_deg = 30.0; ///< ... or rotation between them (paper II-B.3); see MapPolicy
   std::size_t max_bytes = 100'000'000;
 
   bool operator==(const MapOptions&) const = default;

@@ -35,6 +35,9 @@ constexpr double kNarrowing = 0.25;
 /// to say, and less where they fit worse than their surfaces tell, which differs twentyfold between scenes.
 constexpr double kIndependent = 0.06;
 constexpr double kBestFit = 0.3; ///< mean squared Mahalanobis distance
+/// Squared Mahalanobis distance at which a point is as likely in unmapped space as on a surface: 2 ln(L / sqrt(2 pi)),
+/// with unmapped space as long as 20 standard deviations of a surface (1 m and 5 cm).
+constexpr double kUnmapped = 4.2;
 double honest_share(double mean_error) { return kIndependent / std::max(kBestFit, mean_error); }
 
 /// The products of as many normals that err independently come to that much by chance, in standard deviations; it is
@@ -239,8 +242,19 @@ double fit_of(const Registration& registration) {
   return static_cast<double>(registration.inliers) * (kMissing - registration.mean_error);
 }
 
+namespace {
+
+/// Twice the negative log likelihood of the points under the mixture of evidence().
+double mixture_cost(const Registration& registration) {
+  const auto all = static_cast<double>(registration.points), mapped = static_cast<double>(registration.inliers);
+  const auto weighed = [&](double part) { return part > 0.0 ? -2.0 * part * std::log(part / all) : 0.0; };
+  return mapped * registration.mean_error + (all - mapped) * kUnmapped + weighed(mapped) + weighed(all - mapped);
+}
+
+} // namespace
+
 double evidence(const Registration& one, const Registration& other) {
-  const double gained = fit_of(one) - fit_of(other);
+  const double gained = mixture_cost(other) - mixture_cost(one);
   return gained * honest_share((gained > 0.0 ? one : other).mean_error);
 }
 
@@ -248,6 +262,7 @@ Registration Gicp::align(const ElasticScan& source, const SurfaceMap& target, co
                          const MotionBelief& prior, const RegistrationOptions& options, bool wide,
                          const StopRequested& stop) {
   Registration result;
+  result.points = source.points.size();
   result.T_target_source = T_start;
   result.twist_base = source.twist_base;
   if (!T_start.finite() || !target.reaches(T_start.translation))

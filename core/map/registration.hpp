@@ -42,20 +42,29 @@ struct Registration {
   Vector6 twist_base = Vector6::Zero();
   bool converged = false;                  ///< the last step was below the thresholds
   int iterations = 0;                      ///< Gauss-Newton steps
+  std::size_t points = 0;                  ///< of the scan
   std::size_t inliers = 0;                 ///< points with a correspondence within reach
   double mean_error = 0.0;                 ///< mean squared Mahalanobis distance of the inliers
   Matrix12 information = Matrix12::Zero(); ///< of the points alone, as far as they are independent
   /// Mean over the points of (n, p x n) with itself, n the unit normal of the correspondence, p the point in m about
   /// the source's origin: what the surfaces around allow to be seen. Target axes.
   Matrix6 observability = Matrix6::Zero();
+
+  /// Returns the share of the points that have a correspondence.
+  [[nodiscard]] double overlap() const {
+    return points > 0 ? static_cast<double>(inliers) / static_cast<double>(points) : 0.0;
+  }
 };
 
 /// How well a registration fits: the points with a correspondence, each worth the more the nearer it lies. One without
 /// counts as one that is three standard deviations off. Of registrations of the same points the larger is the better.
 double fit_of(const Registration& registration);
 
-/// Twice the logarithm of how much likelier the surfaces find `one` than `other`, of the same points, as far as these
-/// are independent.
+/// Twice the log likelihood ratio of two registrations of the same points, scaled to the points that are independent.
+///
+/// Model of a point: a mixture. It lies on a surface of the map (its squared Mahalanobis distance counts), or in space
+/// that is not mapped (uniform). The share of mapped points is the most likely one for each registration: where little
+/// is mapped, a pose that slides the scan back onto the map gains nothing.
 double evidence(const Registration& one, const Registration& other);
 
 /// Generalised ICP (Segal 2009; paper equations 1 and 2): aligns points that have surface covariances with a map of

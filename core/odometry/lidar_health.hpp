@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
-
 #include "core/map/registration.hpp"
 
 namespace locus {
@@ -11,18 +9,18 @@ namespace locus {
 /// detect dust or a fault of the lidar. One owner.
 class LidarHealth {
  public:
-  /// Learns from an accepted registration of `registered` points, `elapsed_s` after the last one.
-  void learn(const Registration& registration, std::size_t registered, double elapsed_s);
+  /// Learns from an accepted registration, `elapsed_s` after the last one.
+  void learn(const Registration& registration, double elapsed_s);
 
   /// Returns whether there are fewer correspondences than half of the usual: dust or a lidar fault, since surroundings
   /// do not change that fast. Such a sweep must not enter the map.
-  [[nodiscard]] bool misses_most(const Registration& registration, std::size_t registered) const;
+  [[nodiscard]] bool misses_most(const Registration& registration) const;
 
   /// Returns whether the fit is worse than usual: the de-skew or the prior may be wrong.
-  [[nodiscard]] bool is_unusual(const Registration& registration, std::size_t registered) const;
+  [[nodiscard]] bool is_unusual(const Registration& registration) const;
 
  private:
-  double share_ = 0.0, fit_ = 0.0; ///< usual values
+  double overlap_ = 0.0, fit_ = 0.0; ///< usual values
   double learned_s_ = 0.0;
 };
 

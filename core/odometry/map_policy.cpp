@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/odometry/map_policy.hpp"
 
+#include <algorithm>
 #include <chrono>
 
 namespace locus {
@@ -13,10 +14,16 @@ namespace {
 constexpr int kRefusalsToRestart = 10;
 constexpr Duration kLately = std::chrono::seconds{5};
 
+/// Part of the best overlap since the last keyframe below which the next one is due, if the robot has moved by as much
+/// as this: a narrow view turns to unmapped space long before the robot has driven a metre.
+constexpr double kOverlapLeft = 0.85;
+constexpr double kOverlapMoved_m = 0.1, kOverlapMoved_deg = 5.0;
+
 } // namespace
 
 void MapPolicy::begin(Stamp stamp, const Pose& T_odom_base) {
   T_odom_keyframe_ = T_odom_base;
+  best_overlap_ = 0.0;
   last_placed_ = stamp;
   refused_in_a_row_ = 0;
   placed_ = 1;
@@ -24,24 +31,35 @@ void MapPolicy::begin(Stamp stamp, const Pose& T_odom_base) {
 
 bool MapPolicy::was_placed_lately(Stamp now) const { return std::chrono::abs(now - last_placed_) < kLately; }
 
+/// Returns whether the map is due to take in a sweep: after a distance, a turn, or a loss of overlap. The latter needs
+/// a source that measures the turn: without one, what a wrong turn loses of the overlap would make it a part of the
+/// map.
+bool MapPolicy::is_keyframe_due(const Outcome& outcome) const {
+  const Pose T_keyframe_base = T_odom_keyframe_.inverse() * outcome.T_odom_base;
+  const double moved_m = T_keyframe_base.translation.norm();
+  const double turned_deg = angle_rad(T_keyframe_base.rotation) / kRadPerDeg;
+  const bool loses_overlap = outcome.turn_measured && outcome.overlap < kOverlapLeft * best_overlap_ &&
+                             (moved_m > kOverlapMoved_m || turned_deg > kOverlapMoved_deg);
+  return moved_m > options_.keyframe_m || turned_deg > options_.keyframe_deg || loses_overlap;
+}
+
 MapPolicy::Verdict MapPolicy::judge(const Outcome& outcome) {
   if (outcome.placed) {
     refused_in_a_row_ = 0;
     ++placed_;
     last_placed_ = outcome.stamp;
+    best_overlap_ = std::max(best_overlap_, outcome.overlap);
   } else if (outcome.has_points) {
     ++refused_in_a_row_;
   }
-  const Pose T_keyframe_base = T_odom_keyframe_.inverse() * outcome.T_odom_base;
-  const bool moved = T_keyframe_base.translation.norm() > options_.keyframe_m ||
-                     angle_rad(T_keyframe_base.rotation) > options_.keyframe_deg * kRadPerDeg;
   // As many sweeps contradict the map as ever fitted: it was begun wrong, and there is nothing in it to go on from.
   const bool in_doubt = !resumed_ && refused_in_a_row_ >= placed_;
   const bool carried = outcome.carried && was_placed_lately(outcome.stamp) && !in_doubt;
   const bool restarts = refused_in_a_row_ >= kRefusalsToRestart && !carried && outcome.has_points;
-  if (!restarts && !(outcome.placed && moved && !outcome.misses_most))
+  if (!restarts && !(outcome.placed && is_keyframe_due(outcome) && !outcome.misses_most))
     return Verdict::waits;
   T_odom_keyframe_ = outcome.T_odom_base;
+  best_overlap_ = 0.0;
   refused_in_a_row_ = 0;
   if (!restarts || !in_doubt)
     return Verdict::takes_in;

@@ -18,10 +18,12 @@ class MapPolicy {
   struct Outcome {
     Stamp stamp;
     Pose T_odom_base;
-    bool placed = false;      ///< by lidar
-    bool has_points = false;  ///< enough to be placed
-    bool misses_most = false; ///< of the usual correspondences: not for the map
-    bool carried = false;     ///< an odometry source tells the way
+    bool placed = false;        ///< by lidar
+    bool has_points = false;    ///< enough to be placed
+    bool misses_most = false;   ///< of the usual correspondences: not for the map
+    bool carried = false;       ///< an odometry source tells the way
+    bool turn_measured = false; ///< by a motion source
+    double overlap = 1.0;       ///< share of the points that have a correspondence in the map
   };
 
   explicit MapPolicy(const MapOptions& options) : options_(options) {}
@@ -37,8 +39,11 @@ class MapPolicy {
   [[nodiscard]] bool was_placed_lately(Stamp now) const;
 
  private:
+  [[nodiscard]] bool is_keyframe_due(const Outcome& outcome) const;
+
   MapOptions options_;
   Pose T_odom_keyframe_;
+  double best_overlap_ = 0.0; ///< since the last keyframe
   Stamp last_placed_;
   int refused_in_a_row_ = 0; ///< sweeps with points
   std::int64_t placed_ = 0;  ///< sweeps, since the map was begun

@@ -482,6 +482,17 @@ void MotionFilter::correct(const State& error) {
 
 MotionBelief MotionFilter::belief() const { return {T_odom_base_, twist_base_, covariance().inverse()}; }
 
+double MotionFilter::surprise(const Registration& found) const {
+  constexpr double kAxes = 6.0; // the pose follows from the twist
+  const Matrix12 P = covariance();
+  Vector12 moved;
+  moved << difference(found.T_target_source, T_odom_base_), found.twist_base - twist_base_;
+  const double distance = std::max(0.0, moved.dot(P.ldlt().solve(moved)));
+  const double determined = (Matrix12::Identity() + P * found.information).determinant();
+  return (kDegreesOfFreedom + kAxes) * std::log(1.0 + distance / kDegreesOfFreedom) +
+         std::log(std::max(1.0, determined));
+}
+
 void MotionFilter::see(const Pose& T_odom_base, const Vector6& twist_base, const Matrix12& information) {
   const Matrix12 P = covariance();
   Vector12 moved;

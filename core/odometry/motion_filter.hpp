@@ -106,6 +106,10 @@ class MotionFilter {
   /// The pose moves with the twist, to the end of the sweep.
   void move();
 
+  /// Twice the negative log likelihood of a registration under the prediction, up to a constant: Student's t of how far
+  /// it moves pose and twist, and Occam's factor of what the points determine (MacKay 2003, 28.1). Before see().
+  [[nodiscard]] double surprise(const Registration& found) const;
+
   /// Lidar has placed the robot, with information that the points alone give.
   void see(const Pose& T_odom_base, const Vector6& twist_base, const Matrix12& information);
 

@@ -110,7 +110,7 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
   }
   if (!estimate.failed) {
     filter_.learn();
-    lidar_health_.learn(best.fit, aged_.size(), steps_.elapsed_s(sweep));
+    lidar_health_.learn(best.fit, steps_.elapsed_s(sweep));
   }
   if (observer_)
     observe(sweep, best);
@@ -183,7 +183,7 @@ Odometry::Hypothesis Odometry::assume(const Sweep& sweep, std::bitset<kMaxSource
 void Odometry::tell(MotionFilter& filter, const Sweep& sweep, const Hypothesis& hypothesis) const {
   const auto& [rotation, translation] = hypothesis.choice;
   const bool free = hypothesis.without.all();
-  const std::optional<SpecificForce> force = free ? std::nullopt : sweep.motion.specific_force;
+  const std::optional<SpecificForce> force = force_of(sweep, hypothesis.without);
   std::optional<Eigen::Vector3d> sensed_rate;
   if (force)
     if (const auto sensed = steps_.twist_base(sweep, force->source))
@@ -270,46 +270,79 @@ void Odometry::register_with(const Sweep& sweep, Hypothesis& hypothesis, const G
   hypothesis.fit.iterations += before;
 }
 
-/// Twice the logarithm of the odds that all are right of whom the choice is and who feels the force.
-double Odometry::all_are_right(const Sweep& sweep, const SourceChoice& choice) {
+/// Returns the specific force of a sweep, unless its source is left out.
+std::optional<SpecificForce> Odometry::force_of(const Sweep& sweep, std::bitset<kMaxSources> without) {
+  const std::optional<SpecificForce>& force = sweep.motion.specific_force;
+  return force && !without[index_of(force->source)] ? force : std::nullopt;
+}
+
+/// Returns twice the logarithm of the odds that all sources are right that are used when some are left out. The
+/// accelerometer counts as a source.
+double Odometry::odds_of_sources(const Sweep& sweep, std::bitset<kMaxSources> without) const {
+  const SourceChoice choice = choose_among(sweep, without);
   const int sources = int{choice.rotation.has_value()} +
                       int{choice.translation.has_value() && choice.translation != choice.rotation} +
-                      int{sweep.motion.specific_force.has_value()};
+                      int{force_of(sweep, without).has_value()};
   return kSourceIsRight * sources;
 }
 
-/// Of what may be true, what is likeliest by what the surfaces say and by the odds that sources are right.
-Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopRequested& stop) {
-  const auto attempt = [&](std::bitset<kMaxSources> without, bool rests) {
-    Hypothesis hypothesis = assume(sweep, without, rests);
-    register_with(sweep, hypothesis, stop);
-    return hypothesis;
+Odometry::Hypothesis Odometry::attempt(const Sweep& sweep, std::bitset<kMaxSources> without, bool rests,
+                                       const Gicp::StopRequested& stop) {
+  Hypothesis hypothesis = assume(sweep, without, rests);
+  register_with(sweep, hypothesis, stop);
+  return hypothesis;
+}
+
+/// Compares the hypotheses that a source is wrong, or that all are, with the one that all are right: by the likelihood
+/// of the points, of the motion that they show, and of the faults. Tries them only where a source contradicts the
+/// others or the sweep fits unusually badly. Returns the registration without sources where it fits better and the
+/// faults that it assumes are too unlikely.
+std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Hypothesis& best,
+                                                      const Gicp::StopRequested& stop) {
+  const auto contradiction = worst_source(sweep, best);
+  const auto is_unusual = [&] { return lidar_health_.is_unusual(best.fit); };
+  if ((!contradiction && !is_unusual()) || stop()) // a registration that was cut short fits badly for that alone
+    return std::nullopt;
+  const auto gained = [&](const Hypothesis& other) {
+    return evidence(other.fit, best.fit) + best.filter.surprise(best.fit) - other.filter.surprise(other.fit);
   };
-  Hypothesis best = attempt({}, false);
+  const auto odds_against = [&](const Hypothesis& other) {
+    return odds_of_sources(sweep, best.without) - odds_of_sources(sweep, other.without);
+  };
+  std::array<std::optional<SourceId>, 2> suspects{best.choice.translation, best.choice.rotation};
+  if (suspects[0] == suspects[1])
+    suspects[1].reset();
+  if (contradiction && suspects[1] && index_of(*suspects[1]) == contradiction->source)
+    std::swap(suspects[0], suspects[1]);
+  for (const std::optional<SourceId>& suspect : suspects) {
+    const bool is_explained = best.without.any() && !is_unusual();
+    if (!suspect || is_explained || stop())
+      continue;
+    std::bitset<kMaxSources> without;
+    without.set(index_of(*suspect));
+    if (Hypothesis other = attempt(sweep, without, false, stop); gained(other) > odds_against(other))
+      best = other;
+  }
+  if (!is_unusual() || stop() || !(suspects[0] || suspects[1]))
+    return std::nullopt;
+  Hypothesis free = attempt(sweep, kAllSources, false, stop);
+  const double gain = gained(free);
+  if (gain > odds_against(free))
+    best = free;
+  else if (gain > 0.0)
+    return free.fit;
+  return std::nullopt;
+}
+
+/// Returns the likeliest hypothesis about a sweep.
+Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopRequested& stop) {
+  Hypothesis best = attempt(sweep, {}, false, stop);
   gravity_.observe(filter_.pose().rotation.conjugate() * best.filter.pose().rotation, sweep);
   flat_ground_.observe(sweep.end, gravity_.up_base());
   if (sweep.points.size() < kMinPoints)
     return best;
-  Hypothesis first = best;
-  const auto contradiction = worst_source(sweep, best);
-  const bool unusual = lidar_health_.is_unusual(best.fit, aged_.size());
-  std::optional<Registration> lidar_alone; // set where it would place the robot elsewhere and is not believed
-
-  if ((contradiction || (unusual && best.choice.rotation)) && !stop()) { // what was cut short fits badly for that alone
-    std::bitset<kMaxSources> without = best.without;
-    without.set(contradiction ? contradiction->source : index_of(*best.choice.rotation));
-    const double against = contradiction ? kInnovationGate * contradiction->test_ratio : 0.0;
-    if (Hypothesis other = attempt(without, false); evidence(other.fit, best.fit) + against > kSourceIsRight)
-      best = other;
-    if (lidar_health_.is_unusual(best.fit, aged_.size())) {
-      Hypothesis free = attempt(kAllSources, false);
-      const double gained = evidence(free.fit, best.fit);
-      if (gained > all_are_right(sweep, best.choice))
-        best = free;
-      else if (gained > 0.0)
-        lidar_alone = free.fit;
-    }
-  }
+  const Hypothesis first = best;
+  const std::optional<Registration> lidar_alone = consider_faults(sweep, best, stop);
   const Vector6 twist = best.filter.twist_base();
   const Vector6 sigma = best.filter.covariance().diagonal().tail<6>().cwiseSqrt();
   const bool may_rest = (twist.array().abs() < kRest_sigma * sigma.array() + 1e-3).all();
@@ -321,7 +354,8 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
   if (!slow)
     slow_since_ = sweep.end;
   if (may_rest && (stands_ || sweep.end - slow_since_ >= kSlowFor)) {
-    if (Hypothesis rest = attempt(best.without, true); fit_of(rest.fit) > kAsGoodAtRest * fit_of(best.fit)) {
+    if (Hypothesis rest = attempt(sweep, best.without, true, stop);
+        fit_of(rest.fit) > kAsGoodAtRest * fit_of(best.fit)) {
       rest.filter.put(filter_.pose());
       best = rest;
     }
@@ -363,11 +397,10 @@ std::optional<Odometry::Contradiction> Odometry::worst_source(const Sweep& sweep
 /// Whether a registration is believed. What misses most of what is usually seen gives way to motion sources that say
 /// otherwise, as `all_sources` has them, unless nothing was seen for a while.
 bool Odometry::is_placed(const Sweep& sweep, const Registration& fit, const Hypothesis& all_sources) const {
-  if (fit.iterations == 0 || !fit.T_target_source.finite() ||
-      static_cast<double>(fit.inliers) < kMinInlierShare * static_cast<double>(aged_.size()))
+  if (fit.iterations == 0 || !fit.T_target_source.finite() || fit.overlap() < kMinInlierShare)
     return false;
   const bool had_sight = saw_ || (map_policy_.is_refused() && map_policy_.was_placed_lately(sweep.end));
-  if (!all_sources.choice.translation || !had_sight || !lidar_health_.misses_most(fit, aged_.size()))
+  if (!all_sources.choice.translation || !had_sight || !lidar_health_.misses_most(fit))
     return true;
   const Vector6 deviation = difference(fit.T_target_source, all_sources.filter.pose()).cwiseAbs();
   const Vector6 sigma = all_sources.filter.covariance().diagonal().head<6>().cwiseSqrt();
@@ -468,8 +501,10 @@ void Odometry::finish(const Sweep& sweep, OdometryEstimate& estimate) {
                          .T_odom_base = estimate.T_odom_base,
                          .placed = !estimate.failed,
                          .has_points = scan_.size() >= kMinPoints,
-                         .misses_most = lidar_health_.misses_most(estimate.scan_to_submap, aged_.size()),
-                         .carried = estimate.prior.translation.has_value()});
+                         .misses_most = lidar_health_.misses_most(estimate.scan_to_submap),
+                         .carried = estimate.prior.translation.has_value(),
+                         .turn_measured = estimate.prior.rotation.has_value(),
+                         .overlap = estimate.scan_to_submap.overlap()});
   if (verdict == MapPolicy::Verdict::begins_anew)
     map_.clear();
   if (verdict != MapPolicy::Verdict::waits) {

@@ -120,7 +120,10 @@ class Odometry {
   void match_last(const Sweep& sweep, const MotionBelief& belief, Hypothesis& hypothesis,
                   const Gicp::StopRequested& stop);
   void register_with(const Sweep& sweep, Hypothesis& hypothesis, const Gicp::StopRequested& stop);
-  [[nodiscard]] static double all_are_right(const Sweep& sweep, const SourceChoice& choice);
+  [[nodiscard]] static std::optional<SpecificForce> force_of(const Sweep& sweep, std::bitset<kMaxSources> without);
+  [[nodiscard]] double odds_of_sources(const Sweep& sweep, std::bitset<kMaxSources> without) const;
+  std::optional<Registration> consider_faults(const Sweep& sweep, Hypothesis& best, const Gicp::StopRequested& stop);
+  Hypothesis attempt(const Sweep& sweep, std::bitset<kMaxSources> without, bool rests, const Gicp::StopRequested& stop);
   Hypothesis choose(const Sweep& sweep, const Gicp::StopRequested& stop);
   void tell(MotionFilter& filter, const Sweep& sweep, const Hypothesis& hypothesis) const;
   void observe(const Sweep& sweep, const Hypothesis& best);

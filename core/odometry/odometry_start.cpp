@@ -107,7 +107,7 @@ void Odometry::find_start(const Sweep& sweep, const Gicp::StopRequested& stop) {
     if (!stop()) // what was cut short fits badly for that alone
       find_once_more(first, sweep, *start);
   } else if (start) {
-    lidar_health_.learn(start->fit, sweep.registered, steps_.elapsed_s(sweep));
+    lidar_health_.learn(start->fit, steps_.elapsed_s(sweep));
     map_.clear();
   }
   free_space_.forget(); // the first sweep was not corrected for any motion
@@ -136,7 +136,7 @@ std::optional<Odometry::Start> Odometry::find_first_motion(const Sweep& first, c
   Start start = start_without({}, first, sweep, stop);
   if (const SourceChoice choice = choose_among(sweep, {}); choice.rotation && !stop())
     if (Start free = start_without(kAllSources, first, sweep, stop);
-        evidence(free.fit, start.fit) > all_are_right(sweep, choice))
+        evidence(free.fit, start.fit) > odds_of_sources(sweep, {}))
       start = free;
   if (static_cast<double>(start.fit.inliers) < kMinOverlap * static_cast<double>(sweep.registered))
     return std::nullopt;
@@ -161,7 +161,7 @@ void Odometry::find_once_more(const Sweep& first, const Sweep& sweep, const Star
     return;
   start_ = run_before_->moved_to(found->place);
   begin_filter(start_->T_odom_base, start);
-  lidar_health_.learn(found->fit, first.registered, steps_.elapsed_s(sweep));
+  lidar_health_.learn(found->fit, steps_.elapsed_s(sweep));
 }
 
 /// The motion between the first two sweeps, if their points are corrected as some sources would not have it.

@@ -202,6 +202,7 @@ TEST(Gicp, TheInformationTellsTheErrorsThatAreMade) {
 
 Registration fitting(std::size_t inliers, double mean_error = 1.0) {
   Registration registration;
+  registration.points = 1000;
   registration.inliers = inliers;
   registration.mean_error = mean_error;
   return registration;
@@ -226,11 +227,17 @@ TEST(Evidence, IsForWhatFitsBetterAndAgainstTheOther) {
 }
 
 TEST(Evidence, CountsAPointAsTheInformationOfTheRegistrationDoes) {
-  // A hundred points more, 8 each, of which 0.06 count as independent.
-  EXPECT_NEAR(evidence(fitting(900, 1.0), fitting(800, 1.0)), 0.06 * 100.0 * 8.0, 1e-9);
+  // A hundred points more, 4.2 less 1 each, of which 0.06 count as independent. Shares of 0.45 and 0.55 are as likely.
+  EXPECT_NEAR(evidence(fitting(550, 1.0), fitting(450, 1.0)), 0.06 * 100.0 * 3.2, 1e-9);
   // Surfaces that fit as well as is possible.
   EXPECT_NEAR(evidence(fitting(900, 0.3), fitting(900, 0.4)), 0.06 / 0.3 * 900.0 * 0.1, 1e-9);
   EXPECT_NEAR(evidence(fitting(900, 0.1), fitting(900, 0.2)), 0.06 / 0.3 * 900.0 * 0.1, 1e-9);
+}
+
+TEST(Evidence, WhereLittleIsMappedSlidingBackOntoTheMapGainsNothing) {
+  EXPECT_GT(evidence(fitting(900), fitting(800)), 10.0);
+  EXPECT_LT(evidence(fitting(200), fitting(100)), 0.0);
+  EXPECT_LT(evidence(fitting(100), fitting(0)), 0.0);
 }
 
 TEST(Evidence, WhereTheSceneFitsBadlyADifferenceSaysLess) {

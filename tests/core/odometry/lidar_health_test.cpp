@@ -8,11 +8,12 @@
 namespace locus {
 namespace {
 
-constexpr std::size_t kRegistered = 1000;
+constexpr std::size_t kPoints = 1000;
 constexpr double kPeriod_s = 0.1;
 
-Registration fit(std::size_t inliers, double mean_error = 1.0) {
+Registration fit(std::size_t inliers, double mean_error = 1.0, std::size_t points = kPoints) {
   Registration registration;
+  registration.points = points;
   registration.inliers = inliers;
   registration.mean_error = mean_error;
   return registration;
@@ -22,62 +23,62 @@ Registration fit(std::size_t inliers, double mean_error = 1.0) {
 LidarHealth used_to(const Registration& registration, double period_s = kPeriod_s) {
   LidarHealth health;
   for (int i = 0; i < static_cast<int>(2.0 / period_s); ++i)
-    health.learn(registration, kRegistered, period_s);
+    health.learn(registration, period_s);
   return health;
 }
 
 TEST(LidarHealth, KnowsNothingUnusualBeforeTheFirstSweep) {
   const LidarHealth health;
-  EXPECT_FALSE(health.misses_most(fit(0), kRegistered));
-  EXPECT_FALSE(health.is_unusual(fit(0), kRegistered));
+  EXPECT_FALSE(health.misses_most(fit(0)));
+  EXPECT_FALSE(health.is_unusual(fit(0)));
 }
 
 TEST(LidarHealth, TheFirstSweepIsTheUsualAtOnce) {
   LidarHealth health;
-  health.learn(fit(900), kRegistered, kPeriod_s);
-  EXPECT_TRUE(health.misses_most(fit(449), kRegistered));
-  EXPECT_FALSE(health.misses_most(fit(451), kRegistered));
+  health.learn(fit(900), kPeriod_s);
+  EXPECT_TRUE(health.misses_most(fit(449)));
+  EXPECT_FALSE(health.misses_most(fit(451)));
 }
 
 TEST(LidarHealth, MissesMostBelowHalfOfTheUsualShare) {
   const LidarHealth health = used_to(fit(600));
-  EXPECT_TRUE(health.misses_most(fit(299), kRegistered));
-  EXPECT_FALSE(health.misses_most(fit(301), kRegistered));
-  EXPECT_FALSE(health.misses_most(fit(31), kRegistered / 10)) << "a share, whatever the number of points";
+  EXPECT_TRUE(health.misses_most(fit(299)));
+  EXPECT_FALSE(health.misses_most(fit(301)));
+  EXPECT_FALSE(health.misses_most(fit(31, 1.0, kPoints / 10))) << "a share, whatever the number of points";
 }
 
 TEST(LidarHealth, AFitIsUnusualThatIsWorseByASeventh) {
   const LidarHealth health = used_to(fit(800, 1.0));
-  EXPECT_FALSE(health.is_unusual(fit(800, 1.0), kRegistered));
-  EXPECT_TRUE(health.is_unusual(fit(679, 1.0), kRegistered)) << "fewer";
-  EXPECT_FALSE(health.is_unusual(fit(681, 1.0), kRegistered));
-  EXPECT_TRUE(health.is_unusual(fit(800, 2.21), kRegistered)) << "farther off";
-  EXPECT_FALSE(health.is_unusual(fit(800, 2.19), kRegistered));
-  EXPECT_FALSE(health.is_unusual(fit(80, 1.0), kRegistered / 10));
+  EXPECT_FALSE(health.is_unusual(fit(800, 1.0)));
+  EXPECT_TRUE(health.is_unusual(fit(679, 1.0))) << "fewer";
+  EXPECT_FALSE(health.is_unusual(fit(681, 1.0)));
+  EXPECT_TRUE(health.is_unusual(fit(800, 2.21))) << "farther off";
+  EXPECT_FALSE(health.is_unusual(fit(800, 2.19)));
+  EXPECT_FALSE(health.is_unusual(fit(80, 1.0, kPoints / 10)));
 }
 
 TEST(LidarHealth, AnotherPlaceIsUsualAfterSecondsAtAnyRate) {
   for (const double period_s : {0.2, 0.1, 0.05}) {
     LidarHealth health = used_to(fit(1000), period_s);
-    EXPECT_TRUE(health.misses_most(fit(400), kRegistered));
+    EXPECT_TRUE(health.misses_most(fit(400)));
     for (int i = 0; i < static_cast<int>(std::lround(1.0 / period_s)); ++i)
-      health.learn(fit(400), kRegistered, period_s);
-    EXPECT_FALSE(health.misses_most(fit(400), kRegistered));
+      health.learn(fit(400), period_s);
+    EXPECT_FALSE(health.misses_most(fit(400)));
     const double left = std::exp(-1.0), usual = 400 + 600 * left;
-    EXPECT_FALSE(health.misses_most(fit(static_cast<std::size_t>(0.5 * usual) + 1), kRegistered)) << period_s;
+    EXPECT_FALSE(health.misses_most(fit(static_cast<std::size_t>(0.5 * usual) + 1))) << period_s;
     const double least_left = std::pow(0.8, 5), least = 400 + 600 * least_left;
-    EXPECT_TRUE(health.misses_most(fit(static_cast<std::size_t>(0.5 * least) - 1), kRegistered)) << period_s;
+    EXPECT_TRUE(health.misses_most(fit(static_cast<std::size_t>(0.5 * least) - 1))) << period_s;
   }
 }
 
 TEST(LidarHealth, ASweepOfNoPointsIsNoDivisionByNothing) {
   LidarHealth health;
-  health.learn(fit(0), 0, 0.0);
-  health.learn(fit(0), 0, kPeriod_s);
-  EXPECT_FALSE(health.misses_most(fit(0), 0));
-  EXPECT_FALSE(health.is_unusual(fit(0), 0));
+  health.learn(fit(0, 1.0, 0), 0.0);
+  health.learn(fit(0, 1.0, 0), kPeriod_s);
+  EXPECT_FALSE(health.misses_most(fit(0, 1.0, 0)));
+  EXPECT_FALSE(health.is_unusual(fit(0, 1.0, 0)));
   health = used_to(fit(800));
-  EXPECT_TRUE(health.misses_most(fit(0), 0));
+  EXPECT_TRUE(health.misses_most(fit(0, 1.0, 0)));
 }
 
 } // namespace

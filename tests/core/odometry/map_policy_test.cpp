@@ -66,6 +66,37 @@ TEST(MapPolicy, TakesInNothingThatMissesMostOfWhatIsUsual) {
   EXPECT_EQ(policy.judge(placed(2, ahead(5.0))), Verdict::takes_in);
 }
 
+MapPolicy::Outcome overlapping(int sweep, double overlap, const Pose& T_odom_base = {}, bool turn_measured = true) {
+  MapPolicy::Outcome outcome = placed(sweep, T_odom_base);
+  outcome.overlap = overlap;
+  outcome.turn_measured = turn_measured;
+  return outcome;
+}
+
+TEST(MapPolicy, LostOverlapIsAKeyframe) {
+  MapPolicy policy(kMapOptions);
+  policy.begin(end_of(0), Pose{});
+  EXPECT_EQ(policy.judge(overlapping(1, 0.8)), Verdict::waits);
+  EXPECT_EQ(policy.judge(overlapping(2, 0.69, ahead(0.0, 6.0))), Verdict::waits) << "0.86 of the best";
+  EXPECT_EQ(policy.judge(overlapping(3, 0.67, ahead(0.0, 6.0))), Verdict::takes_in) << "0.84 of it, after a turn";
+  EXPECT_EQ(policy.judge(overlapping(4, 0.67, ahead(0.2, 6.0))), Verdict::waits) << "the best since the last one";
+  EXPECT_EQ(policy.judge(overlapping(5, 0.55, ahead(0.2, 6.0))), Verdict::takes_in) << "after a distance";
+}
+
+TEST(MapPolicy, LostOverlapIsNoKeyframeOfARobotThatStands) {
+  MapPolicy policy(kMapOptions);
+  policy.begin(end_of(0), Pose{});
+  EXPECT_EQ(policy.judge(overlapping(1, 0.8)), Verdict::waits);
+  EXPECT_EQ(policy.judge(overlapping(2, 0.4, ahead(0.09, 4.9))), Verdict::waits) << "people in front of it";
+}
+
+TEST(MapPolicy, LostOverlapIsNoKeyframeWhereNoSourceMeasuresTheTurn) {
+  MapPolicy policy(kMapOptions);
+  policy.begin(end_of(0), Pose{});
+  EXPECT_EQ(policy.judge(overlapping(1, 0.8, {}, false)), Verdict::waits);
+  EXPECT_EQ(policy.judge(overlapping(2, 0.5, ahead(0.5, 20.0), false)), Verdict::waits);
+}
+
 TEST(MapPolicy, TakesInNothingThatLidarDidNotPlace) {
   MapPolicy policy = policy_begun();
   EXPECT_EQ(policy.judge(refused(1, ahead(5.0))), Verdict::waits) << "one sweep against one";

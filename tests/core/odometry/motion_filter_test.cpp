@@ -50,6 +50,26 @@ TEST(MotionFilter, IsAsSureAsItIsRightWithWheelsAndGyro) { expect_consistent({})
 TEST(MotionFilter, IsAsSureAsItIsRightWithAccelerometerAndGyro) { expect_consistent({.wheels = false, .force = true}); }
 TEST(MotionFilter, IsAsSureAsItIsRightWithAllSensors) { expect_consistent({.force = true}); }
 
+// --- Evidence -----------------------------------------------------------------------------------------------------
+
+TEST(MotionFilter, SurpriseIsStudentsOfTheMotionAndOccamsFactorOfThePoints) {
+  GaussianRobot robot(winding, {}, 1);
+  MotionFilter filter = begun_with(robot, winding);
+  filter.predict(0.1, 0.1, std::nullopt, {});
+  filter.move();
+  Registration found;
+  found.T_target_source = filter.pose();
+  found.twist_base = filter.twist_base();
+  EXPECT_NEAR(filter.surprise(found), 0.0, 1e-6);
+  const Matrix12 P = filter.covariance();
+  found.information = 3.0 * P.inverse();
+  EXPECT_NEAR(filter.surprise(found), 12.0 * std::log(1.0 + 3.0), 1e-3) << "of P information^-1 = 3 along each axis";
+  found.information.setZero();
+  // One conditional standard deviation of the rate of yaw, all else as predicted.
+  found.twist_base[5] += 1.0 / std::sqrt(P.inverse()(11, 11));
+  EXPECT_NEAR(filter.surprise(found), 10.0 * std::log(1.0 + 1.0 / 4.0), 1e-3);
+}
+
 // --- Unobserved axes ----------------------------------------------------------------------------------------------
 
 /// Wheels are the only source along x: their own measurements must not change their scale.
