@@ -18,21 +18,21 @@ namespace locus {
 
 namespace {
 
-/// Where fewer of the points than this find a plane, as in a thicket, shapeless voxels serve as well. Elsewhere they
-/// would only tie the robot to where the scan lines fell.
+/// Share of points with a plane below which voxels without one serve as correspondences as well, as in a thicket.
+/// Elsewhere they would only tie the robot to the pattern of the scan lines.
 constexpr double kFewPlanes = 0.4;
 
-constexpr double kDamping = 1e-6; ///< keeps directions solvable that neither points nor prior know
+constexpr double kDamping = 1e-6; ///< regularises directions that neither points nor prior constrain
 
-/// Geman-McClure width in standard deviations: begins wide to reach far, narrows with each look-up to shut out what
-/// does not fit.
+/// Geman-McClure width in standard deviations: starts wide for a large basin of convergence, and narrows with each
+/// search for correspondences to reject outliers.
 constexpr double kWidthStartWide = 80.0;
 constexpr double kWidthStart = 12.0;
 constexpr double kWidthEnd = 3.5;
 constexpr double kNarrowing = 0.25;
 
-/// Points of one voxel, one arc, one object are not independent: what all say together is that part of what they seem
-/// to say, and less where they fit worse than their surfaces tell, which differs twentyfold between scenes.
+/// Scale factor of the information, because residuals of one voxel, arc or object are correlated. Smaller if the fit is
+/// worse than the surfaces' covariances predict, which differs twentyfold between scenes.
 constexpr double kIndependent = 0.06;
 constexpr double kBestFit = 0.3; ///< mean squared Mahalanobis distance
 /// Squared Mahalanobis distance at which a point is as likely in unmapped space as on a surface: 2 ln(L / sqrt(2 pi)),
@@ -40,15 +40,15 @@ constexpr double kBestFit = 0.3; ///< mean squared Mahalanobis distance
 constexpr double kUnmapped = 4.2;
 double honest_share(double mean_error) { return kIndependent / std::max(kBestFit, mean_error); }
 
-/// The products of as many normals that err independently come to that much by chance, in standard deviations; it is
-/// no information (the estimator of James and Stein). It is not claimed, though the registration follows it: what
-/// little a sweep tells is better than nothing.
+/// Noise floor of the normal products (2 sigma): products of as many independent errors reach it by chance. Subtracted
+/// from the reported information only (James-Stein). The solution follows it all the same: weak information from a
+/// sweep is better than none.
 constexpr double kByChance_sigma = 2.0;
-constexpr double kNothing = 1e-9; ///< of information
+constexpr double kNothing = 1e-9; ///< least information
 
-/// An error that a sweep has in common: of the calibration, of the angle at which surfaces are hit, of what the map has
-/// taken in of both. It is considered (Schmidt), not estimated. Where a few surfaces stand across, it costs little;
-/// along a corridor, of which a thousand leaning normals tell, it leaves nothing.
+/// Error common to all points of a sweep: of the calibration, of the angle of incidence, and of both in the map.
+/// Considered (Schmidt), not estimated. It costs little where a few surfaces face the motion, and leaves nothing along
+/// a corridor, where the information comes from a thousand slightly tilted normals.
 constexpr double kCommonError_m = 0.001;
 
 constexpr double kConvergedTranslation_m = 1e-3;
@@ -66,7 +66,7 @@ Axes axes_of(const Normals& normals) {
 
 constexpr double square(double x) { return x * x; }
 
-/// What a matrix does to the pose, in the target's axes, it does to the twist in those of the base.
+/// Applies a matrix of the pose (target axes) to the twist as well (base axes).
 Matrix12 pose_and_twist(const Matrix6& of_pose, const Matrix6& R_target_base) {
   Matrix12 both = Matrix12::Zero();
   both.topLeftCorner<6, 6>() = of_pose;
@@ -76,12 +76,12 @@ Matrix12 pose_and_twist(const Matrix6& of_pose, const Matrix6& R_target_base) {
 
 /// Normal equations of pose and twist.
 struct ElasticEquations {
-  Matrix12 H = Matrix12::Zero(); ///< once complete, of the equations to be solved: not symmetric
+  Matrix12 H = Matrix12::Zero(); ///< after complete(): of the equations to be solved, not symmetric
   Matrix12 information;
   Vector12 b = Vector12::Zero();
   NormalEquations of_pose;
 
-  /// Those of a block of points that are `age_s` old.
+  /// Adds the equations of a block of points that are `age_s` old.
   void add(const NormalEquations& block, double age_s, const Matrix6& R_target_base) {
     of_pose += block;
     if (age_s == 0.0)
@@ -95,7 +95,7 @@ struct ElasticEquations {
     H.topLeftCorner<6, 6>() = of_pose.H;
     H.bottomLeftCorner<6, 6>() = H.topRightCorner<6, 6>().transpose();
     b.head<6>() = of_pose.b;
-    Matrix6 solved = Matrix6::Zero(), claimed = Matrix6::Zero(); // square roots of what is left of the information
+    Matrix6 solved = Matrix6::Zero(), claimed = Matrix6::Zero(); // square roots of the remaining share of information
     const double independent = std::max(1.0, kIndependent * of_pose.weight);
     for (int side = 0; side < 6; ++side) {
       Vector6 axis = Vector6::Unit(side);
@@ -123,7 +123,7 @@ struct ElasticEquations {
 } // namespace
 
 struct Gicp::Workers {
-  /// No more than there are processors: TBB would not start them, and says so on stderr.
+  /// At most one thread per processor: TBB would not start more, and warns on stderr.
   Workers(int threads, Isa with_isa)
       : arena(std::min(threads, tbb::info::default_concurrency())), parallel(threads > 1), isa(with_isa) {}
 
@@ -147,14 +147,14 @@ struct Gicp::Workers {
     twist_of_scan = source.twist_base;
   }
 
-  /// Where the frame of a block lies in the target for a base that moved with `twist_base`.
+  /// Returns the pose of a block's frame in the target, for a base that moved with `twist_base`.
   [[nodiscard]] Pose place(std::size_t block, const Pose& T_target_source, const Vector6& twist_base) const {
     if (age_s[block] == 0.0)
       return T_target_source;
     return T_target_source * se3_exp(-age_s[block] * twist_base) * se3_exp(age_s[block] * twist_of_scan);
   }
 
-  /// One pass over all points, block by block in a fixed order of summation.
+  /// Runs one pass over all points, block by block in a fixed order of summation.
   ElasticEquations run(GicpPass pass, const Vector6& twist_base) {
     const auto of = [&](std::size_t block) {
       GicpPass of_block = pass;
@@ -192,14 +192,14 @@ struct Gicp::Workers {
     return gradients / std::max(normals().points, 1.0);
   }
 
-  /// Our own: other users of TBB in the process neither slow us nor are bound by our number of threads.
+  /// Private arena: other users of TBB in the process neither compete with it nor inherit its number of threads.
   tbb::task_arena arena;
   bool parallel;
   Isa isa;
   std::vector<SourceBlock> blocks;
   std::vector<MatchBlock> matches;
   std::vector<NormalEquations> partial;
-  std::vector<double> age_s; ///< of the blocks
+  std::vector<double> age_s; ///< age of each block
   Axes axes{};
   Vector6 twist_of_scan = Vector6::Zero();
 };
@@ -209,7 +209,7 @@ Gicp::~Gicp() = default;
 
 namespace {
 
-/// Gauss-Newton step from where the registration stands.
+/// Returns the Gauss-Newton step from `at`.
 Vector12 solve(const ElasticEquations& points, const Registration& at, const MotionBelief& prior) {
   Vector12 from_prior;
   from_prior << difference(at.T_target_source, prior.T_target_source), at.twist_base - prior.twist_base;
@@ -244,7 +244,7 @@ double fit_of(const Registration& registration) {
 
 namespace {
 
-/// Twice the negative log likelihood of the points under the mixture of evidence().
+/// Returns twice the negative log likelihood of the points under the mixture of evidence().
 double mixture_cost(const Registration& registration) {
   const auto all = static_cast<double>(registration.points), mapped = static_cast<double>(registration.inliers);
   const auto weighed = [&](double part) { return part > 0.0 ? -2.0 * part * std::log(part / all) : 0.0; };

@@ -8,14 +8,14 @@ namespace locus {
 
 namespace {
 
-/// After so many refusals in a row the submap is behind us, and the map goes on from the prediction. Where wheels or
-/// legs carry the estimate it waits, for so long since lidar last placed the robot: what is measured wrong must not get
-/// into the map.
+/// Consecutive rejections after which the submap is out of sight and mapping resumes from the prediction. While wheels
+/// or legs carry the estimate, mapping waits until kLately after the last accepted registration, to keep errors of a
+/// wrong measurement out of the map.
 constexpr int kRefusalsToRestart = 10;
 constexpr Duration kLately = std::chrono::seconds{5};
 
-/// Part of the best overlap since the last keyframe below which the next one is due, if the robot has moved by as much
-/// as this: a narrow view turns to unmapped space long before the robot has driven a metre.
+/// Share of the best overlap since the last keyframe below which the next one is due, if the robot has also moved this
+/// far: a narrow view turns to unmapped space long before the robot has driven a metre.
 constexpr double kOverlapLeft = 0.85;
 constexpr double kOverlapMoved_m = 0.1, kOverlapMoved_deg = 5.0;
 
@@ -31,9 +31,8 @@ void MapPolicy::begin(Stamp stamp, const Pose& T_odom_base) {
 
 bool MapPolicy::was_placed_lately(Stamp now) const { return std::chrono::abs(now - last_placed_) < kLately; }
 
-/// Returns whether the map is due to take in a sweep: after a distance, a turn, or a loss of overlap. The latter needs
-/// a source that measures the turn: without one, what a wrong turn loses of the overlap would make it a part of the
-/// map.
+/// Returns whether a keyframe is due: after a distance, a rotation, or a loss of overlap. The last requires a source
+/// that measures rotation; without one, a wrong rotation would lose overlap and then enter the map.
 bool MapPolicy::is_keyframe_due(const Outcome& outcome) const {
   const Pose T_keyframe_base = T_odom_keyframe_.inverse() * outcome.T_odom_base;
   const double moved_m = T_keyframe_base.translation.norm();
@@ -52,7 +51,7 @@ MapPolicy::Verdict MapPolicy::judge(const Outcome& outcome) {
   } else if (outcome.has_points) {
     ++refused_in_a_row_;
   }
-  // As many sweeps contradict the map as ever fitted: it was begun wrong, and there is nothing in it to go on from.
+  // At least as many sweeps contradict the map as ever fitted: it was started wrong and is of no use.
   const bool in_doubt = !resumed_ && refused_in_a_row_ >= placed_;
   const bool carried = outcome.carried && was_placed_lately(outcome.stamp) && !in_doubt;
   const bool restarts = refused_in_a_row_ >= kRefusalsToRestart && !carried && outcome.has_points;

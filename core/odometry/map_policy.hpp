@@ -9,8 +9,7 @@
 
 namespace locus {
 
-/// What becomes of the map with a sweep: whether it takes the sweep in (paper II-B.3), waits, or begins anew. One
-/// owner.
+/// Decides whether the map takes in a sweep (paper II-B.3), waits, or restarts. One owner.
 class MapPolicy {
  public:
   enum class Verdict : std::uint8_t { waits, takes_in, begins_anew };
@@ -18,23 +17,23 @@ class MapPolicy {
   struct Outcome {
     Stamp stamp;
     Pose T_odom_base;
-    bool placed = false;        ///< by lidar
-    bool has_points = false;    ///< enough to be placed
-    bool misses_most = false;   ///< of the usual correspondences: not for the map
-    bool carried = false;       ///< an odometry source tells the way
-    bool turn_measured = false; ///< by a motion source
+    bool placed = false;        ///< accepted registration
+    bool has_points = false;    ///< enough for a registration
+    bool misses_most = false;   ///< misses most of the usual correspondences; not inserted
+    bool carried = false;       ///< an odometry source measures the translation
+    bool turn_measured = false; ///< a motion source measures the rotation
     double overlap = 1.0;       ///< share of the points that have a correspondence in the map
   };
 
   explicit MapPolicy(const MapOptions& options) : options_(options) {}
 
-  /// The map holds what another run left behind, and the first sweep was found in it.
+  /// Marks the map as one of another run in which the first sweep was found.
   void resume() { resumed_ = true; }
-  /// The first sweep, or one that begins the map anew.
+  /// Starts with the first sweep, or one that restarts the map.
   void begin(Stamp stamp, const Pose& T_odom_base);
   Verdict judge(const Outcome& outcome);
 
-  /// The last sweep with points was not placed.
+  /// Returns whether the registration of the last sweep with points was rejected.
   [[nodiscard]] bool is_refused() const { return refused_in_a_row_ > 0; }
   [[nodiscard]] bool was_placed_lately(Stamp now) const;
 
@@ -45,8 +44,8 @@ class MapPolicy {
   Pose T_odom_keyframe_;
   double best_overlap_ = 0.0; ///< since the last keyframe
   Stamp last_placed_;
-  int refused_in_a_row_ = 0; ///< sweeps with points
-  std::int64_t placed_ = 0;  ///< sweeps, since the map was begun
+  int refused_in_a_row_ = 0; ///< consecutive rejected sweeps with points
+  std::int64_t placed_ = 0;  ///< accepted sweeps since the map was started
   bool resumed_ = false;
 };
 

@@ -14,7 +14,7 @@ namespace locus {
 
 namespace {
 
-/// Where the parts of the state begin.
+/// Offsets of the parts of the state.
 enum : int {
   kPosition = 0,
   kTurn = 3,
@@ -33,61 +33,62 @@ Vector6 squares(double translation, double rotation) {
       .finished();
 }
 
-/// None goes on for long sideways or upwards, rolls or pitches on. Ahead and in yaw a robot goes on as it did, but what
-/// is told of neither for a second is taken to come to rest.
+/// Decay time constants of the twist. Lateral, vertical, roll and pitch rates decay fast. Forward speed and yaw rate
+/// persist for kGoesOn_s after the last measurement.
 const Vector6 kFades_s = (Vector6() << 0.6, 0.3, 0.3, 0.3, 0.3, 0.6).finished();
 constexpr double kGoesOn_s = 1.0;
-constexpr double kTold = 0.5; ///< of the variance of a prediction: what is left of it when somebody tells
+constexpr double kTold = 0.5; ///< an axis is observed if an update lowers its variance below this fraction
 
-/// How its motion changes: standard deviations of the twist after a second.
+/// Process noise: variance of the twist after one second, from standard deviations in m/s and rad/s.
 const Vector6 kProcess = squares(0.7, 0.7);
 constexpr double kAbleToTurn_radps2 = 20.0; ///< one standard deviation
-constexpr double kKnownSpeed = 0.5;         ///< a speed that is known so well, in parts of the limit, may be above it
+constexpr double kKnownSpeed = 0.5;         ///< sigma of a speed, as a fraction of the limit, that halves its excess
 
-/// Noise of the sources, until it is learned, and the least: of the way and the turn after a second.
+/// Prior and least noise of the sources: variance of position and rotation after one second.
 const Vector6 kOdometryNoise = squares(0.02, 0.01), kLeastOdometryNoise = squares(0.006, 0.001);
 const Vector6 kGyroNoise = squares(1.0, 0.006), kLeastGyroNoise = squares(1.0, 0.001);
 constexpr double kForceNoise = square(0.02); ///< of the velocity after a second of specific force
 
-/// Errors that are no noise: in proportion, and of stamps that are late while the motion changes.
+/// Errors other than white noise: proportional ones, and those of late stamps while the motion changes.
 constexpr double kProportion = 0.01;
-constexpr double kLever_m = 0.1;       ///< where a sensor sits is not quite known, or what it speaks of is not the base
-constexpr double kLeverBends_m = 0.02; ///< of the accelerometer: no robot is rigid
+constexpr double kLever_m = 0.1;       ///< position error of a sensor, or of the point that it reports
+constexpr double kLeverBends_m = 0.02; ///< flexing of the accelerometer's lever arm: no robot is rigid
 constexpr double kLateOdometry_s = 0.02, kLateGyro_s = 0.003;
 
-/// What the slow states may be, and how they walk, per square root of a second.
+/// Prior standard deviations of the slow states, and their random walk per square root of a second.
 constexpr double kAccelerometerBias = 0.1, kAccelerometerWalk = 0.002;
 constexpr double kGravityError = 0.2, kGravityWalk = 0.001;
 constexpr double kGyroBias = 0.02, kGyroWalk = 1e-4;
 constexpr double kScale = 0.02, kScaleWalk = 3e-4;
-constexpr double kDirection_rad = 0.01;                       ///< in which an odometry goes when it goes ahead
-constexpr double kSlip_mps = 0.003, kSlipLasts_s = 1.0;       ///< of an odometry, ahead
-constexpr double kLate_s = 0.015, kLateWalk = 1e-5;           ///< the stamps of a gyro
-constexpr double kMounting_rad = 0.015, kMountingWalk = 1e-5; ///< of a gyro, otherwise than configured
+constexpr double kDirection_rad = 0.01;                       ///< misalignment of an odometry's forward axis
+constexpr double kSlip_mps = 0.003, kSlipLasts_s = 1.0;       ///< forward slip of an odometry
+constexpr double kLate_s = 0.015, kLateWalk = 1e-5;           ///< lateness of a gyro's stamps
+constexpr double kMounting_rad = 0.015, kMountingWalk = 1e-5; ///< deviation of a gyro's mounting from the configuration
 
-/// A turn that its own noise would explain tells nothing of how late a gyro is, or how it is mounted.
+/// A rotation within this many standard deviations of a gyro's noise carries no information on its lateness or
+/// mounting.
 constexpr double kPlain_sigma = 2.0;
 
-/// Student's t: wheels slip and visual odometry jumps more often than a Gaussian allows. A surprise of the way ahead is
-/// either over with the sweep, or a slip begins: one error for as long as it lasts.
+/// Student's t, because wheels slip and visual odometry jumps more often than a Gaussian allows. An outlier of the
+/// forward speed either lasts one sweep or starts a slip, which is one error for as long as it lasts.
 constexpr double kDegreesOfFreedom = 4.0;
-constexpr double kSlips_per_s = 0.1; ///< that begin: the odds of the two are those and the likelihood of no slip
+constexpr double kSlips_per_s = 0.1; ///< rate at which slips begin: prior odds against the likelihood of no slip
 
-constexpr double kLearns_s = 5.0;   ///< time constant of what is learned
-constexpr double kHeard_s = 0.5;    ///< what the expectation counts for
-constexpr double kMostSigmas = 3.0; ///< an innovation teaches no more than that
+constexpr double kLearns_s = 5.0;   ///< time constant of the learned noise
+constexpr double kHeard_s = 0.5;    ///< weight of the prior noise, as a duration
+constexpr double kMostSigmas = 3.0; ///< innovations are clipped here before the noise is learned from them
 
-/// How the lidar sits otherwise than thought, before anything calibrates it.
+/// Prior variance of the lidar extrinsics (5 mm, 2 mrad). Considered, not estimated.
 const Vector6 kMountingOfLidar = squares(0.005, 0.002);
 
-const Vector6 kFirst = squares(0.003, 3e-4); ///< what the first sweep of the map may lie askew
-const Vector6 kFloor = squares(0.001, 1e-4); ///< of the pose against the submap: surfaces are no better known
+const Vector6 kFirst = squares(0.003, 3e-4); ///< alignment variance of the first sweep of the map
+const Vector6 kFloor = squares(0.001, 1e-4); ///< least pose variance against the submap: surfaces are known no better
 
-/// How many states a source has of its own: three biases, its lateness and a turn of its mounting, or two scales and
-/// two directions.
+/// Returns the number of calibration states of a source: three biases, the lateness and three mounting angles of a
+/// gyro, or two scales and two directions of an odometry.
 int states_of(SourceKind kind) { return kind == SourceKind::imu ? 7 : 4; }
 
-/// How they walk, per square root of a second.
+/// Returns the random walk of these states per square root of a second.
 LearnedSource::States walk_of(SourceKind kind) {
   if (kind == SourceKind::imu)
     return {kGyroWalk, kGyroWalk, kGyroWalk, kLateWalk, kMountingWalk, kMountingWalk, kMountingWalk};
@@ -129,7 +130,7 @@ MotionFilter::MotionFilter(const std::vector<MotionSourceOptions>& sources, cons
     const LearnedSource known = as_configured(sources[i]);
     source.first = known.states;
     source.first_variance = known.covariance.diagonal();
-    if (sources[i].calibration != Calibration::automatic) // of a gyro the bias is left, which is never configured
+    if (sources[i].calibration != Calibration::automatic) // a gyro's bias is always estimated: it is never configured
       source.first_variance
           .tail(LearnedSource::kMostStates - (source.kind == SourceKind::imu ? LearnedSource::kLate : 0))
           .setZero();
@@ -173,7 +174,7 @@ void MotionFilter::forget(SourceId source) {
   P_.diagonal().segment(of.state, of.states) = of.first_variance.head(of.states);
   if (of.slip)
     wander(*of.slip, 0.0, square(kSlip_mps), 0.0);
-  const int changed = gyro ? LearnedSource::kLate : of.states; // a gyro is as late as it was, and sits as it sat
+  const int changed = gyro ? LearnedSource::kLate : of.states; // lateness and mounting of a gyro keep their values
   x_.segment(of.state, changed) = of.first.head(changed);
   of.noise_per_s = gyro ? kGyroNoise : kOdometryNoise;
   of.learned_s.setZero();
@@ -186,7 +187,7 @@ void MotionFilter::recall(SourceId source, const LearnedSource& learned, double 
   of.noise_per_s = learned.noise_per_s;
   for (int i = 0; i < of.states; ++i) {
     if (of.first_variance[i] == 0.0)
-      continue; // the user knows better
+      continue; // configured as exact
     x_[of.state + i] = learned.states[i];
     for (int j = 0; j < of.states; ++j)
       P_(of.state + i, of.state + j) = of.first_variance[j] == 0.0 ? 0.0 : learned.covariance(i, j);
@@ -194,7 +195,7 @@ void MotionFilter::recall(SourceId source, const LearnedSource& learned, double 
   age(of, elapsed_s);
 }
 
-/// What was learned of a source is forgotten in time, and nobody is ever less sure of it than the configuration.
+/// Relaxes the calibration of a source towards its prior, so it is never less certain than the configuration.
 void MotionFilter::age(const Source& source, double elapsed_s) {
   for (int i = 0; i < source.states; ++i)
     wander(source.state + i, source.first[i], source.first_variance[i], std::exp(-source.fades_per_s[i] * elapsed_s));
@@ -202,7 +203,8 @@ void MotionFilter::age(const Source& source, double elapsed_s) {
     wander(*source.slip, 0.0, square(kSlip_mps), std::exp(-elapsed_s / kSlipLasts_s));
 }
 
-/// A state that wanders about a mean (Ornstein and Uhlenbeck).
+/// Propagates a state that reverts to a mean (Ornstein-Uhlenbeck process); `kept` is the factor by which its deviation
+/// decays.
 void MotionFilter::wander(int state, double mean, double variance, double kept) {
   x_[state] = mean + kept * (x_[state] - mean);
   P_.row(state) *= kept;
@@ -220,7 +222,7 @@ LearnedSource MotionFilter::learned(SourceId source) const {
 
 void MotionFilter::predict(double elapsed_s, double period_s, const std::optional<SpecificForce>& force,
                            Measured measured, const std::optional<Eigen::Vector3d>& sensed_rate) {
-  const double step_s = elapsed_s_ > 0.0 ? 0.5 * (elapsed_s + elapsed_s_) : elapsed_s; // between means of two sweeps
+  const double step_s = elapsed_s_ > 0.0 ? 0.5 * (elapsed_s + elapsed_s_) : elapsed_s; // between sweep centres
   const double unfelt_s = std::max(0.0, std::max(step_s, elapsed_s) - period_s);
   TwistStep step = decay(elapsed_s, step_s, unfelt_s, force.has_value(), measured);
   if (force)
@@ -242,8 +244,8 @@ void MotionFilter::predict(double elapsed_s, double period_s, const std::optiona
   elapsed_s_ = elapsed_s;
 }
 
-/// Process model without a force: axes that nobody measures come to rest. With a force the velocity does so only while
-/// it is not felt.
+/// Predicts the twist without specific force: axes that no source measures decay to rest. With specific force the
+/// velocity decays only over the time that the force does not cover.
 MotionFilter::TwistStep MotionFilter::decay(double elapsed_s, double step_s, double unfelt_s, bool felt,
                                             Measured measured) {
   TwistStep step;
@@ -260,13 +262,13 @@ MotionFilter::TwistStep MotionFilter::decay(double elapsed_s, double step_s, dou
     step.mean[axis] = kept * twist_base_[axis];
     step.variance[axis] = open ? able_[axis] * square(decays_s)
                                : kProcess[axis] * decays_s + square(twist_base_[axis]) * kept * (1.0 - kept);
-    step.F(row, row) = lasts ? 1.0 : kept; // the mean decays, the doubt does not
+    step.F(row, row) = lasts ? 1.0 : kept; // the mean decays, the standard deviation does not
   }
   return step;
 }
 
-/// Integrates the specific force. Stamps that are late and a lever arm are no noise: what they add to the velocity
-/// telescopes, so they are states.
+/// Integrates the specific force. Late stamps and a lever arm are states, not noise, because their effects on the
+/// velocity telescope.
 void MotionFilter::integrate(const SpecificForce& force, double felt_s, const Eigen::Vector3d& new_rate,
                              TwistStep& step) const {
   const Source& source = sources_[index_of(force.source)];
@@ -295,12 +297,12 @@ void MotionFilter::integrate(const SpecificForce& force, double felt_s, const Ei
   step.F.block<3, 3>(kVelocity, kLever) = -skew(new_rate - rate) - felt_s * skew(mean_rate) * skew(mean_rate);
 }
 
-/// Of the mean of the force, between the last two sweeps.
+/// Returns the change of the mean specific force between the last two sweeps (m/s^2, base axes).
 Eigen::Vector3d MotionFilter::force_change(const SpecificForce& force) const {
   return force.mean_base_mps2() - last_force_.value_or(force).mean_base_mps2();
 }
 
-/// The velocity errs by the lateness of the force times what the force has changed by.
+/// Couples the velocity with the lateness: the velocity error is the lateness times the change of the specific force.
 void MotionFilter::couple_lateness(const SpecificForce& force) {
   const int late = sources_[index_of(force.source)].state + LearnedSource::kLate;
   const Eigen::Vector3d change = force_change(force);
@@ -313,8 +315,8 @@ void MotionFilter::expect_rest() {
   twist_base_.setZero();
 }
 
-/// A speed that the robot is not able to is not expected, unless it is known. By how much it is taken down is doubt:
-/// what lidar sees goes beyond.
+/// Shrinks a predicted speed above the limit in proportion to its variance, and adds the reduction to the covariance,
+/// so registration may exceed the limit.
 void MotionFilter::limit_speed() {
   const double speed_mps = twist_base_.head<3>().norm();
   const double excess_mps = speed_mps - limits_.max_speed_mps;
@@ -337,7 +339,7 @@ void MotionFilter::move() {
   const Matrix6 R = turn_both(T_odom_last.rotation * so3_exp(0.5 * elapsed_s_ * twist_base_.tail<3>()));
   F.block<6, 6>(kPosition, kVelocity) = elapsed_s_ * R;
   F.block<3, 3>(kPosition, kRate) = -0.5 * square(elapsed_s_) * R.topLeftCorner<3, 3>() * skew(twist_base_.head<3>());
-  // Of the second order: how far a way bends that is turned and driven otherwise than thought.
+  // Second-order position variance from turn-rate and speed uncertainty.
   const double rate = P_.diagonal().segment<3>(kRate).maxCoeff(),
                speed = P_.diagonal().segment<3>(kVelocity).maxCoeff();
   const double bends =
@@ -347,7 +349,7 @@ void MotionFilter::move() {
   P_.diagonal().segment<3>(kPosition).array() += bends;
 }
 
-/// The common states change; those of the sources stay, and what they have in common with them changes along.
+/// Propagates the covariance of the common states, and their covariance with those of the sources, which do not change.
 void MotionFilter::propagate(const Common& F) {
   const int own = states_ - kCommonStates;
   P_.topLeftCorner<kCommonStates, kCommonStates>() =
@@ -356,8 +358,9 @@ void MotionFilter::propagate(const Common& F) {
   P_.bottomLeftCorner(own, kCommonStates) = P_.topRightCorner(kCommonStates, own).transpose();
 }
 
-/// What a source should read along an axis of the twist: an odometry by its scale more, a gyro by its bias, by what the
-/// rate has changed since it was as it says, and by what it takes from the other axes.
+/// Returns Jacobian and expected value of a source's reading of one axis of the twist. An odometry scales the twist,
+/// adds its slip ahead, and leaks forward speed into the other two axes. A gyro adds its bias, the effect of its
+/// lateness (rate change times lateness), and cross-axis terms of its mounting.
 MotionFilter::Row MotionFilter::row(const Source& source, const SensedTwist& sensed, int axis) const {
   Row row{State::Zero(states_), twist_base_[axis]};
   row.h[kVelocity + axis] = 1.0;
@@ -393,7 +396,7 @@ MotionFilter::Row MotionFilter::row(const Source& source, const SensedTwist& sen
 
 Vector6 MotionFilter::known_variance(const Source& source, const Vector6& twist_base) const {
   const double late_s = source.kind == SourceKind::imu ? kLateGyro_s : kLateOdometry_s;
-  const Vector6 able = elapsed_s_ * able_.cwiseSqrt(); // no robot changes its motion faster
+  const Vector6 able = elapsed_s_ * able_.cwiseSqrt(); // limit on the change of motion
   const Vector6 change = (twist_base - source.last_twist.value_or(twist_base)).cwiseMin(able).cwiseMax(-able);
   Vector6 variance = (kProportion * twist_base).cwiseAbs2() + (late_s / elapsed_s_ * change).cwiseAbs2();
   variance.head<3>().array() += square(kLever_m) * twist_base.tail<3>().squaredNorm();
@@ -430,8 +433,8 @@ void MotionFilter::measure(SourceId id, const SensedTwist& sensed, Measured what
   }
 }
 
-/// What a source cannot tell apart, its scale and the twist, lies elsewhere once the twist has changed: the covariance
-/// turns with it, or the next reading of the same source tells them apart.
+/// Rotates the covariance of a scale and the twist after the twist has changed. One source cannot separate the two, and
+/// in the old direction its next reading would appear to.
 void MotionFilter::turn_scale(int scale, int axis, double change) {
   const double turned = -change / (1.0 + x_[scale]);
   P_.row(kVelocity + axis) += turned * P_.row(scale);
@@ -447,7 +450,8 @@ void MotionFilter::rest() {
   }
 }
 
-/// What a gyro differs by from what was predicted tells nothing of the gyro: how late and how askew it is, lidar says.
+/// Applies a scalar measurement. Lateness and mounting of gyros are considered, not corrected: only lidar makes them
+/// observable.
 void MotionFilter::update(const State& h, double surprise, double variance) {
   const State Ph = P_ * h;
   const double innovation_variance = h.dot(Ph) + variance;
@@ -465,8 +469,8 @@ MotionFilter::State MotionFilter::of_map(const State& Ph) {
   return map;
 }
 
-/// By what a measurement told. The part of Ph that is considered and not corrected (Schmidt), the error of the map
-/// always, stays as uncertain as it was.
+/// Lowers the covariance after a measurement. The considered part of Ph (Schmidt), always including the error of the
+/// map, stays as uncertain as it was.
 void MotionFilter::lower(const State& Ph, const State& considered, double innovation_variance) {
   P_ -= (Ph * Ph.transpose() - considered * considered.transpose()) / innovation_variance;
   P_ = (0.5 * (P_ + P_.transpose())).eval();
@@ -483,7 +487,7 @@ void MotionFilter::correct(const State& error) {
 MotionBelief MotionFilter::belief() const { return {T_odom_base_, twist_base_, covariance().inverse()}; }
 
 double MotionFilter::surprise(const Registration& found) const {
-  constexpr double kAxes = 6.0; // the pose follows from the twist
+  constexpr double kAxes = 6.0; // degrees of freedom: the pose follows from the twist
   const Matrix12 P = covariance();
   Vector12 moved;
   moved << difference(found.T_target_source, T_odom_base_), found.twist_base - twist_base_;
@@ -500,7 +504,7 @@ void MotionFilter::see(const Pose& T_odom_base, const Vector6& twist_base, const
   State error = P_.leftCols<12>() * P.inverse() * moved;
   error.head<12>().setZero();
   correct(error);
-  // One direction after the other: what was as good as unknown must not leave its rounding behind.
+  // One eigenvector at a time, so that rounding in nearly unknown directions does not remain.
   const Eigen::SelfAdjointEigenSolver<Matrix12> seen(information);
   for (int i = 0; i < 12; ++i) {
     if (seen.eigenvalues()[i] <= 0.0)
@@ -523,7 +527,7 @@ Innovation MotionFilter::innovation(SourceId id, const SensedTwist& sensed) cons
   Innovation found;
   for (int axis = source.kind == SourceKind::imu ? 3 : 0; axis < 6; ++axis) {
     auto [h, expected] = row(source, sensed, axis);
-    if (axis == 0) { // a slip is what is wrong with it
+    if (axis == 0) { // a slip is part of the innovation
       h[*source.slip] = 0.0;
       expected -= x_[*source.slip];
     }
@@ -531,7 +535,7 @@ Innovation MotionFilter::innovation(SourceId id, const SensedTwist& sensed) cons
     const double noise = source.noise_per_s[axis] / elapsed_s_ + known[axis];
     const double error = twist_base[axis] - expected;
     const bool used = source.used && source.variance[axis] > 0.0;
-    const double left = used ? std::max(1e-3, 1.0 - after / source.variance[axis]) : 1.0; // of the others' information
+    const double left = used ? std::max(1e-3, 1.0 - after / source.variance[axis]) : 1.0; // the others' information
     found.value[axis] = error / left;
     found.known[axis] = known[axis];
     found.others[axis] = after / left;
@@ -548,11 +552,12 @@ void MotionFilter::learn() {
 
 namespace {
 
-/// Moves a variance towards what an innovation says of it. `others`: variance of what all others say.
+/// Moves a variance towards the one that an innovation implies. `others`: variance of the estimate from all other
+/// sources.
 void learn_variance(double& variance, double& learned_s, double innovation, double known, double others, double per,
                     double elapsed_s, double least) {
   const double expected = variance * per + known;
-  const double weight = square(expected / (expected + others)); // how much of the innovation is its own
+  const double weight = square(expected / (expected + others)); // share of the innovation due to this source
   const double most = square(kMostSigmas) * (expected + others);
   const double found = (std::min(square(innovation), most) - others - known) / per;
   learned_s = std::min(learned_s + weight * elapsed_s, kLearns_s);
@@ -569,7 +574,7 @@ void MotionFilter::learn_source(Source& source) {
     const bool felt = axis < 3 && last_force_;
     const bool told = felt || found.others[axis] < kTold * predicted_variance_[axis];
     if (source.variance[axis] == 0.0 || !told)
-      continue; // what nothing else tells teaches nothing
+      continue; // no reference to compare with
     learn_variance(source.noise_per_s[axis], source.learned_s[axis], found.value[axis], source.known_variance[axis],
                    found.others[axis], 1.0 / elapsed_s_, elapsed_s_, least[axis]);
   }
@@ -589,8 +594,8 @@ Matrix6 MotionFilter::pose_covariance_since_start() const {
   return P_.topLeftCorner<6, 6>() + P_.block<6, 6>(kMap, kMap) + both + both.transpose() + of_mounting();
 }
 
-/// A lidar that sits otherwise than thought sees the way of another body: in the end, what the first pose is off less
-/// what the last is. Considered.
+/// Returns the pose covariance caused by an extrinsics error, relative to the start: error of the first pose minus that
+/// of the last. Considered.
 Matrix6 MotionFilter::of_mounting() const {
   const Matrix6 error =
       transport(T_odom_base_.translation - T_odom_start_.translation) * turn_both(T_odom_start_.rotation) -

@@ -18,33 +18,34 @@
 
 namespace locus {
 
-/// A figure that is learned, and its standard deviation.
+/// Estimate of a calibration parameter, and its standard deviation.
 struct Learned {
   double mean = 0.0, sigma = 0.0;
 };
 
-/// What a filter has learned of a motion source, for the filter of another run to begin with. The states are its own:
-/// three biases of a gyro, its lateness and the turn of its mounting, or two scales and two directions of an odometry.
+/// Calibration and noise of a motion source, for the filter of another run to start with. States: three biases, the
+/// lateness and three mounting angles (rotation vector) of a gyro, or two scales and two directions of an odometry.
 struct LearnedSource {
   static constexpr int kMostStates = 7;
-  using States = Eigen::Matrix<double, kMostStates, 1>; ///< an odometry has fewer; the rest is zero
+  using States = Eigen::Matrix<double, kMostStates, 1>; ///< the first four for an odometry; the rest is zero
   using Covariance = Eigen::Matrix<double, kMostStates, kMostStates>;
-  static constexpr int kLate = 3, kMounting = 4;  ///< of a gyro, behind its biases
+  static constexpr int kLate = 3, kMounting = 4;  ///< of a gyro, after its biases
   static constexpr int kScale = 0, kYawScale = 1; ///< of an odometry
 
-  Vector6 noise_per_s = Vector6::Zero(); ///< variance of its twist times seconds
+  Vector6 noise_per_s = Vector6::Zero(); ///< variance of its mean twist over one second
   States states = States::Zero();
   Covariance covariance = Covariance::Zero();
-  Stamp since{}; ///< end of the first sweep that told of it
+  Stamp since{}; ///< end of the first sweep with a sample of it
 
-  /// Of a gyro: for how long a sample is stamped after the motion that it tells of.
+  /// Returns the delay of a gyro's stamps after the motion, in seconds.
   [[nodiscard]] Learned lateness_s() const { return figure(kLate); }
-  /// Of a gyro: by which turn about an axis of the base (0 to 2) it is mounted otherwise than configured.
+  /// Returns a gyro's mounting error relative to the configuration, about an axis of the base (0 to 2).
   [[nodiscard]] Learned mounting_rad(int axis) const { return figure(kMounting + axis); }
-  /// Of an odometry: how much more than the way ahead it reports, in parts of it; the same of the yaw.
+  /// Returns an odometry's relative excess of reported forward distance, and of yaw.
   [[nodiscard]] Learned scale() const { return figure(kScale); }
   [[nodiscard]] Learned yaw_scale() const { return figure(kYawScale); }
-  /// The way of the base, of the way that an odometry reports: wherever it went between, if it turned as it says.
+  /// Returns the motion of the base for a motion reported by an odometry, with the scale removed. Exact for any path if
+  /// the rotation is right.
   [[nodiscard]] Pose without_scale(const Pose& way) const;
 
  private:
@@ -53,111 +54,114 @@ struct LearnedSource {
   }
 };
 
-/// What is known of a source before it is heard: its configuration and how sure that is.
+/// Returns the prior of a source: its configured calibration and the uncertainty of that.
 LearnedSource as_configured(const MotionSourceOptions& source);
 
-/// By the index of the source; nothing of those that were not heard.
+/// Indexed by source; empty for sources that have not been received.
 using LearnedSources = std::array<std::optional<LearnedSource>, kMaxSources>;
 
-/// The state of the robot and of its sensors with one covariance: an error-state Kalman filter on the manifold.
+/// Error-state Kalman filter on the manifold for the robot and its sensors, with one joint covariance.
 ///
-/// State: pose at the end of the sweep (odom frame) against the submap, twist during it (base frame, mean), bias of the
-/// accelerometer, gravity, lever arm of the accelerometer, what the map is off since the start (considered), for each
-/// gyro a bias, how late its samples
-/// are stamped and by how much it is mounted askew, for each odometry a scale of the way ahead and one of the yaw, and
-/// where it goes when it goes ahead (to the left, upwards), and how fast it slips. A sweep is predict(), measure() for
-/// each source or rest(), move(), see() with what lidar found, and learn(). Noise of the sources is learned from the
-/// innovations that each leaves when it is left out (variance components): what nothing else tells teaches nothing. All
-/// of it is per second, so that the rate of the sweeps does not matter. A value: copies are hypotheses. Fixed size. One
-/// owner.
+/// Common states: pose at the end of the sweep (odom frame) against the submap, mean twist during it (base frame), bias
+/// of the accelerometer, gravity, lever arm of the accelerometer, and error of the map since the start (considered).
+/// Each gyro adds bias, lateness and mounting error; each odometry adds scales of forward distance and yaw, the
+/// direction of its forward axis (left, up) and its slip.
+///
+/// Sequence for a sweep: predict(), measure() for each source or rest(), move(), see() with the registration, learn().
+/// The noise of each source is learned from its innovation against all others (variance components); an axis that
+/// nothing else measures is skipped. Noise is per second, so the sweep rate does not matter. Copies of this value
+/// type are hypotheses. Fixed size. One owner.
 class MotionFilter {
  public:
-  static constexpr int kCommonStates = 27; ///< before those of the sources
+  static constexpr int kCommonStates = 27; ///< common states come before those of the sources
   static constexpr int kMaxStates = kCommonStates + (LearnedSource::kMostStates + 1) * static_cast<int>(kMaxSources);
   using State = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxStates, 1>;
   using Common = Eigen::Matrix<double, kCommonStates, kCommonStates>;
   using Covariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxStates, kMaxStates>;
 
-  /// Which axes of the twist a source measures. Those of the process are put aside for it: a robot may brake harder
-  /// than it ever did.
+  /// Axes of the twist that a source measures. The process noise for them is replaced by the acceleration limit,
+  /// because a robot may brake harder than ever before.
   struct Measured {
     bool translation = false, rotation = false;
   };
 
   explicit MotionFilter(const std::vector<MotionSourceOptions>& sources, const MotionLimits& limits = {});
 
-  /// Begins at a pose with a twist of which only `twist_sigma` (standard deviations) is known. `map_covariance`: of the
-  /// map that another run has left, since its start.
+  /// Restarts at a pose with a twist of standard deviation `twist_sigma`. `map_covariance`: pose covariance, since its
+  /// start, of the map that another run left.
   void begin(const Pose& T_odom_base, const Vector6& twist_base, const Vector6& twist_sigma,
              const Matrix6& map_covariance = Matrix6::Zero());
 
-  /// The twist during a sweep of `period_s` whose end is `elapsed_s` after that of the last. `force`: where it is
-  /// felt. `sensed_rate`: what its gyro reads (mean since the last sweep), to linearise about; measure() uses it.
+  /// Predicts the twist during a sweep of `period_s` that ends `elapsed_s` after the last one. `force`: specific force,
+  /// if an accelerometer measures it. `sensed_rate`: mean rate of its gyro since the last sweep (rad/s, base axes), the
+  /// linearisation point; measure() applies it.
   void predict(double elapsed_s, double period_s, const std::optional<SpecificForce>& force, Measured measured,
                const std::optional<Eigen::Vector3d>& sensed_rate = std::nullopt);
 
-  /// Takes the robot to stand, as far as anything else is not told (paper II-B.2).
+  /// Predicts zero velocity (paper II-B.2); the former prediction becomes uncertainty.
   void expect_rest();
 
-  /// A source says that the base moved with a twist (mean, base axes) since the end of the last sweep.
+  /// Updates with the mean twist of a source since the end of the last sweep (base axes).
   void measure(SourceId id, const SensedTwist& sensed, Measured what);
-  /// The robot stands.
+  /// Updates with zero twist.
   void rest();
-  /// The pose moves with the twist, to the end of the sweep.
+  /// Integrates the twist to the pose at the end of the sweep.
   void move();
 
-  /// Twice the negative log likelihood of a registration under the prediction, up to a constant: Student's t of how far
-  /// it moves pose and twist, and Occam's factor of what the points determine (MacKay 2003, 28.1). Before see().
+  /// Returns twice the negative log likelihood of a registration under the prediction, up to a constant: Student's t of
+  /// its innovation in pose and twist, and Occam's factor for the directions that the points determine (MacKay 2003,
+  /// 28.1). Call before see().
   [[nodiscard]] double surprise(const Registration& found) const;
 
-  /// Lidar has placed the robot, with information that the points alone give.
+  /// Sets pose and twist to the registration's result, which includes the prior, and updates the covariance with
+  /// `information`, that of the points alone.
   void see(const Pose& T_odom_base, const Vector6& twist_base, const Matrix12& information);
 
-  /// Compares each source that was measured with all others, and learns its noise.
+  /// Compares each measured source with all others, and learns its noise.
   void learn();
 
-  /// Of any source, whether it was measured or not. After see().
+  /// Returns the innovation of a source, measured or not. Call after see().
   [[nodiscard]] Innovation innovation(SourceId id, const SensedTwist& sensed) const;
 
-  /// The map has taken the sweep as it was placed: `share` of its error, along each axis, is now the map's.
+  /// Transfers `share` of the pose error, along each axis, to the error of the map. Call after a keyframe is inserted.
   void keep(const Matrix6& share);
-  /// Places the robot elsewhere without any news of how sure that is.
+  /// Sets the pose and leaves the covariance unchanged.
   void put(const Pose& T_odom_base);
-  /// What comes back may come back as another.
+  /// Resets calibration and noise of a source to their priors; lateness and mounting of a gyro keep their values.
   void forget(SourceId source);
-  /// As another run has learned of it that ended `elapsed_s` ago, and back. Its correlations with the rest are left
-  /// out, and what the user knows for sure stays as configured.
+  /// Restores the calibration that another run learned, which ended `elapsed_s` ago. Correlations with other states are
+  /// dropped. States configured as exact keep their configured value.
   void recall(SourceId source, const LearnedSource& learned, double elapsed_s);
   [[nodiscard]] LearnedSource learned(SourceId source) const;
 
   [[nodiscard]] const Pose& pose() const { return T_odom_base_; }
   [[nodiscard]] const Vector6& twist_base() const { return twist_base_; }
-  /// What pose and twist are believed to be.
+  /// Returns pose and twist with their information as a prior for registration.
   [[nodiscard]] MotionBelief belief() const;
-  [[nodiscard]] Matrix12 covariance() const { return P_.topLeftCorner<12, 12>(); } ///< pose against the submap
+  [[nodiscard]] Matrix12 covariance() const { return P_.topLeftCorner<12, 12>(); } ///< pose (submap), twist
   [[nodiscard]] Matrix6 pose_covariance_since_start() const;
-  [[nodiscard]] const State& state() const { return x_; } ///< behind the twist, for tests
+  [[nodiscard]] const State& state() const { return x_; } ///< states after the twist; for tests
   [[nodiscard]] int state_of(SourceId source) const { return sources_[index_of(source)].state; }
 
  private:
   struct Source {
     SourceKind kind = SourceKind::odometry;
-    Eigen::Vector3d lever_m = Eigen::Vector3d::Zero(); ///< from the base to it, as configured
-    int state = 0, states = 0;                         ///< first of its own, and how many
-    LearnedSource::States first, first_variance;       ///< of these: as configured
-    LearnedSource::States fades_per_s;                 ///< how quickly they come back to it
-    std::optional<int> slip;                           ///< of an odometry, its state: of the moment, not learned
-    Vector6 noise_per_s;                               ///< variance of the twist times seconds
+    Eigen::Vector3d lever_m = Eigen::Vector3d::Zero(); ///< from the base to the source, as configured, in base axes
+    int state = 0, states = 0;                         ///< offset and number of its states
+    LearnedSource::States first, first_variance;       ///< their prior, as configured
+    LearnedSource::States fades_per_s;                 ///< rate at which they revert to the prior
+    std::optional<int> slip;                           ///< slip state of an odometry; momentary, not learned
+    Vector6 noise_per_s;                               ///< variance of the mean twist over one second
     Vector6 learned_s = Vector6::Zero();
     std::optional<Vector6> last_twist;
-    bool used = false; ///< in the sweep at hand
+    bool used = false; ///< in the current sweep
     SensedTwist sensed = Vector6::Zero().eval();
-    Vector6 variance = Vector6::Zero();       ///< that it was used with; zero along axes that were not
+    Vector6 variance = Vector6::Zero();       ///< variance applied; zero along axes that were not used
     Vector6 known_variance = Vector6::Zero(); ///< the part of it that is not learned
   };
 
-  /// Prediction of the twist: its mean, Jacobians with respect to the common states before the noise is added and to
-  /// the new rate afterwards, and the variance of the noise.
+  /// Prediction of the twist: mean, variance of the noise, and Jacobians of the common states before the noise is added
+  /// (F) and with respect to the new rate afterwards.
   struct TwistStep {
     Vector6 mean, variance;
     Common F = Common::Identity(), of_new_rate = Common::Identity();
@@ -167,7 +171,7 @@ class MotionFilter {
   void couple_lateness(const SpecificForce& force);
   [[nodiscard]] Eigen::Vector3d force_change(const SpecificForce& force) const;
 
-  struct Row { ///< of a measurement of one axis
+  struct Row { ///< measurement of one axis
     State h;
     double expected;
   };
@@ -187,18 +191,18 @@ class MotionFilter {
   void keep_floor();
 
   MotionLimits limits_;
-  Vector6 able_; ///< what the robot is able to, one standard deviation: m/s^2 and rad/s^2, squared
+  Vector6 able_; ///< acceleration variance, (m/s^2)^2 and (rad/s^2)^2
   std::array<Source, kMaxSources> sources_;
-  std::size_t count_; ///< of sources
+  std::size_t count_; ///< number of sources
   int states_ = kCommonStates;
   Pose T_odom_start_, T_odom_base_;
   Vector6 twist_base_ = Vector6::Zero();
-  State x_; ///< all that is neither pose nor twist; zero there
+  State x_; ///< states other than pose and twist; zero at the entries of those
   Covariance P_;
   double elapsed_s_ = 0.0; ///< between the ends of the last two sweeps
   std::optional<SpecificForce> last_force_;
-  Vector6 predicted_variance_ = Vector6::Zero(); ///< of the twist
-  Vector6 untold_s_ = Vector6::Zero();           ///< for how long nobody has told of an axis of the twist
+  Vector6 predicted_variance_ = Vector6::Zero(); ///< variance of the predicted twist
+  Vector6 untold_s_ = Vector6::Zero();           ///< time since each axis of the twist was last observed
 };
 
 } // namespace locus

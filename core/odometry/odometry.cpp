@@ -13,39 +13,40 @@ namespace locus {
 
 namespace {
 
-/// Least share of the points that must find a correspondence for a registration to be believed.
+/// Least overlap of an accepted registration.
 constexpr double kMinInlierShare = 0.1;
 
-/// What misses most of the usual correspondences may contradict the motion sources by no more than this.
+/// Largest deviation from the motion sources for a registration that misses most of the usual correspondences.
 constexpr double kLoneDeviation_sigma = 3.0;
 
-/// A belief that is less sure than this looks for correspondences all around each point.
+/// Standard deviation of the prior position above which correspondences are searched in all voxels around a point.
 constexpr double kWide_m = 0.3;
 
-/// A twist that the points were not corrected for bends a block of them: so much of it and they are corrected anew.
+/// Change of the twist above which the points are de-skewed again: it distorts a block of points.
 constexpr double kBends_mps = 0.3, kBends_radps = 0.05;
 
-/// That the robot still stands may fit so much worse than another hypothesis, no more: a robot that pulls away would be
-/// held back.
+/// Least fit at rest, relative to the best other hypothesis. A lower one would hold back a robot that pulls away.
 constexpr double kAsGoodAtRest = 0.998;
 
-/// A robot that comes to rest is slow for so long, and known to be.
+/// Conditions to start a standstill: the twist is slow for kSlowFor and known to kSlowDoubt times the limit for slow,
+/// and zero lies within kRest_sigma of the prediction.
 constexpr double kSlowDoubt = 4.0;
 constexpr Duration kSlowFor = std::chrono::milliseconds{500};
 constexpr double kRest_sigma = 3.0;
 
-/// Room for the 16 000 voxels of a large sweep, and small enough for the second cache.
+/// Capacity for the 16 000 voxels of a large sweep that still fits the L2 cache.
 constexpr std::size_t kLastScanBytes = 2'500'000;
 
-/// A gyro that is known to be later than what was taken out of its stamps; none is by more.
+/// Deviation of a gyro's estimated lateness from the applied one above which it is updated, and its largest value.
 constexpr double kPlainlyLate_sigma = 3.0, kPlainlyLate_s = 0.001, kMostLate_s = 0.25;
 
-/// So many lengths of a sweep after the last one, sweeps were dropped in between.
+/// Elapsed time, in sweep lengths, above which sweeps were dropped in between.
 constexpr double kDropped = 1.5;
 
-/// Of what sweeps to come are laid against, the part that a sweep makes up. If a share s of it is new, then 2/s - 1
-/// sweeps are in sight at a time, and a step of the mean over so many shifts it by 2s/(1 + s) of a step in the end.
-/// Along axes that no surface constrains nothing old holds it back.
+/// Returns the fraction of the future registration target contributed by this keyframe. If a share s of its surfaces is
+/// new, 2/s - 1 sweeps are visible at a time, and a step in the mean over that many shifts it by 2s/(1 + s) of the step
+/// in the long run. Along axes that no surface constrains the fraction is 1, since older surfaces do not hold the
+/// target.
 Matrix6 share_of_map(double fresh, const Matrix6& observability) {
   const Matrix6 all = Matrix6::Identity();
   const Matrix6 seen = observability / SeenAxes::kWeakBelow;
@@ -143,15 +144,15 @@ void Odometry::prepare_next() {
   keyframe_observability_.reset();
 }
 
-/// Of the sources that can be used.
+/// Chooses among the usable sources, except those in `without`.
 SourceChoice Odometry::choose_among(const Sweep& sweep, std::bitset<kMaxSources> without) const {
   return choose_sources([this](SourceId source) { return sources_[index_of(source)].kind; }, sources_.size(),
                         options_.fusion,
                         [&](SourceId source) { return !without[index_of(source)] && steps_.is_usable(sweep, source); });
 }
 
-/// By how much the base moves otherwise during the sweep than on the mean since the last one, as far as sources tell:
-/// nothing, unless sweeps were dropped in between.
+/// Returns the twist during the sweep minus the mean since the last processed one, as far as sources measure it. Zero
+/// unless sweeps were dropped in between.
 Vector6 Odometry::unlike_mean(const Sweep& sweep) const {
   Vector6 difference = Vector6::Zero();
   if (steps_.elapsed_s(sweep) < kDropped * to_seconds(sweep.end - sweep.start))
@@ -165,7 +166,7 @@ Vector6 Odometry::unlike_mean(const Sweep& sweep) const {
   return difference;
 }
 
-/// What the filter makes of the sources, before a look at the points.
+/// Returns the hypothesis after the update with the sources, before registration.
 Odometry::Hypothesis Odometry::assume(const Sweep& sweep, std::bitset<kMaxSources> without, bool rests) const {
   Hypothesis hypothesis{.without = without,
                         .rests = rests,
@@ -179,7 +180,7 @@ Odometry::Hypothesis Odometry::assume(const Sweep& sweep, std::bitset<kMaxSource
   return hypothesis;
 }
 
-/// A filter hears of a sweep all but what lidar says.
+/// Predicts the filter for a sweep and updates it with the sources of a hypothesis, all but lidar.
 void Odometry::tell(MotionFilter& filter, const Sweep& sweep, const Hypothesis& hypothesis) const {
   const auto& [rotation, translation] = hypothesis.choice;
   const bool free = hypothesis.without.all();
@@ -202,8 +203,8 @@ void Odometry::tell(MotionFilter& filter, const Sweep& sweep, const Hypothesis& 
   filter.move();
 }
 
-/// What sources would be taken for that are only reported on: nothing of it is used. The fit is what the points say and
-/// what the filter expected; the observer makes one of the points and of what it expects itself.
+/// Updates the observer, which estimates calibrations that are only reported. The posterior `fit` includes the prior of
+/// the best hypothesis's filter; that prior is exchanged for the observer's.
 void Odometry::observe(const Sweep& sweep, const Hypothesis& best) {
   tell(*observer_, sweep, best);
   if (best.placed && !best.rests) {
@@ -223,8 +224,8 @@ void Odometry::observe(const Sweep& sweep, const Hypothesis& best) {
     observer_->learn();
 }
 
-/// Where the sweep lies beside the last one, from where the hypothesis has it. That is where the search in the submap
-/// begins and no measurement: the submap holds the last sweep, too.
+/// Registers the sweep with the last one, starting from the hypothesis. The result is only the starting pose for the
+/// submap, not a measurement, because the submap contains the last sweep, too.
 void Odometry::match_last(const Sweep& sweep, const MotionBelief& belief, Hypothesis& hypothesis,
                           const Gicp::StopRequested& stop) {
   const StageScope scope(clock_, Stage::scan_to_scan);
@@ -236,7 +237,7 @@ void Odometry::match_last(const Sweep& sweep, const MotionBelief& belief, Hypoth
   hypothesis.scan_to_scan.T_target_source = filter_.pose().inverse() * found.T_target_source;
 }
 
-/// Lays the sweep into the submap, from where the hypothesis has it.
+/// Registers the sweep with the submap, starting from the hypothesis.
 void Odometry::register_with(const Sweep& sweep, Hypothesis& hypothesis, const Gicp::StopRequested& stop) {
   MotionBelief belief = hypothesis.filter.belief();
   RegistrationOptions options = options_.scan_to_submap;
@@ -270,14 +271,14 @@ void Odometry::register_with(const Sweep& sweep, Hypothesis& hypothesis, const G
   hypothesis.fit.iterations += before;
 }
 
-/// Returns the specific force of a sweep, unless its source is left out.
+/// Returns the specific force of a sweep, or none if its source is excluded.
 std::optional<SpecificForce> Odometry::force_of(const Sweep& sweep, std::bitset<kMaxSources> without) {
   const std::optional<SpecificForce>& force = sweep.motion.specific_force;
   return force && !without[index_of(force->source)] ? force : std::nullopt;
 }
 
-/// Returns twice the logarithm of the odds that all sources are right that are used when some are left out. The
-/// accelerometer counts as a source.
+/// Returns the prior odds, as twice their logarithm, that all sources in use are right when those in `without` are
+/// excluded. The accelerometer counts as a source.
 double Odometry::odds_of_sources(const Sweep& sweep, std::bitset<kMaxSources> without) const {
   const SourceChoice choice = choose_among(sweep, without);
   const int sources = int{choice.rotation.has_value()} +
@@ -293,15 +294,15 @@ Odometry::Hypothesis Odometry::attempt(const Sweep& sweep, std::bitset<kMaxSourc
   return hypothesis;
 }
 
-/// Compares the hypotheses that a source is wrong, or that all are, with the one that all are right: by the likelihood
-/// of the points, of the motion that they show, and of the faults. Tries them only where a source contradicts the
-/// others or the sweep fits unusually badly. Returns the registration without sources where it fits better and the
-/// faults that it assumes are too unlikely.
+/// Compares the hypotheses that one source is wrong, or all are, with the one that none is: by the likelihood of the
+/// points, of the motion they imply, and the prior odds of faults. Tries them only if a source contradicts the others
+/// or the fit is unusually bad. Returns the registration without sources if it fits better but the faults it assumes
+/// are too unlikely.
 std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Hypothesis& best,
                                                       const Gicp::StopRequested& stop) {
   const auto contradiction = worst_source(sweep, best);
   const auto is_unusual = [&] { return lidar_health_.is_unusual(best.fit); };
-  if ((!contradiction && !is_unusual()) || stop()) // a registration that was cut short fits badly for that alone
+  if ((!contradiction && !is_unusual()) || stop()) // a registration cut short fits badly for that reason alone
     return std::nullopt;
   const auto gained = [&](const Hypothesis& other) {
     return evidence(other.fit, best.fit) + best.filter.surprise(best.fit) - other.filter.surprise(other.fit);
@@ -334,7 +335,7 @@ std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Hypoth
   return std::nullopt;
 }
 
-/// Returns the likeliest hypothesis about a sweep.
+/// Returns the likeliest hypothesis for a sweep.
 Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopRequested& stop) {
   Hypothesis best = attempt(sweep, {}, false, stop);
   gravity_.observe(filter_.pose().rotation.conjugate() * best.filter.pose().rotation, sweep);
@@ -350,7 +351,7 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
   after.see(best.fit.T_target_source, best.fit.twist_base, best.fit.information);
   const Vector6 doubt = after.covariance().diagonal().tail<6>().cwiseSqrt();
   const bool slow = (best.fit.twist_base.array().abs() < kSlow.array()).all() &&
-                    (doubt.array() < kSlowDoubt * kSlow.array()).all(); // who does not see does not see that it stands
+                    (doubt.array() < kSlowDoubt * kSlow.array()).all(); // standstill requires an observed twist
   if (!slow)
     slow_since_ = sweep.end;
   if (may_rest && (stands_ || sweep.end - slow_since_ >= kSlowFor)) {
@@ -361,13 +362,13 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
     }
   }
   if (!best.rests && !is_placed(sweep, lidar_alone.value_or(best.fit), first))
-    return first; // what carries on unseen is what the sources say
+    return first; // not accepted: dead reckoning uses all sources
   best.placed = true;
   return best;
 }
 
-/// Takes out of the points what they were not corrected for, of a base that moved with `twist_base` since the last
-/// sweep, on the mean.
+/// De-skews the points for a base that moved with mean twist `twist_base` since the last sweep. If sources are
+/// excluded, their motion within the sweep is removed.
 void Odometry::correct(const Sweep& sweep, const Vector6& twist_base, std::bitset<kMaxSources> without) {
   move_points(sweep, without.any() ? SweepCorrection::anew(sweep, twist_base)
                                    : SweepCorrection::all(sweep, twist_base + unlike_mean(sweep)));
@@ -378,7 +379,7 @@ void Odometry::move_points(const Sweep& sweep, const SweepCorrection& correction
   correction_.apply(sweep.points, scan_);
 }
 
-/// The source that contradicts what all others say most, if any does.
+/// Returns the source that contradicts all others most, if any.
 std::optional<Odometry::Contradiction> Odometry::worst_source(const Sweep& sweep, const Hypothesis& hypothesis) const {
   MotionFilter after = hypothesis.filter;
   after.see(hypothesis.fit.T_target_source, hypothesis.fit.twist_base, hypothesis.fit.information);
@@ -394,8 +395,8 @@ std::optional<Odometry::Contradiction> Odometry::worst_source(const Sweep& sweep
   return worst;
 }
 
-/// Whether a registration is believed. What misses most of what is usually seen gives way to motion sources that say
-/// otherwise, as `all_sources` has them, unless nothing was seen for a while.
+/// Returns whether a registration is accepted. One that misses most of the usual correspondences is rejected if it
+/// deviates from the prediction of `all_sources`, unless lidar had no registration for a while.
 bool Odometry::is_placed(const Sweep& sweep, const Registration& fit, const Hypothesis& all_sources) const {
   if (fit.iterations == 0 || !fit.T_target_source.finite() || fit.overlap() < kMinInlierShare)
     return false;
@@ -407,14 +408,14 @@ bool Odometry::is_placed(const Sweep& sweep, const Registration& fit, const Hypo
   return (deviation.array() <= kLoneDeviation_sigma * sigma.array()).all();
 }
 
-/// What a placed sweep says of what lidar sees and of the motion sources.
+/// Reports observability and the innovations of the motion sources after an accepted registration.
 void Odometry::report(const Sweep& sweep, OdometryEstimate& estimate) {
   const Matrix6 R = turn_both(estimate.T_odom_base.rotation);
   estimate.observability = seen_axes_.observe(R.transpose() * estimate.scan_to_submap.observability * R);
   if (!seen_axes_.all() && estimate.state == TrackingState::tracking)
     estimate.state = TrackingState::degenerate;
   if (!saw_)
-    return; // the way back to the submap is no motion of the robot
+    return; // a jump back to the submap is not motion of the robot
   for (std::size_t i = 0; i < sources_.size(); ++i)
     if (const auto twist_base = steps_.twist_base(sweep, SourceId{i})) {
       const Innovation innovation = filter_.innovation(SourceId{i}, *twist_base);
@@ -426,14 +427,15 @@ void Odometry::report(const Sweep& sweep, OdometryEstimate& estimate) {
   feedback_.sees = seen_axes_.each();
 }
 
-/// What is known of the stamps of a gyro is taken out of them where its samples come in.
+/// Sets the lateness of a gyro that the ingest subtracts from its stamps. Follows the estimate only if it differs
+/// clearly.
 void Odometry::follow_lateness(const Learned& late_s, Duration& taken_out) {
   if (std::abs(late_s.mean - to_seconds(taken_out)) > std::max(kPlainlyLate_sigma * late_s.sigma, kPlainlyLate_s))
     taken_out = MotionTrack::taken_out(std::clamp(late_s.mean, -kMostLate_s, kMostLate_s));
 }
 
-/// Forgets what was learned of a source that was lost and comes back, perhaps as another. A sweep without a sample of
-/// it is no loss: its scale and its bias are those of before.
+/// Resets a source that was lost and returns with a new epoch, perhaps as another device. A sweep without a sample of
+/// it is no loss: scale and bias are unchanged.
 void Odometry::follow_epoch(SourceId source, const SourcePose& sensed) {
   std::optional<std::uint32_t>& epoch = epochs_[index_of(source)];
   if (!sensed.known || epoch == sensed.epoch)
@@ -451,7 +453,7 @@ void Odometry::forget(SourceId source) {
     learned_since_[index_of(source)] = Stamp{};
 }
 
-/// Where each source saw the base, and what is known of it.
+/// Reports pose, health and calibration of each source.
 void Odometry::report_sources(const Sweep& sweep, OdometryEstimate& estimate) {
   for (std::size_t i = 0; i < sources_.size(); ++i) {
     const SourcePose& sensed = sweep.motion.sources[i];
@@ -476,7 +478,7 @@ void Odometry::report_sources(const Sweep& sweep, OdometryEstimate& estimate) {
   estimate.sources = source_reports_;
 }
 
-/// Fills in what the estimate says beside its pose, and remembers the sweep as the last.
+/// Completes the estimate, decides on the keyframe, and stores the sweep as the last one.
 void Odometry::finish(const Sweep& sweep, OdometryEstimate& estimate) {
   estimate.stamp = sweep.end;
   estimate.beginning = beginning_;

@@ -30,75 +30,75 @@
 
 namespace locus {
 
-/// The scan matching unit of LOCUS (paper II-B): sweeps in, odometry out.
+/// Lidar odometry: the scan matching unit of LOCUS (paper II-B).
 ///
 /// The filter predicts the motion, the motion sources measure it, and the sweep is registered with the submap (equation
-/// 2) from there: pose and twist together, against what is known of both. Where sources and surfaces do not fit, other
-/// hypotheses are tried (without a source, free, at rest), and the likeliest is taken. The result depends on the sweeps
-/// that were processed and on nothing else. One owner.
+/// 2): pose and twist jointly, with the filter's estimate as prior. If sources and surfaces disagree, other hypotheses
+/// are tried (without one source, without any, at rest), and the likeliest is selected. The result depends on the
+/// processed sweeps only. One owner.
 class Odometry {
  public:
-  /// `sources` in the order of their priority, as MotionSources has them.
+  /// `sources`: in order of priority, as in MotionSources.
   explicit Odometry(const OdometryOptions& options, const std::vector<MotionSourceOptions>& sources = {},
                     StageClock* clock = nullptr);
 
-  /// Before the first sweep: where the robot was, instead of level at the origin. With surfaces that were seen there
-  /// (odom frame) it is looked for among them. Where they leave a doubt that waits a second at the most for an odometry
-  /// that can tell how far it has come since; where it is not found it begins where such an odometry says, or level at
-  /// the origin all the same.
+  /// Starts from `last` instead of level at the origin. Relocalises in `map_odom` (surfaces in the odom frame), if
+  /// given. If the result is ambiguous, waits up to 1 s for an odometry source that spans the gap. If relocalisation
+  /// fails, starts at the pose from such a source, or else level at the origin. Call before the first sweep.
   void begin_at(const Whereabouts& last, std::span<const SurfacePoint> map_odom = {});
 
-  /// Before the first sweep: what another run has learned of the motion sources, that ended `elapsed_s` ago.
+  /// Restores the calibration of the motion sources from another run that ended `elapsed_s` ago. Call before the first
+  /// sweep.
   void recall(const LearnedSources& learned, double elapsed_s);
 
-  /// The estimate for the end of the sweep. Never fails: a sweep that cannot be registered yields the prediction,
-  /// flagged. `stop` ends a registration early, but for the one that finds where to go on.
+  /// Returns the estimate for the end of the sweep. Never fails: a sweep that cannot be registered yields the
+  /// prediction, flagged. `stop` ends a registration early, except the one that relocalises.
   OdometryEstimate process(
       const Sweep& sweep, const Gicp::StopRequested& stop = [] { return false; });
 
-  /// What the next sweep needs of the last one: the map takes in a keyframe. For when the estimate is on its way; what
-  /// is not done here, process() does before it begins. The results are the same.
+  /// Prepares for the next sweep: inserts the last one into the map if it is a keyframe. Call it after the estimate is
+  /// published; otherwise process() does this work first. The results are the same.
   void prepare_next();
 
-  /// What the sweep processed last says of the motion sources, for their health.
+  /// Returns the last sweep's evidence on the health of the motion sources.
   [[nodiscard]] const RegistrationFeedback& feedback() const { return feedback_; }
 
-  /// A keyframe is in it from prepare_next() on.
+  /// Returns the map. It includes a keyframe after prepare_next().
   [[nodiscard]] const SurfaceMap& map() const { return map_; }
 
-  /// The points of the sweep processed last, fully corrected: base frame at its end, in the order of Sweep::points.
+  /// Returns the points of the last sweep, fully de-skewed: base frame at its end, in the order of Sweep::points.
   [[nodiscard]] std::span<const SurfacePoint> scan() const { return scan_; }
 
-  /// What moved them there from where the ingest had put them.
+  /// Returns the transform from the points of the ingest to those of scan().
   [[nodiscard]] const SweepCorrection& correction() const { return correction_; }
 
-  /// From the next sweep on.
+  /// Takes effect with the next sweep.
   void set_flat_ground(FlatGround mode) { flat_ground_ = FlatGroundAssumption(mode); }
 
  private:
-  static constexpr std::size_t kMinPoints = 30; ///< fewer say nothing reliable about six axes
+  static constexpr std::size_t kMinPoints = 30; ///< fewer do not constrain six axes reliably
   static constexpr std::bitset<kMaxSources> kAllSources{(1U << kMaxSources) - 1U};
-  /// Twice the logarithm of the odds, before a look at the surfaces: that a source is right in a sweep (one in a
-  /// thousand is not), and that a robot stands in its first two sweeps.
+  /// Prior odds, as twice their logarithm: that a source is right in a sweep (it is wrong once in a thousand), and that
+  /// the robot stands during its first two sweeps.
   static constexpr double kSourceIsRight = 13.8, kBeginsAtRest = 20.0;
 
-  /// What may be true of a sweep, and what the surfaces say of it.
+  /// A motion hypothesis for one sweep, and its registration.
   struct Hypothesis {
-    std::bitset<kMaxSources> without; ///< sources that are not believed
+    std::bitset<kMaxSources> without; ///< excluded sources
     bool rests = false;
-    bool placed = false; ///< what the surfaces say is believed
+    bool placed = false; ///< the registration is accepted
     SourceChoice choice;
-    MotionFilter filter; ///< before it sees
+    MotionFilter filter; ///< before the update with lidar
     Registration scan_to_scan, fit;
   };
 
-  /// A source that contradicts what all others say.
+  /// A source that contradicts all others.
   struct Contradiction {
     std::size_t source = 0;
     double test_ratio = 0.0;
   };
 
-  /// What may be true of the first two sweeps.
+  /// A hypothesis for the motion between the first two sweeps.
   struct Start {
     std::bitset<kMaxSources> without;
     bool rests = false;
@@ -153,22 +153,22 @@ class Odometry {
   SeenAxes seen_axes_;
   SensedSteps steps_;
   MotionFilter filter_;
-  std::optional<MotionFilter> observer_; ///< of sources that are only reported on; tells nobody of the robot
-  SweepCorrection correction_;           ///< of the sweep at hand
-  std::vector<SurfacePoint> scan_;       ///< the same, fully corrected
-  AgedScan aged_;                        ///< what is registered of it
-  std::optional<Sweep> first_;           ///< while no motion is known
-  std::bitset<kMaxSources> recalled_;    ///< sources known from another run, and not heard yet
-  std::array<std::optional<std::uint32_t>, kMaxSources> epochs_; ///< of each source, when it was heard last
+  std::optional<MotionFilter> observer_; ///< calibrates sources whose result is only reported, never used
+  SweepCorrection correction_;           ///< de-skew of the current sweep
+  std::vector<SurfacePoint> scan_;       ///< points of the current sweep, fully de-skewed
+  AgedScan aged_;                        ///< the points of scan_ to be registered, by age
+  std::optional<Sweep> first_;           ///< first sweep, until the second one arrives
+  std::bitset<kMaxSources> recalled_;    ///< sources restored from another run and not received yet
+  std::array<std::optional<std::uint32_t>, kMaxSources> epochs_; ///< last known epoch of each source
   std::array<Stamp, kMaxSources> learned_since_{};
-  std::optional<Whereabouts> start_;              ///< where to begin
-  std::optional<Whereabouts> run_before_;         ///< where it ended, if the first sweep was found in its map
-  std::optional<Stamp> waits_since_;              ///< for an odometry that can tell where that is
-  std::optional<Matrix6> keyframe_observability_; ///< of the last sweep, if the map is still to take it in
+  std::optional<Whereabouts> start_;              ///< starting pose
+  std::optional<Whereabouts> run_before_;         ///< end of the last run, if the first sweep was found in its map
+  std::optional<Stamp> waits_since_;              ///< start of the wait for an odometry source that spans the gap
+  std::optional<Matrix6> keyframe_observability_; ///< of the last sweep, if it is a keyframe that is not in the map yet
   std::optional<Beginning> beginning_;
   bool stands_ = false, saw_ = false;
-  bool scan_is_next_target_ = false; ///< scan-to-scan is to take in the last sweep
-  bool has_last_scan_ = false;       ///< it has taken in one
+  bool scan_is_next_target_ = false; ///< the last sweep is to become the target of scan-to-scan
+  bool has_last_scan_ = false;       ///< scan-to-scan has a target
   Stamp slow_since_;
   RegistrationFeedback feedback_;
   std::array<SourceReport, kMaxSources> source_reports_{};

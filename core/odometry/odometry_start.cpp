@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How an odometry begins: its first two sweeps.
+// Start of the odometry: its first two sweeps.
 #include <algorithm>
 #include <chrono>
 #include <utility>
@@ -10,18 +10,18 @@ namespace locus {
 
 namespace {
 
-/// Of the points of the second sweep, those that the first must have seen, too, if the motion between them is to be
-/// found: honest starts have 0.45 and more, two halves of a turn 0.1 to 0.17.
+/// Least overlap of the first two sweeps for a two-sweep start. Correct starts reach 0.45 and more, two halves of a
+/// turn 0.1 to 0.17.
 constexpr double kMinOverlap = 0.3;
 
-constexpr double kUnknownRate_radps = 10.0; ///< of a robot of which nothing is known: a flick of a hand
-constexpr int kRounds = 8;                  ///< at the most, until motion and correction of the first two sweeps agree:
-constexpr double kAgrees = 0.002;           ///< metres, radians
+constexpr double kUnknownRate_radps = 10.0; ///< standard deviation of an unknown turn rate: a flick of a hand
+constexpr int kRounds = 8;                  ///< most iterations until motion and de-skew of the first two sweeps agree
+constexpr double kAgrees = 0.002;           ///< in metres and radians
 
 } // namespace
 
-/// The world begins at the first sweep: where another run has ended, or at its origin, without yaw, level if gravity is
-/// known.
+/// Starts the odometry at the first sweep: at the end of another run, or at the origin with zero yaw, level if gravity
+/// is known.
 OdometryEstimate Odometry::begin(const Sweep& sweep) {
   OdometryEstimate estimate;
   move_points(sweep, SweepCorrection::all(sweep, corrected_twist(sweep)));
@@ -38,7 +38,7 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
   filter_.begin(here.T_odom_base, Vector6::Zero(), unknown, here.pose_covariance);
   if (observer_)
     observer_->begin(here.T_odom_base, Vector6::Zero(), unknown, here.pose_covariance);
-  if (estimate.failed) { // the next sweep is the first
+  if (estimate.failed) { // try again with the next sweep
     estimate.state = TrackingState::dead_reckoning;
   } else {
     if (!beginning_)
@@ -62,10 +62,10 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
   return estimate;
 }
 
-/// Looks for the robot in the map that another run has left. Where it is not found the map is given up, and it begins
-/// where an odometry says, or at the origin. False while it is too early to say.
+/// Relocalises in the map of another run. If that fails, discards the map and starts at the pose from an odometry
+/// source, or at the origin. Returns false while waiting for such a source.
 bool Odometry::find_again(const Sweep& sweep) {
-  constexpr Duration kPatience = std::chrono::seconds{1}; ///< publishers find each other faster
+  constexpr Duration kPatience = std::chrono::seconds{1}; ///< DDS discovery takes less
   waits_since_ = waits_since_.value_or(sweep.end);
   const StageScope scope(clock_, Stage::scan_to_submap);
   const std::vector<Place> places = start_->places(sweep.end, sweep.motion, options_.motion.max_speed_mps);
@@ -90,9 +90,9 @@ bool Odometry::find_again(const Sweep& sweep) {
   return true;
 }
 
-/// The first sweep came without any idea of the motion. What is found between it and the second corrects both, so it
-/// can be found better; then the map begins with the first one corrected. A source that is wrong bends both, and says
-/// that the robot is elsewhere in a map that another run has left.
+/// Estimates the motion between the first and the second sweep, and de-skews both with it, iteratively. The map then
+/// starts with the corrected first sweep. A wrong source distorts both sweeps, and reports a wrong pose in the map of
+/// another run.
 void Odometry::find_start(const Sweep& sweep, const Gicp::StopRequested& stop) {
   const Sweep first = *std::exchange(first_, std::nullopt);
   const auto start = find_first_motion(first, sweep, stop);
@@ -104,13 +104,13 @@ void Odometry::find_start(const Sweep& sweep, const Gicp::StopRequested& stop) {
     move_points(first, SweepCorrection::all(first, corrected_twist(first)));
   }
   if (start && run_before_) {
-    if (!stop()) // what was cut short fits badly for that alone
+    if (!stop()) // a registration cut short fits badly for that reason alone
       find_once_more(first, sweep, *start);
   } else if (start) {
     lidar_health_.learn(start->fit, steps_.elapsed_s(sweep));
     map_.clear();
   }
-  free_space_.forget(); // the first sweep was not corrected for any motion
+  free_space_.forget(); // the first sweep was not de-skewed
   if (start || run_before_) {
     free_space_.expect(first);
     map_.insert(free_space_.leave_out_moving(scan_, filter_.pose()), filter_.pose());
@@ -126,7 +126,7 @@ void Odometry::begin_filter(const Pose& T_odom_first, const Start& start) {
     observer_->begin(T_odom_first, start.twist_base, sigma, of_map);
 }
 
-/// The motion between the first two sweeps, as far as they see the same.
+/// Returns the motion between the first two sweeps, or none if their overlap is too small.
 std::optional<Odometry::Start> Odometry::find_first_motion(const Sweep& first, const Sweep& sweep,
                                                            const Gicp::StopRequested& stop) {
   if (sweep.points.size() < kMinPoints || steps_.elapsed_s(sweep) <= 0.0 ||
@@ -143,8 +143,8 @@ std::optional<Odometry::Start> Odometry::find_first_motion(const Sweep& first, c
   return start;
 }
 
-/// The first sweep, now that it is corrected for what the first two say. An odometry that they contradict is in doubt:
-/// where it says that the robot is, it need not be.
+/// Relocalises the first sweep again after its de-skew with the motion of the first two. An odometry source that
+/// contradicts this motion is doubted: its pose need not be right.
 void Odometry::find_once_more(const Sweep& first, const Sweep& sweep, const Start& start) {
   const StageScope scope(clock_, Stage::scan_to_submap);
   MotionFilter lidar_alone = assume(sweep, kAllSources, false).filter;
@@ -164,13 +164,13 @@ void Odometry::find_once_more(const Sweep& first, const Sweep& sweep, const Star
   lidar_health_.learn(found->fit, steps_.elapsed_s(sweep));
 }
 
-/// The motion between the first two sweeps, if their points are corrected as some sources would not have it.
+/// Returns the motion between the first two sweeps with the sources in `without` excluded from the de-skew.
 Odometry::Start Odometry::start_without(std::bitset<kMaxSources> without, const Sweep& first, const Sweep& sweep,
                                         const Gicp::StopRequested& stop) {
   const MotionFilter unknown = assume(sweep, without, false).filter;
   const Pose T_odom_first = filter_.pose();
   MotionBelief prior = unknown.belief();
-  prior.information.setZero(); // the pose alone is looked for
+  prior.information.setZero(); // estimates the pose only
   prior.information.topLeftCorner<6, 6>() = unknown.covariance().topLeftCorner<6, 6>().inverse();
   const auto match = [&](const Vector6& twist, std::bitset<kMaxSources> unused, const Pose& T_start,
                          const MotionBelief& belief, int iterations) {
