@@ -103,7 +103,7 @@ struct ElasticEquations {
         axis.head<3>() = Eigen::Vector3f(axes[static_cast<std::size_t>(side)].data()).cast<double>();
       const double all = std::max(axis.dot(of_pose.H * axis), kNothing);
       const double seen = std::clamp(of_pose.seen[side], kNothing, all);
-      const double sure = std::max(kNothing, seen - square(kByChance_sigma * all) / independent / seen); // James, Stein
+      const double sure = std::max(kNothing, seen - square(kByChance_sigma * all) / independent / seen); // James-Stein
       const double common = square(kCommonError_m * of_pose.sides[side]);
       solved += seen / std::sqrt(all * (seen + common)) * axis * axis.transpose();
       claimed += sure / std::sqrt(all * (sure + common)) * axis * axis.transpose();

@@ -39,15 +39,15 @@ const Vector6 kFades_s = (Vector6() << 0.6, 0.3, 0.3, 0.3, 0.3, 0.6).finished();
 constexpr double kGoesOn_s = 1.0;
 constexpr double kTold = 0.5; ///< an axis is observed if an update lowers its variance below this fraction
 
-/// Process noise: variance of the twist after one second, from standard deviations in m/s and rad/s.
+/// Process noise: variance of the twist after one second, as squares of standard deviations in m/s and rad/s.
 const Vector6 kProcess = squares(0.7, 0.7);
-constexpr double kAbleToTurn_radps2 = 20.0; ///< one standard deviation
+constexpr double kAbleToTurn_radps2 = 20.0; ///< standard deviation of the angular acceleration
 constexpr double kKnownSpeed = 0.5;         ///< sigma of a speed, as a fraction of the limit, that halves its excess
 
-/// Prior and least noise of the sources: variance of position and rotation after one second.
+/// Prior and least noise of the sources: variance of position (m) and rotation (rad) after one second.
 const Vector6 kOdometryNoise = squares(0.02, 0.01), kLeastOdometryNoise = squares(0.006, 0.001);
 const Vector6 kGyroNoise = squares(1.0, 0.006), kLeastGyroNoise = squares(1.0, 0.001);
-constexpr double kForceNoise = square(0.02); ///< of the velocity after a second of specific force
+constexpr double kForceNoise = square(0.02); ///< velocity variance after one second of specific force
 
 /// Errors other than white noise: proportional ones, and those of late stamps while the motion changes.
 constexpr double kProportion = 0.01;
@@ -359,8 +359,8 @@ void MotionFilter::propagate(const Common& F) {
 }
 
 /// Returns Jacobian and expected value of a source's reading of one axis of the twist. An odometry scales the twist,
-/// adds its slip ahead, and leaks forward speed into the other two axes. A gyro adds its bias, the effect of its
-/// lateness (rate change times lateness), and cross-axis terms of its mounting.
+/// adds its slip to the forward speed, and leaks that speed into the other two axes. A gyro adds its bias, the effect
+/// of its lateness (rate change times lateness), and cross-axis terms of its mounting.
 MotionFilter::Row MotionFilter::row(const Source& source, const SensedTwist& sensed, int axis) const {
   Row row{State::Zero(states_), twist_base_[axis]};
   row.h[kVelocity + axis] = 1.0;
@@ -433,8 +433,8 @@ void MotionFilter::measure(SourceId id, const SensedTwist& sensed, Measured what
   }
 }
 
-/// Rotates the covariance of a scale and the twist after the twist has changed. One source cannot separate the two, and
-/// in the old direction its next reading would appear to.
+/// Re-linearises the covariance of a scale and the twist after the twist has changed. A source cannot separate the two;
+/// along the old direction its next reading would seem to.
 void MotionFilter::turn_scale(int scale, int axis, double change) {
   const double turned = -change / (1.0 + x_[scale]);
   P_.row(kVelocity + axis) += turned * P_.row(scale);

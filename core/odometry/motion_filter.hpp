@@ -30,7 +30,7 @@ struct LearnedSource {
   using States = Eigen::Matrix<double, kMostStates, 1>; ///< the first four for an odometry; the rest is zero
   using Covariance = Eigen::Matrix<double, kMostStates, kMostStates>;
   static constexpr int kLate = 3, kMounting = 4;  ///< of a gyro, after its biases
-  static constexpr int kScale = 0, kYawScale = 1; ///< of an odometry
+  static constexpr int kScale = 0, kYawScale = 1; ///< of an odometry, with its two directions after them
 
   Vector6 noise_per_s = Vector6::Zero(); ///< variance of its mean twist over one second
   States states = States::Zero();
@@ -157,7 +157,7 @@ class MotionFilter {
     bool used = false; ///< in the current sweep
     SensedTwist sensed = Vector6::Zero().eval();
     Vector6 variance = Vector6::Zero();       ///< variance applied; zero along axes that were not used
-    Vector6 known_variance = Vector6::Zero(); ///< the part of it that is not learned
+    Vector6 known_variance = Vector6::Zero(); ///< part of `variance` that is not learned
   };
 
   /// Prediction of the twist: mean, variance of the noise, and Jacobians of the common states before the noise is added
@@ -199,7 +199,7 @@ class MotionFilter {
   Vector6 twist_base_ = Vector6::Zero();
   State x_; ///< states other than pose and twist; zero at the entries of those
   Covariance P_;
-  double elapsed_s_ = 0.0; ///< between the ends of the last two sweeps
+  double elapsed_s_ = 0.0; ///< time between the ends of the last two sweeps
   std::optional<SpecificForce> last_force_;
   Vector6 predicted_variance_ = Vector6::Zero(); ///< variance of the predicted twist
   Vector6 untold_s_ = Vector6::Zero();           ///< time since each axis of the twist was last observed

@@ -16,7 +16,7 @@ constexpr double kMinOverlap = 0.3;
 
 constexpr double kUnknownRate_radps = 10.0; ///< standard deviation of an unknown turn rate: a flick of a hand
 constexpr int kRounds = 8;                  ///< most iterations until motion and de-skew of the first two sweeps agree
-constexpr double kAgrees = 0.002;           ///< in metres and radians
+constexpr double kAgrees = 0.002;           ///< change per iteration below which they agree: metres, radians
 
 } // namespace
 
