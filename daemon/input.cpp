@@ -15,9 +15,6 @@ namespace locus::daemon {
 
 namespace {
 
-/// Largest delay of an out-of-order input; more is a backward clock step that was not yet detected.
-constexpr Duration kMostLate = std::chrono::milliseconds{50};
-
 /// Returns the arrival of a sample; a health verdict has no stamp and applies at once.
 Stamp arrival_of(const LiveInput::Motion& motion) {
   if (const auto* imu = std::get_if<ImuInput>(&motion))
@@ -101,9 +98,11 @@ std::optional<LiveInput::Motion> LiveInput::take_motion() {
   return motion;
 }
 
-/// Returns an arrival after that of the input returned before, unless the clock was set back.
+/// Returns an arrival after that of the input returned before. A step of the clock is already undone (SteadyTime), so
+/// what is earlier was on its way while its thread, or the kernel's, waited for a processor. A stamp that is earlier by
+/// more than any transit shows that the one before it was wrong.
 Stamp LiveInput::in_order(Stamp arrival) {
-  const bool late = arrival <= latest_ && latest_ - arrival <= kMostLate;
+  const bool late = arrival <= latest_ && latest_ - arrival <= SteadyTime::kOnItsWay;
   return latest_ = late ? latest_ + Duration{1} : arrival;
 }
 

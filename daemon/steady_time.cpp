@@ -6,7 +6,6 @@ namespace locus::daemon {
 namespace {
 
 constexpr Duration kSlew = std::chrono::milliseconds{5};         ///< largest offset change without a step
-constexpr Duration kOnItsWay = std::chrono::seconds{2};          ///< longest transit of a stamp made before a step
 constexpr Duration kUndisturbed = std::chrono::microseconds{20}; ///< longest gap between two simultaneous readings
 
 } // namespace

@@ -15,6 +15,9 @@ namespace locus::daemon {
 /// outputs are converted to wall time. One owner, except for wall() and set_by().
 class SteadyTime {
  public:
+  /// Longest transit of a stamp: from the clock that made it to here, on a machine that is busy.
+  static constexpr Duration kOnItsWay = std::chrono::seconds{2};
+
   using Clock = Duration (*)(clockid_t); ///< read_clock(), replaceable in tests
   explicit SteadyTime(Clock clock = [](clockid_t id) { return read_clock(id); });
 

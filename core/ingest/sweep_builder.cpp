@@ -22,6 +22,10 @@ constexpr Duration kMaxPause = std::chrono::seconds{60};
 constexpr std::uint64_t kLatePacketsToRestart = 500;
 constexpr Duration kLateToRestart = std::chrono::milliseconds{500};
 
+/// Longest lateness that is waited for instead, since a sender that waited for a processor catches up slowly. Stamps of
+/// sweeps go back only by more.
+constexpr Duration kLatestThatIsWaitedFor = std::chrono::seconds{2};
+
 constexpr std::size_t kReturnsPerSegmentPoint = 4; ///< headroom until the leaf has adapted
 
 /// Selects the returns of a firing group: -1 for one fired in [first_ns, last_ns) and within range, else 0. Adds the
@@ -94,7 +98,8 @@ void SweepBuilder::add(const LidarPacket& packet, Stamp arrival) {
   if (late) {
     ++counters_.late_packets;
     late_since_ = consecutive_late_ == 0 ? arrival : std::min(late_since_, arrival);
-    if (++consecutive_late_ < kLatePacketsToRestart || arrival - late_since_ < kLateToRestart)
+    if (++consecutive_late_ < kLatePacketsToRestart || arrival - late_since_ < kLateToRestart ||
+        window_->start - packet.stamp < kLatestThatIsWaitedFor)
       return;
   }
   consecutive_late_ = 0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// stage_instructions STAGE: drives through the plant with lidar alone and counts, by callgrind, the instructions of
-// that stage, or of the whole pipeline (`all`). stage_instructions.sh runs it and compares.
+// stage_instructions STAGE...: drives through the plant with lidar alone, once for each stage, and counts by callgrind
+// the instructions of that stage, or of the whole pipeline (`all`); each count is a dump of callgrind's.
+// stage_instructions.sh runs it and compares.
 #include <valgrind/callgrind.h>
 
 #include <array>
@@ -36,6 +37,11 @@ class InstructionCounter : public StageClock {
     started_ = true;
     count(outside_);
   }
+  void stop() {
+    count(false);
+    CALLGRIND_STOP_INSTRUMENTATION;
+    started_ = false;
+  }
 
  private:
   void count(bool on) {
@@ -50,16 +56,10 @@ class InstructionCounter : public StageClock {
   bool started_ = false, counting_ = false;
 };
 
-} // namespace
-
-int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::fputs("usage: stage_instructions STAGE\n", stderr);
-    return 2;
-  }
+/// Counts the instructions of a stage; returns the number of sweeps.
+int count(const test::Recording& recording, const char* stage) {
   constexpr int kWarmUp = 30; // standstill and acceleration
-  const test::Recording recording = test::plant_recording(std::chrono::milliseconds{4450});
-  InstructionCounter counter(argv[1]);
+  InstructionCounter counter(stage);
   SweepOptions sweep_options;
   OdometryOptions options;
   sweep_options.isa = options.isa = Isa::baseline;
@@ -73,5 +73,19 @@ int main(int argc, char** argv) {
     if (++sweeps_seen == kWarmUp)
       counter.start();
   }
-  std::printf("%d\n", sweeps_seen - kWarmUp);
+  counter.stop();
+  CALLGRIND_DUMP_STATS_AT(stage);
+  return sweeps_seen - kWarmUp;
+}
+
+} // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) {
+    std::fputs("usage: stage_instructions STAGE...\n", stderr);
+    return 2;
+  }
+  const test::Recording recording = test::plant_recording(std::chrono::milliseconds{4450});
+  for (int i = 1; i < argc; ++i)
+    std::printf("%s %d\n", argv[i], count(recording, argv[i]));
 }

@@ -8,12 +8,16 @@ accepted=$(dirname "$(realpath "$0")")/stage_instructions.txt
 measured=$(mktemp)
 trap 'rm -f "$measured"*' EXIT
 
-for stage in all decode correct filter covariance scan_to_submap map; do # scan-to-scan runs only at the start
-  sweeps=$(valgrind --tool=callgrind --instr-atstart=no --collect-atstart=no \
-    --callgrind-out-file="$measured.$stage" "$bin/stage_instructions" $stage 2>"$measured.log") || { cat "$measured.log" >&2; exit 1; }
-  total=$(sed -n 's/^\(summary\|totals\): \([0-9]*\).*/\2/p' "$measured.$stage" | head -n 1)
-  printf '%-15s %9d\n' $stage $((total / sweeps)) >>"$measured"
-done
+# Scan-to-scan runs only at the start.
+valgrind --tool=callgrind --instr-atstart=no --collect-atstart=no --callgrind-out-file="$measured.dump" \
+  "$bin/stage_instructions" all decode correct filter covariance scan_to_submap map \
+  >"$measured.sweeps" 2>"$measured.log" || { cat "$measured.log" >&2; exit 1; }
+dump=0
+while read -r stage sweeps; do
+  dump=$((dump + 1))
+  total=$(sed -n 's/^totals: \([0-9]*\).*/\1/p' "$measured.dump.$dump")
+  printf '%-15s %9d\n' "$stage" $((total / sweeps)) >>"$measured"
+done <"$measured.sweeps"
 
 if [ "$accept" = --accept ]; then
   cp "$measured" "$accepted"

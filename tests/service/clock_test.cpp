@@ -7,6 +7,7 @@
 
 #include "service/notify_socket.hpp"
 #include "service/robot_network.hpp"
+#include "support/led_clock.hpp"
 #include "support/simulated_clock.hpp"
 
 namespace locus::test {
@@ -32,6 +33,15 @@ class HostClock : public RobotNetwork {
     command.insert(command.begin(), {"/usr/bin/env", std::string{"LD_PRELOAD="} + SIMULATED_CLOCK_LIBRARY,
                                      "SIMULATED_CLOCK=" + file("clock").string()});
     return command;
+  }
+
+  /// Expects that nothing of the drive was lost, and that the robot came to where the replay has it.
+  void expect_nothing_lost(const std::filesystem::path& drive, const Child& listener) const {
+    EXPECT_EQ(status()["packets"]["total"]["lost"], 0);
+    const Replay replay({"--quiet", drive.string()});
+    const Pose there = replay.trajectory().back().T_source_base;
+    const Pose heard_last = heard(listener).back().T_odom_base;
+    EXPECT_LT((heard_last.translation - there.translation).norm(), 0.05);
   }
 
   /// Returns whether both peers continue to receive estimates.
@@ -80,12 +90,33 @@ TEST_F(HostClock, ThatIsSetBackAndForwardCostsNoPacketAndNoSource) {
   }
   ASSERT_EQ(play.wait_for_exit(), 0);
   status_when([](const auto& s) { return s["lidars"].front()["heard_ms_ago"] > 300; });
-  EXPECT_EQ(status()["packets"]["total"]["lost"], 0);
   EXPECT_FALSE(daemon.has_line("is lost")) << testing::PrintToString(daemon.lines());
-  const Replay replay({"--quiet", drive.string()});
-  const Pose there = replay.trajectory().back().T_source_base;
-  const Pose heard_last = heard(cyclone).back().T_odom_base;
-  EXPECT_LT((heard_last.translation - there.translation).norm(), 0.05);
+  expect_nothing_lost(drive, cyclone);
+}
+
+/// The same on a clock that the player moves.
+TEST_F(HostClock, ThatIsSetBackAndForwardLosesNoInputOfADriveThatWaits) {
+  const std::filesystem::path drive = plant();
+  const Child daemon(led_locusd(drive / "config.yaml"));
+  const Child cyclone({CYCLONE_PEER, "0", "listen", "/locus"});
+  ASSERT_TRUE(hears_the_service(cyclone));
+  LedTime& time = led_time();
+  time.hold_at_ns = Duration{seconds{5}}.count();
+  Child play(leading_play({drive.string()}));
+  for (const auto& [offset, until] : {std::pair{-hours{1}, seconds{10}}, {hours{1}, seconds{19}}}) {
+    ASSERT_TRUE(is_held());
+    time.set_by_ns = Duration{offset}.count();
+    time.hold_at_ns = Duration{until}.count();
+  }
+  ASSERT_TRUE(is_held());
+  EXPECT_TRUE(daemon.wait_for_line("the clock of this computer was set by +7200.000 s"));
+  for (const auto& [name, source] : status()["sources"].items())
+    EXPECT_EQ(source["health"], "healthy") << name;
+  EXPECT_FALSE(daemon.has_line("is lost")) << testing::PrintToString(daemon.lines());
+  time.hold_at_ns = 0;
+  ASSERT_EQ(play.wait_for_exit(seconds{200}), 0) << testing::PrintToString(play.lines());
+  status_when([](const auto& s) { return s["lidars"].front()["heard_ms_ago"] > 300; });
+  expect_nothing_lost(drive, cyclone);
 }
 
 /// No traffic: no message wakes the waiting threads.

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <sched.h>
@@ -23,6 +24,7 @@
 #include "drivers/velodyne/model.hpp"
 #include "service/robot_network.hpp"
 #include "support/errors.hpp"
+#include "support/led_clock.hpp"
 #include "support/udp_sender.hpp"
 
 namespace locus::test {
@@ -63,7 +65,7 @@ class Incident : public RobotNetwork {
     ASSERT_EQ(mount("state", file("").c_str(), "tmpfs", 0, "size=64g"), 0); // sparse: almost nothing is used
     std::filesystem::create_directory(file("run"));
     ASSERT_EQ(mount("run", file("run").c_str(), "tmpfs", 0, "size=400m"), 0);
-    setenv("RUNTIME_DIRECTORY", file("run").c_str(), 1); // NOLINT(concurrency-mt-unsafe)
+    use_runtime_folder(file("run"));
   }
   void TearDown() override {
     daemon_.reset();
@@ -71,24 +73,21 @@ class Incident : public RobotNetwork {
     umount2(file("").c_str(), MNT_DETACH);
   }
 
-  [[nodiscard]] ProgramRun ask(std::vector<std::string> words) const {
-    words.insert(words.begin(), {"--socket", file("run/control").string()});
-    return run_program(LOCUSCTL, words);
-  }
   void reload() const {
-    const ProgramRun run = ask({"reload"});
+    const ProgramRun run = ctl({"reload"});
     ASSERT_EQ(run.status, 0) << run.err;
   }
   [[nodiscard]] nlohmann::json incidents_of_status() const {
-    const ProgramRun run = ask({"status", "--json"});
+    const ProgramRun run = ctl({"status", "--json"});
     EXPECT_EQ(run.status, 0) << run.err;
     return nlohmann::json::parse(run.out, nullptr, false)["incidents"];
   }
+
   /// Waits until the lidar has sent this fraction of the drive.
   [[nodiscard]] bool has_driven(double part) const {
     const double wanted = part * static_cast<double>(datagrams_in(plant() / "lidar.pcap"));
     return comes_true([&] {
-      const auto status = nlohmann::json::parse(ask({"status", "--json"}).out, nullptr, false);
+      const auto status = nlohmann::json::parse(ctl({"status", "--json"}).out, nullptr, false);
       return status.is_object() && status["packets"]["total"]["received"].get<double>() >= wanted;
     });
   }
@@ -99,12 +98,19 @@ class Incident : public RobotNetwork {
     return config;
   }
 
-  void start(const std::string& record) {
-    daemon_.emplace(locusd(with(record)));
+  void start(const std::string& record) { start(locusd(with(record)), {LOCUS_PLAY, plant().string()}); }
+  /// Starts a service on a clock that the player moves, and that stands still after 14 of the 20 seconds.
+  void start_led(const std::string& record) {
+    const std::vector<std::string> service = led_locusd(with(record));
+    led_time().hold_at_ns = Duration{seconds{14}}.count();
+    start(service, leading_play({plant().string()}));
+  }
+  void start(std::vector<std::string> service, std::vector<std::string> player) {
+    daemon_.emplace(std::move(service));
     listener_.emplace(std::vector<std::string>{CYCLONE_PEER, "0", "listen", "/locus"});
     ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
     ASSERT_TRUE(hears_the_service(*listener_));
-    play_.emplace(std::vector<std::string>{LOCUS_PLAY, plant().string()});
+    play_.emplace(std::move(player));
     ASSERT_TRUE(daemon_->wait_for_line("tracking"));
   }
 
@@ -145,22 +151,23 @@ class Incident : public RobotNetwork {
 
   /// Requests an incident in mid-drive, and replays the recording after the drive.
   void keep_and_replay(const std::string& record, const std::function<void(const Replay&)>& judge) {
-    ASSERT_NO_FATAL_FAILURE(start(record));
-    ASSERT_TRUE(has_driven(0.7));
-    const ProgramRun kept = ask({"record", "--keep", "8s"});
+    ASSERT_NO_FATAL_FAILURE(start_led(record));
+    ASSERT_TRUE(is_held());
+    const ProgramRun kept = ctl({"record", "--keep", "8s"});
     ASSERT_EQ(kept.status, 0) << kept.err;
     const path folder = kept.out.substr(0, kept.out.find('\n'));
     EXPECT_EQ(folder.parent_path(), file("incidents"));
     EXPECT_TRUE(folder.string().ends_with("Z_asked")) << folder;
     EXPECT_EQ(incidents_of_status()["last"], folder.string());
-    EXPECT_TRUE(contains(ask({"status"}).out, "incident    " + folder.filename().string()));
+    EXPECT_TRUE(contains(ctl({"status"}).out, "incident    " + folder.filename().string()));
     EXPECT_EQ(runs_in(file("run/input-ring")).size(), record == "keep_s: 8" ? 1U : 0U) << "nothing is written twice";
     const nlohmann::json why = nlohmann::json::parse(read_text(folder / "why.json"));
     EXPECT_EQ(why["why"], "asked");
     EXPECT_TRUE(why["status"].contains("state"));
     EXPECT_TRUE(why["status"].contains("pose"));
     EXPECT_FALSE(why["version"].get<std::string>().empty());
-    ASSERT_TRUE(play_->wait_for_exit());
+    led_time().hold_at_ns = 0;
+    ASSERT_EQ(play_->wait_for_exit(seconds{200}), 0) << testing::PrintToString(play_->lines());
     daemon_->signal(SIGTERM);
     ASSERT_EQ(daemon_->wait_for_exit(), 0);
     EXPECT_FALSE(std::filesystem::exists(file("run/input-ring")));
@@ -193,19 +200,13 @@ class Incident : public RobotNetwork {
   std::optional<Child> daemon_, listener_, play_;
 };
 
-TEST_F(Incident, AskedForIsTheLastInput) {
+TEST_F(Incident, AskedForIsTheLastInputAndReplaysToTheSameEstimate) {
   for (const char* record : {"keep_s: 8", "keep_s: 8, folder: record"})
-    ASSERT_NO_FATAL_FAILURE(keep_and_replay(record, [](const Replay& replay) {
+    ASSERT_NO_FATAL_FAILURE(keep_and_replay(record, [this](const Replay& replay) {
       EXPECT_GT(replay.trajectory().size(), 50U);
       EXPECT_LT(replay.trajectory().size(), 180U) << "the last of it, not all";
+      expect_same_estimates(replay, heard(*listener_), 70);
     }));
-}
-
-/// Requires a machine on which the service drops no sweep.
-TEST_F(Incident, AskedForReplaysToTheSameEstimate) {
-  for (const char* record : {"keep_s: 8", "keep_s: 8, folder: record"})
-    ASSERT_NO_FATAL_FAILURE(keep_and_replay(
-        record, [this](const Replay& replay) { expect_same_estimates(replay, heard(*listener_), 70); }));
 }
 
 /// Foreign files in the runtime folder stay; a service that ends removes only its own.
@@ -229,7 +230,7 @@ TEST_F(Incident, SecondServiceOnTheSameFolderTouchesNothing) {
   EXPECT_EQ(runs_in(file("run/input-ring")), runs);
   EXPECT_EQ(read_text(file("run/input-ring/run")), mark);
   EXPECT_TRUE(folders_in(file("incidents")).empty());
-  EXPECT_EQ(ask({"record", "--keep", "10s"}).status, 0);
+  EXPECT_EQ(ctl({"record", "--keep", "10s"}).status, 0);
   static_cast<void>(with("keep_s: 0"));
   ASSERT_NO_FATAL_FAILURE(reload());
   EXPECT_TRUE(comes_true([this] {
@@ -250,12 +251,12 @@ TEST_F(Incident, NeedsATmpfsThatIsLargeEnough) {
     play_.emplace(endlessly(plant()));
     ASSERT_TRUE(daemon_->wait_for_line("tracking"));
     EXPECT_FALSE(std::filesystem::exists(file("run/input-ring")));
-    const ProgramRun kept = ask({"record", "--keep", "10s"});
+    const ProgramRun kept = ctl({"record", "--keep", "10s"});
     EXPECT_EQ(kept.status, 1);
     EXPECT_TRUE(contains(kept.err, "a tmpfs as RUNTIME_DIRECTORY, or record.folder")) << kept.err;
     static_cast<void>(with("keep_s: 10, folder: record"));
     ASSERT_NO_FATAL_FAILURE(reload());
-    EXPECT_TRUE(comes_true([this] { return ask({"record", "--keep", "10s"}).status == 0; }));
+    EXPECT_TRUE(comes_true([this] { return ctl({"record", "--keep", "10s"}).status == 0; }));
     play_.reset();
     daemon_.reset();
     std::filesystem::remove(file("state"));
@@ -313,20 +314,20 @@ TEST_F(Incident, LossOfTrackingIsOneByItself) {
 TEST_F(Incident, WhatCannotBeKeptIsSaid) {
   daemon_.emplace(locusd(with("keep_s: 10")));
   ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
-  const ProgramRun nothing = ask({"record", "--keep", "10s"});
+  const ProgramRun nothing = ctl({"record", "--keep", "10s"});
   EXPECT_EQ(nothing.status, 1);
   EXPECT_TRUE(contains(nothing.err, "no input has come")) << nothing.err;
   EXPECT_EQ(incidents_of_status()["problem"], "") << "what was refused is no fault of the service";
-  const ProgramRun more = ask({"record", "--keep", "11s"});
+  const ProgramRun more = ctl({"record", "--keep", "11s"});
   EXPECT_EQ(more.status, 2);
   EXPECT_TRUE(contains(more.err, "no more than 10s can be kept; see record.keep_s")) << more.err;
   for (const char* wrong : {"", "x", "10m", "nan", "-1", "1e9", "0"})
-    EXPECT_EQ(ask({"record", "--keep", wrong}).status, 2) << wrong;
-  EXPECT_TRUE(contains(ask({"record", "--keep", "nan"}).err, "--keep nan: must be seconds, e.g. 60s"));
-  EXPECT_EQ(ask({"record"}).status, 2);
+    EXPECT_EQ(ctl({"record", "--keep", wrong}).status, 2) << wrong;
+  EXPECT_TRUE(contains(ctl({"record", "--keep", "nan"}).err, "--keep nan: must be seconds, e.g. 60s"));
+  EXPECT_EQ(ctl({"record"}).status, 2);
   static_cast<void>(with("keep_s: 0"));
   ASSERT_NO_FATAL_FAILURE(reload());
-  const ProgramRun off = ask({"record", "--keep", "1s"});
+  const ProgramRun off = ctl({"record", "--keep", "1s"});
   EXPECT_EQ(off.status, 1);
   EXPECT_TRUE(contains(off.err, "set record.keep_s")) << off.err;
 }
@@ -338,7 +339,7 @@ TEST_F(Incident, DiskThatIsFullOrAFolderThatCannotBeMadeIsSaidAndTheOdometryGoes
   std::filesystem::create_directory(older);
   ASSERT_NO_FATAL_FAILURE(start("keep_s: 10"));
   ASSERT_TRUE(has_driven(0.2));
-  const ProgramRun full = ask({"record", "--keep", "10s"});
+  const ProgramRun full = ctl({"record", "--keep", "10s"});
   EXPECT_EQ(full.status, 1);
   EXPECT_TRUE(contains(full.err, "MB are free on the disk")) << full.err;
   EXPECT_EQ(folders_in(file("incidents")), std::vector<path>{older}) << "nothing is left of it, nor given for it";
@@ -346,12 +347,12 @@ TEST_F(Incident, DiskThatIsFullOrAFolderThatCannotBeMadeIsSaidAndTheOdometryGoes
   umount2(file("incidents").c_str(), MNT_DETACH);
   std::filesystem::remove(file("incidents"));
   std::ofstream{file("incidents")} << "a file";
-  const ProgramRun no_folder = ask({"record", "--keep", "10s"});
+  const ProgramRun no_folder = ctl({"record", "--keep", "10s"});
   EXPECT_EQ(no_folder.status, 1);
   EXPECT_TRUE(contains(no_folder.err, "incidents: the incident cannot be kept (Not a directory)")) << no_folder.err;
   EXPECT_TRUE(daemon_->wait_for_line("(Not a directory); let locusd write there"));
   std::filesystem::remove(file("incidents"));
-  EXPECT_EQ(ask({"record", "--keep", "10s"}).status, 0) << "as soon as it can be";
+  EXPECT_EQ(ctl({"record", "--keep", "10s"}).status, 0) << "as soon as it can be";
   EXPECT_EQ(folders_in(file("incidents")).size(), 1U);
 }
 
@@ -372,7 +373,7 @@ TEST_F(Incident, FloodFillsNoMoreThanItsBound) {
   }
   EXPECT_LE(most, kBytes);
   EXPECT_GE(most, kBytes / 2);
-  EXPECT_EQ(ask({"record", "--keep", "60s"}).status, 0);
+  EXPECT_EQ(ctl({"record", "--keep", "60s"}).status, 0);
   EXPECT_LE(bytes_in(file("incidents")), kBytes + 100'000);
 
   const Child asks({LOCUSCTL, "--socket", file("run/control").string(), "record", "--keep", "60s"});

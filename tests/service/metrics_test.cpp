@@ -32,6 +32,7 @@
 #include "service/open_metrics.hpp"
 #include "service/robot_network.hpp"
 #include "support/errors.hpp"
+#include "support/test_drives.hpp"
 
 namespace locus::test {
 namespace {
@@ -126,10 +127,10 @@ class Metrics : public RobotNetwork {
   }
 
   /// Drives the robot with metrics enabled.
-  void drive() {
+  void drive(const std::filesystem::path& drive = capture()) {
     daemon_.emplace(locusd(listening()));
     ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
-    play_.emplace(std::vector<std::string>{LOCUS_PLAY, capture().string()});
+    play_.emplace(std::vector<std::string>{LOCUS_PLAY, drive.string()});
     ASSERT_TRUE(daemon_->wait_for_line("tracking"));
   }
 
@@ -137,7 +138,7 @@ class Metrics : public RobotNetwork {
 };
 
 TEST_F(Metrics, AreWhatTheStatusTells) {
-  ASSERT_NO_FATAL_FAILURE(drive());
+  ASSERT_NO_FATAL_FAILURE(drive(room_drive()));
   ASSERT_EQ(play_->wait_for_exit(), 0);
   const auto [before, status, metrics] = told_at_rest();
   EXPECT_EQ(metrics.mistakes, std::vector<std::string>{});
@@ -180,7 +181,7 @@ TEST_F(Metrics, AreWhatTheStatusTells) {
 /// Each value lies between those of the statuses before and after it.
 TEST_F(Metrics, OfTheMachineAreTrueAndTheHistogramIsOfAllSweeps) {
   const double launched_s = to_seconds(daemon::read_clock(CLOCK_REALTIME));
-  ASSERT_NO_FATAL_FAILURE(drive());
+  ASSERT_NO_FATAL_FAILURE(drive(room_drive()));
   ASSERT_EQ(play_->wait_for_exit(), 0);
   const auto [before, after, metrics] = told_at_rest();
   const auto sweeps = [](const nlohmann::json& status) {

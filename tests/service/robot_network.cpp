@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
@@ -10,9 +11,11 @@
 #include <sstream>
 #include <thread>
 
+#include <fcntl.h>
 #include <net/if.h>
 #include <sched.h>
 #include <sys/ioctl.h>
+#include <sys/mman.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -40,8 +43,13 @@ void RobotNetwork::SetUp() {
   if (unshare(CLONE_NEWNET) != 0 && unshare(CLONE_NEWUSER | CLONE_NEWNET) != 0)
     GTEST_SKIP() << "no network namespace of one's own: run as root, or allow user namespaces";
   ASSERT_TRUE(bring_up("lo"));
-  setenv("RUNTIME_DIRECTORY", runtime_.path().c_str(), 1); // NOLINT(concurrency-mt-unsafe): nobody else yet
-  setenv("STATE_DIRECTORY", folder_.path().c_str(), 1);    // NOLINT(concurrency-mt-unsafe)
+  use_runtime_folder(runtime_.path());
+  setenv("STATE_DIRECTORY", folder_.path().c_str(), 1); // NOLINT(concurrency-mt-unsafe)
+}
+
+void RobotNetwork::use_runtime_folder(const std::filesystem::path& folder) {
+  runtime_in_use_ = folder;
+  setenv("RUNTIME_DIRECTORY", folder.c_str(), 1); // NOLINT(concurrency-mt-unsafe): no other thread yet
 }
 
 ProgramRun RobotNetwork::ctl(std::vector<std::string> words) const {
@@ -119,6 +127,19 @@ std::vector<std::string> RobotNetwork::leading_play(std::vector<std::string> opt
                                    control().string()};
   command.insert(command.end(), options.begin(), options.end());
   return command;
+}
+
+LedTime& RobotNetwork::led_time() const {
+  const int descriptor = open(file("led_clock").c_str(), O_RDWR | O_CLOEXEC);
+  void* const page = mmap(nullptr, sizeof(LedTime), PROT_READ | PROT_WRITE, MAP_SHARED, descriptor, 0);
+  EXPECT_NE(page, MAP_FAILED) << std::strerror(errno); // NOLINT(concurrency-mt-unsafe)
+  close(descriptor);
+  return *static_cast<LedTime*>(page);
+}
+
+bool RobotNetwork::is_held() const {
+  const LedTime& time = led_time();
+  return comes_true([&] { return time.held_at_ns == time.hold_at_ns; });
 }
 
 bool comes_true(const std::function<bool()>& holds) {

@@ -14,6 +14,8 @@
 
 namespace locus::test {
 
+struct LedTime;
+
 /// A network namespace per test, with the loopback interface up: ports and DDS domains are not shared. Child processes
 /// of the test run in it, too. Skips if the system does not permit it.
 class RobotNetwork : public testing::Test {
@@ -29,7 +31,9 @@ class RobotNetwork : public testing::Test {
 
   [[nodiscard]] std::filesystem::path file(const std::string& name) const { return folder_ / name; }
   /// Control socket of the service, in a runtime folder on a tmpfs as on a robot.
-  [[nodiscard]] std::filesystem::path control() const { return runtime_ / "control"; }
+  [[nodiscard]] std::filesystem::path control() const { return runtime_in_use_ / "control"; }
+  /// Has services that are started from now on use another runtime folder.
+  void use_runtime_folder(const std::filesystem::path& folder);
   /// Returns the configuration of the capture, with more lines of YAML.
   [[nodiscard]] std::filesystem::path config(const std::string& more = "") const;
   /// Returns the configuration of the capture, with another value of a key of the lidar.
@@ -47,6 +51,11 @@ class RobotNetwork : public testing::Test {
   [[nodiscard]] std::vector<std::string> led_locusd(const std::filesystem::path& config) const;
   [[nodiscard]] std::vector<std::string> leading_play(std::vector<std::string> options) const;
 
+  /// Returns the time that both have in common, for as long as this process runs.
+  [[nodiscard]] LedTime& led_time() const;
+  /// Waits until the player holds the time where it is to.
+  [[nodiscard]] bool is_held() const;
+
   [[nodiscard]] static std::vector<std::string> locusd(const std::filesystem::path& config) {
     return {LOCUSD, "--config", config.string()};
   }
@@ -60,6 +69,7 @@ class RobotNetwork : public testing::Test {
 
  private:
   TemporaryFolder folder_, runtime_{"/dev/shm"};
+  std::filesystem::path runtime_in_use_;
 };
 
 /// Waits until it holds; false after the test's patience.

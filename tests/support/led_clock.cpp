@@ -74,6 +74,11 @@ int note_range(dl_phdr_info* info, std::size_t /*size*/, void* first) {
   return 0;
 }
 
+// Ingest thread of the service; counts go on where those of a process before it ended.
+std::uint64_t received_datagrams = 0;
+std::atomic<std::uint64_t> pushed_motion{0}; ///< any thread
+std::uint64_t seen_motion = 0;               ///< pushed before the last wait ended
+
 bool leads = false;
 LedTime nobodys_time;
 LedTime* led = &nobodys_time;
@@ -91,6 +96,9 @@ __attribute__((constructor)) void begin() {
     return;
   led = static_cast<LedTime*>(page);
   leads = std::getenv("LEADS_CLOCK") != nullptr; // NOLINT(concurrency-mt-unsafe)
+  received_datagrams = led->datagrams.load();
+  seen_motion = led->motion.load();
+  pushed_motion = seen_motion;
 }
 
 bool is_wall(clockid_t clock) { return clock == CLOCK_REALTIME || clock == CLOCK_REALTIME_COARSE; }
@@ -99,10 +107,11 @@ bool is_monotonic(clockid_t clock) {
 }
 
 std::int64_t led_ns(clockid_t clock) {
+  const std::int64_t set_by_ns = is_wall(clock) && !leads ? led->set_by_ns.load(std::memory_order_relaxed) : 0;
   if (led->is_led.load(std::memory_order_acquire) == 0)
-    return system_ns(clock) + led->offset_ns.load(std::memory_order_relaxed);
+    return system_ns(clock) + led->offset_ns.load(std::memory_order_relaxed) + set_by_ns;
   const std::int64_t began = is_wall(clock) ? led->wall_ns : is_monotonic(clock) ? led->monotonic_ns : led->boot_ns;
-  return began + led->added_ns.load(std::memory_order_relaxed);
+  return began + led->added_ns.load(std::memory_order_relaxed) + set_by_ns;
 }
 
 // Player side.
@@ -127,6 +136,18 @@ void wait_for_the_service() {
     kSleep(&kLook, nullptr);
 }
 
+/// Waits while the test holds the time.
+void wait_for_the_test() {
+  static auto* const kSleep = next<int(const timespec*, timespec*)>("nanosleep");
+  constexpr timespec kLook{0, 1'000'000};
+  for (std::int64_t at = led->hold_at_ns.load(); at != 0 && led->added_ns.load() >= at; at = led->hold_at_ns.load()) {
+    led->held_at_ns.store(at);
+    kSleep(&kLook, nullptr);
+    sent_datagrams = led->datagrams.load(); // others may have sent meanwhile
+    sent_motion = led->motion.load();
+  }
+}
+
 /// Lets time run on its own from here.
 __attribute__((destructor)) void end() {
   if (!leads || led->is_led.load() == 0)
@@ -135,12 +156,6 @@ __attribute__((destructor)) void end() {
   led->offset_ns.store(led_ns(CLOCK_MONOTONIC) - system_ns(CLOCK_MONOTONIC));
   led->is_led.store(0, std::memory_order_release);
 }
-
-// Ingest thread of the service.
-
-std::uint64_t received_datagrams = 0;
-std::atomic<std::uint64_t> pushed_motion{0}; ///< any thread
-std::uint64_t seen_motion = 0;               ///< pushed before the last wait ended
 
 bool is_ingest() {
   thread_local bool is = false;
@@ -164,13 +179,18 @@ int clock_gettime(clockid_t clock, timespec* time) noexcept {
   return 0;
 }
 
-/// Intercepts the player's sleeps.
+/// Intercepts the player's sleeps, and the service's pause after requests, 50 ms in which no time passes: the player
+/// makes a request for each 40 ms of its time.
 int nanosleep(const timespec* duration, timespec* left) {
   static auto* const kNext = next<int(const timespec*, timespec*)>("nanosleep");
-  if (!leads || led->is_led.load() == 0 || !program_range.holds(__builtin_return_address(0)))
+  constexpr timespec kPause{0, 500'000};
+  if (led->is_led.load() == 0 || !program_range.holds(__builtin_return_address(0)))
     return kNext(duration, left);
+  if (!leads)
+    return kNext(gettid() == getpid() ? &kPause : duration, left);
   wait_for_the_service();
   led->added_ns.fetch_add(ns_of(*duration));
+  wait_for_the_test();
   return 0;
 }
 
@@ -199,7 +219,8 @@ int recvmmsg(int socket, mmsghdr* messages, unsigned count, int flags, timespec*
       if (c->cmsg_level == SOL_SOCKET && c->cmsg_type == SCM_TIMESTAMPNS) {
         timespec stamp{};
         std::memcpy(&stamp, CMSG_DATA(c), sizeof(stamp));
-        stamp = to_timespec(is_led ? led_ns(CLOCK_REALTIME) : ns_of(stamp) + led->offset_ns.load());
+        stamp =
+            to_timespec(is_led ? led_ns(CLOCK_REALTIME) : ns_of(stamp) + led->offset_ns.load() + led->set_by_ns.load());
         std::memcpy(CMSG_DATA(c), &stamp, sizeof(stamp));
       }
   return received;

@@ -13,6 +13,7 @@ namespace locus {
 namespace {
 
 using std::chrono::hours;
+using std::chrono::microseconds;
 using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
 using std::chrono::seconds;
@@ -270,6 +271,40 @@ TEST(SweepBuilder, PacketsThatWereHeldUpAndComeAllAtOnceAreNoNewStart) {
   for (std::size_t i = 1; i < built.sweeps.size(); ++i)
     ASSERT_EQ(built.sweeps[i].start, built.sweeps[i - 1].end);
   EXPECT_GT(built.sweeps.back().points.size(), 25'000U);
+}
+
+/// A sender that waits for a processor sends what it has saved up in time slices, slowly. This was taken for a clock
+/// that was set back: sweeps ended before others that were already given out.
+TEST(SweepBuilder, PacketsThatCatchUpSlowlyAreNoNewStart) {
+  NumberedLidar lidar;
+  Built built;
+  built.play(lidar, seconds{1});
+  Stamp arrival = lidar.next() + milliseconds{1400};
+  built.builder.advance(arrival);
+  for (int i = 0; i < 2000; ++i, arrival += microseconds{1100})
+    built.builder.add(lidar.packet(), arrival);
+  EXPECT_GT(built.builder.counters().late_packets, 900U);
+  EXPECT_EQ(built.builder.counters().restarts, 0U);
+  for (std::size_t i = 1; i < built.sweeps.size(); ++i)
+    ASSERT_EQ(built.sweeps[i].start, built.sweeps[i - 1].end);
+  EXPECT_GT(built.sweeps.back().points.size(), 25'000U);
+}
+
+/// The stamps of tf go back only where waiting would take longer than a listener bridges.
+TEST(SweepBuilder, ClockThatIsSetBackByASecondIsWaitedFor) {
+  for (const auto& [set_back, restarts] : {std::pair{milliseconds{1500}, 0U}, std::pair{milliseconds{5000}, 1U}}) {
+    NumberedLidar lidar;
+    Built built;
+    built.play(lidar, seconds{1});
+    lidar.jump(-set_back);
+    built.play(lidar, seconds{3});
+    EXPECT_EQ(built.builder.counters().restarts, restarts);
+    int went_back = 0;
+    for (std::size_t i = 1; i < built.sweeps.size(); ++i)
+      went_back += built.sweeps[i].end <= built.sweeps[i - 1].end ? 1 : 0;
+    EXPECT_EQ(went_back, restarts);
+    EXPECT_GT(built.sweeps.back().points.size(), 25'000U);
+  }
 }
 
 TEST(SweepBuilder, AJumpForwardByAnHourIsNoRunOfEmptyWindows) {
