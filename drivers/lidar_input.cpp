@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "drivers/hesai/calibration.hpp"
 #include "drivers/velodyne/calibration.hpp"
@@ -185,6 +186,9 @@ std::optional<PacketError> LidarInput::take_position(const Datagram& datagram) {
     return PacketError::length;
   position_ = velodyne::parse_position_packet(datagram.payload.first<velodyne::kPositionPacketBytes>());
   clock_.set_synchronised(position_->is_synchronised());
+  const std::string_view why = options_.time != LidarTime::receive ? velodyne::why_unused(*position_) : "";
+  if (why != std::exchange(pps_unused_for_, why))
+    pps_unused_since_ = datagram.receive_stamp;
   ++counters_.position;
   return std::nullopt;
 }
@@ -314,6 +318,11 @@ std::string_view LidarInput::clock_state() const {
   if (tells_date())
     return counters_.data > 0 ? to_string(time_scale_) : "absent";
   return to_string(position_ ? position_->pps : velodyne::PpsState::absent);
+}
+
+std::string_view LidarInput::why_pps_is_unused() const {
+  constexpr Duration kWorthTelling = std::chrono::seconds{5};
+  return last_heard_ - pps_unused_since_ > kWorthTelling ? pps_unused_for_ : std::string_view{};
 }
 
 double LidarInput::rotation_rate_rpm() const {

@@ -116,6 +116,9 @@ class LidarInput {
   /// State of the lidar's clock: PpsState of a Velodyne, TimeScale of a lidar whose packets carry the date.
   [[nodiscard]] std::string_view clock_state() const;
   [[nodiscard]] bool tells_date() const { return velodyne() == nullptr; }
+  /// Says why the time of a Velodyne with a locked PPS has not been used for more than five seconds; empty if it is
+  /// used, was configured not to be or PPS is not locked.
+  [[nodiscard]] std::string_view why_pps_is_unused() const;
   /// Rotation rate of the last good packet; 0 before the first.
   [[nodiscard]] double rotation_rate_rpm() const;
   /// Packets that cannot be decoded because their model is unknown or differs; empty for an Ouster.
@@ -160,6 +163,8 @@ class LidarInput {
   std::optional<velodyne::PositionPacket> position_;
   TimeScale time_scale_ = TimeScale::free_running; ///< only for packets that carry the date
   UnknownPackets unknown_hesai_;                   ///< the latest packets rejected for their model
+  std::string_view pps_unused_for_; ///< velodyne::why_unused() of position_
+  Stamp pps_unused_since_;
   std::array<ImuSample, ouster::ImuMeasurements::kMost> imu_samples_;
   std::size_t imu_count_ = 0;
 

@@ -2,8 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
+#include <cstring>
 #include <optional>
 #include <random>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "drivers/lidar_input.hpp"
@@ -231,6 +235,53 @@ TEST(LidarRouter, LidarsAreToldApartByPort) {
     EXPECT_EQ(router->receive(front(i))->lidar, 0);
     EXPECT_EQ(router->receive(rear(i))->lidar, 1);
   }
+/// The clock of a lidar passes the hour without wrapping, and one packet right there has a wrong time.
+TEST(LidarInput, ClockThatRunsOnBeyondTheHourCostsTheOneWrongPacket) {
+  LidarInput lidar = opened();
+  constexpr double kPacket_us = 1327.104, kHour_us = 3.6e9;
+  for (int i = 0; i < 2000; ++i) {
+    const double us = kPacket_us * i;
+    const double shown_us = i == 1000 ? 48e6 : kHour_us - 1000 * kPacket_us + us;
+    VelodyneTestPacket bytes(Model::vlp16, ReturnMode::strongest, static_cast<std::uint32_t>(std::lround(shown_us)),
+                             static_cast<std::uint16_t>(std::lround(0.36 * us) % velodyne::kCdegPerTurn));
+    bytes.set_all_returns(1000);
+    const Stamp received = stamp_from_ns(1'700'000'000'000'000'000) + from_seconds(1e-6 * (us + kPacket_us + 80.0));
+    EXPECT_EQ(lidar.receive({bytes.payload(), kLidarIp, 2368, 2368, received}) != nullptr, i != 1000) << i;
+  }
+  EXPECT_EQ(lidar.counters()[PacketError::time], 1U);
+  EXPECT_EQ(lidar.counters().lost, 1U);
+  EXPECT_EQ(lidar.counters().clock_steps, 0U);
+}
+
+/// Position packets with a locked PPS for so long, and data packets between them.
+std::string_view why_unused_after(Duration duration, const std::string& nmea, LidarTime time = LidarTime::automatic) {
+  LidarOptions options;
+  options.time = time;
+  LidarInput lidar = std::move(*LidarInput::open(options, 0));
+  Stream stream;
+  std::array<std::byte, velodyne::kPositionPacketBytes> position{};
+  position[0xCA] = std::byte{2};
+  std::memcpy(&position[0xCE], nmea.data(), nmea.size());
+  const Stamp begin = stream(0).receive_stamp;
+  for (int i = 0;; ++i) {
+    const Datagram data = stream(i);
+    lidar.receive(data);
+    lidar.receive({position, kLidarIp, 8308, 8308, data.receive_stamp});
+    if (data.receive_stamp - begin > duration)
+      return lidar.why_pps_is_unused();
+  }
+}
+
+TEST(LidarInput, LockedPpsThatIsNotUsedIsToldAfterFiveSeconds) {
+  const std::string gga = "$GPGGA,220243,3708.5809,N*00";
+  EXPECT_EQ(why_unused_after(std::chrono::seconds{4}, gga), "");
+  EXPECT_NE(why_unused_after(std::chrono::seconds{6}, gga).find("no RMC"), std::string_view::npos);
+  EXPECT_EQ(why_unused_after(std::chrono::seconds{6}, gga, LidarTime::receive), "") << "configured so";
+  EXPECT_EQ(why_unused_after(std::chrono::seconds{6},
+                             "$GPRMC,220243,A,3708.5809,N,12139.7813,W,028.8,158.3,111212,013.8,E,D*03\r\n"),
+            "");
+}
+
   EXPECT_EQ(router->lidars()[1].counters().data, 10U);
 }
 
