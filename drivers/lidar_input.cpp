@@ -418,11 +418,27 @@ void LidarInput::count(const SensorClock::Reading& reading) {
     return;
   }
   if (reading.continuous)
-    counters_.lost += missing_before(reading);
+    count_lost(reading);
   last_azimuth_cdeg_ = packet_.first_azimuth_cdeg;
   last_first_column_ = ouster() != nullptr ? ouster()->first_column() : 0;
   last_number_ = hesai() != nullptr ? hesai()->number().value_or(0) : 0;
   last_duration_ = packet_.duration;
+}
+
+void LidarInput::count_lost(const SensorClock::Reading& reading) {
+  const bool has_numbers = ouster() != nullptr || (hesai() != nullptr && hesai()->number());
+  std::uint64_t missing = missing_before(reading);
+  if (!has_numbers) {
+    const double cdeg_per_s = rotation_rate_rpm() / 60.0 * velodyne::kCdegPerTurn;
+    const double turned_cdeg = cdeg_per_s * to_seconds(reading.advance);
+    if (missing > 0 && turned_cdeg < velodyne::kCdegPerTurn)
+      missing = sectors_.lost_between(last_azimuth_cdeg_ + cdeg_per_s * to_seconds(last_duration_),
+                                      packet_.first_azimuth_cdeg, missing);
+    const bool skips_a_sector = 2 * packet_.duration > 3 * nominal_duration();
+    sectors_.take(packet_.first_azimuth_cdeg, skips_a_sector ? 0.0 : turn_of_packet_cdeg(), turned_cdeg);
+    counters_.lost -= std::min(counters_.lost, sectors_.take_corrected());
+  }
+  counters_.lost += missing;
 }
 
 void LidarInput::remember(const Datagram& datagram) {
