@@ -18,6 +18,7 @@
 #include "drivers/other_maker.hpp"
 #include "faults/fault_injection.hpp"
 #include "locus_replay/motion_recordings.hpp"
+#include "locus_replay/recorded_times.hpp"
 
 namespace locus::tools {
 
@@ -69,6 +70,8 @@ class Recording : public daemon::InputSource {
   /// That more datagrams than not are older than the one before them in the file, with what helps; nothing where they
   /// are in order, but for some that were overtaken on their way.
   [[nodiscard]] std::optional<std::string> runs_backwards() const;
+  /// Returns the time by the clock of the recording computer, which may have been set in the recording.
+  [[nodiscard]] Stamp wall(Stamp steady) const { return source_->wall(steady); }
   /// What is wrong with the capture and with the motion played along with it, a line for the user each.
   [[nodiscard]] std::vector<std::string> warnings() const;
 
@@ -85,6 +88,7 @@ class Recording : public daemon::InputSource {
     MotionRecording recording;
     bool has_faults; ///< injected
     Duration earlier{};
+    const RecordedTimes* times = nullptr;
 
     [[nodiscard]] Stamp arrival() const; ///< of the next sample; Stamp::max() after the last
     [[nodiscard]] std::optional<TimeSpan> arrivals() const;
@@ -96,7 +100,7 @@ class Recording : public daemon::InputSource {
   void note_traffic(const Datagram& datagram);
   Pending fetch();
 
-  std::unique_ptr<DatagramSource> source_;
+  std::unique_ptr<RecordedTimes> source_;
   std::vector<MotionCursor> motion_;
   LidarRouter lidars_; ///< never receives anything
   std::optional<Duration> play_for_;
