@@ -32,6 +32,7 @@ IngestReport::Lidar IngestReport::Lidar::of(const LidarInput& lidar) {
           .last_heard = lidar.last_heard(),
           .unknown_last_heard = lidar.unknown_last_heard(),
           .pps = lidar.clock_state(),
+          .pps_unused = lidar.why_pps_is_unused(),
           .tells_date = lidar.tells_date(),
           .packets_of_other_mode = lidar.ouster() != nullptr && lidar.ouster()->is_in_other_mode()
                                        ? lidar.ouster()->packets_of_other_start()
@@ -60,7 +61,10 @@ void IngestReport::read(const Ingest& ingest) {
     sources[i] = {.counters = health.counters(),
                   .healthy = health.healthy(),
                   .last_heard = health.last_heard(),
-                  .verdict = health.verdict()};
+                  .verdict = health.verdict(),
+                  .period = health.period(),
+                  .refusal = health.refusal().value_or(Refusal{}),
+                  .longest_refusal = health.longest_refusal()};
   }
   sweeps = ingest.sweeps().counters();
 }
@@ -124,6 +128,12 @@ std::optional<std::string> too_fast(const MotionLimits& limits, double largest_s
   return fmt::format("estimates claim up to {:.1f} m/s, and motion.max_speed_mps is {:g}: set it to what the robot is "
                      "able to, or do not rely on them",
                      largest_speed_mps, limits.max_speed_mps);
+}
+
+std::optional<std::string> unused_pps(const LidarOptions& options, const IngestReport::Lidar& lidar) {
+  if (lidar.pps_unused.empty())
+    return std::nullopt;
+  return fmt::format("lidar {}: its PPS is locked, but its time is not used: {}", options.name, lidar.pps_unused);
 }
 
 std::optional<std::string> short_sweep(const SweepOptions& options, const std::string& lidar,
@@ -219,6 +229,23 @@ std::string_view health_of(const IngestReport::Source& source) {
   return source.healthy ? "healthy" : source.counters.received == 0 ? "never heard" : "lost";
 }
 
+std::optional<std::string> slow_imu(const MotionSource& options, const IngestReport::Source& source) {
+  constexpr Duration kTooSlow = std::chrono::milliseconds{35}; ///< less than three samples in a sweep of 100 ms
+  if (options.kind != SourceKind::imu || source.period.value_or(Duration{}) <= kTooSlow)
+    return std::nullopt;
+  return fmt::format(
+      "motion source {} comes {:.0f} times a second, too seldom to tell the motion within a sweep; let it "
+      "publish 100 times a second or more",
+      options.name, 1.0 / to_seconds(*source.period));
+}
+
+std::string verdict_on(const IngestReport::Source& source, bool is_live) {
+  const Refusal& refusal = is_live ? source.refusal : source.longest_refusal;
+  if (!source.verdict.empty() || !refusal.is_worth_telling())
+    return std::string{source.verdict};
+  return fmt::format("is refused for {:.0f} s: it {}", to_seconds(refusal.lasted), explanation(refusal.reason));
+}
+
 /// Ignores foreign senders and cloud faults that were last seen more than kLately before the lidar's last data.
 std::string problem_of(const LidarOptions& options, const IngestReport::Lidar& lidar) {
   constexpr Duration kLately = std::chrono::seconds{5};
@@ -235,7 +262,8 @@ std::string problem_of(const LidarOptions& options, const IngestReport::Lidar& l
       stranger = {};
   if (lidar.last_heard - lidar.unknown_last_heard > kLately)
     now.unknown_packets.reset();
-  for (const auto& problem : {shared_port(options, now), unknown_model(options, now), stale_metadata(options, now)})
+  for (const auto& problem :
+       {shared_port(options, now), unknown_model(options, now), stale_metadata(options, now), unused_pps(options, now)})
     if (problem)
       return *problem;
   return "";

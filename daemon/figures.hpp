@@ -44,6 +44,7 @@ struct IngestReport {
     Stamp last_heard;                              ///< LidarInput::last_heard()
     Stamp unknown_last_heard;                      ///< LidarInput::unknown_last_heard()
     std::string_view pps = "absent";               ///< LidarInput::clock_state()
+    std::string_view pps_unused{};                 ///< LidarInput::why_pps_is_unused()
     bool tells_date = false;                       ///< LidarInput::tells_date()
     std::uint64_t packets_of_other_mode = 0; ///< ouster::Decoder::packets_of_other_start() where is_in_other_mode()
 
@@ -57,8 +58,11 @@ struct IngestReport {
   struct Source {
     SourceCounters counters;
     bool healthy = false;
-    Stamp last_heard;         ///< HealthMonitor::last_heard()
-    std::string_view verdict; ///< text with static lifetime; see HealthMonitor
+    Stamp last_heard;                 ///< HealthMonitor::last_heard()
+    std::string_view verdict;         ///< text with static lifetime; see HealthMonitor
+    std::optional<Duration> period{}; ///< HealthMonitor::period()
+    Refusal refusal{};                ///< HealthMonitor::refusal(); default: none
+    Refusal longest_refusal{};
   };
 
   PacketCounters total;
@@ -84,6 +88,9 @@ std::optional<std::string> unknown_model(const LidarOptions& options, const Inge
 
 /// Describes the faults in the times of a lidar's clouds, one line each.
 std::vector<std::string> cloud_doubts(const LidarOptions& options, const IngestReport::Lidar& lidar);
+
+/// Reports a locked PPS whose time is not used, with the reason; empty otherwise.
+std::optional<std::string> unused_pps(const LidarOptions& options, const IngestReport::Lidar& lidar);
 
 /// Reports an Ouster that was restarted after its metadata was fetched and now runs in another mode, so that its
 /// packets are rejected; empty otherwise.
@@ -198,6 +205,13 @@ std::optional<Duration> time_since(Stamp then);
 
 /// Returns "healthy", "lost" or "never heard".
 std::string_view health_of(const IngestReport::Source& source);
+
+/// Warns of an IMU that is too slow to tell the motion within a sweep; empty otherwise.
+std::optional<std::string> slow_imu(const MotionSource& options, const IngestReport::Source& source);
+
+/// Says what is wrong with a source as a whole, or why its samples are refused for longer than is worth telling: at
+/// present in a service, at its longest in a finished replay. Follows the name of the source; empty if all is well.
+std::string verdict_on(const IngestReport::Source& source, bool is_live);
 
 /// Describes a current fault found in a lidar's packets or clouds; empty if there is none.
 std::string problem_of(const LidarOptions& options, const IngestReport::Lidar& lidar);

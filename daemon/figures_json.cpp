@@ -132,8 +132,9 @@ ordered_json source_json(const Figures& figures, std::size_t i) {
                     {"used_sweeps", figures.sweeps.used_sweeps[i]},
                     {"rejected", counts_json<HealthReason>(source.counters.rejected, kAlwaysTold)},
                     {"health_changes", source.counters.health_changes}};
-  if (figures.live || !source.verdict.empty())
-    json["verdict"] = source.verdict;
+  const std::string verdict = verdict_on(source, figures.live.has_value());
+  if (figures.live || !verdict.empty())
+    json["verdict"] = verdict;
   const MotionSource& options = figures.config.motion_sources[i];
   if (figures.sweeps.last && figures.sweeps.last->sources[i].learned && options.calibration != Calibration::off)
     json["learned"] = learned_json(options, *figures.sweeps.last->sources[i].learned);

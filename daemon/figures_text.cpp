@@ -119,8 +119,8 @@ std::string sources_text(const Figures& figures) {
                         counters.health_changes, silence_text(source.last_heard));
     if (const std::string refused = reasons<HealthReason>(counters.rejected); !refused.empty())
       text += fmt::format("{:<12}refused: {}\n", "", refused);
-    if (!source.verdict.empty())
-      text += fmt::format("{:<12}{}\n", "", source.verdict);
+    if (const std::string verdict = verdict_on(source, true); !verdict.empty())
+      text += fmt::format("{:<12}{}\n", "", verdict);
     if (const std::string doubt = calibration_doubt(figures, i); !doubt.empty())
       text += fmt::format("{:<12}{}\n", "", doubt);
   }

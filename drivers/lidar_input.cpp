@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "drivers/hesai/calibration.hpp"
 #include "drivers/velodyne/calibration.hpp"
@@ -185,6 +186,9 @@ std::optional<PacketError> LidarInput::take_position(const Datagram& datagram) {
     return PacketError::length;
   position_ = velodyne::parse_position_packet(datagram.payload.first<velodyne::kPositionPacketBytes>());
   clock_.set_synchronised(position_->is_synchronised());
+  const std::string_view why = options_.time != LidarTime::receive ? velodyne::why_unused(*position_) : "";
+  if (why != std::exchange(pps_unused_for_, why))
+    pps_unused_since_ = datagram.receive_stamp;
   ++counters_.position;
   return std::nullopt;
 }
@@ -316,6 +320,11 @@ std::string_view LidarInput::clock_state() const {
   return to_string(position_ ? position_->pps : velodyne::PpsState::absent);
 }
 
+std::string_view LidarInput::why_pps_is_unused() const {
+  constexpr Duration kWorthTelling = std::chrono::seconds{5};
+  return last_heard_ - pps_unused_since_ > kWorthTelling ? pps_unused_for_ : std::string_view{};
+}
+
 double LidarInput::rotation_rate_rpm() const {
   if (const ouster::Decoder* const sensor = ouster())
     return sensor->rotation_rate_rpm();
@@ -409,11 +418,27 @@ void LidarInput::count(const SensorClock::Reading& reading) {
     return;
   }
   if (reading.continuous)
-    counters_.lost += missing_before(reading);
+    count_lost(reading);
   last_azimuth_cdeg_ = packet_.first_azimuth_cdeg;
   last_first_column_ = ouster() != nullptr ? ouster()->first_column() : 0;
   last_number_ = hesai() != nullptr ? hesai()->number().value_or(0) : 0;
   last_duration_ = packet_.duration;
+}
+
+void LidarInput::count_lost(const SensorClock::Reading& reading) {
+  const bool has_numbers = ouster() != nullptr || (hesai() != nullptr && hesai()->number());
+  std::uint64_t missing = missing_before(reading);
+  if (!has_numbers) {
+    const double cdeg_per_s = rotation_rate_rpm() / 60.0 * velodyne::kCdegPerTurn;
+    const double turned_cdeg = cdeg_per_s * to_seconds(reading.advance);
+    if (missing > 0 && turned_cdeg < velodyne::kCdegPerTurn)
+      missing = sectors_.lost_between(last_azimuth_cdeg_ + cdeg_per_s * to_seconds(last_duration_),
+                                      packet_.first_azimuth_cdeg, missing);
+    const bool skips_a_sector = 2 * packet_.duration > 3 * nominal_duration();
+    sectors_.take(packet_.first_azimuth_cdeg, skips_a_sector ? 0.0 : turn_of_packet_cdeg(), turned_cdeg);
+    counters_.lost -= std::min(counters_.lost, sectors_.take_corrected());
+  }
+  counters_.lost += missing;
 }
 
 void LidarInput::remember(const Datagram& datagram) {

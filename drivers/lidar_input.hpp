@@ -22,6 +22,7 @@
 #include "drivers/packet_counters.hpp"
 #include "drivers/sensor_clock.hpp"
 #include "drivers/sensor_time.hpp"
+#include "drivers/sent_sectors.hpp"
 #include "drivers/unknown_packets.hpp"
 #include "drivers/velodyne/decoder.hpp"
 #include "drivers/velodyne/position_packet.hpp"
@@ -55,7 +56,7 @@ struct PacketLengths {
 /// - Reordering: a packet overtaken by up to 100 ms is counted as reordered and returned as usual; its stamp precedes
 ///   that of the packet before it. It is no longer counted as lost.
 /// - Loss: counted from gaps in the packet numbers. Without numbers, it is counted from gaps in the stamps, confirmed
-///   by the azimuth for gaps of up to one second.
+///   by the azimuth for gaps of up to one second; a sector that is never sent is no loss.
 /// - Maker: if not configured, the maker of the first readable packets.
 /// - Ouster: IMU packets are counted as position packets.
 ///
@@ -115,6 +116,9 @@ class LidarInput {
   [[nodiscard]] std::string_view recognised_model() const;
   /// State of the lidar's clock: PpsState of a Velodyne, TimeScale of a lidar whose packets carry the date.
   [[nodiscard]] std::string_view clock_state() const;
+  /// Says why the time of a Velodyne with a locked PPS has not been used for more than five seconds; empty if it is
+  /// used, was configured not to be or PPS is not locked.
+  [[nodiscard]] std::string_view why_pps_is_unused() const;
   [[nodiscard]] bool tells_date() const { return velodyne() == nullptr; }
   /// Rotation rate of the last good packet; 0 before the first.
   [[nodiscard]] double rotation_rate_rpm() const;
@@ -149,6 +153,7 @@ class LidarInput {
   [[nodiscard]] Duration nominal_duration() const;
   [[nodiscard]] std::uint64_t missing_before(const SensorClock::Reading& reading) const;
   void count(const SensorClock::Reading& reading);
+  void count_lost(const SensorClock::Reading& reading);
   void remember(const Datagram& datagram);
 
   LidarOptions options_;
@@ -158,6 +163,8 @@ class LidarInput {
   const LidarPacket* ready_ = nullptr; ///< decoded from the current datagram
   PacketCounters counters_;
   std::optional<velodyne::PositionPacket> position_;
+  std::string_view pps_unused_for_; ///< velodyne::why_unused() of position_
+  Stamp pps_unused_since_;
   TimeScale time_scale_ = TimeScale::free_running; ///< only for packets that carry the date
   UnknownPackets unknown_hesai_;                   ///< the latest packets rejected for their model
   std::array<ImuSample, ouster::ImuMeasurements::kMost> imu_samples_;
@@ -170,6 +177,7 @@ class LidarInput {
   std::size_t last_first_column_ = 0;   ///< first column of the latest packet; Ouster only
   std::uint32_t last_number_ = 0;       ///< sequence number of the latest packet; Hesai only
   Duration last_duration_{};            ///< duration of the latest packet
+  SentSectors sectors_;                 ///< only for packets without numbers
 
   static constexpr std::size_t kRemembered = 8;
   std::array<Payload, kRemembered> recent_{}; ///< latest packets, for duplicate detection

@@ -29,6 +29,11 @@ Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
   return m;
 }
 
+bool is_rotation(const Eigen::Quaterniond& quaternion) {
+  constexpr double kTolerance = 0.01; ///< of the squared norm
+  return std::abs(quaternion.squaredNorm() - 1.0) < kTolerance;
+}
+
 Eigen::Quaterniond so3_exp(const Eigen::Vector3d& rotation_vector_rad) {
   const double angle = rotation_vector_rad.norm();
   const double sine_over_angle = angle < kSmallAngleRad ? 0.5 - angle * angle / 48.0 : std::sin(0.5 * angle) / angle;

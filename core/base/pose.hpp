@@ -39,6 +39,10 @@ struct Pose {
 /// Returns the matrix with skew(v) * w == v x w.
 Eigen::Matrix3d skew(const Eigen::Vector3d& v);
 
+/// Tells whether a quaternion is a rotation, that is, of unit length up to rounding; false for NaN. The tolerance is
+/// that of tf2.
+bool is_rotation(const Eigen::Quaterniond& quaternion);
+
 /// Convert a rotation vector (rad) to a rotation and back; log returns the shorter rotation.
 Eigen::Quaterniond so3_exp(const Eigen::Vector3d& rotation_vector_rad);
 Eigen::Vector3d so3_log(const Eigen::Quaterniond& rotation);

@@ -14,14 +14,17 @@ std::optional<HealthReason> reason_if(bool wrong, HealthReason reason) {
   return wrong ? std::optional{reason} : std::nullopt;
 }
 
-/// Rejects NaN and values beyond the reach of any robot or sensor: sums would never recover from either.
+/// Rejects NaN and values beyond the reach of any robot or sensor, since sums would never recover from either, and
+/// quaternions that are no rotation.
 class NotANumber : public HealthMetric {
  public:
   explicit NotANumber(UseAcceleration use_acceleration) : use_acceleration_(use_acceleration) {}
 
   std::optional<HealthReason> judge(const SourceReading& reading) override {
-    return reason_if(!(reading.imu != nullptr ? is_number(*reading.imu) : is_number(*reading.odometry)),
-                     HealthReason::nan);
+    if (!(reading.imu != nullptr ? is_number(*reading.imu) : is_number(*reading.odometry)))
+      return HealthReason::nan;
+    return reason_if(reading.odometry != nullptr && !rotates(reading.odometry->T_source_base.rotation),
+                     HealthReason::no_rotation);
   }
 
  private:
@@ -33,13 +36,20 @@ class NotANumber : public HealthMetric {
   }
   static bool is_number(const OdometrySample& sample) {
     constexpr double kFarthest_m = 1e8; ///< geocentric coordinates are within it
-    constexpr double kLeastNorm = 0.5;  ///< of a usable quaternion
-    return is_within(kFarthest_m, sample.T_source_base.translation) && sample.T_source_base.finite() &&
-           sample.T_source_base.rotation.norm() > kLeastNorm;
+    return is_within(kFarthest_m, sample.T_source_base.translation) && sample.T_source_base.finite();
+  }
+  /// Tells whether the quaternion is a rotation. One without w is none, though it is of unit length at half a turn.
+  bool rotates(const Eigen::Quaterniond& quaternion) {
+    if (quaternion.w() != 0.0)
+      lacks_w_ = false;
+    else if (!is_rotation(quaternion))
+      lacks_w_ = true;
+    return !lacks_w_ && is_rotation(quaternion);
   }
   static bool is_within(double most, const Eigen::Vector3d& v) { return (v.array().abs() <= most).all(); }
 
   UseAcceleration use_acceleration_;
+  bool lacks_w_ = false;
 };
 
 class OutOfOrder : public HealthMetric {

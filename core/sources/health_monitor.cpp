@@ -33,13 +33,13 @@ std::optional<Stamp> HealthMonitor::judge(SourceReading reading) {
     lose(HealthReason::out_of_order, reading.arrival); // the duration of the step is unknown
   counters_.clock_steps = clock_.steps();
   if (!stamp)
-    return leave_out(HealthReason::out_of_order);
+    return refuse(HealthReason::out_of_order, reading.arrival);
   reading.stamp = *stamp;
   if (outside_objects_)
-    return leave_out(HealthReason::outside);
+    return refuse(HealthReason::outside, reading.arrival);
   for (const auto& metric : metrics_) {
     if (const auto reason = metric->judge(reading))
-      return leave_out(*reason);
+      return refuse(*reason, reading.arrival);
   }
   accept(reading);
   return stamp;
@@ -48,6 +48,19 @@ std::optional<Stamp> HealthMonitor::judge(SourceReading reading) {
 std::nullopt_t HealthMonitor::leave_out(HealthReason reason) {
   ++counters_.rejected[static_cast<std::size_t>(reason)];
   objection_ = reason;
+  return std::nullopt;
+}
+
+/// Leaves a sample out, and follows how long this has been going on.
+std::nullopt_t HealthMonitor::refuse(HealthReason reason, Stamp arrival) {
+  leave_out(reason);
+  if (!refusal_)
+    refused_since_ = arrival;
+  refusal_ = {reason, std::max(arrival - refused_since_, Duration{})};
+  if (refusal_->lasted > longest_refusal_.lasted)
+    longest_refusal_ = *refusal_;
+  if (state_ == State::unheard && refusal_->is_worth_telling())
+    lose(reason, arrival);
   return std::nullopt;
 }
 
@@ -68,6 +81,8 @@ void HealthMonitor::accept(const SourceReading& reading) {
     state_ = State::healthy;
     change(true, lost_for_, reading.arrival);
   }
+  if (state_ == State::healthy)
+    refusal_.reset();
 }
 
 void HealthMonitor::advance(Stamp now) {
@@ -95,7 +110,7 @@ void HealthMonitor::set_outside_verdict(bool healthy, Stamp now) {
 }
 
 void HealthMonitor::lose(HealthReason reason, Stamp now) {
-  if (state_ == State::healthy) {
+  if (state_ == State::healthy || (state_ == State::unheard && refusal_ && refusal_->is_worth_telling())) {
     lost_for_ = reason;
     change(false, reason, now);
   } else if (reason == HealthReason::self_check) { // also if already lost: it may be permanent
@@ -126,6 +141,11 @@ std::string_view HealthMonitor::verdict() const {
 
 bool HealthMonitor::trusts_accelerometer() const {
   return std::ranges::all_of(metrics_, [](const auto& metric) { return metric->trusts_accelerometer(); });
+}
+
+std::optional<Duration> HealthMonitor::period() const {
+  constexpr std::uint64_t kEnough = 50;
+  return counters_.received >= kEnough && period_s_ > 0.0 ? std::optional(from_seconds(period_s_)) : std::nullopt;
 }
 
 Duration HealthMonitor::timeout() const {

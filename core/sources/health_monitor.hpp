@@ -20,7 +20,8 @@ namespace locus {
 ///
 /// A sample that a metric rejects is dropped and counted. Without a good one for timeout() the source loses its health,
 /// for the reason of the last rejection or, if nothing arrived, as stale: a single bad sample costs nothing, and a long
-/// run of them no more than silence does. Good samples for kProbation restore the health, so a flapping sensor does not
+/// run of them no more than silence does. A source of which no sample has been good yet loses its health once the run
+/// is worth telling. Good samples for kProbation restore the health, so a flapping sensor does not
 /// flap the odometry. Reads no clock: the time comes from the samples and from advance(), in stamps of arrival. One
 /// owner.
 class HealthMonitor {
@@ -51,9 +52,15 @@ class HealthMonitor {
   [[nodiscard]] std::uint32_t epoch() const { return epoch_; }
   /// Returns the silence that costs the source its health: three of its own periods.
   [[nodiscard]] Duration timeout() const;
+  /// Returns the period of its samples once it is known well, from fifty of them on.
+  [[nodiscard]] std::optional<Duration> period() const;
   /// Returns the finding about the source as a whole, in words for the user; empty if nothing is wrong.
   [[nodiscard]] std::string_view verdict() const;
   [[nodiscard]] bool trusts_accelerometer() const;
+  /// Returns the present run of refused samples; empty while the source is healthy and before its first sample.
+  [[nodiscard]] const std::optional<Refusal>& refusal() const { return refusal_; }
+  /// Returns the longest run of refused samples so far, the present one included.
+  [[nodiscard]] const Refusal& longest_refusal() const { return longest_refusal_; }
   /// Returns the arrival of the last good sample; Stamp{} before the first.
   [[nodiscard]] Stamp last_heard() const { return last_arrival_; }
   /// Returns the latest change since the last call; the caller sets HealthEvent::source.
@@ -65,6 +72,7 @@ class HealthMonitor {
 
   std::optional<Stamp> judge(SourceReading reading);
   std::nullopt_t leave_out(HealthReason reason);
+  std::nullopt_t refuse(HealthReason reason, Stamp arrival);
   void accept(const SourceReading& reading);
   void lose(HealthReason reason, Stamp now);
   void change(bool healthy, HealthReason reason, Stamp now);
@@ -77,6 +85,9 @@ class HealthMonitor {
   bool outside_objects_ = false;
   std::optional<HealthReason> objection_; ///< latest rejection since the last good sample
   HealthReason lost_for_ = HealthReason::stale;
+  std::optional<Refusal> refusal_;
+  Refusal longest_refusal_;
+  Stamp refused_since_;             ///< arrival of the first sample of refusal_
   Stamp last_stamp_, last_arrival_; ///< of the last good sample
   Stamp probation_since_;
   double period_s_ = 0.0; ///< learned; 0: not yet

@@ -23,11 +23,12 @@ enum class HealthReason : std::uint8_t {
   disagreement, ///< motion differs from lidar's; either may be wrong
   outside,      ///< rejected by an external monitor
   self_check,   ///< rejected by ImuSelfCheck
-  speed         ///< a speed beyond MotionLimits
+  speed,        ///< a speed beyond MotionLimits
+  no_rotation   ///< an orientation whose quaternion is not of unit length
 };
 constexpr auto names_of(HealthReason) {
   return std::to_array<std::string_view>({"stale", "jump", "nan", "frozen", "out_of_order", "covariance",
-                                          "disagreement", "outside", "self_check", "speed"});
+                                          "disagreement", "outside", "self_check", "speed", "no_rotation"});
 }
 inline constexpr std::size_t kHealthReasonCount = names_of(HealthReason{}).size();
 
@@ -35,6 +36,21 @@ inline constexpr std::size_t kHealthReasonCount = names_of(HealthReason{}).size(
 inline constexpr std::string_view kTooFast =
     "claims a higher speed than motion.max_speed_mps, and is not used while it does "
     "(set that to what the robot is able to, or look at the unit of the source)";
+
+/// Says for the user why samples are refused or a source is lost, and what to do about it; follows the name of the
+/// source.
+std::string_view explanation(HealthReason reason);
+
+/// Run of refused samples of a source, between which it was never healthy.
+struct Refusal {
+  static constexpr Duration kWorthTelling = std::chrono::seconds{5};
+
+  HealthReason reason = HealthReason::stale; ///< of the latest refused sample
+  Duration lasted{};                         ///< from the first to the latest refused sample
+
+  /// Returns false for a self-check, which has a verdict of its own.
+  [[nodiscard]] bool is_worth_telling() const { return lasted > kWorthTelling && reason != HealthReason::self_check; }
+};
 
 /// Counters of the samples of one motion source.
 struct SourceCounters {

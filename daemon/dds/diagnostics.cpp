@@ -88,8 +88,9 @@ std::vector<Diagnostic> diagnostics(const Figures& figures, Stamp now) {
   for (std::size_t i = 0; i < figures.config.motion_sources.size(); ++i) {
     const std::string& name = figures.config.motion_sources[i].name;
     const IngestReport::Source& source = figures.ingest.sources[i];
+    const std::string verdict = source.healthy ? "" : verdict_on(source, figures.live.has_value());
     all.push_back(diagnostic(source.healthy ? Level::ok : Level::warning, ": source " + name,
-                             std::string{health_of(source)}, json["sources"][name]));
+                             verdict.empty() ? std::string{health_of(source)} : verdict, json["sources"][name]));
   }
   return all;
 }

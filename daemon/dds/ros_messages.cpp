@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 namespace locus::daemon {
 namespace {
@@ -15,12 +16,6 @@ char* c_string(const std::string& text) { return const_cast<char*>(text.c_str())
 
 Eigen::Quaterniond to_eigen(const ros::Quaternion& q) { return {q.w_, q.x_, q.y_, q.z_}; }
 Eigen::Vector3d to_eigen(const ros::Vector3& v) { return {v.x_, v.y_, v.z_}; }
-
-/// Tells whether a quaternion has unit norm up to rounding; drivers without an attitude send zeros.
-bool is_rotation(const Eigen::Quaterniond& q) {
-  constexpr double kTolerance = 0.1;
-  return std::abs(q.norm() - 1.0) < kTolerance; // false for NaN
-}
 
 ros::Quaternion to_ros(const Eigen::Quaterniond& q) { return {q.x(), q.y(), q.z(), q.w()}; }
 
@@ -42,27 +37,69 @@ ImuSample to_sample(const ros::Imu& message, Stamp arrival) {
   return sample;
 }
 
-double UsualCovariance::scale(std::span<const double, 36> twist_covariance) {
-  constexpr double kMemory = 6000.0; ///< samples: two minutes at 50 Hz
-  double trace = 0.0;
-  for (std::size_t i = 0; i < 6; ++i) {
-    const double variance = twist_covariance[7 * i];
-    if (!(variance >= 0.0 && std::isfinite(variance)))
-      return std::numeric_limits<double>::infinity();
-    trace += variance;
+double UsualCovariance::scale(const ros::Odometry& message) {
+  if (!moves(message))
+    return 1.0;
+  const Stamp stamp = to_stamp(message.header_.stamp_);
+  const double scale = compare(message.twist_.covariance_);
+  if (scale <= kAsUsual)
+    unusual_since_.reset();
+  else if (!unusual_since_ || stamp < *unusual_since_)
+    unusual_since_ = stamp;
+  else if (stamp - *unusual_since_ > kBecomesUsual) {
+    axes_ = {};
+    unusual_since_.reset();
+    return compare(message.twist_.covariance_);
   }
-  if (!(trace > 0.0 && std::isfinite(trace)))
-    return trace > 0.0 ? std::numeric_limits<double>::infinity() : 1.0;
-  ++samples_;
-  log_usual_ += (std::log(trace) - log_usual_) / std::min(static_cast<double>(samples_), kMemory);
-  return trace / std::exp(log_usual_);
+  return scale;
+}
+
+/// Compares the axes of which both the present and the usual variance are known, and learns the present one.
+double UsualCovariance::compare(std::span<const double, 36> twist_covariance) {
+  double now = 0.0, usual = 0.0;
+  bool any_is_lost = false;
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    constexpr double kMemory = 6000.0; ///< samples: two minutes at 50 Hz
+    constexpr double kUnknown = 1e3;   ///< 32 m/s or rad/s: drivers send 1e3 to DBL_MAX for what they do not know
+    const double variance = twist_covariance[7 * i];
+    Axis& axis = axes_[i];
+    const bool is_known = variance > 0.0 && variance < kUnknown; // false for NaN
+    any_is_lost = any_is_lost || (axis.samples > 0 && variance >= kUnknown);
+    if (!is_known)
+      continue;
+    ++axis.samples;
+    axis.log_usual += (std::log(variance) - axis.log_usual) / std::min(static_cast<double>(axis.samples), kMemory);
+    now += variance;
+    usual += std::exp(axis.log_usual);
+  }
+  if (usual > 0.0)
+    return now / usual;
+  return any_is_lost ? std::numeric_limits<double>::infinity() : 1.0;
+}
+
+/// Tells whether the robot clearly moves: by the twist or, for drivers that leave it zero, by the step since the
+/// message before.
+bool UsualCovariance::moves(const ros::Odometry& message) {
+  constexpr double kMoves_mps = 0.1, kMoves_radps = 0.1; ///< above what drivers take for rest
+  const Stamp stamp = to_stamp(message.header_.stamp_);
+  const auto& [p, q] = message.pose_.pose_;
+  const Pose before = std::exchange(last_, Pose{to_eigen(q), {p.x_, p.y_, p.z_}});
+  const double step_s = to_seconds(stamp - std::exchange(last_stamp_, stamp));
+  const Eigen::Vector3d velocity_mps = to_eigen(message.twist_.twist_.linear_);
+  const Eigen::Vector3d turn_rate_radps = to_eigen(message.twist_.twist_.angular_);
+  if (!velocity_mps.isZero(0) || !turn_rate_radps.isZero(0))
+    return velocity_mps.norm() > kMoves_mps || turn_rate_radps.norm() > kMoves_radps;
+  const double turned_rad = 2.0 * (last_.rotation.coeffs() - before.rotation.coeffs()).norm();
+  return step_s > 0.0 &&
+         ((last_.translation - before.translation).norm() > kMoves_mps * step_s || turned_rad > kMoves_radps * step_s);
 }
 
 OdometrySample to_sample(const ros::Odometry& message, Stamp arrival, UsualCovariance& usual) {
   const auto& [position, orientation] = message.pose_.pose_;
+  const Eigen::Quaterniond rotation = to_eigen(orientation);
   return {to_stamp(message.header_.stamp_), arrival,
-          Pose{to_eigen(orientation).normalized(), {position.x_, position.y_, position.z_}},
-          usual.scale(std::span<const double, 36>(message.twist_.covariance_))};
+          Pose{is_rotation(rotation) ? rotation.normalized() : rotation, {position.x_, position.y_, position.z_}},
+          usual.scale(message)};
 }
 
 OdometryReport report_of(const OdometryEstimate& e) {

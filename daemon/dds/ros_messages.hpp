@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -25,17 +28,37 @@ Stamp to_stamp(const ros::Time& time);
 ImuSample to_sample(const ros::Imu& message, Stamp arrival);
 
 /// Compares the reported twist covariance of an odometry source with its usual value. The pose covariance is
-/// unsuitable, since it grows with the distance travelled. One owner.
+/// unsuitable, since it grows with the distance travelled.
+///
+/// Zero, negative, huge or no number means that the driver does not know the variance of this axis; it is then left
+/// out. Variances at rest are not compared with those in motion, for many drivers report next to nothing at rest. What
+/// remains unusual for ten seconds becomes the usual. One owner.
 class UsualCovariance {
  public:
-  /// Returns the ratio to the usual covariance; 1 if none is reported, infinity if it is invalid.
-  double scale(std::span<const double, 36> twist_covariance);
+  static constexpr double kAsUsual = 4.0; ///< largest ratio that is nothing unusual: twice the standard deviation
+  static constexpr Duration kBecomesUsual = std::chrono::seconds{10};
+
+  /// Returns the ratio to the usual covariance; 1 at rest and if none is reported, infinity if all that was reported
+  /// before is now huge.
+  double scale(const ros::Odometry& message);
 
  private:
-  double log_usual_ = 0.0;
-  std::uint64_t samples_ = 0;
+  struct Axis {
+    double log_usual = 0.0;
+    std::uint64_t samples = 0;
+  };
+
+  double compare(std::span<const double, 36> twist_covariance);
+  bool moves(const ros::Odometry& message);
+
+  std::array<Axis, 6> axes_{};
+  std::optional<Stamp> unusual_since_;
+  Pose last_;
+  Stamp last_stamp_;
 };
 
+/// Converts an odometry message. A quaternion that is no rotation is passed on as it is, for the HealthMonitor to
+/// count.
 OdometrySample to_sample(const ros::Odometry& message, Stamp arrival, UsualCovariance& usual);
 
 /// Frame names in messages. Must outlive the messages created with it.

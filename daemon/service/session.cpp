@@ -357,12 +357,9 @@ namespace {
 std::string why_lost(const HealthEvent& event) {
   if (!event.verdict.empty())
     return std::string(event.verdict);
-  if (event.reason == HealthReason::disagreement)
-    return "and lidar disagree on how the robot moves; it is not used until they agree (possible causes: its slip, "
-           "scale or stamps, an IMU whose stamps are late, or lidar that follows what moves around the robot)";
-  if (event.reason == HealthReason::speed)
-    return std::string(kTooFast);
-  return fmt::format("is lost ({})", to_string(event.reason));
+  if (event.reason == HealthReason::disagreement || event.reason == HealthReason::speed)
+    return std::string(explanation(event.reason));
+  return fmt::format("is lost ({}): it {}", to_string(event.reason), explanation(event.reason));
 }
 
 } // namespace

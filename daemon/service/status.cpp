@@ -90,7 +90,8 @@ void Watch::look_at_lidars(const Figures& figures) {
                .told = {},
                .short_sweep_told = lidar.short_sweep_told,
                .shared_port_told = lidar.shared_port_told,
-               .doubts_told = lidar.doubts_told};
+               .doubts_told = lidar.doubts_told,
+               .unused_pps_told = std::move(lidar.unused_pps_told)};
     }
     const auto warning = short_sweep(figures.config.sweep, lidars[i].name, ingest.lidars[i].rotation_rate_rpm);
     if (warning && !std::exchange(lidar.short_sweep_told, true))
@@ -98,6 +99,9 @@ void Watch::look_at_lidars(const Figures& figures) {
     const auto shared = figures.duration > kPatience ? shared_port(lidars[i], ingest.lidars[i]) : std::nullopt;
     if (shared && !std::exchange(lidar.shared_port_told, true))
       log_.warn(*shared, {{"LOCUS_LIDAR", lidars[i].name}});
+    const auto unused = unused_pps(lidars[i], ingest.lidars[i]);
+    if (unused && *unused != std::exchange(lidar.unused_pps_told, *unused))
+      log_.warn(*unused, {{"LOCUS_LIDAR", lidars[i].name}});
     look_at_doubts(lidar, lidars[i], ingest.lidars[i]);
     if (now - lidar.heard < kPatience)
       continue;
@@ -138,9 +142,10 @@ std::string Watch::why_silent(const Lidar& lidar, const LidarOptions& options, c
                        dotted(*now.refused_ip), options.source_ip ? "configured is" : "the lidar was",
                        dotted(*now.source_ip), options.name);
   if (packets.data + packets.position == packets.received)
-    return fmt::format(
-        "only its position packets arrive; find its data port with locusctl sensors and set lidars.{}.port",
-        options.name);
+    return fmt::format("only its position packets arrive; its laser or motor is off (see its web page), or its data "
+                       "packets go to another "
+                       "port (locusctl sensors): set lidars.{}.port",
+                       options.name);
   const std::string unknown = now.unknown_packets ? fmt::format(" ({})", to_string(*now.unknown_packets)) : "";
   if (options.is_ouster())
     return stale_metadata(options, now)
@@ -161,6 +166,10 @@ void Watch::look_at_verdicts(const IngestReport& ingest) {
     if (!verdict.empty() && verdict != verdicts_[i])
       log_.warn(fmt::format("motion source {} {}", sources[i].name, verdict), {{"LOCUS_SOURCE", sources[i].name}});
     verdicts_[i] = verdict;
+    if (const auto slow = slow_imu(sources[i], ingest.sources[i]); slow && !slow_told_.test(i)) {
+      log_.warn(*slow, {{"LOCUS_SOURCE", sources[i].name}});
+      slow_told_.set(i);
+    }
   }
 }
 

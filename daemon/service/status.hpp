@@ -63,6 +63,7 @@ class Watch {
     bool short_sweep_told = false;
     bool shared_port_told = false;
     CloudDoubts doubts_told{};
+    std::string unused_pps_told; ///< logged reason why its locked PPS is not used
   };
   void look_at_doubts(Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now);
   static std::string why_silent(const Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now);
@@ -75,6 +76,7 @@ class Watch {
   std::uint64_t told_attempts_ = 0;
   std::array<Lidar, kMaxLidars> lidars_;
   bool told_speed_ = false;
+  std::bitset<kMaxSources> slow_told_;
   std::array<std::string_view, kMaxSources> verdicts_; ///< last logged verdicts
   std::bitset<kMaxSources> askew_;                     ///< sources with a logged calibration error
   std::set<std::string> unheard_;                      ///< sources logged as silent

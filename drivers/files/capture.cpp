@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 #include <pcap/pcap.h>
 
+#include "drivers/files/pcapng_reader.hpp"
 #include "drivers/files/udp_frame.hpp"
 
 namespace locus {
@@ -46,6 +47,8 @@ constexpr std::array kForeignFiles{
 
 constexpr std::array<std::string_view, 6> kCaptureMagics{"\xD4\xC3\xB2\xA1", "\xA1\xB2\xC3\xD4", "\x4D\x3C\xB2\xA1",
                                                          "\xA1\xB2\x3C\x4D", "\x0A\x0D\x0D\x0A", "\x34\xCD\xB2\xA1"};
+
+constexpr std::string_view kPcapngMagic = "\x0A\x0D\x0D\x0A";
 
 /// Describes a file that libpcap cannot read, judged by its first bytes; quotes libpcap's message if it is a capture.
 std::string foreign_file(std::string_view start, const std::filesystem::path& name, std::string_view libpcap_says) {
@@ -91,15 +94,6 @@ void count(FrameError error, Capture::Stats& stats) {
     ++stats.malformed;
     return;
   }
-}
-
-/// Returns the stamp; empty if it is out of range: a pcapng file may claim any 64-bit number of seconds.
-std::optional<Stamp> stamp_of(const pcap_pkthdr& header) {
-  constexpr std::int64_t kMaxSeconds = kLatestStamp.time_since_epoch() / std::chrono::seconds{1};
-  if (header.ts.tv_sec < 0 || header.ts.tv_sec >= kMaxSeconds) {
-    return std::nullopt;
-  }
-  return stamp_from_ns(header.ts.tv_sec * 1'000'000'000 + header.ts.tv_usec); // nanoseconds, as requested in open()
 }
 
 } // namespace
@@ -157,8 +151,9 @@ struct Capture::Feed {
 
 void Capture::Closer::operator()(pcap* handle) const { pcap_close(handle); }
 
-Capture::Capture(std::filesystem::path file, pcap* handle, const ByteStream& stream)
-    : file_(std::move(file)), pcap_(handle), stream_(&stream) {}
+Capture::Capture(std::filesystem::path file, pcap* handle, std::unique_ptr<PcapngReader> pcapng,
+                 const ByteStream& stream)
+    : file_(std::move(file)), pcap_(handle), pcapng_(std::move(pcapng)), stream_(&stream) {}
 
 Expected<Capture, std::string> Capture::open(const std::filesystem::path& file) {
   Expected<std::unique_ptr<ByteStream>, std::string> stream = open_stream(file);
@@ -173,15 +168,25 @@ Expected<Capture, std::string> Capture::open(std::unique_ptr<ByteStream> stream,
   if (opened == nullptr) {
     return fmt::format("{}: {}", name.string(), std::generic_category().message(errno));
   }
+  const auto problem_of = [&](std::string_view reason) {
+    const std::string problem = bytes.problem();
+    return fmt::format("{}: {}", name.string(), problem.empty() ? foreign_file(start, name, reason) : problem);
+  };
+  if (start.starts_with(kPcapngMagic)) {
+    auto reader = std::make_unique<PcapngReader>(opened);
+    if (!reader->open()) {
+      return problem_of(reader->problem());
+    }
+    return Capture{name, nullptr, std::move(reader), bytes};
+  }
   std::array<char, PCAP_ERRBUF_SIZE> reason{};
   pcap_t* handle = pcap_fopen_offline_with_tstamp_precision(opened, PCAP_TSTAMP_PRECISION_NANO, reason.data());
   if (handle == nullptr) {
-    std::string problem = bytes.problem();
+    std::string problem = problem_of(reason.data());
     std::fclose(opened);
-    return fmt::format("{}: {}", name.string(),
-                       problem.empty() ? foreign_file(start, name, reason.data()) : std::move(problem));
+    return problem;
   }
-  Capture capture{name, handle, bytes}; // pcap_close() closes the file
+  Capture capture{name, handle, nullptr, bytes}; // pcap_close() closes the file
   if (const int link_type = pcap_datalink(handle); !link_type_supported(link_type)) {
     return fmt::format("{}: link type {} is not supported; record on the network card that the lidar is plugged into "
                        "(Ethernet, VLAN, Linux cooked, loopback and raw IP are read)",
@@ -191,58 +196,92 @@ Expected<Capture, std::string> Capture::open(std::unique_ptr<ByteStream> stream,
 }
 
 const Datagram* Capture::next() {
-  while (break_.empty()) {
-    pcap_pkthdr* header = nullptr;
-    const u_char* data = nullptr;
-    const int status = pcap_next_ex(pcap_.get(), &header, &data);
-    if (status == PCAP_ERROR_BREAK) { // regular end
-      return nullptr;
-    }
-    if (status != 1) {
-      note_break();
-      return nullptr;
-    }
+  while (const std::optional<CapturedFrame> frame = next_frame()) {
     ++stats_.frames;
-    const std::span<const std::byte> frame{reinterpret_cast<const std::byte*>(data), header->caplen};
-    Expected<Datagram, FrameError> datagram = udp_datagram(pcap_datalink(pcap_.get()), frame, header->len);
+    Expected<Datagram, FrameError> datagram = udp_datagram(frame->link_type, frame->bytes, frame->wire_bytes);
     if (!datagram && datagram.error() == FrameError::fragment) {
-      if (const auto joined = fragments_.take(pcap_datalink(pcap_.get()), frame)) {
+      if (const auto joined = fragments_.take(frame->link_type, frame->bytes)) {
         datagram = *joined;
       }
     }
-    const std::optional<Stamp> stamp = stamp_of(*header);
-    if (!datagram || !stamp) {
+    if (!link_type_supported(frame->link_type)) {
+      foreign_link_type_ = frame->link_type;
+    }
+    if (!datagram || !frame->stamp) {
       count(datagram ? FrameError::malformed : datagram.error(), stats_);
       continue;
     }
     ++stats_.datagrams;
     stats_.truncated += datagram->truncated ? 1u : 0u;
     datagram_ = *datagram;
-    datagram_.receive_stamp = *stamp;
+    datagram_.receive_stamp = *frame->stamp;
     return &datagram_;
   }
   return nullptr;
 }
 
-/// Records why reading stopped. libpcap reports truncation and damage alike; only the stream knows whether its end was
-/// reached.
-void Capture::note_break() {
-  const std::string_view why = pcap_geterr(pcap_.get());
-  if (why.find("different from") != std::string_view::npos) {
-    break_ = fmt::format("{}: it was recorded on several interfaces of different kinds, which libpcap does not read "
-                         "({}); the {} frames before are used; record with: tcpdump -i CARD, of the lidar's card alone",
-                         file_.string(), why, stats_.frames);
-    return;
+/// Returns the next frame; empty at the end, and where reading stops early.
+std::optional<CapturedFrame> Capture::next_frame() {
+  if (!break_.empty()) {
+    return std::nullopt;
   }
-  const bool cut = std::feof(pcap_file(pcap_.get())) != 0;
+  if (pcapng_ != nullptr) {
+    const std::optional<CapturedFrame> frame = pcapng_->next();
+    if (!frame && !pcapng_->problem().empty()) {
+      note_break(pcapng_->file(), pcapng_->problem());
+    }
+    return frame;
+  }
+  pcap_pkthdr* header = nullptr;
+  const u_char* data = nullptr;
+  const int status = pcap_next_ex(pcap_.get(), &header, &data);
+  if (status == PCAP_ERROR_BREAK) { // regular end
+    return std::nullopt;
+  }
+  if (status != 1) {
+    note_break(pcap_file(pcap_.get()), pcap_geterr(pcap_.get()));
+    return std::nullopt;
+  }
+  return CapturedFrame{pcap_datalink(pcap_.get()),
+                       {reinterpret_cast<const std::byte*>(data), header->caplen},
+                       header->len,
+                       stamp_of(header->ts)};
+}
+
+/// Returns the stamp; empty if it is out of range. Precondition: `time` is in nanoseconds, as requested in open().
+///
+/// Some recorders write nanoseconds into a file of microseconds, where libpcap multiplies them by a thousand: all but
+/// one in a thousand are then beyond a second. A few of those in a sound file are damage.
+std::optional<Stamp> Capture::stamp_of(const timeval& time) {
+  constexpr std::int64_t kMaxSeconds = kLatestStamp.time_since_epoch() / std::chrono::seconds{1};
+  constexpr std::int64_t kSecond_ns = 1'000'000'000, kFactor = 1'000;
+  const bool is_beyond = time.tv_usec >= kSecond_ns;
+  ++(is_beyond ? beyond_a_second_ : within_a_second_);
+  const bool holds_ns = beyond_a_second_ > within_a_second_;
+  const std::int64_t fraction_ns = holds_ns ? time.tv_usec / kFactor : time.tv_usec;
+  if (time.tv_sec < 0 || time.tv_sec >= kMaxSeconds || fraction_ns < 0 || fraction_ns >= kSecond_ns) {
+    return std::nullopt;
+  }
+  return stamp_from_ns(time.tv_sec * kSecond_ns + fraction_ns);
+}
+
+/// Records why reading stopped. Truncation and damage are reported alike; only the stream knows whether its end was
+/// reached.
+void Capture::note_break(std::FILE* file, std::string_view why) {
+  const bool cut = std::feof(file) != 0;
   const std::string problem = stream_->problem(); // not empty: the stream, not the capture, ended early
-  break_ =
-      fmt::format("{}: byte {}: {} ({}); the {} frames before it are used{}", file_.string(),
-                  ftello(pcap_file(pcap_.get())), cut ? "the capture ends in mid-packet" : "the capture is damaged",
-                  problem.empty() ? why : problem, stats_.frames, cut ? "" : ", what follows is not");
+  break_ = fmt::format("{}: byte {}: {} ({}); the {} frames before it are used{}", file_.string(), ftello(file),
+                       cut ? "the capture ends in mid-packet" : "the capture is damaged",
+                       problem.empty() ? why : problem, stats_.frames, cut ? "" : ", what follows is not");
 }
 
 std::string Capture::why_none() const {
+  if (foreign_link_type_) {
+    return fmt::format(
+        "no UDP datagram in {} frames, and frames of link type {} are not read; record on the network card "
+        "that the lidar is plugged into: tcpdump -i CARD -s 0 -w lidar.pcap udp",
+        stats_.frames, link_type_name(*foreign_link_type_));
+  }
   return fmt::format("no UDP datagram in {} frames; record next to the lidar with: tcpdump -s 0 -w lidar.pcap udp",
                      stats_.frames);
 }
@@ -253,6 +292,12 @@ std::vector<std::string> Capture::warnings() const {
     lines.push_back(break_);
   } else if (std::string problem = stream_->problem(); !problem.empty()) {
     lines.push_back(fmt::format("{}: {}; the {} frames before it are used", file_.string(), problem, stats_.frames));
+  }
+  if (beyond_a_second_ > within_a_second_) {
+    lines.push_back(
+        fmt::format("{}: its header promises microseconds, but its times hold nanoseconds; they are read as "
+                    "such",
+                    file_.string()));
   }
   const auto warn = [&](std::uint64_t count, std::string_view what) {
     if (count > 0) {

@@ -52,13 +52,12 @@ std::optional<PacketError> Decoder::decode(std::span<const std::byte> payload, L
   if (payload.size() != kDataPacketBytes)
     return PacketError::length;
   const auto bytes = payload.first<kDataPacketBytes>();
-  const Duration stamp = std::chrono::microseconds{read_u32(payload.data() + kTimeOffset)};
+  // Some lidars do not wrap at the hour; SensorClock rejects a lone wrong time.
+  const Duration stamp = std::chrono::microseconds{read_u32(payload.data() + kTimeOffset)} % kHour;
   if (const auto error = recognise(bytes, stamp))
     return error;
   if (const auto error = check_blocks(bytes))
     return error;
-  if (stamp >= kHour)
-    return PacketError::time;
   if (!measure_turns(bytes, stamp))
     return PacketError::azimuth;
 

@@ -50,8 +50,8 @@ class Decoder {
  public:
   explicit Decoder(const DecoderOptions& options = {}) : options_(options) {}
 
-  /// Fills all of `packet` except `lidar` and `stamp`. Returns the reason for rejection (length, model, flag, azimuth,
-  /// time), if any; `packet` is then undefined.
+  /// Fills all of `packet` except `lidar` and `stamp`. Returns the reason for rejection (length, model, flag,
+  /// azimuth), if any; `packet` is then undefined.
   std::optional<PacketError> decode(std::span<const std::byte> payload, LidarPacket& packet);
 
   /// Model as which packets are decoded; empty before the first good packet. The same applies to the next.

@@ -13,8 +13,6 @@ namespace locus::velodyne {
 namespace {
 
 constexpr std::size_t kPpsAt = 0xCA;
-constexpr std::size_t kNmeaAt = 0xCE;
-constexpr std::size_t kNmeaBytes = 128;
 
 constexpr double kMpsPerKnot = 1852.0 / 3600.0;
 
@@ -31,18 +29,28 @@ template <class Number> std::optional<Number> parse_number(std::string_view text
   return value;
 }
 
-/// Returns the text between $ and *, if the two digits after it are its checksum.
-std::optional<std::string_view> checked_body(std::string_view sentence) {
-  const std::size_t star = sentence.find('*');
-  if (!sentence.starts_with('$') || star == std::string_view::npos || star + 3 > sentence.size())
-    return std::nullopt;
-  const std::string_view body = sentence.substr(1, star - 1);
-  unsigned checksum = 0;
-  for (const char c : body)
-    checksum ^= static_cast<unsigned char>(c);
-  if (parse_number<unsigned>(sentence.substr(star + 1, 2), 16) != checksum)
-    return std::nullopt;
-  return body;
+/// Splits off the next sentence of a text: from a $ to before the next one. Empty if there is none.
+std::string_view take_sentence(std::string_view& text) {
+  text.remove_prefix(std::min(text.find('$'), text.size()));
+  const std::string_view sentence = text.substr(0, text.find('$', 1));
+  text.remove_prefix(sentence.size());
+  return sentence;
+}
+
+/// Tells whether a sentence begins with a talker of two capitals (GP, GN, GL, GA, GB, BD, QZ, ...) and the type RMC.
+bool is_rmc(std::string_view sentence) {
+  constexpr std::string_view kType = "RMC,";
+  constexpr std::size_t kTypeAt = 3;
+  const auto is_capital = [](char c) { return c >= 'A' && c <= 'Z'; };
+  return sentence.size() > kTypeAt && is_capital(sentence[1]) && is_capital(sentence[2]) &&
+         sentence.substr(kTypeAt).starts_with(kType);
+}
+
+/// Tells whether a sentence begins as one of any type, rather than at a stray $.
+bool is_any(std::string_view sentence) {
+  constexpr std::size_t kAddress = 6; ///< $GPGGA
+  const auto is_of_address = [](char c) { return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'); };
+  return sentence.size() > kAddress && std::ranges::all_of(sentence.substr(1, kAddress - 1), is_of_address);
 }
 
 /// Parses hhmmss or hhmmss.sss.
@@ -73,40 +81,85 @@ std::optional<std::chrono::year_month_day> parse_date(std::string_view text) {
 
 } // namespace
 
-std::optional<RmcSentence> parse_rmc(std::string_view sentence) {
+namespace {
+
+/// Parses one RMC sentence. Returns why it is unusable, or no_fix or good with `rmc` filled.
+Nmea parse_sentence(std::string_view sentence, std::optional<RmcSentence>& rmc) {
   enum Field : std::size_t { kType, kTime, kStatus, kSpeed = 7, kCourse = 8, kDate = 9, kFieldCount = 10 };
 
-  const auto body = checked_body(sentence);
-  if (!body)
-    return std::nullopt;
+  const std::size_t star = sentence.find('*');
+  if (star == std::string_view::npos || star + 3 > sentence.size())
+    return Nmea::no_checksum;
+  const std::string_view body = sentence.substr(1, star - 1);
+  unsigned checksum = 0;
+  for (const char c : body)
+    checksum ^= static_cast<unsigned char>(c);
+  if (parse_number<unsigned>(sentence.substr(star + 1, 2), 16) != checksum)
+    return Nmea::wrong_checksum;
   std::array<std::string_view, kFieldCount> fields;
-  std::string_view rest = *body;
+  std::string_view rest = body;
   for (std::string_view& field : fields) {
     field = rest.substr(0, rest.find(','));
     rest.remove_prefix(std::min(rest.size(), field.size() + 1));
   }
   const auto time_of_day = parse_time_of_day(fields[kTime]);
-  if ((fields[kType] != "GPRMC" && fields[kType] != "GNRMC") || !time_of_day)
-    return std::nullopt;
-
-  RmcSentence rmc;
-  rmc.valid = fields[kStatus] == "A";
-  rmc.time_of_day = *time_of_day;
-  rmc.date = parse_date(fields[kDate]);
+  if (!time_of_day)
+    return Nmea::no_time;
+  rmc.emplace();
+  rmc->valid = fields[kStatus] == "A";
+  rmc->time_of_day = *time_of_day;
+  rmc->date = parse_date(fields[kDate]);
   if (const auto knots = parse_number<double>(fields[kSpeed]))
-    rmc.speed_mps = *knots * kMpsPerKnot;
-  rmc.course_deg = parse_number<double>(fields[kCourse]);
-  return rmc;
+    rmc->speed_mps = *knots * kMpsPerKnot;
+  rmc->course_deg = parse_number<double>(fields[kCourse]);
+  return rmc->valid ? Nmea::good : Nmea::no_fix;
+}
+
+} // namespace
+
+NmeaText parse_nmea(std::string_view text) {
+  NmeaText best;
+  for (std::string_view sentence = take_sentence(text); !sentence.empty(); sentence = take_sentence(text)) {
+    NmeaText one;
+    one.state = is_rmc(sentence) ? parse_sentence(sentence, one.rmc) : is_any(sentence) ? Nmea::no_rmc : Nmea::none;
+    if (one.state > best.state)
+      best = one;
+  }
+  return best;
+}
+
+std::string_view why_unused(const PositionPacket& packet) {
+  if (packet.pps != PpsState::locked)
+    return {};
+  switch (packet.nmea) {
+  case Nmea::none:
+    return "its position packets hold no NMEA sentence (connect the receiver's serial output to the lidar, and look at "
+           "its baud rate)";
+  case Nmea::no_rmc:
+    return "its position packets hold NMEA sentences, but no RMC (let the receiver send $GPRMC once a second)";
+  case Nmea::no_checksum:
+    return "its RMC sentences are cut short or have no checksum (let the receiver add one, and send RMC alone)";
+  case Nmea::wrong_checksum:
+    return "the checksums of its RMC sentences are wrong (look at the serial line from the receiver to the lidar)";
+  case Nmea::no_time:
+    return "its RMC sentences hold no time (look at the receiver and its antenna)";
+  case Nmea::no_fix:
+    return "its receiver has no fix, by the status of its RMC sentences (look at its antenna)";
+  case Nmea::good:
+    return {};
+  }
+  return {};
 }
 
 PositionPacket parse_position_packet(std::span<const std::byte, kPositionPacketBytes> payload) {
-  std::array<char, kNmeaBytes> nmea;
-  std::transform(payload.begin() + kNmeaAt, payload.begin() + kNmeaAt + kNmeaBytes, nmea.begin(),
-                 [](std::byte b) { return std::to_integer<char>(b); });
+  std::array<char, kPositionPacketBytes> text;
+  std::ranges::transform(payload, text.begin(), [](std::byte b) { return std::to_integer<char>(b); });
+  const NmeaText nmea = parse_nmea({text.data(), text.size()});
   const auto pps = std::to_integer<std::uint8_t>(payload[kPpsAt]);
   return {.time_of_hour = std::chrono::microseconds{read_u32(payload.data() + kTimeOfHourOffset)},
           .pps = pps <= static_cast<std::uint8_t>(PpsState::error) ? static_cast<PpsState>(pps) : PpsState::error,
-          .rmc = parse_rmc({nmea.data(), nmea.size()})};
+          .nmea = nmea.state,
+          .rmc = nmea.rmc};
 }
 
 } // namespace locus::velodyne

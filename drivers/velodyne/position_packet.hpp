@@ -26,9 +26,18 @@ struct RmcSentence {
   std::optional<double> course_deg; ///< clockwise from true north
 };
 
-/// Parses $GPRMC (or $GNRMC, from multi-constellation receivers). Empty unless the checksum is present and correct.
+/// Content of the NMEA text of a position packet, from the least to the most useful.
+enum class Nmea : std::uint8_t { none, no_rmc, no_checksum, wrong_checksum, no_time, no_fix, good };
+
+/// Best RMC sentence of a text.
+struct NmeaText {
+  Nmea state = Nmea::none;
+  std::optional<RmcSentence> rmc; ///< set for no_fix and good
+};
+
+/// Finds the RMC sentence of any talker in a text that may begin in the middle of another sentence and hold several.
 /// Safe for arbitrary input.
-std::optional<RmcSentence> parse_rmc(std::string_view sentence);
+NmeaText parse_nmea(std::string_view text);
 
 /// State of the pulse per second, as reported by the sensor.
 enum class PpsState : std::uint8_t { absent = 0, synchronizing = 1, locked = 2, error = 3 };
@@ -41,11 +50,16 @@ using locus::to_string;
 struct PositionPacket {
   Duration time_of_hour{};
   PpsState pps = PpsState::absent;
+  Nmea nmea = Nmea::none;
   std::optional<RmcSentence> rmc;
 
   /// Returns true if the sensor's time of hour is UTC.
   [[nodiscard]] bool is_synchronised() const { return pps == PpsState::locked && rmc && rmc->valid; }
 };
+
+/// Says for the user why the time of a lidar with a locked PPS is not used; empty if it is, or if PPS is not locked.
+/// The text has static lifetime.
+std::string_view why_unused(const PositionPacket& packet);
 
 /// Parses a position packet from any bytes of the right length; its content may be meaningless. Sensors without the PPS
 /// byte (early HDL-32E) leave it 0.

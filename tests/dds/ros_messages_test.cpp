@@ -3,11 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <string>
+#include <utility>
 
 namespace locus::daemon {
 namespace {
@@ -73,7 +75,19 @@ TEST(RosMessages, NotANumberIsPassedOnToWhoeverCountsIt) {
   EXPECT_FALSE(to_sample(odometry, kArrival, usual).T_source_base.finite());
   odometry = odometry_at(1.0);
   odometry.pose_.pose_.orientation_ = {};
-  EXPECT_LT(to_sample(odometry, kArrival, usual).T_source_base.rotation.norm(), 0.5) << "no rotation at all";
+  EXPECT_EQ(to_sample(odometry, kArrival, usual).T_source_base.rotation.norm(), 0.0) << "no rotation at all";
+}
+
+TEST(RosMessages, QuaternionThatIsNoRotationStaysWhatItIs) {
+  UsualCovariance usual;
+  ros::Odometry odometry = odometry_at(1.0);
+  odometry.pose_.pose_.orientation_ = {0.0, 0.0, 0.3, 0.0}; // w is missing
+  EXPECT_EQ(to_sample(odometry, kArrival, usual).T_source_base.rotation.norm(), 0.3);
+  odometry.pose_.pose_.orientation_ = {0.0, 0.0, 0.6, 0.8001}; // rounded
+  EXPECT_NEAR(to_sample(odometry, kArrival, usual).T_source_base.rotation.norm(), 1.0, 1e-12);
+  ros::Imu imu = resting_imu();
+  imu.orientation_ = {0.0, 0.0, 0.97, 0.0};
+  EXPECT_FALSE(to_sample(imu, kArrival).attitude);
 }
 
 TEST(RosMessages, AnyBitsOfAStampAreAnInstant) {
@@ -90,24 +104,96 @@ TEST(RosMessages, StampsGoThereAndBack) {
   }
 }
 
-TEST(UsualCovariance, TellsHowMuchWorseThanUsual) {
-  UsualCovariance usual;
+/// Odometry at 50 Hz that moves at 1 m/s, or stands, and reports covariances.
+class UsualCovarianceTest : public testing::Test {
+ protected:
+  double scale(const std::array<double, 36>& covariance, double speed_mps = 1.0) {
+    ros::Odometry message = odometry_at(0.0);
+    message.header_.stamp_ = to_ros(now_ += std::chrono::milliseconds{20});
+    message.twist_.twist_.linear_.x_ = speed_mps;
+    std::ranges::copy(covariance, std::begin(message.twist_.covariance_));
+    return usual_.scale(message);
+  }
+  double scale(double variance, double speed_mps = 1.0) { return scale(covariance(variance), speed_mps); }
+
+  UsualCovariance usual_;
+  Stamp now_ = kArrival;
+};
+
+TEST_F(UsualCovarianceTest, TellsHowMuchWorseThanUsual) {
   for (int i = 0; i < 100; ++i)
-    EXPECT_NEAR(usual.scale(covariance(1e-4)), 1.0, 1e-9);
-  EXPECT_NEAR(usual.scale(covariance(1e-3)), 10.0, 0.5);
-  EXPECT_NEAR(usual.scale(covariance(1e-4)), 1.0, 0.1);
+    EXPECT_NEAR(scale(1e-4), 1.0, 1e-9);
+  EXPECT_NEAR(scale(1e-3), 10.0, 0.5);
+  EXPECT_NEAR(scale(1e-4), 1.0, 0.1);
 }
 
-TEST(UsualCovariance, ThatIsNotReportedIsAsUsual) {
-  UsualCovariance usual;
-  EXPECT_EQ(usual.scale(covariance(0.0)), 1.0);
+TEST_F(UsualCovarianceTest, WhatIsUnknownIsAsUsual) {
+  for (const double unknown : {0.0, kNan, -1.0, 1e3, 1e6, 1e12, 1e308, std::numeric_limits<double>::max(),
+                               std::numeric_limits<double>::infinity()})
+    EXPECT_EQ(scale(unknown), 1.0) << unknown;
+  EXPECT_NEAR(scale(1e-4), 1.0, 1e-9) << "and teaches nothing";
 }
 
-TEST(UsualCovariance, ThatCannotBeIsInfinite) {
-  UsualCovariance usual;
-  for (const double impossible : {kNan, -1.0, std::numeric_limits<double>::infinity(), 1e308})
-    EXPECT_EQ(usual.scale(covariance(impossible)), std::numeric_limits<double>::infinity()) << impossible;
-  EXPECT_NEAR(usual.scale(covariance(1e-4)), 1.0, 1e-9) << "and teaches nothing";
+/// Wheels know x and yaw, and drivers fill in the other axes as they like.
+TEST_F(UsualCovarianceTest, UnknownAxesDoNotHideTheKnownOnes) {
+  for (const double unknown : {0.0, kNan, -1.0, 1e6, std::numeric_limits<double>::max()}) {
+    usual_ = {};
+    std::array<double, 36> wheels = covariance(unknown);
+    wheels[0] = 2e-4;
+    wheels[35] = 2e-3;
+    for (int i = 0; i < 100; ++i)
+      EXPECT_NEAR(scale(wheels), 1.0, 1e-9) << unknown;
+    wheels[0] = wheels[35] = 0.1;
+    EXPECT_GT(scale(wheels), UsualCovariance::kAsUsual) << unknown;
+  }
+}
+
+TEST_F(UsualCovarianceTest, AtRestAndInMotionAreNotCompared) {
+  for (const auto& [at_rest, in_motion] : {std::pair{1e-12, 1e-2}, std::pair{1e-2, 1e-12}, std::pair{1e12, 1e-2}}) {
+    usual_ = {};
+    for (int start = 0; start < 10; ++start) {
+      for (int i = 0; i < 500; ++i)
+        EXPECT_EQ(scale(at_rest, 0.0), 1.0);
+      for (int i = 0; i < 500; ++i)
+        EXPECT_NEAR(scale(in_motion), 1.0, 1e-9) << at_rest;
+    }
+  }
+}
+
+/// Some drivers leave the twist zero and report a pose only.
+TEST_F(UsualCovarianceTest, MotionIsSeenInThePoseAsWell) {
+  ros::Odometry message = odometry_at(0.0);
+  const auto scale_at = [&](double x_m, double variance) {
+    message.header_.stamp_ = to_ros(now_ += std::chrono::milliseconds{20});
+    message.pose_.pose_.position_.x_ = x_m;
+    std::ranges::copy(covariance(variance), std::begin(message.twist_.covariance_));
+    return usual_.scale(message);
+  };
+  double x_m = 0.0;
+  for (int i = 0; i < 100; ++i)
+    EXPECT_NEAR(scale_at(x_m += 0.02, 1e-4), 1.0, 1e-9);
+  EXPECT_NEAR(scale_at(x_m += 0.02, 1e-3), 10.0, 0.5);
+}
+
+/// A visual odometry that loses track reports huge variances on every axis.
+TEST_F(UsualCovarianceTest, AnOdometryThatNoLongerKnowsAnythingIsWorseThanUsual) {
+  for (int i = 0; i < 100; ++i)
+    scale(1e-4);
+  EXPECT_EQ(scale(1e6), std::numeric_limits<double>::infinity());
+}
+
+TEST_F(UsualCovarianceTest, WhatStaysUnusualBecomesUsual) {
+  for (const double lasting : {1.0, 1e9}) {
+    usual_ = {};
+    for (int i = 0; i < 100; ++i)
+      scale(1e-8);
+    const Stamp begin = now_;
+    while (now_ - begin < UsualCovariance::kBecomesUsual)
+      EXPECT_GT(scale(lasting), UsualCovariance::kAsUsual);
+    scale(lasting);
+    scale(lasting);
+    EXPECT_NEAR(scale(lasting), 1.0, 1e-9) << lasting;
+  }
 }
 
 TEST(RosMessages, EstimateBecomesOdometryWithFramesAndBothCovariances) {

@@ -2,8 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
+#include <cstring>
 #include <optional>
 #include <random>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "drivers/lidar_input.hpp"
@@ -124,6 +128,61 @@ TEST(LidarInput, Vls128StampsAreThoseOfItsFirstFiringToo) {
   EXPECT_EQ(packet->stamp + packet->duration, receive);
 }
 
+/// The packets of a VLP-16 at 600 rpm whose field of view leaves a sector out: blocks within the view, twelve to a
+/// packet.
+class ViewOfSector {
+ public:
+  ViewOfSector(double from_cdeg, double to_cdeg) : from_cdeg_(from_cdeg), to_cdeg_(to_cdeg) {}
+
+  void show_all() { is_restricted_ = false; }
+
+  Datagram operator()() {
+    constexpr double kBlock_us = 110.592;
+    std::array<double, velodyne::kBlocks> us{};
+    for (std::size_t block = 0; block < us.size(); next_us_ += kBlock_us) {
+      const double azimuth_cdeg = std::fmod(0.36 * next_us_, velodyne::kCdegPerTurn);
+      if (!is_restricted_ || azimuth_cdeg < from_cdeg_ || azimuth_cdeg >= to_cdeg_)
+        us[block++] = next_us_;
+    }
+    packet_.emplace(Model::vlp16, ReturnMode::strongest, static_cast<std::uint32_t>(std::lround(1e9 + us[0])));
+    for (std::size_t block = 0; block < us.size(); ++block)
+      packet_->set_azimuth(block, static_cast<std::uint16_t>(std::fmod(0.36 * us[block], velodyne::kCdegPerTurn)));
+    packet_->set_all_returns(1000);
+    return {packet_->payload(), kLidarIp, 2368, 2368,
+            stamp_from_ns(1'700'000'000'000'000'000) + from_seconds(1e-6 * (next_us_ + 80.0))};
+  }
+
+ private:
+  double from_cdeg_, to_cdeg_;
+  bool is_restricted_ = true;
+  double next_us_ = 0.0;
+  std::optional<VelodyneTestPacket> packet_;
+};
+
+/// A field of view that is set on the lidar's page leaves sectors out; the packets that would fill them were lost.
+TEST(LidarInput, SectorsThatAreNotSentAreNoLoss) {
+  for (const auto& [from_cdeg, to_cdeg] :
+       {std::pair{9'000.0, 27'000.0}, std::pair{4'500.0, 31'500.0}, std::pair{3'000.0, 4'200.0}}) {
+    LidarInput lidar = opened();
+    ViewOfSector next(from_cdeg, to_cdeg);
+    for (int i = 0; i < 1'500; ++i)
+      EXPECT_NE(lidar.receive(next()), nullptr);
+    EXPECT_EQ(lidar.counters().lost, 0U) << from_cdeg;
+    for (int i = 1; i <= 1'500; ++i)
+      if (const Datagram datagram = next(); i % 100 != 0)
+        lidar.receive(datagram);
+    EXPECT_NEAR(static_cast<double>(lidar.counters().lost), 15.0, 3.0) << from_cdeg;
+    next.show_all();
+    for (int i = 0; i < 3'000; ++i)
+      lidar.receive(next());
+    const std::uint64_t lost = lidar.counters().lost;
+    for (int i = 0; i < 3; ++i)
+      next();
+    lidar.receive(next());
+    EXPECT_EQ(lidar.counters().lost, lost + 3) << from_cdeg;
+  }
+}
+
 TEST(LidarInput, GapOfStampAndAzimuthIsLoss) {
   LidarInput lidar = opened();
   Stream stream;
@@ -174,6 +233,53 @@ TEST(LidarInput, TimeFarOffIsRefusedAndASetClockCounted) {
   EXPECT_EQ(lidar.counters().clock_steps, 1U);
   EXPECT_EQ(lidar.counters().data, 16U);
   EXPECT_EQ(lidar.counters().lost, 0U);
+}
+
+/// The clock of a lidar passes the hour without wrapping, and one packet right there has a wrong time.
+TEST(LidarInput, ClockThatRunsOnBeyondTheHourCostsTheOneWrongPacket) {
+  LidarInput lidar = opened();
+  constexpr double kPacket_us = 1327.104, kHour_us = 3.6e9;
+  for (int i = 0; i < 2000; ++i) {
+    const double us = kPacket_us * i;
+    const double shown_us = i == 1000 ? 48e6 : kHour_us - 1000 * kPacket_us + us;
+    VelodyneTestPacket bytes(Model::vlp16, ReturnMode::strongest, static_cast<std::uint32_t>(std::lround(shown_us)),
+                             static_cast<std::uint16_t>(std::lround(0.36 * us) % velodyne::kCdegPerTurn));
+    bytes.set_all_returns(1000);
+    const Stamp received = stamp_from_ns(1'700'000'000'000'000'000) + from_seconds(1e-6 * (us + kPacket_us + 80.0));
+    EXPECT_EQ(lidar.receive({bytes.payload(), kLidarIp, 2368, 2368, received}) != nullptr, i != 1000) << i;
+  }
+  EXPECT_EQ(lidar.counters()[PacketError::time], 1U);
+  EXPECT_EQ(lidar.counters().lost, 1U);
+  EXPECT_EQ(lidar.counters().clock_steps, 0U);
+}
+
+/// Position packets with a locked PPS for so long, and data packets between them.
+std::string_view why_unused_after(Duration duration, const std::string& nmea, LidarTime time = LidarTime::automatic) {
+  LidarOptions options;
+  options.time = time;
+  LidarInput lidar = std::move(*LidarInput::open(options, 0));
+  Stream stream;
+  std::array<std::byte, velodyne::kPositionPacketBytes> position{};
+  position[0xCA] = std::byte{2};
+  std::memcpy(&position[0xCE], nmea.data(), nmea.size());
+  const Stamp begin = stream(0).receive_stamp;
+  for (int i = 0;; ++i) {
+    const Datagram data = stream(i);
+    lidar.receive(data);
+    lidar.receive({position, kLidarIp, 8308, 8308, data.receive_stamp});
+    if (data.receive_stamp - begin > duration)
+      return lidar.why_pps_is_unused();
+  }
+}
+
+TEST(LidarInput, LockedPpsThatIsNotUsedIsToldAfterFiveSeconds) {
+  const std::string gga = "$GPGGA,220243,3708.5809,N*00";
+  EXPECT_EQ(why_unused_after(std::chrono::seconds{4}, gga), "");
+  EXPECT_NE(why_unused_after(std::chrono::seconds{6}, gga).find("no RMC"), std::string_view::npos);
+  EXPECT_EQ(why_unused_after(std::chrono::seconds{6}, gga, LidarTime::receive), "") << "configured so";
+  EXPECT_EQ(why_unused_after(std::chrono::seconds{6},
+                             "$GPRMC,220243,A,3708.5809,N,12139.7813,W,028.8,158.3,111212,013.8,E,D*03\r\n"),
+            "");
 }
 
 TEST(LidarInput, FirstSenderIsTheLidarUntilItFallsSilent) {

@@ -10,7 +10,7 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace locus;
   using fuzz::demand;
-  static_cast<void>(velodyne::parse_rmc(fuzz::text_of(data, size)));
+  static_cast<void>(velodyne::parse_nmea(fuzz::text_of(data, size)));
 
   std::array<std::byte, velodyne::kPositionPacketBytes> payload{};
   fuzz::FuzzBytes bytes{data, size};

@@ -5,9 +5,11 @@
 
 #include <gtest/gtest.h>
 
+#include "bag_writer.hpp"
 #include "drivers/files/capture.hpp"
 #include "drivers/files/pcap_writer.hpp"
 #include "drivers/velodyne/model.hpp"
+#include "drivers/velodyne/position_packet.hpp"
 #include "replay_run.hpp"
 #include "support/test_drives.hpp"
 
@@ -33,6 +35,45 @@ TEST(Warnings, NoneWhereAllIsWell) {
 TEST(Warnings, PacketsOfAnotherModelThanTheConfiguredOne) {
   expect_warning({"--set", "lidars.front.model=VLP-32C", "--duration", "2", room_drive().string()},
                  {"lidar front: configured as VLP-32C", "those of a VLP-16", "--set lidars.front.model=auto"});
+}
+
+/// A source of which every sample was refused was refused in silence.
+TEST(Warnings, SourceThatIsRefusedThroughout) {
+  const TemporaryFolder folder;
+  std::vector<RecordedMessage> messages = messages_of(room_drive(), RosVersion::ros2);
+  for (RecordedMessage& message : messages)
+    if (message.topic == "/wheel_odometry")
+      message.data = odometry_message({.stamp = message.recorded,
+                                       .arrival = message.recorded,
+                                       .T_source_base = {Eigen::Quaterniond{0, 0, 0, 0}, Eigen::Vector3d::Zero()}},
+                                      RosVersion::ros2);
+  write_db3(folder / "drive.db3", messages);
+  const Replay replay({"-c", room_drive() / "config.yaml", (folder / "drive.db3").string()});
+  EXPECT_NE(replay.run().err.find("warning: motion source wio was refused for"), std::string::npos) << replay.run().err;
+  EXPECT_NE(replay.run().err.find("orientations that are no rotation"), std::string::npos) << replay.run().err;
+  const std::string verdict = replay.summary()["sources"]["wio"]["verdict"];
+  EXPECT_NE(verdict.find("orientations that are no rotation"), std::string::npos) << verdict;
+  EXPECT_EQ(replay.summary()["sources"]["wio"]["used_sweeps"], 0);
+}
+
+/// A lidar whose laser is off sends its position packets alone; the advice was to record what had been recorded.
+TEST(Warnings, PositionPacketsAloneAreOfALidarThatSendsNoData) {
+  const TemporaryFolder folder;
+  auto capture = Capture::open(room_drive() / "lidar.pcap");
+  {
+    auto writer = PcapWriter::open(folder / "positions.pcap");
+    while (const Datagram* datagram = capture->next())
+      if (datagram->payload.size() == velodyne::kPositionPacketBytes)
+        writer->write(datagram->receive_stamp,
+                      {.source_ip = datagram->source_ip, .destination_port = datagram->destination_port},
+                      datagram->payload);
+  }
+  const Replay replay({(folder / "positions.pcap").string()});
+  EXPECT_EQ(replay.run().status, 1);
+  EXPECT_NE(
+      replay.run().err.find("position packets of a Velodyne and no data packet of it: the lidar is there and sends"),
+      std::string::npos)
+      << replay.run().err;
 }
 
 TEST(Warnings, LidarThatIsNotHeardWhileAnotherIs) {

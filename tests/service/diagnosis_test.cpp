@@ -146,8 +146,10 @@ TEST_F(Diagnosis, LidarOnAnotherPortIsToldByItsPositionPackets) {
   const std::filesystem::path wrong = lidar_with("port: 2390");
   Child daemon(locusd(wrong));
   const Child play(endlessly(capture()));
-  EXPECT_TRUE(daemon.wait_for_line("lidar front: no data packet on UDP port 2390 for 5 s; only its position packets "
-                                   "arrive; find its data port with locusctl sensors and set lidars.front.port"))
+  EXPECT_TRUE(daemon.wait_for_line(
+      "lidar front: no data packet on UDP port 2390 for 5 s; only its position packets "
+      "arrive; its laser or motor is off (see its web page), or its data packets go to another port "
+      "(locusctl sensors): set lidars.front.port"))
       << testing::PrintToString(daemon.lines());
 }
 
@@ -311,7 +313,8 @@ TEST_F(WatchedFigures, TellOfASilentLidarAfterFiveSecondsAndOncePerReason) {
   lidar().packets.received = lidar().packets.position = 3;
   EXPECT_EQ(said_after(std::chrono::seconds{1}),
             Lines{"locusd: warning: lidar front: no data packet on UDP port 2368 for 11 s; only its position packets "
-                  "arrive; find its data port with locusctl sensors and set lidars.front.port"});
+                  "arrive; its laser or motor is off (see its web page), or its data packets go to another port "
+                  "(locusctl sensors): set lidars.front.port"});
   lidar().packets.received += 2;
   lidar().packets[PacketError::sender] = 2;
   lidar().refused_ip = INADDR_LOOPBACK;

@@ -72,6 +72,14 @@ std::uint64_t of_length(const PortTraffic& traffic, std::size_t bytes) {
   return found == traffic.by_length.end() ? 0 : found->second;
 }
 
+/// Returns the number of datagrams of a length to all ports.
+std::uint64_t total_of(const std::map<std::uint16_t, PortTraffic>& traffic, std::size_t bytes) {
+  std::uint64_t datagrams = 0;
+  for (const auto& entry : traffic)
+    datagrams += of_length(entry.second, bytes);
+  return datagrams;
+}
+
 /// Returns the lengths of the lidars' data packets.
 std::set<std::size_t> data_packet_lengths(const LidarRouter& lidars) {
   std::set<std::size_t> lengths;
@@ -188,6 +196,12 @@ std::string why_no_data(const Recording& recording, const LidarRouter& lidars) {
   };
   if (std::string other = of_other_model(busiest.datagrams); packets == 0 && !other.empty())
     return other;
+  if (const std::uint64_t positions = total_of(traffic, velodyne::kPositionPacketBytes); packets == 0 && positions > 0)
+    return fmt::format(
+        "it holds {} position packets of a Velodyne and no data packet of it: the lidar is there and sends "
+        "none, for its laser or its motor is off, or they go to another address; switch them on and look "
+        "at the destination on the lidar's web page, or record the data port as well, mostly {}",
+        positions, kDefaultDataPort);
   if (packets == 0)
     return fmt::format("none of its UDP datagrams has the size of a data packet, {} bytes; most ({}) go to port {}; "
                        "record the lidar's data port",
@@ -262,6 +276,8 @@ std::vector<std::string> lidar_warnings(const Recording& recording, const LidarR
     if (auto warning = daemon::shared_port(lidar.options(), report))
       warnings.push_back(std::move(*warning));
     if (auto warning = daemon::stale_metadata(lidar.options(), report))
+      warnings.push_back(std::move(*warning));
+    if (auto warning = daemon::unused_pps(lidar.options(), report))
       warnings.push_back(std::move(*warning));
     if (auto warning = daemon::short_sweep(sweeps, lidar.options().name, report.rotation_rate_rpm))
       warnings.push_back(std::move(*warning));

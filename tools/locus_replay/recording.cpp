@@ -26,6 +26,11 @@ MotionSamples<Sample> with_faults(std::vector<Sample> samples, const PlayOptions
   return MotionSamples<Sample>(std::move(samples));
 }
 
+/// Tells whether one clock stamps a sample and its arrival.
+bool has_one_clock(const auto& sample) {
+  return std::chrono::abs(sample.arrival - sample.stamp) < std::chrono::seconds{1};
+}
+
 } // namespace
 
 using daemon::EndOfInput;
@@ -56,7 +61,8 @@ void check_faults(const std::vector<Fault>& faults, const Config& config) {
 
 Recording::Recording(std::unique_ptr<DatagramSource> source, std::vector<MotionRecording> motion, const Config& config,
                      LidarRouter lidars, const PlayOptions& options)
-    : source_(std::move(source)), lidars_(std::move(lidars)), play_for_(options.duration), head_(source_->next()),
+    : source_(std::make_unique<RecordedTimes>(std::move(source), config.lidars)), lidars_(std::move(lidars)),
+      play_for_(options.duration), head_(source_->next()),
       capture_start_(head_ != nullptr ? head_->receive_stamp : Stamp{}), injected_(options.faults) {
   begin_ = capture_start_ + options.start;
   end_ = play_for_ ? begin_ + *play_for_ : Stamp::max();
@@ -69,8 +75,8 @@ Recording::Recording(std::unique_ptr<DatagramSource> source, std::vector<MotionR
       std::visit([&](auto& samples) { samples = with_faults(samples.drain(), options, name, capture_start_); },
                  recording.samples);
     const std::size_t index = index_of(recording.source);
-    motion_.push_back(
-        {std::move(recording), has_faults, index < options.earlier.size() ? options.earlier[index] : Duration{}});
+    motion_.push_back({std::move(recording), has_faults,
+                       index < options.earlier.size() ? options.earlier[index] : Duration{}, source_.get()});
     MotionCursor& cursor = motion_.back();
     while (cursor.arrival() < begin_ - kMotionAhead)
       cursor.take();
@@ -84,9 +90,10 @@ Stamp Recording::MotionCursor::arrival() const {
         const auto* const next = samples.front();
         if (next == nullptr)
           return Stamp::max();
-        const Stamp in_time = next->arrival - std::max(earlier, Duration{});
-        const bool one_clock = std::chrono::abs(next->arrival - next->stamp) < std::chrono::seconds{1};
-        return earlier != Duration{} && one_clock ? std::max(in_time, next->stamp - earlier) : in_time;
+        const Duration leaps = next->arrival - times->steady(next->arrival);
+        const Stamp in_time = next->arrival - leaps - std::max(earlier, Duration{});
+        return earlier != Duration{} && has_one_clock(*next) ? std::max(in_time, next->stamp - leaps - earlier)
+                                                             : in_time;
       },
       recording.samples);
 }
@@ -97,6 +104,8 @@ std::optional<TimeSpan> Recording::MotionCursor::arrivals() const {
 
 Input Recording::MotionCursor::take() {
   const auto input_of = [&](auto sample) -> Input {
+    if (has_one_clock(sample))
+      sample.stamp -= sample.arrival - times->steady(sample.arrival);
     sample.arrival = arrival();
     sample.stamp -= earlier;
     if constexpr (std::is_same_v<std::decay_t<decltype(sample)>, ImuSample>)

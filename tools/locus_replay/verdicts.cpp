@@ -32,6 +32,10 @@ std::vector<std::string> source_verdicts(const Config& config, const MotionSourc
                       "the end (possible causes: T_base_source, the unit (rad/s) or the stamps of the gyro, or lidar "
                       "that follows what moves around the robot)",
                       name));
+    else if (health.longest_refusal().is_worth_telling())
+      lines.push_back(fmt::format("motion source {} was refused for {:.1f} s: it {}", name,
+                                  to_seconds(health.longest_refusal().lasted),
+                                  explanation(health.longest_refusal().reason)));
   }
   return lines;
 }
@@ -59,6 +63,9 @@ std::vector<std::string> warnings_about(const PlayedRecording& played) {
   add(lidar_warnings(played.recording, played.ingest.lidars(), played.config.sweep));
   add(cloud_warnings(played.figures));
   add(source_verdicts(played.config, played.ingest.sources()));
+  for (std::size_t i = 0; i < played.config.motion_sources.size(); ++i)
+    if (const auto slow = daemon::slow_imu(played.config.motion_sources[i], played.figures.ingest.sources[i]))
+      lines.push_back(*slow);
   for (std::size_t i = 0; i < played.config.motion_sources.size(); ++i)
     if (const std::string doubt = daemon::calibration_doubt(played.figures, i); !doubt.empty())
       lines.push_back(fmt::format("motion source {} {}", played.config.motion_sources[i].name, doubt));

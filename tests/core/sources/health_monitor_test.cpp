@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <limits>
+#include <vector>
 
 namespace locus {
 namespace {
@@ -173,11 +175,11 @@ TEST_F(WheelsTest, NotANumberForLongCostsTheirHealth) {
   expect_back_after_probation();
 }
 
-TEST_F(WheelsTest, AQuaternionOfLengthZeroIsNotANumberEither) {
+TEST_F(WheelsTest, AQuaternionOfLengthZeroIsNoRotation) {
   OdometrySample bad = next();
   bad.T_source_base.rotation.coeffs().setZero();
   EXPECT_FALSE(monitor_.judge(bad));
-  EXPECT_EQ(left_out(HealthReason::nan), 1U);
+  EXPECT_EQ(left_out(HealthReason::no_rotation), 1U);
 }
 
 TEST_F(WheelsTest, AnAbsurdPositionIsNotANumberEither) {
@@ -324,6 +326,83 @@ TEST_F(WheelsTest, TenTimesTheCovarianceCostsTheirHealth) {
   run(seconds{1}, [](OdometrySample& sample) { sample.covariance_scale = 10.0; });
   expect_lost(HealthReason::covariance, kDetected);
   expect_back_after_probation();
+}
+
+/// Wheels whose driver left out the quaternion's w were used wherever its length was above a half.
+TEST_F(WheelsTest, QuaternionsThatAreNoRotationAreRefusedAsSuch) {
+  for (const Eigen::Quaterniond& q : {Eigen::Quaterniond{0, 0, 0, 0}, Eigen::Quaterniond{0, 0, 0, 0.3},
+                                      Eigen::Quaterniond{0, 0, 0, 0.98}, Eigen::Quaterniond{2, 0, 0, 0}}) {
+    const std::uint64_t before = left_out(HealthReason::no_rotation);
+    OdometrySample sample = next();
+    sample.T_source_base.rotation = q;
+    EXPECT_FALSE(monitor_.judge(sample));
+    EXPECT_EQ(left_out(HealthReason::no_rotation), before + 1) << q.coeffs().transpose();
+  }
+}
+
+/// At half a turn a quaternion without w is of unit length, and such wheels were used there.
+TEST_F(WheelsTest, QuaternionsWithoutWAreRefusedAtHalfATurnAsWell) {
+  OdometrySample sample = next();
+  sample.T_source_base.rotation = {0, 0, 0, 0.9};
+  EXPECT_FALSE(monitor_.judge(sample));
+  sample = next();
+  sample.T_source_base.rotation = {0, 0, 0, 1};
+  EXPECT_FALSE(monitor_.judge(sample));
+  EXPECT_EQ(left_out(HealthReason::no_rotation), 2U);
+  EXPECT_TRUE(monitor_.judge(next()));
+}
+
+/// A source that was refused from its first sample on was refused in silence.
+TEST(HealthMonitor, OfASourceWhoseSamplesWereNeverGoodSaysSoAfterFiveSeconds) {
+  HealthMonitor monitor(kWheels);
+  Stamp now = stamp_from_ns(1'700'000'000'000'000'000);
+  const auto send_for = [&](Duration duration, const Eigen::Quaterniond& rotation) {
+    std::vector<HealthEvent> events;
+    for (const Stamp end = now + duration; now < end;) {
+      now += milliseconds{20};
+      monitor.judge(OdometrySample{.stamp = now, .arrival = now, .T_source_base = {rotation, {0, 0, 0}}});
+      if (const auto event = monitor.take_event())
+        events.push_back(*event);
+    }
+    return events;
+  };
+  EXPECT_TRUE(send_for(milliseconds{4900}, Eigen::Quaterniond{0, 0, 0, 0}).empty());
+  EXPECT_FALSE(monitor.refusal()->is_worth_telling());
+  const std::vector<HealthEvent> events = send_for(seconds{60}, Eigen::Quaterniond{0, 0, 0, 0});
+  ASSERT_EQ(events.size(), 1U) << "said once";
+  EXPECT_FALSE(events[0].healthy);
+  EXPECT_EQ(events[0].reason, HealthReason::no_rotation);
+  EXPECT_TRUE(monitor.refusal()->is_worth_telling());
+  EXPECT_EQ(monitor.refusal()->reason, HealthReason::no_rotation);
+  send_for(seconds{2}, Eigen::Quaterniond::Identity());
+  EXPECT_TRUE(monitor.healthy());
+  EXPECT_FALSE(monitor.refusal());
+  EXPECT_GT(monitor.longest_refusal().lasted, seconds{64});
+}
+
+TEST_F(WheelsTest, ARefusalLastsUntilTheirHealthIsBack) {
+  EXPECT_FALSE(monitor_.refusal());
+  int i = 0;
+  run(seconds{6}, [&](OdometrySample& sample) { // one sample in two seconds is good
+    sample.covariance_scale = ++i % 100 == 0 ? 1.0 : 10.0;
+  });
+  ASSERT_TRUE(monitor_.refusal());
+  EXPECT_TRUE(monitor_.refusal()->is_worth_telling());
+  EXPECT_EQ(monitor_.refusal()->reason, HealthReason::covariance);
+  run(seconds{2});
+  EXPECT_TRUE(monitor_.healthy());
+  EXPECT_FALSE(monitor_.refusal());
+}
+
+TEST_F(WheelsTest, TheirPeriodIsKnownAfterFiftySamples) {
+  ASSERT_TRUE(monitor_.period());
+  EXPECT_NEAR(to_seconds(*monitor_.period()), 0.02, 1e-3);
+  EXPECT_FALSE(HealthMonitor(kWheels).period());
+}
+
+TEST(HealthReason, EachIsExplained) {
+  for (std::size_t i = 0; i < kHealthReasonCount; ++i)
+    EXPECT_FALSE(explanation(static_cast<HealthReason>(i)).empty()) << i;
 }
 
 TEST_F(WheelsTest, AClockThatStepsByAnHourCostsTheirHealthAndIsLearnedAnew) {

@@ -284,10 +284,15 @@ TEST(VelodyneDecoder, FullTurnIsZero) {
   EXPECT_LT(angle_between(clockwise_azimuth_rad(returns[4 * kChannels]), 0.0), 0.6 * kRadPerCdeg);
 }
 
-TEST(VelodyneDecoder, ImpossibleTimeOfHourIsRefused) {
+/// Some lidars go on counting beyond the hour; every packet of theirs was refused from then on.
+TEST(VelodyneDecoder, TimeBeyondTheHourIsTakenWithinIt) {
   LidarPacket packet;
-  EXPECT_EQ(Decoder{}.decode(VelodyneTestPacket(Model::vlp16, ReturnMode::strongest, 3'600'000'000).payload(), packet),
-            PacketError::time);
+  Decoder decoder;
+  for (const std::uint32_t us : {3'600'000'000U, 4'294'967'295U}) {
+    ASSERT_EQ(decoder.decode(VelodyneTestPacket(Model::vlp16, ReturnMode::strongest, us).payload(), packet),
+              std::nullopt);
+    EXPECT_EQ(decoder.time_of_hour(), std::chrono::microseconds{us} % std::chrono::hours{1});
+  }
 }
 
 TEST(VelodyneDecoder, UnknownFactoryBytesAreRefusedUnlessTheConfigurationKnowsBetter) {
