@@ -15,7 +15,7 @@ struct LedTime {
   std::atomic<std::int64_t> offset_ns{0};             ///< controlled time minus system time after the control has ended
   std::atomic<std::uint64_t> datagrams{0}, motion{0}; ///< processed by the service's ingest
 
-  // Of the test.
+  // Written by the test.
   std::atomic<std::int64_t> set_by_ns{0};  ///< step of the service's wall clock; may change at any time
   std::atomic<std::int64_t> hold_at_ns{0}; ///< `added_ns` at which the player waits for another value; 0: never
   std::atomic<std::int64_t> held_at_ns{0}; ///< `hold_at_ns` at which the player waits or has waited last
