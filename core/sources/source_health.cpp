@@ -29,9 +29,8 @@ std::string_view explanation(HealthReason reason) {
   case HealthReason::speed:
     return kTooFast;
   case HealthReason::no_rotation:
-    return "sends orientations that are no rotation: quaternions of zeros, or not of unit length (let its driver fill "
-           "in "
-           "all of x, y, z and w)";
+    return "sends orientations that are no rotation: quaternions of zeros, or not of unit length (let its driver "
+           "fill in all of x, y, z and w)";
   }
   return {};
 }

@@ -143,8 +143,7 @@ std::string Watch::why_silent(const Lidar& lidar, const LidarOptions& options, c
                        dotted(*now.source_ip), options.name);
   if (packets.data + packets.position == packets.received)
     return fmt::format("only its position packets arrive; its laser or motor is off (see its web page), or its data "
-                       "packets go to another "
-                       "port (locusctl sensors): set lidars.{}.port",
+                       "packets go to another port (locusctl sensors): set lidars.{}.port",
                        options.name);
   const std::string unknown = now.unknown_packets ? fmt::format(" ({})", to_string(*now.unknown_packets)) : "";
   if (options.is_ouster())
