@@ -26,56 +26,6 @@ BagPackets::BagPackets(std::unique_ptr<Bag> bag, std::filesystem::path file, con
                          config.lidars[i].source_ip.value_or(0)});
     }
   }
-  compare_clocks();
-}
-
-/// Reads the first second of each lidar, and finds those whose packets have stamps that are constant or absurd.
-void BagPackets::compare_clocks() {
-  constexpr Duration kEnough = std::chrono::seconds{1}, kLeastToJudge = std::chrono::milliseconds{300};
-  constexpr std::uint64_t kMostMessages = 20'000;
-  constexpr int kTooSlowOrFast = 10;
-  struct Times {
-    Stamp first_stamp, stamp, first_recorded, recorded;
-    int messages = 0;
-  };
-  std::vector<Times> times(lidars_.size());
-  const auto is_done = [&](std::size_t i) {
-    return lidars_[i].packets == nullptr ||
-           (times[i].messages > 0 && times[i].recorded - times[i].first_recorded > kEnough);
-  };
-  const auto all_are_done = [&] {
-    for (std::size_t i = 0; i < lidars_.size(); ++i)
-      if (!is_done(i))
-        return false;
-    return true;
-  };
-  for (std::uint64_t i = 0; i < kMostMessages && !all_are_done(); ++i) {
-    const BagMessage* const message = bag_->next();
-    if (message == nullptr)
-      break;
-    const auto lidar = std::ranges::find(lidars_, message->topic, &Lidar::topic);
-    if (lidar == lidars_.end() || lidar->packets == nullptr)
-      continue;
-    const auto packets = lidar->packets->read({message->data, bag_->topics()[message->topic].serialisation});
-    if (!packets || packets->packets.empty())
-      continue;
-    Times& seen = times[static_cast<std::size_t>(lidar - lidars_.begin())];
-    seen.stamp = packets->packets.back().stamp;
-    seen.recorded = message->recorded;
-    if (seen.messages++ == 0) {
-      seen.first_stamp = seen.stamp;
-      seen.first_recorded = seen.recorded;
-    }
-  }
-  bag_->rewind();
-  for (std::size_t i = 0; i < lidars_.size(); ++i) {
-    const Duration by_recorder = times[i].recorded - times[i].first_recorded;
-    const Duration by_stamps = times[i].stamp - times[i].first_stamp;
-    if (by_recorder < kLeastToJudge)
-      continue;
-    lidars_[i].period = by_recorder / (times[i].messages - 1);
-    lidars_[i].stamps_are_wrong = by_stamps < by_recorder / kTooSlowOrFast || by_stamps / kTooSlowOrFast > by_recorder;
-  }
 }
 
 const Datagram* BagPackets::next() {
@@ -147,39 +97,16 @@ void BagPackets::take_cloud(const BagMessage& message, const Lidar& lidar) {
   scans_.push_back({&lidar, message.recorded, {}, {message.data.begin(), message.data.end()}});
 }
 
-void BagPackets::take_packets(const BagMessage& message, Lidar& lidar) {
+void BagPackets::take_packets(const BagMessage& message, const Lidar& lidar) {
   const Serialisation serialisation = bag_->topics()[message.topic].serialisation;
   std::optional<LidarPackets> packets = lidar.packets->read({message.data, serialisation});
   malformed_ += packets ? 0U : 1U;
   if (!packets || packets->packets.empty())
     return;
-  restamp(message, lidar, *packets);
+  for (LidarPackets::Packet& packet : packets->packets)
+    packet.stamp = stamp_or(message.recorded, packet.stamp);
   waiting_ += packets->bytes.size() + kWithEach * packets->packets.size();
   scans_.push_back({&lidar, message.recorded, *std::move(packets), {}});
-}
-
-/// Replaces stamps that are wrong by the time of recording: those of all packets of the lidar, or those of a message
-/// whose stamps are not as long before their recording as in the messages before.
-void BagPackets::restamp(const BagMessage& message, Lidar& lidar, LidarPackets& packets) {
-  constexpr Duration kMostChange = std::chrono::seconds{10}, kLongestPeriod = std::chrono::milliseconds{200};
-  const Duration delay = message.recorded - packets.packets.back().stamp;
-  const auto is_absurd = [&](const LidarPackets::Packet& packet) {
-    return std::chrono::abs(message.recorded - packet.stamp - *lidar.delay) > kMostChange;
-  };
-  const bool is_odd = lidar.delay && std::ranges::any_of(packets.packets, is_absurd);
-  const bool is_unset = packets.packets.back().stamp == Stamp{};
-  if (!lidar.stamps_are_wrong && !is_odd && !is_unset) {
-    lidar.delay = delay;
-    for (LidarPackets::Packet& packet : packets.packets)
-      packet.stamp = stamp_or(message.recorded, packet.stamp);
-    return;
-  }
-  ++lidar.restamped;
-  const auto count = static_cast<std::int64_t>(packets.packets.size());
-  const Duration spacing = std::min(lidar.period, kLongestPeriod) / count;
-  const Stamp last = message.recorded - lidar.delay.value_or(Duration{});
-  for (std::int64_t i = 0; i < count; ++i)
-    packets.packets[static_cast<std::size_t>(i)].stamp = last - (count - 1 - i) * spacing;
 }
 
 std::string BagPackets::why_none() const {
@@ -196,12 +123,6 @@ std::vector<std::string> BagPackets::warnings() const {
                                 "wrong; sort it with: rosbag filter BAG SORTED_BAG True, or mcap sort BAG -o "
                                 "SORTED_BAG",
                                 file_.string(), misplaced_));
-  for (const Lidar& lidar : lidars_)
-    if (lidar.restamped > 0)
-      lines.push_back(
-          fmt::format("{}: {}: the stamps of the packets in {} messages are constant, zero or absurd, and the "
-                      "time of their recording is used; look at what stamps them in the driver",
-                      file_.string(), bag_->topics()[lidar.topic].name, lidar.restamped));
   if (malformed_ > 0)
     lines.push_back(
         fmt::format("{}: {} of {} messages of type {} are cut short, or not serialised as little-endian, and "

@@ -43,10 +43,6 @@ class BagPackets : public DatagramSource {
     const PacketType* packets; ///< message type; nullptr: clouds
     std::uint16_t port;
     std::uint32_t ip;
-    Duration period{};               ///< of its messages, by the recorder
-    bool stamps_are_wrong = false;   ///< they do not go on as the recorder's time does
-    std::optional<Duration> delay{}; ///< from the last stamp of a message to its recording, where stamps are right
-    std::uint64_t restamped = 0;     ///< messages
   };
   struct Scan {
     const Lidar* lidar;
@@ -62,9 +58,7 @@ class BagPackets : public DatagramSource {
 
   void read_ahead();
   void take(const BagMessage& message);
-  void take_packets(const BagMessage& message, Lidar& lidar);
-  void compare_clocks();
-  void restamp(const BagMessage& message, Lidar& lidar, LidarPackets& packets);
+  void take_packets(const BagMessage& message, const Lidar& lidar);
   void take_cloud(const BagMessage& message, const Lidar& lidar);
   void give_packet(const Scan& scan);
   void give_cloud(Scan& scan);

@@ -10,7 +10,6 @@
 namespace locus::tools {
 namespace {
 
-constexpr Duration kLeap = std::chrono::seconds{10};
 constexpr Duration kLongestStep = std::chrono::seconds{1}; ///< from one packet to the next of a lidar that goes on
 constexpr Duration kLookAhead = std::chrono::milliseconds{500};
 
@@ -33,8 +32,6 @@ const Datagram* RecordedTimes::next() {
   datagram_ = *datagram;
   if (lidar_time_)
     follow_lidar();
-  else if (has_bytes(datagram_))
-    look_for_leap();
   return &datagram_;
 }
 
@@ -63,8 +60,7 @@ void RecordedTimes::look_ahead() {
     held_.push_back({*datagram, {datagram->payload.begin(), datagram->payload.end()}});
     if (!has_bytes(*datagram)) // lives until the next call only
       return;
-    if (time->take(*datagram) && !reference_)
-      reference_ = held_.back();
+    time->take(*datagram);
   }
   if (!time || !arrivals_stand_still(*time))
     return;
@@ -113,63 +109,6 @@ void RecordedTimes::follow_lidar() {
   datagram_.receive_stamp = begin_ + lidar_time_->elapsed();
 }
 
-/// Takes a leap of the recording computer's clock out of the arrival. Until a packet of the reference explains the
-/// leap, the time stands still.
-void RecordedTimes::look_for_leap() {
-  constexpr int kMostUnexplained = 100;
-  if (!reference_)
-    return;
-  const Stamp wall = datagram_.receive_stamp;
-  const bool leaps = has_started_ && std::chrono::abs(wall - latest_wall_) > kLeap;
-  datagram_.clock_set_by = set_by_;
-  if (leaps && !is_reference() && ++unexplained_ < kMostUnexplained) {
-    datagram_.receive_stamp = latest_;
-    return;
-  }
-  unexplained_ = 0;
-  if (const auto step = leaps && is_reference() ? lidar_time_since_reference() : std::nullopt) {
-    const Duration by = wall - reference_->datagram.receive_stamp - *step;
-    datagram_.clock_set_by = set_by_ += by;
-    leaps_.push_back({wall - set_by_, latest_wall_, by});
-  }
-  has_started_ = true;
-  latest_wall_ = wall;
-  latest_ = datagram_.receive_stamp = wall - set_by_;
-  if (!is_reference())
-    return;
-  reference_->datagram.receive_stamp = wall;
-  reference_->payload.assign(datagram_.payload.begin(), datagram_.payload.end());
-}
-
-/// Tells whether the datagram comes from where the reference does, as long as that.
-bool RecordedTimes::is_reference() const {
-  return reference_->payload.size() == datagram_.payload.size() &&
-         reference_->datagram.source_ip == datagram_.source_ip &&
-         reference_->datagram.destination_port == datagram_.destination_port;
-}
-
-/// Returns the time by the lidar's clock since the reference; empty if that does not go on from there.
-std::optional<Duration> RecordedTimes::lidar_time_since_reference() const {
-  std::optional<LidarTime> time = open_time();
-  Datagram before = reference_->datagram;
-  before.payload = reference_->payload;
-  return time && time->take(before) && time->take(datagram_) ? std::optional(time->elapsed()) : std::nullopt;
-}
-
-Stamp RecordedTimes::wall(Stamp steady) const {
-  Duration set_by{};
-  for (const Leap& leap : leaps_)
-    set_by += steady >= leap.at ? leap.by : Duration{};
-  return steady + std::max(set_by, Duration{});
-}
-
-Stamp RecordedTimes::steady(Stamp wall) const {
-  Stamp steady = wall;
-  for (const Leap& leap : leaps_)
-    steady -= leap.by > Duration{} && wall > leap.wall_before + leap.by / 2 ? leap.by : Duration{};
-  return steady;
-}
-
 std::vector<std::string> RecordedTimes::warnings() const {
   std::vector<std::string> lines = source_->warnings();
   if (lidar_time_)
@@ -177,14 +116,6 @@ std::vector<std::string> RecordedTimes::warnings() const {
         "the times of arrival are all the same, so the lidar's own clock tells the time{}",
         is_utc_ ? ", which is UTC by its PPS and GPRMC"
                 : ", from the first arrival on; files of other sensors do not fit it: record again with times"));
-  constexpr std::size_t kMostTold = 3;
-  for (std::size_t i = 0; i < std::min(leaps_.size(), kMostTold); ++i)
-    lines.push_back(
-        fmt::format("the clock of the recording computer was set by {:+.3f} s in the recording; the odometry "
-                    "goes on, and its stamps {}",
-                    to_seconds(leaps_[i].by), leaps_[i].by > Duration{} ? "follow the clock" : "do not go back"));
-  if (leaps_.size() > kMostTold)
-    lines.push_back(fmt::format("it was set {} times in all", leaps_.size()));
   return lines;
 }
 

@@ -10,6 +10,7 @@
 #include "core/sources/motion_sources.hpp"
 #include "drivers/velodyne/model.hpp"
 #include "locus_replay/failure.hpp"
+#include "locus_replay/recorded_times.hpp"
 #include "locus_replay/time_span_text.hpp"
 
 namespace locus::tools {
@@ -24,11 +25,6 @@ MotionSamples<Sample> with_faults(std::vector<Sample> samples, const PlayOptions
                                   Stamp capture_start) {
   inject_faults(options.faults, source, capture_start, options.seed, samples);
   return MotionSamples<Sample>(std::move(samples));
-}
-
-/// Tells whether one clock stamps a sample and its arrival.
-bool has_one_clock(const auto& sample) {
-  return std::chrono::abs(sample.arrival - sample.stamp) < std::chrono::seconds{1};
 }
 
 } // namespace
@@ -75,8 +71,8 @@ Recording::Recording(std::unique_ptr<DatagramSource> source, std::vector<MotionR
       std::visit([&](auto& samples) { samples = with_faults(samples.drain(), options, name, capture_start_); },
                  recording.samples);
     const std::size_t index = index_of(recording.source);
-    motion_.push_back({std::move(recording), has_faults,
-                       index < options.earlier.size() ? options.earlier[index] : Duration{}, source_.get()});
+    motion_.push_back(
+        {std::move(recording), has_faults, index < options.earlier.size() ? options.earlier[index] : Duration{}});
     MotionCursor& cursor = motion_.back();
     while (cursor.arrival() < begin_ - kMotionAhead)
       cursor.take();
@@ -90,10 +86,9 @@ Stamp Recording::MotionCursor::arrival() const {
         const auto* const next = samples.front();
         if (next == nullptr)
           return Stamp::max();
-        const Duration leaps = next->arrival - times->steady(next->arrival);
-        const Stamp in_time = next->arrival - leaps - std::max(earlier, Duration{});
-        return earlier != Duration{} && has_one_clock(*next) ? std::max(in_time, next->stamp - leaps - earlier)
-                                                             : in_time;
+        const Stamp in_time = next->arrival - std::max(earlier, Duration{});
+        const bool one_clock = std::chrono::abs(next->arrival - next->stamp) < std::chrono::seconds{1};
+        return earlier != Duration{} && one_clock ? std::max(in_time, next->stamp - earlier) : in_time;
       },
       recording.samples);
 }
@@ -104,8 +99,6 @@ std::optional<TimeSpan> Recording::MotionCursor::arrivals() const {
 
 Input Recording::MotionCursor::take() {
   const auto input_of = [&](auto sample) -> Input {
-    if (has_one_clock(sample))
-      sample.stamp -= sample.arrival - times->steady(sample.arrival);
     sample.arrival = arrival();
     sample.stamp -= earlier;
     if constexpr (std::is_same_v<std::decay_t<decltype(sample)>, ImuSample>)

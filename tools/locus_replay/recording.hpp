@@ -18,7 +18,6 @@
 #include "drivers/other_maker.hpp"
 #include "faults/fault_injection.hpp"
 #include "locus_replay/motion_recordings.hpp"
-#include "locus_replay/recorded_times.hpp"
 
 namespace locus::tools {
 
@@ -69,8 +68,6 @@ class Recording : public daemon::InputSource {
   /// Returns an error, with a remedy, if most datagrams are older than the preceding one in the file; nothing if they
   /// are in order except for some reordering by the network.
   [[nodiscard]] std::optional<std::string> runs_backwards() const;
-  /// Returns the time by the clock of the recording computer, which may have been set in the recording.
-  [[nodiscard]] Stamp wall(Stamp steady) const { return source_->wall(steady); }
   /// Returns problems of the capture and its motion, a line for the user each.
   [[nodiscard]] std::vector<std::string> warnings() const;
 
@@ -87,7 +84,6 @@ class Recording : public daemon::InputSource {
     MotionRecording recording;
     bool has_faults; ///< injected by this
     Duration earlier{};
-    const RecordedTimes* times = nullptr;
 
     [[nodiscard]] Stamp arrival() const; ///< arrival of the next sample; Stamp::max() after the last
     [[nodiscard]] std::optional<TimeSpan> arrivals() const;
@@ -99,7 +95,7 @@ class Recording : public daemon::InputSource {
   void note_traffic(const Datagram& datagram);
   Pending fetch();
 
-  std::unique_ptr<RecordedTimes> source_;
+  std::unique_ptr<DatagramSource> source_;
   std::vector<MotionCursor> motion_;
   LidarRouter lidars_; ///< for look-ups only
   std::optional<Duration> play_for_;

@@ -50,9 +50,7 @@ Results::Results(const Arguments& arguments, const Config& config, const Recordi
     : arguments_(arguments), config_(config), recording_(recording), begin_(begin),
       odometry_(made(arguments.output), config.motion_sources), truth_(std::move(truth)), progress_(!arguments.quiet) {}
 
-void Results::take(const daemon::ProcessedSweep& processed) {
-  daemon::ProcessedSweep sweep = processed;
-  sweep.estimate.stamp = recording_.wall(processed.estimate.stamp);
+void Results::take(const daemon::ProcessedSweep& sweep) {
   odometry_.write(sweep.estimate);
   tally_.take(sweep);
   sweeps_.push_back(record_of(sweep));
