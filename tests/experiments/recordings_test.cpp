@@ -42,6 +42,13 @@ TEST_F(FoundRecordings, AreAllThatLocusReplayReadsAtAnyDepth) {
                                                "day/drive_0001_sync", "record"}));
 }
 
+TEST_F(FoundRecordings, OfAFolderNamedVelodyneAreItsCaptures) {
+  put("data/velodyne/one.pcap");
+  put("data/velodyne/two.pcap");
+  put("data/robot/lidar.pcap");
+  EXPECT_EQ(names_in({folder_ / "data"}), (Names{"robot", "velodyne/one.pcap", "velodyne/two.pcap"}));
+}
+
 TEST_F(FoundRecordings, MayBeNamedThemselves) {
   put("robot/lidar.pcap");
   put("one.pcap");

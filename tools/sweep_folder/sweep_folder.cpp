@@ -69,10 +69,16 @@ bool has_sweep(const path& folder) {
   return false;
 }
 
+/// Returns whether a folder has sweeps, or nothing at all: one with other files, such as captures, is no recording.
+bool may_have_sweeps(const path& folder) {
+  std::error_code error;
+  return is_folder(folder) && (has_sweep(folder) || std::filesystem::is_empty(folder, error));
+}
+
 /// Returns the folder of the sweeps; empty if there is none.
 path sweeps_folder_of(const path& where) {
   for (const char* const name : {"velodyne", "lidar0/data", "lidar0"}) {
-    if (is_folder(where / name))
+    if (may_have_sweeps(where / name))
       return where / name;
   }
   for (const path& folder : {where, where / "data"}) {
