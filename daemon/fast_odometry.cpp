@@ -30,7 +30,7 @@ std::optional<Eigen::Vector3d> velocity(const MotionSources& sources, const Sour
 /// Propagates the pose covariance and adds that of a constant twist error. The twist is rotated into odom axes, and its
 /// lever arm measured, at the midpoint of the path, where the error acts on average. Second order in the rotation
 /// during a sweep: 0.1 % at 1 rad/s.
-Matrix6 carried_covariance(const FastSample& from, const Pose& T_odom_now, double elapsed_s) {
+Matrix6 predicted_covariance(const FastSample& from, const Pose& T_odom_now, double elapsed_s) {
   const Pose T_from_now = from.T_odom_base.inverse() * T_odom_now;
   const Pose T_odom_half = from.T_odom_base * se3_exp(0.5 * se3_log(T_from_now));
   const Matrix6 of_pose = transport(T_odom_now.translation - from.T_odom_base.translation);
@@ -41,7 +41,7 @@ Matrix6 carried_covariance(const FastSample& from, const Pose& T_odom_now, doubl
 
 } // namespace
 
-std::optional<FastSample> FastOdometry::carry(const MotionSources& sources, SourceId source, Stamp arrival) const {
+std::optional<FastSample> FastOdometry::predict(const MotionSources& sources, SourceId source, Stamp arrival) const {
   const SourceChoice choice = sources.choose(arrival);
   const std::optional<Stamp> newest = sources.newest(source);
   if (!estimate_ || choice.rotation != source || !newest || *newest <= estimate_->stamp)
@@ -60,7 +60,7 @@ std::optional<FastSample> FastOdometry::carry(const MotionSources& sources, Sour
   Vector6 arc;
   arc << to_seconds(*newest - measured) * now.twist_base.head<3>(), so3_log(T_measured_now->rotation);
   now.T_odom_base = estimate_->T_odom_base * *T_estimate_measured * se3_exp(arc);
-  now.pose_covariance = carried_covariance(*estimate_, now.T_odom_base, to_seconds(*newest - estimate_->stamp));
+  now.pose_covariance = predicted_covariance(*estimate_, now.T_odom_base, to_seconds(*newest - estimate_->stamp));
   return now;
 }
 

@@ -22,11 +22,11 @@ struct FastSample {
 /// estimates, too. One owner, the ingest thread.
 class FastOdometry {
  public:
-  void take(const FastSample& estimate) { estimate_ = estimate; }
+  void set_estimate(const FastSample& estimate) { estimate_ = estimate; }
 
   /// Predicts the state after a sample of `source`. Empty for other sources, while no source is healthy, and before the
   /// first estimate.
-  [[nodiscard]] std::optional<FastSample> carry(const MotionSources& sources, SourceId source, Stamp arrival) const;
+  [[nodiscard]] std::optional<FastSample> predict(const MotionSources& sources, SourceId source, Stamp arrival) const;
 
  private:
   std::optional<FastSample> estimate_;

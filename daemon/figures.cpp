@@ -16,7 +16,7 @@ namespace locus::daemon {
 namespace {
 
 /// Number of data packets per foreign packet above which foreign packets are ignored.
-constexpr std::uint64_t kNextToNothing = 100;
+constexpr std::uint64_t kNegligibleRatio = 100;
 
 } // namespace
 
@@ -76,7 +76,7 @@ std::optional<std::string> shared_port(const LidarOptions& options, const Ingest
   std::string yaml =
       fmt::format("{{name: {}, port: {}, source_ip: {}}}", options.name, options.port, dotted(*lidar.source_ip));
   for (const LidarInput::Stranger& stranger : lidar.strangers) {
-    if (stranger.ip == *lidar.source_ip || stranger.packets * kNextToNothing <= lidar.packets.data)
+    if (stranger.ip == *lidar.source_ip || stranger.packets * kNegligibleRatio <= lidar.packets.data)
       continue;
     refused.push_back(fmt::format("{} of {}", stranger.packets, dotted(stranger.ip)));
     yaml += fmt::format(", {{name: {}_{}, port: {}, source_ip: {}}}", options.name, refused.size() + 1, options.port,
@@ -90,7 +90,7 @@ std::optional<std::string> shared_port(const LidarOptions& options, const Ingest
 }
 
 std::optional<std::string> unknown_model(const LidarOptions& options, const IngestReport::Lidar& lidar) {
-  if (!lidar.unknown_packets || lidar.unknown_packets->packets * kNextToNothing <= lidar.packets.data)
+  if (!lidar.unknown_packets || lidar.unknown_packets->packets * kNegligibleRatio <= lidar.packets.data)
     return std::nullopt;
   if (lidar.unknown_packets->is_readable)
     return fmt::format(
@@ -122,8 +122,8 @@ std::optional<std::string> stale_metadata(const LidarOptions& options, const Ing
 }
 
 std::optional<std::string> too_fast(const MotionLimits& limits, double largest_speed_mps) {
-  constexpr double kClearly = 1.05;
-  if (largest_speed_mps <= kClearly * limits.max_speed_mps)
+  constexpr double kTolerance = 1.05;
+  if (largest_speed_mps <= kTolerance * limits.max_speed_mps)
     return std::nullopt;
   return fmt::format("estimates claim up to {:.1f} m/s, and motion.max_speed_mps is {:g}: set it to what the robot is "
                      "able to, or do not rely on them",
@@ -138,11 +138,11 @@ std::optional<std::string> unused_pps(const LidarOptions& options, const IngestR
 
 std::optional<std::string> short_sweep(const SweepOptions& options, const std::string& lidar,
                                        double rotation_rate_rpm) {
-  constexpr double kAlmost = 0.95, kMsPerMinute = 60e3;
+  constexpr double kTolerance = 0.95, kMsPerMinute = 60e3;
   if (!options.sweep_period || rotation_rate_rpm <= 0.0)
     return std::nullopt;
   const double turn_ms = kMsPerMinute / rotation_rate_rpm, sweep_ms = 1e3 * to_seconds(*options.sweep_period);
-  if (sweep_ms >= kAlmost * turn_ms)
+  if (sweep_ms >= kTolerance * turn_ms)
     return std::nullopt;
   return fmt::format(
       "lidar {}: one revolution takes {:.0f} ms, so each sweep of {:.0f} ms covers only a different part of the scene; "
@@ -150,13 +150,13 @@ std::optional<std::string> short_sweep(const SweepOptions& options, const std::s
       lidar, turn_ms, sweep_ms);
 }
 
-void LatencyHistogram::take(double took_s) {
-  const auto bound = std::ranges::lower_bound(kBounds_s, took_s);
+void LatencyHistogram::add(double duration_s) {
+  const auto bound = std::ranges::lower_bound(kBounds_s, duration_s);
   ++counts[static_cast<std::size_t>(bound - kBounds_s.begin())];
-  sum_s += took_s;
+  sum_s += duration_s;
 }
 
-void SweepTally::take(const ProcessedSweep& sweep) {
+void SweepStatistics::add(const ProcessedSweep& sweep) {
   const OdometryEstimate& estimate = sweep.estimate;
   const Timing timing{read_clock(CLOCK_MONOTONIC), static_cast<float>(1e3 * to_seconds(sweep.took.wall)),
                       static_cast<float>(1e3 * to_seconds(sweep.took.cpu))};
@@ -165,7 +165,7 @@ void SweepTally::take(const ProcessedSweep& sweep) {
   else
     timings_[sums_.sweeps % window_] = timing;
   ++sums_.sweeps;
-  sums_.process.take(to_seconds(sweep.took.wall));
+  sums_.process.add(to_seconds(sweep.took.wall));
   sums_.raw_points += static_cast<double>(sweep.raw_returns);
   sums_.filtered_points += static_cast<double>(estimate.points);
   sums_.scan_to_scan_iterations += estimate.scan_to_scan.iterations;
@@ -184,7 +184,7 @@ void SweepTally::take(const ProcessedSweep& sweep) {
   sums_.last_at = timing.at;
 }
 
-SweepFigures SweepTally::figures() const {
+SweepFigures SweepStatistics::figures() const {
   SweepFigures figures = sums_;
   figures.process_ms = percentiles(&Timing::wall_ms);
   figures.process_cpu_ms = percentiles(&Timing::cpu_ms);
@@ -193,7 +193,7 @@ SweepFigures SweepTally::figures() const {
 }
 
 /// Uses the nearest-rank method: each percentile is one of the values.
-Percentiles SweepTally::percentiles(float Timing::*figure) const {
+Percentiles SweepStatistics::percentiles(float Timing::*figure) const {
   if (timings_.empty())
     return {};
   std::vector<float> values(timings_.size());
@@ -206,19 +206,19 @@ Percentiles SweepTally::percentiles(float Timing::*figure) const {
   return {at(0.5), at(0.9), at(0.99), at(1.0)};
 }
 
-double SweepTally::rate_hz() const {
+double SweepStatistics::rate_hz() const {
   constexpr Duration kSpan = std::chrono::seconds{5};
   const Duration now = read_clock(CLOCK_MONOTONIC);
-  std::size_t young = 0;
+  std::size_t recent = 0;
   Duration oldest = now;
-  for (; young < timings_.size(); ++young) {
-    const Timing& timing = timings_[(sums_.sweeps - 1 - young) % window_];
+  for (; recent < timings_.size(); ++recent) {
+    const Timing& timing = timings_[(sums_.sweeps - 1 - recent) % window_];
     if (now - timing.at > kSpan)
       break;
     oldest = timing.at;
   }
   const double elapsed_s = to_seconds(now - oldest);
-  return young > 1 && elapsed_s > 0 ? static_cast<double>(young - 1) / elapsed_s : 0.0;
+  return recent > 1 && elapsed_s > 0 ? static_cast<double>(recent - 1) / elapsed_s : 0.0;
 }
 
 std::optional<Duration> time_since(Stamp then) {
@@ -246,21 +246,21 @@ std::string verdict_on(const IngestReport::Source& source, bool is_live) {
   return fmt::format("is refused for {:.0f} s: it {}", to_seconds(refusal.lasted), explanation(refusal.reason));
 }
 
-/// Ignores foreign senders and cloud faults that were last seen more than kLately before the lidar's last data.
+/// Ignores foreign senders and cloud faults that were last seen more than kMaxAge before the lidar's last data.
 std::string problem_of(const LidarOptions& options, const IngestReport::Lidar& lidar) {
-  constexpr Duration kLately = std::chrono::seconds{5};
+  constexpr Duration kMaxAge = std::chrono::seconds{5};
   IngestReport::Lidar now = lidar;
   if (lidar.clouds) {
     for (std::size_t i = 0; i < kCloudDoubts; ++i)
-      if (lidar.last_heard - lidar.clouds->last_doubted[i] > kLately)
+      if (lidar.last_heard - lidar.clouds->last_doubted[i] > kMaxAge)
         now.clouds->doubts.reset(i);
     const std::vector<std::string> doubts = cloud_doubts(options, now);
     return doubts.empty() ? "" : doubts.front();
   }
   for (LidarInput::Stranger& stranger : now.strangers)
-    if (lidar.last_heard - stranger.last_heard > kLately)
+    if (lidar.last_heard - stranger.last_heard > kMaxAge)
       stranger = {};
-  if (lidar.last_heard - lidar.unknown_last_heard > kLately)
+  if (lidar.last_heard - lidar.unknown_last_heard > kMaxAge)
     now.unknown_packets.reset();
   for (const auto& problem :
        {shared_port(options, now), unknown_model(options, now), stale_metadata(options, now), unused_pps(options, now)})

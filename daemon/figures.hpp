@@ -118,7 +118,7 @@ struct LatencyHistogram {
   std::array<std::uint64_t, kBounds_s.size() + 1> counts{}; ///< by bound; the last counts values above all bounds
   double sum_s = 0;
 
-  void take(double took_s);
+  void add(double duration_s);
 };
 
 /// Statistics of the processed sweeps: sums since the start, distributions of the latest ones.
@@ -138,12 +138,12 @@ struct SweepFigures {
 };
 
 /// Accumulates SweepFigures over the sweeps. One owner.
-class SweepTally {
+class SweepStatistics {
  public:
   /// Computes distributions over the last `window` sweeps, at 16 bytes each.
-  explicit SweepTally(std::size_t window) : window_(window) {}
+  explicit SweepStatistics(std::size_t window) : window_(window) {}
 
-  void take(const ProcessedSweep& sweep);
+  void add(const ProcessedSweep& sweep);
   [[nodiscard]] SweepFigures figures() const;
 
  private:

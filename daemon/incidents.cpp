@@ -24,17 +24,19 @@ namespace {
 
 using std::filesystem::path;
 
-constexpr std::size_t kBytesOfARound = 4 << 20;
+constexpr std::size_t kBytesPerRound = 4 << 20;
 
-std::string not_kept(const path& where, const std::string& why, const char* remedy) {
+std::string store_failure_text(const path& where, const std::string& why, const char* remedy) {
   return fmt::format("{}: the incident cannot be kept ({}); {}", where.string(), why, remedy);
 }
 
-std::string not_kept(const path& where, const std::error_code& error) {
-  return not_kept(where, error.message(), "let locusd write there, see INCIDENTS in locusd(8)");
+std::string store_failure_text(const path& where, const std::error_code& error) {
+  return store_failure_text(where, error.message(), "let locusd write there, see INCIDENTS in locusd(8)");
 }
 
-std::string not_kept(const path& where, int error) { return not_kept(where, {error, std::generic_category()}); }
+std::string store_failure_text(const path& where, int error) {
+  return store_failure_text(where, {error, std::generic_category()});
+}
 
 std::vector<path> files_below(const path& folder) {
   std::vector<path> files;
@@ -119,9 +121,9 @@ void Incidents::set_max_bytes(std::uint64_t max_bytes) {
   max_bytes_ = max_bytes;
 }
 
-Expected<path, std::string> Incidents::ask(Request request) {
+Expected<path, std::string> Incidents::submit(Request request) {
   const std::scoped_lock lock(mutex_);
-  if (!take(std::move(request)))
+  if (!accept(std::move(request)))
     return fmt::format("{}: is still being written; ask again once it is there", status_.writing.string());
   return status_.writing;
 }
@@ -130,8 +132,8 @@ bool Incidents::raise(Request request) {
   const std::scoped_lock lock(mutex_);
   auto& last = last_raised_[static_cast<std::size_t>(request.cause)];
   const Stamp when = request.when;
-  const bool is_too_soon = last && std::chrono::abs(when - *last) < kPause;
-  if (is_too_soon || !take(std::move(request))) {
+  const bool is_too_soon = last && std::chrono::abs(when - *last) < kMinInterval;
+  if (is_too_soon || !accept(std::move(request))) {
     ++status_.suppressed;
     return false;
   }
@@ -140,12 +142,12 @@ bool Incidents::raise(Request request) {
 }
 
 /// Accepts a request unless an incident is being written. Precondition: the mutex is locked.
-bool Incidents::take(Request request) {
+bool Incidents::accept(Request request) {
   if (!status_.writing.empty())
     return false;
   status_.writing = name_of(folder_, request.when, request.cause);
-  was_asked_ = request.cause == IncidentCause::asked;
-  asked_ = std::move(request);
+  is_requested_ = request.cause == IncidentCause::asked;
+  pending_ = std::move(request);
   return true;
 }
 
@@ -156,14 +158,14 @@ Incidents::Status Incidents::status() const {
 
 void Incidents::work(Recorder* recorder) {
   if (job_) {
-    if (const auto problem = copy_some())
+    if (const auto problem = copy_files())
       end(*problem);
     return;
   }
   std::optional<Request> request;
   {
     const std::scoped_lock lock(mutex_);
-    request = std::exchange(asked_, std::nullopt);
+    request = std::exchange(pending_, std::nullopt);
   }
   if (!request)
     return;
@@ -176,60 +178,61 @@ std::optional<std::string> Incidents::begin(Request request, Recorder* recorder)
     request.pieces = recorder->end_pieces(request.keep);
   const path target = status().writing;
   if (request.pieces.empty())
-    return not_kept(target, "no input has come", "is there data? see locusctl status");
+    return store_failure_text(target, "no input has come", "is there data? see locusctl status");
   std::error_code error;
   std::filesystem::create_directories(folder_, error);
   if (error)
-    return not_kept(folder_, error);
+    return store_failure_text(folder_, error);
   const path snapshot = snapshot_in(request.pieces.front().parent_path().parent_path());
   if ((error = link_all(request.pieces, snapshot)))
-    return not_kept(snapshot, error);
+    return store_failure_text(snapshot, error);
   job_ = Job{std::move(request), snapshot, target.string() + ".part", target, files_below(snapshot)};
   std::filesystem::rename(snapshot, job_->part, error);
   if (!error) {
     job_->files.clear();
     job_->snapshot.clear();
   } else if (error != std::errc::cross_device_link) {
-    return not_kept(job_->part, error);
+    return store_failure_text(job_->part, error);
   }
   return make_room(bytes_below(error ? snapshot : job_->part));
 }
 
 std::optional<std::string> Incidents::make_room(std::uint64_t bytes) const {
-  std::vector<path> there = incidents_in(folder_);
+  std::vector<path> older = incidents_in(folder_);
   std::uint64_t max_bytes = 0;
   {
     const std::scoped_lock lock(mutex_);
     max_bytes = max_bytes_;
   }
   if (bytes > max_bytes)
-    return not_kept(folder_, fmt::format("it has {} MB, and {} may be used", bytes / 1'000'000, max_bytes / 1'000'000),
-                    "raise record.incidents_bytes, or lower record.keep_s");
+    return store_failure_text(folder_,
+                              fmt::format("it has {} MB, and {} may be used", bytes / 1'000'000, max_bytes / 1'000'000),
+                              "raise record.incidents_bytes, or lower record.keep_s");
   for (;;) {
-    std::uint64_t older = 0;
-    for (const path& incident : there)
-      older += bytes_below(incident);
+    std::uint64_t older_bytes = 0;
+    for (const path& incident : older)
+      older_bytes += bytes_below(incident);
     std::error_code error;
     const std::uint64_t free = std::filesystem::space(folder_, error).available;
     if (error)
-      return not_kept(folder_, error);
+      return store_failure_text(folder_, error);
     const std::uint64_t wanted = job_->snapshot.empty() ? bytes : 2 * bytes; // leaves as much free
-    if (older + bytes <= max_bytes && there.size() < kMost && free >= wanted)
+    if (older_bytes + bytes <= max_bytes && older.size() < kMaxIncidents && free >= wanted)
       return std::nullopt;
-    if (there.empty() || free + older < wanted) // deletes no incident in vain
-      return not_kept(folder_,
-                      fmt::format("{} MB are free on the disk, and {} wanted", free / 1'000'000, wanted / 1'000'000),
-                      "free some, or lower record.keep_s");
-    std::filesystem::remove_all(there.front(), error);
+    if (older.empty() || free + older_bytes < wanted) // deletes no incident in vain
+      return store_failure_text(
+          folder_, fmt::format("{} MB are free on the disk, and {} wanted", free / 1'000'000, wanted / 1'000'000),
+          "free some, or lower record.keep_s");
+    std::filesystem::remove_all(older.front(), error);
     if (error)
-      return not_kept(there.front(), error);
-    there.erase(there.begin());
+      return store_failure_text(older.front(), error);
+    older.erase(older.begin());
   }
 }
 
-/// Copies files from the last to the first, kBytesOfARound per call. Waits for the disk only after a complete file.
-std::optional<std::string> Incidents::copy_some() {
-  for (std::size_t copied = 0; copied < kBytesOfARound;) {
+/// Copies files from the last to the first, kBytesPerRound per call. Waits for the disk only after a complete file.
+std::optional<std::string> Incidents::copy_files() {
+  for (std::size_t copied = 0; copied < kBytesPerRound;) {
     if (job_->files.empty())
       return finish();
     const path from = job_->snapshot / job_->files.back(), to = job_->part / job_->files.back();
@@ -240,9 +243,9 @@ std::optional<std::string> Incidents::copy_some() {
       job_->out = Descriptor{open(to.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)};
     }
     const int in = job_->in.number(), out = job_->out.number();
-    const ssize_t sent = in < 0 || out < 0 ? -1 : sendfile(out, in, nullptr, kBytesOfARound);
+    const ssize_t sent = in < 0 || out < 0 ? -1 : sendfile(out, in, nullptr, kBytesPerRound);
     if (sent < 0 || (sent == 0 && fdatasync(out) != 0))
-      return not_kept(to, errno);
+      return store_failure_text(to, errno);
     copied += static_cast<std::size_t>(sent);
     if (sent == 0) {
       job_->in = Descriptor{};
@@ -257,12 +260,12 @@ std::optional<std::string> Incidents::finish() {
   std::ofstream report{job_->part / "why.json"};
   report << job_->request.report << std::flush;
   if (!report)
-    return not_kept(job_->part / "why.json", errno);
+    return store_failure_text(job_->part / "why.json", errno);
   report.close();
   std::error_code error;
   std::filesystem::rename(job_->part, job_->target, error);
   if (error)
-    return not_kept(job_->target, error);
+    return store_failure_text(job_->target, error);
   end("");
   return std::nullopt;
 }
@@ -281,7 +284,7 @@ void Incidents::end(const std::string& problem) {
     ++status_.kept;
     status_.problem.clear();
   }
-  (was_asked_ ? status_.refusal : status_.problem) = problem;
+  (is_requested_ ? status_.refusal : status_.problem) = problem;
   status_.writing.clear();
 }
 

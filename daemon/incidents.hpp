@@ -33,10 +33,10 @@ constexpr auto names_of(IncidentCause) {
 /// disk. One owner makes requests; another thread, which may block on the disk, does the work.
 class Incidents {
  public:
-  static constexpr std::size_t kMost = 32; ///< largest number of incidents in the folder
+  static constexpr std::size_t kMaxIncidents = 32; ///< largest number of incidents in the folder
   /// Least time between two incidents of one cause, except requested ones. Holds across restarts, so that a crash loop
   /// does not fill the disk.
-  static constexpr Duration kPause = std::chrono::minutes{5};
+  static constexpr Duration kMinInterval = std::chrono::minutes{5};
 
   struct Request {
     IncidentCause cause = IncidentCause::asked;
@@ -63,7 +63,7 @@ class Incidents {
   /// Owner: sets the limit for all incidents together, from the next one on.
   void set_max_bytes(std::uint64_t max_bytes);
   /// Owner: requests an incident. Returns its future folder, or one line for the user while another is being written.
-  Expected<std::filesystem::path, std::string> ask(Request request);
+  Expected<std::filesystem::path, std::string> submit(Request request);
   /// Owner: requests an automatic incident, unless it is too soon. Tells whether it was accepted.
   bool raise(Request request);
   /// Returns the status. Any thread.
@@ -81,10 +81,10 @@ class Incidents {
     Descriptor in{}, out{};                   ///< source and copy of files.back()
   };
 
-  bool take(Request request);
+  bool accept(Request request);
   std::optional<std::string> begin(Request request, Recorder* recorder);
   std::optional<std::string> make_room(std::uint64_t bytes) const;
-  std::optional<std::string> copy_some();
+  std::optional<std::string> copy_files();
   std::optional<std::string> finish();
   void end(const std::string& problem);
 
@@ -93,8 +93,8 @@ class Incidents {
 
   mutable std::mutex mutex_; ///< guards all members below
   std::uint64_t max_bytes_ = 0;
-  std::optional<Request> asked_;
-  bool was_asked_ = false; ///< the incident being written was requested; otherwise automatic
+  std::optional<Request> pending_;
+  bool is_requested_ = false; ///< the incident being written was requested; otherwise automatic
   std::array<std::optional<Stamp>, names_of(IncidentCause{}).size()> last_raised_; ///< by cause
   Status status_;
 };

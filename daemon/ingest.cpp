@@ -91,7 +91,7 @@ Ingest::Ingest(const Config& config, LidarRouter lidars, Sink sink, MotionSource
                                                   },
                                                   &cut_watch_) {}
 
-void Ingest::take(const Datagram& datagram) {
+void Ingest::process(const Datagram& datagram) {
   sweeps_.advance(datagram.receive_stamp);
   const LidarPacket* packet = nullptr;
   {
@@ -106,7 +106,7 @@ void Ingest::take(const Datagram& datagram) {
       sweeps_.sources().add(*source, sample);
 }
 
-void Ingest::take(const CloudInput& cloud) {
+void Ingest::process(const CloudInput& cloud) {
   sweeps_.advance(cloud.arrival);
   CloudDecoder& decoder = *clouds_[cloud.lidar];
   const auto next = [&] {
@@ -124,12 +124,12 @@ void Ingest::take(const CloudInput& cloud) {
     sweeps_.add(*packet, cloud.arrival);
 }
 
-template <class MotionInput> void Ingest::take_motion(const MotionInput& input) {
+template <class MotionInput> void Ingest::process_motion(const MotionInput& input) {
   sweeps_.advance(input.sample.arrival);
   sweeps_.sources().add(input.source, input.sample);
 }
-template void Ingest::take_motion(const ImuInput&);
-template void Ingest::take_motion(const OdometryInput&);
+template void Ingest::process_motion(const ImuInput&);
+template void Ingest::process_motion(const OdometryInput&);
 
 void Ingest::CutWatch::enter(Stage stage) {
   if (stage == Stage::filter)
@@ -138,8 +138,8 @@ void Ingest::CutWatch::enter(Stage stage) {
 }
 
 std::size_t Ingest::max_points(const Config& config) {
-  const std::size_t singly = config.sweep.segment_filter.enabled ? 0 : max_returns(config);
-  return std::max(singly, RingSegments::kMaxSegments);
+  const std::size_t unsegmented = config.sweep.segment_filter.enabled ? 0 : max_returns(config);
+  return std::max(unsegmented, RingSegments::kMaxSegments);
 }
 
 } // namespace locus::daemon

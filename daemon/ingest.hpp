@@ -32,21 +32,23 @@ class Ingest {
   Ingest(const Ingest&) = delete;
   Ingest& operator=(const Ingest&) = delete;
 
-  void take(const Input& input) {
-    std::visit([this](const auto& what) { take(what); }, input);
+  void process(const Input& input) {
+    std::visit([this](const auto& one) { process(one); }, input);
   }
-  void take(const Datagram& datagram);
-  void take(const CloudInput& cloud);
-  void take(const ImuInput& imu) { take_motion(imu); }
-  void take(const OdometryInput& odometry) { take_motion(odometry); }
-  void take(const OutsideVerdict& verdict) { sweeps_.sources().set_outside_verdict(verdict.source, verdict.healthy); }
-  void take(const Silence& silence) { sweeps_.advance(silence.now); }
-  void take(const EndOfInput&) { sweeps_.finish(); }
+  void process(const Datagram& datagram);
+  void process(const CloudInput& cloud);
+  void process(const ImuInput& imu) { process_motion(imu); }
+  void process(const OdometryInput& odometry) { process_motion(odometry); }
+  void process(const ExternalHealth& verdict) {
+    sweeps_.sources().set_outside_verdict(verdict.source, verdict.healthy);
+  }
+  void process(const Silence& silence) { sweeps_.advance(silence.now); }
+  void process(const EndOfInput&) { sweeps_.finish(); }
 
   /// Accepts the feedback of the last registration on the motion sources; effective from the next window on.
-  void take(const RegistrationFeedback& feedback) { sweeps_.sources().hear(feedback); }
+  void apply(const RegistrationFeedback& feedback) { sweeps_.sources().hear(feedback); }
 
-  /// Returns the lidars; the counters of this and the following belong to the thread that calls take().
+  /// Returns the lidars; the counters of this and the following belong to the thread that calls process().
   [[nodiscard]] const LidarRouter& lidars() const { return lidars_; }
   /// Returns the decoder of the lidar with this index; nullptr for one that sends packets.
   [[nodiscard]] const CloudDecoder* clouds_of(std::size_t lidar) const { return clouds_[lidar].get(); }
@@ -71,7 +73,7 @@ class Ingest {
     MachineTime cut_began_;
   };
 
-  template <class MotionInput> void take_motion(const MotionInput& input);
+  template <class MotionInput> void process_motion(const MotionInput& input);
 
   Sink sink_;
   StageStopwatch stages_;

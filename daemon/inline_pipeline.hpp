@@ -11,7 +11,7 @@
 
 namespace locus::daemon {
 
-/// Ingest and odometry in the caller's thread: take() returns once the sweeps completed by the input are processed.
+/// Ingest and odometry in the caller's thread: process() returns once the sweeps completed by the input are processed.
 /// Shared by locus-replay and liblocus; the service runs the same objects in separate threads (LivePipeline). The same
 /// inputs give the same bits. One owner.
 class InlinePipeline {
@@ -26,24 +26,24 @@ class InlinePipeline {
                  Stage stage = {})
       : stage_(std::move(stage)), sink_(std::move(sink)), processor_(config),
         ingest_(
-            config, std::move(lidars), [this](Sweep& sweep, const SweepCut& cut) { process(sweep, cut); },
+            config, std::move(lidars), [this](Sweep& sweep, const SweepCut& cut) { process_sweep(sweep, cut); },
             std::move(health_sink)) {}
   InlinePipeline(const InlinePipeline&) = delete;
   InlinePipeline& operator=(const InlinePipeline&) = delete;
 
-  void take(const Input& input) { ingest_.take(input); }
+  void process(const Input& input) { ingest_.process(input); }
 
   [[nodiscard]] const Ingest& ingest() const { return ingest_; }
   [[nodiscard]] const SweepProcessor& processor() const { return processor_; }
   [[nodiscard]] const SweepCounters& counters() const { return counters_; }
 
  private:
-  void process(Sweep& sweep, const SweepCut& cut) {
+  void process_sweep(Sweep& sweep, const SweepCut& cut) {
     if (stage_)
       stage_(sweep);
     const ProcessedSweep done = processor_.process(sweep, cut);
     processor_.prepare_next();
-    ingest_.take(processor_.odometry().feedback());
+    ingest_.apply(processor_.odometry().feedback());
     ++counters_.seen;
     ++(done.estimate.failed ? counters_.failed : counters_.processed);
     sink_(sweep, done);

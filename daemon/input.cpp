@@ -25,7 +25,7 @@ Stamp arrival_of(const LiveInput::Motion& motion) {
 }
 
 /// Applies `change` to a sample; ignores a health verdict.
-void with_sample_of(LiveInput::Motion& motion, const auto& change) {
+void modify_sample(LiveInput::Motion& motion, const auto& change) {
   if (auto* imu = std::get_if<ImuInput>(&motion))
     change(imu->source, imu->sample);
   else if (auto* odometry = std::get_if<OdometryInput>(&motion))
@@ -36,34 +36,34 @@ void with_sample_of(LiveInput::Motion& motion, const auto& change) {
 
 LiveInput::LiveInput(std::vector<UdpSocket> sockets, const std::vector<bool>& gives_clouds)
     : sockets_(std::move(sockets)), guards_(sockets_.size()), waiting_(sockets_.size()),
-      received_until_(sockets_.size(), Stamp::min()), motion_is_there_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+      received_until_(sockets_.size(), Stamp::min()), wakeup_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
   for (const UdpSocket& socket : sockets_)
     poll_.push_back({socket.descriptor(), POLLIN, 0});
-  poll_.push_back({motion_is_there_, POLLIN, 0});
+  poll_.push_back({wakeup_, POLLIN, 0});
   for (const bool gives : gives_clouds)
     clouds_.push_back(gives ? std::make_unique<Clouds>() : nullptr);
 }
 
-LiveInput::~LiveInput() { close(motion_is_there_); }
+LiveInput::~LiveInput() { close(wakeup_); }
 
 void LiveInput::push(const Motion& motion) noexcept {
   if (!motion_.push(motion))
     motion_drops_.fetch_add(1, std::memory_order_relaxed);
-  eventfd_write(motion_is_there_, 1);
+  eventfd_write(wakeup_, 1);
 }
 
 void LiveInput::push_cloud(std::uint8_t lidar) noexcept {
   if (clouds_[lidar]->slot.publish())
     clouds_[lidar]->drops.fetch_add(1, std::memory_order_relaxed);
-  eventfd_write(motion_is_there_, 1);
+  eventfd_write(wakeup_, 1);
 }
 
 /// Collects new clouds; true if any is waiting.
-bool LiveInput::look_for_clouds() {
+bool LiveInput::poll_clouds() {
   bool any = false;
   for (const auto& clouds : clouds_) {
     if (clouds && clouds->waiting == nullptr)
-      clouds->waiting = clouds->slot.take();
+      clouds->waiting = clouds->slot.poll();
     any = any || (clouds && clouds->waiting != nullptr);
   }
   return any;
@@ -71,29 +71,29 @@ bool LiveInput::look_for_clouds() {
 
 Input LiveInput::next(Duration timeout) {
   if (!next_motion_)
-    next_motion_ = take_motion();
-  time_.look();
-  Stamp asked;
+    next_motion_ = pop_motion();
+  time_.detect_step();
+  Stamp polled_at;
   if (std::ranges::all_of(waiting_, [](const auto& datagrams) { return datagrams.empty(); }))
-    asked = receive(next_motion_ || look_for_clouds() ? Duration::zero() : timeout);
+    polled_at = receive(next_motion_ || poll_clouds() ? Duration::zero() : timeout);
   Earliest from = earliest();
   if (may_hold_earlier(from.arrival)) {
     receive(Duration::zero());
     from = earliest();
   }
-  if (auto input = take(from))
+  if (auto input = pop(from))
     return *input;
-  return Silence{in_order(asked)};
+  return Silence{monotonic(polled_at)};
 }
 
-std::optional<LiveInput::Motion> LiveInput::take_motion() {
+std::optional<LiveInput::Motion> LiveInput::pop_motion() {
   std::optional<Motion> motion = motion_.pop();
   if (!motion)
     return motion;
-  time_.look();
-  with_sample_of(*motion, [this](SourceId source, auto& sample) {
-    sample.arrival = time_.steady(sample.arrival);
-    sample.stamp = time_.steady(sample.stamp, sample.arrival, senders_[index_of(source)]);
+  time_.detect_step();
+  modify_sample(*motion, [this](SourceId source, auto& sample) {
+    sample.arrival = time_.to_steady(sample.arrival);
+    sample.stamp = time_.to_steady(sample.stamp, sample.arrival, senders_[index_of(source)]);
   });
   return motion;
 }
@@ -101,12 +101,12 @@ std::optional<LiveInput::Motion> LiveInput::take_motion() {
 /// Returns an arrival after that of the input returned before. A step of the clock is already undone (SteadyTime), so
 /// what is earlier was on its way while its thread, or the kernel's, waited for a processor. A stamp that is earlier by
 /// more than any transit shows that the one before it was wrong.
-Stamp LiveInput::in_order(Stamp arrival) {
-  const bool late = arrival <= latest_ && latest_ - arrival <= SteadyTime::kOnItsWay;
+Stamp LiveInput::monotonic(Stamp arrival) {
+  const bool late = arrival <= latest_ && latest_ - arrival <= SteadyTime::kMaxTransit;
   return latest_ = late ? latest_ + Duration{1} : arrival;
 }
 
-void LiveInput::expect(const LidarRouter& lidars) {
+void LiveInput::update_filter(const LidarRouter& lidars) {
   for (std::size_t i = 0; i < sockets_.size(); ++i)
     guards_[i].expect(lidars.senders_to(sockets_[i].port()), sockets_[i]);
 }
@@ -124,8 +124,8 @@ bool LiveInput::may_hold_earlier(Stamp arrival) const {
 /// start of the call: later input has a later arrival.
 Stamp LiveInput::receive(Duration timeout) {
   const Stamp wall{read_clock(CLOCK_REALTIME)};
-  time_.look();
-  const Stamp asked = time_.steady(wall);
+  time_.detect_step();
+  const Stamp polled_at = time_.to_steady(wall);
   const timespec wait = to_timespec(timeout);
   const bool has_datagrams = std::ranges::any_of(waiting_, [](const auto& datagrams) { return !datagrams.empty(); });
   const bool is_silent = ppoll(poll_.data(), poll_.size(), &wait, nullptr) == 0 && !has_datagrams;
@@ -141,67 +141,67 @@ Stamp LiveInput::receive(Duration timeout) {
     drops += sockets_[i].kernel_drops();
     filtered += sockets_[i].filtered();
   }
-  time_.look();
-  Stamp seen_until = asked; // the first datagram of a socket was there when all were polled
+  time_.detect_step();
+  Stamp received_until = polled_at; // the first datagram of a socket was there when all were polled
   for (const auto& datagrams : waiting_)
     if (!datagrams.empty())
-      seen_until = std::max(seen_until, time_.steady(datagrams.front().receive_stamp));
+      received_until = std::max(received_until, time_.to_steady(datagrams.front().receive_stamp));
   for (std::size_t i = 0; i < sockets_.size(); ++i)
-    received_until_[i] = waiting_[i].empty() ? seen_until : time_.steady(waiting_[i].back().receive_stamp);
+    received_until_[i] = waiting_[i].empty() ? received_until : time_.to_steady(waiting_[i].back().receive_stamp);
   kernel_drops_.store(drops, std::memory_order_relaxed);
   filtered_.store(filtered, std::memory_order_relaxed);
   if (poll_.back().revents != 0) {
     eventfd_t notifications = 0;
-    eventfd_read(motion_is_there_, &notifications);
+    eventfd_read(wakeup_, &notifications);
   }
-  return asked;
+  return polled_at;
 }
 
 /// Finds the earliest input among those already received.
 LiveInput::Earliest LiveInput::earliest() {
   if (!next_motion_)
-    next_motion_ = take_motion();
+    next_motion_ = pop_motion();
   Earliest found;
   if (next_motion_)
     found.arrival = arrival_of(*next_motion_);
-  look_for_clouds();
+  poll_clouds();
   for (std::size_t i = 0; i < clouds_.size(); ++i) {
     if (!clouds_[i] || clouds_[i]->waiting == nullptr)
       continue;
-    const Stamp arrival = time_.steady(clouds_[i]->waiting->arrival);
+    const Stamp arrival = time_.to_steady(clouds_[i]->waiting->arrival);
     if (arrival < found.arrival)
       found = {arrival, std::nullopt, i};
   }
   for (std::size_t i = 0; i < waiting_.size(); ++i) {
     if (waiting_[i].empty())
       continue;
-    const Stamp arrival = time_.steady(waiting_[i].front().receive_stamp);
+    const Stamp arrival = time_.to_steady(waiting_[i].front().receive_stamp);
     if (arrival < found.arrival)
       found = {arrival, i, std::nullopt};
   }
   return found;
 }
 
-std::optional<Input> LiveInput::take(const Earliest& from) {
+std::optional<Input> LiveInput::pop(const Earliest& from) {
   if (from.socket) {
     std::span<const Datagram>& waiting = waiting_[*from.socket];
     Datagram datagram = waiting.front();
     waiting = waiting.subspan(1);
-    datagram.receive_stamp = in_order(from.arrival);
-    datagram.clock_set_by = time_.set_by();
+    datagram.receive_stamp = monotonic(from.arrival);
+    datagram.clock_set_by = time_.steps();
     return datagram;
   }
   if (from.lidar)
-    return give_cloud(*from.lidar, in_order(from.arrival));
+    return pop_cloud(*from.lidar, monotonic(from.arrival));
   if (!next_motion_)
     return std::nullopt;
-  with_sample_of(*next_motion_, [&](SourceId, auto& sample) { sample.arrival = in_order(from.arrival); });
+  modify_sample(*next_motion_, [&](SourceId, auto& sample) { sample.arrival = monotonic(from.arrival); });
   Input input = std::visit([](const auto& motion) { return Input{motion}; }, *next_motion_);
   next_motion_.reset();
   return input;
 }
 
-Input LiveInput::give_cloud(std::size_t lidar, Stamp arrival) {
+Input LiveInput::pop_cloud(std::size_t lidar, Stamp arrival) {
   Clouds& clouds = *clouds_[lidar];
   const CloudBytes& cloud = *std::exchange(clouds.waiting, nullptr);
   const auto index = static_cast<std::uint8_t>(lidar);
@@ -211,37 +211,37 @@ Input LiveInput::give_cloud(std::size_t lidar, Stamp arrival) {
   if (!message)
     return CloudInput{index, nullptr, arrival, CloudError::cut};
   cloud_ = *message;
-  cloud_.ahead = cloud_.stamp - time_.steady(cloud_.stamp, arrival, clouds.sender);
+  cloud_.ahead = cloud_.stamp - time_.to_steady(cloud_.stamp, arrival, clouds.sender);
   return CloudInput{index, &cloud_, arrival, {}};
 }
 
-const PacedInput::Clock PacedInput::kOfTheHost{[] { return read_clock(CLOCK_MONOTONIC); },
+const PacedInput::Clock PacedInput::kHostClock{[] { return read_clock(CLOCK_MONOTONIC); },
                                                [](Duration time) { std::this_thread::sleep_for(time); }};
 
 void PacedInput::read_ahead() {
-  held_ = Held{recording_.next(Duration::zero()), {}};
-  held_->arrival = arrival_of(held_->input, last_arrival_);
-  if (!started_ || std::chrono::abs(held_->arrival - last_arrival_) > kMaxPause) {
-    anchor_arrival_ = held_->arrival;
+  pending_ = PendingInput{recording_.next(Duration::zero()), {}};
+  pending_->arrival = arrival_of(pending_->input, last_arrival_);
+  if (!started_ || std::chrono::abs(pending_->arrival - last_arrival_) > kMaxPause) {
+    anchor_arrival_ = pending_->arrival;
     anchor_clock_ = clock_.now();
     started_ = true;
   }
-  last_arrival_ = held_->arrival;
+  last_arrival_ = pending_->arrival;
 }
 
 Input PacedInput::next(Duration timeout) {
-  if (!held_)
+  if (!pending_)
     read_ahead();
-  const Duration due = anchor_clock_ + from_seconds(to_seconds(held_->arrival - anchor_arrival_) / speed_);
+  const Duration due = anchor_clock_ + from_seconds(to_seconds(pending_->arrival - anchor_arrival_) / speed_);
   const Duration remaining = due - clock_.now();
   if (remaining > Duration::zero())
     clock_.sleep_for(std::min(remaining, timeout));
   if (remaining > timeout) {
     const Duration since_anchor = clock_.now() - anchor_clock_;
-    return Silence{std::min(held_->arrival, anchor_arrival_ + from_seconds(speed_ * to_seconds(since_anchor)))};
+    return Silence{std::min(pending_->arrival, anchor_arrival_ + from_seconds(speed_ * to_seconds(since_anchor)))};
   }
-  Input input = held_->input;
-  held_.reset();
+  Input input = pending_->input;
+  pending_.reset();
   return input;
 }
 

@@ -51,7 +51,7 @@ struct CloudInput {
 
 /// Serialised sensor_msgs/PointCloud2 with encapsulation, on its way to the ingest.
 struct CloudBytes {
-  static constexpr std::size_t kMost = 64'000'000; ///< longer messages are rejected
+  static constexpr std::size_t kMaxBytes = 64'000'000; ///< longer messages are rejected
 
   Stamp arrival;
   bool too_large = false; ///< `bytes` is then empty
@@ -59,7 +59,7 @@ struct CloudBytes {
 };
 
 /// Health of a motion source as reported by an external monitor (health_topic).
-struct OutsideVerdict {
+struct ExternalHealth {
   SourceId source;
   bool healthy;
 };
@@ -73,7 +73,7 @@ struct Silence {
 struct EndOfInput {};
 
 /// Any input of the ingest.
-using Input = std::variant<Silence, Datagram, CloudInput, ImuInput, OdometryInput, OutsideVerdict, EndOfInput>;
+using Input = std::variant<Silence, Datagram, CloudInput, ImuInput, OdometryInput, ExternalHealth, EndOfInput>;
 
 /// Returns the arrival of an input; `otherwise` for inputs without one.
 inline Stamp arrival_of(const Input& input, Stamp otherwise) {
@@ -100,7 +100,7 @@ class InputSource {
   virtual Input next(Duration timeout) = 0;
 
   /// Updates the known lidars, so that the source can filter other senders. Called periodically.
-  virtual void expect(const LidarRouter& /*lidars*/) {}
+  virtual void update_filter(const LidarRouter& /*lidars*/) {}
 };
 
 /// Live input: datagrams from all sockets, and motion samples and clouds handed over by the DDS thread.
@@ -114,7 +114,7 @@ class InputSource {
 /// all sources preserves their order.
 class LiveInput : public InputSource {
  public:
-  using Motion = std::variant<ImuInput, OdometryInput, OutsideVerdict>;
+  using Motion = std::variant<ImuInput, OdometryInput, ExternalHealth>;
   static constexpr std::size_t kMaxUnread = 1024;
 
   /// Takes the lidar sockets; `gives_clouds` is true for each lidar, by index, that publishes clouds.
@@ -124,7 +124,7 @@ class LiveInput : public InputSource {
   LiveInput& operator=(const LiveInput&) = delete;
 
   Input next(Duration timeout) override;
-  void expect(const LidarRouter& lidars) override;
+  void update_filter(const LidarRouter& lidars) override;
 
   /// Producer: hands over a sample; drops and counts it if the ring is full.
   void push(const Motion& motion) noexcept;
@@ -161,21 +161,21 @@ class LiveInput : public InputSource {
     std::optional<std::size_t> socket{}, lidar{};
   };
 
-  [[nodiscard]] std::optional<Motion> take_motion();
-  bool look_for_clouds();
-  [[nodiscard]] Input give_cloud(std::size_t lidar, Stamp arrival);
+  [[nodiscard]] std::optional<Motion> pop_motion();
+  bool poll_clouds();
+  [[nodiscard]] Input pop_cloud(std::size_t lidar, Stamp arrival);
   [[nodiscard]] Earliest earliest();
-  [[nodiscard]] std::optional<Input> take(const Earliest& from);
+  [[nodiscard]] std::optional<Input> pop(const Earliest& from);
   Stamp receive(Duration timeout);
   [[nodiscard]] bool may_hold_earlier(Stamp arrival) const;
-  [[nodiscard]] Stamp in_order(Stamp arrival);
+  [[nodiscard]] Stamp monotonic(Stamp arrival);
 
   std::vector<UdpSocket> sockets_;
   std::vector<FloodGuard> guards_;                 ///< by socket
   std::vector<std::span<const Datagram>> waiting_; ///< by socket: received, not yet returned
   std::vector<Stamp> received_until_;              ///< by socket: datagrams still in it arrived later
-  std::vector<pollfd> poll_;                       ///< the sockets, then motion_is_there_
-  int motion_is_there_;                         ///< eventfd for motion and clouds, so that poll() waits for all inputs
+  std::vector<pollfd> poll_;                       ///< the sockets, then wakeup_
+  int wakeup_;                                  ///< eventfd for motion and clouds, so that poll() waits for all inputs
   std::vector<std::unique_ptr<Clouds>> clouds_; ///< by lidar; nullptr for one that sends packets
   CloudView cloud_;                             ///< cloud returned last
   SpscRing<Motion, kMaxUnread> motion_;
@@ -197,16 +197,16 @@ class PacedInput : public InputSource {
     Duration (*now)();
     void (*sleep_for)(Duration);
   };
-  static const Clock kOfTheHost;
+  static const Clock kHostClock;
 
   /// Takes a recording that outlives this and whose Silence inputs carry their time. Precondition: speed > 0.
-  PacedInput(InputSource& recording, double speed, Clock clock = kOfTheHost)
+  PacedInput(InputSource& recording, double speed, Clock clock = kHostClock)
       : recording_(recording), speed_(speed), clock_(clock) {}
 
   Input next(Duration timeout) override;
 
  private:
-  struct Held { ///< input read from the recording, not yet returned
+  struct PendingInput { ///< input read from the recording, not yet returned
     Input input;
     Stamp arrival;
   };
@@ -216,7 +216,7 @@ class PacedInput : public InputSource {
   InputSource& recording_;
   double speed_;
   Clock clock_;
-  std::optional<Held> held_;
+  std::optional<PendingInput> pending_;
   bool started_ = false;
   Stamp last_arrival_;
   Stamp anchor_arrival_;    ///< reference arrival

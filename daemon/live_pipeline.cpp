@@ -28,7 +28,7 @@ LivePipeline::LivePipeline(const Config& config, LidarRouter lidars, InputSource
             if (!health_events_.push(event))
               unfetched_.fetch_add(1, std::memory_order_relaxed);
           }),
-      processor_(config, options_.start, options_.recalled), flat_ground_(config.odometry.flat_ground),
+      processor_(config, options_.start, options_.calibration), flat_ground_(config.odometry.flat_ground),
       ingest_thread_([this] { run_ingest(); }), odometry_thread_([this] { run_odometry(); }) {
   pthread_setname_np(ingest_thread_.native_handle(), "ingest");
   pthread_setname_np(odometry_thread_.native_handle(), "odometry");
@@ -48,35 +48,35 @@ void LivePipeline::run_ingest() {
   while (more && !stopping_.load(std::memory_order_relaxed)) {
     ingest_progress_.fetch_add(1, std::memory_order_relaxed);
     const Input input = input_.next(kMaxSilence);
-    ingest_.take(input);
-    carry_forward(input);
-    report();
+    ingest_.process(input);
+    publish_fast_sample(input);
+    publish_report();
     more = !std::holds_alternative<EndOfInput>(input);
   }
   ingest_ended_.store(true, std::memory_order_release);
-  sweep_is_there_.notify();
+  sweep_ready_.notify();
 }
 
-void LivePipeline::carry_forward(const Input& input) {
-  while (const std::optional<FastSample> anchor = anchors_.pop())
-    fast_odometry_.take(*anchor);
+void LivePipeline::publish_fast_sample(const Input& input) {
+  while (const std::optional<FastSample> estimate = estimates_to_propagate_.pop())
+    fast_odometry_.set_estimate(*estimate);
   std::optional<FastSample> sample;
   if (const auto* imu = std::get_if<ImuInput>(&input))
-    sample = fast_odometry_.carry(ingest_.sources(), imu->source, imu->sample.arrival);
+    sample = fast_odometry_.predict(ingest_.sources(), imu->source, imu->sample.arrival);
   else if (const auto* odometry = std::get_if<OdometryInput>(&input))
-    sample = fast_odometry_.carry(ingest_.sources(), odometry->source, odometry->sample.arrival);
+    sample = fast_odometry_.predict(ingest_.sources(), odometry->source, odometry->sample.arrival);
   if (!sample)
     return;
   static_cast<void>(fast_samples_.push(*sample)); // dropped if not fetched
-  estimate_is_there_.notify();
+  estimate_ready_.notify();
 }
 
-void LivePipeline::report() {
+void LivePipeline::publish_report() {
   const Duration now = read_clock(CLOCK_MONOTONIC_COARSE);
   if (now - reported_ < kMaxSleep)
     return;
   reported_ = now;
-  input_.expect(ingest_.lidars());
+  input_.update_filter(ingest_.lidars());
   reports_.back().read(ingest_);
   static_cast<void>(reports_.publish());
 }
@@ -90,55 +90,56 @@ void LivePipeline::hand_over(Sweep& sweep, const SweepCut& cut) {
   sweep.points = std::move(spare); // NOLINT(bugprone-use-after-move): the one member that was moved away
   seen_.fetch_add(1, std::memory_order_relaxed);
   while (const std::optional<RegistrationFeedback> feedback = feedback_.pop())
-    ingest_.take(*feedback);
+    ingest_.apply(*feedback);
   if (newest_sweep_.publish())
     dropped_.fetch_add(1, std::memory_order_relaxed);
   else
-    sweep_is_there_.notify();
+    sweep_ready_.notify();
 }
 
 void LivePipeline::run_odometry() {
   options_.on_thread_start();
   FlatGround flat_ground = flat_ground_.load(std::memory_order_relaxed);
-  for (bool last_look = false; !last_look;) {
+  for (bool is_last = false; !is_last;) {
     odometry_progress_.fetch_add(1, std::memory_order_relaxed);
     if (const FlatGround wanted = flat_ground_.load(std::memory_order_relaxed); wanted != flat_ground)
       processor_.set_flat_ground(flat_ground = wanted);
-    last_look = ingest_ended_.load(std::memory_order_acquire);
-    if (const CutSweep* taken = newest_sweep_.take())
-      process(*taken);
-    else if (!last_look)
-      sweep_is_there_.wait_for(kMaxSleep);
+    is_last = ingest_ended_.load(std::memory_order_acquire);
+    if (const CutSweep* cut_sweep = newest_sweep_.poll())
+      process(*cut_sweep);
+    else if (!is_last)
+      sweep_ready_.wait_for(kMaxSleep);
   }
   odometry_ended_.store(true, std::memory_order_release);
-  estimate_is_there_.notify();
+  estimate_ready_.notify();
 }
 
-void LivePipeline::process(const CutSweep& taken) {
-  const Duration period = from_seconds(to_seconds(taken.sweep.end - taken.sweep.start) / options_.speed);
-  const Duration deadline = taken.cut.began.wall + period;
-  const ProcessedSweep done = processor_.process(taken.sweep, taken.cut, [this, deadline] {
+void LivePipeline::process(const CutSweep& cut_sweep) {
+  const Duration period = from_seconds(to_seconds(cut_sweep.sweep.end - cut_sweep.sweep.start) / options_.speed);
+  const Duration deadline = cut_sweep.cut.began.wall + period;
+  const ProcessedSweep done = processor_.process(cut_sweep.sweep, cut_sweep.cut, [this, deadline] {
     return stopping_.load(std::memory_order_relaxed) || read_clock(CLOCK_MONOTONIC) > deadline;
   });
   // Never full: one entry per sweep handed over, and the ingest empties the ring when it hands over the next.
   static_cast<void>(feedback_.push(processor_.odometry().feedback()));
   const OdometryEstimate& estimate = done.estimate;
-  static_cast<void>(anchors_.push({estimate.stamp, estimate.T_odom_base, estimate.pose_covariance, estimate.twist_base,
-                                   estimate.twist_covariance})); // never full: emptied with every input
+  static_cast<void>(
+      estimates_to_propagate_.push({estimate.stamp, estimate.T_odom_base, estimate.pose_covariance, estimate.twist_base,
+                                    estimate.twist_covariance})); // never full: emptied with every input
   if (!estimates_.push(done))
     unfetched_.fetch_add(1, std::memory_order_relaxed);
   (estimate.failed ? failed_ : processed_).fetch_add(1, std::memory_order_release); // after everything was handed over
-  estimate_is_there_.notify();
+  estimate_ready_.notify();
   processor_.prepare_next();
   if (options_.after_estimate)
-    options_.after_estimate(taken.sweep, processor_.odometry(), estimate);
+    options_.after_estimate(cut_sweep.sweep, processor_.odometry(), estimate);
 }
 
 std::optional<ProcessedSweep> LivePipeline::next(Duration timeout) {
   std::optional<ProcessedSweep> done = estimates_.pop();
   if (done)
     return done;
-  estimate_is_there_.wait_for(timeout);
+  estimate_ready_.wait_for(timeout);
   return estimates_.pop();
 }
 

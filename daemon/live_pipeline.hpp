@@ -24,7 +24,7 @@ namespace locus::daemon {
 struct LiveOptions {
   double speed = 1.0;                ///< rate of the input stamps relative to real time; 1 for live input
   std::optional<StartPoint> start{}; ///< empty: level at the origin
-  Recalled recalled{};
+  EarlierCalibration calibration{};
   std::function<void()> on_thread_start = [] {}; ///< called in each thread, e.g. to set its priority
   /// Called in the odometry thread after the estimate was handed over, for clouds, maps and the saved state.
   std::function<void(const Sweep&, const Odometry&, const OdometryEstimate&)> after_estimate{};
@@ -56,7 +56,7 @@ class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it avo
   std::optional<FastSample> next_fast() { return fast_samples_.pop(); }
 
   /// Consumer: returns the ingest's counters, ten times a second; nullptr if there is no new report.
-  const IngestReport* next_report() { return reports_.take(); }
+  const IngestReport* next_report() { return reports_.poll(); }
 
   /// Consumer: returns the next change of health of a motion source.
   std::optional<HealthEvent> next_health_event() { return health_events_.pop(); }
@@ -99,10 +99,10 @@ class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it avo
 
   void run_ingest();
   void run_odometry();
-  void carry_forward(const Input& input);
-  void report();
+  void publish_fast_sample(const Input& input);
+  void publish_report();
   void hand_over(Sweep& sweep, const SweepCut& cut);
-  void process(const CutSweep& taken);
+  void process(const CutSweep& cut_sweep);
 
   InputSource& input_;
   LiveOptions options_;
@@ -111,16 +111,16 @@ class LivePipeline { // NOLINT(clang-analyzer-optin.performance.Padding): it avo
   SweepProcessor processor_;
 
   LatestSlot<CutSweep> newest_sweep_;
-  Wakeup sweep_is_there_;
+  Wakeup sweep_ready_;
   SpscRing<ProcessedSweep, kMaxUnfetched> estimates_;
   SpscRing<HealthEvent, kMaxUnfetched> health_events_; ///< ingest -> consumer
   SpscRing<RegistrationFeedback, 4> feedback_;         ///< odometry -> ingest
-  SpscRing<FastSample, 4> anchors_;                    ///< odometry -> ingest: estimates to propagate
+  SpscRing<FastSample, 4> estimates_to_propagate_;     ///< odometry -> ingest: estimates to propagate
   FastOdometry fast_odometry_;                         ///< owned by the ingest
   SpscRing<FastSample, kMaxUnfetched> fast_samples_;   ///< ingest -> consumer
   LatestSlot<IngestReport> reports_;                   ///< ingest -> consumer
   Duration reported_{};                                ///< owned by the ingest
-  Wakeup estimate_is_there_;
+  Wakeup estimate_ready_;
 
   Counter seen_{0}, dropped_{0};     ///< written by ingest
   Counter processed_{0}, failed_{0}; ///< written by odometry

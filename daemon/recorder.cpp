@@ -39,8 +39,8 @@ std::uint64_t bytes_on_disk(const path& folder) {
   return blocks * kBlockBytes;
 }
 
-std::string cannot(const char* what, const path& where, const std::error_code& error) {
-  return fmt::format("{}: {} ({}); let locusd write there, see RECORDING and INCIDENTS in locusd(8)", where.string(),
+std::string disk_failure_text(const char* what, const path& file, const std::error_code& error) {
+  return fmt::format("{}: {} ({}); let locusd write there, see RECORDING and INCIDENTS in locusd(8)", file.string(),
                      what, error.message());
 }
 
@@ -57,20 +57,20 @@ std::optional<std::string> CaptureRing::obstacle() const {
   while (!std::filesystem::exists(there, error) && there.has_relative_path())
     there = there.parent_path();
   if (!std::filesystem::is_directory(there, error))
-    return cannot("cannot be made", folder_, std::make_error_code(std::errc::not_a_directory));
+    return disk_failure_text("cannot be made", folder_, std::make_error_code(std::errc::not_a_directory));
   if (faccessat(AT_FDCWD, there.c_str(), W_OK, AT_EACCESS) != 0)
-    return cannot("cannot be written to", there, {errno, std::generic_category()});
+    return disk_failure_text("cannot be written to", there, {errno, std::generic_category()});
   return std::nullopt;
 }
 
 /// Lists the pieces on the disk.
-std::optional<std::string> CaptureRing::look() {
+std::optional<std::string> CaptureRing::scan_folder() {
   pieces_.clear();
   bytes_ = 0;
   std::error_code error;
   std::filesystem::create_directories(folder_, error);
   if (error)
-    return cannot("cannot be made", folder_, error);
+    return disk_failure_text("cannot be made", folder_, error);
   for (const path& run : runs_in(folder_)) {
     last_run_ = number_of(run);
     for (const path& piece : pieces_in(run)) {
@@ -78,7 +78,7 @@ std::optional<std::string> CaptureRing::look() {
       bytes_ += pieces_.back().bytes;
     }
   }
-  looked_ = true;
+  is_scanned_ = true;
   return std::nullopt;
 }
 
@@ -91,7 +91,7 @@ std::optional<std::string> CaptureRing::make_room() {
     std::error_code error;
     const std::uint64_t free = std::filesystem::space(folder_, error).available;
     if (error)
-      return cannot("cannot be looked at", folder_, error);
+      return disk_failure_text("cannot be looked at", folder_, error);
     if (bytes_ + piece <= max_bytes_ && free >= 2 * piece)
       return std::nullopt;
     if (free + bytes_ < 2 * piece)
@@ -107,7 +107,7 @@ std::optional<std::string> CaptureRing::remove_oldest() {
   std::error_code error;
   std::filesystem::remove_all(oldest.folder, error);
   if (error)
-    return cannot("cannot be removed", oldest.folder, error);
+    return disk_failure_text("cannot be removed", oldest.folder, error);
   std::filesystem::remove(oldest.folder.parent_path(), error); // fails unless the run is empty
   bytes_ -= oldest.bytes;
   pieces_.pop_front();
@@ -116,10 +116,10 @@ std::optional<std::string> CaptureRing::remove_oldest() {
 
 /// Rereads the disk after a failure, since the folder may have been removed.
 Expected<path, std::string> CaptureRing::begin_piece(Stamp now) {
-  if (auto problem = looked_ ? std::nullopt : look())
+  if (auto problem = is_scanned_ ? std::nullopt : scan_folder())
     return *problem;
   auto piece = make_piece(now);
-  looked_ = piece.has_value();
+  is_scanned_ = piece.has_value();
   return piece;
 }
 
@@ -135,7 +135,7 @@ Expected<path, std::string> CaptureRing::make_piece(Stamp now) {
   std::error_code error;
   const bool is_new = std::filesystem::create_directories(piece_, error);
   if (error)
-    return cannot("cannot be made", piece_, error);
+    return disk_failure_text("cannot be made", piece_, error);
   if (!is_new)
     return fmt::format("{}: is there already; give each locusd folders of its own", piece_.string());
   return piece_;
@@ -165,21 +165,21 @@ namespace {
 /// File buffer: holds the samples of one round of the recorder, so that they are written at once.
 constexpr std::size_t kBufferBytes = 1 << 16;
 
-bool is_sensible(Stamp stamp) { return stamp > kEarliestStamp && stamp < kLatestStamp; }
+bool is_storable(Stamp stamp) { return stamp > kEarliestStamp && stamp < kLatestStamp; }
 
-std::string cannot_be_written(const std::filesystem::path& file) {
+std::string write_failure_text(const std::filesystem::path& file) {
   return fmt::format("{}: cannot be written ({}); check permissions and free space", file.string(),
                      std::generic_category().message(errno));
 }
 
 /// Copies the metadata without which an Ouster's packets cannot be decoded; skipped if the original no longer exists.
-std::optional<std::string> keep_metadata(const LidarOptions& lidar, const path& folder) {
+std::optional<std::string> copy_metadata(const LidarOptions& lidar, const path& folder) {
   std::error_code error;
   if (!lidar.is_ouster() || !std::filesystem::exists(lidar.metadata, error))
     return std::nullopt;
   const path copy = folder / metadata_file(lidar.name);
   std::filesystem::copy_file(lidar.metadata, copy, std::filesystem::copy_options::overwrite_existing, error);
-  return error ? std::optional{cannot("cannot be written", copy, error)} : std::nullopt;
+  return error ? std::optional{disk_failure_text("cannot be written", copy, error)} : std::nullopt;
 }
 
 } // namespace
@@ -188,8 +188,8 @@ std::vector<std::optional<std::string>> sample_files(const Config& config) {
   std::vector<std::optional<std::string>> files;
   bool has_imu = false;
   for (const MotionSource& source : config.motion_sources) {
-    const bool would_be_anothers = source.kind == SourceKind::odometry && (source.name == "gt" || source.name == "imu");
-    if (would_be_anothers || source.of_lidar) // samples in a lidar's packets are recorded with them
+    const bool is_reserved_name = source.kind == SourceKind::odometry && (source.name == "gt" || source.name == "imu");
+    if (is_reserved_name || source.of_lidar) // samples in a lidar's packets are recorded with them
       files.emplace_back(std::nullopt);
     else if (source.kind == SourceKind::odometry)
       files.emplace_back(source.name + ".tum");
@@ -206,7 +206,7 @@ Expected<PieceWriter, std::string> PieceWriter::open(const std::filesystem::path
   PieceWriter writer(std::move(*pcap), folder, config);
   writer.append(writer.config_, print_config(config));
   for (const LidarOptions& lidar : config.lidars)
-    if (auto problem = keep_metadata(lidar, folder))
+    if (auto problem = copy_metadata(lidar, folder))
       return *problem;
   if (auto problem = writer.flush(false))
     return *problem;
@@ -237,7 +237,7 @@ bool PieceWriter::write(const OdometryInput& input) {
 
 bool PieceWriter::write(SourceId source, Stamp stamp, Stamp arrival, double covariance_scale, const std::string& line) {
   SourceFiles& files = sources_[index_of(source)];
-  if (files.samples.path.empty() || !is_sensible(stamp) || !is_sensible(arrival))
+  if (files.samples.path.empty() || !is_storable(stamp) || !is_storable(arrival))
     return false;
   append(files.samples, line);
   append(files.meta, fmt::format("{},{},{}\n", to_ns(stamp), to_ns(arrival), covariance_scale));
@@ -250,10 +250,10 @@ void PieceWriter::append(TextFile& file, const std::string& text) {
     if (file.file)
       std::setvbuf(file.file.get(), nullptr, _IOFBF, kBufferBytes);
     else
-      problem_ = cannot_be_written(file.path);
+      problem_ = write_failure_text(file.path);
   }
   if (file.file && std::fwrite(text.data(), 1, text.size(), file.file.get()) != text.size() && !problem_)
-    problem_ = cannot_be_written(file.path);
+    problem_ = write_failure_text(file.path);
   text_bytes_ += text.size();
 }
 
@@ -262,12 +262,12 @@ std::optional<std::string> PieceWriter::flush(bool to_disk) {
   const auto flush_text = [&](TextFile& file) {
     if (file.file && !problem_ &&
         (std::fflush(file.file.get()) != 0 || (to_disk && fdatasync(fileno(file.file.get())) != 0)))
-      problem_ = cannot_be_written(file.path);
+      problem_ = write_failure_text(file.path);
   };
   if (!problem_)
     problem_ = pcap_.flush();
   if (to_disk && !problem_ && fdatasync(pcap_.descriptor()) != 0)
-    problem_ = cannot_be_written(config_.path.parent_path() / "lidar.pcap");
+    problem_ = write_failure_text(config_.path.parent_path() / "lidar.pcap");
   flush_text(config_);
   for (SourceFiles& source : sources_) {
     flush_text(source.samples);
@@ -278,43 +278,43 @@ std::optional<std::string> PieceWriter::flush(bool to_disk) {
 
 namespace {
 
-constexpr Duration kToDiskEvery = std::chrono::seconds{5};
-constexpr Duration kTryAgainAfter = std::chrono::seconds{10};
+constexpr Duration kSyncPeriod = std::chrono::seconds{5};
+constexpr Duration kRetryDelay = std::chrono::seconds{10};
 
 } // namespace
 
 Recorder::Recorder(const std::filesystem::path& folder, Config config, RecordingBounds bounds)
-    : config_(std::move(config)), disk_(folder, bounds.max_bytes, bounds.keep), piece_for_(bounds.piece) {
+    : config_(std::move(config)), disk_(folder, bounds.max_bytes, bounds.keep), piece_duration_(bounds.piece) {
   const auto files = sample_files(config_);
   for (std::size_t i = 0; i < files.size(); ++i)
     has_file_[i] = files[i].has_value();
 }
 
-void Recorder::take(const Input& input) noexcept {
-  bool taken = true;
+void Recorder::record(const Input& input) noexcept {
+  bool queued = true;
   if (const auto* datagram = std::get_if<Datagram>(&input)) {
-    taken = store(*datagram);
+    queued = push(*datagram);
   } else if (const auto* imu = std::get_if<ImuInput>(&input); imu != nullptr && has_file_[index_of(imu->source)]) {
-    taken = waiting_->push(*imu);
+    queued = queue_->push(*imu);
   } else if (const auto* odometry = std::get_if<OdometryInput>(&input);
              odometry != nullptr && has_file_[index_of(odometry->source)]) {
-    taken = waiting_->push(*odometry);
+    queued = queue_->push(*odometry);
   }
-  if (!taken)
+  if (!queued)
     overflowed_.fetch_add(1, std::memory_order_relaxed);
 }
 
 /// Queues all parts of a datagram, or none.
-bool Recorder::store(const Datagram& datagram) noexcept {
+bool Recorder::push(const Datagram& datagram) noexcept {
   constexpr std::size_t kMost = DatagramPart::kMaxBytes;
   std::span<const std::byte> rest = datagram.payload;
-  if (waiting_->free_places() < std::max<std::size_t>(1, (rest.size() + kMost - 1) / kMost))
+  if (queue_->free_slots() < std::max<std::size_t>(1, (rest.size() + kMost - 1) / kMost))
     return false;
   do {
     DatagramPart part{datagram, std::min(rest.size(), kMost), rest.size() <= kMost};
     std::copy_n(rest.begin(), part.bytes, part.payload.begin());
     rest = rest.subspan(part.bytes);
-    if (!waiting_->push(part))
+    if (!queue_->push(part))
       return false;
   } while (!rest.empty());
   return true;
@@ -330,17 +330,17 @@ Recorder::Status Recorder::status() const {
 /// Writes at most one ring capacity of inputs; later ones wait for the next round.
 void Recorder::write(bool last_round) {
   is_last_round_ = last_round;
-  if (!std::exchange(has_begun_, true))
+  if (!std::exchange(is_started_, true))
     problem_ = disk_.obstacle().value_or(""); // reported before an input is lost
   for (std::size_t written = 0; written < kMaxUnwritten; ++written) {
-    const std::optional<Entry> entry = waiting_->pop();
+    const std::optional<Entry> entry = queue_->pop();
     if (!entry)
       break;
     write(*entry);
   }
   if (piece_)
-    flush(read_clock(CLOCK_MONOTONIC) - synced_ > kToDiskEvery);
-  tell();
+    flush(read_clock(CLOCK_MONOTONIC) - synced_ > kSyncPeriod);
+  update_status();
 }
 
 /// Writes an entry; parts of a datagram are collected until its last one.
@@ -357,7 +357,7 @@ void Recorder::write(const Entry& entry) {
     return;
   }
   ++(write_to_piece(entry) ? unflushed_ : unfit_);
-  if (piece_->bytes() >= disk_.piece_bytes() || read_clock(CLOCK_MONOTONIC) - piece_began_ >= piece_for_)
+  if (piece_->bytes() >= disk_.piece_bytes() || read_clock(CLOCK_MONOTONIC) - piece_began_ >= piece_duration_)
     end_piece();
 }
 
@@ -381,11 +381,11 @@ std::vector<std::filesystem::path> Recorder::end_pieces(Duration keep) {
 }
 
 bool Recorder::begin_piece(Stamp now) {
-  if (read_clock(CLOCK_MONOTONIC) < try_again_)
+  if (read_clock(CLOCK_MONOTONIC) < retry_at_)
     return false;
   const auto fail = [this](const std::string& problem) {
     problem_ = problem;
-    try_again_ = read_clock(CLOCK_MONOTONIC) + kTryAgainAfter;
+    retry_at_ = read_clock(CLOCK_MONOTONIC) + kRetryDelay;
     return false;
   };
   const auto folder = disk_.begin_piece(now);
@@ -423,7 +423,7 @@ void Recorder::flush(bool to_disk) {
     return;
   }
   dropped_ += inputs;
-  try_again_ = read_clock(CLOCK_MONOTONIC) + kTryAgainAfter;
+  retry_at_ = read_clock(CLOCK_MONOTONIC) + kRetryDelay;
   piece_.reset();
   if (flushed_ > 0)
     disk_.end_piece();
@@ -431,7 +431,7 @@ void Recorder::flush(bool to_disk) {
     disk_.discard_piece();
 }
 
-void Recorder::tell() {
+void Recorder::update_status() {
   const std::scoped_lock lock(status_mutex_);
   status_.run = disk_.run();
   status_.bytes = disk_.bytes() + (piece_ ? piece_->bytes() : 0);

@@ -72,7 +72,7 @@ class CaptureRing {
     Duration ended; ///< CLOCK_MONOTONIC; time of discovery for a piece of an earlier run
   };
 
-  std::optional<std::string> look();
+  std::optional<std::string> scan_folder();
   std::optional<std::string> make_room();
   Expected<std::filesystem::path, std::string> make_piece(Stamp now);
   std::optional<std::string> remove_oldest();
@@ -80,7 +80,7 @@ class CaptureRing {
   std::filesystem::path folder_;
   std::uint64_t max_bytes_;
   Duration keep_;
-  bool looked_ = false;
+  bool is_scanned_ = false;
   std::deque<Piece> pieces_; ///< oldest first
   std::uint64_t bytes_ = 0;  ///< total size of pieces_
   int last_run_ = 0;
@@ -157,7 +157,7 @@ class Recorder {
   Recorder(const std::filesystem::path& folder, Config config, RecordingBounds bounds);
 
   /// Producer: records datagrams and motion samples, ignores other inputs. Takes no lock, allocates nothing.
-  void take(const Input& input) noexcept;
+  void record(const Input& input) noexcept;
 
   /// Disk thread, periodically: writes the queued inputs. The last round flushes to the system without waiting for the
   /// disk.
@@ -182,30 +182,30 @@ class Recorder {
   };
   using Entry = std::variant<ImuInput, OdometryInput, DatagramPart>;
 
-  [[nodiscard]] bool store(const Datagram& datagram) noexcept;
+  [[nodiscard]] bool push(const Datagram& datagram) noexcept;
   void write(const Entry& entry);
   [[nodiscard]] bool write_to_piece(const Entry& entry);
   bool begin_piece(Stamp now);
   void end_piece();
   void flush(bool to_disk);
-  void tell();
+  void update_status();
 
   Config config_;
   std::bitset<kMaxSources> has_file_; ///< by source index
-  using Waiting = SpscRing<Entry, kMaxUnwritten>;
-  std::unique_ptr<Waiting> waiting_ = std::make_unique<Waiting>(); ///< on the heap: larger than a stack
-  std::atomic<std::uint64_t> overflowed_{0};                       ///< inputs dropped because the ring was full
+  using Queue = SpscRing<Entry, kMaxUnwritten>;
+  std::unique_ptr<Queue> queue_ = std::make_unique<Queue>(); ///< on the heap: larger than a stack
+  std::atomic<std::uint64_t> overflowed_{0};                 ///< inputs dropped because the ring was full
 
-  CaptureRing disk_;                   ///< this and the following are owned by the disk thread
-  Duration piece_for_, piece_began_{}; ///< longest duration of a piece; start of this one, CLOCK_MONOTONIC
-  bool has_begun_ = false, is_last_round_ = false;
+  CaptureRing disk_;                        ///< this and the following are owned by the disk thread
+  Duration piece_duration_, piece_began_{}; ///< longest duration of a piece; start of this one, CLOCK_MONOTONIC
+  bool is_started_ = false, is_last_round_ = false;
   std::optional<PieceWriter> piece_;
   std::vector<std::byte> parts_; ///< parts of a datagram received so far
   std::uint64_t unflushed_ = 0;  ///< inputs written to the piece, not yet flushed
   std::uint64_t flushed_ = 0;    ///< inputs flushed to the piece
   std::uint64_t recorded_ = 0, dropped_ = 0, unfit_ = 0;
   std::string problem_;
-  Duration try_again_{}, synced_{}; ///< CLOCK_MONOTONIC
+  Duration retry_at_{}, synced_{}; ///< CLOCK_MONOTONIC
 
   mutable std::mutex status_mutex_; ///< never locked by the producer
   Status status_;
@@ -219,10 +219,10 @@ class RecordingInput : public InputSource {
 
   Input next(Duration timeout) override {
     Input input = source_.next(timeout);
-    recorder_.take(input);
+    recorder_.record(input);
     return input;
   }
-  void expect(const LidarRouter& lidars) override { source_.expect(lidars); }
+  void update_filter(const LidarRouter& lidars) override { source_.update_filter(lidars); }
 
  private:
   InputSource& source_;

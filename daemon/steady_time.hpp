@@ -12,36 +12,36 @@ namespace locus::daemon {
 
 /// Monotonic time on the wall-clock epoch of start-up (CLOCK_BOOTTIME + constant). Unaffected by clock steps such as
 /// the first NTP fix, which may come minutes after boot and amount to days. Used internally for all measurements;
-/// outputs are converted to wall time. One owner, except for wall() and set_by().
+/// outputs are converted to wall time. One owner, except for to_wall() and steps().
 class SteadyTime {
  public:
   /// Longest transit of a stamp: from the clock that made it to here, on a machine that is busy.
-  static constexpr Duration kOnItsWay = std::chrono::seconds{2};
+  static constexpr Duration kMaxTransit = std::chrono::seconds{2};
 
   using Clock = Duration (*)(clockid_t); ///< read_clock(), replaceable in tests
   explicit SteadyTime(Clock clock = [](clockid_t id) { return read_clock(id); });
 
   /// Detects a step of the wall clock. To be called after stamps are obtained and before they are converted.
-  void look();
+  void detect_step();
 
   /// Converts a recent wall-clock stamp, made before or after the last step.
-  [[nodiscard]] Stamp steady(Stamp wall) const;
+  [[nodiscard]] Stamp to_steady(Stamp wall) const;
 
   /// State of a publisher that stamps its own samples: with this host's clock, or with an independent clock that a step
   /// does not affect.
   struct Sender {
-    Duration shift{};  ///< correction subtracted from its stamps
-    Duration lag{};    ///< arrival minus converted stamp of its last sample
-    Duration set_by{}; ///< total clock steps accounted for in `shift`
+    Duration shift{}; ///< correction subtracted from its stamps
+    Duration lag{};   ///< arrival minus converted stamp of its last sample
+    Duration steps{}; ///< total clock steps accounted for in `shift`
   };
   /// Converts the stamp of a sample that arrived at `arrival`. The lag identifies the clock: a step leaves it unchanged
   /// if it is attributed to the right clock.
-  [[nodiscard]] Stamp steady(Stamp stamp, Stamp arrival, Sender& sender) const;
+  [[nodiscard]] Stamp to_steady(Stamp stamp, Stamp arrival, Sender& sender) const;
 
   /// Converts steady time to the current wall clock. Any thread.
-  [[nodiscard]] Stamp wall(Stamp steady) const { return steady + set_by(); }
+  [[nodiscard]] Stamp to_wall(Stamp steady) const { return steady + steps(); }
   /// Returns the sum of all wall-clock steps since the start. Any thread.
-  [[nodiscard]] Duration set_by() const { return Duration{set_by_ns_.load(std::memory_order_relaxed)}; }
+  [[nodiscard]] Duration steps() const { return Duration{steps_ns_.load(std::memory_order_relaxed)}; }
 
  private:
   struct Offset {
@@ -51,10 +51,10 @@ class SteadyTime {
   [[nodiscard]] Stamp now() const;
 
   Clock clock_;
-  Duration offset_;                     ///< CLOCK_REALTIME - CLOCK_BOOTTIME
-  Duration set_by_{}, set_by_before_{}; ///< sum of all steps since the start, including and excluding the last
-  Stamp set_at_;                        ///< detection of the last step, steady time
-  std::atomic<std::int64_t> set_by_ns_{0};
+  Duration offset_;                        ///< CLOCK_REALTIME - CLOCK_BOOTTIME
+  Duration steps_{}, steps_before_last_{}; ///< sum of all steps since the start, including and excluding the last
+  Stamp stepped_at_;                       ///< detection of the last step, steady time
+  std::atomic<std::int64_t> steps_ns_{0};
 };
 
 } // namespace locus::daemon

@@ -32,7 +32,7 @@ struct StartPoint {
 };
 
 /// Calibration of the motion sources from an earlier run, see Odometry::recall().
-struct Recalled {
+struct EarlierCalibration {
   LearnedSources learned{};
   double elapsed_s = 0.0;
 };
@@ -51,9 +51,9 @@ struct ProcessedSweep {
 class SweepProcessor {
  public:
   explicit SweepProcessor(const Config& config, const std::optional<StartPoint>& start = {},
-                          const Recalled& recalled = {})
+                          const EarlierCalibration& calibration = {})
       : odometry_(config.odometry, config.source_options(), &stages_) {
-    odometry_.recall(recalled.learned, recalled.elapsed_s);
+    odometry_.recall(calibration.learned, calibration.elapsed_s);
     if (start)
       odometry_.begin_at(start->last, start->map_odom);
   }

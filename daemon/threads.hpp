@@ -28,7 +28,7 @@ inline constexpr std::size_t kCacheLineBytes = 64;
 /// by a release store of its count after its last access, and the other acquires it by an acquire load of that count
 /// before its first access. Each side may read its own count relaxed. 64 bits do not wrap.
 template <class T, std::size_t N> class SpscRing {
-  static_assert(std::has_single_bit(N), "a power of two, so that a place is a mask away");
+  static_assert(std::has_single_bit(N), "a power of two, so that an index is a mask away");
 
  public:
   /// Producer: appends a value; false if the ring is full. The value is then lost, and the caller counts it.
@@ -36,13 +36,13 @@ template <class T, std::size_t N> class SpscRing {
     const std::uint64_t pushed = pushed_.load(std::memory_order_relaxed);
     if (pushed - popped_.load(std::memory_order_acquire) == N)
       return false;
-    places_[pushed % N] = value;
+    slots_[pushed % N] = value;
     pushed_.store(pushed + 1, std::memory_order_release);
     return true;
   }
 
   /// Producer: returns the least number of values that push() will accept.
-  [[nodiscard]] std::size_t free_places() const noexcept {
+  [[nodiscard]] std::size_t free_slots() const noexcept {
     return N -
            static_cast<std::size_t>(pushed_.load(std::memory_order_relaxed) - popped_.load(std::memory_order_acquire));
   }
@@ -52,7 +52,7 @@ template <class T, std::size_t N> class SpscRing {
     const std::uint64_t popped = popped_.load(std::memory_order_relaxed);
     if (pushed_.load(std::memory_order_acquire) == popped)
       return std::nullopt;
-    std::optional<T> value{places_[popped % N]};
+    std::optional<T> value{slots_[popped % N]};
     popped_.store(popped + 1, std::memory_order_release);
     return value;
   }
@@ -67,12 +67,12 @@ template <class T, std::size_t N> class SpscRing {
 
   alignas(kCacheLineBytes) std::atomic<std::uint64_t> pushed_{0};
   alignas(kCacheLineBytes) std::atomic<std::uint64_t> popped_{0};
-  alignas(kCacheLineBytes) std::array<T, N> places_{};
+  alignas(kCacheLineBytes) std::array<T, N> slots_{};
 };
 
 /// Mailbox between one producer and one consumer that holds only the newest value. Wait-free, never allocates.
 ///
-/// Triple buffer: one being filled, one being read, one in the middle; publish() and take() swap theirs with the
+/// Triple buffer: one being filled, one being read, one in the middle; publish() and poll() swap theirs with the
 /// middle.
 ///
 /// Correctness: the indices back_, middle_ and front_ are a permutation of 0, 1, 2, changed only by an atomic exchange
@@ -80,7 +80,7 @@ template <class T, std::size_t N> class SpscRing {
 /// without a loop. Each exchange
 /// - releases: accesses by this side to the buffer it hands over happen before those of the other side;
 /// - acquires: the buffer it receives is visible as the other side left it.
-/// The load before the exchange in take() may be relaxed: only take() clears kFresh, so a set flag stays set, and the
+/// The load before the exchange in poll() may be relaxed: only poll() clears kFresh, so a set flag stays set, and the
 /// exchange that follows provides the ordering. Exchanges of one atomic have a single total order, so the consumer
 /// never receives an older value after a newer one.
 template <class T> class LatestSlot {
@@ -97,7 +97,7 @@ template <class T> class LatestSlot {
   }
 
   /// Consumer: returns the newest value, or nullptr if there is none since the last call; valid until the next call.
-  [[nodiscard]] T* take() noexcept {
+  [[nodiscard]] T* poll() noexcept {
     if ((middle_.load(std::memory_order_relaxed) & kFresh) == 0)
       return nullptr;
     front_ = middle_.exchange(front_, std::memory_order_acq_rel) & kIndex;

@@ -197,7 +197,7 @@ void RosLink::receive(Session& session) {
   for (auto& from : session.health_topics)
     from.reader.take([&](const ros::Bool& message, dds_instance_handle_t writer) {
       if (from.admission.admits(writer, now))
-        sink_(OutsideVerdict{from.source, message.data_});
+        sink_(ExternalHealth{from.source, message.data_});
     });
   if (auto& from = session.flat_ground)
     from->reader.take([&](const ros::Bool& message, dds_instance_handle_t writer) {

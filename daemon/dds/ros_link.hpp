@@ -28,7 +28,7 @@ struct FlatGroundWord {
 };
 
 /// Any input over DDS except clouds.
-using RosInput = std::variant<ImuInput, OdometryInput, OutsideVerdict, FlatGroundWord>;
+using RosInput = std::variant<ImuInput, OdometryInput, ExternalHealth, FlatGroundWord>;
 
 /// Receives a cloud of the lidar with this index.
 using RosCloudSink = std::function<void(std::uint8_t lidar, Stamp arrival, const SerialisedSample& cloud)>;

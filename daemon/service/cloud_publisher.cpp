@@ -44,9 +44,9 @@ void CloudPublisher::take(const Sweep& sweep, const Odometry& odometry, const Od
 }
 
 void CloudPublisher::publish() {
-  if (const Cloud* sweep = sweep_.take())
+  if (const Cloud* sweep = sweep_.poll())
     link_.publish_cloud(sweep->points, sweep->stamp);
-  if (const Cloud* map = map_.take())
+  if (const Cloud* map = map_.poll())
     link_.publish_map(map->points, map->stamp);
 }
 

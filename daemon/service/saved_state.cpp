@@ -327,8 +327,8 @@ void StateKeeper::begin_anew(const std::optional<SavedState>& start) {
   now_.reset();
   saved_.reset();
   written_.reset();
-  static_cast<void>(states_.take()); // discards stale data
-  static_cast<void>(whereabouts_.take());
+  static_cast<void>(states_.poll()); // discards stale data
+  static_cast<void>(whereabouts_.poll());
   std::error_code error;
   if (file_ && start) {
     if (const auto problem = write_state(*file_, *start))
@@ -361,8 +361,8 @@ void StateKeeper::take(const Odometry& odometry, const OdometryEstimate& estimat
 
 /// Reads the whereabouts first: the state that they refer to is then pending or already written.
 void StateKeeper::write() {
-  const Update* const update = whereabouts_.take();
-  if (const Due* const due = states_.take()) {
+  const Update* const update = whereabouts_.poll();
+  if (const Due* const due = states_.poll()) {
     const auto problem = write_state(*file_, due->state);
     written_ = problem ? std::nullopt : std::optional{due->number};
     if (problem)

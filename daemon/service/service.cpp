@@ -290,7 +290,7 @@ std::optional<ControlServer::Answer> Service::answer(KeepIncident request) {
     return Answer::wrong_usage(
         fmt::format("no more than {:g}s can be kept; see record.keep_s", figures.config.record.keep_s));
   const Stamp now{read_clock(CLOCK_REALTIME)};
-  const auto folder = incidents_->ask(
+  const auto folder = incidents_->submit(
       {IncidentCause::asked, from_seconds(request.keep_s), now, incident_report(IncidentCause::asked, now, figures)});
   if (!folder)
     return Answer::refusal(folder.error());

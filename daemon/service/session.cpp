@@ -63,7 +63,7 @@ Session::Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket
   if (start_) {
     start_->forget_changed(ids_of(config_.motion_sources));
     const Duration age = Stamp{read_clock(CLOCK_REALTIME)} - start_->last.stamp;
-    recalled_ = {start_->last.learned, std::max(0.0, to_seconds(age))};
+    calibration_ = {start_->last.learned, std::max(0.0, to_seconds(age))};
   }
   // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): grouped with the use of start_
   has_past_ = start_ && start_->is_recent && !start_->map_odom.empty();
@@ -76,7 +76,7 @@ void Session::begin(LidarRouter lidars) {
   LiveOptions options;
   if (start_ && start_->is_recent)
     options.start = {start_->last, start_->map_odom};
-  options.recalled = recalled_;
+  options.calibration = calibration_;
   options.on_thread_start = [this] {
     if (const auto problem = raise_priority(config_.realtime.priority))
       log_.warn(*problem);
@@ -162,12 +162,12 @@ void Session::end() {
 /// Converts the times of an estimate from SteadyTime to the host's wall clock.
 OdometryEstimate Session::on_the_wall(const OdometryEstimate& estimate) const {
   OdometryEstimate told = estimate;
-  told.stamp = input_.time().wall(estimate.stamp);
+  told.stamp = input_.time().to_wall(estimate.stamp);
   for (SourceReport& source : told.sources) {
     if (source.last_used != Stamp{})
-      source.last_used = input_.time().wall(source.last_used);
+      source.last_used = input_.time().to_wall(source.last_used);
     if (source.learned)
-      source.learned->since = input_.time().wall(source.learned->since);
+      source.learned->since = input_.time().to_wall(source.learned->since);
   }
   return told;
 }
@@ -189,7 +189,7 @@ void Session::after(const Sweep& sweep, const Odometry& odometry, const Odometry
 }
 
 const std::vector<SurfacePoint>* Session::take_map() {
-  const Map* const map = map_.take();
+  const Map* const map = map_.poll();
   return map != nullptr && map->request == map_wanted_.load(std::memory_order_relaxed) ? &map->points : nullptr;
 }
 
@@ -200,7 +200,7 @@ std::optional<std::string> Session::reset(std::optional<Pose> T_odom_base) {
   end();
   start_.reset();
   if (state_.now())
-    recalled_ = {state_.now()->learned, 0.0};
+    calibration_ = {state_.now()->learned, 0.0};
   if (T_odom_base)
     start_ = {{Stamp{read_clock(CLOCK_REALTIME)}, *T_odom_base}, flat_ground(), {}};
   state_.begin_anew(start_);
@@ -231,14 +231,14 @@ void Session::receive(const RosInput& input) {
   else if (const auto* odometry = std::get_if<OdometryInput>(&input))
     input_.push(*odometry);
   else
-    input_.push(std::get<OutsideVerdict>(input));
+    input_.push(std::get<ExternalHealth>(input));
 }
 
 /// Copies a cloud into the input. Allocates only for a cloud larger than all earlier ones.
 void Session::receive(std::uint8_t lidar, Stamp arrival, const SerialisedSample& cloud) {
   CloudBytes& next = input_.next_cloud(lidar);
   next.arrival = arrival;
-  next.too_large = cloud.size() > CloudBytes::kMost;
+  next.too_large = cloud.size() > CloudBytes::kMaxBytes;
   next.bytes.resize(next.too_large ? 0 : cloud.size());
   if (!next.too_large)
     cloud.copy_to(next.bytes);
@@ -271,7 +271,7 @@ void Session::publish() {
     if (const auto done = pipeline_->next(std::chrono::milliseconds{50}))
       publish(*done);
     while (auto sample = pipeline_->next_fast()) {
-      sample->stamp = input_.time().wall(sample->stamp);
+      sample->stamp = input_.time().to_wall(sample->stamp);
       link_.publish_fast(report_of(*sample));
     }
     while (const auto event = pipeline_->next_health_event())
@@ -284,7 +284,7 @@ void Session::publish() {
 }
 
 void Session::tell_of_clock() {
-  const Duration set_by = input_.time().set_by();
+  const Duration set_by = input_.time().steps();
   if (const Duration change = set_by - std::exchange(told_clock_set_by_, set_by); change != Duration::zero())
     log_.info(
         fmt::format("the clock of this computer was set by {:+.3f} s; the odometry goes on, and its stamps follow "
@@ -297,7 +297,7 @@ void Session::publish(const ProcessedSweep& done) {
   const bool is_published = link_.publish(report_of(estimate), estimate.state);
   {
     const std::scoped_lock lock(told_mutex_);
-    told_.sweeps.take(done);
+    told_.sweeps.add(done);
     told_.unpublished += is_published ? 0 : 1;
   }
   if (estimate.beginning && !announced_)
@@ -403,7 +403,7 @@ Figures Session::figures() const {
   live.unpublished = told_.unpublished;
   if (figures.sweeps.last)
     figures.sweeps.last = on_the_wall(*figures.sweeps.last);
-  const auto wall = [this](Stamp steady) { return steady == Stamp{} ? Stamp{} : input_.time().wall(steady); };
+  const auto wall = [this](Stamp steady) { return steady == Stamp{} ? Stamp{} : input_.time().to_wall(steady); };
   const auto put_on_the_wall = [&](auto& sensors) {
     for (auto& sensor : sensors)
       sensor.last_heard = wall(sensor.last_heard);

@@ -95,7 +95,7 @@ class Session {
   Log& log_;
   MachineTime started_;
   struct Told { ///< figures collected by the publisher
-    SweepTally sweeps{600};
+    SweepStatistics sweeps{600};
     IngestReport ingest;
     std::uint64_t unpublished = 0;
   };
@@ -125,7 +125,7 @@ class Session {
   RosLink link_;
   CloudPublisher clouds_;
   std::optional<SavedState> start_; ///< initial state, until the first estimate
-  Recalled recalled_;               ///< calibration learned in the previous run or before a reset
+  EarlierCalibration calibration_;  ///< calibration learned in the previous run or before a reset
   StateKeeper state_;
   std::optional<TrackingState> told_state_;
   Duration told_clock_set_by_{};

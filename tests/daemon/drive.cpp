@@ -63,12 +63,12 @@ std::vector<ProcessedSweep> process_in_one_thread(const Config& config) {
   SweepProcessor processor(config);
   const auto process = [&](Ingest& ingest, const Sweep& sweep) {
     processed.push_back(processor.process(sweep, {MachineTime::now(), {}}));
-    ingest.take(processor.odometry().feedback());
+    ingest.apply(processor.odometry().feedback());
   };
   Ingest ingest(config, open_lidars(config), [&](Sweep& sweep, const SweepCut&) { process(ingest, sweep); });
   for (const Input& input : Drive::instance().inputs())
-    ingest.take(input);
-  ingest.take(EndOfInput{});
+    ingest.process(input);
+  ingest.process(EndOfInput{});
   return processed;
 }
 

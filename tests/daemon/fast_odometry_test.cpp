@@ -51,8 +51,8 @@ class ArcDrive {
 
   [[nodiscard]] FastSample carried(const FastSample& estimate, Duration now) const {
     FastOdometry fast;
-    fast.take(estimate);
-    const std::optional<FastSample> sample = fast.carry(sources_, SourceId{1}, at(now));
+    fast.set_estimate(estimate);
+    const std::optional<FastSample> sample = fast.predict(sources_, SourceId{1}, at(now));
     EXPECT_TRUE(sample);
     return sample.value_or(FastSample{});
   }
@@ -131,9 +131,9 @@ TEST(FastOdometry, UncertainTwistMovesThePoseAsAnotherTwistWould) {
 TEST(FastOdometry, NothingBeforeTheFirstEstimateAndForOtherSources) {
   const MotionSources none({{"imu", SourceKind::imu, {}}}, Fusion::combined);
   FastOdometry fast;
-  EXPECT_FALSE(fast.carry(none, SourceId{0}, at(milliseconds{1}))) << "no estimate";
-  fast.take(FastSample{});
-  EXPECT_FALSE(fast.carry(none, SourceId{0}, at(milliseconds{1}))) << "no sample";
+  EXPECT_FALSE(fast.predict(none, SourceId{0}, at(milliseconds{1}))) << "no estimate";
+  fast.set_estimate(FastSample{});
+  EXPECT_FALSE(fast.predict(none, SourceId{0}, at(milliseconds{1}))) << "no sample";
 }
 
 } // namespace

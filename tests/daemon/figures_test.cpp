@@ -23,11 +23,11 @@ ProcessedSweep sweep(unsigned number, Duration wall) {
   return done;
 }
 
-TEST(SweepTally, SumsAreOfAllSweepsAndDistributionsOfTheLast) {
-  SweepTally tally(100);
+TEST(SweepStatistics, SumsAreOfAllSweepsAndDistributionsOfTheLast) {
+  SweepStatistics statistics(100);
   for (unsigned i = 0; i < 200; ++i)
-    tally.take(sweep(i, milliseconds{i}));
-  const SweepFigures figures = tally.figures();
+    statistics.add(sweep(i, milliseconds{i}));
+  const SweepFigures figures = statistics.figures();
   EXPECT_EQ(figures.sweeps, 200U);
   EXPECT_EQ(figures.raw_points, 20'000);
   EXPECT_EQ(figures.path_m, 199);
@@ -42,8 +42,8 @@ TEST(SweepTally, SumsAreOfAllSweepsAndDistributionsOfTheLast) {
   EXPECT_GT(figures.rate_hz, 10);
 }
 
-TEST(SweepTally, HasNothingBeforeTheFirst) {
-  const SweepFigures figures = SweepTally(100).figures();
+TEST(SweepStatistics, HasNothingBeforeTheFirst) {
+  const SweepFigures figures = SweepStatistics(100).figures();
   EXPECT_FALSE(figures.last);
   EXPECT_EQ(figures.process_ms.max, 0);
   EXPECT_EQ(figures.rate_hz, 0);

@@ -33,7 +33,7 @@ template <class Feed> std::vector<Summary> sweeps_of(const Config& config, const
   });
   for (const Input& input : Drive::instance().inputs())
     feed(ingest, input);
-  ingest.take(EndOfInput{});
+  ingest.process(EndOfInput{});
   return sweeps;
 }
 
@@ -51,9 +51,9 @@ TEST(Ingest, MakesOneSweepPerRevolutionAndCountsEveryPacket) {
   std::uint64_t datagrams = 0;
   for (const Input& input : Drive::instance().inputs()) {
     datagrams += is_datagram(input) ? 1U : 0U;
-    ingest.take(input);
+    ingest.process(input);
   }
-  ingest.take(EndOfInput{});
+  ingest.process(EndOfInput{});
   EXPECT_NEAR(static_cast<double>(sweeps), Drive::kSweeps, 1);
   EXPECT_EQ(ingest.lidars().total().received, datagrams);
   EXPECT_EQ(ingest.lidars().total().data, datagrams);
@@ -62,10 +62,10 @@ TEST(Ingest, MakesOneSweepPerRevolutionAndCountsEveryPacket) {
 }
 
 TEST(Ingest, SilenceBetweenTheInputsChangesNoSweep) {
-  const auto alone = sweeps_of(Drive::config(), [](Ingest& ingest, const Input& input) { ingest.take(input); });
+  const auto alone = sweeps_of(Drive::config(), [](Ingest& ingest, const Input& input) { ingest.process(input); });
   const auto with_silence = sweeps_of(Drive::config(), [](Ingest& ingest, const Input& input) {
-    ingest.take(Silence{arrival_of(input, {})});
-    ingest.take(input);
+    ingest.process(Silence{arrival_of(input, {})});
+    ingest.process(input);
   });
   ASSERT_FALSE(alone.empty());
   EXPECT_EQ(alone, with_silence);
@@ -75,7 +75,7 @@ TEST(Ingest, WindowsWithoutLidarAreSweepsToo) {
   const Stamp dies = arrival_of(Drive::instance().inputs().front(), {}) + std::chrono::seconds{2};
   const auto sweeps = sweeps_of(Drive::config(), [&](Ingest& ingest, const Input& input) {
     if (!is_datagram(input) || arrival_of(input, {}) < dies)
-      ingest.take(input);
+      ingest.process(input);
   });
   ASSERT_NEAR(static_cast<double>(sweeps.size()), Drive::kSweeps, 2);
   EXPECT_GT(sweeps[10].raw_returns, 10'000U);
@@ -104,7 +104,7 @@ TEST_P(IngestWithFilters, AllocatesNothingOnceWarm) {
     (sweep.sequence <= kWarm ? before : after) = allocations();
   });
   for (const Input& input : Drive::instance().inputs())
-    ingest.take(input);
+    ingest.process(input);
   ASSERT_TRUE(before && after);
   EXPECT_EQ(*after - *before, 0U);
 }

@@ -192,7 +192,7 @@ struct RunningRecorder : Recorder {
 void record(const std::filesystem::path& folder, const Config& config, std::span<const Input> inputs) {
   Recorder recorder(folder, config, {config.record.max_bytes});
   for (std::size_t i = 0; i < inputs.size(); ++i) {
-    recorder.take(inputs[i]);
+    recorder.record(inputs[i]);
     if (i % 2000 == 1999)
       recorder.write(false);
   }
@@ -264,12 +264,12 @@ TEST(Recorder, AbsurdSamplesAreReadAgainOrLeftOut) {
   {
     RunningRecorder recorder(folder / "record", config, {config.record.max_bytes});
     for (const OdometrySample& sample : {no_rotation, good, before_1951})
-      recorder.take(OdometryInput{SourceId{0}, sample});
-    recorder.take(ImuInput{SourceId{1}, imu});
-    recorder.take(ImuInput{SourceId{2}, imu});
-    recorder.take(datagram);
-    recorder.take(Silence{now});
-    recorder.take(OutsideVerdict{SourceId{0}, false});
+      recorder.record(OdometryInput{SourceId{0}, sample});
+    recorder.record(ImuInput{SourceId{1}, imu});
+    recorder.record(ImuInput{SourceId{2}, imu});
+    recorder.record(datagram);
+    recorder.record(Silence{now});
+    recorder.record(ExternalHealth{SourceId{0}, false});
     wait_until([&] { return recorder.status().recorded >= 3; });
     EXPECT_EQ(recorder.status().recorded, 3U);
     EXPECT_EQ(recorder.status().unfit, 2U);
@@ -292,11 +292,11 @@ TEST(Recorder, WhatTheDiskIsTooSlowForIsDroppedAndCounted) {
   constexpr std::uint64_t kInputs = 4 * Recorder::kMaxUnwritten;
   const ImuInput imu{SourceId{1}, {}};
   for (std::uint64_t i = 0; i < kInputs; ++i)
-    recorder.take(imu);
+    recorder.record(imu);
   recorder.write(false);
   EXPECT_EQ(recorder.status().recorded, Recorder::kMaxUnwritten);
   EXPECT_EQ(recorder.status().dropped, kInputs - Recorder::kMaxUnwritten);
-  recorder.take(imu);
+  recorder.record(imu);
   recorder.write(true);
   EXPECT_EQ(recorder.status().recorded, Recorder::kMaxUnwritten + 1) << "there is room again";
 }
@@ -317,7 +317,7 @@ TEST(Recorder, LongDatagramsAreRecordedWhole) {
     for (const auto& payload : sent) {
       datagram.payload = payload;
       datagram.receive_stamp += milliseconds{1};
-      recorder.take(datagram);
+      recorder.record(datagram);
     }
   }
   EXPECT_EQ(read(folder / "record").payloads, sent);
@@ -328,13 +328,13 @@ TEST(Recorder, TellsTheSourceOfTheLidars) {
   struct Source : InputSource {
     const LidarRouter* told = nullptr;
     Input next(Duration /*timeout*/) override { return EndOfInput{}; }
-    void expect(const LidarRouter& lidars) override { told = &lidars; }
+    void update_filter(const LidarRouter& lidars) override { told = &lidars; }
   } source;
   const QuickFolder folder;
   Recorder recorder(folder / "record", recorded_config(), {recorded_config().record.max_bytes});
   const auto lidars = LidarRouter::open(recorded_config().lidars);
   ASSERT_TRUE(lidars);
-  RecordingInput(source, recorder).expect(*lidars);
+  RecordingInput(source, recorder).update_filter(*lidars);
   EXPECT_EQ(source.told, &*lidars);
 }
 

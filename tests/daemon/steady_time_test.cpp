@@ -65,9 +65,9 @@ TEST_F(Steady, StampsAreThoseOfBeforeHoweverLittleTheClockIsSet) {
       const bool made_after = made_at >= seconds{110};
       const Stamp stamp = kBoot + made_at + (c.by_host && made_after ? c.step : Duration{});
       const Stamp arrived{since_boot + wall_ahead};
-      time.look();
-      const Stamp arrival = time.steady(arrived);
-      const Duration off = std::chrono::abs(time.steady(stamp, arrival, sender) - (kBoot + made_at));
+      time.detect_step();
+      const Stamp arrival = time.to_steady(arrived);
+      const Duration off = std::chrono::abs(time.to_steady(stamp, arrival, sender) - (kBoot + made_at));
       unlike += off > milliseconds{1} ? 1 : 0;
       worst = std::max(worst, since_boot > seconds{113} ? off : Duration{});
       worst_arrival = std::max(worst_arrival, std::chrono::abs(arrival - (kBoot + since_boot)));
@@ -86,11 +86,11 @@ TEST_F(Steady, ArrivalFromBeforeTheStepThatIsReadAfterItIsOfItsTime) {
     const Stamp made{since_boot + wall_ahead};
     since_boot += milliseconds{2};
     wall_ahead += step;
-    time.look();
-    EXPECT_EQ(time.steady(made), kBoot + seconds{100});
-    EXPECT_EQ(time.steady(Stamp{since_boot + wall_ahead}), kBoot + seconds{100} + milliseconds{2});
-    EXPECT_EQ(time.wall(kBoot), kBoot + step);
-    EXPECT_EQ(time.set_by(), step);
+    time.detect_step();
+    EXPECT_EQ(time.to_steady(made), kBoot + seconds{100});
+    EXPECT_EQ(time.to_steady(Stamp{since_boot + wall_ahead}), kBoot + seconds{100} + milliseconds{2});
+    EXPECT_EQ(time.to_wall(kBoot), kBoot + step);
+    EXPECT_EQ(time.steps(), step);
   }
 }
 
@@ -103,8 +103,8 @@ TEST_F(Steady, ArrivalBetweenTheStepAndTheLookThatNoticesItIsOfItsTime) {
     since_boot += milliseconds{1};
     const Stamp made{since_boot + wall_ahead};
     since_boot += milliseconds{1};
-    time.look();
-    EXPECT_EQ(time.steady(made), kBoot + seconds{100} + milliseconds{1}) << to_seconds(step);
+    time.detect_step();
+    EXPECT_EQ(time.to_steady(made), kBoot + seconds{100} + milliseconds{1}) << to_seconds(step);
   }
 }
 
@@ -113,9 +113,9 @@ TEST_F(Steady, ClockThatIsSlewedIsNotSet) {
   for (int i = 0; i < 1000; ++i) {
     since_boot += milliseconds{2};
     wall_ahead += std::chrono::microseconds{i % 2 == 0 ? 900 : -900};
-    time.look();
+    time.detect_step();
   }
-  EXPECT_EQ(time.set_by(), Duration{});
+  EXPECT_EQ(time.steps(), Duration{});
 }
 
 } // namespace

@@ -72,13 +72,13 @@ TEST(SpscRing, WhatIsPushedByOneThreadComesOutOnceWholeAndInOrderInAnother) {
 
 TEST(LatestSlot, IsEmptyBeforeTheFirstValueAndAfterEachTake) {
   LatestSlot<int> slot;
-  EXPECT_EQ(slot.take(), nullptr);
+  EXPECT_EQ(slot.poll(), nullptr);
   slot.back() = 7;
   EXPECT_FALSE(slot.publish());
-  const int* taken = slot.take();
+  const int* taken = slot.poll();
   ASSERT_NE(taken, nullptr);
   EXPECT_EQ(*taken, 7);
-  EXPECT_EQ(slot.take(), nullptr);
+  EXPECT_EQ(slot.poll(), nullptr);
 }
 
 TEST(LatestSlot, NewestOfThreeWinsAndTheOthersAreReportedDropped) {
@@ -89,7 +89,7 @@ TEST(LatestSlot, NewestOfThreeWinsAndTheOthersAreReportedDropped) {
   EXPECT_TRUE(slot.publish());
   slot.back() = 3;
   EXPECT_TRUE(slot.publish());
-  const int* taken = slot.take();
+  const int* taken = slot.poll();
   ASSERT_NE(taken, nullptr);
   EXPECT_EQ(*taken, 3);
   slot.back() = 4;
@@ -100,7 +100,7 @@ TEST(LatestSlot, TakenValueStaysWhileTheProducerGoesOn) {
   LatestSlot<int> slot;
   slot.back() = 1;
   ASSERT_FALSE(slot.publish());
-  const int* taken = slot.take();
+  const int* taken = slot.poll();
   ASSERT_NE(taken, nullptr);
   for (int value = 2; value < 10; ++value) {
     slot.back() = value;
@@ -125,7 +125,7 @@ TEST(LatestSlot, ConsumerSeesWholeValuesInOrderAndEveryOneIsTakenOrDropped) {
   std::uint64_t torn = 0;
   std::uint64_t out_of_order = 0;
   for (std::uint64_t newest = 0; newest < kValues;) {
-    const auto* value = slot.take();
+    const auto* value = slot.poll();
     if (value == nullptr)
       continue;
     ++taken;

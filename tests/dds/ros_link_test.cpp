@@ -191,7 +191,7 @@ TEST_P(Peers, AreHeardInOrderWithEveryFigure) {
   test::Child talker(peer("talk"));
   EXPECT_TRUE(eventually([&] {
     return inbox_.all<ImuInput>().size() > 50 && inbox_.all<OdometryInput>().size() > 50 &&
-           inbox_.all<OutsideVerdict>().size() > 50;
+           inbox_.all<ExternalHealth>().size() > 50;
   }));
   const LinkFigures status = link.status();
   EXPECT_TRUE(status.connected);
@@ -217,7 +217,7 @@ TEST_P(Peers, AreHeardInOrderWithEveryFigure) {
     EXPECT_EQ(odometry.sample.stamp, to_stamp({said.sec, said.nanosec}));
     EXPECT_NEAR(odometry.sample.covariance_scale, 1.0, 1e-9);
   }
-  EXPECT_EQ(inbox_.all<OutsideVerdict>().front().source, SourceId{0});
+  EXPECT_EQ(inbox_.all<ExternalHealth>().front().source, SourceId{0});
 }
 
 /// A participant as discovered by a peer: its DDS endpoints, and the endpoints that its node claims.

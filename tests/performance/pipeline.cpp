@@ -27,14 +27,14 @@ Pipeline::Pipeline(const Config& config)
 void Pipeline::process(Sweep& sweep, const daemon::SweepCut& cut) {
   processed_ = processor_.process(sweep, cut);
   std::swap(points_, sweep.points);
-  ingest_.take(processor_.odometry().feedback());
+  ingest_.apply(processor_.odometry().feedback());
   processor_.prepare_next();
 }
 
 const daemon::ProcessedSweep* Pipeline::take(const daemon::Input& input) {
   processed_.reset();
   if (hears_motion_ || std::holds_alternative<Datagram>(input))
-    ingest_.take(input);
+    ingest_.process(input);
   return processed_ ? &*processed_ : nullptr;
 }
 

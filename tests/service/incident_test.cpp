@@ -399,10 +399,10 @@ TEST(IncidentFolder, OldestGoesFirst) {
   daemon::Incidents incidents(folder / "incidents");
   incidents.set_max_bytes(3'500'000);
   const auto keep = [&](int second) {
-    const auto where = incidents.ask(
+    const auto where = incidents.submit(
         {daemon::IncidentCause::asked, seconds{60}, Stamp{seconds{1'800'000'000 + second}}, "{}", {piece}});
     EXPECT_TRUE(where);
-    EXPECT_FALSE(incidents.ask({})) << "one at a time";
+    EXPECT_FALSE(incidents.submit({})) << "one at a time";
     incidents.work(nullptr);
     incidents.work(nullptr);
     EXPECT_EQ(incidents.status().refusal, "");
@@ -415,7 +415,8 @@ TEST(IncidentFolder, OldestGoesFirst) {
   EXPECT_EQ(folders_in(folder / "incidents"), std::vector<path>(all.begin() + 2, all.end()));
   EXPECT_TRUE(std::filesystem::exists(all.back() / "000001/lidar.pcap"));
   incidents.set_max_bytes(900'000);
-  ASSERT_TRUE(incidents.ask({daemon::IncidentCause::asked, seconds{60}, Stamp{seconds{1'900'000'000}}, "{}", {piece}}));
+  ASSERT_TRUE(
+      incidents.submit({daemon::IncidentCause::asked, seconds{60}, Stamp{seconds{1'900'000'000}}, "{}", {piece}}));
   incidents.work(nullptr);
   EXPECT_TRUE(contains(incidents.status().refusal, "it has 1 MB, and 0 may be used); raise record.incidents_bytes"))
       << incidents.status().refusal;
@@ -469,7 +470,7 @@ TEST(IncidentFolder, OneOfTheFutureHidesNoneOfToday) {
     return daemon::Incidents::Request{cause, seconds{60}, Stamp{daemon::read_clock(CLOCK_REALTIME)}, "{}", {piece}};
   };
   EXPECT_FALSE(incidents.raise(request(daemon::IncidentCause::restart)));
-  EXPECT_TRUE(incidents.ask(request(daemon::IncidentCause::asked)));
+  EXPECT_TRUE(incidents.submit(request(daemon::IncidentCause::asked)));
   EXPECT_FALSE(incidents.raise(request(daemon::IncidentCause::tracking_lost))) << "another one is on its way";
   incidents.work(nullptr);
   incidents.work(nullptr);

@@ -37,7 +37,7 @@ void RestartingPipeline::begin(Stamp now) {
   daemon::LiveOptions options;
   options.speed = kNoHurry;
   if (auto state = read_state(state_file_, now)) {
-    options.recalled = {state->last.learned, to_seconds(now - state->last.stamp)};
+    options.calibration = {state->last.learned, to_seconds(now - state->last.stamp)};
     options.start = {state->last, std::move(state->map_odom)};
   }
   options.after_estimate = [this](const Sweep&, const Odometry& odometry, const OdometryEstimate& estimate) {

@@ -37,7 +37,7 @@ Engine::Engine(Config config, LidarRouter lidars)
       pipeline_(config_, std::move(lidars), [this](const Sweep&, const daemon::ProcessedSweep& done) { take(done); }) {}
 
 void Engine::take(const daemon::ProcessedSweep& done) {
-  tally_.take(done);
+  tally_.add(done);
   completed_.push_back(estimate_of(done.estimate, source_names_));
 }
 

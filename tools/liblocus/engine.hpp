@@ -22,7 +22,7 @@ class Engine {
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
 
-  void take(const daemon::Input& input) { pipeline_.take(input); }
+  void take(const daemon::Input& input) { pipeline_.process(input); }
 
   /// Estimates not fetched yet, the oldest first.
   [[nodiscard]] std::deque<liblocus::Estimate>& completed() { return completed_; }
@@ -40,7 +40,7 @@ class Engine {
   Config config_;
   std::vector<std::string> source_names_;
   daemon::MachineTime begin_ = daemon::MachineTime::now();
-  daemon::SweepTally tally_;
+  daemon::SweepStatistics tally_;
   std::deque<liblocus::Estimate> completed_;
   daemon::InlinePipeline pipeline_;
 };

@@ -91,7 +91,7 @@ std::vector<std::string> names_on_topics(const Config& config) {
 void send_all(const PlayArguments& arguments, daemon::InputSource& recording, PacketSender& packets,
               MotionPublisher& motion, Lockstep* lockstep, const std::function<double()>& progress) {
   daemon::PacedInput paced(recording, arguments.speed,
-                           lockstep != nullptr ? kWallClock : daemon::PacedInput::kOfTheHost);
+                           lockstep != nullptr ? kWallClock : daemon::PacedInput::kHostClock);
   ProgressBar bar(!arguments.quiet);
   std::optional<Duration> shift;
   const auto shift_at = [&](Stamp arrival) {

@@ -67,7 +67,7 @@ Pass replay(const Arguments& arguments, Config config, ChosenRecording chosen, c
       });
   for (bool goes_on = true; goes_on;) {
     const daemon::Input input = open.recording->next(Duration::zero());
-    pipeline.take(input);
+    pipeline.process(input);
     goes_on = !std::holds_alternative<daemon::EndOfInput>(input);
     const auto* const imu = std::get_if<daemon::ImuInput>(&input);
     if (imu == nullptr || !imu->sample.angular_velocity_radps.allFinite())

@@ -37,7 +37,7 @@ template <class Message> void McapResults::write(std::uint16_t channel, const Me
 void McapResults::take(const Sweep& sweep, const Odometry& odometry, const daemon::ProcessedSweep& done) {
   const OdometryEstimate& estimate = done.estimate;
   now_ = estimate.stamp;
-  tally_.take(done);
+  tally_.add(done);
   write(odometry_, daemon::to_ros(daemon::report_of(estimate), frames_));
   ros::TransformStamped transform = daemon::to_ros_transform(estimate.stamp, estimate.T_odom_base, frames_);
   write(tf_, ros::TFMessage{{1, 1, &transform, false}});

@@ -38,7 +38,7 @@ class McapResults {
   McapWriter writer_;
   std::uint16_t odometry_, tf_, cloud_, diagnostics_;
   Stamp now_, diagnosed_; ///< end of the latest sweep; time of the latest diagnostics
-  daemon::SweepTally tally_;
+  daemon::SweepStatistics tally_;
   daemon::CloudMessage cloud_message_;
   std::vector<daemon::CloudMessage::Point> points_;
   std::vector<std::byte> serialised_;

@@ -71,7 +71,7 @@ void replay(const Config& config, LidarRouter lidars, Recording& recording, Resu
       config, std::move(lidars), take, [&](const HealthEvent& event) { results.take(event); }, stage);
   for (bool goes_on = true; goes_on;) {
     const daemon::Input input = recording.next(Duration::zero());
-    pipeline->take(input);
+    pipeline->process(input);
     goes_on = !std::holds_alternative<daemon::EndOfInput>(input);
   }
   more.close();

@@ -52,7 +52,7 @@ Results::Results(const Arguments& arguments, const Config& config, const Recordi
 
 void Results::take(const daemon::ProcessedSweep& sweep) {
   odometry_.write(sweep.estimate);
-  tally_.take(sweep);
+  tally_.add(sweep);
   sweeps_.push_back(record_of(sweep));
   truth_.take(sweep.estimate);
   progress_.show(recording_.progress());

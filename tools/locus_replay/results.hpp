@@ -48,7 +48,7 @@ class Results {
   const Recording& recording_;
   daemon::MachineTime begin_;
   OdometryFiles odometry_;
-  daemon::SweepTally tally_{std::numeric_limits<std::size_t>::max()};
+  daemon::SweepStatistics tally_{std::numeric_limits<std::size_t>::max()};
   std::vector<HealthEvent> health_events_;
   std::vector<SweepRecord> sweeps_;
   Truth truth_;
