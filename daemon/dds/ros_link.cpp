@@ -202,7 +202,7 @@ void RosLink::receive(Session& session) {
   if (auto& from = session.flat_ground)
     from->reader.take([&](const ros::Bool& message, dds_instance_handle_t writer) {
       if (from->admission.admits(writer, now))
-        sink_(FlatGroundWord{message.data_});
+        sink_(FlatGroundMessage{message.data_});
     });
 }
 

@@ -23,12 +23,12 @@
 namespace locus::daemon {
 
 /// External message whether the ground is flat (flat_ground_topic).
-struct FlatGroundWord {
+struct FlatGroundMessage {
   bool flat;
 };
 
 /// Any input over DDS except clouds.
-using RosInput = std::variant<ImuInput, OdometryInput, ExternalHealth, FlatGroundWord>;
+using RosInput = std::variant<ImuInput, OdometryInput, ExternalHealth, FlatGroundMessage>;
 
 /// Receives a cloud of the lidar with this index.
 using RosCloudSink = std::function<void(std::uint8_t lidar, Stamp arrival, const SerialisedSample& cloud)>;

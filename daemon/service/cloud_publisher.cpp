@@ -28,7 +28,7 @@ CloudPublisher::CloudPublisher(DdsOptions options, RosLink& link) : options_(std
     worker_.emplace("clouds", std::chrono::milliseconds{100}, [this](bool /*last*/) { publish(); });
 }
 
-void CloudPublisher::take(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
+void CloudPublisher::submit(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
   if (options_.publish_cloud) {
     sweep_points(sweep.points, odometry.scan(), sweep_.back().points);
     sweep_.back().stamp = estimate.stamp;

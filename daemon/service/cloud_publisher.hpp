@@ -19,7 +19,7 @@ class CloudPublisher {
   CloudPublisher(DdsOptions options, RosLink& link);
 
   /// Producer, one thread: hands over the clouds of a processed sweep.
-  void take(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate);
+  void submit(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate);
 
  private:
   struct Cloud {

@@ -35,14 +35,14 @@ Parsed parse_flat_ground(const nlohmann::json& request) {
 }
 
 Parsed parse_reset(const nlohmann::json& request) {
-  constexpr double kFarthest_m = 500e3, kMost_deg = 360.0; // extent of a map, see SurfaceGrid::reaches()
+  constexpr double kMaxDistance_m = 500e3, kMaxAngle_deg = 360.0; // extent of a map, see SurfaceGrid::reaches()
   if (!request.contains("pose"))
     return ControlRequest{Reset{}};
   const auto v = request["pose"].get<std::array<double, 6>>();
   for (std::size_t i = 0; i < v.size(); ++i)
-    if (!(std::abs(v[i]) <= (i < 3 ? kFarthest_m : kMost_deg)))
-      return fmt::format("the pose must lie within {:.0f} m and {:.0f} degrees; give X,Y,Z,R,P,Y", kFarthest_m,
-                         kMost_deg);
+    if (!(std::abs(v[i]) <= (i < 3 ? kMaxDistance_m : kMaxAngle_deg)))
+      return fmt::format("the pose must lie within {:.0f} m and {:.0f} degrees; give X,Y,Z,R,P,Y", kMaxDistance_m,
+                         kMaxAngle_deg);
   return ControlRequest{Reset{Pose{from_rpy_rad(Eigen::Vector3d{v[3], v[4], v[5]} * kRadPerDeg), {v[0], v[1], v[2]}}}};
 }
 
@@ -50,7 +50,7 @@ Parsed parse_record(const nlohmann::json& request) {
   const double keep_s = request.at("keep_s").get<double>();
   if (!(keep_s >= 1.0 && keep_s <= 600.0))
     return std::string{"what to keep must be 1s to 600s"};
-  return ControlRequest{KeepIncident{keep_s}};
+  return ControlRequest{StoreIncident{keep_s}};
 }
 
 } // namespace
@@ -92,25 +92,25 @@ std::vector<gid_t> groups_of(int client) {
 
 /// Returns the group of privileged users. Looked up once a second at most, since other users may send requests at any
 /// rate. Main thread only.
-std::optional<gid_t> commanders() {
-  static std::optional<gid_t> commanders;
+std::optional<gid_t> privileged_group() {
+  static std::optional<gid_t> privileged_group;
   static Duration looked_up = -std::chrono::hours{1};
   if (const Duration now = read_clock(CLOCK_MONOTONIC); now - looked_up > std::chrono::seconds{1}) {
     const group* const found = getgrnam("locusd"); // NOLINT(concurrency-mt-unsafe)
-    commanders = found != nullptr ? std::optional{found->gr_gid} : std::nullopt;
+    privileged_group = found != nullptr ? std::optional{found->gr_gid} : std::nullopt;
     looked_up = now;
   }
-  return commanders;
+  return privileged_group;
 }
 
-bool may_command(int client) {
+bool is_privileged(int client) {
   ucred peer{};
   socklen_t size = sizeof(peer);
   if (getsockopt(client, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0)
     return false;
   if (peer.uid == 0 || peer.uid == geteuid())
     return true;
-  const std::optional<gid_t> allowed = commanders();
+  const std::optional<gid_t> allowed = privileged_group();
   if (!allowed)
     return false;
   const std::vector<gid_t> groups = groups_of(client);
@@ -185,8 +185,8 @@ Expected<ControlServer, std::string> ControlServer::open(const std::filesystem::
         errno == EADDRINUSE
             ? "another service answers there, or it is no socket; set RUNTIME_DIRECTORY to a folder of its own"
             : "set RUNTIME_DIRECTORY to a folder that may be written");
-  constexpr mode_t kEverybody = 0666; // requests are checked by the peer's credentials
-  if (chmod(path.c_str(), kEverybody) != 0 || listen(listener.number(), kMaxClients) != 0)
+  constexpr mode_t kReadWriteForAll = 0666; // requests are checked by the peer's credentials
+  if (chmod(path.c_str(), kReadWriteForAll) != 0 || listen(listener.number(), kMaxClients) != 0)
     return failed("cannot listen on it");
   return ControlServer{std::move(listener), std::move(handler)};
 }
@@ -199,9 +199,9 @@ void ControlServer::add_to(std::vector<pollfd>& poll) const {
 
 bool ControlServer::serve() {
   const std::uint64_t answered_before = answered_;
-  const bool called = accept_waiting();
+  const bool has_accepted = accept_waiting();
   const std::size_t gone = std::erase_if(clients_, [this](Client& client) { return !serve(client); });
-  return called || gone > 0 || answered_ != answered_before;
+  return has_accepted || gone > 0 || answered_ != answered_before;
 }
 
 /// Accepts at most kMaxClients per call, so that repeated connects do not block the service.
@@ -210,8 +210,8 @@ bool ControlServer::accept_waiting() {
     Descriptor client{accept4(listener_.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC)};
     if (client.number() < 0)
       return i > 0 || accept_has_failed();
-    if (clients_.size() == kMaxClients && may_command(client.number()))
-      drop_a_stranger();
+    if (clients_.size() == kMaxClients && is_privileged(client.number()))
+      drop_unprivileged_client();
     if (clients_.size() < kMaxClients)
       clients_.push_back({std::move(client), std::nullopt, {}});
     else
@@ -221,11 +221,11 @@ bool ControlServer::accept_waiting() {
 }
 
 /// Disconnects an unprivileged client to make room for a privileged one.
-void ControlServer::drop_a_stranger() {
-  const auto stranger =
-      std::ranges::find_if(clients_, [](const Client& client) { return !may_command(client.socket.number()); });
-  if (stranger != clients_.end())
-    clients_.erase(stranger);
+void ControlServer::drop_unprivileged_client() {
+  const auto unprivileged =
+      std::ranges::find_if(clients_, [](const Client& client) { return !is_privileged(client.socket.number()); });
+  if (unprivileged != clients_.end())
+    clients_.erase(unprivileged);
 }
 
 bool ControlServer::serve(Client& client) {
@@ -237,7 +237,7 @@ bool ControlServer::serve(Client& client) {
     if (size == 0)
       return false;
     client.pending = parse_control_request({text.data(), static_cast<std::size_t>(size)});
-    client.asked = read_clock(CLOCK_MONOTONIC);
+    client.requested_at = read_clock(CLOCK_MONOTONIC);
   }
   const std::optional<Answer> answer = handle(client);
   if (!answer)
@@ -251,9 +251,9 @@ std::optional<ControlServer::Answer> ControlServer::handle(Client& client) {
   const Expected<ControlRequest, std::string>& request = *client.pending;
   if (!request)
     return Answer::wrong_usage(request.error());
-  if (!std::holds_alternative<ShowStatus>(*request) && !may_command(client.socket.number()))
+  if (!std::holds_alternative<ShowStatus>(*request) && !is_privileged(client.socket.number()))
     return Answer::refusal("not permitted; be root or a member of group locusd");
-  if (read_clock(CLOCK_MONOTONIC) - client.asked > kLongestAnswer)
+  if (read_clock(CLOCK_MONOTONIC) - client.requested_at > kLongestAnswer)
     return Answer::refusal("no answer in time; is there lidar data (locusctl status)?");
   return handler_(*request);
 }

@@ -35,10 +35,10 @@ struct Reset {
   std::optional<Pose> T_odom_base; ///< initial pose after the reset; empty: the origin
 };
 struct Reload {};
-struct KeepIncident {
+struct StoreIncident {
   double keep_s; ///< length of the input to store, up to now
 };
-using ControlRequest = std::variant<ShowStatus, SaveMap, SetFlatGround, Reset, Reload, KeepIncident>;
+using ControlRequest = std::variant<ShowStatus, SaveMap, SetFlatGround, Reset, Reload, StoreIncident>;
 
 /// Parses one message of arbitrary bytes: {"command": "save-map" | "reload"}, {"command": "status"} with "text": true
 /// for an answer {"text": "..."}, {"command": "flat-ground", "mode": "on" | "off" | "auto"}, {"command": "record",
@@ -81,13 +81,13 @@ class ControlServer {
   struct Client {
     Descriptor socket;
     std::optional<Expected<ControlRequest, std::string>> pending;
-    Duration asked{};
+    Duration requested_at{};
   };
 
   ControlServer(Descriptor listener, Handler handler) : listener_(std::move(listener)), handler_(std::move(handler)) {}
   /// Accepts waiting clients; true if there was one.
   bool accept_waiting();
-  void drop_a_stranger();
+  void drop_unprivileged_client();
   /// Serves a client; false if it is to be disconnected.
   bool serve(Client& client);
   [[nodiscard]] std::optional<Answer> handle(Client& client);

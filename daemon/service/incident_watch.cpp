@@ -48,7 +48,7 @@ std::string text_of(const ordered_json& json) {
 
 } // namespace
 
-std::optional<IncidentCause> IncidentWatch::look(const Figures& figures) {
+std::optional<IncidentCause> IncidentWatch::check(const Figures& figures) {
   const std::uint64_t before = std::exchange(contradictions_, contradictions(figures.ingest));
   const std::optional<OdometryEstimate>& last = figures.sweeps.last;
   const Duration now = clock_(CLOCK_MONOTONIC);
@@ -57,7 +57,7 @@ std::optional<IncidentCause> IncidentWatch::look(const Figures& figures) {
     lost_since_.reset();
   } else if (has_tracked_) {
     lost_since_ = lost_since_.value_or(now);
-    if (now - *lost_since_ >= kLostFor) {
+    if (now - *lost_since_ >= kMinLoss) {
       has_tracked_ = false;
       return IncidentCause::tracking_lost;
     }
@@ -65,7 +65,7 @@ std::optional<IncidentCause> IncidentWatch::look(const Figures& figures) {
   if (contradictions_ <= before)
     return std::nullopt;
   const std::optional<Duration> earlier = std::exchange(contradicted_, now);
-  return earlier && now - *earlier < kQuiet ? std::nullopt : std::optional{IncidentCause::contradiction};
+  return earlier && now - *earlier < kMinGap ? std::nullopt : std::optional{IncidentCause::contradiction};
 }
 
 std::string incident_report(IncidentCause cause, Stamp when, const Figures& figures) {

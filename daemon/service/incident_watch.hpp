@@ -13,18 +13,18 @@
 
 namespace locus::daemon {
 
-/// Detects incidents from the figures of a service: dead reckoning for kLostFor after tracking, through loss of lidar
+/// Detects incidents from the figures of a service: dead reckoning for kMinLoss after tracking, through loss of lidar
 /// or failed registration; rejection of a motion source because lidar or gravity contradicts it. One owner.
 class IncidentWatch {
  public:
-  static constexpr Duration kLostFor = std::chrono::seconds{1}; ///< a single failed sweep is no incident
-  static constexpr Duration kQuiet = std::chrono::seconds{10};  ///< quiet time that separates two contradictions
+  static constexpr Duration kMinLoss = std::chrono::seconds{1}; ///< a single failed sweep is no incident
+  static constexpr Duration kMinGap = std::chrono::seconds{10}; ///< quiet time that separates two contradictions
 
   using Clock = Duration (*)(clockid_t); ///< read_clock(), replaceable in tests
   explicit IncidentWatch(Clock clock = [](clockid_t id) { return read_clock(id); }) : clock_(clock) {}
 
   /// Checks the figures, a few times a second. Returns the cause once per incident, at its start.
-  std::optional<IncidentCause> look(const Figures& figures);
+  std::optional<IncidentCause> check(const Figures& figures);
 
  private:
   Clock clock_;

@@ -18,7 +18,7 @@ namespace locus::daemon {
 namespace {
 
 /// Subscription to the topic of a motion source or of a lidar's clouds.
-struct HeardTopic {
+struct Subscription {
   std::string whose; ///< "imu NAME"
   std::string name;
   std::optional<DdsReader<ros::Imu>> imu{};
@@ -27,7 +27,7 @@ struct HeardTopic {
   std::uint64_t messages = 0;
   std::uint32_t writers = 0;
 
-  void take() {
+  void poll() {
     const auto count = [this](const auto&) { ++messages; };
     if (imu) {
       imu->take(count);
@@ -44,18 +44,18 @@ struct HeardTopic {
   }
 };
 
-std::vector<HeardTopic> subscribe(const DdsNode& node, const Config& config) {
-  std::vector<HeardTopic> topics;
+std::vector<Subscription> subscribe(const DdsNode& node, const Config& config) {
+  std::vector<Subscription> topics;
   for (const LidarOptions& lidar : config.lidars) {
     if (lidar.gives_clouds())
-      topics.emplace_back(HeardTopic{"lidar " + lidar.name, lidar.topic})
+      topics.emplace_back(Subscription{"lidar " + lidar.name, lidar.topic})
           .clouds.emplace(node, lidar.topic, TopicQos::cloud_count());
   }
   for (const MotionSource& source : config.motion_sources) {
     if (source.topic.empty())
       continue;
-    HeardTopic& topic =
-        topics.emplace_back(HeardTopic{fmt::format("{} {}", to_string(source.kind), source.name), source.topic});
+    Subscription& topic =
+        topics.emplace_back(Subscription{fmt::format("{} {}", to_string(source.kind), source.name), source.topic});
     if (source.kind == SourceKind::imu)
       topic.imu.emplace(node, source.topic, TopicQos::sensor_in());
     else
@@ -70,7 +70,7 @@ bool is_for(const HeardLidar& lidar, const LidarOptions& options) {
 }
 
 /// Lists the lidars that match no entry of the configuration.
-std::string strangers(const Config& config, const std::vector<HeardLidar>& heard) {
+std::string unconfigured_lidars(const Config& config, const std::vector<HeardLidar>& heard) {
   std::string text;
   for (const HeardLidar& lidar : heard)
     if (lidar.is_known() &&
@@ -80,9 +80,9 @@ std::string strangers(const Config& config, const std::vector<HeardLidar>& heard
 }
 
 /// Returns a remedy for a lidar without packets.
-std::string advice(const LidarOptions& options, const Config& config, const std::vector<HeardLidar>& heard,
+std::string remedy(const LidarOptions& options, const Config& config, const std::vector<HeardLidar>& heard,
                    bool hears_all) {
-  if (const std::string others = strangers(config, heard); !others.empty())
+  if (const std::string others = unconfigured_lidars(config, heard); !others.empty())
     return fmt::format("{}; if it is that one, set port and source_ip in the entry of {}", others, options.name);
   return hears_all ? "look at power, cable and the address it sends to"
                    : "other ports were not listened to: run as root to hear all lidars, or locusctl sensors";
@@ -96,54 +96,57 @@ void compare(const LidarOptions& options, const Config& config, const std::vecto
       mine.push_back(&lidar);
   const std::string& name = options.name;
   if (mine.empty()) {
-    check.differs.push_back(fmt::format("lidar {}: nothing comes to port {}{}; {}", name, options.port,
-                                        options.source_ip ? " from " + dotted(*options.source_ip) : "",
-                                        advice(options, config, heard, hears_all)));
+    check.differences.push_back(fmt::format("lidar {}: nothing comes to port {}{}; {}", name, options.port,
+                                            options.source_ip ? " from " + dotted(*options.source_ip) : "",
+                                            remedy(options, config, heard, hears_all)));
     return;
   }
   const HeardLidar& lidar = *mine.front();
   if (mine.size() > 1)
-    check.differs.push_back(fmt::format("lidar {}: {} and {} send to its port {}; tell them apart by source_ip, each "
-                                        "with an entry of its own",
-                                        name, lidar.name(), mine[1]->name(), options.port));
+    check.differences.push_back(
+        fmt::format("lidar {}: {} and {} send to its port {}; tell them apart by source_ip, each "
+                    "with an entry of its own",
+                    name, lidar.name(), mine[1]->name(), options.port));
   else if (!lidar.is_known())
-    check.differs.push_back(fmt::format("lidar {}: what comes to port {} is not read: {}", name, options.port,
-                                        lidar.unknown_packets ? to_string(*lidar.unknown_packets) : "no lidar packet"));
+    check.differences.push_back(
+        fmt::format("lidar {}: what comes to port {} is not read: {}", name, options.port,
+                    lidar.unknown_packets ? to_string(*lidar.unknown_packets) : "no lidar packet"));
   else if (lidar.ouster.has_value() != options.is_ouster())
-    check.differs.push_back(fmt::format("lidar {}: is configured as one of {}, but {} sends to port {}; set model{} in "
-                                        "its entry",
-                                        name,
-                                        options.is_ouster()         ? "Ouster"
-                                        : options.is_hesai()        ? "Hesai"
-                                        : options.is_of_any_maker() ? "Velodyne or Hesai"
-                                                                    : "Velodyne",
-                                        lidar.name(), options.port, options.is_ouster() ? "" : " and metadata"));
+    check.differences.push_back(
+        fmt::format("lidar {}: is configured as one of {}, but {} sends to port {}; set model{} in "
+                    "its entry",
+                    name,
+                    options.is_ouster()         ? "Ouster"
+                    : options.is_hesai()        ? "Hesai"
+                    : options.is_of_any_maker() ? "Velodyne or Hesai"
+                                                : "Velodyne",
+                    lidar.name(), options.port, options.is_ouster() ? "" : " and metadata"));
   else if (!lidar.ouster && !options.is_of_any_maker() && options.is_hesai() != lidar.clock.has_value())
-    check.differs.push_back(
+    check.differences.push_back(
         fmt::format("lidar {}: its calibration is of another maker than {}, which sends to port {}; "
                     "set model to auto in its entry, and calibration to the file of that sensor",
                     name, lidar.name(), options.port));
   else if (!lidar.ouster && !configured_model(options).empty() && configured_model(options) != lidar.model)
-    check.differs.push_back(
+    check.differences.push_back(
         fmt::format("lidar {}: is configured as {}, and its packets say {}; set model to auto in its entry", name,
                     configured_model(options), lidar.model));
   else if (!lidar.ouster && options.time == LidarTime::sensor && !lidar.is_synchronised())
-    check.differs.push_back(fmt::format("lidar {}: time: sensor, but it tells {}; connect a GPS receiver or set "
-                                        "time to auto in its entry",
-                                        name, lidar.clock_state()));
+    check.differences.push_back(fmt::format("lidar {}: time: sensor, but it tells {}; connect a GPS receiver or set "
+                                            "time to auto in its entry",
+                                            name, lidar.clock_state()));
   else
-    check.agrees.push_back(fmt::format("lidar {}: {} to port {}, {:.0f} packets/s, {}", name, lidar.name(),
-                                       options.port, lidar.packets_per_s, lidar.clock_state()));
+    check.matches.push_back(fmt::format("lidar {}: {} to port {}, {:.0f} packets/s, {}", name, lidar.name(),
+                                        options.port, lidar.packets_per_s, lidar.clock_state()));
 }
 
 /// Returns the type with which the topic is published, correct or not; empty without a publisher.
 std::string published_type(const DdsNode& node, const std::string& topic) {
   const DdsEntity reader{dds_create_reader(node.participant(), DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr)};
   std::string type;
-  constexpr std::uint32_t kMost = 1024;
-  std::vector<void*> samples(kMost);
-  std::vector<dds_sample_info_t> infos(kMost);
-  const dds_return_t count = dds_read(reader.handle(), samples.data(), infos.data(), kMost, kMost);
+  constexpr std::uint32_t kMaxEndpoints = 1024;
+  std::vector<void*> samples(kMaxEndpoints);
+  std::vector<dds_sample_info_t> infos(kMaxEndpoints);
+  const dds_return_t count = dds_read(reader.handle(), samples.data(), infos.data(), kMaxEndpoints, kMaxEndpoints);
   for (std::size_t i = 0; count > 0 && i < static_cast<std::size_t>(count); ++i)
     if (const auto* writer = static_cast<const dds_builtintopic_endpoint_t*>(samples[i]);
         infos[i].valid_data && "rt" + topic == writer->topic_name)
@@ -153,22 +156,24 @@ std::string published_type(const DdsNode& node, const std::string& topic) {
   return type;
 }
 
-void compare(const HeardTopic& topic, const DdsNode& node, const DdsOptions& dds, Duration duration, LiveCheck& check) {
+void compare(const Subscription& topic, const DdsNode& node, const DdsOptions& dds, Duration duration,
+             LiveCheck& check) {
   const std::string about = fmt::format("{}: topic {}: ", topic.whose, topic.name);
   const std::string type = topic.writers == 0 ? published_type(node, topic.name) : "";
   if (!type.empty())
-    check.differs.push_back(
+    check.differences.push_back(
         fmt::format("{}is published as {}; set {}another topic", about, type, topic.clouds ? "" : "its kind, or "));
   else if (topic.writers == 0)
-    check.differs.push_back(fmt::format("{}nobody publishes it in domain {} on {}; look at the name of the topic, and "
-                                        "at ROS_DOMAIN_ID and interface of its node",
-                                        about, dds.domain, dds.interface));
+    check.differences.push_back(
+        fmt::format("{}nobody publishes it in domain {} on {}; look at the name of the topic, and "
+                    "at ROS_DOMAIN_ID and interface of its node",
+                    about, dds.domain, dds.interface));
   else if (topic.messages == 0)
-    check.differs.push_back(fmt::format("{}its publisher sends nothing", about));
+    check.differences.push_back(fmt::format("{}its publisher sends nothing", about));
   else if (topic.writers > 1)
-    check.differs.push_back(fmt::format("{}{} nodes publish it, and only the first is used", about, topic.writers));
+    check.differences.push_back(fmt::format("{}{} nodes publish it, and only the first is used", about, topic.writers));
   else
-    check.agrees.push_back(
+    check.matches.push_back(
         fmt::format("{}{:.0f} messages/s", about, static_cast<double>(topic.messages) / to_seconds(duration)));
 }
 
@@ -187,25 +192,25 @@ Expected<LiveCheck, std::string> check_live(const Config& config, Duration durat
     join_multicast(config, std::span(&*member, 1));
   LiveCheck check;
   auto node = DdsNode::open(config.dds);
-  std::vector<HeardTopic> topics;
+  std::vector<Subscription> topics;
   if (node)
     topics = subscribe(*node, config);
   else
-    check.differs.push_back(node.error());
+    check.differences.push_back(node.error());
 
   LidarSurvey survey;
   for (Duration listened{}; listened < duration; listened += kRound) {
     wire->listen(kRound, [&](const Datagram& datagram) { survey.take(datagram); });
-    for (HeardTopic& topic : topics)
-      topic.take();
+    for (Subscription& topic : topics)
+      topic.poll();
   }
   const std::vector<HeardLidar> heard = survey.lidars();
   for (const LidarOptions& lidar : config.lidars)
     if (!lidar.gives_clouds())
       compare(lidar, config, heard, wire->hears_all(), check);
-  if (const std::string others = strangers(config, heard); !others.empty() && check.differs.empty())
-    check.agrees.push_back(fmt::format("not configured: {}", others));
-  for (const HeardTopic& topic : topics)
+  if (const std::string others = unconfigured_lidars(config, heard); !others.empty() && check.differences.empty())
+    check.matches.push_back(fmt::format("not configured: {}", others));
+  for (const Subscription& topic : topics)
     compare(topic, *node, config.dds, duration, check);
   return check;
 }

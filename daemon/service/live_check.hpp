@@ -11,8 +11,8 @@ namespace locus::daemon {
 
 /// Comparison of a configuration with the traffic on the network; each entry is one line for the user.
 struct LiveCheck {
-  std::vector<std::string> agrees;
-  std::vector<std::string> differs; ///< difference and remedy
+  std::vector<std::string> matches;
+  std::vector<std::string> differences; ///< difference and remedy
 };
 
 /// Listens to all lidar packets and to the configured topics for `duration`. Does not disturb a running service. Fails

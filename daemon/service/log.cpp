@@ -31,33 +31,33 @@ bool stderr_is_journal() {
 
 Log::Log(Clock clock) : clock_(clock), to_journal_(stderr_is_journal()) {}
 
-void Log::say(Severity severity, const std::string& message, Fields fields, const CodePlace& where) {
-  std::uint64_t silenced = 0;
-  if (!may_speak(where, silenced))
+void Log::write(Severity severity, const std::string& message, Fields fields, const SourceLocation& where) {
+  std::uint64_t suppressed = 0;
+  if (!is_admitted(where, suppressed))
     return;
-  if (silenced > 0)
-    write(severity, fmt::format("{} ({} more like it were left out)", message, silenced), fields, where);
+  if (suppressed > 0)
+    emit(severity, fmt::format("{} ({} more like it were left out)", message, suppressed), fields, where);
   else
-    write(severity, message, fields, where);
+    emit(severity, message, fields, where);
 }
 
-bool Log::may_speak(const CodePlace& where, std::uint64_t& silenced_before) {
+bool Log::is_admitted(const SourceLocation& where, std::uint64_t& suppressed_before) {
   const std::scoped_lock lock(mutex_);
   const Duration now = clock_(CLOCK_MONOTONIC);
   Site& site = sites_[{where.file, where.line}];
-  if (site.said == 0 || now - site.since > kInterval) {
-    silenced_before = site.silenced;
+  if (site.written == 0 || now - site.since > kInterval) {
+    suppressed_before = site.suppressed;
     site = {now, 0, 0};
   }
-  if (site.said == kBurst) {
-    ++site.silenced;
+  if (site.written == kBurst) {
+    ++site.suppressed;
     return false;
   }
-  ++site.said;
+  ++site.written;
   return true;
 }
 
-void Log::write(Severity severity, const std::string& message, Fields fields, const CodePlace& where) const {
+void Log::emit(Severity severity, const std::string& message, Fields fields, const SourceLocation& where) const {
   if (!to_journal_) {
     static constexpr std::array<std::string_view, 7> kWords{"", "", "", "error: ", "warning: ", "", ""};
     const std::string line = fmt::format("locusd: {}{}\n", kWords[static_cast<std::size_t>(severity)], message);

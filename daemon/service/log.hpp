@@ -19,13 +19,13 @@ namespace locus::daemon {
 enum class Severity : std::uint8_t { error = 3, warning = 4, notice = 5, info = 6 };
 
 /// Source location: a substitute for std::source_location, which clang 14 lacks.
-struct CodePlace {
+struct SourceLocation {
   const char* file;
   std::uint32_t line;
   const char* function;
 
-  static constexpr CodePlace current(const char* file = __builtin_FILE(), std::uint32_t line = __builtin_LINE(),
-                                     const char* function = __builtin_FUNCTION()) {
+  static constexpr SourceLocation current(const char* file = __builtin_FILE(), std::uint32_t line = __builtin_LINE(),
+                                          const char* function = __builtin_FUNCTION()) {
     return {file, line, function};
   }
 };
@@ -45,27 +45,27 @@ class Log {
   using Clock = Duration (*)(clockid_t); ///< read_clock(), replaceable in tests
   explicit Log(Clock clock = [](clockid_t id) { return read_clock(id); });
 
-  void say(Severity severity, const std::string& message, Fields fields = {},
-           const CodePlace& where = CodePlace::current());
-  void error(const std::string& message, Fields fields = {}, const CodePlace& where = CodePlace::current()) {
-    say(Severity::error, message, fields, where);
+  void write(Severity severity, const std::string& message, Fields fields = {},
+             const SourceLocation& where = SourceLocation::current());
+  void error(const std::string& message, Fields fields = {}, const SourceLocation& where = SourceLocation::current()) {
+    write(Severity::error, message, fields, where);
   }
-  void warn(const std::string& message, Fields fields = {}, const CodePlace& where = CodePlace::current()) {
-    say(Severity::warning, message, fields, where);
+  void warn(const std::string& message, Fields fields = {}, const SourceLocation& where = SourceLocation::current()) {
+    write(Severity::warning, message, fields, where);
   }
-  void info(const std::string& message, Fields fields = {}, const CodePlace& where = CodePlace::current()) {
-    say(Severity::info, message, fields, where);
+  void info(const std::string& message, Fields fields = {}, const SourceLocation& where = SourceLocation::current()) {
+    write(Severity::info, message, fields, where);
   }
 
  private:
   struct Site {
     Duration since{};
-    int said = 0;
-    std::uint64_t silenced = 0;
+    int written = 0;
+    std::uint64_t suppressed = 0;
   };
 
-  [[nodiscard]] bool may_speak(const CodePlace& where, std::uint64_t& silenced_before);
-  void write(Severity severity, const std::string& message, Fields fields, const CodePlace& where) const;
+  [[nodiscard]] bool is_admitted(const SourceLocation& where, std::uint64_t& suppressed_before);
+  void emit(Severity severity, const std::string& message, Fields fields, const SourceLocation& where) const;
 
   Clock clock_;
   bool to_journal_;

@@ -104,7 +104,7 @@ void join_multicast(const Config& config, std::span<const UdpSocket> sockets) {
 
 namespace {
 
-std::string refused(const char* what, const char* advice) {
+std::string not_granted_text(const char* what, const char* advice) {
   return fmt::format("{} was not granted ({}); the service runs without; {}", what, std::strerror(errno), // NOLINT
                      advice);
 }
@@ -114,11 +114,11 @@ std::string refused(const char* what, const char* advice) {
 std::optional<std::string> lock_memory(bool wanted) {
   if ((wanted ? mlockall(MCL_CURRENT | MCL_FUTURE) : munlockall()) == 0)
     return std::nullopt;
-  return refused("realtime.lock_memory", "grant it as /usr/share/doc/locusd/examples/realtime.conf does");
+  return not_granted_text("realtime.lock_memory", "grant it as /usr/share/doc/locusd/examples/realtime.conf does");
 }
 
-std::optional<std::string> keep_to_cpus(const std::vector<int>& cpus) {
-  static const cpu_set_t kAtFirst = [] {
+std::optional<std::string> set_cpu_affinity(const std::vector<int>& cpus) {
+  static const cpu_set_t kInitial = [] {
     cpu_set_t set;
     CPU_ZERO(&set);
     sched_getaffinity(0, sizeof(set), &set);
@@ -128,16 +128,16 @@ std::optional<std::string> keep_to_cpus(const std::vector<int>& cpus) {
   CPU_ZERO(&set);
   for (const int cpu : cpus)
     CPU_SET(static_cast<std::size_t>(cpu), &set);
-  if (sched_setaffinity(0, sizeof(set), cpus.empty() ? &kAtFirst : &set) == 0)
+  if (sched_setaffinity(0, sizeof(set), cpus.empty() ? &kInitial : &set) == 0)
     return std::nullopt;
-  return refused("realtime.cpus", "name processors that this machine has and the unit may use");
+  return not_granted_text("realtime.cpus", "name processors that this machine has and the unit may use");
 }
 
 std::optional<std::string> raise_priority(int fifo_priority) {
   const sched_param wanted{fifo_priority};
   if (fifo_priority == 0 || sched_setscheduler(0, SCHED_FIFO, &wanted) == 0)
     return std::nullopt;
-  return refused("realtime.priority", "grant it as /usr/share/doc/locusd/examples/realtime.conf does");
+  return not_granted_text("realtime.priority", "grant it as /usr/share/doc/locusd/examples/realtime.conf does");
 }
 
 std::string scheduling() {
@@ -153,9 +153,9 @@ std::string scheduling() {
   return text;
 }
 
-void take_least_priority() {
-  constexpr int kLeast = 19;
-  setpriority(PRIO_PROCESS, 0, kLeast); // affects only this thread on Linux
+void set_lowest_priority() {
+  constexpr int kLowest = 19;
+  setpriority(PRIO_PROCESS, 0, kLowest); // affects only this thread on Linux
 }
 
 } // namespace locus::daemon

@@ -33,7 +33,7 @@ void join_multicast(const Config& config, std::span<const UdpSocket> sockets);
 /// Applies RealtimeOptions to the process; to be called before threads are created, which inherit the CPU affinity. All
 /// of it is optional: returns a line for the user if a request was not granted. A default value reverts earlier calls.
 std::optional<std::string> lock_memory(bool wanted);
-std::optional<std::string> keep_to_cpus(const std::vector<int>& cpus);
+std::optional<std::string> set_cpu_affinity(const std::vector<int>& cpus);
 
 /// Sets the SCHED_FIFO priority of the calling thread and of threads it creates, such as TBB's workers. Returns a line
 /// for the user if it was not granted.
@@ -43,6 +43,6 @@ std::optional<std::string> raise_priority(int fifo_priority);
 std::string scheduling();
 
 /// Sets the calling thread to the lowest priority (nice 19).
-void take_least_priority();
+void set_lowest_priority();
 
 } // namespace locus::daemon

@@ -47,11 +47,11 @@ int compare_with_wire(const locus::Config& config) {
     fmt::print(stderr, "locusd: {}\n", check.error());
     return kFailed;
   }
-  for (const std::string& line : check->agrees)
+  for (const std::string& line : check->matches)
     fmt::print("{}\n", line);
-  for (const std::string& line : check->differs)
+  for (const std::string& line : check->differences)
     fmt::print(stderr, "locusd: {}\n", line);
-  return check->differs.empty() ? kDone : kFailed;
+  return check->differences.empty() ? kDone : kFailed;
 }
 
 int run(const Arguments& arguments) {

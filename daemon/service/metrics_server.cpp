@@ -119,7 +119,7 @@ bool MetricsServer::serve() {
 }
 
 bool MetricsServer::serve(Client& client) {
-  if (clock_(CLOCK_MONOTONIC) - client.came > kPatience)
+  if (clock_(CLOCK_MONOTONIC) - client.connected_at > kPatience)
     return false;
   if (client.answer.empty() && !read_request(client))
     return false;

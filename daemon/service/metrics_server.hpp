@@ -49,7 +49,7 @@ class MetricsServer {
  private:
   struct Client {
     Descriptor socket;
-    Duration came{};
+    Duration connected_at{};
     std::string request, answer; ///< received so far; still to be sent
   };
 

@@ -20,7 +20,7 @@ namespace {
 
 using std::filesystem::path;
 
-constexpr std::int64_t kPiecesOfKept = 6; ///< pieces per kept duration; the excess is up to one piece
+constexpr std::int64_t kPiecesPerKeptDuration = 6; ///< pieces per kept duration; the excess is up to one piece
 
 path folder_of_socket() { return control_path().parent_path(); }
 
@@ -38,17 +38,17 @@ path ring_folder() { return folder_of_socket() / "input-ring"; }
 Expected<RecordingBounds, std::string> ring_bounds(std::uint64_t max_bytes, Duration keep) {
   std::error_code error;
   std::filesystem::create_directories(folder_of_socket(), error);
-  const auto no_ring = [](const std::string& why) {
+  const auto unusable = [](const std::string& why) {
     return fmt::format("{}: {}, so no input is held there for incidents; mount a tmpfs of 40 MB or more there, or set "
                        "record.folder (record.keep_s: 0 if no incidents are wanted)",
                        folder_of_socket().string(), why);
   };
   if (!is_in_memory(folder_of_socket()))
-    return no_ring("is no tmpfs");
+    return unusable("is no tmpfs");
   const std::uint64_t share = std::filesystem::space(folder_of_socket(), error).capacity / 4;
   if (error || share < RecordOptions::kLeastBytes)
-    return no_ring("is too small");
-  return RecordingBounds{std::min(max_bytes, share), keep / kPiecesOfKept, keep};
+    return unusable("is too small");
+  return RecordingBounds{std::min(max_bytes, share), keep / kPiecesPerKeptDuration, keep};
 }
 
 void mark_run(const path& run) {
@@ -61,7 +61,7 @@ void mark_run(const path& run) {
   std::ofstream{mark()} << run.string() << std::flush;
 }
 
-std::optional<path> take_marked_run() {
+std::optional<path> consume_mark() {
   std::string run;
   std::getline(std::ifstream{mark()}, run);
   std::error_code ignored;

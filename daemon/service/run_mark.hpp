@@ -27,7 +27,7 @@ Expected<RecordingBounds, std::string> ring_bounds(std::uint64_t max_bytes, Dura
 void mark_run(const std::filesystem::path& run);
 
 /// Returns the run marked by a process that did not end cleanly, and removes the mark.
-std::optional<std::filesystem::path> take_marked_run();
+std::optional<std::filesystem::path> consume_mark();
 
 /// Removes the mark and the recordings of all processes; files with other names stay.
 void remove_mark_and_ring();

@@ -24,7 +24,7 @@ namespace locus::daemon {
 
 namespace {
 
-constexpr double kInSight_m = 60.0;
+constexpr double kMapRadius_m = 60.0;
 
 constexpr std::array<char, 8> kMagic{'l', 'o', 'c', 'u', 's', 'd', ' ', '8'};
 
@@ -168,11 +168,11 @@ struct NewestHead {
 /// Returns the newest valid header, if any; `bytes` is the beginning of the file.
 std::optional<NewestHead> newest_head(std::string_view bytes) {
   std::optional<NewestHead> newest;
-  for (std::size_t place = 0; place < kHeads && bytes.size() >= (place + 1) * sizeof(Head); ++place) {
+  for (std::size_t index = 0; index < kHeads && bytes.size() >= (index + 1) * sizeof(Head); ++index) {
     Head head{};
-    std::memcpy(&head, bytes.data() + place * sizeof(Head), sizeof(Head));
+    std::memcpy(&head, bytes.data() + index * sizeof(Head), sizeof(Head));
     if (head.magic == kMagic && head.checksum == checksum_of(head) && (!newest || head.number > newest->head.number))
-      newest = {head, (kHeads - 1 - place) * sizeof(Head)};
+      newest = {head, (kHeads - 1 - index) * sizeof(Head)};
   }
   return newest;
 }
@@ -186,37 +186,37 @@ template <class Matrix> bool is_covariance(const Matrix& matrix) {
 }
 
 /// Checks a learned calibration for plausible values; one learned from a faulty source is discarded.
-bool makes_sense(const LearnedSource& learned) {
-  constexpr double kLeast = -0.9, kMost = 1.5; // bias in rad/s, delay in s, mounting in rad, scale - 1
+bool is_plausible(const LearnedSource& learned) {
+  constexpr double kMin = -0.9, kMax = 1.5; // bias in rad/s, delay in s, mounting in rad, scale - 1
   return (learned.noise_per_s.array() > 0.0).all() && learned.noise_per_s.allFinite() &&
-         (learned.states.array() > kLeast && learned.states.array() < kMost).all() && is_covariance(learned.covariance);
+         (learned.states.array() > kMin && learned.states.array() < kMax).all() && is_covariance(learned.covariance);
 }
 
 /// Checks that a state is usable, since the file may contain arbitrary values.
-bool makes_sense(const SavedState& state) {
-  constexpr double kFarthest_m = 1e8; // geocentric coordinates are within it
+bool is_plausible(const SavedState& state) {
+  constexpr double kMaxDistance_m = 1e8; // geocentric coordinates are within it
   if (state.last.stamp < Stamp{})
     return false;
-  const auto is_sound = [](const Pose& pose) {
-    return pose.rotation.norm() > 0.5 && pose.translation.norm() < kFarthest_m; // false for NaN
+  const auto is_valid = [](const Pose& pose) {
+    return pose.rotation.norm() > 0.5 && pose.translation.norm() < kMaxDistance_m; // false for NaN
   };
-  return is_sound(state.last.carried_to(Stamp::max())) && is_covariance(state.last.pose_covariance) &&
-         std::ranges::all_of(state.last.T_source_base, [&](const auto& pose) { return !pose || is_sound(*pose); }) &&
+  return is_valid(state.last.carried_to(Stamp::max())) && is_covariance(state.last.pose_covariance) &&
+         std::ranges::all_of(state.last.T_source_base, [&](const auto& pose) { return !pose || is_valid(*pose); }) &&
          std::ranges::all_of(state.map_odom, [](const SurfacePoint& point) {
-           return point.position_m.cast<double>().norm() < kFarthest_m && point.normal.allFinite();
+           return point.position_m.cast<double>().norm() < kMaxDistance_m && point.normal.allFinite();
          });
 }
 
 /// Parses a state; empty if the file is truncated or damaged.
 std::optional<SavedState> from_bytes(std::string_view bytes) {
-  constexpr std::size_t kBodyAt = kHeads * sizeof(Head), kPointsAt = kBodyAt + sizeof(Body);
+  constexpr std::size_t kBodyOffset = kHeads * sizeof(Head), kPointsOffset = kBodyOffset + sizeof(Body);
   const std::optional<NewestHead> newest = newest_head(bytes);
-  if (!newest || bytes.size() < kPointsAt)
+  if (!newest || bytes.size() < kPointsOffset)
     return std::nullopt;
   const Head& head = newest->head;
   Body body{};
-  std::memcpy(&body, bytes.data() + kBodyAt, sizeof(body));
-  const std::string_view points = bytes.substr(kPointsAt);
+  std::memcpy(&body, bytes.data() + kBodyOffset, sizeof(body));
+  const std::string_view points = bytes.substr(kPointsOffset);
   if (body.checksum != checksum_of(body, points) || points.size() != body.points * sizeof(SurfacePoint) ||
       body.flat_ground < 0 || body.flat_ground > static_cast<std::int32_t>(FlatGround::automatic))
     return std::nullopt;
@@ -225,9 +225,9 @@ std::optional<SavedState> from_bytes(std::string_view bytes) {
   state.last.T_odom_base = to_pose(head.xyz_xyzw);
   state.last.pose_covariance = Eigen::Map<const Matrix6>(head.covariance.data()).selfadjointView<Eigen::Lower>();
   for (std::size_t i = 0; i < kMaxSources; ++i) {
-    if (const auto& seen = head.sources_xyz_xyzw[i]; seen != decltype(seen){})
-      state.last.T_source_base[i] = to_pose(seen);
-    if (const LearnedSource learned = to_learned(head.learned[i]); makes_sense(learned))
+    if (const auto& stored = head.sources_xyz_xyzw[i]; stored != decltype(stored){})
+      state.last.T_source_base[i] = to_pose(stored);
+    if (const LearnedSource learned = to_learned(head.learned[i]); is_plausible(learned))
       state.last.learned[i].emplace(learned).since = stamp_from_ns(head.learned_since_ns[i]);
   }
   state.last.doubted = head.doubted;
@@ -237,7 +237,7 @@ std::optional<SavedState> from_bytes(std::string_view bytes) {
   state.map_odom.resize(body.points);
   if (body.points > 0)
     std::memcpy(std::as_writable_bytes(std::span(state.map_odom)).data(), points.data(), points.size());
-  return makes_sense(state) ? std::optional(std::move(state)) : std::nullopt;
+  return is_plausible(state) ? std::optional(std::move(state)) : std::nullopt;
 }
 
 } // namespace
@@ -257,7 +257,7 @@ SourceIds ids_of(std::span<const MotionSource> sources) {
   return ids;
 }
 
-void SavedState::forget_changed(const SourceIds& now) {
+void SavedState::reset_changed_sources(const SourceIds& now) {
   if (sources.list != now.list)
     last.forget_sources();
   for (std::size_t i = 0; i < kMaxSources; ++i)
@@ -266,7 +266,7 @@ void SavedState::forget_changed(const SourceIds& now) {
 }
 
 void read_map(const Odometry& odometry, const Pose& T_odom_base, std::vector<SurfacePoint>& map_odom) {
-  read_planes(odometry.map().fine(), map_odom, T_odom_base.translation, kInSight_m);
+  read_planes(odometry.map().fine(), map_odom, T_odom_base.translation, kMapRadius_m);
 }
 
 std::optional<std::string> write_state(const std::filesystem::path& file, const SavedState& state) {
@@ -318,13 +318,13 @@ std::optional<std::filesystem::path> state_path() {
 }
 
 /// Tells whether a full state is due. A clock that was set back does not delay it.
-bool StateKeeper::is_due() const {
-  return !saved_ || std::chrono::abs(now_->stamp - saved_->stamp) > kEvery ||
-         (now_->T_odom_base.translation - saved_->T_odom_base.translation).norm() > kEvery_m;
+bool StateSaver::is_due() const {
+  return !saved_ || std::chrono::abs(last_->stamp - saved_->stamp) > kPeriod ||
+         (last_->T_odom_base.translation - saved_->T_odom_base.translation).norm() > kDistance_m;
 }
 
-void StateKeeper::begin_anew(const std::optional<SavedState>& start) {
-  now_.reset();
+void StateSaver::reset(const std::optional<SavedState>& start) {
+  last_.reset();
   saved_.reset();
   written_.reset();
   static_cast<void>(states_.poll()); // discards stale data
@@ -332,41 +332,41 @@ void StateKeeper::begin_anew(const std::optional<SavedState>& start) {
   std::error_code error;
   if (file_ && start) {
     if (const auto problem = write_state(*file_, *start))
-      complain_(*problem);
+      error_sink_(*problem);
   } else if (file_ && !std::filesystem::remove(*file_, error) && error) {
-    complain_(fmt::format("{}: cannot be removed ({}); a restart within a minute goes on from it", file_->string(),
-                          error.message()));
+    error_sink_(fmt::format("{}: cannot be removed ({}); a restart within a minute goes on from it", file_->string(),
+                            error.message()));
   }
 }
 
-void StateKeeper::take(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground) {
+void StateSaver::update(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground) {
   if (!estimate.beginning) // the saved state is still valid
     return;
-  now_ = now_.value_or(Whereabouts{}).followed_by(estimate);
+  last_ = last_.value_or(Whereabouts{}).followed_by(estimate);
   if (!file_)
     return;
   if (!estimate.failed && is_due()) {
-    saved_ = now_;
-    Due& due = states_.back();
-    due.number = ++number_;
-    due.state.last = *now_;
-    due.state.flat_ground = flat_ground;
-    due.state.sources = sources_;
-    read_map(odometry, now_->T_odom_base, due.state.map_odom);
+    saved_ = last_;
+    PendingState& pending = states_.back();
+    pending.number = ++number_;
+    pending.state.last = *last_;
+    pending.state.flat_ground = flat_ground;
+    pending.state.sources = sources_;
+    read_map(odometry, last_->T_odom_base, pending.state.map_odom);
     static_cast<void>(states_.publish()); // replaces an older unwritten state
   }
-  whereabouts_.back() = {number_, *now_};
+  whereabouts_.back() = {number_, *last_};
   static_cast<void>(whereabouts_.publish());
 }
 
 /// Reads the whereabouts first: the state that they refer to is then pending or already written.
-void StateKeeper::write() {
-  const Update* const update = whereabouts_.poll();
-  if (const Due* const due = states_.poll()) {
-    const auto problem = write_state(*file_, due->state);
-    written_ = problem ? std::nullopt : std::optional{due->number};
+void StateSaver::write() {
+  const PendingUpdate* const update = whereabouts_.poll();
+  if (const PendingState* const pending = states_.poll()) {
+    const auto problem = write_state(*file_, pending->state);
+    written_ = problem ? std::nullopt : std::optional{pending->number};
     if (problem)
-      complain_(*problem);
+      error_sink_(*problem);
   }
   if (update != nullptr && update->number == written_)
     update_whereabouts(*file_, update->last);

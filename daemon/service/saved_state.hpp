@@ -37,7 +37,7 @@ struct SavedState {
 
   /// Discards the data of motion sources if their list has changed, and the learned calibration of sources whose
   /// configuration has changed.
-  void forget_changed(const SourceIds& now);
+  void reset_changed_sources(const SourceIds& now);
 };
 
 /// Copies the surfaces of the map within sight of the robot, odom frame, after an estimate.
@@ -57,37 +57,37 @@ void update_whereabouts(const std::filesystem::path& file, const Whereabouts& la
 std::optional<std::filesystem::path> state_path();
 
 /// Saves the full state periodically and the whereabouts more often, from a thread that may block on the disk: the map
-/// is worth its cost only every kEvery or kEvery_m, but the pose of a moving robot is outdated within a second.
-class StateKeeper {
+/// is worth its cost only every kPeriod or kDistance_m, but the pose of a moving robot is outdated within a second.
+class StateSaver {
  public:
-  static constexpr Duration kEvery = std::chrono::seconds{30};
-  static constexpr double kEvery_m = 10.0;
-  using Complain = std::function<void(const std::string&)>;
+  static constexpr Duration kPeriod = std::chrono::seconds{30};
+  static constexpr double kDistance_m = 10.0;
+  using ErrorSink = std::function<void(const std::string&)>;
 
   /// Does nothing if `file` is empty.
-  StateKeeper(std::optional<std::filesystem::path> file, std::span<const MotionSource> sources, Complain complain)
-      : file_(std::move(file)), sources_(ids_of(sources)), complain_(std::move(complain)) {}
+  StateSaver(std::optional<std::filesystem::path> file, std::span<const MotionSource> sources, ErrorSink error_sink)
+      : file_(std::move(file)), sources_(ids_of(sources)), error_sink_(std::move(error_sink)) {}
 
   /// Producer, one thread: hands over the state after every estimate.
-  void take(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground);
+  void update(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground);
 
   /// Producer: returns the current whereabouts; empty before the first estimate.
-  [[nodiscard]] const std::optional<Whereabouts>& now() const { return now_; }
+  [[nodiscard]] const std::optional<Whereabouts>& last() const { return last_; }
 
   /// Disk thread, periodically: writes the latest state or whereabouts.
   void write();
 
   /// Producer: replaces the saved state by `start`, or removes it. Blocks on the disk; precondition: write() is not
   /// running.
-  void begin_anew(const std::optional<SavedState>& start);
+  void reset(const std::optional<SavedState>& start);
 
  private:
-  struct Due {
+  struct PendingState {
     std::uint64_t number = 0;
     SavedState state;
   };
   /// Whereabouts in the odom frame of the state with this number.
-  struct Update {
+  struct PendingUpdate {
     std::uint64_t number = 0;
     Whereabouts last;
   };
@@ -96,12 +96,12 @@ class StateKeeper {
 
   std::optional<std::filesystem::path> file_;
   SourceIds sources_;
-  Complain complain_;
-  LatestSlot<Due> states_;
-  LatestSlot<Update> whereabouts_;
-  std::optional<Whereabouts> now_, saved_; ///< after the last estimate; in the last state; owned by the producer
-  std::uint64_t number_ = 0;               ///< number of the last state handed over; owned by the producer
-  std::optional<std::uint64_t> written_;   ///< number of the state in the file; owned by the disk thread
+  ErrorSink error_sink_;
+  LatestSlot<PendingState> states_;
+  LatestSlot<PendingUpdate> whereabouts_;
+  std::optional<Whereabouts> last_, saved_; ///< after the last estimate; in the last state; owned by the producer
+  std::uint64_t number_ = 0;                ///< number of the last state handed over; owned by the producer
+  std::optional<std::uint64_t> written_;    ///< number of the state in the file; owned by the disk thread
 };
 
 } // namespace locus::daemon

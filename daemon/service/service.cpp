@@ -28,8 +28,8 @@ namespace locus::daemon {
 namespace {
 
 constexpr Duration kTick = std::chrono::milliseconds{100};
-constexpr Duration kAfterAnswers = std::chrono::milliseconds{50}; ///< limits clients to 20 rounds of requests/s
-constexpr Duration kTellEvery = std::chrono::seconds{1};
+constexpr Duration kPauseAfterAnswers = std::chrono::milliseconds{50}; ///< limits clients to 20 rounds of requests/s
+constexpr Duration kReportPeriod = std::chrono::seconds{1};
 
 /// Blocks the signals before the first thread is created, so that they are delivered through the descriptor only.
 int open_signals() {
@@ -57,7 +57,7 @@ Expected<Config, ConfigErrors> read_config(const std::filesystem::path& file) {
 Service::Service(std::filesystem::path config_file, Log& log)
     : config_file_(std::move(config_file)), log_(log), inherited_(inherited_sockets()), signals_(open_signals()) {
   set_dds_log([this](bool is_error, std::string_view line) {
-    log_.say(is_error ? Severity::error : Severity::info, fmt::format("Cyclone DDS: {}", line));
+    log_.write(is_error ? Severity::error : Severity::info, fmt::format("Cyclone DDS: {}", line));
   });
 }
 
@@ -68,7 +68,7 @@ int Service::run(const Config& config) {
   if (const auto file = state_path(); file && control_)
     incidents_.emplace(file->parent_path() / "incidents");
   std::optional<SavedState> state = recent_state();
-  keep_what_was_left(config, state);
+  store_crashed_run(config, state);
   if (const auto problem = begin(config, std::move(state))) {
     log_.error(*problem);
     finish_incident(); // lost otherwise, since the process ends here
@@ -83,20 +83,20 @@ int Service::run(const Config& config) {
       metrics_->add_to(wait);
     const timespec tick = to_timespec(kTick);
     ppoll(wait.data(), wait.size(), &tick, nullptr);
-    wanted = take_signal();
+    wanted = handle_signals();
     const bool was_asked = wanted && control_ && control_->serve();
     const bool was_scraped = wanted && session_ && metrics_ && metrics_->serve();
     if (was_asked || was_scraped)
-      std::this_thread::sleep_for(kAfterAnswers);
-    look_after();
+      std::this_thread::sleep_for(kPauseAfterAnswers);
+    supervise();
   }
   sd_notify(0, "STOPPING=1\nSTATUS=Stopping");
   if (!session_)
     return 1;
-  watch_.reset();
+  monitor_.reset();
   const std::optional<SavedState> last = session_->stop();
   session_.reset(); // ends the other writer of states
-  keep_state(last);
+  save_state(last);
   finish_incident();
   if (control_)
     remove_mark_and_ring();
@@ -115,7 +115,7 @@ void Service::open_control() {
 
 /// Loads the state of an earlier service and marks whether its pose may still be valid.
 std::optional<SavedState> Service::recent_state() {
-  constexpr Duration kOldest = std::chrono::seconds{60};
+  constexpr Duration kMaxAge = std::chrono::seconds{60};
   const auto file = state_path();
   if (!file || !std::filesystem::exists(*file))
     return std::nullopt;
@@ -125,16 +125,16 @@ std::optional<SavedState> Service::recent_state() {
     return std::nullopt;
   }
   const Duration age = Stamp{read_clock(CLOCK_REALTIME)} - state->last.stamp;
-  state->is_recent = age >= Duration::zero() && age <= kOldest;
+  state->is_recent = age >= Duration::zero() && age <= kMaxAge;
   if (age < Duration::zero())
     log_.info("a fresh start: the saved state is newer than the clock; the clock was set back");
-  if (age > kOldest)
+  if (age > kMaxAge)
     log_.info(fmt::format("a fresh start: the saved state is {:.0f} s old, more than {:.0f} s", to_seconds(age),
-                          to_seconds(kOldest)));
+                          to_seconds(kMaxAge)));
   return std::move(*state);
 }
 
-void Service::keep_state(const std::optional<SavedState>& state) {
+void Service::save_state(const std::optional<SavedState>& state) {
   const auto file = state_path();
   if (!file || !state)
     return;
@@ -143,13 +143,13 @@ void Service::keep_state(const std::optional<SavedState>& state) {
 }
 
 /// Stores the input of a crashed run as an incident; a run that ended cleanly has left no mark.
-void Service::keep_what_was_left(const Config& config, const std::optional<SavedState>& state) {
+void Service::store_crashed_run(const Config& config, const std::optional<SavedState>& state) {
   if (!incidents_)
     return;
   std::error_code ignored;
   for (const auto& folder : {ring_folder(), record_folder(config.record.folder)})
     std::filesystem::remove_all(snapshot_in(folder), ignored); // incomplete when the run ended
-  const auto run = take_marked_run();
+  const auto run = consume_mark();
   if (!run || config.record.keep_s == 0)
     return;
   const Duration keep = from_seconds(config.record.keep_s);
@@ -166,9 +166,9 @@ void Service::keep_what_was_left(const Config& config, const std::optional<Saved
 }
 
 std::optional<std::string> Service::begin(const Config& config, std::optional<SavedState> state) {
-  watch_.reset();
+  monitor_.reset();
   session_.reset();
-  if (const auto problem = keep_to_cpus(config.realtime.cpus)) // inherited by the new threads
+  if (const auto problem = set_cpu_affinity(config.realtime.cpus)) // inherited by the new threads
     log_.warn(*problem);
   if (const auto problem = lock_memory(config.realtime.lock_memory))
     log_.warn(*problem);
@@ -179,14 +179,14 @@ std::optional<std::string> Service::begin(const Config& config, std::optional<Sa
   if (!session)
     return session.error();
   session_ = std::move(*session);
-  map_asked_.reset();
-  watch_.emplace(session_->config(), session_->input().sockets(), log_);
-  listen_for_metrics(config.metrics.listen);
+  map_requested_at_.reset();
+  monitor_.emplace(session_->config(), session_->input().sockets(), log_);
+  serve_metrics(config.metrics.listen);
   return std::nullopt;
 }
 
 /// Starts the metrics server. A reload retries after a failure.
-void Service::listen_for_metrics(const std::string& address) {
+void Service::serve_metrics(const std::string& address) {
   if (metrics_ && address == metrics_address_)
     return;
   metrics_.reset();
@@ -206,7 +206,7 @@ ControlServer::Answer Service::reload() {
   Answer answer = Answer::done();
   if (const auto config = read_config(config_file_); !config)
     answer = Answer::wrong_usage(fmt::format("{}", fmt::join(config.error(), "; ")));
-  else if (const auto problem = go_on_with(*config))
+  else if (const auto problem = restart_with(*config))
     answer = Answer::refusal(*problem);
   if (!answer.json.contains("error"))
     log_.info("reloaded");
@@ -220,19 +220,19 @@ ControlServer::Answer Service::reload() {
 
 /// Restarts the session with `config` at the current pose. If that fails, restarts it with the old configuration: its
 /// sockets had to be closed first, since the new ones may be the same.
-std::optional<std::string> Service::go_on_with(const Config& config) {
+std::optional<std::string> Service::restart_with(const Config& config) {
   const Config old = session_->config();
   const FlatGround mode = session_->flat_ground();
   const std::optional<SavedState> state = session_->stop();
-  std::optional<SavedState> its_state = state;
-  if (its_state)
-    its_state->flat_ground = config.odometry.flat_ground;
-  auto problem = begin(config, std::move(its_state));
+  std::optional<SavedState> new_state = state;
+  if (new_state)
+    new_state->flat_ground = config.odometry.flat_ground;
+  auto problem = begin(config, std::move(new_state));
   if (!problem)
     return std::nullopt;
   if (const auto old_problem = begin(old, state)) {
     *problem += "; the old configuration fails as well; the service stops: " + *old_problem;
-    keep_state(state);
+    save_state(state);
   } else {
     session_->set_flat_ground(mode);
   }
@@ -240,15 +240,15 @@ std::optional<std::string> Service::go_on_with(const Config& config) {
 }
 
 /// Handles pending signals; false if the service is to stop. Several SIGHUP cause one reload.
-bool Service::take_signal() {
+bool Service::handle_signals() {
   signalfd_siginfo info{};
-  bool is_to_reload = false;
+  bool reload_requested = false;
   while (read(signals_, &info, sizeof(info)) == static_cast<ssize_t>(sizeof(info))) {
     if (info.ssi_signo != SIGHUP)
       return false;
-    is_to_reload = true;
+    reload_requested = true;
   }
-  if (is_to_reload)
+  if (reload_requested)
     reload();
   return true;
 }
@@ -279,7 +279,7 @@ std::optional<ControlServer::Answer> Service::answer(const Reset& request) {
 
 std::optional<ControlServer::Answer> Service::answer(Reload /*request*/) { return reload(); }
 
-std::optional<ControlServer::Answer> Service::answer(KeepIncident request) {
+std::optional<ControlServer::Answer> Service::answer(StoreIncident request) {
   using Answer = ControlServer::Answer;
   const Figures figures = session_->figures();
   if (!figures.live->incidents)
@@ -305,52 +305,52 @@ void Service::finish_incident() {
     incidents_->work(nullptr);
 }
 
-void Service::look_for_incidents(const Figures& figures) {
-  const auto cause = incident_watch_.look(figures);
+void Service::check_for_incidents(const Figures& figures) {
+  const auto cause = incident_watch_.check(figures);
   const Stamp now{read_clock(CLOCK_REALTIME)};
   if (cause)
     incidents_->raise({*cause, from_seconds(figures.config.record.keep_s), now, incident_report(*cause, now, figures)});
   const Incidents::Status& incidents = *figures.live->incidents;
-  if (!incidents.problem.empty() && incidents.problem != told_incidents_.problem)
+  if (!incidents.problem.empty() && incidents.problem != logged_incidents_.problem)
     log_.error(fmt::format("{}; the odometry goes on", incidents.problem));
-  if (!incidents.refusal.empty() && incidents.refusal != told_incidents_.refusal)
+  if (!incidents.refusal.empty() && incidents.refusal != logged_incidents_.refusal)
     log_.warn(incidents.refusal);
-  if (incidents.kept != told_incidents_.kept)
-    log_.say(Severity::notice, fmt::format("the last input is kept in {}", incidents.last.string()));
-  told_incidents_ = incidents;
+  if (incidents.kept != logged_incidents_.kept)
+    log_.write(Severity::notice, fmt::format("the last input is kept in {}", incidents.last.string()));
+  logged_incidents_ = incidents;
 }
 
 /// Returns the points of the map in their memory layout; empty until the odometry thread has delivered them. A request
 /// whose client has timed out is repeated, since its map would be stale.
 std::optional<ControlServer::Answer> Service::answer(SaveMap /*request*/) {
   const Duration now = read_clock(CLOCK_MONOTONIC);
-  if (!map_asked_ || now - *map_asked_ > ControlServer::kLongestAnswer) {
+  if (!map_requested_at_ || now - *map_requested_at_ > ControlServer::kLongestAnswer) {
     session_->request_map();
-    map_asked_ = now;
+    map_requested_at_ = now;
   }
-  const std::vector<SurfacePoint>* const points = session_->take_map();
+  const std::vector<SurfacePoint>* const points = session_->poll_map();
   if (points == nullptr)
     return std::nullopt;
-  map_asked_.reset();
+  map_requested_at_.reset();
   const auto bytes = std::as_bytes(std::span(*points));
   return ControlServer::Answer{{{"points", points->size()}}, {bytes.begin(), bytes.end()}};
 }
 
-void Service::look_after() {
+void Service::supervise() {
   if (!session_)
     return;
   const Figures figures = session_->figures();
-  watch_->look(figures);
+  monitor_->check(figures);
   if (figures.live->incidents)
-    look_for_incidents(figures);
-  watchdog_.look(*session_);
+    check_for_incidents(figures);
+  watchdog_.feed(*session_);
   const auto& last = figures.sweeps.last;
   const std::optional<TrackingState> state = last ? std::optional{last->state} : std::nullopt;
   const Duration now = read_clock(CLOCK_MONOTONIC);
-  if (state == told_state_ && now - told_ < kTellEvery)
+  if (state == reported_state_ && now - reported_at_ < kReportPeriod)
     return;
-  told_state_ = state;
-  told_ = now;
+  reported_state_ = state;
+  reported_at_ = now;
   sd_notify(0, fmt::format("STATUS={}", status_line(figures)).c_str());
   const Stamp stamp{read_clock(CLOCK_REALTIME)};
   session_->link().publish(DiagnosticsMessage(diagnostics(figures, stamp), stamp));

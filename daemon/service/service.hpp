@@ -36,23 +36,23 @@ class Service {
   /// Starts a session. Returns the failure, if any; there is no session then.
   std::optional<std::string> begin(const Config& config, std::optional<SavedState> state);
   [[nodiscard]] std::optional<SavedState> recent_state();
-  void keep_state(const std::optional<SavedState>& state);
-  void keep_what_was_left(const Config& config, const std::optional<SavedState>& state);
+  void save_state(const std::optional<SavedState>& state);
+  void store_crashed_run(const Config& config, const std::optional<SavedState>& state);
   void finish_incident();
-  void look_for_incidents(const Figures& figures);
+  void check_for_incidents(const Figures& figures);
   std::optional<ControlServer::Answer> answer(const ControlRequest& request);
   std::optional<ControlServer::Answer> answer(ShowStatus request);
   std::optional<ControlServer::Answer> answer(SaveMap request);
   std::optional<ControlServer::Answer> answer(SetFlatGround request);
   std::optional<ControlServer::Answer> answer(const Reset& request);
   std::optional<ControlServer::Answer> answer(Reload request);
-  std::optional<ControlServer::Answer> answer(KeepIncident request);
+  std::optional<ControlServer::Answer> answer(StoreIncident request);
   /// Rereads the configuration file; an invalid one leaves the old configuration in effect and is reported.
   ControlServer::Answer reload();
-  std::optional<std::string> go_on_with(const Config& config);
-  void listen_for_metrics(const std::string& address);
-  void look_after();
-  bool take_signal();
+  std::optional<std::string> restart_with(const Config& config);
+  void serve_metrics(const std::string& address);
+  void supervise();
+  bool handle_signals();
 
   std::filesystem::path config_file_;
   Log& log_;
@@ -60,16 +60,16 @@ class Service {
   int signals_;                        ///< signalfd
   std::optional<Incidents> incidents_; ///< empty without a state directory or control socket
   IncidentWatch incident_watch_;
-  Incidents::Status told_incidents_;
+  Incidents::Status logged_incidents_;
   std::unique_ptr<Session> session_;
   std::optional<ControlServer> control_;
   std::unique_ptr<MetricsServer> metrics_;
-  std::string metrics_address_;       ///< address of the last attempt to listen
-  std::optional<Duration> map_asked_; ///< time of the pending map request, CLOCK_MONOTONIC; empty: none
-  std::optional<Watch> watch_;
+  std::string metrics_address_;              ///< address of the last attempt to listen
+  std::optional<Duration> map_requested_at_; ///< time of the pending map request, CLOCK_MONOTONIC; empty: none
+  std::optional<SessionMonitor> monitor_;
   Watchdog watchdog_;
-  Duration told_{};
-  std::optional<TrackingState> told_state_;
+  Duration reported_at_{};
+  std::optional<TrackingState> reported_state_;
 };
 
 } // namespace locus::daemon

@@ -24,10 +24,11 @@ OdometryReport report_of(const FastSample& s) {
   return {s.stamp, s.T_odom_base, s.pose_covariance, s.twist_base, s.twist_covariance};
 }
 
-std::vector<bool> which_give_clouds(const std::vector<LidarOptions>& lidars) {
-  std::vector<bool> which(lidars.size());
-  std::transform(lidars.begin(), lidars.end(), which.begin(), [](const auto& lidar) { return lidar.gives_clouds(); });
-  return which;
+std::vector<bool> publishes_clouds(const std::vector<LidarOptions>& lidars) {
+  std::vector<bool> publishes(lidars.size());
+  std::transform(lidars.begin(), lidars.end(), publishes.begin(),
+                 [](const auto& lidar) { return lidar.gives_clouds(); });
+  return publishes;
 }
 
 } // namespace
@@ -53,20 +54,20 @@ Expected<std::unique_ptr<Session>, std::string> Session::start(const Config& con
 Session::Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket> sockets,
                  std::optional<SavedState> state, Incidents* incidents, Log& log)
     : config_(config), log_(log), started_(MachineTime::now()),
-      input_(std::move(sockets), which_give_clouds(config.lidars)),
+      input_(std::move(sockets), publishes_clouds(config.lidars)),
       flat_ground_(state && state->is_recent ? state->flat_ground : config.odometry.flat_ground), incidents_(incidents),
       link_(
           config, [this](const RosInput& input) { receive(input); }, instance_name(),
           [this](std::uint8_t lidar, Stamp arrival, const SerialisedSample& cloud) { receive(lidar, arrival, cloud); }),
       clouds_(config.dds, link_), start_(std::move(state)),
-      state_(state_path(), config.motion_sources, [this](const std::string& problem) { log_.error(problem); }) {
+      state_saver_(state_path(), config.motion_sources, [this](const std::string& problem) { log_.error(problem); }) {
   if (start_) {
-    start_->forget_changed(ids_of(config_.motion_sources));
+    start_->reset_changed_sources(ids_of(config_.motion_sources));
     const Duration age = Stamp{read_clock(CLOCK_REALTIME)} - start_->last.stamp;
     calibration_ = {start_->last.learned, std::max(0.0, to_seconds(age))};
   }
   // NOLINTNEXTLINE(cppcoreguidelines-prefer-member-initializer): grouped with the use of start_
-  has_past_ = start_ && start_->is_recent && !start_->map_odom.empty();
+  has_saved_map_ = start_ && start_->is_recent && !start_->map_odom.empty();
   begin(std::move(lidars));
 }
 
@@ -80,20 +81,20 @@ void Session::begin(LidarRouter lidars) {
   options.on_thread_start = [this] {
     if (const auto problem = raise_priority(config_.realtime.priority))
       log_.warn(*problem);
-    if (!scheduling_told_.exchange(true))
+    if (!scheduling_logged_.exchange(true))
       log_.info("runs with " + scheduling());
   };
   options.after_estimate = [this](const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
-    after(sweep, odometry, estimate);
+    after_estimate(sweep, odometry, estimate);
   };
   InputSource& input = begin_recording();
   disk_.emplace(
-      "disk", kDiskRound, [this](bool last) { write_to_disk(last); }, [] { take_least_priority(); });
+      "disk", kDiskRound, [this](bool last) { write_to_disk(last); }, [] { set_lowest_priority(); });
   const std::scoped_lock lock(pipeline_mutex_);
   pipeline_ = std::make_unique<LivePipeline>(config_, std::move(lidars), input, std::move(options));
   pipeline_->set_flat_ground(flat_ground());
   stopping_.store(false, std::memory_order_relaxed);
-  publisher_ = std::thread([this] { publish(); });
+  publisher_ = std::thread([this] { run_publisher(); });
   pthread_setname_np(publisher_.native_handle(), "publisher");
 }
 
@@ -101,7 +102,7 @@ void Session::begin(LidarRouter lidars) {
 /// same poses. Incidents use the recording to a folder if there is one, otherwise a ring in memory.
 InputSource& Session::begin_recording() {
   recorder_.reset(); // its pipeline is stopped
-  holds_ring_ = ring_is_looked_at_ = false;
+  records_to_memory_ = old_ring_removed_ = false;
   const RecordOptions& options = config_.record;
   const Duration keep = incidents_ != nullptr ? from_seconds(options.keep_s) : Duration{};
   if (options.folder.empty() && keep == Duration{})
@@ -112,7 +113,7 @@ InputSource& Session::begin_recording() {
       log_.warn(bounds.error());
       return input_;
     }
-    holds_ring_ = true;
+    records_to_memory_ = true;
     return record_to(ring_folder(), *bounds);
   }
   const auto files = sample_files(config_);
@@ -129,25 +130,25 @@ InputSource& Session::record_to(const std::filesystem::path& folder, const Recor
   return recording_input_.emplace(input_, *recorder_);
 }
 
-bool Session::keeps_incidents() const {
+bool Session::stores_incidents() const {
   return incidents_ != nullptr && recorder_ != nullptr && config_.record.keep_s > 0;
 }
 
 /// Disk thread: writes states, incidents and the recording. Incidents precede the recording, so that the pieces they
 /// link are complete and not yet removed. A ring of an earlier session is removed once no incident is being written.
 void Session::write_to_disk(bool last_round) {
-  state_.write();
+  state_saver_.write();
   if (incidents_ != nullptr) {
     incidents_->work(recorder_.get());
-    if (!holds_ring_ && !ring_is_looked_at_ && incidents_->status().writing.empty()) {
+    if (!records_to_memory_ && !old_ring_removed_ && incidents_->status().writing.empty()) {
       remove_mark_and_ring();
-      ring_is_looked_at_ = true;
+      old_ring_removed_ = true;
     }
   }
   if (!recorder_)
     return;
   recorder_->write(last_round);
-  if (keeps_incidents() && (holds_ring_ || ring_is_looked_at_))
+  if (stores_incidents() && (records_to_memory_ || old_ring_removed_))
     mark_run(recorder_->status().run);
 }
 
@@ -160,25 +161,25 @@ void Session::end() {
 }
 
 /// Converts the times of an estimate from SteadyTime to the host's wall clock.
-OdometryEstimate Session::on_the_wall(const OdometryEstimate& estimate) const {
-  OdometryEstimate told = estimate;
-  told.stamp = input_.time().to_wall(estimate.stamp);
-  for (SourceReport& source : told.sources) {
+OdometryEstimate Session::in_wall_time(const OdometryEstimate& estimate) const {
+  OdometryEstimate converted = estimate;
+  converted.stamp = input_.time().to_wall(estimate.stamp);
+  for (SourceReport& source : converted.sources) {
     if (source.last_used != Stamp{})
       source.last_used = input_.time().to_wall(source.last_used);
     if (source.learned)
       source.learned->since = input_.time().to_wall(source.learned->since);
   }
-  return told;
+  return converted;
 }
 
 /// Odometry thread: hands over clouds, state and map after the estimate was handed over.
-void Session::after(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& steady_estimate) {
-  const OdometryEstimate estimate = on_the_wall(steady_estimate);
+void Session::after_estimate(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& steady_estimate) {
+  const OdometryEstimate estimate = in_wall_time(steady_estimate);
   if (estimate.beginning)
     start_.reset();
-  clouds_.take(sweep, odometry, estimate);
-  state_.take(odometry, estimate, flat_ground());
+  clouds_.submit(sweep, odometry, estimate);
+  state_saver_.update(odometry, estimate, flat_ground());
   const std::uint64_t wanted = map_wanted_.load(std::memory_order_relaxed);
   if (wanted == map_answered_)
     return;
@@ -188,7 +189,7 @@ void Session::after(const Sweep& sweep, const Odometry& odometry, const Odometry
   static_cast<void>(map_.publish());
 }
 
-const std::vector<SurfacePoint>* Session::take_map() {
+const std::vector<SurfacePoint>* Session::poll_map() {
   const Map* const map = map_.poll();
   return map != nullptr && map->request == map_wanted_.load(std::memory_order_relaxed) ? &map->points : nullptr;
 }
@@ -199,12 +200,12 @@ std::optional<std::string> Session::reset(std::optional<Pose> T_odom_base) {
     return lidars.error();
   end();
   start_.reset();
-  if (state_.now())
-    calibration_ = {state_.now()->learned, 0.0};
+  if (state_saver_.last())
+    calibration_ = {state_saver_.last()->learned, 0.0};
   if (T_odom_base)
     start_ = {{Stamp{read_clock(CLOCK_REALTIME)}, *T_odom_base}, flat_ground(), {}};
-  state_.begin_anew(start_);
-  has_past_ = announced_ = false;
+  state_saver_.reset(start_);
+  has_saved_map_ = announced_ = false;
   announcement_.reset();
   begin(std::move(*lidars));
   log_.info("odometry begins anew, as it was told to");
@@ -213,19 +214,19 @@ std::optional<std::string> Session::reset(std::optional<Pose> T_odom_base) {
 
 std::optional<SavedState> Session::stop() {
   end();
-  if (!state_.now()) {
+  if (!state_saver_.last()) {
     if (start_)
       start_->flat_ground = flat_ground();
     return std::move(start_);
   }
-  SavedState state{*state_.now(), flat_ground(), {}, ids_of(config_.motion_sources)};
+  SavedState state{*state_saver_.last(), flat_ground(), {}, ids_of(config_.motion_sources)};
   read_map(pipeline_->processor().odometry(), state.last.T_odom_base, state.map_odom);
   return state;
 }
 
 void Session::receive(const RosInput& input) {
-  if (const auto* word = std::get_if<FlatGroundWord>(&input))
-    take(*word);
+  if (const auto* message = std::get_if<FlatGroundMessage>(&input))
+    apply(*message);
   else if (const auto* imu = std::get_if<ImuInput>(&input))
     input_.push(*imu);
   else if (const auto* odometry = std::get_if<OdometryInput>(&input))
@@ -246,15 +247,15 @@ void Session::receive(std::uint8_t lidar, Stamp arrival, const SerialisedSample&
 }
 
 /// Applies a flat-ground message, at most one change a second, to suppress chatter of the topic.
-void Session::take(FlatGroundWord word) {
-  constexpr Duration kLeastPause = std::chrono::seconds{1};
-  const FlatGround wanted = word.flat ? FlatGround::on : FlatGround::off;
+void Session::apply(FlatGroundMessage message) {
+  constexpr Duration kMinInterval = std::chrono::seconds{1};
+  const FlatGround wanted = message.flat ? FlatGround::on : FlatGround::off;
   const Duration now = read_clock(CLOCK_MONOTONIC);
-  if (wanted == flat_ground() || now - flat_ground_changed_ < kLeastPause)
+  if (wanted == flat_ground() || now - flat_ground_changed_ < kMinInterval)
     return;
   flat_ground_changed_ = now;
   set_flat_ground(wanted);
-  log_.info(fmt::format("flat ground is {}, as {} says", word.flat ? "on" : "off", config_.dds.flat_ground_topic));
+  log_.info(fmt::format("flat ground is {}, as {} says", message.flat ? "on" : "off", config_.dds.flat_ground_topic));
 }
 
 void Session::set_flat_ground(FlatGround mode) {
@@ -264,10 +265,10 @@ void Session::set_flat_ground(FlatGround mode) {
     pipeline_->set_flat_ground(mode);
 }
 
-void Session::publish() {
+void Session::run_publisher() {
   while (!stopping_.load(std::memory_order_relaxed)) {
     publisher_progress_.fetch_add(1, std::memory_order_relaxed);
-    tell_of_clock();
+    log_clock_steps();
     if (const auto done = pipeline_->next(std::chrono::milliseconds{50}))
       publish(*done);
     while (auto sample = pipeline_->next_fast()) {
@@ -275,17 +276,17 @@ void Session::publish() {
       link_.publish_fast(report_of(*sample));
     }
     while (const auto event = pipeline_->next_health_event())
-      tell(*event);
+      log_health(*event);
     if (const IngestReport* report = pipeline_->next_report()) {
-      const std::scoped_lock lock(told_mutex_);
-      told_.ingest = *report;
+      const std::scoped_lock lock(collected_mutex_);
+      collected_.ingest = *report;
     }
   }
 }
 
-void Session::tell_of_clock() {
-  const Duration set_by = input_.time().steps();
-  if (const Duration change = set_by - std::exchange(told_clock_set_by_, set_by); change != Duration::zero())
+void Session::log_clock_steps() {
+  const Duration steps = input_.time().steps();
+  if (const Duration change = steps - std::exchange(logged_clock_steps_, steps); change != Duration::zero())
     log_.info(
         fmt::format("the clock of this computer was set by {:+.3f} s; the odometry goes on, and its stamps follow "
                     "the clock",
@@ -293,25 +294,25 @@ void Session::tell_of_clock() {
 }
 
 void Session::publish(const ProcessedSweep& done) {
-  const OdometryEstimate estimate = on_the_wall(done.estimate);
+  const OdometryEstimate estimate = in_wall_time(done.estimate);
   const bool is_published = link_.publish(report_of(estimate), estimate.state);
   {
-    const std::scoped_lock lock(told_mutex_);
-    told_.sweeps.add(done);
-    told_.unpublished += is_published ? 0 : 1;
+    const std::scoped_lock lock(collected_mutex_);
+    collected_.sweeps.add(done);
+    collected_.unpublished += is_published ? 0 : 1;
   }
   if (estimate.beginning && !announced_)
     announce(estimate);
   if (announcement_ && link_.publish_beginning(DiagnosticsMessage({*announcement_}, estimate.stamp)))
     announcement_.reset();
-  tell(estimate.state);
+  log_state(estimate.state);
 }
 
 /// Publishes and logs the origin of the odom frame, so that subscribers learn of a new frame.
 void Session::announce(const OdometryEstimate& estimate) {
   announced_ = true;
   const Beginning from = *estimate.beginning;
-  const bool is_lost = has_past_ && from != Beginning::map;
+  const bool is_lost = has_saved_map_ && from != Beginning::map;
   const std::string text = from == Beginning::map    ? "resumed where the service ended"
                            : from == Beginning::told ? "begins where it was told to"
                            : from == Beginning::odometry
@@ -321,7 +322,7 @@ void Session::announce(const OdometryEstimate& estimate) {
                                      : "begins at the origin";
   if (is_lost)
     log_.warn(text);
-  else if (has_past_)
+  else if (has_saved_map_)
     log_.info(text);
   const Eigen::Vector3d& p = estimate.T_odom_base.translation;
   announcement_ = {is_lost ? Diagnostic::Level::warning : Diagnostic::Level::ok,
@@ -336,10 +337,10 @@ void Session::announce(const OdometryEstimate& estimate) {
                     {"yaw_deg", fmt::format("{}", to_rpy_rad(estimate.T_odom_base.rotation).z() / kRadPerDeg)}}};
 }
 
-void Session::tell(TrackingState state) {
-  if (told_state_ == state)
+void Session::log_state(TrackingState state) {
+  if (logged_state_ == state)
     return;
-  told_state_ = state;
+  logged_state_ = state;
   const std::string name{to_string(state)};
   if (state == TrackingState::dead_reckoning)
     log_.warn("dead reckoning: no sweep can be registered; look whether the lidars send (locusctl status)",
@@ -354,7 +355,7 @@ void Session::tell(TrackingState state) {
 namespace {
 
 /// Describes the loss of a motion source. In a disagreement either the source or lidar may be at fault.
-std::string why_lost(const HealthEvent& event) {
+std::string loss_text(const HealthEvent& event) {
   if (!event.verdict.empty())
     return std::string(event.verdict);
   if (event.reason == HealthReason::disagreement || event.reason == HealthReason::speed)
@@ -364,12 +365,12 @@ std::string why_lost(const HealthEvent& event) {
 
 } // namespace
 
-void Session::tell(const HealthEvent& event) {
+void Session::log_health(const HealthEvent& event) {
   const std::string& name = config_.motion_sources[index_of(event.source)].name;
   if (event.healthy)
     log_.info(fmt::format("motion source {} is back", name), {{"LOCUS_SOURCE", name}});
   else
-    log_.warn(fmt::format("motion source {} {}; the next best one is used", name, why_lost(event)),
+    log_.warn(fmt::format("motion source {} {}; the next best one is used", name, loss_text(event)),
               {{"LOCUS_SOURCE", name}, {"LOCUS_REASON", std::string{to_string(event.reason)}}});
 }
 
@@ -386,7 +387,7 @@ Figures Session::figures() const {
     live.cloud_drops[i] = input_.cloud_drops(i);
   live.unfetched = pipeline_->unfetched();
   live.link = link_.status();
-  if (keeps_incidents())
+  if (stores_incidents())
     live.incidents = incidents_->status();
   if (recorder_ && !config_.record.folder.empty()) {
     live.recording = recorder_->status();
@@ -397,23 +398,23 @@ Figures Session::figures() const {
     if (live.incidents->problem.empty())
       live.incidents->problem = ring.problem;
   }
-  const std::scoped_lock lock(told_mutex_);
-  figures.ingest = told_.ingest;
-  figures.sweeps = told_.sweeps.figures();
-  live.unpublished = told_.unpublished;
+  const std::scoped_lock lock(collected_mutex_);
+  figures.ingest = collected_.ingest;
+  figures.sweeps = collected_.sweeps.figures();
+  live.unpublished = collected_.unpublished;
   if (figures.sweeps.last)
-    figures.sweeps.last = on_the_wall(*figures.sweeps.last);
+    figures.sweeps.last = in_wall_time(*figures.sweeps.last);
   const auto wall = [this](Stamp steady) { return steady == Stamp{} ? Stamp{} : input_.time().to_wall(steady); };
-  const auto put_on_the_wall = [&](auto& sensors) {
+  const auto convert_last_heard = [&](auto& sensors) {
     for (auto& sensor : sensors)
       sensor.last_heard = wall(sensor.last_heard);
   };
-  put_on_the_wall(figures.ingest.lidars);
+  convert_last_heard(figures.ingest.lidars);
   for (IngestReport::Lidar& lidar : figures.ingest.lidars) {
-    put_on_the_wall(lidar.strangers);
+    convert_last_heard(lidar.strangers);
     lidar.unknown_last_heard = wall(lidar.unknown_last_heard);
   }
-  put_on_the_wall(figures.ingest.sources);
+  convert_last_heard(figures.ingest.sources);
   return figures;
 }
 

@@ -64,7 +64,7 @@ class Session {
 
   /// Requests the surfaces of the map, available after the next sweep. Supersedes an earlier request.
   void request_map() { map_wanted_.fetch_add(1, std::memory_order_relaxed); }
-  [[nodiscard]] const std::vector<SurfacePoint>* take_map();
+  [[nodiscard]] const std::vector<SurfacePoint>* poll_map();
 
   void set_flat_ground(FlatGround mode);
   [[nodiscard]] FlatGround flat_ground() const { return flat_ground_.load(std::memory_order_relaxed); }
@@ -76,44 +76,44 @@ class Session {
   InputSource& begin_recording();
   InputSource& record_to(const std::filesystem::path& folder, const RecordingBounds& bounds);
   /// Tells whether incidents can be stored, that is, whether their input is being recorded.
-  [[nodiscard]] bool keeps_incidents() const;
+  [[nodiscard]] bool stores_incidents() const;
   void write_to_disk(bool last_round);
   void end();
-  void after(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate);
+  void after_estimate(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate);
   void receive(const RosInput& input);
   void receive(std::uint8_t lidar, Stamp arrival, const SerialisedSample& cloud);
-  void take(FlatGroundWord word);
-  void publish();
+  void apply(FlatGroundMessage message);
+  void run_publisher();
   void publish(const ProcessedSweep& done);
-  [[nodiscard]] OdometryEstimate on_the_wall(const OdometryEstimate& estimate) const;
-  void tell_of_clock();
+  [[nodiscard]] OdometryEstimate in_wall_time(const OdometryEstimate& estimate) const;
+  void log_clock_steps();
   void announce(const OdometryEstimate& estimate);
-  void tell(TrackingState state);
-  void tell(const HealthEvent& event);
+  void log_state(TrackingState state);
+  void log_health(const HealthEvent& event);
 
   Config config_;
   Log& log_;
   MachineTime started_;
-  struct Told { ///< figures collected by the publisher
+  struct Collected { ///< figures collected by the publisher
     SweepStatistics sweeps{600};
     IngestReport ingest;
     std::uint64_t unpublished = 0;
   };
-  Told told_;
-  mutable std::mutex told_mutex_; ///< guards told_
+  Collected collected_;
+  mutable std::mutex collected_mutex_; ///< guards collected_
   LiveInput input_;
   std::atomic<FlatGround> flat_ground_;
   Duration flat_ground_changed_{};     ///< owned by the link's thread
   Incidents* incidents_;               ///< null: no folder for incidents
-  bool holds_ring_ = false;            ///< the recording is in memory, for incidents only
-  bool ring_is_looked_at_ = false;     ///< remains of earlier sessions or processes are removed; disk thread
+  bool records_to_memory_ = false;     ///< the recording is in memory, for incidents only
+  bool old_ring_removed_ = false;      ///< remains of earlier sessions or processes are removed; disk thread
   std::unique_ptr<Recorder> recorder_; ///< one run; null without recording
   std::optional<RecordingInput> recording_input_;
   std::unique_ptr<LivePipeline> pipeline_;
-  std::mutex pipeline_mutex_; ///< guards pipeline_ between its owner and the link's thread
-  bool has_past_ = false;     ///< started with the map of an earlier run
+  std::mutex pipeline_mutex_;  ///< guards pipeline_ between its owner and the link's thread
+  bool has_saved_map_ = false; ///< started with the map of an earlier run
   bool announced_ = false;
-  std::atomic<bool> scheduling_told_ = false;
+  std::atomic<bool> scheduling_logged_ = false;
   std::optional<Diagnostic> announcement_; ///< not yet accepted by DDS
   struct Map {
     std::uint64_t request = 0;
@@ -126,9 +126,9 @@ class Session {
   CloudPublisher clouds_;
   std::optional<SavedState> start_; ///< initial state, until the first estimate
   EarlierCalibration calibration_;  ///< calibration learned in the previous run or before a reset
-  StateKeeper state_;
-  std::optional<TrackingState> told_state_;
-  Duration told_clock_set_by_{};
+  StateSaver state_saver_;
+  std::optional<TrackingState> logged_state_;
+  Duration logged_clock_steps_{};
   std::atomic<std::uint64_t> publisher_progress_{0};
   std::atomic<bool> stopping_{false};
   std::thread publisher_;

@@ -26,40 +26,40 @@ std::string status_line(const Figures& figures) {
                      sweeps.process_ms.p50, figures.counters.dropped);
 }
 
-void Watch::look(const Figures& figures) {
+void SessionMonitor::check(const Figures& figures) {
   const Figures::Live& live = *figures.live;
-  look_at_link(live.link);
-  look_at_intruders(live.link);
+  check_link(live.link);
+  check_publishers(live.link);
   if (figures.duration > kPatience && live.link.connected)
-    look_at_sources(live.link);
-  look_at_lidars(figures);
-  look_at_verdicts(figures.ingest);
-  look_at_calibration(figures);
-  look_at_speed(figures.sweeps.largest_speed_mps);
-  look_at_load(figures.counters);
-  look_at_drops(live);
+    check_sources(live.link);
+  check_lidars(figures);
+  check_verdicts(figures.ingest);
+  check_calibration(figures);
+  check_speed(figures.sweeps.largest_speed_mps);
+  check_load(figures.counters);
+  check_drops(live);
   if (live.recording)
-    look_at_recording(*live.recording);
-  if (const Duration now = clock_(CLOCK_MONOTONIC); now - joined_ > kPatience) {
+    check_recording(*live.recording);
+  if (const Duration now = clock_(CLOCK_MONOTONIC); now - joined_at_ > kPatience) {
     join_multicast(config_, sockets_);
-    joined_ = now;
+    joined_at_ = now;
   }
 }
 
-void Watch::look_at_link(const LinkFigures& link) {
+void SessionMonitor::check_link(const LinkFigures& link) {
   if (link.connected && !was_connected_)
     log_.info(fmt::format("DDS is up: domain {} on interface {}", config_.dds.domain, config_.dds.interface));
-  else if (!link.connected && link.attempts != told_attempts_)
+  else if (!link.connected && link.attempts != logged_attempts_)
     log_.warn(fmt::format("{}; trying again", link.problem), {{"LOCUS_ATTEMPT", std::to_string(link.attempts)}});
   was_connected_ = link.connected;
-  told_attempts_ = link.attempts;
+  logged_attempts_ = link.attempts;
 }
 
-void Watch::look_at_sources(const LinkFigures& link) {
+void SessionMonitor::check_sources(const LinkFigures& link) {
   for (std::size_t i = 0; i < link.sources.size(); ++i) {
     const std::string& name = config_.motion_sources[i].name;
     const std::string& topic = config_.motion_sources[i].topic;
-    if (topic.empty() || link.sources[i].received > 0 || !unheard_.insert(name).second)
+    if (topic.empty() || link.sources[i].received > 0 || !silent_sources_.insert(name).second)
       continue;
     const std::string found =
         link.sources[i].writers == 0
@@ -73,63 +73,64 @@ void Watch::look_at_sources(const LinkFigures& link) {
   }
 }
 
-void Watch::look_at_lidars(const Figures& figures) {
+void SessionMonitor::check_lidars(const Figures& figures) {
   const IngestReport& ingest = figures.ingest;
   const std::vector<LidarOptions>& lidars = figures.config.lidars;
   const Duration now = clock_(CLOCK_MONOTONIC);
   for (std::size_t i = 0; i < lidars.size(); ++i) {
     const std::uint64_t used = ingest.lidars[i].used();
     Lidar& lidar = lidars_[i];
-    const bool heard = used > lidar.data;
-    if (used != lidar.data || lidar.heard == Duration::zero()) { // fewer: the counters were reset
-      if (heard && !lidar.told.empty())
+    const bool has_new_data = used > lidar.data;
+    if (used != lidar.data || lidar.last_data == Duration::zero()) { // fewer: the counters were reset
+      if (has_new_data && !lidar.logged_silence.empty())
         log_.info(fmt::format("lidar {}: heard", lidars[i].name), {{"LOCUS_LIDAR", lidars[i].name}});
       lidar = {.data = used,
                .received = ingest.lidars[i].received(),
-               .heard = now,
-               .told = {},
-               .short_sweep_told = lidar.short_sweep_told,
-               .shared_port_told = lidar.shared_port_told,
-               .doubts_told = lidar.doubts_told,
-               .unused_pps_told = std::move(lidar.unused_pps_told)};
+               .last_data = now,
+               .logged_silence = {},
+               .short_sweep_logged = lidar.short_sweep_logged,
+               .shared_port_logged = lidar.shared_port_logged,
+               .logged_doubts = lidar.logged_doubts,
+               .logged_unused_pps = std::move(lidar.logged_unused_pps)};
     }
     const auto warning = short_sweep(figures.config.sweep, lidars[i].name, ingest.lidars[i].rotation_rate_rpm);
-    if (warning && !std::exchange(lidar.short_sweep_told, true))
+    if (warning && !std::exchange(lidar.short_sweep_logged, true))
       log_.warn(*warning, {{"LOCUS_LIDAR", lidars[i].name}});
     const auto shared = figures.duration > kPatience ? shared_port(lidars[i], ingest.lidars[i]) : std::nullopt;
-    if (shared && !std::exchange(lidar.shared_port_told, true))
+    if (shared && !std::exchange(lidar.shared_port_logged, true))
       log_.warn(*shared, {{"LOCUS_LIDAR", lidars[i].name}});
     const auto unused = unused_pps(lidars[i], ingest.lidars[i]);
-    if (unused && *unused != std::exchange(lidar.unused_pps_told, *unused))
+    if (unused && *unused != std::exchange(lidar.logged_unused_pps, *unused))
       log_.warn(*unused, {{"LOCUS_LIDAR", lidars[i].name}});
-    look_at_doubts(lidar, lidars[i], ingest.lidars[i]);
-    if (now - lidar.heard < kPatience)
+    check_doubts(lidar, lidars[i], ingest.lidars[i]);
+    if (now - lidar.last_data < kPatience)
       continue;
     const std::string why = why_silent(lidar, lidars[i], ingest.lidars[i]);
-    if (why == lidar.told)
+    if (why == lidar.logged_silence)
       continue;
-    lidar.told = why;
+    lidar.logged_silence = why;
     const std::string what = lidars[i].gives_clouds() ? fmt::format("cloud on topic {}", lidars[i].topic)
                                                       : fmt::format("data packet on UDP port {}", lidars[i].port);
     log_.warn(fmt::format("lidar {}: no {} for {} s; {}", lidars[i].name, what,
-                          std::chrono::duration_cast<std::chrono::seconds>(now - lidar.heard).count(), why),
+                          std::chrono::duration_cast<std::chrono::seconds>(now - lidar.last_data).count(), why),
               {{"LOCUS_LIDAR", lidars[i].name}});
   }
 }
 
 /// Logs each fault of a lidar's clouds once.
-void Watch::look_at_doubts(Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now) {
+void SessionMonitor::check_doubts(Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now) {
   const CloudDoubts doubts = now.clouds ? now.clouds->doubts : CloudDoubts{};
-  if ((doubts & ~lidar.doubts_told).none())
+  if ((doubts & ~lidar.logged_doubts).none())
     return;
-  IngestReport::Lidar untold = now;
-  untold.clouds->doubts &= ~lidar.doubts_told;
-  lidar.doubts_told |= doubts;
-  for (const std::string& line : cloud_doubts(options, untold))
+  IngestReport::Lidar unlogged = now;
+  unlogged.clouds->doubts &= ~lidar.logged_doubts;
+  lidar.logged_doubts |= doubts;
+  for (const std::string& line : cloud_doubts(options, unlogged))
     log_.warn(line, {{"LOCUS_LIDAR", options.name}});
 }
 
-std::string Watch::why_silent(const Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now) {
+std::string SessionMonitor::why_silent(const Lidar& lidar, const LidarOptions& options,
+                                       const IngestReport::Lidar& now) {
   const PacketCounters& packets = now.packets;
   if (now.clouds)
     return now.received() == lidar.received
@@ -158,44 +159,44 @@ std::string Watch::why_silent(const Lidar& lidar, const LidarOptions& options, c
 }
 
 /// Logs faults of sources that remain in partial use; those of a lost source are logged with its loss.
-void Watch::look_at_verdicts(const IngestReport& ingest) {
+void SessionMonitor::check_verdicts(const IngestReport& ingest) {
   const auto& sources = config_.motion_sources;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     const std::string_view verdict = ingest.sources[i].healthy ? ingest.sources[i].verdict : std::string_view{};
-    if (!verdict.empty() && verdict != verdicts_[i])
+    if (!verdict.empty() && verdict != logged_verdicts_[i])
       log_.warn(fmt::format("motion source {} {}", sources[i].name, verdict), {{"LOCUS_SOURCE", sources[i].name}});
-    verdicts_[i] = verdict;
-    if (const auto slow = slow_imu(sources[i], ingest.sources[i]); slow && !slow_told_.test(i)) {
+    logged_verdicts_[i] = verdict;
+    if (const auto slow = slow_imu(sources[i], ingest.sources[i]); slow && !slow_imus_logged_.test(i)) {
       log_.warn(*slow, {{"LOCUS_SOURCE", sources[i].name}});
-      slow_told_.set(i);
+      slow_imus_logged_.set(i);
     }
   }
 }
 
-void Watch::look_at_calibration(const Figures& figures) {
+void SessionMonitor::check_calibration(const Figures& figures) {
   const auto& sources = config_.motion_sources;
   for (std::size_t i = 0; i < sources.size(); ++i) {
-    if (askew_[i])
+    if (miscalibrated_[i])
       continue;
     if (const std::string doubt = calibration_doubt(figures, i); !doubt.empty()) {
       log_.warn(fmt::format("motion source {} {}", sources[i].name, doubt), {{"LOCUS_SOURCE", sources[i].name}});
-      askew_.set(i);
+      miscalibrated_.set(i);
     }
   }
 }
 
-void Watch::look_at_speed(double largest_mps) {
-  if (const auto warning = too_fast(config_.odometry.motion, largest_mps); warning && !told_speed_) {
+void SessionMonitor::check_speed(double largest_mps) {
+  if (const auto warning = too_fast(config_.odometry.motion, largest_mps); warning && !speed_logged_) {
     log_.warn(*warning);
-    told_speed_ = true;
+    speed_logged_ = true;
   }
 }
 
-void Watch::look_at_load(const SweepCounters& counters) {
+void SessionMonitor::check_load(const SweepCounters& counters) {
   const Duration now = clock_(CLOCK_MONOTONIC);
-  if (now - weighed_ < kPatience)
+  if (now - load_checked_at_ < kPatience)
     return;
-  weighed_ = now;
+  load_checked_at_ = now;
   const std::uint64_t drops = counters.dropped;
   if (drops > sweep_drops_)
     log_.warn(fmt::format(
@@ -205,7 +206,7 @@ void Watch::look_at_load(const SweepCounters& counters) {
   sweep_drops_ = drops;
 }
 
-void Watch::look_at_drops(const Figures::Live& live) {
+void SessionMonitor::check_drops(const Figures::Live& live) {
   const std::uint64_t drops = live.kernel_drops;
   if (drops != kernel_drops_)
     log_.warn(fmt::format("the kernel threw away {} lidar packets, for their buffer was full; sysctl "
@@ -221,9 +222,9 @@ void Watch::look_at_drops(const Figures::Live& live) {
   filtered_ = filtered;
 }
 
-void Watch::look_at_intruders(const LinkFigures& link) {
-  const auto tell = [this](std::uint64_t refused, const std::string& topic, const std::string& source) {
-    if (refused > 0 && intruded_.insert(topic).second)
+void SessionMonitor::check_publishers(const LinkFigures& link) {
+  const auto report = [this](std::uint64_t refused, const std::string& topic, const std::string& source) {
+    if (refused > 0 && contested_topics_.insert(topic).second)
       log_.warn(
           fmt::format("{}messages on {} are refused: a second publisher, or more than {} kHz; give each publisher its "
                       "own topic",
@@ -232,14 +233,14 @@ void Watch::look_at_intruders(const LinkFigures& link) {
   };
   for (std::size_t i = 0; i < link.sources.size(); ++i) {
     const MotionSource& source = config_.motion_sources[i];
-    tell(link.sources[i].refused, source.topic, source.name);
-    tell(link.sources[i].health_refused, source.health_topic, source.name);
+    report(link.sources[i].refused, source.topic, source.name);
+    report(link.sources[i].health_refused, source.health_topic, source.name);
   }
-  tell(link.flat_ground_refused, config_.dds.flat_ground_topic, "");
+  report(link.flat_ground_refused, config_.dds.flat_ground_topic, "");
 }
 
 /// Logs changes of the recording. Drops during a disk failure are not logged separately.
-void Watch::look_at_recording(const Recorder::Status& recording) {
+void SessionMonitor::check_recording(const Recorder::Status& recording) {
   const std::uint64_t dropped = recording.dropped - std::min(recording.dropped, recording_.dropped);
   if (recording_.problem.empty() && !recording.problem.empty())
     log_.error(fmt::format("{}; the odometry goes on without a recording", recording.problem));
@@ -258,18 +259,18 @@ Watchdog::Watchdog() {
     period_ = std::chrono::microseconds{period_us / 3};
 }
 
-void Watchdog::look(const Session& session) {
+void Watchdog::feed(const Session& session) {
   const Duration now = read_clock(CLOCK_MONOTONIC);
-  if (period_ == Duration::zero() || now - fed_ < period_)
+  if (period_ == Duration::zero() || now - fed_at_ < period_)
     return;
   const Session::Progress progress = session.progress();
-  const bool all_go_on =
+  const bool all_progress =
       !last_ || (progress.live.ingest != last_->live.ingest && progress.live.odometry != last_->live.odometry &&
                  progress.publisher != last_->publisher && progress.dds != last_->dds);
-  if (!all_go_on)
+  if (!all_progress)
     return;
   sd_notify(0, "WATCHDOG=1");
-  fed_ = now;
+  fed_at_ = now;
   last_ = progress;
 }
 

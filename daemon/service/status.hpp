@@ -28,44 +28,44 @@ std::string status_line(const Figures& figures);
 /// Monitors a session a few times a second and logs problems: silent sensors, a missing network, packets dropped by the
 /// kernel, an overloaded computer, a failing recording. Logs each once per change for the worse or the better. One
 /// owner.
-class Watch {
+class SessionMonitor {
  public:
   /// Silence of a sensor before it is reported; also the period of some checks.
   static constexpr Duration kPatience = std::chrono::seconds{5};
 
   using Clock = Duration (*)(clockid_t); ///< read_clock(), replaceable in tests
   /// Monitors a session with this configuration and these lidar sockets.
-  Watch(
+  SessionMonitor(
       const Config& config, std::span<const UdpSocket> sockets, Log& log,
       Clock clock = [](clockid_t id) { return read_clock(id); })
       : config_(config), sockets_(sockets), log_(log), clock_(clock) {}
 
   /// Checks the figures of that session.
-  void look(const Figures& figures);
+  void check(const Figures& figures);
 
  private:
-  void look_at_link(const LinkFigures& link);
-  void look_at_sources(const LinkFigures& link);
-  void look_at_lidars(const Figures& figures);
-  void look_at_verdicts(const IngestReport& ingest);
-  void look_at_calibration(const Figures& figures);
-  void look_at_speed(double largest_mps);
-  void look_at_load(const SweepCounters& counters);
-  void look_at_drops(const Figures::Live& live);
-  void look_at_intruders(const LinkFigures& link);
-  void look_at_recording(const Recorder::Status& recording);
+  void check_link(const LinkFigures& link);
+  void check_sources(const LinkFigures& link);
+  void check_lidars(const Figures& figures);
+  void check_verdicts(const IngestReport& ingest);
+  void check_calibration(const Figures& figures);
+  void check_speed(double largest_mps);
+  void check_load(const SweepCounters& counters);
+  void check_drops(const Figures::Live& live);
+  void check_publishers(const LinkFigures& link);
+  void check_recording(const Recorder::Status& recording);
 
   /// Last known state of a lidar.
   struct Lidar {
     std::uint64_t data = 0, received = 0; ///< counters at the last usable data
-    Duration heard{};                     ///< time of the last usable data, or start of the wait for it
-    std::string told;                     ///< logged reason of its silence; empty: not silent
-    bool short_sweep_told = false;
-    bool shared_port_told = false;
-    CloudDoubts doubts_told{};
-    std::string unused_pps_told; ///< logged reason why its locked PPS is not used
+    Duration last_data{};                 ///< time of the last usable data, or start of the wait for it
+    std::string logged_silence;           ///< logged reason of its silence; empty: not silent
+    bool short_sweep_logged = false;
+    bool shared_port_logged = false;
+    CloudDoubts logged_doubts{};
+    std::string logged_unused_pps; ///< logged reason why its locked PPS is not used
   };
-  void look_at_doubts(Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now);
+  void check_doubts(Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now);
   static std::string why_silent(const Lidar& lidar, const LidarOptions& options, const IngestReport::Lidar& now);
 
   const Config& config_;
@@ -73,17 +73,17 @@ class Watch {
   Log& log_;
   Clock clock_;
   bool was_connected_ = false;
-  std::uint64_t told_attempts_ = 0;
+  std::uint64_t logged_attempts_ = 0;
   std::array<Lidar, kMaxLidars> lidars_;
-  bool told_speed_ = false;
-  std::bitset<kMaxSources> slow_told_;
-  std::array<std::string_view, kMaxSources> verdicts_; ///< last logged verdicts
-  std::bitset<kMaxSources> askew_;                     ///< sources with a logged calibration error
-  std::set<std::string> unheard_;                      ///< sources logged as silent
-  std::set<std::string> intruded_;                     ///< topics logged for rejected messages
+  bool speed_logged_ = false;
+  std::bitset<kMaxSources> slow_imus_logged_;
+  std::array<std::string_view, kMaxSources> logged_verdicts_; ///< last logged verdicts
+  std::bitset<kMaxSources> miscalibrated_;                    ///< sources with a logged calibration error
+  std::set<std::string> silent_sources_;                      ///< sources logged as silent
+  std::set<std::string> contested_topics_;                    ///< topics logged for rejected messages
   std::uint64_t kernel_drops_ = 0, filtered_ = 0, sweep_drops_ = 0;
   Recorder::Status recording_; ///< last logged status
-  Duration joined_{}, weighed_{};
+  Duration joined_at_{}, load_checked_at_{};
 };
 
 /// Feeds systemd's watchdog while all threads make progress, and so detects a hung thread. One owner.
@@ -91,11 +91,11 @@ class Watchdog {
  public:
   /// Enables the watchdog if systemd requests it (WatchdogSec=).
   Watchdog();
-  void look(const Session& session);
+  void feed(const Session& session);
 
  private:
   Duration period_{}; ///< zero: disabled
-  Duration fed_{};
+  Duration fed_at_{};
   std::optional<Session::Progress> last_;
 };
 

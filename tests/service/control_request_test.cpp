@@ -36,7 +36,7 @@ TEST(ControlRequest, IsWhatLocusctlSends) {
   EXPECT_TRUE(is(R"({"command": "reload"})", Reload{}));
   const auto keep = parse_control_request(R"({"command": "record", "keep_s": 60})");
   ASSERT_TRUE(keep);
-  EXPECT_EQ(std::get<KeepIncident>(*keep).keep_s, 60);
+  EXPECT_EQ(std::get<StoreIncident>(*keep).keep_s, 60);
   const auto flat = parse_control_request(R"({"command": "flat-ground", "mode": "auto"})");
   ASSERT_TRUE(flat);
   EXPECT_EQ(std::get<SetFlatGround>(*flat).mode, FlatGround::automatic);

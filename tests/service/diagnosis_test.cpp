@@ -275,7 +275,7 @@ TEST_F(Diagnosis, SweepsThatAreShorterThanATurnAreSaidOnce) {
 }
 
 /// The service's monitoring with figures and time set by the test.
-class WatchedFigures : public testing::Test {
+class SessionMonitorTest : public testing::Test {
  protected:
   void SetUp() override {
     figures_.live.emplace().link.sources.resize(config_.motion_sources.size());
@@ -287,23 +287,23 @@ class WatchedFigures : public testing::Test {
     now_ += time;
     figures_.duration += time;
     testing::internal::CaptureStderr();
-    watch_.look(figures_);
+    monitor_.check(figures_);
     return lines_of(testing::internal::GetCapturedStderr());
   }
   daemon::IngestReport::Lidar& lidar() { return figures_.ingest.lidars.front(); }
 
-  static constexpr Duration kPatience = daemon::Watch::kPatience;
+  static constexpr Duration kPatience = daemon::SessionMonitor::kPatience;
   static inline Duration now_ = std::chrono::hours{1};
   static Duration read_now(clockid_t /*clock*/) { return now_; }
   Config config_;
   daemon::Figures figures_{config_};
   daemon::Log log_{read_now};
-  daemon::Watch watch_{config_, {}, log_, read_now};
+  daemon::SessionMonitor monitor_{config_, {}, log_, read_now};
 };
 
 using Lines = std::vector<std::string>;
 
-TEST_F(WatchedFigures, TellOfASilentLidarAfterFiveSecondsAndOncePerReason) {
+TEST_F(SessionMonitorTest, TellOfASilentLidarAfterFiveSecondsAndOncePerReason) {
   EXPECT_EQ(said_after(kPatience - Duration{1}), Lines{});
   EXPECT_EQ(said_after(Duration{1}),
             Lines{"locusd: warning: lidar front: no data packet on UDP port 2368 for 5 s; look "
@@ -331,7 +331,7 @@ TEST_F(WatchedFigures, TellOfASilentLidarAfterFiveSecondsAndOncePerReason) {
   EXPECT_EQ(said_after(Duration{1}).size(), 1U) << "again silent";
 }
 
-TEST_F(WatchedFigures, TellOfASourceThatIsNotHeardFiveSecondsAfterTheStart) {
+TEST_F(SessionMonitorTest, TellOfASourceThatIsNotHeardFiveSecondsAfterTheStart) {
   figures_.live->link.connected = true;
   const Lines up = said_after(Duration{1});
   ASSERT_EQ(up.size(), 1U);
@@ -349,7 +349,7 @@ TEST_F(WatchedFigures, TellOfASourceThatIsNotHeardFiveSecondsAfterTheStart) {
   EXPECT_EQ(said_after(Duration{1}), Lines{}) << "once";
 }
 
-TEST_F(WatchedFigures, TellOfDroppedSweepsEveryFiveSeconds) {
+TEST_F(SessionMonitorTest, TellOfDroppedSweepsEveryFiveSeconds) {
   figures_.counters.dropped = 1;
   EXPECT_EQ(said_after(kPatience - Duration{1}), Lines{});
   figures_.counters.dropped = 4;

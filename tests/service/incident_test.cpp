@@ -484,7 +484,7 @@ class NoticedIncidents : public testing::Test {
  protected:
   std::optional<daemon::IncidentCause> look_after(Duration while_nothing_changes) {
     now_ += while_nothing_changes;
-    return watch_.look(figures_);
+    return watch_.check(figures_);
   }
   void estimate(TrackingState state) { figures_.sweeps.last.emplace().state = state; }
   void refuse(HealthReason reason) {
@@ -504,9 +504,9 @@ TEST_F(NoticedIncidents, AreOneContradictionUntilNoneWasSeenForTenSeconds) {
   EXPECT_EQ(look_after(seconds{1}), daemon::IncidentCause::contradiction);
   for (int i = 0; i < 5; ++i) {
     refuse(i % 2 == 0 ? HealthReason::self_check : HealthReason::disagreement);
-    EXPECT_FALSE(look_after(daemon::IncidentWatch::kQuiet - Duration{1}));
+    EXPECT_FALSE(look_after(daemon::IncidentWatch::kMinGap - Duration{1}));
   }
-  EXPECT_FALSE(look_after(daemon::IncidentWatch::kQuiet));
+  EXPECT_FALSE(look_after(daemon::IncidentWatch::kMinGap));
   refuse(HealthReason::disagreement);
   EXPECT_EQ(look_after(Duration{1}), daemon::IncidentCause::contradiction);
   refuse(HealthReason::stale);
@@ -522,7 +522,7 @@ TEST_F(NoticedIncidents, AreOneLossAfterASecondOfDeadReckoning) {
     EXPECT_FALSE(look_after(seconds{1}));
     estimate(TrackingState::dead_reckoning);
     EXPECT_FALSE(look_after(seconds{1}));
-    EXPECT_FALSE(look_after(daemon::IncidentWatch::kLostFor - Duration{1}));
+    EXPECT_FALSE(look_after(daemon::IncidentWatch::kMinLoss - Duration{1}));
     EXPECT_EQ(look_after(Duration{1}), daemon::IncidentCause::tracking_lost);
     EXPECT_FALSE(look_after(std::chrono::hours{1})) << "once";
   }

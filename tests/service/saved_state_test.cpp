@@ -17,23 +17,23 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// A state keeper that is fed by the test. The ground mode is part of the map state and not of the whereabouts, and so
+/// A state saver that is fed by the test. The ground mode is part of the map state and not of the whereabouts, and so
 /// tells when the map state was last written.
-class Keeper : public testing::Test {
+class StateSaverTest : public testing::Test {
  protected:
-  void take(Duration after_start, double x_m, FlatGround mode, bool has_begun = true) {
+  void update(Duration after_start, double x_m, FlatGround mode, bool has_begun = true) {
     OdometryEstimate estimate;
     estimate.stamp = stamp_from_ns(1'700'000'000'000'000'000) + after_start;
     estimate.T_odom_base.translation.x() = x_m;
     estimate.twist_base[0] = 1.5;
     if (has_begun)
       estimate.beginning = Beginning::origin;
-    keeper_.take(odometry_, estimate, mode);
+    saver_.update(odometry_, estimate, mode);
   }
 
   /// Writes the pending state, then returns whether the file contains these values.
   [[nodiscard]] bool says(double x_m, FlatGround mode) {
-    keeper_.write();
+    saver_.write();
     const auto state = load_state(file_);
     return state && state->last.T_odom_base.translation.x() == x_m && state->flat_ground == mode;
   }
@@ -41,52 +41,52 @@ class Keeper : public testing::Test {
   test::TemporaryFolder folder_;
   std::filesystem::path file_ = folder_ / "state";
   Odometry odometry_{OdometryOptions{}};
-  StateKeeper keeper_{file_, {}, [](const std::string& problem) { ADD_FAILURE() << problem; }};
+  StateSaver saver_{file_, {}, [](const std::string& problem) { ADD_FAILURE() << problem; }};
 };
 
-TEST_F(Keeper, WritesTheMapEveryThirtySecondsOrTenMetresAndTheWhereaboutsAlways) {
-  take(seconds{0}, 0, FlatGround::off, false);
-  keeper_.write();
+TEST_F(StateSaverTest, WritesTheMapEveryThirtySecondsOrTenMetresAndTheWhereaboutsAlways) {
+  update(seconds{0}, 0, FlatGround::off, false);
+  saver_.write();
   EXPECT_FALSE(std::filesystem::exists(file_)) << "nothing was seen yet";
-  take(seconds{1}, 1, FlatGround::off);
+  update(seconds{1}, 1, FlatGround::off);
   EXPECT_TRUE(says(1, FlatGround::off));
-  take(seconds{2}, 10.5, FlatGround::on);
+  update(seconds{2}, 10.5, FlatGround::on);
   EXPECT_TRUE(says(10.5, FlatGround::off));
-  take(seconds{3}, 11.5, FlatGround::on);
+  update(seconds{3}, 11.5, FlatGround::on);
   EXPECT_TRUE(says(11.5, FlatGround::on)) << "ten metres on";
-  take(seconds{32}, 12, FlatGround::automatic);
+  update(seconds{32}, 12, FlatGround::automatic);
   EXPECT_TRUE(says(12, FlatGround::on));
-  take(seconds{34}, 12.5, FlatGround::automatic);
+  update(seconds{34}, 12.5, FlatGround::automatic);
   EXPECT_TRUE(says(12.5, FlatGround::automatic)) << "thirty seconds later";
-  keeper_.begin_anew(std::nullopt);
-  take(seconds{35}, 0, FlatGround::off);
+  saver_.reset(std::nullopt);
+  update(seconds{35}, 0, FlatGround::off);
   EXPECT_TRUE(says(0, FlatGround::off)) << "at once";
 }
 
-TEST_F(Keeper, WhatWasIsForgottenAtAResetAndThePoseThatIsToldKept) {
-  take(seconds{0}, 3, FlatGround::off);
+TEST_F(StateSaverTest, WhatWasIsForgottenAtAResetAndThePoseThatIsToldKept) {
+  update(seconds{0}, 3, FlatGround::off);
   ASSERT_TRUE(says(3, FlatGround::off));
   const SavedState told{{Stamp{}, Pose{Eigen::Quaterniond::Identity(), {7, 0, 0}}}, FlatGround::on, {}};
-  keeper_.begin_anew(told);
-  EXPECT_FALSE(keeper_.now());
+  saver_.reset(told);
+  EXPECT_FALSE(saver_.last());
   EXPECT_EQ(load_state(file_)->last.T_odom_base.translation.x(), 7) << "at once";
   for (const bool was_written : {false, true}) {
-    take(seconds{1}, 8, FlatGround::off);
+    update(seconds{1}, 8, FlatGround::off);
     if (was_written)
-      keeper_.write();
-    keeper_.begin_anew(std::nullopt);
-    keeper_.write();
+      saver_.write();
+    saver_.reset(std::nullopt);
+    saver_.write();
     EXPECT_FALSE(std::filesystem::exists(file_)) << was_written;
   }
-  take(seconds{2}, 9, FlatGround::off);
+  update(seconds{2}, 9, FlatGround::off);
   EXPECT_TRUE(says(9, FlatGround::off));
 }
 
-TEST_F(Keeper, WritesFromAnotherThreadWhileItIsTold) {
-  Worker disk("disk", milliseconds{1}, [this](bool /*last*/) { keeper_.write(); });
+TEST_F(StateSaverTest, WritesFromAnotherThreadWhileItIsTold) {
+  Worker disk("disk", milliseconds{1}, [this](bool /*last*/) { saver_.write(); });
   constexpr int kSweeps = 200;
   for (int sweep = 0; sweep <= kSweeps; ++sweep)
-    take(milliseconds{100 * sweep}, sweep, FlatGround::off);
+    update(milliseconds{100 * sweep}, sweep, FlatGround::off);
   const auto give_up = std::chrono::steady_clock::now() + test::patience();
   std::optional<double> x_m;
   while (x_m != kSweeps && std::chrono::steady_clock::now() < give_up)
@@ -95,17 +95,17 @@ TEST_F(Keeper, WritesFromAnotherThreadWhileItIsTold) {
   EXPECT_EQ(x_m, kSweeps);
 }
 
-TEST_F(Keeper, ClockThatIsSetBackPutsNothingOff) {
-  take(seconds{0}, 1, FlatGround::off);
+TEST_F(StateSaverTest, ClockThatIsSetBackPutsNothingOff) {
+  update(seconds{0}, 1, FlatGround::off);
   ASSERT_TRUE(says(1, FlatGround::off));
-  take(-seconds{10}, 2, FlatGround::on);
+  update(-seconds{10}, 2, FlatGround::on);
   EXPECT_TRUE(says(2, FlatGround::off)) << "the whereabouts";
-  take(-std::chrono::hours{1}, 3, FlatGround::on);
+  update(-std::chrono::hours{1}, 3, FlatGround::on);
   EXPECT_TRUE(says(3, FlatGround::on)) << "and the map";
 }
 
-TEST_F(Keeper, RobotThatDrivesIsCarriedOnForAMoment) {
-  take(seconds{0}, 3, FlatGround::off);
+TEST_F(StateSaverTest, RobotThatDrivesIsCarriedOnForAMoment) {
+  update(seconds{0}, 3, FlatGround::off);
   ASSERT_TRUE(says(3, FlatGround::off));
   const Whereabouts last = load_state(file_)->last;
   const auto x_m = [&](Duration later) { return last.carried_to(last.stamp + later).translation.x(); };
@@ -114,41 +114,41 @@ TEST_F(Keeper, RobotThatDrivesIsCarriedOnForAMoment) {
   EXPECT_NEAR(x_m(-seconds{1}), 3, 1e-9) << "clocks are set";
 }
 
-TEST_F(Keeper, SweepThatLiesAskewCarriesNobodyAway) {
+TEST_F(StateSaverTest, SweepThatLiesAskewCarriesNobodyAway) {
   OdometryEstimate estimate;
   estimate.beginning = Beginning::origin;
   for (int sweep = 0; sweep < 5; ++sweep) {
     estimate.stamp = stamp_from_ns(1'700'000'000'000'000'000) + milliseconds{100 * sweep};
-    keeper_.take(odometry_, estimate, FlatGround::off);
+    saver_.update(odometry_, estimate, FlatGround::off);
   }
   const Stamp later = estimate.stamp + seconds{2};
   estimate.stamp += milliseconds{100};
   estimate.twist_base[0] = -0.8;
-  keeper_.take(odometry_, estimate, FlatGround::off);
-  ASSERT_TRUE(keeper_.now());
-  EXPECT_LT(keeper_.now()->carried_to(later).translation.norm(), 0.5) << "of a motion that is believed";
+  saver_.update(odometry_, estimate, FlatGround::off);
+  ASSERT_TRUE(saver_.last());
+  EXPECT_LT(saver_.last()->carried_to(later).translation.norm(), 0.5) << "of a motion that is believed";
   estimate.stamp += milliseconds{100};
   estimate.twist_covariance.diagonal().setConstant(0.5 * 0.5);
-  keeper_.take(odometry_, estimate, FlatGround::off);
-  EXPECT_LT(keeper_.now()->carried_to(later).translation.norm(), 0.5) << "and of one that is not";
+  saver_.update(odometry_, estimate, FlatGround::off);
+  EXPECT_LT(saver_.last()->carried_to(later).translation.norm(), 0.5) << "and of one that is not";
 }
 
 /// Drivers are stopped before the service.
-TEST_F(Keeper, WhatWasLearnedOfASourceOutlivesItsSilence) {
+TEST_F(StateSaverTest, WhatWasLearnedOfASourceOutlivesItsSilence) {
   OdometryEstimate estimate;
   estimate.stamp = stamp_from_ns(1);
   estimate.beginning = Beginning::origin;
   estimate.sources[1].learned.emplace().states[LearnedSource::kLate] = 0.02;
-  keeper_.take(odometry_, estimate, FlatGround::off);
+  saver_.update(odometry_, estimate, FlatGround::off);
   estimate.stamp += milliseconds{100};
   estimate.sources[1].learned.reset();
-  keeper_.take(odometry_, estimate, FlatGround::off);
-  ASSERT_TRUE(keeper_.now() && keeper_.now()->learned[1]);
-  EXPECT_EQ(keeper_.now()->learned[1]->lateness_s().mean, 0.02);
-  EXPECT_FALSE(keeper_.now()->learned[0]);
+  saver_.update(odometry_, estimate, FlatGround::off);
+  ASSERT_TRUE(saver_.last() && saver_.last()->learned[1]);
+  EXPECT_EQ(saver_.last()->learned[1]->lateness_s().mean, 0.02);
+  EXPECT_FALSE(saver_.last()->learned[0]);
 }
 
-TEST_F(Keeper, MinutesOfDeadReckoningAreNoDamage) {
+TEST_F(StateSaverTest, MinutesOfDeadReckoningAreNoDamage) {
   SavedState state;
   state.last.pose_covariance = Vector6(1e12, 1e12, 1e12, 1, 1, 1).asDiagonal();
   state.last.pose_covariance(0, 1) = state.last.pose_covariance(1, 0) = 1e12 * (1 + 1e-9); // rounding error
@@ -159,7 +159,7 @@ TEST_F(Keeper, MinutesOfDeadReckoningAreNoDamage) {
   EXPECT_FALSE(load_state(file_)) << "no covariance is like that";
 }
 
-TEST_F(Keeper, WhatWasLearnedOfASourceGoesOn) {
+TEST_F(StateSaverTest, WhatWasLearnedOfASourceGoesOn) {
   SavedState state;
   LearnedSource& learned = state.last.learned[1].emplace();
   learned.noise_per_s = Vector6::LinSpaced(0.1, 0.6);
@@ -187,7 +187,7 @@ TEST_F(Keeper, WhatWasLearnedOfASourceGoesOn) {
 }
 
 /// Learned values are corrections of configured ones, and are discarded with them.
-TEST_F(Keeper, WhatWasLearnedOfASourceGoesWhereItIsConfiguredOtherwise) {
+TEST_F(StateSaverTest, WhatWasLearnedOfASourceGoesWhereItIsConfiguredOtherwise) {
   std::vector<MotionSource> sources(2);
   sources[0].name = "wio";
   sources[1].name = "imu";
@@ -203,7 +203,7 @@ TEST_F(Keeper, WhatWasLearnedOfASourceGoesWhereItIsConfiguredOtherwise) {
   auto same = load_state(file_);
   ASSERT_TRUE(same);
   EXPECT_EQ(same->sources, state.sources);
-  same->forget_changed(ids_of(sources));
+  same->reset_changed_sources(ids_of(sources));
   ASSERT_TRUE(same->last.learned[0] && same->last.learned[1]);
   EXPECT_EQ(same->last.learned[1]->since, stamp_from_ns(7));
 
@@ -211,7 +211,7 @@ TEST_F(Keeper, WhatWasLearnedOfASourceGoesWhereItIsConfiguredOtherwise) {
     std::vector<MotionSource> changed = sources;
     change(changed[1]);
     SavedState left = state;
-    left.forget_changed(ids_of(changed));
+    left.reset_changed_sources(ids_of(changed));
     EXPECT_EQ(left.last.learned[0].has_value(), changed[1].name == "imu") << "the other one";
     return left.last.learned[1].has_value();
   };
@@ -223,7 +223,7 @@ TEST_F(Keeper, WhatWasLearnedOfASourceGoesWhereItIsConfiguredOtherwise) {
   EXPECT_TRUE(left_after([](MotionSource& imu) { imu.health_topic = "/health"; }));
 }
 
-TEST_F(Keeper, EveryDamagedByteIsNoticed) {
+TEST_F(StateSaverTest, EveryDamagedByteIsNoticed) {
   const test::TemporaryFolder memory{"/dev/shm"}; // no disk latency, thousands of times
   const std::filesystem::path file = memory / "state";
   SavedState state;
@@ -254,7 +254,7 @@ TEST_F(Keeper, EveryDamagedByteIsNoticed) {
 }
 
 /// Power fails while the whereabouts are written: only this many bytes are new.
-TEST_F(Keeper, WhereaboutsThatWereCutShortCostNoMap) {
+TEST_F(StateSaverTest, WhereaboutsThatWereCutShortCostNoMap) {
   const test::TemporaryFolder memory{"/dev/shm"};
   const std::filesystem::path file = memory / "state";
   SavedState state;

@@ -42,11 +42,12 @@ void RestartingPipeline::begin(Stamp now) {
   }
   options.after_estimate = [this](const Sweep&, const Odometry& odometry, const OdometryEstimate& estimate) {
     resumed_.store(estimate.beginning == Beginning::map, std::memory_order_relaxed);
-    keeper_->take(odometry, estimate, FlatGround::off);
+    state_saver_->update(odometry, estimate, FlatGround::off);
   };
   resumed_.store(false, std::memory_order_relaxed);
-  keeper_.emplace(state_file_, config_.motion_sources, [](const std::string& problem) { tools::say("soak", problem); });
-  disk_.emplace("disk", std::chrono::milliseconds{10}, [this](bool /*last*/) { keeper_->write(); });
+  state_saver_.emplace(state_file_, config_.motion_sources,
+                       [](const std::string& problem) { tools::say("soak", problem); });
+  disk_.emplace("disk", std::chrono::milliseconds{10}, [this](bool /*last*/) { state_saver_->write(); });
   pipeline_.emplace(config_, tools::value_or_fail(LidarRouter::open(config_.lidars), tools::ExitStatus::failed), input_,
                     std::move(options));
   input_.wait_for(&*pipeline_);
@@ -60,11 +61,11 @@ void RestartingPipeline::end(End how) {
   daemon::IngestReport report;
   report.read(pipeline_->ingest());
   before_ = with(report);
-  const std::optional<Whereabouts> last = keeper_->now();
+  const std::optional<Whereabouts> last = state_saver_->last();
   if (how == End::crash && last)
     wait_for_disk(*last);
   disk_.reset();
-  keeper_.reset();
+  state_saver_.reset();
   if (how == End::orderly && last) {
     daemon::SavedState state{*last, FlatGround::off, {}};
     daemon::read_map(pipeline_->processor().odometry(), state.last.T_odom_base, state.map_odom);

@@ -52,7 +52,7 @@ class RestartingPipeline {
   test::PatientInput input_;
   std::filesystem::path state_file_;
   Take take_;
-  std::optional<daemon::StateKeeper> keeper_;
+  std::optional<daemon::StateSaver> state_saver_;
   std::optional<daemon::Worker> disk_;
   std::optional<daemon::LivePipeline> pipeline_;
   std::atomic<bool> resumed_{false};
