@@ -97,7 +97,7 @@ std::function<void(bool, std::string_view)>& log_sink() {
 }
 
 /// Assembles log lines, which the library delivers in pieces that end with a line feed.
-void take_log(void*, const dds_log_data_t* data) {
+void collect_log_line(void*, const dds_log_data_t* data) {
   static std::mutex mutex;
   static std::string line;
   const std::scoped_lock lock(mutex);
@@ -114,7 +114,7 @@ void take_log(void*, const dds_log_data_t* data) {
 
 void set_dds_log(std::function<void(bool, std::string_view)> sink) {
   log_sink() = std::move(sink);
-  dds_set_log_sink(&take_log, nullptr);
+  dds_set_log_sink(&collect_log_line, nullptr);
 }
 
 Expected<DdsNode, std::string> DdsNode::open(const DdsOptions& options) {

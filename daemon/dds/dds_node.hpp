@@ -134,15 +134,15 @@ template <class Message> class DdsReader {
   /// Passes the received messages to `use`, oldest first, with their writer if it accepts one; valid during the call
   /// only. Bounded, however fast messages arrive.
   template <class Use> void take(const Use& use) {
-    constexpr std::uint32_t kBatch = 32, kMostBatches = 4;
+    constexpr std::uint32_t kBatch = 32, kMaxBatches = 4;
     dds_return_t count = kBatch;
-    for (std::uint32_t batch = 0; batch < kMostBatches && count == kBatch; ++batch) {
+    for (std::uint32_t batch = 0; batch < kMaxBatches && count == kBatch; ++batch) {
       std::array<void*, kBatch> samples{};
       std::array<dds_sample_info_t, kBatch> infos{};
       count = dds_take(reader_.handle(), samples.data(), infos.data(), kBatch, kBatch);
       for (std::size_t i = 0; count > 0 && i < static_cast<std::size_t>(count); ++i)
         if (infos[i].valid_data)
-          hand_out(use, *static_cast<const Message*>(samples[i]), infos[i].publication_handle);
+          deliver(use, *static_cast<const Message*>(samples[i]), infos[i].publication_handle);
       if (count > 0)
         dds_return_loan(reader_.handle(), samples.data(), count);
     }
@@ -150,9 +150,9 @@ template <class Message> class DdsReader {
 
   /// Passes the received messages to `use` in serialised form, with their writer; otherwise as take().
   template <class Use> void take_serialised(const Use& use) {
-    constexpr std::uint32_t kBatch = 8, kMostBatches = 4;
+    constexpr std::uint32_t kBatch = 8, kMaxBatches = 4;
     dds_return_t count = kBatch;
-    for (std::uint32_t batch = 0; batch < kMostBatches && count == kBatch; ++batch) {
+    for (std::uint32_t batch = 0; batch < kMaxBatches && count == kBatch; ++batch) {
       std::array<ddsi_serdata*, kBatch> samples{};
       std::array<dds_sample_info_t, kBatch> infos{};
       count = dds_takecdr(reader_.handle(), samples.data(), kBatch, infos.data(), DDS_ANY_STATE);
@@ -169,7 +169,7 @@ template <class Message> class DdsReader {
     return dds_get_subscription_matched_status(reader_.handle(), &status) == DDS_RETCODE_OK ? status.current_count : 0;
   }
   /// Tells whether a writer is matched; true for any writer beyond 64 matched ones.
-  [[nodiscard]] bool hears(dds_instance_handle_t writer) const {
+  [[nodiscard]] bool is_matched(dds_instance_handle_t writer) const {
     std::array<dds_instance_handle_t, 64> all{};
     const dds_return_t count = dds_get_matched_publications(reader_.handle(), all.data(), all.size());
     const auto end = all.begin() + std::clamp<dds_return_t>(count, 0, all.size());
@@ -178,7 +178,7 @@ template <class Message> class DdsReader {
   [[nodiscard]] dds_entity_t handle() const { return reader_.handle(); }
 
  private:
-  template <class Use> static void hand_out(const Use& use, const Message& message, dds_instance_handle_t writer) {
+  template <class Use> static void deliver(const Use& use, const Message& message, dds_instance_handle_t writer) {
     if constexpr (std::is_invocable_v<Use, const Message&, dds_instance_handle_t>)
       use(message, writer);
     else
@@ -204,20 +204,20 @@ class Admission {
       window_began_ = now;
       in_window_ = 0;
     }
-    return ++in_window_ <= kMostInWindow || refuse();
+    return ++in_window_ <= kMaxPerWindow || refuse();
   }
   [[nodiscard]] std::uint64_t refused() const { return refused_; }
 
   /// Lets another writer take over if `reader` no longer matches the current one.
-  template <class Message> void look_after(const DdsReader<Message>& reader) {
-    if (!reader.hears(writer_))
+  template <class Message> void update_owner(const DdsReader<Message>& reader) {
+    if (!reader.is_matched(writer_))
       last_heard_ = {};
   }
 
  private:
   static constexpr Duration kSilence = std::chrono::seconds{2}; ///< longer than the period of any source
   static constexpr Duration kWindow = std::chrono::milliseconds{100};
-  static constexpr std::int64_t kMostInWindow = kMaxRateKhz * (kWindow / std::chrono::milliseconds{1});
+  static constexpr std::int64_t kMaxPerWindow = kMaxRateKhz * (kWindow / std::chrono::milliseconds{1});
 
   bool refuse() {
     ++refused_;

@@ -51,7 +51,7 @@ struct RosLink::Session {
     Admission admission;
   };
 
-  Session(DdsNode node_, const Config& config, const RosNode& named) : node(std::move(node_)) {
+  Session(DdsNode node_, const Config& config, const RosNode& ros_node) : node(std::move(node_)) {
     const DdsOptions& dds = config.dds;
     odometry = {node, dds.prefix + "/odometry", TopicQos::standard()};
     odometry_fast = {node, dds.prefix + "/odometry_fast", TopicQos::standard()};
@@ -65,41 +65,40 @@ struct RosLink::Session {
     if (dds.publish_map)
       map.emplace(node, dds.prefix + "/map", TopicQos::latch());
     listen(config);
-    graph = announce(named, node, dds.ros_graph);
+    graph = announce(ros_node, node, dds.ros_graph);
   }
 
   void listen(const Config& config) {
     waitset = DdsEntity{dds_create_waitset(node.participant())};
-    no_topic = DdsEntity{dds_create_guardcondition(node.participant())};
-    dds_waitset_attach(waitset.handle(), no_topic.handle(), 0);
-    const auto wake_by = [this](dds_entity_t reader) {
+    idle_condition = DdsEntity{dds_create_guardcondition(node.participant())};
+    dds_waitset_attach(waitset.handle(), idle_condition.handle(), 0);
+    const auto attach = [this](dds_entity_t reader) {
       dds_set_status_mask(reader, DDS_DATA_AVAILABLE_STATUS);
       dds_waitset_attach(waitset.handle(), reader, 0);
     };
     for (std::size_t i = 0; i < config.lidars.size(); ++i) {
       if (config.lidars[i].gives_clouds())
-        wake_by(cloud_lidars
-                    .emplace_back(CloudLidar{
-                        static_cast<std::uint8_t>(i), {node, config.lidars[i].topic, TopicQos::cloud_in()}, {}})
-                    .reader.handle());
+        attach(cloud_lidars
+                   .emplace_back(CloudLidar{
+                       static_cast<std::uint8_t>(i), {node, config.lidars[i].topic, TopicQos::cloud_in()}, {}})
+                   .reader.handle());
     }
     for (std::size_t i = 0; i < config.motion_sources.size(); ++i) {
       const MotionSource& source = config.motion_sources[i];
       if (!source.topic.empty() && source.kind == SourceKind::imu)
-        wake_by(
+        attach(
             imus.emplace_back(ImuSource{SourceId{i}, {node, source.topic, TopicQos::sensor_in()}, {}}).reader.handle());
       else if (!source.topic.empty())
-        wake_by(
-            odometries.emplace_back(OdometrySource{SourceId{i}, {node, source.topic, TopicQos::sensor_in()}, {}, {}})
-                .reader.handle());
+        attach(odometries.emplace_back(OdometrySource{SourceId{i}, {node, source.topic, TopicQos::sensor_in()}, {}, {}})
+                   .reader.handle());
       if (!source.health_topic.empty())
-        wake_by(
+        attach(
             health_topics.emplace_back(HealthTopic{SourceId{i}, {node, source.health_topic, TopicQos::standard()}, {}})
                 .reader.handle());
     }
     if (!config.dds.flat_ground_topic.empty())
-      wake_by(flat_ground.emplace(FlatGroundTopic{{node, config.dds.flat_ground_topic, TopicQos::standard()}, {}})
-                  .reader.handle());
+      attach(flat_ground.emplace(FlatGroundTopic{{node, config.dds.flat_ground_topic, TopicQos::standard()}, {}})
+                 .reader.handle());
   }
 
   DdsNode node; ///< first member: outlives its endpoints
@@ -108,7 +107,7 @@ struct RosLink::Session {
   DdsWriter<ros::DiagnosticArray> diagnostics, beginning;
   std::optional<DdsWriter<ros::TFMessage>> tf;
   std::optional<DdsWriter<ros::PointCloud2>> cloud, map;
-  DdsEntity no_topic; ///< never triggered; a waitset without conditions would return at once
+  DdsEntity idle_condition; ///< never triggered; a waitset without conditions would return at once
   DdsEntity waitset;
   std::vector<ImuSource> imus;
   std::vector<OdometrySource> odometries;
@@ -120,7 +119,7 @@ struct RosLink::Session {
 
 RosLink::RosLink(const Config& config, Sink sink, std::string_view instance, RosCloudSink cloud_sink)
     : config_(config), frames_{config.dds.frame_odom, config.dds.frame_base},
-      named_(ros_node(config.dds.prefix, instance)), sink_(std::move(sink)), cloud_sink_(std::move(cloud_sink)) {
+      ros_node_(ros_node(config.dds.prefix, instance)), sink_(std::move(sink)), cloud_sink_(std::move(cloud_sink)) {
   status_.sources.resize(config.motion_sources.size());
   status_.lidars.resize(config.lidars.size());
   thread_ = std::thread([this] { run(); });
@@ -138,14 +137,14 @@ void RosLink::run() {
     return;
   connected_.store(session_.get(), std::memory_order_release);
   std::array<dds_attach_t, 1> triggered{};
-  Duration told{};
+  Duration status_updated_at{};
   while (!stopping_.load(std::memory_order_relaxed)) {
     progress_.fetch_add(1, std::memory_order_relaxed);
     dds_waitset_wait(session_->waitset.handle(), triggered.data(), triggered.size(), kMaxSleep.count());
     receive(*session_);
-    if (const Duration now = read_clock(CLOCK_MONOTONIC); now - told >= kMaxSleep) {
-      look_after_sources(*session_);
-      told = now;
+    if (const Duration now = read_clock(CLOCK_MONOTONIC); now - status_updated_at >= kMaxSleep) {
+      update_status(*session_);
+      status_updated_at = now;
     }
   }
 }
@@ -165,7 +164,7 @@ std::unique_ptr<RosLink::Session> RosLink::connect() {
     ++status_.attempts;
     status_.connected = node.has_value();
     if (node)
-      return std::make_unique<Session>(std::move(*node), config_, named_);
+      return std::make_unique<Session>(std::move(*node), config_, ros_node_);
     status_.problem = node.error();
     next_attempt = read_clock(CLOCK_MONOTONIC) + pause;
     pause = std::min(2 * pause, kLongestPause);
@@ -206,26 +205,26 @@ void RosLink::receive(Session& session) {
     });
 }
 
-void RosLink::look_after_sources(Session& session) {
+void RosLink::update_status(Session& session) {
   const std::scoped_lock lock(status_mutex_);
-  const auto tell = [this](auto& sources) {
+  const auto update = [this](auto& sources) {
     for (auto& from : sources) {
-      from.admission.look_after(from.reader);
+      from.admission.update_owner(from.reader);
       status_.sources[index_of(from.source)] = {from.reader.writers(), from.received, from.admission.refused(), 0};
     }
   };
   for (auto& from : session.cloud_lidars) {
-    from.admission.look_after(from.reader);
+    from.admission.update_owner(from.reader);
     status_.lidars[from.lidar] = {from.reader.writers(), from.received, from.admission.refused(), 0};
   }
-  tell(session.imus);
-  tell(session.odometries);
+  update(session.imus);
+  update(session.odometries);
   for (auto& from : session.health_topics) {
-    from.admission.look_after(from.reader);
+    from.admission.update_owner(from.reader);
     status_.sources[index_of(from.source)].health_refused = from.admission.refused();
   }
   if (auto& from = session.flat_ground) {
-    from->admission.look_after(from->reader);
+    from->admission.update_owner(from->reader);
     status_.flat_ground_refused = from->admission.refused();
   }
 }
@@ -234,12 +233,12 @@ bool RosLink::publish(const OdometryReport& report, TrackingState state) {
   Session* const to = session();
   if (to == nullptr)
     return false;
-  const bool odometry_left = to->odometry.write(to_ros(report, frames_));
-  const bool state_left = to->state.write(to_ros(state));
+  const bool odometry_sent = to->odometry.write(to_ros(report, frames_));
+  const bool state_sent = to->state.write(to_ros(state));
   if (!to->tf)
-    return odometry_left && state_left;
+    return odometry_sent && state_sent;
   ros::TransformStamped transform = to_ros_transform(report.stamp, report.T_odom_base, frames_);
-  return to->tf->write({{1, 1, &transform, false}}) && odometry_left && state_left;
+  return to->tf->write({{1, 1, &transform, false}}) && odometry_sent && state_sent;
 }
 
 bool RosLink::publish_fast(const OdometryReport& report) {

@@ -67,12 +67,12 @@ class RosLink {
   void run();
   [[nodiscard]] std::unique_ptr<Session> connect();
   void receive(Session& session);
-  void look_after_sources(Session& session);
+  void update_status(Session& session);
   [[nodiscard]] Session* session() const { return connected_.load(std::memory_order_acquire); }
 
   Config config_;
   FrameNames frames_;
-  RosNode named_;
+  RosNode ros_node_;
   Sink sink_;
   RosCloudSink cloud_sink_;
   CloudMessage cloud_, map_;

@@ -42,11 +42,11 @@ double UsualCovariance::scale(const ros::Odometry& message) {
     return 1.0;
   const Stamp stamp = to_stamp(message.header_.stamp_);
   const double scale = compare(message.twist_.covariance_);
-  if (scale <= kAsUsual)
+  if (scale <= kMaxUsualRatio)
     unusual_since_.reset();
   else if (!unusual_since_ || stamp < *unusual_since_)
     unusual_since_ = stamp;
-  else if (stamp - *unusual_since_ > kBecomesUsual) {
+  else if (stamp - *unusual_since_ > kAdaptationTime) {
     axes_ = {};
     unusual_since_.reset();
     return compare(message.twist_.covariance_);

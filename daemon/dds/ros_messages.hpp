@@ -35,8 +35,8 @@ ImuSample to_sample(const ros::Imu& message, Stamp arrival);
 /// remains unusual for ten seconds becomes the usual. One owner.
 class UsualCovariance {
  public:
-  static constexpr double kAsUsual = 4.0; ///< largest ratio that is nothing unusual: twice the standard deviation
-  static constexpr Duration kBecomesUsual = std::chrono::seconds{10};
+  static constexpr double kMaxUsualRatio = 4.0; ///< largest ratio that is nothing unusual: twice the standard deviation
+  static constexpr Duration kAdaptationTime = std::chrono::seconds{10};
 
   /// Returns the ratio to the usual covariance; 1 at rest and if none is reported, infinity if all that was reported
   /// before is now huge.

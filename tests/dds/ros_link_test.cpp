@@ -338,7 +338,7 @@ TEST(RosLink, ManyWritersDoNotHideTheOwner) {
   ASSERT_TRUE(eventually([&] { return reader.writers() == writers.size(); }));
   std::vector<dds_instance_handle_t> all(writers.size());
   ASSERT_EQ(dds_get_matched_publications(reader.handle(), all.data(), all.size()), all.size());
-  EXPECT_TRUE(std::ranges::all_of(all, [&](dds_instance_handle_t writer) { return reader.hears(writer); }));
+  EXPECT_TRUE(std::ranges::all_of(all, [&](dds_instance_handle_t writer) { return reader.is_matched(writer); }));
 }
 
 /// Robots are distinguished by prefix or by domain. Each publishes a position of its own.

@@ -144,7 +144,7 @@ TEST_F(UsualCovarianceTest, UnknownAxesDoNotHideTheKnownOnes) {
     for (int i = 0; i < 100; ++i)
       EXPECT_NEAR(scale(wheels), 1.0, 1e-9) << unknown;
     wheels[0] = wheels[35] = 0.1;
-    EXPECT_GT(scale(wheels), UsualCovariance::kAsUsual) << unknown;
+    EXPECT_GT(scale(wheels), UsualCovariance::kMaxUsualRatio) << unknown;
   }
 }
 
@@ -188,8 +188,8 @@ TEST_F(UsualCovarianceTest, WhatStaysUnusualBecomesUsual) {
     for (int i = 0; i < 100; ++i)
       scale(1e-8);
     const Stamp begin = now_;
-    while (now_ - begin < UsualCovariance::kBecomesUsual)
-      EXPECT_GT(scale(lasting), UsualCovariance::kAsUsual);
+    while (now_ - begin < UsualCovariance::kAdaptationTime)
+      EXPECT_GT(scale(lasting), UsualCovariance::kMaxUsualRatio);
     scale(lasting);
     scale(lasting);
     EXPECT_NEAR(scale(lasting), 1.0, 1e-9) << lasting;
