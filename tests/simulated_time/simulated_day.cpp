@@ -114,7 +114,7 @@ void SimulatedDay::look() {
     return;
   try {
     const std::uint64_t sent = robot_->sent();
-    service_->look(tools::ask(computer_.file("control"), {{"command", "status"}}).json, sent);
+    service_->look(tools::send_request(computer_.file("control"), {{"command", "status"}}).json, sent);
   } catch (const tools::Failure& failure) {
     events_.find(fmt::format("the status cannot be had: {}", failure.what()));
   }
@@ -177,7 +177,7 @@ void SimulatedDay::reload_configuration(bool broken) {
     std::ofstream{file} << text.substr(0, text.find("T_base_lidar") + 20);
   std::string refused;
   try {
-    tools::ask(computer_.file("control"), {{"command", "reload"}});
+    tools::send_request(computer_.file("control"), {{"command", "reload"}});
     service_->begin_life();
     frames_->begin_life();
   } catch (const tools::Failure& failure) {

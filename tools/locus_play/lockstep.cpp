@@ -18,14 +18,14 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 /// Interval between checks, shorter than a sweep at 20 Hz, the fastest rotation of a lidar.
-constexpr Duration kBetweenLooks = std::chrono::milliseconds{40};
-constexpr std::chrono::seconds kLongestWait{60};
+constexpr Duration kPollInterval = std::chrono::milliseconds{40};
+constexpr std::chrono::seconds kTimeout{60};
 
 /// Polls without a delay of its own: the service limits the rate of requests.
-template <class Holds> bool comes_true(const std::filesystem::path& socket, const Holds& holds) {
-  const auto give_up = std::chrono::steady_clock::now() + kLongestWait;
-  while (!holds(ask(socket, {{"command", "status"}}).json))
-    if (std::chrono::steady_clock::now() > give_up)
+template <class Holds> bool wait_until(const std::filesystem::path& socket, const Holds& holds) {
+  const auto deadline = std::chrono::steady_clock::now() + kTimeout;
+  while (!holds(send_request(socket, {{"command", "status"}}).json))
+    if (std::chrono::steady_clock::now() > deadline)
       return false;
   return true;
 }
@@ -37,7 +37,7 @@ void Lockstep::wait_for_writers(const std::vector<std::string>& sources) const {
     const auto source = status["sources"].find(name);
     return source == status["sources"].end() || source->value("writers", 0) > 0;
   };
-  if (!comes_true(socket_, [&](const Json& status) {
+  if (!wait_until(socket_, [&](const Json& status) {
         return std::ranges::all_of(sources, [&](const std::string& name) { return is_known(status, name); });
       }))
     throw Failure(ExitStatus::failed, fmt::format("{}: its service does not hear all of {}; look at dds.interface and "
@@ -45,16 +45,16 @@ void Lockstep::wait_for_writers(const std::vector<std::string>& sources) const {
                                                   socket_.string(), fmt::join(sources, ", ")));
 }
 
-void Lockstep::follow(Stamp now) {
-  if (asked_ != Stamp::min() && std::chrono::abs(now - asked_) < kBetweenLooks)
+void Lockstep::wait_until_processed(Stamp now) {
+  if (checked_at_ != Stamp::min() && std::chrono::abs(now - checked_at_) < kPollInterval)
     return;
-  asked_ = now;
-  const auto is_at_rest = [](const Json& status) {
+  checked_at_ = now;
+  const auto has_processed_all = [](const Json& status) {
     const Json& sweeps = status["sweeps"];
     const auto count = [&](const char* what) { return sweeps[what].get<std::int64_t>(); };
     return count("seen") == count("processed") + count("failed") + count("dropped");
   };
-  if (!comes_true(socket_, is_at_rest))
+  if (!wait_until(socket_, has_processed_all))
     throw Failure(ExitStatus::failed, fmt::format("{}: its service processes no sweep any more", socket_.string()));
 }
 

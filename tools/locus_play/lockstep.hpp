@@ -20,11 +20,11 @@ class Lockstep {
 
   /// Waits until the service has processed each sweep that it received. Call twice per sweep, before waiting for `now`,
   /// the time of the recording. Throws Failure if the service is gone.
-  void follow(Stamp now);
+  void wait_until_processed(Stamp now);
 
  private:
   std::filesystem::path socket_;
-  Stamp asked_ = Stamp::min();
+  Stamp checked_at_ = Stamp::min();
 };
 
 } // namespace locus::tools

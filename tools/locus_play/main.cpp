@@ -37,7 +37,7 @@ namespace {
 
 void warn(const std::string& line) { say("locus-play", "warning: " + line); }
 
-Config value_or_refuse(Expected<Config, ConfigErrors> config) {
+Config config_or_fail(Expected<Config, ConfigErrors> config) {
   if (!config)
     throw Failure(ExitStatus::wrong_usage, fmt::format("{}", fmt::join(config.error(), "\n")));
   return *std::move(config);
@@ -64,11 +64,11 @@ Recording open_recording(const PlayArguments& arguments, const CaptureFolder& fo
 }
 
 /// Waits for subscribers that already run, so that they receive the first sample; gives up after kPatience.
-void wait_for_listeners(const MotionPublisher& motion, const DdsOptions& dds) {
-  constexpr Duration kPatience = std::chrono::seconds{3}, kLook = std::chrono::milliseconds{20};
-  for (Duration waited{}; waited < kPatience && !motion.unheard().empty(); waited += kLook)
-    std::this_thread::sleep_for(kLook);
-  for (const std::string& topic : motion.unheard())
+void wait_for_subscribers(const MotionPublisher& motion, const DdsOptions& dds) {
+  constexpr Duration kPatience = std::chrono::seconds{3}, kPollPeriod = std::chrono::milliseconds{20};
+  for (Duration waited{}; waited < kPatience && !motion.topics_without_subscribers().empty(); waited += kPollPeriod)
+    std::this_thread::sleep_for(kPollPeriod);
+  for (const std::string& topic : motion.topics_without_subscribers())
     warn(fmt::format("nobody listens to {} in DDS domain {} on interface {}; it is sent all the same", topic,
                      dds.domain, dds.interface));
 }
@@ -99,9 +99,9 @@ void send_all(const PlayArguments& arguments, daemon::InputSource& recording, Pa
       const Duration now = daemon::read_clock(CLOCK_REALTIME) - arrival.time_since_epoch();
       shift = arguments.keep_stamps ? Duration::zero() : std::chrono::floor<std::chrono::microseconds>(now);
     }
-    motion.tell_time(arrival + *shift);
+    motion.publish_clock(arrival + *shift);
     if (lockstep != nullptr)
-      lockstep->follow(arrival);
+      lockstep->wait_until_processed(arrival);
     return *shift;
   };
   for (bool more = true; more;) {
@@ -113,7 +113,7 @@ void send_all(const PlayArguments& arguments, daemon::InputSource& recording, Pa
     else if (const auto* odometry = std::get_if<daemon::OdometryInput>(&input))
       motion.publish(*odometry, shift_at(odometry->sample.arrival));
     else if (const auto* silence = std::get_if<daemon::Silence>(&input); silence != nullptr && shift)
-      motion.tell_time(silence->now + *shift);
+      motion.publish_clock(silence->now + *shift);
     more = !std::holds_alternative<daemon::EndOfInput>(input);
     bar.show(progress());
   }
@@ -129,7 +129,7 @@ void play(const PlayArguments& arguments, const Config& config, daemon::InputSou
   MotionPublisher motion(config, arguments.clock);
   std::optional<Lockstep> lockstep;
   if (arguments.lockstep.empty())
-    wait_for_listeners(motion, config.dds);
+    wait_for_subscribers(motion, config.dds);
   else
     lockstep.emplace(arguments.lockstep).wait_for_writers(names_on_topics(config));
   send_all(arguments, recording, packets, motion, lockstep ? &*lockstep : nullptr, progress);
@@ -140,9 +140,9 @@ void play(const PlayArguments& arguments, const Config& config, daemon::InputSou
   if (packets.sent() == 0)
     throw Failure(ExitStatus::failed,
                   fmt::format("{}: holds no UDP datagram; nothing was sent", arguments.capture.string()));
-  const bool asked_for_sender =
+  const bool expects_source_ip =
       std::ranges::any_of(config.lidars, [](const auto& l) { return l.source_ip.has_value(); });
-  if (packets.changed_sender() && asked_for_sender)
+  if (packets.changed_sender() && expects_source_ip)
     warn(
         "this host has not the addresses of the lidars: a receiver whose configuration names source_ip has refused the "
         "packets");
@@ -152,9 +152,9 @@ void play_folder(const PlayArguments& arguments) {
   const CaptureFolder folder = value_or_fail(CaptureFolder::find(arguments.capture), ExitStatus::failed);
   Config config;
   if (!folder.config.empty())
-    config = value_or_refuse(load_config(folder.first_config()));
+    config = config_or_fail(load_config(folder.first_config()));
   use_recorded_metadata(folder, config);
-  config = value_or_refuse(with_lidar_metadata(std::move(config)));
+  config = config_or_fail(with_lidar_metadata(std::move(config)));
   if (const auto changed = folder.changed_config())
     warn(*changed);
   config = with_options(std::move(config), arguments);
@@ -168,7 +168,7 @@ void play_stream(const PlayArguments& arguments) {
     throw Failure(ExitStatus::wrong_usage, "-: standard input is a terminal; try: locus-sim ... -o - | locus-play -");
   CaptureStream stream(value_or_fail(open_capture(arguments.capture), ExitStatus::failed));
   const Config config = with_options(
-      value_or_refuse(parse_config(stream.config(), arguments.capture.string() + ": config.yaml")), arguments);
+      config_or_fail(parse_config(stream.config(), arguments.capture.string() + ": config.yaml")), arguments);
   StreamRecording recording(stream, config, value_or_fail(LidarRouter::open(config.lidars), ExitStatus::wrong_usage),
                             arguments.faults);
   play(arguments, config, recording, stream.capture(), [&] { return stream.capture().progress(); });

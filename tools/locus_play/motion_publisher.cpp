@@ -58,16 +58,16 @@ void MotionPublisher::publish(const daemon::OdometryInput& input, Duration shift
   refused_ += writer->second.write(daemon::to_ros(report, frames)) ? 0U : 1U;
 }
 
-void MotionPublisher::tell_time(Stamp now) {
+void MotionPublisher::publish_clock(Stamp now) {
   const Duration monotonic = daemon::read_clock(CLOCK_MONOTONIC);
-  if (!clock_ || monotonic < clock_due_ || now <= clock_shows_)
+  if (!clock_ || monotonic < clock_due_ || now <= published_time_)
     return;
   refused_ += clock_->write({daemon::to_ros(now)}) ? 0U : 1U;
-  clock_shows_ = now;
+  published_time_ = now;
   clock_due_ = monotonic + kClockPeriod;
 }
 
-std::vector<std::string> MotionPublisher::unheard() const {
+std::vector<std::string> MotionPublisher::topics_without_subscribers() const {
   std::vector<std::string> topics;
   if (clock_ && !clock_->has_readers())
     topics.emplace_back("/clock");

@@ -26,10 +26,10 @@ class MotionPublisher {
   void publish(const daemon::OdometryInput& input, Duration shift);
 
   /// Publishes the clock if a period has passed, and never backwards. Call with every new time.
-  void tell_time(Stamp now);
+  void publish_clock(Stamp now);
 
   /// Returns topics without subscribers.
-  [[nodiscard]] std::vector<std::string> unheard() const;
+  [[nodiscard]] std::vector<std::string> topics_without_subscribers() const;
   /// Returns the number of samples rejected by DDS.
   [[nodiscard]] std::uint64_t refused() const { return refused_; }
   /// DDS node, for other publishers and readers of this process.
@@ -42,7 +42,7 @@ class MotionPublisher {
   std::map<SourceId, daemon::DdsWriter<daemon::ros::Imu>> imus_;
   std::map<SourceId, daemon::DdsWriter<daemon::ros::Odometry>> odometries_;
   std::optional<daemon::DdsWriter<daemon::ros::Clock>> clock_;
-  Stamp clock_shows_ = Stamp::min();
+  Stamp published_time_ = Stamp::min();
   Duration clock_due_{}; ///< CLOCK_MONOTONIC
   std::uint64_t refused_ = 0;
 };

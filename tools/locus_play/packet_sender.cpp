@@ -49,10 +49,10 @@ int PacketSender::socket_for(std::uint32_t source_ip) {
   sockets_[source_ip] = descriptor;
   const int yes = 1;
   setsockopt(descriptor, SOL_SOCKET, SO_BROADCAST, &yes, sizeof(yes));
-  ip_mreqn leave_by{};
-  leave_by.imr_ifindex = static_cast<int>(if_nametoindex(interface_.c_str()));
-  if (IN_MULTICAST(to_) && leave_by.imr_ifindex != 0)
-    setsockopt(descriptor, IPPROTO_IP, IP_MULTICAST_IF, &leave_by, sizeof(leave_by));
+  ip_mreqn outgoing{};
+  outgoing.imr_ifindex = static_cast<int>(if_nametoindex(interface_.c_str()));
+  if (IN_MULTICAST(to_) && outgoing.imr_ifindex != 0)
+    setsockopt(descriptor, IPPROTO_IP, IP_MULTICAST_IF, &outgoing, sizeof(outgoing));
   const sockaddr_in recorded = address(source_ip, 0);
   changed_sender_ |= bind(descriptor, reinterpret_cast<const sockaddr*>(&recorded), sizeof(recorded)) != 0;
   return descriptor;

@@ -28,10 +28,10 @@ Input StreamRecording::next(Duration) {
     read();
   if (waiting_.empty())
     return EndOfInput{};
-  given_out_ = std::move(waiting_.extract(waiting_.begin()).mapped());
-  if (auto* datagram = std::get_if<Datagram>(&given_out_.input))
-    datagram->payload = given_out_.payload;
-  return given_out_.input;
+  current_ = std::move(waiting_.extract(waiting_.begin()).mapped());
+  if (auto* datagram = std::get_if<Datagram>(&current_.input))
+    datagram->payload = current_.payload;
+  return current_.input;
 }
 
 void StreamRecording::read() {
@@ -44,11 +44,11 @@ void StreamRecording::read() {
   if (!lidar_faults_)
     begin(now_);
   if (const auto text = sim::StreamText::of(*datagram)) {
-    take(*text, now_);
+    read_text(*text, now_);
     return;
   }
   const std::size_t waiting = waiting_.size();
-  lidar_faults_->pass(lidars_.configured_for(*datagram), *datagram, [this](const Datagram& d) { keep(d); });
+  lidar_faults_->pass(lidars_.configured_for(*datagram), *datagram, [this](const Datagram& d) { enqueue(d); });
   if (waiting_.size() == waiting)
     waiting_.emplace(now_, OwnedInput{Silence{now_}, {}});
 }
@@ -67,16 +67,16 @@ void StreamRecording::begin(Stamp start) {
   }
 }
 
-void StreamRecording::take(const sim::StreamText& text, Stamp arrival) {
+void StreamRecording::read_text(const sim::StreamText& text, Stamp arrival) {
   const auto source = sources_.find(std::string(text.file));
   if (source != sources_.end())
-    std::visit([&]<class Sample>(SampleFaults<Sample>&) { take<Sample>(text, arrival, source->second); },
+    std::visit([&]<class Sample>(SampleFaults<Sample>&) { read_samples<Sample>(text, arrival, source->second); },
                source->second.faults);
   else if (text.file != "gt.tum" && text.file != "config.yaml")
     unknown_files_.emplace(text.file);
 }
 
-template <class Sample> void StreamRecording::take(const sim::StreamText& text, Stamp arrival, Source& source) {
+template <class Sample> void StreamRecording::read_samples(const sim::StreamText& text, Stamp arrival, Source& source) {
   auto samples = parse_samples<Sample>(std::string(text.lines), std::string(text.file));
   if (!samples) {
     problem_ = samples.error();
@@ -84,19 +84,19 @@ template <class Sample> void StreamRecording::take(const sim::StreamText& text, 
   }
   for (Sample& sample : *samples) {
     sample.arrival = arrival;
-    std::get<SampleFaults<Sample>>(source.faults).pass(sample, [&](const Sample& s) { keep(source.id, s); });
+    std::get<SampleFaults<Sample>>(source.faults).pass(sample, [&](const Sample& s) { enqueue(source.id, s); });
   }
 }
 
-void StreamRecording::keep(const Datagram& datagram) {
+void StreamRecording::enqueue(const Datagram& datagram) {
   waiting_.emplace(datagram.receive_stamp, OwnedInput{datagram, {datagram.payload.begin(), datagram.payload.end()}});
 }
 
-void StreamRecording::keep(SourceId source, const ImuSample& sample) {
+void StreamRecording::enqueue(SourceId source, const ImuSample& sample) {
   waiting_.emplace(sample.arrival, OwnedInput{daemon::ImuInput{source, sample}, {}});
 }
 
-void StreamRecording::keep(SourceId source, const OdometrySample& sample) {
+void StreamRecording::enqueue(SourceId source, const OdometrySample& sample) {
   waiting_.emplace(sample.arrival, OwnedInput{daemon::OdometryInput{source, sample}, {}});
 }
 
@@ -104,12 +104,12 @@ void StreamRecording::end() {
   now_ = Stamp::max();
   if (!lidar_faults_)
     return;
-  lidar_faults_->finish([this](const Datagram& datagram) { keep(datagram); });
+  lidar_faults_->finish([this](const Datagram& datagram) { enqueue(datagram); });
   for (auto& entry : sources_) {
     Source& source = entry.second;
     std::visit(
         [&]<class Sample>(SampleFaults<Sample>& faults) {
-          faults.finish([&](const Sample& sample) { keep(source.id, sample); });
+          faults.finish([&](const Sample& sample) { enqueue(source.id, sample); });
         },
         source.faults);
   }

@@ -68,11 +68,11 @@ class StreamRecording : public daemon::InputSource {
 
   void read();
   void begin(Stamp start);
-  void take(const sim::StreamText& text, Stamp arrival);
-  template <class Sample> void take(const sim::StreamText& text, Stamp arrival, Source& source);
-  void keep(const Datagram& datagram);
-  void keep(SourceId source, const ImuSample& sample);
-  void keep(SourceId source, const OdometrySample& sample);
+  void read_text(const sim::StreamText& text, Stamp arrival);
+  template <class Sample> void read_samples(const sim::StreamText& text, Stamp arrival, Source& source);
+  void enqueue(const Datagram& datagram);
+  void enqueue(SourceId source, const ImuSample& sample);
+  void enqueue(SourceId source, const OdometrySample& sample);
   void end();
 
   CaptureStream& stream_;
@@ -82,7 +82,7 @@ class StreamRecording : public daemon::InputSource {
   std::optional<DatagramFaults> lidar_faults_; ///< from the first packet on
   std::map<std::string, Source> sources_;      ///< by file name
   std::multimap<Stamp, OwnedInput> waiting_;   ///< read but not returned yet; by arrival
-  OwnedInput given_out_;
+  OwnedInput current_;
   Stamp now_; ///< arrival of the latest datagram read, Stamp::max() after the last
   std::set<std::string> unknown_files_;
   std::optional<std::string> problem_;

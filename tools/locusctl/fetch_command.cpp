@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Replaces the file atomically: concurrent readers get either version in full.
-void write_whole(const fs::path& file, const std::string& text) {
+void write_atomically(const fs::path& file, const std::string& text) {
   const fs::path beside = file.string() + ".new";
   std::error_code error;
   if (!(std::ofstream{beside, std::ios::binary} << text).flush())
@@ -33,7 +33,7 @@ void write_whole(const fs::path& file, const std::string& text) {
 }
 
 struct Description {
-  std::string what, keys; ///< for the user; for the configuration
+  std::string summary, keys; ///< for the user; for the configuration
   std::string_view suffix;
 };
 
@@ -51,15 +51,16 @@ Description describe(const hesai::Calibration& angles) {
 
 std::string fetch(const std::string& address, fs::path file) {
   const SensorFile fetched = value_or_fail(fetch_sensor_file(address), ExitStatus::failed);
-  const Description its = std::visit([](const auto& content) { return describe(content); }, fetched.content);
+  const Description description = std::visit([](const auto& content) { return describe(content); }, fetched.content);
   if (file.empty())
-    file = address + std::string{its.suffix};
-  if (file.extension() != its.suffix)
+    file = address + std::string{description.suffix};
+  if (file.extension() != description.suffix)
     throw Failure(ExitStatus::wrong_usage,
-                  fmt::format("{}: its name must end in {}, by which it is known", file.string(), its.suffix));
-  write_whole(file, fetched.text);
+                  fmt::format("{}: its name must end in {}, by which it is known", file.string(), description.suffix));
+  write_atomically(file, fetched.text);
   const std::string path = fs::absolute(file).lexically_normal().string();
-  return fmt::format("{}: {}\n\nlidars:\n{}", path, its.what, lidar_entry("lidar1", its.keys + path));
+  return fmt::format("{}: {}\n\nlidars:\n{}", path, description.summary,
+                     lidar_entry("lidar1", description.keys + path));
 }
 
 } // namespace locus::tools

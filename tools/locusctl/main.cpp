@@ -43,7 +43,7 @@ struct CtlArguments {
 };
 
 std::string status_text(const CtlArguments& arguments) {
-  return ask(arguments.control(), {{"command", "status"}, {"text", true}}).json.value("text", "");
+  return send_request(arguments.control(), {{"command", "status"}, {"text", true}}).json.value("text", "");
 }
 
 void watch(const CtlArguments& arguments) {
@@ -60,12 +60,12 @@ void watch(const CtlArguments& arguments) {
 void status(const CtlArguments& arguments) {
   if (arguments.watch)
     return watch(arguments);
-  fmt::print("{}", arguments.json ? ask(arguments.control(), {{"command", "status"}}).json.dump(1) + '\n'
+  fmt::print("{}", arguments.json ? send_request(arguments.control(), {{"command", "status"}}).json.dump(1) + '\n'
                                   : status_text(arguments));
 }
 
 void save_map(const CtlArguments& arguments) {
-  const std::vector<std::byte> bytes = ask(arguments.control(), {{"command", "save-map"}}).bytes;
+  const std::vector<std::byte> bytes = send_request(arguments.control(), {{"command", "save-map"}}).bytes;
   std::vector<SurfacePoint> points(bytes.size() / sizeof(SurfacePoint));
   if (!points.empty())
     std::memcpy(std::as_writable_bytes(std::span(points)).data(), bytes.data(), points.size() * sizeof(SurfacePoint));
@@ -77,12 +77,12 @@ void reset(const CtlArguments& arguments) {
   Json request{{"command", "reset"}};
   if (!arguments.pose.empty())
     request["pose"] = arguments.pose;
-  ask(arguments.control(), request);
+  send_request(arguments.control(), request);
 }
 
 /// Prints the estimated calibration of the motion sources, or the configuration with it.
 void calibration(const CtlArguments& arguments) {
-  const Json sources = ask(arguments.control(), {{"command", "status"}}).json.value("sources", Json::object());
+  const Json sources = send_request(arguments.control(), {{"command", "status"}}).json.value("sources", Json::object());
   fmt::print("{}", arguments.yaml ? daemon::calibration_yaml(sources) : daemon::calibration_text(sources));
 }
 
@@ -94,10 +94,10 @@ void record(const CtlArguments& arguments) {
   if (const std::string_view unit{stopped, end};
       error != std::errc{} || !std::isfinite(keep_s) || (unit != "s" && !unit.empty()))
     throw Failure(ExitStatus::wrong_usage, fmt::format("--keep {}: must be seconds, e.g. 60s", arguments.keep));
-  const Json answer = ask(arguments.control(), {{"command", "record"}, {"keep_s", keep_s}}).json;
+  const Json answer = send_request(arguments.control(), {{"command", "record"}, {"keep_s", keep_s}}).json;
   const std::string folder = answer.value("folder", "");
   for (;; std::this_thread::sleep_for(std::chrono::milliseconds{200})) {
-    const Json status = ask(arguments.control(), {{"command", "status"}}).json;
+    const Json status = send_request(arguments.control(), {{"command", "status"}}).json;
     if (!status.contains("incidents"))
       throw Failure(ExitStatus::failed,
                     fmt::format("{}: no incidents are kept since the service was reloaded; this one may "
@@ -137,7 +137,7 @@ std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
       ->required()
       ->check(CLI::IsMember(std::vector<std::string>(modes.begin(), modes.end())));
   flat->callback([&] {
-    action = [&] { ask(arguments.control(), {{"command", "flat-ground"}, {"mode", arguments.mode}}); };
+    action = [&] { send_request(arguments.control(), {{"command", "flat-ground"}, {"mode", arguments.mode}}); };
   });
   CLI::App* const learned = app.add_subcommand("calibration", "What drives have told of stamps, mountings and wheels");
   learned->add_flag("--yaml", arguments.yaml, "What is known better than it is configured, to be pasted there");
@@ -152,7 +152,7 @@ std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
       ->expected(6);
   again->callback([&] { action = [&] { reset(arguments); }; });
   app.add_subcommand("reload", "Reads the configuration again")->callback([&] {
-    action = [&] { ask(arguments.control(), {{"command", "reload"}}); };
+    action = [&] { send_request(arguments.control(), {{"command", "reload"}}); };
   });
   CLI::App* const keep = app.add_subcommand("record", "Keeps the last input as an incident, for locus-replay");
   keep->add_option("--keep", arguments.keep, "How much of it, e.g. 60s")->required()->type_name("SECONDS");

@@ -38,7 +38,7 @@ Screen::Screen() {
   for (const int number : {SIGINT, SIGTERM, SIGHUP})
     std::signal(number, [](int) { interrupted = 1; });
   if (termios settings{}; tcgetattr(STDIN_FILENO, &settings) == 0) {
-    found_ = settings;
+    original_settings_ = settings;
     settings.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
     settings.c_cc[VSUSP] = _POSIX_VDISABLE; // disables suspending: a shell prompt would be lost on this page
     tcsetattr(STDIN_FILENO, TCSANOW, &settings);
@@ -49,8 +49,8 @@ Screen::Screen() {
 Screen::~Screen() {
   std::fputs("\x1b[?25h\x1b[?1049l", stdout);
   std::fflush(stdout);
-  if (found_)
-    tcsetattr(STDIN_FILENO, TCSAFLUSH, &*found_);
+  if (original_settings_)
+    tcsetattr(STDIN_FILENO, TCSAFLUSH, &*original_settings_);
 }
 
 void Screen::show(std::string_view text) { // NOLINT(readability-convert-member-functions-to-static): on our page
@@ -68,7 +68,7 @@ void Screen::show(std::string_view text) { // NOLINT(readability-convert-member-
 }
 
 bool Screen::wait_for_end(Duration timeout) {
-  pollfd keys{found_ ? STDIN_FILENO : -1, POLLIN, 0};
+  pollfd keys{original_settings_ ? STDIN_FILENO : -1, POLLIN, 0};
   const Duration end = daemon::read_clock(CLOCK_MONOTONIC) + timeout;
   for (Duration now{}; interrupted == 0 && (now = daemon::read_clock(CLOCK_MONOTONIC)) < end;) {
     const timespec wait = daemon::to_timespec(end - now);

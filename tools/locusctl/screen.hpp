@@ -27,7 +27,7 @@ class Screen {
   bool wait_for_end(Duration timeout);
 
  private:
-  std::optional<termios> found_; ///< original settings; nothing if stdin is not a terminal
+  std::optional<termios> original_settings_; ///< original settings; nothing if stdin is not a terminal
 };
 
 } // namespace locus::tools

@@ -48,8 +48,8 @@ std::string entry(const HeardLidar& lidar, int number, bool shares_port) {
 } // namespace
 
 std::string find_sensors(Duration duration) {
-  constexpr std::array kUsualPorts{kDefaultDataPort, kDefaultPositionPort, ouster::kDefaultLidarPort};
-  auto wire = WireTap::open(kUsualPorts);
+  constexpr std::array kDefaultPorts{kDefaultDataPort, kDefaultPositionPort, ouster::kDefaultLidarPort};
+  auto wire = WireTap::open(kDefaultPorts);
   if (!wire)
     throw Failure(ExitStatus::failed, wire.error());
   LidarSurvey survey;

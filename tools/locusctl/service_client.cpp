@@ -89,9 +89,9 @@ std::vector<std::byte> read_all(int descriptor) {
 
 } // namespace
 
-ServiceAnswer ask(const std::filesystem::path& socket, const nlohmann::ordered_json& request) {
-  const bool waits_for_no_disk = request.value("command", "") == "status";
-  const Connection connection(socket, waits_for_no_disk ? std::chrono::seconds{5} : std::chrono::seconds{30});
+ServiceAnswer send_request(const std::filesystem::path& socket, const nlohmann::ordered_json& request) {
+  const bool answers_at_once = request.value("command", "") == "status";
+  const Connection connection(socket, answers_at_once ? std::chrono::seconds{5} : std::chrono::seconds{30});
   connection.send(request.dump());
   const auto [text, descriptor] = connection.receive();
   ServiceAnswer answer{nlohmann::ordered_json::parse(text, nullptr, false), {}};

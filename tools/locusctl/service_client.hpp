@@ -17,6 +17,6 @@ struct ServiceAnswer {
 
 /// Sends one request to a running service; see daemon::ControlServer. Throws Failure if there is no service, on a
 /// timeout of a few seconds, or if it refuses.
-ServiceAnswer ask(const std::filesystem::path& socket, const nlohmann::ordered_json& request);
+ServiceAnswer send_request(const std::filesystem::path& socket, const nlohmann::ordered_json& request);
 
 } // namespace locus::tools
