@@ -153,13 +153,13 @@ std::string calibration_yaml(const ordered_json& sources) {
   for (const auto& [name, source] : sources.items()) {
     const ordered_json learned = source.value("learned", ordered_json::object());
     if (learned.value("too_late", false))
-      notes += fmt::format("# {} is too late to be measured in a drive; take its values from a recording of one:\n"
+      notes += fmt::format("# {} arrives too late for a calibration during a drive; calibrate it from a recording:\n"
                            "# locus-replay --calibrate FILE RECORDING\n",
                            name);
     if (const ordered_json better = learned.value("calibrated", ordered_json::object()); !better.empty())
       entries += entry_yaml(name, learned, better);
   }
-  return notes + (entries.empty() ? "# Nothing is known better than it is configured.\n"
+  return notes + (entries.empty() ? "# No learned value is better known than the configured one.\n"
                                   : "# For the entries of the same name.\nmotion_sources:\n" + entries);
 }
 
@@ -175,8 +175,8 @@ std::string line_of(std::string_view source, std::string_view figure, const orde
     return (axis < 0 ? value : value.at(static_cast<std::size_t>(axis))).get<double>();
   };
   const double sd = get("sd"), off = std::abs(get("value") - get("configured"));
-  const std::string_view verdict = too_late                             ? "too late to be measured in a drive"
-                                   : sd >= kTold * get("configured_sd") ? "not told by the drives so far"
+  const std::string_view verdict = too_late                             ? "too late to calibrate during a drive"
+                                   : sd >= kTold * get("configured_sd") ? "not observed by the drives so far"
                                    : off > kBetter_sigma * sd           ? "better known than configured"
                                                                         : "as configured";
   return fmt::format("{:<12} {:<24} {:>16} {:>20}  {}\n", source, figure,
@@ -204,7 +204,7 @@ std::string calibration_text(const ordered_json& sources) {
     const auto since_s = static_cast<std::time_t>(learned.value("since_ns", std::int64_t{0}) / 1'000'000'000);
     text += fmt::format("{:<12} since {:%F %T}\n", "", fmt::localtime(since_s));
   }
-  return text.size() > head ? text : "No motion source has been heard that calibrates itself.\n";
+  return text.size() > head ? text : "No motion source that calibrates itself has been received.\n";
 }
 
 std::string calibration_doubt(const Figures& figures, std::size_t source) {
@@ -218,18 +218,18 @@ std::string calibration_doubt(const Figures& figures, std::size_t source) {
   late.mean -= 1e-3 * configured_ms;
   if (is_plainly_above(late, kGrossly_s))
     return fmt::format("stamps a motion {} {} lidar does{}; make its driver stamp samples when they are measured and "
-                       "look at the clocks of both, or {}",
+                       "check the clocks of both, or {}",
                        too_late ? fmt::format("more than {:.0f} ms", 1e3 * kGrossly_s)
                                 : fmt::format("{:.0f} ms", std::abs(1e3 * late.mean)),
                        late.mean > 0.0 ? "later than" : "earlier than",
                        configured_ms != 0.0 ? " on top of late_ms" : "",
-                       too_late ? "take late_ms from a recording, with locus-replay --calibrate"
+                       too_late ? "estimate late_ms from a recording, with locus-replay --calibrate"
                                 : fmt::format("configure late_ms: {:.0f}", configured_ms + 1e3 * late.mean));
   for (int axis = 0; axis < 3 && !too_late; ++axis) {
     const Learned turn = learned.mounting_rad(axis);
     if (turn.sigma < kKnown_rad && is_plainly_above(turn, kGrossly_rad))
-      return fmt::format("sits turned by {:+.1f} degrees about {} of the base against lidar, otherwise than "
-                         "T_base_source and T_base_lidar say; measure both, and correct the wrong rpy_deg",
+      return fmt::format("is rotated by {:+.1f} degrees about {} of the base relative to lidar, against T_base_source "
+                         "and T_base_lidar; measure both, and correct the wrong rpy_deg",
                          turn.mean / kRadPerDeg, kAxisNames[static_cast<std::size_t>(axis)]);
   }
   return "";

@@ -78,14 +78,14 @@ std::optional<std::string> shared_port(const LidarOptions& options, const Ingest
   for (const LidarInput::Stranger& stranger : lidar.strangers) {
     if (stranger.ip == *lidar.source_ip || stranger.packets * kNegligibleRatio <= lidar.packets.data)
       continue;
-    refused.push_back(fmt::format("{} of {}", stranger.packets, dotted(stranger.ip)));
+    refused.push_back(fmt::format("{} from {}", stranger.packets, dotted(stranger.ip)));
     yaml += fmt::format(", {{name: {}_{}, port: {}, source_ip: {}}}", options.name, refused.size() + 1, options.port,
                         dotted(stranger.ip));
   }
   if (refused.empty())
     return std::nullopt;
-  return fmt::format("lidar {}: others send to its port {}, too: the packets of {} are read, and {} are refused; if "
-                     "these are lidars, give each its own entry, with its T_base_lidar: lidars: [{}]",
+  return fmt::format("lidar {}: other senders use its port {}: packets from {} are used, and {} are refused; if these "
+                     "are lidars, give each its own entry, with its T_base_lidar: lidars: [{}]",
                      options.name, options.port, dotted(*lidar.source_ip), fmt::join(refused, ", "), yaml);
 }
 
@@ -115,8 +115,8 @@ std::vector<std::string> cloud_doubts(const LidarOptions& options, const IngestR
 std::optional<std::string> stale_metadata(const LidarOptions& options, const IngestReport::Lidar& lidar) {
   if (lidar.packets_of_other_mode == 0)
     return std::nullopt;
-  return fmt::format("lidar {}: refused the last {} packets: the sensor was started anew since {} was fetched, and is "
-                     "not in the mode that this tells of; fetch it again: locusctl fetch {} -o {}",
+  return fmt::format("lidar {}: refused the last {} packets: the sensor was restarted after {} was fetched, and runs "
+                     "in another mode; fetch it again: locusctl fetch {} -o {}",
                      options.name, lidar.packets_of_other_mode, options.metadata,
                      lidar.source_ip ? dotted(*lidar.source_ip) : "SENSOR", options.metadata);
 }
@@ -125,8 +125,8 @@ std::optional<std::string> too_fast(const MotionLimits& limits, double largest_s
   constexpr double kTolerance = 1.05;
   if (largest_speed_mps <= kTolerance * limits.max_speed_mps)
     return std::nullopt;
-  return fmt::format("estimates claim up to {:.1f} m/s, and motion.max_speed_mps is {:g}: set it to what the robot is "
-                     "able to, or do not rely on them",
+  return fmt::format("estimates reach {:.1f} m/s, above motion.max_speed_mps of {:g}: set it to the top speed of the "
+                     "robot, or do not rely on them",
                      largest_speed_mps, limits.max_speed_mps);
 }
 
@@ -233,10 +233,9 @@ std::optional<std::string> slow_imu(const MotionSource& options, const IngestRep
   constexpr Duration kTooSlow = std::chrono::milliseconds{35}; ///< less than three samples in a sweep of 100 ms
   if (options.kind != SourceKind::imu || source.period.value_or(Duration{}) <= kTooSlow)
     return std::nullopt;
-  return fmt::format(
-      "motion source {} comes {:.0f} times a second, too seldom to tell the motion within a sweep; let it "
-      "publish 100 times a second or more",
-      options.name, 1.0 / to_seconds(*source.period));
+  return fmt::format("motion source {} has a rate of {:.0f} Hz, too low to measure the motion within a sweep; let it "
+                     "publish at 100 Hz or more",
+                     options.name, 1.0 / to_seconds(*source.period));
 }
 
 std::string verdict_on(const IngestReport::Source& source, bool is_live) {

@@ -117,7 +117,7 @@ void add_reasons(MetricsText& text, std::string_view key, std::string_view name,
 void add_build(MetricsText& text, const Figures& figures) {
   text.info("locusd_build", "The program.");
   text.add_info({{"version", LOCUS_VERSION}});
-  text.info("locusd_config", "The configuration in force, as --print-config prints it, and the instruction set.");
+  text.info("locusd_config", "The configuration in effect, as --print-config prints it, and the instruction set.");
   text.add_info({{"sha256", config_sha256(figures.config)}, {"isa", to_string(figures.config.odometry.isa)}});
 }
 
@@ -135,19 +135,18 @@ void add_estimate(MetricsText& text, const SweepFigures& sweeps) {
     text.add_state({}, state, last && state == to_string(last->state));
   if (!last)
     return;
-  text.info("locusd_beginning", "Where the first pose is from: origin, told, odometry or map.");
+  text.info("locusd_beginning", "Source of the first pose: origin, told, odometry or map.");
   if (last->beginning)
     text.add_info({{"from", to_string(*last->beginning)}});
   text.gauge("locusd_estimate_age_seconds", "Time since the end of the last estimated sweep.");
   text.add(to_seconds(time_since(last->stamp).value_or(Duration{})));
-  text.gauge("locusd_position_sigma_meters", "Standard deviation of the position, over the whole way since the start.");
+  text.gauge("locusd_position_sigma_meters", "Standard deviation of the position, over the path since the start.");
   for (std::size_t axis = 0; axis < 3; ++axis)
     text.add({{"axis", kAxes[axis]}}, sigma(*last, static_cast<Eigen::Index>(axis)));
-  text.gauge("locusd_attitude_sigma_radians",
-             "Standard deviation of the attitude, over the whole way since the start.");
+  text.gauge("locusd_attitude_sigma_radians", "Standard deviation of the attitude, over the path since the start.");
   for (std::size_t axis = 3; axis < 6; ++axis)
     text.add({{"axis", kAxes[axis]}}, sigma(*last, static_cast<Eigen::Index>(axis)));
-  text.gauge("locusd_observability_ratio", "How well lidar sees each axis of the base, from 0 to 1.");
+  text.gauge("locusd_observability_ratio", "Observability of each axis of the base by lidar, from 0 to 1.");
   for (std::size_t axis = 0; axis < 6; ++axis)
     text.add({{"axis", kAxes[axis]}}, last->observability[static_cast<Eigen::Index>(axis)]);
 }
@@ -158,23 +157,23 @@ void add_sweeps(MetricsText& text, const Figures& figures) {
   text.add(counters.seen);
   text.counter("locusd_sweeps_processed", "Sweeps registered.");
   text.add(counters.processed);
-  text.counter("locusd_sweeps_dropped", "Sweeps replaced by a newer one before the odometry had time.");
+  text.counter("locusd_sweeps_dropped", "Sweeps replaced by a newer one before they were processed.");
   text.add(counters.dropped);
   text.counter("locusd_sweeps_failed", "Sweeps not registered; the pose is a prediction.");
   text.add(counters.failed);
-  text.counter("locusd_sweep_builder_restarts", "Begins of a new sweep because the time of the lidars stepped.");
+  text.counter("locusd_sweep_builder_restarts", "Restarts of the sweep because the time of the lidars stepped.");
   text.add(figures.ingest.sweeps.restarts);
   text.histogram("locusd_sweep_process_seconds", "Time from the cut of a sweep to its estimate.");
   text.add_buckets(figures.sweeps.process);
   text.counter("locusd_sweep_stage_cpu_seconds", "Processor time of the sweeps by stage.");
   for (std::size_t i = 0; i < kStages; ++i)
     text.add({{"stage", to_string(static_cast<Stage>(i))}}, to_seconds(figures.sweeps.stages[i]));
-  text.gauge("locusd_largest_speed_meters_per_second", "Largest speed that any estimate claims.");
+  text.gauge("locusd_largest_speed_meters_per_second", "Largest speed of any estimate.");
   text.add(figures.sweeps.largest_speed_mps);
 }
 
 void add_datagrams(MetricsText& text, const PacketCounters& total) {
-  text.counter("locusd_datagrams_received", "Datagrams on the ports of all lidars, those of nobody's included.");
+  text.counter("locusd_datagrams_received", "Datagrams on the ports of all lidars, from any sender.");
   text.add(total.received);
   text.counter("locusd_datagrams_rejected", "Datagrams on the ports of all lidars that are not used.");
   for (std::size_t i = 0; i < total.rejected.size(); ++i)
@@ -200,8 +199,8 @@ void add_clouds(MetricsText& text, const Figures& figures) {
   count("locusd_clouds_used", "Used clouds.", &CloudCounters::used);
   count("locusd_clouds_reordered", "Used clouds after a later one.", &CloudCounters::reordered);
   count("locusd_clouds_clock_steps", "Steps of the stamps of a lidar's clouds.", &CloudCounters::clock_steps);
-  count("locusd_cloud_points", "Points of the used clouds, whether or not anything returned.", &CloudCounters::points);
-  text.counter("locusd_clouds_dropped", "Clouds that came before the one before was taken, in place of it.");
+  count("locusd_cloud_points", "Points of the used clouds, with or without a return.", &CloudCounters::points);
+  text.counter("locusd_clouds_dropped", "Clouds replaced by a newer one before they were processed.");
   for (std::size_t i = 0; i < lidars.size(); ++i) {
     if (lidars[i].gives_clouds())
       text.add({{"lidar", lidars[i].name}}, figures.live->cloud_drops[i]);
@@ -210,7 +209,7 @@ void add_clouds(MetricsText& text, const Figures& figures) {
   for_each([&](const auto& lidar, const auto& clouds) {
     add_reasons<CloudError>(text, "lidar", lidar, clouds.counters.refused);
   });
-  text.counter("locusd_cloud_points_left_out", "Points of the used clouds that are no returns.");
+  text.counter("locusd_cloud_points_left_out", "Points of the used clouds without a return.");
   for_each([&](const auto& lidar, const auto& clouds) {
     text.add({{"lidar", lidar}, {"reason", "nan"}}, clouds.counters.nan);
     text.add({{"lidar", lidar}, {"reason", "origin"}}, clouds.counters.origin);
@@ -253,12 +252,12 @@ void add_lidars(MetricsText& text, const Figures& figures) {
   for_each([&](const auto& options, const auto& lidar) {
     text.add({{"lidar", options.name}}, lidar.rotation_rate_rpm / 60.0);
   });
-  text.info("locusd_lidar", "As what the packets of a lidar are read; missing before the first.");
+  text.info("locusd_lidar", "Model and return mode of a lidar; missing before its first packet.");
   for_each([&](const auto& options, const auto& lidar) {
     if (!lidar.model.empty())
       text.add_info({{"lidar", options.name}, {"model", lidar.model}, {"return_mode", lidar.return_mode}});
   });
-  text.state_set("locusd_lidar_pps", "Pulse per second, as position packets tell it.");
+  text.state_set("locusd_lidar_pps", "Pulse per second, from position packets.");
   for_each([&](const auto& options, const auto& lidar) {
     if (!lidar.tells_date)
       add_states<velodyne::PpsState>(text, {{"lidar", options.name}}, lidar.pps);
@@ -266,7 +265,7 @@ void add_lidars(MetricsText& text, const Figures& figures) {
   bool tell_date = false;
   for_each([&](const auto&, const auto& lidar) { tell_date = tell_date || lidar.tells_date; });
   if (tell_date) {
-    text.state_set("locusd_lidar_clock", "What the clock of an Ouster or a Hesai counts from.");
+    text.state_set("locusd_lidar_clock", "Reference of the clock of an Ouster or a Hesai.");
     for_each([&](const auto& options, const auto& lidar) {
       if (lidar.tells_date)
         add_states<TimeScale>(text, {{"lidar", options.name}}, lidar.pps);
@@ -292,13 +291,13 @@ void add_innovations(MetricsText& text, const Figures& figures) {
   const auto deviation = [](const Innovation& innovation, Eigen::Index axis) {
     return std::sqrt(innovation.variance[axis]);
   };
-  add("locusd_source_velocity_innovation_meters_per_second", "Velocity of a source less that of everything else.", 0,
+  add("locusd_source_velocity_innovation_meters_per_second", "Velocity of a source minus that of everything else.", 0,
       value);
-  add("locusd_source_velocity_innovation_sigma_meters_per_second", "Its expected deviation; 0 where nothing is told.",
-      0, deviation);
-  add("locusd_source_turn_innovation_radians_per_second", "Turn rate of a source less that of everything else.", 3,
+  add("locusd_source_velocity_innovation_sigma_meters_per_second", "Its expected deviation; 0 if not measured.", 0,
+      deviation);
+  add("locusd_source_turn_innovation_radians_per_second", "Turn rate of a source minus that of everything else.", 3,
       value);
-  add("locusd_source_turn_innovation_sigma_radians_per_second", "Its expected deviation; 0 where nothing is told.", 3,
+  add("locusd_source_turn_innovation_sigma_radians_per_second", "Its expected deviation; 0 if not measured.", 3,
       deviation);
 }
 
@@ -352,14 +351,14 @@ void add_drops(MetricsText& text, const Figures& figures, const Figures::Live& l
     text.counter(name, help);
     text.add(value);
   };
-  count("locusd_kernel_drops", "Datagrams for which the socket's buffer had no room.", live.kernel_drops);
-  count("locusd_flood_datagrams_dropped", "Datagrams of no lidar that the kernel kept out.", live.filtered);
+  count("locusd_kernel_drops", "Datagrams dropped because the socket buffer was full.", live.kernel_drops);
+  count("locusd_flood_datagrams_dropped", "Datagrams of other senders, filtered by the kernel.", live.filtered);
   count("locusd_late_packets", "Packets too late for their sweep.", figures.ingest.sweeps.late_packets);
   count("locusd_overflowed_points", "Points over the limit of a sweep.", figures.ingest.sweeps.overflowed_points);
-  count("locusd_motion_samples_dropped", "Samples for which the ring to the ingest had no room.", live.motion_drops);
+  count("locusd_motion_samples_dropped", "Samples dropped because the ring to the ingest was full.", live.motion_drops);
   count("locusd_flat_ground_messages_refused", "Messages of a second publisher.", live.link.flat_ground_refused);
-  count("locusd_estimates_unfetched", "Estimates that the publisher was too slow for.", live.unfetched);
-  count("locusd_estimates_unpublished", "Estimates that DDS did not take.", live.unpublished);
+  count("locusd_estimates_unfetched", "Estimates lost because the publisher was too slow.", live.unfetched);
+  count("locusd_estimates_unpublished", "Estimates that DDS did not accept.", live.unpublished);
 }
 
 void add_outlets(MetricsText& text, const Figures::Live& live) {
@@ -370,11 +369,11 @@ void add_outlets(MetricsText& text, const Figures::Live& live) {
   text.state_set("locusd_flat_ground", "Whether the ground is assumed level.");
   add_states(text, {}, live.flat_ground);
   if (live.incidents) {
-    text.counter("locusd_incidents_kept", "Incidents whose last input was kept.");
+    text.counter("locusd_incidents_kept", "Incidents stored.");
     text.add(live.incidents->kept);
     text.counter("locusd_incidents_suppressed", "Incidents too soon after another.");
     text.add(live.incidents->suppressed);
-    text.counter("locusd_incident_inputs_dropped", "Inputs missing in what is held in memory for the next incident.");
+    text.counter("locusd_incident_inputs_dropped", "Inputs missing from the memory for the next incident.");
     text.add(live.incidents->dropped);
     text.gauge("locusd_incidents_problem",
                "1 where the last incident could not be kept, or the input for the next is not held.");
@@ -388,7 +387,7 @@ void add_outlets(MetricsText& text, const Figures::Live& live) {
   text.add(live.recording->bytes);
   text.counter("locusd_recording_inputs", "Inputs recorded.");
   text.add(live.recording->recorded);
-  text.counter("locusd_recording_inputs_dropped", "Inputs that the disk was too slow for, or did not take.");
+  text.counter("locusd_recording_inputs_dropped", "Inputs lost because the disk was too slow or failed.");
   text.add(live.recording->dropped);
   text.counter("locusd_recording_inputs_unfit", "Samples that a recording cannot hold.");
   text.add(live.recording->unfit);

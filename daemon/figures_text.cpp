@@ -142,7 +142,7 @@ std::string incidents_text(const std::optional<Incidents::Status>& incidents) {
     return "";
   return fmt::format("incident    {}{}\n",
                      !incidents->problem.empty() ? "none: " + incidents->problem
-                     : incidents->last.empty()   ? "none kept"
+                     : incidents->last.empty()   ? "none stored"
                                                  : incidents->last.filename().string(),
                      incidents->suppressed > 0 ? fmt::format("   {} more too soon", incidents->suppressed) : "");
 }
@@ -167,11 +167,11 @@ std::string to_text(const Figures& figures) {
   text += fmt::format("sweeps      {} seen   {} processed   {} dropped   {} failed   {} lost by kernel\n",
                       counters.seen, counters.processed, counters.dropped, counters.failed, live.kernel_drops);
   if (live.filtered > 0)
-    text += fmt::format("flood       {} datagrams of no lidar were kept out by the kernel\n", live.filtered);
+    text += fmt::format("flood       {} datagrams of other senders were filtered by the kernel\n", live.filtered);
   text += fmt::format("machine     {:.1f} % of a core since the start   {:.0f} MB at most\n",
                       up_s > 0 ? 100 * to_seconds(figures.spent.cpu) / up_s : 0.0, peak_rss_mb());
   text +=
-      fmt::format("dds         {}, domain {}, interface {}\n", live.link.connected ? "up" : "not up, is tried again",
+      fmt::format("dds         {}, domain {}, interface {}\n", live.link.connected ? "up" : "not connected, retrying",
                   figures.config.dds.domain, figures.config.dds.interface);
   return text + recording_text(live.recording) + incidents_text(live.incidents) + pose_text(sweeps.last) +
          lidars_text(figures) + sources_text(figures);

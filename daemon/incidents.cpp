@@ -27,7 +27,7 @@ using std::filesystem::path;
 constexpr std::size_t kBytesPerRound = 4 << 20;
 
 std::string store_failure_text(const path& where, const std::string& why, const char* remedy) {
-  return fmt::format("{}: the incident cannot be kept ({}); {}", where.string(), why, remedy);
+  return fmt::format("{}: the incident cannot be stored ({}); {}", where.string(), why, remedy);
 }
 
 std::string store_failure_text(const path& where, const std::error_code& error) {
@@ -124,7 +124,7 @@ void Incidents::set_max_bytes(std::uint64_t max_bytes) {
 Expected<path, std::string> Incidents::submit(Request request) {
   const std::scoped_lock lock(mutex_);
   if (!accept(std::move(request)))
-    return fmt::format("{}: is still being written; ask again once it is there", status_.writing.string());
+    return fmt::format("{}: is still being written; try again when it is complete", status_.writing.string());
   return status_.writing;
 }
 
@@ -178,7 +178,7 @@ std::optional<std::string> Incidents::begin(Request request, Recorder* recorder)
     request.pieces = recorder->end_pieces(request.keep);
   const path target = status().writing;
   if (request.pieces.empty())
-    return store_failure_text(target, "no input has come", "is there data? see locusctl status");
+    return store_failure_text(target, "no input was received", "check with locusctl status that sensors send");
   std::error_code error;
   std::filesystem::create_directories(folder_, error);
   if (error)
@@ -206,7 +206,7 @@ std::optional<std::string> Incidents::make_room(std::uint64_t bytes) const {
   }
   if (bytes > max_bytes)
     return store_failure_text(folder_,
-                              fmt::format("it has {} MB, and {} may be used", bytes / 1'000'000, max_bytes / 1'000'000),
+                              fmt::format("it has {} MB, and {} are allowed", bytes / 1'000'000, max_bytes / 1'000'000),
                               "raise record.incidents_bytes, or lower record.keep_s");
   for (;;) {
     std::uint64_t older_bytes = 0;
@@ -220,9 +220,9 @@ std::optional<std::string> Incidents::make_room(std::uint64_t bytes) const {
     if (older_bytes + bytes <= max_bytes && older.size() < kMaxIncidents && free >= wanted)
       return std::nullopt;
     if (older.empty() || free + older_bytes < wanted) // deletes no incident in vain
-      return store_failure_text(
-          folder_, fmt::format("{} MB are free on the disk, and {} wanted", free / 1'000'000, wanted / 1'000'000),
-          "free some, or lower record.keep_s");
+      return store_failure_text(folder_,
+                                fmt::format("{} MB free on the disk, {} needed", free / 1'000'000, wanted / 1'000'000),
+                                "free space, or lower record.keep_s");
     std::filesystem::remove_all(older.front(), error);
     if (error)
       return store_failure_text(older.front(), error);

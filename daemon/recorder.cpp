@@ -57,7 +57,7 @@ std::optional<std::string> CaptureRing::obstacle() const {
   while (!std::filesystem::exists(there, error) && there.has_relative_path())
     there = there.parent_path();
   if (!std::filesystem::is_directory(there, error))
-    return disk_failure_text("cannot be made", folder_, std::make_error_code(std::errc::not_a_directory));
+    return disk_failure_text("cannot be created", folder_, std::make_error_code(std::errc::not_a_directory));
   if (faccessat(AT_FDCWD, there.c_str(), W_OK, AT_EACCESS) != 0)
     return disk_failure_text("cannot be written to", there, {errno, std::generic_category()});
   return std::nullopt;
@@ -70,7 +70,7 @@ std::optional<std::string> CaptureRing::scan_folder() {
   std::error_code error;
   std::filesystem::create_directories(folder_, error);
   if (error)
-    return disk_failure_text("cannot be made", folder_, error);
+    return disk_failure_text("cannot be created", folder_, error);
   for (const path& run : runs_in(folder_)) {
     last_run_ = number_of(run);
     for (const path& piece : pieces_in(run)) {
@@ -91,11 +91,11 @@ std::optional<std::string> CaptureRing::make_room() {
     std::error_code error;
     const std::uint64_t free = std::filesystem::space(folder_, error).available;
     if (error)
-      return disk_failure_text("cannot be looked at", folder_, error);
+      return disk_failure_text("cannot be read", folder_, error);
     if (bytes_ + piece <= max_bytes_ && free >= 2 * piece)
       return std::nullopt;
     if (free + bytes_ < 2 * piece)
-      return fmt::format("{}: {} MB free on the disk, and {} are wanted; free some, or lower its bound in record",
+      return fmt::format("{}: {} MB free on the disk, {} needed; free space, or lower its limit in record",
                          folder_.string(), free / 1'000'000, 2 * piece / 1'000'000);
     if (auto problem = remove_oldest())
       return problem;
@@ -135,9 +135,9 @@ Expected<path, std::string> CaptureRing::make_piece(Stamp now) {
   std::error_code error;
   const bool is_new = std::filesystem::create_directories(piece_, error);
   if (error)
-    return disk_failure_text("cannot be made", piece_, error);
+    return disk_failure_text("cannot be created", piece_, error);
   if (!is_new)
-    return fmt::format("{}: is there already; give each locusd folders of its own", piece_.string());
+    return fmt::format("{}: exists already; give each locusd folders of its own", piece_.string());
   return piece_;
 }
 

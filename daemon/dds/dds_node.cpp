@@ -122,7 +122,7 @@ Expected<DdsNode, std::string> DdsNode::open(const DdsOptions& options) {
     return fmt::format("dds.interface: there is no network interface {}; there are {}", options.interface,
                        fmt::join(interfaces(), ", "));
   const auto failed = [&](const char* what, dds_entity_t code) {
-    return fmt::format("DDS did not give a {} in domain {} on interface {} ({}); bring the interface up, or set "
+    return fmt::format("DDS could not create a {} in domain {} on interface {} ({}); bring the interface up, or set "
                        "dds.interface to one that is",
                        what, options.domain, options.interface, dds_strretcode(code));
   };
@@ -136,7 +136,7 @@ Expected<DdsNode, std::string> DdsNode::open(const DdsOptions& options) {
     return *problem;
   DdsEntity participant{dds_create_participant(id, qos.get(), nullptr)};
   if (participant.handle() < 0 && !options.security.empty())
-    return fmt::format("DDS did not take the enclave {} for domain {}; look whether its certificates are in date, "
+    return fmt::format("DDS did not accept the enclave {} for domain {}; check that its certificates are valid today, "
                        "their permissions name this domain, and all are signed by its authorities (security.md)",
                        options.security, options.domain);
   if (participant.handle() < 0)

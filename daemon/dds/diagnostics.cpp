@@ -41,7 +41,7 @@ Diagnostic odometry_diagnostic(const Figures& figures, const ordered_json& json,
   }
   const std::optional<OdometryEstimate>& last = figures.sweeps.last;
   if (!last || now - last->stamp >= kStale)
-    return diagnostic(Level::stale, "", "no lidar data; look whether the lidars send", values);
+    return diagnostic(Level::stale, "", "no lidar data; check that the lidars send", values);
   const bool is_well = last->state == TrackingState::tracking || last->state == TrackingState::standstill;
   return diagnostic(is_well ? Level::ok : Level::warning, "", std::string{to_string(last->state)}, values);
 }
@@ -57,9 +57,9 @@ Diagnostic lidar_diagnostic(const LidarOptions& options, const IngestReport::Lid
                                        : Level::ok,
                     ": lidar " + options.name,
                     !problem.empty() ? problem
-                    : !silence  ? (options.gives_clouds() ? "never heard; look whether its driver publishes the topic"
-                                                          : "never heard; look at its cable, address and port")
-                    : is_silent ? "silent; look at its cable and power"
+                    : !silence  ? (options.gives_clouds() ? "never heard; check that its driver publishes the topic"
+                                                          : "never heard; check its cable, address and port")
+                    : is_silent ? "silent; check its cable and power"
                                 : "heard",
                     values);
 }

@@ -49,7 +49,7 @@ Parsed parse_reset(const nlohmann::json& request) {
 Parsed parse_record(const nlohmann::json& request) {
   const double keep_s = request.at("keep_s").get<double>();
   if (!(keep_s >= 1.0 && keep_s <= 600.0))
-    return std::string{"what to keep must be 1s to 600s"};
+    return std::string{"the length to keep must be 1s to 600s"};
   return ControlRequest{StoreIncident{keep_s}};
 }
 
@@ -166,7 +166,7 @@ std::string instance_name() {
 
 Expected<ControlServer, std::string> ControlServer::open(const std::filesystem::path& path, Handler handler) {
   const auto failed = [&](const char* what) {
-    return fmt::format("{}: {}; locusctl will not reach this service, and no incidents are kept: {}", path.string(),
+    return fmt::format("{}: {}; locusctl will not reach this service, and no incidents are stored: {}", path.string(),
                        std::generic_category().message(errno), what);
   };
   sockaddr_un address{};
@@ -181,10 +181,9 @@ Expected<ControlServer, std::string> ControlServer::open(const std::filesystem::
   remove_if_left_behind(path, SOCK_SEQPACKET);
   Descriptor listener{::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)};
   if (bind(listener.number(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
-    return failed(
-        errno == EADDRINUSE
-            ? "another service answers there, or it is no socket; set RUNTIME_DIRECTORY to a folder of its own"
-            : "set RUNTIME_DIRECTORY to a folder that may be written");
+    return failed(errno == EADDRINUSE
+                      ? "another service uses it, or it is not a socket; set RUNTIME_DIRECTORY to a folder of its own"
+                      : "set RUNTIME_DIRECTORY to a writable folder");
   constexpr mode_t kReadWriteForAll = 0666; // requests are checked by the peer's credentials
   if (chmod(path.c_str(), kReadWriteForAll) != 0 || listen(listener.number(), kMaxClients) != 0)
     return failed("cannot listen on it");
@@ -215,7 +214,7 @@ bool ControlServer::accept_waiting() {
     if (clients_.size() < kMaxClients)
       clients_.push_back({std::move(client), std::nullopt, {}});
     else
-      send(client.number(), Answer::refusal("too many clients; end a locusctl that still runs"));
+      send(client.number(), Answer::refusal("too many clients; end another locusctl"));
   }
   return true;
 }

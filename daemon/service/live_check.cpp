@@ -83,9 +83,9 @@ std::string unconfigured_lidars(const Config& config, const std::vector<HeardLid
 std::string remedy(const LidarOptions& options, const Config& config, const std::vector<HeardLidar>& heard,
                    bool hears_all) {
   if (const std::string others = unconfigured_lidars(config, heard); !others.empty())
-    return fmt::format("{}; if it is that one, set port and source_ip in the entry of {}", others, options.name);
-  return hears_all ? "look at power, cable and the address it sends to"
-                   : "other ports were not listened to: run as root to hear all lidars, or locusctl sensors";
+    return fmt::format("{}; if that is the lidar, set port and source_ip in the entry of {}", others, options.name);
+  return hears_all ? "check its power, its cable and the address it sends to"
+                   : "other ports were not checked: run as root to receive from all lidars, or use locusctl sensors";
 }
 
 void compare(const LidarOptions& options, const Config& config, const std::vector<HeardLidar>& heard, bool hears_all,
@@ -96,7 +96,7 @@ void compare(const LidarOptions& options, const Config& config, const std::vecto
       mine.push_back(&lidar);
   const std::string& name = options.name;
   if (mine.empty()) {
-    check.differences.push_back(fmt::format("lidar {}: nothing comes to port {}{}; {}", name, options.port,
+    check.differences.push_back(fmt::format("lidar {}: no packets arrive at port {}{}; {}", name, options.port,
                                             options.source_ip ? " from " + dotted(*options.source_ip) : "",
                                             remedy(options, config, heard, hears_all)));
     return;
@@ -104,12 +104,11 @@ void compare(const LidarOptions& options, const Config& config, const std::vecto
   const HeardLidar& lidar = *mine.front();
   if (mine.size() > 1)
     check.differences.push_back(
-        fmt::format("lidar {}: {} and {} send to its port {}; tell them apart by source_ip, each "
-                    "with an entry of its own",
-                    name, lidar.name(), mine[1]->name(), options.port));
+        fmt::format("lidar {}: {} and {} send to its port {}; give each its own entry with source_ip", name,
+                    lidar.name(), mine[1]->name(), options.port));
   else if (!lidar.is_known())
     check.differences.push_back(
-        fmt::format("lidar {}: what comes to port {} is not read: {}", name, options.port,
+        fmt::format("lidar {}: the packets at port {} are not supported: {}", name, options.port,
                     lidar.unknown_packets ? to_string(*lidar.unknown_packets) : "no lidar packet"));
   else if (lidar.ouster.has_value() != options.is_ouster())
     check.differences.push_back(
@@ -123,17 +122,18 @@ void compare(const LidarOptions& options, const Config& config, const std::vecto
                     lidar.name(), options.port, options.is_ouster() ? "" : " and metadata"));
   else if (!lidar.ouster && !options.is_of_any_maker() && options.is_hesai() != lidar.clock.has_value())
     check.differences.push_back(
-        fmt::format("lidar {}: its calibration is of another maker than {}, which sends to port {}; "
+        fmt::format("lidar {}: its calibration is for another maker than {}, which sends to port {}; "
                     "set model to auto in its entry, and calibration to the file of that sensor",
                     name, lidar.name(), options.port));
   else if (!lidar.ouster && !configured_model(options).empty() && configured_model(options) != lidar.model)
     check.differences.push_back(
-        fmt::format("lidar {}: is configured as {}, and its packets say {}; set model to auto in its entry", name,
+        fmt::format("lidar {}: is configured as {}, but its packets are of {}; set model to auto in its entry", name,
                     configured_model(options), lidar.model));
   else if (!lidar.ouster && options.time == LidarTime::sensor && !lidar.is_synchronised())
-    check.differences.push_back(fmt::format("lidar {}: time: sensor, but it tells {}; connect a GPS receiver or set "
-                                            "time to auto in its entry",
-                                            name, lidar.clock_state()));
+    check.differences.push_back(
+        fmt::format("lidar {}: time: sensor, but its clock state is {}; connect a GPS receiver or set "
+                    "time to auto in its entry",
+                    name, lidar.clock_state()));
   else
     check.matches.push_back(fmt::format("lidar {}: {} to port {}, {:.0f} packets/s, {}", name, lidar.name(),
                                         options.port, lidar.packets_per_s, lidar.clock_state()));
@@ -164,12 +164,11 @@ void compare(const Subscription& topic, const DdsNode& node, const DdsOptions& d
     check.differences.push_back(
         fmt::format("{}is published as {}; set {}another topic", about, type, topic.clouds ? "" : "its kind, or "));
   else if (topic.writers == 0)
-    check.differences.push_back(
-        fmt::format("{}nobody publishes it in domain {} on {}; look at the name of the topic, and "
-                    "at ROS_DOMAIN_ID and interface of its node",
-                    about, dds.domain, dds.interface));
+    check.differences.push_back(fmt::format(
+        "{}no publisher in domain {} on {}; check the name of the topic, and ROS_DOMAIN_ID and interface of its node",
+        about, dds.domain, dds.interface));
   else if (topic.messages == 0)
-    check.differences.push_back(fmt::format("{}its publisher sends nothing", about));
+    check.differences.push_back(fmt::format("{}its publisher has sent nothing", about));
   else if (topic.writers > 1)
     check.differences.push_back(fmt::format("{}{} nodes publish it, and only the first is used", about, topic.writers));
   else

@@ -36,7 +36,7 @@ void Log::write(Severity severity, const std::string& message, Fields fields, co
   if (!is_admitted(where, suppressed))
     return;
   if (suppressed > 0)
-    emit(severity, fmt::format("{} ({} more like it were left out)", message, suppressed), fields, where);
+    emit(severity, fmt::format("{} ({} more like it were suppressed)", message, suppressed), fields, where);
   else
     emit(severity, message, fields, where);
 }

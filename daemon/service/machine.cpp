@@ -69,8 +69,7 @@ Expected<std::vector<UdpSocket>, std::string> open_lidar_sockets(const Config& c
     if (ports.erase(socket->port()) > 0)
       sockets.push_back(std::move(*socket));
     else
-      log.warn(
-          fmt::format("systemd listens to UDP port {}, but no lidar of the configuration sends there", socket->port()));
+      log.warn(fmt::format("systemd listens on UDP port {}, but no configured lidar sends to it", socket->port()));
   }
   for (const auto& [port, needed] : ports) {
     auto socket = needed ? UdpSocket::open(port) : UdpSocket::open_beside_others(port);
@@ -80,17 +79,16 @@ Expected<std::vector<UdpSocket>, std::string> open_lidar_sockets(const Config& c
       return socket.error();
     else
       log.warn(socket.error() + (is_imu_port(config, port)
-                                     ? "; the inertial unit of the lidar is not heard"
-                                     : "; without position packets the time of lidars is that of their arrival"));
+                                     ? "; the IMU of the lidar is not received"
+                                     : "; without position packets, lidar data has the time of its arrival"));
   }
   const auto smallest = std::ranges::min_element(sockets, {}, &UdpSocket::buffer_bytes);
   if (smallest == sockets.end()) // all lidars publish clouds
     return sockets;
   if (const int least = smallest->buffer_bytes(); least < UdpSocket::kWantedBufferBytes)
-    log.warn(
-        fmt::format("the kernel gives lidar sockets {} bytes of the {} asked for: packets will be lost under load; "
-                    "sysctl net.core.rmem_max={}",
-                    least, UdpSocket::kWantedBufferBytes, UdpSocket::kWantedBufferBytes));
+    log.warn(fmt::format("the kernel grants lidar sockets {} of the {} bytes requested: packets will be lost under "
+                         "load; set sysctl net.core.rmem_max={}",
+                         least, UdpSocket::kWantedBufferBytes, UdpSocket::kWantedBufferBytes));
   join_multicast(config, sockets);
   return sockets;
 }
@@ -105,7 +103,7 @@ void join_multicast(const Config& config, std::span<const UdpSocket> sockets) {
 namespace {
 
 std::string not_granted_text(const char* what, const char* advice) {
-  return fmt::format("{} was not granted ({}); the service runs without; {}", what, std::strerror(errno), // NOLINT
+  return fmt::format("{} was not granted ({}); the service runs without it; {}", what, std::strerror(errno), // NOLINT
                      advice);
 }
 

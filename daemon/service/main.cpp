@@ -29,13 +29,13 @@ void describe(CLI::App& app, Arguments& arguments) {
   app.add_option("-c,--config", arguments.config, "Configuration file; without one every key has its default")
       ->type_name("FILE");
   CLI::Option* const check =
-      app.add_flag("--check-config", arguments.check_config, "Only says what is wrong with the configuration");
-  app.add_flag("--live", arguments.live, "With --check-config: compares it with what is on the wire, too")
+      app.add_flag("--check-config", arguments.check_config, "Checks the configuration, prints its errors and exits");
+  app.add_flag("--live", arguments.live, "With --check-config: also compares it with the traffic on the network")
       ->needs(check);
-  app.add_flag("--print-config", arguments.print_config, "Only prints the configuration in force, every key");
+  app.add_flag("--print-config", arguments.print_config, "Prints the configuration in effect with every key and exits");
   app.set_version_flag("--version", "locusd " LOCUS_VERSION);
   app.footer("Signals: SIGHUP reloads the configuration, SIGTERM stops.\n"
-             "Exit status: 0 stopped as told, 1 failed while running, 2 wrong usage or configuration.\n"
+             "Exit status: 0 stopped on request, 1 failed while running, 2 wrong usage or configuration.\n"
              "Examples:\n"
              "  locusd --config /etc/locusd/locusd.yaml\n"
              "  locusd --config robot.yaml --check-config --live");

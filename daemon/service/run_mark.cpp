@@ -39,12 +39,13 @@ Expected<RecordingBounds, std::string> ring_bounds(std::uint64_t max_bytes, Dura
   std::error_code error;
   std::filesystem::create_directories(folder_of_socket(), error);
   const auto unusable = [](const std::string& why) {
-    return fmt::format("{}: {}, so no input is held there for incidents; mount a tmpfs of 40 MB or more there, or set "
-                       "record.folder (record.keep_s: 0 if no incidents are wanted)",
-                       folder_of_socket().string(), why);
+    return fmt::format(
+        "{}: {}, so no input is stored there for incidents; mount a tmpfs of 40 MB or more there, or set "
+        "record.folder (or record.keep_s: 0 to store no incidents)",
+        folder_of_socket().string(), why);
   };
   if (!is_in_memory(folder_of_socket()))
-    return unusable("is no tmpfs");
+    return unusable("is not a tmpfs");
   const std::uint64_t share = std::filesystem::space(folder_of_socket(), error).capacity / 4;
   if (error || share < RecordOptions::kLeastBytes)
     return unusable("is too small");

@@ -283,20 +283,20 @@ std::optional<std::string> write_state(const std::filesystem::path& file, const 
   }
   const std::string why = std::strerror(written ? errno : error); // NOLINT(concurrency-mt-unsafe)
   unlink(beside.c_str());
-  return fmt::format("{}: the state cannot be saved ({}); after a restart the odometry begins anew", file.string(),
-                     why);
+  return fmt::format("{}: the state cannot be saved ({}); after a restart the odometry starts at the origin",
+                     file.string(), why);
 }
 
 Expected<SavedState, std::string> load_state(const std::filesystem::path& file) {
   std::ifstream stream{file, std::ios::binary};
   if (!stream)
-    return fmt::format("{}: there is none", file.string());
+    return fmt::format("{}: cannot be opened", file.string());
   const std::string bytes{std::istreambuf_iterator<char>{stream}, {}};
   if (bytes.starts_with(kAnyVersion) && !bytes.starts_with(std::string_view{kMagic.data(), kMagic.size()}))
     return fmt::format("{}: was written by another version", file.string());
   std::optional<SavedState> state = from_bytes(bytes);
   if (!state)
-    return fmt::format("{}: is cut short or damaged", file.string());
+    return fmt::format("{}: is truncated or damaged", file.string());
   return std::move(*state);
 }
 
@@ -334,7 +334,7 @@ void StateSaver::reset(const std::optional<SavedState>& start) {
     if (const auto problem = write_state(*file_, *start))
       error_sink_(*problem);
   } else if (file_ && !std::filesystem::remove(*file_, error) && error) {
-    error_sink_(fmt::format("{}: cannot be removed ({}); a restart within a minute goes on from it", file_->string(),
+    error_sink_(fmt::format("{}: cannot be removed ({}); a restart within a minute resumes from it", file_->string(),
                             error.message()));
   }
 }

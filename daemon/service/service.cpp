@@ -121,15 +121,15 @@ std::optional<SavedState> Service::recent_state() {
     return std::nullopt;
   auto state = load_state(*file);
   if (!state) {
-    log_.warn(fmt::format("a fresh start: {}", state.error()));
+    log_.warn(fmt::format("starting without a saved state: {}", state.error()));
     return std::nullopt;
   }
   const Duration age = Stamp{read_clock(CLOCK_REALTIME)} - state->last.stamp;
   state->is_recent = age >= Duration::zero() && age <= kMaxAge;
   if (age < Duration::zero())
-    log_.info("a fresh start: the saved state is newer than the clock; the clock was set back");
+    log_.info("starting without the saved pose: it is newer than the clock, which was set back");
   if (age > kMaxAge)
-    log_.info(fmt::format("a fresh start: the saved state is {:.0f} s old, more than {:.0f} s", to_seconds(age),
+    log_.info(fmt::format("starting without the saved pose: it is {:.0f} s old, more than {:.0f} s", to_seconds(age),
                           to_seconds(kMaxAge)));
   return std::move(*state);
 }
@@ -159,10 +159,9 @@ void Service::store_crashed_run(const Config& config, const std::optional<SavedS
     return;
   const auto pose = state && state->is_recent ? std::optional{state->last.T_odom_base} : std::nullopt;
   if (!incidents_->raise({IncidentCause::restart, keep, now, restart_report(now, *run, pose), std::move(pieces)}))
-    log_.warn(
-        fmt::format("the run before crashed less than five minutes after another: no incident is kept of it; what "
-                    "it received is in {} until this service stops",
-                    run->string()));
+    log_.warn(fmt::format("the previous run crashed less than five minutes after another: no incident is stored; its "
+                          "input remains in {} until this service stops",
+                          run->string()));
 }
 
 std::optional<std::string> Service::begin(const Config& config, std::optional<SavedState> state) {
@@ -197,7 +196,7 @@ void Service::serve_metrics(const std::string& address) {
   if (!server)
     return log_.warn(server.error());
   metrics_ = std::move(*server);
-  log_.info(fmt::format("metrics are told at {}", address));
+  log_.info(fmt::format("metrics are served at {}", address));
 }
 
 ControlServer::Answer Service::reload() {
@@ -211,7 +210,7 @@ ControlServer::Answer Service::reload() {
   if (!answer.json.contains("error"))
     log_.info("reloaded");
   else
-    log_.error(fmt::format("reload refused{}: {}", session_ ? ", the old configuration stays in force" : "",
+    log_.error(fmt::format("reload refused{}: {}", session_ ? ", the old configuration remains in effect" : "",
                            answer.json["error"].get<std::string>()));
   if (session_)
     sd_notify(0, "READY=1");
@@ -255,7 +254,7 @@ bool Service::handle_signals() {
 
 std::optional<ControlServer::Answer> Service::answer(const ControlRequest& request) {
   if (!session_) // ended by a failed reload of another client
-    return ControlServer::Answer::refusal("the service ends; look at: journalctl -u locusd");
+    return ControlServer::Answer::refusal("the service is stopping; see: journalctl -u locusd");
   return std::visit([this](const auto& one) { return answer(one); }, request);
 }
 
@@ -284,11 +283,11 @@ std::optional<ControlServer::Answer> Service::answer(StoreIncident request) {
   const Figures figures = session_->figures();
   if (!figures.live->incidents)
     return Answer::refusal(
-        "incidents are not kept; set record.keep_s, and without systemd STATE_DIRECTORY and a tmpfs as "
+        "incidents are not stored; set record.keep_s, and without systemd STATE_DIRECTORY and a tmpfs as "
         "RUNTIME_DIRECTORY, or record.folder");
   if (request.keep_s > figures.config.record.keep_s)
     return Answer::wrong_usage(
-        fmt::format("no more than {:g}s can be kept; see record.keep_s", figures.config.record.keep_s));
+        fmt::format("at most {:g}s can be stored; see record.keep_s", figures.config.record.keep_s));
   const Stamp now{read_clock(CLOCK_REALTIME)};
   const auto folder = incidents_->submit(
       {IncidentCause::asked, from_seconds(request.keep_s), now, incident_report(IncidentCause::asked, now, figures)});
@@ -312,11 +311,11 @@ void Service::check_for_incidents(const Figures& figures) {
     incidents_->raise({*cause, from_seconds(figures.config.record.keep_s), now, incident_report(*cause, now, figures)});
   const Incidents::Status& incidents = *figures.live->incidents;
   if (!incidents.problem.empty() && incidents.problem != logged_incidents_.problem)
-    log_.error(fmt::format("{}; the odometry goes on", incidents.problem));
+    log_.error(fmt::format("{}; the odometry continues", incidents.problem));
   if (!incidents.refusal.empty() && incidents.refusal != logged_incidents_.refusal)
     log_.warn(incidents.refusal);
   if (incidents.kept != logged_incidents_.kept)
-    log_.write(Severity::notice, fmt::format("the last input is kept in {}", incidents.last.string()));
+    log_.write(Severity::notice, fmt::format("the latest input is stored in {}", incidents.last.string()));
   logged_incidents_ = incidents;
 }
 

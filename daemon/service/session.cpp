@@ -82,7 +82,7 @@ void Session::begin(LidarRouter lidars) {
     if (const auto problem = raise_priority(config_.realtime.priority))
       log_.warn(*problem);
     if (!scheduling_logged_.exchange(true))
-      log_.info("runs with " + scheduling());
+      log_.info("running with " + scheduling());
   };
   options.after_estimate = [this](const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
     after_estimate(sweep, odometry, estimate);
@@ -119,7 +119,7 @@ InputSource& Session::begin_recording() {
   const auto files = sample_files(config_);
   for (std::size_t i = 0; i < files.size(); ++i)
     if (!files[i] && !config_.motion_sources[i].of_lidar)
-      log_.warn(fmt::format("motion source {}: is not recorded, for a recording holds one IMU; the first one is",
+      log_.warn(fmt::format("motion source {}: is not recorded: a recording holds one IMU, the first",
                             config_.motion_sources[i].name));
   return record_to(record_folder(options.folder),
                    {options.max_bytes, keep == Duration{} ? RecordingBounds::kForEver : keep});
@@ -208,7 +208,7 @@ std::optional<std::string> Session::reset(std::optional<Pose> T_odom_base) {
   has_saved_map_ = announced_ = false;
   announcement_.reset();
   begin(std::move(*lidars));
-  log_.info("odometry begins anew, as it was told to");
+  log_.info("odometry reset on request");
   return std::nullopt;
 }
 
@@ -255,7 +255,8 @@ void Session::apply(FlatGroundMessage message) {
     return;
   flat_ground_changed_ = now;
   set_flat_ground(wanted);
-  log_.info(fmt::format("flat ground is {}, as {} says", message.flat ? "on" : "off", config_.dds.flat_ground_topic));
+  log_.info(fmt::format("flat ground turned {} by a message on {}", message.flat ? "on" : "off",
+                        config_.dds.flat_ground_topic));
 }
 
 void Session::set_flat_ground(FlatGround mode) {
@@ -287,10 +288,9 @@ void Session::run_publisher() {
 void Session::log_clock_steps() {
   const Duration steps = input_.time().steps();
   if (const Duration change = steps - std::exchange(logged_clock_steps_, steps); change != Duration::zero())
-    log_.info(
-        fmt::format("the clock of this computer was set by {:+.3f} s; the odometry goes on, and its stamps follow "
-                    "the clock",
-                    to_seconds(change)));
+    log_.info(fmt::format(
+        "the clock of this computer stepped by {:+.3f} s; the odometry continues, and its stamps follow the clock",
+        to_seconds(change)));
 }
 
 void Session::publish(const ProcessedSweep& done) {
@@ -313,13 +313,13 @@ void Session::announce(const OdometryEstimate& estimate) {
   announced_ = true;
   const Beginning from = *estimate.beginning;
   const bool is_lost = has_saved_map_ && from != Beginning::map;
-  const std::string text = from == Beginning::map    ? "resumed where the service ended"
-                           : from == Beginning::told ? "begins where it was told to"
-                           : from == Beginning::odometry
-                               ? "resumed where an odometry says that the robot is; the first "
-                                 "sweep does not fit the saved state"
-                           : is_lost ? "a fresh start: the first sweep does not fit the saved state"
-                                     : "begins at the origin";
+  const std::string text =
+      from == Beginning::map    ? "resumed from the saved state"
+      : from == Beginning::told ? "started at the requested pose"
+      : from == Beginning::odometry
+          ? "resumed at the pose of an odometry source; the first sweep does not match the saved state"
+      : is_lost ? "started at the origin: the first sweep does not match the saved state"
+                : "started at the origin";
   if (is_lost)
     log_.warn(text);
   else if (has_saved_map_)
@@ -343,7 +343,7 @@ void Session::log_state(TrackingState state) {
   logged_state_ = state;
   const std::string name{to_string(state)};
   if (state == TrackingState::dead_reckoning)
-    log_.warn("dead reckoning: no sweep can be registered; look whether the lidars send (locusctl status)",
+    log_.warn("dead reckoning: no sweep can be registered; check that the lidars send (locusctl status)",
               {{"LOCUS_STATE", name}});
   else if (state == TrackingState::degenerate)
     log_.warn("degenerate: the surroundings do not constrain every axis; motion sources determine the rest",
@@ -368,7 +368,7 @@ std::string loss_text(const HealthEvent& event) {
 void Session::log_health(const HealthEvent& event) {
   const std::string& name = config_.motion_sources[index_of(event.source)].name;
   if (event.healthy)
-    log_.info(fmt::format("motion source {} is back", name), {{"LOCUS_SOURCE", name}});
+    log_.info(fmt::format("motion source {} is used again", name), {{"LOCUS_SOURCE", name}});
   else
     log_.warn(fmt::format("motion source {} {}; the next best one is used", name, loss_text(event)),
               {{"LOCUS_SOURCE", name}, {"LOCUS_REASON", std::string{to_string(event.reason)}}});

@@ -50,7 +50,7 @@ void SessionMonitor::check_link(const LinkFigures& link) {
   if (link.connected && !was_connected_)
     log_.info(fmt::format("DDS is up: domain {} on interface {}", config_.dds.domain, config_.dds.interface));
   else if (!link.connected && link.attempts != logged_attempts_)
-    log_.warn(fmt::format("{}; trying again", link.problem), {{"LOCUS_ATTEMPT", std::to_string(link.attempts)}});
+    log_.warn(fmt::format("{}; retrying", link.problem), {{"LOCUS_ATTEMPT", std::to_string(link.attempts)}});
   was_connected_ = link.connected;
   logged_attempts_ = link.attempts;
 }
@@ -65,9 +65,9 @@ void SessionMonitor::check_sources(const LinkFigures& link) {
         link.sources[i].writers == 0
             ? fmt::format("no publisher found for {}; DDS uses interface {}, domain {} (dds.interface, dds.domain)",
                           topic, config_.dds.interface, config_.dds.domain)
-            : fmt::format("{} of DDS on interface {} has {} publishers, but none has sent anything", topic,
+            : fmt::format("topic {} has {} publishers on interface {}, but none has sent anything", topic,
                           config_.dds.interface, link.sources[i].writers);
-    log_.warn(fmt::format("motion source {}: not heard since the start, {} s ago: {}", name,
+    log_.warn(fmt::format("motion source {}: nothing received since the start, {} s ago: {}", name,
                           kPatience.count() / 1'000'000'000, found),
               {{"LOCUS_SOURCE", name}});
   }
@@ -83,7 +83,7 @@ void SessionMonitor::check_lidars(const Figures& figures) {
     const bool has_new_data = used > lidar.data;
     if (used != lidar.data || lidar.last_data == Duration::zero()) { // fewer: the counters were reset
       if (has_new_data && !lidar.logged_silence.empty())
-        log_.info(fmt::format("lidar {}: heard", lidars[i].name), {{"LOCUS_LIDAR", lidars[i].name}});
+        log_.info(fmt::format("lidar {}: data received", lidars[i].name), {{"LOCUS_LIDAR", lidars[i].name}});
       lidar = {.data = used,
                .received = ingest.lidars[i].received(),
                .last_data = now,
@@ -134,10 +134,10 @@ std::string SessionMonitor::why_silent(const Lidar& lidar, const LidarOptions& o
   const PacketCounters& packets = now.packets;
   if (now.clouds)
     return now.received() == lidar.received
-               ? "look whether its driver runs and publishes it in this domain, and whether DDS may use that interface"
-               : "what comes is refused, for the reasons that locusctl status counts";
+               ? "check that its driver runs and publishes it in this domain, and that DDS may use that interface"
+               : "its clouds are refused; locusctl status counts the reasons";
   if (packets.received == lidar.received)
-    return "look at its power and cable, and where it sends to (locusctl sensors)";
+    return "check its power and cable, and the address it sends to (locusctl sensors)";
   if (packets[PacketError::sender] > 0 && now.refused_ip && now.source_ip)
     return fmt::format("packets come from {}, {} {}: set lidars.{}.source_ip to that of the lidar",
                        dotted(*now.refused_ip), options.source_ip ? "configured is" : "the lidar was",
@@ -149,12 +149,11 @@ std::string SessionMonitor::why_silent(const Lidar& lidar, const LidarOptions& o
   const std::string unknown = now.unknown_packets ? fmt::format(" ({})", to_string(*now.unknown_packets)) : "";
   if (options.is_ouster())
     return stale_metadata(options, now)
-        .value_or(
-            fmt::format("what comes is refused, for the reasons that locusctl status counts: is {} the metadata of "
-                        "this sensor, as it is set now? locusctl fetch SENSOR fetches it",
-                        options.metadata));
-  return fmt::format("what comes is refused, for the reasons that locusctl status counts{}: is it a lidar "
-                     "whose packets can be read, and lidars.{}.model the right one?",
+        .value_or(fmt::format("its packets are refused; locusctl status counts the reasons. Check that {} is the "
+                              "metadata of this sensor in its present mode; locusctl fetch SENSOR fetches it",
+                              options.metadata));
+  return fmt::format("its packets are refused{}; locusctl status counts the reasons. Check that the lidar is of a "
+                     "supported model, and lidars.{}.model",
                      unknown, options.name);
 }
 
@@ -199,26 +198,25 @@ void SessionMonitor::check_load(const SweepCounters& counters) {
   load_checked_at_ = now;
   const std::uint64_t drops = counters.dropped;
   if (drops > sweep_drops_)
-    log_.warn(fmt::format(
-        "this computer is too busy: {} sweeps were dropped within {} s; see /usr/share/doc/locusd/tuning.md, and what "
-        "else runs here",
-        drops - sweep_drops_, std::chrono::duration_cast<std::chrono::seconds>(kPatience).count()));
+    log_.warn(fmt::format("this computer is overloaded: {} sweeps were dropped within {} s; see "
+                          "/usr/share/doc/locusd/tuning.md, and check what else runs on it",
+                          drops - sweep_drops_, std::chrono::duration_cast<std::chrono::seconds>(kPatience).count()));
   sweep_drops_ = drops;
 }
 
 void SessionMonitor::check_drops(const Figures::Live& live) {
   const std::uint64_t drops = live.kernel_drops;
   if (drops != kernel_drops_)
-    log_.warn(fmt::format("the kernel threw away {} lidar packets, for their buffer was full; sysctl "
-                          "net.core.rmem_max={}, or a higher realtime.priority",
+    log_.warn(fmt::format("the kernel dropped {} lidar packets because their receive buffer was full; set sysctl "
+                          "net.core.rmem_max={}, or raise realtime.priority",
                           drops - kernel_drops_, UdpSocket::kWantedBufferBytes));
   kernel_drops_ = drops;
   const std::uint64_t filtered = live.filtered;
   if (filtered != filtered_)
-    log_.warn(fmt::format(
-        "the ports of the lidars are flooded: the kernel has kept out {} datagrams that are no lidar's "
-        "by length or sender; tcpdump shows whose, /usr/share/doc/locusd/security.md what to set against them",
-        filtered - filtered_));
+    log_.warn(
+        fmt::format("the ports of the lidars are flooded: the kernel has filtered {} datagrams that by length or "
+                    "sender are no lidar's; find the sender with tcpdump, and see /usr/share/doc/locusd/security.md",
+                    filtered - filtered_));
   filtered_ = filtered;
 }
 
@@ -243,13 +241,13 @@ void SessionMonitor::check_publishers(const LinkFigures& link) {
 void SessionMonitor::check_recording(const Recorder::Status& recording) {
   const std::uint64_t dropped = recording.dropped - std::min(recording.dropped, recording_.dropped);
   if (recording_.problem.empty() && !recording.problem.empty())
-    log_.error(fmt::format("{}; the odometry goes on without a recording", recording.problem));
+    log_.error(fmt::format("{}; the odometry continues without a recording", recording.problem));
   else if (!recording.run.empty() &&
            (recording.run != recording_.run || (!recording_.problem.empty() && recording.problem.empty())))
     log_.info(fmt::format("recording to {}", recording.run.string()));
   else if (recording.problem.empty() && dropped > 0)
     log_.warn(
-        fmt::format("{} inputs were not recorded, for the disk is too slow; see record in locusd.yaml(5)", dropped));
+        fmt::format("{} inputs were not recorded because the disk is too slow; see record in locusd.yaml(5)", dropped));
   recording_ = recording;
 }
 

@@ -144,7 +144,7 @@ TEST(Calibration, YamlIsReadAsConfiguration) {
   const auto read = parse_config("version: 1\ndefaults: true\n" + yaml, "pasted");
   ASSERT_TRUE(read) << read.error().front();
   EXPECT_DOUBLE_EQ(read->motion_sources[0].late_ms, -34.0);
-  const std::string nothing = "# Nothing is known better than it is configured.\n";
+  const std::string nothing = "# No learned value is better known than the configured one.\n";
   EXPECT_EQ(calibration_yaml(sources_of(imu_turned({0, 0, 0}), gyro(0, {0, 0, 0}))), nothing);
   EXPECT_EQ(calibration_yaml(nlohmann::ordered_json::object()), nothing) << "no source at all";
 }
@@ -154,10 +154,10 @@ TEST(Calibration, WhatIsTooLateForADriveIsNotTakenFromOne) {
   const MotionSourceOptions imu = imu_turned({0, 0, 0});
   const LearnedSource late = gyro(0.017, {0, 5, 0});
   const nlohmann::ordered_json of_drive = sources_of(imu, late);
-  EXPECT_EQ(calibration_yaml(of_drive), "# imu is too late to be measured in a drive; take its values from a recording "
-                                        "of one:\n# locus-replay --calibrate FILE RECORDING\n"
-                                        "# Nothing is known better than it is configured.\n");
-  EXPECT_NE(calibration_text(of_drive).find("17 +- 0.1  too late to be measured in a drive"), std::string::npos);
+  EXPECT_EQ(calibration_yaml(of_drive), "# imu arrives too late for a calibration during a drive; calibrate it from a "
+                                        "recording:\n# locus-replay --calibrate FILE RECORDING\n"
+                                        "# No learned value is better known than the configured one.\n");
+  EXPECT_NE(calibration_text(of_drive).find("17 +- 0.1  too late to calibrate during a drive"), std::string::npos);
   const nlohmann::ordered_json in_time = {{"imu", {{"learned", learned_json(imu, late, true)}}}};
   EXPECT_NE(calibration_yaml(in_time).find("late_ms: 17"), std::string::npos);
   EXPECT_NE(calibration_yaml(sources_of(imu, gyro(0.014, {0, 5, 0}))).find("late_ms: 14"), std::string::npos);
@@ -168,11 +168,11 @@ TEST(Calibration, TableSaysWhatTheDriveHasNotTold) {
   learned.covariance(LearnedSource::kMounting, LearnedSource::kMounting) = 1e-2;
   const std::string text = calibration_text(sources_of(imu_turned({0, 0, 0}), learned));
   EXPECT_NE(text.find("-34 +- 0.1  better known than configured"), std::string::npos) << text;
-  EXPECT_NE(text.find("not told by the drives so far"), std::string::npos) << text;
+  EXPECT_NE(text.find("not observed by the drives so far"), std::string::npos) << text;
   EXPECT_NE(text.find("0.1 +- 0.1  as configured"), std::string::npos) << text;
   EXPECT_NE(text.find("since 1970"), std::string::npos) << text;
   EXPECT_EQ(calibration_text(nlohmann::ordered_json::object()),
-            "No motion source has been heard that calibrates itself.\n");
+            "No motion source that calibrates itself has been received.\n");
 }
 
 /// Values that the user has configured are not reported.

@@ -121,7 +121,7 @@ TEST(CaptureRing, DiskThatIsTooSmallIsNotEmptiedForNothing) {
   CaptureRing ring(folder / "record", kMaxBytes);
   const std::filesystem::path piece = fill_piece(ring);
   CaptureRing huge(folder / "record", 1'000'000'000'000'000);
-  EXPECT_TRUE(contains(error_of(huge.begin_piece(kNow)), "MB free on the disk, and 125000000 are wanted"));
+  EXPECT_TRUE(contains(error_of(huge.begin_piece(kNow)), "MB free on the disk, 125000000 needed"));
   EXPECT_TRUE(std::filesystem::exists(piece));
 }
 
@@ -131,7 +131,7 @@ TEST(CaptureRing, FolderThatWasRemovedIsMadeAgain) {
   for (int i = 0; i < 3; ++i)
     fill_piece(ring);
   std::filesystem::remove_all(folder / "record");
-  EXPECT_TRUE(contains(error_of(ring.begin_piece(kNow)), "record: cannot be looked at"));
+  EXPECT_TRUE(contains(error_of(ring.begin_piece(kNow)), "record: cannot be read"));
   const std::filesystem::path piece = fill_piece(ring);
   EXPECT_TRUE(std::filesystem::exists(piece));
   EXPECT_LT(ring.bytes(), kMaxBytes / 10) << "what is gone takes no room";
@@ -142,7 +142,7 @@ TEST(CaptureRing, FolderThatCannotBeMadeIsAnError) {
   std::ofstream{folder / "plain"} << "a file";
   CaptureRing ring(folder / "plain/record", kMaxBytes);
   for (int attempt = 0; attempt < 2; ++attempt)
-    EXPECT_TRUE(contains(error_of(ring.begin_piece(kNow)), "plain/record: cannot be made (Not a directory)"));
+    EXPECT_TRUE(contains(error_of(ring.begin_piece(kNow)), "plain/record: cannot be created (Not a directory)"));
 }
 
 Config recorded_config() {

@@ -24,7 +24,7 @@ alive() { is active ActiveState && ! is "$1" MainPID; }
 says() { journalctl --no-pager -u locusd --since "$1" | grep "$2" >/dev/null; }
 # goes_on SINCE: waits until it has resumed from the saved state and tracks again.
 goes_on() {
-  wait_for 20 says "$1" "resumed where the service ended"
+  wait_for 20 says "$1" "resumed from the saved state"
   wait_for 20 tracks
 }
 now() { date '+%Y-%m-%d %H:%M:%S.%N' | head -c 26; }
@@ -51,7 +51,7 @@ cp robot.yaml /etc/locusd/locusd.yaml
 
 step "it says which sensors it does not hear"
 wait_for 10 says -1min "lidar .*: no data packet on UDP port 2368"
-wait_for 10 says -1min "motion source wio: not heard"
+wait_for 10 says -1min "motion source wio: nothing received"
 for field in LOCUS_LIDAR LOCUS_SOURCE; do
   journalctl --no-pager -u locusd -o json | grep "\"$field\":\"" | grep '"CODE_FILE":"' | grep '"PRIORITY":"4"' >/dev/null
 done

@@ -68,7 +68,7 @@ TEST(ControlRequest, WhatLacksSomethingIsNone) {
 TEST(ControlRequest, WhatToKeepIsWithinLimits) {
   for (const char* keep_s : {"0", "-1", "0.99", "600.1", "1e300"})
     EXPECT_EQ(error_of(parse_control_request(R"({"command": "record", "keep_s": )" + std::string(keep_s) + "}")),
-              "what to keep must be 1s to 600s")
+              "the length to keep must be 1s to 600s")
         << keep_s;
 }
 

@@ -109,7 +109,7 @@ TEST_F(Control, WatchOutlivesTheService) {
 TEST_F(Control, WatchWithoutATerminalIsWrongUsage) {
   const ProgramRun run = ctl({"status", "--watch"});
   EXPECT_EQ(run.status, 2);
-  EXPECT_NE(run.err.find("--watch draws on a terminal"), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("--watch needs a terminal"), std::string::npos) << run.err;
   EXPECT_EQ(run.out, "");
 }
 
@@ -301,7 +301,7 @@ TEST_F(Control, SensorsAreFoundWithoutAServiceAndByAnybody) {
   if (geteuid() != 0)
     GTEST_SKIP() << "no second user to be: run as root";
   const Child play({LOCUS_PLAY, capture().string()});
-  ASSERT_TRUE(play.wait_for_line("nobody listens")) << "it waits for a service, and then sends";
+  ASSERT_TRUE(play.wait_for_line("has no subscriber")) << "it waits for a service, and then sends";
   const ProgramRun sensors = as_nobody("--clear-groups", {"sensors"});
   EXPECT_EQ(sensors.status, 0) << sensors.err;
   EXPECT_NE(sensors.out.find("127.0.0.1"), std::string::npos) << sensors.out;

@@ -99,7 +99,7 @@ TEST_F(DdsSecurity, EnclaveThatIsNotTakenIsNamed) {
   const std::filesystem::path ours = enclaves("ours");
   std::ofstream{ours / "locusd" / "permissions.p7s"} << "hello";
   const Child daemon(locusd(secured(ours / "locusd")));
-  EXPECT_TRUE(daemon.wait_for_line("DDS did not take the enclave " + (ours / "locusd").string()))
+  EXPECT_TRUE(daemon.wait_for_line("DDS did not accept the enclave " + (ours / "locusd").string()))
       << testing::PrintToString(daemon.lines());
 }
 

@@ -27,7 +27,7 @@ class Diagnosis : public RobotNetwork {};
 
 TEST_F(Diagnosis, SensorsThatAreNotHeardAreNamedWithTheInterfaceOfDds) {
   Child daemon(locusd(config()));
-  EXPECT_TRUE(daemon.wait_for_line("motion source wio: not heard"));
+  EXPECT_TRUE(daemon.wait_for_line("motion source wio: nothing received"));
   EXPECT_TRUE(daemon.wait_for_line("no publisher found for /wheel_odometry; DDS uses interface lo"));
   EXPECT_TRUE(daemon.wait_for_line("lidar front: no data packet on UDP port 2368"));
   EXPECT_EQ(status()["state"], "waiting");
@@ -39,8 +39,7 @@ TEST_F(Diagnosis, SensorsThatAreNotHeardAreNamedWithTheInterfaceOfDds) {
 TEST_F(Diagnosis, LidarOfAnotherAddressIsNamedWithBoth) {
   const std::filesystem::path wrong = lidar_with("source_ip: 192.168.1.77");
   Child daemon(locusd(wrong));
-  ASSERT_TRUE(
-      daemon.wait_for_line("lidar front: no data packet on UDP port 2368 for 5 s; look at its power and cable"));
+  ASSERT_TRUE(daemon.wait_for_line("lidar front: no data packet on UDP port 2368 for 5 s; check its power and cable"));
   const Child play(endlessly(capture()));
   EXPECT_TRUE(daemon.wait_for_line("; packets come from 127.0.0.1, configured is 192.168.1.77: set "
                                    "lidars.front.source_ip to that of the lidar"))
@@ -64,7 +63,7 @@ TEST_F(Diagnosis, SecondLidarOnThePortIsNamedWithTheConfigurationOfBoth) {
       std::this_thread::sleep_for(milliseconds{5});
     }
   });
-  EXPECT_TRUE(daemon.wait_for_line("lidar front: others send to its port 2368, too: the packets of 127.0.0.1 are read"))
+  EXPECT_TRUE(daemon.wait_for_line("lidar front: other senders use its port 2368: packets from 127.0.0.1 are used"))
       << testing::PrintToString(daemon.lines());
   EXPECT_TRUE(
       status_comes([](const nlohmann::json& status) { return status["lidars"]["front"]["model"] == "VLP-16"; }));
@@ -101,23 +100,22 @@ TEST_F(Diagnosis, UnknownProductIdIsSaidByTheServiceAndByLocusctlSensors) {
   Child daemon(locusd(lidar_with("model: auto")));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   const std::jthread device = unknown_device(capture(), std::byte{0x31});
-  EXPECT_TRUE(
-      daemon.wait_for_line("what comes is refused, for the reasons that locusctl status counts (product id 0x31 "
-                           "and return mode 0x37 in "))
+  EXPECT_TRUE(daemon.wait_for_line("its packets are refused (product id 0x31 "
+                                   "and return mode 0x37 in "))
       << testing::PrintToString(daemon.lines());
-  EXPECT_TRUE(daemon.wait_for_line("is it a lidar whose packets can be read, and lidars.front.model the right one?"));
+  EXPECT_TRUE(daemon.wait_for_line("Check that the lidar is of a supported model, and lidars.front.model"));
   const ProgramRun alone = ctl({"sensors"});
   EXPECT_EQ(alone.status, 1);
   EXPECT_TRUE(contains(alone.err, "127.0.0.1       2368   not read: product id 0x31 and return mode 0x37 in "))
       << alone.err;
-  EXPECT_TRUE(contains(alone.err, "no lidar was heard")) << alone.err;
+  EXPECT_TRUE(contains(alone.err, "no lidar was received")) << alone.err;
 }
 
 /// Readable lidars are listed with their configuration, the unknown device on a separate line.
 TEST_F(Diagnosis, UnknownProductIdBesideALidarIsToldOnALineOfItsOwn) {
   const std::jthread device = unknown_device(capture(), std::byte{0x31}, INADDR_LOOPBACK + 1);
   const Child play(endlessly(capture()));
-  ASSERT_TRUE(play.wait_for_line("nobody listens")) << "it waits for a service, and then sends";
+  ASSERT_TRUE(play.wait_for_line("has no subscriber")) << "it waits for a service, and then sends";
   const ProgramRun both = ctl({"sensors"});
   EXPECT_EQ(both.status, 0) << both.err;
   EXPECT_TRUE(contains(both.out, "127.0.0.2       2368   not read: product id 0x31 and return mode 0x37 in "))
@@ -162,10 +160,9 @@ TEST_F(Diagnosis, ConfigurationIsComparedWithTheWire) {
   };
   const ProgramRun silent = compare(config());
   EXPECT_EQ(silent.status, 1);
-  EXPECT_TRUE(contains(silent.err, "locusd: lidar front: nothing comes to port 2368; look at power, cable"))
+  EXPECT_TRUE(contains(silent.err, "locusd: lidar front: no packets arrive at port 2368; check its power, its cable"))
       << silent.err;
-  EXPECT_TRUE(
-      contains(silent.err, "locusd: odometry wio: topic /wheel_odometry: nobody publishes it in domain 0 on lo"))
+  EXPECT_TRUE(contains(silent.err, "locusd: odometry wio: topic /wheel_odometry: no publisher in domain 0 on lo"))
       << silent.err;
 
   const Child daemon(locusd(config()));
@@ -180,13 +177,12 @@ TEST_F(Diagnosis, ConfigurationIsComparedWithTheWire) {
 
   const ProgramRun port = compare(lidar_with("port: 2390"));
   EXPECT_EQ(port.status, 1);
-  EXPECT_TRUE(contains(port.err,
-                       "lidar front: nothing comes to port 2390; VLP-16 at 127.0.0.1 sends to port 2368; if it "
-                       "is that one, set port and source_ip in the entry of front"))
+  EXPECT_TRUE(contains(port.err, "lidar front: no packets arrive at port 2390; VLP-16 at 127.0.0.1 sends to port 2368; "
+                                 "if that is the lidar, set port and source_ip in the entry of front"))
       << port.err;
   const ProgramRun model = compare(lidar_with("model: HDL-32E"));
   EXPECT_EQ(model.status, 1);
-  EXPECT_TRUE(contains(model.err, "is configured as HDL-32E, and its packets say VLP-16")) << model.err;
+  EXPECT_TRUE(contains(model.err, "is configured as HDL-32E, but its packets are of VLP-16")) << model.err;
   std::ofstream{file("kind.yaml")} << std::regex_replace(read_text(config()), std::regex{"kind: odometry"},
                                                          "kind: imu");
   const ProgramRun kind = compare(file("kind.yaml"));
@@ -257,7 +253,7 @@ TEST_F(Diagnosis, SweepsThatAreDroppedAreSaidWithTheReason) {
   const Child play(endlessly(capture()));
   ASSERT_TRUE(daemon.wait_for_line("tracking"));
   const Child hang({HANG_THREAD, std::to_string(daemon.pid()), "odometry"});
-  EXPECT_TRUE(daemon.wait_for_line("this computer is too busy: ")) << testing::PrintToString(daemon.lines());
+  EXPECT_TRUE(daemon.wait_for_line("this computer is overloaded: ")) << testing::PrintToString(daemon.lines());
 }
 
 TEST_F(Diagnosis, SweepsThatAreShorterThanATurnAreSaidOnce) {
@@ -306,8 +302,8 @@ using Lines = std::vector<std::string>;
 TEST_F(SessionMonitorTest, TellOfASilentLidarAfterFiveSecondsAndOncePerReason) {
   EXPECT_EQ(said_after(kPatience - Duration{1}), Lines{});
   EXPECT_EQ(said_after(Duration{1}),
-            Lines{"locusd: warning: lidar front: no data packet on UDP port 2368 for 5 s; look "
-                  "at its power and cable, and where it sends to (locusctl sensors)"});
+            Lines{"locusd: warning: lidar front: no data packet on UDP port 2368 for 5 s; check its power and cable, "
+                  "and the address it sends to (locusctl sensors)"});
   EXPECT_EQ(said_after(kPatience), Lines{});
 
   lidar().packets.received = lidar().packets.position = 3;
@@ -326,7 +322,7 @@ TEST_F(SessionMonitorTest, TellOfASilentLidarAfterFiveSecondsAndOncePerReason) {
   EXPECT_EQ(said_after(std::chrono::hours{1}), Lines{});
 
   lidar().packets.data = 1;
-  EXPECT_EQ(said_after(Duration{1}), Lines{"locusd: lidar front: heard"});
+  EXPECT_EQ(said_after(Duration{1}), Lines{"locusd: lidar front: data received"});
   EXPECT_EQ(said_after(kPatience - Duration{1}), Lines{});
   EXPECT_EQ(said_after(Duration{1}).size(), 1U) << "again silent";
 }
@@ -342,8 +338,9 @@ TEST_F(SessionMonitorTest, TellOfASourceThatIsNotHeardFiveSecondsAfterTheStart) 
   ++lidar().packets.data;
   const Lines unheard = said_after(Duration{1});
   ASSERT_EQ(unheard.size(), 1U);
-  EXPECT_TRUE(contains(unheard.front(), "motion source wio: not heard since the start, 5 s ago: no publisher found for "
-                                        "/wheel_odometry; DDS uses interface "))
+  EXPECT_TRUE(contains(unheard.front(),
+                       "motion source wio: nothing received since the start, 5 s ago: no publisher found for "
+                       "/wheel_odometry; DDS uses interface "))
       << unheard.front();
   ++lidar().packets.data;
   EXPECT_EQ(said_after(Duration{1}), Lines{}) << "once";
@@ -354,10 +351,10 @@ TEST_F(SessionMonitorTest, TellOfDroppedSweepsEveryFiveSeconds) {
   EXPECT_EQ(said_after(kPatience - Duration{1}), Lines{});
   figures_.counters.dropped = 4;
   lidar().packets.data = 1;
-  EXPECT_TRUE(contains(said_after(Duration{1}).at(0), "this computer is too busy: 4 sweeps were dropped within 5 s"));
+  EXPECT_TRUE(contains(said_after(Duration{1}).at(0), "this computer is overloaded: 4 sweeps were dropped within 5 s"));
   figures_.counters.dropped = 5;
   ++lidar().packets.data;
-  EXPECT_TRUE(contains(said_after(kPatience).at(0), "this computer is too busy: 1 sweeps were dropped within 5 s"));
+  EXPECT_TRUE(contains(said_after(kPatience).at(0), "this computer is overloaded: 1 sweeps were dropped within 5 s"));
   ++lidar().packets.data;
   EXPECT_EQ(said_after(kPatience), Lines{});
 }
@@ -372,10 +369,9 @@ TEST_F(Diagnosis, BufferThatIsSmallerThanAskedForIsSaidWithTheSettingToChange) {
   if (geteuid() == 0)
     command.insert(command.begin(), {"/usr/bin/setpriv", "--bounding-set", "-net_admin"});
   Child daemon(command);
-  EXPECT_TRUE(
-      daemon.wait_for_line(fmt::format("the kernel gives lidar sockets {} bytes of the 8388608 asked for: packets "
-                                       "will be lost under load; sysctl net.core.rmem_max=8388608",
-                                       allowed)))
+  EXPECT_TRUE(daemon.wait_for_line(fmt::format("the kernel grants lidar sockets {} of the 8388608 bytes requested: "
+                                               "packets will be lost under load; set sysctl net.core.rmem_max=8388608",
+                                               allowed)))
       << testing::PrintToString(daemon.lines());
 }
 

@@ -185,7 +185,7 @@ class Incident : public RobotNetwork {
     ASSERT_TRUE(daemon_->wait_for_exit());
     const std::vector<HeardPose> live = heard(*listener_);
     daemon_.emplace(locusd(with("keep_s: 10")));
-    ASSERT_TRUE(daemon_->wait_for_line("the last input is kept in")) << testing::PrintToString(daemon_->lines());
+    ASSERT_TRUE(daemon_->wait_for_line("the latest input is stored in")) << testing::PrintToString(daemon_->lines());
     const std::vector<path> kept = folders_in(file("incidents"));
     ASSERT_EQ(kept.size(), 1U);
     EXPECT_TRUE(kept[0].string().ends_with("Z_restart")) << kept[0];
@@ -222,7 +222,7 @@ TEST_F(Incident, SecondServiceOnTheSameFolderTouchesNothing) {
   EXPECT_EQ(mark, runs.front().string());
   {
     Child second(locusd(lidar_with("port: 2390")));
-    EXPECT_TRUE(second.wait_for_line("and no incidents are kept: another service answers there"));
+    EXPECT_TRUE(second.wait_for_line("and no incidents are stored: another service uses it"));
     EXPECT_TRUE(second.wait_for_line("DDS is up")) << testing::PrintToString(second.lines());
     second.signal(SIGTERM);
     EXPECT_EQ(second.wait_for_exit(), 0);
@@ -263,10 +263,10 @@ TEST_F(Incident, NeedsATmpfsThatIsLargeEnough) {
   };
   umount2(file("run").c_str(), MNT_DETACH);
   ASSERT_EQ(mount("run", file("run").c_str(), "ramfs", 0, nullptr), 0);
-  ASSERT_NO_FATAL_FAILURE(expect_none("run: is no tmpfs, so no input is held there for incidents; mount a tmpfs"));
+  ASSERT_NO_FATAL_FAILURE(expect_none("run: is not a tmpfs, so no input is stored there for incidents; mount a tmpfs"));
   umount2(file("run").c_str(), MNT_DETACH);
   ASSERT_EQ(mount("run", file("run").c_str(), "tmpfs", 0, "size=30m"), 0);
-  ASSERT_NO_FATAL_FAILURE(expect_none("run: is too small, so no input is held there for incidents; mount a tmpfs"));
+  ASSERT_NO_FATAL_FAILURE(expect_none("run: is too small, so no input is stored there for incidents; mount a tmpfs"));
 }
 
 /// A crash during a drive becomes an incident; the next crash follows too soon and does not.
@@ -301,7 +301,7 @@ TEST_F(Incident, LossOfTrackingIsOneByItself) {
   daemon_.emplace(locusd(with("keep_s: 10")));
   ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
   play_.emplace(std::vector<std::string>{LOCUS_PLAY, "--fail", "all-lidars:lost@5-12", robot.string()});
-  ASSERT_TRUE(daemon_->wait_for_line("the last input is kept in")) << testing::PrintToString(daemon_->lines());
+  ASSERT_TRUE(daemon_->wait_for_line("the latest input is stored in")) << testing::PrintToString(daemon_->lines());
   const std::vector<path> kept = folders_in(file("incidents"));
   ASSERT_EQ(kept.size(), 1U);
   EXPECT_TRUE(kept[0].string().ends_with("Z_tracking_lost")) << kept[0];
@@ -316,11 +316,11 @@ TEST_F(Incident, WhatCannotBeKeptIsSaid) {
   ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
   const ProgramRun nothing = ctl({"record", "--keep", "10s"});
   EXPECT_EQ(nothing.status, 1);
-  EXPECT_TRUE(contains(nothing.err, "no input has come")) << nothing.err;
+  EXPECT_TRUE(contains(nothing.err, "no input was received")) << nothing.err;
   EXPECT_EQ(incidents_of_status()["problem"], "") << "what was refused is no fault of the service";
   const ProgramRun more = ctl({"record", "--keep", "11s"});
   EXPECT_EQ(more.status, 2);
-  EXPECT_TRUE(contains(more.err, "no more than 10s can be kept; see record.keep_s")) << more.err;
+  EXPECT_TRUE(contains(more.err, "at most 10s can be stored; see record.keep_s")) << more.err;
   for (const char* wrong : {"", "x", "10m", "nan", "-1", "1e9", "0"})
     EXPECT_EQ(ctl({"record", "--keep", wrong}).status, 2) << wrong;
   EXPECT_TRUE(contains(ctl({"record", "--keep", "nan"}).err, "--keep nan: must be seconds, e.g. 60s"));
@@ -341,7 +341,7 @@ TEST_F(Incident, DiskThatIsFullOrAFolderThatCannotBeMadeIsSaidAndTheOdometryGoes
   ASSERT_TRUE(has_driven(0.2));
   const ProgramRun full = ctl({"record", "--keep", "10s"});
   EXPECT_EQ(full.status, 1);
-  EXPECT_TRUE(contains(full.err, "MB are free on the disk")) << full.err;
+  EXPECT_TRUE(contains(full.err, "MB free on the disk")) << full.err;
   EXPECT_EQ(folders_in(file("incidents")), std::vector<path>{older}) << "nothing is left of it, nor given for it";
   EXPECT_TRUE(folders_in(file("run/input-ring/.incident.part")).empty());
   umount2(file("incidents").c_str(), MNT_DETACH);
@@ -349,7 +349,7 @@ TEST_F(Incident, DiskThatIsFullOrAFolderThatCannotBeMadeIsSaidAndTheOdometryGoes
   std::ofstream{file("incidents")} << "a file";
   const ProgramRun no_folder = ctl({"record", "--keep", "10s"});
   EXPECT_EQ(no_folder.status, 1);
-  EXPECT_TRUE(contains(no_folder.err, "incidents: the incident cannot be kept (Not a directory)")) << no_folder.err;
+  EXPECT_TRUE(contains(no_folder.err, "incidents: the incident cannot be stored (Not a directory)")) << no_folder.err;
   EXPECT_TRUE(daemon_->wait_for_line("(Not a directory); let locusd write there"));
   std::filesystem::remove(file("incidents"));
   EXPECT_EQ(ctl({"record", "--keep", "10s"}).status, 0) << "as soon as it can be";
@@ -418,7 +418,7 @@ TEST(IncidentFolder, OldestGoesFirst) {
   ASSERT_TRUE(
       incidents.submit({daemon::IncidentCause::asked, seconds{60}, Stamp{seconds{1'900'000'000}}, "{}", {piece}}));
   incidents.work(nullptr);
-  EXPECT_TRUE(contains(incidents.status().refusal, "it has 1 MB, and 0 may be used); raise record.incidents_bytes"))
+  EXPECT_TRUE(contains(incidents.status().refusal, "it has 1 MB, and 0 are allowed); raise record.incidents_bytes"))
       << incidents.status().refusal;
   EXPECT_EQ(folders_in(folder / "incidents").size(), 3U) << "none is given for nothing";
 }

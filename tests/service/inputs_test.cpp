@@ -90,10 +90,10 @@ TEST_F(Inputs, FlatGroundIsSwitchedByItsTopicAtMostOnceASecond) {
   constexpr std::ptrdiff_t kSwitches = 4;
   EXPECT_TRUE(daemon.wait_until([](const std::vector<std::string>& lines) {
     return std::ranges::count_if(lines, [](const std::string& line) {
-             return line.find("flat ground is") != std::string::npos;
+             return line.find("flat ground turned") != std::string::npos;
            }) >= kSwitches;
   }));
-  EXPECT_TRUE(daemon.has_line("flat ground is on, as /wheel_health says"));
+  EXPECT_TRUE(daemon.has_line("flat ground turned on by a message on /wheel_health"));
   EXPECT_GE(std::chrono::steady_clock::now() - before, seconds{kSwitches - 1});
 }
 

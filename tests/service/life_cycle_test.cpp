@@ -81,7 +81,7 @@ TEST_F(LifeCycle, SecondServiceLeavesTheSocketOfTheFirstAlone) {
   {
     const Child second(locusd(lidar_with("port: 2390")));
     EXPECT_TRUE(second.wait_for_line("control: Address already in use; locusctl will not reach this service, and no "
-                                     "incidents are kept: another service"))
+                                     "incidents are stored: another service"))
         << testing::PrintToString(second.lines());
   }
   EXPECT_EQ(status()["lidars"]["front"]["port"], 2368);
@@ -131,7 +131,7 @@ TEST_F(LifeCycle, ResetBeforeTheFirstSweepIsNoDoubtAboutTheSavedState) {
   ASSERT_EQ(ctl({"reset"}).status, 0);
   const Child play({LOCUS_PLAY, capture().string()});
   ASSERT_TRUE(daemon.wait_for_line("tracking"));
-  EXPECT_FALSE(daemon.has_line("does not fit the saved state")) << testing::PrintToString(daemon.lines());
+  EXPECT_FALSE(daemon.has_line("does not match the saved state")) << testing::PrintToString(daemon.lines());
 }
 
 TEST_F(LifeCycle, MapIsThatOfTheMomentAlsoAfterOneThatNeverCame) {
@@ -230,9 +230,8 @@ TEST_F(LifeCycle, CablePullIsBridgedByDeadReckoning) {
   Child play(leading_play({"--fail", "all-lidars:lost@4-16", capture().string()}));
   ASSERT_EQ(play.wait_for_exit(seconds{200}), 0) << testing::PrintToString(play.lines());
   EXPECT_TRUE(daemon.wait_for_line("dead reckoning"));
-  EXPECT_TRUE(
-      daemon.wait_for_line("lidar front: no data packet on UDP port 2368 for 5 s; look at its power and cable"));
-  EXPECT_TRUE(daemon.wait_for_line("lidar front: heard"));
+  EXPECT_TRUE(daemon.wait_for_line("lidar front: no data packet on UDP port 2368 for 5 s; check its power and cable"));
+  EXPECT_TRUE(daemon.wait_for_line("lidar front: data received"));
   EXPECT_TRUE(listener.wait_until([](const auto& lines) {
     return std::ranges::count_if(lines, [](const std::string& line) { return line.starts_with("state "); }) > 190;
   }));
@@ -256,13 +255,15 @@ TEST_F(LifeCycle, CablePullIsBridgedByDeadReckoning) {
 TEST_F(LifeCycle, DamagedStateIsAFreshStart) {
   std::ofstream{file("state")} << "half of a sta";
   Child daemon(locusd(config()));
-  EXPECT_TRUE(daemon.wait_for_line("a fresh start: " + file("state").string() + ": is cut short or damaged"));
+  EXPECT_TRUE(
+      daemon.wait_for_line("starting without a saved state: " + file("state").string() + ": is truncated or damaged"));
 }
 
 TEST_F(LifeCycle, StateOfAnotherVersionIsAFreshStart) {
   std::ofstream{file("state")} << "locusd 3 and so on";
   Child daemon(locusd(config()));
-  EXPECT_TRUE(daemon.wait_for_line("a fresh start: " + file("state").string() + ": was written by another version"));
+  EXPECT_TRUE(daemon.wait_for_line("starting without a saved state: " + file("state").string() +
+                                   ": was written by another version"));
 }
 
 TEST_F(LifeCycle, StateOfAnotherTimeIsAFreshStart) {
@@ -270,7 +271,7 @@ TEST_F(LifeCycle, StateOfAnotherTimeIsAFreshStart) {
   old.last.stamp = Stamp{daemon::read_clock(CLOCK_REALTIME)} - seconds{61};
   ASSERT_FALSE(daemon::write_state(file("state"), old));
   Child daemon(locusd(config()));
-  EXPECT_TRUE(daemon.wait_for_line("a fresh start: the saved state is")) << testing::PrintToString(daemon.lines());
+  EXPECT_TRUE(daemon.wait_for_line("starting without the saved pose: it is")) << testing::PrintToString(daemon.lines());
 }
 
 /// The robot may have been moved overnight, but has the same sensors.
@@ -288,7 +289,7 @@ TEST_F(LifeCycle, WhatWasLearnedOfTheSourcesOutlivesAnotherTime) {
   }
   ASSERT_FALSE(daemon::write_state(file("state"), old));
   Child daemon(locusd(config()));
-  ASSERT_TRUE(daemon.wait_for_line("a fresh start: the saved state is"));
+  ASSERT_TRUE(daemon.wait_for_line("starting without the saved pose: it is"));
   ASSERT_EQ(ctl({"reload"}).status, 0) << "before anything is known of the robot";
   Child play({LOCUS_PLAY, capture().string()});
   const json status = status_when([](const json& s) { return s["sweeps"]["processed"] > 2; });

@@ -42,7 +42,7 @@ TEST(Log, PlaceThatMaySpeakAgainTellsHowMuchWasLeftOut) {
   say();
   const std::vector<std::string> lines = test::lines_of(testing::internal::GetCapturedStderr());
   ASSERT_EQ(lines.size(), static_cast<std::size_t>(Log::kBurst) + 2);
-  EXPECT_EQ(lines[Log::kBurst], "locusd: warning: the same again (3 more like it were left out)");
+  EXPECT_EQ(lines[Log::kBurst], "locusd: warning: the same again (3 more like it were suppressed)");
   EXPECT_EQ(lines.back(), "locusd: warning: the same again");
 }
 

@@ -235,7 +235,7 @@ TEST_F(Metrics, PleasePromtool) {
 
 TEST_F(Metrics, AreToldBeforeAnySensorIsHeard) {
   const Child daemon(locusd(listening()));
-  ASSERT_TRUE(daemon.wait_for_line("metrics are told at 127.0.0.1:9464"));
+  ASSERT_TRUE(daemon.wait_for_line("metrics are served at 127.0.0.1:9464"));
   const OpenMetrics metrics = scrape();
   EXPECT_EQ(metrics.mistakes, std::vector<std::string>{});
   EXPECT_EQ(metrics.value("locusd_state", {{"locusd_state", "waiting"}}), 1);
@@ -246,7 +246,7 @@ TEST_F(Metrics, AreToldBeforeAnySensorIsHeard) {
 TEST_F(Metrics, EachAddressIsListenedToAsItSays) {
   for (const std::string& address : {std::string{"[::1]:9464"}, file("metrics").string()}) {
     Child daemon(locusd(listening(address)));
-    ASSERT_TRUE(daemon.wait_for_line("metrics are told at")) << testing::PrintToString(daemon.lines());
+    ASSERT_TRUE(daemon.wait_for_line("metrics are served at")) << testing::PrintToString(daemon.lines());
     EXPECT_EQ(scrape(address).mistakes, std::vector<std::string>{}) << address;
     daemon.signal(SIGTERM);
     ASSERT_EQ(daemon.wait_for_exit(), 0);
@@ -257,7 +257,7 @@ TEST_F(Metrics, EachAddressIsListenedToAsItSays) {
 TEST_F(Metrics, SocketOfOneThatCrashedIsTakenOverAndAFileIsNot) {
   for (const int end : {SIGKILL, SIGTERM}) {
     Child daemon(locusd(listening(file("metrics").string())));
-    ASSERT_TRUE(daemon.wait_for_line("metrics are told at")) << testing::PrintToString(daemon.lines());
+    ASSERT_TRUE(daemon.wait_for_line("metrics are served at")) << testing::PrintToString(daemon.lines());
     daemon.signal(end);
     ASSERT_TRUE(daemon.wait_for_exit());
   }
@@ -354,7 +354,7 @@ TEST_F(Metrics, ReloadTurnsThemOnAndOff) {
 
 TEST_F(Metrics, OtherRequestsAreAnsweredWithWhatIsWrong) {
   const Child daemon(locusd(listening()));
-  ASSERT_TRUE(daemon.wait_for_line("metrics are told"));
+  ASSERT_TRUE(daemon.wait_for_line("metrics are served"));
   const auto first_line = [](std::string_view request) {
     const std::string answer = ask_for(request);
     return answer.substr(0, answer.find("\r\n"));
@@ -383,7 +383,7 @@ TEST_F(Metrics, OtherRequestsAreAnsweredWithWhatIsWrong) {
 
 TEST_F(Metrics, WhoIsSilentHoldsNobodyUp) {
   const Child daemon(locusd(listening()));
-  ASSERT_TRUE(daemon.wait_for_line("metrics are told"));
+  ASSERT_TRUE(daemon.wait_for_line("metrics are served"));
   std::vector<Descriptor> silent;
   for (std::size_t i = 0; i < daemon::MetricsServer::kMaxClients + 4; ++i) {
     silent.push_back(connect_to(kAddress));

@@ -65,7 +65,7 @@ class Scheduling : public RobotNetwork {};
 
 TEST_F(Scheduling, PriorityIsThatOfIngestOdometryAndItsHelpers) {
   Child daemon(locusd(config("realtime: {priority: 7}\nthreads: 2\n")));
-  ASSERT_TRUE(daemon.wait_for_line("runs with "));
+  ASSERT_TRUE(daemon.wait_for_line("running with "));
   if (daemon.has_line("realtime.priority was not granted"))
     GTEST_SKIP() << "real-time scheduling is not permitted here";
   const Child play(endlessly(capture()));
@@ -222,7 +222,7 @@ TEST_F(RealTime, OneCoreSharedWithABusyLoopOfTheSameRealTimePriority) {
   const std::string processor = std::to_string(first_processor());
   Child daemon(locusd(config("realtime: {priority: 2, cpus: [" + processor + "]}\nthreads: 1\n")));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
-  ASSERT_TRUE(daemon.wait_for_line("runs with "));
+  ASSERT_TRUE(daemon.wait_for_line("running with "));
   if (daemon.has_line("realtime.priority was not granted"))
     GTEST_SKIP() << "real-time scheduling is not permitted here";
   Child lidar({LOCUS_PLAY, capture().string()});

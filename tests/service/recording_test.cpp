@@ -187,7 +187,7 @@ TEST_F(Recording, DiskThatIsFullIsSaidOnceAndTheOdometryGoesOn) {
     return errors;
   };
   EXPECT_NE(error_lines()[0].find("No space left on device"), std::string::npos) << error_lines()[0];
-  EXPECT_NE(error_lines()[0].find("the odometry goes on"), std::string::npos) << error_lines()[0];
+  EXPECT_NE(error_lines()[0].find("the odometry continues"), std::string::npos) << error_lines()[0];
   const int before = status()["sweeps"]["processed"];
   status_when(
       [&](const auto& now) { return now["sweeps"]["processed"] > before + 10 && now["recording"]["dropped"] > 0; });
@@ -209,7 +209,7 @@ TEST_F(Recording, FolderThatCannotBeMadeIsSaidOnceAndTheOdometryGoesOn) {
   std::ofstream{file("plain")} << "a file";
   Child daemon(locusd(recording(capture(), 10'000'000, "plain/record")));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
-  EXPECT_TRUE(daemon.wait_for_line("plain/record: cannot be made (Not a directory)"))
+  EXPECT_TRUE(daemon.wait_for_line("plain/record: cannot be created (Not a directory)"))
       << testing::PrintToString(daemon.lines());
   const Child play({LOCUS_PLAY, capture().string()});
   const nlohmann::json status = status_when(

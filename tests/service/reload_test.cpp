@@ -30,7 +30,7 @@ TEST_F(Reload, BadConfigurationLeavesTheOldOneInForce) {
   const ProgramRun refused = ctl({"reload"});
   EXPECT_EQ(refused.status, 2);
   EXPECT_NE(refused.err.find("no_such_key"), std::string::npos) << refused.err;
-  EXPECT_TRUE(daemon.wait_for_line("the old configuration stays in force"));
+  EXPECT_TRUE(daemon.wait_for_line("the old configuration remains in effect"));
   EXPECT_EQ(status()["state"], "waiting");
   static_cast<void>(config("threads: 1\n"));
   EXPECT_EQ(ctl({"reload"}).status, 0);

@@ -36,7 +36,7 @@ class Restart : public RobotNetwork {
 
   void expect_to_resume() {
     start();
-    EXPECT_TRUE(daemon_->wait_for_line("resumed where the service ended")) << testing::PrintToString(daemon_->lines());
+    EXPECT_TRUE(daemon_->wait_for_line("resumed from the saved state")) << testing::PrintToString(daemon_->lines());
   }
 
   /// After the drive, compares all poses with its replay.
@@ -113,8 +113,7 @@ class RestartOfADriveThatWaits : public RobotNetwork {
         return std::ranges::all_of(now["sources"], [](const auto& source) { return source["writers"] == 1; });
       }));
       time.hold_at_ns = i + 1 < outages.size() ? (outages[i + 1].begin + kAmid).count() : 0;
-      EXPECT_TRUE(daemon_->wait_for_line("resumed where the service ended"))
-          << testing::PrintToString(daemon_->lines());
+      EXPECT_TRUE(daemon_->wait_for_line("resumed from the saved state")) << testing::PrintToString(daemon_->lines());
     }
     ASSERT_EQ(play_->wait_for_exit(seconds{200}), 0) << testing::PrintToString(play_->lines());
     const Replay replay({"--quiet", plant().string()});

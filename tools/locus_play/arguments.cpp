@@ -19,24 +19,25 @@ std::optional<PlayArguments> parse_play_arguments(int argc, char** argv) {
                  "Folder with lidar.pcap and any of imu.csv, NAME.tum and config.yaml, which names the topics; or a "
                  "capture file; -: the stream of locus-sim on standard input")
       ->required();
-  app.add_option("--to", arguments.to, "Where packets go: a host, a broadcast or a multicast address")
+  app.add_option("--to", arguments.to, "Destination of packets: a host, a broadcast or a multicast address")
       ->type_name("ADDRESS")
       ->check(CLI::ValidIPV4)
       ->capture_default_str();
   app.add_option("--speed", arguments.speed,
-                 "So many times as fast as recorded; for another than 1 the receiver is to run with time: sensor")
+                 "Playback speed relative to the recording; other than 1 requires time: sensor at the receiver")
       ->type_name("X")
       ->check(number_between(0.01, 1000))
       ->capture_default_str();
   app.add_option("--interface", arguments.interface,
                  "Network interface of DDS and of multicast; default: dds.interface")
       ->type_name("NAME");
-  app.add_option("--domain", arguments.domain, "Of DDS; default: dds.domain")
+  app.add_option("--domain", arguments.domain, "DDS domain; default: dds.domain")
       ->type_name("N")
       ->check(CLI::Range(0, 232));
   app.add_flag("--keep-stamps", arguments.keep_stamps,
                "Leaves all stamps as recorded, instead of making the first now");
-  app.add_flag("--clock", arguments.clock, "Publishes the time of what is sent on /clock, for nodes with use_sim_time");
+  app.add_flag("--clock", arguments.clock,
+               "Publishes the time of the recording on /clock, for nodes with use_sim_time");
   app.add_option("--fail", faults, "Injects a fault, as locus-replay does, e.g. front:lost@10-20; may be repeated")
       ->type_name("SPEC")
       ->allow_extra_args(false);
@@ -45,7 +46,7 @@ std::optional<PlayArguments> parse_play_arguments(int argc, char** argv) {
          "Waits until the service of this control socket has processed each sweep before it sends more, so that "
          "a computer that is too slow or busy loses none")
       ->type_name("SOCKET");
-  app.add_flag("--quiet", arguments.quiet, "Prints warnings and errors alone");
+  app.add_flag("--quiet", arguments.quiet, "Prints warnings and errors only");
   app.set_version_flag("--version", "locus-play " LOCUS_VERSION);
   app.footer("Examples:\n"
              "  locus-play robot_folder/\n"

@@ -40,9 +40,9 @@ void Lockstep::wait_for_writers(const std::vector<std::string>& sources) const {
   if (!wait_until(socket_, [&](const Json& status) {
         return std::ranges::all_of(sources, [&](const std::string& name) { return is_known(status, name); });
       }))
-    throw Failure(ExitStatus::failed, fmt::format("{}: its service does not hear all of {}; look at dds.interface and "
-                                                  "dds.domain",
-                                                  socket_.string(), fmt::join(sources, ", ")));
+    throw Failure(ExitStatus::failed,
+                  fmt::format("{}: its service does not receive all of {}; check dds.interface and dds.domain",
+                              socket_.string(), fmt::join(sources, ", ")));
 }
 
 void Lockstep::wait_until_processed(Stamp now) {
@@ -55,7 +55,7 @@ void Lockstep::wait_until_processed(Stamp now) {
     return count("seen") == count("processed") + count("failed") + count("dropped");
   };
   if (!wait_until(socket_, has_processed_all))
-    throw Failure(ExitStatus::failed, fmt::format("{}: its service processes no sweep any more", socket_.string()));
+    throw Failure(ExitStatus::failed, fmt::format("{}: its service no longer processes sweeps", socket_.string()));
 }
 
 } // namespace locus::tools

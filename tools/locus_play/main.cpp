@@ -69,7 +69,7 @@ void wait_for_subscribers(const MotionPublisher& motion, const DdsOptions& dds) 
   for (Duration waited{}; waited < kPatience && !motion.topics_without_subscribers().empty(); waited += kPollPeriod)
     std::this_thread::sleep_for(kPollPeriod);
   for (const std::string& topic : motion.topics_without_subscribers())
-    warn(fmt::format("nobody listens to {} in DDS domain {} on interface {}; it is sent all the same", topic,
+    warn(fmt::format("{} has no subscriber in DDS domain {} on interface {}; it is sent nevertheless", topic,
                      dds.domain, dds.interface));
 }
 
@@ -136,16 +136,15 @@ void play(const PlayArguments& arguments, const Config& config, daemon::InputSou
   for (const std::string& warning : source.warnings())
     warn(warning);
   if (motion.refused() > 0)
-    warn(fmt::format("{} motion samples were not sent: DDS did not take them", motion.refused()));
+    warn(fmt::format("{} motion samples were not sent: DDS did not accept them", motion.refused()));
   if (packets.sent() == 0)
     throw Failure(ExitStatus::failed,
                   fmt::format("{}: holds no UDP datagram; nothing was sent", arguments.capture.string()));
   const bool expects_source_ip =
       std::ranges::any_of(config.lidars, [](const auto& l) { return l.source_ip.has_value(); });
   if (packets.changed_sender() && expects_source_ip)
-    warn(
-        "this host has not the addresses of the lidars: a receiver whose configuration names source_ip has refused the "
-        "packets");
+    warn("this host does not have the addresses of the lidars: a receiver with source_ip in its configuration has "
+         "refused the packets");
 }
 
 void play_folder(const PlayArguments& arguments) {

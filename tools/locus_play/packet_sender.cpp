@@ -45,7 +45,7 @@ int PacketSender::socket_for(std::uint32_t source_ip) {
     return found->second;
   const int descriptor = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   if (descriptor < 0)
-    throw Failure(ExitStatus::failed, fmt::format("no socket: {}", std::strerror(errno))); // NOLINT
+    throw Failure(ExitStatus::failed, fmt::format("a socket cannot be opened: {}", std::strerror(errno))); // NOLINT
   sockets_[source_ip] = descriptor;
   const int yes = 1;
   setsockopt(descriptor, SOL_SOCKET, SO_BROADCAST, &yes, sizeof(yes));

@@ -56,7 +56,7 @@ std::string fetch(const std::string& address, fs::path file) {
     file = address + std::string{description.suffix};
   if (file.extension() != description.suffix)
     throw Failure(ExitStatus::wrong_usage,
-                  fmt::format("{}: its name must end in {}, by which it is known", file.string(), description.suffix));
+                  fmt::format("{}: its name must end in {}", file.string(), description.suffix));
   write_atomically(file, fetched.text);
   const std::string path = fs::absolute(file).lexically_normal().string();
   return fmt::format("{}: {}\n\nlidars:\n{}", path, description.summary,

@@ -99,39 +99,39 @@ void record(const CtlArguments& arguments) {
   for (;; std::this_thread::sleep_for(std::chrono::milliseconds{200})) {
     const Json status = send_request(arguments.control(), {{"command", "status"}}).json;
     if (!status.contains("incidents"))
-      throw Failure(ExitStatus::failed,
-                    fmt::format("{}: no incidents are kept since the service was reloaded; this one may "
-                                "come yet",
-                                folder));
+      throw Failure(
+          ExitStatus::failed,
+          fmt::format("{}: incidents are off since the service was reloaded; this one may still be completed", folder));
     const Json& incidents = status["incidents"];
     if (incidents.value("last", "") == folder)
       return fmt::print("{}\n", folder);
     if (incidents.value("writing", "") != folder)
-      throw Failure(ExitStatus::failed, incidents.value("refusal", "the incident is not kept"));
+      throw Failure(ExitStatus::failed, incidents.value("refusal", "the incident was not stored"));
   }
 }
 
 /// Parses the arguments to an action; nothing if help or version were requested.
 std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
   std::function<void()> action;
-  CLI::App app{"Talks to a running locusd.", "locusctl"};
+  CLI::App app{"Controls a running locusd.", "locusctl"};
   app.require_subcommand(1);
   app.fallthrough();
-  app.add_option("--instance", arguments.instance, "Of the service, as in locusd@NAME")->type_name("NAME");
-  app.add_option("--socket", arguments.socket, "Of the service, where it is not in /run")->type_name("PATH");
+  app.add_option("--instance", arguments.instance, "Instance of the service, as in locusd@NAME")->type_name("NAME");
+  app.add_option("--socket", arguments.socket, "Control socket of the service, if it is not in /run")
+      ->type_name("PATH");
   app.set_version_flag("--version", "locusctl " LOCUS_VERSION);
-  app.footer("All but status, calibration, sensors and fetch are for root and members of group locusd.\n"
+  app.footer("All commands except status, calibration, sensors and fetch require root or group locusd.\n"
              "Examples:\n"
              "  locusctl status --watch\n"
              "  locusctl reset --pose 1,2,0,0,0,90\n"
              "  locusctl save-map map.pcd\n"
              "  locusctl record --keep 60s\n"
              "  locusctl calibration --yaml");
-  CLI::App* const show = app.add_subcommand("status", "What the service does and has counted");
-  show->add_flag("--json", arguments.json, "For programs");
-  show->add_flag("--watch", arguments.watch, "Goes on until q or Ctrl-C");
+  CLI::App* const show = app.add_subcommand("status", "Shows the state and the counters of the service");
+  show->add_flag("--json", arguments.json, "Prints JSON, for programs");
+  show->add_flag("--watch", arguments.watch, "Refreshes until q or Ctrl-C");
   show->callback([&] { action = [&] { status(arguments); }; });
-  CLI::App* const flat = app.add_subcommand("flat-ground", "Whether the ground is taken to be level");
+  CLI::App* const flat = app.add_subcommand("flat-ground", "Sets whether the ground is assumed level");
   const auto modes = names_of(FlatGround{});
   flat->add_option("MODE", arguments.mode, "on, off or auto")
       ->required()
@@ -139,14 +139,18 @@ std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
   flat->callback([&] {
     action = [&] { send_request(arguments.control(), {{"command", "flat-ground"}, {"mode", arguments.mode}}); };
   });
-  CLI::App* const learned = app.add_subcommand("calibration", "What drives have told of stamps, mountings and wheels");
-  learned->add_flag("--yaml", arguments.yaml, "What is known better than it is configured, to be pasted there");
+  CLI::App* const learned =
+      app.add_subcommand("calibration", "Shows the learned delays, mountings and scales of motion sources");
+  learned->add_flag("--yaml", arguments.yaml,
+                    "Prints values better known than the configured ones, to paste into the configuration");
   learned->callback([&] { action = [&] { calibration(arguments); }; });
   CLI::App* const save = app.add_subcommand("save-map", "Writes the map as PCD");
   save->add_option("FILE", arguments.file)->required();
   save->callback([&] { action = [&] { save_map(arguments); }; });
-  CLI::App* const again = app.add_subcommand("reset", "Begins the odometry anew, with an empty map");
-  again->add_option("--pose", arguments.pose, "Where: x,y,z in metres, roll,pitch,yaw in degrees; default: the origin")
+  CLI::App* const again = app.add_subcommand("reset", "Resets the odometry, with an empty map");
+  again
+      ->add_option("--pose", arguments.pose,
+                   "Initial pose: x,y,z in metres, roll,pitch,yaw in degrees; default: the origin")
       ->type_name("X,Y,Z,R,P,Y")
       ->delimiter(',')
       ->expected(6);
@@ -154,15 +158,15 @@ std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
   app.add_subcommand("reload", "Reads the configuration again")->callback([&] {
     action = [&] { send_request(arguments.control(), {{"command", "reload"}}); };
   });
-  CLI::App* const keep = app.add_subcommand("record", "Keeps the last input as an incident, for locus-replay");
-  keep->add_option("--keep", arguments.keep, "How much of it, e.g. 60s")->required()->type_name("SECONDS");
+  CLI::App* const keep = app.add_subcommand("record", "Stores the latest input as an incident, for locus-replay");
+  keep->add_option("--keep", arguments.keep, "Length of the input, e.g. 60s")->required()->type_name("SECONDS");
   keep->callback([&] { action = [&] { record(arguments); }; });
-  app.add_subcommand("sensors", "Finds the lidars on the wire; needs no service")->callback([&] {
+  app.add_subcommand("sensors", "Finds the lidars on the network; needs no service")->callback([&] {
     action = [] { fmt::print("{}", find_sensors(std::chrono::seconds{2})); };
   });
   CLI::App* const from_lidar =
       app.add_subcommand("fetch", "Fetches an Ouster's metadata or a Hesai's angles from the lidar; needs no service");
-  from_lidar->add_option("ADDRESS", arguments.address, "Of the lidar, e.g. 192.168.1.201")->required();
+  from_lidar->add_option("ADDRESS", arguments.address, "Address of the lidar, e.g. 192.168.1.201")->required();
   from_lidar->add_option("-o,--output", arguments.file, "Default: ADDRESS.json or ADDRESS.csv")->type_name("FILE");
   from_lidar->callback([&] { action = [&] { fmt::print("{}", fetch(arguments.address, arguments.file)); }; });
   if (!parse_command_line(app, argc, argv))

@@ -33,8 +33,7 @@ Size size_of_terminal() {
 
 Screen::Screen() {
   if (isatty(STDOUT_FILENO) == 0)
-    throw Failure(ExitStatus::wrong_usage,
-                  "--watch draws on a terminal, and there is none; use status or status --json");
+    throw Failure(ExitStatus::wrong_usage, "--watch needs a terminal; use status or status --json");
   for (const int number : {SIGINT, SIGTERM, SIGHUP})
     std::signal(number, [](int) { interrupted = 1; });
   if (termios settings{}; tcgetattr(STDIN_FILENO, &settings) == 0) {

@@ -72,7 +72,7 @@ std::string find_sensors(Duration duration) {
   }
   if (text.empty())
     throw Failure(ExitStatus::failed,
-                  fmt::format("{}no lidar was heard within {:.0f} s; look at power, cable and the address it sends to",
+                  fmt::format("{}no lidar was received within {:.0f} s; check power, cable and the address it sends to",
                               refused, to_seconds(duration)));
   return text + refused + "\nlidars:\n" + yaml;
 }

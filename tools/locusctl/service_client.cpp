@@ -24,7 +24,7 @@ std::string remedy(const std::filesystem::path& socket, int error) {
   const std::filesystem::path folder = socket.parent_path();
   const std::string unit = folder.filename().string();
   if (error == EACCES)
-    return fmt::format("this account may not enter {}; ask its owner, or be root", folder.string());
+    return fmt::format("this account may not access {}; ask its owner, or be root", folder.string());
   if (folder.parent_path() != "/run" || !unit.starts_with("locusd"))
     return fmt::format("is there a locusd whose RUNTIME_DIRECTORY is {}?", folder.string());
   return fmt::format("start it with: systemctl start {0}; if it does not stay: journalctl -u {0}", unit);
@@ -62,7 +62,7 @@ class Connection {
     message.msg_controllen = control.size();
     const ssize_t size = recvmsg(socket_, &message, MSG_CMSG_CLOEXEC);
     if (size <= 0)
-      throw Failure(ExitStatus::failed, "the service does not answer; look at: systemctl status locusd");
+      throw Failure(ExitStatus::failed, "the service does not answer; see: systemctl status locusd");
     text.resize(static_cast<std::size_t>(size));
     int descriptor = -1;
     if (const cmsghdr* header = CMSG_FIRSTHDR(&message); header != nullptr && header->cmsg_type == SCM_RIGHTS)
@@ -83,7 +83,7 @@ std::vector<std::byte> read_all(int descriptor) {
     count = pread(descriptor, bytes.data() + done, bytes.size() - done, static_cast<off_t>(done));
   close(descriptor);
   if (done != bytes.size())
-    throw Failure(ExitStatus::failed, "the service's answer broke off; try again");
+    throw Failure(ExitStatus::failed, "the service's answer is incomplete; try again");
   return bytes;
 }
 
@@ -98,7 +98,7 @@ ServiceAnswer send_request(const std::filesystem::path& socket, const nlohmann::
   if (descriptor >= 0)
     answer.bytes = read_all(descriptor);
   if (!answer.json.is_object())
-    throw Failure(ExitStatus::failed, "the service's answer makes no sense; use locusctl of the same version");
+    throw Failure(ExitStatus::failed, "the service's answer is invalid; use locusctl of the same version");
   if (answer.json.contains("error"))
     throw Failure(answer.json.contains("wrong_usage") ? ExitStatus::wrong_usage : ExitStatus::failed,
                   answer.json["error"].get<std::string>());
