@@ -34,7 +34,7 @@ std::string doubt_of_gyro(double late_s, const Eigen::Vector3d& mounting_deg = {
   return doubt(SourceKind::imu, gyro(late_s, mounting_deg));
 }
 
-TEST(Calibration, WhatIsGrossIsToldWithItsFigure) {
+TEST(Calibration, GrossErrorIsReportedWithItsSize) {
   EXPECT_NE(doubt_of_gyro(0.04).find("more than 30 ms later than lidar"), std::string::npos);
   EXPECT_NE(doubt_of_gyro(-0.04).find("40 ms earlier than lidar"), std::string::npos);
   EXPECT_NE(doubt_of_gyro(0, {4, 0, 0}).find("+4.0 degrees about x (roll)"), std::string::npos);
@@ -42,13 +42,13 @@ TEST(Calibration, WhatIsGrossIsToldWithItsFigure) {
   EXPECT_NE(doubt_of_gyro(0, {0, 0, 90}).find("+90.0 degrees about z (yaw)"), std::string::npos);
 }
 
-TEST(Calibration, WhatIsNotGrossIsNotToldOf) {
+TEST(Calibration, SmallErrorIsNotReported) {
   EXPECT_EQ(doubt_of_gyro(0.014, {2.9, -2.9, 2.9}), "");
   EXPECT_EQ(doubt_of_gyro(-0.029), "");
   EXPECT_EQ(doubt_of_gyro(0.029, {0, 0, 5}), "") << "a mounting that was measured late is no mounting";
 }
 
-TEST(Calibration, WhatIsNotKnownIsNotToldOf) {
+TEST(Calibration, UncertainErrorIsNotReported) {
   LearnedSource unsure = gyro(0.04, {10, 0, 0});
   unsure.covariance *= 1e4;
   EXPECT_EQ(doubt(SourceKind::imu, unsure), "");
@@ -59,7 +59,7 @@ TEST(Calibration, WhatIsNotKnownIsNotToldOf) {
 }
 
 /// Odometry has other states: a scale error of 4 % must not be reported as lateness.
-TEST(Calibration, OfAnOdometryNothingIsToldThatItDoesNotHave) {
+TEST(Calibration, ScaleErrorOfAnOdometryIsNotReportedAsLateness) {
   EXPECT_EQ(doubt(SourceKind::odometry, gyro(0.04, {10, 0, 0})), "");
 }
 
@@ -87,7 +87,7 @@ LearnedSource wheels(double scale, double yaw_scale, double sigma) {
   return learned;
 }
 
-TEST(Calibration, FiguresStandWithTheirDeviationsAndTheConfiguration) {
+TEST(Calibration, FiguresAreListedWithDeviationsAndConfiguration) {
   const nlohmann::json of_gyro = learned_json(imu_turned({0, 0, 0}), gyro(0.005, {1, 2, -3}));
   EXPECT_DOUBLE_EQ(of_gyro["late_ms"]["value"], 5.0);
   EXPECT_DOUBLE_EQ(of_gyro["late_ms"]["sd"], 0.1);
@@ -105,7 +105,7 @@ TEST(Calibration, FiguresStandWithTheirDeviationsAndTheConfiguration) {
 }
 
 /// The learned rotation is in the base frame, composed with the configured one.
-TEST(Calibration, WhatIsKnownBetterTakesThePlaceOfTheConfiguration) {
+TEST(Calibration, BetterKnownValuesReplaceTheConfiguredOnes) {
   const MotionSourceOptions imu = calibrated(imu_turned({0, 0, 90}), gyro(0.034, {5, 0, 0}));
   EXPECT_DOUBLE_EQ(imu.late_ms, 34.0);
   const Eigen::Quaterniond expected =
@@ -117,7 +117,7 @@ TEST(Calibration, WhatIsKnownBetterTakesThePlaceOfTheConfiguration) {
   EXPECT_DOUBLE_EQ(wio.yaw_scale, 0.95);
 }
 
-TEST(Calibration, WhatIsNotKnownBetterStaysAsConfigured) {
+TEST(Calibration, OtherValuesRemainAsConfigured) {
   const MotionSourceOptions imu = imu_turned({1, 2, 3});
   EXPECT_EQ(calibrated(imu, gyro(0.0002, {0.2, -0.2, 0.2})), imu) << "within three deviations";
   LearnedSource unsure = gyro(0.1, {30, 0, 0});
@@ -133,7 +133,7 @@ nlohmann::ordered_json sources_of(const MotionSourceOptions& source, const Learn
   return {{source.name, {{"learned", learned_json(source, learned)}}}};
 }
 
-TEST(Calibration, YamlIsReadAsConfiguration) {
+TEST(Calibration, YamlIsValidConfiguration) {
   const std::string yaml = calibration_yaml(sources_of(imu_turned({0, 0, 90}), gyro(-0.034, {0, 5, 0})));
   EXPECT_EQ(yaml,
             "# For the entries of the same name.\nmotion_sources:\n"
@@ -150,7 +150,7 @@ TEST(Calibration, YamlIsReadAsConfiguration) {
 }
 
 /// A drive de-skews points before the samples of their time arrive, so it cannot estimate such a lateness.
-TEST(Calibration, WhatIsTooLateForADriveIsNotTakenFromOne) {
+TEST(Calibration, TooLateSourceIsNotCalibratedFromADrive) {
   const MotionSourceOptions imu = imu_turned({0, 0, 0});
   const LearnedSource late = gyro(0.017, {0, 5, 0});
   const nlohmann::ordered_json of_drive = sources_of(imu, late);
@@ -163,7 +163,7 @@ TEST(Calibration, WhatIsTooLateForADriveIsNotTakenFromOne) {
   EXPECT_NE(calibration_yaml(sources_of(imu, gyro(0.014, {0, 5, 0}))).find("late_ms: 14"), std::string::npos);
 }
 
-TEST(Calibration, TableSaysWhatTheDriveHasNotTold) {
+TEST(Calibration, TableMarksUnobservedFigures) {
   LearnedSource learned = gyro(-0.034, {0, 0, 0.1});
   learned.covariance(LearnedSource::kMounting, LearnedSource::kMounting) = 1e-2;
   const std::string text = calibration_text(sources_of(imu_turned({0, 0, 0}), learned));
@@ -176,7 +176,7 @@ TEST(Calibration, TableSaysWhatTheDriveHasNotTold) {
 }
 
 /// Values that the user has configured are not reported.
-TEST(Calibration, ConfiguredLatenessIsNotToldOfAgain) {
+TEST(Calibration, ConfiguredLatenessIsNotReported) {
   Config config;
   config.motion_sources = {{imu_turned({0, 0, 0}), "", ""}};
   config.motion_sources[0].late_ms = 38;

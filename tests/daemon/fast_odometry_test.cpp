@@ -75,20 +75,20 @@ void expect_on_arc(const ArcDrive& drive, Duration now) {
 }
 
 /// Regression: the pose was extrapolated in a straight line, 4.5 mm off this arc.
-TEST(FastOdometry, GyroAloneCarriesTheSpeedOfTheEstimateRoundTheArc) {
+TEST(FastOdometry, GyroAlonePropagatesAlongAnArcAtTheSpeedOfTheEstimate) {
   expect_on_arc(ArcDrive(turning(), milliseconds{1100}, milliseconds{-1}), milliseconds{1100});
 }
 
 /// The wheels' track is extrapolated in a straight line from their last sample, here 15 ms before that of the gyro.
-TEST(FastOdometry, BeyondTheLastSampleOfTheWheelsTheArcGoesOn) {
+TEST(FastOdometry, ArcContinuesBeyondTheLastWheelSample) {
   expect_on_arc(ArcDrive(turning(), milliseconds{1095}, milliseconds{1080}), milliseconds{1095});
 }
 
-TEST(FastOdometry, WheelsOlderThanTheEstimateTellTheSpeed) {
+TEST(FastOdometry, WheelSamplesBeforeTheEstimateGiveTheSpeed) {
   expect_on_arc(ArcDrive(turning(), milliseconds{1015}, milliseconds{980}), milliseconds{1015});
 }
 
-TEST(FastOdometry, UncertainSpeedGrowsAlongTheHeading) {
+TEST(FastOdometry, SpeedVarianceGrowsAlongTheHeading) {
   const ArcDrive drive(straight_on(), milliseconds{1100}, milliseconds{-1});
   FastSample from = drive.estimate();
   from.twist_covariance(0, 0) = 0.04; // forward
@@ -98,7 +98,7 @@ TEST(FastOdometry, UncertainSpeedGrowsAlongTheHeading) {
   EXPECT_NEAR(covariance(0, 0), 0.01 * 0.01, 1e-12);
 }
 
-TEST(FastOdometry, UncertainHeadingOfTheEstimateShiftsWhatLiesAhead) {
+TEST(FastOdometry, HeadingVarianceOfTheEstimateAddsLateralVariance) {
   const ArcDrive drive(straight_on(), milliseconds{1100}, milliseconds{-1});
   FastSample from = drive.estimate();
   from.pose_covariance(5, 5) = 1e-4;
@@ -111,7 +111,7 @@ TEST(FastOdometry, UncertainHeadingOfTheEstimateShiftsWhatLiesAhead) {
 }
 
 /// Compares each twist error alone with its effect on the exact motion.
-TEST(FastOdometry, UncertainTwistMovesThePoseAsAnotherTwistWould) {
+TEST(FastOdometry, TwistCovariancePropagatesToThePose) {
   constexpr double kError = 1e-6;
   constexpr double kElapsed_s = 0.1;
   const ArcDrive drive(turning(), milliseconds{1100}, milliseconds{-1});
@@ -128,7 +128,7 @@ TEST(FastOdometry, UncertainTwistMovesThePoseAsAnotherTwistWould) {
   }
 }
 
-TEST(FastOdometry, NothingBeforeTheFirstEstimateAndForOtherSources) {
+TEST(FastOdometry, PredictsNothingBeforeTheFirstEstimateOrForOtherSources) {
   const MotionSources none({{"imu", SourceKind::imu, {}}}, Fusion::combined);
   FastOdometry fast;
   EXPECT_FALSE(fast.predict(none, SourceId{0}, at(milliseconds{1}))) << "no estimate";

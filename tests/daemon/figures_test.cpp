@@ -23,7 +23,7 @@ ProcessedSweep sweep(unsigned number, Duration wall) {
   return done;
 }
 
-TEST(SweepStatistics, SumsAreOfAllSweepsAndDistributionsOfTheLast) {
+TEST(SweepStatistics, SumsCoverAllSweepsAndDistributionsTheLatest) {
   SweepStatistics statistics(100);
   for (unsigned i = 0; i < 200; ++i)
     statistics.add(sweep(i, milliseconds{i}));
@@ -42,7 +42,7 @@ TEST(SweepStatistics, SumsAreOfAllSweepsAndDistributionsOfTheLast) {
   EXPECT_GT(figures.rate_hz, 10);
 }
 
-TEST(SweepStatistics, HasNothingBeforeTheFirst) {
+TEST(SweepStatistics, IsEmptyBeforeTheFirstSweep) {
   const SweepFigures figures = SweepStatistics(100).figures();
   EXPECT_FALSE(figures.last);
   EXPECT_EQ(figures.process_ms.max, 0);
@@ -66,7 +66,7 @@ TEST(Figures, ServiceHasTheKeysOfARunAndMore) {
 }
 
 /// The problem is cleared once PTP is repaired.
-TEST(Figures, DoubtOfCloudsIsAProblemForAsLongAsTheyGiveRiseToIt) {
+TEST(Figures, CloudDoubtIsAProblemOnlyWhileItLasts) {
   LidarOptions options;
   options.topic = "/points";
   const Stamp now = stamp_from_ns(1'700'000'000'000'000'000);
@@ -86,7 +86,7 @@ TEST(Figures, DoubtOfCloudsIsAProblemForAsLongAsTheyGiveRiseToIt) {
   EXPECT_EQ(cloud_doubts(options, lidar).size(), 2U) << "of all that was met";
 }
 
-TEST(Figures, MetadataIsStaleWhileTheSensorIsInAnotherMode) {
+TEST(Figures, MetadataIsStaleWhileTheSensorRunsInAnotherMode) {
   LidarOptions options;
   options.metadata = "front.json";
   IngestReport::Lidar lidar;
@@ -98,7 +98,7 @@ TEST(Figures, MetadataIsStaleWhileTheSensorIsInAnotherMode) {
   EXPECT_NE(problem.find("locusctl fetch SENSOR -o front.json"), std::string::npos) << problem;
 }
 
-TEST(Figures, TextOfAServiceThatHasHeardNothingSaysSo) {
+TEST(Figures, TextOfAServiceWithoutInputSaysSo) {
   const Config config = Config{};
   Figures figures{.config = config};
   figures.live = Figures::Live{};

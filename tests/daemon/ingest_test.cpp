@@ -39,7 +39,7 @@ template <class Feed> std::vector<Summary> sweeps_of(const Config& config, const
 
 bool is_datagram(const Input& input) { return std::holds_alternative<Datagram>(input); }
 
-TEST(Ingest, MakesOneSweepPerRevolutionAndCountsEveryPacket) {
+TEST(Ingest, BuildsOneSweepPerRevolutionAndCountsEveryPacket) {
   const Config config = Drive::config();
   std::size_t sweeps = 0;
   Ingest ingest(config, open_lidars(config), [&](Sweep& sweep, const SweepCut& cut) {
@@ -61,7 +61,7 @@ TEST(Ingest, MakesOneSweepPerRevolutionAndCountsEveryPacket) {
   EXPECT_GT(ingest.stages().total(Stage::correct), Duration::zero());
 }
 
-TEST(Ingest, SilenceBetweenTheInputsChangesNoSweep) {
+TEST(Ingest, SilenceBetweenInputsChangesNoSweep) {
   const auto alone = sweeps_of(Drive::config(), [](Ingest& ingest, const Input& input) { ingest.process(input); });
   const auto with_silence = sweeps_of(Drive::config(), [](Ingest& ingest, const Input& input) {
     ingest.process(Silence{arrival_of(input, {})});
@@ -71,7 +71,7 @@ TEST(Ingest, SilenceBetweenTheInputsChangesNoSweep) {
   EXPECT_EQ(alone, with_silence);
 }
 
-TEST(Ingest, WindowsWithoutLidarAreSweepsToo) {
+TEST(Ingest, WindowsWithoutLidarAreSweeps) {
   const Stamp dies = arrival_of(Drive::instance().inputs().front(), {}) + std::chrono::seconds{2};
   const auto sweeps = sweeps_of(Drive::config(), [&](Ingest& ingest, const Input& input) {
     if (!is_datagram(input) || arrival_of(input, {}) < dies)

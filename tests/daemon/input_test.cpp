@@ -62,7 +62,7 @@ ImuInput imu_at(Stamp arrival) {
   return input;
 }
 
-TEST(LiveInput, GivesSocketsAndMotionInTheOrderOfArrival) {
+TEST(LiveInput, ReturnsDatagramsAndMotionInOrderOfArrival) {
   const test::KernelStamps stamps;
   LiveInput input(two_sockets());
   const test::UdpSender sender;
@@ -87,7 +87,7 @@ TEST(LiveInput, GivesSocketsAndMotionInTheOrderOfArrival) {
 
 /// Sockets return 32 datagrams at a time: those of the lidar span a short time, its position packets a long one. After
 /// a stall, unsorted batches would make time jump ahead and back.
-TEST(LiveInput, BacklogOfAStallComesInTheOrderOfArrival) {
+TEST(LiveInput, BacklogAfterAStallIsInOrderOfArrival) {
   const test::KernelStamps stamps;
   LiveInput input(two_sockets());
   const test::UdpSender sender;
@@ -116,7 +116,7 @@ TEST(LiveInput, BacklogOfAStallComesInTheOrderOfArrival) {
   EXPECT_EQ(received, sent);
 }
 
-TEST(LiveInput, SilenceIsNeverLaterThanWhatComesNext) {
+TEST(LiveInput, SilenceIsNeverLaterThanTheNextInput) {
   LiveInput input(two_sockets());
   const std::uint16_t port = input.sockets()[0].port();
   std::thread robot([port] {
@@ -155,7 +155,7 @@ TEST(LiveInput, MotionWakesTheWaitingThread) {
 /// Late motion arrives just after the last input returned, so that a recording preserves the order. A thread that waits
 /// for a processor hands over a sample a time slice late, 100 ms beside a load of 25. An hour late is a clock step and
 /// passes unchanged.
-TEST(LiveInput, MotionThatIsHandedOverLateArrivesAfterWhatWasGivenOut) {
+TEST(LiveInput, LateMotionArrivesAfterTheInputReturnedBefore) {
   const test::KernelStamps stamps;
   LiveInput input(two_sockets());
   const test::UdpSender sender;
@@ -172,7 +172,7 @@ TEST(LiveInput, MotionThatIsHandedOverLateArrivesAfterWhatWasGivenOut) {
   EXPECT_EQ(next_arrival(), given_out - hours{1});
 }
 
-TEST(LiveInput, MotionThatNobodyFetchesIsCounted) {
+TEST(LiveInput, UnfetchedMotionIsCounted) {
   LiveInput input(two_sockets());
   for (std::size_t i = 0; i < LiveInput::kMaxUnread + 7; ++i)
     input.push(imu_at(now()));
@@ -180,7 +180,7 @@ TEST(LiveInput, MotionThatNobodyFetchesIsCounted) {
 }
 
 /// After a flood, whether it ended or overflowed the buffer, no further datagram wakes the thread.
-TEST(LiveInput, WhatTheKernelKeptOutIsCountedThoughNothingComesAfterIt) {
+TEST(LiveInput, KernelFilteredDatagramsAreCountedWithoutFurtherInput) {
   LiveInput input(two_sockets());
   const test::UdpSender sender;
   const std::vector<std::byte> foreign(700);
@@ -258,7 +258,7 @@ std::vector<std::byte> cloud_message(Stamp stamp) {
 }
 
 /// An input whose only lidar publishes clouds, with a socket of another.
-class CloudsOfALiveInput : public testing::Test {
+class LiveInputClouds : public testing::Test {
  protected:
   void hand_over(Stamp arrival, std::span<const std::byte> message) {
     CloudBytes& next = input_.next_cloud(0);
@@ -272,7 +272,7 @@ class CloudsOfALiveInput : public testing::Test {
   test::UdpSender sender_;
 };
 
-TEST_F(CloudsOfALiveInput, ComeInTheOrderOfArrivalWithDatagramsAndMotion) {
+TEST_F(LiveInputClouds, AreInOrderOfArrivalWithDatagramsAndMotion) {
   const test::KernelStamps stamps;
   bring(input_.sockets()[0], test::bytes_of("a"), sender_);
   const Stamp cloud = now();
@@ -306,7 +306,7 @@ TEST_F(CloudsOfALiveInput, ComeInTheOrderOfArrivalWithDatagramsAndMotion) {
   EXPECT_TRUE(std::holds_alternative<Silence>(input_.next(milliseconds{1})));
 }
 
-TEST_F(CloudsOfALiveInput, WakeTheWaitingThread) {
+TEST_F(LiveInputClouds, WakeTheWaitingThread) {
   std::thread reader([&] {
     std::this_thread::sleep_for(milliseconds{50});
     hand_over(now(), cloud_message(now()));
@@ -315,7 +315,7 @@ TEST_F(CloudsOfALiveInput, WakeTheWaitingThread) {
   reader.join();
 }
 
-TEST_F(CloudsOfALiveInput, ThatNobodyFetchesAreCountedAndTheNewestIsKept) {
+TEST_F(LiveInputClouds, UnfetchedOnesAreCountedAndTheNewestRemains) {
   const Stamp first = now();
   for (int i = 0; i < 5; ++i)
     hand_over(first + milliseconds{i}, cloud_message(first + milliseconds{i}));
@@ -327,7 +327,7 @@ TEST_F(CloudsOfALiveInput, ThatNobodyFetchesAreCountedAndTheNewestIsKept) {
   EXPECT_TRUE(std::holds_alternative<Silence>(input_.next(milliseconds{1})));
 }
 
-TEST_F(CloudsOfALiveInput, ThatCannotBeReadSayWhy) {
+TEST_F(LiveInputClouds, UnreadableOnesCarryTheReason) {
   const auto error = [&] {
     const Input next = input_.next(milliseconds{100});
     const auto* cloud = std::get_if<CloudInput>(&next);
@@ -348,7 +348,7 @@ TEST_F(CloudsOfALiveInput, ThatCannotBeReadSayWhy) {
   EXPECT_TRUE(std::holds_alternative<CloudInput>(input_.next(milliseconds{100})));
 }
 
-TEST_F(CloudsOfALiveInput, AllocateNothingOnceTheLargestHasCome) {
+TEST_F(LiveInputClouds, AllocateNothingAfterTheLargest) {
   if (!allocations())
     GTEST_SKIP() << "a sanitizer is in the way of counting";
   const std::vector<std::byte> message = cloud_message(now());
@@ -411,7 +411,7 @@ std::vector<Heard> listen(PacedInput& input) {
   return heard;
 }
 
-TEST(PacedInput, EachComesWhenItIsDue) {
+TEST(PacedInput, ReturnsEachInputWhenDue) {
   Recording recording({kStart, kStart + milliseconds{40}, kStart + milliseconds{60}});
   PacedInput paced(recording, 2.0, SleepingClock::kClock);
   std::size_t datagrams = 0;
@@ -427,7 +427,7 @@ TEST(PacedInput, EachComesWhenItIsDue) {
   EXPECT_EQ(datagrams, 3U);
 }
 
-TEST(PacedInput, SilenceTellsATimeThatRunsAndIsNeverLaterThanTheNextArrival) {
+TEST(PacedInput, SilenceAdvancesAndIsNeverLaterThanTheNextArrival) {
   const Stamp last = kStart + milliseconds{60};
   Recording recording({kStart, last});
   PacedInput paced(recording, 1.0, SleepingClock::kClock);
@@ -443,7 +443,7 @@ TEST(PacedInput, SilenceTellsATimeThatRunsAndIsNeverLaterThanTheNextArrival) {
   EXPECT_LE(silences.back(), last);
 }
 
-TEST(PacedInput, JumpOfTheClockIsNotWaitedForAndThePaceGoesOnAfterIt) {
+TEST(PacedInput, ClockJumpIsSkippedAndThePaceContinues) {
   const Stamp later = kStart + hours{1};
   Recording recording({kStart, later, later + milliseconds{30}, kStart, kStart + milliseconds{30}});
   PacedInput paced(recording, 1.0, SleepingClock::kClock);

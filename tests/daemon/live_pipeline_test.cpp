@@ -120,7 +120,7 @@ Duration median_wall(std::vector<ProcessedSweep>::const_iterator begin,
   return walls[walls.size() / 2];
 }
 
-TEST(LivePipeline, GivesTheBitsOfOneThreadWhenNothingIsDropped) {
+TEST(LivePipeline, SameBitsAsOneThreadWithoutDrops) {
   const Config config = Drive::config();
   const std::vector<ProcessedSweep> expected = process_in_one_thread(config);
   DriveInput drive;
@@ -186,7 +186,7 @@ TEST(LivePipeline, OverloadDropsSweepsAndNeverMakesEstimatesOlder) {
 
 /// Blocks the odometry while sweeps arrive. Afterwards it processes the newest; all others are dropped and counted, and
 /// the following ones are processed one by one.
-TEST(LivePipeline, QueueIsBackWithTheFirstSweepAfterAnOverload) {
+TEST(LivePipeline, NewestSweepIsNextAfterAnOverloadAndNoneIsDroppedThen) {
   const Config config = Drive::config();
   DriveInput drive;
   MeteredInput input(drive);
@@ -218,7 +218,7 @@ TEST(LivePipeline, QueueIsBackWithTheFirstSweepAfterAnOverload) {
 }
 
 /// Inputs wait for this counter until a sweep is processed; its estimate must then be available.
-TEST(LivePipeline, EstimateOfASweepThatCountsAsProcessedIsThere) {
+TEST(LivePipeline, ProcessedSweepHasItsEstimateReady) {
   const Config config = Drive::config();
   DriveInput drive;
   test::PatientInput input(drive);
@@ -236,7 +236,7 @@ TEST(LivePipeline, EstimateOfASweepThatCountsAsProcessedIsThere) {
 }
 
 /// Purpose of the deadline: a registration that is too slow is cut short, and few sweeps are dropped.
-TEST(LivePipeline, RegistrationEndsAnIterationAfterItsDeadline) {
+TEST(LivePipeline, RegistrationStopsAnIterationAfterItsDeadline) {
   constexpr double kImpossible = 1e9; // every deadline is over before the registration starts
   DriveInput drive;
   test::PatientInput input(drive);
@@ -249,7 +249,7 @@ TEST(LivePipeline, RegistrationEndsAnIterationAfterItsDeadline) {
     EXPECT_LE(done.estimate.scan_to_submap.iterations, 1) << "sweep " << done.sequence;
 }
 
-TEST(LivePipeline, ConsumerThatFetchesNothingLosesEstimatesAndDelaysNobody) {
+TEST(LivePipeline, SlowConsumerLosesEstimatesAndDelaysNoThread) {
   const Config config = Drive::config();
   DriveInput drive;
   test::PatientInput input(drive);
@@ -280,7 +280,7 @@ TEST(LivePipeline, StopsInSilence) {
   EXPECT_EQ(pipeline.counters(), SweepCounters{});
 }
 
-TEST(LivePipeline, StopsInMidDriveAndAccountsForWhatItHasSeen) {
+TEST(LivePipeline, StopInMidDriveAccountsForEverySweep) {
   constexpr std::uint64_t kSeen = Drive::kSweeps / 2;
   DriveInput drive;
   MeteredInput input(drive);

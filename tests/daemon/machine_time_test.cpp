@@ -41,7 +41,7 @@ TEST(StageStopwatch, InnerStageIsNotChargedToTheOuter) {
   EXPECT_EQ(stopwatch.total(Stage::map), Duration::zero());
 }
 
-TEST(StageStopwatch, WhatIsDoneInAPauseBelongsToNoStage) {
+TEST(StageStopwatch, PauseIsChargedToNoStage) {
   StageStopwatch stopwatch(WorkingThread::clock);
   {
     const StageScope filter(&stopwatch, Stage::filter);
@@ -52,7 +52,7 @@ TEST(StageStopwatch, WhatIsDoneInAPauseBelongsToNoStage) {
   EXPECT_EQ(stopwatch.total(Stage::filter), milliseconds{10});
 }
 
-TEST(StageStopwatch, LapHoldsWhatWasSpentSinceTheLastOne) {
+TEST(StageStopwatch, LapReturnsTheTimeSinceTheLastOne) {
   StageStopwatch stopwatch(WorkingThread::clock);
   const auto work_in_filter_for = [&](Duration cpu) {
     const StageScope filter(&stopwatch, Stage::filter);
@@ -66,7 +66,7 @@ TEST(StageStopwatch, LapHoldsWhatWasSpentSinceTheLastOne) {
   EXPECT_EQ(lap[static_cast<std::size_t>(Stage::map)], Duration::zero());
 }
 
-TEST(StageStopwatch, VisitsThatAreNotTimedCountLikeThoseThatAre) {
+TEST(StageStopwatch, UntimedVisitsAreExtrapolated) {
   StageStopwatch stopwatch(WorkingThread::clock);
   for (int packet = 0; packet < 200; ++packet) {
     {
@@ -86,7 +86,7 @@ TEST(StageStopwatch, VisitsThatAreNotTimedCountLikeThoseThatAre) {
 }
 
 /// The default clock is that of the calling thread.
-TEST(StageStopwatch, CountsTheTimeOfItsOwnThread) {
+TEST(StageStopwatch, CountsTimeOfItsThreadOnly) {
   StageStopwatch stopwatch;
   const Duration before = read_clock(CLOCK_THREAD_CPUTIME_ID);
   {

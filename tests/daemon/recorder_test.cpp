@@ -51,7 +51,7 @@ std::filesystem::path fill_piece(CaptureRing& ring) {
   return *piece;
 }
 
-TEST(CaptureRing, OldestPiecesGoFirstWhicheverRunTheyAreOf) {
+TEST(CaptureRing, OldestPiecesOfAllRunsAreRemovedFirst) {
   const QuickFolder folder;
   CaptureRing first(folder / "record", kMaxBytes);
   std::vector<std::filesystem::path> pieces;
@@ -74,7 +74,7 @@ TEST(CaptureRing, OldestPiecesGoFirstWhicheverRunTheyAreOf) {
   EXPECT_FALSE(std::filesystem::exists(first.run())) << "none of its pieces is left";
 }
 
-TEST(CaptureRing, NothingElseIsTouched) {
+TEST(CaptureRing, OtherFilesAreNotTouched) {
   const QuickFolder folder;
   const std::filesystem::path record = folder / "record";
   std::filesystem::path run;
@@ -96,7 +96,7 @@ TEST(CaptureRing, NothingElseIsTouched) {
     EXPECT_TRUE(std::filesystem::exists(record / other / "000001/file"));
 }
 
-TEST(CaptureRing, LowerBoundThanBeforeIsKept) {
+TEST(CaptureRing, LoweredLimitIsEnforced) {
   const QuickFolder folder;
   CaptureRing large(folder / "record", 2 * kMaxBytes);
   for (int i = 0; i < 16; ++i)
@@ -106,7 +106,7 @@ TEST(CaptureRing, LowerBoundThanBeforeIsKept) {
   EXPECT_LE(small.bytes(), kMaxBytes);
 }
 
-TEST(CaptureRing, DiscardedPieceLeavesNothingBehind) {
+TEST(CaptureRing, DiscardedPieceLeavesNoFiles) {
   const QuickFolder folder;
   CaptureRing ring(folder / "record", kMaxBytes);
   ASSERT_TRUE(ring.begin_piece(kNow));
@@ -116,7 +116,7 @@ TEST(CaptureRing, DiscardedPieceLeavesNothingBehind) {
   EXPECT_TRUE(ring.begin_piece(kNow));
 }
 
-TEST(CaptureRing, DiskThatIsTooSmallIsNotEmptiedForNothing) {
+TEST(CaptureRing, TooSmallDiskIsNotEmptiedInVain) {
   const QuickFolder folder;
   CaptureRing ring(folder / "record", kMaxBytes);
   const std::filesystem::path piece = fill_piece(ring);
@@ -125,7 +125,7 @@ TEST(CaptureRing, DiskThatIsTooSmallIsNotEmptiedForNothing) {
   EXPECT_TRUE(std::filesystem::exists(piece));
 }
 
-TEST(CaptureRing, FolderThatWasRemovedIsMadeAgain) {
+TEST(CaptureRing, RemovedFolderIsCreatedAgain) {
   const QuickFolder folder;
   CaptureRing ring(folder / "record", kMaxBytes);
   for (int i = 0; i < 3; ++i)
@@ -137,7 +137,7 @@ TEST(CaptureRing, FolderThatWasRemovedIsMadeAgain) {
   EXPECT_LT(ring.bytes(), kMaxBytes / 10) << "what is gone takes no room";
 }
 
-TEST(CaptureRing, FolderThatCannotBeMadeIsAnError) {
+TEST(CaptureRing, FolderThatCannotBeCreatedIsAnError) {
   const QuickFolder folder;
   std::ofstream{folder / "plain"} << "a file";
   CaptureRing ring(folder / "plain/record", kMaxBytes);
@@ -205,7 +205,7 @@ bool is_same(const Datagram& a, const Datagram& b) {
 }
 
 /// Many pieces: no bit is lost between them.
-TEST(Recorder, EveryBitIsReadAgain) {
+TEST(Recorder, EveryBitIsReadBack) {
   const QuickFolder folder;
   Config config = recorded_config();
   config.record.max_bytes = 20'000'000;
@@ -245,7 +245,7 @@ TEST(Recorder, EveryBitIsReadAgain) {
 }
 
 /// Absurd samples of a broken driver must not make the rest unreadable.
-TEST(Recorder, AbsurdSamplesAreReadAgainOrLeftOut) {
+TEST(Recorder, AbsurdSamplesAreReadBackOrCountedUnfit) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   const Stamp now = stamp_from_ns(1'700'000'000'000'000'000);
   Config config = recorded_config();
@@ -286,7 +286,7 @@ TEST(Recorder, AbsurdSamplesAreReadAgainOrLeftOut) {
   EXPECT_GT(recorded.payloads[0].size(), velodyne::kDataPacketBytes) << "as no lidar sends them";
 }
 
-TEST(Recorder, WhatTheDiskIsTooSlowForIsDroppedAndCounted) {
+TEST(Recorder, InputsBeyondTheDiskRateAreDroppedAndCounted) {
   const QuickFolder folder;
   Recorder recorder(folder / "record", recorded_config(), {recorded_config().record.max_bytes});
   constexpr std::uint64_t kInputs = 4 * Recorder::kMaxUnwritten;
@@ -324,7 +324,7 @@ TEST(Recorder, LongDatagramsAreRecordedWhole) {
 }
 
 /// The input source needs the known lidars for its flood filter, whether or not everything is recorded.
-TEST(Recorder, TellsTheSourceOfTheLidars) {
+TEST(Recorder, UpdatesTheFilterOfTheSource) {
   struct Source : InputSource {
     const LidarRouter* told = nullptr;
     Input next(Duration /*timeout*/) override { return EndOfInput{}; }
@@ -338,7 +338,7 @@ TEST(Recorder, TellsTheSourceOfTheLidars) {
   EXPECT_EQ(source.told, &*lidars);
 }
 
-TEST(Recorder, NothingIsMadeBeforeTheFirstInput) {
+TEST(Recorder, CreatesNothingBeforeTheFirstInput) {
   const QuickFolder folder;
   Recorder recorder(folder / "record", recorded_config(), {recorded_config().record.max_bytes});
   for (const bool last : {false, false, true})
@@ -347,7 +347,7 @@ TEST(Recorder, NothingIsMadeBeforeTheFirstInput) {
 }
 
 /// Only the disk thread may allocate; here there is none.
-TEST(Recorder, TakingAllocatesNothing) {
+TEST(Recorder, RecordingAllocatesNothing) {
   if (!allocations())
     GTEST_SKIP() << "a sanitizer is in the way of counting";
   const QuickFolder folder;

@@ -18,7 +18,7 @@ Duration since_boot, wall_ahead; ///< clocks of the host
 
 Duration host_clock(clockid_t id) { return since_boot + (id == CLOCK_REALTIME ? wall_ahead : Duration::zero()); }
 
-class Steady : public testing::Test {
+class SteadyTimeTest : public testing::Test {
  protected:
   void SetUp() override {
     since_boot = seconds{100};
@@ -34,7 +34,7 @@ struct Case {
   Duration step, period, lag, jitter;
 };
 
-TEST_F(Steady, StampsAreThoseOfBeforeHoweverLittleTheClockIsSet) {
+TEST_F(SteadyTimeTest, StampsAreUnaffectedByStepsOfAnySize) {
   for (const Case& c : {Case{true, milliseconds{6}, milliseconds{5}, milliseconds{3}, milliseconds{1}},
                         {true, milliseconds{20}, milliseconds{10}, milliseconds{10}, milliseconds{3}},
                         {true, milliseconds{20}, milliseconds{20}, milliseconds{30}, milliseconds{5}},
@@ -79,7 +79,7 @@ TEST_F(Steady, StampsAreThoseOfBeforeHoweverLittleTheClockIsSet) {
   }
 }
 
-TEST_F(Steady, ArrivalFromBeforeTheStepThatIsReadAfterItIsOfItsTime) {
+TEST_F(SteadyTimeTest, ArrivalBeforeTheStepConvertsAfterIt) {
   for (const Duration step : {Duration{milliseconds{20}}, Duration{hours{1}}, Duration{-hours{1}}}) {
     SetUp();
     SteadyTime time(host_clock);
@@ -94,7 +94,7 @@ TEST_F(Steady, ArrivalFromBeforeTheStepThatIsReadAfterItIsOfItsTime) {
   }
 }
 
-TEST_F(Steady, ArrivalBetweenTheStepAndTheLookThatNoticesItIsOfItsTime) {
+TEST_F(SteadyTimeTest, ArrivalBetweenStepAndDetectionConverts) {
   for (const Duration step :
        {Duration{milliseconds{20}}, Duration{-milliseconds{20}}, Duration{hours{1}}, Duration{-hours{1}}}) {
     SetUp();
@@ -108,7 +108,7 @@ TEST_F(Steady, ArrivalBetweenTheStepAndTheLookThatNoticesItIsOfItsTime) {
   }
 }
 
-TEST_F(Steady, ClockThatIsSlewedIsNotSet) {
+TEST_F(SteadyTimeTest, SlewIsNoStep) {
   SteadyTime time(host_clock);
   for (int i = 0; i < 1000; ++i) {
     since_boot += milliseconds{2};

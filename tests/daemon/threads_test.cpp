@@ -20,7 +20,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-TEST(SpscRing, GivesBackInOrderAndIsEmptyThen) {
+TEST(SpscRing, PopsInOrderUntilEmpty) {
   SpscRing<int, 4> ring;
   EXPECT_TRUE(ring.empty());
   EXPECT_EQ(ring.pop(), std::nullopt);
@@ -32,7 +32,7 @@ TEST(SpscRing, GivesBackInOrderAndIsEmptyThen) {
   EXPECT_EQ(ring.pop(), std::nullopt);
 }
 
-TEST(SpscRing, FullRingRefusesAndKeepsWhatItHas) {
+TEST(SpscRing, FullRingRejectsPushAndPreservesItsValues) {
   SpscRing<int, 4> ring;
   for (int round = 0; round < 3; ++round) { // the slots wrap around
     for (int value = 0; value < 4; ++value)
@@ -45,7 +45,7 @@ TEST(SpscRing, FullRingRefusesAndKeepsWhatItHas) {
   }
 }
 
-TEST(SpscRing, WhatIsPushedByOneThreadComesOutOnceWholeAndInOrderInAnother) {
+TEST(SpscRing, ValuesCrossThreadsOnceWholeAndInOrder) {
   constexpr std::uint64_t kValues = 300'000;
   using Value = std::array<std::uint64_t, 4>;
   SpscRing<Value, 16> ring;
@@ -70,7 +70,7 @@ TEST(SpscRing, WhatIsPushedByOneThreadComesOutOnceWholeAndInOrderInAnother) {
   EXPECT_TRUE(ring.empty());
 }
 
-TEST(LatestSlot, IsEmptyBeforeTheFirstValueAndAfterEachTake) {
+TEST(LatestSlot, IsEmptyBeforeTheFirstValueAndAfterEachPoll) {
   LatestSlot<int> slot;
   EXPECT_EQ(slot.poll(), nullptr);
   slot.back() = 7;
@@ -81,7 +81,7 @@ TEST(LatestSlot, IsEmptyBeforeTheFirstValueAndAfterEachTake) {
   EXPECT_EQ(slot.poll(), nullptr);
 }
 
-TEST(LatestSlot, NewestOfThreeWinsAndTheOthersAreReportedDropped) {
+TEST(LatestSlot, PollReturnsTheNewestAndPublishReportsDrops) {
   LatestSlot<int> slot;
   slot.back() = 1;
   EXPECT_FALSE(slot.publish());
@@ -96,7 +96,7 @@ TEST(LatestSlot, NewestOfThreeWinsAndTheOthersAreReportedDropped) {
   EXPECT_FALSE(slot.publish()) << "3 was taken, nothing was dropped";
 }
 
-TEST(LatestSlot, TakenValueStaysWhileTheProducerGoesOn) {
+TEST(LatestSlot, PolledValueIsUnchangedByLaterPublications) {
   LatestSlot<int> slot;
   slot.back() = 1;
   ASSERT_FALSE(slot.publish());
@@ -110,7 +110,7 @@ TEST(LatestSlot, TakenValueStaysWhileTheProducerGoesOn) {
 }
 
 /// A torn value would contain words of two values.
-TEST(LatestSlot, ConsumerSeesWholeValuesInOrderAndEveryOneIsTakenOrDropped) {
+TEST(LatestSlot, ValuesCrossThreadsWholeAndInOrderAndEachIsPolledOrDropped) {
   constexpr std::uint64_t kValues = 300'000;
   LatestSlot<std::array<std::uint64_t, 32>> slot;
   std::uint64_t dropped = 0;
@@ -150,7 +150,7 @@ TEST(Wakeup, WaitEndsAtItsTimeout) {
   EXPECT_GE(time_of([&] { wakeup.wait_for(milliseconds{20}); }), milliseconds{20});
 }
 
-TEST(Wakeup, NotificationBeforeTheWaitIsUsedOnce) {
+TEST(Wakeup, NotificationBeforeTheWaitEndsOneWait) {
   Wakeup wakeup;
   wakeup.notify();
   EXPECT_LT(time_of([&] { wakeup.wait_for(test::patience()); }), test::patience());
@@ -158,7 +158,7 @@ TEST(Wakeup, NotificationBeforeTheWaitIsUsedOnce) {
 }
 
 /// A thousand notifications while the consumer is busy cause one wake-up, not a thousand.
-TEST(Wakeup, NotificationsThatCameTogetherEndOneWait) {
+TEST(Wakeup, CoalescedNotificationsEndOneWait) {
   Wakeup wakeup;
   for (int i = 0; i < 1000; ++i)
     wakeup.notify();
@@ -166,7 +166,7 @@ TEST(Wakeup, NotificationsThatCameTogetherEndOneWait) {
   EXPECT_GE(time_of([&] { wakeup.wait_for(milliseconds{20}); }), milliseconds{20});
 }
 
-TEST(Wakeup, AnotherThreadEndsTheWait) {
+TEST(Wakeup, NotificationFromAnotherThreadEndsTheWait) {
   Wakeup wakeup;
   std::thread other([&] {
     std::this_thread::sleep_for(milliseconds{20});
@@ -186,7 +186,7 @@ template <class Condition> bool comes_true(const Condition& condition) {
   return condition();
 }
 
-TEST(Worker, DoesARoundAfterEachNotificationThatItSleepsThrough) {
+TEST(Worker, RunsARoundAfterEachNotification) {
   std::atomic<int> rounds{0};
   Worker worker("test", kLong, [&](bool /*last*/) { ++rounds; });
   for (int notified = 1; notified <= 3; ++notified) {
@@ -195,13 +195,13 @@ TEST(Worker, DoesARoundAfterEachNotificationThatItSleepsThrough) {
   }
 }
 
-TEST(Worker, DoesARoundEachPeriodThoughNobodyNotifies) {
+TEST(Worker, RunsARoundEachPeriodWithoutNotification) {
   std::atomic<int> rounds{0};
   const Worker worker("test", milliseconds{5}, [&](bool /*last*/) { ++rounds; });
   EXPECT_TRUE(comes_true([&] { return rounds >= 3; })) << rounds;
 }
 
-TEST(Worker, BeginsInItsOwnThreadBeforeTheFirstRound) {
+TEST(Worker, CallsBeginInItsThreadBeforeTheFirstRound) {
   std::atomic<std::thread::id> began;
   std::atomic<bool> began_first{false};
   {
@@ -214,7 +214,7 @@ TEST(Worker, BeginsInItsOwnThreadBeforeTheFirstRound) {
 }
 
 /// Items handed over before the stop are processed.
-TEST(Worker, DoesALastRoundWhenItIsDestroyedWithoutWaitingForThePeriod) {
+TEST(Worker, DestructorRunsALastRoundAtOnce) {
   std::atomic<int> handed_over{0}, seen{0};
   std::atomic<bool> is_told{false};
   const auto began = std::chrono::steady_clock::now();

@@ -10,7 +10,7 @@
 namespace locus::daemon {
 namespace {
 
-TEST(RosNode, LiesWhereItsTopicsLie) {
+TEST(RosNode, HasTheNamespaceOfItsTopics) {
   EXPECT_EQ(ros_node("/locus", "").name_space, "/");
   EXPECT_EQ(ros_node("/robot_7/locus", "").name_space, "/robot_7");
   EXPECT_EQ(ros_node("/site/robot_7/locus", "").name_space, "/site/robot_7");
@@ -25,7 +25,7 @@ TEST(RosNode, HasTheNameOfTheServiceAndOfItsInstance) {
 }
 
 /// systemd allows letters, digits and :-_.\ in the name of an instance.
-TEST(RosNode, OfEachInstanceHasALegalNameOfItsOwn) {
+TEST(RosNode, NameOfEachInstanceIsUniqueAndValid) {
   std::set<std::string> names;
   std::size_t count = 0;
   for (const char* instance : {"a-b", "a_b", "a.b", "a:b", "a\\x2db", "a_x2db", "a_x5fx2db", "a__x2db", "a_-b", "a-_b",

@@ -86,7 +86,7 @@ struct CloudTopic {
   std::string frame = "lidar";
 };
 
-TEST(CloudTopic, CountsAllThatCameBetweenTwoLooks) {
+TEST(CloudTopic, CountsAllMessagesBetweenTwoCalls) {
   for (const auto& [qos, counted] : {std::pair{TopicQos::cloud_count(), 12}, {TopicQos::cloud_in(), 1}}) {
     CloudTopic topic(qos);
     ASSERT_TRUE(eventually([&] { return topic.writer.has_readers(); }));
@@ -99,7 +99,7 @@ TEST(CloudTopic, CountsAllThatCameBetweenTwoLooks) {
 }
 
 /// take() terminates even if messages keep arriving, here one during each callback.
-TEST(CloudTopic, TakingComesToAnEnd) {
+TEST(CloudTopic, TakeTerminatesUnderConstantTraffic) {
   constexpr int kGiveUp = 1000;
   for (const TopicQos qos : {TopicQos::cloud_count(), TopicQos::cloud_in()}) {
     CloudTopic topic(qos);
@@ -135,7 +135,7 @@ class Peers : public testing::TestWithParam<const char*> {
   Inbox inbox_;
 };
 
-TEST_P(Peers, HearOdometryStateTransformCloudAndDiagnostics) {
+TEST_P(Peers, ReceiveOdometryStateTransformCloudAndDiagnostics) {
   test::Child listener(peer("listen"));
   RosLink link(config_, inbox_.sink());
   const std::vector<CloudMessage::Point> points(2'000, {1, 2, 3, 4, 0, 5, 0}); // more needs larger socket buffers
@@ -172,7 +172,7 @@ TEST_P(Peers, HearOdometryStateTransformCloudAndDiagnostics) {
   EXPECT_EQ(listener.lines_of("diagnostics").back(), "2 1 locusd");
 }
 
-TEST_P(Peers, WhoComeLaterHearHowItBeganAndTheMapOnce) {
+TEST_P(Peers, LateSubscribersReceiveBeginningAndMapOnce) {
   const std::vector<CloudMessage::Point> points(100, {1, 2, 3, 0, 0, 0, 0});
   RosLink link(config_, inbox_.sink());
   ASSERT_TRUE(eventually([&] {
@@ -186,7 +186,7 @@ TEST_P(Peers, WhoComeLaterHearHowItBeganAndTheMapOnce) {
   EXPECT_EQ(listener.lines_of("beginning"), std::vector<std::string>{"1 1 locusd: beginning"});
 }
 
-TEST_P(Peers, AreHeardInOrderWithEveryFigure) {
+TEST_P(Peers, SamplesArriveInOrderWithEveryFigure) {
   RosLink link(config_, inbox_.sink());
   test::Child talker(peer("talk"));
   EXPECT_TRUE(eventually([&] {
@@ -250,7 +250,7 @@ HeardNode heard_node(const test::Child& peer) {
 }
 
 /// Both message layouts; peers that start before the node, and after it.
-TEST_P(Peers, SeeOneNodeWhoseEndpointsAreThoseOfItsParticipant) {
+TEST_P(Peers, ListOneNodeWithAllEndpoints) {
   for (const auto& [graph, word] : {std::pair{RosGraph::iron, "iron"}, std::pair{RosGraph::humble, "humble"}}) {
     config_.dds.ros_graph = graph;
     const test::Child early(peer(word));
@@ -279,7 +279,7 @@ TEST_P(Peers, SeeOneNodeWhoseEndpointsAreThoseOfItsParticipant) {
   }
 }
 
-TEST_P(Peers, SeeNoNodeWhereItIsOff) {
+TEST_P(Peers, ListNoNodeIfTheGraphIsOff) {
   config_.dds.ros_graph = RosGraph::off;
   auto link = std::make_unique<RosLink>(config_, inbox_.sink());
   const test::Child listener(peer("iron"));
@@ -297,7 +297,7 @@ INSTANTIATE_TEST_SUITE_P(Dds, Peers, testing::Values(CYCLONE_PEER, FAST_DDS_PEER
 });
 
 /// Two publishers on a source's topic would look like one that jumps: the first owns it until it disappears.
-TEST(RosLink, TopicBelongsToTheFirstPublisherUntilItGoes) {
+TEST(RosLink, TopicBelongsToTheFirstPublisherUntilItLeaves) {
   const test::DdsDomain domain;
   Inbox inbox;
   RosLink link(config_in(domain), inbox.sink());
@@ -342,7 +342,7 @@ TEST(RosLink, ManyWritersDoNotHideTheOwner) {
 }
 
 /// Robots are distinguished by prefix or by domain. Each publishes a position of its own.
-TEST(RosLink, RobotsOnOneNetworkAreToldApart) {
+TEST(RosLink, RobotsOnOneNetworkAreSeparate) {
   const test::DdsDomain domain, other_domain;
   RosLink robot(config_in(domain), [](const RosInput&) {}), other(config_in(other_domain), [](const RosInput&) {});
   const auto peer_of = [](const test::DdsDomain& d, const char* prefix) {
@@ -364,7 +364,7 @@ TEST(RosLink, RobotsOnOneNetworkAreToldApart) {
   EXPECT_TRUE(hears_none.lines_of("odometry").empty());
 }
 
-TEST(RosLink, WithoutItsInterfaceGoesOnTryingAndSaysWhichOne) {
+TEST(RosLink, MissingInterfaceIsNamedAndRetried) {
   const test::DdsDomain domain;
   Config config = config_in(domain);
   config.dds.interface = "nowhere7";
@@ -377,7 +377,7 @@ TEST(RosLink, WithoutItsInterfaceGoesOnTryingAndSaysWhichOne) {
   EXPECT_TRUE(eventually([&] { return link.progress() > before; })) << "waiting is no standstill";
 }
 
-TEST(RosLink, WithNothingToHearSleeps) {
+TEST(RosLink, IdleLinkUsesNoCpu) {
   const test::DdsDomain domain;
   Config config = config_in(domain);
   config.motion_sources.clear();

@@ -55,7 +55,7 @@ TEST(RosMessages, ImuBecomesASampleInTheSensorsFrame) {
   EXPECT_EQ(sample.attitude->w(), 1.0);
 }
 
-TEST(RosMessages, ImuWithoutAttitudeSaysSoInOneOfThreeWays) {
+TEST(RosMessages, ImuWithoutAttitudeIsRecognisedInThreeForms) {
   ros::Imu declared = resting_imu();
   declared.orientation_covariance_[0] = -1.0;
   ros::Imu zero = resting_imu();
@@ -66,7 +66,7 @@ TEST(RosMessages, ImuWithoutAttitudeSaysSoInOneOfThreeWays) {
     EXPECT_FALSE(to_sample(imu, kArrival).attitude);
 }
 
-TEST(RosMessages, NotANumberIsPassedOnToWhoeverCountsIt) {
+TEST(RosMessages, NotANumberIsPassedOn) {
   ros::Imu imu = resting_imu();
   imu.angular_velocity_.y_ = kNan;
   EXPECT_TRUE(std::isnan(to_sample(imu, kArrival).angular_velocity_radps.y()));
@@ -78,7 +78,7 @@ TEST(RosMessages, NotANumberIsPassedOnToWhoeverCountsIt) {
   EXPECT_EQ(to_sample(odometry, kArrival, usual).T_source_base.rotation.norm(), 0.0) << "no rotation at all";
 }
 
-TEST(RosMessages, QuaternionThatIsNoRotationStaysWhatItIs) {
+TEST(RosMessages, InvalidQuaternionIsPassedOn) {
   UsualCovariance usual;
   ros::Odometry odometry = odometry_at(1.0);
   odometry.pose_.pose_.orientation_ = {0.0, 0.0, 0.3, 0.0}; // w is missing
@@ -90,13 +90,13 @@ TEST(RosMessages, QuaternionThatIsNoRotationStaysWhatItIs) {
   EXPECT_FALSE(to_sample(imu, kArrival).attitude);
 }
 
-TEST(RosMessages, AnyBitsOfAStampAreAnInstant) {
+TEST(RosMessages, AnyBitsOfAStampConvert) {
   EXPECT_EQ(to_ns(to_stamp({-1, 0})), -1'000'000'000);
   EXPECT_EQ(to_ns(to_stamp({2'147'483'647, 4'294'967'295U})), 2'147'483'647'000'000'000 + 4'294'967'295);
   EXPECT_EQ(to_ns(to_stamp({-2'147'483'648, 0})), -2'147'483'648'000'000'000);
 }
 
-TEST(RosMessages, StampsGoThereAndBack) {
+TEST(RosMessages, StampsConvertBothWays) {
   for (const std::int64_t ns : {0LL, 1LL, -1LL, 1'700'000'000'999'999'999LL, -1'500'000'000LL}) {
     const ros::Time time = to_ros(stamp_from_ns(ns));
     EXPECT_LT(time.nanosec_, 1'000'000'000U);
@@ -120,14 +120,14 @@ class UsualCovarianceTest : public testing::Test {
   Stamp now_ = kArrival;
 };
 
-TEST_F(UsualCovarianceTest, TellsHowMuchWorseThanUsual) {
+TEST_F(UsualCovarianceTest, ScaleIsTheRatioToTheUsual) {
   for (int i = 0; i < 100; ++i)
     EXPECT_NEAR(scale(1e-4), 1.0, 1e-9);
   EXPECT_NEAR(scale(1e-3), 10.0, 0.5);
   EXPECT_NEAR(scale(1e-4), 1.0, 0.1);
 }
 
-TEST_F(UsualCovarianceTest, WhatIsUnknownIsAsUsual) {
+TEST_F(UsualCovarianceTest, UnknownCovarianceIsUsual) {
   for (const double unknown : {0.0, kNan, -1.0, 1e3, 1e6, 1e12, 1e308, std::numeric_limits<double>::max(),
                                std::numeric_limits<double>::infinity()})
     EXPECT_EQ(scale(unknown), 1.0) << unknown;
@@ -161,7 +161,7 @@ TEST_F(UsualCovarianceTest, AtRestAndInMotionAreNotCompared) {
 }
 
 /// Some drivers leave the twist zero and report a pose only.
-TEST_F(UsualCovarianceTest, MotionIsSeenInThePoseAsWell) {
+TEST_F(UsualCovarianceTest, MotionIsDetectedInThePoseToo) {
   ros::Odometry message = odometry_at(0.0);
   const auto scale_at = [&](double x_m, double variance) {
     message.header_.stamp_ = to_ros(now_ += std::chrono::milliseconds{20});
@@ -176,13 +176,13 @@ TEST_F(UsualCovarianceTest, MotionIsSeenInThePoseAsWell) {
 }
 
 /// A visual odometry that loses track reports huge variances on every axis.
-TEST_F(UsualCovarianceTest, AnOdometryThatNoLongerKnowsAnythingIsWorseThanUsual) {
+TEST_F(UsualCovarianceTest, LossOfAllVariancesIsWorseThanUsual) {
   for (int i = 0; i < 100; ++i)
     scale(1e-4);
   EXPECT_EQ(scale(1e6), std::numeric_limits<double>::infinity());
 }
 
-TEST_F(UsualCovarianceTest, WhatStaysUnusualBecomesUsual) {
+TEST_F(UsualCovarianceTest, LastingChangeBecomesUsual) {
   for (const double lasting : {1.0, 1e9}) {
     usual_ = {};
     for (int i = 0; i < 100; ++i)
@@ -217,7 +217,7 @@ TEST(RosMessages, EstimateBecomesOdometryWithFramesAndBothCovariances) {
   EXPECT_EQ(message.twist_.twist_.angular_.z_, 6.0);
 }
 
-TEST(CloudMessage, HoldsPointsAsItsFieldsSay) {
+TEST(CloudMessage, LayoutMatchesItsFields) {
   CloudMessage cloud;
   const std::vector<CloudMessage::Point> points{{1, 2, 3, 40, -0.05F, 7, 1}, {4, 5, 6, 50, 0, 15, 0}};
   const std::string frame = "base_link";

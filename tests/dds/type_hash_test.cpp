@@ -150,12 +150,12 @@ std::string ros_type(const std::string& dds_type) {
 }
 
 /// Reference printed by ROS 2 itself for this type.
-TEST(TypeHash, OfThisTestIsThatOfRos) {
+TEST(TypeHash, MatchesRos) {
   EXPECT_EQ(type_hash("std_msgs/msg/Header"),
             "RIHS01_f49fb3ae2cf070f793645ff749683ac6b06203e41c891e17701b1cb597ce6a01");
 }
 
-class SeenTypes : public testing::TestWithParam<const char*> {
+class DiscoveredTypes : public testing::TestWithParam<const char*> {
  protected:
   /// Waits for this number of endpoints, each of which must announce the hash of its type.
   void expect_hashes(std::size_t endpoints, const std::set<std::string>& types) const {
@@ -181,7 +181,7 @@ class SeenTypes : public testing::TestWithParam<const char*> {
   test::Child peer_{{GetParam(), std::to_string(domain_.number()), "iron", "/locus"}};
 };
 
-TEST_P(SeenTypes, OfTheServiceHaveTheHashesOfRos) {
+TEST_P(DiscoveredTypes, OfTheServiceHaveTheHashesOfRos) {
   Config config;
   config.dds.domain = domain_.number();
   config.dds.publish_tf = config.dds.publish_cloud = config.dds.publish_map = true;
@@ -192,7 +192,7 @@ TEST_P(SeenTypes, OfTheServiceHaveTheHashesOfRos) {
                      "rmw_dds_common/msg/ParticipantEntitiesInfo"});
 }
 
-TEST_P(SeenTypes, OfTheClockHasTheHashOfRos) {
+TEST_P(DiscoveredTypes, OfTheClockHaveTheHashOfRos) {
   DdsOptions options;
   options.domain = domain_.number();
   const auto node = DdsNode::open(options);
@@ -201,7 +201,7 @@ TEST_P(SeenTypes, OfTheClockHasTheHashOfRos) {
   expect_hashes(1, {"rosgraph_msgs/msg/Clock"});
 }
 
-INSTANTIATE_TEST_SUITE_P(Dds, SeenTypes, testing::Values(CYCLONE_PEER, FAST_DDS_PEER), [](const auto& peer) {
+INSTANTIATE_TEST_SUITE_P(Dds, DiscoveredTypes, testing::Values(CYCLONE_PEER, FAST_DDS_PEER), [](const auto& peer) {
   return std::string(peer.param).find("fast") == std::string::npos ? "Cyclone" : "FastDds";
 });
 

@@ -56,7 +56,7 @@ class Listener {
 };
 
 /// Its packets exceed an Ethernet frame, and their format is known only from the metadata.
-TEST(PacketSender, SendsAnOustersPacketsWholeAndAtTheirNewTime) {
+TEST(PacketSender, SendsOusterPacketsWholeWithShiftedTime) {
   const Listener listener;
   sim::SyntheticLidarOptions sensor_options;
   sensor_options.model = sim::OusterModel::os1_32;

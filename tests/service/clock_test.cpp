@@ -57,7 +57,7 @@ class HostClock : public RobotNetwork {
   }
 };
 
-TEST_F(HostClock, ThatIsSetBackAndForwardLeavesEveryListenerItsOdometry) {
+TEST_F(HostClock, StepsInterruptNoSubscriber) {
   const std::filesystem::path drive = plant();
   Child daemon(locusd_with_clock(drive / "config.yaml"));
   const Child cyclone({CYCLONE_PEER, "0", "listen", "/locus"});
@@ -77,7 +77,7 @@ TEST_F(HostClock, ThatIsSetBackAndForwardLeavesEveryListenerItsOdometry) {
 }
 
 /// Real time: nothing that the sensors sent is missing, and the path equals the replay's.
-TEST_F(HostClock, ThatIsSetBackAndForwardCostsNoPacketAndNoSource) {
+TEST_F(HostClock, StepsLoseNoPacketAndNoSource) {
   const std::filesystem::path drive = plant();
   Child daemon(locusd_with_clock(drive / "config.yaml"));
   const Child cyclone({CYCLONE_PEER, "0", "listen", "/locus"});
@@ -95,7 +95,7 @@ TEST_F(HostClock, ThatIsSetBackAndForwardCostsNoPacketAndNoSource) {
 }
 
 /// The same on a clock that the player moves.
-TEST_F(HostClock, ThatIsSetBackAndForwardLosesNoInputOfADriveThatWaits) {
+TEST_F(HostClock, StepsLoseNoInputOfAHeldDrive) {
   const std::filesystem::path drive = plant();
   const Child daemon(led_locusd(drive / "config.yaml"));
   const Child cyclone({CYCLONE_PEER, "0", "listen", "/locus"});
@@ -120,7 +120,7 @@ TEST_F(HostClock, ThatIsSetBackAndForwardLosesNoInputOfADriveThatWaits) {
 }
 
 /// No traffic: no message wakes the waiting threads.
-TEST_F(HostClock, ThatIsSetBackWhileNothingComesLeavesTheWatchdogFed) {
+TEST_F(HostClock, StepBackWithoutInputLeavesTheWatchdogFed) {
   NotifySocket systemd(file("notify"));
   setenv("WATCHDOG_USEC", "600000", 1); // NOLINT(concurrency-mt-unsafe)
   Child daemon(locusd_with_clock(config()));

@@ -24,7 +24,7 @@ class LiveClouds : public RobotNetwork {
 class LiveCloudsOf : public LiveClouds, public testing::WithParamInterface<const char*> {};
 
 /// Every cloud that reaches the service is used, none is rejected, and the robot stands.
-TEST_P(LiveCloudsOf, AreUsedAsTheyCome) {
+TEST_P(LiveCloudsOf, AreUsedOnArrival) {
   const Child daemon(locusd(written(kConfig)));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   const Child peer({GetParam(), "0", "clouds", "/locus"});
@@ -50,7 +50,7 @@ TEST_P(LiveCloudsOf, AreUsedAsTheyCome) {
 }
 
 /// Depends on the speed of the machine.
-TEST_P(LiveCloudsOf, AreAsManyAsWerePublished) {
+TEST_P(LiveCloudsOf, MatchThePublishedNumber) {
   const Child daemon(locusd(written(kConfig)));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   const Child peer({GetParam(), "0", "clouds", "/locus"});
@@ -67,13 +67,13 @@ TEST_P(LiveCloudsOf, AreAsManyAsWerePublished) {
 INSTANTIATE_TEST_SUITE_P(Peers, LiveCloudsOf, testing::Values(CYCLONE_PEER, FAST_DDS_PEER),
                          [](const auto& tested) { return std::string{tested.index == 0 ? "Cyclone" : "FastDds"}; });
 
-TEST_F(LiveClouds, DriverThatIsMissingIsNamed) {
+TEST_F(LiveClouds, MissingDriverIsReported) {
   Child daemon(locusd(written(kConfig)));
   EXPECT_TRUE(daemon.wait_for_line("lidar top: no cloud on topic /points for 5 s"));
 }
 
 /// No wait for clouds is indefinite, and a publisher that returns is received.
-TEST_F(LiveClouds, DriverThatIsRestartedIsHeardAgain) {
+TEST_F(LiveClouds, RestartedDriverIsReceivedAgain) {
   Child daemon(locusd(written(kConfig)));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   const auto used = [&] { return status()["lidars"]["top"]["clouds"]["used"].get<int>(); };

@@ -24,7 +24,7 @@
 namespace locus::daemon {
 namespace {
 
-TEST(ControlRequest, IsWhatLocusctlSends) {
+TEST(ControlRequest, ParsesWhatLocusctlSends) {
   const auto is = [](const char* message, auto kind) {
     const auto request = parse_control_request(message);
     return request && std::holds_alternative<decltype(kind)>(*request);
@@ -50,7 +50,7 @@ TEST(ControlRequest, IsWhatLocusctlSends) {
   EXPECT_NEAR(to_rpy_rad(T_odom_base.rotation).z() / kRadPerDeg, 90, 1e-9);
 }
 
-TEST(ControlRequest, WhatLacksSomethingIsNone) {
+TEST(ControlRequest, IncompleteRequestIsRejected) {
   for (const char* message :
        {"", "{", "[]", "7", "null", "\xff", "{}", R"({"command": 7})", R"({"command": null})",
         R"({"command": "flat-ground"})", R"({"command": "flat-ground", "mode": 1})", R"({"command": "record"})",
@@ -65,14 +65,14 @@ TEST(ControlRequest, WhatLacksSomethingIsNone) {
             "flat-ground must be on, off or auto");
 }
 
-TEST(ControlRequest, WhatToKeepIsWithinLimits) {
+TEST(ControlRequest, LengthToKeepIsWithinLimits) {
   for (const char* keep_s : {"0", "-1", "0.99", "600.1", "1e300"})
     EXPECT_EQ(error_of(parse_control_request(R"({"command": "record", "keep_s": )" + std::string(keep_s) + "}")),
               "the length to keep must be 1s to 600s")
         << keep_s;
 }
 
-TEST(ControlRequest, PoseIsOneThatARobotCanHave) {
+TEST(ControlRequest, PoseIsWithinLimits) {
   for (const char* pose : {"[1e300, 0, 0, 0, 0, 0]", "[0, -500001, 0, 0, 0, 0]", "[0, 0, 0, 0, 0, 361]"})
     EXPECT_TRUE(contains(error_of(parse_control_request(R"({"command": "reset", "pose": )" + std::string(pose) + "}")),
                          "the pose must lie within 500000 m and 360 degrees"))
@@ -80,7 +80,7 @@ TEST(ControlRequest, PoseIsOneThatARobotCanHave) {
 }
 
 /// A server driven by the test, and its clients.
-class ControlOnCall : public testing::Test {
+class ControlServerTest : public testing::Test {
  protected:
   void SetUp() override {
     ASSERT_EQ(chmod(path_.parent_path().c_str(), 0755), 0);
@@ -128,7 +128,7 @@ class ControlOnCall : public testing::Test {
 };
 
 /// The caller of serve() pauses after it, so that requests cost at most this many answers per round.
-TEST_F(ControlOnCall, AnswersEachOfSixteenOnceARound) {
+TEST_F(ControlServerTest, AnswersEachOfSixteenClientsOncePerRound) {
   std::vector<Descriptor> clients;
   for (std::size_t i = 0; i < ControlServer::kMaxClients; ++i) {
     clients.push_back(connected());
@@ -148,7 +148,7 @@ TEST_F(ControlOnCall, AnswersEachOfSixteenOnceARound) {
   EXPECT_TRUE(contains(answer(one_more).value_or(""), "too many clients"));
 }
 
-TEST_F(ControlOnCall, HasRoomForWhoMayCommandAmongAnyNumberOfStrangers) {
+TEST_F(ControlServerTest, UnprivilegedClientsDoNotBlockPrivilegedOnes) {
   if (geteuid() != 0)
     GTEST_SKIP() << "no second user to be: run as root";
   std::vector<Descriptor> strangers;

@@ -85,7 +85,7 @@ void expect_watch_ends(const std::vector<std::string>& command, const std::strin
   EXPECT_EQ(terminal.overflows(), 0);
 }
 
-TEST_F(Control, WatchFillsATerminalOf80By24AndLeavesItAsItWas) {
+TEST_F(Control, WatchFillsATerminalOf80By24AndRestoresIt) {
   Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   const Child play({LOCUS_PLAY, capture().string()});
@@ -94,7 +94,7 @@ TEST_F(Control, WatchFillsATerminalOf80By24AndLeavesItAsItWas) {
   expect_watch_ends(watch(), "\x03");
 }
 
-TEST_F(Control, WatchOutlivesTheService) {
+TEST_F(Control, WatchContinuesWithoutTheService) {
   Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   Terminal terminal(watch());
@@ -113,7 +113,7 @@ TEST_F(Control, WatchWithoutATerminalIsWrongUsage) {
   EXPECT_EQ(run.out, "");
 }
 
-TEST_F(Control, StatusTellsWhoWasAlwaysSilent) {
+TEST_F(Control, StatusShowsSensorsThatWereNeverReceived) {
   Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   EXPECT_TRUE(status()["lidars"].front()["heard_ms_ago"].is_null());
@@ -136,7 +136,7 @@ TEST_F(Control, StatusKeepsItsColumnsWhileALidarSynchronises) {
   EXPECT_TRUE(said);
 }
 
-TEST_F(Control, StrangersMayLookAndNotTouch) {
+TEST_F(Control, UnprivilegedUsersMayOnlyQueryTheStatus) {
   if (geteuid() != 0)
     GTEST_SKIP() << "no second user to be: run as root";
   Child daemon(locusd(config()));
@@ -222,7 +222,7 @@ class Pest {
   std::array<std::thread, 4> threads_;
 };
 
-TEST_F(Control, StrangersWhoAskWithoutEndKeepNobodyOut) {
+TEST_F(Control, UnprivilegedRequestFloodBlocksNoPrivilegedClient) {
   if (geteuid() != 0)
     GTEST_SKIP() << "no second user to be: run as root";
   const Child daemon(locusd(config()));
@@ -242,7 +242,7 @@ TEST_F(Control, StrangersWhoAskWithoutEndKeepNobodyOut) {
 
 /// The cost of strangers is compared with that of the odometry on the same machine. Their rate is bounded by time, and
 /// holds on any machine.
-TEST_F(Control, StrangersWhoAskWithoutEndCostLittle) {
+TEST_F(Control, UnprivilegedRequestFloodCostsLittle) {
   if (geteuid() != 0)
     GTEST_SKIP() << "no second user to be: run as root";
   Child daemon(locusd(config()));
@@ -274,7 +274,7 @@ TEST_F(Control, StrangersWhoAskWithoutEndCostLittle) {
 }
 
 /// The service is a named instance, and its group exists only in this test.
-TEST_F(Control, MembersOfTheGroupMayCommandAnInstanceByItsName) {
+TEST_F(Control, GroupMembersControlAnInstanceByItsName) {
   if (unshare(CLONE_NEWNS) != 0 || mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
       mount("tmpfs", "/run", "tmpfs", 0, nullptr) != 0)
     GTEST_SKIP() << "no file system of one's own: run as root";
@@ -297,7 +297,7 @@ TEST_F(Control, MembersOfTheGroupMayCommandAnInstanceByItsName) {
   umount2("/run", MNT_DETACH);
 }
 
-TEST_F(Control, SensorsAreFoundWithoutAServiceAndByAnybody) {
+TEST_F(Control, SensorsNeedsNeitherServiceNorPrivilege) {
   if (geteuid() != 0)
     GTEST_SKIP() << "no second user to be: run as root";
   const Child play({LOCUS_PLAY, capture().string()});
@@ -309,7 +309,7 @@ TEST_F(Control, SensorsAreFoundWithoutAServiceAndByAnybody) {
 }
 
 /// A stand-in for a service whose disk is slower than the timeout of a status request.
-TEST_F(Control, WhatTheServiceMayWaitForADiskForIsWaitedForLonger) {
+TEST_F(Control, DiskBoundRequestsHaveALongerTimeout) {
   std::filesystem::create_directories(control().parent_path());
   const int service = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
   sockaddr_un address{AF_UNIX, {}};
@@ -328,7 +328,7 @@ TEST_F(Control, WhatTheServiceMayWaitForADiskForIsWaitedForLonger) {
   close(service);
 }
 
-TEST_F(Control, MistypedWordsNameTheNearestThatExists) {
+TEST_F(Control, MistypedWordsSuggestTheNearest) {
   const auto refused = [](const ProgramRun& run, const std::string& words) {
     EXPECT_EQ(run.status, 2) << run.err;
     EXPECT_NE(run.err.find(words), std::string::npos) << run.err;

@@ -31,7 +31,7 @@ class DdsSecurity : public RobotNetwork {
 
 /// A permitted participant exchanges data with the robot. Meanwhile participants without credentials, with those of
 /// another authority, or without permission neither receive nor are received.
-TEST_F(DdsSecurity, WhoHasNoCredentialsNeitherHearsNorIsHeard) {
+TEST_F(DdsSecurity, PeerWithoutCredentialsNeitherReceivesNorIsReceived) {
   const std::filesystem::path ours = enclaves("ours"), theirs = enclaves("theirs");
   Child daemon(locusd(secured(ours / "locusd")));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up")) << testing::PrintToString(daemon.lines());
@@ -71,7 +71,7 @@ TEST_F(DdsSecurity, ViewerSeesTheNode) {
 }
 
 /// An enclave from before the service had a ROS node: no permission for ros_discovery_info.
-TEST_F(DdsSecurity, WithoutPermissionForItsNodeAllElseGoesOn) {
+TEST_F(DdsSecurity, WithoutPermissionForTheGraphTheRestWorks) {
   const std::filesystem::path old = file("old.sh");
   std::string script = read_text(DDS_SECURITY);
   const std::string node = "/diagnostics ros_discovery_info";
@@ -85,7 +85,7 @@ TEST_F(DdsSecurity, WithoutPermissionForItsNodeAllElseGoesOn) {
   EXPECT_TRUE(viewer.wait_for_line("diagnostics ")) << testing::PrintToString(viewer.lines());
 }
 
-TEST_F(DdsSecurity, FileThatIsMissingIsNamedAndWaitedFor) {
+TEST_F(DdsSecurity, MissingFileIsNamedAndAwaited) {
   const std::filesystem::path ours = enclaves("ours"), key = ours / "locusd" / "key.pem";
   std::filesystem::rename(key, file("key.pem"));
   const Child daemon(locusd(secured(ours / "locusd")));
@@ -95,7 +95,7 @@ TEST_F(DdsSecurity, FileThatIsMissingIsNamedAndWaitedFor) {
   EXPECT_TRUE(daemon.wait_for_line("DDS is up"));
 }
 
-TEST_F(DdsSecurity, EnclaveThatIsNotTakenIsNamed) {
+TEST_F(DdsSecurity, RejectedEnclaveIsNamed) {
   const std::filesystem::path ours = enclaves("ours");
   std::ofstream{ours / "locusd" / "permissions.p7s"} << "hello";
   const Child daemon(locusd(secured(ours / "locusd")));

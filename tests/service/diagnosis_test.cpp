@@ -25,7 +25,7 @@ using std::chrono::milliseconds;
 /// Diagnostics of sensors, network and machine that the service itself reports.
 class Diagnosis : public RobotNetwork {};
 
-TEST_F(Diagnosis, SensorsThatAreNotHeardAreNamedWithTheInterfaceOfDds) {
+TEST_F(Diagnosis, SilentSensorsAreReportedWithTheDdsInterface) {
   Child daemon(locusd(config()));
   EXPECT_TRUE(daemon.wait_for_line("motion source wio: nothing received"));
   EXPECT_TRUE(daemon.wait_for_line("no publisher found for /wheel_odometry; DDS uses interface lo"));
@@ -36,7 +36,7 @@ TEST_F(Diagnosis, SensorsThatAreNotHeardAreNamedWithTheInterfaceOfDds) {
 }
 
 /// The message follows the diagnosis: at first there are no packets at all.
-TEST_F(Diagnosis, LidarOfAnotherAddressIsNamedWithBoth) {
+TEST_F(Diagnosis, LidarAtAnotherAddressIsReportedWithBothAddresses) {
   const std::filesystem::path wrong = lidar_with("source_ip: 192.168.1.77");
   Child daemon(locusd(wrong));
   ASSERT_TRUE(daemon.wait_for_line("lidar front: no data packet on UDP port 2368 for 5 s; check its power and cable"));
@@ -50,7 +50,7 @@ TEST_F(Diagnosis, LidarOfAnotherAddressIsNamedWithBoth) {
 }
 
 /// Regression: half of the packets were rejected without a message.
-TEST_F(Diagnosis, SecondLidarOnThePortIsNamedWithTheConfigurationOfBoth) {
+TEST_F(Diagnosis, SecondLidarOnThePortIsReportedWithAConfigurationForBoth) {
   Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   const Child play(endlessly(capture()));
@@ -96,7 +96,7 @@ std::jthread unknown_device(const std::filesystem::path& capture, std::byte prod
   });
 }
 
-TEST_F(Diagnosis, UnknownProductIdIsSaidByTheServiceAndByLocusctlSensors) {
+TEST_F(Diagnosis, UnknownProductIdIsReportedByServiceAndSensors) {
   Child daemon(locusd(lidar_with("model: auto")));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   const std::jthread device = unknown_device(capture(), std::byte{0x31});
@@ -112,7 +112,7 @@ TEST_F(Diagnosis, UnknownProductIdIsSaidByTheServiceAndByLocusctlSensors) {
 }
 
 /// Readable lidars are listed with their configuration, the unknown device on a separate line.
-TEST_F(Diagnosis, UnknownProductIdBesideALidarIsToldOnALineOfItsOwn) {
+TEST_F(Diagnosis, UnknownProductIdBesideALidarHasItsOwnLine) {
   const std::jthread device = unknown_device(capture(), std::byte{0x31}, INADDR_LOOPBACK + 1);
   const Child play(endlessly(capture()));
   ASSERT_TRUE(play.wait_for_line("has no subscriber")) << "it waits for a service, and then sends";
@@ -124,7 +124,7 @@ TEST_F(Diagnosis, UnknownProductIdBesideALidarIsToldOnALineOfItsOwn) {
 }
 
 /// The packets have the lidar's address; only the model differs.
-TEST_F(Diagnosis, UnknownProductIdIsNoProblemOfALidarAnyMoreOnceItIsGone) {
+TEST_F(Diagnosis, UnknownProductIdIsNoProblemOnceItsSenderIsGone) {
   Child daemon(locusd(lidar_with("model: auto")));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   const Child play(endlessly(capture()));
@@ -140,7 +140,7 @@ TEST_F(Diagnosis, UnknownProductIdIsNoProblemOfALidarAnyMoreOnceItIsGone) {
   EXPECT_TRUE(status_comes([](const nlohmann::json& status) { return status["lidars"]["front"]["problem"] == ""; }));
 }
 
-TEST_F(Diagnosis, LidarOnAnotherPortIsToldByItsPositionPackets) {
+TEST_F(Diagnosis, LidarOnAnotherPortIsDetectedByItsPositionPackets) {
   const std::filesystem::path wrong = lidar_with("port: 2390");
   Child daemon(locusd(wrong));
   const Child play(endlessly(capture()));
@@ -154,7 +154,7 @@ TEST_F(Diagnosis, LidarOnAnotherPortIsToldByItsPositionPackets) {
 const std::regex kRateOfLidar{R"(lidar front: VLP-16 at 127\.0\.0\.1 to port 2368, (\d+) packets/s)"};
 
 /// Runs beside a service that receives the same packets and is not disturbed.
-TEST_F(Diagnosis, ConfigurationIsComparedWithTheWire) {
+TEST_F(Diagnosis, ConfigurationIsComparedWithTheNetwork) {
   const auto compare = [](const std::filesystem::path& with) {
     return run_program(LOCUSD, {"--config", with.string(), "--check-config", "--live"});
   };
@@ -195,7 +195,7 @@ TEST_F(Diagnosis, ConfigurationIsComparedWithTheWire) {
 }
 
 /// Depends on the speed of the machine.
-TEST_F(Diagnosis, ComparisonCountsWhatComesAndTakesNothingFromTheService) {
+TEST_F(Diagnosis, ComparisonCountsTrafficWithoutDisturbingTheService) {
   const Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   const Child play({LOCUS_PLAY, capture().string()});
@@ -207,7 +207,7 @@ TEST_F(Diagnosis, ComparisonCountsWhatComesAndTakesNothingFromTheService) {
   EXPECT_EQ(status()["packets"]["total"]["lost"], 0) << "the service was disturbed";
 }
 
-TEST_F(Diagnosis, AccelerationsInGAreNamed) {
+TEST_F(Diagnosis, AccelerationsInGAreReported) {
   const std::filesystem::path drive = file("in_g");
   std::filesystem::copy(capture(), drive);
   auto samples = MotionSamples<ImuSample>::open((capture() / "imu.csv").string());
@@ -231,7 +231,7 @@ TEST_F(Diagnosis, AccelerationsInGAreNamed) {
 }
 
 /// Only the scale of the wheels is wrong. The service cannot know whether wheels or lidar are right.
-TEST_F(Diagnosis, WheelsAndLidarThatDisagreeAreSaidWithAllPossibleCauses) {
+TEST_F(Diagnosis, DisagreementOfWheelsAndLidarIsReportedWithItsPossibleCauses) {
   const std::filesystem::path drive = file("scaled");
   std::filesystem::copy(capture(), drive);
   write_scaled_tum(capture() / "wio.tum", 3.0, drive / "wio.tum");
@@ -247,7 +247,7 @@ TEST_F(Diagnosis, WheelsAndLidarThatDisagreeAreSaidWithAllPossibleCauses) {
   EXPECT_EQ(status()["incidents"]["kept"], 1);
 }
 
-TEST_F(Diagnosis, SweepsThatAreDroppedAreSaidWithTheReason) {
+TEST_F(Diagnosis, DroppedSweepsAreReportedWithTheReason) {
   Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   const Child play(endlessly(capture()));
@@ -256,7 +256,7 @@ TEST_F(Diagnosis, SweepsThatAreDroppedAreSaidWithTheReason) {
   EXPECT_TRUE(daemon.wait_for_line("this computer is overloaded: ")) << testing::PrintToString(daemon.lines());
 }
 
-TEST_F(Diagnosis, SweepsThatAreShorterThanATurnAreSaidOnce) {
+TEST_F(Diagnosis, SweepsShorterThanARevolutionAreReportedOnce) {
   Child daemon(locusd(config("sweep_period_ms: 50\n")));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   const Child play(endlessly(capture()));
@@ -299,7 +299,7 @@ class SessionMonitorTest : public testing::Test {
 
 using Lines = std::vector<std::string>;
 
-TEST_F(SessionMonitorTest, TellOfASilentLidarAfterFiveSecondsAndOncePerReason) {
+TEST_F(SessionMonitorTest, ReportsASilentLidarAfterFiveSecondsOncePerReason) {
   EXPECT_EQ(said_after(kPatience - Duration{1}), Lines{});
   EXPECT_EQ(said_after(Duration{1}),
             Lines{"locusd: warning: lidar front: no data packet on UDP port 2368 for 5 s; check its power and cable, "
@@ -327,7 +327,7 @@ TEST_F(SessionMonitorTest, TellOfASilentLidarAfterFiveSecondsAndOncePerReason) {
   EXPECT_EQ(said_after(Duration{1}).size(), 1U) << "again silent";
 }
 
-TEST_F(SessionMonitorTest, TellOfASourceThatIsNotHeardFiveSecondsAfterTheStart) {
+TEST_F(SessionMonitorTest, ReportsASilentSourceFiveSecondsAfterTheStart) {
   figures_.live->link.connected = true;
   const Lines up = said_after(Duration{1});
   ASSERT_EQ(up.size(), 1U);
@@ -346,7 +346,7 @@ TEST_F(SessionMonitorTest, TellOfASourceThatIsNotHeardFiveSecondsAfterTheStart) 
   EXPECT_EQ(said_after(Duration{1}), Lines{}) << "once";
 }
 
-TEST_F(SessionMonitorTest, TellOfDroppedSweepsEveryFiveSeconds) {
+TEST_F(SessionMonitorTest, ReportsDroppedSweepsEveryFiveSeconds) {
   figures_.counters.dropped = 1;
   EXPECT_EQ(said_after(kPatience - Duration{1}), Lines{});
   figures_.counters.dropped = 4;
@@ -360,7 +360,7 @@ TEST_F(SessionMonitorTest, TellOfDroppedSweepsEveryFiveSeconds) {
 }
 
 /// Without the capability to exceed the kernel's limit, as under systemd.
-TEST_F(Diagnosis, BufferThatIsSmallerThanAskedForIsSaidWithTheSettingToChange) {
+TEST_F(Diagnosis, SmallSocketBufferIsReportedWithTheSettingToChange) {
   int allowed = UdpSocket::kWantedBufferBytes;
   std::ifstream("/proc/sys/net/core/rmem_max") >> allowed;
   if (allowed >= UdpSocket::kWantedBufferBytes)

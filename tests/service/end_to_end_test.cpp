@@ -33,7 +33,7 @@ void expect_same(const std::vector<StampedPose>& replay, const std::vector<Heard
   testing::Test::RecordProperty(who + "_worst_mdeg", static_cast<int>(1e3 * worst_deg));
 }
 
-TEST_F(EndToEnd, LiveOdometryIsThatOfTheReplayForCycloneAndForFastDds) {
+TEST_F(EndToEnd, LiveOdometryEqualsTheReplayForCycloneAndFastDds) {
   const std::filesystem::path capture = plant();
   Child daemon(led_locusd(capture / "config.yaml"));
   Child cyclone({CYCLONE_PEER, "0", "listen", "/locus"});

@@ -88,7 +88,7 @@ std::uint64_t sum_but_stale(json counts) {
 }
 
 /// Every datagram of lidar and flood is accounted for: decoded, rejected with a reason, or filtered by the kernel.
-TEST_F(Flood, OfGarbageOnTheLidarsPortsCostsNoPacketOfTheLidar) {
+TEST_F(Flood, GarbageOnTheLidarPortsLosesNoLidarPacket) {
   Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   Child play({LOCUS_PLAY, capture().string()});
@@ -124,10 +124,10 @@ TEST_F(Flood, OfGarbageOnTheLidarsPortsCostsNoPacketOfTheLidar) {
 }
 
 /// DDS inputs belong to their first publisher. Data of a source that had no publisher before is validated.
-class FloodOfDds : public Flood {
+class DdsFlood : public Flood {
  protected:
   /// Limits the quarantine of AddressSanitizer, which retains freed memory: the test measures memory.
-  FloodOfDds() {
+  DdsFlood() {
     setenv("ASAN_OPTIONS", "quarantine_size_mb=8", 1); // NOLINT(concurrency-mt-unsafe): before the programs are started
   }
 
@@ -145,7 +145,7 @@ class FloodOfDds : public Flood {
 
 /// The flood can occupy both cores, so that a source may be silent for a moment; none of its samples may be rejected
 /// because of the flood.
-TEST_F(FloodOfDds, BesideTheSensorsChangesNothingButACounter) {
+TEST_F(DdsFlood, BesideTheSensorsChangesOnlyACounter) {
   const Replay replay({"--quiet", capture().string()});
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
   Child daemon(locusd(config("flat_ground: off\ndds: {flat_ground_topic: /flat_ground}\n")));
@@ -186,7 +186,7 @@ TEST_F(FloodOfDds, BesideTheSensorsChangesNothingButACounter) {
 }
 
 /// The flood is the first publisher of these topics and becomes the source; lidar carries the odometry.
-TEST_F(FloodOfDds, AsTheOnlySourceIsJudgedUnfitAndLidarGoesOn) {
+TEST_F(DdsFlood, AsTheOnlySourceIsRejectedAndLidarContinues) {
   Child daemon(locusd(with_health_topic()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   Child flood(peer("flood"));

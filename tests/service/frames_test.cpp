@@ -269,7 +269,7 @@ void expect_clouds_in_the_room(const std::vector<HeardCloud>& clouds, const std:
   }
 }
 
-TEST_F(Frames, OfADriveAreThoseOfRep103AndRep105) {
+TEST_F(Frames, OfADriveFollowRep103AndRep105) {
   const Truth truth(capture() / "gt.tum");
   const Child daemon(led_locusd(config("dds: {publish_tf: true, publish_cloud: true}\n")));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));

@@ -200,7 +200,7 @@ class Incident : public RobotNetwork {
   std::optional<Child> daemon_, listener_, play_;
 };
 
-TEST_F(Incident, AskedForIsTheLastInputAndReplaysToTheSameEstimate) {
+TEST_F(Incident, RequestedIncidentReplaysToTheSameEstimate) {
   for (const char* record : {"keep_s: 8", "keep_s: 8, folder: record"})
     ASSERT_NO_FATAL_FAILURE(keep_and_replay(record, [this](const Replay& replay) {
       EXPECT_GT(replay.trajectory().size(), 50U);
@@ -210,7 +210,7 @@ TEST_F(Incident, AskedForIsTheLastInputAndReplaysToTheSameEstimate) {
 }
 
 /// Foreign files in the runtime folder stay; a service that ends removes only its own.
-TEST_F(Incident, SecondServiceOnTheSameFolderTouchesNothing) {
+TEST_F(Incident, SecondServiceOnTheSameFolderChangesNothing) {
   for (const char* mine : {"run/ring/mine", "run/incident/mine", "run/input-ring/mine"})
     std::filesystem::create_directories(file(mine));
   std::ofstream{file("run/run")} << "mine";
@@ -270,7 +270,7 @@ TEST_F(Incident, NeedsATmpfsThatIsLargeEnough) {
 }
 
 /// A crash during a drive becomes an incident; the next crash follows too soon and does not.
-TEST_F(Incident, CrashIsOneAndAStopIsNone) {
+TEST_F(Incident, CrashStoresAnIncidentAndAStopDoesNot) {
   ASSERT_NO_FATAL_FAILURE(
       crash_and_replay([](const Replay& replay, const auto& /*live*/) { EXPECT_GT(replay.trajectory().size(), 30U); }));
   daemon_->signal(SIGKILL);
@@ -293,7 +293,7 @@ TEST_F(Incident, CrashReplaysToTheSameEstimate) {
 }
 
 /// The lidar is unplugged, and the wheels continue.
-TEST_F(Incident, LossOfTrackingIsOneByItself) {
+TEST_F(Incident, LossOfTrackingStoresAnIncident) {
   const path robot = file("robot");
   const ProgramRun sim = run_program(LOCUS_SIM, {"--world", "urban", "--robot", "husky", "--duration", "12", "--seed",
                                                  "3", "--realism", "clean", "-o", robot.string()});
@@ -311,7 +311,7 @@ TEST_F(Incident, LossOfTrackingIsOneByItself) {
   EXPECT_GT(replay.trajectory().size(), 30U);
 }
 
-TEST_F(Incident, WhatCannotBeKeptIsSaid) {
+TEST_F(Incident, FailureToStoreIsReported) {
   daemon_.emplace(locusd(with("keep_s: 10")));
   ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
   const ProgramRun nothing = ctl({"record", "--keep", "10s"});
@@ -332,7 +332,7 @@ TEST_F(Incident, WhatCannotBeKeptIsSaid) {
   EXPECT_TRUE(contains(off.err, "set record.keep_s")) << off.err;
 }
 
-TEST_F(Incident, DiskThatIsFullOrAFolderThatCannotBeMadeIsSaidAndTheOdometryGoesOn) {
+TEST_F(Incident, FullDiskOrUnusableFolderIsReportedAndTheOdometryContinues) {
   std::filesystem::create_directory(file("incidents"));
   ASSERT_EQ(mount("incidents", file("incidents").c_str(), "tmpfs", 0, "size=3m"), 0);
   const path older = file("incidents/2026-01-01T00-00-00.000Z_asked");
@@ -357,7 +357,7 @@ TEST_F(Incident, DiskThatIsFullOrAFolderThatCannotBeMadeIsSaidAndTheOdometryGoes
 }
 
 /// A flood of ten times the lidar's packet rate: the memory bound holds, and the recording covers less time.
-TEST_F(Incident, FloodFillsNoMoreThanItsBound) {
+TEST_F(Incident, FloodFillsNoMoreThanTheLimit) {
   constexpr std::uint64_t kBytes = 10'000'000;
   ASSERT_NO_FATAL_FAILURE(start(fmt::format("keep_s: 60, keep_bytes: {}", kBytes)));
   const UdpSender pest(0x7F000002);
@@ -391,7 +391,7 @@ TEST_F(Incident, FloodFillsNoMoreThanItsBound) {
 }
 
 /// Consecutive requests; the folder stays within its size limit.
-TEST(IncidentFolder, OldestGoesFirst) {
+TEST(IncidentFolder, OldestIsRemovedFirst) {
   const TemporaryFolder folder;
   const path piece = folder / "record/000001_2026-11-22T08-12-05Z/000001";
   std::filesystem::create_directories(piece);
@@ -424,7 +424,7 @@ TEST(IncidentFolder, OldestGoesFirst) {
 }
 
 /// Automatic incidents are limited to one in five minutes, across processes.
-TEST(IncidentFolder, WhatComesTooSoonIsCounted) {
+TEST(IncidentFolder, IncidentsTooSoonAreCounted) {
   const TemporaryFolder folder;
   const path piece = folder / "record/000001_2026-11-22T08-12-05Z/000001";
   std::filesystem::create_directories(piece);
@@ -450,7 +450,7 @@ TEST(IncidentFolder, WhatComesTooSoonIsCounted) {
 }
 
 /// State after a step of the clock by minus one year.
-TEST(IncidentFolder, OneOfTheFutureHidesNoneOfToday) {
+TEST(IncidentFolder, FutureIncidentSuppressesNoneOfToday) {
   const TemporaryFolder folder;
   const path piece = folder / "record/000001_2026-11-22T08-12-05Z/000001";
   std::filesystem::create_directories(piece);
@@ -480,7 +480,7 @@ TEST(IncidentFolder, OneOfTheFutureHidesNoneOfToday) {
 }
 
 /// Figures and time of a service, both set by the test.
-class NoticedIncidents : public testing::Test {
+class IncidentWatchTest : public testing::Test {
  protected:
   std::optional<daemon::IncidentCause> look_after(Duration while_nothing_changes) {
     now_ += while_nothing_changes;
@@ -498,7 +498,7 @@ class NoticedIncidents : public testing::Test {
 };
 
 /// One contradiction lasts as long as samples are rejected consecutively.
-TEST_F(NoticedIncidents, AreOneContradictionUntilNoneWasSeenForTenSeconds) {
+TEST_F(IncidentWatchTest, ContradictionsWithinTenSecondsAreOne) {
   EXPECT_FALSE(look_after(seconds{1}));
   refuse(HealthReason::disagreement);
   EXPECT_EQ(look_after(seconds{1}), daemon::IncidentCause::contradiction);
@@ -513,7 +513,7 @@ TEST_F(NoticedIncidents, AreOneContradictionUntilNoneWasSeenForTenSeconds) {
   EXPECT_FALSE(look_after(std::chrono::hours{1})) << "who is silent contradicts nobody";
 }
 
-TEST_F(NoticedIncidents, AreOneLossAfterASecondOfDeadReckoning) {
+TEST_F(IncidentWatchTest, OneSecondOfDeadReckoningIsOneLoss) {
   estimate(TrackingState::dead_reckoning);
   EXPECT_FALSE(look_after(seconds{1}));
   EXPECT_FALSE(look_after(std::chrono::hours{1})) << "it has not tracked yet";

@@ -36,7 +36,7 @@ TEST(LidarPorts, AreThoseOfTheMakers) {
 
 class Inputs : public RobotNetwork {};
 
-TEST_F(Inputs, GarbageOnTheWireIsCountedAndHarmsNothing) {
+TEST_F(Inputs, GarbageOnTheNetworkIsCountedAndHarmless) {
   Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   const UdpSender sender;
@@ -63,7 +63,7 @@ TEST_F(Inputs, GarbageOnTheWireIsCountedAndHarmsNothing) {
   EXPECT_TRUE(daemon.wait_for_line("tracking"));
 }
 
-TEST_F(Inputs, LidarThatFallsSilentIsStaleInTheDiagnostics) {
+TEST_F(Inputs, SilentLidarIsStaleInTheDiagnostics) {
   const auto says = [](const char* level) {
     return [=](const std::vector<std::string>& lines) {
       return std::ranges::any_of(lines, [&](const std::string& line) {
@@ -82,7 +82,7 @@ TEST_F(Inputs, LidarThatFallsSilentIsStaleInTheDiagnostics) {
 }
 
 /// A topic that toggles a hundred times a second switches at most once a second.
-TEST_F(Inputs, FlatGroundIsSwitchedByItsTopicAtMostOnceASecond) {
+TEST_F(Inputs, FlatGroundTopicSwitchesAtMostOnceASecond) {
   const Child daemon(locusd(config("flat_ground: off\ndds: {flat_ground_topic: /wheel_health}\n")));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   const auto before = std::chrono::steady_clock::now();

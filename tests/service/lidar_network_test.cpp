@@ -85,14 +85,14 @@ class LidarNetwork : public RobotNetwork {
   std::unique_ptr<Child> lidar_;
 };
 
-TEST_F(LidarNetwork, LidarIsHeardByUnicast) {
+TEST_F(LidarNetwork, UnicastIsReceived) {
   lay_cable();
   const Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   expect_heard("10.9.0.1");
 }
 
-TEST_F(LidarNetwork, LidarIsHeardByBroadcastToItsNetworkAndToAll) {
+TEST_F(LidarNetwork, BroadcastToTheNetworkAndToAllIsReceived) {
   for (const char* to : {"10.9.0.255", "255.255.255.255"}) {
     lay_cable();
     const Child daemon(locusd(config()));
@@ -103,7 +103,7 @@ TEST_F(LidarNetwork, LidarIsHeardByBroadcastToItsNetworkAndToAll) {
 }
 
 /// The network appears only after the service has started.
-TEST_F(LidarNetwork, LidarIsHeardByMulticastOnceItsNetworkIsThere) {
+TEST_F(LidarNetwork, MulticastIsReceivedOnceTheNetworkIsUp) {
   std::string text = read_text(config());
   text.replace(text.find("{name: front,"), 13, "{name: front, multicast_ip: 239.1.2.3,");
   std::ofstream{file("multicast.yaml")} << text;
@@ -115,7 +115,7 @@ TEST_F(LidarNetwork, LidarIsHeardByMulticastOnceItsNetworkIsThere) {
 
 /// Alternating packets of two lidars would look like one that jumps, so a new address is accepted only after the old
 /// one is silent.
-TEST_F(LidarNetwork, LidarThatChangesItsAddressIsTakenBack) {
+TEST_F(LidarNetwork, LidarWithANewAddressIsAcceptedAgain) {
   lay_cable();
   const Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
@@ -128,7 +128,7 @@ TEST_F(LidarNetwork, LidarThatChangesItsAddressIsTakenBack) {
 }
 
 /// docs/examples/locusd.nft: drops everything from other hosts on the lidar's cable, and nothing from the lidar.
-TEST_F(LidarNetwork, FirewallLetsTheLidarPassAndNobodyElse) {
+TEST_F(LidarNetwork, FirewallPassesOnlyTheLidar) {
   if (run_program("/usr/sbin/nft", {"add", "table", "inet", "probe"}).status != 0)
     GTEST_SKIP() << "this kernel has no nf_tables, or there is no nft";
   lay_cable();
@@ -161,7 +161,7 @@ TEST_F(LidarNetwork, FirewallLetsTheLidarPassAndNobodyElse) {
 }
 
 /// Everything sent meanwhile is lost and counted.
-TEST_F(LidarNetwork, CableThatIsPulledAndPutBack) {
+TEST_F(LidarNetwork, PacketsLostWhileUnpluggedAreCounted) {
   lay_cable();
   const Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));

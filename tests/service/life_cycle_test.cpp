@@ -47,7 +47,7 @@ TEST_F(LifeCycle, ConfigurationIsCheckedAndPrinted) {
   EXPECT_NE(bad.err.find("bad.yaml:2"), std::string::npos) << bad.err;
 }
 
-TEST_F(LifeCycle, CalibrationThatCannotBeReadIsAWrongConfiguration) {
+TEST_F(LifeCycle, UnreadableCalibrationIsAnInvalidConfiguration) {
   for (const char* option : {"--check-config", "--print-config"}) {
     const ProgramRun bad = run_program(LOCUSD, {"--config", lidar_with("calibration: nothere.yaml").string(), option});
     EXPECT_EQ(bad.status, 2) << option;
@@ -58,7 +58,7 @@ TEST_F(LifeCycle, CalibrationThatCannotBeReadIsAWrongConfiguration) {
 }
 
 /// READY does not wait for sensors, the watchdog is fed without any, and STOPPING is sent.
-TEST_F(LifeCycle, SystemdIsToldOfStartReloadStopAndThatThreadsLive) {
+TEST_F(LifeCycle, SystemdIsNotifiedOfStartReloadStopAndProgress) {
   NotifySocket systemd(file("notify"));
   setenv("WATCHDOG_USEC", "600000", 1); // NOLINT(concurrency-mt-unsafe)
   Child daemon(locusd(config()));
@@ -75,7 +75,7 @@ TEST_F(LifeCycle, SystemdIsToldOfStartReloadStopAndThatThreadsLive) {
   EXPECT_EQ(daemon.wait_for_exit(), 0);
 }
 
-TEST_F(LifeCycle, SecondServiceLeavesTheSocketOfTheFirstAlone) {
+TEST_F(LifeCycle, SecondServiceKeepsTheSocketOfTheFirst) {
   const Child first(locusd(config()));
   ASSERT_TRUE(first.wait_for_line("DDS is up"));
   {
@@ -87,7 +87,7 @@ TEST_F(LifeCycle, SecondServiceLeavesTheSocketOfTheFirstAlone) {
   EXPECT_EQ(status()["lidars"]["front"]["port"], 2368);
 }
 
-TEST_F(LifeCycle, ResetWithoutLidarOutlivesAReloadAndARestart) {
+TEST_F(LifeCycle, ResetPoseWithoutLidarOutlivesReloadAndRestart) {
   constexpr double kNear_m = 0.5; // the robot stands at the start
   const auto starts_at_x = [] {
     const Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
@@ -118,7 +118,7 @@ TEST_F(LifeCycle, ResetWithoutLidarOutlivesAReloadAndARestart) {
   EXPECT_NEAR(starts_at_x(), 0, kNear_m);
 }
 
-TEST_F(LifeCycle, ResetBeforeTheFirstSweepIsNoDoubtAboutTheSavedState) {
+TEST_F(LifeCycle, ResetBeforeTheFirstSweepGivesNoWarningOfTheSavedState) {
   {
     Child daemon(locusd(config()));
     const Child play({LOCUS_PLAY, capture().string()});
@@ -134,7 +134,7 @@ TEST_F(LifeCycle, ResetBeforeTheFirstSweepIsNoDoubtAboutTheSavedState) {
   EXPECT_FALSE(daemon.has_line("does not match the saved state")) << testing::PrintToString(daemon.lines());
 }
 
-TEST_F(LifeCycle, MapIsThatOfTheMomentAlsoAfterOneThatNeverCame) {
+TEST_F(LifeCycle, MapIsCurrentAfterARequestThatTimedOut) {
   Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   EXPECT_EQ(ctl({"save-map", file("none.pcd").string()}).status, 1) << "there is no lidar";
@@ -148,7 +148,7 @@ TEST_F(LifeCycle, MapIsThatOfTheMomentAlsoAfterOneThatNeverCame) {
   EXPECT_GT(bytes[0], bytes[1] * 9 / 10) << "the first is as the second";
 }
 
-TEST_F(LifeCycle, LogThatIsFullEndsNoService) {
+TEST_F(LifeCycle, FullLogDoesNotEndTheService) {
   NotifySocket systemd(file("notify"));
   Child daemon({"/bin/sh", "-c", std::string("exec ") + LOCUSD + " --config " + config().string() + " 2> /dev/full"});
   EXPECT_TRUE(systemd.hears("READY=1"));
@@ -156,7 +156,7 @@ TEST_F(LifeCycle, LogThatIsFullEndsNoService) {
   EXPECT_EQ(daemon.wait_for_exit(), 0);
 }
 
-TEST_F(LifeCycle, NetworkOfDdsMayComeLater) {
+TEST_F(LifeCycle, DdsNetworkMayComeUpLater) {
   Child daemon(locusd(config("dds: {interface: robot0}\n")));
   EXPECT_TRUE(daemon.wait_for_line("dds.interface: there is no network interface robot0; there are lo"));
   if (!add_interfaces())
@@ -165,7 +165,7 @@ TEST_F(LifeCycle, NetworkOfDdsMayComeLater) {
 }
 
 /// A robot whose estimates are received over a network interface of its own.
-class NetworkOfDds : public LifeCycle {
+class DdsNetwork : public LifeCycle {
  protected:
   void SetUp() override {
     LifeCycle::SetUp();
@@ -196,7 +196,7 @@ class NetworkOfDds : public LifeCycle {
 };
 
 /// After a network failure the subscribers receive again; the odometry has continued meanwhile.
-TEST_F(NetworkOfDds, MayFailForAWhile) {
+TEST_F(DdsNetwork, RecoversFromAnOutage) {
   expect_estimates_are_heard();
   set_network("down");
   const auto processed = [](const json& s) { return s["sweeps"]["processed"].get<int>(); };
@@ -206,7 +206,7 @@ TEST_F(NetworkOfDds, MayFailForAWhile) {
   expect_estimates_are_heard();
 }
 
-TEST_F(NetworkOfDds, ThatFailsDelaysNoSweep) {
+TEST_F(DdsNetwork, OutageDelaysNoSweep) {
   expect_estimates_are_heard();
   set_network("down");
   const int before = status()["sweeps"]["seen"];
@@ -214,7 +214,7 @@ TEST_F(NetworkOfDds, ThatFailsDelaysNoSweep) {
   EXPECT_EQ(after["sweeps"]["dropped"], 0);
 }
 
-TEST_F(LifeCycle, PortThatIsTakenEndsItWithStatusOne) {
+TEST_F(LifeCycle, PortInUseEndsWithStatusOne) {
   const Child first(locusd(config()));
   ASSERT_TRUE(first.wait_for_line("DDS is up"));
   const ProgramRun second = run_program(LOCUSD, {"--config", config().string()});
@@ -252,21 +252,21 @@ TEST_F(LifeCycle, CablePullIsBridgedByDeadReckoning) {
   EXPECT_EQ(states[185], "0") << "it tracks again before the end";
 }
 
-TEST_F(LifeCycle, DamagedStateIsAFreshStart) {
+TEST_F(LifeCycle, DamagedStateIsNotUsed) {
   std::ofstream{file("state")} << "half of a sta";
   Child daemon(locusd(config()));
   EXPECT_TRUE(
       daemon.wait_for_line("starting without a saved state: " + file("state").string() + ": is truncated or damaged"));
 }
 
-TEST_F(LifeCycle, StateOfAnotherVersionIsAFreshStart) {
+TEST_F(LifeCycle, StateOfAnotherVersionIsNotUsed) {
   std::ofstream{file("state")} << "locusd 3 and so on";
   Child daemon(locusd(config()));
   EXPECT_TRUE(daemon.wait_for_line("starting without a saved state: " + file("state").string() +
                                    ": was written by another version"));
 }
 
-TEST_F(LifeCycle, StateOfAnotherTimeIsAFreshStart) {
+TEST_F(LifeCycle, OutdatedPoseIsNotUsed) {
   daemon::SavedState old;
   old.last.stamp = Stamp{daemon::read_clock(CLOCK_REALTIME)} - seconds{61};
   ASSERT_FALSE(daemon::write_state(file("state"), old));
@@ -275,7 +275,7 @@ TEST_F(LifeCycle, StateOfAnotherTimeIsAFreshStart) {
 }
 
 /// The robot may have been moved overnight, but has the same sensors.
-TEST_F(LifeCycle, WhatWasLearnedOfTheSourcesOutlivesAnotherTime) {
+TEST_F(LifeCycle, LearnedCalibrationOutlivesAnOutdatedPose) {
   const Config configured = *parse_config(read_text(config()), "config");
   daemon::SavedState old;
   old.last.stamp = Stamp{daemon::read_clock(CLOCK_REALTIME)} - std::chrono::hours{24};
@@ -298,7 +298,7 @@ TEST_F(LifeCycle, WhatWasLearnedOfTheSourcesOutlivesAnotherTime) {
   EXPECT_GT(status["sources"]["imu"]["learned"]["mounting_deg"]["value"][2].get<double>(), 0.5);
 }
 
-TEST_F(LifeCycle, FullDiskCostsTheStateAndNothingElse) {
+TEST_F(LifeCycle, FullDiskLosesOnlyTheState) {
   std::filesystem::create_directory(file("full"));
   if (unshare(CLONE_NEWNS) != 0 || mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
       mount("tmpfs", file("full").c_str(), "tmpfs", 0, "size=4k") != 0)
@@ -314,7 +314,7 @@ TEST_F(LifeCycle, FullDiskCostsTheStateAndNothingElse) {
   umount2(file("full").c_str(), MNT_DETACH);
 }
 
-TEST_F(LifeCycle, ControlShowsSavesResetsAndSwitches) {
+TEST_F(LifeCycle, ControlCommandsTakeEffect) {
   Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   const Child play(endlessly(capture()));
@@ -369,7 +369,7 @@ TEST_F(LifeCycle, ControlShowsSavesResetsAndSwitches) {
   EXPECT_NE(sensors.out.find("port: 2368"), std::string::npos) << sensors.out;
 }
 
-TEST_F(LifeCycle, ControlWithoutAServiceSaysHowToStartOne) {
+TEST_F(LifeCycle, ControlWithoutAServiceExplainsHowToStartIt) {
   const ProgramRun run = ctl({"status"});
   EXPECT_EQ(run.status, 1);
   EXPECT_NE(run.err.find("no service answers"), std::string::npos);
@@ -377,7 +377,7 @@ TEST_F(LifeCycle, ControlWithoutAServiceSaysHowToStartOne) {
 
 /// Packets arrive thirty times as fast as they were fired, by the sensor's clock: 3 ms per sweep. The configuration
 /// makes processing slow.
-TEST_F(LifeCycle, OverloadDropsAndCountsAndMakesNothingOlder) {
+TEST_F(LifeCycle, OverloadDropsSweepsAndNeverMakesEstimatesOlder) {
   std::string text = read_text(config("segment_filter: {enabled: false}\nscan_to_scan: {mode: always}\nthreads: 1\n"));
   text.replace(text.find("{name: front,"), 13, "{name: front, time: sensor,");
   std::ofstream{file("overloaded.yaml")} << text;
@@ -400,7 +400,7 @@ TEST_F(LifeCycle, OverloadDropsAndCountsAndMakesNothingOlder) {
   EXPECT_LT(of("process_ms", "max"), 200.0) << "a queue would be seconds long at the end";
 }
 
-TEST_F(LifeCycle, SocketsMayComeFromSystemd) {
+TEST_F(LifeCycle, SocketsOfSystemdAreUsed) {
   Child daemon({"/usr/bin/systemd-socket-activate", "--datagram", "--listen", "2368", "-E", "RUNTIME_DIRECTORY", "-E",
                 "STATE_DIRECTORY", LOCUSD, "--config", config().string()});
   ASSERT_TRUE(daemon.wait_for_line("Listening on")) << testing::PrintToString(daemon.lines());

@@ -17,7 +17,7 @@ Duration log_time = std::chrono::hours{1};
 /// Simulated time, advanced by the test only.
 Duration read_log_time(clockid_t /*clock*/) { return log_time; }
 
-TEST(Log, OnePlaceThatSaysTooMuchIsSilencedAndNoOther) {
+TEST(Log, RateLimitAppliesPerSourceLocation) {
   testing::internal::CaptureStderr();
   Log log{read_log_time};
   for (int i = 0; i < 100; ++i)
@@ -29,7 +29,7 @@ TEST(Log, OnePlaceThatSaysTooMuchIsSilencedAndNoOther) {
   EXPECT_EQ(lines.back(), "locusd: error: something else");
 }
 
-TEST(Log, PlaceThatMaySpeakAgainTellsHowMuchWasLeftOut) {
+TEST(Log, NextMessageAfterSuppressionReportsTheNumber) {
   testing::internal::CaptureStderr();
   Log log{read_log_time};
   const auto say = [&log] { log.warn("the same again"); };

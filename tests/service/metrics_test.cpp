@@ -137,7 +137,7 @@ class Metrics : public RobotNetwork {
   std::optional<Child> daemon_, play_;
 };
 
-TEST_F(Metrics, AreWhatTheStatusTells) {
+TEST_F(Metrics, MatchTheStatus) {
   ASSERT_NO_FATAL_FAILURE(drive(room_drive()));
   ASSERT_EQ(play_->wait_for_exit(), 0);
   const auto [before, status, metrics] = told_at_rest();
@@ -179,7 +179,7 @@ TEST_F(Metrics, AreWhatTheStatusTells) {
 }
 
 /// Each value lies between those of the statuses before and after it.
-TEST_F(Metrics, OfTheMachineAreTrueAndTheHistogramIsOfAllSweeps) {
+TEST_F(Metrics, ProcessFiguresAreTrueAndTheHistogramCoversAllSweeps) {
   const double launched_s = to_seconds(daemon::read_clock(CLOCK_REALTIME));
   ASSERT_NO_FATAL_FAILURE(drive(room_drive()));
   ASSERT_EQ(play_->wait_for_exit(), 0);
@@ -215,7 +215,7 @@ TEST_F(Metrics, OfTheMachineAreTrueAndTheHistogramIsOfAllSweeps) {
 
 /// promtool reads the older text format, which has neither infos nor state sets, and in which the counters' suffix is
 /// part of the family name; the samples are identical.
-TEST_F(Metrics, PleasePromtool) {
+TEST_F(Metrics, PassPromtool) {
   if (const ProgramRun fetched = fetch_promtool(); fetched.status != 0)
     GTEST_SKIP() << "no promtool: " << fetched.err;
   ASSERT_NO_FATAL_FAILURE(drive());
@@ -233,7 +233,7 @@ TEST_F(Metrics, PleasePromtool) {
   EXPECT_EQ(check.out, "");
 }
 
-TEST_F(Metrics, AreToldBeforeAnySensorIsHeard) {
+TEST_F(Metrics, AreServedBeforeAnySensorIsReceived) {
   const Child daemon(locusd(listening()));
   ASSERT_TRUE(daemon.wait_for_line("metrics are served at 127.0.0.1:9464"));
   const OpenMetrics metrics = scrape();
@@ -243,7 +243,7 @@ TEST_F(Metrics, AreToldBeforeAnySensorIsHeard) {
   EXPECT_EQ(metrics.value("locusd_source_health", {{"source", "imu"}, {"locusd_source_health", "never heard"}}), 1);
 }
 
-TEST_F(Metrics, EachAddressIsListenedToAsItSays) {
+TEST_F(Metrics, EachFormOfAddressIsServed) {
   for (const std::string& address : {std::string{"[::1]:9464"}, file("metrics").string()}) {
     Child daemon(locusd(listening(address)));
     ASSERT_TRUE(daemon.wait_for_line("metrics are served at")) << testing::PrintToString(daemon.lines());
@@ -254,7 +254,7 @@ TEST_F(Metrics, EachAddressIsListenedToAsItSays) {
   EXPECT_FALSE(std::filesystem::exists(file("metrics")));
 }
 
-TEST_F(Metrics, SocketOfOneThatCrashedIsTakenOverAndAFileIsNot) {
+TEST_F(Metrics, StaleSocketIsReplacedAndAFileIsNot) {
   for (const int end : {SIGKILL, SIGTERM}) {
     Child daemon(locusd(listening(file("metrics").string())));
     ASSERT_TRUE(daemon.wait_for_line("metrics are served at")) << testing::PrintToString(daemon.lines());
@@ -267,7 +267,7 @@ TEST_F(Metrics, SocketOfOneThatCrashedIsTakenOverAndAFileIsNot) {
   EXPECT_EQ(read_text(file("metrics")), "of somebody");
 }
 
-TEST_F(Metrics, WrongAddressesAreRefusedWithWhatToWrite) {
+TEST_F(Metrics, InvalidAddressesAreRejectedWithTheSyntax) {
   for (const char* address : {"9464", "localhost:9464", "127.0.0.1", "127.0.0.1:0", "127.0.0.1:65536", "::1:9464",
                               "[::1]", "unix:/run/x", "run/x", "/run/", "127.0.0.1:94 64", "0x7f.1:80", ":9464"}) {
     const ProgramRun run = run_program(LOCUSD, {"--config", listening(address).string(), "--check-config"});
@@ -280,7 +280,7 @@ TEST_F(Metrics, WrongAddressesAreRefusedWithWhatToWrite) {
   EXPECT_FALSE(parse_socket_address(longest + 'a'));
 }
 
-TEST_F(Metrics, PortThatIsTakenIsSaidAndTheServiceRunsOn) {
+TEST_F(Metrics, PortInUseIsReportedAndTheServiceContinues) {
   const auto taken = daemon::MetricsServer::open(kAddress, [] { return std::string{}; });
   ASSERT_TRUE(taken) << taken.error();
   const Child daemon(locusd(listening()));
@@ -289,7 +289,7 @@ TEST_F(Metrics, PortThatIsTakenIsSaidAndTheServiceRunsOn) {
   EXPECT_EQ(status()["state"], "waiting");
 }
 
-TEST_F(Metrics, SocketOfAnotherKindIsNotTakenOver) {
+TEST_F(Metrics, SocketOfAnotherKindIsNotReplaced) {
   const Child daemon(locusd(listening(control().string())));
   EXPECT_TRUE(daemon.wait_for_line("control: Address already in use; the service runs without metrics"))
       << testing::PrintToString(daemon.lines());
@@ -316,7 +316,7 @@ class NoDescriptorLeft {
 };
 
 /// Clients are not served while no descriptor is left; the main thread does not spin on that.
-TEST_F(Metrics, NoDescriptorLeftCostsNoProcessor) {
+TEST_F(Metrics, LackOfDescriptorsCostsNoCpu) {
   const Child daemon(locusd(listening()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   const auto spent = [&] {
@@ -336,7 +336,7 @@ TEST_F(Metrics, NoDescriptorLeftCostsNoProcessor) {
   EXPECT_EQ(scrape().mistakes, std::vector<std::string>{}) << testing::PrintToString(daemon.lines());
 }
 
-TEST_F(Metrics, ReloadTurnsThemOnAndOff) {
+TEST_F(Metrics, ReloadSwitchesThemOnAndOff) {
   const Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   for (int turn = 0; turn < 2; ++turn) {
@@ -352,7 +352,7 @@ TEST_F(Metrics, ReloadTurnsThemOnAndOff) {
   EXPECT_LT(connect_to(kAddress).number(), 0);
 }
 
-TEST_F(Metrics, OtherRequestsAreAnsweredWithWhatIsWrong) {
+TEST_F(Metrics, InvalidRequestsAreAnsweredWithTheError) {
   const Child daemon(locusd(listening()));
   ASSERT_TRUE(daemon.wait_for_line("metrics are served"));
   const auto first_line = [](std::string_view request) {
@@ -381,7 +381,7 @@ TEST_F(Metrics, OtherRequestsAreAnsweredWithWhatIsWrong) {
             ok.size() + 2);
 }
 
-TEST_F(Metrics, WhoIsSilentHoldsNobodyUp) {
+TEST_F(Metrics, SilentClientBlocksNoOther) {
   const Child daemon(locusd(listening()));
   ASSERT_TRUE(daemon.wait_for_line("metrics are served"));
   std::vector<Descriptor> silent;
@@ -396,7 +396,7 @@ TEST_F(Metrics, WhoIsSilentHoldsNobodyUp) {
 }
 
 /// A server driven by the test, with simulated time.
-class MetricsOnCall : public RobotNetwork {
+class MetricsServerTest : public RobotNetwork {
  protected:
   void SetUp() override {
     RobotNetwork::SetUp();
@@ -447,7 +447,7 @@ class MetricsOnCall : public RobotNetwork {
   std::unique_ptr<daemon::MetricsServer> server_;
 };
 
-TEST_F(MetricsOnCall, AreToldBesideAnyNumberWhoAreSilent) {
+TEST_F(MetricsServerTest, ServesDespiteAnyNumberOfSilentClients) {
   std::vector<Descriptor> silent;
   for (int i = 0; i < 100; ++i) {
     silent.push_back(client());
@@ -465,7 +465,7 @@ TEST_F(MetricsOnCall, AreToldBesideAnyNumberWhoAreSilent) {
 }
 
 /// A request that arrives byte by byte is served if it is complete before the timeout.
-TEST_F(MetricsOnCall, AreToldToWhoIsSlow) {
+TEST_F(MetricsServerTest, ServesSlowClientsWithinTheTimeout) {
   const Descriptor slow = client();
   for (const char letter : kScrape) {
     say(slow, {&letter, 1});
@@ -475,7 +475,7 @@ TEST_F(MetricsOnCall, AreToldToWhoIsSlow) {
   EXPECT_TRUE(served(slow).ends_with("# EOF\n"));
 }
 
-TEST_F(MetricsOnCall, AreNotWaitedForWithWhoSaysNothing) {
+TEST_F(MetricsServerTest, DropsClientsSilentBeyondTheTimeout) {
   const Descriptor loris = client();
   now_ += daemon::MetricsServer::kPatience;
   EXPECT_FALSE(server_->serve());
@@ -486,7 +486,7 @@ TEST_F(MetricsOnCall, AreNotWaitedForWithWhoSaysNothing) {
 }
 
 /// The caller of serve() pauses after it, and does not spin while a client waits that cannot be accepted.
-TEST_F(MetricsOnCall, AreToldLaterToWhoComesWhileNoDescriptorIsLeft) {
+TEST_F(MetricsServerTest, ServesClientsAfterALackOfDescriptors) {
   const Descriptor client = connect_to(kAddress);
   say(client, kScrape);
   bool says_so = true;
@@ -501,7 +501,7 @@ TEST_F(MetricsOnCall, AreToldLaterToWhoComesWhileNoDescriptorIsLeft) {
 }
 
 /// The parser of these tests detects errors.
-TEST(OpenMetricsReader, ForgivesNothing) {
+TEST(OpenMetricsReader, RejectsInvalidText) {
   const std::string good = "# TYPE a counter\n# HELP a b\na_total{x=\"1\"} 1\n# EOF\n";
   EXPECT_EQ(OpenMetrics::parse(good).mistakes, std::vector<std::string>{});
   const auto with = [&](const std::string& part, const std::string& other) {
@@ -588,7 +588,7 @@ class Examples : public Metrics {
   }
 };
 
-TEST_F(Examples, NameMetricsAndLabelsThatThereAre) {
+TEST_F(Examples, UseExistingMetricsAndLabels) {
   const OpenMetrics metrics = all_metrics();
   EXPECT_EQ(metrics.mistakes, std::vector<std::string>{});
   int rules = 0, targets = 0;

@@ -63,7 +63,7 @@ double milliseconds_of(Duration duration) { return 1e3 * to_seconds(duration); }
 /// Scheduling settings requested from the operating system.
 class Scheduling : public RobotNetwork {};
 
-TEST_F(Scheduling, PriorityIsThatOfIngestOdometryAndItsHelpers) {
+TEST_F(Scheduling, PriorityAppliesToIngestOdometryAndHelpers) {
   Child daemon(locusd(config("realtime: {priority: 7}\nthreads: 2\n")));
   ASSERT_TRUE(daemon.wait_for_line("running with "));
   if (daemon.has_line("realtime.priority was not granted"))
@@ -81,7 +81,7 @@ TEST_F(Scheduling, PriorityIsThatOfIngestOdometryAndItsHelpers) {
   EXPECT_EQ(priorities.count("ingest"), 1U);
 }
 
-TEST_F(Scheduling, WishesThatAreNotGrantedAreSaidAndCostNothing) {
+TEST_F(Scheduling, DeniedRequestsAreReportedAndHarmless) {
   Child daemon(locusd(config("realtime: {cpus: [1000]}\n")));
   EXPECT_TRUE(daemon.wait_for_line("realtime.cpus was not granted"));
   EXPECT_TRUE(daemon.wait_for_line("DDS is up"));
@@ -120,7 +120,7 @@ std::vector<Stamp> sent_packets(const std::filesystem::path& folder) {
 
 /// Latency from the packet that closes a sweep, the first beyond its end, to the subscriber. The median over ten
 /// sections of the drive counts, because other load on the machine may spoil some.
-TEST_F(RealTime, EstimateIsInTheSubscribersHandsAMomentAfterItsSweep) {
+TEST_F(RealTime, EstimateReachesTheSubscriberShortlyAfterItsSweep) {
   Child daemon(locusd(config()));
   Child listener({FAST_DDS_PEER, "0", "listen", "/locus"});
   ASSERT_TRUE(hears_the_service(listener));
@@ -173,7 +173,7 @@ TEST_F(RealTime, TwoLidarsImuAndOdometryOnOneCore) {
 
 /// Worst overload: 1.5 s without any processing, while packets queue in the kernel. Two sweeps later every sweep is
 /// processed again, without delay.
-TEST_F(RealTime, StallIsForgottenTwoSweepsAfterIt) {
+TEST_F(RealTime, RecoversTwoSweepsAfterAStall) {
   Child daemon(locusd(config()));
   Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
   ASSERT_TRUE(hears_the_service(listener));

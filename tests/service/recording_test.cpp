@@ -78,7 +78,7 @@ Agreement agreement(const std::vector<StampedPose>& replay, const std::vector<He
   return found;
 }
 
-TEST_F(Recording, ReplayIsWhatTheServiceComputed) {
+TEST_F(Recording, ReplayEqualsTheEstimatesOfTheService) {
   const std::filesystem::path robot = drive();
   Child daemon(led_locusd(recording(robot, 1'000'000'000)));
   Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
@@ -118,7 +118,7 @@ TEST_F(Recording, ReplayIsWhatTheServiceComputed) {
 }
 
 /// Power is cut in mid-drive; then the robot drives again, with disk space for six seconds of it.
-TEST_F(Recording, OldestGoesFirstAndWhatWasKilledReplaysAsFarAsItGoes) {
+TEST_F(Recording, OldestIsRemovedFirstAndAKilledRunReplays) {
   constexpr std::uint64_t kMaxBytes = 10'000'000;
   const std::filesystem::path robot = drive();
   {
@@ -164,7 +164,7 @@ TEST_F(Recording, OldestGoesFirstAndWhatWasKilledReplaysAsFarAsItGoes) {
   EXPECT_GE(all.trajectory().size(), 30U);
 }
 
-TEST_F(Recording, DiskThatIsFullIsSaidOnceAndTheOdometryGoesOn) {
+TEST_F(Recording, FullDiskIsReportedOnceAndTheOdometryContinues) {
   if (unshare(CLONE_NEWNS) != 0 || mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0)
     GTEST_SKIP() << "no mounts of one's own: run as root, or allow user namespaces";
   const std::filesystem::path disk = file("disk");
@@ -205,7 +205,7 @@ TEST_F(Recording, DiskThatIsFullIsSaidOnceAndTheOdometryGoesOn) {
   umount2(disk.c_str(), MNT_DETACH);
 }
 
-TEST_F(Recording, FolderThatCannotBeMadeIsSaidOnceAndTheOdometryGoesOn) {
+TEST_F(Recording, UnusableFolderIsReportedOnceAndTheOdometryContinues) {
   std::ofstream{file("plain")} << "a file";
   Child daemon(locusd(recording(capture(), 10'000'000, "plain/record")));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
@@ -217,7 +217,7 @@ TEST_F(Recording, FolderThatCannotBeMadeIsSaidOnceAndTheOdometryGoesOn) {
   EXPECT_EQ(status["recording"]["recorded"], 0);
 }
 
-TEST_F(Recording, DiskThatIsReadOnlyIsSaidBeforeAnythingComesIn) {
+TEST_F(Recording, ReadOnlyDiskIsReportedBeforeAnyInput) {
   if (unshare(CLONE_NEWNS) != 0 || mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0)
     GTEST_SKIP() << "no mounts of one's own: run as root, or allow user namespaces";
   const std::filesystem::path disk = file("disk");

@@ -22,7 +22,7 @@ using std::chrono::milliseconds;
 
 class Reload : public RobotNetwork {};
 
-TEST_F(Reload, BadConfigurationLeavesTheOldOneInForce) {
+TEST_F(Reload, InvalidConfigurationLeavesTheOldOneInEffect) {
   const std::filesystem::path file = config();
   Child daemon(locusd(file));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
@@ -37,7 +37,7 @@ TEST_F(Reload, BadConfigurationLeavesTheOldOneInForce) {
   EXPECT_EQ(status()["threads"], 1);
 }
 
-TEST_F(Reload, PortThatIsTakenLeavesTheOldConfigurationInForce) {
+TEST_F(Reload, PortInUseLeavesTheOldConfigurationInEffect) {
   const std::filesystem::path file = config("flat_ground: off\n");
   Child daemon(locusd(file));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
@@ -56,7 +56,7 @@ TEST_F(Reload, PortThatIsTakenLeavesTheOldConfigurationInForce) {
 }
 
 /// Each reload takes longer than the interval to the next.
-TEST_F(Reload, ComingTooFastHoldsUpNeitherAnswersNorTheEnd) {
+TEST_F(Reload, FrequentReloadsDelayNeitherAnswersNorTheStop) {
   Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   std::atomic<bool> stopping{false};
@@ -77,7 +77,7 @@ TEST_F(Reload, ComingTooFastHoldsUpNeitherAnswersNorTheEnd) {
 
 /// Neither the new configuration nor the old one works: systemd restarts the service, which resumes from the saved
 /// pose.
-TEST_F(Reload, FailingTwiceEndsTheServiceWithItsStateSaved) {
+TEST_F(Reload, FailureOfBothConfigurationsEndsTheServiceWithItsStateSaved) {
   for (const bool by_signal : {false, true}) {
     std::ofstream calibration{this->file("unit.yaml")};
     calibration << "num_lasers: 16\nlasers:\n";

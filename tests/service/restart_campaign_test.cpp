@@ -116,7 +116,7 @@ class RestartCampaign : public RobotNetwork, public testing::WithParamInterface<
   std::optional<Child> daemon_, listener_, play_;
 };
 
-TEST_P(RestartCampaign, TheRobotGoesOnWhereItIs) {
+TEST_P(RestartCampaign, ResumesAtTheTruePose) {
   std::mt19937 random(static_cast<std::uint32_t>(number("SEED", 4711)));
   std::vector<Event> events;
   for (int i = 0; i < restarts_; ++i) { // four of six are crashes

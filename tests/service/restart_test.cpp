@@ -52,7 +52,7 @@ class Restart : public RobotNetwork {
 };
 
 /// After a crash only the pose of the last sweep tells how far the robot has come since the map was saved.
-TEST_F(Restart, StoppedAndKilledInMidDriveItGoesOnWhereTheRobotIs) {
+TEST_F(Restart, ResumesAtThePoseOfTheRobotAfterStopAndKill) {
   for (const int end : {SIGTERM, SIGKILL}) {
     std::this_thread::sleep_for(seconds{4});
     daemon_->signal(end);
@@ -66,7 +66,7 @@ TEST_F(Restart, StoppedAndKilledInMidDriveItGoesOnWhereTheRobotIs) {
 
 /// Restart by the watchdog: six seconds later the robot is elsewhere, and only its wheels have measured
 /// the motion.
-TEST_F(Restart, StalledForSixSecondsInMidDriveItGoesOnWhereTheWheelsSay) {
+TEST_F(Restart, ResumesAtThePoseOfTheWheelsAfterASixSecondStall) {
   std::this_thread::sleep_for(seconds{3});
   daemon_->signal(SIGSTOP);
   std::this_thread::sleep_for(seconds{6});
@@ -81,7 +81,7 @@ TEST_F(Restart, StalledForSixSecondsInMidDriveItGoesOnWhereTheWheelsSay) {
 
 /// The same on a clock that the player moves: all that the sensors send while the service is away is lost, and the time
 /// stands still while it ends and begins.
-class RestartOfADriveThatWaits : public RobotNetwork {
+class RestartWithHeldInput : public RobotNetwork {
  protected:
   struct Outage {
     int signal;
@@ -128,12 +128,12 @@ class RestartOfADriveThatWaits : public RobotNetwork {
   static constexpr Duration kAmid = milliseconds{50}; ///< from the edges of an outage to what happens in it
 };
 
-TEST_F(RestartOfADriveThatWaits, StoppedAndKilledItGoesOnWhereTheRobotIs) {
+TEST_F(RestartWithHeldInput, ResumesAtThePoseOfTheRobotAfterStopAndKill) {
   drive_with({{SIGTERM, seconds{5}, milliseconds{5500}}, {SIGKILL, seconds{10}, milliseconds{10500}}});
   EXPECT_GT(heard(*listener_).size(), 120U);
 }
 
-TEST_F(RestartOfADriveThatWaits, AwayForSixSecondsItGoesOnWhereTheWheelsSay) {
+TEST_F(RestartWithHeldInput, ResumesAtThePoseOfTheWheelsAfterSixSeconds) {
   drive_with({{SIGKILL, seconds{5}, seconds{11}}});
   EXPECT_EQ(status()["beginning"], "map");
   EXPECT_TRUE(listener_->wait_until([](const auto& lines) {

@@ -26,7 +26,7 @@ bool hears_node(const Child& peer, const std::string& node, std::ptrdiff_t write
 }
 
 /// Topics added by a reload are claimed, too.
-TEST_F(RosNodeOfService, HasTheNameOfTheInstanceAndAllThatItPublishes) {
+TEST_F(RosNodeOfService, HasTheNameOfTheInstanceAndAllItsTopics) {
   const std::filesystem::path runtime = file("locusd@left");
   setenv("RUNTIME_DIRECTORY", runtime.c_str(), 1); // NOLINT(concurrency-mt-unsafe)
   const Child cyclone({CYCLONE_PEER, "0", "iron", "/locus"}), fast_dds({FAST_DDS_PEER, "0", "iron", "/locus"});
@@ -42,7 +42,7 @@ TEST_F(RosNodeOfService, HasTheNameOfTheInstanceAndAllThatItPublishes) {
     EXPECT_TRUE(hears_node(*peer, "/robot_7 locusd_left", kAlways + 2)) << testing::PrintToString(peer->lines());
 }
 
-TEST_F(RosNodeOfService, ThatIsTheOnlyOneIsLocusdInTheLayoutThatIsConfigured) {
+TEST_F(RosNodeOfService, SingleServiceIsNamedLocusdInTheConfiguredLayout) {
   const Child cyclone({CYCLONE_PEER, "0", "humble", "/locus"}), fast_dds({FAST_DDS_PEER, "0", "humble", "/locus"});
   const Child daemon(locusd(config("dds: {ros_graph: humble}\n")));
   for (const Child* peer : {&cyclone, &fast_dds})

@@ -44,7 +44,7 @@ class StateSaverTest : public testing::Test {
   StateSaver saver_{file_, {}, [](const std::string& problem) { ADD_FAILURE() << problem; }};
 };
 
-TEST_F(StateSaverTest, WritesTheMapEveryThirtySecondsOrTenMetresAndTheWhereaboutsAlways) {
+TEST_F(StateSaverTest, WritesTheMapEveryThirtySecondsOrTenMetresAndThePoseAlways) {
   update(seconds{0}, 0, FlatGround::off, false);
   saver_.write();
   EXPECT_FALSE(std::filesystem::exists(file_)) << "nothing was seen yet";
@@ -63,7 +63,7 @@ TEST_F(StateSaverTest, WritesTheMapEveryThirtySecondsOrTenMetresAndTheWhereabout
   EXPECT_TRUE(says(0, FlatGround::off)) << "at once";
 }
 
-TEST_F(StateSaverTest, WhatWasIsForgottenAtAResetAndThePoseThatIsToldKept) {
+TEST_F(StateSaverTest, ResetDiscardsTheStateAndStoresTheGivenPose) {
   update(seconds{0}, 3, FlatGround::off);
   ASSERT_TRUE(says(3, FlatGround::off));
   const SavedState told{{Stamp{}, Pose{Eigen::Quaterniond::Identity(), {7, 0, 0}}}, FlatGround::on, {}};
@@ -82,7 +82,7 @@ TEST_F(StateSaverTest, WhatWasIsForgottenAtAResetAndThePoseThatIsToldKept) {
   EXPECT_TRUE(says(9, FlatGround::off));
 }
 
-TEST_F(StateSaverTest, WritesFromAnotherThreadWhileItIsTold) {
+TEST_F(StateSaverTest, WritesFromAnotherThreadDuringUpdates) {
   Worker disk("disk", milliseconds{1}, [this](bool /*last*/) { saver_.write(); });
   constexpr int kSweeps = 200;
   for (int sweep = 0; sweep <= kSweeps; ++sweep)
@@ -95,7 +95,7 @@ TEST_F(StateSaverTest, WritesFromAnotherThreadWhileItIsTold) {
   EXPECT_EQ(x_m, kSweeps);
 }
 
-TEST_F(StateSaverTest, ClockThatIsSetBackPutsNothingOff) {
+TEST_F(StateSaverTest, ClockSetBackDelaysNoWrite) {
   update(seconds{0}, 1, FlatGround::off);
   ASSERT_TRUE(says(1, FlatGround::off));
   update(-seconds{10}, 2, FlatGround::on);
@@ -104,7 +104,7 @@ TEST_F(StateSaverTest, ClockThatIsSetBackPutsNothingOff) {
   EXPECT_TRUE(says(3, FlatGround::on)) << "and the map";
 }
 
-TEST_F(StateSaverTest, RobotThatDrivesIsCarriedOnForAMoment) {
+TEST_F(StateSaverTest, MovingRobotIsPredictedForAMoment) {
   update(seconds{0}, 3, FlatGround::off);
   ASSERT_TRUE(says(3, FlatGround::off));
   const Whereabouts last = load_state(file_)->last;
@@ -114,7 +114,7 @@ TEST_F(StateSaverTest, RobotThatDrivesIsCarriedOnForAMoment) {
   EXPECT_NEAR(x_m(-seconds{1}), 3, 1e-9) << "clocks are set";
 }
 
-TEST_F(StateSaverTest, SweepThatLiesAskewCarriesNobodyAway) {
+TEST_F(StateSaverTest, JumpOfTheTwistIsNotExtrapolated) {
   OdometryEstimate estimate;
   estimate.beginning = Beginning::origin;
   for (int sweep = 0; sweep < 5; ++sweep) {
@@ -134,7 +134,7 @@ TEST_F(StateSaverTest, SweepThatLiesAskewCarriesNobodyAway) {
 }
 
 /// Drivers are stopped before the service.
-TEST_F(StateSaverTest, WhatWasLearnedOfASourceOutlivesItsSilence) {
+TEST_F(StateSaverTest, LearnedCalibrationOutlivesSilenceOfItsSource) {
   OdometryEstimate estimate;
   estimate.stamp = stamp_from_ns(1);
   estimate.beginning = Beginning::origin;
@@ -148,7 +148,7 @@ TEST_F(StateSaverTest, WhatWasLearnedOfASourceOutlivesItsSilence) {
   EXPECT_FALSE(saver_.last()->learned[0]);
 }
 
-TEST_F(StateSaverTest, MinutesOfDeadReckoningAreNoDamage) {
+TEST_F(StateSaverTest, CovarianceAfterMinutesOfDeadReckoningIsValid) {
   SavedState state;
   state.last.pose_covariance = Vector6(1e12, 1e12, 1e12, 1, 1, 1).asDiagonal();
   state.last.pose_covariance(0, 1) = state.last.pose_covariance(1, 0) = 1e12 * (1 + 1e-9); // rounding error
@@ -159,7 +159,7 @@ TEST_F(StateSaverTest, MinutesOfDeadReckoningAreNoDamage) {
   EXPECT_FALSE(load_state(file_)) << "no covariance is like that";
 }
 
-TEST_F(StateSaverTest, WhatWasLearnedOfASourceGoesOn) {
+TEST_F(StateSaverTest, LearnedCalibrationIsRestored) {
   SavedState state;
   LearnedSource& learned = state.last.learned[1].emplace();
   learned.noise_per_s = Vector6::LinSpaced(0.1, 0.6);
@@ -187,7 +187,7 @@ TEST_F(StateSaverTest, WhatWasLearnedOfASourceGoesOn) {
 }
 
 /// Learned values are corrections of configured ones, and are discarded with them.
-TEST_F(StateSaverTest, WhatWasLearnedOfASourceGoesWhereItIsConfiguredOtherwise) {
+TEST_F(StateSaverTest, LearnedCalibrationIsDiscardedIfReconfigured) {
   std::vector<MotionSource> sources(2);
   sources[0].name = "wio";
   sources[1].name = "imu";
@@ -223,7 +223,7 @@ TEST_F(StateSaverTest, WhatWasLearnedOfASourceGoesWhereItIsConfiguredOtherwise) 
   EXPECT_TRUE(left_after([](MotionSource& imu) { imu.health_topic = "/health"; }));
 }
 
-TEST_F(StateSaverTest, EveryDamagedByteIsNoticed) {
+TEST_F(StateSaverTest, EveryDamagedByteIsDetected) {
   const test::TemporaryFolder memory{"/dev/shm"}; // no disk latency, thousands of times
   const std::filesystem::path file = memory / "state";
   SavedState state;
@@ -254,7 +254,7 @@ TEST_F(StateSaverTest, EveryDamagedByteIsNoticed) {
 }
 
 /// Power fails while the whereabouts are written: only this many bytes are new.
-TEST_F(StateSaverTest, WhereaboutsThatWereCutShortCostNoMap) {
+TEST_F(StateSaverTest, TruncatedPoseUpdateLosesNoMap) {
   const test::TemporaryFolder memory{"/dev/shm"};
   const std::filesystem::path file = memory / "state";
   SavedState state;

@@ -93,7 +93,7 @@ class SimTime : public RobotNetwork {
   }
 };
 
-TEST_F(SimTime, AtTwiceTheSpeedIsThatOfSensorsAndOfTheOdometry) {
+TEST_F(SimTime, ClockAtTwiceTheSpeedEqualsSensorsAndOdometry) {
   constexpr double kSpeed = 2.0, kStep_s = kSpeed * 0.01;
   const Child daemon(locusd(lidar_with("time: sensor")));
   const Child peer({FAST_DDS_PEER, "0", "listen", "/locus"});
@@ -111,7 +111,7 @@ TEST_F(SimTime, AtTwiceTheSpeedIsThatOfSensorsAndOfTheOdometry) {
     EXPECT_TRUE(clock.front().stamp < one.stamp && one.stamp < clock.back().stamp) << "of the same time";
 }
 
-TEST_F(SimTime, WithKeptStampsStaysWithinTheRecording) {
+TEST_F(SimTime, KeptStampsStayWithinTheRecording) {
   const auto [first, last] = range_of_the_drive();
   const Child peer({FAST_DDS_PEER, "0", "listen", "/locus"});
   play(peer, {"--clock", "--keep-stamps", "--speed", "4", capture().string()});
@@ -123,7 +123,7 @@ TEST_F(SimTime, WithKeptStampsStaysWithinTheRecording) {
   EXPECT_FALSE(stamps_of(peer, "imu").empty());
 }
 
-TEST_F(SimTime, WithKeptStampsIsThatOfTheRecording) {
+TEST_F(SimTime, ClockWithKeptStampsEqualsTheRecording) {
   const auto [first, last] = range_of_the_drive();
   const Child peer({FAST_DDS_PEER, "0", "listen", "/locus"});
   play(peer, {"--clock", "--keep-stamps", "--speed", "4", capture().string()});
@@ -136,7 +136,7 @@ TEST_F(SimTime, WithKeptStampsIsThatOfTheRecording) {
 }
 
 /// The second half of a capture, followed by the first.
-TEST_F(SimTime, DoesNotGoBackWithARecordingThatDoes) {
+TEST_F(SimTime, ClockDoesNotFollowARecordingBackwards) {
   constexpr Duration kHalf = seconds{10};
   std::filesystem::create_directory(file("turned"));
   {
@@ -156,7 +156,7 @@ TEST_F(SimTime, DoesNotGoBackWithARecordingThatDoes) {
   expect_never_back(stamps_of(peer, "clock"));
 }
 
-TEST_F(SimTime, IsNotToldUnlessItIsAskedFor) {
+TEST_F(SimTime, ClockIsPublishedOnlyOnRequest) {
   const Child peer({FAST_DDS_PEER, "0", "listen", "/locus"});
   play(peer, {"--speed", "10", capture().string()});
   EXPECT_FALSE(stamps_of(peer, "imu").empty());

@@ -75,7 +75,7 @@ TEST_F(Stream, CaptureFileIsSentWithoutConfigurationAndMotion) {
   EXPECT_NE(run.out.find(" packets sent"), std::string::npos) << run.out;
 }
 
-TEST_F(Stream, WhatIsNoneIsAnErrorOfOneLine) {
+TEST_F(Stream, InvalidStreamIsAnErrorOfOneLine) {
   const auto expect_refused = [](const std::string& from, int status, const std::string& said) {
     const ProgramRun run = play(from);
     EXPECT_EQ(run.status, status) << from;

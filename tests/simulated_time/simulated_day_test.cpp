@@ -21,7 +21,7 @@ double number(const char* variable, double otherwise) {
   return text == nullptr ? otherwise : std::stod(text);
 }
 
-TEST(FaultSchedule, SameSeedGivesTheSameFaultsAndAnotherOneOthers) {
+TEST(FaultSchedule, SeedDeterminesTheFaults) {
   const auto text = [](std::uint64_t seed) {
     std::string all;
     for (const ScheduledFault& fault : schedule_faults(seed, std::chrono::hours{24}, std::chrono::seconds{30}))
@@ -35,7 +35,7 @@ TEST(FaultSchedule, SameSeedGivesTheSameFaultsAndAnotherOneOthers) {
 }
 
 /// The default seed covers 16 of the 17 kinds of fault, including a crash, and a silence in which packets are balanced.
-TEST(SimulatedDay, ServiceOutlivesItsFaults) {
+TEST(SimulatedDay, ServiceSurvivesItsFaults) {
   constexpr double kMostDisturbed = 0.5;
   constexpr double kSweeps_hz = 10, kLeastHeard = 0.3; // lidar, service and link are down for part of the day
   std::optional<RobotComputer> computer;

@@ -73,7 +73,7 @@ TEST(LoopedCourse, LapsJoinWithoutAGapAcrossTheEndOfTheHour) {
 }
 
 /// Six laps in two processes, with restarts on the last three; the first process runs part of the day only.
-TEST(SoakProgram, GoesOnWhereItWasInterruptedAndAllBoundsHold) {
+TEST(SoakProgram, ResumesAfterInterruptionAndAllBoundsHold) {
   const test::TemporaryFolder folder;
   const auto soak_for = [&](double hours_long) {
     return std::vector<std::string>{
@@ -122,21 +122,21 @@ std::vector<Piece> good_day(int day_h) {
   return pieces;
 }
 
-TEST(Verdict, GoodDayBreaksNothing) {
+TEST(Verdict, GoodDayPasses) {
   const Verdict verdict = judge(good_day(24));
   EXPECT_TRUE(verdict.broken.empty());
   EXPECT_NEAR(verdict.growth_mb_per_hour.value(), 0.0, 1e-9);
   EXPECT_NEAR(verdict.cpu_drift.value(), 1.0, 1e-9);
 }
 
-TEST(Verdict, WhatTakesHoursIsNotJudgedBefore) {
+TEST(Verdict, LongTermBoundsAreNotJudgedEarly) {
   const Verdict verdict = judge(good_day(1));
   EXPECT_FALSE(verdict.growth_mb_per_hour || verdict.cpu_drift || verdict.latency_drift);
   EXPECT_TRUE(verdict.broken.empty());
   EXPECT_TRUE(judge({}).broken.empty());
 }
 
-TEST(Verdict, LeakIsFoundWhateverTheLevelOfAProcess) {
+TEST(Verdict, LeakIsDetectedAtAnyMemoryLevel) {
   std::vector<Piece> pieces = good_day(24);
   for (Piece& piece : pieces) {
     if (piece.hour > 12.0)
@@ -151,7 +151,7 @@ TEST(Verdict, LeakIsFoundWhateverTheLevelOfAProcess) {
   EXPECT_EQ(judge(pieces).broken.size(), 1U);
 }
 
-TEST(Verdict, EachBoundIsHeld) {
+TEST(Verdict, EachBoundIsChecked) {
   const auto broken_by = [](const auto& spoil) {
     std::vector<Piece> pieces = good_day(24);
     spoil(pieces);
