@@ -22,16 +22,17 @@ using nlohmann::ordered_json;
 
 namespace {
 
-constexpr double kBetter_sigma = 3.0;  ///< least deviation from the configuration
-constexpr double kTold = 0.7;          ///< largest ratio of learned to configured sigma of an observed figure
-constexpr double kHardlyLate_s = 1e-3; ///< largest delay left after the compensation by MotionTrack
-constexpr double kGrossly_s = 0.03, kGrossly_rad = 3.0 * kRadPerDeg;
-constexpr double kPlain_sigma = 5.0; ///< least significance above these limits
-constexpr double kKnown_rad = 0.01;  ///< largest sigma of a reported mounting; hard driving biases less certain ones
+constexpr double kMinDeviation_sigma = 3.0;     ///< least deviation from the configuration
+constexpr double kObservedRatio = 0.7;          ///< largest ratio of learned to configured sigma of an observed figure
+constexpr double kMaxResidualLateness_s = 1e-3; ///< largest delay left after the compensation by MotionTrack
+constexpr double kGrossLateness_s = 0.03, kGrossMounting_rad = 3.0 * kRadPerDeg;
+constexpr double kSignificance_sigma = 5.0; ///< least significance above these limits
+/// Largest sigma of a reported mounting; hard driving biases less certain ones.
+constexpr double kMaxMountingSigma_rad = 0.01;
 constexpr std::array<std::string_view, 3> kAxisNames{"x (roll)", "y (pitch)", "z (yaw)"};
 
-bool is_plainly_above(const Learned& figure, double limit) {
-  return std::abs(figure.mean) - kPlain_sigma * figure.sigma > limit;
+bool significantly_exceeds(const Learned& figure, double limit) {
+  return std::abs(figure.mean) - kSignificance_sigma * figure.sigma > limit;
 }
 
 /// Formats a figure and its configuration in `unit`, offset by `from`.
@@ -53,8 +54,8 @@ ordered_json mounting_json(const LearnedSource& learned, const LearnedSource& co
 }
 
 bool is_known_better(const Learned& figure, const Learned& configured) {
-  return std::abs(figure.mean - configured.mean) > kBetter_sigma * figure.sigma &&
-         figure.sigma < kTold * configured.sigma;
+  return std::abs(figure.mean - configured.mean) > kMinDeviation_sigma * figure.sigma &&
+         figure.sigma < kObservedRatio * configured.sigma;
 }
 
 /// Returns the keys in which two configurations of a source differ, with the values of the second.
@@ -84,7 +85,7 @@ namespace {
 /// Tells whether samples arrive after the de-skew of the points that they belong to.
 bool is_too_late(const MotionSourceOptions& source, const LearnedSource& learned) {
   const double late_s = learned.lateness_s().mean;
-  return source.kind == SourceKind::imu && late_s - to_seconds(MotionTrack::taken_out(late_s)) > kHardlyLate_s;
+  return source.kind == SourceKind::imu && late_s - to_seconds(MotionTrack::taken_out(late_s)) > kMaxResidualLateness_s;
 }
 
 } // namespace
@@ -175,10 +176,10 @@ std::string line_of(std::string_view source, std::string_view figure, const orde
     return (axis < 0 ? value : value.at(static_cast<std::size_t>(axis))).get<double>();
   };
   const double sd = get("sd"), off = std::abs(get("value") - get("configured"));
-  const std::string_view verdict = too_late                             ? "too late to calibrate during a drive"
-                                   : sd >= kTold * get("configured_sd") ? "not observed by the drives so far"
-                                   : off > kBetter_sigma * sd           ? "better known than configured"
-                                                                        : "as configured";
+  const std::string_view verdict = too_late ? "too late to calibrate during a drive"
+                                   : sd >= kObservedRatio * get("configured_sd") ? "not observed by the drives so far"
+                                   : off > kMinDeviation_sigma * sd              ? "better known than configured"
+                                                                                 : "as configured";
   return fmt::format("{:<12} {:<24} {:>16} {:>20}  {}\n", source, figure,
                      text_of(get("configured"), get("configured_sd")), text_of(get("value"), sd), verdict);
 }
@@ -207,7 +208,7 @@ std::string calibration_text(const ordered_json& sources) {
   return text.size() > head ? text : "No motion source that calibrates itself has been received.\n";
 }
 
-std::string calibration_doubt(const Figures& figures, std::size_t source) {
+std::string calibration_warning(const Figures& figures, std::size_t source) {
   if (figures.config.motion_sources[source].kind != SourceKind::imu || !figures.sweeps.last ||
       !figures.sweeps.last->sources[source].learned)
     return "";
@@ -216,10 +217,10 @@ std::string calibration_doubt(const Figures& figures, std::size_t source) {
   const double configured_ms = figures.config.motion_sources[source].late_ms;
   Learned late = learned.lateness_s();
   late.mean -= 1e-3 * configured_ms;
-  if (is_plainly_above(late, kGrossly_s))
+  if (significantly_exceeds(late, kGrossLateness_s))
     return fmt::format("stamps a motion {} {} lidar does{}; make its driver stamp samples when they are measured and "
                        "check the clocks of both, or {}",
-                       too_late ? fmt::format("more than {:.0f} ms", 1e3 * kGrossly_s)
+                       too_late ? fmt::format("more than {:.0f} ms", 1e3 * kGrossLateness_s)
                                 : fmt::format("{:.0f} ms", std::abs(1e3 * late.mean)),
                        late.mean > 0.0 ? "later than" : "earlier than",
                        configured_ms != 0.0 ? " on top of late_ms" : "",
@@ -227,7 +228,7 @@ std::string calibration_doubt(const Figures& figures, std::size_t source) {
                                 : fmt::format("configure late_ms: {:.0f}", configured_ms + 1e3 * late.mean));
   for (int axis = 0; axis < 3 && !too_late; ++axis) {
     const Learned turn = learned.mounting_rad(axis);
-    if (turn.sigma < kKnown_rad && is_plainly_above(turn, kGrossly_rad))
+    if (turn.sigma < kMaxMountingSigma_rad && significantly_exceeds(turn, kGrossMounting_rad))
       return fmt::format("is rotated by {:+.1f} degrees about {} of the base relative to lidar, against T_base_source "
                          "and T_base_lidar; measure both, and correct the wrong rpy_deg",
                          turn.mean / kRadPerDeg, kAxisNames[static_cast<std::size_t>(axis)]);

@@ -36,6 +36,6 @@ std::string calibration_text(const nlohmann::ordered_json& sources);
 /// Describes a significant, large error in the stamps or the mounting of the IMU with this index, and the remedy;
 /// phrased to follow the name of the source. Whether the IMU or the lidar is at fault is unknown. Empty if there is no
 /// such error. Any thread.
-std::string calibration_doubt(const Figures& figures, std::size_t source);
+std::string calibration_warning(const Figures& figures, std::size_t source);
 
 } // namespace locus::daemon

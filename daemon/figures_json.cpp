@@ -126,11 +126,11 @@ ordered_json innovation_json(const SourceReport& report) {
 }
 
 ordered_json source_json(const Figures& figures, std::size_t i) {
-  constexpr std::size_t kAlwaysTold = 7; ///< reasons; the others are rare and listed only if they occur
+  constexpr std::size_t kAlwaysListed = 7; ///< reasons; the others are rare and listed only if they occur
   const IngestReport::Source& source = figures.ingest.sources[i];
   ordered_json json{{"received", source.counters.received},
                     {"used_sweeps", figures.sweeps.used_sweeps[i]},
-                    {"rejected", counts_json<HealthReason>(source.counters.rejected, kAlwaysTold)},
+                    {"rejected", counts_json<HealthReason>(source.counters.rejected, kAlwaysListed)},
                     {"health_changes", source.counters.health_changes}};
   const std::string verdict = verdict_on(source, figures.live.has_value());
   if (figures.live || !verdict.empty())
@@ -209,7 +209,7 @@ ordered_json live_json(const Figures& figures, const Figures::Live& live) {
         {"unfit", recording->unfit},       {"problem", recording->problem}};
   if (const auto& incidents = live.incidents)
     json["incidents"] = {{"last", incidents->last.string()}, {"writing", incidents->writing.string()},
-                         {"kept", incidents->kept},          {"suppressed", incidents->suppressed},
+                         {"kept", incidents->stored},        {"suppressed", incidents->suppressed},
                          {"dropped", incidents->dropped},    {"problem", incidents->problem},
                          {"refusal", incidents->refusal}};
   json["dds"] = {{"connected", live.link.connected},

@@ -262,9 +262,9 @@ void add_lidars(MetricsText& text, const Figures& figures) {
     if (!lidar.tells_date)
       add_states<velodyne::PpsState>(text, {{"lidar", options.name}}, lidar.pps);
   });
-  bool tell_date = false;
-  for_each([&](const auto&, const auto& lidar) { tell_date = tell_date || lidar.tells_date; });
-  if (tell_date) {
+  bool any_tells_date = false;
+  for_each([&](const auto&, const auto& lidar) { any_tells_date = any_tells_date || lidar.tells_date; });
+  if (any_tells_date) {
     text.state_set("locusd_lidar_clock", "Reference of the clock of an Ouster or a Hesai.");
     for_each([&](const auto& options, const auto& lidar) {
       if (lidar.tells_date)
@@ -370,7 +370,7 @@ void add_outlets(MetricsText& text, const Figures::Live& live) {
   add_states(text, {}, live.flat_ground);
   if (live.incidents) {
     text.counter("locusd_incidents_kept", "Incidents stored.");
-    text.add(live.incidents->kept);
+    text.add(live.incidents->stored);
     text.counter("locusd_incidents_suppressed", "Incidents too soon after another.");
     text.add(live.incidents->suppressed);
     text.counter("locusd_incident_inputs_dropped", "Inputs missing from the memory for the next incident.");

@@ -121,7 +121,7 @@ std::string sources_text(const Figures& figures) {
       text += fmt::format("{:<12}refused: {}\n", "", refused);
     if (const std::string verdict = verdict_on(source, true); !verdict.empty())
       text += fmt::format("{:<12}{}\n", "", verdict);
-    if (const std::string doubt = calibration_doubt(figures, i); !doubt.empty())
+    if (const std::string doubt = calibration_warning(figures, i); !doubt.empty())
       text += fmt::format("{:<12}{}\n", "", doubt);
   }
   return text;

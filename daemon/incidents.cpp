@@ -281,7 +281,7 @@ void Incidents::end(const std::string& problem) {
   const std::scoped_lock lock(mutex_);
   if (problem.empty()) {
     status_.last = status_.writing;
-    ++status_.kept;
+    ++status_.stored;
     status_.problem.clear();
   }
   (is_requested_ ? status_.refusal : status_.problem) = problem;

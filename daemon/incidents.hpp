@@ -48,7 +48,7 @@ class Incidents {
   struct Status {
     std::filesystem::path last;    ///< last complete incident of this process; empty: none
     std::filesystem::path writing; ///< incident being written; empty: none
-    std::uint64_t kept = 0;        ///< incidents stored by this process
+    std::uint64_t stored = 0;      ///< incidents stored by this process
     std::uint64_t suppressed = 0;  ///< automatic incidents too soon after another
     std::uint64_t dropped = 0;     ///< inputs missing in the buffer for the next incident, see Recorder::Status
     std::string problem;           ///< failure of the last automatic incident; cleared by the next stored one

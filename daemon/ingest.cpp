@@ -11,7 +11,7 @@ namespace locus::daemon {
 
 namespace {
 
-constexpr Duration kLongestTurn = std::chrono::milliseconds{200}; ///< at 300 rpm, the lowest rate of all models
+constexpr Duration kMaxRevolution = std::chrono::milliseconds{200}; ///< at 300 rpm, the lowest rate of all models
 
 std::vector<Pose> mounts(const std::vector<LidarOptions>& lidars) {
   std::vector<Pose> T_base_lidar;
@@ -57,7 +57,7 @@ std::size_t hesai_firings(hesai::Model model, Duration period) {
 /// Returns the largest number of returns in a sweep: dual return mode, an echo for every firing. Assumes the largest
 /// model while a lidar is not yet recognised; surplus memory is reserved, but never touched.
 std::size_t max_returns(const Config& config) {
-  const Duration period = std::max(kLongestTurn, config.sweep.sweep_period.value_or(kLongestTurn));
+  const Duration period = std::max(kMaxRevolution, config.sweep.sweep_period.value_or(kMaxRevolution));
   std::size_t returns = 0;
   for (const LidarOptions& lidar : config.lidars) {
     if (lidar.is_ouster()) {
@@ -87,7 +87,7 @@ Ingest::Ingest(const Config& config, LidarRouter lidars, Sink sink, MotionSource
                                                   max_returns(config),
                                                   [this](Sweep& sweep) {
                                                     const StageStopwatch::Pause pause(stages_);
-                                                    sink_(sweep, {cut_watch_.cut_began(), stages_.lap()});
+                                                    sink_(sweep, {cut_watch_.cut_start(), stages_.lap()});
                                                   },
                                                   &cut_watch_) {}
 
@@ -133,7 +133,7 @@ template void Ingest::process_motion(const OdometryInput&);
 
 void Ingest::CutWatch::enter(Stage stage) {
   if (stage == Stage::filter)
-    cut_began_ = MachineTime::now();
+    cut_start_ = MachineTime::now();
   stages_.enter(stage);
 }
 

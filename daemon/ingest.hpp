@@ -66,11 +66,11 @@ class Ingest {
     explicit CutWatch(StageStopwatch& stages) : stages_(stages) {}
     void enter(Stage stage) override;
     void leave() override { stages_.leave(); }
-    [[nodiscard]] const MachineTime& cut_began() const { return cut_began_; }
+    [[nodiscard]] const MachineTime& cut_start() const { return cut_start_; }
 
    private:
     StageStopwatch& stages_;
-    MachineTime cut_began_;
+    MachineTime cut_start_;
   };
 
   template <class MotionInput> void process_motion(const MotionInput& input);

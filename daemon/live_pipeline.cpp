@@ -116,7 +116,7 @@ void LivePipeline::run_odometry() {
 
 void LivePipeline::process(const CutSweep& cut_sweep) {
   const Duration period = from_seconds(to_seconds(cut_sweep.sweep.end - cut_sweep.sweep.start) / options_.speed);
-  const Duration deadline = cut_sweep.cut.began.wall + period;
+  const Duration deadline = cut_sweep.cut.start.wall + period;
   const ProcessedSweep done = processor_.process(cut_sweep.sweep, cut_sweep.cut, [this, deadline] {
     return stopping_.load(std::memory_order_relaxed) || read_clock(CLOCK_MONOTONIC) > deadline;
   });

@@ -90,7 +90,7 @@ class StageStopwatch : public StageClock {
 
 /// Cost data that accompanies a sweep from its cut to its processing.
 struct SweepCut {
-  MachineTime began;        ///< start of the work on the cut
+  MachineTime start;        ///< start of the work on the cut
   StageTimes ingest_took{}; ///< since the previous cut
 };
 

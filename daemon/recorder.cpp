@@ -53,13 +53,13 @@ std::uint64_t CaptureRing::piece_bytes() const { return max_bytes_ / kPieces - k
 
 std::optional<std::string> CaptureRing::obstacle() const {
   std::error_code error;
-  path there = std::filesystem::absolute(folder_, error);
-  while (!std::filesystem::exists(there, error) && there.has_relative_path())
-    there = there.parent_path();
-  if (!std::filesystem::is_directory(there, error))
+  path existing = std::filesystem::absolute(folder_, error);
+  while (!std::filesystem::exists(existing, error) && existing.has_relative_path())
+    existing = existing.parent_path();
+  if (!std::filesystem::is_directory(existing, error))
     return disk_failure_text("cannot be created", folder_, std::make_error_code(std::errc::not_a_directory));
-  if (faccessat(AT_FDCWD, there.c_str(), W_OK, AT_EACCESS) != 0)
-    return disk_failure_text("cannot be written to", there, {errno, std::generic_category()});
+  if (faccessat(AT_FDCWD, existing.c_str(), W_OK, AT_EACCESS) != 0)
+    return disk_failure_text("cannot be written to", existing, {errno, std::generic_category()});
   return std::nullopt;
 }
 
@@ -306,12 +306,12 @@ void Recorder::record(const Input& input) noexcept {
 
 /// Queues all parts of a datagram, or none.
 bool Recorder::push(const Datagram& datagram) noexcept {
-  constexpr std::size_t kMost = DatagramPart::kMaxBytes;
+  constexpr std::size_t kPartBytes = DatagramPart::kMaxBytes;
   std::span<const std::byte> rest = datagram.payload;
-  if (queue_->free_slots() < std::max<std::size_t>(1, (rest.size() + kMost - 1) / kMost))
+  if (queue_->free_slots() < std::max<std::size_t>(1, (rest.size() + kPartBytes - 1) / kPartBytes))
     return false;
   do {
-    DatagramPart part{datagram, std::min(rest.size(), kMost), rest.size() <= kMost};
+    DatagramPart part{datagram, std::min(rest.size(), kPartBytes), rest.size() <= kPartBytes};
     std::copy_n(rest.begin(), part.bytes, part.payload.begin());
     rest = rest.subspan(part.bytes);
     if (!queue_->push(part))
@@ -357,7 +357,7 @@ void Recorder::write(const Entry& entry) {
     return;
   }
   ++(write_to_piece(entry) ? unflushed_ : unfit_);
-  if (piece_->bytes() >= disk_.piece_bytes() || read_clock(CLOCK_MONOTONIC) - piece_began_ >= piece_duration_)
+  if (piece_->bytes() >= disk_.piece_bytes() || read_clock(CLOCK_MONOTONIC) - piece_start_ >= piece_duration_)
     end_piece();
 }
 
@@ -398,7 +398,7 @@ bool Recorder::begin_piece(Stamp now) {
   }
   piece_.emplace(std::move(*piece));
   flushed_ = 0;
-  piece_began_ = synced_ = read_clock(CLOCK_MONOTONIC);
+  piece_start_ = synced_ = read_clock(CLOCK_MONOTONIC);
   return true;
 }
 

@@ -197,7 +197,7 @@ class Recorder {
   std::atomic<std::uint64_t> overflowed_{0};                 ///< inputs dropped because the ring was full
 
   CaptureRing disk_;                        ///< this and the following are owned by the disk thread
-  Duration piece_duration_, piece_began_{}; ///< longest duration of a piece; start of this one, CLOCK_MONOTONIC
+  Duration piece_duration_, piece_start_{}; ///< longest duration of a piece; start of this one, CLOCK_MONOTONIC
   bool is_started_ = false, is_last_round_ = false;
   std::optional<PieceWriter> piece_;
   std::vector<std::byte> parts_; ///< parts of a datagram received so far

@@ -64,7 +64,7 @@ class SweepProcessor {
   ProcessedSweep process(
       const Sweep& sweep, const SweepCut& cut, const Gicp::StopRequested& stop = [] { return false; }) {
     ProcessedSweep done{odometry_.process(sweep, stop), sweep.sequence, sweep.raw_returns, {}, {}, cut.ingest_took};
-    done.took = MachineTime::now() - cut.began;
+    done.took = MachineTime::now() - cut.start;
     const StageTimes odometry_took = stages_.lap();
     std::ranges::transform(done.stages_took, odometry_took, done.stages_took.begin(), std::plus{});
     for (std::size_t source = 0; source < kMaxSources; ++source)

@@ -15,11 +15,11 @@ namespace {
 bool is_letter_or_digit(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'); }
 
 /// Escapes characters that are invalid in ROS 2 names. Reversible, so distinct texts stay distinct.
-std::string legal(std::string_view text) {
+std::string escape(std::string_view text) {
   std::string name;
   for (std::size_t i = 0; i < text.size(); ++i) {
-    const bool looks_written = text.substr(i, 2) == "_x";
-    if (is_letter_or_digit(text[i]) || (text[i] == '_' && !looks_written))
+    const bool is_escape_prefix = text.substr(i, 2) == "_x";
+    if (is_letter_or_digit(text[i]) || (text[i] == '_' && !is_escape_prefix))
       name += text[i];
     else
       name += fmt::format("_x{:02x}", static_cast<unsigned char>(text[i]));
@@ -58,24 +58,24 @@ template <class Gid> Endpoints<Gid> endpoints_of(dds_entity_t participant) {
   return all;
 }
 
-template <class Sequence, class Item> void show(Sequence& sequence, std::vector<Item>& items) {
+template <class Sequence, class Item> void set_sequence(Sequence& sequence, std::vector<Item>& items) {
   const auto count = static_cast<std::uint32_t>(items.size());
   sequence = {count, count, items.data(), false};
 }
 
 /// Publishes the announcement. Its own writer is not listed as an endpoint of the node, as in ROS 2.
-template <class Info> DdsEntity tell(RosNode node, const DdsNode& from) {
+template <class Info> DdsEntity write_announcement(RosNode node, const DdsNode& from) {
   using Gid = decltype(Info::gid_);
   using Node = std::remove_pointer_t<decltype(Info{}.node_entities_info_seq_._buffer)>;
   Endpoints<Gid> endpoints = endpoints_of<Gid>(from.participant());
   std::vector<Node> nodes(1);
   nodes.front().node_namespace_ = node.name_space.data();
   nodes.front().node_name_ = node.name.data();
-  show(nodes.front().reader_gid_seq_, endpoints.readers);
-  show(nodes.front().writer_gid_seq_, endpoints.writers);
+  set_sequence(nodes.front().reader_gid_seq_, endpoints.readers);
+  set_sequence(nodes.front().writer_gid_seq_, endpoints.writers);
   Info info{};
   info.gid_ = gid_of<Gid>(from.participant());
-  show(info.node_entities_info_seq_, nodes);
+  set_sequence(info.node_entities_info_seq_, nodes);
   DdsEntity writer = from.create_writer<Info>("ros_discovery_info", TopicQos::latch());
   dds_write(writer.handle(), &info);
   return writer;
@@ -85,15 +85,15 @@ template <class Info> DdsEntity tell(RosNode node, const DdsNode& from) {
 
 RosNode ros_node(std::string_view prefix, std::string_view instance) {
   const std::string_view parent = prefix.substr(0, prefix.rfind('/'));
-  return {parent.empty() ? "/" : std::string(parent), instance.empty() ? "locusd" : "locusd_" + legal(instance)};
+  return {parent.empty() ? "/" : std::string(parent), instance.empty() ? "locusd" : "locusd_" + escape(instance)};
 }
 
 DdsEntity announce(const RosNode& node, const DdsNode& from, RosGraph graph) {
   switch (graph) {
   case RosGraph::iron:
-    return tell<ros::ParticipantEntitiesInfo>(node, from);
+    return write_announcement<ros::ParticipantEntitiesInfo>(node, from);
   case RosGraph::humble:
-    return tell<ros::HumbleParticipantEntitiesInfo>(node, from);
+    return write_announcement<ros::HumbleParticipantEntitiesInfo>(node, from);
   case RosGraph::off:
     break;
   }

@@ -15,8 +15,8 @@ namespace locus::daemon {
 namespace {
 
 constexpr Duration kMaxSleep = std::chrono::milliseconds{100}; ///< period of checks of the stop flag
-constexpr Duration kFirstPause = std::chrono::seconds{1}; ///< pause after the first failed attempt; doubled each time
-constexpr Duration kLongestPause = std::chrono::seconds{15};
+constexpr Duration kFirstRetryDelay = std::chrono::seconds{1}; ///< doubled after each failed attempt
+constexpr Duration kMaxRetryDelay = std::chrono::seconds{15};
 
 } // namespace
 
@@ -151,7 +151,7 @@ void RosLink::run() {
 
 /// Connects, with retries; returns null when the link is to stop.
 std::unique_ptr<RosLink::Session> RosLink::connect() {
-  Duration pause = kFirstPause;
+  Duration delay = kFirstRetryDelay;
   Duration next_attempt{};
   while (!stopping_.load(std::memory_order_relaxed)) {
     progress_.fetch_add(1, std::memory_order_relaxed);
@@ -166,8 +166,8 @@ std::unique_ptr<RosLink::Session> RosLink::connect() {
     if (node)
       return std::make_unique<Session>(std::move(*node), config_, ros_node_);
     status_.problem = node.error();
-    next_attempt = read_clock(CLOCK_MONOTONIC) + pause;
-    pause = std::min(2 * pause, kLongestPause);
+    next_attempt = read_clock(CLOCK_MONOTONIC) + delay;
+    delay = std::min(2 * delay, kMaxRetryDelay);
   }
   return nullptr;
 }

@@ -38,7 +38,7 @@ ImuSample to_sample(const ros::Imu& message, Stamp arrival) {
 }
 
 double UsualCovariance::scale(const ros::Odometry& message) {
-  if (!moves(message))
+  if (!is_moving(message))
     return 1.0;
   const Stamp stamp = to_stamp(message.header_.stamp_);
   const double scale = compare(message.twist_.covariance_);
@@ -57,14 +57,14 @@ double UsualCovariance::scale(const ros::Odometry& message) {
 /// Compares the axes of which both the present and the usual variance are known, and learns the present one.
 double UsualCovariance::compare(std::span<const double, 36> twist_covariance) {
   double now = 0.0, usual = 0.0;
-  bool any_is_lost = false;
+  bool lost_any = false;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     constexpr double kMemory = 6000.0; ///< samples: two minutes at 50 Hz
     constexpr double kUnknown = 1e3;   ///< 32 m/s or rad/s: drivers send 1e3 to DBL_MAX for what they do not know
     const double variance = twist_covariance[7 * i];
     Axis& axis = axes_[i];
     const bool is_known = variance > 0.0 && variance < kUnknown; // false for NaN
-    any_is_lost = any_is_lost || (axis.samples > 0 && variance >= kUnknown);
+    lost_any = lost_any || (axis.samples > 0 && variance >= kUnknown);
     if (!is_known)
       continue;
     ++axis.samples;
@@ -74,13 +74,13 @@ double UsualCovariance::compare(std::span<const double, 36> twist_covariance) {
   }
   if (usual > 0.0)
     return now / usual;
-  return any_is_lost ? std::numeric_limits<double>::infinity() : 1.0;
+  return lost_any ? std::numeric_limits<double>::infinity() : 1.0;
 }
 
 /// Tells whether the robot clearly moves: by the twist or, for drivers that leave it zero, by the step since the
 /// message before.
-bool UsualCovariance::moves(const ros::Odometry& message) {
-  constexpr double kMoves_mps = 0.1, kMoves_radps = 0.1; ///< above what drivers take for rest
+bool UsualCovariance::is_moving(const ros::Odometry& message) {
+  constexpr double kMinSpeed_mps = 0.1, kMinTurnRate_radps = 0.1; ///< above what drivers take for rest
   const Stamp stamp = to_stamp(message.header_.stamp_);
   const auto& [p, q] = message.pose_.pose_;
   const Pose before = std::exchange(last_, Pose{to_eigen(q), {p.x_, p.y_, p.z_}});
@@ -88,10 +88,10 @@ bool UsualCovariance::moves(const ros::Odometry& message) {
   const Eigen::Vector3d velocity_mps = to_eigen(message.twist_.twist_.linear_);
   const Eigen::Vector3d turn_rate_radps = to_eigen(message.twist_.twist_.angular_);
   if (!velocity_mps.isZero(0) || !turn_rate_radps.isZero(0))
-    return velocity_mps.norm() > kMoves_mps || turn_rate_radps.norm() > kMoves_radps;
+    return velocity_mps.norm() > kMinSpeed_mps || turn_rate_radps.norm() > kMinTurnRate_radps;
   const double turned_rad = 2.0 * (last_.rotation.coeffs() - before.rotation.coeffs()).norm();
-  return step_s > 0.0 &&
-         ((last_.translation - before.translation).norm() > kMoves_mps * step_s || turned_rad > kMoves_radps * step_s);
+  return step_s > 0.0 && ((last_.translation - before.translation).norm() > kMinSpeed_mps * step_s ||
+                          turned_rad > kMinTurnRate_radps * step_s);
 }
 
 OdometrySample to_sample(const ros::Odometry& message, Stamp arrival, UsualCovariance& usual) {

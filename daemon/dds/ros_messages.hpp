@@ -49,7 +49,7 @@ class UsualCovariance {
   };
 
   double compare(std::span<const double, 36> twist_covariance);
-  bool moves(const ros::Odometry& message);
+  bool is_moving(const ros::Odometry& message);
 
   std::array<Axis, 6> axes_{};
   std::optional<Stamp> unusual_since_;

@@ -10,8 +10,9 @@
 
 namespace locus::daemon {
 
-/// Replaces `out` by the de-skewed points of a sweep, in the base frame at its end; `placed` has the order of `points`.
-void sweep_points(std::span<const SweepPoint> points, std::span<const SurfacePoint> placed,
+/// Replaces `out` by the de-skewed points of a sweep, in the base frame at its end; `deskewed` has the order of
+/// `points`.
+void sweep_points(std::span<const SweepPoint> points, std::span<const SurfacePoint> deskewed,
                   std::vector<CloudMessage::Point>& out);
 
 } // namespace locus::daemon

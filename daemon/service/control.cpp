@@ -94,11 +94,11 @@ std::vector<gid_t> groups_of(int client) {
 /// rate. Main thread only.
 std::optional<gid_t> privileged_group() {
   static std::optional<gid_t> privileged_group;
-  static Duration looked_up = -std::chrono::hours{1};
-  if (const Duration now = read_clock(CLOCK_MONOTONIC); now - looked_up > std::chrono::seconds{1}) {
+  static Duration refreshed_at = -std::chrono::hours{1};
+  if (const Duration now = read_clock(CLOCK_MONOTONIC); now - refreshed_at > std::chrono::seconds{1}) {
     const group* const found = getgrnam("locusd"); // NOLINT(concurrency-mt-unsafe)
     privileged_group = found != nullptr ? std::optional{found->gr_gid} : std::nullopt;
-    looked_up = now;
+    refreshed_at = now;
   }
   return privileged_group;
 }
@@ -199,8 +199,8 @@ void ControlServer::add_to(std::vector<pollfd>& poll) const {
 bool ControlServer::serve() {
   const std::uint64_t answered_before = answered_;
   const bool has_accepted = accept_waiting();
-  const std::size_t gone = std::erase_if(clients_, [this](Client& client) { return !serve(client); });
-  return has_accepted || gone > 0 || answered_ != answered_before;
+  const std::size_t disconnected = std::erase_if(clients_, [this](Client& client) { return !serve(client); });
+  return has_accepted || disconnected > 0 || answered_ != answered_before;
 }
 
 /// Accepts at most kMaxClients per call, so that repeated connects do not block the service.
@@ -252,7 +252,7 @@ std::optional<ControlServer::Answer> ControlServer::handle(Client& client) {
     return Answer::wrong_usage(request.error());
   if (!std::holds_alternative<ShowStatus>(*request) && !is_privileged(client.socket.number()))
     return Answer::refusal("not permitted; be root or a member of group locusd");
-  if (read_clock(CLOCK_MONOTONIC) - client.requested_at > kLongestAnswer)
+  if (read_clock(CLOCK_MONOTONIC) - client.requested_at > kAnswerTimeout)
     return Answer::refusal("no answer in time; is there lidar data (locusctl status)?");
   return handler_(*request);
 }

@@ -63,11 +63,11 @@ class ControlServer {
     static Answer wrong_usage(const std::string& why) { return {{{"error", why}, {"wrong_usage", true}}, {}}; }
   };
   /// Callback that answers a request; empty while there is no answer yet: serve() then repeats the request for up to
-  /// kLongestAnswer.
+  /// kAnswerTimeout.
   using Handler = std::function<std::optional<Answer>(const ControlRequest& request)>;
 
   static constexpr std::size_t kMaxClients = 16;
-  static constexpr Duration kLongestAnswer = std::chrono::seconds{3};
+  static constexpr Duration kAnswerTimeout = std::chrono::seconds{3};
 
   /// Opens the socket, whose owner also owns its folder. Fails with one line for the user, also if another service
   /// listens on it.

@@ -19,7 +19,7 @@ namespace {
 
 /// Subscription to the topic of a motion source or of a lidar's clouds.
 struct Subscription {
-  std::string whose; ///< "imu NAME"
+  std::string label; ///< "imu NAME"
   std::string name;
   std::optional<DdsReader<ros::Imu>> imu{};
   std::optional<DdsReader<ros::Odometry>> odometry{};
@@ -70,9 +70,9 @@ bool is_for(const HeardLidar& lidar, const LidarOptions& options) {
 }
 
 /// Lists the lidars that match no entry of the configuration.
-std::string unconfigured_lidars(const Config& config, const std::vector<HeardLidar>& heard) {
+std::string unconfigured_lidars(const Config& config, const std::vector<HeardLidar>& lidars) {
   std::string text;
-  for (const HeardLidar& lidar : heard)
+  for (const HeardLidar& lidar : lidars)
     if (lidar.is_known() &&
         std::ranges::none_of(config.lidars, [&](const auto& options) { return is_for(lidar, options); }))
       text += fmt::format("{}{} sends to port {}", text.empty() ? "" : ", ", lidar.name(), lidar.port);
@@ -80,32 +80,32 @@ std::string unconfigured_lidars(const Config& config, const std::vector<HeardLid
 }
 
 /// Returns a remedy for a lidar without packets.
-std::string remedy(const LidarOptions& options, const Config& config, const std::vector<HeardLidar>& heard,
+std::string remedy(const LidarOptions& options, const Config& config, const std::vector<HeardLidar>& lidars,
                    bool hears_all) {
-  if (const std::string others = unconfigured_lidars(config, heard); !others.empty())
+  if (const std::string others = unconfigured_lidars(config, lidars); !others.empty())
     return fmt::format("{}; if that is the lidar, set port and source_ip in the entry of {}", others, options.name);
   return hears_all ? "check its power, its cable and the address it sends to"
                    : "other ports were not checked: run as root to receive from all lidars, or use locusctl sensors";
 }
 
-void compare(const LidarOptions& options, const Config& config, const std::vector<HeardLidar>& heard, bool hears_all,
+void compare(const LidarOptions& options, const Config& config, const std::vector<HeardLidar>& lidars, bool hears_all,
              LiveCheck& check) {
-  std::vector<const HeardLidar*> mine;
-  for (const HeardLidar& lidar : heard)
+  std::vector<const HeardLidar*> matching;
+  for (const HeardLidar& lidar : lidars)
     if (is_for(lidar, options))
-      mine.push_back(&lidar);
+      matching.push_back(&lidar);
   const std::string& name = options.name;
-  if (mine.empty()) {
+  if (matching.empty()) {
     check.differences.push_back(fmt::format("lidar {}: no packets arrive at port {}{}; {}", name, options.port,
                                             options.source_ip ? " from " + dotted(*options.source_ip) : "",
-                                            remedy(options, config, heard, hears_all)));
+                                            remedy(options, config, lidars, hears_all)));
     return;
   }
-  const HeardLidar& lidar = *mine.front();
-  if (mine.size() > 1)
+  const HeardLidar& lidar = *matching.front();
+  if (matching.size() > 1)
     check.differences.push_back(
         fmt::format("lidar {}: {} and {} send to its port {}; give each its own entry with source_ip", name,
-                    lidar.name(), mine[1]->name(), options.port));
+                    lidar.name(), matching[1]->name(), options.port));
   else if (!lidar.is_known())
     check.differences.push_back(
         fmt::format("lidar {}: the packets at port {} are not supported: {}", name, options.port,
@@ -158,7 +158,7 @@ std::string published_type(const DdsNode& node, const std::string& topic) {
 
 void compare(const Subscription& topic, const DdsNode& node, const DdsOptions& dds, Duration duration,
              LiveCheck& check) {
-  const std::string about = fmt::format("{}: topic {}: ", topic.whose, topic.name);
+  const std::string about = fmt::format("{}: topic {}: ", topic.label, topic.name);
   const std::string type = topic.writers == 0 ? published_type(node, topic.name) : "";
   if (!type.empty())
     check.differences.push_back(
@@ -203,11 +203,11 @@ Expected<LiveCheck, std::string> check_live(const Config& config, Duration durat
     for (Subscription& topic : topics)
       topic.poll();
   }
-  const std::vector<HeardLidar> heard = survey.lidars();
+  const std::vector<HeardLidar> lidars = survey.lidars();
   for (const LidarOptions& lidar : config.lidars)
     if (!lidar.gives_clouds())
-      compare(lidar, config, heard, wire->hears_all(), check);
-  if (const std::string others = unconfigured_lidars(config, heard); !others.empty() && check.differences.empty())
+      compare(lidar, config, lidars, wire->hears_all(), check);
+  if (const std::string others = unconfigured_lidars(config, lidars); !others.empty() && check.differences.empty())
     check.matches.push_back(fmt::format("not configured: {}", others));
   for (const Subscription& topic : topics)
     compare(topic, *node, config.dds, duration, check);

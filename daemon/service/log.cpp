@@ -59,8 +59,8 @@ bool Log::is_admitted(const SourceLocation& where, std::uint64_t& suppressed_bef
 
 void Log::emit(Severity severity, const std::string& message, Fields fields, const SourceLocation& where) const {
   if (!to_journal_) {
-    static constexpr std::array<std::string_view, 7> kWords{"", "", "", "error: ", "warning: ", "", ""};
-    const std::string line = fmt::format("locusd: {}{}\n", kWords[static_cast<std::size_t>(severity)], message);
+    static constexpr std::array<std::string_view, 7> kPrefixes{"", "", "", "error: ", "warning: ", "", ""};
+    const std::string line = fmt::format("locusd: {}{}\n", kPrefixes[static_cast<std::size_t>(severity)], message);
     static_cast<void>(std::fputs(line.c_str(), stderr)); // a full log does not stop the service
     return;
   }

@@ -85,10 +85,10 @@ Expected<std::vector<UdpSocket>, std::string> open_lidar_sockets(const Config& c
   const auto smallest = std::ranges::min_element(sockets, {}, &UdpSocket::buffer_bytes);
   if (smallest == sockets.end()) // all lidars publish clouds
     return sockets;
-  if (const int least = smallest->buffer_bytes(); least < UdpSocket::kWantedBufferBytes)
+  if (const int bytes = smallest->buffer_bytes(); bytes < UdpSocket::kWantedBufferBytes)
     log.warn(fmt::format("the kernel grants lidar sockets {} of the {} bytes requested: packets will be lost under "
                          "load; set sysctl net.core.rmem_max={}",
-                         least, UdpSocket::kWantedBufferBytes, UdpSocket::kWantedBufferBytes));
+                         bytes, UdpSocket::kWantedBufferBytes, UdpSocket::kWantedBufferBytes));
   join_multicast(config, sockets);
   return sockets;
 }

@@ -41,7 +41,7 @@ void describe(CLI::App& app, Arguments& arguments) {
              "  locusd --config robot.yaml --check-config --live");
 }
 
-int compare_with_wire(const locus::Config& config) {
+int compare_with_network(const locus::Config& config) {
   const auto check = locus::daemon::check_live(config, std::chrono::seconds{3});
   if (!check) {
     fmt::print(stderr, "locusd: {}\n", check.error());
@@ -63,13 +63,13 @@ int run(const Arguments& arguments) {
   }
   if (arguments.print_config)
     fmt::print("{}", locus::print_config(*config));
-  const int compared = arguments.live ? compare_with_wire(*config) : kDone;
+  const int live_status = arguments.live ? compare_with_network(*config) : kDone;
   if (std::fflush(stdout) != 0) {
     fmt::print(stderr, "locusd: standard output cannot be written; check free space\n");
     return kFailed;
   }
   if (arguments.print_config || arguments.check_config)
-    return compared;
+    return live_status;
   locus::daemon::Log log;
   locus::daemon::Service service(arguments.config, log);
   return service.run(*config);
@@ -84,8 +84,8 @@ int main(int argc, char** argv) { // NOLINT(bugprone-exception-escape): exceptio
   try {
     app.parse(argc, argv);
     return run(arguments);
-  } catch (const CLI::Success& asked_for_text) {
-    return app.exit(asked_for_text);
+  } catch (const CLI::Success& requested_text) {
+    return app.exit(requested_text);
   } catch (const CLI::ParseError& error) {
     fmt::print(stderr, "locusd: {}\n", locus::explain(app, error));
     return kWrongUsage;

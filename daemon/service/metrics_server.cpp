@@ -31,7 +31,7 @@ std::string http_refusal(std::string_view status, std::string_view why, std::str
 }
 
 /// Removes the first word and the space after it, and returns the word.
-std::string_view take_word(std::string_view& text) {
+std::string_view split_word(std::string_view& text) {
   const std::string_view word = text.substr(0, text.find(' '));
   text.remove_prefix(std::min(text.size(), word.size() + 1));
   return word;
@@ -53,13 +53,13 @@ void set_options(const Descriptor& listener, int family) {
 
 std::string http_answer(std::string_view request, const std::function<std::string()>& metrics) {
   std::string_view line = request.substr(0, request.find("\r\n"));
-  const std::string_view method = take_word(line), target = take_word(line);
+  const std::string_view method = split_word(line), target = split_word(line);
   if (request.find(kEndOfHead) == std::string_view::npos || target.empty() || !line.starts_with("HTTP/1."))
     return http_refusal("400 Bad Request", "Send GET /metrics HTTP/1.1 and a short head.");
   if (target.substr(0, target.find('?')) != "/metrics")
-    return http_refusal("404 Not Found", "There is /metrics alone.");
+    return http_refusal("404 Not Found", "The only resource is /metrics.");
   if (method != "GET" && method != "HEAD")
-    return http_refusal("405 Method Not Allowed", "There are GET and HEAD alone.", "Allow: GET, HEAD\r\n");
+    return http_refusal("405 Method Not Allowed", "The only methods are GET and HEAD.", "Allow: GET, HEAD\r\n");
   std::string answer = http("200 OK", "application/openmetrics-text; version=1.0.0; charset=utf-8", "", metrics());
   if (method == "HEAD")
     answer.resize(answer.find(kEndOfHead) + kEndOfHead.size());
@@ -82,8 +82,8 @@ MetricsServer::open(const std::string& listen, std::function<std::string()> metr
   set_options(listener, family);
   if (bind(listener.number(), reinterpret_cast<const sockaddr*>(&address->storage), address->size) != 0)
     return failed(errno);
-  constexpr mode_t kEverybody = 0666; // like the status, for any local user
-  if ((!path.empty() && chmod(path.c_str(), kEverybody) != 0) || ::listen(listener.number(), kMaxClients) != 0)
+  constexpr mode_t kReadWriteForAll = 0666; // like the status, for any local user
+  if ((!path.empty() && chmod(path.c_str(), kReadWriteForAll) != 0) || ::listen(listener.number(), kMaxClients) != 0)
     return failed(errno);
   return std::unique_ptr<MetricsServer>(new MetricsServer(std::move(listener), path, std::move(metrics), clock));
 }
@@ -102,12 +102,12 @@ void MetricsServer::add_to(std::vector<pollfd>& poll) const {
 
 /// Accepts clients. A request that is already there is answered at once and displaces no other client.
 bool MetricsServer::serve() {
-  round_.clear();
-  const std::size_t gone = std::erase_if(clients_, [this](Client& client) { return !serve(client); });
+  cache_.clear();
+  const std::size_t disconnected = std::erase_if(clients_, [this](Client& client) { return !serve(client); });
   for (std::size_t i = 0; i < kMaxClients; ++i) {
     Descriptor socket{accept4(listener_.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC)};
     if (socket.number() < 0)
-      return i > 0 || gone > 0 || accept_has_failed();
+      return i > 0 || disconnected > 0 || accept_has_failed();
     Client client{std::move(socket), clock_(CLOCK_MONOTONIC), {}, {}};
     if (!serve(client))
       continue;
@@ -143,14 +143,14 @@ bool MetricsServer::read_request(Client& client) {
     return false;
   client.request.append(bytes.data(), static_cast<std::size_t>(size));
   if (client.request.find(kEndOfHead) != std::string::npos || client.request.size() > kMaxRequestBytes)
-    client.answer = http_answer(client.request, [this] { return metrics_of_this_round(); });
+    client.answer = http_answer(client.request, [this] { return cached_metrics(); });
   return true;
 }
 
-const std::string& MetricsServer::metrics_of_this_round() {
-  if (round_.empty())
-    round_ = metrics_();
-  return round_;
+const std::string& MetricsServer::cached_metrics() {
+  if (cache_.empty())
+    cache_ = metrics_();
+  return cache_;
 }
 
 } // namespace locus::daemon

@@ -58,13 +58,13 @@ class MetricsServer {
   /// Serves a client; false if it is to be disconnected.
   bool serve(Client& client);
   bool read_request(Client& client);
-  const std::string& metrics_of_this_round();
+  const std::string& cached_metrics();
 
   Descriptor listener_;
   std::filesystem::path path_; ///< Unix socket; otherwise empty
   std::function<std::string()> metrics_;
   Clock clock_;
-  std::string round_; ///< metrics cached for this round; empty until requested
+  std::string cache_; ///< metrics cached for this round; empty until requested
   std::vector<Client> clients_;
 };
 

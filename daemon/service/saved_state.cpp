@@ -270,19 +270,19 @@ void read_map(const Odometry& odometry, const Pose& T_odom_base, std::vector<Sur
 }
 
 std::optional<std::string> write_state(const std::filesystem::path& file, const SavedState& state) {
-  const std::filesystem::path beside = file.string() + ".new";
+  const std::filesystem::path new_file = file.string() + ".new";
   const std::string bytes = to_bytes(state);
-  const int descriptor = open(beside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  const int descriptor = open(new_file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   const bool written = descriptor >= 0 && write_all(descriptor, bytes) && fsync(descriptor) == 0;
   const int error = errno;
   if (descriptor >= 0)
     close(descriptor);
-  if (written && rename(beside.c_str(), file.c_str()) == 0) {
+  if (written && rename(new_file.c_str(), file.c_str()) == 0) {
     sync_folder(file.parent_path());
     return std::nullopt;
   }
   const std::string why = std::strerror(written ? errno : error); // NOLINT(concurrency-mt-unsafe)
-  unlink(beside.c_str());
+  unlink(new_file.c_str());
   return fmt::format("{}: the state cannot be saved ({}); after a restart the odometry starts at the origin",
                      file.string(), why);
 }

@@ -84,9 +84,9 @@ int Service::run(const Config& config) {
     const timespec tick = to_timespec(kTick);
     ppoll(wait.data(), wait.size(), &tick, nullptr);
     wanted = handle_signals();
-    const bool was_asked = wanted && control_ && control_->serve();
-    const bool was_scraped = wanted && session_ && metrics_ && metrics_->serve();
-    if (was_asked || was_scraped)
+    const bool has_answered = wanted && control_ && control_->serve();
+    const bool has_served = wanted && session_ && metrics_ && metrics_->serve();
+    if (has_answered || has_served)
       std::this_thread::sleep_for(kPauseAfterAnswers);
     supervise();
   }
@@ -314,7 +314,7 @@ void Service::check_for_incidents(const Figures& figures) {
     log_.error(fmt::format("{}; the odometry continues", incidents.problem));
   if (!incidents.refusal.empty() && incidents.refusal != logged_incidents_.refusal)
     log_.warn(incidents.refusal);
-  if (incidents.kept != logged_incidents_.kept)
+  if (incidents.stored != logged_incidents_.stored)
     log_.write(Severity::notice, fmt::format("the latest input is stored in {}", incidents.last.string()));
   logged_incidents_ = incidents;
 }
@@ -323,7 +323,7 @@ void Service::check_for_incidents(const Figures& figures) {
 /// whose client has timed out is repeated, since its map would be stale.
 std::optional<ControlServer::Answer> Service::answer(SaveMap /*request*/) {
   const Duration now = read_clock(CLOCK_MONOTONIC);
-  if (!map_requested_at_ || now - *map_requested_at_ > ControlServer::kLongestAnswer) {
+  if (!map_requested_at_ || now - *map_requested_at_ > ControlServer::kAnswerTimeout) {
     session_->request_map();
     map_requested_at_ = now;
   }

@@ -180,10 +180,10 @@ void Session::after_estimate(const Sweep& sweep, const Odometry& odometry, const
     start_.reset();
   clouds_.submit(sweep, odometry, estimate);
   state_saver_.update(odometry, estimate, flat_ground());
-  const std::uint64_t wanted = map_wanted_.load(std::memory_order_relaxed);
-  if (wanted == map_answered_)
+  const std::uint64_t wanted = map_requests_.load(std::memory_order_relaxed);
+  if (wanted == map_delivered_)
     return;
-  map_answered_ = wanted;
+  map_delivered_ = wanted;
   map_.back().request = wanted;
   read_planes(odometry.map().fine(), map_.back().points);
   static_cast<void>(map_.publish());
@@ -191,7 +191,7 @@ void Session::after_estimate(const Sweep& sweep, const Odometry& odometry, const
 
 const std::vector<SurfacePoint>* Session::poll_map() {
   const Map* const map = map_.poll();
-  return map != nullptr && map->request == map_wanted_.load(std::memory_order_relaxed) ? &map->points : nullptr;
+  return map != nullptr && map->request == map_requests_.load(std::memory_order_relaxed) ? &map->points : nullptr;
 }
 
 std::optional<std::string> Session::reset(std::optional<Pose> T_odom_base) {

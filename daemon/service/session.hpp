@@ -63,7 +63,7 @@ class Session {
   std::optional<SavedState> stop();
 
   /// Requests the surfaces of the map, available after the next sweep. Supersedes an earlier request.
-  void request_map() { map_wanted_.fetch_add(1, std::memory_order_relaxed); }
+  void request_map() { map_requests_.fetch_add(1, std::memory_order_relaxed); }
   [[nodiscard]] const std::vector<SurfacePoint>* poll_map();
 
   void set_flat_ground(FlatGround mode);
@@ -119,8 +119,8 @@ class Session {
     std::uint64_t request = 0;
     std::vector<SurfacePoint> points;
   };
-  std::atomic<std::uint64_t> map_wanted_{0}; ///< number of the last request
-  std::uint64_t map_answered_ = 0;           ///< last answered request; owned by the odometry thread
+  std::atomic<std::uint64_t> map_requests_{0}; ///< number of the last request
+  std::uint64_t map_delivered_ = 0;            ///< last answered request; owned by the odometry thread
   LatestSlot<Map> map_;
   RosLink link_;
   CloudPublisher clouds_;

@@ -177,7 +177,7 @@ void SessionMonitor::check_calibration(const Figures& figures) {
   for (std::size_t i = 0; i < sources.size(); ++i) {
     if (miscalibrated_[i])
       continue;
-    if (const std::string doubt = calibration_doubt(figures, i); !doubt.empty()) {
+    if (const std::string doubt = calibration_warning(figures, i); !doubt.empty()) {
       log_.warn(fmt::format("motion source {} {}", sources[i].name, doubt), {{"LOCUS_SOURCE", sources[i].name}});
       miscalibrated_.set(i);
     }

@@ -28,7 +28,7 @@ std::string doubt(SourceKind kind, const LearnedSource& learned) {
   config.motion_sources = {{{"source", kind, {}}, "", ""}};
   Figures figures{.config = config};
   figures.sweeps.last.emplace().sources[0].learned = learned;
-  return calibration_doubt(figures, 0);
+  return calibration_warning(figures, 0);
 }
 std::string doubt_of_gyro(double late_s, const Eigen::Vector3d& mounting_deg = {0, 0, 0}) {
   return doubt(SourceKind::imu, gyro(late_s, mounting_deg));
@@ -55,7 +55,7 @@ TEST(Calibration, UncertainErrorIsNotReported) {
   LearnedSource absurd = gyro(std::numeric_limits<double>::quiet_NaN(), {0, 0, 0});
   EXPECT_EQ(doubt(SourceKind::imu, absurd), "");
   Config config;
-  EXPECT_EQ(calibration_doubt(Figures{.config = config}, 0), "") << "no sweep yet";
+  EXPECT_EQ(calibration_warning(Figures{.config = config}, 0), "") << "no sweep yet";
 }
 
 /// Odometry has other states: a scale error of 4 % must not be reported as lateness.
@@ -182,12 +182,12 @@ TEST(Calibration, ConfiguredLatenessIsNotReported) {
   config.motion_sources[0].late_ms = 38;
   Figures figures{.config = config};
   figures.sweeps.last.emplace().sources[0].learned = gyro(0.04, {0, 0, 0});
-  EXPECT_EQ(calibration_doubt(figures, 0), "");
+  EXPECT_EQ(calibration_warning(figures, 0), "");
   figures.sweeps.last->sources[0].learned = gyro(0.09, {0, 0, 0});
-  EXPECT_NE(calibration_doubt(figures, 0).find("30 ms later than lidar does on top of late_ms"), std::string::npos);
-  EXPECT_NE(calibration_doubt(figures, 0).find("locus-replay --calibrate"), std::string::npos);
+  EXPECT_NE(calibration_warning(figures, 0).find("30 ms later than lidar does on top of late_ms"), std::string::npos);
+  EXPECT_NE(calibration_warning(figures, 0).find("locus-replay --calibrate"), std::string::npos);
   figures.sweeps.last->sources[0].learned = gyro(-0.04, {0, 0, 0});
-  EXPECT_NE(calibration_doubt(figures, 0).find("late_ms: -40"), std::string::npos);
+  EXPECT_NE(calibration_warning(figures, 0).find("late_ms: -40"), std::string::npos);
 }
 
 } // namespace

@@ -45,7 +45,7 @@ TEST(Ingest, BuildsOneSweepPerRevolutionAndCountsEveryPacket) {
   Ingest ingest(config, open_lidars(config), [&](Sweep& sweep, const SweepCut& cut) {
     ++sweeps;
     EXPECT_GT(sweep.points.size(), 1000U);
-    EXPECT_GT(cut.began.wall, Duration::zero());
+    EXPECT_GT(cut.start.wall, Duration::zero());
     EXPECT_EQ(sweep.uncorrected, sweeps == 1 ? sweep.uncorrected : Uncorrected::nothing);
   });
   std::uint64_t datagrams = 0;

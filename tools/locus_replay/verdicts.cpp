@@ -67,7 +67,7 @@ std::vector<std::string> warnings_about(const PlayedRecording& played) {
     if (const auto slow = daemon::slow_imu(played.config.motion_sources[i], played.figures.ingest.sources[i]))
       lines.push_back(*slow);
   for (std::size_t i = 0; i < played.config.motion_sources.size(); ++i)
-    if (const std::string doubt = daemon::calibration_doubt(played.figures, i); !doubt.empty())
+    if (const std::string doubt = daemon::calibration_warning(played.figures, i); !doubt.empty())
       lines.push_back(fmt::format("motion source {} {}", played.config.motion_sources[i].name, doubt));
   if (const auto warning = daemon::too_fast(played.config.odometry.motion, played.figures.sweeps.largest_speed_mps))
     lines.push_back(*warning);

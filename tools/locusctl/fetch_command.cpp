@@ -18,16 +18,16 @@ namespace fs = std::filesystem;
 
 /// Replaces the file atomically: concurrent readers get either version in full.
 void write_atomically(const fs::path& file, const std::string& text) {
-  const fs::path beside = file.string() + ".new";
+  const fs::path new_file = file.string() + ".new";
   std::error_code error;
-  if (!(std::ofstream{beside, std::ios::binary} << text).flush())
+  if (!(std::ofstream{new_file, std::ios::binary} << text).flush())
     error = {errno, std::generic_category()};
   else
-    fs::rename(beside, file, error);
+    fs::rename(new_file, file, error);
   if (!error)
     return;
   std::error_code ignored;
-  fs::remove(beside, ignored);
+  fs::remove(new_file, ignored);
   throw Failure(ExitStatus::failed, fmt::format("{}: cannot be written ({}); name another file with -o, or be root",
                                                 file.string(), error.message()));
 }
