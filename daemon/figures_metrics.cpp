@@ -376,7 +376,7 @@ void add_outlets(MetricsText& text, const Figures::Live& live) {
     text.counter("locusd_incident_inputs_dropped", "Inputs missing from the memory for the next incident.");
     text.add(live.incidents->dropped);
     text.gauge("locusd_incidents_problem",
-               "1 where the last incident could not be kept, or the input for the next is not held.");
+               "1 if the last incident could not be stored, or the input for the next is not recorded.");
     text.add(live.incidents->problem.empty() ? 0 : 1);
   }
   if (!live.recording)

@@ -40,7 +40,7 @@ std::string pose_text(const std::optional<OdometryEstimate>& last) {
                                  "attitude    {:9.2f} {:9.2f} {:9.2f} deg   +- {:.2f} {:.2f} {:.2f}\n",
                                  p[0], p[1], p[2], sigma(0, 1), sigma(1, 1), sigma(2, 1), a[0], a[1], a[2],
                                  sigma(3, 1 / kRadPerDeg), sigma(4, 1 / kRadPerDeg), sigma(5, 1 / kRadPerDeg));
-  text += "lidar sees ";
+  text += "observable ";
   for (std::size_t i = 0; i < kAxes.size(); ++i)
     text += fmt::format(" {} {}", kAxes[i], bar(last->observability[static_cast<Eigen::Index>(i)]));
   if (last->beginning)
@@ -72,7 +72,7 @@ std::string clouds_text(const LidarOptions& options, const IngestReport::Lidar& 
   const CloudCounters& counters = clouds.counters;
   std::string text =
       fmt::format("{:<9.8}{:<12}{:>5.0f}{:>10}{:>8}{:>9}{:>9}{:>8}\n", options.name,
-                  counters.used > 0 ? "clouds" : "unheard", 60 / to_seconds(clouds.period), counters.used, drops,
+                  counters.used > 0 ? "clouds" : "no data", 60 / to_seconds(clouds.period), counters.used, drops,
                   sum(counters.refused), counters.reordered, silence_text(lidar.last_heard));
   if (const std::string refused = reasons<CloudError>(counters.refused); !refused.empty())
     text += fmt::format("{:<9}refused: {}\n", "", refused);
@@ -94,7 +94,7 @@ std::string lidars_text(const Figures& figures) {
     const PacketCounters& packets = lidar.packets;
     text +=
         fmt::format("{:<9.8}{:<12}{:>5.0f}{:>10}{:>8}{:>9}{:>9}{:>8} {:.8}\n", options.name,
-                    lidar.model.empty() ? "unheard" : lidar.model, lidar.rotation_rate_rpm, packets.data, packets.lost,
+                    lidar.model.empty() ? "no data" : lidar.model, lidar.rotation_rate_rpm, packets.data, packets.lost,
                     sum(packets.rejected), packets.reordered, silence_text(lidar.last_heard), lidar.pps);
     if (const std::string refused = reasons<PacketError>(packets.rejected); !refused.empty())
       text += fmt::format("{:<9}refused: {}{}\n", "", refused,

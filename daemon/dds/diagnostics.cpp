@@ -60,7 +60,7 @@ Diagnostic lidar_diagnostic(const LidarOptions& options, const IngestReport::Lid
                     : !silence  ? (options.gives_clouds() ? "never heard; check that its driver publishes the topic"
                                                           : "never heard; check its cable, address and port")
                     : is_silent ? "silent; check its cable and power"
-                                : "heard",
+                                : "receiving",
                     values);
 }
 

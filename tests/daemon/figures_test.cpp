@@ -103,7 +103,7 @@ TEST(Figures, TextOfAServiceWithoutInputSaysSo) {
   Figures figures{.config = config};
   figures.live = Figures::Live{};
   const std::string text = to_text(figures);
-  for (const char* words : {"   waiting   ", "last never", "pose        none yet", "unheard", "never heard", "always"})
+  for (const char* words : {"   waiting   ", "last never", "pose        none yet", "no data", "never heard", "always"})
     EXPECT_NE(text.find(words), std::string::npos) << words << '\n' << text;
 }
 

@@ -104,7 +104,7 @@ TEST_F(McapResults, IsWhatOtherProgramsTakeForMessagesOfRos) {
       ASSERT_GE(diagnostics.statuses.size(), 4U) << "odometry, lidar, imu, wheels";
       EXPECT_EQ(diagnostics.statuses[0].name, "locusd");
       EXPECT_EQ(diagnostics.statuses[1].name, "locusd: lidar front");
-      EXPECT_EQ(diagnostics.statuses[1].message, "heard");
+      EXPECT_EQ(diagnostics.statuses[1].message, "receiving");
       ++statuses;
     }
   }
