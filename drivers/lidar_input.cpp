@@ -435,8 +435,8 @@ void LidarInput::count_lost(const SensorClock::Reading& reading) {
       missing = sectors_.lost_between(last_azimuth_cdeg_ + cdeg_per_s * to_seconds(last_duration_),
                                       packet_.first_azimuth_cdeg, missing);
     const bool skips_a_sector = 2 * packet_.duration > 3 * nominal_duration();
-    sectors_.take(packet_.first_azimuth_cdeg, skips_a_sector ? 0.0 : turn_of_packet_cdeg(), turned_cdeg);
-    counters_.lost -= std::min(counters_.lost, sectors_.take_corrected());
+    sectors_.add(packet_.first_azimuth_cdeg, skips_a_sector ? 0.0 : turn_of_packet_cdeg(), turned_cdeg);
+    counters_.lost -= std::min(counters_.lost, sectors_.withdraw_false_losses());
   }
   counters_.lost += missing;
 }
