@@ -266,6 +266,17 @@ TEST(SweepFolder, SweepsThatWereWrittenAreReplayedAsTheyAre) {
   EXPECT_LT((a.back().T_source_base.translation - b.back().T_source_base.translation).norm(), 0.05);
 }
 
+/// Points of one instant have their neighbours on the rings above and below as well: without these, no normals.
+TEST(SweepFolder, SweepsOfOneInstantAreFollowedAmongManyThings) {
+  const TemporaryFolder folder;
+  const path sweeps = folder / "out/sweeps";
+  const Replay first({"--sweeps", sweeps, "--set", kNoSources, plant_drive()});
+  const Replay again({"--set", kNoSources, "--set", "lidars.0.point_times=none", sweeps});
+  ASSERT_EQ(again.run().status, 0) << again.run().err;
+  const std::vector<StampedPose> a = first.trajectory(), b = again.trajectory();
+  EXPECT_LT((a.back().T_source_base.translation - b.back().T_source_base.translation).norm(), 0.05);
+}
+
 TEST(SweepFolder, ResultsAndSweepsAreNotWrittenIntoIt) {
   const TemporaryFolder folder;
   const path drive = in_order(folder / "drive", bin_of, "bin");
