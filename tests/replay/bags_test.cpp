@@ -154,7 +154,8 @@ TEST(Bags, Ros1BagThatIsNotInOrderIsCalledSo) {
   std::vector<RecordedMessage> messages = room_messages(RosVersion::ros1);
   std::rotate(messages.begin(), messages.begin() + static_cast<std::ptrdiff_t>(messages.size() / 2), messages.end());
   write_text(folder / "drive.bag", ros1_bag(messages));
-  expect_line(replay_room(folder / "drive.bag").run().err, {"goes back 1 times", "rosbag filter"});
+  expect_line(replay_room(folder / "drive.bag").run().err,
+              {"messages stand behind one that was received later", "rosbag filter"});
 }
 
 /// Some versions of rosbag2 leave the database in WAL mode, for which SQLite would create a log on reading.

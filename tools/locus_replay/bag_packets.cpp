@@ -76,7 +76,8 @@ void BagPackets::read_ahead() {
 }
 
 void BagPackets::take(const BagMessage& message) {
-  misplaced_ += message.recorded < newest_ - kAhead ? 1U : 0U;
+  misplaced_ += message.recorded < latest_ - kAhead ? 1U : 0U;
+  latest_ = std::max(latest_, message.recorded);
   newest_ = message.recorded;
   const auto lidar = std::ranges::find(lidars_, message.topic, &Lidar::topic);
   if (lidar == lidars_.end())
@@ -118,10 +119,9 @@ std::string BagPackets::why_none() const {
 std::vector<std::string> BagPackets::warnings() const {
   std::vector<std::string> lines = bag_->warnings();
   if (misplaced_ > 0)
-    lines.push_back(fmt::format("{}: the time of reception goes back {} times from one message to the next: the "
-                                "recorder's clock was set, or the bag is not in order, and what was made of it is "
-                                "wrong; sort it with: rosbag filter BAG SORTED_BAG True, or mcap sort BAG -o "
-                                "SORTED_BAG",
+    lines.push_back(fmt::format("{}: {} messages stand behind one that was received later: the recorder's clock was "
+                                "set, or the bag is not in order, and what was made of it is wrong; sort it with: "
+                                "rosbag filter BAG SORTED_BAG True, or mcap sort BAG -o SORTED_BAG",
                                 file_.string(), misplaced_));
   if (malformed_ > 0)
     lines.push_back(

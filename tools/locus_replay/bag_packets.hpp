@@ -69,13 +69,14 @@ class BagPackets : public DatagramSource {
   std::vector<Lidar> lidars_;
   std::deque<Scan> scans_;  ///< read but not returned yet; in file order
   std::size_t waiting_ = 0; ///< bytes of memory in use for them
-  Stamp newest_;            ///< recording time of the latest message
+  Stamp newest_;            ///< recording time of the preceding message
+  Stamp latest_;            ///< latest recording time so far
   bool bag_is_over_ = false;
   std::vector<std::byte> bytes_; ///< of the datagram returned
   CloudView cloud_;
   Datagram datagram_;
   std::uint64_t datagrams_ = 0, messages_ = 0, malformed_ = 0;
-  std::uint64_t misplaced_ = 0; ///< messages received well before the preceding one in the file
+  std::uint64_t misplaced_ = 0; ///< messages received well before one that precedes them in the file
 };
 
 } // namespace locus::tools
