@@ -486,14 +486,6 @@ TEST_F(BadBag, WithoutLidarSaysWhatIsInIt) {
                  {"no velodyne_msgs/VelodyneScan", "/imu/data (sensor_msgs/Imu)", "/image_raw (sensor_msgs/Image)"});
 }
 
-TEST_F(BadBag, OfALidarThatIsNotDecodedNamesItsMaker) {
-  const Stamp now = room_messages(RosVersion::ros1).front().recorded;
-  for (const auto& [type, maker] :
-       {std::pair{"ouster_ros/PacketMsg", "Ouster"}, {"ouster_sensor_msgs/PacketMsg", "Ouster"}})
-    expect_refused("a.bag", ros1_bag(std::vector{RecordedMessage{"/packets", type, now, {}}}),
-                   {"/packets ("s + type + ") is of a lidar of " + maker + ", whose packets are not read from bags"});
-}
-
 /// Messages of the Nebula drivers, including that for Velodyne.
 TEST(Bags, NebulaPacketsGiveTheBitsOfAVelodyneScan) {
   const TemporaryFolder folder;

@@ -40,8 +40,7 @@ RecordedInput open_bag_input(const Arguments& arguments, const std::filesystem::
       warnings.push_back(fmt::format("{}: motion source {}: never heard from, nothing of its kind in the bag",
                                      file.string(), config.motion_sources[i].name));
   }
-  return {
-      std::make_unique<BagPackets>(std::move(bag), file, config, topics.of_lidar), std::move(motion), topics.taken, {}};
+  return {std::make_unique<BagPackets>(std::move(bag), file, config, topics), std::move(motion), topics.taken, {}};
 }
 
 RecordedInput open_drive_input(const Arguments& arguments, const std::filesystem::path& folder, const Config& config,
