@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "drivers/ouster/metadata.hpp"
+#include "drivers/lidar_input.hpp"
 
 namespace locus {
 
@@ -13,7 +13,7 @@ Expected<Config, ConfigErrors> with_lidar_metadata(Config config) {
   for (LidarOptions& lidar : config.lidars) {
     if (!lidar.is_ouster())
       continue;
-    const auto metadata = ouster::read_metadata(lidar.metadata);
+    const auto metadata = metadata_of(lidar);
     if (!metadata)
       return ConfigErrors{fmt::format("lidars.{}.metadata: {}", lidar.name, metadata.error())};
     if (lidar.port == 0)

@@ -58,7 +58,7 @@ Expected<LidarInput, std::string> LidarInput::open(LidarOptions options, std::ui
 Expected<LidarInput::Decoder, std::string> LidarInput::decoder_for(const LidarOptions& options) {
   const std::string key = "lidars." + options.name + '.';
   if (options.is_ouster()) {
-    const auto metadata = ouster::read_metadata(options.metadata);
+    const auto metadata = metadata_of(options);
     if (!metadata)
       return key + "metadata: " + metadata.error();
     return Decoder{ouster::Decoder{*metadata, options.isa}};
@@ -97,6 +97,14 @@ const LidarPacket* LidarInput::receive(const Datagram& datagram) {
       unknown_last_heard_ = datagram.receive_stamp;
   }
   return ready_;
+}
+
+Expected<ouster::Metadata, std::string> metadata_of(const LidarOptions& options) {
+  if (options.metadata_text.empty())
+    return ouster::read_metadata(options.metadata);
+  auto metadata = ouster::parse_metadata(options.metadata_text);
+  return metadata ? std::move(metadata)
+                  : Expected<ouster::Metadata, std::string>{options.metadata + ": " + metadata.error()};
 }
 
 bool LidarInput::listens_to(std::uint16_t port) const {
@@ -435,8 +443,8 @@ void LidarInput::count_lost(const SensorClock::Reading& reading) {
       missing = sectors_.lost_between(last_azimuth_cdeg_ + cdeg_per_s * to_seconds(last_duration_),
                                       packet_.first_azimuth_cdeg, missing);
     const bool skips_a_sector = 2 * packet_.duration > 3 * nominal_duration();
-    sectors_.take(packet_.first_azimuth_cdeg, skips_a_sector ? 0.0 : turn_of_packet_cdeg(), turned_cdeg);
-    counters_.lost -= std::min(counters_.lost, sectors_.take_corrected());
+    sectors_.add(packet_.first_azimuth_cdeg, skips_a_sector ? 0.0 : turn_of_packet_cdeg(), turned_cdeg);
+    counters_.lost -= std::min(counters_.lost, sectors_.withdraw_false_losses());
   }
   counters_.lost += missing;
 }

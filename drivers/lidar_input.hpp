@@ -37,6 +37,9 @@ inline constexpr std::uint16_t kDefaultPositionPort = 8308;
 /// Returns the name of the configured model; empty if none is configured, and for an Ouster.
 std::string_view configured_model(const LidarOptions& options);
 
+/// Reads an Ouster's metadata from the text or the file of its options. Fails with one line for the user.
+Expected<ouster::Metadata, std::string> metadata_of(const LidarOptions& options);
+
 /// Lengths of a lidar's packets in bytes: data packets first, then the others. The spans refer to this object, so calls
 /// on temporaries are deleted.
 struct PacketLengths {

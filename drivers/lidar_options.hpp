@@ -38,9 +38,10 @@ struct LidarOptions {
   std::optional<std::uint32_t> source_ip;    ///< sender's address, host byte order; empty (key: any): any sender
   std::optional<std::uint32_t> multicast_ip; ///< group, host byte order; empty (key: none): unicast or broadcast
   LidarTime time = LidarTime::automatic;
-  std::string calibration; ///< file with the laser angles of this unit; empty: built-in table of the model
-  std::string metadata;    ///< an Ouster's metadata file, see ouster::read_metadata(); empty for other makers
-  std::string topic;       ///< topic of clouds made from its packets elsewhere; empty: packets are received
+  std::string calibration;   ///< file with the laser angles of this unit; empty: built-in table of the model
+  std::string metadata;      ///< an Ouster's metadata file, see ouster::read_metadata(); empty for other makers
+  std::string metadata_text; ///< no key: the metadata themselves, from a bag; `metadata` then names their origin
+  std::string topic;         ///< topic of clouds made from its packets elsewhere; empty: packets are received
   PointTimesFrom point_times = PointTimesFrom::automatic; ///< source of the point times of these clouds
   Pose T_base_lidar;
   std::uint16_t imu_port = 0; ///< no key: from an Ouster's metadata; 0: no IMU

@@ -8,17 +8,17 @@ namespace locus {
 namespace {
 
 constexpr double kTurn_cdeg = 36'000.0, kSector_cdeg = 100.0;
-constexpr double kTurnsKept = 10.0, kTurnsToKnowTheView = 3.0;
+constexpr double kTurnsInPeriod = 10.0, kTurnsToKnowTheView = 3.0;
 
 } // namespace
 
-void SentSectors::take(double from_cdeg, double turn_cdeg, double turned_cdeg) {
+void SentSectors::add(double from_cdeg, double turn_cdeg, double turned_cdeg) {
   const auto first = static_cast<std::size_t>(from_cdeg / kSector_cdeg);
   const auto last = static_cast<std::size_t>((from_cdeg + turn_cdeg) / kSector_cdeg);
   for (std::size_t sector = first; sector <= last && sector < first + kSectors; ++sector)
     sent_.set(sector % kSectors);
   turned_cdeg_ += turned_cdeg;
-  if (turned_cdeg_ < kTurnsKept * kTurn_cdeg)
+  if (turned_cdeg_ < kTurnsInPeriod * kTurn_cdeg)
     return;
   sent_before_ = std::exchange(sent_, {});
   turned_cdeg_ = 0.0;
@@ -36,7 +36,7 @@ std::uint64_t SentSectors::lost_between(double from_cdeg, double to_cdeg, std::u
   return missing;
 }
 
-std::uint64_t SentSectors::take_corrected() {
+std::uint64_t SentSectors::withdraw_false_losses() {
   if (gap_count_ == 0 || !knows_view())
     return 0;
   const std::size_t count = std::exchange(gap_count_, 0);
@@ -46,7 +46,7 @@ std::uint64_t SentSectors::take_corrected() {
   return corrected;
 }
 
-/// Looks at the sectors that lie wholly within the gap: the lost packets are the share of those that are sent.
+/// Considers the sectors wholly within the gap: the share of them that is sent is the share of packets that are lost.
 std::uint64_t SentSectors::lost_in(const Gap& gap) const {
   const double wide_cdeg = std::fmod(std::fmod(gap.to_cdeg - gap.from_cdeg, kTurn_cdeg) + kTurn_cdeg, kTurn_cdeg);
   const auto first = static_cast<std::size_t>(gap.from_cdeg / kSector_cdeg) + 1;

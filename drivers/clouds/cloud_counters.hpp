@@ -12,15 +12,15 @@ namespace locus {
 
 /// Reason why a cloud was rejected. Each has a counter in CloudCounters::refused.
 enum class CloudError : std::uint8_t {
-  cut,        ///< truncated, or less data than width, height and steps require
-  fields,     ///< no x, y, z of float32 or float64, or one outside the point record
-  big_endian, ///< big-endian numbers, which no lidar driver writes
-  too_large,  ///< more points than the decoder's memory holds
-  duplicate,  ///< cloud received before
-  clock,      ///< stamps differ from the host's clock by an offset not yet known
+  cut,       ///< truncated, or less data than width, height and steps require
+  fields,    ///< no x, y, z of float32 or float64, or one outside the point record
+  too_large, ///< more points than the decoder's memory holds
+  duplicate, ///< cloud received before
+  frame,     ///< frame of another lidar on the same topic
+  clock,     ///< stamps differ from the host's clock by an offset not yet known
 };
 constexpr auto names_of(CloudError) {
-  return std::to_array<std::string_view>({"cut", "fields", "big_endian", "too_large", "duplicate", "clock"});
+  return std::to_array<std::string_view>({"cut", "fields", "too_large", "duplicate", "frame", "clock"});
 }
 inline constexpr std::size_t kCloudErrors = names_of(CloudError{}).size();
 

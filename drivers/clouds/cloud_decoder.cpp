@@ -2,10 +2,13 @@
 #include "drivers/clouds/cloud_decoder.hpp"
 
 #include <algorithm>
+#include <bitset>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <numbers>
 #include <numeric>
+#include <string_view>
 #include <utility>
 
 namespace locus {
@@ -13,6 +16,9 @@ namespace locus {
 namespace {
 
 constexpr Duration kLongestSlice = std::chrono::microseconds{1330}; ///< duration of a VLP-16 packet
+/// Span of the firings of a cloud of one instant. They need an order, from which the neighbours of a point on other
+/// rings are found; a robot moves by less than the lidar's noise in this time.
+constexpr Duration kInstant = std::chrono::microseconds{50};
 constexpr std::size_t kBuckets = std::size_t{1} << 16;
 constexpr double kTurn_rad = 2 * std::numbers::pi;
 constexpr double kCdegPerTurn = 36000;
@@ -67,6 +73,11 @@ std::optional<CloudError> CloudDecoder::begin(const CloudView& message, Stamp ar
   const Expected<CloudLayout, CloudError> layout = layout_of(message);
   if (!layout)
     return refuse(layout.error());
+  const std::size_t frame = std::hash<std::string_view>{}(message.frame);
+  if (is_of_another_lidar(frame, arrival)) {
+    doubt(CloudDoubt::two_frames, arrival);
+    return refuse(CloudError::frame);
+  }
   if (message.stamp != Stamp{} && last_stamp_ == message.stamp && last_digest_ == digest_of(message))
     return refuse(CloudError::duplicate);
   if (layout_ != *layout) {
@@ -83,16 +94,23 @@ std::optional<CloudError> CloudDecoder::begin(const CloudView& message, Stamp ar
   if (!on_host)
     return refuse(CloudError::clock);
   cloud_ = {*on_host, *on_host + length + Duration{1}, false};
+  zero_ = cloud_.begin;
   measure_period();
+  sort_by_time();
   if (timing_ == PointTiming::instant)
     cloud_.begin = cloud_.end - period_;
-  sort_by_time();
   next_ = 0;
   count(counted);
   last_stamp_ = message.stamp;
   last_digest_ = digest_of(message);
+  frame_ = frame;
   last_heard_ = arrival;
   return std::nullopt;
+}
+
+bool CloudDecoder::is_of_another_lidar(std::size_t frame, Stamp arrival) const {
+  constexpr Duration kSilence = std::chrono::seconds{1};
+  return last_heard_ != Stamp{} && frame != frame_ && std::chrono::abs(arrival - last_heard_) < kSilence;
 }
 
 void CloudDecoder::count(const Counted& counted) {
@@ -159,14 +177,18 @@ Stamp CloudDecoder::time_points(const CloudView& message, const CloudLayout& lay
     timing_ = PointTiming::field;
     for (std::size_t i = 0; i < count; ++i)
       points_.offset_ns[i] = static_cast<std::int32_t>(times_->between(times_->first, points_.time[i]).count());
-    const Stamp begin = times_->begin(header + message.ahead, arrival + message.ahead) - message.ahead;
-    return times_->of_a_clock ? begin : stamped_at_begin(begin, header, arrival);
+    if (const auto begin = times_->begin_by_clock(header + message.ahead, arrival + message.ahead))
+      return *begin - message.ahead;
+    return stamped_at_begin(times_->begin_by_header(header), header, arrival);
   }
-  if (times_from_ != PointTimesFrom::none && time_by_azimuth()) {
+  if (times_from_ != PointTimesFrom::none && time_by_azimuth(period_)) {
     timing_ = PointTiming::azimuth;
     return stamped_at_begin(header, header, arrival);
   }
-  return header;
+  if (!time_by_azimuth(kInstant))
+    time_by_place(message);
+  const Duration length{count > 0 ? *std::ranges::max_element(points_.offset_ns) : 0};
+  return header - length;
 }
 
 /// Interprets the message's point times. Returns true if they are valid.
@@ -190,6 +212,12 @@ bool CloudDecoder::understand_times(bool has_times, Stamp arrival) {
     doubt(understood.error(), arrival);
     return false;
   }
+  if (spans_too_little(*understood)) {
+    doubt(CloudDoubt::no_unit, arrival);
+    times_.reset();
+    unit_votes_ = 0;
+    return false;
+  }
   const bool is_turn = understood->between(understood->first, understood->last) >= kShortestCloud;
   if (!known_unit_s || *known_unit_s != understood->unit_s)
     unit_votes_ = 0;
@@ -201,9 +229,37 @@ bool CloudDecoder::understand_times(bool has_times, Stamp arrival) {
   return true;
 }
 
-/// Computes the time of each return from the rotation along its ring since the first return; the direction of rotation
-/// is that of most steps. Returns false if the points do not rotate.
-bool CloudDecoder::time_by_azimuth() {
+/// Returns true if the points lie all around although their times span a small part of the period: these are shares of
+/// the turn, for example, and no times.
+bool CloudDecoder::spans_too_little(const PointTimes& times) const {
+  constexpr int kSmallPart = 8;
+  constexpr std::size_t kSectors = 36;
+  if (kSmallPart * times.between(times.first, times.last) >= period_)
+    return false;
+  std::bitset<kSectors> sectors;
+  for (std::size_t i = 0; i < points_.x_m.size(); ++i) {
+    const double share = azimuth_rad(points_.x_m[i], points_.y_m[i]) / kTurn_rad + 0.5;
+    sectors.set(std::min(static_cast<std::size_t>(share * kSectors), kSectors - 1));
+  }
+  return 2 * sectors.count() >= kSectors;
+}
+
+/// Distributes the returns over kInstant in the order of the message, in which drivers write them as fired. In an
+/// organised cloud the longer dimension is time.
+void CloudDecoder::time_by_place(const CloudView& message) {
+  const std::size_t width = std::max<std::size_t>(message.width, 1);
+  const bool is_wide = message.width >= message.height;
+  const auto extent = static_cast<double>(std::max(message.width, message.height));
+  for (std::size_t i = 0; i < points_.offset_ns.size(); ++i) {
+    const std::size_t place = is_wide ? points_.order[i] % width : points_.order[i] / width;
+    points_.offset_ns[i] =
+        static_cast<std::int32_t>(static_cast<double>(place) / extent * static_cast<double>(kInstant.count()));
+  }
+}
+
+/// Computes the time of each return from the rotation along its ring since the first return, `turn` for a whole one;
+/// the direction of rotation is that of most steps. Returns false if the points do not rotate.
+bool CloudDecoder::time_by_azimuth(Duration turn) {
   constexpr double kStep_rad = 0.1, kBeforeFirst_rad = -0.4;
   constexpr std::size_t kNineTenths = 10;
   const std::size_t count = points_.x_m.size();
@@ -236,7 +292,7 @@ bool CloudDecoder::time_by_azimuth() {
     }
     last = azimuth;
     const double share = std::clamp(turned / kTurn_rad, 0.0, 1.0);
-    points_.offset_ns[i] = static_cast<std::int32_t>(share * static_cast<double>(period_.count()));
+    points_.offset_ns[i] = static_cast<std::int32_t>(share * static_cast<double>(turn.count()));
   }
   return true;
 }
@@ -315,12 +371,11 @@ const LidarPacket* CloudDecoder::next() {
   const std::size_t count = points_.order.size();
   if (next_ >= std::max<std::size_t>(count, 1))
     return nullptr;
-  const Stamp zero = timing_ == PointTiming::instant ? cloud_.end - Duration{1} : cloud_.begin;
   const auto offset = [&](std::size_t place) { return points_.offset_ns[points_.order[place]]; };
   const std::int32_t begin_ns = count > 0 ? offset(next_) : 0;
   std::int32_t last_ns = begin_ns;
   packet_.cloud = cloud_;
-  packet_.stamp = count > 0 ? zero + Duration{begin_ns} : cloud_.begin;
+  packet_.stamp = count > 0 ? zero_ + Duration{begin_ns} : cloud_.begin;
   packet_.count = 0;
   open_.fill(nullptr);
   for (; next_ < count && offset(next_) - begin_ns < kLongestSlice.count(); ++next_) {
@@ -332,7 +387,7 @@ const LidarPacket* CloudDecoder::next() {
     last_ns = std::max(last_ns, points_.offset_ns[point]);
   }
   next_ += count == 0 ? 1 : 0;
-  const Stamp after = next_ < count ? zero + Duration{std::max(offset(next_), last_ns + 1)} : cloud_.end;
+  const Stamp after = next_ < count ? zero_ + Duration{std::max(offset(next_), last_ns + 1)} : cloud_.end;
   packet_.duration = after - packet_.stamp;
   packet_.cloud->ends_here = next_ >= count;
   const double turned = to_seconds(packet_.stamp - cloud_.begin) / to_seconds(period_);

@@ -22,7 +22,8 @@ namespace locus {
 /// with each return in the slot of its laser.
 ///
 /// Point times are interpreted according to PointTimes and PointTimesFrom; stamps are converted to the host's clock as
-/// those of a motion source (SourceClock). A cloud without returns is valid. Memory is reserved at construction, and
+/// those of a motion source (SourceClock). A cloud without returns is valid. Clouds of another frame are another
+/// lidar's, and accepted only after one second without any of this frame. Memory is reserved at construction, and
 /// touched as clouds need it; after that, allocates nothing and throws nothing. Single owner, not thread-safe.
 class CloudDecoder {
  public:
@@ -55,6 +56,7 @@ class CloudDecoder {
     std::size_t points = 0, nan = 0, origin = 0, untimed = 0;
   };
 
+  [[nodiscard]] bool is_of_another_lidar(std::size_t frame, Stamp arrival) const;
   void count(const Counted& counted);
   void doubt(CloudDoubt doubt, Stamp arrival) {
     doubts_.set(static_cast<std::size_t>(doubt));
@@ -64,7 +66,9 @@ class CloudDecoder {
   Counted keep_returns();
   Stamp time_points(const CloudView& message, const CloudLayout& layout, Stamp arrival);
   bool understand_times(bool has_times, Stamp arrival);
-  bool time_by_azimuth();
+  [[nodiscard]] bool spans_too_little(const PointTimes& times) const;
+  bool time_by_azimuth(Duration turn);
+  void time_by_place(const CloudView& message);
   Stamp stamped_at_begin(Stamp begin, Stamp header, Stamp arrival);
   std::optional<Stamp> on_host_clock(Stamp begin, Duration length, Stamp arrival);
   void measure_period();
@@ -100,6 +104,7 @@ class CloudDecoder {
   PointTiming timing_ = PointTiming::field;
 
   LidarPacket::Cloud cloud_; ///< current cloud
+  Stamp zero_;               ///< instant of offset 0 in it
   std::size_t next_ = 1;     ///< index into points_.order
   LidarPacket packet_;
   std::array<FiringGroup*, LidarPacket::kMaxLasers / FiringGroup::kLasers> open_{}; ///< indexed by bank, current packet
@@ -109,6 +114,7 @@ class CloudDecoder {
   std::optional<Stamp> last_begin_;
   std::optional<Stamp> last_stamp_; ///< header stamp
   std::uint64_t last_digest_ = 0;
+  std::size_t frame_ = 0; ///< hash of the frame's name
   Stamp last_heard_;
   CloudCounters counters_;
   CloudDoubts doubts_;

@@ -31,10 +31,10 @@ std::string explain(CloudDoubt doubt, PointTiming timing) {
                        "one that a filter has made of it",
                        fallback(timing));
   case CloudDoubt::no_unit:
-    return fmt::format(
-        "the times of its points span no turn of a lidar in s, ms, us or ns (0.5 to 250 ms), so {}; look "
-        "which unit the driver writes, and whether its clouds are of one turn",
-        fallback(timing));
+    return fmt::format("the times of its points span no turn of a lidar in s, ms, us or ns (0.5 to 250 ms, an eighth "
+                       "of the period at least), so {}; look "
+                       "which unit the driver writes, and whether its clouds are of one turn",
+                       fallback(timing));
   case CloudDoubt::stamp_at_end:
     return "its clouds arrive before their last point by their stamps: the header's stamp is taken for that of the "
            "last "
@@ -45,6 +45,9 @@ std::string explain(CloudDoubt doubt, PointTiming timing) {
   case CloudDoubt::ahead:
     return "its stamps are in the future by this computer's clock, so they are put where they arrive; synchronise the "
            "lidar's clock with it (PTP), or have the driver stamp by the computer's clock";
+  case CloudDoubt::two_frames:
+    return "some of its clouds are of another frame, so of another lidar, and are left out; give each lidar a topic of "
+           "its own";
   case CloudDoubt::behind:
     return "its stamps are of another clock than this computer's, so they are put where they arrive; synchronise the "
            "lidar's clock with it (PTP), or have the driver stamp by the computer's clock";

@@ -14,12 +14,12 @@ namespace locus {
 
 /// Source of point times (key: point_times). `automatic` (key: auto): the message's own field if it is valid, otherwise
 /// azimuth if the points rotate, otherwise none. `azimuth`: the rotation since the first point. `none`: all points at
-/// the instant of the header's stamp.
+/// the instant of the header's stamp, the last one exactly.
 enum class PointTimesFrom : std::uint8_t { automatic, azimuth, none };
 constexpr auto names_of(PointTimesFrom) { return std::to_array<std::string_view>({"auto", "azimuth", "none"}); }
 
-/// Problem with the times in a lidar's clouds. With the first four, the points' own times are not used; the others
-/// shift the whole cloud in time.
+/// Problem with a lidar's clouds, mostly with their times. With the first four, the points' own times are not used; the
+/// next four shift the whole cloud in time.
 enum class CloudDoubt : std::uint8_t {
   no_times,     ///< no time field
   equal_times,  ///< all times equal
@@ -29,10 +29,11 @@ enum class CloudDoubt : std::uint8_t {
   tai,          ///< stamps are 37 s ahead: TAI, not UTC
   ahead,        ///< stamps are ahead of the host's clock
   behind,       ///< stamps are behind the host's clock
+  two_frames,   ///< clouds of two frames on one topic
 };
 constexpr auto names_of(CloudDoubt) {
   return std::to_array<std::string_view>(
-      {"no_times", "equal_times", "disorder", "no_unit", "stamp_at_end", "tai", "ahead", "behind"});
+      {"no_times", "equal_times", "disorder", "no_unit", "stamp_at_end", "tai", "ahead", "behind", "two_frames"});
 }
 inline constexpr std::size_t kCloudDoubts = names_of(CloudDoubt{}).size();
 using CloudDoubts = std::bitset<kCloudDoubts>;

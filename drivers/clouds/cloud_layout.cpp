@@ -64,8 +64,6 @@ Expected<CloudLayout, CloudError> layout_of(const CloudView& message) {
   constexpr std::array<std::string_view, 6> kTimes{"time",       "t",           "timestamp",
                                                    "time_stamp", "offset_time", "time_offset"};
   constexpr std::uint32_t kFewestRows = 4;
-  if (message.is_big_endian)
-    return CloudError::big_endian;
   const auto x = coordinate(message, "x"), y = coordinate(message, "y"), z = coordinate(message, "z");
   if (!x || !y || !z)
     return CloudError::fields;

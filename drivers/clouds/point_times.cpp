@@ -48,24 +48,21 @@ std::optional<double> guess_unit_s(double span) {
 } // namespace
 
 PointTimes PointTimes::in_unit(double unit_s, double first, double last) {
-  constexpr double kFarFromHeader_s = 60;
-  return {unit_s, std::max(std::abs(first), std::abs(last)) * unit_s > kFarFromHeader_s, first, last};
+  const double farthest_s = std::max(std::abs(first), std::abs(last)) * unit_s;
+  return {unit_s, farthest_s > to_seconds(kSameClock), first, last};
 }
 
 bool PointTimes::is_short_enough() const { return (last - first) * unit_s <= to_seconds(kLongestCloud); }
 
-Stamp PointTimes::begin(Stamp header, Stamp arrival) const {
+std::optional<Stamp> PointTimes::begin_by_clock(Stamp header, Stamp arrival) const {
   constexpr double kMost_ns = 9e18;
-  if (!of_a_clock)
-    return header + between(0, first);
   const double ns = first * (unit_s * 1e9);
-  if (!(std::abs(ns) < kMost_ns))
-    return header;
-  const Stamp own = stamp_from_ns(std::llround(ns));
+  if (!of_a_clock || !(std::abs(ns) < kMost_ns))
+    return std::nullopt;
   const auto is_near = [ns](Stamp other) {
     return std::abs(ns - static_cast<double>(to_ns(other))) < static_cast<double>(kSameClock.count());
   };
-  return is_near(header) || is_near(arrival) ? own : header;
+  return is_near(header) || is_near(arrival) ? std::optional{stamp_from_ns(std::llround(ns))} : std::nullopt;
 }
 
 Expected<PointTimes, CloudDoubt> understand(std::span<const double> times, std::span<const std::uint8_t> rings,

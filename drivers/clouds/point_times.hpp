@@ -20,7 +20,7 @@ inline constexpr Duration kShortestCloud = std::chrono::microseconds{500};
 /// The unit is the one of s, ms, us and ns in which the span of the points is that of a lidar's turn. It is unique,
 /// since the shortest and the longest turn differ by fewer than three decades. A unit known from other clouds of the
 /// lidar is retained, since a cloud with few columns spans less, unless it makes the span too long. Numbers within a
-/// minute of 0 are relative to the header's stamp (negative: before it); others are absolute times of a clock.
+/// second of 0 are relative to the header's stamp (negative: before it); others are absolute times of a clock.
 struct PointTimes {
   double unit_s = 1.0;
   bool of_a_clock = false;
@@ -34,9 +34,11 @@ struct PointTimes {
   /// Time between two numbers.
   [[nodiscard]] Duration between(double from, double to) const { return from_seconds((to - from) * unit_s); }
 
-  /// Returns the instant of the first point. Absolute point times are trusted if they agree within a second with the
-  /// header's stamp or the arrival; otherwise the header's stamp is used for the first point.
-  [[nodiscard]] Stamp begin(Stamp header, Stamp arrival) const;
+  /// Returns the instant of the first point by absolute times that agree within a second with the header's stamp or the
+  /// arrival; nothing for relative times and for those of another clock.
+  [[nodiscard]] std::optional<Stamp> begin_by_clock(Stamp header, Stamp arrival) const;
+  /// Returns the instant of the first point relative to the header's stamp, which it is for times of another clock.
+  [[nodiscard]] Stamp begin_by_header(Stamp header) const { return of_a_clock ? header : header + between(0, first); }
 };
 
 /// Interprets the times of a cloud in the order of its points, with their rings (all 0 if unknown). Precondition: all

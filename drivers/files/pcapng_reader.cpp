@@ -87,7 +87,7 @@ bool PcapngReader::read_bytes(std::span<std::byte> out) {
   return std::fread(out.data(), 1, out.size(), file_.get()) == out.size() || stop("the file ends within a block");
 }
 
-/// Reads a block. Returns false at the end of the file and on a problem.
+/// Reads a block. Returns false at the end of the file or on an error.
 bool PcapngReader::read_block() {
   std::array<std::byte, 12> head{};
   const std::size_t type_bytes = std::fread(head.data(), 1, 4, file_.get());
@@ -128,7 +128,7 @@ bool PcapngReader::open() {
   while (interfaces_.empty()) {
     if (!read_block())
       return problem_.empty() ? stop("no interface is described") : false;
-    if (type_ == kSection ? !begin_section() : type_ == kInterface && !add_interface())
+    if (type_ == kSection ? !start_section() : type_ == kInterface && !add_interface())
       return false;
   }
   return true;
@@ -136,7 +136,7 @@ bool PcapngReader::open() {
 
 std::optional<CapturedFrame> PcapngReader::next() {
   while (problem_.empty() && read_block()) {
-    if (type_ == kSection ? !begin_section() : type_ == kInterface && !add_interface())
+    if (type_ == kSection ? !start_section() : type_ == kInterface && !add_interface())
       return std::nullopt;
     if (type_ == kEnhancedPacket || type_ == kOldPacket || type_ == kSimplePacket)
       return frame();
@@ -144,7 +144,7 @@ std::optional<CapturedFrame> PcapngReader::next() {
   return std::nullopt;
 }
 
-bool PcapngReader::begin_section() {
+bool PcapngReader::start_section() {
   constexpr std::size_t kBytes = 16;
   interfaces_.clear();
   if (body_.size() < kBytes)
@@ -177,7 +177,7 @@ bool PcapngReader::add_interface() {
   return true;
 }
 
-/// Returns the frame of a packet block of any kind; empty on a problem.
+/// Returns the frame of a packet block of any kind; empty on an error.
 std::optional<CapturedFrame> PcapngReader::frame() {
   constexpr std::size_t kHeader = 20, kSimpleHeader = 4;
   if (body_.size() < (type_ == kSimplePacket ? kSimpleHeader : kHeader)) {

@@ -19,7 +19,7 @@ struct CapturedFrame {
   int link_type = 0; ///< libpcap's DLT_...
   std::span<const std::byte> bytes;
   std::size_t wire_bytes = 0; ///< length before truncation to the snap length
-  std::optional<Stamp> stamp; ///< empty if it is beyond all stamps
+  std::optional<Stamp> stamp; ///< empty if it is outside the range of Stamp
 };
 
 /// Reads the frames of a pcapng file: any number of sections of either byte order, and of interfaces of any link type,
@@ -28,21 +28,21 @@ struct CapturedFrame {
 /// per frame once the longest block has been read.
 class PcapngReader {
  public:
-  /// Takes a file at its beginning, which it closes at the end.
+  /// Owns the file, which must be at its start.
   explicit PcapngReader(std::FILE* file) : file_(file) {}
 
-  /// Reads up to the first description of an interface. Returns false if there is none, with the reason in problem().
+  /// Reads up to the first interface description. Returns false if there is none; problem() then has the reason.
   bool open();
 
-  /// Returns the next frame, valid until the next call; empty at the end of the file and on a problem.
+  /// Returns the next frame, valid until the next call; empty at the end of the file or on an error.
   std::optional<CapturedFrame> next();
 
-  /// Says why reading stopped before the end of the file; empty if it did not.
+  /// Returns why reading stopped before the end of the file; empty if it did not.
   [[nodiscard]] std::string_view problem() const { return problem_; }
   [[nodiscard]] std::FILE* file() const { return file_.get(); }
 
  private:
-  /// How an interface counts time: in units of 10^-exponent or 2^-exponent seconds.
+  /// Interface description; times are in units of 10^-exponent or 2^-exponent seconds.
   struct Interface {
     int link_type = 0;
     std::uint32_t snap_bytes = 0; ///< 0: no limit
@@ -59,7 +59,7 @@ class PcapngReader {
   bool read_block();
   bool read_bytes(std::span<std::byte> out);
   bool stop(std::string_view problem);
-  bool begin_section();
+  bool start_section();
   bool add_interface();
   [[nodiscard]] std::optional<CapturedFrame> frame();
   [[nodiscard]] std::optional<CapturedFrame> frame_in(const Interface& interface, std::size_t at,
@@ -70,9 +70,9 @@ class PcapngReader {
   [[nodiscard]] std::uint64_t u64(std::size_t at) const;
 
   std::unique_ptr<std::FILE, Closer> file_;
-  std::uint32_t type_ = 0;      ///< of the block
-  std::vector<std::byte> body_; ///< of the block, without its lengths
-  bool is_big_endian_ = false;  ///< the section
+  std::uint32_t type_ = 0;      ///< of the current block
+  std::vector<std::byte> body_; ///< of the current block, without its lengths
+  bool is_big_endian_ = false;  ///< byte order of the current section
   std::vector<Interface> interfaces_;
   std::string_view problem_;
 };

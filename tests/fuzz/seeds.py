@@ -503,3 +503,9 @@ for aligned in (False, True):
     message = cloud_message(aligned, 0, None, 20 if aligned else 19,
                             lambda x, y, z, r, t: struct.pack("<I3f3B", int(t * 1e9), x, y, z, 9, 16, r % 6))
     write("cloud_messages", f"custom_{int(aligned)}", bytes([2 + int(aligned), 104]) + struct.pack("<H", len(message)) + message)
+
+# Tables of the times of sweeps: those of EuRoC and KITTI, and every unit.
+for name, rows in {"euroc": "#timestamp [ns],filename\n1403636579763555584,1.pcd\n1403636579863555584,2.pcd\n",
+                   "kitti": "0.000000e+00\n1.036224e-01\n2.072210e-01\n", "us": "1700000000000000\n1700000000100000\n",
+                   "ms": "t x\n1700000000000 a.bin\r\n1700000000100 b.bin\n", "one": "5\n", "back": "2\n1\n", "none": "a\nb\n"}.items():
+    write("sweep_times", name, rows)

@@ -62,7 +62,7 @@ TEST_F(McapResults, HoldsTheOdometryOfEverySweep) {
   while (const tools::BagMessage* message = (*bag)->next()) {
     const tools::BagTopic& topic = (*bag)->topics().at(message->topic);
     const std::size_t k = count[topic.name + " " + topic.type]++;
-    if (topic.type != "nav_msgs/Odometry")
+    if (topic.name != "/locus/odometry")
       continue;
     const auto odometry = tools::read_odometry({message->data, topic.serialisation});
     ASSERT_TRUE(odometry);
@@ -79,7 +79,36 @@ TEST_F(McapResults, HoldsTheOdometryOfEverySweep) {
   EXPECT_EQ(count["/locus/cloud sensor_msgs/PointCloud2"], trajectory.size());
   const double duration_s = to_seconds(trajectory.back().stamp - trajectory.front().stamp);
   EXPECT_NEAR(static_cast<double>(count["/diagnostics diagnostic_msgs/DiagnosticArray"]), duration_s, 2);
-  EXPECT_EQ(count.size(), 4U);
+  EXPECT_EQ(count["/tf_static tf2_msgs/TFMessage"], 1U);
+  EXPECT_GT(count["/imu/data sensor_msgs/Imu"], 7U * 90);
+  EXPECT_GT(count["/wheel_odometry nav_msgs/Odometry"], 7U * 40);
+  EXPECT_EQ(count.size(), 7U);
+}
+
+/// The inputs in the file are those of the recording, to the last bit that a message can hold.
+TEST_F(McapResults, HoldsTheSamplesOfTheMotionSources) {
+  const auto bag = tools::open_bag(file_);
+  ASSERT_TRUE(bag) << bag.error();
+  auto recorded = MotionSamples<ImuSample>::open(room_drive() / "imu.csv");
+  ASSERT_TRUE(recorded) << recorded.error();
+  std::map<Stamp, ImuSample> by_stamp;
+  for (const ImuSample& sample : recorded->drain())
+    by_stamp[sample.stamp] = sample;
+  std::size_t compared = 0;
+  while (const tools::BagMessage* message = (*bag)->next()) {
+    const tools::BagTopic& topic = (*bag)->topics().at(message->topic);
+    if (topic.type != "sensor_msgs/Imu")
+      continue;
+    const auto imu = read_by_fast_cdr<FastImu>(message->data);
+    const Stamp stamp{std::chrono::seconds{imu.header.sec} + std::chrono::nanoseconds{imu.header.nanosec}};
+    ASSERT_TRUE(by_stamp.contains(stamp));
+    EXPECT_EQ(message->recorded, by_stamp[stamp].arrival);
+    EXPECT_EQ(imu.header.frame_id, "imu");
+    EXPECT_EQ(imu.angular_velocity[2], by_stamp[stamp].angular_velocity_radps.z());
+    EXPECT_EQ(imu.linear_acceleration[0], by_stamp[stamp].specific_force_mps2.x());
+    ++compared;
+  }
+  EXPECT_GT(compared, 7U * 90);
 }
 
 TEST_F(McapResults, IsWhatOtherProgramsTakeForMessagesOfRos) {
@@ -87,8 +116,8 @@ TEST_F(McapResults, IsWhatOtherProgramsTakeForMessagesOfRos) {
   ASSERT_TRUE(bag) << bag.error();
   std::size_t points = 0, statuses = 0, transforms = 0;
   while (const tools::BagMessage* message = (*bag)->next()) {
-    const std::string& type = (*bag)->topics().at(message->topic).type;
-    if (type == "tf2_msgs/TFMessage") {
+    const auto& [name, type, unused] = (*bag)->topics().at(message->topic);
+    if (name == "/tf") {
       const auto tf = read_by_fast_cdr<FastTransforms>(message->data);
       ASSERT_EQ(tf.transforms.size(), 1U);
       EXPECT_EQ(tf.transforms[0].header.frame_id, "odom");
@@ -163,8 +192,8 @@ TEST_F(McapResults, IndexLeadsToEachMessage) {
     EXPECT_EQ(indices_seen, indices_length);
   }
   EXPECT_TRUE(rest.empty());
-  EXPECT_EQ(records[McapOp::schema], 4);
-  EXPECT_EQ(records[McapOp::channel], 4);
+  EXPECT_EQ(records[McapOp::schema], 7);
+  EXPECT_EQ(records[McapOp::channel], 7);
   EXPECT_EQ(records[McapOp::statistics], 1);
   EXPECT_GT(records[McapOp::chunk_index], 3);
   EXPECT_EQ(indexed, messages);

@@ -63,6 +63,19 @@ TEST(Mcap, FileThatWasNeverClosedIsReadToItsEndAndCalledSo) {
   EXPECT_TRUE(read_text(replay.file("odometry.csv")) == odometry_of(folder / "whole.mcap"));
 }
 
+/// Each message is less than half a second older than the one before it.
+TEST(Mcap, MessagesThatGoBackBySmallStepsAreSaidToBeOutOfOrder) {
+  const TemporaryFolder folder;
+  std::vector<RecordedMessage> messages = messages_of(room_drive(), RosVersion::ros2);
+  std::erase_if(messages, [](const RecordedMessage& m) { return !m.topic.ends_with("packets"); });
+  constexpr std::size_t kBlock = 10;
+  for (std::size_t i = 0; i + kBlock <= messages.size(); i += kBlock)
+    std::ranges::reverse(std::span(messages).subspan(i, kBlock));
+  write_bytes(folder / "backwards.mcap", mcap_file(messages, RosVersion::ros2, {.chunked = false}));
+  const Replay replay({"-c", room_drive() / "config.yaml", folder / "backwards.mcap"});
+  EXPECT_TRUE(contains(replay.run().err, "messages stand behind one that was received later")) << replay.run().err;
+}
+
 TEST(Mcap, FolderOfSeveralFilesIsReadInTheOrderOfItsMetadata) {
   const TemporaryFolder folder;
   const std::vector<RecordedMessage> messages = messages_of(room_drive(), RosVersion::ros2);
@@ -174,6 +187,19 @@ TEST_F(SmallMcap, IsReadInEveryForm) {
   const Read without_chunks = read(closed(records()));
   expect_all(without_chunks);
   EXPECT_TRUE(without_chunks.warnings.empty());
+}
+
+/// Writers with several threads store messages as they come; the index, which players use, is by time.
+TEST_F(SmallMcap, MessagesOfAChunkComeInTheOrderOfTheirTimes) {
+  std::string mixed;
+  for (const int i : {2, 0, 1})
+    mixed += mcap_message(2, static_cast<std::uint64_t>(10 * i + 5), "odom" + std::to_string(i)) +
+             mcap_message(1, static_cast<std::uint64_t>(10 * i), "imu" + std::to_string(i));
+  for (const McapCompression compression : {McapCompression::none, McapCompression::zstd}) {
+    const Read sorted = read(closed(mcap_chunk(declarations() + mixed, compression)));
+    expect_all(sorted);
+    EXPECT_TRUE(sorted.warnings.empty());
+  }
 }
 
 TEST_F(SmallMcap, CutAtAnyByteIsReadUpToTheCut) {

@@ -256,6 +256,35 @@ TEST(Parts, OfACaptureFollowEachOther) {
   EXPECT_LT(one.trajectory().size(), parts.trajectory().size() / 6) << "a part that is named stands for itself";
 }
 
+/// tcpdump -C with -W, or with a name without .pcap, names the parts like other files.
+TEST(Parts, ThatCannotBeToldFromOtherFilesAreNamed) {
+  const TemporaryFolder folder;
+  for (const char* const name : {"ring.pcap00", "ring.pcap01", "drive", "drive1", "lidar0", "lidar2"})
+    std::filesystem::copy(room_drive() / "lidar.pcap", folder / name);
+  for (const auto& [first, next] : {std::pair{"ring.pcap00", "ring.pcap01"}, {"drive", "drive1"}}) {
+    const Replay replay({"--duration", "1", folder / first});
+    EXPECT_EQ(replay.run().status, 0);
+    EXPECT_TRUE(contains(replay.run().err, std::string{first} + ": is replayed alone, without " + next))
+        << replay.run().err;
+    EXPECT_TRUE(contains(replay.run().err, "mergecap -w")) << replay.run().err;
+  }
+  for (const char* const alone : {"ring.pcap01", "lidar0"})
+    EXPECT_EQ(Replay({"--duration", "1", folder / alone}).run().err, "") << alone;
+}
+
+TEST(FolderAbove, TakesTheOnlyFileThatIsARecording) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder / "day");
+  std::filesystem::copy(room_drive() / "lidar.pcap", folder / "day/drive.pcap");
+  const Replay replay({"--duration", "1", folder.path()});
+  EXPECT_EQ(replay.run().status, 0) << replay.run().err;
+  EXPECT_TRUE(contains(replay.run().out, "the only recording in it is taken, ")) << replay.run().out;
+  put(folder / "day/other.bag", ros1_bag(messages_of(room_drive(), RosVersion::ros1)));
+  const Replay of_two({folder.path()});
+  EXPECT_EQ(of_two.run().status, 1);
+  EXPECT_TRUE(contains(of_two.run().err, "holds 2 recordings")) << of_two.run().err;
+}
+
 /// Contains messages_of() the room drive.
 class PackedBag : public testing::Test {
  protected:

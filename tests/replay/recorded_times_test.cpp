@@ -64,7 +64,7 @@ TEST(RecordedTimes, ThatAreAllTheSameLeaveTheTimeToTheLidar) {
   for (const std::int64_t ns : {std::int64_t{0}, std::int64_t{1'600'000'000'000'000'000}}) {
     const TemporaryFolder folder;
     const Replay replay({capture_with(folder, [&](Stamp, Duration) { return stamp_from_ns(ns); })});
-    expect_same_way(replay, "the lidar's own clock tells the time");
+    expect_same_way(replay, "those of the lidar's own clock are used");
     const std::vector<StampedPose> poses = replay.trajectory();
     ASSERT_FALSE(poses.empty());
     EXPECT_NEAR(to_seconds(poses.back().stamp - poses.front().stamp),

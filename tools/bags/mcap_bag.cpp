@@ -12,6 +12,16 @@
 #include "bags/decompression.hpp"
 
 namespace locus::tools {
+namespace {
+
+/// Returns the time of reception of a message; 0 if it is too short.
+std::uint64_t log_time_ns(const McapRecord& message) {
+  MessageReader fields = message.fields();
+  fields.bytes(sizeof(std::uint16_t) + sizeof(std::uint32_t)); // channel and sequence number
+  return fields.number<std::uint64_t>();
+}
+
+} // namespace
 
 McapBag::McapBag(const std::filesystem::path& file, std::string name)
     : name_(std::move(name)), stream_(file, std::ios::binary) {
@@ -70,17 +80,17 @@ bool McapBag::read_topics_from_summary() {
   std::span<const std::byte> bytes(record_);
   if (footer->summary_crc != 0 && mcap_crc(bytes.first(bytes.size() - kBehindCrc)) != footer->summary_crc)
     return false;
-  return take_summary(bytes.first(bytes.size() - kMcapFooterBytes));
+  return accept_summary(bytes.first(bytes.size() - kMcapFooterBytes));
 }
 
 /// Returns false if a channel, or the schema of one, is missing: writers may omit either.
-bool McapBag::take_summary(std::span<const std::byte> summary) {
+bool McapBag::accept_summary(std::span<const std::byte> summary) {
   std::vector<McapRecord> channels;
   std::optional<std::uint32_t> count;
   while (const std::optional<McapRecord> record = take_mcap_record(summary)) {
     MessageReader fields = record->fields();
     if (record->op == McapOp::schema)
-      take_schema(*record);
+      accept_schema(*record);
     else if (record->op == McapOp::channel)
       channels.push_back(*record);
     else if (record->op == McapOp::statistics && !fields.bytes(sizeof(std::uint64_t) + sizeof(std::uint16_t)).empty())
@@ -95,7 +105,7 @@ bool McapBag::take_summary(std::span<const std::byte> summary) {
     return false;
   }
   for (const McapRecord& channel : channels)
-    take_channel(channel);
+    accept_channel(channel);
   return true;
 }
 
@@ -108,7 +118,9 @@ bool McapBag::read_at(std::uint64_t place, std::span<std::byte> bytes) {
 
 /// Frees the memory of this file: a folder may hold many, which are read one at a time.
 void McapBag::free_memory() {
-  left_ = {};
+  records_ = {};
+  next_ = 0;
+  std::vector<std::uint32_t>().swap(messages_);
   for (std::vector<std::byte>* const room : {&record_, &chunk_})
     std::vector<std::byte>().swap(*room);
 }
@@ -126,23 +138,20 @@ void McapBag::rewind() {
 
 const BagMessage* McapBag::next() {
   while (const std::optional<McapRecord> record = next_record()) {
-    if (take(*record))
+    if (accept(*record))
       return &message_;
   }
   free_memory();
   return nullptr;
 }
 
-/// Reads from the current chunk, else from the file; nothing at the end or where the file is truncated.
+/// Returns the next message of the current chunk, else the next record of the file; nothing at the end or where the
+/// file is truncated.
 std::optional<McapRecord> McapBag::next_record() {
-  if (left_.empty())
+  if (next_ == messages_.size())
     return read_record();
-  const std::optional<McapRecord> record = take_mcap_record(left_);
-  if (record && record->op != McapOp::chunk)
-    return record;
-  left_ = {};
-  leave_out("the records in it are damaged");
-  return next_record();
+  std::span<const std::byte> rest = records_.subspan(messages_[next_++]);
+  return take_mcap_record(rest);
 }
 
 /// Reads the next relevant record of the file.
@@ -176,22 +185,22 @@ std::optional<McapRecord> McapBag::read_record() {
 }
 
 /// Processes a record; returns whether it yields a message.
-bool McapBag::take(const McapRecord& record) {
+bool McapBag::accept(const McapRecord& record) {
   if (record.op == McapOp::schema)
-    take_schema(record);
+    accept_schema(record);
   else if (record.op == McapOp::channel)
-    take_channel(record);
+    accept_channel(record);
   else if (record.op == McapOp::chunk)
-    take_chunk(record);
-  return record.op == McapOp::message && take_message(record);
+    open_chunk(record);
+  return record.op == McapOp::message && accept_message(record);
 }
 
-void McapBag::take_schema(const McapRecord& record) {
+void McapBag::accept_schema(const McapRecord& record) {
   if (std::optional<McapSchema> schema = McapSchema::read(record))
     schemas_[schema->id] = schema->name.substr(0, kMaxNameBytes + 1); // still rejected if too long
 }
 
-void McapBag::take_channel(const McapRecord& record) {
+void McapBag::accept_channel(const McapRecord& record) {
   const std::optional<McapChannel> channel = McapChannel::read(record);
   if (!channel)
     return;
@@ -202,20 +211,39 @@ void McapBag::take_channel(const McapRecord& record) {
   declare(channel->id, {channel->topic, type, channel->encoding == "ros1" ? Serialisation::ros1 : Serialisation::cdr});
 }
 
-void McapBag::take_chunk(const McapRecord& record) {
-  McapChunkRecords records = unpack_mcap_chunk(record, chunk_);
-  left_ = records.bytes;
-  if (!records.problem.empty())
-    leave_out(records.problem);
+/// Processes the schemas and channels of a chunk, and sorts its messages by time: writers with several threads store
+/// them as they come.
+void McapBag::open_chunk(const McapRecord& record) {
+  const McapChunkRecords chunk = unpack_mcap_chunk(record, chunk_);
+  if (!chunk.problem.empty())
+    leave_out(chunk.problem);
+  records_ = chunk.bytes;
+  messages_.clear();
+  next_ = 0;
+  for (std::span<const std::byte> left = records_; !left.empty();) {
+    const auto offset = static_cast<std::uint32_t>(records_.size() - left.size());
+    const std::optional<McapRecord> inner = take_mcap_record(left);
+    if (!inner || inner->op == McapOp::chunk) {
+      leave_out("the records in it are damaged");
+      break;
+    }
+    if (inner->op == McapOp::message)
+      messages_.push_back(offset);
+    else
+      accept(*inner);
+  }
+  std::ranges::stable_sort(messages_, {}, [&](std::uint32_t offset) {
+    std::span<const std::byte> rest = records_.subspan(offset);
+    return log_time_ns(*take_mcap_record(rest));
+  });
 }
 
 /// Returns false for a message without a known channel or a valid time.
-bool McapBag::take_message(const McapRecord& record) {
+bool McapBag::accept_message(const McapRecord& record) {
   MessageReader fields = record.fields();
   const std::optional<std::size_t> topic = topic_of(fields.number<std::uint16_t>());
-  fields.number<std::uint32_t>(); // sequence number
-  const auto recorded_ns = fields.number<std::uint64_t>();
-  fields.number<std::uint64_t>(); // publication time
+  const std::uint64_t recorded_ns = log_time_ns(record);
+  fields.bytes(sizeof(std::uint32_t) + 2 * sizeof(std::uint64_t)); // sequence number, times of reception and sending
   const bool has_time = recorded_ns <= static_cast<std::uint64_t>(kMaxBagTime_ns);
   timeless_ += has_time ? 0U : 1U;
   if (!fields.whole() || !topic || !has_time)

@@ -36,16 +36,16 @@ class McapBag : public Bag {
 
   [[nodiscard]] std::optional<std::string> read_magic();
   bool read_topics_from_summary();
-  bool take_summary(std::span<const std::byte> summary);
+  bool accept_summary(std::span<const std::byte> summary);
   std::optional<McapFooter> read_footer();
   bool read_at(std::uint64_t place, std::span<std::byte> bytes);
   std::optional<McapRecord> next_record();
   std::optional<McapRecord> read_record();
-  bool take(const McapRecord& record);
-  void take_schema(const McapRecord& record);
-  void take_channel(const McapRecord& record);
-  void take_chunk(const McapRecord& record);
-  bool take_message(const McapRecord& record);
+  bool accept(const McapRecord& record);
+  void accept_schema(const McapRecord& record);
+  void accept_channel(const McapRecord& record);
+  void open_chunk(const McapRecord& record);
+  bool accept_message(const McapRecord& record);
   void free_memory();
   std::nullopt_t break_off();
   void leave_out(const std::string& why);
@@ -58,7 +58,9 @@ class McapBag : public Bag {
   bool is_closed_ = false;  ///< has its footer
   bool is_over_ = false;    ///< no more records
   std::vector<std::byte> record_, chunk_;
-  std::span<const std::byte> left_; ///< unread part of the current chunk
+  std::span<const std::byte> records_;  ///< of the current chunk
+  std::vector<std::uint32_t> messages_; ///< offsets in it of its messages, by time
+  std::size_t next_ = 0;                ///< index of the next one
   std::map<std::uint16_t, std::string> schemas_;
   BagMessage message_{};
 

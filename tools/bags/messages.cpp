@@ -54,6 +54,15 @@ std::optional<LidarPackets> read_velodyne_scan(MessageReader reader) {
   return read_packets(reader, [](MessageReader& r) { return r.bytes(velodyne::kDataPacketBytes); });
 }
 
+/// Reads one packet without a stamp. Older drivers append a byte; the lengths of Ouster's packets are multiples of 4.
+std::optional<LidarPackets> read_ouster_packet(MessageReader reader) {
+  constexpr std::size_t kMultiple = 4;
+  const std::span<const std::byte> bytes = reader.sequence();
+  LidarPackets packets;
+  packets.add(Stamp{}, bytes.first(bytes.size() - (bytes.size() % kMultiple == 1 ? 1 : 0)));
+  return reader.whole() ? std::optional(std::move(packets)) : std::nullopt;
+}
+
 std::optional<LidarPackets> read_nebula_packets(MessageReader reader) {
   return read_packets(reader, [](MessageReader& r) { return r.sequence(); });
 }
@@ -127,12 +136,13 @@ void LidarPackets::add(Stamp stamp, std::span<const std::byte> payload) {
 }
 
 std::span<const PacketType> packet_types() {
-  static constexpr std::array kTypes{PacketType{"velodyne_msgs/VelodyneScan", "Velodyne", read_velodyne_scan},
-                                     PacketType{"nebula_msgs/NebulaPackets", "", read_nebula_packets},
-                                     PacketType{"ouster_ros/PacketMsg", "Ouster", nullptr},
-                                     PacketType{"ouster_sensor_msgs/PacketMsg", "Ouster", nullptr},
-                                     PacketType{"pandar_msgs/PandarScan", "Hesai", read_pandar_scan},
-                                     PacketType{"hesai_ros_driver/UdpFrame", "Hesai", read_hesai_frame}};
+  static constexpr std::array kTypes{PacketType{"velodyne_msgs/VelodyneScan", read_velodyne_scan},
+                                     PacketType{"nebula_msgs/NebulaPackets", read_nebula_packets},
+                                     PacketType{"ouster_ros/PacketMsg", read_ouster_packet},
+                                     PacketType{"ouster_msgs/PacketMsg", read_ouster_packet},
+                                     PacketType{"ouster_sensor_msgs/PacketMsg", read_ouster_packet},
+                                     PacketType{"pandar_msgs/PandarScan", read_pandar_scan},
+                                     PacketType{"hesai_ros_driver/UdpFrame", read_hesai_frame}};
   return kTypes;
 }
 
@@ -141,9 +151,6 @@ const PacketType* packet_type(std::string_view name) {
   return found != packet_types().end() ? &*found : nullptr;
 }
 
-bool are_packets_decoded(std::string_view type_name) {
-  const PacketType* const type = packet_type(type_name);
-  return type != nullptr && type->read != nullptr;
-}
+bool is_ouster_type(std::string_view name) { return name.starts_with("ouster_") && packet_type(name) != nullptr; }
 
 } // namespace locus::tools

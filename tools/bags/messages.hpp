@@ -35,16 +35,15 @@ struct LidarPackets {
 /// Message type that holds lidar packets.
 struct PacketType {
   std::string_view name;
-  std::string_view maker; ///< of the lidars; empty: any
-  /// Returns nothing for a truncated message; nullptr: the packets of this maker are not decoded.
+  /// Returns nothing for a truncated message.
   std::optional<LidarPackets> (*read)(MessageReader reader);
 };
 /// Returns all known types.
 std::span<const PacketType> packet_types();
 /// Returns nullptr for a type without packets.
 const PacketType* packet_type(std::string_view name);
-/// Returns whether the type holds packets of a lidar that is supported.
-bool are_packets_decoded(std::string_view type_name);
+/// Returns whether the type is that of ouster-ros, in any of its packages: one packet, of the lidar or of its IMU.
+bool is_ouster_type(std::string_view name);
 
 /// Returns the stamp of a header or packet, or `recorded` if it was not set.
 Stamp stamp_or(Stamp recorded, Stamp stamp);

@@ -30,6 +30,10 @@ constexpr std::array kDefinitions{
     Definition{"nav_msgs/Odometry", "std_msgs/Header header\nstring child_frame_id\n"
                                     "geometry_msgs/PoseWithCovariance pose\ngeometry_msgs/TwistWithCovariance twist\n"},
     Definition{"tf2_msgs/TFMessage", "geometry_msgs/TransformStamped[] transforms\n"},
+    Definition{"sensor_msgs/Imu",
+               "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n"
+               "geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n"
+               "geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance\n"},
     Definition{"sensor_msgs/PointField",
                "uint8 INT8=1\nuint8 UINT8=2\nuint8 INT16=3\nuint8 UINT16=4\nuint8 INT32=5\nuint8 UINT32=6\n"
                "uint8 FLOAT32=7\nuint8 FLOAT64=8\nstring name\nuint32 offset\nuint8 datatype\nuint32 count\n"},

@@ -6,6 +6,7 @@
 #include "daemon/dds/ros_messages.hpp"
 #include "daemon/machine_time.hpp"
 #include "locus_replay/failure.hpp"
+#include "locus_replay/motion_messages.hpp"
 
 namespace locus::tools {
 
@@ -30,32 +31,21 @@ MotionPublisher::MotionPublisher(const Config& config, bool clock)
     clock_.emplace(node_, "/clock", TopicQos::clock());
 }
 
-void MotionPublisher::publish(const daemon::ImuInput& input, Duration shift) {
+void MotionPublisher::publish(daemon::ImuInput input, Duration shift) {
   const auto writer = imus_.find(input.source);
   if (writer == imus_.end())
     return;
-  const Eigen::Vector3d& w = input.sample.angular_velocity_radps;
-  const Eigen::Vector3d& f = input.sample.specific_force_mps2;
-  ros::Imu message{};
-  message.header_ = {daemon::to_ros(input.sample.stamp + shift), frame_base_.data()};
-  if (const auto& q = input.sample.attitude)
-    message.orientation_ = {q->x(), q->y(), q->z(), q->w()};
-  else
-    message.orientation_covariance_[0] = -1; // REP 145: not available
-  message.angular_velocity_ = {w.x(), w.y(), w.z()};
-  message.linear_acceleration_ = {f.x(), f.y(), f.z()};
-  refused_ += writer->second.write(message) ? 0U : 1U;
+  input.sample.stamp += shift;
+  refused_ += writer->second.write(to_ros(input.sample, frame_base_)) ? 0U : 1U;
 }
 
-void MotionPublisher::publish(const daemon::OdometryInput& input, Duration shift) {
-  constexpr double kUsualVariance = 1e-4;
+void MotionPublisher::publish(daemon::OdometryInput input, Duration shift) {
   const auto writer = odometries_.find(input.source);
   if (writer == odometries_.end())
     return;
-  daemon::OdometryReport report{.stamp = input.sample.stamp + shift, .T_odom_base = input.sample.T_source_base};
-  report.twist_covariance.diagonal().setConstant(kUsualVariance * input.sample.covariance_scale);
+  input.sample.stamp += shift;
   const daemon::FrameNames frames{frame_odom_, frame_base_};
-  refused_ += writer->second.write(daemon::to_ros(report, frames)) ? 0U : 1U;
+  refused_ += writer->second.write(to_ros(input.sample, frames)) ? 0U : 1U;
 }
 
 void MotionPublisher::publish_clock(Stamp now) {

@@ -22,8 +22,8 @@ class MotionPublisher {
   /// Throws Failure.
   MotionPublisher(const Config& config, bool clock);
 
-  void publish(const daemon::ImuInput& input, Duration shift);
-  void publish(const daemon::OdometryInput& input, Duration shift);
+  void publish(daemon::ImuInput input, Duration shift);
+  void publish(daemon::OdometryInput input, Duration shift);
 
   /// Publishes the clock if a period has passed, and never backwards. Call with every new time.
   void publish_clock(Stamp now);

@@ -12,7 +12,9 @@
 #include "bags/messages.hpp"
 #include "bags/static_transforms.hpp"
 #include "drivers/clouds/cloud_layout.hpp"
+#include "locus_replay/bag_topics.hpp"
 #include "locus_replay/failure.hpp"
+#include "locus_replay/ouster_metadata.hpp"
 
 namespace locus::tools {
 namespace {
@@ -58,7 +60,8 @@ Clouds look_into(Bag& bag) {
     ++seen.messages;
     if (const auto cloud = read_cloud({message->data, topic.serialisation}, topic.type)) {
       seen.points += points_of(*cloud);
-      seen.frame = cloud->frame;
+      if (seen.messages == 1)
+        seen.frame = cloud->frame;
     }
   }
   return clouds;
@@ -80,7 +83,10 @@ std::string other_topics(const Bag& bag, const Clouds& clouds, std::size_t taken
 
 void take_clouds_of(const std::filesystem::path& bag_file, Config& config, std::vector<std::string>& lines) {
   const std::unique_ptr<Bag> bag = value_or_fail(open_bag(bag_file), ExitStatus::failed);
-  if (std::ranges::any_of(bag->topics(), [](const BagTopic& topic) { return are_packets_decoded(topic.type); }))
+  const auto is_readable = [&](const BagTopic& topic) {
+    return are_lidar_packets(topic) && (!is_ouster_type(topic.type) || has_metadata(bag_file));
+  };
+  if (std::ranges::any_of(bag->topics(), is_readable))
     return;
   const Clouds clouds = look_into(*bag);
   const auto most = std::ranges::max_element(clouds.topics, {}, [](const auto& entry) { return entry.second.points; });
@@ -91,7 +97,9 @@ void take_clouds_of(const std::filesystem::path& bag_file, Config& config, std::
   lidar.topic = bag->topics()[topic].name;
   if (!lidar.topic.starts_with('/'))
     lidar.topic.insert(0, 1, '/');
-  lines.push_back(fmt::format("{}: no packets, so the clouds on {} are taken{}", bag_file.string(), lidar.topic,
+  const bool has_packets = std::ranges::any_of(bag->topics(), are_lidar_packets);
+  lines.push_back(fmt::format("{}: {}, so the clouds on {} are taken{}", bag_file.string(),
+                              has_packets ? "no metadata for the packets of its Ouster" : "no packets", lidar.topic,
                               other_topics(*bag, clouds, topic)));
   const std::string& base = config.dds.frame_base;
   if (const std::optional<Pose> T_base_lidar = clouds.transforms.between(base, seen.frame)) {

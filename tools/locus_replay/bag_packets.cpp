@@ -17,15 +17,21 @@ constexpr std::size_t kWithEach = 100; ///< bytes of overhead per packet or clou
 } // namespace
 
 BagPackets::BagPackets(std::unique_ptr<Bag> bag, std::filesystem::path file, const Config& config,
-                       const std::vector<std::optional<std::size_t>>& topic_of_lidar)
+                       const BagTopics& topics)
     : bag_(std::move(bag)), file_(std::move(file)) {
-  for (std::size_t i = 0; i < topic_of_lidar.size(); ++i) {
-    if (const auto topic = topic_of_lidar[i]) {
-      const std::string& type = bag_->topics()[*topic].type;
-      lidars_.push_back({static_cast<std::uint8_t>(i), *topic, type, packet_type(type), config.lidars[i].port,
-                         config.lidars[i].source_ip.value_or(0)});
-    }
+  for (std::size_t i = 0; i < config.lidars.size(); ++i) {
+    const LidarOptions& lidar = config.lidars[i];
+    if (topics.of_lidar[i])
+      add(*topics.of_lidar[i], i, lidar, lidar.port);
+    if (topics.of_imu[i])
+      add(*topics.of_imu[i], i, lidar, lidar.imu_port);
   }
+}
+
+void BagPackets::add(std::size_t topic, std::size_t lidar, const LidarOptions& options, std::uint16_t port) {
+  const std::string& type = bag_->topics()[topic].type;
+  lidars_.push_back(
+      {static_cast<std::uint8_t>(lidar), topic, type, packet_type(type), port, options.source_ip.value_or(0)});
 }
 
 const Datagram* BagPackets::next() {
@@ -34,9 +40,9 @@ const Datagram* BagPackets::next() {
   if (earliest == scans_.end())
     return nullptr;
   if (earliest->is_cloud())
-    give_cloud(*earliest);
+    emit_cloud(*earliest);
   else
-    give_packet(*earliest);
+    emit_packet(*earliest);
   waiting_ -= bytes_.size() + kWithEach;
   if (++earliest->next >= earliest->packets.packets.size())
     scans_.erase(earliest);
@@ -44,13 +50,13 @@ const Datagram* BagPackets::next() {
   return &datagram_;
 }
 
-void BagPackets::give_packet(const Scan& scan) {
+void BagPackets::emit_packet(const Scan& scan) {
   const auto payload = scan.packets.payload(scan.packet());
   bytes_.assign(payload.begin(), payload.end());
   datagram_ = {bytes_, scan.lidar->ip, scan.lidar->port, scan.lidar->port, scan.stamp(), false};
 }
 
-void BagPackets::give_cloud(Scan& scan) {
+void BagPackets::emit_cloud(Scan& scan) {
   bytes_ = std::move(scan.cloud);
   const Serialisation serialisation = bag_->topics()[scan.lidar->topic].serialisation;
   cloud_ = read_cloud({bytes_, serialisation}, scan.lidar->type).value_or(CloudView{});
@@ -71,24 +77,25 @@ void BagPackets::read_ahead() {
     const BagMessage* message = bag_->next();
     bag_is_over_ = message == nullptr;
     if (message != nullptr)
-      take(*message);
+      accept(*message);
   }
 }
 
-void BagPackets::take(const BagMessage& message) {
-  misplaced_ += message.recorded < newest_ - kAhead ? 1U : 0U;
+void BagPackets::accept(const BagMessage& message) {
+  misplaced_ += message.recorded < latest_ - kAhead ? 1U : 0U;
+  latest_ = std::max(latest_, message.recorded);
   newest_ = message.recorded;
   const auto lidar = std::ranges::find(lidars_, message.topic, &Lidar::topic);
   if (lidar == lidars_.end())
     return;
   ++messages_;
   if (lidar->packets == nullptr)
-    take_cloud(message, *lidar);
+    accept_cloud(message, *lidar);
   else
-    take_packets(message, *lidar);
+    accept_packets(message, *lidar);
 }
 
-void BagPackets::take_cloud(const BagMessage& message, const Lidar& lidar) {
+void BagPackets::accept_cloud(const BagMessage& message, const Lidar& lidar) {
   if (!read_cloud({message.data, bag_->topics()[message.topic].serialisation}, lidar.type)) {
     ++malformed_;
     return;
@@ -97,7 +104,7 @@ void BagPackets::take_cloud(const BagMessage& message, const Lidar& lidar) {
   scans_.push_back({&lidar, message.recorded, {}, {message.data.begin(), message.data.end()}});
 }
 
-void BagPackets::take_packets(const BagMessage& message, const Lidar& lidar) {
+void BagPackets::accept_packets(const BagMessage& message, const Lidar& lidar) {
   const Serialisation serialisation = bag_->topics()[message.topic].serialisation;
   std::optional<LidarPackets> packets = lidar.packets->read({message.data, serialisation});
   malformed_ += packets ? 0U : 1U;
@@ -118,10 +125,9 @@ std::string BagPackets::why_none() const {
 std::vector<std::string> BagPackets::warnings() const {
   std::vector<std::string> lines = bag_->warnings();
   if (misplaced_ > 0)
-    lines.push_back(fmt::format("{}: the time of reception goes back {} times from one message to the next: the "
-                                "recorder's clock was set, or the bag is not in order, and what was made of it is "
-                                "wrong; sort it with: rosbag filter BAG SORTED_BAG True, or mcap sort BAG -o "
-                                "SORTED_BAG",
+    lines.push_back(fmt::format("{}: {} messages stand behind one that was received later: the recorder's clock was "
+                                "set, or the bag is not in order, and what was made of it is wrong; sort it with: "
+                                "rosbag filter BAG SORTED_BAG True, or mcap sort BAG -o SORTED_BAG",
                                 file_.string(), misplaced_));
   if (malformed_ > 0)
     lines.push_back(

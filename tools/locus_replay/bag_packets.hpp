@@ -15,6 +15,7 @@
 #include "config/config.hpp"
 #include "drivers/clouds/cloud_view.hpp"
 #include "drivers/net/datagram.hpp"
+#include "locus_replay/bag_topics.hpp"
 
 namespace locus::tools {
 
@@ -25,9 +26,8 @@ namespace locus::tools {
 /// second ahead. One owner.
 class BagPackets : public DatagramSource {
  public:
-  /// Takes the bag at its first message. `topic_of_lidar`: by configuration index.
-  BagPackets(std::unique_ptr<Bag> bag, std::filesystem::path file, const Config& config,
-             const std::vector<std::optional<std::size_t>>& topic_of_lidar);
+  /// Takes the bag at its first message.
+  BagPackets(std::unique_ptr<Bag> bag, std::filesystem::path file, const Config& config, const BagTopics& topics);
 
   const Datagram* next() override;
   [[nodiscard]] std::uint64_t datagrams() const override { return datagrams_; }
@@ -36,6 +36,7 @@ class BagPackets : public DatagramSource {
   [[nodiscard]] double progress() const override { return bag_->progress(); }
 
  private:
+  /// Lidar, or the IMU in it, whose packets have a topic of their own.
   struct Lidar {
     std::uint8_t index;
     std::size_t topic;
@@ -57,11 +58,12 @@ class BagPackets : public DatagramSource {
   };
 
   void read_ahead();
-  void take(const BagMessage& message);
-  void take_packets(const BagMessage& message, const Lidar& lidar);
-  void take_cloud(const BagMessage& message, const Lidar& lidar);
-  void give_packet(const Scan& scan);
-  void give_cloud(Scan& scan);
+  void add(std::size_t topic, std::size_t lidar, const LidarOptions& options, std::uint16_t port);
+  void accept(const BagMessage& message);
+  void accept_packets(const BagMessage& message, const Lidar& lidar);
+  void accept_cloud(const BagMessage& message, const Lidar& lidar);
+  void emit_packet(const Scan& scan);
+  void emit_cloud(Scan& scan);
   [[nodiscard]] std::string types() const;
 
   std::unique_ptr<Bag> bag_;
@@ -69,13 +71,14 @@ class BagPackets : public DatagramSource {
   std::vector<Lidar> lidars_;
   std::deque<Scan> scans_;  ///< read but not returned yet; in file order
   std::size_t waiting_ = 0; ///< bytes of memory in use for them
-  Stamp newest_;            ///< recording time of the latest message
+  Stamp newest_;            ///< recording time of the preceding message
+  Stamp latest_;            ///< latest recording time so far
   bool bag_is_over_ = false;
   std::vector<std::byte> bytes_; ///< of the datagram returned
   CloudView cloud_;
   Datagram datagram_;
   std::uint64_t datagrams_ = 0, messages_ = 0, malformed_ = 0;
-  std::uint64_t misplaced_ = 0; ///< messages received well before the preceding one in the file
+  std::uint64_t misplaced_ = 0; ///< messages received well before one that precedes them in the file
 };
 
 } // namespace locus::tools

@@ -23,7 +23,9 @@ using Index = std::optional<std::size_t>;
 
 std::string_view type_of(SourceKind kind) { return kind == SourceKind::imu ? kImuType : kOdometryType; }
 
-bool is_of_lidar(const BagTopic& topic) { return are_packets_decoded(topic.type); }
+bool is_imu_of_ouster(const BagTopic& topic) {
+  return is_ouster_type(topic.type) && topic.name.ends_with("imu_packets");
+}
 
 /// Assigns the topics of one kind to lidars or motion sources.
 class Dealer {
@@ -93,24 +95,11 @@ std::string all_of(const Topics& topics) {
   return lines.empty() ? "no topics" : fmt::format("{}", fmt::join(lines, ", "));
 }
 
-/// Lists the topics with packets of unsupported lidars; empty without any.
-std::string not_decoded(const Topics& topics) {
-  std::vector<std::string> found;
-  for (const BagTopic& topic : topics) {
-    if (const PacketType* const type = packet_type(topic.type))
-      found.push_back(fmt::format("{} ({}) is of a lidar of {}, whose packets are not read from bags", topic.name,
-                                  topic.type, type->maker));
-  }
-  return fmt::format("{}", fmt::join(found, ", "));
-}
-
 /// Lists the supported types.
-std::string decoded_types() {
+std::string packet_type_names() {
   std::vector<std::string_view> names;
-  for (const PacketType& type : packet_types()) {
-    if (type.read != nullptr)
-      names.push_back(type.name);
-  }
+  for (const PacketType& type : packet_types())
+    names.push_back(type.name);
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
@@ -155,15 +144,33 @@ Index first_of_packets(const Config& config) {
 }
 
 [[noreturn]] void fail_without_packets(const Topics& topics, const std::string& bag_name) {
-  if (const std::string instead = clouds_instead(topics); !instead.empty())
-    throw Failure(ExitStatus::failed, fmt::format("{}: no {} in it, but {}", bag_name, decoded_types(), instead));
-  const std::string others = not_decoded(topics);
+  const std::string instead = clouds_instead(topics);
   throw Failure(ExitStatus::failed,
-                others.empty()
+                instead.empty()
                     ? fmt::format("{}: no {} in it, but {}; record the lidar's packets, mostly on /velodyne_packets",
-                                  bag_name, decoded_types(), all_of(topics))
-                    : fmt::format("{}: {}; only those of Velodyne are ({}), so record those of one", bag_name, others,
-                                  decoded_types()));
+                                  bag_name, packet_type_names(), all_of(topics))
+                    : fmt::format("{}: no {} in it, but {}", bag_name, packet_type_names(), instead));
+}
+
+/// Assigns the IMU packets beside the lidar packets of each Ouster. Throws Failure for one without metadata.
+void deal_ousters(const Topics& topics, const std::string& bag_name, const Config& config, BagTopics& chosen) {
+  chosen.of_imu.resize(config.lidars.size());
+  for (std::size_t i = 0; i < config.lidars.size(); ++i) {
+    if (!chosen.of_lidar[i] || !is_ouster_type(topics[*chosen.of_lidar[i]].type))
+      continue;
+    const BagTopic& packets = topics[*chosen.of_lidar[i]];
+    if (!config.lidars[i].is_ouster())
+      throw Failure(ExitStatus::wrong_usage,
+                    fmt::format("{}: {} is of an Ouster, whose packets cannot be read without its metadata: neither "
+                                "the bag nor a .json file beside it has those; name a file with --set "
+                                "lidars.{}.metadata=FILE",
+                                bag_name, packets.name, i));
+    const auto found = std::ranges::find_if(topics, [&](const BagTopic& topic) {
+      return is_imu_of_ouster(topic) && namespace_of(topic.name) == namespace_of(packets.name);
+    });
+    if (found != topics.end() && config.lidars[i].imu_port != 0)
+      chosen.of_imu[i] = static_cast<std::size_t>(found - topics.begin());
+  }
 }
 
 /// Assigns packet topics to the lidars with packets, `first` of them first.
@@ -201,11 +208,12 @@ void deal_lidars(const Bag& bag, const std::string& bag_name, const Config& conf
   const Index first = first_of_packets(config);
   if (!first && !has_clouds)
     throw Failure(ExitStatus::wrong_usage, chosen.doubts.front());
-  Dealer dealer(bag.topics(), is_of_lidar);
+  Dealer dealer(bag.topics(), are_lidar_packets);
   if (dealer.left() == 0 && !has_clouds)
     fail_without_packets(bag.topics(), bag_name);
   if (first && dealer.left() > 0)
     deal_packets(dealer, bag_name, config, *first, chosen);
+  deal_ousters(bag.topics(), bag_name, config, chosen);
 }
 
 void deal_sources(const Bag& bag, const std::string& bag_name, const Config& config,
@@ -242,12 +250,14 @@ std::string describe(const Bag& bag, const std::string& bag_name, const Config& 
   };
   for (std::size_t i = 0; i < chosen.of_lidar.size(); ++i)
     take("lidar " + config.lidars[i].name, chosen.of_lidar[i]);
+  for (std::size_t i = 0; i < chosen.of_imu.size(); ++i)
+    take(config.lidars[i].name + "_imu", chosen.of_imu[i]);
   for (std::size_t i = 0; i < chosen.of_source.size(); ++i)
     take(config.motion_sources[i].name, chosen.of_source[i]);
   for (std::size_t i = 0; i < bag.topics().size(); ++i) {
     const BagTopic& topic = bag.topics()[i];
-    if (!is_taken[i] &&
-        (is_of_lidar(topic) || is_cloud_type(topic.type) || topic.type == kImuType || topic.type == kOdometryType))
+    if (!is_taken[i] && (packet_type(topic.type) != nullptr || is_cloud_type(topic.type) || topic.type == kImuType ||
+                         topic.type == kOdometryType))
       left_out.push_back(topic.name);
   }
   return fmt::format("{}: {}{}{}", bag_name, fmt::join(taken, ", "),
@@ -255,6 +265,10 @@ std::string describe(const Bag& bag, const std::string& bag_name, const Config& 
 }
 
 } // namespace
+
+bool are_lidar_packets(const BagTopic& topic) { return packet_type(topic.type) != nullptr && !is_imu_of_ouster(topic); }
+
+std::string_view namespace_of(std::string_view topic) { return topic.substr(0, topic.rfind('/') + 1); }
 
 BagTopics BagTopics::choose(const Bag& bag, const std::string& bag_name, const Config& config,
                             const std::function<bool(SourceId)>& has_file) {

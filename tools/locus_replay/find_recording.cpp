@@ -22,6 +22,11 @@ bool is_all_in_one(const std::filesystem::path& where) {
   return looks_like_bag(where) || KittiDrive::is(where) || SweepFolder::is(where);
 }
 
+/// Returns whether the file is a recording by itself, judged by its name. A folder of ROS 2 bags is one as a whole.
+bool is_recording_file(const std::filesystem::path& file) {
+  return file.extension() == ".bag" || is_named_as_capture(file);
+}
+
 /// Lists what could be replayed in a folder that is not a recording itself, or in its subfolders.
 std::vector<std::filesystem::path> recordings_in(const std::filesystem::path& where) {
   constexpr int kDepth = 2;
@@ -31,7 +36,8 @@ std::vector<std::filesystem::path> recordings_in(const std::filesystem::path& wh
   std::filesystem::recursive_directory_iterator entry{where, directory_options::skip_permission_denied, ignored};
   for (const std::filesystem::recursive_directory_iterator end; !ignored && entry != end; entry.increment(ignored)) {
     const bool is_folder = entry->is_directory(ignored);
-    const bool is_recording = is_folder && (is_all_in_one(entry->path()) || CaptureFolder::find(entry->path()));
+    const bool is_recording = is_folder ? is_all_in_one(entry->path()) || CaptureFolder::find(entry->path())
+                                        : is_recording_file(entry->path());
     if (is_recording)
       found.push_back(entry->path());
     if (is_recording || entry.depth() + 1 >= kDepth)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -11,14 +12,18 @@ namespace locus::tools {
 
 /// Result of the search for metadata.
 struct FoundMetadata {
-  std::string taken;                 ///< file in use, for the user; empty if none
+  std::string taken;                 ///< origin of the metadata in use, for the user; empty if none
   std::vector<std::string> warnings; ///< a line each
 };
 
-/// Searches next to a pcap capture for the metadata of its Ouster, and configures the first lidar accordingly: a file
-/// named after the capture (drive.json or drive_0.json for drive.pcap), else the only .json file that matches packets
-/// of the capture. For default configurations; does nothing if the configuration names an Ouster.
+/// Searches for the metadata of the Ouster in a capture or a bag, and configures the first lidar accordingly: in a bag
+/// its topic `metadata`, as ouster-ros publishes it; else a file named after the recording (drive.json or drive_0.json
+/// for drive.pcap), else the only .json file beside it that matches packets of the recording. For default
+/// configurations; does nothing if the configuration names an Ouster, or if its first lidar gives clouds.
 FoundMetadata find_metadata(const CaptureFolder& folder, Config& config);
+
+/// Returns whether find_metadata() finds metadata for a bag.
+bool has_metadata(const std::filesystem::path& bag);
 
 /// Makes the Ousters of a recording by locusd use the metadata recorded with it.
 void use_recorded_metadata(const CaptureFolder& folder, Config& config);

@@ -2,6 +2,7 @@
 #include "locus_replay/recorded_input.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <iterator>
 #include <utility>
 
@@ -40,8 +41,7 @@ RecordedInput open_bag_input(const Arguments& arguments, const std::filesystem::
       warnings.push_back(fmt::format("{}: motion source {}: never heard from, nothing of its kind in the bag",
                                      file.string(), config.motion_sources[i].name));
   }
-  return {
-      std::make_unique<BagPackets>(std::move(bag), file, config, topics.of_lidar), std::move(motion), topics.taken, {}};
+  return {std::make_unique<BagPackets>(std::move(bag), file, config, topics), std::move(motion), topics.taken, {}};
 }
 
 RecordedInput open_drive_input(const Arguments& arguments, const std::filesystem::path& folder, const Config& config,
@@ -101,6 +101,21 @@ RecordedInput open_sweeps_input(const Arguments& arguments, const CaptureFolder&
   return input;
 }
 
+/// Returns the file behind the named one in a row whose names do not show that it is one capture: tcpdump -C with -W,
+/// or with a name without .pcap. After an overwritten part the row starts anywhere.
+std::optional<std::filesystem::path> part_beside(const std::filesystem::path& named) {
+  const std::string name = named.filename().string();
+  const std::string stem = name.substr(0, name.find_last_not_of('0') + 1);
+  const bool is_zero = stem.size() < name.size() && !stem.empty() && std::isdigit(stem.back()) == 0;
+  std::filesystem::path next = named;
+  if (is_zero)
+    next.replace_filename(fmt::format("{}{:0{}}", stem, 1, name.size() - stem.size()));
+  else if (!named.has_extension())
+    next += "1";
+  std::error_code ignored;
+  return next != named && std::filesystem::is_regular_file(next, ignored) ? std::optional{next} : std::nullopt;
+}
+
 } // namespace
 
 bool gives_sweeps(const std::filesystem::path& capture) {
@@ -133,6 +148,10 @@ RecordedInput open_input(const Arguments& arguments, const CaptureFolder& folder
   std::string taken = has_parts ? fmt::format("{}: and the parts behind it, up to {}", arguments.capture.string(),
                                               folder.lidar.back().filename().string())
                                 : "";
+  if (const auto part = folder.lidar.size() == 1 ? part_beside(arguments.capture) : std::nullopt)
+    warnings.push_back(fmt::format("{}: is replayed alone, without {}; if both are parts of one capture, join all of "
+                                   "them: mergecap -w WHOLE.pcap PART...",
+                                   arguments.capture.string(), part->filename().string()));
   return {
       std::move(capture), read_motion(arguments, folder, config, config_is_users_own, warnings), std::move(taken), {}};
 }

@@ -16,12 +16,12 @@
 
 namespace locus::tools {
 
-/// Replaces the arrival times of a recording by the lidar's own clock where they are all the same, or nearly so, though
-/// that clock goes on. It is on UTC if PPS is locked and a position packet has the date; otherwise it begins at the
+/// Replaces the arrival times of a recording by the lidar's own clock if they are all (nearly) the same although that
+/// clock advances. The time is UTC if PPS is locked and a position packet contains the date; otherwise it starts at the
 /// first arrival.
 ///
-/// Reads the first packets ahead and decodes them for that. Decoded packets and clouds have no such clock and pass as
-/// they are. Single owner, not thread-safe.
+/// Reads ahead and decodes the first packets to decide. Decoded packets and clouds have no such clock and pass
+/// unchanged. Single owner, not thread-safe.
 class RecordedTimes : public DatagramSource {
  public:
   RecordedTimes(std::unique_ptr<DatagramSource> source, std::vector<LidarOptions> lidars);
@@ -33,21 +33,20 @@ class RecordedTimes : public DatagramSource {
   [[nodiscard]] double progress() const override { return source_->progress(); }
 
  private:
-  struct Held {
+  struct Stored {
     Datagram datagram; ///< without payload
     std::vector<std::byte> payload;
   };
-  /// Follows the clock of the first lidar that is heard.
-  class LidarTime {
+  /// Clock of the first lidar that sends packets.
+  class LidarClock {
    public:
-    explicit LidarTime(LidarRouter lidars) : lidars_(std::move(lidars)) {}
+    explicit LidarClock(LidarRouter lidars) : lidars_(std::move(lidars)) {}
 
-    /// Takes a datagram, whatever its arrival. Returns whether it is the first packet of that lidar, or goes on in
-    /// time.
-    bool take(Datagram datagram);
+    /// Reads the time of a datagram; ignores its arrival time.
+    void accept(Datagram datagram);
     /// Returns the time since the first packet.
     [[nodiscard]] Duration elapsed() const { return elapsed_; }
-    /// Returns the UTC of the first packet, where position packets tell it.
+    /// Returns the UTC time of the first packet if position packets contain it.
     [[nodiscard]] std::optional<Stamp> utc() const;
 
    private:
@@ -58,20 +57,19 @@ class RecordedTimes : public DatagramSource {
   };
 
   void look_ahead();
-  [[nodiscard]] bool arrivals_stand_still(const LidarTime& time) const;
-  const Datagram* take_next();
-  [[nodiscard]] std::optional<LidarTime> open_time() const;
-  void follow_lidar();
+  [[nodiscard]] bool arrivals_stand_still(const LidarClock& clock) const;
+  const Datagram* next_unchanged();
+  [[nodiscard]] std::optional<LidarClock> open_clock() const;
 
   std::unique_ptr<DatagramSource> source_;
   std::vector<LidarOptions> lidars_;
   bool has_looked_ahead_ = false;
-  std::deque<Held> held_;
-  Held given_out_;
+  std::deque<Stored> stored_; ///< read ahead
+  Stored returned_;
   Datagram datagram_;
-  std::optional<LidarTime> lidar_time_; ///< replaces the arrivals
+  std::optional<LidarClock> lidar_clock_; ///< replaces the arrival times
   bool is_utc_ = false;
-  Stamp begin_; ///< of lidar_time_
+  Stamp begin_; ///< time of the first packet by lidar_clock_
 };
 
 } // namespace locus::tools

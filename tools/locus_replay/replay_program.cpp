@@ -43,7 +43,7 @@ struct MoreResults {
   }
   void take(const Sweep& sweep, const Odometry& odometry, const daemon::ProcessedSweep& done) {
     if (mcap)
-      mcap->take(sweep, odometry, done);
+      mcap->add(sweep, odometry, done);
     if (sweeps)
       sweeps->take(sweep, odometry, done.estimate);
   }
@@ -64,13 +64,15 @@ void replay(const Config& config, LidarRouter lidars, Recording& recording, Resu
     if (observer)
       observer(done.estimate);
     if (more.mcap)
-      more.mcap->take(pipeline->ingest(), pipeline->counters());
+      more.mcap->add(pipeline->ingest(), pipeline->counters());
     results.take(done);
   };
   pipeline.emplace(
       config, std::move(lidars), take, [&](const HealthEvent& event) { results.take(event); }, stage);
   for (bool goes_on = true; goes_on;) {
     const daemon::Input input = recording.next(Duration::zero());
+    if (more.mcap)
+      more.mcap->add(input);
     pipeline->process(input);
     goes_on = !std::holds_alternative<daemon::EndOfInput>(input);
   }

@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/files/pcapng_reader.hpp"
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <pcap/dlt.h>
+
+#include "capture_bytes.hpp"
+#include "support/errors.hpp"
+#include "support/temporary_file.hpp"
+
+namespace locus {
+namespace {
+
+using test::opened;
+using test::payload_of;
+using test::TemporaryFile;
+
+/// Writes pcapng in either byte order.
+class PcapngFile {
+ public:
+  explicit PcapngFile(bool is_big_endian = false) { start_section(is_big_endian); }
+
+  void start_section(bool is_big_endian) {
+    is_big_endian_ = is_big_endian;
+    Bytes body;
+    put(body, 0x1A2B3C4D, 4);
+    put(body, 1, 2);
+    put(body, 0, 2);
+    put(body, ~0ULL, 8);
+    add_block(0x0A0D0D0A, body);
+  }
+  void add_interface(std::uint16_t link_type, std::uint32_t snap_bytes, std::optional<std::uint8_t> resolution = {},
+                     std::int64_t offset_s = 0) {
+    Bytes body;
+    put(body, link_type, 2);
+    put(body, 0, 2);
+    put(body, snap_bytes, 4);
+    if (resolution) {
+      put(body, 9, 2);
+      put(body, 1, 2);
+      body.push_back(std::byte{*resolution});
+      body.resize(body.size() + 3);
+    }
+    if (offset_s != 0) {
+      put(body, 14, 2);
+      put(body, 8, 2);
+      put(body, static_cast<std::uint64_t>(offset_s), 8);
+    }
+    add_block(1, body);
+  }
+  void add_frame(std::uint32_t interface, std::uint64_t ticks, const Bytes& frame) {
+    Bytes body;
+    put(body, interface, 4);
+    put_packet(body, ticks, frame);
+    add_block(6, body);
+  }
+  void add_frame_without_time(const Bytes& frame) {
+    Bytes body;
+    put(body, frame.size(), 4);
+    append(body, frame);
+    add_block(3, body);
+  }
+  void add_old_frame(std::uint16_t interface, std::uint64_t ticks, const Bytes& frame) {
+    Bytes body;
+    put(body, interface, 2);
+    put(body, 0, 2);
+    put_packet(body, ticks, frame);
+    add_block(2, body);
+  }
+  void add_block(std::uint32_t type, Bytes body) {
+    body.resize((body.size() + 3) / 4 * 4);
+    put(bytes_, type, 4);
+    put(bytes_, body.size() + 12, 4);
+    append(bytes_, body);
+    put(bytes_, body.size() + 12, 4);
+  }
+  [[nodiscard]] const Bytes& bytes() const { return bytes_; }
+
+ private:
+  void put_packet(Bytes& body, std::uint64_t ticks, const Bytes& frame) const {
+    put(body, ticks >> 32, 4);
+    put(body, ticks & 0xFFFFFFFF, 4);
+    put(body, frame.size(), 4);
+    put(body, frame.size(), 4);
+    append(body, frame);
+  }
+  void put(Bytes& out, std::uint64_t value, int count) const {
+    for (int i = 0; i < count; ++i) {
+      out.push_back(static_cast<std::byte>(value >> 8 * (is_big_endian_ ? count - 1 - i : i) & 0xFF));
+    }
+  }
+
+  bool is_big_endian_ = false;
+  Bytes bytes_;
+};
+
+Bytes linux_cooked(const Bytes& ip) {
+  Bytes frame(16);
+  frame[14] = std::byte{0x08};
+  append(frame, ip);
+  return frame;
+}
+
+/// Reads all datagrams: their stamps in ns.
+std::vector<std::int64_t> stamps_in(const Bytes& file_bytes, const std::string& name = "any.pcapng") {
+  const TemporaryFile file{name, file_bytes};
+  Capture capture = opened(file.path());
+  std::vector<std::int64_t> stamps;
+  while (const Datagram* datagram = capture.next()) {
+    EXPECT_EQ(datagram->payload.size(), 31u);
+    stamps.push_back(to_ns(datagram->receive_stamp));
+  }
+  EXPECT_EQ(capture.warnings(), std::vector<std::string>{});
+  return stamps;
+}
+
+TEST(Pcapng, IsReadWithItsNanosecondsAndCutAtAnyByte) {
+  PcapngFile written;
+  written.add_interface(DLT_EN10MB, 0, 9);
+  const std::size_t header_size = written.bytes().size();
+  written.add_frame(0, 1'700'000'000'123'456'789, ethernet(ipv4_udp({}, payload_of(31))));
+  const std::size_t record_size = written.bytes().size() - header_size;
+  written.add_frame(0, 1'700'000'000'123'456'790, ethernet(ipv4_udp({}, payload_of(31))));
+  const Bytes& whole = written.bytes();
+  const TemporaryFile file{"whole.pcapng", whole};
+  {
+    Capture capture = opened(file.path());
+    const Datagram* datagram = capture.next();
+    ASSERT_NE(datagram, nullptr);
+    EXPECT_EQ(to_ns(datagram->receive_stamp), 1'700'000'000'123'456'789);
+    EXPECT_EQ(datagram->payload.size(), 31u);
+  }
+  for (std::size_t size = 0; size <= whole.size(); ++size) {
+    SCOPED_TRACE(size);
+    file.write(std::span{whole}.first(size));
+    if (size < header_size) {
+      EXPECT_NE(error_of(Capture::open(file.path())), "");
+      continue;
+    }
+    Capture capture = opened(file.path());
+    while (capture.next() != nullptr) {
+    }
+    EXPECT_EQ(capture.stats().datagrams, (size - header_size) / record_size);
+    EXPECT_EQ(capture.warnings().empty(), (size - header_size) % record_size == 0);
+  }
+}
+
+/// libpcap stops where an interface differs from the first in link type or snap length, and captures on "any" or on
+/// several cards have such.
+TEST(Pcapng, OfInterfacesOfAnyKindIsRead) {
+  constexpr std::uint64_t kTime_us = 1'700'000'000'123'456;
+  const Bytes ip = ipv4_udp({}, payload_of(31));
+  for (const bool is_big_endian : {false, true}) {
+    PcapngFile file{is_big_endian};
+    file.add_interface(DLT_LINUX_SLL, 262144);
+    file.add_interface(DLT_EN10MB, 65535);
+    file.add_frame(1, kTime_us, ethernet(ip));
+    file.add_block(5, Bytes(8)); // statistics
+    file.add_frame(0, kTime_us + 1, linux_cooked(ip));
+    file.add_interface(189, 0); // USB, in the middle
+    file.add_frame(2, kTime_us + 2, Bytes(64));
+    file.add_interface(101, 0); // raw IP
+    file.add_frame(3, kTime_us + 3, ip);
+    file.add_old_frame(1, kTime_us + 4, ethernet(ip));
+    EXPECT_EQ(stamps_in(file.bytes()),
+              (std::vector<std::int64_t>{1'700'000'000'123'456'000, 1'700'000'000'123'457'000,
+                                         1'700'000'000'123'459'000, 1'700'000'000'123'460'000}));
+  }
+}
+
+TEST(Pcapng, OfSeveralSectionsIsReadInTheByteOrderOfEach) {
+  const Bytes frame = ethernet(ipv4_udp({}, payload_of(31)));
+  PcapngFile file{true};
+  file.add_interface(DLT_EN10MB, 0);
+  file.add_frame(0, 1'000'000, frame);
+  file.start_section(false);
+  file.add_interface(189, 0);
+  file.add_interface(DLT_EN10MB, 0, 9);
+  file.add_frame(1, 2'000'000'000, frame);
+  file.start_section(true);
+  file.add_interface(DLT_EN10MB, 0);
+  file.add_frame(0, 3'000'000, frame);
+  EXPECT_EQ(stamps_in(file.bytes()), (std::vector<std::int64_t>{1'000'000'000, 2'000'000'000, 3'000'000'000}));
+}
+
+TEST(Pcapng, TimesAreInTheUnitOfTheirInterface) {
+  const Bytes frame = ethernet(ipv4_udp({}, payload_of(31)));
+  PcapngFile file;
+  file.add_interface(DLT_EN10MB, 0, 0);
+  file.add_interface(DLT_EN10MB, 0, 3);
+  file.add_interface(DLT_EN10MB, 0, 12);
+  file.add_interface(DLT_EN10MB, 0, 0x80 | 10);
+  file.add_interface(DLT_EN10MB, 0, 6, 100);
+  file.add_frame(0, 7, frame);
+  file.add_frame(1, 7'001, frame);
+  file.add_frame(2, 7'250'000'000'000, frame);
+  file.add_frame(3, 7 * 1024 + 512, frame);
+  file.add_frame(4, 7'000'000, frame);
+  file.add_frame_without_time(frame);
+  EXPECT_EQ(stamps_in(file.bytes()), (std::vector<std::int64_t>{7'000'000'000, 7'001'000'000, 7'250'000'000,
+                                                                7'500'000'000, 107'000'000'000, 0}));
+}
+
+TEST(Pcapng, OfForeignLinkTypesAloneNamesThem) {
+  PcapngFile file;
+  file.add_interface(189, 0);
+  file.add_frame(0, 1, Bytes(64));
+  const TemporaryFile temporary{"usb.pcapng", file.bytes()};
+  Capture capture = opened(temporary.path());
+  EXPECT_EQ(capture.next(), nullptr);
+  EXPECT_TRUE(contains(capture.why_none(), "link type USB_LINUX (189)")) << capture.why_none();
+}
+
+TEST(Pcapng, DamagedFileIsReadUpToTheDamage) {
+  const Bytes frame = ethernet(ipv4_udp({}, payload_of(31)));
+  PcapngFile good;
+  good.add_interface(DLT_EN10MB, 0);
+  good.add_frame(0, 1, frame);
+  PcapngFile undescribed = good;
+  undescribed.add_frame(1, 2, frame);
+  PcapngFile short_packet = good;
+  short_packet.add_block(6, Bytes(8));
+  Bytes lengths = undescribed.bytes();
+  lengths.back() = std::byte{0x11};
+  for (const Bytes& bytes : {undescribed.bytes(), short_packet.bytes(), lengths}) {
+    const TemporaryFile temporary{"damaged.pcapng", bytes};
+    Capture capture = opened(temporary.path());
+    EXPECT_NE(capture.next(), nullptr);
+    EXPECT_EQ(capture.next(), nullptr);
+    ASSERT_EQ(capture.warnings().size(), 1U);
+    EXPECT_TRUE(contains(capture.warnings()[0], "the capture is damaged")) << capture.warnings()[0];
+    EXPECT_TRUE(contains(capture.warnings()[0], "the 1 frames before it are used")) << capture.warnings()[0];
+  }
+}
+
+/// Every single-byte corruption of a pcapng file gives data or a sentence.
+TEST(Pcapng, CorruptedFileNeverCrashes) {
+  PcapngFile file;
+  file.add_interface(DLT_EN10MB, 65535, 9, 3);
+  file.add_frame(0, 1, ethernet(ipv4_udp({}, payload_of(31))));
+  file.add_frame_without_time(ethernet(ipv4_udp({}, payload_of(31))));
+  const TemporaryFile temporary{"corrupt.pcapng", file.bytes()};
+  for (std::size_t at = 0; at < file.bytes().size(); ++at) {
+    for (const unsigned value : {0U, 1U, 0x7FU, 0xFFU}) {
+      Bytes bytes = file.bytes();
+      bytes[at] = static_cast<std::byte>(value);
+      temporary.write(bytes);
+      Expected<Capture, std::string> capture = Capture::open(temporary.path());
+      if (!capture) {
+        EXPECT_NE(capture.error(), "");
+        continue;
+      }
+      while (capture->next() != nullptr) {
+      }
+      const Capture::Stats& s = capture->stats();
+      EXPECT_EQ(s.datagrams + s.not_ip + s.ipv6 + s.fragments + s.not_udp + s.malformed, s.frames);
+    }
+  }
+}
+
+TEST(Pcapng, TimeBeyondAllStampsIsMalformed) {
+  PcapngFile late;
+  late.add_interface(DLT_EN10MB, 0, 9);
+  late.add_frame(0, ~0ULL, ethernet(ipv4_udp({}, payload_of(31))));
+  const TemporaryFile file{"late.pcapng", late.bytes()};
+  Capture capture = opened(file.path());
+  EXPECT_EQ(capture.next(), nullptr);
+  EXPECT_EQ(capture.stats().malformed, 1u);
+}
+
+} // namespace
+} // namespace locus
