@@ -76,8 +76,8 @@ void Decoder::aim_beams() {
 std::optional<PacketError> Decoder::decode(std::span<const std::byte> payload, LidarPacket& packet) {
   if (payload.size() != format_.packet_bytes)
     return PacketError::length;
-  const PacketFormat::Header header = format_.header(payload);
-  if (!header.is_lidar_packet)
+  const PacketHeader header = format_.header(payload);
+  if (header.packet_type != PacketHeader::kLidar)
     return PacketError::flag;
   if (header.serial_number != 0 && metadata_.serial_number != 0 && header.serial_number != metadata_.serial_number)
     return PacketError::sender;
@@ -156,7 +156,7 @@ std::optional<PacketError> Decoder::find_columns(Packet payload) {
 
 /// Returns true if the packet comes from the known start of the sensor, or from one in the same mode: equal column
 /// spacing, and measurement IDs that advance with time from one turn to the next.
-bool Decoder::turns_as_known(const PacketFormat::Header& header) {
+bool Decoder::turns_as_known(const PacketHeader& header) {
   if (header.init_id == 0 || metadata_.init_id == 0 || header.init_id == metadata_.init_id)
     return true;
   const OtherStart before = other_start_;

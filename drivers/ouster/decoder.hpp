@@ -100,7 +100,7 @@ class Decoder {
 
   void aim_beams();
   std::optional<PacketError> find_columns(Packet payload);
-  bool turns_as_known(const PacketFormat::Header& header);
+  bool turns_as_known(const PacketHeader& header);
   [[nodiscard]] bool is_spaced_as_known() const;
   [[nodiscard]] std::size_t columns_between(std::size_t from, std::size_t to) const;
   [[nodiscard]] bool is_in_window(std::size_t measurement_id) const;
