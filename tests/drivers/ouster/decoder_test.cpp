@@ -247,6 +247,12 @@ TEST(OusterDecoder, TurnsAsFastAsItsColumnsSay) {
   LidarPacket packet;
   ASSERT_EQ(decoder.decode(OusterTestPacket{metadata, 1016}.payload(), packet), std::nullopt);
   EXPECT_NEAR(decoder.rotation_rate_rpm(), 600.0, 0.1) << "across the end of the turn";
+  OusterTestPacket last_of_window{metadata, 32};
+  for (std::size_t i = 1; i < 16; ++i)
+    last_of_window.set_valid(i, false);
+  last_of_window.seal();
+  ASSERT_EQ(decoder.decode(last_of_window.payload(), packet), std::nullopt);
+  EXPECT_NEAR(decoder.rotation_rate_rpm(), 600.0, 0.1) << "a single column tells none";
 }
 
 TEST(OusterDecoder, RefusesEveryOtherLength) {
