@@ -97,9 +97,11 @@ std::optional<std::string> unknown_model(const LidarOptions& options, const Inge
         "lidar {0}: refused {1}, which is not what lidars.{0} is configured as; set its model to auto, and "
         "calibration, if any, to the file of that sensor",
         options.name, to_string(*lidar.unknown_packets));
-  return fmt::format("lidar {0}: refused {1}, no model that can be read; if another device sends to port {2}, set "
-                     "lidars.{0}.source_ip to that of the lidar",
-                     options.name, to_string(*lidar.unknown_packets), options.port);
+  const std::string_view help = remedy(*lidar.unknown_packets);
+  return fmt::format(
+      "lidar {0}: refused {1}, no model that can be read{3}{4}; if another device sends to port {2}, set "
+      "lidars.{0}.source_ip to that of the lidar",
+      options.name, to_string(*lidar.unknown_packets), options.port, help.empty() ? "" : "; ", help);
 }
 
 std::vector<std::string> cloud_doubts(const LidarOptions& options, const IngestReport::Lidar& lidar) {

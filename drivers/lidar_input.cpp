@@ -183,22 +183,28 @@ std::optional<PacketError> LidarInput::take(const Datagram& datagram) {
   if (ouster() != nullptr)
     return take_imu(datagram);
   if (const auto looks = hesai::look_at(datagram.payload)) {
-    refuse_hesai(*looks);
+    refuse(OtherMaker::hesai, looks->name, looks->model.has_value());
     return PacketError::model;
   }
-  return hesai() == nullptr ? take_position(datagram) : PacketError::length;
+  if (hesai() == nullptr && datagram.payload.size() == velodyne::kPositionPacketBytes) {
+    take_position(datagram);
+    return std::nullopt;
+  }
+  const bool is_of_ouster = ouster::format_of_lidar_packet(datagram.payload).has_value();
+  const auto maker = is_of_ouster ? std::optional{OtherMaker::ouster} : unsupported_maker(datagram.payload);
+  if (!maker)
+    return PacketError::length;
+  refuse(*maker);
+  return PacketError::model;
 }
 
-std::optional<PacketError> LidarInput::take_position(const Datagram& datagram) {
-  if (datagram.payload.size() != velodyne::kPositionPacketBytes)
-    return PacketError::length;
+void LidarInput::take_position(const Datagram& datagram) {
   position_ = velodyne::parse_position_packet(datagram.payload.first<velodyne::kPositionPacketBytes>());
   clock_.set_synchronised(position_->is_synchronised());
   const std::string_view why = options_.time != LidarTime::receive ? velodyne::why_unused(*position_) : "";
   if (why != std::exchange(pps_unused_for_, why))
     pps_unused_since_ = datagram.receive_stamp;
   ++counters_.position;
-  return std::nullopt;
 }
 
 /// Stamps IMU samples with the sensor's clock as estimated from the column packets; samples before the first column
@@ -268,15 +274,16 @@ std::optional<PacketError> LidarInput::decode(const Datagram& datagram) {
 
 std::optional<PacketError> LidarInput::decode_hesai(hesai::Decoder& decoder, const Datagram& datagram) {
   const auto error = decoder.decode(datagram.payload, packet_);
-  if (error == PacketError::model && decoder.recognised())
-    refuse_hesai(*decoder.recognised());
+  if (const auto looks = decoder.recognised(); error == PacketError::model && looks)
+    refuse(OtherMaker::hesai, looks->name, looks->model.has_value());
   return error;
 }
 
-void LidarInput::refuse_hesai(const hesai::Looks& looks) {
-  unknown_hesai_.hesai = looks.name;
-  unknown_hesai_.is_readable = looks.model.has_value();
-  ++unknown_hesai_.packets;
+void LidarInput::refuse(OtherMaker maker, std::string_view model, bool is_readable) {
+  unknown_other_.maker = maker;
+  unknown_other_.model = model;
+  unknown_other_.is_readable = is_readable;
+  ++unknown_other_.packets;
 }
 
 /// Time of hour of the last good packet.
@@ -319,7 +326,7 @@ std::string_view LidarInput::recognised_model() const {
   if (const hesai::Decoder* const sensor = hesai())
     return sensor->recognised() ? sensor->recognised()->name : std::string_view{};
   const auto model = velodyne() != nullptr ? velodyne()->recognised_model() : std::nullopt;
-  return model ? velodyne::to_string(*model) : unknown_hesai_.hesai;
+  return model ? velodyne::to_string(*model) : unknown_other_.model;
 }
 
 std::string_view LidarInput::clock_state() const {
@@ -343,9 +350,9 @@ double LidarInput::rotation_rate_rpm() const {
 
 std::optional<UnknownPackets> LidarInput::unknown_packets() const {
   const auto unknown = velodyne() != nullptr ? velodyne()->unknown_packets() : std::nullopt;
-  if (unknown && unknown->packets > unknown_hesai_.packets)
+  if (unknown && unknown->packets > unknown_other_.packets)
     return UnknownPackets{*unknown};
-  return unknown_hesai_.packets > 0 ? std::optional{unknown_hesai_} : std::nullopt;
+  return unknown_other_.packets > 0 ? std::optional{unknown_other_} : std::nullopt;
 }
 
 bool LidarInput::is_sender(const Datagram& datagram) const {

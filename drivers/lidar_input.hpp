@@ -142,10 +142,10 @@ class LidarInput {
   std::optional<PacketError> take(const Datagram& datagram);
   std::optional<PacketError> take_decoded(const Datagram& datagram);
   std::optional<PacketError> take_data(const Datagram& datagram);
-  std::optional<PacketError> take_position(const Datagram& datagram);
+  void take_position(const Datagram& datagram);
   std::optional<PacketError> take_imu(const Datagram& datagram);
   std::optional<PacketError> decode(const Datagram& datagram);
-  void refuse_hesai(const hesai::Looks& looks);
+  void refuse(OtherMaker maker, std::string_view model = "", bool is_readable = false);
   std::optional<PacketError> decode_hesai(hesai::Decoder& decoder, const Datagram& datagram);
   [[nodiscard]] bool is_data_packet(const Datagram& datagram) const;
   [[nodiscard]] Duration time_of_hour() const;
@@ -169,7 +169,7 @@ class LidarInput {
   std::string_view pps_unused_for_; ///< velodyne::why_unused() of position_
   Stamp pps_unused_since_;
   TimeScale time_scale_ = TimeScale::free_running; ///< only for packets that carry the date
-  UnknownPackets unknown_hesai_;                   ///< the latest packets rejected for their model
+  UnknownPackets unknown_other_;                   ///< the latest packets rejected as another maker's or model's
   std::array<ImuSample, ouster::ImuMeasurements::kMost> imu_samples_;
   std::size_t imu_count_ = 0;
 

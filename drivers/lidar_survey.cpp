@@ -30,7 +30,7 @@ void LidarSurvey::take(const Datagram& datagram) {
         velodyne::parse_position_packet(datagram.payload.first<velodyne::kPositionPacketBytes>()).pps;
   const auto key = std::pair{datagram.source_ip, datagram.destination_port};
   const bool is_one = datagram.payload.size() == velodyne::kDataPacketBytes || hesai::look_at(datagram.payload) ||
-                      ouster::format_of_lidar_packet(datagram.payload);
+                      ouster::format_of_lidar_packet(datagram.payload) || unsupported_maker(datagram.payload);
   if (!is_one || (senders_.size() >= kMaxSenders && !senders_.contains(key)))
     return;
   auto& sender = senders_[key];
@@ -50,18 +50,26 @@ bool LidarSurvey::Sender::read(const Datagram& datagram) {
   if (const auto looks = hesai::look_at(datagram.payload)) {
     if (const auto error = hesai.decode(datagram.payload, packet)) {
       if (error == PacketError::model)
-        unknown_hesai = {{.packets = unknown_hesai.packets + 1}, looks->name, looks->model.has_value()};
+        refuse(OtherMaker::hesai, *looks);
       return false;
     }
     clock = scale_of(false, hesai.time(), datagram.receive_stamp);
     return true;
   }
+  if (const auto maker = unsupported_maker(datagram.payload)) {
+    refuse(*maker, {});
+    return false;
+  }
   return !velodyne.decode(datagram.payload, packet);
+}
+
+void LidarSurvey::Sender::refuse(OtherMaker maker, const hesai::Looks& looks) {
+  unknown_other = {{.packets = unknown_other.packets + 1}, maker, looks.name, looks.model.has_value()};
 }
 
 void LidarSurvey::Sender::read_ouster(const ouster::PacketFormat& format, const Datagram& datagram) {
   ouster = format.header(datagram.payload).serial_number;
-  beams = format.pixels_per_column;
+  beams = ouster::pixels_of_length(datagram.payload.size());
   mode.take(format, datagram.payload);
   const std::byte* const column = format.column(datagram.payload.data(), format.columns_per_packet / 2);
   const std::uint64_t time_ns = ouster::PacketFormat::time_of(column);
@@ -104,8 +112,8 @@ std::vector<HeardLidar> LidarSurvey::lidars() const {
     std::tie(lidar.ip, lidar.port) = key;
     if (const auto unknown = sender->velodyne.unknown_packets())
       lidar.unknown_packets = UnknownPackets{*unknown};
-    if (sender->unknown_hesai.packets > 0)
-      lidar.unknown_packets = sender->unknown_hesai;
+    if (sender->unknown_other.packets > 0)
+      lidar.unknown_packets = sender->unknown_other;
     if (const auto pps = pps_.find(lidar.ip); pps != pps_.end())
       lidar.pps = pps->second;
     if (sender->packets == 0)

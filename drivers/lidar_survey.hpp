@@ -28,7 +28,7 @@ struct HeardLidar {
   std::uint16_t port = 0;
   std::string_view model;              ///< Velodyne or Hesai; empty: no packet could be decoded
   std::optional<std::uint64_t> ouster; ///< serial number of an Ouster, 0 if its packets carry none
-  std::size_t beams = 0;               ///< Ouster only
+  std::size_t beams = 0;               ///< Ouster only; 0 if packets of several models have this length
   std::size_t columns_per_turn = 0;    ///< Ouster only; 0 until two starts of a turn were received
   std::string_view return_mode;        ///< only if `model` is known
   double rotation_rate_rpm = 0, packets_per_s = 0;
@@ -80,12 +80,13 @@ class LidarSurvey {
     std::optional<std::uint64_t> ouster; ///< HeardLidar::ouster
     std::size_t beams = 0;
     OusterMode mode;
-    TimeScale clock{}; ///< Ouster or Hesai
-    UnknownPackets unknown_hesai;
-    std::uint64_t packets = 0; ///< decoded packets, or column packets of an Ouster
+    TimeScale clock{};            ///< Ouster or Hesai
+    UnknownPackets unknown_other; ///< of another maker, or of an unsupported model of Hesai
+    std::uint64_t packets = 0;    ///< decoded packets, or column packets of an Ouster
     Stamp first, last;
 
     bool read(const Datagram& datagram);
+    void refuse(OtherMaker maker, const hesai::Looks& looks);
     void read_ouster(const ouster::PacketFormat& format, const Datagram& datagram);
   };
 

@@ -264,7 +264,9 @@ ModelSpec ot128() {
 }
 
 constexpr std::size_t kOldPandar40Bytes = 1256; ///< plus four with a sequence number
-constexpr std::byte kFirstStatusOfOt128{128};   ///< status version by which the maker's SDK identifies it
+
+/// Status versions by which the maker's SDK tells the models of protocol 1.4 apart: Pandar128, OT128, JT128.
+constexpr std::byte kFirstStatusOfOt128{128}, kFirstStatusOfJt128{137};
 
 const std::array<ModelSpec, kModels>& all_specs() {
   static const std::array<ModelSpec, kModels> specs{pandar40p(),
@@ -292,6 +294,10 @@ bool has_layout_of(const ModelSpec& its, std::span<const std::byte> payload) {
          (layout.header == 8 || (number(2) == its.version[0] && number(3) == its.version[1]));
 }
 
+bool has_status_of_ot128(std::span<const std::byte> payload) {
+  return payload[4] >= kFirstStatusOfOt128 && payload[4] < kFirstStatusOfJt128;
+}
+
 /// Unsupported models whose packets start with EE FF, by protocol version.
 struct Unread {
   unsigned major, minor;
@@ -299,8 +305,8 @@ struct Unread {
 };
 constexpr std::array kUnread{Unread{1, 3, "Pandar128"}, Unread{1, 4, "Pandar128"}, Unread{1, 8, "JT16"},
                              Unread{2, 4, "ET25"},      Unread{2, 5, "ET25"},      Unread{2, 6, "ET25"},
-                             Unread{3, 1, "QT32"},      Unread{4, 1, "AT128"},     Unread{4, 3, "AT128"},
-                             Unread{4, 7, "ATX"},       Unread{7, 2, "FT120"}};
+                             Unread{2, 7, "ET30"},      Unread{3, 1, "QT32"},      Unread{4, 1, "AT128"},
+                             Unread{4, 3, "AT128"},     Unread{4, 7, "ATX"},       Unread{7, 2, "FT120"}};
 
 } // namespace
 
@@ -347,11 +353,13 @@ std::optional<Looks> look_at(std::span<const std::byte> payload) {
   const auto& specs = all_specs();
   for (std::size_t i = 0; i < kModels; ++i) {
     const auto model = static_cast<Model>(i);
-    if (has_layout_of(specs[i], payload) && (model != Model::ot128 || payload[4] >= kFirstStatusOfOt128))
+    if (has_layout_of(specs[i], payload) && (model != Model::ot128 || has_status_of_ot128(payload)))
       return Looks{to_string(model), model};
   }
   if (!opens_with(payload, 0xEE, 0xFF))
     return std::nullopt;
+  if (has_layout_of(Model::ot128, payload) && payload[4] >= kFirstStatusOfJt128)
+    return Looks{"JT128", std::nullopt};
   const auto unread = std::ranges::find_if(kUnread, [&](const Unread& one) {
     return payload[2] == std::byte(one.major) && payload[3] == std::byte(one.minor);
   });

@@ -76,8 +76,8 @@ void Decoder::aim_beams() {
 std::optional<PacketError> Decoder::decode(std::span<const std::byte> payload, LidarPacket& packet) {
   if (payload.size() != format_.packet_bytes)
     return PacketError::length;
-  const PacketFormat::Header header = format_.header(payload);
-  if (!header.is_lidar_packet)
+  const PacketHeader header = format_.header(payload);
+  if (header.packet_type != PacketHeader::kLidar)
     return PacketError::flag;
   if (header.serial_number != 0 && metadata_.serial_number != 0 && header.serial_number != metadata_.serial_number)
     return PacketError::sender;
@@ -102,21 +102,17 @@ std::optional<PacketError> Decoder::decode(std::span<const std::byte> payload, L
   time_ = time_of_packet_;
   first_column_ = first.measurement_id;
   last_column_ = last.measurement_id;
-  spanned_ = Duration{last.offset_ns};
+  const Duration spanned{last.offset_ns};
+  if (spanned > Duration{})
+    rotation_rate_rpm_ = 60.0 * static_cast<double>(columns_between(first_column_, last_column_)) /
+                         static_cast<double>(metadata_.columns_per_frame) / to_seconds(spanned);
   packet.count = 0;
   for (std::size_t i = 0; i < column_count_; ++i)
     run_as(isa_, [&] { read_column(columns_[i], packet); });
-  packet.duration = spanned_ + column_duration_;
+  packet.duration = spanned + column_duration_;
   const auto turned_cdeg = static_cast<int>(first_column_ * kFullTurn_cdeg / metadata_.columns_per_frame);
   packet.first_azimuth_cdeg = static_cast<std::uint16_t>((azimuth_zero_cdeg_ + turned_cdeg) % kFullTurn_cdeg);
   return std::nullopt;
-}
-
-double Decoder::rotation_rate_rpm() const {
-  if (spanned_ == Duration{})
-    return 0.0;
-  const auto turned = static_cast<double>(columns_between(first_column_, last_column_));
-  return 60.0 * turned / static_cast<double>(metadata_.columns_per_frame) / to_seconds(spanned_);
 }
 
 /// Finds the valid columns. Fails if a column is inconsistent with the first of them.
@@ -156,7 +152,7 @@ std::optional<PacketError> Decoder::find_columns(Packet payload) {
 
 /// Returns true if the packet comes from the known start of the sensor, or from one in the same mode: equal column
 /// spacing, and measurement IDs that advance with time from one turn to the next.
-bool Decoder::turns_as_known(const PacketFormat::Header& header) {
+bool Decoder::turns_as_known(const PacketHeader& header) {
   if (header.init_id == 0 || metadata_.init_id == 0 || header.init_id == metadata_.init_id)
     return true;
   const OtherStart before = other_start_;

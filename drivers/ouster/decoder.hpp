@@ -46,8 +46,9 @@ class Decoder {
   [[nodiscard]] std::size_t first_column() const { return first_column_; }
   [[nodiscard]] std::size_t last_column() const { return last_column_; }
 
-  /// Rotation rate of the last good packet, from the times of its columns.
-  [[nodiscard]] double rotation_rate_rpm() const;
+  /// Rotation rate from the times of the columns of the last good packet that had several; 0 before it. At the edge of
+  /// a window a packet may have a single one.
+  [[nodiscard]] double rotation_rate_rpm() const { return rotation_rate_rpm_; }
 
   /// Returns the number of packets sent between one whose first column had this ID and the last good one, `advance`
   /// later; 0 if IDs and time disagree.
@@ -100,7 +101,7 @@ class Decoder {
 
   void aim_beams();
   std::optional<PacketError> find_columns(Packet payload);
-  bool turns_as_known(const PacketFormat::Header& header);
+  bool turns_as_known(const PacketHeader& header);
   [[nodiscard]] bool is_spaced_as_known() const;
   [[nodiscard]] std::size_t columns_between(std::size_t from, std::size_t to) const;
   [[nodiscard]] bool is_in_window(std::size_t measurement_id) const;
@@ -129,7 +130,7 @@ class Decoder {
 
   Duration time_{};
   std::size_t first_column_ = 0, last_column_ = 0;
-  Duration spanned_{}; ///< time from the first to the last column
+  double rotation_rate_rpm_ = 0.0;
   std::uint64_t invalid_columns_ = 0, packets_of_other_start_ = 0;
   std::uint64_t packets_per_turn_; ///< packets that the sensor sends per turn
   bool has_checksums_ = false;

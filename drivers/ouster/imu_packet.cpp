@@ -32,23 +32,37 @@ Eigen::Vector3d read_vector(const std::byte* at) {
 }
 
 std::optional<PacketError> problem_of_standard(const Metadata& metadata, std::span<const std::byte> payload) {
-  const StandardHeader header = read_standard_header(payload);
-  if (header.packet_type != StandardHeader::kImu)
+  const PacketHeader header = read_header(payload, metadata.safety_header);
+  if (header.packet_type != PacketHeader::kImu)
     return PacketError::flag;
   if (header.serial_number != 0 && metadata.serial_number != 0 && header.serial_number != metadata.serial_number)
     return PacketError::sender;
-  return has_right_checksum(payload) ? std::nullopt : std::optional{PacketError::checksum};
+  const bool has_checksum = !metadata.safety_header;
+  return !has_checksum || has_right_checksum(payload) ? std::nullopt : std::optional{PacketError::checksum};
 }
 
+constexpr std::size_t kFirstMeasurementAt = PacketFormat::kPacketHeaderBytes + kNmeaBytes;
+
 } // namespace
+
+bool is_standard_imu_packet(std::span<const std::byte> payload) {
+  constexpr std::size_t kFrame = kFirstMeasurementAt + PacketFormat::kPacketFooterBytes;
+  if (payload.size() <= kFrame || (payload.size() - kFrame) % kMeasurementBytes != 0 ||
+      (payload.size() - kFrame) / kMeasurementBytes > ImuMeasurements::kMost)
+    return false;
+  const auto is_imu = [&](bool is_safety_header) {
+    const PacketHeader header = read_header(payload, is_safety_header);
+    return header.packet_type == PacketHeader::kImu && header.serial_number != 0;
+  };
+  return is_imu(false) || is_imu(true);
+}
 
 ImuPacketLayout imu_packet_layout(const Metadata& metadata) {
   if (!metadata.standard_imu_packets)
     return kLegacy;
-  constexpr std::size_t kFirst = PacketFormat::kPacketHeaderBytes + kNmeaBytes;
   const std::size_t count = metadata.imu_measurements_per_packet;
-  return {.bytes = kFirst + count * kMeasurementBytes + PacketFormat::kPacketFooterBytes,
-          .first = kFirst,
+  return {.bytes = kFirstMeasurementAt + count * kMeasurementBytes + PacketFormat::kPacketFooterBytes,
+          .first = kFirstMeasurementAt,
           .stride = kMeasurementBytes,
           .count = count,
           .time = 0,

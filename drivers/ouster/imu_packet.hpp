@@ -38,6 +38,9 @@ struct ImuPacketLayout {
   double force_unit_mps2, rate_unit_radps;
 };
 
+/// Returns true for a packet with the header of those of several measurements, of any sensor.
+bool is_standard_imu_packet(std::span<const std::byte> payload);
+
 /// Returns the layout of the IMU packets that the sensor sends according to its metadata.
 ImuPacketLayout imu_packet_layout(const Metadata& metadata);
 

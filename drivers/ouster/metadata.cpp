@@ -217,7 +217,8 @@ void read_profile(const Document& file, Metadata& metadata) {
                          fmt::format("{} cannot be read; set the sensor to one of {}", *name, known_profiles()));
     metadata.profile = *profile;
   }
-  metadata.safety_header = text(file, kDataFormat, "header_type") == "FUSA";
+  metadata.safety_header =
+      metadata.profile == Profile::fusa_rng15_dual || text(file, kDataFormat, "header_type") == "FUSA";
 }
 
 /// Reads the data format. Firmware before 1.14 has none: its packets have 64 pixels per column, whatever the model.

@@ -23,7 +23,15 @@ constexpr std::array<ProfileSpec, kProfiles> kSpecs{{
     {"FUSA_RNG15_RFL8_NIR8_DUAL", 8, 15, 3, 2, {{{0, 2}, {4, 6}}}},
     {"RNG15_RFL8_NIR8_ZONE16", 8, 15, 3, 1, {{{0, 2}}}},
     {"RNG19_RFL8_SIG16_NIR16_ZONE16", 12, 19, 0, 1, {{{0, 4}}}},
+    {"RNG19_RFL8_SIG16_ZONE16_DUAL", 16, 19, 0, 2, {{{0, 3}, {4, 7}}}},
+    {"RNG15_RFL8_WIN8", 4, 15, 3, 1, {{{0, 2}}}},
+    {"RNG19_RFL8_SIG16_NIR16_RGB16", 16, 19, 0, 1, {{{0, 3}}}},
+    {"RNG19_RFL8_SIG16_NIR16_RGB16_DUAL", 20, 19, 0, 2, {{{0, 3}, {4, 7}}}},
+    {"FIVE_WORD_PIXEL", 20, 19, 0, 2, {{{0, 3}, {4, 7}}}},
 }};
+
+constexpr std::array<std::size_t, 4> kPixels{16, 32, 64, 128}; ///< per column, of all sensors
+constexpr std::size_t kUsualColumns = 16;                      ///< per packet
 
 } // namespace
 
@@ -57,37 +65,50 @@ bool PacketFormat::is_valid(const std::byte* column) const {
                 : (read_u16(column + 10) & 1U) != 0;
 }
 
-PacketFormat::Header PacketFormat::header(std::span<const std::byte> packet) const {
-  const std::byte* const at = packet.data();
+PacketHeader PacketFormat::header(std::span<const std::byte> packet) const {
   if (legacy)
-    return {true, read_u16(at + 10), 0, 0};
-  if (safety_header)
-    return {std::to_integer<unsigned>(at[0]) == StandardHeader::kLidar, read_u32(at + 4),
-            read_u32(at + 1) & kInitIdMask, read_u64(at + 11) & kSerialNumberMask};
-  const StandardHeader standard = read_standard_header(packet);
-  return {standard.packet_type == StandardHeader::kLidar, standard.frame_id, standard.init_id, standard.serial_number};
+    return {PacketHeader::kLidar, read_u16(packet.data() + 10), 0, 0};
+  return read_header(packet, safety_header);
+}
+
+PacketHeader read_header(std::span<const std::byte> packet, bool is_safety_header) {
+  const std::byte* const at = packet.data();
+  if (is_safety_header)
+    return {std::to_integer<std::uint8_t>(at[0]), read_u32(at + 4), read_u32(at + 1) & kInitIdMask,
+            read_u64(at + 11) & kSerialNumberMask};
+  return {read_u16(at), read_u16(at + 2), read_u32(at + 4) & kInitIdMask, read_u64(at + 7) & kSerialNumberMask};
 }
 
 std::optional<PacketFormat> format_of_lidar_packet(std::span<const std::byte> packet) {
-  constexpr std::size_t kColumns = 16;
-  for (std::size_t i = 0; i < kProfiles; ++i) {
-    for (const std::size_t pixels : {16U, 32U, 64U, 128U}) {
-      const PacketFormat format{static_cast<Profile>(i), false, pixels, kColumns};
-      if (packet.size() != format.packet_bytes)
-        continue;
-      const PacketFormat::Header header = format.header(packet);
-      const bool is_one = format.legacy ? format.is_valid(format.column(packet.data(), kColumns / 2))
-                                        : header.is_lidar_packet && header.serial_number != 0;
-      if (is_one)
-        return format;
+  for (const bool is_safety_header : {false, true}) {
+    for (std::size_t i = 0; i < kProfiles; ++i) {
+      for (const std::size_t pixels : kPixels) {
+        const PacketFormat format{static_cast<Profile>(i), is_safety_header, pixels, kUsualColumns};
+        if (packet.size() != format.packet_bytes)
+          continue;
+        const PacketHeader header = format.header(packet);
+        const bool is_one = format.legacy ? format.is_valid(format.column(packet.data(), kUsualColumns / 2))
+                                          : header.packet_type == PacketHeader::kLidar && header.serial_number != 0;
+        if (is_one)
+          return format;
+      }
     }
   }
   return std::nullopt;
 }
 
-StandardHeader read_standard_header(std::span<const std::byte> packet) {
-  const std::byte* const at = packet.data();
-  return {read_u16(at), read_u16(at + 2), read_u32(at + 4) & kInitIdMask, read_u64(at + 7) & kSerialNumberMask};
+std::size_t pixels_of_length(std::size_t packet_bytes) {
+  std::size_t found = 0;
+  for (std::size_t i = 0; i < kProfiles; ++i) {
+    for (const std::size_t pixels : kPixels) {
+      if (PacketFormat{static_cast<Profile>(i), false, pixels, kUsualColumns}.packet_bytes != packet_bytes)
+        continue;
+      if (found != 0 && found != pixels)
+        return 0;
+      found = pixels;
+    }
+  }
+  return found;
 }
 
 } // namespace locus::ouster

@@ -21,6 +21,11 @@ enum class Profile : std::uint8_t {
   fusa_rng15_dual,
   rng15_zone,
   rng19_zone,
+  rng19_zone_dual,
+  rng15_window,
+  rng19_rgb,
+  rng19_rgb_dual,
+  five_word_pixel,
 };
 
 /// Position of one return of a pixel: range in 32 bits at `range_at`, reflectivity in one byte.
@@ -40,7 +45,7 @@ struct ProfileSpec {
   std::array<EchoField, 2> echo_fields;
 };
 
-inline constexpr std::size_t kProfiles = 8;
+inline constexpr std::size_t kProfiles = 13;
 const ProfileSpec& spec(Profile profile);
 
 /// Returns the profile; empty if it is not supported.
@@ -48,6 +53,18 @@ std::optional<Profile> profile_from_string(std::string_view name);
 
 /// Returns "LEGACY, RNG19_RFL8_SIG16_NIR16, ...".
 std::string known_profiles();
+
+/// Header of 32 bytes of every packet except the legacy ones.
+struct PacketHeader {
+  std::uint16_t packet_type;
+  std::uint32_t frame_id;
+  std::uint32_t init_id; ///< changes with every start of the sensor and every change of its settings
+  std::uint64_t serial_number;
+
+  static constexpr std::uint16_t kLidar = 1, kImu = 2;
+};
+/// Parses the header, with the offsets of functional safety or the usual ones. Precondition: at least 32 bytes.
+PacketHeader read_header(std::span<const std::byte> packet, bool is_safety_header);
 
 /// Sizes and offsets in a lidar packet in bytes, from the start of the packet or of a column.
 ///
@@ -59,7 +76,7 @@ struct PacketFormat {
 
   ProfileSpec profile;
   bool legacy;
-  bool safety_header; ///< header of the functional-safety profiles, with other offsets
+  bool safety_header; ///< header of functional safety, see read_header()
   std::size_t pixels_per_column, columns_per_packet;
   std::size_t column_bytes, packet_bytes;
 
@@ -75,35 +92,21 @@ struct PacketFormat {
     return column + (legacy ? kLegacyColumnHeaderBytes : kColumnHeaderBytes);
   }
 
-  /// Header fields of a packet. Legacy packets have no type, initialisation or serial number: type is accepted, others
-  /// are 0.
-  struct Header {
-    bool is_lidar_packet;
-    std::uint32_t frame_id;
-    std::uint32_t init_id; ///< changes with every start of the sensor and every change of its settings
-    std::uint64_t serial_number;
-  };
-  /// Parses the header. Precondition: `packet` has packet_bytes bytes.
-  [[nodiscard]] Header header(std::span<const std::byte> packet) const;
+  /// Parses the header. Legacy packets have neither type nor initialisation nor serial number: they count as lidar
+  /// packets, and the others are 0. Precondition: `packet` has packet_bytes bytes.
+  [[nodiscard]] PacketHeader header(std::span<const std::byte> packet) const;
 
   static constexpr std::size_t kPacketHeaderBytes = 32, kPacketFooterBytes = 32;
   static constexpr std::size_t kColumnHeaderBytes = 12, kLegacyColumnHeaderBytes = 16, kLegacyColumnFooterBytes = 4;
 };
 
 /// Recognises the format of a lidar packet of 16 columns in any profile without metadata, by length and header, which
-/// some profiles have in common. Empty if it does not look like a lidar packet.
+/// some profiles have in common: header and columns are right, profile and pixels may be those of another one. Empty if
+/// it does not look like a lidar packet.
 std::optional<PacketFormat> format_of_lidar_packet(std::span<const std::byte> packet);
 
-/// Header of every packet of 32 + n + 32 bytes, except the functional-safety profiles.
-struct StandardHeader {
-  std::uint16_t packet_type;
-  std::uint16_t frame_id;
-  std::uint32_t init_id;
-  std::uint64_t serial_number;
-
-  static constexpr std::uint16_t kLidar = 1, kImu = 2;
-};
-/// Parses the header. Precondition: at least 32 bytes.
-StandardHeader read_standard_header(std::span<const std::byte> packet);
+/// Returns the number of pixels per column of all packets of this length with 16 columns; 0 if they differ: 128 pixels
+/// with RNG15 are as long as 32 with two returns.
+std::size_t pixels_of_length(std::size_t packet_bytes);
 
 } // namespace locus::ouster

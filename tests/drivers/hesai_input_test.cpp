@@ -11,6 +11,7 @@
 #include "drivers/hesai_test_packet.hpp"
 #include "drivers/lidar_input.hpp"
 #include "drivers/lidar_survey.hpp"
+#include "drivers/ouster_test_packet.hpp"
 #include "drivers/velodyne_test_packet.hpp"
 
 namespace locus::hesai {
@@ -143,6 +144,30 @@ TEST(HesaiInput, ModelThatCannotBeReadIsNamed) {
   EXPECT_EQ(lidar.receive({at128, kHesaiIp, 2368, 2368, Stamp{HesaiTestPacket::kTime}}), nullptr);
   EXPECT_EQ(lidar.counters()[PacketError::model], 1U);
   EXPECT_EQ(to_string(lidar.unknown_packets().value()), "a Hesai AT128 in 1 packets");
+}
+
+/// Whatever the lidar is configured as, the maker of what comes to its port is named, with what to do.
+TEST(LidarInput, PacketsOfAnotherMakerAreNamedWithTheRemedy) {
+  std::vector<std::byte> livox(1380), stranger(8448);
+  for (const auto& [at, value] : {std::pair{1U, 0x64}, {2U, 5}, {5U, 96}, {10U, 1}})
+    livox[at] = static_cast<std::byte>(value);
+  const test::OusterTestPacket ouster{test::ouster_metadata()};
+  LidarOptions xt32;
+  xt32.hesai = Model::xt32;
+  for (const LidarOptions& options : {LidarOptions{}, xt32}) {
+    LidarInput lidar = opened(options);
+    lidar.receive({stranger, kHesaiIp, 2368, 2368, Stamp{HesaiTestPacket::kTime}});
+    EXPECT_EQ(lidar.counters()[PacketError::length], 1U);
+    EXPECT_FALSE(lidar.unknown_packets());
+    lidar.receive({livox, kHesaiIp, 2368, 2368, Stamp{HesaiTestPacket::kTime}});
+    EXPECT_EQ(lidar.counters()[PacketError::model], 1U);
+    EXPECT_EQ(to_string(lidar.unknown_packets().value()), "a Livox in 1 packets");
+    EXPECT_NE(remedy(*lidar.unknown_packets()).find("key topic"), std::string_view::npos);
+    lidar.receive({ouster.payload(), kHesaiIp, 2368, 2368, Stamp{HesaiTestPacket::kTime}});
+    EXPECT_EQ(to_string(lidar.unknown_packets().value()), "an Ouster in 2 packets");
+    EXPECT_NE(remedy(*lidar.unknown_packets()).find("locusctl fetch"), std::string_view::npos);
+    EXPECT_EQ(lidar.unknown_last_heard(), Stamp{HesaiTestPacket::kTime});
+  }
 }
 
 TEST(HesaiInput, LostAreThePacketsWhoseNumbersAreMissing) {

@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "drivers/ouster_test_packet.hpp"
+
 namespace locus {
 namespace {
 
@@ -38,6 +40,31 @@ TEST(LidarSurvey, KnownSendersAreFollowedWhenThereIsRoomForNoMore) {
   EXPECT_EQ(lidars.front().pps, PpsState::locked);
   EXPECT_EQ(lidars[1].pps, PpsState::absent);
   EXPECT_EQ(lidars.back().ip, one_more - 1);
+}
+
+TEST(LidarSurvey, LidarsWithoutADecoderAreNamed) {
+  std::array<std::byte, 1248> robosense{};
+  for (std::size_t i = 0; i < 4; ++i)
+    robosense[i] = std::array{std::byte{0x55}, std::byte{0xAA}, std::byte{0x05}, std::byte{0x5A}}[i];
+  LidarSurvey survey;
+  for (int i = 0; i < 3; ++i)
+    survey.take({robosense, kFirstIp, 6699, 6699, Stamp{}});
+  const auto lidars = survey.lidars();
+  ASSERT_EQ(lidars.size(), 1U);
+  EXPECT_FALSE(lidars.front().is_known());
+  ASSERT_TRUE(lidars.front().unknown_packets);
+  EXPECT_EQ(to_string(*lidars.front().unknown_packets), "a RoboSense in 3 packets");
+}
+
+/// The packets of 128 beams with RNG15 are as long as those of 32 with two returns.
+TEST(LidarSurvey, BeamsOfAnOusterAreLeftOpenWhereThePacketsDoNotTellThem) {
+  LidarSurvey survey;
+  const test::OusterTestPacket bytes{test::ouster_metadata(ouster::Profile::rng15, 128)};
+  survey.take({bytes.payload(), kFirstIp, 7502, 7502, Stamp{}});
+  const auto lidars = survey.lidars();
+  ASSERT_EQ(lidars.size(), 1U);
+  EXPECT_TRUE(lidars.front().is_known());
+  EXPECT_EQ(lidars.front().beams, 0U);
 }
 
 } // namespace

@@ -117,6 +117,30 @@ TEST_F(Fetch, AnAnswerOfHttpWithoutItsLengthEndsWithTheConnection) {
   EXPECT_EQ(file->text, metadata_text());
 }
 
+TEST_F(Fetch, AnAnswerInChunksOfHttpIsJoined) {
+  const std::string text = metadata_text(), head = "HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n";
+  std::string chunks = head;
+  for (std::size_t at = 0; at < text.size(); at += 1000) {
+    const std::string piece = text.substr(at, 1000);
+    chunks += fmt::format("{:x}\r\n{}\r\n", piece.size(), piece);
+  }
+  const TcpServer server(http_, always(chunks + "0\r\n\r\n"));
+  const auto file = fetch();
+  ASSERT_TRUE(file) << file.error();
+  EXPECT_EQ(file->text, text);
+}
+
+TEST_F(Fetch, AnAnswerThatBreaksOffBetweenItsChunksIsNoFile) {
+  const std::string head = "HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n";
+  for (const std::string rest : {"", "3e8\r\n{", "ffffffffffff\r\n{", "x\r\n", "10000000000000000\r\n{}\r\n"}) {
+    Lidar lidar;
+    const TcpServer server(lidar.http, always(head + rest));
+    const auto file = lidar.fetch(patience_);
+    ASSERT_FALSE(file) << rest;
+    EXPECT_NE(file.error().find("the answer breaks off between its chunks"), std::string::npos) << file.error();
+  }
+}
+
 TEST_F(Fetch, OlderFirmwareTellsItsMetadataPartByPart) {
   const auto parts = nlohmann::json::parse(metadata_text());
   const auto answer = [&](const std::string& question) -> std::optional<std::string> {

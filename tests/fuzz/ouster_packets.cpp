@@ -25,6 +25,7 @@ std::vector<ouster::Metadata> all_kinds() {
     kinds.back().standard_imu_packets = profile > 3;
     kinds.back().imu_measurements_per_packet = profile > 3 ? 8 : 1;
     kinds.back().first_column = 1020 * (profile % 2);
+    kinds.back().safety_header = profile % 4 == 3;
   }
   return kinds;
 }

@@ -174,13 +174,13 @@ TEST_F(BadCapture, CompressedFilesThatAreDamagedOrOfAnotherKindAreCalledSo) {
 }
 
 TEST_F(BadCapture, OfAnotherMakersLidarIsSaidWithTheMaker) {
-  const auto write = [&](std::uint16_t port, std::size_t bytes, int first, int second) {
+  const auto write = [&](std::uint16_t port, std::size_t bytes, int first, int second, int third = 4, int fourth = 3) {
     PcapWriter pcap = std::move(*PcapWriter::open(folder_ / "bad.pcap"));
     Bytes payload(bytes);
     payload[0] = std::byte(first);
     payload[1] = std::byte(second);
-    payload[2] = std::byte{4};
-    payload[3] = std::byte{3};
+    payload[2] = std::byte(third);
+    payload[3] = std::byte(fourth);
     for (int i = 0; i < 20; ++i)
       pcap.write(stamp_from_ns(1'700'000'000'000'000'000 + 1'000'000LL * i), UdpAddresses{.destination_port = port},
                  payload);
@@ -189,6 +189,11 @@ TEST_F(BadCapture, OfAnotherMakersLidarIsSaidWithTheMaker) {
   expect_error(
       replay(), 1,
       {"bad.pcap", "20 packets look like those of a Hesai AT128", "port 2368", "1080 bytes", "which are not read"});
+  write(6699, 1248, 0x55, 0xAA, 0x05, 0x5A);
+  expect_error(replay(), 1,
+               {"bad.pcap", "20 packets look like those of a RoboSense (most go to port 6699", "not read"});
+  write(7503, 48, 0, 0);
+  expect_error(replay(), 1, {"bad.pcap", "20 packets of the inertial unit of an Ouster", "port 7503", "mostly 7502"});
   write(7502, 6464, 1, 0);
   expect_error(replay(), 1, {"bad.pcap", "20 packets look like those of a lidar of Ouster", "port 7502", "6464 bytes"});
 }

@@ -108,7 +108,7 @@ TEST_F(Diagnosis, UnknownProductIdIsReportedByServiceAndSensors) {
   EXPECT_EQ(alone.status, 1);
   EXPECT_TRUE(contains(alone.err, "127.0.0.1       2368   not read: product id 0x31 and return mode 0x37 in "))
       << alone.err;
-  EXPECT_TRUE(contains(alone.err, "no lidar was received")) << alone.err;
+  EXPECT_TRUE(contains(alone.err, "no lidar that can be read was received")) << alone.err;
 }
 
 /// Readable lidars are listed with their configuration, the unknown device on a separate line.

@@ -40,6 +40,7 @@ struct HttpHead {
   std::size_t bytes;
   int status;
   std::optional<std::size_t> content_bytes; ///< nothing: until the connection closes
+  bool is_chunked;
 };
 
 template <class Number> std::optional<Number> leading_number(std::string_view text) {
@@ -51,7 +52,8 @@ template <class Number> std::optional<Number> leading_number(std::string_view te
 
 /// Returns nothing while the header is incomplete or if it is not HTTP.
 std::optional<HttpHead> http_head(std::string_view answer) {
-  constexpr std::string_view kVersion = "HTTP/1.x ", kEnd = "\r\n\r\n", kLength = "\r\ncontent-length:";
+  constexpr std::string_view kVersion = "HTTP/1.x ", kEnd = "\r\n\r\n",
+                             kLength = "\r\ncontent-length:", kChunked = "\r\ntransfer-encoding: chunked";
   const std::size_t end = answer.find(kEnd);
   const auto status = answer.starts_with("HTTP/1.") && end != std::string_view::npos
                           ? leading_number<int>(answer.substr(kVersion.size()))
@@ -60,18 +62,44 @@ std::optional<HttpHead> http_head(std::string_view answer) {
     return std::nullopt;
   std::string lines{answer.substr(0, end)};
   std::ranges::transform(lines, lines.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  HttpHead head{end + kEnd.size(), *status, std::nullopt};
+  HttpHead head{end + kEnd.size(), *status, std::nullopt, lines.find(kChunked) != std::string::npos};
   if (const std::size_t length = lines.find(kLength); length != std::string::npos)
     head.content_bytes = leading_number<std::size_t>(std::string_view{lines}.substr(length + kLength.size()));
   return head;
 }
 
-/// Requests the metadata of current firmware by HTTP. Uses version 1.0, whose responses are not chunked.
+/// Joins the chunks of a body: each follows its length, a hexadecimal number in a line of its own, and the last one is
+/// empty. Returns nothing if they break off.
+std::optional<std::string> joined(std::string_view chunks) {
+  constexpr std::string_view kLineEnd = "\r\n";
+  constexpr int kHexadecimal = 16;
+  std::string body;
+  for (;;) {
+    std::size_t bytes = 0;
+    const std::size_t line = chunks.find(kLineEnd);
+    if (line == std::string_view::npos ||
+        std::from_chars(chunks.data(), chunks.data() + line, bytes, kHexadecimal).ec != std::errc{})
+      return std::nullopt;
+    if (bytes == 0)
+      return body;
+    chunks.remove_prefix(line + kLineEnd.size());
+    if (bytes > kMostBytes || chunks.size() < bytes + kLineEnd.size())
+      return std::nullopt;
+    body.append(chunks.substr(0, bytes));
+    chunks.remove_prefix(bytes + kLineEnd.size());
+  }
+}
+
+/// Requests the metadata of current firmware by HTTP. Version 1.0 asks for a response in one piece; one in chunks is
+/// accepted all the same.
 File ask_ouster_http(TcpClient& client) {
-  if (auto problem = client.send("GET /api/v1/sensor/metadata HTTP/1.0\r\nAccept: application/json\r\n\r\n"))
+  if (auto problem = client.send("GET /api/v1/sensor/metadata HTTP/1.0\r\nHost: sensor\r\n"
+                                 "Accept: application/json\r\n\r\n"))
     return *std::move(problem);
   const auto is_whole = [](std::string_view text) {
     const auto head = http_head(text);
+    if (head && head->status == 200 && head->is_chunked)
+      return joined(text.substr(head->bytes)).has_value();
     if (!head || (head->status == 200 && !head->content_bytes))
       return false;
     return head->status != 200 || *head->content_bytes > kMostBytes ||
@@ -85,6 +113,10 @@ File ask_ouster_http(TcpClient& client) {
     return std::string{"the answer is none of HTTP"};
   if (head->status != 200)
     return fmt::format("answers with HTTP status {}", head->status);
+  if (head->is_chunked) {
+    auto body = joined(std::string_view{answer}.substr(head->bytes));
+    return body ? as_metadata(*std::move(body)) : File{std::string{"the answer breaks off between its chunks"}};
+  }
   if (auto problem = problem_of_size(answer.size() - head->bytes, head->content_bytes.value_or(0)))
     return *std::move(problem);
   return as_metadata(answer.substr(head->bytes, head->content_bytes.value_or(kMostBytes)));

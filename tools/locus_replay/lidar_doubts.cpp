@@ -138,29 +138,37 @@ std::string not_heard(const LidarInput& lidar, const Recording& recording, const
 std::string other_makers(const std::map<std::uint16_t, PortTraffic>& traffic, const LidarRouter& lidars) {
   const bool has_ouster =
       std::ranges::any_of(lidars.lidars(), [](const auto& one) { return one.options().is_ouster(); });
-  for (const OtherMaker maker : {OtherMaker::hesai, OtherMaker::ouster}) {
-    if (maker == OtherMaker::ouster && has_ouster)
-      continue;
+  for (std::size_t i = 0; i < kOtherMakers; ++i) {
+    const auto maker = static_cast<OtherMaker>(i);
     const auto packets_of = [&](const auto& entry) {
       return entry.second.of_other_maker[static_cast<std::size_t>(maker)];
     };
     const auto& [port, busiest] = *std::ranges::max_element(traffic, {}, packets_of);
-    std::uint64_t packets = 0, velodyne = 0;
+    std::uint64_t packets = 0, of_imu = 0, velodyne = 0;
     for (const auto& entry : traffic) {
       packets += packets_of(entry);
+      of_imu += entry.second.of_ouster_imu;
       velodyne += of_length(entry.second, velodyne::kDataPacketBytes);
     }
-    if (packets > velodyne && maker == OtherMaker::ouster)
+    if (packets <= velodyne)
+      continue;
+    if (maker == OtherMaker::ouster && packets == of_imu)
+      return fmt::format("{} packets of the inertial unit of an Ouster (most go to port {}), and none of its columns; "
+                         "record its lidar port as well, mostly {}",
+                         packets, port, ouster::kDefaultLidarPort);
+    if (maker == OtherMaker::ouster && has_ouster)
+      continue;
+    if (maker == OtherMaker::ouster)
       return fmt::format(
           "{} packets look like those of a lidar of Ouster (most go to port {}, the last of them with {} "
-          "bytes), and its metadata is not beside the capture; fetch it, as it was set then: locusctl "
+          "bytes), and no metadata of it is named or alone beside the capture; fetch it, as it was set then: locusctl "
           "fetch SENSOR -o drive.json for a drive.pcap, or name it: --set "
           "lidars.0.metadata=FILE --set lidars.0.port={}",
           packets, port, busiest.bytes, port);
-    if (packets > velodyne)
-      return fmt::format("{} packets look like those of a Hesai {} (most go to port {}, the last of them with {} "
-                         "bytes), which are not read; record clouds of its driver, or another lidar",
-                         packets, busiest.hesai, port, busiest.bytes);
+    const std::string_view model = maker == OtherMaker::hesai ? busiest.hesai : std::string_view{};
+    return fmt::format("{} packets look like those of a {}{}{} (most go to port {}, the last of them with {} "
+                       "bytes), which are not read; record clouds of its driver, or another lidar",
+                       packets, to_string(maker), model.empty() ? "" : " ", model, port, busiest.bytes);
   }
   return "";
 }

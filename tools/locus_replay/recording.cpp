@@ -190,6 +190,7 @@ void Recording::note_traffic(const Datagram& datagram) {
   traffic.bytes = datagram.payload.size();
   if (const std::optional<OtherMaker> maker = other_maker(datagram))
     ++traffic.of_other_maker[static_cast<std::size_t>(*maker)];
+  traffic.of_ouster_imu += is_ouster_imu(datagram) ? 1U : 0U;
   if (const auto looks = hesai::look_at(datagram.payload); looks && !looks->model)
     traffic.hesai = looks->name;
 }

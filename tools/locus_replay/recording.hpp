@@ -38,6 +38,7 @@ struct PortTraffic {
   std::uint64_t datagrams = 0;
   std::map<std::size_t, std::uint64_t> by_length;           ///< number of datagrams, by size in bytes
   std::array<std::uint64_t, kOtherMakers> of_other_maker{}; ///< number of datagrams, by apparent maker
+  std::uint64_t of_ouster_imu = 0;                          ///< number of datagrams of an Ouster's inertial unit
   std::string_view hesai;                                   ///< model of the latest Hesai datagram among these
   std::size_t bytes = 0;                                    ///< of the latest
   std::uint32_t source_ip = 0;                              ///< of the latest

@@ -18,7 +18,8 @@ namespace locus::tools {
 namespace {
 
 std::string describe(const HeardLidar& lidar) {
-  const std::string model = lidar.ouster ? fmt::format("Ouster-{}", lidar.beams) : std::string{lidar.model};
+  const std::string beams = lidar.beams > 0 ? fmt::format("-{}", lidar.beams) : "";
+  const std::string model = lidar.ouster ? "Ouster" + beams : std::string{lidar.model};
   std::string mode{lidar.return_mode};
   if (lidar.columns_per_turn > 0)
     mode = fmt::format("{}x{:.0f}", lidar.columns_per_turn, lidar.rotation_rate_rpm / 60.0);
@@ -28,6 +29,12 @@ std::string describe(const HeardLidar& lidar) {
   if (lidar.ouster.value_or(0) > 0)
     text += fmt::format("  serial number {}", *lidar.ouster);
   return text + "\n";
+}
+
+std::string describe_unread(const HeardLidar& lidar) {
+  const std::string_view help = remedy(*lidar.unknown_packets);
+  return fmt::format("{:<16}{:<7}not read: {}{}{}\n", dotted(lidar.ip), lidar.port, to_string(*lidar.unknown_packets),
+                     help.empty() ? "" : "; ", help);
 }
 
 /// Formats a configuration entry, and the command that fetches the file that only the sensor has: an Ouster requires
@@ -48,7 +55,9 @@ std::string entry(const HeardLidar& lidar, int number, bool shares_port) {
 } // namespace
 
 std::string find_sensors(Duration duration) {
-  constexpr std::array kDefaultPorts{kDefaultDataPort, kDefaultPositionPort, ouster::kDefaultLidarPort};
+  constexpr std::uint16_t kRoboSensePort = 6699, kSeyondPort = 8010, kLivoxPort = 56301;
+  constexpr std::array kDefaultPorts{kDefaultDataPort, kDefaultPositionPort, ouster::kDefaultLidarPort,
+                                     kRoboSensePort,   kSeyondPort,          kLivoxPort};
   auto wire = WireTap::open(kDefaultPorts);
   if (!wire)
     throw Failure(ExitStatus::failed, wire.error());
@@ -63,17 +72,17 @@ std::string find_sensors(Duration duration) {
   int known = 0;
   for (const HeardLidar& lidar : lidars) {
     if (lidar.unknown_packets)
-      refused +=
-          fmt::format("{:<16}{:<7}not read: {}\n", dotted(lidar.ip), lidar.port, to_string(*lidar.unknown_packets));
+      refused += describe_unread(lidar);
     if (!lidar.is_known())
       continue;
     text += describe(lidar);
     yaml += entry(lidar, ++known, on_port[lidar.port] > 1);
   }
   if (text.empty())
-    throw Failure(ExitStatus::failed,
-                  fmt::format("{}no lidar was received within {:.0f} s; check power, cable and the address it sends to",
-                              refused, to_seconds(duration)));
+    throw Failure(
+        ExitStatus::failed,
+        fmt::format("{}no lidar {}was received within {:.0f} s; check power, cable and the address it sends to",
+                    refused, refused.empty() ? "" : "that can be read ", to_seconds(duration)));
   return text + refused + "\nlidars:\n" + yaml;
 }
 

@@ -457,6 +457,9 @@ TEST(HesaiLooks, ModelsThatCannotBeReadHaveTheirNames) {
   EXPECT_EQ(look_of(1, 4, 128, 2)->name, "Pandar128");
   EXPECT_EQ(look_of(1, 4, 128, 2)->model, std::nullopt);
   EXPECT_EQ(look_of(1, 4, 128, 2, 128)->model, Model::ot128);
+  EXPECT_EQ(look_of(1, 4, 128, 2, 136)->model, Model::ot128);
+  EXPECT_EQ(look_of(1, 4, 128, 2, 137)->name, "JT128") << "the layout of an OT128, with other angles";
+  EXPECT_EQ(look_of(1, 4, 128, 2, 137)->model, std::nullopt);
   EXPECT_EQ(look_of(3, 1, 32, 4)->model, std::nullopt) << "QT32";
   EXPECT_EQ(look_of(99, 1, 32, 4)->name, "of an unknown model");
   EXPECT_EQ(look_at(std::vector<std::byte>(1262)), std::nullopt);

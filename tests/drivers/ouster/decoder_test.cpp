@@ -18,9 +18,12 @@ namespace {
 using test::ouster_metadata;
 using test::OusterTestPacket;
 
-constexpr std::array<Profile, kProfiles> kAll{Profile::legacy,     Profile::rng19,      Profile::rng19_dual,
-                                              Profile::rng15,      Profile::rng15_dual, Profile::fusa_rng15_dual,
-                                              Profile::rng15_zone, Profile::rng19_zone};
+const std::array<Profile, kProfiles> kAll = [] {
+  std::array<Profile, kProfiles> all{};
+  for (std::size_t i = 0; i < kProfiles; ++i)
+    all[i] = static_cast<Profile>(i);
+  return all;
+}();
 
 /// Returns the position of a pixel in the sensor frame by the manual: the beam starts on a circle about the lidar
 /// frame's z axis, and its length is the range minus the radius of that circle.
@@ -67,6 +70,90 @@ TEST(OusterDecoder, PlacesEveryPixelOfEveryProfile) {
       }
     }
   }
+}
+
+/// The lengths and bits of a pixel are those of the maker's SDK: bytes, and where ranges and reflectivities are.
+TEST(OusterDecoder, ReadsTheBitsThatTheMakerDescribesForEachProfile) {
+  struct Described {
+    const char* name;
+    std::size_t bytes, first_bit, bits, up, reflectivity_bit, second_bit, second_reflectivity_bit;
+  };
+  constexpr auto kDescribed = std::to_array<Described>({{"LEGACY", 12, 0, 20, 0, 32, 0, 0},
+                                                        {"RNG19_RFL8_SIG16_NIR16", 12, 0, 19, 0, 32, 0, 0},
+                                                        {"RNG19_RFL8_SIG16_NIR16_DUAL", 16, 0, 19, 0, 24, 32, 56},
+                                                        {"RNG15_RFL8_NIR8", 4, 0, 15, 3, 16, 0, 0},
+                                                        {"RNG15_RFL8_NIR8_DUAL", 8, 0, 15, 3, 16, 32, 48},
+                                                        {"FUSA_RNG15_RFL8_NIR8_DUAL", 8, 0, 15, 3, 16, 32, 48},
+                                                        {"RNG15_RFL8_NIR8_ZONE16", 8, 0, 15, 3, 16, 0, 0},
+                                                        {"RNG19_RFL8_SIG16_NIR16_ZONE16", 12, 0, 19, 0, 32, 0, 0},
+                                                        {"RNG19_RFL8_SIG16_ZONE16_DUAL", 16, 0, 19, 0, 24, 32, 56},
+                                                        {"RNG15_RFL8_WIN8", 4, 0, 15, 3, 16, 0, 0},
+                                                        {"RNG19_RFL8_SIG16_NIR16_RGB16", 16, 0, 19, 0, 24, 0, 0},
+                                                        {"RNG19_RFL8_SIG16_NIR16_RGB16_DUAL", 20, 0, 19, 0, 24, 32, 56},
+                                                        {"FIVE_WORD_PIXEL", 20, 0, 19, 0, 24, 32, 56}});
+  static_assert(kDescribed.size() == kProfiles);
+  for (const Described& one : kDescribed) {
+    const auto profile = profile_from_string(one.name);
+    ASSERT_TRUE(profile) << one.name;
+    const Metadata metadata = ouster_metadata(*profile, 16);
+    OusterTestPacket bytes{metadata};
+    const std::size_t pixel = (*profile == Profile::legacy ? 16U : 32U + 12U) + 5 * one.bytes;
+    const auto set = [&](std::size_t bit, std::uint64_t value, std::size_t size) {
+      bytes.put(pixel + bit / 8, value, size);
+    };
+    set(0, ~std::uint64_t{0}, std::min<std::size_t>(one.bytes, 8)); // bits around the fields are other fields
+    const std::uint64_t flags = ~((1ULL << one.bits) - 1);
+    const std::size_t size = one.bits == 15 ? 2 : 3;
+    set(one.first_bit, 1234 | flags, size);
+    set(one.reflectivity_bit, 77, 1);
+    const bool is_dual = one.second_bit > 0;
+    if (is_dual) {
+      set(one.second_bit, 2345 | flags, size);
+      set(one.second_reflectivity_bit, 88, 1);
+    }
+    bytes.seal();
+    Decoder decoder{metadata};
+    LidarPacket packet;
+    ASSERT_EQ(decoder.decode(bytes.payload(), packet), std::nullopt) << one.name;
+    const auto returns = test::returns_of(packet);
+    ASSERT_EQ(returns.size(), is_dual ? 2U : 1U) << one.name;
+    EXPECT_FLOAT_EQ(returns[0].range_m, 1e-3F * static_cast<float>(1234U << one.up)) << one.name;
+    EXPECT_EQ(returns[0].intensity, 77) << one.name;
+    EXPECT_EQ(returns[0].ring, 10) << one.name;
+    if (is_dual) {
+      EXPECT_FLOAT_EQ(returns[1].range_m, 1e-3F * static_cast<float>(2345U << one.up)) << one.name;
+      EXPECT_EQ(returns[1].intensity, 88) << one.name;
+    }
+  }
+}
+
+/// Any profile but the legacy one may come with the header of functional safety, whose offsets differ.
+TEST(OusterDecoder, ReadsTheHeaderOfFunctionalSafetyWithAnyProfile) {
+  Metadata metadata = ouster_metadata(Profile::rng19);
+  metadata.safety_header = true;
+  OusterTestPacket bytes{metadata, 0, 1'000'000'000, 0x12345};
+  bytes.set_return(3, 4, 5000);
+  Decoder decoder{metadata};
+  LidarPacket packet;
+  ASSERT_EQ(decoder.decode(bytes.payload(), packet), std::nullopt);
+  EXPECT_EQ(test::returns_of(packet).size(), 1U);
+  const auto recognised = format_of_lidar_packet(bytes.payload());
+  ASSERT_TRUE(recognised);
+  EXPECT_EQ(recognised->header(bytes.payload()).serial_number, metadata.serial_number);
+  EXPECT_EQ(recognised->header(bytes.payload()).frame_id, 0x12345U);
+  bytes.put(0, 2, 1);
+  EXPECT_EQ(decoder.decode(bytes.payload(), packet), PacketError::flag);
+  EXPECT_FALSE(format_of_lidar_packet(bytes.payload()));
+}
+
+TEST(OusterFormat, LengthOfAPacketMayLeaveTheNumberOfPixelsOpen) {
+  const auto bytes_of = [](Profile profile, std::size_t pixels) {
+    return PacketFormat{profile, false, pixels, 16}.packet_bytes;
+  };
+  EXPECT_EQ(pixels_of_length(bytes_of(Profile::legacy, 64)), 64U);
+  EXPECT_EQ(pixels_of_length(bytes_of(Profile::rng19, 128)), 128U);
+  EXPECT_EQ(pixels_of_length(bytes_of(Profile::rng15, 128)), 0U) << "as long as rng19_dual with 32";
+  EXPECT_EQ(pixels_of_length(1206), 0U);
 }
 
 TEST(OusterDecoder, ForwardIsHalfATurnOfTheEncoder) {
@@ -160,6 +247,12 @@ TEST(OusterDecoder, TurnsAsFastAsItsColumnsSay) {
   LidarPacket packet;
   ASSERT_EQ(decoder.decode(OusterTestPacket{metadata, 1016}.payload(), packet), std::nullopt);
   EXPECT_NEAR(decoder.rotation_rate_rpm(), 600.0, 0.1) << "across the end of the turn";
+  OusterTestPacket last_of_window{metadata, 32};
+  for (std::size_t i = 1; i < 16; ++i)
+    last_of_window.set_valid(i, false);
+  last_of_window.seal();
+  ASSERT_EQ(decoder.decode(last_of_window.payload(), packet), std::nullopt);
+  EXPECT_NEAR(decoder.rotation_rate_rpm(), 600.0, 0.1) << "a single column tells none";
 }
 
 TEST(OusterDecoder, RefusesEveryOtherLength) {

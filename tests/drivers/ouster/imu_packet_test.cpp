@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/ouster/imu_packet.hpp"
 
+#include <algorithm>
 #include <limits>
 
 #include <gtest/gtest.h>
@@ -107,6 +108,34 @@ TEST(OusterImuPacket, OfNewerFirmwareIsRefusedForWhatOpensAndEndsIt) {
   EXPECT_EQ(error_of(7, 1, 5), PacketError::sender);
   EXPECT_EQ(error_of(140, 1, 1, false), PacketError::checksum);
   EXPECT_EQ(error_of(132, ~std::uint64_t{0}, 8), PacketError::time);
+}
+
+/// The header has other offsets, and no checksum ends the packet.
+TEST(OusterImuPacket, OfFunctionalSafetyIsReadByItsOwnHeader) {
+  Metadata metadata = standard_metadata();
+  metadata.safety_header = true;
+  auto bytes = standard_packet(metadata);
+  std::fill_n(bytes.begin(), 32, std::byte{});
+  test::put_little_endian(&bytes[0], 2, 1);
+  test::put_little_endian(&bytes[1], metadata.init_id, 3);
+  test::put_little_endian(&bytes[4], 70'000, 4);
+  test::put_little_endian(&bytes[11], metadata.serial_number, 5);
+  ImuMeasurements measurements;
+  EXPECT_EQ(read_imu_packet(metadata, bytes, measurements), std::nullopt);
+  EXPECT_EQ(measurements.count, 8U);
+  EXPECT_TRUE(is_standard_imu_packet(bytes));
+  test::put_little_endian(&bytes[11], 1, 5);
+  EXPECT_EQ(read_imu_packet(metadata, bytes, measurements), PacketError::sender);
+}
+
+TEST(OusterImuPacket, OfNewerFirmwareIsKnownByItsHeaderAndItsLength) {
+  const auto bytes = standard_packet(standard_metadata());
+  EXPECT_TRUE(is_standard_imu_packet(bytes));
+  EXPECT_FALSE(is_standard_imu_packet(std::span{bytes}.first(451)));
+  EXPECT_FALSE(is_standard_imu_packet({}));
+  auto column_packet = bytes;
+  test::put_little_endian(&column_packet[0], 1, 2);
+  EXPECT_FALSE(is_standard_imu_packet(column_packet));
 }
 
 } // namespace

@@ -168,12 +168,22 @@ TEST(OusterMetadata, IsRefusedWithTheKey) {
 
 TEST(OusterMetadata, NamesAProfileThatCannotBeRead) {
   json file = nested();
-  file["lidar_data_format"]["udp_profile_lidar"] = "FIVE_WORD_PIXEL";
+  file["lidar_data_format"]["udp_profile_lidar"] = "RNG23_RFL8";
   const auto metadata = parse_metadata(file.dump());
   ASSERT_FALSE(metadata);
-  EXPECT_EQ(metadata.error(), "lidar_data_format.udp_profile_lidar: FIVE_WORD_PIXEL cannot be read; set the sensor to "
+  EXPECT_EQ(metadata.error(), "lidar_data_format.udp_profile_lidar: RNG23_RFL8 cannot be read; set the sensor to "
                               "one of " +
                                   known_profiles());
+}
+
+TEST(OusterMetadata, HeaderOfFunctionalSafetyIsSetByItsKeyOrByTheProfile) {
+  json file = nested();
+  EXPECT_FALSE(parse_metadata(file.dump())->safety_header);
+  file["lidar_data_format"]["header_type"] = "FUSA";
+  EXPECT_TRUE(parse_metadata(file.dump())->safety_header);
+  file["lidar_data_format"].erase("header_type");
+  file["lidar_data_format"]["udp_profile_lidar"] = "FUSA_RNG15_RFL8_NIR8_DUAL";
+  EXPECT_TRUE(parse_metadata(file.dump())->safety_header);
 }
 
 TEST(OusterMetadata, WithoutImuPacketsHasNoPortForThem) {
