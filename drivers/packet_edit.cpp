@@ -23,4 +23,11 @@ void lengthen_ranges(std::span<std::byte> packet, const ouster::Metadata* ouster
     velodyne::lengthen_ranges(packet, more_m);
 }
 
+void narrow_view(std::span<std::byte> packet, const ouster::Metadata* ouster, double view_deg) {
+  if (ouster != nullptr)
+    ouster::narrow_view(*ouster, packet, view_deg);
+  else if (!hesai::narrow_view(packet, view_deg))
+    velodyne::narrow_view(packet, view_deg);
+}
+
 } // namespace locus

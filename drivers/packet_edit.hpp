@@ -22,4 +22,8 @@ void shift_clock(std::span<std::byte> packet, const ouster::Metadata* ouster, Du
 /// Lengthens the ranges of a data packet by `more_m`, up to the largest that its fields can hold. Adds no returns.
 void lengthen_ranges(std::span<std::byte> packet, const ouster::Metadata* ouster, double more_m);
 
+/// Removes the returns of all columns of a data packet that are more than half of `view_deg` away from the lidar's x
+/// axis. Leaves azimuths and times unchanged.
+void narrow_view(std::span<std::byte> packet, const ouster::Metadata* ouster, double view_deg);
+
 } // namespace locus

@@ -3,6 +3,7 @@
 
 #include <limits>
 
+#include "drivers/field_of_view.hpp"
 #include "drivers/hesai/packet_parts.hpp"
 #include "drivers/longer_range.hpp"
 #include "drivers/wire.hpp"
@@ -47,6 +48,18 @@ bool lengthen_ranges(std::span<std::byte> packet, double more_m) {
         constexpr std::uint32_t kLongest = std::numeric_limits<std::uint16_t>::max();
         put_little_endian(range, longer_range(read_u16(range), more, kLongest), 2);
       }
+    }
+  });
+}
+
+bool narrow_view(std::span<std::byte> packet, double view_deg) {
+  return edit(packet, [&](const PacketLayout& layout, const std::byte*) {
+    for (std::size_t block = 0; block < layout.blocks; ++block) {
+      std::byte* const first = packet.data() + layout.header + block * layout.block() + layout.block_header;
+      if (is_in_view(0.01 * read_u16(first - 2), view_deg))
+        continue;
+      for (std::size_t channel = 0; channel < layout.channels; ++channel)
+        put_little_endian(first + channel * layout.channel, 0, 2);
     }
   });
 }

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <limits>
 
+#include "drivers/field_of_view.hpp"
 #include "drivers/longer_range.hpp"
 #include "drivers/ouster/checksum.hpp"
 #include "drivers/ouster/imu_packet.hpp"
@@ -57,6 +59,19 @@ void shift_time(std::byte* at, Duration shift) {
 
 void put_float(std::byte* at, float value) { put_little_endian(at, std::bit_cast<std::uint32_t>(value), 4); }
 
+void put_range(std::byte* at, std::uint32_t range_mask, std::uint32_t counts) {
+  put_little_endian(at, (read_u32(at) & ~range_mask) | counts, 4);
+}
+
+/// Calls `change` with each range of a column.
+template <class Change> void edit_ranges(const PacketFormat& format, std::byte* column, Change&& change) {
+  std::byte* pixel = column + (format.pixels_of(column) - column);
+  for (std::size_t i = 0; i < format.pixels_per_column; ++i, pixel += format.profile.pixel_bytes) {
+    for (std::size_t echo = 0; echo < format.profile.echoes; ++echo)
+      change(pixel + format.profile.echo_fields[echo].range_at);
+  }
+}
+
 } // namespace
 
 void shift_clock(const Metadata& metadata, Packet packet, Duration shift) {
@@ -67,18 +82,24 @@ void shift_clock(const Metadata& metadata, Packet packet, Duration shift) {
 
 void lengthen_ranges(const Metadata& metadata, Packet packet, double more_m) {
   const PacketFormat format = metadata.packet_format();
-  const ProfileSpec& profile = format.profile;
-  const std::uint32_t longest = (1U << profile.range_bits) - 1;
-  const double more = 1e3 * more_m / static_cast<double>(1U << profile.range_shift);
+  const std::uint32_t longest = (1U << format.profile.range_bits) - 1;
+  const double more = 1e3 * more_m / static_cast<double>(1U << format.profile.range_shift);
   edit_columns(format, packet, [&](std::byte* column) {
-    std::byte* pixel = column + (format.pixels_of(column) - column);
-    for (std::size_t i = 0; i < format.pixels_per_column; ++i, pixel += profile.pixel_bytes) {
-      for (std::size_t echo = 0; echo < profile.echoes; ++echo) {
-        std::byte* const range = pixel + profile.echo_fields[echo].range_at;
-        const std::uint32_t word = read_u32(range);
-        put_little_endian(range, (word & ~longest) | longer_range(word & longest, more, longest), 4);
-      }
-    }
+    edit_ranges(format, column, [&](std::byte* range) {
+      put_range(range, longest, longer_range(read_u32(range) & longest, more, longest));
+    });
+  });
+}
+
+void narrow_view(const Metadata& metadata, Packet packet, double view_deg) {
+  const PacketFormat format = metadata.packet_format();
+  const std::uint32_t longest = (1U << format.profile.range_bits) - 1;
+  const Eigen::Matrix3d R = metadata.T_sensor_lidar.R();
+  const double zero_deg = std::atan2(R(1, 0), R(0, 0)) / kRadPerDeg;
+  const double step_deg = 360.0 / static_cast<double>(metadata.columns_per_frame);
+  edit_columns(format, packet, [&](std::byte* column) {
+    if (!is_in_view(zero_deg - step_deg * PacketFormat::measurement_id_of(column), view_deg))
+      edit_ranges(format, column, [&](std::byte* range) { put_range(range, longest, 0); });
   });
 }
 

@@ -15,6 +15,9 @@ void shift_clock(const Metadata& metadata, std::span<std::byte> packet, Duration
 /// Implements locus::lengthen_ranges().
 void lengthen_ranges(const Metadata& metadata, std::span<std::byte> packet, double more_m);
 
+/// Implements locus::narrow_view(). The x axis is that of the sensor frame.
+void narrow_view(const Metadata& metadata, std::span<std::byte> packet, double view_deg);
+
 /// Adds `more_radps` to the angular velocity about z of an IMU packet, IMU frame. Leaves other packets unchanged.
 void add_turn(const Metadata& metadata, std::span<std::byte> packet, double more_radps);
 

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <limits>
 
+#include "drivers/field_of_view.hpp"
 #include "drivers/longer_range.hpp"
 #include "drivers/velodyne/model.hpp"
 #include "drivers/velodyne/position_packet.hpp"
@@ -44,6 +45,18 @@ void lengthen_ranges(std::span<std::byte> packet, double more_m) {
         packet.data() + i / kChannels * kBlockBytes + kBlockHeaderBytes + i % kChannels * kChannelBytes;
     constexpr std::uint32_t kLongest = std::numeric_limits<std::uint16_t>::max();
     put_little_endian(range, longer_range(read_u16(range), more, kLongest), 2);
+  }
+}
+
+void narrow_view(std::span<std::byte> packet, double view_deg) {
+  if (packet.size() != kDataPacketBytes)
+    return;
+  for (std::size_t block = 0; block < kBlocks; ++block) {
+    std::byte* const at = packet.data() + block * kBlockBytes;
+    if (is_in_view(0.01 * read_u16(at + 2), view_deg))
+      continue;
+    for (std::size_t channel = 0; channel < kChannels; ++channel)
+      put_little_endian(at + kBlockHeaderBytes + channel * kChannelBytes, 0, 2);
   }
 }
 

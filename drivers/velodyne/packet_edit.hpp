@@ -14,4 +14,7 @@ void shift_clock(std::span<std::byte> packet, Duration shift);
 /// Implements locus::lengthen_ranges() for packets with a known product ID.
 void lengthen_ranges(std::span<std::byte> packet, double more_m);
 
+/// Implements locus::narrow_view().
+void narrow_view(std::span<std::byte> packet, double view_deg);
+
 } // namespace locus::velodyne

@@ -20,8 +20,11 @@
 #include "drivers/ouster/imu_packet.hpp"
 #include "drivers/ouster/packet_edit.hpp"
 #include "drivers/ouster_test_packet.hpp"
+#include "drivers/velodyne/decoder.hpp"
 #include "drivers/velodyne/model.hpp"
+#include "drivers/velodyne_test_packet.hpp"
 #include "drivers/wire.hpp"
+#include "support/returns.hpp"
 
 namespace locus {
 namespace {
@@ -37,6 +40,25 @@ std::vector<float> ranges_m(const LidarPacket& packet) {
   for (const FiringGroup& group : packet.firing_groups())
     std::ranges::copy_if(group.range_m, std::back_inserter(ranges), [](float range_m) { return range_m > 0.0F; });
   return ranges;
+}
+
+/// Expects a view of 90 degrees to leave exactly the returns ahead, judged by the decoded points. The packet holds one
+/// return.
+template <class Decoder>
+void expect_only_ahead(std::span<const std::byte> payload, const ouster::Metadata* metadata, Decoder decoder) {
+  Bytes bytes = copy_of(payload);
+  LidarPacket packet;
+  ASSERT_EQ(decoder.decode(bytes, packet), std::nullopt);
+  const std::vector<LidarReturn> before = test::returns_of(packet);
+  ASSERT_EQ(before.size(), 1U);
+  const double away_deg =
+      std::abs(std::atan2(static_cast<double>(before[0].y_m), static_cast<double>(before[0].x_m))) / kRadPerDeg;
+  constexpr double kBesideItsColumn_deg = 6; // direction of a laser relative to its column
+  if (std::abs(away_deg - 45) < kBesideItsColumn_deg)
+    return;
+  narrow_view(bytes, metadata, 90);
+  ASSERT_EQ(decoder.decode(bytes, packet), std::nullopt) << "and it has its checksum";
+  EXPECT_EQ(ranges_m(packet).size(), away_deg < 45 ? 1U : 0U) << away_deg;
 }
 
 /// The packets of all Ouster's profiles.
@@ -93,6 +115,15 @@ TEST_P(PacketEditOfOuster, KeepsAReturnOneWhateverIsAsked) {
   lengthen_ranges(bytes_, &metadata_, 1e6);
   ASSERT_EQ(decoder_->decode(bytes_, packet_), std::nullopt);
   EXPECT_GT(ranges_m(packet_).front(), 200.0F);
+}
+
+TEST_P(PacketEditOfOuster, ANarrowViewLeavesWhatIsAhead) {
+  for (std::size_t first = 0; first < metadata_.columns_per_frame; first += 32) {
+    test::OusterTestPacket packet{metadata_, first};
+    packet.set_return(1, 5, 10'000, 77);
+    packet.seal();
+    expect_only_ahead(packet.payload(), &metadata_, ouster::Decoder{metadata_});
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Profiles, PacketEditOfOuster, testing::Range(std::size_t{0}, ouster::kProfiles),
@@ -204,6 +235,16 @@ TEST_P(PacketEditOfHesai, LengthensEveryReturnAndNothingElse) {
   EXPECT_EQ(decoder_.time(), time_);
 }
 
+TEST_P(PacketEditOfHesai, ANarrowViewLeavesWhatIsAhead) {
+  for (int azimuth_cdeg = 0; azimuth_cdeg < 36'000; azimuth_cdeg += 1'000) {
+    test::HesaiTestPacket packet{static_cast<hesai::Model>(GetParam()), 0x37, test::HesaiTestPacket::kTime,
+                                 static_cast<std::uint16_t>(azimuth_cdeg)};
+    packet.set_return(1, 5, 2'500, 77);
+    packet.seal();
+    expect_only_ahead(packet.payload(), nullptr, hesai::Decoder{});
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Models, PacketEditOfHesai, testing::Range(std::size_t{0}, hesai::kModels),
                          [](const auto& model) {
                            return std::string{to_string(static_cast<hesai::Model>(model.param))};
@@ -219,6 +260,17 @@ TEST(PacketEdit, OfAVelodyneATimeThatIsNoneStays) {
   EXPECT_EQ(read_u32(&bytes[velodyne::kTimeOffset]), 0U);
 }
 
+TEST(PacketEdit, OfAVelodyneANarrowViewLeavesWhatIsAhead) {
+  for (const velodyne::Model model : velodyne::kModels) {
+    for (int azimuth_cdeg = 0; azimuth_cdeg < 36'000; azimuth_cdeg += 1'000) {
+      test::VelodyneTestPacket packet{model, velodyne::ReturnMode::strongest, 0,
+                                      static_cast<std::uint16_t>(azimuth_cdeg)};
+      packet.set_return(4, 5, 5'000);
+      expect_only_ahead(packet.payload(), nullptr, velodyne::Decoder{});
+    }
+  }
+}
+
 TEST(PacketEdit, WhatIsNoPacketStaysAsItIs) {
   const auto metadata = test::ouster_metadata();
   for (const std::size_t size : {0U, 1U, 100U, 1080U}) {
@@ -226,6 +278,7 @@ TEST(PacketEdit, WhatIsNoPacketStaysAsItIs) {
     for (const ouster::Metadata* ouster : {static_cast<const ouster::Metadata*>(nullptr), &metadata}) {
       shift_clock(bytes, ouster, 1s);
       lengthen_ranges(bytes, ouster, 1.0);
+      narrow_view(bytes, ouster, 90);
     }
     EXPECT_EQ(bytes, Bytes(size, std::byte{0xEE}));
   }

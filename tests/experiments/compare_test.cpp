@@ -168,6 +168,28 @@ Results harsh(double worst_m, int lost = 0, int flagged = 0, double claimed_mps 
           {"harsh", {{"seeds", 1}, {"only", ""}, {"rows", {row}}}}};
 }
 
+/// A row in the format of judge_subsets(), of a recording.
+Results subsets(double error_m, double ratio) {
+  const Results all{{"subset", "all"}, {"mean_m", error_m}, {"worst_m", 0.2}, {"worst_sigma", 1.0}};
+  const Results row{{"drive", "robot1"},          {"view_deg", 90}, {"subsets", {all}}, {"ratio", ratio},
+                    {"broken", Results::array()}, {"holds", true}};
+  return {{"version", "1"},
+          {"duration_s", nullptr},
+          {"runs", Results::array()},
+          {"subsets", {{"starts", 1}, {"rows", {row}}}}};
+}
+
+TEST_F(Compare, RowsOfSubsetsAreKeyedByDriveAndView) {
+  const std::string text = page(subsets(0.02, 1.0), subsets(0.04, 1.5));
+  EXPECT_TRUE(contains_text(text, "| **worse** | robot1, 90 degrees | yes | 20.0 -> 40.0 (+100 %) | 200.0 | 1.0 | 1.00 "
+                                  "-> 1.50 (+50 %) |"))
+      << text;
+  EXPECT_TRUE(contains_text(text, ", subsets. Before")) << text;
+  Results more_starts = subsets(0.02, 1.0);
+  more_starts["subsets"]["starts"] = 3;
+  EXPECT_TRUE(contains_text(error(more_starts, subsets(0.02, 1.0)), "starts is 3 there and 1 here"));
+}
+
 TEST_F(Compare, HarshRowsAreKeyedByCourseImperfectionAndSensors) {
   const std::string text = page(harsh(0.1), harsh(124));
   EXPECT_TRUE(contains_text(text, "| **worse** | urban, late IMU, all |  | 20.0 | 100.0 -> 124000.0 (+123900 %) | 1.0 "

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The harsh table at reduced size: the real world, and people in a bare corridor.
+// The harsh table at reduced size: the real world, and people in a bare corridor; and that of subsets.
 #include <string>
 
 #include <gtest/gtest.h>
@@ -43,6 +43,22 @@ TEST_P(HarshOnCourses, EveryDriveIsMeasured) {
 }
 
 INSTANTIATE_TEST_SUITE_P(SmallForm, HarshOnCourses, testing::Values("plant/real", "corridor/people"));
+
+TEST(SubsetsOnACourse, EveryPartOfTwoDrivesIsMeasuredInEveryView) {
+  const TemporaryFolder folder;
+  const ProgramRun run =
+      run_program(LOCUS_EXPERIMENTS, {"--subsets", "--only", "plant, spot/real", "--quiet", "--duration", "16",
+                                      "--seeds", "1", "--starts", "2", "--jobs", "2", "-o", folder / "out"});
+  ASSERT_EQ(run.status, 0) << run.err;
+  const json rows = json::parse(read_text(folder / "out/results.json"))["subsets"]["rows"];
+  ASSERT_EQ(rows.size(), 2U * 3U);
+  for (const json& row : rows) {
+    EXPECT_EQ(row["subsets"].size(), 6U + 2U) << row << ": with and without each source, and vio and kio alone";
+    EXPECT_NE(row["verdict"], "failed") << row;
+  }
+  EXPECT_NE(read_text(folder / "out/subsets.md").find("| plant, spot/real 1, from 4 s | 90 |"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder / "out/courses"));
+}
 
 } // namespace
 } // namespace locus::test

@@ -324,6 +324,23 @@ TEST(DatagramFaults, JumpLengthensTheRangesThatThereAre) {
   EXPECT_EQ(after({"front:jump=2@0"}, with_one_return(0)), with_one_return(0));
 }
 
+/// Its last block, with the return, is at this azimuth.
+std::vector<std::byte> with_return_at(std::uint16_t azimuth_cdeg) {
+  std::vector<std::byte> payload = with_one_return(1000);
+  put_little_endian(&payload[velodyne::kTimeOffset - velodyne::kBlockBytes + 2], azimuth_cdeg, 2);
+  return payload;
+}
+
+TEST(DatagramFaults, ANarrowViewHasNoReturnsFromElsewhereAndTheNarrowestCounts) {
+  EXPECT_EQ(after({"front:view@0"}, with_return_at(8'900)), with_return_at(8'900)) << "180 degrees";
+  EXPECT_EQ(after({"front:view=90@0"}, with_return_at(31'600)), with_return_at(31'600));
+  std::vector<std::byte> blank = with_return_at(9'100);
+  blank[velodyne::kTimeOffset - 3] = blank[velodyne::kTimeOffset - 2] = std::byte{0};
+  EXPECT_EQ(after({"all-lidars:view@0"}, with_return_at(9'100)), blank);
+  EXPECT_EQ(after({"front:view=90@0", "front:view=200@0"}, with_return_at(9'100)), blank);
+  EXPECT_EQ(after({"front:view=360@0"}, with_return_at(18'000)), with_return_at(18'000));
+}
+
 /// Returns the shortest range and the time of an Ouster or Hesai packet after these faults, as decoded; nothing if the
 /// decoder rejects it.
 template <class Decoder>

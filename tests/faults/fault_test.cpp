@@ -50,6 +50,7 @@ TEST(Fault, ValuesHaveTheDocumentedDefaults) {
   EXPECT_EQ(parsed("a:packet-loss@1").value, 10.0);
   EXPECT_EQ(parsed("a:reorder@1").value, 10.0);
   EXPECT_EQ(parsed("a:duplicate@1").value, 10.0);
+  EXPECT_EQ(parsed("a:view@1").value, 180.0);
   EXPECT_EQ(parsed("a:corrupt@1").value, 10.0);
   EXPECT_EQ(parsed("a:clock-step=-3@1").value, -3.0);
 }
@@ -60,7 +61,7 @@ TEST(Fault, WhatCannotBeReadIsAnErrorThatSaysWhatCan) {
   }
   EXPECT_TRUE(contains(error_of(Fault::parse("wio:broken@3")),
                        "unknown kind \"broken\"; known are lost, frozen, jump, nan, late, "
-                       "covariance, clock-step, packet-loss, reorder, duplicate, corrupt"));
+                       "covariance, clock-step, packet-loss, reorder, duplicate, view, corrupt"));
   for (const char* text : {"wio:lost=3@1", "wio:nan=@1"}) {
     EXPECT_TRUE(contains(error_of(Fault::parse(text)), "takes no value")) << text;
   }
@@ -88,6 +89,7 @@ TEST(Fault, MustFitTheSensorItNames) {
       contains(problem_of("front:nan@1"), "a lidar cannot have it; it can have lost, frozen, jump, late, clock-step"));
   EXPECT_TRUE(contains(problem_of("all-lidars:covariance@1"), "a lidar cannot have it"));
   EXPECT_TRUE(contains(problem_of("imu:covariance@1"), "an IMU cannot have it"));
+  EXPECT_TRUE(contains(problem_of("imu:view@1"), "an IMU cannot have it"));
   EXPECT_TRUE(contains(problem_of("front.position:jump@1"), "a position packet cannot have it"));
 }
 

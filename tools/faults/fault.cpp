@@ -44,6 +44,7 @@ constexpr std::array kKinds{
     KindTraits{FaultKind::packet_loss, "packet-loss", true, true, true, true, "percent", 10, 0, 100},
     KindTraits{FaultKind::reorder, "reorder", true, true, true, true, "percent", 10, 0, 100},
     KindTraits{FaultKind::duplicate, "duplicate", true, true, true, true, "percent", 10, 0, 100},
+    KindTraits{FaultKind::view, "view", true, false, false, false, "degrees", 180, 0, 360},
     KindTraits{FaultKind::corrupt, "corrupt", true, true, true, true, "percent", 10, 0, 100},
 };
 
@@ -247,6 +248,9 @@ FaultPlan::Verdict FaultPlan::judge(std::string_view sensor, bool is_lidar, Stam
       break;
     case FaultKind::duplicate:
       verdict.duplicated |= drawn();
+      break;
+    case FaultKind::view:
+      verdict.view_deg = std::min(verdict.view_deg, fault.value);
       break;
     case FaultKind::corrupt:
       if (drawn()) {

@@ -26,6 +26,7 @@ enum class FaultKind : std::uint8_t {
   packet_loss, ///< `value` percent of the messages are lost (10)
   reorder,     ///< `value` percent of the messages are overtaken by the next one of the same sensor (10)
   duplicate,   ///< `value` percent of the messages arrive twice (10)
+  view,        ///< a lidar has no returns but from `value` degrees about its x axis (180)
   corrupt,     ///< `value` percent of the messages contain random bits, a packet's from a random byte on (10)
 };
 
@@ -81,6 +82,7 @@ class FaultPlan {
     Duration clock_step{};
     double jump = 0.0;
     double covariance_scale = 1.0;
+    double view_deg = 360.0;
 
     [[nodiscard]] bool harmless() const { return *this == Verdict{}; }
     bool operator==(const Verdict&) const = default;

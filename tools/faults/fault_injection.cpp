@@ -85,6 +85,9 @@ void distort_packet(const FaultPlan::Verdict& verdict, const ouster::Metadata* o
   } else if (verdict.jump != 0.0) {
     lengthen_ranges(payload, ouster, verdict.jump);
   }
+  if (verdict.view_deg < 360.0) {
+    narrow_view(payload, ouster, verdict.view_deg);
+  }
   if (verdict.nan && inertial) {
     ouster::make_nan(*ouster, payload);
   }

@@ -43,32 +43,6 @@ std::vector<double> speeds_of_fixes_mps(DatagramSource& capture) {
   return speeds;
 }
 
-/// Filters the names of sources of kind imu, by the configuration that locus-replay uses.
-std::vector<std::string> imus_among(std::vector<std::string> names, const path& recording) {
-  Config config;
-  if (const auto folder = CaptureFolder::find(recording); folder && !folder->first_config().empty()) {
-    if (auto loaded = load_config(folder->first_config()))
-      config = *std::move(loaded);
-  }
-  const auto is_imu = [&](const std::string& name) {
-    return std::ranges::any_of(config.motion_sources, [&](const MotionSourceOptions& source) {
-      return source.name == name && source.kind == SourceKind::imu;
-    });
-  };
-  std::erase_if(names, [&](const std::string& name) { return !is_imu(name); });
-  return names;
-}
-
-/// Returns the sources that a finished run received.
-std::vector<std::string> heard_in(const ordered_json& summary) {
-  std::vector<std::string> names;
-  for (const auto& [name, source] : summary.at("sources").items()) {
-    if (source.at("received") > 0)
-      names.push_back(name);
-  }
-  return names;
-}
-
 std::vector<std::string> warnings_in(const path& log, const std::string& name, const path& recording) {
   constexpr std::string_view kWarning = "locus-replay: warning: ";
   std::ifstream stream{log};
@@ -98,6 +72,30 @@ ordered_json states_in(const std::vector<OdometryRow>& rows) {
 }
 
 } // namespace
+
+std::vector<std::string> imus_among(std::vector<std::string> names, const path& recording) {
+  Config config;
+  if (const auto folder = CaptureFolder::find(recording); folder && !folder->first_config().empty()) {
+    if (auto loaded = load_config(folder->first_config()))
+      config = *std::move(loaded);
+  }
+  const auto is_imu = [&](const std::string& name) {
+    return std::ranges::any_of(config.motion_sources, [&](const MotionSourceOptions& source) {
+      return source.name == name && source.kind == SourceKind::imu;
+    });
+  };
+  std::erase_if(names, [&](const std::string& name) { return !is_imu(name); });
+  return names;
+}
+
+std::vector<std::string> heard_in(const ordered_json& summary) {
+  std::vector<std::string> names;
+  for (const auto& [name, source] : summary.at("sources").items()) {
+    if (source.at("received") > 0)
+      names.push_back(name);
+  }
+  return names;
+}
 
 std::string readable(const std::string& said, const std::string& name, const path& recording) {
   constexpr std::string_view kProgram = "locus-replay: ";

@@ -27,7 +27,7 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   auto* recordings =
       app.add_option("RECORDING", arguments.recordings,
                      "Capture folders to run on; without any, the courses of the paper are simulated. With "
-                     "--accuracy: files and folders to search");
+                     "--accuracy or --subsets: files and folders to search");
   app.add_option(
          "-o,--output", arguments.output,
          "Folder for experiments.html, results.json and the runs; made if need be. What is done in it already is "
@@ -65,17 +65,33 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
                     ->excludes(faults)
                     ->excludes(matrix)
                     ->excludes(realism);
-  app.add_option("--only", arguments.only,
-                 "Of --harsh the rows whose COURSE/IMPERFECTION holds this, as in corridor/people")
-      ->type_name("TEXT")
-      ->needs(harsh);
+  auto* subsets = app.add_flag("--subsets", arguments.subsets,
+                               "Whether all sources are as accurate as the best part of them, with views of 360, 180 "
+                               "and 90 degrees, on the recordings with truth in these folders or on the courses of "
+                               "--harsh: subsets.md")
+                      ->excludes(faults)
+                      ->excludes(matrix)
+                      ->excludes(harsh)
+                      ->excludes(realism);
+  app.add_option("--starts", arguments.starts,
+                 "Drives of each course or recording with --subsets, from places in its first half to its end")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100))
+      ->needs(subsets);
+  auto* only =
+      app.add_option("--only", arguments.only,
+                     "The rows of --harsh or --subsets whose COURSE/IMPERFECTION holds this, as in corridor/people")
+          ->type_name("TEXT")
+          ->excludes(recordings);
   auto* accuracy = app.add_flag("--accuracy", arguments.accuracy,
                                 "What all recordings in these folders show, at any depth, in their place: accuracy.md")
                        ->excludes(faults)
                        ->excludes(matrix)
-                       ->excludes(harsh);
+                       ->excludes(harsh)
+                       ->excludes(subsets);
   app.add_flag("--simulated", arguments.simulated, "Simulates three drives for --accuracy, too")->needs(accuracy);
-  app.add_option("--seeds", arguments.seeds, "Of each course with --faults or --harsh")
+  app.add_option("--seeds", arguments.seeds, "Of each course with --faults, --harsh or --subsets")
       ->type_name("N")
       ->capture_default_str()
       ->check(CLI::Range(1, 100))
@@ -108,11 +124,15 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
              "  locus-experiments --fault-matrix --duration 120 -o matrix\n"
              "  locus-experiments --harsh --seeds 1 -o harsh\n"
              "  locus-experiments --harsh --only plant/real --duration 40 --seeds 1 -o small\n"
+             "  locus-experiments --subsets --only plant/real --seeds 1 -o law\n"
+             "  locus-experiments --subsets --starts 5 -o law recordings/\n"
              "  locus-experiments --faults --duration 120 --compare before/results.json -o faults\n"
              "  locus-experiments --accuracy -o accuracy recordings/");
   if (!tools::parse_command_line(app, argc, argv))
     return std::nullopt;
-  if (arguments.harsh && duration->empty())
+  if (!only->empty() && !arguments.harsh && !arguments.subsets)
+    throw Failure(ExitStatus::wrong_usage, "--only: is for --harsh and --subsets");
+  if ((arguments.harsh || arguments.subsets) && duration->empty())
     arguments.duration_s = kHarshCourse_s;
   if (arguments.accuracy && arguments.recordings.empty() && !arguments.simulated)
     throw Failure(ExitStatus::wrong_usage, "--accuracy: name folders with recordings, or --simulated");

@@ -19,7 +19,9 @@ struct Arguments {
   bool faults = false;                           ///< the table of faults instead of the paper's experiments
   bool fault_matrix = false;                     ///< the matrix of faults instead
   bool harsh = false;                            ///< the harsh courses instead
-  std::string only = {};                         ///< subset of these: COURSE/IMPERFECTION contains this
+  std::string only = {};                         ///< of these: COURSE/IMPERFECTION contains this
+  bool subsets = false;                          ///< each subset of the sources instead, on recordings or harsh courses
+  int starts = 1;                                ///< for each course or recording of `subsets`
   int seeds = 3;                                 ///< for each course of the faults and of the harsh ones
   bool accuracy = false;                         ///< results on recordings instead; `recordings`: where to search
   bool simulated = false;                        ///< adds a few simulated drives to these

@@ -168,6 +168,12 @@ std::string header_of(const std::vector<FigureKind>& kinds) {
   return names + '\n' + rule + '\n';
 }
 
+/// Returns the length of simulated courses; recordings have their own.
+std::string length_of(const Results& results) {
+  const Results& duration_s = results.at("duration_s");
+  return duration_s.is_null() ? "" : fmt::format(", {} s", duration_s.dump());
+}
+
 std::string origin(const Results& results) {
   return fmt::format("version {}, {}", results.at("version").get<std::string>(), machines_of(results.at("runs")));
 }
@@ -192,7 +198,7 @@ void ResultsBefore::check_is_of(const Results& after) const {
   const ComparedTable* const table = table_of(after);
   if (table == nullptr)
     throw Failure(ExitStatus::failed, "--compare: the paper's experiments have no rows to compare; run --faults, "
-                                      "--fault-matrix or --harsh");
+                                      "--fault-matrix, --harsh or --subsets");
   if (table_ != table)
     throw Failure(ExitStatus::failed, fmt::format("{}: holds no results of the same experiment ({}); name a "
                                                   "results.json of its own",
@@ -202,7 +208,8 @@ void ResultsBefore::check_is_of(const Results& after) const {
                                                   "--realism",
                                                   file_.string(), realism_of(results_), realism_of(after)));
   for (const Results::json_pointer& pointer :
-       {Results::json_pointer("/duration_s"), Results::json_pointer(fmt::format("/{}/seeds", table->key))}) {
+       {Results::json_pointer("/duration_s"), Results::json_pointer(fmt::format("/{}/seeds", table->key)),
+        Results::json_pointer(fmt::format("/{}/starts", table->key))}) {
     const Results was = results_.value(pointer, Results{}), is = after.value(pointer, Results{});
     if (was != is)
       throw Failure(ExitStatus::failed, fmt::format("{}: {} is {} there and {} here; compare runs of the same",
@@ -214,8 +221,8 @@ std::string ResultsBefore::comparison_with(const Results& after) const {
   check_is_of(after);
   const std::vector<ComparedRow> rows_after = table_->rows(after);
   const std::vector<RowChange> changes = changes_between(*table_, rows_, rows_after);
-  std::string page = fmt::format("`locus-experiments --compare {}`, {}, {} s. Before: {}. After: {}.\n\n{}\n{}\n{}",
-                                 file_.string(), table_->key, after.at("duration_s").dump(), origin_, origin(after),
+  std::string page = fmt::format("`locus-experiments --compare {}`, {}{}. Before: {}. After: {}.\n\n{}\n{}\n{}",
+                                 file_.string(), table_->key, length_of(after), origin_, origin(after),
                                  summary_of(changes), what_is_same(table_->kinds), header_of(table_->kinds));
   for (const RowChange& row : changes)
     page += line_of(table_->kinds, row);

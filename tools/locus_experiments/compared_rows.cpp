@@ -23,6 +23,9 @@ constexpr FigureKind kTooFast{"claims too much, m/s", 1, 1, 0.1};
 /// Factor between the NEES and its ideal value of 6 (six axes): too large and too small covariances count alike.
 constexpr FigureKind kNees{"NEES, times off 6", 1, 2, 0.1};
 
+/// Ratio of the mean error to that of the best subset; up to 1.2 is allowed.
+constexpr FigureKind kRatio{"times the best subset", 1, 2, 0.2};
+
 using Pointer = Results::json_pointer;
 
 /// Returns nothing if the value is null or absent.
@@ -95,13 +98,24 @@ std::vector<ComparedRow> harsh_rows(const Results& results) {
   return rows;
 }
 
+std::vector<ComparedRow> subset_rows(const Results& results) {
+  std::vector<ComparedRow> rows;
+  for (const Results& row : results.at("subsets").at("rows"))
+    rows.push_back(
+        row_of(fmt::format("{}, {} degrees", row.at("drive").get<std::string>(), row.at("view_deg").get<int>()), row,
+               {number_at(row, "/subsets/0/mean_m"), number_at(row, "/subsets/0/worst_m"),
+                number_at(row, "/subsets/0/worst_sigma"), number_at(row, "/ratio")}));
+  return rows;
+}
+
 } // namespace
 
 const ComparedTable* table_of(const Results& results) {
   static const std::array tables{
       ComparedTable{"faults", {kError, kSigma, kLost, kFailed, kNees}, fault_rows},
       ComparedTable{"matrix", {kError, kSigma, kLost, kFailed}, matrix_rows},
-      ComparedTable{"harsh", {kMedianError, kWorstError, kSigma, kDrivesLost, kUnsaid, kTooFast}, harsh_rows}};
+      ComparedTable{"harsh", {kMedianError, kWorstError, kSigma, kDrivesLost, kUnsaid, kTooFast}, harsh_rows},
+      ComparedTable{"subsets", {kError, kWorstError, kSigma, kRatio}, subset_rows}};
   const auto* const found =
       std::ranges::find_if(tables, [&](const ComparedTable& table) { return results.contains(table.key); });
   return found == tables.end() ? nullptr : found;

@@ -165,6 +165,8 @@ std::string machines_of(const Results& runs) {
   return fmt::format("{}", fmt::join(machines, "; "));
 }
 
+std::string in_mm(double metres) { return fmt::format("{:.{}f}", 1e3 * metres, metres < 0.1 ? 1 : 0); }
+
 std::string realism_of(const Results& results) { return results.value("realism", std::string{"clean"}); }
 
 } // namespace locus::experiments

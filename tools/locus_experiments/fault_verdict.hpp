@@ -49,6 +49,9 @@ Verdict judge(Demand demand, double limit, const std::string& kind_of_course, co
 /// Lists the processors of the runs, for the head of a table.
 std::string machines_of(const Results& runs);
 
+/// Formats metres as millimetres, three digits whatever their size.
+std::string in_mm(double metres);
+
 /// Describes the realism of the simulated courses; results without one (older versions) are of clean courses.
 std::string realism_of(const Results& results);
 

@@ -12,8 +12,6 @@
 
 #include <fmt/format.h>
 
-#include "accuracy/pose_pairs.hpp"
-#include "locus_experiments/odometry_rows.hpp"
 #include "locus_replay/failure.hpp"
 
 namespace locus::experiments {
@@ -40,24 +38,23 @@ bool stands_at_first(std::span<const PosePair> pairs) {
   });
 }
 
-/// Adds the time of loss and the delay until it was flagged.
-void add_loss(std::span<const PosePair> pairs, std::span<const OdometryRow> rows, double mounting_rad,
-              ordered_json& figures) {
+using PairIterator = std::vector<PosePair>::const_iterator;
+
+PairIterator first_lost(const std::vector<PosePair>& pairs, double mounting_rad) {
   const Pose T_odom_truth = pairs.front().T_odom_base * pairs.front().T_truth_base.inverse();
   const Eigen::Vector3d* last_m = &pairs.front().T_truth_base.translation;
   double way_m = 0;
-  const auto lost = std::ranges::find_if(pairs, [&](const PosePair& pair) {
+  return std::ranges::find_if(pairs, [&](const PosePair& pair) {
     way_m += (pair.T_truth_base.translation - *last_m).norm();
     last_m = &pair.T_truth_base.translation;
     const double error_m = (pair.T_odom_base.translation - T_odom_truth * pair.T_truth_base.translation).norm();
     return !(error_m < kLost_m + way_m * mounting_rad);
   });
-  const auto flagged =
-      std::find_if(lost, pairs.end(), [&](const PosePair& pair) { return rows[pair.estimate].flagged(); });
-  figures["lost_after_s"] =
-      lost == pairs.end() ? ordered_json(nullptr) : ordered_json(to_seconds(lost->stamp - pairs.front().stamp));
-  figures["flagged_after_s"] =
-      flagged == pairs.end() ? ordered_json(nullptr) : ordered_json(to_seconds(flagged->stamp - lost->stamp));
+}
+
+/// Returns the time from `begin`; null at the end of the pairs.
+ordered_json seconds_to(PairIterator pair, const std::vector<PosePair>& pairs, PairIterator begin) {
+  return pair == pairs.end() ? ordered_json(nullptr) : ordered_json(to_seconds(pair->stamp - begin->stamp));
 }
 
 std::string without_numbers(std::string_view line) {
@@ -92,6 +89,18 @@ std::vector<std::string> said(const std::filesystem::path& log, const ordered_js
 
 } // namespace
 
+ordered_json lost_after_s(const std::vector<PosePair>& pairs, double mounting_rad) {
+  return seconds_to(first_lost(pairs, mounting_rad), pairs, pairs.begin());
+}
+
+ordered_json loss_figures(const std::vector<PosePair>& pairs, std::span<const OdometryRow> rows, double mounting_rad) {
+  const auto lost = first_lost(pairs, mounting_rad);
+  const auto flagged =
+      std::find_if(lost, pairs.end(), [&](const PosePair& pair) { return rows[pair.estimate].flagged(); });
+  return {{"lost_after_s", seconds_to(lost, pairs, pairs.begin())},
+          {"flagged_after_s", seconds_to(flagged, pairs, lost)}};
+}
+
 ordered_json harsh_figures(const std::filesystem::path& run_folder, const CaptureFolder& capture,
                            const ordered_json& summary, double mounting_rad) {
   const auto [estimates, rows] = read_odometry(run_folder);
@@ -102,7 +111,7 @@ ordered_json harsh_figures(const std::filesystem::path& run_folder, const Captur
         tools::ExitStatus::failed,
         fmt::format("{}: has no estimate within the time of the truth; run again", run_folder.string()));
   ordered_json figures{{"standing", stands_at_first(pairs)}, {"true_mps", largest_speed_mps(pairs)}};
-  add_loss(pairs, rows, mounting_rad, figures);
+  figures.update(loss_figures(pairs, rows, mounting_rad));
   figures["said"] = said(run_folder / "log", summary);
   return figures;
 }

@@ -76,13 +76,6 @@ bool is_tried(const Drive& drive, const Imperfection& imperfection) {
   return imperfection.courses.empty() || std::ranges::count(imperfection.courses, drive.name) > 0;
 }
 
-/// Returns a file name: without blanks and commas.
-std::string file_name(std::string name) {
-  std::erase(name, ',');
-  std::ranges::replace(name, ' ', '_');
-  return name;
-}
-
 Options without(const HarshCase& harsh_case, Sensors sensors) {
   Options options;
   const auto lose = [&](const std::string& source) {
@@ -109,6 +102,12 @@ void add_runs(Plan& plan, const HarshCase& harsh_case, const std::string& course
 }
 
 } // namespace
+
+std::string file_name(std::string name) {
+  std::erase(name, ',');
+  std::ranges::replace(name, ' ', '_');
+  return name;
+}
 
 std::string name_of(Sensors sensors) {
   switch (sensors) {
@@ -163,6 +162,25 @@ std::vector<HarshCase> harsh_cases(const std::string& only) {
   return cases;
 }
 
+std::vector<HarshCase> named_harsh_cases(const std::string& only) {
+  std::vector<HarshCase> cases = harsh_cases(only);
+  if (cases.empty())
+    throw Failure(ExitStatus::wrong_usage,
+                  fmt::format("--only {}: no COURSE/IMPERFECTION holds that; there are plant/real, corridor/people, "
+                              "...; without it there are all",
+                              only));
+  return cases;
+}
+
+Course harsh_course(const Arguments& arguments, const HarshCase& harsh_case, int seed) {
+  const std::string name = harsh_case.course_name(seed);
+  Course course{name, arguments.output / "courses" / name, harsh_case.simulation};
+  course.simulation.insert(course.simulation.end(),
+                           {"--seed", std::to_string(seed), "--duration", std::to_string(arguments.duration_s)});
+  course.has_true_map = false;
+  return course;
+}
+
 std::string harsh_configuration(Sensors sensors, int start) {
   return file_name(fmt::format("{}_{}", name_of(sensors), start));
 }
@@ -172,23 +190,12 @@ Plan plan_of_harsh(const Arguments& arguments) {
     throw Failure(ExitStatus::wrong_usage,
                   fmt::format("--duration {}: a harsh course has to be longer than its drives of {} s",
                               arguments.duration_s, kHarshDrive_s));
-  const std::vector<HarshCase> cases = harsh_cases(arguments.only);
-  if (cases.empty())
-    throw Failure(
-        ExitStatus::wrong_usage,
-        fmt::format("--only {}: no COURSE/IMPERFECTION holds that; there are plant/real, corridor/people, ...; "
-                    "--harsh without it shows all",
-                    arguments.only));
+  const std::vector<HarshCase> cases = named_harsh_cases(arguments.only);
   Plan plan;
   for (int seed = 1; seed <= arguments.seeds; ++seed) {
     for (const HarshCase& harsh_case : cases) {
-      const std::string name = harsh_case.course_name(seed);
-      Course course{name, arguments.output / "courses" / name, harsh_case.simulation};
-      course.simulation.insert(course.simulation.end(),
-                               {"--seed", std::to_string(seed), "--duration", std::to_string(arguments.duration_s)});
-      course.has_true_map = false;
-      plan.courses.push_back(std::move(course));
-      add_runs(plan, harsh_case, name, arguments.duration_s);
+      plan.courses.push_back(harsh_course(arguments, harsh_case, seed));
+      add_runs(plan, harsh_case, plan.courses.back().name, arguments.duration_s);
     }
   }
   return plan;

@@ -48,6 +48,15 @@ struct HarshCase {
 /// Returns the cases whose COURSE/IMPERFECTION contains `only`; all if it is empty.
 std::vector<HarshCase> harsh_cases(const std::string& only);
 
+/// Returns these. Throws tools::Failure if `only` matches nothing.
+std::vector<HarshCase> named_harsh_cases(const std::string& only);
+
+/// Returns the course of a case, of the requested length.
+Course harsh_course(const Arguments& arguments, const HarshCase& harsh_case, int seed);
+
+/// Returns a file name: without blanks and commas.
+std::string file_name(std::string name);
+
 /// Returns the name of a run: sensors and start.
 std::string harsh_configuration(Sensors sensors, int start);
 

@@ -21,9 +21,9 @@ namespace {
 
 using Drives = std::vector<const Results*>;
 
-/// Criteria for every row: position errors within four standard deviations, no reported speed more than 1 m/s above the
-/// robot's largest, and a loss flagged within a second.
-constexpr double kMostSigmas = 4, kLeastNees = 3, kMostNees = 12, kMostTooFast_mps = 1, kFlaggedWithin_s = 1;
+/// Criteria for every row, beside kMostSigmas and kFlaggedWithin_s: no reported speed more than 1 m/s above the robot's
+/// largest.
+constexpr double kLeastNees = 3, kMostNees = 12, kMostTooFast_mps = 1;
 
 /// Limits on the error with these sensors: the median over the drives of the mean, and the largest of all.
 struct Asked {
@@ -156,9 +156,6 @@ std::optional<Results> row_of(const HarshCase& harsh_case, Sensors sensors, cons
   row["holds"] = row["broken"].empty();
   return row;
 }
-
-/// Formats three digits, whether millimetres or kilometres.
-std::string in_mm(double metres) { return fmt::format("{:.{}f}", 1e3 * metres, metres < 0.1 ? 1 : 0); }
 
 std::string said_in_words(const Results& said) {
   constexpr std::size_t kLongest = 90;

@@ -34,7 +34,7 @@ namespace locus::experiments {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Interval, from_s, until_s)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Run, course, configuration, options, paced_cpus, loam_features, watched,
-                                   mounting_rad, refusal, shows_recording)
+                                   mounting_rad, refusal, shows_recording, shows_subset)
 
 namespace {
 

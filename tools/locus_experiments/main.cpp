@@ -16,6 +16,7 @@
 #include "locus_experiments/loam_features.hpp"
 #include "locus_experiments/plan.hpp"
 #include "locus_experiments/results.hpp"
+#include "locus_experiments/subset_experiment.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/output_file.hpp"
 #include "locus_replay/replay_program.hpp"
@@ -25,6 +26,15 @@ namespace {
 
 using tools::ExitStatus;
 using tools::Failure;
+
+Results subsets_asked(const Arguments& arguments) {
+  Results subsets{{"starts", arguments.starts}};
+  if (arguments.recordings.empty())
+    subsets.update({{"seeds", arguments.seeds}, {"only", arguments.only}});
+  for (const std::filesystem::path& place : arguments.recordings)
+    subsets["places"].push_back(std::filesystem::absolute(place / "").parent_path().filename().string());
+  return subsets;
+}
 
 /// Returns the results before any run: the request.
 Results what_is_asked(const Arguments& arguments) {
@@ -37,6 +47,8 @@ Results what_is_asked(const Arguments& arguments) {
     asked["matrix"] = Results::object();
   if (arguments.harsh)
     asked["harsh"] = {{"seeds", arguments.seeds}, {"only", arguments.only}};
+  else if (arguments.subsets)
+    asked["subsets"] = subsets_asked(arguments);
   else if (arguments.recordings.empty())
     asked["realism"] = arguments.realism;
   return asked;
@@ -58,6 +70,10 @@ std::string failures_in(const Results& results) {
 }
 
 Results experiment(const Arguments& arguments) {
+  if (arguments.accuracy)
+    return accuracy_of(arguments);
+  if (arguments.subsets)
+    return results_of_subsets(arguments, what_is_asked(arguments));
   const Plan plan = make_plan(arguments);
   Results results = what_is_asked(arguments);
   results["runs"] = carry_out(plan, arguments);
@@ -72,7 +88,7 @@ void run(const Arguments& arguments) {
   if (before) // reports a mismatch before the hours of runs
     before->check_is_of(what_is_asked(arguments));
   tools::make_folder(arguments.output);
-  const Results results = arguments.accuracy ? accuracy_of(arguments) : experiment(arguments);
+  const Results results = experiment(arguments);
   const std::filesystem::path page = write_results(arguments.output, results);
   if (!arguments.quiet)
     fmt::print("results in {}\n", page.string());

@@ -15,6 +15,7 @@
 #include "locus_experiments/fault_figures.hpp"
 #include "locus_experiments/harsh_figures.hpp"
 #include "locus_experiments/job_control.hpp"
+#include "locus_experiments/subset_figures.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/quantiles.hpp"
 
@@ -90,6 +91,10 @@ ordered_json measurement(const Run& run, const std::filesystem::path& folder, co
     return recording_figures(run.course, folder, capture);
   ordered_json result{
       {"options", run.options}, {"machine", machine_name()}, {"summary", read_json(folder / "summary.json")}};
+  if (run.shows_subset) {
+    result["figures"] = subset_figures(folder, capture, run.mounting_rad.value_or(0));
+    return result;
+  }
   const CaptureFolder files = value_or_fail(CaptureFolder::find(capture), ExitStatus::failed);
   if (run.mounting_rad)
     result["harsh"] = harsh_figures(folder, files, result["summary"], *run.mounting_rad);

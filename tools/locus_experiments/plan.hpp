@@ -31,11 +31,12 @@ struct Run {
   int paced_cpus = 0;               ///< at the pace of the recording on this many processors; 0: as fast as possible
   bool loam_features = false;       ///< LOAM's points instead of the filters
   std::optional<Interval> watched = {}; ///< interval measured for the table of faults
-  /// Mounting error of the lidars relative to config.yaml, for a drive of the harsh table. The files of such a drive
-  /// are deleted.
+  /// Mounting error of the lidars relative to config.yaml, for a drive of the harsh table or of that of subsets. The
+  /// files of such a drive are deleted.
   std::optional<double> mounting_rad = {};
   std::string refusal = {};     ///< expected refusal by locus-replay; empty: it has to run
   bool shows_recording = false; ///< for the page of recordings: measures recording_figures()
+  bool shows_subset = false;    ///< for the table of subsets: measures subset_figures()
 
   [[nodiscard]] std::string id() const { return course + '/' + configuration; }
 };

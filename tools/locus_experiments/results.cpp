@@ -11,6 +11,7 @@
 #include "locus_experiments/fault_table.hpp"
 #include "locus_experiments/harsh_table.hpp"
 #include "locus_experiments/matrix_table.hpp"
+#include "locus_experiments/subset_table.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/output_file.hpp"
 #include "pages/data_page.hpp"
@@ -103,6 +104,8 @@ std::filesystem::path write_results(const std::filesystem::path& folder, const R
     return write_table(folder / "matrix.md", matrix_table(results));
   if (results.contains("harsh"))
     return write_table(folder / "harsh.md", harsh_table(results));
+  if (results.contains("subsets"))
+    return write_table(folder / "subsets.md", subset_table(results));
   std::filesystem::path page = folder / "experiments.html";
   tools::write_data_page(page, {locus_experiments_page_begin, locus_experiments_page_end}, results);
   return page;

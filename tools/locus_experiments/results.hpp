@@ -13,7 +13,8 @@ namespace locus::experiments {
 /// measurement(), or its course and configuration with "failed", the reason for its absence. With --faults "faults"
 /// replaces "robustness": {"seeds", "consistency_runs", "rows": [...], "consistency"}, of judge_faults(); with
 /// --fault-matrix "matrix": {"cells": [...]}, of judge_matrix(); with --harsh "harsh": {"seeds", "only", "rows":
-/// [...]}, of judge_harsh(). A run that was refused as expected has "refused", the message of locus-replay. With
+/// [...]}, of judge_harsh(); with --subsets "subsets": {"seeds", "starts", "only" or "places", "without_truth", "rows":
+/// [...]}, of judge_subsets(). A run that was refused as expected has "refused", the message of locus-replay. With
 /// --accuracy it holds the results of accuracy_of().
 using Results = nlohmann::ordered_json;
 
@@ -29,8 +30,8 @@ void judge_robustness(Results& results);
 /// Evaluates the runs by judge_robustness(), judge_faults(), judge_matrix() or judge_harsh().
 void judge(Results& results);
 
-/// Writes results.json and experiments.html, faults.md, matrix.md, harsh.md or accuracy.md, and returns the path of the
-/// latter. Throws tools::Failure.
+/// Writes results.json and experiments.html, faults.md, matrix.md, harsh.md, subsets.md or accuracy.md, and returns the
+/// path of the latter. Throws tools::Failure.
 std::filesystem::path write_results(const std::filesystem::path& folder, const Results& results);
 
 } // namespace locus::experiments

@@ -87,7 +87,7 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   app.add_option("--fail", faults,
                  "Injects a fault, NAME:KIND[=VALUE]@T[-T1], e.g. all-lidars:lost@10-20; may be repeated. NAME: a "
                  "lidar, a motion source or all-lidars. KIND: lost, frozen, jump, nan, late, covariance, clock-step, "
-                 "packet-loss, reorder, duplicate, corrupt. T: seconds from the start of the capture")
+                 "packet-loss, reorder, duplicate, view, corrupt. T: seconds from the start of the capture")
       ->type_name("SPEC")
       ->allow_extra_args(false);
   auto* realtime = app.add_flag("--realtime{1}", speed,
