@@ -1,13 +1,13 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
 # dds-security.sh FOLDER DOMAIN: certificates, governance and permissions (DDS Security) for a robot with locusd, in that
-# DDS domain, valid for two years. Makes in FOLDER an enclave, as ROS 2 lays them out, for each who takes part:
-#   locusd   publishes odometry, state, clouds, /tf, /diagnostics, itself as a node; hears the inputs. For dds.security in
-#            locusd.yaml
-#   sensors  publishes the inputs, hears nothing
-#   viewer   hears everything, publishes nothing
-# FOLDER/ca holds the key that vouches for them all: take it off the robot. INPUTS in the environment names the topics
-# of motion_sources, health and flat ground, if they are others than those of the shipped locusd.yaml.
+# DDS domain, valid for two years. Makes in FOLDER an enclave in the layout of ROS 2 for each participant:
+#   locusd   publishes odometry, state, clouds, /tf, /diagnostics, itself as a node; subscribes to the inputs. For
+#            dds.security in locusd.yaml
+#   sensors  publishes the inputs, subscribes to nothing
+#   viewer   subscribes to everything, publishes nothing
+# FOLDER/ca holds the key that signs all of them: do not leave it on the robot. INPUTS in the environment lists the
+# topics of motion_sources, health and flat ground, if they differ from those of the shipped locusd.yaml.
 set -eu
 [ $# -eq 2 ] || { echo "usage: dds-security.sh FOLDER DOMAIN" >&2; exit 2; }
 command -v openssl >/dev/null || { echo "dds-security.sh: needs openssl: sudo apt install openssl" >&2; exit 1; }
@@ -21,7 +21,7 @@ cd "$folder"
 
 new_key() { openssl genpkey -quiet -algorithm EC -pkeyopt ec_paramgen_curve:P-256 -out "$1"; }
 sign() { openssl smime -sign -text -in "$1" -out "$2" -signer ca/cert.pem -inkey ca/key.pem; }
-topics() { for topic; do echo "          <topic>$topic</topic>" | sed 's,>/,>rt/,'; done; } # as ROS 2 calls them in DDS
+topics() { for topic; do echo "          <topic>$topic</topic>" | sed 's,>/,>rt/,'; done; } # the names that ROS 2 uses in DDS
 allow() { # publish|subscribe TOPIC...
   way=$1
   shift

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prints where the robot was, as TUM has it (t x y z qx qy qz qw), and what was seen on the way.
+// Prints the trajectory of the robot in TUM format (t x y z qx qy qz qw), and the size of the map.
 //   g++ -std=c++20 replay.cpp -o replay $(pkg-config --cflags --libs liblocus) && ./replay drive.pcap
 #include <cmath>
 #include <cstdio>

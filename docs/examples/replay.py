@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Prints where the robot was, as TUM has it (t x y z qx qy qz qw), and what was seen on the way.
+"""Prints the trajectory of the robot in TUM format (t x y z qx qy qz qw), and the size of the map.
 
 python3 replay.py drive.pcap
 """

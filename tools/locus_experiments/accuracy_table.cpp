@@ -163,8 +163,8 @@ std::string kitti_note(const Results& results) {
   if (drives.empty())
     return "";
   return fmt::format(
-      "Of drives of KITTI the vertical angles are too small in the files, and {} degrees are added to them, as is done "
-      "for the figures that others publish. Those are means over sequences 11 to 21 of KITTI's odometry benchmark, "
+      "The vertical angles in the files of KITTI's drives are too small; {} degrees are added to them, as in other "
+      "published figures. Those are means over sequences 11 to 21 of KITTI's odometry benchmark, "
       "over "
       "100 to 800 m, lidar alone: LOAM 0.55 %, CT-ICP 0.59 %, IMLS-SLAM 0.69 % "
       "(https://www.cvlibs.net/datasets/kitti/eval_odometry.php). Their sweeps come corrected for the motion; those of "
@@ -194,29 +194,26 @@ std::string command_of(const Results& results) {
 std::string introduction(const Results& results) {
   return fmt::format(
       "# What recordings show\n\n"
-      "`{}`, version {}, {}. Recordings found: {}. Each is taken at its word: whether it is of a robot or of a "
-      "simulator, only who made it knows. It is replayed with all motion sources that it has, with its IMU, "
-      "and with lidar alone, as far as these differ. Times are those of one thread, {} runs at a time, from the cut of "
-      "a "
-      "sweep to its estimate: the median and what 99 % stay below, by the clock, which is worth no more than the "
-      "machine was quiet, and of a processor.\n\n",
+      "`{}`, version {}, {}. Recordings found: {}; a recording does not show whether it is of a robot or of a "
+      "simulator. Each is replayed with all its motion sources, with its IMU, and with lidar alone, as far as these "
+      "differ. Times are those of one thread, {} runs at a time, from the cut of a sweep to its estimate: median and "
+      "99th percentile, in real time, which includes other load on the machine, and in processor time.\n\n",
       command_of(results), results.at("version").get<std::string>(), results.at("machine").get<std::string>(),
       results.at("recordings").size() - results.at("simulated").get<std::size_t>(), results.at("jobs").get<int>());
 }
 
 constexpr const char* kHowToReadTruth =
     "The error is that of the position, after alignment. *Over 10 m* is the mean error over all stretches of that "
-    "length, *over 100 to 800 m* the same as KITTI's benchmark has it. *End* is how far the last pose is off where the "
-    "first poses are aligned, in metres and of the way. *Worst sigma* is the largest error of a position in standard "
-    "deviations that its covariance states; errors below a centimetre count as none. A run holds if no position, the "
-    "last one included, is off by more than 1 % of the way (3 cm are always allowed, the range error of such lidars by "
-    "their data sheets) or by more than 3 sigma, and no sweep failed.\n\n";
+    "length, *over 100 to 800 m* the same by the method of KITTI's benchmark. *End* is the error of the last pose with "
+    "the first poses aligned, in metres and relative to the distance. *Worst sigma* is the largest error of a position "
+    "in standard deviations of its stated covariance; errors below a centimetre are ignored. A run holds if no "
+    "position, the last one included, is off by more than 1 % of the distance (3 cm are always allowed, the range "
+    "error of such lidars by their data sheets) or by more than 3 sigma, and no sweep failed.\n\n";
 
 constexpr const char* kHowToReadClaims =
-    "Nobody says where these were, so what the odometry claims is shown, and the reader judges: what stands must stay "
-    "where it is. *By GPS* is what a receiver at the lidar said meanwhile, in its position packets, often of the "
-    "second "
-    "before; a speed is that from pose to pose.\n\n";
+    "There is no truth for these, so the table shows the estimate for the reader to judge: a standing robot must stay "
+    "at its pose. *By GPS* is the speed reported by a receiver at the lidar, in its position packets, often of the "
+    "second before; the speed of the estimate is that from pose to pose.\n\n";
 
 } // namespace
 
