@@ -9,8 +9,8 @@ Vector6 corrected_twist(const Sweep& sweep) {
   const CorrectedPath& path = sweep.path;
   if (path.count < 2)
     return Vector6::Zero();
-  const CorrectedPath::Place &first = path.places[0], &last = path.places[path.count - 1];
-  return se3_log(first.T_start_base.inverse() * last.T_start_base) / to_seconds(last.stamp - first.stamp);
+  const CorrectedPath::Place& last = path.places[path.count - 1];
+  return se3_log(last.T_start_base) / to_seconds(last.stamp - sweep.start);
 }
 
 SweepCorrection SweepCorrection::anew(const Sweep& sweep, const Vector6& twist_base) {

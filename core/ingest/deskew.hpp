@@ -12,7 +12,8 @@
 
 namespace locus {
 
-/// Returns the mean twist (m/s, rad/s) that the points of a sweep were corrected for; zero if they were not.
+/// Returns the mean twist (m/s, rad/s), over the whole sweep, of the motion that its points were corrected for; zero if
+/// they were not. Packets may cover a part of the sweep only.
 Vector6 corrected_twist(const Sweep& sweep);
 
 /// Second de-skew of one sweep: moves its points from their positions as received to their positions at the end of the

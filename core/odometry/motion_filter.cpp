@@ -410,6 +410,8 @@ void MotionFilter::measure(SourceId id, const SensedTwist& sensed, Measured what
   source.sensed = sensed;
   source.variance.setZero();
   source.used = true;
+  if (what.slips && source.slip) // wheels may spin on the spot, or be blocked while the robot slides
+    P_(*source.slip, *source.slip) += square(std::max(std::abs(twist_base[0]), std::abs(twist_base_[0])));
   for (int axis = what.translation ? 0 : 3; axis < (what.rotation ? 6 : 3); ++axis) {
     const auto [h, expected] = row(source, sensed, axis);
     double variance = source.noise_per_s[axis] / elapsed_s_ + source.known_variance[axis];
@@ -520,14 +522,14 @@ void MotionFilter::see(const Pose& T_odom_base, const Vector6& twist_base, const
 
 void MotionFilter::keep_floor() { P_.diagonal().head<6>() = P_.diagonal().head<6>().cwiseMax(kFloor); }
 
-Innovation MotionFilter::innovation(SourceId id, const SensedTwist& sensed) const {
+Innovation MotionFilter::innovation(SourceId id, const SensedTwist& sensed, bool excused) const {
   const Source& source = sources_[index_of(id)];
   const Vector6& twist_base = sensed.mean;
   const Vector6 known = source.used ? source.known_variance : known_variance(source, twist_base);
   Innovation found;
   for (int axis = source.kind == SourceKind::imu ? 3 : 0; axis < 6; ++axis) {
     auto [h, expected] = row(source, sensed, axis);
-    if (axis == 0) { // a slip is part of the innovation
+    if (axis == 0 && !excused) {
       h[*source.slip] = 0.0;
       expected -= x_[*source.slip];
     }
@@ -543,6 +545,8 @@ Innovation MotionFilter::innovation(SourceId id, const SensedTwist& sensed) cons
   }
   return found;
 }
+
+double MotionFilter::odds_against_slip() const { return -2.0 * std::log(kSlips_per_s * elapsed_s_); }
 
 void MotionFilter::learn() {
   for (Source& source : std::span(sources_).first(count_))

@@ -83,6 +83,7 @@ class MotionFilter {
   /// because a robot may brake harder than ever before.
   struct Measured {
     bool translation = false, rotation = false;
+    bool slips = false; ///< a slip of the odometry begins: its forward speed is unknown until lidar measures it
   };
 
   explicit MotionFilter(const std::vector<MotionSourceOptions>& sources, const MotionLimits& limits = {});
@@ -120,8 +121,12 @@ class MotionFilter {
   /// Compares each measured source with all others, and learns its noise.
   void learn();
 
-  /// Returns the innovation of a source, measured or not. Call after see().
-  [[nodiscard]] Innovation innovation(SourceId id, const SensedTwist& sensed) const;
+  /// Returns the innovation of a source, measured or not. Call after see(). A slip that the filter estimates is part of
+  /// the innovation, unless it is `excused`.
+  [[nodiscard]] Innovation innovation(SourceId id, const SensedTwist& sensed, bool excused = false) const;
+
+  /// Returns the prior odds, as twice their logarithm, that no slip begins in this sweep. Call after predict().
+  [[nodiscard]] double odds_against_slip() const;
 
   /// Transfers `share` of the pose error, along each axis, to the error of the map. Call after a keyframe is inserted.
   void keep(const Matrix6& share);

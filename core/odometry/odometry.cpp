@@ -167,15 +167,8 @@ Vector6 Odometry::unlike_mean(const Sweep& sweep) const {
 }
 
 /// Returns the hypothesis after the update with the sources, before registration.
-Odometry::Hypothesis Odometry::assume(const Sweep& sweep, std::bitset<kMaxSources> without, bool rests) const {
-  Hypothesis hypothesis{.without = without,
-                        .rests = rests,
-                        .placed = false,
-                        .choice = {},
-                        .filter = filter_,
-                        .scan_to_scan = {},
-                        .fit = {}};
-  hypothesis.choice = choose_among(sweep, without);
+Odometry::Hypothesis Odometry::assume(const Sweep& sweep, const Assumption& assumption) const {
+  Hypothesis hypothesis{assumption, choose_among(sweep, assumption.without), false, filter_, {}, {}};
   tell(hypothesis.filter, sweep, hypothesis);
   return hypothesis;
 }
@@ -193,9 +186,10 @@ void Odometry::tell(MotionFilter& filter, const Sweep& sweep, const Hypothesis& 
                  {.translation = free || translation, .rotation = free || rotation}, sensed_rate);
   if (rotation)
     filter.measure(*rotation, *steps_.twist_base(sweep, *rotation),
-                   {.translation = translation == rotation, .rotation = true});
+                   {.translation = translation == rotation, .rotation = true, .slips = hypothesis.slips});
   if (translation && translation != rotation)
-    filter.measure(*translation, *steps_.twist_base(sweep, *translation), {.translation = true, .rotation = false});
+    filter.measure(*translation, *steps_.twist_base(sweep, *translation),
+                   {.translation = true, .rotation = false, .slips = hypothesis.slips});
   if (hypothesis.rests)
     filter.rest();
   if (!rotation && !translation && options_.no_source_prior == NoSourcePrior::identity)
@@ -287,17 +281,17 @@ double Odometry::odds_of_sources(const Sweep& sweep, std::bitset<kMaxSources> wi
   return kSourceIsRight * sources;
 }
 
-Odometry::Hypothesis Odometry::attempt(const Sweep& sweep, std::bitset<kMaxSources> without, bool rests,
+Odometry::Hypothesis Odometry::attempt(const Sweep& sweep, const Assumption& assumption,
                                        const Gicp::StopRequested& stop) {
-  Hypothesis hypothesis = assume(sweep, without, rests);
+  Hypothesis hypothesis = assume(sweep, assumption);
   register_with(sweep, hypothesis, stop);
   return hypothesis;
 }
 
-/// Compares the hypotheses that one source is wrong, or all are, with the one that none is: by the likelihood of the
-/// points, of the motion they imply, and the prior odds of faults. Tries them only if a source contradicts the others
-/// or the fit is unusually bad. Returns the registration without sources if it fits better but the faults it assumes
-/// are too unlikely.
+/// Compares the hypotheses that a slip begins, that one source is wrong, or all are, with the one that none is: by the
+/// likelihood of the points, of the motion they imply, and the prior odds of faults. Tries them only if a source
+/// contradicts the others or the fit is unusually bad. Returns the registration without sources if it fits better but
+/// the faults it assumes are too unlikely.
 std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Hypothesis& best,
                                                       const Gicp::StopRequested& stop) {
   const auto contradiction = worst_source(sweep, best);
@@ -307,26 +301,31 @@ std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Hypoth
   const auto gained = [&](const Hypothesis& other) {
     return evidence(other.fit, best.fit) + best.filter.surprise(best.fit) - other.filter.surprise(other.fit);
   };
-  const auto odds_against = [&](const Hypothesis& other) {
-    return odds_of_sources(sweep, best.without) - odds_of_sources(sweep, other.without);
+  const auto odds = [&](const Hypothesis& hypothesis) {
+    return odds_of_sources(sweep, hypothesis.without) -
+           (hypothesis.slips ? hypothesis.filter.odds_against_slip() : 0.0);
   };
+  const auto odds_against = [&](const Hypothesis& other) { return odds(best) - odds(other); };
+  if (contradiction && best.choice.translation && index_of(*best.choice.translation) == contradiction->source)
+    if (Hypothesis other = attempt(sweep, {.slips = true}, stop); gained(other) > odds_against(other))
+      best = other;
   std::array<std::optional<SourceId>, 2> suspects{best.choice.translation, best.choice.rotation};
   if (suspects[0] == suspects[1])
     suspects[1].reset();
   if (contradiction && suspects[1] && index_of(*suspects[1]) == contradiction->source)
     std::swap(suspects[0], suspects[1]);
   for (const std::optional<SourceId>& suspect : suspects) {
-    const bool is_explained = best.without.any() && !is_unusual();
+    const bool is_explained = (best.slips || best.without.any()) && !is_unusual();
     if (!suspect || is_explained || stop())
       continue;
-    std::bitset<kMaxSources> without;
-    without.set(index_of(*suspect));
-    if (Hypothesis other = attempt(sweep, without, false, stop); gained(other) > odds_against(other))
+    Assumption assumption;
+    assumption.without.set(index_of(*suspect));
+    if (Hypothesis other = attempt(sweep, assumption, stop); gained(other) > odds_against(other))
       best = other;
   }
   if (!is_unusual() || stop() || !(suspects[0] || suspects[1]))
     return std::nullopt;
-  Hypothesis free = attempt(sweep, kAllSources, false, stop);
+  Hypothesis free = attempt(sweep, {.without = kAllSources}, stop);
   const double gain = gained(free);
   if (gain > odds_against(free))
     best = free;
@@ -337,7 +336,7 @@ std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Hypoth
 
 /// Returns the likeliest hypothesis for a sweep.
 Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopRequested& stop) {
-  Hypothesis best = attempt(sweep, {}, false, stop);
+  Hypothesis best = attempt(sweep, {}, stop);
   gravity_.observe(filter_.pose().rotation.conjugate() * best.filter.pose().rotation, sweep);
   flat_ground_.observe(sweep.end, gravity_.up_base());
   if (sweep.points.size() < kMinPoints)
@@ -355,7 +354,7 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
   if (!slow)
     slow_since_ = sweep.end;
   if (may_rest && (stands_ || sweep.end - slow_since_ >= kSlowFor)) {
-    if (Hypothesis rest = attempt(sweep, best.without, true, stop);
+    if (Hypothesis rest = attempt(sweep, {.without = best.without, .rests = true}, stop);
         fit_of(rest.fit) > kAsGoodAtRest * fit_of(best.fit)) {
       rest.filter.put(filter_.pose());
       best = rest;
@@ -379,7 +378,7 @@ void Odometry::move_points(const Sweep& sweep, const SweepCorrection& correction
   correction_.apply(sweep.points, scan_);
 }
 
-/// Returns the source that contradicts all others most, if any.
+/// Returns the source that contradicts all others most, if any: one whose innovation is less likely than its fault.
 std::optional<Odometry::Contradiction> Odometry::worst_source(const Sweep& sweep, const Hypothesis& hypothesis) const {
   MotionFilter after = hypothesis.filter;
   after.see(hypothesis.fit.T_target_source, hypothesis.fit.twist_base, hypothesis.fit.information);
@@ -387,10 +386,16 @@ std::optional<Odometry::Contradiction> Odometry::worst_source(const Sweep& sweep
   for (const auto& source : {hypothesis.choice.rotation, hypothesis.choice.translation}) {
     if (!source)
       continue;
-    const Innovation found = after.innovation(*source, *steps_.twist_base(sweep, *source));
-    const double ratio = test_ratio(found, steps_.elapsed_s(sweep)).value_or(0.0);
-    if (ratio > (worst ? worst->test_ratio : 1.0))
-      worst = {index_of(*source), ratio};
+    const Innovation found = after.innovation(*source, *steps_.twist_base(sweep, *source), true);
+    const bool is_odometry = sources_[index_of(*source)].kind == SourceKind::odometry;
+    const double fault = is_odometry ? after.odds_against_slip() : kSourceIsRight;
+    for (int axis = 0; axis < 6; ++axis) {
+      if (found.variance[axis] <= 0.0)
+        continue;
+      const double surprise = found.value[axis] * found.value[axis] / found.variance[axis] / fault;
+      if (surprise > (worst ? worst->surprise : 1.0))
+        worst = {index_of(*source), surprise};
+    }
   }
   return worst;
 }

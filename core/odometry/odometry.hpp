@@ -82,12 +82,17 @@ class Odometry {
   /// the robot stands during its first two sweeps.
   static constexpr double kSourceIsRight = 13.8, kBeginsAtRest = 20.0;
 
+  /// An assumption on the motion during a sweep and on the sources that measure it.
+  struct Assumption {
+    std::bitset<kMaxSources> without{}; ///< excluded sources
+    bool rests = false;                 ///< the robot stands
+    bool slips = false;                 ///< a slip of the odometry begins
+  };
+
   /// A motion hypothesis for one sweep, and its registration.
-  struct Hypothesis {
-    std::bitset<kMaxSources> without; ///< excluded sources
-    bool rests = false;
-    bool placed = false; ///< the registration is accepted
+  struct Hypothesis : Assumption {
     SourceChoice choice;
+    bool placed = false; ///< the registration is accepted
     MotionFilter filter; ///< before the update with lidar
     Registration scan_to_scan, fit;
   };
@@ -95,7 +100,7 @@ class Odometry {
   /// A source that contradicts all others.
   struct Contradiction {
     std::size_t source = 0;
-    double test_ratio = 0.0;
+    double surprise = 0.0; ///< largest squared innovation of an axis, in units of the odds of a fault
   };
 
   /// A hypothesis for the motion between the first two sweeps.
@@ -116,14 +121,14 @@ class Odometry {
                                     const Gicp::StopRequested& stop);
   [[nodiscard]] SourceChoice choose_among(const Sweep& sweep, std::bitset<kMaxSources> without) const;
   [[nodiscard]] Vector6 unlike_mean(const Sweep& sweep) const;
-  [[nodiscard]] Hypothesis assume(const Sweep& sweep, std::bitset<kMaxSources> without, bool rests) const;
+  [[nodiscard]] Hypothesis assume(const Sweep& sweep, const Assumption& assumption) const;
   void match_last(const Sweep& sweep, const MotionBelief& belief, Hypothesis& hypothesis,
                   const Gicp::StopRequested& stop);
   void register_with(const Sweep& sweep, Hypothesis& hypothesis, const Gicp::StopRequested& stop);
   [[nodiscard]] static std::optional<SpecificForce> force_of(const Sweep& sweep, std::bitset<kMaxSources> without);
   [[nodiscard]] double odds_of_sources(const Sweep& sweep, std::bitset<kMaxSources> without) const;
   std::optional<Registration> consider_faults(const Sweep& sweep, Hypothesis& best, const Gicp::StopRequested& stop);
-  Hypothesis attempt(const Sweep& sweep, std::bitset<kMaxSources> without, bool rests, const Gicp::StopRequested& stop);
+  Hypothesis attempt(const Sweep& sweep, const Assumption& assumption, const Gicp::StopRequested& stop);
   Hypothesis choose(const Sweep& sweep, const Gicp::StopRequested& stop);
   void tell(MotionFilter& filter, const Sweep& sweep, const Hypothesis& hypothesis) const;
   void observe(const Sweep& sweep, const Hypothesis& best);

@@ -14,6 +14,7 @@
 namespace locus::test {
 namespace {
 
+using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 constexpr Duration kDrive = seconds{8};
@@ -74,6 +75,26 @@ TEST(MotionCorrection, IsTakenBackWhereTheGyroWasWrong) {
     EXPECT_LT(left_m, 0.02F) << "sweep " << i;
     EXPECT_LT(left_rad, 0.05F) << "sweep " << i;
   }
+}
+
+/// A lidar that sees a quarter of the turn, on a robot that turns only while it looks.
+TEST(MotionCorrection, MeanTwistIsThatOfTheWholeSweepIfPointsComeFromItsEnd) {
+  constexpr double kTurn_rad = 0.05;
+  Sweep sweep;
+  sweep.start = Stamp{seconds{5}};
+  sweep.end = sweep.start + milliseconds{100};
+  const auto turned = [](double yaw_rad) { return Pose{so3_exp({0, 0, yaw_rad}), Eigen::Vector3d::Zero()}; };
+  sweep.path.places[sweep.path.count++] = {sweep.start + milliseconds{75}, turned(0.0)};
+  sweep.path.places[sweep.path.count++] = {sweep.end, turned(kTurn_rad)};
+  sweep.points = {{{10, 0, 0}, Eigen::Vector3f::UnitX(), 0.025F, 0, 0},
+                  {{0, 10, 0}, Eigen::Vector3f::UnitY(), 0, 0, 0}};
+  const Vector6 mean = corrected_twist(sweep);
+  EXPECT_NEAR(mean[5], kTurn_rad / 0.1, 1e-9);
+  EXPECT_LT(mean.head<5>().norm(), 1e-9);
+  std::vector<SurfacePoint> scan;
+  SweepCorrection::all(sweep, mean).apply(sweep.points, scan);
+  for (std::size_t i = 0; i < scan.size(); ++i)
+    EXPECT_LT((scan[i].position_m - sweep.points[i].position_base_m).norm(), 1e-4F) << "no motion is left to correct";
 }
 
 TEST(MotionCorrection, BringsEveryPointOfARoomToItsSurface) {

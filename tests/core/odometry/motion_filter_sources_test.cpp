@@ -289,6 +289,40 @@ TEST(MotionFilter, ASourceThatComesBackIsAsLateAsItWas) {
   EXPECT_GT(after.lateness_s().sigma, 10.0 * before.lateness_s().sigma) << "and it may have changed";
 }
 
+/// Wheels that begin to spin while the robot turns: their speed is open until lidar measures it, their turn is not.
+TEST(MotionFilter, BeginningSlipLeavesOpenTheSpeedAloneAndLastsUntilItIsMeasured) {
+  constexpr double kElapsed_s = 0.1, kSpeed_mps = 1.0, kTurn_radps = 0.3;
+  GaussianRobot robot(straight(kSpeed_mps), {}, 1);
+  MotionFilter filter = begun_with(robot, straight(kSpeed_mps));
+  while (robot.t_s() < 20.0)
+    sweep(filter, robot, kElapsed_s, {.lidar = usual_lidar(kElapsed_s)});
+  constexpr double kReading_mps = 1.8;
+  const SensedTwist reading(twist_of(kReading_mps, 0, 0, 0, 0, kTurn_radps));
+  const auto predict = [&](bool slips) {
+    MotionFilter after = filter;
+    after.predict(kElapsed_s, kElapsed_s, std::nullopt, kAll);
+    after.measure(kWheelSource, reading, {.translation = true, .rotation = true, .slips = slips});
+    after.move();
+    return after;
+  };
+  EXPECT_GT(predict(false).twist_base()[kX], 1.3) << "else the test proves nothing";
+  const MotionFilter open = predict(true);
+  MotionFilter unmeasured = filter;
+  unmeasured.predict(kElapsed_s, kElapsed_s, std::nullopt, kAll);
+  const double predicted_mps = unmeasured.twist_base()[kX], variance = unmeasured.covariance()(6 + kX, 6 + kX);
+  const double weight = variance / (variance + kReading_mps * kReading_mps);
+  EXPECT_NEAR(open.twist_base()[kX], predicted_mps + weight * (kReading_mps - predicted_mps), 0.02);
+  EXPECT_NEAR(open.twist_base()[kYaw], kTurn_radps, 0.03);
+  EXPECT_GT(std::sqrt(open.covariance()(6 + kX, 6 + kX)), 0.3);
+
+  filter = open;
+  const Vector6 twist = twist_of(kSpeed_mps, 0, 0, 0, 0, kTurn_radps);
+  const Pose T_odom_base =
+      open.pose() * se3_exp(kElapsed_s * open.twist_base()).inverse() * se3_exp(kElapsed_s * twist);
+  filter.see(T_odom_base, twist, usual_lidar(kElapsed_s));
+  EXPECT_NEAR(predict(false).twist_base()[kX], kSpeed_mps, 0.1) << "the slip goes on";
+}
+
 /// Returns the largest forward error that one second of wheel spin causes.
 double dragged_m(double rate_hz, unsigned seed, const Matrix12& lidar) {
   const auto spin = [](double t_s) { return t_s > 20.0 && t_s < 21.0 ? 0.6 : 0.0; };

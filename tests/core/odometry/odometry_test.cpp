@@ -39,6 +39,13 @@ RobotSetup robot_with_lidar_alone() {
   return setup;
 }
 
+/// Wheels that slip in bursts, as on a wet floor, by up to twice the true speed; nothing else but lidar.
+RobotSetup robot_with_slipping_wheels() {
+  RobotSetup setup = robot_with_lidar_alone();
+  setup.wheels = sim::OdometryFaults{.scale_error = 0.005, .slip_bursts_per_min = 20.0};
+  return setup;
+}
+
 /// 30 m along x, a half turn at 2 rad/s, and back.
 sim::Trajectory sixty_metres(const sim::Start& start) {
   sim::Course course;
@@ -241,6 +248,14 @@ TEST(Odometry, TenSecondsWithoutLidarAreBridgedByWheelOdometry) {
   EXPECT_NEAR(static_cast<double>(dead_reckoning), 100.0, 3.0);
   EXPECT_LT(result.worst_error_m, 0.005 * 22 + 0.05) << "half a percent of slip";
   expect_sound(result.estimates);
+}
+
+TEST(Odometry, WheelsThatSlipDoNotDragTheEstimateAlong) {
+  const sim::Trajectory trajectory(sim::plant_course(seconds{60}, 1.0), sim::plant_start());
+  const auto drive_with = [&](const RobotSetup& setup) {
+    return drive_through(sim::plant(), trajectory, setup, seconds{60}).worst_error_m;
+  };
+  EXPECT_LT(drive_with(robot_with_slipping_wheels()), 1.2 * drive_with(robot_with_lidar_alone()));
 }
 
 TEST(Odometry, AlongABareCorridorTheWheelsCarryOnAndTheDoubtGrows) {
