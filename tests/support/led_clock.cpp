@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cinttypes>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <string_view>
@@ -128,12 +130,22 @@ void take_over() {
   led->is_led.store(1, std::memory_order_release);
 }
 
+/// Waits until the service has processed everything sent; ends the player if it does not in two minutes.
 void wait_for_the_service() {
   static auto* const kSleep = next<int(const timespec*, timespec*)>("nanosleep");
   constexpr timespec kLook{0, 20'000};
+  const std::int64_t give_up_ns = system_ns(CLOCK_MONOTONIC) + 120 * kSecond;
   while (led->datagrams.load(std::memory_order_acquire) < sent_datagrams ||
-         led->motion.load(std::memory_order_acquire) < sent_motion)
+         led->motion.load(std::memory_order_acquire) < sent_motion) {
+    if (system_ns(CLOCK_MONOTONIC) > give_up_ns) {
+      std::fprintf(stderr,
+                   "led_clock: the service has processed %" PRIu64 " of %" PRIu64 " datagrams and %" PRIu64
+                   " of %" PRIu64 " motion samples\n",
+                   led->datagrams.load(), sent_datagrams, led->motion.load(), sent_motion);
+      _exit(EXIT_FAILURE);
+    }
     kSleep(&kLook, nullptr);
+  }
 }
 
 /// Waits while the test holds the time.
@@ -207,6 +219,15 @@ std::int32_t dds_write(std::int32_t writer, const void* data) {
   const std::int32_t result = kNext(writer, data);
   sent_motion += leads && result == 0 ? 1U : 0U;
   return result;
+}
+
+/// Intercepts the end of the player's writers: a subscriber whose threads receive the samples last, after the end of
+/// their writer, drops them.
+std::int32_t dds_delete(std::int32_t entity) {
+  static auto* const kNext = next<std::int32_t(std::int32_t)>("dds_delete");
+  if (leads && led->is_led.load() != 0)
+    wait_for_the_service();
+  return kNext(entity);
 }
 
 int recvmmsg(int socket, mmsghdr* messages, unsigned count, int flags, timespec* timeout) {
