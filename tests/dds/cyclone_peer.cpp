@@ -39,10 +39,11 @@ void say(const ros::DiagnosticArray& m, const char* topic) {
 }
 
 void listen(const DdsNode& node, const std::string& prefix) {
-  DdsReader<ros::Odometry> odometry{node, prefix + "/odometry", TopicQos::standard()};
-  DdsReader<ros::Odometry> fast{node, prefix + "/odometry_fast", TopicQos::standard()};
-  DdsReader<ros::UInt8> state{node, prefix + "/state", TopicQos::standard()};
-  DdsReader<ros::TFMessage> tf{node, "/tf", TopicQos::transform()};
+  constexpr TopicQos kAll{.reliable = true, .depth = 10'000}; // no sample is lost while this process waits for a core
+  DdsReader<ros::Odometry> odometry{node, prefix + "/odometry", kAll};
+  DdsReader<ros::Odometry> fast{node, prefix + "/odometry_fast", kAll};
+  DdsReader<ros::UInt8> state{node, prefix + "/state", kAll};
+  DdsReader<ros::TFMessage> tf{node, "/tf", kAll};
   DdsReader<ros::PointCloud2> cloud{node, prefix + "/cloud", TopicQos::standard()}; // QoS as requested by rviz2
   DdsReader<ros::PointCloud2> map{node, prefix + "/map", TopicQos::latch()};
   DdsReader<ros::DiagnosticArray> diagnostics{node, "/diagnostics", TopicQos::standard()};

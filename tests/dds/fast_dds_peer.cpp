@@ -137,7 +137,7 @@ void listen(dds::DomainParticipant& participant, const std::string& topic, const
   dds::DataReaderQos qos;
   qos.reliability().kind = reliable ? dds::RELIABLE_RELIABILITY_QOS : dds::BEST_EFFORT_RELIABILITY_QOS;
   qos.durability().kind = latched ? dds::TRANSIENT_LOCAL_DURABILITY_QOS : dds::VOLATILE_DURABILITY_QOS;
-  qos.history().depth = 100;
+  qos.history().depth = 400; // Fast DDS's limit of a topic
   qos.endpoint().history_memory_policy = kAsNeeded;
   participant.create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT)
       ->create_datareader(topic_of<Message>(participant, topic), qos, &listeners.emplace_back(word));

@@ -213,6 +213,14 @@ ssize_t sendto(int socket, const void* bytes, size_t size, int flags, const sock
   return sent;
 }
 
+/// Intercepts the histories of Cyclone DDS: since the time of the service does not wait for its subscribers, what they
+/// have not yet acknowledged stays, but for topics of which the latest alone matters.
+void dds_qset_history(void* qos, int kind, std::int32_t depth) {
+  static auto* const kNext = next<void(void*, int, std::int32_t)>("dds_qset_history");
+  constexpr std::int32_t kFew = 5, kAll = 10'000;
+  kNext(qos, kind, depth > kFew ? kAll : depth);
+}
+
 /// Intercepts Cyclone DDS.
 std::int32_t dds_write(std::int32_t writer, const void* data) {
   static auto* const kNext = next<std::int32_t(std::int32_t, const void*)>("dds_write");
