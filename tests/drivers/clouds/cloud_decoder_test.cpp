@@ -400,7 +400,8 @@ TEST(CloudDecoder, PointsOfOneInstantStandInTheOrderOfTheirAzimuths) {
     const std::vector<Fired> fired = drain(*tested);
     ASSERT_EQ(fired.size(), turn.points.size());
     for (const Fired& f : fired) {
-      const double turned_rad = std::numbers::pi - std::atan2(double{f.what.y_m}, double{f.what.x_m});
+      const double turned_rad =
+          std::numbers::pi - std::atan2(static_cast<double>(f.what.y_m), static_cast<double>(f.what.x_m));
       const double share = turned_rad / (2 * std::numbers::pi);
       EXPECT_LE(f.stamp, kBegin);
       EXPECT_NEAR(to_seconds(f.stamp - kBegin), (share - 1) * to_seconds(kInstant), 1e-7) << is_ring_by_ring;
@@ -433,7 +434,7 @@ TEST(CloudDecoder, LongerDimensionOfAnOrganisedCloudIsTheOrderOfOneInstant) {
     const auto tested = decoder(PointTimesFrom::none);
     ASSERT_EQ(begin(*tested, cloud), std::nullopt);
     for (const Fired& f : drain(*tested)) {
-      const double shot = 1000 * (double{f.what.z_m} - std::floor(double{f.what.z_m}));
+      const double shot = 1000 * (static_cast<double>(f.what.z_m) - std::floor(static_cast<double>(f.what.z_m)));
       EXPECT_NEAR(to_seconds(f.stamp - kBegin), (shot + 1 - kShots) / kShots * to_seconds(kInstant), 1e-7) << is_wide;
     }
   }
