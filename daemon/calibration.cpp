@@ -85,7 +85,8 @@ namespace {
 /// Tells whether samples arrive after the de-skew of the points that they belong to.
 bool is_too_late(const MotionSourceOptions& source, const LearnedSource& learned) {
   const double late_s = learned.lateness_s().mean;
-  return source.kind == SourceKind::imu && late_s - to_seconds(MotionTrack::taken_out(late_s)) > kMaxResidualLateness_s;
+  return source.kind == SourceKind::imu &&
+         late_s - to_seconds(MotionTrack::applied_lateness(late_s)) > kMaxResidualLateness_s;
 }
 
 } // namespace

@@ -18,8 +18,8 @@ namespace locus::daemon {
 /// `yaw_scale`, the reported distance per metre ahead and the reported angle per radian of yaw. `calibrated` holds the
 /// configuration keys whose learned value is better known than the configured one, with that value. Unless its samples
 /// were played `in_time`, an IMU is `too_late` if its delay exceeds what a live run can compensate
-/// (MotionTrack::taken_out()): its figures are wrong by more than their deviation, and `calibrated` is empty. Any
-/// thread.
+/// (MotionTrack::applied_lateness()): its figures are wrong by more than their deviation, and `calibrated` is empty.
+/// Any thread.
 nlohmann::ordered_json learned_json(const MotionSourceOptions& source, const LearnedSource& learned,
                                     bool in_time = false);
 

@@ -29,8 +29,8 @@ IngestReport::Lidar IngestReport::Lidar::of(const LidarInput& lidar) {
           .refused_ip = lidar.refused_ip(),
           .strangers = lidar.strangers(),
           .unknown_packets = lidar.unknown_packets(),
-          .last_heard = lidar.last_heard(),
-          .unknown_last_heard = lidar.unknown_last_heard(),
+          .last_received = lidar.last_received(),
+          .unknown_last_received = lidar.unknown_last_received(),
           .pps = lidar.clock_state(),
           .pps_unused = lidar.why_pps_is_unused(),
           .tells_date = lidar.tells_date(),
@@ -46,7 +46,7 @@ void IngestReport::Lidar::add(const CloudDecoder& decoder) {
                   .timing = decoder.timing(),
                   .rings = decoder.rings(),
                   .period = decoder.period()};
-  last_heard = decoder.last_heard();
+  last_received = decoder.last_received();
 }
 
 void IngestReport::read(const Ingest& ingest) {
@@ -60,7 +60,7 @@ void IngestReport::read(const Ingest& ingest) {
     const HealthMonitor& health = ingest.sources().health(SourceId{i});
     sources[i] = {.counters = health.counters(),
                   .healthy = health.healthy(),
-                  .last_heard = health.last_heard(),
+                  .last_received = health.last_received(),
                   .verdict = health.verdict(),
                   .period = health.period(),
                   .refusal = health.refusal().value_or(Refusal{}),
@@ -242,7 +242,7 @@ std::optional<std::string> slow_imu(const MotionSource& options, const IngestRep
 
 std::string verdict_on(const IngestReport::Source& source, bool is_live) {
   const Refusal& refusal = is_live ? source.refusal : source.longest_refusal;
-  if (!source.verdict.empty() || !refusal.is_worth_telling())
+  if (!source.verdict.empty() || !refusal.is_worth_reporting())
     return std::string{source.verdict};
   return fmt::format("is refused for {:.0f} s: it {}", to_seconds(refusal.lasted), explanation(refusal.reason));
 }
@@ -253,15 +253,15 @@ std::string problem_of(const LidarOptions& options, const IngestReport::Lidar& l
   IngestReport::Lidar now = lidar;
   if (lidar.clouds) {
     for (std::size_t i = 0; i < kCloudDoubts; ++i)
-      if (lidar.last_heard - lidar.clouds->last_doubted[i] > kMaxAge)
+      if (lidar.last_received - lidar.clouds->last_doubted[i] > kMaxAge)
         now.clouds->doubts.reset(i);
     const std::vector<std::string> doubts = cloud_doubts(options, now);
     return doubts.empty() ? "" : doubts.front();
   }
   for (LidarInput::Stranger& stranger : now.strangers)
-    if (lidar.last_heard - stranger.last_heard > kMaxAge)
+    if (lidar.last_received - stranger.last_received > kMaxAge)
       stranger = {};
-  if (lidar.last_heard - lidar.unknown_last_heard > kMaxAge)
+  if (lidar.last_received - lidar.unknown_last_received > kMaxAge)
     now.unknown_packets.reset();
   for (const auto& problem :
        {shared_port(options, now), unknown_model(options, now), stale_metadata(options, now), unused_pps(options, now)})

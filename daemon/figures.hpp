@@ -41,8 +41,8 @@ struct IngestReport {
     std::optional<std::uint32_t> refused_ip;       ///< LidarInput::refused_ip()
     LidarInput::Strangers strangers;               ///< LidarInput::strangers()
     std::optional<UnknownPackets> unknown_packets; ///< LidarInput::unknown_packets()
-    Stamp last_heard;                              ///< LidarInput::last_heard()
-    Stamp unknown_last_heard;                      ///< LidarInput::unknown_last_heard()
+    Stamp last_received;                           ///< LidarInput::last_received()
+    Stamp unknown_last_received;                   ///< LidarInput::unknown_last_received()
     std::string_view pps = "absent";               ///< LidarInput::clock_state()
     std::string_view pps_unused{};                 ///< LidarInput::why_pps_is_unused()
     bool tells_date = false;                       ///< LidarInput::tells_date()
@@ -58,7 +58,7 @@ struct IngestReport {
   struct Source {
     SourceCounters counters;
     bool healthy = false;
-    Stamp last_heard;                 ///< HealthMonitor::last_heard()
+    Stamp last_received;              ///< HealthMonitor::last_received()
     std::string_view verdict;         ///< text with static lifetime; see HealthMonitor
     std::optional<Duration> period{}; ///< HealthMonitor::period()
     Refusal refusal{};                ///< HealthMonitor::refusal(); default: none

@@ -94,7 +94,7 @@ ordered_json cloud_lidar_json(const Figures& figures, std::size_t i) {
   json["clouds"]["dropped"] = figures.live->cloud_drops[i];
   json.update({{"writers", figures.live->link.lidars[i].writers},
                {"refused", figures.live->link.lidars[i].refused},
-               {"heard_ms_ago", ms_since(lidar.last_heard)},
+               {"heard_ms_ago", ms_since(lidar.last_received)},
                {"problem", problem_of(options, lidar)}});
   return json;
 }
@@ -111,7 +111,7 @@ ordered_json lidar_json(const Figures& figures, std::size_t i) {
     json.update({{"port", options.port},
                  {"source_ip", text_or_null(lidar.source_ip, dotted)},
                  {"refused_ip", text_or_null(lidar.refused_ip, dotted)},
-                 {"heard_ms_ago", ms_since(lidar.last_heard)},
+                 {"heard_ms_ago", ms_since(lidar.last_received)},
                  {"pps", lidar.pps},
                  {"problem", problem_of(options, lidar)}});
   return json;
@@ -145,7 +145,7 @@ ordered_json source_json(const Figures& figures, std::size_t i) {
   }
   if (figures.live)
     json.update({{"health", health_of(source)},
-                 {"heard_ms_ago", ms_since(source.last_heard)},
+                 {"heard_ms_ago", ms_since(source.last_received)},
                  {"writers", figures.live->link.sources[i].writers},
                  {"refused", figures.live->link.sources[i].refused},
                  {"health_refused", figures.live->link.sources[i].health_refused}});

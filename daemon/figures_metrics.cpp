@@ -246,7 +246,7 @@ void add_lidars(MetricsText& text, const Figures& figures) {
   });
   text.gauge("locusd_lidar_silence_seconds", "Time since the last used data packet, or since the start.");
   for_each([&](const auto& options, const auto& lidar) {
-    text.add({{"lidar", options.name}}, to_seconds(time_since(lidar.last_heard).value_or(figures.duration)));
+    text.add({{"lidar", options.name}}, to_seconds(time_since(lidar.last_received).value_or(figures.duration)));
   });
   text.gauge("locusd_lidar_rotation_hertz", "Revolutions per second; 0 before the first data packet.");
   for_each([&](const auto& options, const auto& lidar) {
@@ -335,7 +335,7 @@ void add_sources(MetricsText& text, const Figures& figures) {
   for_each([&](const std::string& source, std::size_t i) { text.add({{"source", source}}, link[i].writers); });
   text.gauge("locusd_source_silence_seconds", "Time since the last good sample; missing before the first.");
   for_each([&](const std::string& source, std::size_t i) {
-    if (const auto silence = time_since(sources[i].last_heard))
+    if (const auto silence = time_since(sources[i].last_received))
       text.add({{"source", source}}, to_seconds(*silence));
   });
   text.gauge("locusd_source_test_ratio", "Above 1 where everything else contradicts the source.");

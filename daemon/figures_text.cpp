@@ -58,8 +58,8 @@ template <class E> std::string reasons(const auto& counts) {
   return text;
 }
 
-std::string silence_text(Stamp last_heard) {
-  const std::optional<Duration> silence = time_since(last_heard);
+std::string silence_text(Stamp last_received) {
+  const std::optional<Duration> silence = time_since(last_received);
   if (!silence)
     return "always";
   const double silence_s = to_seconds(*silence);
@@ -73,7 +73,7 @@ std::string clouds_text(const LidarOptions& options, const IngestReport::Lidar& 
   std::string text =
       fmt::format("{:<9.8}{:<12}{:>5.0f}{:>10}{:>8}{:>9}{:>9}{:>8}\n", options.name,
                   counters.used > 0 ? "clouds" : "no data", 60 / to_seconds(clouds.period), counters.used, drops,
-                  sum(counters.refused), counters.reordered, silence_text(lidar.last_heard));
+                  sum(counters.refused), counters.reordered, silence_text(lidar.last_received));
   if (const std::string refused = reasons<CloudError>(counters.refused); !refused.empty())
     text += fmt::format("{:<9}refused: {}\n", "", refused);
   if (const std::string problem = problem_of(options, lidar); !problem.empty())
@@ -95,7 +95,7 @@ std::string lidars_text(const Figures& figures) {
     text +=
         fmt::format("{:<9.8}{:<12}{:>5.0f}{:>10}{:>8}{:>9}{:>9}{:>8} {:.8}\n", options.name,
                     lidar.model.empty() ? "no data" : lidar.model, lidar.rotation_rate_rpm, packets.data, packets.lost,
-                    sum(packets.rejected), packets.reordered, silence_text(lidar.last_heard), lidar.pps);
+                    sum(packets.rejected), packets.reordered, silence_text(lidar.last_received), lidar.pps);
     if (const std::string refused = reasons<PacketError>(packets.rejected); !refused.empty())
       text += fmt::format("{:<9}refused: {}{}\n", "", refused,
                           lidar.refused_ip ? "; the last sender: " + dotted(*lidar.refused_ip) : "");
@@ -116,7 +116,7 @@ std::string sources_text(const Figures& figures) {
     const SourceCounters& counters = source.counters;
     text += fmt::format("{:<12.11}{:<12}{:>12}{:>12}{:>12}{:>10}{:>9}\n", sources[i].name, health_of(source),
                         counters.received, sum(counters.rejected), figures.sweeps.used_sweeps[i],
-                        counters.health_changes, silence_text(source.last_heard));
+                        counters.health_changes, silence_text(source.last_received));
     if (const std::string refused = reasons<HealthReason>(counters.rejected); !refused.empty())
       text += fmt::format("{:<12}refused: {}\n", "", refused);
     if (const std::string verdict = verdict_on(source, true); !verdict.empty())

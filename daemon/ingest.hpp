@@ -46,7 +46,7 @@ class Ingest {
   void process(const EndOfInput&) { sweeps_.finish(); }
 
   /// Accepts the feedback of the last registration on the motion sources; effective from the next window on.
-  void apply(const RegistrationFeedback& feedback) { sweeps_.sources().hear(feedback); }
+  void apply(const RegistrationFeedback& feedback) { sweeps_.sources().on_feedback(feedback); }
 
   /// Returns the lidars; the counters of this and the following belong to the thread that calls process().
   [[nodiscard]] const LidarRouter& lidars() const { return lidars_; }

@@ -27,7 +27,7 @@ struct SweepCounters {
 
 /// Initial state and map, see Odometry::begin_at().
 struct StartPoint {
-  Whereabouts last;
+  ResumeState last;
   std::vector<SurfacePoint> map_odom;
 };
 

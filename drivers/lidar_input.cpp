@@ -94,7 +94,7 @@ const LidarPacket* LidarInput::receive(const Datagram& datagram) {
   if (const auto error = take(datagram)) {
     ++counters_[*error];
     if (*error == PacketError::model)
-      unknown_last_heard_ = datagram.receive_stamp;
+      unknown_last_received_ = datagram.receive_stamp;
   }
   return ready_;
 }
@@ -160,7 +160,7 @@ std::optional<std::uint32_t> LidarInput::source_ip() const {
 
 /// Switches to the decoder of the maker that this packet belongs to, unless a packet was decoded within the timeout.
 void LidarInput::follow_maker(const Datagram& datagram) {
-  if (!options_.is_of_any_maker() || (counters_.data > 0 && datagram.receive_stamp - last_heard_ <= kSenderTimeout))
+  if (!options_.is_of_any_maker() || (counters_.data > 0 && datagram.receive_stamp - last_received_ <= kSenderTimeout))
     return;
   if (hesai() != nullptr && datagram.payload.size() == velodyne::kDataPacketBytes)
     decoder_.emplace<velodyne::Decoder>(velodyne::DecoderOptions{.isa = options_.isa});
@@ -336,8 +336,8 @@ std::string_view LidarInput::clock_state() const {
 }
 
 std::string_view LidarInput::why_pps_is_unused() const {
-  constexpr Duration kWorthTelling = std::chrono::seconds{5};
-  return last_heard_ - pps_unused_since_ > kWorthTelling ? pps_unused_for_ : std::string_view{};
+  constexpr Duration kWorthReporting = std::chrono::seconds{5};
+  return last_received_ - pps_unused_since_ > kWorthReporting ? pps_unused_for_ : std::string_view{};
 }
 
 double LidarInput::rotation_rate_rpm() const {
@@ -358,7 +358,7 @@ std::optional<UnknownPackets> LidarInput::unknown_packets() const {
 bool LidarInput::is_sender(const Datagram& datagram) const {
   if (options_.source_ip || !learnt_ip_)
     return !options_.source_ip || *options_.source_ip == datagram.source_ip;
-  return *learnt_ip_ == datagram.source_ip || datagram.receive_stamp - last_heard_ > kSenderTimeout;
+  return *learnt_ip_ == datagram.source_ip || datagram.receive_stamp - last_received_ > kSenderTimeout;
 }
 
 void LidarInput::refuse_sender(const Datagram& datagram) {
@@ -458,7 +458,7 @@ void LidarInput::count_lost(const SensorClock::Reading& reading) {
 
 void LidarInput::remember(const Datagram& datagram) {
   learnt_ip_ = datagram.source_ip;
-  last_heard_ = datagram.receive_stamp;
+  last_received_ = datagram.receive_stamp;
   std::memcpy(recent_[remembered_ % kRemembered].data(), datagram.payload.data(),
               std::min(datagram.payload.size(), velodyne::kDataPacketBytes));
   ++remembered_;

@@ -91,7 +91,7 @@ class LidarInput {
   struct Stranger {
     std::uint32_t ip = 0;      ///< host byte order
     std::uint64_t packets = 0; ///< rejected packets from this sender
-    Stamp last_heard;          ///< arrival of the latest of them
+    Stamp last_received;       ///< arrival of the latest of them
   };
   static constexpr std::size_t kMaxStrangers = 4;
   using Strangers = std::array<Stranger, kMaxStrangers>;
@@ -100,9 +100,9 @@ class LidarInput {
   [[nodiscard]] const Strangers& strangers() const { return strangers_; }
 
   /// Arrival of the latest accepted packet; Stamp{} before the first.
-  [[nodiscard]] Stamp last_heard() const { return last_heard_; }
+  [[nodiscard]] Stamp last_received() const { return last_received_; }
   /// Arrival of the latest packet rejected for its model, see unknown_packets().
-  [[nodiscard]] Stamp unknown_last_heard() const { return unknown_last_heard_; }
+  [[nodiscard]] Stamp unknown_last_received() const { return unknown_last_received_; }
 
   [[nodiscard]] const LidarOptions& options() const { return options_; }
   [[nodiscard]] const PacketCounters& counters() const { return counters_; }
@@ -175,7 +175,7 @@ class LidarInput {
 
   std::optional<std::uint32_t> learnt_ip_, refused_ip_;
   Strangers strangers_{};
-  Stamp last_heard_, unknown_last_heard_;
+  Stamp last_received_, unknown_last_received_;
   std::uint16_t last_azimuth_cdeg_ = 0; ///< first firing of the latest packet
   std::size_t last_first_column_ = 0;   ///< first column of the latest packet; Ouster only
   std::uint32_t last_number_ = 0;       ///< sequence number of the latest packet; Hesai only

@@ -13,7 +13,7 @@ Vector6 corrected_twist(const Sweep& sweep) {
   return se3_log(last.T_start_base) / to_seconds(last.stamp - sweep.start);
 }
 
-SweepCorrection SweepCorrection::anew(const Sweep& sweep, const Vector6& twist_base) {
+SweepCorrection SweepCorrection::constant(const Sweep& sweep, const Vector6& twist_base) {
   if (sweep.path.count == 0)
     return all(sweep, twist_base);
   SweepCorrection correction;

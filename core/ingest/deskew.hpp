@@ -17,14 +17,14 @@ namespace locus {
 Vector6 corrected_twist(const Sweep& sweep);
 
 /// Second de-skew of one sweep: moves its points from their positions as received to their positions at the end of the
-/// sweep. Created by all() or anew(). Any thread.
+/// sweep. Created by all() or constant(). Any thread.
 class SweepCorrection {
  public:
   /// De-skews for a base with mean twist `twist_base` (m/s, rad/s); variations in the earlier correction are retained.
   static SweepCorrection all(const Sweep& sweep, const Vector6& twist_base);
 
   /// De-skews for a constant `twist_base` and undoes the earlier correction: for a source that turned out to be wrong.
-  static SweepCorrection anew(const Sweep& sweep, const Vector6& twist_base);
+  static SweepCorrection constant(const Sweep& sweep, const Vector6& twist_base);
 
   /// Replaces `scan` by the moved points, in the same order.
   void apply(std::span<const SweepPoint> points, std::vector<SurfacePoint>& scan) const;

@@ -79,7 +79,7 @@ std::size_t RingSegments::add(std::size_t lidar, const FiringGroup& group, const
   const std::size_t place = group.first_laser / FiringGroup::kLasers;
   lidars_[lidar].banks_used = std::max(lidars_[lidar].banks_used, place + 1);
   Bank& bank = lidars_[lidar].storage[place];
-  Mask begins, takes = counts;
+  Mask begins, accepted = counts;
   std::uint32_t beginnings = 0;
   run_as(isa_, [&] {
     begins = beginnings_in(bank, group, counts);
@@ -92,40 +92,40 @@ std::size_t RingSegments::add(std::size_t lidar, const FiringGroup& group, const
     bank.id[k] = open();
     bank.ring[k] = group.ring[k];
     if (bank.id[k] == kNone) {
-      takes[k] = 0;
+      accepted[k] = 0;
       ++refused;
     }
   });
-  run_as(isa_, [&] { bank.take(group, begins, takes, lidars_[lidar].motion.stamp_s, lidars_[lidar].packet); });
+  run_as(isa_, [&] { bank.add(group, begins, accepted, lidars_[lidar].motion.stamp_s, lidars_[lidar].packet); });
   return refused;
 }
 
-/// Adds the returns selected by `takes`; those in `begins` are the first of their segments. Sums instead of branches,
-/// and inputs by value: otherwise the loop is not vectorised.
-[[gnu::always_inline]] inline void RingSegments::Bank::take(FiringGroup group, Mask begins, Mask takes, float stamp_s,
-                                                            std::int32_t packet) {
+/// Adds the returns selected by `accepted`; those in `begins` are the first of their segments. Sums instead of
+/// branches, and inputs by value: otherwise the loop is not vectorised.
+[[gnu::always_inline]] inline void RingSegments::Bank::add(FiringGroup group, Mask begins, Mask accepted, float stamp_s,
+                                                           std::int32_t packet) {
   PerLaser<float> intensity;
   for (std::size_t k = 0; k < FiringGroup::kLasers; ++k)
     intensity[k] = static_cast<float>(group.intensity[k]);
   for (std::size_t k = 0; k < FiringGroup::kLasers; ++k) {
     const float x = group.x_m[k], y = group.y_m[k], z = group.z_m[k];
     const float time_s = stamp_s + 1e-9F * static_cast<float>(group.offset_ns[k]);
-    const auto share = static_cast<float>(-takes[k]), keeps = 1.0F - share;
-    const auto is_first = static_cast<float>(-(begins[k] & takes[k])), earlier = 1.0F - is_first;
+    const auto share = static_cast<float>(-accepted[k]), rest = 1.0F - share;
+    const auto is_first = static_cast<float>(-(begins[k] & accepted[k])), earlier = 1.0F - is_first;
     first_x[k] = earlier * first_x[k] + is_first * x;
     first_y[k] = earlier * first_y[k] + is_first * y;
     first_z[k] = earlier * first_z[k] + is_first * z;
-    last_x[k] = keeps * last_x[k] + share * x;
-    last_y[k] = keeps * last_y[k] + share * y;
-    last_z[k] = keeps * last_z[k] + share * z;
+    last_x[k] = rest * last_x[k] + share * x;
+    last_y[k] = rest * last_y[k] + share * y;
+    last_z[k] = rest * last_z[k] + share * z;
     sum_x[k] = earlier * sum_x[k] + share * x;
     sum_y[k] = earlier * sum_y[k] + share * y;
     sum_z[k] = earlier * sum_z[k] + share * z;
     time_sum_s[k] = earlier * time_sum_s[k] + share * time_s;
     intensity_sum[k] = earlier * intensity_sum[k] + share * intensity[k];
     count[k] = earlier * count[k] + share;
-    last_range_m[k] = keeps * last_range_m[k] + share * group.range_m[k];
-    last_packet[k] = (last_packet[k] & ~takes[k]) | (packet & takes[k]);
+    last_range_m[k] = rest * last_range_m[k] + share * group.range_m[k];
+    last_packet[k] = (last_packet[k] & ~accepted[k]) | (packet & accepted[k]);
   }
 }
 

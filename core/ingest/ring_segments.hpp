@@ -69,7 +69,7 @@ class RingSegments {
     PerLaser<std::uint32_t> id{};
     PerLaser<std::uint8_t> ring{};
 
-    void take(FiringGroup group, Mask begins, Mask takes, float stamp_s, std::int32_t packet);
+    void add(FiringGroup group, Mask begins, Mask accepted, float stamp_s, std::int32_t packet);
   };
   struct Lidar {
     PacketMotion motion;

@@ -53,8 +53,8 @@ struct BatchPoints {
     const auto j = static_cast<std::ptrdiff_t>(neighbour[i]);
     const float x = x_m[j] - p.x[i], y = y_m[j] - p.y[i], z = z_m[j] - p.z[i];
     const float distance2 = x * x + y * y + z * z;
-    const std::int32_t speaks = -(distance2 <= p.reach2[i]) & -(distance2 > 0.0F);
-    const auto counts = static_cast<float>(-speaks);
+    const std::int32_t contributes = -(distance2 <= p.reach2[i]) & -(distance2 > 0.0F);
+    const auto counts = static_cast<float>(-contributes);
     const float cx = counts * x, cy = counts * y, cz = counts * z;
     moments.count[i] += counts;
     moments.x[i] += cx;

@@ -299,7 +299,7 @@ void SweepBuilder::reduce(float duration_s) {
     normals_.estimate(sweep_.points);
   }
   if (keeps_singly())
-    take_singly(duration_s);
+    copy_returns(duration_s);
   if (options_.voxel_filter.enabled)
     voxel_filter_.apply(sweep_.points);
   if (options_.random_filter.enabled)
@@ -310,16 +310,16 @@ void SweepBuilder::reduce(float duration_s) {
 }
 
 /// Copies the individually stored returns to the sweep, with the normals of their segments.
-void SweepBuilder::take_singly(float duration_s) {
+void SweepBuilder::copy_returns(float duration_s) {
   for (RawPoint& raw : raw_) {
     if (const std::uint32_t place = segments_.place_of(raw.segment); place != RingSegments::kNone)
       raw.point.normal_base = sweep_.points[place].normal_base;
     raw.point.age_s = duration_s - raw.point.age_s;
   }
-  std::vector<SweepPoint>& taken = options_.segment_filter.enabled ? sweep_.returns : sweep_.points;
-  taken.clear();
+  std::vector<SweepPoint>& target = options_.segment_filter.enabled ? sweep_.returns : sweep_.points;
+  target.clear();
   for (const RawPoint& raw : raw_)
-    taken.push_back(raw.point);
+    target.push_back(raw.point);
   raw_.clear();
   if (options_.keeps_returns && !options_.segment_filter.enabled)
     sweep_.returns = sweep_.points;

@@ -93,7 +93,7 @@ class SweepBuilder {
   void close();
   void append(const LidarPacket& packet, Stamp from, Stamp to);
   void reduce(float duration_s);
-  void take_singly(float duration_s);
+  void copy_returns(float duration_s);
   void choose_registered();
   void move_to_end();
   [[nodiscard]] Pose T_start_base(Stamp stamp);

@@ -46,7 +46,7 @@ class Centres {
   Eigen::Vector3f centre_m_;
 };
 
-void put(const Surface& surface, const Eigen::Vector3f& mean_m, std::size_t i, MatchBlock& matches) {
+void store_match(const Surface& surface, const Eigen::Vector3f& mean_m, std::size_t i, MatchBlock& matches) {
   const bool planar = surface.planar();
   matches.x_m[i] = mean_m.x();
   matches.y_m[i] = mean_m.y();
@@ -141,7 +141,7 @@ std::size_t find_in(const GicpPass& pass, const SurfaceGrid& grid, const VoxelOf
     if (serves(surface[k], pass.takes_shapeless)) {
       const Eigen::Vector3f mean_m = centres[index[k]] + surface[k]->mean_m;
       if (!surface[k]->planar() || std::abs(surface[k]->normal.dot(points[i] - mean_m)) < reach_m) {
-        put(*surface[k], mean_m, i, matches);
+        store_match(*surface[k], mean_m, i, matches);
         continue;
       }
     }
@@ -187,7 +187,7 @@ bool find_around(const GicpPass& pass, const SurfaceGrid& grid, const Eigen::Vec
     }
   }
   if (nearest != nullptr)
-    put(*nearest, nearest_mean_m, i, matches);
+    store_match(*nearest, nearest_mean_m, i, matches);
   return nearest != nullptr;
 }
 

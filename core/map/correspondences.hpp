@@ -43,7 +43,7 @@ struct MatchBlock {
 
 /// Strategy for finding correspondences in a pass.
 enum class LookUp {
-  keep,   ///< those of the previous pass
+  reuse,  ///< those of the previous pass
   follow, ///< those of the previous pass if the point is still in its voxel, else as `here`
   here,   ///< plane of the voxel around the point, fine or else coarse
   around, ///< nearest plane of the 27 voxels around it, coarse or else fine
@@ -75,7 +75,7 @@ struct GicpPass {
   }
 };
 
-/// Finds the correspondences of the points by the strategy of the pass, which must not be LookUp::keep. Writes to
+/// Finds the correspondences of the points by the strategy of the pass, which must not be LookUp::reuse. Writes to
 /// `matches` only; any thread.
 void find(const GicpPass& pass, const SourceBlock& source, MatchBlock& matches, Isa isa);
 

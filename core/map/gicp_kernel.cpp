@@ -15,8 +15,8 @@ enum Term : std::size_t {
   kHrr = kHtr + 9, ///< rotation with rotation: xx xy xz yy yz zz
   kBt = kHrr + 6,
   kBr = kBt + 3,
-  kSeen = kBr + 3,    ///< along the axes of the pass and about those of the target
-  kSides = kSeen + 6, ///< likewise
+  kObserved = kBr + 3,    ///< along the axes of the pass and about those of the target
+  kSides = kObserved + 6, ///< likewise
   kError = kSides + 6,
   kWeight,
   kInliers,
@@ -36,8 +36,8 @@ using Sums = std::array<Lanes, kTerms>;
 /// surfaces of every orientation: along a corridor it would tie the robot to where the scan lines fell. The errors of
 /// the source point's own normal m are independent of n, so a sum of m n' (kSeen) has no such part: the method of
 /// instrumental variables (Reiersol 1941). A shapeless correspondence is a ball.
-[[gnu::always_inline]] inline void take_terms(const Affine& T, const SourceBlock& source, const MatchBlock& match,
-                                              const Axes& axes, float width2, std::size_t begin, Terms& terms) {
+[[gnu::always_inline]] inline void compute_terms(const Affine& T, const SourceBlock& source, const MatchBlock& match,
+                                                 const Axes& axes, float width2, std::size_t begin, Terms& terms) {
   const auto [R, t] = T;
   const float r00 = R(0, 0), r01 = R(0, 1), r02 = R(0, 2), r10 = R(1, 0), r11 = R(1, 1), r12 = R(1, 2), r20 = R(2, 0),
               r21 = R(2, 1), r22 = R(2, 2), tx = t.x(), ty = t.y(), tz = t.z();
@@ -106,12 +106,12 @@ using Sums = std::array<Lanes, kTerms>;
     for (std::size_t side = 0; side < 3; ++side) {
       const float along_m = mx * axes[side][0] + my * axes[side][1] + mz * axes[side][2];
       const float along_n = nx * axes[side][0] + ny * axes[side][1] + nz * axes[side][2];
-      terms[kSeen + side][k] = wp * along_m * along_n + wb;
+      terms[kObserved + side][k] = wp * along_m * along_n + wb;
       terms[kSides + side][k] = wp * std::abs(along_m);
     }
-    terms[kSeen + 3][k] = wp * gx * hx + wb * (y * y + z * z);
-    terms[kSeen + 4][k] = wp * gy * hy + wb * (z * z + x * x);
-    terms[kSeen + 5][k] = wp * gz * hz + wb * (x * x + y * y);
+    terms[kObserved + 3][k] = wp * gx * hx + wb * (y * y + z * z);
+    terms[kObserved + 4][k] = wp * gy * hy + wb * (z * z + x * x);
+    terms[kObserved + 5][k] = wp * gz * hz + wb * (x * x + y * y);
     terms[kSides + 3][k] = wp * std::abs(hx);
     terms[kSides + 4][k] = wp * std::abs(hy);
     terms[kSides + 5][k] = wp * std::abs(hz);
@@ -134,7 +134,7 @@ using Sums = std::array<Lanes, kTerms>;
                                              const Axes& axes, float width2, Sums& sums) {
   Terms terms;
   for (std::size_t begin = 0; begin < kGicpBlock; begin += kChunk) {
-    take_terms(T, source, matches, axes, width2, begin, terms);
+    compute_terms(T, source, matches, axes, width2, begin, terms);
     add_up(terms, sums);
   }
 }
@@ -169,7 +169,7 @@ NormalEquations equations_of(const Sums& sums) {
   for (int i = 0; i < 6; ++i)
     result.b[i] = total(sums[kBt + static_cast<std::size_t>(i)]);
   for (int axis = 0; axis < 6; ++axis) {
-    result.seen[axis] = total(sums[kSeen + static_cast<std::size_t>(axis)]);
+    result.observed[axis] = total(sums[kObserved + static_cast<std::size_t>(axis)]);
     result.sides[axis] = total(sums[kSides + static_cast<std::size_t>(axis)]);
   }
   result.error = total(sums[kError]);

@@ -13,10 +13,10 @@ namespace locus {
 struct NormalEquations {
   Matrix6 H = Matrix6::Zero();
   Vector6 b = Vector6::Zero();
-  /// Values along the axes of the pass and about those of the target: `seen` is the information without the part that
-  /// noise of the normals alone produces, `sides` what an error of one metre common to all points, each with the worse
-  /// sign, adds to b.
-  Vector6 seen = Vector6::Zero(), sides = Vector6::Zero();
+  /// Values along the axes of the pass and about those of the target: `observed` is the information without the part
+  /// that noise of the normals alone produces, `sides` what an error of one metre common to all points, each with the
+  /// worse sign, adds to b.
+  Vector6 observed = Vector6::Zero(), sides = Vector6::Zero();
   double error = 0.0;
   double weight = 0.0;
   std::size_t planes = 0; ///< points whose correspondence is a plane
@@ -25,7 +25,7 @@ struct NormalEquations {
   void operator+=(const NormalEquations& other) {
     H += other.H;
     b += other.b;
-    seen += other.seen;
+    observed += other.observed;
     sides += other.sides;
     error += other.error;
     weight += other.weight;

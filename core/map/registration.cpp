@@ -102,15 +102,16 @@ struct ElasticEquations {
       if (side < 3)
         axis.head<3>() = Eigen::Vector3f(axes[static_cast<std::size_t>(side)].data()).cast<double>();
       const double all = std::max(axis.dot(of_pose.H * axis), kNothing);
-      const double seen = std::clamp(of_pose.seen[side], kNothing, all);
-      const double sure = std::max(kNothing, seen - square(kByChance_sigma * all) / independent / seen); // James-Stein
+      const double observed = std::clamp(of_pose.observed[side], kNothing, all);
+      const double certain =
+          std::max(kNothing, observed - square(kByChance_sigma * all) / independent / observed); // James-Stein
       const double common = square(kCommonError_m * of_pose.sides[side]);
-      solved += seen / std::sqrt(all * (seen + common)) * axis * axis.transpose();
-      claimed += sure / std::sqrt(all * (sure + common)) * axis * axis.transpose();
+      solved += observed / std::sqrt(all * (observed + common)) * axis * axis.transpose();
+      claimed += certain / std::sqrt(all * (certain + common)) * axis * axis.transpose();
     }
     const Matrix12 of_both = pose_and_twist(solved, R_target_base),
-                   sure_of_both = pose_and_twist(claimed, R_target_base);
-    information = sure_of_both * H * sure_of_both;
+                   certain_of_both = pose_and_twist(claimed, R_target_base);
+    information = certain_of_both * H * certain_of_both;
     H = (of_both * of_both * H).eval();
     b = (of_both * of_both * b).eval();
     const double honest = honest_share(of_pose.error / std::max(of_pose.weight, 1.0));
@@ -136,7 +137,7 @@ struct Gicp::Workers {
     arena.execute([&] { tbb::parallel_for(std::size_t{0}, blocks.size(), body, tbb::simple_partitioner{}); });
   }
 
-  void take(const ElasticScan& source) {
+  void set_source(const ElasticScan& source) {
     blocks.clear();
     for (std::size_t begin = 0; begin < source.points.size(); begin += kGicpBlock)
       blocks.emplace_back(source.points.subspan(begin, std::min(kGicpBlock, source.points.size() - begin)));
@@ -161,7 +162,7 @@ struct Gicp::Workers {
       of_block.T_target_source = place(block, pass.T_target_source, twist_base);
       return of_block;
     };
-    if (pass.look_up != LookUp::keep) {
+    if (pass.look_up != LookUp::reuse) {
       for_each_block([&](std::size_t block) { find(of(block), blocks[block], matches[block], isa); });
       axes = axes_of(normals());
     }
@@ -267,7 +268,7 @@ Registration Gicp::align(const ElasticScan& source, const SurfaceMap& target, co
   result.twist_base = source.twist_base;
   if (!T_start.finite() || !target.reaches(T_start.translation))
     return result;
-  workers_->take(source);
+  workers_->set_source(source);
   double width = wide ? kWidthStartWide : kWidthStart;
   bool few_planes = false;
   bool can_follow = false;
@@ -275,15 +276,15 @@ Registration Gicp::align(const ElasticScan& source, const SurfaceMap& target, co
     const bool looks_up = result.iterations % kStepsPerLookUp == 0;
     if (looks_up && result.iterations > 0)
       width = std::max(kNarrowing * width, kWidthEnd);
-    const LookUp anew = wide && width > kWidthStart ? LookUp::around : can_follow ? LookUp::follow : LookUp::here;
+    const LookUp look_up = wide && width > kWidthStart ? LookUp::around : can_follow ? LookUp::follow : LookUp::here;
     const ElasticEquations points =
-        workers_->run({target, result.T_target_source, T_start.translation, looks_up ? anew : LookUp::keep, few_planes,
-                       options.max_correspondence_m, width * width},
+        workers_->run({target, result.T_target_source, T_start.translation, looks_up ? look_up : LookUp::reuse,
+                       few_planes, options.max_correspondence_m, width * width},
                       result.twist_base);
     if (!(points.of_pose.weight > 0.0))
       break;
     if (looks_up)
-      can_follow = anew != LookUp::around;
+      can_follow = look_up != LookUp::around;
     if (!few_planes &&
         static_cast<double>(points.of_pose.planes) < kFewPlanes * static_cast<double>(source.points.size())) {
       few_planes = true;

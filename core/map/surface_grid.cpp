@@ -176,7 +176,7 @@ std::uint32_t SurfaceGrid::find_or_create(VoxelIndex index, std::uint64_t hash) 
   const std::uint32_t found = slot_of(index, hash);
   if (found != kEmpty)
     return found;
-  const std::uint32_t slot = take_slot();
+  const std::uint32_t slot = allocate_slot();
   voxels_[slot] = {index, Surface{}};
   moments_[slot] = Moments{};
   const std::size_t mask = entries_.size() - 1;
@@ -187,7 +187,7 @@ std::uint32_t SurfaceGrid::find_or_create(VoxelIndex index, std::uint64_t hash) 
   return slot;
 }
 
-std::uint32_t SurfaceGrid::take_slot() {
+std::uint32_t SurfaceGrid::allocate_slot() {
   if (used_ < capacity())
     return static_cast<std::uint32_t>(used_++);
   if (2 * touched_.size() > capacity())

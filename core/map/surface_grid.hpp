@@ -133,7 +133,7 @@ class SurfaceGrid {
   std::uint32_t find_or_create(VoxelIndex index, std::uint64_t hash);
   void place(const Points& points, Places& places) const;
   void add(const Points& points, const Places& places, std::size_t i, std::uint32_t slot);
-  std::uint32_t take_slot();
+  std::uint32_t allocate_slot();
   void erase_entry(VoxelIndex index);
   void fit(std::span<const std::uint32_t> slots);
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -19,8 +18,6 @@ class AgedScan {
   /// Sorts `scan_base`: the points of the sweep, in its order, de-skewed for `twist_base` (m/s, rad/s) to its end. The
   /// result refers to this object.
   ElasticScan sort(const Sweep& sweep, std::span<const SurfacePoint> scan_base, const Vector6& twist_base);
-
-  [[nodiscard]] std::size_t size() const { return points_base_.size(); } ///< of the last result
 
  private:
   std::vector<SurfacePoint> points_base_;

@@ -42,7 +42,7 @@ std::span<const SurfacePoint> FreeSpace::leave_out_moving(std::span<const Surfac
   std::ranges::copy_if(scan_base, std::back_inserter(standing_), [&](const SurfacePoint& point) {
     return !is_free(R_odom_base * point.position_m + t_odom_base);
   });
-  see(scan_base, T_odom_base);
+  add_keyframe(scan_base, T_odom_base);
   return standing_;
 }
 
@@ -85,7 +85,7 @@ FreeSpace::Cell FreeSpace::cell_of(const Eigen::Vector3f& direction, float range
           std::clamp(static_cast<int>(up * (static_cast<float>(kRows) / 2.0F)), 0, kRows - 1)};
 }
 
-void FreeSpace::see(std::span<const SurfacePoint> scan_base, const Pose& T_odom_base) {
+void FreeSpace::add_keyframe(std::span<const SurfacePoint> scan_base, const Pose& T_odom_base) {
   Keyframe& keyframe = last_[keyframes_++ % kKeyframes];
   keyframe.stamp = stamp_;
   for (std::size_t i = 0; i < lidars_.count; ++i) {

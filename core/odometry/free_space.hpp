@@ -30,7 +30,7 @@ class FreeSpace {
   std::span<const SurfacePoint> leave_out_moving(std::span<const SurfacePoint> scan_base, const Pose& T_odom_base);
 
   /// Drops all free space, when the pose relative to it has been lost.
-  void forget() { keyframes_ = 0; }
+  void clear() { keyframes_ = 0; }
 
  private:
   static constexpr std::size_t kKeyframes = 5;
@@ -53,10 +53,10 @@ class FreeSpace {
   [[nodiscard]] static Cell cell_of(const Eigen::Vector3f& direction, float range_m);
   [[nodiscard]] static bool sees_through(const View& view, const Eigen::Vector3f& point_odom_m);
   [[nodiscard]] bool is_free(const Eigen::Vector3f& point_odom_m) const;
-  void see(std::span<const SurfacePoint> scan_base, const Pose& T_odom_base);
+  void add_keyframe(std::span<const SurfacePoint> scan_base, const Pose& T_odom_base);
 
   std::array<Keyframe, kKeyframes> last_;
-  std::size_t keyframes_ = 0; ///< since forget()
+  std::size_t keyframes_ = 0; ///< since clear()
   Stamp stamp_;
   LidarPlaces lidars_;
   std::vector<std::uint8_t> lidar_of_; ///< by point

@@ -49,7 +49,7 @@ void TiltKeeper::observe(const Eigen::Quaterniond& R_odom_base, const std::optio
   tilt_rad_ += (tilt_rad - tilt_rad_) / observed_;
 }
 
-Eigen::Vector3d TiltKeeper::take_correction_rad() {
+Eigen::Vector3d TiltKeeper::pop_correction_rad() {
   const double tilt_rad = tilt_rad_.norm();
   if (observed_ < kMemoryOfTilt_sweeps || tilt_rad < kNotWorthIt_rad)
     return Eigen::Vector3d::Zero();

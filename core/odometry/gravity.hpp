@@ -35,7 +35,7 @@ class TiltKeeper {
   void observe(const Eigen::Quaterniond& R_odom_base, const std::optional<Eigen::Vector3d>& up_base);
 
   /// Returns the rotation about the odom axes to apply to the next keyframe, and counts it as applied.
-  Eigen::Vector3d take_correction_rad();
+  Eigen::Vector3d pop_correction_rad();
 
  private:
   Eigen::Vector3d tilt_rad_ = Eigen::Vector3d::Zero(); ///< recent mean: rotation that would level the odometry

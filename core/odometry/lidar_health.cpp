@@ -24,7 +24,7 @@ void LidarHealth::learn(const Registration& registration, double elapsed_s) {
   fit_ += weight * (mean_fit(registration) - fit_);
 }
 
-bool LidarHealth::misses_most(const Registration& registration) const {
+bool LidarHealth::lacks_correspondences(const Registration& registration) const {
   return registration.overlap() < kLeastOfUsual * overlap_;
 }
 

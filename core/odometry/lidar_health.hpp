@@ -14,7 +14,7 @@ class LidarHealth {
 
   /// Returns whether there are fewer correspondences than half of the usual: dust or a lidar fault, since surroundings
   /// do not change that fast. Such a sweep must not enter the map.
-  [[nodiscard]] bool misses_most(const Registration& registration) const;
+  [[nodiscard]] bool lacks_correspondences(const Registration& registration) const;
 
   /// Returns whether the fit is worse than usual: the de-skew or the prior may be wrong.
   [[nodiscard]] bool is_unusual(const Registration& registration) const;

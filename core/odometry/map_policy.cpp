@@ -24,12 +24,12 @@ constexpr double kOverlapMoved_m = 0.1, kOverlapMoved_deg = 5.0;
 void MapPolicy::begin(Stamp stamp, const Pose& T_odom_base) {
   T_odom_keyframe_ = T_odom_base;
   best_overlap_ = 0.0;
-  last_placed_ = stamp;
+  last_accepted_ = stamp;
   refused_in_a_row_ = 0;
-  placed_ = 1;
+  accepted_ = 1;
 }
 
-bool MapPolicy::was_placed_lately(Stamp now) const { return std::chrono::abs(now - last_placed_) < kLately; }
+bool MapPolicy::was_accepted_lately(Stamp now) const { return std::chrono::abs(now - last_accepted_) < kLately; }
 
 /// Returns whether a keyframe is due: after a distance, a rotation, or a loss of overlap. The last requires a source
 /// that measures rotation; without one, a wrong rotation would lose overlap and then enter the map.
@@ -43,27 +43,27 @@ bool MapPolicy::is_keyframe_due(const Outcome& outcome) const {
 }
 
 MapPolicy::Verdict MapPolicy::judge(const Outcome& outcome) {
-  if (outcome.placed) {
+  if (outcome.accepted) {
     refused_in_a_row_ = 0;
-    ++placed_;
-    last_placed_ = outcome.stamp;
+    ++accepted_;
+    last_accepted_ = outcome.stamp;
     best_overlap_ = std::max(best_overlap_, outcome.overlap);
   } else if (outcome.has_points) {
     ++refused_in_a_row_;
   }
   // At least as many sweeps contradict the map as ever fitted: it was started wrong and is of no use.
-  const bool in_doubt = !resumed_ && refused_in_a_row_ >= placed_;
-  const bool carried = outcome.carried && was_placed_lately(outcome.stamp) && !in_doubt;
+  const bool in_doubt = !resumed_ && refused_in_a_row_ >= accepted_;
+  const bool carried = outcome.carried && was_accepted_lately(outcome.stamp) && !in_doubt;
   const bool restarts = refused_in_a_row_ >= kRefusalsToRestart && !carried && outcome.has_points;
-  if (!restarts && !(outcome.placed && is_keyframe_due(outcome) && !outcome.misses_most))
-    return Verdict::waits;
+  if (!restarts && !(outcome.accepted && is_keyframe_due(outcome) && !outcome.lacks_correspondences))
+    return Verdict::wait;
   T_odom_keyframe_ = outcome.T_odom_base;
   best_overlap_ = 0.0;
   refused_in_a_row_ = 0;
   if (!restarts || !in_doubt)
-    return Verdict::takes_in;
-  placed_ = 1;
-  return Verdict::begins_anew;
+    return Verdict::insert;
+  accepted_ = 1;
+  return Verdict::restart;
 }
 
 } // namespace locus

@@ -12,17 +12,17 @@ namespace locus {
 /// Decides whether the map takes in a sweep (paper II-B.3), waits, or restarts. One owner.
 class MapPolicy {
  public:
-  enum class Verdict : std::uint8_t { waits, takes_in, begins_anew };
+  enum class Verdict : std::uint8_t { wait, insert, restart };
 
   struct Outcome {
     Stamp stamp;
     Pose T_odom_base;
-    bool placed = false;        ///< accepted registration
-    bool has_points = false;    ///< enough for a registration
-    bool misses_most = false;   ///< misses most of the usual correspondences; not inserted
-    bool carried = false;       ///< an odometry source measures the translation
-    bool turn_measured = false; ///< a motion source measures the rotation
-    double overlap = 1.0;       ///< share of the points that have a correspondence in the map
+    bool accepted = false;              ///< accepted registration
+    bool has_points = false;            ///< enough for a registration
+    bool lacks_correspondences = false; ///< misses most of the usual correspondences; not inserted
+    bool carried = false;               ///< an odometry source measures the translation
+    bool turn_measured = false;         ///< a motion source measures the rotation
+    double overlap = 1.0;               ///< share of the points that have a correspondence in the map
   };
 
   explicit MapPolicy(const MapOptions& options) : options_(options) {}
@@ -35,7 +35,7 @@ class MapPolicy {
 
   /// Returns whether the registration of the last sweep with points was rejected.
   [[nodiscard]] bool is_refused() const { return refused_in_a_row_ > 0; }
-  [[nodiscard]] bool was_placed_lately(Stamp now) const;
+  [[nodiscard]] bool was_accepted_lately(Stamp now) const;
 
  private:
   [[nodiscard]] bool is_keyframe_due(const Outcome& outcome) const;
@@ -43,9 +43,9 @@ class MapPolicy {
   MapOptions options_;
   Pose T_odom_keyframe_;
   double best_overlap_ = 0.0; ///< since the last keyframe
-  Stamp last_placed_;
-  int refused_in_a_row_ = 0; ///< consecutive rejected sweeps with points
-  std::int64_t placed_ = 0;  ///< accepted sweeps since the map was started
+  Stamp last_accepted_;
+  int refused_in_a_row_ = 0;  ///< consecutive rejected sweeps with points
+  std::int64_t accepted_ = 0; ///< accepted sweeps since the map was started
   bool resumed_ = false;
 };
 

@@ -34,15 +34,15 @@ Vector6 squares(double translation, double rotation) {
 }
 
 /// Decay time constants of the twist. Lateral, vertical, roll and pitch rates decay fast. Forward speed and yaw rate
-/// persist for kGoesOn_s after the last measurement.
+/// persist for kPersists_s after the last measurement.
 const Vector6 kFades_s = (Vector6() << 0.6, 0.3, 0.3, 0.3, 0.3, 0.6).finished();
-constexpr double kGoesOn_s = 1.0;
-constexpr double kTold = 0.5; ///< an axis is observed if an update lowers its variance below this fraction
+constexpr double kPersists_s = 1.0;
+constexpr double kObservedRatio = 0.5; ///< an axis is observed if an update lowers its variance below this fraction
 
 /// Process noise: variance of the twist after one second, as squares of standard deviations in m/s and rad/s.
 const Vector6 kProcess = squares(0.7, 0.7);
-constexpr double kAbleToTurn_radps2 = 20.0; ///< standard deviation of the angular acceleration
-constexpr double kKnownSpeed = 0.5;         ///< sigma of a speed, as a fraction of the limit, that halves its excess
+constexpr double kAngularAcceleration_radps2 = 20.0; ///< standard deviation of the angular acceleration
+constexpr double kKnownSpeed = 0.5; ///< sigma of a speed, as a fraction of the limit, that halves its excess
 
 /// Prior and least noise of the sources: variance of position (m) and rotation (rad) after one second.
 const Vector6 kOdometryNoise = squares(0.02, 0.01), kLeastOdometryNoise = squares(0.006, 0.001);
@@ -51,8 +51,8 @@ constexpr double kForceNoise = square(0.02); ///< velocity variance after one se
 
 /// Errors other than white noise: proportional ones, and those of late stamps while the motion changes.
 constexpr double kProportion = 0.01;
-constexpr double kLever_m = 0.1;       ///< position error of a sensor, or of the point that it reports
-constexpr double kLeverBends_m = 0.02; ///< flexing of the accelerometer's lever arm: no robot is rigid
+constexpr double kLever_m = 0.1;      ///< position error of a sensor, or of the point that it reports
+constexpr double kLeverFlex_m = 0.02; ///< flexing of the accelerometer's lever arm: no robot is rigid
 constexpr double kLateOdometry_s = 0.02, kLateGyro_s = 0.003;
 
 /// Prior standard deviations of the slow states, and their random walk per square root of a second.
@@ -74,9 +74,9 @@ constexpr double kPlain_sigma = 2.0;
 constexpr double kDegreesOfFreedom = 4.0;
 constexpr double kSlips_per_s = 0.1; ///< rate at which slips begin: prior odds against the likelihood of no slip
 
-constexpr double kLearns_s = 5.0;   ///< time constant of the learned noise
-constexpr double kHeard_s = 0.5;    ///< weight of the prior noise, as a duration
-constexpr double kMostSigmas = 3.0; ///< innovations are clipped here before the noise is learned from them
+constexpr double kLearns_s = 5.0;      ///< time constant of the learned noise
+constexpr double kPriorWeight_s = 0.5; ///< weight of the prior noise, as a duration
+constexpr double kMostSigmas = 3.0;    ///< innovations are clipped here before the noise is learned from them
 
 /// Prior variance of the lidar extrinsics (5 mm, 2 mrad). Considered, not estimated.
 const Vector6 kMountingOfLidar = squares(0.005, 0.002);
@@ -100,17 +100,18 @@ Eigen::Vector3d slip(const Eigen::Vector3d& rate, const Eigen::Vector3d& velocit
 } // namespace
 
 LearnedSource as_configured(const MotionSourceOptions& source) {
-  const CalibrationSigma& told = source.calibration_sigma;
+  const CalibrationSigma& configured = source.calibration_sigma;
   LearnedSource known;
   LearnedSource::States sigma;
   if (source.kind == SourceKind::imu) {
-    const double late = told.late_ms ? 1e-3 * *told.late_ms : kLate_s;
-    const double mounting = told.mounting_deg ? kRadPerDeg * *told.mounting_deg : kMounting_rad;
+    const double late = configured.late_ms ? 1e-3 * *configured.late_ms : kLate_s;
+    const double mounting = configured.mounting_deg ? kRadPerDeg * *configured.mounting_deg : kMounting_rad;
     known.states[LearnedSource::kLate] = 1e-3 * source.late_ms;
     sigma << kGyroBias, kGyroBias, kGyroBias, late, mounting, mounting, mounting;
   } else {
     known.states.head<2>() << source.scale - 1.0, source.yaw_scale - 1.0;
-    sigma << told.scale.value_or(kScale), told.yaw_scale.value_or(kScale), kDirection_rad, kDirection_rad, 0, 0, 0;
+    sigma << configured.scale.value_or(kScale), configured.yaw_scale.value_or(kScale), kDirection_rad, kDirection_rad,
+        0, 0, 0;
   }
   known.covariance.diagonal() = sigma.cwiseAbs2();
   known.noise_per_s = source.kind == SourceKind::imu ? kGyroNoise : kOdometryNoise;
@@ -120,7 +121,8 @@ LearnedSource as_configured(const MotionSourceOptions& source) {
 Pose LearnedSource::without_scale(const Pose& way) const { return {way.rotation, way.translation / (1.0 + states[0])}; }
 
 MotionFilter::MotionFilter(const std::vector<MotionSourceOptions>& sources, const MotionLimits& limits)
-    : limits_(limits), able_(squares(0.5 * limits.max_acceleration_mps2, kAbleToTurn_radps2)), count_(sources.size()) {
+    : limits_(limits), acceleration_variance_(squares(0.5 * limits.max_acceleration_mps2, kAngularAcceleration_radps2)),
+      count_(sources.size()) {
   for (std::size_t i = 0; i < count_; ++i) {
     Source& source = sources_[i];
     source.kind = sources[i].kind;
@@ -148,7 +150,7 @@ MotionFilter::MotionFilter(const std::vector<MotionSourceOptions>& sources, cons
   P_.diagonal().segment<3>(kGravity).setConstant(square(kGravityError));
   P_.diagonal().segment<3>(kLever).setConstant(square(kLever_m));
   for (std::size_t i = 0; i < count_; ++i)
-    forget(SourceId{i});
+    reset_source(SourceId{i});
 }
 
 void MotionFilter::begin(const Pose& T_odom_base, const Vector6& twist_base, const Vector6& twist_sigma,
@@ -166,7 +168,7 @@ void MotionFilter::begin(const Pose& T_odom_base, const Vector6& twist_base, con
   elapsed_s_ = 0.0;
 }
 
-void MotionFilter::forget(SourceId source) {
+void MotionFilter::reset_source(SourceId source) {
   Source& of = sources_[index_of(source)];
   const bool gyro = of.kind == SourceKind::imu;
   P_.middleRows(of.state, of.states).setZero();
@@ -182,7 +184,7 @@ void MotionFilter::forget(SourceId source) {
 }
 
 void MotionFilter::recall(SourceId source, const LearnedSource& learned, double elapsed_s) {
-  forget(source);
+  reset_source(source);
   Source& of = sources_[index_of(source)];
   of.noise_per_s = learned.noise_per_s;
   for (int i = 0; i < of.states; ++i) {
@@ -203,13 +205,13 @@ void MotionFilter::age(const Source& source, double elapsed_s) {
     wander(*source.slip, 0.0, square(kSlip_mps), std::exp(-elapsed_s / kSlipLasts_s));
 }
 
-/// Propagates a state that reverts to a mean (Ornstein-Uhlenbeck process); `kept` is the factor by which its deviation
-/// decays.
-void MotionFilter::wander(int state, double mean, double variance, double kept) {
-  x_[state] = mean + kept * (x_[state] - mean);
-  P_.row(state) *= kept;
-  P_.col(state) *= kept;
-  P_(state, state) += (1.0 - square(kept)) * variance;
+/// Propagates a state that reverts to a mean (Ornstein-Uhlenbeck process); `retained` is the factor by which its
+/// deviation decays.
+void MotionFilter::wander(int state, double mean, double variance, double retained) {
+  x_[state] = mean + retained * (x_[state] - mean);
+  P_.row(state) *= retained;
+  P_.col(state) *= retained;
+  P_(state, state) += (1.0 - square(retained)) * variance;
 }
 
 LearnedSource MotionFilter::learned(SourceId source) const {
@@ -223,8 +225,8 @@ LearnedSource MotionFilter::learned(SourceId source) const {
 void MotionFilter::predict(double elapsed_s, double period_s, const std::optional<SpecificForce>& force,
                            Measured measured, const std::optional<Eigen::Vector3d>& sensed_rate) {
   const double step_s = elapsed_s_ > 0.0 ? 0.5 * (elapsed_s + elapsed_s_) : elapsed_s; // between sweep centres
-  const double unfelt_s = std::max(0.0, std::max(step_s, elapsed_s) - period_s);
-  TwistStep step = decay(elapsed_s, step_s, unfelt_s, force.has_value(), measured);
+  const double unmeasured_s = std::max(0.0, std::max(step_s, elapsed_s) - period_s);
+  TwistStep step = decay(elapsed_s, step_s, unmeasured_s, force.has_value(), measured);
   if (force)
     integrate(*force, std::min(step_s, period_s), sensed_rate.value_or(step.mean.tail<3>()), step);
   propagate(step.F);
@@ -246,30 +248,30 @@ void MotionFilter::predict(double elapsed_s, double period_s, const std::optiona
 
 /// Predicts the twist without specific force: axes that no source measures decay to rest. With specific force the
 /// velocity decays only over the time that the force does not cover.
-MotionFilter::TwistStep MotionFilter::decay(double elapsed_s, double step_s, double unfelt_s, bool felt,
+MotionFilter::TwistStep MotionFilter::decay(double elapsed_s, double step_s, double unmeasured_s, bool force_measured,
                                             Measured measured) {
   TwistStep step;
   for (int axis = 0; axis < 6; ++axis) {
-    const bool integrated = axis < 3 && felt;
-    const double decays_s = integrated ? unfelt_s : step_s;
+    const bool integrated = axis < 3 && force_measured;
+    const double decays_s = integrated ? unmeasured_s : step_s;
     const bool open = integrated || (axis < 3 ? measured.translation : measured.rotation);
     const bool lasts = axis == 0 || axis == 5;
     const int row = kVelocity + axis;
-    const bool told = P_(row, row) < kTold * predicted_variance_[axis];
-    untold_s_[axis] = told ? 0.0 : untold_s_[axis] + elapsed_s;
-    const bool goes_on = (open && !integrated) || (lasts && untold_s_[axis] < kGoesOn_s);
-    const double kept = goes_on ? 1.0 : std::exp(-decays_s / kFades_s[axis]);
-    step.mean[axis] = kept * twist_base_[axis];
-    step.variance[axis] = open ? able_[axis] * square(decays_s)
-                               : kProcess[axis] * decays_s + square(twist_base_[axis]) * kept * (1.0 - kept);
-    step.F(row, row) = lasts ? 1.0 : kept; // the mean decays, the standard deviation does not
+    const bool observed = P_(row, row) < kObservedRatio * predicted_variance_[axis];
+    unobserved_s_[axis] = observed ? 0.0 : unobserved_s_[axis] + elapsed_s;
+    const bool persists = (open && !integrated) || (lasts && unobserved_s_[axis] < kPersists_s);
+    const double retained = persists ? 1.0 : std::exp(-decays_s / kFades_s[axis]);
+    step.mean[axis] = retained * twist_base_[axis];
+    step.variance[axis] = open ? acceleration_variance_[axis] * square(decays_s)
+                               : kProcess[axis] * decays_s + square(twist_base_[axis]) * retained * (1.0 - retained);
+    step.F(row, row) = lasts ? 1.0 : retained; // the mean decays, the standard deviation does not
   }
   return step;
 }
 
 /// Integrates the specific force. Late stamps and a lever arm are states, not noise, because their effects on the
 /// velocity telescope.
-void MotionFilter::integrate(const SpecificForce& force, double felt_s, const Eigen::Vector3d& new_rate,
+void MotionFilter::integrate(const SpecificForce& force, double measured_s, const Eigen::Vector3d& new_rate,
                              TwistStep& step) const {
   const Source& source = sources_[index_of(force.source)];
   const Eigen::Vector3d velocity = twist_base_.head<3>(), rate = twist_base_.tail<3>();
@@ -283,18 +285,18 @@ void MotionFilter::integrate(const SpecificForce& force, double felt_s, const Ei
                                        slip(mean_rate, slip(mean_rate, lever_m)); // m/s^2, base axes
   const Eigen::Vector3d change = force_change(force);
   const double late_s = x_[source.state + LearnedSource::kLate] - to_seconds(force.late);
-  step.mean.head<3>() += felt_s * acceleration + late_s * change - rate_change.cross(lever_m);
+  step.mean.head<3>() += measured_s * acceleration + late_s * change - rate_change.cross(lever_m);
   step.variance.head<3>() +=
-      felt_s * (force.noise_per_s.array() + kForceNoise).matrix() + square(kLateGyro_s) * change.cwiseAbs2();
-  step.variance.head<3>().array() += square(kLeverBends_m) * (new_rate - rate).squaredNorm();
-  const Eigen::Matrix3d of_rate = 0.5 * felt_s * skew(velocity), of_rate_change = skew(lever_m);
-  step.F.block<3, 3>(kVelocity, kTurn) = -felt_s * R_base_odom * skew(up);
-  step.F.block<3, 3>(kVelocity, kVelocity) -= felt_s * skew(mean_rate);
+      measured_s * (force.noise_per_s.array() + kForceNoise).matrix() + square(kLateGyro_s) * change.cwiseAbs2();
+  step.variance.head<3>().array() += square(kLeverFlex_m) * (new_rate - rate).squaredNorm();
+  const Eigen::Matrix3d of_rate = 0.5 * measured_s * skew(velocity), of_rate_change = skew(lever_m);
+  step.F.block<3, 3>(kVelocity, kTurn) = -measured_s * R_base_odom * skew(up);
+  step.F.block<3, 3>(kVelocity, kVelocity) -= measured_s * skew(mean_rate);
   step.F.block<3, 3>(kVelocity, kRate) = of_rate - of_rate_change;
   step.of_new_rate.block<3, 3>(kVelocity, kRate) = of_rate + of_rate_change;
-  step.F.block<3, 3>(kVelocity, kAccelerometer).diagonal().setConstant(-felt_s);
-  step.F.block<3, 3>(kVelocity, kGravity) = -felt_s * R_base_odom;
-  step.F.block<3, 3>(kVelocity, kLever) = -skew(new_rate - rate) - felt_s * skew(mean_rate) * skew(mean_rate);
+  step.F.block<3, 3>(kVelocity, kAccelerometer).diagonal().setConstant(-measured_s);
+  step.F.block<3, 3>(kVelocity, kGravity) = -measured_s * R_base_odom;
+  step.F.block<3, 3>(kVelocity, kLever) = -skew(new_rate - rate) - measured_s * skew(mean_rate) * skew(mean_rate);
 }
 
 /// Returns the change of the mean specific force between the last two sweeps (m/s^2, base axes).
@@ -323,10 +325,11 @@ void MotionFilter::limit_speed() {
   if (excess_mps <= 0.0)
     return;
   const Eigen::Vector3d ahead = twist_base_.head<3>() / speed_mps;
-  const double doubt = ahead.dot(P_.block<3, 3>(kVelocity, kVelocity) * ahead);
-  const Eigen::Vector3d taken = doubt / (doubt + square(kKnownSpeed * limits_.max_speed_mps)) * excess_mps * ahead;
-  twist_base_.head<3>() -= taken;
-  P_.block<3, 3>(kVelocity, kVelocity) += taken * taken.transpose();
+  const double variance = ahead.dot(P_.block<3, 3>(kVelocity, kVelocity) * ahead);
+  const Eigen::Vector3d reduction =
+      variance / (variance + square(kKnownSpeed * limits_.max_speed_mps)) * excess_mps * ahead;
+  twist_base_.head<3>() -= reduction;
+  P_.block<3, 3>(kVelocity, kVelocity) += reduction * reduction.transpose();
 }
 
 void MotionFilter::move() {
@@ -342,11 +345,11 @@ void MotionFilter::move() {
   // Second-order position variance from turn-rate and speed uncertainty.
   const double rate = P_.diagonal().segment<3>(kRate).maxCoeff(),
                speed = P_.diagonal().segment<3>(kVelocity).maxCoeff();
-  const double bends =
+  const double second_order =
       0.5 * square(square(elapsed_s_) * elapsed_s_ / 3.0 * rate) * twist_base_.head<3>().squaredNorm() +
       square(0.5 * square(elapsed_s_)) * rate * speed;
   propagate(F);
-  P_.diagonal().segment<3>(kPosition).array() += bends;
+  P_.diagonal().segment<3>(kPosition).array() += second_order;
 }
 
 /// Propagates the covariance of the common states, and their covariance with those of the sources, which do not change.
@@ -396,8 +399,8 @@ MotionFilter::Row MotionFilter::row(const Source& source, const SensedTwist& sen
 
 Vector6 MotionFilter::known_variance(const Source& source, const Vector6& twist_base) const {
   const double late_s = source.kind == SourceKind::imu ? kLateGyro_s : kLateOdometry_s;
-  const Vector6 able = elapsed_s_ * able_.cwiseSqrt(); // limit on the change of motion
-  const Vector6 change = (twist_base - source.last_twist.value_or(twist_base)).cwiseMin(able).cwiseMax(-able);
+  const Vector6 limit = elapsed_s_ * acceleration_variance_.cwiseSqrt(); // limit on the change of motion
+  const Vector6 change = (twist_base - source.last_twist.value_or(twist_base)).cwiseMin(limit).cwiseMax(-limit);
   Vector6 variance = (kProportion * twist_base).cwiseAbs2() + (late_s / elapsed_s_ * change).cwiseAbs2();
   variance.head<3>().array() += square(kLever_m) * twist_base.tail<3>().squaredNorm();
   return variance;
@@ -429,7 +432,7 @@ void MotionFilter::measure(SourceId id, const SensedTwist& sensed, Measured what
       source.variance[axis] = variance;
     }
     const double before = twist_base_[axis];
-    update(h, surprise, variance);
+    update_scalar(h, surprise, variance);
     if (source.kind == SourceKind::odometry && (axis == 0 || axis == 5))
       turn_scale(source.state + (axis == 0 ? 0 : 1), axis, twist_base_[axis] - before);
   }
@@ -448,13 +451,13 @@ void MotionFilter::rest() {
   for (int axis = 0; axis < 6; ++axis) {
     State h = State::Zero(states_);
     h[kVelocity + axis] = 1.0;
-    update(h, -twist_base_[axis], sigma2[axis]);
+    update_scalar(h, -twist_base_[axis], sigma2[axis]);
   }
 }
 
 /// Applies a scalar measurement. Lateness and mounting of gyros are considered, not corrected: only lidar makes them
 /// observable.
-void MotionFilter::update(const State& h, double surprise, double variance) {
+void MotionFilter::update_scalar(const State& h, double innovation, double variance) {
   const State Ph = P_ * h;
   const double innovation_variance = h.dot(Ph) + variance;
   State considered = of_map(Ph);
@@ -462,7 +465,7 @@ void MotionFilter::update(const State& h, double surprise, double variance) {
     if (source.kind == SourceKind::imu)
       considered.segment<4>(source.state + LearnedSource::kLate) = Ph.segment<4>(source.state + LearnedSource::kLate);
   lower(Ph, considered, innovation_variance);
-  correct((Ph - considered) / innovation_variance * surprise);
+  correct((Ph - considered) / innovation_variance * innovation);
 }
 
 MotionFilter::State MotionFilter::of_map(const State& Ph) {
@@ -499,7 +502,7 @@ double MotionFilter::surprise(const Registration& found) const {
          std::log(std::max(1.0, determined));
 }
 
-void MotionFilter::see(const Pose& T_odom_base, const Vector6& twist_base, const Matrix12& information) {
+void MotionFilter::update(const Pose& T_odom_base, const Vector6& twist_base, const Matrix12& information) {
   const Matrix12 P = covariance();
   Vector12 moved;
   moved << difference(T_odom_base, T_odom_base_), twist_base - twist_base_;
@@ -507,13 +510,13 @@ void MotionFilter::see(const Pose& T_odom_base, const Vector6& twist_base, const
   error.head<12>().setZero();
   correct(error);
   // One eigenvector at a time, so that rounding in nearly unknown directions does not remain.
-  const Eigen::SelfAdjointEigenSolver<Matrix12> seen(information);
+  const Eigen::SelfAdjointEigenSolver<Matrix12> eigen(information);
   for (int i = 0; i < 12; ++i) {
-    if (seen.eigenvalues()[i] <= 0.0)
+    if (eigen.eigenvalues()[i] <= 0.0)
       continue;
-    const auto direction = seen.eigenvectors().col(i);
+    const auto direction = eigen.eigenvectors().col(i);
     const State Ph = P_.leftCols<12>() * direction;
-    lower(Ph, of_map(Ph), Ph.head<12>().dot(direction) + 1.0 / seen.eigenvalues()[i]);
+    lower(Ph, of_map(Ph), Ph.head<12>().dot(direction) + 1.0 / eigen.eigenvalues()[i]);
   }
   keep_floor();
   T_odom_base_ = T_odom_base;
@@ -522,14 +525,14 @@ void MotionFilter::see(const Pose& T_odom_base, const Vector6& twist_base, const
 
 void MotionFilter::keep_floor() { P_.diagonal().head<6>() = P_.diagonal().head<6>().cwiseMax(kFloor); }
 
-Innovation MotionFilter::innovation(SourceId id, const SensedTwist& sensed, bool excused) const {
+Innovation MotionFilter::innovation(SourceId id, const SensedTwist& sensed, bool slip_explained) const {
   const Source& source = sources_[index_of(id)];
   const Vector6& twist_base = sensed.mean;
   const Vector6 known = source.used ? source.known_variance : known_variance(source, twist_base);
   Innovation found;
   for (int axis = source.kind == SourceKind::imu ? 3 : 0; axis < 6; ++axis) {
     auto [h, expected] = row(source, sensed, axis);
-    if (axis == 0 && !excused) {
+    if (axis == 0 && !slip_explained) {
       h[*source.slip] = 0.0;
       expected -= x_[*source.slip];
     }
@@ -565,7 +568,7 @@ void learn_variance(double& variance, double& learned_s, double innovation, doub
   const double most = square(kMostSigmas) * (expected + others);
   const double found = (std::min(square(innovation), most) - others - known) / per;
   learned_s = std::min(learned_s + weight * elapsed_s, kLearns_s);
-  variance += weight * elapsed_s / (kHeard_s + learned_s) * (found - variance);
+  variance += weight * elapsed_s / (kPriorWeight_s + learned_s) * (found - variance);
   variance = std::max(variance, least);
 }
 
@@ -575,9 +578,9 @@ void MotionFilter::learn_source(Source& source) {
   const Innovation found = innovation(SourceId{static_cast<std::size_t>(&source - sources_.data())}, source.sensed);
   const Vector6& least = source.kind == SourceKind::imu ? kLeastGyroNoise : kLeastOdometryNoise;
   for (int axis = 0; axis < 6; ++axis) {
-    const bool felt = axis < 3 && last_force_;
-    const bool told = felt || found.others[axis] < kTold * predicted_variance_[axis];
-    if (source.variance[axis] == 0.0 || !told)
+    const bool force_measured = axis < 3 && last_force_;
+    const bool observed = force_measured || found.others[axis] < kObservedRatio * predicted_variance_[axis];
+    if (source.variance[axis] == 0.0 || !observed)
       continue; // no reference to compare with
     learn_variance(source.noise_per_s[axis], source.learned_s[axis], found.value[axis], source.known_variance[axis],
                    found.others[axis], 1.0 / elapsed_s_, elapsed_s_, least[axis]);
@@ -585,11 +588,11 @@ void MotionFilter::learn_source(Source& source) {
   source.last_twist = source.sensed.mean;
 }
 
-void MotionFilter::keep(const Matrix6& share) {
-  Common kept = Common::Identity();
-  kept.topLeftCorner<6, 6>() -= share;
-  kept.block<6, 6>(kMap, kPosition) = share;
-  propagate(kept);
+void MotionFilter::transfer_error_to_map(const Matrix6& share) {
+  Common transfer = Common::Identity();
+  transfer.topLeftCorner<6, 6>() -= share;
+  transfer.block<6, 6>(kMap, kPosition) = share;
+  propagate(transfer);
   keep_floor();
 }
 
@@ -607,6 +610,6 @@ Matrix6 MotionFilter::of_mounting() const {
   return error * kMountingOfLidar.asDiagonal() * error.transpose();
 }
 
-void MotionFilter::put(const Pose& T_odom_base) { T_odom_base_ = T_odom_base; }
+void MotionFilter::set_pose(const Pose& T_odom_base) { T_odom_base_ = T_odom_base; }
 
 } // namespace locus

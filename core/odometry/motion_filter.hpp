@@ -67,9 +67,9 @@ using LearnedSources = std::array<std::optional<LearnedSource>, kMaxSources>;
 /// Each gyro adds bias, lateness and mounting error; each odometry adds scales of forward distance and yaw, the
 /// direction of its forward axis (left, up) and its slip.
 ///
-/// Sequence for a sweep: predict(), measure() for each source or rest(), move(), see() with the registration, learn().
-/// The noise of each source is learned from its innovation against all others (variance components); an axis that
-/// nothing else measures is skipped. Noise is per second, so the sweep rate does not matter. Copies of this value
+/// Sequence for a sweep: predict(), measure() for each source or rest(), move(), update() with the registration,
+/// learn(). The noise of each source is learned from its innovation against all others (variance components); an axis
+/// that nothing else measures is skipped. Noise is per second, so the sweep rate does not matter. Copies of this value
 /// type are hypotheses. Fixed size. One owner.
 class MotionFilter {
  public:
@@ -111,29 +111,29 @@ class MotionFilter {
 
   /// Returns twice the negative log likelihood of a registration under the prediction, up to a constant: Student's t of
   /// its innovation in pose and twist, and Occam's factor for the directions that the points determine (MacKay 2003,
-  /// 28.1). Call before see().
+  /// 28.1). Call before update().
   [[nodiscard]] double surprise(const Registration& found) const;
 
   /// Sets pose and twist to the registration's result, which includes the prior, and updates the covariance with
   /// `information`, that of the points alone.
-  void see(const Pose& T_odom_base, const Vector6& twist_base, const Matrix12& information);
+  void update(const Pose& T_odom_base, const Vector6& twist_base, const Matrix12& information);
 
   /// Compares each measured source with all others, and learns its noise.
   void learn();
 
-  /// Returns the innovation of a source, measured or not. Call after see(). A slip that the filter estimates is part of
-  /// the innovation, unless it is `excused`.
-  [[nodiscard]] Innovation innovation(SourceId id, const SensedTwist& sensed, bool excused = false) const;
+  /// Returns the innovation of a source, measured or not. Call after update(). A slip that the filter estimates is part
+  /// of the innovation, unless `slip_explained`.
+  [[nodiscard]] Innovation innovation(SourceId id, const SensedTwist& sensed, bool slip_explained = false) const;
 
   /// Returns the prior odds, as twice their logarithm, that no slip begins in this sweep. Call after predict().
   [[nodiscard]] double odds_against_slip() const;
 
   /// Transfers `share` of the pose error, along each axis, to the error of the map. Call after a keyframe is inserted.
-  void keep(const Matrix6& share);
+  void transfer_error_to_map(const Matrix6& share);
   /// Sets the pose and leaves the covariance unchanged.
-  void put(const Pose& T_odom_base);
+  void set_pose(const Pose& T_odom_base);
   /// Resets calibration and noise of a source to their priors; lateness and mounting of a gyro keep their values.
-  void forget(SourceId source);
+  void reset_source(SourceId source);
   /// Restores the calibration that another run learned, which ended `elapsed_s` ago. Correlations with other states are
   /// dropped. States configured as exact keep their configured value.
   void recall(SourceId source, const LearnedSource& learned, double elapsed_s);
@@ -171,8 +171,9 @@ class MotionFilter {
     Vector6 mean, variance;
     Common F = Common::Identity(), of_new_rate = Common::Identity();
   };
-  [[nodiscard]] TwistStep decay(double elapsed_s, double step_s, double unfelt_s, bool felt, Measured measured);
-  void integrate(const SpecificForce& force, double felt_s, const Eigen::Vector3d& new_rate, TwistStep& step) const;
+  [[nodiscard]] TwistStep decay(double elapsed_s, double step_s, double unmeasured_s, bool force_measured,
+                                Measured measured);
+  void integrate(const SpecificForce& force, double measured_s, const Eigen::Vector3d& new_rate, TwistStep& step) const;
   void couple_lateness(const SpecificForce& force);
   [[nodiscard]] Eigen::Vector3d force_change(const SpecificForce& force) const;
 
@@ -183,20 +184,20 @@ class MotionFilter {
   [[nodiscard]] Row row(const Source& source, const SensedTwist& sensed, int axis) const;
   [[nodiscard]] Vector6 known_variance(const Source& source, const Vector6& twist_base) const;
   void propagate(const Common& F);
-  void update(const State& h, double surprise, double variance);
+  void update_scalar(const State& h, double innovation, double variance);
   void correct(const State& error);
   void lower(const State& Ph, const State& considered, double innovation_variance);
   [[nodiscard]] static State of_map(const State& Ph);
   void turn_scale(int scale, int axis, double change);
   void learn_source(Source& source);
   void age(const Source& source, double elapsed_s);
-  void wander(int state, double mean, double variance, double kept);
+  void wander(int state, double mean, double variance, double retained);
   [[nodiscard]] Matrix6 of_mounting() const;
   void limit_speed();
   void keep_floor();
 
   MotionLimits limits_;
-  Vector6 able_; ///< acceleration variance, (m/s^2)^2 and (rad/s^2)^2
+  Vector6 acceleration_variance_; ///< acceleration variance, (m/s^2)^2 and (rad/s^2)^2
   std::array<Source, kMaxSources> sources_;
   std::size_t count_; ///< number of sources
   int states_ = kCommonStates;
@@ -207,7 +208,7 @@ class MotionFilter {
   double elapsed_s_ = 0.0; ///< time between the ends of the last two sweeps
   std::optional<SpecificForce> last_force_;
   Vector6 predicted_variance_ = Vector6::Zero(); ///< variance of the predicted twist
-  Vector6 untold_s_ = Vector6::Zero();           ///< time since each axis of the twist was last observed
+  Vector6 unobserved_s_ = Vector6::Zero();       ///< time since each axis of the twist was last observed
 };
 
 } // namespace locus

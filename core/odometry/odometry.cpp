@@ -23,7 +23,7 @@ constexpr double kLoneDeviation_sigma = 3.0;
 constexpr double kWide_m = 0.3;
 
 /// Change of the twist above which the points are de-skewed again: it distorts a block of points.
-constexpr double kBends_mps = 0.3, kBends_radps = 0.05;
+constexpr double kDistorts_mps = 0.3, kDistorts_radps = 0.05;
 
 /// Least fit at rest, relative to the best other hypothesis. A lower one would hold back a robot that pulls away.
 constexpr double kAsGoodAtRest = 0.998;
@@ -49,10 +49,10 @@ constexpr double kDropped = 1.5;
 /// target.
 Matrix6 share_of_map(double fresh, const Matrix6& observability) {
   const Matrix6 all = Matrix6::Identity();
-  const Matrix6 seen = observability / SeenAxes::kWeakBelow;
-  const Matrix6 unseen = (seen * seen + all).inverse();
+  const Matrix6 constrained = observability / ObservedAxes::kWeakBelow;
+  const Matrix6 unconstrained = (constrained * constrained + all).inverse();
   const double share = 2.0 * fresh / (1.0 + fresh);
-  return share * all + (1.0 - share) * unseen;
+  return share * all + (1.0 - share) * unconstrained;
 }
 
 } // namespace
@@ -63,7 +63,7 @@ Odometry::Odometry(const OdometryOptions& options, const std::vector<MotionSourc
       last_scan_map_(kLastScanBytes, options.isa), map_policy_(options.map), filter_(sources, options.motion) {
   std::vector<MotionSourceOptions> observed = sources;
   for (std::size_t i = 0; i < sources.size(); ++i) {
-    feedback_.late[i] = MotionTrack::taken_out(1e-3 * sources[i].late_ms);
+    feedback_.late[i] = MotionTrack::applied_lateness(1e-3 * sources[i].late_ms);
     if (sources[i].calibration == Calibration::report)
       observed[i].calibration = Calibration::automatic;
   }
@@ -71,7 +71,7 @@ Odometry::Odometry(const OdometryOptions& options, const std::vector<MotionSourc
     observer_.emplace(observed, options.motion);
 }
 
-void Odometry::begin_at(const Whereabouts& last, std::span<const SurfacePoint> map_odom) {
+void Odometry::begin_at(const ResumeState& last, std::span<const SurfacePoint> map_odom) {
   start_ = last;
   map_.insert(map_odom, Pose{});
 }
@@ -101,13 +101,13 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
   estimate.scan_to_submap = best.fit;
   static_cast<SourceChoice&>(estimate.prior) = best.choice;
   estimate.prior.otherwise = options_.no_source_prior;
-  estimate.failed = !best.placed;
+  estimate.failed = !best.accepted;
   if (estimate.failed) {
     estimate.state = TrackingState::dead_reckoning;
   } else if (best.rests) {
     estimate.state = TrackingState::standstill;
   } else {
-    filter_.see(best.fit.T_target_source, best.fit.twist_base, best.fit.information);
+    filter_.update(best.fit.T_target_source, best.fit.twist_base, best.fit.information);
   }
   if (!estimate.failed) {
     filter_.learn();
@@ -118,9 +118,9 @@ OdometryEstimate Odometry::process(const Sweep& sweep, const Gicp::StopRequested
   stands_ = best.rests;
   correct(sweep, filter_.twist_base(), best.rests ? kAllSources : best.without);
   if (flat_ground_.holds())
-    filter_.put(flat_ground_.flatten(T_odom_last, filter_.pose(),
-                                     estimate.failed ? Matrix6::Zero().eval()
-                                                     : best.fit.information.topLeftCorner<6, 6>().eval()));
+    filter_.set_pose(flat_ground_.flatten(T_odom_last, filter_.pose(),
+                                          estimate.failed ? Matrix6::Zero().eval()
+                                                          : best.fit.information.topLeftCorner<6, 6>().eval()));
   finish(sweep, estimate);
   return estimate;
 }
@@ -138,9 +138,9 @@ void Odometry::prepare_next() {
   const StageScope scope(clock_, Stage::map);
   const double fresh = map_.insert(free_space_.leave_out_moving(scan_, filter_.pose()), filter_.pose());
   const Matrix6 share = share_of_map(fresh, *keyframe_observability_);
-  filter_.keep(share);
+  filter_.transfer_error_to_map(share);
   if (observer_)
-    observer_->keep(share);
+    observer_->transfer_error_to_map(share);
   keyframe_observability_.reset();
 }
 
@@ -153,7 +153,7 @@ SourceChoice Odometry::choose_among(const Sweep& sweep, std::bitset<kMaxSources>
 
 /// Returns the twist during the sweep minus the mean since the last processed one, as far as sources measure it. Zero
 /// unless sweeps were dropped in between.
-Vector6 Odometry::unlike_mean(const Sweep& sweep) const {
+Vector6 Odometry::twist_offset_after_drops(const Sweep& sweep) const {
   Vector6 difference = Vector6::Zero();
   if (steps_.elapsed_s(sweep) < kDropped * to_seconds(sweep.end - sweep.start))
     return difference;
@@ -169,12 +169,12 @@ Vector6 Odometry::unlike_mean(const Sweep& sweep) const {
 /// Returns the hypothesis after the update with the sources, before registration.
 Odometry::Hypothesis Odometry::assume(const Sweep& sweep, const Assumption& assumption) const {
   Hypothesis hypothesis{assumption, choose_among(sweep, assumption.without), false, filter_, {}, {}};
-  tell(hypothesis.filter, sweep, hypothesis);
+  apply_sources(hypothesis.filter, sweep, hypothesis);
   return hypothesis;
 }
 
 /// Predicts the filter for a sweep and updates it with the sources of a hypothesis, all but lidar.
-void Odometry::tell(MotionFilter& filter, const Sweep& sweep, const Hypothesis& hypothesis) const {
+void Odometry::apply_sources(MotionFilter& filter, const Sweep& sweep, const Hypothesis& hypothesis) const {
   const auto& [rotation, translation] = hypothesis.choice;
   const bool free = hypothesis.without.all();
   const std::optional<SpecificForce> force = force_of(sweep, hypothesis.without);
@@ -200,8 +200,8 @@ void Odometry::tell(MotionFilter& filter, const Sweep& sweep, const Hypothesis& 
 /// Updates the observer, which estimates calibrations that are only reported. The posterior `fit` includes the prior of
 /// the best hypothesis's filter; that prior is exchanged for the observer's.
 void Odometry::observe(const Sweep& sweep, const Hypothesis& best) {
-  tell(*observer_, sweep, best);
-  if (best.placed && !best.rests) {
+  apply_sources(*observer_, sweep, best);
+  if (best.accepted && !best.rests) {
     const Registration& fit = best.fit;
     const auto expected = [&](const MotionFilter& filter) {
       Vector12 off_fit;
@@ -210,11 +210,11 @@ void Odometry::observe(const Sweep& sweep, const Hypothesis& best) {
     };
     const Matrix12 known = observer_->covariance().inverse() + fit.information;
     const Vector12 off_fit = known.ldlt().solve(expected(*observer_) - expected(best.filter));
-    observer_->see({(so3_exp(off_fit.segment<3>(3)) * fit.T_target_source.rotation).normalized(),
-                    fit.T_target_source.translation + off_fit.head<3>()},
-                   fit.twist_base + off_fit.tail<6>(), fit.information);
+    observer_->update({(so3_exp(off_fit.segment<3>(3)) * fit.T_target_source.rotation).normalized(),
+                       fit.T_target_source.translation + off_fit.head<3>()},
+                      fit.twist_base + off_fit.tail<6>(), fit.information);
   }
-  if (best.placed)
+  if (best.accepted)
     observer_->learn();
 }
 
@@ -254,9 +254,10 @@ void Odometry::register_with(const Sweep& sweep, Hypothesis& hypothesis, const G
       !hypothesis.rests && hypothesis.filter.covariance().diagonal().head<3>().maxCoeff() > kWide_m * kWide_m;
   const Pose T_start = hypothesis.fit.T_target_source;
   hypothesis.fit = gicp_.align(aged_.sort(sweep, scan_, belief.twist_base), map_, T_start, belief, options, wide, stop);
-  const Vector6 bent = (hypothesis.fit.twist_base - belief.twist_base).cwiseAbs();
-  const bool bends = bent.head<3>().maxCoeff() >= kBends_mps || bent.tail<3>().maxCoeff() >= kBends_radps;
-  if (!bends || stop())
+  const Vector6 twist_change = (hypothesis.fit.twist_base - belief.twist_base).cwiseAbs();
+  const bool is_distorted =
+      twist_change.head<3>().maxCoeff() >= kDistorts_mps || twist_change.tail<3>().maxCoeff() >= kDistorts_radps;
+  if (!is_distorted || stop())
     return;
   const int before = hypothesis.fit.iterations;
   correct(sweep, hypothesis.fit.twist_base, hypothesis.without);
@@ -347,30 +348,30 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
   const Vector6 sigma = best.filter.covariance().diagonal().tail<6>().cwiseSqrt();
   const bool may_rest = (twist.array().abs() < kRest_sigma * sigma.array() + 1e-3).all();
   MotionFilter after = best.filter;
-  after.see(best.fit.T_target_source, best.fit.twist_base, best.fit.information);
-  const Vector6 doubt = after.covariance().diagonal().tail<6>().cwiseSqrt();
+  after.update(best.fit.T_target_source, best.fit.twist_base, best.fit.information);
+  const Vector6 sigma_after = after.covariance().diagonal().tail<6>().cwiseSqrt();
   const bool slow = (best.fit.twist_base.array().abs() < kSlow.array()).all() &&
-                    (doubt.array() < kSlowDoubt * kSlow.array()).all(); // standstill requires an observed twist
+                    (sigma_after.array() < kSlowDoubt * kSlow.array()).all(); // standstill requires an observed twist
   if (!slow)
     slow_since_ = sweep.end;
   if (may_rest && (stands_ || sweep.end - slow_since_ >= kSlowFor)) {
     if (Hypothesis rest = attempt(sweep, {.without = best.without, .rests = true}, stop);
         fit_of(rest.fit) > kAsGoodAtRest * fit_of(best.fit)) {
-      rest.filter.put(filter_.pose());
+      rest.filter.set_pose(filter_.pose());
       best = rest;
     }
   }
-  if (!best.rests && !is_placed(sweep, lidar_alone.value_or(best.fit), first))
+  if (!best.rests && !is_accepted(sweep, lidar_alone.value_or(best.fit), first))
     return first; // not accepted: dead reckoning uses all sources
-  best.placed = true;
+  best.accepted = true;
   return best;
 }
 
 /// De-skews the points for a base that moved with mean twist `twist_base` since the last sweep. If sources are
 /// excluded, their motion within the sweep is removed.
 void Odometry::correct(const Sweep& sweep, const Vector6& twist_base, std::bitset<kMaxSources> without) {
-  move_points(sweep, without.any() ? SweepCorrection::anew(sweep, twist_base)
-                                   : SweepCorrection::all(sweep, twist_base + unlike_mean(sweep)));
+  move_points(sweep, without.any() ? SweepCorrection::constant(sweep, twist_base)
+                                   : SweepCorrection::all(sweep, twist_base + twist_offset_after_drops(sweep)));
 }
 
 void Odometry::move_points(const Sweep& sweep, const SweepCorrection& correction) {
@@ -381,7 +382,7 @@ void Odometry::move_points(const Sweep& sweep, const SweepCorrection& correction
 /// Returns the source that contradicts all others most, if any: one whose innovation is less likely than its fault.
 std::optional<Odometry::Contradiction> Odometry::worst_source(const Sweep& sweep, const Hypothesis& hypothesis) const {
   MotionFilter after = hypothesis.filter;
-  after.see(hypothesis.fit.T_target_source, hypothesis.fit.twist_base, hypothesis.fit.information);
+  after.update(hypothesis.fit.T_target_source, hypothesis.fit.twist_base, hypothesis.fit.information);
   std::optional<Contradiction> worst;
   for (const auto& source : {hypothesis.choice.rotation, hypothesis.choice.translation}) {
     if (!source)
@@ -402,11 +403,11 @@ std::optional<Odometry::Contradiction> Odometry::worst_source(const Sweep& sweep
 
 /// Returns whether a registration is accepted. One that misses most of the usual correspondences is rejected if it
 /// deviates from the prediction of `all_sources`, unless lidar had no registration for a while.
-bool Odometry::is_placed(const Sweep& sweep, const Registration& fit, const Hypothesis& all_sources) const {
+bool Odometry::is_accepted(const Sweep& sweep, const Registration& fit, const Hypothesis& all_sources) const {
   if (fit.iterations == 0 || !fit.T_target_source.finite() || fit.overlap() < kMinInlierShare)
     return false;
-  const bool had_sight = saw_ || (map_policy_.is_refused() && map_policy_.was_placed_lately(sweep.end));
-  if (!all_sources.choice.translation || !had_sight || !lidar_health_.misses_most(fit))
+  const bool was_registered = registered_ || (map_policy_.is_refused() && map_policy_.was_accepted_lately(sweep.end));
+  if (!all_sources.choice.translation || !was_registered || !lidar_health_.lacks_correspondences(fit))
     return true;
   const Vector6 deviation = difference(fit.T_target_source, all_sources.filter.pose()).cwiseAbs();
   const Vector6 sigma = all_sources.filter.covariance().diagonal().head<6>().cwiseSqrt();
@@ -416,10 +417,10 @@ bool Odometry::is_placed(const Sweep& sweep, const Registration& fit, const Hypo
 /// Reports observability and the innovations of the motion sources after an accepted registration.
 void Odometry::report(const Sweep& sweep, OdometryEstimate& estimate) {
   const Matrix6 R = turn_both(estimate.T_odom_base.rotation);
-  estimate.observability = seen_axes_.observe(R.transpose() * estimate.scan_to_submap.observability * R);
-  if (!seen_axes_.all() && estimate.state == TrackingState::tracking)
+  estimate.observability = observed_axes_.observe(R.transpose() * estimate.scan_to_submap.observability * R);
+  if (!observed_axes_.all() && estimate.state == TrackingState::tracking)
     estimate.state = TrackingState::degenerate;
-  if (!saw_)
+  if (!registered_)
     return; // a jump back to the submap is not motion of the robot
   for (std::size_t i = 0; i < sources_.size(); ++i)
     if (const auto twist_base = steps_.twist_base(sweep, SourceId{i})) {
@@ -428,15 +429,16 @@ void Odometry::report(const Sweep& sweep, OdometryEstimate& estimate) {
       source_reports_[i].test_ratio = test_ratio(innovation, steps_.elapsed_s(sweep)).value_or(0.0);
       feedback_.opinions[i] = opinion_on(innovation, steps_.elapsed_s(sweep));
     }
-  feedback_.twist_base = seen_axes_.part_of(filter_.twist_base());
-  feedback_.sees = seen_axes_.each();
+  feedback_.twist_base = observed_axes_.part_of(filter_.twist_base());
+  feedback_.observes = observed_axes_.each();
 }
 
 /// Sets the lateness of a gyro that the ingest subtracts from its stamps. Follows the estimate only if it differs
 /// clearly.
-void Odometry::follow_lateness(const Learned& late_s, Duration& taken_out) {
-  if (std::abs(late_s.mean - to_seconds(taken_out)) > std::max(kPlainlyLate_sigma * late_s.sigma, kPlainlyLate_s))
-    taken_out = MotionTrack::taken_out(std::clamp(late_s.mean, -kMostLate_s, kMostLate_s));
+void Odometry::follow_lateness(const Learned& late_s, Duration& applied_lateness) {
+  if (std::abs(late_s.mean - to_seconds(applied_lateness)) >
+      std::max(kPlainlyLate_sigma * late_s.sigma, kPlainlyLate_s))
+    applied_lateness = MotionTrack::applied_lateness(std::clamp(late_s.mean, -kMostLate_s, kMostLate_s));
 }
 
 /// Resets a source that was lost and returns with a new epoch, perhaps as another device. A sweep without a sample of
@@ -446,14 +448,14 @@ void Odometry::follow_epoch(SourceId source, const SourcePose& sensed) {
   if (!sensed.known || epoch == sensed.epoch)
     return;
   if (epoch && !recalled_[index_of(source)])
-    forget(source);
+    reset_source(source);
   epoch = sensed.epoch;
 }
 
-void Odometry::forget(SourceId source) {
-  filter_.forget(source);
+void Odometry::reset_source(SourceId source) {
+  filter_.reset_source(source);
   if (observer_)
-    observer_->forget(source);
+    observer_->reset_source(source);
   if (sources_[index_of(source)].kind == SourceKind::odometry)
     learned_since_[index_of(source)] = Stamp{};
 }
@@ -493,44 +495,44 @@ void Odometry::finish(const Sweep& sweep, OdometryEstimate& estimate) {
                .to = sweep.end,
                .opinions = {},
                .twist_base = Vector6::Zero(),
-               .sees = {},
+               .observes = {},
                .late = feedback_.late};
   if (!estimate.failed)
     report(sweep, estimate);
   for (const auto& source : {estimate.prior.rotation, estimate.prior.translation})
     if (source)
       source_reports_[index_of(*source)].last_used = sweep.end;
-  saw_ = !estimate.failed;
-  scan_is_next_target_ = saw_ && options_.scan_to_scan_mode == ScanToScanMode::always;
+  registered_ = !estimate.failed;
+  scan_is_next_target_ = registered_ && options_.scan_to_scan_mode == ScanToScanMode::always;
   tilt_keeper_.observe(estimate.T_odom_base.rotation, gravity_.up_base());
   const MapPolicy::Verdict verdict =
       map_policy_.judge({.stamp = sweep.end,
                          .T_odom_base = estimate.T_odom_base,
-                         .placed = !estimate.failed,
+                         .accepted = !estimate.failed,
                          .has_points = scan_.size() >= kMinPoints,
-                         .misses_most = lidar_health_.misses_most(estimate.scan_to_submap),
+                         .lacks_correspondences = lidar_health_.lacks_correspondences(estimate.scan_to_submap),
                          .carried = estimate.prior.translation.has_value(),
                          .turn_measured = estimate.prior.rotation.has_value(),
                          .overlap = estimate.scan_to_submap.overlap()});
-  if (verdict == MapPolicy::Verdict::begins_anew)
+  if (verdict == MapPolicy::Verdict::restart)
     map_.clear();
-  if (verdict != MapPolicy::Verdict::waits) {
+  if (verdict != MapPolicy::Verdict::wait) {
     if (estimate.failed)
-      free_space_.forget();
+      free_space_.clear();
     free_space_.expect(sweep);
     estimate.keyframe = true;
     keyframe_observability_ = estimate.scan_to_submap.observability;
-    filter_.put({(so3_exp(tilt_keeper_.take_correction_rad()) * estimate.T_odom_base.rotation).normalized(),
-                 estimate.T_odom_base.translation});
+    filter_.set_pose({(so3_exp(tilt_keeper_.pop_correction_rad()) * estimate.T_odom_base.rotation).normalized(),
+                      estimate.T_odom_base.translation});
     estimate.T_odom_base = filter_.pose();
   }
   estimate.twist_base = filter_.twist_base();
   estimate.twist_covariance = filter_.covariance().bottomRightCorner<6, 6>();
   estimate.pose_covariance = filter_.pose_covariance_since_start();
   if (observer_)
-    observer_->put(filter_.pose());
+    observer_->set_pose(filter_.pose());
   report_sources(sweep, estimate);
-  steps_.remember(sweep);
+  steps_.store(sweep);
 }
 
 } // namespace locus

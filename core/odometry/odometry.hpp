@@ -22,9 +22,9 @@
 #include "core/odometry/lidar_health.hpp"
 #include "core/odometry/map_policy.hpp"
 #include "core/odometry/motion_filter.hpp"
+#include "core/odometry/observed_axes.hpp"
 #include "core/odometry/odometry_estimate.hpp"
 #include "core/odometry/relocation.hpp"
-#include "core/odometry/seen_axes.hpp"
 #include "core/odometry/sensed_steps.hpp"
 #include "core/sources/registration_feedback.hpp"
 
@@ -45,7 +45,7 @@ class Odometry {
   /// Starts from `last` instead of level at the origin. Relocalises in `map_odom` (surfaces in the odom frame), if
   /// given. If the result is ambiguous, waits up to 1 s for an odometry source that spans the gap. If relocalisation
   /// fails, starts at the pose from such a source, or else level at the origin. Call before the first sweep.
-  void begin_at(const Whereabouts& last, std::span<const SurfacePoint> map_odom = {});
+  void begin_at(const ResumeState& last, std::span<const SurfacePoint> map_odom = {});
 
   /// Restores the calibration of the motion sources from another run that ended `elapsed_s` ago. Call before the first
   /// sweep.
@@ -92,8 +92,8 @@ class Odometry {
   /// A motion hypothesis for one sweep, and its registration.
   struct Hypothesis : Assumption {
     SourceChoice choice;
-    bool placed = false; ///< the registration is accepted
-    MotionFilter filter; ///< before the update with lidar
+    bool accepted = false; ///< the registration is accepted
+    MotionFilter filter;   ///< before the update with lidar
     Registration scan_to_scan, fit;
   };
 
@@ -112,15 +112,15 @@ class Odometry {
   };
 
   OdometryEstimate begin(const Sweep& sweep);
-  bool find_again(const Sweep& sweep);
+  bool relocalise_first(const Sweep& sweep);
   void find_start(const Sweep& sweep, const Gicp::StopRequested& stop);
   std::optional<Start> find_first_motion(const Sweep& first, const Sweep& sweep, const Gicp::StopRequested& stop);
   void begin_filter(const Pose& T_odom_first, const Start& start);
-  void find_once_more(const Sweep& first, const Sweep& sweep, const Start& start);
+  void relocalise_again(const Sweep& first, const Sweep& sweep, const Start& start);
   [[nodiscard]] Start start_without(std::bitset<kMaxSources> without, const Sweep& first, const Sweep& sweep,
                                     const Gicp::StopRequested& stop);
   [[nodiscard]] SourceChoice choose_among(const Sweep& sweep, std::bitset<kMaxSources> without) const;
-  [[nodiscard]] Vector6 unlike_mean(const Sweep& sweep) const;
+  [[nodiscard]] Vector6 twist_offset_after_drops(const Sweep& sweep) const;
   [[nodiscard]] Hypothesis assume(const Sweep& sweep, const Assumption& assumption) const;
   void match_last(const Sweep& sweep, const MotionBelief& belief, Hypothesis& hypothesis,
                   const Gicp::StopRequested& stop);
@@ -130,16 +130,16 @@ class Odometry {
   std::optional<Registration> consider_faults(const Sweep& sweep, Hypothesis& best, const Gicp::StopRequested& stop);
   Hypothesis attempt(const Sweep& sweep, const Assumption& assumption, const Gicp::StopRequested& stop);
   Hypothesis choose(const Sweep& sweep, const Gicp::StopRequested& stop);
-  void tell(MotionFilter& filter, const Sweep& sweep, const Hypothesis& hypothesis) const;
+  void apply_sources(MotionFilter& filter, const Sweep& sweep, const Hypothesis& hypothesis) const;
   void observe(const Sweep& sweep, const Hypothesis& best);
   void follow_epoch(SourceId source, const SourcePose& sensed);
-  void forget(SourceId source);
+  void reset_source(SourceId source);
   void correct(const Sweep& sweep, const Vector6& twist_base, std::bitset<kMaxSources> without);
   void move_points(const Sweep& sweep, const SweepCorrection& correction);
   [[nodiscard]] std::optional<Contradiction> worst_source(const Sweep& sweep, const Hypothesis& hypothesis) const;
-  [[nodiscard]] bool is_placed(const Sweep& sweep, const Registration& fit, const Hypothesis& all_sources) const;
+  [[nodiscard]] bool is_accepted(const Sweep& sweep, const Registration& fit, const Hypothesis& all_sources) const;
   void report(const Sweep& sweep, OdometryEstimate& estimate);
-  static void follow_lateness(const Learned& late_s, Duration& taken_out);
+  static void follow_lateness(const Learned& late_s, Duration& applied_lateness);
   void report_sources(const Sweep& sweep, OdometryEstimate& estimate);
   void finish(const Sweep& sweep, OdometryEstimate& estimate);
 
@@ -155,7 +155,7 @@ class Odometry {
   FreeSpace free_space_;
   MapPolicy map_policy_;
   LidarHealth lidar_health_;
-  SeenAxes seen_axes_;
+  ObservedAxes observed_axes_;
   SensedSteps steps_;
   MotionFilter filter_;
   std::optional<MotionFilter> observer_; ///< calibrates sources whose result is only reported, never used
@@ -166,12 +166,12 @@ class Odometry {
   std::bitset<kMaxSources> recalled_;    ///< sources restored from another run and not received yet
   std::array<std::optional<std::uint32_t>, kMaxSources> epochs_; ///< last known epoch of each source
   std::array<Stamp, kMaxSources> learned_since_{};
-  std::optional<Whereabouts> start_;              ///< starting pose
-  std::optional<Whereabouts> run_before_;         ///< end of the last run, if the first sweep was found in its map
+  std::optional<ResumeState> start_;              ///< starting pose
+  std::optional<ResumeState> run_before_;         ///< end of the last run, if the first sweep was found in its map
   std::optional<Stamp> waits_since_;              ///< start of the wait for an odometry source that spans the gap
   std::optional<Matrix6> keyframe_observability_; ///< of the last sweep, if it is a keyframe that is not in the map yet
   std::optional<Beginning> beginning_;
-  bool stands_ = false, saw_ = false;
+  bool stands_ = false, registered_ = false;
   bool scan_is_next_target_ = false; ///< the last sweep is to become the target of scan-to-scan
   bool has_last_scan_ = false;       ///< scan-to-scan has a target
   Stamp slow_since_;

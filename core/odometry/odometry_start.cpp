@@ -26,10 +26,10 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
   OdometryEstimate estimate;
   move_points(sweep, SweepCorrection::all(sweep, corrected_twist(sweep)));
   gravity_.observe(Eigen::Quaterniond::Identity(), sweep);
-  estimate.failed = scan_.size() < kMinPoints || (map_.fine().size() > 0 && !find_again(sweep));
-  Whereabouts here;
+  estimate.failed = scan_.size() < kMinPoints || (map_.fine().size() > 0 && !relocalise_first(sweep));
+  ResumeState here;
   if (start_ && estimate.failed)
-    here = start_->moved_to(start_->places(sweep.end, sweep.motion, options_.motion.max_speed_mps).front());
+    here = start_->moved_to(start_->candidates(sweep.end, sweep.motion, options_.motion.max_speed_mps).front());
   else if (start_)
     here = *start_;
   else if (const auto up_base = gravity_.up_base())
@@ -58,32 +58,32 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
   estimate.pose_covariance = filter_.pose_covariance_since_start();
   estimate.points = sweep.registered;
   report_sources(sweep, estimate);
-  steps_.remember(sweep);
+  steps_.store(sweep);
   return estimate;
 }
 
 /// Relocalises in the map of another run. If that fails, discards the map and starts at the pose from an odometry
 /// source, or at the origin. Returns false while waiting for such a source.
-bool Odometry::find_again(const Sweep& sweep) {
+bool Odometry::relocalise_first(const Sweep& sweep) {
   constexpr Duration kPatience = std::chrono::seconds{1}; ///< DDS discovery takes less
   waits_since_ = waits_since_.value_or(sweep.end);
   const StageScope scope(clock_, Stage::scan_to_submap);
-  const std::vector<Place> places = start_->places(sweep.end, sweep.motion, options_.motion.max_speed_mps);
-  const bool waits = !places.front().vouched && start_->awaits(sweep.motion) &&
+  const std::vector<Candidate> candidates = start_->candidates(sweep.end, sweep.motion, options_.motion.max_speed_mps);
+  const bool waits = !candidates.front().from_healthy && start_->awaits(sweep.motion) &&
                      std::chrono::abs(sweep.end - *waits_since_) < kPatience;
-  if (const auto found =
-          relocate(gicp_, std::span(scan_).first(sweep.registered), map_, places, options_.scan_to_submap, waits)) {
+  if (const auto found = relocalise(gicp_, std::span(scan_).first(sweep.registered), map_, candidates,
+                                    options_.scan_to_submap, waits)) {
     beginning_ = Beginning::map;
-    run_before_ = std::exchange(start_, start_->moved_to(found->place));
+    run_before_ = std::exchange(start_, start_->moved_to(found->candidate));
     map_policy_.resume();
     return true;
   }
   if (waits)
     return false;
   map_.clear();
-  if (const auto told = std::ranges::find_if(places, &Place::told); told != places.end()) {
+  if (const auto sensed = std::ranges::find_if(candidates, &Candidate::from_odometry); sensed != candidates.end()) {
     beginning_ = Beginning::odometry;
-    start_ = start_->moved_to(*told);
+    start_ = start_->moved_to(*sensed);
   } else {
     start_.reset();
   }
@@ -105,12 +105,12 @@ void Odometry::find_start(const Sweep& sweep, const Gicp::StopRequested& stop) {
   }
   if (start && run_before_) {
     if (!stop()) // a registration cut short fits badly for that reason alone
-      find_once_more(first, sweep, *start);
+      relocalise_again(first, sweep, *start);
   } else if (start) {
     lidar_health_.learn(start->fit, steps_.elapsed_s(sweep));
     map_.clear();
   }
-  free_space_.forget(); // the first sweep was not de-skewed
+  free_space_.clear(); // the first sweep was not de-skewed
   if (start || run_before_) {
     free_space_.expect(first);
     map_.insert(free_space_.leave_out_moving(scan_, filter_.pose()), filter_.pose());
@@ -145,21 +145,21 @@ std::optional<Odometry::Start> Odometry::find_first_motion(const Sweep& first, c
 
 /// Relocalises the first sweep again after its de-skew with the motion of the first two. An odometry source that
 /// contradicts this motion is doubted: its pose need not be right.
-void Odometry::find_once_more(const Sweep& first, const Sweep& sweep, const Start& start) {
+void Odometry::relocalise_again(const Sweep& first, const Sweep& sweep, const Start& start) {
   const StageScope scope(clock_, Stage::scan_to_submap);
   MotionFilter lidar_alone = assume(sweep, {.without = kAllSources}).filter;
-  lidar_alone.see(start.fit.T_target_source, start.twist_base, start.fit.information);
+  lidar_alone.update(start.fit.T_target_source, start.twist_base, start.fit.information);
   for (std::size_t i = 0; i < sources_.size(); ++i)
     if (const auto twist_base = steps_.twist_base(sweep, SourceId{i})) {
       const auto ratio = test_ratio(lidar_alone.innovation(SourceId{i}, *twist_base), steps_.elapsed_s(sweep));
       run_before_->doubted[i] = run_before_->doubted[i] || ratio.value_or(0.0) > 1.0;
     }
-  const auto found = relocate(gicp_, std::span(scan_).first(first.registered), map_,
-                              run_before_->places(first.end, first.motion, options_.motion.max_speed_mps),
-                              options_.scan_to_submap, false);
+  const auto found = relocalise(gicp_, std::span(scan_).first(first.registered), map_,
+                                run_before_->candidates(first.end, first.motion, options_.motion.max_speed_mps),
+                                options_.scan_to_submap, false);
   if (!found)
     return;
-  start_ = run_before_->moved_to(found->place);
+  start_ = run_before_->moved_to(found->candidate);
   begin_filter(start_->T_odom_base, start);
   lidar_health_.learn(found->fit, steps_.elapsed_s(sweep));
 }

@@ -20,16 +20,16 @@ namespace locus {
 inline const Vector6 kSlow = along_each_axis(0.05, 2.0);
 
 /// Candidate pose of the robot.
-struct Place {
+struct Candidate {
   Pose T_odom_base;
-  Vector6 sigma;        ///< of the search: one standard deviation, m and rad
-  Matrix6 covariance;   ///< relative to the map of the earlier run, odom axes
-  bool told = false;    ///< from an odometry
-  bool vouched = false; ///< from one that was healthy
+  Vector6 sigma;              ///< of the search: one standard deviation, m and rad
+  Matrix6 covariance;         ///< relative to the map of the earlier run, odom axes
+  bool from_odometry = false; ///< from an odometry
+  bool from_healthy = false;  ///< from one that was healthy
 };
 
 /// State at the end of a run of the odometry, from which another run resumes. A value.
-struct Whereabouts {
+struct ResumeState {
   Stamp stamp; ///< end of its last sweep
   Pose T_odom_base;
   Matrix6 pose_covariance = Matrix6::Zero(); ///< as in OdometryEstimate
@@ -41,23 +41,23 @@ struct Whereabouts {
 
   /// Returns the state after the next estimate. The twist is low-pass filtered (0.3 s) and weighted by its covariance:
   /// when a faulty source is lost, the next sweep is offset from those before.
-  [[nodiscard]] Whereabouts followed_by(const OdometryEstimate& estimate) const;
+  [[nodiscard]] ResumeState followed_by(const OdometryEstimate& estimate) const;
 
   /// Drops the data of the motion sources, when those of the next run are different ones.
-  void forget_sources() {
+  void drop_sources() {
     T_source_base = {};
     learned = {};
     doubted.reset();
   }
 
   /// Returns the pose at `now` at constant twist, which is assumed for 2 s at most.
-  [[nodiscard]] Pose carried_to(Stamp now) const;
+  [[nodiscard]] Pose extrapolated_to(Stamp now) const;
 
   /// Returns whether an odometry that was received then has not been received again yet.
   [[nodiscard]] bool awaits(const SensedMotion& sensed) const;
 
   /// Returns whether the robot was at rest, so that it may still be there.
-  [[nodiscard]] bool stood() const;
+  [[nodiscard]] bool was_at_rest() const;
 
   /// Returns the candidate poses at `now` without odometry: constant velocity, and stops along that path.
   [[nodiscard]] std::vector<Pose> way(Stamp now) const;
@@ -66,15 +66,15 @@ struct Whereabouts {
   /// path without odometry. The farther an odometry is from that path the less certain its pose, since the source may
   /// have been restarted. A source that was in doubt is less certain still and adds candidates ahead of and behind its
   /// pose. A robot that was at rest may still be there, to the centimetres of a pose from a healthy odometry.
-  [[nodiscard]] std::vector<Place> places(Stamp now, const SensedMotion& sensed, double max_speed_mps) const;
+  [[nodiscard]] std::vector<Candidate> candidates(Stamp now, const SensedMotion& sensed, double max_speed_mps) const;
 
   /// Returns the state at a candidate; its twist and sources are left unset.
-  [[nodiscard]] Whereabouts moved_to(const Place& place) const;
+  [[nodiscard]] ResumeState moved_to(const Candidate& candidate) const;
 };
 
 /// Candidate at which a sweep was found, and its registration.
-struct Relocated {
-  Place place;
+struct Relocalised {
+  Candidate candidate;
   Registration fit;
 };
 
@@ -87,10 +87,10 @@ struct Relocated {
 /// far away or hidden. It is therefore compared with the share two metres away on every side and at the other
 /// candidates. The smaller the share, the more clearly it must exceed theirs, unless an odometry vouches for the
 /// candidate; a large share may be that of a corridor, which looks the same two metres on, and need only be hardly
-/// less. Among equal fits the likelier candidate is chosen. `beyond_doubt`: the share must be clearly larger in any
+/// less. Among equal fits the likelier candidate is chosen. `unambiguous`: the share must be clearly larger in any
 /// case. Any thread, one at a time for a Gicp.
-std::optional<Relocated> relocate(Gicp& gicp, std::span<const SurfacePoint> scan_base, const SurfaceMap& map_odom,
-                                  std::span<const Place> expected, const RegistrationOptions& options,
-                                  bool beyond_doubt);
+std::optional<Relocalised> relocalise(Gicp& gicp, std::span<const SurfacePoint> scan_base, const SurfaceMap& map_odom,
+                                      std::span<const Candidate> expected, const RegistrationOptions& options,
+                                      bool unambiguous);
 
 } // namespace locus

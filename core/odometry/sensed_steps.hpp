@@ -15,7 +15,7 @@ namespace locus {
 class SensedSteps {
  public:
   /// Stores the processed `sweep` as the last one.
-  void remember(const Sweep& sweep) {
+  void store(const Sweep& sweep) {
     last_ = sweep.end;
     sources_ = sweep.motion.sources;
   }

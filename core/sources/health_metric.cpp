@@ -58,7 +58,7 @@ class OutOfOrder : public HealthMetric {
     return reason_if(newest_ && reading.stamp <= *newest_, HealthReason::out_of_order);
   }
   void accept(const SourceReading& reading) override { newest_ = reading.stamp; }
-  void forget() override { newest_.reset(); }
+  void reset() override { newest_.reset(); }
 
  private:
   std::optional<Stamp> newest_;
@@ -106,15 +106,15 @@ class FrozenOdometry : public HealthMetric {
   std::optional<HealthReason> judge(const SourceReading& reading) override {
     if (!last_ || reading.odometry->T_source_base != *last_) {
       frozen_ = false;
-      lidar_sees_twist_.setZero();
-      lidar_sees_way_.setZero();
+      lidar_twist_.setZero();
+      lidar_path_.setZero();
       return std::nullopt;
     }
     if (reading.stamp < changed_at_) { // a clock was set back: time at rest unknown
       changed_at_ = reading.stamp;
       twist_.setZero();
     }
-    frozen_ = frozen_ || cannot_stop_within(reading.stamp - changed_at_) || lidar_sees_it_move();
+    frozen_ = frozen_ || cannot_stop_within(reading.stamp - changed_at_) || lidar_observes_motion();
     return reason_if(frozen_, HealthReason::frozen);
   }
 
@@ -128,22 +128,20 @@ class FrozenOdometry : public HealthMetric {
     changed_at_ = reading.stamp;
   }
 
-  std::optional<HealthReason> hear(LidarOpinion, const RegistrationFeedback& feedback) override {
+  std::optional<HealthReason> on_feedback(LidarOpinion, const RegistrationFeedback& feedback) override {
     if (feedback.from < changed_at_) // outdated: it was still moving then
       return std::nullopt;
-    lidar_sees_twist_ = feedback.twist_base;
-    lidar_sees_way_ += to_seconds(feedback.to - feedback.from) * feedback.twist_base;
+    lidar_twist_ = feedback.twist_base;
+    lidar_path_ += to_seconds(feedback.to - feedback.from) * feedback.twist_base;
     return std::nullopt;
   }
 
  private:
   /// Returns whether lidar observes motion, farther than a wrong gyro shakes a sweep or two.
-  [[nodiscard]] bool lidar_sees_it_move() const {
+  [[nodiscard]] bool lidar_observes_motion() const {
     constexpr double kMoves_mps = 0.2, kTurns_radps = 0.2, kFor_s = 0.3;
-    return (lidar_sees_twist_.head<3>().norm() > kMoves_mps &&
-            lidar_sees_way_.head<3>().norm() > kFor_s * kMoves_mps) ||
-           (lidar_sees_twist_.tail<3>().norm() > kTurns_radps &&
-            lidar_sees_way_.tail<3>().norm() > kFor_s * kTurns_radps);
+    return (lidar_twist_.head<3>().norm() > kMoves_mps && lidar_path_.head<3>().norm() > kFor_s * kMoves_mps) ||
+           (lidar_twist_.tail<3>().norm() > kTurns_radps && lidar_path_.tail<3>().norm() > kFor_s * kTurns_radps);
   }
 
   [[nodiscard]] bool cannot_stop_within(Duration duration) const {
@@ -158,8 +156,8 @@ class FrozenOdometry : public HealthMetric {
   Stamp changed_at_;
   Vector6 twist_ = Vector6::Zero(); ///< before changed_at_
   bool frozen_ = false;
-  Vector6 lidar_sees_twist_ = Vector6::Zero();
-  Vector6 lidar_sees_way_ = Vector6::Zero(); ///< m and rad, since the last change
+  Vector6 lidar_twist_ = Vector6::Zero();
+  Vector6 lidar_path_ = Vector6::Zero(); ///< m and rad, since the last change
 };
 
 /// Rejects a turn rate that no robot has.
@@ -198,7 +196,7 @@ class PoseJump : public HealthMetric {
     last_ = T_source_base;
     last_stamp_ = reading.stamp;
   }
-  void forget() override { last_.reset(); }
+  void reset() override { last_.reset(); }
 
  private:
   std::optional<Pose> last_;
@@ -227,7 +225,7 @@ class ImpossibleSpeed : public HealthMetric {
     last_ = reading.odometry->T_source_base;
     last_stamp_ = reading.stamp;
   }
-  void forget() override { last_.reset(); }
+  void reset() override { last_.reset(); }
 
  private:
   double max_mps_;
@@ -238,7 +236,7 @@ class ImpossibleSpeed : public HealthMetric {
 /// Rejects a source whose motion differs from lidar's in several consecutive sweeps.
 class LidarDisagrees : public HealthMetric {
  public:
-  std::optional<HealthReason> hear(LidarOpinion opinion, const RegistrationFeedback&) override {
+  std::optional<HealthReason> on_feedback(LidarOpinion opinion, const RegistrationFeedback&) override {
     constexpr int kSweepsInARow = 3;
     if (opinion == LidarOpinion::none)
       return std::nullopt;

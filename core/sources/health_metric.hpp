@@ -34,7 +34,7 @@ class HealthMetric {
   virtual void accept(const SourceReading&) {}
 
   /// Returns the reason to stop using the source, given lidar's `opinion` on it; nothing if there is none.
-  virtual std::optional<HealthReason> hear(LidarOpinion /*opinion*/, const RegistrationFeedback&) {
+  virtual std::optional<HealthReason> on_feedback(LidarOpinion /*opinion*/, const RegistrationFeedback&) {
     return std::nullopt;
   }
 
@@ -45,7 +45,7 @@ class HealthMetric {
   [[nodiscard]] virtual bool trusts_accelerometer() const { return true; }
 
   /// Handles a loss of health: later samples need not be continuous with earlier ones.
-  virtual void forget() {}
+  virtual void reset() {}
 };
 
 /// Returns all metrics for a source, in the order of their calls.

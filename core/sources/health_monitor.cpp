@@ -22,7 +22,8 @@ std::optional<Stamp> HealthMonitor::judge(const OdometrySample& sample) {
 }
 
 std::optional<Stamp> HealthMonitor::judge(SourceReading reading) {
-  if (state_ != State::unheard && reading.arrival < last_arrival_ - kLongestTimeout) { // the host's clock was set back
+  if (state_ != State::never_received &&
+      reading.arrival < last_arrival_ - kLongestTimeout) { // the host's clock was set back
     lose(HealthReason::out_of_order, reading.arrival);
     last_arrival_ = reading.arrival;
   }
@@ -59,7 +60,7 @@ std::nullopt_t HealthMonitor::refuse(HealthReason reason, Stamp arrival) {
   refusal_ = {reason, std::max(arrival - refused_since_, Duration{})};
   if (refusal_->lasted > longest_refusal_.lasted)
     longest_refusal_ = *refusal_;
-  if (state_ == State::unheard && refusal_->is_worth_telling())
+  if (state_ == State::never_received && refusal_->is_worth_reporting())
     lose(reason, arrival);
   return std::nullopt;
 }
@@ -67,12 +68,12 @@ std::nullopt_t HealthMonitor::refuse(HealthReason reason, Stamp arrival) {
 void HealthMonitor::accept(const SourceReading& reading) {
   for (const auto& metric : metrics_)
     metric->accept(reading);
-  if (state_ != State::unheard)
+  if (state_ != State::never_received)
     learn_period(reading.stamp - last_stamp_);
   last_stamp_ = reading.stamp;
   last_arrival_ = reading.arrival;
   objection_.reset();
-  if (state_ == State::unheard) {
+  if (state_ == State::never_received) {
     state_ = State::healthy;
   } else if (state_ == State::lost) {
     state_ = State::probation;
@@ -86,17 +87,17 @@ void HealthMonitor::accept(const SourceReading& reading) {
 }
 
 void HealthMonitor::advance(Stamp now) {
-  if (state_ == State::unheard || state_ == State::lost || now - last_arrival_ <= timeout())
+  if (state_ == State::never_received || state_ == State::lost || now - last_arrival_ <= timeout())
     return;
   if (!objection_)
     leave_out(HealthReason::stale);
   lose(*objection_, now);
 }
 
-void HealthMonitor::hear(LidarOpinion opinion, const RegistrationFeedback& feedback, Stamp now) {
+void HealthMonitor::on_feedback(LidarOpinion opinion, const RegistrationFeedback& feedback, Stamp now) {
   for (const auto& metric : metrics_) {
-    const auto reason = metric->hear(opinion, feedback);
-    if (!reason || state_ == State::unheard || (state_ == State::lost && reason != HealthReason::self_check))
+    const auto reason = metric->on_feedback(opinion, feedback);
+    if (!reason || state_ == State::never_received || (state_ == State::lost && reason != HealthReason::self_check))
       continue;
     leave_out(*reason);
     lose(*reason, now);
@@ -110,7 +111,7 @@ void HealthMonitor::set_outside_verdict(bool healthy, Stamp now) {
 }
 
 void HealthMonitor::lose(HealthReason reason, Stamp now) {
-  if (state_ == State::healthy || (state_ == State::unheard && refusal_ && refusal_->is_worth_telling())) {
+  if (state_ == State::healthy || (state_ == State::never_received && refusal_ && refusal_->is_worth_reporting())) {
     lost_for_ = reason;
     change(false, reason, now);
   } else if (reason == HealthReason::self_check) { // also if already lost: it may be permanent
@@ -119,7 +120,7 @@ void HealthMonitor::lose(HealthReason reason, Stamp now) {
   state_ = State::lost;
   ++epoch_;
   for (const auto& metric : metrics_)
-    metric->forget();
+    metric->reset();
 }
 
 void HealthMonitor::change(bool healthy, HealthReason reason, Stamp now) {
@@ -129,7 +130,7 @@ void HealthMonitor::change(bool healthy, HealthReason reason, Stamp now) {
     event_->verdict = verdict();
 }
 
-std::optional<HealthEvent> HealthMonitor::take_event() { return std::exchange(event_, std::nullopt); }
+std::optional<HealthEvent> HealthMonitor::pop_event() { return std::exchange(event_, std::nullopt); }
 
 std::string_view HealthMonitor::verdict() const {
   for (const auto& metric : metrics_) {

@@ -41,7 +41,7 @@ class HealthMonitor {
   void advance(Stamp now);
 
   /// Processes lidar's feedback on this source.
-  void hear(LidarOpinion opinion, const RegistrationFeedback& feedback, Stamp now);
+  void on_feedback(LidarOpinion opinion, const RegistrationFeedback& feedback, Stamp now);
 
   /// Sets the external verdict on the health, valid until the next one.
   void set_outside_verdict(bool healthy, Stamp now);
@@ -62,13 +62,13 @@ class HealthMonitor {
   /// Returns the longest run of refused samples so far, the present one included.
   [[nodiscard]] const Refusal& longest_refusal() const { return longest_refusal_; }
   /// Returns the arrival of the last good sample; Stamp{} before the first.
-  [[nodiscard]] Stamp last_heard() const { return last_arrival_; }
+  [[nodiscard]] Stamp last_received() const { return last_arrival_; }
   /// Returns the latest change since the last call; the caller sets HealthEvent::source.
-  std::optional<HealthEvent> take_event();
+  std::optional<HealthEvent> pop_event();
   [[nodiscard]] const SourceCounters& counters() const { return counters_; }
 
  private:
-  enum class State : std::uint8_t { unheard, healthy, lost, probation };
+  enum class State : std::uint8_t { never_received, healthy, lost, probation };
 
   std::optional<Stamp> judge(SourceReading reading);
   std::nullopt_t leave_out(HealthReason reason);
@@ -80,7 +80,7 @@ class HealthMonitor {
 
   std::vector<std::unique_ptr<HealthMetric>> metrics_;
   SourceClock clock_;
-  State state_ = State::unheard;
+  State state_ = State::never_received;
   std::uint32_t epoch_ = 0;
   bool outside_objects_ = false;
   std::optional<HealthReason> objection_; ///< latest rejection since the last good sample

@@ -78,32 +78,32 @@ void ImuSelfCheck::follow_turns(const Eigen::Vector3d& turn_rate_base_radps, Sta
   if (std::chrono::abs(step) < kMaxGap)
     angle_rad_ += to_seconds(step) * turn_rate_base_radps;
   else
-    known_ = 0;
+    count_ = 0;
   last_ = stamp;
-  if (known_ > 0 && stamp - turned_[newest_].stamp < kResolution)
+  if (count_ > 0 && stamp - turned_[newest_].stamp < kResolution)
     return;
   newest_ = (newest_ + 1) % turned_.size();
   turned_[newest_] = {stamp, angle_rad_};
-  known_ = std::min(known_ + 1, turned_.size());
+  count_ = std::min(count_ + 1, turned_.size());
 }
 
-const ImuSelfCheck::Turned& ImuSelfCheck::remembered(std::size_t age) const {
+const ImuSelfCheck::Turned& ImuSelfCheck::by_age(std::size_t age) const {
   return turned_[(newest_ + turned_.size() - age) % turned_.size()];
 }
 
-bool ImuSelfCheck::remembers(Stamp stamp) const {
-  return known_ > 1 && stamp >= remembered(known_ - 1).stamp && stamp < remembered(0).stamp + kMaxGap;
+bool ImuSelfCheck::covers(Stamp stamp) const {
+  return count_ > 1 && stamp >= by_age(count_ - 1).stamp && stamp < by_age(0).stamp + kMaxGap;
 }
 
 /// Interpolates; outside the stored range, returns the nearest angle. Precondition: something is stored.
 Eigen::Vector3d ImuSelfCheck::angle_rad_at(Stamp stamp) const {
   std::size_t age = 0;
-  while (age + 1 < known_ && remembered(age).stamp > stamp)
+  while (age + 1 < count_ && by_age(age).stamp > stamp)
     ++age;
-  const Turned& before = remembered(age);
+  const Turned& before = by_age(age);
   if (age == 0 || stamp <= before.stamp)
     return before.angle_rad;
-  const Turned& after = remembered(age - 1);
+  const Turned& after = by_age(age - 1);
   const double fraction = to_seconds(stamp - before.stamp) / to_seconds(after.stamp - before.stamp);
   return before.angle_rad + fraction * (after.angle_rad - before.angle_rad);
 }
@@ -137,8 +137,8 @@ bool ImuSelfCheck::is_yet_to_be_used(const RegistrationFeedback& feedback) const
   return !set_aside_ && back_since_ && feedback.from < *back_since_ + HealthMonitor::kProbation;
 }
 
-std::optional<HealthReason> ImuSelfCheck::hear(LidarOpinion /*opinion*/, const RegistrationFeedback& feedback) {
-  if (refused_ || !remembers(feedback.from) || !remembers(feedback.to) || is_yet_to_be_used(feedback))
+std::optional<HealthReason> ImuSelfCheck::on_feedback(LidarOpinion /*opinion*/, const RegistrationFeedback& feedback) {
+  if (refused_ || !covers(feedback.from) || !covers(feedback.to) || is_yet_to_be_used(feedback))
     return std::nullopt;
   const bool was_set_aside = set_aside_;
   compare(feedback);
@@ -152,7 +152,7 @@ void ImuSelfCheck::compare(const RegistrationFeedback& feedback) {
   for (std::size_t i = 0; i < turns_.size(); ++i) {
     const auto axis = static_cast<Eigen::Index>(i);
     const bool turned = std::max(std::abs(gyro_rad[axis]), std::abs(lidar_rad[axis])) > kTurns_rad;
-    if (turned && feedback.sees[3 + i] && !(turns_[i].agree() && turns_[i].sweeps >= kSweepsToJudge))
+    if (turned && feedback.observes[3 + i] && !(turns_[i].agree() && turns_[i].sweeps >= kSweepsToJudge))
       turns_[i].add(gyro_rad[axis], lidar_rad[axis]);
   }
 }
@@ -222,7 +222,7 @@ std::size_t ImuSelfCheck::contradicted_axis(int sweeps) const {
 /// Returns a text of static lifetime.
 std::string_view ImuSelfCheck::words(Difference difference, std::size_t axis, bool for_good) {
   struct Finding {
-    const char* seen;
+    const char* observation;
     const char* causes;
   };
   constexpr std::array<Finding, 4> kFindings{
@@ -242,7 +242,7 @@ std::string_view ImuSelfCheck::words(Difference difference, std::size_t axis, bo
       for (std::size_t k = 0; k < kAxes.size(); ++k)
         for (std::size_t good = 0; good < 2; ++good)
           words[i][k][good] = std::string("and lidar disagree on how the robot turns about ") + kAxes[k] + ": " +
-                              kFindings[i].seen + "; it is not used " +
+                              kFindings[i].observation + "; it is not used " +
                               (good == 1 ? "any more, until a restart" : "until they agree") +
                               " (possible causes: " + kFindings[i].causes + ")";
     return words;
@@ -251,7 +251,7 @@ std::string_view ImuSelfCheck::words(Difference difference, std::size_t axis, bo
 }
 
 /// Restarts the check: a source that comes back is checked as at the start.
-void ImuSelfCheck::forget() {
+void ImuSelfCheck::reset() {
   if (refused_)
     return;
   if (!set_aside_)
@@ -260,7 +260,7 @@ void ImuSelfCheck::forget() {
   back_since_.reset();
   first_.reset();
   last_.reset();
-  known_ = 0;
+  count_ = 0;
   weighed_ = false;
   force_sum_mps2_.setZero();
   forces_ = 0.0;

@@ -28,8 +28,8 @@ class ImuSelfCheck : public HealthMetric {
 
   std::optional<HealthReason> judge(const SourceReading& reading) override;
   void accept(const SourceReading& reading) override;
-  std::optional<HealthReason> hear(LidarOpinion opinion, const RegistrationFeedback& feedback) override;
-  void forget() override;
+  std::optional<HealthReason> on_feedback(LidarOpinion opinion, const RegistrationFeedback& feedback) override;
+  void reset() override;
 
   [[nodiscard]] std::string_view verdict() const override;
   /// Returns false, until gravity has been weighed, if the mean so far cannot be gravity: forces in another unit look
@@ -61,8 +61,8 @@ class ImuSelfCheck : public HealthMetric {
   void weigh_gravity();
   [[nodiscard]] bool may_be_gravity() const;
   void follow_turns(const Eigen::Vector3d& turn_rate_base_radps, Stamp stamp);
-  [[nodiscard]] const Turned& remembered(std::size_t age) const;
-  [[nodiscard]] bool remembers(Stamp stamp) const;
+  [[nodiscard]] const Turned& by_age(std::size_t age) const;
+  [[nodiscard]] bool covers(Stamp stamp) const;
   [[nodiscard]] Eigen::Vector3d angle_rad_at(Stamp stamp) const;
   [[nodiscard]] bool is_yet_to_be_used(const RegistrationFeedback& feedback) const;
   void compare(const RegistrationFeedback& feedback);
@@ -84,7 +84,7 @@ class ImuSelfCheck : public HealthMetric {
   double forces_ = 0.0;
 
   std::array<Turned, 128> turned_; ///< ring
-  std::size_t newest_ = 0, known_ = 0;
+  std::size_t newest_ = 0, count_ = 0;
   Eigen::Vector3d angle_rad_ = Eigen::Vector3d::Zero();
   std::optional<Stamp> last_;
   bool was_lost_ = false;

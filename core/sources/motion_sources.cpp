@@ -14,9 +14,9 @@ MotionSources::MotionSources(const std::vector<MotionSourceOptions>& options, Fu
     sources_.emplace_back(source, limits);
 }
 
-template <class Sample> void MotionSources::take(SourceId source, Sample sample) {
+template <class Sample> void MotionSources::accept(SourceId source, Sample sample) {
   Source& from = sources_[index_of(source)];
-  tell_time(sample.arrival);
+  set_time(sample.arrival);
   const std::optional<Stamp> stamp = from.health.judge(sample);
   follow_health(source);
   if (!stamp)
@@ -24,11 +24,11 @@ template <class Sample> void MotionSources::take(SourceId source, Sample sample)
   sample.stamp = *stamp;
   from.track.add(sample);
 }
-template void MotionSources::take(SourceId, ImuSample);
-template void MotionSources::take(SourceId, OdometrySample);
+template void MotionSources::accept(SourceId, ImuSample);
+template void MotionSources::accept(SourceId, OdometrySample);
 
 void MotionSources::advance(Stamp now) {
-  tell_time(now);
+  set_time(now);
   for (std::size_t i = 0; i < sources_.size(); ++i) {
     sources_[i].health.advance(now_);
     follow_health(SourceId{i});
@@ -36,18 +36,18 @@ void MotionSources::advance(Stamp now) {
 }
 
 /// Updates the time. Inputs may be slightly out of order; a larger step back means that the clock was set.
-void MotionSources::tell_time(Stamp now) {
+void MotionSources::set_time(Stamp now) {
   if (now > now_ || now < now_ - HealthMonitor::kLongestTimeout)
     now_ = now;
 }
 
-void MotionSources::hear(const RegistrationFeedback& feedback) {
+void MotionSources::on_feedback(const RegistrationFeedback& feedback) {
   for (std::size_t i = 0; i < sources_.size(); ++i) {
     sources_[i].track.set_late(feedback.late[i]);
     RegistrationFeedback in_its_stamps = feedback;
     in_its_stamps.from += feedback.late[i];
     in_its_stamps.to += feedback.late[i];
-    sources_[i].health.hear(feedback.opinions[i], in_its_stamps, now_);
+    sources_[i].health.on_feedback(feedback.opinions[i], in_its_stamps, now_);
     follow_health(SourceId{i});
   }
 }
@@ -63,7 +63,7 @@ void MotionSources::follow_health(SourceId source) {
     of.epoch = of.health.epoch();
     of.track.clear();
   }
-  if (std::optional<HealthEvent> event = of.health.take_event(); event && health_sink_) {
+  if (std::optional<HealthEvent> event = of.health.pop_event(); event && health_sink_) {
     event->source = source;
     health_sink_(*event);
   }

@@ -27,14 +27,14 @@ class MotionSources {
                 HealthSink health_sink = {});
 
   /// Add a sample; its type must fit the kind of the source.
-  void add(SourceId source, const ImuSample& sample) { take(source, sample); }
-  void add(SourceId source, const OdometrySample& sample) { take(source, sample); }
+  void add(SourceId source, const ImuSample& sample) { accept(source, sample); }
+  void add(SourceId source, const OdometrySample& sample) { accept(source, sample); }
 
   /// Sets the time, in stamps of arrival, so that silence is detected.
   void advance(Stamp now);
 
   /// Passes lidar's feedback on to the sources.
-  void hear(const RegistrationFeedback& feedback);
+  void on_feedback(const RegistrationFeedback& feedback);
 
   /// Sets the external verdict on a source, valid until the next one (health_topic).
   void set_outside_verdict(SourceId source, bool healthy);
@@ -65,8 +65,8 @@ class MotionSources {
     std::uint32_t epoch = 0; ///< of the samples in the track
   };
 
-  template <class Sample> void take(SourceId source, Sample sample);
-  void tell_time(Stamp now);
+  template <class Sample> void accept(SourceId source, Sample sample);
+  void set_time(Stamp now);
   void follow_health(SourceId source);
 
   Fusion fusion_;

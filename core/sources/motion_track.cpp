@@ -6,10 +6,10 @@
 namespace locus {
 
 MotionTrack::MotionTrack(const MotionSourceOptions& options)
-    : kind_(options.kind), late_(taken_out(1e-3 * options.late_ms)), T_base_source_(options.T_base_source),
+    : kind_(options.kind), late_(applied_lateness(1e-3 * options.late_ms)), T_base_source_(options.T_base_source),
       nodes_(kCapacity) {}
 
-Duration MotionTrack::taken_out(double late_s) {
+Duration MotionTrack::applied_lateness(double late_s) {
   constexpr double kMostLate_s = 0.015;
   return from_seconds(std::min(kMostLate_s, late_s));
 }

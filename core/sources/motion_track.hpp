@@ -35,7 +35,7 @@ class MotionTrack {
   void set_late(Duration late) { late_ = late; }
   /// Returns the part of a stamp delay that is worth removing. With more, a sample arrives later than can well be
   /// extrapolated when points are corrected.
-  [[nodiscard]] static Duration taken_out(double late_s);
+  [[nodiscard]] static Duration applied_lateness(double late_s);
   [[nodiscard]] Duration late() const { return late_; }
 
   /// Drops all samples, when the following ones are not continuous with them.

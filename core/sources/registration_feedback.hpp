@@ -36,7 +36,7 @@ struct RegistrationFeedback {
   Stamp from, to; ///< ends of the two sweeps between which lidar measured the motion
   std::array<LidarOpinion, kMaxSources> opinions{};
   Vector6 twist_base = Vector6::Zero();     ///< m/s and rad/s, measured by lidar; zero along weakly observed axes
-  std::array<bool, 6> sees{};               ///< observed axes
+  std::array<bool, 6> observes{};           ///< observed axes
   std::array<Duration, kMaxSources> late{}; ///< delay of each source's stamps after the motion
 };
 

@@ -19,7 +19,7 @@ std::optional<Stamp> SourceClock::on_host_clock(Stamp stamp, Stamp arrival) {
   const Duration latency = arrival - (stamp - offset_);
   if (credible(latency)) {
     if (!known_)
-      begin_anew(arrival, latency);
+      restart(arrival, latency);
     follow_drift(arrival, latency);
     known_ = true;
     suspects_ = 0;
@@ -31,11 +31,11 @@ std::optional<Stamp> SourceClock::on_host_clock(Stamp stamp, Stamp arrival) {
   suspect_ = agrees ? std::max(suspect_, ahead) : ahead; // the sample with the least latency is the best
   if (suspects_ < kSamplesToLearn)
     return std::nullopt;
-  const bool at_its_word = credible(-suspect_);
-  offset_ = at_its_word ? Duration::zero() : suspect_ + least_latency_;
+  const bool is_on_host_clock = credible(-suspect_);
+  offset_ = is_on_host_clock ? Duration::zero() : suspect_ + least_latency_;
   const Duration shortest = offset_ - suspect_;
-  if (!known_ || at_its_word)
-    begin_anew(arrival, shortest);
+  if (!known_ || is_on_host_clock)
+    restart(arrival, shortest);
   window_began_ = arrival;
   least_in_window_ = shortest;
   steps_ += known_ ? 1 : 0;
@@ -45,7 +45,7 @@ std::optional<Stamp> SourceClock::on_host_clock(Stamp stamp, Stamp arrival) {
 }
 
 /// Restarts the drift estimation: the first window determines the usual latency.
-void SourceClock::begin_anew(Stamp arrival, Duration latency) {
+void SourceClock::restart(Stamp arrival, Duration latency) {
   window_began_ = arrival;
   least_latency_ = least_in_window_ = latency;
   first_window_ = true;

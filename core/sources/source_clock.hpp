@@ -32,7 +32,7 @@ class SourceClock {
   [[nodiscard]] std::uint64_t steps() const { return steps_; }
 
  private:
-  void begin_anew(Stamp arrival, Duration latency);
+  void restart(Stamp arrival, Duration latency);
   void follow_drift(Stamp arrival, Duration latency);
 
   bool known_ = false;

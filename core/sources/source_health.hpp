@@ -43,13 +43,15 @@ std::string_view explanation(HealthReason reason);
 
 /// Run of refused samples of a source, between which it was never healthy.
 struct Refusal {
-  static constexpr Duration kWorthTelling = std::chrono::seconds{5};
+  static constexpr Duration kWorthReporting = std::chrono::seconds{5};
 
   HealthReason reason = HealthReason::stale; ///< of the latest refused sample
   Duration lasted{};                         ///< from the first to the latest refused sample
 
   /// Returns false for a self-check, which has a verdict of its own.
-  [[nodiscard]] bool is_worth_telling() const { return lasted > kWorthTelling && reason != HealthReason::self_check; }
+  [[nodiscard]] bool is_worth_reporting() const {
+    return lasted > kWorthReporting && reason != HealthReason::self_check;
+  }
 };
 
 /// Counters of the samples of one motion source.

@@ -196,10 +196,10 @@ class Admission {
 
   /// Tells whether a sample of `writer` at `now` (CLOCK_MONOTONIC) is accepted; otherwise counts it.
   bool admits(dds_instance_handle_t writer, Duration now) {
-    if (writer != writer_ && now - last_heard_ < kSilence)
+    if (writer != writer_ && now - last_received_ < kSilence)
       return refuse();
     writer_ = writer;
-    last_heard_ = now;
+    last_received_ = now;
     if (now - window_began_ >= kWindow || now < window_began_) {
       window_began_ = now;
       in_window_ = 0;
@@ -211,7 +211,7 @@ class Admission {
   /// Lets another writer take over if `reader` no longer matches the current one.
   template <class Message> void update_owner(const DdsReader<Message>& reader) {
     if (!reader.is_matched(writer_))
-      last_heard_ = {};
+      last_received_ = {};
   }
 
  private:
@@ -225,7 +225,7 @@ class Admission {
   }
 
   dds_instance_handle_t writer_ = 0;
-  Duration last_heard_{}, window_began_{};
+  Duration last_received_{}, window_began_{};
   std::int64_t in_window_ = 0;
   std::uint64_t refused_ = 0;
 };

@@ -48,7 +48,7 @@ Diagnostic odometry_diagnostic(const Figures& figures, const ordered_json& json,
 
 Diagnostic lidar_diagnostic(const LidarOptions& options, const IngestReport::Lidar& lidar, const ordered_json& values,
                             Stamp now) {
-  const std::optional<Duration> silence = lidar.used() > 0 ? std::optional(now - lidar.last_heard) : std::nullopt;
+  const std::optional<Duration> silence = lidar.used() > 0 ? std::optional(now - lidar.last_received) : std::nullopt;
   const bool is_silent = silence && *silence > kStale;
   const std::string problem = problem_of(options, lidar);
   return diagnostic(!silence           ? Level::error

@@ -122,7 +122,7 @@ LearnedSource to_learned(const LearnedNumbers& numbers) {
                             .selfadjointView<Eigen::Lower>()};
 }
 
-Head head_of(const Whereabouts& last, std::uint64_t number) {
+Head head_of(const ResumeState& last, std::uint64_t number) {
   Head head{.magic = kMagic,
             .number = number,
             .stamp_ns = to_ns(last.stamp),
@@ -200,7 +200,7 @@ bool is_plausible(const SavedState& state) {
   const auto is_valid = [](const Pose& pose) {
     return pose.rotation.norm() > 0.5 && pose.translation.norm() < kMaxDistance_m; // false for NaN
   };
-  return is_valid(state.last.carried_to(Stamp::max())) && is_covariance(state.last.pose_covariance) &&
+  return is_valid(state.last.extrapolated_to(Stamp::max())) && is_covariance(state.last.pose_covariance) &&
          std::ranges::all_of(state.last.T_source_base, [&](const auto& pose) { return !pose || is_valid(*pose); }) &&
          std::ranges::all_of(state.map_odom, [](const SurfacePoint& point) {
            return point.position_m.cast<double>().norm() < kMaxDistance_m && point.normal.allFinite();
@@ -259,7 +259,7 @@ SourceIds ids_of(std::span<const MotionSource> sources) {
 
 void SavedState::reset_changed_sources(const SourceIds& now) {
   if (sources.list != now.list)
-    last.forget_sources();
+    last.drop_sources();
   for (std::size_t i = 0; i < kMaxSources; ++i)
     if (sources.configured[i] != now.configured[i])
       last.learned[i].reset();
@@ -300,7 +300,7 @@ Expected<SavedState, std::string> load_state(const std::filesystem::path& file) 
   return std::move(*state);
 }
 
-void update_whereabouts(const std::filesystem::path& file, const Whereabouts& last) {
+void update_resume_state(const std::filesystem::path& file, const ResumeState& last) {
   const int descriptor = open(file.c_str(), O_RDWR | O_CLOEXEC);
   if (descriptor < 0)
     return;
@@ -328,7 +328,7 @@ void StateSaver::reset(const std::optional<SavedState>& start) {
   saved_.reset();
   written_.reset();
   static_cast<void>(states_.poll()); // discards stale data
-  static_cast<void>(whereabouts_.poll());
+  static_cast<void>(resume_state_.poll());
   std::error_code error;
   if (file_ && start) {
     if (const auto problem = write_state(*file_, *start))
@@ -342,7 +342,7 @@ void StateSaver::reset(const std::optional<SavedState>& start) {
 void StateSaver::update(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground) {
   if (!estimate.beginning) // the saved state is still valid
     return;
-  last_ = last_.value_or(Whereabouts{}).followed_by(estimate);
+  last_ = last_.value_or(ResumeState{}).followed_by(estimate);
   if (!file_)
     return;
   if (!estimate.failed && is_due()) {
@@ -355,13 +355,13 @@ void StateSaver::update(const Odometry& odometry, const OdometryEstimate& estima
     read_map(odometry, last_->T_odom_base, pending.state.map_odom);
     static_cast<void>(states_.publish()); // replaces an older unwritten state
   }
-  whereabouts_.back() = {number_, *last_};
-  static_cast<void>(whereabouts_.publish());
+  resume_state_.back() = {number_, *last_};
+  static_cast<void>(resume_state_.publish());
 }
 
-/// Reads the whereabouts first: the state that they refer to is then pending or already written.
+/// Reads the resume state first: the state that it refers to is then pending or already written.
 void StateSaver::write() {
-  const PendingUpdate* const update = whereabouts_.poll();
+  const PendingUpdate* const update = resume_state_.poll();
   if (const PendingState* const pending = states_.poll()) {
     const auto problem = write_state(*file_, pending->state);
     written_ = problem ? std::nullopt : std::optional{pending->number};
@@ -369,7 +369,7 @@ void StateSaver::write() {
       error_sink_(*problem);
   }
   if (update != nullptr && update->number == written_)
-    update_whereabouts(*file_, update->last);
+    update_resume_state(*file_, update->last);
 }
 
 } // namespace locus::daemon

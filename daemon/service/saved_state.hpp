@@ -29,7 +29,7 @@ SourceIds ids_of(std::span<const MotionSource> sources);
 
 /// State needed to resume where another service ended: the pose of the robot and the map around it.
 struct SavedState {
-  Whereabouts last;
+  ResumeState last;
   FlatGround flat_ground = FlatGround::off;
   std::vector<SurfacePoint> map_odom;
   SourceIds sources{};   ///< motion sources that `last` refers to
@@ -51,12 +51,12 @@ Expected<SavedState, std::string> load_state(const std::filesystem::path& file);
 /// Updates pose and sources in a file that holds the map of the same odom frame; the previous entry stays valid while
 /// this one is written. Does not sync: a crash of the machine may lose the last updates, but never the map. A failure
 /// is reported by the next write_state().
-void update_whereabouts(const std::filesystem::path& file, const Whereabouts& last);
+void update_resume_state(const std::filesystem::path& file, const ResumeState& last);
 
 /// Returns $STATE_DIRECTORY/state, with the variable set by systemd; empty without it: no state is saved then.
 std::optional<std::filesystem::path> state_path();
 
-/// Saves the full state periodically and the whereabouts more often, from a thread that may block on the disk: the map
+/// Saves the full state periodically and the resume state more often, from a thread that may block on the disk: the map
 /// is worth its cost only every kPeriod or kDistance_m, but the pose of a moving robot is outdated within a second.
 class StateSaver {
  public:
@@ -71,10 +71,10 @@ class StateSaver {
   /// Producer, one thread: hands over the state after every estimate.
   void update(const Odometry& odometry, const OdometryEstimate& estimate, FlatGround flat_ground);
 
-  /// Producer: returns the current whereabouts; empty before the first estimate.
-  [[nodiscard]] const std::optional<Whereabouts>& last() const { return last_; }
+  /// Producer: returns the current resume state; empty before the first estimate.
+  [[nodiscard]] const std::optional<ResumeState>& last() const { return last_; }
 
-  /// Disk thread, periodically: writes the latest state or whereabouts.
+  /// Disk thread, periodically: writes the latest state or resume state.
   void write();
 
   /// Producer: replaces the saved state by `start`, or removes it. Blocks on the disk; precondition: write() is not
@@ -86,10 +86,10 @@ class StateSaver {
     std::uint64_t number = 0;
     SavedState state;
   };
-  /// Whereabouts in the odom frame of the state with this number.
+  /// ResumeState in the odom frame of the state with this number.
   struct PendingUpdate {
     std::uint64_t number = 0;
-    Whereabouts last;
+    ResumeState last;
   };
 
   [[nodiscard]] bool is_due() const;
@@ -98,8 +98,8 @@ class StateSaver {
   SourceIds sources_;
   ErrorSink error_sink_;
   LatestSlot<PendingState> states_;
-  LatestSlot<PendingUpdate> whereabouts_;
-  std::optional<Whereabouts> last_, saved_; ///< after the last estimate; in the last state; owned by the producer
+  LatestSlot<PendingUpdate> resume_state_;
+  std::optional<ResumeState> last_, saved_; ///< after the last estimate; in the last state; owned by the producer
   std::uint64_t number_ = 0;                ///< number of the last state handed over; owned by the producer
   std::optional<std::uint64_t> written_;    ///< number of the state in the file; owned by the disk thread
 };

@@ -405,16 +405,16 @@ Figures Session::figures() const {
   if (figures.sweeps.last)
     figures.sweeps.last = in_wall_time(*figures.sweeps.last);
   const auto wall = [this](Stamp steady) { return steady == Stamp{} ? Stamp{} : input_.time().to_wall(steady); };
-  const auto convert_last_heard = [&](auto& sensors) {
+  const auto convert_last_received = [&](auto& sensors) {
     for (auto& sensor : sensors)
-      sensor.last_heard = wall(sensor.last_heard);
+      sensor.last_received = wall(sensor.last_received);
   };
-  convert_last_heard(figures.ingest.lidars);
+  convert_last_received(figures.ingest.lidars);
   for (IngestReport::Lidar& lidar : figures.ingest.lidars) {
-    convert_last_heard(lidar.strangers);
-    lidar.unknown_last_heard = wall(lidar.unknown_last_heard);
+    convert_last_received(lidar.strangers);
+    lidar.unknown_last_received = wall(lidar.unknown_last_received);
   }
-  convert_last_heard(figures.ingest.sources);
+  convert_last_received(figures.ingest.sources);
   return figures;
 }
 

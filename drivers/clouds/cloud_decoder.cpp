@@ -104,13 +104,13 @@ std::optional<CloudError> CloudDecoder::begin(const CloudView& message, Stamp ar
   last_stamp_ = message.stamp;
   last_digest_ = digest_of(message);
   frame_ = frame;
-  last_heard_ = arrival;
+  last_received_ = arrival;
   return std::nullopt;
 }
 
 bool CloudDecoder::is_of_another_lidar(std::size_t frame, Stamp arrival) const {
   constexpr Duration kSilence = std::chrono::seconds{1};
-  return last_heard_ != Stamp{} && frame != frame_ && std::chrono::abs(arrival - last_heard_) < kSilence;
+  return last_received_ != Stamp{} && frame != frame_ && std::chrono::abs(arrival - last_received_) < kSilence;
 }
 
 void CloudDecoder::count(const Counted& counted) {

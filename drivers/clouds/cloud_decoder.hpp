@@ -49,7 +49,7 @@ class CloudDecoder {
   /// Smoothed time from the start of one cloud to the next; 100 ms before the second cloud.
   [[nodiscard]] Duration period() const { return period_; }
   /// Arrival of the latest accepted cloud; Stamp{} before the first.
-  [[nodiscard]] Stamp last_heard() const { return last_heard_; }
+  [[nodiscard]] Stamp last_received() const { return last_received_; }
 
  private:
   struct Counted {
@@ -115,7 +115,7 @@ class CloudDecoder {
   std::optional<Stamp> last_stamp_; ///< header stamp
   std::uint64_t last_digest_ = 0;
   std::size_t frame_ = 0; ///< hash of the frame's name
-  Stamp last_heard_;
+  Stamp last_received_;
   CloudCounters counters_;
   CloudDoubts doubts_;
   std::array<Stamp, kCloudDoubts> last_doubted_{};

@@ -71,7 +71,7 @@ TEST(Figures, CloudDoubtIsAProblemOnlyWhileItLasts) {
   options.topic = "/points";
   const Stamp now = stamp_from_ns(1'700'000'000'000'000'000);
   IngestReport::Lidar lidar;
-  lidar.last_heard = now;
+  lidar.last_received = now;
   lidar.clouds = IngestReport::Clouds{};
   constexpr auto kTai = static_cast<std::size_t>(CloudDoubt::tai),
                  kEqual = static_cast<std::size_t>(CloudDoubt::equal_times);

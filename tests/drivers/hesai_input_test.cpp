@@ -166,7 +166,7 @@ TEST(LidarInput, PacketsOfAnotherMakerAreNamedWithTheRemedy) {
     lidar.receive({ouster.payload(), kHesaiIp, 2368, 2368, Stamp{HesaiTestPacket::kTime}});
     EXPECT_EQ(to_string(lidar.unknown_packets().value()), "an Ouster in 2 packets");
     EXPECT_NE(remedy(*lidar.unknown_packets()).find("locusctl fetch"), std::string_view::npos);
-    EXPECT_EQ(lidar.unknown_last_heard(), Stamp{HesaiTestPacket::kTime});
+    EXPECT_EQ(lidar.unknown_last_received(), Stamp{HesaiTestPacket::kTime});
   }
 }
 

@@ -50,7 +50,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (!state)
     return 0;
   demand(state->map_odom.size() * sizeof(SurfacePoint) + kHeads * kHeadBytes + kBodyBytes == size);
-  demand(state->last.carried_to(stamp_from_ns(1'700'000'000'000'000'000)).finite());
+  demand(state->last.extrapolated_to(stamp_from_ns(1'700'000'000'000'000'000)).finite());
   for (const SurfacePoint& point : state->map_odom)
     demand(point.position_m.allFinite() && point.normal.allFinite());
   return 0;

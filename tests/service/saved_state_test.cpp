@@ -17,7 +17,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// A state saver that is fed by the test. The ground mode is part of the map state and not of the whereabouts, and so
+/// A state saver that is fed by the test. The ground mode is part of the map state and not of the resume state, and so
 /// tells when the map state was last written.
 class StateSaverTest : public testing::Test {
  protected:
@@ -99,7 +99,7 @@ TEST_F(StateSaverTest, ClockSetBackDelaysNoWrite) {
   update(seconds{0}, 1, FlatGround::off);
   ASSERT_TRUE(says(1, FlatGround::off));
   update(-seconds{10}, 2, FlatGround::on);
-  EXPECT_TRUE(says(2, FlatGround::off)) << "the whereabouts";
+  EXPECT_TRUE(says(2, FlatGround::off)) << "the resume state";
   update(-std::chrono::hours{1}, 3, FlatGround::on);
   EXPECT_TRUE(says(3, FlatGround::on)) << "and the map";
 }
@@ -107,8 +107,8 @@ TEST_F(StateSaverTest, ClockSetBackDelaysNoWrite) {
 TEST_F(StateSaverTest, MovingRobotIsPredictedForAMoment) {
   update(seconds{0}, 3, FlatGround::off);
   ASSERT_TRUE(says(3, FlatGround::off));
-  const Whereabouts last = load_state(file_)->last;
-  const auto x_m = [&](Duration later) { return last.carried_to(last.stamp + later).translation.x(); };
+  const ResumeState last = load_state(file_)->last;
+  const auto x_m = [&](Duration later) { return last.extrapolated_to(last.stamp + later).translation.x(); };
   EXPECT_NEAR(x_m(seconds{1}), 4.5, 1e-9);
   EXPECT_NEAR(x_m(seconds{60}), 6, 1e-9);
   EXPECT_NEAR(x_m(-seconds{1}), 3, 1e-9) << "clocks are set";
@@ -126,11 +126,11 @@ TEST_F(StateSaverTest, JumpOfTheTwistIsNotExtrapolated) {
   estimate.twist_base[0] = -0.8;
   saver_.update(odometry_, estimate, FlatGround::off);
   ASSERT_TRUE(saver_.last());
-  EXPECT_LT(saver_.last()->carried_to(later).translation.norm(), 0.5) << "of a motion that is believed";
+  EXPECT_LT(saver_.last()->extrapolated_to(later).translation.norm(), 0.5) << "of a motion that is believed";
   estimate.stamp += milliseconds{100};
   estimate.twist_covariance.diagonal().setConstant(0.5 * 0.5);
   saver_.update(odometry_, estimate, FlatGround::off);
-  EXPECT_LT(saver_.last()->carried_to(later).translation.norm(), 0.5) << "and of one that is not";
+  EXPECT_LT(saver_.last()->extrapolated_to(later).translation.norm(), 0.5) << "and of one that is not";
 }
 
 /// Drivers are stopped before the service.
@@ -232,7 +232,7 @@ TEST_F(StateSaverTest, EveryDamagedByteIsDetected) {
   state.map_odom.resize(3, {Eigen::Vector3f::Ones(), Eigen::Vector3f::UnitZ()});
   ASSERT_FALSE(write_state(file, state));
   state.last.T_odom_base.translation.x() = 5;
-  update_whereabouts(file, state.last);
+  update_resume_state(file, state.last);
   ASSERT_TRUE(load_state(file));
   const std::string whole = test::read_text(file);
   std::size_t refused = 0;
@@ -242,7 +242,7 @@ TEST_F(StateSaverTest, EveryDamagedByteIsDetected) {
     std::ofstream{file} << damaged;
     const auto left = load_state(file);
     refused += left ? 0U : 1U;
-    if (left) { // from the other of two copies of the whereabouts
+    if (left) { // from the other of two copies of the resume state
       EXPECT_EQ(left->last.T_source_base[1]->translation, Eigen::Vector3d::Zero()) << i;
       EXPECT_TRUE(left->last.T_odom_base.translation.x() == 0 || left->last.T_odom_base.translation.x() == 5) << i;
       EXPECT_EQ(left->map_odom.size(), 3U) << i;
@@ -253,7 +253,7 @@ TEST_F(StateSaverTest, EveryDamagedByteIsDetected) {
   EXPECT_GT(refused, 3 * sizeof(SurfacePoint)) << "all of the map";
 }
 
-/// Power fails while the whereabouts are written: only this many bytes are new.
+/// Power fails while the resume state is written: only this many bytes are new.
 TEST_F(StateSaverTest, TruncatedPoseUpdateLosesNoMap) {
   const test::TemporaryFolder memory{"/dev/shm"};
   const std::filesystem::path file = memory / "state";
@@ -268,7 +268,7 @@ TEST_F(StateSaverTest, TruncatedPoseUpdateLosesNoMap) {
   for (int sweep = 1; sweep <= 3; ++sweep) {
     const std::string before = test::read_text(file);
     state.last.T_odom_base.translation.x() = sweep;
-    update_whereabouts(file, state.last);
+    update_resume_state(file, state.last);
     ASSERT_EQ(x_m(), sweep);
     const std::string after = test::read_text(file);
     ASSERT_EQ(after.size(), before.size());

@@ -61,7 +61,7 @@ void RestartingPipeline::end(End how) {
   daemon::IngestReport report;
   report.read(pipeline_->ingest());
   before_ = with(report);
-  const std::optional<Whereabouts> last = state_saver_->last();
+  const std::optional<ResumeState> last = state_saver_->last();
   if (how == End::crash && last)
     wait_for_disk(*last);
   disk_.reset();
@@ -77,7 +77,7 @@ void RestartingPipeline::end(End how) {
 
 /// Waits until the state is written. An accelerated drive outruns a busy disk by seconds of stamps; a real robot does
 /// not.
-void RestartingPipeline::wait_for_disk(const Whereabouts& last) const {
+void RestartingPipeline::wait_for_disk(const ResumeState& last) const {
   const Duration give_up = daemon::read_clock(CLOCK_MONOTONIC) + test::patience();
   while (daemon::read_clock(CLOCK_MONOTONIC) < give_up) {
     const auto written = daemon::load_state(state_file_);

@@ -45,7 +45,7 @@ class RestartingPipeline {
   [[nodiscard]] bool has_resumed() const { return resumed_.load(std::memory_order_relaxed); }
 
  private:
-  void wait_for_disk(const Whereabouts& last) const;
+  void wait_for_disk(const ResumeState& last) const;
   [[nodiscard]] Counts with(const daemon::IngestReport& report) const;
 
   Config config_;

@@ -32,7 +32,7 @@ std::vector<std::string> source_verdicts(const Config& config, const MotionSourc
                       "the end (possible causes: T_base_source, the unit (rad/s) or the stamps of the gyro, or lidar "
                       "that follows what moves around the robot)",
                       name));
-    else if (health.longest_refusal().is_worth_telling())
+    else if (health.longest_refusal().is_worth_reporting())
       lines.push_back(fmt::format("motion source {} was refused for {:.1f} s: it {}", name,
                                   to_seconds(health.longest_refusal().lasted),
                                   explanation(health.longest_refusal().reason)));

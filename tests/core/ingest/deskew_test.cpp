@@ -62,7 +62,7 @@ TEST(MotionCorrection, IsTakenBackWhereTheGyroWasWrong) {
   std::vector<SurfacePoint> mended;
   for (std::size_t i = 9; i < 13; ++i) {
     ASSERT_EQ(bent[i].points.size(), good[i].points.size());
-    SweepCorrection::anew(bent[i], Vector6::Zero()).apply(bent[i].points, mended);
+    SweepCorrection::constant(bent[i], Vector6::Zero()).apply(bent[i].points, mended);
     float bent_by_m = 0.0F, left_m = 0.0F, left_rad = 0.0F;
     for (std::size_t k = 0; k < mended.size(); ++k) {
       const SweepPoint& truth = good[i].points[k];

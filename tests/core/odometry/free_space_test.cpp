@@ -181,7 +181,7 @@ TEST_F(FreeSpaceTest, AClockThatStepsBackMakesAllOld) {
 
 TEST_F(FreeSpaceTest, ForgetsWhereItWas) {
   take(0, {}, room_);
-  space_.forget();
+  space_.clear();
   const Points seen = around_vehicle(4.0F, {});
   EXPECT_EQ(take(1, {}, seen).size(), seen.size());
 }

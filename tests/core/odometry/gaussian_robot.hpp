@@ -186,9 +186,9 @@ inline void see(MotionFilter& filter, GaussianRobot& robot, const Matrix12& info
   const Vector12 off = robot.seen_beside(belief, information);
   const Vector12 step = (belief.information + information).ldlt().solve(information * off);
   const Eigen::Vector3d turn = step.segment<3>(3);
-  filter.see({(so3_exp(turn) * belief.T_target_source.rotation).normalized(),
-              belief.T_target_source.translation + step.head<3>()},
-             belief.twist_base + step.tail<6>(), information);
+  filter.update({(so3_exp(turn) * belief.T_target_source.rotation).normalized(),
+                 belief.T_target_source.translation + step.head<3>()},
+                belief.twist_base + step.tail<6>(), information);
 }
 
 struct Sensing {

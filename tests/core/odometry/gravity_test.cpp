@@ -153,7 +153,7 @@ double tilt_after(int sweeps, double tilt_rad, double up_noise_rad = 0.0) {
     const double noise = i % 2 == 0 ? up_noise_rad : -up_noise_rad;
     keeper.observe(R_odom_base, from_rpy_rad({noise, 0, 0}).conjugate() * kUp);
     if (i % 10 == 9)
-      R_odom_base = so3_exp(keeper.take_correction_rad()) * R_odom_base;
+      R_odom_base = so3_exp(keeper.pop_correction_rad()) * R_odom_base;
   }
   return std::acos((R_odom_base * kUp).z());
 }

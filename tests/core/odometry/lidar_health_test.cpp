@@ -29,22 +29,22 @@ LidarHealth used_to(const Registration& registration, double period_s = kPeriod_
 
 TEST(LidarHealth, KnowsNothingUnusualBeforeTheFirstSweep) {
   const LidarHealth health;
-  EXPECT_FALSE(health.misses_most(fit(0)));
+  EXPECT_FALSE(health.lacks_correspondences(fit(0)));
   EXPECT_FALSE(health.is_unusual(fit(0)));
 }
 
 TEST(LidarHealth, TheFirstSweepIsTheUsualAtOnce) {
   LidarHealth health;
   health.learn(fit(900), kPeriod_s);
-  EXPECT_TRUE(health.misses_most(fit(449)));
-  EXPECT_FALSE(health.misses_most(fit(451)));
+  EXPECT_TRUE(health.lacks_correspondences(fit(449)));
+  EXPECT_FALSE(health.lacks_correspondences(fit(451)));
 }
 
 TEST(LidarHealth, MissesMostBelowHalfOfTheUsualShare) {
   const LidarHealth health = used_to(fit(600));
-  EXPECT_TRUE(health.misses_most(fit(299)));
-  EXPECT_FALSE(health.misses_most(fit(301)));
-  EXPECT_FALSE(health.misses_most(fit(31, 1.0, kPoints / 10))) << "a share, whatever the number of points";
+  EXPECT_TRUE(health.lacks_correspondences(fit(299)));
+  EXPECT_FALSE(health.lacks_correspondences(fit(301)));
+  EXPECT_FALSE(health.lacks_correspondences(fit(31, 1.0, kPoints / 10))) << "a share, whatever the number of points";
 }
 
 TEST(LidarHealth, AFitIsUnusualThatIsWorseByASeventh) {
@@ -60,14 +60,14 @@ TEST(LidarHealth, AFitIsUnusualThatIsWorseByASeventh) {
 TEST(LidarHealth, AnotherPlaceIsUsualAfterSecondsAtAnyRate) {
   for (const double period_s : {0.2, 0.1, 0.05}) {
     LidarHealth health = used_to(fit(1000), period_s);
-    EXPECT_TRUE(health.misses_most(fit(400)));
+    EXPECT_TRUE(health.lacks_correspondences(fit(400)));
     for (int i = 0; i < static_cast<int>(std::lround(1.0 / period_s)); ++i)
       health.learn(fit(400), period_s);
-    EXPECT_FALSE(health.misses_most(fit(400)));
+    EXPECT_FALSE(health.lacks_correspondences(fit(400)));
     const double left = std::exp(-1.0), usual = 400 + 600 * left;
-    EXPECT_FALSE(health.misses_most(fit(static_cast<std::size_t>(0.5 * usual) + 1))) << period_s;
+    EXPECT_FALSE(health.lacks_correspondences(fit(static_cast<std::size_t>(0.5 * usual) + 1))) << period_s;
     const double least_left = std::pow(0.8, 5), least = 400 + 600 * least_left;
-    EXPECT_TRUE(health.misses_most(fit(static_cast<std::size_t>(0.5 * least) - 1))) << period_s;
+    EXPECT_TRUE(health.lacks_correspondences(fit(static_cast<std::size_t>(0.5 * least) - 1))) << period_s;
   }
 }
 
@@ -75,10 +75,10 @@ TEST(LidarHealth, ASweepOfNoPointsIsNoDivisionByNothing) {
   LidarHealth health;
   health.learn(fit(0, 1.0, 0), 0.0);
   health.learn(fit(0, 1.0, 0), kPeriod_s);
-  EXPECT_FALSE(health.misses_most(fit(0, 1.0, 0)));
+  EXPECT_FALSE(health.lacks_correspondences(fit(0, 1.0, 0)));
   EXPECT_FALSE(health.is_unusual(fit(0, 1.0, 0)));
   health = used_to(fit(800));
-  EXPECT_TRUE(health.misses_most(fit(0, 1.0, 0)));
+  EXPECT_TRUE(health.lacks_correspondences(fit(0, 1.0, 0)));
 }
 
 } // namespace

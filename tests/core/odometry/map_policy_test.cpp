@@ -20,10 +20,10 @@ Stamp end_of(int sweep) { return stamp_from_ns(1'000'000'000) + sweep * kEverySw
 Pose ahead(double x_m, double yaw_deg = 0.0) { return {from_rpy_rad({0, 0, yaw_deg * kRadPerDeg}), {x_m, 0, 0}}; }
 
 MapPolicy::Outcome placed(int sweep, const Pose& T_odom_base = {}) {
-  return {.stamp = end_of(sweep), .T_odom_base = T_odom_base, .placed = true, .has_points = true};
+  return {.stamp = end_of(sweep), .T_odom_base = T_odom_base, .accepted = true, .has_points = true};
 }
 MapPolicy::Outcome refused(int sweep, const Pose& T_odom_base = {}) {
-  return {.stamp = end_of(sweep), .T_odom_base = T_odom_base, .placed = false, .has_points = true};
+  return {.stamp = end_of(sweep), .T_odom_base = T_odom_base, .accepted = false, .has_points = true};
 }
 MapPolicy::Outcome carried(MapPolicy::Outcome outcome) {
   outcome.carried = true;
@@ -35,35 +35,35 @@ MapPolicy policy_begun(int last = 0) {
   MapPolicy policy(kMapOptions);
   policy.begin(end_of(0), Pose{});
   for (int i = 1; i <= last; ++i)
-    EXPECT_EQ(policy.judge(placed(i)), Verdict::waits) << "it stands";
+    EXPECT_EQ(policy.judge(placed(i)), Verdict::wait) << "it stands";
   return policy;
 }
 
 /// Returns the first sweep at which the policy stops waiting, and its verdict; the last sweep if there is none.
 std::pair<int, Verdict> first_that_waits_no_longer(MapPolicy& policy, int from, int to, bool are_carried) {
   for (int i = from; i <= to; ++i)
-    if (const Verdict verdict = policy.judge(are_carried ? carried(refused(i)) : refused(i)); verdict != Verdict::waits)
+    if (const Verdict verdict = policy.judge(are_carried ? carried(refused(i)) : refused(i)); verdict != Verdict::wait)
       return {i, verdict};
-  return {to, Verdict::waits};
+  return {to, Verdict::wait};
 }
 
 TEST(MapPolicy, TakesInASweepAfterEveryMetreOrThirtyDegrees) {
   MapPolicy policy = policy_begun();
-  EXPECT_EQ(policy.judge(placed(1, ahead(0.99))), Verdict::waits);
-  EXPECT_EQ(policy.judge(placed(2, ahead(1.01))), Verdict::takes_in);
-  EXPECT_EQ(policy.judge(placed(3, ahead(2.0))), Verdict::waits) << "counted from the last that was taken in";
-  EXPECT_EQ(policy.judge(placed(4, ahead(2.0, 29.9))), Verdict::waits);
-  EXPECT_EQ(policy.judge(placed(5, ahead(2.0, 30.1))), Verdict::takes_in);
-  EXPECT_EQ(policy.judge(placed(6, ahead(2.0, 0.2))), Verdict::waits);
-  EXPECT_EQ(policy.judge(placed(7, ahead(2.0, 0.0))), Verdict::takes_in) << "back again";
+  EXPECT_EQ(policy.judge(placed(1, ahead(0.99))), Verdict::wait);
+  EXPECT_EQ(policy.judge(placed(2, ahead(1.01))), Verdict::insert);
+  EXPECT_EQ(policy.judge(placed(3, ahead(2.0))), Verdict::wait) << "counted from the last that was taken in";
+  EXPECT_EQ(policy.judge(placed(4, ahead(2.0, 29.9))), Verdict::wait);
+  EXPECT_EQ(policy.judge(placed(5, ahead(2.0, 30.1))), Verdict::insert);
+  EXPECT_EQ(policy.judge(placed(6, ahead(2.0, 0.2))), Verdict::wait);
+  EXPECT_EQ(policy.judge(placed(7, ahead(2.0, 0.0))), Verdict::insert) << "back again";
 }
 
 TEST(MapPolicy, TakesInNothingThatMissesMostOfWhatIsUsual) {
   MapPolicy policy = policy_begun();
   MapPolicy::Outcome dusty = placed(1, ahead(5.0));
-  dusty.misses_most = true;
-  EXPECT_EQ(policy.judge(dusty), Verdict::waits);
-  EXPECT_EQ(policy.judge(placed(2, ahead(5.0))), Verdict::takes_in);
+  dusty.lacks_correspondences = true;
+  EXPECT_EQ(policy.judge(dusty), Verdict::wait);
+  EXPECT_EQ(policy.judge(placed(2, ahead(5.0))), Verdict::insert);
 }
 
 MapPolicy::Outcome overlapping(int sweep, double overlap, const Pose& T_odom_base = {}, bool turn_measured = true) {
@@ -76,32 +76,32 @@ MapPolicy::Outcome overlapping(int sweep, double overlap, const Pose& T_odom_bas
 TEST(MapPolicy, LostOverlapIsAKeyframe) {
   MapPolicy policy(kMapOptions);
   policy.begin(end_of(0), Pose{});
-  EXPECT_EQ(policy.judge(overlapping(1, 0.8)), Verdict::waits);
-  EXPECT_EQ(policy.judge(overlapping(2, 0.69, ahead(0.0, 6.0))), Verdict::waits) << "0.86 of the best";
-  EXPECT_EQ(policy.judge(overlapping(3, 0.67, ahead(0.0, 6.0))), Verdict::takes_in) << "0.84 of it, after a turn";
-  EXPECT_EQ(policy.judge(overlapping(4, 0.67, ahead(0.2, 6.0))), Verdict::waits) << "the best since the last one";
-  EXPECT_EQ(policy.judge(overlapping(5, 0.55, ahead(0.2, 6.0))), Verdict::takes_in) << "after a distance";
+  EXPECT_EQ(policy.judge(overlapping(1, 0.8)), Verdict::wait);
+  EXPECT_EQ(policy.judge(overlapping(2, 0.69, ahead(0.0, 6.0))), Verdict::wait) << "0.86 of the best";
+  EXPECT_EQ(policy.judge(overlapping(3, 0.67, ahead(0.0, 6.0))), Verdict::insert) << "0.84 of it, after a turn";
+  EXPECT_EQ(policy.judge(overlapping(4, 0.67, ahead(0.2, 6.0))), Verdict::wait) << "the best since the last one";
+  EXPECT_EQ(policy.judge(overlapping(5, 0.55, ahead(0.2, 6.0))), Verdict::insert) << "after a distance";
 }
 
 TEST(MapPolicy, LostOverlapIsNoKeyframeOfARobotThatStands) {
   MapPolicy policy(kMapOptions);
   policy.begin(end_of(0), Pose{});
-  EXPECT_EQ(policy.judge(overlapping(1, 0.8)), Verdict::waits);
-  EXPECT_EQ(policy.judge(overlapping(2, 0.4, ahead(0.09, 4.9))), Verdict::waits) << "people in front of it";
+  EXPECT_EQ(policy.judge(overlapping(1, 0.8)), Verdict::wait);
+  EXPECT_EQ(policy.judge(overlapping(2, 0.4, ahead(0.09, 4.9))), Verdict::wait) << "people in front of it";
 }
 
 TEST(MapPolicy, LostOverlapIsNoKeyframeWhereNoSourceMeasuresTheTurn) {
   MapPolicy policy(kMapOptions);
   policy.begin(end_of(0), Pose{});
-  EXPECT_EQ(policy.judge(overlapping(1, 0.8, {}, false)), Verdict::waits);
-  EXPECT_EQ(policy.judge(overlapping(2, 0.5, ahead(0.5, 20.0), false)), Verdict::waits);
+  EXPECT_EQ(policy.judge(overlapping(1, 0.8, {}, false)), Verdict::wait);
+  EXPECT_EQ(policy.judge(overlapping(2, 0.5, ahead(0.5, 20.0), false)), Verdict::wait);
 }
 
 TEST(MapPolicy, TakesInNothingThatLidarDidNotPlace) {
   MapPolicy policy = policy_begun();
-  EXPECT_EQ(policy.judge(refused(1, ahead(5.0))), Verdict::waits) << "one sweep against one";
+  EXPECT_EQ(policy.judge(refused(1, ahead(5.0))), Verdict::wait) << "one sweep against one";
   EXPECT_TRUE(policy.is_refused());
-  EXPECT_EQ(policy.judge(placed(2)), Verdict::waits);
+  EXPECT_EQ(policy.judge(placed(2)), Verdict::wait);
   EXPECT_FALSE(policy.is_refused());
 }
 
@@ -109,15 +109,15 @@ TEST(MapPolicy, GoesOnFromThePredictionAfterTenRefusalsInARow) {
   MapPolicy policy = policy_begun(50);
   const auto [sweep, verdict] = first_that_waits_no_longer(policy, 51, 100, false);
   EXPECT_EQ(sweep, 50 + kPatience);
-  EXPECT_EQ(verdict, Verdict::takes_in);
+  EXPECT_EQ(verdict, Verdict::insert);
   EXPECT_FALSE(policy.is_refused()) << "it counts anew";
 }
 
 TEST(MapPolicy, OneThatIsPlacedEndsTheRow) {
   MapPolicy policy = policy_begun(50);
-  EXPECT_EQ(first_that_waits_no_longer(policy, 51, 59, false).second, Verdict::waits);
-  EXPECT_EQ(policy.judge(placed(60)), Verdict::waits);
-  EXPECT_EQ(first_that_waits_no_longer(policy, 61, 69, false).second, Verdict::waits);
+  EXPECT_EQ(first_that_waits_no_longer(policy, 51, 59, false).second, Verdict::wait);
+  EXPECT_EQ(policy.judge(placed(60)), Verdict::wait);
+  EXPECT_EQ(first_that_waits_no_longer(policy, 61, 69, false).second, Verdict::wait);
 }
 
 TEST(MapPolicy, SweepsWithoutPointsSayNothingAgainstTheMap) {
@@ -125,7 +125,7 @@ TEST(MapPolicy, SweepsWithoutPointsSayNothingAgainstTheMap) {
   for (int i = 1; i < 100; ++i) {
     MapPolicy::Outcome empty = refused(i, ahead(0.5 * i));
     empty.has_points = false;
-    EXPECT_EQ(policy.judge(empty), Verdict::waits) << i;
+    EXPECT_EQ(policy.judge(empty), Verdict::wait) << i;
     EXPECT_FALSE(policy.is_refused());
   }
 }
@@ -134,7 +134,7 @@ TEST(MapPolicy, WaitsFiveSecondsWhereAnOdometryCarries) {
   MapPolicy policy = policy_begun(100);
   const auto [sweep, verdict] = first_that_waits_no_longer(policy, 101, 200, true);
   EXPECT_EQ(sweep, 150) << "fifty sweeps since the last that was placed";
-  EXPECT_EQ(verdict, Verdict::takes_in);
+  EXPECT_EQ(verdict, Verdict::insert);
 }
 
 TEST(MapPolicy, BeginsAnewWhereAsManySweepsContradictTheMapAsFittedIt) {
@@ -142,32 +142,32 @@ TEST(MapPolicy, BeginsAnewWhereAsManySweepsContradictTheMapAsFittedIt) {
     MapPolicy policy = policy_begun();
     const auto [sweep, verdict] = first_that_waits_no_longer(policy, 1, 100, are_carried);
     EXPECT_EQ(sweep, kPatience) << are_carried;
-    EXPECT_EQ(verdict, Verdict::begins_anew) << "carried or not: " << are_carried;
+    EXPECT_EQ(verdict, Verdict::restart) << "carried or not: " << are_carried;
     const auto [again, same] = first_that_waits_no_longer(policy, sweep + 1, 100, false);
     EXPECT_EQ(again, 2 * kPatience) << "the new one is in doubt as well";
-    EXPECT_EQ(same, Verdict::begins_anew);
+    EXPECT_EQ(same, Verdict::restart);
   }
 }
 
 TEST(MapPolicy, AMapIsNoLongerInDoubtOnceItFittedMoreOften) {
   MapPolicy policy = policy_begun(kPatience); // eleven with the first
-  EXPECT_EQ(first_that_waits_no_longer(policy, kPatience + 1, 100, false).second, Verdict::takes_in);
+  EXPECT_EQ(first_that_waits_no_longer(policy, kPatience + 1, 100, false).second, Verdict::insert);
   MapPolicy doubtful = policy_begun(kPatience - 1);
-  EXPECT_EQ(first_that_waits_no_longer(doubtful, kPatience, 100, false).second, Verdict::begins_anew);
+  EXPECT_EQ(first_that_waits_no_longer(doubtful, kPatience, 100, false).second, Verdict::restart);
 }
 
 TEST(MapPolicy, AMapOfAnotherRunIsNeverThrownAway) {
   MapPolicy policy(kMapOptions);
   policy.resume();
   policy.begin(end_of(0), Pose{});
-  EXPECT_EQ(first_that_waits_no_longer(policy, 1, 100, false), std::pair(kPatience, Verdict::takes_in));
+  EXPECT_EQ(first_that_waits_no_longer(policy, 1, 100, false), std::pair(kPatience, Verdict::insert));
 }
 
 TEST(MapPolicy, KnowsWhetherASweepWasPlacedInTheLastFiveSeconds) {
   const MapPolicy policy = policy_begun();
-  EXPECT_TRUE(policy.was_placed_lately(end_of(49)));
-  EXPECT_FALSE(policy.was_placed_lately(end_of(50)));
-  EXPECT_TRUE(policy_begun(10).was_placed_lately(end_of(59)));
+  EXPECT_TRUE(policy.was_accepted_lately(end_of(49)));
+  EXPECT_FALSE(policy.was_accepted_lately(end_of(50)));
+  EXPECT_TRUE(policy_begun(10).was_accepted_lately(end_of(59)));
 }
 
 } // namespace

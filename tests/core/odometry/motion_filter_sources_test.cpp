@@ -137,10 +137,10 @@ TEST(MotionFilter, ForgetsBiasScaleAndNoiseOfASourceThatMayComeBackAsAnother) {
   ASSERT_GT(noise_of(filter, kWheelSource, robot.twist(), 0.1)[kX], 5.0 * kUsualWheels[kX] * kUsualWheels[kX]);
   const Matrix12 before = filter.covariance();
   const Eigen::Vector3d bias = filter.state().segment<3>(filter.state_of(kGyroSource));
-  filter.forget(kWheelSource);
+  filter.reset_source(kWheelSource);
   EXPECT_EQ(filter.state().segment<2>(filter.state_of(kWheelSource)), Eigen::Vector2d::Zero());
   EXPECT_EQ(filter.state().segment<3>(filter.state_of(kGyroSource)), bias) << "another one";
-  filter.forget(kGyroSource);
+  filter.reset_source(kGyroSource);
   EXPECT_EQ(filter.state().segment<3>(filter.state_of(kGyroSource)), Eigen::Vector3d::Zero());
   EXPECT_EQ(filter.covariance(), before) << "where the robot is is as well known";
   filter.predict(0.1, 0.1, std::nullopt, kNothing);
@@ -282,7 +282,7 @@ TEST(MotionFilter, ASourceThatComesBackIsAsLateAsItWas) {
   MotionFilter filter = begun_with(robot, swaying);
   sweep_for(60.0, filter, robot, 0.1, {.wheels = false, .lidar = usual_lidar(0.1)});
   const LearnedSource before = filter.learned(kGyroSource);
-  filter.forget(kGyroSource);
+  filter.reset_source(kGyroSource);
   const LearnedSource after = filter.learned(kGyroSource);
   EXPECT_EQ(after.lateness_s().mean, before.lateness_s().mean);
   EXPECT_EQ(after.mounting_rad(2).mean, before.mounting_rad(2).mean);
@@ -319,7 +319,7 @@ TEST(MotionFilter, BeginningSlipLeavesOpenTheSpeedAloneAndLastsUntilItIsMeasured
   const Vector6 twist = twist_of(kSpeed_mps, 0, 0, 0, 0, kTurn_radps);
   const Pose T_odom_base =
       open.pose() * se3_exp(kElapsed_s * open.twist_base()).inverse() * se3_exp(kElapsed_s * twist);
-  filter.see(T_odom_base, twist, usual_lidar(kElapsed_s));
+  filter.update(T_odom_base, twist, usual_lidar(kElapsed_s));
   EXPECT_NEAR(predict(false).twist_base()[kX], kSpeed_mps, 0.1) << "the slip goes on";
 }
 

@@ -221,7 +221,7 @@ TEST(MotionFilter, WhatTheMapTakesOverIsNotLostSinceTheStart) {
     sweep_for(1.0, filter, robot, 0.1, {}); // unobserved: far above the floor of the pose
     const Matrix6 before = filter.pose_covariance_since_start();
     const double against_map = filter.covariance()(kX, kX);
-    filter.keep(share * Matrix6::Identity());
+    filter.transfer_error_to_map(share * Matrix6::Identity());
     const Matrix6 after = filter.pose_covariance_since_start();
     const Vector6 floor = along_each_axis(0.001, 1e-4 / kRadPerDeg).cwiseAbs2(); // the surfaces' own uncertainty
     for (int axis = 0; axis < 6; ++axis)
@@ -236,7 +236,7 @@ TEST(MotionFilter, SinceTheStartItIsNeverSurerThanAgainstTheMap) {
   double last = 0.0;
   for (int keyframe = 0; keyframe < 50; ++keyframe) {
     sweep_for(1.0, filter, robot, 0.1, {.lidar = usual_lidar(0.1)});
-    filter.keep(0.2 * Matrix6::Identity());
+    filter.transfer_error_to_map(0.2 * Matrix6::Identity());
     const Matrix6 more = filter.pose_covariance_since_start() - filter.covariance().topLeftCorner<6, 6>();
     EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6>(more).eigenvalues()[0], -1e-9);
     EXPECT_GT(more(kX, kX), last) << "the map drifts";
@@ -249,7 +249,7 @@ TEST(MotionFilter, ALidarThatSitsOtherwiseThanThoughtSeesTheWayOfAnotherBody) {
   MotionFilter filter = begun(Vector6::Zero());
   const Matrix6 at_start = filter.pose_covariance_since_start();
   const auto sigma_at = [&](const Pose& pose) {
-    filter.put(pose);
+    filter.set_pose(pose);
     return (filter.pose_covariance_since_start() - at_start).diagonal().cwiseMax(0.0).cwiseSqrt().eval();
   };
   EXPECT_TRUE(sigma_at(Pose{}).isZero(1e-9));
@@ -300,7 +300,7 @@ TEST(MotionFilter, PutMovesThePoseAndNothingElse) {
   MotionFilter filter = begun(twist_of(1, 0, 0, 0, 0, 0));
   const Matrix12 before = filter.covariance();
   const Pose elsewhere{so3_exp({0, 0, 0.1}), {1, 2, 3}};
-  filter.put(elsewhere);
+  filter.set_pose(elsewhere);
   EXPECT_EQ(filter.pose(), elsewhere);
   EXPECT_EQ(filter.covariance(), before);
   EXPECT_EQ(filter.twist_base(), twist_of(1, 0, 0, 0, 0, 0));
@@ -333,11 +333,11 @@ class AnyDay {
     if (maybe())
       filter.learn();
     if (any(5) == 0)
-      filter.keep(0.1 * static_cast<double>(any(11)) * Matrix6::Identity());
+      filter.transfer_error_to_map(0.1 * static_cast<double>(any(11)) * Matrix6::Identity());
     if (any(100) == 0)
-      filter.forget(SourceId{any(2)});
+      filter.reset_source(SourceId{any(2)});
     if (any(100) == 0)
-      filter.put(robot_.pose());
+      filter.set_pose(robot_.pose());
   }
 
  private:

@@ -116,8 +116,8 @@ Gaps drive_with_gaps(const sim::Scene& scene, const sim::Trajectory& trajectory,
   if (wheels == Wheels::learned || wheels == Wheels::not_learned)
     robot.wheels->scale_error = 0.1;
   Odometry odometry(robot.odometry(), robot.motion_sources());
-  Whereabouts now;
-  std::deque<std::pair<Whereabouts, std::vector<SurfacePoint>>> ended;
+  ResumeState now;
+  std::deque<std::pair<ResumeState, std::vector<SurfacePoint>>> ended;
   Gaps gaps;
   int sweeps = 0;
   drive(scene, trajectory, robot, seconds{26}, [&](const Sweep& sweep) {
@@ -239,8 +239,8 @@ double worst_beside_spinning_wheels_m(const sim::Scene& scene, Duration gap) {
   RobotSetup robot = robot_of_restarts();
   robot.wheels->spinning_mps = 0.95;
   Odometry odometry(robot.odometry(), robot.motion_sources());
-  Whereabouts now;
-  std::deque<std::pair<Whereabouts, std::vector<SurfacePoint>>> ended;
+  ResumeState now;
+  std::deque<std::pair<ResumeState, std::vector<SurfacePoint>>> ended;
   std::deque<std::pair<Odometry, int>> others; // with the number of sweeps processed by each
   int sweeps = 0, judged = 0;
   double worst_m = 0;
@@ -288,7 +288,7 @@ TEST(Relocation, WithoutWheelsASecondIsBridgedAndSixAreAFreshStart) {
 /// The first two seconds of a drive through a tunnel, and the final state of another run in a different place.
 class AnotherPlace : public testing::Test {
  protected:
-  [[nodiscard]] std::vector<OdometryEstimate> go_on_from(const Whereabouts& last,
+  [[nodiscard]] std::vector<OdometryEstimate> go_on_from(const ResumeState& last,
                                                          Duration wheels_are_silent_for = {}) const {
     RobotSetup robot = robot_of_restarts();
     robot.is_silent = [&](std::size_t source, Stamp now) {
@@ -305,7 +305,7 @@ class AnotherPlace : public testing::Test {
 
   sim::Trajectory trajectory_{sim::weaving_course(seconds{5}, 1.0, 0.3, 12.0), sim::weaving_start(5, 0.3, 12.0)};
   std::vector<SurfacePoint> wall_ = std::vector<SurfacePoint>(100, {{40, 0, 0}, {1, 0, 0}});
-  Whereabouts last_{.stamp = trajectory_.start() - seconds{3},
+  ResumeState last_{.stamp = trajectory_.start() - seconds{3},
                     .T_odom_base = {Eigen::Quaterniond::Identity(), {7, 0, 0}}};
 };
 
@@ -341,10 +341,10 @@ TEST_F(AnotherPlace, OneOfTwoOdometriesThatWasRestartedIsPassedOver) {
   last_.T_source_base[2] = Pose{Eigen::Quaterniond::Identity(), {-2, 0, 0}};
   SensedMotion sensed;
   sensed.sources[0].usable = sensed.sources[2].usable = true;
-  const std::vector<Place> places = last_.places(last_.stamp + seconds{3}, sensed, 10);
-  EXPECT_TRUE(places.front().told);
-  EXPECT_NEAR(places.front().T_odom_base.translation.x(), 9, 1e-9);
-  EXPECT_FALSE(places[1].told);
+  const std::vector<Candidate> candidates = last_.candidates(last_.stamp + seconds{3}, sensed, 10);
+  EXPECT_TRUE(candidates.front().from_odometry);
+  EXPECT_NEAR(candidates.front().T_odom_base.translation.x(), 9, 1e-9);
+  EXPECT_FALSE(candidates[1].from_odometry);
 }
 
 TEST_F(AnotherPlace, HealthyOdometryGoesBeforeOneInDoubt) {
@@ -354,11 +354,11 @@ TEST_F(AnotherPlace, HealthyOdometryGoesBeforeOneInDoubt) {
   last_.doubted.set(0);
   SensedMotion sensed;
   sensed.sources[0].usable = sensed.sources[2].usable = true;
-  const std::vector<Place> places = last_.places(last_.stamp + seconds{3}, sensed, 10);
-  EXPECT_TRUE(places[0].vouched);
-  EXPECT_NEAR(places[0].T_odom_base.translation.x(), 9, 1e-9);
-  EXPECT_TRUE(places[1].told && !places[1].vouched);
-  EXPECT_NEAR(places[1].T_odom_base.translation.x(), 8, 1e-9);
+  const std::vector<Candidate> candidates = last_.candidates(last_.stamp + seconds{3}, sensed, 10);
+  EXPECT_TRUE(candidates[0].from_healthy);
+  EXPECT_NEAR(candidates[0].T_odom_base.translation.x(), 9, 1e-9);
+  EXPECT_TRUE(candidates[1].from_odometry && !candidates[1].from_healthy);
+  EXPECT_NEAR(candidates[1].T_odom_base.translation.x(), 8, 1e-9);
 }
 
 TEST_F(AnotherPlace, OdometryInDoubtIsBelievedWhereNothingElseTells) {
@@ -379,12 +379,12 @@ TEST_F(AnotherPlace, WhoStoodMayStandThereStill) {
   last_.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {-1, 0, 0}};
   SensedMotion sensed;
   sensed.sources[0].usable = true;
-  const std::vector<Place> sound = last_.places(last_.stamp + seconds{3}, sensed, 10);
-  EXPECT_TRUE(sound[0].vouched);
+  const std::vector<Candidate> sound = last_.candidates(last_.stamp + seconds{3}, sensed, 10);
+  EXPECT_TRUE(sound[0].from_healthy);
   EXPECT_EQ(sound[1].T_odom_base.translation.x(), 7);
   EXPECT_LT(sound[1].sigma[0], 0.1);
   last_.doubted.set(0);
-  EXPECT_EQ(last_.places(last_.stamp + seconds{3}, sensed, 10).front().T_odom_base.translation.x(), 7);
+  EXPECT_EQ(last_.candidates(last_.stamp + seconds{3}, sensed, 10).front().T_odom_base.translation.x(), 7);
 }
 
 TEST_F(AnotherPlace, AnotherOdometryIsAwaitedWhereOneWasRestarted) {
@@ -411,7 +411,7 @@ TEST(Relocation, InABareCorridorTheSigmaHoldsWhatRestartedWheelsGetWrong) {
   const RobotSetup robot = robot_of_restarts();
   Odometry odometry(robot.odometry(), robot.motion_sources());
   std::optional<Odometry> next;
-  Whereabouts last;
+  ResumeState last;
   double worst_sigma = 0;
   int begun = 0;
   drive(sim::corridor(60, sim::Walls::bare), weaving, robot, seconds{12}, [&](const Sweep& sweep) {

@@ -22,7 +22,7 @@ Sweep sweep_at(Duration elapsed) {
 }
 SensedSteps begun() {
   SensedSteps steps;
-  steps.remember(sweep_at(milliseconds{0}));
+  steps.store(sweep_at(milliseconds{0}));
   return steps;
 }
 
@@ -41,7 +41,7 @@ TEST(SensedSteps, AreMeanTwistsHoweverManySweepsWereDropped) {
 TEST(SensedSteps, CountFromTheLastThatWasRemembered) {
   SensedSteps steps = begun();
   const Sweep second = sweep_at(milliseconds{100});
-  steps.remember(second);
+  steps.store(second);
   EXPECT_EQ(steps.last(), second.end);
   EXPECT_DOUBLE_EQ(steps.elapsed_s(sweep_at(milliseconds{250})), 0.15);
   EXPECT_LT((steps.twist_base(sweep_at(milliseconds{250}), kSource)->mean - kTwist).norm(), 1e-9);
@@ -56,7 +56,7 @@ TEST(SensedSteps, TellHowTheTwistChangesAndWhatIsDueToStampsThatWereCorrected) {
   began.late = milliseconds{10};
   ended.late = milliseconds{40};
   SensedSteps steps;
-  steps.remember(first);
+  steps.store(first);
   const auto sensed = steps.twist_base(second, kSource);
   ASSERT_TRUE(sensed);
   EXPECT_LT((sensed->change_per_s - 20.0 * kTwist).norm(), 1e-9);
@@ -71,7 +71,7 @@ TEST(SensedSteps, AreNothingWhereTheSourceWasNotHeard) {
   EXPECT_FALSE(steps.twist_base(sweep, kSource)) << "not now";
   EXPECT_FALSE(steps.is_usable(sweep, kSource));
   SensedSteps silent;
-  silent.remember(sweep);
+  silent.store(sweep);
   EXPECT_FALSE(silent.twist_base(sweep_at(milliseconds{200}), kSource)) << "not then";
 }
 
@@ -93,7 +93,7 @@ TEST(SensedSteps, OfASickSourceAreKnownButNotUsed) {
   EXPECT_TRUE(begun().twist_base(sick, kSource));
   EXPECT_FALSE(begun().is_usable(sick, kSource));
   SensedSteps steps;
-  steps.remember(sick);
+  steps.store(sick);
   EXPECT_TRUE(steps.twist_base(sweep_at(milliseconds{200}), kSource));
   EXPECT_FALSE(steps.is_usable(sweep_at(milliseconds{200}), kSource)) << "it has only just recovered";
 }

@@ -67,7 +67,7 @@ class WheelsTest : public testing::Test {
   void hear(LidarOpinion opinion, int sweeps, const RegistrationFeedback& feedback = {}) {
     for (int i = 0; i < sweeps; ++i) {
       run(milliseconds{100});
-      monitor_.hear(opinion, feedback, now_);
+      monitor_.on_feedback(opinion, feedback, now_);
       note();
     }
   }
@@ -103,7 +103,7 @@ class WheelsTest : public testing::Test {
 
  private:
   void note() {
-    if (const auto event = monitor_.take_event())
+    if (const auto event = monitor_.pop_event())
       events_.push_back(*event);
   }
 };
@@ -118,7 +118,7 @@ TEST_F(WheelsTest, AreHealthyFromTheFirstSampleOn) {
   HealthMonitor unheard(kWheels);
   EXPECT_FALSE(unheard.healthy());
   unheard.advance(now_);
-  EXPECT_FALSE(unheard.take_event()) << "who never spoke cannot fall silent";
+  EXPECT_FALSE(unheard.pop_event()) << "who never spoke cannot fall silent";
 }
 
 TEST_F(WheelsTest, SilenceOfThreeLearnedPeriodsCostsTheirHealth) {
@@ -237,7 +237,7 @@ TEST_F(WheelsTest, ThatStandWhileLidarSeesMotionAreFrozen) {
   brake_and_stand(seconds{2});
   RegistrationFeedback moving{now_ - milliseconds{200}, now_};
   moving.twist_base.x() = 0.5;
-  monitor_.hear(LidarOpinion::none, moving, now_);
+  monitor_.on_feedback(LidarOpinion::none, moving, now_);
   begin_fault();
   brake_and_stand(seconds{1});
   expect_lost(HealthReason::frozen, kDetected);
@@ -249,7 +249,7 @@ TEST_F(WheelsTest, ThatStandWhileLidarIsShakenAreNotFrozen) {
     RegistrationFeedback shaken{now_, now_ + milliseconds{100}};
     shaken.twist_base.x() = sweep % 2 == 0 ? 0.5 : -0.5;
     brake_and_stand(milliseconds{100});
-    monitor_.hear(LidarOpinion::none, shaken, now_);
+    monitor_.on_feedback(LidarOpinion::none, shaken, now_);
   }
   EXPECT_EQ(left_out(HealthReason::frozen), 0U);
 }
@@ -260,11 +260,11 @@ TEST_F(WheelsTest, ThatStoppedBeforeLidarToldOfTheDriveAreNotFrozen) {
   RegistrationFeedback before_the_stop{now_ - milliseconds{220}, now_ - milliseconds{20}};
   before_the_stop.twist_base.x() = 0.4;
   brake_and_stand(milliseconds{320});
-  monitor_.hear(LidarOpinion::none, before_the_stop, now_);
+  monitor_.on_feedback(LidarOpinion::none, before_the_stop, now_);
   brake_and_stand(seconds{1});
   RegistrationFeedback shaken{now_ - milliseconds{200}, now_};
   shaken.twist_base.x() = 0.25;
-  monitor_.hear(LidarOpinion::none, shaken, now_);
+  monitor_.on_feedback(LidarOpinion::none, shaken, now_);
   brake_and_stand(seconds{1});
   EXPECT_EQ(left_out(HealthReason::frozen), 0U);
 }
@@ -361,18 +361,18 @@ TEST(HealthMonitor, OfASourceWhoseSamplesWereNeverGoodSaysSoAfterFiveSeconds) {
     for (const Stamp end = now + duration; now < end;) {
       now += milliseconds{20};
       monitor.judge(OdometrySample{.stamp = now, .arrival = now, .T_source_base = {rotation, {0, 0, 0}}});
-      if (const auto event = monitor.take_event())
+      if (const auto event = monitor.pop_event())
         events.push_back(*event);
     }
     return events;
   };
   EXPECT_TRUE(send_for(milliseconds{4900}, Eigen::Quaterniond{0, 0, 0, 0}).empty());
-  EXPECT_FALSE(monitor.refusal()->is_worth_telling());
+  EXPECT_FALSE(monitor.refusal()->is_worth_reporting());
   const std::vector<HealthEvent> events = send_for(seconds{60}, Eigen::Quaterniond{0, 0, 0, 0});
   ASSERT_EQ(events.size(), 1U) << "said once";
   EXPECT_FALSE(events[0].healthy);
   EXPECT_EQ(events[0].reason, HealthReason::no_rotation);
-  EXPECT_TRUE(monitor.refusal()->is_worth_telling());
+  EXPECT_TRUE(monitor.refusal()->is_worth_reporting());
   EXPECT_EQ(monitor.refusal()->reason, HealthReason::no_rotation);
   send_for(seconds{2}, Eigen::Quaterniond::Identity());
   EXPECT_TRUE(monitor.healthy());
@@ -387,7 +387,7 @@ TEST_F(WheelsTest, ARefusalLastsUntilTheirHealthIsBack) {
     sample.covariance_scale = ++i % 100 == 0 ? 1.0 : 10.0;
   });
   ASSERT_TRUE(monitor_.refusal());
-  EXPECT_TRUE(monitor_.refusal()->is_worth_telling());
+  EXPECT_TRUE(monitor_.refusal()->is_worth_reporting());
   EXPECT_EQ(monitor_.refusal()->reason, HealthReason::covariance);
   run(seconds{2});
   EXPECT_TRUE(monitor_.healthy());
@@ -504,7 +504,7 @@ class ImuTest : public testing::Test {
 
 TEST_F(ImuTest, ThatRepeatsItsReadingIsFrozen) {
   run(milliseconds{60}, 0.5, 0.0);
-  const auto event = monitor_.take_event();
+  const auto event = monitor_.pop_event();
   ASSERT_TRUE(event);
   EXPECT_EQ(event->reason, HealthReason::frozen);
   run(seconds{2}, 0.5);
@@ -513,13 +513,13 @@ TEST_F(ImuTest, ThatRepeatsItsReadingIsFrozen) {
 
 TEST_F(ImuTest, ThatFreezesInATurnIsNotTakenForAWrongOne) {
   RegistrationFeedback otherwise;
-  otherwise.sees.fill(true);
+  otherwise.observes.fill(true);
   otherwise.twist_base << 1.0, 0, 0, 0, 0, -0.3;
   for (int sweep = 0; sweep < 20; ++sweep) {
     run(milliseconds{100}, 0.5, 0.0);
     otherwise.from = now_ - milliseconds{200};
     otherwise.to = now_ - milliseconds{100};
-    monitor_.hear(LidarOpinion::none, otherwise, now_);
+    monitor_.on_feedback(LidarOpinion::none, otherwise, now_);
   }
   EXPECT_FALSE(monitor_.healthy());
   EXPECT_EQ(monitor_.verdict(), "");
@@ -552,13 +552,13 @@ TEST_F(ImuTest, OneAbsurdReadingCostsNothing) {
   now_ += milliseconds{5};
   EXPECT_FALSE(monitor_.judge(ImuSample{now_, now_, {0, 0, 1e20}, {0, 0, 9.81}, {}}));
   RegistrationFeedback agreeing;
-  agreeing.sees.fill(true);
+  agreeing.observes.fill(true);
   agreeing.twist_base[5] = 0.5;
   for (int sweep = 0; sweep < 40; ++sweep) {
     run(milliseconds{100}, 0.5);
     agreeing.from = now_ - milliseconds{200};
     agreeing.to = now_ - milliseconds{100};
-    monitor_.hear(LidarOpinion::agrees, agreeing, now_);
+    monitor_.on_feedback(LidarOpinion::agrees, agreeing, now_);
   }
   EXPECT_TRUE(monitor_.healthy());
   EXPECT_EQ(monitor_.verdict(), "");

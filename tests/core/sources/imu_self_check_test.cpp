@@ -28,9 +28,9 @@ class ImuSelfCheckTest : public testing::Test {
       RegistrationFeedback seen; // of the sweep before the last: latency of a live pipeline
       seen.to = now_ - milliseconds{100};
       seen.from = seen.to - milliseconds{100};
-      seen.sees = sees_;
+      seen.observes = sees_;
       seen.twist_base.tail<3>() = Eigen::Vector3d{0, 0, turn_rate_radps(seen.from + milliseconds{50})};
-      check.hear(LidarOpinion::none, seen);
+      check.on_feedback(LidarOpinion::none, seen);
     }
   }
   /// Turns steadily for this many sweeps.
@@ -42,9 +42,9 @@ class ImuSelfCheckTest : public testing::Test {
       if (i % 20 != 0)
         continue;
       RegistrationFeedback seen{
-          .from = now_ - milliseconds{100}, .to = now_, .opinions = {}, .twist_base = {}, .sees = sees_};
+          .from = now_ - milliseconds{100}, .to = now_, .opinions = {}, .twist_base = {}, .observes = sees_};
       seen.twist_base << Eigen::Vector3d::Zero(), lidar_radps;
-      refused_ = check.hear(LidarOpinion::none, seen).has_value() || refused_;
+      refused_ = check.on_feedback(LidarOpinion::none, seen).has_value() || refused_;
     }
   }
   void stand(ImuSelfCheck& check) { turn(check, 1, {0, 0, 0}, {0, 0, 0}); }
@@ -158,7 +158,7 @@ TEST_F(ImuSelfCheckTest, AGyroThatWasSetAsideIsUsedAgainWhenLidarAgrees) {
   stand(check);
   turn(check, 2, {0, 0.3, 0}, {0, -0.1, 0});
   EXPECT_TRUE(refused_);
-  check.forget(); // as the monitor calls it at that point
+  check.reset(); // as the monitor calls it at that point
   stand(check);
   turn(check, 5, {0, 0.3, 0}, {0, 0.3, 0});
   EXPECT_FALSE(refused_);
@@ -203,7 +203,7 @@ TEST_F(ImuSelfCheckTest, AGyroThatStandsStillWhileLidarTurnsIsNotCalledWrong) {
 TEST_F(ImuSelfCheckTest, WhatLidarSeesAloneAfterALossSpeaksAgainstNoGyro) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   stand(check);
-  check.forget();
+  check.reset();
   now_ += milliseconds{200};
   check.accept(SourceReading{.stamp = now_, .arrival = now_});
   turn(check, 9, {0, 0, 1.0}, {0, 0, -1.0});
@@ -222,7 +222,7 @@ TEST_F(ImuSelfCheckTest, WhatLidarDoesNotSeeSpeaksAgainstNoGyro) {
 TEST_F(ImuSelfCheckTest, WhatComesBackIsCheckedAnew) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   turn(check, 15, {0, 0, 1.0}, {0, 0, 1.0});
-  check.forget();
+  check.reset();
   now_ += seconds{2};
   turn(check, 3, {0, 0, -1.0}, {0, 0, 1.0});
   EXPECT_TRUE(refused_);

@@ -203,10 +203,10 @@ TEST_F(MotionSourcesTest, WhatTheSelfCheckFoundIsToldInWords) {
   for (int ms = 0; ms < 2000; ms += 100) {
     feed(sources, 1, ms, ms + 80);
     RegistrationFeedback seen{
-        .from = at_ms(ms - 100), .to = at_ms(ms), .opinions = {}, .twist_base = Vector6::Zero(), .sees = {}};
-    seen.sees.fill(true);
+        .from = at_ms(ms - 100), .to = at_ms(ms), .opinions = {}, .twist_base = Vector6::Zero(), .observes = {}};
+    seen.observes.fill(true);
     seen.twist_base[5] = -1.0;
-    sources.hear(seen);
+    sources.on_feedback(seen);
   }
   ASSERT_EQ(events.size(), 2U);
   for (const HealthEvent& event : events) {

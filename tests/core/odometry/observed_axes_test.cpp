@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "core/odometry/seen_axes.hpp"
+#include "core/odometry/observed_axes.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,15 +11,15 @@ constexpr int kHeading = 5;
 
 /// All axes are well observed but one, which has `observability` and no correlation with the others.
 Matrix6 weak_along(int axis, double observability) {
-  Matrix6 seen = 0.3 * Matrix6::Identity();
-  seen(axis, axis) = observability;
-  return seen;
+  Matrix6 observed = 0.3 * Matrix6::Identity();
+  observed(axis, axis) = observability;
+  return observed;
 }
 
-TEST(SeenAxes, AreAllBeforeTheFirstLook) { EXPECT_TRUE(SeenAxes{}.all()); }
+TEST(ObservedAxes, AreAllBeforeTheFirstLook) { EXPECT_TRUE(ObservedAxes{}.all()); }
 
-TEST(SeenAxes, AnAxisIsLostBelowAHundredthAndBackFromTwoOn) {
-  SeenAxes axes;
+TEST(ObservedAxes, AnAxisIsLostBelowAHundredthAndBackFromTwoOn) {
+  ObservedAxes axes;
   const auto sees_after = [&axes](double observability) {
     const Vector6 observed = axes.observe(weak_along(kForward, observability));
     EXPECT_NEAR(observed[kForward], observability, 2e-6);
@@ -36,8 +36,8 @@ TEST(SeenAxes, AnAxisIsLostBelowAHundredthAndBackFromTwoOn) {
 
 /// A surface that constrains only a combination of rotation and translation, such as a distant wall to the side, makes
 /// neither observable.
-TEST(SeenAxes, WhatIsOnlySeenTogetherWithAnotherAxisIsNotSeen) {
-  SeenAxes axes;
+TEST(ObservedAxes, WhatIsOnlySeenTogetherWithAnotherAxisIsNotSeen) {
+  ObservedAxes axes;
   Matrix6 together = weak_along(kForward, 0.3);
   together(kForward, kHeading) = together(kHeading, kForward) = 0.3;
   const Vector6 observed = axes.observe(together);
@@ -47,23 +47,20 @@ TEST(SeenAxes, WhatIsOnlySeenTogetherWithAnotherAxisIsNotSeen) {
   EXPECT_FALSE(axes.each()[kHeading]);
 }
 
-TEST(SeenAxes, NothingSeenAtAllIsAFigureAllTheSame) {
-  SeenAxes axes;
+TEST(ObservedAxes, NothingSeenAtAllIsAFigureAllTheSame) {
+  ObservedAxes axes;
   const Vector6 observed = axes.observe(Matrix6::Zero());
   EXPECT_TRUE(observed.allFinite());
-  for (const bool seen : axes.each())
-    EXPECT_FALSE(seen);
+  for (const bool axis_observed : axes.each())
+    EXPECT_FALSE(axis_observed);
 }
 
-TEST(SeenAxes, OnlyWhatIsSeenIsLeft) {
-  SeenAxes axes;
+TEST(ObservedAxes, OnlyWhatIsSeenIsLeft) {
+  ObservedAxes axes;
   axes.observe(weak_along(kForward, 0.001));
   Vector6 left = Vector6::Ones();
   left[kForward] = 0.0;
   EXPECT_EQ(axes.part_of(Vector6::Ones()), left);
-  Matrix6 rows = Matrix6::Ones();
-  rows.row(kForward).setZero();
-  EXPECT_EQ(axes.rows_of(Matrix6::Ones()), rows);
 }
 
 } // namespace
