@@ -101,14 +101,14 @@ void check_lidars(Problems& problems, const std::vector<LidarOptions>& lidars) {
                      item("lidars", i, "multicast_ip"), "must be within 224.0.0.0 .. 239.255.255.255, or none");
     problems.require((!lidars[i].model && !lidars[i].hesai) || lidars[i].metadata.empty(),
                      item("lidars", i, "metadata"), "belongs to model Ouster, or auto");
-    const bool heard_twice =
+    const bool is_ambiguous =
         std::any_of(lidars.begin(), lidars.begin() + static_cast<std::ptrdiff_t>(i),
                     [&lidar = lidars[i]](const LidarOptions& other) {
                       return !other.gives_clouds() && !lidar.gives_clouds() && other.port == lidar.port &&
                              lidar.port != 0 &&
                              (!other.source_ip || !lidar.source_ip || *other.source_ip == *lidar.source_ip);
                     });
-    problems.require(!heard_twice, item("lidars", i, "port"),
+    problems.require(!is_ambiguous, item("lidars", i, "port"),
                      "is another lidar's too; give each its own port, or each its own source_ip");
   }
 }

@@ -87,7 +87,7 @@ class Reading {
   /// that could not be read, as they are already reported.
   void blame_problems(const std::optional<std::string>& problems);
 
-  [[nodiscard]] std::vector<Mistake> take_mistakes() {
+  [[nodiscard]] std::vector<Mistake> release_mistakes() {
     std::stable_sort(mistakes_.begin(), mistakes_.end(), [](const auto& a, const auto& b) { return a.line < b.line; });
     return std::move(mistakes_);
   }
@@ -375,7 +375,7 @@ Expected<Config, ConfigErrors> parse_config(const std::string& yaml, const std::
   reading.read_section(document, "", 1, config);
   reading.blame_problems(config.problem());
   ConfigErrors errors;
-  for (const Mistake& mistake : reading.take_mistakes())
+  for (const Mistake& mistake : reading.release_mistakes())
     errors.push_back(error_line(at_line(origin, mistake.line), text_of(mistake)));
   if (!errors.empty())
     return errors;
@@ -416,7 +416,7 @@ Expected<Config, ConfigErrors> override_config(const Config& config, std::span<c
       blame(override, *problem);
     else
       reading.read_section(tree, "", 1, changed);
-    for (Mistake& mistake : reading.take_mistakes()) {
+    for (Mistake& mistake : reading.release_mistakes()) {
       blame(override, text_of(mistake));
       unreadable.push_back(std::move(mistake));
     }

@@ -27,13 +27,13 @@ IngestReport::Lidar IngestReport::Lidar::of(const LidarInput& lidar) {
           .rotation_rate_rpm = lidar.rotation_rate_rpm(),
           .source_ip = lidar.source_ip(),
           .refused_ip = lidar.refused_ip(),
-          .strangers = lidar.strangers(),
+          .other_senders = lidar.other_senders(),
           .unknown_packets = lidar.unknown_packets(),
           .last_received = lidar.last_received(),
           .unknown_last_received = lidar.unknown_last_received(),
           .pps = lidar.clock_state(),
           .pps_unused = lidar.why_pps_is_unused(),
-          .tells_date = lidar.tells_date(),
+          .has_date = lidar.has_date(),
           .packets_of_other_mode = lidar.ouster() != nullptr && lidar.ouster()->is_in_other_mode()
                                        ? lidar.ouster()->packets_of_other_start()
                                        : 0};
@@ -75,12 +75,12 @@ std::optional<std::string> shared_port(const LidarOptions& options, const Ingest
   std::vector<std::string> refused;
   std::string yaml =
       fmt::format("{{name: {}, port: {}, source_ip: {}}}", options.name, options.port, dotted(*lidar.source_ip));
-  for (const LidarInput::Stranger& stranger : lidar.strangers) {
-    if (stranger.ip == *lidar.source_ip || stranger.packets * kNegligibleRatio <= lidar.packets.data)
+  for (const LidarInput::OtherSender& sender : lidar.other_senders) {
+    if (sender.ip == *lidar.source_ip || sender.packets * kNegligibleRatio <= lidar.packets.data)
       continue;
-    refused.push_back(fmt::format("{} from {}", stranger.packets, dotted(stranger.ip)));
+    refused.push_back(fmt::format("{} from {}", sender.packets, dotted(sender.ip)));
     yaml += fmt::format(", {{name: {}_{}, port: {}, source_ip: {}}}", options.name, refused.size() + 1, options.port,
-                        dotted(stranger.ip));
+                        dotted(sender.ip));
   }
   if (refused.empty())
     return std::nullopt;
@@ -258,9 +258,9 @@ std::string problem_of(const LidarOptions& options, const IngestReport::Lidar& l
     const std::vector<std::string> doubts = cloud_doubts(options, now);
     return doubts.empty() ? "" : doubts.front();
   }
-  for (LidarInput::Stranger& stranger : now.strangers)
-    if (lidar.last_received - stranger.last_received > kMaxAge)
-      stranger = {};
+  for (LidarInput::OtherSender& sender : now.other_senders)
+    if (lidar.last_received - sender.last_received > kMaxAge)
+      sender = {};
   if (lidar.last_received - lidar.unknown_last_received > kMaxAge)
     now.unknown_packets.reset();
   for (const auto& problem :

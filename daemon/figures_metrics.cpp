@@ -259,15 +259,15 @@ void add_lidars(MetricsText& text, const Figures& figures) {
   });
   text.state_set("locusd_lidar_pps", "Pulse per second, from position packets.");
   for_each([&](const auto& options, const auto& lidar) {
-    if (!lidar.tells_date)
+    if (!lidar.has_date)
       add_states<velodyne::PpsState>(text, {{"lidar", options.name}}, lidar.pps);
   });
-  bool any_tells_date = false;
-  for_each([&](const auto&, const auto& lidar) { any_tells_date = any_tells_date || lidar.tells_date; });
-  if (any_tells_date) {
+  bool any_has_date = false;
+  for_each([&](const auto&, const auto& lidar) { any_has_date = any_has_date || lidar.has_date; });
+  if (any_has_date) {
     text.state_set("locusd_lidar_clock", "Reference of the clock of an Ouster or a Hesai.");
     for_each([&](const auto& options, const auto& lidar) {
-      if (lidar.tells_date)
+      if (lidar.has_date)
         add_states<TimeScale>(text, {{"lidar", options.name}}, lidar.pps);
     });
   }

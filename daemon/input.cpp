@@ -136,7 +136,7 @@ Stamp LiveInput::receive(Duration timeout) {
       guards_[i].look_at(waiting_[i], sockets_[i]);
     } else if (is_silent) {
       sockets_[i].count_drops(); // a drop causes no wakeup
-      guards_[i].hear_nothing(Stamp{read_clock(CLOCK_REALTIME)}, sockets_[i]);
+      guards_[i].advance(Stamp{read_clock(CLOCK_REALTIME)}, sockets_[i]);
     }
     drops += sockets_[i].kernel_drops();
     filtered += sockets_[i].filtered();

@@ -14,7 +14,7 @@ namespace locus {
 namespace {
 
 constexpr Duration kSenderTimeout = std::chrono::seconds{1};
-constexpr Duration kLongestGapToldByAzimuth = std::chrono::seconds{1};
+constexpr Duration kLongestGapByAzimuth = std::chrono::seconds{1};
 constexpr double kAzimuthToleranceCdeg = 100.0;
 constexpr double kSpeedTolerance = 0.02; ///< relative change of the motor's speed over a gap
 
@@ -91,7 +91,7 @@ const LidarPacket* LidarInput::receive(const Datagram& datagram) {
   ready_ = nullptr;
   imu_count_ = 0;
   ++counters_.received;
-  if (const auto error = take(datagram)) {
+  if (const auto error = process(datagram)) {
     ++counters_[*error];
     if (*error == PacketError::model)
       unknown_last_received_ = datagram.receive_stamp;
@@ -168,9 +168,9 @@ void LidarInput::follow_maker(const Datagram& datagram) {
     decoder_.emplace<hesai::Decoder>(hesai::DecoderOptions{.isa = options_.isa});
 }
 
-std::optional<PacketError> LidarInput::take(const Datagram& datagram) {
+std::optional<PacketError> LidarInput::process(const Datagram& datagram) {
   if (datagram.decoded != nullptr)
-    return take_decoded(datagram);
+    return process_decoded(datagram);
   if (datagram.truncated)
     return PacketError::truncated;
   if (!is_sender(datagram)) {
@@ -179,15 +179,15 @@ std::optional<PacketError> LidarInput::take(const Datagram& datagram) {
   }
   follow_maker(datagram);
   if (is_data_packet(datagram))
-    return take_data(datagram);
+    return process_data(datagram);
   if (ouster() != nullptr)
-    return take_imu(datagram);
+    return process_imu(datagram);
   if (const auto looks = hesai::look_at(datagram.payload)) {
     refuse(OtherMaker::hesai, looks->name, looks->model.has_value());
     return PacketError::model;
   }
   if (hesai() == nullptr && datagram.payload.size() == velodyne::kPositionPacketBytes) {
-    take_position(datagram);
+    process_position(datagram);
     return std::nullopt;
   }
   const bool is_of_ouster = ouster::format_of_lidar_packet(datagram.payload).has_value();
@@ -198,7 +198,7 @@ std::optional<PacketError> LidarInput::take(const Datagram& datagram) {
   return PacketError::model;
 }
 
-void LidarInput::take_position(const Datagram& datagram) {
+void LidarInput::process_position(const Datagram& datagram) {
   position_ = velodyne::parse_position_packet(datagram.payload.first<velodyne::kPositionPacketBytes>());
   clock_.set_synchronised(position_->is_synchronised());
   const std::string_view why = options_.time != LidarTime::receive ? velodyne::why_unused(*position_) : "";
@@ -210,7 +210,7 @@ void LidarInput::take_position(const Datagram& datagram) {
 /// Stamps IMU samples with the sensor's clock as estimated from the column packets; samples before the first column
 /// packet are dropped. Column packets are sent up to 16 ms later than IMU packets (in recordings), so a stamp may lie
 /// after its reception; `arrival` is clamped to it, otherwise the sample would be taken for one of another clock.
-std::optional<PacketError> LidarInput::take_imu(const Datagram& datagram) {
+std::optional<PacketError> LidarInput::process_imu(const Datagram& datagram) {
   ouster::ImuMeasurements measurements;
   if (const auto error = ouster::read_imu_packet(ouster()->metadata(), datagram.payload, measurements))
     return error;
@@ -226,7 +226,7 @@ std::optional<PacketError> LidarInput::take_imu(const Datagram& datagram) {
 }
 
 /// Keeps the stamp of the recording: a decoded packet carries no sensor time.
-std::optional<PacketError> LidarInput::take_decoded(const Datagram& datagram) {
+std::optional<PacketError> LidarInput::process_decoded(const Datagram& datagram) {
   ready_ = datagram.decoded;
   if (const std::uint8_t index = packet_.lidar; ready_->lidar != index) {
     packet_ = *ready_;
@@ -237,7 +237,7 @@ std::optional<PacketError> LidarInput::take_decoded(const Datagram& datagram) {
   return std::nullopt;
 }
 
-std::optional<PacketError> LidarInput::take_data(const Datagram& datagram) {
+std::optional<PacketError> LidarInput::process_data(const Datagram& datagram) {
   if (is_duplicate(datagram.payload))
     return PacketError::duplicate;
   if (const auto error = decode(datagram))
@@ -249,7 +249,7 @@ std::optional<PacketError> LidarInput::take_data(const Datagram& datagram) {
   packet_.stamp = reading->stamp;
   ready_ = &packet_;
   count(*reading);
-  remember(datagram);
+  store(datagram);
   return std::nullopt;
 }
 
@@ -330,7 +330,7 @@ std::string_view LidarInput::recognised_model() const {
 }
 
 std::string_view LidarInput::clock_state() const {
-  if (tells_date())
+  if (has_date())
     return counters_.data > 0 ? to_string(time_scale_) : "absent";
   return to_string(position_ ? position_->pps : velodyne::PpsState::absent);
 }
@@ -368,17 +368,18 @@ void LidarInput::refuse_sender(const Datagram& datagram) {
   if (!is_data_packet(datagram) && !is_of_another_maker)
     return;
   refused_ip_ = datagram.source_ip;
-  const auto known = std::ranges::find_if(
-      strangers_, [&](const Stranger& stranger) { return stranger.packets == 0 || stranger.ip == datagram.source_ip; });
-  if (known != strangers_.end())
+  const auto known = std::ranges::find_if(other_senders_, [&](const OtherSender& sender) {
+    return sender.packets == 0 || sender.ip == datagram.source_ip;
+  });
+  if (known != other_senders_.end())
     *known = {datagram.source_ip, known->packets + 1, datagram.receive_stamp};
 }
 
 bool LidarInput::is_duplicate(std::span<const std::byte> payload) const {
-  const auto end = recent_.begin() + static_cast<std::ptrdiff_t>(std::min(remembered_, kRemembered));
+  const auto end = recent_.begin() + static_cast<std::ptrdiff_t>(std::min(stored_, kStored));
   const std::size_t bytes = std::min(payload.size(), velodyne::kDataPacketBytes);
   return std::any_of(recent_.begin(), end,
-                     [&](const Payload& seen) { return std::memcmp(seen.data(), payload.data(), bytes) == 0; });
+                     [&](const Payload& recent) { return std::memcmp(recent.data(), payload.data(), bytes) == 0; });
 }
 
 /// Rotation from the first to the last column of the last good packet, hundredths of a degree.
@@ -414,7 +415,7 @@ std::uint64_t LidarInput::missing_before(const SensorClock::Reading& reading) co
   const auto missing = std::llround(to_seconds(reading.advance - last_duration_) / to_seconds(nominal_duration()));
   if (missing <= 0)
     return 0;
-  if (reading.advance <= kLongestGapToldByAzimuth) {
+  if (reading.advance <= kLongestGapByAzimuth) {
     const double expected_cdeg = rotation_rate_rpm() / 60.0 * velodyne::kCdegPerTurn * to_seconds(reading.advance);
     const double turned_cdeg = packet_.first_azimuth_cdeg - last_azimuth_cdeg_;
     const double error_cdeg = std::remainder(turned_cdeg - expected_cdeg, velodyne::kCdegPerTurn);
@@ -456,12 +457,12 @@ void LidarInput::count_lost(const SensorClock::Reading& reading) {
   counters_.lost += missing;
 }
 
-void LidarInput::remember(const Datagram& datagram) {
+void LidarInput::store(const Datagram& datagram) {
   learnt_ip_ = datagram.source_ip;
   last_received_ = datagram.receive_stamp;
-  std::memcpy(recent_[remembered_ % kRemembered].data(), datagram.payload.data(),
+  std::memcpy(recent_[stored_ % kStored].data(), datagram.payload.data(),
               std::min(datagram.payload.size(), velodyne::kDataPacketBytes));
-  ++remembered_;
+  ++stored_;
 }
 
 Expected<LidarRouter, std::string> LidarRouter::open(const std::vector<LidarOptions>& options) {

@@ -88,16 +88,16 @@ class LidarInput {
   [[nodiscard]] std::optional<std::uint32_t> refused_ip() const { return refused_ip_; }
 
   /// Another sender of data packets to this lidar's port.
-  struct Stranger {
+  struct OtherSender {
     std::uint32_t ip = 0;      ///< host byte order
     std::uint64_t packets = 0; ///< rejected packets from this sender
     Stamp last_received;       ///< arrival of the latest of them
   };
-  static constexpr std::size_t kMaxStrangers = 4;
-  using Strangers = std::array<Stranger, kMaxStrangers>;
+  static constexpr std::size_t kMaxOtherSenders = 4;
+  using OtherSenders = std::array<OtherSender, kMaxOtherSenders>;
 
-  /// The first kMaxStrangers other senders, in order of arrival; entries with zero packets are unused.
-  [[nodiscard]] const Strangers& strangers() const { return strangers_; }
+  /// The first kMaxOtherSenders other senders, in order of arrival; entries with zero packets are unused.
+  [[nodiscard]] const OtherSenders& other_senders() const { return other_senders_; }
 
   /// Arrival of the latest accepted packet; Stamp{} before the first.
   [[nodiscard]] Stamp last_received() const { return last_received_; }
@@ -122,7 +122,7 @@ class LidarInput {
   /// Says why the time of a Velodyne with a locked PPS has not been used for more than five seconds; empty if it is
   /// used, was configured not to be or PPS is not locked.
   [[nodiscard]] std::string_view why_pps_is_unused() const;
-  [[nodiscard]] bool tells_date() const { return velodyne() == nullptr; }
+  [[nodiscard]] bool has_date() const { return velodyne() == nullptr; }
   /// Rotation rate of the last good packet; 0 before the first.
   [[nodiscard]] double rotation_rate_rpm() const;
   /// Packets that cannot be decoded because their model is unknown or differs; empty for an Ouster.
@@ -139,11 +139,11 @@ class LidarInput {
   static Expected<Decoder, std::string> decoder_for(const LidarOptions& options);
 
   void follow_maker(const Datagram& datagram);
-  std::optional<PacketError> take(const Datagram& datagram);
-  std::optional<PacketError> take_decoded(const Datagram& datagram);
-  std::optional<PacketError> take_data(const Datagram& datagram);
-  void take_position(const Datagram& datagram);
-  std::optional<PacketError> take_imu(const Datagram& datagram);
+  std::optional<PacketError> process(const Datagram& datagram);
+  std::optional<PacketError> process_decoded(const Datagram& datagram);
+  std::optional<PacketError> process_data(const Datagram& datagram);
+  void process_position(const Datagram& datagram);
+  std::optional<PacketError> process_imu(const Datagram& datagram);
   std::optional<PacketError> decode(const Datagram& datagram);
   void refuse(OtherMaker maker, std::string_view model = "", bool is_readable = false);
   std::optional<PacketError> decode_hesai(hesai::Decoder& decoder, const Datagram& datagram);
@@ -157,7 +157,7 @@ class LidarInput {
   [[nodiscard]] std::uint64_t missing_before(const SensorClock::Reading& reading) const;
   void count(const SensorClock::Reading& reading);
   void count_lost(const SensorClock::Reading& reading);
-  void remember(const Datagram& datagram);
+  void store(const Datagram& datagram);
 
   LidarOptions options_;
   Decoder decoder_;
@@ -174,7 +174,7 @@ class LidarInput {
   std::size_t imu_count_ = 0;
 
   std::optional<std::uint32_t> learnt_ip_, refused_ip_;
-  Strangers strangers_{};
+  OtherSenders other_senders_{};
   Stamp last_received_, unknown_last_received_;
   std::uint16_t last_azimuth_cdeg_ = 0; ///< first firing of the latest packet
   std::size_t last_first_column_ = 0;   ///< first column of the latest packet; Ouster only
@@ -182,9 +182,9 @@ class LidarInput {
   Duration last_duration_{};            ///< duration of the latest packet
   SentSectors sectors_;                 ///< only for packets without numbers
 
-  static constexpr std::size_t kRemembered = 8;
-  std::array<Payload, kRemembered> recent_{}; ///< latest packets, for duplicate detection
-  std::size_t remembered_ = 0;
+  static constexpr std::size_t kStored = 8;
+  std::array<Payload, kStored> recent_{}; ///< latest packets, for duplicate detection
+  std::size_t stored_ = 0;
 };
 
 /// Routes each datagram to its lidar, by destination port and source address. Single owner, not thread-safe.

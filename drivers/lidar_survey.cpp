@@ -8,7 +8,7 @@
 
 namespace locus {
 
-std::string HeardLidar::name() const {
+std::string SurveyedLidar::name() const {
   std::string what = "an unknown lidar";
   if (!model.empty())
     what = model;
@@ -17,13 +17,13 @@ std::string HeardLidar::name() const {
   return what + " at " + dotted(ip);
 }
 
-std::string HeardLidar::clock_state() const {
+std::string SurveyedLidar::clock_state() const {
   if (clock)
     return "clock " + std::string{to_string(*clock)};
   return "PPS " + std::string{pps ? to_string(*pps) : "unknown"};
 }
 
-void LidarSurvey::take(const Datagram& datagram) {
+void LidarSurvey::add(const Datagram& datagram) {
   if (datagram.payload.size() == velodyne::kPositionPacketBytes &&
       (pps_.size() < kMaxSenders || pps_.contains(datagram.source_ip)))
     pps_[datagram.source_ip] =
@@ -70,14 +70,14 @@ void LidarSurvey::Sender::refuse(OtherMaker maker, const hesai::Looks& looks) {
 void LidarSurvey::Sender::read_ouster(const ouster::PacketFormat& format, const Datagram& datagram) {
   ouster = format.header(datagram.payload).serial_number;
   beams = ouster::pixels_of_length(datagram.payload.size());
-  mode.take(format, datagram.payload);
+  mode.add(format, datagram.payload);
   const std::byte* const column = format.column(datagram.payload.data(), format.columns_per_packet / 2);
   const std::uint64_t time_ns = ouster::PacketFormat::time_of(column);
   if (format.is_valid(column) && time_ns <= static_cast<std::uint64_t>(to_ns(kLatestStamp)))
     clock = scale_of(false, Duration{static_cast<Duration::rep>(time_ns)}, datagram.receive_stamp);
 }
 
-void LidarSurvey::OusterMode::take(const ouster::PacketFormat& format, std::span<const std::byte> packet) {
+void LidarSurvey::OusterMode::add(const ouster::PacketFormat& format, std::span<const std::byte> packet) {
   const std::byte* const one = format.column(packet.data(), 0);
   const std::byte* const next = format.column(packet.data(), 1);
   if (!format.is_valid(one) || !format.is_valid(next))
@@ -105,10 +105,10 @@ std::size_t LidarSurvey::OusterMode::columns_per_turn() const {
   return turn_s > 0.0 ? static_cast<std::size_t>(std::lround(1.0 / turn_s)) : 0;
 }
 
-std::vector<HeardLidar> LidarSurvey::lidars() const {
-  std::vector<HeardLidar> heard;
+std::vector<SurveyedLidar> LidarSurvey::lidars() const {
+  std::vector<SurveyedLidar> found;
   for (const auto& [key, sender] : senders_) {
-    HeardLidar& lidar = heard.emplace_back();
+    SurveyedLidar& lidar = found.emplace_back();
     std::tie(lidar.ip, lidar.port) = key;
     if (const auto unknown = sender->velodyne.unknown_packets())
       lidar.unknown_packets = UnknownPackets{*unknown};
@@ -139,7 +139,7 @@ std::vector<HeardLidar> LidarSurvey::lidars() const {
     lidar.packets_per_s =
         static_cast<double>(sender->packets - 1) / std::max(1e-3, to_seconds(sender->last - sender->first));
   }
-  return heard;
+  return found;
 }
 
 } // namespace locus

@@ -23,7 +23,7 @@
 namespace locus {
 
 /// Sender of lidar packets, as described by its packets.
-struct HeardLidar {
+struct SurveyedLidar {
   std::uint32_t ip = 0; ///< host byte order
   std::uint16_t port = 0;
   std::string_view model;              ///< Velodyne or Hesai; empty: no packet could be decoded
@@ -54,9 +54,9 @@ class LidarSurvey {
  public:
   static constexpr std::size_t kMaxSenders = 64; ///< more than any robot has; further senders are ignored
 
-  void take(const Datagram& datagram);
+  void add(const Datagram& datagram);
   /// Returns the lidars, ordered by address and port.
-  [[nodiscard]] std::vector<HeardLidar> lidars() const;
+  [[nodiscard]] std::vector<SurveyedLidar> lidars() const;
 
  private:
   /// Mode of an Ouster (columns per turn, rate), estimated from the packet times, since no field reports it.
@@ -69,7 +69,7 @@ class LidarSurvey {
     std::optional<Turn> first, last;       ///< turns whose first packet was received
     Duration column{};                     ///< time from one column to the next
 
-    void take(const ouster::PacketFormat& format, std::span<const std::byte> packet);
+    void add(const ouster::PacketFormat& format, std::span<const std::byte> packet);
     [[nodiscard]] double turns_per_s() const; ///< 0 until two starts of a turn were received
     [[nodiscard]] std::size_t columns_per_turn() const;
   };
@@ -77,7 +77,7 @@ class LidarSurvey {
     velodyne::Decoder velodyne;
     hesai::Decoder hesai;
     LidarPacket packet;
-    std::optional<std::uint64_t> ouster; ///< HeardLidar::ouster
+    std::optional<std::uint64_t> ouster; ///< SurveyedLidar::ouster
     std::size_t beams = 0;
     OusterMode mode;
     TimeScale clock{};            ///< Ouster or Hesai

@@ -101,11 +101,11 @@ Duration SensorClock::lateness(Duration sensor_time, Duration until_sent, Stamp 
 /// packets sent in a burst after congestion are consistent too, but faster than a clock runs.
 bool SensorClock::proves_step(Duration time_of_hour, Stamp receive, bool late) {
   const Duration advance = nearest_hour(time_of_hour - suspect_time_of_hour_, Duration{});
-  const bool goes_on = suspects_ > 0 && advance > Duration{} && advance <= kReorderWindow;
+  const bool continues = suspects_ > 0 && advance > Duration{} && advance <= kReorderWindow;
   const Duration passed = std::clamp(receive - suspect_receive_, Duration{}, kReorderWindow);
   const Duration ahead = suspects_ahead_ + advance - kMaxLiveSpeed * passed;
-  suspects_ = goes_on ? std::min(suspects_ + 1, kProofOfStep) : 1;
-  suspects_ahead_ = goes_on ? std::clamp(ahead, Duration{}, kReorderWindow) : Duration{};
+  suspects_ = continues ? std::min(suspects_ + 1, kProofOfStep) : 1;
+  suspects_ahead_ = continues ? std::clamp(ahead, Duration{}, kReorderWindow) : Duration{};
   suspect_time_of_hour_ = time_of_hour;
   suspect_receive_ = receive;
   return suspects_ == kProofOfStep && !(late && suspects_ahead_ > Duration{});

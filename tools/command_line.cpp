@@ -7,7 +7,7 @@
 
 #include "config/mistyped.hpp"
 #include "locus_replay/failure.hpp"
-#include "locus_replay/say.hpp"
+#include "locus_replay/print_message.hpp"
 
 namespace locus::tools {
 
@@ -29,10 +29,10 @@ int exit_status_of(std::string_view program, const std::function<void()>& work) 
     flush_standard_output();
     return static_cast<int>(ExitStatus::done);
   } catch (const Failure& failure) {
-    say(program, failure.what());
+    print_message(program, failure.what());
     return static_cast<int>(failure.status());
   } catch (const std::exception& error) { // out of memory or threads
-    say(program, error.what());
+    print_message(program, error.what());
     return static_cast<int>(ExitStatus::failed);
   }
 }

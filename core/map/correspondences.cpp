@@ -23,8 +23,8 @@ constexpr float kMaxDistance_m = 1000.0F;
 /// Substitute for a non-finite point, which would spoil the sums even with zero weight.
 const SurfacePoint kOutOfReach{Eigen::Vector3f::Constant(1e6F * kMaxDistance_m), Eigen::Vector3f::Zero()};
 
-bool serves(const Surface* surface, bool takes_shapeless) {
-  return surface != nullptr && (surface->planar() || (takes_shapeless && surface->shapeless()));
+bool serves(const Surface* surface, bool accepts_shapeless) {
+  return surface != nullptr && (surface->planar() || (accepts_shapeless && surface->shapeless()));
 }
 
 /// Centres of the voxels of a grid relative to the origin of the pass, in single precision.
@@ -138,7 +138,7 @@ std::size_t find_in(const GicpPass& pass, const SurfaceGrid& grid, const VoxelOf
   std::size_t left = 0;
   for (std::size_t k = 0; k < count; ++k) {
     const std::uint32_t i = open[k];
-    if (serves(surface[k], pass.takes_shapeless)) {
+    if (serves(surface[k], pass.accepts_shapeless)) {
       const Eigen::Vector3f mean_m = centres[index[k]] + surface[k]->mean_m;
       if (!surface[k]->planar() || std::abs(surface[k]->normal.dot(points[i] - mean_m)) < reach_m) {
         store_match(*surface[k], mean_m, i, matches);
@@ -176,7 +176,7 @@ bool find_around(const GicpPass& pass, const SurfaceGrid& grid, const Eigen::Vec
   for (int step = 0; step < 27; ++step) {
     const VoxelIndex index{centre.x + step % 3 - 1, centre.y + step / 3 % 3 - 1, centre.z + step / 9 - 1};
     const Surface* surface = grid.find(index);
-    if (!serves(surface, pass.takes_shapeless))
+    if (!serves(surface, pass.accepts_shapeless))
       continue;
     const Eigen::Vector3f mean_m = centres[index] + surface->mean_m;
     const float distance_m2 = (point - mean_m).squaredNorm();

@@ -64,7 +64,7 @@ struct GicpPass {
   Pose T_target_source;
   Eigen::Vector3d origin_m; ///< in the target, near the source: origin of the single-precision coordinates
   LookUp look_up;
-  bool takes_shapeless;        ///< voxels without a plane are used, too
+  bool accepts_shapeless;      ///< voxels without a plane are used, too
   double max_correspondence_m; ///< gate, across the plane
   double width2;               ///< of the Geman-McClure kernel, in squared standard deviations
   Axes axes{};                 ///< of the surrounding surfaces, from the least to the best observed

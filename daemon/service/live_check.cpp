@@ -64,15 +64,15 @@ std::vector<Subscription> subscribe(const DdsNode& node, const Config& config) {
   return topics;
 }
 
-bool is_for(const HeardLidar& lidar, const LidarOptions& options) {
+bool is_for(const SurveyedLidar& lidar, const LidarOptions& options) {
   return !options.gives_clouds() && lidar.port == options.port &&
          (!options.source_ip || lidar.ip == *options.source_ip);
 }
 
 /// Lists the lidars that match no entry of the configuration.
-std::string unconfigured_lidars(const Config& config, const std::vector<HeardLidar>& lidars) {
+std::string unconfigured_lidars(const Config& config, const std::vector<SurveyedLidar>& lidars) {
   std::string text;
-  for (const HeardLidar& lidar : lidars)
+  for (const SurveyedLidar& lidar : lidars)
     if (lidar.is_known() &&
         std::ranges::none_of(config.lidars, [&](const auto& options) { return is_for(lidar, options); }))
       text += fmt::format("{}{} sends to port {}", text.empty() ? "" : ", ", lidar.name(), lidar.port);
@@ -80,28 +80,28 @@ std::string unconfigured_lidars(const Config& config, const std::vector<HeardLid
 }
 
 /// Returns a remedy for a lidar without packets.
-std::string remedy(const LidarOptions& options, const Config& config, const std::vector<HeardLidar>& lidars,
-                   bool hears_all) {
+std::string remedy(const LidarOptions& options, const Config& config, const std::vector<SurveyedLidar>& lidars,
+                   bool captures_all) {
   if (const std::string others = unconfigured_lidars(config, lidars); !others.empty())
     return fmt::format("{}; if that is the lidar, set port and source_ip in the entry of {}", others, options.name);
-  return hears_all ? "check its power, its cable and the address it sends to"
-                   : "other ports were not checked: run as root to receive from all lidars, or use locusctl sensors";
+  return captures_all ? "check its power, its cable and the address it sends to"
+                      : "other ports were not checked: run as root to receive from all lidars, or use locusctl sensors";
 }
 
-void compare(const LidarOptions& options, const Config& config, const std::vector<HeardLidar>& lidars, bool hears_all,
-             LiveCheck& check) {
-  std::vector<const HeardLidar*> matching;
-  for (const HeardLidar& lidar : lidars)
+void compare(const LidarOptions& options, const Config& config, const std::vector<SurveyedLidar>& lidars,
+             bool captures_all, LiveCheck& check) {
+  std::vector<const SurveyedLidar*> matching;
+  for (const SurveyedLidar& lidar : lidars)
     if (is_for(lidar, options))
       matching.push_back(&lidar);
   const std::string& name = options.name;
   if (matching.empty()) {
     check.differences.push_back(fmt::format("lidar {}: no packets arrive at port {}{}; {}", name, options.port,
                                             options.source_ip ? " from " + dotted(*options.source_ip) : "",
-                                            remedy(options, config, lidars, hears_all)));
+                                            remedy(options, config, lidars, captures_all)));
     return;
   }
-  const HeardLidar& lidar = *matching.front();
+  const SurveyedLidar& lidar = *matching.front();
   if (matching.size() > 1)
     check.differences.push_back(
         fmt::format("lidar {}: {} and {} send to its port {}; give each its own entry with source_ip", name,
@@ -199,14 +199,14 @@ Expected<LiveCheck, std::string> check_live(const Config& config, Duration durat
 
   LidarSurvey survey;
   for (Duration listened{}; listened < duration; listened += kRound) {
-    wire->listen(kRound, [&](const Datagram& datagram) { survey.take(datagram); });
+    wire->listen(kRound, [&](const Datagram& datagram) { survey.add(datagram); });
     for (Subscription& topic : topics)
       topic.poll();
   }
-  const std::vector<HeardLidar> lidars = survey.lidars();
+  const std::vector<SurveyedLidar> lidars = survey.lidars();
   for (const LidarOptions& lidar : config.lidars)
     if (!lidar.gives_clouds())
-      compare(lidar, config, lidars, wire->hears_all(), check);
+      compare(lidar, config, lidars, wire->captures_all(), check);
   if (const std::string others = unconfigured_lidars(config, lidars); !others.empty() && check.differences.empty())
     check.matches.push_back(fmt::format("not configured: {}", others));
   for (const Subscription& topic : topics)

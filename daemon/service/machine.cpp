@@ -72,7 +72,7 @@ Expected<std::vector<UdpSocket>, std::string> open_lidar_sockets(const Config& c
       log.warn(fmt::format("systemd listens on UDP port {}, but no configured lidar sends to it", socket->port()));
   }
   for (const auto& [port, needed] : ports) {
-    auto socket = needed ? UdpSocket::open(port) : UdpSocket::open_beside_others(port);
+    auto socket = needed ? UdpSocket::open(port) : UdpSocket::open_shared(port);
     if (socket)
       sockets.push_back(std::move(*socket));
     else if (needed)

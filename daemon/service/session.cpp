@@ -411,7 +411,7 @@ Figures Session::figures() const {
   };
   convert_last_received(figures.ingest.lidars);
   for (IngestReport::Lidar& lidar : figures.ingest.lidars) {
-    convert_last_received(lidar.strangers);
+    convert_last_received(lidar.other_senders);
     lidar.unknown_last_received = wall(lidar.unknown_last_received);
   }
   convert_last_received(figures.ingest.sources);

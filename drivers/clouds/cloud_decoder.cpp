@@ -168,8 +168,8 @@ CloudDecoder::Counted CloudDecoder::keep_returns() {
 /// Computes the offset of each return. Returns the stamp of offset 0, in the clock of the message.
 Stamp CloudDecoder::time_points(const CloudView& message, const CloudLayout& layout, Stamp arrival) {
   const std::size_t count = points_.x_m.size();
-  rings_.tell({points_.x_m, points_.y_m, points_.z_m}, points_.ring,
-              layout.row_is_ring ? RingsFrom::rows : RingsFrom::field, points_.laser);
+  rings_.assign({points_.x_m, points_.y_m, points_.z_m}, points_.ring,
+                layout.row_is_ring ? RingsFrom::rows : RingsFrom::field, points_.laser);
   const Stamp header = message.stamp == Stamp{} ? arrival : message.stamp - message.ahead;
   points_.offset_ns.assign(count, 0);
   timing_ = PointTiming::instant;
@@ -383,7 +383,7 @@ const LidarPacket* CloudDecoder::next() {
     FiringGroup* const group = group_for(points_.laser[point]);
     if (group == nullptr)
       break;
-    put(point, *group, begin_ns);
+    add_point(point, *group, begin_ns);
     last_ns = std::max(last_ns, points_.offset_ns[point]);
   }
   next_ += count == 0 ? 1 : 0;
@@ -410,7 +410,7 @@ FiringGroup* CloudDecoder::group_for(std::size_t laser) {
   return group;
 }
 
-void CloudDecoder::put(std::size_t point, FiringGroup& group, std::int32_t begin_ns) const {
+void CloudDecoder::add_point(std::size_t point, FiringGroup& group, std::int32_t begin_ns) const {
   constexpr float kMaxIntensity = 255.0F;
   const std::size_t k = points_.laser[point] % FiringGroup::kLasers;
   const float x = points_.x_m[point], y = points_.y_m[point], z = points_.z_m[point];

@@ -74,7 +74,7 @@ class CloudDecoder {
   void measure_period();
   void sort_by_time();
   FiringGroup* group_for(std::size_t laser);
-  void put(std::size_t point, FiringGroup& group, std::int32_t begin_ns) const;
+  void add_point(std::size_t point, FiringGroup& group, std::int32_t begin_ns) const;
 
   /// Point data, one array per quantity in the order of the message; only returns after keep_returns().
   struct Points {

@@ -49,29 +49,29 @@ inline constexpr std::size_t kMaxCloudPoints = std::size_t{1} << 20;
 
 inline std::size_t points_of(const CloudView& message) { return std::size_t{message.height} * message.width; }
 
-/// Calls `take(value)` with each point's value in one column, in the order of the message. Precondition: `column`
+/// Calls `visit(value)` with each point's value in one column, in the order of the message. Precondition: `column`
 /// belongs to the layout that layout_of() returned for this message.
-template <class Take> void for_each_in(const CloudView& message, CloudLayout::Column column, const Take& take) {
-  const auto visit_each = [&](const auto& visit) {
+template <class Visit> void for_each_in(const CloudView& message, CloudLayout::Column column, const Visit& visit) {
+  const auto visit_each = [&](const auto& visit_bytes) {
     if (message.width == 0)
       return;
     for (std::size_t row = 0; row < message.height; ++row) {
       const std::byte* at = message.data.data() + row * message.row_step + column.offset;
       for (std::size_t i = 0; i < message.width; ++i, at += message.point_step)
-        visit(at);
+        visit_bytes(at);
     }
   };
   const auto read_as = [&]<class Number>(Number value) {
     if (!message.is_big_endian)
       return visit_each([&](const std::byte* at) {
         std::memcpy(&value, at, sizeof(value));
-        take(value);
+        visit(value);
       });
     visit_each([&](const std::byte* at) {
       std::array<std::byte, sizeof(value)> bytes;
       std::reverse_copy(at, at + sizeof(value), bytes.begin());
       std::memcpy(&value, bytes.data(), sizeof(value));
-      take(value);
+      visit(value);
     });
   };
   using Type = CloudView::Type;

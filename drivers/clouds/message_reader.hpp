@@ -25,8 +25,8 @@ class MessageReader {
     static_assert(std::is_arithmetic_v<Number> && std::endian::native == std::endian::little);
     align(sizeof(Number));
     Number value{};
-    if (const auto taken = bytes(sizeof(Number)); !taken.empty())
-      std::memcpy(&value, taken.data(), sizeof(Number));
+    if (const auto data = bytes(sizeof(Number)); !data.empty())
+      std::memcpy(&value, data.data(), sizeof(Number));
     return value;
   }
   void numbers(std::span<double> out) {
@@ -39,8 +39,8 @@ class MessageReader {
   std::span<const std::byte> sequence() { return bytes(number<std::uint32_t>()); }
   std::span<const std::byte> rest() { return bytes(data_.size() - at_); }
   std::string_view text() {
-    const std::span<const std::byte> taken = sequence();
-    const std::string_view all{reinterpret_cast<const char*>(taken.data()), taken.size()};
+    const std::span<const std::byte> data = sequence();
+    const std::string_view all{reinterpret_cast<const char*>(data.data()), data.size()};
     return all.substr(0, all.find('\0')); // CDR includes the terminating zero
   }
 

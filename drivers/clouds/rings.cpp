@@ -16,14 +16,15 @@ float elevation_rad(const Rings::Positions& points, std::size_t i) {
 
 } // namespace
 
-void Rings::tell(Positions points, std::span<const float> told, RingsFrom told_by, std::vector<std::uint8_t>& lasers) {
+void Rings::assign(Positions points, std::span<const float> rings, RingsFrom source,
+                   std::vector<std::uint8_t>& lasers) {
   constexpr auto kEnd = static_cast<float>(kMax);
-  const bool is_told =
-      !told.empty() && std::ranges::all_of(told, [](float ring) { return ring >= 0.0F && ring < kEnd; });
+  const bool has_rings =
+      !rings.empty() && std::ranges::all_of(rings, [](float ring) { return ring >= 0.0F && ring < kEnd; });
   lasers.clear();
-  if (is_told) {
-    from_ = told_by;
-    for (const float ring : told)
+  if (has_rings) {
+    from_ = source;
+    for (const float ring : rings)
       lasers.push_back(static_cast<std::uint8_t>(ring));
   } else {
     if (!lines_known_)
@@ -71,9 +72,9 @@ void Rings::find_lines(Positions points) {
   if (lines >= kFewestLines && lines <= kMax) {
     from_ = RingsFrom::elevation;
   } else {
-    const auto seen = [](std::uint32_t points_of_bin) { return points_of_bin > 0; };
-    const auto first = std::ranges::find_if(histogram_, seen) - histogram_.begin();
-    const auto last = histogram_.rend() - std::find_if(histogram_.rbegin(), histogram_.rend(), seen);
+    const auto is_occupied = [](std::uint32_t points_of_bin) { return points_of_bin > 0; };
+    const auto first = std::ranges::find_if(histogram_, is_occupied) - histogram_.begin();
+    const auto last = histogram_.rend() - std::find_if(histogram_.rbegin(), histogram_.rend(), is_occupied);
     lines = kBands;
     for (std::size_t band = 0; band < kBands; ++band)
       centres[band] =
@@ -93,19 +94,19 @@ void Rings::find_lines(Positions points) {
 void Rings::rank(Positions points, std::span<const std::uint8_t> lasers) {
   bool is_new = false;
   for (const std::uint8_t laser : lasers)
-    is_new = is_new || seen_[laser] == 0;
+    is_new = is_new || counts_[laser] == 0;
   if (!is_new)
     return;
   for (std::size_t i = 0; i < lasers.size(); ++i) {
     elevation_sum_rad_[lasers[i]] += static_cast<double>(elevation_rad(points, i));
-    ++seen_[lasers[i]];
+    ++counts_[lasers[i]];
   }
   std::array<std::uint8_t, kMax> by_elevation{};
   std::iota(by_elevation.begin(), by_elevation.end(), std::uint8_t{0});
   const auto end =
-      std::partition(by_elevation.begin(), by_elevation.end(), [&](std::uint8_t laser) { return seen_[laser] > 0; });
+      std::partition(by_elevation.begin(), by_elevation.end(), [&](std::uint8_t laser) { return counts_[laser] > 0; });
   const auto mean_rad = [&](std::uint8_t laser) {
-    return elevation_sum_rad_[laser] / static_cast<double>(seen_[laser]);
+    return elevation_sum_rad_[laser] / static_cast<double>(counts_[laser]);
   };
   std::sort(by_elevation.begin(), end, [&](std::uint8_t a, std::uint8_t b) { return mean_rad(a) < mean_rad(b); });
   for (std::size_t i = 0; i < kMax; ++i)

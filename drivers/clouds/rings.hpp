@@ -29,9 +29,9 @@ class Rings {
     std::span<const float> x_m, y_m, z_m;
   };
 
-  /// Writes the laser of each point, 0 .. kMax - 1, to `lasers`. `told`: ring from the field or row; empty if there is
+  /// Writes the laser of each point, 0 .. kMax - 1, to `lasers`. `rings`: ring from the field or row; empty if there is
   /// neither. All are ignored if any is out of range.
-  void tell(Positions points, std::span<const float> told, RingsFrom told_by, std::vector<std::uint8_t>& lasers);
+  void assign(Positions points, std::span<const float> rings, RingsFrom source, std::vector<std::uint8_t>& lasers);
 
   /// Ring of a laser, ordered by mean observed elevation; 0 is the lowest.
   [[nodiscard]] std::uint8_t ring_of(std::size_t laser) const { return ring_of_[laser]; }
@@ -49,7 +49,7 @@ class Rings {
   std::array<std::uint8_t, kBins> laser_of_bin_{};
   std::array<std::uint32_t, kBins> histogram_{};
   std::array<double, kMax> elevation_sum_rad_{};
-  std::array<std::uint64_t, kMax> seen_{};
+  std::array<std::uint64_t, kMax> counts_{};
   std::array<std::uint8_t, kMax> ring_of_{};
 };
 

@@ -200,7 +200,7 @@ const Datagram* Capture::next() {
     ++stats_.frames;
     Expected<Datagram, FrameError> datagram = udp_datagram(frame->link_type, frame->bytes, frame->wire_bytes);
     if (!datagram && datagram.error() == FrameError::fragment) {
-      if (const auto joined = fragments_.take(frame->link_type, frame->bytes)) {
+      if (const auto joined = fragments_.add(frame->link_type, frame->bytes)) {
         datagram = *joined;
       }
     }

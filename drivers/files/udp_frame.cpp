@@ -167,7 +167,7 @@ Expected<Datagram, FrameError> udp_datagram(int link_type, std::span<const std::
   return datagram_in(*packet, wire_bytes - std::min(wire_bytes, frame.size()));
 }
 
-std::optional<Datagram> IpFragments::take(int link_type, std::span<const std::byte> frame) {
+std::optional<Datagram> IpFragments::add(int link_type, std::span<const std::byte> frame) {
   const Expected<ByteSpan, FrameError> found = ip_packet(link_type, frame);
   if (!found) {
     return std::nullopt;
@@ -222,7 +222,7 @@ std::optional<Datagram> IpFragments::add(Packet& packet, ByteSpan fragment, std:
   }
   std::ranges::copy(fragment, packet.payload.begin() + static_cast<std::ptrdiff_t>(begin));
   packet.bytes += fragment.size();
-  packet.latest = ++taken_;
+  packet.latest = ++added_;
   ++packet.fragments;
   if (is_last) {
     packet.bytes_total = begin + fragment.size();

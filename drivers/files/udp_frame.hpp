@@ -41,7 +41,7 @@ class IpFragments {
 
   /// Adds a frame in which udp_datagram() found a fragment. Returns the datagram that it completes, valid until the
   /// next call.
-  std::optional<Datagram> take(int link_type, std::span<const std::byte> frame);
+  std::optional<Datagram> add(int link_type, std::span<const std::byte> frame);
 
   /// Number of fragments joined to datagrams so far, excluding the one that completes each datagram.
   [[nodiscard]] std::uint64_t joined() const { return joined_; }
@@ -70,7 +70,7 @@ class IpFragments {
   std::optional<Datagram> add(Packet& packet, std::span<const std::byte> fragment, std::size_t begin, bool is_last);
 
   std::unique_ptr<std::array<Packet, kPackets>> packets_;
-  std::uint64_t taken_ = 0, joined_ = 0;
+  std::uint64_t added_ = 0, joined_ = 0;
 };
 
 } // namespace locus

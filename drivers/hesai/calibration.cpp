@@ -59,7 +59,7 @@ bool is_head(const Fields& fields) {
 class Reader {
  public:
   /// Parses a line. Returns an error, or nothing if the line is valid.
-  std::optional<std::string> take(std::string_view line) {
+  std::optional<std::string> read_line(std::string_view line) {
     const auto fields = fields_of(line);
     if (!has_head_) {
       has_head_ = fields && is_head(*fields);
@@ -70,26 +70,26 @@ class Reader {
     }
     const auto laser = fields ? number<std::size_t>((*fields)[0]) : std::nullopt;
     if (!laser)
-      return take_other(line);
+      return read_other_line(line);
     if (is_over_ || *laser == 0 || *laser > kMaxChannels)
       return fmt::format("laser {}: they count from 1 to {} at most", *laser, kMaxChannels);
-    if (seen_.test(*laser - 1))
+    if (present_.test(*laser - 1))
       return fmt::format("laser {} is there twice", *laser);
     const auto elevation_deg = angle((*fields)[1], kSteepestDeg), azimuth_deg = angle((*fields)[2], kFarthestDeg);
     if (!elevation_deg || !azimuth_deg)
       return fmt::format("laser {}: Elevation must be a number from -90 to 90, Azimuth one from -180 to 180", *laser);
-    seen_.set(*laser - 1);
+    present_.set(*laser - 1);
     calibration_.storage[*laser - 1] = {*elevation_deg * kRadPerDeg, *azimuth_deg * kRadPerDeg, 0};
     return std::nullopt;
   }
 
   /// Completes the calibration after the last line.
   Expected<Calibration, std::string> finish() {
-    if (!has_head_ || seen_.none())
+    if (!has_head_ || present_.none())
       return std::string{"no lasers in it; give the angle correction file of the lidar"};
-    calibration_.laser_count = seen_.count();
+    calibration_.laser_count = present_.count();
     for (std::size_t i = 0; i < calibration_.laser_count; ++i)
-      if (!seen_.test(i))
+      if (!present_.test(i))
         return fmt::format("laser {} is missing", i + 1);
     calibration_.assign_rings();
     return calibration_;
@@ -97,17 +97,17 @@ class Reader {
 
  private:
   /// Parses an empty line, or the hash after all lasers.
-  std::optional<std::string> take_other(std::string_view line) {
+  std::optional<std::string> read_other_line(std::string_view line) {
     if (line.find_first_not_of(" \t\r,") == std::string_view::npos)
       return std::nullopt;
     const bool is_hash =
-        seen_.any() && !is_over_ && line.find_first_not_of("0123456789abcdefABCDEF, \r") == std::string_view::npos;
+        present_.any() && !is_over_ && line.find_first_not_of("0123456789abcdefABCDEF, \r") == std::string_view::npos;
     is_over_ = is_hash;
     return is_hash ? std::nullopt : std::optional<std::string>{"a laser, its elevation and its azimuth are expected"};
   }
 
   Calibration calibration_;
-  std::bitset<kMaxChannels> seen_;
+  std::bitset<kMaxChannels> present_;
   bool has_head_ = false, is_over_ = false;
 };
 
@@ -121,7 +121,7 @@ Expected<Calibration, std::string> parse_calibration(std::string_view text, std:
   Reader reader;
   for (int line = 1; !text.empty(); ++line) {
     const std::size_t end = text.find('\n');
-    if (const auto problem = reader.take(text.substr(0, end)))
+    if (const auto problem = reader.read_line(text.substr(0, end)))
       return fmt::format("{}:{}: {}", name, line, *problem);
     text = end == std::string_view::npos ? std::string_view{} : text.substr(end + 1);
   }

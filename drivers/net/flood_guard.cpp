@@ -70,7 +70,7 @@ void FloodGuard::look_at(std::span<const Datagram> datagrams, UdpSocket& socket)
     guard(socket);
 }
 
-void FloodGuard::hear_nothing(Stamp now, UdpSocket& socket) {
+void FloodGuard::advance(Stamp now, UdpSocket& socket) {
   if (guards_)
     begin_second(now, socket);
 }

@@ -27,7 +27,7 @@ class FloodGuard {
 
   /// Advances time when the socket received nothing; `now` is wall time. Needed because a flood that has ended sends no
   /// samples.
-  void hear_nothing(Stamp now, UdpSocket& socket);
+  void advance(Stamp now, UdpSocket& socket);
 
   /// Updates the known lidars of the port.
   void expect(const LidarRouter::Senders& senders, UdpSocket& socket);

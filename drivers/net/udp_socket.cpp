@@ -94,9 +94,9 @@ UdpSocket::~UdpSocket() {
 
 Expected<UdpSocket, std::string> UdpSocket::open(std::uint16_t port) { return open(port, false); }
 
-Expected<UdpSocket, std::string> UdpSocket::open_beside_others(std::uint16_t port) { return open(port, true); }
+Expected<UdpSocket, std::string> UdpSocket::open_shared(std::uint16_t port) { return open(port, true); }
 
-Expected<UdpSocket, std::string> UdpSocket::open(std::uint16_t port, bool beside_others) {
+Expected<UdpSocket, std::string> UdpSocket::open(std::uint16_t port, bool shared) {
   UdpSocket opened(::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
   if (opened.descriptor_ < 0)
     return because("no socket", port);
@@ -104,7 +104,7 @@ Expected<UdpSocket, std::string> UdpSocket::open(std::uint16_t port, bool beside
   address.sin_family = AF_INET;
   address.sin_port = htons(port);
   address.sin_addr.s_addr = htonl(INADDR_ANY);
-  set(opened.descriptor_, SOL_SOCKET, SO_REUSEPORT, beside_others ? 1 : 0);
+  set(opened.descriptor_, SOL_SOCKET, SO_REUSEPORT, shared ? 1 : 0);
   if (bind(opened.descriptor_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
     return because("cannot bind", port);
   if (auto problem = opened.prepare())

@@ -32,7 +32,7 @@ class UdpSocket {
 
   /// Opens a port shared (SO_REUSEPORT) with other sockets of the same user that also request it. Each receives
   /// broadcasts; a unicast datagram is delivered to only one of them.
-  static Expected<UdpSocket, std::string> open_beside_others(std::uint16_t port);
+  static Expected<UdpSocket, std::string> open_shared(std::uint16_t port);
 
   /// Takes ownership of a socket bound by another process, e.g. systemd. Fails with one line for the user.
   static Expected<UdpSocket, std::string> adopt(int descriptor);
@@ -67,7 +67,7 @@ class UdpSocket {
   struct Batch;
 
   explicit UdpSocket(int descriptor);
-  static Expected<UdpSocket, std::string> open(std::uint16_t port, bool beside_others);
+  static Expected<UdpSocket, std::string> open(std::uint16_t port, bool shared);
   std::optional<std::string> prepare();
 
   int descriptor_;

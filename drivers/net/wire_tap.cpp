@@ -37,14 +37,14 @@ WireTap::WireTap(WireTap&& other) noexcept
     : frames_(std::exchange(other.frames_, -1)), sockets_(std::move(other.sockets_)),
       fragments_(std::move(other.fragments_)) {}
 
-void WireTap::listen(Duration duration, const Take& take) {
+void WireTap::listen(Duration duration, const Receiver& receive) {
   const auto end = std::chrono::steady_clock::now() + duration;
   for (auto now = end - duration; now < end; now = std::chrono::steady_clock::now()) {
     wait(end - now);
     for (UdpSocket& socket : sockets_)
       for (const Datagram& datagram : socket.receive())
-        take(datagram);
-    take_frames(take);
+        receive(datagram);
+    read_frames(receive);
   }
 }
 
@@ -59,9 +59,9 @@ void WireTap::wait(Duration timeout) const {
 }
 
 /// Reads the pending frames, at most kBatch, so that listen() ends on time even in a flood.
-void WireTap::take_frames(const Take& take) {
+void WireTap::read_frames(const Receiver& receive) {
   constexpr int kBatch = 1024;
-  for (int taken = 0; frames_ >= 0 && taken < kBatch; ++taken) {
+  for (int frames = 0; frames_ >= 0 && frames < kBatch; ++frames) {
     sockaddr_ll from{};
     socklen_t size = sizeof(from);
     const ssize_t bytes =
@@ -76,10 +76,10 @@ void WireTap::take_frames(const Take& take) {
     if (const auto whole = udp_datagram(DLT_RAW, frame, length))
       datagram = *whole;
     else if (whole.error() == FrameError::fragment)
-      datagram = fragments_.take(DLT_RAW, frame);
+      datagram = fragments_.add(DLT_RAW, frame);
     if (datagram) {
       datagram->receive_stamp = Stamp{std::chrono::system_clock::now().time_since_epoch()};
-      take(*datagram);
+      receive(*datagram);
     }
   }
 }

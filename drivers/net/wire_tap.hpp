@@ -19,7 +19,7 @@ namespace locus {
 /// Captures the UDP datagrams that reach this computer, whatever their destination. Single owner, not thread-safe.
 class WireTap {
  public:
-  using Take = std::function<void(const Datagram&)>;
+  using Receiver = std::function<void(const Datagram&)>;
 
   /// Captures frames on all interfaces if permitted (CAP_NET_RAW), without disturbing a service that uses the ports;
   /// otherwise binds those of `ports` that are free. Fails with one line for the user.
@@ -30,16 +30,16 @@ class WireTap {
   WireTap& operator=(WireTap&&) = delete;
 
   /// Returns true if datagrams to all ports are captured.
-  [[nodiscard]] bool hears_all() const { return frames_ >= 0; }
+  [[nodiscard]] bool captures_all() const { return frames_ >= 0; }
 
-  /// Passes received datagrams to `take` for `duration`, stamped by this computer's clock; a datagram is valid during
-  /// the call.
-  void listen(Duration duration, const Take& take);
+  /// Passes received datagrams to `receive` for `duration`, stamped by this computer's clock; a datagram is valid
+  /// during the call.
+  void listen(Duration duration, const Receiver& receive);
 
  private:
   WireTap(int frames, std::vector<UdpSocket> sockets) : frames_(frames), sockets_(std::move(sockets)) {}
   void wait(Duration timeout) const;
-  void take_frames(const Take& take);
+  void read_frames(const Receiver& receive);
 
   int frames_; ///< packet socket; -1 if not permitted
   std::vector<UdpSocket> sockets_;

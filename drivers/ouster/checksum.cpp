@@ -40,7 +40,7 @@ constexpr Tables make_tables() {
 constexpr Tables kTables = make_tables();
 
 /// Returns the contribution of eight bytes that are followed by `behind` bytes.
-std::uint64_t take_eight(std::uint64_t bytes, std::size_t behind) {
+std::uint64_t crc_of_eight(std::uint64_t bytes, std::size_t behind) {
   std::uint64_t crc = 0;
   for (std::size_t i = 0; i < 8; ++i)
     crc ^= kTables[behind + 7 - i][bytes >> (8 * i) & 0xFF];
@@ -90,8 +90,8 @@ template <int kBits> [[gnu::target("pclmul,sse4.1")]] inline Lane moved_ahead(La
     sum = moved_ahead<8 * kLaneBytes>(sum) ^ lanes[lane];
   for (; bytes.size() >= kLaneBytes; bytes = bytes.subspan(kLaneBytes))
     sum = moved_ahead<8 * kLaneBytes>(sum) ^ load(0);
-  return take_eight(static_cast<std::uint64_t>(_mm_extract_epi64(sum.bits, 0)), 8) ^
-         take_eight(static_cast<std::uint64_t>(_mm_extract_epi64(sum.bits, 1)), 0);
+  return crc_of_eight(static_cast<std::uint64_t>(_mm_extract_epi64(sum.bits, 0)), 8) ^
+         crc_of_eight(static_cast<std::uint64_t>(_mm_extract_epi64(sum.bits, 1)), 0);
 }
 
 #endif
@@ -106,7 +106,7 @@ std::uint64_t crc64(std::span<const std::byte> bytes) {
     crc = fold(crc, bytes);
 #endif
   for (; bytes.size() >= kSlices; bytes = bytes.subspan(kSlices))
-    crc = take_eight(crc ^ read_u64(bytes.data()), 8) ^ take_eight(read_u64(bytes.data() + 8), 0);
+    crc = crc_of_eight(crc ^ read_u64(bytes.data()), 8) ^ crc_of_eight(read_u64(bytes.data() + 8), 0);
   for (const std::byte byte : bytes)
     crc = kTables[0][(crc ^ std::to_integer<std::uint64_t>(byte)) & 0xFF] ^ crc >> 8;
   return ~crc;

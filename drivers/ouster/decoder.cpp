@@ -89,7 +89,7 @@ std::optional<PacketError> Decoder::decode(std::span<const std::byte> payload, L
       other_start_ = {}; // measurement IDs beyond the known mode: discard the evidence
     return error;
   }
-  if (!turns_as_known(header)) {
+  if (!has_known_mode(header)) {
     ++packets_of_other_start_;
     return PacketError::model;
   }
@@ -152,14 +152,14 @@ std::optional<PacketError> Decoder::find_columns(Packet payload) {
 
 /// Returns true if the packet comes from the known start of the sensor, or from one in the same mode: equal column
 /// spacing, and measurement IDs that advance with time from one turn to the next.
-bool Decoder::turns_as_known(const PacketHeader& header) {
+bool Decoder::has_known_mode(const PacketHeader& header) {
   if (header.init_id == 0 || metadata_.init_id == 0 || header.init_id == metadata_.init_id)
     return true;
   const OtherStart before = other_start_;
   const auto frame_id = static_cast<std::uint16_t>(header.frame_id);
   other_start_ = {header.init_id, frame_id, columns_.front().measurement_id, time_of_packet_};
   const auto next_frame = static_cast<std::uint16_t>(before.frame_id + 1);
-  if (before.init_id != header.init_id || frame_id != next_frame || !is_spaced_as_known())
+  if (before.init_id != header.init_id || frame_id != next_frame || !has_known_spacing())
     return false;
   // Time is not reduced modulo a turn: with twice the columns per turn, a missing half turn would go unnoticed.
   const auto turn = static_cast<std::int64_t>(metadata_.columns_per_frame);
@@ -172,7 +172,7 @@ bool Decoder::turns_as_known(const PacketHeader& header) {
 }
 
 /// Returns true if the columns of the current packet have the spacing of the mode; false for a single column.
-bool Decoder::is_spaced_as_known() const {
+bool Decoder::has_known_spacing() const {
   const Column& last = columns_[column_count_ - 1];
   const std::size_t steps = columns_between(columns_.front().measurement_id, last.measurement_id);
   const std::int64_t expected_ns = static_cast<std::int64_t>(steps) * column_duration_.count();

@@ -101,8 +101,8 @@ class Decoder {
 
   void aim_beams();
   std::optional<PacketError> find_columns(Packet payload);
-  bool turns_as_known(const PacketHeader& header);
-  [[nodiscard]] bool is_spaced_as_known() const;
+  bool has_known_mode(const PacketHeader& header);
+  [[nodiscard]] bool has_known_spacing() const;
   [[nodiscard]] std::size_t columns_between(std::size_t from, std::size_t to) const;
   [[nodiscard]] bool is_in_window(std::size_t measurement_id) const;
   [[nodiscard]] std::uint64_t sent_after(std::size_t packet, std::size_t packets) const;

@@ -186,8 +186,8 @@ void read_mode(const Document& file, Metadata& metadata) {
   const auto mode = needed(file, kConfig, "lidar_mode", text(file, kConfig, "lidar_mode"));
   const char* const end = mode.data() + mode.size();
   const auto columns = std::from_chars(mode.data(), end, metadata.columns_per_frame);
-  const bool goes_on = columns.ec == std::errc{} && columns.ptr != end && *columns.ptr == 'x';
-  const auto turns = std::from_chars(goes_on ? columns.ptr + 1 : end, end, metadata.frames_per_s);
+  const bool has_rate = columns.ec == std::errc{} && columns.ptr != end && *columns.ptr == 'x';
+  const auto turns = std::from_chars(has_rate ? columns.ptr + 1 : end, end, metadata.frames_per_s);
   constexpr std::size_t kFewestColumns = 256, kMostColumns = 4096;
   constexpr int kMostTurns = 50;
   if (turns.ec != std::errc{} || turns.ptr != end || metadata.columns_per_frame < kFewestColumns ||

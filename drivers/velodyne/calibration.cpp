@@ -74,14 +74,14 @@ Calibration parse(const YAML::Node& file) {
   if (lasers.size() != calibration.laser_count)
     throw Problem{lasers.Mark(), "num_lasers is " + std::to_string(calibration.laser_count) + ", but there are " +
                                      std::to_string(lasers.size()) + " lasers"};
-  std::bitset<kMaxLasers> seen;
+  std::bitset<kMaxLasers> present;
   for (const YAML::Node& laser : lasers) {
     if (!laser.IsMap())
       throw Problem{laser.Mark(), "a laser must be a map of corrections"};
     const std::size_t id = count(laser, "laser_id", calibration.laser_count);
-    if (seen.test(id))
+    if (present.test(id))
       throw Problem{laser.Mark(), "laser_id " + std::to_string(id) + " is there twice"};
-    seen.set(id);
+    present.set(id);
     calibration.storage[id] = read_laser(laser);
   }
   calibration.assign_rings();

@@ -57,8 +57,8 @@ Model ModelRecognition::recognise(Model claimed, ReturnMode mode, std::optional<
   if (claimed != claimed_)
     verdict_.reset();
   claimed_ = claimed;
-  if (const auto told = spacing ? model_of_spacing(claimed, mode, *spacing) : std::nullopt)
-    verdict_ = told;
+  if (const auto spaced = spacing ? model_of_spacing(claimed, mode, *spacing) : std::nullopt)
+    verdict_ = spaced;
   if (!verdict_)
     verdict_ = claimed == Model::hdl32e && fires_sixteen_lasers_twice(packet) ? Model::vlp16 : claimed;
   return *verdict_;

@@ -30,7 +30,7 @@ template <class Number> std::optional<Number> parse_number(std::string_view text
 }
 
 /// Splits off the next sentence of a text: from a $ to before the next one. Empty if there is none.
-std::string_view take_sentence(std::string_view& text) {
+std::string_view pop_sentence(std::string_view& text) {
   text.remove_prefix(std::min(text.find('$'), text.size()));
   const std::string_view sentence = text.substr(0, text.find('$', 1));
   text.remove_prefix(sentence.size());
@@ -119,7 +119,7 @@ Nmea parse_sentence(std::string_view sentence, std::optional<RmcSentence>& rmc) 
 
 NmeaText parse_nmea(std::string_view text) {
   NmeaText best;
-  for (std::string_view sentence = take_sentence(text); !sentence.empty(); sentence = take_sentence(text)) {
+  for (std::string_view sentence = pop_sentence(text); !sentence.empty(); sentence = pop_sentence(text)) {
     NmeaText one;
     one.state = is_rmc(sentence) ? parse_sentence(sentence, one.rmc) : is_any(sentence) ? Nmea::no_rmc : Nmea::none;
     if (one.state > best.state)

@@ -12,20 +12,13 @@
 #include "drivers/hesai_test_packet.hpp"
 #include "drivers/ouster/decoder.hpp"
 #include "drivers/ouster_test_packet.hpp"
+#include "support/returns.hpp"
 
 namespace {
 
 using namespace locus;
 
 constexpr int kPackets = 64;
-
-std::size_t returns_of(const LidarPacket& packet) {
-  std::size_t returns = 0;
-  for (const FiringGroup& group : packet.firing_groups())
-    for (const float range_m : group.range_m)
-      returns += range_m > 0.0F ? 1 : 0;
-  return returns;
-}
 
 /// Counts the decoding of this packet, after one for the initialisation.
 template <class Decoder>
@@ -41,7 +34,7 @@ void count(const std::string& name, Decoder&& decoder, std::span<const std::byte
   CALLGRIND_TOGGLE_COLLECT;
   CALLGRIND_STOP_INSTRUMENTATION;
   CALLGRIND_DUMP_STATS_AT(name.c_str());
-  std::printf("%s %zu\n", name.c_str(), kPackets * returns_of(packet));
+  std::printf("%s %zu\n", name.c_str(), kPackets * test::count_returns(packet));
 }
 
 /// Three quarters of the firings of a dense scene have a return.

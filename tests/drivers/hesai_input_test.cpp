@@ -205,7 +205,7 @@ TEST(HesaiInput, ClockOnUtcOrTaiIsTrustedAndOneThatRunsFreeIsSetByArrival) {
       packet = sender.send(lidar, number);
     ASSERT_NE(packet, nullptr);
     EXPECT_EQ(lidar.clock_state(), scale);
-    EXPECT_TRUE(lidar.tells_date());
+    EXPECT_TRUE(lidar.has_date());
     const Duration time = 5 * microseconds{200} - microseconds{150} + microseconds{6};
     const Duration late = packet->stamp.time_since_epoch() - HesaiTestPacket::kTime - time;
     if (std::string_view{scale} == "internal")
@@ -220,12 +220,12 @@ TEST(HesaiSurvey, TellsModelModeAndClock) {
   for (std::uint32_t number = 1; number <= 11; ++number) {
     const Duration passed = number * milliseconds{1};
     HesaiTestPacket bytes{Model::xt32, kHesaiDual, HesaiTestPacket::kTime + passed};
-    survey.take({bytes.payload(), kHesaiIp, 2368, 2369, Stamp{HesaiTestPacket::kTime + passed}});
+    survey.add({bytes.payload(), kHesaiIp, 2368, 2369, Stamp{HesaiTestPacket::kTime + passed}});
   }
   std::vector<std::byte> at128(1118);
   for (const auto& [at, value] : {std::pair{0U, 0xEE}, {1U, 0xFF}, {2U, 4}, {3U, 3}})
     at128[at] = static_cast<std::byte>(value);
-  survey.take({at128, kHesaiIp + 1, 2368, 2368, Stamp{HesaiTestPacket::kTime}});
+  survey.add({at128, kHesaiIp + 1, 2368, 2368, Stamp{HesaiTestPacket::kTime}});
   const auto lidars = survey.lidars();
   ASSERT_EQ(lidars.size(), 2U);
   EXPECT_EQ(lidars[0].name(), "XT32 at 192.168.1.201");

@@ -68,12 +68,12 @@ TEST(LidarInput, OthersWhoSendToItsPortAreCountedByAddress) {
     EXPECT_NE(lidar.receive(stream(i)), nullptr);
     EXPECT_EQ(lidar.receive(other(i)), nullptr);
   }
-  EXPECT_EQ(lidar.strangers()[0].ip, kOtherIp);
-  EXPECT_EQ(lidar.strangers()[0].packets, 100U);
-  EXPECT_EQ(lidar.strangers()[1].packets, 0U);
+  EXPECT_EQ(lidar.other_senders()[0].ip, kOtherIp);
+  EXPECT_EQ(lidar.other_senders()[0].packets, 100U);
+  EXPECT_EQ(lidar.other_senders()[1].packets, 0U);
   for (std::uint32_t ip = 1; ip < 100; ++ip) // the first few of a flood suffice
     EXPECT_EQ(lidar.receive(Stream(ip)(100)), nullptr);
-  EXPECT_EQ(lidar.strangers().back().packets, 1U);
+  EXPECT_EQ(lidar.other_senders().back().packets, 1U);
 }
 
 std::uint64_t rejected(const PacketCounters& counters) {

@@ -21,9 +21,9 @@ constexpr std::size_t kPpsOffset = 0xCA;
 void hear(LidarSurvey& survey, std::uint32_t ip, PpsState pps) {
   std::array<std::byte, velodyne::kPositionPacketBytes> position{};
   position[kPpsOffset] = static_cast<std::byte>(pps);
-  survey.take({position, ip, 8308, 8308, Stamp{}});
+  survey.add({position, ip, 8308, 8308, Stamp{}});
   const std::array<std::byte, velodyne::kDataPacketBytes> data{};
-  survey.take({data, ip, 2368, 2368, Stamp{}});
+  survey.add({data, ip, 2368, 2368, Stamp{}});
 }
 
 TEST(LidarSurvey, KnownSendersAreFollowedWhenThereIsRoomForNoMore) {
@@ -48,7 +48,7 @@ TEST(LidarSurvey, LidarsWithoutADecoderAreNamed) {
     robosense[i] = std::array{std::byte{0x55}, std::byte{0xAA}, std::byte{0x05}, std::byte{0x5A}}[i];
   LidarSurvey survey;
   for (int i = 0; i < 3; ++i)
-    survey.take({robosense, kFirstIp, 6699, 6699, Stamp{}});
+    survey.add({robosense, kFirstIp, 6699, 6699, Stamp{}});
   const auto lidars = survey.lidars();
   ASSERT_EQ(lidars.size(), 1U);
   EXPECT_FALSE(lidars.front().is_known());
@@ -60,7 +60,7 @@ TEST(LidarSurvey, LidarsWithoutADecoderAreNamed) {
 TEST(LidarSurvey, BeamsOfAnOusterAreLeftOpenWhereThePacketsDoNotTellThem) {
   LidarSurvey survey;
   const test::OusterTestPacket bytes{test::ouster_metadata(ouster::Profile::rng15, 128)};
-  survey.take({bytes.payload(), kFirstIp, 7502, 7502, Stamp{}});
+  survey.add({bytes.payload(), kFirstIp, 7502, 7502, Stamp{}});
   const auto lidars = survey.lidars();
   ASSERT_EQ(lidars.size(), 1U);
   EXPECT_TRUE(lidars.front().is_known());

@@ -263,7 +263,7 @@ TEST_F(OusterInput, EveryDatagramIsCounted) {
   const PacketCounters& counters = lidar.counters();
   EXPECT_EQ(counters[PacketError::length], 20U);
   EXPECT_EQ(counters[PacketError::sender], 10U);
-  EXPECT_EQ(lidar.strangers()[0].ip, kSecondOusterIp);
+  EXPECT_EQ(lidar.other_senders()[0].ip, kSecondOusterIp);
   EXPECT_EQ(counters.received,
             std::accumulate(counters.rejected.begin(), counters.rejected.end(), counters.data + counters.position));
 }
@@ -323,23 +323,23 @@ TEST_F(OusterInput, SurveyTellsItWithoutMetadata) {
   LidarSurvey survey;
   OusterStream stream;
   for (int i = 0; i < 100; ++i) {
-    survey.take(stream(i));
-    survey.take(stream.imu(i, {0.0F, 0.0F, 0.0F}));
+    survey.add(stream(i));
+    survey.add(stream.imu(i, {0.0F, 0.0F, 0.0F}));
   }
-  const std::vector<HeardLidar> heard = survey.lidars();
-  ASSERT_EQ(heard.size(), 1U);
-  EXPECT_TRUE(heard[0].is_known());
-  EXPECT_EQ(heard[0].ouster, test::ouster_metadata().serial_number);
-  EXPECT_EQ(heard[0].port, 7502);
-  EXPECT_NEAR(heard[0].packets_per_s, 640.0, 1.0);
-  EXPECT_EQ(heard[0].beams, 32U);
-  EXPECT_EQ(heard[0].columns_per_turn, 0U) << "the begin of one turn tells no mode";
+  const std::vector<SurveyedLidar> surveyed = survey.lidars();
+  ASSERT_EQ(surveyed.size(), 1U);
+  EXPECT_TRUE(surveyed[0].is_known());
+  EXPECT_EQ(surveyed[0].ouster, test::ouster_metadata().serial_number);
+  EXPECT_EQ(surveyed[0].port, 7502);
+  EXPECT_NEAR(surveyed[0].packets_per_s, 640.0, 1.0);
+  EXPECT_EQ(surveyed[0].beams, 32U);
+  EXPECT_EQ(surveyed[0].columns_per_turn, 0U) << "the begin of one turn tells no mode";
   for (int i = 100; i < 300; ++i)
-    survey.take(stream(i));
+    survey.add(stream(i));
   EXPECT_EQ(survey.lidars()[0].columns_per_turn, 1024U);
   EXPECT_NEAR(survey.lidars()[0].rotation_rate_rpm, 600.0, 1.0);
   EXPECT_EQ(survey.lidars()[0].clock_state(), "clock internal");
-  EXPECT_EQ(heard[0].name(), "Ouster 122201000998 at 169.254.92.158");
+  EXPECT_EQ(surveyed[0].name(), "Ouster 122201000998 at 169.254.92.158");
 }
 
 /// Two sensors send to one port, lidar and IMU packets alike, all of them fragmented.

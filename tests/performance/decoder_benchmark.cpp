@@ -12,6 +12,7 @@
 #include "drivers/velodyne/decoder.hpp"
 #include "drivers/velodyne_test_packet.hpp"
 #include "suite.hpp"
+#include "support/returns.hpp"
 
 namespace locus::performance {
 
@@ -28,14 +29,6 @@ test::VelodyneTestPacket full_packet(velodyne::Model model, velodyne::ReturnMode
     }
   }
   return bytes;
-}
-
-std::size_t returns_of(const LidarPacket& packet) {
-  std::size_t returns = 0;
-  for (const FiringGroup& group : packet.firing_groups())
-    for (const float range_m : group.range_m)
-      returns += range_m > 0.0F ? 1 : 0;
-  return returns;
 }
 
 /// Reports seconds per return, and the number of such lidars that one core decodes.
@@ -55,7 +48,7 @@ void decode(benchmark::State& state, velodyne::Model model, velodyne::ReturnMode
     benchmark::DoNotOptimize(packet.count);
     benchmark::ClobberMemory();
   }
-  report(state, returns_of(packet), velodyne::packet_duration(model, mode));
+  report(state, test::count_returns(packet), velodyne::packet_duration(model, mode));
 }
 
 void copy(benchmark::State& state, velodyne::Model model, velodyne::ReturnMode mode) {
@@ -69,7 +62,7 @@ void copy(benchmark::State& state, velodyne::Model model, velodyne::ReturnMode m
     benchmark::DoNotOptimize(copied.data());
     benchmark::ClobberMemory();
   }
-  report(state, returns_of(packet), velodyne::packet_duration(model, mode));
+  report(state, test::count_returns(packet), velodyne::packet_duration(model, mode));
 }
 
 /// A packet of a dense scene: three quarters of the pixels have a return.
@@ -98,7 +91,7 @@ void decode_ouster(benchmark::State& state, const ouster::Metadata& metadata) {
     benchmark::DoNotOptimize(packet.count);
     benchmark::ClobberMemory();
   }
-  report(state, returns_of(packet), packet.duration);
+  report(state, test::count_returns(packet), packet.duration);
 }
 
 /// A packet of a dense scene: three quarters of the firings have a return. A quarter of a QT128's channels does not
@@ -128,7 +121,7 @@ void decode_hesai(benchmark::State& state, hesai::Model model, std::uint8_t mode
     benchmark::DoNotOptimize(packet.count);
     benchmark::ClobberMemory();
   }
-  report(state, returns_of(packet), packet.duration);
+  report(state, test::count_returns(packet), packet.duration);
 }
 
 } // namespace

@@ -213,7 +213,7 @@ TEST(WrongUsage, FolderAboveADriveOfKittiStandsForTheOnlyDriveInIt) {
   const std::filesystem::path day = kitti_room_drive().parent_path();
   const Replay replay({"--duration", "1", day.string()});
   EXPECT_EQ(replay.run().status, 0) << replay.run().err;
-  EXPECT_NE(replay.run().out.find(day.string() + ": the only recording in it is taken, " + kitti_room_drive().string()),
+  EXPECT_NE(replay.run().out.find(day.string() + ": the only recording in it is used, " + kitti_room_drive().string()),
             std::string::npos)
       << replay.run().out;
   const TemporaryFolder empty;

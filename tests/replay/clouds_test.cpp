@@ -140,7 +140,7 @@ TEST(Clouds, OneCommandWithoutAConfigurationReachesTheReport) {
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
   EXPECT_EQ(replay.run().err, "");
   expect_parts(replay.run().out, {"/points is lidar front, /wheel_odometry is wio, /imu/data is imu",
-                                  "no packets, so the clouds on /points are taken",
+                                  "no packets, so the clouds on /points are used",
                                   "/tf_static does not say where the lidar (lidar) sits on base_link"});
   EXPECT_TRUE(std::filesystem::exists(replay.file("report.html")));
   EXPECT_EQ(replay.summary()["sweeps"]["seen"], room_turns().size());
@@ -190,7 +190,7 @@ TEST(Clouds, MountingIsThatOfTheStaticTransforms) {
 tools::StaticTransforms transforms_of(const std::vector<std::tuple<std::string, std::string, Pose>>& all) {
   tools::StaticTransforms transforms;
   for (const auto& [parent, child, T_parent_child] : all)
-    transforms.take({transform_message(parent, child, T_parent_child, RosVersion::ros1), Serialisation::ros1});
+    transforms.add({transform_message(parent, child, T_parent_child, RosVersion::ros1), Serialisation::ros1});
   return transforms;
 }
 
@@ -232,7 +232,7 @@ TEST(Clouds, TopicWithMostPointsIsTakenAndTheOthersAreNamed) {
       {"/filtered", type_of(filtered), messages.back().recorded, cloud_message(filtered, RosVersion::ros1)});
   write_file(folder / "clouds.bag", ros1_bag(messages));
   const Replay most({folder / "clouds.bag"});
-  expect_parts(most.run().out, {"the clouds on /points are taken, not /filtered", "--set lidars.0.topic=/filtered",
+  expect_parts(most.run().out, {"the clouds on /points are used, not /filtered", "--set lidars.0.topic=/filtered",
                                 "left out: /filtered"});
   const Replay asked({"--set", "lidars.0.topic=/filtered", folder / "clouds.bag"});
   expect_parts(asked.run().out, {"/filtered is lidar front"});

@@ -90,7 +90,7 @@ TEST_F(KittiOdometry, SequenceIsReplayedAndMeasuredByItsPoses) {
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
   EXPECT_EQ(replay.run().err, "");
   EXPECT_TRUE(contains(replay.run().out, "velodyne is lidar front, the poses of KITTI are the truth; the points of a "
-                                         "sweep are taken as of one instant"))
+                                         "sweep are treated as of one instant"))
       << replay.run().out;
   const nlohmann::json summary = replay.summary();
   EXPECT_EQ(summary["sweeps"]["seen"], kSweeps);
@@ -135,7 +135,7 @@ TEST_F(KittiOdometry, FolderAboveItIsEnoughWhereItIsTheOnlyOne) {
     const Replay replay({above});
     EXPECT_EQ(read_text(replay.file("odometry.tum")), expected);
     EXPECT_TRUE(
-        contains(replay.run().out, above.string() + ": the only recording in it is taken, " + sequence().string()))
+        contains(replay.run().out, above.string() + ": the only recording in it is used, " + sequence().string()))
         << replay.run().out;
   }
 }

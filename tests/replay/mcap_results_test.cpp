@@ -45,7 +45,7 @@ class McapResults : public testing::Test {
   }
   [[nodiscard]] McapRecord record_at(std::uint64_t begin) const {
     std::span<const std::byte> rest = bytes(begin, bytes_.size() - begin);
-    return tools::take_mcap_record(rest).value();
+    return tools::pop_mcap_record(rest).value();
   }
 
   TemporaryFolder folder_;
@@ -152,7 +152,7 @@ TEST_F(McapResults, IndexLeadsToEachMessage) {
   std::map<McapOp, int> records;
   std::uint64_t indexed = 0, messages = 0;
   std::span<const std::byte> rest = bytes(footer->summary_start, footer->summary_offset_start - footer->summary_start);
-  while (const auto record = tools::take_mcap_record(rest)) {
+  while (const auto record = tools::pop_mcap_record(rest)) {
     ++records[record->op];
     MessageReader fields = record->fields();
     if (record->op == McapOp::statistics)
@@ -180,7 +180,7 @@ TEST_F(McapResults, IndexLeadsToEachMessage) {
       for (auto ns = times.number<std::uint64_t>(); times.whole(); ns = times.number<std::uint64_t>()) {
         EXPECT_TRUE(ns >= first_ns && ns <= last_ns);
         std::span<const std::byte> at = unpacked.bytes.subspan(times.number<std::uint64_t>());
-        const McapRecord message = tools::take_mcap_record(at).value();
+        const McapRecord message = tools::pop_mcap_record(at).value();
         MessageReader of_message = message.fields();
         EXPECT_EQ(message.op, McapOp::message);
         EXPECT_EQ(of_message.number<std::uint16_t>(), channel);

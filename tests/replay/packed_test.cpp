@@ -278,7 +278,7 @@ TEST(FolderAbove, TakesTheOnlyFileThatIsARecording) {
   std::filesystem::copy(room_drive() / "lidar.pcap", folder / "day/drive.pcap");
   const Replay replay({"--duration", "1", folder.path()});
   EXPECT_EQ(replay.run().status, 0) << replay.run().err;
-  EXPECT_TRUE(contains(replay.run().out, "the only recording in it is taken, ")) << replay.run().out;
+  EXPECT_TRUE(contains(replay.run().out, "the only recording in it is used, ")) << replay.run().out;
   put(folder / "day/other.bag", ros1_bag(messages_of(room_drive(), RosVersion::ros1)));
   const Replay of_two({folder.path()});
   EXPECT_EQ(of_two.run().status, 1);

@@ -132,7 +132,7 @@ TEST(EurocFolder, ImuAndTruthAreThoseBesideTheLidar) {
   EXPECT_LT(replay.summary()["ape_m"]["mean"], 0.03) << "ranges are off by 1 cm";
   const Replay above({mounted[0], mounted[1], folder.path()});
   EXPECT_EQ(read_text(above.file("odometry.tum")), read_text(replay.file("odometry.tum")));
-  EXPECT_TRUE(contains(above.run().out, "the only recording in it is taken, " + (folder / "mav0").string()))
+  EXPECT_TRUE(contains(above.run().out, "the only recording in it is used, " + (folder / "mav0").string()))
       << above.run().out;
   const Replay alone({mounted[0], mounted[1], folder / "mav0/lidar0"});
   EXPECT_EQ(read_text(alone.file("odometry.tum")), read_text(replay.file("odometry.tum"))) << "imu0 lies beside it";

@@ -68,8 +68,8 @@ TEST(Mounting, OfEachSensorAndSeedIsWrongInItsOwnDirection) {
       turns.emplace_back(so3_log(believed.rotation.conjugate() * truth.rotation).normalized());
     };
     for (const NamedLidar& lidar : wrong.sensors.lidars)
-      add(lidar.options.T_base_lidar, *lidar.T_base_believed);
-    add(wrong.sensors.imu->T_base_imu, *wrong.sensors.imu->T_base_believed);
+      add(lidar.options.T_base_lidar, *lidar.T_base_configured);
+    add(wrong.sensors.imu->T_base_imu, *wrong.sensors.imu->T_base_configured);
   }
   for (std::size_t i = 0; i < shifts.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {
@@ -105,7 +105,7 @@ Corner seen_of_corner(const NamedLidar& named) {
       continue;
     for (const LidarReturn& echo : test::returns_of(*packet)) {
       const Eigen::Vector3d point =
-          *named.T_base_believed * Eigen::Vector3f{echo.x_m, echo.y_m, echo.z_m}.cast<double>();
+          *named.T_base_configured * Eigen::Vector3f{echo.x_m, echo.y_m, echo.z_m}.cast<double>();
       const Eigen::Array3d off = (point - Eigen::Vector3d{kAhead_m, kAhead_m, -kBelow_m}).array().abs();
       if (off.x() < kNear_m && off.y() > kClear_m && off.z() > kClear_m)
         seen.ahead.push_back(point);
@@ -168,7 +168,7 @@ TEST(Mounting, OfAnImuThatStandsTiltsItsGravity) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const MountedImu mounted = *make_husky({.noise = false, .imperfections = {.mounting_deg = 2}}, seed).sensors.imu;
     SyntheticImu imu(trajectory, 200, mounted.faults, 1, mounted.T_base_imu);
-    const Eigen::Vector3d up_mps2 = mounted.T_base_believed->rotation * imu.next().specific_force_mps2;
+    const Eigen::Vector3d up_mps2 = mounted.T_base_configured->rotation * imu.next().specific_force_mps2;
     EXPECT_NEAR(up_mps2.norm(), kGravity_mps2, 1e-9);
     const double tilt_rad = std::asin(up_mps2.head<2>().norm() / kGravity_mps2);
     EXPECT_LT(tilt_rad, 2 * kRadPerDeg + 1e-9) << "about an axis that is not level it is less";
@@ -180,7 +180,7 @@ TEST(Mounting, OfAnImuThatStandsTiltsItsGravity) {
 TEST(Impairment, IsOfEveryRobot) {
   for (const NamedRobot& named : kRobots) {
     const Robot robot = named.make({.imperfections = {.mounting_mm = 30, .imu_late_ms = 5, .odometry_late_ms = 20}}, 1);
-    EXPECT_TRUE(robot.sensors.lidars.front().T_base_believed) << named.name;
+    EXPECT_TRUE(robot.sensors.lidars.front().T_base_configured) << named.name;
     EXPECT_TRUE(!robot.sensors.imu || robot.sensors.imu->faults.stamps.late == milliseconds{5}) << named.name;
     for (const NamedOdometry& odometry : robot.sensors.odometry)
       EXPECT_EQ(odometry.faults.stamps.late, milliseconds{20}) << named.name;

@@ -268,7 +268,7 @@ TEST(LidarView, PartsOfTheRobotStandStillInItAndLeaveNoTraceInTheMap) {
                               {.height_m = 0.03, .tilt_rad = 0.03, .wavelength_m = 1});
   const Pose T_base_lidar{from_rpy_rad({0, 0.1, 0.4}), {0.1, 0, 0.5}};
   const Sphere knob{{0.8, 0.3, 0.5}, 0.1};
-  SeenSpace seen(scene.bounds());
+  ObservedSpace seen(scene.bounds());
   SyntheticLidar lidar(scene, trajectory, {.T_base_lidar = T_base_lidar, .max_range_m = 5, .own_parts = {{knob, 40}}},
                        &seen);
   velodyne::Decoder decoder({.model = velodyne::Model::vlp16});

@@ -17,7 +17,7 @@
 #include "command_line.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/number_between.hpp"
-#include "locus_replay/say.hpp"
+#include "locus_replay/print_message.hpp"
 #include "piece.hpp"
 #include "soak.hpp"
 #include "verdict.hpp"
@@ -110,10 +110,10 @@ int main(int argc, char** argv) {
     const std::optional<soak::Arguments> arguments = soak::parse_arguments(argc, argv);
     return arguments ? soak::run(*arguments) : 0;
   } catch (const tools::Failure& failure) {
-    tools::say("soak", failure.what());
+    tools::print_message("soak", failure.what());
     return static_cast<int>(failure.status());
   } catch (const std::exception& error) { // out of memory, threads or disk
-    tools::say("soak", error.what());
+    tools::print_message("soak", error.what());
     return static_cast<int>(tools::ExitStatus::failed);
   }
 }

@@ -7,7 +7,7 @@
 
 #include "daemon/machine_time.hpp"
 #include "locus_replay/failure.hpp"
-#include "locus_replay/say.hpp"
+#include "locus_replay/print_message.hpp"
 #include "support/patience.hpp"
 
 namespace locus::soak {
@@ -46,7 +46,7 @@ void RestartingPipeline::begin(Stamp now) {
   };
   resumed_.store(false, std::memory_order_relaxed);
   state_saver_.emplace(state_file_, config_.motion_sources,
-                       [](const std::string& problem) { tools::say("soak", problem); });
+                       [](const std::string& problem) { tools::print_message("soak", problem); });
   disk_.emplace("disk", std::chrono::milliseconds{10}, [this](bool /*last*/) { state_saver_->write(); });
   pipeline_.emplace(config_, tools::value_or_fail(LidarRouter::open(config_.lidars), tools::ExitStatus::failed), input_,
                     std::move(options));

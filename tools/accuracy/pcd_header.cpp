@@ -28,7 +28,7 @@ class PcdHeaderLines {
   PcdHeader header;
 
   /// Parses one line; sets `ended` at the last of the header.
-  PcdProblem take(const std::string& line, bool& ended) {
+  PcdProblem read_line(const std::string& line, bool& ended) {
     std::vector<std::string> words = words_of(line);
     if (words.empty() || words[0].starts_with('#'))
       return std::nullopt;
@@ -41,7 +41,7 @@ class PcdHeaderLines {
     if (key == "VERSION" || key == "VIEWPOINT")
       return std::nullopt;
     if (key == "WIDTH" || key == "HEIGHT" || key == "POINTS")
-      return take_number(key, words);
+      return read_number(key, words);
     if (key == "FIELDS" || key == "SIZE" || key == "TYPE" || key == "COUNT") {
       lines_[key] = words;
       return std::nullopt;
@@ -50,7 +50,7 @@ class PcdHeaderLines {
   }
 
  private:
-  PcdProblem take_number(const std::string& key, const std::vector<std::string>& values) {
+  PcdProblem read_number(const std::string& key, const std::vector<std::string>& values) {
     std::uint64_t& number = key == "WIDTH" ? header.width : key == "HEIGHT" ? header.height : header.points;
     if (values.size() != 1 || !parse_pcd(values[0], number))
       return fmt::format("{} is no number; export it again", key);
@@ -123,7 +123,7 @@ Expected<PcdHeader, std::string> PcdHeader::read(std::istream& stream) {
       return std::string{"1: not a PCD file; export it as one"};
     if (!line)
       return fmt::format("{}: the header does not end; export it again", number);
-    if (PcdProblem problem = lines.take(*line, ended))
+    if (PcdProblem problem = lines.read_line(*line, ended))
       return fmt::format("{}: {}", number, *problem);
     lines.header.lines = number;
   }

@@ -59,7 +59,7 @@ class PlyHeader {
   LayoutBuilder builder;
 
   /// Parses a line; sets `ended` at the last of the header.
-  Problem take(const Words& words, bool& ended) {
+  Problem read_line(const Words& words, bool& ended) {
     if (words.empty() || words[0] == "comment" || words[0] == "obj_info" || words[0] == "ply")
       return std::nullopt;
     if (words[0] == "end_header") {
@@ -67,16 +67,16 @@ class PlyHeader {
       return builder.missing();
     }
     if (words.size() == 3 && words[0] == "format")
-      return take_format(words[1]);
+      return read_format(words[1]);
     if (words.size() == 3 && words[0] == "element")
-      return take_element(words);
+      return read_element(words);
     if (words.size() >= 3 && words[0] == "property")
-      return in_vertex_ ? take_property(words) : std::nullopt;
+      return in_vertex_ ? read_property(words) : std::nullopt;
     return "not a line of a PLY header; export the map again";
   }
 
  private:
-  Problem take_format(const std::string& name) {
+  Problem read_format(const std::string& name) {
     static const std::map<std::string, Encoding> kEncodings{{"ascii", Encoding::text},
                                                             {"binary_little_endian", Encoding::little_endian},
                                                             {"binary_big_endian", Encoding::big_endian}};
@@ -87,7 +87,7 @@ class PlyHeader {
     return std::nullopt;
   }
 
-  Problem take_element(const Words& words) {
+  Problem read_element(const Words& words) {
     in_vertex_ = words[1] == "vertex";
     if (in_vertex_ && elements_ > 0)
       return "the element vertex is not the first; export the points alone";
@@ -97,7 +97,7 @@ class PlyHeader {
     return std::nullopt;
   }
 
-  Problem take_property(const Words& words) {
+  Problem read_property(const Words& words) {
     static const std::map<std::string, std::pair<std::size_t, bool>> kTypes{
         {"char", {1, false}},  {"int8", {1, false}},   {"uchar", {1, false}},  {"uint8", {1, false}},
         {"short", {2, false}}, {"int16", {2, false}},  {"ushort", {2, false}}, {"uint16", {2, false}},
@@ -121,7 +121,7 @@ Expected<PointCloudLayout, std::string> read_ply_header(std::istream& stream) {
     const std::optional<std::string> line = read_short_line(stream);
     if (!line)
       return fmt::format("{}: the header does not end; export the map again", number);
-    if (Problem problem = header.take(words_of(*line), ended))
+    if (Problem problem = header.read_line(words_of(*line), ended))
       return fmt::format("{}: {}", number, *problem);
     if (ended)
       break;

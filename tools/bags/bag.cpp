@@ -56,7 +56,7 @@ std::optional<std::size_t> Bag::topic_of(std::int64_t number) const {
   return found != declared_.end() ? std::optional(found->second) : std::nullopt;
 }
 
-void Bag::tell_of_bounds(const std::string& file, std::vector<std::string>& lines) const {
+void Bag::add_bound_warnings(const std::string& file, std::vector<std::string>& lines) const {
   if (is_beyond_bounds_)
     lines.push_back(fmt::format("{}: topics beyond the {}th, or with a name or type of more than {} bytes, are left "
                                 "out; copy or record it again",

@@ -69,7 +69,7 @@ class Bag {
   [[nodiscard]] std::optional<std::size_t> topic_of(std::int64_t number) const;
 
   /// Adds one line for the user if topics were dropped.
-  void tell_of_bounds(const std::string& file, std::vector<std::string>& lines) const;
+  void add_bound_warnings(const std::string& file, std::vector<std::string>& lines) const;
 
  private:
   std::vector<BagTopic> topics_;

@@ -61,7 +61,7 @@ std::optional<McapFooter> McapBag::read_footer() {
   if (size_ < kMcapMagic.size() + end.size() || !read_at(size_ - end.size(), end))
     return std::nullopt;
   std::span<const std::byte> bytes(end);
-  const std::optional<McapRecord> record = take_mcap_record(bytes);
+  const std::optional<McapRecord> record = pop_mcap_record(bytes);
   const std::string_view magic(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   return record && magic == kMcapMagic ? McapFooter::read(*record) : std::nullopt;
 }
@@ -87,7 +87,7 @@ bool McapBag::read_topics_from_summary() {
 bool McapBag::accept_summary(std::span<const std::byte> summary) {
   std::vector<McapRecord> channels;
   std::optional<std::uint32_t> count;
-  while (const std::optional<McapRecord> record = take_mcap_record(summary)) {
+  while (const std::optional<McapRecord> record = pop_mcap_record(summary)) {
     MessageReader fields = record->fields();
     if (record->op == McapOp::schema)
       accept_schema(*record);
@@ -151,7 +151,7 @@ std::optional<McapRecord> McapBag::next_record() {
   if (next_ == messages_.size())
     return read_record();
   std::span<const std::byte> rest = records_.subspan(messages_[next_++]);
-  return take_mcap_record(rest);
+  return pop_mcap_record(rest);
 }
 
 /// Reads the next relevant record of the file.
@@ -222,7 +222,7 @@ void McapBag::open_chunk(const McapRecord& record) {
   next_ = 0;
   for (std::span<const std::byte> left = records_; !left.empty();) {
     const auto offset = static_cast<std::uint32_t>(records_.size() - left.size());
-    const std::optional<McapRecord> inner = take_mcap_record(left);
+    const std::optional<McapRecord> inner = pop_mcap_record(left);
     if (!inner || inner->op == McapOp::chunk) {
       leave_out("the records in it are damaged");
       break;
@@ -234,7 +234,7 @@ void McapBag::open_chunk(const McapRecord& record) {
   }
   std::ranges::stable_sort(messages_, {}, [&](std::uint32_t offset) {
     std::span<const std::byte> rest = records_.subspan(offset);
-    return log_time_ns(*take_mcap_record(rest));
+    return log_time_ns(*pop_mcap_record(rest));
   });
 }
 
@@ -279,7 +279,7 @@ std::vector<std::string> McapBag::warnings() const {
                                 name_, left_out_, first_left_out_));
   if (timeless_ > 0)
     lines.push_back(timeless_messages(name_, timeless_));
-  tell_of_bounds(name_, lines);
+  add_bound_warnings(name_, lines);
   return lines;
 }
 

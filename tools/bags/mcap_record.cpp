@@ -9,7 +9,7 @@
 
 namespace locus::tools {
 
-std::optional<McapRecord> take_mcap_record(std::span<const std::byte>& bytes) {
+std::optional<McapRecord> pop_mcap_record(std::span<const std::byte>& bytes) {
   MessageReader reader(bytes, Serialisation::ros1);
   const auto op = static_cast<McapOp>(reader.number<std::uint8_t>());
   const std::span<const std::byte> content = reader.bytes(reader.number<std::uint64_t>());

@@ -43,7 +43,7 @@ struct McapRecord {
 };
 
 /// Removes the first record from the bytes and returns it; nothing if they do not start with a complete one.
-std::optional<McapRecord> take_mcap_record(std::span<const std::byte>& bytes);
+std::optional<McapRecord> pop_mcap_record(std::span<const std::byte>& bytes);
 
 struct McapSchema {
   std::uint16_t id = 0;

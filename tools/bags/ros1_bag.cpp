@@ -64,7 +64,7 @@ bool Ros1Bag::read_topics_from_index() {
   go_to(index_);
   std::optional<BagRecord> record = next_record();
   for (; record && record->fields.op() == BagOp::connection; record = next_record())
-    take_connection(*record);
+    add_connection(*record);
   return break_.empty();
 }
 
@@ -81,10 +81,10 @@ void Ros1Bag::go_to(std::uint64_t place) {
 const BagMessage* Ros1Bag::next() {
   while (const std::optional<BagRecord> record = next_record()) {
     if (record->fields.op() == BagOp::chunk)
-      take_chunk(*record);
+      open_chunk(*record);
     else if (record->fields.op() == BagOp::connection)
-      take_connection(*record);
-    else if (record->fields.op() == BagOp::message && take_message(*record))
+      add_connection(*record);
+    else if (record->fields.op() == BagOp::message && accept_message(*record))
       return &message_;
   }
   return nullptr;
@@ -94,7 +94,7 @@ const BagMessage* Ros1Bag::next() {
 std::optional<BagRecord> Ros1Bag::next_record() {
   if (left_.empty())
     return at_ < size_ && break_.empty() ? read_record() : std::nullopt;
-  const std::optional<BagRecord> record = take_record(left_);
+  const std::optional<BagRecord> record = pop_record(left_);
   if (record && record->fields.op() != BagOp::chunk)
     return record;
   left_ = {};
@@ -136,21 +136,21 @@ bool Ros1Bag::skip_block() {
   return length && stream_.seekg(*length, std::ios::cur);
 }
 
-void Ros1Bag::take_chunk(const BagRecord& chunk) {
+void Ros1Bag::open_chunk(const BagRecord& chunk) {
   if (const std::optional<std::string> problem = decompress_chunk(chunk, chunk_))
     break_off(*problem);
   else
     left_ = chunk_;
 }
 
-void Ros1Bag::take_connection(const BagRecord& connection) {
+void Ros1Bag::add_connection(const BagRecord& connection) {
   if (const auto id = connection.fields.number<std::uint32_t>("conn"))
     declare(*id, {std::string(connection.fields.text("topic")), std::string(BagFields(connection.data).text("type")),
                   Serialisation::ros1});
 }
 
 /// Returns false for a message without a known connection.
-bool Ros1Bag::take_message(const BagRecord& message) {
+bool Ros1Bag::accept_message(const BagRecord& message) {
   struct Time {
     std::uint32_t seconds, nanoseconds;
   };
@@ -176,7 +176,7 @@ std::vector<std::string> Ros1Bag::warnings() const {
         fmt::format("{}: was not closed by its recorder and has no index; all {} bytes are used, but the end may be "
                     "missing; rosbag reindex makes it whole for other programs",
                     file_.string(), size_));
-  tell_of_bounds(file_.string(), lines);
+  add_bound_warnings(file_.string(), lines);
   return lines;
 }
 

@@ -35,9 +35,9 @@ class Ros1Bag : public Bag {
   bool skip_block();
   std::optional<BagRecord> next_record();
   std::optional<BagRecord> read_record();
-  void take_chunk(const BagRecord& chunk);
-  void take_connection(const BagRecord& connection);
-  bool take_message(const BagRecord& message);
+  void open_chunk(const BagRecord& chunk);
+  void add_connection(const BagRecord& connection);
+  bool accept_message(const BagRecord& message);
   void go_to(std::uint64_t place);
   void break_off(const std::string& why);
 

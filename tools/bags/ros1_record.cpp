@@ -12,7 +12,7 @@ namespace {
 using Bytes = std::span<const std::byte>;
 
 /// Removes a length-prefixed block and returns it.
-std::optional<Bytes> take_block(Bytes& bytes) {
+std::optional<Bytes> pop_block(Bytes& bytes) {
   std::uint32_t length = 0;
   if (bytes.size() < sizeof(length))
     return std::nullopt;
@@ -28,7 +28,7 @@ std::optional<Bytes> take_block(Bytes& bytes) {
 
 std::string_view BagFields::text(std::string_view name) const {
   Bytes left = bytes_;
-  while (const std::optional<Bytes> field = take_block(left)) {
+  while (const std::optional<Bytes> field = pop_block(left)) {
     const std::string_view text(reinterpret_cast<const char*>(field->data()), field->size());
     if (text.size() > name.size() && text.starts_with(name) && text[name.size()] == '=')
       return text.substr(name.size() + 1);
@@ -41,9 +41,9 @@ std::optional<BagOp> BagFields::op() const {
   return value ? std::optional(static_cast<BagOp>(*value)) : std::nullopt;
 }
 
-std::optional<BagRecord> take_record(Bytes& bytes) {
-  const std::optional<Bytes> header = take_block(bytes);
-  const std::optional<Bytes> data = header ? take_block(bytes) : std::nullopt;
+std::optional<BagRecord> pop_record(Bytes& bytes) {
+  const std::optional<Bytes> header = pop_block(bytes);
+  const std::optional<Bytes> data = header ? pop_block(bytes) : std::nullopt;
   if (!data || !BagFields(*header).op())
     return std::nullopt;
   return BagRecord{BagFields(*header), *data};

@@ -44,7 +44,7 @@ struct BagRecord {
 };
 
 /// Removes the first record from the bytes and returns it; nothing if they do not start with a complete one.
-std::optional<BagRecord> take_record(std::span<const std::byte>& bytes);
+std::optional<BagRecord> pop_record(std::span<const std::byte>& bytes);
 
 /// Decompresses the data of a chunk. Returns the problem, or nothing.
 std::optional<std::string> decompress_chunk(const BagRecord& chunk, std::vector<std::byte>& out);

@@ -218,7 +218,7 @@ std::vector<std::string> Ros2Bag::warnings() const {
     lines.push_back(fmt::format("{}: {} messages are compressed with zstd and damaged, and were left out; copy or "
                                 "record it again",
                                 name_, damaged_));
-  tell_of_bounds(name_, lines);
+  add_bound_warnings(name_, lines);
   return lines;
 }
 

@@ -145,7 +145,7 @@ std::vector<std::string> SqliteBag::warnings() const {
     lines.push_back(break_);
   if (timeless_ > 0)
     lines.push_back(timeless_messages(name_, timeless_));
-  tell_of_bounds(name_, lines);
+  add_bound_warnings(name_, lines);
   return lines;
 }
 

@@ -16,7 +16,7 @@ std::string bare(std::string_view frame) { return std::string{frame.substr(frame
 
 } // namespace
 
-void StaticTransforms::take(MessageReader reader) {
+void StaticTransforms::add(MessageReader reader) {
   constexpr std::size_t kMost = 1000;
   for (auto left = reader.number<std::uint32_t>(); left > 0 && reader.whole() && parents_.size() < kMost; --left) {
     if (reader.serialisation() == Serialisation::ros1)

@@ -18,7 +18,7 @@ inline constexpr std::string_view kStaticTopic = "/tf_static";
 class StaticTransforms {
  public:
   /// Adds all transforms of a tf2_msgs/TFMessage, except those that are not finite poses.
-  void take(MessageReader reader);
+  void add(MessageReader reader);
 
   /// Returns T_to_from; nothing if no chain of transforms connects the frames.
   [[nodiscard]] std::optional<Pose> between(std::string_view to, std::string_view from) const;

@@ -92,7 +92,7 @@ std::string_view description(FaultTarget::Kind target) {
 }
 
 /// Parses a finite number at the front of `text` and removes it.
-std::optional<double> take_number(std::string_view& text) {
+std::optional<double> pop_number(std::string_view& text) {
   double number = 0.0;
   const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error != std::errc{} || !std::isfinite(number)) {
@@ -103,7 +103,7 @@ std::optional<double> take_number(std::string_view& text) {
 }
 
 std::optional<double> parse_value(const KindTraits& traits, std::string_view text) {
-  const std::optional<double> value = take_number(text);
+  const std::optional<double> value = pop_number(text);
   const bool acceptable = value && text.empty() && *value > traits.min_value && *value <= traits.max_value;
   return acceptable ? value : std::nullopt;
 }
@@ -111,7 +111,7 @@ std::optional<double> parse_value(const KindTraits& traits, std::string_view tex
 /// Parses `T[-T1]` into the fault.
 bool parse_window(std::string_view text, Fault& fault) {
   constexpr double kMax_s = 1e9;
-  const std::optional<double> from = take_number(text);
+  const std::optional<double> from = pop_number(text);
   if (!from || *from < 0.0 || *from > kMax_s) {
     return false;
   }
@@ -123,7 +123,7 @@ bool parse_window(std::string_view text, Fault& fault) {
     return false;
   }
   text.remove_prefix(1);
-  const std::optional<double> until = take_number(text);
+  const std::optional<double> until = pop_number(text);
   if (!until || !text.empty() || *until <= *from || *until > kMax_s) {
     return false;
   }

@@ -34,9 +34,10 @@ std::vector<liblocus::Surface> surfaces_of(std::span<const SurfacePoint> points)
 
 Engine::Engine(Config config, LidarRouter lidars)
     : config_(std::move(config)), source_names_(names_of_sources(config_)), tally_(kTalliedSweeps),
-      pipeline_(config_, std::move(lidars), [this](const Sweep&, const daemon::ProcessedSweep& done) { take(done); }) {}
+      pipeline_(config_, std::move(lidars),
+                [this](const Sweep&, const daemon::ProcessedSweep& done) { add_result(done); }) {}
 
-void Engine::take(const daemon::ProcessedSweep& done) {
+void Engine::add_result(const daemon::ProcessedSweep& done) {
   tally_.add(done);
   completed_.push_back(estimate_of(done.estimate, source_names_));
 }

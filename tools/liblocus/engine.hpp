@@ -22,7 +22,7 @@ class Engine {
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
 
-  void take(const daemon::Input& input) { pipeline_.process(input); }
+  void process(const daemon::Input& input) { pipeline_.process(input); }
 
   /// Estimates not fetched yet, the oldest first.
   [[nodiscard]] std::deque<liblocus::Estimate>& completed() { return completed_; }
@@ -35,7 +35,7 @@ class Engine {
   [[nodiscard]] daemon::Figures figures() const;
 
  private:
-  void take(const daemon::ProcessedSweep& done);
+  void add_result(const daemon::ProcessedSweep& done);
 
   Config config_;
   std::vector<std::string> source_names_;

@@ -38,10 +38,10 @@ struct Odometry::Implementation {
       : engine(config, tools::value_or_fail(LidarRouter::open(config.lidars), tools::ExitStatus::wrong_usage)) {}
 
   /// Returns the estimates that an input completes.
-  std::vector<Estimate> take(const daemon::Input& input) {
+  std::vector<Estimate> process(const daemon::Input& input) {
     if (std::exchange(finished, finished || std::holds_alternative<daemon::EndOfInput>(input)))
       throw Error("an input after finish(); make another Odometry");
-    engine.take(input);
+    engine.process(input);
     std::vector<Estimate> estimates(std::make_move_iterator(engine.completed().begin()),
                                     std::make_move_iterator(engine.completed().end()));
     engine.completed().clear();
@@ -117,7 +117,7 @@ std::vector<Estimate> Odometry::packet(std::span<const std::byte> payload, std::
   datagram.receive_stamp = stamp_of("packet: arrival_ns", arrival_ns);
   datagram.destination_port = port;
   datagram.source_ip = source_ip;
-  return implementation_->take(datagram);
+  return implementation_->process(datagram);
 }
 
 std::vector<Estimate> Odometry::cloud(std::string_view lidar, const Cloud& cloud) {
@@ -126,8 +126,8 @@ std::vector<Estimate> Odometry::cloud(std::string_view lidar, const Cloud& cloud
   stamp_of("cloud: stamp_ns", cloud.stamp_ns);
   const Stamp arrival = stamp_of("cloud: arrival_ns", cloud.arrival_ns);
   if (library::points_of(cloud) > kMaxCloudPoints)
-    return implementation_->take(daemon::CloudInput{index, nullptr, arrival, CloudError::too_large});
-  return implementation_->take(daemon::CloudInput{index, &implementation_->cloud.make(cloud), arrival, {}});
+    return implementation_->process(daemon::CloudInput{index, nullptr, arrival, CloudError::too_large});
+  return implementation_->process(daemon::CloudInput{index, &implementation_->cloud.make(cloud), arrival, {}});
 }
 
 std::vector<Estimate> Odometry::imu(std::string_view source, const ImuSample& sample) {
@@ -140,12 +140,12 @@ std::vector<Estimate> Odometry::imu(std::string_view source, const ImuSample& sa
                           {}}};
   if (sample.orientation_xyzw)
     input.sample.attitude = rotation_of("imu", *sample.orientation_xyzw);
-  return implementation_->take(input);
+  return implementation_->process(input);
 }
 
 std::vector<Estimate> Odometry::odometry(std::string_view source, const OdometrySample& sample) {
   const SourceId id = implementation_->source("odometry", source, SourceKind::odometry);
-  return implementation_->take(
+  return implementation_->process(
       daemon::OdometryInput{id,
                             {stamp_of("odometry: stamp_ns", sample.stamp_ns),
                              stamp_of("odometry: arrival_ns", sample.arrival_ns),
@@ -153,7 +153,7 @@ std::vector<Estimate> Odometry::odometry(std::string_view source, const Odometry
                              sample.covariance_scale}});
 }
 
-std::vector<Estimate> Odometry::finish() { return implementation_->take(daemon::EndOfInput{}); }
+std::vector<Estimate> Odometry::finish() { return implementation_->process(daemon::EndOfInput{}); }
 
 std::vector<Surface> Odometry::scan() const { return implementation_->engine.scan(); }
 std::vector<Surface> Odometry::map() const { return implementation_->engine.map(); }

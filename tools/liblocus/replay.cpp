@@ -59,7 +59,7 @@ struct Replay::Implementation {
 
   void play_on() {
     const daemon::Input input = open.recording->next({});
-    engine.take(input);
+    engine.process(input);
     over = std::holds_alternative<daemon::EndOfInput>(input);
     if (!over)
       return;

@@ -88,7 +88,7 @@ std::vector<std::string> imus_among(std::vector<std::string> names, const path& 
   return names;
 }
 
-std::vector<std::string> heard_in(const ordered_json& summary) {
+std::vector<std::string> received_sources(const ordered_json& summary) {
   std::vector<std::string> names;
   for (const auto& [name, source] : summary.at("sources").items()) {
     if (source.at("received") > 0)
@@ -97,9 +97,9 @@ std::vector<std::string> heard_in(const ordered_json& summary) {
   return names;
 }
 
-std::string readable(const std::string& said, const std::string& name, const path& recording) {
+std::string readable(const std::string& message, const std::string& name, const path& recording) {
   constexpr std::string_view kProgram = "locus-replay: ";
-  std::string line = said.starts_with(kProgram) ? said.substr(kProgram.size()) : said;
+  std::string line = message.starts_with(kProgram) ? message.substr(kProgram.size()) : message;
   const std::string where = recording.string();
   for (std::size_t at = 0; (at = line.find(where, at)) != std::string::npos; at += name.size())
     line.replace(at, where.size(), name);
@@ -110,9 +110,9 @@ ordered_json recording_figures(const std::string& name, const path& folder, cons
   ordered_json figures{{"summary", read_json(folder / "summary.json")}};
   if (figures.at("summary").at("sweeps").at("seen") == 0)
     throw Failure(ExitStatus::failed, "it holds no whole turn of a lidar");
-  const std::vector<std::string> heard = heard_in(figures.at("summary"));
-  figures["sources"] = heard;
-  figures["imus"] = imus_among(heard, recording);
+  const std::vector<std::string> received = received_sources(figures.at("summary"));
+  figures["sources"] = received;
+  figures["imus"] = imus_among(received, recording);
   figures["receiver"] = receiver_speed(recording);
   const OdometryRows odometry = read_odometry(folder);
   figures["states"] = states_in(odometry.rows);

@@ -18,14 +18,14 @@ nlohmann::ordered_json recording_figures(const std::string& name, const std::fil
                                          const std::filesystem::path& recording);
 
 /// Returns the sources that a finished run received.
-std::vector<std::string> heard_in(const nlohmann::ordered_json& summary);
+std::vector<std::string> received_sources(const nlohmann::ordered_json& summary);
 
 /// Filters the names of sources of kind imu, by the configuration that locus-replay uses.
 std::vector<std::string> imus_among(std::vector<std::string> names, const std::filesystem::path& recording);
 
 /// Formats a message of locus-replay as a line for a page: about the recording, without the program name or local
 /// paths.
-std::string readable(const std::string& said, const std::string& name, const std::filesystem::path& recording);
+std::string readable(const std::string& message, const std::string& name, const std::filesystem::path& recording);
 
 /// Derives the motion reported by a run without truth: {"poses", "farthest_at_first_m", "farthest_m",
 /// "most_turned_deg", "speed_mps": {"median", "max"}}: distance from the first pose, within half a second and ever, and

@@ -38,11 +38,11 @@ std::vector<Course> drives_of(const Arguments& arguments) {
           drive("spot-plant", "urban", "spot")};
 }
 
-/// Returns a run with only `sources`: all others of `heard` are lost from the start.
-Run run_with(const Names& sources, const Names& heard, const std::string& course, const char* configuration) {
+/// Returns a run with only `sources`: all others of `received` are lost from the start.
+Run run_with(const Names& sources, const Names& received, const std::string& course, const char* configuration) {
   Run run{course, configuration, {}};
   run.shows_recording = true;
-  for (const std::string& source : heard) {
+  for (const std::string& source : received) {
     if (std::ranges::find(sources, source) == sources.end())
       run.options.insert(run.options.end(), {"--fail", source + ":lost@0"});
   }
@@ -52,12 +52,12 @@ Run run_with(const Names& sources, const Names& heard, const std::string& course
 /// Lists the further runs on a recording: with its IMU and with lidar alone, where these differ from the first.
 std::vector<Run> further_runs(const Results& row) {
   const std::string course = row.at("course");
-  const Names heard = row.value("sources", Names{}), inertial = row.value("imus", Names{});
+  const Names received = row.value("sources", Names{}), inertial = row.value("imus", Names{});
   std::vector<Run> runs;
-  if (!inertial.empty() && inertial.size() < heard.size())
-    runs.push_back(run_with(inertial, heard, course, "imu"));
-  if (!heard.empty())
-    runs.push_back(run_with({}, heard, course, "alone"));
+  if (!inertial.empty() && inertial.size() < received.size())
+    runs.push_back(run_with(inertial, received, course, "imu"));
+  if (!received.empty())
+    runs.push_back(run_with({}, received, course, "alone"));
   return runs;
 }
 

@@ -145,10 +145,10 @@ std::string failures(const Results& rows) {
 std::string warnings(const Results& results) {
   std::string text;
   for (const Results& recording : results.at("recordings")) {
-    std::set<std::string> said;
+    std::set<std::string> seen_lines;
     for (const Results& run : recording.at("runs")) {
       for (const Results& line : run.value("warnings", Results::array())) {
-        if (said.insert(line).second)
+        if (seen_lines.insert(line).second)
           text += fmt::format("- {}: {}\n", recording.at("recording").get<std::string>(), line.get<std::string>());
       }
     }

@@ -27,9 +27,9 @@ double driven_m(std::span<const StampedPose> truth) {
   return sum_m;
 }
 
-double share_told(std::span<const OdometryRow> rows) {
-  const auto told = std::ranges::count_if(rows, &OdometryRow::flagged);
-  return static_cast<double>(told) / std::max(1.0, static_cast<double>(rows.size()));
+double share_flagged(std::span<const OdometryRow> rows) {
+  const auto flagged = std::ranges::count_if(rows, &OdometryRow::flagged);
+  return static_cast<double>(flagged) / std::max(1.0, static_cast<double>(rows.size()));
 }
 
 ordered_json growth(const std::vector<OdometryRow>& rows, std::span<const StampedPose> estimates) {
@@ -79,7 +79,7 @@ ordered_json fault_figures(const Interval& interval, const std::filesystem::path
   const auto before = std::ranges::lower_bound(estimates, from, {}, &StampedPose::stamp) - estimates.begin();
   ordered_json figures{{"length_m", driven_m(truth)},
                        {"added_m", error_added_m(estimates, truth, interval)},
-                       {"told", share_told(std::span{rows}.subspan(static_cast<std::size_t>(before)))},
+                       {"told", share_flagged(std::span{rows}.subspan(static_cast<std::size_t>(before)))},
                        {"growth", growth(rows, estimates)},
                        {"sources", ordered_json::object()}};
   for (const CaptureFolder::Source& source : capture.odometry) {

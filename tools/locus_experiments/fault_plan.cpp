@@ -47,7 +47,7 @@ void add_without_faults(std::vector<FaultCase>& cases) {
 
 void add_losses(std::vector<FaultCase>& cases) {
   const auto add = [&](const char* configuration, const char* what, const char* course, const Options& lost) {
-    cases.push_back({configuration, what, course, lost, Lasting::second_half, Demand::unharmed_or_told, 0.2});
+    cases.push_back({configuration, what, course, lost, Lasting::second_half, Demand::unharmed_or_flagged, 0.2});
   };
   for (const auto& [course, limit_m] : {std::pair{"urban", 0.3}, std::pair{"tunnel", 0.05}})
     cases.push_back({"lidar_alone",

@@ -14,7 +14,7 @@ enum class Demand : std::uint8_t {
   accurate,            ///< mean error at most `limit` metres
   accurate_and_honest, ///< the same, and no position error above three standard deviations
   unharmed,            ///< mean error at most by the share `limit` larger than without the fault, plus a centimetre
-  unharmed_or_told,    ///< the same; or sweeps are flagged, and no position error is above three standard deviations
+  unharmed_or_flagged, ///< the same; or sweeps are flagged, and no position error is above three standard deviations
   carried,             ///< error added during the fault at most `limit` times that of the motion source alone
   resisted,            ///< error added during the fault, and to the mean error, at most `limit` metres
   no_worse_than_wheels ///< mean error at most that of the wheels; variance grows tenfold along the path, not across

@@ -25,7 +25,7 @@ std::vector<double> values_of(const Pairs& pairs, const Figure& figure) {
 double ape_m(const Results& run) { return run.at("summary").at("ape_m").at("mean"); }
 double difference_m(const Pair& pair) { return with_m(pair) - without_m(pair); }
 double added_m(const Pair& pair) { return pair.with->at("fault").at("added_m"); }
-double told(const Pair& pair) { return pair.with->at("fault").at("told"); }
+double share_flagged(const Pair& pair) { return pair.with->at("fault").at("told"); }
 
 std::string mm(double metres) { return fmt::format("{:.1f} mm", 1e3 * metres); }
 
@@ -37,7 +37,7 @@ Verdict accurate(const Pairs& pairs, double limit_m) {
 Verdict honest(const Pairs& pairs) {
   const double sigmas = largest(pairs, worst_sigma);
   return Verdict{fmt::format("<= {} sigma", kHonestSigmas),
-                 fmt::format("{:.0f} % flagged, {:.1f} sigma", 100 * median(pairs, told), sigmas),
+                 fmt::format("{:.0f} % flagged, {:.1f} sigma", 100 * median(pairs, share_flagged), sigmas),
                  {}}
       .expect(sigmas <= kHonestSigmas, "farther off than its covariance says");
 }
@@ -57,9 +57,10 @@ Verdict unharmed(const Pairs& pairs, double limit) {
       .expect(more_m <= allowed_m, "more error than allowed");
 }
 
-Verdict unharmed_or_told(const Pairs& pairs, double limit) {
+Verdict unharmed_or_flagged(const Pairs& pairs, double limit) {
   const Verdict error = unharmed(pairs, limit);
-  Verdict either = both(error, honest(pairs).expect(median(pairs, told) > 0, "not flagged"), ", or flagged and ");
+  Verdict either =
+      both(error, honest(pairs).expect(median(pairs, share_flagged) > 0, "not flagged"), ", or flagged and ");
   if (error.broken.empty() || either.broken.size() == error.broken.size())
     either.broken.clear();
   return either;
@@ -144,8 +145,8 @@ Verdict judge(Demand demand, double limit, const std::string& kind_of_course, co
     return both(accurate(pairs, limit), honest(pairs), "; ");
   case Demand::unharmed:
     return unharmed(pairs, limit);
-  case Demand::unharmed_or_told:
-    return unharmed_or_told(pairs, limit);
+  case Demand::unharmed_or_flagged:
+    return unharmed_or_flagged(pairs, limit);
   case Demand::carried:
     return carried(pairs, limit, source);
   case Demand::resisted:

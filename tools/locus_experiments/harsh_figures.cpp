@@ -72,7 +72,7 @@ std::string without_numbers(std::string_view line) {
 }
 
 /// Lists the warnings in the log and the received sources that were taken out of use.
-std::vector<std::string> said(const std::filesystem::path& log, const ordered_json& summary) {
+std::vector<std::string> messages_of(const std::filesystem::path& log, const ordered_json& summary) {
   constexpr std::string_view kWarning = "locus-replay: warning: ";
   std::set<std::string> lines;
   std::ifstream stream{log};
@@ -112,7 +112,7 @@ ordered_json harsh_figures(const std::filesystem::path& run_folder, const Captur
         fmt::format("{}: has no estimate within the time of the truth; run again", run_folder.string()));
   ordered_json figures{{"standing", stands_at_first(pairs)}, {"true_mps", largest_speed_mps(pairs)}};
   figures.update(loss_figures(pairs, rows, mounting_rad));
-  figures["said"] = said(run_folder / "log", summary);
+  figures["said"] = messages_of(run_folder / "log", summary);
   return figures;
 }
 

@@ -70,16 +70,16 @@ void add_losses(const Drives& drives, Results& row) {
   row["flagged_after_s"] = flagged > 0 ? Results(after_s) : Results(nullptr);
 }
 
-Results said_in(const Drives& drives) {
+Results messages_in(const Drives& drives) {
   std::map<std::string, int> counts;
   for (const Results* drive : drives) {
     for (const Results& line : drive->at("harsh").at("said"))
       ++counts[line.get<std::string>()];
   }
-  Results said = Results::array();
+  Results messages = Results::array();
   for (const auto& [text, count] : counts)
-    said.push_back({{"text", text}, {"drives", count}});
-  return said;
+    messages.push_back({{"text", text}, {"drives", count}});
+  return messages;
 }
 
 std::vector<std::string> broken_in(const Results& row, bool accuracy_is_asked) {
@@ -150,17 +150,17 @@ std::optional<Results> row_of(const HarshCase& harsh_case, Sensors sensors, cons
   row["claimed_mps"] = largest(drives, [](const Results& run) { return run.at("summary").at("largest_speed_mps"); });
   row["true_mps"] = largest(drives, harsh("true_mps"));
   add_losses(drives, row);
-  row["said"] = said_in(drives);
+  row["said"] = messages_in(drives);
   const bool tells_nothing_along = harsh_case.bare && sensors != Sensors::all;
   row["broken"] = broken_in(row, !tells_nothing_along);
   row["holds"] = row["broken"].empty();
   return row;
 }
 
-std::string said_in_words(const Results& said) {
+std::string messages_in_words(const Results& messages) {
   constexpr std::size_t kLongest = 90;
   std::vector<std::string> texts;
-  for (const Results& line : said) {
+  for (const Results& line : messages) {
     auto text = line.at("text").get<std::string>();
     if (text.size() > kLongest)
       text = text.substr(0, text.rfind(' ', kLongest)) + " ...";
@@ -191,7 +191,7 @@ std::string harsh_line(const Results& row) {
                      in_mm(row.at("worst_m")), row.at("worst_sigma").get<double>(),
                      nees.is_number() ? fmt::format("{:.1f}", nees.get<double>()) : "",
                      row.at("claimed_mps").get<double>(), row.at("true_mps").get<double>(), lost_in_words(row), holds,
-                     said_in_words(row.at("said")));
+                     messages_in_words(row.at("said")));
 }
 
 } // namespace

@@ -254,10 +254,10 @@ std::string last_line_of(const path& file) {
 std::optional<std::string> problem_of(int status, const path& log) {
   if (status == 0)
     return std::nullopt;
-  const std::string said = last_line_of(log);
+  const std::string message = last_line_of(log);
   if (status > 128)
     return fmt::format("ended by signal {}", status - 128);
-  return said.empty() ? "failed without an error message" : said;
+  return message.empty() ? "failed without an error message" : message;
 }
 
 std::optional<std::string> problem_of(const Course& course, const Places& places) {

@@ -70,14 +70,14 @@ class LineFeatures {
     std::ranges::sort(by_curvature, {}, [this](std::size_t i) { return curvature_[i]; });
     std::size_t edges = 0, planes = 0;
     for (auto i = by_curvature.rbegin(); i != by_curvature.rend() && edges < kEdges && is_edge(*i); ++i)
-      edges += take(*i, chosen);
+      edges += select(*i, chosen);
     for (auto i = by_curvature.begin(); i != by_curvature.end() && planes < kPlanes && !is_edge(*i); ++i)
-      planes += take(*i, chosen);
+      planes += select(*i, chosen);
   }
 
   [[nodiscard]] bool is_edge(std::size_t i) const { return curvature_[i] > kEdgeCurvature; }
 
-  std::size_t take(std::size_t i, std::vector<SweepPoint>& chosen) {
+  std::size_t select(std::size_t i, std::vector<SweepPoint>& chosen) {
     if (ruled_out_[i])
       return 0;
     chosen.push_back(line_[i]);

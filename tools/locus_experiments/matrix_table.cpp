@@ -37,7 +37,7 @@ std::string in_words(const Results& value) { return value.is_string() ? value.ge
 
 /// Lists, in words, differing counters of an input and its verdict, without those that only follow from others.
 std::vector<std::string> differences(const std::string& input, const Pair& pair) {
-  constexpr std::array kOfNoNews{"processed", "used_sweeps", "seen"};
+  constexpr std::array kIgnored{"processed", "used_sweeps", "seen"};
   std::vector<std::string> found;
   for (const Account& account : accounts_of(input)) {
     const Results with = pair.with->at("summary").at(account.pointer).flatten();
@@ -46,7 +46,7 @@ std::vector<std::string> differences(const std::string& input, const Pair& pair)
       std::string name = key.substr(1);
       std::ranges::replace(name, '/', '.');
       const Results before = without.value(key, Results(0));
-      if (now != before && std::ranges::count(kOfNoNews, name) == 0)
+      if (now != before && std::ranges::count(kIgnored, name) == 0)
         found.push_back(fmt::format("{}{} {}", account.name, name, in_words(now)) +
                         (before == 0 ? "" : fmt::format(" of {}", in_words(before))));
     }
@@ -92,11 +92,11 @@ Results driven(const MatrixCell& cell, const Pair& pair) {
 /// Judges a cell whose run was refused, or ended unexpectedly.
 Results ended(const MatrixCell& cell, const Results& run) {
   const bool refused = run.contains("refused");
-  const std::string said = run.value(refused ? "refused" : "failed", "");
-  const auto broken = refused ? Results::array() : Results::array({"does not end with 0: " + said});
+  const std::string message = run.value(refused ? "refused" : "failed", "");
+  const auto broken = refused ? Results::array() : Results::array({"does not end with 0: " + message});
   return {{"asked", cell.refusal.empty() ? "" : "status 1"},
           {"found", refused ? "status 1" : ""},
-          {"shown", Results::array({cell.refusal.empty() ? said : cell.refusal})},
+          {"shown", Results::array({cell.refusal.empty() ? message : cell.refusal})},
           {"broken", broken}};
 }
 

@@ -53,9 +53,9 @@ Sources sources_in(const Results& row, const std::filesystem::path& recording) {
   const Results& summary = row.at("summary");
   for (const auto& lidar : summary.at("lidars").items())
     sources.lidars.push_back(lidar.key());
-  const Names heard = heard_in(summary);
-  sources.imus = imus_among(heard, recording);
-  std::ranges::copy_if(heard, std::back_inserter(sources.odometry), [&](const std::string& name) {
+  const Names received = received_sources(summary);
+  sources.imus = imus_among(received, recording);
+  std::ranges::copy_if(received, std::back_inserter(sources.odometry), [&](const std::string& name) {
     return std::ranges::find(sources.imus, name) == sources.imus.end();
   });
   return sources;

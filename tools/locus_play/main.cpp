@@ -27,15 +27,15 @@
 #include "locus_replay/failure.hpp"
 #include "locus_replay/motion_recordings.hpp"
 #include "locus_replay/ouster_metadata.hpp"
+#include "locus_replay/print_message.hpp"
 #include "locus_replay/progress_bar.hpp"
 #include "locus_replay/recording.hpp"
-#include "locus_replay/say.hpp"
 #include "unpacking/unpacking_stream.hpp"
 
 namespace locus::tools {
 namespace {
 
-void warn(const std::string& line) { say("locus-play", "warning: " + line); }
+void warn(const std::string& line) { print_message("locus-play", "warning: " + line); }
 
 Config config_or_fail(Expected<Config, ConfigErrors> config) {
   if (!config)

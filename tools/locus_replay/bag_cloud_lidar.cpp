@@ -51,7 +51,7 @@ Clouds look_into(Bag& bag) {
       break;
     const BagTopic& topic = bag.topics()[message->topic];
     if (topic.type == kTransformsType && topic.name == kStaticTopic) {
-      clouds.transforms.take({message->data, topic.serialisation});
+      clouds.transforms.add({message->data, topic.serialisation});
       waits_for_transforms = false;
     }
     if (!is_cloud_type(topic.type))
@@ -67,21 +67,21 @@ Clouds look_into(Bag& bag) {
   return clouds;
 }
 
-std::string other_topics(const Bag& bag, const Clouds& clouds, std::size_t taken) {
+std::string other_topics(const Bag& bag, const Clouds& clouds, std::size_t used) {
   std::vector<std::string> others;
   for (const auto& [topic, unused] : clouds.topics) {
-    if (topic != taken)
+    if (topic != used)
       others.push_back(bag.topics()[topic].name);
   }
   return others.empty() ? ""
-                        : fmt::format(", not {}, for it has most points; another is taken with --set "
+                        : fmt::format(", not {}, for it has most points; another is selected with --set "
                                       "lidars.0.topic={}",
                                       fmt::join(others, ", "), others.front());
 }
 
 } // namespace
 
-void take_clouds_of(const std::filesystem::path& bag_file, Config& config, std::vector<std::string>& lines) {
+void configure_clouds_of(const std::filesystem::path& bag_file, Config& config, std::vector<std::string>& lines) {
   const std::unique_ptr<Bag> bag = value_or_fail(open_bag(bag_file), ExitStatus::failed);
   const auto is_readable = [&](const BagTopic& topic) {
     return are_lidar_packets(topic) && (!is_ouster_type(topic.type) || has_metadata(bag_file));
@@ -98,7 +98,7 @@ void take_clouds_of(const std::filesystem::path& bag_file, Config& config, std::
   if (!lidar.topic.starts_with('/'))
     lidar.topic.insert(0, 1, '/');
   const bool has_packets = std::ranges::any_of(bag->topics(), are_lidar_packets);
-  lines.push_back(fmt::format("{}: {}, so the clouds on {} are taken{}", bag_file.string(),
+  lines.push_back(fmt::format("{}: {}, so the clouds on {} are used{}", bag_file.string(),
                               has_packets ? "no metadata for the packets of its Ouster" : "no packets", lidar.topic,
                               other_topics(*bag, clouds, topic)));
   const std::string& base = config.dds.frame_base;

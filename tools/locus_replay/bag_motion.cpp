@@ -26,7 +26,7 @@ class MotionTopic {
 
   [[nodiscard]] std::size_t topic() const { return topic_; }
 
-  void take(const BagMessage& message, MessageReader reader) {
+  void add(const BagMessage& message, MessageReader reader) {
     if (name_.type == kImuType)
       keep(
           read_imu(reader), imu_, [&](const auto& imu) { return daemon::to_sample(imu, message.recorded); }, message);
@@ -93,7 +93,7 @@ std::vector<MotionRecording> read_bag_motion(Bag& bag, const std::filesystem::pa
   while (const BagMessage* message = motion.empty() ? nullptr : bag.next()) {
     const auto found = std::ranges::find(motion, message->topic, &MotionTopic::topic);
     if (found != motion.end())
-      found->take(*message, {message->data, bag.topics()[message->topic].serialisation});
+      found->add(*message, {message->data, bag.topics()[message->topic].serialisation});
   }
   bag.rewind();
   std::vector<MotionRecording> recordings;

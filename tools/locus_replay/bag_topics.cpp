@@ -240,27 +240,27 @@ void deal_sources(const Bag& bag, const std::string& bag_name, const Config& con
 }
 
 std::string describe(const Bag& bag, const std::string& bag_name, const Config& config, const BagTopics& chosen) {
-  std::vector<std::string> taken, left_out;
-  std::vector<bool> is_taken(bag.topics().size());
-  const auto take = [&](const std::string& name, const Index& topic) {
+  std::vector<std::string> used, left_out;
+  std::vector<bool> is_used(bag.topics().size());
+  const auto add_used = [&](const std::string& name, const Index& topic) {
     if (!topic)
       return;
-    is_taken[*topic] = true;
-    taken.push_back(fmt::format("{} is {}", bag.topics()[*topic].name, name));
+    is_used[*topic] = true;
+    used.push_back(fmt::format("{} is {}", bag.topics()[*topic].name, name));
   };
   for (std::size_t i = 0; i < chosen.of_lidar.size(); ++i)
-    take("lidar " + config.lidars[i].name, chosen.of_lidar[i]);
+    add_used("lidar " + config.lidars[i].name, chosen.of_lidar[i]);
   for (std::size_t i = 0; i < chosen.of_imu.size(); ++i)
-    take(config.lidars[i].name + "_imu", chosen.of_imu[i]);
+    add_used(config.lidars[i].name + "_imu", chosen.of_imu[i]);
   for (std::size_t i = 0; i < chosen.of_source.size(); ++i)
-    take(config.motion_sources[i].name, chosen.of_source[i]);
+    add_used(config.motion_sources[i].name, chosen.of_source[i]);
   for (std::size_t i = 0; i < bag.topics().size(); ++i) {
     const BagTopic& topic = bag.topics()[i];
-    if (!is_taken[i] && (packet_type(topic.type) != nullptr || is_cloud_type(topic.type) || topic.type == kImuType ||
-                         topic.type == kOdometryType))
+    if (!is_used[i] && (packet_type(topic.type) != nullptr || is_cloud_type(topic.type) || topic.type == kImuType ||
+                        topic.type == kOdometryType))
       left_out.push_back(topic.name);
   }
-  return fmt::format("{}: {}{}{}", bag_name, fmt::join(taken, ", "),
+  return fmt::format("{}: {}{}{}", bag_name, fmt::join(used, ", "),
                      left_out.empty() ? "" : "; left out: ", fmt::join(left_out, ", "));
 }
 
@@ -277,7 +277,7 @@ BagTopics BagTopics::choose(const Bag& bag, const std::string& bag_name, const C
   chosen.of_source.resize(config.motion_sources.size());
   for (const SourceKind kind : {SourceKind::imu, SourceKind::odometry})
     deal_sources(bag, bag_name, config, has_file, kind, chosen);
-  chosen.taken = describe(bag, bag_name, config, chosen);
+  chosen.used = describe(bag, bag_name, config, chosen);
   return chosen;
 }
 

@@ -29,7 +29,7 @@ struct BagTopics {
   std::vector<std::optional<std::size_t>> of_lidar;  ///< by configuration index
   std::vector<std::optional<std::size_t>> of_imu;    ///< IMU packets of the lidars, by configuration index
   std::vector<std::optional<std::size_t>> of_source; ///< by configuration index
-  std::string taken;                                 ///< assignments that were guessed, in one line for the user
+  std::string used;                                  ///< assignments that were guessed, in one line for the user
   std::vector<std::string> doubts; ///< a line for each lidar and motion source that a remaining topic may belong to
 
   /// Assigns the topics. `has_file`: motion sources that need none. Throws Failure if there is no topic for any lidar.

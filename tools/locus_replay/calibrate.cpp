@@ -100,15 +100,15 @@ std::optional<double> misfit(const std::vector<Rates::Gyro>& gyro, const std::ve
   if (both.size() < kFewest)
     return std::nullopt;
   Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero(), mean_estimated = Eigen::Vector3d::Zero();
-  for (const auto& [said, seen] : both) {
-    mean_gyro += said / static_cast<double>(both.size());
-    mean_estimated += seen / static_cast<double>(both.size());
+  for (const auto& [gyro_radps, estimated_radps] : both) {
+    mean_gyro += gyro_radps / static_cast<double>(both.size());
+    mean_estimated += estimated_radps / static_cast<double>(both.size());
   }
   Eigen::Matrix3d correlation = Eigen::Matrix3d::Zero();
   double variance = 0.0;
-  for (const auto& [said, seen] : both) {
-    correlation += (said - mean_gyro) * (seen - mean_estimated).transpose();
-    variance += (said - mean_gyro).squaredNorm() + (seen - mean_estimated).squaredNorm();
+  for (const auto& [gyro_radps, estimated_radps] : both) {
+    correlation += (gyro_radps - mean_gyro) * (estimated_radps - mean_estimated).transpose();
+    variance += (gyro_radps - mean_gyro).squaredNorm() + (estimated_radps - mean_estimated).squaredNorm();
   }
   const Eigen::Matrix3d squared = correlation.transpose() * correlation; // eigenvalues: squared singular values
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> singular(squared, Eigen::EigenvaluesOnly);

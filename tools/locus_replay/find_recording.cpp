@@ -83,7 +83,7 @@ FoundRecording find_recording(const std::filesystem::path& named) {
   if (inside.empty())
     return {named, value_or_fail(CaptureFolder::find(named), ExitStatus::failed), ""};
   return {inside.front(), files_of(inside.front()).value(),
-          fmt::format("{}: the only recording in it is taken, {}", named.string(), inside.front().string())};
+          fmt::format("{}: the only recording in it is used, {}", named.string(), inside.front().string())};
 }
 
 void check_output(const std::filesystem::path& folder) {

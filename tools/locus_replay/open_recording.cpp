@@ -22,8 +22,8 @@ ChosenRecording choose_recording(Arguments& arguments) {
   FoundMetadata metadata;
   chosen.config = configuration_for(found, config_file, arguments, chosen.lines, metadata);
   chosen.config_is_users_own = !config_file.empty();
-  if (!metadata.taken.empty())
-    chosen.lines.push_back(metadata.taken);
+  if (!metadata.used.empty())
+    chosen.lines.push_back(metadata.used);
   chosen.warnings = std::move(metadata.warnings);
   if (const auto changed = arguments.config.empty() ? found.files.changed_config() : std::nullopt)
     chosen.warnings.push_back(*changed);
@@ -36,8 +36,8 @@ OpenRecording open_recording(const Arguments& arguments, ChosenRecording& chosen
   check_faults(arguments.faults, config);
   LidarRouter lidars = value_or_fail(LidarRouter::open(config.lidars), ExitStatus::wrong_usage);
   RecordedInput input = open_input(arguments, chosen.files, config, chosen.config_is_users_own, chosen.warnings);
-  if (!input.taken.empty())
-    chosen.lines.push_back(input.taken);
+  if (!input.used.empty())
+    chosen.lines.push_back(input.used);
   const PlayOptions options{arguments.start, arguments.duration, arguments.faults, config.sweep.seed,
                             std::move(earlier)};
   auto recording =

@@ -173,10 +173,10 @@ FoundMetadata find_metadata(const CaptureFolder& folder, Config& config) {
   lidar.metadata_text = chosen->text;
   lidar.port = port;
   const ouster::Metadata& metadata = chosen->decoder->metadata();
-  found.taken = fmt::format("{}: the metadata of lidar {}, {} with serial number {}", lidar.metadata, lidar.name,
-                            ouster::name_of(metadata), metadata.serial_number);
+  found.used = fmt::format("{}: the metadata of lidar {}, {} with serial number {}", lidar.metadata, lidar.name,
+                           ouster::name_of(metadata), metadata.serial_number);
   if (!is_bag)
-    found.taken += fmt::format("; its packets go to port {}", lidar.port);
+    found.used += fmt::format("; its packets go to port {}", lidar.port);
   return found;
 }
 
@@ -184,7 +184,7 @@ bool has_metadata(const path& bag) {
   CaptureFolder folder;
   folder.lidar = {bag};
   Config config;
-  return !find_metadata(folder, config).taken.empty();
+  return !find_metadata(folder, config).used.empty();
 }
 
 void use_recorded_metadata(const CaptureFolder& folder, Config& config) {

@@ -12,7 +12,7 @@ namespace locus::tools {
 
 /// Result of the search for metadata.
 struct FoundMetadata {
-  std::string taken;                 ///< origin of the metadata in use, for the user; empty if none
+  std::string used;                  ///< origin of the metadata in use, for the user; empty if none
   std::vector<std::string> warnings; ///< a line each
 };
 

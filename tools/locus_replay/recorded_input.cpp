@@ -41,7 +41,7 @@ RecordedInput open_bag_input(const Arguments& arguments, const std::filesystem::
       warnings.push_back(fmt::format("{}: motion source {}: never heard from, nothing of its kind in the bag",
                                      file.string(), config.motion_sources[i].name));
   }
-  return {std::make_unique<BagPackets>(std::move(bag), file, config, topics), std::move(motion), topics.taken, {}};
+  return {std::make_unique<BagPackets>(std::move(bag), file, config, topics), std::move(motion), topics.used, {}};
 }
 
 RecordedInput open_drive_input(const Arguments& arguments, const std::filesystem::path& folder, const Config& config,
@@ -62,16 +62,15 @@ RecordedInput open_drive_input(const Arguments& arguments, const std::filesystem
   const std::vector<MotionSource>& sources = config.motion_sources;
   const auto imu = std::ranges::find(sources, SourceKind::imu, &MotionSourceOptions::kind);
   const SourceId source{static_cast<std::size_t>(imu - sources.begin())};
-  const bool takes_oxts = !drive.imu.empty() && imu != sources.end() &&
-                          std::ranges::find(input.motion, source, &MotionRecording::source) == input.motion.end();
-  if (takes_oxts)
+  const bool uses_oxts = !drive.imu.empty() && imu != sources.end() &&
+                         std::ranges::find(input.motion, source, &MotionRecording::source) == input.motion.end();
+  if (uses_oxts)
     input.motion.push_back({source, folder / "oxts", MotionSamples<ImuSample>(std::move(drive.imu))});
   const double raised_deg = raised_by_deg(arguments).value_or(0);
-  input.taken =
-      fmt::format("{}: velodyne_points is lidar {}{}{}; {}", folder.string(), config.lidars.front().name,
-                  takes_oxts ? ", oxts is " + imu->name : "", input.truth.empty() ? "" : ", oxts is the truth",
-                  raised_deg > 0 ? fmt::format("{} degrees are added to its vertical angles", raised_deg)
-                                 : "its vertical angles are as published");
+  input.used = fmt::format("{}: velodyne_points is lidar {}{}{}; {}", folder.string(), config.lidars.front().name,
+                           uses_oxts ? ", oxts is " + imu->name : "", input.truth.empty() ? "" : ", oxts is the truth",
+                           raised_deg > 0 ? fmt::format("{} degrees are added to its vertical angles", raised_deg)
+                                          : "its vertical angles are as published");
   input.lidars = std::make_unique<KittiPackets>(std::move(drive.sweeps), config.lidars.front(), raised_deg);
   return input;
 }
@@ -87,16 +86,16 @@ RecordedInput open_sweeps_input(const Arguments& arguments, const CaptureFolder&
     input.truth.push_back(
         {pose.stamp, sweeps.is_kitti ? pose.T_source_base * lidar.T_base_lidar.inverse() : pose.T_source_base});
   const double raised_deg = raised_by_deg(arguments).value_or(0);
-  input.taken =
+  input.used =
       fmt::format("{}: {} is lidar {}", arguments.capture.string(), sweeps.folder.filename().string(), lidar.name);
   for (const MotionRecording& motion : input.motion)
-    input.taken += fmt::format(", {} is {}", motion.file.string(), config.motion_sources[index_of(motion.source)].name);
+    input.used += fmt::format(", {} is {}", motion.file.string(), config.motion_sources[index_of(motion.source)].name);
   if (!input.truth.empty())
-    input.taken += sweeps.is_kitti ? ", the poses of KITTI are the truth" : ", the estimated states are the truth";
+    input.used += sweeps.is_kitti ? ", the poses of KITTI are the truth" : ", the estimated states are the truth";
   if (lidar.point_times == PointTimesFrom::none)
-    input.taken += "; the points of a sweep are taken as of one instant";
+    input.used += "; the points of a sweep are treated as of one instant";
   if (raised_deg > 0)
-    input.taken += fmt::format("; {} degrees are added to their vertical angles", raised_deg);
+    input.used += fmt::format("; {} degrees are added to their vertical angles", raised_deg);
   input.lidars = std::make_unique<SweepClouds>(std::move(sweeps), raised_deg);
   return input;
 }
@@ -145,15 +144,15 @@ RecordedInput open_input(const Arguments& arguments, const CaptureFolder& folder
   auto capture = std::make_unique<CaptureSequence>(
       value_or_fail(CaptureSequence::open(folder.lidar, open_capture), ExitStatus::failed));
   const bool has_parts = folder.lidar.size() > 1 && folder.lidar.front() == arguments.capture;
-  std::string taken = has_parts ? fmt::format("{}: and the parts behind it, up to {}", arguments.capture.string(),
-                                              folder.lidar.back().filename().string())
-                                : "";
+  std::string used = has_parts ? fmt::format("{}: and the parts behind it, up to {}", arguments.capture.string(),
+                                             folder.lidar.back().filename().string())
+                               : "";
   if (const auto part = folder.lidar.size() == 1 ? part_beside(arguments.capture) : std::nullopt)
     warnings.push_back(fmt::format("{}: is replayed alone, without {}; if both are parts of one capture, join all of "
                                    "them: mergecap -w WHOLE.pcap PART...",
                                    arguments.capture.string(), part->filename().string()));
   return {
-      std::move(capture), read_motion(arguments, folder, config, config_is_users_own, warnings), std::move(taken), {}};
+      std::move(capture), read_motion(arguments, folder, config, config_is_users_own, warnings), std::move(used), {}};
 }
 
 } // namespace locus::tools

@@ -18,7 +18,7 @@ namespace locus::tools {
 struct RecordedInput {
   std::unique_ptr<DatagramSource> lidars;
   std::vector<MotionRecording> motion;
-  std::string taken;              ///< choices made, in one line for the user; empty if there were none
+  std::string used;               ///< choices made, in one line for the user; empty if there were none
   std::vector<StampedPose> truth; ///< true poses of the base, for a drive or a folder of sweeps
 };
 

@@ -75,7 +75,7 @@ Recording::Recording(std::unique_ptr<DatagramSource> source, std::vector<MotionR
         {std::move(recording), has_faults, index < options.earlier.size() ? options.earlier[index] : Duration{}});
     MotionCursor& cursor = motion_.back();
     while (cursor.arrival() < begin_ - kMotionAhead)
-      cursor.take();
+      cursor.pop();
   }
 }
 
@@ -97,7 +97,7 @@ std::optional<TimeSpan> Recording::MotionCursor::arrivals() const {
   return std::visit([](const auto& samples) { return samples.arrivals(); }, recording.samples);
 }
 
-Input Recording::MotionCursor::take() {
+Input Recording::MotionCursor::pop() {
   const auto input_of = [&](auto sample) -> Input {
     sample.arrival = arrival();
     sample.stamp -= earlier;
@@ -120,7 +120,7 @@ Input Recording::next(Duration) {
     pending_ = fetch();
   const auto earliest = std::ranges::min_element(motion_, {}, &MotionCursor::arrival);
   if (earliest != motion_.end() && earliest->arrival() <= pending_->arrival)
-    return earliest->take();
+    return earliest->pop();
   Input input = pending_->input;
   pending_.reset();
   return input;

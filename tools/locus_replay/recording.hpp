@@ -88,7 +88,7 @@ class Recording : public daemon::InputSource {
 
     [[nodiscard]] Stamp arrival() const; ///< arrival of the next sample; Stamp::max() after the last
     [[nodiscard]] std::optional<TimeSpan> arrivals() const;
-    daemon::Input take();
+    daemon::Input pop();
   };
 
   const Datagram* read();

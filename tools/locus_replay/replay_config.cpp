@@ -52,7 +52,7 @@ Config configuration_of(const CaptureFolder& folder, const std::filesystem::path
                         std::vector<std::string>& lines) {
   Config config;
   if (looks_like_bag(capture))
-    take_clouds_of(capture, config, lines);
+    configure_clouds_of(capture, config, lines);
   if (KittiDrive::is(capture) || SweepFolder::is_kitti_odometry(capture))
     config.odometry.motion.max_speed_mps = kFastestCar_mps;
   for (const char* const name : {"kio", "vio"}) {
@@ -64,15 +64,15 @@ Config configuration_of(const CaptureFolder& folder, const std::filesystem::path
 }
 
 /// Makes the first lidar read the sweeps of a folder, whatever its packet settings.
-void take_sweeps(const std::filesystem::path& capture, Config& config) {
+void configure_sweeps(const std::filesystem::path& capture, Config& config) {
   LidarOptions& lidar = config.lidars.front();
   if (!lidar.gives_clouds()) {
-    LidarOptions takes;
-    takes.name = lidar.name;
-    takes.topic = "/sweeps";
-    takes.T_base_lidar = lidar.T_base_lidar;
-    takes.isa = lidar.isa;
-    lidar = std::move(takes);
+    LidarOptions replacement;
+    replacement.name = lidar.name;
+    replacement.topic = "/sweeps";
+    replacement.T_base_lidar = lidar.T_base_lidar;
+    replacement.isa = lidar.isa;
+    lidar = std::move(replacement);
   }
   if (SweepFolder::is_kitti_odometry(capture) && lidar.point_times == PointTimesFrom::automatic)
     lidar.point_times = PointTimesFrom::none;
@@ -94,7 +94,7 @@ Config configuration_for(const FoundRecording& found, const std::filesystem::pat
   if (arguments.config.empty())
     use_recorded_metadata(found.files, config);
   if (gives_sweeps(found.capture))
-    take_sweeps(found.capture, config);
+    configure_sweeps(found.capture, config);
   config = config_or_fail(override_config(config, arguments.overrides));
   if (file.empty())
     metadata = find_metadata(found.files, config);

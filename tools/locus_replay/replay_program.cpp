@@ -19,9 +19,9 @@
 #include "locus_replay/mcap_results.hpp"
 #include "locus_replay/open_recording.hpp"
 #include "locus_replay/overwriting.hpp"
+#include "locus_replay/print_message.hpp"
 #include "locus_replay/recording.hpp"
 #include "locus_replay/results.hpp"
-#include "locus_replay/say.hpp"
 #include "locus_replay/sweep_files.hpp"
 #include "locus_replay/truth.hpp"
 
@@ -41,11 +41,11 @@ struct MoreResults {
     if (!arguments.sweeps.empty())
       sweeps.emplace(arguments.sweeps, arguments.sweeps_format);
   }
-  void take(const Sweep& sweep, const Odometry& odometry, const daemon::ProcessedSweep& done) {
+  void write(const Sweep& sweep, const Odometry& odometry, const daemon::ProcessedSweep& done) {
     if (mcap)
       mcap->add(sweep, odometry, done);
     if (sweeps)
-      sweeps->take(sweep, odometry, done.estimate);
+      sweeps->write(sweep, odometry, done.estimate);
   }
   void close() {
     if (mcap)
@@ -59,22 +59,22 @@ struct MoreResults {
 void replay(const Config& config, LidarRouter lidars, Recording& recording, Results& results, MoreResults more,
             const SweepStage& stage, const EstimateObserver& observer) {
   std::optional<daemon::InlinePipeline> pipeline;
-  const auto take = [&](const Sweep& sweep, const daemon::ProcessedSweep& done) {
-    more.take(sweep, pipeline->processor().odometry(), done);
+  const auto on_sweep = [&](const Sweep& sweep, const daemon::ProcessedSweep& done) {
+    more.write(sweep, pipeline->processor().odometry(), done);
     if (observer)
       observer(done.estimate);
     if (more.mcap)
       more.mcap->add(pipeline->ingest(), pipeline->counters());
-    results.take(done);
+    results.add(done);
   };
   pipeline.emplace(
-      config, std::move(lidars), take, [&](const HealthEvent& event) { results.take(event); }, stage);
-  for (bool goes_on = true; goes_on;) {
+      config, std::move(lidars), on_sweep, [&](const HealthEvent& event) { results.add(event); }, stage);
+  for (bool more_input = true; more_input;) {
     const daemon::Input input = recording.next(Duration::zero());
     if (more.mcap)
       more.mcap->add(input);
     pipeline->process(input);
-    goes_on = !std::holds_alternative<daemon::EndOfInput>(input);
+    more_input = !std::holds_alternative<daemon::EndOfInput>(input);
   }
   more.close();
   results.finish(pipeline->ingest(), pipeline->processor(), pipeline->counters());
@@ -85,17 +85,17 @@ void replay_live(const Config& config, LidarRouter lidars, Recording& recording,
   constexpr Duration kPatience = std::chrono::milliseconds{100};
   daemon::PacedInput paced(recording, speed);
   daemon::LivePipeline pipeline(config, std::move(lidars), paced, {.speed = speed});
-  const auto take_events = [&] {
+  const auto add_events = [&] {
     while (const auto event = pipeline.next_health_event())
-      results.take(*event);
+      results.add(*event);
   };
   while (!pipeline.finished()) {
     if (const auto done = pipeline.next(kPatience))
-      results.take(*done);
-    take_events();
+      results.add(*done);
+    add_events();
   }
   pipeline.stop();
-  take_events();
+  add_events();
   results.finish(pipeline.ingest(), pipeline.processor(), pipeline.counters());
 }
 
@@ -122,7 +122,7 @@ void run(Arguments arguments, const SweepStage& stage, const EstimateObserver& o
   }
   OpenRecording open = open_recording(arguments, chosen);
   for (const std::string& warning : chosen.warnings)
-    say("locus-replay", "warning: " + warning);
+    print_message("locus-replay", "warning: " + warning);
   for (const std::string& line : chosen.lines) {
     if (!arguments.quiet)
       fmt::print("{}\n", line);

@@ -29,9 +29,9 @@ Tiles thinned(std::span<const SurfacePoint> surfaces) {
                        [](const SurfacePoint& surface) { return surface.position_m.allFinite(); });
   while (tiles.surfaces.size() > kMapTiles) {
     tiles.side_m *= kCoarser;
-    std::unordered_set<std::uint64_t> taken;
+    std::unordered_set<std::uint64_t> used;
     std::erase_if(tiles.surfaces, [&](const SurfacePoint& surface) {
-      return !taken.insert(voxel_key(surface.position_m, tiles.side_m)).second;
+      return !used.insert(voxel_key(surface.position_m, tiles.side_m)).second;
     });
   }
   return tiles;

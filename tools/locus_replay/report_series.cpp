@@ -20,10 +20,11 @@ double rounded(double value, double resolution) {
 }
 
 /// Calls `take` with each of at most `count` chunks of equal length.
-template <class T, class Take> void for_each_stretch(std::span<const T> samples, std::size_t count, const Take& take) {
+template <class T, class Visit>
+void for_each_stretch(std::span<const T> samples, std::size_t count, const Visit& visit) {
   const std::size_t length = std::max<std::size_t>(1, (samples.size() + count - 1) / count);
   for (std::size_t begin = 0; begin < samples.size(); begin += length)
-    take(samples.subspan(begin, std::min(length, samples.size() - begin)));
+    visit(samples.subspan(begin, std::min(length, samples.size() - begin)));
 }
 
 double smooth_step_m(std::span<const PathPoint> points) {

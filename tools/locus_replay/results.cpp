@@ -12,10 +12,10 @@
 #include "locus_replay/failure.hpp"
 #include "locus_replay/map_file.hpp"
 #include "locus_replay/output_file.hpp"
+#include "locus_replay/print_message.hpp"
 #include "locus_replay/recorded_input.hpp"
 #include "locus_replay/report.hpp"
 #include "locus_replay/report_map.hpp"
-#include "locus_replay/say.hpp"
 #include "locus_replay/verdicts.hpp"
 
 namespace locus::tools {
@@ -40,7 +40,7 @@ const std::filesystem::path& made(const std::filesystem::path& folder) {
 
 void warn(const std::vector<std::string>& lines) {
   for (const std::string& line : lines)
-    tools::say("locus-replay", "warning: " + line);
+    tools::print_message("locus-replay", "warning: " + line);
 }
 
 } // namespace
@@ -50,11 +50,11 @@ Results::Results(const Arguments& arguments, const Config& config, const Recordi
     : arguments_(arguments), config_(config), recording_(recording), begin_(begin),
       odometry_(made(arguments.output), config.motion_sources), truth_(std::move(truth)), progress_(!arguments.quiet) {}
 
-void Results::take(const daemon::ProcessedSweep& sweep) {
+void Results::add(const daemon::ProcessedSweep& sweep) {
   odometry_.write(sweep.estimate);
   tally_.add(sweep);
   sweeps_.push_back(record_of(sweep));
-  truth_.take(sweep.estimate);
+  truth_.add(sweep.estimate);
   progress_.show(recording_.progress());
 }
 

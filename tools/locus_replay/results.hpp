@@ -32,8 +32,8 @@ class Results {
   Results(const Arguments& arguments, const Config& config, const Recording& recording, Truth truth,
           const daemon::MachineTime& begin);
 
-  void take(const daemon::ProcessedSweep& sweep);
-  void take(const HealthEvent& event) { health_events_.push_back(event); }
+  void add(const daemon::ProcessedSweep& sweep);
+  void add(const HealthEvent& event) { health_events_.push_back(event); }
 
   /// Writes the results after the last sweep. Warns of suspicious input. Fails for a recording without a valid data
   /// packet: then only summary.json is written, whose counters show the reason.

@@ -23,18 +23,18 @@ std::string_view reason_of(const HealthEvent& event) {
 
 /// Describes when and why a source was lost, and when it recovered.
 std::string readable_health(const FinishedRun& run, SourceId source) {
-  constexpr std::size_t kTold = 4; ///< changes shown; a flapping source would fill a page
+  constexpr std::size_t kListed = 4; ///< changes shown; a flapping source would fill a page
   std::string text;
-  std::size_t told = 0;
+  std::size_t listed = 0;
   for (const HealthEvent& event : run.health_events) {
-    if (event.source != source || told++ >= kTold)
+    if (event.source != source || listed++ >= kListed)
       continue;
     const double after_s = to_seconds(event.stamp - run.capture_start);
     text += event.healthy ? fmt::format(", back at {:.2f} s", after_s)
                           : fmt::format(", lost at {:.2f} s ({})", after_s, reason_of(event));
   }
-  if (told > kTold)
-    text += fmt::format(" and {} more changes", told - kTold);
+  if (listed > kListed)
+    text += fmt::format(" and {} more changes", listed - kListed);
   return text;
 }
 
@@ -101,7 +101,7 @@ std::string readable(const FinishedRun& run) {
     if (!lidar.model.empty())
       text += fmt::format("{:10} {}, {} returns, {:.0f} rpm{}\n", figures.config.lidars[i].name, lidar.model,
                           lidar.return_mode, lidar.rotation_rate_rpm,
-                          lidar.tells_date ? fmt::format(", clock {}", lidar.pps) : "");
+                          lidar.has_date ? fmt::format(", clock {}", lidar.pps) : "");
     if (const auto& clouds = lidar.clouds)
       text += fmt::format("{:10} {} clouds of {} used, {:.1f} a second, {:.0f} points each; times: {}, rings: {}\n",
                           figures.config.lidars[i].name, clouds->counters.used, clouds->counters.received,

@@ -28,7 +28,7 @@ const std::filesystem::path& newly_made(const std::filesystem::path& folder) {
 SweepFiles::SweepFiles(const std::filesystem::path& folder, CloudFormat format)
     : folder_(newly_made(folder)), format_(format), times_(folder / "times.txt"), poses_(folder / "poses.txt") {}
 
-void SweepFiles::take(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
+void SweepFiles::write(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
   odometry.correction().apply(sweep.returns, placed_);
   daemon::sweep_points(sweep.returns, placed_, points_);
   write_points(folder_ / fmt::format("{:06}.{}", sweeps_++, to_string(format_)));

@@ -26,7 +26,7 @@ class SweepFiles {
   SweepFiles(const std::filesystem::path& folder, CloudFormat format);
 
   /// Writes a sweep with its returns (SweepOptions::keeps_returns). Call right after it was processed.
-  void take(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate);
+  void write(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate);
   void close();
 
  private:

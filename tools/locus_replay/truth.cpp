@@ -22,7 +22,7 @@ Truth::Truth(const Arguments& arguments, const CaptureFolder& folder, std::vecto
     map_ = value_or_fail(PointCloudFile::open(map_file_), ExitStatus::failed);
 }
 
-void Truth::take(const OdometryEstimate& estimate) {
+void Truth::add(const OdometryEstimate& estimate) {
   if (trajectory_.empty())
     return;
   estimates_.push_back({estimate.stamp, estimate.T_odom_base});

@@ -24,7 +24,7 @@ class Truth {
   /// is no file. Throws Failure.
   Truth(const Arguments& arguments, const CaptureFolder& folder, std::vector<StampedPose> recorded);
 
-  void take(const OdometryEstimate& estimate);
+  void add(const OdometryEstimate& estimate);
 
   /// Returns the true poses; empty if there are none.
   [[nodiscard]] std::span<const StampedPose> trajectory() const { return trajectory_; }

@@ -68,9 +68,10 @@ std::vector<LineSource> line_sources(const Trajectory& trajectory, const RobotOp
 /// Merges the datagrams of all lidars and their inertial units, in order of arrival. One owner.
 class Lidars {
  public:
-  Lidars(const Scene& scene, const Trajectory& trajectory, const std::vector<NamedLidar>& lidars, SeenSpace* seen) {
+  Lidars(const Scene& scene, const Trajectory& trajectory, const std::vector<NamedLidar>& lidars,
+         ObservedSpace* observed) {
     for (const NamedLidar& lidar : lidars) {
-      senders_.emplace_back(SyntheticLidar(scene, trajectory, lidar.options, seen));
+      senders_.emplace_back(SyntheticLidar(scene, trajectory, lidar.options, observed));
       if (lidar.imu)
         senders_.emplace_back(OusterImu(trajectory, lidar.options, *lidar.imu));
     }
@@ -129,14 +130,14 @@ std::string configuration(const RobotOptions& robot) {
                              }) > 1;
     text += fmt::format("  - {{name: {}, model: {}, port: {}{}, T_base_lidar: {}}}\n", lidar.name, model_of(lidar),
                         options.port, shares_port ? ", source_ip: " + dotted(options.source_ip) : "",
-                        yaml(lidar.T_base_believed.value_or(options.T_base_lidar)));
+                        yaml(lidar.T_base_configured.value_or(options.T_base_lidar)));
   }
   text += fmt::format("motion_sources:{}\n", robot.odometry.empty() && !robot.imu ? " []" : "");
   for (const NamedOdometry& odometry : robot.odometry)
     text += fmt::format("  - {{name: {}, kind: odometry, topic: {}}}\n", odometry.name, odometry.topic);
   if (robot.imu)
     text += fmt::format("  - {{name: imu, kind: imu, topic: /imu/data, T_base_source: {}}}\n",
-                        yaml(robot.imu->T_base_believed.value_or(robot.imu->T_base_imu)));
+                        yaml(robot.imu->T_base_configured.value_or(robot.imu->T_base_imu)));
   if (robot.max_speed_mps)
     text += fmt::format("motion: {{max_speed_mps: {}}}\n", *robot.max_speed_mps);
   if (robot.body_box)
@@ -148,7 +149,7 @@ std::string configuration(const RobotOptions& robot) {
 } // namespace
 
 void write_capture(CaptureSink& sink, const Scene& scene, const Trajectory& trajectory, Duration duration,
-                   const RobotOptions& robot, SeenSpace* seen, const std::function<void(double)>& progress) {
+                   const RobotOptions& robot, ObservedSpace* observed, const std::function<void(double)>& progress) {
   const Stamp start = trajectory.start(), end = start + duration;
   sink.text("config.yaml", start, configuration(robot));
   for (const NamedLidar& lidar : robot.lidars)
@@ -167,7 +168,7 @@ void write_capture(CaptureSink& sink, const Scene& scene, const Trajectory& traj
       next->write(sink);
     }
   };
-  for (Lidars lidars(scene, trajectory, robot.lidars, seen); lidars.front().receive_stamp <= end; lidars.pop()) {
+  for (Lidars lidars(scene, trajectory, robot.lidars, observed); lidars.front().receive_stamp <= end; lidars.pop()) {
     write_texts_until(lidars.front().receive_stamp);
     sink.datagram(lidars.front());
     progress(to_seconds(lidars.front().receive_stamp - start) / to_seconds(duration));

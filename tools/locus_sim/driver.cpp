@@ -51,10 +51,10 @@ class Walk {
     const Roads::Lane& lane = roads_.lanes()[best];
     const Eigen::Vector2d from = roads_.places_m()[here_];
     here_ = lane.from == here_ ? lane.to : lane.from;
-    take(from, roads_.places_m()[here_]);
+    append_way(from, roads_.places_m()[here_]);
   }
 
-  void take(const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
+  void append_way(const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
     const Eigen::Vector2d along = to - from, left = Eigen::Vector2d{-along.y(), along.x()}.normalized();
     const auto parts = static_cast<int>(std::max(1.0, along.norm() / straight_m_));
     for (int i = parts; i >= 1; --i) {

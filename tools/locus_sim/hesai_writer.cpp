@@ -50,8 +50,8 @@ class HesaiWriter : public PacketWriter {
   std::span<const std::byte> finish(Stamp begin) override {
     const hesai::ModelSpec& spec = hesai::spec(model_);
     const auto last_column = static_cast<Duration::rep>(pattern().columns - 1);
-    const Duration told = spec.time_of_last_column ? last_column * pattern().column_duration : Duration{};
-    packet_->set_time((begin + told - spec.azimuth_delay + clock_offset_).time_since_epoch());
+    const Duration reported = spec.time_of_last_column ? last_column * pattern().column_duration : Duration{};
+    packet_->set_time((begin + reported - spec.azimuth_delay + clock_offset_).time_since_epoch());
     packet_->set_number(++number_);
     packet_->seal();
     return packet_->payload();

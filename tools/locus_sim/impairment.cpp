@@ -51,7 +51,7 @@ void impair(ImuFaults& faults, const Imperfections& all, std::uint64_t seed) {
 
 void impair(NamedLidar& lidar, const Imperfections& all, std::uint64_t seed) {
   SyntheticLidarOptions& options = lidar.options;
-  displace(options.T_base_lidar, lidar.T_base_believed, all, seed_for(seed, "mounting"));
+  displace(options.T_base_lidar, lidar.T_base_configured, all, seed_for(seed, "mounting"));
   options.beam_rad = 1e-3 * all.beam_mrad;
   options.laser_bias_m = 1e-3 * all.laser_bias_mm;
   options.incidence_bias_m = 1e-3 * all.incidence_bias_mm;
@@ -67,7 +67,7 @@ void impair(NamedLidar& lidar, const Imperfections& all, std::uint64_t seed) {
 }
 
 void impair(MountedImu& imu, const Imperfections& all, std::uint64_t seed) {
-  displace(imu.T_base_imu, imu.T_base_believed, all, seed_for(seed, "mounting"));
+  displace(imu.T_base_imu, imu.T_base_configured, all, seed_for(seed, "mounting"));
   impair(imu.faults, all, seed);
 }
 

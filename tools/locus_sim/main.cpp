@@ -7,12 +7,12 @@
 #include "command_line.hpp"
 #include "daemon/machine_time.hpp"
 #include "locus_replay/output_file.hpp"
+#include "locus_replay/print_message.hpp"
 #include "locus_replay/progress_bar.hpp"
-#include "locus_replay/say.hpp"
 #include "locus_sim/arguments.hpp"
 #include "locus_sim/capture_writer.hpp"
 #include "locus_sim/folder_sink.hpp"
-#include "locus_sim/seen_space.hpp"
+#include "locus_sim/observed_space.hpp"
 #include "locus_sim/stream_sink.hpp"
 #include "locus_sim/surroundings.hpp"
 #include "locus_sim/truth_map.hpp"
@@ -36,19 +36,20 @@ void run(const SimArguments& arguments) {
       sim::drive_about(world, robot, arguments.duration, arguments.slips, arguments.seed);
   const bool has_room = surround(world, robot, trajectory, arguments.sensors.imperfections, arguments.seed);
   if (!has_room && arguments.names_vehicle)
-    say("locus-sim", fmt::format("warning: --vehicle-s-per-min: nowhere on this drive is room for a vehicle beside a "
-                                 "{} in --world {}, so none comes; try a wider world, another seed or a longer drive",
-                                 arguments.robot.name, arguments.world.name));
+    print_message("locus-sim",
+                  fmt::format("warning: --vehicle-s-per-min: nowhere on this drive is room for a vehicle beside a "
+                              "{} in --world {}, so none comes; try a wider world, another seed or a longer drive",
+                              arguments.robot.name, arguments.world.name));
   if (!folder) {
     sim::StreamSink sink;
     write_capture(sink, world.scene, trajectory, arguments.duration, robot.sensors);
     return;
   }
-  sim::SeenSpace seen(world.scene.bounds());
+  sim::ObservedSpace observed(world.scene.bounds());
   ProgressBar bar(true);
-  write_capture(*folder, world.scene, trajectory, arguments.duration, robot.sensors, &seen,
+  write_capture(*folder, world.scene, trajectory, arguments.duration, robot.sensors, &observed,
                 [&](double done) { bar.show(done); });
-  write_truth_map(*map, world.scene, seen);
+  write_truth_map(*map, world.scene, observed);
   bar.wipe();
   const daemon::MachineTime spent = daemon::MachineTime::now() - begin;
   fmt::print("{}: {:.0f} m in {:.0f} s, {:.1f} times faster than that on one core ({:.1f} s)\n",

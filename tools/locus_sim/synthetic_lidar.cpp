@@ -18,7 +18,7 @@ namespace locus::sim {
 namespace {
 
 constexpr double kTurn_rad = 2 * std::numbers::pi;
-constexpr double kTellingApart_m = 1.0; // closer echoes merge into one
+constexpr double kRangeResolution_m = 1.0; // closer echoes merge into one
 constexpr int kDataPacketsPerPosition = 5;
 
 // A Gaussian beam is reduced to five rays that match its moments up to the fifth (Gauss-Hermite): the centre, and four
@@ -82,7 +82,7 @@ class SyntheticLidar::Footprint {
     std::size_t merged = 0;
     for (std::size_t i = 0, end = 0; i < count_; i = end) {
       const double from_m = glimpses_[i].sight.hit.range_m;
-      for (end = i; end < count_ && glimpses_[end].sight.hit.range_m < from_m + kTellingApart_m;)
+      for (end = i; end < count_ && glimpses_[end].sight.hit.range_m < from_m + kRangeResolution_m;)
         ++end;
       glimpses_[merged++] = mixed(std::span(glimpses_).subspan(i, end - i));
     }
@@ -136,11 +136,11 @@ class SyntheticLidar::Footprint {
 };
 
 SyntheticLidar::SyntheticLidar(const Scene& scene, const Trajectory& trajectory, const SyntheticLidarOptions& options,
-                               SeenSpace* seen)
+                               ObservedSpace* observed)
     : scene_(scene), trajectory_(trajectory), options_(options), writer_(writer_for(options, trajectory.start())),
       pattern_(writer_->pattern()),
       T_base_rotor_(pattern_.T_lidar_rotor ? options.T_base_lidar * *pattern_.T_lidar_rotor : options.T_base_lidar),
-      dice_(options.seed), seen_(seen), packet_begin_(trajectory.start()),
+      dice_(options.seed), observed_(observed), packet_begin_(trajectory.start()),
       data_packets_until_position_(kDataPacketsPerPosition) {
   aim(options);
   if (options_.beam_rad > 0) {
@@ -271,7 +271,7 @@ Echoes SyntheticLidar::fire_line(const Mount& mount, Aim& aim) {
     return {center_echo, center_echo};
 
   const auto edge = look(mount, aim, Eigen::AngleAxisd(-kHalfBeam_rad, mount.R_world_lidar.col(2)) * aimed);
-  if (!center || !edge || std::abs(edge->hit.range_m - center->hit.range_m) < kTellingApart_m)
+  if (!center || !edge || std::abs(edge->hit.range_m - center->hit.range_m) < kRangeResolution_m)
     return {center_echo, center_echo};
   const Echo edge_echo = measure(aim, edge);
   if (edge_echo.ticks == 0 || center_echo.ticks == 0) // one of them was lost
@@ -383,8 +383,8 @@ Echo SyntheticLidar::measure(const Aim& aim, const std::optional<Sight>& sight) 
   const double ticks = std::round(range_m / pattern_.resolution_m);
   if (range_m < options_.min_range_m || ticks > pattern_.most_ticks)
     return {};
-  if (seen_ != nullptr && !sight->is_own_part && !hit.apparent)
-    seen_->mark(hit.point_m);
+  if (observed_ != nullptr && !sight->is_own_part && !hit.apparent)
+    observed_->mark(hit.point_m);
   return {static_cast<std::uint32_t>(ticks), static_cast<std::uint8_t>(std::clamp(brightness, 1.0, 255.0))};
 }
 

@@ -12,10 +12,10 @@
 #include "core/base/pose.hpp"
 #include "drivers/net/datagram.hpp"
 #include "locus_sim/lidar_model.hpp"
+#include "locus_sim/observed_space.hpp"
 #include "locus_sim/packet_writer.hpp"
 #include "locus_sim/quick_dice.hpp"
 #include "locus_sim/scene.hpp"
-#include "locus_sim/seen_space.hpp"
 #include "locus_sim/trajectory.hpp"
 
 namespace locus::sim {
@@ -64,10 +64,10 @@ std::uint32_t microseconds_past_hour(Stamp shown);
 /// position at its own time, at the rotor's azimuth at that time. One owner.
 class SyntheticLidar {
  public:
-  /// Scene and trajectory must outlive it. The same arguments give the same bytes. `seen` receives each surface point
-  /// that returns an echo.
+  /// Scene and trajectory must outlive it. The same arguments give the same bytes. `observed` receives each surface
+  /// point that returns an echo.
   SyntheticLidar(const Scene& scene, const Trajectory& trajectory, const SyntheticLidarOptions& options,
-                 SeenSpace* seen = nullptr);
+                 ObservedSpace* observed = nullptr);
 
   /// Returns the next data or position packet, sent after its last firing. There is always one: after the course the
   /// robot stands.
@@ -137,7 +137,7 @@ class SyntheticLidar {
   std::size_t columns_fired_ = 0;
   QuickDice dice_;
 
-  SeenSpace* seen_;
+  ObservedSpace* observed_;
   Stamp packet_begin_; ///< first column of the next data packet, by the lidar's clock
   Stamp last_arrival_;
   int data_packets_until_position_;

@@ -165,8 +165,8 @@ void Trajectory::add_flick(Swing& sum, double since_start_s) const {
   if (after == ride_.flicks.begin())
     return;
   const Flick& flick = *(after - 1);
-  const double rate = 1 / to_seconds(flick.there), gone = rate * (since_start_s - to_seconds(flick.from));
-  const Jet share = ease(Jet(gone, rate)) - ease(Jet(gone - 1, rate));
+  const double rate = 1 / to_seconds(flick.there), phase = rate * (since_start_s - to_seconds(flick.from));
+  const Jet share = ease(Jet(phase, rate)) - ease(Jet(phase - 1, rate));
   for (std::size_t axis = 0; axis < 3; ++axis)
     sum.turn_rad[axis] = sum.turn_rad[axis] + flick.turn_rpy_rad[static_cast<Eigen::Index>(axis)] * share;
 }

@@ -74,21 +74,21 @@ template <class Sink> class Sampler {
   Sink& sink_;
 };
 
-template <class Sink> void for_each_point(const Scene& scene, const SeenSpace& seen, Sink sink) {
+template <class Sink> void for_each_point(const Scene& scene, const ObservedSpace& observed, Sink sink) {
   auto if_seen = [&](const Eigen::Vector3d& point) {
-    if (seen.holds(point))
+    if (observed.holds(point))
       sink(point);
   };
   const Sampler sampler(if_seen);
   for (const Surface& surface : scene.surfaces()) {
-    if (seen.reaches_into(std::visit([](const auto& shape) { return shape.bounds(); }, surface.shape)))
+    if (observed.reaches_into(std::visit([](const auto& shape) { return shape.bounds(); }, surface.shape)))
       std::visit(sampler, surface.shape);
   }
 }
 
 } // namespace
 
-void write_truth_map(tools::OutputFile& file, const Scene& scene, const SeenSpace& seen) {
+void write_truth_map(tools::OutputFile& file, const Scene& scene, const ObservedSpace& observed) {
   const auto write_header = [&](std::size_t points) {
     file.print("ply\nformat binary_little_endian 1.0\nelement vertex {:12}\nproperty float x\nproperty float y\n"
                "property float z\nend_header\n",
@@ -96,7 +96,7 @@ void write_truth_map(tools::OutputFile& file, const Scene& scene, const SeenSpac
   };
   std::size_t points = 0;
   write_header(points); // placeholder, overwritten when the number is known
-  for_each_point(scene, seen, [&](const Eigen::Vector3d& point) {
+  for_each_point(scene, observed, [&](const Eigen::Vector3d& point) {
     const Eigen::Vector3f single = point.cast<float>();
     file.write(std::as_bytes(std::span(single.data(), 3)));
     ++points;

@@ -17,7 +17,7 @@
 namespace locus::tools {
 namespace {
 
-std::string describe(const HeardLidar& lidar) {
+std::string describe(const SurveyedLidar& lidar) {
   const std::string beams = lidar.beams > 0 ? fmt::format("-{}", lidar.beams) : "";
   const std::string model = lidar.ouster ? "Ouster" + beams : std::string{lidar.model};
   std::string mode{lidar.return_mode};
@@ -31,7 +31,7 @@ std::string describe(const HeardLidar& lidar) {
   return text + "\n";
 }
 
-std::string describe_unread(const HeardLidar& lidar) {
+std::string describe_unread(const SurveyedLidar& lidar) {
   const std::string_view help = remedy(*lidar.unknown_packets);
   return fmt::format("{:<16}{:<7}not read: {}{}{}\n", dotted(lidar.ip), lidar.port, to_string(*lidar.unknown_packets),
                      help.empty() ? "" : "; ", help);
@@ -39,7 +39,7 @@ std::string describe_unread(const HeardLidar& lidar) {
 
 /// Formats a configuration entry, and the command that fetches the file that only the sensor has: an Ouster requires
 /// it.
-std::string entry(const HeardLidar& lidar, int number, bool shares_port) {
+std::string entry(const SurveyedLidar& lidar, int number, bool shares_port) {
   const std::string name = fmt::format("lidar{}", number), ip = dotted(lidar.ip);
   const std::string file = fmt::format("/etc/locusd/{}{}", name, lidar.ouster ? ".json" : ".csv");
   const std::string model = lidar.ouster ? "Ouster, metadata: " + file : std::string{lidar.model};
@@ -62,15 +62,15 @@ std::string find_sensors(Duration duration) {
   if (!wire)
     throw Failure(ExitStatus::failed, wire.error());
   LidarSurvey survey;
-  wire->listen(duration, [&](const Datagram& datagram) { survey.take(datagram); });
+  wire->listen(duration, [&](const Datagram& datagram) { survey.add(datagram); });
 
-  const std::vector<HeardLidar> lidars = survey.lidars();
+  const std::vector<SurveyedLidar> lidars = survey.lidars();
   std::map<std::uint16_t, int> on_port;
-  for (const HeardLidar& lidar : lidars)
+  for (const SurveyedLidar& lidar : lidars)
     on_port[lidar.port] += lidar.is_known() ? 1 : 0;
   std::string text, refused, yaml;
   int known = 0;
-  for (const HeardLidar& lidar : lidars) {
+  for (const SurveyedLidar& lidar : lidars) {
     if (lidar.unknown_packets)
       refused += describe_unread(lidar);
     if (!lidar.is_known())

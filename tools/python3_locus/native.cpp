@@ -171,7 +171,7 @@ void define_estimate(py::module_& module) {
   add_vector(estimate, "twist", &Estimate::twist, "float64 (6,): m/s along and rad/s about x, y, z of base.");
   add_matrix(estimate, "twist_covariance", &Estimate::twist_covariance, "float64 (6, 6): of the twist.");
   add_vector(estimate, "observability", &Estimate::observability,
-             "float64 (6,): how well lidar sees x, y, z, roll, pitch, yaw of base, from 0 to 1.");
+             "float64 (6,): observability by lidar of x, y, z, roll, pitch, yaw of base, from 0 to 1.");
   estimate
       .def_property_readonly(
           "state", [](const Estimate& object) { return std::string(name_of(object.state)); },
@@ -180,7 +180,7 @@ void define_estimate(py::module_& module) {
       .def_readonly("points", &Estimate::points, "That were registered.")
       .def_readonly("iterations", &Estimate::iterations, "Of the registration with the map.")
       .def_readonly("inliers", &Estimate::inliers, "Points with a surface of the map within reach.")
-      .def_readonly("keyframe", &Estimate::keyframe, "The map took this sweep.")
+      .def_readonly("keyframe", &Estimate::keyframe, "The sweep was inserted into the map.")
       .def_readonly("failed", &Estimate::failed, "The registration was refused: the pose is the prediction.")
       .def_property_readonly(
           "sources", [](const Estimate& object) { return object.sources; },

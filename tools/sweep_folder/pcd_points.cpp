@@ -62,7 +62,7 @@ template <class Visit> void for_each_field(const PcdHeader& header, Visit&& visi
   }
 }
 
-Problem take_header(const PcdHeader& header, SweepPoints& points) {
+Problem apply_header(const PcdHeader& header, SweepPoints& points) {
   const std::size_t step = header.record_bytes();
   if (header.points > kMaxCloudPoints || header.points * step > SweepPoints::kMostBytes)
     return fmt::format(
@@ -197,7 +197,7 @@ Problem read_pcd_points(const std::filesystem::path& file, SweepPoints& points) 
   const Expected<PcdHeader, std::string> header = PcdHeader::read(stream);
   if (!header)
     return header.error();
-  if (Problem problem = take_header(*header, points))
+  if (Problem problem = apply_header(*header, points))
     return problem;
   const auto begin = static_cast<std::uint64_t>(stream.tellg());
   std::error_code error;

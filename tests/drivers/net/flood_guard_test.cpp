@@ -113,10 +113,10 @@ TEST_F(Guarded, EndOfTheFloodOpensTheSocketAgain) {
 /// A few later datagrams are no flood, and must not be reported as one.
 TEST_F(Guarded, EndOfTheFloodIsSeenWhereNobodySends) {
   look_at(FloodGuard::kFlood + 1, 700, kStranger);
-  guard_.hear_nothing(now_ += milliseconds{900}, socket_);
+  guard_.advance(now_ += milliseconds{900}, socket_);
   EXPECT_LT(passing(700), 30U) << "the second is not over";
   for (int second = 0; second < 2; ++second) // the previous count expires with the first
-    guard_.hear_nothing(now_ += milliseconds{1100}, socket_);
+    guard_.advance(now_ += milliseconds{1100}, socket_);
   EXPECT_EQ(passing(700), 1000U);
 }
 

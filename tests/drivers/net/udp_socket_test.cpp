@@ -99,9 +99,9 @@ TEST(UdpSocket, PortThatIsTakenIsSaid) {
 /// Two instances of the service receive the position packets of broadcasting lidars like this.
 TEST(UdpSocket, OfTwoBesideEachOtherEachHearsABroadcast) {
   constexpr std::uint32_t kEverybody = 0x7FFF'FFFF; // 127.255.255.255
-  auto first = UdpSocket::open_beside_others(0);
+  auto first = UdpSocket::open_shared(0);
   ASSERT_TRUE(first) << first.error();
-  auto second = UdpSocket::open_beside_others(first->port());
+  auto second = UdpSocket::open_shared(first->port());
   ASSERT_TRUE(second) << second.error();
   EXPECT_FALSE(UdpSocket::open(first->port())) << "who wants it alone is not let in";
   UdpSender().send(first->port(), test::bytes_of("to everybody"), kEverybody);

@@ -10,23 +10,23 @@ namespace locus::sim {
 
 /// Records the origins of echoes in cubes of half a metre: the true map contains only observed space, no hidden sides.
 /// One owner.
-class SeenSpace {
+class ObservedSpace {
  public:
   /// Ignores points outside the bounds.
-  explicit SeenSpace(const Bounds& bounds)
+  explicit ObservedSpace(const Bounds& bounds)
       : origin_m_(bounds.min_m.array() - kCube_m),
         size_(((bounds.max_m - origin_m_) / kCube_m).array().ceil().cast<std::ptrdiff_t>() + 1),
-        seen_(static_cast<std::size_t>(size_.prod())) {}
+        observed_(static_cast<std::size_t>(size_.prod())) {}
 
   void mark(const Eigen::Vector3d& point) {
     const Cube cube = cube_of(point);
     if (contains(cube))
-      seen_[index(cube)] = true;
+      observed_[index(cube)] = true;
   }
 
   [[nodiscard]] bool holds(const Eigen::Vector3d& point) const {
     const Cube cube = cube_of(point);
-    return contains(cube) && seen_[index(cube)];
+    return contains(cube) && observed_[index(cube)];
   }
 
   /// Returns whether there is any such cube within bounds, or at their edge.
@@ -35,7 +35,7 @@ class SeenSpace {
     for (std::ptrdiff_t z = first.z(); z <= last.z(); ++z)
       for (std::ptrdiff_t y = first.y(); y <= last.y(); ++y)
         for (std::ptrdiff_t x = first.x(); x <= last.x(); ++x)
-          if (seen_[index({x, y, z})])
+          if (observed_[index({x, y, z})])
             return true;
     return false;
   }
@@ -54,7 +54,7 @@ class SeenSpace {
 
   Eigen::Vector3d origin_m_;
   Cube size_;
-  std::vector<bool> seen_;
+  std::vector<bool> observed_;
 };
 
 } // namespace locus::sim
