@@ -163,7 +163,7 @@ TEST(ConfigYaml, LidarHasPacketsOrClouds) {
   EXPECT_NE(errors_in("lidars: [{topic: /imu/data}]\n").at(0).find("cannot carry PointCloud2"), std::string::npos);
 }
 
-TEST(ConfigYaml, AnglesReadBackToANanodegreeAlsoWhereYawAndRollAreOne) {
+TEST(ConfigYaml, AnglesRoundTripToANanodegreeEvenInGimbalLock) {
   std::mt19937 random{1};
   std::uniform_real_distribution<double> angle_rad{-3.1, 3.1};
   for (int i = 0; i < 200; ++i) {
@@ -209,7 +209,7 @@ TEST(ConfigYaml, AllMistakesAreReportedInTheOrderOfTheirLines) {
             }));
 }
 
-TEST(ConfigYaml, ModelIsThatOfItsWordWhoeverMakesIt) {
+TEST(ConfigYaml, ModelNameSelectsTheMaker) {
   for (std::size_t i = 0; i < hesai::kModels; ++i) {
     const auto model = static_cast<hesai::Model>(i);
     const std::string word = "model: " + std::string{to_string(model)};
@@ -233,7 +233,7 @@ struct BadValue {
   std::string reason;
 };
 
-TEST(ConfigYaml, EveryKindOfBadValueIsRefusedWithItsKeyAndReason) {
+TEST(ConfigYaml, EveryKindOfBadValueIsRejectedWithItsKeyAndReason) {
   const std::vector<BadValue> bad_values{
       {"threads=2.5", "must be a whole number"},
       {"threads=many", "must be a whole number"},
@@ -343,7 +343,7 @@ TEST(ConfigYaml, MistakesThatQuoteLineBreaksStayOneLine) {
       ConfigErrors{"robot.yaml:2: lidars.0.name: 'a b: c' is no name; write a letter, then letters, digits, _ or -"});
 }
 
-TEST(ConfigYaml, OffAndOnAreWordsWhateverYamlMakesOfThem) {
+TEST(ConfigYaml, OffAndOnAreReadAsWords) {
   EXPECT_EQ(valid(parse_config("flat_ground: on\nscan_to_scan: {mode: off}", "")).odometry.flat_ground, FlatGround::on);
   EXPECT_EQ(valid(parse_config("flat_ground: 'on'", "")).odometry.flat_ground, FlatGround::on);
   EXPECT_EQ(valid(parse_config("flat_ground: true", "")).odometry.flat_ground, FlatGround::on);
@@ -351,12 +351,12 @@ TEST(ConfigYaml, OffAndOnAreWordsWhateverYamlMakesOfThem) {
 }
 
 /// Regression: it was read as an endless sequence of empty documents, until memory was exhausted.
-TEST(ConfigYaml, CommaInFrontOfEverythingIsAMistake) {
+TEST(ConfigYaml, LeadingCommaIsAnError) {
   EXPECT_EQ(errors_in(",lidars: []\n"),
             ConfigErrors{"robot.yaml:1: no key begins like this; remove what stands in front of it"});
 }
 
-TEST(ConfigYaml, WhatIsNotYamlIsRefusedWithItsLine) {
+TEST(ConfigYaml, InvalidYamlIsRejectedWithItsLine) {
   EXPECT_EQ(errors_in("threads: 1\nlidars: [a\n").size(), 1U);
   EXPECT_TRUE(errors_in("threads: 1\nlidars: ]\n")[0].starts_with("robot.yaml:2: not YAML: "));
   EXPECT_TRUE(errors_in(std::string(100'000, '['))[0].starts_with("robot.yaml:1: not YAML: "));
@@ -368,7 +368,7 @@ TEST(ConfigYaml, WhatIsNotYamlIsRefusedWithItsLine) {
 }
 
 /// Error messages must not contain terms of the YAML grammar.
-TEST(ConfigYaml, MistakesOfIndentationAreToldInPlainWords) {
+TEST(ConfigYaml, IndentationErrorsAreExplainedPlainly) {
   const auto said = [](const std::string& yaml, const std::string& where, const std::string& what) {
     const ConfigErrors errors = errors_in(yaml);
     ASSERT_EQ(errors.size(), 1U);
@@ -404,19 +404,19 @@ TEST(ConfigYaml, DamagedFilesGiveOnePrintableLinePerMistakeAndNeverCrash) {
   EXPECT_GT(refused, 1000);
 }
 
-TEST(ConfigYaml, FileThatCannotBeReadIsNamed) {
+TEST(ConfigYaml, UnreadableFileIsNamed) {
   const auto error_of = [](const std::string& file) { return errors_of(load_config(file)).at(0); };
   EXPECT_TRUE(error_of("/nowhere/robot.yaml").starts_with("/nowhere/robot.yaml: cannot be read"));
   EXPECT_TRUE(error_of(testing::TempDir()).starts_with(testing::TempDir() + ": cannot be read"));
   EXPECT_TRUE(error_of("/dev/zero").starts_with("/dev/zero: is longer than 1 MiB"));
 }
 
-TEST(ConfigYaml, FileGivesWhatItsTextGives) {
+TEST(ConfigYaml, FileReadsTheSameAsItsText) {
   const test::TemporaryFile file{"robot.yaml", test::bytes_of(kAllChanged)};
   EXPECT_EQ(valid(load_config(file.path())), valid(parse_config(kAllChanged, "")));
 }
 
-TEST(ConfigYaml, FileForTheServiceNamesALidarOrSaysThatItNeedNot) {
+TEST(ConfigYaml, ServiceFileMustNameALidarUnlessExempt) {
   const auto errors_of_file = [](const std::string& text) {
     return errors_of(load_service_config(test::TemporaryFile{"robot.yaml", test::bytes_of(text)}.path()));
   };

@@ -50,7 +50,7 @@ TEST(LidarImus, AreMotionSourcesMountedWithTheirLidar) {
   EXPECT_EQ(*again, *config) << "as a recording of it is read";
 }
 
-TEST(LidarImus, KeepThePlaceThatTheyAreListedAt) {
+TEST(LidarImus, RetainTheirPlaceInTheList) {
   const test::TemporaryFile file{"imu.json"};
   Config config = with_ouster(file);
   config.motion_sources.insert(config.motion_sources.begin(), {{"front_imu", SourceKind::imu, {}}, "", ""});
@@ -69,7 +69,7 @@ TEST(LidarImus, KeepThePlaceThatTheyAreListedAt) {
 }
 
 /// An IMU that is published on a topic is not read a second time from packets.
-TEST(LidarImus, WithATopicAreHeardThereAlone) {
+TEST(LidarImus, WithATopicUseTheTopicOnly) {
   const test::TemporaryFile file{"imu.json"};
   Config config = with_ouster(file);
   config.motion_sources.insert(config.motion_sources.begin(), {{"front_imu", SourceKind::imu, {}}, "/os/imu", ""});
@@ -79,7 +79,7 @@ TEST(LidarImus, WithATopicAreHeardThereAlone) {
   EXPECT_EQ(with->lidars[0].imu_port, 0);
 }
 
-TEST(LidarPort, IsThatOfTheMetadataWhereTheFileNamesNone) {
+TEST(LidarPort, DefaultsToTheMetadata) {
   const test::TemporaryFile file{"port.json"};
   with_ouster(file);
   const auto port_of = [&](const std::string& keys) {
@@ -103,7 +103,7 @@ TEST(LidarPort, IsThatOfTheMetadataWhereTheFileNamesNone) {
   EXPECT_EQ(parse_config("lidars: [{name: front}]", "test")->lidars[0].port, 2368);
 }
 
-TEST(LidarImus, AreNoneWhereNoneIsSent) {
+TEST(LidarImus, AreAbsentIfTheLidarSendsNone) {
   const test::TemporaryFile file{"imu.json"};
   const auto off = with_lidar_metadata(with_ouster(file, "OFF"));
   ASSERT_TRUE(off);
@@ -111,7 +111,7 @@ TEST(LidarImus, AreNoneWhereNoneIsSent) {
   EXPECT_EQ(*with_lidar_metadata(Config{}), Config{}) << "a Velodyne";
 }
 
-TEST(LidarImus, MetadataThatIsNotReadIsNamed) {
+TEST(LidarImus, UnreadableMetadataIsNamed) {
   Config config;
   config.lidars[0].ouster = true;
   const auto without = with_lidar_metadata(config);

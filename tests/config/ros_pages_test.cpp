@@ -87,7 +87,7 @@ std::map<std::string, std::set<std::string>> values_by_default() {
           {"global_frame", {"map", dds.frame_odom}}};
 }
 
-TEST(RosPages, SnippetsForLocusdAreTakenByIt) {
+TEST(RosPages, SnippetsForLocusdAreValid) {
   int found = 0;
   for (const char* name : {"nav2.md", "ros2.md"})
     for (const std::string& snippet : snippets_of(page(name), "yaml"))

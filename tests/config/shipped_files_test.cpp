@@ -38,7 +38,7 @@ Config without_robot(Config config) {
 
 double pitch_deg(const LidarOptions& lidar) { return to_rpy_rad(lidar.T_base_lidar.rotation).y() / kRadPerDeg; }
 
-TEST(ShippedFiles, LocusdNamesEveryKeyWithItsBuiltInDefault) {
+TEST(ShippedFiles, LocusdListsEveryKeyWithItsDefault) {
   std::ifstream file{shipped("locusd.yaml")};
   const std::string text{std::istreambuf_iterator<char>{file}, {}};
   EXPECT_EQ(test::leaves_of(text), test::leaves_of(print_config(Config{})));
@@ -60,7 +60,7 @@ TEST(ShippedFiles, SpotHasOneLidarAndPrefersVisionOverLegsOverImu) {
   EXPECT_EQ(source_names(spot), (std::vector<std::string>{"vio", "kio", "imu"}));
 }
 
-TEST(ShippedFiles, HuskyAndSpotLeaveTheAlgorithmAsItIs) {
+TEST(ShippedFiles, HuskyAndSpotUseTheDefaultAlgorithm) {
   EXPECT_EQ(without_robot(load_shipped("husky.yaml")), Config{});
   EXPECT_EQ(without_robot(load_shipped("spot.yaml")), Config{});
 }

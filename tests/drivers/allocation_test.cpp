@@ -46,7 +46,7 @@ TEST(Decoders, OfHesaiAllocateNothingForAnyModel) {
   }
 }
 
-TEST(LidarInput, AllocatesNothingForAPacketThatIsReadOrRefused) {
+TEST(LidarInput, AllocatesNothingPerPacket) {
   LidarOptions options;
   auto lidar = LidarInput::open(options, 0);
   ASSERT_TRUE(lidar);

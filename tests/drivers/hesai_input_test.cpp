@@ -56,7 +56,7 @@ class HesaiSender {
   Duration clock_ahead_;
 };
 
-TEST(HesaiInput, IsToldFromItsPackets) {
+TEST(HesaiInput, IsRecognisedFromItsPackets) {
   for (std::size_t i = 0; i < hesai::kModels; ++i) {
     const auto model = static_cast<Model>(i);
     LidarInput lidar = opened();
@@ -73,7 +73,7 @@ TEST(HesaiInput, IsToldFromItsPackets) {
   }
 }
 
-TEST(HesaiInput, OneThatWasTakenForAVelodyneOrTheOtherWayRoundIsNot) {
+TEST(HesaiInput, WrongMakerIsCorrected) {
   LidarInput lidar = opened();
   const test::VelodyneTestPacket unknown{velodyne::Model::vlp16, velodyne::ReturnMode::strongest};
   std::vector<std::byte> payload(unknown.payload().begin(), unknown.payload().end());
@@ -95,7 +95,7 @@ TEST(HesaiInput, OneThatWasTakenForAVelodyneOrTheOtherWayRoundIsNot) {
 
 /// A broadcasting lidar is received first. Packets of another sender are accepted only after the first was silent for
 /// one second.
-TEST(HesaiInput, VelodyneBesideItIsNamedAndReadOnceItIsSilent) {
+TEST(HesaiInput, VelodyneBesideItIsNamedAndDecodedOnceItIsSilent) {
   LidarInput lidar = opened();
   HesaiSender sender{Model::xt32};
   ASSERT_NE(sender.send(lidar, 1), nullptr);
@@ -117,7 +117,7 @@ TEST(HesaiInput, VelodyneBesideItIsNamedAndReadOnceItIsSilent) {
   EXPECT_EQ(lidar.model(), "VLP-16");
 }
 
-TEST(HesaiInput, ConfiguredModelIsHeldToAndAnotherIsNamed) {
+TEST(HesaiInput, ConfiguredModelIsEnforcedAndAnotherNamed) {
   LidarOptions options;
   options.hesai = Model::xt16;
   LidarInput lidar = opened(options);
@@ -136,7 +136,7 @@ TEST(HesaiInput, ConfiguredModelIsHeldToAndAnotherIsNamed) {
   EXPECT_EQ(other.recognised_model(), "XT32");
 }
 
-TEST(HesaiInput, ModelThatCannotBeReadIsNamed) {
+TEST(HesaiInput, UnsupportedModelIsNamed) {
   std::vector<std::byte> at128(1118);
   for (const auto& [at, value] : {std::pair{0U, 0xEE}, {1U, 0xFF}, {2U, 4}, {3U, 3}})
     at128[at] = static_cast<std::byte>(value);
@@ -170,7 +170,7 @@ TEST(LidarInput, PacketsOfAnotherMakerAreNamedWithTheRemedy) {
   }
 }
 
-TEST(HesaiInput, LostAreThePacketsWhoseNumbersAreMissing) {
+TEST(HesaiInput, MissingNumbersCountAsLost) {
   LidarInput lidar = opened();
   HesaiSender sender{Model::xt32};
   for (const std::uint32_t number : {10U, 11U, 15U, 16U})
@@ -186,7 +186,7 @@ TEST(HesaiInput, LostAreThePacketsWhoseNumbersAreMissing) {
   EXPECT_EQ(lidar.counters().received, 7U);
 }
 
-TEST(HesaiInput, WithoutNumbersStampsAndAzimuthsTellWhatIsLost) {
+TEST(HesaiInput, WithoutNumbersLossIsInferredFromStampsAndAzimuths) {
   LidarInput lidar = opened();
   HesaiSender sender{Model::pandar40p};
   for (const std::uint32_t number : {10U, 11U, 15U, 16U})
@@ -195,7 +195,7 @@ TEST(HesaiInput, WithoutNumbersStampsAndAzimuthsTellWhatIsLost) {
 }
 
 /// The lidar's first packet here ends 4 columns after its first firing.
-TEST(HesaiInput, ClockOnUtcOrTaiIsTrustedAndOneThatRunsFreeIsSetByArrival) {
+TEST(HesaiInput, UtcAndTaiAreTrustedAndAFreeClockFollowsArrival) {
   for (const auto& [ahead, scale] : {std::pair{Duration{}, "UTC"}, std::pair{Duration{seconds{37}}, "TAI"},
                                      std::pair{-Duration{seconds{900'000'000}}, "internal"}}) {
     LidarInput lidar = opened();
@@ -215,7 +215,7 @@ TEST(HesaiInput, ClockOnUtcOrTaiIsTrustedAndOneThatRunsFreeIsSetByArrival) {
   }
 }
 
-TEST(HesaiSurvey, TellsModelModeAndClock) {
+TEST(HesaiSurvey, ReportsModelModeAndClock) {
   LidarSurvey survey;
   for (std::uint32_t number = 1; number <= 11; ++number) {
     const Duration passed = number * milliseconds{1};

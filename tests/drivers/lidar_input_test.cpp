@@ -60,7 +60,7 @@ LidarOptions options(const char* name, std::uint16_t port, std::optional<std::ui
   return result;
 }
 
-TEST(LidarInput, OthersWhoSendToItsPortAreCountedByAddress) {
+TEST(LidarInput, OtherSendersToItsPortAreCountedByAddress) {
   LidarInput lidar = opened();
   Stream stream;
   Stream other(kOtherIp);
@@ -119,7 +119,7 @@ TEST(LidarInput, LostPacketsOfAVls128AreCountedAtItsPace) {
   }
 }
 
-TEST(LidarInput, Vls128StampsAreThoseOfItsFirstFiringToo) {
+TEST(LidarInput, Vls128StampsAreThoseOfItsFirstFiring) {
   LidarInput lidar = opened();
   const VelodyneTestPacket bytes{Model::vls128, ReturnMode::strongest};
   const Stamp receive = stamp_from_ns(1'700'000'000'000'000'000);
@@ -160,7 +160,7 @@ class ViewOfSector {
 };
 
 /// A field of view that is set on the lidar's page leaves sectors out; the packets that would fill them were lost.
-TEST(LidarInput, SectorsThatAreNotSentAreNoLoss) {
+TEST(LidarInput, UnsentSectorsAreNotLost) {
   for (const auto& [from_cdeg, to_cdeg] :
        {std::pair{9'000.0, 27'000.0}, std::pair{4'500.0, 31'500.0}, std::pair{3'000.0, 4'200.0}}) {
     LidarInput lidar = opened();
@@ -212,7 +212,7 @@ TEST(LidarInput, OvertakenPacketIsReorderedAndNotLost) {
   EXPECT_EQ(lidar.counters().lost, 0U);
 }
 
-TEST(LidarInput, PacketThatWasThereBeforeIsADuplicate) {
+TEST(LidarInput, RepeatedPacketIsADuplicate) {
   LidarInput lidar = opened();
   Stream stream;
   for (const int number : {0, 1, 1, 2, 0, 3})
@@ -222,7 +222,7 @@ TEST(LidarInput, PacketThatWasThereBeforeIsADuplicate) {
   EXPECT_EQ(lidar.counters().reordered, 0U);
 }
 
-TEST(LidarInput, TimeFarOffIsRefusedAndASetClockCounted) {
+TEST(LidarInput, FarOffTimeIsRejectedAndAClockStepCounted) {
   LidarInput lidar = opened();
   Stream stream;
   for (int i = 0; i < 10; ++i)
@@ -236,7 +236,7 @@ TEST(LidarInput, TimeFarOffIsRefusedAndASetClockCounted) {
 }
 
 /// The clock of a lidar passes the hour without wrapping, and one packet right there has a wrong time.
-TEST(LidarInput, ClockThatRunsOnBeyondTheHourCostsTheOneWrongPacket) {
+TEST(LidarInput, ClockBeyondTheHourCostsOnePacket) {
   LidarInput lidar = opened();
   constexpr double kPacket_us = 1327.104, kHour_us = 3.6e9;
   for (int i = 0; i < 2000; ++i) {
@@ -272,7 +272,7 @@ std::string_view why_unused_after(Duration duration, const std::string& nmea, Li
   }
 }
 
-TEST(LidarInput, LockedPpsThatIsNotUsedIsToldAfterFiveSeconds) {
+TEST(LidarInput, UnusedLockedPpsIsReportedAfterFiveSeconds) {
   const std::string gga = "$GPGGA,220243,3708.5809,N*00";
   EXPECT_EQ(why_unused_after(std::chrono::seconds{4}, gga), "");
   EXPECT_NE(why_unused_after(std::chrono::seconds{6}, gga).find("no RMC"), std::string_view::npos);
@@ -294,7 +294,7 @@ TEST(LidarInput, FirstSenderIsTheLidarUntilItFallsSilent) {
   EXPECT_EQ(lidar.source_ip(), kOtherIp);
 }
 
-TEST(LidarInput, TruncatedDatagramIsTruncatedWhateverItsLength) {
+TEST(LidarInput, TruncatedDatagramOfAnyLengthIsCountedAsSuch) {
   LidarInput lidar = opened();
   Stream stream;
   Datagram datagram = stream(0);
@@ -305,7 +305,7 @@ TEST(LidarInput, TruncatedDatagramIsTruncatedWhateverItsLength) {
   EXPECT_EQ(lidar.counters()[PacketError::truncated], 2U);
 }
 
-TEST(LidarInput, EveryDatagramIsCountedOnceWhateverItHolds) {
+TEST(LidarInput, EveryDatagramIsCountedOnce) {
   LidarInput lidar = opened();
   Stream stream;
   std::mt19937 random{11};
@@ -328,7 +328,7 @@ TEST(LidarInput, EveryDatagramIsCountedOnceWhateverItHolds) {
   EXPECT_EQ(counters.received, counters.data + counters.position + rejected(counters));
 }
 
-TEST(LidarRouter, LidarsAreToldApartByPort) {
+TEST(LidarRouter, LidarsAreDistinguishedByPort) {
   auto router = LidarRouter::open({options("front", 2368), options("rear", 2369)});
   ASSERT_TRUE(router);
   Stream front;
@@ -340,7 +340,7 @@ TEST(LidarRouter, LidarsAreToldApartByPort) {
   EXPECT_EQ(router->lidars()[1].counters().data, 10U);
 }
 
-TEST(LidarRouter, LidarsAreToldApartByAddress) {
+TEST(LidarRouter, LidarsAreDistinguishedByAddress) {
   auto router = LidarRouter::open({options("front", 2368), options("rear", 2368, kOtherIp)});
   ASSERT_TRUE(router);
   Stream front;

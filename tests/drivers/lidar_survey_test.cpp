@@ -26,7 +26,7 @@ void hear(LidarSurvey& survey, std::uint32_t ip, PpsState pps) {
   survey.add({data, ip, 2368, 2368, Stamp{}});
 }
 
-TEST(LidarSurvey, KnownSendersAreFollowedWhenThereIsRoomForNoMore) {
+TEST(LidarSurvey, KnownSendersAreFollowedWhenFull) {
   LidarSurvey survey;
   for (std::uint32_t i = 0; i < LidarSurvey::kMaxSenders; ++i)
     hear(survey, kFirstIp + i, PpsState::absent);
@@ -57,7 +57,7 @@ TEST(LidarSurvey, LidarsWithoutADecoderAreNamed) {
 }
 
 /// The packets of 128 beams with RNG15 are as long as those of 32 with two returns.
-TEST(LidarSurvey, BeamsOfAnOusterAreLeftOpenWhereThePacketsDoNotTellThem) {
+TEST(LidarSurvey, BeamsOfAnOusterAreUnknownIfThePacketsDoNotReportThem) {
   LidarSurvey survey;
   const test::OusterTestPacket bytes{test::ouster_metadata(ouster::Profile::rng15, 128)};
   survey.add({bytes.payload(), kFirstIp, 7502, 7502, Stamp{}});

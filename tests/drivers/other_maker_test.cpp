@@ -26,20 +26,20 @@ std::optional<OtherMaker> maker_of(std::size_t bytes, std::uint16_t port = 2368,
   return other_maker(datagram);
 }
 
-TEST(OtherMaker, HesaiOfAModelThatCannotBeReadIsToldByItsPreamble) {
+TEST(OtherMaker, UnsupportedHesaiIsRecognisedByItsPreamble) {
   EXPECT_EQ(maker_of(568, 2368, 0xEE, 0xFF), OtherMaker::hesai);
   EXPECT_EQ(maker_of(1080, 10110, 0xEE, 0xFF), OtherMaker::hesai);
   EXPECT_EQ(maker_of(1256, 2368, 0xFF, 0xEE), OtherMaker::hesai) << "Pandar40: no preamble";
   EXPECT_FALSE(maker_of(1262, 2368, 0xFF, 0xEE)) << "Pandar40P: it is read";
 }
 
-TEST(OtherMaker, OusterIsToldByItsPortsAndLengths) {
+TEST(OtherMaker, OusterIsRecognisedByItsPortsAndLengths) {
   EXPECT_EQ(maker_of(48, 7503), OtherMaker::ouster) << "IMU";
   for (const std::size_t bytes : {3392U, 6464U, 12608U, 24896U, 8448U, 16640U, 33024U})
     EXPECT_EQ(maker_of(bytes, 53750), OtherMaker::ouster) << bytes;
 }
 
-TEST(OtherMaker, OusterIsToldByTheImuPacketsOfNewFirmware) {
+TEST(OtherMaker, OusterIsRecognisedByTheImuPacketsOfNewFirmware) {
   std::vector<std::byte> imu(452);
   imu[0] = std::byte{2};
   imu[7] = std::byte{1}; // serial number
@@ -59,7 +59,7 @@ std::optional<OtherMaker> maker_by(std::size_t bytes, std::initializer_list<std:
   return unsupported_maker(payload);
 }
 
-TEST(OtherMaker, LivoxIsToldByVersionLengthAndDataType) {
+TEST(OtherMaker, LivoxIsRecognisedByVersionLengthAndDataType) {
   EXPECT_EQ(maker_by(1380, {{1, 0x64}, {2, 5}, {5, 96}, {10, 1}}), OtherMaker::livox) << "Mid-360, 96 points of 14";
   EXPECT_EQ(maker_by(804, {{1, 0x24}, {2, 3}, {5, 96}, {10, 2}}), OtherMaker::livox) << "96 points of 8 bytes";
   EXPECT_EQ(maker_by(60, {{1, 60}, {10, 0}}), OtherMaker::livox) << "inertial unit";
@@ -72,7 +72,7 @@ TEST(OtherMaker, LivoxIsToldByVersionLengthAndDataType) {
   EXPECT_FALSE(maker_by(17, {{0, 5}}));
 }
 
-TEST(OtherMaker, RoboSenseAndSeyondAreToldByTheirIdentifiers) {
+TEST(OtherMaker, RoboSenseAndSeyondAreRecognisedByTheirIdentifiers) {
   EXPECT_EQ(maker_by(1248, {{0, 0x55}, {1, 0xAA}, {2, 0x05}, {3, 0x0A}, {4, 0x5A}, {5, 0xA5}, {6, 0x50}, {7, 0xA0}}),
             OtherMaker::robosense);
   EXPECT_EQ(maker_by(1248, {{0, 0x55}, {1, 0xAA}, {2, 0x05}, {3, 0x5A}}), OtherMaker::robosense);
@@ -86,7 +86,7 @@ TEST(OtherMaker, RoboSenseAndSeyondAreToldByTheirIdentifiers) {
   EXPECT_FALSE(maker_by(0, {}));
 }
 
-TEST(OtherMaker, VelodyneAndStrangersAreNone) {
+TEST(OtherMaker, VelodyneAndUnknownPacketsAreNone) {
   EXPECT_FALSE(maker_of(velodyne::kDataPacketBytes, 2368, 0xFF, 0xEE));
   EXPECT_FALSE(maker_of(512, 8308));
   EXPECT_FALSE(maker_of(0));
@@ -94,7 +94,7 @@ TEST(OtherMaker, VelodyneAndStrangersAreNone) {
   EXPECT_FALSE(maker_of(1262));
 }
 
-TEST(OtherMaker, RecordedOusterIsToldFromItsFirstPacketOn) {
+TEST(OtherMaker, RecordedOusterIsRecognisedFromItsFirstPacketOn) {
   const auto folder = test::test_data() / "ouster";
   if (!std::filesystem::exists(folder))
     GTEST_SKIP() << "no real captures in " << folder << "; set LOCUS_TEST_DATA";

@@ -158,7 +158,7 @@ TEST_F(OusterInput, LostPacketsAreCountedAcrossTurns) {
 }
 
 /// Columns outside the window are not sent, so they are not lost.
-TEST_F(OusterInput, NothingIsLostOutsideTheWindow) {
+TEST_F(OusterInput, ColumnsOutsideTheWindowAreNotLost) {
   ouster::Metadata metadata = test::ouster_metadata();
   metadata.first_column = 912;
   metadata.last_column = 111; // 14 packets: columns 912 through 1023, and up to 111
@@ -192,7 +192,7 @@ TEST_F(OusterInput, DuplicatesAreRefusedAndOvertakenPacketsUsed) {
   EXPECT_EQ(lidar.counters().lost, 0U);
 }
 
-TEST_F(OusterInput, StepOfItsClockIsCountedAndTimeGoesOn) {
+TEST_F(OusterInput, ClockStepIsCountedAndTimeContinues) {
   LidarInput lidar = opened();
   OusterStream before, after(test::ouster_metadata(), kOusterIp, seconds{9000});
   for (int i = 0; i < 100; ++i)
@@ -210,7 +210,7 @@ TEST_F(OusterInput, StepOfItsClockIsCountedAndTimeGoesOn) {
   EXPECT_LT(refused, 10);
 }
 
-TEST_F(OusterInput, PtpTimeIsTakenAsTai) {
+TEST_F(OusterInput, PtpTimeIsReadAsTai) {
   LidarInput lidar = opened();
   OusterStream stream(test::ouster_metadata(), kOusterIp,
                       kOusterStart.time_since_epoch() + seconds{37} + microseconds{300});
@@ -222,7 +222,7 @@ TEST_F(OusterInput, PtpTimeIsTakenAsTai) {
   EXPECT_EQ(lidar.clock_state(), "TAI");
 }
 
-TEST_F(OusterInput, ImuIsPlacedByTheColumnsClock) {
+TEST_F(OusterInput, ImuIsStampedByTheColumnsClock) {
   LidarInput lidar = opened();
   OusterStream stream;
   EXPECT_EQ(lidar.receive(stream.imu(0, {10.0F, 0.0F, 0.0F})), nullptr);
@@ -278,7 +278,7 @@ TEST_F(OusterInput, MissingMetadataIsNamedWithItsKey) {
   EXPECT_NE(lidar.error().find("locusctl fetch"), std::string::npos);
 }
 
-TEST_F(OusterInput, StandsBesideAVelodyneAndTellsItsLengths) {
+TEST_F(OusterInput, WorksBesideAVelodyneAndReportsItsLengths) {
   LidarOptions velodyne;
   velodyne.name = "rear";
   const auto router = LidarRouter::open({options(), velodyne});
@@ -293,7 +293,7 @@ TEST_F(OusterInput, StandsBesideAVelodyneAndTellsItsLengths) {
   EXPECT_TRUE(std::ranges::find(lengths, velodyne::kDataPacketBytes) == lengths.end());
 }
 
-TEST_F(OusterInput, RouterTellsWhoseInertialUnitItWas) {
+TEST_F(OusterInput, RouterReportsTheOwnerOfAnImu) {
   ouster::Metadata rear = test::ouster_metadata(ouster::Profile::rng15);
   rear.serial_number = 991'913'000'010;
   LidarOptions second = options(rear, "rear");
@@ -319,7 +319,7 @@ TEST_F(OusterInput, RouterTellsWhoseInertialUnitItWas) {
   EXPECT_TRUE(router->imu().samples.empty());
 }
 
-TEST_F(OusterInput, SurveyTellsItWithoutMetadata) {
+TEST_F(OusterInput, SurveyRecognisesItWithoutMetadata) {
   LidarSurvey survey;
   OusterStream stream;
   for (int i = 0; i < 100; ++i) {
@@ -343,7 +343,7 @@ TEST_F(OusterInput, SurveyTellsItWithoutMetadata) {
 }
 
 /// Two sensors send to one port, lidar and IMU packets alike, all of them fragmented.
-TEST(OusterCapture, TwoSensorsOnOnePortAreToldApart) {
+TEST(OusterCapture, TwoSensorsOnOnePortAreDistinguished) {
   const auto folder = test::test_data() / "ouster";
   if (!std::filesystem::exists(folder / "same_ports_nonlegacy.pcap"))
     GTEST_SKIP() << "no real captures in " << folder << "; set LOCUS_TEST_DATA";

@@ -108,7 +108,7 @@ TEST_P(PacketEditOfOuster, LengthensEveryReturnAndNothingElse) {
     EXPECT_EQ(packet_.firing_groups()[i].intensity, groups[i].intensity);
 }
 
-TEST_P(PacketEditOfOuster, KeepsAReturnOneWhateverIsAsked) {
+TEST_P(PacketEditOfOuster, KeepsEveryReturnValid) {
   lengthen_ranges(bytes_, &metadata_, -1e6);
   ASSERT_EQ(decoder_->decode(bytes_, packet_), std::nullopt);
   EXPECT_FLOAT_EQ(ranges_m(packet_).front(), 1e-3F * static_cast<float>(1U << decoder_->format().profile.range_shift));
@@ -140,14 +140,14 @@ TEST(PacketEdit, AChecksumThatWasWrongStaysWrong) {
   EXPECT_TRUE(std::ranges::equal(std::span{bytes}.last(8), packet.payload().last(8)));
 }
 
-TEST(PacketEdit, NoClockShowsAnythingBeforeItsZero) {
+TEST(PacketEdit, ClocksStayAboveZero) {
   const auto metadata = test::ouster_metadata();
   Bytes bytes = copy_of(test::OusterTestPacket{metadata, 0, 1'000}.payload());
   shift_clock(bytes, &metadata, -1h);
   EXPECT_EQ(ouster::PacketFormat::time_of(metadata.packet_format().column(bytes.data(), 0)), 0U);
 }
 
-TEST(PacketEdit, OfAnInertialUnitItIsTheGyrosTimeTurnAndReadings) {
+TEST(PacketEdit, ShiftsTheTimeAndReadingsOfAnImu) {
   const auto metadata = test::ouster_metadata();
   Bytes bytes = test::ouster_imu_packet(5'000'000'000, {0, 0, 1}, {1, 2, 3});
   shift_clock(bytes, &metadata, 10s);
@@ -160,7 +160,7 @@ TEST(PacketEdit, OfAnInertialUnitItIsTheGyrosTimeTurnAndReadings) {
   EXPECT_TRUE(ouster::read_imu_packet(metadata, bytes, found)) << "not finite";
 }
 
-TEST(PacketEdit, OfNewerInertialPacketsItIsEveryMeasurementAndTheChecksum) {
+TEST(PacketEdit, ShiftsEveryMeasurementAndTheChecksumOfNewerImus) {
   auto metadata = test::ouster_metadata();
   metadata.standard_imu_packets = true;
   metadata.imu_measurements_per_packet = 2;
@@ -250,7 +250,7 @@ INSTANTIATE_TEST_SUITE_P(Models, PacketEditOfHesai, testing::Range(std::size_t{0
                            return std::string{to_string(static_cast<hesai::Model>(model.param))};
                          });
 
-TEST(PacketEdit, OfAVelodyneATimeThatIsNoneStays) {
+TEST(PacketEdit, InvalidVelodyneTimeIsUnchanged) {
   Bytes bytes(velodyne::kDataPacketBytes);
   put_little_endian(&bytes[velodyne::kTimeOffset], 3'600'000'000, 4);
   shift_clock(bytes, nullptr, 1s);
@@ -260,7 +260,7 @@ TEST(PacketEdit, OfAVelodyneATimeThatIsNoneStays) {
   EXPECT_EQ(read_u32(&bytes[velodyne::kTimeOffset]), 0U);
 }
 
-TEST(PacketEdit, OfAVelodyneANarrowViewLeavesWhatIsAhead) {
+TEST(PacketEdit, NarrowViewOfAVelodyneLeavesWhatIsAhead) {
   for (const velodyne::Model model : velodyne::kModels) {
     for (int azimuth_cdeg = 0; azimuth_cdeg < 36'000; azimuth_cdeg += 1'000) {
       test::VelodyneTestPacket packet{model, velodyne::ReturnMode::strongest, 0,
@@ -271,7 +271,7 @@ TEST(PacketEdit, OfAVelodyneANarrowViewLeavesWhatIsAhead) {
   }
 }
 
-TEST(PacketEdit, WhatIsNoPacketStaysAsItIs) {
+TEST(PacketEdit, OtherDatagramsAreUnchanged) {
   const auto metadata = test::ouster_metadata();
   for (const std::size_t size : {0U, 1U, 100U, 1080U}) {
     Bytes bytes(size, std::byte{0xEE});

@@ -40,7 +40,7 @@ struct Link {
   }
 };
 
-TEST(SensorClock, JitterOfTheNetworkDoesNotReachTheStamps) {
+TEST(SensorClock, NetworkJitterDoesNotReachTheStamps) {
   SensorClock clock{LidarTime::receive};
   Link link{.sensor_ahead = seconds{-700}, .drift = 50e-6};
   std::mt19937 random{1};
@@ -73,7 +73,7 @@ TEST(SensorClock, DurationsComeFromTheSensorsClock) {
   }
 }
 
-TEST(SensorClock, LateFirstPacketIsForgottenWithinASecond) {
+TEST(SensorClock, LateFirstPacketIsCorrectedWithinASecond) {
   SensorClock clock{LidarTime::receive};
   Link link;
   link.send(clock, milliseconds{15});
@@ -89,7 +89,7 @@ TEST(SensorClock, LateFirstPacketIsForgottenWithinASecond) {
   EXPECT_EQ(clock.steps(), 0U);
 }
 
-TEST(SensorClock, HourRollsOverUnnoticed) {
+TEST(SensorClock, HourRollOverIsSeamless) {
   for (const LidarTime mode : {LidarTime::receive, LidarTime::sensor, LidarTime::automatic}) {
     SensorClock clock{mode};
     Link link;
@@ -116,7 +116,7 @@ TEST(SensorClock, FewHoursOfSilenceAreNoStep) {
 }
 
 /// The step looks like an hour of silence, and nothing tells how many packets were lost.
-TEST(SensorClock, HostsClockThatIsSetByAnHourIsNoGap) {
+TEST(SensorClock, HostClockStepOfAnHourIsNoGap) {
   for (const LidarTime mode : {LidarTime::receive, LidarTime::sensor}) {
     for (const Duration step : {Duration{hours{1}}, Duration{-hours{1}}}) {
       SensorClock clock{mode};
@@ -136,7 +136,7 @@ TEST(SensorClock, HostsClockThatIsSetByAnHourIsNoGap) {
 
 /// A robot without a clock battery gets the time of day minutes after it has booted. From then on the lidar's UTC
 /// agrees with the wall clock, while internal time is continuous.
-TEST(SensorClock, HostsClockThatIsSetRightMakesALidarOnUtcBelieved) {
+TEST(SensorClock, CorrectedHostClockMakesUtcTrusted) {
   constexpr Duration kHostIsSlow = seconds{600};
   for (const LidarTime mode : {LidarTime::sensor, LidarTime::automatic}) {
     SensorClock clock{mode};
@@ -155,7 +155,7 @@ TEST(SensorClock, HostsClockThatIsSetRightMakesALidarOnUtcBelieved) {
   }
 }
 
-TEST(SensorClock, SensorTimeIsTakenAsTrueWithTheHourOfReception) {
+TEST(SensorClock, SensorTimeUsesTheHourOfReception) {
   SensorClock clock{LidarTime::sensor};
   Link link{.sensor_ahead = milliseconds{368}};
   for (int i = 0; i < 100; ++i) {
@@ -165,7 +165,7 @@ TEST(SensorClock, SensorTimeIsTakenAsTrueWithTheHourOfReception) {
   }
 }
 
-TEST(SensorClock, AutomaticTakesSensorTimeOnlyWhileSynchronisedAndInAgreementWithTheHost) {
+TEST(SensorClock, AutomaticUsesSensorTimeOnlyIfSynchronisedAndConsistent) {
   const auto error_after = [](Duration ahead, bool synchronised) {
     SensorClock clock{LidarTime::automatic};
     clock.set_synchronised(synchronised);
@@ -178,7 +178,7 @@ TEST(SensorClock, AutomaticTakesSensorTimeOnlyWhileSynchronisedAndInAgreementWit
   EXPECT_NEAR(to_seconds(error_after(milliseconds{368}, true)), 100e-6, 2e-6) << "the host's clock is not on UTC";
 }
 
-TEST(SensorClock, PacketsThatComeLateDoNotShakeATrueTime) {
+TEST(SensorClock, LatePacketsDoNotAffectSensorTime) {
   SensorClock clock{LidarTime::automatic};
   clock.set_synchronised(true);
   Link link{.sensor_ahead = milliseconds{2}};
@@ -191,7 +191,7 @@ TEST(SensorClock, PacketsThatComeLateDoNotShakeATrueTime) {
   EXPECT_EQ(clock.steps(), 0U);
 }
 
-TEST(SensorClock, PacketsThatComeLateForHalfAMinuteShowThatAClockIsWrong) {
+TEST(SensorClock, HalfAMinuteOfLatePacketsRevealsAWrongClock) {
   SensorClock clock{LidarTime::automatic};
   clock.set_synchronised(true);
   Link link;
@@ -202,7 +202,7 @@ TEST(SensorClock, PacketsThatComeLateForHalfAMinuteShowThatAClockIsWrong) {
   EXPECT_EQ(clock.steps(), 1U);
 }
 
-TEST(SensorClock, TrueTimeIsLeftWhenTheLockIsLostAndWhenAClockIsSet) {
+TEST(SensorClock, SensorTimeEndsWithTheLockOrAClockStep) {
   for (const Duration step : {Duration{-milliseconds{500}}, Duration{seconds{-10}}, Duration{seconds{10}}}) {
     SensorClock clock{LidarTime::automatic};
     clock.set_synchronised(true);
@@ -230,7 +230,7 @@ TEST(SensorClock, TrueTimeIsLeftWhenTheLockIsLostAndWhenAClockIsSet) {
   EXPECT_EQ(clock.steps(), 0U) << "the zero of the ruler has moved, not the clock";
 }
 
-TEST(SensorClock, SetClockIsAStepThatIsSurvived) {
+TEST(SensorClock, ClockStepIsFollowed) {
   for (const LidarTime mode : {LidarTime::receive, LidarTime::sensor}) {
     for (const Duration step : {Duration{seconds{10}}, Duration{seconds{-10}}, Duration{-milliseconds{500}}}) {
       SensorClock clock{mode};
@@ -250,7 +250,7 @@ TEST(SensorClock, SetClockIsAStepThatIsSurvived) {
   }
 }
 
-TEST(SensorClock, PacketsHeldUpForSecondsThatComeAllAtOnceAreNoStep) {
+TEST(SensorClock, PacketBurstAfterSecondsIsNoStep) {
   for (const Duration held_up : {Duration{milliseconds{1500}}, Duration{seconds{5}}}) {
     SensorClock clock{LidarTime::receive};
     Link link;
@@ -270,7 +270,7 @@ TEST(SensorClock, PacketsHeldUpForSecondsThatComeAllAtOnceAreNoStep) {
   }
 }
 
-TEST(SensorClock, BurstThatPausesCostsLittleOfWhatComesInTimeAfterIt) {
+TEST(SensorClock, PausedBurstCostsFewPackets) {
   SensorClock clock{LidarTime::receive};
   Link link;
   for (int i = 0; i < 2000; ++i)
@@ -284,7 +284,7 @@ TEST(SensorClock, BurstThatPausesCostsLittleOfWhatComesInTimeAfterIt) {
   EXPECT_LT(refused * kPacket, milliseconds{150});
 }
 
-TEST(SensorClock, StartAmidPacketsThatComeAllAtOnceIsForgottenAtOnce) {
+TEST(SensorClock, StartWithinABurstIsCorrectedAtOnce) {
   SensorClock clock{LidarTime::receive};
   Link link;
   const Stamp released = link.now + seconds{2};
@@ -299,7 +299,7 @@ TEST(SensorClock, StartAmidPacketsThatComeAllAtOnceIsForgottenAtOnce) {
   EXPECT_LT(std::chrono::abs(*error), microseconds{150});
 }
 
-TEST(SensorClock, PacketsThatComeInBatchesAreTakenFromTheThirdOn) {
+TEST(SensorClock, BatchedPacketsAreAcceptedFromTheThirdOn) {
   SensorClock clock{LidarTime::receive};
   Link link;
   const Duration batch = milliseconds{100};
@@ -312,7 +312,7 @@ TEST(SensorClock, PacketsThatComeInBatchesAreTakenFromTheThirdOn) {
   }
 }
 
-TEST(SensorClock, ReplayAtTwentyTimesTheSpeedGoesOnAfterAGap) {
+TEST(SensorClock, TwentyfoldReplayContinuesAfterAGap) {
   SensorClock clock{LidarTime::sensor};
   Link link;
   Stamp receive = link.now;
@@ -325,7 +325,7 @@ TEST(SensorClock, ReplayAtTwentyTimesTheSpeedGoesOnAfterAGap) {
   EXPECT_EQ(refused, 4) << "the fifth proves it";
 }
 
-TEST(SensorClock, LoneWrongTimesAreRefusedAndChangeNothing) {
+TEST(SensorClock, SingleWrongTimesAreRejected) {
   SensorClock clock{LidarTime::receive};
   Link link;
   for (int i = 0; i < 2000; ++i) {
@@ -339,7 +339,7 @@ TEST(SensorClock, LoneWrongTimesAreRefusedAndChangeNothing) {
   EXPECT_EQ(clock.steps(), 0U);
 }
 
-TEST(SensorClock, TimeThatRunsBackwardsIsNeverBelieved) {
+TEST(SensorClock, BackwardTimeIsNeverTrusted) {
   SensorClock clock{LidarTime::receive};
   Duration time_of_hour = seconds{1800};
   ASSERT_TRUE(clock.read(time_of_hour, kPacket, stamp_from_ns(kEpoch)));
@@ -389,7 +389,7 @@ TEST(SensorClock, ReplayAtTenTimesTheSpeedWorksInSensorTime) {
   EXPECT_EQ(clock.steps(), 0U);
 }
 
-TEST(SensorClock, NoStampsBreakIt) {
+TEST(SensorClock, AnyStampsAreSurvived) {
   std::mt19937_64 random{5};
   std::uniform_int_distribution<std::int64_t> hour{0, hours{1} / nanoseconds{1} - 1};
   std::uniform_int_distribution<std::int64_t> stamp{0, 9'000'000'000'000'000'000};

@@ -11,7 +11,7 @@ using std::chrono::seconds;
 
 constexpr Stamp kNow{seconds{1'726'766'428}};
 
-TEST(SensorTime, IsToldByTheArrivalOfThePacket) {
+TEST(SensorTime, ScaleIsInferredFromTheArrival) {
   const Duration now = kNow.time_since_epoch();
   for (const bool is_set_to_ptp : {false, true}) {
     EXPECT_EQ(scale_of(is_set_to_ptp, seconds{866}, kNow), TimeScale::free_running) << "since its start";
@@ -20,7 +20,7 @@ TEST(SensorTime, IsToldByTheArrivalOfThePacket) {
   }
 }
 
-TEST(SensorTime, OfPtpIsTaiWhateverTheHostsClockSays) {
+TEST(SensorTime, PtpIsTaiWhateverTheHostClock) {
   const Duration hour_ago = kNow.time_since_epoch() - seconds{3600};
   EXPECT_EQ(scale_of(true, hour_ago, kNow), TimeScale::tai);
   EXPECT_EQ(scale_of(false, hour_ago, kNow), TimeScale::free_running);

@@ -45,7 +45,7 @@ TEST_P(PoseAtAngle, ExponentialIsTheLimitOfManySmallSteps) {
   EXPECT_LT(largest_difference(T, se3_exp(tangent)), 2e-3);
 }
 
-TEST_P(PoseAtAngle, AdjointTakesATwistToTheOtherFrame) {
+TEST_P(PoseAtAngle, AdjointTransformsATwistToTheOtherFrame) {
   std::mt19937_64 random{3};
   const Pose T{so3_exp(GetParam() * random_direction(random)), 3 * random_direction(random)};
   Vector6 twist;
@@ -58,7 +58,7 @@ TEST_P(PoseAtAngle, AdjointTakesATwistToTheOtherFrame) {
 INSTANTIATE_TEST_SUITE_P(Angles, PoseAtAngle,
                          testing::Values(0.0, 1e-12, 1e-8, 0.99e-4, 1.01e-4, 1e-3, 0.5, 2.0, kPi - 1e-3, kPi - 1e-6));
 
-TEST(Pose, LogarithmTakesTheShorterWayRound) {
+TEST(Pose, LogarithmIsOfTheShorterRotation) {
   EXPECT_NEAR(so3_log(so3_exp({0, 0, kPi + 0.1})).z(), -kPi + 0.1, 1e-12);
   const Eigen::Quaterniond q = so3_exp({0.3, -0.2, 0.1});
   EXPECT_LT((so3_log(Eigen::Quaterniond{-q.coeffs()}) - so3_log(q)).norm(), 1e-15);
@@ -78,7 +78,7 @@ TEST(Pose, AMillionProductsStayARotation) {
   EXPECT_NEAR(T.rotation.norm(), 1.0, 1e-12);
 }
 
-TEST(Pose, InterpolationMeetsItsEndsAndGoesOnBeyond) {
+TEST(Pose, InterpolationMeetsItsEndsAndExtrapolates) {
   const Pose from{so3_exp({0, 0, 0.5}), {1, 2, 3}};
   const Pose to{so3_exp({0, 0, 1.5}), {2, 4, 3}};
   EXPECT_LT(largest_difference(interpolate(from, to, 0.0), from), 1e-12);
@@ -105,7 +105,7 @@ TEST(Pose, DifferenceIsAlongTheAxesOfTheCommonFrame) {
   EXPECT_LT((difference(T_b_a * T, T_b_a * reference) - turn_both(T_b_a.rotation) * off).norm(), 1e-12);
 }
 
-TEST(Pose, RollPitchYawComeBack) {
+TEST(Pose, RollPitchYawRoundTrip) {
   for (const double yaw : {-3.0, 0.0, 1.0})
     for (const double pitch : {-1.5, 0.0, 0.7})
       for (const double roll : {-2.0, 0.0, 3.0})

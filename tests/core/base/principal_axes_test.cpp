@@ -28,7 +28,7 @@ template <class Real> PrincipalAxes<Real> axes_of(const Eigen::Matrix3d& m) {
   return principal_axes<Real>({of(0, 0), of(0, 1), of(0, 2), of(1, 1), of(1, 2), of(2, 2)});
 }
 
-TEST(PrincipalAxes, OfPointsOnAPlaneAreThoseOfAGeneralSolver) {
+TEST(PrincipalAxes, OfAPlaneEqualThoseOfAGeneralSolver) {
   for (unsigned seed = 0; seed < 1000; ++seed) {
     const double middle = std::pow(10.0, -2.0 + 0.002 * seed), least = 1e-4 + 1e-4 * (seed % 100) * middle;
     const Eigen::Matrix3d m = scatter({least, middle, 1.5 * middle}, seed);
@@ -43,7 +43,7 @@ TEST(PrincipalAxes, OfPointsOnAPlaneAreThoseOfAGeneralSolver) {
   }
 }
 
-TEST(PrincipalAxes, OfABallOrALineLookLikeNoPlane) {
+TEST(PrincipalAxes, OfABallOrALineAreNotPlanar) {
   for (unsigned seed = 0; seed < 100; ++seed) {
     const PrincipalAxes<double> ball = axes_of<double>(scatter({1.0, 1.0, 1.0}, seed));
     EXPECT_GT(ball.least, 0.5 * ball.middle);
@@ -69,7 +69,7 @@ TEST(PrincipalAxes, OfTwoPointsAreFinite) {
   }
 }
 
-TEST(PrincipalAxes, OfOnePlaceAreFinite) {
+TEST(PrincipalAxes, OfCoincidentPointsAreFinite) {
   const PrincipalAxes<float> axes = axes_of<float>(Eigen::Matrix3d::Zero());
   for (const float figure : {axes.least, axes.middle, axes.greatest, axes.x, axes.y, axes.z})
     EXPECT_EQ(figure, 0.0F);

@@ -51,7 +51,7 @@ sim::Trajectory there_and_back(const sim::Start& start) {
 }
 
 /// Sweeps of a robot at rest whose gyro starts to report a false rate in the middle of one.
-TEST(MotionCorrection, IsTakenBackWhereTheGyroWasWrong) {
+TEST(MotionCorrection, OfAWrongGyroIsUndone) {
   const sim::Trajectory trajectory(sim::Course{}.stand(seconds{2}), sim::room_start());
   RobotSetup setup;
   setup.imu = sim::ImuFaults{.gyro_noise_radps = 1e-4};
@@ -110,7 +110,7 @@ TEST(MotionCorrection, BringsEveryPointOfATunnelToItsSurface) {
   EXPECT_LT(farthest_from_its_surface_m(sim::tunnel(20), there_and_back({.position_m = {5, 0}})), 0.02);
 }
 
-TEST(MotionCorrection, WithoutItPointsLieFarOff) {
+TEST(MotionCorrection, WithoutItPointsAreFarFromTheirSurface) {
   const sim::Trajectory laps(sim::room_course(kDrive, 1.0), sim::room_start());
   EXPECT_GT(farthest_from_its_surface_m(sim::room(), laps, false), 0.2) << "else the tests above prove nothing";
 }

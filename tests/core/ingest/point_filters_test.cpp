@@ -47,7 +47,7 @@ TEST(VoxelFilter, PointsOfAVoxelBecomeTheirMean) {
   EXPECT_EQ(points[1].position_base_m, Eigen::Vector3f(5, 5, 5));
 }
 
-TEST(VoxelFilter, TheOrderIsThatOfTheFirstPointsOfTheVoxels) {
+TEST(VoxelFilter, OrderIsThatOfTheFirstPointOfEachVoxel) {
   VoxelFilter filter({.enabled = true, .leaf_m = 1.0}, 10);
   std::vector<SweepPoint> points{point(9.5F, 0.5F, 0.5F), point(-3.5F, 0.5F, 0.5F), point(4.5F, 0.5F, 0.5F),
                                  point(-3.4F, 0.5F, 0.5F), point(9.6F, 0.5F, 0.5F)};
@@ -65,7 +65,7 @@ TEST(VoxelFilter, BothSidesOfZeroAreDifferentVoxels) {
   EXPECT_EQ(points.size(), 2U);
 }
 
-TEST(VoxelFilter, NoPointsAreNoPoints) {
+TEST(VoxelFilter, EmptyInputGivesEmptyOutput) {
   VoxelFilter filter({.enabled = true, .leaf_m = 1.0}, 2);
   std::vector<SweepPoint> points;
   filter.apply(points);
@@ -100,7 +100,7 @@ TEST(RandomFilter, TheSameSeedMakesTheSameChoices) {
   EXPECT_NE(choices(7)[0], choices(7)[1]) << "not the same points of every sweep";
 }
 
-TEST(RandomFilter, EveryPointIsAsLikelyAsAnyOther) {
+TEST(RandomFilter, EveryPointIsEquallyLikely) {
   RandomFilter filter({.enabled = true, .keep = 0.2}, 3);
   std::vector<int> times_kept(50);
   constexpr int kSweeps = 5000;

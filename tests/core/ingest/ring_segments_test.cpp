@@ -55,7 +55,7 @@ double tank(double) { return 5.0; }
 /// Range to the walls of a square room of 8 m, from its centre.
 double square_room(double azimuth) { return 4.0 / std::max(std::abs(std::cos(azimuth)), std::abs(std::sin(azimuth))); }
 
-TEST(RingSegments, CentroidsComeByScanLineAndWithinItByTime) {
+TEST(RingSegments, CentroidsAreOrderedByScanLineThenTime) {
   RingSegments segments(2, 100);
   for (const int line : {7, 0, 256 + 3, 2})
     scan(segments, static_cast<std::uint16_t>(line), tank);
@@ -70,7 +70,7 @@ TEST(RingSegments, CentroidsComeByScanLineAndWithinItByTime) {
   }
 }
 
-TEST(RingSegments, ACentroidHasTheMeanPlaceTimeAndIntensityOfItsReturns) {
+TEST(RingSegments, CentroidIsTheMeanOfItsReturns) {
   RingSegments segments(1, 100);
   std::vector<std::uint32_t> used;
   for (int i = 0; i < 4; ++i)
@@ -87,7 +87,7 @@ TEST(RingSegments, ACentroidHasTheMeanPlaceTimeAndIntensityOfItsReturns) {
   EXPECT_TRUE(points[0].normal_base.isZero());
 }
 
-TEST(RingSegments, AStepInRangeIsAnotherSurface) {
+TEST(RingSegments, RangeStepStartsANewSegment) {
   RingSegments segments(1, 100);
   const std::uint32_t wall = add(segments, 0, {5.0F, 0.0F, 0.0F}, 5.0F, 0.0F, 0.0F);
   const std::uint32_t pillar = add(segments, 0, {4.5F, 0.01F, 0.0F}, 4.5F, 0.001F, 0.0F);
@@ -109,7 +109,7 @@ TEST(RingSegments, NoSegmentIsLongerThanTheLargestLeaf) {
   }
 }
 
-TEST(RingSegments, TheLeafFollowsTheSceneToTheNumberWanted) {
+TEST(RingSegments, LeafAdaptsToTheRequestedNumber) {
   RingSegments segments(1, 1000); // 8 lines of 31 m: a leaf of 0.25 m
   std::vector<SweepPoint> points;
   for (int sweep = 0; sweep < 10; ++sweep) {
@@ -143,7 +143,7 @@ TEST(RingSegments, NoCentroidCutsACorner) {
   EXPECT_TRUE(corner_left_out);
 }
 
-TEST(RingSegments, MoreThanFitAreRefused) {
+TEST(RingSegments, ExcessSegmentsAreRejected) {
   RingSegments segments(1, 1000);
   std::size_t refused = 0;
   for (std::size_t i = 0; i < RingSegments::kMaxSegments + 100; ++i) {
@@ -158,7 +158,7 @@ TEST(RingSegments, MoreThanFitAreRefused) {
   EXPECT_NE(add(segments, 0, {5, 0, 0}, 5.0F, 0.0F, 0.0F), RingSegments::kNone) << "the next sweep starts afresh";
 }
 
-TEST(RingSegments, ACentroidIsMovedWithTheInstantThatIsItsMean) {
+TEST(RingSegments, CentroidIsDeskewedAtItsMeanTime) {
   RingSegments segments(1, 100);
   PacketMotion motion;
   motion.stamp_s = 0.02F;
@@ -174,7 +174,7 @@ TEST(RingSegments, ACentroidIsMovedWithTheInstantThatIsItsMean) {
   EXPECT_NEAR(points[0].age_s, 0.1F - 0.0205F, 1e-6F);
 }
 
-TEST(RingSegments, ALaserThatSeesNothingForAWholePacketBeginsAnew) {
+TEST(RingSegments, LaserWithoutReturnsForAPacketStartsANewSegment) {
   RingSegments segments(1, 100);
   const auto hit = [&] { return add(segments, 0, {5.0F, 0.0F, 0.0F}, 5.0F, 0.0F, 0.0F); };
   segments.begin_packet(0, {});
@@ -186,7 +186,7 @@ TEST(RingSegments, ALaserThatSeesNothingForAWholePacketBeginsAnew) {
   EXPECT_NE(hit(), first);
 }
 
-TEST(RingSegments, AnEmptySweepIsEmpty) {
+TEST(RingSegments, EmptySweepHasNoCentroids) {
   RingSegments segments(1, 1000);
   std::vector<SweepPoint> points(3);
   segments.finish(kSweep_s, points);

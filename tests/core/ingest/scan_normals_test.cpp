@@ -76,7 +76,7 @@ TEST(ScanNormals, AFloorPointsUp) {
   }
 }
 
-TEST(ScanNormals, WherePlanesMeetANormalIsThatOfOneOfThemOrNone) {
+TEST(ScanNormals, EdgeNormalBelongsToOnePlaneOrNone) {
   const auto points = with_normals(scan(16, walls));
   EXPECT_GT(count_with_normal(points), points.size() * 9 / 10);
   for (const SweepPoint& p : points) {
@@ -93,15 +93,15 @@ TEST(ScanNormals, WherePlanesMeetANormalIsThatOfOneOfThemOrNone) {
   }
 }
 
-TEST(ScanNormals, OnASingleLineNothingIsKnown) { EXPECT_EQ(count_with_normal(with_normals(scan(1, walls))), 0U); }
+TEST(ScanNormals, SingleScanLineHasNoNormals) { EXPECT_EQ(count_with_normal(with_normals(scan(1, walls))), 0U); }
 
-TEST(ScanNormals, LinesThatAreNotNeighboursDoNotSpeakForEachOther) {
+TEST(ScanNormals, OnlyNeighbouringLinesSupportEachOther) {
   std::vector<SweepPoint> points = scan(16, walls);
   std::erase_if(points, [](const SweepPoint& p) { return p.scan_line % 2 == 1; });
   EXPECT_EQ(count_with_normal(with_normals(points)), 0U);
 }
 
-TEST(ScanNormals, TwoCentimetresOfNoiseTurnTheNormalsByAFewDegrees) {
+TEST(ScanNormals, TwoCentimetresOfNoiseCostAFewDegrees) {
   const auto points = with_normals(scan(16, walls, 0.02));
   std::vector<double> off_deg;
   for (const SweepPoint& p : points)
@@ -112,13 +112,13 @@ TEST(ScanNormals, TwoCentimetresOfNoiseTurnTheNormalsByAFewDegrees) {
   EXPECT_LT(off_deg[off_deg.size() / 2], 15.0);
 }
 
-TEST(ScanNormals, ThicketHasFew) {
+TEST(ScanNormals, ThicketHasFewNormals) {
   const auto points = with_normals(scan(
       16, [](const Eigen::Vector3d&) { return std::optional{4.0}; }, 0.5));
   EXPECT_LT(count_with_normal(points), points.size() / 5);
 }
 
-TEST(ScanNormals, NothingComesOfNothing) {
+TEST(ScanNormals, EmptyInputIsAccepted) {
   std::vector<SweepPoint> points;
   ScanNormals(0).estimate(points);
   EXPECT_TRUE(points.empty());

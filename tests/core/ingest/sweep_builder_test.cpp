@@ -158,7 +158,7 @@ INSTANTIATE_TEST_SUITE_P(Speeds, SweepsAtAnySpeed,
                          testing::Combine(testing::Values(300.0, 593.0, 600.0, 707.0, 1200.0),
                                           testing::Values(0.0, 123.4, 359.9)));
 
-TEST(SweepBuilder, TheCutIsBetweenFiringsNotBetweenPackets) {
+TEST(SweepBuilder, SweepsAreCutBetweenFirings) {
   SweepOptions options = keep_all();
   options.sweep_period = milliseconds{100};
   NumberedLidar lidar;
@@ -189,7 +189,7 @@ TEST(SweepBuilder, TwoLidarsNeedNoPhaseLock) {
   }
 }
 
-TEST(SweepBuilder, ADeadLidarIsSimplyNotThere) {
+TEST(SweepBuilder, DeadLidarDoesNotHoldUpTheOthers) {
   NumberedLidar front(0), rear(1, 600, 90);
   Built built(keep_all(), 2);
   while (rear.next() < kStart + seconds{2}) {
@@ -239,7 +239,7 @@ TEST(SweepBuilder, WindowsDoNotCloseBeforeTheirTime) {
   EXPECT_EQ(built.sweeps.size(), before);
 }
 
-TEST(SweepBuilder, TimeThatRanBackwardsIsANewStart) {
+TEST(SweepBuilder, BackwardTimeRestarts) {
   NumberedLidar lidar;
   Built built;
   built.play(lidar, seconds{1});
@@ -256,7 +256,7 @@ TEST(SweepBuilder, TimeThatRanBackwardsIsANewStart) {
 }
 
 /// Packets delayed by a stalled network while other sensors advanced the time.
-TEST(SweepBuilder, PacketsThatWereHeldUpAndComeAllAtOnceAreNoNewStart) {
+TEST(SweepBuilder, PacketBurstDoesNotRestart) {
   NumberedLidar lidar;
   Built built;
   built.play(lidar, seconds{1});
@@ -275,7 +275,7 @@ TEST(SweepBuilder, PacketsThatWereHeldUpAndComeAllAtOnceAreNoNewStart) {
 
 /// A sender that waits for a processor sends what it has saved up in time slices, slowly. This was taken for a clock
 /// that was set back: sweeps ended before others that were already given out.
-TEST(SweepBuilder, PacketsThatCatchUpSlowlyAreNoNewStart) {
+TEST(SweepBuilder, SlowCatchUpDoesNotRestart) {
   NumberedLidar lidar;
   Built built;
   built.play(lidar, seconds{1});
@@ -291,7 +291,7 @@ TEST(SweepBuilder, PacketsThatCatchUpSlowlyAreNoNewStart) {
 }
 
 /// The stamps of tf go back only where waiting would take longer than a listener bridges.
-TEST(SweepBuilder, ClockThatIsSetBackByASecondIsWaitedFor) {
+TEST(SweepBuilder, OneSecondBackwardStepIsWaitedOut) {
   for (const auto& [set_back, restarts] : {std::pair{milliseconds{1500}, 0U}, std::pair{milliseconds{5000}, 1U}}) {
     NumberedLidar lidar;
     Built built;
@@ -307,7 +307,7 @@ TEST(SweepBuilder, ClockThatIsSetBackByASecondIsWaitedFor) {
   }
 }
 
-TEST(SweepBuilder, AJumpForwardByAnHourIsNoRunOfEmptyWindows) {
+TEST(SweepBuilder, ForwardJumpOfAnHourSkipsEmptyWindows) {
   NumberedLidar lidar;
   Built built;
   built.play(lidar, seconds{1});
@@ -319,7 +319,7 @@ TEST(SweepBuilder, AJumpForwardByAnHourIsNoRunOfEmptyWindows) {
   EXPECT_GE(built.sweeps.back().start, jumped_to);
 }
 
-TEST(SweepBuilder, AnOldPacketIsCountedAndLeftOut) {
+TEST(SweepBuilder, LatePacketIsCountedAndDropped) {
   NumberedLidar lidar;
   Built built;
   const LidarPacket old = lidar.packet();
@@ -333,7 +333,7 @@ TEST(SweepBuilder, AnOldPacketIsCountedAndLeftOut) {
   expect_each_return_in_its_sweep(built.sweeps, {&lidar});
 }
 
-TEST(SweepBuilder, PacketsThatOvertakeEachOtherAreNoLoss) {
+TEST(SweepBuilder, ReorderedPacketsAreNotLost) {
   NumberedLidar lidar;
   Built built;
   while (lidar.next() < kStart + seconds{1}) {
@@ -356,7 +356,7 @@ TEST(SweepBuilder, PacketsThatOvertakeEachOtherAreNoLoss) {
   }
 }
 
-TEST(SweepBuilder, TheLastWindowCountsWhenItIsLongerThanHalfAPeriod) {
+TEST(SweepBuilder, LastWindowCountsFromHalfAPeriodOn) {
   SweepOptions options = keep_all();
   options.sweep_period = milliseconds{100};
   for (const auto& [played, expected] : {std::pair{940, 9U}, std::pair{960, 10U}}) {
@@ -459,7 +459,7 @@ TEST(SweepBuilder, ReturnsFromTheRobotItselfAreDropped) {
   EXPECT_EQ(seen, built.sweeps.front().raw_returns - 1001);
 }
 
-TEST(SweepBuilder, MoreThanFitIntoMemoryAreCounted) {
+TEST(SweepBuilder, PointsBeyondTheMemoryAreCounted) {
   NumberedLidar lidar;
   Built built(keep_all(), 1, {}, 10'000);
   built.play(lidar, milliseconds{150});
@@ -468,7 +468,7 @@ TEST(SweepBuilder, MoreThanFitIntoMemoryAreCounted) {
   EXPECT_GE(built.builder.counters().overflowed_points, built.sweeps.front().raw_returns - 10'000);
 }
 
-TEST(SweepBuilder, ASinkMayTakeThePointsAway) {
+TEST(SweepBuilder, SinkMayMoveThePointsOut) {
   NumberedLidar lidar;
   std::vector<SweepPoint> mine;
   std::size_t sweeps = 0;
@@ -511,7 +511,7 @@ class SweepsOfAMovingRobot : public testing::Test {
   }
 };
 
-TEST_F(SweepsOfAMovingRobot, PointsAreSeenFromTheEndOfTheSweep) {
+TEST_F(SweepsOfAMovingRobot, PointsAreInTheFrameAtTheEndOfTheSweep) {
   const std::vector<Sweep> corrected = sweeps(keep_all(), true);
   ASSERT_GE(corrected.size(), 9U);
   for (const Sweep& sweep : corrected) {
@@ -522,7 +522,7 @@ TEST_F(SweepsOfAMovingRobot, PointsAreSeenFromTheEndOfTheSweep) {
   }
 }
 
-TEST_F(SweepsOfAMovingRobot, WithoutCorrectionPointsStayWhereTheyWereMeasured) {
+TEST_F(SweepsOfAMovingRobot, WithoutDeskewPointsAreAsMeasured) {
   SweepOptions options = keep_all();
   options.motion_correction = false;
   for (const Sweep& sweep : sweeps(options, true)) {
@@ -533,7 +533,7 @@ TEST_F(SweepsOfAMovingRobot, WithoutCorrectionPointsStayWhereTheyWereMeasured) {
   }
 }
 
-TEST_F(SweepsOfAMovingRobot, WithoutASourceAllIsLeftToOdometry) {
+TEST_F(SweepsOfAMovingRobot, WithoutASourceDeskewIsLeftToOdometry) {
   for (const Sweep& sweep : sweeps(keep_all(), false)) {
     EXPECT_EQ(sweep.uncorrected, Uncorrected::all);
     for (const SweepPoint& point : sweep.points)
@@ -551,7 +551,7 @@ TEST(RevolutionTimer, KnowsTheSpeedAfterOneRevolution) {
   }
 }
 
-TEST(RevolutionTimer, IsNotConfusedByAGapOrAnotherLidar) {
+TEST(RevolutionTimer, IgnoresGapsAndOtherLidars) {
   RevolutionTimer timer;
   NumberedLidar front(0, 600), rear(1, 1200);
   for (int i = 0; i < 300; ++i) {

@@ -51,7 +51,7 @@ TEST(Gicp, FindsAKnownMotion) {
   }
 }
 
-TEST(Gicp, PointsWithoutNormalsWillDo) {
+TEST(Gicp, PointsNeedNoNormals) {
   const SurfaceMap map = map_of(test::points_on(test::furnished_room(), 3000, 1, 0.01));
   const Pose truth{so3_exp({0.02, -0.01, 0.05}), {0.1, -0.15, 0.05}};
   const auto source = test::seen_from(truth, test::points_on(test::furnished_room(), 400, 2, 0.01));
@@ -70,7 +70,7 @@ TEST(Gicp, WideReachesHalfAMetreAndTenDegrees) {
   EXPECT_LT(off_deg(found.T_target_source, truth), 0.1);
 }
 
-TEST(Gicp, OutliersArePushedAside) {
+TEST(Gicp, OutliersAreRejected) {
   const SurfaceMap map = map_of(test::points_on(test::furnished_room(), 3000, 1, 0.01));
   const Pose truth{so3_exp({0, 0, 0.05}), {0.15, 0.1, 0}};
   auto points = test::points_on(test::furnished_room(), 400, 2, 0.01);
@@ -134,7 +134,7 @@ TEST(Gicp, StopEndsTheWorkEarly) {
   EXPECT_TRUE(stopped.T_target_source.finite());
 }
 
-TEST(Gicp, NeverStepsMoreOftenThanItMay) {
+TEST(Gicp, IterationsAreLimited) {
   const SurfaceMap map = map_of(test::points_on(test::furnished_room(), 3000));
   const auto source =
       test::seen_from({so3_exp({0, 0, 0.1}), {0.3, 0, 0}}, test::points_on(test::furnished_room(), 400, 2));
@@ -169,7 +169,7 @@ TEST(Gicp, FarFromTheMapTheStartIsTheResult) {
   EXPECT_EQ(found.T_target_source, start);
 }
 
-TEST(Gicp, PointsThatAreNotNumbersDoNotCount) {
+TEST(Gicp, NonFinitePointsAreIgnored) {
   constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   const SurfaceMap map = map_of(test::points_on(test::furnished_room(), 3000, 1, 0.01));
@@ -182,7 +182,7 @@ TEST(Gicp, PointsThatAreNotNumbersDoNotCount) {
   EXPECT_LT(off_m(found.T_target_source, truth), 0.01);
 }
 
-TEST(Gicp, TheInformationTellsTheErrorsThatAreMade) {
+TEST(Gicp, InformationMatchesTheErrors) {
   const SurfaceMap map = map_of(test::points_on(test::furnished_room(), 5000, 1, 0.0));
   Gicp gicp(1);
   double squared = 0.0, dimensions = 0.0;
@@ -214,19 +214,19 @@ TEST(FitOf, MoreAndNearerPointsFitBetter) {
   EXPECT_EQ(fit_of(fitting(0)), 0.0);
 }
 
-TEST(FitOf, APointThreeSigmaOffIsWorthNoMoreThanOneWithoutCorrespondence) {
+TEST(FitOf, PointAtThreeSigmaCountsAsNoCorrespondence) {
   EXPECT_EQ(fit_of(fitting(500, 9.0)), fit_of(fitting(0)));
   // 1000 points, half with a residual of 1 and half of 9, are as good as 500 of 1 and 500 without a correspondence.
   EXPECT_DOUBLE_EQ(fit_of(fitting(1000, 5.0)), fit_of(fitting(500, 1.0)));
 }
 
-TEST(Evidence, IsForWhatFitsBetterAndAgainstTheOther) {
+TEST(Evidence, FavoursTheBetterFit) {
   EXPECT_GT(evidence(fitting(900), fitting(800)), 0.0);
   EXPECT_DOUBLE_EQ(evidence(fitting(900), fitting(800)), -evidence(fitting(800), fitting(900)));
   EXPECT_EQ(evidence(fitting(900), fitting(900)), 0.0);
 }
 
-TEST(Evidence, CountsAPointAsTheInformationOfTheRegistrationDoes) {
+TEST(Evidence, WeighsPointsAsTheRegistrationDoes) {
   // A hundred points more, 4.2 less 1 each, of which 0.06 count as independent. Shares of 0.45 and 0.55 are as likely.
   EXPECT_NEAR(evidence(fitting(550, 1.0), fitting(450, 1.0)), 0.06 * 100.0 * 3.2, 1e-9);
   // Surfaces that fit as well as is possible.
@@ -234,13 +234,13 @@ TEST(Evidence, CountsAPointAsTheInformationOfTheRegistrationDoes) {
   EXPECT_NEAR(evidence(fitting(900, 0.1), fitting(900, 0.2)), 0.06 / 0.3 * 900.0 * 0.1, 1e-9);
 }
 
-TEST(Evidence, WhereLittleIsMappedSlidingBackOntoTheMapGainsNothing) {
+TEST(Evidence, SlidingBackOntoASparseMapGainsNothing) {
   EXPECT_GT(evidence(fitting(900), fitting(800)), 10.0);
   EXPECT_LT(evidence(fitting(200), fitting(100)), 0.0);
   EXPECT_LT(evidence(fitting(100), fitting(0)), 0.0);
 }
 
-TEST(Evidence, WhereTheSceneFitsBadlyADifferenceSaysLess) {
+TEST(Evidence, BadFitLowersTheWeightOfADifference) {
   EXPECT_NEAR(evidence(fitting(900, 3.0), fitting(900, 3.5)), evidence(fitting(900, 1.0), fitting(900, 1.5)) / 3.0,
               1e-9);
 }

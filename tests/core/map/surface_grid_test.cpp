@@ -35,7 +35,7 @@ void insert_voxels_along_x(SurfaceGrid& grid, int from, int to) {
 
 bool has_voxel_along_x(const SurfaceGrid& grid, int i) { return grid.find({i, 0, 0}) != nullptr; }
 
-TEST(SurfaceGrid, FindsWhatWasInserted) {
+TEST(SurfaceGrid, FindsInsertedPoints) {
   SurfaceGrid grid(kLeaf_m, kEnoughBytes);
   const Eigen::Vector3d p{3.1, -2.2, 0.7};
   EXPECT_EQ(grid.find(grid.index_of(p)), nullptr);
@@ -48,14 +48,14 @@ TEST(SurfaceGrid, FindsWhatWasInserted) {
   EXPECT_EQ(grid.find({0, 0, 0}), nullptr);
 }
 
-TEST(SurfaceGrid, TheIndexIsOfTheNearestCentre) {
+TEST(SurfaceGrid, IndexIsThatOfTheNearestCentre) {
   const SurfaceGrid grid(kLeaf_m, kEnoughBytes);
   EXPECT_EQ(grid.index_of({0.24, -0.24, 0.0}), (VoxelIndex{0, 0, 0}));
   EXPECT_EQ(grid.index_of({0.26, -0.26, 0.0}), (VoxelIndex{1, -1, 0}));
   EXPECT_EQ(grid.centre_of({2, -3, 0}), Eigen::Vector3d(1.0, -1.5, 0.0));
 }
 
-TEST(SurfaceGrid, APointThatKnowsItsNormalIsAPlane) {
+TEST(SurfaceGrid, PointWithNormalIsPlanar) {
   SurfaceGrid grid(kLeaf_m, kEnoughBytes);
   const Eigen::Vector3f normal = Eigen::Vector3f{1, 2, 2}.normalized();
   insert(grid, {0.1, 0.1, 0.1}, normal);
@@ -65,14 +65,14 @@ TEST(SurfaceGrid, APointThatKnowsItsNormalIsAPlane) {
   EXPECT_NEAR(std::abs(surface->normal.dot(normal)), 1.0F, 1e-5F);
 }
 
-TEST(SurfaceGrid, APointThatDoesNotIsNone) {
+TEST(SurfaceGrid, PointWithoutNormalIsNotPlanar) {
   SurfaceGrid grid(kLeaf_m, kEnoughBytes);
   insert(grid, {0.1, 0.1, 0.1}, kNoNormal);
   grid.refresh();
   EXPECT_FALSE(grid.find({0, 0, 0})->planar());
 }
 
-TEST(SurfaceGrid, OneScanLineIsNoPlane) {
+TEST(SurfaceGrid, ScanLineIsNotPlanar) {
   SurfaceGrid grid(kLeaf_m, kEnoughBytes);
   std::mt19937 random{1};
   std::normal_distribution<double> noise{0.0, 0.01};
@@ -83,7 +83,7 @@ TEST(SurfaceGrid, OneScanLineIsNoPlane) {
   EXPECT_FALSE(grid.find({0, 0, 0})->planar());
 }
 
-TEST(SurfaceGrid, ThePointsOfACornerAreNoPlane) {
+TEST(SurfaceGrid, CornerIsNotPlanar) {
   SurfaceGrid grid(kLeaf_m, kEnoughBytes);
   std::mt19937 random{1};
   std::uniform_real_distribution<double> along{-0.24, 0.24};
@@ -127,7 +127,7 @@ TEST(SurfaceGrid, PlanesAreReadAllOrThoseWithinARadius) {
   EXPECT_EQ(planes[0].normal, Eigen::Vector3f::UnitZ());
 }
 
-TEST(SurfaceGrid, ALongStayDoesNotFreezeAVoxel) {
+TEST(SurfaceGrid, LongStayDoesNotFreezeAVoxel) {
   SurfaceGrid grid(kLeaf_m, kEnoughBytes);
   for (int i = 0; i < 20'000; ++i)
     insert(grid, {0, 0, 0}, Eigen::Vector3f::UnitZ());
@@ -152,7 +152,7 @@ TEST(SurfaceGrid, AFullGridEvictsTheOldest) {
     EXPECT_TRUE(has_voxel_along_x(grid, i));
 }
 
-TEST(SurfaceGrid, WhatIsHeldCanBeFoundAfterAnyNumberOfEvictions) {
+TEST(SurfaceGrid, StoredVoxelsAreFoundAfterManyEvictions) {
   SurfaceGrid grid(kLeaf_m, 20'000);
   std::mt19937 random{1};
   std::uniform_int_distribution<int> cell{-20, 20};
@@ -168,7 +168,7 @@ TEST(SurfaceGrid, WhatIsHeldCanBeFoundAfterAnyNumberOfEvictions) {
     ASSERT_EQ(grid.find(grid.index_of(grid.centre(slot))), &grid.surface(slot));
 }
 
-TEST(SurfaceGrid, VoxelsNearTheRobotAreSpared) {
+TEST(SurfaceGrid, VoxelsNearTheRobotAreNotEvicted) {
   SurfaceGrid grid(kLeaf_m, 20'000);
   const int capacity = static_cast<int>(grid.capacity());
   grid.protect({0, 0, 0}, 10.1 * kLeaf_m);
@@ -177,7 +177,7 @@ TEST(SurfaceGrid, VoxelsNearTheRobotAreSpared) {
     EXPECT_TRUE(has_voxel_along_x(grid, i));
 }
 
-TEST(SurfaceGrid, ProtectingEverythingDoesNotStopIt) {
+TEST(SurfaceGrid, ProtectingEverythingDoesNotStopEviction) {
   SurfaceGrid grid(kLeaf_m, 20'000);
   grid.protect({0, 0, 0}, 1e9);
   const int capacity = static_cast<int>(grid.capacity());
@@ -186,7 +186,7 @@ TEST(SurfaceGrid, ProtectingEverythingDoesNotStopIt) {
   EXPECT_TRUE(has_voxel_along_x(grid, 3 * capacity - 1));
 }
 
-TEST(SurfaceGrid, AMapsWorthOfInsertionsInOneGoFitsTheSmallestBudget) {
+TEST(SurfaceGrid, WholeMapInsertedAtOnceFitsTheSmallestBudget) {
   SurfaceGrid grid(kLeaf_m, 1);
   EXPECT_GT(grid.capacity(), 0U);
   for (int i = 0; i < 10'000; ++i) // without a refresh in between

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kLimit_bytes = 20'000'000;
 
-TEST(SurfaceMap, ASweepIsInsertedFromWhereItWasSeen) {
+TEST(SurfaceMap, SweepIsInsertedAtItsPose) {
   SurfaceMap map(kLimit_bytes);
   const Pose T_map_base{so3_exp({0, 0, 1.0}), {30, -20, 1}};
   map.insert(test::seen_from(T_map_base, test::points_on({{{10, 10, 2}, {2, 0, 0}, {0, 2, 0}}}, 1000)), T_map_base);

@@ -101,13 +101,13 @@ class FreeSpaceTest : public ::testing::Test {
   FreeSpace space_;
 };
 
-TEST_F(FreeSpaceTest, KnowsNothingBeforeTheFirstKeyframe) {
+TEST_F(FreeSpaceTest, IsEmptyBeforeTheFirstKeyframe) {
   const Points seen = around_vehicle(4.0F, {});
   EXPECT_EQ(take(0, {}, seen).size(), seen.size());
   EXPECT_TRUE(take(1, {}, Points{}).empty());
 }
 
-TEST_F(FreeSpaceTest, WhatHasComeIsLeftOutAndWhatStandsStays) {
+TEST_F(FreeSpaceTest, NewObjectsAreRemovedAndStaticOnesRemain) {
   take(0, {}, room_);
   const Points seen = around_vehicle(4.0F, metres_ahead(1.0));
   const Points left = take(1, metres_ahead(1.0), seen);
@@ -115,7 +115,7 @@ TEST_F(FreeSpaceTest, WhatHasComeIsLeftOutAndWhatStandsStays) {
   EXPECT_TRUE(std::ranges::none_of(left, [](const auto& point) { return point.norm() < 9.0F; }));
 }
 
-TEST_F(FreeSpaceTest, WhatDrivesOnIsLeftOutInEachKeyframe) {
+TEST_F(FreeSpaceTest, MovingObjectIsRemovedInEachKeyframe) {
   for (int i = 0; i < 8; ++i)
     take(i, {}, room_);
   for (int i = 8; i < 12; ++i) {
@@ -124,7 +124,7 @@ TEST_F(FreeSpaceTest, WhatDrivesOnIsLeftOutInEachKeyframe) {
   }
 }
 
-TEST_F(FreeSpaceTest, WhatHasComeToStayIsTakenInFiveKeyframesLater) {
+TEST_F(FreeSpaceTest, ObjectThatStaysIsInsertedFiveKeyframesLater) {
   take(0, {}, room_);
   const Points seen = around_vehicle(4.0F, {});
   for (int i = 1; i <= 5; ++i)
@@ -132,13 +132,13 @@ TEST_F(FreeSpaceTest, WhatHasComeToStayIsTakenInFiveKeyframesLater) {
   EXPECT_EQ(take(6, {}, seen).size(), seen.size());
 }
 
-TEST_F(FreeSpaceTest, WhatComesIntoSightBehindSomethingStays) {
+TEST_F(FreeSpaceTest, DisoccludedSurfaceRemains) {
   take(0, {}, around_vehicle(4.0F, {}));
   const Points farther = both(room_, vehicle(7.0F)); // the vehicle's position before it was at 4 m
   EXPECT_EQ(take(1, {}, farther).size(), farther.size());
 }
 
-TEST_F(FreeSpaceTest, WhereNothingWasSeenNothingIsKnown) {
+TEST_F(FreeSpaceTest, UnobservedSpaceIsNotFree) {
   Points half;
   std::ranges::copy_if(room_, std::back_inserter(half), [](const auto& point) { return point.x() < 0.0F; });
   take(0, {}, half);
@@ -146,13 +146,13 @@ TEST_F(FreeSpaceTest, WhereNothingWasSeenNothingIsKnown) {
   EXPECT_EQ(take(1, {}, seen).size(), seen.size());
 }
 
-TEST_F(FreeSpaceTest, AWallThatIsSeenFromNearByAtASlantStays) {
+TEST_F(FreeSpaceTest, ObliqueNearbyWallRemains) {
   take(0, {}, room_);
   for (int i = 1; i < 8; ++i)
     EXPECT_EQ(take(i, metres_ahead(i), room_).size(), room_.size()) << i;
 }
 
-TEST_F(FreeSpaceTest, FloorBetweenTwoRingsStays) {
+TEST_F(FreeSpaceTest, FloorBetweenRingsRemains) {
   const auto ring = [](float radius_m) {
     Points points;
     for (int degree = 0; degree < 360; ++degree) {
@@ -165,7 +165,7 @@ TEST_F(FreeSpaceTest, FloorBetweenTwoRingsStays) {
   EXPECT_EQ(take(1, {}, ring(6.2F)).size(), ring(6.2F).size());
 }
 
-TEST_F(FreeSpaceTest, AKeyframeOfTenSecondsAgoSaysNothing) {
+TEST_F(FreeSpaceTest, TenSecondOldKeyframeIsIgnored) {
   take(0, {}, room_);
   const Points seen = around_vehicle(4.0F, {});
   EXPECT_EQ(take(10, {}, seen).size(), seen.size());
@@ -173,26 +173,26 @@ TEST_F(FreeSpaceTest, AKeyframeOfTenSecondsAgoSaysNothing) {
   EXPECT_EQ(take(20, {}, seen).size(), seen.size() - vehicle(4.0F).size()) << "nine seconds";
 }
 
-TEST_F(FreeSpaceTest, AClockThatStepsBackMakesAllOld) {
+TEST_F(FreeSpaceTest, BackwardClockStepExpiresAllKeyframes) {
   take(20, {}, room_);
   const Points seen = around_vehicle(4.0F, {});
   EXPECT_EQ(take(0, {}, seen).size(), seen.size());
 }
 
-TEST_F(FreeSpaceTest, ForgetsWhereItWas) {
+TEST_F(FreeSpaceTest, ClearDropsAllKeyframes) {
   take(0, {}, room_);
   space_.clear();
   const Points seen = around_vehicle(4.0F, {});
   EXPECT_EQ(take(1, {}, seen).size(), seen.size());
 }
 
-TEST_F(FreeSpaceTest, EachLidarSeesThroughWhatIsBeforeIt) {
+TEST_F(FreeSpaceTest, EachLidarHasItsOwnFreeSpace) {
   take_of(2, 0, {}, {{{}, 0}, {room_, 1}});
   const Points seen = around_vehicle(4.0F, {});
   EXPECT_EQ(take_of(2, 1, {}, {{seen, 0}, {{}, 1}}).size(), seen.size() - vehicle(4.0F).size());
 }
 
-TEST_F(FreeSpaceTest, PointsOfALidarThatIsNowhereAreTakenAsTheyAre) {
+TEST_F(FreeSpaceTest, PointsOfAnUnknownLidarRemain) {
   take_of(0, 0, {}, {{room_, 5}});
   const Points seen = around_vehicle(4.0F, {});
   EXPECT_EQ(take_of(0, 1, {}, {{seen, 5}}).size(), seen.size());

@@ -27,14 +27,14 @@ double tilt_deg(const Gravity& gravity) { return std::acos(std::min(1.0, gravity
 
 const Eigen::Quaterniond kNoTurn = Eigen::Quaterniond::Identity();
 
-TEST(Gravity, IsReadAtOnceOfARobotAtRest) {
+TEST(Gravity, IsKnownAtOnceAtRest) {
   Gravity gravity;
   gravity.observe(kNoTurn, sweep_with({5, -3, 0}));
   ASSERT_TRUE(gravity.up_base());
   EXPECT_LT((level_rpy_rad(*gravity.up_base()) - Eigen::Vector3d(5, -3, 0) * kRadPerDeg).norm(), 1e-9);
 }
 
-TEST(Gravity, AnAccelerationOfASecondTiltsNothingMuch) {
+TEST(Gravity, OneSecondOfAccelerationHardlyTilts) {
   Gravity gravity;
   gravity.observe(kNoTurn, sweep_with({0, 0, 0}));
   for (int i = 0; i < 10; ++i)
@@ -42,7 +42,7 @@ TEST(Gravity, AnAccelerationOfASecondTiltsNothingMuch) {
   EXPECT_LT(tilt_deg(gravity), 1.5);
 }
 
-TEST(Gravity, ARampIsNoticedAtOnceByTheGyro) {
+TEST(Gravity, GyroDetectsARampAtOnce) {
   Gravity gravity;
   gravity.observe(kNoTurn, sweep_with({0, 0, 0}));
   double pitch_deg = 0;
@@ -53,7 +53,7 @@ TEST(Gravity, ARampIsNoticedAtOnceByTheGyro) {
   EXPECT_NEAR(tilt_deg(gravity), 10.0, 0.01);
 }
 
-TEST(Gravity, AGyroThatDriftsIsOutvotedInTime) {
+TEST(Gravity, GyroDriftIsCorrected) {
   Gravity gravity;
   gravity.observe(kNoTurn, sweep_with({0, 0, 0}));
   for (int i = 0; i < 300; ++i)
@@ -61,7 +61,7 @@ TEST(Gravity, AGyroThatDriftsIsOutvotedInTime) {
   EXPECT_LT(tilt_deg(gravity), 0.05);
 }
 
-TEST(Gravity, WhatIsNotAsStrongAsGravityIsNotLookedAt) {
+TEST(Gravity, ForcesUnlikeGravityAreIgnored) {
   Gravity gravity;
   gravity.observe(kNoTurn, sweep_with({0, 0, 0}, {6, 0, 0}));
   EXPECT_FALSE(gravity.up_base());
@@ -86,7 +86,7 @@ Eigen::Vector3d up_at_pitch_deg(double pitch_deg) {
 }
 Stamp at(int sweep) { return stamp_from_ns(1'000'000'000) + sweep * kPeriod; }
 
-TEST(FlatGround, IsFoundAfterTwoLevelSecondsAndLeftAtOnceOnARamp) {
+TEST(FlatGround, StartsAfterTwoLevelSecondsAndEndsAtOnceOnARamp) {
   FlatGroundAssumption ground(FlatGround::automatic);
   for (int i = 0; i < 20; ++i) {
     ground.observe(at(i), up_at_pitch_deg(0.5));
@@ -100,7 +100,7 @@ TEST(FlatGround, IsFoundAfterTwoLevelSecondsAndLeftAtOnceOnARamp) {
   EXPECT_FALSE(ground.holds()) << "one level sweep is no floor";
 }
 
-TEST(FlatGround, IsNotKnownWithoutGravity) {
+TEST(FlatGround, NeedsGravity) {
   FlatGroundAssumption ground(FlatGround::automatic);
   for (int i = 0; i < 30; ++i)
     ground.observe(at(i), kUp);
@@ -109,7 +109,7 @@ TEST(FlatGround, IsNotKnownWithoutGravity) {
   EXPECT_FALSE(ground.holds());
 }
 
-TEST(FlatGround, ByContextHoldsWhateverGravitySays) {
+TEST(FlatGround, SetByContextIgnoresGravity) {
   FlatGroundAssumption on(FlatGround::on), off(FlatGround::off);
   for (int i = 0; i < 30; ++i) {
     on.observe(at(i), up_at_pitch_deg(10));
@@ -122,14 +122,14 @@ TEST(FlatGround, ByContextHoldsWhateverGravitySays) {
 const Pose kLast{Eigen::Quaterniond::Identity(), {0, 0, 0.2}};
 const Pose kRolledUpward{from_rpy_rad({0.02, -0.03, 0.5}), {1.0, 0.3, 0.25}};
 
-TEST(FlatGround, ByContextKeepsHeadingAndWayAndTakesOutTheRest) {
+TEST(FlatGround, SetByContextRetainsOnlyHeadingAndPath) {
   const FlatGroundAssumption ground(FlatGround::on);
   const Pose flat = ground.flatten(kLast, kRolledUpward, 1e8 * Matrix6::Identity());
   EXPECT_LT((flat.translation - Eigen::Vector3d(1.0, 0.3, 0.2)).norm(), 1e-12);
   EXPECT_LT((to_rpy_rad(flat.rotation) - Eigen::Vector3d(0, 0, 0.5)).norm(), 1e-3);
 }
 
-TEST(FlatGround, FoundGivesWayToLidarWhereThatSeesBetter) {
+TEST(FlatGround, DetectedYieldsToLidarWhereThatIsMoreCertain) {
   FlatGroundAssumption ground(FlatGround::automatic);
   for (int i = 0; i < 30; ++i)
     ground.observe(at(i), kUp);
@@ -158,20 +158,20 @@ double tilt_after(int sweeps, double tilt_rad, double up_noise_rad = 0.0) {
   return std::acos((R_odom_base * kUp).z());
 }
 
-TEST(TiltKeeper, BringsADriftBackToWhatAnAccelerometerKnows) {
+TEST(TiltKeeper, CorrectsDriftTowardsGravity) {
   EXPECT_LT(tilt_after(10'000, 3 * kRadPerDeg), 1.1 * kRadPerDeg);
   EXPECT_GT(tilt_after(10'000, 3 * kRadPerDeg), 0.8 * kRadPerDeg) << "and no farther";
 }
 
-TEST(TiltKeeper, TurnsNoKeyframeByMoreThanTheMapCanBear) {
+TEST(TiltKeeper, CorrectionPerKeyframeIsLimited) {
   EXPECT_GT(tilt_after(1000, 3 * kRadPerDeg), (3 - 100 * 0.02) * kRadPerDeg);
 }
 
-TEST(TiltKeeper, LeavesALevelOdometryAlone) {
+TEST(TiltKeeper, LevelOdometryIsUnchanged) {
   EXPECT_NEAR(tilt_after(1000, 0.5 * kRadPerDeg, 0.02), 0.5 * kRadPerDeg, 1e-9);
 }
 
-TEST(TiltKeeper, ABlowIsNoDrift) { EXPECT_NEAR(tilt_after(1000, 8 * kRadPerDeg), 8 * kRadPerDeg, 1e-9); }
+TEST(TiltKeeper, ShockIsNotDrift) { EXPECT_NEAR(tilt_after(1000, 8 * kRadPerDeg), 8 * kRadPerDeg, 1e-9); }
 
 } // namespace
 } // namespace locus

@@ -27,27 +27,27 @@ LidarHealth used_to(const Registration& registration, double period_s = kPeriod_
   return health;
 }
 
-TEST(LidarHealth, KnowsNothingUnusualBeforeTheFirstSweep) {
+TEST(LidarHealth, NothingIsUnusualBeforeTheFirstSweep) {
   const LidarHealth health;
   EXPECT_FALSE(health.lacks_correspondences(fit(0)));
   EXPECT_FALSE(health.is_unusual(fit(0)));
 }
 
-TEST(LidarHealth, TheFirstSweepIsTheUsualAtOnce) {
+TEST(LidarHealth, FirstSweepSetsTheUsual) {
   LidarHealth health;
   health.learn(fit(900), kPeriod_s);
   EXPECT_TRUE(health.lacks_correspondences(fit(449)));
   EXPECT_FALSE(health.lacks_correspondences(fit(451)));
 }
 
-TEST(LidarHealth, MissesMostBelowHalfOfTheUsualShare) {
+TEST(LidarHealth, LacksCorrespondencesBelowHalfOfTheUsualShare) {
   const LidarHealth health = used_to(fit(600));
   EXPECT_TRUE(health.lacks_correspondences(fit(299)));
   EXPECT_FALSE(health.lacks_correspondences(fit(301)));
   EXPECT_FALSE(health.lacks_correspondences(fit(31, 1.0, kPoints / 10))) << "a share, whatever the number of points";
 }
 
-TEST(LidarHealth, AFitIsUnusualThatIsWorseByASeventh) {
+TEST(LidarHealth, FitWorseByASeventhIsUnusual) {
   const LidarHealth health = used_to(fit(800, 1.0));
   EXPECT_FALSE(health.is_unusual(fit(800, 1.0)));
   EXPECT_TRUE(health.is_unusual(fit(679, 1.0))) << "fewer";
@@ -57,7 +57,7 @@ TEST(LidarHealth, AFitIsUnusualThatIsWorseByASeventh) {
   EXPECT_FALSE(health.is_unusual(fit(80, 1.0, kPoints / 10)));
 }
 
-TEST(LidarHealth, AnotherPlaceIsUsualAfterSecondsAtAnyRate) {
+TEST(LidarHealth, AdaptsToANewPlaceInSecondsAtAnyRate) {
   for (const double period_s : {0.2, 0.1, 0.05}) {
     LidarHealth health = used_to(fit(1000), period_s);
     EXPECT_TRUE(health.lacks_correspondences(fit(400)));
@@ -71,7 +71,7 @@ TEST(LidarHealth, AnotherPlaceIsUsualAfterSecondsAtAnyRate) {
   }
 }
 
-TEST(LidarHealth, ASweepOfNoPointsIsNoDivisionByNothing) {
+TEST(LidarHealth, EmptySweepDoesNotDivideByZero) {
   LidarHealth health;
   health.learn(fit(0, 1.0, 0), 0.0);
   health.learn(fit(0, 1.0, 0), kPeriod_s);

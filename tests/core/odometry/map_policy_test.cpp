@@ -47,7 +47,7 @@ std::pair<int, Verdict> first_that_waits_no_longer(MapPolicy& policy, int from, 
   return {to, Verdict::wait};
 }
 
-TEST(MapPolicy, TakesInASweepAfterEveryMetreOrThirtyDegrees) {
+TEST(MapPolicy, InsertsAfterAMetreOrThirtyDegrees) {
   MapPolicy policy = policy_begun();
   EXPECT_EQ(policy.judge(placed(1, ahead(0.99))), Verdict::wait);
   EXPECT_EQ(policy.judge(placed(2, ahead(1.01))), Verdict::insert);
@@ -58,7 +58,7 @@ TEST(MapPolicy, TakesInASweepAfterEveryMetreOrThirtyDegrees) {
   EXPECT_EQ(policy.judge(placed(7, ahead(2.0, 0.0))), Verdict::insert) << "back again";
 }
 
-TEST(MapPolicy, TakesInNothingThatMissesMostOfWhatIsUsual) {
+TEST(MapPolicy, InsertsNothingThatLacksCorrespondences) {
   MapPolicy policy = policy_begun();
   MapPolicy::Outcome dusty = placed(1, ahead(5.0));
   dusty.lacks_correspondences = true;
@@ -83,21 +83,21 @@ TEST(MapPolicy, LostOverlapIsAKeyframe) {
   EXPECT_EQ(policy.judge(overlapping(5, 0.55, ahead(0.2, 6.0))), Verdict::insert) << "after a distance";
 }
 
-TEST(MapPolicy, LostOverlapIsNoKeyframeOfARobotThatStands) {
+TEST(MapPolicy, LostOverlapIsNoKeyframeAtRest) {
   MapPolicy policy(kMapOptions);
   policy.begin(end_of(0), Pose{});
   EXPECT_EQ(policy.judge(overlapping(1, 0.8)), Verdict::wait);
   EXPECT_EQ(policy.judge(overlapping(2, 0.4, ahead(0.09, 4.9))), Verdict::wait) << "people in front of it";
 }
 
-TEST(MapPolicy, LostOverlapIsNoKeyframeWhereNoSourceMeasuresTheTurn) {
+TEST(MapPolicy, LostOverlapIsNoKeyframeWithoutAMeasuredTurn) {
   MapPolicy policy(kMapOptions);
   policy.begin(end_of(0), Pose{});
   EXPECT_EQ(policy.judge(overlapping(1, 0.8, {}, false)), Verdict::wait);
   EXPECT_EQ(policy.judge(overlapping(2, 0.5, ahead(0.5, 20.0), false)), Verdict::wait);
 }
 
-TEST(MapPolicy, TakesInNothingThatLidarDidNotPlace) {
+TEST(MapPolicy, InsertsNoRejectedSweep) {
   MapPolicy policy = policy_begun();
   EXPECT_EQ(policy.judge(refused(1, ahead(5.0))), Verdict::wait) << "one sweep against one";
   EXPECT_TRUE(policy.is_refused());
@@ -105,7 +105,7 @@ TEST(MapPolicy, TakesInNothingThatLidarDidNotPlace) {
   EXPECT_FALSE(policy.is_refused());
 }
 
-TEST(MapPolicy, GoesOnFromThePredictionAfterTenRefusalsInARow) {
+TEST(MapPolicy, ResumesAtThePredictionAfterTenConsecutiveRejections) {
   MapPolicy policy = policy_begun(50);
   const auto [sweep, verdict] = first_that_waits_no_longer(policy, 51, 100, false);
   EXPECT_EQ(sweep, 50 + kPatience);
@@ -113,14 +113,14 @@ TEST(MapPolicy, GoesOnFromThePredictionAfterTenRefusalsInARow) {
   EXPECT_FALSE(policy.is_refused()) << "it counts anew";
 }
 
-TEST(MapPolicy, OneThatIsPlacedEndsTheRow) {
+TEST(MapPolicy, AcceptedSweepResetsTheRejectionCount) {
   MapPolicy policy = policy_begun(50);
   EXPECT_EQ(first_that_waits_no_longer(policy, 51, 59, false).second, Verdict::wait);
   EXPECT_EQ(policy.judge(placed(60)), Verdict::wait);
   EXPECT_EQ(first_that_waits_no_longer(policy, 61, 69, false).second, Verdict::wait);
 }
 
-TEST(MapPolicy, SweepsWithoutPointsSayNothingAgainstTheMap) {
+TEST(MapPolicy, EmptySweepsAreNoRejections) {
   MapPolicy policy = policy_begun();
   for (int i = 1; i < 100; ++i) {
     MapPolicy::Outcome empty = refused(i, ahead(0.5 * i));
@@ -130,14 +130,14 @@ TEST(MapPolicy, SweepsWithoutPointsSayNothingAgainstTheMap) {
   }
 }
 
-TEST(MapPolicy, WaitsFiveSecondsWhereAnOdometryCarries) {
+TEST(MapPolicy, WaitsFiveSecondsWithOdometry) {
   MapPolicy policy = policy_begun(100);
   const auto [sweep, verdict] = first_that_waits_no_longer(policy, 101, 200, true);
   EXPECT_EQ(sweep, 150) << "fifty sweeps since the last that was placed";
   EXPECT_EQ(verdict, Verdict::insert);
 }
 
-TEST(MapPolicy, BeginsAnewWhereAsManySweepsContradictTheMapAsFittedIt) {
+TEST(MapPolicy, RestartsIfAsManySweepsContradictTheMapAsFit) {
   for (const bool are_carried : {false, true}) {
     MapPolicy policy = policy_begun();
     const auto [sweep, verdict] = first_that_waits_no_longer(policy, 1, 100, are_carried);
@@ -149,21 +149,21 @@ TEST(MapPolicy, BeginsAnewWhereAsManySweepsContradictTheMapAsFittedIt) {
   }
 }
 
-TEST(MapPolicy, AMapIsNoLongerInDoubtOnceItFittedMoreOften) {
+TEST(MapPolicy, MapIsConfirmedOnceMoreSweepsFit) {
   MapPolicy policy = policy_begun(kPatience); // eleven with the first
   EXPECT_EQ(first_that_waits_no_longer(policy, kPatience + 1, 100, false).second, Verdict::insert);
   MapPolicy doubtful = policy_begun(kPatience - 1);
   EXPECT_EQ(first_that_waits_no_longer(doubtful, kPatience, 100, false).second, Verdict::restart);
 }
 
-TEST(MapPolicy, AMapOfAnotherRunIsNeverThrownAway) {
+TEST(MapPolicy, MapOfAnotherRunIsNeverDropped) {
   MapPolicy policy(kMapOptions);
   policy.resume();
   policy.begin(end_of(0), Pose{});
   EXPECT_EQ(first_that_waits_no_longer(policy, 1, 100, false), std::pair(kPatience, Verdict::insert));
 }
 
-TEST(MapPolicy, KnowsWhetherASweepWasPlacedInTheLastFiveSeconds) {
+TEST(MapPolicy, ReportsAnAcceptedSweepInTheLastFiveSeconds) {
   const MapPolicy policy = policy_begun();
   EXPECT_TRUE(policy.was_accepted_lately(end_of(49)));
   EXPECT_FALSE(policy.was_accepted_lately(end_of(50)));

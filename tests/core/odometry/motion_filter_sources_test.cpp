@@ -19,7 +19,7 @@ namespace {
 // --- Estimated errors of the sensors ------------------------------------------------------------------------------
 
 /// The rotation measured by lidar over this time determines the bias as well as the gyro's own noise allows.
-TEST(MotionFilter, FindsTheBiasOfAGyro) {
+TEST(MotionFilter, EstimatesGyroBias) {
   constexpr double kTime_s = 60.0;
   const Eigen::Vector3d bias{0.01, -0.015, 0.02};
   for (const double rate_hz : kRates_hz) {
@@ -32,7 +32,7 @@ TEST(MotionFilter, FindsTheBiasOfAGyro) {
   }
 }
 
-TEST(MotionFilter, FindsTheScaleOfWheelsWhereLidarSeesAllAxes) {
+TEST(MotionFilter, EstimatesWheelScaleIfLidarObservesAllAxes) {
   constexpr double kTime_s = 60.0, kSpeed_mps = 1.5, kScale = 0.04;
   for (const double rate_hz : kRates_hz) {
     GaussianRobot robot(straight(kSpeed_mps), {.scale = kScale}, 1);
@@ -45,7 +45,7 @@ TEST(MotionFilter, FindsTheScaleOfWheelsWhereLidarSeesAllAxes) {
 }
 
 /// Odometry misaligned by half a degree: its direction of travel matters for dead reckoning without lidar.
-TEST(MotionFilter, FindsWhereAnOdometryGoesWhenItGoesAhead) {
+TEST(MotionFilter, EstimatesTheForwardDirectionOfAnOdometry) {
   constexpr double kTime_s = 60.0, kSpeed_mps = 1.5, kToTheLeft = 0.015, kUpwards = -0.01;
   for (const double rate_hz : kRates_hz) {
     GaussianRobot robot(straight(kSpeed_mps), {.to_the_left = kToTheLeft, .upwards = kUpwards}, 1);
@@ -88,17 +88,17 @@ void expect_learned(SourceId source, const GaussianRobot::Sensors& sensors) {
 }
 
 // The floors are 6 mm and 1 mrad for odometry, 1 mrad for a gyro.
-TEST(MotionFilter, LearnsHowBadWheelsAre) { expect_learned(kWheelSource, {.wheels = 10.0 * kUsualWheels}); }
-TEST(MotionFilter, LearnsHowGoodWheelsAre) {
+TEST(MotionFilter, LearnsHighWheelNoise) { expect_learned(kWheelSource, {.wheels = 10.0 * kUsualWheels}); }
+TEST(MotionFilter, LearnsLowWheelNoise) {
   expect_learned(kWheelSource, {.wheels = along_each_axis(0.006, 0.001 / kRadPerDeg)});
 }
-TEST(MotionFilter, LearnsHowBadAGyroIs) { expect_learned(kGyroSource, {.gyro = 10.0 * kUsualGyro}); }
-TEST(MotionFilter, LearnsHowGoodAGyroIs) {
+TEST(MotionFilter, LearnsHighGyroNoise) { expect_learned(kGyroSource, {.gyro = 10.0 * kUsualGyro}); }
+TEST(MotionFilter, LearnsLowGyroNoise) {
   expect_learned(kGyroSource, {.gyro = along_each_axis(0.0, 0.001 / kRadPerDeg)});
 }
 
 /// Two sources of ordinary noise and no third measurement: neither estimate of their noise may change.
-TEST(MotionFilter, LearnsNothingOfASourceThatNothingElseCanJudge) {
+TEST(MotionFilter, LearnsNoNoiseWithoutAReference) {
   for (const double rate_hz : kRates_hz) {
     const double elapsed_s = 1.0 / rate_hz;
     for (const bool gyro : {false, true}) {
@@ -115,7 +115,7 @@ TEST(MotionFilter, LearnsNothingOfASourceThatNothingElseCanJudge) {
   }
 }
 
-TEST(MotionFilter, LearnsNothingOfWheelsAlongAnAxisThatLidarDoesNotSee) {
+TEST(MotionFilter, LearnsNoWheelNoiseAlongAnUnobservedAxis) {
   for (const double rate_hz : kRates_hz) {
     const double elapsed_s = 1.0 / rate_hz;
     GaussianRobot robot(straight(1.0), {}, 1);
@@ -128,7 +128,7 @@ TEST(MotionFilter, LearnsNothingOfWheelsAlongAnAxisThatLidarDoesNotSee) {
   }
 }
 
-TEST(MotionFilter, ForgetsBiasScaleAndNoiseOfASourceThatMayComeBackAsAnother) {
+TEST(MotionFilter, ResetSourceRestoresThePriors) {
   GaussianRobot robot(
       straight(1.5),
       {.wheels = 5.0 * kUsualWheels, .gyro = 5.0 * kUsualGyro, .scale = 0.04, .bias_radps = {0.01, 0.01, 0.01}}, 1);
@@ -165,7 +165,7 @@ LearnedSource learned_of_gyro(const Motion& motion, const GaussianRobot::Sensors
 }
 
 /// Corrects the stamps by the estimated lateness, as the estimator does.
-TEST(MotionFilter, FindsHowLateAGyroIs) {
+TEST(MotionFilter, EstimatesGyroLateness) {
   for (const double late_s : {-0.1, -0.04, 0.0, 0.01, 0.04, 0.1})
     for (unsigned seed = 1; seed <= 5; ++seed) {
       GaussianRobot robot(swaying, {.late_s = late_s}, seed);
@@ -186,7 +186,7 @@ TEST(MotionFilter, FindsHowLateAGyroIs) {
     }
 }
 
-TEST(MotionFilter, FindsHowAGyroIsMounted) {
+TEST(MotionFilter, EstimatesGyroMounting) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     const Eigen::Vector3d mounting_rad = kRadPerDeg * Eigen::Vector3d{5.0, -4.0, 3.0};
     const LearnedSource found = learned_of_gyro(swaying, {.mounting_rad = mounting_rad}, seed);
@@ -198,7 +198,7 @@ TEST(MotionFilter, FindsHowAGyroIsMounted) {
 }
 
 /// Unobservable states must not move by more than their prior uncertainty.
-TEST(MotionFilter, ADriveStraightAheadTellsNothingOfHowAGyroIsMountedAndHowLateItIs) {
+TEST(MotionFilter, StraightMotionDoesNotObserveGyroMountingAndLateness) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     const LearnedSource found =
         learned_of_gyro(straight(1.5), {.late_s = 0.04, .mounting_rad = {0.05, 0.05, 0.05}}, seed, 300.0);
@@ -208,7 +208,7 @@ TEST(MotionFilter, ADriveStraightAheadTellsNothingOfHowAGyroIsMountedAndHowLateI
   }
 }
 
-TEST(MotionFilter, WhatWasTakenOutOfTheStampsOfAGyroChangesNothingOfWhatIsKnown) {
+TEST(MotionFilter, AppliedLatenessDoesNotChangeTheEstimate) {
   GaussianRobot robot(swaying, {.late_s = 0.04}, 1);
   MotionFilter filter = begun_with(robot, swaying);
   sweep_for(60.0, filter, robot, 0.1, {.wheels = false, .lidar = usual_lidar(0.1)});
@@ -237,7 +237,7 @@ LearnedSource learned_of_gyro_as(const std::vector<MotionSourceOptions>& sources
   return filter.learned(kGyroSource);
 }
 
-TEST(MotionFilter, WhatIsNotToBeCalibratedStaysAsConfigured) {
+TEST(MotionFilter, CalibrationThatIsOffStaysAsConfigured) {
   for (const Calibration mode : {Calibration::off, Calibration::report}) {
     const LearnedSource fixed = learned_of_gyro_as(wheels_and_gyro_with([&](MotionSourceOptions& source) {
       source.late_ms = 30.0;
@@ -251,7 +251,7 @@ TEST(MotionFilter, WhatIsNotToBeCalibratedStaysAsConfigured) {
 }
 
 /// Values configured as exact are not estimated, each on its own.
-TEST(MotionFilter, WhatTheUserIsSureOfIsNotMoved) {
+TEST(MotionFilter, ExactCalibrationIsNotChanged) {
   const LearnedSource found = learned_of_gyro_as(wheels_and_gyro_with([](MotionSourceOptions& source) {
     if (source.kind == SourceKind::imu)
       source.calibration_sigma.mounting_deg = 0.0;
@@ -260,7 +260,7 @@ TEST(MotionFilter, WhatTheUserIsSureOfIsNotMoved) {
   EXPECT_GT(found.lateness_s().mean, 0.02);
 }
 
-TEST(MotionFilter, WhatAnotherRunLearnedIsAsSureAsTheTimeSinceAllows) {
+TEST(MotionFilter, RecalledCalibrationIsAged) {
   MotionFilter filter(wheels_and_gyro());
   LearnedSource learned = as_configured(wheels_and_gyro()[1]);
   const double before = learned.mounting_rad(0).sigma;
@@ -277,7 +277,7 @@ TEST(MotionFilter, WhatAnotherRunLearnedIsAsSureAsTheTimeSinceAllows) {
   EXPECT_NEAR(filter.learned(kGyroSource).mounting_rad(0).sigma, before, 1e-9) << "no worse than configured";
 }
 
-TEST(MotionFilter, ASourceThatComesBackIsAsLateAsItWas) {
+TEST(MotionFilter, ResetSourceRetainsLateness) {
   GaussianRobot robot(swaying, {.late_s = 0.04}, 1);
   MotionFilter filter = begun_with(robot, swaying);
   sweep_for(60.0, filter, robot, 0.1, {.wheels = false, .lidar = usual_lidar(0.1)});
@@ -290,7 +290,7 @@ TEST(MotionFilter, ASourceThatComesBackIsAsLateAsItWas) {
 }
 
 /// Wheels that begin to spin while the robot turns: their speed is open until lidar measures it, their turn is not.
-TEST(MotionFilter, BeginningSlipLeavesOpenTheSpeedAloneAndLastsUntilItIsMeasured) {
+TEST(MotionFilter, SlipFreesTheForwardSpeedUntilItIsMeasured) {
   constexpr double kElapsed_s = 0.1, kSpeed_mps = 1.0, kTurn_radps = 0.3;
   GaussianRobot robot(straight(kSpeed_mps), {}, 1);
   MotionFilter filter = begun_with(robot, straight(kSpeed_mps));
@@ -338,7 +338,7 @@ double dragged_m(double rate_hz, unsigned seed, const Matrix12& lidar) {
 }
 
 /// An open field: lidar measures the forward position to 0.1 m, and the spin causes no acceleration.
-TEST(MotionFilter, WheelsThatSpinAreWrongOnceHoweverManySweepsTheySpin) {
+TEST(MotionFilter, LongSlipCountsAsOneFault) {
   std::vector<double> mean_m;
   for (const double rate_hz : kRates_hz) {
     Matrix12 lidar = usual_lidar(1.0 / rate_hz);
@@ -384,7 +384,7 @@ Vector6 mean_ratio(double rate_hz, SourceId source, bool all_the_time) {
   return sum / count;
 }
 
-TEST(MotionFilter, AnHonestSourceIsAsFarOffAsItMayBe) {
+TEST(MotionFilter, HonestSourceHasConsistentInnovations) {
   for (const double rate_hz : kRates_hz)
     for (const SourceId source : {kWheelSource, kGyroSource}) {
       const Vector6 mean = mean_ratio(rate_hz, source, true);
@@ -395,7 +395,7 @@ TEST(MotionFilter, AnHonestSourceIsAsFarOffAsItMayBe) {
     }
 }
 
-TEST(MotionFilter, AnHonestSourceThatIsNotUsedIsAsFarOffAsItMayBe) {
+TEST(MotionFilter, HonestUnusedSourceHasConsistentInnovations) {
   for (const double rate_hz : kRates_hz)
     for (const SourceId source : {kWheelSource, kGyroSource}) {
       const Vector6 mean = mean_ratio(rate_hz, source, false);
@@ -406,7 +406,7 @@ TEST(MotionFilter, AnHonestSourceThatIsNotUsedIsAsFarOffAsItMayBe) {
     }
 }
 
-TEST(MotionFilter, WheelsThatAreOffByAMetreEachSecondAreFoundOut) {
+TEST(MotionFilter, WheelErrorOfOneMetrePerSecondIsDetected) {
   for (const double rate_hz : kRates_hz)
     for (const bool measured : {false, true}) {
       const double elapsed_s = 1.0 / rate_hz;

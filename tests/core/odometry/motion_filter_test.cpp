@@ -43,16 +43,16 @@ void expect_consistent(const Sensing& sensing) {
   }
 }
 
-TEST(MotionFilter, IsAsSureAsItIsRightWithLidarAlone) { expect_consistent({.wheels = false, .gyro = false}); }
-TEST(MotionFilter, IsAsSureAsItIsRightWithGyro) { expect_consistent({.wheels = false}); }
-TEST(MotionFilter, IsAsSureAsItIsRightWithWheels) { expect_consistent({.gyro = false}); }
-TEST(MotionFilter, IsAsSureAsItIsRightWithWheelsAndGyro) { expect_consistent({}); }
-TEST(MotionFilter, IsAsSureAsItIsRightWithAccelerometerAndGyro) { expect_consistent({.wheels = false, .force = true}); }
-TEST(MotionFilter, IsAsSureAsItIsRightWithAllSensors) { expect_consistent({.force = true}); }
+TEST(MotionFilter, IsConsistentWithLidarAlone) { expect_consistent({.wheels = false, .gyro = false}); }
+TEST(MotionFilter, IsConsistentWithGyro) { expect_consistent({.wheels = false}); }
+TEST(MotionFilter, IsConsistentWithWheels) { expect_consistent({.gyro = false}); }
+TEST(MotionFilter, IsConsistentWithWheelsAndGyro) { expect_consistent({}); }
+TEST(MotionFilter, IsConsistentWithAccelerometerAndGyro) { expect_consistent({.wheels = false, .force = true}); }
+TEST(MotionFilter, IsConsistentWithAllSensors) { expect_consistent({.force = true}); }
 
 // --- Evidence -----------------------------------------------------------------------------------------------------
 
-TEST(MotionFilter, SurpriseIsStudentsOfTheMotionAndOccamsFactorOfThePoints) {
+TEST(MotionFilter, SurpriseIsStudentsTPlusOccamsFactor) {
   GaussianRobot robot(winding, {}, 1);
   MotionFilter filter = begun_with(robot, winding);
   filter.predict(0.1, 0.1, std::nullopt, {});
@@ -73,7 +73,7 @@ TEST(MotionFilter, SurpriseIsStudentsOfTheMotionAndOccamsFactorOfThePoints) {
 // --- Unobserved axes ----------------------------------------------------------------------------------------------
 
 /// Wheels are the only source along x: their own measurements must not change their scale.
-TEST(MotionFilter, WheelsInATunnelKeepTheirScale) {
+TEST(MotionFilter, WheelScaleIsRetainedInATunnel) {
   constexpr double kSpeed_mps = 1.5, kTime_s = 300.0;
   for (unsigned seed = 1; seed <= 5; ++seed) {
     GaussianRobot robot(straight(kSpeed_mps), {}, seed);
@@ -85,7 +85,7 @@ TEST(MotionFilter, WheelsInATunnelKeepTheirScale) {
   }
 }
 
-TEST(MotionFilter, WheelsOfSomeScaleInATunnelAreWithinTheirDoubt) {
+TEST(MotionFilter, WheelScaleErrorInATunnelIsWithinSigma) {
   constexpr double kSpeed_mps = 1.5, kTime_s = 300.0;
   GaussianRobot robot(straight(kSpeed_mps), {.scale = 0.05}, 1);
   MotionFilter filter = begun_with(robot, straight(kSpeed_mps));
@@ -101,7 +101,7 @@ Vector6 walking(double t) {
 
 /// Regression: the weight of the integrated force decreased with its change, so that braking counted more than speeding
 /// up, and the estimate stood still while the robot walked on.
-TEST(MotionFilter, AWalkingRobotThatNothingTellsOfItsWayKeepsItsSpeed) {
+TEST(MotionFilter, UnobservedForwardSpeedPersists) {
   constexpr double kPeriod_s = 0.05, kTime_s = 3.0;
   GaussianRobot robot(walking, {.lever_m = {0.1, 0.0, 0.3}}, 1);
   MotionFilter filter = begun_with(robot, walking);
@@ -155,12 +155,12 @@ const std::vector<std::pair<const char*, Sensing>> kInAGap{{"nothing", {.wheels 
                                                            {"force", {.wheels = false, .gyro = false, .force = true}},
                                                            {"wheels", {.wheels = true, .gyro = false}}};
 
-TEST(MotionFilter, IsHonestAfterAGapInWhichItSpedUp) {
+TEST(MotionFilter, IsConsistentAfterAGapWithAcceleration) {
   for (const auto& [what, sensing] : kInAGap)
     Gap(sensing).expect_covered(what);
 }
 
-TEST(MotionFilter, IsHonestWhenItIsSeenAfterAGap) {
+TEST(MotionFilter, IsConsistentAtTheFirstUpdateAfterAGap) {
   for (const auto& [what, sensing] : kInAGap) {
     Gap gap(sensing);
     gap.look();
@@ -168,7 +168,7 @@ TEST(MotionFilter, IsHonestWhenItIsSeenAfterAGap) {
   }
 }
 
-TEST(MotionFilter, IsHonestInTheSweepThatFollowsAGap) {
+TEST(MotionFilter, IsConsistentInTheSweepAfterAGap) {
   for (const auto& [what, sensing] : kInAGap) {
     Gap gap(sensing);
     gap.look();
@@ -178,7 +178,7 @@ TEST(MotionFilter, IsHonestInTheSweepThatFollowsAGap) {
 }
 
 /// Unobserved: the robot may have stopped at once or continued at its speed, and the covariance must cover both.
-TEST(MotionFilter, ARobotThatIsNotSeenComesToRestAndMayAsWellHaveGoneOn) {
+TEST(MotionFilter, UnobservedTwistDecaysAndItsVarianceCoversMotion) {
   constexpr double kSpeed_mps = 1.0, kTime_s = 3.0;
   for (const double rate_hz : kRates_hz) {
     GaussianRobot robot(straight(kSpeed_mps), {}, 1);
@@ -199,7 +199,7 @@ TEST(MotionFilter, ARobotThatIsNotSeenComesToRestAndMayAsWellHaveGoneOn) {
   }
 }
 
-TEST(MotionFilter, ARobotThatStandsHasNoTwist) {
+TEST(MotionFilter, RestHasZeroTwist) {
   MotionFilter filter = begun(twist_of(0.3, 0.1, -0.1, 0.1, -0.1, 0.2), along_each_axis(0.5, 20.0));
   filter.predict(0.1, 0.1, std::nullopt, kNothing);
   filter.rest();
@@ -214,7 +214,7 @@ TEST(MotionFilter, ARobotThatStandsHasNoTwist) {
 
 /// Transferring a share of the pose error to the map reduces the covariance against the map; that since the start is
 /// unchanged.
-TEST(MotionFilter, WhatTheMapTakesOverIsNotLostSinceTheStart) {
+TEST(MotionFilter, ErrorTransferredToTheMapRemainsInTheTotal) {
   for (const double share : {0.0, 0.1, 0.5, 1.0}) {
     MotionFilter filter = begun(twist_of(1, 0, 0, 0, 0, 0.2));
     GaussianRobot robot(straight(1.0), {}, 1);
@@ -230,7 +230,7 @@ TEST(MotionFilter, WhatTheMapTakesOverIsNotLostSinceTheStart) {
   }
 }
 
-TEST(MotionFilter, SinceTheStartItIsNeverSurerThanAgainstTheMap) {
+TEST(MotionFilter, CovarianceSinceStartIsAtLeastThatAgainstTheMap) {
   GaussianRobot robot(straight(1.5), {}, 1);
   MotionFilter filter = begun_with(robot, straight(1.5));
   double last = 0.0;
@@ -245,7 +245,7 @@ TEST(MotionFilter, SinceTheStartItIsNeverSurerThanAgainstTheMap) {
 }
 
 /// Prior of the lidar extrinsics: two milliradians and five millimetres.
-TEST(MotionFilter, ALidarThatSitsOtherwiseThanThoughtSeesTheWayOfAnotherBody) {
+TEST(MotionFilter, ExtrinsicsErrorAppearsInThePoseCovariance) {
   MotionFilter filter = begun(Vector6::Zero());
   const Matrix6 at_start = filter.pose_covariance_since_start();
   const auto sigma_at = [&](const Pose& pose) {
@@ -270,13 +270,13 @@ double speed_after_a_move(const MotionLimits& limits, double sigma_mps) {
   return filter.twist_base().head<3>().norm();
 }
 
-TEST(MotionFilter, AHigherSpeedThanTheRobotIsAbleToIsExpectedOnlyWhereItIsKnown) {
+TEST(MotionFilter, SpeedAboveTheLimitIsPredictedOnlyIfCertain) {
   EXPECT_LT(speed_after_a_move({}, 10.0), 11.0);
   EXPECT_GT(speed_after_a_move({}, 0.5), 13.9);
   EXPECT_DOUBLE_EQ(speed_after_a_move({.max_speed_mps = 40.0}, 10.0), 14.0);
 }
 
-TEST(MotionFilter, WhatLidarSeesGoesBeyondAnyLimit) {
+TEST(MotionFilter, LidarUpdateMayExceedTheSpeedLimit) {
   for (const double max_mps : {0.1, 1.0, 10.0, 40.0}) {
     GaussianRobot robot(straight(14.0), {}, 1);
     MotionFilter filter(wheels_and_gyro(), {.max_speed_mps = max_mps});
@@ -286,7 +286,7 @@ TEST(MotionFilter, WhatLidarSeesGoesBeyondAnyLimit) {
   }
 }
 
-TEST(MotionFilter, ARobotThatIsAbleToMoreIsBelievedToDoMore) {
+TEST(MotionFilter, HigherLimitsAllowMoreMotion) {
   const auto doubt_mps = [](const MotionLimits& limits) {
     MotionFilter filter(wheels_and_gyro(), limits);
     filter.begin(Pose{}, Vector6::Zero(), Vector6::Zero());
@@ -296,7 +296,7 @@ TEST(MotionFilter, ARobotThatIsAbleToMoreIsBelievedToDoMore) {
   EXPECT_NEAR(doubt_mps({.max_acceleration_mps2 = 30.0}), 3.0 * doubt_mps({}), 1e-9);
 }
 
-TEST(MotionFilter, PutMovesThePoseAndNothingElse) {
+TEST(MotionFilter, SetPoseChangesThePoseOnly) {
   MotionFilter filter = begun(twist_of(1, 0, 0, 0, 0, 0));
   const Matrix12 before = filter.covariance();
   const Pose elsewhere{so3_exp({0, 0, 0.1}), {1, 2, 3}};
@@ -348,7 +348,7 @@ class AnyDay {
   std::mt19937 random_;
 };
 
-TEST(MotionFilter, TheCovarianceStaysACovarianceWhateverComes) {
+TEST(MotionFilter, CovarianceStaysValidForAnyInput) {
   for (unsigned seed = 1; seed <= 3; ++seed) {
     AnyDay day(seed);
     MotionFilter filter = begun(winding(0.0));
@@ -361,7 +361,7 @@ TEST(MotionFilter, TheCovarianceStaysACovarianceWhateverComes) {
   }
 }
 
-TEST(MotionFilter, TheCovarianceStaysACovarianceOverAnHourInATunnel) {
+TEST(MotionFilter, CovarianceStaysValidOverAnHourInATunnel) {
   GaussianRobot robot(straight(1.5), {}, 1);
   MotionFilter filter = begun_with(robot, straight(1.5));
   for (int minute = 0; minute < 60; ++minute) {
@@ -370,7 +370,7 @@ TEST(MotionFilter, TheCovarianceStaysACovarianceOverAnHourInATunnel) {
   }
 }
 
-TEST(MotionFilter, SweepsOfAMicrosecondAreFigures) {
+TEST(MotionFilter, MicrosecondSweepsStayFinite) {
   constexpr double kMoment_s = 1e-6;
   for (const bool force : {false, true}) {
     GaussianRobot robot(winding, {}, 1);
@@ -393,7 +393,7 @@ TEST(MotionFilter, SweepsOfAMicrosecondAreFigures) {
   }
 }
 
-TEST(MotionFilter, ACopyThatIsToldTheSameIsTheSameToTheBit) {
+TEST(MotionFilter, CopyWithTheSameInputIsBitIdentical) {
   AnyDay day(7), same_day(7);
   MotionFilter filter = begun(winding(0.0));
   for (int i = 0; i < 100; ++i) {

@@ -16,9 +16,9 @@ Matrix6 weak_along(int axis, double observability) {
   return observed;
 }
 
-TEST(ObservedAxes, AreAllBeforeTheFirstLook) { EXPECT_TRUE(ObservedAxes{}.all()); }
+TEST(ObservedAxes, AreAllInitially) { EXPECT_TRUE(ObservedAxes{}.all()); }
 
-TEST(ObservedAxes, AnAxisIsLostBelowAHundredthAndBackFromTwoOn) {
+TEST(ObservedAxes, HaveHysteresisFromOneToTwoHundredths) {
   ObservedAxes axes;
   const auto sees_after = [&axes](double observability) {
     const Vector6 observed = axes.observe(weak_along(kForward, observability));
@@ -36,7 +36,7 @@ TEST(ObservedAxes, AnAxisIsLostBelowAHundredthAndBackFromTwoOn) {
 
 /// A surface that constrains only a combination of rotation and translation, such as a distant wall to the side, makes
 /// neither observable.
-TEST(ObservedAxes, WhatIsOnlySeenTogetherWithAnotherAxisIsNotSeen) {
+TEST(ObservedAxes, ExcludeAnAxisObservedOnlyTogetherWithAnother) {
   ObservedAxes axes;
   Matrix6 together = weak_along(kForward, 0.3);
   together(kForward, kHeading) = together(kHeading, kForward) = 0.3;
@@ -47,7 +47,7 @@ TEST(ObservedAxes, WhatIsOnlySeenTogetherWithAnotherAxisIsNotSeen) {
   EXPECT_FALSE(axes.each()[kHeading]);
 }
 
-TEST(ObservedAxes, NothingSeenAtAllIsAFigureAllTheSame) {
+TEST(ObservedAxes, ZeroObservabilityStaysFinite) {
   ObservedAxes axes;
   const Vector6 observed = axes.observe(Matrix6::Zero());
   EXPECT_TRUE(observed.allFinite());
@@ -55,7 +55,7 @@ TEST(ObservedAxes, NothingSeenAtAllIsAFigureAllTheSame) {
     EXPECT_FALSE(axis_observed);
 }
 
-TEST(ObservedAxes, OnlyWhatIsSeenIsLeft) {
+TEST(ObservedAxes, PartOfZeroesUnobservedAxes) {
   ObservedAxes axes;
   axes.observe(weak_along(kForward, 0.001));
   Vector6 left = Vector6::Ones();

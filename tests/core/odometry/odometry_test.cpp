@@ -153,7 +153,7 @@ TEST(Odometry, NeedsNoSourceInAStreetAtFifteenMetresPerSecond) {
 
 // --- As in the paper --------------------------------------------------------------------------------------------
 
-TEST(Odometry, ScanToScanBeginsTheSearchOfEverySweepOrRunsAtTheStartAlone) {
+TEST(Odometry, ScanToScanRunsForEverySweepOrAtTheStartOnly) {
   const sim::Trajectory trajectory(sim::room_course(seconds{10}, 1.0), sim::room_start());
   const std::vector<Sweep> sweeps = sweeps_of(sim::room(), trajectory, robot_with_lidar_alone(), seconds{6});
   for (const ScanToScanMode mode : {ScanToScanMode::always, ScanToScanMode::automatic, ScanToScanMode::off}) {
@@ -184,7 +184,7 @@ TEST(Odometry, ScanToScanBeginsTheSearchOfEverySweepOrRunsAtTheStartAlone) {
   }
 }
 
-TEST(Odometry, WithoutSourcesARobotMayBeTakenToStand) {
+TEST(Odometry, WithoutSourcesZeroMotionMayBeThePrior) {
   const sim::Trajectory trajectory(sim::room_course(seconds{10}, 1.0), sim::room_start());
   OdometryOptions options;
   options.scan_to_scan_mode = ScanToScanMode::always;
@@ -258,7 +258,7 @@ TEST(Odometry, WheelsThatSlipDoNotDragTheEstimateAlong) {
   EXPECT_LT(drive_with(robot_with_slipping_wheels()), 1.2 * drive_with(robot_with_lidar_alone()));
 }
 
-TEST(Odometry, AlongABareCorridorTheWheelsCarryOnAndTheDoubtGrows) {
+TEST(Odometry, WheelsBridgeABareCorridorWithGrowingSigma) {
   const sim::Trajectory trajectory = sixty_metres({.position_m = {50, 0}});
   const Outcome result =
       drive_through(sim::corridor(200, sim::Walls::bare), trajectory, robot_with_wheels_and_imu(), seconds{15});
@@ -276,7 +276,7 @@ TEST(Odometry, AlongABareCorridorTheWheelsCarryOnAndTheDoubtGrows) {
   EXPECT_LT(result.worst_error_m, 3 * sigma_m(late, 0));
 }
 
-TEST(Odometry, WhereNothingTellsTheWayAlongItComesToRestAndSaysHowFarItMayBeOff) {
+TEST(Odometry, UnobservedMotionDecaysToRestWithHonestSigma) {
   const sim::Trajectory trajectory = sixty_metres({.position_m = {50, 0}});
   RobotSetup setup = robot_with_wheels_and_imu();
   const Stamp lost = trajectory.start() + seconds{7};
@@ -297,7 +297,7 @@ TEST(Odometry, WhereNothingTellsTheWayAlongItComesToRestAndSaysHowFarItMayBeOff)
   EXPECT_NONFATAL_FAILURE(EXPECT_LT(creeps_mps, 0.1), "creeps_mps"); // known not to hold: decision 47
 }
 
-TEST(Odometry, WhatSeesNothingAnyMoreAndHasStoppedStaysThere) {
+TEST(Odometry, BlindStandstillIsHeld) {
   const sim::Trajectory trajectory(sim::Course{}
                                        .stand(seconds{1})
                                        .change_speed(1.0, seconds{1})
@@ -324,7 +324,7 @@ TEST(Odometry, WhatSeesNothingAnyMoreAndHasStoppedStaysThere) {
   }
 }
 
-TEST(Odometry, WhatSeesNothingAnyMoreAndDroveComesToRest) {
+TEST(Odometry, BlindMotionDecaysToRest) {
   const sim::Trajectory trajectory = sixty_metres({.position_m = {50, 0}});
   RobotSetup setup;
   const Stamp dark = trajectory.start() + seconds{10};
@@ -344,7 +344,7 @@ TEST(Odometry, WhatSeesNothingAnyMoreAndDroveComesToRest) {
   EXPECT_NEAR(after_a_second_m, gone_m + 2.0, 0.3);
 }
 
-TEST(Odometry, TheErrorOfABlindStretchIsTakenBackWhereTheMapIsKnown) {
+TEST(Odometry, ErrorOfABlindStretchIsCorrectedByTheMap) {
   const sim::Trajectory trajectory(sim::room_course(seconds{40}, 1.0), sim::room_start());
   const Stamp dark = trajectory.start() + seconds{15}, light = dark + seconds{10};
   RobotSetup setup = robot_with_wheels_and_imu();
@@ -390,7 +390,7 @@ class OdometryUnderWay : public testing::Test {
   OdometryEstimate last_;
 };
 
-TEST_F(OdometryUnderWay, AFailureYieldsThePredictionAndLeavesTheMapUntouched) {
+TEST_F(OdometryUnderWay, FailureYieldsThePredictionAndLeavesTheMapUnchanged) {
   ASSERT_FALSE(last_.failed);
   const std::size_t fine = odometry_.map().fine().size(), coarse = odometry_.map().coarse().size();
   const OdometryEstimate estimate = odometry_.process(next_with(nonsense(2000)));
@@ -423,7 +423,7 @@ TEST_F(OdometryUnderWay, ThreePointsAreDeadReckoning) {
   EXPECT_FALSE(estimate.keyframe);
 }
 
-TEST_F(OdometryUnderWay, TheUncertaintyGrowsWhileNothingIsSeen) {
+TEST_F(OdometryUnderWay, CovarianceGrowsWithoutLidar) {
   double before_m2 = last_.pose_covariance.topLeftCorner<3, 3>().trace();
   Sweep sweep = next_with({});
   for (int i = 0; i < 20; ++i) {
@@ -435,14 +435,14 @@ TEST_F(OdometryUnderWay, TheUncertaintyGrowsWhileNothingIsSeen) {
   }
 }
 
-TEST_F(OdometryUnderWay, AStopAtOnceStillGivesAnEstimate) {
+TEST_F(OdometryUnderWay, ImmediateStopStillGivesAnEstimate) {
   const OdometryEstimate estimate = odometry_.process(sweeps_.back(), [] { return true; });
   EXPECT_TRUE(estimate.T_odom_base.finite());
   EXPECT_LE(estimate.scan_to_submap.iterations, 1);
   EXPECT_TRUE(is_covariance(estimate.pose_covariance));
 }
 
-TEST(Odometry, SweepsWithoutAPointAtTheBeginningAreWaitedOut) {
+TEST(Odometry, EmptySweepsAtTheStartAreSkipped) {
   Odometry odometry(OdometryOptions{});
   Sweep empty;
   empty.start = stamp_from_ns(1'000'000'000);
@@ -463,7 +463,7 @@ TEST(Odometry, SweepsWithoutAPointAtTheBeginningAreWaitedOut) {
 
 // --- Map and initialisation -------------------------------------------------------------------------------------
 
-TEST(Odometry, TheMapTakesASweepAfterAMetreOrThirtyDegrees) {
+TEST(Odometry, KeyframesFollowAMetreOrThirtyDegrees) {
   const sim::Trajectory trajectory(sim::room_course(seconds{20}, 1.0), sim::room_start());
   const Outcome result = drive_through(sim::room(), trajectory, robot_with_wheels_and_imu(), seconds{20});
   ASSERT_TRUE(result.estimates.front().keyframe);
@@ -481,7 +481,7 @@ TEST(Odometry, TheMapTakesASweepAfterAMetreOrThirtyDegrees) {
   EXPECT_GT(keyframes, 15U);
 }
 
-TEST(Odometry, ARobotThatStandsIsHeldAndAddsNothingToTheMap) {
+TEST(Odometry, StandstillIsHeldAndAddsNothingToTheMap) {
   const sim::Trajectory trajectory(sim::Course{}.stand(seconds{10}));
   const RobotSetup setup = robot_with_lidar_alone();
   Odometry odometry(setup.odometry(), setup.motion_sources());
@@ -503,7 +503,7 @@ TEST(Odometry, ARobotThatStandsIsHeldAndAddsNothingToTheMap) {
   EXPECT_LT(angle_rad(error.rotation), 0.05 * kRadPerDeg);
 }
 
-TEST(Odometry, BeginsLevelByGravityAndWithoutYaw) {
+TEST(Odometry, StartsLevelByGravityWithZeroYaw) {
   const sim::Trajectory trajectory(sim::Course{}.stand(seconds{1}));
   std::vector<Sweep> sweeps = sweeps_of(sim::room(), trajectory, RobotSetup{}, milliseconds{250});
   ASSERT_FALSE(sweeps.empty());
@@ -515,7 +515,7 @@ TEST(Odometry, BeginsLevelByGravityAndWithoutYaw) {
   EXPECT_LT((to_rpy_rad(estimate.T_odom_base.rotation) - rpy_rad).norm(), 1e-9);
 }
 
-TEST(Odometry, AnAcceleratingRobotIsNotLevelledByWhatIsNotGravity) {
+TEST(Odometry, AccelerationDoesNotTiltTheStart) {
   const sim::Trajectory trajectory(sim::Course{}.stand(seconds{1}));
   std::vector<Sweep> sweeps = sweeps_of(sim::room(), trajectory, RobotSetup{}, milliseconds{250});
   sweeps.front().motion.specific_force = SpecificForce{{6.0, 0, 9.80665}, {6.0, 0, 9.80665}};
@@ -523,7 +523,7 @@ TEST(Odometry, AnAcceleratingRobotIsNotLevelledByWhatIsNotGravity) {
 }
 
 /// Regression: the standard deviation was 100 deg/s instead of 100 rad/s, so that a flick of a hand was two sigma.
-TEST(Odometry, BeforeItsSecondSweepATurnOfFourRadiansPerSecondIsNothingUnusual) {
+TEST(Odometry, FourRadiansPerSecondAtTheStartAreWithinSigma) {
   const sim::Trajectory trajectory(sim::room_course(seconds{1}, 1.0), sim::room_start());
   const Outcome result = drive_through(sim::room(), trajectory, robot_with_lidar_alone(), seconds{1});
   EXPECT_GT(std::sqrt(result.estimates.front().twist_covariance(5, 5)), 8.0);
@@ -544,7 +544,7 @@ std::vector<double> sigma_of_scale(const std::function<void(std::size_t sweep, S
 }
 
 /// Regression: a gap of 60 ms, from a hiccup or a busy processor, erased everything learned about the wheels.
-TEST(Odometry, ASweepWithoutASampleOfASourceIsNoReasonToForgetIt) {
+TEST(Odometry, MissingSampleDoesNotResetTheSource) {
   const std::vector<double> sigma = sigma_of_scale([](std::size_t sweep, SourcePose& wheels) {
     if (sweep == 60)
       wheels = SourcePose{};
@@ -553,7 +553,7 @@ TEST(Odometry, ASweepWithoutASampleOfASourceIsNoReasonToForgetIt) {
   EXPECT_LT(sigma[61], 1.1 * sigma[59]);
 }
 
-TEST(Odometry, ASourceThatWasLostAndComesBackIsLearnedAnew) {
+TEST(Odometry, SourceThatReturnsIsReset) {
   const std::vector<double> sigma = sigma_of_scale([](std::size_t sweep, SourcePose& wheels) {
     if (sweep >= 60 && sweep < 70)
       wheels = SourcePose{};
@@ -563,7 +563,7 @@ TEST(Odometry, ASourceThatWasLostAndComesBackIsLearnedAnew) {
   EXPECT_GT(sigma[70], 2.0 * sigma[59]);
 }
 
-TEST(Odometry, SourcesInTheQueueAreUsedWhileTheyLast) {
+TEST(Odometry, QueuedSourcesAreUsedWhileHealthy) {
   const sim::Trajectory trajectory(sim::room_course(seconds{10}, 1.0), sim::room_start());
   RobotSetup setup = robot_with_wheels_and_imu();
   const Stamp silent = trajectory.start() + seconds{5};

@@ -55,7 +55,7 @@ class RealSensor : public testing::Test {
   if (!(recording))                                                                                                    \
   GTEST_SKIP() << "no real captures; set LOCUS_TEST_DATA"
 
-TEST_F(RealSensor, ACarAtFifteenMetresPerSecondThatTurnsRight) {
+TEST_F(RealSensor, CarTurnsRightAtFifteenMetresPerSecond) {
   LOAD_OR_SKIP(car, "hdl32e_moving_15mps");
   const std::vector<OdometryEstimate> run = estimates(*car);
   ASSERT_GE(run.size(), 5U);
@@ -120,7 +120,7 @@ class ShiftAlongX {
 
 /// The capture is labelled as a standing car. It stands for half a second and then pulls away: the raw points show it
 /// without any registration, and the car ends a third of a metre ahead.
-TEST_F(RealSensor, ACarThatStandsAndPullsAway) {
+TEST_F(RealSensor, CarPullsAwayFromStandstill) {
   LOAD_OR_SKIP(car, "hdl32e_static_monterey");
   const std::vector<OdometryEstimate> run = estimates(*car);
   const std::vector<Sweep> sweeps = sweeps_of(*car, every_return());
@@ -141,7 +141,7 @@ TEST_F(RealSensor, ACarThatStandsAndPullsAway) {
   }
 }
 
-TEST_F(RealSensor, AStandingVlp16ThatReportsAnotherModel) {
+TEST_F(RealSensor, StaticVlp16ThatReportsAnotherModel) {
   LOAD_OR_SKIP(tripod, "vlp16_static_1200rpm_product21");
   std::vector<OdometryEstimate> run = estimates(*tripod);
   EXPECT_NEAR(static_cast<double>(run.size()), 50.4, 1.0);
@@ -149,7 +149,7 @@ TEST_F(RealSensor, AStandingVlp16ThatReportsAnotherModel) {
   expect_still(run, 0.1);
 }
 
-TEST_F(RealSensor, AStandingVlp16WithGps) {
+TEST_F(RealSensor, StaticVlp16WithGps) {
   LOAD_OR_SKIP(tripod, "vlp16_static_gps_pps");
   const std::vector<OdometryEstimate> run = estimates(*tripod);
   EXPECT_NEAR(static_cast<double>(run.size()), 3.9, 1.0);

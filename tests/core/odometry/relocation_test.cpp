@@ -157,7 +157,7 @@ Gaps drive_with_gaps(const sim::Scene& scene, const sim::Trajectory& trajectory,
 }
 
 /// Half of the lidar's points there are far, newly visible or moving.
-TEST(Relocation, InAPlantTheRobotIsFoundWhereItIsAndNowhereElse) {
+TEST(Relocation, PlantIsRelocalisedOnlyAtTheTruePose) {
   const sim::World plant = sim::make_urban(1);
   sim::Dice dice(1);
   const sim::PlannedCourse planned = plan_course(plant.roads, {1.0, 0.8, 0.5, 1.0, 0.1}, seconds{34}, dice);
@@ -169,7 +169,7 @@ TEST(Relocation, InAPlantTheRobotIsFoundWhereItIsAndNowhereElse) {
   EXPECT_EQ(restarts.found_where_it_was_long_ago, 0);
 }
 
-TEST(Relocation, InATunnelTheRobotIsFoundWhereItIsAndNowhereElse) {
+TEST(Relocation, TunnelIsRelocalisedOnlyAtTheTruePose) {
   const sim::Course course = sim::weaving_course(seconds{34}, 1.0, 0.3, 12.0);
   const Restarts restarts(sim::tunnel(60), sim::Trajectory(course, sim::weaving_start(5, 0.3, 12.0)), seconds{31});
   ASSERT_EQ(restarts.all(), 10U);
@@ -180,7 +180,7 @@ TEST(Relocation, InATunnelTheRobotIsFoundWhereItIsAndNowhereElse) {
 }
 
 /// The position along the corridor is unobservable there; only lateral errors can be rejected.
-TEST(Relocation, InABareCorridorTheRobotIsFoundWhereItIsAndNotBesideIt) {
+TEST(Relocation, BareCorridorIsRelocalisedOnlyAtTheTruePose) {
   const sim::Course course = sim::weaving_course(seconds{34}, 1.0, 0.3, 12.0);
   const Restarts restarts(sim::corridor(60, sim::Walls::bare),
                           sim::Trajectory(course, sim::weaving_start(5, 0.3, 12.0)), seconds{31});
@@ -190,7 +190,7 @@ TEST(Relocation, InABareCorridorTheRobotIsFoundWhereItIsAndNotBesideIt) {
 }
 
 /// The watchdog takes six seconds to end a hanging service, while the robot drives on.
-TEST(Relocation, WheelsBridgeSixSecondsInAPlantATunnelAndABareCorridor) {
+TEST(Relocation, WheelsBridgeSixSeconds) {
   const sim::World plant = sim::make_urban(1);
   sim::Dice dice(1);
   const sim::PlannedCourse planned = plan_course(plant.roads, {1.0, 0.8, 0.5, 1.0, 0.1}, seconds{29}, dice);
@@ -206,7 +206,7 @@ TEST(Relocation, WheelsBridgeSixSecondsInAPlantATunnelAndABareCorridor) {
 }
 
 /// Without the learned scale, 10 % of six seconds' travel lies outside the search range.
-TEST(Relocation, WhatWasLearnedOfWheelsIsTrueAfterTheGap) {
+TEST(Relocation, LearnedWheelCalibrationHoldsAfterTheGap) {
   const sim::Trajectory weaving(sim::weaving_course(seconds{29}, 1.0, 0.3, 12.0), sim::weaving_start(5, 0.3, 12.0));
   const Gaps learned = drive_with_gaps(sim::tunnel(60), weaving, seconds{6}, Wheels::learned);
   EXPECT_GE(learned.found + learned.bridged, learned.all - 2) << "the first second or two teach little";
@@ -214,7 +214,7 @@ TEST(Relocation, WhatWasLearnedOfWheelsIsTrueAfterTheGap) {
   EXPECT_LT(drive_with_gaps(sim::tunnel(60), weaving, seconds{6}, Wheels::not_learned).found, learned.all / 2);
 }
 
-TEST(Relocation, WheelsThatSpunAsItEndedTellWhereToLook) {
+TEST(Relocation, WheelsThatSlippedGuideTheSearch) {
   const sim::World plant = sim::make_urban(1);
   sim::Dice dice(1);
   const sim::PlannedCourse planned = plan_course(plant.roads, {1.0, 0.8, 0.5, 1.0, 0.1}, seconds{29}, dice);
@@ -269,14 +269,14 @@ double worst_beside_spinning_wheels_m(const sim::Scene& scene, Duration gap) {
 }
 
 /// The wheels report 1 m/s. The first two sweeps show that the robot is at rest.
-TEST(Relocation, WheelsThatSpinDoNotMoveARobotThatStands) {
+TEST(Relocation, SpinningWheelsDoNotMoveARobotAtRest) {
   for (const Duration gap : {milliseconds{500}, milliseconds{5000}}) {
     EXPECT_LT(worst_beside_spinning_wheels_m(sim::tunnel(60), gap), 0.05);
     EXPECT_LT(worst_beside_spinning_wheels_m(sim::corridor(60, sim::Walls::bare), gap), 0.05);
   }
 }
 
-TEST(Relocation, WithoutWheelsASecondIsBridgedAndSixAreAFreshStart) {
+TEST(Relocation, WithoutWheelsOneSecondIsBridgedAndSixRestart) {
   const sim::Trajectory weaving(sim::weaving_course(seconds{29}, 1.0, 0.3, 12.0), sim::weaving_start(5, 0.3, 12.0));
   const sim::Scene tunnel = sim::tunnel(60);
   const Gaps second = drive_with_gaps(tunnel, weaving, seconds{1}, Wheels::none);
@@ -309,7 +309,7 @@ class AnotherPlace : public testing::Test {
                     .T_odom_base = {Eigen::Quaterniond::Identity(), {7, 0, 0}}};
 };
 
-TEST_F(AnotherPlace, WheelsSayWhereTheRobotIsAllTheSame) {
+TEST_F(AnotherPlace, WheelsDetermineThePose) {
   last_.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {-2, 0, 0}}; // each starts at its own origin
   const std::vector<OdometryEstimate> estimates = go_on_from(last_);
   EXPECT_EQ(estimates.front().beginning, Beginning::odometry);
@@ -319,7 +319,7 @@ TEST_F(AnotherPlace, WheelsSayWhereTheRobotIsAllTheSame) {
   EXPECT_GT(estimates.front().twist_covariance(0, 0), 1.0) << "nobody has seen it move yet";
 }
 
-TEST_F(AnotherPlace, WheelsThatSpunAsItEndedAreBelievedTheLess) {
+TEST_F(AnotherPlace, WheelsThatSlippedAreLessCertain) {
   last_.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {-2, 0, 0}};
   last_.twist_base[0] = 1.0;
   const double sound_sigma = std::sqrt(go_on_from(last_).front().pose_covariance(0, 0));
@@ -329,14 +329,14 @@ TEST_F(AnotherPlace, WheelsThatSpunAsItEndedAreBelievedTheLess) {
   EXPECT_GT(std::sqrt(first.pose_covariance(0, 0)), sound_sigma + 1.5);
 }
 
-TEST_F(AnotherPlace, WheelsThatWouldHaveFlownThereWereRestarted) {
+TEST_F(AnotherPlace, UnreachableWheelPoseIsDiscarded) {
   last_.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {-200, 0, 0}};
   const OdometryEstimate first = go_on_from(last_).front();
   EXPECT_EQ(first.beginning, Beginning::origin);
   EXPECT_EQ(first.T_odom_base.translation.norm(), 0);
 }
 
-TEST_F(AnotherPlace, OneOfTwoOdometriesThatWasRestartedIsPassedOver) {
+TEST_F(AnotherPlace, RestartedOdometryIsSkipped) {
   last_.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {-200, 0, 0}};
   last_.T_source_base[2] = Pose{Eigen::Quaterniond::Identity(), {-2, 0, 0}};
   SensedMotion sensed;
@@ -347,7 +347,7 @@ TEST_F(AnotherPlace, OneOfTwoOdometriesThatWasRestartedIsPassedOver) {
   EXPECT_FALSE(candidates[1].from_odometry);
 }
 
-TEST_F(AnotherPlace, HealthyOdometryGoesBeforeOneInDoubt) {
+TEST_F(AnotherPlace, HealthyOdometryIsPreferred) {
   last_.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {-1, 0, 0}};
   last_.T_source_base[2] = Pose{Eigen::Quaterniond::Identity(), {-2, 0, 0}};
   last_.twist_base[0] = 0.3;
@@ -361,13 +361,13 @@ TEST_F(AnotherPlace, HealthyOdometryGoesBeforeOneInDoubt) {
   EXPECT_NEAR(candidates[1].T_odom_base.translation.x(), 8, 1e-9);
 }
 
-TEST_F(AnotherPlace, OdometryInDoubtIsBelievedWhereNothingElseTells) {
+TEST_F(AnotherPlace, UnhealthyOdometryIsTheLastResort) {
   last_.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {-2, 0, 0}};
   last_.doubted.set(0);
   EXPECT_EQ(go_on_from(last_).front().beginning, Beginning::odometry) << "it stood, and is not seen there any more";
 }
 
-TEST_F(AnotherPlace, WhatIsKnownOfASourceThatIsNotHeardYetIsHandedOn) {
+TEST_F(AnotherPlace, CalibrationOfAnAbsentSourceIsRetained) {
   last_.learned[0] = LearnedSource{.noise_per_s = Vector6::Constant(0.01), .states = {0.05, 0, 0, 0, 0, 0, 0}};
   const std::vector<OdometryEstimate> estimates = go_on_from(last_, milliseconds{500});
   ASSERT_TRUE(estimates[0].sources[0].learned && estimates[2].sources[0].learned);
@@ -375,7 +375,7 @@ TEST_F(AnotherPlace, WhatIsKnownOfASourceThatIsNotHeardYetIsHandedOn) {
   EXPECT_FALSE(estimates[2].sources[3].learned) << "there is no such source";
 }
 
-TEST_F(AnotherPlace, WhoStoodMayStandThereStill) {
+TEST_F(AnotherPlace, RobotAtRestMayStillBeThere) {
   last_.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {-1, 0, 0}};
   SensedMotion sensed;
   sensed.sources[0].usable = true;
@@ -406,7 +406,7 @@ TEST_F(AnotherPlace, OdometryThatIsNotHealthyIsAwaited) {
 }
 
 /// The driver restarts at an origin within the robot's reach.
-TEST(Relocation, InABareCorridorTheSigmaHoldsWhatRestartedWheelsGetWrong) {
+TEST(Relocation, BareCorridorSigmaCoversTheErrorOfRestartedWheels) {
   const sim::Trajectory weaving(sim::weaving_course(seconds{15}, 1.0, 0.3, 12.0), sim::weaving_start(5, 0.3, 12.0));
   const RobotSetup robot = robot_of_restarts();
   Odometry odometry(robot.odometry(), robot.motion_sources());
@@ -436,7 +436,7 @@ TEST(Relocation, InABareCorridorTheSigmaHoldsWhatRestartedWheelsGetWrong) {
   EXPECT_NONFATAL_FAILURE(EXPECT_LT(worst_sigma, 3), "worst_sigma"); // known not to hold: decision 30
 }
 
-TEST_F(AnotherPlace, WheelsAreWaitedForASecondAtTheMost) {
+TEST_F(AnotherPlace, WaitsForWheelsAtMostOneSecond) {
   last_.T_source_base[0] = Pose{Eigen::Quaterniond::Identity(), {-2, 0, 0}};
   for (const auto& [silent_for, waits_at_least, from] :
        {std::tuple{milliseconds{500}, 3, Beginning::odometry}, std::tuple{milliseconds{5000}, 9, Beginning::origin}}) {

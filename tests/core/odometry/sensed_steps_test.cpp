@@ -26,7 +26,7 @@ SensedSteps begun() {
   return steps;
 }
 
-TEST(SensedSteps, AreMeanTwistsHoweverManySweepsWereDropped) {
+TEST(SensedSteps, AreMeanTwistsOverDroppedSweeps) {
   const SensedSteps steps = begun();
   for (const int elapsed_ms : {50, 100, 1000}) {
     const Sweep sweep = sweep_at(milliseconds{elapsed_ms});
@@ -38,7 +38,7 @@ TEST(SensedSteps, AreMeanTwistsHoweverManySweepsWereDropped) {
   }
 }
 
-TEST(SensedSteps, CountFromTheLastThatWasRemembered) {
+TEST(SensedSteps, StartAtTheStoredSweep) {
   SensedSteps steps = begun();
   const Sweep second = sweep_at(milliseconds{100});
   steps.store(second);
@@ -47,7 +47,7 @@ TEST(SensedSteps, CountFromTheLastThatWasRemembered) {
   EXPECT_LT((steps.twist_base(sweep_at(milliseconds{250}), kSource)->mean - kTwist).norm(), 1e-9);
 }
 
-TEST(SensedSteps, TellHowTheTwistChangesAndWhatIsDueToStampsThatWereCorrected) {
+TEST(SensedSteps, ReportTwistChangeAndCorrectedLateness) {
   Sweep first = sweep_at(milliseconds{0}), second = sweep_at(milliseconds{100});
   SourcePose& began = first.motion.sources[index_of(kSource)];
   SourcePose& ended = second.motion.sources[index_of(kSource)];
@@ -63,7 +63,7 @@ TEST(SensedSteps, TellHowTheTwistChangesAndWhatIsDueToStampsThatWereCorrected) {
   EXPECT_LT((sensed->brought_forward - (0.04 * 3.0 - 0.01) / 0.1 * kTwist).norm(), 1e-9);
 }
 
-TEST(SensedSteps, AreNothingWhereTheSourceWasNotHeard) {
+TEST(SensedSteps, AreEmptyIfTheSourceIsAbsent) {
   const SensedSteps steps = begun();
   Sweep sweep = sweep_at(milliseconds{100});
   EXPECT_FALSE(steps.twist_base(sweep, kOther)) << "never";
@@ -75,19 +75,19 @@ TEST(SensedSteps, AreNothingWhereTheSourceWasNotHeard) {
   EXPECT_FALSE(silent.twist_base(sweep_at(milliseconds{200}), kSource)) << "not then";
 }
 
-TEST(SensedSteps, AreNothingAcrossEpochs) {
+TEST(SensedSteps, AreEmptyAcrossEpochs) {
   Sweep sweep = sweep_at(milliseconds{100});
   ++sweep.motion.sources[index_of(kSource)].epoch;
   EXPECT_FALSE(begun().twist_base(sweep, kSource));
   EXPECT_FALSE(begun().is_usable(sweep, kSource));
 }
 
-TEST(SensedSteps, AreNothingInNoTime) {
+TEST(SensedSteps, AreEmptyForZeroDuration) {
   EXPECT_FALSE(begun().twist_base(sweep_at(milliseconds{0}), kSource));
   EXPECT_FALSE(begun().twist_base(sweep_at(milliseconds{-100}), kSource)) << "nor backwards";
 }
 
-TEST(SensedSteps, OfASickSourceAreKnownButNotUsed) {
+TEST(SensedSteps, OfAnUnhealthySourceAreKnownButUnusable) {
   Sweep sick = sweep_at(milliseconds{100});
   sick.motion.sources[index_of(kSource)].usable = false;
   EXPECT_TRUE(begun().twist_base(sick, kSource));

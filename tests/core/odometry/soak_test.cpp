@@ -65,7 +65,7 @@ TEST(Soak, FifteenKilometresTakeNoMoreMemoryThanOne) {
   EXPECT_NEAR(driven_m, 15'000, 0.002 * 15'000);
 }
 
-TEST(Soak, AThousandSweepsAtAStandAddNothingToTheMapAndMoveNothing) {
+TEST(Soak, AThousandSweepsAtRestChangeNothing) {
   const sim::Trajectory trajectory(sim::Course{}.stand(seconds{101}));
   const sim::Scene scene = sim::street(100);
   const RobotSetup setup = robot();

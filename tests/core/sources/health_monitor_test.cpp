@@ -145,7 +145,7 @@ TEST_F(WheelsTest, TheTimeoutIsNeverShorterThanFiftyMillisecondsNorLongerThanASe
   }
 }
 
-TEST_F(WheelsTest, ThatSlowDownForGoodAreLearnedAnew) {
+TEST_F(WheelsTest, PermanentlyLowerRateIsLearned) {
   for (int i = 0; i < 200; ++i) {
     now_ += milliseconds{80};
     x_m_ += 0.08;
@@ -156,7 +156,7 @@ TEST_F(WheelsTest, ThatSlowDownForGoodAreLearnedAnew) {
   EXPECT_GT(monitor_.timeout(), milliseconds{200});
 }
 
-TEST_F(WheelsTest, OneBadSampleIsLeftOutAndCostsNothing) {
+TEST_F(WheelsTest, OneBadSampleIsDropped) {
   OdometrySample bad = next();
   bad.T_source_base.translation.x() = kNan;
   EXPECT_FALSE(monitor_.judge(bad));
@@ -166,7 +166,7 @@ TEST_F(WheelsTest, OneBadSampleIsLeftOutAndCostsNothing) {
   EXPECT_EQ(left_out(HealthReason::nan), 1U);
 }
 
-TEST_F(WheelsTest, NotANumberForLongCostsTheirHealth) {
+TEST_F(WheelsTest, LongRunOfNonFiniteSamplesIsUnhealthy) {
   begin_fault();
   run(seconds{1}, [](OdometrySample& sample) { sample.T_source_base.rotation.coeffs().setConstant(kNan); });
   expect_lost(HealthReason::nan, kDetected);
@@ -175,21 +175,21 @@ TEST_F(WheelsTest, NotANumberForLongCostsTheirHealth) {
   expect_back_after_probation();
 }
 
-TEST_F(WheelsTest, AQuaternionOfLengthZeroIsNoRotation) {
+TEST_F(WheelsTest, ZeroQuaternionIsRejected) {
   OdometrySample bad = next();
   bad.T_source_base.rotation.coeffs().setZero();
   EXPECT_FALSE(monitor_.judge(bad));
   EXPECT_EQ(left_out(HealthReason::no_rotation), 1U);
 }
 
-TEST_F(WheelsTest, AnAbsurdPositionIsNotANumberEither) {
+TEST_F(WheelsTest, AbsurdPositionIsRejectedAsNonFinite) {
   OdometrySample sample = next();
   sample.T_source_base.translation.y() = -1e300;
   EXPECT_FALSE(monitor_.judge(sample));
   EXPECT_EQ(left_out(HealthReason::nan), 1U);
 }
 
-TEST_F(WheelsTest, OldAndDoubleSamplesAreLeftOut) {
+TEST_F(WheelsTest, OldAndDuplicateSamplesAreDropped) {
   const OdometrySample before = next();
   OdometrySample after = next();
   EXPECT_TRUE(monitor_.judge(after));
@@ -199,7 +199,7 @@ TEST_F(WheelsTest, OldAndDoubleSamplesAreLeftOut) {
   EXPECT_TRUE(monitor_.healthy());
 }
 
-TEST_F(WheelsTest, SamplesThatComeLateAreStale) {
+TEST_F(WheelsTest, LateSamplesAreStale) {
   begin_fault();
   be_silent(milliseconds{200});
   run(seconds{1}, [](OdometrySample& sample) { sample.stamp -= milliseconds{200}; });
@@ -208,7 +208,7 @@ TEST_F(WheelsTest, SamplesThatComeLateAreStale) {
   expect_back_after_probation();
 }
 
-TEST_F(WheelsTest, ALatencyThatSweepsCanBearIsNoFault) {
+TEST_F(WheelsTest, TolerableLatencyIsHealthy) {
   Duration latency{};
   run(seconds{2}, [&](OdometrySample& sample) {
     latency = std::min<Duration>(latency + milliseconds{1}, milliseconds{45});
@@ -218,7 +218,7 @@ TEST_F(WheelsTest, ALatencyThatSweepsCanBearIsNoFault) {
   EXPECT_TRUE(events_.empty());
 }
 
-TEST_F(WheelsTest, ThatHangWhileMovingAreFrozen) {
+TEST_F(WheelsTest, ConstantPoseWhileMovingIsFrozen) {
   begin_fault();
   const double hangs_at_m = x_m_;
   run(seconds{2}, [&](OdometrySample& sample) { sample.T_source_base.translation.x() = hangs_at_m; });
@@ -227,13 +227,13 @@ TEST_F(WheelsTest, ThatHangWhileMovingAreFrozen) {
   expect_back_after_probation();
 }
 
-TEST_F(WheelsTest, ThatStandAreNotFrozen) {
+TEST_F(WheelsTest, StandstillIsNotFrozen) {
   brake_and_stand(seconds{5});
   EXPECT_TRUE(monitor_.healthy());
   EXPECT_EQ(left_out(HealthReason::frozen), 0U);
 }
 
-TEST_F(WheelsTest, ThatStandWhileLidarSeesMotionAreFrozen) {
+TEST_F(WheelsTest, ConstantPoseAgainstLidarMotionIsFrozen) {
   brake_and_stand(seconds{2});
   RegistrationFeedback moving{now_ - milliseconds{200}, now_};
   moving.twist_base.x() = 0.5;
@@ -243,7 +243,7 @@ TEST_F(WheelsTest, ThatStandWhileLidarSeesMotionAreFrozen) {
   expect_lost(HealthReason::frozen, kDetected);
 }
 
-TEST_F(WheelsTest, ThatStandWhileLidarIsShakenAreNotFrozen) {
+TEST_F(WheelsTest, ShakenLidarDoesNotMakeThemFrozen) {
   brake_and_stand(seconds{2});
   for (int sweep = 0; sweep < 20; ++sweep) {
     RegistrationFeedback shaken{now_, now_ + milliseconds{100}};
@@ -255,7 +255,7 @@ TEST_F(WheelsTest, ThatStandWhileLidarIsShakenAreNotFrozen) {
 }
 
 /// At 5 Hz the feedback on a sweep arrives with the next sweep.
-TEST_F(WheelsTest, ThatStoppedBeforeLidarToldOfTheDriveAreNotFrozen) {
+TEST_F(WheelsTest, LateLidarFeedbackDoesNotMakeThemFrozen) {
   brake_and_stand(milliseconds{520});
   RegistrationFeedback before_the_stop{now_ - milliseconds{220}, now_ - milliseconds{20}};
   before_the_stop.twist_base.x() = 0.4;
@@ -269,7 +269,7 @@ TEST_F(WheelsTest, ThatStoppedBeforeLidarToldOfTheDriveAreNotFrozen) {
   EXPECT_EQ(left_out(HealthReason::frozen), 0U);
 }
 
-TEST_F(WheelsTest, ThatJumpLoseTheirHealthUntilTheyGoOnFromThere) {
+TEST_F(WheelsTest, JumpIsUnhealthyUntilMotionResumes) {
   begin_fault();
   x_m_ += 2.0;
   run(milliseconds{80});
@@ -278,7 +278,7 @@ TEST_F(WheelsTest, ThatJumpLoseTheirHealthUntilTheyGoOnFromThere) {
   EXPECT_LE(left_out(HealthReason::jump), 4U);
 }
 
-TEST_F(WheelsTest, ASingleSampleInTheWrongPlaceCostsNothing) {
+TEST_F(WheelsTest, SingleOutlierIsDropped) {
   OdometrySample astray = next();
   astray.T_source_base.translation.y() += 2.0;
   EXPECT_FALSE(monitor_.judge(astray));
@@ -287,7 +287,7 @@ TEST_F(WheelsTest, ASingleSampleInTheWrongPlaceCostsNothing) {
   EXPECT_EQ(left_out(HealthReason::jump), 1U);
 }
 
-TEST_F(WheelsTest, ThatClaimMoreThanTheRobotIsAbleToAreLostUntilTheyDoNot) {
+TEST_F(WheelsTest, SpeedAboveTheLimitIsUnhealthy) {
   double ahead_m = 0.0, more_mps = 0.0;
   const auto speed_up = [&](double by_mps2) {
     return [&, by_mps2](OdometrySample& sample) { // added to the 1 m/s
@@ -304,14 +304,14 @@ TEST_F(WheelsTest, ThatClaimMoreThanTheRobotIsAbleToAreLostUntilTheyDoNot) {
   EXPECT_TRUE(monitor_.healthy());
 }
 
-TEST_F(WheelsTest, ATurnThatNoRobotMakesIsAJump) {
+TEST_F(WheelsTest, ImpossibleTurnIsAJump) {
   OdometrySample turned = next();
   turned.T_source_base.rotation = so3_exp({0, 0, 0.3});
   EXPECT_FALSE(monitor_.judge(turned));
   EXPECT_EQ(left_out(HealthReason::jump), 1U);
 }
 
-TEST_F(WheelsTest, RoughButHonestMotionIsNoJump) {
+TEST_F(WheelsTest, RoughMotionIsNoJump) {
   int i = 0;
   run(seconds{5}, [&](OdometrySample& sample) { // alternating pose errors of 15 mm and one degree
     sample.T_source_base.translation.y() += ++i % 2 == 0 ? 0.015 : -0.015;
@@ -321,7 +321,7 @@ TEST_F(WheelsTest, RoughButHonestMotionIsNoJump) {
   EXPECT_EQ(left_out(HealthReason::jump), 0U);
 }
 
-TEST_F(WheelsTest, TenTimesTheCovarianceCostsTheirHealth) {
+TEST_F(WheelsTest, TenfoldCovarianceIsUnhealthy) {
   begin_fault();
   run(seconds{1}, [](OdometrySample& sample) { sample.covariance_scale = 10.0; });
   expect_lost(HealthReason::covariance, kDetected);
@@ -329,7 +329,7 @@ TEST_F(WheelsTest, TenTimesTheCovarianceCostsTheirHealth) {
 }
 
 /// Wheels whose driver left out the quaternion's w were used wherever its length was above a half.
-TEST_F(WheelsTest, QuaternionsThatAreNoRotationAreRefusedAsSuch) {
+TEST_F(WheelsTest, UnnormalisedQuaternionsAreRejected) {
   for (const Eigen::Quaterniond& q : {Eigen::Quaterniond{0, 0, 0, 0}, Eigen::Quaterniond{0, 0, 0, 0.3},
                                       Eigen::Quaterniond{0, 0, 0, 0.98}, Eigen::Quaterniond{2, 0, 0, 0}}) {
     const std::uint64_t before = left_out(HealthReason::no_rotation);
@@ -341,7 +341,7 @@ TEST_F(WheelsTest, QuaternionsThatAreNoRotationAreRefusedAsSuch) {
 }
 
 /// At half a turn a quaternion without w is of unit length, and such wheels were used there.
-TEST_F(WheelsTest, QuaternionsWithoutWAreRefusedAtHalfATurnAsWell) {
+TEST_F(WheelsTest, QuaternionsWithoutWAreRejectedAtHalfATurn) {
   OdometrySample sample = next();
   sample.T_source_base.rotation = {0, 0, 0, 0.9};
   EXPECT_FALSE(monitor_.judge(sample));
@@ -353,7 +353,7 @@ TEST_F(WheelsTest, QuaternionsWithoutWAreRefusedAtHalfATurnAsWell) {
 }
 
 /// A source that was refused from its first sample on was refused in silence.
-TEST(HealthMonitor, OfASourceWhoseSamplesWereNeverGoodSaysSoAfterFiveSeconds) {
+TEST(HealthMonitor, ReportsASourceThatWasNeverGoodAfterFiveSeconds) {
   HealthMonitor monitor(kWheels);
   Stamp now = stamp_from_ns(1'700'000'000'000'000'000);
   const auto send_for = [&](Duration duration, const Eigen::Quaterniond& rotation) {
@@ -380,7 +380,7 @@ TEST(HealthMonitor, OfASourceWhoseSamplesWereNeverGoodSaysSoAfterFiveSeconds) {
   EXPECT_GT(monitor.longest_refusal().lasted, seconds{64});
 }
 
-TEST_F(WheelsTest, ARefusalLastsUntilTheirHealthIsBack) {
+TEST_F(WheelsTest, RefusalLastsUntilTheyAreHealthy) {
   EXPECT_FALSE(monitor_.refusal());
   int i = 0;
   run(seconds{6}, [&](OdometrySample& sample) { // one sample in two seconds is good
@@ -405,7 +405,7 @@ TEST(HealthReason, EachIsExplained) {
     EXPECT_FALSE(explanation(static_cast<HealthReason>(i)).empty()) << i;
 }
 
-TEST_F(WheelsTest, AClockThatStepsByAnHourCostsTheirHealthAndIsLearnedAnew) {
+TEST_F(WheelsTest, ClockStepOfAnHourIsUnhealthyAndRelearned) {
   begin_fault();
   run(milliseconds{200}, [](OdometrySample& sample) { sample.stamp += hours{1}; });
   expect_lost(HealthReason::out_of_order, kDetected);
@@ -419,14 +419,14 @@ TEST_F(WheelsTest, AClockThatStepsByAnHourCostsTheirHealthAndIsLearnedAnew) {
 }
 
 /// Regression: the step back was taken for a period of minus one hour, which no later sample corrected.
-TEST_F(WheelsTest, AClockOfTheHostThatIsSetBackDoesNotChangeTheirTimeout) {
+TEST_F(WheelsTest, BackwardHostClockStepKeepsTheTimeout) {
   const Duration timeout = monitor_.timeout();
   run(seconds{4}, [](OdometrySample& sample) { sample.arrival -= hours{1}; });
   EXPECT_TRUE(monitor_.healthy());
   EXPECT_EQ(monitor_.timeout(), timeout);
 }
 
-TEST_F(WheelsTest, ThatStandWhileTheClockOfTheHostIsSetBackAreNotFrozen) {
+TEST_F(WheelsTest, BackwardHostClockStepAtRestIsNotFrozen) {
   brake_and_stand(seconds{3});
   run(seconds{4}, [&](OdometrySample& sample) {
     sample.arrival -= hours{1};
@@ -436,7 +436,7 @@ TEST_F(WheelsTest, ThatStandWhileTheClockOfTheHostIsSetBackAreNotFrozen) {
   EXPECT_EQ(left_out(HealthReason::frozen), 0U);
 }
 
-TEST_F(WheelsTest, ThreeSweepsOfDisagreementWithLidarCostTheirHealth) {
+TEST_F(WheelsTest, ThreeContradictingSweepsAreUnhealthy) {
   begin_fault();
   hear(LidarOpinion::disagrees, 2);
   hear(LidarOpinion::agrees, 1);
@@ -452,7 +452,7 @@ TEST_F(WheelsTest, ThreeSweepsOfDisagreementWithLidarCostTheirHealth) {
   EXPECT_EQ(events_.size(), 2U);
 }
 
-TEST_F(WheelsTest, AnOutsideVerdictStandsUntilItIsTakenBack) {
+TEST_F(WheelsTest, ExternalVerdictHoldsUntilItIsWithdrawn) {
   begin_fault();
   monitor_.set_outside_verdict(false, now_);
   run(seconds{3});
@@ -462,7 +462,7 @@ TEST_F(WheelsTest, AnOutsideVerdictStandsUntilItIsTakenBack) {
   expect_back_after_probation();
 }
 
-TEST_F(WheelsTest, AFlappingSourceChangesItsHealthOnceNotEachTime) {
+TEST_F(WheelsTest, FlappingSourceChangesHealthOnce) {
   for (int i = 0; i < 20; ++i) {
     be_silent(milliseconds{150});
     run(milliseconds{500});
@@ -473,7 +473,7 @@ TEST_F(WheelsTest, AFlappingSourceChangesItsHealthOnceNotEachTime) {
   expect_back_after_probation();
 }
 
-TEST_F(WheelsTest, ASpellEndsWithEachLoss) {
+TEST_F(WheelsTest, EpochEndsWithEachLoss) {
   const std::uint32_t epoch = monitor_.epoch();
   be_silent(milliseconds{200});
   EXPECT_NE(monitor_.epoch(), epoch);
@@ -502,7 +502,7 @@ class ImuTest : public testing::Test {
   Stamp now_ = stamp_from_ns(1'700'000'000'000'000'000);
 };
 
-TEST_F(ImuTest, ThatRepeatsItsReadingIsFrozen) {
+TEST_F(ImuTest, RepeatedReadingIsFrozen) {
   run(milliseconds{60}, 0.5, 0.0);
   const auto event = monitor_.pop_event();
   ASSERT_TRUE(event);
@@ -511,7 +511,7 @@ TEST_F(ImuTest, ThatRepeatsItsReadingIsFrozen) {
   EXPECT_TRUE(monitor_.healthy());
 }
 
-TEST_F(ImuTest, ThatFreezesInATurnIsNotTakenForAWrongOne) {
+TEST_F(ImuTest, FrozenInATurnIsNotCalledWrong) {
   RegistrationFeedback otherwise;
   otherwise.observes.fill(true);
   otherwise.twist_base << 1.0, 0, 0, 0, 0, -0.3;
@@ -527,7 +527,7 @@ TEST_F(ImuTest, ThatFreezesInATurnIsNotTakenForAWrongOne) {
   EXPECT_TRUE(monitor_.healthy());
 }
 
-TEST_F(ImuTest, WithoutNoiseIsNotFrozenAtRest) {
+TEST_F(ImuTest, NoiselessUnitIsNotFrozenAtRest) {
   run(seconds{2}, 0.0, 0.0);
   EXPECT_TRUE(monitor_.healthy());
   EXPECT_EQ(monitor_.counters().rejected_as(HealthReason::frozen), 0U);
@@ -539,7 +539,7 @@ TEST_F(ImuTest, ATurnRateBeyondAnyRangeIsAJump) {
   EXPECT_EQ(monitor_.counters().rejected_as(HealthReason::jump), 20U);
 }
 
-TEST_F(ImuTest, NotANumberInAnyPartIsLeftOut) {
+TEST_F(ImuTest, NonFiniteReadingIsDropped) {
   now_ += milliseconds{5};
   EXPECT_FALSE(monitor_.judge(ImuSample{now_, now_, {0, 0, kNan}, {0, 0, 9.81}, {}}));
   EXPECT_FALSE(monitor_.judge(ImuSample{now_, now_, {0, 0, 0.1}, {kNan, 0, 9.81}, {}}));
@@ -548,7 +548,7 @@ TEST_F(ImuTest, NotANumberInAnyPartIsLeftOut) {
 
 /// Regression: the reading stayed in the accumulated rotation, masked the robot's own, and the unit was rejected for
 /// good.
-TEST_F(ImuTest, OneAbsurdReadingCostsNothing) {
+TEST_F(ImuTest, OneAbsurdReadingIsDropped) {
   now_ += milliseconds{5};
   EXPECT_FALSE(monitor_.judge(ImuSample{now_, now_, {0, 0, 1e20}, {0, 0, 9.81}, {}}));
   RegistrationFeedback agreeing;

@@ -64,7 +64,7 @@ TEST_F(ImuSelfCheckTest, AGoodUnitPasses) {
   EXPECT_TRUE(check.trusts_accelerometer());
 }
 
-TEST_F(ImuSelfCheckTest, AUnitOnItsSidePassesIfTheConfigurationSaysSo) {
+TEST_F(ImuSelfCheckTest, UnitOnItsSidePassesIfConfigured) {
   const Pose T_base_imu{so3_exp({std::numbers::pi / 2, 0, 0}), {}};
   const auto turned = [&](ImuSample& sample) {
     sample.angular_velocity_radps = T_base_imu.rotation.conjugate() * sample.angular_velocity_radps;
@@ -97,13 +97,13 @@ TEST_F(ImuSelfCheckTest, AccelerationsInGAreNotTrustedBeforeGravityIsWeighed) {
   }
 }
 
-TEST_F(ImuSelfCheckTest, AnAccelerometerThatFeelsGravityIsTrustedFromItsFirstSampleOn) {
+TEST_F(ImuSelfCheckTest, AccelerometerThatMeasuresGravityIsTrustedAtOnce) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   drive(check, milliseconds{5}, [](ImuSample&) {});
   EXPECT_TRUE(check.trusts_accelerometer());
 }
 
-TEST_F(ImuSelfCheckTest, AFirstSampleOfZerosIsOutweighedWithinTenSamples) {
+TEST_F(ImuSelfCheckTest, ZeroFirstSampleIsOutweighedWithinTenSamples) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   drive(check, milliseconds{5}, [](ImuSample& sample) { sample.specific_force_mps2.setZero(); });
   EXPECT_FALSE(check.trusts_accelerometer());
@@ -111,21 +111,21 @@ TEST_F(ImuSelfCheckTest, AFirstSampleOfZerosIsOutweighedWithinTenSamples) {
   EXPECT_TRUE(check.trusts_accelerometer());
 }
 
-TEST_F(ImuSelfCheckTest, AccelerationsThatAreNoGravityAreNotUsed) {
+TEST_F(ImuSelfCheckTest, AccelerationsUnlikeGravityAreNotUsed) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   drive(check, seconds{5}, [](ImuSample& sample) { sample.specific_force_mps2 *= 2.0; });
   EXPECT_FALSE(refused_);
   EXPECT_FALSE(check.trusts_accelerometer());
 }
 
-TEST_F(ImuSelfCheckTest, AGyroInDegreesIsRefusedByName) {
+TEST_F(ImuSelfCheckTest, GyroInDegreesIsRejectedByName) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   drive(check, seconds{5}, [](ImuSample& sample) { sample.angular_velocity_radps /= kRadPerDeg; });
   EXPECT_TRUE(refused_);
   EXPECT_NE(check.verdict().find("deg/s"), std::string_view::npos);
 }
 
-TEST_F(ImuSelfCheckTest, AGyroThatTurnsTheOtherWayIsRefused) {
+TEST_F(ImuSelfCheckTest, InvertedGyroIsRejected) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   drive(check, seconds{5}, [](ImuSample& sample) { sample.angular_velocity_radps *= -1.0; });
   EXPECT_TRUE(refused_);
@@ -140,7 +140,7 @@ TEST_F(ImuSelfCheckTest, AGoodGyroIsUsedFromItsFirstTurnOn) {
   }
 }
 
-TEST_F(ImuSelfCheckTest, AGyroThatLidarContradictsIsSetAsideAfterTwoSweepsThoughItIsRightAboutOtherAxes) {
+TEST_F(ImuSelfCheckTest, GyroContradictedOnOneAxisIsQuarantinedAfterTwoSweeps) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   turn(check, 12, {0.1, 0.2, 0.0}, {0.1, 0.2, 0.0});
   turn(check, 1, {0.1, 0.2, 0.1}, {0.1, 0.2, -0.1});
@@ -153,7 +153,7 @@ TEST_F(ImuSelfCheckTest, AGyroThatLidarContradictsIsSetAsideAfterTwoSweepsThough
   EXPECT_NE(check.verdict().find("other way"), std::string_view::npos);
 }
 
-TEST_F(ImuSelfCheckTest, AGyroThatWasSetAsideIsUsedAgainWhenLidarAgrees) {
+TEST_F(ImuSelfCheckTest, QuarantinedGyroIsUsedAgainWhenLidarAgrees) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   stand(check);
   turn(check, 2, {0, 0.3, 0}, {0, -0.1, 0});
@@ -165,7 +165,7 @@ TEST_F(ImuSelfCheckTest, AGyroThatWasSetAsideIsUsedAgainWhenLidarAgrees) {
   EXPECT_EQ(check.verdict(), "");
 }
 
-TEST_F(ImuSelfCheckTest, AGyroIsTriedAgainWhereLidarSeesNothingClearWithoutItButNotForEver) {
+TEST_F(ImuSelfCheckTest, QuarantineEndsWithoutClearLidarEvidenceButNotForever) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   stand(check);
   for (int round = 0; round < 3; ++round) {
@@ -184,7 +184,7 @@ TEST_F(ImuSelfCheckTest, AGyroIsTriedAgainWhereLidarSeesNothingClearWithoutItBut
 }
 
 /// Regression: the robot stands and lidar follows people who walk around it; the gyro was reported as mounted wrongly.
-TEST_F(ImuSelfCheckTest, AGyroThatStandsStillWhileLidarTurnsIsNotCalledWrong) {
+TEST_F(ImuSelfCheckTest, StaticGyroAgainstLidarTurnIsNotCalledWrong) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   stand(check);
   for (int round = 0; round < 3; ++round) {
@@ -200,7 +200,7 @@ TEST_F(ImuSelfCheckTest, AGyroThatStandsStillWhileLidarTurnsIsNotCalledWrong) {
 }
 
 /// The gyro is unused in the second after a loss.
-TEST_F(ImuSelfCheckTest, WhatLidarSeesAloneAfterALossSpeaksAgainstNoGyro) {
+TEST_F(ImuSelfCheckTest, LidarAloneAfterALossIsNoEvidence) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   stand(check);
   check.reset();
@@ -212,14 +212,14 @@ TEST_F(ImuSelfCheckTest, WhatLidarSeesAloneAfterALossSpeaksAgainstNoGyro) {
   EXPECT_TRUE(refused_);
 }
 
-TEST_F(ImuSelfCheckTest, WhatLidarDoesNotSeeSpeaksAgainstNoGyro) {
+TEST_F(ImuSelfCheckTest, UnobservedAxesAreNoEvidence) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   sees_ = {true, true, true, true, true, false};
   turn(check, 30, {0, 0, 1.0}, {0, 0, 0});
   EXPECT_FALSE(refused_);
 }
 
-TEST_F(ImuSelfCheckTest, WhatComesBackIsCheckedAnew) {
+TEST_F(ImuSelfCheckTest, ReturningUnitIsCheckedAgain) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   turn(check, 15, {0, 0, 1.0}, {0, 0, 1.0});
   check.reset();
@@ -228,7 +228,7 @@ TEST_F(ImuSelfCheckTest, WhatComesBackIsCheckedAnew) {
   EXPECT_TRUE(refused_);
 }
 
-TEST_F(ImuSelfCheckTest, SamplesOutOfOrderDoNotHinderIt) {
+TEST_F(ImuSelfCheckTest, ToleratesSamplesOutOfOrder) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   int count = 0;
   drive(check, seconds{5}, [&](ImuSample& sample) {
@@ -241,7 +241,7 @@ TEST_F(ImuSelfCheckTest, SamplesOutOfOrderDoNotHinderIt) {
   EXPECT_TRUE(refused_);
 }
 
-TEST_F(ImuSelfCheckTest, AGyroThatDoesNotTurnWithTheRobotIsRefused) {
+TEST_F(ImuSelfCheckTest, GyroThatDoesNotTurnWithTheRobotIsRejected) {
   ImuSelfCheck check(Pose{}, UseAcceleration::automatic);
   drive(check, seconds{5}, [](ImuSample& sample) { sample.angular_velocity_radps = {0.5, 0, 0.01}; });
   EXPECT_TRUE(refused_);

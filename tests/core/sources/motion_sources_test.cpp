@@ -58,7 +58,7 @@ TEST_F(MotionSourcesTest, QueueTakesAllFromTheFirstHealthyOne) {
   EXPECT_NEAR(so3_log(sources.motion(choice, at_ms(400), at_ms(500))->rotation).z(), 0.0, 1e-12);
 }
 
-TEST_F(MotionSourcesTest, AnInertialSourceFirstInTheQueueLeavesTheTranslationOpen) {
+TEST_F(MotionSourcesTest, InertialSourceFirstInTheQueueLeavesTranslationOpen) {
   MotionSources sources({kWheelsImuVisual[1], kWheelsImuVisual[0]}, Fusion::queue);
   for (const int ms : {0, 10}) {
     sources.add(SourceId{0}, ImuSample{at_ms(ms), at_ms(ms), {0, 0, 1.0}, {1e-6 * ms, 0, 9.81}, {}});
@@ -81,7 +81,7 @@ TEST_F(MotionSourcesTest, ASilentSourceIsNotChosen) {
 
 // Its track has zero velocity between the end of a sample's extrapolation and the next sample: half of a sweep would
 // count as standstill.
-TEST_F(MotionSourcesTest, ASourceSlowerThanTracksAreExtrapolatedIsNotChosen) {
+TEST_F(MotionSourcesTest, SourceSlowerThanTheExtrapolationIsNotChosen) {
   MotionSources sources(kWheelsImuVisual, Fusion::queue);
   for (int ms = 0; ms <= 1000; ms += 100)
     sources.add(SourceId{0},
@@ -98,7 +98,7 @@ TEST_F(MotionSourcesTest, WithoutAnySourceNothingIsCorrected) {
   EXPECT_EQ(*sources.motion(choice, at_ms(0), at_ms(100)), Pose{});
 }
 
-TEST_F(MotionSourcesTest, NoMotionWhereATrackDoesNotReach) {
+TEST_F(MotionSourcesTest, NoMotionBeyondATrack) {
   MotionSources sources(kWheelsImuVisual, Fusion::combined);
   feed(sources, 0, 0, 1000);
   feed(sources, 1, 500, 1000);
@@ -107,7 +107,7 @@ TEST_F(MotionSourcesTest, NoMotionWhereATrackDoesNotReach) {
   EXPECT_FALSE(sources.motion(choice, at_ms(400), at_ms(600)));
 }
 
-TEST_F(MotionSourcesTest, SensesThePoseOfEverySourceThatSpokeDuringTheSweep) {
+TEST_F(MotionSourcesTest, SensesThePoseOfEverySourceReceivedDuringTheSweep) {
   MotionSources sources(kWheelsImuVisual, Fusion::queue);
   feed(sources, 0, 0, 1000);
   feed(sources, 1, 0, 1000);
@@ -127,7 +127,7 @@ TEST_F(MotionSourcesTest, SensesThePoseOfEverySourceThatSpokeDuringTheSweep) {
   EXPECT_FALSE(silence.specific_force);
 }
 
-TEST_F(MotionSourcesTest, AnAccelerometerThatIsNotWantedIsNotUsedAndItsGyroIs) {
+TEST_F(MotionSourcesTest, DisabledAccelerometerLeavesItsGyroInUse) {
   std::vector<MotionSourceOptions> options = kWheelsImuVisual;
   options[1].use_acceleration = UseAcceleration::off;
   MotionSources sources(options, Fusion::queue);
@@ -144,7 +144,7 @@ TEST_F(MotionSourcesTest, AnAccelerometerThatIsNotWantedIsNotUsedAndItsGyroIs) {
   EXPECT_EQ(broken.health(SourceId{1}).verdict(), "");
 }
 
-TEST_F(MotionSourcesTest, WhoeverLosesHealthIsKnownToTheSweepButNotUsable) {
+TEST_F(MotionSourcesTest, UnhealthySourceIsKnownButUnusable) {
   MotionSources sources(kWheelsImuVisual, Fusion::combined);
   feed(sources, 0, 0, 1000);
   sources.set_outside_verdict(SourceId{0}, false);
@@ -157,7 +157,7 @@ TEST_F(MotionSourcesTest, WhoeverLosesHealthIsKnownToTheSweepButNotUsable) {
   EXPECT_FALSE(sources.choose(at_ms(1100)).translation);
 }
 
-TEST_F(MotionSourcesTest, EachChangeOfHealthIsToldOnceWithItsSource) {
+TEST_F(MotionSourcesTest, EachHealthChangeIsReportedOnce) {
   std::vector<HealthEvent> events;
   MotionSources sources(kWheelsImuVisual, Fusion::combined, {},
                         [&](const HealthEvent& event) { events.push_back(event); });
@@ -179,7 +179,7 @@ TEST_F(MotionSourcesTest, EachChangeOfHealthIsToldOnceWithItsSource) {
 }
 
 /// Regression: a step back cost them as much time as the step, because their samples were older than the last ones.
-TEST_F(MotionSourcesTest, AClockOfTheHostThatIsSetCostsThemTwoSeconds) {
+TEST_F(MotionSourcesTest, HostClockStepCostsTwoSeconds) {
   for (const int step_ms : {-3'600'000, 3'600'000}) {
     MotionSources sources(kWheelsImuVisual, Fusion::combined);
     for (const int from_ms : {0, step_ms}) {
@@ -196,7 +196,7 @@ TEST_F(MotionSourcesTest, AClockOfTheHostThatIsSetCostsThemTwoSeconds) {
   }
 }
 
-TEST_F(MotionSourcesTest, WhatTheSelfCheckFoundIsToldInWords) {
+TEST_F(MotionSourcesTest, SelfCheckFindingIsReportedInWords) {
   std::vector<HealthEvent> events;
   MotionSources sources(kWheelsImuVisual, Fusion::combined, {},
                         [&](const HealthEvent& event) { events.push_back(event); });

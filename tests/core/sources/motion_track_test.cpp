@@ -43,7 +43,7 @@ TEST(MotionTrack, PosesBetweenSamplesAreInterpolated) {
 }
 
 /// Two poses 2 cm and 0.1 ms apart would mean 200 m/s.
-TEST(MotionTrack, StampThatIsOffByAMomentMakesNoVelocity) {
+TEST(MotionTrack, StampJitterMakesNoVelocity) {
   MotionTrack track = odometry_track();
   for (int i = 0; i < 5; ++i)
     track.add(odometry(at_ms(20 * i), 0.02 * i));
@@ -72,7 +72,7 @@ TEST(MotionTrack, ExtrapolatesForFiftyMillisecondsAndNoFarther) {
   EXPECT_FALSE(track.at(at_ms(151)));
 }
 
-TEST(MotionTrack, OfALateSourceIsToldAsOfTheMotion) {
+TEST(MotionTrack, LatenessIsCompensated) {
   MotionTrack track = imu_track();
   for (int i = 0; i <= 20; ++i)
     track.add(imu(at_ms(10 * i), {0, 0, 0.1 * i}, {0.01 * i, 0, 9.81}));
@@ -89,13 +89,13 @@ TEST(MotionTrack, OfALateSourceIsToldAsOfTheMotion) {
   EXPECT_FALSE(track.at(at_ms(211)));
 }
 
-TEST(MotionTrack, ASingleSampleStands) {
+TEST(MotionTrack, SingleSampleHasNoMotion) {
   MotionTrack track = odometry_track();
   track.add(odometry(at_ms(0), 7.0));
   EXPECT_EQ(track.at(at_ms(40))->translation.x(), 7.0);
 }
 
-TEST(MotionTrack, AClearedTrackBeginsAnew) {
+TEST(MotionTrack, ClearedTrackRestarts) {
   MotionTrack track = odometry_track();
   track.add(odometry(at_ms(0), 0.0));
   track.add(odometry(at_ms(20), 1.0));
@@ -106,7 +106,7 @@ TEST(MotionTrack, AClearedTrackBeginsAnew) {
   EXPECT_EQ(track.at(at_ms(50))->translation.x(), 9.0);
 }
 
-TEST(MotionTrack, AFullRingForgetsTheOldest) {
+TEST(MotionTrack, FullRingDropsTheOldest) {
   MotionTrack track = odometry_track();
   const int samples = static_cast<int>(MotionTrack::kCapacity) + 10;
   for (int i = 0; i < samples; ++i)
@@ -133,7 +133,7 @@ TEST(MotionTrack, TheGyroIsIntegratedInTheFrameOfTheBase) {
   EXPECT_LT((force->late_base_mps2 - Eigen::Vector3d{0, 0, 9.81}).norm(), 1e-9);
 }
 
-TEST(MotionTrack, OfAForceThatGrowsALaterPartIsFeltLate) {
+TEST(MotionTrack, GrowingForceHasALargerLatePart) {
   MotionTrack track = imu_track();
   for (int ms = 0; ms <= 200; ++ms)
     track.add(imu(at_ms(ms), {0, 0, 0}, {1e-2 * ms, 0, 9.81}));
@@ -144,7 +144,7 @@ TEST(MotionTrack, OfAForceThatGrowsALaterPartIsFeltLate) {
   EXPECT_NEAR(force->early_base_mps2.x(), 1.0 + 1.0 / 3.0, 0.01);
 }
 
-TEST(MotionTrack, AForceThatIsFeltOnceIsFeltEarlyAndLate) {
+TEST(MotionTrack, SingleForceSampleIsBothEarlyAndLate) {
   MotionTrack track = imu_track();
   track.add(imu(at_ms(200), {0, 0, 0}, {1.0, 0, 9.81}));
   const auto force = track.specific_force(at_ms(100), at_ms(200));
@@ -175,7 +175,7 @@ TEST(MotionTrack, TheNoiseOfAForceIsMeasured) {
   EXPECT_LT(force->noise_per_s.tail<2>().norm(), 1e-12);
 }
 
-TEST(MotionTrack, AnAttitudeSaysWhichWayIsUpInTheBaseFrame) {
+TEST(MotionTrack, AttitudeGivesUpInTheBaseFrame) {
   MotionTrack track = imu_track({from_rpy_rad({0, 0, std::numbers::pi / 2}), {0, 0, 0}});
   ImuSample sample;
   sample.stamp = sample.arrival = at_ms(10);
@@ -198,7 +198,7 @@ TEST(MotionTrack, AChangingTurnRateIsIntegratedByTrapezoids) {
   EXPECT_NEAR(so3_log(track.at(at_ms(0))->rotation.conjugate() * track.at(at_ms(1000))->rotation).z(), 0.5, 1e-9);
 }
 
-TEST(MotionTrack, KnowsWhetherASampleLiesInAWindow) {
+TEST(MotionTrack, ReportsWhetherASampleLiesInAWindow) {
   MotionTrack track = odometry_track();
   EXPECT_FALSE(track.has_sample_in(at_ms(-100), at_ms(100)));
   track.add(odometry(at_ms(0), 0.0));

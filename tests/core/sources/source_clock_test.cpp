@@ -18,7 +18,7 @@ std::optional<Stamp> sample(SourceClock& clock, int index, Duration ahead) {
   return clock.on_host_clock(measured + ahead, measured + milliseconds{3});
 }
 
-TEST(SourceClock, StampsThatArriveWithinASecondAreTrue) {
+TEST(SourceClock, StampsWithinASecondOfArrivalAreAccepted) {
   SourceClock clock;
   EXPECT_EQ(clock.on_host_clock(today_ms(0), today_ms(0)), today_ms(0));
   EXPECT_EQ(clock.on_host_clock(today_ms(20), today_ms(220)), today_ms(20));
@@ -26,7 +26,7 @@ TEST(SourceClock, StampsThatArriveWithinASecondAreTrue) {
   EXPECT_EQ(clock.offset(), Duration::zero());
 }
 
-TEST(SourceClock, AStepIsLearnedFromFiveSamplesAndTakenOut) {
+TEST(SourceClock, StepIsLearnedFromFiveSamplesAndRemoved) {
   for (const Duration step :
        {Duration{hours{1}}, Duration{-hours{1}}, Duration{milliseconds{500}}, Duration{-seconds{5}}}) {
     SourceClock clock;
@@ -42,7 +42,7 @@ TEST(SourceClock, AStepIsLearnedFromFiveSamplesAndTakenOut) {
 }
 
 /// 100 ppm over ten hours are 3.6 s.
-TEST(SourceClock, AClockThatRunsFasterOrSlowerIsFollowed) {
+TEST(SourceClock, DriftIsFollowed) {
   for (const double rate : {100e-6, -100e-6, 20e-6, -20e-6}) {
     for (const Duration ahead : {Duration{}, Duration{hours{3}}}) {
       SourceClock clock;
@@ -63,7 +63,7 @@ TEST(SourceClock, AClockThatRunsFasterOrSlowerIsFollowed) {
 }
 
 /// A sudden increase of the latency is a delay, not a clock step.
-TEST(SourceClock, ADelayIsNotFollowed) {
+TEST(SourceClock, DelayIsNotFollowed) {
   SourceClock clock;
   for (int i = 0; i < 600; ++i) {
     const Stamp measured = today_ms(0) + seconds{1} * i;
@@ -72,7 +72,7 @@ TEST(SourceClock, ADelayIsNotFollowed) {
   }
 }
 
-TEST(SourceClock, AClockThatIsSetRightAgainIsLearnedAnew) {
+TEST(SourceClock, CorrectedClockIsRelearned) {
   SourceClock clock;
   int i = 0;
   for (; i < 10; ++i)
@@ -86,7 +86,7 @@ TEST(SourceClock, AClockThatIsSetRightAgainIsLearnedAnew) {
 }
 
 /// Latencies of another publisher, from before a clock step, do not apply to the current samples.
-TEST(SourceClock, WhoComesBackToTheHostsClockIsTakenAtItsWord) {
+TEST(SourceClock, ReturnToTheHostClockRemovesTheOffset) {
   SourceClock clock;
   int i = 0;
   for (; i < 10; ++i)
@@ -99,7 +99,7 @@ TEST(SourceClock, WhoComesBackToTheHostsClockIsTakenAtItsWord) {
   EXPECT_EQ(clock.offset(), Duration::zero());
 }
 
-TEST(SourceClock, AClockThatNeverWasTheHostsIsNoStep) {
+TEST(SourceClock, ForeignClockIsNoStep) {
   SourceClock clock;
   int i = 0;
   for (; i < SourceClock::kSamplesToLearn; ++i)
@@ -110,7 +110,7 @@ TEST(SourceClock, AClockThatNeverWasTheHostsIsNoStep) {
   EXPECT_EQ(clock.steps(), 0U);
 }
 
-TEST(SourceClock, StampsThatContradictEachOtherTeachNothing) {
+TEST(SourceClock, InconsistentStampsTeachNothing) {
   SourceClock clock;
   int i = 0;
   for (; i < 10; ++i)

@@ -140,7 +140,7 @@ TEST_P(DecoderOf, GivesEveryReturnAtItsTimeWithItsRing) {
 INSTANTIATE_TEST_SUITE_P(Kinds, DecoderOf, testing::Range(0, kCloudKinds),
                          [](const auto& tested) { return name_of(static_cast<CloudKind>(tested.param)); });
 
-TEST(CloudDecoder, FieldsMayStandInAnyOrderWithPaddingAndOthersBetween) {
+TEST(CloudDecoder, FieldsMayHaveAnyOrderAndPadding) {
   OwnCloud cloud;
   cloud.stamp = kBegin;
   cloud.fields = {{"label", 1, Type::uint8}, {"time", 3, Type::float32}, {"z", 11, Type::float64},
@@ -163,7 +163,7 @@ TEST(CloudDecoder, FieldsMayStandInAnyOrderWithPaddingAndOthersBetween) {
   expect_all_of(turn, drain(*tested));
 }
 
-TEST(CloudDecoder, UnitIsToldFromTheNumbers) {
+TEST(CloudDecoder, UnitIsInferredFromTheValues) {
   for (const double unit_s : {1.0, 1e-3, 1e-6, 1e-9}) {
     const CloudTurn turn = round_room();
     OwnCloud cloud = timed_in(unit_s, turn);
@@ -176,7 +176,7 @@ TEST(CloudDecoder, UnitIsToldFromTheNumbers) {
 }
 
 /// A lidar that faces the sky has a few columns only: 3 of them span 194 us, 5 span 388 us.
-TEST(CloudDecoder, FewColumnsAreInTheUnitOfTheCloudsBefore) {
+TEST(CloudDecoder, FewColumnsUseTheUnitOfEarlierClouds) {
   for (const double unit_s : {1.0, 1e-3, 1e-6, 1e-9}) {
     const auto tested = decoder();
     for (const std::size_t columns : {1024U, 3U, 1024U, 1024U, 1024U, 5U, 3U}) {
@@ -190,7 +190,7 @@ TEST(CloudDecoder, FewColumnsAreInTheUnitOfTheCloudsBefore) {
 }
 
 /// A span below one turn in the finest or the coarsest unit is a partial turn, not another unit.
-TEST(CloudDecoder, FewColumnsOfAFirstCloudAreNoDoubt) {
+TEST(CloudDecoder, FewColumnsInTheFirstCloudRaiseNoDoubt) {
   for (const auto& [unit_s, columns] : {std::pair{1e-9, 5U}, {1e-9, 4U}, {1.0, 2U}, {1.0, 5U}}) {
     const auto tested = decoder();
     const CloudTurn turn = many_lasers(columns);
@@ -202,7 +202,7 @@ TEST(CloudDecoder, FewColumnsOfAFirstCloudAreNoDoubt) {
 }
 
 /// Several turns in one cloud look like one turn in a finer unit.
-TEST(CloudDecoder, WrongUnitIsLeftBehind) {
+TEST(CloudDecoder, WrongUnitIsCorrected) {
   const auto tested = decoder();
   CloudTurn turns = round_room();
   for (FiredPoint& point : turns.points)
@@ -225,7 +225,7 @@ std::optional<Duration> first_point(CloudDecoder& decoder, int turn, Duration af
   return drain(decoder).front().stamp - room.begin;
 }
 
-TEST(CloudDecoder, OneCloudThatArrivesTooEarlyMovesNoOther) {
+TEST(CloudDecoder, OneEarlyCloudDoesNotShiftOthers) {
   const auto tested = decoder();
   for (int k = 0; k < 40; ++k) {
     const bool is_early = k % 10 >= 6; // up to four in a row
@@ -235,7 +235,7 @@ TEST(CloudDecoder, OneCloudThatArrivesTooEarlyMovesNoOther) {
   EXPECT_TRUE(tested->doubts().none());
 }
 
-TEST(CloudDecoder, AFirstCloudThatArrivesTooEarlyMovesNoOther) {
+TEST(CloudDecoder, EarlyFirstCloudDoesNotShiftOthers) {
   const auto tested = decoder();
   EXPECT_LT(first_point(*tested, 0, milliseconds{30}), -milliseconds{90});
   for (int k = 1; k < 10; ++k)
@@ -243,7 +243,7 @@ TEST(CloudDecoder, AFirstCloudThatArrivesTooEarlyMovesNoOther) {
   EXPECT_TRUE(tested->doubts().none());
 }
 
-TEST(CloudDecoder, StampsOfTheLastPointAreToldAndForgottenAfterSomeInARow) {
+TEST(CloudDecoder, StampsOfTheLastPointAreReportedUntilSomeAreNot) {
   const auto tested = decoder();
   for (int k = 0; k < 4; ++k) {
     EXPECT_LT(first_point(*tested, k, kWay), -milliseconds{90}) << k;
@@ -261,7 +261,7 @@ TEST(CloudDecoder, StampsOfTheLastPointAreToldAndForgottenAfterSomeInARow) {
       << "the clouds since are sound";
 }
 
-TEST(CloudDecoder, PointsThatAreNoReturnsAreCountedAndLeftOut) {
+TEST(CloudDecoder, PointsWithoutReturnAreCountedAndDropped) {
   CloudTurn turn = round_room();
   OwnCloud cloud = cloud_of(turn, CloudKind::velodyne_start);
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInfinite = std::numeric_limits<float>::infinity();
@@ -280,7 +280,7 @@ TEST(CloudDecoder, PointsThatAreNoReturnsAreCountedAndLeftOut) {
   EXPECT_EQ(tested->counters().untimed, 1U);
 }
 
-TEST(CloudDecoder, CloudWithoutAReturnIsACloud) {
+TEST(CloudDecoder, CloudWithoutReturnsIsAccepted) {
   const auto tested = decoder();
   const CloudTurn nothing{kBegin, {}};
   for (const CloudKind kind : {CloudKind::velodyne_start, CloudKind::ouster, CloudKind::bare}) {
@@ -291,7 +291,7 @@ TEST(CloudDecoder, CloudWithoutAReturnIsACloud) {
   EXPECT_EQ(tested->counters().origin, tested->counters().points);
 }
 
-TEST(CloudDecoder, WhatDoesNotFitItsBytesIsRefused) {
+TEST(CloudDecoder, InconsistentSizesAreRejected) {
   const OwnCloud whole = cloud_of(round_room(), CloudKind::velodyne_start);
   const auto tested = decoder();
   const auto refused = [&](const auto& change) {
@@ -323,7 +323,7 @@ TEST(CloudDecoder, WhatDoesNotFitItsBytesIsRefused) {
 }
 
 /// Fields of unknown type are ignored; the points are used.
-TEST(CloudDecoder, FieldOfUnknownTypeIsNone) {
+TEST(CloudDecoder, FieldOfUnknownTypeIsIgnored) {
   OwnCloud cloud = cloud_of(round_room(), CloudKind::velodyne_start);
   cloud.fields[5].type = Type{77};
   const auto tested = decoder();
@@ -332,7 +332,7 @@ TEST(CloudDecoder, FieldOfUnknownTypeIsNone) {
   EXPECT_EQ(tested->timing(), PointTiming::azimuth);
 }
 
-TEST(CloudDecoder, DuplicatesAreRefusedAndLateOnesCounted) {
+TEST(CloudDecoder, DuplicatesAreRejectedAndLateCloudsCounted) {
   const auto tested = decoder();
   const OwnCloud first = cloud_of(round_room(), CloudKind::velodyne_start);
   const OwnCloud second = cloud_of(round_room(kBegin + kTurn), CloudKind::velodyne_start);
@@ -344,7 +344,7 @@ TEST(CloudDecoder, DuplicatesAreRefusedAndLateOnesCounted) {
 }
 
 /// Drivers whose stamps are constant or whole seconds send no duplicates.
-TEST(CloudDecoder, OtherPointsUnderTheSameStampAreNoDuplicate) {
+TEST(CloudDecoder, DifferentPointsWithTheSameStampAreNoDuplicate) {
   const auto tested = decoder();
   OwnCloud cloud = cloud_of(round_room(), CloudKind::velodyne_start);
   EXPECT_EQ(begin(*tested, cloud), std::nullopt);
@@ -355,7 +355,7 @@ TEST(CloudDecoder, OtherPointsUnderTheSameStampAreNoDuplicate) {
 }
 
 /// Clouds with too few points to determine the unit use that of the clouds before, however large their times are.
-TEST(CloudDecoder, AbsurdTimesOfAFewPointsAreBorne) {
+TEST(CloudDecoder, ToleratesAFewAbsurdPointTimes) {
   const auto tested = decoder();
   ASSERT_EQ(begin(*tested, cloud_of(round_room(), CloudKind::velodyne_start)), std::nullopt);
   for (const float time : {1e30F, -1e30F, 3e38F, 0.02F}) {
@@ -371,7 +371,7 @@ TEST(CloudDecoder, AbsurdTimesOfAFewPointsAreBorne) {
 }
 
 /// Azimuths that go back indicate no rotating lidar: all points of a cloud without times have its stamp.
-TEST(CloudDecoder, WhatDoesNotTurnHasNoTimesByAzimuth) {
+TEST(CloudDecoder, NonRotatingLidarHasNoTimesByAzimuth) {
   CloudTurn turn = round_room();
   for (std::size_t i = 0; i < turn.points.size(); ++i) // back and forth
     if (i / kRings % 20 >= 10)
@@ -388,7 +388,7 @@ TEST(CloudDecoder, WhatDoesNotTurnHasNoTimesByAzimuth) {
 }
 
 /// Neighbours of a point on the rings above and below are those fired at its time, so one instant has an order, too.
-TEST(CloudDecoder, PointsOfOneInstantStandInTheOrderOfTheirAzimuths) {
+TEST(CloudDecoder, PointsOfOneInstantAreOrderedByAzimuth) {
   const CloudTurn turn = round_room();
   for (const bool is_ring_by_ring : {false, true}) {
     CloudTurn stored = turn;
@@ -411,7 +411,7 @@ TEST(CloudDecoder, PointsOfOneInstantStandInTheOrderOfTheirAzimuths) {
 
 /// An organised cloud of a lidar that does not rotate: its columns, or its rows if there are more of them, are fired
 /// one after the other.
-TEST(CloudDecoder, LongerDimensionOfAnOrganisedCloudIsTheOrderOfOneInstant) {
+TEST(CloudDecoder, OrganisedCloudOfOneInstantIsOrderedByItsLongerDimension) {
   constexpr std::uint32_t kLines = 8, kShots = 200;
   for (const bool is_wide : {true, false}) {
     OwnCloud cloud;
@@ -440,7 +440,7 @@ TEST(CloudDecoder, LongerDimensionOfAnOrganisedCloudIsTheOrderOfOneInstant) {
   }
 }
 
-TEST(CloudDecoder, BigEndianNumbersAreTheSameNumbers) {
+TEST(CloudDecoder, BigEndianCloudsGiveTheSamePoints) {
   const CloudTurn turn = round_room();
   OwnCloud cloud = cloud_of(turn, CloudKind::hesai);
   const auto bytes_of = [](Type type) { return type == Type::float64 ? 8 : type == Type::uint16 ? 2 : 4; };
@@ -458,7 +458,7 @@ TEST(CloudDecoder, BigEndianNumbersAreTheSameNumbers) {
 }
 
 /// A clock that starts with the lidar has small numbers at first.
-TEST(CloudDecoder, TimesSinceTheStartOfTheLidarAreOfItsClockFromTheFirstMinuteOn) {
+TEST(CloudDecoder, TimesSinceStartUpAreRecognisedFromTheFirstMinute) {
   for (const double since_start_s : {2.0, 55.0, 3000.0}) {
     const CloudTurn turn = round_room();
     OwnCloud cloud = timed_in(1.0, turn);
@@ -472,7 +472,7 @@ TEST(CloudDecoder, TimesSinceTheStartOfTheLidarAreOfItsClockFromTheFirstMinuteOn
 }
 
 /// Times of another clock do not say whether the header's stamp is that of the first or of the last point.
-TEST(CloudDecoder, HeaderOfTheLastPointIsFoundForTimesOfAnotherClock) {
+TEST(CloudDecoder, StampOfTheLastPointIsFoundForAForeignClock) {
   const CloudTurn turn = round_room();
   OwnCloud cloud = timed_in(1.0, turn);
   for (std::size_t i = 0; i < turn.points.size(); ++i)
@@ -484,7 +484,7 @@ TEST(CloudDecoder, HeaderOfTheLastPointIsFoundForTimesOfAnotherClock) {
 }
 
 /// Two drivers with the same topic: the first lidar is used until it is silent.
-TEST(CloudDecoder, CloudsOfAnotherFrameAreAnotherLidars) {
+TEST(CloudDecoder, CloudsOfAnotherFrameBelongToAnotherLidar) {
   const auto tested = decoder();
   for (int k = 0; k < 5; ++k) {
     OwnCloud cloud = cloud_of(round_room(kBegin + k * kTurn), CloudKind::hesai);
@@ -499,7 +499,7 @@ TEST(CloudDecoder, CloudsOfAnotherFrameAreAnotherLidars) {
   EXPECT_EQ(begin(*tested, renamed, kBegin + 21 * kTurn + kWay), std::nullopt);
 }
 
-TEST(CloudDecoder, SharesOfTheTurnAreNoTimes) {
+TEST(CloudDecoder, FractionsOfTheTurnAreNotTimes) {
   const CloudTurn turn = round_room();
   for (const double whole : {0.01, 1.0, 100.0, 360.0}) {
     OwnCloud cloud = timed_in(to_seconds(kTurn) / whole, turn);
@@ -517,7 +517,7 @@ TEST(CloudDecoder, ManyLasersFillManyPackets) {
   expect_all_of(turn, drain(*tested));
 }
 
-TEST(CloudMessages, EveryCutAndAbsurdCountIsNoMessage) {
+TEST(CloudMessages, CutAndAbsurdMessagesAreRejected) {
   std::vector<std::byte> bytes(100, std::byte{0xff});
   for (const auto type : {kPointCloudType, std::string_view{"livox_ros_driver2/CustomMsg"}}) {
     for (std::size_t size = 0; size < bytes.size(); ++size)

@@ -15,7 +15,7 @@ namespace {
 
 using test::TemporaryFile;
 
-TEST(CaptureSequence, ReadsOnePieceAfterTheOtherAndLeavesOutWhatWasNeverBegun) {
+TEST(CaptureSequence, ReadsPiecesInOrderAndSkipsUnstartedOnes) {
   const TemporaryFile first{"1.pcap"}, begun{"2.pcap", {}}, cut{"3.pcap"}, last{"4.pcap"};
   std::int64_t ns = 0;
   for (const TemporaryFile* file : {&first, &cut, &last}) {
@@ -42,7 +42,7 @@ TEST(CaptureSequence, ReadsOnePieceAfterTheOtherAndLeavesOutWhatWasNeverBegun) {
   EXPECT_TRUE(contains(error_of(CaptureSequence::open({begun.path()})), "2.pcap: the file is empty"));
 }
 
-TEST(PcapWriter, DiskThatIsFullIsToldByFlush) {
+TEST(PcapWriter, FlushReportsAFullDisk) {
   auto writer = PcapWriter::open("/dev/full");
   ASSERT_TRUE(writer);
   for (int i = 0; i < 100; ++i)
@@ -51,7 +51,7 @@ TEST(PcapWriter, DiskThatIsFullIsToldByFlush) {
   EXPECT_TRUE(contains(error_of(PcapWriter::open("/nowhere/lidar.pcap")), "/nowhere/lidar.pcap: cannot be written"));
 }
 
-TEST(PcapWriter, TellsTheBytesOfTheFile) {
+TEST(PcapWriter, ReportsTheFileSize) {
   const TemporaryFile file{"bytes.pcap"};
   auto writer = PcapWriter::open(file.path());
   for (int i = 0; i < 10; ++i)

@@ -52,7 +52,7 @@ Bytes with_16(Bytes bytes, std::size_t at, std::uint16_t value) {
   return bytes;
 }
 
-TEST(Capture, KeepsAddressesPayloadAndNanoseconds) {
+TEST(Capture, RetainsAddressesPayloadAndNanoseconds) {
   const TemporaryFile file{"one.pcap"};
   const Bytes payload = payload_of(1206);
   {
@@ -74,7 +74,7 @@ TEST(Capture, KeepsAddressesPayloadAndNanoseconds) {
   EXPECT_EQ(capture.progress(), 1.0);
 }
 
-TEST(Capture, TwoLidarsInOneFileAreToldApartByPortAndAddress) {
+TEST(Capture, TwoLidarsInOneFileAreDistinguishedByPortAndAddress) {
   const TemporaryFile file{"two.pcap"};
   {
     PcapWriter writer = std::move(*PcapWriter::open(file.path()));
@@ -164,7 +164,7 @@ std::vector<Bytes> fragments_of(const Bytes& packet, std::size_t bytes, std::uin
   return fragments;
 }
 
-TEST(Capture, FragmentsAreJoinedInWhateverOrderTheyCome) {
+TEST(Capture, FragmentsAreJoinedInAnyOrder) {
   const TemporaryFile file{"joined.pcap"};
   const Bytes payload = payload_of(8448), other = payload_of(3392);
   const auto first = fragments_of(ipv4_udp({}, payload), 1480, 7), second = fragments_of(ipv4_udp({}, other), 1480, 8);
@@ -196,7 +196,7 @@ TEST(Capture, FragmentsAreJoinedInWhateverOrderTheyCome) {
   EXPECT_TRUE(capture.warnings().empty());
 }
 
-TEST(Capture, PacketWhoseFragmentsAreLostHoldsUpNoOther) {
+TEST(Capture, LostFragmentsDoNotBlockOtherPackets) {
   const TemporaryFile file{"lost.pcap"};
   const Bytes payload = payload_of(4000);
   {
@@ -225,7 +225,7 @@ TEST(Capture, PacketWhoseFragmentsAreLostHoldsUpNoOther) {
       << capture.warnings()[0];
 }
 
-TEST(Capture, FragmentsWithoutTheOthersAreToldWithTheRemedy) {
+TEST(Capture, IncompleteFragmentsAreReportedWithTheRemedy) {
   const TemporaryFile file{"fragments.pcap"};
   {
     const Bytes packet = ipv4_udp({}, payload_of(100));
@@ -244,7 +244,7 @@ TEST(Capture, FragmentsWithoutTheOthersAreToldWithTheRemedy) {
   EXPECT_TRUE(contains(capture.warnings()[0], "tcpdump -s 0 udp")) << capture.warnings()[0];
 }
 
-TEST(Capture, LyingLengthsAreMalformedNotRead) {
+TEST(Capture, WrongLengthsAreMalformed) {
   const Bytes packet = ipv4_udp({}, payload_of(100)); // 20 + 8 + 100 bytes
   const auto ip_header_words = [&](std::uint8_t words) {
     Bytes lying = packet;
@@ -264,7 +264,7 @@ TEST(Capture, LyingLengthsAreMalformedNotRead) {
 
 /// A VLP-16 of 2014 sends position packets whose IP header claims the 1234 bytes of a data packet; the UDP length is
 /// correct.
-TEST(Capture, IpLengthBeyondTheFrameIsForgivenWhereTheUdpLengthFits) {
+TEST(Capture, IpLengthBeyondTheFrameIsAcceptedIfTheUdpLengthFits) {
   const Bytes payload = payload_of(512);
   const Bytes packet = with_16(ipv4_udp({}, payload), 2, 1234);
   EXPECT_EQ(payload_in(DLT_EN10MB, ethernet(packet)), payload);
@@ -364,7 +364,7 @@ TEST(Capture, NanosecondsInAFileOfMicrosecondsAreReadAsSuch) {
       << "one damaged time in a sound file";
 }
 
-TEST(Capture, DamageInTheMiddleKeepsWhatPrecedesIt) {
+TEST(Capture, DamageInTheMiddleLeavesThePrecedingPackets) {
   const TemporaryFile file{"damaged.pcap"};
   {
     PcapWriter writer = std::move(*PcapWriter::open(file.path()));
@@ -382,7 +382,7 @@ TEST(Capture, DamageInTheMiddleKeepsWhatPrecedesIt) {
   EXPECT_TRUE(contains(capture.warnings()[0], "the capture is damaged")) << capture.warnings()[0];
 }
 
-TEST(Capture, FilesThatAreNoCapturesAreNamedForWhatTheyAre) {
+TEST(Capture, OtherFileTypesAreIdentified) {
   const auto error_with = [](const std::string& name, const Bytes& content) {
     const TemporaryFile file{name, content};
     return error_of(Capture::open(file.path()));
@@ -463,7 +463,7 @@ struct RealCapture {
 
 class RealCaptures : public testing::TestWithParam<RealCapture> {};
 
-TEST_P(RealCaptures, HoldAsManyPacketsAsTheirRecordersSay) {
+TEST_P(RealCaptures, HaveTheDocumentedNumberOfPackets) {
   const std::filesystem::path file = test::test_data() / "velodyne" / GetParam().file;
   if (!std::filesystem::exists(file)) {
     GTEST_SKIP() << file << " is not here; set LOCUS_TEST_DATA";

@@ -75,7 +75,7 @@ TEST(MotionFiles, OdometryRowsHoldPosesWithTheRotationsRealPartLast) {
   EXPECT_EQ((*samples)[0].covariance_scale, 1.0);
 }
 
-TEST(MotionFiles, TumTimesKeepTheirNanoseconds) {
+TEST(MotionFiles, TumTimesRetainNanoseconds) {
   constexpr auto kCases = std::to_array<std::pair<const char*, std::int64_t>>({
       {"1403636579.763555527", 1403636579763555527},
       {"1.403636579763555527e+09", 1403636579763555527}, // format of NumPy and evo
@@ -99,7 +99,7 @@ TEST(MotionFiles, TumTimesKeepTheirNanoseconds) {
   }
 }
 
-TEST(MotionFiles, TimesThatAreNoneAreErrors) {
+TEST(MotionFiles, InvalidTimesAreErrors) {
   for (const char* text :
        {"nan", "inf", "-", ".", "1.2.3", "1e", "1e99", "e5", "0x10", "9999999999999", "1,5", "12:30:00"}) {
     EXPECT_TRUE(contains(error_of(odometry_from("1 0 0 0 0 0 0 1\n" + std::string{text} + " 0 0 0 0 0 0 1\n")),
@@ -113,7 +113,7 @@ TEST(MotionFiles, TimesThatAreNoneAreErrors) {
   }
 }
 
-TEST(MotionFiles, TimesThatCannotBeReckonedWithAreErrors) {
+TEST(MotionFiles, TimesOutOfRangeAreErrors) {
   EXPECT_TRUE(imu_from("-599999999999999999,0,0,0,0,0,0\n3999999999999999999,0,0,0,0,0,0\n"));
   for (const char* text : {"-600000000000000000", "4000000000000000000"})
     EXPECT_TRUE(contains(error_of(imu_from(std::string{text} + ",0,0,0,0,0,0\n")), "imu.csv:1: time ")) << text;
@@ -172,7 +172,7 @@ TEST(MotionFiles, MetaFileGivesArrivalAndCovarianceAndItsArrivalTheOrder) {
   EXPECT_EQ(to_ns((*samples)[2].arrival), 1250000000);
 }
 
-TEST(MotionFiles, RepeatedStampsTakeTheirMetaRowsInOrder) {
+TEST(MotionFiles, RepeatedStampsUseTheirMetaRowsInOrder) {
   const auto samples =
       odometry_from("1.0 1 0 0 0 0 0 1\n1.0 2 0 0 0 0 0 1\n", "1000000000,1100000000,1\n1000000000,1200000000,2\n");
   ASSERT_TRUE(samples) << samples.error();
@@ -249,14 +249,14 @@ TEST_F(CaptureFolders, OnlyTheCaptureMustBeThere) {
   EXPECT_TRUE(contains(error_of(CaptureFolder::find(folder_)), "holds both lidar.pcap and lidar.pcapng"));
 }
 
-TEST_F(CaptureFolders, FileStandsForItself) {
+TEST_F(CaptureFolders, SingleFileIsTheCapture) {
   add("drive.pcap");
   const auto found = CaptureFolder::find(folder_ / "drive.pcap");
   ASSERT_TRUE(found) << found.error();
   EXPECT_EQ(found->lidar, std::vector{folder_ / "drive.pcap"});
 }
 
-TEST_F(CaptureFolders, PartsFollowTheCaptureThatIsNamed) {
+TEST_F(CaptureFolders, PartsFollowTheNamedCapture) {
   for (const char* const name : {"drive.pcap", "drive.pcap1", "drive.pcap2.gz", "drive.pcap4", "drive.pcapng", "drive",
                                  "drive1", "lidar.pcap.xz", "lidar.pcap1.xz", "a.pcap0", "a.pcap1"})
     add(name);
@@ -309,7 +309,7 @@ TEST_F(CaptureFolders, PiecesAreOneRecordingInTheOrderOfTheirNumbers) {
   EXPECT_TRUE(contains(error_of(CaptureFolder::find(folder_)), "kio.meta.csv: belongs to no source"));
 }
 
-TEST_F(CaptureFolders, WhatWouldBeIgnoredInSilenceIsAnError) {
+TEST_F(CaptureFolders, SilentlyIgnoredFilesAreErrors) {
   EXPECT_TRUE(contains(error_of(CaptureFolder::find(folder_ / "nothing")), "no such file or folder"));
   add("lidar.pcap");
   add("wio.meta.csv");
@@ -330,7 +330,7 @@ TEST(MotionFiles, TrajectoryIsReadAsOdometryIs) {
   EXPECT_DOUBLE_EQ((*poses)[0].T_source_base.rotation.z(), 0.6);
 }
 
-TEST(MotionFiles, TrajectoryThatCannotBeMeasuredByIsRefusedWithItsLine) {
+TEST(MotionFiles, UnusableTrajectoryIsRejectedWithItsLine) {
   const std::string good = "10 0 0 0 0 0 0 1\n";
   EXPECT_TRUE(contains(error_of(trajectory_from(good + "11 nan 0 0 0 0 0 1\n")), "gt.tum:2: the pose is not finite"));
   EXPECT_TRUE(contains(error_of(trajectory_from(good + "11 0 0 0 nan 0 0 1\n")), "gt.tum:2: the pose is not finite"));
@@ -355,7 +355,7 @@ std::vector<std::int64_t> stamps_of(MotionSamples<OdometrySample> samples) {
 
 std::string row_at(const char* time) { return std::string{time} + " 0 0 0 0 0 0 1\n"; }
 
-TEST(MotionSamples, ComeOneAfterTheOther) {
+TEST(MotionSamples, AreReadOneByOne) {
   const TemporaryFile file{"wio.tum", bytes_of("# t x y z qx qy qz qw\n" + row_at("1e-9") + "\n" + row_at("2e-9") +
                                                row_at("2e-9") + row_at("3e-9"))};
   auto samples = MotionSamples<OdometrySample>::open(file.path());
@@ -363,7 +363,7 @@ TEST(MotionSamples, ComeOneAfterTheOther) {
   EXPECT_EQ(stamps_of(std::move(*samples)), (std::vector<std::int64_t>{1, 2, 2, 3}));
 }
 
-TEST(MotionSamples, ComeInTheOrderOfTheirArrival) {
+TEST(MotionSamples, AreReadInOrderOfArrival) {
   const TemporaryFile file{"wio.tum", bytes_of(row_at("3e-9") + row_at("1e-9"))};
   auto samples = MotionSamples<OdometrySample>::open(file.path());
   ASSERT_TRUE(samples) << samples.error();
@@ -375,14 +375,14 @@ TEST(MotionSamples, ComeInTheOrderOfTheirArrival) {
   EXPECT_EQ(stamps_of(std::move(*late)), (std::vector<std::int64_t>{3, 1})) << "the first came late";
 }
 
-TEST(MotionSamples, AreKnownToBeGoodBeforeTheFirstIsUsed) {
+TEST(MotionSamples, AreValidatedBeforeTheFirstIsUsed) {
   const TemporaryFile file{"wio.tum", bytes_of(row_at("1") + row_at("2") + "3 0 0\n")};
   EXPECT_TRUE(contains(error_of(MotionSamples<OdometrySample>::open(file.path())), "wio.tum:3: 3 columns"));
   EXPECT_TRUE(contains(error_of(MotionSamples<OdometrySample>::open("/nowhere/wio.tum")), "cannot be read"));
 }
 
 /// After a power failure each file may be truncated at a different row.
-TEST(MotionSamples, AreReadAsFarAsABrokenRecordingGoes) {
+TEST(MotionSamples, AreReadUpToTheDamage) {
   const std::string rows = row_at("1") + row_at("2") + row_at("3");
   const std::string meta = "1000000000,1000000001,1\n2000000000,2000000002,2\n3000000000,3000000003,3\n";
   for (std::size_t kept = 0; kept <= rows.size(); ++kept) {
@@ -450,7 +450,7 @@ TEST(MotionSamples, PiecesOutOfOrderAreSortedByArrival) {
             (std::vector<std::int64_t>{1'000'000'000, 2'000'000'000, 5'000'000'000, 6'000'000'000}));
 }
 
-TEST(MotionFiles, LinesAreReadAgainToTheLastBit) {
+TEST(MotionFiles, LinesRoundTripToTheLastBit) {
   std::minstd_rand random(1);
   std::uniform_real_distribution<double> number(-1000, 1000);
   const auto vector = [&] { return Eigen::Vector3d(number(random), number(random) * 1e-12, number(random) * 1e12); };
@@ -483,7 +483,7 @@ TEST(MotionFiles, LinesAreReadAgainToTheLastBit) {
             "1.500000001 0.000 0.000 0.000 0.000 0.000 0.000 1.000\n");
 }
 
-TEST(MotionSamples, TellWhenTheFirstAndTheLastArrive) {
+TEST(MotionSamples, ReportTheFirstAndTheLastArrival) {
   for (const std::string& rows : {row_at("1e-9") + row_at("3e-9"), row_at("3e-9") + row_at("1e-9")}) {
     const TemporaryFile file{"wio.tum", bytes_of(rows)};
     const auto samples = MotionSamples<OdometrySample>::open(file.path());
@@ -495,7 +495,7 @@ TEST(MotionSamples, TellWhenTheFirstAndTheLastArrive) {
   EXPECT_FALSE(MotionSamples<OdometrySample>::open(empty.path())->arrivals());
 }
 
-TEST(MotionSamples, DrainGivesWhatIsLeft) {
+TEST(MotionSamples, DrainReturnsTheRest) {
   MotionSamples<ImuSample> samples(std::vector<ImuSample>(3));
   samples.pop();
   EXPECT_EQ(samples.drain().size(), 2u);

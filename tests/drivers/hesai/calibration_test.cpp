@@ -63,7 +63,7 @@ TEST_F(HesaiCalibration, AllFormsOfTheFileAreRead) {
   }
 }
 
-TEST_F(HesaiCalibration, WhatIsWrongIsToldWithItsLine) {
+TEST_F(HesaiCalibration, ErrorsNameTheirLine) {
   expect_error("", " ", "no lasers in it");
   expect_error(kHead, " ", "no lasers in it");
   expect_error("lasers: []\n", "1: ", "\"Laser id,Elevation,Azimuth\" is expected");
@@ -84,7 +84,7 @@ TEST_F(HesaiCalibration, WhatIsWrongIsToldWithItsLine) {
   EXPECT_NE(missing.error().find("/nowhere/angles.csv: cannot be read"), std::string::npos);
 }
 
-TEST_F(HesaiCalibration, OfAnotherNumberOfLasersIsRefusedAtTheStart) {
+TEST_F(HesaiCalibration, OfAnotherNumberOfLasersIsRejected) {
   std::ofstream{path_} << kHead + "1,0,0\n";
   LidarOptions options;
   options.calibration = path_.string();

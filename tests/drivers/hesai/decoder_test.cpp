@@ -100,7 +100,7 @@ TEST_P(HesaiModel, ColumnsFollowEachOtherAsTheirDurationSays) {
   }
 }
 
-TEST_P(HesaiModel, AnotherModelThanTheConfiguredOneIsRefused) {
+TEST_P(HesaiModel, AnotherModelThanConfiguredIsRejected) {
   const HesaiTestPacket bytes{GetParam(), kDual};
   LidarPacket packet;
   for (const Model other : all_models()) {
@@ -111,7 +111,7 @@ TEST_P(HesaiModel, AnotherModelThanTheConfiguredOneIsRefused) {
   }
 }
 
-TEST_P(HesaiModel, EveryOtherLengthIsRefused) {
+TEST_P(HesaiModel, EveryOtherLengthIsRejected) {
   const HesaiTestPacket bytes{GetParam(), kDual};
   std::vector<std::byte> longer(bytes.payload().begin(), bytes.payload().end());
   longer.resize(longer.size() + 100);
@@ -125,7 +125,7 @@ TEST_P(HesaiModel, EveryOtherLengthIsRefused) {
   }
 }
 
-TEST_P(HesaiModel, WhateverTheBytesAreReturnsAreFiniteAndWithinBounds) {
+TEST_P(HesaiModel, AnyBytesGiveFiniteReturnsWithinBounds) {
   std::mt19937 random{1};
   Decoder decoder;
   for (int round = 0; round < 3000; ++round) {
@@ -170,7 +170,7 @@ TEST(HesaiDecoder, TimeIsThatOfTheFirstFiring) {
   EXPECT_EQ(time_of(Model::qt128, kDual), nanoseconds{9'600});
 }
 
-TEST(HesaiDecoder, ReturnAtTheDistanceOfAnotherOfItsPulseIsNone) {
+TEST(HesaiDecoder, DuplicateReturnOfAPulseIsDropped) {
   const auto ranges_of = [](std::uint8_t mode, const std::vector<std::uint16_t>& distances) {
     HesaiTestPacket bytes{Model::xt32m, mode};
     for (std::size_t block = 0; block < distances.size(); ++block)
@@ -192,7 +192,7 @@ TEST(HesaiDecoder, ReturnAtTheDistanceOfAnotherOfItsPulseIsNone) {
   EXPECT_EQ(ranges_of(kTriple, {2500, 1250, 625}), (std::vector{10.0F, 5.0F, 2.5F}));
 }
 
-TEST(HesaiDecoder, WhatIsNearerThanTheModelIsSpecifiedForIsNone) {
+TEST(HesaiDecoder, ReturnsBelowTheLeastRangeAreDropped) {
   for (const auto& [distance, returns] : {std::pair{124, 0U}, std::pair{125, 1U}, std::pair{1, 0U}}) {
     HesaiTestPacket bytes{Model::xt32m, kStrongest}; // minimum range 0.5 m
     bytes.set_return(0, 0, static_cast<std::uint16_t>(distance));
@@ -261,7 +261,7 @@ TEST(HesaiDecoder, UnlockedClockFrom2000IsRead) {
   EXPECT_EQ(std::chrono::round<seconds>(decoder.time()), seconds{946'684'807});
 }
 
-TEST(HesaiDecoder, DateThatIsNoneIsRefused) {
+TEST(HesaiDecoder, InvalidDateIsRejected) {
   struct Odd {
     std::size_t byte;
     std::uint8_t value;
@@ -282,7 +282,7 @@ TEST(HesaiDecoder, DateThatIsNoneIsRefused) {
   EXPECT_EQ(Decoder{}.decode(far.payload(), packet), PacketError::time);
 }
 
-TEST(HesaiDecoder, WhatIsNoPacketOfItIsRefusedWithTheReason) {
+TEST(HesaiDecoder, ForeignPacketsAreRejectedWithTheReason) {
   LidarPacket packet;
   const auto error_of = [&](HesaiTestPacket bytes, const auto& change) {
     change(bytes);
@@ -307,7 +307,7 @@ TEST(HesaiDecoder, WhatIsNoPacketOfItIsRefusedWithTheReason) {
       << "a turn that no motor makes";
 }
 
-TEST(HesaiDecoder, CalibrationIsThatOfAsManyLasers) {
+TEST(HesaiDecoder, CalibrationMustHaveAsManyLasers) {
   Calibration calibration;
   calibration.laser_count = 32;
   calibration.storage[0] = {0.1, 0.2, 0};
@@ -360,7 +360,7 @@ TEST(HesaiDecoder, TurnsCounterclockwiseIfItsAzimuthsDo) {
 }
 
 /// With a limited field of view, the columns after the blind sector are later by its duration.
-TEST(HesaiDecoder, BlindSectorWithinAPacketTakesItsTime) {
+TEST(HesaiDecoder, BlindSectorWithinAPacketCountsInTime) {
   HesaiTestPacket bytes{Model::xt32, kStrongest}; // 18 cdeg per column
   for (std::size_t block = 4; block < 8; ++block)
     bytes.set_azimuth(block, static_cast<std::uint16_t>(18 * (block + 500)));
@@ -377,7 +377,7 @@ TEST(HesaiDecoder, BlindSectorWithinAPacketTakesItsTime) {
 }
 
 /// Two columns leave no third to detect a damaged azimuth by.
-TEST(HesaiDecoder, OfTwoColumnsTheChecksumVouchesForABlindSectorBetweenThem) {
+TEST(HesaiDecoder, ChecksumConfirmsABlindSectorBetweenTwoColumns) {
   for (const Model model : {Model::qt128, Model::ot128}) {
     const std::int64_t column_ns = spec(model).sequences[0].column_duration.count();
     const double turn_cdeg = 360'000.0 * 1e-9 * static_cast<double>(column_ns);
@@ -396,7 +396,7 @@ TEST(HesaiDecoder, OfTwoColumnsTheChecksumVouchesForABlindSectorBetweenThem) {
   }
 }
 
-TEST(HesaiDecoder, ChecksumsCountOnceTheyHaveBeenRight) {
+TEST(HesaiDecoder, ChecksumsAreEnforcedOnceOneWasRight) {
   for (const Model model : {Model::qt128, Model::ot128}) {
     HesaiTestPacket good{model, kDual};
     good.seal();
@@ -434,7 +434,7 @@ TEST(HesaiDecoder, SequenceOfAQt128FollowsItsModeFlag) {
 }
 
 /// In high resolution an OT128 has twice the columns, and its channels fire in half the time.
-TEST(HesaiDecoder, HighResolutionOfAnOt128IsToldByItsState) {
+TEST(HesaiDecoder, HighResolutionOfAnOt128IsReadFromItsState) {
   HesaiTestPacket bytes{Model::ot128, kStrongest, HesaiTestPacket::kTime, 0, 600.0, 1};
   bytes.set_return(1, 0, kTenMetres);
   bytes.seal();
@@ -445,7 +445,7 @@ TEST(HesaiDecoder, HighResolutionOfAnOt128IsToldByItsState) {
             HesaiTestPacket::kTime + nanoseconds{43'346} + nanoseconds{49'758 - 27'778});
 }
 
-TEST(HesaiLooks, ModelsThatCannotBeReadHaveTheirNames) {
+TEST(HesaiLooks, UnsupportedModelsAreNamed) {
   const auto look_of = [](int major, int minor, int lasers, int blocks, int status = 0) {
     std::vector<std::byte> payload(1000);
     for (const auto& [at, value] :

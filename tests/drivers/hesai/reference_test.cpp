@@ -150,7 +150,7 @@ double distance_m(const Point& a, const Point& b) {
 
 class HesaiReference : public testing::TestWithParam<Recorded> {};
 
-TEST_P(HesaiReference, EveryPointIsWhereTheOtherDecoderHasIt) {
+TEST_P(HesaiReference, PointsMatchAnotherDecoder) {
   SKIP_WITHOUT(hesai_data(GetParam().folder));
   const auto calibration = read_calibration(hesai_data("calibration/" + GetParam().angles));
   ASSERT_TRUE(calibration) << calibration.error();
@@ -226,7 +226,7 @@ double mean_step_m(const std::vector<std::vector<std::byte>>& packets, const Cal
 
 /// The azimuth is that of the block, and the lasers fire later, by the table of their sequence: adjacent lasers agree
 /// better on walls than with no rotation, the opposite one, or twice as much.
-TEST(HesaiFirings, OfAQt128LetNeighbouringLasersAgree) {
+TEST(HesaiFirings, OfAQt128AgreeBetweenNeighbouringLasers) {
   SKIP_WITHOUT(hesai_data("qt128"));
   const auto calibration = read_calibration(hesai_data("calibration/PandarQT128.csv"));
   ASSERT_TRUE(calibration) << calibration.error();

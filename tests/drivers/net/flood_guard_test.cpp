@@ -53,13 +53,13 @@ class Guarded : public testing::Test {
   Stamp now_ = stamp_from_ns(1'700'000'000'000'000'000);
 };
 
-TEST_F(Guarded, WhatIsLessThanAFloodIsAllHandedOver) {
+TEST_F(Guarded, TrafficBelowAFloodIsPassed) {
   look_at(FloodGuard::kFlood, 700, INADDR_LOOPBACK);
   EXPECT_EQ(passing(700), 1000U);
   EXPECT_EQ(socket_.filtered(), 0U);
 }
 
-TEST_F(Guarded, FloodOfAWrongLengthIsKeptOutButForSamplesAndLidarsPass) {
+TEST_F(Guarded, FloodOfAWrongLengthIsFilteredExceptSamplesAndLidars) {
   look_at(FloodGuard::kFlood + 1, 700, kStranger);
   for (const std::size_t bytes : {0U, 1U, 511U, 513U, 1205U, 1207U, 3000U}) {
     const std::uint64_t before = socket_.filtered();
@@ -73,7 +73,7 @@ TEST_F(Guarded, FloodOfAWrongLengthIsKeptOutButForSamplesAndLidarsPass) {
   EXPECT_EQ(socket_.kernel_drops(), 0U);
 }
 
-TEST_F(Guarded, FloodOfAForeignSenderIsKeptOutOnceTheLidarIsKnown) {
+TEST_F(Guarded, FloodOfAForeignSenderIsFilteredOnceTheLidarIsKnown) {
   guard_.expect(senders(kStranger), socket_);
   look_at(FloodGuard::kFlood + 1, velodyne::kDataPacketBytes, INADDR_LOOPBACK);
   EXPECT_LT(passing(velodyne::kDataPacketBytes), 30U);
@@ -92,7 +92,7 @@ TEST_F(Guarded, FloodOfAForeignSenderIsKeptOutOnceTheLidarIsKnown) {
   EXPECT_LT(passing(velodyne::kPositionPacketBytes), 30U);
 }
 
-TEST_F(Guarded, LidarIsNoFloodHoweverFast) {
+TEST_F(Guarded, FastLidarIsNoFlood) {
   guard_.expect(senders(INADDR_LOOPBACK), socket_);
   look_at(20 * FloodGuard::kFlood, velodyne::kDataPacketBytes, INADDR_LOOPBACK);
   EXPECT_EQ(passing(700), 1000U);
@@ -111,7 +111,7 @@ TEST_F(Guarded, EndOfTheFloodOpensTheSocketAgain) {
 }
 
 /// A few later datagrams are no flood, and must not be reported as one.
-TEST_F(Guarded, EndOfTheFloodIsSeenWhereNobodySends) {
+TEST_F(Guarded, EndOfTheFloodIsDetectedInSilence) {
   look_at(FloodGuard::kFlood + 1, 700, kStranger);
   guard_.advance(now_ += milliseconds{900}, socket_);
   EXPECT_LT(passing(700), 30U) << "the second is not over";

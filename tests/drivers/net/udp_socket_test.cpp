@@ -56,7 +56,7 @@ TEST(UdpSocket, GivesPayloadSenderPortAndTheKernelsStamp) {
   EXPECT_TRUE(socket.receive().empty());
 }
 
-TEST(UdpSocket, LongDatagramIsCutAndSaysSo) {
+TEST(UdpSocket, LongDatagramIsMarkedTruncated) {
   UdpSocket socket = open_any();
   UdpSender().send(socket.port(), std::vector<std::byte>(kLongestPayload + 1));
   const auto datagrams = socket.receive();
@@ -64,7 +64,7 @@ TEST(UdpSocket, LongDatagramIsCutAndSaysSo) {
   EXPECT_TRUE(datagrams[0].truncated);
 }
 
-TEST(UdpSocket, CountsWhatTheKernelHadNoRoomFor) {
+TEST(UdpSocket, CountsKernelDrops) {
   UdpSocket socket = open_any();
   const UdpSender sender;
   const std::vector<std::byte> packet(1206);
@@ -80,7 +80,7 @@ TEST(UdpSocket, CountsWhatTheKernelHadNoRoomFor) {
   EXPECT_EQ(received + socket.kernel_drops(), flood + 1);
 }
 
-TEST(UdpSocket, HearsTheGroupsThatItHasJoined) {
+TEST(UdpSocket, ReceivesFromJoinedGroups) {
   constexpr std::uint32_t kGroup = 0xEF01'0203; // 239.1.2.3
   UdpSocket socket = open_any();
   ASSERT_TRUE(socket.join(kGroup));
@@ -89,7 +89,7 @@ TEST(UdpSocket, HearsTheGroupsThatItHasJoined) {
   EXPECT_EQ(socket.receive().size(), 1U);
 }
 
-TEST(UdpSocket, PortThatIsTakenIsSaid) {
+TEST(UdpSocket, PortInUseIsReported) {
   const UdpSocket first = open_any();
   const auto second = UdpSocket::open(first.port());
   ASSERT_FALSE(second);
@@ -97,7 +97,7 @@ TEST(UdpSocket, PortThatIsTakenIsSaid) {
 }
 
 /// Two instances of the service receive the position packets of broadcasting lidars like this.
-TEST(UdpSocket, OfTwoBesideEachOtherEachHearsABroadcast) {
+TEST(UdpSocket, SharedSocketsBothReceiveABroadcast) {
   constexpr std::uint32_t kEverybody = 0x7FFF'FFFF; // 127.255.255.255
   auto first = UdpSocket::open_shared(0);
   ASSERT_TRUE(first) << first.error();
@@ -122,7 +122,7 @@ TEST(UdpSocket, TakesOverWhatIsBoundToBothFamilies) {
   EXPECT_EQ(datagrams[0].source_ip, INADDR_LOOPBACK);
 }
 
-TEST(UdpSocket, WhatAnOwnerBeforeHasLostIsNotItsOwn) {
+TEST(UdpSocket, DropsBeforeTheTakeOverAreNotCounted) {
   UdpSocket first = open_any();
   const int again = dup(first.descriptor());
   const UdpSender sender;
@@ -169,7 +169,7 @@ TEST(UdpSocket, TakesOverALargerBufferAsItIs) {
 }
 
 /// Privileged processes get the requested size, others at most the limit of the kernel.
-TEST(UdpSocket, KnowsWhatItsBufferHasGot) {
+TEST(UdpSocket, ReportsItsBufferSize) {
   int allowed = 0;
   std::ifstream("/proc/sys/net/core/rmem_max") >> allowed;
   if (allowed == 0)

@@ -22,12 +22,12 @@ std::uint64_t slow_crc64(std::span<const std::byte> bytes) {
   return ~crc;
 }
 
-TEST(OusterChecksum, IsTheOneOfTheCatalogue) {
+TEST(OusterChecksum, MatchesTheCatalogue) {
   EXPECT_EQ(crc64(bytes_of("123456789")), 0x995D'C9BB'DF19'39FAU) << "check value of CRC-64/XZ";
   EXPECT_EQ(crc64({}), 0U);
 }
 
-TEST(OusterChecksum, IsThatOfOneBitAfterTheOtherForEveryLength) {
+TEST(OusterChecksum, MatchesTheBitwiseDefinitionForEveryLength) {
   std::vector<std::byte> bytes;
   for (unsigned i = 0; i < 200; ++i) {
     ASSERT_EQ(crc64(bytes), slow_crc64(bytes)) << bytes.size();
@@ -35,7 +35,7 @@ TEST(OusterChecksum, IsThatOfOneBitAfterTheOtherForEveryLength) {
   }
 }
 
-TEST(OusterChecksum, KnowsEveryFlippedBit) {
+TEST(OusterChecksum, DetectsEveryFlippedBit) {
   std::vector<std::byte> packet(100, std::byte{0x5A});
   const std::uint64_t crc = crc64(std::span{packet}.first(92));
   for (std::size_t i = 0; i < 8; ++i)

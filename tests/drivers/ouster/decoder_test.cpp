@@ -240,7 +240,7 @@ TEST(OusterDecoder, InvalidColumnsAreLeftOutAndCountedWithinTheWindow) {
   }
 }
 
-TEST(OusterDecoder, TurnsAsFastAsItsColumnsSay) {
+TEST(OusterDecoder, RotationRateFollowsItsColumns) {
   const Metadata metadata = ouster_metadata();
   Decoder decoder{metadata};
   EXPECT_EQ(decoder.rotation_rate_rpm(), 0.0);
@@ -294,7 +294,7 @@ TEST(OusterDecoder, RefusesWhatIsAbsurd) {
             PacketError::flag);
 }
 
-TEST(OusterDecoder, HoldsASensorToItsChecksumOnceItWasRight) {
+TEST(OusterDecoder, EnforcesTheChecksumOnceItWasRight) {
   const Metadata metadata = ouster_metadata();
   OusterTestPacket good{metadata}, flipped{metadata};
   flipped.put(1000, 0xFF, 1);
@@ -359,7 +359,7 @@ std::size_t refused_of(const Metadata& known, const Metadata& sensor, std::size_
 }
 
 /// A restarted sensor is accepted if it still is in the mode of the metadata, and only then.
-TEST(OusterDecoder, OfAnotherStartIsBelievedOnceATurnHasShownItsMode) {
+TEST(OusterDecoder, AcceptsAnotherStartOnceATurnConfirmsItsMode) {
   for (const Mode known : kModes) {
     for (const Mode mode : kModes) {
       const bool is_same = known.columns == mode.columns && known.frames_per_s == mode.frames_per_s;
@@ -374,7 +374,7 @@ TEST(OusterDecoder, OfAnotherStartIsBelievedOnceATurnHasShownItsMode) {
 }
 
 /// After a restart, two turns without a valid packet indicate another mode; a valid one rules it out.
-TEST(OusterDecoder, OfAnotherStartForTwoTurnsIsInAnotherMode) {
+TEST(OusterDecoder, RejectsAnotherStartInAnotherMode) {
   const Metadata known = metadata_of({1024, 10});
   LidarPacket packet;
   const auto play = [&](Decoder& decoder, Mode mode, std::size_t packets) {
@@ -399,7 +399,7 @@ TEST(OusterDecoder, OfAnotherStartForTwoTurnsIsInAnotherMode) {
 }
 
 /// A clock step in mid-turn must not discard the evidence of that turn.
-TEST(OusterDecoder, TurnWithIdsOfAnotherModeShowsNothing) {
+TEST(OusterDecoder, TurnWithIdsOfAnotherModeConfirmsNothing) {
   const Metadata known = metadata_of({1024, 20}), sensor = metadata_of({2048, 10});
   constexpr std::uint64_t kStart_ns = 1'000'000'000, kPacket_ns = 16 * 48'828;
   Decoder decoder{known};
@@ -412,7 +412,7 @@ TEST(OusterDecoder, TurnWithIdsOfAnotherModeShowsNothing) {
   EXPECT_EQ(error(0, kStart_ns + kPacket_ns, 8), PacketError::model);
 }
 
-TEST(OusterDecoder, RefusedPacketLeavesItAsItWas) {
+TEST(OusterDecoder, RejectedPacketLeavesItUnchanged) {
   const Metadata metadata = ouster_metadata();
   Decoder decoder{metadata};
   LidarPacket packet;

@@ -62,7 +62,7 @@ TEST(OusterImuPacket, IsTimedByItsGyro) {
   EXPECT_EQ(measurements.all()[0].time.count(), static_cast<std::int64_t>(kTimeNs + 222'000));
 }
 
-TEST(OusterImuPacket, IsRefusedWhereItIsAbsurd) {
+TEST(OusterImuPacket, RejectsAbsurdValues) {
   const Metadata metadata = ouster_metadata();
   ImuMeasurements measurements;
   for (const std::size_t length : {0U, 1U, 47U, 49U, 452U})
@@ -94,7 +94,7 @@ TEST(OusterImuPacket, OfNewerFirmwareHoldsSeveralMeasurements) {
   EXPECT_EQ(measurements.count, 7U) << "one is invalid";
 }
 
-TEST(OusterImuPacket, OfNewerFirmwareIsRefusedForWhatOpensAndEndsIt) {
+TEST(OusterImuPacket, OfNewerFirmwareIsRejectedForABadHeaderOrFooter) {
   const Metadata metadata = standard_metadata();
   const auto error_of = [&](std::size_t at, std::uint64_t value, std::size_t count, bool sealed = true) {
     auto bytes = standard_packet(metadata);

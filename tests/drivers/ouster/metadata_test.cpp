@@ -112,7 +112,7 @@ TEST(OusterMetadata, OfOldFirmwareHasTheMakersDefaults) {
   EXPECT_EQ(metadata->imu_port, 7503);
 }
 
-TEST(OusterMetadata, IsRefusedWithTheKey) {
+TEST(OusterMetadata, IsRejectedWithTheKey) {
   const auto changed = [](const std::function<void(json&)>& change) {
     json file = nested();
     change(file);
@@ -166,7 +166,7 @@ TEST(OusterMetadata, IsRefusedWithTheKey) {
                  "beam_intrinsics.lidar_origin_to_beam_origin_mm: puts the origin of the beams outside the sensor");
 }
 
-TEST(OusterMetadata, NamesAProfileThatCannotBeRead) {
+TEST(OusterMetadata, NamesAnUnsupportedProfile) {
   json file = nested();
   file["lidar_data_format"]["udp_profile_lidar"] = "RNG23_RFL8";
   const auto metadata = parse_metadata(file.dump());
@@ -194,7 +194,7 @@ TEST(OusterMetadata, WithoutImuPacketsHasNoPortForThem) {
   EXPECT_EQ(metadata->imu_port, 0);
 }
 
-TEST(OusterMetadata, SaysWhereTextIsNoJson) {
+TEST(OusterMetadata, ReportsWhereTextIsNoJson) {
   EXPECT_EQ(parse_metadata("{\"a\": ]").error(), "is no JSON from byte 7 on");
   EXPECT_EQ(parse_metadata("").error(), "is no JSON from byte 1 on");
   const std::string text = nested().dump();
@@ -202,7 +202,7 @@ TEST(OusterMetadata, SaysWhereTextIsNoJson) {
     EXPECT_FALSE(parse_metadata(text.substr(0, length))) << length;
 }
 
-TEST(OusterMetadata, FileIsNamedInWhatIsWrongWithIt) {
+TEST(OusterMetadata, ErrorsNameTheFile) {
   const auto file = std::filesystem::temp_directory_path() / "locus_ouster_metadata.json";
   std::filesystem::remove(file);
   EXPECT_NE(read_metadata(file).error().find("locusctl fetch SENSOR"), std::string::npos);

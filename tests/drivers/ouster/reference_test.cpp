@@ -83,7 +83,7 @@ class OusterDigest : public testing::TestWithParam<Recorded> {};
 
 /// Ranges, reflectivities and times of the decoder are equal to the bit; signal and near infrared, which it does not
 /// use, are at the offsets of the profile.
-TEST_P(OusterDigest, IsThatOfTheMakersDecoder) {
+TEST_P(OusterDigest, MatchesTheMakersDecoder) {
   const auto& name = GetParam().name;
   const auto& other_fields = GetParam().other_fields;
   SKIP_WITHOUT(ouster_data(name + ".pcap"));
@@ -205,7 +205,7 @@ TEST(OusterReference, ChecksumsOfNewFirmwareAreRight) {
   EXPECT_EQ(spoilt, 34);
 }
 
-TEST(OusterReference, WindowIsWhatIsMeasured) {
+TEST(OusterReference, WindowMatchesTheData) {
   SKIP_WITHOUT(ouster_data("windowed_frame1.pcap"));
   const Metadata metadata = metadata_of("windowed_frame1_0.json");
   ASSERT_EQ(metadata.first_column, 1U);
@@ -271,7 +271,7 @@ TEST(OusterReference, EmptyCaptureIsEmpty) {
   EXPECT_EQ(datagrams, 0);
 }
 
-TEST(OusterReference, ImuAtRestFeelsGravityAlone) {
+TEST(OusterReference, ImuAtRestMeasuresGravityAlone) {
   for (const std::string name : {"OS-0-32-U1_v2.2.0_1024x10", "OS-0-128-U1_v2.3.0_1024x10", "crc_test"}) {
     SKIP_WITHOUT(ouster_data(name + ".pcap"));
     const Metadata metadata = metadata_of(name + ".json");

@@ -82,7 +82,7 @@ TEST_F(CalibrationFile, MissingFileIsNamed) {
   EXPECT_TRUE(result.error().starts_with(path_.string() + ": cannot be read; give ")) << result.error();
 }
 
-TEST_F(CalibrationFile, FileForAnotherModelStopsTheStart) {
+TEST_F(CalibrationFile, FileForAnotherModelIsAnError) {
   ASSERT_TRUE(read(kTwoLasers));
   LidarOptions options;
   options.model = Model::vlp16;

@@ -39,7 +39,7 @@ double angle_between(double a_rad, double b_rad) {
   return std::abs(std::remainder(a_rad - b_rad, 2.0 * std::numbers::pi));
 }
 
-TEST(VelodyneDecoder, EveryFiringOfEveryModelHasItsTimeItsDirectionAndItsRing) {
+TEST(VelodyneDecoder, EveryFiringHasItsTimeDirectionAndRing) {
   constexpr std::uint16_t kDistance = 5000;
   for (const Model model : kModels) {
     for (const ReturnMode mode : kModes) {
@@ -104,7 +104,7 @@ TEST(VelodyneDecoder, AzimuthIsInterpolatedAtAnySpeedAndThroughTheWrap) {
   }
 }
 
-TEST(VelodyneDecoder, TimeOfHourIsThatOfTheFirstFiringWhateverInstantTheStampNames) {
+TEST(VelodyneDecoder, TimeOfHourIsThatOfTheFirstFiring) {
   constexpr Duration kHour = std::chrono::hours{1};
   for (const Model model : kModels) {
     const Duration delay = spec(model).stamp_delay;
@@ -118,7 +118,7 @@ TEST(VelodyneDecoder, TimeOfHourIsThatOfTheFirstFiringWhateverInstantTheStampNam
   }
 }
 
-TEST(VelodyneDecoder, SpeedIsThatOfThePacketsColumns) {
+TEST(VelodyneDecoder, RotationRateFollowsTheColumns) {
   Decoder decoder;
   LidarPacket packet;
   EXPECT_EQ(decoder.rotation_rate_rpm(), 0.0);
@@ -127,7 +127,7 @@ TEST(VelodyneDecoder, SpeedIsThatOfThePacketsColumns) {
   EXPECT_NEAR(decoder.rotation_rate_rpm(), 1200.0, 4.0);
 }
 
-TEST(VelodyneDecoder, Vls128InDualModeTakesItsSpeedFromThePacketBefore) {
+TEST(VelodyneDecoder, Vls128InDualModeUsesTheRateOfThePreviousPacket) {
   Decoder decoder;
   LidarPacket packet;
   VelodyneTestPacket first{Model::vls128, ReturnMode::dual, 1'000'000, 100};
@@ -165,7 +165,7 @@ TEST(VelodyneDecoder, DistanceZeroIsNoReturn) {
   EXPECT_TRUE(returns_in({Model::vls128, ReturnMode::strongest}).empty());
 }
 
-TEST(VelodyneDecoder, ColumnsBehindABlindSectorAreLaterByTheColumnsItTook) {
+TEST(VelodyneDecoder, ColumnsBehindABlindSectorAreLaterByItsLength) {
   // A VLP-32C with a field of view from 270 to 90 degrees: the packet continues after the blind sector.
   VelodyneTestPacket bytes{Model::vlp32c, ReturnMode::strongest, 0, 9'000, 600.0};
   for (std::size_t block = 8; block < kBlocks; ++block)
@@ -185,14 +185,14 @@ TEST(VelodyneDecoder, ColumnsBehindABlindSectorAreLaterByTheColumnsItTook) {
 }
 
 /// Regression: encoder jitter was interpreted as a blind sector that takes twenty seconds at this speed.
-TEST(VelodyneDecoder, MotorThatStandsHasNoBlindSector) {
+TEST(VelodyneDecoder, StoppedMotorHasNoBlindSector) {
   VelodyneTestPacket bytes{Model::vlp16, ReturnMode::strongest, 0, 100, 0.0};
   bytes.set_azimuth(7, 101);
   bytes.set_all_returns(1000);
   EXPECT_EQ(decoded(bytes).duration, packet_duration(Model::vlp16, ReturnMode::strongest));
 }
 
-TEST(VelodyneDecoder, AnyOtherLengthIsRefused) {
+TEST(VelodyneDecoder, AnyOtherLengthIsRejected) {
   Decoder decoder;
   LidarPacket packet;
   const std::vector<std::byte> bytes(1500, std::byte{0xFF});
@@ -202,7 +202,7 @@ TEST(VelodyneDecoder, AnyOtherLengthIsRefused) {
   }
 }
 
-TEST(VelodyneDecoder, WrongFlagIsRefused) {
+TEST(VelodyneDecoder, WrongFlagIsRejected) {
   LidarPacket packet;
   for (std::size_t block = 0; block < kBlocks; ++block) {
     VelodyneTestPacket bytes{Model::vls128, ReturnMode::strongest};
@@ -234,7 +234,7 @@ TEST(VelodyneDecoder, Vls128IsReadAtThePaceOfItsPackets) {
 }
 
 /// Four of its packets take as long as one of a VLP-32C.
-TEST(VelodyneDecoder, Vls128OfTheSlowerPaceThatLosesThreePacketsIsNoVlp32c) {
+TEST(VelodyneDecoder, SlowVls128ThatLosesThreePacketsIsNoVlp32c) {
   Decoder decoder;
   LidarPacket packet;
   for (const int i : {0, 1, 2, 3, 7, 8, 12})
@@ -263,7 +263,7 @@ TEST(VelodyneDecoder, UnusedBlocksOfTheVls128MayHoldAnything) {
   decoded(bytes);
 }
 
-TEST(VelodyneDecoder, AbsurdAzimuthsAreRefused) {
+TEST(VelodyneDecoder, AbsurdAzimuthsAreRejected) {
   LidarPacket packet;
   VelodyneTestPacket beyond{Model::vlp16, ReturnMode::strongest};
   beyond.set_azimuth(7, 36'001);
@@ -285,7 +285,7 @@ TEST(VelodyneDecoder, FullTurnIsZero) {
 }
 
 /// Some lidars go on counting beyond the hour; every packet of theirs was refused from then on.
-TEST(VelodyneDecoder, TimeBeyondTheHourIsTakenWithinIt) {
+TEST(VelodyneDecoder, TimeBeyondTheHourWraps) {
   LidarPacket packet;
   Decoder decoder;
   for (const std::uint32_t us : {3'600'000'000U, 4'294'967'295U}) {
@@ -295,7 +295,7 @@ TEST(VelodyneDecoder, TimeBeyondTheHourIsTakenWithinIt) {
   }
 }
 
-TEST(VelodyneDecoder, UnknownFactoryBytesAreRefusedUnlessTheConfigurationKnowsBetter) {
+TEST(VelodyneDecoder, UnknownFactoryBytesAreRejectedUnlessConfigured) {
   LidarPacket packet;
   VelodyneTestPacket bytes{Model::vlp16, ReturnMode::strongest};
   bytes.set_product_id(0x77);
@@ -308,7 +308,7 @@ TEST(VelodyneDecoder, UnknownFactoryBytesAreRefusedUnlessTheConfigurationKnowsBe
   EXPECT_EQ(told.return_mode(), ReturnMode::last);
 }
 
-TEST(VelodyneDecoder, CalibrationForAnotherNumberOfLasersIsRefused) {
+TEST(VelodyneDecoder, CalibrationForAnotherNumberOfLasersIsRejected) {
   LidarPacket packet;
   Decoder decoder{{.calibration = spec(Model::vlp16).calibration}};
   EXPECT_EQ(decoder.decode(VelodyneTestPacket(Model::hdl32e, ReturnMode::strongest).payload(), packet),
@@ -334,7 +334,7 @@ TEST(VelodyneDecoder, CalibratedOffsetsMoveTheReturn) {
   EXPECT_NEAR(returns[0].z_m, 0.3, 1e-5);
 }
 
-TEST(VelodyneDecoder, SpacingOfPacketsOverrulesTheProductIdInEitherModeAndThroughLoss) {
+TEST(VelodyneDecoder, PacketSpacingOverrulesTheProductId) {
   LidarPacket packet;
   for (const ReturnMode mode : kModes) {
     for (const Model truth : {Model::vlp16, Model::vlp32c, Model::hdl32e, Model::vls128}) {
@@ -359,7 +359,7 @@ TEST(VelodyneDecoder, SpacingOfPacketsOverrulesTheProductIdInEitherModeAndThroug
   }
 }
 
-TEST(VelodyneDecoder, ConfiguredModelIsObeyedAndTheOneThatThePacketsSpeakOfIsTold) {
+TEST(VelodyneDecoder, ConfiguredModelIsUsedAndTheReportedOneNamed) {
   Decoder decoder{{.model = Model::vlp16}};
   LidarPacket packet;
   EXPECT_EQ(decoder.recognised_model(), std::nullopt);
@@ -374,7 +374,7 @@ TEST(VelodyneDecoder, ConfiguredModelIsObeyedAndTheOneThatThePacketsSpeakOfIsTol
   EXPECT_EQ(decoder.recognised_model(), Model::vls128) << "of a packet that is refused, too";
 }
 
-TEST(VelodyneDecoder, PuckHiResIsNotTakenForAVlp16ThatHasTheSameTiming) {
+TEST(VelodyneDecoder, PuckHiResIsDistinguishedFromAVlp16) {
   Decoder decoder;
   LidarPacket packet;
   for (const std::uint32_t number : {0U, 1U, 2U}) {
@@ -385,7 +385,7 @@ TEST(VelodyneDecoder, PuckHiResIsNotTakenForAVlp16ThatHasTheSameTiming) {
   }
 }
 
-TEST(VelodyneDecoder, NoBytesBreakIt) {
+TEST(VelodyneDecoder, AnyBytesAreSurvived) {
   std::mt19937 random{7};
   std::uniform_int_distribution<int> byte{0, 255};
   std::uniform_int_distribution<std::size_t> at{0, kDataPacketBytes - 1};

@@ -39,7 +39,7 @@ TEST(VelodyneModel, RingsCountTheLasersUpwards) {
   }
 }
 
-TEST(VelodyneModel, OutermostLasersAreThoseOfTheManuals) {
+TEST(VelodyneModel, OutermostLasersMatchTheManuals) {
   const auto range = [](Model model) {
     const auto lasers = spec(model).calibration.lasers();
     const auto [low, high] = std::minmax_element(

@@ -33,7 +33,7 @@ TEST(PositionPacket, ReceiverWithoutFixHasTimeButNoSpeed) {
   EXPECT_EQ(rmc->course_deg, std::nullopt);
 }
 
-TEST(PositionPacket, EveryChangedCharacterIsNoticed) {
+TEST(PositionPacket, EveryChangedCharacterIsDetected) {
   for (std::size_t i = 0; i < kSentence.find('\r'); ++i) {
     std::string changed = kSentence;
     changed[i] = changed[i] == '7' ? '8' : '7';
@@ -41,12 +41,12 @@ TEST(PositionPacket, EveryChangedCharacterIsNoticed) {
   }
 }
 
-TEST(PositionPacket, EveryBeginningOfASentenceIsNone) {
+TEST(PositionPacket, TruncatedSentencesAreRejected) {
   for (std::size_t length = 0; length < kSentence.find('\r'); ++length)
     EXPECT_EQ(parse_nmea(kSentence.substr(0, length)).rmc, std::nullopt);
 }
 
-TEST(PositionPacket, OtherSentencesAreNone) {
+TEST(PositionPacket, OtherSentencesAreIgnored) {
   EXPECT_EQ(parse_nmea("$GPGGA,220243,3708.5809,N*00").rmc, std::nullopt);
   EXPECT_EQ(parse_nmea("$*00").rmc, std::nullopt);
   EXPECT_EQ(parse_nmea("").rmc, std::nullopt);
@@ -99,7 +99,7 @@ TEST(PositionPacket, RmcIsFoundBetweenOtherSentences) {
       EXPECT_TRUE(parse_position_packet(packet(2, before + kSentence + after)).is_synchronised()) << before << after;
 }
 
-TEST(PositionPacket, LockedPpsThatIsNotUsedSaysWhy) {
+TEST(PositionPacket, UnusedLockedPpsHasAReason) {
   const auto why = [](const std::string& nmea, std::uint8_t pps = 2) {
     return std::string{why_unused(parse_position_packet(packet(pps, nmea)))};
   };
@@ -113,7 +113,7 @@ TEST(PositionPacket, LockedPpsThatIsNotUsedSaysWhy) {
   EXPECT_NE(why(with_checksum("GPRMC,081802,V,,,,,,,210116,,,N")).find("no fix"), std::string::npos);
 }
 
-TEST(PositionPacket, RandomBytesSayNothing) {
+TEST(PositionPacket, RandomBytesAreIgnored) {
   std::mt19937 random{3};
   std::uniform_int_distribution<int> byte{0, 255};
   std::array<std::byte, kPositionPacketBytes> bytes;

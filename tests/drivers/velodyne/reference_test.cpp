@@ -62,7 +62,7 @@ std::vector<int> returns_per_frame(const std::filesystem::path& file, Decoder& d
   return frames;
 }
 
-TEST(VelodyneReference, Hdl32eFramesHoldAsManyReturnsAsAnIndependentDecoderFound) {
+TEST(VelodyneReference, Hdl32eReturnsMatchAnIndependentDecoder) {
   const auto file = velodyne_data("hdl32e_static_monterey.pcap");
   SKIP_WITHOUT(file);
   Decoder decoder;
@@ -77,7 +77,7 @@ TEST(VelodyneReference, Hdl32eFramesHoldAsManyReturnsAsAnIndependentDecoderFound
   EXPECT_EQ(frames[18], 396);
 }
 
-TEST(VelodyneReference, Vlp16ThatReportsTheProductIdOfAnHdl32eIsAVlp16) {
+TEST(VelodyneReference, Vlp16WithTheProductIdOfAnHdl32eIsRecognised) {
   const auto file = velodyne_data("vlp16_static_1200rpm_product21.pcap");
   SKIP_WITHOUT(file);
   Decoder decoder;
@@ -90,7 +90,7 @@ TEST(VelodyneReference, Vlp16ThatReportsTheProductIdOfAnHdl32eIsAVlp16) {
   EXPECT_EQ(frames[51], 274);
 }
 
-TEST(VelodyneReference, ModelIsRightFromTheFirstPacketOnWhereverACaptureBegins) {
+TEST(VelodyneReference, ModelIsRightFromTheFirstPacketOn) {
   const std::vector<std::pair<std::string, Model>> captures{{"vlp16_static_1200rpm_product21.pcap", Model::vlp16},
                                                             {"vlp16_static_gps_pps.pcap", Model::vlp16},
                                                             {"hdl32e_moving_15mps.pcap", Model::hdl32e}};
@@ -254,7 +254,7 @@ std::vector<std::pair<Key, Point>> expected_dual_points() {
   return points;
 }
 
-TEST(VelodyneReference, Vlp16DualReturnsAreThoseOfAnotherDecoderInItsConventions) {
+TEST(VelodyneReference, Vlp16DualReturnsMatchAnotherDecoder) {
   SKIP_WITHOUT(velodyne_data("vlp16_dual.packets.bin"));
   const auto packets = test::read_file(velodyne_data("vlp16_dual.packets.bin"));
   const auto expected = expected_dual_points();
@@ -270,7 +270,7 @@ TEST(VelodyneReference, Vlp16DualReturnsAreThoseOfAnotherDecoderInItsConventions
   EXPECT_LT(with_vertical.matched, 0.8 * with_vertical.points) << "up to 11.2 mm of vertical correction must show";
 }
 
-TEST(VelodyneReference, Vlp32cReturnsAreThoseOfAnotherDecoderInItsConventions) {
+TEST(VelodyneReference, Vlp32cReturnsMatchAnotherDecoder) {
   SKIP_WITHOUT(velodyne_data("vlp32c_strongest.packets.bin"));
   const auto packets = test::read_file(velodyne_data("vlp32c_strongest.packets.bin"));
   const auto lasers = velodyne::spec(Model::vlp32c).calibration.lasers();
@@ -337,7 +337,7 @@ PacketCounters good_packets(std::uint64_t data, std::uint64_t position) {
   return counters;
 }
 
-TEST(VelodyneReference, EveryPacketOfTheCapturesIsTakenAndCounted) {
+TEST(VelodyneReference, EveryPacketOfTheCapturesIsAcceptedAndCounted) {
   SKIP_WITHOUT(velodyne_data("hdl32e_moving_15mps.pcap"));
   EXPECT_EQ(replay(velodyne_data("hdl32e_moving_15mps.pcap")).counters, good_packets(876, 100));
   EXPECT_EQ(replay(velodyne_data("hdl32e_static_monterey.pcap")).counters, good_packets(2702, 299));
@@ -369,7 +369,7 @@ TEST(VelodyneReference, Vlp16WithReceiverIsLockedToPps) {
     EXPECT_TRUE(position.is_synchronised());
 }
 
-TEST(VelodyneReference, StampsByReceptionLieWithinAMillisecondAndAHalfOfIt) {
+TEST(VelodyneReference, ReceptionStampsAreWithinOneAndAHalfMilliseconds) {
   SKIP_WITHOUT(velodyne_data("vlp16_static_gps_pps.pcap"));
   for (const char* name : {"hdl32e_moving_15mps.pcap", "hdl32e_static_monterey.pcap", "vlp16_static_gps_pps.pcap",
                            "vlp16_static_1200rpm_product21.pcap"}) {
@@ -379,7 +379,7 @@ TEST(VelodyneReference, StampsByReceptionLieWithinAMillisecondAndAHalfOfIt) {
   }
 }
 
-TEST(VelodyneReference, SensorTimeIsTakenAsItIs) {
+TEST(VelodyneReference, SensorTimeIsUsedUnchanged) {
   SKIP_WITHOUT(velodyne_data("vlp16_static_gps_pps.pcap"));
   const Replayed capture = replay(velodyne_data("vlp16_static_gps_pps.pcap"), LidarTime::sensor);
   ASSERT_FALSE(capture.stamps.empty());
