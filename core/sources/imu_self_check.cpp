@@ -226,9 +226,9 @@ std::string_view ImuSelfCheck::words(Difference difference, std::size_t axis, bo
     const char* causes;
   };
   constexpr std::array<Finding, 4> kFindings{
-      Finding{"they see different turns",
+      Finding{"they measure different turns",
               "T_base_source, scale, stamps or delay of the gyro, or lidar that follows what moves around the robot"},
-      Finding{"lidar sees turns and the gyro hardly any",
+      Finding{"lidar measures turns and the gyro hardly any",
               "people or things that move around a robot that stands, T_base_source, delay or a dead axis of the gyro"},
       Finding{
           "the gyro turns the other way",

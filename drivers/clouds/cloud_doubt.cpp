@@ -9,8 +9,8 @@ namespace {
 
 /// Describes the substitute for missing point times.
 std::string_view fallback(PointTiming timing) {
-  return timing == PointTiming::azimuth ? "their times are told from their azimuths"
-                                        : "they count as seen at one instant, so a robot that moves makes them a "
+  return timing == PointTiming::azimuth ? "their times are computed from their azimuths"
+                                        : "they count as measured at one instant, so a robot that moves makes them a "
                                           "distorted world";
 }
 
@@ -36,7 +36,7 @@ std::string explain(CloudDoubt doubt, PointTiming timing) {
                        "which unit the driver writes, and whether its clouds are of one turn",
                        fallback(timing));
   case CloudDoubt::stamp_at_end:
-    return "its clouds arrive before their last point by their stamps: the header's stamp is taken for that of the "
+    return "its clouds arrive before their last point by their stamps: the header's stamp is read as that of the "
            "last "
            "point, not of the first; set the driver to stamp the first point";
   case CloudDoubt::tai:

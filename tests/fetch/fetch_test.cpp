@@ -177,11 +177,11 @@ TEST_F(Fetch, AnAnswerThatBreaksOffIsNoFile) {
     std::string answer, problem;
   };
   for (const Case& broken : {Case{&Lidar::http, page.substr(0, page.size() - 10), "the answer breaks off after"},
-                             Case{&Lidar::http, "HTTP/1.1 200 OK\r\nConte", "the answer is none of HTTP"},
+                             Case{&Lidar::http, "HTTP/1.1 200 OK\r\nConte", "the answer is not HTTP"},
                              Case{&Lidar::http, "HTTP/1.1 200 OK\r\n\r\n{", "its metadata: is no JSON"},
                              Case{&Lidar::commands, R"({"prod_line": )", "the answer to get_sensor_info breaks off"},
                              Case{&Lidar::hesai, ptc(angles, angles.size() + 1), angles_size},
-                             Case{&Lidar::hesai, "\x47\x74", "the answer is none of a Hesai"}}) {
+                             Case{&Lidar::hesai, "\x47\x74", "the answer is not that of a Hesai"}}) {
     Lidar lidar;
     TcpServer server(lidar.*broken.port, always(broken.answer));
     const auto file = lidar.fetch(patience_);
@@ -207,7 +207,7 @@ TEST_F(Fetch, AnErrorIsToldAsTheLidarTellsIt) {
   const auto file = fetch();
   ASSERT_FALSE(file);
   EXPECT_NE(file.error().find("answers with HTTP status 503"), std::string::npos) << file.error();
-  EXPECT_NE(file.error().find("refuses to tell its angles, with code 7"), std::string::npos) << file.error();
+  EXPECT_NE(file.error().find("refuses to send its angles, with code 7"), std::string::npos) << file.error();
 }
 
 TEST_F(Fetch, SilenceEndsWithThePatience) {
@@ -238,7 +238,7 @@ TEST_F(Fetch, WhatIsNoLidarIsNotBelieved) {
 
 TEST_F(Fetch, AnotherVersionOfHesaisProtocolIsNone) {
   TcpServer server(hesai_, always("\x57\x75\x01\x05" + std::string(8, '\0')));
-  expect_problem("the answer is none of a Hesai");
+  expect_problem("the answer is not that of a Hesai");
 }
 
 TEST_F(Fetch, WhereNobodyListensEachPortIsNamed) {

@@ -110,7 +110,7 @@ File ask_ouster_http(TcpClient& client) {
     return *std::move(problem);
   const auto head = http_head(answer);
   if (!head)
-    return std::string{"the answer is none of HTTP"};
+    return std::string{"the answer is not HTTP"};
   if (head->status != 200)
     return fmt::format("answers with HTTP status {}", head->status);
   if (head->is_chunked) {
@@ -173,9 +173,9 @@ File ask_hesai(TcpClient& client) {
   if (auto problem = client.receive(answer, kMostBytes, is_whole))
     return *std::move(problem);
   if (answer.size() < kHeadBytes || !answer.starts_with(kQuestion.substr(0, 3)))
-    return std::string{"the answer is none of a Hesai"};
+    return std::string{"the answer is not that of a Hesai"};
   if (answer[3] != 0)
-    return fmt::format("refuses to tell its angles, with code {}", static_cast<unsigned char>(answer[3]));
+    return fmt::format("refuses to send its angles, with code {}", static_cast<unsigned char>(answer[3]));
   if (auto problem = problem_of_size(answer.size(), end_of(answer)))
     return *std::move(problem);
   std::string csv = answer.substr(kHeadBytes, end_of(answer) - kHeadBytes);
@@ -217,7 +217,7 @@ Expected<SensorFile, std::string> fetch_sensor_file(const std::string& address, 
     reasons += fmt::format("  {}, TCP port {}: {}\n", port.name, port.number, printable(file.error()));
   }
   return fmt::format("{}: no lidar gives its metadata or angles there:\n{}look at its power, cable and address, which "
-                     "locusctl sensors tells; a Velodyne has nothing to be fetched",
+                     "locusctl sensors shows; a Velodyne has nothing to be fetched",
                      address, reasons);
 }
 

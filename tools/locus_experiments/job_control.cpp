@@ -236,7 +236,7 @@ void run_ninja(const Places& places, const Arguments& arguments) {
   const int status = std::system(command.c_str());
   if (status != 0)
     throw Failure(ExitStatus::failed,
-                  fmt::format("ninja ended with status {}; started again, locus-experiments goes on where it was",
+                  fmt::format("ninja ended with status {}; started again, locus-experiments resumes where it was",
                               WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status)));
 }
 

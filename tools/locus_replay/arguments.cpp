@@ -69,7 +69,7 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   auto* calibrate =
       app.add_option("--calibrate", arguments.calibrate,
                      "Replays several times, finds how late the stamps of an IMU are, how it is turned and the scales "
-                     "of wheels, goes on with that and writes it into FILE, YAML for the configuration")
+                     "of wheels, continues with that and writes it into FILE, YAML for the configuration")
           ->type_name("FILE");
   app.add_option("--sweeps-format", format, "Of these files: pcd, ply or bin (KITTI's); default: pcd")
       ->type_name("FORMAT")

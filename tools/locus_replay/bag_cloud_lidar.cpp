@@ -113,7 +113,7 @@ void configure_clouds_of(const std::filesystem::path& bag_file, Config& config, 
   } else {
     lines.push_back(
         fmt::format("{}: /tf_static does not say where the lidar ({}) sits on {}, so poses are those of the "
-                    "lidar; tell with --set lidars.0.T_base_lidar.xyz_m=[X,Y,Z], and rpy_deg",
+                    "lidar; set it with --set lidars.0.T_base_lidar.xyz_m=[X,Y,Z], and rpy_deg",
                     bag_file.string(), seen.frame, base));
   }
 }

@@ -133,7 +133,7 @@ void deal_clouds(const Bag& bag, const std::string& bag_name, const Config& conf
 std::string clouds_instead(const Topics& topics) {
   const auto cloud = std::ranges::find_if(topics, [](const BagTopic& topic) { return is_cloud_type(topic.type); });
   return cloud == topics.end() ? ""
-                               : fmt::format("{} ({}) has clouds of a lidar; take them with --set lidars.0.topic={}",
+                               : fmt::format("{} ({}) has clouds of a lidar; select them with --set lidars.0.topic={}",
                                              cloud->name, cloud->type, cloud->name);
 }
 

@@ -78,8 +78,9 @@ FoundRecording find_recording(const std::filesystem::path& named) {
     return {named, *std::move(files), ""};
   const auto inside = captures_in(named).empty() ? recordings_in(named) : std::vector<std::filesystem::path>{};
   if (inside.size() > 1)
-    throw Failure(ExitStatus::failed, fmt::format("{}: holds {} recordings, but is none itself; name one of them: {}",
-                                                  named.string(), inside.size(), names_of_some(inside)));
+    throw Failure(ExitStatus::failed,
+                  fmt::format("{}: holds {} recordings, but is not one itself; name one of them: {}", named.string(),
+                              inside.size(), names_of_some(inside)));
   if (inside.empty())
     return {named, value_or_fail(CaptureFolder::find(named), ExitStatus::failed), ""};
   return {inside.front(), files_of(inside.front()).value(),

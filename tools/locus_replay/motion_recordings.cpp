@@ -53,9 +53,9 @@ std::string without_source(const MotionFile& file) {
 
 std::string without_file(const MotionSourceOptions& source) {
   return source.kind == SourceKind::imu
-             ? fmt::format("motion source {}: never heard from, there is no imu.csv; name a file with --imu FILE",
+             ? fmt::format("motion source {}: never received, there is no imu.csv; name a file with --imu FILE",
                            source.name)
-             : fmt::format("motion source {0}: never heard from, there is no {0}.tum; name a file with --odometry "
+             : fmt::format("motion source {0}: never received, there is no {0}.tum; name a file with --odometry "
                            "{0}=FILE",
                            source.name);
 }

@@ -38,7 +38,7 @@ RecordedInput open_bag_input(const Arguments& arguments, const std::filesystem::
   std::ranges::move(read_bag_motion(*bag, file, topics.of_source, has_packets, warnings), std::back_inserter(motion));
   for (std::size_t i = 0; config_is_users_own && topics.doubts.empty() && i < topics.of_source.size(); ++i) {
     if (!has_file(SourceId{i}) && !config.motion_sources[i].of_lidar)
-      warnings.push_back(fmt::format("{}: motion source {}: never heard from, nothing of its kind in the bag",
+      warnings.push_back(fmt::format("{}: motion source {}: never received, nothing of its kind in the bag",
                                      file.string(), config.motion_sources[i].name));
   }
   return {std::make_unique<BagPackets>(std::move(bag), file, config, topics), std::move(motion), topics.used, {}};

@@ -19,7 +19,7 @@ double rounded(double value, double resolution) {
   return std::round(value * steps) / steps;
 }
 
-/// Calls `take` with each of at most `count` chunks of equal length.
+/// Calls `visit` with each of at most `count` chunks of equal length.
 template <class T, class Visit>
 void for_each_stretch(std::span<const T> samples, std::size_t count, const Visit& visit) {
   const std::size_t length = std::max<std::size_t>(1, (samples.size() + count - 1) / count);

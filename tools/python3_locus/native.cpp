@@ -199,22 +199,22 @@ constexpr Text kOdometry =
     "or\n"
     "a foreign packet is counted and no error. Raises locus.Error for a configuration that is wrong, a source that is\n"
     "not configured or of another kind, arrays of wrong shape and stamps outside 1951 to 2096.";
-constexpr Text kPacket = "Takes the payload of a UDP datagram: bytes, or any object that has them in a row.\n\n"
+constexpr Text kPacket = "Processes the payload of a UDP datagram: bytes, or any object that has them in a row.\n\n"
                          "arrival_ns: when it reached this computer. port: that it was sent to. source_ip: of the "
                          "sender, text or a number in\n"
                          "host byte order; 0: not known.";
 constexpr Text kCloud =
-    "Takes the returns of a lidar that the configuration gives a topic.\n\n"
+    "Processes the returns of a lidar that the configuration gives a topic.\n\n"
     "xyz: (n, 3), metres, frame of the lidar; read as float32. stamp_ns: what `time` counts from, by the clock of the\n"
     "lidar. arrival_ns: when it reached this computer; None: stamp_ns. time: (n,), seconds since stamp_ns; None: not\n"
     "known. ring: (n,), laser of each point, read as uint16. intensity: (n,), 0 to 255.";
 constexpr Text kImu =
-    "Takes a reading of a motion source of kind imu, in its own frame.\n\n"
+    "Processes a reading of a motion source of kind imu, in its own frame.\n\n"
     "angular_velocity: (3,), rad/s. specific_force: (3,), m/s^2, +9.81 on z at rest and level. orientation_xyzw: (4,), "
     "in\n"
     "a level frame of any heading, or None. arrival_ns: when it reached this computer; None: stamp_ns.";
 constexpr Text kOdometrySample =
-    "Takes a pose of a motion source of kind odometry.\n\n"
+    "Processes a pose of a motion source of kind odometry.\n\n"
     "position: (3,), metres, and orientation_xyzw: (4,), of base in a frame of the source's own. covariance_scale: "
     "how\n"
     "much worse than usual the source says it is. arrival_ns: when it reached this computer; None: stamp_ns.";
@@ -236,7 +236,7 @@ void define_odometry(py::module_& module) {
            arg("orientation_xyzw"), arg("covariance_scale") = 1.0, arg("arrival_ns") = py::none())
       .def(
           "finish", [](Odometry& shared) { return shared.compute([](auto& object) { return object.finish(); }); },
-          "Tells that nothing more will come: the last sweep, if more than half of it is there. Inputs afterwards are\n"
+          "Ends the input; returns the last sweep, if more than half of it is there. Later inputs are\n"
           "errors.");
   add_views(definition);
 }

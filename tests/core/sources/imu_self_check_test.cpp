@@ -177,7 +177,7 @@ TEST_F(ImuSelfCheckTest, QuarantineEndsWithoutClearLidarEvidenceButNotForever) {
     stand(check);
     EXPECT_EQ(refused_, round == 2);
   }
-  EXPECT_NE(check.verdict().find("disagree on how the robot turns about y (pitch): they see different turns"),
+  EXPECT_NE(check.verdict().find("disagree on how the robot turns about y (pitch): they measure different turns"),
             std::string_view::npos)
       << check.verdict();
   EXPECT_EQ(check.verdict().find("wrong"), std::string_view::npos) << "who is right is not known";
@@ -193,7 +193,7 @@ TEST_F(ImuSelfCheckTest, StaticGyroAgainstLidarTurnIsNotCalledWrong) {
     turn(check, 10, {0, 0, 1e-3}, {0, 0, -0.2});
     stand(check);
   }
-  EXPECT_NE(check.verdict().find("about z (yaw): lidar sees turns and the gyro hardly any"), std::string_view::npos)
+  EXPECT_NE(check.verdict().find("about z (yaw): lidar measures turns and the gyro hardly any"), std::string_view::npos)
       << check.verdict();
   EXPECT_NE(check.verdict().find("people or things that move around a robot that stands"), std::string_view::npos);
   EXPECT_EQ(check.verdict().find("other way"), std::string_view::npos) << "two readings of noise have any sign";
