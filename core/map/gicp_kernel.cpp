@@ -131,11 +131,15 @@ using Sums = std::array<Lanes, kTerms>;
 }
 
 [[gnu::always_inline]] inline void sum_block(const Affine& T, const SourceBlock& source, const MatchBlock& matches,
-                                             const Axes& axes, float width2, Sums& sums) {
+                                             const Axes& axes, float width2, Sums& sums, FitBlock& fit) {
   Terms terms;
   for (std::size_t begin = 0; begin < kGicpBlock; begin += kChunk) {
     compute_terms(T, source, matches, axes, width2, begin, terms);
     add_up(terms, sums);
+    for (std::size_t k = 0; k < kChunk; ++k) {
+      fit.error[begin + k] = terms[kError][k];
+      fit.mapped[begin + k] = terms[kInliers][k];
+    }
   }
 }
 
@@ -224,10 +228,11 @@ NormalEquations equations_of(const Sums& sums) {
 
 } // namespace
 
-NormalEquations linearise(const GicpPass& pass, const SourceBlock& source, const MatchBlock& matches, Isa isa) {
+NormalEquations linearise(const GicpPass& pass, const SourceBlock& source, const MatchBlock& matches, Isa isa,
+                          FitBlock& fit) {
   Sums sums{};
   const Affine T = pass.T_origin_source();
-  run_as(isa, [&] { sum_block(T, source, matches, pass.axes, static_cast<float>(pass.width2), sums); });
+  run_as(isa, [&] { sum_block(T, source, matches, pass.axes, static_cast<float>(pass.width2), sums, fit); });
   return equations_of(sums);
 }
 

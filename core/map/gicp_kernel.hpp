@@ -34,8 +34,15 @@ struct NormalEquations {
   }
 };
 
-/// Sums the normal equations. Pure; any thread. The last digits depend on the instruction set.
-NormalEquations linearise(const GicpPass& pass, const SourceBlock& source, const MatchBlock& matches, Isa isa);
+/// Fit of each point of a block in the last pass.
+struct FitBlock {
+  PerPoint error;  ///< squared Mahalanobis distance times its robust weight
+  PerPoint mapped; ///< 1 for an inlier, else 0
+};
+
+/// Sums the normal equations, and sets `fit`. Pure; any thread. The last digits depend on the instruction set.
+NormalEquations linearise(const GicpPass& pass, const SourceBlock& source, const MatchBlock& matches, Isa isa,
+                          FitBlock& fit);
 
 /// Number of points of a block with a correspondence, and the scatter of its normals; a shapeless one counts as a third
 /// of a plane along each axis.

@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+
 #include <vector>
 
 #include "core/map/gicp_kernel.hpp"
@@ -38,6 +40,8 @@ constexpr double kBestFit = 0.3; ///< mean squared Mahalanobis distance
 /// Squared Mahalanobis distance at which a point is as likely in unmapped space as on a surface: 2 ln(L / sqrt(2 pi)),
 /// with unmapped space as long as 20 standard deviations of a surface (1 m and 5 cm).
 constexpr double kUnmapped = 4.2;
+/// Odds, as twice their logarithm, that an object is where the map has it: one of twenty has moved.
+constexpr double kObjectMoved = 6.0;
 double honest_share(double mean_error) { return kIndependent / std::max(kBestFit, mean_error); }
 
 /// Noise floor of the normal products (2 sigma): products of as many independent errors reach it by chance. Subtracted
@@ -65,6 +69,13 @@ Axes axes_of(const Normals& normals) {
 }
 
 constexpr double square(double x) { return x * x; }
+
+/// Returns the element of Registration::object_costs for a point, by a hash of the square metre on which it stands.
+std::size_t object_at(float x_m, float y_m) {
+  const auto column = static_cast<std::uint32_t>(static_cast<std::int32_t>(std::floor(x_m)));
+  const auto row = static_cast<std::uint32_t>(static_cast<std::int32_t>(std::floor(y_m)));
+  return ((column * 73856093U) ^ (row * 19349663U)) % kObjects;
+}
 
 /// Applies a matrix of the pose (target axes) to the twist as well (base axes).
 Matrix12 pose_and_twist(const Matrix6& of_pose, const Matrix6& R_target_base) {
@@ -142,6 +153,7 @@ struct Gicp::Workers {
     for (std::size_t begin = 0; begin < source.points.size(); begin += kGicpBlock)
       blocks.emplace_back(source.points.subspan(begin, std::min(kGicpBlock, source.points.size() - begin)));
     matches.resize(std::max(matches.size(), blocks.size()));
+    fits.assign(blocks.size(), {});
     partial.resize(std::max(partial.size(), blocks.size()));
     age_s.assign(blocks.size(), 0.0);
     std::copy(source.block_age_s.begin(), source.block_age_s.end(), age_s.begin());
@@ -169,7 +181,7 @@ struct Gicp::Workers {
     pass.axes = axes;
     for_each_block([&](std::size_t block) {
       const GicpPass of_block = of(block);
-      partial[block] = linearise(of_block, blocks[block], matches[block], isa);
+      partial[block] = linearise(of_block, blocks[block], matches[block], isa, fits[block]);
     });
     const Matrix6 R_target_base = turn_both(pass.T_target_source.rotation);
     ElasticEquations total;
@@ -186,6 +198,26 @@ struct Gicp::Workers {
     return total;
   }
 
+  /// Sums what the points of each object cost in a mixture with the shares of this registration. The robust weights
+  /// lower the errors; all are scaled up by their mean.
+  void sum_objects(Registration& result) const {
+    const auto all = static_cast<double>(result.points), mapped = static_cast<double>(result.inliers);
+    const auto cost = [&](double part) { return part > 0.0 ? -2.0 * std::log(part / all) : 0.0; };
+    const double of_mapped = cost(mapped), of_unmapped = kUnmapped + cost(all - mapped);
+    std::array<double, kObjects> errors{}, costs{};
+    double total = 0.0;
+    for (std::size_t block = 0; block < blocks.size(); ++block)
+      for (std::size_t i = 0; i < blocks[block].count; ++i) {
+        const std::size_t object = object_at(blocks[block].x_m[i], blocks[block].y_m[i]);
+        errors[object] += static_cast<double>(fits[block].error[i]);
+        total += static_cast<double>(fits[block].error[i]);
+        costs[object] += fits[block].mapped[i] > 0.0F ? of_mapped : of_unmapped;
+      }
+    const double scale = total > 0.0 ? mapped * result.mean_error / total : 0.0;
+    for (std::size_t object = 0; object < kObjects; ++object)
+      result.object_costs[object] = static_cast<float>(costs[object] + scale * errors[object]);
+  }
+
   [[nodiscard]] Matrix6 observability(const Eigen::Matrix3d& R_target_source) const {
     Matrix6 gradients = Matrix6::Zero();
     for (std::size_t block = 0; block < blocks.size(); ++block)
@@ -199,6 +231,7 @@ struct Gicp::Workers {
   Isa isa;
   std::vector<SourceBlock> blocks;
   std::vector<MatchBlock> matches;
+  std::vector<FitBlock> fits;
   std::vector<NormalEquations> partial;
   std::vector<double> age_s; ///< age of each block
   Axes axes{};
@@ -245,18 +278,20 @@ double fit_of(const Registration& registration) {
 
 namespace {
 
-/// Returns twice the negative log likelihood of the points under the mixture of evidence().
-double mixture_cost(const Registration& registration) {
-  const auto all = static_cast<double>(registration.points), mapped = static_cast<double>(registration.inliers);
-  const auto weighed = [&](double part) { return part > 0.0 ? -2.0 * part * std::log(part / all) : 0.0; };
-  return mapped * registration.mean_error + (all - mapped) * kUnmapped + weighed(mapped) + weighed(all - mapped);
+/// Returns the sum over the objects of what they say for `one` against `other`.
+double weigh_objects(const Registration& one, const Registration& other, double share) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < kObjects; ++i)
+    sum += std::clamp(share * static_cast<double>(other.object_costs[i] - one.object_costs[i]), -kObjectMoved,
+                      kObjectMoved);
+  return sum;
 }
 
 } // namespace
 
 double evidence(const Registration& one, const Registration& other) {
-  const double gained = mixture_cost(other) - mixture_cost(one);
-  return gained * honest_share((gained > 0.0 ? one : other).mean_error);
+  const double gained = weigh_objects(one, other, honest_share(one.mean_error));
+  return gained > 0.0 ? gained : weigh_objects(one, other, honest_share(other.mean_error));
 }
 
 Registration Gicp::align(const ElasticScan& source, const SurfaceMap& target, const Pose& T_start,
@@ -266,9 +301,11 @@ Registration Gicp::align(const ElasticScan& source, const SurfaceMap& target, co
   result.points = source.points.size();
   result.T_target_source = T_start;
   result.twist_base = source.twist_base;
-  if (!T_start.finite() || !target.reaches(T_start.translation))
-    return result;
   workers_->set_source(source);
+  if (!T_start.finite() || !target.reaches(T_start.translation)) {
+    workers_->sum_objects(result);
+    return result;
+  }
   double width = wide ? kWidthStartWide : kWidthStart;
   bool few_planes = false;
   bool can_follow = false;
@@ -299,6 +336,7 @@ Registration Gicp::align(const ElasticScan& source, const SurfaceMap& target, co
     if (result.converged)
       break;
   }
+  workers_->sum_objects(result);
   if (result.iterations > 0)
     result.observability = workers_->observability(result.T_target_source.R());
   return result;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <functional>
 #include <memory>
@@ -36,6 +37,8 @@ struct MotionBelief {
   Matrix12 information = Matrix12::Zero(); ///< zero: no information about an axis
 };
 
+inline constexpr std::size_t kObjects = 512; ///< elements of Registration::object_costs
+
 /// Outcome of a registration.
 struct Registration {
   Pose T_target_source;
@@ -46,6 +49,9 @@ struct Registration {
   std::size_t inliers = 0;                 ///< points with a correspondence within reach
   double mean_error = 0.0;                 ///< mean squared Mahalanobis distance of the inliers
   Matrix12 information = Matrix12::Zero(); ///< of the points alone, scaled for their correlation
+  /// Twice the negative log likelihood of the points of each object, see evidence(). An object is what stands on a
+  /// square metre around the robot; a few share an element.
+  std::array<float, kObjects> object_costs{};
   /// Mean over the points of v v', v = (n, p x n): n the unit normal of the correspondence, p the point in m about the
   /// source's origin. Measures how well the surfaces constrain each direction. Target axes.
   Matrix6 observability = Matrix6::Zero();
@@ -65,7 +71,8 @@ double fit_of(const Registration& registration);
 ///
 /// Model of a point: a mixture. It lies on a surface of the map (squared Mahalanobis distance), or in unmapped space
 /// (uniform). The share of mapped points is the maximum likelihood one for each registration: where little is mapped, a
-/// pose that slides the scan back onto the map gains nothing.
+/// pose that slides the scan back onto the map gains nothing. Model of an object: it may have moved, so that all of its
+/// points together are worth no more than the odds against that, whichever registration they speak for.
 double evidence(const Registration& one, const Registration& other);
 
 /// Generalised ICP (Segal 2009; paper equations 1 and 2): aligns points that have surface covariances with a map of

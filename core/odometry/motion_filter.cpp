@@ -423,7 +423,7 @@ void MotionFilter::measure(SourceId id, const SensedTwist& sensed, Measured what
     const double peak = variance * std::max(0.0, (ratio - 1.0) / (kDegreesOfFreedom + 1.0));
     if (axis == 0 && source.slip) {
       double& slip = P_(*source.slip, *source.slip);
-      const double begins = 1.0 / (1.0 + std::exp(-0.5 * ratio) / (kSlips_per_s * elapsed_s_));
+      const double begins = 1.0 / (1.0 + std::exp(0.5 * (odds_against_slip() - ratio)));
       slip += begins * peak;
       variance += (1.0 - begins) * peak;
       source.variance[axis] = variance + slip;
@@ -491,15 +491,28 @@ void MotionFilter::correct(const State& error) {
 
 MotionBelief MotionFilter::belief() const { return {T_odom_base_, twist_base_, covariance().inverse()}; }
 
+namespace {
+
+/// Returns twice the negative log likelihood of Student's t for a squared Mahalanobis distance, up to a constant. The
+/// pose follows from the twist, so there are six degrees of freedom.
+double student_cost(double distance) {
+  constexpr double kAxes = 6.0;
+  return (kDegreesOfFreedom + kAxes) * std::log(1.0 + std::max(0.0, distance) / kDegreesOfFreedom);
+}
+
+} // namespace
+
 double MotionFilter::surprise(const Registration& found) const {
-  constexpr double kAxes = 6.0; // degrees of freedom: the pose follows from the twist
   const Matrix12 P = covariance();
   Vector12 moved;
   moved << difference(found.T_target_source, T_odom_base_), found.twist_base - twist_base_;
-  const double distance = std::max(0.0, moved.dot(P.ldlt().solve(moved)));
   const double determined = (Matrix12::Identity() + P * found.information).determinant();
-  return (kDegreesOfFreedom + kAxes) * std::log(1.0 + distance / kDegreesOfFreedom) +
-         std::log(std::max(1.0, determined));
+  return student_cost(moved.dot(P.ldlt().solve(moved))) + std::log(std::max(1.0, determined));
+}
+
+double MotionFilter::surprise_at_rest() const {
+  const Matrix6 P = covariance().bottomRightCorner<6, 6>();
+  return student_cost(twist_base_.dot(P.ldlt().solve(twist_base_)));
 }
 
 void MotionFilter::update(const Pose& T_odom_base, const Vector6& twist_base, const Matrix12& information) {
@@ -549,7 +562,7 @@ Innovation MotionFilter::innovation(SourceId id, const SensedTwist& sensed, bool
   return found;
 }
 
-double MotionFilter::odds_against_slip() const { return -2.0 * std::log(kSlips_per_s * elapsed_s_); }
+double MotionFilter::odds_against_slip() const { return -2.0 * std::log(std::expm1(kSlips_per_s * elapsed_s_)); }
 
 void MotionFilter::learn() {
   for (Source& source : std::span(sources_).first(count_))

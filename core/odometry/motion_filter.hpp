@@ -114,6 +114,9 @@ class MotionFilter {
   /// 28.1). Call before update().
   [[nodiscard]] double surprise(const Registration& found) const;
 
+  /// Returns the same of a standstill under the prediction, without Occam's factor: what the sources say against it.
+  [[nodiscard]] double surprise_at_rest() const;
+
   /// Sets pose and twist to the registration's result, which includes the prior, and updates the covariance with
   /// `information`, that of the points alone.
   void update(const Pose& T_odom_base, const Vector6& twist_base, const Matrix12& information);

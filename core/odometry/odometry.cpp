@@ -25,8 +25,8 @@ constexpr double kWide_m = 0.3;
 /// Change of the twist above which the points are de-skewed again: it distorts a block of points.
 constexpr double kDistorts_mps = 0.3, kDistorts_radps = 0.05;
 
-/// Least fit at rest, relative to the best other hypothesis. A lower one would hold back a robot that pulls away.
-constexpr double kAsGoodAtRest = 0.998;
+/// Prior odds, as twice their logarithm, that a robot that stands does not move off in a sweep.
+constexpr double kMovesOff = 9.2;
 
 /// Conditions to start a standstill: the twist is slow for kSlowFor and known to kSlowDoubt times the limit for slow,
 /// and zero lies within kRest_sigma of the prediction.
@@ -356,7 +356,9 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
     slow_since_ = sweep.end;
   if (may_rest && (stands_ || sweep.end - slow_since_ >= kSlowFor)) {
     if (Hypothesis rest = attempt(sweep, {.without = best.without, .rests = true}, stop);
-        fit_of(rest.fit) > kAsGoodAtRest * fit_of(best.fit)) {
+        evidence(rest.fit, best.fit) + best.filter.surprise(best.fit) - best.filter.surprise_at_rest() +
+            (stands_ ? kMovesOff : 0.0) >
+        0.0) {
       rest.filter.set_pose(filter_.pose());
       best = rest;
     }
@@ -393,9 +395,9 @@ std::optional<Odometry::Contradiction> Odometry::worst_source(const Sweep& sweep
     for (int axis = 0; axis < 6; ++axis) {
       if (found.variance[axis] <= 0.0)
         continue;
-      const double surprise = found.value[axis] * found.value[axis] / found.variance[axis] / fault;
-      if (surprise > (worst ? worst->surprise : 1.0))
-        worst = {index_of(*source), surprise};
+      const double evidence = found.value[axis] * found.value[axis] / found.variance[axis] - fault;
+      if (evidence > (worst ? worst->evidence : 0.0))
+        worst = {index_of(*source), evidence};
     }
   }
   return worst;
@@ -472,8 +474,8 @@ void Odometry::report_sources(const Sweep& sweep, OdometryEstimate& estimate) {
         sensed.known && sources_[i].kind == SourceKind::odometry ? std::optional{sensed.T_source_base} : std::nullopt;
     report.doubted = !sensed.usable;
     report.learned.reset();
-    if (!sensed.usable && !recalled_[i])
-      continue;
+    if (!sensed.usable && !recalled_[i] && learned_since_[i] == Stamp{})
+      continue; // not used yet
     if (sources_[i].kind == SourceKind::imu)
       follow_lateness(filter_.learned(SourceId{i}).lateness_s(), feedback_.late[i]);
     const bool only_reported = sources_[i].calibration == Calibration::report;

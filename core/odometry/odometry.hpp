@@ -78,9 +78,8 @@ class Odometry {
  private:
   static constexpr std::size_t kMinPoints = 30; ///< fewer do not constrain six axes reliably
   static constexpr std::bitset<kMaxSources> kAllSources{(1U << kMaxSources) - 1U};
-  /// Prior odds, as twice their logarithm: that a source is right in a sweep (it is wrong once in a thousand), and that
-  /// the robot stands during its first two sweeps.
-  static constexpr double kSourceIsRight = 13.8, kBeginsAtRest = 20.0;
+  /// Prior odds, as twice their logarithm, that a source is right in a sweep: it is wrong once in a thousand.
+  static constexpr double kSourceIsRight = 13.8;
 
   /// An assumption on the motion during a sweep and on the sources that measure it.
   struct Assumption {
@@ -100,7 +99,7 @@ class Odometry {
   /// A source that contradicts all others.
   struct Contradiction {
     std::size_t source = 0;
-    double surprise = 0.0; ///< largest squared innovation of an axis, in units of the odds of a fault
+    double evidence = 0.0; ///< largest squared innovation of an axis less the odds against a fault, both as -2 log
   };
 
   /// A hypothesis for the motion between the first two sweeps.

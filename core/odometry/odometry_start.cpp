@@ -194,7 +194,8 @@ Odometry::Start Odometry::start_without(std::bitset<kMaxSources> without, const 
     if (difference(T_odom_base, T_before).cwiseAbs().maxCoeff() < kAgrees || stop())
       break;
   }
-  if (evidence(rest, start.fit) > -kBeginsAtRest)
+  const MotionFilter free = assume(sweep, {.without = kAllSources}).filter;
+  if (evidence(rest, start.fit) + free.surprise(start.fit) - unknown.surprise_at_rest() > 0.0)
     start = {.without = kAllSources, .rests = true, .twist_base = Vector6::Zero(), .fit = rest};
   return start;
 }

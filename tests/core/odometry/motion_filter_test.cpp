@@ -296,6 +296,19 @@ TEST(MotionFilter, HigherLimitsAllowMoreMotion) {
   EXPECT_NEAR(doubt_mps({.max_acceleration_mps2 = 30.0}), 3.0 * doubt_mps({}), 1e-9);
 }
 
+/// The probability that no slip begins in two intervals is the product of the two, also beyond ten seconds.
+TEST(MotionFilter, OddsOfASlipComposeOverTime) {
+  const auto none_begins_in = [](double elapsed_s) {
+    MotionFilter filter{{}};
+    filter.begin({}, Vector6::Zero(), Vector6::Ones());
+    filter.predict(elapsed_s, elapsed_s, {}, {});
+    return 1.0 / (1.0 + std::exp(-0.5 * filter.odds_against_slip()));
+  };
+  for (const double elapsed_s : {0.05, 0.1, 3.0, 15.0, 60.0})
+    EXPECT_NEAR(none_begins_in(2.0 * elapsed_s), std::pow(none_begins_in(elapsed_s), 2), 1e-12) << elapsed_s;
+  EXPECT_GT(none_begins_in(0.1), 0.98);
+}
+
 TEST(MotionFilter, SetPoseChangesThePoseOnly) {
   MotionFilter filter = begun(twist_of(1, 0, 0, 0, 0, 0));
   const Matrix12 before = filter.covariance();
