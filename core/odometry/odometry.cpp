@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/odometry/relocation.hpp"
+#include "core/odometry/rest.hpp"
 #include "core/sources/motion_sources.hpp"
 
 namespace locus {
@@ -28,11 +29,9 @@ constexpr double kDistorts_mps = 0.3, kDistorts_radps = 0.05;
 /// Prior odds, as twice their logarithm, that a robot that stands does not move off in a sweep.
 constexpr double kMovesOff = 9.2;
 
-/// Conditions to start a standstill: the twist is slow for kSlowFor and known to kSlowDoubt times the limit for slow,
-/// and zero lies within kRest_sigma of the prediction.
+/// Conditions to start a standstill: the twist is slow for kSlowFor and known to kSlowDoubt times the limit for slow.
 constexpr double kSlowDoubt = 4.0;
 constexpr Duration kSlowFor = std::chrono::milliseconds{500};
-constexpr double kRest_sigma = 3.0;
 
 /// Capacity for the 16 000 voxels of a large sweep that still fits the L2 cache.
 constexpr std::size_t kLastScanBytes = 2'500'000;
@@ -344,9 +343,6 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
     return best;
   const Hypothesis first = best;
   const std::optional<Registration> lidar_alone = consider_faults(sweep, best, stop);
-  const Vector6 twist = best.filter.twist_base();
-  const Vector6 sigma = best.filter.covariance().diagonal().tail<6>().cwiseSqrt();
-  const bool may_rest = (twist.array().abs() < kRest_sigma * sigma.array() + 1e-3).all();
   MotionFilter after = best.filter;
   after.update(best.fit.T_target_source, best.fit.twist_base, best.fit.information);
   const Vector6 sigma_after = after.covariance().diagonal().tail<6>().cwiseSqrt();
@@ -354,7 +350,7 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
                     (sigma_after.array() < kSlowDoubt * kSlow.array()).all(); // standstill requires an observed twist
   if (!slow)
     slow_since_ = sweep.end;
-  if (may_rest && (stands_ || sweep.end - slow_since_ >= kSlowFor)) {
+  if (may_rest(best.filter) && (stands_ || sweep.end - slow_since_ >= kSlowFor)) {
     if (Hypothesis rest = attempt(sweep, {.without = best.without, .rests = true}, stop);
         evidence(rest.fit, best.fit) + best.filter.surprise(best.fit) - best.filter.surprise_at_rest() +
             (stands_ ? kMovesOff : 0.0) >
