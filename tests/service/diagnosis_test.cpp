@@ -274,7 +274,8 @@ TEST_F(Diagnosis, SweepsShorterThanARevolutionAreReportedOnce) {
 class SessionMonitorTest : public testing::Test {
  protected:
   void SetUp() override {
-    figures_.live.emplace().link.sources.resize(config_.motion_sources.size());
+    figures_.live = daemon::Figures::Live{};
+    figures_.live->link.sources.resize(config_.motion_sources.size());
     static_cast<void>(said_after(Duration::zero()));
   }
 
