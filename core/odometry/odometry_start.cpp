@@ -16,10 +16,9 @@ namespace {
 constexpr double kMinOverlap = 0.3;
 
 constexpr double kUnknownRate_radps = 10.0; ///< standard deviation of an unknown turn rate: a flick of a hand
-/// Speed and turn rate of a robot that already moves as the odometry starts, for its comparison with one that stands.
-constexpr double kUsualSpeed_mps = 1.0, kUsualRate_radps = 0.5;
-constexpr int kRounds = 8;        ///< most iterations until motion and de-skew of the first two sweeps agree
-constexpr double kAgrees = 0.002; ///< change per iteration below which they agree: metres, radians
+constexpr double kBeginsAtRest = 20.0; ///< prior odds, as twice their logarithm, of a stand during the first two sweeps
+constexpr int kRounds = 8;             ///< most iterations until motion and de-skew of the first two sweeps agree
+constexpr double kAgrees = 0.002;      ///< change per iteration below which they agree: metres, radians
 
 } // namespace
 
@@ -197,11 +196,7 @@ Odometry::Start Odometry::start_without(std::bitset<kMaxSources> without, const 
     if (difference(T_odom_base, T_before).cwiseAbs().maxCoeff() < kAgrees || stop())
       break;
   }
-  Hypothesis moving{{.without = kAllSources}, {}, false, filter_, {}, {}};
-  moving.filter.begin(T_odom_first, Vector6::Zero(), along_each_axis(kUsualSpeed_mps, kUsualRate_radps / kRadPerDeg));
-  apply_sources(moving.filter, sweep, moving);
-  if (may_rest(unknown) &&
-      evidence(rest, start.fit) + moving.filter.surprise(start.fit) - unknown.surprise_at_rest() > 0.0)
+  if (may_rest(unknown) && evidence(rest, start.fit) > -kBeginsAtRest)
     start = {.without = kAllSources, .rests = true, .twist_base = Vector6::Zero(), .fit = rest};
   return start;
 }
