@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "core/odometry/relocation.hpp"
-#include "core/odometry/rest.hpp"
 #include "core/sources/motion_sources.hpp"
 
 namespace locus {
@@ -27,7 +26,10 @@ constexpr double kWide_m = 0.3;
 constexpr double kDistorts_mps = 0.3, kDistorts_radps = 0.05;
 
 /// Prior odds, as twice their logarithm, that a robot that stands does not move off in a sweep.
-constexpr double kMovesOff = 9.2;
+constexpr double kStaysAtRest = 9.2;
+
+/// Least fit at rest of lidar alone, relative to any other motion. A lower one would hold back a robot that pulls away.
+constexpr double kAsGoodAtRest = 0.998;
 
 /// Conditions to start a standstill: the twist is slow for kSlowFor and known to kSlowDoubt times the limit for slow.
 constexpr double kSlowDoubt = 4.0;
@@ -52,6 +54,13 @@ Matrix6 share_of_map(double fresh, const Matrix6& observability) {
   const Matrix6 unconstrained = (constrained * constrained + all).inverse();
   const double share = 2.0 * fresh / (1.0 + fresh);
   return share * all + (1.0 - share) * unconstrained;
+}
+
+/// Tells whether a twist of zero is within three standard deviations of the prediction.
+bool may_rest(const MotionFilter& prediction) {
+  constexpr double kSigmas = 3.0, kLeast = 1e-3; // m/s, rad/s
+  const Vector6 sigma = prediction.covariance().diagonal().tail<6>().cwiseSqrt();
+  return (prediction.twist_base().array().abs() < kSigmas * sigma.array() + kLeast).all();
 }
 
 } // namespace
@@ -334,6 +343,16 @@ std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Hypoth
   return std::nullopt;
 }
 
+/// Tells whether a standstill is likelier than a motion. Where sources measure the motion, the odds are those of the
+/// points, of what the sources measure, and Occam's factor of the motion that a standstill spares.
+bool Odometry::is_likelier(const Registration& at_rest, const Hypothesis& moving) const {
+  if (!moving.choice.rotation && !moving.choice.translation)
+    return fit_of(at_rest) > kAsGoodAtRest * fit_of(moving.fit);
+  return evidence(at_rest, moving.fit) + moving.filter.surprise(moving.fit) - moving.filter.surprise_at_rest() +
+             (stands_ ? kStaysAtRest : 0.0) >
+         0.0;
+}
+
 /// Returns the likeliest hypothesis for a sweep.
 Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopRequested& stop) {
   Hypothesis best = attempt(sweep, {}, stop);
@@ -351,10 +370,7 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
   if (!slow)
     slow_since_ = sweep.end;
   if (may_rest(best.filter) && (stands_ || sweep.end - slow_since_ >= kSlowFor)) {
-    if (Hypothesis rest = attempt(sweep, {.without = best.without, .rests = true}, stop);
-        evidence(rest.fit, best.fit) + best.filter.surprise(best.fit) - best.filter.surprise_at_rest() +
-            (stands_ ? kMovesOff : 0.0) >
-        0.0) {
+    if (Hypothesis rest = attempt(sweep, {.without = best.without, .rests = true}, stop); is_likelier(rest.fit, best)) {
       rest.filter.set_pose(filter_.pose());
       best = rest;
     }

@@ -126,6 +126,7 @@ class Odometry {
   void register_with(const Sweep& sweep, Hypothesis& hypothesis, const Gicp::StopRequested& stop);
   [[nodiscard]] static std::optional<SpecificForce> force_of(const Sweep& sweep, std::bitset<kMaxSources> without);
   [[nodiscard]] double odds_of_sources(const Sweep& sweep, std::bitset<kMaxSources> without) const;
+  [[nodiscard]] bool is_likelier(const Registration& at_rest, const Hypothesis& moving) const;
   std::optional<Registration> consider_faults(const Sweep& sweep, Hypothesis& best, const Gicp::StopRequested& stop);
   Hypothesis attempt(const Sweep& sweep, const Assumption& assumption, const Gicp::StopRequested& stop);
   Hypothesis choose(const Sweep& sweep, const Gicp::StopRequested& stop);

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "core/odometry/odometry.hpp"
-#include "core/odometry/rest.hpp"
 
 namespace locus {
 
@@ -196,7 +195,7 @@ Odometry::Start Odometry::start_without(std::bitset<kMaxSources> without, const 
     if (difference(T_odom_base, T_before).cwiseAbs().maxCoeff() < kAgrees || stop())
       break;
   }
-  if (may_rest(unknown) && evidence(rest, start.fit) > -kBeginsAtRest)
+  if (evidence(rest, start.fit) > -kBeginsAtRest)
     start = {.without = kAllSources, .rests = true, .twist_base = Vector6::Zero(), .fit = rest};
   return start;
 }
