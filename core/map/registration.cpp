@@ -41,7 +41,7 @@ constexpr double kBestFit = 0.3; ///< mean squared Mahalanobis distance
 /// with unmapped space as long as 20 standard deviations of a surface (1 m and 5 cm).
 constexpr double kUnmapped = 4.2;
 /// Odds, as twice their logarithm, that an object is where the map has it: one of twenty has moved.
-constexpr double kObjectMoved = 6.0;
+constexpr double kObjectIsStatic = 6.0;
 double honest_share(double mean_error) { return kIndependent / std::max(kBestFit, mean_error); }
 
 /// Noise floor of the normal products (2 sigma): products of as many independent errors reach it by chance. Subtracted
@@ -282,8 +282,8 @@ namespace {
 double weigh_objects(const Registration& one, const Registration& other, double share) {
   double sum = 0.0;
   for (std::size_t i = 0; i < kObjects; ++i)
-    sum += std::clamp(share * static_cast<double>(other.object_costs[i] - one.object_costs[i]), -kObjectMoved,
-                      kObjectMoved);
+    sum += std::clamp(share * static_cast<double>(other.object_costs[i] - one.object_costs[i]), -kObjectIsStatic,
+                      kObjectIsStatic);
   return sum;
 }
 

@@ -407,9 +407,9 @@ std::optional<Odometry::Contradiction> Odometry::worst_source(const Sweep& sweep
     for (int axis = 0; axis < 6; ++axis) {
       if (found.variance[axis] <= 0.0)
         continue;
-      const double evidence = found.value[axis] * found.value[axis] / found.variance[axis] - fault;
-      if (evidence > (worst ? worst->evidence : 0.0))
-        worst = {index_of(*source), evidence};
+      const double excess = found.value[axis] * found.value[axis] / found.variance[axis] - fault;
+      if (excess > (worst ? worst->evidence : 0.0))
+        worst = {index_of(*source), excess};
     }
   }
   return worst;
