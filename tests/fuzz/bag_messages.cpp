@@ -18,8 +18,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     break;
   default:
     const tools::PacketType& type = tools::packet_types()[(kind / 2U - 2U) % tools::packet_types().size()];
-    if (const auto packets = type.read(reader))
-      fuzz::demand(packets->packets.size() * 8 + packets->bytes.size() <= size); // each after its stamp
+    if (const auto packets = type.read(reader)) // each has a stamp, or a length of 4 bytes
+      fuzz::demand(packets->packets.size() * 4 + packets->bytes.size() <= size);
   }
   return 0;
 }
