@@ -360,7 +360,7 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
   flat_ground_.observe(sweep.end, gravity_.up_base());
   if (sweep.points.size() < kMinPoints)
     return best;
-  const Hypothesis first = best;
+  Hypothesis first = best;
   const std::optional<Registration> lidar_alone = consider_faults(sweep, best, stop);
   MotionFilter after = best.filter;
   after.update(best.fit.T_target_source, best.fit.twist_base, best.fit.information);

@@ -154,7 +154,7 @@ Eigen::Vector3d MotionTrack::force_noise_per_s(Stamp to) const {
     squares += (from_newest(age).specific_force_base_mps2 - 2.0 * from_newest(age + 1).specific_force_base_mps2 +
                 from_newest(age + 2).specific_force_base_mps2)
                    .cwiseAbs2();
-  const double count = static_cast<double>(age - newest);
+  const auto count = static_cast<double>(age - newest);
   if (count == 0.0)
     return Eigen::Vector3d::Zero();
   const double spacing_s = to_seconds(from_newest(newest).stamp - from_newest(age + 1).stamp) / (count + 1.0);

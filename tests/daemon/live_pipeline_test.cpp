@@ -91,7 +91,7 @@ class SilentInput : public InputSource {
 std::optional<ProcessedSweep> next_estimate(LivePipeline& pipeline) {
   const Duration give_up = read_clock(CLOCK_MONOTONIC) + test::patience();
   while (!pipeline.finished() && read_clock(CLOCK_MONOTONIC) < give_up)
-    if (const auto done = pipeline.next(milliseconds{100}))
+    if (auto done = pipeline.next(milliseconds{100}))
       return done;
   return std::nullopt;
 }

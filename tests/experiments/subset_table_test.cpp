@@ -189,8 +189,8 @@ TEST(SubsetTable, ThePageHasEveryPartAndTheVerdict) {
   })));
   for (const char* const line :
        {"`locus-experiments --subsets --only \"plant/real\" --duration 80 --seeds 1`, version 1, a machine. ",
-        "| plant/real 1 | 360 | 100 | 300 | 2.0 | 100 % | lidar and IMU | 20.0 | 5.00 | **broken**: 5.00 x lidar and "
-        "IMU |\n",
+        ("| plant/real 1 | 360 | 100 | 300 | 2.0 | 100 % | lidar and IMU | 20.0 | 5.00 | **broken**: 5.00 x lidar and "
+         "IMU |\n"),
         "| plant/real 1 | 360 | all (not sound) | 100 | 300 | 2.0 | 100 % |\n",
         "| plant/real 1 | 360 | **lidar and IMU** | 20.0 | 60.0 | 2.0 | 100 % |\n",
         "| plant/real 1 | 360 | lidar | 50.0 | 150 | 2.0 | 25 % |\n",

@@ -97,7 +97,7 @@ class Metrics : public RobotNetwork {
   }
 
   /// Metrics between two statuses with equal input counters.
-  struct Told {
+  struct Told { // NOLINT(bugprone-exception-escape): the destructor of nlohmann::json may allocate
     nlohmann::json before, after;
     OpenMetrics metrics;
   };

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
+#include <new>
 
 #include <dlfcn.h>
 #include <poll.h>
@@ -109,7 +110,8 @@ int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*
   static auto* const kNext = next<int(pthread_t*, const pthread_attr_t*, void* (*)(void*), void*)>("pthread_create");
   if (calls_per_delay() == 0)
     return kNext(thread, attributes, run, argument);
-  return kNext(thread, attributes, run_later, new Thread{run, argument}); // freed by run_later()
+  auto* const later = new (std::nothrow) Thread{run, argument}; // freed by run_later()
+  return later != nullptr ? kNext(thread, attributes, run_later, later) : EAGAIN;
 }
 
 } // extern "C"

@@ -25,7 +25,7 @@ std::vector<double> values_of(const Pairs& pairs, const Figure& figure) {
 double ape_m(const Results& run) { return run.at("summary").at("ape_m").at("mean"); }
 double difference_m(const Pair& pair) { return with_m(pair) - without_m(pair); }
 double added_m(const Pair& pair) { return pair.with->at("fault").at("added_m"); }
-double share_flagged(const Pair& pair) { return pair.with->at("fault").at("told"); }
+double flagged_share(const Pair& pair) { return pair.with->at("fault").at("told"); }
 
 std::string mm(double metres) { return fmt::format("{:.1f} mm", 1e3 * metres); }
 
@@ -37,7 +37,7 @@ Verdict accurate(const Pairs& pairs, double limit_m) {
 Verdict honest(const Pairs& pairs) {
   const double sigmas = largest(pairs, worst_sigma);
   return Verdict{fmt::format("<= {} sigma", kHonestSigmas),
-                 fmt::format("{:.0f} % flagged, {:.1f} sigma", 100 * median(pairs, share_flagged), sigmas),
+                 fmt::format("{:.0f} % flagged, {:.1f} sigma", 100 * median(pairs, flagged_share), sigmas),
                  {}}
       .expect(sigmas <= kHonestSigmas, "farther off than its covariance says");
 }
@@ -60,7 +60,7 @@ Verdict unharmed(const Pairs& pairs, double limit) {
 Verdict unharmed_or_flagged(const Pairs& pairs, double limit) {
   const Verdict error = unharmed(pairs, limit);
   Verdict either =
-      both(error, honest(pairs).expect(median(pairs, share_flagged) > 0, "not flagged"), ", or flagged and ");
+      both(error, honest(pairs).expect(median(pairs, flagged_share) > 0, "not flagged"), ", or flagged and ");
   if (error.broken.empty() || either.broken.size() == error.broken.size())
     either.broken.clear();
   return either;

@@ -149,7 +149,7 @@ std::string subset_lines(const Results& row) {
   for (const Results& subset : row.at("subsets")) {
     auto name = subset.at("subset").get<std::string>();
     if (row.at("best") == name)
-      name = "**" + name + "**";
+      name.insert(0, "**").append("**");
     if (!subset.at("sound").get<bool>())
       name += " (not sound)";
     const std::string figures =

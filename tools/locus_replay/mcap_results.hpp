@@ -35,7 +35,7 @@ class McapResults {
   void close() { writer_.close(); }
 
  private:
-  template <class Message> std::uint16_t add_topic(const std::string& name);
+  template <class Message> std::uint16_t add_topic(const std::string& topic);
   template <class Message> void write(std::uint16_t channel, Stamp stamp, const Message& message);
   void write_mountings(Stamp stamp);
 

@@ -96,7 +96,9 @@ TEST(PositionPacket, RmcIsFoundBetweenOtherSentences) {
                     gga = with_checksum("GPGGA,220243,3708.5,N,12139.7,W,1,8,0.9,50,M,,,,");
   for (const std::string& before : {rest, gga, rest + gga, std::string{"$"}, std::string{"$GPRM"}})
     for (const std::string& after : {std::string{}, gga, std::string{"$GPRMC,2202"}})
-      EXPECT_TRUE(parse_position_packet(packet(2, before + kSentence + after)).is_synchronised()) << before << after;
+      EXPECT_TRUE(
+          parse_position_packet(packet(2, std::string{before}.append(kSentence).append(after))).is_synchronised())
+          << before << after;
 }
 
 TEST(PositionPacket, UnusedLockedPpsHasAReason) {
