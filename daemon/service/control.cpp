@@ -20,7 +20,7 @@
 #include <unistd.h>
 
 #include "daemon/machine_time.hpp"
-#include "daemon/service/unix_socket.hpp"
+#include "daemon/unix_socket.hpp"
 
 namespace locus::daemon {
 
