@@ -63,6 +63,8 @@ Expected<ControlRequest, std::string> parse_control_request(std::string_view mes
       return ControlRequest{ShowStatus{request.value("text", false)}};
     if (command == "save-map")
       return ControlRequest{SaveMap{}};
+    if (command == "view")
+      return ControlRequest{ShowSweep{}};
     if (command == "flat-ground")
       return parse_flat_ground(request);
     if (command == "reset")

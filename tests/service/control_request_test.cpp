@@ -33,6 +33,7 @@ TEST(ControlRequest, ParsesWhatLocusctlSends) {
   EXPECT_FALSE(std::get<ShowStatus>(*parse_control_request(R"({"command": "status"})")).as_text);
   EXPECT_TRUE(std::get<ShowStatus>(*parse_control_request(R"({"command": "status", "text": true})")).as_text);
   EXPECT_TRUE(is(R"({"command": "save-map", "more": 1})", SaveMap{}));
+  EXPECT_TRUE(is(R"({"command": "view"})", ShowSweep{}));
   EXPECT_TRUE(is(R"({"command": "reload"})", Reload{}));
   const auto keep = parse_control_request(R"({"command": "record", "keep_s": 60})");
   ASSERT_TRUE(keep);
