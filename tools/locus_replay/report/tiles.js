@@ -56,7 +56,19 @@ const kTileShader = {
 };
 
 /** Draws one square in many instances. Back faces are translucent, so that rooms can be viewed from outside. */
-export function makeTiles({tile_m, centres, normals}, {low, high}) {
+class Tiles extends THREE.Mesh {
+  setSide(tile_m) {
+    this.material.uniforms.side.value = kOverlap * tile_m;
+  }
+
+  /** Sets the heights of the first and the last colour. */
+  setHeights({low, high}) {
+    this.material.uniforms.low.value = low;
+    this.material.uniforms.high.value = high;
+  }
+}
+
+export function makeTiles({tile_m, centres, normals}, heights) {
   const geometry = new THREE.InstancedBufferGeometry();
   const corners = [-0.5, -0.5, 0, 0.5, -0.5, 0, 0.5, 0.5, 0, -0.5, 0.5, 0];
   geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(corners), 3));
@@ -68,15 +80,17 @@ export function makeTiles({tile_m, centres, normals}, {low, high}) {
     fragmentShader: kTileShader.fragment,
     side: THREE.DoubleSide,
     uniforms: {
-      side: {value: kOverlap * tile_m},
+      side: {value: 0},
       floor_tint: {value: new THREE.Color()},
-      low: {value: low},
-      high: {value: high},
+      low: {value: 0},
+      high: {value: 1},
       ramp: {value: rampTexture()}
     },
   });
-  const tiles = new THREE.Mesh(geometry, material);
+  const tiles = new Tiles(geometry, material);
   tiles.frustumCulled = false;  // bounds of the single square do not apply
+  tiles.setSide(tile_m);
+  tiles.setHeights(heights);
   return tiles;
 }
 
