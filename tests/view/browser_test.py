@@ -87,6 +87,7 @@ class View(unittest.TestCase):
             browser.wait_until(lambda: float(self.figure(browser, "Path").split()[0] or 0) > 5)
             self.assertGreater(float(self.figure(browser, "Position, m").split()[0]), 4)
             self.assertGreater(float(self.figure(browser, "Sweeps per second")), 0)
+            self.assertIn("not shown here", self.text(browser, "#key-figures"))
             self.assertIn("VLP-16", self.text(browser, "#lidars"))
             for source in "wio", "imu":
                 self.assertIn(source, self.text(browser, "#sources"))

@@ -124,6 +124,7 @@ class LiveMap extends SpaceView {
   /** Updates after a change of the page's size or colours. */
   refresh() {
     this.resize();
+    if (this.fits && !this.bounds.isEmpty()) this.look();
     this.tiles.material.uniforms.floor_tint.value.set(colour("wall"));
     this.sweep.material.color.set(colour("sweep"));
     this.robot.material.color.set(colour("ink"));

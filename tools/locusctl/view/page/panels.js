@@ -54,7 +54,7 @@ function keyFigures(live) {
     {
       name: "Sweeps per second",
       value: fixed(status.rate_hz, 1),
-      detail: `last ${seconds(status.age_ms)} ago`,
+      detail: `last ${seconds(status.age_ms)} ago; ${count(unseen)} not shown here`,
       warning: !(status.age_ms < kLate_ms)
     },
     {name: "Per sweep", value: `${written(process_ms.p50)} ms`, detail: `99 % within ${written(process_ms.p99)} ms`},
@@ -70,7 +70,6 @@ function keyFigures(live) {
       detail: "sweeps; the prediction stands",
       warning: sweeps.failed > 0
     },
-    {name: "Not shown", value: count(unseen), detail: "sweeps, by this page only"},
   ];
 }
 
