@@ -128,6 +128,16 @@ class ControlServerTest : public testing::Test {
   std::optional<ControlServer> server_;
 };
 
+TEST_F(ControlServerTest, SweepsAreForPrivilegedClientsOnly) {
+  if (geteuid() != 0)
+    GTEST_SKIP() << "no second user to be: run as root";
+  const Descriptor stranger = connected_stranger();
+  say(stranger, R"({"command": "view"})");
+  server_->serve();
+  EXPECT_TRUE(contains(answer(stranger).value_or(""), "not permitted"));
+  EXPECT_EQ(handled_, 0);
+}
+
 /// The caller of serve() pauses after it, so that requests cost at most this many answers per round.
 TEST_F(ControlServerTest, AnswersEachOfSixteenClientsOncePerRound) {
   std::vector<Descriptor> clients;

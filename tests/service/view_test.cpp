@@ -1,9 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hand-over of sweeps to a viewer.
+// Hand-over of sweeps to a viewer, and the command that serves them to a browser.
+#include <array>
+#include <csignal>
 #include <cstdint>
+#include <functional>
 #include <optional>
+#include <string>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <sys/socket.h>
 
 #include "core/base/surface_point.hpp"
+#include "daemon/descriptor.hpp"
+#include "drivers/net/socket_address.hpp"
 #include "locusctl/service_client.hpp"
 #include "service/robot_network.hpp"
 
@@ -64,6 +74,45 @@ TEST_F(View, BeforeTheFirstSweepTheStatusIsHandedOutAlone) {
   EXPECT_EQ(answer.json["status"]["state"], "waiting");
   EXPECT_FALSE(answer.json.contains("sweep"));
   EXPECT_TRUE(answer.bytes.empty());
+}
+
+/// Returns the answer of the command's server.
+std::string get(std::string_view target, std::string_view host = "127.0.0.1:8042") {
+  const auto address = parse_socket_address("127.0.0.1:8042");
+  const daemon::Descriptor client{::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)};
+  EXPECT_EQ(connect(client.number(), reinterpret_cast<const sockaddr*>(&address->storage), address->size), 0);
+  const std::string request = fmt::format("GET {} HTTP/1.1\r\nHost: {}\r\n\r\n", target, host);
+  EXPECT_GT(::send(client.number(), request.data(), request.size(), MSG_NOSIGNAL), 0);
+  std::string all;
+  std::array<char, 65536> bytes{};
+  for (ssize_t size = 0; (size = recv(client.number(), bytes.data(), bytes.size(), 0)) > 0;)
+    all.append(bytes.data(), static_cast<std::size_t>(size));
+  return all;
+}
+
+TEST_F(View, CommandServesThePageAndTheDriveUntilItIsInterrupted) {
+  ASSERT_NO_FATAL_FAILURE(drive());
+  Child view({LOCUSCTL, "--socket", control().string(), "view"});
+  ASSERT_TRUE(view.wait_for_line("http://127.0.0.1:8042/")) << testing::PrintToString(view.lines());
+  EXPECT_NE(get("/").find("</html>"), std::string::npos);
+  EXPECT_TRUE(comes_true([] {
+    const std::string answer = get("/live?epoch=0");
+    return answer.find("\"state\":\"tracking\"") != std::string::npos &&
+           answer.find("\"tiles\":{\"from\":0,\"count\":0") == std::string::npos;
+  }));
+  EXPECT_TRUE(get("/live", "evil.example").starts_with("HTTP/1.1 403 "));
+  view.signal(SIGINT);
+  EXPECT_EQ(view.wait_for_exit(), 128 + SIGINT);
+}
+
+TEST_F(View, PortIsOfTheLoopbackInterfaceOnly) {
+  if (!add_interfaces())
+    GTEST_SKIP() << "no pair of interfaces";
+  const Child view({LOCUSCTL, "--socket", control().string(), "view"});
+  ASSERT_TRUE(view.wait_for_line("http://127.0.0.1:8042/"));
+  const auto address = parse_socket_address("10.7.0.1:8042");
+  const daemon::Descriptor client{::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)};
+  EXPECT_NE(connect(client.number(), reinterpret_cast<const sockaddr*>(&address->storage), address->size), 0);
 }
 
 } // namespace

@@ -111,7 +111,7 @@ class LiveMap extends SpaceView {
     this.describe(heights);
     const box = boundsOf(sample).expandByPoint(this.robot.position);
     if (!this.fits || this.bounds.containsBox(box)) return;
-    this.bounds = box.expandByScalar(0.05 * box.getSize(new THREE.Vector3()).length());
+    this.bounds = box.expandByScalar(0.02 * box.getSize(new THREE.Vector3()).length());
     this.look();
   }
 
