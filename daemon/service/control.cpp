@@ -20,7 +20,7 @@
 #include <unistd.h>
 
 #include "daemon/machine_time.hpp"
-#include "daemon/service/unix_socket.hpp"
+#include "daemon/unix_socket.hpp"
 
 namespace locus::daemon {
 
@@ -63,6 +63,8 @@ Expected<ControlRequest, std::string> parse_control_request(std::string_view mes
       return ControlRequest{ShowStatus{request.value("text", false)}};
     if (command == "save-map")
       return ControlRequest{SaveMap{}};
+    if (command == "view")
+      return ControlRequest{ShowSweep{}};
     if (command == "flat-ground")
       return parse_flat_ground(request);
     if (command == "reset")

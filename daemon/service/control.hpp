@@ -28,6 +28,7 @@ struct ShowStatus {
   bool as_text = false; ///< formatted text; otherwise JSON
 };
 struct SaveMap {};
+struct ShowSweep {}; ///< status and newest sweep, for a viewer
 struct SetFlatGround {
   FlatGround mode;
 };
@@ -38,12 +39,13 @@ struct Reload {};
 struct StoreIncident {
   double keep_s; ///< length of the input to store, up to now
 };
-using ControlRequest = std::variant<ShowStatus, SaveMap, SetFlatGround, Reset, Reload, StoreIncident>;
+using ControlRequest = std::variant<ShowStatus, SaveMap, ShowSweep, SetFlatGround, Reset, Reload, StoreIncident>;
 
-/// Parses one message of arbitrary bytes: {"command": "save-map" | "reload"}, {"command": "status"} with "text": true
-/// for an answer {"text": "..."}, {"command": "flat-ground", "mode": "on" | "off" | "auto"}, {"command": "record",
-/// "keep_s": 60} for an answer {"folder": "..."}, whose progress the status reports, {"command": "reset"} with an
-/// optional "pose": [x, y, z, roll, pitch, yaw] in metres and degrees. Fails with one line for the user. Any thread.
+/// Parses one message of arbitrary bytes: {"command": "save-map" | "view" | "reload"}, {"command": "status"} with
+/// "text": true for an answer {"text": "..."}, {"command": "flat-ground", "mode": "on" | "off" | "auto"}, {"command":
+/// "record", "keep_s": 60} for an answer {"folder": "..."}, whose progress the status reports, {"command": "reset"}
+/// with an optional "pose": [x, y, z, roll, pitch, yaw] in metres and degrees. Fails with one line for the user. Any
+/// thread.
 Expected<ControlRequest, std::string> parse_control_request(std::string_view message);
 
 /// Server for locusctl: a Unix socket on which each message is one JSON request or answer.

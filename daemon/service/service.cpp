@@ -335,6 +335,23 @@ std::optional<ControlServer::Answer> Service::answer(SaveMap /*request*/) {
   return ControlServer::Answer{{{"points", points->size()}}, {bytes.begin(), bytes.end()}};
 }
 
+/// Returns the status and the newest sweep with its points in their memory layout.
+std::optional<ControlServer::Answer> Service::answer(ShowSweep /*request*/) {
+  ControlServer::Answer answer{{{"status", to_json(session_->figures())}}, {}};
+  const Session::ViewedSweep* const sweep = session_->view();
+  if (sweep == nullptr)
+    return answer;
+  const Pose& T = sweep->T_odom_base;
+  answer.json["sweep"] = {{"run", to_ns(sweep->run_began)},
+                          {"sequence", sweep->sequence},
+                          {"t_ns", to_ns(sweep->stamp)},
+                          {"xyz_m", {T.translation.x(), T.translation.y(), T.translation.z()}},
+                          {"quaternion_xyzw", {T.rotation.x(), T.rotation.y(), T.rotation.z(), T.rotation.w()}}};
+  const auto bytes = std::as_bytes(std::span(sweep->points));
+  answer.bytes.assign(bytes.begin(), bytes.end());
+  return answer;
+}
+
 void Service::supervise() {
   if (!session_)
     return;

@@ -43,6 +43,7 @@ class Service {
   std::optional<ControlServer::Answer> answer(const ControlRequest& request);
   std::optional<ControlServer::Answer> answer(ShowStatus request);
   std::optional<ControlServer::Answer> answer(SaveMap request);
+  std::optional<ControlServer::Answer> answer(ShowSweep request);
   std::optional<ControlServer::Answer> answer(SetFlatGround request);
   std::optional<ControlServer::Answer> answer(const Reset& request);
   std::optional<ControlServer::Answer> answer(Reload request);

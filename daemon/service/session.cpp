@@ -87,6 +87,7 @@ void Session::begin(LidarRouter lidars) {
   options.after_estimate = [this](const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
     after_estimate(sweep, odometry, estimate);
   };
+  run_began_ = Stamp{read_clock(CLOCK_REALTIME)};
   InputSource& input = begin_recording();
   disk_.emplace(
       "disk", kDiskRound, [this](bool last) { write_to_disk(last); }, [] { set_lowest_priority(); });
@@ -179,6 +180,7 @@ void Session::after_estimate(const Sweep& sweep, const Odometry& odometry, const
   if (estimate.beginning)
     start_.reset();
   clouds_.submit(sweep, odometry, estimate);
+  hand_to_viewer(sweep, odometry, estimate);
   state_saver_.update(odometry, estimate, flat_ground());
   const std::uint64_t wanted = map_requests_.load(std::memory_order_relaxed);
   if (wanted == map_delivered_)
@@ -187,6 +189,27 @@ void Session::after_estimate(const Sweep& sweep, const Odometry& odometry, const
   map_.back().request = wanted;
   read_planes(odometry.map().fine(), map_.back().points);
   static_cast<void>(map_.publish());
+}
+
+/// Copies the points only while a viewer asks for them.
+void Session::hand_to_viewer(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate) {
+  if (read_clock(CLOCK_MONOTONIC) > viewed_until_.load(std::memory_order_relaxed))
+    return;
+  ViewedSweep& next = viewed_.back();
+  next.run_began = run_began_;
+  next.sequence = sweep.sequence;
+  next.stamp = estimate.stamp;
+  next.T_odom_base = estimate.T_odom_base;
+  next.points.assign(odometry.scan().begin(), odometry.scan().end());
+  static_cast<void>(viewed_.publish());
+}
+
+const Session::ViewedSweep* Session::view() {
+  constexpr Duration kInterest = std::chrono::seconds{1};
+  viewed_until_.store(read_clock(CLOCK_MONOTONIC) + kInterest, std::memory_order_relaxed);
+  if (const ViewedSweep* const next = viewed_.poll())
+    last_viewed_ = next;
+  return last_viewed_;
 }
 
 const std::vector<SurfacePoint>* Session::poll_map() {

@@ -66,6 +66,18 @@ class Session {
   void request_map() { map_requests_.fetch_add(1, std::memory_order_relaxed); }
   [[nodiscard]] const std::vector<SurfacePoint>* poll_map();
 
+  /// A processed sweep, for a viewer.
+  struct ViewedSweep {
+    Stamp run_began;            ///< wall clock; another value marks another odom frame or an empty map
+    std::uint64_t sequence = 0; ///< Sweep::sequence
+    Stamp stamp;                ///< wall clock
+    Pose T_odom_base;
+    std::vector<SurfacePoint> points; ///< Odometry::scan()
+  };
+  /// Has the odometry thread hand over each sweep of the next second, and returns the newest, or nullptr before the
+  /// first one; valid until the next call.
+  [[nodiscard]] const ViewedSweep* view();
+
   void set_flat_ground(FlatGround mode);
   [[nodiscard]] FlatGround flat_ground() const { return flat_ground_.load(std::memory_order_relaxed); }
 
@@ -79,6 +91,7 @@ class Session {
   [[nodiscard]] bool stores_incidents() const;
   void write_to_disk(bool last_round);
   void end();
+  void hand_to_viewer(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate);
   void after_estimate(const Sweep& sweep, const Odometry& odometry, const OdometryEstimate& estimate);
   void receive(const RosInput& input);
   void receive(std::uint8_t lidar, Stamp arrival, const SerialisedSample& cloud);
@@ -122,6 +135,10 @@ class Session {
   std::atomic<std::uint64_t> map_requests_{0}; ///< number of the last request
   std::uint64_t map_delivered_ = 0;            ///< last answered request; owned by the odometry thread
   LatestSlot<Map> map_;
+  Stamp run_began_;                        ///< written while no odometry thread runs
+  std::atomic<Duration> viewed_until_{{}}; ///< CLOCK_MONOTONIC
+  LatestSlot<ViewedSweep> viewed_;
+  const ViewedSweep* last_viewed_ = nullptr; ///< last value of viewed_; owned by the caller of view()
   RosLink link_;
   CloudPublisher clouds_;
   std::optional<SavedState> start_; ///< initial state, until the first estimate

@@ -6,7 +6,7 @@ export NODE_PATH=/usr/share/nodejs:/usr/share/javascript
 work=$(mktemp -d)
 trap 'rm -r "$work"' EXIT
 status=0
-for page in tools/locus_replay/report tools/locus_experiments/page; do
+for page in tools/locus_replay/report tools/locus_experiments/page tools/locusctl/view/page; do
   esbuild "$page/main.js" --bundle --metafile="$work/meta.json" --outfile="$work/bundle.js" --log-level=warning
   libraries=$(grep -oP 'usr/share/(nodejs|javascript)/\K[^/"]+' "$work/meta.json" | sort -u)
   [ -n "$libraries" ] || { echo "$page: bundles nothing; is this check out of date?"; exit 1; }

@@ -323,7 +323,7 @@ def connection(number, topic, kind):
     return record(7, text(b"topic=" + topic) + text(b"type=" + kind), conn=struct.pack("<I", number), topic=topic)
 
 
-for name, request in (("status", '{"command": "status"}'), ("map", '{"command":"save-map"}'), ("reload", '{"command": "reload"}'),
+for name, request in (("status", '{"command": "status"}'), ("view", '{"command": "view"}'), ("map", '{"command":"save-map"}'), ("reload", '{"command": "reload"}'),
                       ("reset", '{"command": "reset"}'), ("there", '{"command": "reset", "pose": [1.5, -2e3, 0, 0, 0, 90]}'),
                       ("far", '{"pose": [1e300, 0, 0, 0, 0, 361], "command": "reset"}'), ("other", '{"command": "dan\\u0063e", "a": {"b": [null, true]}}'),
                       *((mode, f'{{"command": "flat-ground", "mode": "{mode}"}}') for mode in ("on", "off", "auto", "maybe"))):

@@ -26,7 +26,7 @@ expect() {
 for program in locusd locusctl locus-experiments locus-play locus-replay locus-sim; do
   expect "$("$program" --help | grep -oP '^  (-.,)?\K--[a-z-]+' | sort | xargs)" "$program" --
 done
-expect "calibration flat-ground record reload reset save-map sensors status" locusctl ""
+expect "calibration fetch flat-ground record reload reset save-map sensors status view" locusctl ""
 expect "save-map" locusctl --instance front sa
 expect "--help --instance --json --socket --watch" locusctl status --
 expect "auto off on" locusctl flat-ground ""

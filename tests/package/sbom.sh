@@ -32,9 +32,11 @@ for package in locusd locus-tools liblocus0; do
       complain "$sbom: lacks $header_only, which is compiled in"
   done
 done
-for script in libjs-three node-d3-scale; do
-  jq -e --arg id "SPDXRef-Package-$script" 'any(.relationships[]; .relationshipType == "CONTAINS" and
-    .relatedSpdxElement == $id)' "$work/locus-tools/usr/share/doc/locus-tools/locus-tools.spdx.json" >/dev/null ||
-    complain "locus-tools.spdx.json: does not contain $script, which the report is drawn with"
+for package in locusd locus-tools; do
+  for script in libjs-three node-d3-scale; do
+    jq -e --arg id "SPDXRef-Package-$script" 'any(.relationships[]; .relationshipType == "CONTAINS" and
+      .relatedSpdxElement == $id)' "$work/$package/usr/share/doc/$package/$package.spdx.json" >/dev/null ||
+      complain "$package.spdx.json: does not contain $script, which a page is drawn with"
+  done
 done
 exit $status

@@ -33,6 +33,7 @@ TEST(ControlRequest, ParsesWhatLocusctlSends) {
   EXPECT_FALSE(std::get<ShowStatus>(*parse_control_request(R"({"command": "status"})")).as_text);
   EXPECT_TRUE(std::get<ShowStatus>(*parse_control_request(R"({"command": "status", "text": true})")).as_text);
   EXPECT_TRUE(is(R"({"command": "save-map", "more": 1})", SaveMap{}));
+  EXPECT_TRUE(is(R"({"command": "view"})", ShowSweep{}));
   EXPECT_TRUE(is(R"({"command": "reload"})", Reload{}));
   const auto keep = parse_control_request(R"({"command": "record", "keep_s": 60})");
   ASSERT_TRUE(keep);
@@ -126,6 +127,16 @@ class ControlServerTest : public testing::Test {
   int handled_ = 0;
   std::optional<ControlServer> server_;
 };
+
+TEST_F(ControlServerTest, SweepsAreForPrivilegedClientsOnly) {
+  if (geteuid() != 0)
+    GTEST_SKIP() << "no second user to be: run as root";
+  const Descriptor stranger = connected_stranger();
+  say(stranger, R"({"command": "view"})");
+  server_->serve();
+  EXPECT_TRUE(contains(answer(stranger).value_or(""), "not permitted"));
+  EXPECT_EQ(handled_, 0);
+}
 
 /// The caller of serve() pauses after it, so that requests cost at most this many answers per round.
 TEST_F(ControlServerTest, AnswersEachOfSixteenClientsOncePerRound) {

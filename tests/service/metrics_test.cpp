@@ -374,8 +374,9 @@ TEST_F(Metrics, InvalidRequestsAreAnsweredWithTheError) {
   EXPECT_EQ(first_line("GET /metrics HTTP/2\r\n\r\n"), bad);
   EXPECT_EQ(first_line("\r\n\r\n"), bad);
   EXPECT_EQ(first_line(std::string(9, '\0') + "\xff\xfe \r\n\r\n"), bad);
-  EXPECT_EQ(first_line(std::string(4097, 'A')), bad);
-  EXPECT_EQ(first_line("GET /metrics HTTP/1.1\r\nCookie: " + std::string(4096, 'A')), bad);
+  EXPECT_EQ(first_line(std::string(daemon::HttpServer::kMaxRequestBytes + 1, 'A')), bad);
+  EXPECT_EQ(first_line("GET /metrics HTTP/1.1\r\nCookie: " + std::string(daemon::HttpServer::kMaxRequestBytes, 'A')),
+            bad);
   EXPECT_EQ(ask_for(kScrape).substr(0, 120).find("Content-Type: application/openmetrics-text; version=1.0.0; "
                                                  "charset=utf-8\r\n"),
             ok.size() + 2);
@@ -385,7 +386,7 @@ TEST_F(Metrics, SilentClientBlocksNoOther) {
   const Child daemon(locusd(listening()));
   ASSERT_TRUE(daemon.wait_for_line("metrics are served"));
   std::vector<Descriptor> silent;
-  for (std::size_t i = 0; i < daemon::MetricsServer::kMaxClients + 4; ++i) {
+  for (std::size_t i = 0; i < daemon::HttpServer::kMaxClients + 4; ++i) {
     silent.push_back(connect_to(kAddress));
     ASSERT_GE(silent.back().number(), 0) << i;
     say(silent.back(), "GET /metr");
@@ -469,7 +470,7 @@ TEST_F(MetricsServerTest, ServesSlowClientsWithinTheTimeout) {
   const Descriptor slow = client();
   for (const char letter : kScrape) {
     say(slow, {&letter, 1});
-    now_ += daemon::MetricsServer::kPatience / kScrape.size();
+    now_ += daemon::HttpServer::kPatience / kScrape.size();
     server_->serve();
   }
   EXPECT_TRUE(served(slow).ends_with("# EOF\n"));
@@ -477,7 +478,7 @@ TEST_F(MetricsServerTest, ServesSlowClientsWithinTheTimeout) {
 
 TEST_F(MetricsServerTest, DropsClientsSilentBeyondTheTimeout) {
   const Descriptor loris = client();
-  now_ += daemon::MetricsServer::kPatience;
+  now_ += daemon::HttpServer::kPatience;
   EXPECT_FALSE(server_->serve());
   EXPECT_TRUE(is_connected(loris));
   now_ += Duration{1};

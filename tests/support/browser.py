@@ -33,7 +33,7 @@ LOOK_AT_CANVAS = """
 
 
 class Browser:
-    """A page in its own window, closed at the end of a with statement."""
+    """A page, given by its path or address, in its own window, closed at the end of a with statement."""
 
     def __init__(self, page, width=1280, dark=False, webgl=True):
         self.profile = tempfile.mkdtemp(prefix="locus-browser-")
@@ -51,7 +51,7 @@ class Browser:
         self.driver.set_script_timeout(120)  # software rendering of the first page is slow on a busy processor
         self.set_size(width)
         self.set_dark(dark)
-        self.driver.get(f"file://{page}")
+        self.driver.get(page if "://" in page else f"file://{page}")
 
     def __enter__(self):
         return self

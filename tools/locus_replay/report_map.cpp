@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <unordered_set>
@@ -11,6 +12,7 @@
 #include <nettle/base64.h>
 
 #include "accuracy/voxel_key.hpp"
+#include "pages/octahedral.hpp"
 
 namespace locus::tools {
 namespace {
@@ -45,17 +47,6 @@ Eigen::Vector3f turned_to_viewer(const SurfacePoint& surface, std::span<const Ei
   return (nearest - surface.position_m).dot(surface.normal) < 0.0F ? -surface.normal : surface.normal;
 }
 
-/// Maps a unit normal to the octahedral square: the lower half of the octahedron is folded into the corners.
-Eigen::Vector2f octahedral(const Eigen::Vector3f& normal) {
-  const float reach = normal.lpNorm<1>();
-  if (!(reach > 0.0F))
-    return Eigen::Vector2f::Zero();
-  const float u = normal.x() / reach, v = normal.y() / reach;
-  if (normal.z() >= 0.0F)
-    return {u, v};
-  return {std::copysign(1.0F - std::abs(v), u), std::copysign(1.0F - std::abs(u), v)};
-}
-
 std::string base64(std::span<const std::uint8_t> bytes) {
   std::string text(BASE64_ENCODE_RAW_LENGTH(bytes.size()), '\0');
   base64_encode_raw(text.data(), bytes.size(), bytes.data());
@@ -66,10 +57,6 @@ void append_int16(std::vector<std::uint8_t>& bytes, float value) {
   const auto bits = static_cast<std::uint16_t>(static_cast<std::int16_t>(std::lround(value)));
   bytes.push_back(static_cast<std::uint8_t>(bits & 0xFFU));
   bytes.push_back(static_cast<std::uint8_t>(bits >> 8U));
-}
-
-void append_int8(std::vector<std::uint8_t>& bytes, float value) {
-  bytes.push_back(static_cast<std::uint8_t>(static_cast<std::int8_t>(std::lround(127.0F * value))));
 }
 
 /// Returns the plane of the coarse map that contains the point.
@@ -114,8 +101,7 @@ nlohmann::ordered_json map_tiles(std::span<const SurfacePoint> surfaces, std::sp
   for (const SurfacePoint& surface : tiles.surfaces) {
     for (const float steps : Eigen::Vector3f{(surface.position_m - origin) / step_m})
       append_int16(bytes, steps);
-    for (const float part : octahedral(turned_to_viewer(surface, viewpoints)))
-      append_int8(bytes, part);
+    std::ranges::copy(octahedral(turned_to_viewer(surface, viewpoints)), std::back_inserter(bytes));
   }
   return {{"tile_m", tiles.side_m},
           {"count", tiles.surfaces.size()},

@@ -3,6 +3,7 @@
 #include <charconv>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <functional>
 #include <span>
@@ -24,6 +25,7 @@
 #include "locusctl/screen.hpp"
 #include "locusctl/sensors.hpp"
 #include "locusctl/service_client.hpp"
+#include "locusctl/view/view_command.hpp"
 
 namespace locus::tools {
 namespace {
@@ -33,6 +35,7 @@ using Json = nlohmann::ordered_json;
 struct CtlArguments {
   std::string instance, socket, mode, address, file, keep;
   std::vector<double> pose;
+  std::uint16_t port = kViewPort;
   bool json = false, watch = false, yaml = false;
 
   [[nodiscard]] std::filesystem::path control() const {
@@ -123,6 +126,7 @@ std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
   app.footer("All commands except status, calibration, sensors and fetch require root or group locusd.\n"
              "Examples:\n"
              "  locusctl status --watch\n"
+             "  locusctl view\n"
              "  locusctl reset --pose 1,2,0,0,0,90\n"
              "  locusctl save-map map.pcd\n"
              "  locusctl record --keep 60s\n"
@@ -131,6 +135,12 @@ std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
   show->add_flag("--json", arguments.json, "Prints JSON, for programs");
   show->add_flag("--watch", arguments.watch, "Refreshes until q or Ctrl-C");
   show->callback([&] { action = [&] { status(arguments); }; });
+  CLI::App* const live = app.add_subcommand("view", "Shows the live robot in a browser: map, sweep, path, sources");
+  live->add_option("--port", arguments.port, "Port of 127.0.0.1 to serve the page at")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 65535));
+  live->callback([&] { action = [&] { view(arguments.control(), arguments.port); }; });
   CLI::App* const flat = app.add_subcommand("flat-ground", "Sets whether the ground is assumed level");
   const auto modes = names_of(FlatGround{});
   flat->add_option("MODE", arguments.mode, "on, off or auto")

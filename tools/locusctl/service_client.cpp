@@ -30,50 +30,6 @@ std::string remedy(const std::filesystem::path& socket, int error) {
   return fmt::format("start it with: systemctl start {0}; if it does not stay: journalctl -u {0}", unit);
 }
 
-class Connection {
- public:
-  Connection(const std::filesystem::path& path, std::chrono::seconds patience)
-      : socket_(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0)) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    path.native().copy(address.sun_path, sizeof(address.sun_path) - 1);
-    const timeval timeout{patience.count(), 0};
-    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof(timeout));
-    if (connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
-      throw Failure(ExitStatus::failed,
-                    fmt::format("{}: no service answers ({}); {}", path.string(), std::strerror(errno), // NOLINT
-                                remedy(path, errno)));
-  }
-  ~Connection() { close(socket_); }
-  Connection(const Connection&) = delete;
-  Connection& operator=(const Connection&) = delete;
-
-  void send(const std::string& text) const { ::send(socket_, text.data(), text.size(), MSG_NOSIGNAL); }
-
-  /// Returns the text, and the descriptor received with it or -1.
-  [[nodiscard]] std::pair<std::string, int> receive() const {
-    std::string text(kMaxAnswerBytes, '\0');
-    iovec vector{text.data(), text.size()};
-    alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control{};
-    msghdr message{};
-    message.msg_iov = &vector;
-    message.msg_iovlen = 1;
-    message.msg_control = control.data();
-    message.msg_controllen = control.size();
-    const ssize_t size = recvmsg(socket_, &message, MSG_CMSG_CLOEXEC);
-    if (size <= 0)
-      throw Failure(ExitStatus::failed, "the service does not answer; see: systemctl status locusd");
-    text.resize(static_cast<std::size_t>(size));
-    int descriptor = -1;
-    if (const cmsghdr* header = CMSG_FIRSTHDR(&message); header != nullptr && header->cmsg_type == SCM_RIGHTS)
-      std::memcpy(&descriptor, CMSG_DATA(header), sizeof(descriptor));
-    return {text, descriptor};
-  }
-
- private:
-  int socket_;
-};
-
 std::vector<std::byte> read_all(int descriptor) {
   const off_t size = lseek(descriptor, 0, SEEK_END);
   std::vector<std::byte> bytes(static_cast<std::size_t>(std::max<off_t>(size, 0)));
@@ -89,11 +45,30 @@ std::vector<std::byte> read_all(int descriptor) {
 
 } // namespace
 
-ServiceAnswer send_request(const std::filesystem::path& socket, const nlohmann::ordered_json& request) {
-  const bool answers_at_once = request.value("command", "") == "status";
-  const Connection connection(socket, answers_at_once ? std::chrono::seconds{5} : std::chrono::seconds{30});
-  connection.send(request.dump());
-  const auto [text, descriptor] = connection.receive();
+ServiceConnection::ServiceConnection(const std::filesystem::path& socket)
+    : socket_(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0)) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  socket.native().copy(address.sun_path, sizeof(address.sun_path) - 1);
+  if (connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0)
+    return;
+  const int error = errno;
+  close(socket_);
+  throw Failure(ExitStatus::failed,
+                fmt::format("{}: no service answers ({}); {}", socket.string(), std::strerror(error), // NOLINT
+                            remedy(socket, error)));
+}
+
+ServiceConnection::~ServiceConnection() { close(socket_); }
+
+ServiceAnswer ServiceConnection::request(const nlohmann::ordered_json& request) const {
+  const std::string command = request.value("command", "");
+  const bool answers_at_once = command == "status" || command == "view";
+  const timeval timeout{answers_at_once ? 5 : 30, 0};
+  setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof(timeout));
+  const std::string message = request.dump();
+  ::send(socket_, message.data(), message.size(), MSG_NOSIGNAL);
+  const auto [text, descriptor] = receive();
   ServiceAnswer answer{nlohmann::ordered_json::parse(text, nullptr, false), {}};
   if (descriptor >= 0)
     answer.bytes = read_all(descriptor);
@@ -103,6 +78,29 @@ ServiceAnswer send_request(const std::filesystem::path& socket, const nlohmann::
     throw Failure(answer.json.contains("wrong_usage") ? ExitStatus::wrong_usage : ExitStatus::failed,
                   answer.json["error"].get<std::string>());
   return answer;
+}
+
+std::pair<std::string, int> ServiceConnection::receive() const {
+  std::string text(kMaxAnswerBytes, '\0');
+  iovec vector{text.data(), text.size()};
+  alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(int))> control{};
+  msghdr message{};
+  message.msg_iov = &vector;
+  message.msg_iovlen = 1;
+  message.msg_control = control.data();
+  message.msg_controllen = control.size();
+  const ssize_t size = recvmsg(socket_, &message, MSG_CMSG_CLOEXEC);
+  if (size <= 0)
+    throw Failure(ExitStatus::failed, "the service does not answer; see: systemctl status locusd");
+  text.resize(static_cast<std::size_t>(size));
+  int descriptor = -1;
+  if (const cmsghdr* header = CMSG_FIRSTHDR(&message); header != nullptr && header->cmsg_type == SCM_RIGHTS)
+    std::memcpy(&descriptor, CMSG_DATA(header), sizeof(descriptor));
+  return {text, descriptor};
+}
+
+ServiceAnswer send_request(const std::filesystem::path& socket, const nlohmann::ordered_json& request) {
+  return ServiceConnection(socket).request(request);
 }
 
 } // namespace locus::tools

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Data of the run shown by this page, as embedded by locus-replay (report.cpp).
+import {unfolded} from "./octahedral.js";
 
 export const run = JSON.parse(document.getElementById("run").textContent);
 export const summary = run.summary;
@@ -21,13 +22,4 @@ function decode({tile_m, count, origin_m, step_m, data}) {
     normals.set(unfolded(view.getInt8(8 * i + 6) / 127, view.getInt8(8 * i + 7) / 127), 3 * i);
   }
   return {tile_m, count, centres, normals};
-}
-
-/** Decodes a normal from its octahedral coordinates. */
-function unfolded(u, v) {
-  const z = 1 - Math.abs(u) - Math.abs(v);
-  const x = z >= 0 ? u : (1 - Math.abs(v)) * (u < 0 ? -1 : 1);
-  const y = z >= 0 ? v : (1 - Math.abs(u)) * (v < 0 ? -1 : 1);
-  const length = Math.hypot(x, y, z);
-  return [x / length, y / length, z / length];
 }

@@ -7,29 +7,9 @@ import {select} from "d3-selection";
 import {legend} from "./drawing.js";
 import {count, figure as written} from "./format.js";
 import {run, summary} from "./run.js";
+import {mishap, table} from "./table.js";
 
 const words = (key) => key.replace(/_/g, " ");
-
-/** Builds a table. Each row is an array whose first cell is a heading. A cell may be {text, warning}. */
-function table(parent, head, rows) {
-  const element = parent.append("div").attr("class", "scroll").append("table");
-  element.append("thead").append("tr").selectAll("th").data(head).join("th").attr("scope", "col").text((cell) => cell);
-  const row = element.append("tbody").selectAll("tr").data(rows).join("tr");
-  row.each(function(cells) {
-    select(this)
-        .selectAll(null)
-        .data(cells)
-        .enter()
-        .append((_, i) => document.createElement(i === 0 ? "th" : "td"))
-        .attr("scope", (_, i) => (i === 0 ? "row" : null))
-        .attr("class", (cell) => (cell?.warning ? "warning" : null))
-        .text((cell) => cell?.text ?? cell);
-  });
-  return {head: element.select("thead tr"), rows: row};
-}
-
-/** Formats a count of anomalies: marked unless zero. */
-const mishap = (value) => (value > 0 ? {text: `▲ ${count(value)}`, warning: true} : count(value));
 
 export function stages(figure) {
   const drawing = figure.select(".drawing").html("");

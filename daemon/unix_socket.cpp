@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/service/unix_socket.hpp"
+#include "daemon/unix_socket.hpp"
 
 #include <cerrno>
 #include <system_error>
