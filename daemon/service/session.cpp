@@ -157,6 +157,8 @@ void Session::end() {
   if (publisher_.joinable())
     publisher_.join();
   pipeline_->stop();
+  while (const auto done = pipeline_->next(Duration::zero()))
+    publish(*done);
   disk_.reset();
 }
 
@@ -199,6 +201,7 @@ std::optional<std::string> Session::reset(std::optional<Pose> T_odom_base) {
   if (!lidars)
     return lidars.error();
   end();
+  log_.info("run ended: " + summary_line(figures()));
   start_.reset();
   if (state_saver_.last())
     calibration_ = {state_saver_.last()->learned, 0.0};
@@ -207,6 +210,7 @@ std::optional<std::string> Session::reset(std::optional<Pose> T_odom_base) {
   state_saver_.reset(start_);
   has_saved_map_ = announced_ = false;
   announcement_.reset();
+  collected_ = {};
   begin(std::move(*lidars));
   log_.info("odometry reset on request");
   return std::nullopt;

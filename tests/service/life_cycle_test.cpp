@@ -360,6 +360,7 @@ TEST_F(LifeCycle, ControlCommandsTakeEffect) {
   EXPECT_NE(read_text(file("map.pcd")).find("FIELDS x y z"), std::string::npos);
 
   EXPECT_EQ(ctl({"reset", "--pose", "100,50,0,0,0,90"}).status, 0);
+  EXPECT_TRUE(daemon.has_line("run ended: ")) << testing::PrintToString(daemon.lines());
   const json reset = status_when([](const json& s) { return s["sweeps"]["processed"] > 5; });
   constexpr double kRoom_m = 13; // the room's diagonal: the robot continues to drive
   EXPECT_NEAR(reset["pose"]["xyz_m"][0].get<double>(), 100, kRoom_m);
@@ -369,6 +370,14 @@ TEST_F(LifeCycle, ControlCommandsTakeEffect) {
   EXPECT_EQ(sensors.status, 0) << sensors.err;
   EXPECT_NE(sensors.out.find("VLP-16"), std::string::npos) << sensors.out;
   EXPECT_NE(sensors.out.find("port: 2368"), std::string::npos) << sensors.out;
+
+  daemon.signal(SIGTERM);
+  ASSERT_EQ(daemon.wait_for_exit(), 0);
+  const std::string last = daemon.lines().back();
+  EXPECT_TRUE(last.starts_with("locusd: stopped: ")) << last;
+  EXPECT_TRUE(last.find(" (wio); trajectory ") != std::string::npos ||
+              last.find(" (imu); trajectory ") != std::string::npos)
+      << last;
 }
 
 TEST_F(LifeCycle, ControlWithoutAServiceExplainsHowToStartIt) {
