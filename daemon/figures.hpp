@@ -203,6 +203,9 @@ struct Figures {
     std::array<std::uint64_t, kMaxLidars> cloud_drops{};            ///< see LiveInput; by lidar
     std::uint64_t unfetched = 0;                                    ///< see LivePipeline
     std::uint64_t unpublished = 0;                                  ///< estimates not accepted by DDS
+    /// How often the odometry started at the origin or at a given pose since the start of the process, rather than
+    /// where it was before; counted with its first estimate.
+    std::uint64_t resets = 0;
     LinkFigures link;
     std::optional<Recorder::Status> recording;
     std::optional<Incidents::Status> incidents; ///< empty if incidents are not stored

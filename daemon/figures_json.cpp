@@ -202,7 +202,8 @@ ordered_json live_json(const Figures& figures, const Figures::Live& live) {
                       {"flat_ground_messages", live.link.flat_ground_refused},
                       {"estimates_unfetched", live.unfetched},
                       {"estimates_unpublished", live.unpublished}}},
-                    {"restarts", builder.restarts}};
+                    {"restarts", builder.restarts},
+                    {"resets", live.resets}};
   if (const auto& recording = live.recording)
     json["recording"] = {
         {"run", recording->run.string()},  {"mb", rounded(1e-6 * static_cast<double>(recording->bytes))},

@@ -175,7 +175,7 @@ std::optional<std::string> Service::begin(const Config& config, std::optional<Sa
   if (incidents_)
     incidents_->set_max_bytes(config.record.incidents_bytes);
   Incidents* const incidents = incidents_ ? &*incidents_ : nullptr;
-  auto session = Session::start(config, inherited_, std::move(state), incidents, log_);
+  auto session = Session::start(config, inherited_, std::move(state), incidents, resets_, log_);
   if (!session)
     return session.error();
   session_ = std::move(*session);

@@ -40,7 +40,7 @@ std::filesystem::path record_folder(const std::filesystem::path& folder) {
 
 Expected<std::unique_ptr<Session>, std::string> Session::start(const Config& config, std::span<const int> inherited,
                                                                std::optional<SavedState> state, Incidents* incidents,
-                                                               Log& log) {
+                                                               std::atomic<std::uint64_t>& resets, Log& log) {
   auto lidars = LidarRouter::open(config.lidars);
   if (!lidars)
     return lidars.error();
@@ -48,14 +48,15 @@ Expected<std::unique_ptr<Session>, std::string> Session::start(const Config& con
   if (!sockets)
     return sockets.error();
   return std::unique_ptr<Session>(
-      new Session(config, std::move(*lidars), std::move(*sockets), std::move(state), incidents, log));
+      new Session(config, std::move(*lidars), std::move(*sockets), std::move(state), incidents, resets, log));
 }
 
 Session::Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket> sockets,
-                 std::optional<SavedState> state, Incidents* incidents, Log& log)
+                 std::optional<SavedState> state, Incidents* incidents, std::atomic<std::uint64_t>& resets, Log& log)
     : config_(config), log_(log), started_(MachineTime::now()),
       input_(std::move(sockets), publishes_clouds(config.lidars)),
       flat_ground_(state && state->is_recent ? state->flat_ground : config.odometry.flat_ground), incidents_(incidents),
+      resets_(resets),
       link_(
           config, [this](const RosInput& input) { receive(input); }, instance_name(),
           [this](std::uint8_t lidar, Stamp arrival, const SerialisedSample& cloud) { receive(lidar, arrival, cloud); }),
@@ -307,7 +308,8 @@ void Session::publish(const ProcessedSweep& done) {
   }
   if (estimate.beginning && !announced_)
     announce(estimate);
-  if (announcement_ && link_.publish_beginning(DiagnosticsMessage({*announcement_}, estimate.stamp)))
+  if (announcement_ && link_.publish_beginning(DiagnosticsMessage({*announcement_}, estimate.stamp),
+                                               resets_.load(std::memory_order_relaxed)))
     announcement_.reset();
   log_state(estimate.state);
 }
@@ -317,6 +319,8 @@ void Session::announce(const OdometryEstimate& estimate) {
   announced_ = true;
   const Beginning from = *estimate.beginning;
   const bool is_lost = has_saved_map_ && from != Beginning::map;
+  if (from == Beginning::origin || from == Beginning::told)
+    resets_.fetch_add(1, std::memory_order_relaxed);
   const std::string text =
       from == Beginning::map    ? "resumed from the saved state"
       : from == Beginning::told ? "started at the requested pose"
@@ -390,6 +394,7 @@ Figures Session::figures() const {
   for (std::size_t i = 0; i < config_.lidars.size(); ++i)
     live.cloud_drops[i] = input_.cloud_drops(i);
   live.unfetched = pipeline_->unfetched();
+  live.resets = resets_.load(std::memory_order_relaxed);
   live.link = link_.status();
   if (stores_incidents())
     live.incidents = incidents_->status();

@@ -118,6 +118,23 @@ TEST_F(LifeCycle, ResetPoseWithoutLidarOutlivesReloadAndRestart) {
   EXPECT_NEAR(starts_at_x(), 0, kNear_m);
 }
 
+TEST_F(LifeCycle, ResetsAreCountedForTheLifeOfTheProcess) {
+  Child daemon(locusd(config()));
+  Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
+  ASSERT_TRUE(hears_the_service(listener));
+  EXPECT_EQ(status()["resets"], 0) << "no estimate yet";
+  {
+    const Child play(endlessly(capture()));
+    status_when([](const json& s) { return s["resets"] == 1 && s["beginning"] == "origin"; });
+    ASSERT_EQ(ctl({"reset", "--pose", "100,0,0,0,0,0"}).status, 0);
+    status_when([](const json& s) { return s["resets"] == 2 && s["beginning"] == "told"; });
+  }
+  EXPECT_TRUE(listener.wait_for_line("resets 2"));
+  EXPECT_EQ(listener.lines_of("resets"), (std::vector<std::string>{"1", "2"}));
+  ASSERT_EQ(ctl({"reload"}).status, 0);
+  EXPECT_GE(status()["resets"], 2);
+}
+
 TEST_F(LifeCycle, ResetBeforeTheFirstSweepGivesNoWarningOfTheSavedState) {
   {
     Child daemon(locusd(config()));
