@@ -23,10 +23,10 @@ expect() {
   [ "$found" = "$wanted" ] || { echo "$*<TAB>: offers '$found', not '$wanted'"; status=1; }
 }
 
-for program in locusd locusctl locus-experiments locus-play locus-replay locus-sim; do
+for program in locusd locusctl locus-demo locus-experiments locus-play locus-replay locus-sim; do
   expect "$("$program" --help | grep -oP '^  (-.,)?\K--[a-z-]+' | sort | xargs)" "$program" --
 done
-expect "calibration flat-ground record reload reset save-map sensors status" locusctl ""
+expect "calibration fetch flat-ground record reload reset save-map sensors status" locusctl ""
 expect "save-map" locusctl --instance front sa
 expect "--help --instance --json --socket --watch" locusctl status --
 expect "auto off on" locusctl flat-ground ""
