@@ -2,7 +2,6 @@
 #include "config/config_yaml.hpp"
 
 #include <fmt/format.h>
-#include <nettle/sha2.h>
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
@@ -10,10 +9,12 @@
 #include <cctype>
 #include <fstream>
 #include <map>
+#include <span>
 #include <sstream>
 
 #include "config/config_fields.hpp"
 #include "config/mistyped.hpp"
+#include "config/sha256.hpp"
 #include "config/yaml_values.hpp"
 
 namespace locus {
@@ -439,12 +440,9 @@ std::string print_config(const Config& config) {
 
 std::string config_sha256(const Config& config) {
   const std::string text = print_config(config);
-  sha256_ctx context;
-  sha256_init(&context);
-  sha256_update(&context, text.size(), reinterpret_cast<const std::uint8_t*>(text.data()));
-  std::array<std::uint8_t, SHA256_DIGEST_SIZE> digest{};
-  sha256_digest(&context, digest.size(), digest.data());
-  return fmt::format("{:02x}", fmt::join(digest, ""));
+  Sha256 digest;
+  digest.add(std::as_bytes(std::span(text)));
+  return digest.hex();
 }
 
 } // namespace locus

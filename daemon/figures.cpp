@@ -5,6 +5,7 @@
 #include <cmath>
 #include <ctime>
 #include <fstream>
+#include <span>
 
 #include <fmt/format.h>
 
@@ -177,6 +178,13 @@ void SweepStatistics::add(const ProcessedSweep& sweep) {
     ++sums_.used_sweeps[index_of(*prior.rotation)];
   if (prior.translation && prior.translation != prior.rotation)
     ++sums_.used_sweeps[index_of(*prior.translation)];
+  if (sums_.sweeps > 1 && !prior.rotation && !prior.translation)
+    ++sums_.without_source;
+  for (std::size_t i = 0; i < kMaxSources; ++i)
+    sums_.largest_test_ratios[i] = std::max(sums_.largest_test_ratios[i], estimate.sources[i].test_ratio);
+  if (estimate.state == TrackingState::dead_reckoning)
+    ++sums_.dead_reckoned;
+  add_to_trajectory(estimate);
   for (std::size_t i = 0; i < kStages; ++i)
     sums_.stages[i] += sweep.stages_took[i];
   if (sums_.last)
@@ -186,11 +194,22 @@ void SweepStatistics::add(const ProcessedSweep& sweep) {
   sums_.last_at = timing.at;
 }
 
+void SweepStatistics::add_to_trajectory(const OdometryEstimate& estimate) {
+  if (sums_.sweeps == 1)
+    trajectory_start_ = estimate.stamp;
+  const std::int64_t since_start_ns = (estimate.stamp - trajectory_start_).count();
+  trajectory_.add(std::as_bytes(std::span(&since_start_ns, 1)));
+  trajectory_.add(std::as_bytes(std::span(estimate.T_odom_base.translation.data(), 3)));
+  trajectory_.add(std::as_bytes(std::span(estimate.T_odom_base.rotation.coeffs().data(), 4)));
+}
+
 SweepFigures SweepStatistics::figures() const {
+  constexpr std::size_t kDigits = 16; ///< short enough to compare by eye
   SweepFigures figures = sums_;
   figures.process_ms = percentiles(&Timing::wall_ms);
   figures.process_cpu_ms = percentiles(&Timing::cpu_ms);
   figures.rate_hz = rate_hz();
+  figures.trajectory_digest = trajectory_.hex().substr(0, kDigits);
   return figures;
 }
 

@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "config/config.hpp"
+#include "config/sha256.hpp"
 #include "core/ingest/sweep.hpp"
 #include "daemon/incidents.hpp"
 #include "daemon/ingest.hpp"
@@ -127,6 +128,9 @@ struct SweepFigures {
   double raw_points = 0, filtered_points = 0, scan_to_scan_iterations = 0, scan_to_submap_iterations = 0;
   /// Number of sweeps whose prior came from the source, fully or in part.
   std::array<std::uint64_t, kMaxSources> used_sweeps{};
+  std::array<double, kMaxSources> largest_test_ratios{}; ///< by source; zero without a comparison
+  std::uint64_t dead_reckoned = 0;                       ///< sweeps in this state
+  std::uint64_t without_source = 0; ///< sweeps after the first whose prior no source measured, not even in part
   StageTimes stages{};
   double path_m = 0;
   double largest_speed_mps = 0; ///< maximum over all estimates
@@ -135,6 +139,9 @@ struct SweepFigures {
   LatencyHistogram process;
   Percentiles process_ms, process_cpu_ms;
   double rate_hz = 0; ///< over the last five seconds; zero when estimates have stopped
+  /// First 16 digits of the SHA-256 of all poses, with their times since the first one. Differs between instruction
+  /// sets, as the bits of the poses do.
+  std::string trajectory_digest;
 };
 
 /// Accumulates SweepFigures over the sweeps. One owner.
@@ -153,10 +160,13 @@ class SweepStatistics {
   };
   [[nodiscard]] Percentiles percentiles(float Timing::*figure) const;
   [[nodiscard]] double rate_hz() const;
+  void add_to_trajectory(const OdometryEstimate& estimate);
 
   std::size_t window_;
-  SweepFigures sums_;           ///< distributions and rate are unset
+  SweepFigures sums_;           ///< distributions, rate and digest are unset
   std::vector<Timing> timings_; ///< ring buffer once it holds `window_` entries
+  Stamp trajectory_start_;
+  Sha256 trajectory_;
 };
 
 /// State and counters of the link to the robot's network.
@@ -193,6 +203,9 @@ struct Figures {
     std::array<std::uint64_t, kMaxLidars> cloud_drops{};            ///< see LiveInput; by lidar
     std::uint64_t unfetched = 0;                                    ///< see LivePipeline
     std::uint64_t unpublished = 0;                                  ///< estimates not accepted by DDS
+    /// How often the odometry started at the origin or at a given pose since the start of the process, rather than
+    /// where it was before; counted with its first estimate.
+    std::uint64_t resets = 0;
     LinkFigures link;
     std::optional<Recorder::Status> recording;
     std::optional<Incidents::Status> incidents; ///< empty if incidents are not stored
@@ -221,6 +234,9 @@ double rounded(double value);
 
 /// Returns the contents of summary.json except those that need ground truth; also the answer to locusctl status --json.
 nlohmann::ordered_json to_json(const Figures& figures);
+
+/// Summarises a run in one line: the last one of locus-replay, and of the log of a service for each run.
+std::string summary_line(const Figures& figures);
 
 /// Formats the status of a service as text, 80 x 24 with three lidars and four motion sources. Precondition: live.
 std::string to_text(const Figures& figures);

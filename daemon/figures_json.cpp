@@ -130,6 +130,7 @@ ordered_json source_json(const Figures& figures, std::size_t i) {
   const IngestReport::Source& source = figures.ingest.sources[i];
   ordered_json json{{"received", source.counters.received},
                     {"used_sweeps", figures.sweeps.used_sweeps[i]},
+                    {"largest_test_ratio", rounded(figures.sweeps.largest_test_ratios[i])},
                     {"rejected", counts_json<HealthReason>(source.counters.rejected, kAlwaysListed)},
                     {"health_changes", source.counters.health_changes}};
   const std::string verdict = verdict_on(source, figures.live.has_value());
@@ -201,7 +202,8 @@ ordered_json live_json(const Figures& figures, const Figures::Live& live) {
                       {"flat_ground_messages", live.link.flat_ground_refused},
                       {"estimates_unfetched", live.unfetched},
                       {"estimates_unpublished", live.unpublished}}},
-                    {"restarts", builder.restarts}};
+                    {"restarts", builder.restarts},
+                    {"resets", live.resets}};
   if (const auto& recording = live.recording)
     json["recording"] = {
         {"run", recording->run.string()},  {"mb", rounded(1e-6 * static_cast<double>(recording->bytes))},
@@ -243,7 +245,10 @@ ordered_json to_json(const Figures& figures) {
   json["sweeps"] = {{"seen", counters.seen},
                     {"processed", counters.processed},
                     {"dropped", counters.dropped},
-                    {"failed", counters.failed}};
+                    {"failed", counters.failed},
+                    {"dead_reckoned", figures.sweeps.dead_reckoned},
+                    {"without_source", figures.sweeps.without_source}};
+  json["trajectory_digest"] = figures.sweeps.trajectory_digest;
   json.update(sweeps_json(figures.sweeps));
   json["sources"] = ordered_json::object();
   for (std::size_t i = 0; i < config.motion_sources.size(); ++i)

@@ -366,6 +366,8 @@ void add_outlets(MetricsText& text, const Figures::Live& live) {
   text.add(live.link.connected ? 1 : 0);
   text.counter("locusd_dds_attempts", "Attempts to join DDS.");
   text.add(live.link.attempts);
+  text.counter("locusd_resets", "Starts of the odometry at the origin or at a given pose, in this process.");
+  text.add(live.resets);
   text.state_set("locusd_flat_ground", "Whether the ground is assumed level.");
   add_states(text, {}, live.flat_ground);
   if (live.incidents) {

@@ -147,7 +147,24 @@ std::string incidents_text(const std::optional<Incidents::Status>& incidents) {
                      incidents->suppressed > 0 ? fmt::format("   {} more too soon", incidents->suppressed) : "");
 }
 
+/// Names the source that everything else contradicted most, with the test ratio.
+std::string worst_source_text(const Figures& figures) {
+  const auto& ratios = figures.sweeps.largest_test_ratios;
+  const auto worst = std::ranges::max_element(ratios);
+  if (*worst == 0.0)
+    return "no source compared";
+  const auto source = static_cast<std::size_t>(worst - ratios.begin());
+  return fmt::format("largest test ratio {:.2f} ({})", *worst, figures.config.motion_sources[source].name);
+}
+
 } // namespace
+
+std::string summary_line(const Figures& figures) {
+  const SweepCounters& counters = figures.counters;
+  return fmt::format("{} sweeps: {} dropped, {} failed, {} dead reckoned, {} without a source; {}; trajectory {}",
+                     counters.seen, counters.dropped, counters.failed, figures.sweeps.dead_reckoned,
+                     figures.sweeps.without_source, worst_source_text(figures), figures.sweeps.trajectory_digest);
+}
 
 std::string to_text(const Figures& figures) {
   const Figures::Live& live = *figures.live;

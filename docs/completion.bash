@@ -32,4 +32,4 @@ _locus() {
     _filedir
   fi
 } &&
-  complete -F _locus locusd locusctl locus-experiments locus-play locus-replay locus-sim
+  complete -F _locus locusd locusctl locus-demo locus-experiments locus-play locus-replay locus-sim

@@ -26,9 +26,10 @@ done
 [ -n "${release_of[${suite:-none}]:-}" ] ||
   fail "packages are for Debian ${!release_of[*]}, not for '$suite'; name one by --suite, or look at packaging/Containerfile"
 
-profiles=nocheck
+profiles=nocheck builds=binary
 in_tree=()
-[ "$arch" = "$here_arch" ] || profiles="cross nocheck"
+# locus-demo-data is for all processors, so that only one build may make it.
+[ "$arch" = "$here_arch" ] || profiles="cross nocheck" builds=any
 [ "$suite $arch" = "$here_suite $here_arch" ] || in_tree=("$source/packaging/build-tree.sh" "$suite" "$arch" "$work")
 folder=deb
 [ ${#in_tree[@]} -eq 0 ] || folder=deb-$suite-$arch
@@ -54,11 +55,11 @@ export DEB_BUILD_OPTIONS=${DEB_BUILD_OPTIONS-"parallel=$(nproc)"}" nocheck" DEB_
 "${in_tree[@]}" packaging/install-build-deps.sh "$arch"
 mv packaging/debian debian
 sed -i "1s/) [a-z]*;/$(suffix_of "$suite")) $suite;/" debian/changelog
-if ! "${in_tree[@]}" dpkg-buildpackage --host-arch "$arch" --build=binary --no-sign 2>&1 | tee "$log" | progress; then
+if ! "${in_tree[@]}" dpkg-buildpackage --host-arch "$arch" --build=$builds --no-sign 2>&1 | tee "$log" | progress; then
   tail -n 40 "$log" >&2
   echo "build-deb.sh: dpkg-buildpackage failed; the end of $log stands above" >&2
   exit 1
 fi
-rm -f "$result"/{locusd,locus-tools,liblocus0,liblocus-dev,python3-locus}{,-dbgsym}_*.deb "$result"/locusd_*.{buildinfo,changes} # packages of other versions
+rm -f "$result"/{locusd,locus-tools,locus-demo-data,liblocus0,liblocus-dev,python3-locus}{,-dbgsym}_*.deb "$result"/locusd_*.{buildinfo,changes} # packages of other versions
 mv "$work"/*.deb "$work"/*.buildinfo "$work"/*.changes "$result"
-ls "$result"/*_"$arch".deb
+ls "$result"/*.deb

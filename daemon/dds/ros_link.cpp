@@ -58,6 +58,7 @@ struct RosLink::Session {
     state = {node, dds.prefix + "/state", TopicQos::standard()};
     diagnostics = {node, "/diagnostics", TopicQos::standard()};
     beginning = {node, dds.prefix + "/beginning", TopicQos::latch()};
+    resets = {node, dds.prefix + "/resets", TopicQos::latch()};
     if (dds.publish_tf)
       tf.emplace(node, "/tf", TopicQos::transform());
     if (dds.publish_cloud)
@@ -103,7 +104,7 @@ struct RosLink::Session {
 
   DdsNode node; ///< first member: outlives its endpoints
   DdsWriter<ros::Odometry> odometry, odometry_fast;
-  DdsWriter<ros::UInt8> state;
+  DdsWriter<ros::UInt8> state, resets;
   DdsWriter<ros::DiagnosticArray> diagnostics, beginning;
   std::optional<DdsWriter<ros::TFMessage>> tf;
   std::optional<DdsWriter<ros::PointCloud2>> cloud, map;
@@ -261,9 +262,10 @@ bool RosLink::publish(const DiagnosticsMessage& diagnostics) {
   return to != nullptr && to->diagnostics.write(diagnostics.message());
 }
 
-bool RosLink::publish_beginning(const DiagnosticsMessage& beginning) {
+bool RosLink::publish_beginning(const DiagnosticsMessage& beginning, std::uint64_t resets) {
   Session* const to = session();
-  return to != nullptr && to->beginning.write(beginning.message());
+  return to != nullptr && to->resets.write({static_cast<std::uint8_t>(resets)}) &&
+         to->beginning.write(beginning.message());
 }
 
 LinkFigures RosLink::status() const {

@@ -54,7 +54,8 @@ class RosLink {
   bool publish_cloud(std::span<const CloudMessage::Point> points, Stamp stamp); ///< base frame
   bool publish_map(std::span<const CloudMessage::Point> points, Stamp stamp);   ///< odom frame
   bool publish(const DiagnosticsMessage& diagnostics);
-  bool publish_beginning(const DiagnosticsMessage& beginning); ///< latched
+  /// Publishes, latched, the origin of a frame, and how many times the pose was reset so far, modulo 256.
+  bool publish_beginning(const DiagnosticsMessage& beginning, std::uint64_t resets);
 
   /// Returns state and counters. Any thread.
   [[nodiscard]] LinkFigures status() const;

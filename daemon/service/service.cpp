@@ -95,12 +95,13 @@ int Service::run(const Config& config) {
     return 1;
   monitor_.reset();
   const std::optional<SavedState> last = session_->stop();
+  const std::string run = summary_line(session_->figures());
   session_.reset(); // ends the other writer of states
   save_state(last);
   finish_incident();
   if (control_)
     remove_mark_and_ring();
-  log_.info("stopped");
+  log_.info("stopped: " + run);
   return 0;
 }
 
@@ -174,7 +175,7 @@ std::optional<std::string> Service::begin(const Config& config, std::optional<Sa
   if (incidents_)
     incidents_->set_max_bytes(config.record.incidents_bytes);
   Incidents* const incidents = incidents_ ? &*incidents_ : nullptr;
-  auto session = Session::start(config, inherited_, std::move(state), incidents, log_);
+  auto session = Session::start(config, inherited_, std::move(state), incidents, resets_, log_);
   if (!session)
     return session.error();
   session_ = std::move(*session);
@@ -223,6 +224,7 @@ std::optional<std::string> Service::restart_with(const Config& config) {
   const Config old = session_->config();
   const FlatGround mode = session_->flat_ground();
   const std::optional<SavedState> state = session_->stop();
+  log_.info("run ended: " + summary_line(session_->figures()));
   std::optional<SavedState> new_state = state;
   if (new_state)
     new_state->flat_ground = config.odometry.flat_ground;

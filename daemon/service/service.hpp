@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -58,8 +60,9 @@ class Service {
   std::filesystem::path config_file_;
   Log& log_;
   std::vector<int> inherited_;
-  int signals_;                        ///< signalfd
-  std::optional<Incidents> incidents_; ///< empty without a state directory or control socket
+  int signals_;                          ///< signalfd
+  std::atomic<std::uint64_t> resets_{0}; ///< Figures::Live::resets
+  std::optional<Incidents> incidents_;   ///< empty without a state directory or control socket
   IncidentWatch incident_watch_;
   Incidents::Status logged_incidents_;
   std::unique_ptr<Session> session_;

@@ -40,7 +40,7 @@ std::filesystem::path record_folder(const std::filesystem::path& folder) {
 
 Expected<std::unique_ptr<Session>, std::string> Session::start(const Config& config, std::span<const int> inherited,
                                                                std::optional<SavedState> state, Incidents* incidents,
-                                                               Log& log) {
+                                                               std::atomic<std::uint64_t>& resets, Log& log) {
   auto lidars = LidarRouter::open(config.lidars);
   if (!lidars)
     return lidars.error();
@@ -48,14 +48,15 @@ Expected<std::unique_ptr<Session>, std::string> Session::start(const Config& con
   if (!sockets)
     return sockets.error();
   return std::unique_ptr<Session>(
-      new Session(config, std::move(*lidars), std::move(*sockets), std::move(state), incidents, log));
+      new Session(config, std::move(*lidars), std::move(*sockets), std::move(state), incidents, resets, log));
 }
 
 Session::Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket> sockets,
-                 std::optional<SavedState> state, Incidents* incidents, Log& log)
+                 std::optional<SavedState> state, Incidents* incidents, std::atomic<std::uint64_t>& resets, Log& log)
     : config_(config), log_(log), started_(MachineTime::now()),
       input_(std::move(sockets), publishes_clouds(config.lidars)),
       flat_ground_(state && state->is_recent ? state->flat_ground : config.odometry.flat_ground), incidents_(incidents),
+      resets_(resets),
       link_(
           config, [this](const RosInput& input) { receive(input); }, instance_name(),
           [this](std::uint8_t lidar, Stamp arrival, const SerialisedSample& cloud) { receive(lidar, arrival, cloud); }),
@@ -158,6 +159,8 @@ void Session::end() {
   if (publisher_.joinable())
     publisher_.join();
   pipeline_->stop();
+  while (const auto done = pipeline_->next(Duration::zero()))
+    publish(*done);
   disk_.reset();
 }
 
@@ -222,6 +225,7 @@ std::optional<std::string> Session::reset(std::optional<Pose> T_odom_base) {
   if (!lidars)
     return lidars.error();
   end();
+  log_.info("run ended: " + summary_line(figures()));
   start_.reset();
   if (state_saver_.last())
     calibration_ = {state_saver_.last()->learned, 0.0};
@@ -230,6 +234,7 @@ std::optional<std::string> Session::reset(std::optional<Pose> T_odom_base) {
   state_saver_.reset(start_);
   has_saved_map_ = announced_ = false;
   announcement_.reset();
+  collected_ = {};
   begin(std::move(*lidars));
   log_.info("odometry reset on request");
   return std::nullopt;
@@ -326,7 +331,8 @@ void Session::publish(const ProcessedSweep& done) {
   }
   if (estimate.beginning && !announced_)
     announce(estimate);
-  if (announcement_ && link_.publish_beginning(DiagnosticsMessage({*announcement_}, estimate.stamp)))
+  if (announcement_ && link_.publish_beginning(DiagnosticsMessage({*announcement_}, estimate.stamp),
+                                               resets_.load(std::memory_order_relaxed)))
     announcement_.reset();
   log_state(estimate.state);
 }
@@ -336,6 +342,8 @@ void Session::announce(const OdometryEstimate& estimate) {
   announced_ = true;
   const Beginning from = *estimate.beginning;
   const bool is_lost = has_saved_map_ && from != Beginning::map;
+  if (from == Beginning::origin || from == Beginning::told)
+    resets_.fetch_add(1, std::memory_order_relaxed);
   const std::string text =
       from == Beginning::map    ? "resumed from the saved state"
       : from == Beginning::told ? "started at the requested pose"
@@ -409,6 +417,7 @@ Figures Session::figures() const {
   for (std::size_t i = 0; i < config_.lidars.size(); ++i)
     live.cloud_drops[i] = input_.cloud_drops(i);
   live.unfetched = pipeline_->unfetched();
+  live.resets = resets_.load(std::memory_order_relaxed);
   live.link = link_.status();
   if (stores_incidents())
     live.incidents = incidents_->status();

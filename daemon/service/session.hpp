@@ -33,10 +33,11 @@ std::filesystem::path record_folder(const std::filesystem::path& folder);
 class Session {
  public:
   /// Opens all files and sockets and starts all threads. Fails with one line for the user.
-  /// `incidents`, null without a folder for them, must outlive the session.
+  /// `incidents`, null without a folder for them, and `resets`, the count that Figures::Live has, must outlive the
+  /// session.
   static Expected<std::unique_ptr<Session>, std::string> start(const Config& config, std::span<const int> inherited,
                                                                std::optional<SavedState> state, Incidents* incidents,
-                                                               Log& log);
+                                                               std::atomic<std::uint64_t>& resets, Log& log);
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -83,7 +84,7 @@ class Session {
 
  private:
   Session(const Config& config, LidarRouter lidars, std::vector<UdpSocket> sockets, std::optional<SavedState> state,
-          Incidents* incidents, Log& log);
+          Incidents* incidents, std::atomic<std::uint64_t>& resets, Log& log);
   void begin(LidarRouter lidars);
   InputSource& begin_recording();
   InputSource& record_to(const std::filesystem::path& folder, const RecordingBounds& bounds);
@@ -118,6 +119,7 @@ class Session {
   std::atomic<FlatGround> flat_ground_;
   Duration flat_ground_changed_{};     ///< owned by the link's thread
   Incidents* incidents_;               ///< null: no folder for incidents
+  std::atomic<std::uint64_t>& resets_; ///< written by the publisher
   bool records_to_memory_ = false;     ///< the recording is in memory, for incidents only
   bool old_ring_removed_ = false;      ///< remains of earlier sessions or processes are removed; disk thread
   std::unique_ptr<Recorder> recorder_; ///< one run; null without recording

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cmath>
 #include <string>
+#include <vector>
 
 namespace locus::daemon {
 namespace {
@@ -47,6 +49,78 @@ TEST(SweepStatistics, IsEmptyBeforeTheFirstSweep) {
   EXPECT_FALSE(figures.last);
   EXPECT_EQ(figures.process_ms.max, 0);
   EXPECT_EQ(figures.rate_hz, 0);
+}
+
+TEST(SweepStatistics, CountSweepsWithoutASourceAfterTheFirst) {
+  SweepStatistics statistics(100);
+  for (unsigned i = 0; i < 6; ++i) {
+    ProcessedSweep done = sweep(i, milliseconds{1});
+    if (i != 3)
+      done.estimate.prior.rotation.reset();
+    if (i < 3)
+      done.estimate.prior.translation.reset();
+    if (i == 2)
+      done.estimate.state = TrackingState::dead_reckoning;
+    done.estimate.sources[1].test_ratio = i == 4 ? 2.5 : 0.5;
+    statistics.add(done);
+  }
+  const SweepFigures figures = statistics.figures();
+  EXPECT_EQ(figures.without_source, 2U) << "0, 1 and 2 have none, and 4 and 5 have half";
+  EXPECT_EQ(figures.dead_reckoned, 1U);
+  EXPECT_EQ(figures.largest_test_ratios[0], 0.0);
+  EXPECT_EQ(figures.largest_test_ratios[1], 2.5);
+}
+
+/// Digest of a drive whose poses `change` alters.
+std::string digest_of(const auto& change) {
+  SweepStatistics statistics(100);
+  for (unsigned i = 0; i < 10; ++i) {
+    ProcessedSweep done = sweep(i, milliseconds{i});
+    done.estimate.stamp = stamp_from_ns(1'700'000'000'000'000'000) + i * milliseconds{100};
+    change(i, done.estimate);
+    statistics.add(done);
+  }
+  return statistics.figures().trajectory_digest;
+}
+
+TEST(SweepStatistics, DigestIsOfThePosesAndTheTimesBetweenThem) {
+  const auto unchanged = [](unsigned, OdometryEstimate&) {};
+  const std::string digest = digest_of(unchanged);
+  EXPECT_EQ(digest.size(), 16U);
+  EXPECT_EQ(digest_of(unchanged), digest);
+  EXPECT_EQ(digest_of([](unsigned, OdometryEstimate& estimate) { estimate.stamp += std::chrono::hours{1}; }), digest)
+      << "played later";
+  std::vector<std::string> changed;
+  changed.push_back(digest_of([](unsigned i, OdometryEstimate& estimate) {
+    double& x = estimate.T_odom_base.translation.x();
+    if (i == 5)
+      x = std::nextafter(x, 100.0);
+  }));
+  changed.push_back(digest_of([](unsigned i, OdometryEstimate& estimate) {
+    double& w = estimate.T_odom_base.rotation.w();
+    if (i == 5)
+      w = std::nextafter(w, 0.0);
+  }));
+  changed.push_back(digest_of([](unsigned i, OdometryEstimate& estimate) {
+    if (i == 5)
+      estimate.stamp += std::chrono::nanoseconds{1};
+  }));
+  for (const std::string& other : changed)
+    EXPECT_NE(other, digest);
+}
+
+TEST(Figures, LineSummarisesTheRun) {
+  const Config config = Config{};
+  Figures figures{.config = config};
+  figures.counters = {.seen = 300, .processed = 295, .dropped = 2, .failed = 3};
+  figures.sweeps.trajectory_digest = "0123456789abcdef";
+  EXPECT_EQ(summary_line(figures), "300 sweeps: 2 dropped, 3 failed, 0 dead reckoned, 0 without a source; no source "
+                                   "compared; trajectory 0123456789abcdef");
+  figures.sweeps.dead_reckoned = 4;
+  figures.sweeps.without_source = 1;
+  figures.sweeps.largest_test_ratios = {0.5, 3.207};
+  EXPECT_EQ(summary_line(figures), "300 sweeps: 2 dropped, 3 failed, 4 dead reckoned, 1 without a source; largest test "
+                                   "ratio 3.21 (imu); trajectory 0123456789abcdef");
 }
 
 TEST(Figures, ServiceHasTheKeysOfARunAndMore) {

@@ -48,6 +48,7 @@ void listen(const DdsNode& node, const std::string& prefix) {
   DdsReader<ros::PointCloud2> map{node, prefix + "/map", TopicQos::latch()};
   DdsReader<ros::DiagnosticArray> diagnostics{node, "/diagnostics", TopicQos::standard()};
   DdsReader<ros::DiagnosticArray> beginning{node, prefix + "/beginning", TopicQos::latch()};
+  DdsReader<ros::UInt8> resets{node, prefix + "/resets", TopicQos::latch()};
   const auto say_cloud = [](const ros::PointCloud2& m, const char* topic) {
     tell("{} {} {} {} {} {}", topic, m.width_, m.point_step_, m.data_._length, m.fields_._length, m.header_.frame_id_);
   };
@@ -82,6 +83,7 @@ void listen(const DdsNode& node, const std::string& prefix) {
     map.take([&](const ros::PointCloud2& m) { say_cloud(m, "map"); });
     diagnostics.take([](const ros::DiagnosticArray& m) { say(m, "diagnostics"); });
     beginning.take([](const ros::DiagnosticArray& m) { say(m, "beginning"); });
+    resets.take([](const ros::UInt8& m) { tell("resets {}", m.data_); });
     std::this_thread::sleep_for(std::chrono::microseconds{200});
   }
 }

@@ -207,6 +207,7 @@ void hear_all(dds::DomainParticipant& participant, const std::string& prefix) {
   listen<FastCloud>(participant, prefix + "/map", "map", true, true);
   listen<FastDiagnostics>(participant, "/diagnostics", "diagnostics");
   listen<FastDiagnostics>(participant, prefix + "/beginning", "beginning", true, true);
+  listen<FastUInt8>(participant, prefix + "/resets", "resets", true, true);
   listen<FastClock>(participant, "/clock", "clock", false);
   listen<FastImu>(participant, "/imu/data", "imu", false);
   tell("listens");

@@ -176,14 +176,20 @@ TEST_P(Peers, LateSubscribersReceiveBeginningAndMapOnce) {
   const std::vector<CloudMessage::Point> points(100, {1, 2, 3, 0, 0, 0, 0});
   RosLink link(config_, inbox_.sink());
   ASSERT_TRUE(eventually([&] {
-    return link.publish_beginning(DiagnosticsMessage(
-        {{Diagnostic::Level::warning, "locusd: beginning", "", {{"from", "map"}}}}, stamp_from_ns(1)));
+    return link.publish_beginning(
+        DiagnosticsMessage({{Diagnostic::Level::warning, "locusd: beginning", "", {{"from", "map"}}}},
+                           stamp_from_ns(1)),
+        259);
   }));
   link.publish_map(points, stamp_from_ns(1));
   const test::Child listener(peer("listen"));
-  EXPECT_TRUE(eventually([&] { return !listener.lines_of("beginning").empty() && !listener.lines_of("map").empty(); }));
+  EXPECT_TRUE(eventually([&] {
+    return !listener.lines_of("beginning").empty() && !listener.lines_of("resets").empty() &&
+           !listener.lines_of("map").empty();
+  }));
   EXPECT_EQ(listener.lines_of("map").size(), 1U);
   EXPECT_EQ(listener.lines_of("beginning"), std::vector<std::string>{"1 1 locusd: beginning"});
+  EXPECT_EQ(listener.lines_of("resets"), std::vector<std::string>{"3"}) << "modulo 256";
 }
 
 TEST_P(Peers, SamplesArriveInOrderWithEveryFigure) {
@@ -264,7 +270,7 @@ TEST_P(Peers, ListOneNodeWithAllEndpoints) {
     ASSERT_TRUE(eventually([&] { return link.status().connected; }));
     const test::Child late(peer(word));
     for (const test::Child* one : {&early, &late}) {
-      constexpr std::size_t kReaders = 4, kWriters = 8;
+      constexpr std::size_t kReaders = 4, kWriters = 9;
       EXPECT_TRUE(eventually([&] {
         const HeardNode heard = heard_node(*one);
         return heard.readers.size() >= kReaders && heard.writers.size() >= kWriters && !heard.node_writers.empty();

@@ -187,7 +187,7 @@ TEST_P(DiscoveredTypes, OfTheServiceHaveTheHashesOfRos) {
   config.dds.publish_tf = config.dds.publish_cloud = config.dds.publish_map = true;
   config.dds.flat_ground_topic = "/flat_ground";
   const RosLink link(config, [](const RosInput&) {});
-  expect_hashes(12, {"nav_msgs/msg/Odometry", "std_msgs/msg/UInt8", "std_msgs/msg/Bool", "tf2_msgs/msg/TFMessage",
+  expect_hashes(13, {"nav_msgs/msg/Odometry", "std_msgs/msg/UInt8", "std_msgs/msg/Bool", "tf2_msgs/msg/TFMessage",
                      "sensor_msgs/msg/Imu", "sensor_msgs/msg/PointCloud2", "diagnostic_msgs/msg/DiagnosticArray",
                      "rmw_dds_common/msg/ParticipantEntitiesInfo"});
 }

@@ -23,7 +23,7 @@ expect() {
   [ "$found" = "$wanted" ] || { echo "$*<TAB>: offers '$found', not '$wanted'"; status=1; }
 }
 
-for program in locusd locusctl locus-experiments locus-play locus-replay locus-sim; do
+for program in locusd locusctl locus-demo locus-experiments locus-play locus-replay locus-sim; do
   expect "$("$program" --help | grep -oP '^  (-.,)?\K--[a-z-]+' | sort | xargs)" "$program" --
 done
 expect "calibration fetch flat-ground record reload reset save-map sensors status view" locusctl ""

@@ -8,4 +8,4 @@ command -v piuparts >/dev/null || skip "there is no piuparts; packaging/install-
 base=$(base_tree "$1" $(library_depends "$1"))
 # The ignored folder is debconf's own, which piuparts of Debian 12 does not know for Debian 13.
 piuparts --existing-chroot "$base" --distribution "$(suite_of "$1")" --no-upgrade-test --ignore /var/cache/debconf/tmp.ci/ \
-  "$1"/locusd_*.deb "$1"/locus-tools_*.deb "$1"/{liblocus0,liblocus-dev,python3-locus}_*.deb
+  "$1"/locusd_*.deb "$1"/locus-tools_*.deb "$1"/locus-demo-data_*.deb "$1"/{liblocus0,liblocus-dev,python3-locus}_*.deb

@@ -48,7 +48,7 @@ newer() { # VERSION: prints the path of a package of it, with another configurat
 }
 
 step "a robot installs it from there"
-publish "$work/repository" "$folder"/*_"$(dpkg --print-architecture)".deb
+publish "$work/repository" "$folder"/*.deb
 mkdir -p "$work/root/etc/apt/keyrings"
 cp "$work/repository/public/locusd.asc" "$work/root/etc/apt/keyrings"
 rm -f "$work"/root/etc/apt/sources.list{,.d/*}

@@ -111,6 +111,7 @@ TEST(LocusReplay, SummaryHasTheKeysOfTheContract) {
                                                   "packets",
                                                   "lidars",
                                                   "sweeps",
+                                                  "trajectory_digest",
                                                   "process_ms",
                                                   "process_cpu_ms",
                                                   "stage_ms",
@@ -141,8 +142,8 @@ TEST(LocusReplay, SummaryHasTheKeysOfTheContract) {
   EXPECT_EQ(summary["lidars"]["front"]["return_mode"], "strongest");
   EXPECT_NEAR(summary["lidars"]["front"]["rpm"].get<double>(), 600, 5);
   EXPECT_EQ(keys(summary["sources"]), (std::set<std::string>{"wio", "imu"}));
-  EXPECT_EQ(keys(summary["sources"]["imu"]),
-            (std::set<std::string>{"received", "used_sweeps", "rejected", "health_changes", "learned"}));
+  EXPECT_EQ(keys(summary["sources"]["imu"]), (std::set<std::string>{"received", "used_sweeps", "largest_test_ratio",
+                                                                    "rejected", "health_changes", "learned"}));
   EXPECT_EQ(keys(summary["sources"]["imu"]["rejected"]),
             (std::set<std::string>{"stale", "jump", "nan", "frozen", "out_of_order", "covariance", "disagreement"}));
 
@@ -326,6 +327,25 @@ TEST(LocusReplay, RealtimeMayBeSlowedDown) {
 TEST(LocusReplay, LidarsAreToldWithWhatTheirPacketsAreReadAs) {
   const std::string told = Replay({"--duration", "2", room_drive().string()}).run().out;
   EXPECT_NE(told.find("\nfront      VLP-16, strongest returns, 600 rpm\n"), std::string::npos) << told;
+}
+
+TEST(LocusReplay, LastLineTellsRunsApart) {
+  const Replay replay({"--threads", "1", room_drive().string()});
+  const json summary = replay.summary();
+  const std::string line = lines_of(replay.run().out).back();
+  EXPECT_TRUE(line.starts_with("run        80 sweeps: 0 dropped, 0 failed, 0 dead reckoned, 0 without a source;"))
+      << line;
+  EXPECT_TRUE(line.ends_with("; trajectory " + summary["trajectory_digest"].get<std::string>())) << line;
+  EXPECT_EQ(lines_of(Replay({"--threads", "4", room_drive().string()}).run().out).back(), line);
+  const Replay jump({"--fail", "wio:jump=1@4", room_drive().string()});
+  EXPECT_NE(jump.summary()["trajectory_digest"], summary["trajectory_digest"]);
+  EXPECT_GT(jump.summary()["sources"]["wio"]["largest_test_ratio"], summary["sources"]["wio"]["largest_test_ratio"]);
+
+  const json blind = Replay({"--fail", "all-lidars:lost@4-6", "--fail", "wio:lost@4-6", "--fail", "imu:lost@4-6",
+                             room_drive().string()})
+                         .summary()["sweeps"];
+  EXPECT_NEAR(blind["dead_reckoned"].get<int>(), 20, 2);
+  EXPECT_NEAR(blind["without_source"].get<int>(), 30, 2) << "sources that return stay on probation for a second";
 }
 
 TEST(LocusReplay, FiguresGoToStdoutUnlessQuiet) {

@@ -118,6 +118,23 @@ TEST_F(LifeCycle, ResetPoseWithoutLidarOutlivesReloadAndRestart) {
   EXPECT_NEAR(starts_at_x(), 0, kNear_m);
 }
 
+TEST_F(LifeCycle, ResetsAreCountedForTheLifeOfTheProcess) {
+  Child daemon(locusd(config()));
+  Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
+  ASSERT_TRUE(hears_the_service(listener));
+  EXPECT_EQ(status()["resets"], 0) << "no estimate yet";
+  {
+    const Child play(endlessly(capture()));
+    status_when([](const json& s) { return s["resets"] == 1 && s["beginning"] == "origin"; });
+    ASSERT_EQ(ctl({"reset", "--pose", "100,0,0,0,0,0"}).status, 0);
+    status_when([](const json& s) { return s["resets"] == 2 && s["beginning"] == "told"; });
+  }
+  EXPECT_TRUE(listener.wait_for_line("resets 2"));
+  EXPECT_EQ(listener.lines_of("resets"), (std::vector<std::string>{"1", "2"}));
+  ASSERT_EQ(ctl({"reload"}).status, 0);
+  EXPECT_GE(status()["resets"], 2);
+}
+
 TEST_F(LifeCycle, ResetBeforeTheFirstSweepGivesNoWarningOfTheSavedState) {
   {
     Child daemon(locusd(config()));
@@ -360,6 +377,7 @@ TEST_F(LifeCycle, ControlCommandsTakeEffect) {
   EXPECT_NE(read_text(file("map.pcd")).find("FIELDS x y z"), std::string::npos);
 
   EXPECT_EQ(ctl({"reset", "--pose", "100,50,0,0,0,90"}).status, 0);
+  EXPECT_TRUE(daemon.has_line("run ended: ")) << testing::PrintToString(daemon.lines());
   const json reset = status_when([](const json& s) { return s["sweeps"]["processed"] > 5; });
   constexpr double kRoom_m = 13; // the room's diagonal: the robot continues to drive
   EXPECT_NEAR(reset["pose"]["xyz_m"][0].get<double>(), 100, kRoom_m);
@@ -369,6 +387,14 @@ TEST_F(LifeCycle, ControlCommandsTakeEffect) {
   EXPECT_EQ(sensors.status, 0) << sensors.err;
   EXPECT_NE(sensors.out.find("VLP-16"), std::string::npos) << sensors.out;
   EXPECT_NE(sensors.out.find("port: 2368"), std::string::npos) << sensors.out;
+
+  daemon.signal(SIGTERM);
+  ASSERT_EQ(daemon.wait_for_exit(), 0);
+  const std::string last = daemon.lines().back();
+  EXPECT_TRUE(last.starts_with("locusd: stopped: ")) << last;
+  EXPECT_TRUE(last.find(" (wio); trajectory ") != std::string::npos ||
+              last.find(" (imu); trajectory ") != std::string::npos)
+      << last;
 }
 
 TEST_F(LifeCycle, ControlWithoutAServiceExplainsHowToStartIt) {

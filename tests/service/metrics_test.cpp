@@ -171,6 +171,7 @@ TEST_F(Metrics, MatchTheStatus) {
   EXPECT_LE(sigma_m, 1.001 * std::sqrt(status["covariance"][14].get<double>()));
   EXPECT_EQ(metrics.value("locusd_dds_connected"), 1);
   EXPECT_EQ(metrics.value("locusd_beginning_info", {{"from", status["beginning"]}}), 1);
+  EXPECT_EQ(metrics.value("locusd_resets_total"), status["resets"]);
   EXPECT_EQ(metrics.value("locusd_flat_ground", {{"locusd_flat_ground", status["flat_ground"]}}), 1);
   double states = 0;
   for (const auto& [labels, is_it] : metrics.samples.at("locusd_state"))

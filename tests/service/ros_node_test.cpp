@@ -31,7 +31,7 @@ TEST_F(RosNodeOfService, HasTheNameOfTheInstanceAndAllItsTopics) {
   setenv("RUNTIME_DIRECTORY", runtime.c_str(), 1); // NOLINT(concurrency-mt-unsafe)
   const Child cyclone({CYCLONE_PEER, "0", "iron", "/locus"}), fast_dds({FAST_DDS_PEER, "0", "iron", "/locus"});
   const Child daemon(locusd(config()));
-  constexpr std::ptrdiff_t kAlways = 5; // odometry, odometry_fast, state, beginning, diagnostics
+  constexpr std::ptrdiff_t kAlways = 6; // odometry, odometry_fast, state, beginning, resets, diagnostics
   for (const Child* peer : {&cyclone, &fast_dds})
     EXPECT_TRUE(hears_node(*peer, "/ locusd_left", kAlways)) << testing::PrintToString(peer->lines());
   ASSERT_TRUE(daemon.wait_for_line("DDS is up")) << testing::PrintToString(daemon.lines());
@@ -46,7 +46,7 @@ TEST_F(RosNodeOfService, SingleServiceIsNamedLocusdInTheConfiguredLayout) {
   const Child cyclone({CYCLONE_PEER, "0", "humble", "/locus"}), fast_dds({FAST_DDS_PEER, "0", "humble", "/locus"});
   const Child daemon(locusd(config("dds: {ros_graph: humble}\n")));
   for (const Child* peer : {&cyclone, &fast_dds})
-    EXPECT_TRUE(hears_node(*peer, "/ locusd", 5)) << testing::PrintToString(peer->lines());
+    EXPECT_TRUE(hears_node(*peer, "/ locusd", 6)) << testing::PrintToString(peer->lines());
 }
 
 } // namespace

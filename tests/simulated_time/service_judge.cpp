@@ -72,7 +72,7 @@ const std::vector<Claim>& claims() {
 }
 
 /// Messages that need no explanation.
-constexpr std::array<std::string_view, 13> kAlwaysTrue{"DDS is up",
+constexpr std::array<std::string_view, 14> kAlwaysTrue{"DDS is up",
                                                        "degenerate", // in a corner of the course
                                                        "tracking",
                                                        "standstill",
@@ -82,6 +82,7 @@ constexpr std::array<std::string_view, 13> kAlwaysTrue{"DDS is up",
                                                        "reloaded",
                                                        "resumed from the saved state",
                                                        "running with",
+                                                       "run ended",
                                                        "started at the origin",
                                                        "started at the requested pose",
                                                        "stopped"};

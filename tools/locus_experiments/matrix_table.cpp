@@ -37,7 +37,8 @@ std::string in_words(const Results& value) { return value.is_string() ? value.ge
 
 /// Lists, in words, differing counters of an input and its verdict, without those that only follow from others.
 std::vector<std::string> differences(const std::string& input, const Pair& pair) {
-  constexpr std::array kIgnored{"processed", "used_sweeps", "seen"};
+  constexpr std::array kIgnored{"processed",     "used_sweeps",    "seen",
+                                "dead_reckoned", "without_source", "largest_test_ratio"};
   std::vector<std::string> found;
   for (const Account& account : accounts_of(input)) {
     const Results with = pair.with->at("summary").at(account.pointer).flatten();

@@ -88,7 +88,7 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
   warn(warnings_about(played));
   warn(accuracy.warnings);
   if (!arguments_.quiet)
-    fmt::print("{}results    {}\n", readable(run), arguments_.output.string());
+    fmt::print("{}results    {}\nrun        {}\n", readable(run), arguments_.output.string(), summary_line(figures));
   if (!accuracy.problems.empty())
     throw Failure(ExitStatus::failed, fmt::format("{}", fmt::join(accuracy.problems, "\n")));
 }

@@ -110,9 +110,6 @@ std::string readable(const FinishedRun& run) {
                               static_cast<double>(std::max<std::uint64_t>(clouds->counters.used, 1)),
                           to_string(clouds->timing), to_string(clouds->rings));
   }
-  const daemon::SweepCounters& counters = figures.counters;
-  text += fmt::format("sweeps     {} seen: {} processed, {} dropped, {} failed\n", counters.seen, counters.processed,
-                      counters.dropped, counters.failed);
   const std::vector<MotionSource>& sources = figures.config.motion_sources;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     if (const auto received = figures.ingest.sources[i].counters.received; received > 0)
