@@ -278,21 +278,29 @@ double fit_of(const Registration& registration) {
 
 namespace {
 
-/// Returns the sum over the objects of what they say for `one` against `other`.
-double weigh_objects(const Registration& one, const Registration& other, double share) {
-  double sum = 0.0;
+ObjectEvidence weigh_objects(const Registration& one, const Registration& other, double mean_error) {
+  ObjectEvidence evidence;
   for (std::size_t i = 0; i < kObjects; ++i)
-    sum += std::clamp(share * static_cast<double>(other.object_costs[i] - one.object_costs[i]), -kObjectIsStatic,
-                      kObjectIsStatic);
-  return sum;
+    evidence[i] =
+        static_cast<float>(honest_share(mean_error) * static_cast<double>(other.object_costs[i] - one.object_costs[i]));
+  return evidence;
 }
 
 } // namespace
 
-double evidence(const Registration& one, const Registration& other) {
-  const double gained = weigh_objects(one, other, honest_share(one.mean_error));
-  return gained > 0.0 ? gained : weigh_objects(one, other, honest_share(other.mean_error));
+ObjectEvidence compare(const Registration& one, const Registration& other) {
+  const ObjectEvidence gained = weigh_objects(one, other, one.mean_error);
+  return total(gained) > 0.0 ? gained : weigh_objects(one, other, other.mean_error);
 }
+
+double total(const ObjectEvidence& evidence) {
+  double sum = 0.0;
+  for (const float of_object : evidence)
+    sum += std::clamp(static_cast<double>(of_object), -kObjectIsStatic, kObjectIsStatic);
+  return sum;
+}
+
+double evidence(const Registration& one, const Registration& other) { return total(compare(one, other)); }
 
 Registration Gicp::align(const ElasticScan& source, const SurfaceMap& target, const Pose& T_start,
                          const MotionBelief& prior, const RegistrationOptions& options, bool wide,

@@ -67,12 +67,22 @@ struct Registration {
 /// the larger score is better.
 double fit_of(const Registration& registration);
 
-/// Returns twice the log likelihood ratio of two registrations of the same points, scaled for their correlation.
+/// Evidence of each object for one hypothesis against another: twice a log likelihood ratio. May be summed over sweeps.
+using ObjectEvidence = std::array<float, kObjects>;
+
+/// Compares two registrations of the same points, object by object, scaled for the correlation of points. Positive
+/// where an object fits `one` better.
 ///
 /// Model of a point: a mixture. It lies on a surface of the map (squared Mahalanobis distance), or in unmapped space
 /// (uniform). The share of mapped points is the maximum likelihood one for each registration: where little is mapped, a
-/// pose that slides the scan back onto the map gains nothing. Model of an object: it may have moved, so that all of its
-/// points together are worth no more than the odds against that, whichever registration they speak for.
+/// pose that slides the scan back onto the map gains nothing.
+ObjectEvidence compare(const Registration& one, const Registration& other);
+
+/// Returns the evidence of all objects. Each may have moved, so that all of its points together, in however many
+/// sweeps, are worth no more than the odds against that, whichever hypothesis they speak for.
+double total(const ObjectEvidence& evidence);
+
+/// Returns the evidence for `one` against `other`.
 double evidence(const Registration& one, const Registration& other);
 
 /// Generalised ICP (Segal 2009; paper equations 1 and 2): aligns points that have surface covariances with a map of

@@ -13,27 +13,11 @@ namespace locus {
 
 namespace {
 
-/// Least overlap of an accepted registration.
-constexpr double kMinInlierShare = 0.1;
-
-/// Largest deviation from the motion sources for a registration that misses most of the usual correspondences.
-constexpr double kLoneDeviation_sigma = 3.0;
-
 /// Standard deviation of the prior position above which correspondences are searched in all voxels around a point.
 constexpr double kWide_m = 0.3;
 
 /// Change of the twist above which the points are de-skewed again: it distorts a block of points.
 constexpr double kDistorts_mps = 0.3, kDistorts_radps = 0.05;
-
-/// Prior odds, as twice their logarithm, that a robot that stands does not move off in a sweep.
-constexpr double kStaysAtRest = 9.2;
-
-/// Least fit at rest of lidar alone, relative to any other motion. A lower one would hold back a robot that pulls away.
-constexpr double kAsGoodAtRest = 0.998;
-
-/// Conditions to start a standstill: the twist is slow for kSlowFor and known to kSlowDoubt times the limit for slow.
-constexpr double kSlowDoubt = 4.0;
-constexpr Duration kSlowFor = std::chrono::milliseconds{500};
 
 /// Capacity for the 16 000 voxels of a large sweep that still fits the L2 cache.
 constexpr std::size_t kLastScanBytes = 2'500'000;
@@ -54,13 +38,6 @@ Matrix6 share_of_map(double fresh, const Matrix6& observability) {
   const Matrix6 unconstrained = (constrained * constrained + all).inverse();
   const double share = 2.0 * fresh / (1.0 + fresh);
   return share * all + (1.0 - share) * unconstrained;
-}
-
-/// Tells whether a twist of zero is within three standard deviations of the prediction.
-bool may_rest(const MotionFilter& prediction) {
-  constexpr double kSigmas = 3.0, kLeast = 1e-3; // m/s, rad/s
-  const Vector6 sigma = prediction.covariance().diagonal().tail<6>().cwiseSqrt();
-  return (prediction.twist_base().array().abs() < kSigmas * sigma.array() + kLeast).all();
 }
 
 } // namespace
@@ -147,6 +124,8 @@ void Odometry::prepare_next() {
   const double fresh = map_.insert(free_space_.leave_out_moving(scan_, filter_.pose()), filter_.pose());
   const Matrix6 share = share_of_map(fresh, *keyframe_observability_);
   filter_.transfer_error_to_map(share);
+  if (rival_)
+    rival_->hypothesis.filter.transfer_error_to_map(share);
   if (observer_)
     observer_->transfer_error_to_map(share);
   keyframe_observability_.reset();
@@ -174,9 +153,10 @@ Vector6 Odometry::twist_offset_after_drops(const Sweep& sweep) const {
   return difference;
 }
 
-/// Returns the hypothesis after the update with the sources, before registration.
-Odometry::Hypothesis Odometry::assume(const Sweep& sweep, const Assumption& assumption) const {
-  Hypothesis hypothesis{assumption, choose_among(sweep, assumption.without), false, filter_, {}, {}};
+/// Returns the hypothesis after the update with the sources, before registration. `last`: filter after the last sweep.
+Odometry::Hypothesis Odometry::assume(const Sweep& sweep, const Assumption& assumption,
+                                      const MotionFilter& last) const {
+  Hypothesis hypothesis{assumption, choose_among(sweep, assumption.without), false, last, {}, {}};
   apply_sources(hypothesis.filter, sweep, hypothesis);
   return hypothesis;
 }
@@ -280,107 +260,6 @@ std::optional<SpecificForce> Odometry::force_of(const Sweep& sweep, std::bitset<
   return force && !without[index_of(force->source)] ? force : std::nullopt;
 }
 
-/// Returns the prior odds, as twice their logarithm, that all sources in use are right when those in `without` are
-/// excluded. The accelerometer counts as a source.
-double Odometry::odds_of_sources(const Sweep& sweep, std::bitset<kMaxSources> without) const {
-  const SourceChoice choice = choose_among(sweep, without);
-  const int sources = int{choice.rotation.has_value()} +
-                      int{choice.translation.has_value() && choice.translation != choice.rotation} +
-                      int{force_of(sweep, without).has_value()};
-  return kSourceIsRight * sources;
-}
-
-Odometry::Hypothesis Odometry::attempt(const Sweep& sweep, const Assumption& assumption,
-                                       const Gicp::StopRequested& stop) {
-  Hypothesis hypothesis = assume(sweep, assumption);
-  register_with(sweep, hypothesis, stop);
-  return hypothesis;
-}
-
-/// Compares the hypotheses that a slip begins, that one source is wrong, or all are, with the one that none is: by the
-/// likelihood of the points, of the motion they imply, and the prior odds of faults. Tries them only if a source
-/// contradicts the others or the fit is unusually bad. Returns the registration without sources if it fits better but
-/// the faults it assumes are too unlikely.
-std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Hypothesis& best,
-                                                      const Gicp::StopRequested& stop) {
-  const auto contradiction = worst_source(sweep, best);
-  const auto is_unusual = [&] { return lidar_health_.is_unusual(best.fit); };
-  if ((!contradiction && !is_unusual()) || stop()) // a registration cut short fits badly for that reason alone
-    return std::nullopt;
-  const auto gained = [&](const Hypothesis& other) {
-    return evidence(other.fit, best.fit) + best.filter.surprise(best.fit) - other.filter.surprise(other.fit);
-  };
-  const auto odds = [&](const Hypothesis& hypothesis) {
-    return odds_of_sources(sweep, hypothesis.without) -
-           (hypothesis.slips ? hypothesis.filter.odds_against_slip() : 0.0);
-  };
-  const auto odds_against = [&](const Hypothesis& other) { return odds(best) - odds(other); };
-  if (contradiction && best.choice.translation && index_of(*best.choice.translation) == contradiction->source)
-    if (Hypothesis other = attempt(sweep, {.slips = true}, stop); gained(other) > odds_against(other))
-      best = other;
-  std::array<std::optional<SourceId>, 2> suspects{best.choice.translation, best.choice.rotation};
-  if (suspects[0] == suspects[1])
-    suspects[1].reset();
-  if (contradiction && suspects[1] && index_of(*suspects[1]) == contradiction->source)
-    std::swap(suspects[0], suspects[1]);
-  for (const std::optional<SourceId>& suspect : suspects) {
-    const bool is_explained = (best.slips || best.without.any()) && !is_unusual();
-    if (!suspect || is_explained || stop())
-      continue;
-    Assumption assumption;
-    assumption.without.set(index_of(*suspect));
-    if (Hypothesis other = attempt(sweep, assumption, stop); gained(other) > odds_against(other))
-      best = other;
-  }
-  if (!is_unusual() || stop() || !(suspects[0] || suspects[1]))
-    return std::nullopt;
-  Hypothesis free = attempt(sweep, {.without = kAllSources}, stop);
-  const double gain = gained(free);
-  if (gain > odds_against(free))
-    best = free;
-  else if (gain > 0.0)
-    return free.fit;
-  return std::nullopt;
-}
-
-/// Tells whether a standstill is likelier than a motion. Where sources measure the motion, the odds are those of the
-/// points, of what the sources measure, and Occam's factor of the motion that a standstill spares.
-bool Odometry::is_likelier(const Registration& at_rest, const Hypothesis& moving) const {
-  if (!moving.choice.rotation && !moving.choice.translation)
-    return fit_of(at_rest) > kAsGoodAtRest * fit_of(moving.fit);
-  return evidence(at_rest, moving.fit) + moving.filter.surprise(moving.fit) - moving.filter.surprise_at_rest() +
-             (stands_ ? kStaysAtRest : 0.0) >
-         0.0;
-}
-
-/// Returns the likeliest hypothesis for a sweep.
-Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopRequested& stop) {
-  Hypothesis best = attempt(sweep, {}, stop);
-  gravity_.observe(filter_.pose().rotation.conjugate() * best.filter.pose().rotation, sweep);
-  flat_ground_.observe(sweep.end, gravity_.up_base());
-  if (sweep.points.size() < kMinPoints)
-    return best;
-  Hypothesis first = best;
-  const std::optional<Registration> lidar_alone = consider_faults(sweep, best, stop);
-  MotionFilter after = best.filter;
-  after.update(best.fit.T_target_source, best.fit.twist_base, best.fit.information);
-  const Vector6 sigma_after = after.covariance().diagonal().tail<6>().cwiseSqrt();
-  const bool slow = (best.fit.twist_base.array().abs() < kSlow.array()).all() &&
-                    (sigma_after.array() < kSlowDoubt * kSlow.array()).all(); // standstill requires an observed twist
-  if (!slow)
-    slow_since_ = sweep.end;
-  if (may_rest(best.filter) && (stands_ || sweep.end - slow_since_ >= kSlowFor)) {
-    if (Hypothesis rest = attempt(sweep, {.without = best.without, .rests = true}, stop); is_likelier(rest.fit, best)) {
-      rest.filter.set_pose(filter_.pose());
-      best = rest;
-    }
-  }
-  if (!best.rests && !is_accepted(sweep, lidar_alone.value_or(best.fit), first))
-    return first; // not accepted: dead reckoning uses all sources
-  best.accepted = true;
-  return best;
-}
-
 /// De-skews the points for a base that moved with mean twist `twist_base` since the last sweep. If sources are
 /// excluded, their motion within the sweep is removed.
 void Odometry::correct(const Sweep& sweep, const Vector6& twist_base, std::bitset<kMaxSources> without) {
@@ -391,41 +270,6 @@ void Odometry::correct(const Sweep& sweep, const Vector6& twist_base, std::bitse
 void Odometry::move_points(const Sweep& sweep, const SweepCorrection& correction) {
   correction_ = correction;
   correction_.apply(sweep.points, scan_);
-}
-
-/// Returns the source that contradicts all others most, if any: one whose innovation is less likely than its fault.
-std::optional<Odometry::Contradiction> Odometry::worst_source(const Sweep& sweep, const Hypothesis& hypothesis) const {
-  MotionFilter after = hypothesis.filter;
-  after.update(hypothesis.fit.T_target_source, hypothesis.fit.twist_base, hypothesis.fit.information);
-  std::optional<Contradiction> worst;
-  for (const auto& source : {hypothesis.choice.rotation, hypothesis.choice.translation}) {
-    if (!source)
-      continue;
-    const Innovation found = after.innovation(*source, *steps_.twist_base(sweep, *source), true);
-    const bool is_odometry = sources_[index_of(*source)].kind == SourceKind::odometry;
-    const double fault = is_odometry ? after.odds_against_slip() : kSourceIsRight;
-    for (int axis = 0; axis < 6; ++axis) {
-      if (found.variance[axis] <= 0.0)
-        continue;
-      const double excess = found.value[axis] * found.value[axis] / found.variance[axis] - fault;
-      if (excess > (worst ? worst->evidence : 0.0))
-        worst = {index_of(*source), excess};
-    }
-  }
-  return worst;
-}
-
-/// Returns whether a registration is accepted. One that misses most of the usual correspondences is rejected if it
-/// deviates from the prediction of `all_sources`, unless lidar had no registration for a while.
-bool Odometry::is_accepted(const Sweep& sweep, const Registration& fit, const Hypothesis& all_sources) const {
-  if (fit.iterations == 0 || !fit.T_target_source.finite() || fit.overlap() < kMinInlierShare)
-    return false;
-  const bool was_registered = registered_ || (map_policy_.is_refused() && map_policy_.was_accepted_lately(sweep.end));
-  if (!all_sources.choice.translation || !was_registered || !lidar_health_.lacks_correspondences(fit))
-    return true;
-  const Vector6 deviation = difference(fit.T_target_source, all_sources.filter.pose()).cwiseAbs();
-  const Vector6 sigma = all_sources.filter.covariance().diagonal().head<6>().cwiseSqrt();
-  return (deviation.array() <= kLoneDeviation_sigma * sigma.array()).all();
 }
 
 /// Reports observability and the innovations of the motion sources after an accepted registration.
@@ -468,6 +312,7 @@ void Odometry::follow_epoch(SourceId source, const SourcePose& sensed) {
 
 void Odometry::reset_source(SourceId source) {
   filter_.reset_source(source);
+  rival_.reset();
   if (observer_)
     observer_->reset_source(source);
   if (sources_[index_of(source)].kind == SourceKind::odometry)

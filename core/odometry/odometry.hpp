@@ -86,6 +86,7 @@ class Odometry {
     std::bitset<kMaxSources> without{}; ///< excluded sources
     bool rests = false;                 ///< the robot stands
     bool slips = false;                 ///< a slip of the odometry begins
+    bool continues = false;             ///< carried over from the last sweep
   };
 
   /// A motion hypothesis for one sweep, and its registration.
@@ -94,6 +95,23 @@ class Odometry {
     bool accepted = false; ///< the registration is accepted
     MotionFilter filter;   ///< before the update with lidar
     Registration scan_to_scan, fit;
+  };
+
+  /// A hypothesis that is less likely than the best one, and not excluded yet.
+  struct Rival {
+    Hypothesis hypothesis;
+    double odds = 0.0;        ///< for it, of motion and prior, as twice their logarithm
+    ObjectEvidence objects{}; ///< for it, of the points
+
+    [[nodiscard]] double lead() const { return odds + total(objects); }
+  };
+
+  /// The two likeliest hypotheses for a sweep.
+  struct Contest {
+    Hypothesis best;
+    std::optional<Rival> rival;
+
+    void enter(Rival other);
   };
 
   /// A source that contradicts all others.
@@ -120,15 +138,22 @@ class Odometry {
                                     const Gicp::StopRequested& stop);
   [[nodiscard]] SourceChoice choose_among(const Sweep& sweep, std::bitset<kMaxSources> without) const;
   [[nodiscard]] Vector6 twist_offset_after_drops(const Sweep& sweep) const;
-  [[nodiscard]] Hypothesis assume(const Sweep& sweep, const Assumption& assumption) const;
+  [[nodiscard]] Hypothesis assume(const Sweep& sweep, const Assumption& assumption, const MotionFilter& last) const;
   void match_last(const Sweep& sweep, const MotionBelief& belief, Hypothesis& hypothesis,
                   const Gicp::StopRequested& stop);
   void register_with(const Sweep& sweep, Hypothesis& hypothesis, const Gicp::StopRequested& stop);
   [[nodiscard]] static std::optional<SpecificForce> force_of(const Sweep& sweep, std::bitset<kMaxSources> without);
   [[nodiscard]] double odds_of_sources(const Sweep& sweep, std::bitset<kMaxSources> without) const;
+  [[nodiscard]] double prior_odds(const Sweep& sweep, const Hypothesis& hypothesis) const;
+  [[nodiscard]] Rival against(const Hypothesis& best, const Sweep& sweep, Hypothesis other) const;
+  [[nodiscard]] bool may_slip(const Sweep& sweep, const SourceChoice& choice) const;
+  void continue_rival(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop);
+  std::optional<Registration> consider_faults(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop);
   [[nodiscard]] bool is_likelier(const Registration& at_rest, const Hypothesis& moving) const;
-  std::optional<Registration> consider_faults(const Sweep& sweep, Hypothesis& best, const Gicp::StopRequested& stop);
-  Hypothesis attempt(const Sweep& sweep, const Assumption& assumption, const Gicp::StopRequested& stop);
+  std::optional<Hypothesis> consider_rest(const Sweep& sweep, const Hypothesis& moving,
+                                          const Gicp::StopRequested& stop);
+  Hypothesis attempt(const Sweep& sweep, const Assumption& assumption, const MotionFilter& last,
+                     const Gicp::StopRequested& stop);
   Hypothesis choose(const Sweep& sweep, const Gicp::StopRequested& stop);
   void apply_sources(MotionFilter& filter, const Sweep& sweep, const Hypothesis& hypothesis) const;
   void observe(const Sweep& sweep, const Hypothesis& best);
@@ -158,6 +183,7 @@ class Odometry {
   ObservedAxes observed_axes_;
   SensedSteps steps_;
   MotionFilter filter_;
+  std::optional<Rival> rival_;           ///< its filter includes the update with lidar
   std::optional<MotionFilter> observer_; ///< calibrates sources whose result is only reported, never used
   SweepCorrection correction_;           ///< de-skew of the current sweep
   std::vector<SurfacePoint> scan_;       ///< points of the current sweep, fully de-skewed

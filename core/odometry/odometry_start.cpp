@@ -148,7 +148,7 @@ std::optional<Odometry::Start> Odometry::find_first_motion(const Sweep& first, c
 /// contradicts this motion is doubted: its pose need not be right.
 void Odometry::relocalise_again(const Sweep& first, const Sweep& sweep, const Start& start) {
   const StageScope scope(clock_, Stage::scan_to_submap);
-  MotionFilter lidar_alone = assume(sweep, {.without = kAllSources}).filter;
+  MotionFilter lidar_alone = assume(sweep, {.without = kAllSources}, filter_).filter;
   lidar_alone.update(start.fit.T_target_source, start.twist_base, start.fit.information);
   for (std::size_t i = 0; i < sources_.size(); ++i)
     if (const auto twist_base = steps_.twist_base(sweep, SourceId{i})) {
@@ -168,7 +168,7 @@ void Odometry::relocalise_again(const Sweep& first, const Sweep& sweep, const St
 /// Returns the motion between the first two sweeps with the sources in `without` excluded from the de-skew.
 Odometry::Start Odometry::start_without(std::bitset<kMaxSources> without, const Sweep& first, const Sweep& sweep,
                                         const Gicp::StopRequested& stop) {
-  const MotionFilter unknown = assume(sweep, {.without = without}).filter;
+  const MotionFilter unknown = assume(sweep, {.without = without}, filter_).filter;
   const Pose T_odom_first = filter_.pose();
   MotionBelief prior = unknown.belief();
   prior.information.setZero(); // estimates the pose only

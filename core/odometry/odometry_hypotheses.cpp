@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: Apache-2.0
+// Choice of the likeliest hypothesis on the motion during a sweep and on the sources that measure it.
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include "core/odometry/odometry.hpp"
+
+namespace locus {
+
+namespace {
+
+/// Least overlap of an accepted registration.
+constexpr double kMinInlierShare = 0.1;
+
+/// Largest deviation from the motion sources for a registration that misses most of the usual correspondences.
+constexpr double kLoneDeviation_sigma = 3.0;
+
+/// Prior odds, as twice their logarithm, that a robot that stands does not move off in a sweep.
+constexpr double kStaysAtRest = 9.2;
+
+/// Least fit at rest of lidar alone, relative to any other motion. A lower one would hold back a robot that pulls away.
+constexpr double kAsGoodAtRest = 0.998;
+
+/// Conditions to start a standstill: the twist is slow for kSlowFor and known to kSlowDoubt times the limit for slow.
+constexpr double kSlowDoubt = 4.0;
+constexpr Duration kSlowFor = std::chrono::milliseconds{500};
+
+/// Odds against a rival, as twice their logarithm, from which it is dropped, and the time for which sweeps count:
+/// errors of the map are the same for a while, so that they are no independent evidence.
+constexpr double kExcluded = 12.0, kRemembers_s = 1.0;
+/// Distance between a rival and the best hypothesis below which they are the same.
+constexpr double kAgrees_m = 0.01;
+
+/// Acceleration that an odometry reports, above which wheels may just as well slip.
+constexpr double kSlipsFrom_mps2 = 2.0;
+
+/// Tells whether a twist of zero is within three standard deviations of the prediction.
+bool may_rest(const MotionFilter& prediction) {
+  constexpr double kSigmas = 3.0, kLeast = 1e-3; // m/s, rad/s
+  const Vector6 sigma = prediction.covariance().diagonal().tail<6>().cwiseSqrt();
+  return (prediction.twist_base().array().abs() < kSigmas * sigma.array() + kLeast).all();
+}
+
+} // namespace
+
+/// Enters a hypothesis, given how likely it is against the best one.
+void Odometry::Contest::enter(Rival other) {
+  if (other.lead() > 0.0) {
+    std::swap(best, other.hypothesis);
+    other.odds = -other.odds;
+    for (float& of_object : other.objects)
+      of_object = -of_object;
+    rival = std::move(other);
+  } else if (other.lead() > (rival ? rival->lead() : -kExcluded)) {
+    rival = std::move(other);
+  }
+}
+
+Odometry::Hypothesis Odometry::attempt(const Sweep& sweep, const Assumption& assumption, const MotionFilter& last,
+                                       const Gicp::StopRequested& stop) {
+  Hypothesis hypothesis = assume(sweep, assumption, last);
+  register_with(sweep, hypothesis, stop);
+  return hypothesis;
+}
+
+/// Returns the prior odds, as twice their logarithm, that all sources in use are right when those in `without` are
+/// excluded. The accelerometer counts as a source.
+double Odometry::odds_of_sources(const Sweep& sweep, std::bitset<kMaxSources> without) const {
+  const SourceChoice choice = choose_among(sweep, without);
+  const int sources = int{choice.rotation.has_value()} +
+                      int{choice.translation.has_value() && choice.translation != choice.rotation} +
+                      int{force_of(sweep, without).has_value()};
+  return kSourceIsRight * sources;
+}
+
+/// Returns the prior odds of a hypothesis. A fault that continues is no less likely than none.
+double Odometry::prior_odds(const Sweep& sweep, const Hypothesis& hypothesis) const {
+  return odds_of_sources(sweep, hypothesis.continues ? std::bitset<kMaxSources>{} : hypothesis.without) -
+         (hypothesis.slips ? hypothesis.filter.odds_against_slip() : 0.0);
+}
+
+/// Compares a hypothesis with the best one: by the likelihood of the points, of the motion, and the prior odds.
+Odometry::Rival Odometry::against(const Hypothesis& best, const Sweep& sweep, Hypothesis other) const {
+  const double odds = best.filter.surprise(best.fit) - other.filter.surprise(other.fit) + prior_odds(sweep, other) -
+                      prior_odds(sweep, best);
+  const ObjectEvidence objects = compare(other.fit, best.fit);
+  return {std::move(other), odds, objects};
+}
+
+/// Continues the rival of the last sweep with what this one adds, unless it has come to agree with the best hypothesis.
+void Odometry::continue_rival(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop) {
+  if (!rival_ || stop())
+    return;
+  const Assumption assumption{.without = rival_->hypothesis.without, .continues = true};
+  Rival rival = against(contest.best, sweep, attempt(sweep, assumption, rival_->hypothesis.filter, stop));
+  const Hypothesis& other = rival.hypothesis;
+  const Vector6 apart = difference(other.fit.T_target_source, contest.best.fit.T_target_source);
+  const Matrix6 P = contest.best.filter.covariance().topLeftCorner<6, 6>();
+  if ((apart.head<3>().norm() < kAgrees_m && apart.dot(P.ldlt().solve(apart)) < 1.0) ||
+      other.fit.overlap() < kMinInlierShare)
+    return;
+  const double remembered = std::exp(-steps_.elapsed_s(sweep) / kRemembers_s);
+  rival.odds += remembered * rival_->odds;
+  for (std::size_t i = 0; i < kObjects; ++i)
+    rival.objects[i] += static_cast<float>(remembered) * rival_->objects[i];
+  if (rival.lead() > 0.0)
+    std::swap(filter_, rival_->hypothesis.filter);
+  contest.enter(std::move(rival));
+}
+
+/// Tells whether the wheels may have begun to slip: the forward speed that they report changes more than robots usually
+/// accelerate, and lidar observes the axis.
+bool Odometry::may_slip(const Sweep& sweep, const SourceChoice& choice) const {
+  if (!choice.translation || sources_[index_of(*choice.translation)].kind != SourceKind::odometry ||
+      !observed_axes_.each()[0])
+    return false;
+  const double change_mps = steps_.twist_base(sweep, *choice.translation)->mean[0] - filter_.twist_base()[0];
+  return std::abs(change_mps) > kSlipsFrom_mps2 * steps_.elapsed_s(sweep);
+}
+
+/// Compares the hypotheses that a slip begins, that one source is wrong, or all are, with the one that none is. Tries
+/// them only if a source contradicts the others or the fit is unusually bad. Returns the registration without sources
+/// if it fits better but the faults it assumes are too unlikely.
+std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Contest& contest,
+                                                      const Gicp::StopRequested& stop) {
+  const Hypothesis& best = contest.best;
+  const auto contradiction = worst_source(sweep, best);
+  const auto is_unusual = [&] { return lidar_health_.is_unusual(best.fit); };
+  if (stop()) // a registration cut short fits badly for that reason alone
+    return std::nullopt;
+  const auto try_out = [&](const Assumption& assumption) {
+    contest.enter(against(best, sweep, attempt(sweep, assumption, filter_, stop)));
+  };
+  const auto is_suspect = [&](std::optional<SourceId> source) {
+    return contradiction && source && index_of(*source) == contradiction->source;
+  };
+  if (may_slip(sweep, best.choice) || is_suspect(best.choice.translation))
+    try_out({.slips = true});
+  if (!contradiction && !is_unusual())
+    return std::nullopt;
+  std::array<std::optional<SourceId>, 2> suspects{best.choice.translation, best.choice.rotation};
+  if (suspects[0] == suspects[1])
+    suspects[1].reset();
+  if (is_suspect(suspects[1]))
+    std::swap(suspects[0], suspects[1]);
+  for (const std::optional<SourceId>& suspect : suspects) {
+    const bool is_explained = (best.slips || best.without.any()) && !is_unusual();
+    if (!suspect || is_explained || stop())
+      continue;
+    Assumption assumption;
+    assumption.without.set(index_of(*suspect));
+    try_out(assumption);
+  }
+  if (!is_unusual() || stop() || !(suspects[0] || suspects[1]))
+    return std::nullopt;
+  Rival free = against(best, sweep, attempt(sweep, {.without = kAllSources}, filter_, stop));
+  const double fits_better = free.lead() + prior_odds(sweep, best) - prior_odds(sweep, free.hypothesis);
+  std::optional<Registration> too_unlikely;
+  if (free.lead() <= 0.0 && fits_better > 0.0)
+    too_unlikely = free.hypothesis.fit;
+  contest.enter(std::move(free));
+  return too_unlikely;
+}
+
+/// Tells whether a standstill is likelier than a motion. Where sources measure the motion, the odds are those of the
+/// points, of what the sources measure, and Occam's factor of the motion that a standstill spares.
+bool Odometry::is_likelier(const Registration& at_rest, const Hypothesis& moving) const {
+  if (!moving.choice.rotation && !moving.choice.translation)
+    return fit_of(at_rest) > kAsGoodAtRest * fit_of(moving.fit);
+  return evidence(at_rest, moving.fit) + moving.filter.surprise(moving.fit) - moving.filter.surprise_at_rest() +
+             (stands_ ? kStaysAtRest : 0.0) >
+         0.0;
+}
+
+/// Returns a standstill if the robot may stand and it is likelier than the motion.
+std::optional<Odometry::Hypothesis> Odometry::consider_rest(const Sweep& sweep, const Hypothesis& moving,
+                                                            const Gicp::StopRequested& stop) {
+  MotionFilter after = moving.filter;
+  after.update(moving.fit.T_target_source, moving.fit.twist_base, moving.fit.information);
+  const Vector6 sigma_after = after.covariance().diagonal().tail<6>().cwiseSqrt();
+  const bool slow = (moving.fit.twist_base.array().abs() < kSlow.array()).all() &&
+                    (sigma_after.array() < kSlowDoubt * kSlow.array()).all(); // standstill requires an observed twist
+  if (!slow)
+    slow_since_ = sweep.end;
+  if (!may_rest(moving.filter) || (!stands_ && sweep.end - slow_since_ < kSlowFor))
+    return std::nullopt;
+  Hypothesis rest = attempt(sweep, {.without = moving.without, .rests = true}, filter_, stop);
+  if (!is_likelier(rest.fit, moving))
+    return std::nullopt;
+  rest.filter.set_pose(filter_.pose());
+  return rest;
+}
+
+/// Returns the likeliest hypothesis for a sweep. The next one stays as the rival, until a later sweep excludes either.
+Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopRequested& stop) {
+  Contest contest{attempt(sweep, {}, filter_, stop), std::nullopt};
+  if (sweep.points.size() >= kMinPoints)
+    continue_rival(sweep, contest, stop);
+  rival_.reset();
+  Hypothesis& best = contest.best;
+  gravity_.observe(filter_.pose().rotation.conjugate() * best.filter.pose().rotation, sweep);
+  flat_ground_.observe(sweep.end, gravity_.up_base());
+  if (sweep.points.size() < kMinPoints)
+    return best;
+  Hypothesis first = best;
+  const std::optional<Registration> lidar_alone = consider_faults(sweep, contest, stop);
+  if (auto rest = consider_rest(sweep, best, stop))
+    best = *std::move(rest);
+  if (!best.rests && !is_accepted(sweep, lidar_alone.value_or(best.fit), first))
+    return first; // not accepted: dead reckoning uses all sources
+  best.accepted = true;
+  if (contest.rival) {
+    rival_ = std::move(contest.rival);
+    auto& [rival, odds, objects] = *rival_;
+    rival.filter.update(rival.fit.T_target_source, rival.fit.twist_base, rival.fit.information);
+    rival.filter.learn();
+  }
+  return std::move(best);
+}
+
+/// Returns the source that contradicts all others most, if any: one whose innovation is less likely than its fault.
+std::optional<Odometry::Contradiction> Odometry::worst_source(const Sweep& sweep, const Hypothesis& hypothesis) const {
+  MotionFilter after = hypothesis.filter;
+  after.update(hypothesis.fit.T_target_source, hypothesis.fit.twist_base, hypothesis.fit.information);
+  std::optional<Contradiction> worst;
+  for (const auto& source : {hypothesis.choice.rotation, hypothesis.choice.translation}) {
+    if (!source)
+      continue;
+    const Innovation found = after.innovation(*source, *steps_.twist_base(sweep, *source), true);
+    const bool is_odometry = sources_[index_of(*source)].kind == SourceKind::odometry;
+    const double fault = is_odometry ? after.odds_against_slip() : kSourceIsRight;
+    for (int axis = 0; axis < 6; ++axis) {
+      if (found.variance[axis] <= 0.0)
+        continue;
+      const double excess = found.value[axis] * found.value[axis] / found.variance[axis] - fault;
+      if (excess > (worst ? worst->evidence : 0.0))
+        worst = {index_of(*source), excess};
+    }
+  }
+  return worst;
+}
+
+/// Returns whether a registration is accepted. One that misses most of the usual correspondences is rejected if it
+/// deviates from the prediction of `all_sources`, unless lidar had no registration for a while.
+bool Odometry::is_accepted(const Sweep& sweep, const Registration& fit, const Hypothesis& all_sources) const {
+  if (fit.iterations == 0 || !fit.T_target_source.finite() || fit.overlap() < kMinInlierShare)
+    return false;
+  const bool was_registered = registered_ || (map_policy_.is_refused() && map_policy_.was_accepted_lately(sweep.end));
+  if (!all_sources.choice.translation || !was_registered || !lidar_health_.lacks_correspondences(fit))
+    return true;
+  const Vector6 deviation = difference(fit.T_target_source, all_sources.filter.pose()).cwiseAbs();
+  const Vector6 sigma = all_sources.filter.covariance().diagonal().head<6>().cwiseSqrt();
+  return (deviation.array() <= kLoneDeviation_sigma * sigma.array()).all();
+}
+
+} // namespace locus
