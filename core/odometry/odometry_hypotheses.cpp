@@ -91,8 +91,9 @@ Odometry::Rival Odometry::against(const Hypothesis& best, const Sweep& sweep, Hy
 }
 
 /// Continues the rival of the last sweep with what this one adds, unless it has come to agree with the best hypothesis.
+/// Rivals differ in the forward motion most: where lidar does not observe it, points only seem to decide.
 void Odometry::continue_rival(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop) {
-  if (!rival_ || stop())
+  if (!rival_ || !observed_axes_.each()[0] || stop())
     return;
   const Assumption assumption{.without = rival_->hypothesis.without, .continues = true};
   Rival rival = against(contest.best, sweep, attempt(sweep, assumption, rival_->hypothesis.filter, stop));

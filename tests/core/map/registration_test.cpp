@@ -260,6 +260,18 @@ TEST(Evidence, AnObjectIsWorthTheOddsThatItMovedAtMost) {
   EXPECT_EQ(evidence(one, other), 12.0);
 }
 
+TEST(Evidence, AnObjectIsWorthNoMoreInSeveralSweeps) {
+  const Registration one = fitting(900, 0.3);
+  Registration other = one;
+  other.object_costs[7] += 25.0F; // of which a fifth counts
+  ObjectEvidence sum = compare(one, other);
+  EXPECT_NEAR(total(sum), 5.0, 1e-3);
+  const ObjectEvidence of_next_sweep = compare(one, other);
+  for (std::size_t i = 0; i < kObjects; ++i)
+    sum[i] += of_next_sweep[i];
+  EXPECT_EQ(total(sum), 6.0);
+}
+
 TEST(Evidence, WeighsPointsAsTheRegistrationDoes) {
   // A hundred points more, 4.2 less 1 each, of which 0.06 count as independent. Shares of 0.45 and 0.55 are as likely.
   EXPECT_NEAR(evidence(fitting(550, 1.0), fitting(450, 1.0)), 0.06 * 100.0 * 3.2, 1e-3);
