@@ -53,7 +53,7 @@ void Odometry::Contest::enter(Rival other) {
     other.odds = -other.odds;
     for (float& of_object : other.objects)
       of_object = -of_object;
-    rival = std::move(other);
+    rival = std::move(other); // the former best one, however unlikely now: a takeover may be wrong
   } else if (other.lead() > (rival ? rival->lead() : -kExcluded)) {
     rival = std::move(other);
   }
@@ -98,22 +98,27 @@ void Odometry::continue_rival(const Sweep& sweep, Contest& contest, const Gicp::
   const Assumption assumption{.without = rival_->hypothesis.without, .continues = true};
   Rival rival = against(contest.best, sweep, attempt(sweep, assumption, rival_->hypothesis.filter, stop));
   const Hypothesis& other = rival.hypothesis;
+  if (stop() || lidar_health_.lacks_correspondences(other.fit)) // cut short, or blind
+    return;
   const Vector6 apart = difference(other.fit.T_target_source, contest.best.fit.T_target_source);
   const Matrix6 P = contest.best.filter.covariance().topLeftCorner<6, 6>();
   if ((apart.head<3>().norm() < kAgrees_m && apart.dot(P.ldlt().solve(apart)) < 1.0) ||
       other.fit.overlap() < kMinInlierShare)
     return;
-  const double remembered = std::exp(-steps_.elapsed_s(sweep) / kRemembers_s);
+  const double remembered = std::exp(-std::max(0.0, steps_.elapsed_s(sweep)) / kRemembers_s); // a clock may step back
   rival.odds += remembered * rival_->odds;
   for (std::size_t i = 0; i < kObjects; ++i)
     rival.objects[i] += static_cast<float>(remembered) * rival_->objects[i];
-  if (rival.lead() > 0.0)
+  if (rival.lead() > 0.0) {
     std::swap(filter_, rival_->hypothesis.filter);
+    if (observer_)
+      observer_->set_pose(filter_.pose());
+  }
   contest.enter(std::move(rival));
 }
 
-/// Tells whether the wheels may have begun to slip: the forward speed that they report changes more than robots usually
-/// accelerate, and lidar observes the axis.
+/// Tells whether the wheels may have begun to slip: the forward speed that they report differs from that of the robot
+/// in the last sweep by more than robots usually accelerate, and lidar observes the axis.
 bool Odometry::may_slip(const Sweep& sweep, const SourceChoice& choice) const {
   if (!choice.translation || sources_[index_of(*choice.translation)].kind != SourceKind::odometry ||
       !observed_axes_.each()[0])
@@ -211,7 +216,7 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
   if (auto rest = consider_rest(sweep, best, stop))
     best = *std::move(rest);
   if (!best.rests && !is_accepted(sweep, lidar_alone.value_or(best.fit), first))
-    return first; // not accepted: dead reckoning uses all sources
+    return first; // not accepted: dead reckoning assumes no new fault
   best.accepted = true;
   if (contest.rival) {
     rival_ = std::move(contest.rival);
