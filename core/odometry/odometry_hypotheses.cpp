@@ -34,7 +34,8 @@ constexpr double kExcluded = 12.0, kRemembers_s = 1.0;
 /// Distance between a rival and the best hypothesis below which they are the same.
 constexpr double kAgrees_m = 0.01;
 
-/// Acceleration that an odometry reports, above which wheels may just as well slip.
+/// Acceleration that an odometry reports, above which it is worth trying whether the wheels slip. A lower one finds
+/// more slips and costs more registrations (docs/decisions/053).
 constexpr double kSlipsFrom_mps2 = 2.0;
 
 /// Tells whether a twist of zero is within three standard deviations of the prediction.
@@ -128,8 +129,8 @@ bool Odometry::may_slip(const Sweep& sweep, const SourceChoice& choice) const {
 }
 
 /// Compares the hypotheses that a slip begins, that one source is wrong, or all are, with the one that none is. Tries
-/// them only if a source contradicts the others or the fit is unusually bad. Returns the registration without sources
-/// if it fits better but the faults it assumes are too unlikely.
+/// them only if a source contradicts the others or the fit is unusually bad, the slip also if wheels may slip. Returns
+/// the registration without sources if it fits better but the faults it assumes are too unlikely.
 std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Contest& contest,
                                                       const Gicp::StopRequested& stop) {
   const Hypothesis& best = contest.best;

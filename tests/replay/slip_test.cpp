@@ -8,7 +8,7 @@ namespace locus::test {
 namespace {
 
 /// The robot drives off from a stand at 33.5 s, and its wheels report half as much again for two seconds. No single
-/// sweep excludes that they are right; without a rival that is carried over sweeps the robot ends 0.6 m too far.
+/// sweep excludes that they are right; without a rival that is carried over sweeps the path is up to 0.2 m off.
 TEST(Slip, OfTheWheelsIsFoundFromSeveralSweeps) {
   const SimulatedDrive drive("urban", "husky", 36, {}, 9401, "real");
   const Replay replay = drive.replay({"--fail", "imu:lost@0"});
