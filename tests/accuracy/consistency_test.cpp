@@ -35,7 +35,7 @@ template <class ErrorAt> Drive drive(int poses, double variance_per_metre, Error
 
 Pose shifted(double x_m) { return {Eigen::Quaterniond::Identity(), {x_m, 0, 0}}; }
 
-TEST(Consistency, AnErrorOfOneSigmaAlongOneAxisCountsAsOne) {
+TEST(Consistency, ErrorOfOneSigmaOnOneAxisIsOne) {
   // Errors over 10 m are 0.1 m, and the sum of both variances is 0.01 m^2.
   Drive twenty = drive(21, 0.0, [](int i) { return shifted(i < 10 ? 0.0 : 0.1); });
   for (Matrix6& covariance : twenty.covariances)
@@ -47,7 +47,7 @@ TEST(Consistency, AnErrorOfOneSigmaAlongOneAxisCountsAsOne) {
   EXPECT_NEAR(*judged->nees_10m, 10.0 / 11.0, 0.01) << "of eleven stretches one lies beyond the step";
 }
 
-TEST(Consistency, PlacesFoundEachOnItsOwnAndStatedAsSuchHaveSixForSixAxes) {
+TEST(Consistency, NeesOfIndependentPosesIsSix) {
   constexpr double kSigma_m = 0.01, kSigma_rad = 0.001;
   std::mt19937 random{1};
   std::normal_distribution<double> error_m(0.0, kSigma_m), error_rad(0.0, kSigma_rad);
@@ -64,26 +64,26 @@ TEST(Consistency, PlacesFoundEachOnItsOwnAndStatedAsSuchHaveSixForSixAxes) {
   EXPECT_NEAR(*judged->nees_10m, 6.0, 0.3);
 }
 
-TEST(Consistency, NothingIsSaidOfAStretchThatWasNotDriven) {
+TEST(Consistency, IsAbsentWithoutTenMetres) {
   const auto judged = drive(5, 0.001, [](int) { return Pose{}; }).judged();
   ASSERT_TRUE(judged);
   EXPECT_FALSE(judged->nees_10m);
   EXPECT_EQ(judged->worst_sigma, 0.0);
 }
 
-TEST(Consistency, TheWorstPositionIsFoundWhereverItIs) {
+TEST(Consistency, WorstPositionIsFoundAnywhere) {
   // After 50 m the stated standard deviation is 0.1 m.
   const auto judged = drive(100, 0.0002, [](int i) { return shifted(i == 50 ? 0.4 : 0.0); }).judged();
   ASSERT_TRUE(judged);
   EXPECT_NEAR(judged->worst_sigma, 4.0, 1e-6);
 }
 
-TEST(Consistency, AnErrorBelowACentimetreIsNone) {
+TEST(Consistency, ErrorBelowACentimetreIsIgnored) {
   EXPECT_EQ(drive(20, 1e-12, [](int) { return Pose{}; }).judged()->worst_sigma, 0.0);
   EXPECT_EQ(drive(20, 1e-12, [](int i) { return shifted(i == 3 ? 0.009 : 0.0); }).judged()->worst_sigma, 0.0);
 }
 
-TEST(Consistency, TruthOfAnotherTimeSaysNothing) {
+TEST(Consistency, IsAbsentWithTruthOfAnotherTime) {
   Drive other = drive(20, 0.001, [](int) { return Pose{}; });
   for (StampedPose& pose : other.truth)
     pose.stamp += std::chrono::hours{1};

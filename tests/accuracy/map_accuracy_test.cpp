@@ -70,24 +70,24 @@ TEST_F(MapAccuracyOf, TheTruthItselfIsZero) {
   EXPECT_EQ(accuracy.outliers, 0U);
 }
 
-TEST_F(MapAccuracyOf, WallsTooCloseTogetherAreOffByTheirDistance) {
+TEST_F(MapAccuracyOf, WallOffsetIsTheError) {
   const MapAccuracy accuracy = compared(room(0.04F), room(0));
   EXPECT_NEAR(accuracy.rmse_m.value(), 0.04, 1e-4);
 }
 
-TEST_F(MapAccuracyOf, AMisplacedMapIsFittedFirst) {
+TEST_F(MapAccuracyOf, MisplacedMapIsAlignedFirst) {
   const Pose T_wrong{from_rpy_rad({0.01, -0.01, 0.02}), {0.1, -0.08, 0.05}};
   const MapAccuracy accuracy = compared(moved(room(0.04F), T_wrong), room(0));
   EXPECT_NEAR(accuracy.rmse_m.value(), 0.04, 2e-3) << "12 cm and more without the fit";
 }
 
-TEST_F(MapAccuracyOf, FramesMayBeFarApartIfItIsToldHow) {
+TEST_F(MapAccuracyOf, DistantFramesAreAlignedByTheGivenPose) {
   const Pose T_truth_odom{from_rpy_rad({0.1, 0.2, 2.5}), {40, -30, 5}};
   const MapAccuracy accuracy = compared(room(0.04F), moved(room(0), T_truth_odom), T_truth_odom);
   EXPECT_NEAR(accuracy.rmse_m.value(), 0.04, 1e-3);
 }
 
-TEST_F(MapAccuracyOf, PointsBeyondAMetreAreCountedAndLeftOut) {
+TEST_F(MapAccuracyOf, PointsBeyondAMetreAreOutliers) {
   Points map = room(0);
   map.emplace_back(2.9F, 0.0F, 0.0F);
   map.emplace_back(3.1F, 0.0F, 0.0F);
@@ -98,7 +98,7 @@ TEST_F(MapAccuracyOf, PointsBeyondAMetreAreCountedAndLeftOut) {
   EXPECT_NEAR(accuracy.rmse_m.value(), 0.9 / std::sqrt(static_cast<double>(accuracy.compared)), 1e-3);
 }
 
-TEST_F(MapAccuracyOf, AMapThatMeetsNoTruthHasNoError) {
+TEST_F(MapAccuracyOf, MapWithoutOverlapHasNoError) {
   const MapAccuracy far = compared({{100, 0, 0}, {101, 0, 0}, {100, 1, 0}, {100, 0, 1}}, room(0));
   EXPECT_FALSE(far.rmse_m);
   EXPECT_EQ(far.outliers, 4U);

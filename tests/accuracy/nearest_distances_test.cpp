@@ -20,7 +20,7 @@ std::vector<Eigen::Vector3f> random_points(std::size_t count, unsigned seed) {
   return points;
 }
 
-TEST(NearestDistances, AgreeWithLookingAtEveryPair) {
+TEST(NearestDistances, AgreeWithBruteForce) {
   const auto few = random_points(200, 1), many = random_points(5000, 2);
   for (const float reach_m : {0.1F, 0.25F, 1.0F}) {
     NearestDistances nearest(few, reach_m);
@@ -36,7 +36,7 @@ TEST(NearestDistances, AgreeWithLookingAtEveryPair) {
   }
 }
 
-TEST(NearestDistances, NothingWithinReachIsInfinite) {
+TEST(NearestDistances, BeyondTheLimitAreInfinite) {
   const std::vector<Eigen::Vector3f> few{{0, 0, 0}, {10, 0, 0}};
   NearestDistances nearest(few, 1);
   EXPECT_TRUE(std::isinf(nearest.distances_m()[0]));

@@ -78,7 +78,7 @@ TEST(PointCloudFile, PlyInEitherByteOrder) {
   }
 }
 
-TEST(PointCloudFile, PlyWithMoreThanCoordinates) {
+TEST(PointCloudFile, PlyWithOtherProperties) {
   const std::string vertex = "element vertex 1\nproperty uchar red\nproperty double x\nproperty float intensity\n"
                              "property double y\nproperty double z\nelement face 1\nproperty list uchar int i\n";
   expect_points(
@@ -97,7 +97,7 @@ TEST(PointCloudFile, PcdAsTextAndBinary) {
                 {{1, 2, 3}});
 }
 
-TEST(PointCloudFile, PointsWithoutCoordinatesAreLeftOut) {
+TEST(PointCloudFile, PointsWithoutCoordinatesAreDropped) {
   expect_points(ply("ascii", kTwoFloats, "nan nan nan\n4 5 6\n"), {{4, 5, 6}});
   expect_points(
       ply("binary_little_endian", kTwoFloats, raw(1.0F) + raw(kNan) + raw(3.0F) + raw(4.0F) + raw(5.0F) + raw(6.0F)),
@@ -117,7 +117,7 @@ TEST(PointCloudFile, ManyBlocksGiveEveryPointOnce) {
     ASSERT_EQ(found.points[static_cast<std::size_t>(i)].x(), i);
 }
 
-TEST(PointCloudFile, WhatIsNoCloudIsRefused) {
+TEST(PointCloudFile, OtherFilesAreErrors) {
   expect_error("", "neither a PLY nor a PCD");
   expect_error("\x89PNG\r\n", "neither a PLY nor a PCD");
   expect_error(std::string(100'000, 'x'), "neither a PLY nor a PCD");
@@ -125,7 +125,7 @@ TEST(PointCloudFile, WhatIsNoCloudIsRefused) {
   EXPECT_NE(PointCloudFile::open("/tmp").error().find("cannot be read"), std::string::npos);
 }
 
-TEST(PointCloudFile, BrokenPlyIsRefusedWithItsLine) {
+TEST(PointCloudFile, BrokenPlyIsReportedWithItsLine) {
   expect_error(ply("ascii", "element vertex 0\nproperty float x\nproperty float y\nproperty float z\n", ""),
                "holds no point");
   expect_error("ply\nformat ascii 1.0\nelement vertex 2\n", ":4: the header does not end");
@@ -140,7 +140,7 @@ TEST(PointCloudFile, BrokenPlyIsRefusedWithItsLine) {
   expect_error(ply("ascii", kTwoFloats, "1 2 3\n1 2\n"), ":10: not the coordinates of a point");
 }
 
-TEST(PointCloudFile, BinaryFileThatIsTooShortIsRefusedBeforeItIsRead) {
+TEST(PointCloudFile, TruncatedBinaryFileIsAnErrorBeforeReading) {
   const std::string header = ply("binary_little_endian", kTwoFloats, "");
   expect_error(header + std::string(23, '\0'),
                "ends at byte " + std::to_string(header.size() + 23) + " after 1 of 2 points");
@@ -150,7 +150,7 @@ TEST(PointCloudFile, BinaryFileThatIsTooShortIsRefusedBeforeItIsRead) {
                "after 2 of 18446744073709551615 points");
 }
 
-TEST(PointCloudFile, BrokenPcdIsRefusedWithItsLine) {
+TEST(PointCloudFile, BrokenPcdIsReportedWithItsLine) {
   const std::string begin = "VERSION 0.7\nFIELDS x y z\n";
   expect_error(begin + "SIZE 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2 3\n", ":6: SIZE does not have as many values");
   expect_error(begin + "SIZE 4 4 four\nTYPE F F F\nPOINTS 1\nDATA ascii\n", ":6: SIZE or COUNT of z");

@@ -19,7 +19,7 @@ TEST(ThinnedCloud, PointsOfAVoxelBecomeTheirMean) {
   EXPECT_EQ(centroids[1], Eigen::Vector3f(1.5F, 0.5F, 0.5F));
 }
 
-TEST(ThinnedCloud, GrowsCoarserInsteadOfLarger) {
+TEST(ThinnedCloud, BecomesCoarserInsteadOfLarger) {
   ThinnedCloud cloud(0.05F, 100);
   for (int x = 0; x < 200; ++x) {
     for (int y = 0; y < 200; ++y)

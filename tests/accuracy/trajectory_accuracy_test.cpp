@@ -44,7 +44,7 @@ TEST(ErrorStatistics, AreThoseOfTheSet) {
   EXPECT_DOUBLE_EQ(statistics.rmse, std::sqrt(12.5));
 }
 
-TEST(TrajectoryAccuracy, AnotherFrameIsNoError) {
+TEST(TrajectoryAccuracy, FrameOffsetIsNoError) {
   const Pose T_truth_odom{from_rpy_rad({0.3, -0.2, 2.5}), {300, -40, 7}};
   const Trajectory truth = loop(1000);
   Trajectory estimates = truth;
@@ -85,7 +85,7 @@ TEST(TrajectoryAccuracy, WrongScaleIsNotAlignedAway) {
   EXPECT_NEAR(accuracy->end_drift_m, 1.0, 1e-9);
 }
 
-TEST(TrajectoryAccuracy, TurningTooFastShowsPerTenMetres) {
+TEST(TrajectoryAccuracy, YawScaleErrorAppearsPerTenMetres) {
   const Trajectory estimates = drive(31, milliseconds{1000}, [](int i) {
     return yawed(0.1 * kRadPerDeg * i, {1.0 * i, 0, 0});
   });
@@ -106,14 +106,14 @@ TEST(WayDrift, IsTheMeanOverHundredsOfMetres) {
   EXPECT_NEAR(*way_drift(turning, straight(151))->deg_per_100m, 1.0, 1e-6);
 }
 
-TEST(WayDrift, OfAShortWayIsNotTold) {
+TEST(WayDrift, IsAbsentForAShortPath) {
   EXPECT_FALSE(way_drift(straight(100), straight(100))->percent) << "99 m";
   EXPECT_TRUE(way_drift(straight(101), straight(101))->percent);
   EXPECT_FALSE(way_drift(straight(10), {}));
 }
 
 /// Agrees with KITTI's own tool: ten of the hundred sections of 100 m, which start at every estimate, count.
-TEST(WayDrift, CountsStretchesFromEveryTenthEstimate) {
+TEST(WayDrift, StartsASegmentAtEveryTenthEstimate) {
   Trajectory estimates = straight(200);
   for (std::size_t i = 0; i < estimates.size(); ++i)
     estimates[i].T_source_base.translation.y() = i % 10 == 0 ? 0 : 1; // the ends of counted sections are correct, too
@@ -140,7 +140,7 @@ TEST(TrajectoryAccuracy, TruthIsInterpolatedAtTheStampOfTheEstimate) {
   EXPECT_LT(accuracy->T_truth_odom.rotation.angularDistance(from_rpy_rad({0, 0, 22.5 * kRadPerDeg})), 1e-9);
 }
 
-TEST(TrajectoryAccuracy, FewPosesGiveWhatTheyCan) {
+TEST(TrajectoryAccuracy, FewPosesGivePartialFigures) {
   const auto one = trajectory_accuracy(straight(1), straight(1));
   ASSERT_TRUE(one);
   EXPECT_EQ(one->ape_m.max, 0);
@@ -150,7 +150,7 @@ TEST(TrajectoryAccuracy, FewPosesGiveWhatTheyCan) {
   EXPECT_TRUE(trajectory_accuracy(straight(11), straight(11))->rpe_10m_percent) << "10 m";
 }
 
-TEST(TrajectoryAccuracy, OnlyWhatTheTruthSpansIsCompared) {
+TEST(TrajectoryAccuracy, OnlyTheSpanOfTheTruthIsCompared) {
   const Trajectory truth = straight(5);
   Trajectory estimates = straight(5);
   for (StampedPose& estimate : estimates)
@@ -160,7 +160,7 @@ TEST(TrajectoryAccuracy, OnlyWhatTheTruthSpansIsCompared) {
   EXPECT_EQ(accuracy->stamps, (std::vector<Stamp>{estimates[0].stamp, estimates[1].stamp, estimates[2].stamp}));
 }
 
-TEST(TrajectoryAccuracy, WithoutCommonTimeThereIsNone) {
+TEST(TrajectoryAccuracy, IsAbsentWithoutCommonTime) {
   Trajectory later = straight(5);
   for (StampedPose& pose : later)
     pose.stamp += std::chrono::hours{1};
@@ -170,7 +170,7 @@ TEST(TrajectoryAccuracy, WithoutCommonTimeThereIsNone) {
   EXPECT_FALSE(trajectory_accuracy(straight(5), {}));
 }
 
-TEST(TrajectoryAccuracy, NothingIsComparedInAHoleOfTheTruth) {
+TEST(TrajectoryAccuracy, GapOfTheTruthIsNotCompared) {
   const Trajectory estimates = drive(100, milliseconds{100}, [](int i) {
     return yawed(0, {0.1 * i, i > 20 && i < 60 ? 3.0 : 0.0, 0}); // around an obstacle that the truth does not contain
   });
@@ -182,7 +182,7 @@ TEST(TrajectoryAccuracy, NothingIsComparedInAHoleOfTheTruth) {
   EXPECT_NEAR(accuracy->ape_m.max, 0, 1e-9);
 }
 
-TEST(TrajectoryAccuracy, SparseTruthIsNoHole) {
+TEST(TrajectoryAccuracy, SparseTruthIsNoGap) {
   const Trajectory truth = drive(11, milliseconds{5000}, [](int i) { return yawed(0, {5.0 * i, 0, 0}); });
   const auto accuracy = trajectory_accuracy(straight(51), truth);
   ASSERT_TRUE(accuracy);
@@ -190,7 +190,7 @@ TEST(TrajectoryAccuracy, SparseTruthIsNoHole) {
   EXPECT_NEAR(accuracy->ape_m.max, 0, 1e-9);
 }
 
-TEST(TrajectoryAccuracy, FramesOfARobotThatStandsAreKnownByItsAttitude) {
+TEST(TrajectoryAccuracy, AtRestFramesAreAlignedByAttitude) {
   const Pose T_truth_base{from_rpy_rad({0.1, 0.2, 3}), {1, 2, 3}};
   const auto standing = [](const Pose& pose) { return drive(20, milliseconds{100}, [&](int) { return pose; }); };
   const auto accuracy = trajectory_accuracy(standing(Pose{}), standing(T_truth_base));

@@ -432,7 +432,7 @@ TEST(ConfigYaml, ServiceFileMustNameALidarUnlessExempt) {
   EXPECT_FALSE(load_service_config("/nowhere/robot.yaml"));
 }
 
-TEST(ConfigYaml, AnotherVersionIsRefused) {
+TEST(ConfigYaml, AnotherVersionIsAnError) {
   ASSERT_EQ(errors_in("version: 2\n").size(), 1U);
   EXPECT_TRUE(errors_in("version: 2\n")[0].starts_with("robot.yaml:1: version: this locusd reads version 1; see"));
 }

@@ -172,7 +172,7 @@ TEST(Figures, MetadataIsStaleWhileTheSensorRunsInAnotherMode) {
   EXPECT_NE(problem.find("locusctl fetch SENSOR -o front.json"), std::string::npos) << problem;
 }
 
-TEST(Figures, TextOfAServiceWithoutInputSaysSo) {
+TEST(Figures, TextOfAServiceWithoutInputReportsIt) {
   const Config config = Config{};
   Figures figures{.config = config};
   figures.live = Figures::Live{};

@@ -177,7 +177,7 @@ TEST_F(OusterInput, ColumnsOutsideTheWindowAreNotLost) {
   EXPECT_EQ(lidar.counters().lost, 14U) << "one turn";
 }
 
-TEST_F(OusterInput, DuplicatesAreRefusedAndOvertakenPacketsUsed) {
+TEST_F(OusterInput, DuplicatesAreRejectedAndOvertakenPacketsUsed) {
   LidarInput lidar = opened();
   OusterStream stream;
   for (int i = 0; i < 20; ++i) {

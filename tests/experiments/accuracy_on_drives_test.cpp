@@ -9,7 +9,7 @@ namespace {
 
 using nlohmann::json;
 
-TEST(AccuracyOnDrives, SimulatedOnesStandOnThePageAndAreGone) {
+TEST(AccuracyOnDrives, SimulatedDrivesAreOnThePageAndRemoved) {
   const TemporaryFolder folder;
   const ProgramRun run = run_program(
       LOCUS_EXPERIMENTS, {"--accuracy", "--simulated", "--duration", "10", "--quiet", "-o", folder / "out"});

@@ -45,7 +45,7 @@ void write_standing_capture(const std::filesystem::path& file, const std::filesy
   std::filesystem::rename(scratch / "lidar.pcap", file);
 }
 
-TEST(AccuracyPage, ShowsWhatEachRecordingIsWorth) {
+TEST(AccuracyPage, ShowsEachRecording) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder / "data");
   std::filesystem::copy(room_drive(), folder / "data/robot");
@@ -94,7 +94,7 @@ TEST(AccuracyPage, ShowsWhatEachRecordingIsWorth) {
   EXPECT_EQ(page.find(folder.path().string()), std::string::npos) << "names only: " << page;
 }
 
-TEST(AccuracyPage, WithoutARecordingItSaysWhatItLookedFor) {
+TEST(AccuracyPage, WithoutRecordingsListsTheSupportedKinds) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder / "empty");
   const ProgramRun run = accuracy({folder / "empty", "-o", folder / "out"});
@@ -104,7 +104,7 @@ TEST(AccuracyPage, WithoutARecordingItSaysWhatItLookedFor) {
   EXPECT_EQ(accuracy({folder / "nowhere", "-o", folder / "out"}).status, 1);
 }
 
-TEST(AccuracyPage, OfNothingThatCanBeReplayedIsAFailure) {
+TEST(AccuracyPage, WithoutAReplayableRecordingFails) {
   const TemporaryFolder folder;
   std::ofstream{folder / "garbage.pcap"} << "no capture at all";
   const ProgramRun run = accuracy({folder.path(), "-o", folder / "out"});
@@ -124,7 +124,7 @@ TEST(AccuracyPage, WrongUsageIsExplainedInOneLine) {
   }
 }
 
-TEST(AccuracyFigures, ClaimsAreCountedFromTheFirstPose) {
+TEST(AccuracyFigures, ClaimsAreRelativeToTheFirstPose) {
   std::vector<StampedPose> trajectory;
   for (int i = 0; i < 11; ++i) // out and back, one second each way
     trajectory.push_back(
@@ -138,7 +138,7 @@ TEST(AccuracyFigures, ClaimsAreCountedFromTheFirstPose) {
   EXPECT_TRUE(experiments::claims_of({})["speed_mps"].is_null());
 }
 
-TEST(AccuracyFigures, WithoutAReceiverNoSpeedIsMadeUp) {
+TEST(AccuracyFigures, WithoutAReceiverHaveNoSpeed) {
   const TemporaryFolder folder;
   EXPECT_TRUE(experiments::receiver_speed(folder / "nowhere").is_null());
   std::ofstream{folder / "garbage.pcap"} << "no capture at all";
@@ -147,7 +147,7 @@ TEST(AccuracyFigures, WithoutAReceiverNoSpeedIsMadeUp) {
 }
 
 /// GPRMC sentences of the car: 28.8 to 29.5 knots.
-TEST(AccuracyFigures, ReceiverOfARealCarIsHeard) {
+TEST(AccuracyFigures, ReadTheReceiverOfARealCar) {
   const std::filesystem::path capture = test_data() / "velodyne/hdl32e_moving_15mps.pcap";
   if (!std::filesystem::exists(capture))
     GTEST_SKIP() << "no real captures in " << test_data() << "; set LOCUS_TEST_DATA";

@@ -41,7 +41,7 @@ std::string page_of(const Results& run, const Results& receiver = nullptr) {
 
 bool has(const std::string& page, const std::string& text) { return page.find(text) != std::string::npos; }
 
-TEST(AccuracyTable, ARunHoldsWithinAPercentOfTheWay) {
+TEST(AccuracyTable, RunHoldsWithinOnePercentOfTheDistance) {
   Results result = run();
   EXPECT_TRUE(what_does_not_hold(result).empty());
   result["summary"]["end_drift_m"] = 1.1;
@@ -52,7 +52,7 @@ TEST(AccuracyTable, ARunHoldsWithinAPercentOfTheWay) {
   EXPECT_EQ(what_does_not_hold(result), std::vector<std::string>{"off by 1.30 m"}) << "on the way";
 }
 
-TEST(AccuracyTable, AFewCentimetresAreAllowedOnAShortWay) {
+TEST(AccuracyTable, ShortDistanceAllowsThreeCentimetres) {
   Results result = run();
   result["way"]["way_m"] = 0.0;
   result["summary"]["ape_m"]["max"] = 0.01;
@@ -73,7 +73,7 @@ TEST(AccuracyTable, OverconfidenceAndLostSweepsDoNotHold) {
   EXPECT_TRUE(has(page_of(result), "**no**: farther off than it says; 1 sweep failed |"));
 }
 
-TEST(AccuracyTable, TruthIsShownWhereItIsKnown) {
+TEST(AccuracyTable, TruthIsShownIfKnown) {
   const std::string page = page_of(run());
   EXPECT_TRUE(has(page, "| a/b | wio, imu | 100 | 0.100 | 0.200 | 0.300 | 0.700 | 0.900 | 0.900 | 2.00 | 1000, 0 | "
                         "tracking 990, degenerate 10 | 0.5, 2.0 | 0.5, 2.0 | yes |"))
@@ -82,7 +82,7 @@ TEST(AccuracyTable, TruthIsShownWhereItIsKnown) {
   EXPECT_FALSE(has(page, "KITTI's drives"));
 }
 
-TEST(AccuracyTable, ClaimsStandBesideTheReceiver) {
+TEST(AccuracyTable, SpeedIsShownWithThatOfTheReceiver) {
   Results result = run();
   result.erase("way");
   result["summary"]["lidars"]["front"]["model"] = "HDL-32E";
@@ -92,21 +92,21 @@ TEST(AccuracyTable, ClaimsStandBesideTheReceiver) {
   EXPECT_FALSE(has(page, "Where the truth is known"));
 }
 
-TEST(AccuracyTable, ASinglePoseClaimsNothing) {
+TEST(AccuracyTable, SinglePoseHasNoSpeed) {
   Results result = run();
   result.erase("way");
   result["claims"]["speed_mps"] = nullptr;
   EXPECT_TRUE(has(page_of(result), "| 100.0 |  | |  |  | 1000, 0 |")) << page_of(result);
 }
 
-TEST(AccuracyTable, KittiIsShownWithWhatOthersPublish) {
+TEST(AccuracyTable, KittiIsShownWithPublishedResults) {
   Results result = run();
   result["summary"]["kitti_vertical_angle_added_deg"] = 0.205;
   EXPECT_TRUE(has(page_of(result), "0.205 degrees are added")) << page_of(result);
   EXPECT_TRUE(has(page_of(result), "CT-ICP 0.59 %"));
 }
 
-TEST(AccuracyTable, WhatFailedIsARowWithTheReason) {
+TEST(AccuracyTable, FailedRunIsARowWithTheReason) {
   const std::string page = page_of({{"sources", Results::array()}, {"failed", "no whole turn"}});
   EXPECT_TRUE(has(page, "| a/b | no whole turn |")) << page;
   EXPECT_TRUE(
@@ -114,7 +114,7 @@ TEST(AccuracyTable, WhatFailedIsARowWithTheReason) {
                 "show whether it is of a robot or of a simulator."));
 }
 
-TEST(AccuracyTable, AWarningIsSaidOnceForARecording) {
+TEST(AccuracyTable, WarningIsListedOncePerRecording) {
   Results result = run();
   result["warnings"] = {"the IMU is upside down", "the IMU is upside down"};
   const std::string page = page_of(result);

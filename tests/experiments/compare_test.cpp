@@ -63,7 +63,7 @@ class Compare : public testing::Test {
 
 bool contains_text(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
-TEST_F(Compare, ADifferenceCountsBeyondAMillimetreAndATenth) {
+TEST_F(Compare, DifferencesCountBeyondAMillimetreAndATenth) {
   EXPECT_EQ(verdict(0.0040, 0.0049), "same") << "less than a millimetre";
   EXPECT_EQ(verdict(0.100, 0.109), "same") << "less than a tenth";
   EXPECT_EQ(verdict(0.0040, 0.0051), "**worse**");
@@ -73,12 +73,12 @@ TEST_F(Compare, ADifferenceCountsBeyondAMillimetreAndATenth) {
   EXPECT_EQ(verdict(0.004, 0.004, 2.0, 2.3), "**worse**");
 }
 
-TEST_F(Compare, ARowIsWorseIfAnyFigureIs) {
+TEST_F(Compare, RowIsWorseIfAnyFigureIs) {
   EXPECT_EQ(verdict(0.1, 0.01, 2.0, 4.0), "**worse**");
   EXPECT_EQ(verdict(0.01, 0.1, 4.0, 2.0), "**worse**");
 }
 
-TEST_F(Compare, WhetherItHoldsGoesBeforeItsFigures) {
+TEST_F(Compare, HoldingOutweighsFigures) {
   const std::string lost = page(faults({fault_row("a", 0.0201)}), faults({fault_row("a", 0.0200, 2.0, false)}));
   EXPECT_TRUE(contains_text(lost, "| **worse** | urban/a | yes -> **no**: too large an error | 20.1 -> 20.0 |"))
       << lost;
@@ -88,7 +88,7 @@ TEST_F(Compare, WhetherItHoldsGoesBeforeItsFigures) {
   EXPECT_TRUE(contains_text(found, "| better | urban/a | **no** -> yes | 20.0 -> 40.0 (+100 %) |")) << found;
 }
 
-TEST_F(Compare, TheWorstComesFirst) {
+TEST_F(Compare, WorstRowIsFirst) {
   const std::vector<Results> was{fault_row("same", 0.01), fault_row("better", 0.1), fault_row("worse", 0.01),
                                  fault_row("worst", 0.01), fault_row("breaks", 0.02)};
   const std::vector<Results> is{fault_row("same", 0.01), fault_row("better", 0.01), fault_row("worse", 0.02),
@@ -103,7 +103,7 @@ TEST_F(Compare, TheWorstComesFirst) {
   EXPECT_TRUE(contains_text(text, "5 rows: 3 worse, 1 better, 1 same, 1 of these with equal figures")) << text;
 }
 
-TEST_F(Compare, RowsThatOnlyOneOfThemHasAreNamed) {
+TEST_F(Compare, RowsOfOnlyOneResultAreNamed) {
   const std::string text =
       page(faults({fault_row("a", 0.1), fault_row("gone", 0.1)}), faults({fault_row("a", 0.1), fault_row("new", 0.1)}));
   EXPECT_TRUE(contains_text(text, "1 rows: 0 worse, 0 better, 1 same")) << text;
@@ -111,7 +111,7 @@ TEST_F(Compare, RowsThatOnlyOneOfThemHasAreNamed) {
   EXPECT_TRUE(contains_text(text, "Only after, 1: urban/new.")) << text;
 }
 
-TEST_F(Compare, ARunThatGivesNoFigureAnyMoreIsWorse) {
+TEST_F(Compare, RunWithoutAFormerFigureIsWorse) {
   const Results failed{{"fault", "a fault"},
                        {"course", "urban"},
                        {"configuration", "a"},
@@ -122,7 +122,7 @@ TEST_F(Compare, ARunThatGivesNoFigureAnyMoreIsWorse) {
   EXPECT_TRUE(contains_text(page(faults({failed}), faults({failed})), "| same | urban/a |"));
 }
 
-TEST_F(Compare, TheCovariancesAreARowThatIsBestAtSix) {
+TEST_F(Compare, CovariancesAreARowThatIsBestAtSix) {
   const auto with_nees = [](double nees, int runs) {
     Results results = faults({});
     results["faults"]["consistency"] = {{"runs", runs}, {"failed", 0}, {"nees_10m", nees}, {"holds", true}};
@@ -150,7 +150,7 @@ Results matrix(double error_m) {
   return {{"version", "1"}, {"duration_s", 60}, {"runs", {run}}, {"matrix", {{"cells", {judged, impossible}}}}};
 }
 
-TEST_F(Compare, ACellOfTheMatrixHasTheFiguresOfItsRun) {
+TEST_F(Compare, MatrixCellHasTheFiguresOfItsRun) {
   const std::string text = page(matrix(0.004), matrix(0.008));
   EXPECT_TRUE(contains_text(text, "| **worse** | wio: frozen, mid-drive | yes | 4.0 -> 8.0 (+100 %) | 2.0 | 0 | 0 |"))
       << text;
@@ -197,7 +197,7 @@ TEST_F(Compare, HarshRowsAreKeyedByCourseImperfectionAndSensors) {
       << text;
 }
 
-TEST_F(Compare, HarshRowsAreWorseForDrivesLostUnsaidAndForSpeedThatNoRobotHad) {
+TEST_F(Compare, UnreportedLossAndExcessSpeedMakeHarshRowsWorse) {
   const std::string lost = page(harsh(0.1), harsh(0.1, 1, 1));
   EXPECT_TRUE(contains_text(lost, "| **worse** | urban, late IMU, all |  | 20.0 | 100.0 | 1.0 | 0 -> 1 | 0 | 0.2 |"))
       << lost;
@@ -211,7 +211,7 @@ TEST_F(Compare, HarshRowsAreWorseForDrivesLostUnsaidAndForSpeedThatNoRobotHad) {
   EXPECT_TRUE(contains_text(page(harsh(0.1, 0, 0, 0.9), harsh(0.1, 0, 0, 0.5)), "1 same, 1 of these with equal"));
 }
 
-TEST_F(Compare, WhatIsNotOfTheSameExperimentIsRefused) {
+TEST_F(Compare, OtherExperimentsAreAnError) {
   Results longer = faults({}), more_seeds = faults({}), paper = faults({}), real = faults({}), more_drives = harsh(0.1);
   longer["duration_s"] = 300;
   more_seeds["faults"]["seeds"] = 3;
@@ -233,7 +233,7 @@ TEST_F(Compare, WhatIsNotOfTheSameExperimentIsRefused) {
   EXPECT_TRUE(contains_text(error(faults({}), paper), "--compare: the paper's experiments have no rows"));
 }
 
-TEST_F(Compare, AFileThatHoldsNoResultsIsRefused) {
+TEST_F(Compare, FileWithoutResultsIsAnError) {
   EXPECT_THROW(ResultsBefore(folder_ / "nowhere.json"), tools::Failure);
   for (const Results& other : {Results::array(), Results{{"runs", 3}}, Results("text")})
     EXPECT_TRUE(contains_text(error(other, faults({})), "before.json: no results of locus-experiments")) << other;

@@ -30,7 +30,7 @@ void save(const std::filesystem::path& file, const std::vector<StampedPose>& pos
            << " 0 0 0 0 0 1\n";
 }
 
-TEST(ErrorAdded, IsThatOfTheIntervalAlone) {
+TEST(ErrorAdded, IsMeasuredWithinTheInterval) {
   const auto truth = drive([](int) { return 0.0; });
   const auto estimates = drive([](int second) { return 0.5 + (second > 10 ? 0.1 * std::min(second - 10, 5) : 0.0); });
   EXPECT_NEAR(error_added_m(estimates, truth, {2, 9}), 0.0, 1e-9);
@@ -38,7 +38,7 @@ TEST(ErrorAdded, IsThatOfTheIntervalAlone) {
   EXPECT_NEAR(error_added_m(estimates, truth, {10, 100}), 0.5, 1e-9) << "as far as the estimates go";
 }
 
-TEST(FaultFigures, TellOfFlagsGrowthAndTheSourcesThemselves) {
+TEST(FaultFigures, HaveFlagsGrowthAndSourceErrors) {
   const test::TemporaryFolder folder;
   save(folder / "gt.tum", drive([](int) { return 0.0; }));
   save(folder / "odometry.tum", drive([](int) { return 0.0; }));

@@ -24,7 +24,7 @@ Arguments fault_arguments() {
 
 const Run& run_of(const Plan& plan, const std::string& id) { return *std::ranges::find(plan.runs, id, &Run::id); }
 
-TEST(FaultPlan, DoesEachCaseOnEverySeedOnce) {
+TEST(FaultPlan, RunsEachCaseOnEverySeedOnce) {
   const Plan plan = make_plan(fault_arguments());
   std::set<std::string> ids;
   for (const auto& run : plan.runs)
@@ -38,7 +38,7 @@ TEST(FaultPlan, DoesEachCaseOnEverySeedOnce) {
   }
 }
 
-TEST(FaultPlan, EveryFaultIsOneThatReplayKnowsAndIsWatchedWhileItLasts) {
+TEST(FaultPlan, EveryFaultIsValidAndMeasuredWhileItLasts) {
   for (const auto& run : make_plan(fault_arguments()).runs) {
     for (std::size_t i = 1; i < run.options.size(); i += 2) {
       const auto fault = Fault::parse(run.options[i]);

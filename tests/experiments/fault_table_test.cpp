@@ -49,7 +49,7 @@ Results wio_frozen(double ape_m, int changes, const std::string& course = "urban
   return frozen;
 }
 
-TEST(FaultTable, ARowHoldsWhileTheErrorStaysWithinAFifthOrACentimetre) {
+TEST(FaultTable, RowHoldsWithinAFifthOrACentimetre) {
   const auto holds = [](double without_m, double with_m) {
     return row_of({run("urban_1", "none", without_m), wio_frozen(with_m, 2)}, "urban", "wio_frozen")["holds"];
   };
@@ -59,7 +59,7 @@ TEST(FaultTable, ARowHoldsWhileTheErrorStaysWithinAFifthOrACentimetre) {
   EXPECT_FALSE(holds(0.1, 0.121));
 }
 
-TEST(FaultTable, TheMedianOfThePairsDecides) {
+TEST(FaultTable, MedianOfThePairsDecides) {
   std::vector<Results> runs;
   for (const auto& [seed, with_m] : {std::pair{1, 0.100}, std::pair{2, 0.205}, std::pair{3, 0.900}}) {
     runs.push_back(run(fault_course("urban", seed), "none", 0.1 * seed));
@@ -70,7 +70,7 @@ TEST(FaultTable, TheMedianOfThePairsDecides) {
   EXPECT_EQ(row["found"], "+5.0 mm of 40.0 mm");
 }
 
-TEST(FaultTable, ASourceMustBeFoundOutAndTakenBack) {
+TEST(FaultTable, SourceMustBeLostAndReturn) {
   const auto row = [](int changes) {
     return row_of({run("urban_1", "none", 0.1), wio_frozen(0.1, changes)}, "urban", "wio_frozen");
   };
@@ -80,7 +80,7 @@ TEST(FaultTable, ASourceMustBeFoundOutAndTakenBack) {
   EXPECT_EQ(row(4)["health"][0], "wio lost, back, up to 2 x");
 }
 
-TEST(FaultTable, LostAndFailedSweepsAreToldUnlessThereIsNoLidar) {
+TEST(FaultTable, LostAndFailedSweepsBreakARowUnlessLidarIsAbsent) {
   Results fewer = wio_frozen(0.1, 2), failing = fewer, gap = run("urban_1", "lidar_gap", 0.1);
   fewer["summary"]["sweeps"]["seen"] = 590;
   failing["summary"]["sweeps"]["failed"] = 3;
@@ -91,7 +91,7 @@ TEST(FaultTable, LostAndFailedSweepsAreToldUnlessThereIsNoLidar) {
   EXPECT_TRUE(row_of({without, gap}, "urban", "lidar_gap")["holds"]);
 }
 
-TEST(FaultTable, AGapIsMeasuredByTheDriftOfTheSource) {
+TEST(FaultTable, GapIsJudgedByTheDriftOfTheSource) {
   Results gap = run("urban_1", "lidar_gap", 0.1);
   gap["fault"]["added_m"] = 0.149;
   EXPECT_TRUE(row_of({run("urban_1", "none", 0.1), gap}, "urban", "lidar_gap")["holds"]);
@@ -99,7 +99,7 @@ TEST(FaultTable, AGapIsMeasuredByTheDriftOfTheSource) {
   EXPECT_FALSE(row_of({run("urban_1", "none", 0.1), gap}, "urban", "lidar_gap")["holds"]);
 }
 
-TEST(FaultTable, ALossThatAddsErrorMustBeFlaggedAndHonest) {
+TEST(FaultTable, LossThatAddsErrorMustBeFlaggedAndWithinSigma) {
   const auto row = [](double told, double sigmas) {
     Results lost = run("tunnel_1", "wio_lost", 0.5);
     health_changes(lost, "wio") = 1;
@@ -112,7 +112,7 @@ TEST(FaultTable, ALossThatAddsErrorMustBeFlaggedAndHonest) {
   EXPECT_FALSE(row(0.0, 2.9)["holds"]);
 }
 
-TEST(FaultTable, InACorridorTheWheelsAndTheGrowthOfDoubtDecide) {
+TEST(FaultTable, CorridorIsJudgedByWheelsAndSigmaGrowth) {
   Results corridor = run("corridor_1", "none", 0.19);
   EXPECT_TRUE(row_of({corridor}, "corridor", "none")["holds"]);
   corridor["fault"]["growth"]["across"] = 2.1;
@@ -120,14 +120,14 @@ TEST(FaultTable, InACorridorTheWheelsAndTheGrowthOfDoubtDecide) {
   EXPECT_EQ(row_of({run("corridor_1", "none", 0.21)}, "corridor", "none")["broken"][0], "worse than the wheels");
 }
 
-TEST(FaultTable, SlippingIsComparedWithTheDriveWithoutIt) {
+TEST(FaultTable, SlipIsComparedWithTheDriveWithoutIt) {
   Results slip = run("slip_1", "none", 0.04);
   EXPECT_TRUE(row_of({run("urban_1", "none", 0.01), slip}, "slip", "none")["holds"]);
   slip["fault"]["added_m"] = 0.06;
   EXPECT_FALSE(row_of({run("urban_1", "none", 0.01), slip}, "slip", "none")["holds"]);
 }
 
-TEST(FaultTable, ARunThatFailedIsNoRunThatHolds) {
+TEST(FaultTable, FailedRunDoesNotHold) {
   const Results failed{{"course", "urban_1"}, {"configuration", "wio_frozen"}, {"failed", "it crashed"}};
   const Results row = row_of({run("urban_1", "none", 0.1), failed}, "urban", "wio_frozen");
   EXPECT_FALSE(row["holds"]);
@@ -135,7 +135,7 @@ TEST(FaultTable, ARunThatFailedIsNoRunThatHolds) {
 }
 
 /// The mean over the remaining runs would look good.
-TEST(FaultTable, RunsForTheCovariancesThatFailAreCountedAndNothingHoldsByThem) {
+TEST(FaultTable, FailedCovarianceRunsAreCountedAndDoNotHold) {
   Results stood = run("honesty_2", "none", 0.1);
   stood["summary"]["covariance"]["nees_10m"] = nullptr;
   const Results crashed{{"course", "honesty_3"}, {"configuration", "none"}, {"failed", "it crashed"}};
@@ -153,7 +153,7 @@ TEST(FaultTable, RunsForTheCovariancesThatFailAreCountedAndNothingHoldsByThem) {
   EXPECT_NE(text.find("**does not hold**; 2 more runs failed."), std::string::npos) << text;
 }
 
-TEST(FaultTable, ASweepMayFailWhileALateLidarIsSilent) {
+TEST(FaultTable, SweepsMayFailDuringAMissingLidar) {
   Results late = run("urban_1", "lidar_late", 0.1);
   late["summary"]["sweeps"]["failed"] = 3;
   const Results without = run("urban_1", "none", 0.1);
@@ -162,7 +162,7 @@ TEST(FaultTable, ASweepMayFailWhileALateLidarIsSilent) {
   EXPECT_EQ(row_of({without, late}, "urban", "lidar_late")["broken"][0], "sweeps fail");
 }
 
-TEST(FaultTable, SaysInMarkdownWhatHoldsAndWhatDoesNot) {
+TEST(FaultTable, MarkdownStatesWhatHolds) {
   Results results{{"version", "1"},
                   {"simulated", true},
                   {"duration_s", 60},

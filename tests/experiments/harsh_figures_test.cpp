@@ -48,7 +48,7 @@ class HarshFigures : public testing::Test {
 double none(double) { return 0; }
 bool never(double) { return false; }
 
-TEST_F(HarshFigures, ADriveThatKeepsToTheTruthIsNotLost) {
+TEST_F(HarshFigures, DriveNearTheTruthIsNotLost) {
   const auto found = figures(none, never);
   EXPECT_TRUE(found["standing"]);
   EXPECT_NEAR(found["true_mps"].get<double>(), 1.0, 1e-6);
@@ -56,7 +56,7 @@ TEST_F(HarshFigures, ADriveThatKeepsToTheTruthIsNotLost) {
   EXPECT_TRUE(found["flagged_after_s"].is_null());
 }
 
-TEST_F(HarshFigures, WhatWarnedBeforeItWasLostDoesNotCount) {
+TEST_F(HarshFigures, FlagBeforeTheLossDoesNotCount) {
   const auto lost_at_6 = [](double t_s) { return t_s < 5.95 ? 0.02 * t_s : 0.4; };
   const auto found = figures(lost_at_6, [](double t_s) { return t_s < 5 || t_s > 8.45; });
   EXPECT_NEAR(found["lost_after_s"].get<double>(), 6.0, 1e-6);
@@ -65,13 +65,13 @@ TEST_F(HarshFigures, WhatWarnedBeforeItWasLostDoesNotCount) {
 }
 
 /// At 1 m/s from 2 s on, a heading error of 0.01 rad amounts to 20 mm after 4 s.
-TEST_F(HarshFigures, ALidarMountedAskewTurnsTheWay) {
+TEST_F(HarshFigures, MountingErrorOfTheLidarIsNoLoss) {
   const auto askew = [](double t_s) { return t_s < 3.95 ? 0.0 : 0.29 + 0.01 * (t_s - 2); };
   EXPECT_NEAR(figures(askew, never)["lost_after_s"].get<double>(), 4.0, 1e-6);
   EXPECT_TRUE(figures(askew, never, "", 0.01)["lost_after_s"].is_null());
 }
 
-TEST_F(HarshFigures, WhatWasSaidIsToldOnceAndWithoutItsNumbers) {
+TEST_F(HarshFigures, WarningsAreListedOnceWithoutNumbers) {
   sources_ = {{"wio", {{"received", 100}, {"health_changes", 2}}}, {"imu", {{"received", 0}, {"health_changes", 1}}}};
   const auto found = figures(none, never,
                              "locus-replay: warning: wio is off by 3.25 m\nlocus-replay: warning: wio is off by 17 m\n"

@@ -30,7 +30,7 @@ double value_of(const std::vector<std::string>& options, const std::string& opti
   return found == options.end() ? -1 : std::stod(*(found + 1));
 }
 
-TEST(HarshPlan, EveryImperfectionIsTriedAloneInHardUseOnceOnEachCourse) {
+TEST(HarshPlan, EveryImperfectionRunsAloneOnceInHardUse) {
   for (const sim::NamedImperfection& one : sim::kImperfections) {
     const auto has_it = [&](const Imperfection& imperfection) {
       return value_of(imperfection.options, "--" + std::string(one.name)) == one.harsh;
@@ -39,7 +39,7 @@ TEST(HarshPlan, EveryImperfectionIsTriedAloneInHardUseOnceOnEachCourse) {
   }
 }
 
-TEST(HarshPlan, RealAndHarshWorldsAreDrivenOnEveryCourse) {
+TEST(HarshPlan, EveryCourseHasARealAndAHarshWorld) {
   std::set<std::string> courses;
   std::map<std::string, std::set<std::string>> driven;
   for (const HarshCase& harsh_case : harsh_cases("")) {
@@ -51,7 +51,7 @@ TEST(HarshPlan, RealAndHarshWorldsAreDrivenOnEveryCourse) {
   EXPECT_EQ(driven["harsh"], courses);
 }
 
-TEST(HarshPlan, GroupsAreTriedAloneOnThreeCoursesAndTheVehicleWhereItHasRoom) {
+TEST(HarshPlan, GroupsRunAloneOnThreeCoursesAndTheVehicleWhereItFits) {
   std::map<std::string, std::set<std::string>> driven;
   for (const HarshCase& harsh_case : harsh_cases(""))
     driven[harsh_case.imperfection].insert(harsh_case.course);
@@ -77,7 +77,7 @@ TEST(HarshPlan, DrivesBeginAtTenPlacesOfTheCourseAndStayWithinIt) {
     EXPECT_EQ(starts.size(), 10U) << drives;
 }
 
-TEST(HarshPlan, SensorsThatAreNotThereAreLostFromTheFirstSampleOn) {
+TEST(HarshPlan, AbsentSensorsAreLostFromTheFirstSampleOn) {
   for (const auto& run : make_plan(harsh_arguments()).runs) {
     std::set<std::string> lost;
     for (std::size_t i = 0; i + 1 < run.options.size(); ++i) {
@@ -100,7 +100,7 @@ TEST(HarshPlan, SensorsThatAreNotThereAreLostFromTheFirstSampleOn) {
   }
 }
 
-TEST(HarshPlan, NamesOfCoursesAndRunsAreNamesOfFiles) {
+TEST(HarshPlan, NamesOfCoursesAndRunsAreFileNames) {
   std::set<std::string> ids;
   for (const auto& run : make_plan(harsh_arguments()).runs) {
     EXPECT_TRUE(ids.insert(run.id()).second) << run.id() << " twice";
@@ -109,7 +109,7 @@ TEST(HarshPlan, NamesOfCoursesAndRunsAreNamesOfFiles) {
   }
 }
 
-TEST(HarshPlan, RefusesWhatNamesNoCourseAndCoursesShorterThanADrive) {
+TEST(HarshPlan, UnknownAndTooShortCoursesAreErrors) {
   EXPECT_THROW(make_plan(harsh_arguments("moon")), tools::Failure);
   Arguments brief = harsh_arguments();
   brief.duration_s = kHarshDrive_s;

@@ -52,7 +52,7 @@ Results row_with(const std::function<void(Results& drive)>& make_worse) {
 
 Results broken_with(const std::function<void(Results& drive)>& make_worse) { return row_with(make_worse)["broken"]; }
 
-TEST(HarshTable, ARowSumsUpItsDrives) {
+TEST(HarshTable, RowSummarisesItsDrives) {
   const Results row = row_with([](Results& drive) {
     drive["summary"]["ape_m"] = {{"mean", 0.02}, {"max", 0.1}};
     drive["harsh"]["said"] = {"imu set aside"};
@@ -74,7 +74,7 @@ TEST(HarshTable, OneBadDriveBreaksARow) {
             Results::array({"speed"}));
 }
 
-TEST(HarshTable, ADriveThatIsLostHasToSaySoWithinASecond) {
+TEST(HarshTable, LostDriveMustBeFlaggedWithinASecond) {
   const auto lost = [](Results flagged_after_s) {
     return broken_with([=](Results& drive) {
       drive["harsh"]["lost_after_s"] = 7.0;
@@ -86,7 +86,7 @@ TEST(HarshTable, ADriveThatIsLostHasToSaySoWithinASecond) {
   EXPECT_EQ(lost(0.9), Results::array());
 }
 
-TEST(HarshTable, ADriveThatFailsBreaksARowAndLeavesTheOthers) {
+TEST(HarshTable, FailedDriveBreaksOnlyItsRow) {
   const Results row = row_with([](Results& drive) {
     drive = {{"course", drive["course"]}, {"configuration", drive["configuration"]}, {"failed", "ended by signal 11"}};
   });
@@ -95,7 +95,7 @@ TEST(HarshTable, ADriveThatFailsBreaksARowAndLeavesTheOthers) {
   EXPECT_EQ(row["broken"], Results::array({"drives fail"}));
 }
 
-TEST(HarshTable, SaysWhatWasLostAndWhatOfItWasSaid) {
+TEST(HarshTable, ShowsLostAndFlaggedDrives) {
   const std::string text = harsh_table(results_with([](Results& drive) {
     drive["summary"]["ape_m"]["max"] = 12.0;
     drive["harsh"]["lost_after_s"] = 7.0;

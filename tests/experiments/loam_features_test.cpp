@@ -45,7 +45,7 @@ TEST(LoamFeatures, CornersAreEdgesAndWallsArePlanes) {
   EXPECT_EQ(sweep.registered, sweep.points.size());
 }
 
-TEST(LoamFeatures, ChosenPointsAreNoNeighbours) {
+TEST(LoamFeatures, SelectedPointsAreNotNeighbours) {
   Sweep sweep = turn(square_room);
   keep_loam_features(sweep);
   std::ranges::sort(sweep.points, {}, &SweepPoint::age_s);
@@ -53,7 +53,7 @@ TEST(LoamFeatures, ChosenPointsAreNoNeighbours) {
     EXPECT_GT(sweep.points[i].age_s - sweep.points[i - 1].age_s, 5 * 0.1F / 1800);
 }
 
-TEST(LoamFeatures, BorderOfAShadowIsNoEdge) {
+TEST(LoamFeatures, OcclusionBorderIsNoEdge) {
   // A pillar at 2 m occludes part of a round wall at 8 m.
   const auto range_at = [](double azimuth) { return azimuth > 2 && azimuth < 2.2 ? 2.0 : 8.0; };
   Sweep sweep = turn(range_at);
@@ -65,7 +65,7 @@ TEST(LoamFeatures, BorderOfAShadowIsNoEdge) {
   }
 }
 
-TEST(LoamFeatures, SurfaceAlongTheBeamGivesNone) {
+TEST(LoamFeatures, SurfacesAlongTheBeamHaveNone) {
   // Two long parallel walls: beyond 8 degrees, adjacent points on a wall are more than 1/40 of their range apart.
   const auto range_at = [](double azimuth) { return std::min(60.0, 1 / std::max(1e-9, std::abs(std::sin(azimuth)))); };
   Sweep sweep = turn(range_at);
@@ -77,7 +77,7 @@ TEST(LoamFeatures, SurfaceAlongTheBeamGivesNone) {
   }
 }
 
-TEST(LoamFeatures, EachScanLineGivesItsOwn) {
+TEST(LoamFeatures, EachScanLineHasItsOwn) {
   Sweep sweep = turn(square_room, 3);
   const Sweep other = turn(square_room, 260);
   sweep.points.insert(sweep.points.end(), other.points.begin(), other.points.end());
@@ -87,7 +87,7 @@ TEST(LoamFeatures, EachScanLineGivesItsOwn) {
   EXPECT_EQ(of(3), of(260));
 }
 
-TEST(LoamFeatures, TooFewReturnsGiveNone) {
+TEST(LoamFeatures, TooFewReturnsHaveNone) {
   Sweep sweep = turn(square_room);
   sweep.points.resize(8);
   keep_loam_features(sweep);

@@ -40,7 +40,7 @@ std::map<std::string, std::pair<int, int>> times_in(const std::filesystem::path&
   return times;
 }
 
-TEST(LocusExperiments, AFleetsRecordingsMakeOnePage) {
+TEST(LocusExperiments, SeveralRecordingsGiveOnePage) {
   const TemporaryFolder folder;
   const std::filesystem::path out = folder / "out", robot = folder / "robot's $1";
   std::filesystem::create_directories(out / "courses/mine");
@@ -101,7 +101,7 @@ TEST(LocusExperiments, RunsAtAPaceAreAsAccurateAsOthers) {
 }
 
 /// A stand-in for a launcher such as srun.
-TEST(LocusExperiments, ALauncherStartsWhateverTakesLong) {
+TEST(LocusExperiments, LauncherStartsSimulationsAndRuns) {
   const TemporaryFolder folder;
   std::filesystem::copy(room_drive(), folder / "robot");
   const ProgramRun run = experiments({"--accuracy", "--quiet", "-o", folder / "out", folder / "robot", "--launcher",
@@ -123,7 +123,7 @@ TEST(LocusExperiments, LoamFeaturesReplaceTheFilters) {
   EXPECT_LT(summary["ape_m"]["max"].get<double>(), 0.1);
 }
 
-TEST(LocusExperiments, ACourseThatCannotBeSimulatedIsTheReasonOfItsRuns) {
+TEST(LocusExperiments, FailedSimulationIsTheReasonOfItsRuns) {
   const TemporaryFolder folder;
   const ProgramRun run =
       experiments({"--fault-matrix", "--quiet", "--duration", "10", "-o", folder / "out", "--launcher", "false"});
@@ -132,7 +132,7 @@ TEST(LocusExperiments, ACourseThatCannotBeSimulatedIsTheReasonOfItsRuns) {
   EXPECT_TRUE(std::filesystem::exists(folder / "out/matrix.md"));
 }
 
-TEST(LocusExperiments, ARunThatIsKilledIsNamed) {
+TEST(LocusExperiments, KilledRunIsNamed) {
   const TemporaryFolder folder;
   std::filesystem::copy(room_drive(), folder / "robot");
   const ProgramRun run =
@@ -142,7 +142,7 @@ TEST(LocusExperiments, ARunThatIsKilledIsNamed) {
 }
 
 /// Every run but the first blocks until it is killed.
-TEST(LocusExperiments, KilledAndStartedAgainItGoesOnWhereItWas) {
+TEST(LocusExperiments, ResumesAfterKill) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder / "fleet");
   for (const char* name : {"one", "three", "two's"})
@@ -193,7 +193,7 @@ bool comes_true(const std::function<bool()>& holds) {
   return holds();
 }
 
-TEST(LocusExperiments, InterruptedItLeavesNoProgramBehind) {
+TEST(LocusExperiments, InterruptionEndsAllChildren) {
   const TemporaryFolder folder;
   const std::filesystem::path courses = folder / "out/courses";
   Child run({LOCUS_EXPERIMENTS, "--duration", "36000", "--quiet", "-o", folder / "out"});
@@ -212,7 +212,7 @@ TEST(LocusExperiments, WrongUsageIsExplainedInOneLine) {
   }
 }
 
-TEST(LocusExperiments, WhatCannotBeComparedWithIsRefusedBeforeAnythingRuns) {
+TEST(LocusExperiments, IncomparableResultsAreAnErrorBeforeAnyRun) {
   const TemporaryFolder folder;
   std::ofstream{folder / "paper.json"} << R"({"version": "1", "duration_s": 300, "runs": []})";
   for (const auto& [before, problem] : {std::pair{"/nowhere/results.json", "/nowhere/results.json: no results"},
@@ -225,7 +225,7 @@ TEST(LocusExperiments, WhatCannotBeComparedWithIsRefusedBeforeAnythingRuns) {
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));
 }
 
-TEST(LocusExperiments, HelpHasAnExampleAndVersionIsTold) {
+TEST(LocusExperiments, HelpHasAnExampleAndVersionIsPrinted) {
   const ProgramRun help = experiments({"--help"});
   EXPECT_EQ(help.status, 0);
   EXPECT_NE(help.out.find("locus-experiments -o experiments"), std::string::npos);

@@ -25,7 +25,7 @@ TEST(MatrixPlan, EveryInputHasEveryFaultFromTheStartAndMidDrive) {
   EXPECT_LE(std::ranges::count_if(cells, [](const MatrixCell& cell) { return cell.faults.empty(); }), 6);
 }
 
-TEST(MatrixPlan, EveryCellThatCanBeIsRunWithFaultsThatReplayKnows) {
+TEST(MatrixPlan, EveryPossibleCellRunsWithFaultsOfReplay) {
   Arguments arguments;
   arguments.output = "out";
   arguments.fault_matrix = true;
@@ -47,7 +47,7 @@ TEST(MatrixPlan, EveryCellThatCanBeIsRunWithFaultsThatReplayKnows) {
   }
 }
 
-TEST(MatrixPlan, WhatComesBackWasAwayForAMinute) {
+TEST(MatrixPlan, TemporaryLossLastsAMinute) {
   const std::vector<MatrixCell> cells = matrix_cells(120);
   const auto specs = [&](const char* name) {
     return std::ranges::find(cells, name, &MatrixCell::configuration)->faults;

@@ -39,7 +39,7 @@ Results judged(const Results& with) {
   return cell == cells.end() ? Results{} : *cell;
 }
 
-TEST(MatrixTable, ACellHoldsIfTheFaultIsCounted) {
+TEST(MatrixTable, CellHoldsIfTheFaultIsCounted) {
   Results frozen = run(kFrozen);
   frozen["summary"]["ape_m"]["mean"] = 0.004;
   EXPECT_EQ(judged(frozen)["broken"], Results::array({"silent"}));
@@ -48,21 +48,21 @@ TEST(MatrixTable, ACellHoldsIfTheFaultIsCounted) {
   EXPECT_EQ(judged(frozen)["shown"], Results::array({"wio.rejected.frozen 77"}));
 }
 
-TEST(MatrixTable, AnInputThatSuffersMayTellOfAnother) {
+TEST(MatrixTable, CountersOfAnotherInputMayShowAFault) {
   Results frozen = run(kFrozen);
   frozen["summary"]["sources"]["imu"]["health_changes"] = 2;
   EXPECT_EQ(judged(frozen)["shown"], Results::array({"imu.health_changes 2"}));
 }
 
-TEST(MatrixTable, AVerdictOnASourceTellsOfIt) {
+TEST(MatrixTable, VerdictOnASourceShowsAFault) {
   Results frozen = run(kFrozen);
   frozen["summary"]["sources"]["wio"]["verdict"] = "turns the other way";
   EXPECT_EQ(judged(frozen)["shown"], Results::array({"wio.verdict turns the other way"}));
 }
 
-TEST(MatrixTable, WhatChangesNothingNeedsNoCounter) { EXPECT_TRUE(judged(run(kFrozen))["holds"]); }
+TEST(MatrixTable, HarmlessFaultNeedsNoCounter) { EXPECT_TRUE(judged(run(kFrozen))["holds"]); }
 
-TEST(MatrixTable, TooLargeAnErrorAndLostSweepsBreakACell) {
+TEST(MatrixTable, LargeErrorsAndLostSweepsBreakACell) {
   Results frozen = run(kFrozen);
   frozen["summary"]["sources"]["wio"]["rejected"]["frozen"] = 77;
   frozen["summary"]["ape_m"]["mean"] = 0.013;
@@ -72,7 +72,7 @@ TEST(MatrixTable, TooLargeAnErrorAndLostSweepsBreakACell) {
   EXPECT_EQ(judged(frozen)["broken"][1], "sweeps are lost");
 }
 
-TEST(MatrixTable, ARunThatEndsBadlyDoesNotHoldUnlessItWasToBeRefused) {
+TEST(MatrixTable, FailedRunHoldsOnlyIfItMustBeRejected) {
   const auto ended = [](const char* configuration, const char* how) {
     return judged({{"course", matrix_course()}, {"configuration", configuration}, {how, "ended by signal 11"}});
   };

@@ -36,7 +36,7 @@ TEST(Plan, HasEveryRunOfThePapersTables) {
     EXPECT_TRUE(all.contains(run)) << run;
 }
 
-TEST(Plan, LoamFeaturesAreTakenInOneRunFromTheUncutSweep) {
+TEST(Plan, LoamFeaturesAreExtractedInOneRunFromTheUnfilteredSweep) {
   const Plan plan = make_plan(arguments());
   const auto loam = std::ranges::find(plan.runs, true, &Run::loam_features);
   ASSERT_NE(loam, plan.runs.end());
@@ -52,7 +52,7 @@ TEST(Plan, LoamFeaturesAreTakenInOneRunFromTheUncutSweep) {
   EXPECT_FALSE(config->sweep.random_filter.enabled);
 }
 
-TEST(Plan, RecordingsTakeThePlaceOfTheCourses) {
+TEST(Plan, RecordingsReplaceTheCourses) {
   Arguments fleet = arguments();
   fleet.recordings = {"/data/monday/robot1/", "/data/monday/robot2", "/data/tuesday/robot1"};
   const Plan plan = make_plan(fleet);

@@ -32,7 +32,7 @@ class FoundRecordings : public testing::Test {
 
 using Names = std::vector<std::string>;
 
-TEST_F(FoundRecordings, AreAllThatLocusReplayReadsAtAnyDepth) {
+TEST_F(FoundRecordings, AreAllOfLocusReplayAtAnyDepth) {
   for (const char* const name :
        {"README.md", "b/one.pcap", "b/two.pcapng", "b/expected.pcd", "a/robot/lidar.pcap", "a/robot/imu.csv", "d/r.bag",
         "c/ros2/metadata.yaml", "c/ros2/ros2_0.db3", "day/drive_0001_sync/velodyne_points/data/0000000000.bin",
@@ -42,7 +42,7 @@ TEST_F(FoundRecordings, AreAllThatLocusReplayReadsAtAnyDepth) {
                                                "day/drive_0001_sync", "record"}));
 }
 
-TEST_F(FoundRecordings, OfAFolderNamedVelodyneAreItsCaptures) {
+TEST_F(FoundRecordings, InAFolderNamedVelodyneAreItsCaptures) {
   put("data/velodyne/one.pcap");
   put("data/velodyne/two.pcap");
   put("data/robot/lidar.pcap");
@@ -55,20 +55,20 @@ TEST_F(FoundRecordings, MayBeNamedThemselves) {
   EXPECT_EQ(names_in({folder_ / "robot/", folder_ / "one.pcap"}), (Names{"robot", "one.pcap"}));
 }
 
-TEST_F(FoundRecordings, OfSeveralPlacesHaveNamesOfTheirOwn) {
+TEST_F(FoundRecordings, OfSeveralFoldersHaveUniqueNames) {
   put("a/data/one.pcap");
   put("b/data/one.pcap");
   EXPECT_EQ(names_in({folder_ / "a/data", folder_ / "b/data"}), (Names{"data/one.pcap", "data/one.pcap-2"}));
 }
 
-TEST_F(FoundRecordings, AreNotThoseOfTheOutputNorFoundTwiceByALink) {
+TEST_F(FoundRecordings, ExcludeTheOutputAndDuplicatesByLinks) {
   put("output/courses/x/lidar.pcap");
   put("a/one.pcap");
   std::filesystem::create_directory_symlink(folder_.path(), folder_ / "a/back");
   EXPECT_EQ(names_in({folder_.path()}), Names{"a/one.pcap"});
 }
 
-TEST_F(FoundRecordings, InAPlaceThatIsNotThereAreAnError) {
+TEST_F(FoundRecordings, InAMissingFolderAreAnError) {
   EXPECT_THROW((void)names_in({folder_ / "nowhere"}), tools::Failure);
   EXPECT_TRUE(names_in({folder_.path()}).empty());
 }

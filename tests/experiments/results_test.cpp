@@ -20,7 +20,7 @@ Results results(const std::vector<Results>& runs) {
   return {{"version", "1"}, {"simulated", true}, {"duration_s", 300}, {"runs", runs}};
 }
 
-TEST(Robustness, IsJudgedBesideTheRunWithoutFailure) {
+TEST(Robustness, IsJudgedAgainstTheRunWithoutFailure) {
   Results all = results({paper_run("beta", "locusd", 0.1), paper_run("beta", "wio_imu_fail", 0.29),
                          paper_run("beta", "wio_fail", 0.31), paper_run("beta", "lidar_drop", 0.1, 200)});
   judge_robustness(all);
@@ -30,7 +30,7 @@ TEST(Robustness, IsJudgedBesideTheRunWithoutFailure) {
   EXPECT_EQ(all["robustness"][0]["lidar_drop"], "Stops");
 }
 
-TEST(Robustness, WithoutTheRunToCompareWithThereIsNoVerdict) {
+TEST(Robustness, WithoutTheReferenceRunHasNoVerdict) {
   Results all = results(
       {paper_run("beta", "wio_fail", 0.3), {{"course", "alpha"}, {"configuration", "locusd"}, {"failed", "x"}}});
   judge_robustness(all);

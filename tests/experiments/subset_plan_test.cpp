@@ -22,7 +22,7 @@ Names names_of(const Sources& sources) {
   return names;
 }
 
-TEST(SubsetPlan, PartsAreThoseOfTheLawEachOnce) {
+TEST(SubsetPlan, HasEachSubsetOnce) {
   EXPECT_EQ(names_of({{"top"}, {"wio"}, {"imu"}}), (Names{"all", "lidar and IMU", "lidar", "all but imu"}));
   EXPECT_EQ(names_of({{"top"}, {"vio", "kio"}, {"imu"}}),
             (Names{"all", "lidar and IMU", "lidar", "all but vio", "all but kio", "all but imu"}));
@@ -33,7 +33,7 @@ TEST(SubsetPlan, PartsAreThoseOfTheLawEachOnce) {
   EXPECT_EQ(names_of({{"top"}, {}, {}}), Names{"all"});
 }
 
-TEST(SubsetPlan, EveryViewAndSubsetRunsUnderANameOfItsOwn) {
+TEST(SubsetPlan, EveryViewAndSubsetHasItsOwnName) {
   const SubsetDrive drive{"a drive", "course", 12, {{"top"}, {"wio"}, {"imu"}}, {"imu"}, 0.01};
   const std::vector<SubsetRun> runs = subset_runs(drive);
   ASSERT_EQ(runs.size(), 3U * 4U);
@@ -47,7 +47,7 @@ TEST(SubsetPlan, EveryViewAndSubsetRunsUnderANameOfItsOwn) {
   }
 }
 
-TEST(SubsetPlan, SourcesAreLostAndTheViewIsNarrowFromTheFirstPacketOn) {
+TEST(SubsetPlan, FaultsLastFromTheFirstPacketOn) {
   const SubsetDrive drive{"a drive", "course", 0, {{"top"}, {"wio"}, {"imu"}}, {}, 0};
   for (const SubsetRun& run : subset_runs(drive)) {
     std::set<std::string> lost;
@@ -85,7 +85,7 @@ TEST(SubsetPlan, SourcesWorseThanRealOnesAreNotSound) {
     EXPECT_EQ(unsound(world), Names{}) << world;
 }
 
-TEST(SubsetPlan, HarshCoursesAreDrivenWithEachSeedAndStart) {
+TEST(SubsetPlan, HarshCoursesRunWithEachSeedAndStart) {
   Arguments arguments;
   arguments.output = "out";
   arguments.subsets = true;

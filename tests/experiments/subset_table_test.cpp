@@ -65,7 +65,7 @@ void lose_all(Results& runs, const Results& flagged_after_s, double worst_sigma 
   }
 }
 
-TEST(SubsetTable, HoldsUpToAFifthMoreThanTheBestPart) {
+TEST(SubsetTable, HoldsUpToAFifthMoreThanTheBestSubset) {
   const Results row = row_of(0.0239);
   EXPECT_EQ(row["best"], "lidar and IMU");
   EXPECT_NEAR(row["ratio"].get<double>(), 1.195, 1e-9);
@@ -74,21 +74,21 @@ TEST(SubsetTable, HoldsUpToAFifthMoreThanTheBestPart) {
   EXPECT_EQ(row_of(0.0241)["verdict"], "broken");
 }
 
-TEST(SubsetTable, BrokenNamesTheFactorAndThePart) {
+TEST(SubsetTable, BrokenNamesTheFactorAndTheSubset) {
   const Results row = row_of(0.1);
   EXPECT_EQ(row["verdict"], "broken");
   EXPECT_EQ(row["broken"], Results::array({"5.00 x lidar and IMU"}));
   EXPECT_FALSE(row["holds"]);
 }
 
-TEST(SubsetTable, OdometryAloneIsAPart) {
+TEST(SubsetTable, OdometryAloneIsASubset) {
   const Results row = row_of(0.02, [](Results& runs) { runs[0]["figures"]["odometry"]["wio"]["mean_m"] = 0.01; });
   EXPECT_EQ(row["broken"], Results::array({"2.00 x wio alone"}));
   const Results silent = row_of(0.02, [](Results& runs) { runs[0]["figures"]["odometry"]["wio"] = nullptr; });
   EXPECT_EQ(silent["subsets"].size(), 3U);
 }
 
-TEST(SubsetTable, PartsWithAnUnsoundSourceDoNotCount) {
+TEST(SubsetTable, SubsetsWithAnUnsoundSourceDoNotCount) {
   const Results row = row_of(0.05, [](Results& runs) {
     runs[0]["unsound"] = {"imu", "wio"};
     runs[0]["figures"]["odometry"]["wio"]["mean_m"] = 0.01;
@@ -98,7 +98,7 @@ TEST(SubsetTable, PartsWithAnUnsoundSourceDoNotCount) {
   EXPECT_EQ(row["verdict"], "holds");
 }
 
-TEST(SubsetTable, WithoutASoundPartAllSourcesAreComparedWithNone) {
+TEST(SubsetTable, WithoutASoundSubsetNothingIsCompared) {
   const Results row = row_of(0.05, [](Results& runs) {
     runs[0]["unsound"] = {"wio"};
     for (Results& run : runs)
@@ -115,7 +115,7 @@ TEST(SubsetTable, ErrorsBelowAMillimetreAreEqual) {
   EXPECT_TRUE(row["holds"]);
 }
 
-TEST(SubsetTable, WhereNoPartIsGoodTheStateSaysSoAndTheCovarianceHoldsIt) {
+TEST(SubsetTable, LossOfAllSubsetsMustBeFlaggedAndWithinSigma) {
   const auto lost = [](const Results& flagged_after_s, double worst_sigma) {
     return row_of(0.02, [=](Results& runs) { lose_all(runs, flagged_after_s, worst_sigma); });
   };
@@ -126,13 +126,13 @@ TEST(SubsetTable, WhereNoPartIsGoodTheStateSaysSoAndTheCovarianceHoldsIt) {
   EXPECT_EQ(lost(0.0, 4.1)["broken"], Results::array({"lost by 4.1 sigma"}));
 }
 
-TEST(SubsetTable, AFlagExcusesNoErrorBeyondTheBestPart) {
+TEST(SubsetTable, FlagDoesNotExcuseErrorsBeyondTheBestSubset) {
   const Results row = row_of(1.0, [](Results& runs) { lose_all(runs, 0.0); });
   EXPECT_EQ(row["verdict"], "broken");
   EXPECT_EQ(row["broken"], Results::array({"50.00 x lidar and IMU"}));
 }
 
-TEST(SubsetTable, WhereAllSourcesAreNotLostNothingHasToBeSaid) {
+TEST(SubsetTable, NoFlagIsNeededIfAllSourcesAreNotLost) {
   const Results row = row_of(0.01, [](Results& runs) {
     lose_all(runs, nullptr);
     runs[0]["figures"]["lost_after_s"] = nullptr;
@@ -140,7 +140,7 @@ TEST(SubsetTable, WhereAllSourcesAreNotLostNothingHasToBeSaid) {
   EXPECT_EQ(row["verdict"], "holds");
 }
 
-TEST(SubsetTable, PartsThatFailLeaveTheOthersAndAllSourcesThatFailBreakIt) {
+TEST(SubsetTable, OnlyFailureOfAllSourcesBreaksARow) {
   const auto fail = [](std::size_t which) {
     return row_of(0.05, [=](Results& runs) {
       runs[which].erase("summary");
@@ -155,7 +155,7 @@ TEST(SubsetTable, PartsThatFailLeaveTheOthersAndAllSourcesThatFailBreakIt) {
   EXPECT_FALSE(fail(0)["holds"]);
 }
 
-TEST(SubsetTable, EachDriveAndViewIsARowOfItsOwn) {
+TEST(SubsetTable, EachDriveAndViewIsARow) {
   Results runs = drive(0.02);
   for (const char* const key : {"view", "drive"}) {
     for (Results run : drive(0.1)) {
@@ -181,7 +181,7 @@ TEST(SubsetTable, EachDriveAndViewIsARowOfItsOwn) {
       << subset_table(results);
 }
 
-TEST(SubsetTable, ThePageHasEveryPartAndTheVerdict) {
+TEST(SubsetTable, PageHasEverySubsetAndTheVerdict) {
   const std::string text = subset_table(judged_runs(drive(0.1, [](Results& runs) {
     runs[0]["unsound"] = {"wio"};
     runs[0]["sound"] = false;
@@ -198,7 +198,7 @@ TEST(SubsetTable, ThePageHasEveryPartAndTheVerdict) {
     EXPECT_NE(text.find(line), std::string::npos) << line << text;
 }
 
-TEST(SubsetTable, OfADriveThatFailsThePageHasTheReason) {
+TEST(SubsetTable, PageHasTheReasonOfAFailedDrive) {
   const std::string text = subset_table(judged_runs(drive(0.1, [](Results& runs) {
     runs[0].erase("summary");
     runs[0].erase("figures");

@@ -57,7 +57,7 @@ TEST(Subsets, EveryPartOfARecordingIsMeasuredInEveryView) {
   EXPECT_NE(page.find("Without truth, left out: untrue.\n"), std::string::npos) << page;
 }
 
-TEST(Subsets, RefusesFoldersWithoutTruthAndSaysWhereToPutIt) {
+TEST(Subsets, FoldersWithoutTruthAreAnErrorThatSaysWhereToPutIt) {
   const TemporaryFolder folder;
   std::filesystem::copy(room_drive(), folder / "untrue");
   std::filesystem::remove(folder / "untrue/gt.tum");
@@ -66,7 +66,7 @@ TEST(Subsets, RefusesFoldersWithoutTruthAndSaysWhereToPutIt) {
   EXPECT_NE(run.err.find("gt.tum"), std::string::npos) << run.err;
 }
 
-TEST(Subsets, OptionsOfOtherTablesAreRefused) {
+TEST(Subsets, OptionsOfOtherTablesAreErrors) {
   EXPECT_EQ(subsets({"--harsh", "-o", "out"}).status, 2);
   EXPECT_EQ(run_program(LOCUS_EXPERIMENTS, {"--starts", "2", "-o", "out"}).status, 2);
   EXPECT_EQ(run_program(LOCUS_EXPERIMENTS, {"--only", "plant", "-o", "out"}).status, 2);

@@ -60,14 +60,14 @@ std::vector<OdometrySample> drive_with(std::initializer_list<std::string_view> f
 
 double x_m(const OdometrySample& sample) { return sample.T_source_base.translation.x(); }
 
-TEST(InjectFaults, LostSamplesAreGoneOnlyWhileTheFaultLasts) {
+TEST(InjectFaults, LostSamplesAreAbsentOnlyDuringTheFault) {
   const std::vector<OdometrySample> samples = drive_with({"wio:lost@0.5-1"});
   ASSERT_EQ(samples.size(), 15u);
   EXPECT_EQ(x_m(samples[4]), 4.0);
   EXPECT_EQ(x_m(samples[5]), 10.0);
 }
 
-TEST(InjectFaults, OfAnotherSourceTheyChangeNothing) {
+TEST(InjectFaults, OtherSourcesAreUnchanged) {
   const std::vector<OdometrySample> samples = drive_with({"vio:lost@0", "all-lidars:lost@0"});
   EXPECT_EQ(samples.size(), 20u);
 }
@@ -82,7 +82,7 @@ TEST(InjectFaults, FrozenSourceRepeatsItsLastPoseWithNewStamps) {
   EXPECT_EQ(x_m(samples[10]), 10.0);
 }
 
-TEST(InjectFaults, JumpMovesThePoseAndBack) {
+TEST(InjectFaults, JumpOffsetsThePoseDuringTheFault) {
   const std::vector<OdometrySample> samples = drive_with({"wio:jump=-5@0.5-1"});
   EXPECT_EQ(x_m(samples[4]), 4.0);
   EXPECT_EQ(x_m(samples[5]), 0.0);
@@ -103,7 +103,7 @@ TEST(InjectFaults, NanIsInEveryReading) {
   EXPECT_TRUE(imu[0].attitude->coeffs().array().isNaN().all());
 }
 
-TEST(InjectFaults, CorruptReadingsAreNoReadingsAndTheirStampsStand) {
+TEST(InjectFaults, CorruptSamplesAreInvalidAndRetainTheirStamps) {
   const std::vector<OdometrySample> samples = drive_with({"wio:corrupt=100@0"});
   ASSERT_EQ(samples.size(), 20u);
   for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -113,14 +113,14 @@ TEST(InjectFaults, CorruptReadingsAreNoReadingsAndTheirStampsStand) {
   }
 }
 
-TEST(InjectFaults, JumpOfAnImuIsATurnAboutItsZ) {
+TEST(InjectFaults, JumpOfAnImuIsARotationAboutItsZ) {
   std::vector<ImuSample> imu(1);
   imu[0].arrival = kStart;
   inject_faults(faults_of({"imu:jump=0.5@0"}), "imu", kStart, 1, imu);
   EXPECT_EQ(imu[0].angular_velocity_radps, Eigen::Vector3d(0, 0, 0.5));
 }
 
-TEST(InjectFaults, LateSamplesKeepTheirStampAndArriveAfterPunctualOnes) {
+TEST(InjectFaults, LateSamplesRetainTheirStampAndArriveAfterPunctualOnes) {
   const std::vector<OdometrySample> samples = drive_with({"wio:late=0.25@0.5-0.6"}); // one sample: x = 5
   ASSERT_EQ(samples.size(), 20u);
   EXPECT_EQ(x_m(samples[5]), 6.0);
@@ -227,21 +227,21 @@ bool in_order_of_arrival(const Recording& recording) {
   return std::ranges::is_sorted(recording.all, {}, &Arrival::receive_stamp);
 }
 
-TEST(DatagramFaults, WithoutFaultEverythingPassesAsItIs) {
+TEST(DatagramFaults, WithoutFaultsDatagramsAreUnchanged) {
   const Recording recording{};
   ASSERT_EQ(recording.all.size(), 60u);
   EXPECT_TRUE(in_order_of_arrival(recording));
   EXPECT_EQ(recording.all[3], (Arrival{1, kStart + 10ms, 10'000, 2368}));
 }
 
-TEST(DatagramFaults, LostLidarIsSilentAndTheOtherIsNot) {
+TEST(DatagramFaults, LostLidarIsSilentAndOthersAreNot) {
   const Recording recording{"front:lost@0.05-0.1"};
   EXPECT_EQ(recording.to_port(2368).size(), 15u);
   EXPECT_EQ(recording.to_port(8308).size(), 15u);
   EXPECT_EQ(recording.to_port(2369).size(), 20u);
 }
 
-TEST(DatagramFaults, AllLidarsMeansEachOfThem) { EXPECT_TRUE(Recording{"all-lidars:lost@0"}.all.empty()); }
+TEST(DatagramFaults, AllLidarsSelectsEachLidar) { EXPECT_TRUE(Recording{"all-lidars:lost@0"}.all.empty()); }
 
 TEST(DatagramFaults, FrozenLidarRepeatsItsLastDataPacketWithNewReceiveStamps) {
   const Recording recording{"front:frozen@0.05-0.1"};
@@ -254,7 +254,7 @@ TEST(DatagramFaults, FrozenLidarRepeatsItsLastDataPacketWithNewReceiveStamps) {
   EXPECT_EQ(recording.numbers(8308)[7], 4) << "and its last position packet";
 }
 
-TEST(DatagramFaults, PositionPacketsFailAlone) {
+TEST(DatagramFaults, PositionPacketsCanFailAlone) {
   const Recording recording{"front.position:frozen@0.05", "front.position:lost@0.1"};
   EXPECT_EQ(recording.numbers(2368), Recording{}.numbers(2368));
   EXPECT_EQ(recording.numbers(8308), (std::vector{0, 1, 2, 3, 4, 4, 4, 4, 4, 4}));
@@ -283,7 +283,7 @@ std::vector<ouster::ImuMeasurement> readings_with(std::initializer_list<std::str
 
 double rate_dps(const ouster::ImuMeasurement& reading) { return reading.angular_velocity_radps.z() / kRadPerDeg; }
 
-TEST(DatagramFaults, InertialUnitOfALidarFailsAsAnyOtherAndWithIt) {
+TEST(DatagramFaults, ImuOfALidarFailsAloneOrWithItsLidar) {
   EXPECT_EQ(readings_with({"top_imu:lost@0.5-1"}).size(), 15U);
   EXPECT_EQ(readings_with({"top:lost@0.5-1"}).size(), 15U);
   EXPECT_EQ(readings_with({"top_imu:nan@0.5-1"}).size(), 15U); // non-finite samples are no readings
@@ -293,7 +293,7 @@ TEST(DatagramFaults, InertialUnitOfALidarFailsAsAnyOtherAndWithIt) {
 }
 
 /// A jump in metres does not apply to a gyro, and the clock of the columns is separate.
-TEST(DatagramFaults, JumpAndClockStepOfALidarAreNoneOfItsInertialUnit) {
+TEST(DatagramFaults, JumpAndClockStepOfALidarDoNotAffectItsImu) {
   EXPECT_NEAR(rate_dps(readings_with({"top:jump=2@0.5-1"})[7]), 7, 1e-4);
   EXPECT_EQ(readings_with({"top:clock-step=60@0.5-1"})[7].time, 700ms);
 }
@@ -317,7 +317,7 @@ std::vector<std::byte> after(std::initializer_list<std::string_view> faults, con
   return arrived;
 }
 
-TEST(DatagramFaults, JumpLengthensTheRangesThatThereAre) {
+TEST(DatagramFaults, JumpLengthensOnlyRangesWithAReturn) {
   EXPECT_EQ(after({"front:jump=2@0"}, with_one_return(1000)), with_one_return(2000));
   EXPECT_EQ(after({"front:jump=-3@0"}, with_one_return(1000)), with_one_return(1)) << "and still is a return";
   EXPECT_EQ(after({"front:jump=1e6@0"}, with_one_return(1000)), with_one_return(65535));
@@ -331,7 +331,7 @@ std::vector<std::byte> with_return_at(std::uint16_t azimuth_cdeg) {
   return payload;
 }
 
-TEST(DatagramFaults, ANarrowViewHasNoReturnsFromElsewhereAndTheNarrowestCounts) {
+TEST(DatagramFaults, NarrowestViewHasNoReturnsOutside) {
   EXPECT_EQ(after({"front:view@0"}, with_return_at(8'900)), with_return_at(8'900)) << "180 degrees";
   EXPECT_EQ(after({"front:view=90@0"}, with_return_at(31'600)), with_return_at(31'600));
   std::vector<std::byte> blank = with_return_at(9'100);
@@ -362,7 +362,7 @@ std::optional<std::pair<float, Duration>> read_after(std::initializer_list<std::
   return found;
 }
 
-TEST(DatagramFaults, JumpAndClockStepBefallALidarOfAnyMaker) {
+TEST(DatagramFaults, JumpAndClockStepAffectLidarsOfEveryMaker) {
   const auto metadata = test::ouster_metadata();
   test::OusterTestPacket columns{metadata, 0, 5'000'000'000};
   columns.set_return(3, 7, 20'000);
@@ -384,7 +384,7 @@ TEST(DatagramFaults, JumpAndClockStepBefallALidarOfAnyMaker) {
   EXPECT_EQ(hesai({"front:clock-step=-90@0"}), std::pair(10.0F, time - 90s));
 }
 
-TEST(DatagramFaults, CorruptPacketsAreRandomFromSomeByteOnAndTheSameOnEveryRun) {
+TEST(DatagramFaults, CorruptPacketsAreReproducible) {
   const std::vector<std::byte> healthy = with_one_return(1000);
   const std::vector<std::byte> corrupt = after({"front:corrupt=100@0"}, healthy);
   ASSERT_EQ(corrupt.size(), healthy.size());
@@ -398,7 +398,7 @@ TEST(DatagramFaults, LidarFrozenFromTheStartRepeatsItsFirstPacket) {
   EXPECT_EQ(numbers, std::vector<int>(20, 0));
 }
 
-TEST(DatagramFaults, LateDatagramsComeOutInTheOrderOfArrivalWithTheirNewStamp) {
+TEST(DatagramFaults, LateDatagramsAreOrderedByTheirNewStamp) {
   const Recording recording{"front:late=0.032@0.05-0.055"}; // one data packet: 5
   EXPECT_TRUE(in_order_of_arrival(recording));
   EXPECT_EQ(recording.numbers(2368),
@@ -413,7 +413,7 @@ TEST(DatagramFaults, LateDatagramsStillArriveAfterTheEndOfTheCapture) {
   EXPECT_EQ(recording.all.front().receive_stamp, kStart + 10s);
 }
 
-TEST(DatagramFaults, ClockStepMovesTheSensorsTimeOfHourInBothKindsOfPacketAndWraps) {
+TEST(DatagramFaults, ClockStepShiftsAndWrapsTheTimeOfHourInBothKindsOfPacket) {
   const Recording ahead{"front:clock-step=60@0.05"};
   EXPECT_EQ(ahead.to_port(2368)[4].time_of_hour_us, 40'000u);
   EXPECT_EQ(ahead.to_port(2368)[5].time_of_hour_us, 60'050'000u);
@@ -440,7 +440,7 @@ TEST(DatagramFaults, ReorderingEverythingLosesNothing) {
   EXPECT_TRUE(in_order_of_arrival(recording));
 }
 
-TEST(DatagramFaults, DuplicatesArriveTwiceAndLossesNever) {
+TEST(DatagramFaults, DuplicatesArriveTwiceAndLossesDoNot) {
   EXPECT_EQ(Recording{"rear:duplicate=100@0"}.all.size(), 80u);
   EXPECT_EQ(Recording{"rear:packet-loss=100@0"}.all.size(), 40u);
   const std::size_t half = Recording{"rear:packet-loss=50@0"}.to_port(2369).size();
@@ -454,7 +454,7 @@ TEST(DatagramFaults, SameFaultsGiveTheSameArrivalsOnEveryRun) {
   EXPECT_EQ(Recording{faults}.all, Recording{faults}.all);
 }
 
-TEST(DatagramFaults, DatagramsOfNobodyPass) {
+TEST(DatagramFaults, UnknownDatagramsPassUnchanged) {
   DatagramFaults injector{faults_of({"all-lidars:lost@0"}), kStart, 1};
   int emitted = 0;
   Datagram foreign;

@@ -36,7 +36,7 @@ TEST(Fault, NameKindValueAndWindowAreRead) {
   EXPECT_EQ(fault.until, 20500ms);
 }
 
-TEST(Fault, WithoutEndItLastsToTheEndOfTheCapture) {
+TEST(Fault, WithoutAnEndLastsToTheEndOfTheCapture) {
   const Fault fault = parsed("all-lidars:lost@0");
   EXPECT_EQ(fault.from, 0s);
   EXPECT_EQ(fault.until, Duration::max());
@@ -55,7 +55,7 @@ TEST(Fault, ValuesHaveTheDocumentedDefaults) {
   EXPECT_EQ(parsed("a:clock-step=-3@1").value, -3.0);
 }
 
-TEST(Fault, WhatCannotBeReadIsAnErrorThatSaysWhatCan) {
+TEST(Fault, InvalidFaultsAreErrorsThatListTheValidOnes) {
   for (const char* text : {"", "wio", "wio@3", "wio:lost", ":lost@3", "wio@3:lost"}) {
     EXPECT_TRUE(contains(error_of(Fault::parse(text)), "expected NAME:KIND[=VALUE]@T[-T1]")) << text;
   }
@@ -93,7 +93,7 @@ TEST(Fault, MustFitTheSensorItNames) {
   EXPECT_TRUE(contains(problem_of("front.position:jump@1"), "a position packet cannot have it"));
 }
 
-TEST(FaultPlan, ActsFromItsFirstInstantToTheOneBeforeItsLast) {
+TEST(FaultPlan, WindowIncludesItsBeginningAndExcludesItsEnd) {
   FaultPlan plan{std::array{parsed("wio:lost@1-2")}, stamp_from_ns(0), 1};
   EXPECT_FALSE(plan.judge("wio", false, stamp_from_ns(999'999'999)).lost);
   EXPECT_TRUE(plan.judge("wio", false, stamp_from_ns(1'000'000'000)).lost);
@@ -102,14 +102,14 @@ TEST(FaultPlan, ActsFromItsFirstInstantToTheOneBeforeItsLast) {
   EXPECT_FALSE(plan.judge("vio", false, stamp_from_ns(1'500'000'000)).lost);
 }
 
-TEST(FaultPlan, FromTheStartIsFromBeforeTheFirstPacketOn) {
+TEST(FaultPlan, FaultFromTheStartIncludesTheFirstPacket) {
   FaultPlan plan{std::array{parsed("imu:lost@0-2"), parsed("wio:lost@1-2")}, stamp_from_ns(0), 1};
   const Stamp before = stamp_from_ns(-500'000'000);
   EXPECT_TRUE(plan.judge("imu", false, before).lost);
   EXPECT_FALSE(plan.judge("wio", false, before).lost);
 }
 
-TEST(FaultPlan, PositionPacketsHaveTheFaultsOfTheirLidarAndSomeOfTheirOwn) {
+TEST(FaultPlan, PositionPacketsHaveFaultsOfTheirLidarAndTheirOwn) {
   FaultPlan plan{std::array{parsed("front:late@0"), parsed("front.position:lost@0")}, stamp_from_ns(0), 1};
   const auto of = [&](const char* stream) { return plan.judge(stream, true, stamp_from_ns(0)); };
   EXPECT_TRUE(of("front.position").lost);
@@ -125,7 +125,7 @@ TEST(FaultPlan, AllLidarsAreLidarsOnly) {
   EXPECT_FALSE(plan.judge("wio", false, stamp_from_ns(0)).lost);
 }
 
-TEST(FaultPlan, FaultsOfOneSensorAddUp) {
+TEST(FaultPlan, FaultsOfOneSensorCombine) {
   FaultPlan plan{std::array{parsed("wio:late=1@0"), parsed("wio:late=0.5@0"), parsed("wio:jump=3@0")}, stamp_from_ns(0),
                  1};
   const FaultPlan::Verdict verdict = plan.judge("wio", false, stamp_from_ns(0));
@@ -134,7 +134,7 @@ TEST(FaultPlan, FaultsOfOneSensorAddUp) {
   EXPECT_FALSE(verdict.harmless());
 }
 
-TEST(FaultPlan, LosesAboutThePercentageAskedForAndTheSameMessagesOnEveryRun) {
+TEST(FaultPlan, LosesTheConfiguredShareReproducibly) {
   const auto lost = [](std::uint64_t seed) {
     FaultPlan plan{std::array{parsed("front:packet-loss=20@0")}, stamp_from_ns(0), seed};
     std::vector<int> indices;

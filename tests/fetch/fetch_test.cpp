@@ -86,7 +86,7 @@ class Fetch : public testing::Test {
   std::chrono::milliseconds patience_ = std::chrono::duration_cast<std::chrono::milliseconds>(test::patience());
 };
 
-TEST_F(Fetch, AnOusterTellsItsMetadataOverHttp) {
+TEST_F(Fetch, ReadsOusterMetadataOverHttp) {
   TcpServer server(http_, [](const std::string& question) -> std::optional<std::string> {
     return question.starts_with("GET /api/v1/sensor/metadata HTTP/1.0\r\n") ? http(metadata_text())
                                                                             : http("", "400 Bad Request");
@@ -97,7 +97,7 @@ TEST_F(Fetch, AnOusterTellsItsMetadataOverHttp) {
   EXPECT_EQ(std::get<ouster::Metadata>(file->content).pixels_per_column, 32U);
 }
 
-TEST_F(Fetch, AnAnswerInPiecesIsPutTogether) {
+TEST_F(Fetch, JoinsAnswersInSeveralSegments) {
   {
     TcpServer server(http_, always(http(metadata_text())), {.piece_bytes = 97});
     const auto file = fetch();
@@ -110,14 +110,14 @@ TEST_F(Fetch, AnAnswerInPiecesIsPutTogether) {
   EXPECT_EQ(file->text, angles_text());
 }
 
-TEST_F(Fetch, AnAnswerOfHttpWithoutItsLengthEndsWithTheConnection) {
+TEST_F(Fetch, ReadsHttpAnswersWithoutLengthToTheEndOfTheConnection) {
   TcpServer server(http_, always("HTTP/1.0 200 OK\r\n\r\n" + metadata_text()), {.piece_bytes = 500});
   const auto file = fetch();
   ASSERT_TRUE(file) << file.error();
   EXPECT_EQ(file->text, metadata_text());
 }
 
-TEST_F(Fetch, AnAnswerInChunksOfHttpIsJoined) {
+TEST_F(Fetch, JoinsHttpChunks) {
   const std::string text = metadata_text(), head = "HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n";
   std::string chunks = head;
   for (std::size_t at = 0; at < text.size(); at += 1000) {
@@ -130,7 +130,7 @@ TEST_F(Fetch, AnAnswerInChunksOfHttpIsJoined) {
   EXPECT_EQ(file->text, text);
 }
 
-TEST_F(Fetch, AnAnswerThatBreaksOffBetweenItsChunksIsNoFile) {
+TEST_F(Fetch, RejectsAnswersCutBetweenChunks) {
   const std::string head = "HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n";
   for (const std::string rest : {"", "3e8\r\n{", "ffffffffffff\r\n{", "x\r\n", "10000000000000000\r\n{}\r\n"}) {
     Lidar lidar;
@@ -141,7 +141,7 @@ TEST_F(Fetch, AnAnswerThatBreaksOffBetweenItsChunksIsNoFile) {
   }
 }
 
-TEST_F(Fetch, OlderFirmwareTellsItsMetadataPartByPart) {
+TEST_F(Fetch, ReadsMetadataOfOldFirmwareInParts) {
   const auto parts = nlohmann::json::parse(metadata_text());
   const auto answer = [&](const std::string& question) -> std::optional<std::string> {
     if (question == "get_config_param active\n")
@@ -159,7 +159,7 @@ TEST_F(Fetch, OlderFirmwareTellsItsMetadataPartByPart) {
   EXPECT_EQ(std::get<ouster::Metadata>(file->content).columns_per_frame, 1024U);
 }
 
-TEST_F(Fetch, AHesaiTellsItsAngles) {
+TEST_F(Fetch, ReadsHesaiAngles) {
   TcpServer server(hesai_, [](const std::string& question) -> std::optional<std::string> {
     return question == std::string{"\x47\x74\x05\0\0\0\0\0", 8} ? ptc(angles_text()) : ptc("", 0, 2);
   });
@@ -169,7 +169,7 @@ TEST_F(Fetch, AHesaiTellsItsAngles) {
   EXPECT_EQ(std::get<hesai::Calibration>(file->content).laser_count, 32U);
 }
 
-TEST_F(Fetch, AnAnswerThatBreaksOffIsNoFile) {
+TEST_F(Fetch, RejectsTruncatedAnswers) {
   const std::string page = http(metadata_text()), angles = angles_text();
   const std::string angles_size = fmt::format("after {} of {} bytes", 8 + angles.size(), 9 + angles.size());
   struct Case {
@@ -190,7 +190,7 @@ TEST_F(Fetch, AnAnswerThatBreaksOffIsNoFile) {
   }
 }
 
-TEST_F(Fetch, AnAbsurdLengthIsNotWaitedFor) {
+TEST_F(Fetch, RejectsAbsurdLengths) {
   TcpServer web(http_, always("HTTP/1.1 200 OK\r\nContent-Length: 99999999999\r\n\r\n{"), {.hangs_up = false});
   TcpServer commands(commands_, always(std::string(2'000'000, ' ')), {.hangs_up = false});
   TcpServer hesai(hesai_, always(ptc("", 0xFFFFFFFF)), {.hangs_up = false});
@@ -201,7 +201,7 @@ TEST_F(Fetch, AnAbsurdLengthIsNotWaitedFor) {
     EXPECT_NE(file.error().find(reason), std::string::npos) << file.error();
 }
 
-TEST_F(Fetch, AnErrorIsToldAsTheLidarTellsIt) {
+TEST_F(Fetch, ReportsTheErrorOfTheLidar) {
   TcpServer web(http_, always(http("{}", "503 Service Unavailable")), {.hangs_up = false});
   TcpServer hesai(hesai_, always(ptc("", 0, 7)), {.hangs_up = false});
   const auto file = fetch();
@@ -210,7 +210,7 @@ TEST_F(Fetch, AnErrorIsToldAsTheLidarTellsIt) {
   EXPECT_NE(file.error().find("refuses to send its angles, with code 7"), std::string::npos) << file.error();
 }
 
-TEST_F(Fetch, SilenceEndsWithThePatience) {
+TEST_F(Fetch, SilenceEndsAtTheTimeout) {
   patience_ = std::chrono::milliseconds{200};
   TcpServer web(http_, silent), commands(commands_, silent), hesai(hesai_, silent);
   const auto before = std::chrono::steady_clock::now();
@@ -218,13 +218,13 @@ TEST_F(Fetch, SilenceEndsWithThePatience) {
   EXPECT_GE(std::chrono::steady_clock::now() - before, 3 * patience_);
 }
 
-TEST_F(Fetch, DropByDropEndsWithThePatienceToo) {
+TEST_F(Fetch, SlowAnswersEndAtTheTimeout) {
   patience_ = std::chrono::milliseconds{200};
   TcpServer web(http_, always(std::string(100'000, 'x')), {.piece_bytes = 1}); // 20 s for all of it
   expect_problem("no answer in time");
 }
 
-TEST_F(Fetch, WhatIsNoLidarIsNotBelieved) {
+TEST_F(Fetch, RejectsAnswersOfOtherDevices) {
   TcpServer web(http_, always(http("<html>a printer</html>")));
   TcpServer commands(commands_, always("\x1b[2JSSH-2.0\n"), {.hangs_up = false});
   TcpServer hesai(hesai_, always(ptc("a,b,c\n")));
@@ -236,18 +236,18 @@ TEST_F(Fetch, WhatIsNoLidarIsNotBelieved) {
   EXPECT_EQ(file.error().find('\x1b'), std::string::npos) << "the terminal stays as it is";
 }
 
-TEST_F(Fetch, AnotherVersionOfHesaisProtocolIsNone) {
+TEST_F(Fetch, RejectsOtherVersionsOfTheHesaiProtocol) {
   TcpServer server(hesai_, always("\x57\x75\x01\x05" + std::string(8, '\0')));
   expect_problem("the answer is not that of a Hesai");
 }
 
-TEST_F(Fetch, WhereNobodyListensEachPortIsNamed) {
+TEST_F(Fetch, NamesEachClosedPort) {
   for (const TcpPort* port : {&http_, &commands_, &hesai_})
     expect_problem(fmt::format("TCP port {}: Connection refused", port->number()));
   expect_problem("look at its power, cable and address");
 }
 
-TEST_F(Fetch, WhatIsNoAddressIsSaid) {
+TEST_F(Fetch, ReportsInvalidAddresses) {
   for (const std::string text : {"os-122.local", "", "192.168.1", "/run/socket", "1.2.3.4:80"}) {
     const auto file = fetch_sensor_file(text);
     ASSERT_FALSE(file) << text;
@@ -278,7 +278,7 @@ class FetchProgram : public testing::Test {
   std::string address_;
 };
 
-TEST_F(FetchProgram, WritesAFileThatTheYamlNames) {
+TEST_F(FetchProgram, WritesTheFileNamedInItsYaml) {
   TcpPort port(address_, 9347);
   TcpServer server(port, always(ptc(angles_text())));
   const auto file = folder_ / "front.csv";
@@ -315,7 +315,7 @@ TEST_F(FetchProgram, WritesTheMetadataOfAnOuster) {
   EXPECT_TRUE(ouster::read_metadata(file));
 }
 
-TEST_F(FetchProgram, AFailureLeavesTheFileThatIsThere) {
+TEST_F(FetchProgram, FailureLeavesTheExistingFile) {
   const auto file = folder_ / "front.csv";
   std::ofstream{file} << "before";
   const auto [status, text] = run(file);
@@ -324,7 +324,7 @@ TEST_F(FetchProgram, AFailureLeavesTheFileThatIsThere) {
   EXPECT_EQ(content(file), "before");
 }
 
-TEST_F(FetchProgram, AFileThatCannotBeWrittenIsNamed) {
+TEST_F(FetchProgram, UnwritableFileIsNamed) {
   TcpPort port(address_, 9347);
   TcpServer server(port, always(ptc(angles_text())));
   const auto [status, text] = run(folder_ / "none/front.csv");

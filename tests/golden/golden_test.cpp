@@ -105,7 +105,7 @@ TEST_P(GoldenRecording, GivesTheAcceptedEstimates) {
 INSTANTIATE_TEST_SUITE_P(Real, GoldenRecording, testing::ValuesIn(kRecordings),
                          [](const auto& recording) { return recording.param.name; });
 
-TEST(GoldenTraces, AreEachOfADrive) {
+TEST(GoldenTraces, BelongToADrive) {
   std::set<std::filesystem::path> files;
   for (const SimulatedCourse& course : kCourses) {
     for (const Drive& drive : course.drives)

@@ -36,13 +36,13 @@ TEST(Trace, HasALineEachSecondAndTheLastSweep) {
   EXPECT_EQ(found.sweeps, 45U);
 }
 
-TEST(Trace, OfAShortDriveHasEverySweepOrEveryThird) {
+TEST(Trace, OfAShortDriveHasEveryOrEveryThirdSweep) {
   EXPECT_EQ(trace(drive(20)).lines.size(), 20U);
   EXPECT_EQ(trace(drive(30)).lines.size(), 11U);
   EXPECT_TRUE(trace({}).lines.empty());
 }
 
-TEST(Trace, IsReadAsItWasWritten) {
+TEST(Trace, RoundTrips) {
   const Trace written = trace(drive(45));
   const std::optional<Trace> read = Trace::parse(written.text());
   ASSERT_TRUE(read);
@@ -50,14 +50,14 @@ TEST(Trace, IsReadAsItWasWritten) {
   EXPECT_FALSE(difference(*read, written));
 }
 
-TEST(Trace, WhatIsNoTraceIsNotTakenForOne) {
+TEST(Trace, OtherFilesAreNoTrace) {
   const std::string text = trace(drive(45)).text();
   for (const std::string& other :
        {std::string{}, std::string{"<<<<<<< HEAD\n"} + text, text + "=======\n", text.substr(0, text.size() - 12)})
     EXPECT_FALSE(Trace::parse(other)) << other;
 }
 
-TEST(Trace, TheLastBitOfASweepThatHasNoLineIsSeen) {
+TEST(Trace, LastBitOfASweepWithoutLineIsCompared) {
   std::vector<OdometryEstimate> other = drive(45);
   double& x_m = other[13].T_odom_base.translation.x();
   x_m = std::nextafter(x_m, std::numeric_limits<double>::infinity());
@@ -66,7 +66,7 @@ TEST(Trace, TheLastBitOfASweepThatHasNoLineIsSeen) {
   EXPECT_NE(words->find("no line differs"), std::string::npos) << *words;
 }
 
-TEST(Trace, TheFirstLineThatDiffersAndTheLargestChangesAreNamed) {
+TEST(Trace, FirstDifferenceAndLargestChangesAreNamed) {
   std::vector<OdometryEstimate> other = drive(45);
   other[20].T_odom_base.translation.y() = 0.002;
   other[30].T_odom_base.translation.y() = 0.012;
@@ -79,7 +79,7 @@ TEST(Trace, TheFirstLineThatDiffersAndTheLargestChangesAreNamed) {
   EXPECT_NE(words->find("sigma 10.0 %"), std::string::npos) << *words;
 }
 
-TEST(Trace, AnotherRecordingIsSaidToBeOne) {
+TEST(Trace, AnotherRecordingIsReported) {
   const auto words = difference(trace(drive(45)), Trace::of("--world none", "4567", drive(45)));
   ASSERT_TRUE(words);
   EXPECT_NE(words->find("the recording itself is another one"), std::string::npos) << *words;
@@ -92,7 +92,7 @@ template <class Change> bool is_within(const Change& change) {
   return !difference_beyond(Tolerance{}, trace(drive(45)), trace(other));
 }
 
-TEST(Trace, WithinTheToleranceAnotherInstructionSetMayDiffer) {
+TEST(Trace, OtherInstructionSetsMayDifferWithinTheTolerance) {
   const Tolerance limit;
   for (const auto& [share, holds] : {std::pair{0.9, true}, std::pair{1.2, false}}) {
     const double part = share;

@@ -38,7 +38,7 @@ nlohmann::json figures(const Odometry& odometry) { return nlohmann::json::parse(
 liblocus::ImuSample imu_at(std::int64_t ns) { return {.stamp_ns = ns, .arrival_ns = ns}; }
 liblocus::OdometrySample pose_at(std::int64_t ns) { return {.stamp_ns = ns, .arrival_ns = ns}; }
 
-TEST(LibraryInputs, AConfigurationThatIsWrongIsAnErrorOfALineForEachMistake) {
+TEST(LibraryInputs, InvalidConfigurationIsAnErrorWithALinePerMistake) {
   expect_error([] { Odometry("/nowhere/robot.yaml"); }, {"/nowhere/robot.yaml", "cannot be read"});
   expect_error([] { Odometry({}, {"lidars.front.prot=1", "threads=0"}); }, {"prot", "port", "\n", "threads"});
   expect_error([] { liblocus::Replay("/nowhere"); }, {"/nowhere"});
@@ -46,7 +46,7 @@ TEST(LibraryInputs, AConfigurationThatIsWrongIsAnErrorOfALineForEachMistake) {
   expect_error([] { liblocus::Replay(room_drive(), {.duration = std::chrono::hours{2'000'000}}); }, {"duration"});
 }
 
-TEST(LibraryInputs, ARecordingWithoutPacketsIsAnErrorAtItsEnd) {
+TEST(LibraryInputs, RecordingWithoutPacketsIsAnErrorAtItsEnd) {
   const TemporaryFolder folder;
   write_pcap({}, folder / "empty.pcap");
   liblocus::Replay replay(folder / "empty.pcap");
@@ -54,7 +54,7 @@ TEST(LibraryInputs, ARecordingWithoutPacketsIsAnErrorAtItsEnd) {
   EXPECT_FALSE(replay.next());
 }
 
-TEST(LibraryInputs, ASourceMustBeConfiguredAndOfThatKind) {
+TEST(LibraryInputs, SourceMustBeConfiguredAndOfThatKind) {
   Odometry odometry;
   expect_error([&] { odometry.imu("gyro", imu_at(kNow_ns)); }, {"gyro", "wio", "imu"});
   expect_error([&] { odometry.imu("wio", imu_at(kNow_ns)); }, {"wio", "odometry()"});
@@ -63,7 +63,7 @@ TEST(LibraryInputs, ASourceMustBeConfiguredAndOfThatKind) {
   expect_error([&] { odometry.cloud("front", {}); }, {"front", "packets", "topic"});
 }
 
-TEST(LibraryInputs, StampsOutsideOfWhatFilesMayClaimAreErrors) {
+TEST(LibraryInputs, StampsOutsideTheValidRangeAreErrors) {
   Odometry odometry;
   for (const std::int64_t ns : {std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max()}) {
     expect_error([&] { odometry.packet({}, ns); }, {"arrival_ns", "1951"});
@@ -72,7 +72,7 @@ TEST(LibraryInputs, StampsOutsideOfWhatFilesMayClaimAreErrors) {
   }
 }
 
-TEST(LibraryInputs, ACloudWhoseArraysDoNotFitIsAnError) {
+TEST(LibraryInputs, CloudWithArraysOfDifferentLengthsIsAnError) {
   Odometry odometry({}, {"lidars.front.topic=/points"});
   const std::array<float, 6> two{1, 2, 3, 4, 5, 6};
   const std::array<double, 3> three{};
@@ -91,7 +91,7 @@ TEST(LibraryInputs, ACloudWhoseArraysDoNotFitIsAnError) {
   EXPECT_EQ(figures(odometry)["lidars"]["front"]["clouds"]["received"], 0);
 }
 
-TEST(LibraryInputs, CloudsOfNothingOfNaNAndOfTooMuchAreCounted) {
+TEST(LibraryInputs, EmptyNaNAndOversizedCloudsAreCounted) {
   Odometry odometry({}, {"lidars.front.topic=/points"});
   const std::vector<float> nan(300, std::numeric_limits<float>::quiet_NaN());
   const std::vector<float> most(3 * ((std::size_t{1} << 20U) + 1));
@@ -106,7 +106,7 @@ TEST(LibraryInputs, CloudsOfNothingOfNaNAndOfTooMuchAreCounted) {
   EXPECT_EQ(clouds["refused"]["too_large"], 1) << clouds;
 }
 
-TEST(LibraryInputs, TimesOfPointsThatAreNoneDoNoHarm) {
+TEST(LibraryInputs, InvalidPointTimesAreHarmless) {
   std::mt19937 dice(1); // NOLINT(cert-msc51-cpp): the same each time
   Odometry odometry({}, {"lidars.front.topic=/points"});
   std::vector<float> xyz(3 * 1000);
@@ -139,7 +139,7 @@ TEST(LibraryInputs, ForeignPacketsAreCounted) {
   EXPECT_EQ(total["data"], 0) << total;
 }
 
-TEST(LibraryInputs, MotionThatIsNotANumberIsCountedAndAWrongRotationAnError) {
+TEST(LibraryInputs, NonFiniteMotionIsCountedAndInvalidRotationIsAnError) {
   Odometry odometry;
   odometry.imu("imu", {.stamp_ns = kNow_ns, .arrival_ns = kNow_ns, .angular_velocity_radps = {kNaN, 0, 0}});
   odometry.odometry("wio", {.stamp_ns = kNow_ns, .arrival_ns = kNow_ns, .position_m = {kNaN, 0, 0}});
@@ -153,14 +153,14 @@ TEST(LibraryInputs, MotionThatIsNotANumberIsCountedAndAWrongRotationAnError) {
   expect_error([&] { odometry.imu("imu", sample); }, {"orientation_xyzw"});
 }
 
-TEST(LibraryInputs, NothingComesAfterTheEnd) {
+TEST(LibraryInputs, InputAfterTheEndIsAnError) {
   Odometry odometry;
   EXPECT_TRUE(odometry.finish().empty());
   expect_error([&] { odometry.packet({}, kNow_ns); }, {"finish()"});
   expect_error([&] { odometry.finish(); }, {"finish()"});
 }
 
-TEST(LibraryInputs, AnErrorLeavesTheRestAsItIs) {
+TEST(LibraryInputs, ErrorLeavesTheStateUnchanged) {
   const std::vector<FedDatagram> datagrams = datagrams_of({room_drive() / "lidar.pcap"});
   Odometry sound({}, {"motion_sources=[]"}), disturbed({}, {"motion_sources=[]"});
   for (const FedDatagram& datagram : datagrams) {

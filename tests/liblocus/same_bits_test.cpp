@@ -62,7 +62,7 @@ template <class Surfaces> void expect_same_map(const Surfaces& surfaces, const R
   EXPECT_EQ(std::memcmp(map.data() + (map.size() - bytes), surfaces.data(), bytes), 0);
 }
 
-TEST(Library, FedInputByInputItSaysWhatTheProgramSays) {
+TEST(Library, InputByInputEqualsTheProgram) {
   liblocus::Odometry odometry(room_drive() / "config.yaml");
   const std::vector<Estimate> estimates = feed(odometry, room_drive());
   const Replay room = program(room_drive());
@@ -70,12 +70,12 @@ TEST(Library, FedInputByInputItSaysWhatTheProgramSays) {
   expect_same_map(odometry.map(), room);
 }
 
-TEST(Library, SoItDoesOfThePlant) {
+TEST(Library, PlantEqualsTheProgram) {
   liblocus::Odometry odometry(plant_drive() / "config.yaml");
   expect_same(feed(odometry, plant_drive()), program(plant_drive()));
 }
 
-TEST(Library, ReplaySaysWhatTheProgramSays) {
+TEST(Library, ReplayEqualsTheProgram) {
   liblocus::Replay replay(room_drive());
   std::vector<Estimate> estimates;
   while (std::optional<Estimate> estimate = replay.next()) {
@@ -88,9 +88,9 @@ TEST(Library, ReplaySaysWhatTheProgramSays) {
   EXPECT_FALSE(replay.next());
 }
 
-TEST(Library, ReplayReadsADriveOfKitti) { expect_same(replay(kitti_room_drive()), program(kitti_room_drive())); }
+TEST(Library, ReplayReadsAKittiDrive) { expect_same(replay(kitti_room_drive()), program(kitti_room_drive())); }
 
-TEST(Library, ReplaysAPartAsTheProgramDoes) {
+TEST(Library, ReplayOfAPartEqualsTheProgram) {
   using std::chrono::seconds;
   liblocus::Replay replay(room_drive(), {.overrides = {"threads=1"}, .start = seconds{3}, .duration = seconds{2}});
   std::vector<Estimate> estimates;
@@ -125,7 +125,7 @@ std::vector<OwnCloud> room_clouds() {
   return clouds;
 }
 
-TEST(Library, FedCloudByCloudItSaysWhatTheProgramSays) {
+TEST(Library, CloudByCloudEqualsTheProgram) {
   const TemporaryFolder folder;
   const std::vector<OwnCloud> clouds = room_clouds();
   for (const OwnCloud& cloud : clouds)
@@ -157,7 +157,7 @@ void expect_same_of(const std::function<void(std::vector<FedDatagram>&)>& change
   expect_same(feed(odometry, datagrams), program(folder / "changed.pcap", kNoSources));
 }
 
-TEST(Library, PacketsOutOfOrderTwiceOrCutAreTreatedAsByTheProgram) {
+TEST(Library, DisorderedDuplicateAndTruncatedPacketsEqualTheProgram) {
   expect_same_of([](std::vector<FedDatagram>& datagrams) {
     for (std::size_t i = 1; i + 1 < datagrams.size(); i += 7)
       std::swap(datagrams[i].payload, datagrams[i + 1].payload);
@@ -177,21 +177,21 @@ std::vector<FedDatagram> room_with_clock_set_by(Duration step) {
   return datagrams;
 }
 
-TEST(Library, SoIsAClockThatIsSet) {
+TEST(Library, ClockStepEqualsTheProgram) {
   using std::chrono::hours, std::chrono::milliseconds, std::chrono::seconds;
   for (const Duration step : {Duration{hours{1}}, Duration{seconds{-2}}, Duration{milliseconds{-30}}})
     expect_same_of([&](std::vector<FedDatagram>& datagrams) { datagrams = room_with_clock_set_by(step); });
 }
 
 /// The program skips datagrams older than a capture's first; the library has no such start time.
-TEST(Library, GoesOnWhenTheClockIsSetToBeforeItsFirstInput) {
+TEST(Library, ContinuesAfterAClockStepToBeforeItsFirstInput) {
   liblocus::Odometry sound({}, kNoSources), set_back({}, kNoSources);
   const std::size_t sweeps = feed(sound, room_with_clock_set_by({})).size();
   EXPECT_GT(sweeps, 70U);
   EXPECT_GT(feed(set_back, room_with_clock_set_by(-std::chrono::hours{1})).size(), sweeps - 10);
 }
 
-TEST(Library, ObjectsInTwoThreadsDoNotKnowOfEachOther) {
+TEST(Library, ObjectsInTwoThreadsAreIndependent) {
   std::array<std::vector<Estimate>, 2> estimates;
   std::vector<std::thread> threads;
   threads.reserve(estimates.size());
@@ -206,7 +206,7 @@ TEST(Library, ObjectsInTwoThreadsDoNotKnowOfEachOther) {
 
 class RealCaptureInLibrary : public testing::TestWithParam<const char*> {};
 
-TEST_P(RealCaptureInLibrary, SaysWhatTheProgramSays) {
+TEST_P(RealCaptureInLibrary, EqualsTheProgram) {
   const path capture = test_data() / "velodyne" / GetParam();
   if (!std::filesystem::exists(capture))
     GTEST_SKIP() << "no real captures in " << test_data() << "; set LOCUS_TEST_DATA";

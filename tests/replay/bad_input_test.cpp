@@ -52,7 +52,7 @@ class OutputFolder : public testing::Test {
   std::filesystem::path out_ = folder_ / "out";
 };
 
-TEST_F(OutputFolder, InputIsNotWrittenOver) {
+TEST_F(OutputFolder, InputIsNotOverwritten) {
   ASSERT_EQ(replay({"--duration", "2"}).status, 0);
   const std::string poses = read_text(out_ / "odometry.tum");
   for (const std::vector<std::string>& input :
@@ -64,7 +64,7 @@ TEST_F(OutputFolder, InputIsNotWrittenOver) {
   EXPECT_EQ(read_text(out_ / "odometry.tum"), poses);
 }
 
-TEST_F(OutputFolder, RunThatIsEndedLeavesNothingOfTheOneBefore) {
+TEST_F(OutputFolder, InterruptedRunLeavesNoResultsOfThePreviousOne) {
   ASSERT_EQ(replay({"--duration", "2"}).status, 0);
   Child second({LOCUS_REPLAY, "--realtime=0.01", "-o", out_, room_drive() / "lidar.pcap"});
   const auto is_left = [&](const char* name) { return std::filesystem::exists(out_ / name); };
@@ -78,7 +78,7 @@ TEST_F(OutputFolder, RunThatIsEndedLeavesNothingOfTheOneBefore) {
     EXPECT_FALSE(is_left(name)) << name;
 }
 
-TEST_F(OutputFolder, CutWithoutAWholeSweepIsSaidWithTruthAndWithout) {
+TEST_F(OutputFolder, PartWithoutAWholeSweepIsReportedWithAndWithoutTruth) {
   for (const std::vector<std::string>& truth :
        {std::vector<std::string>{}, {"--ground-truth", room_drive() / "gt.tum"}}) {
     std::vector<std::string> arguments{"--duration", "0.02"};
@@ -87,7 +87,7 @@ TEST_F(OutputFolder, CutWithoutAWholeSweepIsSaidWithTruthAndWithout) {
   }
 }
 
-TEST_F(OutputFolder, WhatCannotBePrintedIsNoSuccess) {
+TEST_F(OutputFolder, UnwritableStandardOutputIsAnError) {
   const ProgramRun run = run_program("/bin/sh", {"-c", std::string(LOCUS_REPLAY) + " -o " + out_.string() + " " +
                                                            (room_drive() / "lidar.pcap").string() + " > /dev/full"});
   expect_error(run, 1, {"standard output cannot be written"});
@@ -117,7 +117,7 @@ TEST_F(BadCapture, NoDatagramsAtAll) {
   expect_error(replay(), 1, {"bad.pcap", "no valid data packet", "no UDP datagram"});
 }
 
-TEST_F(BadCapture, DatagramsOfAllLengthsAreCountedAndNoneIsData) {
+TEST_F(BadCapture, DatagramsOfAnyLengthAreCountedAndRejected) {
   {
     PcapWriter pcap = std::move(*PcapWriter::open(folder_ / "bad.pcap"));
     for (std::size_t length = 0; length < 1500; ++length)
@@ -132,7 +132,7 @@ TEST_F(BadCapture, DatagramsOfAllLengthsAreCountedAndNoneIsData) {
   EXPECT_EQ(summary["packets"]["total"]["position"], 1);
 }
 
-TEST_F(BadCapture, TruncatedInMidPacketIsAWarningAndNoFailure) {
+TEST_F(BadCapture, TruncatedInMidPacketIsAWarning) {
   std::string bytes = read_text(room_drive() / "lidar.pcap");
   bytes.resize(bytes.size() / 2 + 17);
   const ProgramRun run = replay(bytes);
@@ -143,7 +143,7 @@ TEST_F(BadCapture, TruncatedInMidPacketIsAWarningAndNoFailure) {
 }
 
 /// Regression: the program played one packet and reported success.
-TEST_F(BadCapture, ThatRunsBackwardsIsSaidWithTheProgramThatSortsIt) {
+TEST_F(BadCapture, UnsortedCaptureIsReportedWithTheProgramThatSortsIt) {
   constexpr std::size_t kPackets = 500;
   std::vector<std::pair<Stamp, Bytes>> packets;
   auto capture = Capture::open(room_drive() / "lidar.pcap");
@@ -162,7 +162,7 @@ TEST_F(BadCapture, ThatRunsBackwardsIsSaidWithTheProgramThatSortsIt) {
   expect_error(replay(), 1, {"bad.pcap", counted, "runs backwards", "reordercap IN OUT"});
 }
 
-TEST_F(BadCapture, CompressedFilesThatAreDamagedOrOfAnotherKindAreCalledSo) {
+TEST_F(BadCapture, CompressedFilesThatAreDamagedOrUnsupportedAreReported) {
   const std::string rest = " and so on and so on and so on and so on";
   expect_error(replay("\x1F\x8B\x08" + rest), 1, {"bad.pcap: its gzip compression is damaged"});
   expect_error(replay("\xFD"
@@ -173,7 +173,7 @@ TEST_F(BadCapture, CompressedFilesThatAreDamagedOrOfAnotherKindAreCalledSo) {
   expect_error(replay("BZh91AY&SY" + rest), 1, {"a bzip2-compressed file", "bzip2 -dc <", "/bad.pcap.unpacked"});
 }
 
-TEST_F(BadCapture, OfAnotherMakersLidarIsSaidWithTheMaker) {
+TEST_F(BadCapture, UnsupportedLidarIsNamedWithItsMaker) {
   const auto write = [&](std::uint16_t port, std::size_t bytes, int first, int second, int third = 4, int fourth = 3) {
     PcapWriter pcap = std::move(*PcapWriter::open(folder_ / "bad.pcap"));
     Bytes payload(bytes);
@@ -209,7 +209,7 @@ TEST(WrongUsage, PipeWithoutACapture) {
   expect_error(from("printf '#ROSBAG V2.0'"), 1, {"-: a ROS 1 bag, not a pcap or pcapng capture"});
 }
 
-TEST(WrongUsage, FolderAboveADriveOfKittiStandsForTheOnlyDriveInIt) {
+TEST(WrongUsage, FolderAboveAKittiDriveResolvesToItsOnlyDrive) {
   const std::filesystem::path day = kitti_room_drive().parent_path();
   const Replay replay({"--duration", "1", day.string()});
   EXPECT_EQ(replay.run().status, 0) << replay.run().err;
@@ -221,13 +221,13 @@ TEST(WrongUsage, FolderAboveADriveOfKittiStandsForTheOnlyDriveInIt) {
 }
 
 /// A folder that contains the day's folder and other recordings.
-TEST(WrongUsage, FolderOfManyRecordingsNamesSome) {
+TEST(WrongUsage, FolderOfManyRecordingsListsSome) {
   expect_error(Replay({kitti_room_drive().parent_path().parent_path().string()}).run(), 1,
                {"name one of them: ", kitti_room_drive(), "more"});
 }
 
 /// Stale output files would be mistaken for results.
-TEST(WrongUsage, OtherPortIsNamedWithTheOverrideThatHelpsAndNothingButTheSummaryIsLeft) {
+TEST(WrongUsage, OtherPortIsNamedWithTheOverrideAndOnlyTheSummaryIsWritten) {
   const TemporaryFolder folder;
   const std::string capture = room_drive().string(), out = folder / "out";
   EXPECT_EQ(run_program(LOCUS_REPLAY, {"--duration", "1", "-o", out, capture}).status, 0);
@@ -240,14 +240,14 @@ TEST(WrongUsage, OtherPortIsNamedWithTheOverrideThatHelpsAndNothingButTheSummary
   EXPECT_EQ(left, std::vector<std::string>{"summary.json"});
 }
 
-TEST(WrongUsage, FolderOfARecordingIsNoPlaceForResults) {
+TEST(WrongUsage, ResultsAreNotWrittenIntoARecording) {
   const std::string capture = room_drive().string();
   expect_error(run_program(LOCUS_REPLAY, {"-o", capture, capture}), 2, {"-o " + capture, "holds a recording"});
   expect_error(run_program(LOCUS_REPLAY, {"-o", capture + "/.", capture + "/lidar.pcap"}), 2, {"holds a recording"});
   EXPECT_FALSE(std::filesystem::exists(room_drive() / "odometry.tum"));
 }
 
-TEST(WrongUsage, OtherAddressIsNamedWithTheOverrideThatHelps) {
+TEST(WrongUsage, OtherAddressIsNamedWithTheOverride) {
   const Replay replay({"--set", "lidars.front.source_ip=10.0.0.1", room_drive().string()});
   expect_error(replay.run(), 1, {"come from 192.168.1.201", "--set lidars.0.source_ip=192.168.1.201"});
 }
@@ -303,7 +303,7 @@ TEST(WrongUsage, OdometryFilesMustBeNamedAsASource) {
   expect_error(Replay({"--odometry", "wio=/nowhere.tum", capture}).run(), 1, {"/nowhere.tum"});
 }
 
-TEST(WrongUsage, FilesAndSourcesWithoutEachOtherAreWarnedAbout) {
+TEST(WrongUsage, UnmatchedFilesAndSourcesAreWarnings) {
   const TemporaryFolder folder;
   std::filesystem::copy(room_drive(), folder.path());
   std::filesystem::rename(folder / "wio.tum", folder / "legs.tum");
@@ -315,7 +315,7 @@ TEST(WrongUsage, FilesAndSourcesWithoutEachOtherAreWarnedAbout) {
   EXPECT_NE(lines[1].find("--odometry wio=FILE"), std::string::npos) << lines[1];
 }
 
-TEST(WrongUsage, OutputThatCannotBeWritten) {
+TEST(WrongUsage, UnwritableOutput) {
   const TemporaryFolder folder;
   std::ofstream{folder / "file"} << "not a folder";
   const std::string capture = room_drive().string();
@@ -323,7 +323,7 @@ TEST(WrongUsage, OutputThatCannotBeWritten) {
   expect_error(run_program(LOCUS_REPLAY, {"-o", (folder / "file/below").string(), capture}), 1, {"file/below"});
 }
 
-TEST(WrongUsage, FullDiskIsToldAndNotIgnored) {
+TEST(WrongUsage, FullDiskIsAnError) {
   const TemporaryFolder folder;
   ASSERT_EQ(::symlink("/dev/full", (folder / "odometry.csv").c_str()), 0);
   expect_error(run_program(LOCUS_REPLAY, {"-o", folder.path().string(), room_drive().string()}), 1,

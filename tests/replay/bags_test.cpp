@@ -93,7 +93,7 @@ TEST(Bags, Ros2BagGivesTheOdometryOfTheCapture) {
 }
 
 /// Converters and early recorders leave the column empty, because only one serialisation existed.
-TEST(Bags, Ros2BagThatNamesNoSerialisationIsCdr) {
+TEST(Bags, Ros2BagWithoutSerialisationIsCdr) {
   const TemporaryFolder folder;
   write_db3(folder / "drive_0.db3", room_messages(RosVersion::ros2), "");
   expect_same_odometry(replay_room(folder / "drive_0.db3"));
@@ -139,7 +139,7 @@ TEST(Bags, BagOfTwoLidarsGivesTheirPacketsInTheOrderOfReception) {
 }
 
 /// Order of scripts that merge or convert bags. Playback is ordered by the time of reception.
-TEST(Bags, DatabaseThatWasWrittenTopicByTopicGivesTheOdometryOfTheCapture) {
+TEST(Bags, DatabaseWrittenTopicByTopicGivesTheOdometryOfTheCapture) {
   const TemporaryFolder folder;
   std::vector<RecordedMessage> messages = room_messages(RosVersion::ros2);
   std::ranges::stable_sort(messages, {}, &RecordedMessage::topic);
@@ -149,7 +149,7 @@ TEST(Bags, DatabaseThatWasWrittenTopicByTopicGivesTheOdometryOfTheCapture) {
   EXPECT_EQ(replay.run().err, "");
 }
 
-TEST(Bags, Ros1BagThatIsNotInOrderIsCalledSo) {
+TEST(Bags, UnorderedRos1BagIsReported) {
   const TemporaryFolder folder;
   std::vector<RecordedMessage> messages = room_messages(RosVersion::ros1);
   std::rotate(messages.begin(), messages.begin() + static_cast<std::ptrdiff_t>(messages.size() / 2), messages.end());
@@ -195,7 +195,7 @@ TEST(Bags, LidarWhoseNameIsPartOfAnothersHasItsOwnTopic) {
   }
 }
 
-TEST(Bags, TopicThatTheUserNamesIsTakenForNoOther) {
+TEST(Bags, ConfiguredTopicIsNotReplacedByAnother) {
   const TemporaryFolder folder;
   write_text(folder / "drive.bag", ros1_bag(room_messages(RosVersion::ros1)));
   const Replay replay =
@@ -205,7 +205,7 @@ TEST(Bags, TopicThatTheUserNamesIsTakenForNoOther) {
   expect_line(replay.run().out, {"left out: /wheel_odometry"});
 }
 
-TEST(Bags, OnlyTopicOfAKindIsTakenWhateverItsName) {
+TEST(Bags, OnlyTopicOfAKindIsUsedWhateverItsName) {
   const TemporaryFolder folder;
   std::vector<RecordedMessage> messages = room_messages(RosVersion::ros1);
   for (RecordedMessage& message : messages)
@@ -233,7 +233,7 @@ TEST(Bags, TopicIsNotGuessedAmongSeveral) {
   expect_line(told.run().out, {"/odom_b is wio", "left out: /odom_a"});
 }
 
-TEST(Bags, FileThatTheUserNamesTakesThePlaceOfATopic) {
+TEST(Bags, NamedFileReplacesATopic) {
   const TemporaryFolder folder;
   write_text(folder / "drive.bag", ros1_bag(room_messages(RosVersion::ros1)));
   const Replay replay = replay_room(folder / "drive.bag", {"--imu", room_drive() / "imu.csv"});
@@ -303,11 +303,11 @@ void expect_damage_is_borne(const std::string& bytes, const std::string& name, i
   }
 }
 
-TEST_P(BagOfRosbag, DamageNeverHangsNorCrashes) {
+TEST_P(BagOfRosbag, SurvivesAnyDamage) {
   expect_damage_is_borne(read_text(std::filesystem::path(LOCUS_TEST_BAGS) / GetParam()), "damaged.bag", 9);
 }
 
-TEST(Bags, DamageOfADatabaseNeverHangsNorCrashes) {
+TEST(Bags, DamagedDatabaseNeverHangsOrCrashes) {
   const TemporaryFolder folder;
   std::vector<RecordedMessage> messages;
   for (int i = 0; i < 60; ++i)
@@ -326,7 +326,7 @@ TEST(Bags, BagWithoutIndexIsReadToItsEnd) {
   expect_same_odometry(replay);
 }
 
-TEST(Bags, BagThatBreaksOffIsReadUpToThere) {
+TEST(Bags, TruncatedBagIsReadUpToTheCut) {
   const TemporaryFolder folder;
   std::string bytes = ros1_bag(room_messages(RosVersion::ros1));
   bytes.resize(bytes.size() / 2);
@@ -338,7 +338,7 @@ TEST(Bags, BagThatBreaksOffIsReadUpToThere) {
   EXPECT_NEAR(static_cast<double>(replay.trajectory().size()), 40, 2);
 }
 
-TEST(Bags, DatabaseThatBreaksOffIsReadUpToThere) {
+TEST(Bags, TruncatedDatabaseIsReadUpToTheCut) {
   const TemporaryFolder folder;
   write_db3(folder / "cut.db3", room_messages(RosVersion::ros2));
   std::filesystem::resize_file(folder / "cut.db3", std::filesystem::file_size(folder / "cut.db3") / 2);
@@ -395,7 +395,7 @@ TEST_F(BadBag, DatabaseOfSomethingElse) {
 }
 
 /// A view can have infinitely many rows.
-TEST_F(BadBag, DatabaseWhoseTablesAreNone) {
+TEST_F(BadBag, DatabaseWithAViewForATable) {
   sqlite3* database = nullptr;
   ASSERT_EQ(sqlite3_open((folder_ / "a.db3").c_str(), &database), SQLITE_OK);
   EXPECT_EQ(sqlite3_exec(database,
@@ -409,7 +409,7 @@ TEST_F(BadBag, DatabaseWhoseTablesAreNone) {
   expect_refused("a.db3", {"not a ROS 2 bag, or damaged"});
 }
 
-TEST_F(BadBag, OfMoreFilesThanMayBeOpenIsNotCalledAnotherThing) {
+TEST_F(BadBag, MoreFilesThanMayBeOpenAreReportedAsSuch) {
   std::filesystem::create_directories(folder_ / "drive");
   const std::span<const RecordedMessage> messages = room_messages(RosVersion::ros2);
   constexpr std::size_t kFiles = 40;
@@ -430,7 +430,7 @@ TEST_F(BadBag, OfMoreFilesThanMayBeOpenIsNotCalledAnotherThing) {
   EXPECT_EQ(asks.status, 0) << asks.err;
 }
 
-TEST_F(BadBag, TopicWithAnAbsurdNameIsLeftOut) {
+TEST_F(BadBag, TopicWithAnAbsurdNameIsRejected) {
   std::vector<RecordedMessage> messages(2, room_messages(RosVersion::ros2).front());
   messages.front().topic = "/" + std::string(4096, 'x');
   write_text(folder_ / "a.bag", ros1_bag(messages));
@@ -449,14 +449,14 @@ TEST_F(BadBag, TopicWithAnAbsurdNameIsLeftOut) {
   }
 }
 
-TEST_F(BadBag, OtherwiseSerialisedRos2Bag) {
+TEST_F(BadBag, Ros2BagWithUnsupportedSerialisation) {
   write_db3(folder_ / "odd.db3", std::vector{room_messages(RosVersion::ros2).front()}, "a\nb\x1B");
   expect_refused("odd.db3", {"\"a?b?\""});
   write_db3(folder_ / "flat.db3", std::vector{room_messages(RosVersion::ros2).front()}, "flatbuffers");
   expect_refused("flat.db3", {"flatbuffers"});
 }
 
-TEST_F(BadBag, Ros2FolderThatIsNotWhole) {
+TEST_F(BadBag, IncompleteRos2Folder) {
   const auto metadata = [&](const std::string& text) {
     std::filesystem::create_directories(folder_ / "drive");
     write_text(folder_ / "drive/metadata.yaml", "rosbag2_bagfile_information:\n" + text);
@@ -478,7 +478,7 @@ TEST_F(BadBag, Ros2FolderThatIsNotWhole) {
   }
 }
 
-TEST_F(BadBag, WithoutLidarSaysWhatIsInIt) {
+TEST_F(BadBag, BagWithoutLidarListsItsTopics) {
   std::vector<RecordedMessage> messages = room_messages(RosVersion::ros1);
   std::erase_if(messages, [](const RecordedMessage& m) { return m.topic.ends_with("packets"); });
   messages.push_back({"/image_raw", "sensor_msgs/Image", messages.back().recorded, {}});
@@ -505,7 +505,7 @@ TEST(Bags, NebulaPacketsGiveTheBitsOfAVelodyneScan) {
 }
 
 /// Packets in the messages of Hesai's drivers; only the newest begins with a header.
-TEST(BagMessages, OfHesaisDriversGiveTheirPackets) {
+TEST(BagMessages, OfHesaiDriversGiveTheirPackets) {
   for (const RosVersion ros : {RosVersion::ros1, RosVersion::ros2}) {
     std::vector<ReceivedPacket> packets;
     for (const std::size_t size : {1262U, 568U, 1U})
@@ -527,7 +527,7 @@ TEST(BagMessages, OfHesaisDriversGiveTheirPackets) {
   }
 }
 
-TEST_F(BadBag, ScansThatAreCutShort) {
+TEST_F(BadBag, TruncatedScans) {
   std::vector<RecordedMessage> messages{
       *std::ranges::find(room_messages(RosVersion::ros1), "velodyne_msgs/VelodyneScan", &RecordedMessage::type)};
   messages.front().data.resize(2000);
@@ -548,7 +548,7 @@ TEST(BagChunk, WithNothingToDecompressIsDamaged) {
 }
 
 /// Lengths in a message are checked against its end.
-TEST(BagMessages, AbsurdCountsAndEveryCutAreNoMessage) {
+TEST(BagMessages, AbsurdCountsAndTruncatedMessagesAreRejected) {
   for (const RosVersion ros : {RosVersion::ros1, RosVersion::ros2}) {
     const auto serialisation = ros == RosVersion::ros1 ? Serialisation::ros1 : Serialisation::cdr;
     const ReceivedPacket packet{stamp_from_ns(5), std::vector<std::byte>(1206)};
@@ -580,7 +580,7 @@ TEST(BagMessages, AbsurdCountsAndEveryCutAreNoMessage) {
 }
 
 /// Stamps that are unset or of another clock, and NaN, as in bags of real robots.
-TEST(Bags, StampsOfAnotherClockAndNanAreBorne) {
+TEST(Bags, StampsOfAnotherClockAndNanAreTolerated) {
   const TemporaryFolder folder;
   std::vector<RecordedMessage> messages = room_messages(RosVersion::ros1);
   for (RecordedMessage& message : messages)

@@ -15,7 +15,7 @@
 namespace locus::test {
 namespace {
 
-TEST(Calibrate, GoesOnWithWhatItHasWritten) {
+TEST(Calibrate, RunEqualsOneWithTheWrittenCalibration) {
   const TemporaryFolder folder;
   const std::string file = folder / "found.yaml";
   const Replay calibrated({"--calibrate", file, room_drive()});
@@ -34,7 +34,7 @@ TEST(Calibrate, GoesOnWithWhatItHasWritten) {
   EXPECT_LT((last_m(calibrated) - last_m(configured)).norm(), 0.002) << "but for what is rounded in the file";
 }
 
-TEST(Calibrate, IsRefusedWhereItCannotBe) {
+TEST(Calibrate, InvalidCombinationsAreErrors) {
   const TemporaryFolder folder;
   const auto refusal = [&](std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), {"-o", folder / "out"});

@@ -133,7 +133,7 @@ TEST_P(CloudsOf, Ros2BagGivesTheSameBits) {
 INSTANTIATE_TEST_SUITE_P(Kinds, CloudsOf, testing::Range(0, kCloudKinds),
                          [](const auto& tested) { return name_of(static_cast<CloudKind>(tested.param)); });
 
-TEST(Clouds, OneCommandWithoutAConfigurationReachesTheReport) {
+TEST(Clouds, OneCommandWithoutConfigurationWritesTheReport) {
   const TemporaryFolder folder;
   write_file(folder / "clouds.bag", ros1_bag(room_clouds(CloudKind::velodyne, RosVersion::ros1)));
   const Replay replay({"--ground-truth", room_drive() / "gt.tum", folder / "clouds.bag"});
@@ -147,7 +147,7 @@ TEST(Clouds, OneCommandWithoutAConfigurationReachesTheReport) {
   EXPECT_EQ(replay.summary()["sweeps"]["failed"], 0);
 }
 
-TEST(Clouds, FiguresTellWhatCame) {
+TEST(Clouds, FiguresCountWhatWasReceived) {
   const TemporaryFolder folder;
   write_file(folder / "clouds.bag", ros1_bag(room_clouds(CloudKind::ouster, RosVersion::ros1)));
   const Replay replay({folder / "clouds.bag"});
@@ -168,7 +168,7 @@ TEST(Clouds, FiguresTellWhatCame) {
   expect_parts(replay.run().out, {"clouds of", "times: field, rings: field"});
 }
 
-TEST(Clouds, MountingIsThatOfTheStaticTransforms) {
+TEST(Clouds, MountingIsReadFromTheStaticTransforms) {
   const TemporaryFolder folder;
   std::vector<RecordedMessage> messages = room_clouds(CloudKind::hesai, RosVersion::ros2, {}, 10);
   const Pose T_base_mast{from_rpy_rad({0, 0, 0.5}), {0.2, 0, 0.6}},
@@ -194,7 +194,7 @@ tools::StaticTransforms transforms_of(const std::vector<std::tuple<std::string, 
   return transforms;
 }
 
-TEST(StaticTransforms, LeadFromFrameToFrameWhereverTheyMeet) {
+TEST(StaticTransforms, ConnectFramesThroughCommonAncestors) {
   const Pose T{from_rpy_rad({0, 0, 0.5}), {0.2, 0, 0.6}}, U{from_rpy_rad({0, 0.1, 0}), {0, 0, 0.1}};
   const auto tree = transforms_of({{"base_link", "mast", T}, {"mast", "lidar", U}, {"mast", "imu", T}});
   const auto expect_pose = [](const std::optional<Pose>& found, const Pose& expected) {
@@ -217,12 +217,12 @@ TEST(StaticTransforms, LeadFromFrameToFrameWhereverTheyMeet) {
   EXPECT_FALSE(circle.between("camera", "lidar"));
 }
 
-TEST(StaticTransforms, AbsurdNamesAreLeftOut) {
+TEST(StaticTransforms, AbsurdNamesAreRejected) {
   const std::string name(5000, 'x');
   EXPECT_FALSE(transforms_of({{name, "lidar", Pose{}}}).between(name, "lidar"));
 }
 
-TEST(Clouds, TopicWithMostPointsIsTakenAndTheOthersAreNamed) {
+TEST(Clouds, TopicWithMostPointsIsUsedAndOthersAreNamed) {
   const TemporaryFolder folder;
   std::vector<RecordedMessage> messages = room_clouds(CloudKind::velodyne, RosVersion::ros1, {}, 10);
   CloudTurn thinned = room_turns().front();
@@ -241,7 +241,7 @@ TEST(Clouds, TopicWithMostPointsIsTakenAndTheOthersAreNamed) {
   expect_parts(none.run().err, {"no clouds on /nothing", "/points (sensor_msgs/PointCloud2)"});
 }
 
-TEST(Clouds, ConfigurationForPacketsSaysHowToTakeThem) {
+TEST(Clouds, PacketConfigurationSuggestsTheCloudTopic) {
   const TemporaryFolder folder;
   write_file(folder / "clouds.bag", ros1_bag(room_clouds(CloudKind::velodyne, RosVersion::ros1, {}, 3)));
   write_file(folder / "packets.yaml", "lidars: [{name: top}]\n");
@@ -250,7 +250,7 @@ TEST(Clouds, ConfigurationForPacketsSaysHowToTakeThem) {
   expect_parts(replay.run().err, {"no velodyne_msgs/VelodyneScan", "--set lidars.0.topic=/points"});
 }
 
-TEST(Clouds, RealtimeGoesThroughTheThreadsOfTheDaemon) {
+TEST(Clouds, RealtimeUsesTheThreadsOfTheDaemon) {
   const TemporaryFolder folder;
   write_file(folder / "clouds.bag", ros1_bag(room_clouds(CloudKind::velodyne, RosVersion::ros1, {}, 30)));
   const Replay replay({"--realtime=2", folder / "clouds.bag"});
@@ -259,7 +259,7 @@ TEST(Clouds, RealtimeGoesThroughTheThreadsOfTheDaemon) {
   EXPECT_EQ(replay.summary()["lidars"]["front"]["clouds"]["used"], 30);
 }
 
-TEST(Clouds, FaultsAreForPackets) {
+TEST(Clouds, PacketFaultsAreAnError) {
   const TemporaryFolder folder;
   write_file(folder / "clouds.bag", ros1_bag(room_clouds(CloudKind::velodyne, RosVersion::ros1, {}, 3)));
   const Replay replay({"--fail", "front:lost@1-2", folder / "clouds.bag"});
@@ -313,7 +313,7 @@ std::vector<WrongTimes> wrong_times() {
 
 class CloudTimes : public testing::TestWithParam<WrongTimes> {};
 
-TEST_P(CloudTimes, ThatAreWrongAreNamedInTheFirstSecondAndReplaced) {
+TEST_P(CloudTimes, WrongTimesAreReportedInTheFirstSecondAndReplaced) {
   const WrongTimes& wrong = GetParam();
   const TemporaryFolder folder;
   write_file(folder / "clouds.bag", ros1_bag(room_clouds(wrong.kind, RosVersion::ros1, wrong.change)));
@@ -352,7 +352,7 @@ TEST(Clouds, UserChoosesAzimuthOrOneInstant) {
   EXPECT_EQ(none.summary()["sweeps"]["failed"], 0);
 }
 
-TEST(Clouds, ClockThatStepsCostsAFewClouds) {
+TEST(Clouds, ClockStepLosesAFewClouds) {
   const TemporaryFolder folder;
   const Stamp middle = room_turns()[room_turns().size() / 2].begin;
   const auto step = [middle](OwnCloud& cloud) { cloud.stamp += cloud.stamp > middle ? seconds{-100} : seconds{0}; };
@@ -368,7 +368,7 @@ TEST(Clouds, ClockThatStepsCostsAFewClouds) {
       0.02);
 }
 
-TEST(Clouds, LostOnesLeaveDeadReckoning) {
+TEST(Clouds, LostCloudsAreDeadReckoned) {
   const TemporaryFolder folder;
   std::vector<RecordedMessage> messages = room_clouds(CloudKind::velodyne_start, RosVersion::ros1);
   std::size_t seen = 0;

@@ -62,7 +62,7 @@ TEST(LocusReplay, OneRowForEverySweepInBothTables) {
   }
 }
 
-TEST(LocusReplay, EachSourceIsComparedWithAllElse) {
+TEST(LocusReplay, EachSourceIsComparedWithAllOthers) {
   const Replay replay({"--fail", "wio:lost@4", room_drive().string()});
   const auto table = replay.table();
   const auto column = [&](const std::string& name) {
@@ -203,7 +203,7 @@ TEST(LocusReplay, StaysWithinThreeCentimetresOfTruthInARoom) {
   EXPECT_LT(error["max"].get<double>(), 0.03);
 }
 
-TEST(LocusReplay, FilesNamedOneByOneGiveWhatTheFolderGives) {
+TEST(LocusReplay, FilesNamedOneByOneEqualTheFolder) {
   const std::string folder = room_drive().string();
   const Replay whole({folder});
   const Replay named({"-c", folder + "/config.yaml", "--imu", folder + "/imu.csv", "--odometry",
@@ -270,13 +270,13 @@ TEST(LocusReplay, LostLidarsAreBridgedByDeadReckoning) {
   EXPECT_LT(replay.summary()["ape_m"]["max"].get<double>(), 0.1);
 }
 
-TEST(LocusReplay, RowsGoOnToTheEndWhenALoneLidarDies) {
+TEST(LocusReplay, RowsContinueToTheEndWithoutLidar) {
   const Replay replay({"--fail", "front:lost@4", (room_drive() / "lidar.pcap").string()});
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
   EXPECT_NEAR(static_cast<double>(replay.trajectory().size()), 80, 2);
 }
 
-TEST(LocusReplay, CountersAddUpWhateverGoesWrong) {
+TEST(LocusReplay, CountersAddUpUnderFaults) {
   const Replay replay({"--fail", "front:packet-loss=5@0", "--fail", "front:duplicate=5@0", "--fail",
                        "front:reorder=5@0", "--fail", "imu:nan@1-2", "--fail", "wio:duplicate=20@0",
                        room_drive().string()});
@@ -292,7 +292,7 @@ TEST(LocusReplay, CountersAddUpWhateverGoesWrong) {
   EXPECT_GT(summary["sources"]["wio"]["rejected"]["out_of_order"], 0);
 }
 
-TEST(LocusReplay, TwoLidarsMakeOneTrajectory) {
+TEST(LocusReplay, TwoLidarsGiveOneTrajectory) {
   const TemporaryFolder folder;
   write_room_drive(folder.path(), std::chrono::seconds{4}, 2);
   const Replay replay({folder.path().string()});
@@ -306,7 +306,7 @@ TEST(LocusReplay, TwoLidarsMakeOneTrajectory) {
   EXPECT_LT(replay.summary()["ape_m"]["max"].get<double>(), 0.03);
 }
 
-TEST(LocusReplay, RealtimeTakesAsLongAsTheRecordingAndLosesCountOfNothing) {
+TEST(LocusReplay, RealtimeTakesAsLongAsTheRecordingAndCountsEverything) {
   const Replay replay({"--realtime=2", "--duration", "4", room_drive().string()});
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
   const json summary = replay.summary();
@@ -324,12 +324,12 @@ TEST(LocusReplay, RealtimeMayBeSlowedDown) {
   EXPECT_GT(replay.summary()["wall_s"], 1.7);
 }
 
-TEST(LocusReplay, LidarsAreToldWithWhatTheirPacketsAreReadAs) {
+TEST(LocusReplay, LidarsArePrintedWithModelModeAndRate) {
   const std::string told = Replay({"--duration", "2", room_drive().string()}).run().out;
   EXPECT_NE(told.find("\nfront      VLP-16, strongest returns, 600 rpm\n"), std::string::npos) << told;
 }
 
-TEST(LocusReplay, LastLineTellsRunsApart) {
+TEST(LocusReplay, LastLineIdentifiesTheRun) {
   const Replay replay({"--threads", "1", room_drive().string()});
   const json summary = replay.summary();
   const std::string line = lines_of(replay.run().out).back();
@@ -355,14 +355,14 @@ TEST(LocusReplay, FiguresGoToStdoutUnlessQuiet) {
   EXPECT_EQ(quiet.run().status, 0);
 }
 
-TEST(LocusReplay, OverridesAreInForceAndNamedInTheSummary) {
+TEST(LocusReplay, OverridesTakeEffectAndAreInTheSummary) {
   const Replay plain({room_drive().string()});
   const Replay changed({"--set", "sweep_period_ms=200", "--set", "lidars.front.time=receive", room_drive().string()});
   EXPECT_NEAR(static_cast<double>(changed.trajectory().size()), 40, 1);
   EXPECT_NE(changed.summary()["config_sha256"], plain.summary()["config_sha256"]);
 }
 
-TEST(LocusReplay, HelpHasAnExampleAndVersionIsTold) {
+TEST(LocusReplay, HelpHasAnExampleAndVersionIsPrinted) {
   const ProgramRun help = run_program(LOCUS_REPLAY, {"--help"});
   EXPECT_EQ(help.status, 0);
   EXPECT_NE(help.out.find("locus-replay -o out drive.pcap"), std::string::npos);

@@ -56,7 +56,7 @@ const SimulatedDrive& late_imu() {
 }
 
 /// The start of the replay determines whether the error is detected.
-TEST(WrongStamps, OfAnImuAreSaidToBeNobodysFault) {
+TEST(WrongStamps, OfAnImuAreReportedWithoutBlame) {
   const SimulatedDrive& drive = late_imu();
   std::size_t disagreements = disagreements_without_blame(drive.replay());
   for (const std::string start_s : {"20", "24", "48", "50", "56"}) {
@@ -67,7 +67,7 @@ TEST(WrongStamps, OfAnImuAreSaidToBeNobodysFault) {
 }
 
 /// Source and lidar agree again at the end, but for less than the probation of one second.
-TEST(WrongStamps, OfAnImuThatIsYetToBeUsedAtTheEndAreToldInAWarning) {
+TEST(WrongStamps, OfAnImuUnusedAtTheEndAreAWarning) {
   const SimulatedDrive& drive = late_imu();
   int told = 0;
   for (const int start_s : {48, 50, 56}) {
@@ -89,7 +89,7 @@ TEST(WrongStamps, OfAnImuThatIsYetToBeUsedAtTheEndAreToldInAWarning) {
 }
 
 /// Only the scale of the wheels is wrong. The available data cannot tell whether wheels or lidar are right.
-TEST(Disagreement, OfWheelsAndLidarIsToldAsOne) {
+TEST(Disagreement, OfWheelsAndLidarIsReportedOnce) {
   const TemporaryFolder folder;
   const std::string wheels = folder / "wheels.tum";
   write_scaled_tum(room_drive() / "wio.tum", 3.0, wheels);

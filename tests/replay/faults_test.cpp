@@ -57,7 +57,7 @@ std::ostream& operator<<(std::ostream& out, const SourceFault& fault) {
 
 class FaultOfASource : public testing::TestWithParam<SourceFault> {};
 
-TEST_P(FaultOfASource, IsDetectedCountedAndSurvivedAndTheSourceComesBack) {
+TEST_P(FaultOfASource, IsDetectedCountedAndSurvivedAndTheSourceReturns) {
   const SourceFault& fault = GetParam();
   const Replay replay = replay_with(fault.source + ":" + fault.kind + "@2-4");
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
@@ -103,7 +103,7 @@ INSTANTIATE_TEST_SUITE_P(Replay, FaultOfASource,
                            return name;
                          });
 
-TEST(Faults, ADisorderOfSamplesIsCountedAndChangesNoHealth) {
+TEST(Faults, DisorderedSamplesAreCountedAndChangeNoHealth) {
   for (const std::string kind : {"reorder", "duplicate"}) {
     const Replay replay({room_drive().string(), "--fail", "wio:" + kind + "@1", "--fail", "imu:" + kind + "@1"});
     const json summary = replay.summary();
@@ -115,7 +115,7 @@ TEST(Faults, ADisorderOfSamplesIsCountedAndChangesNoHealth) {
   }
 }
 
-TEST(Faults, WithoutAnyTheHealthOfASourceNeverChanges) {
+TEST(Faults, WithoutFaultsHealthNeverChanges) {
   const json sources = Replay({room_drive().string()}).summary()["sources"];
   for (const auto& [name, source] : sources.items()) {
     EXPECT_EQ(source["health_changes"], 0) << name;
@@ -125,7 +125,7 @@ TEST(Faults, WithoutAnyTheHealthOfASourceNeverChanges) {
 }
 
 /// Times are relative to the same origin as those of --fail; the first sweep ends 0.1 s after it.
-TEST(Faults, WhenTheyStruckIsToldFromTheStartOfTheCapture) {
+TEST(Faults, TimesArePrintedFromTheStartOfTheCapture) {
   const auto lost_at_s = [](std::vector<std::string> arguments) {
     arguments.insert(arguments.end(), {room_drive().string(), "--fail", "wio:lost@3-5"});
     const std::string said = Replay(arguments).run().out, key = ", lost at ";
@@ -139,14 +139,14 @@ TEST(Faults, WhenTheyStruckIsToldFromTheStartOfTheCapture) {
   EXPECT_NEAR(lost_at_s({"--start", "1.5"}), lost_s, 0.03);
 }
 
-TEST(Faults, WithoutWheelsAndGyroLidarCarriesOnAlone) {
+TEST(Faults, LidarContinuesWithoutWheelsAndGyro) {
   const Replay replay({room_drive().string(), "--fail", "wio:lost@4", "--fail", "imu:lost@4"});
   EXPECT_EQ(replay.summary()["sweeps"]["failed"], 0);
   EXPECT_LT(farthest_apart_m(replay.trajectory(), path_without_faults()), 0.05);
   EXPECT_EQ(replay.table().back()[2], "constant_velocity");
 }
 
-TEST(Faults, WithoutLidarTheMotionSourcesCarryOnFlaggedAndLidarFindsTheMapAgain) {
+TEST(Faults, WithoutLidarSourcesDeadReckonAndLidarRelocalises) {
   const Replay replay = replay_with("all-lidars:lost@3-5");
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
   const auto path = replay.trajectory();
@@ -170,7 +170,7 @@ TEST(Faults, WithoutLidarTheMotionSourcesCarryOnFlaggedAndLidarFindsTheMapAgain)
 }
 
 /// Neither the capture nor the configuration is to blame.
-TEST(Faults, ThatLeaveNoPacketAreNamedAsTheReason) {
+TEST(Faults, LossOfEveryPacketIsNamedAsTheReason) {
   const Replay replay = replay_with("all-lidars:lost@0");
   EXPECT_EQ(replay.run().status, 1);
   EXPECT_EQ(lines_of(replay.run().err).size(), 1U) << replay.run().err;
@@ -178,7 +178,7 @@ TEST(Faults, ThatLeaveNoPacketAreNamedAsTheReason) {
       << replay.run().err;
 }
 
-TEST(Faults, OneOfTwoLidarsMayDieAndComeBack) {
+TEST(Faults, OneOfTwoLidarsMayFailAndReturn) {
   const TemporaryFolder folder;
   write_room_drive(folder.path(), seconds{6}, 2);
   const auto whole = Replay({folder.path().string()}).trajectory();

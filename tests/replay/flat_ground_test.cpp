@@ -25,7 +25,7 @@ double climbed_m(const std::vector<StampedPose>& path, Stamp at) {
   return then == path.end() ? 0.0 : height_m(*then) - height_m(path.front());
 }
 
-TEST(FlatGround, IsLeftWithinASecondOfTheFirstStep) {
+TEST(FlatGround, EndsWithinASecondOfTheFirstStep) {
   const SimulatedDrive drive("stairs", "husky", 40);
   const Replay found = drive.replay(flat_ground("auto")), off = drive.replay(flat_ground("off"));
   const auto truth = read_tum(drive.capture() + "/gt.tum"), path = found.trajectory();
@@ -38,7 +38,7 @@ TEST(FlatGround, IsLeftWithinASecondOfTheFirstStep) {
   EXPECT_LT(ape_mean_m(found), 1.1 * ape_mean_m(off));
 }
 
-TEST(FlatGround, FoundCostsNothingInThePlantAndHelpsWhereLidarIsGone) {
+TEST(FlatGround, DetectedIsHarmlessInThePlantAndHelpsWithoutLidar) {
   const SimulatedDrive drive("urban", "husky", 25);
   const Replay found = drive.replay(flat_ground("auto")), off = drive.replay(flat_ground("off"));
   EXPECT_NE(read_text(found.file("odometry.tum")), read_text(off.file("odometry.tum"))) << "it was found";
@@ -54,7 +54,7 @@ TEST(FlatGround, FoundCostsNothingInThePlantAndHelpsWhereLidarIsGone) {
   EXPECT_LT(climbed_without_lidar_m("auto"), 0.5 * climbed_without_lidar_m("off"));
 }
 
-TEST(FlatGround, ByContextHoldsHeightRollAndPitch) {
+TEST(FlatGround, SetByContextFixesHeightRollAndPitch) {
   const SimulatedDrive drive("urban", "husky", 25);
   const auto path = drive.replay(flat_ground("on")).trajectory();
   ASSERT_GT(path.size(), 200U);

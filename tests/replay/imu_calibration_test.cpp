@@ -36,7 +36,7 @@ std::string earlier(const std::string& line, Duration by) {
                              : std::to_string(std::stoll(line.substr(0, comma)) - by.count()) + line.substr(comma);
 }
 
-TEST(WrongImuCalibration, OfASoundUnitNothingIsSaid) {
+TEST(WrongImuCalibration, SoundUnitRaisesNoWarning) {
   const Replay replay = replay_of_walk();
   EXPECT_EQ(replay.run().err.find("motion source imu"), std::string::npos) << replay.run().err;
   const json learned = learned_of_imu(replay);
@@ -44,7 +44,7 @@ TEST(WrongImuCalibration, OfASoundUnitNothingIsSaid) {
   EXPECT_LT(learned["late_ms"]["sd"], 1.0) << learned;
 }
 
-TEST(WrongImuCalibration, StampsOfAnImuThatAreEarlyAreTakenLaterAndToldOf) {
+TEST(WrongImuCalibration, EarlyStampsAreCorrectedAndReported) {
   constexpr std::chrono::milliseconds kEarly{45};
   const Replay sound = replay_of_walk();
   const TemporaryFolder folder;
@@ -61,7 +61,7 @@ TEST(WrongImuCalibration, StampsOfAnImuThatAreEarlyAreTakenLaterAndToldOf) {
   EXPECT_LT(ape_mean_m(early), 1.2 * ape_mean_m(sound) + 0.002);
 }
 
-TEST(WrongImuCalibration, MountingOfAnImuThatIsWrongByDegreesIsToldOf) {
+TEST(WrongImuCalibration, MountingWrongByDegreesIsReported) {
   const double sound_m = ape_mean_m(replay_of_walk());
   for (const auto& [rpy_deg, words] : std::vector<std::pair<std::string, std::string>>{
            {"[5,0,0]", "degrees about x (roll)"}, {"[0,5,0]", "degrees about y (pitch)"}}) {
@@ -72,7 +72,7 @@ TEST(WrongImuCalibration, MountingOfAnImuThatIsWrongByDegreesIsToldOf) {
 }
 
 /// `report` estimates and reports the calibration without applying it.
-TEST(WrongImuCalibration, WhatIsOnlyReportedChangesNothing) {
+TEST(WrongImuCalibration, ReportAloneChangesNothing) {
   const auto replay = [](const std::string& mode) {
     return replay_of_walk({"--set", "motion_sources.imu.T_base_source.rpy_deg=[5,0,0]", "--set",
                            "motion_sources.imu.calibration=" + mode});
@@ -90,7 +90,7 @@ TEST(WrongImuCalibration, WhatIsOnlyReportedChangesNothing) {
 
 /// Calibrates from a recording whose IMU is misaligned and stamped so late that it is rejected, or before its motion;
 /// compares with the calibration of the original IMU.
-TEST(WrongImuCalibration, OfARecordingIsFoundAndWritten) {
+TEST(WrongImuCalibration, CalibrationOfARecordingIsEstimatedAndWritten) {
   const TemporaryFolder folder;
   const auto late_by = [&](std::chrono::milliseconds late) {
     std::string file = folder / std::to_string(late.count());

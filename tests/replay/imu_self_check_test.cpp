@@ -78,20 +78,20 @@ const SimulatedDrive& wheels() {
   return drive;
 }
 
-TEST(WrongImu, OnWheelsIsRefusedBeforeItBendsTheMap) {
+TEST(WrongImu, OnWheelsIsRejectedBeforeItDistortsTheMap) {
   const SimulatedDrive& drive = wheels();
   EXPECT_EQ(drive.replay().summary()["sources"]["imu"]["health_changes"], 0) << "that is not wrong";
   for (const Wrong& wrong : {kOtherWay, kDegrees})
     expect_refused(replay_with(wrong, drive), wrong, without_imu_m(drive));
 }
 
-TEST(WrongImu, ThatWasGoodBeforeALossIsRefused) {
+TEST(WrongImu, AfterALossIsRejected) {
   const SimulatedDrive& drive = wheels();
   expect_refused(replay_with(kOtherWay, drive, {}, seconds{8}), kOtherWay, without_imu_m(drive));
 }
 
 /// A precise gyro that suddenly fails, at any time within a sweep, must not win against wheels and surfaces.
-TEST(WrongImu, ThatJumpsNowAndThenIsOutvoted) {
+TEST(WrongImu, WithOccasionalJumpsIsExcluded) {
   const SimulatedDrive& drive = wheels();
   const double without_m = without_imu_m(drive);
   const std::vector<std::pair<double, double>> jumps{{0.3, 8.0}, {0.7, 8.0},  {1.0, 8.02},
@@ -110,7 +110,7 @@ TEST(WrongImu, ThatJumpsNowAndThenIsOutvoted) {
   }
 }
 
-TEST(WrongImu, ThatJumpsOnLegsIsOutvoted) {
+TEST(WrongImu, WithJumpsOnLegsIsExcluded) {
   const SimulatedDrive drive("urban", "spot", 40);
   const double without_m = without_imu_m(drive);
   for (const double by_radps : {0.3, 0.4, 2.0}) {
@@ -121,7 +121,7 @@ TEST(WrongImu, ThatJumpsOnLegsIsOutvoted) {
   }
 }
 
-TEST(WrongImu, ThatJumpsBesideLidarAloneIsOutvoted) {
+TEST(WrongImu, WithJumpsAndLidarAloneIsExcluded) {
   const SimulatedDrive& drive = wheels();
   for (const double from_s : {8.0, 8.05}) {
     SCOPED_TRACE(from_s);
@@ -134,7 +134,7 @@ TEST(WrongImu, ThatJumpsBesideLidarAloneIsOutvoted) {
 }
 
 /// The first two sweeps are registered again without the gyro.
-TEST(WrongImu, ThatJumpsFromTheStartInATurnDoesNotBendTheMap) {
+TEST(WrongImu, WithJumpsInAStartingTurnDoesNotDistortTheMap) {
   const SimulatedDrive drive("tunnel", "husky", 60);
   for (const std::string start_s : {"21", "24", "42"}) {
     SCOPED_TRACE(start_s);
@@ -144,7 +144,7 @@ TEST(WrongImu, ThatJumpsFromTheStartInATurnDoesNotBendTheMap) {
   }
 }
 
-TEST(WrongImu, BesideLidarAloneIsRefused) {
+TEST(WrongImu, WithLidarAloneIsRejected) {
   const SimulatedDrive& drive = wheels();
   const double alone_m = ape_mean_m(drive.replay({"--fail", "wio:lost@0", "--fail", "imu:lost@0"}));
   for (const Wrong& wrong : {kOtherWay, kDegrees}) {
@@ -155,7 +155,7 @@ TEST(WrongImu, BesideLidarAloneIsRefused) {
   }
 }
 
-TEST(WrongImu, OnLegsIsRefusedThoughTheGaitLooksRight) {
+TEST(WrongImu, OnLegsIsRejectedAlthoughTheGaitAgrees) {
   const SimulatedDrive drive("urban", "spot", 25);
   const json good = drive.replay().summary();
   EXPECT_EQ(good["sources"]["imu"]["health_changes"], 0);

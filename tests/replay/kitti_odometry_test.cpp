@@ -85,7 +85,7 @@ class KittiOdometry : public testing::Test {
   static inline TemporaryFolder* data_ = nullptr;
 };
 
-TEST_F(KittiOdometry, SequenceIsReplayedAndMeasuredByItsPoses) {
+TEST_F(KittiOdometry, SequenceIsReplayedAndComparedWithItsPoses) {
   const Replay replay({"--kitti-as-published", sequence()});
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
   EXPECT_EQ(replay.run().err, "");
@@ -103,7 +103,7 @@ TEST_F(KittiOdometry, SequenceIsReplayedAndMeasuredByItsPoses) {
   EXPECT_NEAR(to_seconds(trajectory.back().stamp.time_since_epoch()), 0.1 * (kSweeps - 1), 1e-5) << "its own times";
 }
 
-TEST_F(KittiOdometry, AnglesAreMadeRightAsThoseOfRawData) {
+TEST_F(KittiOdometry, AnglesAreCorrectedAsInRawData) {
   const Replay replay({sequence()});
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
   EXPECT_EQ(replay.summary()["kitti_vertical_angle_added_deg"], 0.205);
@@ -129,7 +129,7 @@ TEST_F(KittiOdometry, EachPointIsRaisedByTheAngle) {
     ASSERT_NEAR(elevation_deg(raised, i) - elevation_deg(published, i), 0.205, 1e-3) << i;
 }
 
-TEST_F(KittiOdometry, FolderAboveItIsEnoughWhereItIsTheOnlyOne) {
+TEST_F(KittiOdometry, FolderAboveResolvesToTheOnlySequence) {
   const std::string expected = read_text(Replay({sequence()}).file("odometry.tum"));
   for (const path& above : {data(), data() / "sequences"}) {
     const Replay replay({above});
@@ -140,7 +140,7 @@ TEST_F(KittiOdometry, FolderAboveItIsEnoughWhereItIsTheOnlyOne) {
   }
 }
 
-TEST_F(KittiOdometry, OfSeveralSequencesSomeAreNamed) {
+TEST_F(KittiOdometry, SeveralSequencesAreListed) {
   const TemporaryFolder folder;
   for (int i = 0; i < 5; ++i)
     write_with_folders(folder / fmt::format("sequences/{:02}/velodyne/000000.bin", i), std::string(16, '\0'));

@@ -71,7 +71,7 @@ class KittiReplay : public testing::Test {
   std::filesystem::path drive_ = folder_ / "drive_0001_extract";
 };
 
-TEST(Kitti, DriveIsReplayedAndMeasuredByItsInertialUnit) {
+TEST(Kitti, DriveIsReplayedAndComparedWithItsInertialUnit) {
   const Replay replay({"--kitti-as-published", kitti_room_drive()});
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
   EXPECT_EQ(replay.run().err, "");
@@ -86,7 +86,7 @@ TEST(Kitti, DriveIsReplayedAndMeasuredByItsInertialUnit) {
   EXPECT_LT(summary["ape_m"]["max"], 0.02) << "points at wrong times are 5 cm off";
 }
 
-TEST(Kitti, RelativePathWithSlashIsTheSameDrive) {
+TEST(Kitti, RelativePathMayEndWithASlash) {
   const auto drive = tools::KittiDrive::open(kitti_room_drive().string() + "/");
   ASSERT_TRUE(drive) << drive.error();
   EXPECT_TRUE(drive->warnings.empty()) << "the calibration lies beside the drive";
@@ -94,7 +94,7 @@ TEST(Kitti, RelativePathWithSlashIsTheSameDrive) {
   EXPECT_EQ(drive->truth.size(), 10U * kitti_room::kSweeps);
 }
 
-TEST(Kitti, PointHasTheTimeOfItsAzimuthAndTheRingOfItsPlace) {
+TEST(Kitti, PointHasTheTimeOfItsAzimuthAndTheRingOfItsIndex) {
   std::vector<KittiPoint> points;
   for (const int ring : {0, 1, 2}) {
     for (double ccw_deg = 1; ccw_deg < 360; ccw_deg += 2) {
@@ -129,7 +129,7 @@ TEST(Kitti, PointHasTheTimeOfItsAzimuthAndTheRingOfItsPlace) {
   EXPECT_EQ(returns, points.size());
 }
 
-TEST(Kitti, PointsThatAreNoneAreLeftOutAndAnotherOrderIsRefused) {
+TEST(Kitti, InvalidPointsAreDroppedAndAnotherOrderIsAnError) {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInf = std::numeric_limits<float>::infinity();
   KittiSweep sweep;
   const Stamp start = stamp_from_ns(1);
@@ -148,7 +148,7 @@ TEST(Kitti, PointsThatAreNoneAreLeftOutAndAnotherOrderIsRefused) {
   EXPECT_EQ(sweep.next(), nullptr);
 }
 
-TEST_F(KittiReplay, SweepsThatAreMissingOrDamagedAreLeftOut) {
+TEST_F(KittiReplay, MissingOrDamagedSweepsAreSkipped) {
   std::filesystem::remove(points(5));
   std::ofstream{points(12), std::ios::app} << "1.0 2.0\n";
   std::filesystem::resize_file(points(20), 0);
@@ -162,7 +162,7 @@ TEST_F(KittiReplay, SweepsThatAreMissingOrDamagedAreLeftOut) {
 }
 
 /// KITTI's own drives lack some sweeps, too: no file, and a blank line in its place.
-TEST_F(KittiReplay, BlankTimesStandForSweepsThatAreMissing) {
+TEST_F(KittiReplay, BlankTimesMarkMissingSweeps) {
   for (const char* const name : {"timestamps_start.txt", "timestamps_end.txt"}) {
     const std::filesystem::path file = drive_ / "velodyne_points" / name;
     std::vector<std::string> times = lines_of(read_text(file));
@@ -203,7 +203,7 @@ TEST_F(KittiReplay, BadTimesAreNamedWithFileAndLine) {
   expect_refused({"no sweep that has points"});
 }
 
-TEST_F(KittiReplay, WithoutInertialUnitTheLidarIsAlone) {
+TEST_F(KittiReplay, WithoutInertialUnitRunsOnLidarAlone) {
   std::filesystem::remove_all(drive_ / "oxts");
   const Replay replay({"--kitti-as-published", drive_});
   EXPECT_EQ(replay.run().status, 0) << replay.run().err;
@@ -224,7 +224,7 @@ TEST_F(KittiReplay, InertialUnitAtTenHertzDoesToo) {
   EXPECT_LT(replay.summary()["ape_m"]["max"], 0.05);
 }
 
-TEST(Kitti, RaisedPointsKeepTheirRangeAndAzimuth) {
+TEST(Kitti, RaisedPointsRetainRangeAndAzimuth) {
   constexpr std::array kElevations_deg{-24.8, -10.0, -0.205, 0.0, 2.0};
   for (const double elevation_deg : kElevations_deg) {
     for (double azimuth_deg = -180; azimuth_deg < 180; azimuth_deg += 45) {
@@ -240,7 +240,7 @@ TEST(Kitti, RaisedPointsKeepTheirRangeAndAzimuth) {
   }
 }
 
-TEST(Kitti, PointsWithoutAVerticalPlaneStayWhereTheyAre) {
+TEST(Kitti, PointsWithoutAVerticalPlaneAreUnchanged) {
   std::vector<KittiPoint> points{{0, 0, 0, 0}, {0, 0, 5, 0}, {std::numeric_limits<float>::quiet_NaN(), 1, 1, 0}};
   tools::raise(points, 0.205);
   EXPECT_EQ(points[0].z_m, 0);
@@ -249,7 +249,7 @@ TEST(Kitti, PointsWithoutAVerticalPlaneStayWhereTheyAre) {
 }
 
 /// Each point has KITTI's elevation error: at a distance of four metres the floor is 14 mm too low.
-TEST_F(KittiReplay, AnglesThatAreTooSmallAreMadeRight) {
+TEST_F(KittiReplay, SmallAnglesAreCorrected) {
   const Replay truth({"--kitti-as-published", drive_});
   rewrite_points([](KittiPoint& p) {
     p = point_at(position_of(p).norm(), azimuth_rad(p), elevation_rad(p) - 0.205 * kRadPerDeg);
@@ -268,13 +268,13 @@ TEST_F(KittiReplay, AnglesThatAreTooSmallAreMadeRight) {
   EXPECT_EQ(wrong.summary()["kitti_vertical_angle_added_deg"], 0);
 }
 
-TEST(Kitti, WhatIsNoDriveHasNothingToLeaveAsPublished) {
+TEST(Kitti, AsPublishedRequiresADrive) {
   const Replay replay({"--kitti-as-published", room_drive()});
   EXPECT_EQ(replay.run().status, 2);
   EXPECT_TRUE(contains(replay.run().err, "is no drive of KITTI")) << replay.run().err;
 }
 
-TEST_F(KittiReplay, FaultsOfPacketsAreRefused) {
+TEST_F(KittiReplay, PacketFaultsAreAnError) {
   const ProgramRun run = Replay({"--fail", "front:lost@1-2", drive_}).run();
   EXPECT_EQ(run.status, 2);
   EXPECT_TRUE(contains(run.err, "--fail front")) << run.err;

@@ -54,7 +54,7 @@ class McapResults : public testing::Test {
   std::string bytes_;
 };
 
-TEST_F(McapResults, HoldsTheOdometryOfEverySweep) {
+TEST_F(McapResults, ContainsTheOdometryOfEverySweep) {
   const auto bag = tools::open_bag(file_);
   ASSERT_TRUE(bag) << bag.error();
   const std::vector<StampedPose> trajectory = replay_.trajectory();
@@ -86,7 +86,7 @@ TEST_F(McapResults, HoldsTheOdometryOfEverySweep) {
 }
 
 /// The inputs in the file are those of the recording, to the last bit that a message can hold.
-TEST_F(McapResults, HoldsTheSamplesOfTheMotionSources) {
+TEST_F(McapResults, ContainsTheSamplesOfTheMotionSources) {
   const auto bag = tools::open_bag(file_);
   ASSERT_TRUE(bag) << bag.error();
   auto recorded = MotionSamples<ImuSample>::open(room_drive() / "imu.csv");
@@ -111,7 +111,7 @@ TEST_F(McapResults, HoldsTheSamplesOfTheMotionSources) {
   EXPECT_GT(compared, 7U * 90);
 }
 
-TEST_F(McapResults, IsWhatOtherProgramsTakeForMessagesOfRos) {
+TEST_F(McapResults, IsReadableByAnotherCdrLibrary) {
   const auto bag = tools::open_bag(file_);
   ASSERT_TRUE(bag) << bag.error();
   std::size_t points = 0, statuses = 0, transforms = 0;
@@ -143,7 +143,7 @@ TEST_F(McapResults, IsWhatOtherProgramsTakeForMessagesOfRos) {
 }
 
 /// The index locates each message, as players require, and the checksums are correct.
-TEST_F(McapResults, IndexLeadsToEachMessage) {
+TEST_F(McapResults, IndexLocatesEachMessage) {
   constexpr std::size_t kEnd = tools::kMcapFooterBytes + tools::kMcapMagic.size();
   const auto footer = tools::McapFooter::read(record_at(bytes_.size() - kEnd));
   ASSERT_TRUE(footer);
@@ -200,7 +200,7 @@ TEST_F(McapResults, IndexLeadsToEachMessage) {
   EXPECT_GT(messages, 200U);
 }
 
-TEST(McapDefinitions, HoldAllThatIsInAMessageOnce) {
+TEST(McapDefinitions, ContainEachNestedTypeOnce) {
   const std::string text = tools::ros2_definition("nav_msgs/msg/Odometry");
   EXPECT_TRUE(text.starts_with("std_msgs/Header header\nstring child_frame_id\n")) << text;
   for (const char* const name :
@@ -215,7 +215,7 @@ TEST(McapDefinitions, HoldAllThatIsInAMessageOnce) {
   EXPECT_EQ(text.find("PointField"), std::string::npos);
 }
 
-TEST(McapOption, WritesOverNoInputAndTellsWhatItCannotWrite) {
+TEST(McapOption, OverwritesNoInputAndReportsUnwritableFiles) {
   const TemporaryFolder folder;
   const std::string capture = folder / "drive.pcap";
   std::filesystem::copy_file(room_drive() / "lidar.pcap", capture);
@@ -242,7 +242,7 @@ std::string refusal_of(const std::vector<std::string>& arguments) {
   return run.err;
 }
 
-TEST(McapOption, LeavesTheFolderOfABagAsItIs) {
+TEST(McapOption, LeavesTheFolderOfABagUnchanged) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder / "drive");
   const std::string part = folder / "drive/drive_0.mcap", link = folder / "link.mcap";
@@ -258,7 +258,7 @@ TEST(McapOption, LeavesTheFolderOfABagAsItIs) {
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));
 }
 
-TEST(McapOption, LeavesEveryFileOfACaptureFolderAsItIs) {
+TEST(McapOption, LeavesEveryFileOfACaptureFolderUnchanged) {
   const TemporaryFolder folder;
   const std::filesystem::path drive = folder / "drive";
   std::filesystem::copy(room_drive(), drive);
@@ -274,7 +274,7 @@ TEST(McapOption, LeavesEveryFileOfACaptureFolderAsItIs) {
   EXPECT_TRUE(contains(refusal_of({"-o", folder / "out", "--mcap", drive / "new.mcap", drive}), "lies in"));
 }
 
-TEST(McapOption, IsNoResultOfTheSameRun) {
+TEST(McapOption, OverwritesNoOtherResultOfTheRun) {
   const TemporaryFolder folder;
   for (const char* const name : {"odometry.csv", "summary.json", "../out/map.pcd"})
     EXPECT_TRUE(contains(refusal_of({"-o", folder / "out", "--mcap", folder / "out" / name, room_drive()}),

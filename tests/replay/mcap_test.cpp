@@ -50,7 +50,7 @@ INSTANTIATE_TEST_SUITE_P(Forms, McapDrive,
                                          McapForm{.compression = McapCompression::zstd}, McapForm{.chunked = false},
                                          McapForm{.compression = McapCompression::zstd, .summary = false}));
 
-TEST(Mcap, FileThatWasNeverClosedIsReadToItsEndAndCalledSo) {
+TEST(Mcap, UnclosedFileIsReadToItsEndAndReported) {
   const TemporaryFolder folder;
   const std::vector<RecordedMessage> messages = messages_of(room_drive(), RosVersion::ros2);
   write_bytes(folder / "whole.mcap", mcap_file(messages, RosVersion::ros2));
@@ -64,7 +64,7 @@ TEST(Mcap, FileThatWasNeverClosedIsReadToItsEndAndCalledSo) {
 }
 
 /// Each message is less than half a second older than the one before it.
-TEST(Mcap, MessagesThatGoBackBySmallStepsAreSaidToBeOutOfOrder) {
+TEST(Mcap, MessagesGoingBackBySmallStepsAreReportedOutOfOrder) {
   const TemporaryFolder folder;
   std::vector<RecordedMessage> messages = messages_of(room_drive(), RosVersion::ros2);
   std::erase_if(messages, [](const RecordedMessage& m) { return !m.topic.ends_with("packets"); });
@@ -98,7 +98,7 @@ TEST(Mcap, FolderOfSeveralFilesIsReadInTheOrderOfItsMetadata) {
 }
 
 /// Without metadata the numbers at the end of the file names determine the order.
-TEST(Mcap, FolderWithoutMetadataIsReadByNumbers) {
+TEST(Mcap, FolderWithoutMetadataIsReadInTheOrderOfItsNumbers) {
   const TemporaryFolder folder;
   const std::vector<RecordedMessage> messages = messages_of(room_drive(), RosVersion::ros2);
   constexpr std::size_t kFiles = 11;
@@ -221,7 +221,7 @@ TEST_F(SmallMcap, CutAtAnyByteIsReadUpToTheCut) {
   }
 }
 
-TEST_F(SmallMcap, AnyByteMayBeAnotherOne) {
+TEST_F(SmallMcap, AnyDamagedByteIsHarmless) {
   for (const std::string& body : {records(), mcap_chunk(records()), mcap_chunk(records(), McapCompression::lz4),
                                   mcap_chunk(records(), McapCompression::zstd)}) {
     const std::string whole = closed(body);
@@ -240,7 +240,7 @@ TEST_F(SmallMcap, AnyByteMayBeAnotherOne) {
   }
 }
 
-TEST_F(SmallMcap, ChunkWithAWrongChecksumIsLeftOutAndSaid) {
+TEST_F(SmallMcap, ChunkWithAWrongChecksumIsDroppedAndReported) {
   const std::string good = mcap_chunk(declarations() + mcap_message(1, 1, "good"));
   const std::string bad = mcap_message(1, 2, "bad");
   const Read read_back = read(
@@ -250,7 +250,7 @@ TEST_F(SmallMcap, ChunkWithAWrongChecksumIsLeftOutAndSaid) {
   EXPECT_EQ(read(closed(good + mcap_chunk(bad, {bad.size(), 0, ""}))).messages.size(), 2U) << "0: it has none";
 }
 
-TEST_F(SmallMcap, ChunkThatIsNotAsLongAsItSaysIsLeftOut) {
+TEST_F(SmallMcap, ChunkOfAnotherLengthThanDeclaredIsDropped) {
   const std::string good = mcap_chunk(declarations() + mcap_message(1, 1, "good"));
   const std::string bad = mcap_message(1, 2, std::string(1000, 'x'));
   for (const auto& [compression, name] :
@@ -271,7 +271,7 @@ TEST_F(SmallMcap, ChunkThatIsNotAsLongAsItSaysIsLeftOut) {
 }
 
 /// Memory use stays below the limit for a chunk.
-TEST_F(SmallMcap, AbsurdLengthsAreRefused) {
+TEST_F(SmallMcap, AbsurdLengthsAreRejected) {
   const std::string good = mcap_chunk(declarations() + mcap_message(1, 1, "good"));
   for (const std::uint64_t size : {std::uint64_t{1} << 29U, std::uint64_t{1} << 62U, ~std::uint64_t{0}}) {
     for (const char* const compression : {"", "lz4", "zstd"}) {
@@ -300,13 +300,13 @@ TEST_F(SmallMcap, UnknownCompressionIsNamed) {
 }
 
 /// Tail of a file after a power failure.
-TEST_F(SmallMcap, ZerosAtTheEndAreABreak) {
+TEST_F(SmallMcap, TrailingZerosAreATruncation) {
   const Read zeros = read(head() + records() + std::string(5000, '\0'));
   expect_all(zeros);
   expect_warning(zeros, {"byte " + std::to_string((head() + records()).size())});
 }
 
-TEST_F(SmallMcap, WithoutAnythingUsefulIsRefusedOrEmpty) {
+TEST_F(SmallMcap, WithoutUsefulContentIsAnErrorOrEmpty) {
   EXPECT_TRUE(contains(read("").error, "the file is empty (0 bytes)"));
   EXPECT_TRUE(contains(read("\x89MCAP").error, "not an MCAP file"));
   EXPECT_TRUE(contains(read("\x89MCAP1\r\n and so on").error, "MCAP of another version than 0; record again"));
@@ -319,7 +319,7 @@ TEST_F(SmallMcap, WithoutAnythingUsefulIsRefusedOrEmpty) {
   EXPECT_TRUE(none.topics.empty() && none.messages.empty() && none.warnings.empty());
 }
 
-TEST_F(SmallMcap, ChannelDeclaredTwiceIsAsItWasDeclaredLast) {
+TEST_F(SmallMcap, LastDeclarationOfAChannelCounts) {
   expect_all(read(closed(declarations() + records())));
   const std::string again = mcap_channel(1, 2, "/other");
   const Read read_back = read(closed(declarations() + mcap_message(1, 1, "a") + again + mcap_message(1, 2, "b")));
@@ -327,7 +327,7 @@ TEST_F(SmallMcap, ChannelDeclaredTwiceIsAsItWasDeclaredLast) {
   EXPECT_EQ(read_back.messages.size(), 2U);
 }
 
-TEST_F(SmallMcap, MessageOfNoChannelOrOfAbsurdTimeIsLeftOut) {
+TEST_F(SmallMcap, MessageWithoutChannelOrWithAbsurdTimeIsDropped) {
   const Read unknown = read(closed(records() + mcap_message(7, 30, "whose?") + mcap_message(0, 30, "whose?")));
   expect_all(unknown);
   EXPECT_TRUE(unknown.warnings.empty());
@@ -337,7 +337,7 @@ TEST_F(SmallMcap, MessageOfNoChannelOrOfAbsurdTimeIsLeftOut) {
   expect_warning(late, {"2 messages with an absurd time"});
 }
 
-TEST_F(SmallMcap, OtherEncodingsAreNamedAndOfNoUse) {
+TEST_F(SmallMcap, UnsupportedEncodingsAreNamed) {
   const Read read_back =
       read(closed(mcap_schema(1, "foxglove.PointCloud", "protobuf") + mcap_channel(1, 1, "/points", "protobuf") +
                   mcap_channel(2, 0, "/text", "json") + mcap_schema(3, "sensor_msgs/Imu", "ros1msg") +
@@ -347,7 +347,7 @@ TEST_F(SmallMcap, OtherEncodingsAreNamedAndOfNoUse) {
 }
 
 /// A summary that is damaged or incomplete is ignored.
-TEST_F(SmallMcap, SummaryThatIsNotWholeIsPassedOver) {
+TEST_F(SmallMcap, IncompleteSummaryIsIgnored) {
   const std::string before = head() + records();
   for (const std::string& summary : {mcap_channel(1, 1, "/lie"), mcap_record(11, std::string(30, '\0')),
                                      std::string("garbage"), std::string(100, '\0')})
@@ -367,7 +367,7 @@ TEST_F(SmallMcap, SummaryWithoutSchemasOrWithThemLastGivesTheTypes) {
 }
 
 /// The test is a channel that only the summary contains.
-TEST_F(SmallMcap, SummaryIsBelievedIfItsChecksumIsRight) {
+TEST_F(SmallMcap, SummaryIsUsedOnlyWithACorrectChecksum) {
   const std::string before = head() + mcap_chunk(records());
   const std::string summary = declarations() + mcap_channel(3, 2, "/more") + mcap_statistics(6, 3);
   const std::string whole = before + mcap_end(before, summary);
@@ -382,7 +382,7 @@ TEST_F(SmallMcap, SummaryIsBelievedIfItsChecksumIsRight) {
   EXPECT_EQ(read(wrong).topics, believed.topics) << "0: it has none";
 }
 
-TEST_F(SmallMcap, TopicsBeyondTheBoundsAreLeftOutAndSaid) {
+TEST_F(SmallMcap, TopicsBeyondTheLimitsAreDroppedAndReported) {
   const std::string long_name = "/" + std::string(4096, 'x');
   for (const std::string& more : {mcap_channel(3, 1, long_name), mcap_schema(3, long_name) + mcap_channel(3, 3, "/odd"),
                                   mcap_channel(3, 1, "/odd", long_name)}) {
@@ -400,7 +400,7 @@ TEST_F(SmallMcap, TopicsBeyondTheBoundsAreLeftOutAndSaid) {
 }
 
 /// A bag split by rosbag2. The memory of a file is released when the next one is opened.
-TEST(Mcap, FolderOfManyFilesTakesTheMemoryOfOne) {
+TEST(Mcap, FolderOfManyFilesUsesTheMemoryOfOne) {
   constexpr std::size_t kBytes = 32'000'000, kFiles = 8;
   const TemporaryFolder folder;
   const std::string chunk = mcap_chunk(mcap_schema(1, "sensor_msgs/msg/Imu") + mcap_channel(1, 1, "/imu") +

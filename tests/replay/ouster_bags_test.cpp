@@ -120,7 +120,7 @@ TEST_F(OusterBags, MetadataMayComeAfterTheFirstPacketsOrLieBesideTheBag) {
   EXPECT_TRUE(odometry(Replay({folder_ / "bag"})) == odometry_of_capture()) << "in the folder of the bag";
 }
 
-TEST_F(OusterBags, CloudsAreTakenWhereTheMetadataAreMissing) {
+TEST_F(OusterBags, CloudsAreUsedIfTheMetadataAreMissing) {
   CloudTurn turn{stamp_from_ns(1'700'000'000'000'000'000), {}};
   for (int i = 0; i < 2000; ++i)
     turn.points.push_back({{3.0F + 1e-3F * static_cast<float>(i), 1, 0}, 0, 1, turn.begin + Duration{40'000 * i}});

@@ -91,7 +91,7 @@ std::string some_bytes(std::size_t size) {
   return bytes.substr(0, size);
 }
 
-TEST_P(Packed, BytesComeOutAsTheyWentIn) {
+TEST_P(Packed, DecompressionRestoresTheBytes) {
   for (const std::size_t size : {0U, 1U, 1000U, 65536U, 1000000U}) {
     for (const std::size_t step : {1000U, 70000U}) {
       const Unpacked result = unpack(pack(some_bytes(size)), step);
@@ -102,13 +102,13 @@ TEST_P(Packed, BytesComeOutAsTheyWentIn) {
 }
 
 /// Concatenated files, as appended by rotating recorders.
-TEST_P(Packed, SeveralFilesInOneAreReadOneAfterTheOther) {
+TEST_P(Packed, ConcatenatedFilesAreReadInOrder) {
   const Unpacked result = unpack(pack("first, ") + pack("") + pack(some_bytes(200'000)));
   EXPECT_TRUE(result.bytes == "first, " + some_bytes(200'000));
   EXPECT_EQ(result.problem, "");
 }
 
-TEST_P(Packed, CutAtAnyByteIsReadUpToThereAndSaid) {
+TEST_P(Packed, FileCutAtAnyByteIsReadUpToTheCutAndReported) {
   const std::string whole = pack(some_bytes(300));
   for (std::size_t size = 6; size < whole.size(); ++size) {
     const Unpacked cut = unpack(whole.substr(0, size));
@@ -117,7 +117,7 @@ TEST_P(Packed, CutAtAnyByteIsReadUpToThereAndSaid) {
   }
 }
 
-TEST_P(Packed, AnyByteMayBeAnotherOne) {
+TEST_P(Packed, AnyDamagedByteIsHarmless) {
   const std::string whole = pack(some_bytes(300));
   for (std::size_t at = 0; at < whole.size(); ++at) {
     std::string damaged = whole;
@@ -146,7 +146,7 @@ TEST_P(Packed, CaptureGivesTheSameBits) {
   EXPECT_TRUE(contains(Replay({name}).run().err, "a text file, not a pcap or pcapng capture"));
 }
 
-TEST_P(Packed, StandardInputIsACaptureToo) {
+TEST_P(Packed, StandardInputMayBeACapture) {
   const TemporaryFolder folder;
   put(folder / "packed", pack(read_text(room_drive() / "lidar.pcap")));
   const std::string out = folder / "out";
@@ -162,7 +162,7 @@ INSTANTIATE_TEST_SUITE_P(Packings, Packed,
                          testing::Values(Packing{"gz", gzip}, Packing{"xz", xz}, Packing{"zst", zstd}),
                          [](const auto& instance) { return std::string(instance.param.name); });
 
-TEST(Unpacked, WhatIsNotPackedStaysAsItIs) {
+TEST(Unpacked, UncompressedDataIsUnchanged) {
   const TemporaryFolder folder;
   for (const std::string& bytes : {std::string(), std::string("x"), some_bytes(200'000)}) {
     put(folder / "plain", bytes);
@@ -177,7 +177,7 @@ TEST(Unpacked, WhatIsNotPackedStaysAsItIs) {
 }
 
 /// A read error is more informative than the resulting truncation.
-TEST(Unpacked, FileThatCannotBeReadToItsEndIsNotCalledBroken) {
+TEST(Unpacked, ReadErrorIsNotReportedAsDamage) {
   class Failing : public ByteStream {
    public:
     explicit Failing(std::string bytes) : bytes_(std::move(bytes)) {}
@@ -213,7 +213,7 @@ long most_memory_of_children_kB() {
 }
 
 /// Decompression bomb: 500 MB of zeros in 500 kB, a capture of empty frames, is streamed and not stored.
-TEST(Unpacked, WhatUnpacksToMuchTakesLittleMemory) {
+TEST(Unpacked, DecompressionBombUsesLittleMemory) {
   const TemporaryFolder folder;
   const std::string zeros = gzip(std::string(5'000'000, '\0'));
   std::string bomb = gzip(read_text(room_drive() / "lidar.pcap").substr(0, 24)); // file header
@@ -229,7 +229,7 @@ TEST(Unpacked, WhatUnpacksToMuchTakesLittleMemory) {
 }
 
 /// Parts from tcpdump -C, all but the last compressed by its -z.
-TEST(Parts, OfACaptureFollowEachOther) {
+TEST(Parts, OfACaptureAreReadInOrder) {
   const TemporaryFolder folder;
   const std::string capture = read_text(room_drive() / "lidar.pcap");
   constexpr std::size_t kHeader = 24, kParts = 12;
@@ -257,7 +257,7 @@ TEST(Parts, OfACaptureFollowEachOther) {
 }
 
 /// tcpdump -C with -W, or with a name without .pcap, names the parts like other files.
-TEST(Parts, ThatCannotBeToldFromOtherFilesAreNamed) {
+TEST(Parts, AmbiguousPartsAreNamed) {
   const TemporaryFolder folder;
   for (const char* const name : {"ring.pcap00", "ring.pcap01", "drive", "drive1", "lidar0", "lidar2"})
     std::filesystem::copy(room_drive() / "lidar.pcap", folder / name);
@@ -272,7 +272,7 @@ TEST(Parts, ThatCannotBeToldFromOtherFilesAreNamed) {
     EXPECT_EQ(Replay({"--duration", "1", folder / alone}).run().err, "") << alone;
 }
 
-TEST(FolderAbove, TakesTheOnlyFileThatIsARecording) {
+TEST(FolderAbove, ResolvesToItsOnlyRecording) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder / "day");
   std::filesystem::copy(room_drive() / "lidar.pcap", folder / "day/drive.pcap");
@@ -344,7 +344,7 @@ TEST_F(PackedBag, MessageByMessageGivesTheSameBits) {
   EXPECT_TRUE(contains(damaged.run().err, "30 messages are compressed with zstd and damaged")) << damaged.run().err;
 }
 
-TEST_F(PackedBag, ThatBreaksOffIsReadUpToThere) {
+TEST_F(PackedBag, TruncatedBagIsReadUpToTheCut) {
   const std::string whole = zstd(mcap_file(messages_, RosVersion::ros2));
   put(folder_ / "cut.mcap.zstd", whole.substr(0, whole.size() / 2));
   const Replay cut({"-c", room_drive() / "config.yaml", folder_ / "cut.mcap.zstd"});
@@ -355,7 +355,7 @@ TEST_F(PackedBag, ThatBreaksOffIsReadUpToThere) {
 }
 
 /// Decompression stops early if the content is no bag, or if the disk would fill up.
-TEST(UnpackedCopy, StopsWhereItIsOfNoUseOrTheDiskIsNearlyFull) {
+TEST(UnpackedCopy, StopsIfTheContentIsUselessOrTheDiskNearlyFull) {
   const TemporaryFolder folder;
   put(folder / "zeros.zst", zstd(std::string(8'000'000, '\0')));
   const auto begins_with_x = [](std::string_view start) { return start.starts_with("x"); };
@@ -374,7 +374,7 @@ TEST(UnpackedCopy, StopsWhereItIsOfNoUseOrTheDiskIsNearlyFull) {
 }
 
 /// The temporary file is unlinked while the program runs, so that nothing remains.
-TEST_F(PackedBag, LeavesNothingBehind) {
+TEST_F(PackedBag, LeavesNoTemporaryFile) {
   const TemporaryFolder temporary;
   put(folder_ / "drive.db3.zst", zstd(read_text(folder_ / "whole.db3")));
   const auto replay_with = [&](const std::string& folder) {
@@ -401,7 +401,7 @@ TEST_F(PackedBag, LeavesNothingBehind) {
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
-TEST_F(PackedBag, OtherCompressionIsRefusedByName) {
+TEST_F(PackedBag, UnsupportedCompressionIsNamed) {
   write_metadata("sqlite3", "FILE", "drive_0.db3.lz4");
   std::string metadata = read_text(folder_ / "drive/metadata.yaml");
   put(folder_ / "drive/metadata.yaml", metadata.replace(metadata.find("zstd"), 4, "lz4"));

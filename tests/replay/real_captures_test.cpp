@@ -125,7 +125,7 @@ TEST_F(RealCapture, StandingHdl32) {
 }
 
 /// This lidar is moved 0.1 m towards the end wall after 1.5 s; the distance to the wall is the reference.
-TEST_F(RealCapture, Vlp16ThatReportsAnotherModelStandsThenMoves) {
+TEST_F(RealCapture, Vlp16ReportingAnotherModelStandsThenMoves) {
   const Replay vlp16 = replay("vlp16_static_1200rpm_product21");
   ASSERT_EQ(vlp16.run().status, 0) << vlp16.run().err;
   EXPECT_EQ(vlp16.summary()["packets"]["total"]["data"], 1902);
@@ -170,7 +170,7 @@ TEST_F(RealCapture, StandingVls128InABag) {
 }
 
 /// No option is needed: only one metadata file beside the capture is of the sensor that sent these packets.
-TEST_F(RealCapture, MovingOusterIsReadWithTheMetadataThatFitsIt) {
+TEST_F(RealCapture, MovingOusterIsReadWithTheMatchingMetadata) {
   const Replay moving({(test_data() / "ouster/OS-1-128_v2.3.0_1024x10_lb_n3.pcap").string()});
   ASSERT_EQ(moving.run().status, 0) << moving.run().err;
   EXPECT_NE(
@@ -193,7 +193,7 @@ TEST_F(RealCapture, MovingOusterIsReadWithTheMetadataThatFitsIt) {
 /// odometry does not de-skew the first turns, so a pose is that of the middle of a turn, when the sensor faces forward,
 /// as the car does. Its accelerometer measures 3.7 m/s^2, so that other instants would differ by 4 cm. Sweeps that
 /// begin in the middle of a turn end there.
-TEST_F(RealCapture, MovingOusterIsWhereItsMakerSaysItWas) {
+TEST_F(RealCapture, MovingOusterMatchesThePosesOfItsMaker) {
   std::vector<Pose> truth;
   std::ifstream kitti{test_data() / "ouster/OS-1-128_v2.3.0_1024x10_lb_n3_poses_kitti.txt"};
   const auto read = [&](double& value) { return static_cast<bool>(kitti >> value); };
@@ -212,7 +212,7 @@ TEST_F(RealCapture, MovingOusterIsWhereItsMakerSaysItWas) {
   EXPECT_LT(angle_rad(moved.rotation.conjugate() * by_maker.rotation), 0.2 * kRadPerDeg);
 }
 
-TEST_F(RealCapture, OustersAreReadWithTheMetadataBesideThem) {
+TEST_F(RealCapture, OustersUseTheMetadataBesideThem) {
   for (const auto& [name, model, mode] :
        {std::tuple{"OS-0-128-U1_v2.3.0_1024x10", "OS0-128", "strongest"},
         std::tuple{"OS-0-32-U1_v2.2.0_1024x10", "OS0-32", "dual"},
@@ -231,7 +231,7 @@ TEST_F(RealCapture, OustersAreReadWithTheMetadataBesideThem) {
   }
 }
 
-TEST_F(RealCapture, OfOusterWithTheMetadataOfAnotherSaysSo) {
+TEST_F(RealCapture, OusterWithMetadataOfAnotherIsReported) {
   const std::filesystem::path capture = test_data() / "ouster/OS-1-32-G_v2.1.1_1024x10.pcap";
   for (const auto& [name, reason] :
        {std::pair{"OS-0-32-U1_v2.2.0_1024x10", "length 64"}, {"OS-1-128_v2.3.0_1024x10", "length 64"}}) {
@@ -246,7 +246,7 @@ TEST_F(RealCapture, OfOusterWithTheMetadataOfAnotherSaysSo) {
   }
 }
 
-TEST_F(RealCapture, OfOusterWithoutMetadataIsRefusedByItsName) {
+TEST_F(RealCapture, OusterWithoutMetadataIsNamed) {
   const TemporaryFolder alone;
   std::filesystem::copy_file(test_data() / "ouster/OS-1-32-G_v2.1.1_1024x10.pcap", alone / "drive.pcap");
   const ProgramRun ouster = Replay({(alone / "drive.pcap").string()}).run();
@@ -256,7 +256,7 @@ TEST_F(RealCapture, OfOusterWithoutMetadataIsRefusedByItsName) {
 }
 
 /// No configuration.
-TEST_F(RealCapture, BagsOfHesaiAreReadAsWhatTheyAre) {
+TEST_F(RealCapture, HesaiModelsInBagsAreIdentified) {
   struct Recorded {
     const char *folder, *model;
     std::uint64_t packets, lost; ///< missing packets by sequence number

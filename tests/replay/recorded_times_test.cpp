@@ -60,7 +60,7 @@ void expect_same_way(const Replay& replay, const std::string& warning) {
     EXPECT_LT((poses[i].T_source_base.translation - poses[i - 1].T_source_base.translation).norm(), 0.3) << i;
 }
 
-TEST(RecordedTimes, ThatAreAllTheSameLeaveTheTimeToTheLidar) {
+TEST(RecordedTimes, ConstantTimesAreReplacedByTheLidarClock) {
   for (const std::int64_t ns : {std::int64_t{0}, std::int64_t{1'600'000'000'000'000'000}}) {
     const TemporaryFolder folder;
     const Replay replay({capture_with(folder, [&](Stamp, Duration) { return stamp_from_ns(ns); })});

@@ -12,7 +12,7 @@ namespace locus::test {
 namespace {
 
 /// In an aisle nothing but the people shows the position along it. The walking robot stands until 2.8 s.
-TEST(Rest, PeopleInAnAisleDoNotMoveARobotThatStands) {
+TEST(Rest, PeopleInAnAisleDoNotMoveARobotAtRest) {
   const std::filesystem::path drive = test_data() / "trial/spot";
   if (!std::filesystem::exists(drive))
     GTEST_SKIP() << drive << " is not here; set LOCUS_TEST_DATA";

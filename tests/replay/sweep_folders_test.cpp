@@ -99,7 +99,7 @@ TEST(EurocFolder, PcdOfEveryEncodingGivesTheBitsOfABagWithTheSameClouds) {
   }
 }
 
-TEST(EurocFolder, DriversFieldsAreReadAsInMessages) {
+TEST(EurocFolder, FieldsOfDriversAreReadAsInMessages) {
   for (const CloudKind kind : {CloudKind::ouster, CloudKind::hesai, CloudKind::nebula}) {
     const TemporaryFolder folder;
     write_euroc(folder.path(), pcd_as_binary, "pcd", kind);
@@ -110,7 +110,7 @@ TEST(EurocFolder, DriversFieldsAreReadAsInMessages) {
   }
 }
 
-TEST(EurocFolder, ImuAndTruthAreThoseBesideTheLidar) {
+TEST(EurocFolder, ImuAndTruthBesideTheLidarAreUsed) {
   const TemporaryFolder folder;
   write_euroc(folder / "mav0", pcd_as_binary);
   write_with_folders(folder / "mav0/imu0/data.csv",
@@ -210,20 +210,20 @@ TEST(SweepFolder, WrongTimesAreNamedWithFileAndLine) {
 }
 
 /// KITTI's raw data numbers its sweeps with ten digits, as many as seconds since 1970 have.
-TEST(SweepFolder, NumbersOfTenDigitsAreNoTimes) {
+TEST(SweepFolder, TenDigitNumbersAreNotTimes) {
   const TemporaryFolder folder;
   for (std::size_t i = 0; i < 3; ++i)
     write_with_folders(folder / fmt::format("data/{:010}.pcd", i), pcd_as_binary(room_clouds()[i]));
   expect_refused(folder / "data", {"neither are the names of its sweeps times (0000000000.pcd)"});
 }
 
-TEST(SweepFolder, EmptyOneIsSaidToBeEmpty) {
+TEST(SweepFolder, EmptyFolderIsReported) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder / "drive/lidar0/data");
   expect_refused(folder / "drive", {"drive/lidar0/data: holds no sweep"});
 }
 
-TEST(SweepFolder, SweepsThatCannotBeReadAreLeftOutAndTheFirstIsNamed) {
+TEST(SweepFolder, UnreadableSweepsAreSkippedAndTheFirstIsNamed) {
   const TemporaryFolder folder;
   const path drive = in_order(folder / "drive", bin_of, "bin");
   write_with_folders(drive / "times.txt", times_in("s"));
@@ -241,7 +241,7 @@ TEST(SweepFolder, SweepsThatCannotBeReadAreLeftOutAndTheFirstIsNamed) {
   EXPECT_TRUE(contains(none.run().err, "0.bin: 17 bytes are not whole points of 16")) << none.run().err;
 }
 
-TEST(SweepFolder, PointsThatAreNoneAreCountedAndLeftOut) {
+TEST(SweepFolder, InvalidPointsAreCountedAndDropped) {
   const TemporaryFolder folder;
   const auto spoilt = [](const OwnCloud& cloud) {
     OwnCloud copy = cloud;
@@ -255,7 +255,7 @@ TEST(SweepFolder, PointsThatAreNoneAreCountedAndLeftOut) {
   EXPECT_EQ(replay.summary()["lidars"]["front"]["clouds"]["nan"], 50 * room_clouds().size());
 }
 
-TEST(SweepFolder, SweepsThatWereWrittenAreReplayedAsTheyAre) {
+TEST(SweepFolder, WrittenSweepsAreReplayedUnchanged) {
   const TemporaryFolder folder;
   const path sweeps = folder / "out/sweeps";
   const Replay first({"--sweeps", sweeps, "--set", kNoSources, room_drive()});
@@ -269,7 +269,7 @@ TEST(SweepFolder, SweepsThatWereWrittenAreReplayedAsTheyAre) {
 
 /// Points of one instant have their neighbours on the rings above and below as well: without these, no normals, and the
 /// robot stays behind by metres.
-TEST(SweepFolder, SweepsOfOneInstantAreFollowedAmongManyThings) {
+TEST(SweepFolder, SweepsOfOneInstantAreTrackedInClutter) {
   const path drive = test_data() / "trial/people";
   if (!std::filesystem::exists(drive))
     GTEST_SKIP() << drive << " is not here; set LOCUS_TEST_DATA";
@@ -284,7 +284,7 @@ TEST(SweepFolder, SweepsOfOneInstantAreFollowedAmongManyThings) {
   EXPECT_LT((a.back().T_source_base.translation - b.back().T_source_base.translation).norm(), 0.05);
 }
 
-TEST(SweepFolder, ResultsAndSweepsAreNotWrittenIntoIt) {
+TEST(SweepFolder, IsNotOverwrittenByResults) {
   const TemporaryFolder folder;
   const path drive = in_order(folder / "drive", bin_of, "bin");
   write_with_folders(drive / "times.txt", times_in("s"));

@@ -62,7 +62,7 @@ std::string header(const std::string& fields, const std::string& sizes, const st
 
 const std::string kXyzOfTwo = header("x y z", "4 4 4", "F F F", "WIDTH 2\nHEIGHT 1\nPOINTS 2\n");
 
-TEST(SweepPoints, TextIsReadToTheTypeOfEachField) {
+TEST(SweepPoints, TextIsConvertedToTheTypeOfEachField) {
   const ReadPcd got = read(header("x y z ring t stamp", "4 8 4 2 4 8", "F F F U U U",
                                   "COUNT 1 1 1 1 1 1\nWIDTH 1\nHEIGHT 1\nPOINTS 1\nDATA ascii\n") +
                            "1.5 -2e3 nan 65535 4294967295 1403636579763555584\n");
@@ -75,7 +75,7 @@ TEST(SweepPoints, TextIsReadToTheTypeOfEachField) {
   EXPECT_EQ(number_at<double>(got.points, 0, "stamp"), 1403636579763555584.0);
 }
 
-TEST(SweepPoints, FieldsOfSeveralNumbersAreLeftOutAndRowsKept) {
+TEST(SweepPoints, FieldsOfSeveralNumbersAreDroppedAndRowsRetained) {
   const std::string head =
       "VERSION .7\nFIELDS hist x y z\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 2 1 1 1\nWIDTH 1\nHEIGHT 2\n"
       "POINTS 2\n";
@@ -91,7 +91,7 @@ TEST(SweepPoints, FieldsOfSeveralNumbersAreLeftOutAndRowsKept) {
   }
 }
 
-TEST(SweepPoints, WhatIsNoPcdOrHasTooFewPointsIsRefused) {
+TEST(SweepPoints, InvalidOrTruncatedPcdIsAnError) {
   expect_problem("", "1: not a PCD file");
   expect_problem("\x89PNG\r\n", "1: not a PCD file");
   expect_problem("# .PCD v.7\nFIELDS x y z\n", "3: the header does not end");
@@ -112,7 +112,7 @@ TEST(SweepPoints, WhatIsNoPcdOrHasTooFewPointsIsRefused) {
                  "damaged");
 }
 
-TEST(SweepPoints, AbsurdNumbersTakeNoMemory) {
+TEST(SweepPoints, AbsurdNumbersAllocateNoMemory) {
   for (const char* const points : {"18446744073709551615", "4000000000", "2000000"})
     expect_problem(header("x y z", "4 4 4", "F F F", fmt::format("POINTS {}\nDATA binary\n", points)),
                    "more than a sweep may have");
@@ -121,7 +121,7 @@ TEST(SweepPoints, AbsurdNumbersTakeNoMemory) {
       "more than a sweep may have");
 }
 
-TEST(Lzf, UnpacksWhatWasPacked) {
+TEST(Lzf, RoundTrips) {
   std::string bytes;
   for (int i = 0; i < 1000; ++i)
     bytes += std::string(static_cast<std::size_t>(i % 40 + i % 7 * 60), static_cast<char>(i));
@@ -137,7 +137,7 @@ TEST(Lzf, UnpacksWhatWasPacked) {
 }
 
 /// "ab", then a back reference of four bytes at offset two, which overlaps its own output.
-TEST(Lzf, ReferencesMayOverlapWhatTheyMake) {
+TEST(Lzf, ReferencesMayOverlapTheirOutput) {
   const std::string packed{"\x01"
                            "ab"
                            "\x40\x01",

@@ -39,7 +39,7 @@ TEST(SweepsByPcl, PcdAndPlyAreReadWithAllFields) {
 }
 
 /// The reverse direction: reads sweeps that PCL has written in each encoding.
-TEST(SweepsByPcl, WhatPclWritesIsReadToTheSameBytes) {
+TEST(SweepsByPcl, FilesOfPclAreReadToTheSameBytes) {
   const TemporaryFolder folder;
   ASSERT_EQ(Replay({"--duration", "1", "--sweeps", folder / "sweeps", room_drive()}).run().status, 0);
   pcl::PCLPointCloud2 cloud;

@@ -122,18 +122,18 @@ double share_far_off_as_measured(double far_m) {
 
 /// Range noise is 1 cm (sigma); gyro and wheels contribute less than 1 mm in 0.1 s. At 2 rad/s the skew of walls three
 /// metres away is up to 0.6 m, that of the floor is zero.
-TEST(Sweeps, PointsOfARobotThatTurnsLieOnTheWallsAndAsMeasuredDoNot) {
+TEST(Sweeps, DeskewedPointsLieOnTheWallsInATurn) {
   constexpr double kFar_m = 0.04;
   EXPECT_LT(share_far_off(SweepsOfRoom().sweeps, kFar_m), 0.01);
   EXPECT_GT(share_far_off_as_measured(kFar_m), 0.2);
 }
 
 /// Lidar alone: without motion sources the odometry itself de-skews.
-TEST(Sweeps, TheyAreCorrectedByWhatTheOdometryFoundOut) {
+TEST(Sweeps, AreDeskewedByTheOdometryWithoutMotionSources) {
   EXPECT_LT(share_far_off(SweepsOfRoom({"--set", "motion_sources=[]"}).sweeps, 0.1), 0.02);
 }
 
-TEST(Sweeps, EachReturnHasItsTimeRingAndIntensityAndEachSweepItsStampAndPose) {
+TEST(Sweeps, EachReturnHasTimeRingAndIntensityAndEachSweepStampAndPose) {
   const SweepsOfRoom run;
   const nlohmann::json summary = run.replay.summary();
   const std::vector<StampedPose> estimates = run.replay.trajectory();
@@ -168,7 +168,7 @@ TEST(Sweeps, EachReturnHasItsTimeRingAndIntensityAndEachSweepItsStampAndPose) {
       << "all returns of the room are within reach";
 }
 
-TEST(Sweeps, EveryFormatHoldsTheSamePointsAndTheyLeaveTheOdometryAsItIs) {
+TEST(Sweeps, EveryFormatHasTheSamePointsAndDoesNotChangeTheOdometry) {
   const SweepsOfRoom pcd({"--duration", "2"}), ply({"--duration", "2", "--sweeps-format", "ply"}),
       bin({"--duration", "2", "--sweeps-format", "bin"});
   const Replay without({"--duration", "2", room_drive()});
@@ -201,7 +201,7 @@ TEST(Sweeps, SameBitsWithOneAndTwoThreads) {
 }
 
 /// Filters affect registration but not the output; range limits and the self filter affect both.
-TEST(Sweeps, FiltersTakeNothingAwayButWhatIsOutOfReach) {
+TEST(Sweeps, OnlyRangeLimitsRemovePoints) {
   const SweepsOfRoom all({"--duration", "1"}),
       voxels({"--duration", "1", "--set", "segment_filter.enabled=false", "--set", "voxel_filter.enabled=true"}),
       near({"--duration", "1", "--set", "range_m=[0.5, 3]"});
@@ -212,7 +212,7 @@ TEST(Sweeps, FiltersTakeNothingAwayButWhatIsOutOfReach) {
   EXPECT_FALSE(few.empty());
 }
 
-TEST(SweepsOption, RefusesAFolderThatIsInUseAndFormatsThatAreNone) {
+TEST(SweepsOption, NonEmptyFolderAndUnknownFormatAreErrors) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder / "used");
   std::ofstream{folder / "used/thesis.txt"} << "precious";
@@ -239,7 +239,7 @@ TEST(SweepsOption, RefusesAFolderThatIsInUseAndFormatsThatAreNone) {
 }
 
 /// Simulates a full disk: limits the file size to 100 blocks of 512 bytes or 1 kB.
-TEST(SweepsOption, SweepThatCannotBeWrittenEndsTheRun) {
+TEST(SweepsOption, UnwritableSweepEndsTheRun) {
   const TemporaryFolder folder;
   const ProgramRun run =
       run_program("/bin/sh", {"-c", fmt::format("trap '' XFSZ; ulimit -f 100; exec {} -o {} --sweeps {} {}",

@@ -29,7 +29,7 @@ void expect_refused(const std::string& option, const std::filesystem::path& file
   EXPECT_FALSE(std::filesystem::exists(replay.file("odometry.tum"))) << "known before the run";
 }
 
-TEST(Truth, OfTheFolderIsUsedByItself) {
+TEST(Truth, OfTheFolderIsUsedAutomatically) {
   const Replay replay({room_drive().string()});
   const json summary = replay.summary();
   EXPECT_GT(summary["ape_m"]["mean"].get<double>(), 0.0);
@@ -40,14 +40,14 @@ TEST(Truth, OfTheFolderIsUsedByItself) {
   EXPECT_NE(replay.run().out.find("truth "), std::string::npos) << replay.run().out;
 }
 
-TEST(Truth, ThatIsNamedIsUsedInstead) {
+TEST(Truth, NamedFileIsUsedInstead) {
   EXPECT_FALSE(Replay({(room_drive() / "lidar.pcap").string()}).summary().contains("ape_m"));
   const Replay replay(with("--ground-truth", room_drive() / "gt.tum"));
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
   EXPECT_GT(replay.summary()["ape_m"]["rmse"].get<double>(), 0.0);
 }
 
-TEST(Truth, MapIsComparedWithTheMap) {
+TEST(Truth, MapIsComparedWithTheTrueMap) {
   const Replay first({(room_drive() / "lidar.pcap").string()});
   const Replay second(with("--map-truth", first.file("map.pcd")));
   ASSERT_EQ(second.run().status, 0) << second.run().err;
@@ -56,7 +56,7 @@ TEST(Truth, MapIsComparedWithTheMap) {
   EXPECT_EQ(error["outliers"], 0);
 }
 
-TEST(Truth, OfAnotherTimeFailsAfterTheResultsAreWritten) {
+TEST(Truth, TruthOfAnotherTimeFailsAfterTheResultsAreWritten) {
   const TemporaryFolder folder;
   const Replay replay(with("--ground-truth", written(folder / "gt.tum", "10 0 0 0 0 0 0 1\n11 0 0 0 0 0 0 1\n")));
   EXPECT_EQ(replay.run().status, 1);
@@ -77,7 +77,7 @@ TEST(Truth, MapOfAnotherPlaceIsAWarning) {
   EXPECT_NE(replay.run().err.find("far.ply: none of the "), std::string::npos) << replay.run().err;
 }
 
-TEST(Truth, ThatCannotBeReadIsRefusedBeforeTheRun) {
+TEST(Truth, UnreadableTruthFailsBeforeTheRun) {
   const TemporaryFolder folder;
   expect_refused("--ground-truth", folder / "none.tum", "none.tum: cannot be read");
   expect_refused("--ground-truth", written(folder / "empty.tum", ""), "empty.tum: holds no pose");

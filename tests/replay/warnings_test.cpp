@@ -27,7 +27,7 @@ void expect_warning(const std::vector<std::string>& arguments, const std::vector
     EXPECT_NE(lines[0].find(part), std::string::npos) << "no '" << part << "' in: " << lines[0];
 }
 
-TEST(Warnings, NoneWhereAllIsWell) {
+TEST(Warnings, AreAbsentInAGoodRun) {
   EXPECT_EQ(Replay({"--set", "lidars.front.model=VLP-16", room_drive().string()}).run().err, "");
 }
 
@@ -38,7 +38,7 @@ TEST(Warnings, PacketsOfAnotherModelThanTheConfiguredOne) {
 }
 
 /// A source of which every sample was refused was refused in silence.
-TEST(Warnings, SourceThatIsRefusedThroughout) {
+TEST(Warnings, SourceWhoseSamplesAreAllRejected) {
   const TemporaryFolder folder;
   std::vector<RecordedMessage> messages = messages_of(room_drive(), RosVersion::ros2);
   for (RecordedMessage& message : messages)
@@ -57,7 +57,7 @@ TEST(Warnings, SourceThatIsRefusedThroughout) {
 }
 
 /// A lidar whose laser is off sends its position packets alone; the advice was to record what had been recorded.
-TEST(Warnings, PositionPacketsAloneAreOfALidarThatSendsNoData) {
+TEST(Warnings, LidarThatSendsOnlyPositionPackets) {
   const TemporaryFolder folder;
   auto capture = Capture::open(room_drive() / "lidar.pcap");
   {
@@ -76,7 +76,7 @@ TEST(Warnings, PositionPacketsAloneAreOfALidarThatSendsNoData) {
       << replay.run().err;
 }
 
-TEST(Warnings, LidarThatIsNotHeardWhileAnotherIs) {
+TEST(Warnings, OneOfTwoLidarsWithoutPackets) {
   const TemporaryFolder folder;
   write_room_drive(folder.path(), std::chrono::seconds{2}, 2);
   expect_warning(
@@ -140,7 +140,7 @@ TEST(Warnings, PacketsOfAnUnknownModelAreNamedByTheirProductId) {
 }
 
 /// Consecutive half turns do not overlap. No source is blamed for that, and the motion sources bridge the gaps.
-TEST(Warnings, SweepThatIsShorterThanATurn) {
+TEST(Warnings, SweepShorterThanARevolution) {
   const std::vector<std::string> halves = {"--set", "sweep_period_ms=50", "--duration", "6", room_drive().string()};
   expect_warning(halves, {"lidar front: one revolution takes 100 ms, so each sweep of 50 ms covers only",
                           "sweep_period_ms: auto"});
@@ -148,7 +148,7 @@ TEST(Warnings, SweepThatIsShorterThanATurn) {
 }
 
 /// The true speed is up to 1 m/s. Lidar is still correct.
-TEST(Warnings, RobotThatIsFasterThanItIsSaidToBe) {
+TEST(Warnings, RobotFasterThanConfigured) {
   const Replay replay({"--set", "motion.max_speed_mps=0.3", room_drive().string()});
   const std::vector<std::string> lines = lines_of(replay.run().err);
   ASSERT_EQ(lines.size(), 2U) << replay.run().err;
@@ -168,7 +168,7 @@ TEST(Warnings, MotionOfAnotherTimeNamesBothSpans) {
                  {"imu.csv: its samples (none)"});
 }
 
-TEST(Warnings, SourceThatIsLostOnPurposeIsNotBlamed) {
+TEST(Warnings, SourceLostByAFaultIsNotReported) {
   EXPECT_EQ(Replay({"--fail", "wio:lost@0", "--duration", "1", room_drive().string()}).run().err, "");
 }
 

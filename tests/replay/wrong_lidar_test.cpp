@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-TEST(WrongLidar, ThatMeasuresTooFarNowAndThenIsOutvoted) {
+TEST(WrongLidar, WithOccasionalRangeOffsetsIsExcluded) {
   const SimulatedDrive drive("tunnel", "husky", 60);
   for (const double from_s : {20.0, 20.03, 20.07}) {
     SCOPED_TRACE(from_s);
@@ -29,7 +29,7 @@ TEST(WrongLidar, ThatMeasuresTooFarNowAndThenIsOutvoted) {
 }
 
 /// A map initialised with false walls, and one that was good before the fault, must both recover after it.
-TEST(WrongLidar, ThatMeasuresTooFarAtTheStartBeginsAnew) {
+TEST(WrongLidar, WithRangeOffsetAtTheStartRestarts) {
   const SimulatedDrive drive("tunnel", "husky", 60);
   for (const double from_s : {0.0, 1.3, 1.5, 2.0}) {
     SCOPED_TRACE(from_s);
@@ -40,7 +40,7 @@ TEST(WrongLidar, ThatMeasuresTooFarAtTheStartBeginsAnew) {
 }
 
 /// A truck passes at a distance of less than one metre, at 11 s.
-TEST(PassingVehicle, TakesNobodyAlong) {
+TEST(PassingVehicle, DoesNotDragTheEstimateAlong) {
   const SimulatedDrive drive("tunnel", "husky", 60, {"--model", "HDL-32E"}, 7101, "real");
   for (const std::vector<std::string>& lost : std::vector<std::vector<std::string>>{
            {}, {"--fail", "wio:lost@0"}, {"--fail", "wio:lost@0", "--fail", "imu:lost@0"}}) {
@@ -49,7 +49,7 @@ TEST(PassingVehicle, TakesNobodyAlong) {
   }
 }
 
-TEST(WrongLidar, OnlyDustIsBelieved) {
+TEST(WrongLidar, DustDoesNotDegradeTheEstimate) {
   const SimulatedDrive drive("urban", "husky", 30, {"--dust", "0.1"});
   const Replay replay = drive.replay();
   EXPECT_EQ(replay.summary()["sweeps"]["failed"], 0);
@@ -57,7 +57,7 @@ TEST(WrongLidar, OnlyDustIsBelieved) {
 }
 
 /// No lidar to estimate the gyro bias: wheels do.
-TEST(WrongLidar, ThatFreezesAtItsFirstPacketLeavesWheelsAndGyro) {
+TEST(WrongLidar, FrozenFromItsFirstPacketLeavesWheelsAndGyro) {
   const SimulatedDrive drive("urban", "husky", 60);
   const Replay replay = drive.replay({"--fail", "top:frozen@0"});
   EXPECT_EQ(replay.summary()["sweeps"]["failed"], 598);

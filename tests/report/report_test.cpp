@@ -44,7 +44,7 @@ TEST(Quantiles, AreTheValuesOfTheNearestRank) {
   EXPECT_EQ(Quantiles({}).at(0.5), 0.0);
 }
 
-TEST(ReportSeries, LosesNoPeakOfAnHour) {
+TEST(ReportSeries, RetainsThePeaksOfAnHour) {
   std::vector<Sample> samples(36'000, Sample{0.0, 1.0});
   for (std::size_t i = 0; i < samples.size(); ++i)
     samples[i].t_s = 0.1 * static_cast<double>(i);
@@ -60,13 +60,13 @@ TEST(ReportSeries, LosesNoPeakOfAnHour) {
   EXPECT_EQ(*std::next(peak), -9.0) << "the order of the two is kept";
 }
 
-TEST(ReportSeries, FewSamplesStayAsTheyAreButForThoseThatAreNoNumbers) {
+TEST(ReportSeries, FewSamplesAreUnchangedExceptNonFiniteOnes) {
   const std::vector<Sample> samples{{0.0, 0.12345}, {0.1, std::nan("")}, {0.2, HUGE_VAL}, {0.3, 0.2}};
   EXPECT_EQ(series(samples, 0.001).dump(), R"({"t":[0.0,0.3],"v":[0.123,0.2]})");
   EXPECT_EQ(series({}, 0.001).dump(), R"({"t":[],"v":[]})");
 }
 
-TEST(ReportSeries, PathOfAnHourIsThinnedAndKeepsBothEnds) {
+TEST(ReportSeries, PathOfAnHourIsThinnedAndRetainsBothEnds) {
   std::vector<PathPoint> points;
   for (int i = 0; i < 360'000; ++i)
     points.push_back({0.01 * i, Eigen::Vector3d{50.0 * std::cos(1e-3 * i), 50.0 * std::sin(1e-3 * i), 0.0}});
@@ -78,13 +78,13 @@ TEST(ReportSeries, PathOfAnHourIsThinnedAndKeepsBothEnds) {
   EXPECT_EQ(columns["x"].size(), columns["t"].size());
 }
 
-TEST(ReportSeries, RobotThatStandsTakesTwoPoints) {
+TEST(ReportSeries, RobotAtRestHasTwoPoints) {
   const std::vector<PathPoint> points(1000, PathPoint{1.0, Eigen::Vector3d{1.0, 2.0, 3.0}});
   EXPECT_EQ(path(points).dump(), R"({"t":[1.0,1.0],"x":[1.0,1.0],"y":[2.0,2.0],"z":[3.0,3.0]})");
   EXPECT_EQ(path({})["t"].size(), 0U);
 }
 
-TEST(ReportSeries, BandNamesChangesAloneAndLosesNoShortFailure) {
+TEST(ReportSeries, BandHasOnlyChangesAndRetainsShortFailures) {
   const std::vector<BandSample> few{{0.0, 2}, {0.1, 2}, {0.2, 0}, {0.3, 2}};
   EXPECT_EQ(band(few).dump(), R"({"t":[0.0,0.2,0.3],"what":[2,0,2]})");
   std::vector<BandSample> many(36'000, BandSample{0.0, 2});
@@ -92,7 +92,7 @@ TEST(ReportSeries, BandNamesChangesAloneAndLosesNoShortFailure) {
   EXPECT_EQ(band(many)["what"].dump(), "[2,0,2]");
 }
 
-TEST(ReportMap, TilesAreAsTheDocumentationSays) {
+TEST(ReportMap, TilesHaveTheDocumentedLayout) {
   const std::vector<SurfacePoint> surfaces{{{0.0F, 0.0F, 0.0F}, {0.0F, 0.0F, 1.0F}},
                                            {{2.0F, 0.0F, 1.0F}, {-1.0F, 0.0F, 0.0F}}};
   const ordered_json map = map_tiles(surfaces, {});
@@ -104,14 +104,14 @@ TEST(ReportMap, TilesAreAsTheDocumentationSays) {
   EXPECT_EQ(map["data"], "GPwAAAz+AADoAwAA9AGBAA==");
 }
 
-TEST(ReportMap, NormalsTurnToTheNearestViewpoint) {
+TEST(ReportMap, NormalsFaceTheNearestViewpoint) {
   const std::vector<SurfacePoint> ceiling{{{0.0F, 0.0F, 3.0F}, {0.0F, 0.0F, 1.0F}}};
   const std::vector<Eigen::Vector3f> below{{0.0F, 0.0F, 1.0F}}, above{{0.0F, 0.0F, 9.0F}};
   EXPECT_EQ(map_tiles(ceiling, above)["data"], "AAAAAAAAAAA=");
   EXPECT_EQ(map_tiles(ceiling, below)["data"], "AAAAAAAAgYE=") << "straight down is the corner of the octahedron";
 }
 
-TEST(ReportMap, MoreSurfacesThanTilesAreThinnedEvenly) {
+TEST(ReportMap, ExcessSurfacesAreThinnedEvenly) {
   std::vector<SurfacePoint> floor;
   for (int x = 0; x < 800; ++x) {
     for (int y = 0; y < 800; ++y)
@@ -124,13 +124,13 @@ TEST(ReportMap, MoreSurfacesThanTilesAreThinnedEvenly) {
   EXPECT_NEAR(covered_m2, 400.0 * 400.0, 0.2 * 400.0 * 400.0) << "the tiles are as large as what they stand for";
 }
 
-TEST(ReportMap, NothingAndNoNumbersAreAnEmptyMap) {
+TEST(ReportMap, WithoutFinitePointsIsEmpty) {
   EXPECT_EQ(map_tiles({}, {})["count"], 0);
   const std::vector<SurfacePoint> broken{{{NAN, 0.0F, 0.0F}, {0.0F, 0.0F, 1.0F}}};
   EXPECT_EQ(map_tiles(broken, {})["count"], 0);
 }
 
-TEST(ReportMap, FloorSeenInRingsIsShownByThePlaneOfTheCoarseMap) {
+TEST(ReportMap, FloorInRingsIsShownByThePlanesOfTheCoarseMap) {
   SurfaceMap map(10'000'000);
   std::vector<SurfacePoint> ring; // one line of points in each fine voxel: no plane there, but one in the coarse voxel
   for (const float y : {-0.5F, 0.0F, 0.5F}) {
@@ -146,7 +146,7 @@ TEST(ReportMap, FloorSeenInRingsIsShownByThePlaneOfTheCoarseMap) {
     EXPECT_NEAR(std::abs(surface.normal.z()), 1.0F, 1e-3F);
 }
 
-TEST(SweepRecord, TellsWhatEachSourceWasToTheSweep) {
+TEST(SweepRecord, HasTheRoleOfEachSource) {
   daemon::ProcessedSweep sweep;
   sweep.raw_returns = 1000;
   sweep.usable_sources = 0b0111;
@@ -165,7 +165,7 @@ TEST(SweepRecord, TellsWhatEachSourceWasToTheSweep) {
   EXPECT_EQ(record_of(sweep).lidars, SourceHealth::lost);
 }
 
-TEST(Report, OfAnHourTakesLessThanTenMegabytes) {
+TEST(Report, OfAnHourIsSmallerThanTenMegabytes) {
   const std::string page = written(SampleRun::of(std::chrono::hours{1}, "hour"));
   RecordProperty("bytes", static_cast<int>(page.size()));
   EXPECT_LT(page.size(), 10'000'000U);
@@ -179,7 +179,7 @@ TEST(Report, TimesAreThoseOfTheCapture) {
   EXPECT_EQ(shown["state"]["t"].front(), 60.0);
 }
 
-TEST(Report, NoNameEndsTheScriptThatHoldsIt) {
+TEST(Report, NamesCannotEndTheScript) {
   const std::string hostile = "</script><script>alert(1)</script><!--";
   SampleRun run = SampleRun::bare();
   run.summary["capture"] = hostile;
@@ -188,7 +188,7 @@ TEST(Report, NoNameEndsTheScriptThatHoldsIt) {
   EXPECT_EQ(page.find("alert(1)</script>"), std::string::npos);
 }
 
-TEST(Report, HoldsSummaryConfigurationAndTheTruthInTheFrameOfTheEstimate) {
+TEST(Report, HasSummaryConfigurationAndTruthInTheFrameOfTheEstimate) {
   SampleRun run = SampleRun::of(std::chrono::minutes{1}, "minute");
   const Pose T_other_truth{from_rpy_rad({0.0, 0.0, 1.0}), {1000.0, -2000.0, 30.0}};
   std::vector<StampedPose> estimates;
@@ -215,7 +215,7 @@ TEST(Report, WithoutTruthHasNoErrors) {
   EXPECT_TRUE(shown["series"].contains("std_m"));
 }
 
-TEST(Report, PageLoadsNothingFromAnywhere) {
+TEST(Report, LoadsNothingFromTheNetwork) {
   const std::string page = written(SampleRun::bare());
   for (const char* loading : {" src=", "@import", "url(http", "<link rel=\"stylesheet"})
     EXPECT_EQ(page.find(loading), std::string::npos) << loading;

@@ -120,7 +120,7 @@ TEST_F(Control, StatusShowsSensorsThatWereNeverReceived) {
   EXPECT_NE(ctl({"status"}).out.find("always"), std::string::npos);
 }
 
-TEST_F(Control, StatusKeepsItsColumnsWhileALidarSynchronises) {
+TEST_F(Control, StatusColumnsAreStableWhileALidarSynchronises) {
   Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   std::vector<std::byte> packet(velodyne::kPositionPacketBytes);

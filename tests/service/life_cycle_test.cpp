@@ -75,7 +75,7 @@ TEST_F(LifeCycle, SystemdIsNotifiedOfStartReloadStopAndProgress) {
   EXPECT_EQ(daemon.wait_for_exit(), 0);
 }
 
-TEST_F(LifeCycle, SecondServiceKeepsTheSocketOfTheFirst) {
+TEST_F(LifeCycle, SecondServiceLeavesTheSocketOfTheFirst) {
   const Child first(locusd(config()));
   ASSERT_TRUE(first.wait_for_line("DDS is up"));
   {

@@ -39,7 +39,7 @@ class CaptureFolder : public testing::Test {
   Trajectory trajectory_{room_course(seconds{3}, 1.0), room_start()};
 };
 
-TEST_F(CaptureFolder, HoldsTwoLidarsInOrderOfArrivalAndAllMotion) {
+TEST_F(CaptureFolder, ContainsBothLidarsInOrderOfArrivalAndAllMotion) {
   RobotOptions robot;
   robot.lidars = {{"front", {}}, {"rear", {.port = 2369, .source_ip = 0xC0A8'01CA, .sends_position_packets = true}}};
   write_capture_folder(folder_, scene_, trajectory_, seconds{2}, robot);
@@ -63,7 +63,7 @@ TEST_F(CaptureFolder, HoldsTwoLidarsInOrderOfArrivalAndAllMotion) {
   EXPECT_EQ(lines("config.yaml"), 6U);
 }
 
-TEST_F(CaptureFolder, LeavesOutWhatTheRobotDoesNotCarry) {
+TEST_F(CaptureFolder, HasNoFilesOfAbsentSensors) {
   write_capture_folder(folder_, scene_, trajectory_, seconds{1}, {.imu = {}, .odometry = {}});
   EXPECT_TRUE(std::filesystem::exists(folder_ / "lidar.pcap"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "imu.csv"));

@@ -47,7 +47,7 @@ std::string config_of(const RobotOptions& robot) {
   return sink.config;
 }
 
-TEST(Mounting, IsWrongByWhatIsAskedForAndConfigSaysWhatIsBelieved) {
+TEST(Mounting, ErrorIsAsRequestedAndTheConfigurationHasNone) {
   const Robot right = spot_with({}), wrong = spot_with({.mounting_deg = 2, .mounting_mm = 30});
   const auto expect_displaced = [](const Pose& truth, const Pose& intended) {
     EXPECT_NEAR((truth.translation - intended.translation).norm(), 0.03, 1e-9);
@@ -59,7 +59,7 @@ TEST(Mounting, IsWrongByWhatIsAskedForAndConfigSaysWhatIsBelieved) {
   EXPECT_EQ(config_of(wrong.sensors), config_of(right.sensors));
 }
 
-TEST(Mounting, OfEachSensorAndSeedIsWrongInItsOwnDirection) {
+TEST(Mounting, ErrorDiffersBetweenSensorsAndSeeds) {
   std::vector<Eigen::Vector3d> shifts, turns;
   for (const std::uint64_t seed : {1U, 2U}) {
     const Robot wrong = spot_with({.mounting_deg = 2, .mounting_mm = 30}, seed);
@@ -139,7 +139,7 @@ NamedLidar level_lidar(const Imperfections& imperfections, std::uint64_t seed) {
   return make_spot({.noise = false, .imperfections = imperfections}, seed).sensors.lidars.front();
 }
 
-TEST(Mounting, TurnsFloorAndWallsByWhatIsAskedFor) {
+TEST(Mounting, RotationErrorTurnsFloorAndWalls) {
   double steepest_rad = 0;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     const Corner seen = seen_of_corner(level_lidar({.mounting_deg = 2}, seed));
@@ -153,7 +153,7 @@ TEST(Mounting, TurnsFloorAndWallsByWhatIsAskedFor) {
   EXPECT_LT(steepest_rad, 2.03 * kRadPerDeg);
 }
 
-TEST(Mounting, ShiftsFloorAndWallsByWhatIsAskedFor) {
+TEST(Mounting, TranslationErrorShiftsFloorAndWalls) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     const Corner seen = seen_of_corner(level_lidar({.mounting_mm = 30}, seed));
     const Eigen::Vector3d shift_m{mean_of(seen.ahead).x() - kAhead_m, mean_of(seen.left).y() - kAhead_m,
@@ -162,7 +162,7 @@ TEST(Mounting, ShiftsFloorAndWallsByWhatIsAskedFor) {
   }
 }
 
-TEST(Mounting, OfAnImuThatStandsTiltsItsGravity) {
+TEST(Mounting, RotationErrorOfAnImuTiltsItsGravity) {
   const Trajectory trajectory(Course{}.stand(seconds{1}));
   double steepest_rad = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
@@ -177,7 +177,7 @@ TEST(Mounting, OfAnImuThatStandsTiltsItsGravity) {
   EXPECT_GT(steepest_rad, 1.95 * kRadPerDeg);
 }
 
-TEST(Impairment, IsOfEveryRobot) {
+TEST(Impairment, AppliesToEveryRobot) {
   for (const NamedRobot& named : kRobots) {
     const Robot robot = named.make({.imperfections = {.mounting_mm = 30, .imu_late_ms = 5, .odometry_late_ms = 20}}, 1);
     EXPECT_TRUE(robot.sensors.lidars.front().T_base_configured) << named.name;
@@ -187,7 +187,7 @@ TEST(Impairment, IsOfEveryRobot) {
   }
 }
 
-TEST(Impairment, OfOneKindIsTheSameWhateverElseIsWrong) {
+TEST(Impairment, OfOneKindDoesNotDependOnOthers) {
   const Robot alone = spot_with({.mounting_mm = 30, .gyro_scale_percent = 1});
   Imperfections all = imperfections_of(Realism::harsh);
   all.mounting_mm = 30;
@@ -198,7 +198,7 @@ TEST(Impairment, OfOneKindIsTheSameWhateverElseIsWrong) {
   EXPECT_EQ(alone.sensors.imu->faults.gyro_axis_scale_error, among.sensors.imu->faults.gyro_axis_scale_error);
 }
 
-TEST(BodyBox, HoldsEveryOtherPartOfTheRobotAndNoOther) {
+TEST(BodyBox, ContainsThePartsOfTheRobotOnly) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     Dice dice(seed);
     const Eigen::Vector3d lidar_m{0.1, 0, 0.8};
@@ -219,7 +219,7 @@ TEST(BodyBox, HoldsEveryOtherPartOfTheRobotAndNoOther) {
   }
 }
 
-TEST(BodyBox, StandsInConfigWhereTheRobotHasPartsInView) {
+TEST(BodyBox, IsConfiguredIfPartsAreInView) {
   EXPECT_EQ(config_of(spot_with({}).sensors).find("body_box"), std::string::npos);
   const Robot robot = spot_with({.body_parts = 2});
   EXPECT_NE(config_of(robot.sensors).find("body_box: {enabled: true, min_m: [-"), std::string::npos);
@@ -227,7 +227,7 @@ TEST(BodyBox, StandsInConfigWhereTheRobotHasPartsInView) {
     EXPECT_EQ(lidar.options.own_parts.size(), 2U);
 }
 
-TEST(LidarClock, ThatDriftsHasNoGps) {
+TEST(LidarClock, DriftingClockHasNoGps) {
   const SyntheticLidarOptions kept = spot_with({}).sensors.lidars[0].options;
   EXPECT_TRUE(kept.pps_locked);
   EXPECT_EQ(kept.clock_offset, Duration::zero());
@@ -247,7 +247,7 @@ velodyne::PositionPacket position_packet_of(const Robot& robot) {
   return velodyne::parse_position_packet(datagram.payload.first<velodyne::kPositionPacketBytes>());
 }
 
-TEST(LidarClock, ThatDriftsSaysSoInItsPositionPackets) {
+TEST(LidarClock, DriftingClockIsUnlockedInPositionPackets) {
   const velodyne::PositionPacket kept = position_packet_of(spot_with({}));
   EXPECT_TRUE(kept.is_synchronised());
   const velodyne::PositionPacket left = position_packet_of(spot_with({.lidar_drift_ppm = 60}));
@@ -286,7 +286,7 @@ template <class Source> Scatter lateness(Source source, Stamp start) {
   return scatter_of(all_s);
 }
 
-TEST(SourceStamps, AreLateAndScatterAndNeverRunBackwards) {
+TEST(SourceStamps, AreLateWithJitterAndMonotonic) {
   const Trajectory trajectory(Course{}.stand(seconds{30}));
   for (const double jitter_s : {0.0005, 0.02}) { // the larger one disorders many stamps
     const StampFaults faults{.late = milliseconds{50}, .jitter_s = jitter_s};
@@ -303,8 +303,7 @@ TEST(SourceStamps, AreLateAndScatterAndNeverRunBackwards) {
   }
 }
 
-/// A late stamp belongs to earlier motion.
-TEST(SourceStamps, ThatAreLateStandForWhatWas) {
+TEST(SourceStamps, LateStampBelongsToEarlierMotion) {
   const Trajectory trajectory(Course{}.change_speed(2, seconds{1}).turn(3, 2.0));
   const Duration late = milliseconds{30};
   SyntheticOdometry odometry(trajectory, 50, {.stamps = {.late = late}});
@@ -339,7 +338,7 @@ std::vector<double> reported_shares(const Trajectory& trajectory, double per_min
 }
 
 /// At constant speed. The bursts in ten minutes are Poisson distributed: the bounds are exceeded once in ten thousand.
-TEST(SlipBursts, ReportTooMuchAsOftenAndAsLongAsAskedFor) {
+TEST(SlipBursts, ReportTooMuchAtTheConfiguredRateAndDuration) {
   const Trajectory trajectory(Course{}.change_speed(1, milliseconds{1}).straight(600));
   int bursts = 0, run = 0;
   std::vector<double> shares = reported_shares(trajectory, 5, 3);
@@ -362,7 +361,7 @@ TEST(SlipBursts, ReportTooMuchAsOftenAndAsLongAsAskedFor) {
   EXPECT_LT(bursts, 78);
 }
 
-TEST(SlipBursts, ReportTooLittleWhileTheRobotBrakesAndNothingWhileItStands) {
+TEST(SlipBursts, ReportTooLittleInBrakingAndNothingAtRest) {
   const Trajectory trajectory(
       Course{}.change_speed(10, milliseconds{1}).change_speed(0, seconds{20}).stand(seconds{20}));
   const std::vector<double> shares = reported_shares(trajectory, 60, 3);
@@ -375,7 +374,7 @@ TEST(SlipBursts, ReportTooLittleWhileTheRobotBrakesAndNothingWhileItStands) {
   EXPECT_GT(dragging, 25);
 }
 
-TEST(SlipBursts, AndTurnErrorsAreOfWheelsAndFeetAlone) {
+TEST(SlipBursts, AndTurnErrorsAffectOnlyWheelsAndLegs) {
   const Robot right = spot_with({}), wrong = spot_with({.slip_bursts_per_min = 3, .yaw_error_percent = 5});
   const auto &vision = wrong.sensors.odometry[0].faults, &legs = wrong.sensors.odometry[1].faults;
   EXPECT_EQ(vision.slip_bursts_per_min, 0);
@@ -399,7 +398,7 @@ double reported_of_true_yaw(const NamedOdometry& named) {
   return sum_rad / turn_rad;
 }
 
-TEST(TurnErrors, MakeTheReportedYawTooLargeOrTooSmallByWhatIsAskedFor) {
+TEST(TurnErrors, ScaleTheReportedYawAsConfigured) {
   std::set<bool> signs;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const SensorChoice choice{.noise = false, .imperfections = {.yaw_error_percent = 5}};
@@ -429,7 +428,7 @@ ImuSample excess(const Trajectory& trajectory, const ImuFaults& faults, Duration
   return with;
 }
 
-TEST(Gyro, ShowsTooMuchOrTooLittleOnEachAxis) {
+TEST(Gyro, HasAScaleErrorOnEachAxis) {
   const Trajectory trajectory(Course{}.change_speed(2, seconds{1}).turn(6, 2.0), {},
                               {.tilt_rad = 0.1, .wavelength_m = 2});
   const ImuFaults faults =
@@ -443,7 +442,7 @@ TEST(Gyro, ShowsTooMuchOrTooLittleOnEachAxis) {
   }
 }
 
-TEST(Gyro, ShowsAccelerationButNotTheGravityThatItWasCalibratedIn) {
+TEST(Gyro, IsSensitiveToAccelerationButNotToGravity) {
   const Trajectory trajectory(Course{}.change_speed(6, seconds{2}));
   const ImuFaults faults =
       make_spot({.noise = false, .imperfections = {.g_sensitivity_dps = 0.2}}, 1).sensors.imu->faults;
@@ -454,7 +453,7 @@ TEST(Gyro, ShowsAccelerationButNotTheGravityThatItWasCalibratedIn) {
   EXPECT_NEAR(excess(trajectory, faults, at).angular_velocity_radps.norm(), 0.2 * kRadPerDeg * g, 1e-9);
 }
 
-TEST(Gyro, BiasWalksAwayWithTheRootOfTheTime) {
+TEST(Gyro, BiasIsARandomWalk) {
   const Trajectory trajectory(Course{}.stand(seconds{1}));
   ImuFaults faults = make_spot({.noise = false, .imperfections = {.gyro_walk_dps = 0.1}}, 1).sensors.imu->faults;
   SyntheticImu imu(trajectory, 200, faults);
@@ -469,7 +468,7 @@ TEST(Gyro, BiasWalksAwayWithTheRootOfTheTime) {
   EXPECT_NEAR(std::sqrt(sum), 0.1 * kRadPerDeg, 0.12 * 0.1 * kRadPerDeg); // 600 draws
 }
 
-TEST(Accelerometer, ShakesWhileTheRobotMoves) {
+TEST(Accelerometer, VibratesWhileTheRobotMoves) {
   const Trajectory trajectory(Course{}.stand(seconds{5}).change_speed(1, milliseconds{1}).straight(20));
   const ImuFaults faults = make_spot({.noise = false, .imperfections = {.vibration_mps2 = 3}}, 1).sensors.imu->faults;
   SyntheticImu imu(trajectory, 200, faults);

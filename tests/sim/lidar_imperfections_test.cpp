@@ -94,7 +94,7 @@ TEST(LidarBeam, SurfacesFartherApartThanThePulseIsLongAreNotMixed) {
 }
 
 /// The scan line follows the upper edge of a panel, 1.5 mm above the middle of a beam that is 6.5 mm high there.
-TEST(LidarBeam, IsWideFromTopToBottomToo) {
+TEST(LidarBeam, HasAVerticalDivergence) {
   const double top_m = velodyne::spec(velodyne::Model::vlp16).calibration.lasers()[1].vertical_offset_m +
                        5 * std::tan(kRadPerDeg) + 0.0015;
   const Scene scene({{Rectangle{{5, -0.4, top_m - 1}, {0, 0.8, 0}, {0, 0, 1}}}, upright(5.5, -8, 8)});
@@ -108,7 +108,7 @@ TEST(LidarBeam, IsWideFromTopToBottomToo) {
   EXPECT_GT(mixed(0.003), 15 * 34 / 2); // 34 columns per turn
 }
 
-TEST(LidarBeam, DualReturnsTellBothSurfacesOfAnEdge) {
+TEST(LidarBeam, DualReturnsMeasureBothSurfacesOfAnEdge) {
   const Scene scene = panel_before_wall(3);
   const Trajectory trajectory = standing();
   SyntheticLidar lidar(scene, trajectory, {.return_mode = ReturnMode::dual, .rpm = 597, .beam_rad = 0.003});
@@ -159,7 +159,7 @@ double rms(const std::vector<double>& all) {
 // RMS bounds of 32 draws with standard deviation 1, exceeded once in ten thousand.
 constexpr double kLeastOf32 = 0.57, kMostOf32 = 1.5;
 
-TEST(LidarErrors, EachLaserHasARangeErrorOfItsOwnThatStays) {
+TEST(LidarErrors, EachLaserHasItsOwnConstantRangeError) {
   const Scene scene({{Box{{0, 0, 0}, {7, 6, 5}}}});
   const auto right = ranges_by_laser(scene, {.model = velodyne::Model::hdl32e});
   const auto wrong = ranges_by_laser(scene, {.model = velodyne::Model::hdl32e, .laser_bias_m = 0.05});
@@ -175,7 +175,7 @@ TEST(LidarErrors, EachLaserHasARangeErrorOfItsOwnThatStays) {
 }
 
 /// The floor reveals the elevation of each beam below the horizon.
-TEST(LidarErrors, EachLaserPointsAboveOrBelowWhereItsTableSays) {
+TEST(LidarErrors, EachLaserHasItsOwnElevationError) {
   constexpr double kHeight_m = 2, kSize_rad = 0.3 * kRadPerDeg;
   const Scene floor({{Rectangle{{-200, -200, -kHeight_m}, {400, 0, 0}, {0, 400, 0}}}});
   const auto model = velodyne::Model::hdl32e;
@@ -212,7 +212,7 @@ Scene slanting(double x_m, double incidence_deg) {
   return Scene({{Rectangle{Eigen::Vector3d{x_m, 0, -50} - 90 * along, 180 * along, {0, 0, 100}}}});
 }
 
-TEST(LidarErrors, SlantingSurfacesSeemFartherAndGrazedOnesNotWithoutEnd) {
+TEST(LidarErrors, RangeErrorGrowsWithIncidenceAndIsBounded) {
   constexpr double kSize_m = 0.1;
   const SyntheticLidarOptions options{.incidence_bias_m = kSize_m};
   EXPECT_NEAR(farther_m(slanting(10, 75), options), kSize_m, 0.05 * kSize_m);
@@ -222,7 +222,7 @@ TEST(LidarErrors, SlantingSurfacesSeemFartherAndGrazedOnesNotWithoutEnd) {
   EXPECT_NEAR(farther_m(slanting(30, 86), options), 9 * kSize_m, 2 * kStep_m);
 }
 
-TEST(LidarErrors, DarkSurfacesSeemFartherThanWhiteOnesAndMirrorsDoNot) {
+TEST(LidarErrors, DarkSurfacesMeasureFartherAndRetroreflectorsDoNot) {
   constexpr double kSize_m = 0.2;
   const auto farther = [&](std::uint8_t reflectivity) {
     return farther_m(Scene({upright(10, -20, 20, reflectivity)}), {.intensity_bias_m = kSize_m});
@@ -234,7 +234,7 @@ TEST(LidarErrors, DarkSurfacesSeemFartherThanWhiteOnesAndMirrorsDoNot) {
 }
 
 /// An oscillator that is 1 % fast: all firings are early by that, while the packets' stamps are nominal.
-TEST(LidarClock, RunsFastWithItsFiringsAndTheRotorDoesNot) {
+TEST(LidarClock, DriftScalesTheFiringsButNotTheRotor) {
   constexpr double kDrift = 0.01, kRpm = 600;
   constexpr int kPackets = 300;
   const Scene nothing({});
@@ -262,7 +262,7 @@ TEST(LidarClock, RunsFastWithItsFiringsAndTheRotorDoesNot) {
 }
 
 /// The robot turns and drives; its own parts stay fixed in the lidar's view and are not in the map.
-TEST(LidarView, PartsOfTheRobotStandStillInItAndLeaveNoTraceInTheMap) {
+TEST(LidarView, PartsOfTheRobotAreStaticInTheViewAndAbsentFromTheMap) {
   const Scene scene({{Rectangle{{-30, -30, -30}, {60, 0, 0}, {0, 60, 0}}}}); // below, out of view
   const Trajectory trajectory(Course{}.change_speed(1, seconds{1}).turn(3, 3.0), {},
                               {.height_m = 0.03, .tilt_rad = 0.03, .wavelength_m = 1});
@@ -287,7 +287,7 @@ TEST(LidarView, PartsOfTheRobotStandStillInItAndLeaveNoTraceInTheMap) {
   EXPECT_FALSE(seen.reaches_into(scene.bounds()));
 }
 
-TEST(LidarView, PartsOfTheRobotHideWhatIsBehindThem) {
+TEST(LidarView, PartsOfTheRobotOccludeWhatIsBehindThem) {
   const Scene room({{Box{{0, 0, 0}, {7, 6, 5}}}});
   const SyntheticLidarOptions bare{}, hooded{.own_parts = {{Sphere{{0, 0, 0}, 1}, 40}}};
   for (const auto& laser : ranges_by_laser(room, hooded))

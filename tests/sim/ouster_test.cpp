@@ -24,7 +24,7 @@ SyntheticLidarOptions ouster(OusterModel model = OusterModel::os1_32) {
   return {.model = model, .port = 7502, .imu_port = 7503};
 }
 
-TEST(SimulatedOuster, TellsItsModelModePortsAndBeams) {
+TEST(SimulatedOuster, MetadataHasModelModePortsAndBeams) {
   for (const auto& [model, name, beams] :
        {std::tuple{OusterModel::os1_32, "OS1-32", 32U}, std::tuple{OusterModel::os1_128, "OS1-128", 128U}}) {
     const ouster::Metadata metadata = OusterSensor(sim::ouster(model), Stamp{}).metadata();
@@ -57,7 +57,7 @@ TEST(SimulatedOuster, ClockCountsFromTheSensorsStartAndRunsFast) {
 }
 
 /// Rotates and swings the sensor: the IMU measures at its own position, in its own frame, at its own stamps.
-TEST(SimulatedOuster, ImuTellsWhatItFeelsWhereItSits) {
+TEST(SimulatedOuster, ImuMeasuresTheMotionAtItsMounting) {
   const Trajectory trajectory(Course{}.change_speed(1, milliseconds{200}).turn(4, 8.0), {},
                               {.height_m = 0.03, .tilt_rad = 0.03, .wavelength_m = 1});
   SyntheticLidarOptions options = ouster();
@@ -79,7 +79,7 @@ TEST(SimulatedOuster, ImuTellsWhatItFeelsWhereItSits) {
   }
 }
 
-TEST(SimulatedOuster, RobotsHaveItsImuInPlaceOfTheirOwnAndWrongAsThatIs) {
+TEST(SimulatedOuster, ItsImuReplacesThatOfTheRobotWithTheSameErrors) {
   for (const NamedRobot& named : kRobots) {
     const SensorChoice choice{.lidars = 2, .model = OusterModel::os1_32, .imperfections = {.imu_late_ms = 5}};
     const Robot robot = named.make(choice, 1);
@@ -95,7 +95,7 @@ TEST(SimulatedOuster, RobotsHaveItsImuInPlaceOfTheirOwnAndWrongAsThatIs) {
   }
 }
 
-TEST(SimulatedOuster, CaptureHoldsMetadataAndReadingsInPlaceOfImuCsv) {
+TEST(SimulatedOuster, CaptureHasMetadataAndImuPacketsInPlaceOfImuCsv) {
   const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "simulated_ouster";
   std::filesystem::remove_all(folder);
   const Scene scene = room();

@@ -30,7 +30,7 @@ std::vector<std::string> husky_in(const std::string& world, const std::string& f
 
 const std::vector<std::string> kFiles{"lidar.pcap", "imu.csv", "wio.tum", "gt.tum", "gt_map.ply", "config.yaml"};
 
-TEST(LocusSim, SameOptionsGiveTheSameBytesAndAnotherSeedOthers) {
+TEST(LocusSim, SameOptionsGiveTheSameBytesAndAnotherSeedDoesNot) {
   const TemporaryFolder folder;
   const auto simulate = [&](const std::string& name, const std::string& seed) {
     const ProgramRun run = run_program(LOCUS_SIM, husky_in("urban", folder / name, {"--seed", seed, "--dust", "0.05"}));
@@ -95,7 +95,7 @@ TEST_P(LocusSimWith, FolderReplays) {
   EXPECT_LT(summary["ape_m"]["max"], 0.2);
 }
 
-TEST(LocusSim, PositionPacketsTellTheTimeOfTheirArrival) {
+TEST(LocusSim, PositionPacketsHoldTheTimeOfTheirArrival) {
   const TemporaryFolder folder;
   ASSERT_EQ(run_program(LOCUS_SIM, husky_in("corridor", folder / "c", {"--realism", "clean"})).status, 0);
   auto capture = Capture::open(folder / "c/lidar.pcap");
@@ -118,7 +118,7 @@ TEST(LocusSim, PositionPacketsTellTheTimeOfTheirArrival) {
 }
 
 /// All imperfections, some of which delay stamps. Reassembled, the stream equals the folder, except for the true map.
-TEST(LocusSim, StreamHoldsWhatTheFolderHolds) {
+TEST(LocusSim, StreamEqualsTheFolder) {
   const TemporaryFolder folder;
   ASSERT_EQ(run_program(LOCUS_SIM, husky_in("corridor", folder / "c", {"--lidars", "2"})).status, 0);
   const ProgramRun run = run_program(LOCUS_SIM, husky_in("corridor", "-", {"--lidars", "2"}));
@@ -163,7 +163,7 @@ double cpu_of_a_minute_s(const std::string& world, const std::string& realism) {
 }
 
 /// The target is a tenth; docs/performance.md has measurements. A factor of two is left for loaded machines.
-TEST(LocusSim, TakesAFifthOfTheTimeThatItSimulatesAtMost) {
+TEST(LocusSim, RunsFiveTimesFasterThanRealTime) {
   for (const std::string world : {"urban", "tunnel"}) {
     const double took_s = cpu_of_a_minute_s(world, "clean");
     EXPECT_LT(took_s, 60.0 / 5) << world;
@@ -173,7 +173,7 @@ TEST(LocusSim, TakesAFifthOfTheTimeThatItSimulatesAtMost) {
 
 /// Multiple rays per beam, people, mirrors. Relative to a clean drive in the same run, because a fraction of the
 /// simulated time would depend on the machine.
-TEST(LocusSim, TakesFourTimesAsLongAtMostInARealWorldAsInACleanOne) {
+TEST(LocusSim, RunsARealWorldInFourTimesTheTimeOfACleanOne) {
   for (const std::string world : {"urban", "tunnel"}) {
     const double clean_s = cpu_of_a_minute_s(world, "clean"), real_s = cpu_of_a_minute_s(world, "real");
     EXPECT_LT(real_s, 4 * clean_s) << world;
@@ -182,7 +182,7 @@ TEST(LocusSim, TakesFourTimesAsLongAtMostInARealWorldAsInACleanOne) {
 }
 
 /// The levels are documented by --help and the manual for each imperfection; "real" is the default.
-TEST(LocusSim, LevelsOfRealismAreTheSizesOfTheirImperfections) {
+TEST(LocusSim, LevelsOfRealismEqualTheirImperfections) {
   const TemporaryFolder folder;
   const auto simulate = [&](const std::string& name, const std::vector<std::string>& more) {
     std::vector<std::string> all{"--world", "corridor", "--robot", "spot", "--duration", "2", "-o", folder / name};
@@ -211,7 +211,7 @@ TEST(LocusSim, LevelsOfRealismAreTheSizesOfTheirImperfections) {
   }
 }
 
-TEST(LocusSim, WrongOptionsAreAnErrorOfOneLineThatNamesThem) {
+TEST(LocusSim, InvalidOptionsAreNamedInOneLine) {
   const TemporaryFolder folder;
   const std::string x = folder / "x";
   const auto expect_refused = [](const std::vector<std::string>& arguments, const std::string& named) {
@@ -240,7 +240,7 @@ TEST(LocusSim, WrongOptionsAreAnErrorOfOneLineThatNamesThem) {
   expect_refused({"--world", "urban", "--robot", "husky", "--duration", "nan", "-o", x}, "duration");
 }
 
-TEST(LocusSim, VehicleThatIsNamedAndHasNoRoomIsAWarningOfOneLine) {
+TEST(LocusSim, RequestedVehicleWithoutRoomIsAWarning) {
   const TemporaryFolder folder;
   const auto said = [&](const std::vector<std::string>& options) {
     const ProgramRun run = run_program(LOCUS_SIM, husky_in("corridor", folder / "c", options));
@@ -253,7 +253,7 @@ TEST(LocusSim, VehicleThatIsNamedAndHasNoRoomIsAWarningOfOneLine) {
   EXPECT_EQ(said({"--realism", "harsh"}), "");
 }
 
-TEST(LocusSim, FolderThatCannotBeMadeIsAFailure) {
+TEST(LocusSim, FolderThatCannotBeCreatedIsAnError) {
   const ProgramRun run = run_program(LOCUS_SIM, husky_in("corridor", "/dev/null/folder"));
   EXPECT_EQ(run.status, 1);
   EXPECT_EQ(run.err,

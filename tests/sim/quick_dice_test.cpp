@@ -21,14 +21,14 @@ template <class Distribution> double kolmogorov(std::vector<double> sample, Dist
   return largest;
 }
 
-TEST(QuickDice, UniformNumbersAre) {
+TEST(QuickDice, UniformNumbersHaveTheirMoments) {
   QuickDice dice(7);
   std::vector<double> sample(kDraws);
   std::generate(sample.begin(), sample.end(), [&] { return dice.uniform(); });
   EXPECT_LT(kolmogorov(sample, [](double x) { return std::clamp(x, 0.0, 1.0); }), 0.002);
 }
 
-TEST(QuickDice, NormalNumbersAreToWithinAThousandth) {
+TEST(QuickDice, NormalNumbersHaveTheirDistributionWithinAThousandth) {
   QuickDice dice(7);
   std::vector<double> sample(kDraws);
   std::generate(sample.begin(), sample.end(), [&] { return dice.normal(); });
@@ -42,7 +42,7 @@ TEST(QuickDice, NormalNumbersAreToWithinAThousandth) {
   EXPECT_LT(kolmogorov(sample, [](double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }), 0.002);
 }
 
-TEST(QuickDice, SeedDecides) {
+TEST(QuickDice, NumbersDependOnTheSeed) {
   QuickDice one(1), same(1), other(2);
   const double first = one.uniform();
   EXPECT_EQ(first, same.uniform());

@@ -18,7 +18,7 @@ const NamedWorld& world_called(std::string_view name) {
   return *std::find_if(kWorlds.begin(), kWorlds.end(), [&](const NamedWorld& world) { return world.name == name; });
 }
 
-TEST(Robots, EachDrivesInEachWorldNoFasterThanIsSensibleThere) {
+TEST(Robots, EachRespectsTheSpeedLimitOfEachWorld) {
   for (const NamedWorld& named_world : kWorlds) {
     const World world = named_world.make(2);
     for (const NamedRobot& named : kRobots) {
@@ -42,7 +42,7 @@ TEST(Robots, EachDrivesInEachWorldNoFasterThanIsSensibleThere) {
   }
 }
 
-TEST(Car, GoesAt15MetresPerSecondForFiveMinutesAsCarsDo) {
+TEST(Car, DrivesAt15MetresPerSecondForFiveMinutes) {
   const World road = world_called("road").make(1);
   const Robot car = make_car({}, 1);
   const Trajectory trajectory = drive_about(road, car, seconds{300}, {}, 1);
@@ -64,7 +64,7 @@ TEST(Car, GoesAt15MetresPerSecondForFiveMinutesAsCarsDo) {
   EXPECT_GT(fast, 0.4 * all);
 }
 
-TEST(Handheld, SwaysTurnsFastAndHasAnImuAlone) {
+TEST(Handheld, HasOnlyAnImuAndSwaysAndTurnsFast) {
   const World plant = world_called("urban").make(1);
   const Robot robot = make_handheld({}, 1);
   EXPECT_TRUE(robot.sensors.odometry.empty());

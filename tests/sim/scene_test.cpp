@@ -29,7 +29,7 @@ double marched_range_m(const Scene& scene, const Ray& ray, double max_range_m) {
   return range_m;
 }
 
-TEST(Scene, RayMeetsARectangleWhereItShould) {
+TEST(Scene, RayHitsARectangleAtItsRange) {
   const Scene scene({{Rectangle{{2, -1, -1}, {0, 2, 0}, {0, 0, 2}}, 7}});
   const auto hit = scene.cast({{0, 0, 0}, {1, 0, 0}}, 10);
   ASSERT_TRUE(hit);
@@ -40,7 +40,7 @@ TEST(Scene, RayMeetsARectangleWhereItShould) {
   EXPECT_FALSE(scene.cast({{0, 1.1, 0}, {1, 0, 0}}, 10));
 }
 
-TEST(Scene, BoxIsSeenFromOutsideAndFromInside) {
+TEST(Scene, BoxIsHitFromOutsideAndFromInside) {
   const Scene scene({{Box{{0, 0, 0}, {1, 2, 3}}, 0}});
   EXPECT_DOUBLE_EQ(scene.cast({{-5, 0, 0}, {1, 0, 0}}, 10)->range_m, 4);
   EXPECT_DOUBLE_EQ(scene.cast({{0, 0, 0}, {0, 1, 0}}, 10)->range_m, 2);
@@ -48,7 +48,7 @@ TEST(Scene, BoxIsSeenFromOutsideAndFromInside) {
   EXPECT_DOUBLE_EQ(scene.distance_to_surface({4, 6, 0}), 5);
 }
 
-TEST(Scene, TurnedBoxShowsItsCorner) {
+TEST(Scene, RotatedBoxIsHitAtItsCorner) {
   const double half = std::sqrt(0.5);
   const Scene scene({{Box{{0, 0, 0}, {1, 1, 1}, half, half}, 0}});
   EXPECT_NEAR(scene.cast({{-5, 0, 0}, {1, 0, 0}}, 10)->range_m, 5 - std::sqrt(2.0), 1e-9);
@@ -62,7 +62,7 @@ TEST(Scene, CylinderEndsAtItsHeight) {
   EXPECT_DOUBLE_EQ(scene.distance_to_surface({5, 0, 1}), 1);
 }
 
-TEST(Scene, SurfacesAboutOnePointAreAllKept) {
+TEST(Scene, ConcentricSurfacesAreAllRetained) {
   std::vector<Surface> shells;
   for (int i = 1; i <= 40; ++i)
     shells.push_back({Sphere{{0, 0, 0}, 1.0 * i}, static_cast<std::uint8_t>(i)});
@@ -77,7 +77,7 @@ TEST(Scene, SurfacesAboutOnePointAreAllKept) {
 /// Two independent methods: the tree of boxes with intersection formulae, and marching by distances.
 class ReadyMadeScene : public testing::TestWithParam<std::pair<const char*, Scene>> {};
 
-TEST_P(ReadyMadeScene, RaysEndWhereMarchingByDistanceEnds) {
+TEST_P(ReadyMadeScene, RaysAgreeWithRayMarching) {
   const Scene& scene = GetParam().second;
   std::mt19937_64 random(3);
   for (int i = 0; i < 300; ++i) {
@@ -96,7 +96,7 @@ INSTANTIATE_TEST_SUITE_P(All, ReadyMadeScene,
                                          std::pair{"tunnel", tunnel(40)}, std::pair{"street", street(40)}),
                          [](const auto& test) { return test.param.first; });
 
-TEST(Scene, SameSeedSameStreet) {
+TEST(Scene, SameSeedGivesTheSameStreet) {
   const Scene one = street(100, 5), same = street(100, 5), other = street(100, 6);
   int differences = 0;
   std::mt19937_64 random(1);
@@ -112,7 +112,7 @@ TEST(Scene, SameSeedSameStreet) {
   EXPECT_GT(differences, 0);
 }
 
-TEST(Scene, PlantCourseKeepsAMetreFromEverything) {
+TEST(Scene, PlantCourseStaysAMetreFromEverything) {
   const Scene scene = plant();
   const Trajectory trajectory(plant_course(std::chrono::seconds{150}, 1.0), plant_start());
   EXPECT_GT(to_seconds(trajectory.end() - trajectory.start()), 150);

@@ -88,7 +88,7 @@ World yard_with(const Imperfections& imperfections, const Trajectory& trajectory
   return world;
 }
 
-TEST(People, HideAModeratePartOfTheViewAndInHarshUseAThird) {
+TEST(People, OccludeAModerateShareOfTheViewAndAThirdInHarshWorlds) {
   const Trajectory trajectory = stroll();
   const auto share_at = [&](Realism realism) {
     return share_of_view(yard_with({.people = imperfections_of(realism).people}, trajectory), trajectory);
@@ -113,7 +113,7 @@ TEST(People, HideAModeratePartOfTheViewAndInHarshUseAThird) {
   EXPECT_LT(harsh.largest, 0.45);
 }
 
-TEST(People, KeepClearOfTheRobotStayWithItAndNeverRun) {
+TEST(People, WalkNearTheRobotAndAvoidIt) {
   const Trajectory trajectory = stroll();
   const World world = yard_with({.people = 6}, trajectory);
   ASSERT_EQ(world.scene.passers().size(), 6U);
@@ -136,7 +136,7 @@ TEST(People, KeepClearOfTheRobotStayWithItAndNeverRun) {
   EXPECT_GT(walks_by_standing_robot, 100U); // 5 s of a minute and more, of six people
 }
 
-TEST(People, WaitBesideTheWayOfWhoIsFasterThanTheyAre) {
+TEST(People, WaitBesideThePathOfAFastRobot) {
   const Trajectory trajectory = straight_on(12, 150);
   const World world = yard_with({.people = 6}, trajectory);
   std::vector<double> passed_at_m; // distance along the path
@@ -153,7 +153,7 @@ TEST(People, WaitBesideTheWayOfWhoIsFasterThanTheyAre) {
   EXPECT_GT(passed_at_m.back(), 100); // long after those of the start
 }
 
-TEST(Vehicle, DrivesAlongsideAtTheRobotsSpeedForSoManySecondsOfAMinute) {
+TEST(Vehicle, DrivesAlongsideForTheConfiguredSecondsPerMinute) {
   for (const auto& [speed_mps, length_m] : {std::pair{1.0, 179.0}, std::pair{1.0, 119.0}}) {
     const Trajectory trajectory = straight_on(speed_mps, length_m);
     constexpr double kAsked_s = 12;
@@ -180,7 +180,7 @@ TEST(Vehicle, DrivesAlongsideAtTheRobotsSpeedForSoManySecondsOfAMinute) {
   }
 }
 
-TEST(Vehicle, KeepsOutOfANarrowCorridor) {
+TEST(Vehicle, NeverEntersANarrowCorridor) {
   const Trajectory trajectory(Course{}.change_speed(1, seconds{2}).straight(50), {.position_m = {5, 0}});
   const Way way(trajectory, 0.35, {});
   Dice dice(1);
@@ -200,7 +200,7 @@ int courses_with_vehicle(WorldMaker make_world, const NamedRobot& named) {
   return count;
 }
 
-TEST(Vehicle, FindsRoomOnSomeCoursesOfPlantFieldAndRoadAndOnNoneOfTheCorridor) {
+TEST(Vehicle, FitsOnSomeCoursesOfPlantFieldAndRoadButNotInTheCorridor) {
   const NamedRobot husky{"husky", make_husky}, car{"car", make_car};
   EXPECT_GE(courses_with_vehicle(make_urban, husky), 1);
   EXPECT_GE(courses_with_vehicle(make_field, husky), 1);
@@ -210,7 +210,7 @@ TEST(Vehicle, FindsRoomOnSomeCoursesOfPlantFieldAndRoadAndOnNoneOfTheCorridor) {
 
 const Cloud kCloud{{5, 0, 0}, 1, 1, Start{}.stamp, Start{}.stamp + seconds{4}};
 
-TEST(Steam, LetsThroughWhatItsDepthAndThinnessLeaveAndThrowsTheRestBackFromInside) {
+TEST(Steam, TransmissionFollowsDepthAndDensityAndTheRestIsScattered) {
   Scene scene({{Rectangle{{20, -5, -5}, {0, 10, 0}, {0, 0, 10}}, 60}});
   scene.add(Steam({kCloud}));
   for (const int after_s : {1, 2, 3}) {
@@ -237,7 +237,7 @@ TEST(Steam, LetsThroughWhatItsDepthAndThinnessLeaveAndThrowsTheRestBackFromInsid
   EXPECT_FALSE(scene.cast({{0, 3, 0}, {1, 0, 0}}, 100, kCloud.begin + seconds{1})->apparent); // past the cloud
 }
 
-TEST(Steam, BurstsNearTheWayForSecondsAsOftenAsAsked) {
+TEST(Steam, BurstsLastSecondsAtTheConfiguredRate) {
   const Trajectory trajectory = straight_on(1, 175); // three minutes
   const World world = yard_with({.steam_per_min = 6}, trajectory);
   const auto& clouds = world.scene.steam().clouds();
@@ -259,7 +259,7 @@ Scene hall(double wet, double glass) {
   return scene;
 }
 
-TEST(Mirrors, AsMuchOfTheFloorIsWetAsAskedInPuddles) {
+TEST(Mirrors, ShareOfWetFloorIsAsConfigured) {
   for (const double share : {0.03, 0.2, 0.7}) {
     const Scene scene = hall(share, 0);
     const auto is_wet = [&](double x, double y) { // looking straight down, a wet floor is darker
@@ -277,7 +277,7 @@ TEST(Mirrors, AsMuchOfTheFloorIsWetAsAskedInPuddles) {
   }
 }
 
-TEST(Mirrors, WetFloorShowsTheWallUpsideDownTheMoreTheFlatterTheRay) {
+TEST(Mirrors, WetFloorReflectsTheWallMoreAtGrazingIncidence) {
   const Scene scene = hall(1, 0);
   const auto ghosts = [&](double down_deg) {
     int count = 0;
@@ -301,14 +301,14 @@ TEST(Mirrors, WetFloorShowsTheWallUpsideDownTheMoreTheFlatterTheRay) {
   EXPECT_FALSE(scene.cast({{0, 0, 0.8}, {-std::cos(0.1), 0, -std::sin(0.1)}}, 100)->apparent); // reflects the sky
 }
 
-TEST(Mirrors, FresnelGivesWhatTextbooksHave) {
+TEST(Mirrors, ReflectanceFollowsFresnel) {
   EXPECT_NEAR(mirrored_share(1, 1.33), 0.0201, 1e-4);
   EXPECT_NEAR(mirrored_share(1, 1.52), 0.0426, 1e-4);
   EXPECT_NEAR(mirrored_share(std::cos(80 * kRadPerDeg), 1.33), 0.347, 0.005);
   EXPECT_NEAR(mirrored_share(0, 1.33), 1, 1e-9);
 }
 
-TEST(Mirrors, GlassIsAMirrorWhereAWallStoodAndShowsItselfStraightOn) {
+TEST(Mirrors, GlassReflectsExceptAtNormalIncidence) {
   Scene scene({{Rectangle{{10, -50, 0}, {0, 100, 0}, {0, 0, 8}}, 80},
                {Rectangle{{-10, 12, 0}, {40, 0, 0}, {0, 0, 8}}, 80}}); // a wall, and one across at y = 12
   scene.add(Mirrors(0, 1, 7));
@@ -332,7 +332,7 @@ TEST(Mirrors, GlassIsAMirrorWhereAWallStoodAndShowsItselfStraightOn) {
   EXPECT_TRUE(!wall || wall->reflectivity < 5) << "the wall itself is nearly dark";
 }
 
-TEST(Mirrors, AsManyPanesAreGlassAsAsked) {
+TEST(Mirrors, ShareOfGlassPanesIsAsConfigured) {
   std::vector<Surface> walls;
   for (int i = 0; i < 200; ++i)
     walls.push_back({Rectangle{{4.0 * i, 0, 0}, {4, 0, 0}, {0, 0, 3}}, 80});
@@ -344,7 +344,7 @@ TEST(Mirrors, AsManyPanesAreGlassAsAsked) {
   EXPECT_NEAR(glass, 0.1 * all, 4 * std::sqrt(0.1 * all * 2)); // in pairs: a pane is 2 m wide
 }
 
-TEST(Surroundings, OfACleanWorldAreNone) {
+TEST(Surroundings, AreEmptyInACleanWorld) {
   const Trajectory trajectory = stroll();
   const World clean = yard_with(imperfections_of(Realism::clean), trajectory);
   EXPECT_TRUE(clean.scene.passers().empty());

@@ -107,7 +107,7 @@ INSTANTIATE_TEST_SUITE_P(All, EverySensor,
 /// Full chain: a decoded return, transformed by the lidar's pose at its firing, lies on a surface, up to the resolution
 /// of range (half a step) and azimuth (0.01 degrees) and, for an edge with two echoes, the beam width. A single pose
 /// per column would cause an error of 5 mm; a common origin of an Ouster's beams, 16 mm.
-TEST_P(EverySensor, EveryReturnLiesOnASurfaceFromWhereItWasFired) {
+TEST_P(EverySensor, EveryReturnLiesOnASurfaceAtItsFiringTime) {
   const auto [model, mode] = std::pair{GetParam().model, GetParam().mode};
   const Scene scene = room();
   const Trajectory trajectory = lively_trajectory();
@@ -141,7 +141,7 @@ TEST_P(EverySensor, EveryReturnLiesOnASurfaceFromWhereItWasFired) {
   EXPECT_GE(static_cast<double>(returns), 0.99 * static_cast<double>(firings)); // the room is closed
 }
 
-TEST_P(EverySensor, SendsAsManyPacketsPerSecondAsItsManualSays) {
+TEST_P(EverySensor, PacketRateIsThatOfTheManual) {
   const Sensor& sensor = GetParam();
   const Scene nothing({});
   const Trajectory trajectory(Course{}.stand(seconds{1}));
@@ -152,7 +152,7 @@ TEST_P(EverySensor, SendsAsManyPacketsPerSecondAsItsManualSays) {
   EXPECT_NEAR(packets, sensor.packets_per_s, 1);
 }
 
-TEST(SyntheticLidar, PacketSaysItsTimeModeAndModel) {
+TEST(SyntheticLidar, PacketHoldsTimeModeAndModel) {
   const Scene scene = room();
   const Trajectory trajectory(Course{}.stand(seconds{1}),
                               {.stamp = stamp_from_ns(3600'000'000'000 * 7 + 1'234'567'999)});
@@ -165,7 +165,7 @@ TEST(SyntheticLidar, PacketSaysItsTimeModeAndModel) {
   EXPECT_EQ(datagram.destination_port, 2368);
 }
 
-TEST(SyntheticLidar, TimeStartsAnewWithTheHour) {
+TEST(SyntheticLidar, TimeWrapsAtTheHour) {
   const Scene scene = room();
   const Trajectory trajectory(Course{}.stand(seconds{1}), {.stamp = stamp_from_ns(3600'000'000'000 * 7 - 1'000'000)});
   SyntheticLidar lidar(scene, trajectory, {});
@@ -193,7 +193,7 @@ TEST(SyntheticLidar, SameSeedSameBytes) {
   EXPECT_NE(bytes, bytes_of({scene, trajectory, options}, 200));
 }
 
-TEST(SyntheticLidar, NoiseAndDropoutsAreAsLargeAsAskedFor) {
+TEST(SyntheticLidar, NoiseAndDropoutsAreAsConfigured) {
   const Scene scene = room();
   const Trajectory trajectory(Course{}.stand(seconds{1}), {}, {});
   const Pose T_base_lidar{Eigen::Quaterniond::Identity(), {0, 0, 1}};
@@ -214,7 +214,7 @@ TEST(SyntheticLidar, NoiseAndDropoutsAreAsLargeAsAskedFor) {
   EXPECT_NEAR(lost / (lost + kept), 0.1, 0.005);
 }
 
-TEST(SyntheticLidar, DustThrowsBackTheShareOfPulsesAskedForAndDualModeSeesThroughIt) {
+TEST(SyntheticLidar, DustReturnsTheConfiguredShareAndDualModeSeesThroughIt) {
   const Scene wall({{Rectangle{{20, -200, -200}, {0, 400, 0}, {0, 0, 400}}}});
   const Trajectory trajectory(Course{}.stand(seconds{1}));
   SyntheticLidar lidar(wall, trajectory, {.return_mode = ReturnMode::dual, .dust = 0.2});
@@ -233,7 +233,7 @@ TEST(SyntheticLidar, DustThrowsBackTheShareOfPulsesAskedForAndDualModeSeesThroug
   EXPECT_NEAR(dusty / all, 0.2, 0.03);
 }
 
-TEST(SyntheticLidar, EchoesFadeWithDistanceSlantAndDarkness) {
+TEST(SyntheticLidar, DarkSurfacesFadeWithDistance) {
   const Trajectory trajectory(Course{}.stand(seconds{1}));
   const auto seen_of = [&](double x_m, std::uint8_t reflectivity) { // a wall ahead
     const Scene wall({{Rectangle{{x_m, -200, -200}, {0, 400, 0}, {0, 0, 400}}, reflectivity}});
@@ -250,7 +250,7 @@ TEST(SyntheticLidar, EchoesFadeWithDistanceSlantAndDarkness) {
   EXPECT_EQ(seen_of(80, 10), 0);
 }
 
-TEST(SyntheticLidar, NothingIsSeenBeyondItsReach) {
+TEST(SyntheticLidar, NothingIsReturnedBeyondTheMaximumRange) {
   const Scene scene = room();
   const Trajectory trajectory(Course{}.stand(seconds{1}));
   SyntheticLidar lidar(scene, trajectory,
@@ -268,7 +268,7 @@ TEST(SyntheticLidar, NothingIsSeenBeyondItsReach) {
   EXPECT_GT(unseen, 100U);
 }
 
-TEST(SyntheticLidar, EdgesGiveTwoEchoesInDualReturnMode) {
+TEST(SyntheticLidar, EdgesHaveTwoEchoesInDualReturnMode) {
   const Scene scene = street(50);
   const Trajectory trajectory(Course{}.stand(seconds{1}));
   SyntheticLidar lidar(
@@ -288,7 +288,7 @@ TEST(SyntheticLidar, EdgesGiveTwoEchoesInDualReturnMode) {
   EXPECT_GT(pairs, 20);
 }
 
-TEST(SyntheticLidar, EverySixthPacketIsAPositionPacketWhenAskedFor) {
+TEST(SyntheticLidar, EverySixthPacketIsAPositionPacketIfEnabled) {
   const Scene scene = room();
   const Trajectory trajectory(Course{}.stand(seconds{1})); // 2023-11-14 22:13:20
   SyntheticLidar lidar(scene, trajectory, {.clock_offset = seconds{2}, .sends_position_packets = true});

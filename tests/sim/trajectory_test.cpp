@@ -48,7 +48,7 @@ void expect_exact_derivatives(const Trajectory& trajectory) {
 
 TEST(Trajectory, DerivativesAreThoseOfThePose) { expect_exact_derivatives(Trajectory(winding(), {}, kRough)); }
 
-TEST(Trajectory, DerivativesAreThoseOfThePoseWithHillsGaitAndSlip) {
+TEST(Trajectory, DerivativesAreThoseOfThePoseOnHillsWithGaitAndSlip) {
   Ride legged;
   legged.ground_m = [](const Jet& x, const Jet& y) { return 0.4 * sin(0.5 * x) + 0.3 * cos(0.7 * y); };
   legged.oscillations = {{2.0, {0.01, 0.02, 0.03}, {0.03, 0.02, 0.01}, 0.5}, {5.0, {0, 0, 0.001}, {0, 0.005, 0}, 1}};
@@ -56,7 +56,7 @@ TEST(Trajectory, DerivativesAreThoseOfThePoseWithHillsGaitAndSlip) {
   expect_exact_derivatives(Trajectory(winding(), {}, kRough, legged));
 }
 
-TEST(Trajectory, AccelerationHasNoJumps) {
+TEST(Trajectory, AccelerationIsContinuous) {
   const Trajectory trajectory(winding(), {}, kRough);
   BaseMotion before = trajectory.at(trajectory.start());
   for (Stamp t = trajectory.start(); t < trajectory.end() + milliseconds{100}; t += milliseconds{1}) {
@@ -83,7 +83,7 @@ TEST(Trajectory, StandsStillBeforeAndAfterOnRoughGround) {
   EXPECT_LT((end.translation - trajectory.T_world_base(trajectory.end() + seconds{5}).translation).norm(), 1e-9);
 }
 
-TEST(Trajectory, FifteenMetresPerSecondForAThousandSeconds) {
+TEST(Trajectory, SpeedOfFifteenMetresPerSecondLastsAThousandSeconds) {
   const Trajectory trajectory(Course{}.change_speed(15, Duration::zero()).straight(15'000));
   const Pose far = trajectory.T_world_base(trajectory.start() + seconds{700});
   EXPECT_NEAR(far.translation.x(), 10'500, 1e-6);
@@ -98,7 +98,7 @@ TEST(Trajectory, CourseAlongWaypointsEndsAtTheLastOne) {
   EXPECT_LT((end.translation.head<2>() - waypoints.back()).norm(), 1e-6);
 }
 
-TEST(Trajectory, CourseThereAndBackEndsAsItBeganByTheSameWay) {
+TEST(Trajectory, CourseThereAndBackReturnsAlongTheSamePath) {
   const Course out = winding();
   const Duration there = Trajectory(out).end() - Trajectory(out).start();
   const Trajectory trajectory(Course(out).back(2.0), {.position_m = {3, 4}, .heading_rad = 1});
@@ -114,7 +114,7 @@ TEST(Trajectory, CourseThereAndBackEndsAsItBeganByTheSameWay) {
   }
 }
 
-TEST(Trajectory, LegTooShortForItsTurnsIsRefused) {
+TEST(Trajectory, LegTooShortForItsTurnsIsAnError) {
   EXPECT_THROW(Course::along({{0, 0}, {10, 0}, {10, 1}, {0, 1}}, {.speed_mps = 2, .turn_rate_radps = 0.5}),
                std::invalid_argument);
 }
@@ -143,7 +143,7 @@ TEST(SyntheticImu, SpecificForceIntegratesToTheTrueVelocity) {
   }
 }
 
-TEST(SyntheticOdometry, WithoutFaultsItIsTheTruthFromItsOwnStart) {
+TEST(SyntheticOdometry, WithoutFaultsEqualsTheTruthRelativeToItsStart) {
   const Trajectory trajectory(winding(), {.position_m = {3, 4}, .heading_rad = 1}, kRough);
   const Pose T_source_world = trajectory.T_world_base(trajectory.start()).inverse();
   SyntheticOdometry odometry(trajectory, 50);
@@ -154,7 +154,7 @@ TEST(SyntheticOdometry, WithoutFaultsItIsTheTruthFromItsOwnStart) {
   }
 }
 
-TEST(SyntheticOdometry, SlipShowsAsTooManyMetres) {
+TEST(SyntheticOdometry, ScaleErrorLengthensTheDistance) {
   const Trajectory trajectory(Course{}.change_speed(1, Duration::zero()).straight(10));
   SyntheticOdometry odometry(trajectory, 50, {.scale_error = 0.1});
   OdometrySample last = odometry.next();

@@ -72,7 +72,7 @@ TEST_P(EveryWorld, WithoutNoiseEveryReturnLiesOnASurface) {
   EXPECT_GT(returns, 10'000U);
 }
 
-TEST_P(EveryWorld, RobotKeepsClearOfWhatStandsAround) {
+TEST_P(EveryWorld, RobotDoesNotCollide) {
   for (const std::uint64_t seed : {1U, 2U}) {
     const Drive drive = Drive::through(GetParam(), kRobots[0], seconds{900}, seed);
     for (Stamp t = drive.trajectory.start(); t < drive.trajectory.end(); t += milliseconds{700}) {
@@ -82,7 +82,7 @@ TEST_P(EveryWorld, RobotKeepsClearOfWhatStandsAround) {
   }
 }
 
-TEST_P(EveryWorld, CourseOfAnHourStartsAndEndsAtRestAndIsOneThatARobotCanDrive) {
+TEST_P(EveryWorld, CourseOfAnHourIsDrivableAndStartsAndEndsAtRest) {
   const Drive drive = Drive::through(GetParam(), kRobots[0], std::chrono::hours{1}, 5);
   const Agility& agility = drive.robot.agility;
   const Trajectory& trajectory = drive.trajectory;
@@ -99,14 +99,14 @@ TEST_P(EveryWorld, CourseOfAnHourStartsAndEndsAtRestAndIsOneThatARobotCanDrive) 
   }
 }
 
-TEST(Course, OfAnotherSeedGoesElsewhere) {
+TEST(Course, DependsOnTheSeed) {
   const Drive one = Drive::through(kWorlds[0], kRobots[0], seconds{120}, 1);
   const Drive other = Drive::through(kWorlds[0], kRobots[0], seconds{120}, 2);
   const Eigen::Vector3d a = one.trajectory.T_world_base(one.trajectory.end()).translation;
   EXPECT_GT((a - other.trajectory.T_world_base(other.trajectory.end()).translation).norm(), 1);
 }
 
-TEST(Imu, GyroIntegratesToTheTruthOnALeggedRobot) {
+TEST(Imu, GyroIntegratesToTheTrueRotationOnALeggedRobot) {
   const Drive drive = Drive::through(kWorlds[0], kRobots[1], seconds{30}, 4);
   SyntheticImu imu(drive.trajectory, 2000);
   ImuSample last = imu.next();
@@ -121,7 +121,7 @@ TEST(Imu, GyroIntegratesToTheTruthOnALeggedRobot) {
 }
 
 /// Double integration, away from the origin of the base, reproduces the position over ten seconds of driving.
-TEST(Imu, AccelerometerIntegratesToTheTruthWhereItIsMounted) {
+TEST(Imu, SpecificForceIntegratesToTheTrueVelocityAtTheMounting) {
   const Drive drive = Drive::through(kWorlds[0], kRobots[0], seconds{30}, 4);
   const Pose T_base_imu{from_rpy_rad({0.1, -0.2, 2.0}), {0.2, -0.3, 0.4}};
   SyntheticImu imu(drive.trajectory, 4000, {}, 1, T_base_imu);
@@ -140,7 +140,7 @@ TEST(Imu, AccelerometerIntegratesToTheTruthWhereItIsMounted) {
   EXPECT_LT((position - T_world_imu(drive.trajectory.start() + seconds{12}).translation).norm(), 2e-3);
 }
 
-TEST(Wheels, ErrorIsAPercentOrTwoOfTheWay) {
+TEST(Wheels, ErrorIsOneToTwoPercentOfTheDistance) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const Drive drive = Drive::through(kWorlds[0], kRobots[0], seconds{300}, seed);
     const OdometryFaults faults = make_husky({}, seed).sensors.odometry.front().faults;
@@ -156,7 +156,7 @@ TEST(Wheels, ErrorIsAPercentOrTwoOfTheWay) {
   }
 }
 
-TEST(Wheels, SpinWhileTheRobotStandsInASlip) {
+TEST(Wheels, ReportMotionInASlipWhileTheRobotStands) {
   const Trajectory trajectory(Course{}.change_speed(1, seconds{1}).straight(20), {}, {},
                               {.slips = {{seconds{5}, seconds{9}}}});
   SyntheticOdometry wheels(trajectory, 50, {.spinning_mps = 1});

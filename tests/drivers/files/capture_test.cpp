@@ -131,7 +131,7 @@ TEST(Capture, IpOptionsAndEthernetPaddingAreNotPayload) {
   EXPECT_EQ(payload_in(DLT_EN10MB, ethernet(ipv4_udp({}, payload, options))), payload);
 }
 
-TEST(Capture, WhatIsNotAnIpv4UdpDatagramIsCountedByKind) {
+TEST(Capture, FramesWithoutIpv4UdpAreCountedByKind) {
   Bytes ipv6(60);
   ipv6[0] = std::byte{0x60};
   Bytes tcp = ipv4_udp({}, payload_of(20));

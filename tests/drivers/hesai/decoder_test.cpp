@@ -77,7 +77,7 @@ TEST_P(HesaiModel, EachReturnHasDirectionAndTimeOfItsOwnFiring) {
   }
 }
 
-TEST_P(HesaiModel, ColumnsFollowEachOtherAsTheirDurationSays) {
+TEST_P(HesaiModel, ColumnsAreSpacedByTheirDuration) {
   const ModelSpec& its = spec(GetParam());
   for (const std::uint8_t mode : {kStrongest, kDual}) {
     const HesaiTestPacket bytes{GetParam(), mode};

@@ -255,7 +255,7 @@ TEST(OusterDecoder, RotationRateFollowsItsColumns) {
   EXPECT_NEAR(decoder.rotation_rate_rpm(), 600.0, 0.1) << "a single column tells none";
 }
 
-TEST(OusterDecoder, RefusesEveryOtherLength) {
+TEST(OusterDecoder, RejectsEveryOtherLength) {
   const Metadata metadata = ouster_metadata();
   const std::vector<std::byte> bytes(40'000);
   Decoder decoder{metadata};
@@ -266,7 +266,7 @@ TEST(OusterDecoder, RefusesEveryOtherLength) {
     }
 }
 
-TEST(OusterDecoder, RefusesWhatIsAbsurd) {
+TEST(OusterDecoder, RejectsAbsurdPackets) {
   const Metadata metadata = ouster_metadata();
   const auto error_of = [&](const std::function<void(OusterTestPacket&)>& change) {
     OusterTestPacket bytes{metadata};

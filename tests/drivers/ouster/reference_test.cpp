@@ -165,7 +165,7 @@ TEST(OusterReference, MetadataOfEveryFirmwareIsRead) {
   EXPECT_EQ(read, 26);
 }
 
-TEST(OusterReference, MalformedMetadataIsRefusedWithItsKey) {
+TEST(OusterReference, MalformedMetadataIsReportedWithItsKey) {
   SKIP_WITHOUT(ouster_data("metadata"));
   const std::vector<std::pair<std::string, std::string>> reasons{
       {"complete_but_all_zeros_legacy", "beam_altitude_angles: holds nothing but zeros"},
