@@ -7,8 +7,8 @@ CAPTURES = {
     "mine": "mine, VLP-16 at 10 Hz, 1 m/s",
     "halls": "halls, VLP-16 at 10 Hz, 1 m/s",
     "hdl32e_moving_15mps": "real: HDL-32E at 12 Hz, car at 15 m/s, six sweeps with the start in motion",
-    "hdl32e_static_monterey": "real: HDL-32E at 12 Hz, car at a stand, pulling away",
-    "vlp16_static_1200rpm_product21": "real: VLP-16 at 20 Hz, at a stand",
+    "hdl32e_static_monterey": "real: HDL-32E at 12 Hz, car at standstill, pulling away",
+    "vlp16_static_1200rpm_product21": "real: VLP-16 at 20 Hz, at standstill",
 }
 
 

@@ -60,7 +60,7 @@ def stages(f):
         stage_row(f, name, "scan_to_submap", "wheels_gyro", one_pass * f.counter(aided, "scan_to_submap_iterations")),
         stage_row(f, name, "map", "wheels_gyro", points * f.counter(aided, "keyframes")),
     ]
-    return table(["stage, plant", "locus", "its floor", "times the floor", "PCL", "ratio"], rows)
+    return table(["stage, plant", "locus", "its floor", "relative to the floor", "PCL", "ratio"], rows)
 
 
 def floors(f):
@@ -78,7 +78,7 @@ def decoder(f):
             ns, copy = (1e9 * f.counter(f"{what}/{model}/{mode}", "s_per_return") for what in ("decode", "memcpy"))
             row += [f"{ns:.1f} ns", f"{copy:.2f} ns", f"{f.counter(f'decode/{model}/{mode}', 'lidars_per_core'):.0f}"]
         rows.append(row)
-    return table(["model", "a return, strongest", "copying its bytes", "lidars per core", "a return, dual", "copying its bytes",
+    return table(["model", "per return, strongest", "memcpy of its bytes", "lidars per core", "per return, dual", "memcpy of its bytes",
                   "lidars per core"], rows)
 
 
@@ -90,7 +90,7 @@ def lidars(f):
             cost = f.cpu_ms(f"lidars/{name}/{prior}")
             row += [ms(cost), times(cost / f.cpu_ms(f"lidars/vlp16_1/{prior}"))]
         rows.append(row + [f"{f.counter(f'lidars/{name}/wheels_gyro', 'memory_mb'):.0f} MB"])
-    return table(["lidars", "returns", "lidar alone", "times one", "with wheels and gyro", "times one", "memory"], rows)
+    return table(["lidars", "returns", "lidar alone", "relative to one", "with wheels and gyro", "relative to one", "memory"], rows)
 
 
 def points(f):
@@ -100,14 +100,14 @@ def points(f):
             alone, aided = f"points/{rest[0]}/lidar", f"points/{rest[0]}/wheels_gyro"
             rows.append([f"{f.counter(aided, 'points'):.0f}", ms(f.cpu_ms(alone)), ms(f.cpu_ms(aided)),
                          ms(f.counter(aided, "after_cut_ms")), f"{f.counter(aided, 'memory_mb'):.0f} MB"])
-    return table(["points registered", "lidar alone", "with wheels and gyro", "of it after the cut", "memory"], rows)
+    return table(["points registered", "lidar alone", "with wheels and gyro", "of that after the cut", "memory"], rows)
 
 
 def maps(f):
     rows = [[f"{f.counter(run, 'map_points') / 1e3:.0f} k", f"{rest[0]} MB", f"{f.counter(run, 'voxels') / 1e3:.0f} k",
              ms(f.cpu_ms(run)), ms(f.counter(run, "insert_ms"))]
             for rest in f.named("map") for run in ["/".join(["map", *rest])]]
-    return table(["points taken in", "`map.max_bytes`", "voxels", "registering a sweep", "taking it in"], rows)
+    return table(["points inserted", "`map.max_bytes`", "voxels", "registering a sweep", "inserting it"], rows)
 
 
 def speed_up(f, what, threads):
@@ -121,7 +121,7 @@ THREADED = {"threads_spin/0": "the machine: a loop without memory", "threads_reg
 def threads(f):
     rows = [[words, ms(f.wall_ms(f"{what}/1"))] + [times(speed_up(f, what, n)) for n in (2, 3, 4)]
             for what, words in THREADED.items()]
-    return table(["work", "one thread, wall clock", "2 threads, times as fast", "3", "4"], rows)
+    return table(["work", "one thread, wall clock", "speedup with 2 threads", "3", "4"], rows)
 
 
 def ratio(summary):
@@ -135,8 +135,8 @@ def drives(f):
         cost, p50 = 1e3 * s["cpu_s"] / s["sweeps"]["seen"], s["process_cpu_ms"]["p50"]
         rows.append([f"{d['world']}, {d['lidars']} VLP-16", ms(cost), ms(p50), ms(s["process_cpu_ms"]["p99"]), times(ratio(s)),
                      f"{100 * p50 / cost:.0f} %", f"{s['peak_rss_mb']:.0f} MB"])
-    return table(["drive", "CPU of a sweep", "from the cut, median", "99 of 100 within", "times the median",
-                  "median after the cut", "peak memory"], rows)
+    return table(["drive", "CPU per sweep", "from the cut, median", "99th percentile", "relative to the median",
+                  "median, share of the CPU", "peak memory"], rows)
 
 
 def goals(f):
@@ -160,7 +160,7 @@ def goals(f):
         two = speed_up(f, what, 2)
         rows.append(row(f"two threads 1.5 times as fast: {THREADED[what]}", two, two >= 1.5,
                         "{:.2f}; the machine gives " + times(speed_up(f, "threads_spin/0", 2))))
-    rows.append(row("99 of 100 sweeps within twice the median, from the cut", p99[0], p99[0] <= 2, "{:.1f} (" + p99[1] + ")"))
+    rows.append(row("99 % of the sweeps within twice the median, from the cut", p99[0], p99[0] <= 2, "{:.1f} (" + p99[1] + ")"))
     for prior, words in PRIORS.items():
         share = 100 * after_cut(f"pipeline/plant/{prior}")
         rows.append(row(f"at most 60 % of the work after the cut, plant, {words}", share, share <= 60, "{:.0f} %"))
@@ -178,8 +178,8 @@ def hours(f):
     first, begin, end = f.long_drive[:len(last)], f.long_drive[-len(last) - 1], f.long_drive[-1]
     part = f"minutes {begin['minute']:.0f} to {end['minute']:.0f}"
     rows = [row(f"minutes 0 to {first[-1]['minute']:.0f}", first, "whole", held(first[-1])),
-            row(part, last, "whole", held(end)), row(f"{part}, begun there with an empty map", last, "fresh", ["", "", ""])]
-    return table(["", "from the cut, median", "worst minute, 99 of 100 within", "driven", "memory held", "voxels"], rows)
+            row(part, last, "whole", held(end)), row(f"{part}, started there with an empty map", last, "fresh", ["", "", ""])]
+    return table(["", "from the cut, median", "99th percentile of the worst minute", "driven", "memory held", "voxels"], rows)
 
 
 def simulator(f):
@@ -191,8 +191,8 @@ def draw_points(f):
     def line(prior, figure):
         return f.line("points", lambda rest: int(rest[0]) if rest[1] == prior else None, figure)
     return curves.chart({"lidar alone": line("lidar", f.cpu_ms), "with wheels and gyro": line("wheels_gyro", f.cpu_ms),
-                         "of it after the cut": line("wheels_gyro", lambda run: f.counter(run, "after_cut_ms"))},
-                        "points of a sweep that are registered, of a VLS-128's", "CPU of a sweep, ms", log_x=True, log_y=True)
+                         "of that after the cut": line("wheels_gyro", lambda run: f.counter(run, "after_cut_ms"))},
+                        "registered points per sweep of a VLS-128", "CPU per sweep, ms", log_x=True, log_y=True)
 
 
 def draw_lidars(f):
@@ -201,8 +201,8 @@ def draw_lidars(f):
                       f.cpu_ms)
     one = line("wheels_gyro")[0][1]
     return curves.chart({"lidar alone": line("lidar"), "with wheels and gyro": line("wheels_gyro"),
-                         "goal: 0.6 of one for each more": [(n, one * (1 + 0.6 * (n - 1))) for n in (1, 2, 3)]},
-                        "VLP-16 on the robot", "CPU of a sweep, ms")
+                         "goal: 0.6 of one for each further one": [(n, one * (1 + 0.6 * (n - 1))) for n in (1, 2, 3)]},
+                        "VLP-16 on the robot", "CPU per sweep, ms")
 
 
 def draw_maps(f):
@@ -210,21 +210,21 @@ def draw_maps(f):
         return f.line("map", lambda rest: int(rest[1]) if rest[0] == size else None, figure)
     sizes = dict.fromkeys(rest[0] for rest in f.named("map"))
     series = {f"registering, {size} MB": line(size, f.cpu_ms) for size in sizes}
-    series |= {f"taking in, {size} MB": line(size, lambda run: f.counter(run, "insert_ms")) for size in sizes}
-    return curves.chart(series, "points that the map has taken in", "CPU of a sweep, ms", log_x=True)
+    series |= {f"inserting, {size} MB": line(size, lambda run: f.counter(run, "insert_ms")) for size in sizes}
+    return curves.chart(series, "points inserted into the map", "CPU per sweep, ms", log_x=True)
 
 
 def draw_threads(f):
     series = {words: [(n, speed_up(f, what, n)) for n in (1, 2, 3, 4)] for what, words in THREADED.items()}
-    return curves.chart(series, "threads", "times as fast as one")
+    return curves.chart(series, "threads", "speedup")
 
 
 def draw_hours(f):
     def line(who, key):
         return [(line["minute"], line[who][key]) for line in f.long_drive if line[who]]
-    return curves.chart({"median of the minute": line("whole", "p50_ms"), "99 of 100 within": line("whole", "p99_ms"),
-                         "median, begun there with an empty map": line("fresh", "p50_ms")}, "minutes of driving",
-                        "CPU of a sweep from its cut, ms")
+    return curves.chart({"median of the minute": line("whole", "p50_ms"), "99th percentile": line("whole", "p99_ms"),
+                         "median, started there with an empty map": line("fresh", "p50_ms")}, "minutes of driving",
+                        "CPU per sweep from its cut, ms")
 
 
 def draw_memory(f):
