@@ -68,20 +68,20 @@ TEST(AccuracyPage, ShowsEachRecording) {
   EXPECT_EQ(robot["runs"][2]["sources"], json::array());
   for (const json& of_robot : robot["runs"]) {
     EXPECT_NEAR(of_robot["way"]["way_m"].get<double>(), length_m(read_tum(room_drive() / "gt.tum")), 0.3)
-        << "but for the first sweep, and what comes after the last";
+        << "except before the first sweep and after the last";
     EXPECT_LT(of_robot["summary"]["ape_m"]["max"].get<double>(), 0.1);
     for (const auto& [name, source] : of_robot["summary"]["sources"].items())
       EXPECT_EQ(source["used_sweeps"] > 0, std::ranges::count(of_robot["sources"], json(name)) > 0) << name;
   }
 
-  ASSERT_EQ(kitti["runs"].size(), 2U) << "an IMU is all it has beside lidar";
+  ASSERT_EQ(kitti["runs"].size(), 2U) << "it has only an IMU and lidar";
   EXPECT_EQ(kitti["runs"][0]["sources"], json{"imu"});
   for (const json& of_kitti : kitti["runs"]) {
     EXPECT_EQ(of_kitti["summary"]["kitti_vertical_angle_added_deg"], 0.205);
-    EXPECT_GT(of_kitti["way"]["way_m"], 0.8) << "measured by its inertial unit";
+    EXPECT_GT(of_kitti["way"]["way_m"], 0.8) << "compared with its inertial unit";
   }
 
-  ASSERT_EQ(standing["runs"].size(), 1U) << "lidar is all it has";
+  ASSERT_EQ(standing["runs"].size(), 1U) << "it has only lidar";
   EXPECT_LT(standing["runs"][0]["claims"]["farthest_m"].get<double>(), 0.02);
   EXPECT_EQ(standing["receiver"]["max_mps"], 0.0);
 
@@ -132,7 +132,7 @@ TEST(AccuracyFigures, ClaimsAreRelativeToTheFirstPose) {
   const auto claims = experiments::claims_of(trajectory);
   EXPECT_NEAR(claims["farthest_m"].get<double>(), 5, 1e-9);
   EXPECT_NEAR(claims["farthest_at_first_m"].get<double>(), 2, 1e-9) << "after 0.4 s";
-  EXPECT_NEAR(claims["most_turned_deg"].get<double>(), 0, 1e-6) << "its first heading is no turn";
+  EXPECT_NEAR(claims["most_turned_deg"].get<double>(), 0, 1e-6) << "the initial heading is no turn";
   EXPECT_NEAR(claims["speed_mps"]["median"].get<double>(), 5, 1e-9);
   EXPECT_TRUE(experiments::claims_of({trajectory.front()})["speed_mps"].is_null());
   EXPECT_TRUE(experiments::claims_of({})["speed_mps"].is_null());

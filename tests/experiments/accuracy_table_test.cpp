@@ -67,10 +67,10 @@ TEST(AccuracyTable, OverconfidenceAndLostSweepsDoNotHold) {
   result["summary"]["covariance"]["worst_sigma"] = 3.1;
   result["summary"]["sweeps"]["failed"] = 2;
   result["summary"]["sweeps"]["dropped"] = 1;
-  EXPECT_EQ(what_does_not_hold(result), (std::vector<std::string>{"farther off than it says", "3 sweeps failed"}));
-  EXPECT_TRUE(has(page_of(result), "**no**: farther off than it says; 3 sweeps failed |"));
+  EXPECT_EQ(what_does_not_hold(result), (std::vector<std::string>{"error beyond 3 sigma", "3 sweeps failed"}));
+  EXPECT_TRUE(has(page_of(result), "**no**: error beyond 3 sigma; 3 sweeps failed |"));
   result["summary"]["sweeps"]["failed"] = 0;
-  EXPECT_TRUE(has(page_of(result), "**no**: farther off than it says; 1 sweep failed |"));
+  EXPECT_TRUE(has(page_of(result), "**no**: error beyond 3 sigma; 1 sweep failed |"));
 }
 
 TEST(AccuracyTable, TruthIsShownIfKnown) {
@@ -78,7 +78,7 @@ TEST(AccuracyTable, TruthIsShownIfKnown) {
   EXPECT_TRUE(has(page, "| a/b | wio, imu | 100 | 0.100 | 0.200 | 0.300 | 0.700 | 0.900 | 0.900 | 2.00 | 1000, 0 | "
                         "tracking 990, degenerate 10 | 0.5, 2.0 | 0.5, 2.0 | yes |"))
       << page;
-  EXPECT_FALSE(has(page, "Where it is not")) << "no empty parts";
+  EXPECT_FALSE(has(page, "Without truth")) << "no empty sections";
   EXPECT_FALSE(has(page, "KITTI's drives"));
 }
 
@@ -89,7 +89,7 @@ TEST(AccuracyTable, SpeedIsShownWithThatOfTheReceiver) {
   const std::string page = page_of(result, {{"fixes", 1}, {"min_mps", 1.04}, {"median_mps", 1.04}, {"max_mps", 1.04}});
   EXPECT_TRUE(has(page, "| a/b, HDL-32E | wio, imu | 100.0 | 0.010, 70.0 | 90.0 | 1.00, 1.50 | 1.0 to 1.0, 1 fix |"))
       << page;
-  EXPECT_FALSE(has(page, "Where the truth is known"));
+  EXPECT_FALSE(has(page, "With truth"));
 }
 
 TEST(AccuracyTable, SinglePoseHasNoSpeed) {
@@ -107,11 +107,10 @@ TEST(AccuracyTable, KittiIsShownWithPublishedResults) {
 }
 
 TEST(AccuracyTable, FailedRunIsARowWithTheReason) {
-  const std::string page = page_of({{"sources", Results::array()}, {"failed", "no whole turn"}});
-  EXPECT_TRUE(has(page, "| a/b | no whole turn |")) << page;
-  EXPECT_TRUE(
-      has(page, "`locus-experiments --accuracy data`, version 1, a machine. Recordings found: 1; a recording does not "
-                "show whether it is of a robot or of a simulator."));
+  const std::string page = page_of({{"sources", Results::array()}, {"failed", "no whole revolution"}});
+  EXPECT_TRUE(has(page, "| a/b | no whole revolution |")) << page;
+  EXPECT_TRUE(has(page, "`locus-experiments --accuracy data`, version 1, a machine. Recordings found: 1, of robots "
+                        "or simulators, which the data do not distinguish."));
 }
 
 TEST(AccuracyTable, WarningIsListedOncePerRecording) {

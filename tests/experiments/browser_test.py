@@ -66,7 +66,7 @@ class Page(unittest.TestCase):
             self.assertGreater(len(line.get_attribute("d")), 1000)
         self.assertEqual(browser.complaints(), [])
 
-    def test_every_part_is_drawn_with_our_figures_beside_the_papers(self):
+    def test_every_part_is_drawn_with_our_figures_and_the_papers(self):
         with self.page(paper_runs()) as browser:
             self.expect_whole(browser)
             self.assertIn("These courses are simulated", browser.one("#simulated").text)
@@ -75,13 +75,13 @@ class Page(unittest.TestCase):
             self.assertFalse(browser.one("#failed").is_displayed())
             accuracy = self.rows(browser, "accuracy")
             self.assertIn("paper: LOCUS 1.69 0.620 0.570 0.290 –", accuracy)
-            self.assertIn("locusd as it ships 0.0400 0.0100 0.0100 0.0200 0.100", accuracy)
+            self.assertIn("locusd with default settings 0.0400 0.0100 0.0100 0.0200 0.100", accuracy)
             self.assertIn("on one core 1.50 2.50 3.50 4.50 0.500 0.200", self.rows(browser, "pace"))
             self.assertIn("locusd, Beta 0.0400 m" + 3 * " OK, 0.0400 m",
                           self.rows(browser, "robustness"))
             browser.keep_picture("experiments")
 
-    def test_fits_a_phone_in_the_dark(self):
+    def test_fits_a_phone_in_dark_mode(self):
         with self.page(paper_runs(), width=360, dark=True) as browser:
             self.expect_whole(browser)
             self.assertLessEqual(browser.run("return document.documentElement.scrollWidth"), 360)
@@ -92,7 +92,7 @@ class Page(unittest.TestCase):
             browser.set_size(360)
             browser.keep_picture("experiments-phone")
 
-    def test_what_was_not_run_is_told(self):
+    def test_missing_runs_are_noted(self):
         with self.page([run("alpha", "paper_fga"), run("alpha", "mdc_off"), run("beta", "pace_1cpu")]) as browser:
             self.assertEqual(browser.drawn(), PARTS - {"robustness"})
             self.assertFalse(browser.one("#robustness").is_displayed())
@@ -101,7 +101,7 @@ class Page(unittest.TestCase):
             self.assertIn("on two cores not run", self.rows(browser, "pace"))
             self.assertEqual(browser.complaints(), [])
 
-    def test_failed_runs_are_named_and_no_name_breaks_out_of_the_page(self):
+    def test_failed_runs_are_named_and_names_are_escaped(self):
         hostile = "</script><script>window.broken_out = 1</script>"
         runs = [run(hostile, "locusd"), {"course": hostile, "configuration": "paper", "failed": hostile}]
         with self.page(runs, simulated=False) as browser:

@@ -74,10 +74,10 @@ TEST(FaultTable, SourceMustBeLostAndReturn) {
   const auto row = [](int changes) {
     return row_of({run("urban_1", "none", 0.1), wio_frozen(0.1, changes)}, "urban", "wio_frozen");
   };
-  EXPECT_EQ(row(0)["broken"][0], "wio is not found out on every seed");
-  EXPECT_EQ(row(1)["broken"][0], "wio is not taken back on every seed");
+  EXPECT_EQ(row(0)["broken"][0], "wio is not detected on every seed");
+  EXPECT_EQ(row(1)["broken"][0], "wio is not used again on every seed");
   EXPECT_TRUE(row(2)["holds"]);
-  EXPECT_EQ(row(4)["health"][0], "wio lost, back, up to 2 x");
+  EXPECT_EQ(row(4)["health"][0], "wio lost, used again, up to 2 x");
 }
 
 TEST(FaultTable, LostAndFailedSweepsBreakARowUnlessLidarIsAbsent) {
@@ -116,7 +116,7 @@ TEST(FaultTable, CorridorIsJudgedByWheelsAndSigmaGrowth) {
   Results corridor = run("corridor_1", "none", 0.19);
   EXPECT_TRUE(row_of({corridor}, "corridor", "none")["holds"]);
   corridor["fault"]["growth"]["across"] = 2.1;
-  EXPECT_EQ(row_of({corridor}, "corridor", "none")["broken"][0], "doubt across the way grows");
+  EXPECT_EQ(row_of({corridor}, "corridor", "none")["broken"][0], "variance across the path grows");
   EXPECT_EQ(row_of({run("corridor_1", "none", 0.21)}, "corridor", "none")["broken"][0], "worse than the wheels");
 }
 

@@ -20,11 +20,11 @@ using std::chrono::milliseconds;
 
 /// Known violations by course and configuration; reasons in docs/robustness.md and decision 29.
 const std::map<std::string, std::set<std::string>> kKnown{
-    {"corridor/none", {"doubt across the way grows"}},
-    {"corridor/wio_imu_lost", {"more error than allowed", "farther off than its covariance says"}},
-    {"spot/lidar_gap", {"more added than allowed"}},
+    {"corridor/none", {"variance across the path grows"}},
+    {"corridor/wio_imu_lost", {"more error than allowed", "error beyond 3 sigma"}},
+    {"spot/lidar_gap", {"added error too large"}},
     {"spot/vio_kio_imu_lost", {"more error than allowed", "not flagged"}},
-    {"tunnel/lidar_alone", {"farther off than its covariance says"}},
+    {"tunnel/lidar_alone", {"error beyond 3 sigma"}},
 };
 
 /// Configurations in which motion sources carry sweeps without lidar, and the estimate reports it.
@@ -46,7 +46,7 @@ TEST(FaultsOnCourses, EveryRowOfTheTableHoldsForAMinute) {
   while (!run.wait_for_exit(milliseconds{100}))
     most = std::max(most, courses_in(folder / "out/courses"));
   ASSERT_EQ(run.wait_for_exit(), 0) << testing::PrintToString(run.lines());
-  EXPECT_LE(most, 3U) << "a course is gone when all have driven on it";
+  EXPECT_LE(most, 3U) << "a course is removed after its last run";
   const json faults = json::parse(read_text(folder / "out/results.json"))["faults"];
   EXPECT_EQ(faults["rows"].size(), 59U);
   for (const json& row : faults["rows"]) {
@@ -62,7 +62,7 @@ TEST(FaultsOnCourses, EveryRowOfTheTableHoldsForAMinute) {
   EXPECT_EQ(faults["consistency"]["runs"], 4);
   const auto nees_10m = faults["consistency"]["nees_10m"].get<double>();
   EXPECT_NONFATAL_FAILURE(EXPECT_GE(nees_10m, 3.0), "nees_10m"); // covariance too large in a clean world: decision 29
-  EXPECT_LE(nees_10m, 12.0) << "too sure";
+  EXPECT_LE(nees_10m, 12.0) << "covariance too small";
   EXPECT_TRUE(std::filesystem::exists(folder / "out/faults.md"));
   EXPECT_FALSE(std::filesystem::exists(folder / "out/courses"));
 

@@ -76,7 +76,7 @@ TEST_F(HarshFigures, WarningsAreListedOnceWithoutNumbers) {
   const auto found = figures(none, never,
                              "locus-replay: warning: wio is off by 3.25 m\nlocus-replay: warning: wio is off by 17 m\n"
                              "recording 20 s\n");
-  EXPECT_EQ(found["said"], (nlohmann::ordered_json{"wio is off by # m", "wio set aside"}));
+  EXPECT_EQ(found["said"], (nlohmann::ordered_json{"wio is off by # m", "wio was lost"}));
 }
 
 } // namespace

@@ -36,7 +36,7 @@ TEST_P(HarshOnCourses, EveryDriveIsMeasured) {
     expect_sound(row);
     standing += row["standing"].get<int>();
   }
-  EXPECT_GT(standing, 0) << "no drive begins at a stand";
+  EXPECT_GT(standing, 0) << "no drive begins at standstill";
   EXPECT_LT(standing, 30) << "no drive begins in motion";
   EXPECT_NE(read_text(folder / "out/harsh.md").find("rows hold."), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(folder / "out/courses"));

@@ -46,7 +46,7 @@ Results results_with(const std::function<void(Results& drive)>& make_worse) {
 
 Results row_with(const std::function<void(Results& drive)>& make_worse) {
   const Results rows = results_with(make_worse)["harsh"]["rows"];
-  EXPECT_EQ(rows.size(), 1U) << "of sensors without runs there is no row";
+  EXPECT_EQ(rows.size(), 1U) << "sensors without runs have no row";
   return rows[0];
 }
 
@@ -55,13 +55,13 @@ Results broken_with(const std::function<void(Results& drive)>& make_worse) { ret
 TEST(HarshTable, RowSummarisesItsDrives) {
   const Results row = row_with([](Results& drive) {
     drive["summary"]["ape_m"] = {{"mean", 0.02}, {"max", 0.1}};
-    drive["harsh"]["said"] = {"imu set aside"};
+    drive["harsh"]["said"] = {"imu was lost"};
   });
   EXPECT_EQ(row["drives"], 10);
   EXPECT_EQ(row["standing"], 1);
   EXPECT_DOUBLE_EQ(row["median_m"].get<double>(), 0.01);
   EXPECT_DOUBLE_EQ(row["worst_m"].get<double>(), 0.1);
-  EXPECT_EQ(row["said"], (Results{{{"text", "imu set aside"}, {"drives", 1}}}));
+  EXPECT_EQ(row["said"], (Results{{{"text", "imu was lost"}, {"drives", 1}}}));
   EXPECT_TRUE(row["holds"]);
 }
 
@@ -81,8 +81,8 @@ TEST(HarshTable, LostDriveMustBeFlaggedWithinASecond) {
       drive["harsh"]["flagged_after_s"] = flagged_after_s;
     });
   };
-  EXPECT_EQ(lost(nullptr), Results::array({"lost, unsaid"}));
-  EXPECT_EQ(lost(1.1), Results::array({"lost, unsaid"}));
+  EXPECT_EQ(lost(nullptr), Results::array({"lost, not flagged"}));
+  EXPECT_EQ(lost(1.1), Results::array({"lost, not flagged"}));
   EXPECT_EQ(lost(0.9), Results::array());
 }
 
@@ -103,7 +103,7 @@ TEST(HarshTable, ShowsLostAndFlaggedDrives) {
   }));
   EXPECT_NE(text.find("a machine. 0 of 1 rows hold."), std::string::npos) << text;
   EXPECT_NE(text.find("| plant | real | all | 10, 1 | 10.0 | 12000 | 2.0 | 6.0 | 1.5, 1.2 | 1, 1 within 2.5 s | "
-                      "**no**: worst error, lost, unsaid |  |\n"),
+                      "**no**: worst error, lost, not flagged |  |\n"),
             std::string::npos)
       << text;
 }

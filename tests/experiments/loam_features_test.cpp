@@ -39,9 +39,9 @@ TEST(LoamFeatures, CornersAreEdgesAndWallsArePlanes) {
   keep_loam_features(sweep);
   const auto corners = std::ranges::count_if(sweep.points, [](const auto& point) { return near_corner(point, 0.1F); });
   EXPECT_GE(corners, 4) << "each corner is found";
-  EXPECT_LE(corners, 12) << "and only once or little more";
+  EXPECT_LE(corners, 12) << "at most a little more than once";
   EXPECT_GT(sweep.points.size(), 100U) << "from walls";
-  EXPECT_LE(sweep.points.size(), 4U * (20 + 40)) << "no quarter gives more than its share";
+  EXPECT_LE(sweep.points.size(), 4U * (20 + 40)) << "no quarter has more than its share";
   EXPECT_EQ(sweep.registered, sweep.points.size());
 }
 

@@ -83,7 +83,7 @@ TEST(LocusExperiments, SeveralRecordingsGiveOnePage) {
       const bool other_is_paced = other.find("pace_") != std::string::npos;
       if (paced.find("pace_") != std::string::npos && paced != other) {
         EXPECT_TRUE(when_other.second <= when.first || (other_is_paced && when_other.first >= when.second))
-            << paced << " is neither alone nor last beside " << other;
+            << paced << " is neither alone nor after the others: " << other;
       }
     }
   }
@@ -166,7 +166,7 @@ TEST(LocusExperiments, ResumesAfterKill) {
 
   const ProgramRun second = experiments(arguments);
   ASSERT_EQ(second.status, 0) << second.err;
-  EXPECT_EQ(second.out.find("/3] "), std::string::npos) << "begins anew: " << second.out;
+  EXPECT_EQ(second.out.find("/3] "), std::string::npos) << "starts from the beginning: " << second.out;
   EXPECT_EQ(results_in(folder / "out")["recordings"].size(), 3U);
   const auto after = times_in(folder / "out");
   EXPECT_EQ(after.size(), 9U);
@@ -175,7 +175,7 @@ TEST(LocusExperiments, ResumesAfterKill) {
 
   const ProgramRun third = experiments(arguments);
   EXPECT_EQ(third.status, 0) << third.err;
-  EXPECT_EQ(third.out.find("[1/"), std::string::npos) << "does something again: " << third.out;
+  EXPECT_EQ(third.out.find("[1/"), std::string::npos) << "repeats a run: " << third.out;
   EXPECT_EQ(times_in(folder / "out"), after);
 }
 
@@ -200,7 +200,7 @@ TEST(LocusExperiments, InterruptionEndsAllChildren) {
   EXPECT_TRUE(comes_true([&] { return std::filesystem::exists(courses) && !std::filesystem::is_empty(courses); }));
   run.signal(SIGHUP);
   EXPECT_EQ(run.wait_for_exit(), 128 + SIGHUP) << testing::PrintToString(run.lines());
-  EXPECT_TRUE(comes_true([&] { return !some_program_runs_with(courses.string()); })) << "it simulates still";
+  EXPECT_TRUE(comes_true([&] { return !some_program_runs_with(courses.string()); })) << "simulation has not finished";
 }
 
 TEST(LocusExperiments, WrongUsageIsExplainedInOneLine) {
@@ -216,7 +216,7 @@ TEST(LocusExperiments, IncomparableResultsAreAnErrorBeforeAnyRun) {
   const TemporaryFolder folder;
   std::ofstream{folder / "paper.json"} << R"({"version": "1", "duration_s": 300, "runs": []})";
   for (const auto& [before, problem] : {std::pair{"/nowhere/results.json", "/nowhere/results.json: no results"},
-                                        std::pair{"paper.json", "paper.json: holds no results of the same"}}) {
+                                        std::pair{"paper.json", "paper.json: contains no results of this"}}) {
     const ProgramRun run = experiments({"--faults", "--compare", folder.path() / before, "-o", folder / "out"});
     EXPECT_EQ(run.status, 1);
     EXPECT_NE(run.err.find(problem), std::string::npos) << run.err;

@@ -76,21 +76,21 @@ TEST(MatrixTable, FailedRunHoldsOnlyIfItMustBeRejected) {
   const auto ended = [](const char* configuration, const char* how) {
     return judged({{"course", matrix_course()}, {"configuration", configuration}, {how, "ended by signal 11"}});
   };
-  EXPECT_EQ(ended(kFrozen, "failed")["broken"][0], "does not end with 0: ended by signal 11");
+  EXPECT_EQ(ended(kFrozen, "failed")["broken"][0], "does not exit with 0: ended by signal 11");
   EXPECT_FALSE(ended(kNoLidar, "failed")["holds"]);
   EXPECT_TRUE(ended(kNoLidar, "refused")["holds"]);
-  EXPECT_EQ(judged(run(kNoLidar))["broken"].back(), "is not refused");
+  EXPECT_EQ(judged(run(kNoLidar))["broken"].back(), "is not rejected");
 }
 
 TEST(MatrixTable, IsOneLineForEachFaultOfAnInput) {
   const Results results = results_of({run(kNoFault), run("wio_frozen_start"), run(kFrozen)});
   const std::string text = matrix_table(results);
-  EXPECT_NE(text.find("a machine. 2 of 2 cells hold; 6 more cannot be."), std::string::npos) << text;
-  EXPECT_NE(text.find("| wio | frozen | yes: +0.0 mm of 10.0 mm | nothing: changes nothing | yes: +0.0 mm of 10.0 mm | "
-                      "nothing: changes nothing |\n"),
+  EXPECT_NE(text.find("a machine. 2 of 2 cells hold; 6 more are not applicable."), std::string::npos) << text;
+  EXPECT_NE(text.find("| wio | frozen | yes: +0.0 mm of 10.0 mm | nothing (no effect) | yes: +0.0 mm of 10.0 mm | "
+                      "nothing (no effect) |\n"),
             std::string::npos)
       << text;
-  EXPECT_NE(text.find("| top | NaN | cannot be: a packet holds no floating-point number | |"), std::string::npos)
+  EXPECT_NE(text.find("| top | NaN | not applicable: packets have no floating-point numbers | |"), std::string::npos)
       << text;
 }
 

@@ -48,16 +48,16 @@ TEST(Subsets, EveryPartOfARecordingIsMeasuredInEveryView) {
     }
     EXPECT_EQ(parts, (std::set<std::string>{"all", "all but imu", "lidar", "lidar and IMU", "wio alone"}));
     EXPECT_TRUE(row["best"].is_string());
-    EXPECT_EQ(part(row, "wio alone")["mean_m"], part(rows[0], "wio alone")["mean_m"]) << "has no view";
+    EXPECT_EQ(part(row, "wio alone")["mean_m"], part(rows[0], "wio alone")["mean_m"]) << "no view";
   }
   EXPECT_LT(part(rows[0], "all")["mean_m"].get<double>(), part(rows[0], "wio alone")["mean_m"].get<double>());
-  EXPECT_NE(part(rows[0], "lidar")["mean_m"], part(rows[2], "lidar")["mean_m"]) << "sees less";
+  EXPECT_NE(part(rows[0], "lidar")["mean_m"], part(rows[2], "lidar")["mean_m"]) << "fewer returns";
   const std::string page = read_text(folder / "out/subsets.md");
   EXPECT_NE(page.find("Of 3 drives and views "), std::string::npos) << page;
-  EXPECT_NE(page.find("Without truth, left out: untrue.\n"), std::string::npos) << page;
+  EXPECT_NE(page.find("Skipped, because they have no truth: untrue.\n"), std::string::npos) << page;
 }
 
-TEST(Subsets, FoldersWithoutTruthAreAnErrorThatSaysWhereToPutIt) {
+TEST(Subsets, FoldersWithoutTruthAreAnErrorThatExplainsWhereToPutIt) {
   const TemporaryFolder folder;
   std::filesystem::copy(room_drive(), folder / "untrue");
   std::filesystem::remove(folder / "untrue/gt.tum");

@@ -109,7 +109,7 @@ std::string readable(const std::string& message, const std::string& name, const 
 ordered_json recording_figures(const std::string& name, const path& folder, const path& recording) {
   ordered_json figures{{"summary", read_json(folder / "summary.json")}};
   if (figures.at("summary").at("sweeps").at("seen") == 0)
-    throw Failure(ExitStatus::failed, "it holds no whole turn of a lidar");
+    throw Failure(ExitStatus::failed, "no whole revolution of a lidar");
   const std::vector<std::string> received = received_sources(figures.at("summary"));
   figures["sources"] = received;
   figures["imus"] = imus_among(received, recording);

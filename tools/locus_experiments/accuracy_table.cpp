@@ -74,9 +74,9 @@ std::string row_with_truth(const Results& row) {
 
 std::string table_with_truth(const Results& rows) {
   std::string text =
-      "| recording | motion sources | way, m | error, mean, m | at most, m | over 10 m, % | over 100 to 800 m, % | "
-      "end, "
-      "m | end, % | worst sigma | sweeps, failed | states | ms a sweep, 99 % | of a processor | holds |\n"
+      "| recording | motion sources | distance, m | mean error, m | largest, m | over 10 m, % | over 100 to 800 m, % | "
+      "end, m | end, % | worst sigma | sweeps, failed | states | ms per sweep, median, 99 % | CPU ms, median, 99 % | "
+      "holds |\n"
       "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---|---|---|---|---|\n";
   for (const Results& row : rows)
     text += row_with_truth(row);
@@ -102,9 +102,10 @@ std::string motion_of(const Results& claims) {
 
 std::string table_of_claims(const Results& rows) {
   std::string text =
-      "| recording | motion sources | s | farthest from the first pose, in half a second, in all, m | most turned, deg "
-      "| "
-      "speed, median, largest, m/s | by GPS, m/s | sweeps, failed | states | ms a sweep, 99 % | of a processor |\n"
+      "| recording | motion sources | s | farthest from the first pose, in half a second, in all, m | largest turn, "
+      "deg | "
+      "speed, median, largest, m/s | by GPS, m/s | sweeps, failed | states | ms per sweep, median, 99 % | "
+      "CPU ms, median, 99 % |\n"
       "|---|---|---:|---|---:|---|---|---|---|---|---|\n";
   for (const Results& row : rows) {
     const Results& run = row.at("run");
@@ -153,7 +154,7 @@ std::string warnings(const Results& results) {
       }
     }
   }
-  return text.empty() ? "" : "## What locus-replay warned of\n\n" + text + '\n';
+  return text.empty() ? "" : "## Warnings of locus-replay\n\n" + text + '\n';
 }
 
 std::string kitti_note(const Results& results) {
@@ -164,12 +165,10 @@ std::string kitti_note(const Results& results) {
     return "";
   return fmt::format(
       "The vertical angles in the files of KITTI's drives are too small; {} degrees are added to them, as in other "
-      "published figures. Those are means over sequences 11 to 21 of KITTI's odometry benchmark, "
-      "over "
+      "published figures. Those are means over sequences 11 to 21 of KITTI's odometry benchmark, over "
       "100 to 800 m, lidar alone: LOAM 0.55 %, CT-ICP 0.59 %, IMLS-SLAM 0.69 % "
-      "(https://www.cvlibs.net/datasets/kitti/eval_odometry.php). Their sweeps come corrected for the motion; those of "
-      "a "
-      "raw drive do not.\n\n",
+      "(https://www.cvlibs.net/datasets/kitti/eval_odometry.php). Their sweeps are already corrected for the motion; "
+      "those of raw drives are not.\n\n",
       drives.front().at("run").at("summary").at("kitti_vertical_angle_added_deg").get<double>());
 }
 
@@ -193,9 +192,10 @@ std::string command_of(const Results& results) {
 
 std::string introduction(const Results& results) {
   return fmt::format(
-      "# What recordings show\n\n"
-      "`{}`, version {}, {}. Recordings found: {}; a recording does not show whether it is of a robot or of a "
-      "simulator. Each is replayed with all its motion sources, with its IMU, and with lidar alone, as far as these "
+      "# Accuracy on recordings\n\n"
+      "`{}`, version {}, {}. Recordings found: {}, of robots or simulators, which "
+      "the data do not distinguish. Each is replayed with all its motion sources, with its IMU, and with lidar alone, "
+      "where these "
       "differ. Times are those of one thread, {} runs at a time, from the cut of a sweep to its estimate: median and "
       "99th percentile, in real time, which includes other load on the machine, and in processor time.\n\n",
       command_of(results), results.at("version").get<std::string>(), results.at("machine").get<std::string>(),
@@ -203,7 +203,7 @@ std::string introduction(const Results& results) {
 }
 
 constexpr const char* kHowToReadTruth =
-    "The error is that of the position, after alignment. *Over 10 m* is the mean error over all stretches of that "
+    "The error is that of the position, after alignment. *Over 10 m* is the mean error over all sections of that "
     "length, *over 100 to 800 m* the same by the method of KITTI's benchmark. *End* is the error of the last pose with "
     "the first poses aligned, in metres and relative to the distance. *Worst sigma* is the largest error of a position "
     "in standard deviations of its stated covariance; errors below a centimetre are ignored. A run holds if no "
@@ -211,8 +211,8 @@ constexpr const char* kHowToReadTruth =
     "error of such lidars by their data sheets) or by more than 3 sigma, and no sweep failed.\n\n";
 
 constexpr const char* kHowToReadClaims =
-    "There is no truth for these, so the table shows the estimate for the reader to judge: a standing robot must stay "
-    "at its pose. *By GPS* is the speed reported by a receiver at the lidar, in its position packets, often of the "
+    "These have no truth, so the table shows the estimate for the reader to judge: a standing robot must stay at its "
+    "pose. *By GPS* is the speed reported by a receiver at the lidar, in its position packets, often of the "
     "second before; the speed of the estimate is that from pose to pose.\n\n";
 
 } // namespace
@@ -227,7 +227,7 @@ std::vector<std::string> what_does_not_hold(const Results& run) {
   if (off_m > std::max(kAllowed_m, kAllowedShare * way_m))
     broken.push_back(fmt::format("off by {} m", number(off_m)));
   if (sigma > kAllowedSigma)
-    broken.emplace_back("farther off than it says");
+    broken.emplace_back("error beyond 3 sigma");
   if (failed + dropped > 0)
     broken.push_back(fmt::format("{} sweep{} failed", failed + dropped, failed + dropped == 1 ? "" : "s"));
   return broken;
@@ -246,8 +246,8 @@ std::string accuracy_table(const Results& results) {
   });
   const Results failed = rows_of(results, [&](const Results&, const Results& run) { return !ran(run); });
   return introduction(results) +
-         part("Where the truth is known", known, kHowToReadTruth + kitti_note(results) + table_with_truth(known)) +
-         part("Where it is not", unknown, kHowToReadClaims + table_of_claims(unknown)) +
+         part("With truth", known, kHowToReadTruth + kitti_note(results) + table_with_truth(known)) +
+         part("Without truth", unknown, kHowToReadClaims + table_of_claims(unknown)) +
          part("Simulated drives", simulated,
               (known.empty() ? kHowToReadTruth : "") + simulations(results) + table_with_truth(simulated)) +
          part("Not replayed", failed, failures(failed)) + warnings(results);

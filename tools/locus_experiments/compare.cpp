@@ -140,8 +140,8 @@ std::string summary_of(const std::vector<RowChange>& changes) {
     return count([=](const RowChange& row) { return row.holding_changes && row.change == change; });
   };
   return fmt::format(
-      "{} rows: {} worse, {} better, {} same, {} of these with equal figures. {} hold no longer, {} hold "
-      "anew.\n",
+      "{} rows: {} worse, {} better, {} same, {} of these with equal figures. {} no longer hold, {} newly "
+      "hold.\n",
       changes.size(), are(Change::worse), are(Change::better), are(Change::same),
       count([](const RowChange& row) { return row.equal; }), holding(Change::worse), holding(Change::better));
 }
@@ -152,10 +152,10 @@ std::string what_is_same(const std::vector<FigureKind>& kinds) {
     if (kind.negligible > 0)
       negligible.push_back(fmt::format("{} {:g}", kind.name, kind.shown_per_unit * kind.negligible));
   }
-  return fmt::format("A figure is the same if it differs by no more than {:.0f} %, half of what is allowed a fault, or "
-                     "by no more than nobody would notice, some ten times what another instruction set makes of the "
-                     "same code ({}). A row is worse if any of its figures is, better if none is and one is better; "
-                     "whether it holds goes before its figures.\n",
+  return fmt::format("A figure is the same if it differs by no more than {:.0f} %, half of what a fault may add, or by "
+                     "no more than a negligible amount, about ten times the difference between instruction sets "
+                     "({}). A row is worse if any of its figures is, and better if none is worse and one is better; "
+                     "whether it holds takes precedence over its figures.\n",
                      100 * kSameShare, fmt::join(negligible, "; "));
 }
 
@@ -188,8 +188,8 @@ ResultsBefore::ResultsBefore(std::filesystem::path file)
     rows_ = table_->rows(results_);
     origin_ = origin(results_);
   } catch (const Results::exception& error) {
-    throw Failure(ExitStatus::failed, fmt::format("{}: its {} are not as locus-experiments writes them ({}); make it "
-                                                  "anew",
+    throw Failure(ExitStatus::failed, fmt::format("{}: its {} cannot be read ({}); write it again with this "
+                                                  "locus-experiments",
                                                   file_.string(), table_->key, error.what()));
   }
 }
@@ -200,8 +200,8 @@ void ResultsBefore::check_is_of(const Results& after) const {
     throw Failure(ExitStatus::failed, "--compare: the paper's experiments have no rows to compare; run --faults, "
                                       "--fault-matrix, --harsh or --subsets");
   if (table_ != table)
-    throw Failure(ExitStatus::failed, fmt::format("{}: holds no results of the same experiment ({}); name a "
-                                                  "results.json of its own",
+    throw Failure(ExitStatus::failed, fmt::format("{}: contains no results of this experiment ({}); name a "
+                                                  "results.json that does",
                                                   file_.string(), table->key));
   if (realism_of(results_) != realism_of(after))
     throw Failure(ExitStatus::failed, fmt::format("{}: its courses are {}, these are {}; compare runs of the same "
@@ -212,7 +212,7 @@ void ResultsBefore::check_is_of(const Results& after) const {
         Results::json_pointer(fmt::format("/{}/starts", table->key))}) {
     const Results was = results_.value(pointer, Results{}), is = after.value(pointer, Results{});
     if (was != is)
-      throw Failure(ExitStatus::failed, fmt::format("{}: {} is {} there and {} here; compare runs of the same",
+      throw Failure(ExitStatus::failed, fmt::format("{}: {} is {} there and {} here; compare runs with the same value",
                                                     file_.string(), pointer.back(), was.dump(), is.dump()));
   }
 }

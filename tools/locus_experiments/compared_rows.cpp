@@ -18,13 +18,13 @@ constexpr FigureKind kError{"error, mm", 1e3, 1, 1e-3}, kMedianError{"median err
 constexpr FigureKind kSigma{"worst sigma", 1, 1, 0.1};
 /// Tolerates one failed sweep: a run may end one window earlier than another.
 constexpr FigureKind kLost{"sweeps lost", 1, 0, 0}, kFailed{"failed", 1, 0, 1};
-constexpr FigureKind kDrivesLost{"drives lost", 1, 0, 0}, kUnsaid{"unsaid", 1, 0, 0};
-constexpr FigureKind kTooFast{"claims too much, m/s", 1, 1, 0.1};
+constexpr FigureKind kDrivesLost{"drives lost", 1, 0, 0}, kUnsaid{"not flagged", 1, 0, 0};
+constexpr FigureKind kTooFast{"speed too high, m/s", 1, 1, 0.1};
 /// Factor between the NEES and its ideal value of 6 (six axes): too large and too small covariances count alike.
-constexpr FigureKind kNees{"NEES, times off 6", 1, 2, 0.1};
+constexpr FigureKind kNees{"NEES, factor from 6", 1, 2, 0.1};
 
 /// Ratio of the mean error to that of the best subset; up to 1.2 is allowed.
-constexpr FigureKind kRatio{"times the best subset", 1, 2, 0.2};
+constexpr FigureKind kRatio{"ratio to the best subset", 1, 2, 0.2};
 
 using Pointer = Results::json_pointer;
 

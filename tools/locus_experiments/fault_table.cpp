@@ -64,12 +64,12 @@ HealthFound judge_health(const std::string& source, const std::vector<int>& chan
     return {fmt::format("{} changes {} x", source, fmt::join(changes, ", ")), ""};
   }
   if (least == 0)
-    return {source + " unnoticed", source + " is not found out on every seed"};
+    return {source + " not detected", source + " is not detected on every seed"};
   if (fault_case.lasting == Lasting::second_half)
-    return {source + " lost", ends_lost ? "" : source + " is lost and taken back"};
+    return {source + " lost", ends_lost ? "" : source + " is used again although the fault lasts"};
   if (ends_lost)
-    return {source + " lost", source + " is not taken back on every seed"};
-  return {fmt::format("{} lost, back{}", source, most > 2 ? fmt::format(", up to {} x", most / 2) : ""), ""};
+    return {source + " lost", source + " is not used again on every seed"};
+  return {fmt::format("{} lost, used again{}", source, most > 2 ? fmt::format(", up to {} x", most / 2) : ""), ""};
 }
 
 std::set<std::string> names_of_sources(const Pairs& pairs) {
@@ -127,7 +127,7 @@ std::optional<Results> row_of(const FaultCase& fault_case, const RunsById& runs,
     if (with == nullptr || without == nullptr)
       continue;
     if (with->contains("failed") || without->contains("failed"))
-      failed.push_back(fmt::format("seed {} did not run", seed));
+      failed.push_back(fmt::format("seed {} failed", seed));
     else
       pairs.push_back({with, without});
   }
@@ -188,7 +188,7 @@ std::string consistency_line(const Results& consistency) {
     return "";
   const int failed = consistency.at("failed");
   return fmt::format("\nCovariances: the normalised squared error of the relative pose over 10 m, mean over {} seeded "
-                     "runs of 60 s, is {:.1f} (median {:.1f}, 90 % below {:.1f}); {:.0f} to {:.0f} is asked for six "
+                     "runs of 60 s, is {:.1f} (median {:.1f}, 90 % below {:.1f}); {:.0f} to {:.0f} is required for six "
                      "axes: {}{}.\n",
                      consistency.at("runs").get<int>(), consistency.at("nees_10m").get<double>(),
                      consistency.at("median").get<double>(), consistency.at("p90").get<double>(), kHonestLeast,
@@ -220,7 +220,7 @@ std::string fault_table(const Results& results) {
                   realism_of(results), results.at("duration_s").get<int>(), faults.at("seeds").get<int>(),
                   faults.at("consistency_runs").get<int>(), results.at("version").get<std::string>(),
                   machines_of(results.at("runs")), hold, rows.size());
-  text += "| fault | robot, place | error without, mm | with, mm | asked | found | holds | sweeps lost, failed | "
+  text += "| fault | robot, place | error without, mm | with, mm | required | measured | holds | sweeps lost, failed | "
           "health | worst sigma | NEES |\n|---|---|---:|---:|---|---|---|---|---|---:|---:|\n";
   for (const Results& row : rows)
     text += line_of(row);

@@ -31,7 +31,7 @@ std::string mm(double metres) { return fmt::format("{:.1f} mm", 1e3 * metres); }
 
 Verdict accurate(const Pairs& pairs, double limit_m) {
   const double mean_m = median(pairs, with_m);
-  return Verdict{"error <= " + mm(limit_m), mm(mean_m), {}}.expect(mean_m <= limit_m, "too large an error");
+  return Verdict{"error <= " + mm(limit_m), mm(mean_m), {}}.expect(mean_m <= limit_m, "error too large");
 }
 
 Verdict honest(const Pairs& pairs) {
@@ -39,7 +39,7 @@ Verdict honest(const Pairs& pairs) {
   return Verdict{fmt::format("<= {} sigma", kHonestSigmas),
                  fmt::format("{:.0f} % flagged, {:.1f} sigma", 100 * median(pairs, flagged_share), sigmas),
                  {}}
-      .expect(sigmas <= kHonestSigmas, "farther off than its covariance says");
+      .expect(sigmas <= kHonestSigmas, "error beyond 3 sigma");
 }
 
 Verdict both(Verdict one, const Verdict& other, const char* conjunction) {
@@ -76,14 +76,15 @@ Verdict carried(const Pairs& pairs, double limit, const std::string& source) {
   return Verdict{fmt::format("added <= {} x {}'s drift", limit, source),
                  fmt::format("{}; {} {}", mm(median(pairs, added_m)), source, mm(median(pairs, drift_m))),
                  {}}
-      .expect(median(pairs, excess_m) <= 0, "more added than allowed");
+      .expect(median(pairs, excess_m) <= 0, "added error too large");
 }
 
 Verdict resisted(const Pairs& pairs, double limit_m) {
   const double across_m = median(pairs, added_m), more_m = median(pairs, difference_m);
-  return Verdict{
-      "added <= " + mm(limit_m), fmt::format("{} meanwhile, {:+.1f} mm in the mean", mm(across_m), 1e3 * more_m), {}}
-      .expect(std::max(across_m, more_m) <= limit_m, "more added than allowed");
+  return Verdict{"added <= " + mm(limit_m),
+                 fmt::format("{} during the fault, {:+.1f} mm in the mean", mm(across_m), 1e3 * more_m),
+                 {}}
+      .expect(std::max(across_m, more_m) <= limit_m, "added error too large");
 }
 
 Verdict no_worse_than_wheels(const Pairs& pairs, const std::string& source) {
@@ -105,8 +106,8 @@ Verdict no_worse_than_wheels(const Pairs& pairs, const std::string& source) {
                   mm(median(pairs, wheels_m)), along, across),
       {}}
       .expect(excess_m <= 0, "worse than the wheels")
-      .expect(along >= kGrowsAlong, "doubt along the way does not grow")
-      .expect(across < kStaysAcross, "doubt across the way grows");
+      .expect(along >= kGrowsAlong, "variance along the path does not grow")
+      .expect(across < kStaysAcross, "variance across the path grows");
 }
 
 } // namespace

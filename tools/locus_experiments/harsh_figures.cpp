@@ -82,7 +82,7 @@ std::vector<std::string> messages_of(const std::filesystem::path& log, const ord
   }
   for (const auto& [name, source] : summary.at("sources").items()) {
     if (source.at("received").get<std::uint64_t>() > 0 && source.at("health_changes").get<int>() > 0)
-      lines.insert(name + " set aside");
+      lines.insert(name + " was lost");
   }
   return {lines.begin(), lines.end()};
 }

@@ -166,8 +166,8 @@ std::vector<HarshCase> named_harsh_cases(const std::string& only) {
   std::vector<HarshCase> cases = harsh_cases(only);
   if (cases.empty())
     throw Failure(ExitStatus::wrong_usage,
-                  fmt::format("--only {}: no COURSE/IMPERFECTION holds that; there are plant/real, corridor/people, "
-                              "...; without it there are all",
+                  fmt::format("--only {}: no COURSE/IMPERFECTION contains that; examples are plant/real and "
+                              "corridor/people; without --only all rows run",
                               only));
   return cases;
 }
@@ -188,7 +188,7 @@ std::string harsh_configuration(Sensors sensors, int start) {
 Plan plan_of_harsh(const Arguments& arguments) {
   if (arguments.duration_s <= kHarshDrive_s)
     throw Failure(ExitStatus::wrong_usage,
-                  fmt::format("--duration {}: a harsh course has to be longer than its drives of {} s",
+                  fmt::format("--duration {}: a harsh course must be longer than its drives of {} s",
                               arguments.duration_s, kHarshDrive_s));
   const std::vector<HarshCase> cases = named_harsh_cases(arguments.only);
   Plan plan;

@@ -101,7 +101,7 @@ std::vector<std::string> broken_in(const Results& row, bool accuracy_is_asked) {
   const bool all_flagged =
       row.at("flagged") == row.at("lost") &&
       (row.at("flagged_after_s").is_null() || row.at("flagged_after_s").get<double>() <= kFlaggedWithin_s);
-  expect(all_flagged, "lost, unsaid");
+  expect(all_flagged, "lost, not flagged");
   return broken;
 }
 
@@ -221,8 +221,9 @@ std::string harsh_table(const Results& results) {
                   harsh.at("seeds").get<int>(), results.at("version").get<std::string>(),
                   machines_of(results.at("runs")), hold, rows.size());
   text +=
-      "| course | imperfection | sensors | drives, from a stand | mean error, mm | worst, mm | worst sigma | NEES | "
-      "claims, has m/s | lost, said | holds | said |\n|---|---|---|---|---:|---:|---:|---:|---|---|---|---|\n";
+      "| course | imperfection | sensors | drives, from standstill | mean error, mm | worst, mm | worst sigma | NEES | "
+      "estimated, true speed, m/s | lost, flagged | holds | messages "
+      "|\n|---|---|---|---|---:|---:|---:|---:|---|---|---|---|\n";
   for (const Results& row : rows)
     text += harsh_line(row);
   return text;

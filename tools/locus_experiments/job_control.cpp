@@ -64,7 +64,7 @@ rule leave
 std::string sibling(const char* name) {
   const path program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / name;
   if (!std::filesystem::exists(program))
-    throw Failure(ExitStatus::failed, fmt::format("{}: is not there; install locus-tools whole", program.string()));
+    throw Failure(ExitStatus::failed, fmt::format("{}: not found; install all of locus-tools", program.string()));
   return program.string();
 }
 
@@ -117,7 +117,7 @@ class NinjaFile {
       : plan_(plan), arguments_(arguments), places_(places), file_(places.output / "build.ninja") {}
 
   void write() {
-    file_.print("# What locus-experiments has done and has yet to do here.\nbuilddir = {}\nrow = {}\ncpus = 1\n{}",
+    file_.print("# Jobs of locus-experiments in this folder.\nbuilddir = {}\nrow = {}\ncpus = 1\n{}",
                 ninja_value(places_.output.string()), ninja_value(shell_words({self_, std::string(kRowCommand)})),
                 replaced(kRules, "LAUNCHER", arguments_.launcher));
     for (const Course& course : plan_.courses) {
@@ -235,9 +235,8 @@ void run_ninja(const Places& places, const Arguments& arguments) {
                                           arguments.jobs, arguments.quiet ? " > /dev/null" : "");
   const int status = std::system(command.c_str());
   if (status != 0)
-    throw Failure(ExitStatus::failed,
-                  fmt::format("ninja ended with status {}; started again, locus-experiments resumes where it was",
-                              WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status)));
+    throw Failure(ExitStatus::failed, fmt::format("ninja ended with status {}; start locus-experiments again to resume",
+                                                  WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status)));
 }
 
 std::string last_line_of(const path& file) {
@@ -307,7 +306,7 @@ std::vector<int> usable_cpus() {
 
 void write_row(std::span<char* const> arguments) {
   if (arguments.size() != 4)
-    throw Failure(ExitStatus::wrong_usage, "row: is for locus-experiments itself");
+    throw Failure(ExitStatus::wrong_usage, "row: for internal use by locus-experiments only");
   const path folder = arguments[1];
   const Results row = row_of(std::atoi(arguments[0]), folder, arguments[2], json::parse(arguments[3]).get<Run>());
   tools::OutputFile file(folder / "row.json");
@@ -328,7 +327,7 @@ Results carry_out(const Plan& plan, const Arguments& arguments) {
   for (const Run& run : plan.runs) {
     std::optional<std::string> problem = broken.at(run.course);
     if (!problem && !NinjaFile::is_possible(run))
-      problem = fmt::format("needs {} processors, there is {}", run.paced_cpus, usable_cpus().size());
+      problem = fmt::format("needs {} processors, and this machine has {}", run.paced_cpus, usable_cpus().size());
     rows.push_back(problem ? Results{{"course", run.course}, {"configuration", run.configuration}, {"failed", *problem}}
                            : read_json(places.row(run)));
   }

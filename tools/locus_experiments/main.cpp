@@ -65,7 +65,7 @@ std::string failures_in(const Results& results) {
   const Results recordings = results.value("recordings", Results::array()); // runs of --accuracy
   const auto failed = [](const Results& recording) { return recording.at("runs").front().contains("failed"); };
   if (!recordings.empty() && std::ranges::all_of(recordings, failed))
-    lines = "no recording could be replayed; accuracy.md says of each why not";
+    lines = "no recording could be replayed; accuracy.md lists the reasons";
   return lines;
 }
 

@@ -34,9 +34,9 @@ bool is(const Kind& kind, const Kind& other) { return kind.what == other.what; }
 
 std::string why_impossible(const std::string& input, const Kind& kind) {
   if (input == kPositionPackets && is(kind, kJumping))
-    return "nothing in it is used that could jump";
+    return "no value that is used can jump";
   if (is(kind, kNan) && (input == kLidar || input == kPositionPackets))
-    return "a packet holds no floating-point number";
+    return "packets have no floating-point numbers";
   return "";
 }
 

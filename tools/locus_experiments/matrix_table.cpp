@@ -86,7 +86,7 @@ Results driven(const MatrixCell& cell, const Pair& pair) {
   Verdict verdict = judge(cell.demand, cell.limit, kMatrixCourse, {pair});
   const std::vector<std::string> shown = shown_by(cell, pair);
   verdict.expect(!loses_sweeps(cell, pair), "sweeps are lost");
-  verdict.expect(!shown.empty() || changes_nothing(pair), "silent");
+  verdict.expect(!shown.empty() || changes_nothing(pair), "not reported");
   return {{"asked", verdict.asked}, {"found", verdict.found}, {"shown", shown}, {"broken", verdict.broken}};
 }
 
@@ -94,7 +94,7 @@ Results driven(const MatrixCell& cell, const Pair& pair) {
 Results ended(const MatrixCell& cell, const Results& run) {
   const bool refused = run.contains("refused");
   const std::string message = run.value(refused ? "refused" : "failed", "");
-  const auto broken = refused ? Results::array() : Results::array({"does not end with 0: " + message});
+  const auto broken = refused ? Results::array() : Results::array({"does not exit with 0: " + message});
   return {{"asked", cell.refusal.empty() ? "" : "status 1"},
           {"found", refused ? "status 1" : ""},
           {"shown", Results::array({cell.refusal.empty() ? message : cell.refusal})},
@@ -116,7 +116,7 @@ std::optional<Results> judged(const MatrixCell& cell, const RunsById& runs) {
   if (with->contains("summary") && without->contains("summary")) {
     head.update(driven(cell, {with, without}));
     if (!cell.refusal.empty())
-      head["broken"].push_back("is not refused");
+      head["broken"].push_back("is not rejected");
   } else {
     head.update(ended(cell, with->contains("summary") ? *without : *with));
   }
@@ -126,12 +126,12 @@ std::optional<Results> judged(const MatrixCell& cell, const RunsById& runs) {
 
 std::string text_of(const Results& cell) {
   if (cell.contains("impossible"))
-    return "cannot be: " + cell.at("impossible").get<std::string>() + " | |";
+    return "not applicable: " + cell.at("impossible").get<std::string>() + " | |";
   const auto broken = cell.at("broken").get<std::vector<std::string>>();
   const auto shown = cell.at("shown").get<std::vector<std::string>>();
   return fmt::format("{}{} | {} |", broken.empty() ? "yes: " : fmt::format("**no**, {}: ", fmt::join(broken, "; ")),
                      cell.at("found").get<std::string>(),
-                     shown.empty() ? "nothing: changes nothing" : fmt::format("{}", fmt::join(shown, ", ")));
+                     shown.empty() ? "nothing (no effect)" : fmt::format("{}", fmt::join(shown, ", ")));
 }
 
 } // namespace
@@ -154,7 +154,7 @@ std::string matrix_table(const Results& results) {
   const auto impossible = count([](const Results& cell) { return cell.contains("impossible"); });
   std::string text =
       fmt::format("`locus-experiments --fault-matrix --realism {} --duration {}`, version {}, {}. {} of {} cells "
-                  "hold; {} more cannot be.\n\n",
+                  "hold; {} more are not applicable.\n\n",
                   realism_of(results), results.at("duration_s").get<int>(), results.at("version").get<std::string>(),
                   machines_of(results.at("runs")), hold, run, impossible);
   text += "| input | fault | from the start: holds, error | shown by | mid-drive: holds, error | shown by |\n"

@@ -70,7 +70,7 @@ ordered_json read_json(const std::filesystem::path& file) {
   std::ifstream stream{file};
   ordered_json json = ordered_json::parse(stream, nullptr, false);
   if (json.is_discarded())
-    throw Failure(ExitStatus::failed, fmt::format("{}: is missing or no JSON; run again", file.string()));
+    throw Failure(ExitStatus::failed, fmt::format("{}: missing or not JSON; run again", file.string()));
   return json;
 }
 

@@ -92,7 +92,7 @@ std::vector<FoundRecording> find_recordings(const std::vector<path>& places, con
     std::error_code ignored;
     if (!std::filesystem::exists(place, ignored))
       throw tools::Failure(tools::ExitStatus::failed,
-                           fmt::format("{}: is not there; name folders with recordings", place.string()));
+                           fmt::format("{}: not found; name folders with recordings", place.string()));
     const path root = std::filesystem::absolute(place / "").parent_path().lexically_normal();
     const std::string own_name = root.filename().string();
     const bool needs_prefix = places.size() > 1;

@@ -56,8 +56,8 @@ Results read_results(const std::filesystem::path& file) {
   std::ifstream stream{file};
   Results results = Results::parse(stream, nullptr, false);
   if (!results.is_object() || !results.contains("runs") || !results.at("runs").is_array())
-    throw Failure(ExitStatus::failed, fmt::format("{}: no results of locus-experiments; name what it left in the "
-                                                  "folder that it was given with -o",
+    throw Failure(ExitStatus::failed, fmt::format("{}: no results of locus-experiments; name the results.json in "
+                                                  "its output folder (-o)",
                                                   file.string()));
   return results;
 }

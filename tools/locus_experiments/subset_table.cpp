@@ -86,7 +86,7 @@ void judge_row(const Results& all, Results& row) {
   if (is_lost) {
     const Results& after_s = all.at("figures").at("flagged_after_s");
     if (after_s.is_null() || after_s.get<double>() > kFlaggedWithin_s)
-      broken.emplace_back("lost, unsaid");
+      broken.emplace_back("lost, not flagged");
     if (subsets[0].at("worst_sigma").get<double>() > kMostSigmas)
       broken.push_back(fmt::format("lost by {:.1f} sigma", subsets[0].at("worst_sigma").get<double>()));
   }
@@ -189,8 +189,8 @@ std::string summary_of(const Results& rows) {
     return row.at("verdict") == "broken" && (beyond_best_m(row) > kMuch_m || row.at("ratio") <= kMostRatio);
   });
   std::string text = fmt::format(
-      "Of {} drives and views {} hold, {} are flagged in time with an honest covariance, {} are broken ({} of "
-      "them by more than a centimetre, or lost and unsaid), {} fail.",
+      "Of {} drives and views, {} hold, {} are flagged in time and within their covariance, {} are broken ({} of them "
+      "by more than a centimetre, or lost and not flagged), {} failed.",
       rows.size(), with("holds"), with("flagged"), with("broken"), by_much, with("failed"));
   std::vector<double> ratios;
   const Results* worst = nullptr;
@@ -237,10 +237,10 @@ std::string subset_table(const Results& results) {
                   machines_of(results.at("runs")), summary_of(rows));
   const auto without_truth = subsets.value("without_truth", std::vector<std::string>{});
   if (!without_truth.empty())
-    text += fmt::format("Without truth, left out: {}.\n\n", fmt::join(without_truth, ", "));
+    text += fmt::format("Skipped, because they have no truth: {}.\n\n", fmt::join(without_truth, ", "));
   text +=
       "| drive | view, deg | all, mean error, mm | worst, mm | worst sigma | tracking | best sound subset | its mean "
-      "error, mm | ratio | law |\n|---|---:|---:|---:|---:|---:|---|---:|---:|---|\n";
+      "error, mm | ratio | verdict |\n|---|---:|---:|---:|---:|---:|---|---:|---:|---|\n";
   for (const Results& row : rows)
     text += law_line(row);
   text += "\n| drive | view, deg | subset | mean error, mm | worst, mm | worst sigma | tracking |\n"

@@ -19,7 +19,7 @@ const kVariants = [
   {name: "fga_off", run: "paper", means: "no flat ground"},
   {name: "rdf_off", run: "rdf_off", means: "no random filter"},
   {name: "vgf_off", run: "vgf_off", means: "no voxel filter"},
-  {name: "mdc_off", run: "mdc_off", means: "no correction of motion"},
+  {name: "mdc_off", run: "mdc_off", means: "no motion correction"},
 ].map((variant, i) => ({...variant, result: find("alpha", variant.run), className: `variant-${i}`}));
 
 const kMargin = {top: 8, right: 84, bottom: 26, left: 52};
@@ -63,5 +63,5 @@ export function ablationTable(section) {
                     what]};
   });
   table(section.select(".drawing").html(""),
-        ["", "mean APE, m", "max", "points", "CPU ms a sweep", "of baseline", ""], [{rows}]);
+        ["", "mean APE, m", "max", "points", "CPU ms per sweep", "relative to baseline", ""], [{rows}]);
 }

@@ -25,7 +25,7 @@ export function pace(section) {
     return {name: courseName(course), rows};
   });
   table(section.select(".drawing").html(""),
-        ["", "median ms a sweep", "90 %", "99 %", "max", "dropped sweeps a second", "cores used"], groups);
+        ["", "median ms per sweep", "90 %", "99 %", "max", "dropped sweeps per second", "cores used"], groups);
 }
 
 const kFailures = {wio_imu_fail: "WIO and IMU fail", wio_fail: "WIO fails", lidar_drop: "no lidar for 10 s"};

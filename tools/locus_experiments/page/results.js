@@ -18,8 +18,8 @@ export const courseName = (course) => (results.simulated && kCourseNames[course]
 
 /** Descriptions of the configurations in the accuracy rows. */
 export const configurations = {
-  locusd: "locusd as it ships",
-  locusd_fga: "locusd, flat ground when the IMU says so",
+  locusd: "locusd with default settings",
+  locusd_fga: "locusd, flat ground detected by the IMU",
   paper: "locusd with the paper's settings",
-  paper_fga: "the same, flat ground when the IMU says so",
+  paper_fga: "the same, flat ground detected by the IMU",
 };
