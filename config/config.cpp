@@ -43,7 +43,7 @@ bool is_topic(std::string_view text) {
 
 void require_topic_or_empty(Problems& problems, const std::string& key, const std::string& topic) {
   problems.require(topic.empty() || is_topic(topic), key,
-                   "'" + topic + "' is no topic; write it as /words/of_letters_and_digits");
+                   "'" + topic + "' is not a topic; write it as /words/of_letters_and_digits");
 }
 
 std::string item(const char* list, std::size_t index, const char* key) {
@@ -55,7 +55,7 @@ void check_names(Problems& problems, const Config& config) {
   std::set<std::string_view> taken{"total", "all-lidars", "kernel_drops"};
   const auto check = [&](const std::string& key, std::string_view name) {
     problems.require(is_word(name, "_-"), key,
-                     fmt::format("'{}' is no name; write a letter, then letters, digits, _ or -", name));
+                     fmt::format("'{}' is not a name; write a letter, then letters, digits, _ or -", name));
     problems.require(taken.insert(name).second, key, fmt::format("'{}' is taken, each name may stand once", name));
   };
   for (std::size_t i = 0; i < config.lidars.size(); ++i)
@@ -88,7 +88,7 @@ void check_clouds(Problems& problems, const std::vector<LidarOptions>& lidars, s
   const auto end = lidars.begin() + static_cast<std::ptrdiff_t>(i);
   problems.require(
       std::find_if(lidars.begin(), end, [&](const LidarOptions& other) { return other.topic == lidar.topic; }) == end,
-      item("lidars", i, "topic"), "is another lidar's too; give each its own");
+      item("lidars", i, "topic"), "is also that of another lidar; configure a different one for each");
 }
 
 void check_lidars(Problems& problems, const std::vector<LidarOptions>& lidars) {
@@ -109,7 +109,7 @@ void check_lidars(Problems& problems, const std::vector<LidarOptions>& lidars) {
                              (!other.source_ip || !lidar.source_ip || *other.source_ip == *lidar.source_ip);
                     });
     problems.require(!is_ambiguous, item("lidars", i, "port"),
-                     "is another lidar's too; give each its own port, or each its own source_ip");
+                     "is also that of another lidar; configure separate ports, or a source_ip for each");
   }
 }
 
@@ -152,9 +152,8 @@ void check_types_of_topics(Problems& problems, const Config& config) {
   std::map<std::string_view, std::string_view> types;
   const auto check = [&](const std::string& key, std::string_view topic, std::string_view type) {
     const std::string_view first = topic.empty() ? type : types.try_emplace(topic, type).first->second;
-    problems.require(
-        first == type, key,
-        fmt::format("'{}' cannot carry {} here and {} elsewhere; give each a topic of its own", topic, type, first));
+    problems.require(first == type, key,
+                     fmt::format("'{}' cannot have {} here and {} elsewhere; use separate topics", topic, type, first));
   };
   for (std::size_t i = 0; i < config.motion_sources.size(); ++i) {
     const MotionSource& source = config.motion_sources[i];
@@ -197,7 +196,7 @@ void check_record(Problems& problems, const Config& config) {
   problems.require_range<std::uint64_t>("record.max_bytes", config.record.max_bytes, kLeast, kMost);
   const double keep_s = config.record.keep_s;
   problems.require(keep_s == 0.0 || (keep_s >= 1.0 && keep_s <= 600.0), "record.keep_s",
-                   "must be 1 .. 600, or 0 where no incidents are to be kept");
+                   "must be 1 .. 600, or 0 to store no incidents");
   problems.require_range<std::uint64_t>("record.keep_bytes", config.record.keep_bytes, kLeast, 100'000'000'000);
   problems.require_range<std::uint64_t>("record.incidents_bytes", config.record.incidents_bytes, kLeast, kMost);
   problems.require(config.record.incidents_bytes >= config.record.keep_bytes, "record.incidents_bytes",
@@ -206,7 +205,7 @@ void check_record(Problems& problems, const Config& config) {
 
 void check_metrics(Problems& problems, const MetricsOptions& metrics) {
   problems.require(metrics.listen.empty() || parse_socket_address(metrics.listen).has_value(), "metrics.listen",
-                   fmt::format("'{}' is no address to listen on; write IPv4:PORT as 127.0.0.1:9464, [IPv6]:PORT as "
+                   fmt::format("'{}' is not an address to listen on; write IPv4:PORT as 127.0.0.1:9464, [IPv6]:PORT as "
                                "[::1]:9464, or the absolute path of a Unix socket, of 107 bytes at most",
                                metrics.listen));
 }

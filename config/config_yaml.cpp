@@ -141,7 +141,7 @@ class SectionReader {
       reading_.blame(path_, line, "a key must be a word");
     else if (const auto [entry, is_new] = entries_.try_emplace(key.Scalar(), Entry{value, line}); !is_new)
       reading_.blame(join(path_, key.Scalar()), line,
-                     "stands a second time, first in line " + std::to_string(entry->second.line));
+                     "is repeated, first in line " + std::to_string(entry->second.line));
   }
 
   Reading& reading_;
@@ -244,7 +244,7 @@ std::optional<std::string> descend(YAML::Node& node, std::string& path, const st
   if (node.IsSequence()) {
     const auto index = find_item(node, part);
     if (!index)
-      return path + " has no item '" + part + "'; give a name or an index below " + std::to_string(node.size());
+      return path + " has no item '" + part + "'; use a name or an index below " + std::to_string(node.size());
     path = join(path, std::to_string(*index));
     node.reset(node[*index]);
     return std::nullopt;
@@ -289,18 +289,18 @@ std::string at_line(const std::string& file, int line) { return file + ':' + std
 
 /// Translates the library's messages about invalid YAML for users who do not know the grammar.
 std::string in_plain_words(const std::string& complaint, const std::string& yaml, int line) {
-  static constexpr std::string_view kIndentation = "this line is not indented like the lines it belongs to; give all "
-                                                   "keys of a section, and all items of a list, the same "
+  static constexpr std::string_view kIndentation = "this line is not indented like the lines it belongs to; indent all "
+                                                   "keys of a section, and all items of a list, by the same "
                                                    "number of spaces";
   static const std::map<std::string_view, std::string_view> kWords{
       {"end of map not found", kIndentation},
       {"end of sequence not found", kIndentation},
       {"illegal map value",
-       "a key cannot stand here; look in this line and the one before for a missing colon or space "
-       "behind it, and for an indentation unlike that of the other keys"},
+       "a key is not possible here; check this line and the one before for a missing colon or space "
+       "after it, and for an indentation unlike that of the other keys"},
       {"end of map flow not found", "a { before this line is not closed; add the missing }"},
       {"end of sequence flow not found", "a [ before this line is not closed; add the missing ]"},
-      {"unknown token", "no value begins like this; put it in quotes"}};
+      {"unknown token", "no value begins like this; quote it"}};
   const std::vector<std::string> lines = split(yaml, '\n');
   const auto index = static_cast<std::size_t>(line - 1);
   if (index < lines.size() &&
@@ -338,7 +338,7 @@ std::optional<Mistake> second_document(const std::string& yaml) {
     return std::nullopt;
   return Mistake{"", start.latest.line + 1,
                  start.latest.pos == first.pos
-                     ? "no key begins like this; remove what stands in front of it"
+                     ? "no key begins like this; remove what precedes it"
                      : "a second YAML document begins; keep one, and begin every top-level key in the first column"};
 }
 
@@ -348,9 +348,9 @@ Expected<std::string, ConfigErrors> text_of(const std::filesystem::path& file) {
   std::ifstream stream{file, std::ios::binary};
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (stream.bad() || (stream.gcount() == 0 && !stream.eof()))
-    return ConfigErrors{error_line(file.string(), "cannot be read; give a YAML file that exists and may be read")};
+    return ConfigErrors{error_line(file.string(), "cannot be read; name a YAML file that exists and is readable")};
   if (stream.gcount() > kMaxBytes)
-    return ConfigErrors{error_line(file.string(), "is longer than 1 MiB; this is no configuration")};
+    return ConfigErrors{error_line(file.string(), "is longer than 1 MiB; this is not a configuration")};
   text.resize(static_cast<std::size_t>(stream.gcount()));
   return text;
 }

@@ -32,9 +32,10 @@ Expected<Config, ConfigErrors> with_lidar_metadata(Config config) {
       continue;
     }
     if (known->kind != SourceKind::imu)
-      return ConfigErrors{fmt::format("motion_sources.{}: this is the name of the inertial unit in lidar {}; give the "
-                                      "source another one",
-                                      name, lidar.name)};
+      return ConfigErrors{
+          fmt::format("motion_sources.{}: this is the name of the inertial unit in lidar {}; rename the "
+                      "source",
+                      name, lidar.name)};
     if (!known->topic.empty()) { // published by a driver: reading the lidar's port would duplicate the samples
       lidar.imu_port = 0;
       continue;

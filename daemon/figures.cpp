@@ -85,7 +85,7 @@ std::optional<std::string> shared_port(const LidarOptions& options, const Ingest
   }
   if (refused.empty())
     return std::nullopt;
-  return fmt::format("lidar {}: other senders use its port {}: packets from {} are used, and {} are refused; if these "
+  return fmt::format("lidar {}: other senders use its port {}: packets from {} are used, and {} are rejected; if these "
                      "are lidars, give each its own entry, with its T_base_lidar: lidars: [{}]",
                      options.name, options.port, dotted(*lidar.source_ip), fmt::join(refused, ", "), yaml);
 }
@@ -95,12 +95,12 @@ std::optional<std::string> unknown_model(const LidarOptions& options, const Inge
     return std::nullopt;
   if (lidar.unknown_packets->is_readable)
     return fmt::format(
-        "lidar {0}: refused {1}, which is not what lidars.{0} is configured as; set its model to auto, and "
+        "lidar {0}: rejected {1}, which is not what lidars.{0} is configured as; set its model to auto, and "
         "calibration, if any, to the file of that sensor",
         options.name, to_string(*lidar.unknown_packets));
   const std::string_view help = remedy(*lidar.unknown_packets);
   return fmt::format(
-      "lidar {0}: refused {1}, no model that can be read{3}{4}; if another device sends to port {2}, set "
+      "lidar {0}: rejected {1}, no model that can be read{3}{4}; if another device sends to port {2}, set "
       "lidars.{0}.source_ip to that of the lidar",
       options.name, to_string(*lidar.unknown_packets), options.port, help.empty() ? "" : "; ", help);
 }
@@ -118,7 +118,7 @@ std::vector<std::string> cloud_doubts(const LidarOptions& options, const IngestR
 std::optional<std::string> stale_metadata(const LidarOptions& options, const IngestReport::Lidar& lidar) {
   if (lidar.packets_of_other_mode == 0)
     return std::nullopt;
-  return fmt::format("lidar {}: refused the last {} packets: the sensor was restarted after {} was fetched, and runs "
+  return fmt::format("lidar {}: rejected the last {} packets: the sensor was restarted after {} was fetched, and runs "
                      "in another mode; fetch it again: locusctl fetch {} -o {}",
                      options.name, lidar.packets_of_other_mode, options.metadata,
                      lidar.source_ip ? dotted(*lidar.source_ip) : "SENSOR", options.metadata);
@@ -263,7 +263,7 @@ std::string verdict_on(const IngestReport::Source& source, bool is_live) {
   const Refusal& refusal = is_live ? source.refusal : source.longest_refusal;
   if (!source.verdict.empty() || !refusal.is_worth_reporting())
     return std::string{source.verdict};
-  return fmt::format("is refused for {:.0f} s: it {}", to_seconds(refusal.lasted), explanation(refusal.reason));
+  return fmt::format("is rejected for {:.0f} s: it {}", to_seconds(refusal.lasted), explanation(refusal.reason));
 }
 
 /// Ignores foreign senders and cloud faults that were last seen more than kMaxAge before the lidar's last data.

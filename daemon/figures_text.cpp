@@ -75,7 +75,7 @@ std::string clouds_text(const LidarOptions& options, const IngestReport::Lidar& 
                   counters.used > 0 ? "clouds" : "no data", 60 / to_seconds(clouds.period), counters.used, drops,
                   sum(counters.refused), counters.reordered, silence_text(lidar.last_received));
   if (const std::string refused = reasons<CloudError>(counters.refused); !refused.empty())
-    text += fmt::format("{:<9}refused: {}\n", "", refused);
+    text += fmt::format("{:<9}rejected: {}\n", "", refused);
   if (const std::string problem = problem_of(options, lidar); !problem.empty())
     text += fmt::format("{:<9}{}\n", "", problem);
   return text;
@@ -83,7 +83,7 @@ std::string clouds_text(const LidarOptions& options, const IngestReport::Lidar& 
 
 std::string lidars_text(const Figures& figures) {
   std::string text = fmt::format("\n{:<9}{:<12}{:>5}{:>10}{:>8}{:>9}{:>9}{:>8} {}\n", "lidar", "model", "rpm",
-                                 "packets", "lost", "refused", "disorder", "silent", "pps");
+                                 "packets", "lost", "rejected", "disorder", "silent", "pps");
   for (std::size_t i = 0; i < figures.config.lidars.size(); ++i) {
     const LidarOptions& options = figures.config.lidars[i];
     const IngestReport::Lidar& lidar = figures.ingest.lidars[i];
@@ -97,7 +97,7 @@ std::string lidars_text(const Figures& figures) {
                     lidar.model.empty() ? "no data" : lidar.model, lidar.rotation_rate_rpm, packets.data, packets.lost,
                     sum(packets.rejected), packets.reordered, silence_text(lidar.last_received), lidar.pps);
     if (const std::string refused = reasons<PacketError>(packets.rejected); !refused.empty())
-      text += fmt::format("{:<9}refused: {}{}\n", "", refused,
+      text += fmt::format("{:<9}rejected: {}{}\n", "", refused,
                           lidar.refused_ip ? "; the last sender: " + dotted(*lidar.refused_ip) : "");
     if (const std::string problem = problem_of(options, lidar); !problem.empty())
       text += fmt::format("{:<9}{}\n", "", problem);
@@ -110,7 +110,7 @@ std::string sources_text(const Figures& figures) {
   if (sources.empty())
     return "";
   std::string text = fmt::format("\n{:<12}{:<12}{:>12}{:>12}{:>12}{:>10}{:>9}\n", "source", "health", "samples",
-                                 "refused", "for sweeps", "changes", "silent");
+                                 "rejected", "for sweeps", "changes", "silent");
   for (std::size_t i = 0; i < sources.size(); ++i) {
     const IngestReport::Source& source = figures.ingest.sources[i];
     const SourceCounters& counters = source.counters;
@@ -118,7 +118,7 @@ std::string sources_text(const Figures& figures) {
                         counters.received, sum(counters.rejected), figures.sweeps.used_sweeps[i],
                         counters.health_changes, silence_text(source.last_received));
     if (const std::string refused = reasons<HealthReason>(counters.rejected); !refused.empty())
-      text += fmt::format("{:<12}refused: {}\n", "", refused);
+      text += fmt::format("{:<12}rejected: {}\n", "", refused);
     if (const std::string verdict = verdict_on(source, true); !verdict.empty())
       text += fmt::format("{:<12}{}\n", "", verdict);
     if (const std::string doubt = calibration_warning(figures, i); !doubt.empty())
@@ -130,7 +130,7 @@ std::string sources_text(const Figures& figures) {
 std::string recording_text(const std::optional<Recorder::Status>& recording) {
   if (!recording)
     return "";
-  return fmt::format("recording   {}, {:.0f} MB   {} inputs   {} left out\n",
+  return fmt::format("recording   {}, {:.0f} MB   {} inputs   {} dropped\n",
                      !recording->problem.empty() ? "none: " + recording->problem
                      : recording->run.empty()    ? "nothing yet"
                                                  : recording->run.string(),
@@ -144,7 +144,7 @@ std::string incidents_text(const std::optional<Incidents::Status>& incidents) {
                      !incidents->problem.empty() ? "none: " + incidents->problem
                      : incidents->last.empty()   ? "none stored"
                                                  : incidents->last.filename().string(),
-                     incidents->suppressed > 0 ? fmt::format("   {} more too soon", incidents->suppressed) : "");
+                     incidents->suppressed > 0 ? fmt::format(", {} more within a minute", incidents->suppressed) : "");
 }
 
 /// Names the source that everything else contradicted most, with the test ratio.
@@ -179,10 +179,10 @@ std::string to_text(const Figures& figures) {
       "rate        {:.1f} Hz   last {}\n", sweeps.rate_hz,
       sweeps.last ? fmt::format("{:.0f} ms ago", 1e3 * to_seconds(time_since(sweeps.last->stamp).value_or(Duration{})))
                   : "never");
-  text += fmt::format("a sweep     {:.2f} ms   90 % {:.2f}   99 % {:.2f}   worst {:.2f}\n", wall.p50, wall.p90,
+  text += fmt::format("per sweep   {:.2f} ms   90 % {:.2f}   99 % {:.2f}   worst {:.2f}\n", wall.p50, wall.p90,
                       wall.p99, wall.max);
-  text += fmt::format("sweeps      {} seen   {} processed   {} dropped   {} failed   {} lost by kernel\n",
-                      counters.seen, counters.processed, counters.dropped, counters.failed, live.kernel_drops);
+  text += fmt::format("sweeps      {} seen   {} processed   {} dropped   {} failed   {} kernel drops\n", counters.seen,
+                      counters.processed, counters.dropped, counters.failed, live.kernel_drops);
   if (live.filtered > 0)
     text += fmt::format("flood       {} datagrams of other senders were filtered by the kernel\n", live.filtered);
   text += fmt::format("machine     {:.1f} % of a core since the start   {:.0f} MB at most\n",

@@ -137,7 +137,7 @@ Expected<path, std::string> CaptureRing::make_piece(Stamp now) {
   if (error)
     return disk_failure_text("cannot be created", piece_, error);
   if (!is_new)
-    return fmt::format("{}: exists already; give each locusd folders of its own", piece_.string());
+    return fmt::format("{}: exists already; configure separate folders for each locusd", piece_.string());
   return piece_;
 }
 

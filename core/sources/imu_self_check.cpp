@@ -226,13 +226,13 @@ std::string_view ImuSelfCheck::words(Difference difference, std::size_t axis, bo
     const char* causes;
   };
   constexpr std::array<Finding, 4> kFindings{
-      Finding{"they measure different turns",
-              "T_base_source, scale, stamps or delay of the gyro, or lidar that follows what moves around the robot"},
-      Finding{"lidar measures turns and the gyro hardly any",
-              "people or things that move around a robot that stands, T_base_source, delay or a dead axis of the gyro"},
       Finding{
-          "the gyro turns the other way",
-          "T_base_source, the sign of an axis, delay of the gyro, or lidar that follows what moves around the robot"},
+          "they measure different turns",
+          "T_base_source, scale, stamps or delay of the gyro, or lidar that follows moving objects around the robot"},
+      Finding{"lidar measures turns and the gyro hardly any",
+              "people or objects that move around a robot at rest, T_base_source, delay or a dead axis of the gyro"},
+      Finding{"the gyro turns the other way", "T_base_source, the sign of an axis, delay of the gyro, or lidar that "
+                                              "follows moving objects around the robot"},
       Finding{"the gyro reports some 57 times as much, as if in deg/s, not in rad/s", "the unit of its driver"}};
   constexpr std::array<const char*, 3> kAxes{"x (roll)", "y (pitch)", "z (yaw)"};
   using Words = std::array<std::array<std::array<std::string, 2>, kAxes.size()>, kFindings.size()>;

@@ -119,7 +119,7 @@ void set_dds_log(std::function<void(bool, std::string_view)> sink) {
 
 Expected<DdsNode, std::string> DdsNode::open(const DdsOptions& options) {
   if (if_nametoindex(options.interface.c_str()) == 0)
-    return fmt::format("dds.interface: there is no network interface {}; there are {}", options.interface,
+    return fmt::format("dds.interface: no network interface {}; there are {}", options.interface,
                        fmt::join(interfaces(), ", "));
   const auto failed = [&](const char* what, dds_entity_t code) {
     return fmt::format("DDS could not create a {} in domain {} on interface {} ({}); bring the interface up, or set "

@@ -41,8 +41,8 @@ Parsed parse_reset(const nlohmann::json& request) {
   const auto v = request["pose"].get<std::array<double, 6>>();
   for (std::size_t i = 0; i < v.size(); ++i)
     if (!(std::abs(v[i]) <= (i < 3 ? kMaxDistance_m : kMaxAngle_deg)))
-      return fmt::format("the pose must lie within {:.0f} m and {:.0f} degrees; give X,Y,Z,R,P,Y", kMaxDistance_m,
-                         kMaxAngle_deg);
+      return fmt::format("the pose must lie within {:.0f} m and {:.0f} degrees; write it as X,Y,Z,R,P,Y",
+                         kMaxDistance_m, kMaxAngle_deg);
   return ControlRequest{Reset{Pose{from_rpy_rad(Eigen::Vector3d{v[3], v[4], v[5]} * kRadPerDeg), {v[0], v[1], v[2]}}}};
 }
 

@@ -211,7 +211,7 @@ ControlServer::Answer Service::reload() {
   if (!answer.json.contains("error"))
     log_.info("reloaded");
   else
-    log_.error(fmt::format("reload refused{}: {}", session_ ? ", the old configuration remains in effect" : "",
+    log_.error(fmt::format("reload rejected{}: {}", session_ ? ", the old configuration remains in effect" : "",
                            answer.json["error"].get<std::string>()));
   if (session_)
     sd_notify(0, "READY=1");

@@ -22,7 +22,7 @@ std::string status_line(const Figures& figures) {
   if (!sweeps.last || read_clock(CLOCK_MONOTONIC) - sweeps.last_at > kStale)
     return figures.ingest.total.received == 0 && !figures.ingest.has_lidar_data() ? "Waiting for the first lidar packet"
                                                                                   : "Waiting for lidar data";
-  return fmt::format("{}, {:.1f} Hz, {:.1f} ms a sweep, {} dropped", to_string(sweeps.last->state), sweeps.rate_hz,
+  return fmt::format("{}, {:.1f} Hz, {:.1f} ms per sweep, {} dropped", to_string(sweeps.last->state), sweeps.rate_hz,
                      sweeps.process_ms.p50, figures.counters.dropped);
 }
 
@@ -135,7 +135,7 @@ std::string SessionMonitor::why_silent(const Lidar& lidar, const LidarOptions& o
   if (now.clouds)
     return now.received() == lidar.received
                ? "check that its driver runs and publishes it in this domain, and that DDS may use that interface"
-               : "its clouds are refused; locusctl status counts the reasons";
+               : "its clouds are rejected; locusctl status counts the reasons";
   if (packets.received == lidar.received)
     return "check its power and cable, and the address it sends to (locusctl sensors)";
   if (packets[PacketError::sender] > 0 && now.refused_ip && now.source_ip)
@@ -149,10 +149,10 @@ std::string SessionMonitor::why_silent(const Lidar& lidar, const LidarOptions& o
   const std::string unknown = now.unknown_packets ? fmt::format(" ({})", to_string(*now.unknown_packets)) : "";
   if (options.is_ouster())
     return stale_metadata(options, now)
-        .value_or(fmt::format("its packets are refused; locusctl status counts the reasons. Check that {} is the "
+        .value_or(fmt::format("its packets are rejected; locusctl status counts the reasons. Check that {} is the "
                               "metadata of this sensor in its present mode; locusctl fetch SENSOR fetches it",
                               options.metadata));
-  return fmt::format("its packets are refused{}; locusctl status counts the reasons. Check that the lidar is of a "
+  return fmt::format("its packets are rejected{}; locusctl status counts the reasons. Check that the lidar is of a "
                      "supported model, and lidars.{}.model",
                      unknown, options.name);
 }

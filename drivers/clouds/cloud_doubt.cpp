@@ -10,8 +10,8 @@ namespace {
 /// Describes the substitute for missing point times.
 std::string_view fallback(PointTiming timing) {
   return timing == PointTiming::azimuth ? "their times are computed from their azimuths"
-                                        : "they count as measured at one instant, so a robot that moves makes them a "
-                                          "distorted world";
+                                        : "they count as measured at one instant, so the motion of the robot "
+                                          "distorts them";
 }
 
 } // namespace
@@ -27,29 +27,29 @@ std::string explain(CloudDoubt doubt, PointTiming timing) {
                        "not those of packets or clouds",
                        fallback(timing));
   case CloudDoubt::disorder:
-    return fmt::format("the times of its points go up and down along a ring, so {}; take the topic of the driver, not "
-                       "one that a filter has made of it",
-                       fallback(timing));
+    return fmt::format(
+        "the times of its points are not monotonic along a ring, so {}; use the topic of the driver, not "
+        "of a filter",
+        fallback(timing));
   case CloudDoubt::no_unit:
-    return fmt::format("the times of its points span no turn of a lidar in s, ms, us or ns (0.5 to 250 ms, an eighth "
-                       "of the period at least), so {}; look "
-                       "which unit the driver writes, and whether its clouds are of one turn",
+    return fmt::format("the times of its points do not span a revolution of a lidar in s, ms, us or ns (0.5 to 250 ms, "
+                       "at least an eighth of the period), so {}; check the unit of the driver, and whether its "
+                       "clouds are single revolutions",
                        fallback(timing));
   case CloudDoubt::stamp_at_end:
-    return "its clouds arrive before their last point by their stamps: the header's stamp is read as that of the "
-           "last "
-           "point, not of the first; set the driver to stamp the first point";
+    return "its clouds arrive before their last point by their stamps: the header's stamp is used as that of the "
+           "last point, not of the first; set the driver to stamp the first point";
   case CloudDoubt::tai:
-    return "its stamps are 37 s ahead of this computer's clock: they are TAI, as PTP has it, not UTC; they are put "
-           "where they arrive; give ptp4l and phc2sys the offset to UTC (37 s)";
+    return "its stamps are 37 s ahead of this computer's clock: they are TAI, as of PTP, not UTC, so their time of "
+           "arrival is used; configure the offset to UTC (37 s) in ptp4l and phc2sys";
   case CloudDoubt::ahead:
-    return "its stamps are in the future by this computer's clock, so they are put where they arrive; synchronise the "
+    return "its stamps are in the future by this computer's clock, so their time of arrival is used; synchronise the "
            "lidar's clock with it (PTP), or have the driver stamp by the computer's clock";
   case CloudDoubt::two_frames:
-    return "some of its clouds are of another frame, so of another lidar, and are left out; give each lidar a topic of "
+    return "some of its clouds are of another frame, so of another lidar, and are rejected; give each lidar a topic of "
            "its own";
   case CloudDoubt::behind:
-    return "its stamps are of another clock than this computer's, so they are put where they arrive; synchronise the "
+    return "its stamps are of another clock than this computer's, so their time of arrival is used; synchronise the "
            "lidar's clock with it (PTP), or have the driver stamp by the computer's clock";
   }
   return "";

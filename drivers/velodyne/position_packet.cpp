@@ -133,18 +133,18 @@ std::string_view why_unused(const PositionPacket& packet) {
     return {};
   switch (packet.nmea) {
   case Nmea::none:
-    return "its position packets hold no NMEA sentence (connect the receiver's serial output to the lidar, and look at "
+    return "its position packets hold no NMEA sentence (connect the receiver's serial output to the lidar, and check "
            "its baud rate)";
   case Nmea::no_rmc:
     return "its position packets hold NMEA sentences, but no RMC (let the receiver send $GPRMC once a second)";
   case Nmea::no_checksum:
     return "its RMC sentences are cut short or have no checksum (let the receiver add one, and send RMC alone)";
   case Nmea::wrong_checksum:
-    return "the checksums of its RMC sentences are wrong (look at the serial line from the receiver to the lidar)";
+    return "the checksums of its RMC sentences are wrong (check the serial line from the receiver to the lidar)";
   case Nmea::no_time:
-    return "its RMC sentences hold no time (look at the receiver and its antenna)";
+    return "its RMC sentences hold no time (check the receiver and its antenna)";
   case Nmea::no_fix:
-    return "its receiver has no fix, by the status of its RMC sentences (look at its antenna)";
+    return "its receiver has no fix, by the status of its RMC sentences (check its antenna)";
   case Nmea::good:
     return {};
   }

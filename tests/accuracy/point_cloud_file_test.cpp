@@ -127,9 +127,9 @@ TEST(PointCloudFile, OtherFilesAreErrors) {
 
 TEST(PointCloudFile, BrokenPlyIsReportedWithItsLine) {
   expect_error(ply("ascii", "element vertex 0\nproperty float x\nproperty float y\nproperty float z\n", ""),
-               "holds no point");
+               "contains no point");
   expect_error("ply\nformat ascii 1.0\nelement vertex 2\n", ":4: the header does not end");
-  expect_error("ply\nformat ascii 1.0\nelement vertex many\n", ":3: many is no number of points");
+  expect_error("ply\nformat ascii 1.0\nelement vertex many\n", ":3: many is not a number of points");
   expect_error("ply\nformat zip 1.0\n", ":2: unknown format zip");
   expect_error(ply("ascii", "element face 3\nelement vertex 2\n", ""), ":5: the element vertex is not the first");
   expect_error(ply("ascii", "element vertex 2\nproperty list uchar int x\n", ""), ":5: a property of type list");

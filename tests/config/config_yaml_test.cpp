@@ -158,9 +158,9 @@ TEST(ConfigYaml, LidarHasPacketsOrClouds) {
                                  key)});
   EXPECT_NE(errors_in("lidars: [{point_times: none}]\n").at(0).find("name their topic"), std::string::npos);
   EXPECT_NE(errors_in("lidars: [{topic: points}]\n").at(0).find("is no topic"), std::string::npos);
-  EXPECT_NE(errors_in("lidars: [{name: a, topic: /p}, {name: b, topic: /p}]\n").at(0).find("another lidar's"),
+  EXPECT_NE(errors_in("lidars: [{name: a, topic: /p}, {name: b, topic: /p}]\n").at(0).find("that of another lidar"),
             std::string::npos);
-  EXPECT_NE(errors_in("lidars: [{topic: /imu/data}]\n").at(0).find("cannot carry PointCloud2"), std::string::npos);
+  EXPECT_NE(errors_in("lidars: [{topic: /imu/data}]\n").at(0).find("cannot have PointCloud2"), std::string::npos);
 }
 
 TEST(ConfigYaml, AnglesRoundTripToANanodegreeEvenInGimbalLock) {
@@ -202,7 +202,7 @@ TEST(ConfigYaml, AllMistakesAreReportedInTheOrderOfTheirLines) {
                 "robot.yaml:3: lidars.0.port: must be a whole number, 0 or more",
                 "robot.yaml:5: lidars.1.T_base_lidar.xyz_m: must be a list of 3 finite numbers",
                 "robot.yaml:7: fusion: must be combined | queue",
-                "robot.yaml:10: map.keyframe_m: stands a second time, first in line 9",
+                "robot.yaml:10: map.keyframe_m: is repeated, first in line 9",
                 "robot.yaml:11: map.keyframe: unknown key; the nearest known one is 'keyframe_m'",
                 "robot.yaml:12: map.keyframe_deg: 0 is outside 1 .. 180",
                 "robot.yaml:13: range_m: must be [nearest, farthest] with 0 <= nearest < farthest <= 1000",
@@ -243,7 +243,7 @@ TEST(ConfigYaml, EveryKindOfBadValueIsRejectedWithItsKeyAndReason) {
       {"lidars.front.port=-1", "0 or more"},
       {"lidars.front.port=0", "is outside 1 .. 65535"},
       {"lidars.front.port=65536", "is outside 0 .. 65535"},
-      {"lidars.front.name=2nd", "is no name"},
+      {"lidars.front.name=2nd", "is not a name"},
       {"lidars.front.name=total", "is taken"},
       {"lidars.front.model=VLP-17", "must be VLP-16 | Puck-Hi-Res | VLP-32C | HDL-32E | VLS-128 | Pandar40P | Pandar64 "
                                     "| QT64 | XT16 | XT32 | XT32M | QT128 | OT128 | Ouster, or auto"},
@@ -255,7 +255,7 @@ TEST(ConfigYaml, EveryKindOfBadValueIsRejectedWithItsKeyAndReason) {
       {"lidars=[]", "1 to 16"},
       {"lidars={name: a}", "must be a list"},
       {"motion_sources=[5]", "must be a section of keys"},
-      {"motion_sources=[{kind: imu}]", "is no name"},
+      {"motion_sources=[{kind: imu}]", "is not a name"},
       {"motion_sources.wio.topic=wheel odometry", "is no topic"},
       {"motion_sources.imu.health_topic=/imu/", "is no topic"},
       {"motion_sources.wio.T_base_source.xyz_m=[1, 0, 0]", "belongs to kind imu alone"},
@@ -306,9 +306,9 @@ TEST(ConfigYaml, EveryKindOfBadValueIsRejectedWithItsKeyAndReason) {
       {"dds.prefix=/locus//", "is no topic"},
       {"dds.frame_base=odom", "must differ from frame_odom"},
       {"dds.flat_ground_topic=flat", "is no topic"},
-      {"dds.flat_ground_topic=/imu/data", "'/imu/data' cannot carry Bool here and Imu elsewhere"},
-      {"motion_sources.wio.topic=/imu/data", "cannot carry Imu here and Odometry elsewhere"},
-      {"motion_sources.imu.health_topic=/imu/data", "cannot carry Bool here and Imu elsewhere"},
+      {"dds.flat_ground_topic=/imu/data", "'/imu/data' cannot have Bool here and Imu elsewhere"},
+      {"motion_sources.wio.topic=/imu/data", "cannot have Imu here and Odometry elsewhere"},
+      {"motion_sources.imu.health_topic=/imu/data", "cannot have Bool here and Imu elsewhere"},
       {"lidars.0.name=kernel_drops", "is taken"},
   };
   for (const BadValue& bad : bad_values) {
@@ -338,9 +338,9 @@ TEST(ConfigYaml, ALidarAndASourceMayNotShareAName) {
 }
 
 TEST(ConfigYaml, MistakesThatQuoteLineBreaksStayOneLine) {
-  EXPECT_EQ(
-      errors_in("lidars:\n  - name: \"a\\nb: c\"\n"),
-      ConfigErrors{"robot.yaml:2: lidars.0.name: 'a b: c' is no name; write a letter, then letters, digits, _ or -"});
+  EXPECT_EQ(errors_in("lidars:\n  - name: \"a\\nb: c\"\n"),
+            ConfigErrors{
+                "robot.yaml:2: lidars.0.name: 'a b: c' is not a name; write a letter, then letters, digits, _ or -"});
 }
 
 TEST(ConfigYaml, OffAndOnAreReadAsWords) {
@@ -352,8 +352,7 @@ TEST(ConfigYaml, OffAndOnAreReadAsWords) {
 
 /// Regression: it was read as an endless sequence of empty documents, until memory was exhausted.
 TEST(ConfigYaml, LeadingCommaIsAnError) {
-  EXPECT_EQ(errors_in(",lidars: []\n"),
-            ConfigErrors{"robot.yaml:1: no key begins like this; remove what stands in front of it"});
+  EXPECT_EQ(errors_in(",lidars: []\n"), ConfigErrors{"robot.yaml:1: no key begins like this; remove what precedes it"});
 }
 
 TEST(ConfigYaml, InvalidYamlIsRejectedWithItsLine) {
@@ -378,12 +377,12 @@ TEST(ConfigYaml, IndentationErrorsAreExplainedPlainly) {
   said("lidars:\n  - name: front\n   port: 3\n", "robot.yaml:3: ", "is not indented like the lines it belongs to");
   said("map:\n    keyframe_m: 1\n  keyframe_deg: 3\n",
        "robot.yaml:3: ", "is not indented like the lines it belongs to");
-  said("map:\n  keyframe_m: 1\n   keyframe_deg: 2\n", "robot.yaml:3: ", "a key cannot stand here");
-  said("map:\n  keyframe_m:1\n  keyframe_deg: 2\n", "robot.yaml:3: ", "a missing colon or space behind it");
+  said("map:\n  keyframe_m: 1\n   keyframe_deg: 2\n", "robot.yaml:3: ", "a key is not possible here");
+  said("map:\n  keyframe_m:1\n  keyframe_deg: 2\n", "robot.yaml:3: ", "a missing colon or space after it");
   said("map:\n\tkeyframe_m: 1\n", "robot.yaml:2: ", "is indented by a tab; use spaces");
   said("lidars:\n- {name: front, port: 3\nthreads: 2\n", "robot.yaml:3: ", "a { before this line is not closed");
   said("range_m: [1, 2\nthreads: 2\n", "robot.yaml:2: ", "a [ before this line is not closed");
-  said("threads: @2\n", "robot.yaml:1: ", "put it in quotes");
+  said("threads: @2\n", "robot.yaml:1: ", "quote it");
 }
 
 TEST(ConfigYaml, DamagedFilesGiveOnePrintableLinePerMistakeAndNeverCrash) {
@@ -474,7 +473,7 @@ TEST(ConfigOverride, OptionsTakeEffectTogetherAndTheLastOneWins) {
 TEST(ConfigOverride, MistakesNameTheOptionAtFault) {
   EXPECT_EQ(errors_with({"threads=4", "lidars.frnt.port=1", "voxel.leaf_m=1", "threads.max=2", "threads", "map=[1"}),
             (ConfigErrors{
-                "--set lidars.frnt.port=1: lidars has no item 'frnt'; give a name or an index below 1",
+                "--set lidars.frnt.port=1: lidars has no item 'frnt'; use a name or an index below 1",
                 "--set voxel.leaf_m=1: voxel: unknown key; the nearest known one is 'voxel_filter'",
                 "--set threads.max=2: threads has no keys below it",
                 "--set threads: must be KEY=VALUE, e.g. lidars.front.port=2369",

@@ -168,7 +168,7 @@ TEST(Figures, MetadataIsStaleWhileTheSensorRunsInAnotherMode) {
   EXPECT_EQ(problem_of(options, lidar), "");
   lidar.packets_of_other_mode = 129;
   const std::string problem = problem_of(options, lidar);
-  EXPECT_NE(problem.find("refused the last 129 packets"), std::string::npos) << problem;
+  EXPECT_NE(problem.find("rejected the last 129 packets"), std::string::npos) << problem;
   EXPECT_NE(problem.find("locusctl fetch SENSOR -o front.json"), std::string::npos) << problem;
 }
 

@@ -137,7 +137,7 @@ TEST_F(Fetch, RejectsAnswersCutBetweenChunks) {
     const TcpServer server(lidar.http, always(head + rest));
     const auto file = lidar.fetch(patience_);
     ASSERT_FALSE(file) << rest;
-    EXPECT_NE(file.error().find("the answer breaks off between its chunks"), std::string::npos) << file.error();
+    EXPECT_NE(file.error().find("the answer ends between its chunks"), std::string::npos) << file.error();
   }
 }
 
@@ -176,10 +176,10 @@ TEST_F(Fetch, RejectsTruncatedAnswers) {
     TcpPort Lidar::*port;
     std::string answer, problem;
   };
-  for (const Case& broken : {Case{&Lidar::http, page.substr(0, page.size() - 10), "the answer breaks off after"},
+  for (const Case& broken : {Case{&Lidar::http, page.substr(0, page.size() - 10), "the answer ends after"},
                              Case{&Lidar::http, "HTTP/1.1 200 OK\r\nConte", "the answer is not HTTP"},
                              Case{&Lidar::http, "HTTP/1.1 200 OK\r\n\r\n{", "its metadata: is no JSON"},
-                             Case{&Lidar::commands, R"({"prod_line": )", "the answer to get_sensor_info breaks off"},
+                             Case{&Lidar::commands, R"({"prod_line": )", "the answer to get_sensor_info is truncated"},
                              Case{&Lidar::hesai, ptc(angles, angles.size() + 1), angles_size},
                              Case{&Lidar::hesai, "\x47\x74", "the answer is not that of a Hesai"}}) {
     Lidar lidar;
@@ -197,7 +197,7 @@ TEST_F(Fetch, RejectsAbsurdLengths) {
   const auto file = fetch();
   ASSERT_FALSE(file);
   for (const std::string reason :
-       {"claims to send 99999999999 bytes", "longer than 1000000 bytes", "claims to send 4294967303 bytes"})
+       {"announces 99999999999 bytes", "longer than 1000000 bytes", "announces 4294967303 bytes"})
     EXPECT_NE(file.error().find(reason), std::string::npos) << file.error();
 }
 
@@ -244,14 +244,14 @@ TEST_F(Fetch, RejectsOtherVersionsOfTheHesaiProtocol) {
 TEST_F(Fetch, NamesEachClosedPort) {
   for (const TcpPort* port : {&http_, &commands_, &hesai_})
     expect_problem(fmt::format("TCP port {}: Connection refused", port->number()));
-  expect_problem("look at its power, cable and address");
+  expect_problem("check its power, cable and address");
 }
 
 TEST_F(Fetch, ReportsInvalidAddresses) {
   for (const std::string text : {"os-122.local", "", "192.168.1", "/run/socket", "1.2.3.4:80"}) {
     const auto file = fetch_sensor_file(text);
     ASSERT_FALSE(file) << text;
-    EXPECT_NE(file.error().find("is no address; give that of the lidar"), std::string::npos) << file.error();
+    EXPECT_NE(file.error().find("not an address; name that of the lidar"), std::string::npos) << file.error();
   }
 }
 

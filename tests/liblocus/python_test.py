@@ -94,7 +94,7 @@ class SameBits(unittest.TestCase):
         self.assertEqual((odometry.map().dtype, odometry.map().shape[1]), (np.float32, 6))
         self.assertGreater(len(odometry.map()), 100)
 
-    def test_several_threads_compute_at_once_and_do_not_disturb_each_other(self) -> None:
+    def test_threads_compute_in_parallel_and_independently(self) -> None:
         found: list[list[locus.Estimate]] = []
         threads = [threading.Thread(target=lambda: found.append(list(locus.replay(ROOM)))) for _ in range(2)]
         for thread in threads:
@@ -117,7 +117,7 @@ class SameBits(unittest.TestCase):
 
 
 class Inputs(unittest.TestCase):
-    def test_an_estimate_outlives_what_it_is_of(self) -> None:
+    def test_estimate_outlives_its_odometry(self) -> None:
         estimate = next(iter(locus.replay(ROOM)))
         covariance = estimate.pose_covariance
         self.assertEqual(covariance.shape, (6, 6))
@@ -154,7 +154,7 @@ class Inputs(unittest.TestCase):
             odometry.packet(np.zeros(2412, np.uint8)[::2], NOW_NS)
         self.assertEqual(json.loads(odometry.figures_json())["packets"]["total"]["received"], 4)
 
-    def test_mistakes_are_told(self) -> None:
+    def test_mistakes_are_reported(self) -> None:
         odometry = locus.Odometry()
         rest, level = [0.0, 0.0, 9.81], [0.0, 0.0, 0.0, 1.0]
         mistakes: list[tuple[Callable[[], object], str]] = [
@@ -169,7 +169,7 @@ class Inputs(unittest.TestCase):
             (lambda: odometry.odometry("wio", NOW_NS, rest, level[:3]), "4 numbers"),
             (lambda: odometry.odometry("wio", 2**63 - 1, rest, level), "1951"),
             (lambda: odometry.packet(b"", NOW_NS, source_ip="lidar"), "lidar"),
-            (lambda: odometry.cloud("front", np.zeros((2, 3)), NOW_NS), "takes packets"),
+            (lambda: odometry.cloud("front", np.zeros((2, 3)), NOW_NS), "receives packets"),
             (lambda: odometry.cloud("front", np.zeros(6), NOW_NS), "(n, 3)"),
         ]
         for call, part in mistakes:
@@ -184,7 +184,7 @@ class Inputs(unittest.TestCase):
         with self.assertRaises(locus.Error):
             odometry.finish()
 
-    def test_all_of_it_has_documentation(self) -> None:
+    def test_everything_is_documented(self) -> None:
         for owner in (locus.Error, locus.Estimate, locus.SourceEstimate, locus.Odometry, locus.Replay):
             self.assertTrue(owner.__doc__, owner)
             self.assertEqual(owner.__module__, "locus")

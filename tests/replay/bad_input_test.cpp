@@ -242,8 +242,8 @@ TEST(WrongUsage, OtherPortIsNamedWithTheOverrideAndOnlyTheSummaryIsWritten) {
 
 TEST(WrongUsage, ResultsAreNotWrittenIntoARecording) {
   const std::string capture = room_drive().string();
-  expect_error(run_program(LOCUS_REPLAY, {"-o", capture, capture}), 2, {"-o " + capture, "holds a recording"});
-  expect_error(run_program(LOCUS_REPLAY, {"-o", capture + "/.", capture + "/lidar.pcap"}), 2, {"holds a recording"});
+  expect_error(run_program(LOCUS_REPLAY, {"-o", capture, capture}), 2, {"-o " + capture, "contains a recording"});
+  expect_error(run_program(LOCUS_REPLAY, {"-o", capture + "/.", capture + "/lidar.pcap"}), 2, {"contains a recording"});
   EXPECT_FALSE(std::filesystem::exists(room_drive() / "odometry.tum"));
 }
 

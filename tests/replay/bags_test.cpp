@@ -155,7 +155,7 @@ TEST(Bags, UnorderedRos1BagIsReported) {
   std::rotate(messages.begin(), messages.begin() + static_cast<std::ptrdiff_t>(messages.size() / 2), messages.end());
   write_text(folder / "drive.bag", ros1_bag(messages));
   expect_line(replay_room(folder / "drive.bag").run().err,
-              {"messages stand behind one that was received later", "rosbag filter"});
+              {"messages follow one that was received later", "rosbag filter"});
 }
 
 /// Some versions of rosbag2 leave the database in WAL mode, for which SQLite would create a log on reading.
@@ -202,7 +202,7 @@ TEST(Bags, ConfiguredTopicIsNotReplacedByAnother) {
       replay_room(folder / "drive.bag", {"--duration", "2", "--set", "motion_sources.wio.topic=/gps/odometry"});
   EXPECT_EQ(replay.run().status, 0);
   expect_line(replay.run().err, {"motion source wio: nothing on /gps/odometry", "/wheel_odometry"});
-  expect_line(replay.run().out, {"left out: /wheel_odometry"});
+  expect_line(replay.run().out, {"not used: /wheel_odometry"});
 }
 
 TEST(Bags, OnlyTopicOfAKindIsUsedWhateverItsName) {
@@ -230,7 +230,7 @@ TEST(Bags, TopicIsNotGuessedAmongSeveral) {
   const Replay told =
       replay_room(folder / "drive.bag", {"--duration", "2", "--set", "motion_sources.wio.topic=/odom_b"});
   EXPECT_EQ(told.run().err, "");
-  expect_line(told.run().out, {"/odom_b is wio", "left out: /odom_a"});
+  expect_line(told.run().out, {"/odom_b is wio", "not used: /odom_a"});
 }
 
 TEST(Bags, NamedFileReplacesATopic) {
@@ -238,7 +238,7 @@ TEST(Bags, NamedFileReplacesATopic) {
   write_text(folder / "drive.bag", ros1_bag(room_messages(RosVersion::ros1)));
   const Replay replay = replay_room(folder / "drive.bag", {"--imu", room_drive() / "imu.csv"});
   expect_same_odometry(replay);
-  expect_line(replay.run().out, {"left out: /imu/data"});
+  expect_line(replay.run().out, {"not used: /imu/data"});
 }
 
 /// Bags written by rosbag itself with the messages' own Python code, chunks uncompressed or compressed.
@@ -260,7 +260,7 @@ TEST_P(BagOfRosbag, IsReadFieldByField) {
       EXPECT_EQ(to_ns(imu.stamp), 1'700'000'000'000'000'001 + 1000 * k);
       EXPECT_EQ(imu.angular_velocity_radps, Eigen::Vector3d(0.1 + static_cast<double>(k), 0.2, 0.3));
       EXPECT_EQ(imu.specific_force_mps2, Eigen::Vector3d(1, 2, 9.81));
-      EXPECT_EQ(imu.attitude.has_value(), k < 2) << "the last one says that it has none";
+      EXPECT_EQ(imu.attitude.has_value(), k < 2) << "the last one has none";
     } else if (topic.type == tools::kOdometryType) {
       const std::int64_t k = seen[1]++;
       const auto odometry = tools::read_odometry(reader).value();
@@ -345,7 +345,7 @@ TEST(Bags, TruncatedDatabaseIsReadUpToTheCut) {
   const Replay replay = replay_room(folder / "cut.db3");
   EXPECT_EQ(replay.run().status, 0);
   ASSERT_EQ(lines_of(replay.run().err).size(), 1U) << replay.run().err;
-  expect_line(replay.run().err, {"warning: ", "cut.db3: message ", "breaks off or is damaged"});
+  expect_line(replay.run().err, {"warning: ", "cut.db3: message ", "is truncated or damaged"});
   EXPECT_NEAR(static_cast<double>(replay.trajectory().size()), 40, 10);
 }
 

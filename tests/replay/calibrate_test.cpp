@@ -31,7 +31,7 @@ TEST(Calibrate, RunEqualsOneWithTheWrittenCalibration) {
   const Replay configured(arguments);
   ASSERT_EQ(configured.run().status, 0) << configured.run().err;
   const auto last_m = [](const Replay& replay) { return replay.trajectory().back().T_source_base.translation; };
-  EXPECT_LT((last_m(calibrated) - last_m(configured)).norm(), 0.002) << "but for what is rounded in the file";
+  EXPECT_LT((last_m(calibrated) - last_m(configured)).norm(), 0.002) << "except for rounding in the file";
 }
 
 TEST(Calibrate, InvalidCombinationsAreErrors) {

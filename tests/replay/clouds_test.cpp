@@ -141,7 +141,7 @@ TEST(Clouds, OneCommandWithoutConfigurationWritesTheReport) {
   EXPECT_EQ(replay.run().err, "");
   expect_parts(replay.run().out, {"/points is lidar front, /wheel_odometry is wio, /imu/data is imu",
                                   "no packets, so the clouds on /points are used",
-                                  "/tf_static does not say where the lidar (lidar) sits on base_link"});
+                                  "/tf_static has no mounting of the lidar (lidar) on base_link"});
   EXPECT_TRUE(std::filesystem::exists(replay.file("report.html")));
   EXPECT_EQ(replay.summary()["sweeps"]["seen"], room_turns().size());
   EXPECT_EQ(replay.summary()["sweeps"]["failed"], 0);
@@ -182,7 +182,7 @@ TEST(Clouds, MountingIsReadFromTheStaticTransforms) {
   const Replay replay({folder / "clouds.db3"});
   ASSERT_EQ(replay.run().status, 0) << replay.run().err;
   const Eigen::Vector3d p = (T_base_mast * T_mast_lidar).translation;
-  expect_parts(replay.run().out, {fmt::format("sits at {:.3f} {:.3f} {:.3f} m, 0.0 5.7 28.6 deg on base_link, by "
+  expect_parts(replay.run().out, {fmt::format("is mounted at {:.3f} {:.3f} {:.3f} m, 0.0 5.7 28.6 deg on base_link, by "
                                               "/tf_static",
                                               p.x(), p.y(), p.z())});
 }
@@ -233,7 +233,7 @@ TEST(Clouds, TopicWithMostPointsIsUsedAndOthersAreNamed) {
   write_file(folder / "clouds.bag", ros1_bag(messages));
   const Replay most({folder / "clouds.bag"});
   expect_parts(most.run().out, {"the clouds on /points are used, not /filtered", "--set lidars.0.topic=/filtered",
-                                "left out: /filtered"});
+                                "not used: /filtered"});
   const Replay asked({"--set", "lidars.0.topic=/filtered", folder / "clouds.bag"});
   expect_parts(asked.run().out, {"/filtered is lidar front"});
   const Replay none({"--set", "lidars.0.topic=/nothing", folder / "clouds.bag"});
@@ -302,8 +302,9 @@ std::vector<WrongTimes> wrong_times() {
   const auto at_end = [](OwnCloud& cloud) { cloud.stamp += milliseconds{100}; };
   return {{"missing", CloudKind::velodyne_start, without, "have no field of times", "azimuth", 0.001},
           {"equal", CloudKind::velodyne_start, times_changed("time", 0, 0), "all have the same time", "azimuth", 0.001},
-          {"shuffled", CloudKind::velodyne_start, shuffled, "go up and down along a ring", "azimuth", 0.001},
-          {"wrong_unit", CloudKind::velodyne_start, times_changed("time", 5, 0), "span no turn", "azimuth", 0.001},
+          {"shuffled", CloudKind::velodyne_start, shuffled, "are not monotonic along a ring", "azimuth", 0.001},
+          {"wrong_unit", CloudKind::velodyne_start, times_changed("time", 5, 0), "do not span a revolution", "azimuth",
+           0.001},
           {"at_end", CloudKind::velodyne_start, at_end, "arrive before their last point", "field", 0.001},
           {"tai", CloudKind::velodyne_start, stamps_later(seconds{37}), "37 s ahead", "field", 0.01},
           {"future", CloudKind::velodyne_start, stamps_later(seconds{5}), "in the future", "field", 0.01},

@@ -77,11 +77,11 @@ TEST(LocusReplay, EachSourceIsComparedWithAllOthers) {
                       used = column(name + "_last_used_ns");
     EXPECT_EQ(table[1][used], "0") << "the first sweep has no prior";
     const std::vector<std::string>& amid = table[31];
-    EXPECT_EQ(std::stod(amid[sd_x]) > 0.0, name == "wio") << "an imu tells of no translation";
+    EXPECT_EQ(std::stod(amid[sd_x]) > 0.0, name == "wio") << "an IMU measures no translation";
     EXPECT_LT(std::abs(std::stod(amid[x])), 0.1);
     EXPECT_GT(std::stod(amid[sd_yaw]), 1e-4);
     EXPECT_GT(std::stod(amid[ratio]), 0.0);
-    EXPECT_LT(std::stod(amid[ratio]), 1.0) << "of an honest source";
+    EXPECT_LT(std::stod(amid[ratio]), 1.0) << "consistent source";
     EXPECT_EQ(amid[used], amid[0]);
     EXPECT_EQ(table.back()[used] == table.back()[0], name == "imu") << "the wheels are lost by then";
   }
@@ -265,7 +265,7 @@ TEST(LocusReplay, LostLidarsAreBridgedByDeadReckoning) {
     dead_reckoned += table[i + 1][1] == "dead_reckoning" ? 1 : 0;
   }
   EXPECT_NEAR(dead_reckoned, 29, 2);
-  EXPECT_EQ(table.back()[1], "tracking") << "registration resumes when the lidar does";
+  EXPECT_EQ(table.back()[1], "tracking") << "registration resumes with the lidar";
   expect_sweeps_add_up(replay.summary()["sweeps"]);
   EXPECT_LT(replay.summary()["ape_m"]["max"].get<double>(), 0.1);
 }

@@ -28,8 +28,8 @@ void expect_blames_nobody(const std::string& sentence) {
   EXPECT_TRUE(contains(sentence, "and lidar disagree")) << sentence;
   EXPECT_TRUE(contains(sentence, "(possible causes: ")) << sentence;
   EXPECT_TRUE(contains(sentence, "stamps") || contains(sentence, "delay")) << sentence;
-  EXPECT_TRUE(contains(sentence, "lidar that follows what moves around the robot") ||
-              contains(sentence, "people or things that move around a robot"))
+  EXPECT_TRUE(contains(sentence, "lidar that follows moving objects around the robot") ||
+              contains(sentence, "people or objects that move around a robot"))
       << sentence;
 }
 
@@ -63,7 +63,7 @@ TEST(WrongStamps, OfAnImuAreReportedWithoutBlame) {
     SCOPED_TRACE(start_s);
     disagreements += disagreements_without_blame(drive.replay({"--start", start_s, "--duration", "20"}));
   }
-  EXPECT_GT(disagreements, 0U) << "else nothing was asked";
+  EXPECT_GT(disagreements, 0U) << "otherwise nothing was tested";
 }
 
 /// Source and lidar agree again at the end, but for less than the probation of one second.
@@ -85,7 +85,7 @@ TEST(WrongStamps, OfAnImuUnusedAtTheEndAreAWarning) {
         << cut.run().err;
     ++told;
   }
-  EXPECT_GT(told, 0) << "else nothing was asked";
+  EXPECT_GT(told, 0) << "otherwise nothing was tested";
 }
 
 /// Only the scale of the wheels is wrong. The available data cannot tell whether wheels or lidar are right.

@@ -166,7 +166,7 @@ TEST(Faults, WithoutLidarSourcesDeadReckonAndLidarRelocalises) {
   }
   EXPECT_LT((path.back().T_source_base.translation - path_without_faults().back().T_source_base.translation).norm(),
             0.01);
-  EXPECT_LT(variance_of_x(path.size() - 1), variance_of_x(40)) << "lidar has made up for what was gathered";
+  EXPECT_LT(variance_of_x(path.size() - 1), variance_of_x(40)) << "lidar has corrected the accumulated drift";
 }
 
 /// Neither the capture nor the configuration is to blame.
@@ -185,7 +185,7 @@ TEST(Faults, OneOfTwoLidarsMayFailAndReturn) {
   for (const std::string fault : {"front:lost@2-4", "rear:lost@2-4", "front:lost@0", "rear:lost@0"}) {
     const Replay replay({folder.path().string(), "--fail", fault});
     ASSERT_EQ(replay.run().status, 0);
-    EXPECT_EQ(replay.run().err, "") << "it was asked for";
+    EXPECT_EQ(replay.run().err, "") << "the fault was requested";
     EXPECT_EQ(replay.summary()["sweeps"]["failed"], 0) << fault;
     const auto path = replay.trajectory();
     ASSERT_NEAR(static_cast<double>(path.size()), static_cast<double>(whole.size()), 2);

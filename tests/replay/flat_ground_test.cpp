@@ -41,7 +41,7 @@ TEST(FlatGround, EndsWithinASecondOfTheFirstStep) {
 TEST(FlatGround, DetectedIsHarmlessInThePlantAndHelpsWithoutLidar) {
   const SimulatedDrive drive("urban", "husky", 25);
   const Replay found = drive.replay(flat_ground("auto")), off = drive.replay(flat_ground("off"));
-  EXPECT_NE(read_text(found.file("odometry.tum")), read_text(off.file("odometry.tum"))) << "it was found";
+  EXPECT_NE(read_text(found.file("odometry.tum")), read_text(off.file("odometry.tum"))) << "flat ground was detected";
   EXPECT_LT(ape_mean_m(found), 1.05 * ape_mean_m(off));
 
   const auto climbed_without_lidar_m = [&](const std::string& mode) {

@@ -84,7 +84,7 @@ TEST(WrongImuCalibration, ReportAloneChangesNothing) {
   EXPECT_EQ(off.run().err.find("degrees about x (roll)"), std::string::npos);
   EXPECT_NE(reported.run().err.find("degrees about x (roll)"), std::string::npos) << reported.run().err;
   const json mounting = learned_of_imu(reported)["mounting_deg"];
-  EXPECT_LT(mounting["value"][0], -3.0) << "gross, which a map that was made of it does not change";
+  EXPECT_LT(mounting["value"][0], -3.0) << "gross, although the map was built with it";
   EXPECT_LT(std::abs(mounting["value"][1].get<double>()), 3.0);
 }
 

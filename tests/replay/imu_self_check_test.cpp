@@ -80,7 +80,7 @@ const SimulatedDrive& wheels() {
 
 TEST(WrongImu, OnWheelsIsRejectedBeforeItDistortsTheMap) {
   const SimulatedDrive& drive = wheels();
-  EXPECT_EQ(drive.replay().summary()["sources"]["imu"]["health_changes"], 0) << "that is not wrong";
+  EXPECT_EQ(drive.replay().summary()["sources"]["imu"]["health_changes"], 0) << "correct IMU";
   for (const Wrong& wrong : {kOtherWay, kDegrees})
     expect_refused(replay_with(wrong, drive), wrong, without_imu_m(drive));
 }

@@ -156,7 +156,8 @@ TEST_F(KittiReplay, MissingOrDamagedSweepsAreSkipped) {
   const Replay replay({"--kitti-as-published", drive_});
   EXPECT_EQ(replay.run().status, 0);
   EXPECT_TRUE(contains(replay.run().err, "1 sweeps lack their points in data or their time")) << replay.run().err;
-  EXPECT_TRUE(contains(replay.run().err, "3 sweeps are cut or no points, 0 not in the order")) << replay.run().err;
+  EXPECT_TRUE(contains(replay.run().err, "3 sweeps are truncated or not points, 0 not in the order"))
+      << replay.run().err;
   EXPECT_TRUE(contains(replay.run().err, "calib_imu_to_velo.txt")) << "it was not copied";
   EXPECT_GT(replay.summary()["sweeps"]["processed"], 30);
 }
@@ -185,7 +186,7 @@ TEST_F(KittiReplay, PointsInBinaryGiveTheSameBits) {
   rewrite_points([](const KittiPoint&) {});
   std::filesystem::resize_file(points(39).replace_extension(".bin"), 1001);
   const Replay binary({"--kitti-as-published", drive_});
-  EXPECT_TRUE(contains(binary.run().err, "1 sweeps are cut or no points")) << binary.run().err;
+  EXPECT_TRUE(contains(binary.run().err, "1 sweeps are truncated or not points")) << binary.run().err;
   const std::string all = read_text(text.file("odometry.tum")), less = read_text(binary.file("odometry.tum"));
   EXPECT_EQ(less.substr(0, less.size() / 2), all.substr(0, less.size() / 2));
   EXPECT_GT(lines_of(less).size(), 35U);
@@ -261,7 +262,7 @@ TEST_F(KittiReplay, SmallAnglesAreCorrected) {
   const double wrong_m = wrong.summary()["map_error_m"]["rmse"], right_m = right.summary()["map_error_m"]["rmse"];
   EXPECT_GT(wrong_m, 0.003);
   EXPECT_LT(right_m, 0.1 * wrong_m);
-  EXPECT_LT(right.summary()["ape_m"]["max"], 0.02) << "as that of the points as they were";
+  EXPECT_LT(right.summary()["ape_m"]["max"], 0.02) << "as that of the unchanged points";
   EXPECT_TRUE(contains(right.run().out, "0.205 degrees are added to its vertical angles")) << right.run().out;
   EXPECT_TRUE(contains(wrong.run().out, "its vertical angles are as published")) << wrong.run().out;
   EXPECT_EQ(right.summary()["kitti_vertical_angle_added_deg"], 0.205);
@@ -271,7 +272,7 @@ TEST_F(KittiReplay, SmallAnglesAreCorrected) {
 TEST(Kitti, AsPublishedRequiresADrive) {
   const Replay replay({"--kitti-as-published", room_drive()});
   EXPECT_EQ(replay.run().status, 2);
-  EXPECT_TRUE(contains(replay.run().err, "is no drive of KITTI")) << replay.run().err;
+  EXPECT_TRUE(contains(replay.run().err, "is not a drive of KITTI")) << replay.run().err;
 }
 
 TEST_F(KittiReplay, PacketFaultsAreAnError) {

@@ -229,7 +229,7 @@ TEST(McapOption, OverwritesNoInputAndReportsUnwritableFiles) {
   EXPECT_EQ(std::filesystem::file_size(capture), std::filesystem::file_size(room_drive() / "lidar.pcap"));
   EXPECT_TRUE(contains(refusal("/nowhere/out.mcap", 1), "/nowhere/out.mcap: cannot be written"));
   EXPECT_TRUE(contains(refusal("/dev/full", 1), "/dev/full: cannot be written"));
-  EXPECT_LT(lines_of(read_text(folder / "out/odometry.csv")).size(), 70U) << "it is said before the end of the run";
+  EXPECT_LT(lines_of(read_text(folder / "out/odometry.csv")).size(), 70U) << "reported before the end of the run";
   EXPECT_EQ(
       run_program(LOCUS_REPLAY, {"-o", folder / "out", "--realtime", "--mcap", folder / "a.mcap", capture}).status, 2);
 }

@@ -73,7 +73,7 @@ TEST(Mcap, MessagesGoingBackBySmallStepsAreReportedOutOfOrder) {
     std::ranges::reverse(std::span(messages).subspan(i, kBlock));
   write_bytes(folder / "backwards.mcap", mcap_file(messages, RosVersion::ros2, {.chunked = false}));
   const Replay replay({"-c", room_drive() / "config.yaml", folder / "backwards.mcap"});
-  EXPECT_TRUE(contains(replay.run().err, "messages stand behind one that was received later")) << replay.run().err;
+  EXPECT_TRUE(contains(replay.run().err, "messages follow one that was received later")) << replay.run().err;
 }
 
 TEST(Mcap, FolderOfSeveralFilesIsReadInTheOrderOfItsMetadata) {
@@ -214,10 +214,10 @@ TEST_F(SmallMcap, CutAtAnyByteIsReadUpToTheCut) {
       EXPECT_GE(cut.messages.size(), before);
       EXPECT_LE(cut.messages.size(), messages);
       before = cut.messages.size();
-      EXPECT_NE(cut.error.empty(), cut.warnings.empty()) << "it is said, once";
+      EXPECT_NE(cut.error.empty(), cut.warnings.empty()) << "reported once";
       EXPECT_LE(cut.warnings.size(), 1U);
     }
-    EXPECT_EQ(before, messages) << "the end alone is missing";
+    EXPECT_EQ(before, messages) << "only the end is missing";
   }
 }
 
@@ -258,7 +258,7 @@ TEST_F(SmallMcap, ChunkOfAnotherLengthThanDeclaredIsDropped) {
     for (const std::uint64_t size : {bad.size() - 1, bad.size() + 1, std::size_t{0}, std::size_t{1}}) {
       const Read read_back = read(closed(good + mcap_chunk(packed(bad, compression), {size, 0, name})));
       EXPECT_EQ(read_back.messages, std::vector<std::string>{"/imu 1 good"}) << name << size;
-      expect_warning(read_back, {"left out", "do not have their size"});
+      expect_warning(read_back, {"were skipped", "do not have their size"});
     }
     const std::string bytes = packed(bad, compression);
     for (const std::string& damaged :
@@ -388,7 +388,7 @@ TEST_F(SmallMcap, TopicsBeyondTheLimitsAreDroppedAndReported) {
                                   mcap_channel(3, 1, "/odd", long_name)}) {
     const Read bounded = read(closed(records() + more + mcap_message(3, 30, "odd")));
     expect_all(bounded);
-    expect_warning(bounded, {"with a name or type of more than 4096 bytes, are left out"});
+    expect_warning(bounded, {"with a name or type of more than 4096 bytes, are skipped"});
   }
   std::string many;
   for (std::size_t i = 0; i < 70'000; ++i)

@@ -113,7 +113,7 @@ TEST_P(Packed, FileCutAtAnyByteIsReadUpToTheCutAndReported) {
   for (std::size_t size = 6; size < whole.size(); ++size) {
     const Unpacked cut = unpack(whole.substr(0, size));
     EXPECT_TRUE(some_bytes(300).starts_with(cut.bytes)) << size;
-    EXPECT_TRUE(contains(cut.problem, "compression breaks off")) << size << cut.problem;
+    EXPECT_TRUE(contains(cut.problem, "compression is truncated")) << size << cut.problem;
   }
 }
 
@@ -140,7 +140,7 @@ TEST_P(Packed, CaptureGivesTheSameBits) {
   const Replay cut({name});
   EXPECT_EQ(cut.run().status, 0);
   EXPECT_EQ(lines_of(cut.run().err).size(), 1U) << cut.run().err;
-  EXPECT_TRUE(contains(cut.run().err, "breaks off")) << cut.run().err;
+  EXPECT_TRUE(contains(cut.run().err, "is truncated")) << cut.run().err;
 
   put(name, pack("hello, I am a text"));
   EXPECT_TRUE(contains(Replay({name}).run().err, "a text file, not a pcap or pcapng capture"));
@@ -250,10 +250,10 @@ TEST(Parts, OfACaptureAreReadInOrder) {
   const Replay whole({room_drive() / "lidar.pcap"}), parts({folder / "drive.pcap.gz"}),
       one({folder / "drive.pcap3.gz"});
   EXPECT_EQ(parts.run().err, "");
-  EXPECT_TRUE(contains(parts.run().out, "drive.pcap.gz: and the parts behind it, up to drive.pcap11"))
+  EXPECT_TRUE(contains(parts.run().out, "drive.pcap.gz: with the parts that follow it, up to drive.pcap11"))
       << parts.run().out;
   EXPECT_TRUE(read_text(parts.file("odometry.csv")) == read_text(whole.file("odometry.csv")));
-  EXPECT_LT(one.trajectory().size(), parts.trajectory().size() / 6) << "a part that is named stands for itself";
+  EXPECT_LT(one.trajectory().size(), parts.trajectory().size() / 6) << "a named part is replayed alone";
 }
 
 /// tcpdump -C with -W, or with a name without .pcap, names the parts like other files.
@@ -349,7 +349,7 @@ TEST_F(PackedBag, TruncatedBagIsReadUpToTheCut) {
   put(folder_ / "cut.mcap.zstd", whole.substr(0, whole.size() / 2));
   const Replay cut({"-c", room_drive() / "config.yaml", folder_ / "cut.mcap.zstd"});
   EXPECT_EQ(cut.run().status, 0);
-  EXPECT_TRUE(contains(cut.run().err, "cut.mcap.zstd: its zstd compression breaks off; what lies before it is used"))
+  EXPECT_TRUE(contains(cut.run().err, "cut.mcap.zstd: its zstd compression is truncated; what precedes it is used"))
       << cut.run().err;
   EXPECT_GT(cut.trajectory().size(), 20U);
 }
@@ -389,7 +389,8 @@ TEST_F(PackedBag, LeavesNoTemporaryFile) {
   const ProgramRun bad = replay_with("/nowhere/at/all");
   EXPECT_EQ(bad.status, 1);
   EXPECT_EQ(lines_of(bad.err).size(), 1U) << bad.err;
-  EXPECT_TRUE(contains(bad.err, "drive.db3.zst: it is packed, and cannot be unpacked in /nowhere/at/all")) << bad.err;
+  EXPECT_TRUE(contains(bad.err, "drive.db3.zst: it is compressed, and cannot be unpacked in /nowhere/at/all"))
+      << bad.err;
   std::filesystem::path path;
   {
     auto copy = tools::UnpackedCopy::make(folder_ / "drive.db3.zst", [](std::string_view) { return true; });

@@ -166,7 +166,7 @@ TEST_F(RealCapture, StandingVls128InABag) {
   const Replay with_gap({"--fail", "front:lost@0.1-0.2", (test_data() / "velodyne/vls128").string()});
   const nlohmann::json packets = with_gap.summary()["packets"]["front"];
   EXPECT_GT(packets["lost"], 500);
-  EXPECT_EQ(packets["data"].get<int>() + packets["lost"].get<int>(), 2193) << "all that was lost is counted";
+  EXPECT_EQ(packets["data"].get<int>() + packets["lost"].get<int>(), 2193) << "all lost packets are counted";
 }
 
 /// No option is needed: only one metadata file beside the capture is of the sensor that sent these packets.
@@ -241,7 +241,7 @@ TEST_F(RealCapture, OusterWithMetadataOfAnotherIsReported) {
     EXPECT_NE(replay.run().err.find(std::string{"64 datagrams to port 7502 of lidar front, rejected: "} + reason),
               std::string::npos)
         << replay.run().err;
-    EXPECT_NE(replay.run().err.find("is " + metadata + " the metadata of this sensor, as it was set then?"),
+    EXPECT_NE(replay.run().err.find("is " + metadata + " the metadata of this sensor, as it was configured then?"),
               std::string::npos);
   }
 }

@@ -196,8 +196,8 @@ TEST(SweepFolder, WrongTimesAreNamedWithFileAndLine) {
   expect_refused_with(fewer, {"times.txt", fmt::format("{} times for {} sweeps", fewer.size(), times.size())});
   expect_refused_with(swapped, {"times.txt:7", "is before the time before it"});
   expect_refused_with(twice, {"times.txt:8", "is equal to the time before it"});
-  expect_refused_with(words, {"times.txt:10", "noon is no time"});
-  expect_refused_with(nan, {"times.txt:10", "nan is no time"});
+  expect_refused_with(words, {"times.txt:10", "noon is not a time"});
+  expect_refused_with(nan, {"times.txt:10", "nan is not a time"});
   std::vector<std::string> numbers;
   for (std::size_t i = 0; i < times.size(); ++i)
     numbers.push_back(fmt::format("{:.4f}", 1e-4 * static_cast<double>(i)));
@@ -232,7 +232,8 @@ TEST(SweepFolder, UnreadableSweepsAreSkippedAndTheFirstIsNamed) {
   const Replay replay({"--set", kNoSources, drive});
   EXPECT_EQ(replay.run().status, 0) << replay.run().err;
   EXPECT_TRUE(contains(replay.run().err, "7.bin: 12345 bytes are not whole points of 16")) << replay.run().err;
-  EXPECT_TRUE(contains(replay.run().err, fmt::format("2 of {} sweeps are left out", room_clouds().size())));
+  EXPECT_TRUE(
+      contains(replay.run().err, fmt::format("2 of {} sweeps cannot be read and are skipped", room_clouds().size())));
   EXPECT_EQ(replay.summary()["lidars"]["front"]["clouds"]["received"], room_clouds().size() - 2);
   for (std::size_t i = 0; i < room_clouds().size(); ++i)
     std::filesystem::resize_file(drive / fmt::format("{}.bin", i), 17);
@@ -290,7 +291,7 @@ TEST(SweepFolder, IsNotOverwrittenByResults) {
   write_with_folders(drive / "times.txt", times_in("s"));
   const ProgramRun results = run_program(LOCUS_REPLAY, {"-o", drive, drive});
   EXPECT_EQ(results.status, 2);
-  EXPECT_TRUE(contains(results.err, "holds a recording")) << results.err;
+  EXPECT_TRUE(contains(results.err, "contains a recording")) << results.err;
   const ProgramRun sweeps = run_program(LOCUS_REPLAY, {"-o", folder / "out", "--sweeps", drive / "sweeps", drive});
   EXPECT_EQ(sweeps.status, 2);
   EXPECT_TRUE(contains(sweeps.err, "the recording that is read")) << sweeps.err;

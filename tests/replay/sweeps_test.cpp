@@ -227,9 +227,9 @@ TEST(SweepsOption, NonEmptyFolderAndUnknownFormatAreErrors) {
     EXPECT_TRUE(contains(run.err, said)) << run.err;
     EXPECT_FALSE(std::filesystem::exists(folder / "out/map.pcd"));
   };
-  expect_refusal({"--sweeps", folder / "used"}, "is there and not empty");
-  expect_refusal({"--sweeps", folder / "file"}, "is there and not empty");
-  expect_refusal({"--sweeps", folder / "out/"}, "the results go there");
+  expect_refusal({"--sweeps", folder / "used"}, "exists and is not empty");
+  expect_refusal({"--sweeps", folder / "file"}, "exists and is not empty");
+  expect_refusal({"--sweeps", folder / "out/"}, "is the folder of the results");
   expect_refusal({"--sweeps", folder / "drive/sweeps"}, "the recording that is read");
   expect_refusal({"--sweeps", "/proc/sweeps"}, "choose another with --sweeps", 1);
   expect_refusal({"--sweeps", folder / "a", "--sweeps-format", "las"}, "las");
@@ -247,7 +247,7 @@ TEST(SweepsOption, UnwritableSweepEndsTheRun) {
                                                 (room_drive() / "lidar.pcap").string())});
   EXPECT_EQ(run.status, 1);
   EXPECT_TRUE(contains(run.err, "000000.pcd: cannot be written (File too large)")) << run.err;
-  EXPECT_LT(lines_of(read_text(folder / "out/odometry.csv")).size(), 5U) << "it is said before the end of the run";
+  EXPECT_LT(lines_of(read_text(folder / "out/odometry.csv")).size(), 5U) << "reported before the end of the run";
 }
 
 } // namespace

@@ -49,7 +49,8 @@ TEST(Warnings, SourceWhoseSamplesAreAllRejected) {
                                       RosVersion::ros2);
   write_db3(folder / "drive.db3", messages);
   const Replay replay({"-c", room_drive() / "config.yaml", (folder / "drive.db3").string()});
-  EXPECT_NE(replay.run().err.find("warning: motion source wio was refused for"), std::string::npos) << replay.run().err;
+  EXPECT_NE(replay.run().err.find("warning: motion source wio was rejected for"), std::string::npos)
+      << replay.run().err;
   EXPECT_NE(replay.run().err.find("orientations that are no rotation"), std::string::npos) << replay.run().err;
   const std::string verdict = replay.summary()["sources"]["wio"]["verdict"];
   EXPECT_NE(verdict.find("orientations that are no rotation"), std::string::npos) << verdict;
@@ -70,9 +71,8 @@ TEST(Warnings, LidarThatSendsOnlyPositionPackets) {
   }
   const Replay replay({(folder / "positions.pcap").string()});
   EXPECT_EQ(replay.run().status, 1);
-  EXPECT_NE(
-      replay.run().err.find("position packets of a Velodyne and no data packet of it: the lidar is there and sends"),
-      std::string::npos)
+  EXPECT_NE(replay.run().err.find("position packets of a Velodyne and no data packet: the lidar is present and sends"),
+            std::string::npos)
       << replay.run().err;
 }
 
@@ -109,7 +109,7 @@ TEST(Warnings, TwoLidarsOnOnePortAreNamedWithTheConfigurationThatSeparatesThem) 
       addresses.destination_port = 2368;
   });
   expect_warning({capture}, {"lidar front: other senders use its port 2368", "packets from 192.168.1.201 are used",
-                             " from 192.168.1.202 are refused",
+                             " from 192.168.1.202 are rejected",
                              "lidars: [{name: front, port: 2368, source_ip: 192.168.1.201}, {name: front_2, port: "
                              "2368, source_ip: 192.168.1.202}]"});
   std::ofstream(folder / "both.yaml") << "lidars: [{name: front, port: 2368, source_ip: 192.168.1.201}, "
@@ -129,7 +129,7 @@ TEST(Warnings, PacketsOfAnUnknownModelAreNamedByTheirProductId) {
       payload[velodyne::kProductIdOffset] = std::byte{0x31};
   });
   expect_warning({"--duration", "1", capture},
-                 {"lidar front: refused product id 0x31 and return mode 0x37 in ", "lidars.front.source_ip"});
+                 {"lidar front: rejected product id 0x31 and return mode 0x37 in ", "lidars.front.source_ip"});
   rewrite(room_drive() / "lidar.pcap", capture, [](UdpAddresses&, Bytes& payload) {
     if (payload.size() == velodyne::kDataPacketBytes)
       payload[velodyne::kProductIdOffset] = std::byte{0x63};

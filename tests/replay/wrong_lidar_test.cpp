@@ -20,7 +20,7 @@ TEST(WrongLidar, WithOccasionalRangeOffsetsIsExcluded) {
     SCOPED_TRACE(from_s);
     const Replay replay = drive.replay(a_second_in_five("top:jump=2", from_s, 50.0));
     const json summary = replay.summary();
-    EXPECT_GE(summary["sweeps"]["failed"], 20) << "what is not believed is said";
+    EXPECT_GE(summary["sweeps"]["failed"], 20) << "excluded sweeps are counted";
     EXPECT_LE(summary["sweeps"]["failed"], 66) << "six seconds, and a sweep before and after each";
     EXPECT_EQ(summary["sources"]["wio"]["health_changes"], 0);
     EXPECT_LT(ape_mean_m(replay), 0.01);

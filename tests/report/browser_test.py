@@ -61,7 +61,7 @@ class Report(unittest.TestCase):
         self.assertEqual(len(browser.all("#stages svg.quantiles circle")), 9)
         self.assertEqual(browser.complaints(), [])
 
-    def test_hour_is_drawn_in_full_and_asks_nobody_for_anything(self):
+    def test_hour_is_drawn_in_full_without_network_requests(self):
         with self.browser("hour") as browser:
             self.expect_all_drawn(browser)
             self.assertEqual(browser.run("return performance.getEntriesByType('resource').length"), 0)
@@ -96,7 +96,7 @@ class Report(unittest.TestCase):
                 self.assertGreater(browser.run(CONTRAST, ["estimate", "truth"]), 2.0)
             browser.keep_picture("dark")
 
-    def test_canvases_follow_when_the_colours_of_the_page_change(self):
+    def test_canvases_follow_the_colour_scheme(self):
         with self.browser("hostile") as browser:
             before = {canvas: browser.canvas(canvas)["sum"] for canvas in ("#plan canvas", "#map canvas")}
             browser.set_dark(True)
@@ -112,7 +112,7 @@ class Report(unittest.TestCase):
             self.assertLessEqual(browser.run("return document.documentElement.scrollWidth"), 360)
             self.expect_all_drawn(browser)
 
-    def test_health_is_told_by_shape_not_by_colour_alone(self):
+    def test_health_is_shown_by_shape_and_colour(self):
         with self.browser("hostile") as browser:
             looks = browser.run("""
               const look = (rect) => [rect.getAttribute("fill").startsWith("url("), rect.getAttribute("height")].join();
@@ -123,11 +123,11 @@ class Report(unittest.TestCase):
             self.assertEqual(len({looks["used"], looks["healthy, not used"], looks["lost"]}), 3, looks)
             self.assertNotEqual(looks["tracking"], looks["degenerate"])
 
-    def test_what_is_wrong_with_a_source_is_told_beside_its_counts(self):
+    def test_verdict_on_a_source_is_shown_with_its_counts(self):
         with self.browser("hostile") as browser:
             self.assertIn("▲ nan 7, turns the other way", browser.one("#sources").text)
 
-    def test_map_turns_under_the_mouse_and_comes_nearer_with_the_wheel(self):
+    def test_map_rotates_by_dragging_and_zooms_by_the_wheel(self):
         with self.browser("hostile") as browser:
             canvas = browser.one("#map canvas")
             seen = [browser.canvas("#map canvas")["sum"]]
@@ -141,7 +141,7 @@ class Report(unittest.TestCase):
             self.assertEqual(seen.pop(), seen[0], "oblique again, as at first")
             self.assertEqual(len(set(seen)), 5, "each time another picture")
 
-    def test_instant_pointed_at_is_shown_in_every_figure(self):
+    def test_selected_instant_is_shown_in_every_figure(self):
         with self.browser("hostile") as browser:
             map_before = browser.canvas("#map canvas")["sum"]
             timeline = browser.one("#timeline .drawing > svg")
@@ -153,32 +153,32 @@ class Report(unittest.TestCase):
                 self.assertTrue(browser.one(dot).is_displayed())
             self.assertNotEqual(browser.canvas("#map canvas")["sum"], map_before)
 
-    def test_no_name_breaks_out_of_the_page(self):
+    def test_names_are_escaped(self):
         with self.browser("hostile") as browser:
             self.assertIsNone(browser.run("return window.broken_out ?? null"))
             self.assertIn("<script>window.broken_out", browser.one("#about").text)
             self.assertIn("</script>", browser.one("#sources").text)
             self.expect_all_drawn(browser)
 
-    def test_without_webgl_a_sentence_stands_in_for_the_map(self):
+    def test_without_webgl_a_message_replaces_the_map(self):
         with self.browser("hostile", webgl=False) as browser:
             self.assertIn("WebGL", browser.one("#map .note").text)
             self.assertEqual(browser.drawn(), FIGURES | TABLES)
             self.assertEqual(browser.complaints(), [])
 
-    def test_without_truth_map_or_sources_says_so_calmly(self):
+    def test_missing_truth_map_and_sources_are_noted(self):
         with self.browser("bare", width=360) as browser:
             self.assertEqual(browser.drawn(), FIGURES | TABLES)
-            self.assertIn("No true trajectory", browser.one("#boxes .note").text)
+            self.assertIn("no true trajectory", browser.one("#boxes .note").text)
             self.assertIn("map is empty", browser.one("#map .note").text)
             self.assertEqual(len(browser.all(".truth")), 0)
             self.assertEqual(browser.complaints(), [])
             browser.keep_picture("bare")
 
-    def test_recording_without_a_sweep_still_has_its_counters(self):
+    def test_recording_without_a_sweep_has_its_counters(self):
         with self.browser("nothing") as browser:
             self.assertEqual(browser.drawn(), TABLES)
-            self.assertIn("No sweep was seen", browser.one("#plan .note").text)
+            self.assertIn("There was no sweep", browser.one("#plan .note").text)
             self.assertIn("rejected: length", browser.one("#packets").text)
             self.assertIn("VLP-16", browser.one("#packets").text)
             self.assertEqual(browser.complaints(), [])

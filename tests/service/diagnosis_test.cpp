@@ -45,7 +45,7 @@ TEST_F(Diagnosis, LidarAtAnotherAddressIsReportedWithBothAddresses) {
                                    "lidars.front.source_ip to that of the lidar"))
       << testing::PrintToString(daemon.lines());
   const std::string shown = ctl({"status"}).out;
-  EXPECT_NE(shown.find("refused: sender "), std::string::npos) << shown;
+  EXPECT_NE(shown.find("rejected: sender "), std::string::npos) << shown;
   EXPECT_NE(shown.find("the last sender: 127.0.0.1"), std::string::npos) << shown;
 }
 
@@ -100,7 +100,7 @@ TEST_F(Diagnosis, UnknownProductIdIsReportedByServiceAndSensors) {
   Child daemon(locusd(lidar_with("model: auto")));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   const std::jthread device = unknown_device(capture(), std::byte{0x31});
-  EXPECT_TRUE(daemon.wait_for_line("its packets are refused (product id 0x31 "
+  EXPECT_TRUE(daemon.wait_for_line("its packets are rejected (product id 0x31 "
                                    "and return mode 0x37 in "))
       << testing::PrintToString(daemon.lines());
   EXPECT_TRUE(daemon.wait_for_line("Check that the lidar is of a supported model, and lidars.front.model"));
@@ -135,7 +135,7 @@ TEST_F(Diagnosis, UnknownProductIdIsNoProblemOnceItsSenderIsGone) {
     };
   };
   std::jthread device = unknown_device(capture(), std::byte{0x31});
-  EXPECT_TRUE(status_comes(problem_has("refused product id 0x31")));
+  EXPECT_TRUE(status_comes(problem_has("rejected product id 0x31")));
   device = {};
   EXPECT_TRUE(status_comes([](const nlohmann::json& status) { return status["lidars"]["front"]["problem"] == ""; }));
 }
@@ -240,7 +240,8 @@ TEST_F(Diagnosis, DisagreementOfWheelsAndLidarIsReportedWithItsPossibleCauses) {
   const Child play(leading_play({drive.string()}));
   EXPECT_TRUE(daemon.wait_for_line(
       "motion source wio and lidar disagree on how the robot moves; it is not used until they agree (possible causes: "
-      "its slip, scale or stamps, an IMU whose stamps are late, or lidar that follows what moves around the robot); "
+      "its slip, scale or stamps, an IMU whose stamps are late, or lidar that follows moving objects around the "
+      "robot); "
       "the next best one is used"))
       << testing::PrintToString(daemon.lines());
   EXPECT_TRUE(daemon.wait_for_line("Z_contradiction")) << "the input before it is kept";

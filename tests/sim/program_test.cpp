@@ -248,8 +248,8 @@ TEST(LocusSim, RequestedVehicleWithoutRoomIsAWarning) {
     return run.err;
   };
   EXPECT_EQ(said({"--realism", "clean", "--vehicle-s-per-min", "20"}),
-            "locus-sim: warning: --vehicle-s-per-min: nowhere on this drive is room for a vehicle beside a husky in "
-            "--world corridor, so none comes; try a wider world, another seed or a longer drive\n");
+            "locus-sim: warning: --vehicle-s-per-min: there is no room on this drive for a vehicle beside a husky in "
+            "--world corridor, so there is none; try a wider world, another seed or a longer drive\n");
   EXPECT_EQ(said({"--realism", "harsh"}), "");
 }
 
@@ -257,7 +257,7 @@ TEST(LocusSim, FolderThatCannotBeCreatedIsAnError) {
   const ProgramRun run = run_program(LOCUS_SIM, husky_in("corridor", "/dev/null/folder"));
   EXPECT_EQ(run.status, 1);
   EXPECT_EQ(run.err,
-            "locus-sim: /dev/null/folder: the folder cannot be made (Not a directory); choose another with -o\n");
+            "locus-sim: /dev/null/folder: the folder cannot be created (Not a directory); choose another with -o\n");
 }
 
 /// Detected at the start, not after an hour of driving.

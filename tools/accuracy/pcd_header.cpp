@@ -53,7 +53,7 @@ class PcdHeaderLines {
   PcdProblem read_number(const std::string& key, const std::vector<std::string>& values) {
     std::uint64_t& number = key == "WIDTH" ? header.width : key == "HEIGHT" ? header.height : header.points;
     if (values.size() != 1 || !parse_pcd(values[0], number))
-      return fmt::format("{} is no number; export it again", key);
+      return fmt::format("{} is not a number; export it again", key);
     return std::nullopt;
   }
 
@@ -74,7 +74,7 @@ class PcdHeaderLines {
       PcdHeader::Field field{names[i], lines_["TYPE"][i][0], 0, 0};
       if (!parse_pcd(lines_["SIZE"][i], field.bytes) || !parse_pcd(lines_["COUNT"][i], field.count) ||
           field.bytes > 8 || field.count > kMost)
-        return fmt::format("SIZE or COUNT of {} is no sensible number; export it again", names[i]);
+        return fmt::format("SIZE or COUNT of {} is not a sensible number; export it again", names[i]);
       header.fields.push_back(std::move(field));
     }
     return std::nullopt;

@@ -72,7 +72,7 @@ Expected<PointCloudFile, std::string> PointCloudFile::open(const std::filesystem
   if (!layout)
     return fmt::format("{}:{}", path.string(), layout.error());
   if (layout->points == 0)
-    return fmt::format("{}: holds no point; export the map again", path.string());
+    return fmt::format("{}: contains no point; export the map again", path.string());
   const std::streamoff begin = stream.tellg();
   const std::uint64_t bytes = std::filesystem::file_size(path, ignored) - static_cast<std::uint64_t>(begin);
   if (layout->encoding != PointCloudLayout::Encoding::text && layout->points > bytes / layout->record_bytes)

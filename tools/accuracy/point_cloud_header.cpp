@@ -93,7 +93,7 @@ class PlyHeader {
       return "the element vertex is not the first; export the points alone";
     ++elements_;
     if (in_vertex_ && !parse(words[2], builder.layout.points))
-      return fmt::format("{} is no number of points; export the map again", words[2]);
+      return fmt::format("{} is not a number of points; export the map again", words[2]);
     return std::nullopt;
   }
 

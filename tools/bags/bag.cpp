@@ -58,8 +58,8 @@ std::optional<std::size_t> Bag::topic_of(std::int64_t number) const {
 
 void Bag::add_bound_warnings(const std::string& file, std::vector<std::string>& lines) const {
   if (is_beyond_bounds_)
-    lines.push_back(fmt::format("{}: topics beyond the {}th, or with a name or type of more than {} bytes, are left "
-                                "out; copy or record it again",
+    lines.push_back(fmt::format("{}: topics beyond the {}th, or with a name or type of more than {} bytes, are "
+                                "skipped; copy or record it again",
                                 file, kMaxTopics, kMaxNameBytes));
 }
 
@@ -88,7 +88,7 @@ std::optional<std::string> why_unreadable(const std::filesystem::path& file) {
 }
 
 std::string timeless_messages(const std::string& file, std::uint64_t count) {
-  return fmt::format("{}: {} messages with an absurd time of reception left out; record again if it matters", file,
+  return fmt::format("{}: {} messages with an absurd time of reception were skipped; record again if they matter", file,
                      count);
 }
 

@@ -254,8 +254,8 @@ bool McapBag::accept_message(const McapRecord& record) {
 
 std::nullopt_t McapBag::break_off() {
   is_over_ = true;
-  break_ = fmt::format("{}: byte {}: the file ends in mid-record, or is damaged; what lies before it is used", name_,
-                       place_);
+  break_ =
+      fmt::format("{}: byte {}: the file ends in mid-record, or is damaged; what precedes it is used", name_, place_);
   return std::nullopt;
 }
 
@@ -271,10 +271,10 @@ std::vector<std::string> McapBag::warnings() const {
   else if (!is_closed_)
     lines.push_back(
         fmt::format("{}: was not closed by its recorder and has no index; all {} bytes are used, but the end "
-                    "may be missing; mcap recover makes it whole for other programs",
+                    "may be missing; mcap recover repairs it for other programs",
                     name_, size_));
   if (left_out_ > 0)
-    lines.push_back(fmt::format("{}: {} chunks or records cannot be read and were left out, the first at {}; "
+    lines.push_back(fmt::format("{}: {} chunks or records cannot be read and were skipped, the first at {}; "
                                 "copy or record it again",
                                 name_, left_out_, first_left_out_));
   if (timeless_ > 0)

@@ -43,7 +43,7 @@ std::optional<std::string> Ros1Bag::read_start() {
   stream_.read(start.data(), start.size());
   const std::string_view magic(start.data(), static_cast<std::size_t>(stream_.gcount()));
   if (!magic.starts_with("#ROSBAG V"))
-    return "not a ROS 1 bag, its first bytes are not #ROSBAG V2.0; give one that rosbag info reads";
+    return "not a ROS 1 bag, its first bytes are not #ROSBAG V2.0; name one that rosbag info reads";
   if (magic != kMagic)
     return "a bag of another format than 2.0; convert it with: rosbag reindex, then rosbag fix";
   at_ = kMagic.size();
@@ -164,7 +164,7 @@ bool Ros1Bag::accept_message(const BagRecord& message) {
 }
 
 void Ros1Bag::break_off(const std::string& why) {
-  break_ = fmt::format("{}: byte {}: {}; what lies before it is used", file_.string(), at_, why);
+  break_ = fmt::format("{}: byte {}: {}; what precedes it is used", file_.string(), at_, why);
 }
 
 std::vector<std::string> Ros1Bag::warnings() const {
@@ -174,7 +174,7 @@ std::vector<std::string> Ros1Bag::warnings() const {
   else if (index_ == 0)
     lines.push_back(
         fmt::format("{}: was not closed by its recorder and has no index; all {} bytes are used, but the end may be "
-                    "missing; rosbag reindex makes it whole for other programs",
+                    "missing; rosbag reindex repairs it for other programs",
                     file_.string(), size_));
   add_bound_warnings(file_.string(), lines);
   return lines;

@@ -85,7 +85,7 @@ Expected<std::vector<path>, std::string> files_of(const path& folder) {
       files.push_back(folder / path(file).filename()); // some versions prefix the name of the folder
     return files;
   } catch (const YAML::Exception& error) {
-    return fmt::format("{}:{}: not what rosbag2 writes ({}); make it again with: ros2 bag reindex", metadata.string(),
+    return fmt::format("{}:{}: not written by rosbag2 ({}); recreate it with: ros2 bag reindex", metadata.string(),
                        error.mark.line + 1, error.msg);
   }
 }
@@ -112,7 +112,7 @@ Expected<std::unique_ptr<Bag>, std::string> Ros2Bag::open(const path& where) {
     files = std::move(*found);
   }
   if (files.empty())
-    return fmt::format("{}: {} names no file; make it again with: ros2 bag reindex", where.string(), kMetadata);
+    return fmt::format("{}: {} names no file; recreate it with: ros2 bag reindex", where.string(), kMetadata);
   for (const path& file : files) {
     if (const std::optional<std::string> problem = bag->add(file))
       return *problem;
@@ -136,7 +136,7 @@ std::optional<std::string> Ros2Bag::add(const path& file) {
   if (!copy)
     return refuse(copy.error());
   if (!copy->problem().empty())
-    breaks_.push_back(refuse(copy->problem() + "; what lies before it is used"));
+    breaks_.push_back(refuse(copy->problem() + "; what precedes it is used"));
   if (!starts_with(copy->path(), kSqlite))
     return add(file, copy->path());
   const Expected<path, std::string> named = copy->give_name(); // SQLite opens files by name only
@@ -215,7 +215,7 @@ std::vector<std::string> Ros2Bag::warnings() const {
   for (const File& file : files_)
     std::ranges::move(file.bag->warnings(), std::back_inserter(lines));
   if (damaged_ > 0)
-    lines.push_back(fmt::format("{}: {} messages are compressed with zstd and damaged, and were left out; copy or "
+    lines.push_back(fmt::format("{}: {} messages are compressed with zstd and damaged, and were skipped; copy or "
                                 "record it again",
                                 name_, damaged_));
   add_bound_warnings(name_, lines);

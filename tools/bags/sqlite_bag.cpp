@@ -132,8 +132,8 @@ bool SqliteBag::read_row() {
     return true;
   }
   if (status != SQLITE_DONE)
-    break_ = fmt::format("{}: message {}: the database breaks off or is damaged ({}); what lies before it is used",
-                         name_, row_ + 1, sqlite3_errmsg(database_.get()));
+    break_ = fmt::format("{}: message {}: the database is truncated or damaged ({}); what precedes it is used", name_,
+                         row_ + 1, sqlite3_errmsg(database_.get()));
   rows_.reset();
   is_over_ = true;
   return false;

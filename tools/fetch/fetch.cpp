@@ -25,8 +25,8 @@ constexpr std::size_t kMostBytes = 1'000'000; ///< forty times the longest known
 /// Compares the size of an answer with the expected one; returns the problem, or nothing.
 std::optional<std::string> problem_of_size(std::size_t came, std::size_t expected) {
   if (expected > kMostBytes)
-    return fmt::format("claims to send {} bytes", expected);
-  return came < expected ? std::optional{fmt::format("the answer breaks off after {} of {} bytes", came, expected)}
+    return fmt::format("announces {} bytes", expected);
+  return came < expected ? std::optional{fmt::format("the answer ends after {} of {} bytes", came, expected)}
                          : std::nullopt;
 }
 
@@ -115,7 +115,7 @@ File ask_ouster_http(TcpClient& client) {
     return fmt::format("answers with HTTP status {}", head->status);
   if (head->is_chunked) {
     auto body = joined(std::string_view{answer}.substr(head->bytes));
-    return body ? as_metadata(*std::move(body)) : File{std::string{"the answer breaks off between its chunks"}};
+    return body ? as_metadata(*std::move(body)) : File{std::string{"the answer ends between its chunks"}};
   }
   if (auto problem = problem_of_size(answer.size() - head->bytes, head->content_bytes.value_or(0)))
     return *std::move(problem);
@@ -143,7 +143,7 @@ File ask_ouster_commands(TcpClient& client) {
     if (auto problem = client.receive(answer, kMostBytes, is_line))
       return *std::move(problem);
     if (!is_line(answer))
-      return fmt::format("the answer to {} breaks off", command.substr(0, command.size() - 1));
+      return fmt::format("the answer to {} is truncated", command.substr(0, command.size() - 1));
     answer.erase(answer.find_last_not_of(" \r\n") + 1);
     auto parsed = nlohmann::ordered_json::parse(answer, nullptr, false);
     metadata[std::string{part}] = parsed.is_discarded() ? nlohmann::ordered_json(answer) : std::move(parsed);
@@ -209,16 +209,17 @@ Expected<SensorFile, std::string> fetch_sensor_file(const std::string& address, 
   for (const Port& port : ports) {
     const auto to = parse_socket_address(fmt::format("{}:{}", host, port.number));
     if (!to || to->storage.ss_family == AF_UNIX)
-      return fmt::format("{}: is no address; give that of the lidar, e.g. 192.168.1.201", address);
+      return fmt::format("{}: not an address; name that of the lidar, e.g. 192.168.1.201", address);
     auto client = TcpClient::connect(*to, std::chrono::steady_clock::now() + options.patience);
     File file = client ? port.ask(*client) : client.error();
     if (file)
       return file;
     reasons += fmt::format("  {}, TCP port {}: {}\n", port.name, port.number, printable(file.error()));
   }
-  return fmt::format("{}: no lidar gives its metadata or angles there:\n{}look at its power, cable and address, which "
-                     "locusctl sensors shows; a Velodyne has nothing to be fetched",
-                     address, reasons);
+  return fmt::format(
+      "{}: no lidar answers with its metadata or angles there:\n{}check its power, cable and address, which "
+      "locusctl sensors shows; a Velodyne has nothing to fetch",
+      address, reasons);
 }
 
 } // namespace locus::tools

@@ -98,12 +98,13 @@ Problem read_sweeps(const path& folder, KittiDrive& drive) {
     return fmt::format("{}: no sweep that has points (data/0000000000.bin or .txt) and a time; copy the whole drive",
                        folder.string());
   if (missing > 0)
-    drive.warnings.push_back(fmt::format("{}: {} sweeps lack their points in data or their time and are left out",
-                                         folder.string(), missing));
+    drive.warnings.push_back(
+        fmt::format("{}: {} sweeps lack their points in data or their time and are skipped", folder.string(), missing));
   if (odd > 0)
-    drive.warnings.push_back(fmt::format("{}: {} sweeps left out, whose times are out of order or no turn of 40 to 250 "
-                                         "ms",
-                                         folder.string(), odd));
+    drive.warnings.push_back(
+        fmt::format("{}: {} sweeps were skipped: their times are out of order or not a revolution of 40 to 250 "
+                    "ms",
+                    folder.string(), odd));
   return std::nullopt;
 }
 
@@ -190,7 +191,7 @@ Problem read_inertial_unit(const path& folder, KittiDrive& drive) {
       drive.truth.push_back({*time, T_world_lidar});
   }
   if (unread > 0)
-    drive.warnings.push_back(fmt::format("{}: {} records cannot be read or are out of order and are left out",
+    drive.warnings.push_back(fmt::format("{}: {} records cannot be read or are out of order and are skipped",
                                          (folder / "oxts").string(), unread));
   return std::nullopt;
 }

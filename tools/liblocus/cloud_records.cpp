@@ -23,7 +23,7 @@ struct Record {
 void check_length(std::string_view name, std::size_t length, std::size_t points) {
   if (length != 0 && length != points)
     throw liblocus::Error(
-        fmt::format("cloud: {} has {} numbers for {} points; give as many as points, or none", name, length, points));
+        fmt::format("cloud: {} has {} numbers for {} points; pass one for each point, or none", name, length, points));
 }
 
 } // namespace
@@ -33,7 +33,7 @@ std::size_t points_of(const liblocus::Cloud& cloud) { return cloud.xyz_m.size() 
 void check_lengths(const liblocus::Cloud& cloud) {
   if (cloud.xyz_m.size() % 3 != 0)
     throw liblocus::Error(
-        fmt::format("cloud: xyz_m has {} numbers; give three for each point: x, y, z", cloud.xyz_m.size()));
+        fmt::format("cloud: xyz_m has {} numbers; pass three for each point: x, y, z", cloud.xyz_m.size()));
   check_length("time_s", cloud.time_s.size(), points_of(cloud));
   check_length("ring", cloud.ring.size(), points_of(cloud));
   check_length("intensity", cloud.intensity.size(), points_of(cloud));

@@ -25,7 +25,7 @@ std::string_view name_of(State state) { return to_string(TrackingState{static_ca
 std::uint32_t parse_ip(std::string_view text) {
   in_addr address{};
   if (inet_pton(AF_INET, std::string(text).c_str(), &address) != 1)
-    throw Error(fmt::format("source_ip: \"{}\" is no IPv4 address; write it as 192.168.1.201", text));
+    throw Error(fmt::format("source_ip: \"{}\" is not an IPv4 address; write it as 192.168.1.201", text));
   return ntohl(address.s_addr);
 }
 
@@ -40,7 +40,7 @@ struct Odometry::Implementation {
   /// Returns the estimates that an input completes.
   std::vector<Estimate> process(const daemon::Input& input) {
     if (std::exchange(finished, finished || std::holds_alternative<daemon::EndOfInput>(input)))
-      throw Error("an input after finish(); make another Odometry");
+      throw Error("an input after finish(); create another Odometry");
     engine.process(input);
     std::vector<Estimate> estimates(std::make_move_iterator(engine.completed().begin()),
                                     std::make_move_iterator(engine.completed().end()));
@@ -58,14 +58,14 @@ namespace {
 Stamp stamp_of(std::string_view what, std::int64_t ns) {
   const Stamp stamp = stamp_from_ns(ns);
   if (stamp < kEarliestStamp || stamp > kLatestStamp)
-    throw Error(fmt::format("{}: {} is not within 1951 and 2096; give nanoseconds since 1970", what, ns));
+    throw Error(fmt::format("{}: {} is not within 1951 and 2096; pass nanoseconds since 1970", what, ns));
   return stamp;
 }
 
 Eigen::Quaterniond rotation_of(std::string_view call, const std::array<double, 4>& xyzw) {
   const std::optional<Eigen::Quaterniond> rotation = unit_quaternion(xyzw[3], xyzw[0], xyzw[1], xyzw[2]);
   if (!rotation)
-    throw Error(fmt::format("{}: orientation_xyzw is no unit quaternion; its order is x, y, z, w", call));
+    throw Error(fmt::format("{}: orientation_xyzw is not a unit quaternion; its order is x, y, z, w", call));
   return *rotation;
 }
 
@@ -97,7 +97,7 @@ std::uint8_t Odometry::Implementation::cloud_lidar(std::string_view name) const 
   if (found == lidars.end())
     throw Error(fmt::format("cloud: no lidar {} is configured; there is {}", name, names_of_all(lidars)));
   if (!found->gives_clouds())
-    throw Error(fmt::format("cloud: lidar {0} takes packets; for clouds set lidars.{0}.topic=/points", name));
+    throw Error(fmt::format("cloud: lidar {0} receives packets; for clouds set lidars.{0}.topic=/points", name));
   return static_cast<std::uint8_t>(found - lidars.begin());
 }
 

@@ -46,7 +46,7 @@ std::optional<PlayArguments> parse_play_arguments(int argc, char** argv) {
          "Waits until the service of this control socket has processed each sweep before it sends more, so that "
          "a computer that is too slow or busy loses none")
       ->type_name("SOCKET");
-  app.add_flag("--quiet", arguments.quiet, "Prints warnings and errors only");
+  app.add_flag("--quiet", arguments.quiet, "Prints only warnings and errors");
   app.set_version_flag("--version", "locus-play " LOCUS_VERSION);
   app.footer("Examples:\n"
              "  locus-play robot_folder/\n"

@@ -139,12 +139,12 @@ void play(const PlayArguments& arguments, const Config& config, daemon::InputSou
     warn(fmt::format("{} motion samples were not sent: DDS did not accept them", motion.refused()));
   if (packets.sent() == 0)
     throw Failure(ExitStatus::failed,
-                  fmt::format("{}: holds no UDP datagram; nothing was sent", arguments.capture.string()));
+                  fmt::format("{}: contains no UDP datagram; nothing was sent", arguments.capture.string()));
   const bool expects_source_ip =
       std::ranges::any_of(config.lidars, [](const auto& l) { return l.source_ip.has_value(); });
   if (packets.changed_sender() && expects_source_ip)
     warn("this host does not have the addresses of the lidars: a receiver with source_ip in its configuration has "
-         "refused the packets");
+         "rejected the packets");
 }
 
 void play_folder(const PlayArguments& arguments) {
@@ -172,7 +172,7 @@ void play_stream(const PlayArguments& arguments) {
                             arguments.faults);
   play(arguments, config, recording, stream.capture(), [&] { return stream.capture().progress(); });
   for (const std::string& file : recording.unknown_files())
-    warn(fmt::format("{}: no motion source is configured for it; left out", file));
+    warn(fmt::format("{}: no motion source is configured for it; not sent", file));
   if (recording.problem())
     throw Failure(ExitStatus::failed, *recording.problem());
 }

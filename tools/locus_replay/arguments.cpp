@@ -30,7 +30,7 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   constexpr auto formats = names_of(CloudFormat{});
   std::string format{formats.front()};
 
-  CLI::App app{"Recorded lidar packets in; odometry, map and figures out.", "locus-replay"};
+  CLI::App app{"Replays recorded lidar data and writes odometry, map and figures.", "locus-replay"};
   app.add_option(
          "CAPTURE", arguments.capture,
          "A pcap or pcapng file, packed or not, - for standard input; a ROS 1 bag; MCAP; a ROS 2 bag, its folder "
@@ -38,52 +38,54 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
          "times; or a folder with lidar.pcap and any of imu.csv, NAME.tum, config.yaml, gt.tum, gt_map.ply")
       ->required();
   app.add_option("-o,--output", arguments.output,
-                 "Folder for odometry.tum, odometry.csv, map.pcd, report.html and summary.json; made if need be")
+                 "Folder for odometry.tum, odometry.csv, map.pcd, report.html and summary.json; created if missing")
       ->required()
       ->type_name("DIR");
   app.add_option("-c,--config", arguments.config, "Configuration; default: the folder's config.yaml, else defaults")
       ->type_name("FILE");
-  app.add_option("--set", arguments.overrides, "Overrides one key of it, e.g. lidars.0.port=2369; may be repeated")
+  app.add_option("--set", arguments.overrides,
+                 "Overrides one key of the configuration, e.g. lidars.0.port=2369; may be repeated")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
-  app.add_option("--imu", arguments.imu, "Samples of the motion source of kind imu, CSV as EuRoC's")->type_name("FILE");
-  app.add_option("--odometry", odometry, "Poses of the motion source NAME, as TUM; may be repeated")
+  app.add_option("--imu", arguments.imu, "Samples of the motion source of kind imu, CSV in the format of EuRoC")
+      ->type_name("FILE");
+  app.add_option("--odometry", odometry, "Poses of the motion source NAME, in TUM format; may be repeated")
       ->type_name("NAME=FILE")
       ->allow_extra_args(false);
   app.add_option("--ground-truth", arguments.ground_truth,
-                 "True poses of the robot to measure the odometry by, as TUM; default: the folder's gt.tum")
+                 "True poses for comparison with the odometry, in TUM format; default: the folder's gt.tum")
       ->type_name("FILE");
   app.add_option("--map-truth", arguments.map_truth,
-                 "True map to measure the map by, PLY or PCD; default: the folder's gt_map.ply")
+                 "True map for comparison with the map, PLY or PCD; default: the folder's gt_map.ply")
       ->type_name("FILE");
-  auto* mcap =
-      app.add_option("--mcap", arguments.mcap,
-                     "Also writes odometry, tf, corrected clouds and diagnostics as messages of ROS 2 into FILE, "
-                     "for Foxglove and rosbag2")
-          ->type_name("FILE");
+  auto* mcap = app.add_option("--mcap", arguments.mcap,
+                              "Also writes odometry, tf, corrected clouds and diagnostics as ROS 2 messages to FILE, "
+                              "for Foxglove and rosbag2")
+                   ->type_name("FILE");
   auto* sweeps =
       app.add_option("--sweeps", arguments.sweeps,
-                     "Also writes all returns of each sweep, corrected for motion, as files into DIR, a new or empty "
+                     "Also writes all returns of each sweep, corrected for motion, as files to DIR, a new or empty "
                      "folder, with times.txt and poses.txt")
           ->type_name("DIR");
   auto* calibrate =
       app.add_option("--calibrate", arguments.calibrate,
-                     "Replays several times, finds how late the stamps of an IMU are, how it is turned and the scales "
-                     "of wheels, continues with that and writes it into FILE, YAML for the configuration")
+                     "Replays several times, estimates the lateness and the mounting of an IMU and the scales of "
+                     "wheels, uses them in the run and writes them to FILE, YAML for the configuration")
           ->type_name("FILE");
-  app.add_option("--sweeps-format", format, "Of these files: pcd, ply or bin (KITTI's); default: pcd")
+  app.add_option("--sweeps-format", format, "Format of the files of --sweeps: pcd, ply or bin (KITTI's); default: pcd")
       ->type_name("FORMAT")
       ->check(CLI::IsMember(std::vector<std::string>(formats.begin(), formats.end())))
       ->needs(sweeps);
-  app.add_option("--start", start_s, "Leaves out what arrived earlier, seconds from the start of the capture")
+  app.add_option("--start", start_s, "Skips input that arrived earlier, seconds from the start of the capture")
       ->type_name("S")
       ->check(number_between(0, kLongest_s));
-  auto* duration = app.add_option("--duration", duration_s, "Leaves out what arrived this much later, seconds")
+  auto* duration = app.add_option("--duration", duration_s, "Ends the replay after this part of the recording, seconds")
                        ->type_name("S")
                        ->check(number_between(1e-3, kLongest_s));
-  auto* threads_option = app.add_option("--threads", threads, "That registration uses; does not change the result")
-                             ->type_name("N")
-                             ->check(CLI::Range(1, 256));
+  auto* threads_option =
+      app.add_option("--threads", threads, "Number of threads for registration; does not change the result")
+          ->type_name("N")
+          ->check(CLI::Range(1, 256));
   app.add_option("--fail", faults,
                  "Injects a fault, NAME:KIND[=VALUE]@T[-T1], e.g. all-lidars:lost@10-20; may be repeated. NAME: a "
                  "lidar, a motion source or all-lidars. KIND: lost, frozen, jump, nan, late, covariance, clock-step, "
@@ -91,17 +93,17 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
       ->type_name("SPEC")
       ->allow_extra_args(false);
   auto* realtime = app.add_flag("--realtime{1}", speed,
-                                "At the pace of the recording, or SPEED times it (--realtime=SPEED), through the "
-                                "threads of the service: sweeps that come too fast are dropped")
+                                "Replays at the pace of the recording, or SPEED times it (--realtime=SPEED), in the "
+                                "threads of the service; sweeps are dropped if these are too slow")
                        ->check(number_between(0.01, 1000))
                        ->excludes(mcap)
                        ->excludes(sweeps)
                        ->excludes(calibrate);
   app.add_flag(
       "--kitti-as-published", arguments.kitti_as_published,
-      "Leaves the points of a drive of KITTI as they are; default: their vertical angles are too small by 0.205 "
-      "degrees, which is put right");
-  app.add_flag("--quiet", arguments.quiet, "Prints warnings and errors alone");
+      "Uses the points of a drive of KITTI as published; default: corrects their vertical angles, which are too "
+      "small by 0.205 degrees");
+  app.add_flag("--quiet", arguments.quiet, "Prints only warnings and errors");
   app.set_version_flag("--version", "locus-replay " LOCUS_VERSION);
   app.footer("Examples:\n"
              "  locus-replay -o out drive.pcap\n"

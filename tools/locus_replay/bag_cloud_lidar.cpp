@@ -74,7 +74,7 @@ std::string other_topics(const Bag& bag, const Clouds& clouds, std::size_t used)
       others.push_back(bag.topics()[topic].name);
   }
   return others.empty() ? ""
-                        : fmt::format(", not {}, for it has most points; another is selected with --set "
+                        : fmt::format(", not {}, because it has most points; another is selected with --set "
                                       "lidars.0.topic={}",
                                       fmt::join(others, ", "), others.front());
 }
@@ -106,15 +106,14 @@ void configure_clouds_of(const std::filesystem::path& bag_file, Config& config, 
     lidar.T_base_lidar = *T_base_lidar;
     const Eigen::Vector3d& p = T_base_lidar->translation;
     const Eigen::Vector3d rpy_deg = to_rpy_rad(T_base_lidar->rotation) / kRadPerDeg;
-    lines.push_back(fmt::format("{}: the lidar ({}) sits at {:.3f} {:.3f} {:.3f} m, {:.1f} {:.1f} {:.1f} deg on {}, by "
-                                "/tf_static",
-                                bag_file.string(), seen.frame, p.x(), p.y(), p.z(), rpy_deg.x(), rpy_deg.y(),
-                                rpy_deg.z(), base));
-  } else {
     lines.push_back(
-        fmt::format("{}: /tf_static does not say where the lidar ({}) sits on {}, so poses are those of the "
-                    "lidar; set it with --set lidars.0.T_base_lidar.xyz_m=[X,Y,Z], and rpy_deg",
-                    bag_file.string(), seen.frame, base));
+        fmt::format("{}: the lidar ({}) is mounted at {:.3f} {:.3f} {:.3f} m, {:.1f} {:.1f} {:.1f} deg on {}, by "
+                    "/tf_static",
+                    bag_file.string(), seen.frame, p.x(), p.y(), p.z(), rpy_deg.x(), rpy_deg.y(), rpy_deg.z(), base));
+  } else {
+    lines.push_back(fmt::format("{}: /tf_static has no mounting of the lidar ({}) on {}, so poses are those of the "
+                                "lidar; set it with --set lidars.0.T_base_lidar.xyz_m=[X,Y,Z], and rpy_deg",
+                                bag_file.string(), seen.frame, base));
   }
 }
 

@@ -45,10 +45,11 @@ class MotionTopic {
 
   /// Returns a line about unreadable messages; empty if there are none.
   [[nodiscard]] std::string problem(const std::filesystem::path& file) const {
-    return malformed_ == 0 ? ""
-                           : fmt::format("{}: {} messages on {} are cut short or no {} and were left out; record again "
-                                         "if it matters",
-                                         file.string(), malformed_, name_.name, name_.type);
+    return malformed_ == 0
+               ? ""
+               : fmt::format("{}: {} messages on {} are truncated or not a {} and were skipped; record again "
+                             "if it matters",
+                             file.string(), malformed_, name_.name, name_.type);
   }
 
  private:

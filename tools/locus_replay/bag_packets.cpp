@@ -125,14 +125,14 @@ std::string BagPackets::why_none() const {
 std::vector<std::string> BagPackets::warnings() const {
   std::vector<std::string> lines = bag_->warnings();
   if (misplaced_ > 0)
-    lines.push_back(fmt::format("{}: {} messages stand behind one that was received later: the recorder's clock was "
-                                "set, or the bag is not in order, and what was made of it is wrong; sort it with: "
+    lines.push_back(fmt::format("{}: {} messages follow one that was received later: the recorder's clock was "
+                                "set, or the bag is not in order, and the results are wrong; sort it with: "
                                 "rosbag filter BAG SORTED_BAG True, or mcap sort BAG -o SORTED_BAG",
                                 file_.string(), misplaced_));
   if (malformed_ > 0)
     lines.push_back(
-        fmt::format("{}: {} of {} messages of type {} are cut short, or not serialised as little-endian, and "
-                    "were left out; record again if it matters",
+        fmt::format("{}: {} of {} messages of type {} are truncated, or not serialised as little-endian, and "
+                    "were skipped; record again if they matter",
                     file_.string(), malformed_, messages_, types()));
   return lines;
 }

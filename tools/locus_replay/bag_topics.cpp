@@ -261,7 +261,7 @@ std::string describe(const Bag& bag, const std::string& bag_name, const Config& 
       left_out.push_back(topic.name);
   }
   return fmt::format("{}: {}{}{}", bag_name, fmt::join(used, ", "),
-                     left_out.empty() ? "" : "; left out: ", fmt::join(left_out, ", "));
+                     left_out.empty() ? "" : "; not used: ", fmt::join(left_out, ", "));
 }
 
 } // namespace

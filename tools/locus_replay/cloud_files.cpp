@@ -12,7 +12,8 @@
 namespace locus::tools {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "files hold the machine's bytes, everybody's are little");
+static_assert(std::endian::native == std::endian::little,
+              "files have the byte order of the machine, which must be little-endian");
 
 std::size_t bytes_of(const CloudColumn& column) {
   return column.type == CloudColumn::Type::float32 ? sizeof(float) : sizeof(std::uint16_t);

@@ -79,7 +79,7 @@ FoundRecording find_recording(const std::filesystem::path& named) {
   const auto inside = captures_in(named).empty() ? recordings_in(named) : std::vector<std::filesystem::path>{};
   if (inside.size() > 1)
     throw Failure(ExitStatus::failed,
-                  fmt::format("{}: holds {} recordings, but is not one itself; name one of them: {}", named.string(),
+                  fmt::format("{}: contains {} recordings, but is not one itself; name one of them: {}", named.string(),
                               inside.size(), names_of_some(inside)));
   if (inside.empty())
     return {named, value_or_fail(CaptureFolder::find(named), ExitStatus::failed), ""};
@@ -90,7 +90,7 @@ FoundRecording find_recording(const std::filesystem::path& named) {
 void check_output(const std::filesystem::path& folder) {
   if (std::filesystem::is_directory(folder) && files_of(folder))
     throw Failure(ExitStatus::wrong_usage,
-                  fmt::format("-o {}: holds a recording; choose another folder for the results", folder.string()));
+                  fmt::format("-o {}: contains a recording; choose another folder for the results", folder.string()));
 }
 
 } // namespace locus::tools

@@ -47,8 +47,9 @@ std::string KittiPackets::why_none() const {
 std::vector<std::string> KittiPackets::warnings() const {
   if (damaged_ + unordered_ == 0)
     return {};
-  return {fmt::format("{}: {} sweeps are cut or no points, {} not in the order of the lidar's lines; they are left out",
-                      sweeps_.front().file.parent_path().string(), damaged_, unordered_)};
+  return {fmt::format(
+      "{}: {} sweeps are truncated or not points, {} not in the order of the lidar's lines; they are skipped",
+      sweeps_.front().file.parent_path().string(), damaged_, unordered_)};
 }
 
 double KittiPackets::progress() const { return static_cast<double>(next_sweep_) / static_cast<double>(sweeps_.size()); }

@@ -110,7 +110,7 @@ bool fits_no_packet(const LidarInput& lidar) {
 std::string metadata_of_another(const LidarInput& lidar) {
   const PacketCounters& counters = lidar.counters();
   return fmt::format("{} datagrams to port {} of lidar {}, rejected: {}; is {} the metadata of this sensor, as it was "
-                     "set then?",
+                     "configured then?",
                      counters.received - counters.position, lidar.options().port, lidar.options().name,
                      rejections(counters), lidar.options().metadata);
 }
@@ -131,7 +131,7 @@ std::string not_heard(const LidarInput& lidar, const Recording& recording, const
       return fmt::format("{}; {} packets went to port {}: if they are its own, use --set lidars.{}.port={}", line,
                          packets, port, options.name, port);
   }
-  return line + "; check its port and address, or take it out of the configuration";
+  return line + "; check its port and address, or remove it from the configuration";
 }
 
 /// Names the maker if most packets that could be a lidar's look like another maker's.
@@ -153,7 +153,7 @@ std::string other_makers(const std::map<std::uint16_t, PortTraffic>& traffic, co
     if (packets <= velodyne)
       continue;
     if (maker == OtherMaker::ouster && packets == of_imu)
-      return fmt::format("{} packets of the inertial unit of an Ouster (most go to port {}), and none of its columns; "
+      return fmt::format("{} packets of the inertial unit of an Ouster (most go to port {}), but none of its columns; "
                          "record its lidar port as well, mostly {}",
                          packets, port, ouster::kDefaultLidarPort);
     if (maker == OtherMaker::ouster && has_ouster)
@@ -161,7 +161,8 @@ std::string other_makers(const std::map<std::uint16_t, PortTraffic>& traffic, co
     if (maker == OtherMaker::ouster)
       return fmt::format(
           "{} packets look like those of a lidar of Ouster (most go to port {}, the last of them with {} "
-          "bytes), and no metadata of it is named or alone beside the capture; fetch it, as it was set then: locusctl "
+          "bytes), but no metadata of it is named, and there is not exactly one file of them beside the capture; fetch "
+          "it in the mode of the recording: locusctl "
           "fetch SENSOR -o drive.json for a drive.pcap, or name it: --set "
           "lidars.0.metadata=FILE --set lidars.0.port={}",
           packets, port, busiest.bytes, port);
@@ -206,9 +207,9 @@ std::string why_no_data(const Recording& recording, const LidarRouter& lidars) {
     return other;
   if (const std::uint64_t positions = total_of(traffic, velodyne::kPositionPacketBytes); packets == 0 && positions > 0)
     return fmt::format(
-        "it holds {} position packets of a Velodyne and no data packet of it: the lidar is there and sends "
-        "none, for its laser or its motor is off, or they go to another address; switch them on and look "
-        "at the destination on the lidar's web page, or record the data port as well, mostly {}",
+        "it contains {} position packets of a Velodyne and no data packet: the lidar is present and sends "
+        "none, because its laser or motor is off, or they go to another address; switch them on and check "
+        "the destination on the lidar's web page, or record the data port as well, mostly {}",
         positions, kDefaultDataPort);
   if (packets == 0)
     return fmt::format("none of its UDP datagrams has the size of a data packet, {} bytes; most ({}) go to port {}; "
@@ -220,7 +221,7 @@ std::string why_no_data(const Recording& recording, const LidarRouter& lidars) {
   const LidarInput& lidar =
       *std::ranges::find_if(lidars.lidars(), [port = port](const LidarInput& l) { return l.listens_to(port); });
   if (lost_by_request(lidar, recording))
-    return fmt::format("--fail {} keeps all {} packets to port {} back; let some through, for example with @10-20",
+    return fmt::format("--fail {} removes all {} packets to port {}; limit its time, for example with @10-20",
                        fmt::join(losses_of(lidar, recording), " and "), packets, port);
   const PacketCounters total = lidars.total();
   if (first.source_ip && total[PacketError::sender] > 0)
@@ -238,7 +239,7 @@ std::string why_no_clouds(const daemon::Figures& figures) {
   for (std::size_t i = 0; i < figures.config.lidars.size(); ++i) {
     const auto& clouds = figures.ingest.lidars[i].clouds;
     if (clouds && clouds->counters.received > 0)
-      lines.push_back(fmt::format("{} clouds on {}, refused: {}; take another topic, or look at what its driver "
+      lines.push_back(fmt::format("{} clouds on {}, rejected: {}; choose another topic, or check what its driver "
                                   "publishes",
                                   clouds->counters.received, figures.config.lidars[i].topic,
                                   refusals(clouds->counters)));
@@ -255,10 +256,10 @@ std::vector<std::string> cloud_warnings(const daemon::Figures& figures) {
       continue;
     const CloudCounters& counters = lidar.clouds->counters;
     if (counters.received == 0)
-      warnings.push_back(fmt::format("lidar {}: no cloud on {}; name its topic, or take it out of the configuration",
+      warnings.push_back(fmt::format("lidar {}: no cloud on {}; name its topic, or remove it from the configuration",
                                      options.name, options.topic));
     else if (counters.used < counters.received)
-      warnings.push_back(fmt::format("lidar {}: {} of {} clouds on {} refused: {}", options.name,
+      warnings.push_back(fmt::format("lidar {}: {} of {} clouds on {} rejected: {}", options.name,
                                      counters.received - counters.used, counters.received, options.topic,
                                      refusals(counters)));
     std::ranges::move(daemon::cloud_doubts(options, lidar), std::back_inserter(warnings));
@@ -275,8 +276,8 @@ std::vector<std::string> lidar_warnings(const Recording& recording, const LidarR
     if (lidar.counters().data == 0 && !lost_by_request(lidar, recording))
       warnings.push_back(not_heard(lidar, recording, lidars));
     if (const auto model = other_model(lidar))
-      warnings.push_back(fmt::format("lidar {0}: configured as {1}, but its packets are those of a {2}, and read as a "
-                                     "{1}'s they make a wrong world; use --set lidars.{0}.model=auto",
+      warnings.push_back(fmt::format("lidar {0}: configured as {1}, but its packets are those of a {2}; decoded as a "
+                                     "{1}'s, their points are wrong; use --set lidars.{0}.model=auto",
                                      lidar.options().name, configured_model(lidar.options()), *model));
     const auto report = daemon::IngestReport::Lidar::of(lidar);
     if (auto warning = report.packets.data > 0 ? daemon::unknown_model(lidar.options(), report) : std::nullopt)

@@ -84,14 +84,14 @@ std::vector<MotionRecording> read_motion(const Arguments& arguments, const Captu
   for (const MotionFile& file : motion_files(arguments, folder)) {
     const std::optional<SourceId> source = source_of(file, sources);
     if (source && is_read(*source))
-      throw Failure(ExitStatus::wrong_usage, fmt::format("{}: a second file for motion source {}; keep one",
+      throw Failure(ExitStatus::wrong_usage, fmt::format("{}: a second file for motion source {}; remove one",
                                                          file.files.front().string(), file.name));
     if (source)
       recordings.push_back(read(file, *source, warnings));
     else if (file.named_by_user)
       throw Failure(ExitStatus::wrong_usage, without_source(file));
     else
-      warnings.push_back(without_source(file) + "; left out");
+      warnings.push_back(without_source(file) + "; not used");
   }
   for (std::size_t i = 0; config_is_users_own && i < sources.size(); ++i) {
     if (!is_read(SourceId{i}) && !sources[i].of_lidar)

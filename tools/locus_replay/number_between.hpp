@@ -13,7 +13,7 @@ inline CLI::Validator number_between(double low, double high) {
   return {[=](const std::string& text) {
             double number = 0;
             const bool within = CLI::detail::lexical_cast(text, number) && number >= low && number <= high;
-            return within ? std::string{} : fmt::format("{} is no number from {} to {}", text, low, high);
+            return within ? std::string{} : fmt::format("{} is not a number from {} to {}", text, low, high);
           },
           ""};
 }

@@ -163,7 +163,7 @@ FoundMetadata find_metadata(const CaptureFolder& folder, Config& config) {
     return found;
   const std::uint16_t port = is_bag ? chosen->decoder->metadata().lidar_port : *chosen->port;
   if (!chosen->is_named && std::ranges::count_if(candidates, fits) > 1) {
-    found.warnings.push_back(fmt::format("{}: could be of {} as well as of other files beside it; name one: --set "
+    found.warnings.push_back(fmt::format("{}: matches {} as well as other files beside it; name one: --set "
                                          "lidars.0.metadata=FILE --set lidars.0.port={}",
                                          recording.string(), chosen->origin, port));
     return found;

@@ -21,7 +21,7 @@ inline void make_folder(const std::filesystem::path& folder, std::string_view op
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error)
-    throw Failure(ExitStatus::failed, fmt::format("{}: the folder cannot be made ({}); choose another with {}",
+    throw Failure(ExitStatus::failed, fmt::format("{}: the folder cannot be created ({}); choose another with {}",
                                                   folder.string(), error.message(), option));
 }
 

@@ -87,13 +87,13 @@ void check_sweeps(const Arguments& arguments, const CaptureFolder& folder) {
   std::error_code error;
   const path& sweeps = arguments.sweeps;
   if (are_one(sweeps / "", arguments.output / ""))
-    throw Failure(
-        ExitStatus::wrong_usage,
-        fmt::format("--sweeps {0}: the results go there; choose a folder in it, --sweeps {0}/sweeps", sweeps.string()));
+    throw Failure(ExitStatus::wrong_usage,
+                  fmt::format("--sweeps {0}: is the folder of the results; choose a folder in it, --sweeps {0}/sweeps",
+                              sweeps.string()));
   if (std::filesystem::exists(sweeps, error) && !std::filesystem::is_empty(sweeps, error) && !error)
     throw Failure(
         ExitStatus::wrong_usage,
-        fmt::format("--sweeps {}: is there and not empty; choose a new folder, or remove this one", sweeps.string()));
+        fmt::format("--sweeps {}: exists and is not empty; choose a new folder, or remove this one", sweeps.string()));
   check_is_apart("--sweeps", "folder", sweeps, arguments, folder);
 }
 
@@ -118,8 +118,9 @@ void check_nothing_is_written_over(const Arguments& arguments, const CaptureFold
     if (!file.empty())
       outputs.push_back({file, fmt::format("file with {}", option)});
   if (!arguments.mcap.empty() && are_one(arguments.mcap, arguments.calibrate))
-    throw Failure(ExitStatus::wrong_usage,
-                  fmt::format("--calibrate {}: is that of --mcap; choose another file", arguments.calibrate.string()));
+    throw Failure(
+        ExitStatus::wrong_usage,
+        fmt::format("--calibrate {}: is also the file of --mcap; choose another file", arguments.calibrate.string()));
   for (const char* const name : kResultFiles)
     outputs.push_back({arguments.output / name, "folder with -o"});
   std::error_code ignored;

@@ -48,9 +48,8 @@ RecordedInput open_drive_input(const Arguments& arguments, const std::filesystem
                                std::vector<std::string>& warnings) {
   for (const Fault& fault : arguments.faults) {
     if (std::ranges::any_of(config.lidars, [&](const LidarOptions& lidar) { return fault.strikes_lidar(lidar.name); }))
-      throw Failure(
-          ExitStatus::wrong_usage,
-          fmt::format("--fail {}: a drive of KITTI has no packets that could fail; fail a motion source", fault.name));
+      throw Failure(ExitStatus::wrong_usage,
+                    fmt::format("--fail {}: a drive of KITTI has no packets; choose a motion source", fault.name));
   }
   KittiDrive drive = value_or_fail(KittiDrive::open(folder), ExitStatus::failed);
   RecordedInput input{nullptr, read_motion(arguments, {}, config, false, warnings), "", {}};
@@ -133,8 +132,9 @@ std::optional<double> raised_by_deg(const Arguments& arguments) {
 RecordedInput open_input(const Arguments& arguments, const CaptureFolder& folder, const Config& config,
                          bool config_is_users_own, std::vector<std::string>& warnings) {
   if (arguments.kitti_as_published && !raised_by_deg(arguments))
-    throw Failure(ExitStatus::wrong_usage, fmt::format("--kitti-as-published: {} is no drive of KITTI; leave it out",
-                                                       folder.lidar.front().string()));
+    throw Failure(ExitStatus::wrong_usage,
+                  fmt::format("--kitti-as-published: {} is not a drive of KITTI; remove this option",
+                              folder.lidar.front().string()));
   if (looks_like_bag(folder.lidar.front()))
     return open_bag_input(arguments, folder.lidar.front(), config, config_is_users_own, warnings);
   if (KittiDrive::is(folder.lidar.front()))
@@ -144,7 +144,7 @@ RecordedInput open_input(const Arguments& arguments, const CaptureFolder& folder
   auto capture = std::make_unique<CaptureSequence>(
       value_or_fail(CaptureSequence::open(folder.lidar, open_capture), ExitStatus::failed));
   const bool has_parts = folder.lidar.size() > 1 && folder.lidar.front() == arguments.capture;
-  std::string used = has_parts ? fmt::format("{}: and the parts behind it, up to {}", arguments.capture.string(),
+  std::string used = has_parts ? fmt::format("{}: with the parts that follow it, up to {}", arguments.capture.string(),
                                              folder.lidar.back().filename().string())
                                : "";
   if (const auto part = folder.lidar.size() == 1 ? part_beside(arguments.capture) : std::nullopt)

@@ -111,7 +111,7 @@ std::vector<std::string> RecordedTimes::warnings() const {
     lines.push_back(fmt::format(
         "the times of arrival are all the same, so those of the lidar's own clock are used{}",
         is_utc_ ? ", which is UTC by its PPS and GPRMC"
-                : ", from the first arrival on; files of other sensors do not fit it: record again with times"));
+                : ", from the first arrival on; files of other sensors do not match it: record again with times"));
   return lines;
 }
 

@@ -39,7 +39,7 @@ void check_faults(const std::vector<Fault>& faults, const Config& config) {
     for (const Fault& fault : faults) {
       if (lidar.gives_clouds() && fault.strikes_lidar(lidar.name))
         throw Failure(ExitStatus::wrong_usage,
-                      fmt::format("--fail {}: lidar {} gives clouds, and only packets are made to fail; fail a motion "
+                      fmt::format("--fail {}: lidar {} has clouds, and faults apply to packets only; choose a motion "
                                   "source",
                                   fault.name, lidar.name));
     }
@@ -209,7 +209,7 @@ std::vector<std::string> Recording::warnings() const {
     const std::optional<TimeSpan> span = motion.arrivals();
     if (started_ && !motion.has_faults && (!span || span->last < first_ || span->first > last_))
       warnings.push_back(fmt::format("{}: its samples ({}) and the packets ({}) have no time in common, so nothing of "
-                                     "it was used; give what was recorded with them, by the same clock",
+                                     "it was used; name a file that was recorded with them, by the same clock",
                                      motion.recording.file.string(), text_of(span), text_of(TimeSpan{first_, last_})));
   }
   return warnings;

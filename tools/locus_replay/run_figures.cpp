@@ -60,20 +60,19 @@ void add_accuracy(const Accuracy& accuracy, ordered_json& json) {
 std::string readable(const Accuracy& accuracy, std::size_t estimates) {
   std::string text;
   if (const auto& trajectory = accuracy.trajectory) {
-    text += fmt::format("truth      off by {:.3f} m in the mean, {:.3f} m at most; unaligned, {:.3f} m at the end",
+    text += fmt::format("truth      off by {:.3f} m in the mean, {:.3f} m at most; at the end {:.3f} m, unaligned",
                         trajectory->ape_m.mean, trajectory->ape_m.max, trajectory->end_drift_m);
     if (trajectory->rpe_10m_percent)
       text +=
           fmt::format("; {:.2f} % and {:.2f} deg over 10 m", *trajectory->rpe_10m_percent, *trajectory->rpe_10m_deg);
     if (trajectory->stamps.size() < estimates)
-      text += fmt::format("; it speaks of {} of {} sweeps", trajectory->stamps.size(), estimates);
+      text += fmt::format("; it covers {} of {} sweeps", trajectory->stamps.size(), estimates);
     text += '\n';
   }
   if (const auto& consistency = accuracy.consistency; consistency && consistency->nees_10m)
-    text += fmt::format(
-        "honesty    normalised squared error over 10 m {:.1f} (6: the covariances are right; below: too cautious; "
-        "above: too sure), worst position {:.1f} sigma off\n",
-        *consistency->nees_10m, consistency->worst_sigma);
+    text += fmt::format("covariance normalised squared error over 10 m {:.1f} (6: consistent; below: too large; "
+                        "above: too small), worst position {:.1f} sigma off\n",
+                        *consistency->nees_10m, consistency->worst_sigma);
   if (const auto& map = accuracy.map) {
     text += fmt::format("map truth  {} of {} points within 1 m", map->compared, map->compared + map->outliers);
     text += map->rmse_m ? fmt::format(", off by {:.3f} m rms\n", *map->rmse_m) : "\n";
@@ -103,7 +102,7 @@ std::string readable(const FinishedRun& run) {
                           lidar.return_mode, lidar.rotation_rate_rpm,
                           lidar.has_date ? fmt::format(", clock {}", lidar.pps) : "");
     if (const auto& clouds = lidar.clouds)
-      text += fmt::format("{:10} {} clouds of {} used, {:.1f} a second, {:.0f} points each; times: {}, rings: {}\n",
+      text += fmt::format("{:10} {} clouds of {} used, {:.1f} per second, {:.0f} points each; times: {}, rings: {}\n",
                           figures.config.lidars[i].name, clouds->counters.used, clouds->counters.received,
                           1.0 / to_seconds(clouds->period),
                           static_cast<double>(clouds->counters.points) /
@@ -120,7 +119,7 @@ std::string readable(const FinishedRun& run) {
   text += fmt::format("path       {:.2f} m, ends at {:.3f} {:.3f} {:.3f} m\n", sweeps.path_m, end_m.x(), end_m.y(),
                       end_m.z());
   text +=
-      fmt::format("time       {:.2f} ms a sweep from its cut, 99 % within {:.2f} ms; {:.1f} s in all, {:.0f} MB\n",
+      fmt::format("time       {:.2f} ms per sweep from its cut, 99 % within {:.2f} ms; {:.1f} s in all, {:.0f} MB\n",
                   sweeps.process_ms.p50, sweeps.process_ms.p99, to_seconds(figures.spent.wall), daemon::peak_rss_mb());
   return text + readable(run.accuracy, sweeps.sweeps);
 }

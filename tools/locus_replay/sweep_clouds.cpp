@@ -36,8 +36,8 @@ std::string SweepClouds::why_none() const {
 std::vector<std::string> SweepClouds::warnings() const {
   if (damaged_ == 0)
     return {};
-  return {fmt::format("{} ({} of {} sweeps are left out that cannot be read, this one first)", first_problem_, damaged_,
-                      folder_.sweeps.size())};
+  return {fmt::format("{} ({} of {} sweeps cannot be read and are skipped; this is the first)", first_problem_,
+                      damaged_, folder_.sweeps.size())};
 }
 
 double SweepClouds::progress() const {

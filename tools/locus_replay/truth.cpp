@@ -50,7 +50,7 @@ Accuracy Truth::compare(std::span<const SurfacePoint> map, bool show_progress) {
       accuracy.map = *found;
     if (found && found->compared == 0)
       accuracy.warnings.push_back(fmt::format("{}: none of the {} points of the map lies within 1 m of a true one; "
-                                              "give the map of this place, in the frame of the true poses",
+                                              "name the map of this place, in the frame of the true poses",
                                               map_file_.string(), found->outliers));
   }
   return accuracy;
@@ -60,7 +60,7 @@ std::string Truth::why_nothing_in_common() const {
   const auto span = [](const std::vector<StampedPose>& poses) {
     return text_of(poses.empty() ? std::nullopt : std::optional(TimeSpan{poses.front().stamp, poses.back().stamp}));
   };
-  return fmt::format("{}: its poses ({}) and the sweeps ({}) have no time in common; give the truth of this recording, "
+  return fmt::format("{}: its poses ({}) and the sweeps ({}) have no time in common; name the truth of this recording, "
                      "by the same clock",
                      trajectory_file_.string(), span(trajectory_), span(estimates_));
 }

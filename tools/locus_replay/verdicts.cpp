@@ -30,10 +30,10 @@ std::vector<std::string> source_verdicts(const Config& config, const MotionSourc
       lines.push_back(
           fmt::format("motion source {} and lidar disagreed on how the robot turns, and it was not yet used again at "
                       "the end (possible causes: T_base_source, the unit (rad/s) or the stamps of the gyro, or lidar "
-                      "that follows what moves around the robot)",
+                      "that follows moving objects around the robot)",
                       name));
     else if (health.longest_refusal().is_worth_reporting())
-      lines.push_back(fmt::format("motion source {} was refused for {:.1f} s: it {}", name,
+      lines.push_back(fmt::format("motion source {} was rejected for {:.1f} s: it {}", name,
                                   to_seconds(health.longest_refusal().lasted),
                                   explanation(health.longest_refusal().reason)));
   }
@@ -56,7 +56,7 @@ std::optional<std::string> why_no_result(const PlayedRecording& played) {
 std::vector<std::string> warnings_about(const PlayedRecording& played) {
   std::vector<std::string> lines;
   if (played.figures.counters.seen == 0)
-    lines.push_back(fmt::format("{}: there is lidar data and no whole sweep, which takes 0.05 to 0.2 s; look at "
+    lines.push_back(fmt::format("{}: there is lidar data but no whole sweep, which lasts 0.05 to 0.2 s; check "
                                 "--start and --duration",
                                 played.capture.string()));
   const auto add = [&](const std::vector<std::string>& more) { std::ranges::copy(more, std::back_inserter(lines)); };

@@ -51,7 +51,7 @@ std::vector<sim::Slip> parse_slips(const std::vector<std::string>& texts, double
   for (std::size_t i = 1; i < slips.size(); ++i) {
     if (slips[i].from < slips[i - 1].to)
       throw Failure(ExitStatus::wrong_usage,
-                    fmt::format("--slip: the slip at {} s begins before the one at {} s ends; give each its own time",
+                    fmt::format("--slip: the slip at {} s begins before the one at {} s ends; use separate times",
                                 to_seconds(slips[i].from), to_seconds(slips[i - 1].from)));
   }
   return slips;
@@ -71,7 +71,7 @@ void add_imperfection(CLI::App& app, const sim::NamedImperfection& one, std::opt
   if (one.whole)
     option->check(CLI::Validator(
         [](const std::string& number) {
-          return number.find_first_not_of("0123456789") == std::string::npos ? "" : number + " is no whole number";
+          return number.find_first_not_of("0123456789") == std::string::npos ? "" : number + " is not a whole number";
         },
         ""));
 }
@@ -85,7 +85,7 @@ void check_model(const SimArguments& arguments, const sim::NamedLidarModel& lida
                               lidar.name));
   if (arguments.output == "-" && is_ouster(lidar.model))
     throw Failure(ExitStatus::wrong_usage,
-                  fmt::format("-o -: a stream has no place for the metadata of an {}; write a folder with -o DIR, and "
+                  fmt::format("-o -: a stream cannot contain the metadata of an {}; write a folder with -o DIR and "
                               "play that",
                               lidar.name));
 }
@@ -100,40 +100,41 @@ std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
   bool no_noise = false;
   std::vector<std::string> slips;
 
-  CLI::App app{"A synthetic robot drives through a synthetic place: a capture folder with exact truth.", "locus-sim"};
-  app.add_option("--world", world, "Where it drives")->required()->check(CLI::IsMember(names_of(sim::kWorlds)));
-  app.add_option("--robot", robot, "What drives")->required()->check(CLI::IsMember(names_of(sim::kRobots)));
-  app.add_option("--duration", duration_s, "How long, seconds")
+  CLI::App app{"Simulates the drive of a robot and writes a capture folder with exact truth.", "locus-sim"};
+  app.add_option("--world", world, "World to drive in")->required()->check(CLI::IsMember(names_of(sim::kWorlds)));
+  app.add_option("--robot", robot, "Robot that drives")->required()->check(CLI::IsMember(names_of(sim::kRobots)));
+  app.add_option("--duration", duration_s, "Duration, seconds")
       ->required()
       ->type_name("S")
       ->check(number_between(kShortest_s, kLongest_s));
-  app.add_option("--seed", arguments.seed, "Of course, clutter, moving things and noise; default 1")
+  app.add_option("--seed", arguments.seed, "Seed of course, clutter, moving objects and noise; default 1")
       ->type_name("N")
       ->check(CLI::Range(0.0, 1e15));
-  app.add_option("--lidars", arguments.sensors.lidars, "1: level, 2: and one pitched forward, 3: and one backward")
+  app.add_option("--lidars", arguments.sensors.lidars,
+                 "Number of lidars: 1: level, 2: and one pitched forward, 3: and one backward")
       ->type_name("N")
       ->check(CLI::Range(1, 3));
-  app.add_option("--model", model, "Of all lidars; default VLP-16")->check(CLI::IsMember(names_of(sim::kLidarModels)));
-  app.add_option("--return", return_mode, "Echoes that they report; default strongest")
+  app.add_option("--model", model, "Model of all lidars; default VLP-16")
+      ->check(CLI::IsMember(names_of(sim::kLidarModels)));
+  app.add_option("--return", return_mode, "Return mode of all lidars; default strongest")
       ->check(CLI::IsMember({"strongest", "dual"}));
   auto* realism_option =
-      app.add_option("--realism", realism, "Sets all imperfections below: none, as real robots have them, or harsh")
+      app.add_option("--realism", realism, "Sets all imperfections below: none, as on real robots, or harsh")
           ->capture_default_str()
           ->check(CLI::IsMember(std::vector<std::string>(sim::kRealismNames.begin(), sim::kRealismNames.end())));
-  app.add_flag("--no-noise", no_noise, "Perfect sensors in a clean world, but for the imperfections that are named")
+  app.add_flag("--no-noise", no_noise, "Perfect sensors in a clean world, except for the imperfections given below")
       ->excludes(realism_option);
-  app.add_option("--slip", slips,
-                 "Wheels or feet spin and the robot stays where it is, seconds from the start; may be repeated")
+  app.add_option("--slip", slips, "Wheels or feet slip while the robot stands, seconds from the start; may be repeated")
       ->type_name("T-T1")
       ->allow_extra_args(false);
-  app.add_option("--halts", arguments.halts_s, "Stops at every other corner, for so long at the longest")
+  app.add_option("--halts", arguments.halts_s, "Stops at every other corner, for up to S seconds")
       ->type_name("S")
       ->check(number_between(0.5, 3600));
-  app.add_option("--dust", arguments.sensors.dust, "Share of the laser pulses that meet dust, 0..1")
+  app.add_option("--dust", arguments.sensors.dust, "Share of the laser pulses that hit dust, 0..1")
       ->type_name("P")
       ->check(number_between(0, 1));
   app.add_option("-o,--output", arguments.output,
-                 "Capture folder; made if need be. -: a stream on standard output, for locus-play")
+                 "Capture folder; created if missing. -: a stream on standard output, for locus-play")
       ->required()
       ->type_name("DIR");
   std::array<std::optional<double>, sim::kImperfections.size()> sizes;
@@ -141,7 +142,7 @@ std::optional<SimArguments> parse_sim_arguments(int argc, char** argv) {
     add_imperfection(app, sim::kImperfections[i], sizes[i]);
   app.set_version_flag("--version", "locus-sim " LOCUS_VERSION);
   app.footer(
-      "Writes lidar.pcap, imu.csv, one NAME.tum per odometry source, gt.tum, gt_map.ply and config.yaml; of an OS1\n"
+      "Writes lidar.pcap, imu.csv, one NAME.tum per odometry source, gt.tum, gt_map.ply and config.yaml; for an OS1\n"
       "its metadata, NAME.json, and its inertial unit's packets in place of imu.csv. The same options give the same\n"
       "bytes.\n\n"
       "Examples:\n"

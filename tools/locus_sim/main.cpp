@@ -37,8 +37,8 @@ void run(const SimArguments& arguments) {
   const bool has_room = surround(world, robot, trajectory, arguments.sensors.imperfections, arguments.seed);
   if (!has_room && arguments.names_vehicle)
     print_message("locus-sim",
-                  fmt::format("warning: --vehicle-s-per-min: nowhere on this drive is room for a vehicle beside a "
-                              "{} in --world {}, so none comes; try a wider world, another seed or a longer drive",
+                  fmt::format("warning: --vehicle-s-per-min: there is no room on this drive for a vehicle beside a "
+                              "{} in --world {}, so there is none; try a wider world, another seed or a longer drive",
                               arguments.robot.name, arguments.world.name));
   if (!folder) {
     sim::StreamSink sink;

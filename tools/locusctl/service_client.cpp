@@ -27,7 +27,7 @@ std::string remedy(const std::filesystem::path& socket, int error) {
     return fmt::format("this account may not access {}; ask its owner, or be root", folder.string());
   if (folder.parent_path() != "/run" || !unit.starts_with("locusd"))
     return fmt::format("is there a locusd whose RUNTIME_DIRECTORY is {}?", folder.string());
-  return fmt::format("start it with: systemctl start {0}; if it does not stay: journalctl -u {0}", unit);
+  return fmt::format("start it with: systemctl start {0}; if it stops again: journalctl -u {0}", unit);
 }
 
 std::vector<std::byte> read_all(int descriptor) {

@@ -96,7 +96,7 @@ std::vector<Estimate> odometry(Odometry& odometry, const std::string& source, st
 std::chrono::nanoseconds duration_of(Text name, double seconds) {
   constexpr double kMost_s = 1e9, kPerSecond = 1e9;
   if (!(std::abs(seconds) < kMost_s))
-    throw liblocus::Error(std::string{name} + ": give a number of seconds");
+    throw liblocus::Error(std::string{name} + ": pass a number of seconds");
   return std::chrono::nanoseconds{std::llround(seconds * kPerSecond)};
 }
 
@@ -124,16 +124,16 @@ template <class Class> void add_views(Class& definition) {
   definition
       .def(
           "scan", [](Object& shared) { return points_of(shared.compute([](auto& object) { return object.scan(); })); },
-          "The points of the sweep processed last, corrected for motion: float32 (n, 3), metres, frame base at its "
+          "The points of the last processed sweep, corrected for motion: float32 (n, 3), metres, frame base at its "
           "end.")
       .def(
           "map", [](Object& shared) { return surfaces_of(shared.compute([](auto& object) { return object.map(); })); },
           "The map, a surface for each voxel of half a metre: float32 (n, 6), x, y, z in metres and the unit normal\n"
-          "(0, 0, 0 where it is not known), frame odom.")
+          "(0, 0, 0 where unknown), frame odom.")
       .def(
           "figures_json",
           [](Object& shared) { return shared.compute([](auto& object) { return object.figures_json(); }); },
-          "What was counted so far of packets, clouds, sources and sweeps: JSON as in summary.json of locus-replay.");
+          "Counters of packets, clouds, sources and sweeps so far: JSON as in summary.json of locus-replay.");
 }
 
 template <class Class, class Array>
@@ -149,25 +149,27 @@ void add_matrix(Class& definition, Text name, Array Class::type::*array, Text do
 
 void define_source_estimate(py::module_& module) {
   py::class_<SourceEstimate> source(module, "SourceEstimate", py::is_final(),
-                                    "What a motion source was to an estimate.");
-  source.def_readonly("name", &SourceEstimate::name, "As configured.");
+                                    "Role of a motion source in an estimate.");
+  source.def_readonly("name", &SourceEstimate::name, "Name in the configuration.");
   add_vector(source, "innovation", &SourceEstimate::innovation,
-             "float64 (6,): m/s and rad/s along the axes of base, its motion less that of the others.");
+             "float64 (6,): m/s and rad/s along the axes of base, its motion minus that of all others.");
   add_vector(source, "innovation_sigma", &SourceEstimate::innovation_sigma,
-             "float64 (6,): standard deviation that is expected of the innovation; 0 before the first.");
-  source.def_readonly("test_ratio", &SourceEstimate::test_ratio, "Above 1 it contradicts the rest.")
+             "float64 (6,): expected standard deviation of the innovation; 0 before the first.");
+  source
+      .def_readonly("test_ratio", &SourceEstimate::test_ratio,
+                    "Normalised innovation; above 1 it contradicts all others.")
       .def_readonly("last_used_ns", &SourceEstimate::last_used_ns, "End of the last sweep that used it; 0: never.")
       .def_readonly("doubted", &SourceEstimate::doubted, "It was not healthy.");
 }
 
 void define_estimate(py::module_& module) {
   py::class_<Estimate> estimate(module, "Estimate", py::is_final(),
-                                "Where the robot is at the end of a sweep, and how sure that is.");
+                                "Pose and twist at the end of a sweep, with their covariances.");
   estimate.def_readonly("stamp_ns", &Estimate::stamp_ns, "End of the sweep, nanoseconds since 1970.");
   add_vector(estimate, "position", &Estimate::position_m, "float64 (3,): metres, of base in odom.");
   add_vector(estimate, "orientation_xyzw", &Estimate::orientation_xyzw, "float64 (4,): unit quaternion, base to odom.");
   add_matrix(estimate, "pose_covariance", &Estimate::pose_covariance,
-             "float64 (6, 6): of x, y, z (m) and turns (rad) about the axes of odom; since the start.");
+             "float64 (6, 6): of x, y, z (m) and rotations (rad) about the axes of odom; since the start.");
   add_vector(estimate, "twist", &Estimate::twist, "float64 (6,): m/s along and rad/s about x, y, z of base.");
   add_matrix(estimate, "twist_covariance", &Estimate::twist_covariance, "float64 (6, 6): of the twist.");
   add_vector(estimate, "observability", &Estimate::observability,
@@ -176,12 +178,13 @@ void define_estimate(py::module_& module) {
       .def_property_readonly(
           "state", [](const Estimate& object) { return std::string(name_of(object.state)); },
           "\"tracking\", \"degenerate\", \"dead_reckoning\" or \"standstill\".")
-      .def_readonly("prior", &Estimate::prior, "What the registration began from: \"wio\", \"imu+wio\", \"identity\".")
-      .def_readonly("points", &Estimate::points, "That were registered.")
-      .def_readonly("iterations", &Estimate::iterations, "Of the registration with the map.")
-      .def_readonly("inliers", &Estimate::inliers, "Points with a surface of the map within reach.")
+      .def_readonly("prior", &Estimate::prior,
+                    "Source of the prior of the registration: \"wio\", \"imu+wio\", \"identity\".")
+      .def_readonly("points", &Estimate::points, "Number of registered points.")
+      .def_readonly("iterations", &Estimate::iterations, "Iterations of the registration with the map.")
+      .def_readonly("inliers", &Estimate::inliers, "Points with a correspondence in the map.")
       .def_readonly("keyframe", &Estimate::keyframe, "The sweep was inserted into the map.")
-      .def_readonly("failed", &Estimate::failed, "The registration was refused: the pose is the prediction.")
+      .def_readonly("failed", &Estimate::failed, "The registration was rejected: the pose is the prediction.")
       .def_property_readonly(
           "sources", [](const Estimate& object) { return object.sources; },
           "A list of SourceEstimate, in the order of the configuration.")
@@ -192,32 +195,30 @@ void define_estimate(py::module_& module) {
 }
 
 constexpr Text kOdometry =
-    "Odometry of inputs that the caller feeds, in the order of their arrival.\n\n"
+    "Odometry of inputs that the caller passes in the order of their arrival.\n\n"
     "config: a file as locusd.yaml(5) describes it; None: the defaults, one lidar on port 2368.\n"
     "set: changes to it, as --set of locus-replay, for example [\"lidars.front.model=VLP-16\"].\n\n"
-    "Each input returns the estimates of the sweeps that it completes: most often none. What is late or double, NaN, "
-    "or\n"
-    "a foreign packet is counted and no error. Raises locus.Error for a configuration that is wrong, a source that is\n"
-    "not configured or of another kind, arrays of wrong shape and stamps outside 1951 to 2096.";
-constexpr Text kPacket = "Processes the payload of a UDP datagram: bytes, or any object that has them in a row.\n\n"
-                         "arrival_ns: when it reached this computer. port: that it was sent to. source_ip: of the "
-                         "sender, text or a number in\n"
-                         "host byte order; 0: not known.";
+    "Each input returns the estimates of the sweeps that it completes: mostly none. Late, duplicate and non-finite\n"
+    "input and foreign packets are counted and are no error. Raises locus.Error for an invalid configuration, a "
+    "source\n"
+    "that is not configured or of another kind, arrays of wrong shape and stamps outside 1951 to 2096.";
+constexpr Text kPacket =
+    "Processes the payload of a UDP datagram: bytes, or any object with a contiguous buffer of them.\n\n"
+    "arrival_ns: time of its arrival. port: destination port. source_ip: address of the sender,\n"
+    "text or a number in host byte order; 0: unknown.";
 constexpr Text kCloud =
-    "Processes the returns of a lidar that the configuration gives a topic.\n\n"
-    "xyz: (n, 3), metres, frame of the lidar; read as float32. stamp_ns: what `time` counts from, by the clock of the\n"
-    "lidar. arrival_ns: when it reached this computer; None: stamp_ns. time: (n,), seconds since stamp_ns; None: not\n"
-    "known. ring: (n,), laser of each point, read as uint16. intensity: (n,), 0 to 255.";
-constexpr Text kImu =
-    "Processes a reading of a motion source of kind imu, in its own frame.\n\n"
-    "angular_velocity: (3,), rad/s. specific_force: (3,), m/s^2, +9.81 on z at rest and level. orientation_xyzw: (4,), "
-    "in\n"
-    "a level frame of any heading, or None. arrival_ns: when it reached this computer; None: stamp_ns.";
+    "Processes a cloud of a lidar that has a topic in the configuration.\n\n"
+    "xyz: (n, 3), metres, frame of the lidar; read as float32. stamp_ns: zero of `time`, by the clock of the\n"
+    "lidar. arrival_ns: time of its arrival; None: stamp_ns. time: (n,), seconds since stamp_ns; None: unknown.\n"
+    "ring: (n,), laser of each point, read as uint16. intensity: (n,), 0 to 255.";
+constexpr Text kImu = "Processes a reading of a motion source of kind imu, in its own frame.\n\n"
+                      "angular_velocity: (3,), rad/s. specific_force: (3,), m/s^2, +9.81 on z at rest and level. "
+                      "orientation_xyzw: (4,),\n"
+                      "in a level frame of any heading, or None. arrival_ns: time of its arrival; None: stamp_ns.";
 constexpr Text kOdometrySample =
     "Processes a pose of a motion source of kind odometry.\n\n"
-    "position: (3,), metres, and orientation_xyzw: (4,), of base in a frame of the source's own. covariance_scale: "
-    "how\n"
-    "much worse than usual the source says it is. arrival_ns: when it reached this computer; None: stamp_ns.";
+    "position: (3,), metres, and orientation_xyzw: (4,), of base in the frame of the source. covariance_scale:\n"
+    "ratio of its covariance to the usual one. arrival_ns: time of its arrival; None: stamp_ns.";
 
 void define_odometry(py::module_& module) {
   using py::arg;
@@ -236,18 +237,16 @@ void define_odometry(py::module_& module) {
            arg("orientation_xyzw"), arg("covariance_scale") = 1.0, arg("arrival_ns") = py::none())
       .def(
           "finish", [](Odometry& shared) { return shared.compute([](auto& object) { return object.finish(); }); },
-          "Ends the input; returns the last sweep, if more than half of it is there. Later inputs are\n"
+          "Ends the input; returns the last sweep if more than half of it was received. Later inputs are\n"
           "errors.");
   add_views(definition);
 }
 
 constexpr Text kReplay =
     "Odometry of a recording: whatever locus-replay reads. Returns an iterator of estimates, see Replay.\n\n"
-    "config: None: that of the recording, or the defaults. set: changes to it, as --set of locus-replay. start: leaves "
-    "out\n"
-    "what arrived earlier, seconds from the start of the recording. duration: leaves out what arrived this much "
-    "later;\n"
-    "None: to its end. Raises locus.Error where the recording or the configuration cannot be read.";
+    "config: None: that of the recording, or the defaults. set: changes to it, as --set of locus-replay. start: skips\n"
+    "input that arrived earlier, seconds from the start of the recording. duration: length of the part, seconds;\n"
+    "None: to its end. Raises locus.Error if the recording or the configuration cannot be read.";
 
 void define_replay(py::module_& module) {
   using py::arg;
@@ -259,7 +258,7 @@ void define_replay(py::module_& module) {
       .def("__next__", next)
       .def(
           "warnings", [](Replay& shared) { return shared.compute([](auto& object) { return object.warnings(); }); },
-          "What in the recording is unlikely to be what the user meant, a line each; at the end of it, more.");
+          "Warnings about the recording and its configuration, one per line; complete at its end.");
   add_views(definition);
   module.def("replay", replay, kReplay, arg("path"), arg("config") = py::none(), arg("set") = py::tuple(),
              arg("start") = py::none(), arg("duration") = py::none());
@@ -270,10 +269,10 @@ void define_replay(py::module_& module) {
 
 PYBIND11_MODULE(_native, module) {
   using namespace locus_python;
-  module.doc() = "The native part of the package locus.";
+  module.doc() = "Native part of the package locus.";
   module.attr("__name__") = "locus"; // public name of the module
   py::register_exception<liblocus::Error>(module, "Error", PyExc_RuntimeError).attr("__doc__") =
-      "What is wrong, where, and what to do: a line for each mistake, in the words of locus-replay.";
+      "Error: what is wrong, where, and what to do; one line per mistake, as by locus-replay.";
   define_source_estimate(module);
   define_estimate(module);
   define_odometry(module);

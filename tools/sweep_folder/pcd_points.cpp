@@ -156,7 +156,7 @@ bool read_bytes(std::istream& stream, std::span<std::byte> bytes) {
 Problem read_compressed(std::istream& stream, std::uint64_t left, const PcdHeader& header, SweepPoints& points) {
   std::array<std::uint32_t, 2> sizes{}; // compressed, uncompressed
   if (!read_bytes(stream, std::as_writable_bytes(std::span(sizes))) || sizes[0] > left - sizeof(sizes))
-    return "its compressed points break off; copy it again";
+    return "its compressed points are truncated; copy it again";
   const std::size_t most_packed = points.data.size() + points.data.size() / 32 + 16; // without any repetition
   if (sizes[1] != points.data.size() || sizes[0] > most_packed)
     return fmt::format("its compressed points are damaged, or not {} points; copy it again", header.points);

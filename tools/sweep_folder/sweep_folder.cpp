@@ -147,7 +147,7 @@ Problem match(const std::vector<TimeText>& times, const path& table, const path&
 Problem read_sweeps(const path& where, SweepFolder& recording) {
   std::vector<path> files = sweeps_in(recording.folder);
   if (files.empty())
-    return fmt::format("{}: holds no sweep, a .pcd or .bin whose name begins with a digit; copy the recording again",
+    return fmt::format("{}: contains no sweep, a .pcd or .bin whose name begins with a digit; copy the recording again",
                        recording.folder.string());
   const std::optional<path> table = table_of(where, recording.folder);
   const auto times = table ? read_times(*table) : times_in_names(files);

@@ -57,7 +57,7 @@ Expected<std::vector<TimeText>, std::string> read_times(const std::filesystem::p
   if (!stream)
     return fmt::format("{}: cannot be read; check its permissions", file.string());
   if (std::filesystem::file_size(file, error) > kMostBytes)
-    return fmt::format("{}: is too long for a table of the times of sweeps; take a shorter one", file.string());
+    return fmt::format("{}: is too long for a table of the times of sweeps; use a shorter one", file.string());
   std::vector<TimeText> times;
   std::size_t number = 0;
   for (std::string buffer; std::getline(stream, buffer);) {
@@ -91,7 +91,8 @@ Expected<std::vector<Stamp>, std::string> stamps_of(std::span<const TimeText> ti
   for (const TimeText& time : times) {
     const std::optional<Stamp> stamp = parse_time(time.text, *unit);
     if (!stamp)
-      return fmt::format("{}: {} is no time in seconds or nanoseconds since 1970; correct it", time.place, time.text);
+      return fmt::format("{}: {} is not a time in seconds or nanoseconds since 1970; correct it", time.place,
+                         time.text);
     if (!stamps.empty() && *stamp <= stamps.back())
       return fmt::format("{}: {} is {} the time before it; sort and correct the times, one for each sweep", time.place,
                          time.text, *stamp == stamps.back() ? "equal to" : "before");

@@ -58,9 +58,10 @@ Expected<UnpackedCopy, std::string> UnpackedCopy::make(const std::filesystem::pa
   const bool is_wanted = is_of_use({reinterpret_cast<const char*>(buffer.data()), count});
   for (; count > 0; count = is_wanted ? fill(*stream, buffer) : 0) {
     if (!copy.leaves_free(stays_free_bytes))
-      return fmt::format("it is packed, and to unpack it would leave less than {} MB free in {}; make room there, or "
-                         "name a folder with room for it with: export TMPDIR=FOLDER",
-                         stays_free_bytes / 1'000'000, copy.folder_);
+      return fmt::format(
+          "it is compressed, and unpacking it would leave less than {} MB free in {}; free space there, or "
+          "name a folder with room for it with: export TMPDIR=FOLDER",
+          stays_free_bytes / 1'000'000, copy.folder_);
     if (!write_all(copy.descriptor_, std::span(buffer).first(count)))
       return copy.why_not();
   }
@@ -106,7 +107,7 @@ Expected<std::filesystem::path, std::string> UnpackedCopy::give_name() {
 
 /// Describes the last system error.
 std::string UnpackedCopy::why_not() const {
-  return fmt::format("it is packed, and cannot be unpacked in {} ({}); name a folder with room for it with: export "
+  return fmt::format("it is compressed, and cannot be unpacked in {} ({}); name a folder with room for it with: export "
                      "TMPDIR=FOLDER",
                      folder_, std::generic_category().message(errno));
 }

@@ -64,7 +64,7 @@ class GzipUnpacker : public Unpacker {
     return at_end_ ? State::between : State::within;
   }
   [[nodiscard]] std::string_view why() const override {
-    return stream_.msg != nullptr ? stream_.msg : "not what gzip writes";
+    return stream_.msg != nullptr ? stream_.msg : "not written by gzip";
   }
 
  private:
@@ -179,7 +179,7 @@ class UnpackingStream : public ByteStream {
       if (state == Unpacker::State::damaged)
         problem_ = fmt::format("its {} compression is damaged ({})", unpacker_->name(), unpacker_->why());
       else if (is_over_ && state == Unpacker::State::within)
-        problem_ = fmt::format("its {} compression breaks off", unpacker_->name());
+        problem_ = fmt::format("its {} compression is truncated", unpacker_->name());
     }
     return out.size() - room.size();
   }

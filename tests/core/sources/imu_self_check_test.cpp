@@ -195,7 +195,7 @@ TEST_F(ImuSelfCheckTest, StaticGyroAgainstLidarTurnIsNotCalledWrong) {
   }
   EXPECT_NE(check.verdict().find("about z (yaw): lidar measures turns and the gyro hardly any"), std::string_view::npos)
       << check.verdict();
-  EXPECT_NE(check.verdict().find("people or things that move around a robot that stands"), std::string_view::npos);
+  EXPECT_NE(check.verdict().find("people or objects that move around a robot at rest"), std::string_view::npos);
   EXPECT_EQ(check.verdict().find("other way"), std::string_view::npos) << "two readings of noise have any sign";
 }
 

@@ -18,8 +18,8 @@ export function boxes(figure, width) {
   if (!run.error_boxes) {
     note(
         figure,
-        "No true trajectory came with this capture, so how far the estimate is from it is not known. " +
-            "Give one with --ground-truth FILE, or lay it beside the capture as gt.tum.");
+        "This recording has no true trajectory, so the error of the estimate is unknown. " +
+            "Name one with --ground-truth FILE, or put it beside the capture as gt.tum.");
     return;
   }
   const height = Math.max(0.36 * width, 200);

@@ -32,7 +32,7 @@ function recordedAt() {
 function machine() {
   const {version, isa, threads, wall_s, cpu_s, peak_rss_mb, config_sha256} = summary;
   return `locus-replay ${version}, ${threads} ${threads === 1 ? "thread" : "threads"}, ${isa}; ${
-             written(wall_s)} s by the clock, ` +
+             written(wall_s)} s of wall clock, ` +
       `${written(cpu_s)} s of CPU, ${written(peak_rss_mb)} MB at most; configuration ${config_sha256.slice(0, 12)}`;
 }
 
@@ -52,7 +52,7 @@ function keyFigures() {
     {
       name: "Not registered",
       value: count(sweeps.failed),
-      detail: "sweeps; the prediction stands",
+      detail: "sweeps; their pose is the prediction",
       warning: sweeps.failed > 0
     },
   ];
@@ -82,7 +82,7 @@ function wayFigures() {
       });
   } else {
     figures.push({
-      name: "Stated deviation",
+      name: "Standard deviation",
       ...length(run.series.std_m.v.at(-1)),
       detail: "of the last position; no truth given"
     });

@@ -43,7 +43,7 @@ function drawFigures() {
   if (run.path)
     draw(kFigures);
   else
-    for (const id of Object.keys(kFigures)) note(select(`#${id}`), "No sweep was seen, so there is nothing to draw.");
+    for (const id of Object.keys(kFigures)) note(select(`#${id}`), "There was no sweep, so there is nothing to draw.");
 }
 
 heading();

@@ -19,13 +19,13 @@ export function mapView(figure) {
 
 function makeView(figure) {
   if (map.count === 0) {
-    note(figure, "The map is empty: no sweep showed a surface.");
+    note(figure, "The map is empty: no sweep contained a surface.");
     return false;
   }
   if (!hasWebGL()) {
     note(
         figure,
-        "This browser offers no WebGL, which the map in space needs. Its walls are drawn in the path from above; " +
+        "This browser has no WebGL, which the 3D map needs. The path from above shows its walls; " +
             "map.pcd beside this report opens in any viewer of point clouds.");
     return false;
   }

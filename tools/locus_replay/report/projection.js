@@ -95,7 +95,7 @@ function draw(figure, options) {
       .attr("class", "unit")
       .attr("x", 0)
       .attr("y", height - 4)
-      .text(exaggeration > 1 ? `${axes[1]} in m, drawn ${exaggeration} times as tall` : `${axes[1]} in m`);
+      .text(exaggeration > 1 ? `${axes[1]} in m, exaggerated ${exaggeration} times` : `${axes[1]} in m`);
 
   const at = (path, i) => [across(path[axes[0]][i]), up(path[axes[1]][i])];
   const curve = (path) => line()(path.t.map((_, i) => at(path, i)));

@@ -17,7 +17,7 @@ export function stages(figure) {
   const rows = Object.entries(run.stages ?? {}).map(([name, took]) => ({name: words(name), took}));
   rows.push(
       {name: "cut to estimate, CPU", took: summary.process_cpu_ms, total: true},
-      {name: "cut to estimate, by the clock", took: summary.process_ms});
+      {name: "cut to estimate, wall clock", took: summary.process_ms});
   const {head, rows: row} = table(
       drawing, ["CPU time, ms", "mean", ...kQuantiles],
       rows.map(

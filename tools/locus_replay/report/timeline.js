@@ -58,7 +58,7 @@ function panelsOfRun() {
   const {error_m, std_m, speed_mps, process_ms} = run.series;
   const panels = [];
   if (error_m) panels.push(lengthPanel("Position error", error_m));
-  panels.push(lengthPanel("Stated deviation of the position", std_m));
+  panels.push(lengthPanel("Standard deviation of the position", std_m));
   panels.push({name: "Speed", unit: "m/s", series: speed_mps, factor: 1});
   panels.push({
     name: "Time per sweep, cut to estimate",
@@ -112,7 +112,7 @@ function drawBand(svg, {name, t, what, what_names}, x, top) {
       .append("title")
       .text(name);
   if (summary.sources[name]?.received === 0) {
-    group.append("text").attr("x", kMargin.left + 6).attr("y", top + kBand.height - 3).text("no sample came");
+    group.append("text").attr("x", kMargin.left + 6).attr("y", top + kBand.height - 3).text("no sample received");
     return () => {};
   }
   group.selectAll("rect").data(what).join("rect").each(function(state, i) {

@@ -17,7 +17,7 @@ const kFitPeriod_ms = 1000;
 /** Returns the view, or null without WebGL. */
 export function liveMap(figure, live) {
   if (hasWebGL()) return new LiveMap(figure, live);
-  note(figure, "This browser offers no WebGL, which the map in space needs. The figures beside it are complete.");
+  note(figure, "This browser has no WebGL, which the 3D map needs. All other figures are shown.");
   return null;
 }
 

@@ -67,7 +67,7 @@ function keyFigures(live) {
     {
       name: "Not registered",
       value: count(sweeps.failed),
-      detail: "sweeps; the prediction stands",
+      detail: "sweeps; their pose is the prediction",
       warning: sweeps.failed > 0
     },
   ];
@@ -118,7 +118,7 @@ export function sources(section, {status}) {
   if (all.length === 0) return drawing.append("p").attr("class", "note").text("None is configured: lidar alone.");
   const ratios = all.map(([, source]) => source.innovation?.test_ratio);
   const {head, rows} = table(
-      drawing, ["source", "health", "in sweeps", "silent", "test ratio"],
+      drawing, ["source", "health", "used in sweeps", "silent", "test ratio"],
       all.map(
           ([name, source], i) =>
               [name, source.health === "healthy" ? source.health : {text: `▲ ${source.health}`, warning: true},
@@ -158,5 +158,5 @@ export function lidars(section, {status}) {
 export function bounds({tiles, path}) {
   select("#bounds").text(
       `${count(tiles.count)} of at most ${count(tiles.max)} tiles of ${written(tiles.tile_m)} m; when these are used up, ` +
-      `larger tiles replace them. Tiles show all that the sweeps have shown, also what has moved since.`);
+      `larger tiles replace them. Tiles show everything observed, including objects that have moved since.`);
 }
