@@ -86,7 +86,7 @@ TEST(OtherMaker, RoboSenseAndSeyondAreRecognisedByTheirIdentifiers) {
   EXPECT_FALSE(maker_by(0, {}));
 }
 
-TEST(OtherMaker, VelodyneAndUnknownPacketsAreNone) {
+TEST(OtherMaker, VelodyneAndUnknownPacketsAreNotRecognised) {
   EXPECT_FALSE(maker_of(velodyne::kDataPacketBytes, 2368, 0xFF, 0xEE));
   EXPECT_FALSE(maker_of(512, 8308));
   EXPECT_FALSE(maker_of(0));

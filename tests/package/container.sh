@@ -55,7 +55,7 @@ wait_for() {
   done
 }
 
-step "the image is built of what git tracks"
+step "the image is built from files that git tracks"
 mkdir "$work/source"
 git -C "$source" ls-files -z | tar --create --directory="$source" --null --files-from=- | tar --extract --directory="$work/source"
 compiled=$(ccache --get-config cache_dir)
@@ -63,7 +63,7 @@ mkdir -p "$compiled"
 engine build --format docker --layers=false --isolation chroot --pull=never --volume "$compiled:/root/.cache/ccache" \
   --file "$work/source/packaging/Containerfile" --tag locusd "$work/source" >"$work/built" 2>&1 || { tail -n 40 "$work/built"; exit 1; }
 
-step "it runs as documented, in a network that stands for the host's"
+step "it runs as documented, in a network in place of the host's"
 ip netns add "$net"
 host() { nsenter --net="/run/netns/$net" "$@"; } # ip netns exec would hide the cgroups
 host ip link set lo up
@@ -87,7 +87,7 @@ process=$(engine inspect --format '{{.State.Pid}}' locusd)
 [ "$(awk '$1 == "Uid:" {print $2}' "/proc/$process/status")" -ne 0 ]
 [ "$(awk '$1 == "CapBnd:" {print $2}' "/proc/$process/status")" = 0000000000000000 ]
 
-step "it hears a lidar, and is heard"
+step "it receives a lidar and publishes odometry"
 mkfifo "$work/open"
 host "$bin/fast_dds_peer" 7 listen /locus <>"$work/open" >"$work/heard" 2>&1 &
 host "$bin/locus-play" --quiet --to 127.0.0.1 --interface lo --domain 7 "$work/drive" >"$work/played" 2>&1 &
@@ -97,7 +97,7 @@ engine exec locusd locusctl status
 engine exec locusd locusctl save-map /tmp/map.pcd # the user in the container may send commands
 engine exec locusd locusctl record --keep 10s | grep "^/var/lib/locusd/incidents/"
 
-step "a container that is made anew goes on where the robot is"
+step "a recreated container resumes at the robot's pose"
 sleep 5 # time to save its state
 engine stop --time 10 locusd >/dev/null
 [ "$(engine inspect --format '{{.State.ExitCode}}' locusd)" = 0 ]
@@ -106,7 +106,7 @@ run
 wait_for 20 status_is "tracking|standstill"
 status | grep '^ "beginning": "map"'
 
-step "a wrong configuration is said, and ends it"
+step "an invalid configuration is reported and ends it"
 echo "no_such_key: 1" >>"$work/etc/locusd.yaml"
 engine stop locusd >/dev/null
 engine start locusd >/dev/null

@@ -14,7 +14,7 @@ for package in locusd locus-tools liblocus0 liblocus-dev python3-locus; do
   [ "$(dpkg-deb -f "$deb" Version)" = "$version" ] ||
     complain "$deb: is not of version $version, as CMakeLists.txt and its release say; look at packaging/debian/changelog"
   depends=$(dpkg-deb -f "$deb" Depends)
-  ! grep -qE 'vtk|pcl-io|boost|ros' <<<"$depends" || complain "$deb: drags in a lot: $depends"
+  ! grep -qE 'vtk|pcl-io|boost|ros' <<<"$depends" || complain "$deb: has large dependencies: $depends"
   [ $package = locus-tools ] || ! grep -q pcl <<<"$depends" || complain "$deb: needs PCL: $depends"
   ! dpkg-deb --fsys-tarfile "$deb" | grep -aE 'locusd-deb\.' >/dev/null ||
     complain "$deb: names the folder that it was built in"

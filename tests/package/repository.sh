@@ -35,8 +35,8 @@ on_robot() {
 refused() { # WHY COMMAND...
   local why=$1
   shift
-  if "$@" >"$work/said" 2>&1; then cat "$work/said"; echo "was not refused: $*"; exit 1; fi
-  grep -E "$why" "$work/said" || { cat "$work/said"; echo "refused, but not for: $why"; exit 1; }
+  if "$@" >"$work/said" 2>&1; then cat "$work/said"; echo "was not rejected: $*"; exit 1; fi
+  grep -E "$why" "$work/said" || { cat "$work/said"; echo "rejected, but not for: $why"; exit 1; }
 }
 is_version() { [ "$(on_robot dpkg-query -W -f '${Version}' locusd)" = "$1" ]; }
 newer() { # VERSION: prints the path of a package of it, with another configuration
@@ -63,7 +63,7 @@ on_robot apt-get --quiet update
 on_robot apt-get --quiet --yes install --no-install-recommends locusd
 is_version "$(dpkg-deb -f "$folder"/locusd_*.deb Version)"
 
-step "unattended-upgrades takes a newer version, and leaves what was edited"
+step "unattended-upgrades installs a newer version and keeps edited files"
 echo "# edited" >>"$work/root/etc/locusd/locusd.yaml"
 cp "$source/docs/examples/52unattended-upgrades-locusd" "$work/root/etc/apt/apt.conf.d"
 newest=98$(suffix_of "$suite")
@@ -73,29 +73,29 @@ on_robot unattended-upgrade --verbose
 is_version "$newest"
 [ "$(tail -n 1 "$work/root/etc/locusd/locusd.yaml")" = "# edited" ]
 
-step "a package that was changed is refused"
+step "a modified package is rejected"
 publish "$work/repository" "$(newer "99$(suffix_of "$suite")")"
 find "$work/repository/public" -name 'locusd_99*.deb' -exec sh -c 'printf x | dd of="$1" bs=1 seek=5000 conv=notrunc status=none' sh {} \;
 on_robot apt-get --quiet update
 refused "Hash Sum mismatch" on_robot apt-get --quiet --yes upgrade
 is_version "$newest"
 
-step "a list that was changed is refused"
+step "a modified list is rejected"
 sed -i "s/^Date: .*/Date: $(date --utc --rfc-email --date='+1 hour' | sed 's/+0000/UTC/')/" "$work/repository/public/dists/$suite"/InRelease
 refused "BADSIG|signatures were invalid|verification failed|[Bb]ad signature" on_robot apt-get --quiet --error-on=any update
 
-step "so is one that somebody else signed"
+step "a list signed by someone else is rejected"
 rm -rf "$work/repository"
 gpg --batch --quiet --passphrase '' --quick-generate-key somebody ed25519 sign never
 publish --key somebody "$work/repository" "$(newer "100$(suffix_of "$suite")")"
 refused "NO_PUBKEY|not available|[Mm]issing key" on_robot apt-get --quiet --error-on=any update
 is_version "$newest"
 
-step "so is a key that this account has not, and the repository stays as it is"
+step "a key that this account lacks is rejected, and the repository is unchanged"
 cp "$work/repository/conf/distributions" "$work/before"
 refused "nobody: no secret key" publish --key nobody "$work/repository" "$(newer "101$(suffix_of "$suite")")"
 cmp "$work/repository/conf/distributions" "$work/before"
 
-step "a package for no release is refused before anything changes"
+step "a package for no release is rejected before anything changes"
 refused "for no release" publish "$work/nothing" "$(newer 7)"
 [ ! -e "$work/nothing" ]

@@ -40,7 +40,7 @@ for unit in locusd@.service locusd.socket; do
   if systemctl is-enabled --quiet $unit; then false; fi
 done
 
-step "an edited configuration is taken by a reload, a bad one is refused"
+step "a reload accepts an edited configuration and rejects an invalid one"
 cp robot.yaml /etc/locusd/locusd.yaml
 systemctl reload locusd
 wait_for 10 says -1min "DDS is up: domain 7 on interface uplink0"
@@ -49,21 +49,21 @@ if locusctl reload || systemctl reload locusd; then false; fi
 is active ActiveState
 cp robot.yaml /etc/locusd/locusd.yaml
 
-step "it says which sensors it does not hear"
+step "silent sensors are reported"
 wait_for 10 says -1min "lidar .*: no data packet on UDP port 2368"
 wait_for 10 says -1min "motion source wio: nothing received"
 for field in LOCUS_LIDAR LOCUS_SOURCE; do
   journalctl --no-pager -u locusd -o json | grep "\"$field\":\"" | grep '"CODE_FILE":"' | grep '"PRIORITY":"4"' >/dev/null
 done
 
-step "a buffer that is smaller than asked for is said, with the setting"
+step "a socket buffer that is too small is reported with the setting"
 buffer_is() { # at least this many bytes; the kernel reports twice the requested size
   [ "$(ss --udp --listening --numeric --memory --no-header 'sport = :2368' | grep -oP '\brb\K\d+')" -ge $(($1 * 2)) ]
 }
 buffer_is $((8 << 20)) || says -10min "sysctl net.core.rmem_max=$((8 << 20))"
 
 touch waits_for_drive
-step "an upgrade on the way keeps what was edited, brings what was not, and goes on where it was"
+step "an upgrade under way keeps edited files, replaces others, and resumes"
 wait_for 30 status_is standstill # at the start
 wait_for 30 status_is tracking
 since=$(now)
@@ -80,7 +80,7 @@ goes_on "$since"
 locusctl status --json | grep '^ "beginning": "map"' >/dev/null
 status_is tracking # not yet at its final position
 
-step "it stands where it went, and its wheels spin"
+step "the robot stands while its wheels spin"
 spins() { status_is standstill && locusctl status | grep -E "^wio +lost" >/dev/null; }
 wait_for 30 spins # wheels that begin to spin without lidar are trusted
 locusctl status
@@ -88,11 +88,11 @@ locusctl save-map /tmp/map.pcd
 [ -s /tmp/map.pcd ]
 locusctl sensors | grep "192.168.1.201.*VLP-16" >/dev/null
 
-step "what it receives is recorded where the unit lets it write"
+step "input is recorded where the unit permits writing"
 compgen -G "/var/lib/locusd/record/000001_*/000001/lidar.pcap" >/dev/null
 [ "$(stat -c %U /var/lib/locusd/record)" = locusd ]
 
-step "the unit lets it keep an incident, and tell metrics"
+step "the unit permits incidents and metrics"
 keeps() { incident=$(locusctl record --keep 10s); }
 wait_for 10 keeps # an automatic one may be in progress
 [ -s "$incident/why.json" ] && [ "$(dirname "$incident")" = /var/lib/locusd/incidents ]
@@ -101,7 +101,7 @@ printf 'GET /metrics HTTP/1.1\r\n\r\n' >&3
 grep '^locusd_incidents_kept_total [1-9]' <&3 >/dev/null
 exec 3>&-
 
-step "a thread that hangs is a watchdog's kill and a restart; the odometry goes on where it was"
+step "a hanging thread is killed by the watchdog, and the odometry resumes"
 since=$(now)
 process=$(systemctl show -P MainPID locusd)
 ./hang_thread "$process" odometry &
@@ -114,7 +114,7 @@ is_noticed() { # unless another one was recorded just before
 }
 wait_for 10 is_noticed
 
-step "so does a crash"
+step "after a crash it resumes"
 wait_for 20 spins
 since=$(now)
 process=$(systemctl show -P MainPID locusd)
@@ -123,7 +123,7 @@ wait_for 10 alive "$process"
 goes_on "$since"
 is 2 NRestarts
 
-step "the sandbox is in force: what may be tried in the service's place fails"
+step "the sandbox is in effect: forbidden operations fail"
 mkdir -p /etc/systemd/system/locusd@sandbox.service.d
 cat >/etc/systemd/system/locusd@sandbox.service.d/probe.conf <<'UNIT'
 [Service]
@@ -133,7 +133,7 @@ ExecStart=
 ExecStart=/bin/bash /run/sandbox_probe.sh
 UNIT
 cat >/run/sandbox_probe.sh <<'PROBE'
-refused() { if "$@" 2>/dev/null; then echo "was allowed: $*"; exit 1; fi; }
+refused() { if "$@" 2>/dev/null; then echo "was permitted: $*"; exit 1; fi; }
 touch "$STATE_DIRECTORY/mine" "$RUNTIME_DIRECTORY/mine" || exit 1
 for folder in /etc /etc/locusd /usr /var /var/lib/locusd /home /root /run /boot; do
   refused touch "$folder/mine"
@@ -151,7 +151,7 @@ systemctl start locusd@sandbox || { journalctl --no-pager -u locusd@sandbox; fal
 rm -r /etc/systemd/system/locusd@sandbox.service.d
 systemctl daemon-reload
 
-step "a second instance has a file, a socket and a state of its own"
+step "a second instance has its own file, socket and state"
 sed 's/port: 2368/port: 2400/; s/domain: 7/domain: 8/' robot.yaml >/etc/locusd/second.yaml
 systemctl start locusd@second
 locusctl --instance second status --json | grep '"port": 2400' >/dev/null
@@ -162,7 +162,7 @@ dpkg-reconfigure locusd
 wait_for 5 locusctl --instance second status >/dev/null
 if journalctl --no-pager -u locusd@second | grep "without position packets"; then false; fi # the port is shared
 
-step "DDS Security works in the sandbox, with a key that the service alone may read"
+step "DDS Security works in the sandbox, with a key that only the service may read"
 cp -r enclaves/locusd /etc/locusd/enclave
 chown -R root:locusd /etc/locusd/enclave
 chmod 750 /etc/locusd/enclave
@@ -174,7 +174,7 @@ wait_for 10 is_secured
 systemctl stop locusd@secured
 rm -r /etc/locusd/enclave /etc/locusd/secured.yaml
 
-step "systemd may hold the sockets; then packets wait through a restart, in a large buffer"
+step "with sockets held by systemd, packets are buffered through a restart"
 systemctl stop locusd
 systemctl start locusd.socket
 systemctl start locusd
@@ -184,7 +184,7 @@ systemctl stop locusd.socket
 systemctl restart locusd
 wait_for 20 tracks
 
-step "what was saved before a reset does not come back"
+step "a state saved before a reset is not restored"
 touch /tmp/before_reset
 locusctl reset --pose 100,0,0,0,0,90
 wait_for 10 test /var/lib/locusd/state -nt /tmp/before_reset
@@ -195,7 +195,7 @@ if systemctl is-active --quiet locusd locusd@second; then false; fi
 cmp robot.yaml /etc/locusd/locusd.yaml
 [ -e /var/lib/locusd/state ]
 
-step "installed again it goes on with what was edited"
+step "reinstalled, it uses the edited configuration"
 install_package "$(echo locusd_*.deb)"
 cmp robot.yaml /etc/locusd/locusd.yaml
 wait_for 20 tracks
@@ -205,7 +205,7 @@ dpkg -P locusd
 [ ! -e /etc/locusd/locusd.yaml ]
 [ ! -e /var/lib/locusd ] && [ ! -e /var/lib/locusd@second ] && [ ! -e /run/locusd ]
 
-step "and it is as new once more"
+step "reinstalled after the purge, it has its defaults"
 install_package "$(echo locusd_*.deb)"
 systemctl is-enabled --quiet locusd
 is active ActiveState

@@ -42,7 +42,7 @@ void run_in_simulated_time(char** argv, double rate) {
   setenv(kVariable, path.c_str(), 1);               // NOLINT(concurrency-mt-unsafe)
   setenv("LD_PRELOAD", SIMULATED_CLOCK_LIBRARY, 1); // NOLINT(concurrency-mt-unsafe)
   execv("/proc/self/exe", argv);
-  throw std::runtime_error("this program cannot be begun anew");
+  throw std::runtime_error("this program cannot be restarted");
 }
 
 ClockFile::ClockFile() {

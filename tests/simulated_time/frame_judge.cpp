@@ -70,7 +70,7 @@ void FrameJudge::take(const Listener::Estimate& estimate, Duration set_by, Stamp
   const Stamp stamp = estimate.stamp - set_by;
   const bool may_be_late = events_.any({process_stop, thread_hang, link_down, deaf_reader}, seconds{15});
   if (stamp > steady + milliseconds{20} || (stamp < steady - kLatest && !may_be_late))
-    events_.find(fmt::format("an estimate is stamped {:+.3f} s from when it is heard", to_seconds(stamp - steady)));
+    events_.find(fmt::format("an estimate is stamped {:+.3f} s from its reception", to_seconds(stamp - steady)));
   if (const auto truth = robot_.truth_at(stamp))
     waiting_.push_back({events_.now(), stamp, estimate.T_odom_base, *truth});
 }
@@ -100,7 +100,7 @@ void FrameJudge::judge(const Seen& seen) {
     if (bound == kHealthy_m)
       worst_healthy_m_ = std::max(worst_healthy_m_, error_m);
     if (error_m > bound) {
-      events_.find(fmt::format("{:.2f} m off the way of {:.1f} s, more than {:.1f} m", error_m,
+      events_.find(fmt::format("{:.2f} m off after {:.1f} s, more than {:.1f} m", error_m,
                                to_seconds(seen.at - from.at), bound));
       before_.clear();
     }

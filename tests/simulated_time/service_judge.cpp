@@ -40,7 +40,7 @@ const std::vector<Claim>& claims() {
       {"motion source wio is lost (jump)", {odometry_lost, link_down, process_stop, thread_hang, second_odometry}},
       {"check its power and cable", {lidar_lost}},
       {"other senders use its port", {garbage, flood}},
-      {"its packets are refused", {garbage, flood}},
+      {"its packets are rejected", {garbage, flood}},
       {"packets come from 127.0.0.2", {garbage, flood}},
       {"this computer is overloaded", {process_stop, thread_hang, flood, crash, reload}}, // relocalisation takes time
       {"and lidar disagree on how", {lidar_lost, process_stop, thread_hang, crash, reload, flood}},
@@ -49,7 +49,7 @@ const std::vector<Claim>& claims() {
       {"inputs were not recorded", {disk_full, process_stop, thread_hang}},
       {"the odometry continues without a recording", {disk_full}, seconds{30}},
       {"the state cannot be saved", {disk_full}, seconds{40}},
-      {"reload refused", {broken_config}},
+      {"reload rejected", {broken_config}},
       {"starting without the saved pose: it is newer than the clock", {clock_step}, std::chrono::hours{30}},
       {"starting without the saved pose: it is", {clock_step, disk_full, lidar_lost}, std::chrono::minutes{10}},
       {"started at the origin: the first sweep does not match",
@@ -108,7 +108,7 @@ void ServiceJudge::read(const std::string& line) {
     if (line != "exit 137" || !events_.any({crash, process_stop, thread_hang}, seconds{10}))
       events_.find("the service ended by itself: " + line);
   } else if (!is_true(line)) {
-    events_.find("it says what is not true: " + line);
+    events_.find("a message without a cause: " + line);
   }
 }
 
@@ -156,7 +156,7 @@ void ServiceJudge::look_at_growth(const ordered_json& status) {
                       contains(key, "/received") || contains(key, "/rejected/") || contains(key, "/used_sweeps") ||
                       contains(key, "/recorded") || contains(key, "/refused"));
     if (is_count && value.is_number() && before.contains(key) && before[key].is_number() && value < before[key])
-      events_.find(fmt::format("{} falls from {} to {}", key, before[key].dump(), value.dump()));
+      events_.find(fmt::format("{} decreases from {} to {}", key, before[key].dump(), value.dump()));
   }
 }
 
@@ -181,10 +181,10 @@ void ServiceJudge::look_at_claims(const ordered_json& status) {
   for (const auto& [name, lidar] : status["lidars"].items())
     if (const std::string problem = lidar.value("problem", "");
         !problem.empty() && !events_.any({lidar_lost, garbage, flood, process_stop, thread_hang}, seconds{10}))
-      events_.find(fmt::format("the status blames lidar {}: {}", name, problem));
+      events_.find(fmt::format("the status reports a problem of lidar {}: {}", name, problem));
   if (const ordered_json& recording = status["recording"];
       !recording.value("problem", "").empty() && !events_.any({disk_full}, seconds{30}))
-    events_.find("it does not record, though there is room: " + recording.value("problem", ""));
+    events_.find("it does not record although there is space: " + recording.value("problem", ""));
 }
 
 /// Detects overload of this machine: a runnable thread of the service has waited this long for a processor.

@@ -116,7 +116,7 @@ void SimulatedDay::look() {
     const std::uint64_t sent = robot_->sent();
     service_->look(tools::send_request(computer_.file("control"), {{"command", "status"}}).json, sent);
   } catch (const tools::Failure& failure) {
-    events_.find(fmt::format("the status cannot be had: {}", failure.what()));
+    events_.find(fmt::format("the status cannot be read: {}", failure.what()));
   }
   if (now() - weighed_ < kWeighEvery)
     return;
@@ -185,14 +185,14 @@ void SimulatedDay::reload_configuration(bool broken) {
   }
   std::ofstream{file} << text;
   if (refused.empty() == broken && !events_.any({process_stop, thread_hang, crash}, seconds{15}))
-    events_.find(broken ? "a configuration that is cut short was taken" : "a reload was refused: " + refused);
+    events_.find(broken ? "a truncated configuration was accepted" : "a reload was rejected: " + refused);
 }
 
 std::string SimulatedDay::summary() const {
   return fmt::format(
       "seed {}: {:.2f} simulated hours in {:.1f} min; {} faults, {} lives of the service, {} ended by the "
-      "watchdog; {} estimates heard, {} frames begun, {} anew; at worst {:.3f} m off in 10 s while all "
-      "sensors are heard; {} lines of log, {:.0f} MB at most; packets balanced {} times; this machine "
+      "watchdog; {} estimates received, {} frames started, {} restarted; at worst {:.3f} m off in 10 s while all "
+      "sensors send; {} lines of log, {:.0f} MB at most; packets balanced {} times; this machine "
       "was too slow for {:.1f} % of it",
       options_.seed, to_seconds(events_.now()) / 3600, to_seconds(system_time() - system_began_) / 60, faults_, life_,
       systemd_->watchdog_kills(), frames_->heard(), frames_->beginnings(), frames_->anew(), frames_->worst_healthy_m(),

@@ -39,21 +39,22 @@ struct Arguments {
 /// Nothing if --help was requested and printed.
 std::optional<Arguments> parse_arguments(int argc, char** argv) {
   Arguments arguments;
-  CLI::App app{"A robot drives round a closed course for a day, as fast as the machine can compute.", "soak"};
-  app.add_option("--hours", arguments.hours, "Of stamps; default 24")
+  CLI::App app{"Drives a robot around a closed course for a day, as fast as the machine can compute.", "soak"};
+  app.add_option("--hours", arguments.hours, "Duration by the stamps; default 24")
       ->type_name("H")
       ->check(tools::number_between(0.001, 1000));
-  app.add_option("--piece-minutes", arguments.piece_minutes, "How long a lap takes; default 10")
+  app.add_option("--piece-minutes", arguments.piece_minutes, "Duration of a lap; default 10")
       ->type_name("M")
       ->check(tools::number_between(0.5, 50));
-  app.add_option("STATE_FOLDER", arguments.folder, "Course, saved state and pieces.jsonl; made if need be")->required();
-  app.footer("Interrupted, it ends after the lap; called again, it goes on after the last whole one.\n"
+  app.add_option("STATE_FOLDER", arguments.folder, "Course, saved state and pieces.jsonl; created if missing")
+      ->required();
+  app.footer("Interrupted, it ends after the lap; called again, it resumes after the last complete one.\n"
              "Ends with status 1 when a bound is broken.");
   return tools::parse_command_line(app, argc, argv) ? std::optional(arguments) : std::nullopt;
 }
 
 void print(const Piece& piece) {
-  fmt::print("hour {:6.2f}: {:.3f} ms of CPU a sweep (99 of 100 within {:.2f}), {:.2f} MB, {} descriptors, "
+  fmt::print("hour {:6.2f}: {:.3f} ms of CPU per sweep (99 % within {:.2f}), {:.2f} MB, {} descriptors, "
              "error {:.1f} mm, {:.0f} mm astray; {}{}\n",
              piece.hour, piece.cpu_p50_ms, piece.cpu_p99_ms, piece.rss_anon_mb, piece.descriptors, piece.ape_mean_mm,
              piece.astray_mm, piece.faults, piece.restarts > 0 ? "; restarted" : "");
@@ -67,7 +68,7 @@ std::string text_of(const std::optional<double>& figure) {
 void check_lap(const std::vector<Piece>& pieces, const ClosedCourse& course, const std::filesystem::path& folder) {
   if (!pieces.empty() && std::abs(pieces.back().lap_s - to_seconds(course.lap)) > 1e-3)
     throw Failure(ExitStatus::wrong_usage,
-                  fmt::format("{}: was begun with laps of {:.1f} min; give --piece-minutes {:.1f} or another folder",
+                  fmt::format("{}: was started with laps of {:.1f} min; use --piece-minutes {:.1f} or another folder",
                               folder.string(), pieces.back().lap_s / 60.0, pieces.back().lap_s / 60.0));
 }
 
@@ -89,7 +90,7 @@ int run(const Arguments& arguments) {
     }
   }
   const Verdict verdict = judge(pieces);
-  fmt::print("{} of {} laps. Memory grows by {} MB an hour; the last hour beside the first: CPU {}, latency {}.\n",
+  fmt::print("{} of {} laps. Memory grows by {} MB an hour; the last hour relative to the first: CPU {}, latency {}.\n",
              pieces.size(), laps, text_of(verdict.growth_mb_per_hour), text_of(verdict.cpu_drift),
              text_of(verdict.latency_drift));
   for (const std::string& broken : verdict.broken)

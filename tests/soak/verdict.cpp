@@ -103,7 +103,7 @@ std::optional<std::string> missing_sweeps(std::span<const Piece> pieces) {
   }
   for (const auto& [process, seen] : found)
     if (seen < least[process] - kOfProcess || seen > expected[process] + kOfProcess)
-      return fmt::format("{:.0f} sweeps where the lidar turned {:.0f} times", seen, expected[process]);
+      return fmt::format("{:.0f} sweeps of {:.0f} revolutions of the lidar", seen, expected[process]);
   return std::nullopt;
 }
 
@@ -125,9 +125,9 @@ Verdict judge(std::span<const Piece> pieces) {
   if (verdict.growth_mb_per_hour.value_or(0.0) > kMostGrowth_mb_per_hour)
     verdict.broken.push_back(fmt::format("memory grows by {:.2f} MB an hour", *verdict.growth_mb_per_hour));
   if (verdict.cpu_drift.value_or(1.0) > kMostDrift)
-    verdict.broken.push_back(fmt::format("a sweep costs {:.2f} times what it did", *verdict.cpu_drift));
+    verdict.broken.push_back(fmt::format("CPU per sweep is {:.2f} times the initial one", *verdict.cpu_drift));
   if (verdict.latency_drift.value_or(1.0) > kMostDrift)
-    verdict.broken.push_back(fmt::format("a sweep takes {:.2f} times as long as it did", *verdict.latency_drift));
+    verdict.broken.push_back(fmt::format("latency is {:.2f} times the initial one", *verdict.latency_drift));
   return verdict;
 }
 

@@ -109,7 +109,7 @@ class View(unittest.TestCase):
                 "return performance.getEntriesByType('resource').filter(({name}) => !name.startsWith(origin)).length"), 0)
             self.assertEqual(browser.complaints(), [])
 
-    def test_page_waits_for_the_service_and_finds_it_again(self):
+    def test_page_waits_for_the_service_and_reconnects(self):
         self.start_view()
         with Browser(PAGE, width=500) as browser:
             for _ in range(2):
@@ -121,7 +121,7 @@ class View(unittest.TestCase):
                 service.kill()
             self.shows(browser, "#state", "not connected")
 
-    def test_page_finds_the_command_again(self):
+    def test_page_reconnects_to_the_command(self):
         self.start_service()
         view = self.start_view()
         with Browser(PAGE, width=500) as browser:
