@@ -9,6 +9,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto kind = bytes.take<std::uint8_t>();
   const auto serialisation = kind % 2 == 0 ? Serialisation::ros1 : Serialisation::cdr;
   const MessageReader reader(bytes.rest(), serialisation);
+  fuzz::demand(tools::frame_of(reader).size() <= size);
   switch (kind / 2) {
   case 0:
     tools::read_imu(reader);

@@ -4,13 +4,13 @@
 #include <fstream>
 #include <functional>
 #include <random>
-#include <tuple>
+#include <variant>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "bag_writer.hpp"
-#include "bags/static_transforms.hpp"
+#include "daemon/inline_pipeline.hpp"
 #include "replay_run.hpp"
 #include "support/clouds.hpp"
 #include "support/test_drives.hpp"
@@ -185,41 +185,6 @@ TEST(Clouds, MountingIsThatOfTheStaticTransforms) {
   expect_parts(replay.run().out, {fmt::format("sits at {:.3f} {:.3f} {:.3f} m, 0.0 5.7 28.6 deg on base_link, by "
                                               "/tf_static",
                                               p.x(), p.y(), p.z())});
-}
-
-tools::StaticTransforms transforms_of(const std::vector<std::tuple<std::string, std::string, Pose>>& all) {
-  tools::StaticTransforms transforms;
-  for (const auto& [parent, child, T_parent_child] : all)
-    transforms.add({transform_message(parent, child, T_parent_child, RosVersion::ros1), Serialisation::ros1});
-  return transforms;
-}
-
-TEST(StaticTransforms, LeadFromFrameToFrameWhereverTheyMeet) {
-  const Pose T{from_rpy_rad({0, 0, 0.5}), {0.2, 0, 0.6}}, U{from_rpy_rad({0, 0.1, 0}), {0, 0, 0.1}};
-  const auto tree = transforms_of({{"base_link", "mast", T}, {"mast", "lidar", U}, {"mast", "imu", T}});
-  const auto expect_pose = [](const std::optional<Pose>& found, const Pose& expected) {
-    ASSERT_TRUE(found);
-    EXPECT_LT((found->translation - expected.translation).norm(), 1e-9);
-    EXPECT_LT(found->rotation.angularDistance(expected.rotation), 1e-7);
-  };
-  expect_pose(tree.between("base_link", "/lidar"), T * U);
-  expect_pose(tree.between("lidar", "base_link"), (T * U).inverse());
-  expect_pose(tree.between("imu", "lidar"), T.inverse() * U);
-  expect_pose(tree.between("alone", "alone"), Pose{});
-  EXPECT_FALSE(tree.between("base_link", "camera"));
-
-  const auto circle = transforms_of(
-      {{"base_link", "base_footprint", T}, {"base_footprint", "base_link", T.inverse()}, {"base_link", "lidar", U}});
-  expect_pose(circle.between("base_link", "base_footprint"), T);
-  expect_pose(circle.between("base_footprint", "base_link"), T.inverse());
-  expect_pose(circle.between("base_link", "lidar"), U);
-  expect_pose(circle.between("base_footprint", "lidar"), T.inverse() * U);
-  EXPECT_FALSE(circle.between("camera", "lidar"));
-}
-
-TEST(StaticTransforms, AbsurdNamesAreLeftOut) {
-  const std::string name(5000, 'x');
-  EXPECT_FALSE(transforms_of({{name, "lidar", Pose{}}}).between(name, "lidar"));
 }
 
 TEST(Clouds, TopicWithMostPointsIsTakenAndTheOthersAreNamed) {
