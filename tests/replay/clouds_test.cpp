@@ -317,6 +317,17 @@ TEST(Clouds, UserChoosesAzimuthOrOneInstant) {
   EXPECT_EQ(none.summary()["sweeps"]["failed"], 0);
 }
 
+/// One cloud in three is stamped 150 ms early, so before the one that arrives ahead of it.
+TEST(Clouds, StampsThatGoBackAreNamedInTheFirstSecond) {
+  const TemporaryFolder folder;
+  std::size_t count = 0;
+  const auto early = [&](OwnCloud& cloud) { cloud.stamp -= count++ % 3 == 2 ? milliseconds{150} : milliseconds{0}; };
+  write_file(folder / "clouds.bag", ros1_bag(room_clouds(CloudKind::velodyne_start, RosVersion::ros1, early)));
+  const Replay replay({"--duration", "1", folder / "clouds.bag"});
+  EXPECT_EQ(replay.run().status, 0);
+  expect_parts(replay.run().err, {"lidar front", "go back or stand still from one to the next"});
+}
+
 TEST(Clouds, ClockThatStepsCostsAFewClouds) {
   const TemporaryFolder folder;
   const Stamp middle = room_turns()[room_turns().size() / 2].begin;
