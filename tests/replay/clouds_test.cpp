@@ -130,6 +130,35 @@ TEST_P(CloudsOf, Ros2BagGivesTheSameBits) {
   EXPECT_EQ(read_text(ros1.file("odometry.tum")), read_text(ros2.file("odometry.tum")));
 }
 
+/// The service's receive path from a serialised message on, without DDS and its threads.
+TEST_P(CloudsOf, LiveMessagesGiveTheTrajectoryOfThePackets) {
+  if (kind() == CloudKind::livox_custom)
+    GTEST_SKIP() << "no PointCloud2, and so in bags alone";
+  Config config;
+  config.lidars.front().topic = "/points";
+  config.motion_sources.clear();
+  daemon::LiveInput input({}, {true});
+  std::vector<StampedPose> trajectory;
+  daemon::InlinePipeline pipeline(config, *LidarRouter::open(config.lidars),
+                                  [&](const Sweep&, const daemon::ProcessedSweep& done) {
+                                    trajectory.push_back({done.estimate.stamp, done.estimate.T_odom_base});
+                                  });
+  for (const RecordedMessage& message : room_clouds(kind(), RosVersion::ros2)) {
+    if (message.topic != "/points")
+      continue;
+    daemon::CloudBytes& next = input.next_cloud(0);
+    next.arrival = message.recorded;
+    next.bytes = message.data;
+    input.push_cloud(0);
+    const daemon::Input received = input.next(Duration::zero());
+    ASSERT_TRUE(std::holds_alternative<daemon::CloudInput>(received));
+    pipeline.process(received);
+  }
+  pipeline.process(daemon::EndOfInput{});
+  EXPECT_LT(farthest_from_packets_m(trajectory), 0.001);
+  EXPECT_EQ(input.cloud_drops(0), 0U);
+}
+
 INSTANTIATE_TEST_SUITE_P(Kinds, CloudsOf, testing::Range(0, kCloudKinds),
                          [](const auto& tested) { return name_of(static_cast<CloudKind>(tested.param)); });
 
