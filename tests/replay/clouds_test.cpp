@@ -130,6 +130,15 @@ TEST_P(CloudsOf, Ros2BagGivesTheSameBits) {
   EXPECT_EQ(read_text(ros1.file("odometry.tum")), read_text(ros2.file("odometry.tum")));
 }
 
+TEST_P(CloudsOf, WrittenInputsReplayToTheSameBits) {
+  const TemporaryFolder folder;
+  write_file(folder / "clouds.bag", ros1_bag(room_clouds(kind(), RosVersion::ros1, {}, 20)));
+  const Replay first({"--mcap", folder / "out.mcap", folder / "clouds.bag"}), again({folder / "out.mcap"});
+  ASSERT_EQ(again.run().status, 0) << again.run().err;
+  expect_parts(again.run().out, {"/points is lidar front"});
+  EXPECT_TRUE(read_text(first.file("odometry.csv")) == read_text(again.file("odometry.csv")));
+}
+
 /// The service's receive path from a serialised message on, without DDS and its threads.
 TEST_P(CloudsOf, LiveMessagesGiveTheTrajectoryOfThePackets) {
   if (kind() == CloudKind::livox_custom)

@@ -58,8 +58,8 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
       ->type_name("FILE");
   auto* mcap =
       app.add_option("--mcap", arguments.mcap,
-                     "Also writes odometry, tf, corrected clouds and diagnostics as messages of ROS 2 into FILE, "
-                     "for Foxglove and rosbag2")
+                     "Also writes odometry, tf, corrected clouds, diagnostics and the inputs as messages of ROS 2 "
+                     "into FILE, for Foxglove and rosbag2")
           ->type_name("FILE");
   auto* sweeps =
       app.add_option("--sweeps", arguments.sweeps,
