@@ -15,8 +15,9 @@
 
 namespace locus::tools {
 
-/// Writes the inputs of a run as received, so that the file replays to the same bits: samples of the motion sources,
-/// and packets or clouds of the lidars; before the first of each lidar and IMU its mounting on /tf_static. One owner.
+/// Writes the inputs of a run as received, so that the file replays to the same bits with the same configuration:
+/// samples of the motion sources, and packets or clouds of the lidars; before the first of each lidar and IMU its
+/// mounting on /tf_static. One owner.
 ///
 /// | input | topic | type |
 /// |---|---|---|
@@ -24,6 +25,9 @@ namespace locus::tools {
 /// | clouds | as configured | PointCloud2 |
 /// | packets of an Ouster | /NAME/lidar_packets, /NAME/imu_packets; /NAME/metadata | PacketMsg; String |
 /// | packets of other lidars | /NAME/packets | NebulaPackets, of a tenth of a second |
+///
+/// NebulaPackets is the only one of the types of packets that holds those of any maker and length: a VelodyneScan has
+/// no room for position packets, by which the replay recognises the lidar's clock.
 ///
 /// Left out are packets that no lidar accepts, such as those of another sender, and the points of KITTI's raw data,
 /// which are neither packets nor clouds.
