@@ -401,6 +401,14 @@ Expected<Config, ConfigErrors> load_service_config(const std::filesystem::path& 
   return config;
 }
 
+bool sets_key(const std::filesystem::path& file, const std::string& path) {
+  YAML::Node node = YAML::LoadFile(file.string());
+  std::string known;
+  const std::vector<std::string> parts = split(path, '.');
+  return std::all_of(parts.begin(), parts.end(),
+                     [&](const std::string& part) { return !descend(node, known, part).has_value(); });
+}
+
 Expected<Config, ConfigErrors> override_config(const Config& config, std::span<const std::string> assignments) {
   Config changed = config;
   std::vector<Override> overrides;

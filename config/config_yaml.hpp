@@ -25,6 +25,9 @@ Expected<Config, ConfigErrors> load_service_config(const std::filesystem::path& 
 /// Reads a configuration from text; `origin` replaces the file name in errors. Otherwise as load_config().
 Expected<Config, ConfigErrors> parse_config(const std::string& yaml, const std::string& origin);
 
+/// Returns whether the file itself sets a key, such as "lidars.0.T_base_lidar". Precondition: load_config() accepts it.
+bool sets_key(const std::filesystem::path& file, const std::string& path);
+
 /// Applies options such as "lidars.front.port=2369" all at once: dotted path, list items by name or index, value in
 /// YAML.
 Expected<Config, ConfigErrors> override_config(const Config& config, std::span<const std::string> assignments);

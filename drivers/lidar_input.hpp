@@ -199,6 +199,9 @@ class LidarRouter {
 
   [[nodiscard]] const std::vector<LidarInput>& lidars() const { return lidars_; }
 
+  /// Index of the lidar that processed the latest datagram; empty if it matched none.
+  [[nodiscard]] std::optional<std::size_t> latest() const { return latest_; }
+
   /// IMU samples of the latest datagram, see LidarInput::imu_samples().
   struct Imu {
     std::uint8_t lidar = 0; ///< index

@@ -8,6 +8,8 @@
 #include <limits>
 #include <utility>
 
+#include "drivers/files/motion_rows.hpp"
+
 namespace locus::daemon {
 namespace {
 
@@ -16,6 +18,11 @@ char* c_string(const std::string& text) { return const_cast<char*>(text.c_str())
 
 Eigen::Quaterniond to_eigen(const ros::Quaternion& q) { return {q.w_, q.x_, q.y_, q.z_}; }
 Eigen::Vector3d to_eigen(const ros::Vector3& v) { return {v.x_, v.y_, v.z_}; }
+
+/// Normalises a rotation. Preserves the digits of one that is normalised, so that a recording replays to the same bits.
+Eigen::Quaterniond normalised(const Eigen::Quaterniond& q) {
+  return unit_quaternion(q.w(), q.x(), q.y(), q.z()).value_or(q);
+}
 
 ros::Quaternion to_ros(const Eigen::Quaterniond& q) { return {q.x(), q.y(), q.z(), q.w()}; }
 
@@ -33,7 +40,7 @@ ImuSample to_sample(const ros::Imu& message, Stamp arrival) {
                    to_eigen(message.linear_acceleration_), std::nullopt};
   const Eigen::Quaterniond attitude = to_eigen(message.orientation_);
   if (message.orientation_covariance_[0] != -1.0 && is_rotation(attitude))
-    sample.attitude = attitude.normalized();
+    sample.attitude = normalised(attitude);
   return sample;
 }
 
@@ -98,7 +105,7 @@ OdometrySample to_sample(const ros::Odometry& message, Stamp arrival, UsualCovar
   const auto& [position, orientation] = message.pose_.pose_;
   const Eigen::Quaterniond rotation = to_eigen(orientation);
   return {to_stamp(message.header_.stamp_), arrival,
-          Pose{is_rotation(rotation) ? rotation.normalized() : rotation, {position.x_, position.y_, position.z_}},
+          Pose{is_rotation(rotation) ? normalised(rotation) : rotation, {position.x_, position.y_, position.z_}},
           usual.scale(message)};
 }
 

@@ -95,7 +95,7 @@ std::optional<CloudError> CloudDecoder::begin(const CloudView& message, Stamp ar
     return refuse(CloudError::clock);
   cloud_ = {*on_host, *on_host + length + Duration{1}, false};
   zero_ = cloud_.begin;
-  measure_period();
+  measure_period(arrival);
   sort_by_time();
   if (timing_ == PointTiming::instant)
     cloud_.begin = cloud_.end - period_;
@@ -339,10 +339,15 @@ std::optional<Stamp> CloudDecoder::on_host_clock(Stamp begin, Duration length, S
   return *end - length;
 }
 
-void CloudDecoder::measure_period() {
+/// Measures the period, and finds stamps that do not advance. Once they may stand still: where the header's stamp is
+/// found to be that of the other end, see stamped_at_begin().
+void CloudDecoder::measure_period(Stamp arrival) {
   constexpr Duration kShortest = std::chrono::milliseconds{5};
-  constexpr int kMemory = 8;
+  constexpr int kMemory = 8, kEvidence = 3;
   const Duration since = last_begin_ ? cloud_.begin - *last_begin_ : Duration{};
+  standing_still_ = last_begin_ && since <= Duration{} ? standing_still_ + 1 : 0;
+  if (since < -kShortest || standing_still_ >= kEvidence)
+    doubt(CloudDoubt::backwards, arrival);
   if (last_begin_ && since <= Duration{})
     ++counters_.reordered;
   else if (since > kShortest && since < kLongestCloud) // a longer interval means a lost cloud

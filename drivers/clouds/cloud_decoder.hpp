@@ -71,7 +71,7 @@ class CloudDecoder {
   void time_by_place(const CloudView& message);
   Stamp stamped_at_begin(Stamp begin, Stamp header, Stamp arrival);
   std::optional<Stamp> on_host_clock(Stamp begin, Duration length, Stamp arrival);
-  void measure_period();
+  void measure_period(Stamp arrival);
   void sort_by_time();
   FiringGroup* group_for(std::size_t laser);
   void add_point(std::size_t point, FiringGroup& group, std::int32_t begin_ns) const;
@@ -112,6 +112,7 @@ class CloudDecoder {
   Duration period_ = std::chrono::milliseconds{100};
   bool period_is_known_ = false;
   std::optional<Stamp> last_begin_;
+  int standing_still_ = 0;          ///< consecutive clouds that begin no later than the one before
   std::optional<Stamp> last_stamp_; ///< header stamp
   std::uint64_t last_digest_ = 0;
   std::size_t frame_ = 0; ///< hash of the frame's name

@@ -51,6 +51,10 @@ std::string explain(CloudDoubt doubt, PointTiming timing) {
   case CloudDoubt::behind:
     return "its stamps are of another clock than this computer's, so their time of arrival is used; synchronise the "
            "lidar's clock with it (PTP), or have the driver stamp by the computer's clock";
+  case CloudDoubt::backwards:
+    return "the stamps of its clouds go back or stand still from one to the next, and what is older than the sweep is "
+           "left out; have the driver stamp each cloud by one clock that nobody sets, let no second driver publish on "
+           "the topic, and sort a merged bag by time";
   }
   return "";
 }

@@ -30,10 +30,11 @@ enum class CloudDoubt : std::uint8_t {
   ahead,        ///< stamps are ahead of the host's clock
   behind,       ///< stamps are behind the host's clock
   two_frames,   ///< clouds of two frames on one topic
+  backwards,    ///< stamps go back or stand still from one cloud to the next
 };
 constexpr auto names_of(CloudDoubt) {
-  return std::to_array<std::string_view>(
-      {"no_times", "equal_times", "disorder", "no_unit", "stamp_at_end", "tai", "ahead", "behind", "two_frames"});
+  return std::to_array<std::string_view>({"no_times", "equal_times", "disorder", "no_unit", "stamp_at_end", "tai",
+                                          "ahead", "behind", "two_frames", "backwards"});
 }
 inline constexpr std::size_t kCloudDoubts = names_of(CloudDoubt{}).size();
 using CloudDoubts = std::bitset<kCloudDoubts>;

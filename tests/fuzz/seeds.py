@@ -346,6 +346,11 @@ for kind, body in ((8, pandar), (9, frame)):
     write("bag_messages", f"cdr_{kind}", bytes([2 * (kind - 2) + 1]) + cdr_head + body)
 bare = struct.pack("<II", 1, 1) + STAMP_AND_FRAME + frame[4:]
 write("bag_messages", "ros1_bare", bytes([14]) + bare)
+pose = struct.pack("<7d", 1, 2, 3, 0, 0, 0.6, 0.8)
+links = [struct.pack("<III", 0, 1_700_000_000, 5) + struct.pack(f"<I{len(parent)}sI1s", len(parent), parent, 1, child) + pose
+         for parent, child in ((b"a", b"b"), (b"m", b"a"), (b"m", b"b"), (b"b", b"a"))]
+for name, tree in (("chain", links[:1]), ("fork", links[1:3]), ("circle", [links[0], links[3]])):
+    write("bag_messages", f"ros1_tf_{name}", bytes([254]) + struct.pack("<I", len(tree)) + b"".join(tree))
 topics = connection(0, b"/imu", b"sensor_msgs/Imu") + connection(1, b"/scan", b"velodyne_msgs/VelodyneScan")
 messages = b"".join(record(2, ros1[kind], conn=struct.pack("<I", number), time=struct.pack("<II", 1_700_000_001, 9))
                     for number, kind in ((0, 0), (0, 0), (1, 2)))

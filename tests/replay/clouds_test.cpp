@@ -4,13 +4,13 @@
 #include <fstream>
 #include <functional>
 #include <random>
-#include <tuple>
+#include <variant>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "bag_writer.hpp"
-#include "bags/static_transforms.hpp"
+#include "daemon/inline_pipeline.hpp"
 #include "replay_run.hpp"
 #include "support/clouds.hpp"
 #include "support/test_drives.hpp"
@@ -130,6 +130,44 @@ TEST_P(CloudsOf, Ros2BagGivesTheSameBits) {
   EXPECT_EQ(read_text(ros1.file("odometry.tum")), read_text(ros2.file("odometry.tum")));
 }
 
+TEST_P(CloudsOf, WrittenInputsReplayToTheSameBits) {
+  const TemporaryFolder folder;
+  write_file(folder / "clouds.bag", ros1_bag(room_clouds(kind(), RosVersion::ros1, {}, 20)));
+  const Replay first({"--mcap", folder / "out.mcap", folder / "clouds.bag"}), again({folder / "out.mcap"});
+  ASSERT_EQ(again.run().status, 0) << again.run().err;
+  expect_parts(again.run().out, {"/points is lidar front"});
+  EXPECT_TRUE(read_text(first.file("odometry.csv")) == read_text(again.file("odometry.csv")));
+}
+
+/// The service's receive path from a serialised message on, without DDS and its threads.
+TEST_P(CloudsOf, LiveMessagesGiveTheTrajectoryOfThePackets) {
+  if (kind() == CloudKind::livox_custom)
+    GTEST_SKIP() << "no PointCloud2, and so in bags alone";
+  Config config;
+  config.lidars.front().topic = "/points";
+  config.motion_sources.clear();
+  daemon::LiveInput input({}, {true});
+  std::vector<StampedPose> trajectory;
+  daemon::InlinePipeline pipeline(config, *LidarRouter::open(config.lidars),
+                                  [&](const Sweep&, const daemon::ProcessedSweep& done) {
+                                    trajectory.push_back({done.estimate.stamp, done.estimate.T_odom_base});
+                                  });
+  for (const RecordedMessage& message : room_clouds(kind(), RosVersion::ros2)) {
+    if (message.topic != "/points")
+      continue;
+    daemon::CloudBytes& next = input.next_cloud(0);
+    next.arrival = message.recorded;
+    next.bytes = message.data;
+    input.push_cloud(0);
+    const daemon::Input received = input.next(Duration::zero());
+    ASSERT_TRUE(std::holds_alternative<daemon::CloudInput>(received));
+    pipeline.process(received);
+  }
+  pipeline.process(daemon::EndOfInput{});
+  EXPECT_LT(farthest_from_packets_m(trajectory), 0.001);
+  EXPECT_EQ(input.cloud_drops(0), 0U);
+}
+
 INSTANTIATE_TEST_SUITE_P(Kinds, CloudsOf, testing::Range(0, kCloudKinds),
                          [](const auto& tested) { return name_of(static_cast<CloudKind>(tested.param)); });
 
@@ -185,41 +223,6 @@ TEST(Clouds, MountingIsReadFromTheStaticTransforms) {
   expect_parts(replay.run().out, {fmt::format("is mounted at {:.3f} {:.3f} {:.3f} m, 0.0 5.7 28.6 deg on base_link, by "
                                               "/tf_static",
                                               p.x(), p.y(), p.z())});
-}
-
-tools::StaticTransforms transforms_of(const std::vector<std::tuple<std::string, std::string, Pose>>& all) {
-  tools::StaticTransforms transforms;
-  for (const auto& [parent, child, T_parent_child] : all)
-    transforms.add({transform_message(parent, child, T_parent_child, RosVersion::ros1), Serialisation::ros1});
-  return transforms;
-}
-
-TEST(StaticTransforms, ConnectFramesThroughCommonAncestors) {
-  const Pose T{from_rpy_rad({0, 0, 0.5}), {0.2, 0, 0.6}}, U{from_rpy_rad({0, 0.1, 0}), {0, 0, 0.1}};
-  const auto tree = transforms_of({{"base_link", "mast", T}, {"mast", "lidar", U}, {"mast", "imu", T}});
-  const auto expect_pose = [](const std::optional<Pose>& found, const Pose& expected) {
-    ASSERT_TRUE(found);
-    EXPECT_LT((found->translation - expected.translation).norm(), 1e-9);
-    EXPECT_LT(found->rotation.angularDistance(expected.rotation), 1e-7);
-  };
-  expect_pose(tree.between("base_link", "/lidar"), T * U);
-  expect_pose(tree.between("lidar", "base_link"), (T * U).inverse());
-  expect_pose(tree.between("imu", "lidar"), T.inverse() * U);
-  expect_pose(tree.between("alone", "alone"), Pose{});
-  EXPECT_FALSE(tree.between("base_link", "camera"));
-
-  const auto circle = transforms_of(
-      {{"base_link", "base_footprint", T}, {"base_footprint", "base_link", T.inverse()}, {"base_link", "lidar", U}});
-  expect_pose(circle.between("base_link", "base_footprint"), T);
-  expect_pose(circle.between("base_footprint", "base_link"), T.inverse());
-  expect_pose(circle.between("base_link", "lidar"), U);
-  expect_pose(circle.between("base_footprint", "lidar"), T.inverse() * U);
-  EXPECT_FALSE(circle.between("camera", "lidar"));
-}
-
-TEST(StaticTransforms, AbsurdNamesAreRejected) {
-  const std::string name(5000, 'x');
-  EXPECT_FALSE(transforms_of({{name, "lidar", Pose{}}}).between(name, "lidar"));
 }
 
 TEST(Clouds, TopicWithMostPointsIsUsedAndOthersAreNamed) {
@@ -351,6 +354,17 @@ TEST(Clouds, UserChoosesAzimuthOrOneInstant) {
   EXPECT_EQ(none.run().err, "");
   EXPECT_EQ(none.summary()["lidars"]["front"]["clouds"]["times"], "instant");
   EXPECT_EQ(none.summary()["sweeps"]["failed"], 0);
+}
+
+/// One cloud in three is stamped 150 ms early, so before the one that arrives ahead of it.
+TEST(Clouds, StampsGoingBackAreReportedInTheFirstSecond) {
+  const TemporaryFolder folder;
+  std::size_t count = 0;
+  const auto early = [&](OwnCloud& cloud) { cloud.stamp -= count++ % 3 == 2 ? milliseconds{150} : milliseconds{0}; };
+  write_file(folder / "clouds.bag", ros1_bag(room_clouds(CloudKind::velodyne_start, RosVersion::ros1, early)));
+  const Replay replay({"--duration", "1", folder / "clouds.bag"});
+  EXPECT_EQ(replay.run().status, 0);
+  expect_parts(replay.run().err, {"lidar front", "go back or stand still from one to the next"});
 }
 
 TEST(Clouds, ClockStepLosesAFewClouds) {

@@ -11,6 +11,8 @@
 #include "bags/messages.hpp"
 #include "bags/ros_definitions.hpp"
 #include "dds/fast_dds_types.hpp"
+#include "drivers/files/capture.hpp"
+#include "drivers/files/pcap_writer.hpp"
 #include "mcap_text.hpp"
 #include "replay_run.hpp"
 #include "support/errors.hpp"
@@ -79,10 +81,11 @@ TEST_F(McapResults, ContainsTheOdometryOfEverySweep) {
   EXPECT_EQ(count["/locus/cloud sensor_msgs/PointCloud2"], trajectory.size());
   const double duration_s = to_seconds(trajectory.back().stamp - trajectory.front().stamp);
   EXPECT_NEAR(static_cast<double>(count["/diagnostics diagnostic_msgs/DiagnosticArray"]), duration_s, 2);
-  EXPECT_EQ(count["/tf_static tf2_msgs/TFMessage"], 1U);
+  EXPECT_EQ(count["/tf_static tf2_msgs/TFMessage"], 2U) << "of the lidar and the IMU";
+  EXPECT_NEAR(static_cast<double>(count["/front/packets nebula_msgs/NebulaPackets"]), 10 * duration_s, 10);
   EXPECT_GT(count["/imu/data sensor_msgs/Imu"], 7U * 90);
   EXPECT_GT(count["/wheel_odometry nav_msgs/Odometry"], 7U * 40);
-  EXPECT_EQ(count.size(), 7U);
+  EXPECT_EQ(count.size(), 8U);
 }
 
 /// The inputs in the file are those of the recording, to the last bit that a message can hold.
@@ -109,6 +112,49 @@ TEST_F(McapResults, ContainsTheSamplesOfTheMotionSources) {
     ++compared;
   }
   EXPECT_GT(compared, 7U * 90);
+}
+
+/// The inputs suffice, and the outputs beside them are not used.
+TEST_F(McapResults, ReplaysToTheSameBits) {
+  const Replay again({file_});
+  EXPECT_EQ(again.run().err, "");
+  EXPECT_TRUE(contains(again.run().out, "/front/packets is lidar front, /wheel_odometry is wio, /imu/data is imu; not "
+                                        "used: /locus/odometry, /locus/cloud"))
+      << again.run().out;
+  EXPECT_TRUE(read_text(again.file("odometry.csv")) == read_text(replay_.file("odometry.csv")));
+  EXPECT_EQ(again.summary()["packets"], replay_.summary()["packets"]);
+}
+
+/// A drive without odometry: that of the service beside it is no input.
+TEST(McapInputs, ReplayWithoutTheOdometryOfTheService) {
+  const TemporaryFolder folder;
+  const std::string file = folder / "out.mcap", imu = "motion_sources=[{name: imu, kind: imu, topic: /imu/data}]";
+  const Replay first({"--set", imu, "--mcap", file, room_drive()});
+  const Replay by_default({file}), again({"--set", imu, file});
+  EXPECT_FALSE(contains(by_default.run().out, "/locus/odometry is")) << by_default.run().out;
+  EXPECT_TRUE(read_text(again.file("odometry.tum")) == read_text(first.file("odometry.tum")));
+}
+
+/// Another computer sends to the port of the lidar, from the first second on.
+TEST(McapInputs, LeaveOutThePacketsOfOtherSenders) {
+  const TemporaryFolder folder;
+  auto capture = Capture::open(room_drive() / "lidar.pcap");
+  ASSERT_TRUE(capture) << capture.error();
+  auto both = PcapWriter::open(folder / "both.pcap");
+  ASSERT_TRUE(both) << both.error();
+  for (std::uint64_t count = 0; const Datagram* datagram = capture->next(); ++count) {
+    both->write(*datagram);
+    Datagram foreign = *datagram;
+    foreign.source_ip += 1;
+    if (count > 750)
+      both->write(foreign);
+  }
+  ASSERT_EQ(both->flush(), std::nullopt);
+  const Replay first({"--set", "motion_sources=[]", "--mcap", folder / "out.mcap", folder / "both.pcap"});
+  const Replay again({"--set", "motion_sources=[]", folder / "out.mcap"});
+  EXPECT_GT(first.summary()["packets"]["front"]["rejected"]["sender"], 100);
+  EXPECT_EQ(again.summary()["packets"]["front"]["rejected"]["sender"], 0);
+  EXPECT_TRUE(read_text(again.file("odometry.tum")) == read_text(first.file("odometry.tum")));
 }
 
 TEST_F(McapResults, IsReadableByAnotherCdrLibrary) {
@@ -192,8 +238,8 @@ TEST_F(McapResults, IndexLocatesEachMessage) {
     EXPECT_EQ(indices_seen, indices_length);
   }
   EXPECT_TRUE(rest.empty());
-  EXPECT_EQ(records[McapOp::schema], 7);
-  EXPECT_EQ(records[McapOp::channel], 7);
+  EXPECT_EQ(records[McapOp::schema], 8);
+  EXPECT_EQ(records[McapOp::channel], 8);
   EXPECT_EQ(records[McapOp::statistics], 1);
   EXPECT_GT(records[McapOp::chunk_index], 3);
   EXPECT_EQ(indexed, messages);

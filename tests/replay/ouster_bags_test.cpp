@@ -99,6 +99,16 @@ TEST_F(OusterBags, PacketsAndMetadataOfABagGiveTheBitsOfTheCapture) {
   }
 }
 
+TEST_F(OusterBags, WrittenInputsReplayToTheSameBits) {
+  const Replay first({"--mcap", folder_ / "out.mcap", drive() / "capture/drive.pcap"});
+  EXPECT_TRUE(odometry(first) == odometry_of_capture());
+  const Replay again({folder_ / "out.mcap"});
+  EXPECT_TRUE(odometry(again) == odometry_of_capture());
+  EXPECT_EQ(again.run().err, "");
+  EXPECT_TRUE(contains(again.run().out, "/front/lidar_packets is lidar front, /front/imu_packets is front_imu"))
+      << again.run().out;
+}
+
 TEST_F(OusterBags, MetadataMayComeAfterTheFirstPacketsOrLieBesideTheBag) {
   std::vector<RecordedMessage> late = packets(RosVersion::ros2, "ouster_sensor_msgs");
   const RecordedMessage inserted = metadata_message(RosVersion::ros2, late[100].recorded);

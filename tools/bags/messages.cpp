@@ -19,12 +19,19 @@ ros::Time read_time(MessageReader& reader) {
   return {seconds, reader.number<std::uint32_t>()};
 }
 
-ros::Header read_header(MessageReader& reader) {
+struct Header {
+  ros::Time stamp;
+  std::string_view frame;
+
+  /// Returns the message's header without the frame.
+  [[nodiscard]] ros::Header nameless() const { return {stamp, nullptr}; }
+};
+
+Header read_header(MessageReader& reader) {
   if (reader.serialisation() == Serialisation::ros1)
     reader.number<std::uint32_t>(); // sequence number, dropped in ROS 2
   const ros::Time stamp = read_time(reader);
-  reader.text();
-  return {stamp, nullptr};
+  return {stamp, reader.text()};
 }
 
 ros::Vector3 read_vector(MessageReader& reader) {
@@ -105,9 +112,14 @@ std::optional<LidarPackets> read_hesai_frame(MessageReader message) {
 
 Stamp stamp_or(Stamp recorded, Stamp stamp) { return stamp == Stamp{} ? recorded : stamp; }
 
+std::string_view frame_of(MessageReader reader) {
+  const std::string_view frame = read_header(reader).frame;
+  return reader.whole() ? frame : std::string_view{};
+}
+
 std::optional<ros::Imu> read_imu(MessageReader reader) {
   ros::Imu imu{};
-  imu.header_ = read_header(reader);
+  imu.header_ = read_header(reader).nameless();
   imu.orientation_ = read_quaternion(reader);
   reader.numbers(imu.orientation_covariance_);
   imu.angular_velocity_ = read_vector(reader);
@@ -119,7 +131,7 @@ std::optional<ros::Imu> read_imu(MessageReader reader) {
 
 std::optional<ros::Odometry> read_odometry(MessageReader reader) {
   ros::Odometry odometry{};
-  odometry.header_ = read_header(reader);
+  odometry.header_ = read_header(reader).nameless();
   reader.text(); // child frame
   const ros::Vector3 position = read_vector(reader);
   odometry.pose_.pose_ = {{position.x_, position.y_, position.z_}, read_quaternion(reader)};

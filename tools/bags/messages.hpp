@@ -48,6 +48,9 @@ bool is_ouster_type(std::string_view name);
 /// Returns the stamp of a header or packet, or `recorded` if it was not set.
 Stamp stamp_or(Stamp recorded, Stamp stamp);
 
+/// Reads the frame of a message that begins with a header; empty if it is truncated. Refers to the message.
+std::string_view frame_of(MessageReader reader);
+
 /// Reads everything but the frame names, which stay null.
 std::optional<daemon::ros::Imu> read_imu(MessageReader reader);
 std::optional<daemon::ros::Odometry> read_odometry(MessageReader reader);

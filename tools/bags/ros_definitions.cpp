@@ -17,6 +17,10 @@ struct Definition {
 constexpr std::array kDefinitions{
     Definition{"builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"},
     Definition{"std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n"},
+    Definition{"std_msgs/String", "string data\n"},
+    Definition{"nebula_msgs/NebulaPacket", "builtin_interfaces/Time stamp\nuint8[] data\n"},
+    Definition{"nebula_msgs/NebulaPackets", "std_msgs/Header header\nnebula_msgs/NebulaPacket[] packets\n"},
+    Definition{"ouster_sensor_msgs/PacketMsg", "uint8[] buf\n"},
     Definition{"geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n"},
     Definition{"geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n"},
     Definition{"geometry_msgs/Quaternion", "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n"},

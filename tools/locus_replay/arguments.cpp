@@ -59,8 +59,8 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
                  "True map for comparison with the map, PLY or PCD; default: the folder's gt_map.ply")
       ->type_name("FILE");
   auto* mcap = app.add_option("--mcap", arguments.mcap,
-                              "Also writes odometry, tf, corrected clouds and diagnostics as ROS 2 messages to FILE, "
-                              "for Foxglove and rosbag2")
+                              "Also writes odometry, tf, corrected clouds, diagnostics and the inputs as ROS 2 "
+                              "messages to FILE, for Foxglove and rosbag2")
                    ->type_name("FILE");
   auto* sweeps =
       app.add_option("--sweeps", arguments.sweeps,

@@ -220,7 +220,12 @@ void deal_sources(const Bag& bag, const std::string& bag_name, const Config& con
                   const std::function<bool(SourceId)>& has_file, SourceKind kind, BagTopics& chosen) {
   const std::vector<MotionSource>& sources = config.motion_sources;
   const auto is_wanted = [&](std::size_t i) { return sources[i].kind == kind && !has_file(SourceId{i}); };
-  Dealer dealer(bag.topics(), [kind](const BagTopic& topic) { return topic.type == type_of(kind); });
+  const std::string own = config.dds.prefix + "/odometry"; // published by locusd itself, an input only by name
+  const bool wants_own =
+      std::ranges::any_of(sources, [&](const MotionSource& source) { return is_same_topic(source.topic, own); });
+  Dealer dealer(bag.topics(), [&](const BagTopic& topic) {
+    return topic.type == type_of(kind) && (wants_own || !is_same_topic(topic.name, own));
+  });
   std::vector<Index*> nameless;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     if (!is_wanted(i))

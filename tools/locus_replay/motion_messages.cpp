@@ -21,7 +21,7 @@ ros::Imu to_ros(const ImuSample& sample, const std::string& frame) {
 }
 
 ros::Odometry to_ros(const OdometrySample& sample, const daemon::FrameNames& frames) {
-  constexpr double kUsualVariance = 1e-4;
+  constexpr double kUsualVariance = 1; // its logarithm is exactly 0, so that a usual one replays to the same bits
   daemon::OdometryReport report{.stamp = sample.stamp, .T_odom_base = sample.T_source_base};
   report.twist_covariance.diagonal().setConstant(kUsualVariance * sample.covariance_scale);
   return daemon::to_ros(report, frames);

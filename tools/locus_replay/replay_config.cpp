@@ -13,6 +13,8 @@
 #include "config/lidar_metadata.hpp"
 #include "kitti/kitti_drive.hpp"
 #include "locus_replay/bag_cloud_lidar.hpp"
+#include "locus_replay/bag_mountings.hpp"
+#include "locus_replay/bag_survey.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/recorded_input.hpp"
 #include "sweep_folder/sweep_folder.hpp"
@@ -47,12 +49,9 @@ Config completed(Config config) {
 constexpr double kFastestCar_mps = 60.0;
 
 /// Derives the configuration from the files of a folder that has none: which sources there are, those of a walking
-/// robot first, and whether it was a car. `lines` for the user are about a bag with clouds only.
-Config configuration_of(const CaptureFolder& folder, const std::filesystem::path& capture,
-                        std::vector<std::string>& lines) {
+/// robot first, and whether it was a car.
+Config configuration_of(const CaptureFolder& folder, const std::filesystem::path& capture) {
   Config config;
-  if (looks_like_bag(capture))
-    configure_clouds_of(capture, config, lines);
   if (KittiDrive::is(capture) || SweepFolder::is_kitti_odometry(capture))
     config.odometry.motion.max_speed_mps = kFastestCar_mps;
   for (const char* const name : {"kio", "vio"}) {
@@ -78,6 +77,14 @@ void configure_sweeps(const std::filesystem::path& capture, Config& config) {
     lidar.point_times = PointTimesFrom::none;
 }
 
+/// Returns whether the user gives a file for an IMU: it belongs to the first one.
+bool has_sample_file(const Arguments& arguments, const Config& config, SourceId source) {
+  const auto first = std::ranges::find_if(
+      config.motion_sources, [](const MotionSource& s) { return s.kind == SourceKind::imu && !s.of_lidar; });
+  return !arguments.imu.empty() &&
+         static_cast<std::ptrdiff_t>(index_of(source)) == first - config.motion_sources.begin();
+}
+
 } // namespace
 
 Config read_configuration(const std::filesystem::path& file, const std::vector<std::string>& overrides) {
@@ -89,16 +96,25 @@ Config read_configuration(const std::filesystem::path& file, const std::vector<s
 
 Config configuration_for(const FoundRecording& found, const std::filesystem::path& file, const Arguments& arguments,
                          std::vector<std::string>& lines, FoundMetadata& metadata) {
-  Config config =
-      file.empty() ? configuration_of(found.files, found.capture, lines) : config_or_fail(load_config(file));
+  Config config = file.empty() ? configuration_of(found.files, found.capture) : config_or_fail(load_config(file));
+  std::optional<BagSurvey> survey;
+  if (looks_like_bag(found.capture))
+    survey = BagSurvey::of(found.capture);
+  if (survey && file.empty())
+    configure_clouds_of(*survey, found.capture, config, lines);
   if (arguments.config.empty())
     use_recorded_metadata(found.files, config);
   if (gives_sweeps(found.capture))
     configure_sweeps(found.capture, config);
+  const Config before = config;
   config = config_or_fail(override_config(config, arguments.overrides));
   if (file.empty())
     metadata = find_metadata(found.files, config);
   config = completed(std::move(config));
+  if (survey)
+    mount_by_transforms(
+        *survey, found.capture.string(), UnsetMountings::in(before, file, arguments.overrides),
+        [&](SourceId source) { return has_sample_file(arguments, config, source); }, config, lines);
   config.sweep.keeps_returns = !arguments.sweeps.empty();
   return config;
 }

@@ -71,9 +71,9 @@ void replay(const Config& config, LidarRouter lidars, Recording& recording, Resu
       config, std::move(lidars), on_sweep, [&](const HealthEvent& event) { results.add(event); }, stage);
   for (bool more_input = true; more_input;) {
     const daemon::Input input = recording.next(Duration::zero());
-    if (more.mcap)
-      more.mcap->add(input);
     pipeline->process(input);
+    if (more.mcap)
+      more.mcap->add(input, pipeline->ingest().lidars());
     more_input = !std::holds_alternative<daemon::EndOfInput>(input);
   }
   more.close();

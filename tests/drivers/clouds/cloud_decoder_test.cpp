@@ -483,6 +483,31 @@ TEST(CloudDecoder, StampOfTheLastPointIsFoundForAForeignClock) {
   expect_all_of(turn, drain(*tested));
 }
 
+/// Decodes turns with these begins, in periods; each arrives after the one before, and after its own end.
+CloudDoubts doubts_of_begins(const std::vector<int>& begins) {
+  const auto tested = decoder();
+  Stamp arrival = kBegin;
+  float differs_m = 0; // otherwise one with the same stamp is a duplicate
+  for (const int periods : begins) {
+    const CloudTurn turn = round_room(kBegin + periods * kTurn);
+    OwnCloud cloud = cloud_of(turn, CloudKind::hesai);
+    cloud.set(0, "x", differs_m += 0.01F);
+    arrival = std::max(arrival + kWay, turn.begin + kTurn + kWay);
+    EXPECT_EQ(begin(*tested, cloud, arrival), std::nullopt);
+    drain(*tested);
+  }
+  return tested->doubts();
+}
+
+TEST(CloudDecoder, StampsThatDoNotAdvanceFromCloudToCloudAreReported) {
+  CloudDoubts backwards;
+  backwards.set(static_cast<std::size_t>(CloudDoubt::backwards));
+  EXPECT_EQ(doubts_of_begins({0, 1, 2, 1}), backwards) << "the clock was set back";
+  EXPECT_EQ(doubts_of_begins({0, 0, 1, 1, 3, 3}), CloudDoubts{}) << "may stand still once";
+  EXPECT_EQ(doubts_of_begins({0, 0, 0, 0}), backwards);
+  EXPECT_EQ(doubts_of_begins({0, 1, 3, 4, 8, 9}), CloudDoubts{}) << "some are lost";
+}
+
 /// Two drivers with the same topic: the first lidar is used until it is silent.
 TEST(CloudDecoder, CloudsOfAnotherFrameBelongToAnotherLidar) {
   const auto tested = decoder();
