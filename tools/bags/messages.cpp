@@ -19,11 +19,13 @@ ros::Time read_time(MessageReader& reader) {
   return {seconds, reader.number<std::uint32_t>()};
 }
 
-ros::Header read_header(MessageReader& reader) {
+ros::Header read_header(MessageReader& reader, std::string* frame = nullptr) {
   if (reader.serialisation() == Serialisation::ros1)
     reader.number<std::uint32_t>(); // sequence number, dropped in ROS 2
   const ros::Time stamp = read_time(reader);
-  reader.text();
+  const std::string_view frame_id = reader.text();
+  if (frame != nullptr)
+    *frame = frame_id;
   return {stamp, nullptr};
 }
 
@@ -41,8 +43,8 @@ ros::Quaternion read_quaternion(MessageReader& reader) {
 
 /// Reads a header and stamped packets, each as `payload` reads it.
 template <class Payload> std::optional<LidarPackets> read_packets(MessageReader reader, const Payload& payload) {
-  read_header(reader);
   LidarPackets packets;
+  read_header(reader, &packets.frame);
   for (auto left = reader.number<std::uint32_t>(); left > 0 && reader.whole(); --left) {
     const Stamp stamp = daemon::to_stamp(read_time(reader));
     packets.add(stamp, payload(reader));
