@@ -171,13 +171,23 @@ void check_realtime(Problems& problems, const RealtimeOptions& realtime) {
     problems.require_range("realtime.cpus", cpu, 0, 1023);
 }
 
+/// Checks the name of a frame: tf2 rejects a slash at its beginning, and no blank ever matches.
+void check_frame(Problems& problems, const std::string& key, const std::string& frame, const std::string& usual) {
+  std::string usable = frame;
+  std::erase_if(usable, [](unsigned char c) { return c <= ' ' || c == 0x7F; });
+  usable.erase(0, usable.find_first_not_of('/'));
+  problems.require(frame == usable && !frame.empty(), key,
+                   fmt::format("must be a name without blanks, and without a slash at its beginning; write {}",
+                               usable.empty() ? usual : usable));
+}
+
 void check_dds(Problems& problems, const DdsOptions& dds) {
   problems.require_range("dds.domain", dds.domain, 0, 232);
   problems.require(is_word(dds.interface, "_-.:@") && dds.interface.size() < IFNAMSIZ, "dds.interface",
                    "must name a network interface, e.g. lo or eth0");
-  problems.require(!dds.frame_odom.empty(), "dds.frame_odom", "must not be empty");
-  problems.require(!dds.frame_base.empty() && dds.frame_base != dds.frame_odom, "dds.frame_base",
-                   "must not be empty and must differ from frame_odom");
+  check_frame(problems, "dds.frame_odom", dds.frame_odom, DdsOptions{}.frame_odom);
+  check_frame(problems, "dds.frame_base", dds.frame_base, DdsOptions{}.frame_base);
+  problems.require(dds.frame_base != dds.frame_odom, "dds.frame_base", "must differ from frame_odom");
   require_topic_or_empty(problems, "dds.prefix", dds.prefix);
   require_topic_or_empty(problems, "dds.flat_ground_topic", dds.flat_ground_topic);
 }

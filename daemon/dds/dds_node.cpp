@@ -11,8 +11,13 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <ifaddrs.h>
 #include <net/if.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 #include <unistd.h>
+
+#include "drivers/net/datagram.hpp"
 
 namespace locus::daemon {
 namespace {
@@ -111,6 +116,22 @@ void collect_log_line(void*, const dds_log_data_t* data) {
 }
 
 } // namespace
+
+std::vector<std::string> addresses_of(const std::string& interface) {
+  std::vector<std::string> addresses;
+  ifaddrs* all = nullptr;
+  if (getifaddrs(&all) != 0)
+    return addresses;
+  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next) {
+    if (one->ifa_addr == nullptr || one->ifa_addr->sa_family != AF_INET || interface != one->ifa_name)
+      continue;
+    sockaddr_in address{};
+    std::memcpy(&address, one->ifa_addr, sizeof(address));
+    addresses.push_back(dotted(ntohl(address.sin_addr.s_addr)));
+  }
+  freeifaddrs(all);
+  return addresses;
+}
 
 void set_dds_log(std::function<void(bool, std::string_view)> sink) {
   log_sink() = std::move(sink);

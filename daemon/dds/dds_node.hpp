@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <vector>
 
 #include <dds/dds.h>
 #include <dds/ddsi/ddsi_serdata.h>
@@ -38,6 +39,9 @@ class DdsEntity {
  private:
   dds_entity_t handle_;
 };
+
+/// Returns the IPv4 addresses of a network interface. DDS binds to the first one when it connects.
+std::vector<std::string> addresses_of(const std::string& interface);
 
 /// Quality of service of a topic, after ROS 2's own profiles.
 struct TopicQos {

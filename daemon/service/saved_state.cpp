@@ -283,8 +283,9 @@ std::optional<std::string> write_state(const std::filesystem::path& file, const 
   }
   const std::string why = std::strerror(written ? errno : error); // NOLINT(concurrency-mt-unsafe)
   unlink(new_file.c_str());
-  return fmt::format("{}: the state cannot be saved ({}); after a restart the odometry starts at the origin",
-                     file.string(), why);
+  return fmt::format(
+      "{}: the state cannot be saved ({}); make its folder writable for locusd, or a restart begins at the origin",
+      file.string(), why);
 }
 
 Expected<SavedState, std::string> load_state(const std::filesystem::path& file) {
@@ -365,8 +366,9 @@ void StateSaver::write() {
   if (const PendingState* const pending = states_.poll()) {
     const auto problem = write_state(*file_, pending->state);
     written_ = problem ? std::nullopt : std::optional{pending->number};
-    if (problem)
+    if (problem && !has_failed_)
       error_sink_(*problem);
+    has_failed_ = problem.has_value();
   }
   if (update != nullptr && update->number == written_)
     update_resume_state(*file_, update->last);

@@ -74,7 +74,7 @@ class StateSaver {
   /// Producer: returns the current resume state; empty before the first estimate.
   [[nodiscard]] const std::optional<ResumeState>& last() const { return last_; }
 
-  /// Disk thread, periodically: writes the latest state or resume state.
+  /// Disk thread, periodically: writes the latest state or resume state. Reports a failure once, until it succeeds.
   void write();
 
   /// Producer: replaces the saved state by `start`, or removes it. Blocks on the disk; precondition: write() is not
@@ -102,6 +102,7 @@ class StateSaver {
   std::optional<ResumeState> last_, saved_; ///< after the last estimate; in the last state; owned by the producer
   std::uint64_t number_ = 0;                ///< number of the last state handed over; owned by the producer
   std::optional<std::uint64_t> written_;    ///< number of the state in the file; owned by the disk thread
+  bool has_failed_ = false;                 ///< latest attempt; owned by the disk thread
 };
 
 } // namespace locus::daemon

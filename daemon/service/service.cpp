@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/service/service.hpp"
 
+#include <algorithm>
 #include <array>
 #include <csignal>
 #include <span>
+#include <string>
 #include <thread>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include <fmt/format.h>
 #include <poll.h>
@@ -89,6 +92,7 @@ int Service::run(const Config& config) {
     if (has_answered || has_served)
       std::this_thread::sleep_for(kPauseAfterAnswers);
     supervise();
+    follow_address();
   }
   sd_notify(0, "STOPPING=1\nSTATUS=Stopping");
   if (!session_)
@@ -179,6 +183,7 @@ std::optional<std::string> Service::begin(const Config& config, std::optional<Sa
   if (!session)
     return session.error();
   session_ = std::move(*session);
+  dds_address_.reset();
   map_requested_at_.reset();
   monitor_.emplace(session_->config(), session_->input().sockets(), log_);
   serve_metrics(config.metrics.listen);
@@ -352,6 +357,27 @@ std::optional<ControlServer::Answer> Service::answer(ShowSweep /*request*/) {
   const auto bytes = std::as_bytes(std::span(sweep->points));
   answer.bytes.assign(bytes.begin(), bytes.end());
   return answer;
+}
+
+/// Restarts the session if the interface of DDS has lost the address at which DDS connected: a participant announces
+/// that one until its end, so no reader would be matched any more.
+void Service::follow_address() {
+  constexpr Duration kPeriod = std::chrono::seconds{1};
+  const Duration now = read_clock(CLOCK_MONOTONIC);
+  if (!session_ || now - address_checked_at_ < kPeriod || !session_->link().status().connected)
+    return;
+  address_checked_at_ = now;
+  const Config config = session_->config();
+  const std::vector<std::string> addresses = addresses_of(config.dds.interface);
+  if (addresses.empty()) // the old one may come back
+    return;
+  dds_address_ = dds_address_.value_or(addresses.front());
+  if (std::ranges::find(addresses, *dds_address_) != addresses.end())
+    return;
+  log_.warn(fmt::format("the address of {} changed from {} to {}: DDS is started again, and the odometry continues",
+                        config.dds.interface, *dds_address_, addresses.front()));
+  if (const auto problem = restart_with(config))
+    log_.error(*problem);
 }
 
 void Service::supervise() {

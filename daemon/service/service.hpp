@@ -55,6 +55,7 @@ class Service {
   std::optional<std::string> restart_with(const Config& config);
   void serve_metrics(const std::string& address);
   void supervise();
+  void follow_address();
   bool handle_signals();
 
   std::filesystem::path config_file_;
@@ -71,6 +72,8 @@ class Service {
   std::string metrics_address_;              ///< address of the last attempt to listen
   std::optional<Duration> map_requested_at_; ///< time of the pending map request, CLOCK_MONOTONIC; empty: none
   std::optional<SessionMonitor> monitor_;
+  std::optional<std::string> dds_address_; ///< of the interface when DDS connected
+  Duration address_checked_at_{};          ///< CLOCK_MONOTONIC
   Watchdog watchdog_;
   Duration reported_at_{};
   std::optional<TrackingState> reported_state_;

@@ -90,6 +90,16 @@ template <class Sample> Expected<std::vector<Sample>, std::string> read_samples(
   return samples;
 }
 
+constexpr Duration kLongestBack = std::chrono::milliseconds{100}; ///< of samples that are merely out of order
+
+/// Implements MotionSamples::steps_back().
+template <class Sample> std::size_t count_steps_back(const std::vector<Sample>& samples) {
+  std::size_t count = 0;
+  for (std::size_t i = 1; i < samples.size(); ++i)
+    count += samples[i].arrival < samples[i - 1].arrival - kLongestBack ? 1U : 0U;
+  return count;
+}
+
 /// Appends a number with `decimals` decimals, or with the fewest digits that preserve its value.
 void append_number(std::string& line, double number, std::optional<int> decimals) {
   if (decimals) {
@@ -131,8 +141,10 @@ std::string to_line(const StampedPose& pose, std::optional<int> decimals) {
   return line + '\n';
 }
 
-Expected<std::vector<StampedPose>, std::string> read_trajectory(const std::filesystem::path& file) {
+Expected<std::vector<StampedPose>, std::string> read_trajectory(const std::filesystem::path& file,
+                                                                bool clock_may_be_set) {
   RowReader<OdometrySample> reader = open_table<OdometrySample>(file);
+  const Duration longest_back = clock_may_be_set ? kLongestBack : Duration::max();
   constexpr double kFarthest_m = 1e8; // covers geocentric coordinates; squares stay finite
   std::vector<StampedPose> poses;
   for (OdometrySample sample; reader.next(sample);) {
@@ -140,7 +152,8 @@ Expected<std::vector<StampedPose>, std::string> read_trajectory(const std::files
       reader.report("the pose is not finite; remove the line");
     } else if (sample.T_source_base.translation.cwiseAbs().maxCoeff() > kFarthest_m) {
       reader.report("the position is more than 100000 km from the origin; write metres, or remove the line");
-    } else if (!poses.empty() && sample.stamp <= poses.back().stamp) {
+    } else if (!poses.empty() && sample.stamp <= poses.back().stamp &&
+               poses.back().stamp - sample.stamp <= longest_back) {
       reader.report("its time is not after that of the pose before; sort the lines by time and keep one of each");
     }
     poses.push_back({sample.stamp, sample.T_source_base});
@@ -246,7 +259,8 @@ template <class Sample> class MotionSamples<Sample>::Rows {
 };
 
 template <class Sample>
-Expected<MotionSamples<Sample>, std::string> MotionSamples<Sample>::open(std::vector<std::filesystem::path> files) {
+Expected<MotionSamples<Sample>, std::string> MotionSamples<Sample>::open(std::vector<std::filesystem::path> files,
+                                                                         Order order) {
   Rows rows(files);
   const auto is_pipe = [](const std::filesystem::path& file) { return !std::filesystem::is_regular_file(file); };
   const bool read_once = std::ranges::any_of(files, is_pipe);
@@ -284,7 +298,8 @@ Expected<MotionSamples<Sample>, std::string> MotionSamples<Sample>::open(std::ve
       std::ranges::move(*of_file, std::back_inserter(all));
     }
   }
-  std::ranges::stable_sort(all, {}, &Sample::arrival);
+  if (order == Order::arrival || count_steps_back(all) == 0)
+    std::ranges::stable_sort(all, {}, &Sample::arrival);
   MotionSamples samples(std::move(all));
   samples.breaks_ = rows.breaks();
   return samples;
@@ -297,8 +312,11 @@ MotionSamples<Sample>::MotionSamples(std::unique_ptr<Rows> rows, std::optional<T
 }
 
 template <class Sample> MotionSamples<Sample>::MotionSamples(std::vector<Sample> samples) : held_(std::move(samples)) {
-  if (!held_.empty())
-    arrivals_ = {held_.front().arrival, held_.back().arrival};
+  if (!held_.empty()) {
+    const auto [first, last] = std::ranges::minmax(held_, {}, &Sample::arrival);
+    arrivals_ = {first.arrival, last.arrival};
+  }
+  steps_back_ = count_steps_back(held_);
   pop();
 }
 

@@ -34,20 +34,27 @@ struct TimeSpan {
 /// samples, are streamed; other files and pipes are held in memory. Single owner, not thread-safe.
 template <class Sample> class MotionSamples {
  public:
-  /// Reads all files once, so that errors are reported before the first sample is used.
-  static Expected<MotionSamples, std::string> open(std::vector<std::filesystem::path> files);
+  enum class Order { arrival, recorded };
+
+  /// Reads all files once, so that errors are reported before the first sample is used. Order::recorded leaves samples
+  /// in the order of the files if their arrivals go back by a clock's step, see steps_back().
+  static Expected<MotionSamples, std::string> open(std::vector<std::filesystem::path> files,
+                                                   Order order = Order::arrival);
   static Expected<MotionSamples, std::string> open(const std::filesystem::path& file) {
     return open(std::vector{file});
   }
 
-  /// Holds the given samples, sorted by arrival.
+  /// Holds the given samples in this order.
   explicit MotionSamples(std::vector<Sample> samples);
   MotionSamples(MotionSamples&&) noexcept;
   MotionSamples& operator=(MotionSamples&&) noexcept;
   ~MotionSamples();
 
-  /// Arrivals of the first and the last sample; empty if there are none.
+  /// Earliest and latest arrival; empty if there are no samples.
   [[nodiscard]] const std::optional<TimeSpan>& arrivals() const { return arrivals_; }
+
+  /// Number of samples that arrive more than 0.1 s before the preceding one: a clock was set, or the order is wrong.
+  [[nodiscard]] std::size_t steps_back() const { return steps_back_; }
 
   /// Positions where files were cut off, one line for the user each.
   [[nodiscard]] const std::vector<std::string>& breaks() const { return breaks_; }
@@ -64,6 +71,7 @@ template <class Sample> class MotionSamples {
   MotionSamples(std::unique_ptr<Rows> rows, std::optional<TimeSpan> arrivals);
 
   std::optional<TimeSpan> arrivals_;
+  std::size_t steps_back_ = 0;
   std::vector<std::string> breaks_;
   std::unique_ptr<Rows> rows_; ///< nullptr: the samples are held in memory
   std::vector<Sample> held_;
@@ -87,7 +95,8 @@ std::string to_line(const ImuSample& sample, std::optional<int> decimals = {});
 std::string to_line(const StampedPose& pose, std::optional<int> decimals = {});
 
 /// Reads a TUM file as a reference, with stricter checks: finite, on Earth, strictly increasing in time, at least one
-/// pose. Thread-safe.
-Expected<std::vector<StampedPose>, std::string> read_trajectory(const std::filesystem::path& file);
+/// pose. `clock_may_be_set`: accepts times that go back by more than 0.1 s. Thread-safe.
+Expected<std::vector<StampedPose>, std::string> read_trajectory(const std::filesystem::path& file,
+                                                                bool clock_may_be_set = false);
 
 } // namespace locus

@@ -20,6 +20,7 @@
 #include "drivers/ouster/imu_packet.hpp"
 #include "drivers/ouster/packet_edit.hpp"
 #include "drivers/ouster_test_packet.hpp"
+#include "drivers/packet_clock.hpp"
 #include "drivers/velodyne/decoder.hpp"
 #include "drivers/velodyne/model.hpp"
 #include "drivers/velodyne_test_packet.hpp"
@@ -90,6 +91,7 @@ TEST_P(PacketEditOfOuster, ShiftsTheTimesOfTheValidColumns) {
   shift_clock(bytes_, &metadata_, 60s + 1ns);
   ASSERT_EQ(decoder_->decode(bytes_, packet_), std::nullopt);
   EXPECT_EQ(decoder_->time(), kTime + 60s + 1ns);
+  EXPECT_EQ(clock_in(bytes_, &metadata_), decoder_->time() % 1h);
   EXPECT_EQ(ranges_m(packet_), before_);
   const std::byte* const invalid = metadata_.packet_format().column(bytes_.data(), 2);
   EXPECT_EQ(ouster::PacketFormat::time_of(invalid), 0U) << "which has no time";
@@ -198,6 +200,9 @@ class PacketEditOfHesai : public testing::TestWithParam<std::size_t> {
     shift_clock(bytes_, nullptr, shift);
     ASSERT_EQ(decoder_.decode(bytes_, packet_), std::nullopt);
     EXPECT_EQ(decoder_.time(), time_ + shift);
+    const auto clock = clock_in(bytes_, nullptr);
+    ASSERT_TRUE(clock);
+    EXPECT_LT(std::chrono::abs(clock_advance(*clock, decoder_.time() % 1h)), 10ms) << "up to the first firing";
     EXPECT_EQ(ranges_m(packet_), std::vector{10.0F});
   }
 
@@ -258,6 +263,21 @@ TEST(PacketEdit, InvalidVelodyneTimeIsUnchanged) {
   put_little_endian(&bytes[velodyne::kTimeOffset], 3'599'000'000, 4);
   shift_clock(bytes, nullptr, 1h + 1s);
   EXPECT_EQ(read_u32(&bytes[velodyne::kTimeOffset]), 0U);
+}
+
+TEST(PacketClock, IsReadModuloAnHourFromDataPacketsAlone) {
+  test::VelodyneTestPacket packet{velodyne::Model::vlp16, velodyne::ReturnMode::strongest, 0, 0};
+  Bytes bytes = copy_of(packet.payload());
+  put_little_endian(&bytes[velodyne::kTimeOffset], 3'600'000'007, 4);
+  EXPECT_EQ(clock_in(bytes, nullptr), 7us);
+  EXPECT_FALSE(clock_in(Bytes(velodyne::kPositionPacketBytes), nullptr));
+  EXPECT_FALSE(clock_in(Bytes(velodyne::kDataPacketBytes), nullptr));
+  EXPECT_FALSE(clock_in(Bytes{}, nullptr));
+  const auto metadata = test::ouster_metadata();
+  EXPECT_FALSE(clock_in(bytes, &metadata));
+  EXPECT_EQ(clock_advance(3599s, 1s), 2s);
+  EXPECT_EQ(clock_advance(1s, 3599s), -2s);
+  EXPECT_EQ(clock_advance(5s, 5s), 0s);
 }
 
 TEST(PacketEdit, NarrowViewOfAVelodyneLeavesWhatIsAhead) {

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# units.sh SOURCE BUILD: systemd-analyze reports nothing about the units, including the drop-in, and the sandbox is
-# strict.
+# units.sh SOURCE BUILD: systemd-analyze reports nothing about the units, including the drop-in, the sandbox is strict,
+# and no unit starts again and again for nothing.
 set -euo pipefail
 source=$1/systemd build=$2
 work=$(mktemp -d)
@@ -9,7 +9,7 @@ trap 'rm -r "$work"' EXIT
 cp "$source"/locusd.{service,socket} "$work"
 cp "$build/systemd/locusd@.service" "$work/locusd@.service"
 cp "$build/systemd/locusd@.service" "$work/locusd@front.service"
-sed -i "s,/usr/bin/,$build/bin/," "$work"/*.service
+sed -i "s,/usr/bin/locus,$build/bin/locus," "$work"/*.service
 status=0
 verify() {
   local said
@@ -22,7 +22,15 @@ for unit in locusd.service locusd@front.service; do
 done
 grep -q '^ExecStart=.* --config /etc/locusd/%i.yaml$' "$work/locusd@.service"
 grep -q '^RuntimeDirectory=locusd@%i$' "$work/locusd@.service"
-grep -q '^StateDirectory=locusd@%i$' "$work/locusd@.service"
+grep -q '^Environment=STATE_DIRECTORY=/var/lib/locusd@%i$' "$work/locusd@.service"
+grep -q '^ReadWritePaths=-/var/lib/locusd@%i$' "$work/locusd@.service"
+
+# The service starts without user namespaces and with a read-only /var, and systemd does not repeat a start that fails
+# for good.
+! grep -E '^(PrivateUsers|StateDirectory)=' "$work"/locusd*.service ||
+  { echo "a unit refuses to start where /var is read-only or the kernel has no user namespaces"; status=1; }
+grep -q '^ExecStartPre=-+/usr/bin/install -d .* /var/lib/locusd@%i$' "$work/locusd@.service"
+grep -qE '^RestartPreventExitStatus=2 .*\b217\b.*\b226\b' "$work/locusd.service"
 
 mkdir "$work/locusd.service.d"
 cp "$source/realtime.conf" "$work/locusd.service.d"

@@ -3,10 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <functional>
+#include <initializer_list>
 #include <iterator>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -70,6 +74,140 @@ TEST(RecordedTimes, ConstantTimesAreReplacedByTheLidarClock) {
     EXPECT_NEAR(to_seconds(poses.back().stamp - poses.front().stamp),
                 to_seconds(expected().back().stamp - expected().front().stamp), 0.11);
   }
+}
+
+/// The room drive, with other times.
+class RoomDriveWithTimes {
+ public:
+  using Change = std::function<Stamp(Stamp)>;
+
+  /// Changes the times of all files: the clock of the computer that recorded all of them was set.
+  explicit RoomDriveWithTimes(const Change& change) : RoomDriveWithTimes(change, change, change) {}
+  RoomDriveWithTimes(const Change& of_lidar, const Change& of_imu, const Change& of_rest) {
+    std::filesystem::rename(capture_with(folder_, [&](Stamp arrival, Duration) { return of_lidar(arrival); }),
+                            folder_ / "lidar.pcap");
+    std::filesystem::copy(room_drive() / "config.yaml", folder_ / "config.yaml");
+    std::ofstream imu(folder_ / "imu.csv"), wio(folder_ / "wio.tum"), truth(folder_ / "gt.tum");
+    for (ImuSample sample : MotionSamples<ImuSample>::open(room_drive() / "imu.csv")->drain()) {
+      sample.stamp = of_imu(sample.stamp);
+      imu << to_line(sample);
+    }
+    for (const auto& [file, out] : {std::pair{"wio.tum", &wio}, {"gt.tum", &truth}}) {
+      for (StampedPose pose : read_tum(room_drive() / file)) {
+        pose.stamp = of_rest(pose.stamp);
+        *out << to_line(pose);
+      }
+    }
+  }
+  [[nodiscard]] std::string folder() const { return folder_ / ""; }
+
+ private:
+  TemporaryFolder folder_;
+};
+
+RoomDriveWithTimes::Change unchanged() {
+  return [](Stamp stamp) { return stamp; };
+}
+
+/// Clock that is set in the middle of the room drive.
+RoomDriveWithTimes::Change set_by(Duration step) {
+  const Stamp start = Capture::open(room_drive() / "lidar.pcap")->next()->receive_stamp;
+  return [=](Stamp stamp) { return stamp < start + std::chrono::seconds{4} ? stamp : stamp + step; };
+}
+
+const Replay& replay_with_own_times() {
+  static const RoomDriveWithTimes drive(unchanged());
+  static const Replay replay({drive.folder()});
+  return replay;
+}
+
+/// Expects the poses of the unchanged drive, one for one, within `error_m`.
+void expect_poses_of_room_drive(const Replay& replay, double error_m) {
+  ASSERT_EQ(replay.run().status, 0) << replay.run().err;
+  const std::vector<StampedPose> poses = replay.trajectory(), sound = replay_with_own_times().trajectory();
+  ASSERT_EQ(poses.size(), sound.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    EXPECT_LT((poses[i].T_source_base.translation - sound[i].T_source_base.translation).norm(), error_m) << i;
+    EXPECT_LT(std::abs(to_seconds(poses[i].stamp - sound[i].stamp)), 1e-3) << i;
+  }
+}
+
+TEST(RecordedTimes, OfAClockThatWasSetContinueFromBefore) {
+  using std::chrono::seconds;
+  for (const Duration step : std::initializer_list<Duration>{
+           seconds{200'000'000}, -seconds{200'000'000}, std::chrono::hours{1}, -std::chrono::hours{1}, seconds{30},
+           -seconds{30}, -seconds{3}, seconds{1}, -seconds{1}, std::chrono::milliseconds{-300}}) {
+    SCOPED_TRACE(to_seconds(step));
+    const RoomDriveWithTimes drive(set_by(step));
+    const Replay replay({drive.folder()});
+    expect_poses_of_room_drive(replay, 0.002);
+    EXPECT_EQ(lines_of(replay.run().err).size(), 1U) << replay.run().err;
+    EXPECT_NE(replay.run().err.find("the clock of the recording computer was set"), std::string::npos);
+    EXPECT_NEAR(replay.summary()["ape_m"]["max"], replay_with_own_times().summary()["ape_m"]["max"], 0.002);
+    EXPECT_EQ(replay.summary()["packets"]["total"]["clock_steps"], 0);
+  }
+}
+
+TEST(RecordedTimes, OfAClockThatWasSetDoNotMoveLidarAlone) {
+  for (const int step_s : {200'000'000, 3600, 1, -20}) {
+    const TemporaryFolder folder;
+    const auto change = set_by(std::chrono::seconds{step_s});
+    const Replay replay({capture_with(folder, [&](Stamp arrival, Duration) { return change(arrival); })});
+    expect_same_way(replay, "the clock of the recording computer was set");
+    EXPECT_EQ(replay.trajectory().size(), expected().size()) << step_s;
+  }
+}
+
+TEST(RecordedTimes, OfAClockThatWasSetTwiceAreSaidOnce) {
+  const auto once = set_by(std::chrono::hours{1});
+  const Stamp start = Capture::open(room_drive() / "lidar.pcap")->next()->receive_stamp;
+  const auto back = start + std::chrono::hours{1} + std::chrono::milliseconds{4600};
+  const RoomDriveWithTimes drive([&](Stamp stamp) {
+    const Stamp first = once(stamp);
+    return first < back ? first : stamp;
+  });
+  const Replay replay({drive.folder()});
+  expect_poses_of_room_drive(replay, 0.002);
+  EXPECT_NE(replay.run().err.find("was set 2 times"), std::string::npos) << replay.run().err;
+}
+
+/// A source with a clock of its own, which nobody set.
+TEST(RecordedTimes, OfAnotherClockDoNotFollowTheOneThatWasSet) {
+  const RoomDriveWithTimes drive(set_by(std::chrono::hours{1}), unchanged(), set_by(std::chrono::hours{1}));
+  const Replay replay({drive.folder()});
+  expect_poses_of_room_drive(replay, 0.002);
+  EXPECT_EQ(replay.summary()["sources"]["imu"]["used_sweeps"],
+            replay_with_own_times().summary()["sources"]["imu"]["used_sweeps"]);
+}
+
+TEST(RecordedTimes, OfASourceWhoseOwnClockWasSetContinueFromBefore) {
+  for (const int step_s : {-3, -3600, 200'000'000}) {
+    const RoomDriveWithTimes drive(unchanged(), set_by(std::chrono::seconds{step_s}), unchanged());
+    const Replay replay({drive.folder()});
+    expect_poses_of_room_drive(replay, 0.02);
+    EXPECT_NE(replay.run().err.find("imu.csv: its times jump 1 times"), std::string::npos) << replay.run().err;
+    EXPECT_EQ(lines_of(replay.run().err).size(), 1U) << replay.run().err;
+  }
+}
+
+/// The packets of 0.4 s arrive in a burst.
+TEST(RecordedTimes, OfDelayedPacketsAreNoStep) {
+  const TemporaryFolder folder;
+  const auto delayed = [](Stamp arrival, Duration since_start) {
+    using std::chrono::milliseconds;
+    return since_start < milliseconds{4000} ? arrival
+                                            : arrival + std::max(Duration{}, milliseconds{4400} - since_start);
+  };
+  const Replay replay({capture_with(folder, delayed)});
+  EXPECT_EQ(replay.run().err, "");
+  EXPECT_EQ(replay.trajectory().size(), expected().size());
+}
+
+TEST(RecordedTimes, OfTruthThatGoesBackAloneAreAnError) {
+  const RoomDriveWithTimes drive(unchanged(), unchanged(), set_by(-std::chrono::seconds{3}));
+  const Replay replay({drive.folder()});
+  EXPECT_EQ(replay.run().status, 1);
+  EXPECT_NE(replay.run().err.find("gt.tum: its times jump at"), std::string::npos) << replay.run().err;
 }
 
 } // namespace

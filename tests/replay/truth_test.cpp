@@ -82,7 +82,7 @@ TEST(Truth, UnreadableTruthFailsBeforeTheRun) {
   expect_refused("--ground-truth", folder / "none.tum", "none.tum: cannot be read");
   expect_refused("--ground-truth", written(folder / "empty.tum", ""), "empty.tum: holds no pose");
   expect_refused("--ground-truth", written(folder / "nan.tum", "10 0 0 0 0 0 0 1\n11 nan 0 0 0 0 0 1\n"), "nan.tum:2:");
-  expect_refused("--ground-truth", written(folder / "order.tum", "10 0 0 0 0 0 0 1\n9 0 0 0 0 0 0 1\n"),
+  expect_refused("--ground-truth", written(folder / "order.tum", "10 0 0 0 0 0 0 1\n9.95 0 0 0 0 0 0 1\n"),
                  "order.tum:2:");
   expect_refused("--ground-truth", written(folder / "text.tum", "10 0 0 0 0 0 0 1\nabc\n"), "text.tum:2:");
   expect_refused("--map-truth", folder / "none.ply", "none.ply: cannot be read");

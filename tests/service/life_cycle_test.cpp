@@ -6,8 +6,11 @@
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
+#include <iterator>
 #include <optional>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include <sys/mount.h>
 #include <unistd.h>
@@ -330,6 +333,28 @@ TEST_F(LifeCycle, FullDiskLosesOnlyTheState) {
     status_when([](const json& s) { return s["sweeps"]["processed"] > 50 && s["state"] == "tracking"; });
   }
   umount2(file("full").c_str(), MNT_DETACH);
+}
+
+/// As in a container with --cap-drop=ALL and --read-only: each missing part is reported once, with its remedy.
+TEST_F(LifeCycle, RunsWithoutCapabilitiesAndWritableFolders) {
+  if (geteuid() != 0)
+    GTEST_SKIP() << "only root can give up capabilities";
+  setenv("RUNTIME_DIRECTORY", "/proc/none", 1); // NOLINT(concurrency-mt-unsafe)
+  setenv("STATE_DIRECTORY", "/proc/none", 1);   // NOLINT(concurrency-mt-unsafe)
+  std::vector<std::string> command{"/usr/bin/setpriv", "--bounding-set=-all", "--inh-caps=-all", "--no-new-privs"};
+  std::ranges::copy(locusd(config()), std::back_inserter(command));
+  Child daemon(command);
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up")) << testing::PrintToString(daemon.lines());
+  const Child play(endlessly(capture()));
+  EXPECT_TRUE(daemon.wait_for_line("tracking"));
+  EXPECT_TRUE(daemon.wait_for_line("the state cannot be saved"));
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait_for_exit(), 0);
+  const auto lines_with = [&](const std::string& part) {
+    return std::ranges::count_if(daemon.lines(), [&](const std::string& line) { return contains(line, part); });
+  };
+  EXPECT_EQ(lines_with("set RUNTIME_DIRECTORY to a writable folder"), 1);
+  EXPECT_EQ(lines_with("make its folder writable for locusd"), 2) << "once while it runs, once at its end";
 }
 
 TEST_F(LifeCycle, ControlCommandsTakeEffect) {

@@ -2,6 +2,7 @@
 // The service's node in the ROS 2 graph, as discovered by two implementations of DDS.
 #include <algorithm>
 #include <cstdlib>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -47,6 +48,36 @@ TEST_F(RosNodeOfService, SingleServiceIsNamedLocusdInTheConfiguredLayout) {
   const Child daemon(locusd(config("dds: {ros_graph: humble}\n")));
   for (const Child* peer : {&cyclone, &fast_dds})
     EXPECT_TRUE(hears_node(*peer, "/ locusd", 6)) << testing::PrintToString(peer->lines());
+}
+
+/// Cyclone DDS without multicast would find ten participants at most.
+TEST_F(RosNodeOfService, IsFoundByThirteenOtherParticipantsOnLoopback) {
+  const Child daemon(locusd(config()));
+  std::vector<std::unique_ptr<Child>> peers;
+  for (int i = 0; i < 13; ++i)
+    peers.push_back(std::make_unique<Child>(
+        std::vector<std::string>{i % 2 == 0 ? CYCLONE_PEER : FAST_DDS_PEER, "0", "iron", "/locus"}));
+  constexpr std::ptrdiff_t kAlways = 6;
+  for (const auto& peer : peers)
+    EXPECT_TRUE(hears_node(*peer, "/ locusd", kAlways)) << testing::PrintToString(peer->lines());
+}
+
+/// As DHCP does. A participant would announce the address of its start for ever.
+TEST_F(RosNodeOfService, IsFoundAtTheNewAddressOfItsInterface) {
+  const auto run = [](const char* command) {
+    return std::system(command);
+  }; // NOLINT(concurrency-mt-unsafe, cert-env33-c)
+  const Child daemon(locusd(config()));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
+  ASSERT_EQ(status()["state"], "waiting");
+  if (run("ip address del 127.0.0.1/8 dev lo && ip address add 127.0.0.2/8 dev lo") != 0)
+    GTEST_SKIP() << "there is no ip";
+  EXPECT_TRUE(daemon.wait_for_line("the address of lo changed from 127.0.0.1 to 127.0.0.2: DDS is started again"))
+      << testing::PrintToString(daemon.lines());
+  const Child peer({CYCLONE_PEER, "0", "iron", "/locus"});
+  EXPECT_TRUE(hears_node(peer, "/ locusd", 6)) << testing::PrintToString(daemon.lines());
+  const auto is_about_address = [](const std::string& line) { return line.find("address of lo") != std::string::npos; };
+  EXPECT_EQ(std::ranges::count_if(daemon.lines(), is_about_address), 1);
 }
 
 } // namespace

@@ -7,8 +7,11 @@
 #include <fstream>
 #include <functional>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "replay/replay_run.hpp"
+#include "support/errors.hpp"
 #include "support/patience.hpp"
 
 namespace locus::daemon {
@@ -80,6 +83,32 @@ TEST_F(StateSaverTest, ResetDiscardsTheStateAndStoresTheGivenPose) {
   }
   update(seconds{2}, 9, FlatGround::off);
   EXPECT_TRUE(says(9, FlatGround::off));
+}
+
+TEST(StateSaverFailure, IsReportedOnceUntilAStateIsSaved) {
+  const test::TemporaryFolder folder;
+  const std::filesystem::path missing = folder / "missing";
+  std::vector<std::string> problems;
+  StateSaver saver{missing / "state", {}, [&](const std::string& problem) { problems.push_back(problem); }};
+  const Odometry odometry{OdometryOptions{}};
+  OdometryEstimate estimate;
+  estimate.beginning = Beginning::origin;
+  const auto save_three = [&] {
+    for (int i = 0; i < 3; ++i) {
+      estimate.stamp += 2 * StateSaver::kPeriod;
+      saver.update(odometry, estimate, FlatGround::off);
+      saver.write();
+    }
+  };
+  save_three();
+  EXPECT_EQ(problems.size(), 1U);
+  EXPECT_TRUE(contains(problems.at(0), "make its folder writable")) << problems.at(0);
+  std::filesystem::create_directory(missing);
+  save_three();
+  EXPECT_EQ(problems.size(), 1U);
+  std::filesystem::remove_all(missing);
+  save_three();
+  EXPECT_EQ(problems.size(), 2U);
 }
 
 TEST_F(StateSaverTest, WritesFromAnotherThreadDuringUpdates) {

@@ -48,8 +48,8 @@ ros::Quaternion read_quaternion(MessageReader& reader) {
 
 /// Reads a header and stamped packets, each as `payload` reads it.
 template <class Payload> std::optional<LidarPackets> read_packets(MessageReader reader, const Payload& payload) {
-  read_header(reader);
   LidarPackets packets;
+  packets.frame = read_header(reader).frame;
   for (auto left = reader.number<std::uint32_t>(); left > 0 && reader.whole(); --left) {
     const Stamp stamp = daemon::to_stamp(read_time(reader));
     packets.add(stamp, payload(reader));

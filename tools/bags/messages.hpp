@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -23,6 +24,7 @@ struct LidarPackets {
     Stamp stamp;
     std::size_t begin, size; ///< offset and length in `bytes`
   };
+  std::string frame; ///< frame_id; empty if the message has none
   std::vector<Packet> packets;
   std::vector<std::byte> bytes;
 
@@ -45,7 +47,7 @@ const PacketType* packet_type(std::string_view name);
 /// Returns whether the type is that of ouster-ros, in any of its packages: one packet, of the lidar or of its IMU.
 bool is_ouster_type(std::string_view name);
 
-/// Returns the stamp of a header or packet, or `recorded` if it was not set.
+/// Returns the stamp of a header, or `recorded` if it was not set.
 Stamp stamp_or(Stamp recorded, Stamp stamp);
 
 /// Reads the frame of a message that begins with a header; empty if it is truncated. Refers to the message.

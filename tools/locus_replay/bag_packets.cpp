@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "drivers/packet_clock.hpp"
+
 namespace locus::tools {
 namespace {
 
@@ -17,28 +19,31 @@ constexpr std::size_t kWithEach = 100; ///< bytes of overhead per packet or clou
 } // namespace
 
 BagPackets::BagPackets(std::unique_ptr<Bag> bag, std::filesystem::path file, const Config& config,
-                       const BagTopics& topics)
+                       const BagTopics& topics, const std::vector<std::optional<Duration>>& recorder_ahead)
     : bag_(std::move(bag)), file_(std::move(file)) {
   for (std::size_t i = 0; i < config.lidars.size(); ++i) {
     const LidarOptions& lidar = config.lidars[i];
     if (topics.of_lidar[i])
-      add(*topics.of_lidar[i], i, lidar, lidar.port);
+      add(*topics.of_lidar[i], i, lidar, lidar.port, recorder_ahead[i]);
     if (topics.of_imu[i])
-      add(*topics.of_imu[i], i, lidar, lidar.imu_port);
+      add(*topics.of_imu[i], i, lidar, lidar.imu_port, recorder_ahead[i]);
   }
 }
 
-void BagPackets::add(std::size_t topic, std::size_t lidar, const LidarOptions& options, std::uint16_t port) {
+void BagPackets::add(std::size_t topic, std::size_t lidar, const LidarOptions& options, std::uint16_t port,
+                     std::optional<Duration> recorder_ahead) {
   const std::string& type = bag_->topics()[topic].type;
-  lidars_.push_back(
-      {static_cast<std::uint8_t>(lidar), topic, type, packet_type(type), port, options.source_ip.value_or(0)});
+  lidars_.push_back({static_cast<std::uint8_t>(lidar), topic, type, packet_type(type), port,
+                     options.source_ip.value_or(0), DriverStamps(recorder_ahead)});
 }
 
 const Datagram* BagPackets::next() {
   read_ahead();
-  const auto earliest = std::ranges::min_element(scans_, {}, &Scan::stamp);
-  if (earliest == scans_.end())
+  if (scans_.empty())
     return nullptr;
+  const auto set_back = std::ranges::find_if( // by the recorder's clock; what follows is later
+      scans_, [&](const Scan& scan) { return scan.recorded < scans_.front().recorded - kAhead; });
+  const auto earliest = std::ranges::min_element(scans_.begin(), set_back, {}, &Scan::stamp);
   if (earliest->is_cloud())
     emit_cloud(*earliest);
   else
@@ -82,7 +87,7 @@ void BagPackets::read_ahead() {
 }
 
 void BagPackets::accept(const BagMessage& message) {
-  misplaced_ += message.recorded < latest_ - kAhead ? 1U : 0U;
+  undecided_ += message.recorded < latest_ - kAhead ? 1U : 0U;
   latest_ = std::max(latest_, message.recorded);
   newest_ = message.recorded;
   const auto lidar = std::ranges::find(lidars_, message.topic, &Lidar::topic);
@@ -104,16 +109,43 @@ void BagPackets::accept_cloud(const BagMessage& message, const Lidar& lidar) {
   scans_.push_back({&lidar, message.recorded, {}, {message.data.begin(), message.data.end()}});
 }
 
-void BagPackets::accept_packets(const BagMessage& message, const Lidar& lidar) {
+void BagPackets::accept_packets(const BagMessage& message, Lidar& lidar) {
   const Serialisation serialisation = bag_->topics()[message.topic].serialisation;
   std::optional<LidarPackets> packets = lidar.packets->read({message.data, serialisation});
   malformed_ += packets ? 0U : 1U;
-  if (!packets || packets->packets.empty())
+  if (!packets || packets->packets.empty() || !is_of_used_frame(packets->frame, message.recorded, lidar))
     return;
-  for (LidarPackets::Packet& packet : packets->packets)
-    packet.stamp = stamp_or(message.recorded, packet.stamp);
+  judge_order(message, *packets, lidar);
+  lidar.stamps.correct(*packets, message.recorded);
   waiting_ += packets->bytes.size() + kWithEach * packets->packets.size();
   scans_.push_back({&lidar, message.recorded, *std::move(packets), {}});
+}
+
+/// Decides whether messages are misplaced, or the recorder's clock was set back: then the lidar's clock continues.
+void BagPackets::judge_order(const BagMessage& message, const LidarPackets& packets, Lidar& lidar) {
+  constexpr Duration kLongestPause = std::chrono::seconds{1};
+  const auto first = clock_in(packets.payload(packets.packets.front()), nullptr);
+  const Duration advance = first && lidar.clock ? clock_advance(*lidar.clock, *first) : Duration{};
+  lidar.clock = clock_in(packets.payload(packets.packets.back()), nullptr);
+  if (undecided_ == 0)
+    return;
+  if (advance > Duration{} && advance < kLongestPause)
+    latest_ = message.recorded;
+  else
+    misplaced_ += undecided_;
+  undecided_ = 0;
+}
+
+bool BagPackets::is_of_used_frame(const std::string& frame, Stamp recorded, Lidar& lidar) {
+  constexpr Duration kSilence = std::chrono::seconds{1};
+  if (frame == lidar.frame.value_or(frame) || recorded - lidar.frame_seen > kSilence) {
+    lidar.frame = frame;
+    lidar.frame_seen = recorded;
+    return true;
+  }
+  lidar.other_frame = frame;
+  ++lidar.of_other_frame;
+  return false;
 }
 
 std::string BagPackets::why_none() const {
@@ -124,17 +156,33 @@ std::string BagPackets::why_none() const {
 
 std::vector<std::string> BagPackets::warnings() const {
   std::vector<std::string> lines = bag_->warnings();
-  if (misplaced_ > 0)
+  if (misplaced_ + undecided_ > 0)
     lines.push_back(fmt::format("{}: {} messages follow one that was received later: the recorder's clock was "
                                 "set, or the bag is not in order, and the results are wrong; sort it with: "
                                 "rosbag filter BAG SORTED_BAG True, or mcap sort BAG -o SORTED_BAG",
-                                file_.string(), misplaced_));
+                                file_.string(), misplaced_ + undecided_));
   if (malformed_ > 0)
     lines.push_back(
         fmt::format("{}: {} of {} messages of type {} are truncated, or not serialised as little-endian, and "
                     "were skipped; record again if they matter",
                     file_.string(), malformed_, messages_, types()));
+  add_warnings_of_topics(lines);
   return lines;
+}
+
+/// Adds a line for each topic whose stamps were replaced, or that several lidars share.
+void BagPackets::add_warnings_of_topics(std::vector<std::string>& lines) const {
+  for (const Lidar& lidar : lidars_) {
+    const std::string& topic = bag_->topics()[lidar.topic].name;
+    if (lidar.stamps.replaced() > 0)
+      lines.push_back(fmt::format("{}: {}: the stamps of the packets in {} messages are constant, zero or absurd: the "
+                                  "times at which the bag was recorded are used instead",
+                                  file_.string(), topic, lidar.stamps.replaced()));
+    if (lidar.of_other_frame > 0)
+      lines.push_back(fmt::format("{}: {}: several lidars publish on it: frame_id {} is used, {} messages "
+                                  "of {} are not; give each driver its own namespace, and record again",
+                                  file_.string(), topic, *lidar.frame, lidar.of_other_frame, lidar.other_frame));
+  }
 }
 
 /// Lists the message types of all lidars.

@@ -62,7 +62,8 @@ std::string without_file(const MotionSourceOptions& source) {
 
 template <class Sample>
 MotionRecording read_as(const MotionFile& file, SourceId source, std::vector<std::string>& warnings) {
-  auto samples = value_or_fail(MotionSamples<Sample>::open(file.files), ExitStatus::failed);
+  using Samples = MotionSamples<Sample>;
+  auto samples = value_or_fail(Samples::open(file.files, Samples::Order::recorded), ExitStatus::failed);
   std::ranges::copy(samples.breaks(), std::back_inserter(warnings));
   return {source, file.files.front(), std::move(samples)};
 }

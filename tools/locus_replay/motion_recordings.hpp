@@ -17,7 +17,7 @@
 
 namespace locus::tools {
 
-/// Samples of one motion source, in order of arrival.
+/// Samples of one motion source, in order of arrival; in the order recorded if their arrivals go back.
 struct MotionRecording {
   SourceId source;
   std::filesystem::path file;

@@ -15,6 +15,7 @@
 #include "locus_replay/bag_motion.hpp"
 #include "locus_replay/bag_packets.hpp"
 #include "locus_replay/bag_topics.hpp"
+#include "locus_replay/driver_stamps.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/kitti_packets.hpp"
 #include "locus_replay/sweep_clouds.hpp"
@@ -23,6 +24,22 @@
 
 namespace locus::tools {
 namespace {
+
+/// Returns the values of the lidars by configuration index; nothing for clouds.
+std::vector<std::optional<Duration>> recorder_ahead_of_drivers(Bag& bag, const BagTopics& topics) {
+  std::vector<std::optional<Duration>> ahead;
+  for (const std::optional<std::size_t>& topic : topics.of_lidar)
+    ahead.push_back(topic ? recorder_ahead_of_driver(bag, *topic) : std::nullopt);
+  return ahead;
+}
+
+/// Returns the time between the clocks of the recorder and of the lidars' drivers; zero if it may be that of transit.
+Duration clock_difference(const std::vector<std::optional<Duration>>& recorder_ahead) {
+  constexpr Duration kLongestTransit = std::chrono::seconds{1};
+  const auto known = std::ranges::find_if(recorder_ahead, [](const auto& ahead) { return ahead.has_value(); });
+  const Duration ahead = known != recorder_ahead.end() ? **known : Duration{};
+  return std::chrono::abs(ahead) > kLongestTransit ? ahead : Duration{};
+}
 
 RecordedInput open_bag_input(const Arguments& arguments, const std::filesystem::path& file, const Config& config,
                              bool config_is_users_own, std::vector<std::string>& warnings) {
@@ -33,15 +50,18 @@ RecordedInput open_bag_input(const Arguments& arguments, const std::filesystem::
   };
   const BagTopics topics = BagTopics::choose(*bag, file.string(), config, has_file);
   std::ranges::copy(topics.doubts, std::back_inserter(warnings));
-  const bool has_packets =
-      std::ranges::any_of(config.lidars, [](const LidarOptions& lidar) { return !lidar.gives_clouds(); });
-  std::ranges::move(read_bag_motion(*bag, file, topics.of_source, has_packets, warnings), std::back_inserter(motion));
+  const std::vector<std::optional<Duration>> recorder_ahead = recorder_ahead_of_drivers(*bag, topics);
+  std::ranges::move(read_bag_motion(*bag, file, topics.of_source, clock_difference(recorder_ahead), warnings),
+                    std::back_inserter(motion));
   for (std::size_t i = 0; config_is_users_own && topics.doubts.empty() && i < topics.of_source.size(); ++i) {
     if (!has_file(SourceId{i}) && !config.motion_sources[i].of_lidar)
       warnings.push_back(fmt::format("{}: motion source {}: never received, nothing of its kind in the bag",
                                      file.string(), config.motion_sources[i].name));
   }
-  return {std::make_unique<BagPackets>(std::move(bag), file, config, topics), std::move(motion), topics.used, {}};
+  return {std::make_unique<BagPackets>(std::move(bag), file, config, topics, recorder_ahead),
+          std::move(motion),
+          topics.used,
+          {}};
 }
 
 RecordedInput open_drive_input(const Arguments& arguments, const std::filesystem::path& folder, const Config& config,

@@ -20,9 +20,25 @@ namespace {
 /// Lead of the motion played before the first datagram, so that sources are live when it arrives.
 constexpr Duration kMotionAhead = std::chrono::seconds{1};
 
+/// Longest transit of a sample whose stamp and arrival are of one clock.
+constexpr Duration kLongestTransit = std::chrono::seconds{10};
+
+/// Sorts samples whose arrivals go back, unless their clock was set: then the first is as old as the capture.
+template <class Sample> MotionSamples<Sample> in_order(MotionSamples<Sample> samples, Stamp capture_start) {
+  constexpr Duration kLongestWait = std::chrono::seconds{5}; ///< for the first sample of a sensor
+  constexpr std::size_t kMostSteps = 10;
+  if (samples.steps_back() == 0 ||
+      (samples.steps_back() <= kMostSteps && samples.front()->arrival <= capture_start + kLongestWait))
+    return samples;
+  std::vector<Sample> sorted = samples.drain();
+  std::ranges::stable_sort(sorted, {}, &Sample::arrival);
+  return MotionSamples<Sample>(std::move(sorted));
+}
+
 template <class Sample>
 MotionSamples<Sample> with_faults(std::vector<Sample> samples, const PlayOptions& options, const std::string& source,
                                   Stamp capture_start) {
+  std::ranges::stable_sort(samples, {}, &Sample::arrival);
   inject_faults(options.faults, source, capture_start, options.seed, samples);
   return MotionSamples<Sample>(std::move(samples));
 }
@@ -57,7 +73,8 @@ void check_faults(const std::vector<Fault>& faults, const Config& config) {
 
 Recording::Recording(std::unique_ptr<DatagramSource> source, std::vector<MotionRecording> motion, const Config& config,
                      LidarRouter lidars, const PlayOptions& options)
-    : source_(std::make_unique<RecordedTimes>(std::move(source), config.lidars)), lidars_(std::move(lidars)),
+    : lidars_(std::move(lidars)), source_(std::make_unique<SteadyArrivals>(
+                                      std::make_unique<RecordedTimes>(std::move(source), config.lidars), lidars_)),
       play_for_(options.duration), head_(source_->next()),
       capture_start_(head_ != nullptr ? head_->receive_stamp : Stamp{}), injected_(options.faults) {
   begin_ = capture_start_ + options.start;
@@ -70,9 +87,11 @@ Recording::Recording(std::unique_ptr<DatagramSource> source, std::vector<MotionR
     if (has_faults)
       std::visit([&](auto& samples) { samples = with_faults(samples.drain(), options, name, capture_start_); },
                  recording.samples);
+    else
+      std::visit([&](auto& samples) { samples = in_order(std::move(samples), capture_start_); }, recording.samples);
     const std::size_t index = index_of(recording.source);
-    motion_.push_back(
-        {std::move(recording), has_faults, index < options.earlier.size() ? options.earlier[index] : Duration{}});
+    const Duration earlier = index < options.earlier.size() ? options.earlier[index] : Duration{};
+    motion_.push_back({std::move(recording), has_faults, earlier, ClockFollower(capture_start_), &source_->steps()});
     MotionCursor& cursor = motion_.back();
     while (cursor.arrival() < begin_ - kMotionAhead)
       cursor.pop();
@@ -86,9 +105,11 @@ Stamp Recording::MotionCursor::arrival() const {
         const auto* const next = samples.front();
         if (next == nullptr)
           return Stamp::max();
-        const Stamp in_time = next->arrival - std::max(earlier, Duration{});
-        const bool one_clock = std::chrono::abs(next->arrival - next->stamp) < std::chrono::seconds{1};
-        return earlier != Duration{} && one_clock ? std::max(in_time, next->stamp - earlier) : in_time;
+        const Stamp steady = clock.peek(next->arrival, *steps);
+        const Stamp in_time = steady - std::max(earlier, Duration{});
+        const Duration transit = next->arrival - next->stamp;
+        const bool one_clock = std::chrono::abs(transit) < std::chrono::seconds{1};
+        return earlier != Duration{} && one_clock ? std::max(in_time, steady - transit - earlier) : in_time;
       },
       recording.samples);
 }
@@ -99,8 +120,11 @@ std::optional<TimeSpan> Recording::MotionCursor::arrivals() const {
 
 Input Recording::MotionCursor::pop() {
   const auto input_of = [&](auto sample) -> Input {
-    sample.arrival = arrival();
-    sample.stamp -= earlier;
+    const Stamp arrives = arrival();
+    const Duration step = sample.arrival - clock.pass(sample.arrival, *steps);
+    const bool one_clock = std::chrono::abs(sample.arrival - sample.stamp) < kLongestTransit;
+    sample.arrival = arrives;
+    sample.stamp -= earlier + (one_clock ? step : Duration{});
     if constexpr (std::is_same_v<std::decay_t<decltype(sample)>, ImuSample>)
       return daemon::ImuInput{recording.source, sample};
     else
@@ -206,6 +230,12 @@ std::optional<std::string> Recording::runs_backwards() const {
 std::vector<std::string> Recording::warnings() const {
   std::vector<std::string> warnings = source_->warnings();
   for (const MotionCursor& motion : motion_) {
+    if (motion.clock.own_steps() > 0)
+      warnings.push_back(fmt::format("{}: its times jump {} times, first by {:+.3f} s at {:.3f} s, but those of the "
+                                     "lidar do not: its clock was set, and the times continue from before",
+                                     motion.recording.file.string(), motion.clock.own_steps(),
+                                     to_seconds(motion.clock.first_own_step().by),
+                                     to_seconds(motion.clock.first_own_step().at.time_since_epoch())));
     const std::optional<TimeSpan> span = motion.arrivals();
     if (started_ && !motion.has_faults && (!span || span->last < first_ || span->first > last_))
       warnings.push_back(fmt::format("{}: its samples ({}) and the packets ({}) have no time in common, so nothing of "

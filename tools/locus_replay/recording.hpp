@@ -17,7 +17,9 @@
 #include "drivers/net/datagram.hpp"
 #include "drivers/other_maker.hpp"
 #include "faults/fault_injection.hpp"
+#include "locus_replay/clock_follower.hpp"
 #include "locus_replay/motion_recordings.hpp"
+#include "locus_replay/steady_arrivals.hpp"
 
 namespace locus::tools {
 
@@ -46,6 +48,8 @@ struct PortTraffic {
 
 /// Recording in its original timing: datagrams and motion samples in order of arrival, with faults injected.
 ///
+/// All times are steady: steps of the recording computer's clock are removed (SteadyArrivals, ClockFollower).
+///
 /// Streams the capture, and motion samples without faults. Motion is played from one second before the first datagram,
 /// so that the sources are known by then, up to the last one. A datagram dropped by a fault yields Silence. One owner.
 class Recording : public daemon::InputSource {
@@ -60,6 +64,8 @@ class Recording : public daemon::InputSource {
   [[nodiscard]] double progress() const { return progress_.load(std::memory_order_relaxed); }
 
   [[nodiscard]] const DatagramSource& source() const { return *source_; }
+  /// Returns the steps of the recording computer's clock found so far.
+  [[nodiscard]] const std::vector<ClockStep>& clock_steps() const { return source_->steps(); }
   [[nodiscard]] const std::vector<Fault>& faults() const { return injected_; }
   /// Returns the arrival of the first datagram: the origin of --start and of the seconds of faults.
   [[nodiscard]] Stamp capture_start() const { return capture_start_; }
@@ -85,6 +91,8 @@ class Recording : public daemon::InputSource {
     MotionRecording recording;
     bool has_faults; ///< injected by this
     Duration earlier{};
+    ClockFollower clock{};
+    const std::vector<ClockStep>* steps;
 
     [[nodiscard]] Stamp arrival() const; ///< arrival of the next sample; Stamp::max() after the last
     [[nodiscard]] std::optional<TimeSpan> arrivals() const;
@@ -96,9 +104,9 @@ class Recording : public daemon::InputSource {
   void note_traffic(const Datagram& datagram);
   Pending fetch();
 
-  std::unique_ptr<DatagramSource> source_;
-  std::vector<MotionCursor> motion_;
   LidarRouter lidars_; ///< for look-ups only
+  std::unique_ptr<SteadyArrivals> source_;
+  std::vector<MotionCursor> motion_;
   std::optional<Duration> play_for_;
   const Datagram* head_; ///< read ahead, to find the start of the capture
   Stamp capture_start_;

@@ -65,7 +65,8 @@ void Results::finish(const daemon::Ingest& ingest, const daemon::SweepProcessor&
   odometry_.close();
   std::vector<SurfacePoint> map;
   read_planes(processor.odometry().map().fine(), map);
-  const Accuracy accuracy = sweeps.seen > 0 ? truth_.compare(map, !arguments_.quiet) : Accuracy{};
+  const Accuracy accuracy =
+      sweeps.seen > 0 ? truth_.compare(map, recording_.clock_steps(), !arguments_.quiet) : Accuracy{};
   daemon::Figures figures{.config = config_,
                           .capture = arguments_.capture.string(),
                           .duration = recording_.duration(),

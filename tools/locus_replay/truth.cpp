@@ -15,7 +15,7 @@ Truth::Truth(const Arguments& arguments, const CaptureFolder& folder, std::vecto
       map_file_(arguments.map_truth.empty() ? folder.map_truth : arguments.map_truth),
       trajectory_(std::move(recorded)) {
   if (!trajectory_file_.empty())
-    trajectory_ = value_or_fail(read_trajectory(trajectory_file_), ExitStatus::failed);
+    trajectory_ = value_or_fail(read_trajectory(trajectory_file_, true), ExitStatus::failed);
   else
     trajectory_file_ = arguments.capture; // named in messages about the recorded poses
   if (!map_file_.empty())
@@ -29,9 +29,26 @@ void Truth::add(const OdometryEstimate& estimate) {
   covariances_.push_back(estimate.pose_covariance);
 }
 
-Accuracy Truth::compare(std::span<const SurfacePoint> map, bool show_progress) {
+/// Converts the poses to steady time. Returns an error if they go back without a step.
+std::optional<std::string> Truth::convert(const std::vector<ClockStep>& steps) {
+  ClockFollower clock;
+  for (StampedPose& pose : trajectory_) {
+    const Stamp recorded = pose.stamp;
+    pose.stamp = clock.pass(recorded, steps);
+    if (clock.own_steps() > 0)
+      return fmt::format(
+          "{}: its times jump at {:.3f} s, and those of the recording do not; sort the lines by time and "
+          "keep one of each",
+          trajectory_file_.string(), to_seconds(recorded.time_since_epoch()));
+  }
+  return std::nullopt;
+}
+
+Accuracy Truth::compare(std::span<const SurfacePoint> map, const std::vector<ClockStep>& steps, bool show_progress) {
   Accuracy accuracy;
-  if (!trajectory_.empty()) {
+  if (const auto problem = convert(steps)) {
+    accuracy.problems.push_back(*problem);
+  } else if (!trajectory_.empty()) {
     accuracy.trajectory = trajectory_accuracy(estimates_, trajectory_);
     accuracy.consistency = consistency(estimates_, std::exchange(covariances_, {}), trajectory_);
     if (!accuracy.trajectory)

@@ -12,6 +12,7 @@
 #include "core/odometry/odometry_estimate.hpp"
 #include "drivers/files/capture_folder.hpp"
 #include "locus_replay/arguments.hpp"
+#include "locus_replay/clock_follower.hpp"
 #include "locus_replay/progress_bar.hpp"
 #include "locus_replay/run_figures.hpp"
 
@@ -29,10 +30,13 @@ class Truth {
   /// Returns the true poses; empty if there are none.
   [[nodiscard]] std::span<const StampedPose> trajectory() const { return trajectory_; }
 
-  /// Compares; slow with a map. May be called once: it first frees the covariances, 10 MB per hour of driving.
-  [[nodiscard]] Accuracy compare(std::span<const SurfacePoint> map, bool show_progress);
+  /// Compares; slow with a map. `steps`: those of the clock that stamped the true poses. May be called once: it
+  /// converts the true poses to steady time, and frees the covariances, 10 MB per hour of driving.
+  [[nodiscard]] Accuracy compare(std::span<const SurfacePoint> map, const std::vector<ClockStep>& steps,
+                                 bool show_progress);
 
  private:
+  [[nodiscard]] std::optional<std::string> convert(const std::vector<ClockStep>& steps);
   [[nodiscard]] std::string why_nothing_in_common() const;
 
   std::filesystem::path trajectory_file_, map_file_; ///< empty: none

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/files/pcapng_reader.hpp"
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -52,10 +53,12 @@ class PcapngFile {
     }
     add_block(1, body);
   }
-  void add_frame(std::uint32_t interface, std::uint64_t ticks, const Bytes& frame) {
+  void add_frame(std::uint32_t interface, std::uint64_t ticks, const Bytes& frame, const Bytes& options = {}) {
     Bytes body;
     put(body, interface, 4);
     put_packet(body, ticks, frame);
+    body.resize((body.size() + 3) / 4 * 4);
+    append(body, options);
     add_block(6, body);
   }
   void add_frame_without_time(const Bytes& frame) {
@@ -185,6 +188,51 @@ TEST(Pcapng, OfSeveralSectionsIsReadInTheByteOrderOfEach) {
   file.add_interface(DLT_EN10MB, 0);
   file.add_frame(0, 3'000'000, frame);
   EXPECT_EQ(stamps_in(file.bytes()), (std::vector<std::int64_t>{1'000'000'000, 2'000'000'000, 3'000'000'000}));
+}
+
+/// The kinds of the public test suite pcapng-test-generator: name resolution, statistics, journal, secrets, custom, and
+/// blocks that no version knows, in sections of either order, also before the interface and in sections without
+/// packets.
+TEST(Pcapng, BlocksWithoutPacketsAreSkipped) {
+  const Bytes frame = ethernet(ipv4_udp({}, payload_of(31)));
+  constexpr std::array<std::uint32_t, 10> kWithoutPackets{4, 5, 7, 8, 9, 10, 0xBAD, 0x40000BAD, 0x80000001, 0xFFFFFFFF};
+  for (const bool is_big_endian : {false, true}) {
+    PcapngFile file{is_big_endian};
+    std::vector<std::int64_t> expected;
+    for (int section = 0; section < 3; ++section) {
+      for (const std::uint32_t type : kWithoutPackets)
+        file.add_block(type, Bytes(4 * (type % 7)));
+      file.add_interface(DLT_EN10MB, 0, 9);
+      for (const std::uint32_t type : kWithoutPackets) {
+        file.add_block(type, Bytes(4 * (type % 5)));
+        file.add_frame(0, 1'000 + expected.size(), frame);
+        expected.push_back(static_cast<std::int64_t>(1'000 + expected.size()));
+      }
+      file.start_section(is_big_endian); // without packets
+      file.start_section(section == 0 ? !is_big_endian : is_big_endian);
+    }
+    EXPECT_EQ(stamps_in(file.bytes()), expected);
+  }
+}
+
+TEST(Pcapng, OfSectionsWithoutInterfaceIsCalledSo) {
+  PcapngFile file;
+  file.add_block(0xBAD, Bytes(8));
+  file.start_section(true);
+  const TemporaryFile temporary{"empty.pcapng", file.bytes()};
+  EXPECT_TRUE(contains(error_of(Capture::open(temporary.path())), "no interface is described"));
+}
+
+TEST(Pcapng, OptionsAreSkipped) {
+  const Bytes frame = ethernet(ipv4_udp({}, payload_of(31)));
+  PcapngFile file;
+  file.add_interface(DLT_EN10MB, 0, 9);
+  file.add_frame(
+      0, 1'000, frame,
+      Bytes{
+          std::byte{1}, {}, std::byte{5}, {}, std::byte{'n'}, std::byte{'o'}, {}, {}, {}, {}, {}, {}, {}, {}, {}, {}});
+  file.add_frame(0, 2'000, frame, Bytes(16, std::byte{0xFF})); // options that reach beyond the block
+  EXPECT_EQ(stamps_in(file.bytes()), (std::vector<std::int64_t>{1'000, 2'000}));
 }
 
 TEST(Pcapng, TimesAreInTheUnitOfTheirInterface) {
