@@ -261,8 +261,9 @@ std::optional<SpecificForce> Odometry::force_of(const Sweep& sweep, std::bitset<
 }
 
 /// De-skews the points for a base that moved with mean twist `twist_base` since the last sweep. If sources are
-/// excluded, their motion within the sweep is removed.
+/// excluded, their motion within the sweep is removed. One that repeats its pose has none.
 void Odometry::correct(const Sweep& sweep, const Vector6& twist_base, std::bitset<kMaxSources> without) {
+  without &= ~repeating_sources(sweep);
   move_points(sweep, without.any() ? SweepCorrection::constant(sweep, twist_base)
                                    : SweepCorrection::all(sweep, twist_base + twist_offset_after_drops(sweep)));
 }
@@ -311,6 +312,7 @@ void Odometry::follow_epoch(SourceId source, const SourcePose& sensed) {
 }
 
 void Odometry::reset_source(SourceId source) {
+  changed_at_[index_of(source)].reset();
   filter_.reset_source(source);
   rival_.reset();
   if (observer_)
@@ -391,6 +393,9 @@ void Odometry::finish(const Sweep& sweep, OdometryEstimate& estimate) {
   if (observer_)
     observer_->set_pose(filter_.pose());
   report_sources(sweep, estimate);
+  for (std::size_t i = 0; i < sources_.size(); ++i)
+    if (steps_.twist_base(sweep, SourceId{i}) && !steps_.repeats(sweep, SourceId{i}))
+      changed_at_[i] = {filter_.pose().translation, filter_.covariance().topLeftCorner<3, 3>()};
   steps_.store(sweep);
 }
 

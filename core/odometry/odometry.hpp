@@ -114,6 +114,12 @@ class Odometry {
     void enter(Rival other);
   };
 
+  /// A position in the odom frame.
+  struct Position {
+    Eigen::Vector3d mean_m;
+    Eigen::Matrix3d covariance;
+  };
+
   /// A source that contradicts all others.
   struct Contradiction {
     std::size_t source = 0;
@@ -143,13 +149,16 @@ class Odometry {
                   const Gicp::StopRequested& stop);
   void register_with(const Sweep& sweep, Hypothesis& hypothesis, const Gicp::StopRequested& stop);
   [[nodiscard]] static std::optional<SpecificForce> force_of(const Sweep& sweep, std::bitset<kMaxSources> without);
+  [[nodiscard]] std::bitset<kMaxSources> repeating_sources(const Sweep& sweep) const;
+  [[nodiscard]] double odds_against_stuck(std::bitset<kMaxSources> repeating) const;
   [[nodiscard]] double odds_of_sources(const Sweep& sweep, std::bitset<kMaxSources> without) const;
   [[nodiscard]] double prior_odds(const Sweep& sweep, const Hypothesis& hypothesis) const;
   [[nodiscard]] Rival against(const Hypothesis& best, const Sweep& sweep, Hypothesis other) const;
   [[nodiscard]] bool may_slip(const Sweep& sweep, const SourceChoice& choice) const;
   void continue_rival(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop);
   std::optional<Registration> consider_faults(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop);
-  [[nodiscard]] bool is_likelier(const Registration& at_rest, const Hypothesis& moving) const;
+  [[nodiscard]] bool is_likelier(const Registration& at_rest, const Hypothesis& moving,
+                                 double odds_of_standstill) const;
   std::optional<Hypothesis> consider_rest(const Sweep& sweep, const Hypothesis& moving,
                                           const Gicp::StopRequested& stop);
   Hypothesis attempt(const Sweep& sweep, const Assumption& assumption, const MotionFilter& last,
@@ -183,7 +192,8 @@ class Odometry {
   ObservedAxes observed_axes_;
   SensedSteps steps_;
   MotionFilter filter_;
-  std::optional<Rival> rival_;           ///< its filter includes the update with lidar
+  std::array<std::optional<Position>, kMaxSources> changed_at_; ///< of the robot when each source last changed its pose
+  std::optional<Rival> rival_;                                  ///< its filter includes the update with lidar
   std::optional<MotionFilter> observer_; ///< calibrates sources whose result is only reported, never used
   SweepCorrection correction_;           ///< de-skew of the current sweep
   std::vector<SurfacePoint> scan_;       ///< points of the current sweep, fully de-skewed

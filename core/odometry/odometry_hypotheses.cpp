@@ -83,6 +83,30 @@ double Odometry::prior_odds(const Sweep& sweep, const Hypothesis& hypothesis) co
          (hypothesis.slips ? hypothesis.filter.odds_against_slip() : 0.0);
 }
 
+/// Returns the odometries that repeat their pose: they measure a standstill, or are stuck.
+std::bitset<kMaxSources> Odometry::repeating_sources(const Sweep& sweep) const {
+  std::bitset<kMaxSources> repeating;
+  for (std::size_t i = 0; i < sources_.size(); ++i)
+    repeating[i] = sources_[i].kind == SourceKind::odometry && steps_.is_usable(sweep, SourceId{i}) &&
+                   steps_.repeats(sweep, SourceId{i});
+  return repeating;
+}
+
+/// Returns the odds, as twice their logarithm, that sources which repeat their pose are not stuck: the lower, the
+/// farther the robot has moved since they changed it; even, if they never have.
+double Odometry::odds_against_stuck(std::bitset<kMaxSources> repeating) const {
+  double odds = 0.0;
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    if (!repeating[i] || !changed_at_[i])
+      continue;
+    const auto& [then_m, covariance_then] = *changed_at_[i];
+    const Eigen::Vector3d moved_m = filter_.pose().translation - then_m;
+    const Eigen::Matrix3d covariance = covariance_then + filter_.covariance().topLeftCorner<3, 3>();
+    odds += std::max(0.0, kSourceIsRight - moved_m.dot(covariance.ldlt().solve(moved_m)));
+  }
+  return odds;
+}
+
 /// Compares a hypothesis with the best one: by the likelihood of the points, of the motion, and the prior odds.
 Odometry::Rival Odometry::against(const Hypothesis& best, const Sweep& sweep, Hypothesis other) const {
   const double odds = best.filter.surprise(best.fit) - other.filter.surprise(other.fit) + prior_odds(sweep, other) -
@@ -96,7 +120,7 @@ Odometry::Rival Odometry::against(const Hypothesis& best, const Sweep& sweep, Hy
 void Odometry::continue_rival(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop) {
   if (!rival_ || !observed_axes_.each()[0] || stop())
     return;
-  const Assumption assumption{.without = rival_->hypothesis.without, .continues = true};
+  const Assumption assumption{.without = rival_->hypothesis.without | repeating_sources(sweep), .continues = true};
   Rival rival = against(contest.best, sweep, attempt(sweep, assumption, rival_->hypothesis.filter, stop));
   const Hypothesis& other = rival.hypothesis;
   if (stop() || lidar_health_.lacks_correspondences(other.fit)) // cut short, or blind
@@ -157,7 +181,7 @@ std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Contes
     const bool is_explained = (best.slips || best.without.any()) && !is_unusual();
     if (!suspect || is_explained || stop())
       continue;
-    Assumption assumption;
+    Assumption assumption{.without = repeating_sources(sweep)};
     assumption.without.set(index_of(*suspect));
     try_out(assumption);
   }
@@ -174,11 +198,11 @@ std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Contes
 
 /// Tells whether a standstill is likelier than a motion. Where sources measure the motion, the odds are those of the
 /// points, of what the sources measure, and Occam's factor of the motion that a standstill spares.
-bool Odometry::is_likelier(const Registration& at_rest, const Hypothesis& moving) const {
-  if (!moving.choice.rotation && !moving.choice.translation)
+bool Odometry::is_likelier(const Registration& at_rest, const Hypothesis& moving, double odds_of_standstill) const {
+  if (!moving.choice.rotation && !moving.choice.translation && odds_of_standstill == 0.0)
     return fit_of(at_rest) > kAsGoodAtRest * fit_of(moving.fit);
   return evidence(at_rest, moving.fit) + moving.filter.surprise(moving.fit) - moving.filter.surprise_at_rest() +
-             (stands_ ? kStaysAtRest : 0.0) >
+             (stands_ ? kStaysAtRest : 0.0) + odds_of_standstill >
          0.0;
 }
 
@@ -192,10 +216,12 @@ std::optional<Odometry::Hypothesis> Odometry::consider_rest(const Sweep& sweep, 
                     (sigma_after.array() < kSlowDoubt * kSlow.array()).all(); // standstill requires an observed twist
   if (!slow)
     slow_since_ = sweep.end;
-  if (!may_rest(moving.filter) || (!stands_ && sweep.end - slow_since_ < kSlowFor))
+  const std::bitset<kMaxSources> repeating = repeating_sources(sweep);
+  const double odds = odds_against_stuck(repeating);
+  if (!may_rest(moving.filter) || (!stands_ && odds == 0.0 && sweep.end - slow_since_ < kSlowFor))
     return std::nullopt;
-  Hypothesis rest = attempt(sweep, {.without = moving.without, .rests = true}, filter_, stop);
-  if (!is_likelier(rest.fit, moving))
+  Hypothesis rest = attempt(sweep, {.without = moving.without & ~repeating, .rests = true}, filter_, stop);
+  if (!is_likelier(rest.fit, moving, odds))
     return std::nullopt;
   rest.filter.set_pose(filter_.pose());
   return rest;
@@ -203,7 +229,11 @@ std::optional<Odometry::Hypothesis> Odometry::consider_rest(const Sweep& sweep, 
 
 /// Returns the likeliest hypothesis for a sweep. The next one stays as the rival, until a later sweep excludes either.
 Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopRequested& stop) {
-  Contest contest{attempt(sweep, {}, filter_, stop), std::nullopt};
+  const std::bitset<kMaxSources> repeating = repeating_sources(sweep);
+  Contest contest{attempt(sweep, {.without = repeating}, filter_, stop), std::nullopt};
+  const auto dead_reckoned = [&](Hypothesis hypothesis) {
+    return repeating.any() ? attempt(sweep, {}, filter_, stop) : std::move(hypothesis);
+  };
   if (sweep.points.size() >= kMinPoints)
     continue_rival(sweep, contest, stop);
   rival_.reset();
@@ -211,13 +241,13 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
   gravity_.observe(filter_.pose().rotation.conjugate() * best.filter.pose().rotation, sweep);
   flat_ground_.observe(sweep.end, gravity_.up_base());
   if (sweep.points.size() < kMinPoints)
-    return best;
+    return dead_reckoned(std::move(best));
   Hypothesis first = best;
   const std::optional<Registration> lidar_alone = consider_faults(sweep, contest, stop);
   if (auto rest = consider_rest(sweep, best, stop))
     best = *std::move(rest);
   if (!best.rests && !is_accepted(sweep, lidar_alone.value_or(best.fit), first))
-    return first; // not accepted: dead reckoning assumes no new fault
+    return dead_reckoned(std::move(first)); // not accepted: dead reckoning assumes no new fault
   best.accepted = true;
   if (contest.rival) {
     rival_ = std::move(contest.rival);
