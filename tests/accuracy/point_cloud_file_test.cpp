@@ -155,7 +155,7 @@ TEST(PointCloudFile, BrokenPcdIsReportedWithItsLine) {
   expect_error(begin + "SIZE 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2 3\n", ":6: SIZE does not have as many values");
   expect_error(begin + "SIZE 4 4 four\nTYPE F F F\nPOINTS 1\nDATA ascii\n", ":6: SIZE or COUNT of z");
   expect_error(begin + "SIZE 4 4 4\nTYPE F F I\nPOINTS 1\nDATA ascii\n", ":6: z is neither a float nor a double");
-  expect_error(begin + "POINTS -1\n", ":3: POINTS is no number");
+  expect_error(begin + "POINTS -1\n", ":3: POINTS is not a number");
   expect_error(begin + "SIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA binary_compressed\n", "convert the map to DATA binary");
   expect_error(begin + "nonsense\n", ":3: not a line of a PCD header");
 }

@@ -157,7 +157,7 @@ TEST(ConfigYaml, LidarHasPacketsOrClouds) {
                                  "out one of the two",
                                  key)});
   EXPECT_NE(errors_in("lidars: [{point_times: none}]\n").at(0).find("name their topic"), std::string::npos);
-  EXPECT_NE(errors_in("lidars: [{topic: points}]\n").at(0).find("is no topic"), std::string::npos);
+  EXPECT_NE(errors_in("lidars: [{topic: points}]\n").at(0).find("is not a topic"), std::string::npos);
   EXPECT_NE(errors_in("lidars: [{name: a, topic: /p}, {name: b, topic: /p}]\n").at(0).find("that of another lidar"),
             std::string::npos);
   EXPECT_NE(errors_in("lidars: [{topic: /imu/data}]\n").at(0).find("cannot have PointCloud2"), std::string::npos);
@@ -256,8 +256,8 @@ TEST(ConfigYaml, EveryKindOfBadValueIsRejectedWithItsKeyAndReason) {
       {"lidars={name: a}", "must be a list"},
       {"motion_sources=[5]", "must be a section of keys"},
       {"motion_sources=[{kind: imu}]", "is not a name"},
-      {"motion_sources.wio.topic=wheel odometry", "is no topic"},
-      {"motion_sources.imu.health_topic=/imu/", "is no topic"},
+      {"motion_sources.wio.topic=wheel odometry", "is not a topic"},
+      {"motion_sources.imu.health_topic=/imu/", "is not a topic"},
       {"motion_sources.wio.T_base_source.xyz_m=[1, 0, 0]", "belongs to kind imu alone"},
       {"motion_sources.wio.use_acceleration=off", "belongs to kind imu alone"},
       {"motion_sources.wio.late_ms=251", "is outside -250 .. 250"},
@@ -303,7 +303,7 @@ TEST(ConfigYaml, EveryKindOfBadValueIsRejectedWithItsKeyAndReason) {
       {"dds.domain=233", "is outside 0 .. 232"},
       {"dds.interface=\"\"", "must name a network interface"},
       {"dds.interface=eth0\"/>", "must name a network interface"},
-      {"dds.prefix=/locus//", "is no topic"},
+      {"dds.prefix=/locus//", "is not a topic"},
       {"dds.frame_base=odom", "must differ from frame_odom"},
       {"dds.frame_odom=/odom",
        "dds.frame_odom: must be a name without blanks, and without a slash at its beginning; write odom"},
@@ -314,7 +314,7 @@ TEST(ConfigYaml, EveryKindOfBadValueIsRejectedWithItsKeyAndReason) {
       {"dds.frame_base=\"base\\tlink\"", "; write baselink"},
       {"dds.frame_base=' base_link'", "dds.frame_base: must be a name without blanks"},
       {"dds.frame_base=''", "; write base_link"},
-      {"dds.flat_ground_topic=flat", "is no topic"},
+      {"dds.flat_ground_topic=flat", "is not a topic"},
       {"dds.flat_ground_topic=/imu/data", "'/imu/data' cannot have Bool here and Imu elsewhere"},
       {"motion_sources.wio.topic=/imu/data", "cannot have Imu here and Odometry elsewhere"},
       {"motion_sources.imu.health_topic=/imu/data", "cannot have Bool here and Imu elsewhere"},

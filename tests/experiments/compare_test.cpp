@@ -114,7 +114,7 @@ TEST_F(Compare, RunWithoutAFormerFigureIsWorse) {
   const Results failed{{"fault", "a fault"},
                        {"course", "urban"},
                        {"configuration", "a"},
-                       {"broken", {"seed 1 did not run"}},
+                       {"broken", {"seed 1 failed"}},
                        {"holds", false}};
   EXPECT_TRUE(
       contains_text(page(faults({fault_row("a", 0.1, 2.0, false)}), faults({failed})), "| **worse** | urban/a |"));

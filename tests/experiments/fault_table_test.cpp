@@ -131,7 +131,7 @@ TEST(FaultTable, FailedRunDoesNotHold) {
   const Results failed{{"course", "urban_1"}, {"configuration", "wio_frozen"}, {"failed", "it crashed"}};
   const Results row = row_of({run("urban_1", "none", 0.1), failed}, "urban", "wio_frozen");
   EXPECT_FALSE(row["holds"]);
-  EXPECT_EQ(row["broken"][0], "seed 1 did not run");
+  EXPECT_EQ(row["broken"][0], "seed 1 failed");
 }
 
 /// The mean over the remaining runs would look good.

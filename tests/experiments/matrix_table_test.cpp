@@ -42,7 +42,7 @@ Results judged(const Results& with) {
 TEST(MatrixTable, CellHoldsIfTheFaultIsCounted) {
   Results frozen = run(kFrozen);
   frozen["summary"]["ape_m"]["mean"] = 0.004;
-  EXPECT_EQ(judged(frozen)["broken"], Results::array({"silent"}));
+  EXPECT_EQ(judged(frozen)["broken"], Results::array({"not reported"}));
   frozen["summary"]["sources"]["wio"]["rejected"]["frozen"] = 77;
   EXPECT_TRUE(judged(frozen)["holds"]);
   EXPECT_EQ(judged(frozen)["shown"], Results::array({"wio.rejected.frozen 77"}));

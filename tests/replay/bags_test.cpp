@@ -534,7 +534,7 @@ TEST_F(BadBag, TruncatedScans) {
   write_text(folder_ / "a.bag", ros1_bag(messages));
   const ProgramRun run = run_program(LOCUS_REPLAY, {"-o", folder_ / "out", folder_ / "a.bag"});
   EXPECT_EQ(run.status, 1);
-  expect_line(run.err, {"1 of 1 messages", "cut short", "no whole packet or cloud in 1 messages"});
+  expect_line(run.err, {"1 of 1 messages", "are truncated", "no whole packet or cloud in 1 messages"});
 }
 
 TEST(BagChunk, WithNothingToDecompressIsDamaged) {

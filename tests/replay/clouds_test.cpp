@@ -267,7 +267,7 @@ TEST(Clouds, PacketFaultsAreAnError) {
   write_file(folder / "clouds.bag", ros1_bag(room_clouds(CloudKind::velodyne, RosVersion::ros1, {}, 3)));
   const Replay replay({"--fail", "front:lost@1-2", folder / "clouds.bag"});
   EXPECT_EQ(replay.run().status, 2);
-  expect_parts(replay.run().err, {"lidar front gives clouds"});
+  expect_parts(replay.run().err, {"lidar front has clouds"});
 }
 
 /// Wrong times, the expected warning, and the replacement.

@@ -174,7 +174,7 @@ TEST(Faults, LossOfEveryPacketIsNamedAsTheReason) {
   const Replay replay = replay_with("all-lidars:lost@0");
   EXPECT_EQ(replay.run().status, 1);
   EXPECT_EQ(lines_of(replay.run().err).size(), 1U) << replay.run().err;
-  EXPECT_NE(replay.run().err.find("no valid data packet: --fail all-lidars:lost keeps all "), std::string::npos)
+  EXPECT_NE(replay.run().err.find("no valid data packet: --fail all-lidars:lost removes all "), std::string::npos)
       << replay.run().err;
 }
 

@@ -145,7 +145,7 @@ TEST_F(KittiOdometry, SeveralSequencesAreListed) {
   for (int i = 0; i < 5; ++i)
     write_with_folders(folder / fmt::format("sequences/{:02}/velodyne/000000.bin", i), std::string(16, '\0'));
   expect_refused(folder.path(),
-                 {"holds 5 recordings", "name one of them: ", "sequences/00", "sequences/02 and 2 more"});
+                 {"contains 5 recordings", "name one of them: ", "sequences/00", "sequences/02 and 2 more"});
 }
 
 TEST_F(KittiOdometry, BadPosesAndCalibrationAreNamed) {

@@ -282,7 +282,7 @@ TEST(FolderAbove, ResolvesToItsOnlyRecording) {
   put(folder / "day/other.bag", ros1_bag(messages_of(room_drive(), RosVersion::ros1)));
   const Replay of_two({folder.path()});
   EXPECT_EQ(of_two.run().status, 1);
-  EXPECT_TRUE(contains(of_two.run().err, "holds 2 recordings")) << of_two.run().err;
+  EXPECT_TRUE(contains(of_two.run().err, "contains 2 recordings")) << of_two.run().err;
 }
 
 /// Contains messages_of() the room drive.

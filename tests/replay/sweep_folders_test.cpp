@@ -220,7 +220,7 @@ TEST(SweepFolder, TenDigitNumbersAreNotTimes) {
 TEST(SweepFolder, EmptyFolderIsReported) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder / "drive/lidar0/data");
-  expect_refused(folder / "drive", {"drive/lidar0/data: holds no sweep"});
+  expect_refused(folder / "drive", {"drive/lidar0/data: contains no sweep"});
 }
 
 TEST(SweepFolder, UnreadableSweepsAreSkippedAndTheFirstIsNamed) {

@@ -102,9 +102,9 @@ TEST(SweepPoints, InvalidOrTruncatedPcdIsAnError) {
   expect_problem(kXyzOfTwo + "DATA ascii\n1 2 3\n1 2 three\n", "11: not the 3 fields of a point");
   expect_problem(kXyzOfTwo + "DATA ascii\n1 2 3 4\n", "10: not the 3 fields of a point");
   expect_problem(kXyzOfTwo + "DATA binary\n" + std::string(23, '\0'), "after 1 of 2 points");
-  expect_problem(kXyzOfTwo + "DATA binary_compressed\n" + little_endian(4U), "break off");
+  expect_problem(kXyzOfTwo + "DATA binary_compressed\n" + little_endian(4U), "are truncated");
   expect_problem(kXyzOfTwo + "DATA binary_compressed\n" + little_endian(4'000'000'000U) + little_endian(24U),
-                 "break off");
+                 "are truncated");
   expect_problem(kXyzOfTwo + "DATA binary_compressed\n" + little_endian(2U) + little_endian(24U) +
                      std::string(2, '\xFF'),
                  "damaged");

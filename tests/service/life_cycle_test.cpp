@@ -178,7 +178,7 @@ TEST_F(LifeCycle, FullLogDoesNotEndTheService) {
 
 TEST_F(LifeCycle, DdsNetworkMayComeUpLater) {
   Child daemon(locusd(config("dds: {interface: robot0}\n")));
-  EXPECT_TRUE(daemon.wait_for_line("dds.interface: there is no network interface robot0; there are lo"));
+  EXPECT_TRUE(daemon.wait_for_line("dds.interface: no network interface robot0; there are lo"));
   if (!add_interfaces())
     GTEST_SKIP() << "no pair of virtual interfaces: the kernel has no veth, or ip is missing";
   EXPECT_TRUE(daemon.wait_for_line("DDS is up: domain 0 on interface robot0"));
