@@ -71,7 +71,7 @@ void expect_odometry_of_sound_bag(const Replay& replay, const std::string& warni
 
 Stamp drive_start() { return messages_of(room_drive(), RosVersion::ros2).front().recorded; }
 
-TEST(BagStamps, ThatAreConstantOrZeroGiveWayToTheRecorders) {
+TEST(BagStamps, ConstantOrZeroStampsAreReplacedByTheRecorders) {
   for (const Stamp constant : {Stamp{}, stamp_from_ns(904'636'608'000'032'663), drive_start() + hours{24}}) {
     SCOPED_TRACE(to_ns(constant));
     expect_odometry_of_sound_bag(replay_bag(messages_by_driver([=](Stamp) { return constant; })),
@@ -79,14 +79,14 @@ TEST(BagStamps, ThatAreConstantOrZeroGiveWayToTheRecorders) {
   }
 }
 
-TEST(BagStamps, ThatAreConstantWithinEachMessageGiveWayToTheRecorders) {
+TEST(BagStamps, ConstantStampsWithinMessagesAreReplacedByTheRecorders) {
   const Stamp start = drive_start();
   const auto of_tenth = [=](Stamp stamp) { return stamp - (stamp - start) % milliseconds{200}; };
   const Replay replay = replay_bag(messages_by_driver(of_tenth));
   expect_odometry_of_sound_bag(replay, "constant, zero or absurd");
 }
 
-TEST(BagStamps, ThatAreOffForAWhileGiveWayToTheRecorders) {
+TEST(BagStamps, TemporarilyWrongStampsAreReplacedByTheRecorders) {
   const Stamp start = drive_start();
   for (const Duration off :
        {Duration{-hours{1}}, Duration{hours{1}}, Duration{-seconds{5}}, Duration{hours{24 * 9000}}}) {
@@ -98,13 +98,13 @@ TEST(BagStamps, ThatAreOffForAWhileGiveWayToTheRecorders) {
   }
 }
 
-TEST(BagStamps, ThatAreOffInTheFirstMessagesGiveWayToTheRecorders) {
+TEST(BagStamps, InitiallyWrongStampsAreReplacedByTheRecorders) {
   const Stamp start = drive_start();
   const auto stamps = [=](Stamp stamp) { return stamp < start + milliseconds{300} ? stamp - hours{24 * 365} : stamp; };
   expect_odometry_of_sound_bag(replay_bag(messages_by_driver(stamps)), "constant, zero or absurd");
 }
 
-TEST(BagStamps, ThatAreOffFromSomeTimeOnGiveWayToTheRecorders) {
+TEST(BagStamps, FinallyWrongStampsAreReplacedByTheRecorders) {
   const Stamp start = drive_start();
   const auto stamps = [=](Stamp stamp) { return stamp < start + seconds{4} ? stamp : stamp + hours{2}; };
   expect_odometry_of_sound_bag(replay_bag(messages_by_driver(stamps)), "constant, zero or absurd");
@@ -123,7 +123,7 @@ TEST(BagStamps, OfOneClockMatchWhateverTheRecordersClock) {
 
 /// The clock of the only computer was set: its drivers' and its recorder's. The messages of a database are in the order
 /// of their times, so only another bag shows that the clock was set back.
-TEST(BagStamps, OfAClockThatWasSetContinueFromBefore) {
+TEST(BagStamps, TimesAfterAClockStepContinueFromBefore) {
   const Stamp start = drive_start();
   for (const auto& [ros, step] : {std::pair{RosVersion::ros2, Duration{hours{24 * 2000}}},
                                   {RosVersion::ros1, Duration{hours{1}}},
@@ -164,7 +164,7 @@ std::vector<RecordedMessage> with_stamps(const std::string& topic, const std::fu
   return messages;
 }
 
-TEST(BagStamps, OfSamplesThatAreWrongGiveWayToTheRecorders) {
+TEST(BagStamps, WrongStampsOfSamplesAreReplacedByTheRecorders) {
   const Stamp start = drive_start();
   const auto hour_back = [=](Stamp stamp) {
     return stamp >= start + seconds{3} && stamp < start + milliseconds{3500} ? stamp - hours{1} : stamp;
@@ -185,7 +185,7 @@ TEST(BagStamps, OfASourceWithAnotherClockAreConverted) {
 }
 
 /// Two drivers without namespaces: the second lidar looks the other way.
-TEST(BagStamps, SecondLidarOnATopicIsToldByItsFrame) {
+TEST(BagStamps, SecondLidarOnATopicIsDistinguishedByItsFrame) {
   constexpr std::size_t kFrame = 16; ///< after encapsulation, stamp and length
   std::vector<RecordedMessage> messages = messages_of(room_drive(), RosVersion::ros2);
   std::vector<RecordedMessage> both;

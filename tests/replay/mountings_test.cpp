@@ -88,7 +88,7 @@ TEST_F(Mountings, ImuRotationIsReadFromTheStaticTransforms) {
   EXPECT_TRUE(contains(wrong.run().err, "T_base_source")) << "the test's IMU is turned";
 }
 
-TEST_F(Mountings, ThoseTheUserSetAreUsed) {
+TEST_F(Mountings, ConfiguredMountingsAreUsed) {
   const std::string set_lidar = "lidars.0.T_base_lidar={xyz_m: [0.3, 0, 0.4], rpy_deg: [0, 0, 10]}";
   const Replay with({"--set", set_lidar, "--set", kSetTurned,
                      bag_with({{"base_link", "velodyne", kMast}, {"base_link", "imu_link", kMast}})});
@@ -124,7 +124,7 @@ TEST_F(Mountings, BaseFrameIsTheConfiguredOne) {
   EXPECT_TRUE(contains(configured.run().out, imu)) << configured.run().out;
 }
 
-TEST_F(Mountings, FileSetsThoseThatItNames) {
+TEST_F(Mountings, FileSetsTheMountingsThatItNames) {
   const std::string bag = bag_with({{"base_link", "velodyne", kMast}, {"base_link", "imu_link", kTurned}});
   const Replay lidar({"--duration", "1", "-c", configuration("lidars: [{T_base_lidar: {xyz_m: [0, 0, 0]}}]\n"), bag});
   EXPECT_FALSE(contains(lidar.run().out, "the lidar (velodyne)")) << lidar.run().out;

@@ -132,7 +132,7 @@ void expect_poses_of_room_drive(const Replay& replay, double error_m) {
   }
 }
 
-TEST(RecordedTimes, OfAClockThatWasSetContinueFromBefore) {
+TEST(RecordedTimes, TimesAfterAClockStepContinueFromBefore) {
   using std::chrono::seconds;
   for (const Duration step : std::initializer_list<Duration>{
            seconds{200'000'000}, -seconds{200'000'000}, std::chrono::hours{1}, -std::chrono::hours{1}, seconds{30},
@@ -148,7 +148,7 @@ TEST(RecordedTimes, OfAClockThatWasSetContinueFromBefore) {
   }
 }
 
-TEST(RecordedTimes, OfAClockThatWasSetDoNotMoveLidarAlone) {
+TEST(RecordedTimes, ClockStepDoesNotMoveLidarAlone) {
   for (const int step_s : {200'000'000, 3600, 1, -20}) {
     const TemporaryFolder folder;
     const auto change = set_by(std::chrono::seconds{step_s});
@@ -158,7 +158,7 @@ TEST(RecordedTimes, OfAClockThatWasSetDoNotMoveLidarAlone) {
   }
 }
 
-TEST(RecordedTimes, OfAClockThatWasSetTwiceAreSaidOnce) {
+TEST(RecordedTimes, ClockSetTwiceIsReportedOnce) {
   const auto once = set_by(std::chrono::hours{1});
   const Stamp start = Capture::open(room_drive() / "lidar.pcap")->next()->receive_stamp;
   const auto back = start + std::chrono::hours{1} + std::chrono::milliseconds{4600};
@@ -172,7 +172,7 @@ TEST(RecordedTimes, OfAClockThatWasSetTwiceAreSaidOnce) {
 }
 
 /// A source with a clock of its own, which nobody set.
-TEST(RecordedTimes, OfAnotherClockDoNotFollowTheOneThatWasSet) {
+TEST(RecordedTimes, TimesOfAnotherClockDoNotFollowAClockStep) {
   const RoomDriveWithTimes drive(set_by(std::chrono::hours{1}), unchanged(), set_by(std::chrono::hours{1}));
   const Replay replay({drive.folder()});
   expect_poses_of_room_drive(replay, 0.002);
@@ -180,7 +180,7 @@ TEST(RecordedTimes, OfAnotherClockDoNotFollowTheOneThatWasSet) {
             replay_with_own_times().summary()["sources"]["imu"]["used_sweeps"]);
 }
 
-TEST(RecordedTimes, OfASourceWhoseOwnClockWasSetContinueFromBefore) {
+TEST(RecordedTimes, TimesOfASourceContinueAfterItsClockStep) {
   for (const int step_s : {-3, -3600, 200'000'000}) {
     const RoomDriveWithTimes drive(unchanged(), set_by(std::chrono::seconds{step_s}), unchanged());
     const Replay replay({drive.folder()});
@@ -191,7 +191,7 @@ TEST(RecordedTimes, OfASourceWhoseOwnClockWasSetContinueFromBefore) {
 }
 
 /// The packets of 0.4 s arrive in a burst.
-TEST(RecordedTimes, OfDelayedPacketsAreNoStep) {
+TEST(RecordedTimes, DelayedPacketsAreNoClockStep) {
   const TemporaryFolder folder;
   const auto delayed = [](Stamp arrival, Duration since_start) {
     using std::chrono::milliseconds;
@@ -203,7 +203,7 @@ TEST(RecordedTimes, OfDelayedPacketsAreNoStep) {
   EXPECT_EQ(replay.trajectory().size(), expected().size());
 }
 
-TEST(RecordedTimes, OfTruthThatGoesBackAloneAreAnError) {
+TEST(RecordedTimes, TruthGoingBackAloneIsAnError) {
   const RoomDriveWithTimes drive(unchanged(), unchanged(), set_by(-std::chrono::seconds{3}));
   const Replay replay({drive.folder()});
   EXPECT_EQ(replay.run().status, 1);

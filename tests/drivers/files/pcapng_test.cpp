@@ -215,7 +215,7 @@ TEST(Pcapng, BlocksWithoutPacketsAreSkipped) {
   }
 }
 
-TEST(Pcapng, OfSectionsWithoutInterfaceIsCalledSo) {
+TEST(Pcapng, SectionsWithoutInterfaceAreReported) {
   PcapngFile file;
   file.add_block(0xBAD, Bytes(8));
   file.start_section(true);
