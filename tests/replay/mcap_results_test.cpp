@@ -135,6 +135,23 @@ TEST(McapInputs, ReplayWithoutTheOdometryOfTheService) {
   EXPECT_TRUE(read_text(again.file("odometry.tum")) == read_text(first.file("odometry.tum")));
 }
 
+/// A corrected cloud would be corrected a second time.
+TEST(McapInputs, CloudsOfTheServiceAreNoInput) {
+  const TemporaryFolder folder;
+  std::vector<RecordedMessage> messages;
+  for (const CloudTurn& turn : turns_of(room_drive() / "lidar.pcap")) {
+    const OwnCloud cloud = cloud_of(turn, CloudKind::velodyne);
+    messages.push_back({"/locus/cloud", type_of(cloud), turn.end(), cloud_message(cloud, RosVersion::ros2)});
+  }
+  std::ofstream{folder / "results.mcap", std::ios::binary} << mcap_file(messages, RosVersion::ros2);
+  const Replay refused({folder / "results.mcap"});
+  EXPECT_EQ(refused.run().status, 1);
+  EXPECT_TRUE(contains(refused.run().err, "but /locus/cloud (sensor_msgs/PointCloud2); record the lidar's packets"))
+      << refused.run().err;
+  const Replay named({"--duration", "1", "--set", "lidars.0.topic=/locus/cloud", folder / "results.mcap"});
+  EXPECT_EQ(named.run().status, 0) << named.run().err;
+}
+
 /// Another computer sends to the port of the lidar, from the first second on.
 TEST(McapInputs, LeaveOutThePacketsOfOtherSenders) {
   const TemporaryFolder folder;

@@ -14,12 +14,12 @@
 namespace locus::tools {
 namespace {
 
-/// Lists the topics of clouds, except those that locusd itself has published.
+/// Lists the topics of clouds, except the results of locusd.
 std::vector<std::size_t> cloud_topics(const BagSurvey& survey, const Config& config) {
   std::vector<std::size_t> indices;
   for (const auto& [index, unused] : survey.topics) {
     const BagTopic& topic = survey.bag->topics()[index];
-    if (is_cloud_type(topic.type) && topic.name != config.dds.prefix + "/cloud")
+    if (is_cloud_type(topic.type) && !are_results(topic, config))
       indices.push_back(index);
   }
   return indices;

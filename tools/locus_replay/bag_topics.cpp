@@ -130,8 +130,9 @@ void deal_clouds(const Bag& bag, const std::string& bag_name, const Config& conf
 }
 
 /// Describes how to use the clouds in a bag without packets; empty without any.
-std::string clouds_instead(const Topics& topics) {
-  const auto cloud = std::ranges::find_if(topics, [](const BagTopic& topic) { return is_cloud_type(topic.type); });
+std::string clouds_instead(const Topics& topics, const Config& config) {
+  const auto cloud = std::ranges::find_if(
+      topics, [&](const BagTopic& topic) { return is_cloud_type(topic.type) && !are_results(topic, config); });
   return cloud == topics.end() ? ""
                                : fmt::format("{} ({}) has clouds of a lidar; select them with --set lidars.0.topic={}",
                                              cloud->name, cloud->type, cloud->name);
@@ -143,8 +144,8 @@ Index first_of_packets(const Config& config) {
                                       : std::optional{static_cast<std::size_t>(found - config.lidars.begin())};
 }
 
-[[noreturn]] void fail_without_packets(const Topics& topics, const std::string& bag_name) {
-  const std::string instead = clouds_instead(topics);
+[[noreturn]] void fail_without_packets(const Topics& topics, const std::string& bag_name, const Config& config) {
+  const std::string instead = clouds_instead(topics, config);
   throw Failure(ExitStatus::failed,
                 instead.empty()
                     ? fmt::format("{}: no {} in it, but {}; record the lidar's packets, mostly on /velodyne_packets",
@@ -210,7 +211,7 @@ void deal_lidars(const Bag& bag, const std::string& bag_name, const Config& conf
     throw Failure(ExitStatus::wrong_usage, chosen.doubts.front());
   Dealer dealer(bag.topics(), are_lidar_packets);
   if (dealer.left() == 0 && !has_clouds)
-    fail_without_packets(bag.topics(), bag_name);
+    fail_without_packets(bag.topics(), bag_name, config);
   if (first && dealer.left() > 0)
     deal_packets(dealer, bag_name, config, *first, chosen);
   deal_ousters(bag.topics(), bag_name, config, chosen);
@@ -220,11 +221,12 @@ void deal_sources(const Bag& bag, const std::string& bag_name, const Config& con
                   const std::function<bool(SourceId)>& has_file, SourceKind kind, BagTopics& chosen) {
   const std::vector<MotionSource>& sources = config.motion_sources;
   const auto is_wanted = [&](std::size_t i) { return sources[i].kind == kind && !has_file(SourceId{i}); };
-  const std::string own = config.dds.prefix + "/odometry"; // published by locusd itself, an input only by name
-  const bool wants_own =
-      std::ranges::any_of(sources, [&](const MotionSource& source) { return is_same_topic(source.topic, own); });
+  const auto is_named_by_user = [&](const BagTopic& topic) {
+    return std::ranges::any_of(sources,
+                               [&](const MotionSource& source) { return is_same_topic(source.topic, topic.name); });
+  };
   Dealer dealer(bag.topics(), [&](const BagTopic& topic) {
-    return topic.type == type_of(kind) && (wants_own || !is_same_topic(topic.name, own));
+    return topic.type == type_of(kind) && (!are_results(topic, config) || is_named_by_user(topic));
   });
   std::vector<Index*> nameless;
   for (std::size_t i = 0; i < sources.size(); ++i) {
@@ -272,6 +274,11 @@ std::string describe(const Bag& bag, const std::string& bag_name, const Config& 
 } // namespace
 
 bool are_lidar_packets(const BagTopic& topic) { return packet_type(topic.type) != nullptr && !is_imu_of_ouster(topic); }
+
+bool are_results(const BagTopic& topic, const Config& config) {
+  return is_same_topic(topic.name, config.dds.prefix + "/odometry") ||
+         is_same_topic(topic.name, config.dds.prefix + "/cloud");
+}
 
 std::string_view namespace_of(std::string_view topic) { return topic.substr(0, topic.rfind('/') + 1); }
 

@@ -16,6 +16,8 @@ namespace locus::tools {
 
 /// Returns whether these are the packets of a lidar, and not of an Ouster's IMU.
 bool are_lidar_packets(const BagTopic& topic);
+/// Returns whether these are results of locusd: corrected clouds or its odometry, which are no inputs.
+bool are_results(const BagTopic& topic, const Config& config);
 /// Returns the part of a topic's name before its last word: "/ouster/" for "/ouster/lidar_packets".
 std::string_view namespace_of(std::string_view topic);
 
