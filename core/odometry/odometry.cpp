@@ -261,7 +261,7 @@ std::optional<SpecificForce> Odometry::force_of(const Sweep& sweep, std::bitset<
 }
 
 /// De-skews the points for a base that moved with mean twist `twist_base` since the last sweep. If sources are
-/// excluded, their motion within the sweep is removed. One that repeats its pose has none.
+/// excluded, their motion within the sweep is removed. A source that repeats its pose has none.
 void Odometry::correct(const Sweep& sweep, const Vector6& twist_base, std::bitset<kMaxSources> without) {
   without &= ~repeating_sources(sweep);
   move_points(sweep, without.any() ? SweepCorrection::constant(sweep, twist_base)
@@ -300,6 +300,23 @@ void Odometry::follow_lateness(const Learned& late_s, Duration& applied_lateness
     applied_lateness = MotionTrack::applied_lateness(std::clamp(late_s.mean, -kMostLate_s, kMostLate_s));
 }
 
+/// Stores where the robot was when each source last changed its pose. `returns`: lidar is registered again after dead
+/// reckoning, which moves the estimate, not the robot.
+void Odometry::store_changes(const Sweep& sweep, bool returns) {
+  constexpr double kRounding = 1e-7; ///< m and rad
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    const SourcePose& now = sweep.motion.sources[i];
+    std::optional<LastChange>& last = last_changes_[i];
+    if (!now.known)
+      continue;
+    const bool changed =
+        last && se3_log(last->T_source_base.inverse() * now.T_source_base).cwiseAbs().maxCoeff() > kRounding;
+    if (!last || changed || returns)
+      last = {now.T_source_base, filter_.pose().translation, filter_.covariance().topLeftCorner<3, 3>(),
+              changed || (last && last->is_known)};
+  }
+}
+
 /// Resets a source that was lost and returns with a new epoch, perhaps as another device. A sweep without a sample of
 /// it is no loss: scale and bias are unchanged.
 void Odometry::follow_epoch(SourceId source, const SourcePose& sensed) {
@@ -312,7 +329,7 @@ void Odometry::follow_epoch(SourceId source, const SourcePose& sensed) {
 }
 
 void Odometry::reset_source(SourceId source) {
-  changed_at_[index_of(source)].reset();
+  last_changes_[index_of(source)].reset();
   filter_.reset_source(source);
   rival_.reset();
   if (observer_)
@@ -363,6 +380,7 @@ void Odometry::finish(const Sweep& sweep, OdometryEstimate& estimate) {
   for (const auto& source : {estimate.prior.rotation, estimate.prior.translation})
     if (source)
       source_reports_[index_of(*source)].last_used = sweep.end;
+  const bool returns = !registered_ && !estimate.failed;
   registered_ = !estimate.failed;
   scan_is_next_target_ = registered_ && options_.scan_to_scan_mode == ScanToScanMode::always;
   tilt_keeper_.observe(estimate.T_odom_base.rotation, gravity_.up_base());
@@ -393,9 +411,7 @@ void Odometry::finish(const Sweep& sweep, OdometryEstimate& estimate) {
   if (observer_)
     observer_->set_pose(filter_.pose());
   report_sources(sweep, estimate);
-  for (std::size_t i = 0; i < sources_.size(); ++i)
-    if (steps_.twist_base(sweep, SourceId{i}) && !steps_.repeats(sweep, SourceId{i}))
-      changed_at_[i] = {filter_.pose().translation, filter_.covariance().topLeftCorner<3, 3>()};
+  store_changes(sweep, returns);
   steps_.store(sweep);
 }
 

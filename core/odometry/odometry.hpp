@@ -114,10 +114,12 @@ class Odometry {
     void enter(Rival other);
   };
 
-  /// A position in the odom frame.
-  struct Position {
-    Eigen::Vector3d mean_m;
+  /// The last change of the pose that an odometry reports, and the robot's position in the odom frame at that time.
+  struct LastChange {
+    Pose T_source_base;
+    Eigen::Vector3d position_m;
     Eigen::Matrix3d covariance;
+    bool is_known = false; ///< false: the odometry has reported one pose only
   };
 
   /// A source that contradicts all others.
@@ -150,7 +152,7 @@ class Odometry {
   void register_with(const Sweep& sweep, Hypothesis& hypothesis, const Gicp::StopRequested& stop);
   [[nodiscard]] static std::optional<SpecificForce> force_of(const Sweep& sweep, std::bitset<kMaxSources> without);
   [[nodiscard]] std::bitset<kMaxSources> repeating_sources(const Sweep& sweep) const;
-  [[nodiscard]] double odds_against_stuck(std::bitset<kMaxSources> repeating) const;
+  [[nodiscard]] std::optional<double> odds_against_stuck(std::bitset<kMaxSources> repeating) const;
   [[nodiscard]] double odds_of_sources(const Sweep& sweep, std::bitset<kMaxSources> without) const;
   [[nodiscard]] double prior_odds(const Sweep& sweep, const Hypothesis& hypothesis) const;
   [[nodiscard]] Rival against(const Hypothesis& best, const Sweep& sweep, Hypothesis other) const;
@@ -158,14 +160,16 @@ class Odometry {
   void continue_rival(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop);
   std::optional<Registration> consider_faults(const Sweep& sweep, Contest& contest, const Gicp::StopRequested& stop);
   [[nodiscard]] bool is_likelier(const Registration& at_rest, const Hypothesis& moving,
-                                 double odds_of_standstill) const;
+                                 std::optional<double> odds_against_stuck) const;
   std::optional<Hypothesis> consider_rest(const Sweep& sweep, const Hypothesis& moving,
                                           const Gicp::StopRequested& stop);
   Hypothesis attempt(const Sweep& sweep, const Assumption& assumption, const MotionFilter& last,
                      const Gicp::StopRequested& stop);
+  [[nodiscard]] Hypothesis dead_reckoned(const Sweep& sweep, const Hypothesis& hypothesis) const;
   Hypothesis choose(const Sweep& sweep, const Gicp::StopRequested& stop);
   void apply_sources(MotionFilter& filter, const Sweep& sweep, const Hypothesis& hypothesis) const;
   void observe(const Sweep& sweep, const Hypothesis& best);
+  void store_changes(const Sweep& sweep, bool returns);
   void follow_epoch(SourceId source, const SourcePose& sensed);
   void reset_source(SourceId source);
   void correct(const Sweep& sweep, const Vector6& twist_base, std::bitset<kMaxSources> without);
@@ -192,8 +196,8 @@ class Odometry {
   ObservedAxes observed_axes_;
   SensedSteps steps_;
   MotionFilter filter_;
-  std::array<std::optional<Position>, kMaxSources> changed_at_; ///< of the robot when each source last changed its pose
-  std::optional<Rival> rival_;                                  ///< its filter includes the update with lidar
+  std::array<std::optional<LastChange>, kMaxSources> last_changes_; ///< empty before the first pose of a source
+  std::optional<Rival> rival_;                                      ///< its filter includes the update with lidar
   std::optional<MotionFilter> observer_; ///< calibrates sources whose result is only reported, never used
   SweepCorrection correction_;           ///< de-skew of the current sweep
   std::vector<SurfacePoint> scan_;       ///< points of the current sweep, fully de-skewed

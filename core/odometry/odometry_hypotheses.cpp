@@ -38,6 +38,9 @@ constexpr double kAgrees_m = 0.01;
 /// more slips and costs more registrations (docs/decisions/053).
 constexpr double kSlipsFrom_mps2 = 2.0;
 
+/// Standard deviation of the way that moving objects lead the estimate of a robot that stands.
+constexpr double kAstray_m = 0.05;
+
 /// Tells whether a twist of zero is within three standard deviations of the prediction.
 bool may_rest(const MotionFilter& prediction) {
   constexpr double kSigmas = 3.0, kLeast = 1e-3; // m/s, rad/s
@@ -79,7 +82,7 @@ double Odometry::odds_of_sources(const Sweep& sweep, std::bitset<kMaxSources> wi
 
 /// Returns the prior odds of a hypothesis. A fault that continues is no less likely than none.
 double Odometry::prior_odds(const Sweep& sweep, const Hypothesis& hypothesis) const {
-  return odds_of_sources(sweep, hypothesis.continues ? std::bitset<kMaxSources>{} : hypothesis.without) -
+  return odds_of_sources(sweep, hypothesis.continues ? repeating_sources(sweep) : hypothesis.without) -
          (hypothesis.slips ? hypothesis.filter.odds_against_slip() : 0.0);
 }
 
@@ -92,17 +95,21 @@ std::bitset<kMaxSources> Odometry::repeating_sources(const Sweep& sweep) const {
   return repeating;
 }
 
-/// Returns the odds, as twice their logarithm, that sources which repeat their pose are not stuck: the lower, the
-/// farther the robot has moved since they changed it; even, if they never have.
-double Odometry::odds_against_stuck(std::bitset<kMaxSources> repeating) const {
+/// Returns the odds, as twice their logarithm, that an odometry which repeats its pose is not stuck; nothing if none
+/// repeats it. They are the lower, the farther the robot has moved since the last change, and even if the odometry has
+/// reported one pose only. The highest for several.
+std::optional<double> Odometry::odds_against_stuck(std::bitset<kMaxSources> repeating) const {
+  if (repeating.none())
+    return std::nullopt;
   double odds = 0.0;
   for (std::size_t i = 0; i < sources_.size(); ++i) {
-    if (!repeating[i] || !changed_at_[i])
+    if (!repeating[i] || !last_changes_[i] || !last_changes_[i]->is_known)
       continue;
-    const auto& [then_m, covariance_then] = *changed_at_[i];
-    const Eigen::Vector3d moved_m = filter_.pose().translation - then_m;
-    const Eigen::Matrix3d covariance = covariance_then + filter_.covariance().topLeftCorner<3, 3>();
-    odds += std::max(0.0, kSourceIsRight - moved_m.dot(covariance.ldlt().solve(moved_m)));
+    const LastChange& last = *last_changes_[i];
+    const Eigen::Vector3d moved_m = filter_.pose().translation - last.position_m;
+    const Eigen::Matrix3d covariance = last.covariance + filter_.covariance().topLeftCorner<3, 3>() +
+                                       kAstray_m * kAstray_m * Eigen::Matrix3d::Identity();
+    odds = std::max(odds, kSourceIsRight - moved_m.dot(covariance.ldlt().solve(moved_m)));
   }
   return odds;
 }
@@ -158,6 +165,7 @@ bool Odometry::may_slip(const Sweep& sweep, const SourceChoice& choice) const {
 std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Contest& contest,
                                                       const Gicp::StopRequested& stop) {
   const Hypothesis& best = contest.best;
+  const std::bitset<kMaxSources> repeating = repeating_sources(sweep);
   const auto contradiction = worst_source(sweep, best);
   const auto is_unusual = [&] { return lidar_health_.is_unusual(best.fit); };
   if (stop()) // a registration cut short fits badly for that reason alone
@@ -169,7 +177,7 @@ std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Contes
     return contradiction && source && index_of(*source) == contradiction->source;
   };
   if (may_slip(sweep, best.choice) || is_suspect(best.choice.translation))
-    try_out({.slips = true});
+    try_out({.without = repeating, .slips = true});
   if (!contradiction && !is_unusual())
     return std::nullopt;
   std::array<std::optional<SourceId>, 2> suspects{best.choice.translation, best.choice.rotation};
@@ -178,10 +186,10 @@ std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Contes
   if (is_suspect(suspects[1]))
     std::swap(suspects[0], suspects[1]);
   for (const std::optional<SourceId>& suspect : suspects) {
-    const bool is_explained = (best.slips || best.without.any()) && !is_unusual();
+    const bool is_explained = (best.slips || (best.without & ~repeating).any()) && !is_unusual();
     if (!suspect || is_explained || stop())
       continue;
-    Assumption assumption{.without = repeating_sources(sweep)};
+    Assumption assumption{.without = repeating};
     assumption.without.set(index_of(*suspect));
     try_out(assumption);
   }
@@ -198,11 +206,12 @@ std::optional<Registration> Odometry::consider_faults(const Sweep& sweep, Contes
 
 /// Tells whether a standstill is likelier than a motion. Where sources measure the motion, the odds are those of the
 /// points, of what the sources measure, and Occam's factor of the motion that a standstill spares.
-bool Odometry::is_likelier(const Registration& at_rest, const Hypothesis& moving, double odds_of_standstill) const {
-  if (!moving.choice.rotation && !moving.choice.translation && odds_of_standstill == 0.0)
+bool Odometry::is_likelier(const Registration& at_rest, const Hypothesis& moving,
+                           std::optional<double> odds_against_stuck) const {
+  if (!moving.choice.rotation && !moving.choice.translation && !odds_against_stuck)
     return fit_of(at_rest) > kAsGoodAtRest * fit_of(moving.fit);
   return evidence(at_rest, moving.fit) + moving.filter.surprise(moving.fit) - moving.filter.surprise_at_rest() +
-             (stands_ ? kStaysAtRest : 0.0) + odds_of_standstill >
+             (stands_ ? kStaysAtRest : 0.0) + odds_against_stuck.value_or(0.0) >
          0.0;
 }
 
@@ -217,8 +226,9 @@ std::optional<Odometry::Hypothesis> Odometry::consider_rest(const Sweep& sweep, 
   if (!slow)
     slow_since_ = sweep.end;
   const std::bitset<kMaxSources> repeating = repeating_sources(sweep);
-  const double odds = odds_against_stuck(repeating);
-  if (!may_rest(moving.filter) || (!stands_ && odds == 0.0 && sweep.end - slow_since_ < kSlowFor))
+  const std::optional<double> odds = odds_against_stuck(repeating);
+  if ((stop() && !stands_) || !may_rest(moving.filter) ||
+      (!stands_ && odds.value_or(0.0) == 0.0 && sweep.end - slow_since_ < kSlowFor))
     return std::nullopt;
   Hypothesis rest = attempt(sweep, {.without = moving.without & ~repeating, .rests = true}, filter_, stop);
   if (!is_likelier(rest.fit, moving, odds))
@@ -227,13 +237,21 @@ std::optional<Odometry::Hypothesis> Odometry::consider_rest(const Sweep& sweep, 
   return rest;
 }
 
+/// Returns a hypothesis with all odometries that repeat their pose: what a robot without lidar knows.
+Odometry::Hypothesis Odometry::dead_reckoned(const Sweep& sweep, const Hypothesis& hypothesis) const {
+  const std::bitset<kMaxSources> repeating = repeating_sources(sweep);
+  if ((hypothesis.without & repeating).none())
+    return hypothesis;
+  Hypothesis all = assume(sweep, {.without = hypothesis.without & ~repeating}, filter_);
+  all.scan_to_scan = hypothesis.scan_to_scan;
+  all.fit = hypothesis.fit;
+  return all;
+}
+
 /// Returns the likeliest hypothesis for a sweep. The next one stays as the rival, until a later sweep excludes either.
 Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopRequested& stop) {
   const std::bitset<kMaxSources> repeating = repeating_sources(sweep);
   Contest contest{attempt(sweep, {.without = repeating}, filter_, stop), std::nullopt};
-  const auto dead_reckoned = [&](Hypothesis hypothesis) {
-    return repeating.any() ? attempt(sweep, {}, filter_, stop) : std::move(hypothesis);
-  };
   if (sweep.points.size() >= kMinPoints)
     continue_rival(sweep, contest, stop);
   rival_.reset();
@@ -241,13 +259,13 @@ Odometry::Hypothesis Odometry::choose(const Sweep& sweep, const Gicp::StopReques
   gravity_.observe(filter_.pose().rotation.conjugate() * best.filter.pose().rotation, sweep);
   flat_ground_.observe(sweep.end, gravity_.up_base());
   if (sweep.points.size() < kMinPoints)
-    return dead_reckoned(std::move(best));
-  Hypothesis first = best;
+    return dead_reckoned(sweep, best);
+  Hypothesis first = dead_reckoned(sweep, best);
   const std::optional<Registration> lidar_alone = consider_faults(sweep, contest, stop);
   if (auto rest = consider_rest(sweep, best, stop))
     best = *std::move(rest);
   if (!best.rests && !is_accepted(sweep, lidar_alone.value_or(best.fit), first))
-    return dead_reckoned(std::move(first)); // not accepted: dead reckoning assumes no new fault
+    return first; // not accepted: dead reckoning assumes no new fault
   best.accepted = true;
   if (contest.rival) {
     rival_ = std::move(contest.rival);

@@ -40,9 +40,9 @@ class SensedSteps {
     return sources_[index_of(source)].usable && sweep.motion.sources[index_of(source)].usable &&
            twist_base(sweep, source);
   }
-  /// Returns whether a source repeats its pose to the last bit, as an odometry does at rest or when it is stuck.
+  /// Returns whether a source repeats its pose but for rounding, as an odometry does at rest or when it is stuck.
   [[nodiscard]] bool repeats(const Sweep& sweep, SourceId source) const {
-    constexpr double kRounding = 1e-9; ///< m/s and rad/s
+    constexpr double kRounding = 1e-6; ///< m/s and rad/s
     const auto sensed = twist_base(sweep, source);
     return sensed && sensed->mean.cwiseAbs().maxCoeff() < kRounding;
   }
