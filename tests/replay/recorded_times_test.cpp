@@ -148,6 +148,17 @@ TEST(RecordedTimes, TimesAfterAClockStepContinueFromBefore) {
   }
 }
 
+TEST(RecordedTimes, ClockStepBeforeThePartPlayedIsReportedOnce) {
+  const Replay sound({"--start", "5", RoomDriveWithTimes(unchanged()).folder()});
+  for (const int step_s : {200'000'000, -3600, -3}) {
+    const Replay replay({"--start", "5", RoomDriveWithTimes(set_by(std::chrono::seconds{step_s})).folder()});
+    ASSERT_EQ(replay.run().status, 0) << replay.run().err;
+    EXPECT_EQ(lines_of(replay.run().err).size(), 1U) << replay.run().err;
+    EXPECT_EQ(replay.trajectory().size(), sound.trajectory().size());
+    EXPECT_NEAR(replay.summary()["ape_m"]["max"], sound.summary()["ape_m"]["max"], 0.002);
+  }
+}
+
 TEST(RecordedTimes, ClockStepDoesNotMoveLidarAlone) {
   for (const int step_s : {200'000'000, 3600, 1, -20}) {
     const TemporaryFolder folder;

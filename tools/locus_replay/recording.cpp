@@ -92,9 +92,6 @@ Recording::Recording(std::unique_ptr<DatagramSource> source, std::vector<MotionR
     const std::size_t index = index_of(recording.source);
     const Duration earlier = index < options.earlier.size() ? options.earlier[index] : Duration{};
     motion_.push_back({std::move(recording), has_faults, earlier, ClockFollower(capture_start_), &source_->steps()});
-    MotionCursor& cursor = motion_.back();
-    while (cursor.arrival() < begin_ - kMotionAhead)
-      cursor.pop();
   }
 }
 
@@ -142,12 +139,24 @@ Input Recording::MotionCursor::pop() {
 Input Recording::next(Duration) {
   if (!pending_)
     pending_ = fetch();
+  if (!std::exchange(has_begun_, true))
+    skip_motion();
   const auto earliest = std::ranges::min_element(motion_, {}, &MotionCursor::arrival);
-  if (earliest != motion_.end() && earliest->arrival() <= pending_->arrival)
+  if (earliest != motion_.end() && earliest->arrival() <= pending_->arrival) {
+    earliest->is_used = true;
     return earliest->pop();
+  }
   Input input = pending_->input;
   pending_.reset();
   return input;
+}
+
+/// Skips the samples well before the part played. Steps of the clock before it are known by now.
+void Recording::skip_motion() {
+  for (MotionCursor& cursor : motion_) {
+    while (cursor.arrival() < begin_ - kMotionAhead)
+      cursor.pop();
+  }
 }
 
 /// Returns the next datagram of the part played, or nullptr from its end on.
@@ -237,7 +246,7 @@ std::vector<std::string> Recording::warnings() const {
                                      to_seconds(motion.clock.first_own_step().by),
                                      to_seconds(motion.clock.first_own_step().at.time_since_epoch())));
     const std::optional<TimeSpan> span = motion.arrivals();
-    if (started_ && !motion.has_faults && (!span || span->last < first_ || span->first > last_))
+    if (started_ && !motion.has_faults && !motion.is_used)
       warnings.push_back(fmt::format("{}: its samples ({}) and the packets ({}) have no time in common, so nothing of "
                                      "it was used; name a file that was recorded with them, by the same clock",
                                      motion.recording.file.string(), text_of(span), text_of(TimeSpan{first_, last_})));

@@ -93,6 +93,7 @@ class Recording : public daemon::InputSource {
     Duration earlier{};
     ClockFollower clock{};
     const std::vector<ClockStep>* steps;
+    bool is_used = false; ///< a sample has been returned
 
     [[nodiscard]] Stamp arrival() const; ///< arrival of the next sample; Stamp::max() after the last
     [[nodiscard]] std::optional<TimeSpan> arrivals() const;
@@ -102,6 +103,7 @@ class Recording : public daemon::InputSource {
   const Datagram* read();
   void note(const Datagram& datagram);
   void note_traffic(const Datagram& datagram);
+  void skip_motion();
   Pending fetch();
 
   LidarRouter lidars_; ///< for look-ups only
@@ -111,6 +113,7 @@ class Recording : public daemon::InputSource {
   const Datagram* head_; ///< read ahead, to find the start of the capture
   Stamp capture_start_;
   Stamp begin_, end_; ///< of the part played
+  bool has_begun_ = false;
   bool capture_is_over_ = false;
   std::vector<Fault> injected_;
   std::optional<DatagramFaults> faults_;
