@@ -312,8 +312,7 @@ void Odometry::store_changes(const Sweep& sweep, bool returns) {
     const bool changed =
         last && se3_log(last->T_source_base.inverse() * now.T_source_base).cwiseAbs().maxCoeff() > kRounding;
     if (!last || changed || returns)
-      last = {now.T_source_base, filter_.pose().translation, filter_.covariance().topLeftCorner<3, 3>(),
-              changed || (last && last->is_known)};
+      last = {now.T_source_base, filter_.pose().translation, filter_.covariance().topLeftCorner<3, 3>()};
   }
 }
 

@@ -119,7 +119,6 @@ class Odometry {
     Pose T_source_base;
     Eigen::Vector3d position_m;
     Eigen::Matrix3d covariance;
-    bool is_known = false; ///< false: the odometry has reported one pose only
   };
 
   /// A source that contradicts all others.

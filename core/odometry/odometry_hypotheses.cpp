@@ -96,20 +96,22 @@ std::bitset<kMaxSources> Odometry::repeating_sources(const Sweep& sweep) const {
 }
 
 /// Returns the odds, as twice their logarithm, that an odometry which repeats its pose is not stuck; nothing if none
-/// repeats it. They are the lower, the farther the robot has moved since the last change, and even if the odometry has
-/// reported one pose only. The highest for several.
+/// repeats it. They are the lower, the farther the robot has moved since the last change. The highest for several.
 std::optional<double> Odometry::odds_against_stuck(std::bitset<kMaxSources> repeating) const {
   if (repeating.none())
     return std::nullopt;
   double odds = 0.0;
   for (std::size_t i = 0; i < sources_.size(); ++i) {
-    if (!repeating[i] || !last_changes_[i] || !last_changes_[i]->is_known)
+    if (!repeating[i])
       continue;
-    const LastChange& last = *last_changes_[i];
-    const Eigen::Vector3d moved_m = filter_.pose().translation - last.position_m;
-    const Eigen::Matrix3d covariance = last.covariance + filter_.covariance().topLeftCorner<3, 3>() +
-                                       kAstray_m * kAstray_m * Eigen::Matrix3d::Identity();
-    odds = std::max(odds, kSourceIsRight - moved_m.dot(covariance.ldlt().solve(moved_m)));
+    double moved2 = 0.0; // squared Mahalanobis distance
+    if (const std::optional<LastChange>& last = last_changes_[i]) {
+      const Eigen::Vector3d moved_m = filter_.pose().translation - last->position_m;
+      const Eigen::Matrix3d covariance = last->covariance + filter_.covariance().topLeftCorner<3, 3>() +
+                                         kAstray_m * kAstray_m * Eigen::Matrix3d::Identity();
+      moved2 = moved_m.dot(covariance.ldlt().solve(moved_m));
+    }
+    odds = std::max(odds, kSourceIsRight - moved2);
   }
   return odds;
 }

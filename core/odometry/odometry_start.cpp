@@ -195,7 +195,7 @@ Odometry::Start Odometry::start_without(std::bitset<kMaxSources> without, const 
     if (difference(T_odom_base, T_before).cwiseAbs().maxCoeff() < kAgrees || stop())
       break;
   }
-  if (evidence(rest, start.fit) > -kBeginsAtRest)
+  if (evidence(rest, start.fit) + odds_against_stuck(repeating_sources(sweep)).value_or(0.0) > -kBeginsAtRest)
     start = {.without = kAllSources, .rests = true, .twist_base = Vector6::Zero(), .fit = rest};
   return start;
 }
