@@ -140,8 +140,8 @@ TEST_F(Mountings, FileSetsTheMountingsThatItNames) {
 /// A tree without the base, such as that of a lidar's driver alone.
 TEST_F(Mountings, ImuOfALidarThatIsTheBaseIsMountedOnIt) {
   const Replay replay({bag_with({{"sensor", "velodyne", kMast}, {"sensor", "imu_link", kMast * kTurned}})});
-  EXPECT_TRUE(contains(output_of(replay), "does not say where the lidar (velodyne) sits on base_link, so poses are "
-                                          "those of the lidar"));
+  EXPECT_TRUE(contains(output_of(replay),
+                       "has no mounting of the lidar (velodyne) on base_link, so poses are those of the lidar"));
   EXPECT_TRUE(contains(replay.run().out,
                        "imu (imu_link) is mounted at 0.100 0.000 0.050 m, 90.0 0.0 0.0 deg on velodyne, "
                        "by /tf_static\n"))
