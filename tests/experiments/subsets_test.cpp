@@ -53,7 +53,7 @@ TEST(Subsets, EveryPartOfARecordingIsMeasuredInEveryView) {
   EXPECT_LT(part(rows[0], "all")["mean_m"].get<double>(), part(rows[0], "wio alone")["mean_m"].get<double>());
   EXPECT_NE(part(rows[0], "lidar")["mean_m"], part(rows[2], "lidar")["mean_m"]) << "fewer returns";
   const std::string page = read_text(folder / "out/subsets.md");
-  EXPECT_NE(page.find("Of 3 drives and views "), std::string::npos) << page;
+  EXPECT_NE(page.find("Of 3 drives and views, "), std::string::npos) << page;
   EXPECT_NE(page.find("Skipped, because they have no truth: untrue.\n"), std::string::npos) << page;
 }
 
