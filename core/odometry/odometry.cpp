@@ -261,7 +261,7 @@ std::optional<SpecificForce> Odometry::force_of(const Sweep& sweep, std::bitset<
 }
 
 /// De-skews the points for a base that moved with mean twist `twist_base` since the last sweep. If sources are
-/// excluded, their motion within the sweep is removed. A source that repeats its pose has none.
+/// excluded, their motion within the sweep is removed, unless they repeat their pose: then there is none.
 void Odometry::correct(const Sweep& sweep, const Vector6& twist_base, std::bitset<kMaxSources> without) {
   without &= ~repeating_sources(sweep);
   move_points(sweep, without.any() ? SweepCorrection::constant(sweep, twist_base)

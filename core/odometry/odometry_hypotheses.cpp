@@ -38,8 +38,9 @@ constexpr double kAgrees_m = 0.01;
 /// more slips and costs more registrations (docs/decisions/053).
 constexpr double kSlipsFrom_mps2 = 2.0;
 
-/// Standard deviation of the way that moving objects lead the estimate of a robot that stands.
-constexpr double kAstray_m = 0.05;
+/// Standard deviation of the shift that moving objects cause in the position of a robot that stands (chosen, not
+/// measured: docs/decisions/054).
+constexpr double kShiftByObjects_m = 0.05;
 
 /// Tells whether a twist of zero is within three standard deviations of the prediction.
 bool may_rest(const MotionFilter& prediction) {
@@ -108,7 +109,7 @@ std::optional<double> Odometry::odds_against_stuck(std::bitset<kMaxSources> repe
     if (const std::optional<LastChange>& last = last_changes_[i]) {
       const Eigen::Vector3d moved_m = filter_.pose().translation - last->position_m;
       const Eigen::Matrix3d covariance = last->covariance + filter_.covariance().topLeftCorner<3, 3>() +
-                                         kAstray_m * kAstray_m * Eigen::Matrix3d::Identity();
+                                         kShiftByObjects_m * kShiftByObjects_m * Eigen::Matrix3d::Identity();
       moved2 = moved_m.dot(covariance.ldlt().solve(moved_m));
     }
     odds = std::max(odds, kSourceIsRight - moved2);
@@ -230,7 +231,7 @@ std::optional<Odometry::Hypothesis> Odometry::consider_rest(const Sweep& sweep, 
   const std::bitset<kMaxSources> repeating = repeating_sources(sweep);
   const std::optional<double> odds = odds_against_stuck(repeating);
   if ((stop() && !stands_) || !may_rest(moving.filter) ||
-      (!stands_ && odds.value_or(0.0) == 0.0 && sweep.end - slow_since_ < kSlowFor))
+      (!stands_ && odds.value_or(0.0) <= 0.0 && sweep.end - slow_since_ < kSlowFor))
     return std::nullopt;
   Hypothesis rest = attempt(sweep, {.without = moving.without & ~repeating, .rests = true}, filter_, stop);
   if (!is_likelier(rest.fit, moving, odds))
