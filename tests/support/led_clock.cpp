@@ -3,8 +3,9 @@
 // share the file LED_CLOCK (led_clock.hpp). Time stands still from the player's first read of the wall clock until it
 // exits. Each sleep of the player returns at once and advances the time by its length, after the service has processed
 // everything sent before. Datagrams and samples thus arrive at their recorded times by the service's clock, however
-// busy the computer is. Real waits such as timeouts take real time. The DDS library uses the system's clocks, except
-// for the wall clock.
+// busy the computer is. Real waits such as timeouts take real time. Cyclone DDS uses the system's clocks, except for
+// the wall clock: its own functions of time are replaced, since calls of those of the C library reach this one from the
+// interceptors of a sanitizer, which hide the caller.
 #include "support/led_clock.hpp"
 
 #include <algorithm>
@@ -14,11 +15,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
 #include <string_view>
 
 #include <dlfcn.h>
 #include <fcntl.h>
-#include <link.h>
 #include <poll.h>
 #include <pthread.h>
 #include <semaphore.h>
@@ -49,33 +50,6 @@ std::int64_t system_ns(clockid_t clock) {
   return ns_of(time);
 }
 
-/// Address range of a mapped program or library.
-struct Range {
-  std::uintptr_t begin = 0, end = 0;
-  [[nodiscard]] bool holds(const void* address) const {
-    const auto at = reinterpret_cast<std::uintptr_t>(address);
-    return at >= begin && at < end;
-  }
-};
-Range program_range, dds_range;
-
-int note_range(dl_phdr_info* info, std::size_t /*size*/, void* first) {
-  Range range{~std::uintptr_t{0}, 0};
-  for (int i = 0; i < info->dlpi_phnum; ++i) {
-    const ElfW(Phdr)& part = info->dlpi_phdr[i];
-    if (part.p_type != PT_LOAD)
-      continue;
-    range.begin = std::min<std::uintptr_t>(range.begin, info->dlpi_addr + part.p_vaddr);
-    range.end = std::max<std::uintptr_t>(range.end, info->dlpi_addr + part.p_vaddr + part.p_memsz);
-  }
-  if (*static_cast<bool*>(first))
-    program_range = range;
-  else if (std::string_view(info->dlpi_name).find("libddsc") != std::string_view::npos)
-    dds_range = range;
-  *static_cast<bool*>(first) = false;
-  return 0;
-}
-
 // Ingest thread of the service; counts go on where those of a process before it ended.
 std::uint64_t received_datagrams = 0;
 std::atomic<std::uint64_t> pushed_motion{0}; ///< any thread
@@ -86,8 +60,6 @@ LedTime nobodys_time;
 LedTime* led = &nobodys_time;
 
 __attribute__((constructor)) void begin() {
-  bool first = true;
-  dl_iterate_phdr(note_range, &first);
   const char* const name = std::getenv("LED_CLOCK"); // NOLINT(concurrency-mt-unsafe)
   const int file = name != nullptr ? open(name, O_RDWR | O_CLOEXEC) : -1;
   if (file < 0)
@@ -182,12 +154,10 @@ bool is_ingest() {
 extern "C" {
 
 int clock_gettime(clockid_t clock, timespec* time) noexcept {
-  const void* const caller = __builtin_return_address(0);
-  if (leads && is_wall(clock) && program_range.holds(caller) && led->is_led.load() == 0)
+  if (leads && is_wall(clock) && led->is_led.load() == 0)
     take_over();
-  const bool goes_by_system =
-      !is_wall(clock) && (dds_range.holds(caller) || (!is_monotonic(clock) && clock != CLOCK_BOOTTIME));
-  *time = to_timespec(goes_by_system ? system_ns(clock) : led_ns(clock));
+  const bool is_led = is_wall(clock) || is_monotonic(clock) || clock == CLOCK_BOOTTIME;
+  *time = to_timespec(is_led ? led_ns(clock) : system_ns(clock));
   return 0;
 }
 
@@ -196,7 +166,7 @@ int clock_gettime(clockid_t clock, timespec* time) noexcept {
 int nanosleep(const timespec* duration, timespec* left) {
   static auto* const kNext = next<int(const timespec*, timespec*)>("nanosleep");
   constexpr timespec kPause{0, 500'000};
-  if (led->is_led.load() == 0 || !program_range.holds(__builtin_return_address(0)))
+  if (led->is_led.load() == 0)
     return kNext(duration, left);
   if (!leads)
     return kNext(gettid() == getpid() ? &kPause : duration, left);
@@ -209,19 +179,42 @@ int nanosleep(const timespec* duration, timespec* left) {
 ssize_t sendto(int socket, const void* bytes, size_t size, int flags, const sockaddr* to, socklen_t to_size) {
   static auto* const kNext = next<ssize_t(int, const void*, size_t, int, const sockaddr*, socklen_t)>("sendto");
   const ssize_t sent = kNext(socket, bytes, size, flags, to, to_size);
-  sent_datagrams += leads && sent >= 0 && program_range.holds(__builtin_return_address(0)) ? 1U : 0U;
+  sent_datagrams += leads && sent >= 0 ? 1U : 0U;
   return sent;
 }
 
-/// Intercepts the histories of Cyclone DDS: since the time of the service does not wait for its subscribers, what they
-/// have not yet acknowledged stays, but for topics of which the latest alone matters.
+// Cyclone DDS, whose functions of time have a structure of one integer as their result.
+
+std::int64_t dds_time() { return led_ns(CLOCK_REALTIME); }
+std::int64_t ddsrt_time_wallclock() { return led_ns(CLOCK_REALTIME); }
+std::int64_t ddsrt_time_monotonic() { return system_ns(CLOCK_MONOTONIC); }
+std::int64_t ddsrt_time_elapsed() { return system_ns(CLOCK_MONOTONIC); }
+
+void dds_sleepfor(std::int64_t ns) {
+  static auto* const kSleep = next<int(const timespec*, timespec*)>("nanosleep");
+  timespec left = to_timespec(ns);
+  while (kSleep(&left, &left) != 0 && errno == EINTR) {
+  }
+}
+
+/// Waits until a wall-clock time; false if it has come. Calls by name, which a sanitizer that follows locks observes.
+bool ddsrt_cond_waituntil(pthread_cond_t* condition, pthread_mutex_t* mutex, std::int64_t until_ns) {
+  constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
+  if (until_ns == kNever)
+    return pthread_cond_wait(condition, mutex) == 0;
+  const timespec until = to_timespec(until_ns);
+  return pthread_cond_clockwait(condition, mutex, CLOCK_REALTIME, &until) != ETIMEDOUT;
+}
+
+/// Intercepts the histories: since the time of the service does not wait for its subscribers, what they have not yet
+/// acknowledged stays, but for topics of which the latest alone matters.
 void dds_qset_history(void* qos, int kind, std::int32_t depth) {
   static auto* const kNext = next<void(void*, int, std::int32_t)>("dds_qset_history");
   constexpr std::int32_t kFew = 5, kAll = 10'000;
   kNext(qos, kind, depth > kFew ? kAll : depth);
 }
 
-/// Intercepts Cyclone DDS.
+/// Counts the player's samples.
 std::int32_t dds_write(std::int32_t writer, const void* data) {
   static auto* const kNext = next<std::int32_t(std::int32_t, const void*)>("dds_write");
   const std::int32_t result = kNext(writer, data);
@@ -286,10 +279,6 @@ int pthread_cond_clockwait(pthread_cond_t* condition, pthread_mutex_t* mutex, cl
       next<int(pthread_cond_t*, pthread_mutex_t*, clockid_t, const timespec*)>("pthread_cond_clockwait");
   const timespec end = to_timespec(system_ns(CLOCK_MONOTONIC) + ns_of(*until) - led_ns(clock));
   return kNext(condition, mutex, CLOCK_MONOTONIC, &end);
-}
-
-int pthread_cond_timedwait(pthread_cond_t* condition, pthread_mutex_t* mutex, const timespec* until) {
-  return pthread_cond_clockwait(condition, mutex, CLOCK_REALTIME, until);
 }
 
 } // extern "C"
