@@ -11,7 +11,6 @@ namespace locus::tools {
 namespace {
 
 constexpr Duration kLongestStep = std::chrono::seconds{1}; ///< between consecutive packets
-constexpr Duration kLookAhead = std::chrono::milliseconds{500};
 
 bool has_bytes(const Datagram& datagram) { return datagram.decoded == nullptr && datagram.cloud == nullptr; }
 
@@ -53,9 +52,10 @@ std::optional<RecordedTimes::LidarClock> RecordedTimes::open_clock() const {
 
 /// Reads the first packets and decides whose clock gives their arrival times.
 void RecordedTimes::look_ahead() {
+  constexpr Duration kSpan = std::chrono::milliseconds{500};
   constexpr std::size_t kMostStored = 4'000;
   std::optional<LidarClock> clock = open_clock();
-  while (clock && stored_.size() < kMostStored && clock->elapsed() < kLookAhead) {
+  while (clock && stored_.size() < kMostStored && clock->elapsed() < kSpan) {
     const Datagram* const datagram = source_->next();
     if (datagram == nullptr)
       break;
