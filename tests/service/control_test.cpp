@@ -88,7 +88,7 @@ void expect_watch_ends(const std::vector<std::string>& command, const std::strin
 TEST_F(Control, WatchFillsATerminalOf80By24AndRestoresIt) {
   Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
-  const Child play({LOCUS_PLAY, capture().string()});
+  const Child play(endlessly(capture()));
   ASSERT_TRUE(daemon.wait_for_line("tracking"));
   expect_watch_ends(watch(), "q");
   expect_watch_ends(watch(), "\x03");
@@ -300,7 +300,7 @@ TEST_F(Control, GroupMembersControlAnInstanceByItsName) {
 TEST_F(Control, SensorsNeedsNeitherServiceNorPrivilege) {
   if (geteuid() != 0)
     GTEST_SKIP() << "no second user to be: run as root";
-  const Child play({LOCUS_PLAY, capture().string()});
+  const Child play(endlessly(capture()));
   ASSERT_TRUE(play.wait_for_line("has no subscriber")) << "it waits for a service, and then sends";
   const ProgramRun sensors = as_nobody("--clear-groups", {"sensors"});
   EXPECT_EQ(sensors.status, 0) << sensors.err;

@@ -40,7 +40,7 @@ TEST_F(EndToEnd, LiveOdometryEqualsTheReplayForCycloneAndFastDds) {
   Child fast_dds({FAST_DDS_PEER, "0", "listen", "/locus"});
   ASSERT_TRUE(hears_the_service(cyclone) && hears_the_service(fast_dds));
   Child play(leading_play({capture.string()}));
-  ASSERT_EQ(play.wait_for_exit(seconds{200}), 0) << testing::PrintToString(play.lines());
+  ASSERT_EQ(play.wait_for_exit(patience_of_a_drive()), 0) << testing::PrintToString(play.lines());
   const nlohmann::json status =
       status_when([](const nlohmann::json& s) { return s["lidars"].front()["heard_ms_ago"] > 300; });
   EXPECT_EQ(status["sweeps"]["dropped"], 0);

@@ -278,7 +278,7 @@ TEST_F(Frames, OfADriveFollowRep103AndRep105) {
   Listener listener(*node);
   ASSERT_TRUE(listener.hears_the_service());
   Child play(leading_play({capture().string()}));
-  ASSERT_EQ(play.wait_for_exit(seconds{200}), 0) << testing::PrintToString(play.lines());
+  ASSERT_EQ(play.wait_for_exit(patience_of_a_drive()), 0) << testing::PrintToString(play.lines());
   std::this_thread::sleep_for(milliseconds{500});
   listener.end();
 

@@ -98,12 +98,12 @@ class Incident : public RobotNetwork {
     return config;
   }
 
-  void start(const std::string& record) { start(locusd(with(record)), {LOCUS_PLAY, plant().string()}); }
-  /// Starts a service on a clock that the player moves, and that stands still after 14 of the 20 seconds.
-  void start_led(const std::string& record) {
-    const std::vector<std::string> service = led_locusd(with(record));
-    led_time().hold_at_ns = Duration{seconds{14}}.count();
-    start(service, leading_play({plant().string()}));
+  void start(const std::string& record) { start(locusd(with(record)), endlessly(plant())); }
+  /// Starts a service on a clock that the player moves, and that stands still at a time of the drive.
+  void start_led(const std::string& record, Duration until, const std::vector<std::string>& drive) {
+    led_service_ = led_locusd(with(record));
+    led_time().hold_at_ns = until.count();
+    start(led_service_, leading_play(drive));
   }
   void start(std::vector<std::string> service, std::vector<std::string> player) {
     daemon_.emplace(std::move(service));
@@ -151,7 +151,7 @@ class Incident : public RobotNetwork {
 
   /// Requests an incident in mid-drive, and replays the recording after the drive.
   void keep_and_replay(const std::string& record, const std::function<void(const Replay&)>& judge) {
-    ASSERT_NO_FATAL_FAILURE(start_led(record));
+    ASSERT_NO_FATAL_FAILURE(start_led(record, seconds{14}, {plant().string()}));
     ASSERT_TRUE(is_held());
     const ProgramRun kept = ctl({"record", "--keep", "8s"});
     ASSERT_EQ(kept.status, 0) << kept.err;
@@ -167,7 +167,7 @@ class Incident : public RobotNetwork {
     EXPECT_TRUE(why["status"].contains("pose"));
     EXPECT_FALSE(why["version"].get<std::string>().empty());
     led_time().hold_at_ns = 0;
-    ASSERT_EQ(play_->wait_for_exit(seconds{200}), 0) << testing::PrintToString(play_->lines());
+    ASSERT_EQ(play_->wait_for_exit(patience_of_a_drive()), 0) << testing::PrintToString(play_->lines());
     daemon_->signal(SIGTERM);
     ASSERT_EQ(daemon_->wait_for_exit(), 0);
     EXPECT_FALSE(std::filesystem::exists(file("run/input-ring")));
@@ -177,14 +177,22 @@ class Incident : public RobotNetwork {
     std::filesystem::remove(file("state"));
   }
 
+  /// Waits until the runtime folder has this many data packets.
+  [[nodiscard]] bool is_stored(std::uint64_t packets) const {
+    return comes_true([&] { return bytes_in(file("run/input-ring")) > packets * velodyne::kDataPacketBytes; });
+  }
+
   /// Kills the service in mid-drive, restarts it, and replays the recording of the crashed process.
   void crash_and_replay(const std::function<void(const Replay&, const std::vector<HeardPose>&)>& judge) {
-    ASSERT_NO_FATAL_FAILURE(start("keep_s: 10"));
-    ASSERT_TRUE(has_driven(0.3));
+    ASSERT_NO_FATAL_FAILURE(start_led("keep_s: 10", seconds{6}, {plant().string()}));
+    ASSERT_TRUE(is_held());
+    const auto data = status()["packets"]["total"]["data"].get<std::uint64_t>();
+    ASSERT_TRUE(is_stored(data));
+    ASSERT_TRUE(comes_true([&] { return heard(*listener_).size() > 50; }));
     daemon_->signal(SIGKILL);
     ASSERT_TRUE(daemon_->wait_for_exit());
     const std::vector<HeardPose> live = heard(*listener_);
-    daemon_.emplace(locusd(with("keep_s: 10")));
+    daemon_.emplace(led_service_);
     ASSERT_TRUE(daemon_->wait_for_line("the latest input is stored in")) << testing::PrintToString(daemon_->lines());
     const std::vector<path> kept = folders_in(file("incidents"));
     ASSERT_EQ(kept.size(), 1U);
@@ -197,6 +205,7 @@ class Incident : public RobotNetwork {
     judge(replay, live);
   }
 
+  std::vector<std::string> led_service_;
   std::optional<Child> daemon_, listener_, play_;
 };
 
@@ -273,20 +282,24 @@ TEST_F(Incident, NeedsATmpfsThatIsLargeEnough) {
 TEST_F(Incident, CrashStoresAnIncidentAndAStopDoesNot) {
   ASSERT_NO_FATAL_FAILURE(
       crash_and_replay([](const Replay& replay, const auto& /*live*/) { EXPECT_GT(replay.trajectory().size(), 30U); }));
+  ASSERT_TRUE(status_comes([](const nlohmann::json& now) {
+    return std::ranges::all_of(now["sources"], [](const auto& source) { return source["writers"] == 1; });
+  }));
+  led_time().hold_at_ns = Duration{seconds{8}}.count();
+  ASSERT_TRUE(is_held() && is_stored(100));
   daemon_->signal(SIGKILL);
   ASSERT_TRUE(daemon_->wait_for_exit());
-  daemon_.emplace(locusd(with("keep_s: 10")));
+  daemon_.emplace(led_service_);
   ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
   EXPECT_TRUE(comes_true([this] { return incidents_of_status()["suppressed"] == 1; }));
   daemon_->signal(SIGTERM);
   ASSERT_EQ(daemon_->wait_for_exit(), 0);
-  daemon_.emplace(locusd(with("keep_s: 10")));
+  daemon_.emplace(led_service_);
   ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
   EXPECT_EQ(incidents_of_status()["suppressed"], 0);
   EXPECT_EQ(folders_in(file("incidents")).size(), 1U);
 }
 
-/// Requires a machine on which the service drops no sweep.
 TEST_F(Incident, CrashReplaysToTheSameEstimate) {
   ASSERT_NO_FATAL_FAILURE(crash_and_replay(
       [](const Replay& replay, const std::vector<HeardPose>& live) { expect_same_estimates(replay, live, 45); }));
@@ -298,9 +311,7 @@ TEST_F(Incident, LossOfTrackingStoresAnIncident) {
   const ProgramRun sim = run_program(LOCUS_SIM, {"--world", "urban", "--robot", "husky", "--duration", "12", "--seed",
                                                  "3", "--realism", "clean", "-o", robot.string()});
   ASSERT_EQ(sim.status, 0) << sim.err;
-  daemon_.emplace(locusd(with("keep_s: 10")));
-  ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
-  play_.emplace(std::vector<std::string>{LOCUS_PLAY, "--fail", "all-lidars:lost@5-12", robot.string()});
+  ASSERT_NO_FATAL_FAILURE(start_led("keep_s: 10", seconds{7}, {"--fail", "all-lidars:lost@5-12", robot.string()}));
   ASSERT_TRUE(daemon_->wait_for_line("the latest input is stored in")) << testing::PrintToString(daemon_->lines());
   const std::vector<path> kept = folders_in(file("incidents"));
   ASSERT_EQ(kept.size(), 1U);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
 
 #include "drivers/files/capture.hpp"
 #include "drivers/velodyne/model.hpp"
@@ -50,10 +51,13 @@ class LidarNetwork : public RobotNetwork {
     at_lidar("ip route add default dev eth0 src 10.9.0.201");
   }
 
+  /// Returns the command that runs a player at the lidar.
+  [[nodiscard]] std::vector<std::string> player_at_lidar(std::vector<std::string> player) const {
+    player.insert(player.begin(), {"/usr/bin/nsenter", "-t", std::to_string(lidar_->pid()), "-n"});
+    return player;
+  }
   [[nodiscard]] std::vector<std::string> play(const std::string& to) const {
-    return {
-        "/usr/bin/nsenter", "-t", std::to_string(lidar_->pid()), "-n", LOCUS_PLAY, "--interface", "eth0", "--to", to,
-        capture().string()};
+    return player_at_lidar({LOCUS_PLAY, "--interface", "eth0", "--to", to, capture().string()});
   }
   [[nodiscard]] std::vector<std::string> play_endlessly(const std::string& to) const {
     std::vector<std::string> command = play(to);
@@ -70,12 +74,25 @@ class LidarNetwork : public RobotNetwork {
     });
   }
 
-  /// Expects one second of packets to arrive without loss.
+  /// Returns the configuration of the capture without motion sources, whose topics do not reach the lidar's host.
+  [[nodiscard]] std::filesystem::path lidar_alone(const std::string& multicast_ip = "") const {
+    YAML::Node config = YAML::LoadFile(this->config().string());
+    config["motion_sources"] = YAML::Node(YAML::NodeType::Sequence);
+    if (!multicast_ip.empty())
+      config["lidars"][0]["multicast_ip"] = multicast_ip;
+    std::filesystem::create_directory(file("lidar_alone"));
+    std::ofstream{file("lidar_alone/config.yaml")} << config;
+    std::filesystem::copy_file(capture() / "lidar.pcap", file("lidar_alone/lidar.pcap"),
+                               std::filesystem::copy_options::overwrite_existing);
+    return file("lidar_alone/config.yaml");
+  }
+
+  /// Expects the service, which is led, to receive each packet of the drive of lidar_alone().
   void expect_heard(const std::string& to) const {
-    const std::uint64_t before = data_packets();
-    const Child lidar(play(to));
-    EXPECT_TRUE(comes_since(before, [](const json&) { return true; })) << to;
-    const json status = this->status();
+    Child lidar(player_at_lidar(leading_play({"--interface", "eth0", "--to", to, file("lidar_alone").string()})));
+    ASSERT_EQ(lidar.wait_for_exit(patience_of_a_drive()), 0) << to << testing::PrintToString(lidar.lines());
+    const std::uint64_t sent = datagrams_in(capture() / "lidar.pcap");
+    const json status = status_when([&](const json& s) { return s["packets"]["total"]["received"] == sent; });
     EXPECT_EQ(status["packets"]["total"]["lost"], 0) << to;
     EXPECT_EQ(status["lidars"]["front"]["source_ip"], "10.9.0.201") << to;
     EXPECT_EQ(status["lidars"]["front"]["model"], "VLP-16") << to;
@@ -87,7 +104,7 @@ class LidarNetwork : public RobotNetwork {
 
 TEST_F(LidarNetwork, UnicastIsReceived) {
   lay_cable();
-  const Child daemon(locusd(config()));
+  const Child daemon(led_locusd(lidar_alone()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   expect_heard("10.9.0.1");
 }
@@ -95,7 +112,7 @@ TEST_F(LidarNetwork, UnicastIsReceived) {
 TEST_F(LidarNetwork, BroadcastToTheNetworkAndToAllIsReceived) {
   for (const char* to : {"10.9.0.255", "255.255.255.255"}) {
     lay_cable();
-    const Child daemon(locusd(config()));
+    const Child daemon(led_locusd(lidar_alone()));
     ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
     expect_heard(to);
     here("ip link del lidar0");
@@ -104,12 +121,14 @@ TEST_F(LidarNetwork, BroadcastToTheNetworkAndToAllIsReceived) {
 
 /// The network appears only after the service has started.
 TEST_F(LidarNetwork, MulticastIsReceivedOnceTheNetworkIsUp) {
-  std::string text = read_text(config());
-  text.replace(text.find("{name: front,"), 13, "{name: front, multicast_ip: 239.1.2.3,");
-  std::ofstream{file("multicast.yaml")} << text;
-  const Child daemon(locusd(file("multicast.yaml")));
+  const Child daemon(led_locusd(lidar_alone("239.1.2.3")));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   lay_cable();
+  ASSERT_TRUE(comes_true([] { // the group's address as the kernel prints it, of the cable's interface alone
+    const std::string groups = read_text("/proc/thread-self/net/igmp");
+    const std::size_t cable = groups.find("lidar0");
+    return cable != std::string::npos && groups.find("030201EF", cable) != std::string::npos;
+  }));
   expect_heard("239.1.2.3");
 }
 
@@ -140,7 +159,7 @@ TEST_F(LidarNetwork, FirewallPassesOnlyTheLidar) {
   }
   std::ofstream{file("locusd.nft")} << rules;
   here("/usr/sbin/nft -f " + file("locusd.nft").string());
-  const Child daemon(locusd(config()));
+  const Child daemon(led_locusd(lidar_alone()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   at_lidar("ip route replace 10.9.0.0/24 dev eth0 src 10.9.0.202");
   const auto dropped = [] {

@@ -21,6 +21,7 @@
 #include "service/notify_socket.hpp"
 #include "service/robot_network.hpp"
 #include "support/errors.hpp"
+#include "support/led_clock.hpp"
 
 namespace locus::test {
 namespace {
@@ -92,16 +93,18 @@ TEST_F(LifeCycle, SecondServiceLeavesTheSocketOfTheFirst) {
 
 TEST_F(LifeCycle, ResetPoseWithoutLidarOutlivesReloadAndRestart) {
   constexpr double kNear_m = 0.5; // the robot stands at the start
-  const auto starts_at_x = [] {
+  const std::vector<std::string> service = led_locusd(config());
+  const auto starts_at_x = [this] {
     const Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
     EXPECT_TRUE(hears_the_service(listener));
-    const Child play(endlessly(capture()));
+    Child play(leading_play({capture().string()}));
+    EXPECT_EQ(play.wait_for_exit(patience_of_a_drive()), 0) << testing::PrintToString(play.lines());
     EXPECT_TRUE(listener.wait_for_line("odometry 1"));
     const std::vector<HeardPose> poses = heard(listener);
     return poses.empty() ? std::nan("") : poses.front().T_odom_base.translation.x();
   };
   {
-    Child daemon(locusd(config()));
+    Child daemon(service);
     EXPECT_NEAR(starts_at_x(), 0, kNear_m);
     status_when([](const json& s) { return s["lidars"]["front"]["heard_ms_ago"] > 300; });
     ASSERT_EQ(ctl({"reset", "--pose", "100,0,0,0,0,0"}).status, 0);
@@ -111,13 +114,13 @@ TEST_F(LifeCycle, ResetPoseWithoutLidarOutlivesReloadAndRestart) {
     ASSERT_EQ(daemon.wait_for_exit(), 0);
   }
   {
-    Child daemon(locusd(config()));
+    Child daemon(service);
     EXPECT_NEAR(starts_at_x(), 100, kNear_m);
     ASSERT_EQ(ctl({"reset"}).status, 0);
     daemon.signal(SIGKILL);
     daemon.wait_for_exit();
   }
-  Child daemon(locusd(config()));
+  Child daemon(service);
   EXPECT_NEAR(starts_at_x(), 0, kNear_m);
 }
 
@@ -141,7 +144,7 @@ TEST_F(LifeCycle, ResetsAreCountedForTheLifeOfTheProcess) {
 TEST_F(LifeCycle, ResetBeforeTheFirstSweepGivesNoWarningOfTheSavedState) {
   {
     Child daemon(locusd(config()));
-    const Child play({LOCUS_PLAY, capture().string()});
+    const Child play(endlessly(capture()));
     ASSERT_TRUE(daemon.wait_for_line("tracking"));
     daemon.signal(SIGTERM);
     ASSERT_EQ(daemon.wait_for_exit(), 0);
@@ -149,7 +152,7 @@ TEST_F(LifeCycle, ResetBeforeTheFirstSweepGivesNoWarningOfTheSavedState) {
   Child daemon(locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   ASSERT_EQ(ctl({"reset"}).status, 0);
-  const Child play({LOCUS_PLAY, capture().string()});
+  const Child play(endlessly(capture()));
   ASSERT_TRUE(daemon.wait_for_line("tracking"));
   EXPECT_FALSE(daemon.has_line("does not match the saved state")) << testing::PrintToString(daemon.lines());
 }
@@ -248,7 +251,7 @@ TEST_F(LifeCycle, CablePullIsBridgedByDeadReckoning) {
   const Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
   ASSERT_TRUE(hears_the_service(listener));
   Child play(leading_play({"--fail", "all-lidars:lost@4-16", capture().string()}));
-  ASSERT_EQ(play.wait_for_exit(seconds{200}), 0) << testing::PrintToString(play.lines());
+  ASSERT_EQ(play.wait_for_exit(patience_of_a_drive()), 0) << testing::PrintToString(play.lines());
   EXPECT_TRUE(daemon.wait_for_line("dead reckoning"));
   EXPECT_TRUE(daemon.wait_for_line("lidar front: no data packet on UDP port 2368 for 5 s; check its power and cable"));
   EXPECT_TRUE(daemon.wait_for_line("lidar front: data received"));
@@ -308,10 +311,12 @@ TEST_F(LifeCycle, LearnedCalibrationOutlivesAnOutdatedPose) {
       learned.states[LearnedSource::kMounting + 2] = 0.02;
   }
   ASSERT_FALSE(daemon::write_state(file("state"), old));
-  Child daemon(locusd(config()));
+  Child daemon(led_locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("starting without the saved pose: it is"));
+  ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   ASSERT_EQ(ctl({"reload"}).status, 0) << "before anything is known of the robot";
-  Child play({LOCUS_PLAY, capture().string()});
+  led_time().hold_at_ns = Duration{seconds{1}}.count(); // before the drive corrects what was learned
+  Child play(leading_play({capture().string()}));
   const json status = status_when(
       [](const json& s) { return s["sweeps"]["processed"] > 2 && s["sources"]["imu"].contains("learned"); });
   EXPECT_LT(status["pose"]["xyz_m"][0].get<double>(), 10.0);

@@ -114,7 +114,8 @@ class Metrics : public RobotNetwork {
     EXPECT_TRUE(status_comes([&](const nlohmann::json& before) {
       told.before = before;
       told.metrics = scrape();
-      told.after = status();
+      const double scraped_s = status()["duration_s"]; // its figures may be those of the report before the scrape
+      told.after = status_when([&](const nlohmann::json& after) { return after["duration_s"] > scraped_s; });
       return from_outside(told.before) == from_outside(told.after);
     })) << told.before.dump(1)
         << told.after.dump(1);
@@ -127,10 +128,10 @@ class Metrics : public RobotNetwork {
   }
 
   /// Drives the robot with metrics enabled.
-  void drive(const std::filesystem::path& drive = capture()) {
-    daemon_.emplace(locusd(listening()));
+  void drive(const std::vector<std::string>& service, const std::vector<std::string>& player) {
+    daemon_.emplace(service);
     ASSERT_TRUE(daemon_->wait_for_line("DDS is up"));
-    play_.emplace(std::vector<std::string>{LOCUS_PLAY, drive.string()});
+    play_.emplace(player);
     ASSERT_TRUE(daemon_->wait_for_line("tracking"));
   }
 
@@ -138,8 +139,8 @@ class Metrics : public RobotNetwork {
 };
 
 TEST_F(Metrics, MatchTheStatus) {
-  ASSERT_NO_FATAL_FAILURE(drive(room_drive()));
-  ASSERT_EQ(play_->wait_for_exit(), 0);
+  ASSERT_NO_FATAL_FAILURE(drive(led_locusd(listening()), leading_play({room_drive().string()})));
+  ASSERT_EQ(play_->wait_for_exit(patience_of_a_drive()), 0);
   const auto [before, status, metrics] = told_at_rest();
   EXPECT_EQ(metrics.mistakes, std::vector<std::string>{});
   EXPECT_EQ(metrics.value("locusd_build_info", {{"version", status["version"]}}), 1);
@@ -182,7 +183,7 @@ TEST_F(Metrics, MatchTheStatus) {
 /// Each value lies between those of the statuses before and after it.
 TEST_F(Metrics, ProcessFiguresAreTrueAndTheHistogramCoversAllSweeps) {
   const double launched_s = to_seconds(daemon::read_clock(CLOCK_REALTIME));
-  ASSERT_NO_FATAL_FAILURE(drive(room_drive()));
+  ASSERT_NO_FATAL_FAILURE(drive(locusd(listening()), {LOCUS_PLAY, room_drive().string()}));
   ASSERT_EQ(play_->wait_for_exit(), 0);
   const auto [before, after, metrics] = told_at_rest();
   const auto sweeps = [](const nlohmann::json& status) {
@@ -219,7 +220,7 @@ TEST_F(Metrics, ProcessFiguresAreTrueAndTheHistogramCoversAllSweeps) {
 TEST_F(Metrics, PassPromtool) {
   if (const ProgramRun fetched = fetch_promtool(); fetched.status != 0)
     GTEST_SKIP() << "no promtool: " << fetched.err;
-  ASSERT_NO_FATAL_FAILURE(drive());
+  ASSERT_NO_FATAL_FAILURE(drive(locusd(listening()), endlessly(capture())));
   std::string text = body_of(ask_for(kScrape));
   text = std::regex_replace(text, std::regex{"# UNIT [^\n]*\n|# EOF\n"}, "");
   text = std::regex_replace(text, std::regex{"# TYPE (\\w+) counter\n# HELP \\w+"},
@@ -581,7 +582,7 @@ class Examples : public Metrics {
     daemon_.emplace(locusd(config(
         fmt::format("metrics: {{listen: '{}'}}\nrecord: {{folder: record, max_bytes: 100000000}}\n", kAddress))));
     EXPECT_TRUE(daemon_->wait_for_line("DDS is up"));
-    play_.emplace(std::vector<std::string>{LOCUS_PLAY, capture().string()});
+    play_.emplace(endlessly(capture()));
     EXPECT_TRUE(daemon_->wait_for_line("tracking"));
     EXPECT_TRUE(status_comes([](const nlohmann::json& status) {
       return status["sweeps"]["processed"] > 10 && status["recording"]["recorded"] > 0;

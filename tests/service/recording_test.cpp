@@ -84,7 +84,7 @@ TEST_F(Recording, ReplayEqualsTheEstimatesOfTheService) {
   Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
   ASSERT_TRUE(hears_the_service(listener));
   Child play(leading_play({robot.string()}));
-  ASSERT_EQ(play.wait_for_exit(seconds{200}), 0) << testing::PrintToString(play.lines());
+  ASSERT_EQ(play.wait_for_exit(patience_of_a_drive()), 0) << testing::PrintToString(play.lines());
   const auto received = [](const nlohmann::json& now) {
     return now["packets"]["total"]["received"].get<std::uint64_t>() +
            now["sources"]["imu"]["received"].get<std::uint64_t>() +
@@ -127,7 +127,7 @@ TEST_F(Recording, OldestIsRemovedFirstAndAKilledRunReplays) {
   {
     Child daemon(locusd(recording(robot, kMaxBytes)));
     ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
-    const Child play({LOCUS_PLAY, "--fail", "all-lidars:lost@3-100", robot.string()}); // 5.7 MB
+    const Child play(endlessly(robot));
     ASSERT_TRUE(daemon.wait_for_line("recording to")) << testing::PrintToString(daemon.lines());
     EXPECT_TRUE(comes_true([&] { return bytes_in(file("record")) > kMaxBytes / 2; }));
     daemon.signal(SIGKILL);
@@ -214,7 +214,7 @@ TEST_F(Recording, UnusableFolderIsReportedOnceAndTheOdometryContinues) {
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
   EXPECT_TRUE(daemon.wait_for_line("plain/record: cannot be created (Not a directory)"))
       << testing::PrintToString(daemon.lines());
-  const Child play({LOCUS_PLAY, capture().string()});
+  const Child play(endlessly(capture()));
   const nlohmann::json status = status_when(
       [](const auto& now) { return now["sweeps"]["processed"] > 10 && now["recording"]["dropped"] > 1000; });
   EXPECT_EQ(status["recording"]["recorded"], 0);

@@ -115,7 +115,7 @@ class RestartWithHeldInput : public RobotNetwork {
       time.hold_at_ns = i + 1 < outages.size() ? (outages[i + 1].begin + kAmid).count() : 0;
       EXPECT_TRUE(daemon_->wait_for_line("resumed from the saved state")) << testing::PrintToString(daemon_->lines());
     }
-    ASSERT_EQ(play_->wait_for_exit(seconds{200}), 0) << testing::PrintToString(play_->lines());
+    ASSERT_EQ(play_->wait_for_exit(patience_of_a_drive()), 0) << testing::PrintToString(play_->lines());
     const Replay replay({"--quiet", plant().string()});
     const double error_m = worst_distance_m(replay.trajectory(), heard(*listener_), shift_of(*play_));
     RecordProperty("worst_um", static_cast<int>(1e6 * error_m));

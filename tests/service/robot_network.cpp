@@ -142,6 +142,8 @@ bool RobotNetwork::is_held() const {
   return comes_true([&] { return time.held_at_ns == time.hold_at_ns; });
 }
 
+Duration patience_of_a_drive() { return 4 * patience(); }
+
 bool comes_true(const std::function<bool()>& holds) {
   const auto give_up = std::chrono::steady_clock::now() + patience();
   while (std::chrono::steady_clock::now() < give_up) {

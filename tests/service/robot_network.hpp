@@ -72,6 +72,9 @@ class RobotNetwork : public testing::Test {
   std::filesystem::path runtime_in_use_;
 };
 
+/// Longest time in which a drive of 20 s ends whose time the player controls: a wait for more than one event.
+Duration patience_of_a_drive();
+
 /// Waits until it holds; false after the test's patience.
 bool comes_true(const std::function<bool()>& holds);
 

@@ -49,7 +49,7 @@ TEST_F(Stream, SimulatedRobotDrivesTheServiceWithoutAFile) {
   for (const std::string& word : leading_play({"--fail", "wio:lost@4-8", "-"}))
     play += " " + word;
   Child robot(shell(LOCUS_SIM + std::string(kDrive) + "- |" + play));
-  ASSERT_EQ(robot.wait_for_exit(seconds{200}), 0) << testing::PrintToString(robot.lines());
+  ASSERT_EQ(robot.wait_for_exit(patience_of_a_drive()), 0) << testing::PrintToString(robot.lines());
 
   EXPECT_TRUE(robot.has_line(std::to_string(datagrams_in(folder / "lidar.pcap")) + " packets sent"))
       << testing::PrintToString(robot.lines());

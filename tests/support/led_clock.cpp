@@ -93,9 +93,9 @@ std::int64_t led_ns(clockid_t clock) {
 std::uint64_t sent_datagrams = 0, sent_motion = 0; ///< includes those that the service had received before
 
 void take_over() {
-  led->wall_ns = system_ns(CLOCK_REALTIME);
-  led->monotonic_ns = system_ns(CLOCK_MONOTONIC);
-  led->boot_ns = system_ns(CLOCK_BOOTTIME);
+  led->wall_ns = led_ns(CLOCK_REALTIME);
+  led->monotonic_ns = led_ns(CLOCK_MONOTONIC);
+  led->boot_ns = led_ns(CLOCK_BOOTTIME);
   sent_datagrams = led->datagrams.load();
   sent_motion = led->motion.load();
   led->added_ns.store(0);

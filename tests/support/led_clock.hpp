@@ -10,7 +10,7 @@ namespace locus::test {
 /// service's progress. All zero: system time.
 struct LedTime {
   std::atomic<std::int32_t> is_led{0};                     ///< time advances only by `added_ns`
-  std::int64_t wall_ns = 0, monotonic_ns = 0, boot_ns = 0; ///< system time at takeover
+  std::int64_t wall_ns = 0, monotonic_ns = 0, boot_ns = 0; ///< time at takeover
   std::atomic<std::int64_t> added_ns{0};                   ///< since takeover
   std::atomic<std::int64_t> offset_ns{0};             ///< controlled time minus system time after the control has ended
   std::atomic<std::uint64_t> datagrams{0}, motion{0}; ///< processed by the service's ingest
