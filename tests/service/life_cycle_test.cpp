@@ -22,6 +22,7 @@
 #include "service/robot_network.hpp"
 #include "support/errors.hpp"
 #include "support/led_clock.hpp"
+#include "support/test_drives.hpp"
 
 namespace locus::test {
 namespace {
@@ -97,7 +98,7 @@ TEST_F(LifeCycle, ResetPoseWithoutLidarOutlivesReloadAndRestart) {
   const auto starts_at_x = [this] {
     const Child listener({CYCLONE_PEER, "0", "listen", "/locus"});
     EXPECT_TRUE(hears_the_service(listener));
-    Child play(leading_play({capture().string()}));
+    Child play(leading_play({room_drive().string()}));
     EXPECT_EQ(play.wait_for_exit(patience_of_a_drive()), 0) << testing::PrintToString(play.lines());
     EXPECT_TRUE(listener.wait_for_line("odometry 1"));
     const std::vector<HeardPose> poses = heard(listener);
