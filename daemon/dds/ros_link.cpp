@@ -141,9 +141,10 @@ void RosLink::run() {
   Duration status_updated_at{};
   while (!stopping_.load(std::memory_order_relaxed)) {
     progress_.fetch_add(1, std::memory_order_relaxed);
-    dds_waitset_wait(session_->waitset.handle(), triggered.data(), triggered.size(), kMaxSleep.count());
+    const bool was_idle =
+        dds_waitset_wait(session_->waitset.handle(), triggered.data(), triggered.size(), kMaxSleep.count()) == 0;
     receive(*session_);
-    if (const Duration now = read_clock(CLOCK_MONOTONIC); now - status_updated_at >= kMaxSleep) {
+    if (const Duration now = read_clock(CLOCK_MONOTONIC); was_idle || now - status_updated_at >= kMaxSleep) {
       update_status(*session_);
       status_updated_at = now;
     }
