@@ -364,9 +364,11 @@ TEST_F(LifeCycle, RunsWithoutCapabilitiesAndWritableFolders) {
 }
 
 TEST_F(LifeCycle, ControlCommandsTakeEffect) {
-  Child daemon(locusd(config()));
+  Child daemon(led_locusd(config()));
   ASSERT_TRUE(daemon.wait_for_line("DDS is up"));
-  const Child play(endlessly(capture()));
+  led_time().hold_at_ns = Duration{seconds{10}}.count();
+  Child play(leading_play({capture().string()}));
+  ASSERT_TRUE(is_held());
   const auto is_used = [](const json& source) {
     return source["health"] == "healthy" && source.contains("innovation") && source["innovation"]["test_ratio"] > 0.0;
   };
@@ -404,16 +406,19 @@ TEST_F(LifeCycle, ControlCommandsTakeEffect) {
   const json learned = status_when([](const json& s) { return s["sources"]["imu"].contains("learned"); });
   EXPECT_EQ(learned["sources"]["imu"]["learned"]["late_ms"]["configured"], 0.0);
 
-  EXPECT_EQ(ctl({"save-map", file("map.pcd").string()}).status, 0);
-  EXPECT_NE(read_text(file("map.pcd")).find("FIELDS x y z"), std::string::npos);
-
   EXPECT_EQ(ctl({"reset", "--pose", "100,50,0,0,0,90"}).status, 0);
   EXPECT_TRUE(daemon.has_line("run ended: ")) << testing::PrintToString(daemon.lines());
+  led_time().hold_at_ns = 0;
+  ASSERT_EQ(play.wait_for_exit(patience_of_a_drive()), 0) << testing::PrintToString(play.lines());
   const json reset = status_when([](const json& s) { return s["sweeps"]["processed"] > 5; });
   constexpr double kRoom_m = 13; // the room's diagonal: the robot continues to drive
   EXPECT_NEAR(reset["pose"]["xyz_m"][0].get<double>(), 100, kRoom_m);
   EXPECT_NEAR(reset["pose"]["xyz_m"][1].get<double>(), 50, kRoom_m);
 
+  const Child lidar(endlessly(capture()));
+  status_when([](const json& s) { return s["lidars"]["front"]["heard_ms_ago"] < 1000; });
+  EXPECT_EQ(ctl({"save-map", file("map.pcd").string()}).status, 0);
+  EXPECT_NE(read_text(file("map.pcd")).find("FIELDS x y z"), std::string::npos);
   const ProgramRun sensors = ctl({"sensors"});
   EXPECT_EQ(sensors.status, 0) << sensors.err;
   EXPECT_NE(sensors.out.find("VLP-16"), std::string::npos) << sensors.out;
