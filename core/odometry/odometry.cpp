@@ -58,6 +58,7 @@ Odometry::Odometry(const OdometryOptions& options, const std::vector<MotionSourc
 
 void Odometry::begin_at(const ResumeState& last, std::span<const SurfacePoint> map_odom) {
   start_ = last;
+  continues_motion_ = !last.was_at_rest();
   map_.insert(map_odom, Pose{});
 }
 

@@ -43,8 +43,8 @@ class Odometry {
                     StageClock* clock = nullptr);
 
   /// Starts from `last` instead of level at the origin. Relocalises in `map_odom` (surfaces in the odom frame), if
-  /// given. If the result is ambiguous, waits up to 1 s for an odometry source that spans the gap. If relocalisation
-  /// fails, starts at the pose from such a source, or else level at the origin. Call before the first sweep.
+  /// given. Waits up to 1 s for an odometry source that spans the gap, if there was one. If relocalisation fails,
+  /// starts at the pose from such a source, or else level at the origin. Call before the first sweep.
   void begin_at(const ResumeState& last, std::span<const SurfacePoint> map_odom = {});
 
   /// Restores the calibration of the motion sources from another run that ended `elapsed_s` ago. Call before the first
@@ -207,6 +207,7 @@ class Odometry {
   std::array<Stamp, kMaxSources> learned_since_{};
   std::optional<ResumeState> start_;              ///< starting pose
   std::optional<ResumeState> run_before_;         ///< end of the last run, if the first sweep was found in its map
+  bool continues_motion_ = false;                 ///< the run before ended in motion
   std::optional<Stamp> waits_since_;              ///< start of the wait for an odometry source that spans the gap
   std::optional<Matrix6> keyframe_observability_; ///< of the last sweep, if it is a keyframe that is not in the map yet
   std::optional<Beginning> beginning_;

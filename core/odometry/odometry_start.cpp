@@ -64,23 +64,23 @@ OdometryEstimate Odometry::begin(const Sweep& sweep) {
 }
 
 /// Relocalises in the map of another run. If that fails, discards the map and starts at the pose from an odometry
-/// source, or at the origin. Returns false while waiting for such a source.
+/// source, or at the origin. Returns false while waiting for such a source: along a corridor the sweep fits the map at
+/// wrong poses, too, and only that source knows how far the robot has come.
 bool Odometry::relocalise_first(const Sweep& sweep) {
   constexpr Duration kPatience = std::chrono::seconds{1}; ///< DDS discovery takes less
   waits_since_ = waits_since_.value_or(sweep.end);
-  const StageScope scope(clock_, Stage::scan_to_submap);
   const std::vector<Candidate> candidates = start_->candidates(sweep.end, sweep.motion, options_.motion.max_speed_mps);
-  const bool waits = !candidates.front().from_healthy && start_->awaits(sweep.motion) &&
-                     std::chrono::abs(sweep.end - *waits_since_) < kPatience;
-  if (const auto found = relocalise(gicp_, std::span(scan_).first(sweep.registered), map_, candidates,
-                                    options_.scan_to_submap, waits)) {
+  if (!candidates.front().from_healthy && start_->awaits(sweep.motion) &&
+      std::chrono::abs(sweep.end - *waits_since_) < kPatience)
+    return false;
+  const StageScope scope(clock_, Stage::scan_to_submap);
+  if (const auto found =
+          relocalise(gicp_, std::span(scan_).first(sweep.registered), map_, candidates, options_.scan_to_submap)) {
     beginning_ = Beginning::map;
     run_before_ = std::exchange(start_, start_->moved_to(found->candidate));
     map_policy_.resume();
     return true;
   }
-  if (waits)
-    return false;
   map_.clear();
   if (const auto sensed = std::ranges::find_if(candidates, &Candidate::from_odometry); sensed != candidates.end()) {
     beginning_ = Beginning::odometry;
@@ -157,7 +157,7 @@ void Odometry::relocalise_again(const Sweep& first, const Sweep& sweep, const St
     }
   const auto found = relocalise(gicp_, std::span(scan_).first(first.registered), map_,
                                 run_before_->candidates(first.end, first.motion, options_.motion.max_speed_mps),
-                                options_.scan_to_submap, false);
+                                options_.scan_to_submap);
   if (!found)
     return;
   start_ = run_before_->moved_to(found->candidate);
@@ -165,7 +165,9 @@ void Odometry::relocalise_again(const Sweep& first, const Sweep& sweep, const St
   lidar_health_.learn(found->fit, steps_.elapsed_s(sweep));
 }
 
-/// Returns the motion between the first two sweeps with the sources in `without` excluded from the de-skew.
+/// Returns the motion between the first two sweeps with the sources in `without` excluded from the de-skew. A robot
+/// usually begins at rest. One that was in motion when another run ended is at rest only if the sources that measure a
+/// motion are wrong: along a corridor two sweeps fit equally well.
 Odometry::Start Odometry::start_without(std::bitset<kMaxSources> without, const Sweep& first, const Sweep& sweep,
                                         const Gicp::StopRequested& stop) {
   const MotionFilter unknown = assume(sweep, {.without = without}, filter_).filter;
@@ -195,7 +197,8 @@ Odometry::Start Odometry::start_without(std::bitset<kMaxSources> without, const 
     if (difference(T_odom_base, T_before).cwiseAbs().maxCoeff() < kAgrees || stop())
       break;
   }
-  if (evidence(rest, start.fit) + odds_against_stuck(repeating_sources(sweep)).value_or(0.0) > -kBeginsAtRest)
+  const double odds_of_rest = continues_motion_ ? -odds_of_sources(sweep, {}) : kBeginsAtRest;
+  if (evidence(rest, start.fit) + odds_against_stuck(repeating_sources(sweep)).value_or(0.0) > -odds_of_rest)
     start = {.without = kAllSources, .rests = true, .twist_base = Vector6::Zero(), .fit = rest};
   return start;
 }

@@ -146,8 +146,7 @@ ResumeState ResumeState::moved_to(const Candidate& candidate) const {
 }
 
 std::optional<Relocalised> relocalise(Gicp& gicp, std::span<const SurfacePoint> scan_base, const SurfaceMap& map_odom,
-                                      std::span<const Candidate> expected, const RegistrationOptions& options,
-                                      bool unambiguous) {
+                                      std::span<const Candidate> expected, const RegistrationOptions& options) {
   struct Found {
     double share = 0.0; ///< of the points, with a correspondence
     Registration fit{};
@@ -178,9 +177,7 @@ std::optional<Relocalised> relocalise(Gicp& gicp, std::span<const SurfacePoint> 
     return std::nullopt;
   for (const Pose& T_odom_beside : places_around(here.fit.T_target_source))
     all.push_back(align_at({T_odom_beside, kSigma, Matrix6::Zero()}));
-  const double least = here.from_healthy || here.confirmed ? kHardlyLess
-                       : unambiguous                       ? kClearlyMore
-                                                           : least_ratio(here.share);
+  const double least = here.from_healthy || here.confirmed ? kHardlyLess : least_ratio(here.share);
   for (const Found& other : all)
     if (!is_within(kFarthest_m, other.fit.T_target_source, here.fit.T_target_source) &&
         here.share < least * other.share)

@@ -87,10 +87,8 @@ struct Relocalised {
 /// far away or hidden. It is therefore compared with the share two metres away on every side and at the other
 /// candidates. The smaller the share, the more clearly it must exceed theirs, unless an odometry vouches for the
 /// candidate; a large share may be that of a corridor, which looks the same two metres on, and need only be hardly
-/// less. Among equal fits the likelier candidate is chosen. `unambiguous`: the share must be clearly larger in any
-/// case. Any thread, one at a time for a Gicp.
+/// less. Among equal fits the likelier candidate is chosen. Any thread, one at a time for a Gicp.
 std::optional<Relocalised> relocalise(Gicp& gicp, std::span<const SurfacePoint> scan_base, const SurfaceMap& map_odom,
-                                      std::span<const Candidate> expected, const RegistrationOptions& options,
-                                      bool unambiguous);
+                                      std::span<const Candidate> expected, const RegistrationOptions& options);
 
 } // namespace locus
