@@ -194,7 +194,7 @@ class RestartCampaign : public RobotNetwork, public testing::WithParamInterface<
   std::optional<Child> daemon_, listener_, play_;
 };
 
-/// None may start at the origin, or jump by a metre, unannounced; 98 of 100 are to resume within 50 mm and 2 % of the
+/// Expects no jump by a metre without an announcement, and by hand that 98 of 100 resume within 50 mm and 2 % of the
 /// distance. The same intervals of the replay show how many are within that without a restart.
 TEST_P(RestartCampaign, ResumesAtTheTruePose) {
   ASSERT_NO_FATAL_FAILURE(run());
