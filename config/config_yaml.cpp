@@ -450,6 +450,12 @@ std::string print_config(const Config& config) {
   return std::string{emitter.c_str(), emitter.size()} + '\n';
 }
 
+Pose as_written(Pose pose) {
+  SectionWriter unused;
+  fields(unused, pose);
+  return pose;
+}
+
 std::string config_sha256(const Config& config) {
   const std::string text = print_config(config);
   Sha256 digest;

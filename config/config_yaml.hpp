@@ -35,6 +35,9 @@ Expected<Config, ConfigErrors> override_config(const Config& config, std::span<c
 /// Formats every key as YAML in full precision: it reads back to the same configuration (angles to 1e-9 deg).
 std::string print_config(const Config& config);
 
+/// Returns a pose as a configuration file states it: its angles are rounded to 1e-9 deg.
+Pose as_written(Pose pose);
+
 /// Returns the SHA-256 of print_config() in lower-case hex, to identify the configuration of a result.
 std::string config_sha256(const Config& config);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Messages of bags: the first byte selects type and serialisation.
 #include "bags/messages.hpp"
-#include "bags/static_transforms.hpp"
+#include "discovery/static_transforms.hpp"
 #include "fuzz/fuzz_bytes.hpp"
 
 namespace {

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "bag_writer.hpp"
-#include "bags/static_transforms.hpp"
+#include "discovery/static_transforms.hpp"
 #include "replay_run.hpp"
 #include "support/errors.hpp"
 #include "support/test_drives.hpp"

@@ -99,6 +99,23 @@ TEST_F(OusterBags, PacketsAndMetadataOfABagGiveTheBitsOfTheCapture) {
   }
 }
 
+TEST_F(OusterBags, DiscoveredConfigurationGivesTheSameBits) {
+  write("drive.bag", ros1_bag(with_metadata(RosVersion::ros1, packets(RosVersion::ros1, "ouster_ros"))));
+  for (const std::string recording : {folder_ / "drive.bag", drive() / "capture/drive.pcap"}) {
+    const ProgramRun found = run_program(LOCUS_REPLAY, {"--discover", recording});
+    EXPECT_EQ(found.status, 0) << found.err;
+    write("found.yaml", found.out);
+    const Replay replay({"-c", folder_ / "found.yaml", recording});
+    EXPECT_TRUE(odometry(replay).size() > 1000 &&
+                read_text(replay.file("odometry.tum")) ==
+                    read_text(Replay({drive() / "capture/drive.pcap"}).file("odometry.tum")))
+        << found.out;
+    EXPECT_EQ(replay.run().err, "");
+    EXPECT_TRUE(contains(found.out, "OS1-32 with serial number") || contains(found.out, "/ouster/metadata"))
+        << found.out;
+  }
+}
+
 TEST_F(OusterBags, WrittenInputsReplayToTheSameBits) {
   const Replay first({"--mcap", folder_ / "out.mcap", drive() / "capture/drive.pcap"});
   EXPECT_TRUE(odometry(first) == odometry_of_capture());

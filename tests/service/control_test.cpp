@@ -305,7 +305,7 @@ TEST_F(Control, SensorsNeedsNeitherServiceNorPrivilege) {
   const ProgramRun sensors = as_nobody("--clear-groups", {"sensors"});
   EXPECT_EQ(sensors.status, 0) << sensors.err;
   EXPECT_NE(sensors.out.find("127.0.0.1"), std::string::npos) << sensors.out;
-  EXPECT_NE(sensors.out.find("model: VLP-16, port: 2368"), std::string::npos) << sensors.out;
+  EXPECT_NE(sensors.out.find("    model: VLP-16  # by its packets\n    port: 2368"), std::string::npos) << sensors.out;
 }
 
 /// A stand-in for a service whose disk is slower than the timeout of a status request.

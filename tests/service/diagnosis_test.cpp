@@ -120,7 +120,9 @@ TEST_F(Diagnosis, UnknownProductIdBesideALidarHasItsOwnLine) {
   EXPECT_EQ(both.status, 0) << both.err;
   EXPECT_TRUE(contains(both.out, "127.0.0.2       2368   not read: product id 0x31 and return mode 0x37 in "))
       << both.out;
-  EXPECT_TRUE(contains(both.out, "model: VLP-16, port: 2368, T_base_lidar")) << both.out;
+  EXPECT_TRUE(contains(
+      both.out, "    model: VLP-16  # by its packets\n    port: 2368  # where its packets go\n    T_base_lidar: "))
+      << both.out;
 }
 
 /// The packets have the lidar's address; only the model differs.

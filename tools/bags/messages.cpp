@@ -117,6 +117,12 @@ std::string_view frame_of(MessageReader reader) {
   return reader.whole() ? frame : std::string_view{};
 }
 
+std::string_view child_frame_of(MessageReader odometry) {
+  read_header(odometry);
+  const std::string_view frame = odometry.text();
+  return odometry.whole() ? frame : std::string_view{};
+}
+
 std::optional<ros::Imu> read_imu(MessageReader reader) {
   ros::Imu imu{};
   imu.header_ = read_header(reader).nameless();

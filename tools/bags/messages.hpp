@@ -53,6 +53,9 @@ Stamp stamp_or(Stamp recorded, Stamp stamp);
 /// Reads the frame of a message that begins with a header; empty if it is truncated. Refers to the message.
 std::string_view frame_of(MessageReader reader);
 
+/// Reads the child frame of an odometry likewise.
+std::string_view child_frame_of(MessageReader odometry);
+
 /// Reads everything but the frame names, which stay null.
 std::optional<daemon::ros::Imu> read_imu(MessageReader reader);
 std::optional<daemon::ros::Odometry> read_odometry(MessageReader reader);

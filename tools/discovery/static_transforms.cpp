@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bags/static_transforms.hpp"
+#include "discovery/static_transforms.hpp"
 
 #include <array>
 #include <cmath>

@@ -39,8 +39,10 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
       ->required();
   app.add_option("-o,--output", arguments.output,
                  "Folder for odometry.tum, odometry.csv, map.pcd, report.html and summary.json; created if missing")
-      ->required()
       ->type_name("DIR");
+  app.add_flag("--discover", arguments.discover,
+               "Prints the configuration that fits the recording, YAML for --config with the reason for each line; "
+               "replays nothing");
   app.add_option("-c,--config", arguments.config, "Configuration; default: the folder's config.yaml, else defaults")
       ->type_name("FILE");
   app.add_option("--set", arguments.overrides,
@@ -107,14 +109,20 @@ std::optional<Arguments> parse_arguments(int argc, char** argv) {
   app.set_version_flag("--version", "locus-replay " LOCUS_VERSION);
   app.footer("Examples:\n"
              "  locus-replay -o out drive.pcap\n"
+             "  locus-replay --discover drive.bag >drive.yaml\n"
              "  locus-replay -c husky.yaml --imu imu.csv --odometry wio=wheels.tum -o out drive.pcap\n"
              "  locus-replay --set motion_sources.wio.topic=/odom -o out drive.bag\n"
              "  locus-replay --set lidars.front.port=2369 --fail front:lost@10-20 -o out robot_folder/");
   if (!parse_command_line(app, argc, argv))
     return std::nullopt;
 
-  if (!arguments.calibrate.empty() && arguments.capture == "-")
-    throw Failure(ExitStatus::wrong_usage, "--calibrate: standard input cannot be read several times; name a file");
+  if (arguments.output.empty() && !arguments.discover)
+    throw Failure(ExitStatus::wrong_usage, "--output is required");
+  for (const auto& [is_given, name] :
+       {std::pair{!arguments.calibrate.empty(), "--calibrate"}, std::pair{arguments.discover, "--discover"}})
+    if (is_given && arguments.capture == "-")
+      throw Failure(ExitStatus::wrong_usage,
+                    fmt::format("{}: standard input cannot be read several times; name a file", name));
   for (const std::string& text : odometry)
     arguments.odometry.push_back(parse_odometry(text));
   for (const std::string& text : faults)

@@ -38,6 +38,7 @@ struct Arguments {
   std::vector<Fault> faults;
   std::optional<double> realtime_speed;
   bool kitti_as_published = false; ///< leaves the points of a KITTI drive uncorrected
+  bool discover = false;           ///< prints the configuration and replays nothing
   bool quiet = false;
 };
 

@@ -40,8 +40,10 @@ std::string text_of(const Pose& pose) {
 /// Mounts the sensors of one bag.
 class Mounting {
  public:
-  Mounting(const BagSurvey& survey, const std::string& bag_name, Config& config, std::vector<std::string>& lines)
-      : survey_(survey), bag_name_(bag_name), config_(config), lines_(lines), base_(config.dds.frame_base) {}
+  Mounting(const BagSurvey& survey, const std::string& bag_name, Config& config, std::vector<std::string>& lines,
+           ConfigReasons& reasons)
+      : survey_(survey), bag_name_(bag_name), config_(config), lines_(lines), reasons_(reasons),
+        base_(config.dds.frame_base) {}
 
   void mount_lidars(const BagTopics& topics, const std::vector<Parts>& unset) {
     first_lidar_ = frame_of(topics.of_lidar.front());
@@ -50,7 +52,8 @@ class Mounting {
       use_first_lidar_as_base();
     for (std::size_t i = is_base ? 1 : 0; i < unset.size(); ++i) {
       const std::string frame = frame_of(topics.of_lidar[i]);
-      mount("the lidar", frame, T_base(frame), unset[i], config_.lidars[i].T_base_lidar);
+      mount("the lidar", frame, T_base(frame), unset[i], config_.lidars[i].T_base_lidar,
+            fmt::format("lidars.{}.T_base_lidar", i));
     }
   }
 
@@ -63,7 +66,8 @@ class Mounting {
       std::optional<Pose> T_base_imu = T_base(frame);
       if (const auto T_lidar_imu = survey_.transforms.between(first_lidar_, frame); !T_base_imu && T_lidar_imu)
         T_base_imu = config_.lidars.front().T_base_lidar * *T_lidar_imu;
-      mount(source.name, frame, T_base_imu, unset[i], source.T_base_source);
+      mount(source.name, frame, T_base_imu, unset[i], source.T_base_source,
+            fmt::format("motion_sources.{}.T_base_source", i));
     }
   }
 
@@ -81,17 +85,21 @@ class Mounting {
     lines_.push_back(fmt::format("{}: /tf_static has no mounting of the lidar{} on {}, so poses are those of the "
                                  "lidar; set it with --set lidars.0.T_base_lidar.xyz_m=[X,Y,Z], and rpy_deg",
                                  bag_name_, first_lidar_.empty() ? "" : fmt::format(" ({})", first_lidar_), base_));
+    reasons_.of_key["lidars.0.T_base_lidar"] =
+        fmt::format("/tf_static does not connect '{}' with {}: poses are those of the lidar", first_lidar_, base_);
     base_ = first_lidar_;
   }
 
   void mount(const std::string& sensor, const std::string& frame, const std::optional<Pose>& T_base_sensor,
-             const Parts& unset, Pose& mounting) {
+             const Parts& unset, Pose& mounting, const std::string& key) {
     if (!T_base_sensor || !unset.any())
       return;
+    const Pose T_written = as_written(*T_base_sensor);
     if (unset.rotation)
-      mounting.rotation = T_base_sensor->rotation;
+      mounting.rotation = T_written.rotation;
     if (unset.translation)
-      mounting.translation = T_base_sensor->translation;
+      mounting.translation = T_written.translation;
+    reasons_.of_key[key] = fmt::format("{} on {}, by /tf_static", frame, base_);
     lines_.push_back(fmt::format("{}: {} ({}) is mounted at {} on {}, by /tf_static{}", bag_name_, sensor, frame,
                                  text_of(mounting), base_, unset.all() ? "" : " and --set"));
   }
@@ -100,6 +108,7 @@ class Mounting {
   const std::string& bag_name_;
   Config& config_;
   std::vector<std::string>& lines_;
+  ConfigReasons& reasons_;
   std::string base_, first_lidar_; ///< frames
 };
 
@@ -130,10 +139,10 @@ UnsetMountings UnsetMountings::in(const Config& config, const std::filesystem::p
 }
 
 void mount_by_transforms(const BagSurvey& survey, const std::string& bag_name, const UnsetMountings& unset,
-                         const std::function<bool(SourceId)>& has_file, Config& config,
-                         std::vector<std::string>& lines) {
+                         const std::function<bool(SourceId)>& has_file, Config& config, std::vector<std::string>& lines,
+                         ConfigReasons& reasons) {
   const BagTopics topics = BagTopics::choose(*survey.bag, bag_name, config, has_file);
-  Mounting mounting(survey, bag_name, config, lines);
+  Mounting mounting(survey, bag_name, config, lines, reasons);
   mounting.mount_lidars(topics, unset.lidars);
   mounting.mount_imus(topics, unset.sources);
 }

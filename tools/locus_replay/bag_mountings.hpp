@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "config/config.hpp"
+#include "config/config_proposal.hpp"
 #include "core/base/source_id.hpp"
 #include "locus_replay/bag_survey.hpp"
 
@@ -31,9 +32,10 @@ struct UnsetMountings {
 
 /// Mounts the lidars and IMUs of a bag as /tf_static places the frames of their messages on the base, except what the
 /// user has set. If that does not place the first lidar, its frame is the base. `has_file`: motion sources that do not
-/// use the bag. Reports the mountings in `lines` for the user. Throws Failure as BagTopics::choose() does.
+/// use the bag. Reports the mountings in `lines` for the user, and in `reasons`. Throws Failure as BagTopics::choose()
+/// does.
 void mount_by_transforms(const BagSurvey& survey, const std::string& bag_name, const UnsetMountings& unset,
-                         const std::function<bool(SourceId)>& has_file, Config& config,
-                         std::vector<std::string>& lines);
+                         const std::function<bool(SourceId)>& has_file, Config& config, std::vector<std::string>& lines,
+                         ConfigReasons& reasons);
 
 } // namespace locus::tools

@@ -20,10 +20,13 @@ ChosenRecording choose_recording(Arguments& arguments) {
   if (!found.line.empty())
     chosen.lines.push_back(found.line);
   FoundMetadata metadata;
-  chosen.config = configuration_for(found, config_file, arguments, chosen.lines, metadata);
+  chosen.config = configuration_for(found, config_file, arguments, chosen.lines, chosen.reasons, metadata);
   chosen.config_is_users_own = !config_file.empty();
-  if (!metadata.used.empty())
+  if (!metadata.used.empty()) {
     chosen.lines.push_back(metadata.used);
+    chosen.reasons.of_key["lidars.0.metadata"] = metadata.used;
+    chosen.reasons.of_key["lidars.0.port"] = "where the packets of the Ouster go";
+  }
   chosen.warnings = std::move(metadata.warnings);
   if (const auto changed = arguments.config.empty() ? found.files.changed_config() : std::nullopt)
     chosen.warnings.push_back(*changed);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "config/config.hpp"
+#include "config/config_proposal.hpp"
 #include "drivers/files/capture_folder.hpp"
 #include "drivers/files/motion_files.hpp"
 #include "drivers/lidar_input.hpp"
@@ -19,6 +20,7 @@ struct ChosenRecording {
   CaptureFolder files;
   Config config;
   bool config_is_users_own = false;
+  ConfigReasons reasons;             ///< of the configuration
   std::vector<std::string> lines;    ///< choices made, for the user
   std::vector<std::string> warnings; ///< a line each
 };

@@ -11,6 +11,7 @@ namespace locus::tools {
 namespace {
 
 constexpr Duration kLongestStep = std::chrono::seconds{1}; ///< between consecutive packets
+constexpr Duration kReadAhead = std::chrono::milliseconds{500};
 
 bool has_bytes(const Datagram& datagram) { return datagram.decoded == nullptr && datagram.cloud == nullptr; }
 
@@ -52,10 +53,9 @@ std::optional<RecordedTimes::LidarClock> RecordedTimes::open_clock() const {
 
 /// Reads the first packets and decides whose clock gives their arrival times.
 void RecordedTimes::look_ahead() {
-  constexpr Duration kSpan = std::chrono::milliseconds{500};
   constexpr std::size_t kMostStored = 4'000;
   std::optional<LidarClock> clock = open_clock();
-  while (clock && stored_.size() < kMostStored && clock->elapsed() < kSpan) {
+  while (clock && stored_.size() < kMostStored && clock->elapsed() < kReadAhead) {
     const Datagram* const datagram = source_->next();
     if (datagram == nullptr)
       break;

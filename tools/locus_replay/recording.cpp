@@ -236,6 +236,12 @@ std::optional<std::string> Recording::runs_backwards() const {
                      backwards_, read_);
 }
 
+const std::filesystem::path* Recording::file_of(SourceId source) const {
+  const auto found =
+      std::ranges::find_if(motion_, [&](const MotionCursor& cursor) { return cursor.recording.source == source; });
+  return found == motion_.end() ? nullptr : &found->recording.file;
+}
+
 std::vector<std::string> Recording::warnings() const {
   std::vector<std::string> warnings = source_->warnings();
   for (const MotionCursor& motion : motion_) {

@@ -75,6 +75,8 @@ class Recording : public daemon::InputSource {
   /// Returns an error, with a remedy, if most datagrams are older than the preceding one in the file; nothing if they
   /// are in order except for some reordering by the network.
   [[nodiscard]] std::optional<std::string> runs_backwards() const;
+  /// Returns the file of a motion source's samples; nullptr if it has none.
+  [[nodiscard]] const std::filesystem::path* file_of(SourceId source) const;
   /// Returns problems of the capture and its motion, a line for the user each.
   [[nodiscard]] std::vector<std::string> warnings() const;
 

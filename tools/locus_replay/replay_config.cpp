@@ -12,9 +12,11 @@
 #include "config/config_yaml.hpp"
 #include "config/lidar_metadata.hpp"
 #include "kitti/kitti_drive.hpp"
-#include "locus_replay/bag_cloud_lidar.hpp"
+#include "locus_replay/bag_lidars.hpp"
 #include "locus_replay/bag_mountings.hpp"
+#include "locus_replay/bag_sources.hpp"
 #include "locus_replay/bag_survey.hpp"
+#include "locus_replay/capture_lidars.hpp"
 #include "locus_replay/failure.hpp"
 #include "locus_replay/recorded_input.hpp"
 #include "sweep_folder/sweep_folder.hpp"
@@ -50,10 +52,13 @@ constexpr double kFastestCar_mps = 60.0;
 
 /// Derives the configuration from the files of a folder that has none: which sources there are, those of a walking
 /// robot first, and whether it was a car.
-Config configuration_of(const CaptureFolder& folder, const std::filesystem::path& capture) {
+Config configuration_of(const CaptureFolder& folder, const std::filesystem::path& capture, ConfigReasons& reasons) {
   Config config;
-  if (KittiDrive::is(capture) || SweepFolder::is_kitti_odometry(capture))
+  if (KittiDrive::is(capture) || SweepFolder::is_kitti_odometry(capture)) {
     config.odometry.motion.max_speed_mps = kFastestCar_mps;
+    reasons.of_key["motion.max_speed_mps"] = "KITTI's recordings are those of a car";
+    reasons.of_key["lidars.0.name"] = "points of a drive of KITTI";
+  }
   for (const char* const name : {"kio", "vio"}) {
     if (std::ranges::find(folder.odometry, name, &CaptureFolder::Source::name) == folder.odometry.end())
       continue;
@@ -63,7 +68,7 @@ Config configuration_of(const CaptureFolder& folder, const std::filesystem::path
 }
 
 /// Makes the first lidar read the sweeps of a folder, whatever its packet settings.
-void configure_sweeps(const std::filesystem::path& capture, Config& config) {
+void configure_sweeps(const std::filesystem::path& capture, Config& config, ConfigReasons& reasons) {
   LidarOptions& lidar = config.lidars.front();
   if (!lidar.gives_clouds()) {
     LidarOptions replacement;
@@ -72,9 +77,12 @@ void configure_sweeps(const std::filesystem::path& capture, Config& config) {
     replacement.T_base_lidar = lidar.T_base_lidar;
     replacement.isa = lidar.isa;
     lidar = std::move(replacement);
+    reasons.of_key["lidars.0.topic"] = "files of sweeps, which have no topic: any name";
   }
-  if (SweepFolder::is_kitti_odometry(capture) && lidar.point_times == PointTimesFrom::automatic)
+  if (SweepFolder::is_kitti_odometry(capture) && lidar.point_times == PointTimesFrom::automatic) {
     lidar.point_times = PointTimesFrom::none;
+    reasons.of_key["lidars.0.point_times"] = "corrected for the motion during a sweep, as published";
+  }
 }
 
 /// Returns whether the user gives a file for an IMU: it belongs to the first one.
@@ -95,26 +103,32 @@ Config read_configuration(const std::filesystem::path& file, const std::vector<s
 }
 
 Config configuration_for(const FoundRecording& found, const std::filesystem::path& file, const Arguments& arguments,
-                         std::vector<std::string>& lines, FoundMetadata& metadata) {
-  Config config = file.empty() ? configuration_of(found.files, found.capture) : config_or_fail(load_config(file));
+                         std::vector<std::string>& lines, ConfigReasons& reasons, FoundMetadata& metadata) {
+  Config config =
+      file.empty() ? configuration_of(found.files, found.capture, reasons) : config_or_fail(load_config(file));
+  reasons.of_other_keys = file.empty() ? "by --set" : "as in " + file.string();
   std::optional<BagSurvey> survey;
   if (looks_like_bag(found.capture))
     survey = BagSurvey::of(found.capture);
-  if (survey && file.empty())
-    configure_clouds_of(*survey, found.capture, config, lines);
+  if (survey && file.empty()) {
+    const std::string lidar_frame = configure_lidars_of(*survey, found.capture, config, lines, reasons);
+    configure_sources_of(*survey, lidar_frame, config, reasons);
+  } else if (file.empty()) {
+    configure_lidar_of_capture(found.files.lidar.front(), config, lines, reasons);
+  }
   if (arguments.config.empty())
     use_recorded_metadata(found.files, config);
   if (gives_sweeps(found.capture))
-    configure_sweeps(found.capture, config);
+    configure_sweeps(found.capture, config, reasons);
   const Config before = config;
   config = config_or_fail(override_config(config, arguments.overrides));
-  if (file.empty())
+  if (file.empty() || survey)
     metadata = find_metadata(found.files, config);
   config = completed(std::move(config));
   if (survey)
     mount_by_transforms(
         *survey, found.capture.string(), UnsetMountings::in(before, file, arguments.overrides),
-        [&](SourceId source) { return has_sample_file(arguments, config, source); }, config, lines);
+        [&](SourceId source) { return has_sample_file(arguments, config, source); }, config, lines, reasons);
   config.sweep.keeps_returns = !arguments.sweeps.empty();
   return config;
 }

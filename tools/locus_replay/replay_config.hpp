@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "config/config.hpp"
+#include "config/config_proposal.hpp"
 #include "locus_replay/arguments.hpp"
 #include "locus_replay/find_recording.hpp"
 #include "locus_replay/ouster_metadata.hpp"
@@ -17,8 +18,8 @@ namespace locus::tools {
 Config read_configuration(const std::filesystem::path& file, const std::vector<std::string>& overrides);
 
 /// Returns the configuration for a recording; `file` is empty if neither the user nor its folder has one: then it is
-/// derived from the recording's files. Reports choices in `lines` for the user. Throws Failure.
+/// derived from the recording. Reports choices in `lines` for the user, and reasons in `reasons`. Throws Failure.
 Config configuration_for(const FoundRecording& found, const std::filesystem::path& file, const Arguments& arguments,
-                         std::vector<std::string>& lines, FoundMetadata& metadata);
+                         std::vector<std::string>& lines, ConfigReasons& reasons, FoundMetadata& metadata);
 
 } // namespace locus::tools

@@ -15,6 +15,7 @@
 #include "daemon/live_pipeline.hpp"
 #include "locus_replay/arguments.hpp"
 #include "locus_replay/calibrate.hpp"
+#include "locus_replay/discover.hpp"
 #include "locus_replay/find_recording.hpp"
 #include "locus_replay/mcap_results.hpp"
 #include "locus_replay/open_recording.hpp"
@@ -110,8 +111,11 @@ void allow_many_files() {
 
 void run(Arguments arguments, const SweepStage& stage, const EstimateObserver& observer) {
   const MachineTime begin = MachineTime::now();
-  check_output(arguments.output);
+  if (!arguments.discover)
+    check_output(arguments.output);
   ChosenRecording chosen = choose_recording(arguments);
+  if (arguments.discover)
+    return fmt::print("{}", proposal_for(arguments, chosen));
   const Config& config = chosen.config;
   check_nothing_is_written_over(arguments, chosen.files, config);
   if (!arguments.calibrate.empty()) {

@@ -17,6 +17,7 @@
 #include <fmt/format.h>
 
 #include "command_line.hpp"
+#include "config/config.hpp"
 #include "core/base/options.hpp"
 #include "daemon/calibration.hpp"
 #include "locus_replay/failure.hpp"
@@ -36,6 +37,7 @@ struct CtlArguments {
   std::string instance, socket, mode, address, file, keep;
   std::vector<double> pose;
   std::uint16_t port = kViewPort;
+  DdsOptions dds; ///< network of the ROS 2 nodes
   bool json = false, watch = false, yaml = false;
 
   [[nodiscard]] std::filesystem::path control() const {
@@ -171,9 +173,14 @@ std::function<void()> parse(int argc, char** argv, CtlArguments& arguments) {
   CLI::App* const keep = app.add_subcommand("record", "Stores the latest input as an incident, for locus-replay");
   keep->add_option("--keep", arguments.keep, "Length of the input, e.g. 60s")->required()->type_name("SECONDS");
   keep->callback([&] { action = [&] { record(arguments); }; });
-  app.add_subcommand("sensors", "Finds the lidars on the network; needs no service")->callback([&] {
-    action = [] { fmt::print("{}", find_sensors(std::chrono::seconds{2})); };
-  });
+  CLI::App* const sensors = app.add_subcommand(
+      "sensors", "Finds the lidars, IMUs and odometries on the network, and prints a configuration; needs no service");
+  sensors->add_option("--interface", arguments.dds.interface, "Network interface of the ROS 2 nodes; default: lo")
+      ->type_name("NAME");
+  sensors->add_option("--domain", arguments.dds.domain, "Their ROS_DOMAIN_ID; default: 0")
+      ->type_name("N")
+      ->check(CLI::Range(0, 232));
+  sensors->callback([&] { action = [&] { fmt::print("{}", find_sensors(arguments.dds, std::chrono::seconds{2})); }; });
   CLI::App* const from_lidar =
       app.add_subcommand("fetch", "Fetches an Ouster's metadata or a Hesai's angles from the lidar; needs no service");
   from_lidar->add_option("ADDRESS", arguments.address, "Address of the lidar, e.g. 192.168.1.201")->required();

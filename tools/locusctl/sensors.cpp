@@ -3,16 +3,19 @@
 
 #include <algorithm>
 #include <array>
-#include <map>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "config/config_proposal.hpp"
+#include "config/config_yaml.hpp"
+#include "discovery/lidar_candidates.hpp"
 #include "drivers/lidar_input.hpp"
-#include "drivers/lidar_survey.hpp"
 #include "drivers/net/wire_tap.hpp"
 #include "locus_replay/failure.hpp"
-#include "locusctl/lidar_entry.hpp"
+#include "locusctl/live_topics.hpp"
 
 namespace locus::tools {
 namespace {
@@ -24,7 +27,7 @@ std::string describe(const SurveyedLidar& lidar) {
   if (lidar.columns_per_turn > 0)
     mode = fmt::format("{}x{:.0f}", lidar.columns_per_turn, lidar.rotation_rate_rpm / 60.0);
   std::string text =
-      fmt::format("{:<16}{:<7}{:<12}{:>5.0f} rpm  {:<10}{:>7.0f} packets/s  {}", dotted(lidar.ip), lidar.port, model,
+      fmt::format("# {:<16}{:<7}{:<12}{:>5.0f} rpm  {:<10}{:>7.0f} packets/s  {}", dotted(lidar.ip), lidar.port, model,
                   lidar.rotation_rate_rpm, mode, lidar.packets_per_s, lidar.clock_state());
   if (lidar.ouster.value_or(0) > 0)
     text += fmt::format("  serial number {}", *lidar.ouster);
@@ -37,53 +40,155 @@ std::string describe_unread(const SurveyedLidar& lidar) {
                      help.empty() ? "" : "; ", help);
 }
 
-/// Formats a configuration entry, and the command that fetches the file that only the sensor has: an Ouster requires
-/// it.
-std::string entry(const SurveyedLidar& lidar, int number, bool shares_port) {
-  const std::string name = fmt::format("lidar{}", number), ip = dotted(lidar.ip);
-  const std::string file = fmt::format("/etc/locusd/{}{}", name, lidar.ouster ? ".json" : ".csv");
-  const std::string model = lidar.ouster ? "Ouster, metadata: " + file : std::string{lidar.model};
-  std::string yaml = lidar_entry(
-      name, fmt::format("model: {}, port: {}{}", model, lidar.port, shares_port ? ", source_ip: " + ip : ""));
-  if (lidar.ouster)
-    yaml += fmt::format("    # locusctl fetch {} -o {}\n", ip, file);
-  else if (lidar.clock) // Hesai
-    yaml += fmt::format("    # calibration: {1} has its own angles, after: locusctl fetch {0} -o {1}\n", ip, file);
-  return yaml;
-}
+/// Configuration of a robot, by what is on its networks.
+class LiveProposal {
+ public:
+  void add_lidars(const std::vector<LidarCandidate>& candidates) {
+    config_.lidars.clear();
+    for (const LidarCandidate& one : candidates)
+      add_lidar(one);
+  }
+
+  void add_topics(const LiveTopics& topics) {
+    const std::vector<CloudCandidate> clouds = topics.clouds();
+    for (const CloudCandidate& cloud : clouds)
+      add_clouds(cloud, topics.transforms());
+    const std::string lidar_frame = clouds.empty() ? "" : clouds.front().frame;
+    choose_sources(
+        topics.motion(),
+        [&](const std::string& frame) {
+          return topics.transforms().between(config_.dds.frame_base, frame) ||
+                 topics.transforms().between(lidar_frame, frame);
+        },
+        config_, reasons_);
+    for (const MotionCandidate& one : topics.motion())
+      mount(one, topics.transforms());
+  }
+
+  /// Leaves out the sources whose topic nobody publishes.
+  void reduce_sources(const std::vector<MotionCandidate>& published, const std::string& network) {
+    for (std::size_t i = config_.motion_sources.size(); i-- > 0;)
+      if (std::ranges::find(published, config_.motion_sources[i].topic, &MotionCandidate::topic) == published.end())
+        leave_out_source(i, "nothing of its kind " + network, config_, reasons_);
+    if (config_.motion_sources.empty())
+      reasons_.of_key["motion_sources"] = "no IMU or odometry " + network;
+  }
+
+  void use(const DdsOptions& dds) {
+    config_.dds.domain = dds.domain;
+    config_.dds.interface = dds.interface;
+    reasons_.of_other_keys = "as this command listened";
+  }
+
+  [[nodiscard]] bool has_lidars() const { return !config_.lidars.empty(); }
+  [[nodiscard]] std::string text() const { return print_proposal(config_, reasons_); }
+
+ private:
+  [[nodiscard]] std::string next_name() const {
+    return fmt::format("lidar{}", config_.lidars.size() + reasons_.other_lidars.size() + 1);
+  }
+
+  /// Adds a lidar and, for the file that only the sensor has, the command that fetches it: an Ouster requires it.
+  void add_lidar(const LidarCandidate& one) {
+    const std::string key = fmt::format("lidars.{}.", config_.lidars.size());
+    LidarOptions& lidar = config_.lidars.emplace_back(one.options);
+    lidar.name = fmt::format("lidar{}", config_.lidars.size());
+    const std::string ip = dotted(one.found.ip);
+    const std::string file = fmt::format("/etc/locusd/{}{}", lidar.name, one.found.ouster ? ".json" : ".csv");
+    if (one.found.ouster)
+      lidar.metadata = file;
+    reasons_.of_key[key + "name"] = text_of(one.found);
+    reasons_.of_key[key + "port"] = "where its packets go";
+    if (lidar.source_ip)
+      reasons_.of_key[key + "source_ip"] = "another lidar sends to the same port";
+    reasons_.of_key[key + "T_base_lidar"] = "measure where it is on the robot";
+    const std::string fetch = fmt::format("locusctl fetch {} -o {}", ip, file);
+    if (one.found.ouster)
+      reasons_.of_key[key + "metadata"] = "after " + fetch;
+    else
+      reasons_.of_key[key + "model"] =
+          one.found.clock ? fmt::format("a Hesai; calibration: {} has its own angles, after {}", file, fetch)
+                          : "by its packets";
+    const std::array model{fmt::format("{}model={}", key, one.found.model)};
+    if (const auto named = override_config(config_, model); named && !one.found.ouster)
+      config_ = *named;
+  }
+
+  void add_clouds(const CloudCandidate& cloud, const StaticTransforms& transforms) {
+    LidarOptions lidar;
+    lidar.name = next_name();
+    lidar.topic = cloud.topic;
+    const auto T_base_lidar = transforms.between(config_.dds.frame_base, cloud.frame);
+    lidar.T_base_lidar = T_base_lidar ? as_written(*T_base_lidar) : Pose{};
+    const std::string what =
+        fmt::format("clouds of {} points", cloud.points / std::max<std::size_t>(cloud.messages, 1));
+    if (has_lidars()) {
+      reasons_.other_lidars.push_back({lidar, what + "; packets, or clouds with more points, are preferred"});
+      return;
+    }
+    config_.lidars.push_back(lidar);
+    reasons_.of_key["lidars.0.topic"] = what;
+    reasons_.of_key["lidars.0.T_base_lidar"] =
+        T_base_lidar
+            ? cloud.frame + " on the base, by /tf_static"
+            : fmt::format("/tf_static does not place '{}' on {}: measure it", cloud.frame, config_.dds.frame_base);
+  }
+
+  void mount(const MotionCandidate& imu, const StaticTransforms& transforms) {
+    const auto source = std::ranges::find(config_.motion_sources, imu.topic, &MotionSource::topic);
+    const auto T_base_imu = transforms.between(config_.dds.frame_base, imu.frame);
+    if (imu.kind != SourceKind::imu || source == config_.motion_sources.end() || !T_base_imu)
+      return;
+    source->T_base_source = as_written(*T_base_imu);
+    reasons_.of_key[fmt::format("motion_sources.{}.T_base_source", source - config_.motion_sources.begin())] =
+        imu.frame == config_.dds.frame_base ? "its frame is the base" : imu.frame + " on the base, by /tf_static";
+  }
+
+  Config config_;
+  ConfigReasons reasons_;
+};
 
 } // namespace
 
-std::string find_sensors(Duration duration) {
+std::string find_sensors(const DdsOptions& dds, Duration duration) {
+  constexpr Duration kRound = std::chrono::milliseconds{100}; // the readers' history covers more
   constexpr std::uint16_t kRoboSensePort = 6699, kSeyondPort = 8010, kLivoxPort = 56301;
   constexpr std::array kDefaultPorts{kDefaultDataPort, kDefaultPositionPort, ouster::kDefaultLidarPort,
                                      kRoboSensePort,   kSeyondPort,          kLivoxPort};
   auto wire = WireTap::open(kDefaultPorts);
   if (!wire)
     throw Failure(ExitStatus::failed, wire.error());
+  Expected<LiveTopics, std::string> topics = LiveTopics::join(dds);
   LidarSurvey survey;
-  wire->listen(duration, [&](const Datagram& datagram) { survey.add(datagram); });
-
-  const std::vector<SurveyedLidar> lidars = survey.lidars();
-  std::map<std::uint16_t, int> on_port;
-  for (const SurveyedLidar& lidar : lidars)
-    on_port[lidar.port] += lidar.is_known() ? 1 : 0;
-  std::string text, refused, yaml;
-  int known = 0;
-  for (const SurveyedLidar& lidar : lidars) {
-    if (lidar.unknown_packets)
-      refused += describe_unread(lidar);
-    if (!lidar.is_known())
-      continue;
-    text += describe(lidar);
-    yaml += entry(lidar, ++known, on_port[lidar.port] > 1);
+  for (Duration listened{}; listened < duration; listened += kRound) {
+    wire->listen(kRound, [&](const Datagram& datagram) { survey.add(datagram); });
+    if (topics)
+      topics->poll(Stamp{listened + kRound});
   }
-  if (text.empty())
+  std::string text, refused;
+  for (const SurveyedLidar& lidar : survey.lidars()) {
+    if (lidar.is_known())
+      text += describe(lidar);
+    if (!lidar.unknown_packets)
+      continue;
+    refused += describe_unread(lidar);
+    text += "# " + describe_unread(lidar);
+  }
+  LiveProposal proposal;
+  proposal.add_lidars(lidar_candidates(survey, kDefaultDataPort));
+  if (topics)
+    proposal.add_topics(*topics);
+  if (!proposal.has_lidars())
     throw Failure(
         ExitStatus::failed,
         fmt::format("{}no lidar {}was received within {:.0f} s; check power, cable and the address it sends to",
                     refused, refused.empty() ? "" : "that can be read ", to_seconds(duration)));
-  return text + refused + "\nlidars:\n" + yaml;
+  proposal.reduce_sources(
+      topics ? topics->motion() : std::vector<MotionCandidate>{},
+      topics ? fmt::format("in domain {} on {}; --domain and --interface choose another", dds.domain, dds.interface)
+             : topics.error());
+  proposal.use(dds);
+  return text + proposal.text();
 }
 
 } // namespace locus::tools

@@ -3,12 +3,13 @@
 
 #include <string>
 
+#include "config/config.hpp"
 #include "core/base/stamp.hpp"
 
 namespace locus::tools {
 
-/// Listens to all UDP traffic for a while and lists the lidars that send, with the YAML to paste. Captures raw frames
-/// if permitted, so that a running service is not disturbed; else listens at the lidars' default ports. Throws Failure.
-std::string find_sensors(Duration duration);
+/// Listens to the lidars on all networks, and to the topics of ROS 2 on that of `dds`. Formats a comment for each lidar
+/// and the configuration that fits, YAML with the reason for each line. Throws Failure if there is no lidar.
+std::string find_sensors(const DdsOptions& dds, Duration duration);
 
 } // namespace locus::tools
