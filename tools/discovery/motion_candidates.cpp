@@ -151,11 +151,12 @@ void MotionCandidate::count(Stamp received) {
   ++messages;
   first = first.value_or(received);
   latest = received;
+  later += received > *first ? 1U : 0U;
 }
 
 double MotionCandidate::rate_hz() const {
   const double lasted_s = first ? to_seconds(latest - *first) : 0;
-  return lasted_s > 0 ? static_cast<double>(messages - 1) / lasted_s : 0;
+  return lasted_s > 0 ? static_cast<double>(later) / lasted_s : 0;
 }
 
 double MotionCandidate::mean_force_mps2() const {

@@ -23,6 +23,7 @@ struct MotionCandidate {
   SourceKind kind;
   std::string frame;            ///< of an IMU; of the body whose motion an odometry reports (child_frame_id)
   std::size_t messages = 0;     ///< examined
+  std::size_t later = 0;        ///< of these, received after the first: messages may be received in groups
   std::optional<Stamp> first{}; ///< reception of the first and of the latest message
   Stamp latest{};
   double force_sum_mps2 = 0;                       ///< of an IMU: magnitudes of the specific forces
