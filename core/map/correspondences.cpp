@@ -57,13 +57,14 @@ void store_match(const Surface& surface, const Eigen::Vector3f& mean_m, std::siz
   matches.across_m2[i] = planar ? surface.variance_m2 : surface.strewn_m2;
   matches.along_m2[i] = planar ? kAlongVariance_m2 : surface.strewn_m2;
   matches.found[i] = 1.0F;
+  matches.unknown[i] = 0.0F;
 }
 
 void put_none(std::size_t i, MatchBlock& matches) {
   matches.x_m[i] = matches.y_m[i] = matches.z_m[i] = 0.0F;
   matches.normal_x[i] = matches.normal_y[i] = matches.normal_z[i] = 0.0F;
   matches.across_m2[i] = matches.along_m2[i] = 1.0F;
-  matches.found[i] = 0.0F;
+  matches.found[i] = matches.unknown[i] = 0.0F;
 }
 
 /// Points of a block in the target, relative to the origin.
@@ -127,7 +128,7 @@ std::size_t list_open(const GicpPass& pass, const Placed& points, std::size_t co
 /// number.
 template <class VoxelOf>
 std::size_t find_in(const GicpPass& pass, const SurfaceGrid& grid, const VoxelOf& voxel_of, const Placed& points,
-                    std::size_t count, Places& open, MatchBlock& matches) {
+                    std::size_t count, Places& open, MatchBlock& matches, PerPoint& is_unknown) {
   std::array<VoxelIndex, kGicpBlock> index;
   std::array<const Surface*, kGicpBlock> surface;
   for (std::size_t k = 0; k < count; ++k)
@@ -145,6 +146,8 @@ std::size_t find_in(const GicpPass& pass, const SurfaceGrid& grid, const VoxelOf
         continue;
       }
     }
+    if (pass.accepts_shapeless && surface[k] != nullptr && surface[k]->unknown())
+      is_unknown[i] = 1.0F;
     open[left++] = i;
   }
   return left;
@@ -155,14 +158,17 @@ void find_here(const GicpPass& pass, const Placed& points, std::size_t count, Ma
   Cells fine;
   run_as(isa, [&] { index_all(pass.target.fine(), pass.origin_m, points, fine); });
   Places open; // points still without a correspondence
+  PerPoint is_unknown{};
   count = list_open(pass, points, count, fine, matches, open);
   matches.fine = fine;
   const auto in_fine = [&](std::uint32_t i) { return fine[i]; };
-  count = find_in(pass, pass.target.fine(), in_fine, points, count, open, matches);
+  count = find_in(pass, pass.target.fine(), in_fine, points, count, open, matches, is_unknown);
   const auto in_coarse = [&](std::uint32_t i) { return SurfaceMap::coarse_of(fine[i]); };
-  count = find_in(pass, pass.target.coarse(), in_coarse, points, count, open, matches);
-  for (const std::uint32_t i : std::span(open).first(count))
+  count = find_in(pass, pass.target.coarse(), in_coarse, points, count, open, matches, is_unknown);
+  for (const std::uint32_t i : std::span(open).first(count)) {
     put_none(i, matches);
+    matches.unknown[i] = is_unknown[i];
+  }
 }
 
 /// Assigns the surface with the nearest mean in the 27 voxels around the point, at most a voxel away; false if none.

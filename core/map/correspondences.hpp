@@ -38,6 +38,7 @@ struct MatchBlock {
   PerPoint normal_x, normal_y, normal_z; ///< zero for a shapeless one
   PerPoint across_m2, along_m2;          ///< variances; equal for a shapeless one
   PerPoint found;                        ///< 1, or 0 where there is no correspondence
+  PerPoint unknown;                      ///< 1 in a voxel that is occupied, by a surface of unknown shape
   Cells fine;                            ///< voxels in which they were looked up
 };
 

@@ -22,7 +22,7 @@ namespace {
 
 /// Share of points with a plane below which voxels without one serve as correspondences as well, as in a thicket.
 /// Elsewhere they would only tie the robot to the pattern of the scan lines.
-constexpr double kFewPlanes = 0.4;
+constexpr double kFewPlanes = 0.3;
 
 constexpr double kDamping = 1e-6; ///< regularises directions that neither points nor prior constrain
 
@@ -218,6 +218,14 @@ struct Gicp::Workers {
       result.object_costs[object] = static_cast<float>(costs[object] + scale * errors[object]);
   }
 
+  /// Returns the number of points in space that is occupied by a surface of unknown shape.
+  [[nodiscard]] std::size_t unknown() const {
+    std::ptrdiff_t total = 0;
+    for (std::size_t block = 0; block < blocks.size(); ++block)
+      total += std::ranges::count(matches[block].unknown, 1.0F);
+    return static_cast<std::size_t>(total);
+  }
+
   [[nodiscard]] Matrix6 observability(const Eigen::Matrix3d& R_target_source) const {
     Matrix6 gradients = Matrix6::Zero();
     for (std::size_t block = 0; block < blocks.size(); ++block)
@@ -272,8 +280,9 @@ void move(const Vector12& step, Registration& result) {
 } // namespace
 
 double fit_of(const Registration& registration) {
-  constexpr double kMissing = 9.0;
-  return static_cast<double>(registration.inliers) * (kMissing - registration.mean_error);
+  constexpr double kMissing = 9.0, kExpected = 1.0;
+  return static_cast<double>(registration.inliers) * (kMissing - registration.mean_error) +
+         static_cast<double>(registration.unknown) * (kMissing - kExpected);
 }
 
 namespace {
@@ -345,6 +354,7 @@ Registration Gicp::align(const ElasticScan& source, const SurfaceMap& target, co
       break;
   }
   workers_->sum_objects(result);
+  result.unknown = workers_->unknown();
   if (result.iterations > 0)
     result.observability = workers_->observability(result.T_target_source.R());
   return result;

@@ -47,6 +47,7 @@ struct Registration {
   int iterations = 0;                      ///< Gauss-Newton steps
   std::size_t points = 0;                  ///< number of points of the scan
   std::size_t inliers = 0;                 ///< points with a correspondence within reach
+  std::size_t unknown = 0;                 ///< points in space occupied by a surface of unknown shape
   double mean_error = 0.0;                 ///< mean squared Mahalanobis distance of the inliers
   Matrix12 information = Matrix12::Zero(); ///< of the points alone, scaled for their correlation
   /// Twice the negative log likelihood of the points of each object, see evidence(). An object is what stands on a
@@ -56,9 +57,9 @@ struct Registration {
   /// source's origin. Measures how well the surfaces constrain each direction. Target axes.
   Matrix6 observability = Matrix6::Zero();
 
-  /// Returns the share of the points that have a correspondence.
+  /// Returns the share of the points that lie where the target has points, too.
   [[nodiscard]] double overlap() const {
-    return points > 0 ? static_cast<double>(inliers) / static_cast<double>(points) : 0.0;
+    return points > 0 ? static_cast<double>(inliers + unknown) / static_cast<double>(points) : 0.0;
   }
 };
 

@@ -64,7 +64,8 @@ struct Fits {
 [[gnu::always_inline]] inline void fit_all(Fits& voxels, float leaf_m) {
   const float min_spread_m2 = kMinSpreadInLeaves * kMinSpreadInLeaves * leaf_m * leaf_m;
   const float along_m2 = kDiscRadiusInLeaves * kDiscRadiusInLeaves * leaf_m * leaf_m;
-  Fits f = voxels; // output apart from input: vectorised
+  const float between_lines_m2 = leaf_m * leaf_m / 12.0F; // uniform in the voxel
+  Fits f = voxels;                                        // output apart from input: vectorised
   for (std::size_t i = 0; i < kAtOnce; ++i) {
     const float share = 1.0F / voxels.count[i];
     const float x = share * voxels.x[i], y = share * voxels.y[i], z = share * voxels.z[i];
@@ -93,7 +94,8 @@ struct Fits {
     f.normal_y[i] = best(points.y, discs.y);
     f.normal_z[i] = best(points.z, discs.z);
     f.variance_m2[i] = planar * least - (1.0F - planar);
-    f.strewn_m2[i] = strewn * ((scatter.xx + scatter.yy + scatter.zz) / 3.0F + kPointVariance_m2) - (1.0F - strewn);
+    f.strewn_m2[i] = strewn * ((scatter.xx + scatter.yy + scatter.zz) / 3.0F + between_lines_m2 + kPointVariance_m2) -
+                     (1.0F - strewn);
   }
   voxels = f;
 }
@@ -115,7 +117,8 @@ std::uint64_t hash_of(VoxelIndex index) {
 
 } // namespace
 
-SurfaceGrid::SurfaceGrid(double leaf_m, std::size_t max_bytes, Isa isa) : leaf_m_(leaf_m), isa_(isa) {
+SurfaceGrid::SurfaceGrid(double leaf_m, std::size_t max_bytes, Isa isa, bool of_one_sweep)
+    : leaf_m_(leaf_m), isa_(isa), of_one_sweep_(of_one_sweep) {
   constexpr std::size_t kBytesPerVoxel = sizeof(Voxel) + sizeof(Moments) + sizeof(std::uint32_t) + 4 * sizeof(Entry);
   const std::size_t capacity = std::max<std::size_t>(max_bytes / kBytesPerVoxel, 64);
   entries_.resize(std::bit_ceil(2 * capacity));
@@ -277,6 +280,7 @@ void SurfaceGrid::add(const Points& points, const Places& places, std::size_t i,
   Moments& moments = moments_[slot];
   if (!moments.touched) {
     moments.touched = true;
+    moments.shaped = of_one_sweep_ || !moments.fresh;
     touched_.push_back(slot);
   }
   if (moments.sums[kCount] >= kMaxCount)
@@ -320,7 +324,7 @@ void SurfaceGrid::fit(std::span<const std::uint32_t> slots) {
     voxels_[slots[i]].surface = {{fits.mean_x[i], fits.mean_y[i], fits.mean_z[i]},
                                  {fits.normal_x[i], fits.normal_y[i], fits.normal_z[i]},
                                  fits.variance_m2[i],
-                                 fits.strewn_m2[i]};
+                                 moments_[slots[i]].shaped ? fits.strewn_m2[i] : std::min(0.0F, fits.strewn_m2[i])};
 }
 
 void SurfaceGrid::refresh() {

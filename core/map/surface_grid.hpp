@@ -29,21 +29,27 @@ struct Surface {
   Eigen::Vector3f mean_m = Eigen::Vector3f::Zero(); ///< relative to the centre of the voxel
   Eigen::Vector3f normal = Eigen::Vector3f::Zero(); ///< unit
   float variance_m2 = -1.0F;                        ///< along the normal; negative: no plane
-  float strewn_m2 = -1.0F; ///< mean variance of the points about their mean; negative: too few points
+  /// Variance of a point where there is no plane: that of the voxel's points about their mean, and of the space between
+  /// scan lines. Negative: too few points; zero: all are of one sweep, and lie where its scan lines fell.
+  float strewn_m2 = -1.0F;
   [[nodiscard]] bool planar() const { return variance_m2 > 0.0F; }
   [[nodiscard]] bool shapeless() const { return !planar() && strewn_m2 > 0.0F; }
+  /// Tells whether the space is occupied, by a surface of unknown shape.
+  [[nodiscard]] bool unknown() const { return !planar() && strewn_m2 == 0.0F; }
 };
 
 /// Running Gaussians of points in cubic voxels, found by hashing.
 ///
-/// Only planes are read from it. Along a plane the points of a sweep lie where the scan lines happen to fall, a pattern
-/// that moves with the lidar: anything else read from a voxel would follow the robot. A voxel with enough points is
+/// Planes are read from it. Along a plane the points of a sweep lie where the scan lines happen to fall, a pattern
+/// that moves with the lidar: anything else read from a voxel would follow the robot. Where planes are few, the scatter
+/// of points serves as well, if it is that of several sweeps (docs/decisions/056). A voxel with enough points is
 /// judged by their positions. One with fewer also uses the normals of the points: moment matching of discs, so a single
 /// point with a normal makes a plane. Voxels are stored in a pool of fixed size; when it is full, the oldest one far
 /// from the robot is evicted. Neither insertion nor look-up walks the whole map. One writer or many readers.
 class SurfaceGrid {
  public:
-  SurfaceGrid(double leaf_m, std::size_t max_bytes, Isa isa = best_isa());
+  /// `of_one_sweep`: shapes are read from one sweep, because there will be no other.
+  SurfaceGrid(double leaf_m, std::size_t max_bytes, Isa isa = best_isa(), bool of_one_sweep = false);
 
   /// Points with the unit normals of their surfaces, or zero: one batch for insert().
   struct Points {
@@ -124,7 +130,8 @@ class SurfaceGrid {
   struct Moments { ///< apart from Voxel, which is read far more often
     std::array<float, kSums> sums{};
     bool touched = false;
-    bool fresh = true; ///< not refreshed yet
+    bool fresh = true;   ///< not refreshed yet
+    bool shaped = false; ///< its points are of enough sweeps for a shape
   };
   struct Places;
 
@@ -139,6 +146,7 @@ class SurfaceGrid {
 
   double leaf_m_;
   Isa isa_;
+  bool of_one_sweep_;
   std::vector<Entry> entries_; ///< open addressing, linear probing, power of two, at most half full
   std::vector<Voxel> voxels_;
   std::vector<Moments> moments_;

@@ -52,9 +52,9 @@ SurfaceGrid::Points in_map(std::span<const SurfacePoint> points_base, const Pose
 
 } // namespace
 
-SurfaceMap::SurfaceMap(std::size_t max_bytes, Isa isa)
-    : isa_(isa), fine_(kFineLeaf_m, max_bytes - max_bytes / kCoarseShare, isa),
-      coarse_(kCoarseLeaf_m, max_bytes / kCoarseShare, isa) {}
+SurfaceMap::SurfaceMap(std::size_t max_bytes, Isa isa, bool of_one_sweep)
+    : isa_(isa), fine_(kFineLeaf_m, max_bytes - max_bytes / kCoarseShare, isa, of_one_sweep),
+      coarse_(kCoarseLeaf_m, max_bytes / kCoarseShare, isa, of_one_sweep) {}
 
 double SurfaceMap::insert(std::span<const SurfacePoint> points_base, const Pose& T_map_base) {
   fine_.protect(T_map_base.translation, kSubmapRadius_m);

@@ -22,7 +22,8 @@ class SurfaceMap {
   static constexpr int kFinePerCoarse = 3; ///< odd: no fine voxel lies in two coarse ones
   static constexpr double kCoarseLeaf_m = kFinePerCoarse * kFineLeaf_m;
 
-  explicit SurfaceMap(std::size_t max_bytes, Isa isa = best_isa());
+  /// `of_one_sweep`: target of scan-to-scan, see SurfaceGrid.
+  explicit SurfaceMap(std::size_t max_bytes, Isa isa = best_isa(), bool of_one_sweep = false);
 
   /// Inserts a sweep at T_map_base. Returns the share of its points that fell into empty voxels.
   double insert(std::span<const SurfacePoint> points_base, const Pose& T_map_base);

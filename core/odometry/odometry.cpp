@@ -45,7 +45,7 @@ Matrix6 share_of_map(double fresh, const Matrix6& observability) {
 Odometry::Odometry(const OdometryOptions& options, const std::vector<MotionSourceOptions>& sources, StageClock* clock)
     : options_(options), sources_(sources), clock_(clock), gicp_(options.threads, options.isa),
       flat_ground_(options.flat_ground), map_(options.map.max_bytes, options.isa),
-      last_scan_map_(kLastScanBytes, options.isa), map_policy_(options.map), filter_(sources, options.motion) {
+      last_scan_map_(kLastScanBytes, options.isa, true), map_policy_(options.map), filter_(sources, options.motion) {
   std::vector<MotionSourceOptions> observed = sources;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     feedback_.late[i] = MotionTrack::applied_lateness(1e-3 * sources[i].late_ms);

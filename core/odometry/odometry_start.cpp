@@ -139,7 +139,7 @@ std::optional<Odometry::Start> Odometry::find_first_motion(const Sweep& first, c
     if (Start free = start_without(kAllSources, first, sweep, stop);
         evidence(free.fit, start.fit) > odds_of_sources(sweep, {}))
       start = free;
-  if (static_cast<double>(start.fit.inliers) < kMinOverlap * static_cast<double>(sweep.registered))
+  if (static_cast<double>(start.fit.inliers + start.fit.unknown) < kMinOverlap * static_cast<double>(sweep.registered))
     return std::nullopt;
   return start;
 }

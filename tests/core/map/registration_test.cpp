@@ -63,6 +63,51 @@ TEST(Gicp, PointsNeedNoNormals) {
   EXPECT_LT(off_deg(found.T_target_source, truth), 0.1);
 }
 
+/// Points of a thicket without any surface, in clusters that move with the lidar as the pattern of its scan lines does.
+std::vector<SurfacePoint> scan_lines_in_a_thicket() {
+  std::mt19937 random{7};
+  std::uniform_real_distribution<float> unit{-1.0F, 1.0F};
+  std::vector<SurfacePoint> points;
+  for (int line = 0; line < 300; ++line) {
+    const Eigen::Vector3f centre_m{10.0F * unit(random), 10.0F * unit(random), 2.0F * unit(random)};
+    for (int i = 0; i < 6; ++i)
+      points.push_back(
+          {centre_m + 0.1F * Eigen::Vector3f{unit(random), unit(random), unit(random)}, Eigen::Vector3f::Zero()});
+  }
+  return points;
+}
+
+/// Registers the scan of a thicket with a map of it, from a start that the prior holds to `sigma_m`, 11 cm off the map.
+Registration registered_off_a_thicket(int sweeps, double sigma_m) {
+  const std::vector<SurfacePoint> scan = scan_lines_in_a_thicket();
+  SurfaceMap map(kBytes);
+  for (int i = 0; i < sweeps; ++i)
+    map.insert(scan, Pose{});
+  MotionBelief moved;
+  moved.T_target_source.translation = {0.1, 0.05, 0.0};
+  moved.information.diagonal().setConstant(1.0 / (sigma_m * sigma_m));
+  return Gicp(1).align({scan}, map, moved.T_target_source, moved, kOptions, false, never);
+}
+
+TEST(Gicp, PatternOfOneSweepDoesNotHoldTheRobot) {
+  const Registration found = registered_off_a_thicket(1, 0.03);
+  EXPECT_LT((found.T_target_source.translation - Eigen::Vector3d{0.1, 0.05, 0.0}).norm(), 0.005);
+  EXPECT_GT(found.overlap(), 0.5);
+}
+
+TEST(Gicp, PointsOfSeveralSweepsAreAMeasurementWherePlanesAreFew) {
+  EXPECT_LT(registered_off_a_thicket(2, 1.0).T_target_source.translation.norm(), 0.03);
+}
+
+TEST(Gicp, PointsOfOneSweepAreAMeasurementOfScanToScan) {
+  const std::vector<SurfacePoint> scan = scan_lines_in_a_thicket();
+  SurfaceMap last_scan(kBytes, best_isa(), true);
+  last_scan.insert(scan, Pose{});
+  const Pose start{Eigen::Quaterniond::Identity(), {0.1, 0.05, 0.0}};
+  const Registration found = Gicp(1).align({scan}, last_scan, start, kNoPrior, kOptions, false, never);
+  EXPECT_LT(found.T_target_source.translation.norm(), 0.03);
+}
+
 TEST(Gicp, WideReachesHalfAMetreAndTenDegrees) {
   const SurfaceMap map = map_of(test::points_on(test::furnished_room(), 3000, 1, 0.01));
   const Pose truth{so3_exp({0, 0, 10 * kRadPerDeg}), {0.4, -0.3, 0.0}};

@@ -95,6 +95,41 @@ TEST(SurfaceGrid, CornerIsNotPlanar) {
   EXPECT_FALSE(grid.find({0, 0, 0})->planar());
 }
 
+/// Four points along a line across a voxel, as a scan line leaves them.
+void insert_scan_line(SurfaceGrid& grid, double y_m) {
+  for (const double x_m : {-0.2, -0.1, 0.1, 0.2})
+    insert(grid, {x_m, y_m, 0.0}, kNoNormal);
+  grid.refresh();
+}
+
+TEST(SurfaceGrid, ShapeIsUnknownFromOneSweep) {
+  SurfaceGrid grid(kLeaf_m, kEnoughBytes);
+  insert_scan_line(grid, 0.0);
+  EXPECT_TRUE(grid.find({0, 0, 0})->unknown());
+  EXPECT_FALSE(grid.find({0, 0, 0})->shapeless());
+  insert(grid, {0.0, 0.1, 0.1}, kNoNormal); // of another sweep
+  grid.refresh();
+  EXPECT_FALSE(grid.find({0, 0, 0})->unknown());
+  EXPECT_TRUE(grid.find({0, 0, 0})->shapeless());
+}
+
+TEST(SurfaceGrid, TooFewPointsHaveNoShapeHoweverManySweepsTheyAreOf) {
+  SurfaceGrid grid(kLeaf_m, kEnoughBytes);
+  for (const double y_m : {-0.1, 0.0, 0.1}) {
+    insert(grid, {0.0, y_m, 0.0}, kNoNormal);
+    grid.refresh();
+    EXPECT_FALSE(grid.find({0, 0, 0})->unknown());
+    EXPECT_FALSE(grid.find({0, 0, 0})->shapeless());
+  }
+}
+
+TEST(SurfaceGrid, PointOfAShapelessVoxelMayLieAnywhereInIt) {
+  SurfaceGrid grid(kLeaf_m, kEnoughBytes);
+  insert_scan_line(grid, 0.0);
+  insert_scan_line(grid, 0.0);
+  EXPECT_GE(grid.find({0, 0, 0})->strewn_m2, kLeaf_m * kLeaf_m / 12.0);
+}
+
 TEST(SurfaceGrid, ANoisyFloorAtHeightZeroIsOneLayerOfPlanes) {
   SurfaceGrid grid(kLeaf_m, kEnoughBytes);
   std::mt19937 random{1};
