@@ -68,7 +68,7 @@ std::vector<SurfacePoint> scan_lines_in_a_thicket() {
   std::mt19937 random{7};
   std::uniform_real_distribution<float> unit{-1.0F, 1.0F};
   std::vector<SurfacePoint> points;
-  for (int line = 0; line < 300; ++line) {
+  for (int line = 0; line < 200; ++line) {
     const Eigen::Vector3f centre_m{10.0F * unit(random), 10.0F * unit(random), 2.0F * unit(random)};
     for (int i = 0; i < 6; ++i)
       points.push_back(
