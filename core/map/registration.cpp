@@ -335,7 +335,8 @@ Registration Gicp::align(const ElasticScan& source, const SurfaceMap& target, co
         workers_->run({target, result.T_target_source, T_start.translation, looks_up ? look_up : LookUp::reuse,
                        few_planes, options.max_correspondence_m, width * width},
                       result.twist_base);
-    if (!(points.of_pose.weight > 0.0))
+    const bool is_empty = !(points.of_pose.weight > 0.0);
+    if (is_empty && (few_planes || source.points.empty()))
       break;
     if (looks_up)
       can_follow = look_up != LookUp::around;
@@ -344,6 +345,8 @@ Registration Gicp::align(const ElasticScan& source, const SurfaceMap& target, co
       few_planes = true;
       can_follow = false;
     }
+    if (is_empty)
+      continue; // no plane at all: once more with shapeless voxels
     const Vector12 step = solve(points, result, prior);
     if (!step.allFinite())
       break;
