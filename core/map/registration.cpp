@@ -22,7 +22,7 @@ namespace {
 
 /// Share of points with a plane below which voxels without one serve as correspondences as well, as in a thicket.
 /// Elsewhere they would only tie the robot to the pattern of the scan lines.
-constexpr double kFewPlanes = 0.3;
+constexpr double kFewPlanes = 0.4;
 
 constexpr double kDamping = 1e-6; ///< regularises directions that neither points nor prior constrain
 

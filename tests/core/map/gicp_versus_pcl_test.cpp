@@ -100,7 +100,7 @@ double median(std::vector<double> values) {
 }
 
 Outcome align_ours(const View& target, const View& source, const Pose& truth) {
-  SurfaceMap map(20'000'000);
+  SurfaceMap map(20'000'000, best_isa(), true);
   map.insert(target.surfaces, Pose{});
   Gicp gicp(1);
   Outcome outcome;
