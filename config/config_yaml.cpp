@@ -398,10 +398,6 @@ Expected<Config, ConfigErrors> load_service_config(const std::filesystem::path& 
         error_line(at_line(file.string(), 1),
                    "names no lidar (is the file cut short?); name those of the robot under lidars:, or write "
                    "'defaults: true' for one VLP-16 in the middle of the robot")};
-  if (config && !text->ends_with('\n')) // what was written last may be missing, such as the network of DDS
-    return ConfigErrors{error_line(at_line(file.string(), static_cast<int>(split(*text, '\n').size())),
-                                   "this last line does not end with a line break (is the file cut short?); complete "
-                                   "it, and end it with one")};
   return config;
 }
 

@@ -18,8 +18,8 @@ using ConfigErrors = std::vector<std::string>;
 /// Reads a configuration file. Missing keys have their defaults; an unknown key is an error. At start-up only.
 Expected<Config, ConfigErrors> load_config(const std::filesystem::path& file);
 
-/// Reads a configuration file for the service: a file without lidars, such as an empty one, is an error unless it sets
-/// `defaults: true`, and so is one that ends within a line, as a truncated one does. Otherwise as load_config().
+/// Reads a configuration file for the service: a file without lidars, such as an empty or truncated one, is an error
+/// unless it sets `defaults: true`. Otherwise as load_config().
 Expected<Config, ConfigErrors> load_service_config(const std::filesystem::path& file);
 
 /// Reads a configuration from text; `origin` replaces the file name in errors. Otherwise as load_config().

@@ -440,22 +440,6 @@ TEST(ConfigYaml, ServiceFileMustNameALidarUnlessExempt) {
   EXPECT_FALSE(load_service_config("/nowhere/robot.yaml"));
 }
 
-/// A disk that is full or loses power while a file is written: the rest of it would be the defaults, and DDS would move
-/// to the loopback interface.
-TEST(ConfigYaml, ServiceFileCutWithinALineIsRejected) {
-  const std::string text = "lidars:\n  - {name: front}\ndds: {interface: wlan0}\n# end\n";
-  for (std::size_t length = 0; length <= text.size(); ++length) {
-    const std::string part = text.substr(0, length);
-    const auto config = load_service_config(test::TemporaryFile{"robot.yaml", test::bytes_of(part)}.path());
-    EXPECT_EQ(config.has_value(), part.ends_with("front}\n") || part.ends_with("wlan0}\n") || part == text) << part;
-  }
-  const ConfigErrors errors =
-      errors_of(load_service_config(test::TemporaryFile{"robot.yaml", test::bytes_of("lidars: [{}]\n# dds")}.path()));
-  ASSERT_EQ(errors.size(), 1U);
-  EXPECT_NE(errors[0].find("robot.yaml:2: this last line does not end with a line break"), std::string::npos)
-      << errors[0];
-}
-
 TEST(ConfigYaml, AnotherVersionIsAnError) {
   ASSERT_EQ(errors_in("version: 2\n").size(), 1U);
   EXPECT_TRUE(errors_in("version: 2\n")[0].starts_with("robot.yaml:1: version: this locusd reads version 1; see"));
