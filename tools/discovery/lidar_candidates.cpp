@@ -33,7 +33,8 @@ std::vector<LidarCandidate> lidar_candidates(const LidarSurvey& survey, std::uin
   for (LidarCandidate& one : candidates)
     if (on_port[one.found.port] > 1)
       one.options.source_ip = one.found.ip;
-  std::ranges::stable_partition(candidates, [&](const LidarCandidate& one) { return one.found.port == port; });
+  std::stable_partition(candidates.begin(), candidates.end(),
+                        [&](const LidarCandidate& one) { return one.found.port == port; });
   return candidates;
 }
 

@@ -34,7 +34,8 @@ void configure_lidar_of_capture(const std::filesystem::path& file, Config& confi
     return;
   LidarOptions& lidar = config.lidars.front();
   std::vector<LidarCandidate> candidates = lidar_candidates(survey_of(file), lidar.port);
-  std::ranges::stable_partition(candidates, [&](const LidarCandidate& one) { return !one.options.ouster; });
+  std::stable_partition(candidates.begin(), candidates.end(),
+                        [&](const LidarCandidate& one) { return !one.options.ouster; });
   if (candidates.empty())
     return;
   const LidarCandidate& chosen = candidates.front();
