@@ -52,10 +52,10 @@ void LiveTopics::poll(Stamp now) {
       });
   }
   for (auto& [topic, clouds] : clouds_)
-    clouds.reader.take([&](const ros::PointCloud2& message) {
-      clouds.candidate.frame = text_or_empty(message.header_.frame_id_);
-      clouds.candidate.points += std::size_t{message.height_} * message.width_;
-      ++clouds.candidate.messages;
+    clouds.reader.take([&candidate = clouds.candidate](const ros::PointCloud2& message) {
+      candidate.frame = text_or_empty(message.header_.frame_id_);
+      candidate.points += std::size_t{message.height_} * message.width_;
+      ++candidate.messages;
     });
 }
 
