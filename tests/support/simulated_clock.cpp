@@ -48,27 +48,28 @@ std::int64_t system_ns(clockid_t clock) {
   return ns_of(time);
 }
 
-const volatile SimulatedTime& simulated() {
-  static const SimulatedTime kNone;
-  static const volatile SimulatedTime* const kTime = [] {
-    const int file = open(std::getenv("SIMULATED_CLOCK"), O_RDONLY | O_CLOEXEC); // NOLINT(concurrency-mt-unsafe)
-    void* const page = mmap(nullptr, sizeof(SimulatedTime), PROT_READ, MAP_SHARED, file, 0);
-    close(file);
-    return page == MAP_FAILED ? &kNone : static_cast<const volatile SimulatedTime*>(page);
-  }();
-  return *kTime;
+constexpr SimulatedTime kSystemTime;
+const volatile SimulatedTime* simulated = &kSystemTime; ///< before begin(): a sanitizer reads the clock while it starts
+
+__attribute__((constructor)) void begin() {
+  prctl(PR_SET_TIMERSLACK, 1); // as for real-time threads: the kernel's 50 us would be scaled by the rate
+  const int file = open(std::getenv("SIMULATED_CLOCK"), O_RDONLY | O_CLOEXEC); // NOLINT(concurrency-mt-unsafe)
+  void* const page = mmap(nullptr, sizeof(SimulatedTime), PROT_READ, MAP_SHARED, file, 0);
+  close(file);
+  if (page != MAP_FAILED)
+    simulated = static_cast<const volatile SimulatedTime*>(page);
 }
 
-bool is_faster() { return simulated().rate > 0; }
+bool is_faster() { return simulated->rate > 0; }
 
 /// Converts a simulated duration to system time, rounded up.
 std::int64_t shortened(std::int64_t ns) {
-  return is_faster() ? static_cast<std::int64_t>(std::ceil(static_cast<double>(ns) / simulated().rate)) : ns;
+  return is_faster() ? static_cast<std::int64_t>(std::ceil(static_cast<double>(ns) / simulated->rate)) : ns;
 }
 
 std::int64_t from_origin(std::int64_t monotonic_ns) {
-  const auto since = static_cast<double>(monotonic_ns - simulated().origin_ns);
-  return simulated().origin_ns + static_cast<std::int64_t>(since * simulated().rate);
+  const auto since = static_cast<double>(monotonic_ns - simulated->origin_ns);
+  return simulated->origin_ns + static_cast<std::int64_t>(since * simulated->rate);
 }
 
 /// Returns the system's CLOCK_REALTIME - CLOCK_MONOTONIC, from reads without a preemption between them if possible.
@@ -87,9 +88,9 @@ std::int64_t system_wall_ahead_ns() {
 /// Converts a kernel stamp of the wall clock.
 timespec simulated_stamp(const timespec& stamp, std::int64_t wall_ahead_ns) {
   if (!is_faster())
-    return to_timespec(ns_of(stamp) + simulated().set_by_ns);
+    return to_timespec(ns_of(stamp) + simulated->set_by_ns);
   const std::int64_t monotonic = from_origin(ns_of(stamp) - wall_ahead_ns);
-  return to_timespec(monotonic + simulated().wall_minus_origin_ns + simulated().set_by_ns);
+  return to_timespec(monotonic + simulated->wall_minus_origin_ns + simulated->set_by_ns);
 }
 
 void simulate_stamps(mmsghdr* messages, int count) {
@@ -120,9 +121,6 @@ int wait_until(clockid_t clock, const timespec& until, const auto& wait, const a
   }
 }
 
-/// Removes the timer slack, as for real-time threads: the kernel's 50 us would be scaled by the rate.
-__attribute__((constructor)) void be_punctual() { prctl(PR_SET_TIMERSLACK, 1); }
-
 } // namespace
 
 extern "C" {
@@ -134,13 +132,13 @@ int clock_gettime(clockid_t clock, timespec* time) noexcept {
   if (!is_faster() || (!is_wall && !is_monotonic && clock != CLOCK_BOOTTIME)) {
     const int result = kNext(clock, time);
     if (result == 0 && is_wall)
-      *time = to_timespec(ns_of(*time) + simulated().set_by_ns);
+      *time = to_timespec(ns_of(*time) + simulated->set_by_ns);
     return result;
   }
   const std::int64_t monotonic = from_origin(system_ns(CLOCK_MONOTONIC));
-  *time = to_timespec(monotonic + (is_wall        ? simulated().wall_minus_origin_ns + simulated().set_by_ns
+  *time = to_timespec(monotonic + (is_wall        ? simulated->wall_minus_origin_ns + simulated->set_by_ns
                                    : is_monotonic ? 0
-                                                  : simulated().boot_minus_origin_ns));
+                                                  : simulated->boot_minus_origin_ns));
   return 0;
 }
 
